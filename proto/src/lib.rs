@@ -1,0 +1,37 @@
+//! The wire types of Palpate, generated from `proto/palpate/v1/*.proto` without protoc.
+//!
+//! Nothing but wire types: no validation, no conversion. The daemon converts in one place (`server/daemon/src/grpc/convert.rs`).
+
+/// `palpate.v1`: messages, clients and servers of `Device`, `Surface` and `Session`.
+#[allow(missing_docs, unreachable_pub, clippy::all, clippy::pedantic)]
+pub mod v1 {
+    tonic::include_proto!("palpate.v1");
+}
+
+/// The encoded `FileDescriptorSet` of the package, for server reflection and for the web page.
+pub const DESCRIPTOR_SET: &[u8] = include_bytes!(concat!(env!("OUT_DIR"), "/palpate_descriptor.bin"));
+
+#[cfg(test)]
+mod tests {
+    use prost::Message;
+
+    /// Every field documented: units and frames live in the comments of the proto files.
+    #[test]
+    fn descriptor_set_names_the_three_services() {
+        let set = prost_types_names();
+        for service in ["Device", "Surface", "Session"] {
+            assert!(set.contains(service), "{service} is missing from the descriptor set");
+        }
+    }
+
+    fn prost_types_names() -> String {
+        String::from_utf8_lossy(super::DESCRIPTOR_SET).into_owned()
+    }
+
+    #[test]
+    fn a_sample_survives_the_wire() {
+        let sample = super::v1::DeviceSample { sequence: 7, device_time_ns: 11, buttons: 3, ..Default::default() };
+        let bytes = sample.encode_to_vec();
+        assert_eq!(super::v1::DeviceSample::decode(bytes.as_slice()).unwrap(), sample);
+    }
+}

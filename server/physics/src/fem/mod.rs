@@ -1,0 +1,4 @@
+//! Linear tetrahedral elements: shape gradients, lumped mass, loads on the boundary.
+pub mod element;
+pub mod loads;
+pub mod mass;

@@ -1,0 +1,237 @@
+//! Explicit total-Lagrangian leapfrog (velocity Verlet), the default integrator.
+//!
+//! With lumped mass `m`, force `f` and step `dt = T/s` for `s` substeps of the tick `T`:
+//! ```text
+//! v ← v + ½dt f(x)/m                       first half kick, with the force kept from the last tick
+//! s times:  x ← x + dt v                   drift
+//!           f ← f(x, v)                    internal, gravity, loads, contact
+//!           v ← v + dt f/m                 kick (the last one is a half kick)
+//! ```
+//! Second order and symplectic without damping; `x` and `v` are synchronous at the end of a tick. Viscous forces see the
+//! velocity half a step late, which the step bound of `world::choose_substeps` accounts for.
+//!
+//! Ledger: the work of a force `g` over a kick of length `h` is exactly its share of the kinetic change,
+//! `h g·(v + ½h f/m)`.
+use crate::{
+    contact::ToolTarget,
+    fem::loads,
+    health::{Quarantine, first_non_finite},
+    world::{LoadSpec, Model, Scratch, State, StepReport, TickInput},
+};
+use glam::DVec3;
+
+/// Advances `state` by one tick. Allocates nothing; same arguments, same bits.
+///
+/// A result that is not finite is refused: the last good state is kept, at rest, and marked as quarantined until it is
+/// reset or restored. Inputs that are not finite, or of the wrong length, are replaced by the previous tick's and counted.
+pub fn step(model: &Model, state: &mut State, scratch: &mut Scratch, input: &TickInput<'_>) -> StepReport {
+    if state.quarantine.is_some() {
+        return StepReport { substeps: 0, inputs_rejected: 0, quarantined: None };
+    }
+    scratch.last_good_x.copy_from_slice(&state.x);
+    scratch.last_good_v.copy_from_slice(&state.v);
+    let inputs_rejected = take_inputs(model, state, scratch, input);
+    run_substeps(model, state, scratch, input);
+    state.tick += 1;
+    let quarantined = first_non_finite(state).map(|node| quarantine(state, scratch, node));
+    StepReport { substeps: model.substeps(), inputs_rejected, quarantined }
+}
+
+fn quarantine(state: &mut State, scratch: &Scratch, node: u32) -> Quarantine {
+    state.x.copy_from_slice(&scratch.last_good_x);
+    // Held at rest: a velocity that led here would lead here again.
+    state.v.fill(DVec3::ZERO);
+    state.force_is_current = false;
+    for tool in &mut state.tools {
+        tool.contact_force_n = DVec3::ZERO;
+        tool.device_force_n = DVec3::ZERO;
+        tool.local_model = None;
+    }
+    let what = Quarantine { tick: state.tick, node };
+    state.quarantine = Some(what);
+    what
+}
+
+/// Checks the inputs, starts the tools' tick, and gives prescribed nodes the velocity that reaches their target at its end.
+fn take_inputs(model: &Model, state: &mut State, scratch: &mut Scratch, input: &TickInput<'_>) -> u32 {
+    let mut rejected = 0;
+    let period_s = model.spec().settings.tick_period_s;
+    let tools_ok = input.tools.len() == state.tools.len();
+    rejected += u32::from(!tools_ok);
+    for (index, tool) in state.tools.iter_mut().enumerate() {
+        let target = if tools_ok { input.tools[index] } else { tool.target };
+        let finite = target.position_m.is_finite() && target.velocity_m_per_s.is_finite();
+        rejected += u32::from(!finite);
+        tool.previous_target = tool.target;
+        tool.target = if finite { target } else { ToolTarget { velocity_m_per_s: DVec3::ZERO, ..tool.target } };
+    }
+    model.contact().begin_tick(model.surface(), &state.x, &state.v, &mut state.tools, period_s, &mut scratch.contact);
+    let loads_ok =
+        input.load_factors.len() == state.load_factors.len() && input.load_factors.iter().all(|f| f.is_finite());
+    rejected += u32::from(!loads_ok);
+    let prescribed_ok = input.prescribed_displacements_m.len() == model.spec().prescribed.len()
+        && input.prescribed_displacements_m.iter().all(|d| d.is_finite());
+    rejected += u32::from(!prescribed_ok);
+    for (set, spec) in model.spec().prescribed.iter().enumerate() {
+        let displacement = prescribed_ok.then(|| input.prescribed_displacements_m[set]);
+        aim_prescribed(model, state, &spec.nodes, spec.axes, displacement, period_s);
+    }
+    rejected
+}
+
+/// Sets the constant velocity, on prescribed axes, that takes nodes to `X + displacement` in one tick (`None`: hold).
+/// The kinetic energy this gives is work done from outside.
+fn aim_prescribed(
+    model: &Model,
+    state: &mut State,
+    nodes: &[u32],
+    axes: [bool; 3],
+    displacement_m: Option<DVec3>,
+    period_s: f64,
+) {
+    for node in nodes.iter().map(|&n| n as usize) {
+        let before = state.v[node].length_squared();
+        for axis in (0..3).filter(|&axis| axes[axis]) {
+            let target = displacement_m.map(|d| model.rest_positions_m()[node][axis] + d[axis]);
+            state.v[node][axis] = target.map_or(0.0, |target| (target - state.x[node][axis]) / period_s);
+        }
+        state.ledger.external_work_j += 0.5 * model.mass_kg()[node] * (state.v[node].length_squared() - before);
+    }
+}
+
+fn run_substeps(model: &Model, state: &mut State, scratch: &mut Scratch, input: &TickInput<'_>) {
+    let substeps = model.substeps();
+    let dt_s = model.spec().settings.tick_period_s / f64::from(substeps);
+    let loads = LoadRamp::new(state, input);
+    if !state.force_is_current {
+        evaluate(model, state, scratch, input, &loads, 0.0, 0.0);
+    }
+    kick(model, state, 0.5 * dt_s);
+    for substep in 1..=substeps {
+        for (x, v) in state.x.iter_mut().zip(&state.v) {
+            *x += *v * dt_s;
+        }
+        evaluate(model, state, scratch, input, &loads, f64::from(substep) / f64::from(substeps), dt_s);
+        kick(model, state, if substep == substeps { 0.5 * dt_s } else { dt_s });
+    }
+    loads.finish(state, input);
+    model.contact().end_tick(&mut state.tools, substeps, &mut scratch.contact);
+    for (reaction, (force, inverse_mass)) in
+        scratch.reaction_n.iter_mut().zip(state.force_n.iter().zip(model.inverse_mass_per_kg()))
+    {
+        // The holder supplies what the other forces lack: r = −f on prescribed axes.
+        *reaction = DVec3::select(inverse_mass.cmpeq(DVec3::ZERO), -*force, DVec3::ZERO);
+    }
+}
+
+/// Load factors between the last tick's and this one's.
+struct LoadRamp {
+    usable: bool,
+}
+
+impl LoadRamp {
+    fn new(state: &State, input: &TickInput<'_>) -> Self {
+        let usable =
+            input.load_factors.len() == state.load_factors.len() && input.load_factors.iter().all(|f| f.is_finite());
+        Self { usable }
+    }
+
+    fn factor(&self, state: &State, input: &TickInput<'_>, load: usize, fraction: f64) -> f64 {
+        let from = state.load_factors[load];
+        if self.usable { from + (input.load_factors[load] - from) * fraction } else { from }
+    }
+
+    fn finish(&self, state: &mut State, input: &TickInput<'_>) {
+        if self.usable {
+            state.load_factors.copy_from_slice(input.load_factors);
+        }
+    }
+}
+
+/// Total force at the present positions into `state.force_n`, its external part into `state.external_n`.
+fn evaluate(
+    model: &Model,
+    state: &mut State,
+    scratch: &mut Scratch,
+    input: &TickInput<'_>,
+    loads: &LoadRamp,
+    fraction: f64,
+    dt_s: f64,
+) {
+    let external = &mut state.external_n;
+    external.fill(DVec3::ZERO);
+    for (index, load) in model.spec().loads.iter().enumerate() {
+        let factor = loads.factor(state, input, index, fraction);
+        if factor != 0.0 {
+            add_load(model, load, factor, &state.x, external);
+        }
+    }
+    for point in input.point_forces {
+        if let Some(force) = external.get_mut(point.node as usize).filter(|_| point.force_n.is_finite()) {
+            *force += point.force_n;
+        }
+    }
+    let (x, v) = (&state.x, &state.v);
+    model.contact().substep(model.surface(), x, v, &mut state.tools, fraction, dt_s, external, &mut scratch.contact);
+    let force = &mut state.force_n;
+    let viscous_power_w = model.kernel().forces_n(model.rest_positions_m(), x, v, force, &mut scratch.kernel);
+    state.ledger.dissipated_j += viscous_power_w * dt_s;
+    let gravity = model.gravity_m_per_s2();
+    for ((force, external), mass) in force.iter_mut().zip(external.iter()).zip(model.mass_kg()) {
+        *force += *external + gravity * *mass;
+    }
+    state.force_is_current = true;
+}
+
+/// Adds the forces of a load scaled by `factor`.
+pub(crate) fn add_load(model: &Model, load: &LoadSpec, factor: f64, x: &[DVec3], forces_n: &mut [DVec3]) {
+    match load {
+        LoadSpec::NodalForces(forces) => {
+            for &(node, force_n) in forces {
+                forces_n[node as usize] += force_n * factor;
+            }
+        }
+        LoadSpec::Traction { triangles, traction_pa } => {
+            loads::add_traction_n(
+                model.surface(),
+                triangles,
+                *traction_pa * factor,
+                model.rest_positions_m(),
+                forces_n,
+            );
+        }
+        LoadSpec::Pressure { triangles, pressure_pa, follower } => {
+            let positions = if *follower { x } else { model.rest_positions_m() };
+            loads::add_pressure_n(model.surface(), triangles, pressure_pa * factor, positions, forces_n);
+        }
+    }
+}
+
+/// `v ← (v + h f/m) e^{−c h}`, and the ledger's share of it.
+fn kick(model: &Model, state: &mut State, h_s: f64) {
+    let mut work_j = 0.0;
+    for (((v, force), inverse_mass), external) in
+        state.v.iter_mut().zip(&state.force_n).zip(model.inverse_mass_per_kg()).zip(&state.external_n)
+    {
+        let change = *force * *inverse_mass * h_s;
+        // On prescribed axes the holder's reaction, −f, does the work; on free ones the external force.
+        let worker = DVec3::select(inverse_mass.cmpeq(DVec3::ZERO), *external - *force, *external);
+        work_j += h_s * worker.dot(*v + change * 0.5);
+        *v += change;
+    }
+    state.ledger.external_work_j += work_j;
+    let damping = model.spec().settings.mass_damping_per_s;
+    if damping > 0.0 {
+        damp(model, state, (-damping * h_s).exp());
+    }
+}
+
+fn damp(model: &Model, state: &mut State, factor: f64) {
+    let mut taken_j = 0.0;
+    for ((v, inverse_mass), mass) in state.v.iter_mut().zip(model.inverse_mass_per_kg()).zip(model.mass_kg()) {
+        let damped = DVec3::select(inverse_mass.cmpeq(DVec3::ZERO), *v, *v * factor);
+        taken_j += 0.5 * mass * (v.length_squared() - damped.length_squared());
+        *v = damped;
+    }
+    state.ledger.dissipated_j += taken_j;
+}

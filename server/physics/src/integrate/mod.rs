@@ -1,0 +1,3 @@
+//! Time integrators, and the spectrum that bounds their step.
+pub mod leapfrog;
+pub mod spectrum;

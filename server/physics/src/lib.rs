@@ -1,0 +1,27 @@
+//! The physics of Palpate: deformable bodies, their contact with tools, and time.
+//!
+//! This crate knows no clock, thread, file or network: a [`Model`] is built once from a [`ModelSpec`], and
+//! [`step`] advances a [`State`] by one tick with a [`Scratch`] that holds every buffer, so that a tick allocates
+//! nothing. The same model, state and inputs give the same bits.
+//!
+//! Notation (docs/notation.md): `X` rest position, `x` position, `v` velocity (m, m/s), `F` deformation gradient,
+//! `P` first Piola-Kirchhoff stress (Pa), `b_i = ∇N_i` shape gradient (1/m), `V` rest volume (m³).
+
+pub mod contact;
+pub mod fem;
+pub mod health;
+pub mod integrate;
+pub mod material;
+pub mod mesh;
+pub mod simd;
+pub mod snapshot;
+pub mod solve;
+pub mod world;
+
+pub use health::{Energies, Ledger, Quarantine};
+pub use integrate::leapfrog::step;
+pub use mesh::{MeshError, Surface, TetMesh};
+pub use world::{
+    LoadSpec, Model, ModelError, ModelSpec, PointForce, Precision, PrescribedSpec, Region, Scratch, Settings, State,
+    StepReport, Substeps, TickInput,
+};

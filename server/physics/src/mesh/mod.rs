@@ -1,0 +1,7 @@
+//! Meshes at rest: tetrahedra, their boundary surface, and measures of quality.
+pub mod quality;
+pub mod surface;
+pub mod tet;
+
+pub use surface::Surface;
+pub use tet::{MeshError, TetMesh};

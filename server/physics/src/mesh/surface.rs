@@ -1,0 +1,75 @@
+//! The boundary of a tetrahedral mesh: what tools touch and viewers see.
+use super::tet::{FACES, MeshError, TetMesh};
+use std::collections::BTreeMap;
+
+/// Boundary triangles over *surface vertices*, which are numbered from 0 in ascending order of their nodes.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Surface {
+    /// Node of each surface vertex, ascending.
+    pub nodes: Vec<u32>,
+    /// Triangles as surface-vertex indices, counter-clockwise seen from outside.
+    pub triangles: Vec<[u32; 3]>,
+    /// Surface vertex of each node, or `u32::MAX` for interior nodes.
+    pub vertex_of_node: Vec<u32>,
+}
+
+impl Surface {
+    /// Extracts the faces that belong to exactly one tet, in order of tet and face.
+    ///
+    /// # Errors
+    /// [`MeshError::NonManifoldFace`] when a face belongs to more than two tets.
+    pub fn of(mesh: &TetMesh) -> Result<Self, MeshError> {
+        let mut owners: BTreeMap<[u32; 3], u32> = BTreeMap::new();
+        let faces = || mesh.tets().iter().flat_map(|tet| FACES.map(|face| face.map(|corner| tet[corner])));
+        for face in faces() {
+            let count = owners.entry(sorted(face)).or_insert(0);
+            *count += 1;
+            if *count > 2 {
+                return Err(MeshError::NonManifoldFace { face: sorted(face) });
+            }
+        }
+        let boundary: Vec<[u32; 3]> = faces().filter(|&face| owners[&sorted(face)] == 1).collect();
+        let mut nodes: Vec<u32> = boundary.iter().flatten().copied().collect();
+        nodes.sort_unstable();
+        nodes.dedup();
+        let mut vertex_of_node = vec![u32::MAX; mesh.positions_m().len()];
+        for (vertex, &node) in nodes.iter().enumerate() {
+            vertex_of_node[node as usize] = vertex as u32;
+        }
+        let triangles = boundary.iter().map(|face| face.map(|node| vertex_of_node[node as usize])).collect();
+        Ok(Self { nodes, triangles, vertex_of_node })
+    }
+
+    /// Nodes of a triangle.
+    pub fn triangle_nodes(&self, triangle: usize) -> [u32; 3] {
+        self.triangles[triangle].map(|vertex| self.nodes[vertex as usize])
+    }
+}
+
+fn sorted(mut face: [u32; 3]) -> [u32; 3] {
+    face.sort_unstable();
+    face
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use glam::DVec3;
+
+    #[test]
+    fn two_tets_share_one_face_and_show_six() {
+        let p = vec![DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::Z, DVec3::ONE];
+        let mesh = TetMesh::new(p, vec![[0, 1, 2, 3], [1, 2, 3, 4]]).unwrap();
+        let surface = Surface::of(&mesh).unwrap();
+        assert_eq!(surface.triangles.len(), 6);
+        assert_eq!(surface.nodes, vec![0, 1, 2, 3, 4]);
+        // Closed and outward: the enclosed volume (divergence theorem) is the tets' volume.
+        let volume: f64 = (0..6)
+            .map(|t| {
+                let [a, b, c] = surface.triangle_nodes(t).map(|n| mesh.positions_m()[n as usize]);
+                a.dot(b.cross(c)) / 6.0
+            })
+            .sum();
+        assert!((volume - mesh.total_volume_m3()).abs() < 1e-15);
+    }
+}

@@ -1,0 +1,1 @@
+//! Equilibrium: the static solve that references and `palpated static` use.
