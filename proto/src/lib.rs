@@ -3,7 +3,7 @@
 //! Nothing but wire types: no validation, no conversion. The daemon converts in one place (`server/daemon/src/grpc/convert.rs`).
 
 /// `palpate.v1`: messages, clients and servers of `Device`, `Surface` and `Session`.
-#[allow(missing_docs, unreachable_pub, clippy::all, clippy::pedantic)]
+#[allow(missing_docs, unreachable_pub, unused_qualifications, clippy::all, clippy::pedantic)]
 pub mod v1 {
     tonic::include_proto!("palpate.v1");
 }
@@ -15,17 +15,12 @@ pub const DESCRIPTOR_SET: &[u8] = include_bytes!(concat!(env!("OUT_DIR"), "/palp
 mod tests {
     use prost::Message;
 
-    /// Every field documented: units and frames live in the comments of the proto files.
     #[test]
     fn descriptor_set_names_the_three_services() {
-        let set = prost_types_names();
+        let set = String::from_utf8_lossy(super::DESCRIPTOR_SET);
         for service in ["Device", "Surface", "Session"] {
             assert!(set.contains(service), "{service} is missing from the descriptor set");
         }
-    }
-
-    fn prost_types_names() -> String {
-        String::from_utf8_lossy(super::DESCRIPTOR_SET).into_owned()
     }
 
     #[test]

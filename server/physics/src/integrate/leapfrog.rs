@@ -136,8 +136,7 @@ impl LoadRamp {
         Self { usable }
     }
 
-    fn factor(&self, state: &State, input: &TickInput<'_>, load: usize, fraction: f64) -> f64 {
-        let from = state.load_factors[load];
+    fn factor(&self, from: f64, input: &TickInput<'_>, load: usize, fraction: f64) -> f64 {
         if self.usable { from + (input.load_factors[load] - from) * fraction } else { from }
     }
 
@@ -161,7 +160,7 @@ fn evaluate(
     let external = &mut state.external_n;
     external.fill(DVec3::ZERO);
     for (index, load) in model.spec().loads.iter().enumerate() {
-        let factor = loads.factor(state, input, index, fraction);
+        let factor = loads.factor(state.load_factors[index], input, index, fraction);
         if factor != 0.0 {
             add_load(model, load, factor, &state.x, external);
         }
