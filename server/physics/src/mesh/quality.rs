@@ -76,8 +76,8 @@ mod tests {
     fn regular_tet_is_perfect() {
         let p = [
             DVec3::new(1.0, 1.0, 1.0),
-            DVec3::new(1.0, -1.0, -1.0),
             DVec3::new(-1.0, 1.0, -1.0),
+            DVec3::new(1.0, -1.0, -1.0),
             DVec3::new(-1.0, -1.0, 1.0),
         ];
         assert!((volume_length_ratio(p) - 1.0).abs() < 1e-14);
