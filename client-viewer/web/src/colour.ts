@@ -1,0 +1,42 @@
+// Displacement to colour: viridis, which keeps its order in grey and for colour-blind eyes.
+const STOPS: readonly (readonly [number, number, number])[] = [
+  [0.267, 0.005, 0.329], [0.283, 0.141, 0.458], [0.254, 0.265, 0.53], [0.207, 0.372, 0.553], [0.164, 0.471, 0.558],
+  [0.128, 0.567, 0.551], [0.135, 0.659, 0.518], [0.267, 0.749, 0.441], [0.478, 0.821, 0.318], [0.741, 0.873, 0.15],
+  [0.993, 0.906, 0.144],
+];
+
+/** sRGB in 0..1 for a fraction; outside values take the end colours. */
+export function colourOf(fraction: number): [number, number, number] {
+  const at = Math.min(Math.max(fraction, 0), 1) * (STOPS.length - 1);
+  const low = Math.min(Math.floor(at), STOPS.length - 2);
+  const a = STOPS[low]!;
+  const b = STOPS[low + 1]!;
+  const t = at - low;
+  return [a[0] + (b[0] - a[0]) * t, a[1] + (b[1] - a[1]) * t, a[2] + (b[2] - a[2]) * t];
+}
+
+/** The smallest of 1, 2, 5 × 10ⁿ that is not below `value`; `least` for nothing. */
+export function niceCeiling(value: number, least: number): number {
+  if (!(value > least)) return least;
+  const power = 10 ** Math.floor(Math.log10(value));
+  for (const factor of [1, 2, 5, 10]) if (factor * power >= value * (1 - 1e-9)) return factor * power;
+  return 10 * power;
+}
+
+/** Range of the legend: grows at once, shrinks only after the values stayed small for a while. */
+export class LegendRange {
+  /** Upper end (m). */
+  top = 1e-4;
+  private quietSince = 0;
+
+  update(max: number, nowMs: number): boolean {
+    const wanted = niceCeiling(max, 1e-4);
+    if (wanted >= this.top) this.quietSince = nowMs;
+    const shrink = nowMs - this.quietSince > 6000;
+    if (wanted <= this.top && !shrink) return false;
+    if (wanted === this.top) return false;
+    this.top = wanted;
+    this.quietSince = nowMs;
+    return true;
+  }
+}

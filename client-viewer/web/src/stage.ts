@@ -1,0 +1,158 @@
+// The three-dimensional view: surface, rest shape, tools and force arrows.
+import * as THREE from "three";
+import { OrbitControls } from "three/addons/controls/OrbitControls.js";
+import { colourOf } from "./colour";
+import type { Surface } from "./surface";
+import type { ToolState, Vec3 } from "./wire";
+
+const vector = (v: Vec3 | undefined) => new THREE.Vector3(v?.x ?? 0, v?.y ?? 0, v?.z ?? 0);
+
+interface ToolView { proxy: THREE.Mesh; device: THREE.Mesh; arrow: THREE.ArrowHelper }
+
+export class Stage {
+  private readonly renderer = new THREE.WebGLRenderer({ antialias: true });
+  private readonly scene = new THREE.Scene();
+  private readonly camera = new THREE.PerspectiveCamera(35, 1, 0.001, 10);
+  private readonly controls: OrbitControls;
+  private readonly body = new THREE.Group();
+  private readonly material = new THREE.MeshStandardMaterial({
+    vertexColors: true, roughness: 0.55, metalness: 0, side: THREE.DoubleSide,
+  });
+  private readonly edges = new THREE.MeshBasicMaterial({ color: 0x0d1013, wireframe: true, transparent: true, opacity: 0.35 });
+  private readonly ghost = new THREE.MeshBasicMaterial({ color: 0x9aa4ad, wireframe: true, transparent: true, opacity: 0.18 });
+  private geometry: THREE.BufferGeometry | undefined;
+  private surface: Surface | undefined;
+  private ghostMesh: THREE.Mesh | undefined;
+  private edgeMesh: THREE.Mesh | undefined;
+  private tools: ToolView[] = [];
+  private size = 0.05;
+  private dirty = true;
+
+  constructor(private readonly host: HTMLElement) {
+    this.scene.background = new THREE.Color(0x14181c);
+    this.scene.add(new THREE.HemisphereLight(0xdfe9f2, 0x3a3028, 1.4));
+    const sun = new THREE.DirectionalLight(0xffffff, 2.2);
+    sun.position.set(0.6, -1, 1.4);
+    // The lamp moves with the eye, so that a dent is shaded from wherever one looks.
+    this.camera.add(sun);
+    this.scene.add(this.camera, this.body);
+    this.renderer.setPixelRatio(Math.min(window.devicePixelRatio, 2));
+    host.append(this.renderer.domElement);
+    this.camera.up.set(0, 0, 1);
+    this.controls = new OrbitControls(this.camera, this.renderer.domElement);
+    this.controls.enableDamping = true;
+    this.controls.addEventListener("change", () => (this.dirty = true));
+    new ResizeObserver(() => this.resize()).observe(host);
+    this.resize();
+  }
+
+  show(surface: Surface): void {
+    this.body.clear();
+    this.geometry?.dispose();
+    this.surface = surface;
+    const geometry = new THREE.BufferGeometry();
+    geometry.setIndex(new THREE.BufferAttribute(surface.triangles, 1));
+    geometry.setAttribute("position", new THREE.BufferAttribute(surface.positions, 3));
+    geometry.setAttribute("color", new THREE.BufferAttribute(new Float32Array(surface.positions.length), 3));
+    const rest = new THREE.BufferGeometry();
+    rest.setIndex(geometry.index);
+    rest.setAttribute("position", new THREE.BufferAttribute(surface.rest, 3));
+    this.geometry = geometry;
+    const body = new THREE.Mesh(geometry, this.material);
+    body.frustumCulled = false;
+    this.edgeMesh = new THREE.Mesh(geometry, this.edges);
+    this.edgeMesh.frustumCulled = false;
+    this.ghostMesh = new THREE.Mesh(rest, this.ghost);
+    this.body.add(body, this.edgeMesh, this.ghostMesh);
+    this.setEdges(this.edges.visible);
+    this.setGhost(this.ghost.visible);
+    this.makeTools(surface);
+    this.recentre();
+  }
+
+  setEdges(on: boolean): void {
+    this.edges.visible = on;
+    this.dirty = true;
+  }
+
+  setGhost(on: boolean): void {
+    this.ghost.visible = on;
+    this.dirty = true;
+  }
+
+  recentre(): void {
+    const low = vector(this.surface?.header.boundsMinM);
+    const high = vector(this.surface?.header.boundsMaxM);
+    this.size = Math.max(high.distanceTo(low), 1e-4);
+    const centre = low.clone().add(high).multiplyScalar(0.5);
+    this.camera.near = this.size / 100;
+    this.camera.far = this.size * 40;
+    this.camera.position.copy(centre).add(new THREE.Vector3(0.75, -1.35, 0.55).normalize().multiplyScalar(this.size * 1.9));
+    this.camera.updateProjectionMatrix();
+    this.controls.target.copy(centre);
+    this.dirty = true;
+  }
+
+  /** Takes over changed positions and colours; `top` is the displacement (m) of the last colour. */
+  refresh(top: number): void {
+    if (!this.geometry || !this.surface) return;
+    const colours = this.geometry.getAttribute("color") as THREE.BufferAttribute;
+    const colour = new THREE.Color();
+    this.surface.displacement.forEach((d, vertex) => {
+      const [r, g, b] = colourOf(d / top);
+      colour.setRGB(r, g, b, THREE.SRGBColorSpace);
+      colours.setXYZ(vertex, colour.r, colour.g, colour.b);
+    });
+    colours.needsUpdate = true;
+    (this.geometry.getAttribute("position") as THREE.BufferAttribute).needsUpdate = true;
+    this.geometry.computeVertexNormals();
+    this.dirty = true;
+  }
+
+  moveTools(states: ToolState[], fullScaleN: number): void {
+    this.tools.forEach((view, index) => {
+      const state = states[index];
+      view.proxy.visible = view.device.visible = state !== undefined;
+      if (!state) return;
+      view.proxy.position.copy(vector(state.proxyPositionM));
+      view.device.position.copy(vector(state.devicePositionM));
+      const force = vector(state.contactForceN);
+      const length = force.length();
+      view.arrow.visible = length > 1e-6;
+      if (!view.arrow.visible) return;
+      view.arrow.position.copy(view.proxy.position);
+      view.arrow.setDirection(force.clone().normalize());
+      const shown = this.size * 0.45 * Math.min(length / fullScaleN, 1) + this.size * 0.02;
+      view.arrow.setLength(shown, Math.min(this.size * 0.05, shown), Math.min(this.size * 0.03, shown));
+    });
+    this.dirty = true;
+  }
+
+  render(): void {
+    this.controls.update();
+    if (!this.dirty) return;
+    this.dirty = false;
+    this.renderer.render(this.scene, this.camera);
+  }
+
+  private makeTools(surface: Surface): void {
+    for (const view of this.tools) this.scene.remove(view.proxy, view.device, view.arrow);
+    this.tools = surface.header.tools.map((tool) => {
+      const ball = new THREE.SphereGeometry(tool.radiusM, 48, 24);
+      const proxy = new THREE.Mesh(ball, new THREE.MeshStandardMaterial({ color: 0xe9e4da, roughness: 0.35, transparent: true, opacity: 0.85 }));
+      const device = new THREE.Mesh(ball, new THREE.MeshBasicMaterial({ color: 0x6fb7e9, wireframe: true, transparent: true, opacity: 0.12 }));
+      const arrow = new THREE.ArrowHelper(new THREE.Vector3(0, 0, 1), new THREE.Vector3(), 0.01, 0xf2b84b);
+      arrow.visible = false;
+      this.scene.add(proxy, device, arrow);
+      return { proxy, device, arrow };
+    });
+  }
+
+  private resize(): void {
+    const { clientWidth, clientHeight } = this.host;
+    this.renderer.setSize(clientWidth, clientHeight);
+    this.camera.aspect = clientWidth / Math.max(clientHeight, 1);
+    this.camera.updateProjectionMatrix();
+    this.dirty = true;
+  }
+}

@@ -1,0 +1,64 @@
+// The messages of palpate.v1 that the page reads. The descriptor set comes from the daemon, so that page and daemon
+// never disagree about the wire; these interfaces only give the fields their types.
+import { createFileRegistry, fromBinary, type DescService } from "@bufbuild/protobuf";
+import { FileDescriptorSetSchema } from "@bufbuild/protobuf/wkt";
+
+export interface Vec3 { x: number; y: number; z: number }
+
+export interface KeyframeHeader {
+  sessionId: string;
+  sceneName: string;
+  vertexCount: number;
+  triangleCount: number;
+  tickPeriodS: number;
+  boundsMinM?: Vec3;
+  boundsMaxM?: Vec3;
+  tools: { name: string; radiusM: number }[];
+}
+
+export interface KeyframeChunk {
+  epoch: number;
+  chunk: number;
+  chunkCount: number;
+  header?: KeyframeHeader;
+  restPositionsMF32le: Uint8Array;
+  trianglesU32le: Uint8Array;
+}
+
+export interface ToolState {
+  devicePositionM?: Vec3;
+  proxyPositionM?: Vec3;
+  contactForceN?: Vec3;
+  deviceForceN?: Vec3;
+  contacts: number;
+}
+
+export interface SurfaceUpdate {
+  epoch: number;
+  tick: bigint;
+  timeS: number;
+  sentUnixNs: bigint;
+  skipped: bigint;
+  displacementQuantumM: number;
+  changedU32le: Uint8Array;
+  displacementsI16le: Uint8Array;
+  tools: ToolState[];
+  tickCostUs: number;
+  maxDisplacementM: number;
+}
+
+export interface SurfaceEvent {
+  message: { case: "keyframe"; value: KeyframeChunk } | { case: "update"; value: SurfaceUpdate } | { case: undefined };
+}
+
+/** Where the daemon serves the descriptor set of its own wire types. */
+export const DESCRIPTOR_PATH = "palpate.v1.binpb";
+
+export async function fetchSurfaceService(signal: AbortSignal): Promise<DescService> {
+  const answer = await fetch(DESCRIPTOR_PATH, { signal, cache: "no-cache" });
+  if (!answer.ok) throw new Error(`${DESCRIPTOR_PATH}: ${answer.status} ${answer.statusText}`);
+  const bytes = new Uint8Array(await answer.arrayBuffer());
+  const service = createFileRegistry(fromBinary(FileDescriptorSetSchema, bytes)).getService("palpate.v1.Surface");
+  if (!service) throw new Error("the daemon's descriptor set has no palpate.v1.Surface");
+  return service;
+}
