@@ -1,1 +1,22 @@
-//! placeholder
+//! Scene files and meshes become physics: a TOML document is read, checked with messages a user can act on, and
+//! compiled to a [`palpate_physics::ModelSpec`] with its loads over time, tool drivers and probes.
+//!
+//! The format is described in `docs/scenes.md`; its JSON schema is [`json_schema`].
+
+pub mod builtin;
+pub mod drivers;
+pub mod error;
+mod load;
+pub mod path;
+pub mod probes;
+pub mod scene;
+pub mod timeline;
+
+pub use builtin::{builtin, builtin_names};
+pub use drivers::{Driver, ScriptedHand};
+pub use error::{SceneError, Stage};
+pub use load::{json_schema, load_file, parse};
+pub use path::{Interpolation, MotionPath};
+pub use probes::Probe;
+pub use scene::{BodySummary, OutputSettings, PartSummary, Scene};
+pub use timeline::{Amplitude, PrescribedMotion, Timeline};

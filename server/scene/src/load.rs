@@ -1,0 +1,40 @@
+//! From a file or a text to a [`Scene`].
+use crate::{
+    error::{SceneError, Stage},
+    scene::Scene,
+};
+use std::path::Path;
+
+/// Loads a scene file; files it refers to are looked for beside it. `progress` is told a fraction in [0, 1] and what is
+/// being done.
+///
+/// # Errors
+/// [`SceneError`], pointing into the file where it can.
+pub fn load_file(path: &Path, progress: &mut dyn FnMut(f64, &str)) -> Result<Scene, SceneError> {
+    let name = path.display().to_string();
+    let text = std::fs::read_to_string(path).map_err(|cause| {
+        SceneError::new(Stage::Read, format!("cannot read the scene file {name}: {cause}")).with_cause(cause)
+    })?;
+    parse(&text, &name, Some(path.parent().unwrap_or(Path::new("."))), progress)
+}
+
+/// Loads a scene from its text. `source_name` appears in messages. Relative files are looked for in `base_dir`; without
+/// one the scene may refer to no file.
+///
+/// # Errors
+/// [`SceneError`], pointing into the text where it can.
+pub fn parse(
+    text: &str,
+    source_name: &str,
+    base_dir: Option<&Path>,
+    progress: &mut dyn FnMut(f64, &str),
+) -> Result<Scene, SceneError> {
+    progress(0.0, "reading the scene");
+    let _ = base_dir;
+    Err(SceneError::new(Stage::Document, "scenes cannot be compiled yet").at(source_name, text, None, ""))
+}
+
+/// JSON schema of the scene document.
+pub fn json_schema() -> serde_json::Value {
+    serde_json::Value::Null
+}

@@ -1,0 +1,202 @@
+//! What a scene measures: named values with units, one row per sample.
+use glam::DVec3;
+use palpate_physics::{Energies, Model, Scratch, State, health, mesh::TetMesh};
+
+/// A named measurement.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Probe {
+    name: String,
+    measure: Measure,
+}
+
+/// What a [`Probe`] measures.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Measure {
+    /// Displacement of a material point (m).
+    Displacement(MaterialPoint),
+    /// Force (N) that holds the prescribed degrees of freedom of these nodes.
+    Reaction(Vec<u32>),
+    /// The energy ledger (J).
+    Energy,
+    /// Force of the body on a tool (N).
+    ContactForce(usize),
+    /// Force on a tool's device (N).
+    DeviceForce(usize),
+    /// Centre of a tool (m).
+    ToolPosition(usize),
+    /// Deepest penetration of a tool (m).
+    Penetration(usize),
+    /// Smallest `det F` over all tets.
+    MinVolumeRatio,
+}
+
+/// A point of the body as weights of nodes: inside a tet, or the nearest on the surface.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct MaterialPoint {
+    /// Nodes; unused corners have weight 0.
+    pub nodes: [u32; 4],
+    /// Barycentric weights, sum 1.
+    pub weights: [f64; 4],
+    /// Distance (m) from the point asked for: 0 inside the body.
+    pub distance_m: f64,
+}
+
+impl MaterialPoint {
+    /// Interpolates a nodal field.
+    pub fn of(&self, field: &[DVec3]) -> DVec3 {
+        self.nodes.iter().zip(self.weights).map(|(&node, weight)| field[node as usize] * weight).sum()
+    }
+
+    /// The material point at a rest position (m): barycentric in the first tet that contains it, else the nearest
+    /// point of the boundary triangles (node triples).
+    pub fn locate(mesh: &TetMesh, boundary: &[[u32; 3]], point_m: DVec3) -> Self {
+        (0..mesh.tets().len()).find_map(|tet| Self::inside(mesh, tet, point_m)).unwrap_or_else(|| {
+            let candidates = boundary.iter().map(|&triangle| Self::on_triangle(mesh, triangle, point_m));
+            candidates.fold(Self { nodes: [0; 4], weights: [1.0, 0.0, 0.0, 0.0], distance_m: f64::INFINITY }, |a, b| {
+                if b.distance_m < a.distance_m { b } else { a }
+            })
+        })
+    }
+
+    fn inside(mesh: &TetMesh, tet: usize, point_m: DVec3) -> Option<Self> {
+        const ROUNDING: f64 = 1e-12;
+        let corner = mesh.corners_m(tet)[0];
+        let local = mesh.edge_matrix_m(tet).inverse() * (point_m - corner);
+        let weights = [1.0 - local.x - local.y - local.z, local.x, local.y, local.z];
+        let inside = weights.iter().all(|&w| w >= -ROUNDING);
+        inside.then(|| Self { nodes: mesh.tets()[tet], weights, distance_m: 0.0 })
+    }
+
+    fn on_triangle(mesh: &TetMesh, triangle: [u32; 3], point_m: DVec3) -> Self {
+        let [a, b, c] = triangle.map(|node| mesh.positions_m()[node as usize]);
+        let w = closest_weights(point_m, a, b, c);
+        let closest = a * w[0] + b * w[1] + c * w[2];
+        let nodes = [triangle[0], triangle[1], triangle[2], triangle[2]];
+        Self { nodes, weights: [w[0], w[1], w[2], 0.0], distance_m: closest.distance(point_m) }
+    }
+}
+
+/// Barycentric weights of the point of triangle `abc` closest to `p`: the projection if it falls inside, else the
+/// closest point of the nearest edge.
+fn closest_weights(p: DVec3, a: DVec3, b: DVec3, c: DVec3) -> [f64; 3] {
+    let normal = (b - a).cross(c - a);
+    let area = |u: DVec3, v: DVec3| (u - p).cross(v - p).dot(normal) / normal.length_squared();
+    let inside = [area(b, c), area(c, a), area(a, b)];
+    if inside.iter().all(|&w| w >= 0.0) {
+        return inside;
+    }
+    let on_edge = |u: DVec3, v: DVec3| ((p - u).dot(v - u) / (v - u).length_squared()).clamp(0.0, 1.0);
+    let (ab, bc, ca) = (on_edge(a, b), on_edge(b, c), on_edge(c, a));
+    let candidates = [[1.0 - ab, ab, 0.0], [0.0, 1.0 - bc, bc], [ca, 0.0, 1.0 - ca]];
+    let distance = |w: &[f64; 3]| (a * w[0] + b * w[1] + c * w[2]).distance_squared(p);
+    candidates.into_iter().min_by(|u, v| distance(u).total_cmp(&distance(v))).unwrap_or([1.0, 0.0, 0.0])
+}
+
+const XYZ: &[&str] = &["x", "y", "z"];
+const VALUE: &[&str] = &["value"];
+const ENERGIES: &[&str] = &["kinetic", "elastic", "gravitational", "external_work", "dissipated"];
+
+/// No probe has more columns than this.
+pub const MAX_COLUMNS: usize = 5;
+
+impl Probe {
+    /// A probe with a name.
+    pub fn new(name: impl Into<String>, measure: Measure) -> Self {
+        Self { name: name.into(), measure }
+    }
+
+    /// Its name, unique in a scene.
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// What it measures.
+    pub fn measure(&self) -> &Measure {
+        &self.measure
+    }
+
+    /// Unit of its values: `m`, `N`, `J` or `1`.
+    pub fn unit(&self) -> &'static str {
+        match self.measure {
+            Measure::Displacement(_) | Measure::ToolPosition(_) | Measure::Penetration(_) => "m",
+            Measure::Reaction(_) | Measure::ContactForce(_) | Measure::DeviceForce(_) => "N",
+            Measure::Energy => "J",
+            Measure::MinVolumeRatio => "1",
+        }
+    }
+
+    /// Names of its values: `x y z`, `value`, or the energies.
+    pub fn columns(&self) -> &'static [&'static str] {
+        match self.measure {
+            Measure::Penetration(_) | Measure::MinVolumeRatio => VALUE,
+            Measure::Energy => ENERGIES,
+            _ => XYZ,
+        }
+    }
+
+    /// Writes the values at this state; `out` is at least as long as [`Self::columns`]. Does not allocate.
+    /// Energies and the volume ratio visit every tet.
+    pub fn evaluate(&self, model: &Model, state: &State, scratch: &Scratch, out: &mut [f64]) {
+        match &self.measure {
+            Measure::Displacement(point) => put(out, point.of(&state.x) - point.of(model.rest_positions_m())),
+            Measure::Reaction(nodes) => {
+                put(out, nodes.iter().map(|&node| scratch.reactions_n()[node as usize]).sum());
+            }
+            Measure::Energy => {
+                let e = Energies::of(model, state);
+                let values = [e.kinetic_j, e.elastic_j, e.gravitational_j, e.external_work_j, e.dissipated_j];
+                copy(out, &values);
+            }
+            Measure::ContactForce(tool) => put(out, state.tools[*tool].contact_force_n),
+            Measure::DeviceForce(tool) => put(out, state.tools[*tool].device_force_n),
+            Measure::ToolPosition(tool) => put(out, state.tools[*tool].centre_m),
+            Measure::Penetration(tool) => copy(out, &[state.tools[*tool].penetration_m]),
+            Measure::MinVolumeRatio => copy(out, &[health::min_volume_ratio(model, state).0]),
+        }
+    }
+}
+
+fn put(out: &mut [f64], value: DVec3) {
+    copy(out, &value.to_array());
+}
+
+fn copy(out: &mut [f64], values: &[f64]) {
+    for (slot, value) in out.iter_mut().zip(values) {
+        *slot = *value;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn unit() -> TetMesh {
+        TetMesh::new(vec![DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::Z], vec![[0, 1, 2, 3]]).unwrap()
+    }
+
+    const BOUNDARY: [[u32; 3]; 4] = [[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]];
+
+    #[test]
+    fn a_point_inside_is_reproduced_exactly() {
+        let mesh = unit();
+        let p = DVec3::new(0.2, 0.3, 0.1);
+        let point = MaterialPoint::locate(&mesh, &BOUNDARY, p);
+        assert_eq!(point.distance_m, 0.0);
+        assert!((point.of(mesh.positions_m()) - p).length() < 1e-15);
+    }
+
+    #[test]
+    fn a_point_outside_takes_the_nearest_of_face_edge_and_corner() {
+        let mesh = unit();
+        for (p, nearest) in [
+            (DVec3::new(0.25, 0.25, -1.0), DVec3::new(0.25, 0.25, 0.0)),
+            (DVec3::new(0.5, -1.0, -1.0), DVec3::new(0.5, 0.0, 0.0)),
+            (DVec3::new(3.0, 0.0, 0.0), DVec3::X),
+        ] {
+            let point = MaterialPoint::locate(&mesh, &BOUNDARY, p);
+            assert!((point.of(mesh.positions_m()) - nearest).length() < 1e-15, "{p}");
+            assert!((point.distance_m - p.distance(nearest)).abs() < 1e-15);
+            assert!((point.weights.iter().sum::<f64>() - 1.0).abs() < 1e-15);
+        }
+    }
+}
