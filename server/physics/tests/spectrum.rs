@@ -1,0 +1,177 @@
+//! ω_max: against a dense eigen-solve, a formula, the element bound, and what the leapfrog does on either side of 2/ω_max.
+#![allow(clippy::unwrap_used)] // helpers outside #[test] functions
+mod support;
+use faer::{Mat, Side};
+use glam::DVec3;
+use palpate_physics::{
+    Model, ModelSpec, Precision, PrescribedSpec, Region, Scratch, Settings, State, Substeps, TetMesh, TickInput,
+    fem::{element::RestTet, mass},
+    integrate::spectrum::{element_bound_rad_per_s, max_natural_frequency_rad_per_s},
+    material::{Convention, Lame, Law, Material, Viscosity},
+    step,
+};
+use support::{Random, block};
+
+fn material(young_pa: f64, nu: f64, law: Law) -> Material {
+    Material::new(law, Lame::from_young_poisson(young_pa, nu).unwrap(), Viscosity::default(), Convention::Consistent)
+}
+
+struct Body {
+    mesh: TetMesh,
+    rest: Vec<RestTet>,
+    tet_material: Vec<u16>,
+    materials: Vec<Material>,
+    inverse_mass: Vec<DVec3>,
+}
+
+impl Body {
+    fn new(mesh: TetMesh, materials: Vec<Material>, fixed: impl Fn(usize) -> [bool; 3]) -> Self {
+        let rest: Vec<RestTet> = (0..mesh.tets().len()).map(|t| RestTet::new(&mesh.edge_matrix_m(t))).collect();
+        let tet_material = (0..rest.len()).map(|t| (t * materials.len() / rest.len()) as u16).collect();
+        let inverse_mass = mass::lumped_kg(&mesh, |_| 1000.0)
+            .iter()
+            .enumerate()
+            .map(|(node, m)| DVec3::from_array(fixed(node).map(|f| if f { 0.0 } else { 1.0 / m })))
+            .collect();
+        Self { mesh, rest, tet_material, materials, inverse_mass }
+    }
+
+    fn measured(&self) -> f64 {
+        max_natural_frequency_rad_per_s(&self.mesh, &self.rest, &self.tet_material, &self.materials, &self.inverse_mass)
+    }
+
+    fn element_bound(&self) -> f64 {
+        element_bound_rad_per_s(&self.mesh, &self.rest, &self.tet_material, &self.materials, &self.inverse_mass)
+    }
+
+    /// From the stiffness blocks at rest, assembled densely.
+    fn dense(&self) -> f64 {
+        let dofs = 3 * self.inverse_mass.len();
+        let mut a = Mat::<f64>::zeros(dofs, dofs);
+        for (tet, nodes) in self.mesh.tets().iter().enumerate() {
+            let material = &self.materials[self.tet_material[tet] as usize];
+            for i in 0..4 {
+                for j in 0..4 {
+                    let block = self.rest[tet].stiffness_block(material, &glam::DMat3::IDENTITY, i, j);
+                    let (p, q) = (nodes[i] as usize, nodes[j] as usize);
+                    for r in 0..3 {
+                        for c in 0..3 {
+                            let scale = (self.inverse_mass[p][r] * self.inverse_mass[q][c]).sqrt();
+                            a[(3 * p + r, 3 * q + c)] -= scale * block.col(c)[r];
+                        }
+                    }
+                }
+            }
+        }
+        let values = a.self_adjoint_eigenvalues(Side::Lower).unwrap();
+        values.into_iter().fold(0.0, f64::max).sqrt()
+    }
+}
+
+/// Never below the exact value, and above it by 1e-4 at most: the documented margin.
+fn assert_agrees(measured: f64, exact: f64) {
+    let excess = measured / exact - 1.0;
+    assert!((-1e-9..=1e-4).contains(&excess), "{measured} against {exact}: {excess:e}");
+}
+
+#[test]
+fn lanczos_agrees_with_a_dense_solve_and_stays_below_the_element_bound() {
+    let mut random = Random(7);
+    for (cells, nu, law) in [
+        ([3, 3, 2], 0.3, Law::StVenantKirchhoff),
+        ([4, 2, 2], 0.49, Law::StableNeoHookean),
+        ([2, 2, 5], 0.0, Law::FixedCorotated),
+        ([1, 1, 1], 0.45, Law::StableNeoHookean),
+    ] {
+        let mesh = block(cells, 5e-3, 0.15, &mut random);
+        let materials = vec![material(10e3, nu, law), material(80e3, nu, law)];
+        for fixed in [[false; 3], [true; 3], [true, false, true]] {
+            let body = Body::new(mesh.clone(), materials.clone(), |node| if node < 5 { fixed } else { [false; 3] });
+            let exact = body.dense();
+            assert_agrees(body.measured(), exact);
+            assert!(body.element_bound() >= exact, "{} < {exact}", body.element_bound());
+        }
+    }
+}
+
+/// One free degree of freedom: `ω² = k/m` with `k = V(λ + 2µ)|b|²` along `b ∥ x`, `m = ρV/4`.
+#[test]
+fn one_free_axis_has_the_frequency_of_the_formula() {
+    let h = 3e-3;
+    let mesh = TetMesh::new(vec![DVec3::ZERO, DVec3::X * h, DVec3::Y * h, DVec3::Z * h], vec![[0, 1, 2, 3]]).unwrap();
+    let m = material(20e3, 0.4, Law::StableNeoHookean);
+    let modulus = m.lame.p_wave_modulus_pa();
+    let body = Body::new(mesh, vec![m], |node| [node != 1, true, true]);
+    let expected = (4.0 * modulus / 1000.0).sqrt() / h;
+    assert!((body.measured() / expected - 1.0).abs() < 1e-12, "{} {expected}", body.measured());
+}
+
+/// Uniform stretch `u_x = ±1` of a cube that moves along x alone has `U = ½V(λ + 2µ)(2/h)²` and `T = ½ρV ω²`: Rayleigh's
+/// quotient of it is a lower bound, `ω_max ≥ 2c/h` with the wave speed c.
+#[test]
+fn a_cube_is_at_least_as_fast_as_its_uniform_stretch() {
+    let h = 4e-3;
+    let mesh = block([1, 1, 1], h, 0.0, &mut Random(1));
+    let m = material(10e3, 0.0, Law::StVenantKirchhoff);
+    let body = Body::new(mesh, vec![m], |_| [false, true, true]);
+    assert!(body.measured() >= 2.0 / h * (m.lame.p_wave_modulus_pa() / 1000.0).sqrt());
+}
+
+#[test]
+fn a_body_held_everywhere_has_no_frequency() {
+    let mesh = block([1, 1, 1], 1e-3, 0.0, &mut Random(1));
+    let body = Body::new(mesh, vec![material(10e3, 0.3, Law::StableNeoHookean)], |_| [true; 3]);
+    assert_eq!(body.measured(), 0.0);
+}
+
+/// Total displacement energy after `ticks`, relative to the start, at `fraction` of the step limit 2/ω.
+fn growth(fraction: f64, ticks: u32) -> f64 {
+    let mut random = Random(11);
+    let mesh = block([4, 3, 3], 5e-3, 0.15, &mut random);
+    let spec = |tick_period_s: f64| ModelSpec {
+        regions: vec![Region {
+            name: "body".into(),
+            material: material(10e3, 0.45, Law::StableNeoHookean),
+            density_kg_per_m3: 1000.0,
+        }],
+        tet_region: vec![0; mesh.tets().len()],
+        prescribed: vec![PrescribedSpec { name: "base".into(), nodes: (0..20).collect(), axes: [true; 3] }],
+        loads: vec![],
+        gravity_m_per_s2: DVec3::ZERO,
+        tools: vec![],
+        settings: Settings {
+            tick_period_s,
+            substeps: Substeps::Fixed(1),
+            precision: Precision::Double,
+            ..Settings::default()
+        },
+        mesh: mesh.clone(),
+    };
+    let omega = Model::build(spec(1e-3)).unwrap().max_natural_frequency_rad_per_s();
+    let model = Model::build(spec(fraction * 2.0 / omega)).unwrap();
+    let mut state = State::at_rest(&model);
+    for (x, inverse_mass) in state.x.iter_mut().zip(model.inverse_mass_per_kg()) {
+        if inverse_mass.x > 0.0 {
+            *x += random.vector() * 1e-9;
+        }
+    }
+    let mut scratch = Scratch::new(&model);
+    let input =
+        TickInput { tools: &[], load_factors: &[], prescribed_displacements_m: &[DVec3::ZERO], point_forces: &[] };
+    for _ in 0..ticks {
+        step(&model, &mut state, &mut scratch, &input);
+        if state.quarantine.is_some() {
+            return f64::INFINITY;
+        }
+    }
+    let u: f64 = state.x.iter().zip(model.rest_positions_m()).map(|(x, r)| (*x - *r).length_squared()).sum();
+    (u / (state.x.len() as f64 * 1e-18)).sqrt()
+}
+
+#[test]
+fn leapfrog_is_bounded_below_the_limit_and_blows_up_above_it() {
+    let below = growth(0.98, 20_000);
+    assert!(below < 20.0, "grew {below} times at 0.98");
+    let above = growth(1.05, 200);
+    assert!(above > 1e6, "only {above} times at 1.05");
+}
