@@ -6,10 +6,12 @@
 pub mod builtin;
 pub mod drivers;
 pub mod error;
+pub mod fill;
 mod load;
 pub mod path;
 pub mod probes;
 pub mod scene;
+pub mod shapes;
 pub mod timeline;
 
 pub use builtin::{builtin, builtin_names};

@@ -1,0 +1,3 @@
+//! The volume between two surfaces, filled with tetrahedra.
+pub(crate) mod prisms;
+pub(crate) mod trimesh;
