@@ -1,8 +1,9 @@
 //! Energy ledger, inversion, and quarantine of non-finite state.
 use crate::world::{Model, State};
+use serde::{Deserialize, Serialize};
 
 /// What only time integration knows: work and dissipation since reset (J).
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Ledger {
     /// Work done on the body by tools, loads, injected forces and prescribed motion (J).
     pub external_work_j: f64,
@@ -76,7 +77,7 @@ pub fn min_volume_ratio(model: &Model, state: &State) -> (f64, usize) {
 }
 
 /// A state that became non-finite: it was put back to the last good tick, and stays there until reset or restore.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Quarantine {
     /// Tick whose result was refused.
     pub tick: u64,

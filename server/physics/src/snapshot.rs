@@ -1,19 +1,194 @@
 //! Save, restore, hash: the whole dynamic state as bytes.
-use crate::world::State;
+//!
+//! Layout (little-endian): `PLPS`, version (u32), fingerprint of the body (u64), checksum of what follows (u64), state
+//! (postcard). A state goes back only into the body it came from: same rest positions, same tets, same tools.
+use crate::world::{Model, State};
+use thiserror::Error;
+
+const MAGIC: [u8; 4] = *b"PLPS";
+const HEADER: usize = 24;
+/// Version of the layout; another one is refused.
+pub const VERSION: u32 = 1;
+
+/// Why bytes are not a state of a body.
+#[derive(Debug, Clone, PartialEq, Eq, Error)]
+pub enum SnapshotError {
+    /// Not a snapshot at all.
+    #[error("these {bytes} bytes are no snapshot: they do not begin as one")]
+    NoSnapshot {
+        /// Their number.
+        bytes: usize,
+    },
+    /// Another version.
+    #[error("the snapshot has version {found}, this program reads version {VERSION}")]
+    Version {
+        /// Version found.
+        found: u32,
+    },
+    /// Of another body.
+    #[error("the snapshot belongs to another body: mesh or tools differ from the loaded scene's")]
+    OtherBody,
+    /// Damaged.
+    #[error("the snapshot is damaged: {what}")]
+    Damaged {
+        /// What is wrong.
+        what: &'static str,
+    },
+}
+
+/// The state as bytes.
+pub fn save(model: &Model, state: &State) -> Vec<u8> {
+    let mut bytes = Vec::with_capacity(HEADER + state.x.len() * 96);
+    bytes.extend_from_slice(&MAGIC);
+    bytes.extend_from_slice(&VERSION.to_le_bytes());
+    bytes.extend_from_slice(&fingerprint(model).to_le_bytes());
+    bytes.extend_from_slice(&[0; 8]);
+    // Writing to memory cannot fail for a type without unknown lengths; an empty body would be refused by `restore`.
+    let mut bytes = postcard::to_extend(state, bytes).unwrap_or_default();
+    if bytes.len() > HEADER {
+        let checksum = fnv(OFFSET, bytes[HEADER..].iter().copied());
+        bytes[16..HEADER].copy_from_slice(&checksum.to_le_bytes());
+    }
+    bytes
+}
+
+/// The state that [`save`] wrote.
+///
+/// # Errors
+/// [`SnapshotError`]; whatever the bytes, nothing else happens.
+pub fn restore(model: &Model, bytes: &[u8]) -> Result<State, SnapshotError> {
+    let (header, body) = bytes.split_at_checked(HEADER).ok_or(SnapshotError::NoSnapshot { bytes: bytes.len() })?;
+    if header[..4] != MAGIC {
+        return Err(SnapshotError::NoSnapshot { bytes: bytes.len() });
+    }
+    let found = word(header, 4) as u32;
+    if found != VERSION {
+        return Err(SnapshotError::Version { found });
+    }
+    if word(header, 8) != fingerprint(model) {
+        return Err(SnapshotError::OtherBody);
+    }
+    if word(header, 16) != fnv(OFFSET, body.iter().copied()) {
+        return Err(SnapshotError::Damaged { what: "its checksum is wrong" });
+    }
+    let state: State =
+        postcard::from_bytes(body).map_err(|_| SnapshotError::Damaged { what: "it ends early or has other fields" })?;
+    check(model, &state)?;
+    Ok(state)
+}
+
+fn check(model: &Model, state: &State) -> Result<(), SnapshotError> {
+    let nodes = model.rest_positions_m().len();
+    let counts = [&state.x, &state.v, &state.force_n, &state.external_n].iter().all(|v| v.len() == nodes)
+        && state.tools.len() == model.spec().tools.len()
+        && state.load_factors.len() == model.spec().loads.len();
+    if !counts {
+        return Err(SnapshotError::OtherBody);
+    }
+    if crate::health::first_non_finite(state).is_some() {
+        return Err(SnapshotError::Damaged { what: "a position or velocity is not finite" });
+    }
+    Ok(())
+}
+
+fn word(header: &[u8], at: usize) -> u64 {
+    let mut bytes = [0; 8];
+    let end = (at + 8).min(HEADER);
+    bytes[..end - at].copy_from_slice(&header[at..end]);
+    u64::from_le_bytes(bytes)
+}
+
+/// Hash of what makes a body: rest positions, tets, names of tools.
+fn fingerprint(model: &Model) -> u64 {
+    let positions =
+        model.rest_positions_m().iter().flat_map(glam::DVec3::to_array).flat_map(|c| c.to_bits().to_le_bytes());
+    let tets = model.mesh().tets().iter().flatten().flat_map(|n| n.to_le_bytes());
+    let tools = model.spec().tools.iter().flat_map(|tool| tool.name.bytes().chain([0]));
+    fnv(OFFSET, positions.chain(tets).chain(tools))
+}
+
+const OFFSET: u64 = 0xcbf2_9ce4_8422_2325;
+
+/// FNV-1a, 64 bits.
+fn fnv(start: u64, bytes: impl Iterator<Item = u8>) -> u64 {
+    bytes.fold(start, |hash, byte| (hash ^ u64::from(byte)).wrapping_mul(0x0000_0100_0000_01b3))
+}
 
 /// FNV-1a over the bits of tick, positions and velocities: equal states give equal hashes on every machine.
 pub fn state_hash(state: &State) -> u64 {
-    let mut hash = 0xcbf2_9ce4_8422_2325_u64;
-    let mut eat = |word: u64| {
-        for byte in word.to_le_bytes() {
-            hash = (hash ^ u64::from(byte)).wrapping_mul(0x0000_0100_0000_01b3);
-        }
+    let components = state.x.iter().chain(&state.v).flat_map(glam::DVec3::to_array);
+    fnv(OFFSET, state.tick.to_le_bytes().into_iter().chain(components.flat_map(|c| c.to_bits().to_le_bytes())))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{
+        mesh::TetMesh,
+        world::{ModelSpec, Region, Settings},
     };
-    eat(state.tick);
-    for a in state.x.iter().chain(&state.v) {
-        for component in a.to_array() {
-            eat(component.to_bits());
+    use glam::DVec3;
+
+    fn model(scale_m: f64) -> Model {
+        let p = [DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::Z].map(|p| p * scale_m).to_vec();
+        let material = crate::material::Material {
+            law: crate::material::Law::StableNeoHookean,
+            lame: crate::material::Lame::from_young_poisson(1e4, 0.3).unwrap(),
+            viscosity: crate::material::Viscosity::default(),
+        };
+        Model::build(ModelSpec {
+            mesh: TetMesh::new(p, vec![[0, 1, 2, 3]]).unwrap(),
+            regions: vec![Region { name: "all".into(), material, density_kg_per_m3: 1e3 }],
+            tet_region: vec![0],
+            prescribed: Vec::new(),
+            loads: Vec::new(),
+            gravity_m_per_s2: DVec3::ZERO,
+            tools: Vec::new(),
+            settings: Settings::default(),
+        })
+        .unwrap()
+    }
+
+    fn moved(model: &Model) -> State {
+        let mut state = State::at_rest(model);
+        state.tick = 41;
+        state.x[1] += DVec3::new(0.1, -0.2, 1.0 / 3.0);
+        state.v[2] = DVec3::new(-1e-300, 2.0, 0.0);
+        state
+    }
+
+    #[test]
+    fn a_state_survives_with_its_bits() {
+        let model = model(1.0);
+        let state = moved(&model);
+        let back = restore(&model, &save(&model, &state)).unwrap();
+        assert_eq!(back, state);
+        assert_eq!(state_hash(&back), state_hash(&state));
+    }
+
+    #[test]
+    fn one_wrong_bit_anywhere_is_refused() {
+        let model = model(1.0);
+        let good = save(&model, &moved(&model));
+        for at in 0..good.len() {
+            let mut bad = good.clone();
+            bad[at] ^= 0x10;
+            assert!(restore(&model, &bad).is_err(), "byte {at}");
+            assert!(restore(&model, &good[..at]).is_err(), "cut at {at}");
         }
     }
-    hash
+
+    #[test]
+    fn another_body_is_refused_by_name() {
+        let (one, other) = (model(1.0), model(2.0));
+        assert_eq!(restore(&other, &save(&one, &moved(&one))), Err(SnapshotError::OtherBody));
+    }
+
+    #[test]
+    fn a_state_that_is_not_finite_is_refused() {
+        let model = model(1.0);
+        let mut state = moved(&model);
+        state.x[0].x = f64::NAN;
+        assert!(matches!(restore(&model, &save(&model, &state)), Err(SnapshotError::Damaged { .. })));
+    }
 }

@@ -9,6 +9,7 @@ use crate::{
     simd::{ForceKernel, KernelScratch},
 };
 use glam::DVec3;
+use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 /// A material and density shared by some tets.
@@ -305,7 +306,7 @@ impl Model {
 }
 
 /// What a tick changes.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct State {
     /// Ticks done since reset.
     pub tick: u64,
@@ -380,6 +381,12 @@ impl Scratch {
     /// Force (N) that holds each prescribed degree of freedom, at the end of the last tick; zero on free ones.
     pub fn reactions_n(&self) -> &[DVec3] {
         &self.reaction_n
+    }
+
+    /// Takes the reactions of another scratch of the same model, without allocating: with a copy of the state, all that
+    /// probes need.
+    pub fn copy_reactions_from(&mut self, other: &Self) {
+        self.reaction_n.clone_from(&other.reaction_n);
     }
 }
 

@@ -1,6 +1,7 @@
 //! Spherical tools against the deforming surface.
 use crate::mesh::{Surface, TetMesh};
 use glam::{DMat3, DVec3};
+use serde::{Deserialize, Serialize};
 
 /// How a tool follows its device.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -35,7 +36,7 @@ pub struct ToolSpec {
 }
 
 /// Where a device wants its tool at the end of the tick.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct ToolTarget {
     /// Position (m, world).
     pub position_m: DVec3,
@@ -44,7 +45,7 @@ pub struct ToolTarget {
 }
 
 /// A tool's changing state.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ToolState {
     /// Centre of the tool, the proxy (m).
     pub centre_m: DVec3,
@@ -67,7 +68,7 @@ pub struct ToolState {
 }
 
 /// Force on the device near `point_m`: `F(p) = force_n + stiffness (p − point_m)`, never pulling.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct LocalContactModel {
     /// Device position about which it is expanded (m).
     pub point_m: DVec3,
