@@ -1,1 +1,14 @@
-//! placeholder
+//! The command-line viewer: status, live numbers, pictures without a GPU, exports, scripted forces.
+//!
+//! It knows the wire types only ([`palpate_proto`]); the surface it draws is rebuilt from the stream ([`surface`]).
+pub mod cli;
+pub mod connect;
+pub mod error;
+pub mod export;
+pub mod inject;
+pub mod picture;
+pub mod status;
+pub mod surface;
+pub mod watch;
+
+pub use error::ViewError;

@@ -1,0 +1,98 @@
+//! Arguments, and which file does what.
+use crate::{ViewError, connect::Server, export, inject, picture, status, watch};
+use clap::{Args, Parser, Subcommand};
+use std::{fs, path::PathBuf};
+
+/// Looks at a running palpated: status, live numbers, pictures, exports; injects scripted forces.
+#[derive(Debug, Parser)]
+#[command(
+    name = "palpate-view",
+    version,
+    after_help = "Examples:\n  palpate-view status\n  palpate-view watch --seconds 10\n  palpate-view snapshot dent.png --size 1200x900\n  palpate-view export dent.vtu\n  palpate-view inject push.toml"
+)]
+pub struct Arguments {
+    #[command(flatten)]
+    server: ServerArguments,
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Debug, Args)]
+struct ServerArguments {
+    /// The daemon: http://HOST:PORT, https://HOST:PORT or unix:///path/to/socket
+    #[arg(
+        long,
+        global = true,
+        env = "PALPATE_SERVER",
+        default_value = "http://127.0.0.1:7411",
+        value_name = "ADDRESS"
+    )]
+    server: String,
+    /// Certificate authority to trust for https:// (PEM file)
+    #[arg(long, global = true, value_name = "FILE")]
+    tls_ca: Option<PathBuf>,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    /// Says what the daemon runs, how well it keeps time, and who is attached
+    Status {
+        /// Machine-readable
+        #[arg(long)]
+        json: bool,
+    },
+    /// Prints live numbers: rate, delay, dropped frames, force
+    Watch(watch::WatchArguments),
+    /// Draws the deformed surface, coloured by displacement, into a PNG (no GPU needed)
+    Snapshot(picture::SnapshotArguments),
+    /// Writes the deformed surface as .vtu, .obj or .ply
+    Export(export::ExportArguments),
+    /// Injects the forces of a script
+    Inject(inject::InjectArguments),
+}
+
+/// Runs the command.
+///
+/// # Errors
+/// [`ViewError`], with the next step.
+pub fn run(arguments: &Arguments) -> Result<(), ViewError> {
+    let ca_pem = arguments.server.tls_ca.as_ref().map(read).transpose()?;
+    let server = Server { address: arguments.server.server.clone(), ca_pem };
+    let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().map_err(|source| {
+        ViewError::File { action: "cannot start the runtime of", path: "palpate-view".into(), source }
+    })?;
+    runtime.block_on(async {
+        match &arguments.command {
+            Command::Status { json } => status::run(&server, *json).await,
+            Command::Watch(arguments) => watch::run(&server, arguments).await,
+            Command::Snapshot(arguments) => picture::run(&server, arguments).await,
+            Command::Export(arguments) => export::run(&server, arguments).await,
+            Command::Inject(arguments) => inject::run(&server, arguments).await,
+        }
+    })
+}
+
+/// Reads a file.
+///
+/// # Errors
+/// [`ViewError::File`].
+pub fn read(path: &PathBuf) -> Result<Vec<u8>, ViewError> {
+    fs::read(path).map_err(|source| ViewError::File { action: "cannot read", path: path.clone(), source })
+}
+
+/// Writes a whole file: beside it first, then renamed, so that a failure leaves what was there.
+///
+/// # Errors
+/// [`ViewError::Exists`] without `force`, or [`ViewError::File`].
+pub fn write_new(path: &PathBuf, bytes: &[u8], force: bool) -> Result<(), ViewError> {
+    if path.exists() && !force {
+        return Err(ViewError::Exists(path.clone()));
+    }
+    let mut beside = path.clone().into_os_string();
+    beside.push(".part");
+    fs::write(&beside, bytes).and_then(|()| fs::rename(&beside, path)).map_err(|source| ViewError::File {
+        action: "cannot write",
+        path: path.clone(),
+        source,
+    })
+}

@@ -1,0 +1,78 @@
+//! What can go wrong, with the next step.
+use miette::Diagnostic;
+use std::path::PathBuf;
+use thiserror::Error;
+
+/// An error of the viewer.
+#[derive(Debug, Error, Diagnostic)]
+pub enum ViewError {
+    /// The server's address cannot be used.
+    #[error("\"{address}\" is no address of a daemon: {reason}")]
+    #[diagnostic(help("write http://HOST:PORT, https://HOST:PORT or unix:///path/to/socket"))]
+    Address {
+        /// As given.
+        address: String,
+        /// What is wrong with it.
+        reason: String,
+    },
+    /// Nobody answers.
+    #[error("no daemon answers at {address}: {reason}")]
+    #[diagnostic(help("is `palpated` running there? it prints its address when it starts; give it with --server"))]
+    Unreachable {
+        /// Address tried.
+        address: String,
+        /// The transport's words.
+        reason: String,
+    },
+    /// The daemon refused.
+    #[error("the daemon refused: {message} ({code})")]
+    Refused {
+        /// gRPC code.
+        code: String,
+        /// Its message.
+        message: String,
+    },
+    /// The stream broke the protocol, or ended.
+    #[error("the stream of the surface {0}")]
+    Stream(String),
+    /// A file could not be read or written.
+    #[error("{action} {path}: {source}", path = path.display())]
+    File {
+        /// `cannot read` or `cannot write`.
+        action: &'static str,
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        source: std::io::Error,
+    },
+    /// Would overwrite.
+    #[error("{path} exists", path = .0.display())]
+    #[diagnostic(help("choose another name, or give --force to replace it"))]
+    Exists(PathBuf),
+    /// Unknown file ending.
+    #[error("{path}: unknown ending; known are {known}", path = path.display())]
+    Ending {
+        /// The file.
+        path: PathBuf,
+        /// Endings that work.
+        known: &'static str,
+    },
+    /// A force script is wrong.
+    #[error("{path}: {reason}", path = path.display())]
+    #[diagnostic(help(
+        "a script is TOML: [[force]] with surface_vertex = 12 or nearest_to_m = [x, y, z], force_n = [x, y, z], \
+         from_tick = 0, tick_count = 100"
+    ))]
+    Script {
+        /// The script.
+        path: PathBuf,
+        /// What is wrong, with line where known.
+        reason: String,
+    },
+}
+
+impl From<tonic::Status> for ViewError {
+    fn from(status: tonic::Status) -> Self {
+        Self::Refused { code: format!("{:?}", status.code()), message: status.message().to_owned() }
+    }
+}

@@ -1,0 +1,94 @@
+//! `export`: the deformed surface as a file for other programs. One file per format.
+mod obj;
+mod ply;
+mod vtu;
+
+use crate::{
+    ViewError, cli,
+    connect::Server,
+    surface::{Surface, Watcher},
+};
+use clap::Args;
+use palpate_proto::v1::LevelOfDetail;
+use std::path::{Path, PathBuf};
+
+/// Arguments of `export`.
+#[derive(Debug, Args)]
+pub struct ExportArguments {
+    /// File to write; its ending chooses the format: .vtu, .obj or .ply
+    file: PathBuf,
+    /// Replace the file if it exists
+    #[arg(long)]
+    force: bool,
+}
+
+/// Runs `export`.
+///
+/// # Errors
+/// An unknown ending, an unreachable daemon, or a file that cannot be written.
+pub async fn run(server: &Server, arguments: &ExportArguments) -> Result<(), ViewError> {
+    let write = writer_for(&arguments.file)?;
+    let surface = present_surface(server).await?;
+    cli::write_new(&arguments.file, write(&surface).as_bytes(), arguments.force)?;
+    println!(
+        "{}: {} vertices, {} triangles at tick {}",
+        arguments.file.display(),
+        surface.rest_m.len(),
+        surface.triangles.len(),
+        surface.last.tick
+    );
+    Ok(())
+}
+
+fn writer_for(path: &Path) -> Result<fn(&Surface) -> String, ViewError> {
+    match path.extension().and_then(|e| e.to_str()).map(str::to_ascii_lowercase).as_deref() {
+        Some("vtu") => Ok(vtu::to_text),
+        Some("obj") => Ok(obj::to_text),
+        Some("ply") => Ok(ply::to_text),
+        _ => Err(ViewError::Ending { path: path.into(), known: ".vtu, .obj, .ply" }),
+    }
+}
+
+/// The surface as it is now.
+///
+/// # Errors
+/// An unreachable daemon or a broken stream.
+pub async fn present_surface(server: &Server) -> Result<Surface, ViewError> {
+    let mut watcher = Watcher::start(server.connect().await?, 0.0, LevelOfDetail::Full).await?;
+    watcher.next().await?.cloned().ok_or_else(|| ViewError::Stream("ended before the first surface".into()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use glam::Vec3;
+
+    fn surface() -> Surface {
+        Surface {
+            rest_m: vec![Vec3::ZERO, Vec3::X, Vec3::Y],
+            displacement_m: vec![Vec3::ZERO, Vec3::ZERO, Vec3::new(0.0, 0.25, 0.0)],
+            triangles: vec![[0, 1, 2]],
+            ..Default::default()
+        }
+    }
+
+    #[test]
+    fn every_format_carries_deformed_positions_and_faces() {
+        let obj = obj::to_text(&surface());
+        assert!(obj.contains("v 0 1.25 0\n") && obj.contains("f 1 2 3\n"), "{obj}");
+        let ply = ply::to_text(&surface());
+        assert!(
+            ply.contains("element vertex 3\n") && ply.contains("\n0 1.25 0 ") && ply.ends_with("3 0 1 2\n"),
+            "{ply}"
+        );
+        let vtu = vtu::to_text(&surface());
+        assert!(vtu.contains("NumberOfPoints=\"3\" NumberOfCells=\"1\"") && vtu.contains("0 1.25 0\n"), "{vtu}");
+        assert!(vtu.contains("Name=\"displacement_m\""));
+    }
+
+    #[test]
+    fn unknown_endings_are_refused() {
+        assert!(writer_for(Path::new("dent.docx")).is_err());
+        assert!(writer_for(Path::new("dent.VTU")).is_ok());
+    }
+}

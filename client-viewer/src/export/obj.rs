@@ -1,0 +1,16 @@
+//! Wavefront OBJ.
+use crate::surface::Surface;
+use std::fmt::Write as _;
+
+/// Deformed positions (m) and triangles.
+pub(super) fn to_text(surface: &Surface) -> String {
+    let mut text = format!("# {} at tick {}, metres\n", surface.header.scene_name, surface.last.tick);
+    for p in surface.positions_m() {
+        // Writing into a String cannot fail.
+        let _ = writeln!(text, "v {} {} {}", p.x, p.y, p.z);
+    }
+    for [a, b, c] in &surface.triangles {
+        let _ = writeln!(text, "f {} {} {}", a + 1, b + 1, c + 1);
+    }
+    text
+}

@@ -1,0 +1,131 @@
+//! `inject`: forces on surface vertices at given ticks, from a script.
+use crate::{ViewError, cli, connect::Server, surface::Surface, surface::Watcher};
+use clap::Args;
+use glam::Vec3;
+use palpate_proto::v1::{self, InjectForcesRequest, InjectedForce, LevelOfDetail, session_client::SessionClient};
+use serde::Deserialize;
+use std::path::{Path, PathBuf};
+
+/// Arguments of `inject`.
+#[derive(Debug, Args)]
+pub struct InjectArguments {
+    /// The script (TOML): [[force]] with surface_vertex or nearest_to_m, force_n, from_tick, tick_count
+    script: PathBuf,
+}
+
+/// A force script.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Script {
+    force: Vec<Force>,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+#[allow(clippy::struct_field_names)] // the keys of the file
+struct Force {
+    surface_vertex: Option<u32>,
+    nearest_to_m: Option<[f32; 3]>,
+    force_n: [f64; 3],
+    #[serde(default)]
+    from_tick: u64,
+    tick_count: u32,
+}
+
+/// Runs `inject`.
+///
+/// # Errors
+/// A wrong script, an unreachable daemon, or its refusal.
+pub async fn run(server: &Server, arguments: &InjectArguments) -> Result<(), ViewError> {
+    let text = String::from_utf8_lossy(&cli::read(&arguments.script)?).into_owned();
+    let script = parse(&arguments.script, &text)?;
+    let channel = server.connect().await?;
+    let surface = if script.force.iter().any(|force| force.nearest_to_m.is_some()) {
+        let mut watcher = Watcher::start(channel.clone(), 0.0, LevelOfDetail::Full).await?;
+        watcher.next().await?.cloned()
+    } else {
+        None
+    };
+    let forces = script
+        .force
+        .iter()
+        .enumerate()
+        .map(|(index, force)| resolve(&arguments.script, index, force, surface.as_ref()))
+        .collect::<Result<Vec<_>, _>>()?;
+    let count = forces.len();
+    let request = InjectForcesRequest { session_id: String::new(), forces };
+    let answer = SessionClient::new(channel).inject_forces(request).await?.into_inner();
+    println!("{count} forces accepted; the first acts at tick {}; {} pending", answer.first_tick, answer.pending);
+    Ok(())
+}
+
+fn parse(path: &Path, text: &str) -> Result<Script, ViewError> {
+    toml::from_str(text).map_err(|error| ViewError::Script { path: path.into(), reason: error.to_string() })
+}
+
+fn resolve(path: &Path, index: usize, force: &Force, surface: Option<&Surface>) -> Result<InjectedForce, ViewError> {
+    let bad = |reason: String| ViewError::Script {
+        path: path.into(),
+        reason: format!("[[force]] number {}: {reason}", index + 1),
+    };
+    let surface_vertex = match (force.surface_vertex, force.nearest_to_m) {
+        (Some(vertex), None) => vertex,
+        (None, Some(point)) => {
+            nearest(surface, Vec3::from_array(point)).ok_or_else(|| bad("there is no surface".into()))?
+        }
+        _ => return Err(bad("give exactly one of surface_vertex and nearest_to_m".into())),
+    };
+    if force.tick_count == 0 {
+        return Err(bad("tick_count = 0: must be at least 1".into()));
+    }
+    if !force.force_n.iter().all(|f| f.is_finite()) {
+        return Err(bad("force_n must be finite".into()));
+    }
+    let [x, y, z] = force.force_n;
+    Ok(InjectedForce {
+        surface_vertex,
+        force_n: Some(v1::Vec3 { x, y, z }),
+        from_tick: force.from_tick,
+        tick_count: force.tick_count,
+    })
+}
+
+/// Surface vertex whose rest position is nearest to a point.
+fn nearest(surface: Option<&Surface>, point_m: Vec3) -> Option<u32> {
+    let rest = &surface?.rest_m;
+    (0..rest.len())
+        .min_by(|&a, &b| rest[a].distance_squared(point_m).total_cmp(&rest[b].distance_squared(point_m)))
+        .map(|vertex| vertex as u32)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn read(text: &str) -> Result<Vec<InjectedForce>, ViewError> {
+        let path = Path::new("push.toml");
+        let surface = Surface { rest_m: vec![Vec3::ZERO, Vec3::X, Vec3::Y], ..Default::default() };
+        let script = parse(path, text)?;
+        script.force.iter().enumerate().map(|(i, force)| resolve(path, i, force, Some(&surface))).collect()
+    }
+
+    #[test]
+    fn vertices_are_named_or_found() {
+        let forces = read(
+            "[[force]]\nsurface_vertex = 2\nforce_n = [0, 0, -1]\ntick_count = 5\n\
+             [[force]]\nnearest_to_m = [0.9, 0.1, 0]\nforce_n = [1, 0, 0]\nfrom_tick = 9\ntick_count = 1\n",
+        )
+        .unwrap();
+        assert_eq!((forces[0].surface_vertex, forces[0].tick_count), (2, 5));
+        assert_eq!((forces[1].surface_vertex, forces[1].from_tick), (1, 9));
+    }
+
+    #[test]
+    fn mistakes_are_named() {
+        let message = |text: &str| read(text).unwrap_err().to_string();
+        assert!(message("[[force]]\nforce_n = [0, 0, 1]\ntick_count = 1\n").contains("exactly one"));
+        assert!(message("[[force]]\nsurface_vertex = 1\nforce_n = [0, 0, 1]\ntick_count = 0\n").contains("at least 1"));
+        assert!(message("[[force]]\nsurface_vertex = 1\nforce = [0, 0, 1]\ntick_count = 1\n").contains("force"));
+        assert!(message("[[force]]\nsurface_vertex = 1\nforce_n = [0, nan, 1]\ntick_count = 1\n").contains("finite"));
+    }
+}

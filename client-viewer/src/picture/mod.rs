@@ -1,0 +1,192 @@
+//! `snapshot`: a picture of the deformed surface without a GPU: z-buffer, shading, displacement colours, legend.
+mod camera;
+mod colour;
+mod label;
+mod raster;
+mod solids;
+
+use crate::{ViewError, cli, connect::Server, export, surface::Surface};
+use camera::Camera;
+use clap::Args;
+use colour::Rgb;
+use glam::Vec3;
+use raster::{Canvas, Vertex};
+use std::path::PathBuf;
+
+/// Each pixel is the mean of this many squared.
+const SUPERSAMPLING: usize = 2;
+const GROUND: Rgb = Rgb([0.078, 0.094, 0.110]);
+const INK: Rgb = Rgb([0.90, 0.89, 0.86]);
+const TOOL: Rgb = Rgb([0.91, 0.89, 0.85]);
+const ARROW: Rgb = Rgb([0.95, 0.72, 0.29]);
+
+/// Arguments of `snapshot`.
+#[derive(Debug, Args)]
+pub struct SnapshotArguments {
+    /// PNG file to write
+    file: PathBuf,
+    /// Width and height in pixels
+    #[arg(long, default_value = "1000x750", value_parser = parse_size, value_name = "WxH")]
+    size: (usize, usize),
+    /// Direction to look from, seen from the body's middle
+    #[arg(long, default_value = "0.75,-1.35,0.55", value_parser = parse_direction, allow_hyphen_values = true, value_name = "X,Y,Z")]
+    from: Vec3,
+    /// Displacement (mm) of the last colour; a round number above the largest when absent
+    #[arg(long, value_name = "MM")]
+    full_scale_mm: Option<f32>,
+    /// Replace the file if it exists
+    #[arg(long)]
+    force: bool,
+}
+
+fn parse_size(text: &str) -> Result<(usize, usize), String> {
+    let (w, h) = text.split_once('x').ok_or("write it as WIDTHxHEIGHT, for example 1000x750")?;
+    let number = |s: &str| s.parse::<usize>().map_err(|e| format!("\"{s}\": {e}"));
+    let (w, h) = (number(w)?, number(h)?);
+    if (64..=8192).contains(&w) && (64..=8192).contains(&h) {
+        Ok((w, h))
+    } else {
+        Err("both must be between 64 and 8192 pixels".into())
+    }
+}
+
+fn parse_direction(text: &str) -> Result<Vec3, String> {
+    let numbers: Vec<f32> = text
+        .split(',')
+        .map(|s| s.trim().parse::<f32>().map_err(|e| format!("\"{s}\": {e}")))
+        .collect::<Result<_, _>>()?;
+    match numbers[..] {
+        [x, y, z] if Vec3::new(x, y, z).length() > 1e-6 && Vec3::new(x, y, z).is_finite() => Ok(Vec3::new(x, y, z)),
+        _ => Err("write three numbers, not all zero, for example 1,-1,0.5".into()),
+    }
+}
+
+/// Runs `snapshot`.
+///
+/// # Errors
+/// An unreachable daemon or a file that cannot be written.
+pub async fn run(server: &Server, arguments: &SnapshotArguments) -> Result<(), ViewError> {
+    let surface = export::present_surface(server).await?;
+    let full_scale_m = arguments.full_scale_mm.map(|mm| mm.max(1e-6) * 1e-3);
+    let (canvas, top_m) = draw(&surface, arguments.size, arguments.from, full_scale_m);
+    cli::write_new(&arguments.file, &encode(&canvas)?, arguments.force)?;
+    println!(
+        "{}: tick {}, largest displacement {:.3} mm, full colour at {:.3} mm",
+        arguments.file.display(),
+        surface.last.tick,
+        1e3 * largest(&surface),
+        1e3 * top_m
+    );
+    Ok(())
+}
+
+fn largest(surface: &Surface) -> f32 {
+    surface.displacement_m.iter().map(|d| d.length()).fold(0.0, f32::max)
+}
+
+/// Draws; also returns the displacement (m) of the last colour.
+fn draw(surface: &Surface, (width, height): (usize, usize), from: Vec3, full_scale_m: Option<f32>) -> (Canvas, f32) {
+    let top_m = full_scale_m.unwrap_or_else(|| colour::nice_ceiling(largest(surface), 1e-4));
+    let positions = surface.positions_m();
+    let camera = Camera::looking_at(&surface.rest_m, from, width as f32 / height as f32);
+    let mut canvas = Canvas::new(width * SUPERSAMPLING, height * SUPERSAMPLING, GROUND);
+    let normals = vertex_normals(&positions, &surface.triangles);
+    let vertices: Vec<Vertex> = positions
+        .iter()
+        .zip(&normals)
+        .zip(&surface.displacement_m)
+        .map(|((&position, &normal), d)| Vertex { position, normal, colour: colour::viridis(d.length() / top_m) })
+        .collect();
+    for t in &surface.triangles {
+        canvas.triangle(&camera, t.map(|i| vertices[i as usize]));
+    }
+    draw_tools(&mut canvas, &camera, surface);
+    let mut canvas = canvas.reduced(SUPERSAMPLING);
+    label::legend(&mut canvas, top_m, INK);
+    label::title(&mut canvas, &surface.header.scene_name, surface.last.time_s, INK);
+    (canvas, top_m)
+}
+
+fn draw_tools(canvas: &mut Canvas, camera: &Camera, surface: &Surface) {
+    for (shape, state) in surface.header.tools.iter().zip(&surface.last.tools) {
+        let vector = |v: Option<palpate_proto::v1::Vec3>| v.map(|v| Vec3::new(v.x as f32, v.y as f32, v.z as f32));
+        let Some(centre) = vector(state.proxy_position_m) else { continue };
+        for t in solids::sphere(centre, shape.radius_m as f32, TOOL) {
+            canvas.triangle(camera, t);
+        }
+        let force = vector(state.contact_force_n).unwrap_or(Vec3::ZERO);
+        if force.length() > 1e-6 {
+            // A newton is as long as 30 % of the body; longer arrows are cut at half of it.
+            let length = (0.3 * force.length()).min(0.5) * camera.body_size_m;
+            for t in solids::arrow(centre, force.normalize(), length, camera.body_size_m * 0.008, ARROW) {
+                canvas.triangle(camera, t);
+            }
+        }
+    }
+}
+
+/// Area-weighted vertex normals.
+fn vertex_normals(positions: &[Vec3], triangles: &[[u32; 3]]) -> Vec<Vec3> {
+    let mut normals = vec![Vec3::ZERO; positions.len()];
+    for t in triangles {
+        let [a, b, c] = t.map(|i| positions[i as usize]);
+        for i in t {
+            normals[*i as usize] += (b - a).cross(c - a);
+        }
+    }
+    normals.iter().map(|n| n.normalize_or_zero()).collect()
+}
+
+fn encode(canvas: &Canvas) -> Result<Vec<u8>, ViewError> {
+    let mut bytes = Vec::new();
+    let failed = |error: png::EncodingError| ViewError::Stream(format!("cannot become a PNG: {error}"));
+    let mut encoder = png::Encoder::new(&mut bytes, canvas.width as u32, canvas.height as u32);
+    encoder.set_color(png::ColorType::Rgb);
+    encoder.set_depth(png::BitDepth::Eight);
+    let mut writer = encoder.write_header().map_err(failed)?;
+    writer.write_image_data(&canvas.to_rgb8()).map_err(failed)?;
+    writer.finish().map_err(failed)?;
+    Ok(bytes)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A square in the plane z = 0, seen from above, displaced at one corner.
+    fn square() -> Surface {
+        Surface {
+            rest_m: vec![Vec3::ZERO, Vec3::X, Vec3::new(1.0, 1.0, 0.0), Vec3::Y],
+            displacement_m: vec![Vec3::ZERO, Vec3::ZERO, Vec3::new(0.0, 0.0, 0.02), Vec3::ZERO],
+            triangles: vec![[0, 1, 2], [0, 2, 3]],
+            ..Default::default()
+        }
+    }
+
+    #[test]
+    fn the_middle_shows_the_body_and_the_corner_the_ground() {
+        let (canvas, top_m) = draw(&square(), (200, 150), Vec3::new(0.0, -0.01, 1.0), None);
+        assert!((top_m - 0.02).abs() < 1e-6);
+        assert_ne!(canvas.pixel(100, 75), canvas.pixel(2, 2));
+        assert_eq!(canvas.pixel(2, 148), GROUND.0.map(|c| (c * 255.0).round() as u8));
+    }
+
+    #[test]
+    fn the_picture_is_a_png() {
+        let (canvas, _) = draw(&square(), (64, 64), Vec3::ONE, Some(0.05));
+        let bytes = encode(&canvas).unwrap();
+        let mut reader = png::Decoder::new(std::io::Cursor::new(bytes)).read_info().unwrap();
+        let mut pixels = vec![0; reader.output_buffer_size().unwrap()];
+        let info = reader.next_frame(&mut pixels).unwrap();
+        assert_eq!((info.width, info.height), (64, 64));
+        assert_eq!(pixels, canvas.to_rgb8());
+    }
+
+    #[test]
+    fn sizes_and_directions_are_checked() {
+        assert_eq!(parse_size("640x480"), Ok((640, 480)));
+        assert!(parse_size("640").is_err() && parse_size("1x1").is_err());
+        assert!(parse_direction("0,0,0").is_err() && parse_direction("1,2").is_err());
+        assert_eq!(parse_direction("1, -2, 3"), Ok(Vec3::new(1.0, -2.0, 3.0)));
+    }
+}

@@ -1,0 +1,156 @@
+//! `watch`: one line a second of what a viewer feels.
+use crate::{ViewError, connect::Server, surface::Watcher};
+use clap::Args;
+use palpate_proto::v1::{LevelOfDetail, SurfaceUpdate, Vec3};
+use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
+
+/// Arguments of `watch`.
+#[derive(Debug, Args)]
+pub struct WatchArguments {
+    /// Stop after so many seconds (until interrupted when absent)
+    #[arg(long, value_name = "SECONDS")]
+    seconds: Option<f64>,
+    /// Most updates per second to ask for
+    #[arg(long, default_value_t = 60.0, value_name = "HZ")]
+    rate_hz: f64,
+    /// Ask for numbers only, without the surface
+    #[arg(long)]
+    numbers_only: bool,
+    /// One JSON object a line instead of a table
+    #[arg(long)]
+    json: bool,
+}
+
+/// What one second of the stream was like.
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+struct Second {
+    time_s: f64,
+    rate_hz: f64,
+    delay_ms_median: f64,
+    delay_ms_worst: f64,
+    skipped: u64,
+    contact_force_n: f64,
+    device_force_n: f64,
+    max_displacement_mm: f64,
+    tick_cost_us: f32,
+}
+
+/// Runs `watch`.
+///
+/// # Errors
+/// An unreachable daemon or a broken stream.
+pub async fn run(server: &Server, arguments: &WatchArguments) -> Result<(), ViewError> {
+    let detail = if arguments.numbers_only { LevelOfDetail::Numbers } else { LevelOfDetail::Full };
+    let mut watcher = Watcher::start(server.connect().await?, arguments.rate_hz, detail).await?;
+    let begin = Instant::now();
+    let mut second = Window::new(begin);
+    let mut named = false;
+    loop {
+        let left = arguments.seconds.map(|s| Duration::from_secs_f64(s.max(0.0)).saturating_sub(begin.elapsed()));
+        if left.is_some_and(|left| left.is_zero()) {
+            return Ok(());
+        }
+        let next = tokio::time::timeout(left.unwrap_or(Duration::MAX), watcher.next());
+        let Ok(next) = next.await else { return Ok(()) };
+        let Some(surface) = next? else {
+            return Err(ViewError::Stream("was ended by the daemon".into()));
+        };
+        if !named && !arguments.json {
+            println!("{}: {} vertices", surface.header.scene_name, surface.header.vertex_count);
+            println!(
+                "{:>9} {:>7} {:>16} {:>8} {:>10} {:>10} {:>10} {:>8}",
+                "time s", "Hz", "delay ms (worst)", "skipped", "contact N", "arm N", "max mm", "tick us"
+            );
+            named = true;
+        }
+        if let Some(done) = second.take(&surface.last, Instant::now()) {
+            print(&done, arguments.json);
+        }
+    }
+}
+
+fn print(second: &Second, json: bool) {
+    if json {
+        // A struct of numbers always has a JSON form.
+        println!("{}", serde_json::to_string(second).unwrap_or_default());
+        return;
+    }
+    println!(
+        "{:>9.2} {:>7.1} {:>8.1} ({:>5.1}) {:>8} {:>10.4} {:>10.4} {:>10.3} {:>8.0}",
+        second.time_s,
+        second.rate_hz,
+        second.delay_ms_median,
+        second.delay_ms_worst,
+        second.skipped,
+        second.contact_force_n,
+        second.device_force_n,
+        second.max_displacement_mm,
+        second.tick_cost_us
+    );
+}
+
+/// Collects updates over a second.
+struct Window {
+    begin: Instant,
+    delays_ms: Vec<f64>,
+}
+
+impl Window {
+    fn new(begin: Instant) -> Self {
+        Self { begin, delays_ms: Vec::new() }
+    }
+
+    fn take(&mut self, update: &SurfaceUpdate, now: Instant) -> Option<Second> {
+        self.delays_ms.push(delay_ms(update.sent_unix_ns));
+        let span_s = (now - self.begin).as_secs_f64();
+        if span_s < 1.0 {
+            return None;
+        }
+        self.delays_ms.sort_by(f64::total_cmp);
+        let tool = update.tools.first();
+        let second = Second {
+            time_s: update.time_s,
+            rate_hz: self.delays_ms.len() as f64 / span_s,
+            delay_ms_median: self.delays_ms[self.delays_ms.len() / 2],
+            delay_ms_worst: self.delays_ms[self.delays_ms.len() - 1],
+            skipped: update.skipped,
+            contact_force_n: tool.map_or(0.0, |t| magnitude(t.contact_force_n.as_ref())),
+            device_force_n: tool.map_or(0.0, |t| magnitude(t.device_force_n.as_ref())),
+            max_displacement_mm: 1e3 * update.max_displacement_m,
+            tick_cost_us: update.tick_cost_us as f32,
+        };
+        *self = Self::new(now);
+        Some(second)
+    }
+}
+
+fn magnitude(v: Option<&Vec3>) -> f64 {
+    v.map_or(0.0, |v| (v.x * v.x + v.y * v.y + v.z * v.z).sqrt())
+}
+
+/// Age of a time stamp on this machine's clock (ms); meaningful when daemon and viewer share it.
+fn delay_ms(sent_unix_ns: u64) -> f64 {
+    let now_ns = SystemTime::now().duration_since(UNIX_EPOCH).map_or(0.0, |d| d.as_nanos() as f64);
+    (now_ns - sent_unix_ns as f64) * 1e-6
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_second_counts_its_updates() {
+        let begin = Instant::now();
+        let mut window = Window::new(begin);
+        let force = Vec3 { x: 3.0, y: 0.0, z: 4.0 };
+        let tool = palpate_proto::v1::ToolState { contact_force_n: Some(force), ..Default::default() };
+        let update = SurfaceUpdate { tools: vec![tool], skipped: 3, max_displacement_m: 0.002, ..Default::default() };
+        for i in 0..10 {
+            assert!(window.take(&update, begin + Duration::from_millis(100 * i)).is_none());
+        }
+        let second = window.take(&update, begin + Duration::from_secs(1)).unwrap();
+        assert!((second.rate_hz - 11.0).abs() < 1e-9);
+        assert_eq!((second.contact_force_n, second.skipped, second.max_displacement_mm), (5.0, 3, 2.0));
+        assert!(window.delays_ms.is_empty());
+    }
+}
