@@ -1,0 +1,211 @@
+//! Collects what the readers of the single formats find, and makes a volume or a surface of it.
+use super::error::{FileError, Place, Problem};
+use super::{Group, SurfaceFile, VolumeFile};
+use glam::DVec3;
+use std::collections::{BTreeMap, HashMap};
+use std::path::Path;
+
+/// What becomes of an element.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Shape {
+    Point,
+    Triangle,
+    Polygon,
+    Tet,
+    /// Read past, and counted.
+    Other,
+}
+
+/// An element type of a format.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Kind {
+    pub(super) shape: Shape,
+    /// Name in messages, plural.
+    pub(super) name: &'static str,
+    /// Nodes at the corners; they come first.
+    pub(super) corners: usize,
+}
+
+/// A mesh in the making. Node indices are checked by the readers, who know the place of an error.
+#[derive(Debug, Default)]
+pub(super) struct Builder {
+    pub(super) nodes: Vec<DVec3>,
+    pub(super) warnings: Vec<String>,
+    /// Names of physical groups by dimension and tag; may come before or after the elements.
+    pub(super) names: HashMap<(u8, i64), String>,
+    groups: Vec<(u8, Option<i64>)>,
+    group_of: HashMap<(u8, Option<i64>), u32>,
+    tets: Vec<[u32; 4]>,
+    tet_group: Vec<u32>,
+    tet_of: HashMap<[u32; 4], u32>,
+    more_tet_groups: BTreeMap<usize, Vec<u32>>,
+    repeated_tets: usize,
+    triangles: Vec<[u32; 3]>,
+    surface_groups: BTreeMap<usize, Vec<[u32; 3]>>,
+    node_groups: BTreeMap<usize, Vec<u32>>,
+    skipped: BTreeMap<&'static str, usize>,
+    higher_order: BTreeMap<&'static str, usize>,
+}
+
+impl Builder {
+    /// Adds an element over `nodes` that belongs to the groups `tags` of its dimension.
+    pub(super) fn element(&mut self, kind: Kind, nodes: &[u32], tags: &[i64]) {
+        let corners = &nodes[..kind.corners.min(nodes.len())];
+        match (kind.shape, corners) {
+            (Shape::Tet, &[a, b, c, d]) => self.tet([a, b, c, d], tags),
+            (Shape::Triangle, &[a, b, c]) => self.triangle([a, b, c], tags),
+            (Shape::Polygon, &[first, _, _, ..]) => {
+                for pair in corners[1..].windows(2) {
+                    self.triangle([first, pair[0], pair[1]], tags);
+                }
+            }
+            (Shape::Point, &[node]) => {
+                for &tag in tags {
+                    let group = self.group(0, Some(tag)) as usize;
+                    self.node_groups.entry(group).or_default().push(node);
+                }
+            }
+            _ => return *self.skipped.entry(kind.name).or_default() += 1,
+        }
+        if nodes.len() > corners.len() {
+            *self.higher_order.entry(kind.name).or_default() += 1;
+        }
+    }
+
+    fn tet(&mut self, nodes: [u32; 4], tags: &[i64]) {
+        let mut key = nodes;
+        key.sort_unstable();
+        let new = self.tets.len() as u32;
+        let tet = *self.tet_of.entry(key).or_insert(new);
+        let mut tags = tags.iter();
+        if tet == new {
+            let group = self.group(3, tags.next().copied());
+            self.tets.push(nodes);
+            self.tet_group.push(group);
+        } else if tags.len() == 0 {
+            self.repeated_tets += 1;
+        }
+        for &tag in tags {
+            let group = self.group(3, Some(tag));
+            if self.tet_group[tet as usize] == group {
+                self.repeated_tets += 1;
+            } else {
+                self.more_tet_groups.entry(group as usize).or_default().push(tet);
+            }
+        }
+    }
+
+    fn triangle(&mut self, nodes: [u32; 3], tags: &[i64]) {
+        self.triangles.push(nodes);
+        for &tag in tags {
+            let group = self.group(2, Some(tag)) as usize;
+            self.surface_groups.entry(group).or_default().push(nodes);
+        }
+    }
+
+    /// Puts a node into a group of points.
+    pub(super) fn node_in_group(&mut self, node: u32, tag: i64) {
+        let group = self.group(0, Some(tag)) as usize;
+        self.node_groups.entry(group).or_default().push(node);
+    }
+
+    fn group(&mut self, dimension: u8, tag: Option<i64>) -> u32 {
+        let groups = &mut self.groups;
+        *self.group_of.entry((dimension, tag)).or_insert_with(|| {
+            groups.push((dimension, tag));
+            groups.len() as u32 - 1
+        })
+    }
+
+    fn named_groups(&self) -> Vec<Group> {
+        let named = |&(dimension, tag): &(u8, Option<i64>)| {
+            let name = match tag {
+                None => String::new(),
+                Some(tag) => self.names.get(&(dimension, tag)).cloned().unwrap_or_else(|| tag.to_string()),
+            };
+            Group { name, dimension, tag: tag.unwrap_or(0) }
+        };
+        self.groups.iter().map(named).collect()
+    }
+
+    /// What the file holds, for the message that it is not what was wanted.
+    fn inventory(&self) -> String {
+        let mut parts = vec![format!("{} nodes", self.nodes.len())];
+        if !self.triangles.is_empty() {
+            parts.push(format!("{} triangles", self.triangles.len()));
+        }
+        if !self.tets.is_empty() {
+            parts.push(format!("{} tetrahedra", self.tets.len()));
+        }
+        parts.extend(counted(&self.skipped));
+        parts.join(", ")
+    }
+
+    fn note(&mut self) {
+        if !self.skipped.is_empty() {
+            let skipped = counted(&self.skipped).join(", ");
+            self.warnings.push(format!("not used: {skipped}"));
+        }
+        if !self.higher_order.is_empty() {
+            let curved = counted(&self.higher_order).join(", ");
+            self.warnings.push(format!("of {curved} the corner nodes are used, the nodes between them are not"));
+        }
+        if self.repeated_tets > 0 {
+            self.warnings.push(format!("{} repeated tetrahedra are used once", self.repeated_tets));
+        }
+    }
+
+    /// The volume, if there are tets.
+    pub(super) fn into_volume(mut self, path: &Path) -> Result<VolumeFile, FileError> {
+        if self.tets.is_empty() {
+            return Err(FileError::new(path, Place::File, Problem::NoTets { found: self.inventory() }));
+        }
+        self.note();
+        Ok(VolumeFile {
+            path: path.to_path_buf(),
+            groups: self.named_groups(),
+            mesh_nodes: self.nodes,
+            tets: self.tets,
+            tet_group: self.tet_group,
+            more_tet_groups: self.more_tet_groups.into_iter().collect(),
+            surface_groups: self.surface_groups.into_iter().collect(),
+            node_groups: self.node_groups.into_iter().collect(),
+            warnings: self.warnings,
+        })
+    }
+
+    /// The surface, if there are triangles: every triangle of the file and the vertices they use.
+    pub(super) fn into_surface(mut self, path: &Path) -> Result<SurfaceFile, FileError> {
+        let all = self.triangles.len();
+        self.triangles.retain(|&[a, b, c]| a != b && b != c && c != a);
+        if self.triangles.is_empty() {
+            return Err(FileError::new(path, Place::File, Problem::NoTriangles { found: self.inventory() }));
+        }
+        self.note();
+        let collapsed = all - self.triangles.len();
+        if collapsed > 0 {
+            self.warnings.push(format!("{collapsed} triangles that use a vertex twice are left out"));
+        }
+        let mut index_of = vec![u32::MAX; self.nodes.len()];
+        let mut vertices = Vec::new();
+        for node in self.triangles.iter().flatten() {
+            if index_of[*node as usize] == u32::MAX {
+                index_of[*node as usize] = 0;
+            }
+        }
+        for (node, index) in index_of.iter_mut().enumerate().filter(|(_, index)| **index == 0) {
+            *index = vertices.len() as u32;
+            vertices.push(self.nodes[node]);
+        }
+        let unused = self.nodes.len() - vertices.len();
+        if unused > 0 {
+            self.warnings.push(format!("{unused} points that belong to no triangle are left out"));
+        }
+        let triangles = self.triangles.iter().map(|t| t.map(|node| index_of[node as usize])).collect();
+        Ok(SurfaceFile { vertices, triangles, warnings: self.warnings })
+    }
+}
+
+fn counted(counts: &BTreeMap<&'static str, usize>) -> Vec<String> {
+    counts.iter().map(|(name, count)| format!("{count} {name}")).collect()
+}

@@ -1,0 +1,103 @@
+//! Mesh and surface files: readers of the common formats, writers for frames.
+//!
+//! A reader never trusts a count, an index or a coordinate: what is wrong is a [`FileError`] with its place, and no
+//! file makes it set aside more memory than a small multiple of the file's size. Coordinates stay in the file's unit;
+//! [`VolumeFile::into_tet_mesh`] scales them to metres. What each format keeps: `docs/formats.md`.
+use glam::DVec3;
+use std::path::{Path, PathBuf};
+
+#[allow(dead_code)]
+mod builder;
+#[allow(dead_code)]
+mod cursor;
+mod error;
+mod format;
+mod msh;
+mod obj;
+mod ply;
+mod stl;
+mod tet_mesh;
+mod tetgen;
+mod vtk;
+mod write;
+
+pub use error::{FileError, Place, Problem};
+pub use tet_mesh::{GroupedMesh, UnusedNodes};
+pub use write::{Cells, Field, Values, VtuFrame, encode_vtu, write_obj, write_ply, write_pvd, write_stl, write_vtu};
+
+use builder::Builder;
+use format::Format;
+
+/// A named set of elements (Gmsh: a physical group).
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Group {
+    /// Its name; the tag in decimal where the file gives no name; empty for tets that belong to no group.
+    pub name: String,
+    /// 3 tets, 2 triangles, 0 nodes.
+    pub dimension: u8,
+    /// Its number in the file.
+    pub tag: i64,
+}
+
+/// A tetrahedral mesh as its file gives it, checked for finite coordinates and existing nodes only.
+#[derive(Debug, Clone, PartialEq)]
+pub struct VolumeFile {
+    /// Where it was read from.
+    pub path: PathBuf,
+    /// Nodes in file order and in the file's unit, unscaled; unused ones included.
+    pub mesh_nodes: Vec<DVec3>,
+    /// Nodes of every tet, as indices into `mesh_nodes`, in the file's orientation.
+    pub tets: Vec<[u32; 4]>,
+    /// For every tet, its (first) group as an index into `groups`.
+    pub tet_group: Vec<u32>,
+    /// Tets of a further group: index into `groups`, tets. Empty unless groups overlap.
+    pub more_tet_groups: Vec<(usize, Vec<u32>)>,
+    /// Groups in order of appearance.
+    pub groups: Vec<Group>,
+    /// Triangles by group: index into `groups`, node indices.
+    pub surface_groups: Vec<(usize, Vec<[u32; 3]>)>,
+    /// Points by group: index into `groups`, node indices.
+    pub node_groups: Vec<(usize, Vec<u32>)>,
+    /// What was skipped or changed, for the user to read.
+    pub warnings: Vec<String>,
+}
+
+/// A triangulated surface as its file gives it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SurfaceFile {
+    /// Vertices in the file's unit, unscaled; each is used by a triangle.
+    pub vertices: Vec<DVec3>,
+    /// Vertices of every triangle, in the file's orientation, all different.
+    pub triangles: Vec<[u32; 3]>,
+    /// What was skipped or changed, for the user to read.
+    pub warnings: Vec<String>,
+}
+
+/// Reads a tetrahedral mesh: Gmsh MSH, VTK legacy, VTU or TetGen. The content decides, then the extension.
+///
+/// # Errors
+/// A [`FileError`] with the place and what to do.
+pub fn read_volume(path: &Path) -> Result<VolumeFile, FileError> {
+    read(path)?.into_volume(path)
+}
+
+/// Reads a triangulated surface: STL, OBJ, PLY, VTK legacy, VTP, or the triangles of a volume's file.
+///
+/// # Errors
+/// A [`FileError`] with the place and what to do.
+pub fn read_surface(path: &Path) -> Result<SurfaceFile, FileError> {
+    read(path)?.into_surface(path)
+}
+
+fn read(path: &Path) -> Result<Builder, FileError> {
+    let data = format::load(path)?;
+    match format::recognise(path, &data)? {
+        Format::Msh => msh::read(path, &data),
+        Format::VtkLegacy => vtk::legacy::read(path, &data),
+        Format::VtkXml => vtk::xml::read(path, &data),
+        Format::TetGen => tetgen::read(path),
+        Format::Stl => stl::read(path, &data),
+        Format::Obj => obj::read(path, &data),
+        Format::Ply => ply::read(path, &data),
+    }
+}
