@@ -6,6 +6,7 @@
 pub mod builtin;
 pub mod drivers;
 pub mod error;
+pub mod files;
 pub mod fill;
 mod load;
 pub mod path;
