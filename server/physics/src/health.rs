@@ -1,5 +1,9 @@
 //! Energy ledger, inversion, and quarantine of non-finite state.
-use crate::world::{Model, State};
+use crate::{
+    contact::ToolState,
+    world::{Model, State},
+};
+use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
 /// What only time integration knows: work and dissipation since reset (J).
@@ -9,6 +13,32 @@ pub struct Ledger {
     pub external_work_j: f64,
     /// Energy taken by viscous stress and mass damping (J).
     pub dissipated_j: f64,
+}
+
+/// Power of viscous stress (W), as the leapfrog knows it, and the rate at which its force takes energy.
+///
+/// At step k the viscous force is `−C v_{k−½}`: the kernel reports `q_k = v_{k−½}ᵀ C v_{k−½}`, but the force works on
+/// `½(v_{k−½} + v_{k+½})`. With the polarisation of the quadratic form the work is
+/// `dt (¾ q_k + ¼ q_{k+1}) + O(dt³) = dt (q_k + ¼(q_k − q_{k−1})) + O(dt³)`, which needs no future.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+pub struct ViscousPower {
+    /// `q_k` (W).
+    pub latest_w: f64,
+    /// `q_{k−1}` (W).
+    pub before_w: f64,
+}
+
+impl ViscousPower {
+    /// Takes `q_k`; the first one after a start has no predecessor, and its velocity is not late.
+    pub fn record(&mut self, power_w: f64, has_predecessor: bool) {
+        self.before_w = if has_predecessor { self.latest_w } else { power_w };
+        self.latest_w = power_w;
+    }
+
+    /// `q_k + ¼(q_k − q_{k−1})` (W).
+    pub fn work_rate_w(&self) -> f64 {
+        self.latest_w + 0.25 * (self.latest_w - self.before_w)
+    }
 }
 
 /// The ledger with the energies of a state (J).
@@ -81,17 +111,56 @@ pub fn min_volume_ratio(model: &Model, state: &State) -> (f64, usize) {
 pub struct Quarantine {
     /// Tick whose result was refused.
     pub tick: u64,
-    /// First node that was not finite.
+    /// First node that was not finite, or [`Quarantine::NOT_A_NODE`].
     pub node: u32,
 }
 
-/// First node whose position or velocity is not finite.
+impl Quarantine {
+    /// In place of a node: a tool, a load's work or a sum was not finite.
+    pub const NOT_A_NODE: u32 = u32::MAX;
+}
+
+/// The state to go back to.
+#[derive(Debug, Clone)]
+pub(crate) struct LastGood {
+    x: Vec<DVec3>,
+    tools: Vec<ToolState>,
+    load_factors: Vec<f64>,
+    ledger: Ledger,
+    viscous: ViscousPower,
+}
+
+impl LastGood {
+    pub(crate) fn new(nodes: usize, tools: Vec<ToolState>, loads: usize) -> Self {
+        let (ledger, viscous) = (Ledger::default(), ViscousPower::default());
+        Self { x: vec![DVec3::ZERO; nodes], tools, load_factors: vec![0.0; loads], ledger, viscous }
+    }
+
+    /// Copies what a tick may spoil. Allocates nothing.
+    pub(crate) fn keep(&mut self, state: &State) {
+        self.x.copy_from_slice(&state.x);
+        self.tools.clone_from_slice(&state.tools);
+        self.load_factors.copy_from_slice(&state.load_factors);
+        (self.ledger, self.viscous) = (state.ledger, state.viscous);
+    }
+
+    pub(crate) fn put_back(&self, state: &mut State) {
+        state.x.copy_from_slice(&self.x);
+        state.tools.clone_from_slice(&self.tools);
+        state.load_factors.copy_from_slice(&self.load_factors);
+        (state.ledger, state.viscous) = (self.ledger, self.viscous);
+    }
+}
+
+/// What in a state is not finite: a node whose position or velocity is not, or [`Quarantine::NOT_A_NODE`].
 pub fn first_non_finite(state: &State) -> Option<u32> {
     // One pass of additions: a sum is finite only if every term is (overflow of finite terms is caught as well).
-    let sum: glam::DVec3 = state.x.iter().zip(&state.v).map(|(x, v)| *x + *v).sum();
-    if sum.is_finite() {
+    let sum: DVec3 = state.x.iter().zip(&state.v).map(|(x, v)| *x + *v).sum();
+    let tools: DVec3 = state.tools.iter().map(|tool| tool.centre_m + tool.velocity_m_per_s + tool.device_force_n).sum();
+    let work = state.ledger.external_work_j + state.ledger.dissipated_j;
+    if sum.is_finite() && tools.is_finite() && work.is_finite() {
         return None;
     }
     let node = state.x.iter().zip(&state.v).position(|(x, v)| !x.is_finite() || !v.is_finite());
-    Some(node.unwrap_or(0) as u32)
+    Some(node.map_or(Quarantine::NOT_A_NODE, |node| node as u32))
 }

@@ -1,8 +1,12 @@
 //! Save, restore, hash: the whole dynamic state as bytes.
 //!
 //! Layout (little-endian): `PLPS`, version (u32), fingerprint of the body (u64), checksum of what follows (u64), state
-//! (postcard). A state goes back only into the body it came from: same rest positions, same tets, same tools.
-use crate::world::{Model, State};
+//! (postcard). A state goes back only into the body it came from: same mesh, materials, loads, tools and settings.
+use crate::{
+    contact::ToolState,
+    world::{Model, ModelSpec, State},
+};
+use std::fmt::Write;
 use thiserror::Error;
 
 const MAGIC: [u8; 4] = *b"PLPS";
@@ -26,7 +30,9 @@ pub enum SnapshotError {
         found: u32,
     },
     /// Of another body.
-    #[error("the snapshot belongs to another body: mesh or tools differ from the loaded scene's")]
+    #[error(
+        "the snapshot belongs to another body: mesh, materials, loads, tools or settings differ from the loaded scene's"
+    )]
     OtherBody,
     /// Damaged.
     #[error("the snapshot is damaged: {what}")]
@@ -71,9 +77,14 @@ pub fn restore(model: &Model, bytes: &[u8]) -> Result<State, SnapshotError> {
     if word(header, 16) != fnv(OFFSET, body.iter().copied()) {
         return Err(SnapshotError::Damaged { what: "its checksum is wrong" });
     }
-    let state: State =
-        postcard::from_bytes(body).map_err(|_| SnapshotError::Damaged { what: "it ends early or has other fields" })?;
+    let (mut state, rest): (State, &[u8]) = postcard::take_from_bytes(body)
+        .map_err(|_| SnapshotError::Damaged { what: "it ends early or has other fields" })?;
+    if !rest.is_empty() {
+        return Err(SnapshotError::Damaged { what: "bytes follow its end" });
+    }
     check(model, &state)?;
+    state.contact =
+        model.contact().adopt(&state.contact).ok_or(SnapshotError::Damaged { what: "its contact does not fit" })?;
     Ok(state)
 }
 
@@ -85,10 +96,16 @@ fn check(model: &Model, state: &State) -> Result<(), SnapshotError> {
     if !counts {
         return Err(SnapshotError::OtherBody);
     }
-    if crate::health::first_non_finite(state).is_some() {
-        return Err(SnapshotError::Damaged { what: "a position or velocity is not finite" });
-    }
-    Ok(())
+    if is_finite(state) { Ok(()) } else { Err(SnapshotError::Damaged { what: "a number in it is not finite" }) }
+}
+
+fn is_finite(state: &State) -> bool {
+    let vectors = [&state.x, &state.v, &state.force_n, &state.external_n];
+    let (ledger, viscous) = (&state.ledger, &state.viscous);
+    let sums = [ledger.external_work_j, ledger.dissipated_j, viscous.latest_w, viscous.before_w];
+    vectors.iter().all(|list| list.iter().all(|a| a.is_finite()))
+        && state.tools.iter().all(ToolState::is_finite)
+        && state.load_factors.iter().chain(&sums).all(|n| n.is_finite())
 }
 
 fn word(header: &[u8], at: usize) -> u64 {
@@ -98,13 +115,26 @@ fn word(header: &[u8], at: usize) -> u64 {
     u64::from_le_bytes(bytes)
 }
 
-/// Hash of what makes a body: rest positions, tets, names of tools.
+/// Hash of what makes a body: rest positions, tets, and everything else it was built from, as it prints.
 fn fingerprint(model: &Model) -> u64 {
     let positions =
         model.rest_positions_m().iter().flat_map(glam::DVec3::to_array).flat_map(|c| c.to_bits().to_le_bytes());
     let tets = model.mesh().tets().iter().flatten().flat_map(|n| n.to_le_bytes());
-    let tools = model.spec().tools.iter().flat_map(|tool| tool.name.bytes().chain([0]));
-    fnv(OFFSET, positions.chain(tets).chain(tools))
+    let ModelSpec { mesh: _, regions, tet_region, prescribed, loads, gravity_m_per_s2, tools, settings } = model.spec();
+    let mut hash = Fnv(fnv(OFFSET, positions.chain(tets)));
+    // A float prints as the shortest text that reads back to its bits. Writing to the hash cannot fail.
+    let rest = (regions, tet_region, prescribed, loads, gravity_m_per_s2, tools, settings);
+    let _ = write!(hash, "{rest:?}");
+    hash.0
+}
+
+struct Fnv(u64);
+
+impl Write for Fnv {
+    fn write_str(&mut self, text: &str) -> std::fmt::Result {
+        self.0 = fnv(self.0, text.bytes());
+        Ok(())
+    }
 }
 
 const OFFSET: u64 = 0xcbf2_9ce4_8422_2325;

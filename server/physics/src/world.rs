@@ -1,14 +1,14 @@
 //! [`Model`] (constant after load), [`State`] (what a tick changes) and [`Scratch`] (buffers, no meaning between ticks).
 use crate::{
-    contact::{ContactModel, ContactScratch, ToolSpec, ToolState, ToolTarget},
+    contact::{ContactModel, ContactScratch, ContactState, SurfaceModuli, ToolSpec, ToolState, ToolTarget},
     fem::{element::RestTet, mass},
-    health::{Ledger, Quarantine},
+    health::{LastGood, Ledger, Quarantine, ViscousPower},
     integrate::spectrum,
     material::Material,
     mesh::{MeshError, Surface, TetMesh},
     simd::{ForceKernel, KernelScratch},
 };
-use glam::DVec3;
+use glam::{DVec2, DVec3};
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
@@ -222,13 +222,8 @@ impl Model {
         let mass_kg = mass::lumped_kg(&spec.mesh, density);
         let inverse_mass_per_kg = free_inverse_mass(&mass_kg, &spec.prescribed)?;
         let kernel = ForceKernel::build(&spec.mesh, &rest_tets, &spec.tet_region, &materials, spec.settings.precision);
-        let contact = ContactModel::build(
-            &spec.mesh,
-            &surface,
-            &p_wave_modulus_of_triangles(&spec, &surface),
-            &mass_kg,
-            &spec.tools,
-        );
+        let contact =
+            ContactModel::build(&spec.mesh, &surface, &moduli_of_triangles(&spec, &surface), &mass_kg, &spec.tools);
         let omega = spectrum::max_natural_frequency_rad_per_s(
             &spec.mesh,
             &rest_tets,
@@ -299,6 +294,9 @@ impl Model {
     pub fn max_natural_frequency_rad_per_s(&self) -> f64 {
         self.max_natural_frequency_rad_per_s
     }
+    fn tools_at_start(&self) -> Vec<ToolState> {
+        self.spec.tools.iter().map(ToolState::at_start).collect()
+    }
     /// Substeps per tick.
     pub fn substeps(&self) -> u32 {
         self.substeps
@@ -322,10 +320,14 @@ pub struct State {
     pub force_is_current: bool,
     /// Tools, one per [`ModelSpec::tools`].
     pub tools: Vec<ToolState>,
+    /// What contact remembers: samples touched, friction springs, and geometry that follows from `x`.
+    pub contact: ContactState,
     /// Factor of every load at the end of the last tick.
     pub load_factors: Vec<f64>,
     /// Work and dissipation since reset.
     pub ledger: Ledger,
+    /// Power of viscous stress at the last two substeps.
+    pub viscous: ViscousPower,
     /// Set when a tick's result was not finite.
     pub quarantine: Option<Quarantine>,
 }
@@ -341,11 +343,47 @@ impl State {
             force_n: vec![DVec3::ZERO; nodes],
             external_n: vec![DVec3::ZERO; nodes],
             force_is_current: false,
-            tools: model.spec.tools.iter().map(ToolState::at_start).collect(),
+            tools: model.tools_at_start(),
+            contact: model.contact.state(),
             load_factors: vec![0.0; model.spec.loads.len()],
             ledger: Ledger::default(),
+            viscous: ViscousPower::default(),
             quarantine: None,
         }
+    }
+
+    /// Copies another state of the same model into the buffers it has: allocates nothing.
+    pub fn copy_from(&mut self, other: &Self) {
+        self.tick = other.tick;
+        self.x.copy_from_slice(&other.x);
+        self.v.copy_from_slice(&other.v);
+        self.force_n.copy_from_slice(&other.force_n);
+        self.external_n.copy_from_slice(&other.external_n);
+        self.force_is_current = other.force_is_current;
+        self.tools.clone_from_slice(&other.tools);
+        self.contact.copy_from(&other.contact);
+        self.load_factors.copy_from_slice(&other.load_factors);
+        self.ledger = other.ledger;
+        self.viscous = other.viscous;
+        self.quarantine = other.quarantine;
+    }
+
+    /// Back to rest at tick 0, as [`Self::at_rest`], in the buffers it has: allocates nothing.
+    pub fn reset(&mut self, model: &Model) {
+        self.tick = 0;
+        self.x.copy_from_slice(model.rest_positions_m());
+        for buffer in [&mut self.v, &mut self.force_n, &mut self.external_n] {
+            buffer.fill(DVec3::ZERO);
+        }
+        self.force_is_current = false;
+        for (tool, spec) in self.tools.iter_mut().zip(&model.spec.tools) {
+            *tool = ToolState::at_start(spec);
+        }
+        self.contact.clear();
+        self.load_factors.fill(0.0);
+        self.ledger = Ledger::default();
+        self.viscous = ViscousPower::default();
+        self.quarantine = None;
     }
 
     /// Simulated time (s) since reset.
@@ -359,8 +397,7 @@ impl State {
 pub struct Scratch {
     /// Reaction forces (N) of constrained axes at the end of the tick.
     pub(crate) reaction_n: Vec<DVec3>,
-    pub(crate) last_good_x: Vec<DVec3>,
-    pub(crate) last_good_v: Vec<DVec3>,
+    pub(crate) last_good: LastGood,
     pub(crate) kernel: KernelScratch,
     pub(crate) contact: ContactScratch,
 }
@@ -371,11 +408,15 @@ impl Scratch {
         let nodes = model.rest_positions_m().len();
         Self {
             reaction_n: vec![DVec3::ZERO; nodes],
-            last_good_x: vec![DVec3::ZERO; nodes],
-            last_good_v: vec![DVec3::ZERO; nodes],
+            last_good: LastGood::new(nodes, model.tools_at_start(), model.spec.loads.len()),
             kernel: model.kernel.scratch(),
             contact: model.contact.scratch(),
         }
+    }
+
+    /// Off switch of contact's broad phase ([`ContactScratch::set_exhaustive`]): same bits, only slower.
+    pub fn set_exhaustive_contact(&mut self, on: bool) {
+        self.contact.set_exhaustive(on);
     }
 
     /// Force (N) that holds each prescribed degree of freedom, at the end of the last tick; zero on free ones.
@@ -423,16 +464,19 @@ pub struct StepReport {
     pub quarantined: Option<Quarantine>,
 }
 
-fn p_wave_modulus_of_triangles(spec: &ModelSpec, surface: &Surface) -> Vec<f64> {
-    let mut modulus_of_node = vec![0.0_f64; spec.mesh.positions_m().len()];
+/// Mean over a triangle's corners of the stiffest tet at each.
+fn moduli_of_triangles(spec: &ModelSpec, surface: &Surface) -> Vec<SurfaceModuli> {
+    let mut of_node = vec![DVec2::ZERO; spec.mesh.positions_m().len()];
     for (tet, nodes) in spec.mesh.tets().iter().enumerate() {
-        let modulus = spec.regions[spec.tet_region[tet] as usize].material.lame.p_wave_modulus_pa();
+        let lame = spec.regions[spec.tet_region[tet] as usize].material.lame;
+        let indentation = lame.young_modulus_pa() / (1.0 - lame.poisson_ratio().powi(2));
         for &node in nodes {
-            modulus_of_node[node as usize] = modulus_of_node[node as usize].max(modulus);
+            of_node[node as usize] = of_node[node as usize].max(DVec2::new(lame.p_wave_modulus_pa(), indentation));
         }
     }
+    let mean = |triangle| surface.triangle_nodes(triangle).iter().map(|&n| of_node[n as usize]).sum::<DVec2>() / 3.0;
     (0..surface.triangles.len())
-        .map(|t| surface.triangle_nodes(t).iter().map(|&n| modulus_of_node[n as usize]).sum::<f64>() / 3.0)
+        .map(|triangle| SurfaceModuli { p_wave_pa: mean(triangle).x, indentation_pa: mean(triangle).y })
         .collect()
 }
 
@@ -495,6 +539,7 @@ fn relaxation_time_s(material: &Material) -> f64 {
 mod check {
     //! The specification's ranges.
     use super::{LoadSpec, ModelError, ModelSpec, Substeps, Surface};
+    use crate::contact::{Coupling, ToolSpec};
 
     pub(super) fn spec(spec: &ModelSpec, surface: &Surface) -> Result<(), ModelError> {
         regions(spec)?;
@@ -511,13 +556,26 @@ mod check {
                 }
             }
         }
-        for tool in &spec.tools {
-            let ok = tool.radius_m > 0.0 && tool.radius_m.is_finite();
-            setting("tool radius_m", tool.radius_m, ok, "must be finite and larger than 0")?;
-            let mu = tool.friction_coefficient;
-            setting("friction_coefficient", mu, mu >= 0.0 && mu.is_finite(), "must be finite and not negative")?;
-        }
+        spec.tools.iter().try_for_each(tool)?;
         settings(spec)
+    }
+
+    fn tool(tool: &ToolSpec) -> Result<(), ModelError> {
+        let positive = |name, value: f64| {
+            setting(name, value, value > 0.0 && value.is_finite(), "must be finite and larger than 0")
+        };
+        let not_negative = |name, value: f64| {
+            setting(name, value, value >= 0.0 && value.is_finite(), "must be finite and not negative")
+        };
+        positive("tool radius_m", tool.radius_m)?;
+        not_negative("friction_coefficient", tool.friction_coefficient)?;
+        if let Coupling::Spring { stiffness_n_per_m, damping_n_s_per_m, mass_kg } = tool.coupling {
+            positive("coupling_stiffness_n_per_m", stiffness_n_per_m)?;
+            not_negative("coupling_damping_n_s_per_m", damping_n_s_per_m)?;
+            positive("tool mass_kg", mass_kg)?;
+        }
+        let start = tool.start_position_m.length();
+        setting("tool start_position_m", start, start.is_finite(), "must be finite")
     }
 
     fn regions(spec: &ModelSpec) -> Result<(), ModelError> {

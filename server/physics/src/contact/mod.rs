@@ -1,12 +1,35 @@
 //! Spherical tools against the deforming surface.
+//!
+//! Once a substep, for every tool: it moves ([`proxy`]), the broad phase lists the triangles near it ([`broad`]), samples
+//! fixed in the surface press and rub ([`foundation`], [`narrow`]), and the forces go to nodes and tool by the transpose.
+//! Once a tick the contact is summed up for the servo loop ([`local_model`]).
+mod broad;
+mod foundation;
+mod local_model;
+mod narrow;
+mod proxy;
+mod state;
+mod touching;
+mod triangle;
+
+pub use proxy::SubstepTime;
+pub use state::ContactState;
+pub use triangle::{closest_point, closest_weights};
+
 use crate::mesh::{Surface, TetMesh};
+use broad::Triangles;
+use foundation::{Foundation, SampleTables};
 use glam::{DMat3, DVec3};
+use local_model::MeanContact;
+use narrow::{Meeting, Pressed};
 use serde::{Deserialize, Serialize};
+use touching::Touching;
 
 /// How a tool follows its device.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Coupling {
-    /// The tool is where the device is: a kinematic sphere (trajectories, known-answer tests).
+    /// The tool is where the device is: a kinematic sphere (trajectories, known-answer tests). It moves in a straight line
+    /// during the tick; nothing keeps it outside if it is driven further than its radius in one substep.
     Rigid,
     /// The tool is a mass on a spring and damper to the device (virtual coupling): the proxy stays outside the body
     /// while the device may be inside.
@@ -49,7 +72,7 @@ pub struct ToolTarget {
 pub struct ToolState {
     /// Centre of the tool, the proxy (m).
     pub centre_m: DVec3,
-    /// Its velocity (m/s).
+    /// Its velocity (m/s), at the same time.
     pub velocity_m_per_s: DVec3,
     /// Device position and velocity at the end of the last tick.
     pub target: ToolTarget,
@@ -57,12 +80,16 @@ pub struct ToolState {
     pub previous_target: ToolTarget,
     /// Force of the body on the tool (N), mean over the tick's substeps.
     pub contact_force_n: DVec3,
-    /// Force on the device (N): the coupling's, or the contact force of a rigid tool.
+    /// Force on the device (N), mean over the tick's substeps: the coupling's, or the contact force of a rigid tool.
     pub device_force_n: DVec3,
-    /// Contact samples that carry force.
+    /// Contact samples that carry force, at the end of the tick.
     pub contacts: u32,
-    /// Deepest penetration of the tool into the surface (m).
+    /// Deepest penetration of the tool into the surface during the tick (m).
     pub penetration_m: f64,
+    /// Energy stored in the contact's foundation at the end of the tick (J).
+    pub contact_energy_j: f64,
+    /// Heat of friction since reset (J).
+    pub friction_heat_j: f64,
     /// Linear model of the contact about the device position; `None` out of contact.
     pub local_model: Option<LocalContactModel>,
 }
@@ -94,9 +121,52 @@ impl ToolState {
             device_force_n: DVec3::ZERO,
             contacts: 0,
             penetration_m: 0.0,
+            contact_energy_j: 0.0,
+            friction_heat_j: 0.0,
             local_model: None,
         }
     }
+
+    pub(crate) fn is_finite(&self) -> bool {
+        let targets = [&self.target, &self.previous_target];
+        let vectors = [self.centre_m, self.velocity_m_per_s, self.contact_force_n, self.device_force_n];
+        let model = self.local_model.is_none_or(|m| {
+            [m.point_m, m.normal, m.force_n].iter().all(|a| a.is_finite())
+                && m.stiffness_n_per_m.is_finite()
+                && m.validity_radius_m.is_finite()
+        });
+        model
+            && vectors.iter().all(|a| a.is_finite())
+            && targets.iter().all(|t| t.position_m.is_finite() && t.velocity_m_per_s.is_finite())
+            && [self.penetration_m, self.contact_energy_j, self.friction_heat_j].iter().all(|n| n.is_finite())
+    }
+
+    /// Ends its contact: no force, no speed.
+    pub(crate) fn let_go(&mut self) {
+        let (target, friction_heat_j) = (self.target, self.friction_heat_j);
+        *self = Self {
+            centre_m: self.centre_m,
+            velocity_m_per_s: DVec3::ZERO,
+            target,
+            previous_target: target,
+            friction_heat_j,
+            contact_force_n: DVec3::ZERO,
+            device_force_n: DVec3::ZERO,
+            contacts: 0,
+            penetration_m: 0.0,
+            contact_energy_j: 0.0,
+            local_model: None,
+        };
+    }
+}
+
+/// Elastic moduli behind a boundary triangle.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SurfaceModuli {
+    /// `λ + 2µ` (Pa).
+    pub p_wave_pa: f64,
+    /// `E/(1 − ν²)` (Pa).
+    pub indentation_pa: f64,
 }
 
 /// What contact needs that depends on the rest state alone.
@@ -104,56 +174,240 @@ impl ToolState {
 pub struct ContactModel {
     /// Bound on the square of the natural frequency that contact adds (rad²/s²): λ_max(A + B) ≤ λ_max(A) + λ_max(B).
     pub frequency_bound_sq: f64,
+    triangles: Triangles,
+    tables: SampleTables,
+    tools: Vec<ToolModel>,
+}
+
+/// What contact needs of one tool.
+#[derive(Debug, Clone)]
+struct ToolModel {
+    spec: ToolSpec,
+    foundation: Foundation,
+    /// Where the coupling saturates (N).
+    force_limit_n: f64,
+    /// Bound of the tool's kinetic energy near the surface (J).
+    impact_energy_j: f64,
+}
+
+/// The body at one instant.
+#[derive(Debug, Clone, Copy)]
+pub struct Body<'a> {
+    /// Positions (m) of its nodes.
+    pub x: &'a [DVec3],
+    /// Bound of the speed (m/s) with which any node came here; see [`fastest_m_per_s`].
+    pub fastest_m_per_s: f64,
 }
 
 /// Buffers of contact.
 #[derive(Debug, Clone, Default)]
-pub struct ContactScratch {}
+pub struct ContactScratch {
+    tools: Vec<ToolScratch>,
+    exhaustive: bool,
+}
+
+#[derive(Debug, Clone)]
+struct ToolScratch {
+    next: Touching,
+    sum: Pressed,
+    coupling_sum_n: DVec3,
+}
+
+impl ContactScratch {
+    /// Off switch of the broad phase: every triangle is looked at in every substep. Same bits, only slower.
+    pub fn set_exhaustive(&mut self, on: bool) {
+        self.exhaustive = on;
+    }
+}
+
+impl Coupling {
+    /// What the coupling, and contact of total stiffness `contact_n_per_m` on a tool that is a mass, add (rad²/s²).
+    fn frequency_bound_sq(self, contact_n_per_m: f64) -> f64 {
+        match self {
+            Self::Rigid => 0.0,
+            Self::Spring { stiffness_n_per_m, mass_kg, .. } => (stiffness_n_per_m + contact_n_per_m) / mass_kg,
+        }
+    }
+}
+
+impl ToolModel {
+    fn new(spec: &ToolSpec, foundation: Foundation) -> Self {
+        let radius_m = spec.radius_m;
+        let depth_m = proxy::IMPACT_DEPTH * radius_m;
+        Self {
+            spec: spec.clone(),
+            force_limit_n: foundation.flat_force_n(radius_m, proxy::SATURATION_DEPTH * radius_m),
+            // ∫ π k_f R d² dd
+            impact_energy_j: foundation.flat_force_n(radius_m, depth_m) * depth_m / 3.0,
+            foundation,
+        }
+    }
+
+    fn near_speed_m_per_s(&self, fastest_m_per_s: f64) -> f64 {
+        match self.spec.coupling {
+            Coupling::Rigid => f64::INFINITY,
+            Coupling::Spring { mass_kg, .. } => fastest_m_per_s + (2.0 * self.impact_energy_j / mass_kg).sqrt(),
+        }
+    }
+}
 
 impl ContactModel {
-    /// Precomputes contact samples and the foundation stiffness. `p_wave_modulus_pa[triangle]` is that of the tet behind it.
+    /// Precomputes contact samples and the foundation stiffness. `moduli[triangle]` are those of the tets behind it.
     pub fn build(
-        _mesh: &TetMesh,
-        _surface: &Surface,
-        _p_wave_modulus_pa: &[f64],
-        _mass_kg: &[f64],
-        _tools: &[ToolSpec],
+        mesh: &TetMesh,
+        surface: &Surface,
+        moduli: &[SurfaceModuli],
+        mass_kg: &[f64],
+        tools: &[ToolSpec],
     ) -> Self {
-        Self::default()
+        if tools.is_empty() {
+            return Self::default();
+        }
+        let triangles = Triangles::of(surface, mesh.positions_m());
+        let foundation = |tool: &ToolSpec| Foundation::new(&triangles, mesh.positions_m(), moduli, tool.radius_m);
+        let tools: Vec<ToolModel> = tools.iter().map(|tool| ToolModel::new(tool, foundation(tool))).collect();
+        let bound = |tool: &ToolModel| tool.foundation.frequency_bound_sq(&triangles, mass_kg, &tool.spec);
+        Self { frequency_bound_sq: tools.iter().map(bound).sum(), tables: SampleTables::new(), tools, triangles }
+    }
+
+    /// Force (N) at which a tool's coupling saturates; infinite for a rigid tool.
+    pub fn force_limit_n(&self, tool: usize) -> f64 {
+        match self.tools[tool].spec.coupling {
+            Coupling::Rigid => f64::INFINITY,
+            Coupling::Spring { .. } => self.tools[tool].force_limit_n,
+        }
+    }
+
+    /// Contact's part of the state, touching nothing.
+    pub fn state(&self) -> ContactState {
+        ContactState::new(self)
+    }
+
+    /// A state read from a snapshot, in buffers of this model's size; `None` when it does not fit.
+    pub(crate) fn adopt(&self, saved: &ContactState) -> Option<ContactState> {
+        self.state().adopt(saved, |tool| self.tools[tool].foundation.samples)
     }
 
     /// Buffers large enough for every tick.
     pub fn scratch(&self) -> ContactScratch {
-        ContactScratch {}
+        let tool = |tool: &ToolModel| ToolScratch {
+            next: Touching::with_capacity(tool.foundation.samples),
+            sum: Pressed::default(),
+            coupling_sum_n: DVec3::ZERO,
+        };
+        ContactScratch { tools: self.tools.iter().map(tool).collect(), exhaustive: false }
     }
 
-    /// Once a tick: broad phase for every tool, from where it is towards its target, over `tick_period_s`.
-    pub fn begin_tick(
-        &self,
-        _surface: &Surface,
-        _x: &[DVec3],
-        _v: &[DVec3],
-        _tools: &mut [ToolState],
-        _tick_period_s: f64,
-        _scratch: &mut ContactScratch,
-    ) {
+    /// Once a tick, before its first substep.
+    pub fn begin_tick(&self, tools: &mut [ToolState], scratch: &mut ContactScratch) {
+        for (tool, scratch) in tools.iter_mut().zip(&mut scratch.tools) {
+            tool.penetration_m = 0.0;
+            scratch.sum = Pressed::default();
+            scratch.coupling_sum_n = DVec3::ZERO;
+        }
     }
 
-    /// Once a substep, after the body drifted: moves the tools over `dt_s` (`fraction` of the tick is then done), and adds
-    /// contact forces (N) on nodes to `forces_n`.
+    /// Once a substep, after the body drifted: moves the tools with it, and adds contact forces (N) on nodes to `forces_n`.
     pub fn substep(
         &self,
-        _surface: &Surface,
-        _x: &[DVec3],
-        _v: &[DVec3],
-        _tools: &mut [ToolState],
-        _fraction: f64,
-        _dt_s: f64,
-        _forces_n: &mut [DVec3],
-        _scratch: &mut ContactScratch,
+        body: &Body<'_>,
+        time: &SubstepTime,
+        tools: &mut [ToolState],
+        contact: &mut ContactState,
+        forces_n: &mut [DVec3],
+        scratch: &mut ContactScratch,
     ) {
+        contact.travelled(body.fastest_m_per_s * time.dt_s);
+        let exhaustive = scratch.exhaustive;
+        for (index, (tool, scratch)) in tools.iter_mut().zip(&mut scratch.tools).enumerate() {
+            let model = &self.tools[index];
+            let moved_m = proxy::drift(model, tool, contact.tools[index].force_n, time);
+            contact.tools[index].candidates.slack_m -= moved_m;
+            self.list_candidates(index, tool.centre_m, body.x, contact, exhaustive);
+            let pressed = self.press(index, tool.centre_m, body.x, contact, forces_n, scratch);
+            let near = pressed.distance_m < (1.0 + proxy::NEAR) * model.spec.radius_m;
+            let near_speed = near.then(|| model.near_speed_m_per_s(body.fastest_m_per_s));
+            let coupling_n = proxy::finish(model, tool, pressed.force_n, time, near_speed);
+            tool.friction_heat_j += pressed.heat_j;
+            tool.contacts = pressed.contacts;
+            tool.contact_energy_j = pressed.energy_j;
+            tool.penetration_m = tool.penetration_m.max(pressed.penetration_m);
+            if time.dt_s > 0.0 {
+                scratch.sum.add(&pressed);
+                scratch.coupling_sum_n += coupling_n;
+            }
+        }
     }
 
-    /// Once a tick, at its end: means, penetration and local models.
-    pub fn end_tick(&self, _tools: &mut [ToolState], _substeps: u32, _scratch: &mut ContactScratch) {}
+    fn list_candidates(&self, tool: usize, centre_m: DVec3, x: &[DVec3], contact: &mut ContactState, exhaustive: bool) {
+        let radius_m = self.tools[tool].spec.radius_m;
+        let (inner_m, reach_m) = ((1.0 + proxy::NEAR) * radius_m, (1.0 + 2.0 * proxy::NEAR) * radius_m);
+        let (part, boxes, travel_m) = contact.split(tool);
+        if exhaustive {
+            self.triangles.list_all(&mut part.candidates);
+        } else if part.candidates.slack_m <= 0.0 {
+            self.triangles.query(x, (boxes, travel_m), centre_m, (reach_m, inner_m), &mut part.candidates);
+        }
+    }
+
+    fn press(
+        &self,
+        tool: usize,
+        centre_m: DVec3,
+        x: &[DVec3],
+        contact: &mut ContactState,
+        forces_n: &mut [DVec3],
+        scratch: &mut ToolScratch,
+    ) -> Pressed {
+        let (model, part) = (&self.tools[tool], &mut contact.tools[tool]);
+        let meeting = Meeting {
+            triangles: &self.triangles,
+            foundation: &model.foundation,
+            tables: &self.tables,
+            x,
+            centre_m,
+            radius_m: model.spec.radius_m,
+            friction_coefficient: model.spec.friction_coefficient,
+        };
+        let candidates = part.candidates.triangles();
+        let pressed = narrow::press(&meeting, candidates, &mut part.touching, &mut scratch.next, forces_n);
+        part.force_n = pressed.force_n;
+        pressed
+    }
+
+    /// Once a tick, at its end: means and local models.
+    pub fn end_tick(
+        &self,
+        tools: &mut [ToolState],
+        contact: &mut ContactState,
+        substeps: u32,
+        scratch: &mut ContactScratch,
+    ) {
+        let share = 1.0 / f64::from(substeps);
+        for (index, (tool, scratch)) in tools.iter_mut().zip(&scratch.tools).enumerate() {
+            let model = &self.tools[index];
+            let pressed = scratch.sum.scaled(share);
+            tool.contact_force_n = pressed.force_n;
+            tool.device_force_n = match model.spec.coupling {
+                Coupling::Rigid => pressed.force_n,
+                Coupling::Spring { .. } => -scratch.coupling_sum_n * share,
+            };
+            let mean = MeanContact { pressed, device_force_n: tool.device_force_n };
+            tool.local_model = local_model::update(model, tool, &mut contact.tools[index].estimate, &mean);
+        }
+    }
+}
+
+/// Largest speed (m/s) of any node.
+pub fn fastest_m_per_s(v: &[DVec3]) -> f64 {
+    // Four running maxima, so that one does not wait for the other.
+    let mut most = [0.0_f64; 4];
+    let mut chunks = v.chunks_exact(4);
+    for chunk in &mut chunks {
+        for lane in 0..4 {
+            most[lane] = most[lane].max(chunk[lane].length_squared());
+        }
+    }
+    let rest = chunks.remainder().iter().map(|v| v.length_squared());
+    most.into_iter().chain(rest).fold(0.0, f64::max).sqrt()
 }

@@ -11,12 +11,12 @@
 //! velocity half a step late, which the step bound of `world::choose_substeps` accounts for.
 //!
 //! Ledger: the work of a force `g` over a kick of length `h` is exactly its share of the kinetic change,
-//! `h g·(v + ½h f/m)`.
+//! `h g·(v + ½h f/m)`; what viscous stress takes is second order in dt ([`ViscousPower`]).
 use crate::{
-    contact::ToolTarget,
+    contact::{self, Body, SubstepTime, ToolTarget},
     fem::loads,
     health::{Quarantine, first_non_finite},
-    world::{LoadSpec, Model, Scratch, State, StepReport, TickInput},
+    world::{LoadSpec, Model, PointForce, Scratch, State, StepReport, TickInput},
 };
 use glam::DVec3;
 
@@ -28,8 +28,7 @@ pub fn step(model: &Model, state: &mut State, scratch: &mut Scratch, input: &Tic
     if state.quarantine.is_some() {
         return StepReport { substeps: 0, inputs_rejected: 0, quarantined: None };
     }
-    scratch.last_good_x.copy_from_slice(&state.x);
-    scratch.last_good_v.copy_from_slice(&state.v);
+    scratch.last_good.keep(state);
     let inputs_rejected = take_inputs(model, state, scratch, input);
     run_substeps(model, state, scratch, input);
     state.tick += 1;
@@ -37,17 +36,18 @@ pub fn step(model: &Model, state: &mut State, scratch: &mut Scratch, input: &Tic
     StepReport { substeps: model.substeps(), inputs_rejected, quarantined }
 }
 
+/// Puts back the last good tick, at rest: a velocity that led here would lead here again.
 fn quarantine(state: &mut State, scratch: &Scratch, node: u32) -> Quarantine {
-    state.x.copy_from_slice(&scratch.last_good_x);
-    // Held at rest: a velocity that led here would lead here again.
-    state.v.fill(DVec3::ZERO);
-    state.force_is_current = false;
-    for tool in &mut state.tools {
-        tool.contact_force_n = DVec3::ZERO;
-        tool.device_force_n = DVec3::ZERO;
-        tool.local_model = None;
-    }
     let what = Quarantine { tick: state.tick, node };
+    scratch.last_good.put_back(state);
+    state.v.fill(DVec3::ZERO);
+    state.force_n.fill(DVec3::ZERO);
+    state.external_n.fill(DVec3::ZERO);
+    state.force_is_current = false;
+    state.contact.clear();
+    for tool in &mut state.tools {
+        tool.let_go();
+    }
     state.quarantine = Some(what);
     what
 }
@@ -65,10 +65,11 @@ fn take_inputs(model: &Model, state: &mut State, scratch: &mut Scratch, input: &
         tool.previous_target = tool.target;
         tool.target = if finite { target } else { ToolTarget { velocity_m_per_s: DVec3::ZERO, ..tool.target } };
     }
-    model.contact().begin_tick(model.surface(), &state.x, &state.v, &mut state.tools, period_s, &mut scratch.contact);
+    model.contact().begin_tick(&mut state.tools, &mut scratch.contact);
     let loads_ok =
         input.load_factors.len() == state.load_factors.len() && input.load_factors.iter().all(|f| f.is_finite());
     rejected += u32::from(!loads_ok);
+    rejected += input.point_forces.iter().filter(|point| !is_usable(model, point)).count() as u32;
     let prescribed_ok = input.prescribed_displacements_m.len() == model.spec().prescribed.len()
         && input.prescribed_displacements_m.iter().all(|d| d.is_finite());
     rejected += u32::from(!prescribed_ok);
@@ -77,6 +78,10 @@ fn take_inputs(model: &Model, state: &mut State, scratch: &mut Scratch, input: &
         aim_prescribed(model, state, &spec.nodes, spec.axes, displacement, period_s);
     }
     rejected
+}
+
+fn is_usable(model: &Model, point: &PointForce) -> bool {
+    (point.node as usize) < model.mass_kg().len() && point.force_n.is_finite()
 }
 
 /// Sets the constant velocity, on prescribed axes, that takes nodes to `X + displacement` in one tick (`None`: hold).
@@ -104,6 +109,7 @@ fn run_substeps(model: &Model, state: &mut State, scratch: &mut Scratch, input: 
     let dt_s = model.spec().settings.tick_period_s / f64::from(substeps);
     let loads = LoadRamp::new(state, input);
     if !state.force_is_current {
+        state.contact.forget_geometry();
         evaluate(model, state, scratch, input, &loads, 0.0, 0.0);
     }
     kick(model, state, 0.5 * dt_s);
@@ -115,7 +121,7 @@ fn run_substeps(model: &Model, state: &mut State, scratch: &mut Scratch, input: 
         kick(model, state, if substep == substeps { 0.5 * dt_s } else { dt_s });
     }
     loads.finish(state, input);
-    model.contact().end_tick(&mut state.tools, substeps, &mut scratch.contact);
+    model.contact().end_tick(&mut state.tools, &mut state.contact, substeps, &mut scratch.contact);
     for (reaction, (force, inverse_mass)) in
         scratch.reaction_n.iter_mut().zip(state.force_n.iter().zip(model.inverse_mass_per_kg()))
     {
@@ -166,15 +172,20 @@ fn evaluate(
         }
     }
     for point in input.point_forces {
-        if let Some(force) = external.get_mut(point.node as usize).filter(|_| point.force_n.is_finite()) {
-            *force += point.force_n;
+        if is_usable(model, point) {
+            external[point.node as usize] += point.force_n;
         }
     }
     let (x, v) = (&state.x, &state.v);
-    model.contact().substep(model.surface(), x, v, &mut state.tools, fraction, dt_s, external, &mut scratch.contact);
+    if !state.tools.is_empty() {
+        let body = Body { x, fastest_m_per_s: contact::fastest_m_per_s(v) };
+        let time = SubstepTime { fraction, dt_s, tick_period_s: model.spec().settings.tick_period_s };
+        let (tools, contact) = (&mut state.tools, &mut state.contact);
+        model.contact().substep(&body, &time, tools, contact, external, &mut scratch.contact);
+    }
     let force = &mut state.force_n;
     let viscous_power_w = model.kernel().forces_n(model.rest_positions_m(), x, v, force, &mut scratch.kernel);
-    state.ledger.dissipated_j += viscous_power_w * dt_s;
+    state.viscous.record(viscous_power_w, dt_s > 0.0);
     let gravity = model.gravity_m_per_s2();
     for ((force, external), mass) in force.iter_mut().zip(external.iter()).zip(model.mass_kg()) {
         *force += *external + gravity * *mass;
@@ -219,6 +230,7 @@ fn kick(model: &Model, state: &mut State, h_s: f64) {
         *v += change;
     }
     state.ledger.external_work_j += work_j;
+    state.ledger.dissipated_j += h_s * state.viscous.work_rate_w();
     let damping = model.spec().settings.mass_damping_per_s;
     if damping > 0.0 {
         damp(model, state, (-damping * h_s).exp());

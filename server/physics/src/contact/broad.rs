@@ -1,0 +1,238 @@
+//! Broad phase: which triangles a tool can touch, without looking at the others.
+//!
+//! The boundary's triangles are sorted along a Morton curve of their rest centroids and cut into clusters of
+//! [`CLUSTER`] neighbours. A cluster's box is refitted only when a tool might be near it. What makes a stale box safe is
+//! the *travel* `τ(t) = ∫ max_i |v_i| dt`: no surface point moves further than `τ(t) − τ(t₀)` after `t₀`, so the box of
+//! `t₀`, grown by that much, still holds its triangles. The leapfrog drift is a straight line at a known velocity, so the
+//! bound is exact, not an estimate.
+//!
+//! A query lists the triangles within `reach` of a tool's centre and returns how much further away all others are. As
+//! long as the tool's path plus the travel stay below that slack, the list holds every triangle that can be touched: far
+//! from the body a tick costs two additions per tool and substep.
+use super::triangle::closest_point;
+use crate::mesh::Surface;
+use glam::DVec3;
+use std::ops::Range;
+
+/// Triangles per cluster.
+const CLUSTER: usize = 32;
+/// Rounding of the travel sums is far below this (m).
+const ROUNDING_M: f64 = 1e-12;
+
+/// The boundary's triangles in the order of the broad phase.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Triangles {
+    /// Nodes of each triangle, in Morton order.
+    pub(super) nodes: Vec<[u32; 3]>,
+    /// Index in [`Surface::triangles`] of each.
+    pub(super) surface_triangle: Vec<u32>,
+}
+
+/// Box of a cluster at the time it was fitted.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct ClusterBox {
+    lo: DVec3,
+    hi: DVec3,
+    /// Travel `τ` when fitted; −∞: never.
+    fitted_at_m: f64,
+}
+
+impl ClusterBox {
+    pub(super) const UNFITTED: Self = Self { lo: DVec3::ZERO, hi: DVec3::ZERO, fitted_at_m: f64::NEG_INFINITY };
+
+    /// Lower bound of the distance (m) from `p` to the cluster's triangles when the travel is `travel_m`.
+    fn distance_bound_m(&self, p: DVec3, travel_m: f64) -> f64 {
+        box_distance_m(p, self.lo, self.hi) - (travel_m - self.fitted_at_m)
+    }
+}
+
+/// Triangles a tool may touch, and how far things may move before the list is out of date.
+#[derive(Debug, Clone)]
+pub(super) struct Candidates {
+    list: Box<[u32]>,
+    count: usize,
+    /// What relative motion (m) is left until the list must be renewed.
+    pub(super) slack_m: f64,
+}
+
+impl Default for Candidates {
+    fn default() -> Self {
+        Self::with_capacity(0)
+    }
+}
+
+impl Candidates {
+    pub(super) fn with_capacity(triangles: usize) -> Self {
+        Self { list: vec![0; triangles].into_boxed_slice(), count: 0, slack_m: f64::NEG_INFINITY }
+    }
+
+    /// Triangles, ascending.
+    pub(super) fn triangles(&self) -> &[u32] {
+        &self.list[..self.count]
+    }
+
+    fn push(&mut self, triangle: usize) {
+        self.list[self.count] = triangle as u32;
+        self.count += 1;
+    }
+}
+
+impl Triangles {
+    pub(super) fn of(surface: &Surface, rest_positions_m: &[DVec3]) -> Self {
+        let nodes_of = |t: u32| surface.triangle_nodes(t as usize);
+        let centroid = |t: u32| nodes_of(t).iter().map(|&n| rest_positions_m[n as usize]).sum::<DVec3>() * (1.0 / 3.0);
+        let (lo, hi) =
+            rest_positions_m.iter().fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |b, p| (b.0.min(*p), b.1.max(*p)));
+        let scale = 1023.0 / (hi - lo).max_element().max(f64::MIN_POSITIVE);
+        let mut order: Vec<(u32, u32)> =
+            (0..surface.triangles.len() as u32).map(|t| (morton((centroid(t) - lo) * scale), t)).collect();
+        order.sort_unstable();
+        let surface_triangle: Vec<u32> = order.iter().map(|o| o.1).collect();
+        Self { nodes: surface_triangle.iter().map(|&t| nodes_of(t)).collect(), surface_triangle }
+    }
+
+    pub(super) fn len(&self) -> usize {
+        self.nodes.len()
+    }
+
+    pub(super) fn clusters(&self) -> usize {
+        self.nodes.len().div_ceil(CLUSTER)
+    }
+
+    pub(super) fn corners(&self, triangle: usize, x: &[DVec3]) -> [DVec3; 3] {
+        self.nodes[triangle].map(|n| x[n as usize])
+    }
+
+    fn cluster_range(&self, cluster: usize) -> Range<usize> {
+        cluster * CLUSTER..((cluster + 1) * CLUSTER).min(self.nodes.len())
+    }
+
+    fn fit(&self, cluster: usize, x: &[DVec3], travel_m: f64) -> ClusterBox {
+        let mut fitted = ClusterBox { lo: DVec3::INFINITY, hi: DVec3::NEG_INFINITY, fitted_at_m: travel_m };
+        for nodes in &self.nodes[self.cluster_range(cluster)] {
+            for &node in nodes {
+                fitted.lo = fitted.lo.min(x[node as usize]);
+                fitted.hi = fitted.hi.max(x[node as usize]);
+            }
+        }
+        fitted
+    }
+
+    /// Lists the triangles within `reach_m` of `centre`, and sets the slack: how much further away than `inner_m` all
+    /// others are.
+    pub(super) fn query(
+        &self,
+        x: &[DVec3],
+        (boxes, travel_m): (&mut [ClusterBox], f64),
+        centre: DVec3,
+        (reach_m, inner_m): (f64, f64),
+        candidates: &mut Candidates,
+    ) {
+        candidates.count = 0;
+        let mut others_m = f64::INFINITY;
+        for (cluster, fitted) in boxes.iter_mut().enumerate() {
+            if fitted.distance_bound_m(centre, travel_m) < reach_m {
+                *fitted = self.fit(cluster, x, travel_m);
+            }
+            let bound_m = fitted.distance_bound_m(centre, travel_m);
+            if bound_m >= reach_m {
+                others_m = others_m.min(bound_m);
+                continue;
+            }
+            for triangle in self.cluster_range(cluster) {
+                let distance_m = centre.distance(closest_point(centre, self.corners(triangle, x)));
+                if distance_m >= reach_m {
+                    others_m = others_m.min(distance_m);
+                } else {
+                    candidates.push(triangle);
+                }
+            }
+        }
+        candidates.slack_m = others_m - inner_m - ROUNDING_M;
+    }
+
+    /// The oracle of [`Self::query`]: every triangle.
+    pub(super) fn list_all(&self, candidates: &mut Candidates) {
+        candidates.count = 0;
+        for triangle in 0..self.len() {
+            candidates.push(triangle);
+        }
+        candidates.slack_m = f64::NEG_INFINITY;
+    }
+}
+
+fn box_distance_m(p: DVec3, lo: DVec3, hi: DVec3) -> f64 {
+    (lo - p).max(p - hi).max(DVec3::ZERO).length()
+}
+
+/// Interleaves the bits of three coordinates in 0..1024.
+fn morton(p: DVec3) -> u32 {
+    let spread = |value: f64| {
+        let mut bits = (value as u32).min(1023);
+        bits = (bits | bits << 16) & 0x0300_00ff;
+        bits = (bits | bits << 8) & 0x0300_f00f;
+        bits = (bits | bits << 4) & 0x030c_30c3;
+        (bits | bits << 2) & 0x0924_9249
+    };
+    spread(p.x) | spread(p.y) << 1 | spread(p.z) << 2
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mesh::TetMesh;
+
+    /// A strip of separate tets along x.
+    fn strip(tets: usize) -> (Surface, Vec<DVec3>) {
+        let corner = [DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::Z];
+        let positions: Vec<DVec3> = (0..tets).flat_map(|t| corner.map(|c| c * 0.5 + DVec3::X * t as f64)).collect();
+        let indices = (0..tets as u32).map(|t| [4 * t, 4 * t + 1, 4 * t + 2, 4 * t + 3]).collect();
+        let mesh = TetMesh::new(positions.clone(), indices).unwrap();
+        (Surface::of(&mesh).unwrap(), positions)
+    }
+
+    fn within(triangles: &Triangles, x: &[DVec3], centre: DVec3, distance_m: f64) -> Vec<u32> {
+        let near = |t: &u32| centre.distance(closest_point(centre, triangles.corners(*t as usize, x))) < distance_m;
+        (0..triangles.len() as u32).filter(near).collect()
+    }
+
+    #[test]
+    fn every_triangle_is_listed_once() {
+        let (surface, positions) = strip(50);
+        let triangles = Triangles::of(&surface, &positions);
+        let mut seen = triangles.surface_triangle.clone();
+        seen.sort_unstable();
+        assert_eq!(seen, (0..200).collect::<Vec<u32>>());
+    }
+
+    #[test]
+    fn stale_boxes_never_lose_a_triangle() {
+        let (surface, mut x) = strip(50);
+        let triangles = Triangles::of(&surface, &x);
+        let mut boxes = vec![ClusterBox::UNFITTED; triangles.clusters()];
+        let mut candidates = Candidates::with_capacity(triangles.len());
+        let (mut travel, mut queries) = (0.0, 0);
+        let (reach, inner) = (1.5, 1.2);
+        let mut centre = DVec3::new(-5.0, 0.3, 0.0);
+        for step in 0..2000 {
+            let motion = DVec3::new(0.03, 0.01 * (f64::from(step) * 0.1).sin(), 0.0);
+            centre += motion;
+            let mut fastest = 0.0_f64;
+            for (node, p) in x.iter_mut().enumerate() {
+                let v = DVec3::new(0.0, 0.01 * (node as f64).sin(), 0.02 * (f64::from(step) * 0.01).cos());
+                *p += v;
+                fastest = fastest.max(v.length());
+            }
+            travel += fastest;
+            candidates.slack_m -= motion.length() + fastest;
+            if candidates.slack_m <= 0.0 {
+                triangles.query(&x, (&mut boxes, travel), centre, (reach, inner), &mut candidates);
+                queries += 1;
+            }
+            for needed in within(&triangles, &x, centre, inner) {
+                assert!(candidates.triangles().contains(&needed), "step {step}");
+            }
+        }
+        assert!(queries < 600, "{queries} queries in 2000 steps");
+    }
+}

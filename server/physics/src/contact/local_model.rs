@@ -1,0 +1,184 @@
+//! The local contact model: what the servo loop beside the arm needs to render the contact between two ticks.
+//!
+//! Along the contact's normal three springs stand in series: coupling, foundation, body.
+//! ```text
+//! 1/K_n = 1/K_vc + 1/(s K₀),    1/K₀ = 1/(2 E* a) + 1/K_f,    E* = E/(1 − ν²)
+//! ```
+//! - Body: `dF/dδ = 2 E* a` holds for every axisymmetric punch on an elastic half space (Bulychev, Alekhin & Shorshorov
+//!   1975; Pharr, Oliver & Brotzen 1992), with the contact radius `a`.
+//! - Contact radius, from force and energy of the foundation, which vary smoothly while the number of samples jumps:
+//!   `π a² = F²/(c k_f Φ)`, with c = 16/9 for Hertz's pressure and 3/2 for a parabolic one; `c = 1.65` is 4 % off either radius.
+//! - Foundation: `K_f = k_f π a²`.
+//! - `s` corrects for what the half space leaves out (thin walls, bonded layers, large strain, the mesh): the ratio of
+//!   measured secants `ΔF/Δδ` of recent ticks to `K₀`, averaged in its logarithm and kept within
+//!   [1/[`MOST_CORRECTION`], [`MOST_CORRECTION`]].
+//!
+//! Across the normal the sticking part of the contact carries `2(1 − ν)/(2 − ν) ≈ 0.75` of that (Mindlin); without friction, nothing.
+//! The stiffness is `−K_n nnᵀ − K_t (I − nnᵀ)`: symmetric, negative semi-definite, never stiffer than the coupling, and
+//! smoothed over some ten ticks.
+use super::{Coupling, LocalContactModel, ToolModel, ToolState, narrow::Pressed};
+use glam::{DMat3, DVec3};
+use serde::{Deserialize, Serialize};
+use std::f64::consts::PI;
+
+/// `c` of the contact radius.
+const PRESSURE_SHAPE: f64 = 1.65;
+/// Mindlin's ratio of tangential to normal stiffness.
+const TANGENTIAL_RATIO: f64 = 0.75;
+/// Bound of the correction `s` and of its inverse.
+pub(super) const MOST_CORRECTION: f64 = 8.0;
+/// Share of a new secant in `ln s`.
+const SECANT_SHARE: f64 = 0.3;
+/// Motion (over R) that makes a secant.
+const SECANT_MOTION: f64 = 0.01;
+/// Ticks after which a secant's start is too old.
+const SECANT_TICKS: u32 = 100;
+/// Share of a tick's stiffness in the smoothed one.
+const SMOOTHING: f64 = 0.15;
+
+/// What the local model remembers of earlier ticks.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+pub(super) struct StiffnessEstimate {
+    /// `ln s`.
+    pub(super) log_correction: f64,
+    /// Smoothed `K_n` and `K_t` (N/m); 0 out of contact.
+    pub(super) normal_n_per_m: f64,
+    pub(super) tangential_n_per_m: f64,
+    /// Start of the present secant, with its age in ticks; an age of 0: none.
+    pub(super) start_centre_m: DVec3,
+    pub(super) start_force_n: f64,
+    pub(super) age_ticks: u32,
+}
+
+/// Contact of a tool, mean over a tick.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct MeanContact {
+    pub(super) pressed: Pressed,
+    /// Force on the device (N).
+    pub(super) device_force_n: DVec3,
+}
+
+impl StiffnessEstimate {
+    pub(super) fn is_finite(&self) -> bool {
+        let numbers = [self.log_correction, self.normal_n_per_m, self.tangential_n_per_m, self.start_force_n];
+        numbers.iter().all(|n| n.is_finite()) && self.start_centre_m.is_finite()
+    }
+
+    /// Forgets the contact, keeps what was learnt of the body.
+    fn leave(&mut self) {
+        *self = Self { log_correction: self.log_correction, ..Self::default() };
+    }
+
+    /// Takes a tick's motion into `s`; `prior_n_per_m` is `K₀`.
+    fn learn(&mut self, centre_m: DVec3, normal: DVec3, force_n: f64, prior_n_per_m: f64, radius_m: f64) {
+        let deeper_m = (self.start_centre_m - centre_m).dot(normal);
+        if self.age_ticks > 0 && deeper_m.abs() >= SECANT_MOTION * radius_m {
+            let ratio = (force_n - self.start_force_n) / deeper_m / prior_n_per_m;
+            if ratio > 0.0 {
+                let measured = ratio.ln().clamp(-MOST_CORRECTION.ln(), MOST_CORRECTION.ln());
+                self.log_correction += SECANT_SHARE * (measured - self.log_correction);
+            }
+            self.age_ticks = 0;
+        }
+        if self.age_ticks == 0 || self.age_ticks >= SECANT_TICKS {
+            (self.start_centre_m, self.start_force_n, self.age_ticks) = (centre_m, force_n, 0);
+        }
+        self.age_ticks += 1;
+    }
+
+    fn smooth(&mut self, normal_n_per_m: f64, tangential_n_per_m: f64) {
+        // The first tick of a contact starts from nothing: its radius, and so its stiffness, begins at zero anyway.
+        self.normal_n_per_m += SMOOTHING * (normal_n_per_m - self.normal_n_per_m);
+        self.tangential_n_per_m += SMOOTHING * (tangential_n_per_m - self.tangential_n_per_m);
+    }
+}
+
+/// Updates the estimate and builds the model about the device's position; `None` out of contact.
+pub(super) fn update(
+    model: &ToolModel,
+    tool: &ToolState,
+    estimate: &mut StiffnessEstimate,
+    mean: &MeanContact,
+) -> Option<LocalContactModel> {
+    let pressed = &mean.pressed;
+    let (Some(normal), true) = (pressed.normal_n.try_normalize(), pressed.energy_j > 0.0) else {
+        estimate.leave();
+        return None;
+    };
+    let force_n = pressed.pressing_n;
+    let (k_f, modulus_pa) = (pressed.force_times_k_f / force_n, pressed.force_times_modulus / force_n);
+    // π a² = F²/(c k_f Φ)
+    let area_m2 = force_n * force_n / (PRESSURE_SHAPE * k_f * pressed.energy_j);
+    let contact_radius_m = (area_m2 / PI).sqrt().min(model.spec.radius_m);
+    let prior = series(2.0 * modulus_pa * contact_radius_m, k_f * area_m2);
+    estimate.learn(tool.centre_m, normal, pressed.normal_n.dot(normal), prior, model.spec.radius_m);
+    let contact = prior * estimate.log_correction.exp();
+    let sticking = TANGENTIAL_RATIO * contact * pressed.sticking_n / force_n;
+    let coupling = match model.spec.coupling {
+        Coupling::Rigid => f64::INFINITY,
+        Coupling::Spring { stiffness_n_per_m, .. } => stiffness_n_per_m,
+    };
+    estimate.smooth(series(contact, coupling), series(sticking, coupling));
+    let (k_n, k_t) = (estimate.normal_n_per_m, estimate.tangential_n_per_m);
+    let across = DMat3::from_cols(normal * normal.x, normal * normal.y, normal * normal.z);
+    let stiffness_n_per_m = across * (k_t - k_n) - DMat3::from_diagonal(DVec3::splat(k_t));
+    // δ = a²/R: within δ/2 Hertz's stiffness, ∝ √δ, changes by a quarter; the device moves further, by the coupling's stretch.
+    let body_radius_m = 0.5 * contact_radius_m * contact_radius_m / model.spec.radius_m;
+    let validity_radius_m = body_radius_m * (contact / series(contact, coupling));
+    Some(LocalContactModel {
+        point_m: tool.target.position_m,
+        normal,
+        force_n: at_end_of_tick(model, tool, mean, &stiffness_n_per_m),
+        stiffness_n_per_m,
+        validity_radius_m: validity_radius_m.clamp(0.02 * model.spec.radius_m, model.spec.radius_m),
+    })
+}
+
+/// The mean force belongs to the middle of the tick; the device has moved on since.
+fn at_end_of_tick(model: &ToolModel, tool: &ToolState, mean: &MeanContact, stiffness_n_per_m: &DMat3) -> DVec3 {
+    match model.spec.coupling {
+        Coupling::Rigid => {
+            let half_way = (tool.target.position_m - tool.previous_target.position_m) * 0.5;
+            mean.device_force_n + *stiffness_n_per_m * half_way
+        }
+        Coupling::Spring { .. } => mean.device_force_n,
+    }
+}
+
+/// Stiffness of two springs in series; either may be zero or infinite.
+fn series(a: f64, b: f64) -> f64 {
+    let (soft, stiff) = (a.min(b), a.max(b));
+    if soft <= 0.0 { 0.0 } else { soft / (1.0 + soft / stiff) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn series_of_springs() {
+        assert_eq!(series(2.0, 2.0), 1.0);
+        assert_eq!(series(2.0, f64::INFINITY), 2.0);
+        assert_eq!(series(0.0, 5.0), 0.0);
+        assert_eq!(series(0.0, f64::INFINITY), 0.0);
+    }
+
+    #[test]
+    fn secants_teach_the_correction() {
+        let (mut estimate, radius, truth, prior) = (StiffnessEstimate::default(), 0.01, 300.0, 100.0);
+        for step in 1..200 {
+            let depth = 2e-5 * f64::from(step);
+            estimate.learn(DVec3::NEG_Z * depth, DVec3::Z, truth * depth, prior, radius);
+        }
+        assert!((estimate.log_correction.exp() - 3.0).abs() < 0.01, "{}", estimate.log_correction.exp());
+    }
+
+    #[test]
+    fn a_resting_tool_teaches_nothing() {
+        let mut estimate = StiffnessEstimate::default();
+        for step in 0..1000 {
+            estimate.learn(DVec3::ZERO, DVec3::Z, f64::from(step).sin(), 100.0, 0.01);
+        }
+        assert_eq!(estimate.log_correction, 0.0);
+    }
+}

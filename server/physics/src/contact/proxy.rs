@@ -1,0 +1,104 @@
+//! How a tool moves: along its device's path, or as a mass on the virtual coupling.
+//!
+//! A coupled tool (the *proxy*) obeys `m c̈ = f_contact + K(d − c) + B(ḋ − ċ)` and is advanced with the body's own leapfrog:
+//! half kick, drift, new force, half kick. The damper is integrated exactly over each half kick,
+//! `v ← ḋ + (v − ḋ) e^{−B h/m}`, so no damping makes it unstable.
+//!
+//! What keeps it outside, whatever the device does:
+//! - The spring saturates at `F_max`, the force that presses the sphere [`SATURATION_DEPTH`]·R into the flat foundation; its
+//!   potential is then linear instead of quadratic, so it stays conservative. The damper saturates at the same force.
+//! - It moves at most `R/4` in a substep; within `R/4` of the surface, its kinetic energy relative to the fastest node is at most
+//!   what the flat foundation stores at depth `R/2`. The rest is taken from the (virtual) tool, never given to the body.
+use super::{Coupling, ToolModel, ToolState};
+use glam::DVec3;
+
+/// Depth over R at which the coupling's force saturates.
+pub(super) const SATURATION_DEPTH: f64 = 0.2;
+/// Depth over R whose foundation energy bounds the proxy's kinetic energy near the surface.
+pub(super) const IMPACT_DEPTH: f64 = 0.5;
+/// Largest motion in a substep, and the width of the zone near the surface, over R.
+pub(super) const NEAR: f64 = 0.25;
+
+/// Where a substep stands in its tick.
+#[derive(Debug, Clone, Copy)]
+pub struct SubstepTime {
+    /// Part of the tick done at its end, 0..=1.
+    pub fraction: f64,
+    /// Its length (s); 0 evaluates forces where things are.
+    pub dt_s: f64,
+    /// The tick's length (s).
+    pub tick_period_s: f64,
+}
+
+impl SubstepTime {
+    /// Position (m) and velocity (m/s) of the device: straight from target to target during a tick.
+    fn device(&self, tool: &ToolState) -> (DVec3, DVec3) {
+        let (from, to) = (tool.previous_target.position_m, tool.target.position_m);
+        (from.lerp(to, self.fraction), (to - from) / self.tick_period_s)
+    }
+}
+
+/// First half of a substep: half kick and drift. Returns how far the tool moved (m).
+pub(super) fn drift(model: &ToolModel, tool: &mut ToolState, contact_n: DVec3, time: &SubstepTime) -> f64 {
+    let before = tool.centre_m;
+    let (device_m, device_m_per_s) = time.device(tool);
+    match model.spec.coupling {
+        Coupling::Rigid => {
+            tool.centre_m = device_m;
+            tool.velocity_m_per_s = device_m_per_s;
+        }
+        Coupling::Spring { .. } => {
+            let at_start = SubstepTime { fraction: time.fraction - time.dt_s / time.tick_period_s, ..*time };
+            half_kick(model, tool, contact_n, at_start.device(tool), 0.5 * time.dt_s);
+            limit_speed(tool, NEAR * model.spec.radius_m / time.dt_s.max(f64::MIN_POSITIVE));
+            tool.centre_m += tool.velocity_m_per_s * time.dt_s;
+        }
+    }
+    before.distance(tool.centre_m)
+}
+
+/// Second half, with the new contact force; `near_speed_m_per_s` bounds the speed of a tool that is near the surface.
+/// Returns the coupling's force on the tool (N).
+pub(super) fn finish(
+    model: &ToolModel,
+    tool: &mut ToolState,
+    contact_n: DVec3,
+    time: &SubstepTime,
+    near_speed_m_per_s: Option<f64>,
+) -> DVec3 {
+    if matches!(model.spec.coupling, Coupling::Rigid) {
+        return DVec3::ZERO;
+    }
+    if let Some(speed) = near_speed_m_per_s {
+        limit_speed(tool, speed);
+    }
+    half_kick(model, tool, contact_n, time.device(tool), 0.5 * time.dt_s)
+}
+
+/// Kicks the tool over `h_s` and returns the coupling's mean force (N) over it.
+fn half_kick(
+    model: &ToolModel,
+    tool: &mut ToolState,
+    contact_n: DVec3,
+    (device_m, device_m_per_s): (DVec3, DVec3),
+    h_s: f64,
+) -> DVec3 {
+    let Coupling::Spring { stiffness_n_per_m, damping_n_s_per_m, mass_kg } = model.spec.coupling else {
+        return DVec3::ZERO;
+    };
+    let limit_n = model.force_limit_n;
+    let spring_n = ((device_m - tool.centre_m) * stiffness_n_per_m).clamp_length_max(limit_n);
+    if h_s == 0.0 {
+        return spring_n;
+    }
+    tool.velocity_m_per_s += (contact_n + spring_n) * (h_s / mass_kg);
+    // Impulse of the damper over h: m (1 − e^{−B h/m}) (ḋ − ċ)
+    let share = -(-damping_n_s_per_m * h_s / mass_kg).exp_m1();
+    let damper_n = ((device_m_per_s - tool.velocity_m_per_s) * (mass_kg * share / h_s)).clamp_length_max(limit_n);
+    tool.velocity_m_per_s += damper_n * (h_s / mass_kg);
+    spring_n + damper_n
+}
+
+fn limit_speed(tool: &mut ToolState, limit_m_per_s: f64) {
+    tool.velocity_m_per_s = tool.velocity_m_per_s.clamp_length_max(limit_m_per_s);
+}

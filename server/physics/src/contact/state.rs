@@ -1,0 +1,120 @@
+//! What contact carries from one tick to the next.
+use super::{
+    ContactModel,
+    broad::{Candidates, ClusterBox},
+    local_model::StiffnessEstimate,
+    touching::Touching,
+};
+use glam::DVec3;
+use serde::{Deserialize, Serialize};
+
+/// Contact's part of [`crate::State`].
+///
+/// Samples in contact, friction springs, the force at the end of the tick and the estimate of stiffness are state in the full
+/// sense: saved, restored, compared. The broad phase's boxes and lists follow from the positions; they are neither saved
+/// nor compared, and are rebuilt whenever `force_is_current` is false.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub struct ContactState {
+    pub(super) tools: Vec<ToolContact>,
+    #[serde(skip)]
+    boxes: Vec<ClusterBox>,
+    #[serde(skip)]
+    travel_m: f64,
+}
+
+/// One tool's part.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub(super) struct ToolContact {
+    pub(super) touching: Touching,
+    /// Force of the body on the tool now (N).
+    pub(super) force_n: DVec3,
+    pub(super) estimate: StiffnessEstimate,
+    #[serde(skip)]
+    pub(super) candidates: Candidates,
+}
+
+impl PartialEq for ContactState {
+    fn eq(&self, other: &Self) -> bool {
+        let same = |(a, b): (&ToolContact, &ToolContact)| {
+            a.touching == b.touching && a.force_n == b.force_n && a.estimate == b.estimate
+        };
+        self.tools.len() == other.tools.len() && self.tools.iter().zip(&other.tools).all(same)
+    }
+}
+
+impl ContactState {
+    pub(super) fn new(model: &ContactModel) -> Self {
+        let tool = |tool: &super::ToolModel| ToolContact {
+            touching: Touching::with_capacity(tool.foundation.samples),
+            force_n: DVec3::ZERO,
+            estimate: StiffnessEstimate::default(),
+            candidates: Candidates::with_capacity(model.triangles.len()),
+        };
+        Self {
+            tools: model.tools.iter().map(tool).collect(),
+            boxes: vec![ClusterBox::UNFITTED; model.triangles.clusters()],
+            travel_m: 0.0,
+        }
+    }
+
+    /// Takes over what was read from a snapshot into buffers of the model's size; `None` when it does not fit the model.
+    pub(super) fn adopt(mut self, saved: &Self, samples: impl Fn(usize) -> usize) -> Option<Self> {
+        if saved.tools.len() != self.tools.len() {
+            return None;
+        }
+        for (index, (own, saved)) in self.tools.iter_mut().zip(&saved.tools).enumerate() {
+            let touches = saved.touching.records();
+            let ascending = touches.windows(2).all(|pair| pair[0].sample < pair[1].sample);
+            let known = touches.last().is_none_or(|last| (last.sample as usize) < samples(index));
+            let finite = saved.force_n.is_finite()
+                && saved.estimate.is_finite()
+                && touches.iter().all(|touch| touch.spring_origin_m.is_finite());
+            if !(ascending && known && finite && touches.iter().all(|touch| own.touching.push(*touch))) {
+                return None;
+            }
+            (own.force_n, own.estimate) = (saved.force_n, saved.estimate);
+        }
+        Some(self)
+    }
+
+    /// Copies another state of the same model. Allocates nothing.
+    pub(crate) fn copy_from(&mut self, other: &Self) {
+        for (own, other) in self.tools.iter_mut().zip(&other.tools) {
+            own.touching.copy_from(&other.touching);
+            (own.force_n, own.estimate) = (other.force_n, other.estimate);
+        }
+        self.forget_geometry();
+    }
+
+    /// Touching nothing. Allocates nothing.
+    pub(crate) fn clear(&mut self) {
+        for tool in &mut self.tools {
+            tool.touching.clear();
+            tool.force_n = DVec3::ZERO;
+            tool.estimate = StiffnessEstimate::default();
+        }
+        self.forget_geometry();
+    }
+
+    /// Makes the broad phase look at the positions anew.
+    pub(crate) fn forget_geometry(&mut self) {
+        self.boxes.fill(ClusterBox::UNFITTED);
+        self.travel_m = 0.0;
+        for tool in &mut self.tools {
+            tool.candidates.slack_m = f64::NEG_INFINITY;
+        }
+    }
+
+    /// The surface moved by at most this much (m).
+    pub(super) fn travelled(&mut self, distance_m: f64) {
+        self.travel_m += distance_m;
+        for tool in &mut self.tools {
+            tool.candidates.slack_m -= distance_m;
+        }
+    }
+
+    /// One tool's part, and the boxes with the travel.
+    pub(super) fn split(&mut self, tool: usize) -> (&mut ToolContact, &mut [ClusterBox], f64) {
+        (&mut self.tools[tool], &mut self.boxes, self.travel_m)
+    }
+}

@@ -1,0 +1,71 @@
+//! The samples inside a tool, in a buffer that never grows.
+use glam::DVec3;
+use serde::{Deserialize, Serialize};
+
+/// More samples than this inside one tool are pressed without friction and without memory.
+const MOST: usize = 16_384;
+
+/// A sample inside the tool.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub(super) struct Touch {
+    /// Its number.
+    pub(super) sample: u32,
+    /// The tool reached it from behind the surface: it carries nothing until it leaves.
+    pub(super) from_behind: bool,
+    /// Position relative to the tool's centre (m) where its friction spring is at rest.
+    pub(super) spring_origin_m: DVec3,
+}
+
+/// Records in ascending order of their samples. Its clones keep the capacity.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+#[serde(from = "Vec<Touch>", into = "Vec<Touch>")]
+pub(super) struct Touching {
+    buffer: Box<[Touch]>,
+    count: usize,
+}
+
+impl Touching {
+    pub(super) fn with_capacity(samples: usize) -> Self {
+        let empty = Touch { sample: 0, from_behind: false, spring_origin_m: DVec3::ZERO };
+        Self { buffer: vec![empty; samples.min(MOST)].into_boxed_slice(), count: 0 }
+    }
+
+    pub(super) fn records(&self) -> &[Touch] {
+        &self.buffer[..self.count]
+    }
+
+    pub(super) fn clear(&mut self) {
+        self.count = 0;
+    }
+
+    pub(super) fn copy_from(&mut self, other: &Self) {
+        self.count = other.count.min(self.buffer.len());
+        self.buffer[..self.count].copy_from_slice(&other.buffer[..self.count]);
+    }
+
+    /// False when full: the record is dropped.
+    pub(super) fn push(&mut self, touch: Touch) -> bool {
+        let Some(slot) = self.buffer.get_mut(self.count) else { return false };
+        *slot = touch;
+        self.count += 1;
+        true
+    }
+}
+
+impl From<Vec<Touch>> for Touching {
+    fn from(touches: Vec<Touch>) -> Self {
+        Self { count: touches.len(), buffer: touches.into_boxed_slice() }
+    }
+}
+
+impl From<Touching> for Vec<Touch> {
+    fn from(touching: Touching) -> Self {
+        touching.records().to_vec()
+    }
+}
+
+impl PartialEq for Touching {
+    fn eq(&self, other: &Self) -> bool {
+        self.records() == other.records()
+    }
+}
