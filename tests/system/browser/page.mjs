@@ -1,0 +1,139 @@
+// Drives the page in headless Chromium against a real daemon.
+// Usage: node page.mjs PALPATED ARTEFACTS [CHROMIUM]
+// Each check prints a line; the first that fails ends the run with exit code 1.
+import assert from "node:assert/strict";
+import { spawn } from "node:child_process";
+import { mkdirSync } from "node:fs";
+import { createServer } from "node:net";
+import { join } from "node:path";
+import { setTimeout as sleep } from "node:timers/promises";
+import { chromium } from "playwright-core";
+import { PNG } from "pngjs";
+
+const [palpated, artefacts, executablePath = "/usr/bin/chromium"] = process.argv.slice(2);
+mkdirSync(artefacts, { recursive: true });
+
+const port = await freePort();
+const url = `http://127.0.0.1:${port}/`;
+
+async function freePort() {
+  const server = createServer();
+  await new Promise((resolve) => server.listen(0, "127.0.0.1", resolve));
+  const { port: free } = server.address();
+  await new Promise((resolve) => server.close(resolve));
+  return free;
+}
+
+async function startDaemon() {
+  const child = spawn(palpated, ["serve", "--listen", `127.0.0.1:${port}`], { stdio: ["ignore", "pipe", "pipe"] });
+  let output = "";
+  for (const stream of [child.stdout, child.stderr]) stream.on("data", (data) => (output += data));
+  for (let i = 0; i < 300; i++) {
+    assert.equal(child.exitCode, null, `palpated ended:\n${output}`);
+    try {
+      if ((await fetch(url)).ok) return child;
+    } catch {
+      // not listening yet
+    }
+    await sleep(100);
+  }
+  child.kill("SIGKILL");
+  throw new Error(`palpated does not answer at ${url}:\n${output}`);
+}
+
+async function stopDaemon(child) {
+  const ended = new Promise((resolve) => child.once("exit", (code) => resolve(code)));
+  child.kill("SIGTERM");
+  return ended;
+}
+
+function check(what, ok, detail = "") {
+  assert.ok(ok, `${what} ${detail}`);
+  console.log(`ok  ${what} ${detail}`);
+}
+
+/** How many different colours a screenshot shows inside a box, and how many of its pixels are saturated. */
+function colours(png, x0, y0, x1, y1) {
+  const seen = new Set();
+  let saturated = 0;
+  for (let y = y0; y < y1; y++) {
+    for (let x = x0; x < x1; x++) {
+      const at = 4 * (y * png.width + x);
+      const [r, g, b] = png.data.subarray(at, at + 3);
+      seen.add((r << 16) | (g << 8) | b);
+      if (Math.max(r, g, b) - Math.min(r, g, b) > 40) saturated++;
+    }
+  }
+  return { different: seen.size, saturated };
+}
+
+const number = async (page, id) => Number.parseFloat((await page.textContent(`#${id}`)).replace(",", ""));
+const state = (page) => page.getAttribute("#connection", "data-state");
+
+let daemon = await startDaemon();
+const browser = await chromium.launch({
+  executablePath,
+  args: [
+    "--headless=new", "--no-sandbox", "--disable-quic", "--no-first-run", "--disable-background-networking",
+    "--disable-component-update", "--disable-sync", "--use-angle=swiftshader", "--enable-unsafe-swiftshader",
+  ],
+});
+try {
+  const page = await browser.newPage({ viewport: { width: 1280, height: 860 } });
+  const complaints = [];
+  page.on("pageerror", (error) => complaints.push(String(error)));
+  page.on("console", (message) => message.type() === "error" && complaints.push(message.text()));
+  await page.goto(url);
+  await page.waitForSelector('#connection[data-state="live"]', { timeout: 20_000 });
+  check("the page goes live", true);
+  check("the scene has a name", (await page.textContent("#scene-name")).length > 2, await page.textContent("#scene-name"));
+  check("the mesh is counted", /\d+ vertices, \d+ faces/.test(await page.textContent("#mesh")), await page.textContent("#mesh"));
+
+  // The simulated arm presses about once a second: wait for a firm press.
+  let contact = 0;
+  for (let i = 0; i < 400 && contact < 0.02; i++) {
+    contact = await number(page, "contact-force");
+    await sleep(25);
+  }
+  const pressed = await page.screenshot({ path: join(artefacts, "page-pressed.png") });
+  check("the arm presses", contact >= 0.02, `${contact} N`);
+  check("the surface dents", (await number(page, "max-displacement")) > 0.05, await page.textContent("#max-displacement"));
+  const shot = PNG.sync.read(pressed);
+  const body = colours(shot, 250, 100, 1000, 640);
+  check("the body is drawn in colours", body.different > 300 && body.saturated > 10_000, JSON.stringify(body));
+
+  const ticks = await page.$$eval("#legend-ticks li", (items) => items.map((item) => Number(item.textContent)));
+  check("the legend falls from top to 0", ticks.length === 5 && ticks[4] === 0 && ticks[0] > ticks[1], ticks.join(" "));
+  const caption = await page.textContent("#legend figcaption");
+  check("the legend has a unit", caption.includes("mm"), caption);
+  await sleep(1500);
+  check("updates flow", (await number(page, "rate")) > 5, await page.textContent("#rate"));
+  check("the delay is small", (await number(page, "delay")) < 1000, await page.textContent("#delay"));
+  const before = await number(page, "time");
+  await sleep(500);
+  check("simulated time goes on", (await number(page, "time")) > before);
+  const plot = colours(PNG.sync.read(await page.locator("#plot-canvas").screenshot()), 60, 5, 900, 95);
+  check("the force is plotted", plot.saturated > 100, JSON.stringify(plot));
+
+  await page.check("#wireframe");
+  await page.check("#ghost");
+  await sleep(300);
+  await page.screenshot({ path: join(artefacts, "page-edges.png") });
+  await page.click("#recentre");
+
+  const code = await stopDaemon(daemon);
+  check("the daemon drains with an open page", code === 0, `exit code ${code}`);
+  for (let i = 0; i < 100 && (await state(page)) === "live"; i++) await sleep(100);
+  check("the page says that the stream is lost", (await state(page)) !== "live", await page.textContent("#connection"));
+  await page.screenshot({ path: join(artefacts, "page-lost.png") });
+  daemon = await startDaemon();
+  await page.waitForSelector('#connection[data-state="live"]', { timeout: 20_000 });
+  check("the page comes back by itself", true);
+
+  const serious = complaints.filter((text) => !/Failed to load resource|ERR_|network error|Failed to fetch/i.test(text));
+  check("no error in the console but for the lost connection", serious.length === 0, serious.join("\n"));
+} finally {
+  await browser.close();
+  if (daemon.exitCode === null) await stopDaemon(daemon);
+}
+console.log("page: all checks passed");

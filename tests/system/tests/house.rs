@@ -1,0 +1,128 @@
+//! The house's rules: crate borders, the map, unsafe code.
+#![allow(clippy::unwrap_used)] // a test that cannot read the repository has failed
+#![allow(clippy::case_sensitive_file_extension_comparisons)] // git's paths
+use cargo_metadata::{DependencyKind, MetadataCommand};
+use palpate_system_tests::root;
+use std::{
+    collections::{BTreeMap, BTreeSet},
+    fs,
+    path::Path,
+    process::Command,
+};
+
+/// Who may use whom (ARCHITECTURE.md, "Crate borders"); development dependencies are free.
+const BORDERS: [(&str, &[&str]); 10] = [
+    ("palpate-proto", &[]),
+    ("palpate-physics", &[]),
+    ("palpate-control", &[]),
+    ("palpate-realtime", &[]),
+    ("palpate-scene", &["palpate-physics"]),
+    ("palpated", &["palpate-scene", "palpate-physics", "palpate-control", "palpate-realtime", "palpate-proto"]),
+    ("palpate-bridge", &["palpate-control", "palpate-realtime", "palpate-proto"]),
+    ("palpate-view", &["palpate-proto"]),
+    ("palpate-lab", &["palpate-scene", "palpate-physics"]),
+    ("palpate-system-tests", &[]),
+];
+
+/// Crates that must stay free of the network, however indirectly.
+const PURE: [&str; 4] = ["palpate-physics", "palpate-control", "palpate-realtime", "palpate-scene"];
+const NETWORK: [&str; 5] = ["tokio", "tonic", "prost", "hyper", "axum"];
+
+/// Normal and build dependencies of every package reachable from the workspace, by package name.
+fn dependencies() -> BTreeMap<String, BTreeSet<String>> {
+    let metadata = MetadataCommand::new().manifest_path(root().join("Cargo.toml")).exec().unwrap();
+    let names: BTreeMap<_, _> = metadata.packages.iter().map(|p| (p.id.clone(), p.name.to_string())).collect();
+    let resolve = metadata.resolve.unwrap();
+    resolve
+        .nodes
+        .iter()
+        .map(|node| {
+            let used = node
+                .deps
+                .iter()
+                .filter(|dep| dep.dep_kinds.iter().any(|kind| kind.kind != DependencyKind::Development))
+                .map(|dep| names[&dep.pkg].clone())
+                .collect();
+            (names[&node.id].clone(), used)
+        })
+        .collect()
+}
+
+#[test]
+fn crates_use_only_whom_the_map_allows() {
+    let dependencies = dependencies();
+    for (name, allowed) in BORDERS {
+        let ours: Vec<_> = dependencies[name].iter().filter(|d| d.starts_with("palpate")).collect();
+        for used in ours {
+            assert!(allowed.contains(&used.as_str()), "{name} uses {used}, which ARCHITECTURE.md does not allow");
+        }
+    }
+    let ours = dependencies.keys().filter(|name| name.starts_with("palpate")).count();
+    assert_eq!(ours, BORDERS.len(), "a crate is missing from the borders");
+}
+
+#[test]
+fn pure_crates_never_reach_the_network() {
+    let dependencies = dependencies();
+    for name in PURE {
+        let mut reached = BTreeSet::new();
+        let mut open = vec![name.to_owned()];
+        while let Some(next) = open.pop() {
+            if reached.insert(next.clone()) {
+                open.extend(dependencies[&next].iter().cloned());
+            }
+        }
+        for forbidden in NETWORK {
+            assert!(!reached.contains(forbidden), "{name} reaches {forbidden}");
+        }
+    }
+}
+
+/// Every path in backticks in ARCHITECTURE.md that looks like a file or folder exists.
+#[test]
+fn the_map_names_only_what_exists() {
+    let text = fs::read_to_string(root().join("ARCHITECTURE.md")).unwrap();
+    let paths: Vec<&str> = text
+        .split('`')
+        .skip(1)
+        .step_by(2)
+        .filter(|word| word.contains('/') && !word.contains([' ', ':', '<', '*', '(']))
+        .collect();
+    assert!(paths.len() > 40, "the map names only {} paths", paths.len());
+    let missing: Vec<_> = paths.iter().filter(|path| !root().join(path).exists()).collect();
+    assert!(missing.is_empty(), "ARCHITECTURE.md names what does not exist: {missing:?}");
+}
+
+/// The reverse: every source folder and every crate's top-level file has its place on the map.
+#[test]
+fn every_module_is_on_the_map() {
+    let text = fs::read_to_string(root().join("ARCHITECTURE.md")).unwrap();
+    let missing: Vec<String> = tracked()
+        .iter()
+        .filter(|path| path.ends_with(".rs") && path.contains("/src/"))
+        .filter_map(|path| Path::new(path).parent()?.to_str().map(str::to_owned))
+        .collect::<BTreeSet<_>>()
+        .into_iter()
+        .filter(|folder| !text.contains(&format!("`{folder}")))
+        .collect();
+    assert!(missing.is_empty(), "folders that ARCHITECTURE.md does not name: {missing:?}");
+}
+
+/// `unsafe` lives in two named places.
+#[test]
+fn unsafe_stays_in_its_two_places() {
+    let allowed = ["server/realtime/src/os.rs", "server/physics/src/simd/"];
+    for path in tracked().iter().filter(|p| p.ends_with(".rs") && !p.starts_with("tests/system/tests/house")) {
+        let text = fs::read_to_string(root().join(path)).unwrap();
+        let used = text.lines().any(|line| {
+            let code = line.split("//").next().unwrap_or("");
+            code.contains("unsafe {") || code.contains("unsafe fn") || code.contains("unsafe impl")
+        });
+        assert!(!used || allowed.iter().any(|place| path.starts_with(place)), "unsafe in {path}");
+    }
+}
+
+fn tracked() -> Vec<String> {
+    let output = Command::new("git").arg("ls-files").current_dir(root()).output().unwrap();
+    String::from_utf8(output.stdout).unwrap().lines().map(str::to_owned).collect()
+}
