@@ -1,1 +1,23 @@
-//! placeholder
+//! The control law between an arm and a body. Pure: no clock, no thread, no file, no network; time comes in as an argument.
+//!
+//! Nothing here allocates after construction, except where a constructor says so. Every function that takes a measured or
+//! received number is safe against NaN and infinity: it answers zero force, and counts.
+//!
+//! Sign convention: forces act **on the arm** (N, world); the power an arm puts into the virtual world is `−F·v`.
+pub mod coupling;
+pub mod extrapolate;
+pub mod limits;
+pub mod local_model;
+pub mod parameter;
+pub mod passivity;
+pub mod simulated_arm;
+pub mod watchdog;
+
+pub use coupling::VirtualCoupling;
+pub use extrapolate::{Motion, extrapolate};
+pub use limits::{ForceLimiter, ForceLimits, Limited};
+pub use local_model::{LocalModel, RenderSettings, Rendered};
+pub use parameter::ParameterError;
+pub use passivity::{PassivityController, PassivitySettings, PassivityStep};
+pub use simulated_arm::{ArmSpec, HandPath, Keyframe, SimulatedArm};
+pub use watchdog::{Fault, Link, Verdict, Watchdog, WatchdogSettings};

@@ -1,0 +1,166 @@
+//! Ticks on a fixed grid of absolute deadlines.
+use crate::clock::Clock;
+use thiserror::Error;
+
+/// A period that no loop can keep.
+#[derive(Debug, Clone, Copy, PartialEq, Error)]
+#[error("a tick period of {period_s} s is out of range: it must be between 10 us and 10 s")]
+pub struct PeriodError {
+    /// The period (s).
+    pub period_s: f64,
+}
+
+/// One wake-up.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Wakeup {
+    /// Number of this tick on the grid, from 0; skipped ticks are numbered too.
+    pub tick: u64,
+    /// When it was due (ns).
+    pub deadline_ns: u64,
+    /// When it woke (ns).
+    pub woke_ns: u64,
+    /// Ticks skipped just before this one, because the previous one took so long.
+    pub skipped: u64,
+    /// The previous tick's work ended after this deadline.
+    pub overrun: bool,
+}
+
+impl Wakeup {
+    /// How late it woke (ns).
+    pub fn lateness_ns(&self) -> u64 {
+        self.woke_ns.saturating_sub(self.deadline_ns)
+    }
+}
+
+/// The grid. Deadline n is `start + n · period`, whatever earlier ticks cost: errors do not accumulate.
+///
+/// After an overrun the newest deadline that has passed is served at once, late, and the older ones are skipped and counted:
+/// at most one late tick follows, never a burst that catches up.
+#[derive(Debug, Clone)]
+pub struct Deadlines {
+    clock: Clock,
+    period_ns: u64,
+    next_ns: u64,
+    next_tick: u64,
+}
+
+impl Deadlines {
+    /// First tick one period from now.
+    ///
+    /// # Errors
+    /// [`PeriodError`] when the period is not between 10 µs and 10 s.
+    pub fn new(clock: Clock, period_s: f64) -> Result<Self, PeriodError> {
+        if !(1e-5..=10.0).contains(&period_s) {
+            return Err(PeriodError { period_s });
+        }
+        let period_ns = (period_s * 1e9).round() as u64;
+        let next_ns = clock.now_ns() + period_ns;
+        Ok(Self { clock, period_ns, next_ns, next_tick: 0 })
+    }
+
+    /// A new grid: tick 0 one period from now.
+    pub fn restart(&mut self) {
+        self.next_ns = self.clock.now_ns() + self.period_ns;
+        self.next_tick = 0;
+    }
+
+    /// The period (ns).
+    pub fn period_ns(&self) -> u64 {
+        self.period_ns
+    }
+
+    /// The clock.
+    pub fn clock(&self) -> &Clock {
+        &self.clock
+    }
+
+    /// Sleeps until the next deadline.
+    pub fn wait(&mut self) -> Wakeup {
+        let now_ns = self.clock.now_ns();
+        let overrun = now_ns > self.next_ns;
+        let skipped = now_ns.saturating_sub(self.next_ns) / self.period_ns;
+        let deadline_ns = self.next_ns + skipped * self.period_ns;
+        let tick = self.next_tick + skipped;
+        if !overrun {
+            self.clock.sleep_until(deadline_ns);
+        }
+        self.next_ns = deadline_ns + self.period_ns;
+        self.next_tick = tick + 1;
+        Wakeup { tick, deadline_ns, woke_ns: self.clock.now_ns(), skipped, overrun }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    const MS: u64 = 1_000_000;
+
+    #[test]
+    fn the_grid_does_not_drift() {
+        let (clock, time) = Clock::manual();
+        let mut deadlines = Deadlines::new(clock, 1e-3).unwrap();
+        time.wake_late_by(30_000);
+        for n in 0..1000 {
+            let wakeup = deadlines.wait();
+            assert_eq!((wakeup.tick, wakeup.deadline_ns, wakeup.lateness_ns()), (n, (n + 1) * MS, 30_000));
+            assert!(!wakeup.overrun);
+            time.advance(600_000);
+        }
+    }
+
+    #[test]
+    fn a_small_overrun_is_late_but_skips_nothing() {
+        let (clock, time) = Clock::manual();
+        let mut deadlines = Deadlines::new(clock, 1e-3).unwrap();
+        deadlines.wait();
+        time.advance(1_300_000);
+        let late = deadlines.wait();
+        assert_eq!((late.tick, late.skipped, late.overrun, late.lateness_ns()), (1, 0, true, 300_000));
+        let next = deadlines.wait();
+        assert_eq!((next.tick, next.overrun, next.lateness_ns()), (2, false, 0));
+    }
+
+    #[test]
+    fn a_long_overrun_skips_whole_ticks_without_a_burst() {
+        let (clock, time) = Clock::manual();
+        let mut deadlines = Deadlines::new(clock, 1e-3).unwrap();
+        deadlines.wait();
+        time.advance(7_400_000);
+        let late = deadlines.wait();
+        assert_eq!((late.tick, late.skipped, late.deadline_ns, late.lateness_ns()), (7, 6, 8 * MS, 400_000));
+        let next = deadlines.wait();
+        assert_eq!((next.tick, next.skipped, next.overrun, next.deadline_ns), (8, 0, false, 9 * MS));
+    }
+
+    #[test]
+    fn silly_periods_are_refused() {
+        for period_s in [0.0, -1.0, f64::NAN, f64::INFINITY, 1e-6, 11.0] {
+            let error = Deadlines::new(Clock::Monotonic, period_s).unwrap_err();
+            assert!(error.to_string().contains("between 10 us and 10 s"));
+        }
+    }
+
+    proptest! {
+        /// Whatever the ticks cost: numbers and deadlines agree, every tick is run or counted as skipped, lateness stays
+        /// below the last cost.
+        #[test]
+        fn accounting_adds_up(costs_ns in prop::collection::vec(0..5 * MS, 1..200), late_ns in 0..MS / 2) {
+            let (clock, time) = Clock::manual();
+            time.wake_late_by(late_ns);
+            let mut deadlines = Deadlines::new(clock, 1e-3).unwrap();
+            let (mut run, mut skipped) = (0, 0);
+            for cost_ns in costs_ns {
+                let wakeup = deadlines.wait();
+                skipped += wakeup.skipped;
+                prop_assert_eq!(wakeup.tick, run + skipped);
+                prop_assert_eq!(wakeup.deadline_ns, (wakeup.tick + 1) * MS);
+                prop_assert!(wakeup.woke_ns >= wakeup.deadline_ns);
+                prop_assert!(wakeup.lateness_ns() < MS);
+                run += 1;
+                time.advance(cost_ns);
+            }
+        }
+    }
+}
