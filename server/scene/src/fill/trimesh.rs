@@ -1,6 +1,6 @@
 //! A triangulated surface that can change: half-edges by their ends, edge flips, Delaunay sweeps.
 use glam::DVec3;
-use std::collections::HashMap;
+use std::collections::{BTreeMap, HashMap};
 
 /// Gain in the sum of opposite angles (rad) that a flip must bring; keeps regular quads from flipping for ever.
 const FLIP_GAIN_RAD: f64 = 1e-6;
@@ -26,7 +26,8 @@ impl TriMesh {
         mesh
     }
 
-    fn index_edges(&mut self) {
+    /// Rebuilds the half-edges after the triangles were changed.
+    pub(crate) fn index_edges(&mut self) {
         self.half_edges.clear();
         self.half_edges.reserve(3 * self.triangles.len());
         for t in 0..self.triangles.len() {
@@ -89,6 +90,61 @@ impl TriMesh {
     pub(crate) fn area_vector(&self, [a, b, c]: [u32; 3]) -> DVec3 {
         let p = |v: u32| self.positions[v as usize];
         (p(b) - p(a)).cross(p(c) - p(a))
+    }
+
+    /// Area-weighted unit normals at the vertices.
+    pub(crate) fn vertex_normals(&self) -> Vec<DVec3> {
+        let mut normals = vec![DVec3::ZERO; self.positions.len()];
+        for &triangle in &self.triangles {
+            let area = self.area_vector(triangle);
+            for v in triangle {
+                normals[v as usize] += area;
+            }
+        }
+        normals.into_iter().map(|n| n.normalize_or(DVec3::Z)).collect()
+    }
+
+    /// Area (m²).
+    pub(crate) fn area(&self) -> f64 {
+        Self::area_of(&self.positions, &self.triangles)
+    }
+
+    /// Area (m²) of triangles over positions.
+    pub(crate) fn area_of(positions: &[DVec3], triangles: &[[u32; 3]]) -> f64 {
+        let corners = triangles.iter().map(|t| t.map(|v| positions[v as usize]));
+        corners.map(|[a, b, c]| 0.5 * (b - a).cross(c - a).length()).sum()
+    }
+
+    /// For every vertex on the boundary, the ones before and after it along the rim.
+    pub(crate) fn rim_neighbours(&self) -> BTreeMap<u32, [u32; 2]> {
+        let mut sides: BTreeMap<u32, [u32; 2]> = BTreeMap::new();
+        for &[a, b, c] in &self.triangles {
+            for [i, j] in [[a, b], [b, c], [c, a]] {
+                if self.left_of(j, i).is_none() {
+                    sides.entry(i).or_insert([i, i])[1] = j;
+                    sides.entry(j).or_insert([j, j])[0] = i;
+                }
+            }
+        }
+        sides
+    }
+
+    /// Drops vertices that no triangle uses and rebuilds the half-edges.
+    pub(crate) fn compact(&mut self) {
+        let mut used = vec![false; self.positions.len()];
+        self.triangles.iter().flatten().for_each(|&v| used[v as usize] = true);
+        let mut new = Vec::with_capacity(used.len());
+        let mut count = 0;
+        for &is_used in &used {
+            new.push(count);
+            count += u32::from(is_used);
+        }
+        let mut is_used = used.iter();
+        self.positions.retain(|_| is_used.next() == Some(&true));
+        for triangle in &mut self.triangles {
+            *triangle = triangle.map(|v| new[v as usize]);
+        }
+        self.index_edges();
     }
 
     fn angle_at(&self, at: u32, b: u32, c: u32) -> f64 {

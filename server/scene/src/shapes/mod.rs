@@ -8,6 +8,7 @@ mod shell;
 
 pub use block::box_mesh;
 pub use shell::{ellipsoid_shell, sphere_shell, ventricle};
+pub(crate) use shell::{graded, layers_for};
 
 use palpate_physics::{MeshError, TetMesh};
 use std::collections::BTreeSet;

@@ -7,7 +7,7 @@ use palpate_physics::TetMesh;
 use std::f64::consts::FRAC_PI_2;
 
 /// Edge over layer thickness that a mesh aims at; 1 to 2 gives good tets, and more layers bend better than one.
-pub(crate) const EDGE_PER_LAYER: f64 = 1.4;
+const EDGE_PER_LAYER: f64 = 1.4;
 /// A count is met when it is off by no more than this.
 const COUNT_TOLERANCE: f64 = 0.10;
 /// Most layers through a wall.
