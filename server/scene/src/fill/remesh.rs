@@ -51,7 +51,7 @@ pub(crate) fn remesh(clean: &CleanSurface, target: &Target, wanted: usize, mut p
         mesh.delaunay(3);
     }
     reach(&mut mesh, target, wanted, |now| {
-        progress(0.5 * (start / now).ln().abs() / (start / wanted as f64).ln().abs())
+        progress(0.5 * (start / now).ln().abs() / (start / wanted as f64).ln().abs());
     });
     for round in 0..EQUALISING_ROUNDS {
         progress(0.5 + 0.5 * round as f64 / (EQUALISING_ROUNDS + FINAL_ROUNDS) as f64);

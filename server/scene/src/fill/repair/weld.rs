@@ -33,7 +33,12 @@ impl<'a> Grid<'a> {
         let [x, y, z] = self.key(p);
         let mut best: Option<(u32, f64)> = None;
         for (dx, dy, dz) in (-1..=1).flat_map(|i| (-1..=1).flat_map(move |j| (-1..=1).map(move |k| (i, j, k)))) {
-            for &v in self.cells.get(&[x + dx, y + dy, z + dz]).into_iter().flatten() {
+            for &v in self
+                .cells
+                .get(&[x.saturating_add(dx), y.saturating_add(dy), z.saturating_add(dz)])
+                .into_iter()
+                .flatten()
+            {
                 let distance = self.points[v as usize].distance(p);
                 let better = best.is_none_or(|(w, least)| (distance, v) < (least, w));
                 if distance <= self.cell && better && ok(v) {
@@ -47,7 +52,8 @@ impl<'a> Grid<'a> {
 
 /// Merges coinciding points; drops triangles that are degenerate or present twice.
 pub(super) fn weld(points: &[DVec3], triangles: &[[u32; 3]], repairs: &mut Repairs) -> Soup {
-    let tolerance = (SAME_POINT * Soup::diagonal(points)).max(f64::MIN_POSITIVE);
+    let diagonal = Soup::diagonal(points);
+    let tolerance = if diagonal > 0.0 { SAME_POINT * diagonal } else { 1.0 };
     let mut grid = Grid::new(points, tolerance);
     let mut map: Vec<u32> = Vec::with_capacity(points.len());
     for v in 0..points.len() as u32 {
