@@ -56,16 +56,8 @@ impl<'a> Cursor<'a> {
         Self { path, data, at: 0, mark: 0, encoding: Encoding::Ascii }
     }
 
-    pub(super) fn path(&self) -> &'a Path {
-        self.path
-    }
-
     pub(super) fn rest(&self) -> &'a [u8] {
         &self.data[self.at..]
-    }
-
-    pub(super) fn at(&self) -> usize {
-        self.at
     }
 
     /// Moves on by `bytes`, at most to the end.
@@ -76,7 +68,7 @@ impl<'a> Cursor<'a> {
     /// An error at the item taken last.
     pub(super) fn fail(&self, problem: Problem) -> FileError {
         let place = match self.encoding {
-            Encoding::Ascii => Place::Line(1 + self.data[..self.mark].iter().filter(|&&b| b == b'\n').count()),
+            Encoding::Ascii => Place::Line(self.data[..self.mark].split(|&b| b == b'\n').count()),
             _ => Place::Byte(self.mark),
         };
         FileError::new(self.path, place, problem)

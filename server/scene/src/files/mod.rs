@@ -6,9 +6,7 @@
 use glam::DVec3;
 use std::path::{Path, PathBuf};
 
-#[allow(dead_code)]
 mod builder;
-#[allow(dead_code)]
 mod cursor;
 mod error;
 mod format;
@@ -78,7 +76,7 @@ pub struct SurfaceFile {
 /// # Errors
 /// A [`FileError`] with the place and what to do.
 pub fn read_volume(path: &Path) -> Result<VolumeFile, FileError> {
-    read(path)?.into_volume(path)
+    parse_volume(path, &format::load(path)?)
 }
 
 /// Reads a triangulated surface: STL, OBJ, PLY, VTK legacy, VTP, or the triangles of a volume's file.
@@ -86,18 +84,37 @@ pub fn read_volume(path: &Path) -> Result<VolumeFile, FileError> {
 /// # Errors
 /// A [`FileError`] with the place and what to do.
 pub fn read_surface(path: &Path) -> Result<SurfaceFile, FileError> {
-    read(path)?.into_surface(path)
+    parse_surface(path, &format::load(path)?)
 }
 
-fn read(path: &Path) -> Result<Builder, FileError> {
-    let data = format::load(path)?;
-    match format::recognise(path, &data)? {
-        Format::Msh => msh::read(path, &data),
-        Format::VtkLegacy => vtk::legacy::read(path, &data),
-        Format::VtkXml => vtk::xml::read(path, &data),
+/// As [`read_volume`], from the content `data` of the file; `path` tells the extension and names the file in errors.
+///
+/// # Errors
+/// A [`FileError`] with the place and what to do.
+pub fn parse_volume(path: &Path, data: &[u8]) -> Result<VolumeFile, FileError> {
+    parse(path, data)?.into_volume(path)
+}
+
+/// As [`read_surface`], from the content `data` of the file; `path` tells the extension and names the file in errors.
+///
+/// # Errors
+/// A [`FileError`] with the place and what to do.
+pub fn parse_surface(path: &Path, data: &[u8]) -> Result<SurfaceFile, FileError> {
+    parse(path, data)?.into_surface(path)
+}
+
+fn parse(path: &Path, data: &[u8]) -> Result<Builder, FileError> {
+    if data.is_empty() {
+        return Err(FileError::new(path, Place::File, Problem::Empty));
+    }
+    match format::recognise(path, data)? {
+        Format::Msh => msh::read(path, data),
+        Format::VtkLegacy => vtk::legacy::read(path, data),
+        Format::VtkXml => vtk::xml::read(path, data),
+        // TetGen spreads a mesh over files with one stem.
         Format::TetGen => tetgen::read(path),
-        Format::Stl => stl::read(path, &data),
-        Format::Obj => obj::read(path, &data),
-        Format::Ply => ply::read(path, &data),
+        Format::Stl => stl::read(path, data),
+        Format::Obj => obj::read(path, data),
+        Format::Ply => ply::read(path, data),
     }
 }

@@ -30,7 +30,7 @@ pub(super) fn read(path: &Path, data: &[u8]) -> Result<Builder, FileError> {
                 builder.element(POLYGON, &corners, &[]);
             }
             Some("l" | "p") => {
-                builder.element(Kind { shape: Shape::Other, name: "lines and points", corners: 0 }, &[], &[])
+                builder.element(Kind { shape: Shape::Other, name: "lines and points", corners: 0 }, &[], &[]);
             }
             Some(word) if !KNOWN.contains(&word) => {
                 return Err(cursor.expected("a statement of an OBJ file (v, f, …)", word.as_bytes()));

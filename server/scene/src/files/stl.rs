@@ -55,9 +55,8 @@ impl Soup {
 fn read_ascii(cursor: &mut Cursor, soup: &mut Soup) -> Result<(), FileError> {
     let mut line = cursor.line();
     let mut closed = true;
-    loop {
-        // `solid` and `endsolid` carry a free name to the end of the line.
-        let Some(text) = line else { break };
+    // `solid` and `endsolid` carry a free name to the end of the line.
+    while let Some(text) = line {
         let text = text.trim_ascii();
         closed = if text.starts_with(b"solid") {
             false

@@ -1,3 +1,7 @@
-//! VTK: the legacy format and the XML formats VTU and VTP.
+//! VTK: the legacy format, and the XML formats VTU and VTP.
+mod array;
+mod attributes;
+mod base64;
+mod cells;
 pub(super) mod legacy;
 pub(super) mod xml;

@@ -22,13 +22,13 @@ pub fn write_vtu(path: &Path, frame: &VtuFrame) -> Result<(), FileError> {
 /// # Errors
 /// The file cannot be written.
 pub fn write_pvd(path: &Path, frames: &[(f64, String)]) -> Result<(), FileError> {
-    let mut text =
-        String::from("<?xml version=\"1.0\"?>\n<VTKFile type=\"Collection\" version=\"0.1\">\n<Collection>\n");
+    let mut text = b"<?xml version=\"1.0\"?>\n<VTKFile type=\"Collection\" version=\"0.1\">\n<Collection>\n".to_vec();
     for (time_s, file) in frames {
-        text.push_str(&format!("<DataSet timestep=\"{time_s}\" part=\"0\" file=\"{}\"/>\n", vtu::escaped(file)));
+        // Writing to a vector does not fail.
+        let _ = writeln!(text, "<DataSet timestep=\"{time_s}\" part=\"0\" file=\"{}\"/>", vtu::escaped(file));
     }
-    text.push_str("</Collection>\n</VTKFile>\n");
-    store(path, text.as_bytes())
+    text.extend(b"</Collection>\n</VTKFile>\n");
+    store(path, &text)
 }
 
 /// Writes a triangulated surface as OBJ. Coordinates are written so that they read back to the same bits.
@@ -38,7 +38,6 @@ pub fn write_pvd(path: &Path, frames: &[(f64, String)]) -> Result<(), FileError>
 pub fn write_obj(path: &Path, vertices: &[DVec3], triangles: &[[u32; 3]]) -> Result<(), FileError> {
     let mut text = Vec::new();
     for v in vertices {
-        // Writing to a vector does not fail.
         let _ = writeln!(text, "v {} {} {}", v.x, v.y, v.z);
     }
     for [a, b, c] in triangles.iter().map(|t| t.map(|index| u64::from(index) + 1)) {
@@ -59,7 +58,7 @@ pub fn write_ply(path: &Path, vertices: &[DVec3], triangles: &[[u32; 3]]) -> Res
         triangles.len()
     )
     .into_bytes();
-    bytes.extend(vertices.iter().flat_map(|v| v.to_array()).flat_map(f64::to_le_bytes));
+    bytes.extend(vertices.iter().flat_map(DVec3::to_array).flat_map(f64::to_le_bytes));
     for triangle in triangles {
         bytes.push(3);
         bytes.extend(triangle.iter().flat_map(|index| index.to_le_bytes()));

@@ -90,7 +90,7 @@ impl Values<'_> {
 }
 
 fn vectors(values: &[DVec3]) -> Vec<u8> {
-    values.iter().flat_map(|v| v.to_array()).flat_map(f64::to_le_bytes).collect()
+    values.iter().flat_map(DVec3::to_array).flat_map(f64::to_le_bytes).collect()
 }
 
 /// The bytes of a VTU file.

@@ -1,0 +1,151 @@
+//! VTK's cells, and the cell array that tells their groups.
+use crate::files::builder::{Builder, Kind, Shape};
+use crate::files::error::Problem;
+
+/// The element type by VTK's number.
+fn kind(number: i64) -> Option<Kind> {
+    let (shape, name, corners) = match number {
+        1 => (Shape::Point, "points", 1),
+        2 => (Shape::Other, "sets of points", 0),
+        3 | 4 | 21 | 35 | 68 | 75 => (Shape::Other, "lines", 2),
+        5 | 22 | 34 | 69 | 76 => (Shape::Triangle, "triangles", 3),
+        7 => (Shape::Polygon, "polygons", usize::MAX),
+        8 => (Shape::Other, "pixels", 4),
+        9 | 23 | 28 | 30 | 70 | 77 => (Shape::Polygon, "quadrangles", 4),
+        10 | 24 | 71 | 78 => (Shape::Tet, "tetrahedra", 4),
+        11 => (Shape::Other, "voxels", 8),
+        12 | 25 | 29 | 33 | 72 | 79 => (Shape::Other, "hexahedra", 8),
+        13 | 26 | 31 | 32 | 73 | 80 => (Shape::Other, "prisms", 6),
+        14 | 27 | 37 | 74 | 81 => (Shape::Other, "pyramids", 5),
+        15 | 16 | 36 | 41 | 42 => (Shape::Other, "polygons and polyhedra of other types", 0),
+        _ => return None,
+    };
+    Some(Kind { shape, name, corners })
+}
+
+pub(super) const VERTICES: i64 = 2;
+pub(super) const LINES: i64 = 4;
+pub(super) const STRIP: i64 = 6;
+pub(super) const POLYGON: i64 = 7;
+
+/// Cells of any types: those of cell `i` are `connectivity[offsets[i]..offsets[i + 1]]`.
+#[derive(Debug, Default)]
+pub(super) struct CellTable {
+    pub(super) connectivity: Vec<i64>,
+    pub(super) offsets: Vec<i64>,
+    pub(super) types: Vec<i64>,
+}
+
+impl CellTable {
+    /// Adds the cells to `builder`, whose nodes from `first_node` on are theirs; `tags` has a group for each, if any.
+    pub(super) fn build(&self, builder: &mut Builder, first_node: u32, tags: Option<&[i64]>) -> Result<(), Problem> {
+        let cells = self.types.len();
+        let differ = |what: String| Problem::Inconsistent { what };
+        if self.offsets.len() != cells + 1 {
+            return Err(differ(format!("{} cells have offsets, {cells} have types", self.offsets.len().max(1) - 1)));
+        }
+        if tags.is_some_and(|tags| tags.len() != cells) {
+            return Err(differ(format!("{cells} cells have {} values of their group", tags.unwrap_or_default().len())));
+        }
+        let mut nodes = Vec::new();
+        for cell in 0..cells {
+            self.nodes_of(cell, builder.nodes.len() as u32, first_node, &mut nodes)?;
+            let tag = tags.map(|tags| &tags[cell..=cell]).unwrap_or_default();
+            self.add(builder, cell, &nodes, tag)?;
+        }
+        Ok(())
+    }
+
+    fn nodes_of(&self, cell: usize, node_count: u32, first_node: u32, nodes: &mut Vec<u32>) -> Result<(), Problem> {
+        let [from, to] = [self.offsets[cell], self.offsets[cell + 1]];
+        let range = usize::try_from(from).ok().zip(usize::try_from(to).ok());
+        let Some(corners) = range.and_then(|(from, to)| self.connectivity.get(from..to)) else {
+            let known = self.connectivity.len();
+            return Err(Problem::Inconsistent {
+                what: format!("cell {cell} has offsets {from} to {to} of {known} indices"),
+            });
+        };
+        nodes.clear();
+        for &node in corners {
+            let count = node_count - first_node;
+            if !(0..i64::from(count)).contains(&node) {
+                let known = format!("there are {count}, counting from 0");
+                return Err(Problem::UnknownNode { element: format!("cell {cell}"), node, known });
+            }
+            nodes.push(first_node + node as u32);
+        }
+        Ok(())
+    }
+
+    fn add(&self, builder: &mut Builder, cell: usize, nodes: &[u32], tag: &[i64]) -> Result<(), Problem> {
+        let number = self.types[cell];
+        if number == STRIP {
+            // Every other triangle of a strip runs the other way round.
+            const TRIANGLE: Kind = Kind { shape: Shape::Triangle, name: "triangles", corners: 3 };
+            for (place, t) in nodes.windows(3).enumerate() {
+                let corners = if place % 2 == 0 { [t[0], t[1], t[2]] } else { [t[1], t[0], t[2]] };
+                builder.element(TRIANGLE, &corners, tag);
+            }
+            return Ok(());
+        }
+        let Some(kind) = kind(number) else {
+            let what = format!("cell {cell} has type {number}, which is no cell type of VTK");
+            return Err(Problem::Inconsistent { what });
+        };
+        let exact = matches!(kind.shape, Shape::Tet | Shape::Triangle | Shape::Point);
+        let least = if kind.shape == Shape::Polygon { kind.corners.min(3) } else { kind.corners };
+        if (exact || kind.shape == Shape::Polygon) && nodes.len() < least {
+            let what = format!("cell {cell} ({}) has {} nodes", kind.name, nodes.len());
+            return Err(Problem::Inconsistent { what });
+        }
+        builder.element(kind, nodes, tag);
+        Ok(())
+    }
+}
+
+/// Names of cell arrays that tell a group, the most telling first; compared without case, spaces, `_` and `-`.
+const GROUP_ARRAYS: [&str; 16] = [
+    "gmsh:physical",
+    "physical",
+    "physicalid",
+    "tetgen:ref",
+    "medit:ref",
+    "celltags",
+    "region",
+    "regionid",
+    "regions",
+    "material",
+    "materialid",
+    "group",
+    "groupid",
+    "part",
+    "partid",
+    "cellentityids",
+];
+
+/// The cell array that tells the groups, among those seen so far.
+#[derive(Debug, Default)]
+pub(super) struct Groups {
+    best: Option<usize>,
+    pub(super) tags: Option<Vec<i64>>,
+}
+
+impl Groups {
+    /// Whether an array of this name would be taken.
+    pub(super) fn wants(&self, name: &str, components: usize) -> bool {
+        components == 1 && rank(name).is_some_and(|rank| self.best.is_none_or(|best| rank < best))
+    }
+
+    /// Offers an array; one with values that are not whole is no group.
+    pub(super) fn offer(&mut self, name: &str, values: &[f64]) {
+        if self.wants(name, 1) && values.iter().all(|v| v.fract() == 0.0 && v.abs() < 9e15) {
+            self.best = rank(name);
+            self.tags = Some(values.iter().map(|&v| v as i64).collect());
+        }
+    }
+}
+
+fn rank(name: &str) -> Option<usize> {
+    let plain: String = name.chars().filter(|c| !matches!(c, ' ' | '_' | '-')).flat_map(char::to_lowercase).collect();
+    GROUP_ARRAYS.iter().position(|known| *known == plain)
+}

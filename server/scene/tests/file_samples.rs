@@ -1,0 +1,240 @@
+//! One mesh in every format, as other programs write it: each file must give the same mesh.
+use glam::DVec3;
+use palpate_scene::files::{GroupedMesh, SurfaceFile, UnusedNodes, read_surface, read_volume};
+use std::path::{Path, PathBuf};
+
+fn sample(name: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/files").join(name)
+}
+
+/// In millimetres, for the sake of the scale.
+fn mesh(name: &str) -> GroupedMesh {
+    let file = read_volume(&sample(name)).unwrap_or_else(|error| panic!("{name}: {error}"));
+    file.into_tet_mesh(1e-3, UnusedNodes::Drop).unwrap_or_else(|error| panic!("{name}: {error}"))
+}
+
+/// Tets as their corners' coordinates in units of 1e-9 m, each turned to begin with its least corner but one
+/// orientation, with the group's tag; sorted, so that numbering plays no part.
+fn canonical(mesh: &GroupedMesh) -> Vec<([[i64; 3]; 4], i64)> {
+    let rounded = |p: DVec3| (p * 1e9).round().as_i64vec3().to_array();
+    let mut tets: Vec<_> = (0..mesh.mesh.tets().len())
+        .map(|tet| {
+            let mut corners = mesh.mesh.corners_m(tet).map(rounded);
+            corners.sort_unstable();
+            (corners, mesh.groups[mesh.tet_group[tet] as usize].tag)
+        })
+        .collect();
+    tets.sort_unstable();
+    tets
+}
+
+/// With the groups `left` (11) and `right` (12).
+const GROUPED: [&str; 36] = [
+    "bar_v1.msh",
+    "bar_v22_ascii.msh",
+    "bar_v22_binary.msh",
+    "bar_v41_binary.msh",
+    "bar_sparse_v41_ascii.msh",
+    "bar_sparse_v41_binary.msh",
+    "bar_sparse_v22_ascii.msh",
+    "bar_parametric_v41_ascii.msh",
+    "bar_parametric_v41_binary.msh",
+    "bar_partitioned_v41_ascii.msh",
+    "bar_quadratic_v41_ascii.msh",
+    "bar_quadratic_v22_binary.msh",
+    "bar_meshio42_ascii.vtk",
+    "bar_meshio42_binary.vtk",
+    "bar_meshio51_ascii.vtk",
+    "bar_meshio51_binary.vtk",
+    "bar_meshio_ascii.vtu",
+    "bar_meshio_binary.vtu",
+    "bar_meshio_zlib.vtu",
+    "bar_meshio_v22_ascii.msh",
+    "bar_tetgen.node",
+    "bar_tetgen.ele",
+    "bar_vtk42_ascii.vtk",
+    "bar_vtk42_binary.vtk",
+    "bar_vtk51_ascii.vtk",
+    "bar_vtk51_binary.vtk",
+    "bar_vtk_ascii.vtu",
+    "bar_vtk_inline.vtu",
+    "bar_vtk_inline_zlib.vtu",
+    "bar_vtk_raw.vtu",
+    "bar_vtk_raw_u32.vtu",
+    "bar_vtk_raw_big.vtu",
+    "bar_vtk_base64.vtu",
+    "bar_vtk_raw_zlib.vtu",
+    "bar_vtk_base64_u32_zlib.vtu",
+    "bar_vtk_raw_zlib_blocks.vtu",
+];
+
+#[test]
+fn every_volume_format_gives_the_same_mesh_and_groups() {
+    let reference = mesh("bar_v41_ascii.msh");
+    // Two boxes of 2 x 1 x 1 mm.
+    assert!((reference.mesh.total_volume_m3() - 4e-9).abs() < 1e-21);
+    assert_eq!((reference.mesh.positions_m().len(), reference.mesh.tets().len()), (40, 91));
+    for name in GROUPED {
+        assert!(canonical(&mesh(name)) == canonical(&reference), "{name}");
+    }
+}
+
+/// Gmsh's VTK files and meshio's 4.1 files hold the tets, but not their physical groups.
+#[test]
+fn formats_without_groups_give_the_same_tets() {
+    let without = |name| canonical(&mesh(name)).into_iter().map(|(corners, _)| corners).collect::<Vec<_>>();
+    for name in [
+        "bar_gmsh_ascii.vtk",
+        "bar_gmsh_binary.vtk",
+        "bar_meshio_v41_binary.msh",
+        "bar_mixed.vtu",
+        "bar_mixed_v22_ascii.msh",
+    ] {
+        assert!(without(name) == without("bar_v41_ascii.msh"), "{name}");
+    }
+}
+
+/// Formats with double precision give the nodes to the bit. (Gmsh's own text has 16 digits, one too few; meshio and
+/// VTK made their files from that text.)
+#[test]
+fn double_precision_is_kept_to_the_bit() {
+    let nodes = |name| read_volume(&sample(name)).unwrap().mesh_nodes;
+    assert!(nodes("bar_v22_binary.msh") == nodes("bar_v41_binary.msh"));
+    for name in ["bar_meshio51_binary.vtk", "bar_meshio_zlib.vtu", "bar_vtk_raw_big.vtu", "bar_tetgen.ele"] {
+        assert!(nodes(name) == nodes("bar_v41_ascii.msh"), "{name}");
+    }
+}
+
+#[test]
+fn physical_names_surfaces_and_points_are_kept() {
+    for name in [
+        "bar_v41_ascii.msh",
+        "bar_v41_binary.msh",
+        "bar_v22_ascii.msh",
+        "bar_v22_binary.msh",
+        "bar_sparse_v41_ascii.msh",
+    ] {
+        let mesh = mesh(name);
+        let at = |group: &str, x_m: f64| {
+            let nodes = mesh.nodes_of(group);
+            assert!(!nodes.is_empty(), "{name}: {group}");
+            assert!(
+                nodes.iter().all(|&n| (mesh.mesh.positions_m()[n as usize].x - x_m).abs() < 1e-12),
+                "{name}: {group}"
+            );
+        };
+        at("base", 0.0);
+        at("tip", 4e-3);
+        let corner = mesh.nodes_of("corner");
+        assert_eq!(corner.len(), 1, "{name}");
+        assert_eq!(mesh.mesh.positions_m()[corner[0] as usize], DVec3::ZERO, "{name}");
+        let half = |group: &str| mesh.tets_of(group).iter().map(|&tet| mesh.mesh.volume_m3(tet as usize)).sum::<f64>();
+        assert!((half("left") - 2e-9).abs() < 1e-21 && (half("right") - 2e-9).abs() < 1e-21, "{name}");
+        assert_eq!(mesh.tets_of("left"), mesh.tets_of("11"), "{name}");
+        // A square millimetre of triangles.
+        let area_m2 = |group: &str| -> f64 {
+            let (_, triangles) =
+                mesh.surface_groups.iter().find(|(g, _)| mesh.groups[*g].name == group).expect("the group");
+            let corners = |t: &[u32; 3]| t.map(|n| mesh.mesh.positions_m()[n as usize]);
+            triangles.iter().map(corners).map(|[a, b, c]| (b - a).cross(c - a).length() / 2.0).sum()
+        };
+        assert!((area_m2("base") - 1e-6).abs() < 1e-18, "{name}");
+    }
+}
+
+/// A tet may belong to several physical groups: MSH 2.2 then lists it once for each.
+#[test]
+fn overlapping_groups_are_kept() {
+    for name in ["bar_overlap_v41_ascii.msh", "bar_overlap_v22_ascii.msh"] {
+        let mesh = mesh(name);
+        assert_eq!(mesh.mesh.tets().len(), 91, "{name}");
+        assert_eq!(mesh.tets_of("all").len(), 91, "{name}");
+        assert_eq!(mesh.tets_of("left").len() + mesh.tets_of("right").len(), 91, "{name}");
+    }
+}
+
+#[test]
+fn what_is_not_used_is_said() {
+    let said = |name: &str, words: &str| {
+        let warnings = mesh(name).warnings;
+        assert!(warnings.iter().any(|w| w.contains(words)), "{name}: {warnings:?}");
+    };
+    said("bar_mixed_v22_ascii.msh", "1 hexahedra");
+    said("bar_mixed.vtu", "1 hexahedra");
+    said("bar_mixed.vtu", "8 nodes that belong to no tet");
+    said("bar_quadratic_v41_ascii.msh", "91 tetrahedra");
+    said("bar_quadratic_v41_ascii.msh", "corner nodes");
+    assert_eq!(mesh("bar_v41_binary.msh").warnings, Vec::<String>::new());
+}
+
+#[test]
+fn what_is_not_read_names_the_way_out() {
+    let refused = |name: &str| {
+        let error = read_volume(&sample(name)).unwrap_err();
+        format!("{error}; {}", error.problem.help())
+    };
+    let version = refused("bar_v40_ascii.msh");
+    assert!(version.contains("line 2: MSH version 4 is not read") && version.contains("-format msh41"), "{version}");
+    assert!(refused("bar_vtk_raw_lz4.vtu").contains("vtkLZ4DataCompressor"));
+    assert!(refused("bar_meshio_lzma.vtu").contains("vtkLZMADataCompressor"));
+    assert!(refused("skin_meshio_ascii.stl").contains("no tetrahedra (it holds 38 nodes, 72 triangles)"));
+}
+
+/// Triangles as their corners in units of 1e-5 (some files hold six digits), each begun with its least corner.
+fn triangles(surface: &SurfaceFile) -> Vec<[[i64; 3]; 3]> {
+    let mut all: Vec<_> = surface
+        .triangles
+        .iter()
+        .map(|t| {
+            let mut corners = t.map(|v| (surface.vertices[v as usize] * 1e5).round().as_i64vec3().to_array());
+            let least = (0..3).min_by_key(|&i| corners[i]).unwrap_or(0);
+            corners.rotate_left(least);
+            corners
+        })
+        .collect();
+    all.sort_unstable();
+    all
+}
+
+#[test]
+fn every_surface_format_gives_the_same_triangles() {
+    let reference = read_surface(&sample("skin_meshio.obj")).unwrap();
+    assert_eq!((reference.vertices.len(), reference.triangles.len()), (38, 72));
+    let volume: f64 = reference
+        .triangles
+        .iter()
+        .map(|t| t.map(|v| reference.vertices[v as usize]))
+        .map(|[a, b, c]| a.dot(b.cross(c)) / 6.0)
+        .sum();
+    assert!((volume - 4.0).abs() < 1e-9, "the skin is closed and faces outwards: {volume}");
+    for name in [
+        "skin_meshio51_binary.vtk",
+        "skin_meshio_ascii.ply",
+        "skin_meshio_ascii.stl",
+        "skin_meshio_binary.ply",
+        "skin_meshio_binary.stl",
+        "skin_solid_binary.stl",
+        "skin_vtk42_ascii.vtk",
+        "skin_vtk42_binary.vtk",
+        "skin_vtk51_ascii.vtk",
+        "skin_vtk51_binary.vtk",
+        "skin_vtk_ascii.ply",
+        "skin_vtk_ascii.vtp",
+        "skin_vtk_big.ply",
+        "skin_vtk_little.ply",
+        "skin_vtk_raw.vtp",
+    ] {
+        let surface = read_surface(&sample(name)).unwrap_or_else(|error| panic!("{name}: {error}"));
+        assert_eq!(surface.vertices.len(), 38, "{name}");
+        assert_eq!(triangles(&surface), triangles(&reference), "{name}");
+        assert!(surface.warnings.is_empty(), "{name}: {:?}", surface.warnings);
+    }
+}
+
+/// The triangles of physical groups serve as a surface; the points inside the body are no part of it.
+#[test]
+fn a_volume_file_gives_its_triangles() {
+    let surface = read_surface(&sample("bar_v41_ascii.msh")).unwrap();
+    assert!(surface.vertices.iter().all(|v| v.x == 0.0 || v.x == 4.0));
+    assert!(surface.warnings.iter().any(|w| w.contains("belong to no triangle")), "{:?}", surface.warnings);
+}
