@@ -186,7 +186,7 @@ struct ToolModel {
     foundation: Foundation,
     /// Where the coupling saturates (N).
     force_limit_n: f64,
-    /// Bound of the tool's kinetic energy near the surface (J).
+    /// Bound of the kinetic energy with which the tool meets the surface (J).
     impact_energy_j: f64,
 }
 
@@ -240,13 +240,6 @@ impl ToolModel {
             // ∫ π k_f R d² dd
             impact_energy_j: foundation.flat_force_n(radius_m, depth_m) * depth_m / 3.0,
             foundation,
-        }
-    }
-
-    fn near_speed_m_per_s(&self, fastest_m_per_s: f64) -> f64 {
-        match self.spec.coupling {
-            Coupling::Rigid => f64::INFINITY,
-            Coupling::Spring { mass_kg, .. } => fastest_m_per_s + (2.0 * self.impact_energy_j / mass_kg).sqrt(),
         }
     }
 }
@@ -325,9 +318,7 @@ impl ContactModel {
             contact.tools[index].candidates.slack_m -= moved_m;
             self.list_candidates(index, tool.centre_m, body.x, contact, exhaustive);
             let pressed = self.press(index, tool.centre_m, body.x, contact, forces_n, scratch);
-            let near = pressed.distance_m < (1.0 + proxy::NEAR) * model.spec.radius_m;
-            let near_speed = near.then(|| model.near_speed_m_per_s(body.fastest_m_per_s));
-            let coupling_n = proxy::finish(model, tool, pressed.force_n, time, near_speed);
+            let coupling_n = proxy::finish(model, tool, &pressed, time);
             tool.friction_heat_j += pressed.heat_j;
             tool.contacts = pressed.contacts;
             tool.contact_energy_j = pressed.energy_j;

@@ -59,8 +59,8 @@ pub(super) struct Pressed {
     pub(super) contacts: u32,
     /// Deepest sample (m).
     pub(super) penetration_m: f64,
-    /// Distance (m) of the surface from the tool's centre, infinite when nothing is listed.
-    pub(super) distance_m: f64,
+    /// From the tool's centre to the nearest point of the surface (m); infinite when nothing is listed.
+    pub(super) to_surface_m: DVec3,
 }
 
 impl Pressed {
@@ -98,15 +98,19 @@ pub(super) fn press(
     next: &mut Touching,
     forces_n: &mut [DVec3],
 ) -> Pressed {
-    let mut pressed = Pressed { distance_m: f64::INFINITY, ..Pressed::default() };
+    let mut pressed = Pressed { to_surface_m: DVec3::INFINITY, ..Pressed::default() };
+    let mut nearest_sq = f64::INFINITY;
     let mut before = touching.records();
     next.clear();
     for &triangle in candidates {
         let triangle = triangle as usize;
         let corners = meeting.triangles.corners(triangle, meeting.x);
-        let distance_m = meeting.centre_m.distance(closest_point(meeting.centre_m, corners));
-        pressed.distance_m = pressed.distance_m.min(distance_m);
-        if distance_m >= meeting.radius_m {
+        let to_triangle_m = closest_point(meeting.centre_m, corners) - meeting.centre_m;
+        let distance_sq = to_triangle_m.length_squared();
+        if distance_sq < nearest_sq {
+            (nearest_sq, pressed.to_surface_m) = (distance_sq, to_triangle_m);
+        }
+        if distance_sq >= meeting.radius_m * meeting.radius_m {
             continue;
         }
         let samples = meeting.foundation.of(triangle, meeting.tables);
@@ -208,4 +212,152 @@ fn take(before: &mut &[Touch], sample: u32) -> Option<Touch> {
         }
     }
     None
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::{ContactModel, SurfaceModuli, ToolSpec};
+    use super::*;
+    use crate::{
+        contact::Coupling,
+        mesh::{Surface, TetMesh},
+    };
+    use proptest::prelude::*;
+
+    /// A tet with one face in the plane z = 0, looking up, and a sphere above its middle.
+    struct Bench {
+        model: ContactModel,
+        x: Vec<DVec3>,
+        touching: Touching,
+        next: Touching,
+    }
+
+    const RADIUS_M: f64 = 0.01;
+
+    impl Bench {
+        fn new(friction_coefficient: f64) -> Self {
+            let x = [(0.0, 0.0, 0.0), (0.03, 0.0, 0.0), (0.0, 0.03, 0.0), (0.0, 0.0, -0.03)];
+            let x: Vec<DVec3> = x.into_iter().map(DVec3::from).collect();
+            let mesh = TetMesh::new(x.clone(), vec![[0, 2, 1, 3]]).unwrap();
+            let surface = Surface::of(&mesh).unwrap();
+            let tool = ToolSpec {
+                name: "sphere".into(),
+                radius_m: RADIUS_M,
+                coupling: Coupling::Rigid,
+                friction_coefficient,
+                start_position_m: DVec3::Z,
+            };
+            let moduli = vec![SurfaceModuli { p_wave_pa: 38e3, indentation_pa: 12.5e3 }; 4];
+            let model = ContactModel::build(&mesh, &surface, &moduli, &[1.0; 4], &[tool]);
+            let samples = model.tools[0].foundation.samples;
+            let buffer = || Touching::with_capacity(samples);
+            Self { model, x, touching: buffer(), next: buffer() }
+        }
+
+        fn press(&mut self, centre_m: DVec3) -> (Pressed, Vec<DVec3>) {
+            let tool = &self.model.tools[0];
+            let meeting = Meeting {
+                triangles: &self.model.triangles,
+                foundation: &tool.foundation,
+                tables: &self.model.tables,
+                x: &self.x,
+                centre_m,
+                radius_m: RADIUS_M,
+                friction_coefficient: tool.spec.friction_coefficient,
+            };
+            let mut forces = vec![DVec3::ZERO; 4];
+            let all = [0, 1, 2, 3];
+            let pressed = press(&meeting, &all, &mut self.touching, &mut self.next, &mut forces);
+            (pressed, forces)
+        }
+    }
+
+    fn above(depth_m: f64) -> DVec3 {
+        DVec3::new(0.01, 0.01, RADIUS_M - depth_m)
+    }
+
+    proptest! {
+        #[test]
+        fn forces_balance_and_are_the_gradient_of_the_energy(
+            shift in prop::array::uniform3(-0.3..0.3_f64), axis in 0..3_usize, node in 0..3_usize,
+        ) {
+            // Corners of the upper face, moved; the far one (3) is out of reach.
+            let centre = above(0.3 * RADIUS_M) + DVec3::from(shift) * RADIUS_M;
+            let mut bench = Bench::new(0.0);
+            let (pressed, forces) = bench.press(centre);
+            prop_assert!((pressed.force_n + forces.iter().sum::<DVec3>()).length() <= 1e-12 * pressed.pressing_n);
+            let step = 1e-7;
+            let mut energy = |sign: f64| {
+                bench.x[node][axis] += sign * step;
+                let energy = bench.press(centre).0.energy_j;
+                bench.x[node][axis] -= sign * step;
+                energy
+            };
+            let slope = (energy(1.0) - energy(-1.0)) / (2.0 * step);
+            prop_assert!((slope + forces[node][axis]).abs() <= 1e-5 * pressed.pressing_n, "{slope} {}", forces[node]);
+        }
+
+        #[test]
+        fn no_sample_leaves_the_friction_cone(steps in prop::collection::vec(prop::array::uniform3(-1.0..1.0_f64), 1..40)) {
+            let mu = 0.4;
+            let mut bench = Bench::new(mu);
+            let mut centre = above(0.1 * RADIUS_M);
+            for step in steps {
+                centre += DVec3::from(step) * 2e-4;
+                let (pressed, forces) = bench.press(centre);
+                let friction = pressed.force_n - pressed.normal_n;
+                prop_assert!(friction.length() <= mu * pressed.pressing_n * (1.0 + 1e-12));
+                prop_assert!(pressed.heat_j >= 0.0);
+                prop_assert!((pressed.force_n + forces.iter().sum::<DVec3>()).length() <= 1e-12 * pressed.pressing_n + 1e-18);
+                for touch in bench.touching.records() {
+                    prop_assert!(touch.spring_origin_m.is_finite());
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn it_sticks_below_the_cone_and_slips_at_it() {
+        let (mu, depth) = (0.5, 0.1 * RADIUS_M);
+        let mut bench = Bench::new(mu);
+        bench.press(above(depth));
+        let mut friction_at = |shift_m: f64| {
+            let (pressed, _) = bench.press(above(depth) + DVec3::X * shift_m);
+            (pressed.force_n - pressed.normal_n, pressed)
+        };
+        // Stuck: the tool is pulled back, the force grows with the way and vanishes with it. (The samples at the very rim,
+        // where the pressure is small, slip at once.)
+        let (friction, _) = friction_at(1e-6);
+        let (twice, pressed) = friction_at(2e-6);
+        assert!(friction.x < 0.0 && (twice.x / friction.x - 2.0).abs() < 1e-2, "{friction} {twice}");
+        assert!(pressed.sticking_n > 0.99 * pressed.pressing_n);
+        assert!(friction_at(0.0).0.length() < 1e-2 * friction.length());
+        // Slipping: µ of the pressing force; the normals differ by up to a/R from the plane's.
+        let mut pressed = Pressed::default();
+        for step in 1..=50 {
+            pressed = friction_at(2e-5 * f64::from(step)).1;
+        }
+        let friction = pressed.force_n - pressed.normal_n;
+        assert!((friction.length() / (mu * pressed.pressing_n) - 1.0).abs() < 0.1, "{friction}");
+        assert!(friction.x < 0.0 && friction.y.abs() < 0.05 * friction.x.abs());
+        assert!(pressed.heat_j > 0.0);
+    }
+
+    #[test]
+    fn samples_reached_from_behind_carry_nothing_until_they_left() {
+        let mut bench = Bench::new(0.0);
+        // A centre that starts inside the body and rises: every face is met from behind.
+        let mut ignored = 0;
+        for step in 0..=20 {
+            let centre = DVec3::new(0.004, 0.004, -1.4 * RADIUS_M + 0.06 * RADIUS_M * f64::from(step));
+            let (pressed, forces) = bench.press(centre);
+            assert_eq!(pressed.contacts, 0, "step {step}");
+            assert!(forces.iter().all(|f| *f == DVec3::ZERO));
+            ignored = ignored.max(bench.touching.records().len());
+        }
+        assert!(ignored > 100, "{ignored}");
+        bench.press(DVec3::Z);
+        assert!(bench.touching.records().is_empty());
+        assert!(bench.press(above(0.1 * RADIUS_M)).0.force_n.z > 0.0);
+    }
 }

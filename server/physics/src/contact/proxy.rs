@@ -6,16 +6,17 @@
 //!
 //! What keeps it outside, whatever the device does:
 //! - The spring saturates at `F_max`, the force that presses the sphere [`SATURATION_DEPTH`]·R into the flat foundation; its
-//!   potential is then linear instead of quadratic, so it stays conservative. The damper saturates at the same force.
-//! - It moves at most `R/4` in a substep; within `R/4` of the surface, its kinetic energy relative to the fastest node is at most
-//!   what the flat foundation stores at depth `R/2`. The rest is taken from the (virtual) tool, never given to the body.
-use super::{Coupling, ToolModel, ToolState};
+//!   potential is then linear instead of quadratic, so it stays conservative. The damper is cut where the sum exceeds it.
+//! - It moves at most `R/4` in a substep; within `R/4` of the surface it approaches the nearest point with at most the kinetic
+//!   energy that the flat foundation stores at depth [`IMPACT_DEPTH`]·R. The rest is taken from the (virtual) tool, never given
+//!   to the body.
+use super::{Coupling, ToolModel, ToolState, narrow::Pressed};
 use glam::DVec3;
 
 /// Depth over R at which the coupling's force saturates.
 pub(super) const SATURATION_DEPTH: f64 = 0.2;
 /// Depth over R whose foundation energy bounds the proxy's kinetic energy near the surface.
-pub(super) const IMPACT_DEPTH: f64 = 0.5;
+pub(super) const IMPACT_DEPTH: f64 = 0.35;
 /// Largest motion in a substep, and the width of the zone near the surface, over R.
 pub(super) const NEAR: f64 = 0.25;
 
@@ -57,22 +58,14 @@ pub(super) fn drift(model: &ToolModel, tool: &mut ToolState, contact_n: DVec3, t
     before.distance(tool.centre_m)
 }
 
-/// Second half, with the new contact force; `near_speed_m_per_s` bounds the speed of a tool that is near the surface.
-/// Returns the coupling's force on the tool (N).
-pub(super) fn finish(
-    model: &ToolModel,
-    tool: &mut ToolState,
-    contact_n: DVec3,
-    time: &SubstepTime,
-    near_speed_m_per_s: Option<f64>,
-) -> DVec3 {
-    if matches!(model.spec.coupling, Coupling::Rigid) {
-        return DVec3::ZERO;
+/// Second half, with what the tool now meets. Returns the coupling's force on the tool (N).
+pub(super) fn finish(model: &ToolModel, tool: &mut ToolState, pressed: &Pressed, time: &SubstepTime) -> DVec3 {
+    let Coupling::Spring { mass_kg, .. } = model.spec.coupling else { return DVec3::ZERO };
+    let distance_m = pressed.to_surface_m.length();
+    if distance_m < (1.0 + NEAR) * model.spec.radius_m {
+        limit_approach(tool, pressed.to_surface_m / distance_m, (2.0 * model.impact_energy_j / mass_kg).sqrt());
     }
-    if let Some(speed) = near_speed_m_per_s {
-        limit_speed(tool, speed);
-    }
-    half_kick(model, tool, contact_n, time.device(tool), 0.5 * time.dt_s)
+    half_kick(model, tool, pressed.force_n, time.device(tool), 0.5 * time.dt_s)
 }
 
 /// Kicks the tool over `h_s` and returns the coupling's mean force (N) over it.
@@ -94,11 +87,45 @@ fn half_kick(
     tool.velocity_m_per_s += (contact_n + spring_n) * (h_s / mass_kg);
     // Impulse of the damper over h: m (1 − e^{−B h/m}) (ḋ − ċ)
     let share = -(-damping_n_s_per_m * h_s / mass_kg).exp_m1();
-    let damper_n = ((device_m_per_s - tool.velocity_m_per_s) * (mass_kg * share / h_s)).clamp_length_max(limit_n);
+    let damper_n = (device_m_per_s - tool.velocity_m_per_s) * (mass_kg * share / h_s);
+    let damper_n = damper_n * share_within(spring_n, damper_n, limit_n);
     tool.velocity_m_per_s += damper_n * (h_s / mass_kg);
     spring_n + damper_n
 }
 
+/// Largest `β ≤ 1` with `|s + β d| ≤ limit`, for `|s| ≤ limit`. A shortened damper still only takes energy.
+fn share_within(s: DVec3, d: DVec3, limit: f64) -> f64 {
+    if (s + d).length_squared() <= limit * limit {
+        return 1.0;
+    }
+    // d² β² + 2 s·d β + s² − limit² = 0
+    let (square, half, rest) = (d.length_squared(), s.dot(d), (limit * limit - s.length_squared()).max(0.0));
+    (((half * half + square * rest).sqrt() - half) / square).clamp(0.0, 1.0)
+}
+
+/// Cuts the velocity towards the surface; `towards` is not a direction when the centre lies on the surface.
+fn limit_approach(tool: &mut ToolState, towards: DVec3, limit_m_per_s: f64) {
+    let excess = tool.velocity_m_per_s.dot(towards) - limit_m_per_s;
+    if excess > 0.0 {
+        tool.velocity_m_per_s -= towards * excess;
+    }
+}
+
 fn limit_speed(tool: &mut ToolState, limit_m_per_s: f64) {
     tool.velocity_m_per_s = tool.velocity_m_per_s.clamp_length_max(limit_m_per_s);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_damper_is_cut_at_the_limit_and_never_reversed() {
+        for (s, d) in [(DVec3::X, DVec3::X * 5.0), (DVec3::X * 2.0, DVec3::Y), (DVec3::X * 2.0, DVec3::NEG_X * 9.0)] {
+            let share = share_within(s, d, 2.0);
+            assert!((0.0..=1.0).contains(&share));
+            assert!((s + d * share).length() <= 2.0 + 1e-12, "{s} {d} {share}");
+        }
+        assert_eq!(share_within(DVec3::X, DVec3::X * 0.5, 2.0), 1.0);
+    }
 }

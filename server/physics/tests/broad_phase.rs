@@ -1,0 +1,85 @@
+//! Skipping what a tool cannot touch changes no bit.
+#![allow(clippy::unwrap_used)]
+mod rig;
+use glam::DVec3;
+use palpate_physics::{ModelSpec, State, contact::Coupling, material::Law, snapshot};
+use rig::{Drive, Rig, at, body, bricks, even, material, sphere};
+
+/// A block that falls freely past two tools, is hit by one and swept by the other.
+fn falling_block() -> ModelSpec {
+    let side = even(-0.02, 0.02, 5);
+    let mesh = bricks(&side, &side, &even(-0.02, 0.0, 3));
+    let mut spec = body(mesh, material(Law::StableNeoHookean, 10e3, 0.45));
+    spec.gravity_m_per_s2 = DVec3::new(0.0, 0.5, -9.81);
+    let coupled = Coupling::Spring { stiffness_n_per_m: 300.0, damping_n_s_per_m: 2.0, mass_kg: 0.01 };
+    spec.tools = vec![
+        sphere(0.004, DVec3::new(0.0, 0.0, -0.05), Coupling::Rigid),
+        sphere(0.006, DVec3::new(0.05, 0.0, -0.01), coupled),
+    ];
+    for tool in &mut spec.tools {
+        tool.friction_coefficient = 0.3;
+    }
+    spec
+}
+
+fn devices(tick: u32) -> Vec<palpate_physics::contact::ToolTarget> {
+    let t = f64::from(tick) * 1e-3;
+    vec![
+        at(DVec3::new(0.01 * (40.0 * t).sin(), 0.0, -0.05)),
+        at(DVec3::new(0.05 - 0.6 * t, 0.004, -0.01 - 4.0 * t * t)),
+    ]
+}
+
+fn run(exhaustive: bool, forget_at: Option<u32>) -> (State, u32) {
+    let mut rig = Rig::new(falling_block());
+    rig.scratch.set_exhaustive_contact(exhaustive);
+    let mut touched = 0;
+    for tick in 0..250 {
+        if forget_at.is_some_and(|every| tick % every == 0) {
+            rig.state = rig.state.clone();
+            let bytes = snapshot::save(&rig.model, &rig.state);
+            rig.state = snapshot::restore(&rig.model, &bytes).unwrap();
+        }
+        let drive = Drive { tools: devices(tick), ..rig.still() };
+        rig.tick(&drive);
+        touched += u32::from(rig.state.tools.iter().any(|tool| tool.contacts > 0));
+    }
+    (rig.state, touched)
+}
+
+#[test]
+fn with_and_without_the_broad_phase_the_bits_are_the_same() {
+    let (skipping, touched) = run(false, None);
+    let (exhaustive, _) = run(true, None);
+    assert!(touched > 20 && touched < 230, "the run must touch and let go: {touched}");
+    assert_eq!(snapshot::state_hash(&skipping), snapshot::state_hash(&exhaustive));
+    assert_eq!(skipping, exhaustive);
+}
+
+#[test]
+fn two_runs_give_the_same_bits() {
+    assert_eq!(run(false, None).0, run(false, None).0);
+}
+
+#[test]
+fn a_restored_state_continues_bit_for_bit() {
+    assert_eq!(run(false, None).0, run(false, Some(7)).0);
+}
+
+#[test]
+fn a_used_scratch_carries_nothing_over() {
+    let mut rig = Rig::new(falling_block());
+    let early = rig.state.clone();
+    let mut once = early.clone();
+    for round in 0..2 {
+        rig.state = early.clone();
+        for tick in 0..120 {
+            let drive = Drive { tools: devices(tick), ..rig.still() };
+            rig.tick(&drive);
+        }
+        if round == 0 {
+            once = rig.state.clone();
+        }
+    }
+    assert_eq!(once, rig.state);
+}

@@ -1,0 +1,155 @@
+//! A body with its state and buffers, driven tick by tick: what the tests of contact, energy and snapshots share.
+#![allow(dead_code, missing_docs, unreachable_pub, clippy::expect_used, clippy::unwrap_used)]
+use glam::DVec3;
+use palpate_physics::{
+    Model, ModelSpec, PointForce, Precision, PrescribedSpec, Region, Scratch, Settings, State, StepReport, TetMesh,
+    TickInput,
+    contact::{Coupling, ToolSpec, ToolTarget},
+    material::{Lame, Law, Material, Viscosity},
+};
+
+pub struct Rig {
+    pub model: Model,
+    pub state: State,
+    pub scratch: Scratch,
+}
+
+/// What a tick is given; what is left empty stands still.
+#[derive(Default)]
+pub struct Drive {
+    pub tools: Vec<ToolTarget>,
+    pub load_factors: Vec<f64>,
+    pub prescribed: Vec<DVec3>,
+    pub point_forces: Vec<PointForce>,
+}
+
+impl Rig {
+    pub fn new(spec: ModelSpec) -> Self {
+        let model = Model::build(spec).unwrap();
+        let (state, scratch) = (State::at_rest(&model), Scratch::new(&model));
+        Self { model, state, scratch }
+    }
+
+    /// Inputs that hold everything where it is.
+    pub fn still(&self) -> Drive {
+        let spec = self.model.spec();
+        Drive {
+            tools: self.state.tools.iter().map(|t| at(t.target.position_m)).collect(),
+            load_factors: vec![0.0; spec.loads.len()],
+            prescribed: vec![DVec3::ZERO; spec.prescribed.len()],
+            point_forces: Vec::new(),
+        }
+    }
+
+    pub fn tick(&mut self, drive: &Drive) -> StepReport {
+        let input = TickInput {
+            tools: &drive.tools,
+            load_factors: &drive.load_factors,
+            prescribed_displacements_m: &drive.prescribed,
+            point_forces: &drive.point_forces,
+        };
+        palpate_physics::step(&self.model, &mut self.state, &mut self.scratch, &input)
+    }
+
+    /// One tick with the only tool's device at a position.
+    pub fn tick_at(&mut self, position_m: DVec3) -> StepReport {
+        let drive = Drive { tools: vec![at(position_m)], ..self.still() };
+        self.tick(&drive)
+    }
+}
+
+pub fn at(position_m: DVec3) -> ToolTarget {
+    ToolTarget { position_m, velocity_m_per_s: DVec3::ZERO }
+}
+
+pub fn material(law: Law, young_modulus_pa: f64, poisson_ratio: f64) -> Material {
+    let lame = Lame::from_young_poisson(young_modulus_pa, poisson_ratio).unwrap();
+    Material { law, lame, viscosity: Viscosity::default() }
+}
+
+/// One material, 1000 kg/m³, f64, nothing held or loaded.
+pub fn body(mesh: TetMesh, material: Material) -> ModelSpec {
+    let tets = mesh.tets().len();
+    ModelSpec {
+        mesh,
+        regions: vec![Region { name: "all".into(), material, density_kg_per_m3: 1000.0 }],
+        tet_region: vec![0; tets],
+        prescribed: Vec::new(),
+        loads: Vec::new(),
+        gravity_m_per_s2: DVec3::ZERO,
+        tools: Vec::new(),
+        settings: Settings { precision: Precision::Double, ..Settings::default() },
+    }
+}
+
+pub fn sphere(radius_m: f64, start_position_m: DVec3, coupling: Coupling) -> ToolSpec {
+    ToolSpec { name: "sphere".into(), radius_m, coupling, friction_coefficient: 0.0, start_position_m }
+}
+
+/// Nodes that satisfy a condition on their rest position.
+pub fn nodes_where(mesh: &TetMesh, wanted: impl Fn(DVec3) -> bool) -> Vec<u32> {
+    (0..mesh.positions_m().len() as u32).filter(|&n| wanted(mesh.positions_m()[n as usize])).collect()
+}
+
+pub fn hold(name: &str, nodes: Vec<u32>, axes: [bool; 3]) -> PrescribedSpec {
+    PrescribedSpec { name: name.into(), nodes, axes }
+}
+
+/// Evenly spaced coordinates.
+pub fn even(from_m: f64, to_m: f64, cells: usize) -> Vec<f64> {
+    (0..=cells).map(|i| from_m + (to_m - from_m) * i as f64 / cells as f64).collect()
+}
+
+/// Coordinates from 0: cells of `h_m` up to `fine_m`, then growing by `growth` to exactly `to_m`.
+pub fn graded(h_m: f64, fine_m: f64, growth: f64, to_m: f64) -> Vec<f64> {
+    let cells = (fine_m / h_m).round() as usize;
+    let mut coordinates = even(0.0, h_m * cells as f64, cells);
+    let (mut size, mut last) = (h_m, h_m * cells as f64);
+    while last + 1.5 * size * growth < to_m {
+        size *= growth;
+        last += size;
+        coordinates.push(last);
+    }
+    coordinates.push(to_m);
+    coordinates
+}
+
+/// A box of bricks between the given coordinates, six tets each, neighbours mirrored so that no direction is preferred.
+pub fn bricks(xs: &[f64], ys: &[f64], zs: &[f64]) -> TetMesh {
+    let (nx, ny) = (xs.len(), ys.len());
+    let id = |c: [usize; 3]| (c[0] + nx * (c[1] + ny * c[2])) as u32;
+    let mut positions = Vec::new();
+    for &z in zs {
+        for &y in ys {
+            positions.extend(xs.iter().map(|&x| DVec3::new(x, y, z)));
+        }
+    }
+    let mut tets = Vec::new();
+    for k in 0..zs.len() - 1 {
+        for j in 0..ny - 1 {
+            for i in 0..nx - 1 {
+                // Kuhn's six tets around the diagonal; odd cells are mirrored, which keeps shared faces alike.
+                let cell = [i, j, k];
+                let corner = |c: [usize; 3]| id(std::array::from_fn(|a| cell[a] + (c[a] ^ (cell[a] & 1))));
+                for path in [[0, 1, 2], [0, 2, 1], [1, 0, 2], [1, 2, 0], [2, 0, 1], [2, 1, 0]] {
+                    let mut c = [0; 3];
+                    let mut tet = [corner(c); 4];
+                    for (step, axis) in path.into_iter().enumerate() {
+                        c[axis] = 1;
+                        tet[step + 1] = corner(c);
+                    }
+                    tets.push(oriented(tet, &positions));
+                }
+            }
+        }
+    }
+    TetMesh::new(positions, tets).unwrap()
+}
+
+fn oriented(mut tet: [u32; 4], positions: &[DVec3]) -> [u32; 4] {
+    let [a, b, c, d] = tet.map(|n| positions[n as usize]);
+    if (b - a).cross(c - a).dot(d - a) < 0.0 {
+        tet.swap(2, 3);
+    }
+    tet
+}
