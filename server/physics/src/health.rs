@@ -19,7 +19,8 @@ pub struct Ledger {
 ///
 /// At step k the viscous force is `−C v_{k−½}`: the kernel reports `q_k = v_{k−½}ᵀ C v_{k−½}`, but the force works on
 /// `½(v_{k−½} + v_{k+½})`. With the polarisation of the quadratic form the work is
-/// `dt (¾ q_k + ¼ q_{k+1}) + O(dt³) = dt (q_k + ¼(q_k − q_{k−1})) + O(dt³)`, which needs no future.
+/// `dt (¾ q_k + ¼ q_{k+1}) + O(dt³) = dt (q_k + ¼(q_k − q_{k−1})) + O(dt³)`, which needs no future. That holds while C does;
+/// at large strain it turns with the body, and the sum keeps an error of first order, `¼ dt ∫ vᵀĊv dt`.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct ViscousPower {
     /// `q_k` (W).

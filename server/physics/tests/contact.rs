@@ -111,7 +111,7 @@ fn hertz_force_converges_at_nu_045() {
 #[test]
 fn hertz_force_converges_at_nu_03() {
     let e = errors(0.3, 0.01, 0.002, &[2e-3, 1.4e-3]);
-    assert!(e[0] > e[1] && e[1] > 0.0 && e[1] < 0.05, "{e:?}");
+    assert!(e[0] > e[1] && e[1] > 0.0 && e[1] < 0.055, "{e:?}");
 }
 
 /// δ/R = 0.002: no large strain, no difference between sphere and paraboloid.

@@ -80,17 +80,24 @@ fn half_kick(
         return DVec3::ZERO;
     };
     let limit_n = model.force_limit_n;
-    let spring_n = ((device_m - tool.centre_m) * stiffness_n_per_m).clamp_length_max(limit_n);
+    let spring_n = shortened(device_m - tool.centre_m, limit_n / stiffness_n_per_m) * stiffness_n_per_m;
     if h_s == 0.0 {
         return spring_n;
     }
     tool.velocity_m_per_s += (contact_n + spring_n) * (h_s / mass_kg);
     // Impulse of the damper over h: m (1 − e^{−B h/m}) (ḋ − ċ)
     let share = -(-damping_n_s_per_m * h_s / mass_kg).exp_m1();
-    let damper_n = (device_m_per_s - tool.velocity_m_per_s) * (mass_kg * share / h_s);
+    // |s + β d| ≤ limit and |s| ≤ limit: no more than twice the limit of it can be used.
+    let damper_n = shortened((device_m_per_s - tool.velocity_m_per_s) * (mass_kg * share / h_s), 2.0 * limit_n);
     let damper_n = damper_n * share_within(spring_n, damper_n, limit_n);
     tool.velocity_m_per_s += damper_n * (h_s / mass_kg);
     spring_n + damper_n
+}
+
+/// The vector, cut to a length; safe for any finite vector, however long.
+fn shortened(a: DVec3, limit: f64) -> DVec3 {
+    let largest = a.abs().max_element();
+    if largest <= limit { a.clamp_length_max(limit) } else { (a / largest).normalize() * limit }
 }
 
 /// Largest `β ≤ 1` with `|s + β d| ≤ limit`, for `|s| ≤ limit`. A shortened damper still only takes energy.

@@ -11,7 +11,7 @@
 //! velocity half a step late, which the step bound of `world::choose_substeps` accounts for.
 //!
 //! Ledger: the work of a force `g` over a kick of length `h` is exactly its share of the kinetic change,
-//! `h g·(v + ½h f/m)`; what viscous stress takes is second order in dt ([`ViscousPower`]).
+//! `h g·(v + ½h f/m)`; what viscous stress takes is an estimate ([`ViscousPower`]).
 use crate::{
     contact::{self, Body, SubstepTime, ToolTarget},
     fem::loads,
@@ -31,7 +31,7 @@ pub fn step(model: &Model, state: &mut State, scratch: &mut Scratch, input: &Tic
     scratch.last_good.keep(state);
     let inputs_rejected = take_inputs(model, state, scratch, input);
     run_substeps(model, state, scratch, input);
-    state.tick += 1;
+    state.tick = state.tick.saturating_add(1);
     let quarantined = first_non_finite(state).map(|node| quarantine(state, scratch, node));
     StepReport { substeps: model.substeps(), inputs_rejected, quarantined }
 }
@@ -217,8 +217,13 @@ pub(crate) fn add_load(model: &Model, load: &LoadSpec, factor: f64, x: &[DVec3],
     }
 }
 
-/// `v ← (v + h f/m) e^{−c h}`, and the ledger's share of it.
+/// `v ← (v e^{−c h/2} + h f/m) e^{−c h/2}`, and the ledger's share of it.
 fn kick(model: &Model, state: &mut State, h_s: f64) {
+    let damping = model.spec().settings.mass_damping_per_s;
+    let half = (damping > 0.0).then(|| (-0.5 * damping * h_s).exp());
+    if let Some(factor) = half {
+        damp(model, state, factor);
+    }
     let mut work_j = 0.0;
     for (((v, force), inverse_mass), external) in
         state.v.iter_mut().zip(&state.force_n).zip(model.inverse_mass_per_kg()).zip(&state.external_n)
@@ -231,9 +236,8 @@ fn kick(model: &Model, state: &mut State, h_s: f64) {
     }
     state.ledger.external_work_j += work_j;
     state.ledger.dissipated_j += h_s * state.viscous.work_rate_w();
-    let damping = model.spec().settings.mass_damping_per_s;
-    if damping > 0.0 {
-        damp(model, state, (-damping * h_s).exp());
+    if let Some(factor) = half {
+        damp(model, state, factor);
     }
 }
 

@@ -1,0 +1,106 @@
+//! After `Scratch::new` a tick neither allocates nor frees.
+#![allow(clippy::unwrap_used)]
+mod rig;
+use assert_no_alloc::{AllocDisabler, assert_no_alloc};
+use glam::DVec3;
+use palpate_physics::{
+    LoadSpec, PointForce, TickInput,
+    contact::{Coupling, ToolTarget},
+    material::{Law, Viscosity},
+};
+use rig::{Rig, at, body, bricks, even, hold, material, nodes_where, sphere};
+
+#[global_allocator]
+static ALLOCATOR: AllocDisabler = AllocDisabler;
+
+/// A loaded, damped, viscous block with a rigid and a coupled tool that rub.
+fn rig() -> Rig {
+    let side = even(-0.02, 0.02, 4);
+    let mesh = bricks(&side, &side, &even(-0.02, 0.0, 2));
+    let bottom = nodes_where(&mesh, |p| p.z < -0.0199);
+    let mut spec = body(mesh, material(Law::StableNeoHookean, 10e3, 0.45));
+    spec.regions[0].material.viscosity = Viscosity { phi_pa_s: 0.2, psi_pa_s: 0.2 };
+    spec.settings.mass_damping_per_s = 2.0;
+    spec.gravity_m_per_s2 = DVec3::new(0.0, 0.0, -9.81);
+    spec.prescribed = vec![hold("bottom", bottom, [true; 3])];
+    spec.loads = vec![
+        LoadSpec::NodalForces(vec![(70, DVec3::X * 0.01)]),
+        LoadSpec::Traction { triangles: vec![0, 1, 2], traction_pa: DVec3::Y * 20.0 },
+        LoadSpec::Pressure { triangles: vec![3, 4, 5], pressure_pa: 50.0, follower: true },
+    ];
+    let coupled = Coupling::Spring { stiffness_n_per_m: 300.0, damping_n_s_per_m: 2.0, mass_kg: 0.01 };
+    spec.tools = vec![
+        sphere(0.006, DVec3::new(0.01, 0.0, 0.03), Coupling::Rigid),
+        sphere(0.008, DVec3::new(-0.01, 0.0, 0.03), coupled),
+    ];
+    for tool in &mut spec.tools {
+        tool.friction_coefficient = 0.4;
+    }
+    Rig::new(spec)
+}
+
+/// Up and down through contact, far away for a part of each round, rubbing along.
+fn targets(tick: u32) -> [ToolTarget; 2] {
+    let phase = f64::from(tick) * 0.02;
+    let z = |lift: f64| 0.02 + lift + 0.014 * phase.cos() + if tick % 1000 > 800 { 0.3 } else { 0.0 };
+    [at(DVec3::new(0.01, 0.01 * phase.sin(), z(-0.004))), at(DVec3::new(-0.01, 0.008 * (0.7 * phase).sin(), z(-0.003)))]
+}
+
+#[test]
+fn thousands_of_ticks_allocate_nothing() {
+    let mut rig = rig();
+    let (mut touched, mut far, mut poison) = (0, 0, 0);
+    let mut saved = rig.state.clone();
+    assert_no_alloc(|| {
+        for tick in 0..5000 {
+            let tools = targets(tick);
+            let factor = (f64::from(tick) * 0.003).sin();
+            // Now and then: a force that is not finite, a node that is not there, inputs of the wrong length.
+            let odd = tick % 97 == 0;
+            let forces = [
+                PointForce { node: 40, force_n: if odd { DVec3::NAN } else { DVec3::X * 0.01 } },
+                PointForce { node: if odd { u32::MAX } else { 41 }, force_n: DVec3::Y * 0.01 },
+            ];
+            let input = TickInput {
+                tools: if odd { &[] } else { &tools },
+                load_factors: &[factor, factor, factor],
+                prescribed_displacements_m: &[DVec3::X * 1e-3 * factor],
+                point_forces: &forces,
+            };
+            let report = palpate_physics::step(&rig.model, &mut rig.state, &mut rig.scratch, &input);
+            assert!(report.quarantined.is_none());
+            poison += report.inputs_rejected;
+            touched += u32::from(rig.state.tools.iter().any(|t| t.contacts > 0));
+            far += u32::from(rig.state.tools.iter().all(|t| t.contacts == 0));
+            if tick == 1500 {
+                saved.copy_from(&rig.state);
+            }
+        }
+        rig.state.copy_from(&saved);
+    });
+    assert!(touched > 500 && far > 500 && poison > 100, "{touched} {far} {poison}");
+}
+
+#[test]
+fn quarantine_and_reset_allocate_nothing() {
+    let mut rig = rig();
+    let mut quarantined = 0;
+    assert_no_alloc(|| {
+        for tick in 0..600 {
+            let tools = targets(tick);
+            let blow = [PointForce { node: 60, force_n: DVec3::Z * if tick % 100 == 50 { 1e300 } else { 0.0 } }];
+            let input = TickInput {
+                tools: &tools,
+                load_factors: &[1.0, 1.0, 1.0],
+                prescribed_displacements_m: &[DVec3::ZERO],
+                point_forces: &blow,
+            };
+            let report = palpate_physics::step(&rig.model, &mut rig.state, &mut rig.scratch, &input);
+            quarantined += u32::from(report.quarantined.is_some());
+            if tick % 100 == 80 {
+                rig.state.reset(&rig.model);
+            }
+        }
+    });
+    assert_eq!(quarantined, 6);
+}

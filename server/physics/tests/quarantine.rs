@@ -1,0 +1,109 @@
+//! What is not finite is refused, contained and reported; the last good state stays.
+#![allow(clippy::unwrap_used)]
+mod rig;
+use glam::DVec3;
+use palpate_physics::{
+    ModelSpec, PointForce, State, StepReport,
+    contact::{Coupling, ToolTarget},
+    material::Law,
+    snapshot,
+};
+use rig::{Drive, Rig, at, body, bricks, even, hold, material, nodes_where, sphere};
+
+fn pressed_block() -> ModelSpec {
+    let side = even(-0.02, 0.02, 4);
+    let mesh = bricks(&side, &side, &even(-0.02, 0.0, 2));
+    let bottom = nodes_where(&mesh, |p| p.z < -0.0199);
+    let mut spec = body(mesh, material(Law::StableNeoHookean, 10e3, 0.4));
+    spec.prescribed = vec![hold("bottom", bottom, [true; 3])];
+    let coupling = Coupling::Spring { stiffness_n_per_m: 200.0, damping_n_s_per_m: 2.0, mass_kg: 0.02 };
+    spec.tools = vec![sphere(0.008, DVec3::new(0.0, 0.0, 0.0085), coupling)];
+    spec
+}
+
+fn pressed() -> Rig {
+    let mut rig = Rig::new(pressed_block());
+    for _ in 0..50 {
+        rig.tick_at(DVec3::Z * 0.005);
+    }
+    assert!(rig.state.tools[0].contacts > 0);
+    rig
+}
+
+#[test]
+fn an_enormous_force_leaves_the_last_good_state() {
+    for force_n in [DVec3::Z * 1e300, DVec3::X * f64::MAX, DVec3::splat(1e200)] {
+        let mut rig = pressed();
+        let good = rig.state.clone();
+        let mut drive = rig.still();
+        drive.point_forces.push(PointForce { node: 60, force_n });
+        let report = rig.tick(&drive);
+        assert!(report.quarantined.is_some(), "{force_n}");
+        assert_eq!(report.quarantined, rig.state.quarantine);
+        assert_eq!(rig.state.x, good.x);
+        assert!(rig.state.v.iter().all(|v| *v == DVec3::ZERO));
+        assert_eq!(rig.state.ledger, good.ledger);
+        let tool = &rig.state.tools[0];
+        assert_eq!((tool.device_force_n, tool.local_model, tool.contacts), (DVec3::ZERO, None, 0));
+        assert_eq!(tool.centre_m, good.tools[0].centre_m);
+        // Whatever comes, nothing happens any more.
+        let held = rig.state.clone();
+        for _ in 0..20 {
+            let report = rig.tick_at(DVec3::Z * 0.001);
+            assert_eq!(report, StepReport { substeps: 0, inputs_rejected: 0, quarantined: None });
+        }
+        assert_eq!(rig.state, held);
+        // It can be saved and looked at, and reset.
+        assert_eq!(snapshot::restore(&rig.model, &snapshot::save(&rig.model, &held)).unwrap(), held);
+        rig.state.reset(&rig.model);
+        assert_eq!(rig.state, State::at_rest(&rig.model));
+        assert!(rig.tick_at(DVec3::Z * 0.0085).quarantined.is_none());
+    }
+}
+
+#[test]
+fn a_device_at_an_absurd_place_cannot_harm_the_body() {
+    for far_m in [1e3, 1e30, 1e300] {
+        let mut rig = pressed();
+        for _ in 0..20 {
+            rig.tick_at(DVec3::new(far_m, 0.0, -far_m));
+        }
+        assert_eq!(rig.state.quarantine, None, "{far_m}");
+        assert!(rig.state.x.iter().all(|x| x.is_finite()));
+        assert!(rig.state.tools[0].device_force_n.length() <= rig.model.contact().force_limit_n(0) * (1.0 + 1e-9));
+    }
+}
+
+#[test]
+fn inputs_that_are_not_finite_are_replaced_and_counted() {
+    let mut bad = pressed();
+    let mut good = pressed();
+    let hold_still = good.still();
+    assert_eq!(good.tick(&hold_still).inputs_rejected, 0);
+    let nan_tool = ToolTarget { position_m: DVec3::new(0.0, f64::NAN, 0.0), velocity_m_per_s: DVec3::ZERO };
+    let drive = Drive {
+        tools: vec![nan_tool],
+        prescribed: vec![DVec3::splat(f64::INFINITY)],
+        point_forces: vec![
+            PointForce { node: 5, force_n: DVec3::NAN },
+            PointForce { node: 1_000_000, force_n: DVec3::X },
+        ],
+        ..bad.still()
+    };
+    let report = bad.tick(&drive);
+    assert_eq!(report.inputs_rejected, 4);
+    assert_eq!(report.quarantined, None);
+    // The tool holds its target; the rest acts as if not given.
+    assert_eq!(bad.state, good.state);
+}
+
+#[test]
+fn inputs_of_the_wrong_length_are_replaced_and_counted() {
+    let mut bad = pressed();
+    let mut good = pressed();
+    let hold_still = good.still();
+    good.tick(&hold_still);
+    let drive = Drive { tools: vec![at(DVec3::ONE); 2], load_factors: vec![1.0], ..Drive::default() };
+    assert_eq!(bad.tick(&drive).inputs_rejected, 3);
+    assert_eq!(bad.state, good.state);
+}
