@@ -2,7 +2,7 @@
 use super::{SolveError, follower, stiffness::FreeAxes};
 use crate::{
     contact::ToolTarget,
-    fem::loads,
+    fem::{element::RestTet, loads},
     integrate::leapfrog::add_load,
     world::{LoadSpec, Model},
 };
@@ -131,13 +131,17 @@ pub(super) struct Line<'a> {
     x: &'a [DVec3],
     d: &'a [DVec3],
     elastic_j: Vec<f64>,
+    /// `Σ V (λ + 2µ)` (J): the terms that cancel in `Ψ` are of this size, however small the strain.
+    cancelling_j: f64,
     dead_slope_w: f64,
 }
 
 impl<'a> Line<'a> {
     pub(super) fn new(model: &'a Model, stage: &'a Stage, x: &'a [DVec3], d: &'a [DVec3]) -> Self {
         let elastic_j = elastic_j(model, x);
-        Self { model, stage, x, d, elastic_j, dead_slope_w: dot(&stage.dead_n, d) }
+        let modulus = |(tet, rest): (usize, &RestTet)| rest.volume_m3 * model.material_of(tet).lame.p_wave_modulus_pa();
+        let cancelling_j = model.rest_tets().iter().enumerate().map(modulus).sum();
+        Self { model, stage, x, d, elastic_j, cancelling_j, dead_slope_w: dot(&stage.dead_n, d) }
     }
 
     pub(super) fn at(&self, alpha: f64) -> Vec<DVec3> {
@@ -160,7 +164,10 @@ impl<'a> Line<'a> {
             0.0
         };
         let dead_work = alpha * self.dead_slope_w;
-        (elastic - dead_work - follower_work, f64::EPSILON * (size + dead_work.abs() + follower_work.abs()))
+        (
+            elastic - dead_work - follower_work,
+            f64::EPSILON * (self.cancelling_j + size + dead_work.abs() + follower_work.abs()),
+        )
     }
 
     fn follower_power(&self, t: f64) -> f64 {

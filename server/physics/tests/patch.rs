@@ -1,0 +1,106 @@
+//! The patch test, in both precisions, and rigid motion.
+#![allow(clippy::unwrap_used)] // helpers outside #[test] functions
+mod common;
+use common::{LAWS, Random, block, equilibrium, jittered, material, spec};
+use glam::{DMat3, DQuat, DVec3};
+use palpate_physics::{Model, ModelSpec, Precision, PrescribedSpec, TetMesh, material::Law};
+
+const YOUNG_PA: f64 = 10e3;
+const SIZE_M: f64 = 0.1;
+
+/// A block of 4×4×4 cells, 1 cm wide, with interior nodes moved by up to a fifth of a cell.
+fn irregular() -> TetMesh {
+    jittered(&block(DVec3::splat(SIZE_M), [4, 4, 4]), 0.2 * SIZE_M / 4.0, 7)
+}
+
+fn body(law: Law, precision: Precision) -> ModelSpec {
+    let mut body = spec(irregular(), material(law, YOUNG_PA, 0.45), vec![], vec![]);
+    body.settings.precision = precision;
+    body
+}
+
+/// `F = I + 0.3 R`, R with entries in (−1, 1), and J > 0.2.
+fn random_gradient(random: &mut Random) -> DMat3 {
+    loop {
+        let r = DMat3::from_cols(random.vector(), random.vector(), random.vector());
+        let f = DMat3::IDENTITY + r * 0.3;
+        if f.determinant() > 0.2 {
+            return f;
+        }
+    }
+}
+
+fn kernel_forces(model: &Model, x: &[DVec3]) -> Vec<DVec3> {
+    let mut forces = vec![DVec3::ZERO; x.len()];
+    let v = vec![DVec3::ZERO; x.len()];
+    model.kernel().forces_n(model.rest_positions_m(), x, &v, &mut forces, &mut model.kernel().scratch());
+    forces
+}
+
+/// Largest interior force over the largest force of any single tet on a corner.
+fn interior_residual(model: &Model, f: DMat3) -> f64 {
+    let x: Vec<DVec3> = model.rest_positions_m().iter().map(|p| f * *p + DVec3::new(0.01, -0.02, 0.03)).collect();
+    let forces = kernel_forces(model, &x);
+    let interior = (0..x.len()).filter(|&node| model.surface().vertex_of_node[node] == u32::MAX);
+    let residual = interior.map(|node| forces[node].length()).fold(0.0, f64::max);
+    let corner = |tet: usize| {
+        let rest = &model.rest_tets()[tet];
+        rest.corner_forces_n(&model.material_of(tet).piola(&f)).map(DVec3::length).into_iter().fold(0.0, f64::max)
+    };
+    residual / (0..model.rest_tets().len()).map(corner).fold(0.0, f64::max)
+}
+
+#[test]
+fn uniform_deformation_leaves_interior_nodes_in_balance() {
+    for (name, law) in LAWS {
+        for (precision, bound) in [(Precision::Double, 1e-12), (Precision::Single, 1e-5)] {
+            let model = Model::build(body(law, precision)).unwrap();
+            let mut random = Random(1);
+            let worst = (0..20).map(|_| interior_residual(&model, random_gradient(&mut random))).fold(0.0, f64::max);
+            println!("patch, {name}, {precision:?}: worst interior residual of 20 random F {worst:.1e}");
+            assert!(worst < bound, "{name} {precision:?}: {worst:e}");
+        }
+    }
+}
+
+#[test]
+fn a_boundary_moved_uniformly_solves_to_a_uniform_interior() {
+    for (name, law) in LAWS {
+        let mut body = body(law, Precision::Double);
+        let f = random_gradient(&mut Random(5));
+        let held: Vec<u32> = palpate_physics::Surface::of(&body.mesh).unwrap().nodes;
+        body.prescribed =
+            held.iter().map(|&n| PrescribedSpec { name: format!("{n}"), nodes: vec![n], axes: [true; 3] }).collect();
+        let moved: Vec<DVec3> = held
+            .iter()
+            .map(|&n| {
+                let rest = body.mesh.positions_m()[n as usize];
+                f * rest - rest
+            })
+            .collect();
+        let model = Model::build(body).unwrap();
+        let found = equilibrium(&model, 1.0, &moved);
+        let error = |(x, rest): (&DVec3, &DVec3)| x.distance(f * *rest);
+        let worst = found.x.iter().zip(model.rest_positions_m()).map(error).fold(0.0, f64::max);
+        println!("patch by static solve, {name}: positions within {:.1e} of the size", worst / SIZE_M);
+        assert!(worst < 1e-12 * SIZE_M, "{name}: {worst:e}");
+    }
+}
+
+#[test]
+fn rigid_motion_makes_no_force() {
+    let mut random = Random(3);
+    for (name, law) in LAWS {
+        let model = Model::build(body(law, Precision::Double)).unwrap();
+        let mut worst = 0.0_f64;
+        for _ in 0..20 {
+            let turn = DQuat::from_scaled_axis(random.vector() * 3.0);
+            let shift = random.vector() * SIZE_M;
+            let x: Vec<DVec3> = model.rest_positions_m().iter().map(|p| turn * *p + shift).collect();
+            worst = kernel_forces(&model, &x).iter().map(|f| f.length()).fold(worst, f64::max);
+        }
+        let relative = worst / (YOUNG_PA * SIZE_M * SIZE_M);
+        println!("rigid motion, {name}: worst force {relative:.1e} E A");
+        assert!(relative < 1e-12, "{name}: {relative:e}");
+    }
+}
