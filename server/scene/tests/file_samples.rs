@@ -1,4 +1,5 @@
 //! One mesh in every format, as other programs write it: each file must give the same mesh.
+#![allow(clippy::unwrap_used, clippy::expect_used)] // a test that cannot read its samples has failed
 use glam::DVec3;
 use palpate_scene::files::{GroupedMesh, SurfaceFile, UnusedNodes, read_surface, read_volume};
 use std::path::{Path, PathBuf};

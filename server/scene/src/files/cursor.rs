@@ -205,8 +205,20 @@ impl Number {
 
 /// Bytes as a message shows them: printable and short.
 pub(super) fn shown(bytes: &[u8]) -> String {
-    const LONGEST: usize = 40;
+    const LONGEST: usize = 80;
     let text: String =
         String::from_utf8_lossy(&bytes[..bytes.len().min(LONGEST)]).chars().flat_map(char::escape_debug).collect();
     if bytes.len() > LONGEST { format!("{text}…") } else { text }
+}
+
+/// Where `needle`, which is not empty, first occurs.
+pub(super) fn find(data: &[u8], needle: &[u8]) -> Option<usize> {
+    let mut at = 0;
+    loop {
+        at += data[at..].iter().position(|b| Some(b) == needle.first())?;
+        if data[at..].starts_with(needle) {
+            return Some(at);
+        }
+        at += 1;
+    }
 }

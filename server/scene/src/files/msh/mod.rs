@@ -1,6 +1,6 @@
 //! Gmsh MSH: 4.1 and 2.x, ASCII and binary, and the older 1.0.
 use super::builder::Builder;
-use super::cursor::{Cursor, Encoding, Scalar};
+use super::cursor::{Cursor, Encoding, Scalar, find};
 use super::error::{FileError, Problem};
 use glam::DVec3;
 use std::collections::HashMap;
@@ -126,7 +126,7 @@ impl Reader<'_> {
     /// Passes a section that has no part in a mesh, such as `$Periodic` or `$NodeData`.
     fn skip(&mut self, section: &str) -> Result<(), FileError> {
         let end = format!("$End{section}");
-        match self.cursor.rest().windows(end.len()).position(|w| w == end.as_bytes()) {
+        match find(self.cursor.rest(), end.as_bytes()) {
             Some(at) => self.cursor.advance(at + end.len()),
             None => return Err(self.cursor.truncated(&end)),
         }

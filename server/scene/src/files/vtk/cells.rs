@@ -92,10 +92,14 @@ impl CellTable {
             let what = format!("cell {cell} has type {number}, which is no cell type of VTK");
             return Err(Problem::Inconsistent { what });
         };
-        let exact = matches!(kind.shape, Shape::Tet | Shape::Triangle | Shape::Point);
-        let least = if kind.shape == Shape::Polygon { kind.corners.min(3) } else { kind.corners };
-        if (exact || kind.shape == Shape::Polygon) && nodes.len() < least {
-            let what = format!("cell {cell} ({}) has {} nodes", kind.name, nodes.len());
+        let fits = match (kind.shape, number) {
+            (Shape::Other, _) => true,
+            (_, POLYGON) => nodes.len() >= 3,
+            (_, 1 | 5 | 9 | 10) => nodes.len() == kind.corners,
+            _ => nodes.len() > kind.corners,
+        };
+        if !fits {
+            let what = format!("cell {cell} (type {number}, {}) has {} nodes", kind.name, nodes.len());
             return Err(Problem::Inconsistent { what });
         }
         builder.element(kind, nodes, tag);

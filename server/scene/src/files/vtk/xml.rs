@@ -2,7 +2,7 @@
 use super::array::{DataArray, Source, Storage};
 use super::cells::{CellTable, Groups, LINES, POLYGON, STRIP, VERTICES};
 use crate::files::builder::Builder;
-use crate::files::cursor::{Scalar, shown};
+use crate::files::cursor::{Scalar, find, shown};
 use crate::files::error::{FileError, Problem};
 use glam::DVec3;
 use quick_xml::events::{BytesStart, Event};
@@ -40,7 +40,7 @@ impl<'a> Document<'a> {
     fn parse(&mut self) -> Result<(), FileError> {
         const APPENDED: &[u8] = b"<AppendedData";
         let data = self.storage.data;
-        let end = data.windows(APPENDED.len()).position(|w| w == APPENDED).unwrap_or(data.len());
+        let end = find(data, APPENDED).unwrap_or(data.len());
         let text = match std::str::from_utf8(&data[..end]) {
             Ok(text) => text,
             Err(error) => {
@@ -63,7 +63,7 @@ impl<'a> Document<'a> {
         loop {
             let at = reader.buffer_position() as usize;
             let event = reader.read_event().map_err(|error| {
-                let found = error.to_string();
+                let found = shown(error.to_string().as_bytes());
                 self.storage.fail(at, Problem::Expected { wanted: "well-formed XML".to_string(), found })
             })?;
             match event {
@@ -139,7 +139,7 @@ impl<'a> Document<'a> {
     fn appended(&mut self, at: usize) -> Result<(), FileError> {
         let rest = &self.storage.data[at..];
         let Some(close) = rest.iter().position(|&b| b == b'>') else { return Ok(()) };
-        let base64 = rest[..close].windows(6).any(|w| w == b"base64");
+        let base64 = find(&rest[..close], b"base64").is_some();
         // The data begin behind an underscore, which only blanks may precede.
         let blanks = rest[close + 1..].iter().take_while(|b| b.is_ascii_whitespace()).count();
         let start = close + 1 + blanks;
