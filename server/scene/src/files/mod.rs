@@ -1,7 +1,8 @@
 //! Mesh and surface files: readers of the common formats, writers for frames.
 //!
 //! A reader never trusts a count, an index or a coordinate: what is wrong is a [`FileError`] with its place, and no
-//! file makes it set aside more memory than a small multiple of the file's size. Coordinates stay in the file's unit;
+//! file makes it set aside more memory than a small multiple of the file's size (of what zlib expands it to, where it
+//! is compressed). Coordinates stay in the file's unit;
 //! [`VolumeFile::into_tet_mesh`] scales them to metres. What each format keeps: `docs/formats.md`.
 use glam::DVec3;
 use std::path::{Path, PathBuf};
