@@ -1,8 +1,10 @@
 //! What a fill came out like.
-use super::Wall;
 use super::bvh::SurfaceIndex;
+use super::prisms::Split;
 use super::relation::enclosed_volume;
 use super::repair::{CleanSurface, Repairs};
+use super::trimesh::TriMesh;
+use super::wall::Wall;
 use glam::DVec3;
 use palpate_physics::TetMesh;
 use palpate_physics::mesh::quality::{Quality, measure as measure_quality};
@@ -50,7 +52,7 @@ pub struct FillReport {
     pub outer: SurfaceReport,
     /// Volume of the tets (m³).
     pub volume_m3: f64,
-    /// Volume between the surfaces as given, rims closed by cones to the middle of the inner rim (m³).
+    /// Volume (m³) between the surfaces as given and, where they are open, the mesh's base.
     pub input_volume_m3: f64,
     /// Hints for the user, such as an implausible size.
     pub warnings: Vec<String>,
@@ -77,10 +79,8 @@ impl fmt::Display for FillReport {
     }
 }
 
-pub(super) fn measure(mesh: &TetMesh, inner: &[[u32; 3]], outer: &[[u32; 3]], wall: &Wall, layers: u32) -> FillReport {
-    let rim = wall.inner.rim.iter().map(|&v| wall.inner.mesh.positions[v as usize]);
-    let apex = rim.sum::<DVec3>() / wall.inner.rim.len().max(1) as f64;
-    let enclosed = |surface: &CleanSurface| enclosed_volume(&surface.mesh, &surface.rim, apex);
+pub(super) fn measure(mesh: &TetMesh, parts: &Split, wall: &Wall, layers: u32) -> FillReport {
+    let (inner, outer) = (&parts.inner, &parts.outer);
     let surface = |clean: &CleanSurface, input: &SurfaceIndex, triangles: &[[u32; 3]]| SurfaceReport {
         repairs: clean.repairs,
         input_to_mesh_m: farthest(
@@ -107,9 +107,19 @@ pub(super) fn measure(mesh: &TetMesh, inner: &[[u32; 3]], outer: &[[u32; 3]], wa
         inner: surface(&wall.inner, &wall.inner_target.surface, inner),
         outer: surface(&wall.outer, &wall.outer_target.surface, outer),
         volume_m3: mesh.total_volume_m3(),
-        input_volume_m3: enclosed(&wall.outer) - enclosed(&wall.inner),
+        input_volume_m3: input_volume(mesh, parts, wall),
         warnings,
     }
+}
+
+/// Σ (a−o)·((b−o)×(c−o))/6 over the surfaces as given and the mesh's base. The base's rims differ from the given ones
+/// within an edge; with o in the middle of the rim the cones over those slivers have next to no volume.
+fn input_volume(mesh: &TetMesh, parts: &Split, wall: &Wall) -> f64 {
+    let rim = wall.inner.rim.iter().map(|&v| wall.inner.mesh.positions[v as usize]);
+    let apex = rim.sum::<DVec3>() / wall.inner.rim.len().max(1) as f64;
+    let base = TriMesh::new(mesh.positions_m().to_vec(), parts.base.clone());
+    enclosed_volume(&wall.outer.mesh, &[], apex) - enclosed_volume(&wall.inner.mesh, &[], apex)
+        + enclosed_volume(&base, &[], apex)
 }
 
 fn mean_edge(positions: &[DVec3], triangles: &[[u32; 3]]) -> f64 {

@@ -26,7 +26,7 @@ fn check_sound(fill: &Fill, target: u32) {
     let euler = surface.nodes.len() as i64 - edges.len() as i64 / 2 + surface.triangles.len() as i64;
     assert_eq!(euler, if fill.regions.len() == 3 { 2 } else { 4 });
     assert_eq!(fill.regions.iter().map(|r| r.triangles.len()).sum::<usize>(), surface.triangles.len());
-    assert!(fill.report.quality.min_dihedral_deg > 8.0, "{}", fill.report);
+    assert!(fill.report.quality.min_dihedral_deg > 10.0, "{}", fill.report);
 }
 
 /// Both surfaces are met within this part of an edge.
@@ -45,7 +45,7 @@ fn ventricle_from_different_triangulations_at_every_size() {
     let inner = Sample::icosphere(INNER_MM, Some(CUT_MM), 4, 1.0);
     let outer = Sample::lat_long(OUTER_MM, Some(CUT_MM), 40, 64);
     for target in [188, 1352, 10_000, 50_000] {
-        check_near(&filled(&inner, &outer, target), 0.35);
+        check_near(&filled(&inner, &outer, target), 0.25);
     }
 }
 
@@ -54,7 +54,7 @@ fn bumpy_ventricle() {
     let inner = Sample::icosphere(INNER_MM, Some(CUT_MM), 4, 0.9).with_bumps(INNER_MM);
     let outer = Sample::lat_long(OUTER_MM, Some(CUT_MM), 40, 64).with_bumps(OUTER_MM);
     for target in [188, 1352, 10_000] {
-        check_near(&filled(&inner, &outer, target), 0.35);
+        check_near(&filled(&inner, &outer, target), 0.25);
     }
 }
 
@@ -83,14 +83,19 @@ fn volumes_converge_to_the_analytic_ellipsoids() {
     let inner = Sample::icosphere(INNER_MM, Some(CUT_MM), 5, 1.0);
     let outer = Sample::lat_long(OUTER_MM, Some(CUT_MM), 100, 160);
     let exact = Sample::exact_volume(OUTER_MM, Some(CUT_MM)) - Sample::exact_volume(INNER_MM, Some(CUT_MM));
-    let error = |target| {
-        let fill = filled(&inner, &outer, target);
-        assert!((fill.report.input_volume_m3 * 1e9 / exact - 1.0).abs() < 0.005);
+    let error = |target, match_volume| {
+        let options = FillOptions { match_volume, ..FillOptions::new(target) };
+        let fill = fill(inner.input(), outer.input(), options, &mut |_, _| {}).unwrap();
+        assert!((fill.report.input_volume_m3 * 1e9 / exact - 1.0).abs() < 5e-4);
         (fill.mesh.total_volume_m3() * 1e9 / exact - 1.0).abs()
     };
-    let errors = [error(1352), error(10_000)];
-    println!("volume errors {errors:?}");
-    assert!(errors[0] < 0.04 && errors[1] < 0.01, "{errors:?}");
+    // Matched: as near as the input itself is.
+    let matched = [error(188, true), error(1352, true), error(10_000, true)];
+    // Nodes on the surfaces: the edge falls by 10000^⅓/1352^⅓ = 1.9 or so, the error with its square.
+    let inscribed = [error(1352, false), error(10_000, false)];
+    println!("matched {matched:?} inscribed {inscribed:?}");
+    assert!(matched.into_iter().all(|e| e < 1e-3), "{matched:?}");
+    assert!(inscribed[0] < 0.04 && inscribed[1] < inscribed[0] / 3.0, "{inscribed:?}");
 }
 
 #[test]
@@ -242,4 +247,86 @@ fn every_bad_pair_has_its_message() {
     let options = FillOptions { min_dihedral_deg: 55.0, ..FillOptions::new(1352) };
     let strict = fill(inner.input(), outer.input(), options, &mut |_, _| {}).unwrap_err();
     assert!(matches!(strict, FillError::Quality { wanted_deg: 55.0, .. }));
+}
+
+#[test]
+#[ignore = "prints times"]
+fn stage_times() {
+    let inner = Sample::icosphere(INNER_MM, Some(CUT_MM), 5, 1.0);
+    let outer = Sample::lat_long(OUTER_MM, Some(CUT_MM), 100, 160);
+    for (inner, outer) in [(&inner, &outer), (&lat_long_pair().0, &lat_long_pair().1)] {
+        for target in [1352, 10_000, 50_000] {
+            let started = std::time::Instant::now();
+            let mut last = String::new();
+            println!("{} and {} triangles, {target} tets", inner.triangles.len(), outer.triangles.len());
+            fill(inner.input(), outer.input(), FillOptions::new(target), &mut |part, what| {
+                if what != last {
+                    println!("  {:6.3} s {part:.2} {what}", started.elapsed().as_secs_f64());
+                    last = what.to_owned();
+                }
+            })
+            .unwrap();
+        }
+    }
+}
+
+/// Pairs that are hard on the map between the surfaces.
+#[test]
+fn hard_pairs() {
+    let inner = Sample::icosphere(INNER_MM, Some(CUT_MM), 4, 1.0);
+    let outer = Sample::lat_long(OUTER_MM, Some(CUT_MM), 40, 64);
+    let pairs = [
+        (
+            "cut below the equator",
+            Sample::icosphere(INNER_MM, Some(-5.0), 4, 1.0),
+            Sample::lat_long(OUTER_MM, Some(-5.0), 40, 64),
+        ),
+        ("inner rim lower", Sample::lat_long(INNER_MM, Some(3.5), 40, 64), outer.clone()),
+        ("inner rim higher", Sample::lat_long(INNER_MM, Some(6.5), 40, 64), outer.clone()),
+        ("tilted inner rim", inner.clone().moved(|p| p + DVec3::Z * 0.15 * p.x * ((p.z + 17.0) / 22.0)), outer.clone()),
+        (
+            "wall from 1 to 5 mm",
+            inner.clone().moved(|p| p + DVec3::X * 2.0 * (1.0 - (p.z / 20.0).powi(2))),
+            outer.clone(),
+        ),
+        (
+            "thin wall, 1.5 mm",
+            inner.clone().moved(|p| p * DVec3::new(8.5 / 7.0, 8.5 / 7.0, 1.0) - DVec3::Z * 1.2),
+            outer.clone(),
+        ),
+        ("thick wall, 6 mm", inner.clone().moved(|p| p * DVec3::new(4.0 / 7.0, 4.0 / 7.0, 1.0)), outer.clone()),
+        ("bent", bent(&inner), bent(&outer)),
+        ("deep grooves", grooved(&inner, 0.5), grooved(&outer, 1.2)),
+    ];
+    let mut failed = Vec::new();
+    for (name, inner, outer) in &pairs {
+        for target in [188, 1352, 10_000] {
+            match fill(inner.input(), outer.input(), FillOptions::new(target), &mut |_, _| {}) {
+                Ok(fill) => {
+                    println!("{name}, {target}:\n{}", fill.report);
+                    check_sound(&fill, target);
+                }
+                Err(error) => failed.push(format!("{name}, {target}: {error}")),
+            }
+        }
+    }
+    assert!(failed.is_empty(), "{}", failed.join("\n"));
+}
+
+/// A banana: the long axis bent to a circle of 40 mm.
+fn bent(sample: &Sample) -> Sample {
+    sample.clone().moved(|p| {
+        let (sin, cos) = (p.z / 40.0).sin_cos();
+        DVec3::new(40.0 - (40.0 - p.x) * cos, p.y, (40.0 - p.x) * sin)
+    })
+}
+
+/// Grooves along the long axis, like trabeculae, this deep (mm).
+fn grooved(sample: &Sample, depth: f64) -> Sample {
+    sample.clone().moved(|p| {
+        let around = p.y.atan2(p.x);
+        let radius = p.truncate().length();
+        let factor = 1.0 - depth / 7.0 * (0.5 + 0.5 * (7.0 * around).cos()) * (radius / (radius + 2.0));
+        DVec3::new(p.x * factor, p.y * factor, p.z)
+    })
 }

@@ -1,7 +1,7 @@
 //! Merging of points: those that coincide, and those that face each other across a gap.
 use super::{Repairs, Soup, edges_of};
 use glam::DVec3;
-use std::collections::HashMap;
+use std::collections::{BTreeMap, HashMap};
 
 /// Points nearer than this part of the bounding box's diagonal are one point (single-precision files need 1e-7).
 const SAME_POINT: f64 = 1e-6;
@@ -91,10 +91,20 @@ pub(super) fn join_gaps(soup: &mut Soup, repairs: &mut Repairs) {
     for &v in &open {
         grid.insert(v);
     }
-    let joined_by_edge = |a: u32, b: u32| edges.contains_key(&[a.min(b), a.max(b)]);
+    // Neighbours along the same open line do not face each other, however jagged it is.
+    let mut beside: BTreeMap<u32, Vec<u32>> = BTreeMap::new();
+    for [a, b] in edges.iter().filter(|(_, t)| t.len() == 1).map(|(e, _)| *e) {
+        beside.entry(a).or_default().push(b);
+        beside.entry(b).or_default().push(a);
+    }
+    let close = |a: u32, b: u32| {
+        let of_b = beside.get(&b);
+        let shared = beside.get(&a).into_iter().flatten().any(|v| of_b.is_some_and(|of_b| of_b.contains(v)));
+        shared || edges.contains_key(&[a.min(b), a.max(b)])
+    };
     let mut pairs: Vec<(f64, u32, u32)> = Vec::new();
     for &v in &open {
-        let ok = |w: u32| w != v && !joined_by_edge(v, w);
+        let ok = |w: u32| w != v && !close(v, w);
         if let Some((w, distance)) = grid.nearest(soup.points[v as usize], ok)
             && distance <= GAP * reach[v as usize].min(reach[w as usize])
         {
