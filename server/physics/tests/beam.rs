@@ -101,7 +101,7 @@ fn small_load_finer() {
     let [finer, limit] = cantilever(0.0, Root::Clamped, [8, 16]);
     assert!(finer.abs() < 0.0114 && limit.abs() < 0.0005, "{finer} {limit}");
     let [finer, limit] = cantilever(0.3, Root::FreeToContract, [8, 16]);
-    assert!(finer.abs() < 0.0114 && limit.abs() < 0.0010, "{finer} {limit}");
+    assert!(finer.abs() < 0.0114 && limit.abs() < 0.0007, "{finer} {limit}");
 }
 
 /// Tip deflection over length of the elastica, by shooting: `θ'' = −α cos θ`, `θ(0) = 0`, `θ'(1) = 0`, `w = ∫ sin θ`, with

@@ -8,12 +8,14 @@ mod foundation;
 mod local_model;
 mod narrow;
 mod proxy;
+mod resting;
 mod state;
 mod tool;
 mod touching;
 mod triangle;
 
 pub use proxy::SubstepTime;
+pub(crate) use resting::RestingContact;
 pub use state::ContactState;
 pub use tool::{Coupling, LocalContactModel, ToolSpec, ToolState, ToolTarget};
 pub use triangle::{closest_point, closest_weights};

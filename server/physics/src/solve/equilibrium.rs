@@ -1,7 +1,7 @@
 //! What equilibrium balances: forces at a fraction of the goal, and the change of potential along a line.
 use super::{SolveError, follower, stiffness::FreeAxes};
 use crate::{
-    contact::ToolTarget,
+    contact::{RestingContact, ToolTarget},
     fem::{element::RestTet, loads},
     integrate::leapfrog::add_load,
     world::{LoadSpec, Model},
@@ -23,10 +23,18 @@ pub(super) struct Stage {
     pub(super) load_factors: Vec<f64>,
     /// Gravity and dead loads (N): the same at every position.
     dead_n: Vec<DVec3>,
+    pub(super) contact: RestingContact,
 }
 
 impl Stage {
-    pub(super) fn new(model: &Model, goal: &Goal<'_>, fraction: f64) -> Self {
+    /// The stage entered with the body at `x` and contact as it was `before`.
+    pub(super) fn new(
+        model: &Model,
+        goal: &Goal<'_>,
+        fraction: f64,
+        x: &[DVec3],
+        before: Option<&RestingContact>,
+    ) -> Self {
         let load_factors: Vec<f64> = goal.load_factors.iter().map(|factor| factor * fraction).collect();
         let gravity = model.gravity_m_per_s2() * fraction;
         let mut dead_n: Vec<DVec3> = model.mass_kg().iter().map(|mass| gravity * *mass).collect();
@@ -36,7 +44,10 @@ impl Stage {
                 add_load(model, load, factor, model.rest_positions_m(), &mut dead_n);
             }
         }
-        Self { fraction, load_factors, dead_n }
+        let start = model.spec().tools.iter().map(|tool| tool.start_position_m);
+        let centres = start.zip(goal.tools).map(|(start, tool)| start.lerp(tool.position_m, fraction)).collect();
+        let contact = RestingContact::arrive(model.contact(), centres, x, before);
+        Self { fraction, load_factors, dead_n, contact }
     }
 
     /// Where prescribed axes are to be, the rest as in `x`.
@@ -61,6 +72,8 @@ pub(super) struct Forces {
     pub(super) internal_n: Vec<DVec3>,
     /// Gravity, loads, contact.
     pub(super) external_n: Vec<DVec3>,
+    /// Of the body on the tools (N).
+    pub(super) on_tools: Vec<DVec3>,
 }
 
 impl Forces {
@@ -69,7 +82,8 @@ impl Forces {
         for (triangles, pressure_pa) in follower::active(model, &stage.load_factors) {
             loads::add_pressure_n(model.surface(), triangles, pressure_pa, x, &mut external_n);
         }
-        Self { internal_n: elastic_n(model, x), external_n }
+        let on_tools = stage.contact.add_forces_n(model.contact(), x, &mut external_n);
+        Self { internal_n: elastic_n(model, x), external_n, on_tools }
     }
 
     /// Total force on the free axes.
@@ -131,6 +145,7 @@ pub(super) struct Line<'a> {
     x: &'a [DVec3],
     d: &'a [DVec3],
     elastic_j: Vec<f64>,
+    contact_j: f64,
     /// `Σ V (λ + 2µ)` (J): the terms that cancel in `Ψ` are of this size, however small the strain.
     cancelling_j: f64,
     dead_slope_w: f64,
@@ -141,7 +156,8 @@ impl<'a> Line<'a> {
         let elastic_j = elastic_j(model, x);
         let modulus = |(tet, rest): (usize, &RestTet)| rest.volume_m3 * model.material_of(tet).lame.p_wave_modulus_pa();
         let cancelling_j = model.rest_tets().iter().enumerate().map(modulus).sum();
-        Self { model, stage, x, d, elastic_j, cancelling_j, dead_slope_w: dot(&stage.dead_n, d) }
+        let contact_j = stage.contact.potential_j(model.contact(), x);
+        Self { model, stage, x, d, elastic_j, contact_j, cancelling_j, dead_slope_w: dot(&stage.dead_n, d) }
     }
 
     pub(super) fn at(&self, alpha: f64) -> Vec<DVec3> {
@@ -149,12 +165,14 @@ impl<'a> Line<'a> {
     }
 
     /// Change of potential (J) from 0 to `alpha`, and the size of the rounding in it:
-    /// `ΔΠ = Σ V ΔΨ − α (m g + f_dead)·d − ∫₀^α f_follower(x + td)·d dt`.
+    /// `ΔΠ = Σ V ΔΨ + ΔΦ_contact − α (m g + f_dead)·d − ∫₀^α f_follower(x + td)·d dt`.
     ///
     /// A follower pressure need not have a potential, but its work along a straight line is a number: the integrand is
     /// quadratic in `t`, so Simpson's rule gives it exactly, and `dΔΠ/dα = −f·d` holds for all loads.
     pub(super) fn potential_change_j(&self, alpha: f64) -> (f64, f64) {
-        let after = elastic_j(self.model, &self.at(alpha));
+        let x = self.at(alpha);
+        let after = elastic_j(self.model, &x);
+        let contact = self.stage.contact.potential_j(self.model.contact(), &x) - self.contact_j;
         let elastic: f64 = after.iter().zip(&self.elastic_j).map(|(b, a)| b - a).sum();
         let size: f64 = after.iter().zip(&self.elastic_j).map(|(b, a)| b.abs() + a.abs()).sum();
         let follower_work = if follower::active(self.model, &self.stage.load_factors).next().is_some() {
@@ -164,10 +182,8 @@ impl<'a> Line<'a> {
             0.0
         };
         let dead_work = alpha * self.dead_slope_w;
-        (
-            elastic - dead_work - follower_work,
-            f64::EPSILON * (self.cancelling_j + size + dead_work.abs() + follower_work.abs()),
-        )
+        let terms = self.cancelling_j + size + self.contact_j + dead_work.abs() + follower_work.abs();
+        (elastic + contact - dead_work - follower_work, f64::EPSILON * terms)
     }
 
     fn follower_power(&self, t: f64) -> f64 {

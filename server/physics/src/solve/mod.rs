@@ -1,7 +1,7 @@
 //! Equilibrium: the static solve that references and `palpated static` use, and natural modes about rest.
 //!
 //! Forces are those of `fem::element`, the materials and `fem::loads`, so an equilibrium found here is a resting state of
-//! [`crate::step`]. Everything is f64; linear systems go to faer's sparse Cholesky (docs/adr/0010-static-solve.md).
+//! [`crate::step`]. Everything is f64; linear systems go to faer's sparse Cholesky (docs/adr/static-solve.md).
 //!
 //! - `newton.rs`: load stepping and Newton's method with a line search
 //! - `equilibrium.rs`: forces and the change of potential along a line
@@ -173,7 +173,8 @@ pub enum SolveError {
 }
 
 /// Finds an equilibrium of `model` under its gravity, `load_factors` (one per load), `prescribed_displacements_m` (one per
-/// prescribed set) and rigid `tools` (one per tool, held at their target whatever their coupling), starting from rest.
+/// prescribed set) and rigid `tools` (one per tool, held at their target whatever their coupling), starting from rest with the tools at
+/// their start positions. A tool moves at most half its radius per load step, so it must come from outside.
 ///
 /// `progress` is called once per Newton iteration and may stop the solve. Friction and viscosity do not act at rest and are
 /// left out. The pressure's load stiffness enters with its symmetric part; where a follower pressure ends at a free rim the

@@ -13,7 +13,11 @@ use super::{
     follower,
     stiffness::{Definiteness, FreeAxes, Stiffness, force_differential_n},
 };
-use crate::{fem::element::RestTet, world::Model};
+use crate::{
+    contact::{ToolSpec, ToolTarget},
+    fem::element::RestTet,
+    world::Model,
+};
 use glam::DVec3;
 use std::ops::ControlFlow;
 
@@ -79,8 +83,7 @@ pub(super) fn solve(
         factorisations: 0,
         progress,
     };
-    let (x, load_steps) = solver.follow_load(goal)?;
-    Ok(solver.solution(goal, x, load_steps))
+    solver.follow_load(goal)
 }
 
 /// `ε ‖diag K‖₂ max|x|` (N): a node known to `ε|x|` has a force known to `ε |x| K_ii`.
@@ -92,21 +95,25 @@ fn rounding_n(model: &Model, stiffness: &Stiffness) -> f64 {
 
 impl Solver<'_> {
     /// Raises the load in steps: halved after a failure, doubled after a success.
-    fn follow_load(&mut self, goal: &Goal<'_>) -> Result<(Vec<DVec3>, u32), SolveError> {
+    fn follow_load(&mut self, goal: &Goal<'_>) -> Result<StaticSolution, SolveError> {
         let mut x = self.model.rest_positions_m().to_vec();
         let (mut reached, mut steps) = (0.0, 0);
         let first = 1.0 / f64::from(self.settings.load_steps);
         let smallest = first * 0.5_f64.powi(self.settings.max_halvings as i32);
-        let mut step = first;
+        let largest = largest_step(self.model, goal);
+        let mut step = first.min(largest);
+        let smallest = smallest.min(step);
+        let mut contact = None;
         while reached < 1.0 {
             let fraction = if reached + step > 1.0 - 1e-9 { 1.0 } else { reached + step };
-            let stage = Stage::new(self.model, goal, fraction);
+            let stage = Stage::new(self.model, goal, fraction, &x, contact.as_ref());
             match self.equilibrate(goal, &stage, x.clone()) {
                 Ok(found) => {
                     x = found;
                     reached = fraction;
                     steps += 1;
-                    step *= 2.0;
+                    step = (2.0 * step).min(largest);
+                    contact = Some(stage.contact);
                 }
                 Err(Stop::Final(error)) => return Err(error),
                 Err(Stop::Step(failure)) => {
@@ -117,7 +124,8 @@ impl Solver<'_> {
                 }
             }
         }
-        Ok((x, steps))
+        let stage = Stage::new(self.model, goal, 1.0, &x, contact.as_ref());
+        Ok(self.solution(&stage, x, steps))
     }
 
     fn give_up(&self, failure: Failure, reached_fraction: f64, failed_fraction: f64) -> SolveError {
@@ -213,12 +221,14 @@ impl Solver<'_> {
     fn refactor(&mut self, stage: &Stage, x: &[DVec3]) -> Result<(), SolveError> {
         self.stiffness.assemble(self.model, x, Definiteness::Exact);
         follower::add_stiffness(self.model, &stage.load_factors, x, &self.axes, &mut self.stiffness);
+        self.add_contact_stiffness(stage, x, Definiteness::Exact);
         self.factorisations += 1;
         self.stable = self.factor.factorise(&self.stiffness);
         if self.stable {
             return Ok(());
         }
         self.stiffness.assemble(self.model, x, Definiteness::Projected);
+        self.add_contact_stiffness(stage, x, Definiteness::Projected);
         let largest = self.stiffness.diagonal().fold(0.0, f64::max);
         let mut shift = 1e-10 * largest;
         while shift < largest {
@@ -231,6 +241,14 @@ impl Solver<'_> {
         }
         let reason = "the projected stiffness is not positive definite under any shift".into();
         Err(SolveError::Factorisation { unknowns: self.axes.count, reason })
+    }
+
+    fn add_contact_stiffness(&mut self, stage: &Stage, x: &[DVec3], definiteness: Definiteness) {
+        let (axes, stiffness) = (&self.axes, &mut self.stiffness);
+        let definite = definiteness == Definiteness::Projected;
+        stage.contact.for_each_block(self.model.contact(), x, definite, |i, j, block| {
+            stiffness.add_block(axes, i, j, block);
+        });
     }
 
     /// One step along Newton's direction; `None` when no length of it is acceptable.
@@ -262,9 +280,9 @@ impl Solver<'_> {
         None
     }
 
-    fn solution(self, goal: &Goal<'_>, x: Vec<DVec3>, load_steps: u32) -> StaticSolution {
-        let stage = Stage::new(self.model, goal, 1.0);
-        let total = Forces::at(self.model, &stage, &x).total_n();
+    fn solution(&mut self, stage: &Stage, x: Vec<DVec3>, load_steps: u32) -> StaticSolution {
+        let forces = Forces::at(self.model, stage, &x);
+        let total = forces.total_n();
         let fixed = self.model.inverse_mass_per_kg().iter().map(|m| m.cmpeq(DVec3::ZERO));
         // The holder supplies what the other forces lack.
         let node_reactions_n: Vec<DVec3> =
@@ -278,7 +296,7 @@ impl Solver<'_> {
         StaticSolution {
             reactions_n,
             node_reactions_n,
-            tool_forces_n: vec![DVec3::ZERO; goal.tools.len()],
+            tool_forces_n: forces.on_tools,
             iterations: self.history.len() as u32,
             factorisations: self.factorisations,
             load_steps,
@@ -287,7 +305,7 @@ impl Solver<'_> {
             rounding_n: self.rounding_n,
             stable: self.stable,
             inverted_tets: inverted_tets(self.model, &x),
-            history: self.history,
+            history: std::mem::take(&mut self.history),
             x,
         }
     }
@@ -297,6 +315,15 @@ impl Solver<'_> {
 fn shorter(alpha: f64, slope: f64, change: f64) -> f64 {
     let parabola = -slope * alpha / (2.0 * (change - slope * alpha));
     if parabola.is_finite() { parabola.clamp(0.1, 0.5) } else { 0.1 }
+}
+
+/// A tool moves at most half its radius per load step: it presses what it was outside of.
+fn largest_step(model: &Model, goal: &Goal<'_>) -> f64 {
+    let tools = model.spec().tools.iter().zip(goal.tools);
+    let step = |(spec, target): (&ToolSpec, &ToolTarget)| {
+        0.5 * spec.radius_m / spec.start_position_m.distance(target.position_m).max(f64::MIN_POSITIVE)
+    };
+    tools.map(step).fold(1.0, f64::min)
 }
 
 /// The node with the largest force.
