@@ -228,6 +228,17 @@ impl Sample {
     }
 }
 
+/// A human-sized ventricle, 90 mm from base to apex: bumpy, both surfaces triangulated differently and a little rough,
+/// a hole at the inner apex, the inner rim not quite plane.
+pub(crate) fn human() -> (Sample, Sample) {
+    const SCALE: f64 = 3.6;
+    let mut noise = Noise::new(2);
+    let inner = Sample::icosphere(INNER_MM, Some(CUT_MM), 4, 0.8).with_bumps(INNER_MM).with_apex_hole(0.9);
+    let outer = Sample::lat_long(OUTER_MM, Some(CUT_MM), 36, 60).with_bumps(OUTER_MM);
+    let mut rough = |p: DVec3| (p + noise.vector() * 0.03) * SCALE;
+    (inner.moved(&mut rough), outer.moved(&mut rough))
+}
+
 fn icosahedron() -> Sample {
     let g = 0.5 * (1.0 + 5f64.sqrt());
     let points = [

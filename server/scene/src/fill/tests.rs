@@ -1,7 +1,9 @@
-use super::samples::{CUT_MM, INNER_MM, Noise, OUTER_MM, Sample};
+use super::samples::{CUT_MM, INNER_MM, Noise, OUTER_MM, Sample, human};
 use super::*;
+use crate::files::{read_surface, write_ply, write_stl};
 use palpate_physics::Surface;
 use std::collections::BTreeMap;
+use std::path::PathBuf;
 
 fn filled(inner: &Sample, outer: &Sample, target: u32) -> Fill {
     let started = std::time::Instant::now();
@@ -329,4 +331,42 @@ fn grooved(sample: &Sample, depth: f64) -> Sample {
         let factor = 1.0 - depth / 7.0 * (0.5 + 0.5 * (7.0 * around).cos()) * (radius / (radius + 2.0));
         DVec3::new(p.x * factor, p.y * factor, p.z)
     })
+}
+
+/// The sample surfaces for users: a bumpy human-sized ventricle in millimetres, its cavity with a hole at the apex.
+fn sample_files() -> [PathBuf; 2] {
+    let folder = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../deploy/scenes/data");
+    ["ventricle-inner.stl", "ventricle-outer.ply"].map(|name| folder.join(name))
+}
+
+#[test]
+#[ignore = "writes deploy/scenes/data"]
+fn write_sample_files() {
+    let [inner_path, outer_path] = sample_files();
+    std::fs::create_dir_all(inner_path.parent().unwrap()).unwrap();
+    let (inner, outer) = human();
+    write_stl(&inner_path, &inner.points, &inner.triangles).unwrap();
+    write_ply(&outer_path, &outer.points, &outer.triangles).unwrap();
+}
+
+#[test]
+fn sample_files_are_as_generated_and_fill() {
+    let read = sample_files().map(|path| read_surface(&path).unwrap());
+    let (inner, outer) = human();
+    for (file, made) in read.iter().zip([&inner, &outer]) {
+        assert_eq!(file.triangles.len(), made.triangles.len());
+        for (a, b) in file.triangles.iter().zip(&made.triangles) {
+            for (&i, &j) in a.iter().zip(b) {
+                // STL is single precision.
+                assert!(file.vertices[i as usize].distance(made.points[j as usize]) < 1e-4);
+            }
+        }
+    }
+    let [inner, outer] = read.map(|file| Sample { points: file.vertices, triangles: file.triangles });
+    for target in [188, 1352, 5000] {
+        let fill = filled(&inner, &outer, target);
+        check_near(&fill, 0.25);
+        assert_eq!(fill.report.inner.repairs.filled_holes, 1);
+        assert!((fill.report.volume_m3 / fill.report.input_volume_m3 - 1.0).abs() < 0.01);
+    }
 }
