@@ -1,8 +1,14 @@
 //! Scenes that are part of the program. They are the files of `deploy/scenes` that need no other file.
 
-const SCENES: &[(&str, &str)] = &[];
+macro_rules! scenes {
+    ($($name:literal),*) => {
+        const SCENES: &[(&str, &str)] =
+            &[$(($name, include_str!(concat!("../../../deploy/scenes/", $name, ".toml")))),*];
+        const NAMES: &[&str] = &[$($name),*];
+    };
+}
 
-const NAMES: &[&str] = &[];
+scenes!("ventricle", "cantilever", "lame-sphere", "paper-2006");
 
 /// Text of a built-in scene.
 pub fn builtin(name: &str) -> Option<&'static str> {

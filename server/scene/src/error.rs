@@ -60,6 +60,13 @@ impl SceneError {
         self
     }
 
+    /// Keeps the error underneath, already boxed.
+    #[must_use]
+    pub fn with_boxed_cause(mut self, cause: Box<dyn std::error::Error + Send + Sync>) -> Self {
+        self.cause = Some(cause);
+        self
+    }
+
     /// Points into a text.
     #[must_use]
     pub fn at(mut self, name: &str, text: &str, span: Option<Range<usize>>, label: impl Into<String>) -> Self {

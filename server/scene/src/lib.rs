@@ -4,6 +4,8 @@
 //! The format is described in `docs/scenes.md`; its JSON schema is [`json_schema`].
 
 pub mod builtin;
+mod compile;
+mod document;
 pub mod drivers;
 pub mod error;
 pub mod files;

@@ -1,5 +1,7 @@
 //! From a file or a text to a [`Scene`].
 use crate::{
+    compile::{self, Files},
+    document::{schema, source::Source},
     error::{SceneError, Stage},
     scene::Scene,
 };
@@ -30,11 +32,11 @@ pub fn parse(
     progress: &mut dyn FnMut(f64, &str),
 ) -> Result<Scene, SceneError> {
     progress(0.0, "reading the scene");
-    let _ = base_dir;
-    Err(SceneError::new(Stage::Document, "scenes cannot be compiled yet").at(source_name, text, None, ""))
+    let (source, document) = Source::read(source_name, text)?;
+    compile::compile(&document, &Files { base_dir }, progress).map_err(|fault| source.error(fault))
 }
 
 /// JSON schema of the scene document.
 pub fn json_schema() -> serde_json::Value {
-    serde_json::Value::Null
+    schema::schema()
 }

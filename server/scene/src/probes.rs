@@ -58,7 +58,7 @@ impl MaterialPoint {
         })
     }
 
-    fn inside(mesh: &TetMesh, tet: usize, point_m: DVec3) -> Option<Self> {
+    pub(crate) fn inside(mesh: &TetMesh, tet: usize, point_m: DVec3) -> Option<Self> {
         const ROUNDING: f64 = 1e-12;
         let corner = mesh.corners_m(tet)[0];
         let local = mesh.edge_matrix_m(tet).inverse() * (point_m - corner);
@@ -67,7 +67,7 @@ impl MaterialPoint {
         inside.then(|| Self { nodes: mesh.tets()[tet], weights, distance_m: 0.0 })
     }
 
-    fn on_triangle(mesh: &TetMesh, triangle: [u32; 3], point_m: DVec3) -> Self {
+    pub(crate) fn on_triangle(mesh: &TetMesh, triangle: [u32; 3], point_m: DVec3) -> Self {
         let [a, b, c] = triangle.map(|node| mesh.positions_m()[node as usize]);
         let w = closest_weights(point_m, a, b, c);
         let closest = a * w[0] + b * w[1] + c * w[2];
@@ -137,10 +137,15 @@ impl Probe {
     /// Writes the values at this state; `out` is at least as long as [`Self::columns`]. Does not allocate.
     /// Energies and the volume ratio visit every tet.
     pub fn evaluate(&self, model: &Model, state: &State, scratch: &Scratch, out: &mut [f64]) {
+        self.evaluate_with(model, state, scratch.reactions_n(), out);
+    }
+
+    /// The same with the reactions (N per node) given, for states that no step has made.
+    pub fn evaluate_with(&self, model: &Model, state: &State, reactions_n: &[DVec3], out: &mut [f64]) {
         match &self.measure {
             Measure::Displacement(point) => put(out, point.of(&state.x) - point.of(model.rest_positions_m())),
             Measure::Reaction(nodes) => {
-                put(out, nodes.iter().map(|&node| scratch.reactions_n()[node as usize]).sum());
+                put(out, nodes.iter().map(|&node| reactions_n[node as usize]).sum());
             }
             Measure::Energy => {
                 let e = Energies::of(model, state);

@@ -1,8 +1,15 @@
 //! `palpated check`: what a scene's body is like, and what a tick costs on this machine.
-use std::process::ExitCode;
+use super::{load, simulate::Run, summary::TimeNumbers};
+use palpate_physics::Model;
+use palpate_scene::{Scene, builtin_names};
+use std::{
+    process::ExitCode,
+    time::{Duration, Instant},
+};
 
 /// Flags of `palpated check`.
 #[derive(Debug, Clone, clap::Args)]
+#[command(after_help = "Exit code: 0 when the scene loads (1 with --strict if it has warnings), 1 when it does not.")]
 pub struct CheckArgs {
     /// Scene file or name of a built-in scene
     #[arg(required_unless_present = "list")]
@@ -10,6 +17,9 @@ pub struct CheckArgs {
     /// List the built-in scenes instead
     #[arg(long)]
     pub list: bool,
+    /// Fail when there are warnings
+    #[arg(long)]
+    pub strict: bool,
 }
 
 /// Runs the command.
@@ -17,5 +27,91 @@ pub struct CheckArgs {
 /// # Errors
 /// A scene that does not load.
 pub fn run(args: &CheckArgs) -> miette::Result<ExitCode> {
-    Err(miette::miette!("checking {} is not possible yet", args.scene.as_deref().unwrap_or_default()))
+    let Some(name) = args.scene.as_deref().filter(|_| !args.list) else {
+        builtin_names().iter().for_each(|name| println!("{name}"));
+        return Ok(ExitCode::SUCCESS);
+    };
+    let scene = load::load_scene(name)?;
+    let model = load::build(&scene)?;
+    let cost = measure(&scene, &model)?;
+    print_body(&scene);
+    print_time(&model, &cost);
+    print_contents(&scene);
+    for warning in &scene.warnings {
+        println!("warning: {warning}");
+    }
+    let failed = args.strict && !scene.warnings.is_empty();
+    Ok(if failed { ExitCode::FAILURE } else { ExitCode::SUCCESS })
+}
+
+/// Runs the scene for up to half a second of wall time, or its own duration.
+fn measure(scene: &Scene, model: &Model) -> miette::Result<TimeNumbers> {
+    const BUDGET: Duration = Duration::from_millis(500);
+    let mut run = Run::new(scene, model)?;
+    let started = Instant::now();
+    loop {
+        run.tick();
+        if started.elapsed() > BUDGET || run.state.time_s(model) >= scene.output.duration_s {
+            return Ok(run.cost());
+        }
+    }
+}
+
+fn print_body(scene: &Scene) {
+    let body = &scene.summary;
+    let quality = &body.quality;
+    println!("{}: {}", scene.name, scene.description);
+    println!("body       {}", body.origin);
+    println!("           {} tets, {} nodes, {} surface triangles", body.tets, body.nodes, body.surface_triangles);
+    println!("           volume {:.4} ml, mass {:.4} g", body.volume_m3 * 1e6, body.mass_kg * 1e3);
+    println!(
+        "quality    dihedral angles {:.1}° to {:.1}°, volume-length ratio {:.3} at worst, {:.3} in the mean",
+        quality.min_dihedral_deg, quality.max_dihedral_deg, quality.min_volume_length, quality.mean_volume_length
+    );
+    println!("           edges {:.3} to {:.3} mm", quality.edge_range_m.0 * 1e3, quality.edge_range_m.1 * 1e3);
+    for line in &body.fill_report {
+        println!("           {line}");
+    }
+    for part in &body.parts {
+        println!("region     {:<16} {} nodes, {} triangles, {} tets", part.name, part.nodes, part.triangles, part.tets);
+    }
+    for region in &scene.model.regions {
+        let lame = region.material.lame;
+        println!(
+            "material   {:<16} {:?}, E {:.4e} Pa, nu {:.4}, {} kg/m3",
+            region.name,
+            region.material.law,
+            lame.young_modulus_pa(),
+            lame.poisson_ratio(),
+            region.density_kg_per_m3
+        );
+    }
+}
+
+fn print_time(model: &Model, cost: &TimeNumbers) {
+    let period_us = cost.tick_period_s * 1e6;
+    println!(
+        "time       tick {period_us} us, omega_max {:.4e} rad/s, {} substeps",
+        model.max_natural_frequency_rad_per_s(),
+        cost.substeps_per_tick
+    );
+    let us = cost.tick_wall_us;
+    println!("           a tick costs {:.1} us here (p99 {:.1} us over {} ticks)", us.p50, us.p99, cost.ticks);
+    let verdict = if us.p99 < period_us { "fits" } else { "does NOT fit: coarsen the mesh or lengthen tick_period_s" };
+    println!("           {:.1} % of the tick: {verdict}", 100.0 * us.p50 / period_us);
+}
+
+fn print_contents(scene: &Scene) {
+    let held: usize = scene.model.prescribed.iter().map(|set| set.nodes.len()).sum();
+    println!("held       {held} nodes in {} sets; {} loads", scene.model.prescribed.len(), scene.model.loads.len());
+    for (tool, driver) in scene.model.tools.iter().zip(&scene.drivers) {
+        let driver = match driver {
+            palpate_scene::Driver::Device => "a device",
+            palpate_scene::Driver::Trajectory(_) => "a trajectory",
+            palpate_scene::Driver::Script(_) => "a script",
+        };
+        println!("tool       {:<16} radius {:.3} mm, driven by {driver}", tool.name, tool.radius_m * 1e3);
+    }
+    let probes: Vec<&str> = scene.probes.iter().map(palpate_scene::Probe::name).collect();
+    println!("probes     {}", if probes.is_empty() { "none".to_owned() } else { probes.join(", ") });
 }

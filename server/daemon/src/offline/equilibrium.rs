@@ -1,17 +1,59 @@
 //! `palpated static`: the equilibrium of a scene under its final loads.
-use std::{path::PathBuf, process::ExitCode};
+use super::{
+    folder,
+    frames::Frames,
+    interrupt::Interrupt,
+    load,
+    probes::ProbeRows,
+    progress::Progress,
+    simulate::positive,
+    summary::{Ending, SolveNumbers, Summary},
+};
+use glam::DVec3;
+use miette::Diagnostic;
+use palpate_physics::{
+    Model, State,
+    contact::ToolTarget,
+    solve::{self, SolveError, StaticSettings, StaticSolution},
+};
+use palpate_scene::Scene;
+use std::{ops::ControlFlow, path::PathBuf, process::ExitCode, time::Instant};
+use thiserror::Error;
 
 /// Flags of `palpated static`.
 #[derive(Debug, Clone, clap::Args)]
+#[command(after_help = "Examples:\n  \
+    palpated static cantilever                 where the beam comes to rest\n  \
+    palpated static cantilever --out rest      and keep probes.csv, frames.pvd and summary.json\n  \
+    palpated static ventricle --at-s 0.5       as pressed half a second into the scene")]
 pub struct StaticArgs {
     /// Scene file or name of a built-in scene
     pub scene: String,
+    /// Take loads, motions and tools as they are at this time, instead of what they settle to
+    #[arg(long, value_name = "SECONDS", value_parser = positive)]
+    pub at_s: Option<f64>,
+    /// Largest residual force relative to the forces in play
+    #[arg(long, value_name = "RATIO", value_parser = positive)]
+    pub residual: Option<f64>,
     /// Folder for probes.csv, summary.json and the frame; without it only the summary is printed
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
-    /// Replace what is in the folder
+    /// Print the summary as JSON
+    #[arg(long)]
+    pub json: bool,
+    /// Replace the results of an earlier run in the folder
     #[arg(long)]
     pub force: bool,
+}
+
+#[derive(Debug, Error, Diagnostic)]
+#[error("no equilibrium of \"{scene}\"")]
+#[diagnostic(help("{advice}"))]
+struct NoEquilibrium {
+    scene: String,
+    advice: &'static str,
+    #[source]
+    cause: SolveError,
 }
 
 /// Runs the command.
@@ -19,5 +61,92 @@ pub struct StaticArgs {
 /// # Errors
 /// A scene that does not load, no convergence, or a folder that cannot be written.
 pub fn run(args: &StaticArgs) -> miette::Result<ExitCode> {
-    Err(miette::miette!("solving {} is not possible yet", args.scene))
+    let scene = load::load_with_warnings(&args.scene)?;
+    let model = load::build(&scene)?;
+    let out = args.out.as_deref().map(|out| folder::prepare(out, args.force)).transpose()?;
+    let started = Instant::now();
+    let goal = Goal::of(&scene, args.at_s);
+    let solution = solve(&scene, &model, &goal, args.residual)?;
+    let state = state_of(&model, &goal, &solution);
+    let mut rows = ProbeRows::new(&scene.probes, out.as_ref().map(|out| out.join(folder::PROBES)).as_deref())?;
+    rows.sample(goal.time_s, &model, &state, &solution.node_reactions_n)?;
+    rows.flush()?;
+    let wall_s = started.elapsed().as_secs_f64();
+    let mut ending = Ending { command: "static", by: "equilibrium", simulated_s: goal.time_s, wall_s, frames: 0 };
+    if let Some(out) = &out {
+        let mut frames = Frames::new(out, &model)?;
+        frames.write(goal.time_s, &model, &state)?;
+        ending.frames = frames.count();
+    }
+    let mut summary = Summary::new(&scene, &model, &state, &rows, &ending);
+    summary.solve = Some(SolveNumbers {
+        iterations: solution.iterations,
+        load_steps: solution.load_steps,
+        residual_n: solution.residual_n,
+        relative_residual: solution.relative_residual,
+        stable: solution.stable,
+        inverted_tets: solution.inverted_tets,
+    });
+    if let Some(out) = &out {
+        summary.write(out)?;
+    }
+    summary.print(args.json, out.as_deref())?;
+    Ok(ExitCode::SUCCESS)
+}
+
+/// Under what the equilibrium is sought.
+struct Goal {
+    time_s: f64,
+    load_factors: Vec<f64>,
+    prescribed_m: Vec<DVec3>,
+    tools: Vec<ToolTarget>,
+}
+
+impl Goal {
+    fn of(scene: &Scene, at_s: Option<f64>) -> Self {
+        let mut load_factors = vec![0.0; scene.model.loads.len()];
+        let mut prescribed_m = vec![DVec3::ZERO; scene.model.prescribed.len()];
+        let time_s = at_s.unwrap_or(scene.output.duration_s);
+        match at_s {
+            Some(time_s) => scene.timeline.fill(time_s, &mut load_factors, &mut prescribed_m),
+            None => scene.timeline.fill_final(&mut load_factors, &mut prescribed_m),
+        }
+        let still = |target: ToolTarget| ToolTarget { velocity_m_per_s: DVec3::ZERO, ..target };
+        let tools = (0..scene.model.tools.len()).map(|tool| still(scene.offline_target(tool, time_s))).collect();
+        Self { time_s, load_factors, prescribed_m, tools }
+    }
+}
+
+fn solve(scene: &Scene, model: &Model, goal: &Goal, residual: Option<f64>) -> miette::Result<StaticSolution> {
+    let default = StaticSettings::default();
+    let settings = StaticSettings { relative_residual: residual.unwrap_or(default.relative_residual), ..default };
+    let interrupt = Interrupt::listen();
+    let mut bar = Progress::new(&scene.name);
+    let mut show = |progress: &solve::Progress| {
+        bar.show(progress.load_fraction, &format!("residual {:.1e}", progress.relative_residual));
+        if interrupt.is_set() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+    };
+    let solved = solve::solve_static(model, &goal.load_factors, &goal.prescribed_m, &goal.tools, &settings, &mut show);
+    bar.finish();
+    solved.map_err(|cause| {
+        let advice = match &cause {
+            SolveError::UnderConstrained { .. } => "add a [[fixed]] region to the scene",
+            SolveError::Cancelled { .. } => "it was interrupted; nothing was written",
+            _ => "apply less load, or let `palpated simulate` find the way with viscosity or mass_damping_per_s",
+        };
+        NoEquilibrium { scene: scene.name.clone(), advice, cause }.into()
+    })
+}
+
+/// The equilibrium as a state, for probes and frames.
+fn state_of(model: &Model, goal: &Goal, solution: &StaticSolution) -> State {
+    let mut state = State::at_rest(model);
+    state.x.copy_from_slice(&solution.x);
+    state.load_factors.copy_from_slice(&goal.load_factors);
+    for ((tool, target), force) in state.tools.iter_mut().zip(&goal.tools).zip(&solution.tool_forces_n) {
+        tool.centre_m = target.position_m;
+        tool.contact_force_n = *force;
+        tool.device_force_n = *force;
+    }
+    state
 }

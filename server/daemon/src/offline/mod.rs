@@ -1,5 +1,15 @@
-//! Commands that run without a network: `simulate`, `static`, `check`, `schema`.
+//! Commands that run without a network: `simulate`, `static`, `check`, `schema`. They run the same scenes and the same
+//! physics as `serve`; nothing in them is random, so equal scenes give equal results, bit for bit.
 pub mod check;
 pub mod equilibrium;
+mod folder;
+mod frames;
+mod interrupt;
+mod load;
+mod probes;
+mod progress;
 pub mod schema;
 pub mod simulate;
+mod summary;
+
+pub use load::load_scene;

@@ -1,8 +1,27 @@
 //! `palpated simulate`: a scene headless, as fast as it goes, the same bits every time.
-use std::{path::PathBuf, process::ExitCode};
+use super::{
+    folder,
+    frames::Frames,
+    interrupt::Interrupt,
+    load,
+    probes::ProbeRows,
+    progress::Progress,
+    summary::{Ending, Percentiles, Summary, TimeNumbers},
+};
+use glam::DVec3;
+use hdrhistogram::Histogram;
+use miette::IntoDiagnostic;
+use palpate_physics::{Model, Scratch, State, TickInput, contact::ToolTarget, step};
+use palpate_scene::Scene;
+use std::{path::PathBuf, process::ExitCode, time::Instant};
 
 /// Flags of `palpated simulate`.
 #[derive(Debug, Clone, clap::Args)]
+#[command(after_help = "Examples:\n  \
+    palpated simulate ventricle                      print what it did\n  \
+    palpated simulate ventricle --out run            and keep probes.csv, frames.pvd (open it in ParaView), summary.json\n  \
+    palpated simulate my.toml --out run --frames none --duration-s 10\n\n\
+    Nothing in a run is random: two runs of one scene give the same bits.")]
 pub struct SimulateArgs {
     /// Scene file or name of a built-in scene
     pub scene: String,
@@ -10,14 +29,46 @@ pub struct SimulateArgs {
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
     /// Simulated time in seconds, instead of the scene's
-    #[arg(long, value_name = "SECONDS")]
+    #[arg(long, value_name = "SECONDS", value_parser = positive)]
     pub duration_s: Option<f64>,
-    /// Number of frames to write, or "none"
+    /// Number of frames over the whole run, or "none"; by default the scene's interval decides
     #[arg(long, value_name = "N|none")]
-    pub frames: Option<String>,
-    /// Replace what is in the folder
+    pub frames: Option<FrameCount>,
+    /// Print the summary as JSON
+    #[arg(long)]
+    pub json: bool,
+    /// Replace the results of an earlier run in the folder
     #[arg(long)]
     pub force: bool,
+}
+
+/// How many frames a run writes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum FrameCount {
+    /// None at all.
+    None,
+    /// This many, evenly over the run; the first shows the start.
+    Some(u32),
+}
+
+impl std::str::FromStr for FrameCount {
+    type Err = String;
+    fn from_str(text: &str) -> Result<Self, String> {
+        match text {
+            "none" => Ok(Self::None),
+            _ => match text.parse() {
+                Ok(count) if count > 0 => Ok(Self::Some(count)),
+                _ => Err("give a whole number of frames, 1 or more, or \"none\"".into()),
+            },
+        }
+    }
+}
+
+pub(super) fn positive(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(value) if value > 0.0 && value.is_finite() => Ok(value),
+        _ => Err("give a number larger than 0".into()),
+    }
 }
 
 /// Runs the command.
@@ -25,5 +76,164 @@ pub struct SimulateArgs {
 /// # Errors
 /// A scene that does not load, or a folder that cannot be written.
 pub fn run(args: &SimulateArgs) -> miette::Result<ExitCode> {
-    Err(miette::miette!("simulating {} is not possible yet", args.scene))
+    let scene = load::load_with_warnings(&args.scene)?;
+    let model = load::build(&scene)?;
+    let out = args.out.as_deref().map(|out| folder::prepare(out, args.force)).transpose()?;
+    let plan = Plan::new(&scene, &model, args);
+    let mut rows = ProbeRows::new(&scene.probes, out.as_ref().map(|out| out.join(folder::PROBES)).as_deref())?;
+    let mut frames = match (&out, plan.frame_every) {
+        (Some(out), Some(_)) => Some(Frames::new(out, &model)?),
+        _ => None,
+    };
+    let mut run = Run::new(&scene, &model)?;
+    let started = Instant::now();
+    let ended_by = run.all(&plan, &mut rows, frames.as_mut())?;
+    rows.flush()?;
+    let ending = Ending {
+        command: "simulate",
+        by: ended_by,
+        simulated_s: run.state.time_s(&model),
+        wall_s: started.elapsed().as_secs_f64(),
+        frames: frames.as_ref().map_or(0, Frames::count),
+    };
+    let mut summary = Summary::new(&scene, &model, &run.state, &rows, &ending);
+    summary.time = Some(run.cost());
+    if let Some(out) = &out {
+        summary.write(out)?;
+    }
+    summary.print(args.json, out.as_deref())?;
+    if let Some(quarantine) = run.state.quarantine {
+        return Err(miette::miette!(
+            help = "the step may be unstable: leave `numerics.substeps` out, raise `stretch_allowance`, or press less hard",
+            "the state became non-finite in tick {} at node {}; the run stopped there",
+            quarantine.tick,
+            quarantine.node
+        ));
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+/// What to do at which tick.
+struct Plan {
+    ticks: u64,
+    sample_every: u64,
+    frame_every: Option<u64>,
+}
+
+impl Plan {
+    fn new(scene: &Scene, model: &Model, args: &SimulateArgs) -> Self {
+        let period_s = model.spec().settings.tick_period_s;
+        let in_ticks = |time_s: f64| ((time_s / period_s).round() as u64).max(1);
+        let ticks = in_ticks(args.duration_s.unwrap_or(scene.output.duration_s));
+        let frame_every = match args.frames {
+            Some(FrameCount::None) => None,
+            // The first frame shows the start, the last one at the earliest possible the end.
+            Some(FrameCount::Some(count)) => Some(ticks.div_ceil(u64::from(count.max(2)) - 1).max(1)),
+            None => Some(in_ticks(scene.output.frame_interval_s)),
+        };
+        Self { ticks, sample_every: in_ticks(scene.output.sample_interval_s), frame_every }
+    }
+}
+
+/// A running simulation with its buffers.
+pub(super) struct Run<'s> {
+    scene: &'s Scene,
+    model: &'s Model,
+    pub(super) state: State,
+    scratch: Scratch,
+    targets: Vec<ToolTarget>,
+    load_factors: Vec<f64>,
+    prescribed_m: Vec<DVec3>,
+    tick_wall_ns: Histogram<u64>,
+}
+
+impl<'s> Run<'s> {
+    pub(super) fn new(scene: &'s Scene, model: &'s Model) -> miette::Result<Self> {
+        const LONGEST_TICK_NS: u64 = 600_000_000_000;
+        Ok(Self {
+            scene,
+            model,
+            state: State::at_rest(model),
+            scratch: Scratch::new(model),
+            targets: vec![ToolTarget::default(); scene.model.tools.len()],
+            load_factors: vec![0.0; scene.model.loads.len()],
+            prescribed_m: vec![DVec3::ZERO; scene.model.prescribed.len()],
+            tick_wall_ns: Histogram::new_with_bounds(1, LONGEST_TICK_NS, 3).into_diagnostic()?,
+        })
+    }
+
+    /// Runs to the end of the plan, and says what ended it.
+    fn all(
+        &mut self,
+        plan: &Plan,
+        rows: &mut ProbeRows<'_>,
+        mut frames: Option<&mut Frames>,
+    ) -> miette::Result<&'static str> {
+        let interrupt = Interrupt::listen();
+        let mut bar = Progress::new(&self.scene.name);
+        let mut ended_by = "duration";
+        for tick in 0..=plan.ticks {
+            if tick > 0 {
+                self.tick();
+            }
+            let time_s = self.state.time_s(self.model);
+            let last = tick == plan.ticks || self.state.quarantine.is_some() || interrupt.is_set();
+            if tick % plan.sample_every == 0 || last {
+                rows.sample(time_s, self.model, &self.state, self.scratch.reactions_n())?;
+            }
+            if let (Some(frames), Some(every)) = (&mut frames, plan.frame_every)
+                && tick % every == 0
+            {
+                frames.write(time_s, self.model, &self.state)?;
+            }
+            if self.state.quarantine.is_some() {
+                ended_by = "quarantined";
+                break;
+            }
+            if interrupt.is_set() && tick < plan.ticks {
+                ended_by = "interrupted";
+                break;
+            }
+            bar.show(tick as f64 / plan.ticks as f64, "simulating");
+        }
+        bar.finish();
+        Ok(ended_by)
+    }
+
+    /// One tick: the inputs at its end, then the step, whose wall time is recorded.
+    pub(super) fn tick(&mut self) {
+        let time_s = (self.state.tick + 1) as f64 * self.model.spec().settings.tick_period_s;
+        for (tool, target) in self.targets.iter_mut().enumerate() {
+            *target = self.scene.offline_target(tool, time_s);
+        }
+        self.scene.timeline.fill(time_s, &mut self.load_factors, &mut self.prescribed_m);
+        let input = TickInput {
+            tools: &self.targets,
+            load_factors: &self.load_factors,
+            prescribed_displacements_m: &self.prescribed_m,
+            point_forces: &[],
+        };
+        let started = Instant::now();
+        step(self.model, &mut self.state, &mut self.scratch, &input);
+        self.tick_wall_ns.saturating_record(started.elapsed().as_nanos() as u64);
+    }
+
+    /// What the ticks cost.
+    pub(super) fn cost(&self) -> TimeNumbers {
+        let us = |ns: u64| ns as f64 * 1e-3;
+        let wall = &self.tick_wall_ns;
+        let period_s = self.model.spec().settings.tick_period_s;
+        TimeNumbers {
+            tick_period_s: period_s,
+            ticks: self.state.tick,
+            substeps_per_tick: self.model.substeps(),
+            tick_wall_us: Percentiles {
+                mean: wall.mean() * 1e-3,
+                p50: us(wall.value_at_quantile(0.5)),
+                p99: us(wall.value_at_quantile(0.99)),
+                max: us(wall.max()),
+            },
+            real_time_factor: if wall.is_empty() { 0.0 } else { period_s * 1e9 / wall.mean() },
+        }
+    }
 }

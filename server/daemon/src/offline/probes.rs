@@ -1,0 +1,88 @@
+//! Probes as rows: the CSV file, and the last row for the summary.
+use glam::DVec3;
+use miette::{IntoDiagnostic, WrapErr};
+use palpate_physics::{Model, State};
+use palpate_scene::{Probe, probes::MAX_COLUMNS};
+use std::{
+    fs::File,
+    io::{BufWriter, Write},
+    path::Path,
+};
+
+/// Evaluates all probes into one row, and writes it if there is a file.
+pub(super) struct ProbeRows<'s> {
+    probes: &'s [Probe],
+    row: Vec<f64>,
+    file: Option<BufWriter<File>>,
+    count: u64,
+}
+
+impl<'s> ProbeRows<'s> {
+    /// Without a path only the newest row is kept.
+    pub(super) fn new(probes: &'s [Probe], path: Option<&Path>) -> miette::Result<Self> {
+        let columns = probes.iter().map(|probe| probe.columns().len()).sum();
+        let file = match path {
+            Some(path) => Some(create(path, probes)?),
+            None => None,
+        };
+        Ok(Self { probes, row: vec![0.0; columns], file, count: 0 })
+    }
+
+    /// Evaluates at a state; `reactions_n` is the force (N) that holds each node.
+    pub(super) fn sample(
+        &mut self,
+        time_s: f64,
+        model: &Model,
+        state: &State,
+        reactions_n: &[DVec3],
+    ) -> miette::Result<()> {
+        let mut place = 0;
+        for probe in self.probes {
+            let mut values = [0.0; MAX_COLUMNS];
+            probe.evaluate_with(model, state, reactions_n, &mut values);
+            let columns = probe.columns().len();
+            self.row[place..place + columns].copy_from_slice(&values[..columns]);
+            place += columns;
+        }
+        self.count += 1;
+        let Some(file) = &mut self.file else { return Ok(()) };
+        // The shortest text that reads back to the same bits.
+        let cells: String = self.row.iter().map(|value| format!(",{value}")).collect();
+        writeln!(file, "{time_s}{cells}").into_diagnostic().wrap_err("cannot write probes.csv")
+    }
+
+    /// Rows so far.
+    pub(super) fn count(&self) -> u64 {
+        self.count
+    }
+
+    /// The newest value of every column: probe, column, value.
+    pub(super) fn newest(&self) -> impl Iterator<Item = (&Probe, &'static str, f64)> + '_ {
+        let columns = self.probes.iter().flat_map(|probe| probe.columns().iter().map(move |column| (probe, *column)));
+        columns.zip(&self.row).map(|((probe, column), value)| (probe, column, *value))
+    }
+
+    /// Writes what is buffered.
+    pub(super) fn flush(&mut self) -> miette::Result<()> {
+        self.file.as_mut().map_or(Ok(()), Write::flush).into_diagnostic().wrap_err("cannot write probes.csv")
+    }
+}
+
+fn create(path: &Path, probes: &[Probe]) -> miette::Result<BufWriter<File>> {
+    let refused = || format!("cannot write {}", path.display());
+    let mut file = BufWriter::new(File::create(path).into_diagnostic().wrap_err_with(refused)?);
+    let names: String = probes.iter().flat_map(heads).map(|head| format!(",{head}")).collect();
+    writeln!(file, "time_s{names}").into_diagnostic().wrap_err_with(refused)?;
+    Ok(file)
+}
+
+/// Headings of a probe's columns: name, column, unit.
+fn heads(probe: &Probe) -> Vec<String> {
+    let name = probe.name().replace([',', '"', '\n'], " ");
+    let unit = if probe.unit() == "1" { String::new() } else { format!("_{}", probe.unit().to_lowercase()) };
+    let head = |column: &&str| match *column {
+        "value" => format!("{name}{unit}"),
+        column => format!("{name}_{column}{unit}"),
+    };
+    probe.columns().iter().map(head).collect()
+}

@@ -1,0 +1,194 @@
+//! What a run did, as JSON for programs and as lines for people.
+use super::{folder, probes::ProbeRows};
+use miette::{IntoDiagnostic, WrapErr};
+use palpate_physics::{Energies, Model, State, health, snapshot};
+use palpate_scene::Scene;
+use serde::Serialize;
+use std::{collections::BTreeMap, path::Path};
+
+/// What every offline run reports.
+#[derive(Debug, Serialize)]
+pub(super) struct Summary {
+    pub(super) palpate_version: &'static str,
+    pub(super) command: &'static str,
+    pub(super) scene: String,
+    pub(super) body: BodyNumbers,
+    /// `duration`, `interrupted`, `quarantined` or `equilibrium`.
+    pub(super) ended_by: &'static str,
+    pub(super) simulated_s: f64,
+    pub(super) wall_s: f64,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) time: Option<TimeNumbers>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) solve: Option<SolveNumbers>,
+    pub(super) energies_j: EnergyNumbers,
+    /// Smallest deformed over rest volume of a tet; below 0: inverted.
+    pub(super) min_volume_ratio: f64,
+    /// Newest value of every probe: unit, and value by column.
+    pub(super) probes: BTreeMap<String, ProbeNumbers>,
+    pub(super) samples: u64,
+    pub(super) frames: usize,
+    /// Equal states have equal hashes on every machine.
+    pub(super) state_hash: String,
+    pub(super) warnings: Vec<String>,
+}
+
+#[derive(Debug, Serialize)]
+pub(super) struct BodyNumbers {
+    pub(super) origin: String,
+    pub(super) nodes: usize,
+    pub(super) tets: usize,
+    pub(super) volume_m3: f64,
+    pub(super) mass_kg: f64,
+}
+
+/// The cost of time integration.
+#[derive(Debug, Serialize)]
+pub(super) struct TimeNumbers {
+    pub(super) tick_period_s: f64,
+    pub(super) ticks: u64,
+    pub(super) substeps_per_tick: u32,
+    pub(super) tick_wall_us: Percentiles,
+    /// Simulated time over the wall time of its ticks.
+    pub(super) real_time_factor: f64,
+}
+
+#[derive(Debug, Clone, Copy, Serialize)]
+pub(super) struct Percentiles {
+    pub(super) mean: f64,
+    pub(super) p50: f64,
+    pub(super) p99: f64,
+    pub(super) max: f64,
+}
+
+/// The cost and quality of a static solve.
+#[derive(Debug, Serialize)]
+pub(super) struct SolveNumbers {
+    pub(super) iterations: u32,
+    pub(super) load_steps: u32,
+    pub(super) residual_n: f64,
+    pub(super) relative_residual: f64,
+    pub(super) stable: bool,
+    pub(super) inverted_tets: u32,
+}
+
+#[derive(Debug, Serialize)]
+pub(super) struct EnergyNumbers {
+    pub(super) kinetic: f64,
+    pub(super) elastic: f64,
+    pub(super) gravitational: f64,
+    pub(super) external_work: f64,
+    pub(super) dissipated: f64,
+    /// Held − work + dissipated: 0 but for the error of time integration.
+    pub(super) balance: f64,
+}
+
+#[derive(Debug, Serialize)]
+pub(super) struct ProbeNumbers {
+    pub(super) unit: &'static str,
+    pub(super) values: BTreeMap<&'static str, f64>,
+}
+
+/// How a run ended.
+pub(super) struct Ending {
+    pub(super) command: &'static str,
+    pub(super) by: &'static str,
+    pub(super) simulated_s: f64,
+    pub(super) wall_s: f64,
+    pub(super) frames: usize,
+}
+
+impl Summary {
+    pub(super) fn new(scene: &Scene, model: &Model, state: &State, rows: &ProbeRows<'_>, ending: &Ending) -> Self {
+        let energies = Energies::of(model, state);
+        let mut probes: BTreeMap<String, ProbeNumbers> = BTreeMap::new();
+        for (probe, column, value) in rows.newest() {
+            let new = || ProbeNumbers { unit: probe.unit(), values: BTreeMap::new() };
+            probes.entry(probe.name().to_owned()).or_insert_with(new).values.insert(column, value);
+        }
+        Self {
+            palpate_version: env!("CARGO_PKG_VERSION"),
+            command: ending.command,
+            scene: scene.name.clone(),
+            body: BodyNumbers {
+                origin: scene.summary.origin.clone(),
+                nodes: scene.summary.nodes,
+                tets: scene.summary.tets,
+                volume_m3: scene.summary.volume_m3,
+                mass_kg: scene.summary.mass_kg,
+            },
+            ended_by: ending.by,
+            simulated_s: ending.simulated_s,
+            wall_s: ending.wall_s,
+            time: None,
+            solve: None,
+            energies_j: EnergyNumbers {
+                kinetic: energies.kinetic_j,
+                elastic: energies.elastic_j,
+                gravitational: energies.gravitational_j,
+                external_work: energies.external_work_j,
+                dissipated: energies.dissipated_j,
+                balance: energies.balance_j(),
+            },
+            min_volume_ratio: health::min_volume_ratio(model, state).0,
+            probes,
+            samples: rows.count(),
+            frames: ending.frames,
+            state_hash: format!("{:016x}", snapshot::state_hash(state)),
+            warnings: scene.warnings.clone(),
+        }
+    }
+
+    /// Writes summary.json into a folder.
+    pub(super) fn write(&self, out: &Path) -> miette::Result<()> {
+        let path = out.join(folder::SUMMARY);
+        let text = serde_json::to_string_pretty(self).into_diagnostic()?;
+        std::fs::write(&path, text + "\n")
+            .into_diagnostic()
+            .wrap_err_with(|| format!("cannot write {}", path.display()))
+    }
+
+    /// Prints it: JSON when asked for, else lines for people.
+    pub(super) fn print(&self, json: bool, out: Option<&Path>) -> miette::Result<()> {
+        if json {
+            println!("{}", serde_json::to_string_pretty(self).into_diagnostic()?);
+            return Ok(());
+        }
+        println!("{}: {} tets, {} nodes, ended by {}", self.scene, self.body.tets, self.body.nodes, self.ended_by);
+        if let Some(time) = &self.time {
+            let us = time.tick_wall_us;
+            println!(
+                "  {:.3} s simulated in {:.3} s, {} ticks of {} substeps",
+                self.simulated_s, self.wall_s, time.ticks, time.substeps_per_tick
+            );
+            println!(
+                "  tick: p50 {:.1} us, p99 {:.1} us, max {:.1} us; {:.1} times real time",
+                us.p50, us.p99, us.max, time.real_time_factor
+            );
+        }
+        if let Some(solve) = &self.solve {
+            println!(
+                "  {} Newton iterations, residual {:.2e} N ({:.2e} of the forces), {}, in {:.3} s",
+                solve.iterations,
+                solve.residual_n,
+                solve.relative_residual,
+                if solve.stable { "stable" } else { "NOT stable" },
+                self.wall_s
+            );
+        }
+        for (name, probe) in &self.probes {
+            let values: Vec<String> =
+                probe.values.iter().map(|(column, value)| format!("{column} {value:.6e}")).collect();
+            println!("  {name} ({}): {}", probe.unit, values.join(", "));
+        }
+        println!(
+            "  smallest volume ratio {:.4}, energy balance {:.2e} J, state {}",
+            self.min_volume_ratio, self.energies_j.balance, self.state_hash
+        );
+        match out {
+            Some(out) => println!("  written to {}: {} rows, {} frames", out.display(), self.samples, self.frames),
+            None => println!("  nothing was saved; add --out DIR for probes.csv, frames and summary.json"),
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,204 @@
+//! `[body]`: shapes, mesh files and surface pairs become one kind of body with named parts.
+use super::{Files, exactly_one};
+use crate::{
+    document::{
+        body::{BodyTable, MeshTable, SurfacesTable},
+        source::{Fault, Where},
+    },
+    error::Stage,
+    files::{self, FileError, GroupedMesh, SurfaceFile, UnusedNodes},
+    fill::{self, FillOptions, SurfaceInput},
+    shapes::{self, BoundaryRegion, Shape, ShapeError},
+};
+use glam::DVec3;
+use palpate_physics::{MeshError, Surface, TetMesh};
+
+/// A body before regions, materials and loads.
+pub(crate) struct Body {
+    pub(crate) mesh: TetMesh,
+    pub(crate) surface: Surface,
+    pub(crate) parts: Vec<Part>,
+    pub(crate) origin: String,
+    pub(crate) report: Vec<String>,
+    pub(crate) warnings: Vec<String>,
+}
+
+/// A named part of a body.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Part {
+    pub(crate) name: String,
+    /// Number of the physical group, if it is one.
+    pub(crate) tag: Option<i64>,
+    pub(crate) nodes: Vec<u32>,
+    /// Node triples, in any order.
+    pub(crate) triangles: Vec<[u32; 3]>,
+    pub(crate) tets: Vec<u32>,
+}
+
+impl Body {
+    /// Diagonal of the bounding box (m).
+    pub(crate) fn diagonal_m(&self) -> f64 {
+        let (low, high) = self.mesh.bounds_m();
+        low.distance(high)
+    }
+
+    /// `from (…) to (…) mm`, for messages about regions that miss the body.
+    pub(crate) fn extent(&self) -> String {
+        let (low, high) = self.mesh.bounds_m();
+        let show = |p: DVec3| format!("({:.4}, {:.4}, {:.4})", p.x * 1e3, p.y * 1e3, p.z * 1e3);
+        format!("the body reaches from {} to {} mm", show(low), show(high))
+    }
+}
+
+/// Makes the body.
+pub(crate) fn make(table: &BodyTable, files: &Files<'_>, progress: &mut dyn FnMut(f64, &str)) -> Result<Body, Fault> {
+    let at = Where::root("body");
+    let kind = exactly_one(
+        &at,
+        &[
+            ("box", table.block.is_some()),
+            ("sphere_shell", table.sphere_shell.is_some()),
+            ("ellipsoid_shell", table.ellipsoid_shell.is_some()),
+            ("ventricle", table.ventricle.is_some()),
+            ("mesh", table.mesh.is_some()),
+            ("surfaces", table.surfaces.is_some()),
+        ],
+    )?;
+    let at = at.key(kind);
+    progress(0.05, "making the body");
+    let mut body = match table {
+        BodyTable { mesh: Some(mesh), .. } => from_file(mesh, files, &at)?,
+        BodyTable { surfaces: Some(surfaces), .. } => from_surfaces(surfaces, files, &at, progress)?,
+        _ => from_shape(table, kind, &at)?,
+    };
+    let offset = DVec3::from(table.offset_m);
+    if offset != DVec3::ZERO {
+        let moved = body.mesh.positions_m().iter().map(|p| *p + offset).collect();
+        body.mesh = TetMesh::new(moved, body.mesh.tets().to_vec()).map_err(|error| mesh_fault(&at, error))?;
+    }
+    Ok(body)
+}
+
+fn mesh_fault(at: &Where, error: MeshError) -> Fault {
+    Fault::value(at.clone(), error.to_string()).of(Stage::Body).cause(error)
+}
+
+fn from_shape(table: &BodyTable, kind: &str, at: &Where) -> Result<Body, Fault> {
+    let shape = if let Some(block) = &table.block {
+        shapes::box_mesh(DVec3::from(block.size_m), block.cells)
+    } else if let Some(shell) = &table.sphere_shell {
+        shapes::sphere_shell(shell.inner_radius_m, shell.outer_radius_m, shell.target_tets)
+    } else if let Some(shell) = &table.ellipsoid_shell {
+        let (inner, outer) = (DVec3::from(shell.inner_semi_axes_m), DVec3::from(shell.outer_semi_axes_m));
+        shapes::ellipsoid_shell(inner, outer, shell.target_tets)
+    } else if let Some(ventricle) = &table.ventricle {
+        let (outer, inner) = (ventricle.outer_semi_axes_m.into(), ventricle.inner_semi_axes_m.into());
+        shapes::ventricle(outer, inner, ventricle.cut_z_m, ventricle.target_tets)
+    } else {
+        return Err(Fault::value(at.clone(), "there is no such shape"));
+    };
+    let shape = shape.map_err(|error| shape_fault(at, error))?;
+    of_shape(shape, kind, at)
+}
+
+fn shape_fault(at: &Where, error: ShapeError) -> Fault {
+    Fault::value(at.clone(), format!("[{at}]: {error}")).of(Stage::Body).cause(error)
+}
+
+fn of_shape(shape: Shape, kind: &str, at: &Where) -> Result<Body, Fault> {
+    let surface = Surface::of(&shape.mesh).map_err(|error| mesh_fault(at, error))?;
+    let report = if shape.layers > 0 { vec![format!("{} layers through the wall", shape.layers)] } else { Vec::new() };
+    Ok(Body {
+        parts: boundary_parts(&shape.regions),
+        surface,
+        origin: format!("shape {kind}"),
+        report,
+        warnings: Vec::new(),
+        mesh: shape.mesh,
+    })
+}
+
+fn boundary_parts(regions: &[BoundaryRegion]) -> Vec<Part> {
+    let part = |region: &BoundaryRegion| Part {
+        name: region.name.to_owned(),
+        nodes: region.nodes(),
+        triangles: region.triangles.clone(),
+        ..Part::default()
+    };
+    regions.iter().map(part).collect()
+}
+
+fn file_fault(at: &Where, error: FileError) -> Fault {
+    Fault::value(at.clone(), error.to_string()).of(Stage::Body).help(error.problem.help()).cause(error)
+}
+
+/// Reads both surfaces and fills the wall between them.
+fn from_surfaces(
+    table: &SurfacesTable,
+    files: &Files<'_>,
+    at: &Where,
+    progress: &mut dyn FnMut(f64, &str),
+) -> Result<Body, Fault> {
+    let read = |key: &str, file: &str| -> Result<SurfaceFile, Fault> {
+        let at = at.key(key);
+        let path = files.resolve(&at, file)?;
+        files::read_surface(&path).map_err(|error| file_fault(&at, error))
+    };
+    let (inner, outer) = (read("inner_file", &table.inner_file)?, read("outer_file", &table.outer_file)?);
+    let options = FillOptions { layers: table.layers, ..FillOptions::new(table.target_tets) };
+    let mut part_of_load = |part: f64, what: &str| progress(0.1 + 0.65 * part, what);
+    let filled = fill::fill(
+        input(&inner, table.inner_unit.unwrap_or(table.unit).in_m()),
+        input(&outer, table.unit.in_m()),
+        options,
+        &mut part_of_load,
+    )
+    .map_err(|error| Fault::value(at.clone(), error.to_string()).of(Stage::Body).cause(error))?;
+    let surface = Surface::of(&filled.mesh).map_err(|error| mesh_fault(at, error))?;
+    let warnings = inner.warnings.iter().chain(&outer.warnings).chain(&filled.report.warnings).cloned().collect();
+    Ok(Body {
+        parts: boundary_parts(&filled.regions),
+        surface,
+        origin: format!("wall between {} and {}", table.inner_file, table.outer_file),
+        report: filled.report.to_string().lines().map(str::to_owned).collect(),
+        warnings,
+        mesh: filled.mesh,
+    })
+}
+
+fn input(file: &SurfaceFile, metres_per_unit: f64) -> SurfaceInput<'_> {
+    SurfaceInput { vertices: &file.vertices, triangles: &file.triangles, metres_per_unit }
+}
+
+fn from_file(table: &MeshTable, files: &Files<'_>, at: &Where) -> Result<Body, Fault> {
+    let at = at.key("file");
+    let path = files.resolve(&at, &table.file)?;
+    let refused = |error| file_fault(&at, error);
+    let volume = files::read_volume(&path).map_err(refused)?;
+    let grouped = volume.into_tet_mesh(table.unit.in_m(), UnusedNodes::Drop).map_err(refused)?;
+    let surface = Surface::of(&grouped.mesh).map_err(|error| mesh_fault(&at, error))?;
+    Ok(Body {
+        parts: groups(&grouped),
+        surface,
+        origin: format!("file {}", table.file),
+        report: Vec::new(),
+        warnings: grouped.warnings.clone(),
+        mesh: grouped.mesh,
+    })
+}
+
+/// The physical groups of a file; groups of one name are one part.
+fn groups(grouped: &GroupedMesh) -> Vec<Part> {
+    let mut parts: Vec<Part> = Vec::new();
+    for (index, group) in grouped.groups.iter().enumerate().filter(|(_, group)| !group.name.is_empty()) {
+        let position = parts.iter().position(|part| part.name == group.name).unwrap_or_else(|| {
+            let tets = grouped.tets_of(&group.name);
+            let nodes = grouped.nodes_of(&group.name);
+            parts.push(Part { name: group.name.clone(), tag: Some(group.tag), nodes, tets, triangles: Vec::new() });
+            parts.len() - 1
+        });
+        let own = grouped.surface_groups.iter().filter(|(of, _)| *of == index);
+        parts[position].triangles.extend(own.flat_map(|(_, triangles)| triangles));
+    }
+    parts
+}

@@ -1,0 +1,103 @@
+//! `[[material]]`: laws and constants, and which tets have them.
+use super::{body::Body, regions::Regions};
+use crate::document::{
+    ConventionName, LawName, MaterialTable,
+    source::{Fault, Where},
+};
+use palpate_physics::{
+    Region,
+    material::{Convention, Lame, Law, Material, ParameterError, Viscosity, parameters},
+};
+
+pub(crate) struct Materials {
+    pub(crate) regions: Vec<Region>,
+    pub(crate) tet_region: Vec<u16>,
+    pub(crate) warnings: Vec<String>,
+}
+
+/// Materials, the later ones over the earlier; a tet without one is an error.
+pub(crate) fn compile(tables: &[MaterialTable], regions: &Regions<'_>, body: &Body) -> Result<Materials, Fault> {
+    let mut found = Vec::new();
+    let mut owner: Vec<Option<u16>> = vec![None; body.mesh.tets().len()];
+    let mut warnings = Vec::new();
+    for (index, table) in tables.iter().enumerate() {
+        let at = Where::root("material").index(index);
+        let name = table.region.as_deref().unwrap_or("whole");
+        let number = u16::try_from(index).map_err(|_| Fault::value(at.clone(), "more than 65536 materials"))?;
+        for tet in regions.tets(name, &at.key("region"))? {
+            owner[tet as usize] = Some(number);
+        }
+        let region = material(table, name, &at)?;
+        warn_of_locking(&region, &mut warnings);
+        found.push(region);
+    }
+    let bare = owner.iter().filter(|tet| tet.is_none()).count();
+    if bare > 0 {
+        let message = format!("{bare} of {} tets have no material", owner.len());
+        return Err(Fault::value(Where::root("material"), message)
+            .help("put a [[material]] without `region` first; later ones override it in theirs"));
+    }
+    for (index, region) in found.iter().enumerate() {
+        if !owner.contains(&Some(index as u16)) {
+            warnings.push(format!("the material \"{}\" is overridden everywhere by later ones", region.name));
+        }
+    }
+    Ok(Materials { regions: found, tet_region: owner.into_iter().flatten().collect(), warnings })
+}
+
+fn material(table: &MaterialTable, region: &str, at: &Where) -> Result<Region, Fault> {
+    let refused = |error: ParameterError| parameter_fault(at, error);
+    let lame = lame(table, at)?;
+    let viscosity = Viscosity::new(table.viscosity_phi_pa_s, table.viscosity_psi_pa_s).map_err(refused)?;
+    let density_kg_per_m3 = parameters::checked_density(table.density_kg_per_m3).map_err(refused)?;
+    let law = match table.law {
+        LawName::Stvk => Law::StVenantKirchhoff,
+        LawName::StableNeoHookean => Law::StableNeoHookean,
+        LawName::FixedCorotated => Law::FixedCorotated,
+    };
+    let convention = match table.convention {
+        ConventionName::Consistent => Convention::Consistent,
+        ConventionName::Paper2006 => Convention::Paper2006,
+        ConventionName::Paper2005 => Convention::Paper2005,
+    };
+    let material = Material::new(law, lame, viscosity, convention);
+    Ok(Region { name: table.name.clone().unwrap_or_else(|| region.to_owned()), material, density_kg_per_m3 })
+}
+
+fn lame(table: &MaterialTable, at: &Where) -> Result<Lame, Fault> {
+    let MaterialTable { young_modulus_pa, poisson_ratio, lambda_pa, mu_pa, .. } = table;
+    match (young_modulus_pa, poisson_ratio, lambda_pa, mu_pa) {
+        (Some(e), Some(nu), None, None) => Lame::from_young_poisson(*e, *nu),
+        (None, None, Some(lambda), Some(mu)) => Lame::new(*lambda, *mu),
+        _ => {
+            let message =
+                "a material needs young_modulus_pa with poisson_ratio, or lambda_pa with mu_pa, and not both pairs";
+            return Err(Fault::value(at.clone(), message));
+        }
+    }
+    .map_err(|error| parameter_fault(at, error))
+}
+
+/// The error at the key it speaks of.
+fn parameter_fault(at: &Where, error: ParameterError) -> Fault {
+    let key = match &error {
+        ParameterError::YoungModulus(_) => "young_modulus_pa",
+        ParameterError::PoissonRatio(_) => "poisson_ratio",
+        ParameterError::Lame { .. } => "lambda_pa",
+        ParameterError::Density(_) => "density_kg_per_m3",
+        ParameterError::Viscosity { name, .. } => name,
+    };
+    Fault::value(at.key(key), error.to_string()).cause(error)
+}
+
+fn warn_of_locking(region: &Region, warnings: &mut Vec<String>) {
+    const LOCKING_POISSON_RATIO: f64 = 0.495;
+    let nu = region.material.lame.poisson_ratio();
+    if nu > LOCKING_POISSON_RATIO {
+        warnings.push(format!(
+            "the material \"{}\" has Poisson's ratio {nu:.4}: linear tets are far too stiff above {LOCKING_POISSON_RATIO}, \
+             and the tick needs many substeps",
+            region.name
+        ));
+    }
+}

@@ -1,0 +1,197 @@
+//! From the document to a [`Scene`]: every reference resolved, every value checked, every fault at its key.
+mod amplitude;
+mod body;
+mod csv;
+mod loads;
+mod material;
+mod probes;
+mod regions;
+mod tools;
+
+use crate::{
+    document::{
+        Document, NumericsTable, OutputTable, PrecisionName,
+        source::{Fault, Where},
+    },
+    scene::{BodySummary, OutputSettings, PartSummary, Scene},
+};
+use body::Body;
+use glam::DVec3;
+use palpate_physics::{ModelSpec, Precision, Settings, Substeps, mesh::quality, world::MAX_SUBSTEPS};
+use regions::Regions;
+use std::path::{Path, PathBuf};
+
+/// Where a scene's files are.
+pub(crate) struct Files<'a> {
+    /// The folder relative paths start at; `None`: no file may be read.
+    pub(crate) base_dir: Option<&'a Path>,
+}
+
+impl Files<'_> {
+    /// The path of a file named in a scene.
+    fn resolve(&self, at: &Where, file: &str) -> Result<PathBuf, Fault> {
+        match self.base_dir {
+            Some(base) => Ok(base.join(file)),
+            None => Err(Fault::value(
+                at.clone(),
+                format!("{at} refers to the file {file}, but this scene came without a folder"),
+            )
+            .help("send scenes that need no file, or load the scene by its path on the daemon's machine")),
+        }
+    }
+}
+
+/// Compiles a document.
+pub(crate) fn compile(
+    document: &Document,
+    files: &Files<'_>,
+    progress: &mut dyn FnMut(f64, &str),
+) -> Result<Scene, Fault> {
+    let settings = settings(document)?;
+    let output = output(&document.output)?;
+    let body = body::make(&document.body, files, progress)?;
+    progress(0.8, "selecting regions");
+    let regions = Regions::define(&document.region, &body)?;
+    let materials = material::compile(&document.material, &regions, &body)?;
+    let constraints = loads::constraints(document, &regions, files)?;
+    let loads = loads::loads(document, &regions, files)?;
+    progress(0.9, "placing tools and probes");
+    let tools = tools::compile(document, &body, files)?;
+    let mut warnings = body.warnings.clone();
+    warnings.extend(materials.warnings);
+    warnings.extend(tools.warnings);
+    let probes = probes::compile(&document.probe, &regions, &body, &tools.specs, &constraints, &mut warnings)?;
+    let summary = summary(&body, &regions, &materials.tet_region, &materials.regions);
+    warn_of_shape(&summary, &mut warnings);
+    progress(1.0, "done");
+    Ok(Scene {
+        name: document.scene.name.clone(),
+        description: document.scene.description.trim().to_owned(),
+        model: ModelSpec {
+            mesh: body.mesh,
+            regions: materials.regions,
+            tet_region: materials.tet_region,
+            prescribed: constraints.specs,
+            loads: loads.specs,
+            gravity_m_per_s2: DVec3::from(document.scene.gravity_m_per_s2),
+            tools: tools.specs,
+            settings,
+        },
+        timeline: crate::Timeline { loads: loads.amplitudes, prescribed: constraints.motions },
+        drivers: tools.drivers,
+        probes,
+        output,
+        arm: tools.arm,
+        warnings,
+        summary,
+    })
+}
+
+fn settings(document: &Document) -> Result<Settings, Fault> {
+    let at = Where::root("numerics");
+    let NumericsTable { precision, substeps, step_safety, stretch_allowance, mass_damping_per_s } = document.numerics;
+    let period = document.scene.tick_period_s;
+    check(&Where::root("scene").key("tick_period_s"), period, period > 0.0, "must be larger than 0")?;
+    check(&at.key("step_safety"), step_safety, step_safety > 0.0 && step_safety <= 1.0, "must be in (0, 1]")?;
+    check(&at.key("stretch_allowance"), stretch_allowance, stretch_allowance >= 1.0, "must be 1 or larger")?;
+    check(&at.key("mass_damping_per_s"), mass_damping_per_s, mass_damping_per_s >= 0.0, "must not be negative")?;
+    if let Some(n) = substeps {
+        check(
+            &at.key("substeps"),
+            n,
+            (1..=MAX_SUBSTEPS).contains(&n),
+            "must be 1 to 100000; leave it out to have it measured",
+        )?;
+    }
+    Ok(Settings {
+        tick_period_s: period,
+        substeps: substeps.map_or(Substeps::Measured, Substeps::Fixed),
+        step_safety,
+        stretch_allowance,
+        precision: match precision {
+            PrecisionName::Single => Precision::Single,
+            PrecisionName::Double => Precision::Double,
+        },
+        mass_damping_per_s,
+    })
+}
+
+fn output(table: &OutputTable) -> Result<OutputSettings, Fault> {
+    let at = Where::root("output");
+    let OutputTable { duration_s, sample_interval_s, frame_interval_s } = *table;
+    for (key, value) in
+        [("duration_s", duration_s), ("sample_interval_s", sample_interval_s), ("frame_interval_s", frame_interval_s)]
+    {
+        check(&at.key(key), value, value > 0.0, "must be larger than 0")?;
+    }
+    Ok(OutputSettings { duration_s, sample_interval_s, frame_interval_s })
+}
+
+/// Refuses a value with its rule.
+fn check(at: &Where, value: impl std::fmt::Display, ok: bool, rule: &str) -> Result<(), Fault> {
+    if ok { Ok(()) } else { Err(Fault::value(at.clone(), format!("{at} = {value}: {rule}"))) }
+}
+
+/// The one given of several keys.
+fn exactly_one<'k>(at: &Where, given: &[(&'k str, bool)]) -> Result<&'k str, Fault> {
+    let present: Vec<&str> = given.iter().filter(|(_, present)| *present).map(|(key, _)| *key).collect();
+    let known = given.iter().map(|(key, _)| format!("`{key}`")).collect::<Vec<_>>().join(", ");
+    match present.as_slice() {
+        [one] => Ok(one),
+        [] => Err(Fault::value(at.clone(), format!("[{at}] gives nothing; it needs exactly one of {known}"))),
+        [_, second, ..] => {
+            let all = present.iter().map(|key| format!("`{key}`")).collect::<Vec<_>>().join(" and ");
+            Err(Fault::value(at.key(second), format!("[{at}] gives {all}; it needs exactly one of {known}")))
+        }
+    }
+}
+
+/// Refuses two elements of one name.
+fn unique_names<'n>(table: &str, names: impl Iterator<Item = &'n str>) -> Result<(), Fault> {
+    let mut seen: Vec<&str> = Vec::new();
+    for (index, name) in names.enumerate() {
+        let at = Where::root(table).index(index).key("name");
+        if name.trim().is_empty() {
+            return Err(Fault::value(at, format!("[[{table}]] {index} has an empty name")));
+        }
+        if seen.contains(&name) {
+            return Err(Fault::value(at, format!("there are two [[{table}]] named \"{name}\"")).help("rename one"));
+        }
+        seen.push(name);
+    }
+    Ok(())
+}
+
+fn summary(
+    body: &Body,
+    regions: &Regions<'_>,
+    tet_region: &[u16],
+    materials: &[palpate_physics::Region],
+) -> BodySummary {
+    let mesh = &body.mesh;
+    let mass_of = |(tet, region): (usize, &u16)| mesh.volume_m3(tet) * materials[*region as usize].density_kg_per_m3;
+    BodySummary {
+        origin: body.origin.clone(),
+        nodes: mesh.positions_m().len(),
+        tets: mesh.tets().len(),
+        surface_triangles: body.surface.triangles.len(),
+        volume_m3: mesh.total_volume_m3(),
+        mass_kg: tet_region.iter().enumerate().map(mass_of).sum(),
+        quality: quality::measure(mesh),
+        fill_report: body.report.clone(),
+        parts: regions
+            .summaries()
+            .map(|(name, [nodes, triangles, tets])| PartSummary { name, nodes, triangles, tets })
+            .collect(),
+    }
+}
+
+fn warn_of_shape(summary: &BodySummary, warnings: &mut Vec<String>) {
+    const THIN_DIHEDRAL_DEG: f64 = 5.0;
+    let worst = summary.quality.min_dihedral_deg;
+    if worst < THIN_DIHEDRAL_DEG {
+        warnings.push(format!(
+            "the smallest dihedral angle is {worst:.1}°: such slivers cost substeps and accuracy; improve the mesh"
+        ));
+    }
+}

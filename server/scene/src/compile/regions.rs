@@ -1,0 +1,276 @@
+//! Regions: which nodes, surface triangles and tets a selector chooses.
+use super::{body::Body, unique_names};
+use crate::{
+    document::{
+        region::{NearestSelector, PlaneTable, RegionTable, Selector},
+        source::{Fault, Where, did_you_mean},
+    },
+    probes::MaterialPoint,
+};
+use glam::DVec3;
+use std::collections::HashSet;
+
+/// Chosen nodes, surface triangles and tets.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Selection {
+    nodes: Vec<bool>,
+    triangles: Vec<bool>,
+    tets: Vec<bool>,
+}
+
+impl Selection {
+    fn all(body: &Body, value: bool) -> Self {
+        Self {
+            nodes: vec![value; body.mesh.positions_m().len()],
+            triangles: vec![value; body.surface.triangles.len()],
+            tets: vec![value; body.mesh.tets().len()],
+        }
+    }
+
+    fn combine(mut self, other: &Self, rule: impl Fn(bool, bool) -> bool) -> Self {
+        for (mine, theirs) in
+            [(&mut self.nodes, &other.nodes), (&mut self.triangles, &other.triangles), (&mut self.tets, &other.tets)]
+        {
+            mine.iter_mut().zip(theirs).for_each(|(a, b)| *a = rule(*a, *b));
+        }
+        self
+    }
+
+    fn counts(&self) -> [usize; 3] {
+        [&self.nodes, &self.triangles, &self.tets].map(|flags| flags.iter().filter(|&&flag| flag).count())
+    }
+}
+
+fn chosen(flags: &[bool]) -> Vec<u32> {
+    flags.iter().enumerate().filter(|(_, flag)| **flag).map(|(index, _)| index as u32).collect()
+}
+
+/// All named regions of a scene.
+pub(crate) struct Regions<'b> {
+    body: &'b Body,
+    named: Vec<(String, Selection)>,
+}
+
+impl<'b> Regions<'b> {
+    /// The predefined regions, then the scene's in order; a region may refer to those before it.
+    pub(crate) fn define(tables: &[RegionTable], body: &'b Body) -> Result<Self, Fault> {
+        unique_names("region", tables.iter().map(|table| table.name.as_str()))?;
+        let mut regions = Self { body, named: vec![("whole".into(), Selection::all(body, true))] };
+        regions.named.push(("surface".into(), regions.surface()));
+        for part in &body.parts {
+            let selection = regions.part(&part.nodes, &part.triangles, &part.tets);
+            regions.named.push((part.name.clone(), selection));
+        }
+        let predefined = regions.named.len();
+        for (index, table) in tables.iter().enumerate() {
+            let at = Where::root("region").index(index);
+            if regions.named[..predefined].iter().any(|(name, _)| *name == table.name) {
+                let message = format!("the region \"{}\" exists already: it is a part of the body", table.name);
+                return Err(Fault::value(at.key("name"), message).help("give your region another name"));
+            }
+            let selection = regions.select(&table.select, &at.key("select"))?;
+            if selection.counts() == [0; 3] {
+                let message =
+                    format!("the region \"{}\" selects nothing: no node, surface triangle or tet", table.name);
+                return Err(Fault::value(at.key("select"), message).help(body.extent()));
+            }
+            regions.named.push((table.name.clone(), selection));
+        }
+        Ok(regions)
+    }
+
+    /// Counts of every region: nodes, surface triangles, tets.
+    pub(crate) fn summaries(&self) -> impl Iterator<Item = (String, [usize; 3])> + '_ {
+        self.named.iter().map(|(name, selection)| (name.clone(), selection.counts()))
+    }
+
+    /// Nodes of a region; none is an error.
+    pub(crate) fn nodes(&self, name: &str, at: &Where) -> Result<Vec<u32>, Fault> {
+        let selection = self.named(name, at)?;
+        self.some(name, at, "nodes", &selection.nodes, selection)
+    }
+
+    /// Surface triangles of a region; none is an error.
+    pub(crate) fn triangles(&self, name: &str, at: &Where) -> Result<Vec<u32>, Fault> {
+        let selection = self.named(name, at)?;
+        self.some(name, at, "surface triangles", &selection.triangles, selection)
+    }
+
+    /// Tets of a region; none is an error.
+    pub(crate) fn tets(&self, name: &str, at: &Where) -> Result<Vec<u32>, Fault> {
+        let selection = self.named(name, at)?;
+        self.some(name, at, "tets", &selection.tets, selection)
+    }
+
+    fn some(&self, name: &str, at: &Where, what: &str, flags: &[bool], of: &Selection) -> Result<Vec<u32>, Fault> {
+        let found = chosen(flags);
+        if !found.is_empty() {
+            return Ok(found);
+        }
+        let [nodes, triangles, tets] = of.counts();
+        let message = format!(
+            "the region \"{name}\" selects no {what} (it has {nodes} nodes, {triangles} surface triangles and {tets} tets)"
+        );
+        Err(Fault::value(at.clone(), message).help(self.body.extent()))
+    }
+
+    fn named(&self, name: &str, at: &Where) -> Result<&Selection, Fault> {
+        self.named.iter().find(|(known, _)| known == name).map(|(_, selection)| selection).ok_or_else(|| {
+            let known: Vec<&str> = self.named.iter().map(|(known, _)| known.as_str()).collect();
+            Fault::value(at.clone(), format!("there is no region \"{name}\"")).help(did_you_mean(name, &known))
+        })
+    }
+
+    fn select(&self, selector: &Selector, at: &Where) -> Result<Selection, Fault> {
+        let mut parts = Vec::new();
+        if let Some(name) = &selector.region {
+            parts.push(self.named(name, &at.key("region"))?.clone());
+        }
+        if let Some(group) = &selector.physical_group {
+            parts.push(self.physical_group(group, &at.key("physical_group"))?);
+        }
+        if let Some(plane) = &selector.plane {
+            parts.push(self.near_plane(plane, &at.key("plane"))?);
+        }
+        if let Some(plane) = &selector.half_space {
+            let (side, tolerance) = self.side(plane, &at.key("half_space"))?;
+            parts.push(self.where_point(|p| side(p) >= -tolerance));
+        }
+        if let Some(block) = &selector.block {
+            let (low, high) = (DVec3::from(block.min_m), DVec3::from(block.max_m));
+            if !low.cmple(high).all() {
+                return Err(Fault::value(at.key("box").key("min_m"), "min_m is not below max_m on every axis"));
+            }
+            parts.push(self.where_point(|p| p.cmpge(low).all() && p.cmple(high).all()));
+        }
+        if let Some(sphere) = &selector.sphere {
+            let (centre, radius) = (DVec3::from(sphere.centre_m), sphere.radius_m);
+            super::check(&at.key("sphere").key("radius_m"), radius, radius > 0.0, "must be larger than 0")?;
+            parts.push(self.where_point(|p| p.distance(centre) <= radius));
+        }
+        if let Some(nearest) = &selector.nearest {
+            super::check(&at.key("nearest").key("count"), nearest.count, nearest.count > 0, "must be 1 or larger")?;
+            parts.push(self.nearest(nearest));
+        }
+        self.nested(selector, at, &mut parts)?;
+        parts.into_iter().reduce(|all, one| all.combine(&one, |a, b| a && b)).ok_or_else(|| {
+            Fault::value(at.clone(), "the selector is empty").help("to select everything write `region = \"whole\"`")
+        })
+    }
+
+    fn nested(&self, selector: &Selector, at: &Where, parts: &mut Vec<Selection>) -> Result<(), Fault> {
+        let every = |selectors: &[Selector], key: &str| -> Result<Vec<Selection>, Fault> {
+            let one = |(index, selector): (usize, &Selector)| self.select(selector, &at.key(key).index(index));
+            selectors.iter().enumerate().map(one).collect()
+        };
+        if let Some(selectors) = &selector.all_of {
+            parts.extend(every(selectors, "all_of")?);
+        }
+        if let Some(selectors) = &selector.any_of {
+            let none = Selection::all(self.body, false);
+            parts.push(every(selectors, "any_of")?.iter().fold(none, |any, one| any.combine(one, |a, b| a || b)));
+        }
+        if let Some(selector) = &selector.not {
+            let inside = self.select(selector, &at.key("not"))?;
+            parts.push(Selection::all(self.body, true).combine(&inside, |_, inside| !inside));
+        }
+        Ok(())
+    }
+
+    fn triangle_nodes(&self) -> impl Iterator<Item = [u32; 3]> + '_ {
+        (0..self.body.surface.triangles.len()).map(|triangle| self.body.surface.triangle_nodes(triangle))
+    }
+
+    /// Tets that touch the surface count as being on it in no way: it has nodes and triangles only.
+    fn surface(&self) -> Selection {
+        let mut selection = Selection::all(self.body, false);
+        selection.triangles.fill(true);
+        self.body.surface.nodes.iter().for_each(|&node| selection.nodes[node as usize] = true);
+        selection
+    }
+
+    fn part(&self, nodes: &[u32], triangles: &[[u32; 3]], tets: &[u32]) -> Selection {
+        let mut selection = Selection::all(self.body, false);
+        nodes.iter().for_each(|&node| selection.nodes[node as usize] = true);
+        tets.iter().for_each(|&tet| selection.tets[tet as usize] = true);
+        let sorted = |mut face: [u32; 3]| {
+            face.sort_unstable();
+            face
+        };
+        let faces: HashSet<[u32; 3]> = triangles.iter().copied().map(sorted).collect();
+        for (triangle, corners) in self.triangle_nodes().enumerate() {
+            // A group of tets owns the surface triangles whose corners are all in it.
+            let in_volume = !tets.is_empty() && corners.iter().all(|&node| selection.nodes[node as usize]);
+            selection.triangles[triangle] = in_volume || faces.contains(&sorted(corners));
+        }
+        selection
+    }
+
+    fn physical_group(&self, group: &str, at: &Where) -> Result<Selection, Fault> {
+        let groups = || self.body.parts.iter().filter(|part| part.tag.is_some());
+        let number: Option<i64> = group.parse().ok();
+        let found = groups().find(|part| part.name == group || (number.is_some() && part.tag == number));
+        if let Some(part) = found {
+            return Ok(self.part(&part.nodes, &part.triangles, &part.tets));
+        }
+        let known: Vec<&str> = groups().map(|part| part.name.as_str()).collect();
+        let help =
+            if known.is_empty() { "the mesh has no physical groups".into() } else { did_you_mean(group, &known) };
+        Err(Fault::value(at.clone(), format!("there is no physical group \"{group}\"")).help(help))
+    }
+
+    /// Nodes by position, surface triangles by all three corners, tets by their centroid.
+    fn where_point(&self, inside: impl Fn(DVec3) -> bool) -> Selection {
+        let positions = self.body.mesh.positions_m();
+        let nodes: Vec<bool> = positions.iter().map(|&p| inside(p)).collect();
+        let triangles = self.triangle_nodes().map(|corners| corners.iter().all(|&node| nodes[node as usize])).collect();
+        let centroid = |tet| self.body.mesh.corners_m(tet).iter().sum::<DVec3>() / 4.0;
+        let tets = (0..self.body.mesh.tets().len()).map(|tet| inside(centroid(tet))).collect();
+        Selection { nodes, triangles, tets }
+    }
+
+    /// Signed distance (m) from a plane, and its tolerance (m).
+    fn side(&self, plane: &PlaneTable, at: &Where) -> Result<(impl Fn(DVec3) -> f64 + use<>, f64), Fault> {
+        const DEFAULT_TOLERANCE: f64 = 1e-6;
+        let tolerance = plane.tolerance_m.unwrap_or(DEFAULT_TOLERANCE * self.body.diagonal_m());
+        super::check(&at.key("tolerance_m"), tolerance, tolerance >= 0.0, "must not be negative")?;
+        let normal = DVec3::from(plane.normal).try_normalize();
+        let normal = normal.ok_or_else(|| Fault::value(at.key("normal"), "the normal has no length"))?;
+        let point = DVec3::from(plane.point_m);
+        Ok((move |p: DVec3| (p - point).dot(normal), tolerance))
+    }
+
+    fn near_plane(&self, plane: &PlaneTable, at: &Where) -> Result<Selection, Fault> {
+        let (side, tolerance) = self.side(plane, at)?;
+        Ok(self.where_point(|p| side(p).abs() <= tolerance))
+    }
+
+    fn nearest(&self, nearest: &NearestSelector) -> Selection {
+        let mesh = &self.body.mesh;
+        let point = DVec3::from(nearest.point_m);
+        let mut selection = Selection::all(self.body, false);
+        let distance = |node: &u32| mesh.positions_m()[*node as usize].distance(point);
+        let all: Vec<u32> = (0..mesh.positions_m().len() as u32).collect();
+        let nodes = if nearest.on_surface { &self.body.surface.nodes } else { &all };
+        mark(&mut selection.nodes, nodes, nearest.count, distance);
+        let faces: Vec<[u32; 3]> = self.triangle_nodes().collect();
+        let triangles: Vec<u32> = (0..faces.len() as u32).collect();
+        mark(&mut selection.triangles, &triangles, nearest.count, |&triangle| {
+            MaterialPoint::on_triangle(mesh, faces[triangle as usize], point).distance_m
+        });
+        let tets: Vec<u32> = (0..mesh.tets().len() as u32).collect();
+        mark(&mut selection.tets, &tets, nearest.count, |&tet| {
+            (mesh.corners_m(tet as usize).iter().sum::<DVec3>() / 4.0).distance(point)
+        });
+        selection
+    }
+}
+
+/// Marks the `count` candidates with the smallest distance; of equals the first.
+fn mark(flags: &mut [bool], candidates: &[u32], count: u32, distance: impl Fn(&u32) -> f64) {
+    let mut ordered: Vec<(f64, u32)> = candidates.iter().map(|candidate| (distance(candidate), *candidate)).collect();
+    ordered.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+    for (_, index) in ordered.into_iter().take(count as usize) {
+        flags[index as usize] = true;
+    }
+}

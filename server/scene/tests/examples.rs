@@ -1,0 +1,58 @@
+//! Every scene we ship loads, builds, and says what its comments claim.
+use palpate_physics::Model;
+use palpate_scene::{Scene, builtin, builtin_names, load_file};
+use std::path::PathBuf;
+
+fn folder() -> PathBuf {
+    PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../deploy/scenes")
+}
+
+fn examples() -> Vec<PathBuf> {
+    let entries = std::fs::read_dir(folder()).unwrap().map(|entry| entry.unwrap().path());
+    let mut scenes: Vec<PathBuf> = entries.filter(|path| path.extension().is_some_and(|e| e == "toml")).collect();
+    scenes.sort();
+    assert!(scenes.len() >= 6, "{scenes:?}");
+    scenes
+}
+
+fn load(path: &std::path::Path) -> Scene {
+    load_file(path, &mut |_, _| {}).unwrap_or_else(|error| panic!("{}", error.one_line()))
+}
+
+#[test]
+fn every_example_loads_without_warnings_and_builds() {
+    for path in examples() {
+        let scene = load(&path);
+        assert_eq!(scene.warnings, Vec::<String>::new(), "{}", path.display());
+        assert_eq!(scene.name, path.file_stem().unwrap().to_str().unwrap());
+        let model = Model::build(scene.model.clone()).unwrap_or_else(|error| panic!("{}: {error}", path.display()));
+        assert!(model.substeps() <= 100, "{}: {} substeps", path.display(), model.substeps());
+        assert_eq!(scene.timeline.loads.len(), model.spec().loads.len());
+        assert_eq!(scene.timeline.prescribed.len(), model.spec().prescribed.len());
+        assert_eq!(scene.drivers.len(), model.spec().tools.len());
+    }
+}
+
+#[test]
+fn built_in_scenes_are_the_shipped_files_and_need_no_other() {
+    assert_eq!(builtin_names().first(), Some(&"ventricle"));
+    for name in builtin_names() {
+        let text = builtin(name).unwrap();
+        let scene = palpate_scene::parse(text, name, None, &mut |_, _| {}).unwrap();
+        assert_eq!(scene.name, *name);
+    }
+    assert!(builtin("nothing").is_none());
+}
+
+#[test]
+fn the_default_scene_is_pressed_by_the_simulated_arm_once_a_second() {
+    let scene = load(&folder().join("ventricle.toml"));
+    let arm = scene.arm.as_ref().unwrap();
+    assert_eq!(arm.path.duration_s(), 1.0);
+    assert_eq!(scene.model.tools[arm.tool].name, arm.tool_name);
+    let outer = scene.summary.parts.iter().find(|part| part.name == "outer").unwrap();
+    assert!(outer.triangles > 100 && outer.tets == 0);
+    // Offline the hand stands in for the arm, and comes round.
+    let (a, b) = (scene.offline_target(0, 0.25), scene.offline_target(0, 1.25));
+    assert!((a.position_m - b.position_m).length() < 1e-12 && a.velocity_m_per_s.x < 0.0);
+}
