@@ -96,7 +96,8 @@ fn print_time(model: &Model, cost: &TimeNumbers) {
         cost.substeps_per_tick
     );
     let us = cost.tick_wall_us;
-    println!("           a tick costs {:.1} us here (p99 {:.1} us over {} ticks)", us.p50, us.p99, cost.ticks);
+    let build = if cfg!(debug_assertions) { ", in an UNOPTIMISED build" } else { "" };
+    println!("           a tick costs {:.1} us here (p99 {:.1} us over {} ticks{build})", us.p50, us.p99, cost.ticks);
     let verdict = if us.p99 < period_us { "fits" } else { "does NOT fit: coarsen the mesh or lengthen tick_period_s" };
     println!("           {:.1} % of the tick: {verdict}", 100.0 * us.p50 / period_us);
 }
