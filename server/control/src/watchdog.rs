@@ -111,7 +111,7 @@ impl Watchdog {
         self.settings
     }
 
-    /// How often a fault was latched.
+    /// How often a fault was latched; a stop that was asked for is none.
     pub fn faults(&self) -> u64 {
         self.faults
     }
@@ -174,7 +174,7 @@ impl Watchdog {
         }
         self.latched = Some(fault);
         self.tripped = None;
-        self.faults += 1;
+        self.faults += u64::from(fault != Fault::Requested);
         Link::Latched(fault)
     }
 }
@@ -271,7 +271,7 @@ mod tests {
             watchdog.check(last + tick * MS);
         }
         let verdict = watchdog.check(last + 15 * MS);
-        assert_eq!((verdict.link, verdict.ramp), (Link::Latched(Fault::Requested), 0.0));
+        assert_eq!((verdict.link, verdict.ramp, watchdog.faults()), (Link::Latched(Fault::Requested), 0.0, 0));
     }
 
     #[test]

@@ -1,9 +1,11 @@
 //! Wakes an async task from a real-time thread: one `eventfd`, one system call, no lock.
 //!
-//! A tokio task wraps it in `AsyncFd`, waits until it is readable, calls [`Doorbell::answer`] and looks into its slot.
+//! A tokio task takes [`Doorbell::try_clone_fd`] as a `tokio::net::unix::pipe::Receiver` (`from_owned_fd_unchecked`; eight bytes
+//! are read from it as from a pipe), waits until it is readable, reads, and looks into its slot. A thread polls the
+//! descriptor and calls [`Doorbell::answer`].
 use rustix::{
     event::{EventfdFlags, eventfd},
-    fd::{AsFd, AsRawFd, BorrowedFd, OwnedFd, RawFd},
+    fd::{AsFd, BorrowedFd, OwnedFd},
     io::{read, write},
 };
 use std::{io, sync::Arc};
@@ -28,6 +30,14 @@ impl Doorbell {
         let _ = write(&*self.fd, &1_u64.to_ne_bytes());
     }
 
+    /// Another descriptor of the same bell, for a runtime that wants to own one. Not blocking.
+    ///
+    /// # Errors
+    /// When the process has too many open files.
+    pub fn try_clone_fd(&self) -> io::Result<OwnedFd> {
+        self.fd.try_clone()
+    }
+
     /// Silences it; how often it rang since the last answer.
     pub fn answer(&self) -> u64 {
         let mut rings = [0; 8];
@@ -41,12 +51,6 @@ impl Doorbell {
 impl AsFd for Doorbell {
     fn as_fd(&self) -> BorrowedFd<'_> {
         self.fd.as_fd()
-    }
-}
-
-impl AsRawFd for Doorbell {
-    fn as_raw_fd(&self) -> RawFd {
-        self.fd.as_raw_fd()
     }
 }
 
@@ -68,6 +72,11 @@ mod tests {
         bell.ring();
         bell.clone().ring();
         assert!(readable(&bell));
+        let mut rings = [0; 8];
+        read(bell.try_clone_fd().unwrap(), &mut rings).unwrap();
+        assert_eq!(u64::from_ne_bytes(rings), 2);
+        bell.clone().ring();
+        bell.ring();
         assert_eq!(bell.answer(), 2);
         assert!(!readable(&bell));
     }

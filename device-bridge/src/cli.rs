@@ -1,0 +1,180 @@
+//! The command line.
+use crate::{BridgeError, Config, Handle, config::DeviceConfig, run::run_with};
+use clap::{Parser, ValueEnum};
+use std::{io::IsTerminal, path::PathBuf, process::ExitCode};
+use tokio::signal::unix::{SignalKind, signal};
+use tokio_util::sync::CancellationToken;
+use tracing_subscriber::EnvFilter;
+
+const EXAMPLES: &str = "\
+Examples:
+  palpate-bridge                                   the simulated arm, on a daemon on this machine
+  palpate-bridge --config bridge.toml              your arm, limits and hand path (deploy/bridge.toml is an example)
+  palpate-bridge --server https://lab:7411 --tls-ca ca.pem
+  palpate-bridge --server unix:///run/palpate/palpate.sock --tool left
+  palpate-bridge --print-config > bridge.toml      every key with its default
+
+Signals: SIGTERM or Ctrl-C ramps the force to zero, ends the stream and exits with 0; SIGUSR1 recovers from a latched fault.
+RUST_LOG=debug says more.";
+
+/// Connects a haptic arm to a Palpate daemon.
+///
+/// A servo loop beside the arm renders the newest contact model at 1 kHz, limits the force, and ramps it to zero when the
+/// daemon falls silent; the stream to the daemon reconnects by itself.
+#[derive(Debug, Parser)]
+#[command(name = "palpate-bridge", version, after_help = EXAMPLES)]
+pub struct Cli {
+    /// Configuration file (TOML); flags win over it
+    #[arg(long, value_name = "FILE", env = "PALPATE_BRIDGE_CONFIG")]
+    config: Option<PathBuf>,
+    /// The daemon: http://HOST:PORT, https://HOST:PORT or unix:///path/to/socket [default: http://127.0.0.1:7411]
+    #[arg(long, value_name = "ADDRESS", env = "PALPATE_SERVER")]
+    server: Option<String>,
+    /// Certificate authority to trust for https:// (PEM file)
+    #[arg(long, value_name = "FILE")]
+    tls_ca: Option<PathBuf>,
+    /// Tool of the scene to drive [default: the first that waits for a device]
+    #[arg(long, value_name = "NAME")]
+    tool: Option<String>,
+    /// Name of this arm in the daemon's status
+    #[arg(long, value_name = "NAME")]
+    name: Option<String>,
+    /// The arm
+    #[arg(long, value_enum)]
+    device: Option<DeviceKind>,
+    /// Largest force on the arm (N)
+    #[arg(long, value_name = "N")]
+    max_force: Option<f64>,
+    /// Let the force come back by itself after a latched fault
+    #[arg(long)]
+    auto_recover: bool,
+    /// Stop with an error when no daemon answers for so long (s) [default: wait for ever]
+    #[arg(long, value_name = "S")]
+    give_up_after: Option<f64>,
+    /// Pause between lines of counters (s), 0: only at exit
+    #[arg(long, value_name = "S")]
+    report_every: Option<f64>,
+    /// Print the configuration that would be used, and stop
+    #[arg(long)]
+    print_config: bool,
+}
+
+/// Kinds of arms.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum DeviceKind {
+    /// No hardware: a mass held by a hand that follows a path
+    Simulated,
+}
+
+impl Cli {
+    /// Runs the bridge until it is told to stop.
+    ///
+    /// # Errors
+    /// What stops it.
+    pub fn run(self) -> Result<ExitCode, BridgeError> {
+        let config = self.config()?;
+        if self.print_config {
+            print!("{}", printed(&config)?);
+            return Ok(ExitCode::SUCCESS);
+        }
+        let filter = EnvFilter::try_from_default_env().unwrap_or_else(|_| EnvFilter::new("info"));
+        tracing_subscriber::fmt()
+            .with_env_filter(filter)
+            .with_writer(std::io::stderr)
+            .with_ansi(std::io::stderr().is_terminal())
+            .with_target(false)
+            .init();
+        // One thread: the stream's reader, writer and transport wake each other without crossing processors.
+        let runtime = tokio::runtime::Builder::new_current_thread()
+            .enable_all()
+            .build()
+            .map_err(|source| BridgeError::System { what: "start the runtime", source })?;
+        runtime.block_on(async {
+            let (shutdown, handle) = (CancellationToken::new(), Handle::new());
+            obey_signals(shutdown.clone(), handle.clone())?;
+            let summary = run_with(&config, shutdown, handle).await?;
+            println!("{summary}");
+            Ok(ExitCode::SUCCESS)
+        })
+    }
+
+    /// The file, then the flags.
+    fn config(&self) -> Result<Config, BridgeError> {
+        let mut config = self.config.as_deref().map_or_else(|| Ok(Config::default()), Config::read)?;
+        let server = &mut config.server;
+        replace(&mut server.url, self.server.clone());
+        replace(&mut server.tool, self.tool.clone());
+        replace(&mut server.device_name, self.name.clone());
+        server.tls_ca = self.tls_ca.clone().or(server.tls_ca.take());
+        server.give_up_after_s = self.give_up_after.or(server.give_up_after_s);
+        replace(&mut config.servo.report_every_s, self.report_every);
+        replace(&mut config.limits.max_force_n, self.max_force);
+        config.servo.auto_recover |= self.auto_recover;
+        match (self.device, &config.device) {
+            (None, _) | (Some(DeviceKind::Simulated), DeviceConfig::Simulated(_)) => {}
+        }
+        Ok(config)
+    }
+}
+
+fn replace<T>(value: &mut T, with: Option<T>) {
+    if let Some(with) = with {
+        *value = with;
+    }
+}
+
+fn printed(config: &Config) -> Result<String, BridgeError> {
+    toml::to_string(config)
+        .map_err(|error| BridgeError::Value { key: "configuration".to_owned(), reason: error.to_string() })
+}
+
+fn obey_signals(shutdown: CancellationToken, handle: Handle) -> Result<(), BridgeError> {
+    let listen = |kind| signal(kind).map_err(|source| BridgeError::System { what: "listen for signals", source });
+    let mut terminate = listen(SignalKind::terminate())?;
+    let mut interrupt = listen(SignalKind::interrupt())?;
+    let mut recover = listen(SignalKind::user_defined1())?;
+    tokio::spawn(async move {
+        loop {
+            tokio::select! {
+                _ = terminate.recv() => shutdown.cancel(),
+                _ = interrupt.recv() => shutdown.cancel(),
+                _ = recover.recv() => handle.recover(),
+            }
+        }
+    });
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::CommandFactory;
+
+    #[test]
+    fn the_command_line_is_consistent() {
+        Cli::command().debug_assert();
+    }
+
+    #[test]
+    fn flags_win_over_the_file() {
+        let file = tempfile::NamedTempFile::new().unwrap();
+        std::fs::write(file.path(), "[server]\nurl = \"http://file:1\"\ntool = \"left\"\n").unwrap();
+        let path = file.path().to_str().unwrap();
+        let cli = Cli::try_parse_from(["palpate-bridge", "--config", path, "--server", "http://flag:2"]).unwrap();
+        let config = cli.config().unwrap();
+        assert_eq!((config.server.url.as_str(), config.server.tool.as_str()), ("http://flag:2", "left"));
+        assert!(!config.servo.auto_recover);
+    }
+
+    #[test]
+    fn what_is_printed_can_be_read() {
+        let text = printed(&Config::default()).unwrap();
+        assert_eq!(Config::parse(&text, "printed").unwrap(), Config::default());
+    }
+
+    #[test]
+    fn a_missing_file_is_named() {
+        let cli = Cli::try_parse_from(["palpate-bridge", "--config", "/nowhere/bridge.toml"]).unwrap();
+        assert!(cli.config().unwrap_err().to_string().contains("cannot read the configuration /nowhere/bridge.toml"));
+    }
+}

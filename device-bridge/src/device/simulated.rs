@@ -1,0 +1,53 @@
+//! The simulated arm as a device: it lives in servo time, so it moves by as many periods as really passed.
+use super::Reading;
+use glam::DVec3;
+use palpate_control::SimulatedArm;
+
+/// After a pause longer than this (periods) the arm goes on from where it was.
+const LONGEST_GAP: u64 = 100;
+
+/// The arm and the force held on it.
+#[derive(Debug)]
+pub struct SimulatedDevice {
+    arm: SimulatedArm,
+    force_n: DVec3,
+}
+
+impl SimulatedDevice {
+    /// At the start of its path, without force.
+    pub fn new(arm: SimulatedArm) -> Self {
+        Self { arm, force_n: DVec3::ZERO }
+    }
+
+    /// Moves on under the force held, and reads.
+    pub fn read(&mut self, periods: u64) -> Reading {
+        for _ in 0..periods.min(LONGEST_GAP) {
+            self.arm.step(self.force_n);
+        }
+        Reading { motion: self.arm.motion(), buttons: 0, measured_force_n: Some(self.arm.hand_force_n()) }
+    }
+
+    /// Holds a force (N).
+    pub fn apply(&mut self, force_n: DVec3) {
+        self.force_n = force_n;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use palpate_control::{ArmSpec, HandPath};
+
+    #[test]
+    fn skipped_ticks_pass_in_the_arms_time_too() {
+        let arm = SimulatedArm::new(ArmSpec::default(), HandPath::resting_at(DVec3::ZERO), 1e-3).unwrap();
+        let (mut steady, mut skipping) = (SimulatedDevice::new(arm.clone()), SimulatedDevice::new(arm));
+        steady.apply(DVec3::X);
+        skipping.apply(DVec3::X);
+        for _ in 0..6 {
+            steady.read(1);
+        }
+        skipping.read(1);
+        assert_eq!(skipping.read(5), steady.read(0));
+    }
+}

@@ -1,0 +1,100 @@
+//! What stops a bridge, and what to do about it.
+use miette::{Diagnostic, NamedSource, SourceSpan};
+use std::path::PathBuf;
+use thiserror::Error;
+
+/// An error of the bridge.
+#[derive(Debug, Error, Diagnostic)]
+pub enum BridgeError {
+    /// A file cannot be read.
+    #[error("cannot read {what} {path}: {source}", path = path.display())]
+    #[diagnostic(help(
+        "check the path and its permissions; `palpate-bridge --print-config` prints a complete configuration"
+    ))]
+    Read {
+        /// What the file is for.
+        what: &'static str,
+        /// Which.
+        path: PathBuf,
+        /// Why.
+        source: std::io::Error,
+    },
+    /// The configuration is not TOML, or has unknown keys or wrong types.
+    #[error(transparent)]
+    #[diagnostic(transparent)]
+    Config(Box<ConfigError>),
+    /// A value is out of range.
+    #[error("{key}: {reason}")]
+    #[diagnostic(help("`palpate-bridge --print-config` prints every key with its default"))]
+    Value {
+        /// Section and key.
+        key: String,
+        /// What is wrong.
+        reason: String,
+    },
+    /// The server's address cannot be used.
+    #[error("\"{address}\" is no address of a daemon: {reason}")]
+    #[diagnostic(help("write http://HOST:PORT, https://HOST:PORT or unix:///path/to/socket"))]
+    Address {
+        /// As given.
+        address: String,
+        /// What is wrong with it.
+        reason: String,
+    },
+    /// Nobody answered within the time allowed.
+    #[error("no daemon answered at {address} for {seconds} s: {reason}")]
+    #[diagnostic(help(
+        "is `palpated` running there? it prints its address when it starts; give it with --server. Without --give-up-after the \
+         bridge waits for it"
+    ))]
+    Unreachable {
+        /// Address tried.
+        address: String,
+        /// How long (s).
+        seconds: f64,
+        /// The last attempt's error.
+        reason: String,
+    },
+    /// The daemon refused this bridge, for a reason that trying again does not change.
+    #[error("the daemon at {address} refused the arm: {message} ({code})")]
+    #[diagnostic(help("{help}"))]
+    Refused {
+        /// Address.
+        address: String,
+        /// gRPC code.
+        code: String,
+        /// Its words.
+        message: String,
+        /// What to do.
+        help: &'static str,
+    },
+    /// The operating system refused something the bridge cannot do without.
+    #[error("cannot {what}: {source}")]
+    System {
+        /// What.
+        what: &'static str,
+        /// Why.
+        source: std::io::Error,
+    },
+    /// The servo thread died; its panic message is on standard error.
+    #[error("the servo thread stopped unexpectedly; the arm gets no force")]
+    #[diagnostic(help("this is a defect: please report it with the output above"))]
+    ServoDied,
+}
+
+/// A mistake in a configuration, and where.
+#[derive(Debug, Error, Diagnostic)]
+#[error("{message}")]
+pub struct ConfigError {
+    /// What is wrong.
+    pub message: String,
+    /// The text.
+    #[source_code]
+    pub text: NamedSource<String>,
+    /// Where.
+    #[label("here")]
+    pub at: Option<SourceSpan>,
+    /// What to do.
+    #[help]
+    pub help: Option<String>,
+}

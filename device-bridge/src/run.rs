@@ -1,0 +1,235 @@
+//! Starts servo and uplink, watches both, and ends them in order: force to zero, then the stream, then the program.
+use crate::{
+    BridgeError, Config, Stats, Summary,
+    device::Device,
+    servo::{Servo, ServoLaw},
+    settings::{ServoSettings, Settings},
+    uplink::{SampleSource, Uplink},
+};
+use palpate_control::{Fault, Link};
+use palpate_realtime::{Clock, Doorbell, Note, OsMeasures, TickLoop, slot};
+use std::{
+    sync::{
+        Arc,
+        atomic::{AtomicBool, Ordering},
+    },
+    time::Duration,
+};
+use tokio::{sync::oneshot, task::JoinError, time};
+use tokio_util::sync::CancellationToken;
+
+/// How often changes of the link are looked for.
+const WATCH_PERIOD: Duration = Duration::from_millis(20);
+/// Beyond the ramp, how long the servo may take to stop.
+const STOP_MARGIN: Duration = Duration::from_secs(1);
+/// How long the uplink may take to end its stream.
+const END_TIMEOUT: Duration = Duration::from_secs(6);
+
+/// What servo, uplink and the rest of the program share: flags and counters, all atomic.
+#[derive(Debug, Default)]
+pub struct Shared {
+    /// Counters.
+    pub stats: Stats,
+    /// A stream stands: the servo publishes samples.
+    pub attached: AtomicBool,
+    /// The servo ramps to zero and ends.
+    pub stop: AtomicBool,
+    /// Somebody asks to leave a latched fault.
+    pub recover: AtomicBool,
+    /// The daemon asks for zero force.
+    pub peer_fault: AtomicBool,
+}
+
+/// A running bridge, from outside.
+#[derive(Debug, Clone, Default)]
+pub struct Handle {
+    shared: Arc<Shared>,
+}
+
+impl Handle {
+    /// For [`run_with`].
+    pub fn new() -> Self {
+        Self::default()
+    }
+
+    /// Leaves a latched fault; the force comes back slowly, with the next command.
+    pub fn recover(&self) {
+        self.shared.recover.store(true, Ordering::Relaxed);
+    }
+
+    /// Counters, live.
+    pub fn stats(&self) -> &Stats {
+        &self.shared.stats
+    }
+
+    /// Whether the arm is attached to a tool now.
+    pub fn is_attached(&self) -> bool {
+        self.shared.attached.load(Ordering::Relaxed)
+    }
+}
+
+/// Runs a bridge until `shutdown` is cancelled. Then the force ramps to zero, the stream ends, and the counters are returned.
+///
+/// # Errors
+/// [`BridgeError`], for a bad configuration, or a daemon that can never be attached to.
+pub async fn run(config: Config, shutdown: CancellationToken) -> Result<Summary, BridgeError> {
+    run_with(&config, shutdown, Handle::new()).await
+}
+
+/// As [`run`], with a handle made by the caller.
+///
+/// # Errors
+/// As [`run`].
+pub async fn run_with(config: &Config, shutdown: CancellationToken, handle: Handle) -> Result<Summary, BridgeError> {
+    let settings = Settings::new(config)?;
+    let shared = handle.shared;
+    let (commands, down) = slot(&None);
+    let (up, samples) = slot(&None);
+    let bell = Doorbell::new().map_err(|source| BridgeError::System { what: "create an eventfd", source })?;
+    let source =
+        SampleSource::new(&bell, samples).map_err(|source| BridgeError::System { what: "watch an eventfd", source })?;
+    let servo = Servo {
+        law: ServoLaw::new(settings.servo),
+        device: Device::open(&settings.device),
+        down,
+        up,
+        bell,
+        shared: Arc::clone(&shared),
+        sequence: 0,
+    };
+    let mut servo_done = start_servo(servo, &settings).await?;
+    let end = CancellationToken::new();
+    let uplink = Uplink::new(settings.uplink.clone(), source, commands, Arc::clone(&shared), end.clone());
+    let mut uplink = tokio::spawn(uplink.run());
+    let mut watcher = Watcher::new(&settings);
+    let mut every = time::interval(WATCH_PERIOD);
+    let outcome = loop {
+        tokio::select! {
+            () = shutdown.cancelled() => break Outcome::Asked,
+            ended = &mut uplink => break Outcome::UplinkEnded(ended),
+            _ = &mut servo_done => break Outcome::ServoDied,
+            _ = every.tick() => watcher.look(&shared),
+        }
+    };
+    // The force first; then the stream that carries it.
+    let stopped = match outcome {
+        Outcome::ServoDied => Err(BridgeError::ServoDied),
+        _ => stop_servo(&shared, &settings.servo, servo_done).await,
+    };
+    end.cancel();
+    let ended = match outcome {
+        Outcome::UplinkEnded(ended) => ended,
+        _ => time::timeout(END_TIMEOUT, uplink).await.unwrap_or(Ok(Ok(()))),
+    };
+    stopped?;
+    match ended {
+        Ok(result) => result.map(|()| shared.stats.summary()),
+        Err(panic) => Err(BridgeError::System { what: "run the uplink", source: std::io::Error::other(panic) }),
+    }
+}
+
+/// Why a bridge stops.
+enum Outcome {
+    Asked,
+    UplinkEnded(Result<Result<(), BridgeError>, JoinError>),
+    ServoDied,
+}
+
+/// Starts the servo thread, logs what the operating system granted, and returns what ends with the thread.
+async fn start_servo(mut servo: Servo, settings: &Settings) -> Result<oneshot::Receiver<()>, BridgeError> {
+    let mut tick_loop = TickLoop::new(Clock::Monotonic, settings.servo.period_s)
+        .map_err(|error| BridgeError::Value { key: "servo.rate_hz".to_owned(), reason: error.to_string() })?;
+    servo.shared.stats.set_servo(tick_loop.monitor());
+    let (done, servo_done) = oneshot::channel();
+    let (say, notes) = oneshot::channel::<Vec<Note>>();
+    let measures = settings.measures;
+    std::thread::Builder::new()
+        .name("palpate-servo".to_owned())
+        .spawn(move || {
+            let mut granted = measures.apply();
+            let _ = say.send(std::mem::take(&mut granted.notes));
+            servo.run(&mut tick_loop);
+            let _ = done.send(());
+        })
+        .map_err(|source| BridgeError::System { what: "start the servo thread", source })?;
+    for note in notes.await.unwrap_or_default() {
+        if note.granted {
+            tracing::info!("{note}");
+        } else {
+            tracing::warn!("{note}");
+        }
+    }
+    if settings.measures == OsMeasures::NONE {
+        tracing::info!("no real-time measures asked for");
+    }
+    Ok(servo_done)
+}
+
+async fn stop_servo(
+    shared: &Shared,
+    settings: &ServoSettings,
+    servo_done: oneshot::Receiver<()>,
+) -> Result<(), BridgeError> {
+    shared.stop.store(true, Ordering::Relaxed);
+    let ramp = Duration::from_secs_f64(settings.watchdog.ramp_to_zero_s);
+    match time::timeout(ramp + STOP_MARGIN, servo_done).await {
+        Ok(Ok(())) => Ok(()),
+        _ => Err(BridgeError::ServoDied),
+    }
+}
+
+/// Says every change of the link once, and the counters now and then.
+struct Watcher {
+    link: Link,
+    auto_recover: bool,
+    report: Option<time::Interval>,
+}
+
+impl Watcher {
+    fn new(settings: &Settings) -> Self {
+        let report = settings.report_every.map(|pause| time::interval_at(time::Instant::now() + pause, pause));
+        Self { link: Link::Waiting, auto_recover: settings.servo.auto_recover, report }
+    }
+
+    fn look(&mut self, shared: &Shared) {
+        let link = shared.stats.link();
+        if phase(link) != phase(self.link) {
+            self.say(link);
+            self.link = link;
+        }
+        let mut cx = std::task::Context::from_waker(std::task::Waker::noop());
+        if self.report.as_mut().is_some_and(|report| report.poll_tick(&mut cx).is_ready()) {
+            tracing::info!("\n{}", shared.stats.summary());
+        }
+    }
+
+    fn say(&self, link: Link) {
+        match link {
+            Link::Waiting => tracing::info!("no force until the daemon sends a command"),
+            Link::Fresh | Link::Extrapolating => tracing::info!("commands arrive: the force ramps up"),
+            Link::Ramping(fault) => tracing::warn!("{}: the force ramps to zero", reason(fault)),
+            Link::Latched(fault) if self.auto_recover => {
+                tracing::warn!("{}: the force is zero until the daemon answers steadily", reason(fault));
+            }
+            Link::Latched(fault) => tracing::warn!(
+                "{}: the force stays at zero. Recover with `kill -USR1 {}`, or start with --auto-recover",
+                reason(fault),
+                std::process::id()
+            ),
+        }
+    }
+}
+
+/// Short gaps come and go: fresh and extrapolating are one phase.
+fn phase(link: Link) -> Link {
+    if link == Link::Extrapolating { Link::Fresh } else { link }
+}
+
+fn reason(fault: Fault) -> &'static str {
+    match fault {
+        Fault::Stale => "no command for too long",
+        Fault::NonFinite => "the arm's position is not finite",
+        Fault::Peer => "the daemon stopped the force",
+        Fault::Requested => "stopping",
+    }
+}

@@ -1,0 +1,212 @@
+//! The loop beside the arm: from the newest command and the arm's motion to a safe force.
+use crate::{
+    convert::{Command, Sample},
+    device::Device,
+    run::Shared,
+    settings::ServoSettings,
+};
+use glam::DVec3;
+use palpate_control::{
+    Fault, ForceLimiter, ForceLimits, Limited, Link, Motion, PassivityController, Verdict, Watchdog,
+};
+use palpate_realtime::{Doorbell, SlotReader, SlotWriter, TickLoop, Wakeup};
+use std::{
+    ops::ControlFlow,
+    sync::{Arc, atomic::Ordering},
+};
+
+/// With automatic recovery, commands must have come without a gap for so long (ns).
+const SETTLED_NS: u64 = 500_000_000;
+
+/// The law, free of threads and clocks.
+#[derive(Debug)]
+pub struct ServoLaw {
+    settings: ServoSettings,
+    watchdog: Watchdog,
+    passivity: Option<PassivityController>,
+    limiter: ForceLimiter,
+    command: Option<Command>,
+    steady_since_ns: Option<u64>,
+}
+
+/// What one tick did.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ServoTick {
+    /// Force for the arm (N).
+    pub limited: Limited,
+    /// State of the link.
+    pub verdict: Verdict,
+    /// Damping that the passivity controller added (N s/m).
+    pub added_damping_n_s_per_m: f64,
+}
+
+impl ServoLaw {
+    /// Waiting for a first command.
+    pub fn new(settings: ServoSettings) -> Self {
+        Self {
+            watchdog: Watchdog::new(settings.watchdog),
+            passivity: settings.passivity.map(PassivityController::new),
+            limiter: ForceLimiter::new(settings.limits),
+            command: None,
+            steady_since_ns: None,
+            settings,
+        }
+    }
+
+    /// A new command.
+    pub fn receive(&mut self, command: &Command) {
+        self.watchdog.sample_arrived(command.received_ns);
+        let (ours, theirs) = (self.settings.limits, command.limits);
+        self.limiter.set_limits(ForceLimits {
+            max_force_n: ours.max_force_n.min(theirs.max_force_n),
+            max_force_rate_n_per_s: ours.max_force_rate_n_per_s.min(theirs.max_force_rate_n_per_s),
+        });
+        self.command = Some(*command);
+    }
+
+    /// Ramps to zero from now on, and latches.
+    pub fn trip(&mut self, now_ns: u64, fault: Fault) {
+        self.watchdog.trip(now_ns, fault);
+    }
+
+    /// Leaves a latched fault; the force comes back slowly, with the next command.
+    pub fn recover(&mut self) -> bool {
+        self.watchdog.recover()
+    }
+
+    /// Faults latched so far.
+    pub fn latched(&self) -> u64 {
+        self.watchdog.faults()
+    }
+
+    /// The force for the arm, which now moves so.
+    pub fn tick(&mut self, now_ns: u64, motion: &Motion) -> ServoTick {
+        if !motion.is_finite() {
+            self.watchdog.trip(now_ns, Fault::NonFinite);
+        }
+        self.recover_when_steady(now_ns);
+        let verdict = self.watchdog.check(now_ns);
+        let wanted_n = self.wanted_n(motion, &verdict);
+        let dt_s = self.settings.period_s;
+        let step = self
+            .passivity
+            .as_mut()
+            .map(|passivity| passivity.step(wanted_n, motion.position_m, motion.velocity_m_per_s, dt_s));
+        let limited = self.limiter.limit(step.map_or(wanted_n, |step| step.force_n), verdict.ramp, dt_s);
+        if let Some(passivity) = &mut self.passivity {
+            passivity.held(limited.force_n);
+            if verdict.ramp == 0.0 {
+                passivity.reset();
+            }
+        }
+        ServoTick { limited, verdict, added_damping_n_s_per_m: step.map_or(0.0, |step| step.damping_n_s_per_m) }
+    }
+
+    /// The local model's force, or the daemon's where there is none. On the way down damping takes its place.
+    fn wanted_n(&self, motion: &Motion, verdict: &Verdict) -> DVec3 {
+        let Some(command) = &self.command else { return DVec3::ZERO };
+        let force_n = match (&command.local_model, &self.settings.render) {
+            (Some(model), Some(render)) => {
+                let age_s = verdict.age_s + command.model_age_s;
+                model.render(motion.position_m, motion.velocity_m_per_s, age_s, render).force_n
+            }
+            _ => command.force_n,
+        };
+        match verdict.link {
+            // F ← F − (1 − ramp) B v
+            Link::Ramping(_) => {
+                let damping = self.settings.fading_damping_n_s_per_m * (1.0 - verdict.ramp);
+                force_n - damping * motion.velocity_m_per_s
+            }
+            _ => force_n,
+        }
+    }
+
+    fn recover_when_steady(&mut self, now_ns: u64) {
+        let gap_ns = (self.settings.watchdog.stale_after_s * 1e9) as u64;
+        let alive = self.command.is_some_and(|command| now_ns.saturating_sub(command.received_ns) <= gap_ns);
+        self.steady_since_ns = if alive { self.steady_since_ns.or(Some(now_ns)) } else { None };
+        let steady = self.steady_since_ns.is_some_and(|since| now_ns - since >= SETTLED_NS);
+        if self.settings.auto_recover && steady {
+            self.watchdog.recover();
+        }
+    }
+}
+
+/// The servo's ends of everything.
+#[derive(Debug)]
+pub struct Servo {
+    /// The law.
+    pub law: ServoLaw,
+    /// The arm.
+    pub device: Device,
+    /// Commands from the uplink.
+    pub down: SlotReader<Option<Command>>,
+    /// Samples for the uplink.
+    pub up: SlotWriter<Option<Sample>>,
+    /// Tells the uplink of a sample.
+    pub bell: Doorbell,
+    /// Flags and counters.
+    pub shared: Arc<Shared>,
+    /// Sequence number of the last sample.
+    pub sequence: u64,
+}
+
+impl Servo {
+    /// Runs on this thread until told to stop and the force is at zero.
+    pub fn run(&mut self, tick_loop: &mut TickLoop) {
+        let clock = tick_loop.clock().clone();
+        tick_loop.run(|wakeup| self.tick(wakeup, clock.now_ns()));
+        self.device.apply(DVec3::ZERO);
+        self.shared.stats.set_force(0.0);
+    }
+
+    fn tick(&mut self, wakeup: &Wakeup, now_ns: u64) -> ControlFlow<()> {
+        let reading = self.device.read(1 + wakeup.skipped);
+        if let Some(Some(command)) = self.down.take() {
+            self.law.receive(command);
+        }
+        self.obey_flags(now_ns);
+        let tick = self.law.tick(now_ns, &reading.motion);
+        self.device.apply(tick.limited.force_n);
+        if reading.motion.is_finite() && self.shared.attached.load(Ordering::Relaxed) {
+            self.sequence += 1;
+            self.up.publish(Some(Sample { sequence: self.sequence, device_time_ns: now_ns, reading }));
+            self.bell.ring();
+        }
+        self.count(&tick, reading.motion.is_finite());
+        match tick.verdict.link {
+            Link::Latched(Fault::Requested) => ControlFlow::Break(()),
+            Link::Latched(_) if self.shared.stop.load(Ordering::Relaxed) => ControlFlow::Break(()),
+            _ => ControlFlow::Continue(()),
+        }
+    }
+
+    fn obey_flags(&mut self, now_ns: u64) {
+        if self.shared.stop.load(Ordering::Relaxed) {
+            self.law.trip(now_ns, Fault::Requested);
+        } else if self.shared.peer_fault.swap(false, Ordering::Relaxed) {
+            self.law.trip(now_ns, Fault::Peer);
+        } else if self.shared.recover.swap(false, Ordering::Relaxed) {
+            self.law.recover();
+        }
+    }
+
+    fn count(&self, tick: &ServoTick, motion_finite: bool) {
+        let stats = &self.shared.stats;
+        let count_if = |counter: &crate::stats::Counter, happened: bool| {
+            if happened {
+                counter.increment();
+            }
+        };
+        count_if(&stats.saturated, tick.limited.saturated);
+        count_if(&stats.rate_limited, tick.limited.rate_limited);
+        count_if(&stats.non_finite, tick.limited.non_finite || !motion_finite);
+        count_if(&stats.damped, tick.added_damping_n_s_per_m > 0.0);
+        stats.latched.set(self.law.latched());
+        stats.dropped_up.set(self.up.overwritten());
+        stats.dropped_down.set(self.down.overwritten());
+        stats.set_force(tick.limited.force_n.length());
+        stats.set_link(tick.verdict.link);
+    }
+}

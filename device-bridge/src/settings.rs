@@ -1,0 +1,349 @@
+//! What the configuration means: checked, in the types that the loop and the uplink use.
+use crate::{
+    BridgeError, Config,
+    config::{DeviceConfig, SimulatedConfig},
+};
+use glam::DVec3;
+use palpate_control::{
+    ArmSpec, ForceLimits, HandPath, Keyframe, ParameterError, PassivitySettings, RenderSettings, SimulatedArm,
+    WatchdogSettings, coupling::SampledWall,
+};
+use palpate_realtime::OsMeasures;
+use std::time::Duration;
+use tonic::transport::{Certificate, ClientTlsConfig, Endpoint};
+
+/// The whole bridge.
+#[derive(Debug, Clone)]
+pub struct Settings {
+    /// The uplink.
+    pub uplink: UplinkSettings,
+    /// The servo's law.
+    pub servo: ServoSettings,
+    /// The arm.
+    pub device: DeviceSettings,
+    /// What to ask of the operating system.
+    pub measures: OsMeasures,
+    /// Pause between lines of counters.
+    pub report_every: Option<Duration>,
+}
+
+/// The uplink.
+#[derive(Debug, Clone)]
+pub struct UplinkSettings {
+    /// Where to connect.
+    pub endpoint: Endpoint,
+    /// The same, for people.
+    pub address: String,
+    /// Tool of the scene.
+    pub tool: String,
+    /// Name of the arm.
+    pub device_name: String,
+    /// Shortest and longest pause between attempts.
+    pub pauses: (Duration, Duration),
+    /// Seed of the pauses.
+    pub seed: u64,
+    /// Time without any connection after which to stop.
+    pub give_up_after: Option<Duration>,
+    /// Told to the daemon: peak force (N) and rate (Hz).
+    pub hello: (f64, f64),
+}
+
+/// The servo's law.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ServoSettings {
+    /// Period (s).
+    pub period_s: f64,
+    /// Peak and rate.
+    pub limits: ForceLimits,
+    /// Ages.
+    pub watchdog: WatchdogSettings,
+    /// Damping (N s/m) that replaces a fading force.
+    pub fading_damping_n_s_per_m: f64,
+    /// Local models; `None`: the daemon's force as it comes.
+    pub render: Option<RenderSettings>,
+    /// Energy; `None`: off.
+    pub passivity: Option<PassivitySettings>,
+    /// Recover from latched faults without being asked.
+    pub auto_recover: bool,
+}
+
+/// Which arm.
+#[derive(Debug, Clone)]
+pub enum DeviceSettings {
+    /// The simulated one.
+    Simulated(SimulatedArm),
+}
+
+/// Longest wait for one connection.
+const CONNECT_TIMEOUT: Duration = Duration::from_secs(5);
+/// Unanswered pings for so long end a connection that the network lost silently.
+const KEEP_ALIVE: Duration = Duration::from_secs(2);
+
+impl Settings {
+    /// Checks a configuration, and reads the certificate it names.
+    ///
+    /// # Errors
+    /// [`BridgeError`] naming the key.
+    pub fn new(config: &Config) -> Result<Self, BridgeError> {
+        let rate_hz = config.servo.rate_hz;
+        if !(10.0..=10_000.0).contains(&rate_hz) {
+            return Err(value("servo.rate_hz", format!("{rate_hz} is out of range: use 10 to 10000")));
+        }
+        let servo = servo(config, 1.0 / rate_hz)?;
+        let every_s = config.servo.report_every_s;
+        let report_every = seconds("servo.report_every_s", every_s)?;
+        Ok(Self {
+            uplink: uplink(config)?,
+            device: device(config, servo.period_s)?,
+            servo,
+            measures: measures(config)?,
+            report_every: (!report_every.is_zero()).then_some(report_every),
+        })
+    }
+}
+
+fn servo(config: &Config, period_s: f64) -> Result<ServoSettings, BridgeError> {
+    let limits = &config.limits;
+    let (watchdog, passivity) = (&config.watchdog, &config.passivity);
+    let fading = watchdog.fading_damping_n_s_per_m;
+    if !(fading.is_finite() && fading >= 0.0) {
+        return Err(value("watchdog.fading_damping_n_s_per_m", format!("{fading} must be finite and not negative")));
+    }
+    let passivity_settings = PassivitySettings {
+        max_damping_n_s_per_m: passivity.max_damping_n_s_per_m,
+        max_stored_j: passivity.max_stored_j,
+    }
+    .checked()
+    .map_err(|error| parameter("passivity", &error))?;
+    Ok(ServoSettings {
+        period_s,
+        limits: ForceLimits { max_force_n: limits.max_force_n, max_force_rate_n_per_s: limits.max_force_rate_n_per_s }
+            .checked()
+            .map_err(|error| parameter("limits", &error))?,
+        watchdog: WatchdogSettings {
+            fresh_for_s: watchdog.fresh_for_s,
+            stale_after_s: watchdog.stale_after_s,
+            ramp_to_zero_s: watchdog.ramp_to_zero_s,
+            ramp_up_s: watchdog.ramp_up_s,
+        }
+        .checked()
+        .map_err(|error| parameter("watchdog", &error))?,
+        fading_damping_n_s_per_m: fading,
+        render: render(config, period_s)?,
+        passivity: passivity.enabled.then_some(passivity_settings),
+        auto_recover: config.servo.auto_recover,
+    })
+}
+
+/// The stiffest model the servo renders is what its own sampling allows on this arm.
+fn render(config: &Config, period_s: f64) -> Result<Option<RenderSettings>, BridgeError> {
+    let render = &config.render;
+    let wall = SampledWall {
+        arm_damping_n_s_per_m: render.arm_damping_n_s_per_m,
+        wall_damping_n_s_per_m: render.damping_n_s_per_m,
+        sample_time_s: period_s,
+        delay_s: 0.0,
+    };
+    let max_stiffness_n_per_m = wall.passive_stiffness_limit_n_per_m().map_err(|error| parameter("render", &error))?;
+    if max_stiffness_n_per_m <= 0.0 {
+        let reason = "must be smaller than arm_damping_n_s_per_m, or no stiffness is passive".to_owned();
+        return Err(value("render.damping_n_s_per_m", reason));
+    }
+    let settings = RenderSettings {
+        hold_s: render.hold_s,
+        forget_s: render.forget_s,
+        damping_n_s_per_m: render.damping_n_s_per_m,
+        max_stiffness_n_per_m,
+    }
+    .checked()
+    .map_err(|error| parameter("render", &error))?;
+    Ok(render.local_model.then_some(settings))
+}
+
+fn uplink(config: &Config) -> Result<UplinkSettings, BridgeError> {
+    let server = &config.server;
+    let first = seconds("server.first_pause_s", server.first_pause_s)?;
+    let longest = seconds("server.longest_pause_s", server.longest_pause_s)?;
+    if first.is_zero() || longest < first {
+        let reason = "pauses must be larger than 0, the longest not shorter than the first".to_owned();
+        return Err(value("server.longest_pause_s", reason));
+    }
+    if server.device_name.len() > 64 {
+        return Err(value("server.device_name", format!("is {} bytes long, at most 64", server.device_name.len())));
+    }
+    let give_up_after = server.give_up_after_s.map(|s| seconds("server.give_up_after_s", s)).transpose()?;
+    Ok(UplinkSettings {
+        endpoint: endpoint(config)?,
+        address: server.url.clone(),
+        tool: server.tool.clone(),
+        device_name: server.device_name.clone(),
+        pauses: (first, longest),
+        seed: server.pause_seed.unwrap_or_else(seed_of_this_process),
+        give_up_after,
+        hello: (config.limits.max_force_n, config.servo.rate_hz),
+    })
+}
+
+fn endpoint(config: &Config) -> Result<Endpoint, BridgeError> {
+    let server = &config.server;
+    let bad = |reason: String| BridgeError::Address { address: server.url.clone(), reason };
+    let scheme = server.url.split_once("://").map(|(scheme, _)| scheme);
+    if !matches!(scheme, Some("http" | "https" | "unix")) {
+        return Err(bad("it has no known scheme".to_owned()));
+    }
+    let endpoint = Endpoint::from_shared(server.url.clone())
+        .map_err(|error| bad(causes(&error)))?
+        .connect_timeout(CONNECT_TIMEOUT)
+        .tcp_nodelay(true)
+        .http2_keep_alive_interval(KEEP_ALIVE)
+        .keep_alive_timeout(KEEP_ALIVE);
+    match (&server.tls_ca, scheme) {
+        (None, Some("https")) => {
+            let reason = "https needs the certificate authority to trust: give --tls-ca FILE or server.tls_ca";
+            Err(bad(reason.to_owned()))
+        }
+        (Some(path), Some("https")) => {
+            let pem = std::fs::read(path).map_err(|source| BridgeError::Read {
+                what: "the certificate authority",
+                path: path.clone(),
+                source,
+            })?;
+            let tls = ClientTlsConfig::new().ca_certificate(Certificate::from_pem(pem));
+            endpoint.tls_config(tls).map_err(|error| bad(causes(&error)))
+        }
+        (Some(_), _) => Err(bad("a certificate authority is given, but the address is not https://".to_owned())),
+        (None, _) => Ok(endpoint),
+    }
+}
+
+fn device(config: &Config, period_s: f64) -> Result<DeviceSettings, BridgeError> {
+    match &config.device {
+        DeviceConfig::Simulated(simulated) => Ok(DeviceSettings::Simulated(simulated_arm(simulated, period_s)?)),
+    }
+}
+
+fn simulated_arm(config: &SimulatedConfig, period_s: f64) -> Result<SimulatedArm, BridgeError> {
+    let keyframes = config
+        .keyframes
+        .iter()
+        .map(|key| Keyframe { time_s: key.time_s, position_m: DVec3::from_array(key.position_m) })
+        .collect();
+    let path =
+        HandPath::new(keyframes, config.period_s).map_err(|error| value("device.keyframes", error.to_string()))?;
+    let spec = ArmSpec {
+        mass_kg: config.mass_kg,
+        damping_n_s_per_m: config.damping_n_s_per_m,
+        hand_stiffness_n_per_m: config.hand_stiffness_n_per_m,
+        hand_damping_n_s_per_m: config.hand_damping_n_s_per_m,
+    };
+    SimulatedArm::new(spec, path, period_s).map_err(|error| parameter("device", &error))
+}
+
+fn measures(config: &Config) -> Result<OsMeasures, BridgeError> {
+    let realtime = &config.realtime;
+    if realtime.fifo_priority > 99 {
+        let reason = format!("{} is out of range: use 1 to 99, or 0 for normal scheduling", realtime.fifo_priority);
+        return Err(value("realtime.fifo_priority", reason));
+    }
+    Ok(OsMeasures {
+        fifo_priority: (realtime.fifo_priority > 0).then_some(realtime.fifo_priority),
+        lock_memory: realtime.lock_memory,
+        processor: realtime.processor,
+        stay_awake: realtime.stay_awake,
+    })
+}
+
+fn seed_of_this_process() -> u64 {
+    palpate_realtime::Clock::Monotonic.now_ns() ^ (u64::from(std::process::id()) << 32)
+}
+
+fn seconds(key: &'static str, s: f64) -> Result<Duration, BridgeError> {
+    Duration::try_from_secs_f64(s)
+        .map_err(|_| value(key, format!("{s} is no time: it must be finite and not negative")))
+}
+
+fn value(key: &str, reason: String) -> BridgeError {
+    BridgeError::Value { key: key.to_owned(), reason }
+}
+
+fn parameter(section: &str, error: &ParameterError) -> BridgeError {
+    value(&format!("{section}.{}", error.name), format!("{} {}", error.value, error.rule))
+}
+
+/// An error with its causes, in one line.
+pub(crate) fn causes(error: &dyn std::error::Error) -> String {
+    let mut text = error.to_string();
+    let mut cause = error.source();
+    while let Some(next) = cause {
+        let next_text = next.to_string();
+        if !text.contains(&next_text) {
+            text = format!("{text}: {next_text}");
+        }
+        cause = next.source();
+    }
+    text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::config::KeyframeConfig;
+    use proptest::prelude::*;
+
+    fn refused(change: impl FnOnce(&mut Config)) -> String {
+        let mut config = Config::default();
+        change(&mut config);
+        Settings::new(&config).unwrap_err().to_string()
+    }
+
+    #[tokio::test]
+    async fn the_default_renders_what_sampling_allows() {
+        let settings = Settings::new(&Config::default()).unwrap();
+        // 2 b/T = 2 · 0.4/1e-3
+        assert!((settings.servo.render.unwrap().max_stiffness_n_per_m - 800.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn every_refusal_names_the_key() {
+        assert!(refused(|c| c.servo.rate_hz = 0.0).starts_with("servo.rate_hz: 0 is out of range"));
+        assert!(refused(|c| c.servo.report_every_s = f64::NAN).starts_with("servo.report_every_s"));
+        assert!(refused(|c| c.limits.max_force_n = -1.0).starts_with("limits.max_force_n: -1 must be"));
+        assert!(refused(|c| c.watchdog.ramp_to_zero_s = 0.0).starts_with("watchdog.ramp_to_zero_s"));
+        assert!(refused(|c| c.watchdog.fading_damping_n_s_per_m = -1.0).starts_with("watchdog.fading"));
+        assert!(refused(|c| c.passivity.max_stored_j = f64::INFINITY).starts_with("passivity.max_stored_j"));
+        assert!(refused(|c| c.render.forget_s = 0.0).starts_with("render.forget_s"));
+        assert!(refused(|c| c.render.damping_n_s_per_m = 0.5).starts_with("render.damping_n_s_per_m"));
+        assert!(refused(|c| c.realtime.fifo_priority = 100).starts_with("realtime.fifo_priority"));
+        assert!(refused(|c| c.server.longest_pause_s = 0.0).starts_with("server.longest_pause_s"));
+        assert!(refused(|c| c.server.device_name = "x".repeat(65)).starts_with("server.device_name"));
+        let DeviceConfig::Simulated(simulated) = DeviceConfig::default();
+        let bad = KeyframeConfig { time_s: -1.0, position_m: [0.0; 3] };
+        let device = SimulatedConfig { keyframes: vec![bad], ..simulated };
+        assert!(refused(|c| c.device = DeviceConfig::Simulated(device)).starts_with("device.keyframes: keyframe 0"));
+    }
+
+    #[test]
+    fn addresses_are_checked() {
+        for url in ["127.0.0.1:7411", "ftp://host", "", "http://"] {
+            assert!(refused(|c| c.server.url = url.into()).contains("no address of a daemon"), "{url}");
+        }
+        assert!(refused(|c| c.server.url = "https://host:7411".into()).contains("--tls-ca"));
+        assert!(refused(|c| c.server.tls_ca = Some("ca.pem".into())).contains("not https"));
+        let missing = refused(|c| {
+            c.server.url = "https://host:7411".into();
+            c.server.tls_ca = Some("/nowhere/ca.pem".into());
+        });
+        assert!(missing.contains("cannot read the certificate authority /nowhere/ca.pem"), "{missing}");
+    }
+
+    proptest! {
+        #[test]
+        fn no_number_panics(rate_hz in any::<f64>(), pause_s in any::<f64>(), force_n in any::<f64>()) {
+            let mut config = Config::default();
+            config.servo.rate_hz = rate_hz;
+            config.server.first_pause_s = pause_s;
+            config.limits.max_force_n = force_n;
+            let _ = Settings::new(&config);
+        }
+    }
+}

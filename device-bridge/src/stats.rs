@@ -1,0 +1,239 @@
+//! What the bridge counts. Written by the servo and the uplink, read by anybody.
+use palpate_control::{Fault, Link};
+use palpate_realtime::{Histogram, LoopMonitor, Percentiles};
+use std::{
+    fmt,
+    sync::{
+        Arc, OnceLock,
+        atomic::{AtomicU8, AtomicU64, Ordering},
+    },
+};
+
+/// A counter.
+#[derive(Debug, Default)]
+pub struct Counter(AtomicU64);
+
+impl Counter {
+    /// One more.
+    pub fn increment(&self) {
+        self.0.fetch_add(1, Ordering::Relaxed);
+    }
+
+    /// Sets it.
+    pub fn set(&self, value: u64) {
+        self.0.store(value, Ordering::Relaxed);
+    }
+
+    /// Its value.
+    pub fn get(&self) -> u64 {
+        self.0.load(Ordering::Relaxed)
+    }
+}
+
+/// Everything counted since the start.
+#[derive(Debug, Default)]
+pub struct Stats {
+    /// Samples given to the stream.
+    pub sent: Counter,
+    /// Samples overwritten by newer ones before the stream took them.
+    pub dropped_up: Counter,
+    /// Commands accepted.
+    pub received: Counter,
+    /// Messages refused because a part was bad.
+    pub rejected: Counter,
+    /// Commands overwritten by newer ones before the servo took them.
+    pub dropped_down: Counter,
+    /// Faults that the daemon reported.
+    pub peer_faults: Counter,
+    /// Times the arm was attached.
+    pub attached: Counter,
+    /// Attempts to connect that failed, and streams that broke.
+    pub failures: Counter,
+    /// Faults latched by the watchdog.
+    pub latched: Counter,
+    /// Ticks whose force was cut to the peak.
+    pub saturated: Counter,
+    /// Ticks whose force was held back by the rate.
+    pub rate_limited: Counter,
+    /// Ticks whose force or reading was not finite.
+    pub non_finite: Counter,
+    /// Ticks in which the passivity controller damped.
+    pub damped: Counter,
+    /// From reading the arm to receiving the first command that used it (ns).
+    pub round_trip: Histogram,
+    peak_force_n: AtomicU64,
+    force_n: AtomicU64,
+    link: AtomicU8,
+    servo: OnceLock<Arc<LoopMonitor>>,
+}
+
+impl Stats {
+    /// The force (N) on the arm now.
+    pub fn force_n(&self) -> f64 {
+        f64::from_bits(self.force_n.load(Ordering::Relaxed))
+    }
+
+    /// State of the link as the servo sees it.
+    pub fn link(&self) -> Link {
+        link_of(self.link.load(Ordering::Relaxed))
+    }
+
+    /// The servo loop's own measurements, once it runs.
+    pub fn servo(&self) -> Option<&LoopMonitor> {
+        self.servo.get().map(AsRef::as_ref)
+    }
+
+    pub(crate) fn set_servo(&self, monitor: Arc<LoopMonitor>) {
+        let _ = self.servo.set(monitor);
+    }
+
+    pub(crate) fn set_force(&self, magnitude_n: f64) {
+        // The bits of numbers that are not negative are ordered as the numbers are.
+        self.force_n.store(magnitude_n.to_bits(), Ordering::Relaxed);
+        self.peak_force_n.fetch_max(magnitude_n.to_bits(), Ordering::Relaxed);
+    }
+
+    pub(crate) fn set_link(&self, link: Link) {
+        self.link.store(code_of(link), Ordering::Relaxed);
+    }
+
+    /// A copy for people.
+    pub fn summary(&self) -> Summary {
+        let servo = self.servo();
+        Summary {
+            sent: self.sent.get(),
+            dropped_up: self.dropped_up.get(),
+            received: self.received.get(),
+            rejected: self.rejected.get(),
+            dropped_down: self.dropped_down.get(),
+            peer_faults: self.peer_faults.get(),
+            reconnects: self.attached.get().saturating_sub(1),
+            latched: self.latched.get(),
+            saturated: self.saturated.get(),
+            rate_limited: self.rate_limited.get(),
+            non_finite: self.non_finite.get(),
+            damped: self.damped.get(),
+            peak_force_n: f64::from_bits(self.peak_force_n.load(Ordering::Relaxed)),
+            final_force_n: self.force_n(),
+            round_trip: self.round_trip.percentiles(),
+            ticks: servo.map_or(0, LoopMonitor::ticks),
+            overruns: servo.map_or(0, LoopMonitor::overruns),
+            skipped: servo.map_or(0, LoopMonitor::skipped),
+            wakeup_lateness: servo.map_or_else(Percentiles::default, |s| s.wakeup_lateness.percentiles()),
+            tick_cost: servo.map_or_else(Percentiles::default, |s| s.tick_cost.percentiles()),
+        }
+    }
+}
+
+const FAULTS: [Fault; 4] = [Fault::Stale, Fault::NonFinite, Fault::Peer, Fault::Requested];
+
+fn code_of(link: Link) -> u8 {
+    let index = |fault| FAULTS.iter().position(|f| *f == fault).unwrap_or(0) as u8;
+    match link {
+        Link::Waiting => 0,
+        Link::Fresh => 1,
+        Link::Extrapolating => 2,
+        Link::Ramping(fault) => 8 + index(fault),
+        Link::Latched(fault) => 16 + index(fault),
+    }
+}
+
+fn link_of(code: u8) -> Link {
+    let fault = FAULTS[usize::from(code % 8).min(FAULTS.len() - 1)];
+    match code {
+        1 => Link::Fresh,
+        2 => Link::Extrapolating,
+        8..16 => Link::Ramping(fault),
+        16.. => Link::Latched(fault),
+        _ => Link::Waiting,
+    }
+}
+
+/// Counters at one time.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[allow(missing_docs)] // as in Stats
+pub struct Summary {
+    pub sent: u64,
+    pub dropped_up: u64,
+    pub received: u64,
+    pub rejected: u64,
+    pub dropped_down: u64,
+    pub peer_faults: u64,
+    pub reconnects: u64,
+    pub latched: u64,
+    pub saturated: u64,
+    pub rate_limited: u64,
+    pub non_finite: u64,
+    pub damped: u64,
+    pub peak_force_n: f64,
+    pub final_force_n: f64,
+    pub round_trip: Percentiles,
+    pub ticks: u64,
+    pub overruns: u64,
+    pub skipped: u64,
+    pub wakeup_lateness: Percentiles,
+    pub tick_cost: Percentiles,
+}
+
+impl fmt::Display for Summary {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let us = |ns: u64| ns as f64 / 1e3;
+        writeln!(
+            f,
+            "stream   {} samples sent ({} dropped), {} commands received ({} refused, {} dropped), {} reconnects",
+            self.sent, self.dropped_up, self.received, self.rejected, self.dropped_down, self.reconnects
+        )?;
+        let trip = &self.round_trip;
+        if trip.count == 0 {
+            writeln!(f, "trip     pose to force: none measured")?;
+        } else {
+            let (p50, p99, max) = (us(trip.p50_ns), us(trip.p99_ns), us(trip.max_ns));
+            writeln!(f, "trip     pose to force p50 {p50:.0} us, p99 {p99:.0} us, max {max:.0} us")?;
+        }
+        writeln!(
+            f,
+            "servo    {} ticks, {} overruns, {} skipped; woke late p50 {:.1} us, p99 {:.1} us, max {:.1} us; cost p99 {:.1} us",
+            self.ticks,
+            self.overruns,
+            self.skipped,
+            us(self.wakeup_lateness.p50_ns),
+            us(self.wakeup_lateness.p99_ns),
+            us(self.wakeup_lateness.max_ns),
+            us(self.tick_cost.p99_ns)
+        )?;
+        write!(
+            f,
+            "force    peak {:.3} N; ticks limited: peak {}, rate {}, passivity {}, not finite {}; faults: {} latched, {} from the \
+             daemon",
+            self.peak_force_n,
+            self.saturated,
+            self.rate_limited,
+            self.damped,
+            self.non_finite,
+            self.latched,
+            self.peer_faults
+        )
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_state_of_the_link_survives_its_code() {
+        let states = FAULTS.iter().flat_map(|fault| [Link::Ramping(*fault), Link::Latched(*fault)]);
+        for link in states.chain([Link::Waiting, Link::Fresh, Link::Extrapolating]) {
+            assert_eq!(link_of(code_of(link)), link);
+        }
+    }
+
+    #[test]
+    fn the_peak_is_the_largest_force() {
+        let stats = Stats::default();
+        for force_n in [0.5, 2.0, 1.0] {
+            stats.set_force(force_n);
+        }
+        assert_eq!((stats.summary().peak_force_n, stats.force_n()), (2.0, 1.0));
+    }
+}

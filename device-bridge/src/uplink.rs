@@ -1,0 +1,335 @@
+//! The stream to the daemon: newest samples up, newest commands down, and back again when it breaks.
+use crate::{
+    BridgeError,
+    backoff::Backoff,
+    convert::{self, Command, Sample, Welcome},
+    run::Shared,
+    settings::{UplinkSettings, causes},
+};
+use palpate_proto::v1::{self, device_client::DeviceClient, device_down::Message};
+use palpate_realtime::{Clock, Doorbell, SlotReader, SlotWriter};
+use std::{
+    future::Future,
+    pin::Pin,
+    sync::{Arc, Mutex, PoisonError, atomic::Ordering},
+    task::{Context, Poll, ready},
+    time::{Duration, Instant},
+};
+use tokio::net::unix::pipe;
+use tokio_stream::Stream;
+use tokio_util::sync::{CancellationToken, WaitForCancellationFutureOwned};
+use tonic::{Code, Status, Streaming};
+
+/// Longest wait for the daemon's welcome, and for its end of a stream that we ended.
+const ANSWER_TIMEOUT: Duration = Duration::from_secs(5);
+
+/// Where samples come from: shared by the streams of successive connections, one at a time.
+#[derive(Debug)]
+pub struct SampleSource {
+    /// The bell's descriptor, read as a pipe is.
+    bell: pipe::Receiver,
+    samples: SlotReader<Option<Sample>>,
+}
+
+impl SampleSource {
+    /// Samples announced by `bell`.
+    ///
+    /// # Errors
+    /// When the runtime cannot watch the bell.
+    pub fn new(bell: &Doorbell, samples: SlotReader<Option<Sample>>) -> std::io::Result<Self> {
+        Ok(Self { bell: pipe::Receiver::from_owned_fd_unchecked(bell.try_clone_fd()?)?, samples })
+    }
+
+    fn poll_newest(&mut self, cx: &mut Context<'_>) -> Poll<Sample> {
+        loop {
+            // An error cannot happen on an open eventfd; were it to, the samples still come with the next ring.
+            let _ = ready!(self.bell.poll_read_ready(cx));
+            let rang = self.bell.try_read(&mut [0; 8]).is_ok();
+            if let (true, Some(Some(sample))) = (rang, self.samples.take()) {
+                return Poll::Ready(*sample);
+            }
+        }
+    }
+}
+
+/// Messages of one connection: the hello, then the newest sample whenever the transport can take one, until ended.
+struct UpStream {
+    hello: Option<v1::DeviceUp>,
+    source: Arc<Mutex<SampleSource>>,
+    end: Pin<Box<WaitForCancellationFutureOwned>>,
+    shared: Arc<Shared>,
+}
+
+impl Stream for UpStream {
+    type Item = v1::DeviceUp;
+
+    fn poll_next(mut self: Pin<&mut Self>, cx: &mut Context<'_>) -> Poll<Option<v1::DeviceUp>> {
+        if let Some(hello) = self.hello.take() {
+            return Poll::Ready(Some(hello));
+        }
+        if self.end.as_mut().poll(cx).is_ready() {
+            return Poll::Ready(None);
+        }
+        let sample = ready!(self.source.lock().unwrap_or_else(PoisonError::into_inner).poll_newest(cx));
+        self.shared.stats.sent.increment();
+        Poll::Ready(Some(convert::sample(&sample)))
+    }
+}
+
+/// Why a connection ended.
+enum Ended {
+    /// The daemon cannot be reached.
+    Unreachable(String),
+    /// It answered, and refused.
+    Refused(Status),
+    /// It was attached, and is no longer.
+    Lost(String),
+    /// We ended it.
+    ByUs,
+}
+
+/// The uplink task.
+pub struct Uplink {
+    settings: UplinkSettings,
+    source: Arc<Mutex<SampleSource>>,
+    commands: SlotWriter<Option<Command>>,
+    shared: Arc<Shared>,
+    end: CancellationToken,
+    last_said: String,
+}
+
+impl Uplink {
+    /// Ends its stream when `end` is cancelled.
+    pub fn new(
+        settings: UplinkSettings,
+        source: SampleSource,
+        commands: SlotWriter<Option<Command>>,
+        shared: Arc<Shared>,
+        end: CancellationToken,
+    ) -> Self {
+        let source = Arc::new(Mutex::new(source));
+        Self { settings, source, commands, shared, end, last_said: String::new() }
+    }
+
+    /// Connects, and connects again, until ended.
+    ///
+    /// # Errors
+    /// [`BridgeError::Unreachable`] and [`BridgeError::Refused`], before the arm was ever attached.
+    pub async fn run(mut self) -> Result<(), BridgeError> {
+        let (first, longest) = self.settings.pauses;
+        let mut backoff = Backoff::new(first, longest, self.settings.seed);
+        let began = Instant::now();
+        loop {
+            let attached_before = self.shared.stats.attached.get();
+            let ended = self.connection().await;
+            self.shared.attached.store(false, Ordering::Relaxed);
+            if self.shared.stats.attached.get() > attached_before {
+                backoff.reset();
+            }
+            if self.end.is_cancelled() || matches!(ended, Ended::ByUs) {
+                return Ok(());
+            }
+            self.shared.stats.failures.increment();
+            self.say_or_stop(&ended, began.elapsed())?;
+            tokio::select! {
+                () = self.end.cancelled() => return Ok(()),
+                () = tokio::time::sleep(backoff.pause()) => {}
+            }
+        }
+    }
+
+    /// Logs each reason once, however often it repeats.
+    fn say_or_stop(&mut self, ended: &Ended, since_start: Duration) -> Result<(), BridgeError> {
+        let address = &self.settings.address;
+        let never_attached = self.shared.stats.attached.get() == 0;
+        let text = match ended {
+            Ended::ByUs => return Ok(()),
+            Ended::Refused(status) => {
+                if let (true, Some(help)) = (never_attached, final_refusal(status.code())) {
+                    return Err(refused(address, status, help));
+                }
+                format!("the daemon at {address} refused the arm: {}", status.message())
+            }
+            Ended::Unreachable(reason) | Ended::Lost(reason) => {
+                if let Some(limit) = self.settings.give_up_after.filter(|limit| never_attached && since_start > *limit)
+                {
+                    let (address, reason) = (address.clone(), reason.clone());
+                    return Err(BridgeError::Unreachable { address, seconds: limit.as_secs_f64(), reason });
+                }
+                match ended {
+                    Ended::Lost(_) => format!("lost the daemon at {address} ({reason}); the force is ramped to zero"),
+                    _ => format!("no daemon answers at {address} ({reason}): is `palpated` running there"),
+                }
+            }
+        };
+        if text != self.last_said {
+            tracing::warn!("{text}; trying again, at least every {:?}", self.settings.pauses.1);
+            self.last_said = text;
+        }
+        Ok(())
+    }
+
+    async fn connection(&mut self) -> Ended {
+        // Ends the outbound half whichever way this function returns, so that two streams never share the source.
+        let stream_end = self.end.child_token();
+        let _ended_on_return = stream_end.clone().drop_guard();
+        let connected = tokio::select! {
+            () = self.end.cancelled() => return Ended::ByUs,
+            connected = self.settings.endpoint.connect() => connected,
+        };
+        let channel = match connected {
+            Ok(channel) => channel,
+            Err(error) => return Ended::Unreachable(causes(&error)),
+        };
+        let up = UpStream {
+            hello: Some(convert::hello(&self.settings)),
+            source: Arc::clone(&self.source),
+            end: Box::pin(stream_end.cancelled_owned()),
+            shared: Arc::clone(&self.shared),
+        };
+        let mut client = DeviceClient::new(channel);
+        let attach = async {
+            let mut down = client.attach(up).await?.into_inner();
+            let first = down.message().await?;
+            Ok::<_, Status>((down, first))
+        };
+        let attached = tokio::select! {
+            () = self.end.cancelled() => return Ended::ByUs,
+            attached = tokio::time::timeout(ANSWER_TIMEOUT, attach) => attached,
+        };
+        match attached {
+            Err(_) => Ended::Unreachable(format!("it sent no welcome within {ANSWER_TIMEOUT:?}")),
+            Ok(Err(status)) if is_transport(&status) => Ended::Unreachable(causes(&status)),
+            Ok(Err(status)) => Ended::Refused(status),
+            Ok(Ok((down, first))) => match welcome_of(first) {
+                Ok(welcome) => self.attached(down, &welcome).await,
+                Err(reason) => Ended::Refused(Status::failed_precondition(reason)),
+            },
+        }
+    }
+
+    async fn attached(&mut self, mut down: Streaming<v1::DeviceDown>, welcome: &Welcome) -> Ended {
+        tracing::info!(
+            "attached to tool \"{}\" of session {} at {}: tick {} ms, at most {} N",
+            welcome.tool_name,
+            welcome.session_id,
+            self.settings.address,
+            welcome.tick_period_s * 1e3,
+            welcome.limits.max_force_n
+        );
+        self.last_said.clear();
+        self.shared.stats.attached.increment();
+        self.shared.attached.store(true, Ordering::Relaxed);
+        let mut told = Told::default();
+        loop {
+            let message = tokio::select! {
+                biased;
+                message = down.message() => message,
+                () = self.end.cancelled() => return self.ended_by_us(down).await,
+            };
+            match message {
+                Ok(Some(message)) => self.take(message, welcome, &mut told),
+                Ok(None) => return Ended::Lost("it ended the stream".to_owned()),
+                Err(status) => return Ended::Lost(causes(&status)),
+            }
+        }
+    }
+
+    /// Our half is ended already; waits for the daemon to end its own.
+    async fn ended_by_us(&self, mut down: Streaming<v1::DeviceDown>) -> Ended {
+        self.shared.attached.store(false, Ordering::Relaxed);
+        let drain = async { while let Ok(Some(_)) = down.message().await {} };
+        if tokio::time::timeout(ANSWER_TIMEOUT, drain).await.is_err() {
+            tracing::warn!("the daemon did not end the stream within {ANSWER_TIMEOUT:?}");
+        }
+        Ended::ByUs
+    }
+
+    fn take(&mut self, message: v1::DeviceDown, welcome: &Welcome, told: &mut Told) {
+        let now_ns = Clock::Monotonic.now_ns();
+        match message.message {
+            Some(Message::Command(wire)) => match convert::command(&wire, welcome, now_ns) {
+                Ok(command) => {
+                    self.shared.stats.received.increment();
+                    if wire.sample_sequence > told.newest_sequence {
+                        told.newest_sequence = wire.sample_sequence;
+                        self.shared.stats.round_trip.record(now_ns.saturating_sub(wire.echo_device_time_ns));
+                    }
+                    self.commands.publish(Some(command));
+                }
+                Err(rejection) => {
+                    self.shared.stats.rejected.increment();
+                    told.once(&format!("a command of the daemon was refused: {rejection}"));
+                }
+            },
+            Some(Message::Fault(fault)) => self.take_fault(&fault, told),
+            Some(Message::Welcome(_)) | None => {
+                self.shared.stats.rejected.increment();
+                told.once("the daemon sent a message that has no place here");
+            }
+        }
+    }
+
+    fn take_fault(&self, fault: &v1::DeviceFault, told: &mut Told) {
+        use v1::DeviceFaultCode::{Detached, Quarantined};
+        self.shared.stats.peer_faults.increment();
+        told.once(&format!("the daemon reports {}: {}", fault.code().as_str_name(), fault.message));
+        if matches!(fault.code(), Detached | Quarantined) {
+            self.shared.peer_fault.store(true, Ordering::Relaxed);
+        }
+    }
+}
+
+/// What was said already on this connection, and the newest sample answered.
+#[derive(Debug, Default)]
+struct Told {
+    newest_sequence: u64,
+    said: Vec<String>,
+}
+
+impl Told {
+    /// More different texts than this are not from a healthy peer.
+    const MOST: usize = 32;
+
+    fn once(&mut self, text: &str) {
+        if self.said.len() < Self::MOST && !self.said.iter().any(|said| said == text) {
+            tracing::warn!("{text}");
+            self.said.push(text.to_owned());
+        }
+    }
+}
+
+fn welcome_of(first: Option<v1::DeviceDown>) -> Result<Welcome, String> {
+    match first.and_then(|down| down.message) {
+        Some(Message::Welcome(wire)) => {
+            convert::welcome(&wire).map_err(|rejection| format!("its welcome: {rejection}"))
+        }
+        Some(Message::Fault(fault)) => Err(fault.message),
+        Some(Message::Command(_)) | None => Err("its first message was no welcome".to_owned()),
+    }
+}
+
+/// Unavailable and Unknown come from the transport when a connection breaks.
+fn is_transport(status: &Status) -> bool {
+    matches!(status.code(), Code::Unavailable | Code::Unknown)
+}
+
+/// What to do about refusals that trying again does not change.
+fn final_refusal(code: Code) -> Option<&'static str> {
+    match code {
+        Code::NotFound => Some("give a tool that the scene has, with --tool; `palpate-view status` lists them"),
+        Code::InvalidArgument => Some("check device_name, tool and limits in the configuration"),
+        Code::Unauthenticated | Code::PermissionDenied => Some("ask whoever runs the daemon for access"),
+        Code::Unimplemented => Some("this is no Palpate daemon, or another version: check --server"),
+        _ => None,
+    }
+}
+
+fn refused(address: &str, status: &Status, help: &'static str) -> BridgeError {
+    BridgeError::Refused {
+        address: address.to_owned(),
+        code: format!("{:?}", status.code()),
+        message: status.message().to_owned(),
+        help,
+    }
+}

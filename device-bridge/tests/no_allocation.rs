@@ -1,0 +1,64 @@
+//! The servo thread touches no heap: device, law, slots, bell, counters.
+#![allow(clippy::unwrap_used)]
+use assert_no_alloc::{AllocDisabler, assert_no_alloc};
+use glam::{DMat3, DVec3};
+use palpate_bridge::{
+    Config,
+    convert::Command,
+    device::Device,
+    run::Shared,
+    servo::{Servo, ServoLaw},
+    settings::Settings,
+};
+use palpate_control::{ForceLimits, LocalModel};
+use palpate_realtime::{Clock, Doorbell, TickLoop, slot};
+use std::sync::{Arc, atomic::Ordering};
+
+#[global_allocator]
+static ALLOCATOR: AllocDisabler = AllocDisabler;
+
+#[test]
+fn the_servo_allocates_nothing() {
+    let runtime = tokio::runtime::Builder::new_current_thread().build().unwrap();
+    let settings = runtime.block_on(async { Settings::new(&Config::default()).unwrap() });
+    let (mut commands, down) = slot(&None);
+    let (up, mut samples) = slot(&None);
+    let shared = Arc::new(Shared::default());
+    shared.attached.store(true, Ordering::Relaxed);
+    let mut servo = Servo {
+        law: ServoLaw::new(settings.servo),
+        device: Device::open(&settings.device),
+        down,
+        up,
+        bell: Doorbell::new().unwrap(),
+        shared: Arc::clone(&shared),
+        sequence: 0,
+    };
+    let mut tick_loop = TickLoop::new(Clock::Monotonic, 1e-3).unwrap();
+    let thread = std::thread::spawn(move || {
+        assert_no_alloc(|| servo.run(&mut tick_loop));
+    });
+    // The other thread plays the uplink, for half a second.
+    let model = LocalModel {
+        point_m: DVec3::ZERO,
+        normal: DVec3::Z,
+        force_n: DVec3::Z,
+        stiffness_n_per_m: DMat3::from_diagonal(DVec3::splat(-300.0)),
+        validity_radius_m: 0.01,
+    };
+    for tick in 0..500 {
+        std::thread::sleep(std::time::Duration::from_millis(1));
+        commands.publish(Some(Command {
+            received_ns: Clock::Monotonic.now_ns(),
+            tick,
+            force_n: DVec3::Z,
+            local_model: (tick % 100 < 50).then_some(model),
+            model_age_s: 0.0,
+            limits: ForceLimits { max_force_n: 3.0, max_force_rate_n_per_s: 1000.0 },
+        }));
+    }
+    shared.stop.store(true, Ordering::Relaxed);
+    thread.join().unwrap();
+    assert!(samples.take().is_some_and(|sample| sample.is_some_and(|sample| sample.sequence > 10)));
+    assert!(shared.stats.summary().peak_force_n > 0.1);
+}

@@ -1,0 +1,192 @@
+//! The law of the servo, tick by tick, without threads or real time.
+#![allow(clippy::unwrap_used)] // helpers of tests
+use glam::{DMat3, DVec3};
+use palpate_bridge::{Config, convert::Command, servo::ServoLaw, settings::Settings};
+use palpate_control::{ArmSpec, Fault, ForceLimits, HandPath, Link, LocalModel, Motion, SimulatedArm};
+use proptest::prelude::*;
+
+const MS: u64 = 1_000_000;
+
+/// `Settings` opens an endpoint, which needs a runtime's context.
+fn law(change: impl FnOnce(&mut Config)) -> ServoLaw {
+    let mut config = Config::default();
+    config.passivity.enabled = false;
+    change(&mut config);
+    let runtime = tokio::runtime::Builder::new_current_thread().build().unwrap();
+    ServoLaw::new(runtime.block_on(async { Settings::new(&config).unwrap() }).servo)
+}
+
+fn command(received_ns: u64, force_n: DVec3, local_model: Option<LocalModel>) -> Command {
+    Command {
+        received_ns,
+        tick: 0,
+        force_n,
+        local_model,
+        model_age_s: 0.0,
+        limits: ForceLimits { max_force_n: 100.0, max_force_rate_n_per_s: 1e6 },
+    }
+}
+
+fn still() -> Motion {
+    Motion::at(DVec3::ZERO)
+}
+
+/// Fed every millisecond with 1 N until the ramp is up; the time of the last command.
+fn up(law: &mut ServoLaw) -> u64 {
+    for tick in 1..=500 {
+        law.receive(&command(tick * MS, DVec3::Z, None));
+        law.tick(tick * MS, &still());
+    }
+    assert!((law.tick(500 * MS, &still()).limited.force_n - DVec3::Z).length() < 1e-12);
+    500 * MS
+}
+
+#[test]
+fn no_command_no_force() {
+    let mut law = law(|_| {});
+    for tick in 0..100 {
+        let out = law.tick(tick * MS, &still());
+        assert_eq!((out.limited.force_n, out.verdict.link), (DVec3::ZERO, Link::Waiting));
+    }
+}
+
+#[test]
+fn silence_is_held_ramped_and_latched_within_twenty_ticks() {
+    let mut law = law(|_| {});
+    let last = up(&mut law);
+    for age in 1..=25_u64 {
+        let out = law.tick(last + age * MS, &still());
+        let expected_n = (1.0 - (age as f64 - 5.0).max(0.0) / 15.0).max(0.0);
+        assert!((out.limited.force_n.z - expected_n).abs() < 1e-9, "{age} ms: {}", out.limited.force_n.z);
+    }
+    assert_eq!(law.latched(), 1);
+}
+
+#[test]
+fn a_fading_force_is_replaced_by_damping() {
+    let mut law = law(|config| config.watchdog.fading_damping_n_s_per_m = 2.0);
+    let last = up(&mut law);
+    let moving = Motion { velocity_m_per_s: DVec3::new(0.1, 0.0, 0.0), ..still() };
+    let ramp = 1.0 - 7.0 / 15.0;
+    let out = law.tick(last + 12 * MS, &moving);
+    assert!((out.verdict.ramp - ramp).abs() < 1e-9);
+    // ramp · (F − (1 − ramp) B v)
+    let expected_n = ramp * (DVec3::Z - (1.0 - ramp) * 2.0 * moving.velocity_m_per_s);
+    assert!((out.limited.force_n - expected_n).length() < 1e-9, "{}", out.limited.force_n);
+}
+
+#[test]
+fn an_arm_that_reads_nan_gets_no_force_again() {
+    let mut law = law(|_| {});
+    let last = up(&mut law);
+    let bad = Motion::at(DVec3::new(f64::NAN, 0.0, 0.0));
+    law.tick(last, &bad);
+    for tick in 1..=20 {
+        law.receive(&command(last + tick * MS, DVec3::Z, None));
+        assert!(law.tick(last + tick * MS, &bad).limited.force_n.is_finite());
+    }
+    let out = law.tick(last + 20 * MS, &still());
+    assert_eq!((out.limited.force_n, out.verdict.link), (DVec3::ZERO, Link::Latched(Fault::NonFinite)));
+}
+
+#[test]
+fn an_old_model_in_a_fresh_command_fades() {
+    let mut law = law(|_| {});
+    let last = up(&mut law);
+    let model = LocalModel {
+        point_m: DVec3::ZERO,
+        normal: DVec3::Z,
+        force_n: DVec3::Z,
+        stiffness_n_per_m: DMat3::from_diagonal(DVec3::splat(-100.0)),
+        validity_radius_m: 0.01,
+    };
+    // hold 20 ms, forget 100 ms: half at 60 ms.
+    for (age_s, expected_n) in [(0.0, 1.0), (0.06, 0.5), (0.2, 0.0)] {
+        let fresh = Command { model_age_s: age_s, ..command(last, DVec3::Z, Some(model)) };
+        law.receive(&fresh);
+        law.tick(last, &still());
+        let out = (0..10).map(|_| law.tick(last, &still())).last().unwrap();
+        assert!((out.limited.force_n.z - expected_n).abs() < 1e-9, "{age_s} s: {}", out.limited.force_n.z);
+    }
+}
+
+#[test]
+fn automatic_recovery_needs_half_a_second_without_a_gap() {
+    let mut law = law(|config| config.servo.auto_recover = true);
+    let last = up(&mut law);
+    law.tick(last + 100 * MS, &still());
+    let mut tick = 100;
+    let mut feed = |law: &mut ServoLaw, ticks: u64, gap: u64| {
+        for _ in 0..ticks {
+            tick += 1;
+            law.receive(&command(last + tick * MS, DVec3::Z, None));
+            law.tick(last + tick * MS, &still());
+        }
+        tick += gap;
+        law.tick(last + tick * MS, &still()).verdict.link
+    };
+    assert_eq!(feed(&mut law, 400, 10), Link::Latched(Fault::Stale));
+    assert_eq!(feed(&mut law, 490, 0), Link::Latched(Fault::Stale), "the gap starts the half second again");
+    assert_eq!(feed(&mut law, 30, 0), Link::Fresh);
+}
+
+/// An arm in a hand on a delayed daemon: the wall's force comes 8 ms late, which alone is unstable; the local model is not.
+#[test]
+fn the_local_model_is_stable_where_the_delayed_force_is_not() {
+    let swing = |local: bool| {
+        let mut law = law(|config| config.render.local_model = local);
+        let spec = ArmSpec { hand_stiffness_n_per_m: 50.0, hand_damping_n_s_per_m: 0.5, ..ArmSpec::default() };
+        let path = HandPath::resting_at(DVec3::new(0.0, 0.0, -0.002));
+        let mut arm = SimulatedArm::new(spec, path, 1e-3).unwrap();
+        let (delay, stiffness) = (8, 400.0);
+        let mut seen_m = vec![arm.motion().position_m; delay];
+        let mut range = (f64::INFINITY, f64::NEG_INFINITY);
+        for tick in 1..=4000_usize {
+            let then_m = seen_m[tick - 1];
+            let wall_n = DVec3::Z * (-stiffness * then_m.z).max(0.0);
+            let model = LocalModel {
+                point_m: then_m,
+                normal: DVec3::Z,
+                force_n: wall_n,
+                stiffness_n_per_m: DMat3::from_diagonal(DVec3::new(0.0, 0.0, -stiffness)),
+                validity_radius_m: 0.02,
+            };
+            law.receive(&command(tick as u64 * MS, wall_n, Some(model)));
+            let out = law.tick(tick as u64 * MS, &arm.motion());
+            seen_m.push(arm.step(out.limited.force_n).position_m);
+            if tick > 3000 {
+                range = (range.0.min(arm.motion().position_m.z), range.1.max(arm.motion().position_m.z));
+            }
+        }
+        range.1 - range.0
+    };
+    let (delayed_m, local_m) = (swing(false), swing(true));
+    assert!(delayed_m > 1e-3, "the delayed wall must rattle: {delayed_m} m");
+    assert!(local_m < 1e-5, "the local model must settle: {local_m} m");
+}
+
+proptest! {
+    /// Whatever the daemon sends and however the arm moves: finite, within the peak, zero once stale.
+    #[test]
+    fn any_input_gives_a_safe_force(
+        ticks in prop::collection::vec(
+            (0..30_u64, any::<[f64; 3]>(), any::<[f64; 3]>(), any::<[f64; 3]>(), any::<bool>()), 1..100),
+    ) {
+        let mut law = law(|config| config.passivity.enabled = true);
+        let (mut now, mut last) = (0, None);
+        for (gap, force, position, velocity, arrives) in ticks {
+            now += gap * MS;
+            if arrives {
+                law.receive(&command(now, DVec3::from(force), None));
+                last = Some(now);
+            }
+            let motion = Motion { velocity_m_per_s: DVec3::from(velocity), ..Motion::at(DVec3::from(position)) };
+            let out = law.tick(now, &motion);
+            prop_assert!(out.limited.force_n.is_finite());
+            prop_assert!(out.limited.force_n.length() <= 3.3 * (1.0 + 1e-12));
+            if last.is_none_or(|at| now - at >= 20 * MS) {
+                prop_assert_eq!(out.limited.force_n, DVec3::ZERO);
+            }
+        }
+    }
+}
