@@ -34,27 +34,35 @@ pub struct GroupedMesh {
 }
 
 impl GroupedMesh {
-    /// Tets of the groups called `name`, or whose tag reads `name`; ascending.
+    /// Tets of the volume groups called `name`; where none is, of the one with this tag. Ascending.
     pub fn tets_of(&self, name: &str) -> Vec<u32> {
-        let chosen = |group: usize| self.groups.get(group).is_some_and(|g| g.dimension == 3 && g.answers_to(name));
-        let first = self.tet_group.iter().enumerate().filter(|&(_, &group)| chosen(group as usize));
-        let more = self.more_tet_groups.iter().filter(|(group, _)| chosen(*group)).flat_map(|(_, tets)| tets);
-        sorted(first.map(|(tet, _)| tet as u32).chain(more.copied()).collect())
+        self.tets_of_groups(&self.groups_called(name, |group| group.dimension == 3))
     }
 
-    /// Nodes of every group called `name` (or whose tag reads `name`), of whatever dimension; ascending.
+    /// Nodes of the groups called `name`, of whatever dimension; where none is, of those with this tag. Ascending.
     pub fn nodes_of(&self, name: &str) -> Vec<u32> {
-        let chosen = |group: usize| self.groups.get(group).is_some_and(|g| g.answers_to(name));
-        let mut nodes: Vec<u32> = self.tets_of(name).iter().flat_map(|&tet| self.mesh.tets()[tet as usize]).collect();
-        nodes.extend(self.surface_groups.iter().filter(|(group, _)| chosen(*group)).flat_map(|(_, t)| t).flatten());
-        nodes.extend(self.node_groups.iter().filter(|(group, _)| chosen(*group)).flat_map(|(_, n)| n));
+        let chosen = self.groups_called(name, |_| true);
+        let tets = self.tets_of_groups(&chosen);
+        let mut nodes: Vec<u32> = tets.iter().flat_map(|&tet| self.mesh.tets()[tet as usize]).collect();
+        nodes.extend(self.surface_groups.iter().filter(|(g, _)| chosen.contains(g)).flat_map(|(_, t)| t).flatten());
+        nodes.extend(self.node_groups.iter().filter(|(g, _)| chosen.contains(g)).flat_map(|(_, n)| n));
         sorted(nodes)
     }
-}
 
-impl Group {
-    fn answers_to(&self, name: &str) -> bool {
-        !name.is_empty() && (self.name == name || (!self.name.is_empty() && self.tag.to_string() == name))
+    fn tets_of_groups(&self, chosen: &[usize]) -> Vec<u32> {
+        let first = (0..self.tet_group.len()).filter(|&tet| chosen.contains(&(self.tet_group[tet] as usize)));
+        let more = self.more_tet_groups.iter().filter(|(g, _)| chosen.contains(g)).flat_map(|(_, tets)| tets);
+        sorted(first.map(|tet| tet as u32).chain(more.copied()).collect())
+    }
+
+    /// Indices of the groups that are `eligible` and meant by `name`. Tets without a group have none that is called.
+    fn groups_called(&self, name: &str, eligible: impl Fn(&Group) -> bool) -> Vec<usize> {
+        let that = |meant: &dyn Fn(&Group) -> bool| -> Vec<usize> {
+            let all = self.groups.iter().enumerate().filter(|(_, g)| !g.name.is_empty() && eligible(g) && meant(g));
+            all.map(|(index, _)| index).collect()
+        };
+        let named = that(&|group| group.name == name);
+        if named.is_empty() { that(&|group| group.tag.to_string() == name) } else { named }
     }
 }
 
@@ -193,6 +201,19 @@ mod tests {
         assert_eq!((mesh.tets_of("both"), mesh.tets_of("inside"), mesh.tets_of("")), (vec![0], vec![], vec![]));
         assert_eq!(mesh.nodes_of("inside"), [1, 2, 3]);
         assert!(mesh.warnings[0].starts_with("1 nodes that belong to no tet"));
+    }
+
+    /// A surface without a name is called by its tag, 1; the volume `wall` has the tag 1 too. The nodes of `1` were
+    /// those of both, so that fixing the surface fixed the whole body.
+    #[test]
+    fn a_name_goes_before_a_tag() {
+        let mut file = volume();
+        file.groups[0].tag = 1;
+        file.groups[2].name = "1".to_string();
+        file.groups[2].tag = 1;
+        let mesh = file.into_tet_mesh(1.0, UnusedNodes::Drop).unwrap();
+        assert_eq!(mesh.nodes_of("1"), [1, 2, 3]);
+        assert_eq!((mesh.tets_of("1"), mesh.tets_of("wall")), (vec![0], vec![0]));
     }
 
     #[test]
