@@ -15,7 +15,7 @@ use std::{
     sync::{Arc, atomic::Ordering},
 };
 
-/// With automatic recovery, commands must have come without a gap for so long (ns).
+/// With automatic recovery, commands must have come without a gap for so long (ns) since the fault was latched.
 const SETTLED_NS: u64 = 500_000_000;
 
 /// The law, free of threads and clocks.
@@ -27,6 +27,7 @@ pub struct ServoLaw {
     limiter: ForceLimiter,
     command: Option<Command>,
     steady_since_ns: Option<u64>,
+    faults_seen: u64,
 }
 
 /// What one tick did.
@@ -49,6 +50,7 @@ impl ServoLaw {
             limiter: ForceLimiter::new(settings.limits),
             command: None,
             steady_since_ns: None,
+            faults_seen: 0,
             settings,
         }
     }
@@ -86,6 +88,10 @@ impl ServoLaw {
         }
         self.recover_when_steady(now_ns);
         let verdict = self.watchdog.check(now_ns);
+        if self.watchdog.faults() > self.faults_seen {
+            self.faults_seen = self.watchdog.faults();
+            self.steady_since_ns = None;
+        }
         let wanted_n = self.wanted_n(motion, &verdict);
         let dt_s = self.settings.period_s;
         let step = self

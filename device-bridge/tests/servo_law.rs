@@ -130,6 +130,25 @@ fn automatic_recovery_needs_half_a_second_without_a_gap() {
     assert_eq!(feed(&mut law, 30, 0), Link::Fresh);
 }
 
+/// A fault of the daemon while its commands go on: the force once came back in the very tick after the fault was latched, because
+/// the commands had been steady for long.
+#[test]
+fn automatic_recovery_counts_from_the_fault() {
+    let mut law = law(|config| config.servo.auto_recover = true);
+    let last = up(&mut law);
+    law.trip(last, Fault::Peer);
+    let mut recovered_after_ms = None;
+    for tick in 1..=700_u64 {
+        law.receive(&command(last + tick * MS, DVec3::Z, None));
+        let link = law.tick(last + tick * MS, &still()).verdict.link;
+        if link == Link::Fresh && recovered_after_ms.is_none() {
+            recovered_after_ms = Some(tick);
+        }
+    }
+    // 15 ms of ramp, then half a second, then the next command.
+    assert!((515..=518).contains(&recovered_after_ms.unwrap()), "{recovered_after_ms:?}");
+}
+
 /// An arm in a hand on a delayed daemon: the wall's force comes 8 ms late, which alone is unstable; the local model is not.
 #[test]
 fn the_local_model_is_stable_where_the_delayed_force_is_not() {
