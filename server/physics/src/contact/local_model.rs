@@ -122,8 +122,9 @@ pub(super) fn update(
     let (k_n, k_t) = (estimate.normal_n_per_m, estimate.tangential_n_per_m);
     let across = DMat3::from_cols(normal * normal.x, normal * normal.y, normal * normal.z);
     let stiffness_n_per_m = across * (k_t - k_n) - DMat3::from_diagonal(DVec3::splat(k_t));
-    // δ = a²/R: within δ/2 Hertz's stiffness, ∝ √δ, changes by a quarter; the device moves further, by the coupling's stretch.
-    let body_radius_m = 0.5 * contact_radius_m * contact_radius_m / model.spec.radius_m;
+    // Hertz's force, linearised about δ = a²/R, is wrong by (3/8)(r/δ)² of itself at a distance r: 5 % at r = 0.35 δ. The device
+    // moves further than the tool, by the coupling's stretch.
+    let body_radius_m = 0.35 * contact_radius_m * contact_radius_m / model.spec.radius_m;
     let validity_radius_m = body_radius_m * (contact / series(contact, coupling));
     Some(LocalContactModel {
         point_m: tool.target.position_m,
