@@ -222,8 +222,6 @@ impl Model {
         let mass_kg = mass::lumped_kg(&spec.mesh, density);
         let inverse_mass_per_kg = free_inverse_mass(&mass_kg, &spec.prescribed)?;
         let kernel = ForceKernel::build(&spec.mesh, &rest_tets, &spec.tet_region, &materials, spec.settings.precision);
-        let contact =
-            ContactModel::build(&spec.mesh, &surface, &moduli_of_triangles(&spec, &surface), &mass_kg, &spec.tools);
         let omega = spectrum::max_natural_frequency_rad_per_s(
             &spec.mesh,
             &rest_tets,
@@ -231,7 +229,26 @@ impl Model {
             &materials,
             &inverse_mass_per_kg,
         );
-        let substeps = choose_substeps(&spec, &materials, omega, contact.frequency_bound_sq)?;
+        let contact = ContactModel::build(
+            &spec.mesh,
+            &surface,
+            &moduli_of_triangles(&spec, &surface),
+            &mass_kg,
+            omega,
+            &spec.tools,
+        );
+        let stretch_sq = stretch_factor_sq(&spec.settings);
+        // λ_max(s K + C) = s λ_max(K + C/s)
+        let springs: Vec<f64> = contact.nodal_stiffness_n_per_m.iter().map(|k| k / stretch_sq).collect();
+        let touched = if springs.is_empty() {
+            omega
+        } else {
+            let (tets, regions) = (&rest_tets, &spec.tet_region);
+            let inverse = &inverse_mass_per_kg;
+            spectrum::max_frequency_on_springs_rad_per_s(&spec.mesh, tets, regions, &materials, inverse, &springs)
+        };
+        let omega_sq = stretch_sq * touched.max(omega).powi(2) + contact.tool_frequency_sq;
+        let substeps = choose_substeps(&spec, &materials, omega_sq.sqrt())?;
         Ok(Self {
             surface,
             materials,
@@ -502,21 +519,19 @@ fn free_inverse_mass(mass_kg: &[f64], prescribed: &[PrescribedSpec]) -> Result<V
     Ok(inverse)
 }
 
-/// Substeps for a stable leapfrog: `dt = safety · (2/ω)(√(1 + ξ²) − ξ)` with
-/// `ω² = ω_el² (3s² − 1)/2 + ω_contact²` and `ξ = ½ ω τ`, the damping ratio at ω: τ is the largest ratio of viscosity to
+/// `(3s² − 1)/2`: how much the square of a frequency grows at stretch `s` (St. Venant-Kirchhoff, pulled).
+fn stretch_factor_sq(settings: &Settings) -> f64 {
+    (3.0 * settings.stretch_allowance.powi(2) - 1.0) / 2.0
+}
+
+/// Substeps for a stable leapfrog: `dt = safety · (2/ω)(√(1 + ξ²) − ξ)` with the largest frequency ω of the body, stretched by
+/// s and touched everywhere, `ω² = λ_max(M^{-½} (½(3s² − 1) K + K_contact) M^{-½})`, and `ξ = ½ ω τ`, the damping ratio at ω: τ is the largest ratio of viscosity to
 /// stiffness over P-waves, shear and bulk, `(φ + 2ψ)/(λ + 2µ)`, `ψ/µ`, `(φ + ⅔ψ)/(λ + ⅔µ)`.
-fn choose_substeps(
-    spec: &ModelSpec,
-    materials: &[Material],
-    omega_elastic: f64,
-    omega_contact_sq: f64,
-) -> Result<u32, ModelError> {
+fn choose_substeps(spec: &ModelSpec, materials: &[Material], omega: f64) -> Result<u32, ModelError> {
     let settings = &spec.settings;
     if let Substeps::Fixed(substeps) = settings.substeps {
         return Ok(substeps);
     }
-    let stretch = settings.stretch_allowance;
-    let omega = (omega_elastic.powi(2) * (3.0 * stretch * stretch - 1.0) / 2.0 + omega_contact_sq).sqrt();
     let xi = 0.5 * omega * materials.iter().map(relaxation_time_s).fold(0.0, f64::max);
     let dt_s = settings.step_safety * 2.0 / omega * ((1.0 + xi * xi).sqrt() - xi);
     let substeps = (settings.tick_period_s / dt_s).ceil().max(1.0);

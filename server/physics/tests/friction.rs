@@ -50,17 +50,18 @@ fn it_sticks_below_the_cone() {
     let last = drag_from_rest(&mut rig, 5e-5, 40)[39];
     let heat = rig.state.tools[0].friction_heat_j;
     println!("stick: {last} from {still}, heat {heat:.1e} J");
-    assert_eq!(heat, 0.0);
+    // Only the rim of the contact slips, where the pressure fades (Cattaneo, Mindlin).
+    assert!(heat < 0.1 * 0.5 * last.x.abs() * 5e-5, "{heat}");
     assert!(last.x < 0.0, "friction opposes the motion: {last}");
     assert!(last.x.abs() < 0.7 * mu * last.z && last.x.abs() > 0.1 * mu * last.z);
-    // Going back gives it all back: no heat, an elastic spring.
+    // Going back gives it back: an elastic spring, but for the rim.
     for tick in 1..=100 {
         let back = 5e-5 * (1.0 - f64::from(tick.min(40)) / 40.0);
         rig.tick_at(DVec3::new(-0.004 + back, 0.0, RADIUS_M - DEPTH_M));
     }
     let rest = rig.state.tools[0].contact_force_n;
     println!("back: {rest}");
-    assert!((rest.x - still.x).abs() < 0.01 * (last.x - still.x).abs(), "{rest} after {last}, {still} before");
+    assert!((rest.x - still.x).abs() < 0.1 * (last.x - still.x).abs(), "{rest} after {last}, {still} before");
 }
 
 #[test]
@@ -108,7 +109,7 @@ fn a_coupled_tool_sticks_until_the_spring_pulls_harder_than_the_cone() {
     };
     // 1.5 N press; the cone carries 0.75 N, the spring pulls with 2 N/mm: 0.4 N hold, 8 N do not.
     let (stuck, heat) = moved(2e-4);
-    assert!(stuck[1] < 0.4 * 2e-4 && (stuck[1] - stuck[0]).abs() < 1e-3 * stuck[1] && heat < 1e-9, "{stuck:?} {heat}");
+    assert!(stuck[1] < 0.4 * 2e-4 && (stuck[1] - stuck[0]).abs() < 1e-3 * stuck[1] && heat < 3e-6, "{stuck:?} {heat}");
     let (slid, heat) = moved(4e-3);
     assert!(slid[1] > 2e-3 && heat > 1e-3, "{slid:?} {heat}");
 }

@@ -8,19 +8,23 @@
 //! ```
 //! so contact is conservative and balances linear momentum exactly. `k_f = α (λ + 2µ)/min(h, R)` with the size `h = √(2A₀)`
 //! of the surface element: the foundation vanishes with the mesh (its compliance is first order in h), and its frequency
-//! scales like the element's own.
+//! scales like the element's own. Where a node has much surface and little mass (a sharp edge or corner), `k_f` is lowered so
+//! that the nodal part of the bound below stays under [`FREQUENCY_SHARE`] of the body's own ω²_max: contact never rules the
+//! time step.
 //!
-//! Bound of the frequency that contact adds. With `w_s = (ζ_s, −1)` on (nodes, tool), `K = Σ k a_s w_s w_sᵀ ⊗ C_s`, `C_s ≤ I`
+//! Bound of the frequency. With `w_s = (ζ_s, −1)` on (nodes, tool), `K = Σ k a_s w_s w_sᵀ ⊗ C_s`, `C_s ≤ I`
 //! (pressure along the normal, friction springs of at most the same stiffness across it). A positive block matrix is bounded
-//! by the sum of its diagonal blocks; the nodal block by its row sums (Gershgorin, `Σ_j ζ_sj = 1`):
-//! `λ_max(M⁻¹K) ≤ max_i Σ_s k a_s ζ_si / m_i + Σ_s k a_s / m_tool`. Only samples inside the sphere count: at most `2πR²` of
-//! surface on one node and `4πR²` in all.
-use super::{SurfaceModuli, ToolSpec, broad::Triangles};
+//! by the sum of its diagonal blocks, and the nodal block by the diagonal of its row sums (Gershgorin, `Σ_j ζ_sj = 1`):
+//! `K ≤ diag(Σ_s k a_s ζ_si) ⊕ Σ_s k a_s`. Only samples inside the sphere count: at most `2πR²` of surface on one node and
+//! `4πR²` in all. The largest frequency of body and diagonal together comes from the same Lanczos iteration as the body's own.
+use super::{SurfaceModuli, broad::Triangles};
 use glam::DVec3;
 use std::f64::consts::PI;
 
 /// α: foundation stiffness over that of one element layer, `(λ + 2µ)/h`. See `docs/adr` on contact.
-pub(super) const STIFFNESS_RATIO: f64 = 8.0;
+const STIFFNESS_RATIO: f64 = 8.0;
+/// Largest share of the body's ω²_max that contact may add at a node.
+const FREQUENCY_SHARE: f64 = 1.5;
 /// Sample spacing wanted, as a fraction of the tool's radius.
 const SPACING: f64 = 1.0 / 3.0;
 /// Most subdivisions of a triangle's edge.
@@ -41,6 +45,19 @@ pub(super) struct Foundation {
     indentation_modulus_pa: Vec<f64>,
     /// All samples.
     pub(super) samples: usize,
+    /// `k_f` (Pa/m) of a typical triangle of the softest material; what the coupling's limits are made of.
+    pub(super) typical_pa_per_m: f64,
+}
+
+/// What the foundation is made for.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct BodyAtRest<'a> {
+    pub(super) triangles: &'a Triangles,
+    pub(super) positions_m: &'a [DVec3],
+    pub(super) moduli: &'a [SurfaceModuli],
+    pub(super) mass_kg: &'a [f64],
+    /// ω²_max (rad²/s²) of the body without contact.
+    pub(super) frequency_sq: f64,
 }
 
 /// A triangle as the foundation sees it.
@@ -83,13 +100,8 @@ fn centroids(n: usize) -> Vec<[f64; 2]> {
 }
 
 impl Foundation {
-    pub(super) fn new(
-        triangles: &Triangles,
-        rest_positions_m: &[DVec3],
-        moduli: &[SurfaceModuli],
-        radius_m: f64,
-    ) -> Self {
-        let count = triangles.len();
+    pub(super) fn new(body: &BodyAtRest<'_>, radius_m: f64) -> Self {
+        let count = body.triangles.len();
         let mut built = Self {
             level: Vec::with_capacity(count),
             first_sample: Vec::with_capacity(count),
@@ -97,22 +109,31 @@ impl Foundation {
             stiffness_pa_per_m: Vec::with_capacity(count),
             indentation_modulus_pa: Vec::with_capacity(count),
             samples: 0,
+            typical_pa_per_m: 0.0,
         };
+        let most = most_at_nodes(body, radius_m);
+        let (mut softest_pa, mut ratio_area, mut total_m2) = (f64::INFINITY, 0.0, 0.0);
         for triangle in 0..count {
-            let [a, b, c] = triangles.corners(triangle, rest_positions_m);
-            let area_m2 = 0.5 * (b - a).cross(c - a).length();
+            let moduli = body.moduli[body.triangles.surface_triangle[triangle] as usize];
+            let corners = body.triangles.corners(triangle, body.positions_m);
+            let area_m2 = area_m2(corners);
+            // k_f = α (λ + 2µ)/min(h, R), and no more than any of its nodes can bear
+            let wanted = STIFFNESS_RATIO * moduli.p_wave_pa / (2.0 * area_m2).sqrt().min(radius_m);
+            let k_f = body.triangles.nodes[triangle].iter().map(|&n| most[n as usize]).fold(wanted, f64::min);
+            let [a, b, c] = corners;
             let longest_m = a.distance(b).max(b.distance(c)).max(c.distance(a));
             let n = ((longest_m / (SPACING * radius_m)).ceil() as usize).clamp(1, MAX_LEVEL);
-            let moduli = moduli[triangles.surface_triangle[triangle] as usize];
-            // k_f = α (λ + 2µ) / min(h, R)
-            let k_f = STIFFNESS_RATIO * moduli.p_wave_pa / (2.0 * area_m2).sqrt().min(radius_m);
             built.level.push(n as u8);
             built.first_sample.push(built.samples as u32);
             built.sample_stiffness_n_per_m.push(k_f * area_m2 / (n * n) as f64);
             built.stiffness_pa_per_m.push(k_f);
             built.indentation_modulus_pa.push(moduli.indentation_pa);
             built.samples += n * n;
+            softest_pa = softest_pa.min(moduli.p_wave_pa);
+            ratio_area += k_f / moduli.p_wave_pa * area_m2;
+            total_m2 += area_m2;
         }
+        built.typical_pa_per_m = softest_pa * ratio_area / total_m2;
         built
     }
 
@@ -126,38 +147,51 @@ impl Foundation {
         }
     }
 
-    /// Smallest `k_f` (Pa/m) of the surface.
-    pub(super) fn softest_pa_per_m(&self) -> f64 {
-        self.stiffness_pa_per_m.iter().copied().fold(f64::INFINITY, f64::min)
-    }
-
     /// Force (N) that presses a sphere to depth `d` into a flat foundation: `∫ k_f (d − r²/2R) dA = π k_f R d²`.
     pub(super) fn flat_force_n(&self, radius_m: f64, depth_m: f64) -> f64 {
-        PI * self.softest_pa_per_m() * radius_m * depth_m * depth_m
+        PI * self.typical_pa_per_m * radius_m * depth_m * depth_m
     }
 
-    /// Bound (rad²/s²) of the square of the frequency this tool's contact adds; see the module's documentation.
-    pub(super) fn frequency_bound_sq(&self, triangles: &Triangles, mass_kg: &[f64], tool: &ToolSpec) -> f64 {
-        let ball_m2 = PI * tool.radius_m * tool.radius_m;
-        let mut nodal_n_per_m = vec![0.0_f64; mass_kg.len()];
-        let mut nodal_k_f = vec![0.0_f64; mass_kg.len()];
-        let (mut total_n_per_m, mut stiffest) = (0.0, 0.0_f64);
+    /// Row sums `Σ_s k a_s ζ_si` (N/m) of what one tool can touch around each node, and of all it can touch at once; see the
+    /// module's documentation.
+    pub(super) fn row_sums_n_per_m(&self, triangles: &Triangles, nodes: usize, radius_m: f64) -> (Vec<f64>, f64) {
+        let ball_m2 = PI * radius_m * radius_m;
+        let (mut nodal, mut stiffest_at) = (vec![0.0_f64; nodes], vec![0.0_f64; nodes]);
+        let (mut total, mut stiffest) = (0.0, 0.0_f64);
         for (triangle, nodes) in triangles.nodes.iter().enumerate() {
             let k_f = self.stiffness_pa_per_m[triangle];
             let n = f64::from(self.level[triangle]);
             let whole = self.sample_stiffness_n_per_m[triangle] * n * n;
-            total_n_per_m += whole;
+            total += whole;
             stiffest = stiffest.max(k_f);
             for &node in nodes {
-                nodal_n_per_m[node as usize] += whole / 3.0;
-                nodal_k_f[node as usize] = nodal_k_f[node as usize].max(k_f);
+                nodal[node as usize] += whole / 3.0;
+                stiffest_at[node as usize] = stiffest_at[node as usize].max(k_f);
             }
         }
-        let nodal = (0..mass_kg.len())
-            .map(|node| nodal_n_per_m[node].min(2.0 * ball_m2 * nodal_k_f[node]) / mass_kg[node])
-            .fold(0.0, f64::max);
-        nodal + tool.coupling.frequency_bound_sq(total_n_per_m.min(4.0 * ball_m2 * stiffest))
+        for (sum, k_f) in nodal.iter_mut().zip(&stiffest_at) {
+            *sum = sum.min(2.0 * ball_m2 * k_f);
+        }
+        (nodal, f64::min(total, 4.0 * ball_m2 * stiffest))
     }
+}
+
+fn area_m2([a, b, c]: [DVec3; 3]) -> f64 {
+    0.5 * (b - a).cross(c - a).length()
+}
+
+/// Largest `k_f` (Pa/m) each node can bear: `k_f min(A_i, 2πR²)/m_i ≤ share · ω²_max`, with its third `A_i` of the triangles around.
+fn most_at_nodes(body: &BodyAtRest<'_>, radius_m: f64) -> Vec<f64> {
+    let mut area = vec![0.0; body.mass_kg.len()];
+    for (triangle, nodes) in body.triangles.nodes.iter().enumerate() {
+        let third = area_m2(body.triangles.corners(triangle, body.positions_m)) / 3.0;
+        for &node in nodes {
+            area[node as usize] += third;
+        }
+    }
+    let touched_m2 = 2.0 * PI * radius_m * radius_m;
+    let most = |(area, mass): (&f64, &f64)| FREQUENCY_SHARE * body.frequency_sq * mass / area.min(touched_m2);
+    area.iter().zip(body.mass_kg).map(most).collect()
 }
 
 #[cfg(test)]

@@ -22,7 +22,7 @@ pub use triangle::{closest_point, closest_weights};
 
 use crate::mesh::{Surface, TetMesh};
 use broad::Triangles;
-use foundation::{Foundation, SampleTables};
+use foundation::{BodyAtRest, Foundation, SampleTables};
 use glam::DVec3;
 use local_model::MeanContact;
 use narrow::{Meeting, Pressed};
@@ -40,8 +40,10 @@ pub struct SurfaceModuli {
 /// What contact needs that depends on the rest state alone.
 #[derive(Debug, Clone, Default)]
 pub struct ContactModel {
-    /// Bound on the square of the natural frequency that contact adds (rad²/s²): λ_max(A + B) ≤ λ_max(A) + λ_max(B).
-    pub frequency_bound_sq: f64,
+    /// Bound (N/m) of what contact can do at each node: a spring in all directions. Empty without tools.
+    pub nodal_stiffness_n_per_m: Vec<f64>,
+    /// Bound (rad²/s²) of what contact and coupling add through the tools' masses.
+    pub tool_frequency_sq: f64,
     triangles: Triangles,
     tables: SampleTables,
     tools: Vec<ToolModel>,
@@ -103,22 +105,39 @@ impl ToolModel {
 }
 
 impl ContactModel {
-    /// Precomputes contact samples and the foundation stiffness. `moduli[triangle]` are those of the tets behind it.
+    /// Precomputes contact samples and the foundation stiffness of a body at rest, whose largest natural frequency without
+    /// contact is given. `moduli[triangle]` are those of the tets behind it.
     pub fn build(
         mesh: &TetMesh,
         surface: &Surface,
         moduli: &[SurfaceModuli],
         mass_kg: &[f64],
+        max_natural_frequency_rad_per_s: f64,
         tools: &[ToolSpec],
     ) -> Self {
         if tools.is_empty() {
             return Self::default();
         }
         let triangles = Triangles::of(surface, mesh.positions_m());
-        let foundation = |tool: &ToolSpec| Foundation::new(&triangles, mesh.positions_m(), moduli, tool.radius_m);
-        let tools: Vec<ToolModel> = tools.iter().map(|tool| ToolModel::new(tool, foundation(tool))).collect();
-        let bound = |tool: &ToolModel| tool.foundation.frequency_bound_sq(&triangles, mass_kg, &tool.spec);
-        Self { frequency_bound_sq: tools.iter().map(bound).sum(), tables: SampleTables::new(), tools, triangles }
+        let body = BodyAtRest {
+            triangles: &triangles,
+            positions_m: mesh.positions_m(),
+            moduli,
+            mass_kg,
+            // A body without a free node has none; its foundation is then of no consequence, but must be finite.
+            frequency_sq: max_natural_frequency_rad_per_s.max(1.0).powi(2),
+        };
+        let tools: Vec<ToolModel> =
+            tools.iter().map(|tool| ToolModel::new(tool, Foundation::new(&body, tool.radius_m))).collect();
+        let (mut nodal_stiffness_n_per_m, mut tool_frequency_sq) = (vec![0.0; mass_kg.len()], 0.0);
+        for tool in &tools {
+            let (nodal, total) = tool.foundation.row_sums_n_per_m(&triangles, mass_kg.len(), tool.spec.radius_m);
+            for (sum, nodal) in nodal_stiffness_n_per_m.iter_mut().zip(nodal) {
+                *sum += nodal;
+            }
+            tool_frequency_sq += tool.spec.coupling.frequency_bound_sq(total);
+        }
+        Self { nodal_stiffness_n_per_m, tool_frequency_sq, tables: SampleTables::new(), tools, triangles }
     }
 
     /// Force (N) at which a tool's coupling saturates; infinite for a rigid tool.

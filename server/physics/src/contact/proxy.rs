@@ -14,9 +14,9 @@ use super::{Coupling, ToolModel, ToolState, narrow::Pressed};
 use glam::DVec3;
 
 /// Depth over R at which the coupling's force saturates.
-pub(super) const SATURATION_DEPTH: f64 = 0.2;
+pub(super) const SATURATION_DEPTH: f64 = 0.3;
 /// Depth over R whose foundation energy bounds the proxy's kinetic energy near the surface.
-pub(super) const IMPACT_DEPTH: f64 = 0.35;
+pub(super) const IMPACT_DEPTH: f64 = 0.4;
 /// Largest motion in a substep, and the width of the zone near the surface, over R.
 pub(super) const NEAR: f64 = 0.25;
 

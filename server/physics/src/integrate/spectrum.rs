@@ -35,11 +35,26 @@ pub fn max_natural_frequency_rad_per_s(
     materials: &[Material],
     inverse_mass_per_kg: &[DVec3],
 ) -> f64 {
-    let stiffness = RestStiffness { mesh, rest_tets, tet_material, materials };
+    let stiffness = RestStiffness { mesh, rest_tets, tet_material, materials, springs_n_per_m: &[] };
     let root_inverse_mass: Vec<DVec3> = inverse_mass_per_kg.iter().map(|m| m.map(f64::sqrt)).collect();
     let (theta, residual) = lanczos(&stiffness, &root_inverse_mass);
     let bound = element_bound_rad_per_s(mesh, rest_tets, tet_material, materials, inverse_mass_per_kg);
     (theta + residual).sqrt().min(bound)
+}
+
+/// ω_max (rad/s) of the same body with every node `i` on a spring of `springs_n_per_m[i]` in all directions: `K + diag(k_i)`.
+pub fn max_frequency_on_springs_rad_per_s(
+    mesh: &TetMesh,
+    rest_tets: &[RestTet],
+    tet_material: &[u16],
+    materials: &[Material],
+    inverse_mass_per_kg: &[DVec3],
+    springs_n_per_m: &[f64],
+) -> f64 {
+    let stiffness = RestStiffness { mesh, rest_tets, tet_material, materials, springs_n_per_m };
+    let root_inverse_mass: Vec<DVec3> = inverse_mass_per_kg.iter().map(|m| m.map(f64::sqrt)).collect();
+    let (theta, residual) = lanczos(&stiffness, &root_inverse_mass);
+    (theta + residual).sqrt()
 }
 
 /// `max_e ω_e ≥ ω_max` (rad/s): the frequency bound of single tets, each with its share `m_i V_e/Σ_{t∋i} V_t` of its nodes'
@@ -91,6 +106,8 @@ struct RestStiffness<'a> {
     rest_tets: &'a [RestTet],
     tet_material: &'a [u16],
     materials: &'a [Material],
+    /// One per node, or none.
+    springs_n_per_m: &'a [f64],
 }
 
 impl RestStiffness<'_> {
@@ -104,6 +121,9 @@ impl RestStiffness<'_> {
             for (&node, force) in nodes.iter().zip(rest.corner_forces_n(&sigma)) {
                 out[node as usize] -= force;
             }
+        }
+        for ((out, a), spring) in out.iter_mut().zip(a).zip(self.springs_n_per_m) {
+            *out += *a * *spring;
         }
     }
 }
