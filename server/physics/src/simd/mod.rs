@@ -1,20 +1,58 @@
-//! The force kernel: internal forces of all tets, in blocks, beside its scalar oracle.
+//! The force kernel: internal forces of all tets, in blocks of lanes, beside its scalar oracle.
+//!
+//! Forces are computed in f32 (16 lanes) or f64 (8 lanes) and summed per node in f64; positions and velocities are f64
+//! always. Displacements `u = x − X` are taken in f64, relative to node 0's so that a rigid translation costs no digits,
+//! and only then rounded. Same inputs, same bits, on every instruction set.
+// A vector type is only fast where it is inlined into a function compiled for its instruction set.
+#![allow(clippy::inline_always)]
+mod block;
+mod dispatch;
+mod laws;
+mod layout;
+mod oracle;
+mod real;
+#[cfg(target_arch = "x86_64")]
+mod x86;
+
 use crate::{fem::element::RestTet, material::Material, mesh::TetMesh, world::Precision};
+use block::{Blocks, Job, Node, Run, Sum};
+use dispatch::Available;
+pub use dispatch::InstructionSet;
 use glam::DVec3;
+pub use oracle::Oracle;
+use real::Scalar;
+
+/// Lanes of a block: a block is one or more whole vectors on every instruction set.
+const LANES_F32: usize = 16;
+const LANES_F64: usize = 8;
 
 /// Internal forces of a body: rest data laid out for the kernel of the chosen precision.
 #[derive(Debug, Clone)]
 pub struct ForceKernel {
-    rest_tets: Vec<RestTet>,
-    tets: Vec<[u32; 4]>,
-    tet_material: Vec<u16>,
-    materials: Vec<Material>,
+    layout: Layout,
+    nodes: usize,
     any_viscosity: bool,
+    instruction_set: Available,
+}
+
+#[derive(Debug, Clone)]
+enum Layout {
+    Single(Blocks<f32, LANES_F32>, Vec<Run<f32>>),
+    Double(Blocks<f64, LANES_F64>, Vec<Run<f64>>),
 }
 
 /// Buffers of the kernel.
-#[derive(Debug, Clone, Default)]
-pub struct KernelScratch {}
+#[derive(Debug, Clone)]
+pub struct KernelScratch {
+    nodes: NodeBuffers,
+    sums: Vec<Sum>,
+}
+
+#[derive(Debug, Clone)]
+enum NodeBuffers {
+    Single { displacements: Vec<Node<f32>>, velocities: Vec<Node<f32>> },
+    Double { displacements: Vec<Node<f64>>, velocities: Vec<Node<f64>> },
+}
 
 impl ForceKernel {
     /// Lays out the rest data. `tet_material[t]` indexes `materials`.
@@ -23,47 +61,102 @@ impl ForceKernel {
         rest_tets: &[RestTet],
         tet_material: &[u16],
         materials: &[Material],
-        _precision: Precision,
+        precision: Precision,
     ) -> Self {
+        let layout = match precision {
+            Precision::Single => {
+                let (blocks, runs) = layout::blocks(mesh, rest_tets, tet_material, materials);
+                Layout::Single(blocks, runs)
+            }
+            Precision::Double => {
+                let (blocks, runs) = layout::blocks(mesh, rest_tets, tet_material, materials);
+                Layout::Double(blocks, runs)
+            }
+        };
         Self {
-            rest_tets: rest_tets.to_vec(),
-            tets: mesh.tets().to_vec(),
-            tet_material: tet_material.to_vec(),
-            materials: materials.to_vec(),
+            layout,
+            nodes: mesh.positions_m().len(),
             any_viscosity: materials.iter().any(|m| !m.viscosity.is_zero()),
+            instruction_set: Available::at_most(InstructionSet::best()),
         }
+    }
+
+    /// The same kernel, held to an instruction set or the best below it that there is (for tests and benchmarks).
+    #[must_use]
+    pub fn with_instruction_set(self, instruction_set: InstructionSet) -> Self {
+        Self { instruction_set: Available::at_most(instruction_set), ..self }
     }
 
     /// Buffers for [`Self::forces_n`].
     pub fn scratch(&self) -> KernelScratch {
-        KernelScratch {}
+        // One spare node more, for the lanes of padding.
+        let count = self.nodes + 1;
+        let rates = if self.any_viscosity { count } else { 0 };
+        let nodes = match self.layout {
+            Layout::Single(..) => NodeBuffers::Single {
+                displacements: vec![Node::default(); count],
+                velocities: vec![Node::default(); rates],
+            },
+            Layout::Double(..) => NodeBuffers::Double {
+                displacements: vec![Node::default(); count],
+                velocities: vec![Node::default(); rates],
+            },
+        };
+        KernelScratch { nodes, sums: vec![Sum::default(); count] }
     }
 
     /// Overwrites `forces_n` (N) with elastic and viscous forces at positions `x` (m) and velocities `v` (m/s), and
     /// returns the power (W) that viscous stress takes. `v` is not read when no material is viscous.
     pub fn forces_n(
         &self,
-        _rest_positions_m: &[DVec3],
+        rest_positions_m: &[DVec3],
         x: &[DVec3],
         v: &[DVec3],
         forces_n: &mut [DVec3],
-        _scratch: &mut KernelScratch,
+        scratch: &mut KernelScratch,
     ) -> f64 {
-        forces_n.fill(DVec3::ZERO);
-        let mut viscous_power_w = 0.0;
-        for (tet, nodes) in self.tets.iter().enumerate() {
-            let material = &self.materials[self.tet_material[tet] as usize];
-            let corners = nodes.map(|n| x[n as usize]);
-            let velocities = nodes.map(|n| v[n as usize]);
-            let rest = &self.rest_tets[tet];
-            let f = rest.forces_n(material, &corners, &velocities);
-            if self.any_viscosity {
-                viscous_power_w += rest.viscous_power_w(material, &corners, &velocities);
+        let KernelScratch { nodes, sums } = scratch;
+        sums.fill(Sum::default());
+        let power_w = match (&self.layout, nodes) {
+            (Layout::Single(blocks, runs), NodeBuffers::Single { displacements, velocities }) => {
+                self.evaluate((blocks, runs), (rest_positions_m, x, v), (displacements, velocities), sums)
             }
-            for (corner, &node) in nodes.iter().enumerate() {
-                forces_n[node as usize] += f[corner];
+            (Layout::Double(blocks, runs), NodeBuffers::Double { displacements, velocities }) => {
+                self.evaluate((blocks, runs), (rest_positions_m, x, v), (displacements, velocities), sums)
+            }
+            _ => unreachable!("scratch of another kernel"),
+        };
+        for (force, Sum([fx, fy, fz, _])) in forces_n.iter_mut().zip(sums.iter()) {
+            *force = DVec3::new(*fx, *fy, *fz);
+        }
+        power_w
+    }
+
+    fn evaluate<T: Scalar, const N: usize>(
+        &self,
+        (blocks, runs): (&Blocks<T, N>, &[Run<T>]),
+        (rest_positions_m, x, v): (&[DVec3], &[DVec3], &[DVec3]),
+        (displacements, velocities): (&mut [Node<T>], &mut [Node<T>]),
+        sums: &mut [Sum],
+    ) -> f64 {
+        let origin = x[0] - rest_positions_m[0];
+        for ((u, x), rest) in displacements.iter_mut().zip(x).zip(rest_positions_m) {
+            *u = rounded(*x - *rest - origin);
+        }
+        if self.any_viscosity {
+            for (rate, v_node) in velocities.iter_mut().zip(v) {
+                *rate = rounded(*v_node - v[0]);
             }
         }
-        viscous_power_w
+        let mut power_w = 0.0;
+        for run in runs {
+            let mut job = Job::new(blocks, run, displacements, velocities, sums);
+            power_w += dispatch::run(self.instruction_set, &run.material, &mut job);
+        }
+        power_w
     }
+}
+
+fn rounded<T: Scalar>(a: DVec3) -> Node<T> {
+    Node([T::of(a.x), T::of(a.y), T::of(a.z), T::of(0.0)])
 }

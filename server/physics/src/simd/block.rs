@@ -1,0 +1,277 @@
+//! Tets in blocks of `N` lanes (an array of structs of arrays), and the loop over them.
+//!
+//! A few blocks at a time: gather the corners' displacements (and velocities) as differences to corner 0, compute all
+//! lanes a vector at a time, scatter the corner forces lane by lane in a fixed order. Three separate passes, because a wide
+//! load waits for the narrow stores it overlaps until they have left the store buffer.
+#![allow(unsafe_code)] // unchecked node indices in gather and scatter: 10 % of the kernel's time (docs/adr)
+use super::{
+    laws::{Constants, LaneLaw, M3, columns, plus, rows, viscous},
+    real::{Real, Scalar, Vector},
+};
+use crate::material::Material;
+use glam::DMat3;
+
+/// Three components of a node and one of padding, so that a node is one vector load.
+#[derive(Debug, Clone, Copy, Default)]
+#[repr(C, align(16))]
+pub(super) struct Node<T>(pub(super) [T; 4]);
+
+/// A sum of forces (N) on a node, in f64 for every precision: what a tet adds is zero in total to 1e-16.
+#[derive(Debug, Clone, Copy, Default)]
+#[repr(C, align(32))]
+pub(super) struct Sum(pub(super) [f64; 4]);
+
+/// Rest data of `N` tets. Lanes of padding have four times the spare node, no gradients and no volume.
+#[derive(Debug, Clone)]
+#[repr(C, align(64))]
+pub(super) struct Block<T, const N: usize> {
+    /// Corners of each lane.
+    pub(super) nodes: [[u32; 4]; N],
+    /// `b_1`, `b_2`, `b_3` (1/m): entry `3(i − 1) + axis`.
+    pub(super) gradients: [[T; N]; 9],
+    /// `−V` (m³).
+    pub(super) minus_volume: [T; N],
+}
+
+/// All blocks of a body, with node indices that were checked.
+#[derive(Debug, Clone)]
+pub(super) struct Blocks<T, const N: usize> {
+    blocks: Vec<Block<T, N>>,
+    nodes: usize,
+}
+
+impl<T: Scalar, const N: usize> Blocks<T, N> {
+    /// Blocks over `nodes` nodes, and the spare one of that index.
+    pub(super) fn new(blocks: Vec<Block<T, N>>, nodes: usize) -> Self {
+        let in_range = |block: &Block<T, N>| block.nodes.iter().flatten().all(|&node| node as usize <= nodes);
+        assert!(blocks.iter().all(in_range), "a tet refers to a node that is not there");
+        Self { blocks, nodes }
+    }
+
+    /// The blocks of a run.
+    pub(super) fn of(&self, run: &Run<T>) -> &[Block<T, N>] {
+        &self.blocks[run.blocks.clone()]
+    }
+}
+
+/// Consecutive blocks of one material.
+#[derive(Debug, Clone)]
+pub(super) struct Run<T> {
+    pub(super) material: Material,
+    pub(super) constants: Constants<T>,
+    pub(super) blocks: std::ops::Range<usize>,
+}
+
+/// What the loop over blocks works on. Made by [`Job::new`] alone, so that its node indices are in range.
+pub(super) struct Job<'a, T, const N: usize> {
+    blocks: &'a [Block<T, N>],
+    constants: Constants<T>,
+    displacements: &'a [Node<T>],
+    velocities: &'a [Node<T>],
+    sums: &'a mut [Sum],
+}
+
+impl<'a, T: Scalar, const N: usize> Job<'a, T, N> {
+    /// `displacements`, `velocities` and `sums` have an entry per node and a spare one; `velocities` is empty unless the
+    /// run's material is viscous.
+    pub(super) fn new(
+        blocks: &'a Blocks<T, N>,
+        run: &Run<T>,
+        displacements: &'a [Node<T>],
+        velocities: &'a [Node<T>],
+        sums: &'a mut [Sum],
+    ) -> Self {
+        let entries = blocks.nodes + 1;
+        assert!(displacements.len() == entries && sums.len() == entries, "buffers of another kernel");
+        assert!(run.material.viscosity.is_zero() || velocities.len() == entries, "buffers of another kernel");
+        Self { blocks: blocks.of(run), constants: run.constants, displacements, velocities, sums }
+    }
+}
+
+/// Three components of a row and one of padding.
+pub(super) type Quad<T> = [T; 4];
+
+/// Nine components in lanes: differences `a_i − a_0` or forces `f_i`, `i = 1, 2, 3`, entry `3(i − 1) + axis`.
+pub(super) type Lanes<T, const N: usize> = [[T; N]; 9];
+
+/// Blocks that are gathered, computed and scattered together.
+const BATCH: usize = 4;
+
+/// Adds the forces of all blocks to the sums, computed in vectors `V`; returns the viscous power (W).
+#[inline(always)]
+pub(super) fn add_forces<V: Vector<Scalar = T>, T: Scalar, L: LaneLaw, const VISCOUS: bool, const N: usize>(
+    job: &mut Job<'_, T, N>,
+) -> f64 {
+    let mut edges: [Lanes<T, N>; BATCH] = [[[T::of(0.0); N]; 9]; BATCH];
+    let mut edge_rates = edges;
+    let mut forces = edges;
+    let mut power_w = 0.0;
+    for batch in job.blocks.chunks(BATCH) {
+        for (index, block) in batch.iter().enumerate() {
+            gather(&block.nodes, job.displacements, &mut edges[index]);
+            if VISCOUS {
+                gather(&block.nodes, job.velocities, &mut edge_rates[index]);
+            }
+        }
+        for (index, block) in batch.iter().enumerate() {
+            let input = Input { block, edges: &edges[index], edge_rates: &edge_rates[index] };
+            power_w += compute::<V, T, L, VISCOUS, N>(&job.constants, &input, &mut forces[index]);
+        }
+        for (index, block) in batch.iter().enumerate() {
+            scatter(&block.nodes, &forces[index], job.sums);
+        }
+    }
+    power_w
+}
+
+/// One block, gathered.
+struct Input<'a, T, const N: usize> {
+    block: &'a Block<T, N>,
+    edges: &'a Lanes<T, N>,
+    edge_rates: &'a Lanes<T, N>,
+}
+
+/// Forces of one block; returns the viscous power (W).
+#[inline(always)]
+fn compute<V: Vector<Scalar = T>, T: Scalar, L: LaneLaw, const VISCOUS: bool, const N: usize>(
+    constants: &Constants<T>,
+    input: &Input<'_, T, N>,
+    forces: &mut Lanes<T, N>,
+) -> f64 {
+    let c: Constants<V> = constants.converted();
+    let mut inside = [T::of(0.0); N];
+    let mut power = [T::of(0.0); N];
+    for first in (0..N).step_by(V::WIDTH) {
+        let b: [V; 9] = load(&input.block.gradients, first);
+        let minus_volume = V::load(&input.block.minus_volume[first..]);
+        let h = gradient(&b, &load(input.edges, first));
+        let (mut p, domain) = L::piola(&c, &h);
+        if VISCOUS {
+            let (viscous_p, density) = viscous(&c, &h, &gradient(&b, &load(input.edge_rates, first)));
+            p = plus(&p, &viscous_p);
+            (V::of(0.0) - density * minus_volume).store(&mut power[first..]);
+        }
+        if L::DOMAIN.is_some() {
+            domain.store(&mut inside[first..]);
+        }
+        let f = corner_forces(&b, minus_volume, &p);
+        for component in 0..9 {
+            f[component].store(&mut forces[component][first..]);
+        }
+    }
+    if let Some(limit) = L::DOMAIN {
+        let limit = T::of(limit);
+        // Counted without an early exit: a vector loop. NaN is outside.
+        let count = inside.iter().map(|&domain| u32::from(domain >= limit)).sum::<u32>();
+        if count < N as u32 {
+            redo_outside::<T, L, VISCOUS, N>(constants, input, &inside, forces);
+        }
+    }
+    if VISCOUS { power.iter().fold(0.0, |sum, &p| sum + p.into()) } else { 0.0 }
+}
+
+/// Lanes outside the law's domain, once more, in f64.
+#[cold]
+#[inline(never)]
+fn redo_outside<T: Scalar, L: LaneLaw, const VISCOUS: bool, const N: usize>(
+    constants: &Constants<T>,
+    input: &Input<'_, T, N>,
+    inside: &[T; N],
+    forces: &mut Lanes<T, N>,
+) {
+    let limit = T::of(L::DOMAIN.unwrap_or(0.0));
+    for lane in 0..N {
+        if inside[lane] >= limit {
+            continue;
+        }
+        let b: [f64; 9] = input.block.gradients.map(|component| component[lane].into());
+        let h = gradient(&b, &input.edges.map(|component| component[lane].into()));
+        let c: Constants<f64> = constants.converted();
+        let mut p: M3<f64> = rows(&L::piola_outside(&c, &(columns(&h) + DMat3::IDENTITY)));
+        if VISCOUS {
+            let h_dot = gradient(&b, &input.edge_rates.map(|component| component[lane].into()));
+            p = plus(&p, &viscous(&c, &h, &h_dot).0);
+        }
+        let f = corner_forces(&b, input.block.minus_volume[lane].into(), &p);
+        for component in 0..9 {
+            forces[component][lane] = T::of(f[component]);
+        }
+    }
+}
+
+#[inline(always)]
+fn load<V: Vector, const N: usize>(lanes: &Lanes<V::Scalar, N>, first: usize) -> [V; 9] {
+    let mut loaded = [V::of(0.0); 9];
+    for component in 0..9 {
+        loaded[component] = V::load(&lanes[component][first..]);
+    }
+    loaded
+}
+
+/// `Σ_{i=1..3} (a_i − a_0) b_iᵀ`.
+#[inline(always)]
+fn gradient<V: Real>(b: &[V; 9], edges: &[V; 9]) -> M3<V> {
+    let mut h = [[V::of(0.0); 3]; 3];
+    for row in 0..3 {
+        for column in 0..3 {
+            h[row][column] = edges[row] * b[column] + edges[3 + row] * b[3 + column] + edges[6 + row] * b[6 + column];
+        }
+    }
+    h
+}
+
+/// `f_i = −V P b_i`, `i = 1, 2, 3`.
+#[inline(always)]
+fn corner_forces<V: Real>(b: &[V; 9], minus_volume: V, p: &M3<V>) -> [V; 9] {
+    let mut f = *b;
+    for corner in 0..3 {
+        for row in 0..3 {
+            f[3 * corner + row] = minus_volume
+                * (p[row][0] * b[3 * corner] + p[row][1] * b[3 * corner + 1] + p[row][2] * b[3 * corner + 2]);
+        }
+    }
+    f
+}
+
+/// `a_i − a_0` of all lanes.
+#[inline(always)]
+fn gather<T: Scalar, const N: usize>(nodes: &[[u32; 4]; N], values: &[Node<T>], edges: &mut Lanes<T, N>) {
+    for first in (0..N).step_by(4) {
+        let mut corners = [[Node::default(); 4]; 4];
+        for tet in 0..4 {
+            for corner in 0..4 {
+                let node = nodes[first + tet][corner] as usize;
+                debug_assert!(node < values.len());
+                // SAFETY: `Blocks::new` checked `node <= Blocks::nodes`, `Job::new` that `values` has one entry more than that.
+                corners[tet][corner] = unsafe { *values.get_unchecked(node) };
+            }
+        }
+        T::edges_to_lanes(&corners, edges, first);
+    }
+}
+
+/// Adds the corners' forces, lane after lane: the same order, hence the same bits, always. `f_0 = −(f_1 + f_2 + f_3)` in f64.
+#[inline(always)]
+fn scatter<T: Scalar, const N: usize>(nodes: &[[u32; 4]; N], forces: &Lanes<T, N>, sums: &mut [Sum]) {
+    for first in (0..N).step_by(4) {
+        let rows = T::lanes_to_rows(forces, first);
+        for tet in 0..4 {
+            let mut f = [[0.0; 4]; 4];
+            for axis in 0..4 {
+                for corner in 0..3 {
+                    f[corner + 1][axis] = rows[tet][corner][axis].into();
+                }
+                f[0][axis] = -(f[1][axis] + f[2][axis] + f[3][axis]);
+            }
+            for corner in 0..4 {
+                let node = nodes[first + tet][corner] as usize;
+                debug_assert!(node < sums.len());
+                // SAFETY: `Blocks::new` checked `node <= Blocks::nodes`, `Job::new` that `sums` has one entry more than that.
+                let sum = unsafe { sums.get_unchecked_mut(node) };
+                for axis in 0..4 {
+                    sum.0[axis] += f[corner][axis];
+                }
+            }
+        }
+    }
+}

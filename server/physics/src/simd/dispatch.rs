@@ -1,0 +1,92 @@
+//! One body of code, compiled for several instruction sets, chosen at run time.
+#![allow(unsafe_code)] // calls into functions compiled for an instruction set that was detected
+use super::{
+    block::{Job, add_forces},
+    laws::{FixedCorotated, LaneLaw, StVenantKirchhoff, StableNeoHookean},
+    real::Scalar,
+};
+use crate::material::{Law, Material};
+
+/// Instruction sets a kernel is compiled for. All of them give the same bits.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum InstructionSet {
+    /// What every machine of the target has: SSE2 on x86-64; elsewhere what the compiler makes of plain loops.
+    Baseline,
+    /// AVX2 (x86-64-v3).
+    Avx2,
+    /// AVX-512 F, BW, DQ and VL (x86-64-v4).
+    Avx512,
+}
+
+/// An instruction set that this machine was seen to have.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Available(InstructionSet);
+
+impl Available {
+    /// The wanted one, or the best there is below it.
+    pub(super) fn at_most(wanted: InstructionSet) -> Self {
+        Self(wanted.min(InstructionSet::best()))
+    }
+}
+
+impl InstructionSet {
+    /// The best of this machine.
+    pub fn best() -> Self {
+        #[cfg(target_arch = "x86_64")]
+        {
+            use std::arch::is_x86_feature_detected as has;
+            if has!("avx512f") && has!("avx512bw") && has!("avx512dq") && has!("avx512vl") {
+                return Self::Avx512;
+            }
+            if has!("avx2") {
+                return Self::Avx2;
+            }
+        }
+        Self::Baseline
+    }
+
+    /// All that this machine has, the narrowest first.
+    pub fn available() -> Vec<Self> {
+        [Self::Baseline, Self::Avx2, Self::Avx512].into_iter().filter(|&set| set <= Self::best()).collect()
+    }
+}
+
+/// Adds the forces of one run's blocks to the sums; returns the viscous power (W).
+pub(super) fn run<T: Scalar, const N: usize>(set: Available, material: &Material, job: &mut Job<'_, T, N>) -> f64 {
+    match (material.law, material.viscosity.is_zero()) {
+        (Law::StVenantKirchhoff, true) => pick::<T, StVenantKirchhoff, false, N>(set, job),
+        (Law::StVenantKirchhoff, false) => pick::<T, StVenantKirchhoff, true, N>(set, job),
+        (Law::StableNeoHookean, true) => pick::<T, StableNeoHookean, false, N>(set, job),
+        (Law::StableNeoHookean, false) => pick::<T, StableNeoHookean, true, N>(set, job),
+        (Law::FixedCorotated, true) => pick::<T, FixedCorotated, false, N>(set, job),
+        (Law::FixedCorotated, false) => pick::<T, FixedCorotated, true, N>(set, job),
+    }
+}
+
+#[cfg(target_arch = "x86_64")]
+fn pick<T: Scalar, L: LaneLaw, const VISCOUS: bool, const N: usize>(set: Available, job: &mut Job<'_, T, N>) -> f64 {
+    match set.0 {
+        InstructionSet::Baseline => add_forces::<T::Baseline, T, L, VISCOUS, N>(job),
+        // SAFETY: `Available` holds only what was detected.
+        InstructionSet::Avx2 => unsafe { avx2::<T, L, VISCOUS, N>(job) },
+        // SAFETY: `Available` holds only what was detected.
+        InstructionSet::Avx512 => unsafe { avx512::<T, L, VISCOUS, N>(job) },
+    }
+}
+
+#[cfg(not(target_arch = "x86_64"))]
+fn pick<T: Scalar, L: LaneLaw, const VISCOUS: bool, const N: usize>(_: Available, job: &mut Job<'_, T, N>) -> f64 {
+    add_forces::<T::Baseline, T, L, VISCOUS, N>(job)
+}
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx2")]
+fn avx2<T: Scalar, L: LaneLaw, const VISCOUS: bool, const N: usize>(job: &mut Job<'_, T, N>) -> f64 {
+    add_forces::<T::Avx2, T, L, VISCOUS, N>(job)
+}
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx512f,avx512bw,avx512dq,avx512vl")]
+fn avx512<T: Scalar, L: LaneLaw, const VISCOUS: bool, const N: usize>(job: &mut Job<'_, T, N>) -> f64 {
+    add_forces::<T::Avx512, T, L, VISCOUS, N>(job)
+}

@@ -1,0 +1,208 @@
+//! The force kernel against its scalar oracle, and its own promises: same bits on every instruction set, balanced forces.
+#![allow(clippy::unwrap_used)] // helpers outside #[test] functions
+mod support;
+use glam::DVec3;
+use palpate_physics::{
+    Precision, TetMesh,
+    fem::element::RestTet,
+    material::{Convention, Lame, Law, Material, Viscosity},
+    simd::{ForceKernel, InstructionSet, Oracle},
+};
+use support::{Random, block, largest, largest_difference};
+
+const LAWS: [Law; 3] = [Law::StVenantKirchhoff, Law::StableNeoHookean, Law::FixedCorotated];
+
+fn material(law: Law, nu: f64, viscous: bool) -> Material {
+    let viscosity = if viscous { Viscosity::new(3.0, 5.0).unwrap() } else { Viscosity::default() };
+    Material::new(law, Lame::from_young_poisson(10e3, nu).unwrap(), viscosity, Convention::Consistent)
+}
+
+struct Case {
+    mesh: TetMesh,
+    rest: Vec<RestTet>,
+    tet_material: Vec<u16>,
+    materials: Vec<Material>,
+    x: Vec<DVec3>,
+    v: Vec<DVec3>,
+}
+
+impl Case {
+    /// A jittered block of `materials` in random tets, turned by any angle, sheared and stretched by `strain`, with noise of
+    /// `noise` of the cell, far from where it rests, moving.
+    fn random(materials: Vec<Material>, strain: f64, noise: f64, random: &mut Random) -> Self {
+        let h = 4e-3;
+        let mesh = block([5, 4, 3], h, 0.15, random);
+        let rest: Vec<RestTet> = (0..mesh.tets().len()).map(|t| RestTet::new(&mesh.edge_matrix_m(t))).collect();
+        let tet_material = rest.iter().map(|_| (random.unit() * materials.len() as f64) as u16).collect();
+        let turn = if strain + noise > 1e-3 { random.rotation() } else { glam::DMat3::IDENTITY };
+        let gradient = turn + random.matrix() * strain;
+        let rate = random.matrix() * 3.0;
+        let move_m = DVec3::new(0.3, -0.1, 0.2);
+        let x: Vec<DVec3> =
+            mesh.positions_m().iter().map(|p| gradient * *p + move_m + random.vector() * (noise * h)).collect();
+        let v = x.iter().map(|x| rate * *x + DVec3::new(0.5, 1.0, -1.0) + random.vector() * 1e-2).collect();
+        Self { mesh, rest, tet_material, materials, x, v }
+    }
+
+    fn kernel(&self, precision: Precision) -> ForceKernel {
+        ForceKernel::build(&self.mesh, &self.rest, &self.tet_material, &self.materials, precision)
+    }
+
+    fn run(&self, kernel: &ForceKernel) -> (Vec<DVec3>, f64) {
+        let mut forces = vec![DVec3::NAN; self.x.len()];
+        let mut scratch = kernel.scratch();
+        let power = kernel.forces_n(self.mesh.positions_m(), &self.x, &self.v, &mut forces, &mut scratch);
+        let mut again = vec![DVec3::NAN; self.x.len()];
+        let power_again = kernel.forces_n(self.mesh.positions_m(), &self.x, &self.v, &mut again, &mut scratch);
+        assert_eq!(power.to_bits(), power_again.to_bits());
+        assert!(forces.iter().zip(&again).all(|(a, b)| bits(*a) == bits(*b)), "a second run gave other bits");
+        (forces, power)
+    }
+
+    fn oracle(&self) -> (Vec<DVec3>, f64) {
+        let oracle = Oracle::build(&self.mesh, &self.rest, &self.tet_material, &self.materials);
+        let mut forces = vec![DVec3::NAN; self.x.len()];
+        let power = oracle.forces_n(&self.x, &self.v, &mut forces);
+        (forces, power)
+    }
+
+    /// Largest force (N) of a single tet on a corner: what rounding is relative to (nodal sums nearly cancel).
+    fn largest_tet_force(&self) -> f64 {
+        (0..self.rest.len())
+            .map(|tet| {
+                let nodes = self.mesh.tets()[tet];
+                let material = &self.materials[self.tet_material[tet] as usize];
+                let (x, v) = (nodes.map(|n| self.x[n as usize]), nodes.map(|n| self.v[n as usize]));
+                largest(&self.rest[tet].forces_n(material, &x, &v))
+            })
+            .fold(0.0, f64::max)
+    }
+
+    /// Force (N) that the rounding of positions makes: `ε d (λ + 2µ) V |b|²`, where the distance `d` that is rounded is the
+    /// largest displacement between nodes for f32 and the largest coordinate for f64. A turned body has large ones.
+    fn force_of_rounding(&self, precision: Precision) -> f64 {
+        let u: Vec<DVec3> = self.x.iter().zip(self.mesh.positions_m()).map(|(x, r)| *x - *r).collect();
+        let distance = match precision {
+            Precision::Single => u.iter().map(|u_i| u_i.distance(u[0])).fold(0.0, f64::max) * f64::from(f32::EPSILON),
+            Precision::Double => largest(&self.x) * f64::EPSILON,
+        };
+        let stiffness = |tet: usize| {
+            let modulus = self.materials[self.tet_material[tet] as usize].lame.p_wave_modulus_pa();
+            modulus * self.rest[tet].volume_m3 * largest(&self.rest[tet].gradients_per_m).powi(2)
+        };
+        distance * (0..self.rest.len()).map(stiffness).fold(0.0, f64::max)
+    }
+}
+
+fn bits(a: DVec3) -> [u64; 3] {
+    a.to_array().map(f64::to_bits)
+}
+
+/// Every law alone and all together, elastic and viscous, from tiny strain to crushed and inverted tets.
+fn cases() -> Vec<(String, Case)> {
+    let mut random = Random(3);
+    let mut cases = Vec::new();
+    for viscous in [false, true] {
+        for nu in [0.0, 0.45, 0.49] {
+            let mut sets: Vec<Vec<Material>> = LAWS.map(|law| vec![material(law, nu, viscous)]).to_vec();
+            sets.push(LAWS.map(|law| material(law, nu, viscous)).to_vec());
+            for set in sets {
+                for (strain, noise) in [(1e-6, 0.0), (0.02, 0.01), (0.2, 0.1), (0.3, 0.6)] {
+                    let name = format!("{set:?} strain {strain} noise {noise}");
+                    cases.push((name, Case::random(set.clone(), strain, noise, &mut random)));
+                }
+            }
+        }
+    }
+    cases
+}
+
+/// Errors stay below 1e-5 (f32) and 1e-13 (f64) of the largest force of a tet, and four times what rounding of the positions makes.
+#[test]
+fn kernels_agree_with_the_oracle() {
+    for (precision, tolerance) in [(Precision::Single, 1e-5), (Precision::Double, 1e-13)] {
+        let mut worst = 0.0_f64;
+        for (name, case) in cases() {
+            let (expected, expected_power) = case.oracle();
+            let (forces, power) = case.run(&case.kernel(precision));
+            let error = largest_difference(&forces, &expected);
+            let allowed = tolerance * case.largest_tet_force() + 4.0 * case.force_of_rounding(precision);
+            worst = worst.max(error / allowed);
+            println!("{:8.1e} {precision:?} {name}", error / allowed);
+            assert!(error < allowed, "{precision:?} {name}: {error:e} of {allowed:e}");
+            let close = (power - expected_power).abs() <= 10.0 * tolerance * expected_power;
+            assert!(close, "{precision:?} {name}: {power} {expected_power}");
+        }
+        println!("worst {precision:?} error {worst:.2} of what is allowed");
+    }
+}
+
+#[test]
+fn every_instruction_set_gives_the_same_bits() {
+    for (name, case) in cases() {
+        for precision in [Precision::Single, Precision::Double] {
+            let kernel = case.kernel(precision);
+            let runs =
+                InstructionSet::available().into_iter().map(|set| case.run(&kernel.clone().with_instruction_set(set)));
+            let runs: Vec<_> = runs.collect();
+            for other in &runs[1..] {
+                assert_eq!(runs[0].1.to_bits(), other.1.to_bits(), "{name}");
+                assert!(runs[0].0.iter().zip(&other.0).all(|(a, b)| bits(*a) == bits(*b)), "{precision:?} {name}");
+            }
+        }
+    }
+}
+
+#[test]
+fn forces_of_a_body_sum_to_nothing() {
+    for (name, case) in cases() {
+        let scale = case.largest_tet_force();
+        for precision in [Precision::Single, Precision::Double] {
+            let (forces, _) = case.run(&case.kernel(precision));
+            let total = forces.iter().sum::<DVec3>().length();
+            assert!(total < 1e-12 * scale, "{precision:?} {name}: {total:e} of {scale:e}");
+        }
+    }
+}
+
+/// Where everything is exactly at rest nothing pushes, not even rounding: a body at rest stays there, bit for bit.
+#[test]
+fn at_rest_the_force_is_exactly_zero() {
+    let mut random = Random(5);
+    for law in LAWS {
+        let mut case = Case::random(vec![material(law, 0.45, true)], 0.0, 0.0, &mut random);
+        case.x = case.mesh.positions_m().to_vec();
+        case.v.fill(DVec3::ZERO);
+        for precision in [Precision::Single, Precision::Double] {
+            let (forces, power) = case.run(&case.kernel(precision));
+            assert_eq!(largest(&forces), 0.0, "{law:?}");
+            assert_eq!(power, 0.0);
+        }
+    }
+}
+
+/// A node that is not finite spoils its own tets and nothing else: the lanes beside them, and those of padding, are clean.
+#[test]
+fn a_bad_node_does_not_leak() {
+    let mut random = Random(9);
+    for law in LAWS {
+        let mut case = Case::random(vec![material(law, 0.3, false)], 0.1, 0.05, &mut random);
+        let bad = case.x.len() - 1;
+        let (good, _) = case.run(&case.kernel(Precision::Single));
+        case.x[bad] = DVec3::splat(f64::NAN);
+        let mut neighbour = vec![false; case.x.len()];
+        for nodes in case.mesh.tets().iter().filter(|nodes| nodes.contains(&(bad as u32))) {
+            nodes.iter().for_each(|&n| neighbour[n as usize] = true);
+        }
+        let kernel = case.kernel(Precision::Single);
+        let mut forces = vec![DVec3::ZERO; case.x.len()];
+        kernel.forces_n(case.mesh.positions_m(), &case.x, &case.v, &mut forces, &mut kernel.scratch());
+        for node in 0..forces.len() {
+            if neighbour[node] {
+                assert!(!forces[node].is_finite(), "{law:?}: NaN at node {bad} must show at {node}");
+            } else {
+                assert_eq!(bits(forces[node]), bits(good[node]), "{law:?} node {node}");
+            }
+        }
+    }
+}
