@@ -11,10 +11,10 @@ use super::{
 use crate::material::Material;
 use glam::DMat3;
 
-/// Three components of a node and one of padding, so that a node is one vector load.
+/// A node's displacement or velocity in f64, and one component of padding, so that it is one vector load.
 #[derive(Debug, Clone, Copy, Default)]
-#[repr(C, align(16))]
-pub(super) struct Node<T>(pub(super) [T; 4]);
+#[repr(C, align(32))]
+pub(super) struct Node(pub(super) [f64; 4]);
 
 /// A sum of forces (N) on a node, in f64 for every precision: what a tet adds is zero in total to 1e-16.
 #[derive(Debug, Clone, Copy, Default)]
@@ -66,8 +66,8 @@ pub(super) struct Run<T> {
 pub(super) struct Job<'a, T, const N: usize> {
     blocks: &'a [Block<T, N>],
     constants: Constants<T>,
-    displacements: &'a [Node<T>],
-    velocities: &'a [Node<T>],
+    displacements: &'a [Node],
+    velocities: &'a [Node],
     sums: &'a mut [Sum],
 }
 
@@ -77,8 +77,8 @@ impl<'a, T: Scalar, const N: usize> Job<'a, T, N> {
     pub(super) fn new(
         blocks: &'a Blocks<T, N>,
         run: &Run<T>,
-        displacements: &'a [Node<T>],
-        velocities: &'a [Node<T>],
+        displacements: &'a [Node],
+        velocities: &'a [Node],
         sums: &'a mut [Sum],
     ) -> Self {
         let entries = blocks.nodes + 1;
@@ -235,7 +235,7 @@ fn corner_forces<V: Real>(b: &[V; 9], minus_volume: V, p: &M3<V>) -> [V; 9] {
 
 /// `a_i − a_0` of all lanes.
 #[inline(always)]
-fn gather<T: Scalar, const N: usize>(nodes: &[[u32; 4]; N], values: &[Node<T>], edges: &mut Lanes<T, N>) {
+fn gather<T: Scalar, const N: usize>(nodes: &[[u32; 4]; N], values: &[Node], edges: &mut Lanes<T, N>) {
     for first in (0..N).step_by(4) {
         let mut corners = [[Node::default(); 4]; 4];
         for tet in 0..4 {

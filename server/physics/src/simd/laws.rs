@@ -107,12 +107,12 @@ impl LaneLaw for StableNeoHookean {
 /// `F − R = R G`, `G = √C − I`, and from `(I + G)² = I + 2E`: `G = E − ½G²`. A first `G₀ = sym(RᵀF) − I`, which knows strain
 /// only to the rounding of `R`, put into the right side, gives it relative to itself.
 ///
-/// The domain is `q ≥ 0.1 max(t³, 1)` (16 against 2.7 at rest, 1 against 0.34 for σ = (1, 1, −½)): outside, `R` is close to
+/// The domain is `q ≥ 0.2 max(t³, 1)` (16 against 5.4 at rest, 1 against 0.68 for σ = (1, 1, −½)): outside, `R` is close to
 /// ambiguous or the tet nearly gone.
 pub(super) struct FixedCorotated;
 
 impl LaneLaw for FixedCorotated {
-    const DOMAIN: Option<f64> = Some(0.1);
+    const DOMAIN: Option<f64> = Some(0.2);
     #[inline(always)]
     fn piola<T: Real>(c: &Constants<T>, h: &M3<T>) -> (M3<T>, T) {
         let one = T::of(1.0);

@@ -1,8 +1,9 @@
 //! The force kernel: internal forces of all tets, in blocks of lanes, beside its scalar oracle.
 //!
 //! Forces are computed in f32 (16 lanes) or f64 (8 lanes) and summed per node in f64; positions and velocities are f64
-//! always. Displacements `u = x − X` are taken in f64, relative to node 0's so that a rigid translation costs no digits,
-//! and only then rounded. Same inputs, same bits, on every instruction set.
+//! always. Displacements `u = x − X` and their differences along the edges of a tet are taken in f64, and only the
+//! differences are rounded: what a body's rigid motion and size would cost in digits is not lost. Same inputs, same bits,
+//! on every instruction set.
 // A vector type is only fast where it is inlined into a function compiled for its instruction set.
 #![allow(clippy::inline_always)]
 mod block;
@@ -44,14 +45,9 @@ enum Layout {
 /// Buffers of the kernel.
 #[derive(Debug, Clone)]
 pub struct KernelScratch {
-    nodes: NodeBuffers,
+    displacements: Vec<Node>,
+    velocities: Vec<Node>,
     sums: Vec<Sum>,
-}
-
-#[derive(Debug, Clone)]
-enum NodeBuffers {
-    Single { displacements: Vec<Node<f32>>, velocities: Vec<Node<f32>> },
-    Double { displacements: Vec<Node<f64>>, velocities: Vec<Node<f64>> },
 }
 
 impl ForceKernel {
@@ -92,17 +88,11 @@ impl ForceKernel {
         // One spare node more, for the lanes of padding.
         let count = self.nodes + 1;
         let rates = if self.any_viscosity { count } else { 0 };
-        let nodes = match self.layout {
-            Layout::Single(..) => NodeBuffers::Single {
-                displacements: vec![Node::default(); count],
-                velocities: vec![Node::default(); rates],
-            },
-            Layout::Double(..) => NodeBuffers::Double {
-                displacements: vec![Node::default(); count],
-                velocities: vec![Node::default(); rates],
-            },
-        };
-        KernelScratch { nodes, sums: vec![Sum::default(); count] }
+        KernelScratch {
+            displacements: vec![Node::default(); count],
+            velocities: vec![Node::default(); rates],
+            sums: vec![Sum::default(); count],
+        }
     }
 
     /// Overwrites `forces_n` (N) with elastic and viscous forces at positions `x` (m) and velocities `v` (m/s), and
@@ -115,39 +105,31 @@ impl ForceKernel {
         forces_n: &mut [DVec3],
         scratch: &mut KernelScratch,
     ) -> f64 {
-        let KernelScratch { nodes, sums } = scratch;
-        sums.fill(Sum::default());
-        let power_w = match (&self.layout, nodes) {
-            (Layout::Single(blocks, runs), NodeBuffers::Single { displacements, velocities }) => {
-                self.evaluate((blocks, runs), (rest_positions_m, x, v), (displacements, velocities), sums)
-            }
-            (Layout::Double(blocks, runs), NodeBuffers::Double { displacements, velocities }) => {
-                self.evaluate((blocks, runs), (rest_positions_m, x, v), (displacements, velocities), sums)
-            }
-            _ => unreachable!("scratch of another kernel"),
+        for ((u, x), rest) in scratch.displacements.iter_mut().zip(x).zip(rest_positions_m) {
+            *u = node(*x - *rest);
+        }
+        for (rate, v) in scratch.velocities.iter_mut().zip(v) {
+            *rate = node(*v);
+        }
+        // The spare node of the padding, past the end of `v`, stays zero.
+        scratch.sums.fill(Sum::default());
+        let power_w = match &self.layout {
+            Layout::Single(blocks, runs) => self.add_forces(blocks, runs, scratch),
+            Layout::Double(blocks, runs) => self.add_forces(blocks, runs, scratch),
         };
-        for (force, Sum([fx, fy, fz, _])) in forces_n.iter_mut().zip(sums.iter()) {
+        for (force, Sum([fx, fy, fz, _])) in forces_n.iter_mut().zip(&scratch.sums) {
             *force = DVec3::new(*fx, *fy, *fz);
         }
         power_w
     }
 
-    fn evaluate<T: Scalar, const N: usize>(
+    fn add_forces<T: Scalar, const N: usize>(
         &self,
-        (blocks, runs): (&Blocks<T, N>, &[Run<T>]),
-        (rest_positions_m, x, v): (&[DVec3], &[DVec3], &[DVec3]),
-        (displacements, velocities): (&mut [Node<T>], &mut [Node<T>]),
-        sums: &mut [Sum],
+        blocks: &Blocks<T, N>,
+        runs: &[Run<T>],
+        scratch: &mut KernelScratch,
     ) -> f64 {
-        let origin = x[0] - rest_positions_m[0];
-        for ((u, x), rest) in displacements.iter_mut().zip(x).zip(rest_positions_m) {
-            *u = rounded(*x - *rest - origin);
-        }
-        if self.any_viscosity {
-            for (rate, v_node) in velocities.iter_mut().zip(v) {
-                *rate = rounded(*v_node - v[0]);
-            }
-        }
+        let KernelScratch { displacements, velocities, sums } = scratch;
         let mut power_w = 0.0;
         for run in runs {
             let mut job = Job::new(blocks, run, displacements, velocities, sums);
@@ -157,6 +139,6 @@ impl ForceKernel {
     }
 }
 
-fn rounded<T: Scalar>(a: DVec3) -> Node<T> {
-    Node([T::of(a.x), T::of(a.y), T::of(a.z), T::of(0.0)])
+fn node(a: DVec3) -> Node {
+    Node([a.x, a.y, a.z, 0.0])
 }

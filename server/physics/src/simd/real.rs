@@ -25,8 +25,8 @@ pub(super) trait Scalar: Real + Default + PartialOrd + From<f32> + Into<f64> {
     type Avx2: Vector<Scalar = Self>;
     /// Vectors of AVX-512.
     type Avx512: Vector<Scalar = Self>;
-    /// Rows `a_i − a_0` of four tets to lanes `first..first + 4`: `edges[3(i − 1) + axis][first + tet]`.
-    fn edges_to_lanes<const N: usize>(corners: &[[Node<Self>; 4]; 4], edges: &mut Lanes<Self, N>, first: usize);
+    /// Rows `a_i − a_0` of four tets, taken in f64 and then rounded, to lanes `first..first + 4`: `edges[3(i − 1) + axis][first + tet]`.
+    fn edges_to_lanes<const N: usize>(corners: &[[Node; 4]; 4], edges: &mut Lanes<Self, N>, first: usize);
     /// Lanes `first..first + 4` back to rows: `[tet][i − 1]`.
     fn lanes_to_rows<const N: usize>(lanes: &Lanes<Self, N>, first: usize) -> [[Quad<Self>; 3]; 4];
 }
@@ -81,14 +81,14 @@ scalar!(f64, 6);
 /// [`Scalar::edges_to_lanes`] in plain code.
 #[inline(always)]
 pub(super) fn edges_to_lanes<T: Scalar, const N: usize>(
-    corners: &[[Node<T>; 4]; 4],
+    corners: &[[Node; 4]; 4],
     edges: &mut Lanes<T, N>,
     first: usize,
 ) {
     for tet in 0..4 {
         for edge in 0..3 {
             for axis in 0..3 {
-                edges[3 * edge + axis][first + tet] = corners[tet][edge + 1].0[axis] - corners[tet][0].0[axis];
+                edges[3 * edge + axis][first + tet] = T::of(corners[tet][edge + 1].0[axis] - corners[tet][0].0[axis]);
             }
         }
     }
@@ -120,11 +120,7 @@ mod elsewhere {
                 type Avx2 = Self;
                 type Avx512 = Self;
                 #[inline(always)]
-                fn edges_to_lanes<const N: usize>(
-                    corners: &[[Node<Self>; 4]; 4],
-                    edges: &mut Lanes<Self, N>,
-                    first: usize,
-                ) {
+                fn edges_to_lanes<const N: usize>(corners: &[[Node; 4]; 4], edges: &mut Lanes<Self, N>, first: usize) {
                     super::edges_to_lanes(corners, edges, first);
                 }
                 #[inline(always)]

@@ -175,11 +175,17 @@ impl Scalar for f32 {
     type Avx512 = F32x16;
 
     #[inline(always)]
-    fn edges_to_lanes<const N: usize>(corners: &[[Node<Self>; 4]; 4], edges: &mut Lanes<Self, N>, first: usize) {
-        let at = corners.map_nodes();
+    fn edges_to_lanes<const N: usize>(corners: &[[Node; 4]; 4], edges: &mut Lanes<Self, N>, first: usize) {
         for edge in 0..3 {
-            let difference = |tet: usize| at[tet][edge + 1] - at[tet][0];
-            let [x, y, z, _] = transposed([difference(0), difference(1), difference(2), difference(3)]);
+            let mut rows = [F32x4::of(0.0); 4];
+            for tet in 0..4 {
+                let mut row = [0.0; 4];
+                for axis in 0..4 {
+                    row[axis] = (corners[tet][edge + 1].0[axis] - corners[tet][0].0[axis]) as f32;
+                }
+                rows[tet] = F32x4::load(&row);
+            }
+            let [x, y, z, _] = transposed(rows);
             x.store(&mut edges[3 * edge][first..first + 4]);
             y.store(&mut edges[3 * edge + 1][first..first + 4]);
             z.store(&mut edges[3 * edge + 2][first..first + 4]);
@@ -197,24 +203,6 @@ impl Scalar for f32 {
             }
         }
         rows
-    }
-}
-
-/// Loads of all corners of four tets.
-trait MapNodes {
-    fn map_nodes(&self) -> [[F32x4; 4]; 4];
-}
-
-impl MapNodes for [[Node<f32>; 4]; 4] {
-    #[inline(always)]
-    fn map_nodes(&self) -> [[F32x4; 4]; 4] {
-        let mut at = [[F32x4::of(0.0); 4]; 4];
-        for tet in 0..4 {
-            for corner in 0..4 {
-                at[tet][corner] = F32x4::load(&self[tet][corner].0);
-            }
-        }
-        at
     }
 }
 
@@ -240,7 +228,7 @@ impl Scalar for f64 {
     type Avx512 = F64x8;
 
     #[inline(always)]
-    fn edges_to_lanes<const N: usize>(corners: &[[Node<Self>; 4]; 4], edges: &mut Lanes<Self, N>, first: usize) {
+    fn edges_to_lanes<const N: usize>(corners: &[[Node; 4]; 4], edges: &mut Lanes<Self, N>, first: usize) {
         real::edges_to_lanes(corners, edges, first);
     }
 
