@@ -40,7 +40,7 @@ pub struct StaticSettings {
 
 impl Default for StaticSettings {
     fn default() -> Self {
-        Self { relative_residual: 1e-10, max_iterations: 60, load_steps: 1, max_halvings: 12 }
+        Self { relative_residual: 1e-10, max_iterations: 100, load_steps: 1, max_halvings: 12 }
     }
 }
 
@@ -178,7 +178,8 @@ pub enum SolveError {
 ///
 /// `progress` is called once per Newton iteration and may stop the solve. Friction and viscosity do not act at rest and are
 /// left out. The pressure's load stiffness enters with its symmetric part; where a follower pressure ends at a free rim the
-/// unsymmetric rest slows Newton's method from quadratic to linear convergence but does not change the equilibrium.
+/// unsymmetric rest slows Newton's method from quadratic to linear convergence, the more the further the rim turns, but does not
+/// change the equilibrium.
 ///
 /// # Errors
 /// [`SolveError`].
