@@ -70,7 +70,7 @@ fn uniform_deformation_leaves_interior_nodes_in_balance() {
                 "patch, {name}, {precision:?}: worst of 20 random F {sum:.1e} of what balances at the node, {single:.1e} of \
                  the largest corner force"
             );
-            assert!(sum < bound, "{name} {precision:?}: {sum:e}");
+            assert!(sum < 0.1 * bound && single < bound, "{name} {precision:?}: {sum:e} {single:e}");
         }
     }
 }
