@@ -2,7 +2,7 @@
 //!
 //! The surfaces are cleaned, the outer one is triangulated anew with the wanted density, each of its vertices is
 //! followed across the wall to the inner surface, and the prisms between are layered, split and optimised. Layers keep
-//! whole elements through a thin wall even at few tets; docs/adr/0010-filling-walls.md says why not a lattice.
+//! whole elements through a thin wall even at few tets; docs/adr/filling-walls.md says why not a lattice.
 mod bvh;
 mod correspond;
 mod error;

@@ -59,12 +59,12 @@ pub(crate) fn remesh(clean: &CleanSurface, target: &Target, wanted: usize, mut p
         collapse(&mut mesh, target, usize::MAX, EDGE_RANGE.0 * mean);
         split(&mut mesh, target, usize::MAX, EDGE_RANGE.1 * mean);
         reach(&mut mesh, target, wanted, |_| {});
-        relax(&mut mesh, target);
+        relax(&mut mesh, Some(target));
         mesh.delaunay(3);
     }
     for round in 0..FINAL_ROUNDS {
         progress(0.5 + 0.5 * (EQUALISING_ROUNDS + round) as f64 / (EQUALISING_ROUNDS + FINAL_ROUNDS) as f64);
-        relax(&mut mesh, target);
+        relax(&mut mesh, Some(target));
         mesh.delaunay(3);
     }
     mesh
@@ -84,7 +84,9 @@ fn reach(mesh: &mut TriMesh, target: &Target, wanted: usize, mut progress: impl 
             if count > wanted { collapse(mesh, target, most, f64::INFINITY) } else { split(mesh, target, most, 0.0) };
         stalled = if changed == 0 { stalled + 1 } else { 0 };
         mesh.delaunay(2);
-        relax(mesh, target);
+        // Far from the wanted count the surface need not be met yet; most of the time would go into meeting it.
+        let meet = if mesh.triangles.len() > 2 * wanted { None } else { Some(target) };
+        relax(mesh, meet);
         progress(mesh.triangles.len() as f64);
     }
 }
@@ -115,8 +117,9 @@ fn smooth_freely(mesh: &mut TriMesh) {
     }
 }
 
-/// One step of centroidal smoothing in the tangent plane (along the rim for its vertices), projected back.
-fn relax(mesh: &mut TriMesh, target: &Target) {
+/// One step of centroidal smoothing in the tangent plane (along the rim for its vertices), projected on the target if
+/// there is one; without, the rim stays.
+fn relax(mesh: &mut TriMesh, target: Option<&Target>) {
     let normals = mesh.vertex_normals();
     let mut aims = mesh.centroids();
     for v in 0..aims.len() {
@@ -129,7 +132,12 @@ fn relax(mesh: &mut TriMesh, target: &Target) {
             + 0.5 * mesh.positions[v as usize];
     }
     for v in 0..aims.len() {
-        mesh.positions[v] = target.project(aims[v], sides.contains_key(&(v as u32)));
+        let on_rim = sides.contains_key(&(v as u32));
+        match target {
+            Some(target) => mesh.positions[v] = target.project(aims[v], on_rim),
+            None if on_rim => {}
+            None => mesh.positions[v] = aims[v],
+        }
     }
 }
 

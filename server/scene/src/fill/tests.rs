@@ -28,7 +28,10 @@ fn check_sound(fill: &Fill, target: u32) {
     let euler = surface.nodes.len() as i64 - edges.len() as i64 / 2 + surface.triangles.len() as i64;
     assert_eq!(euler, if fill.regions.len() == 3 { 2 } else { 4 });
     assert_eq!(fill.regions.iter().map(|r| r.triangles.len()).sum::<usize>(), surface.triangles.len());
-    assert!(fill.report.quality.min_dihedral_deg > 10.0, "{}", fill.report);
+    // 10°, or where the wanted edges make flat prisms, most of the angle under which a layer is seen along an edge.
+    let report = &fill.report;
+    let flat_deg = (report.thickness_m / f64::from(report.layers) / report.outer_edge_m).atan().to_degrees();
+    assert!(report.quality.min_dihedral_deg > f64::min(10.0, 0.7 * flat_deg), "{report}");
 }
 
 /// Both surfaces are met within this part of an edge.

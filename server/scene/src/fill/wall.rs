@@ -19,7 +19,7 @@ const UNIT_RATIO: f64 = 20.0;
 /// Thinnest wall, as part of the mean thickness.
 const THINNEST: f64 = 0.01;
 /// Points of the inner surface tested to lie inside the outer one.
-const INSIDE_SAMPLES: usize = 64;
+const INSIDE_SAMPLES: usize = 24;
 
 /// Two clean surfaces that lie as they should.
 pub(super) struct Wall {
