@@ -5,7 +5,7 @@
 //! descriptor and calls [`Doorbell::answer`].
 use rustix::{
     event::{EventfdFlags, eventfd},
-    fd::{AsFd, BorrowedFd, OwnedFd},
+    fd::{AsFd, AsRawFd, BorrowedFd, OwnedFd, RawFd},
     io::{read, write},
 };
 use std::{io, sync::Arc};
@@ -51,6 +51,12 @@ impl Doorbell {
 impl AsFd for Doorbell {
     fn as_fd(&self) -> BorrowedFd<'_> {
         self.fd.as_fd()
+    }
+}
+
+impl AsRawFd for Doorbell {
+    fn as_raw_fd(&self) -> RawFd {
+        self.fd.as_raw_fd()
     }
 }
 
