@@ -215,8 +215,13 @@ impl SimulatedArm {
 
     /// One step of `dt_s` under a force on the arm (N); one that is not finite acts as zero.
     pub fn step(&mut self, force_on_arm_n: DVec3) -> Motion {
-        let force_n = if force_on_arm_n.is_finite() { force_on_arm_n } else { DVec3::ZERO };
         let (hand_m, hand_m_per_s) = self.path.at(self.time_s() + 0.5 * self.dt_s);
+        self.step_towards(hand_m, hand_m_per_s, force_on_arm_n)
+    }
+
+    /// The same with the hand at another place (m) and velocity (m/s) than its path says, held over the step.
+    pub fn step_towards(&mut self, hand_m: DVec3, hand_m_per_s: DVec3, force_on_arm_n: DVec3) -> Motion {
+        let force_n = if force_on_arm_n.is_finite() { force_on_arm_n } else { DVec3::ZERO };
         // u = F + k_h x_h + b_h v_h
         let u = force_n + self.spec.hand_stiffness_n_per_m * hand_m + self.spec.hand_damping_n_s_per_m * hand_m_per_s;
         let (x, v, p, q) = (self.position_m, self.velocity_m_per_s, self.position_row, self.velocity_row);
@@ -224,6 +229,12 @@ impl SimulatedArm {
         self.velocity_m_per_s = q.x * x + q.y * v + q.z * u;
         self.steps += 1;
         self.motion()
+    }
+
+    /// Puts the arm somewhere (m) with a velocity (m/s), as when time jumps; the path goes on.
+    pub fn place(&mut self, position_m: DVec3, velocity_m_per_s: DVec3) {
+        self.position_m = position_m;
+        self.velocity_m_per_s = velocity_m_per_s;
     }
 }
 

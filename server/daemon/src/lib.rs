@@ -1,4 +1,12 @@
 //! `palpated`: the daemon that simulates a body at the haptic rate, and the offline commands on the same scenes.
 pub mod cli;
+pub mod grpc;
+pub mod load;
 pub mod offline;
+pub mod page;
 pub mod serve;
+pub mod session;
+pub mod sim;
+pub mod status;
+pub mod stream;
+pub mod telemetry;

@@ -1,4 +1,18 @@
 //! Flags of `palpated serve`.
+use super::config::{RealtimeConfig, ServeConfig, default_limits};
+use crate::grpc::listen::TlsFiles;
+use clap::ValueEnum;
+use palpate_realtime::OsMeasures;
+use std::{net::SocketAddr, path::PathBuf};
+
+/// What moves the tool while no device is attached.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum Arm {
+    /// A simulated arm, whose hand follows the scene's path and yields to force
+    Simulated,
+    /// Nothing: the tool rests where it is
+    None,
+}
 
 /// Flags of `palpated serve`.
 #[derive(Debug, Clone, clap::Args)]
@@ -6,4 +20,70 @@ pub struct ServeArgs {
     /// Scene file or name of a built-in scene
     #[arg(value_name = "SCENE", default_value = "ventricle")]
     pub scene: String,
+    /// Address and port for arms, viewers and the page; port 0 takes a free one
+    #[arg(long, value_name = "ADDRESS:PORT", default_value = "127.0.0.1:7411")]
+    pub listen: SocketAddr,
+    /// Listen on this Unix socket as well
+    #[arg(long, value_name = "PATH")]
+    pub unix: Option<PathBuf>,
+    /// Certificate chain (PEM): the port speaks TLS
+    #[arg(long, value_name = "FILE", requires = "tls_key")]
+    pub tls_cert: Option<PathBuf>,
+    /// Private key of the certificate (PEM)
+    #[arg(long, value_name = "FILE", requires = "tls_cert")]
+    pub tls_key: Option<PathBuf>,
+    /// What moves the tool while no device is attached
+    #[arg(long, value_enum, default_value_t = Arm::Simulated)]
+    pub arm: Arm,
+    /// Largest force any arm is asked for (N); a device's own limit applies when it is smaller
+    #[arg(long, value_name = "N", default_value_t = default_limits().force.max_force_n)]
+    pub max_force_n: f64,
+    /// Largest change of an arm's force (N/s)
+    #[arg(long, value_name = "N/S", default_value_t = default_limits().force.max_force_rate_n_per_s)]
+    pub max_force_rate_n_per_s: f64,
+    /// Updates per second for viewers that ask for no rate (Hz, 1 to 240)
+    #[arg(long, value_name = "HZ", default_value_t = 60.0)]
+    pub display_rate_hz: f64,
+    /// Folder whose scene files viewers may load; may be given several times
+    #[arg(long = "scene-folder", value_name = "FOLDER")]
+    pub scene_folders: Vec<PathBuf>,
+    /// SCHED_FIFO priority of the loop (1 to 99), or 0 for normal scheduling
+    #[arg(long, value_name = "PRIORITY", default_value_t = 80, value_parser = clap::value_parser!(u8).range(0..=99))]
+    pub priority: u8,
+    /// Run the loop on this processor only
+    #[arg(long, value_name = "NUMBER")]
+    pub processor: Option<usize>,
+    /// Keep processors out of deep sleep: less jitter, more power
+    #[arg(long)]
+    pub stay_awake: bool,
+}
+
+impl ServeArgs {
+    /// The configuration, checked.
+    ///
+    /// # Errors
+    /// [`super::ServeError::Setting`], naming the flag.
+    pub fn config(&self) -> Result<ServeConfig, super::ServeError> {
+        let mut limits = default_limits();
+        limits.force.max_force_n = self.max_force_n;
+        limits.force.max_force_rate_n_per_s = self.max_force_rate_n_per_s;
+        let tls = self.tls_cert.clone().zip(self.tls_key.clone());
+        let measures = OsMeasures {
+            fifo_priority: Some(self.priority).filter(|&priority| priority > 0),
+            lock_memory: true,
+            processor: self.processor,
+            stay_awake: self.stay_awake,
+        };
+        ServeConfig {
+            listen: self.listen,
+            unix: self.unix.clone(),
+            tls: tls.map(|(certificate, key)| TlsFiles { certificate, key }),
+            simulated_arm: self.arm == Arm::Simulated,
+            limits,
+            display_rate_hz: self.display_rate_hz,
+            scene_folders: self.scene_folders.clone(),
+            realtime: RealtimeConfig { measures },
+        }
+        .checked()
+    }
 }

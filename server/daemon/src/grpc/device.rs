@@ -1,0 +1,331 @@
+//! `palpate.v1.Device`: an arm takes a tool, sends poses, receives forces.
+//!
+//! The way down is pulled: whenever the transport takes a message, the newest command is made into one. Nothing queues but a
+//! few faults.
+use super::{
+    convert,
+    uplink::{Ended, FAULTS_WAITING, Uplink},
+};
+use crate::{
+    session::{ActiveSession, Daemon, DeviceRecord, ToolSeat},
+    sim::exchange::{DeviceInput, ToolEnd, ToolOutput},
+};
+use futures_util::{Stream, stream};
+use palpate_physics::contact::Coupling;
+use palpate_proto::v1::{self, DeviceFaultCode, device_down::Message, device_server::Device};
+use std::{pin::Pin, sync::Arc, time::Duration};
+use tokio::{
+    sync::mpsc,
+    task::JoinHandle,
+    time::{Instant, timeout},
+};
+use tokio_util::sync::CancellationToken;
+use tonic::{Request, Response, Status, Streaming};
+use triple_buffer::Input;
+
+/// How long a device may take to say hello.
+const HELLO_WITHIN: Duration = Duration::from_secs(5);
+/// Between two reports that the force is being limited.
+const LIMITED_EVERY: Duration = Duration::from_secs(1);
+/// How long a stream waits for forces to reach zero before it ends.
+const RELEASE_WITHIN: Duration = Duration::from_millis(500);
+
+/// The service.
+#[derive(Debug, Clone)]
+pub struct DeviceService {
+    /// Shared by all services.
+    pub daemon: Arc<Daemon>,
+}
+
+#[tonic::async_trait]
+impl Device for DeviceService {
+    type AttachStream = Pin<Box<dyn Stream<Item = Result<v1::DeviceDown, Status>> + Send>>;
+
+    async fn attach(&self, request: Request<Streaming<v1::DeviceUp>>) -> Result<Response<Self::AttachStream>, Status> {
+        let start = Phase::Hello(Arc::clone(&self.daemon), request.into_inner());
+        Ok(Response::new(Box::pin(stream::unfold(start, next))))
+    }
+}
+
+enum Phase {
+    Hello(Arc<Daemon>, Streaming<v1::DeviceUp>),
+    Live(Box<Attachment>),
+    Over,
+}
+
+async fn next(phase: Phase) -> Option<(Result<v1::DeviceDown, Status>, Phase)> {
+    let (result, phase) = match phase {
+        Phase::Hello(daemon, messages) => match Attachment::begin(daemon, messages).await {
+            Ok((welcome, attachment)) => (Ok(Message::Welcome(welcome)), Phase::Live(Box::new(attachment))),
+            Err(status) => (Err(status), Phase::Over),
+        },
+        Phase::Live(mut attachment) => match attachment.next().await {
+            Some(Ok(message)) => (Ok(message), Phase::Live(attachment)),
+            Some(Err(status)) => (Err(status), Phase::Over),
+            None => return None,
+        },
+        Phase::Over => return None,
+    };
+    Some((result.map(|message| v1::DeviceDown { message: Some(message) }), phase))
+}
+
+/// A device on its tool.
+struct Attachment {
+    daemon: Arc<Daemon>,
+    session: Arc<ActiveSession>,
+    tool: usize,
+    attachment: u64,
+    record: Arc<DeviceRecord>,
+    /// Everything of the tool but the sample slot, which the way up has.
+    end: Option<ToolEnd>,
+    uplink: Option<JoinHandle<(Input<Option<DeviceInput>>, Ended)>>,
+    over: CancellationToken,
+    faults: mpsc::Receiver<v1::DeviceFault>,
+    told: Told,
+    ending: bool,
+}
+
+/// What the device was told already.
+#[derive(Debug, Default)]
+struct Told {
+    stale: bool,
+    quarantined: Option<u64>,
+    limited: Option<Instant>,
+    counts: [u64; 3],
+}
+
+impl Attachment {
+    async fn begin(
+        daemon: Arc<Daemon>,
+        mut messages: Streaming<v1::DeviceUp>,
+    ) -> Result<(v1::DeviceWelcome, Self), Status> {
+        let stop = daemon.stop.clone();
+        let first = tokio::select! {
+            () = stop.cancelled() => return Err(Status::unavailable("the daemon is shutting down")),
+            first = timeout(HELLO_WITHIN, messages.message()) => first,
+        };
+        let first = first.map_err(|_| {
+            Status::deadline_exceeded(format!(
+                "no hello within {} s; the first message must carry it",
+                HELLO_WITHIN.as_secs()
+            ))
+        })??;
+        let hello = convert::device_hello(first)?;
+        let session = daemon.session();
+        let tool = find_tool(&session, &hello.tool_name)?;
+        let record = DeviceRecord::new(hello.device_name.clone());
+        let seat = &session.tools[tool];
+        let end = seat.take(&record).ok_or_else(|| taken(seat))?;
+        let attachment = daemon.numbers.next_attachment();
+        let max_force_n = hello.max_force_n.min(daemon.settings.limits.force.max_force_n);
+        end.shared.attach(attachment, max_force_n);
+        let welcome = welcome(&daemon, &session, tool, max_force_n);
+        tracing::info!(device = hello.device_name, tool = seat.name, "device attached");
+        Ok((welcome, Self::live(daemon, session, (tool, attachment), record, end, messages)))
+    }
+
+    fn live(
+        daemon: Arc<Daemon>,
+        session: Arc<ActiveSession>,
+        (tool, attachment): (usize, u64),
+        record: Arc<DeviceRecord>,
+        end: ToolEnd,
+        messages: Streaming<v1::DeviceUp>,
+    ) -> Self {
+        let over = CancellationToken::new();
+        let (fault_in, faults) = mpsc::channel(FAULTS_WAITING);
+        // The way up has the real slot; what stands in its place is never read.
+        let ToolEnd { samples, outputs, ear, shared } = end;
+        let (placeholder, _) = triple_buffer::triple_buffer(&None);
+        let uplink = Uplink {
+            messages,
+            samples,
+            attachment,
+            record: Arc::clone(&record),
+            daemon: Arc::clone(&daemon),
+            faults: fault_in,
+            over: over.clone(),
+        };
+        let uplink = Some(tokio::spawn(uplink.run(over.clone().drop_guard())));
+        let end = Some(ToolEnd { samples: placeholder, outputs, ear, shared });
+        Self {
+            daemon,
+            session,
+            tool,
+            attachment,
+            record,
+            end,
+            uplink,
+            over,
+            faults,
+            told: Told::default(),
+            ending: false,
+        }
+    }
+
+    /// The next message, `None` when the device has gone.
+    async fn next(&mut self) -> Option<Result<Message, Status>> {
+        if self.ending {
+            return None;
+        }
+        let (stop, replaced) = (self.daemon.stop.clone(), self.session.ended.clone());
+        let over = self.over.clone();
+        loop {
+            let end = self.end.as_mut()?;
+            tokio::select! {
+                biased;
+                () = stop.cancelled() => return Some(Ok(self.detach("the daemon is shutting down").await)),
+                () = replaced.cancelled() => return Some(Ok(self.detach("another scene was loaded: attach again").await)),
+                () = over.cancelled() => return self.how_the_way_up_ended().await,
+                fault = self.faults.recv() => if let Some(fault) = fault { return Some(Ok(Message::Fault(fault))) },
+                rung = end.ear.rung() => rung.ok()?,
+            }
+            if let Some(message) = self.newest() {
+                return Some(Ok(message));
+            }
+        }
+    }
+
+    /// The newest command, or what has to be told before it.
+    fn newest(&mut self) -> Option<Message> {
+        let end = self.end.as_mut()?;
+        end.outputs.update();
+        let output = *end.outputs.output_buffer();
+        if output.attachment != self.attachment {
+            return None;
+        }
+        if let Some(fault) = self.told.news(&output) {
+            return Some(Message::Fault(fault));
+        }
+        self.record.sent_force_n(output.force_n.length());
+        Some(Message::Command(convert::device_command(&output)))
+    }
+
+    /// Waits until the force is zero, then says goodbye.
+    async fn detach(&mut self, why: &str) -> Message {
+        self.ending = true;
+        let released = async {
+            while let Some(end) = self.end.as_mut() {
+                end.outputs.update();
+                if self.session.ended.is_cancelled() || end.outputs.output_buffer().force_n == glam::DVec3::ZERO {
+                    return;
+                }
+                if end.ear.rung().await.is_err() {
+                    return;
+                }
+            }
+        };
+        let _ = timeout(RELEASE_WITHIN, released).await;
+        Message::Fault(fault(DeviceFaultCode::Detached, format!("{why}; the force has been ramped to zero"), 1))
+    }
+
+    async fn how_the_way_up_ended(&mut self) -> Option<Result<Message, Status>> {
+        self.ending = true;
+        let (samples, ended) = self.uplink.take()?.await.ok()?;
+        if let Some(end) = self.end.take() {
+            self.session.tools[self.tool].give_back(ToolEnd { samples, ..end });
+        }
+        ended.err().map(Err)
+    }
+}
+
+impl Drop for Attachment {
+    fn drop(&mut self) {
+        self.over.cancel();
+        tracing::info!(device = self.record.name, tool = self.session.tools[self.tool].name, "device detached");
+        let (Some(end), Some(uplink)) = (self.end.take(), self.uplink.take()) else { return };
+        end.shared.detach();
+        let (session, tool) = (Arc::clone(&self.session), self.tool);
+        // The slot is with the way up, which ends now.
+        tokio::spawn(async move {
+            if let Ok((samples, _)) = uplink.await {
+                session.tools[tool].give_back(ToolEnd { samples, ..end });
+            }
+        });
+    }
+}
+
+impl Told {
+    fn news(&mut self, output: &ToolOutput) -> Option<v1::DeviceFault> {
+        if output.quarantined != self.quarantined {
+            self.quarantined = output.quarantined;
+            if let Some(tick) = output.quarantined {
+                let text = format!(
+                    "the body's state became non-finite in tick {tick}; the force is zero until Reset or Restore"
+                );
+                return Some(self.count(0, DeviceFaultCode::Quarantined, text));
+            }
+        }
+        if output.stale != self.stale {
+            self.stale = output.stale;
+            if output.stale {
+                let text = "no fresh sample: the force ramps to zero until samples come again".to_owned();
+                return Some(self.count(1, DeviceFaultCode::Stale, text));
+            }
+        }
+        if output.limited && self.limited.is_none_or(|told| told.elapsed() > LIMITED_EVERY) {
+            self.limited = Some(Instant::now());
+            return Some(self.count(
+                2,
+                DeviceFaultCode::Limited,
+                "the force is being limited (see the welcome)".to_owned(),
+            ));
+        }
+        None
+    }
+
+    fn count(&mut self, which: usize, code: DeviceFaultCode, message: String) -> v1::DeviceFault {
+        self.counts[which] += 1;
+        fault(code, message, self.counts[which])
+    }
+}
+
+fn fault(code: DeviceFaultCode, message: String, count: u64) -> v1::DeviceFault {
+    v1::DeviceFault { code: code.into(), message, sample_sequence: 0, count }
+}
+
+/// The tool by name, or the first that the scene leaves to a device.
+fn find_tool(session: &ActiveSession, name: &str) -> Result<usize, Status> {
+    let known = || session.tools.iter().map(|tool| format!("\"{}\"", tool.name)).collect::<Vec<_>>().join(", ");
+    if name.is_empty() {
+        let first = session.tools.iter().position(|tool| tool.for_devices);
+        let text = || format!("scene \"{}\" has no tool for a device (tools: {})", session.scene_name, known());
+        return first.ok_or_else(|| Status::failed_precondition(text()));
+    }
+    let shown: String = name.chars().take(64).collect();
+    let tool = session.tools.iter().position(|tool| tool.name == name);
+    let tool =
+        tool.ok_or_else(|| Status::not_found(format!("there is no tool \"{shown}\"; there are: {}", known())))?;
+    if session.tools[tool].for_devices {
+        return Ok(tool);
+    }
+    Err(Status::failed_precondition(format!("tool \"{shown}\" is moved by the scene, not by a device")))
+}
+
+fn taken(seat: &ToolSeat) -> Status {
+    let by = seat.device().map_or_else(|| "another device".to_owned(), |device| format!("device \"{}\"", device.name));
+    Status::already_exists(format!("tool \"{}\" is driven by {by} already", seat.name))
+}
+
+fn welcome(daemon: &Daemon, session: &ActiveSession, tool: usize, max_force_n: f64) -> v1::DeviceWelcome {
+    let spec = &session.model.spec().tools[tool];
+    let (stiffness, damping) = match spec.coupling {
+        Coupling::Rigid => (0.0, 0.0),
+        Coupling::Spring { stiffness_n_per_m, damping_n_s_per_m, .. } => (stiffness_n_per_m, damping_n_s_per_m),
+    };
+    let limits = &daemon.settings.limits;
+    v1::DeviceWelcome {
+        session_id: session.id.clone(),
+        tool_name: spec.name.clone(),
+        tick_period_s: session.model.spec().settings.tick_period_s,
+        limits: Some(v1::DeviceLimits {
+            max_force_n,
+            max_force_rate_n_per_s: limits.force.max_force_rate_n_per_s,
+            coupling_stiffness_n_per_m: stiffness,
+            coupling_damping_n_s_per_m: damping,
+            stale_after_s: limits.watchdog.stale_after_s,
+            ramp_to_zero_s: limits.watchdog.ramp_to_zero_s,
+        }),
+        tool_radius_m: spec.radius_m,
+    }
+}

@@ -1,0 +1,96 @@
+//! The services of `palpate.v1`, beside health, reflection and the page, on one port.
+pub mod convert;
+pub mod device;
+pub mod listen;
+pub mod session;
+pub mod surface;
+pub mod uplink;
+
+use crate::{
+    page,
+    session::{ActiveSession, Daemon},
+};
+use palpate_proto::{
+    DESCRIPTOR_SET,
+    v1::{device_server::DeviceServer, session_server::SessionServer, surface_server::SurfaceServer},
+};
+use std::sync::Arc;
+use thiserror::Error;
+use tonic::{Status, service::Routes};
+use tonic_health::server::HealthReporter;
+use tonic_web::GrpcWebLayer;
+use tower::Layer;
+
+/// Largest message a client may send (bytes), snapshots apart.
+pub const MAX_REQUEST_BYTES: usize = 2 * 1024 * 1024;
+/// Largest snapshot that may be restored (bytes): some 600 000 nodes.
+pub const MAX_SNAPSHOT_BYTES: usize = 64 * 1024 * 1024;
+/// Largest message of a device's stream (bytes): a sample has some 150.
+pub const MAX_SAMPLE_BYTES: usize = 16 * 1024;
+
+/// The built-in descriptor set does not decode; a fault of the build.
+#[derive(Debug, Error)]
+#[error("the built-in descriptor set cannot be served by reflection: {0}")]
+pub struct ReflectionError(#[from] tonic_reflection::server::Error);
+
+/// Every service, each with gRPC-web, and the page as the fallback.
+///
+/// The gRPC-web layer is put around each service and not around the router: it would refuse the page's plain GETs.
+///
+/// # Errors
+/// [`ReflectionError`].
+pub async fn routes(daemon: &Arc<Daemon>) -> Result<(Routes, HealthReporter), ReflectionError> {
+    let web = GrpcWebLayer::new();
+    let device = DeviceServer::new(device::DeviceService { daemon: Arc::clone(daemon) })
+        .max_decoding_message_size(MAX_SAMPLE_BYTES);
+    let surface = SurfaceServer::new(surface::SurfaceService { daemon: Arc::clone(daemon) })
+        .max_decoding_message_size(MAX_SAMPLE_BYTES);
+    let session = SessionServer::new(session::SessionService { daemon: Arc::clone(daemon) })
+        .max_decoding_message_size(MAX_SNAPSHOT_BYTES)
+        .max_encoding_message_size(MAX_SNAPSHOT_BYTES);
+    let (health, health_service) = tonic_health::server::health_reporter();
+    health.set_serving::<DeviceServer<device::DeviceService>>().await;
+    health.set_serving::<SurfaceServer<surface::SurfaceService>>().await;
+    health.set_serving::<SessionServer<session::SessionService>>().await;
+    let reflection = || {
+        tonic_reflection::server::Builder::configure()
+            .register_encoded_file_descriptor_set(DESCRIPTOR_SET)
+            .register_encoded_file_descriptor_set(tonic_health::pb::FILE_DESCRIPTOR_SET)
+    };
+    let router = Routes::new(web.layer(device))
+        .add_service(web.layer(surface))
+        .add_service(web.layer(session))
+        .add_service(web.layer(health_service))
+        .add_service(reflection().build_v1()?)
+        .add_service(reflection().build_v1alpha()?)
+        .into_axum_router()
+        .fallback(page_or_unimplemented);
+    Ok((Routes::from(router), health))
+}
+
+/// A gRPC call of an unknown service gets gRPC's answer, everything else the page.
+async fn page_or_unimplemented(request: axum::extract::Request) -> axum::response::Response {
+    let is_grpc = request.headers().get("content-type").is_some_and(|t| t.as_bytes().starts_with(b"application/grpc"));
+    if is_grpc {
+        let text = format!("there is no service at {}; reflection lists them", request.uri().path());
+        let (parts, ()) = Status::unimplemented(text).into_http::<()>().into_parts();
+        return axum::response::Response::from_parts(parts, axum::body::Body::empty());
+    }
+    page::serve(request.method().clone(), request.uri().clone()).await
+}
+
+/// The session a request means: the current one, by its id or by an empty one.
+///
+/// # Errors
+/// `NOT_FOUND`.
+pub fn current_session(daemon: &Daemon, id: &str) -> Result<Arc<ActiveSession>, Status> {
+    let session = daemon.session();
+    if id.is_empty() || id == session.id {
+        return Ok(session);
+    }
+    let current = &session.id;
+    let shown: String = id.chars().take(64).collect();
+    Err(Status::not_found(format!(
+        "there is no session \"{shown}\"; the current one is \"{current}\" (or leave it empty)"
+    )))
+}

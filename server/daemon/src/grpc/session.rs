@@ -1,0 +1,179 @@
+//! `palpate.v1.Session`.
+use super::{MAX_REQUEST_BYTES, convert, current_session};
+use crate::{
+    load,
+    session::{ActiveSession, Daemon, prepare},
+    sim::{
+        command::{Copy, Done, Refusal, Request as Order},
+        inject::InjectRefusal,
+    },
+    status,
+};
+use palpate_physics::{Scratch, State, snapshot};
+use palpate_proto::v1::{self, load_scene_request::Source as WireSource, session_server::Session};
+use prost::Message;
+use std::sync::Arc;
+use tonic::{Request, Response, Status};
+
+/// The service.
+#[derive(Debug, Clone)]
+pub struct SessionService {
+    /// Shared by all services.
+    pub daemon: Arc<Daemon>,
+}
+
+/// A refusal as gRPC tells it.
+fn refused(refusal: Refusal) -> Status {
+    let text = refusal.to_string();
+    match refusal {
+        Refusal::OtherSession => Status::not_found(text),
+        Refusal::NotPaused | Refusal::Stepping => Status::failed_precondition(text),
+        Refusal::Interrupted => Status::aborted(text),
+        Refusal::OtherBody => Status::invalid_argument(text),
+        Refusal::Inject(InjectRefusal::Past { from_tick, next_tick }) => {
+            Status::invalid_argument(format!("from_tick = {from_tick} is over: the next tick is {next_tick}"))
+        }
+        Refusal::Inject(InjectRefusal::Full { pending }) => {
+            Status::resource_exhausted(format!("{pending} injected forces are waiting already: let them act first"))
+        }
+        Refusal::Busy => Status::resource_exhausted(text),
+        Refusal::Stopping | Refusal::Silent => Status::unavailable(text),
+    }
+}
+
+impl SessionService {
+    async fn order(&self, session: &ActiveSession, order: Order) -> Result<(Order, Done), Status> {
+        let patient = matches!(order, Order::Step(_));
+        tokio::select! {
+            result = self.daemon.orders.give(session.number, order, patient) => result.map_err(refused),
+            () = self.daemon.stop.cancelled() => Err(refused(Refusal::Stopping)),
+        }
+    }
+
+    async fn copy(&self, session: &ActiveSession) -> Result<(Box<Copy>, Done), Status> {
+        let copy = Copy { state: State::at_rest(&session.model), scratch: Scratch::new(&session.model) };
+        match self.order(session, Order::Copy(Box::new(copy))).await? {
+            (Order::Copy(copy), done) => Ok((copy, done)),
+            _ => Err(Status::internal("the loop answered another order")),
+        }
+    }
+
+    async fn load(&self, source: WireSource) -> Result<Arc<ActiveSession>, Status> {
+        let _one_at_a_time =
+            self.daemon.loading.try_lock().map_err(|_| Status::aborted("another scene is being loaded: try again"))?;
+        let daemon = Arc::clone(&self.daemon);
+        let prepared = tokio::task::spawn_blocking(move || {
+            let scene = load::from_wire(source, &daemon.settings.scene_folders)?;
+            prepare(scene, &daemon.settings, &daemon.numbers, &daemon.hub)
+                .map_err(|error| Status::invalid_argument(error.to_string()))
+        })
+        .await
+        .map_err(|_| Status::internal("loading the scene failed unexpectedly; the running scene goes on"))??;
+        self.daemon.replace(prepared).await.map_err(refused)
+    }
+}
+
+/// Requests other than snapshots are small: what is larger was not meant for this daemon.
+fn small<M: Message>(request: Request<M>) -> Result<M, Status> {
+    let message = request.into_inner();
+    let bytes = message.encoded_len();
+    if bytes > MAX_REQUEST_BYTES {
+        return Err(Status::out_of_range(format!("the request has {bytes} bytes; at most {MAX_REQUEST_BYTES}")));
+    }
+    Ok(message)
+}
+
+#[tonic::async_trait]
+impl Session for SessionService {
+    async fn list(&self, _: Request<v1::ListRequest>) -> Result<Response<v1::ListResponse>, Status> {
+        let builtin_scenes = palpate_scene::builtin_names().iter().map(|&name| name.to_owned()).collect();
+        Ok(Response::new(v1::ListResponse { sessions: vec![self.daemon.session().info()], builtin_scenes }))
+    }
+
+    async fn load_scene(
+        &self,
+        request: Request<v1::LoadSceneRequest>,
+    ) -> Result<Response<v1::LoadSceneResponse>, Status> {
+        let Some(source) = small(request)?.source else {
+            return Err(Status::invalid_argument("say which scene: `builtin`, `path` or `toml`"));
+        };
+        if let WireSource::Toml(text) = &source
+            && text.len() > convert::MAX_TOML_BYTES
+        {
+            let bytes = text.len();
+            return Err(Status::invalid_argument(format!(
+                "toml has {bytes} bytes; at most {}",
+                convert::MAX_TOML_BYTES
+            )));
+        }
+        let session = self.load(source).await?;
+        tracing::info!(scene = session.scene_name, session = session.id, "scene loaded");
+        let response = v1::LoadSceneResponse { session: Some(session.info()), warnings: session.warnings.clone() };
+        Ok(Response::new(response))
+    }
+
+    async fn reset(&self, request: Request<v1::ResetRequest>) -> Result<Response<v1::ResetResponse>, Status> {
+        let session = current_session(&self.daemon, &small(request)?.session_id)?;
+        let (_, done) = self.order(&session, Order::Reset).await?;
+        Ok(Response::new(v1::ResetResponse { tick: done.tick }))
+    }
+
+    async fn pause(&self, request: Request<v1::PauseRequest>) -> Result<Response<v1::PauseResponse>, Status> {
+        let request = small(request)?;
+        let session = current_session(&self.daemon, &request.session_id)?;
+        let (_, done) = self.order(&session, Order::Pause(request.paused)).await?;
+        Ok(Response::new(v1::PauseResponse { paused: done.paused, tick: done.tick }))
+    }
+
+    async fn step(&self, request: Request<v1::StepRequest>) -> Result<Response<v1::StepResponse>, Status> {
+        let request = small(request)?;
+        let session = current_session(&self.daemon, &request.session_id)?;
+        let ticks = convert::step_ticks(request.ticks)?;
+        let (_, done) = self.order(&session, Order::Step(ticks)).await?;
+        Ok(Response::new(v1::StepResponse { tick: done.tick, time_s: done.time_s }))
+    }
+
+    async fn snapshot(&self, request: Request<v1::SnapshotRequest>) -> Result<Response<v1::SnapshotResponse>, Status> {
+        let session = current_session(&self.daemon, &small(request)?.session_id)?;
+        let (copy, _) = self.copy(&session).await?;
+        let state = snapshot::save(&session.model, &copy.state);
+        if state.len() > super::MAX_SNAPSHOT_BYTES {
+            let megabytes = state.len() / 1_000_000;
+            return Err(Status::resource_exhausted(format!(
+                "the snapshot would have {megabytes} MB; too large to send"
+            )));
+        }
+        Ok(Response::new(v1::SnapshotResponse {
+            tick: copy.state.tick,
+            state_hash: snapshot::state_hash(&copy.state),
+            state: state.into(),
+        }))
+    }
+
+    async fn restore(&self, request: Request<v1::RestoreRequest>) -> Result<Response<v1::RestoreResponse>, Status> {
+        let request = request.into_inner();
+        let session = current_session(&self.daemon, &request.session_id)?;
+        let state = snapshot::restore(&session.model, &request.state)
+            .map_err(|error| Status::invalid_argument(error.to_string()))?;
+        let response = v1::RestoreResponse { tick: state.tick, state_hash: snapshot::state_hash(&state) };
+        self.order(&session, Order::Restore(Box::new(state))).await?;
+        Ok(Response::new(response))
+    }
+
+    async fn inject_forces(
+        &self,
+        request: Request<v1::InjectForcesRequest>,
+    ) -> Result<Response<v1::InjectForcesResponse>, Status> {
+        let request = small(request)?;
+        let session = current_session(&self.daemon, &request.session_id)?;
+        let forces = convert::injections(&session, &request.forces)?;
+        let (_, done) = self.order(&session, Order::Inject(forces)).await?;
+        Ok(Response::new(v1::InjectForcesResponse { first_tick: done.first_tick, pending: done.pending }))
+    }
+
+    async fn status(&self, request: Request<v1::StatusRequest>) -> Result<Response<v1::StatusResponse>, Status> {
+        let session = current_session(&self.daemon, &small(request)?.session_id)?;
+        let (copy, done) = self.copy(&session).await?;
+        Ok(Response::new(status::of(&self.daemon, &session, &copy, &done)))
+    }
+}

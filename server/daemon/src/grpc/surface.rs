@@ -1,0 +1,29 @@
+//! `palpate.v1.Surface`.
+use super::{convert, current_session};
+use crate::{session::Daemon, stream::viewer::Viewer};
+use futures_util::{Stream, stream};
+use palpate_proto::v1::{self, surface_server::Surface};
+use std::{pin::Pin, sync::Arc};
+use tonic::{Request, Response, Status};
+
+/// The service.
+#[derive(Debug, Clone)]
+pub struct SurfaceService {
+    /// Shared by all services.
+    pub daemon: Arc<Daemon>,
+}
+
+#[tonic::async_trait]
+impl Surface for SurfaceService {
+    type WatchStream = Pin<Box<dyn Stream<Item = Result<v1::SurfaceEvent, Status>> + Send>>;
+
+    async fn watch(&self, request: Request<v1::WatchRequest>) -> Result<Response<Self::WatchStream>, Status> {
+        let request = request.into_inner();
+        current_session(&self.daemon, &request.session_id)?;
+        let (rate_hz, with_vertices) = convert::watch_request(&request, self.daemon.hub.display_rate_hz())?;
+        let seat = self.daemon.hub.join(rate_hz, with_vertices);
+        let viewer = Viewer::new(seat, rate_hz, with_vertices, self.daemon.stop.clone());
+        let events = stream::unfold(viewer, |mut viewer| async move { viewer.next().await.map(|e| (Ok(e), viewer)) });
+        Ok(Response::new(Box::pin(events)))
+    }
+}

@@ -1,0 +1,92 @@
+//! A device's way up: every sample is checked, the newest goes into the loop's slot, what is wrong goes back as a fault.
+use super::convert::{self, Rejected};
+use crate::{
+    session::{Daemon, DeviceRecord},
+    sim::exchange::DeviceInput,
+};
+use palpate_proto::v1::{self, DeviceFaultCode, device_up::Message};
+use palpate_realtime::Clock;
+use std::{
+    collections::BTreeMap,
+    sync::{Arc, atomic::Ordering},
+};
+use tokio::sync::mpsc;
+use tokio_util::sync::{CancellationToken, DropGuard};
+use tonic::{Status, Streaming};
+use triple_buffer::Input;
+
+/// Faults that may wait for the way down; beyond it they are only counted.
+pub const FAULTS_WAITING: usize = 16;
+
+/// The way up of one attachment.
+#[derive(Debug)]
+pub struct Uplink {
+    /// Messages of the device.
+    pub messages: Streaming<v1::DeviceUp>,
+    /// Slot of the loop.
+    pub samples: Input<Option<DeviceInput>>,
+    /// Attachment.
+    pub attachment: u64,
+    /// What status shows.
+    pub record: Arc<DeviceRecord>,
+    /// Total of rejected samples.
+    pub daemon: Arc<Daemon>,
+    /// To the way down.
+    pub faults: mpsc::Sender<v1::DeviceFault>,
+    /// Cancelled when either way ends.
+    pub over: CancellationToken,
+}
+
+/// How the way up ended.
+pub type Ended = Result<(), Status>;
+
+impl Uplink {
+    /// Reads until the device, or the way down, ends. Returns the slot for the next device.
+    pub async fn run(mut self, _ends_the_way_down: DropGuard) -> (Input<Option<DeviceInput>>, Ended) {
+        let mut last_sequence = None;
+        let mut counts: BTreeMap<i32, u64> = BTreeMap::new();
+        let over = self.over.clone();
+        loop {
+            let message = tokio::select! {
+                () = over.cancelled() => return (self.samples, Ok(())),
+                message = self.messages.message() => message,
+            };
+            let up = match message {
+                Ok(Some(up)) => up,
+                Ok(None) => return (self.samples, Ok(())),
+                Err(status) => return (self.samples, Err(status)),
+            };
+            if let Err((sequence, rejected)) = self.take(up, &mut last_sequence) {
+                self.report(sequence, rejected, &mut counts);
+            }
+        }
+    }
+
+    fn take(&mut self, up: v1::DeviceUp, last_sequence: &mut Option<u64>) -> Result<(), (u64, Rejected)> {
+        let missing = |message: &str| Rejected { code: DeviceFaultCode::MissingField, message: message.to_owned() };
+        let sample = match up.message {
+            Some(Message::Sample(sample)) => sample,
+            Some(Message::Hello(_)) => return Err((0, missing("this stream said hello already: send samples"))),
+            None => return Err((0, missing("the message carries neither hello nor sample"))),
+        };
+        let arrived_ns = Clock::Monotonic.now_ns();
+        let input = convert::device_sample(&sample, *last_sequence, self.attachment, arrived_ns)
+            .map_err(|rejected| (sample.sequence, rejected))?;
+        *last_sequence = Some(input.sequence);
+        self.samples.write(Some(input));
+        self.record.accepted.fetch_add(1, Ordering::Relaxed);
+        self.record.newest_ns.store(arrived_ns, Ordering::Relaxed);
+        Ok(())
+    }
+
+    fn report(&self, sample_sequence: u64, rejected: Rejected, counts: &mut BTreeMap<i32, u64>) {
+        self.record.rejected.fetch_add(1, Ordering::Relaxed);
+        self.daemon.samples_rejected.fetch_add(1, Ordering::Relaxed);
+        let code = i32::from(rejected.code);
+        let count = counts.entry(code).or_insert(0);
+        *count += 1;
+        // A full queue drops the fault: the count of the next one tells.
+        let _ =
+            self.faults.try_send(v1::DeviceFault { code, message: rejected.message, sample_sequence, count: *count });
+    }
+}

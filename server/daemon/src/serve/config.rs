@@ -1,0 +1,78 @@
+//! Configuration of a daemon, parsed once.
+use super::ServeError;
+use crate::{grpc::convert::MAX_WATCH_RATE_HZ, grpc::listen::TlsFiles, sim::tool::ArmLimits};
+use palpate_control::{ForceLimits, WatchdogSettings};
+use palpate_realtime::OsMeasures;
+use std::{
+    net::{Ipv4Addr, SocketAddr},
+    path::PathBuf,
+};
+
+/// What the loop asks of the operating system.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct RealtimeConfig {
+    /// Priority, memory, processor.
+    pub measures: OsMeasures,
+}
+
+/// Configuration of a daemon.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ServeConfig {
+    /// Address and port; port 0 takes a free one.
+    pub listen: SocketAddr,
+    /// Unix socket, beside.
+    pub unix: Option<PathBuf>,
+    /// TLS on the port.
+    pub tls: Option<TlsFiles>,
+    /// Whether a simulated arm drives tools without a device.
+    pub simulated_arm: bool,
+    /// Limits of arms.
+    pub limits: ArmLimits,
+    /// Updates per second for viewers that ask for no rate (Hz).
+    pub display_rate_hz: f64,
+    /// Folders whose scene files viewers may load.
+    pub scene_folders: Vec<PathBuf>,
+    /// Of the operating system.
+    pub realtime: RealtimeConfig,
+}
+
+/// Peak 8 N (a desktop arm's is 3 to 9 N), 2000 N/s, and the watchdog's own times.
+pub fn default_limits() -> ArmLimits {
+    ArmLimits {
+        force: ForceLimits { max_force_n: 8.0, max_force_rate_n_per_s: 2000.0 },
+        watchdog: WatchdogSettings::default(),
+    }
+}
+
+impl ServeConfig {
+    /// A free port of this machine only, no real-time measures: for tests and benchmarks in one process.
+    pub fn in_process() -> Self {
+        Self {
+            listen: SocketAddr::from((Ipv4Addr::LOCALHOST, 0)),
+            unix: None,
+            tls: None,
+            simulated_arm: true,
+            limits: default_limits(),
+            display_rate_hz: 60.0,
+            scene_folders: Vec::new(),
+            realtime: RealtimeConfig { measures: OsMeasures::NONE },
+        }
+    }
+
+    /// Checks the numbers.
+    ///
+    /// # Errors
+    /// [`ServeError::Setting`].
+    pub fn checked(self) -> Result<Self, ServeError> {
+        let setting = |error: palpate_control::ParameterError| ServeError::Setting { reason: error.to_string() };
+        self.limits.force.checked().map_err(setting)?;
+        self.limits.watchdog.checked().map_err(setting)?;
+        if !(1.0..=MAX_WATCH_RATE_HZ).contains(&self.display_rate_hz) {
+            let rate = self.display_rate_hz;
+            return Err(ServeError::Setting {
+                reason: format!("display_rate_hz = {rate} must be 1 to {MAX_WATCH_RATE_HZ}"),
+            });
+        }
+        Ok(self)
+    }
+}

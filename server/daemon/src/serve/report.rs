@@ -1,0 +1,79 @@
+//! What `palpated serve` prints: at its start where to connect, at its end how it went.
+use super::{Running, ServeConfig, Summary};
+use crate::sim::timing::STAGES;
+use palpate_realtime::Histogram;
+use std::fmt::Write as _;
+
+/// Lines for the start.
+pub fn startup(running: &Running, config: &ServeConfig, description: &str) -> String {
+    let session = running.daemon.session();
+    let info = session.info();
+    let mut text = String::new();
+    let _ = writeln!(text, "scene      {} — {description}", info.scene_name);
+    let _ = writeln!(
+        text,
+        "body       {} nodes, {} tets, {} surface triangles, {:.1} g; highest natural frequency {:.0} Hz",
+        info.node_count,
+        info.tet_count,
+        info.surface_triangle_count,
+        info.mass_kg * 1e3,
+        info.max_natural_frequency_rad_per_s / std::f64::consts::TAU,
+    );
+    let _ = writeln!(
+        text,
+        "loop       {:.2} ms per tick, {} substeps; tools: {}",
+        info.tick_period_s * 1e3,
+        info.substeps_per_tick,
+        if info.tool_names.is_empty() { "none".to_owned() } else { info.tool_names.join(", ") },
+    );
+    for note in &running.notes {
+        let _ = writeln!(text, "real time  {note}");
+    }
+    for warning in &session.warnings {
+        let _ = writeln!(text, "warning    {warning}");
+    }
+    let scheme = if config.tls.is_some() { "https" } else { "http" };
+    let url = format!("{scheme}://{}", running.address);
+    let _ = writeln!(text, "page       {url}/");
+    let _ = writeln!(text, "arms       palpate-bridge --server {url}");
+    let _ = writeln!(text, "viewers    palpate-view --server {url} status");
+    if let Some(path) = &config.unix {
+        let _ = writeln!(text, "unix       unix://{}", path.display());
+    }
+    let _ = write!(text, "stop       Ctrl-C (forces ramp to zero first)");
+    text
+}
+
+/// The table for the end.
+pub fn farewell(summary: &Summary) -> String {
+    let timing = &summary.timing;
+    let mut text = String::from("us                           p50      p99    p99.9      max\n");
+    let mut row = |name: &str, histogram: &Histogram| {
+        let p = histogram.percentiles();
+        let us = |ns: u64| ns as f64 * 1e-3;
+        let _ = writeln!(
+            text,
+            "{name:<24} {:>7.1}  {:>7.1}  {:>7.1}  {:>7.1}",
+            us(p.p50_ns),
+            us(p.p99_ns),
+            us(p.p999_ns),
+            us(p.max_ns)
+        );
+    };
+    row("wake-up lateness", &timing.wakeup);
+    row("tick", &timing.tick);
+    for (name, histogram) in STAGES.iter().zip(&timing.stages) {
+        row(&format!("  {name}"), histogram);
+    }
+    let _ = write!(
+        text,
+        "{} ticks, {} overruns, {} inputs refused, {} samples rejected, {} frames skipped{}",
+        timing.tick.count(),
+        timing.overruns(),
+        timing.inputs_rejected(),
+        summary.samples_rejected,
+        summary.frames_skipped,
+        if summary.cut { "; some connections did not end in time and were cut" } else { "" },
+    );
+    text
+}

@@ -1,0 +1,74 @@
+//! The process: load, start, tell, wait for a signal, say goodbye.
+use super::{ServeConfig, ServeError, args::ServeArgs, report, start};
+use crate::{load::Source, telemetry};
+use miette::IntoDiagnostic;
+use palpate_scene::Scene;
+use sd_notify::NotifyState;
+use std::process::ExitCode;
+use tokio::{
+    runtime,
+    signal::unix::{Signal, SignalKind, signal},
+};
+use tokio_util::sync::CancellationToken;
+
+/// Serves a scene until it is told to stop.
+///
+/// # Errors
+/// A scene that does not load, a setting out of range, or an address that cannot be bound.
+pub fn run(args: &ServeArgs) -> miette::Result<ExitCode> {
+    telemetry::init();
+    let config = args.config()?;
+    let scene = Source::of_argument(&args.scene).load(&mut |_, _| ())?;
+    let runtime = runtime::Builder::new_multi_thread().enable_all().build().into_diagnostic()?;
+    let code = runtime.block_on(serve(config, scene))?;
+    // What still hangs on a socket is not waited for.
+    runtime.shutdown_background();
+    Ok(code)
+}
+
+async fn serve(config: ServeConfig, scene: Scene) -> Result<ExitCode, ServeError> {
+    let description = scene.description.clone();
+    let stop = CancellationToken::new();
+    let signals = Signals::new().map_err(|source| ServeError::System { what: "signal handlers", source })?;
+    let running = start(config.clone(), scene, stop.clone()).await?;
+    println!("{}", report::startup(&running, &config, &description));
+    notify(&[NotifyState::Ready]);
+    let told = stop.clone();
+    tokio::spawn(async move {
+        signals.first().await;
+        eprintln!("stopping: forces ramp to zero");
+        notify(&[NotifyState::Stopping]);
+        told.cancel();
+    });
+    let Some(summary) = running.finished().await else {
+        tracing::error!("the daemon ended by a panic");
+        return Ok(ExitCode::FAILURE);
+    };
+    println!("{}", report::farewell(&summary));
+    Ok(ExitCode::SUCCESS)
+}
+
+/// Tells systemd, if it is there.
+fn notify(states: &[NotifyState<'_>]) {
+    if let Err(error) = sd_notify::notify(states) {
+        tracing::debug!(%error, "no service manager was told");
+    }
+}
+
+struct Signals {
+    terminate: Signal,
+    interrupt: Signal,
+}
+
+impl Signals {
+    fn new() -> std::io::Result<Self> {
+        Ok(Self { terminate: signal(SignalKind::terminate())?, interrupt: signal(SignalKind::interrupt())? })
+    }
+
+    async fn first(mut self) {
+        tokio::select! {
+            _ = self.terminate.recv() => {}
+            _ = self.interrupt.recv() => {}
+        }
+    }
+}

@@ -1,0 +1,201 @@
+//! Wiring: prepare the session, start the loop, open the doors; and the way back when told to stop.
+use super::{ServeConfig, ServeError};
+use crate::{
+    grpc::{self, listen},
+    session::{Daemon, Numbers, Prepared, SessionSettings, prepare},
+    sim::{
+        command::{Desk, desk},
+        simulation::Simulation,
+        thread::{Loop, StopSign},
+        timing::Timing,
+    },
+    stream::hub::Hub,
+};
+use palpate_realtime::{Clock, Note, OsMeasures};
+use palpate_scene::Scene;
+use std::{
+    net::SocketAddr,
+    sync::{Arc, RwLock, atomic::AtomicU64},
+    thread,
+    time::{Duration, SystemTime, UNIX_EPOCH},
+};
+use tokio::{
+    sync::oneshot,
+    task::{JoinHandle, JoinSet},
+    time::timeout,
+};
+use tokio_util::sync::CancellationToken;
+use tonic::service::Routes;
+
+/// How long open streams may take to end once forces are zero.
+const STREAMS_END_WITHIN: Duration = Duration::from_secs(2);
+
+/// A daemon at work.
+#[derive(Debug)]
+pub struct Running {
+    /// Where it listens.
+    pub address: SocketAddr,
+    /// What the operating system granted or refused.
+    pub notes: Vec<Note>,
+    /// The running session, shared with the services.
+    pub daemon: Arc<Daemon>,
+    ended: JoinHandle<Summary>,
+}
+
+/// What a daemon leaves behind.
+#[derive(Debug)]
+pub struct Summary {
+    /// Times of the loop.
+    pub timing: Arc<Timing>,
+    /// Updates dropped over all viewers.
+    pub frames_skipped: u64,
+    /// Samples dropped over all devices.
+    pub samples_rejected: u64,
+    /// Connections that did not end in time and were cut.
+    pub cut: bool,
+}
+
+impl Running {
+    /// Waits until the daemon has stopped (`None`: it panicked).
+    pub async fn finished(self) -> Option<Summary> {
+        self.ended.await.ok()
+    }
+}
+
+/// Starts a daemon on a scene; it stops gracefully when `stop` is cancelled.
+///
+/// # Errors
+/// [`ServeError`]; nothing keeps running.
+pub async fn start(config: ServeConfig, scene: Scene, stop: CancellationToken) -> Result<Running, ServeError> {
+    let config = config.checked()?;
+    let doors = Doors::open(&config).await?;
+    let hub = Hub::new(config.display_rate_hz);
+    let numbers = Numbers::new(SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |d| d.as_secs()));
+    let settings = SessionSettings {
+        limits: config.limits,
+        simulated_arm: config.simulated_arm,
+        scene_folders: config.scene_folders.clone(),
+    };
+    let Prepared { simulation, session, surface } = prepare(scene, &settings, &numbers, &hub)?;
+    let (desk, orders, clerk) = desk().map_err(|source| ServeError::System { what: "order desk", source })?;
+    let timing = Arc::new(Timing::default());
+    let sign = StopSign::default();
+    let (notes, thread) =
+        start_loop(simulation, desk, sign.clone(), Arc::clone(&timing), config.realtime.measures).await?;
+    tokio::spawn(clerk.work());
+    let daemon = Arc::new(Daemon {
+        orders,
+        hub,
+        timing,
+        realtime_notes: notes.iter().map(ToString::to_string).collect(),
+        settings,
+        stop,
+        sign,
+        samples_rejected: AtomicU64::new(0),
+        current: RwLock::new(Arc::clone(&session)),
+        numbers,
+        loading: tokio::sync::Mutex::new(()),
+    });
+    daemon.show(&session, surface);
+    let (routes, health) = grpc::routes(&daemon).await?;
+    let address = doors.address;
+    let closing = CancellationToken::new();
+    let servers = doors.serve(&routes, &closing);
+    let ended = tokio::spawn(until_stopped(Arc::clone(&daemon), thread, health, servers, closing, config));
+    Ok(Running { address, notes, daemon, ended })
+}
+
+struct Doors {
+    address: SocketAddr,
+    tcp: (tonic::transport::Server, tonic::transport::server::TcpIncoming),
+    unix: Option<(tonic::transport::Server, tokio_stream::wrappers::UnixListenerStream)>,
+}
+
+type Servers = JoinSet<Result<(), tonic::transport::Error>>;
+
+impl Doors {
+    async fn open(config: &ServeConfig) -> Result<Self, ServeError> {
+        let server = listen::server(config.tls.as_ref())?;
+        let (incoming, address) = listen::tcp(config.listen).await?;
+        let unix = match &config.unix {
+            Some(path) => Some((listen::server(None)?, listen::unix(path).await?)),
+            None => None,
+        };
+        Ok(Self { address, tcp: (server, incoming), unix })
+    }
+
+    fn serve(self, routes: &Routes, closing: &CancellationToken) -> Servers {
+        let mut servers = JoinSet::new();
+        let (server, incoming) = self.tcp;
+        servers.spawn(listen::serve_tcp(server, routes.clone(), incoming, closing.clone()));
+        if let Some((server, incoming)) = self.unix {
+            servers.spawn(listen::serve_unix(server, routes.clone(), incoming, closing.clone()));
+        }
+        servers
+    }
+}
+
+/// The loop's thread, once it has asked the operating system for its measures.
+async fn start_loop(
+    simulation: Box<Simulation>,
+    desk: Desk,
+    sign: StopSign,
+    timing: Arc<Timing>,
+    measures: OsMeasures,
+) -> Result<(Vec<Note>, thread::JoinHandle<()>), ServeError> {
+    let the_loop = Loop::new(simulation, desk, sign, timing, Clock::Monotonic)
+        .map_err(|error| ServeError::Prepare(error.into()))?;
+    let (tell, told) = oneshot::channel();
+    let body = move || {
+        let granted = measures.apply();
+        let _ = tell.send(granted.notes.clone());
+        the_loop.run();
+        drop(granted);
+    };
+    let system = |source| ServeError::System { what: "thread", source };
+    let thread = thread::Builder::new().name("palpate-loop".into()).spawn(body).map_err(system)?;
+    Ok((told.await.unwrap_or_default(), thread))
+}
+
+/// Waits for the stop, then: forces to zero, streams end, sockets close, loop joins.
+async fn until_stopped(
+    daemon: Arc<Daemon>,
+    thread: thread::JoinHandle<()>,
+    health: tonic_health::server::HealthReporter,
+    mut servers: Servers,
+    closing: CancellationToken,
+    config: ServeConfig,
+) -> Summary {
+    let mut early = false;
+    tokio::select! {
+        () = daemon.stop.cancelled() => {}
+        ended = servers.join_next() => {
+            early = true;
+            tracing::error!(?ended, "a server ended by itself: stopping");
+            daemon.stop.cancel();
+        }
+    }
+    for service in ["palpate.v1.Device", "palpate.v1.Surface", "palpate.v1.Session", ""] {
+        health.set_service_status(service, tonic_health::ServingStatus::NotServing).await;
+    }
+    // Device streams wait for zero force by themselves; the loop ramps now.
+    daemon.sign.raise();
+    let joined = tokio::task::spawn_blocking(move || thread.join().is_ok());
+    if !matches!(joined.await, Ok(true)) {
+        tracing::error!("the loop ended by a panic");
+    }
+    daemon.session().ended.cancel();
+    closing.cancel();
+    let all_ended = async { while servers.join_next().await.is_some() {} };
+    let cut = timeout(STREAMS_END_WITHIN, all_ended).await.is_err() || early;
+    servers.abort_all();
+    if let Some(path) = &config.unix {
+        let _ = std::fs::remove_file(path);
+    }
+    Summary {
+        timing: Arc::clone(&daemon.timing),
+        frames_skipped: daemon.hub.frames_skipped(),
+        samples_rejected: daemon.samples_rejected.load(std::sync::atomic::Ordering::Relaxed),
+        cut,
+    }
+}

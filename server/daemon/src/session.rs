@@ -1,0 +1,353 @@
+//! The session outside the loop: its body, its tools and who drives them, and how one session replaces another.
+use crate::{
+    sim::{
+        command::{Orders, Refusal, Request},
+        exchange::{SurfaceEnd, ToolEnd},
+        simulation::{Parts, Simulation},
+        thread::StopSign,
+        timing::Timing,
+        tool::ArmLimits,
+    },
+    stream::hub::Hub,
+};
+use palpate_physics::{Model, ModelError, Scratch, State, TickInput, step};
+use palpate_proto::v1;
+use palpate_scene::{Driver, Probe, Scene};
+use std::{
+    io,
+    path::PathBuf,
+    sync::{
+        Arc, Mutex, MutexGuard, PoisonError, RwLock,
+        atomic::{AtomicU64, Ordering},
+    },
+    time::{Duration, Instant},
+};
+use thiserror::Error;
+use tokio_util::sync::CancellationToken;
+
+/// What every session is run with.
+#[derive(Debug, Clone)]
+pub struct SessionSettings {
+    /// Limits of arms.
+    pub limits: ArmLimits,
+    /// Whether the scene's simulated arm drives a tool to which no device is attached.
+    pub simulated_arm: bool,
+    /// Folders below which scene files may be loaded by viewers.
+    pub scene_folders: Vec<PathBuf>,
+}
+
+/// Why a scene cannot be run.
+#[derive(Debug, Error)]
+pub enum PrepareError {
+    /// The physics refused it.
+    #[error(transparent)]
+    Model(#[from] ModelError),
+    /// The loop cannot keep its tick.
+    #[error(transparent)]
+    Period(#[from] palpate_realtime::PeriodError),
+    /// The operating system.
+    #[error("no descriptors for the session's slots: {0}")]
+    Slots(#[from] io::Error),
+}
+
+/// A running session.
+#[derive(Debug)]
+pub struct ActiveSession {
+    /// Its id on the wire.
+    pub id: String,
+    /// Its number in the loop.
+    pub number: u64,
+    /// The scene's name.
+    pub scene_name: String,
+    /// The body.
+    pub model: Arc<Model>,
+    /// What the scene measures.
+    pub probes: Vec<Probe>,
+    /// Remarks.
+    pub warnings: Vec<String>,
+    /// One per tool.
+    pub tools: Vec<ToolSeat>,
+    /// Cancelled when another session replaces it, or the daemon stops.
+    pub ended: CancellationToken,
+}
+
+/// A tool that a device can take.
+#[derive(Debug)]
+pub struct ToolSeat {
+    /// Name in the scene.
+    pub name: String,
+    /// Whether the scene leaves it to a device.
+    pub for_devices: bool,
+    end: Mutex<Option<ToolEnd>>,
+    device: Mutex<Option<Arc<DeviceRecord>>>,
+}
+
+/// What is known of an attached device.
+#[derive(Debug)]
+pub struct DeviceRecord {
+    /// Its name.
+    pub name: String,
+    /// Samples taken.
+    pub accepted: AtomicU64,
+    /// Samples dropped.
+    pub rejected: AtomicU64,
+    /// When the newest sample came (ns, monotonic), 0: none yet.
+    pub newest_ns: AtomicU64,
+    force_n_bits: AtomicU64,
+}
+
+impl DeviceRecord {
+    /// A device that has sent nothing yet.
+    pub fn new(name: String) -> Arc<Self> {
+        Arc::new(Self {
+            name,
+            accepted: AtomicU64::new(0),
+            rejected: AtomicU64::new(0),
+            newest_ns: AtomicU64::new(0),
+            force_n_bits: AtomicU64::new(0),
+        })
+    }
+
+    /// Notes the magnitude of the last force sent (N).
+    pub fn sent_force_n(&self, force_n: f64) {
+        self.force_n_bits.store(force_n.to_bits(), Ordering::Relaxed);
+    }
+
+    /// Magnitude of the last force sent (N).
+    pub fn force_n(&self) -> f64 {
+        f64::from_bits(self.force_n_bits.load(Ordering::Relaxed))
+    }
+}
+
+fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+impl ToolSeat {
+    /// Takes the tool for a device; `None` when another has it.
+    pub fn take(&self, record: &Arc<DeviceRecord>) -> Option<ToolEnd> {
+        let end = lock(&self.end).take()?;
+        *lock(&self.device) = Some(Arc::clone(record));
+        Some(end)
+    }
+
+    /// Gives it back.
+    pub fn give_back(&self, end: ToolEnd) {
+        end.shared.detach();
+        *lock(&self.device) = None;
+        *lock(&self.end) = Some(end);
+    }
+
+    /// The device that has it.
+    pub fn device(&self) -> Option<Arc<DeviceRecord>> {
+        lock(&self.device).clone()
+    }
+}
+
+impl ActiveSession {
+    /// The session as the wire tells it.
+    pub fn info(&self) -> v1::SessionInfo {
+        let model = &self.model;
+        v1::SessionInfo {
+            session_id: self.id.clone(),
+            scene_name: self.scene_name.clone(),
+            node_count: model.rest_positions_m().len() as u32,
+            tet_count: model.mesh().tets().len() as u32,
+            surface_triangle_count: model.surface().triangles.len() as u32,
+            substeps_per_tick: model.substeps(),
+            tick_period_s: model.spec().settings.tick_period_s,
+            mass_kg: model.mass_kg().iter().sum(),
+            max_natural_frequency_rad_per_s: model.max_natural_frequency_rad_per_s(),
+            tool_names: self.tools.iter().map(|tool| tool.name.clone()).collect(),
+        }
+    }
+}
+
+/// A session that is ready to go into the loop.
+#[derive(Debug)]
+pub struct Prepared {
+    /// For the loop.
+    pub simulation: Box<Simulation>,
+    /// For everybody else.
+    pub session: Arc<ActiveSession>,
+    /// For the hub.
+    pub surface: SurfaceEnd,
+}
+
+/// All that the services share.
+#[derive(Debug)]
+pub struct Daemon {
+    /// To the loop.
+    pub orders: Orders,
+    /// To the viewers.
+    pub hub: Arc<Hub>,
+    /// Of the loop.
+    pub timing: Arc<Timing>,
+    /// What the operating system granted or refused, a line each.
+    pub realtime_notes: Vec<String>,
+    /// What sessions are run with.
+    pub settings: SessionSettings,
+    /// Cancelled when the daemon begins to stop.
+    pub stop: CancellationToken,
+    /// Tells when forces are zero.
+    pub sign: StopSign,
+    /// Samples dropped over all devices.
+    pub samples_rejected: AtomicU64,
+    pub(crate) current: RwLock<Arc<ActiveSession>>,
+    pub(crate) numbers: Numbers,
+    pub(crate) loading: tokio::sync::Mutex<()>,
+}
+
+/// Counters that name things.
+#[derive(Debug)]
+pub struct Numbers {
+    started_unix_s: u64,
+    session: AtomicU64,
+    attachment: AtomicU64,
+}
+
+impl Numbers {
+    /// `started_unix_s` tells sessions of one start of the daemon from those of another.
+    pub fn new(started_unix_s: u64) -> Self {
+        Self { started_unix_s, session: AtomicU64::new(0), attachment: AtomicU64::new(0) }
+    }
+
+    fn next_session(&self) -> (u64, String) {
+        let number = self.session.fetch_add(1, Ordering::Relaxed) + 1;
+        (number, format!("{:x}-{number}", self.started_unix_s))
+    }
+
+    /// A number for an attachment, from 1.
+    pub fn next_attachment(&self) -> u64 {
+        self.attachment.fetch_add(1, Ordering::Relaxed) + 1
+    }
+}
+
+/// Builds all of a session. Takes as long as the mesh is large; needs a runtime's context.
+///
+/// # Errors
+/// [`PrepareError`].
+pub fn prepare(
+    scene: Scene,
+    settings: &SessionSettings,
+    numbers: &Numbers,
+    hub: &Hub,
+) -> Result<Prepared, PrepareError> {
+    let model = Arc::new(Model::build(scene.model)?);
+    let period_s = model.spec().settings.tick_period_s;
+    palpate_realtime::Deadlines::new(palpate_realtime::Clock::Monotonic, period_s)?;
+    let mut warnings = scene.warnings;
+    warnings.extend(too_heavy(&model));
+    let (number, id) = numbers.next_session();
+    let for_devices: Vec<bool> = scene.drivers.iter().map(|driver| matches!(driver, Driver::Device)).collect();
+    let (simulation, ends) = Simulation::build(Parts {
+        session: number,
+        model: Arc::clone(&model),
+        timeline: scene.timeline,
+        drivers: scene.drivers,
+        arm: scene.arm.filter(|_| settings.simulated_arm),
+        limits: settings.limits,
+        demand: Arc::clone(&hub.demand),
+    })?;
+    let seat = |((end, spec), for_devices): ((ToolEnd, &palpate_physics::contact::ToolSpec), bool)| ToolSeat {
+        name: spec.name.clone(),
+        for_devices,
+        end: Mutex::new(Some(end)),
+        device: Mutex::new(None),
+    };
+    let tools = ends.tools.into_iter().zip(&model.spec().tools).zip(for_devices).map(seat).collect();
+    let session = ActiveSession {
+        id,
+        number,
+        scene_name: scene.name,
+        model,
+        probes: scene.probes,
+        warnings,
+        tools,
+        ended: CancellationToken::new(),
+    };
+    Ok(Prepared { simulation, session: Arc::new(session), surface: ends.surface })
+}
+
+/// Measures some ticks of the body at rest, and says so when they do not fit their period.
+fn too_heavy(model: &Model) -> Option<String> {
+    let cost_s = median_tick_s(model);
+    let period_s = model.spec().settings.tick_period_s;
+    (cost_s > 0.8 * period_s).then(|| {
+        format!(
+            "a tick costs {:.2} ms here and should last {:.2} ms ({} substeps): the body runs about {:.1} times slower than real \
+             time; coarsen the mesh, soften the material or lengthen the tick",
+            cost_s * 1e3,
+            period_s * 1e3,
+            model.substeps(),
+            cost_s / period_s,
+        )
+    })
+}
+
+fn median_tick_s(model: &Model) -> f64 {
+    let (mut state, mut scratch) = (State::at_rest(model), Scratch::new(model));
+    let targets: Vec<_> = state.tools.iter().map(|tool| tool.target).collect();
+    let load_factors = vec![0.0; model.spec().loads.len()];
+    let prescribed = vec![glam::DVec3::ZERO; model.spec().prescribed.len()];
+    let input = TickInput {
+        tools: &targets,
+        load_factors: &load_factors,
+        prescribed_displacements_m: &prescribed,
+        point_forces: &[],
+    };
+    let begun = Instant::now();
+    let mut costs = Vec::new();
+    // A few at least, more while they are cheap.
+    while costs.len() < 5 || (costs.len() < 51 && begun.elapsed() < Duration::from_millis(50)) {
+        let before = Instant::now();
+        step(model, &mut state, &mut scratch, &input);
+        costs.push(before.elapsed().as_secs_f64());
+    }
+    costs.sort_by(f64::total_cmp);
+    costs[costs.len() / 2]
+}
+
+impl Daemon {
+    /// The running session.
+    pub fn session(&self) -> Arc<ActiveSession> {
+        Arc::clone(&self.current.read().unwrap_or_else(PoisonError::into_inner))
+    }
+
+    /// Lets a prepared session take the place of the running one. Forces on arms go to zero first.
+    ///
+    /// # Errors
+    /// [`Refusal`]; the running session goes on.
+    pub async fn replace(&self, prepared: Prepared) -> Result<Arc<ActiveSession>, Refusal> {
+        let Prepared { simulation, session, surface } = prepared;
+        let old = self.session();
+        let (_, before) = self.orders.give(old.number, Request::Pause(true), false).await?;
+        let ramp = Duration::from_secs_f64(self.settings.limits.watchdog.ramp_to_zero_s);
+        tokio::time::sleep(ramp + Duration::from_millis(5)).await;
+        let loaded = self.orders.give(old.number, Request::Load(simulation), false).await;
+        let (old_simulation, _) = match loaded {
+            Ok(back) => back,
+            Err(refusal) => {
+                let _ = self.orders.give(old.number, Request::Pause(before.was_paused), false).await;
+                return Err(refusal);
+            }
+        };
+        *self.current.write().unwrap_or_else(PoisonError::into_inner) = Arc::clone(&session);
+        old.ended.cancel();
+        self.show(&session, surface);
+        // Freeing a large body takes its time: not on a thread that serves streams.
+        tokio::task::spawn_blocking(move || drop(old_simulation));
+        Ok(session)
+    }
+
+    /// Lets the hub serve a session's surface.
+    pub fn show(&self, session: &Arc<ActiveSession>, surface: SurfaceEnd) {
+        tokio::spawn(Arc::clone(&self.hub).serve(
+            session.id.clone(),
+            session.scene_name.clone(),
+            Arc::clone(&session.model),
+            surface,
+            session.ended.clone(),
+        ));
+    }
+}

@@ -1,0 +1,191 @@
+//! What passes between the loop and the rest of the daemon: fixed slots (the newest wins) and flags. Nothing here blocks or
+//! allocates on the loop's side once built.
+use super::bell::{Ear, bell};
+use glam::DVec3;
+use palpate_physics::{Model, contact::LocalContactModel};
+use palpate_realtime::Doorbell;
+use std::{
+    io,
+    sync::{
+        Arc,
+        atomic::{AtomicU64, Ordering},
+    },
+};
+use triple_buffer::{Input, Output, triple_buffer};
+
+/// One measurement of an arm, checked.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct DeviceInput {
+    /// Attachment it belongs to ([`ToolShared::attachment`]).
+    pub attachment: u64,
+    /// Strictly increasing per attachment.
+    pub sequence: u64,
+    /// The device's clock (ns), to be echoed.
+    pub device_time_ns: u64,
+    /// When the daemon received it (ns, [`palpate_realtime::Clock::Monotonic`]).
+    pub arrived_ns: u64,
+    /// Tool centre (m, world).
+    pub position_m: DVec3,
+    /// Its velocity (m/s, world).
+    pub velocity_m_per_s: DVec3,
+    /// Bit i is button i.
+    pub buttons: u32,
+}
+
+/// What the loop wants an arm to do.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct ToolOutput {
+    /// Attachment it is meant for.
+    pub attachment: u64,
+    /// Tick that computed it.
+    pub tick: u64,
+    /// Limited force on the arm (N, world).
+    pub force_n: DVec3,
+    /// Sequence of the newest sample used.
+    pub sample_sequence: u64,
+    /// Its device time (ns).
+    pub echo_device_time_ns: u64,
+    /// Contact around the device, scaled like the force; `None` out of contact or when the force is zero by order.
+    pub local_model: Option<LocalContactModel>,
+    /// Centre of the proxy (m, world).
+    pub proxy_position_m: DVec3,
+    /// No sample for too long: the force ramps to zero.
+    pub stale: bool,
+    /// The force was saturated or its rate limited.
+    pub limited: bool,
+    /// Tick at which the body's state was quarantined.
+    pub quarantined: Option<u64>,
+}
+
+/// What both sides know of a tool.
+#[derive(Debug, Default)]
+pub struct ToolShared {
+    attachment: AtomicU64,
+    max_force_n_bits: AtomicU64,
+}
+
+impl ToolShared {
+    /// Number of the present attachment; 0: no device.
+    pub fn attachment(&self) -> u64 {
+        self.attachment.load(Ordering::Acquire)
+    }
+
+    /// A device attached: the loop turns to it at its next tick, and never asks it for more than `max_force_n` (N).
+    pub fn attach(&self, attachment: u64, max_force_n: f64) {
+        self.max_force_n_bits.store(max_force_n.to_bits(), Ordering::Relaxed);
+        self.attachment.store(attachment, Ordering::Release);
+    }
+
+    /// The device went.
+    pub fn detach(&self) {
+        self.attachment.store(0, Ordering::Release);
+    }
+
+    /// Largest force the attached device takes (N).
+    pub fn max_force_n(&self) -> f64 {
+        f64::from_bits(self.max_force_n_bits.load(Ordering::Relaxed))
+    }
+}
+
+/// The loop's end of a tool.
+#[derive(Debug)]
+pub struct ToolPort {
+    /// Newest sample.
+    pub samples: Output<Option<DeviceInput>>,
+    /// Newest output.
+    pub outputs: Input<ToolOutput>,
+    /// Rung after an output, while a device is attached.
+    pub bell: Doorbell,
+    /// Attachment.
+    pub shared: Arc<ToolShared>,
+}
+
+/// The end of a tool that a device's stream holds while it is attached.
+#[derive(Debug)]
+pub struct ToolEnd {
+    /// Newest sample.
+    pub samples: Input<Option<DeviceInput>>,
+    /// Newest output.
+    pub outputs: Output<ToolOutput>,
+    /// Hears of outputs.
+    pub ear: Ear,
+    /// Attachment.
+    pub shared: Arc<ToolShared>,
+}
+
+/// Both ends of a tool.
+///
+/// # Errors
+/// See [`bell`].
+pub fn tool() -> io::Result<(ToolPort, ToolEnd)> {
+    let (bell, ear) = bell()?;
+    let (sample_in, sample_out) = triple_buffer(&None);
+    let (output_in, output_out) = triple_buffer(&ToolOutput::default());
+    let shared = Arc::new(ToolShared::default());
+    let port = ToolPort { samples: sample_out, outputs: output_in, bell, shared: Arc::clone(&shared) };
+    Ok((port, ToolEnd { samples: sample_in, outputs: output_out, ear, shared }))
+}
+
+/// A tool as viewers see it.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct ToolView {
+    /// Device (m, world).
+    pub device_position_m: DVec3,
+    /// Proxy (m, world).
+    pub proxy_position_m: DVec3,
+    /// Of the body on the tool (N, world).
+    pub contact_force_n: DVec3,
+    /// Sent to the arm (N, world).
+    pub device_force_n: DVec3,
+    /// Contact points that carry force.
+    pub contacts: u32,
+}
+
+/// The surface at a tick.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct SurfaceSnapshot {
+    /// Tick.
+    pub tick: u64,
+    /// Simulated time (s).
+    pub time_s: f64,
+    /// Wall-clock cost of the last tick (µs).
+    pub tick_cost_us: f64,
+    /// Whether [`SurfaceSnapshot::displacements_m`] was filled.
+    pub has_vertices: bool,
+    /// Displacement of each surface vertex (m) from its f32 rest position.
+    pub displacements_m: Vec<[f32; 3]>,
+    /// Tools.
+    pub tools: Vec<ToolView>,
+}
+
+/// The loop's end of the surface.
+#[derive(Debug)]
+pub struct SurfacePort {
+    /// Newest surface.
+    pub slot: Input<SurfaceSnapshot>,
+    /// Rung after it was filled.
+    pub bell: Doorbell,
+}
+
+/// The hub's end of the surface.
+#[derive(Debug)]
+pub struct SurfaceEnd {
+    /// Newest surface.
+    pub slot: Output<SurfaceSnapshot>,
+    /// Hears of it.
+    pub ear: Ear,
+}
+
+/// Both ends of a model's surface.
+///
+/// # Errors
+/// See [`bell`].
+pub fn surface(model: &Model) -> io::Result<(SurfacePort, SurfaceEnd)> {
+    let (bell, ear) = bell()?;
+    let (input, output) = triple_buffer(&SurfaceSnapshot {
+        displacements_m: vec![[0.0; 3]; model.surface().nodes.len()],
+        tools: vec![ToolView::default(); model.spec().tools.len()],
+        ..Default::default()
+    });
+    Ok((SurfacePort { slot: input, bell }, SurfaceEnd { slot: output, ear }))
+}

@@ -1,0 +1,171 @@
+//! All that the loop needs for one session, built outside it and swapped in whole.
+use super::{
+    arm::BuiltinArm,
+    exchange::{self, SurfaceEnd, SurfacePort, SurfaceSnapshot, ToolEnd},
+    inject::Injections,
+    tool::{ArmLimits, ToolLoop},
+};
+use crate::stream::{hub::Demand, keyframe};
+use glam::DVec3;
+use palpate_physics::{Model, Scratch, State, contact::ToolTarget};
+use palpate_scene::{Driver, ScriptedHand, Timeline};
+use std::{io, sync::Arc};
+
+/// A session in the loop.
+#[derive(Debug)]
+pub struct Simulation {
+    /// Number of the session.
+    pub session: u64,
+    pub(super) model: Arc<Model>,
+    pub(super) state: State,
+    pub(super) scratch: Scratch,
+    pub(super) timeline: Timeline,
+    pub(super) tools: Vec<ToolLoop>,
+    pub(super) targets: Vec<ToolTarget>,
+    pub(super) load_factors: Vec<f64>,
+    pub(super) prescribed_m: Vec<DVec3>,
+    pub(super) injections: Injections,
+    pub(super) surface: SurfacePort,
+    pub(super) rest_f32_m: Vec<[f32; 3]>,
+    pub(super) demand: Arc<Demand>,
+    pub(super) ticks_to_frame: u32,
+}
+
+/// What a session is built from.
+#[derive(Debug)]
+pub struct Parts {
+    /// Number of the session, from 1.
+    pub session: u64,
+    /// The body.
+    pub model: Arc<Model>,
+    /// Its loads and prescribed motions.
+    pub timeline: Timeline,
+    /// Its tools' drivers.
+    pub drivers: Vec<Driver>,
+    /// The hand on the simulated arm, when there is one.
+    pub arm: Option<ScriptedHand>,
+    /// Limits of every arm.
+    pub limits: ArmLimits,
+    /// What viewers want.
+    pub demand: Arc<Demand>,
+}
+
+/// What the rest of the daemon holds of a session in the loop.
+#[derive(Debug)]
+pub struct Ends {
+    /// One per tool.
+    pub tools: Vec<ToolEnd>,
+    /// The surface.
+    pub surface: SurfaceEnd,
+}
+
+impl Simulation {
+    /// Allocates everything.
+    ///
+    /// # Errors
+    /// The operating system's, when it has no descriptors left.
+    pub fn build(parts: Parts) -> io::Result<(Box<Self>, Ends)> {
+        let Parts { session, model, timeline, drivers, arm, limits, demand } = parts;
+        let (surface, surface_end) = exchange::surface(&model)?;
+        let period_s = model.spec().settings.tick_period_s;
+        let mut tools = Vec::new();
+        let mut tool_ends = Vec::new();
+        for (index, driver) in drivers.into_iter().enumerate() {
+            let (port, end) = exchange::tool()?;
+            let hand = arm.as_ref().filter(|hand| hand.tool == index);
+            let arm = hand.map(|hand| BuiltinArm::new(hand.path.clone(), period_s)).transpose();
+            let arm = arm.map_err(io::Error::other)?;
+            tools.push(ToolLoop::new(driver, port, arm, limits));
+            tool_ends.push(end);
+        }
+        let state = State::at_rest(&model);
+        let simulation = Self {
+            session,
+            scratch: Scratch::new(&model),
+            timeline,
+            targets: state.tools.iter().map(|tool| tool.target).collect(),
+            tools,
+            load_factors: vec![0.0; model.spec().loads.len()],
+            prescribed_m: vec![DVec3::ZERO; model.spec().prescribed.len()],
+            injections: Injections::default(),
+            surface,
+            rest_f32_m: keyframe::rest_positions_f32(&model),
+            demand,
+            ticks_to_frame: 0,
+            state,
+            model,
+        };
+        Ok((Box::new(simulation), Ends { tools: tool_ends, surface: surface_end }))
+    }
+
+    /// The body.
+    pub fn model(&self) -> &Arc<Model> {
+        &self.model
+    }
+
+    /// The state.
+    pub fn state(&self) -> &State {
+        &self.state
+    }
+
+    /// Period of the tick (s).
+    pub fn period_s(&self) -> f64 {
+        self.model.spec().settings.tick_period_s
+    }
+
+    /// Whether no arm has a force.
+    pub fn is_released(&self) -> bool {
+        self.tools.iter().all(|tool| tool.force_n() == DVec3::ZERO)
+    }
+
+    /// Back to rest at tick 0. Does not allocate.
+    pub fn reset(&mut self) {
+        self.state.reset(&self.model);
+        self.injections.clear();
+        self.tools.iter_mut().for_each(ToolLoop::reset);
+    }
+
+    /// Takes another state of the same model. Does not allocate. False when it is not one of this model's.
+    pub fn restore(&mut self, state: &State) -> bool {
+        if !copy_state(state, &mut self.state) {
+            return false;
+        }
+        self.injections.clear();
+        for (tool, state) in self.tools.iter_mut().zip(&self.state.tools) {
+            tool.restored(state);
+        }
+        true
+    }
+
+    /// Fills the surface's slot and rings.
+    pub(super) fn publish_surface(&mut self, tick_cost_us: f64) {
+        let snapshot: &mut SurfaceSnapshot = self.surface.slot.input_buffer_mut();
+        snapshot.tick = self.state.tick;
+        snapshot.time_s = self.state.time_s(&self.model);
+        snapshot.tick_cost_us = tick_cost_us;
+        snapshot.has_vertices = self.demand.wants_vertices();
+        for (view, (tool, state)) in snapshot.tools.iter_mut().zip(self.tools.iter().zip(&self.state.tools)) {
+            *view = tool.view(state);
+        }
+        if snapshot.has_vertices {
+            let nodes = &self.model.surface().nodes;
+            for ((displacement, node), rest) in snapshot.displacements_m.iter_mut().zip(nodes).zip(&self.rest_f32_m) {
+                let x = self.state.x[*node as usize].to_array();
+                *displacement = std::array::from_fn(|axis| (x[axis] - f64::from(rest[axis])) as f32);
+            }
+        }
+        self.surface.slot.publish();
+        self.surface.bell.ring();
+    }
+}
+
+/// Copies a state of the same model without allocating; false, and nothing is copied, when the shapes differ.
+pub fn copy_state(from: &State, to: &mut State) -> bool {
+    let same = from.x.len() == to.x.len()
+        && from.tools.len() == to.tools.len()
+        && from.load_factors.len() == to.load_factors.len();
+    if same {
+        to.copy_from(from);
+    }
+    same
+}

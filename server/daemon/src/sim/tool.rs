@@ -1,0 +1,212 @@
+//! One tool's side of the tick: where it shall go, and what force its arm gets.
+use super::{
+    arm::BuiltinArm,
+    exchange::{DeviceInput, ToolOutput, ToolPort, ToolView},
+};
+use glam::DVec3;
+use palpate_control::{
+    extrapolate::{Motion, extrapolate},
+    limits::{ForceLimiter, ForceLimits},
+    watchdog::{Link, Watchdog, WatchdogSettings},
+};
+use palpate_physics::contact::{LocalContactModel, ToolState, ToolTarget};
+use palpate_scene::Driver;
+
+/// Times and limits of an arm's force.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ArmLimits {
+    /// Peak (N) and rate (N/s); a device's own peak applies when it is smaller.
+    pub force: ForceLimits,
+    /// When a sample is stale, and the ramps.
+    pub watchdog: WatchdogSettings,
+}
+
+/// What the loop asks of devices this tick.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Order {
+    /// Render the force.
+    Render,
+    /// Ramp to zero and stay there.
+    Release,
+}
+
+/// A tool in the loop.
+#[derive(Debug)]
+pub struct ToolLoop {
+    driver: Driver,
+    port: ToolPort,
+    arm: Option<BuiltinArm>,
+    limits: ArmLimits,
+    limiter: ForceLimiter,
+    watchdog: Watchdog,
+    /// Factor of the force by order, 0 to 1.
+    level: f64,
+    attachment: u64,
+    newest: Option<DeviceInput>,
+    stale: bool,
+    raw_n: DVec3,
+    output: ToolOutput,
+}
+
+impl ToolLoop {
+    /// A tool of a scene.
+    pub fn new(driver: Driver, port: ToolPort, arm: Option<BuiltinArm>, limits: ArmLimits) -> Self {
+        Self {
+            driver,
+            port,
+            arm,
+            limits,
+            limiter: ForceLimiter::new(limits.force),
+            watchdog: Watchdog::new(limits.watchdog),
+            level: 1.0,
+            attachment: 0,
+            newest: None,
+            stale: false,
+            raw_n: DVec3::ZERO,
+            output: ToolOutput::default(),
+        }
+    }
+
+    /// Whether a device drives it now.
+    pub fn is_attached(&self) -> bool {
+        self.attachment != 0
+    }
+
+    /// The force its arm has now (N).
+    pub fn force_n(&self) -> DVec3 {
+        self.output.force_n
+    }
+
+    /// Takes note of attaching, detaching and new samples. Once per loop, also while paused.
+    pub fn listen(&mut self) {
+        let attachment = self.port.shared.attachment();
+        if attachment != self.attachment {
+            self.change_hands(attachment);
+        }
+        if !self.port.samples.update() {
+            return;
+        }
+        if let Some(sample) =
+            self.port.samples.output_buffer().filter(|s| s.attachment == attachment && attachment != 0)
+        {
+            self.watchdog.recover();
+            self.watchdog.sample_arrived(sample.arrived_ns);
+            self.newest = Some(sample);
+        }
+    }
+
+    fn change_hands(&mut self, attachment: u64) {
+        self.attachment = attachment;
+        self.newest = None;
+        self.stale = false;
+        self.watchdog = Watchdog::new(self.limits.watchdog);
+        let own = self.limits.force;
+        let max_force_n =
+            if attachment == 0 { own.max_force_n } else { own.max_force_n.min(self.port.shared.max_force_n()) };
+        self.limiter = ForceLimiter::new(ForceLimits { max_force_n, ..own });
+        self.output = ToolOutput { attachment, ..ToolOutput::default() };
+    }
+
+    /// Where the tool shall be at the end of the tick, `time_s` (s of simulated time).
+    pub fn target(&mut self, tool: &ToolState, now_ns: u64, time_s: f64) -> ToolTarget {
+        if let Some(target) = self.driver.target(time_s) {
+            return target;
+        }
+        let held = ToolTarget { velocity_m_per_s: DVec3::ZERO, ..tool.target };
+        if !self.is_attached() {
+            let force_n = self.output.force_n;
+            return self.arm.as_mut().map_or(held, |arm| arm.advance(time_s, force_n));
+        }
+        let Some(sample) = &self.newest else { return held };
+        let verdict = self.watchdog.check(now_ns);
+        self.stale = matches!(verdict.link, Link::Ramping(_) | Link::Latched(_));
+        let motion = Motion { velocity_m_per_s: sample.velocity_m_per_s, ..Motion::at(sample.position_m) };
+        let there = extrapolate(&motion, verdict.extrapolate_s, self.limits.watchdog.stale_after_s);
+        let velocity_m_per_s = if self.stale { DVec3::ZERO } else { there.velocity_m_per_s };
+        ToolTarget { position_m: there.position_m, velocity_m_per_s }
+    }
+
+    /// Limits the force after a tick (`advanced`), or of a standing body.
+    pub fn couple(&mut self, tool: &ToolState, frame: &Moment, order: Order, advanced: bool) {
+        if !self.is_attached() && !advanced && order == Order::Render {
+            return;
+        }
+        let quarantined = frame.quarantined;
+        let release = order == Order::Release || quarantined.is_some();
+        let step = frame.period_s / self.limits.watchdog.ramp_to_zero_s;
+        self.level = if release { (self.level - step).max(0.0) } else { (self.level + step).min(1.0) };
+        if quarantined.is_none() {
+            self.raw_n = tool.device_force_n;
+        }
+        let watched = if self.is_attached() { self.watchdog.check(frame.now_ns).ramp } else { 1.0 };
+        let ramp = watched * self.level;
+        let limited = self.limiter.limit(self.raw_n, ramp, frame.period_s);
+        self.output = ToolOutput {
+            attachment: self.attachment,
+            tick: frame.tick,
+            force_n: limited.force_n,
+            sample_sequence: self.newest.map_or(0, |s| s.sequence),
+            echo_device_time_ns: self.newest.map_or(0, |s| s.device_time_ns),
+            local_model: tool.local_model.filter(|_| ramp > 0.0).map(|model| scaled(&model, ramp)),
+            proxy_position_m: tool.centre_m,
+            stale: self.stale,
+            limited: limited.saturated || limited.rate_limited || limited.non_finite,
+            quarantined,
+        };
+    }
+
+    /// Hands the output to the device, if there is one.
+    pub fn publish(&mut self) {
+        if self.is_attached() {
+            self.port.outputs.write(self.output);
+            self.port.bell.ring();
+        }
+    }
+
+    /// The tool as viewers see it.
+    pub fn view(&self, tool: &ToolState) -> ToolView {
+        ToolView {
+            device_position_m: tool.target.position_m,
+            proxy_position_m: tool.centre_m,
+            contact_force_n: tool.contact_force_n,
+            device_force_n: self.output.force_n,
+            contacts: tool.contacts,
+        }
+    }
+
+    /// Back to the start of time.
+    pub fn reset(&mut self) {
+        self.raw_n = DVec3::ZERO;
+        self.level = if self.is_attached() { 0.0 } else { 1.0 };
+        self.limiter.reset();
+        self.output = ToolOutput { attachment: self.attachment, ..ToolOutput::default() };
+        if let Some(arm) = &mut self.arm {
+            arm.reset();
+        }
+    }
+
+    /// The state was put elsewhere in time: the simulated arm goes where its tool was sent.
+    pub fn restored(&mut self, tool: &ToolState) {
+        self.reset();
+        if let Some(arm) = &mut self.arm {
+            arm.place(tool.target);
+        }
+    }
+}
+
+/// When and where in time a tool is coupled.
+#[derive(Debug, Clone, Copy)]
+pub struct Moment {
+    /// Loop clock (ns).
+    pub now_ns: u64,
+    /// Tick done.
+    pub tick: u64,
+    /// Period of the loop (s).
+    pub period_s: f64,
+    /// Tick at which the body was quarantined, if it is.
+    pub quarantined: Option<u64>,
+}
+
+fn scaled(model: &LocalContactModel, by: f64) -> LocalContactModel {
+    LocalContactModel { force_n: model.force_n * by, stiffness_n_per_m: model.stiffness_n_per_m * by, ..*model }
+}

@@ -1,0 +1,98 @@
+//! The daemon's status: computed outside the loop, from a copy of the state that the loop made in one go.
+use crate::{
+    session::{ActiveSession, Daemon},
+    sim::{
+        command::{Copy, Done},
+        timing::STAGES,
+    },
+};
+use palpate_physics::Energies;
+use palpate_proto::v1;
+use palpate_realtime::{Clock, Histogram};
+use palpate_scene::probes::MAX_COLUMNS;
+use std::sync::atomic::Ordering;
+
+/// Version of the program.
+pub const VERSION: &str = env!("CARGO_PKG_VERSION");
+
+/// The answer to `Status`.
+pub fn of(daemon: &Daemon, session: &ActiveSession, copy: &Copy, done: &Done) -> v1::StatusResponse {
+    let stage = |(name, histogram): (&&str, &Histogram)| v1::StageTime {
+        stage: (*name).to_owned(),
+        cost_us: Some(percentiles(histogram)),
+    };
+    v1::StatusResponse {
+        session: Some(session.info()),
+        daemon_version: VERSION.to_owned(),
+        tick: done.tick,
+        time_s: done.time_s,
+        paused: done.paused,
+        realtime_notes: daemon.realtime_notes.clone(),
+        overruns: daemon.timing.overruns(),
+        wakeup_jitter_us: Some(percentiles(&daemon.timing.wakeup)),
+        tick_cost_us: Some(percentiles(&daemon.timing.tick)),
+        stages: STAGES.iter().zip(&daemon.timing.stages).map(stage).collect(),
+        energies: Some(energies(session, copy)),
+        viewers: daemon.hub.viewer_count(),
+        frames_skipped: daemon.hub.frames_skipped(),
+        devices: devices(session),
+        probes: probes(session, copy),
+        quarantine: quarantine(copy),
+        samples_rejected: daemon.samples_rejected.load(Ordering::Relaxed),
+    }
+}
+
+fn percentiles(histogram: &Histogram) -> v1::Percentiles {
+    let p = histogram.percentiles();
+    let us = |ns: u64| ns as f64 * 1e-3;
+    v1::Percentiles { p50: us(p.p50_ns), p99: us(p.p99_ns), p999: us(p.p999_ns), max: us(p.max_ns), count: p.count }
+}
+
+fn energies(session: &ActiveSession, copy: &Copy) -> v1::Energies {
+    let e = Energies::of(&session.model, &copy.state);
+    v1::Energies {
+        kinetic_j: e.kinetic_j,
+        elastic_j: e.elastic_j,
+        gravitational_j: e.gravitational_j,
+        external_work_j: e.external_work_j,
+        dissipated_j: e.dissipated_j,
+    }
+}
+
+fn devices(session: &ActiveSession) -> Vec<v1::AttachedDevice> {
+    let now_ns = Clock::Monotonic.now_ns();
+    let attached = session.tools.iter().filter_map(|tool| tool.device().map(|device| (tool, device)));
+    attached
+        .map(|(tool, device)| {
+            let newest_ns = device.newest_ns.load(Ordering::Relaxed);
+            let age_s = if newest_ns == 0 { 0.0 } else { now_ns.saturating_sub(newest_ns) as f64 * 1e-9 };
+            v1::AttachedDevice {
+                device_name: device.name.clone(),
+                tool_name: tool.name.clone(),
+                samples_accepted: device.accepted.load(Ordering::Relaxed),
+                samples_rejected: device.rejected.load(Ordering::Relaxed),
+                newest_sample_age_s: age_s,
+                force_n: device.force_n(),
+            }
+        })
+        .collect()
+}
+
+fn probes(session: &ActiveSession, copy: &Copy) -> Vec<v1::NamedVector> {
+    let read = |probe: &palpate_scene::Probe| {
+        let mut values = vec![0.0; MAX_COLUMNS];
+        probe.evaluate(&session.model, &copy.state, &copy.scratch, &mut values);
+        values.truncate(probe.columns().len());
+        v1::NamedVector { name: probe.name().to_owned(), unit: probe.unit().to_owned(), values }
+    };
+    session.probes.iter().map(read).collect()
+}
+
+fn quarantine(copy: &Copy) -> String {
+    copy.state.quarantine.map_or_else(String::new, |q| {
+        format!(
+            "tick {} was refused: node {} became non-finite; the last good state is held, forces are zero until Reset or Restore",
+            q.tick, q.node
+        )
+    })
+}

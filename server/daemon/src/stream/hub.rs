@@ -1,0 +1,229 @@
+//! One surface for all viewers: the loop fills a slot only while somebody watches; the hub turns it into a [`Frame`] once.
+use super::{
+    encode::{Delta, Quantiser, Shape},
+    keyframe,
+};
+use crate::sim::exchange::{SurfaceEnd, SurfaceSnapshot};
+use palpate_physics::Model;
+use palpate_proto::v1;
+use std::{
+    sync::{
+        Arc, Mutex, PoisonError,
+        atomic::{AtomicBool, AtomicU32, AtomicU64, Ordering},
+    },
+    time::{SystemTime, UNIX_EPOCH},
+};
+use tokio::sync::watch;
+use tokio_util::sync::CancellationToken;
+
+/// What the loop is asked to publish. Written by the hub, read by the loop.
+#[derive(Debug, Default)]
+pub struct Demand {
+    period_ticks: AtomicU32,
+    vertices: AtomicBool,
+}
+
+impl Demand {
+    /// Ticks between two published surfaces; 0: nobody watches.
+    pub fn period_ticks(&self) -> u32 {
+        self.period_ticks.load(Ordering::Relaxed)
+    }
+
+    /// Whether anybody wants vertices.
+    pub fn wants_vertices(&self) -> bool {
+        self.vertices.load(Ordering::Relaxed)
+    }
+
+    /// Sets both.
+    pub fn set(&self, period_ticks: u32, vertices: bool) {
+        self.vertices.store(vertices, Ordering::Relaxed);
+        self.period_ticks.store(period_ticks, Ordering::Relaxed);
+    }
+}
+
+/// A moment of the surface, as all viewers see it.
+#[derive(Debug)]
+pub struct Frame {
+    /// Epoch of [`Frame::keyframe`].
+    pub epoch: u32,
+    /// Counts from 1 in an epoch.
+    pub number: u64,
+    /// The keyframe's chunks.
+    pub keyframe: Arc<Vec<v1::KeyframeChunk>>,
+    /// Everything but vertices and the viewer's own counters.
+    pub numbers: v1::SurfaceUpdate,
+    /// The vertices, when somebody asked for them.
+    pub shape: Option<Shape>,
+    /// Encoded once, for the viewers that hold the frame before (`Some`) or none (`None`).
+    encoded: Mutex<Vec<(Option<u64>, Delta)>>,
+}
+
+impl Frame {
+    /// The update for a viewer that holds frame `since` of this epoch, or nothing yet.
+    pub fn update(&self, since: Option<u64>, with_vertices: bool, skipped: u64) -> v1::SurfaceUpdate {
+        let mut update = v1::SurfaceUpdate { skipped, ..self.numbers.clone() };
+        if let Some(shape) = self.shape.as_ref().filter(|_| with_vertices) {
+            let delta = self.delta(shape, since);
+            update.displacement_quantum_m = shape.quantum_m;
+            update.changed_u32le = delta.changed_u32le;
+            update.displacements_i16le = delta.displacements_i16le;
+        }
+        update
+    }
+
+    fn delta(&self, shape: &Shape, since: Option<u64>) -> Delta {
+        let mut encoded = self.encoded.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some((_, delta)) = encoded.iter().find(|(from, _)| *from == since) {
+            return delta.clone();
+        }
+        let delta = shape.delta(since);
+        if encoded.len() < 16 {
+            encoded.push((since, delta.clone()));
+        }
+        delta
+    }
+}
+
+/// Counts viewers and hands out the newest frame.
+#[derive(Debug)]
+pub struct Hub {
+    /// What the loop shall publish.
+    pub demand: Arc<Demand>,
+    display_rate_hz: f64,
+    tick_period_s: Mutex<f64>,
+    frames: watch::Sender<Option<Arc<Frame>>>,
+    viewers: Mutex<Vec<Wish>>,
+    next_viewer: AtomicU64,
+    epoch: AtomicU32,
+    skipped: AtomicU64,
+}
+
+#[derive(Debug, Clone, Copy)]
+struct Wish {
+    viewer: u64,
+    rate_hz: f64,
+    vertices: bool,
+}
+
+/// A viewer as long as it lives.
+#[derive(Debug)]
+pub struct Seat {
+    hub: Arc<Hub>,
+    viewer: u64,
+    /// Frames, the newest only.
+    pub frames: watch::Receiver<Option<Arc<Frame>>>,
+}
+
+impl Drop for Seat {
+    fn drop(&mut self) {
+        let viewer = self.viewer;
+        self.hub.change_wishes(|wishes| wishes.retain(|wish| wish.viewer != viewer));
+    }
+}
+
+impl Seat {
+    /// Counts frames dropped for this viewer.
+    pub fn count_skipped(&self, frames: u64) {
+        self.hub.skipped.fetch_add(frames, Ordering::Relaxed);
+    }
+}
+
+impl Hub {
+    /// A hub whose viewers get `display_rate_hz` unless they ask for another rate.
+    pub fn new(display_rate_hz: f64) -> Arc<Self> {
+        Arc::new(Self {
+            demand: Arc::new(Demand::default()),
+            display_rate_hz,
+            tick_period_s: Mutex::new(1e-3),
+            frames: watch::Sender::new(None),
+            viewers: Mutex::new(Vec::new()),
+            next_viewer: AtomicU64::new(1),
+            epoch: AtomicU32::new(0),
+            skipped: AtomicU64::new(0),
+        })
+    }
+
+    /// The daemon's display rate (Hz).
+    pub fn display_rate_hz(&self) -> f64 {
+        self.display_rate_hz
+    }
+
+    /// Viewers now.
+    pub fn viewer_count(&self) -> u32 {
+        self.viewers.lock().unwrap_or_else(PoisonError::into_inner).len() as u32
+    }
+
+    /// Updates dropped over all viewers that ever were.
+    pub fn frames_skipped(&self) -> u64 {
+        self.skipped.load(Ordering::Relaxed)
+    }
+
+    /// Adds a viewer that wants so many updates per second (Hz), with or without vertices.
+    pub fn join(self: &Arc<Self>, rate_hz: f64, vertices: bool) -> Seat {
+        let viewer = self.next_viewer.fetch_add(1, Ordering::Relaxed);
+        let frames = self.frames.subscribe();
+        self.change_wishes(|wishes| wishes.push(Wish { viewer, rate_hz, vertices }));
+        Seat { hub: Arc::clone(self), viewer, frames }
+    }
+
+    fn change_wishes(&self, change: impl FnOnce(&mut Vec<Wish>)) {
+        let mut wishes = self.viewers.lock().unwrap_or_else(PoisonError::into_inner);
+        change(&mut wishes);
+        let rate_hz = wishes.iter().fold(0.0_f64, |rate, wish| rate.max(wish.rate_hz));
+        let period_s = *self.tick_period_s.lock().unwrap_or_else(PoisonError::into_inner);
+        let period_ticks = if rate_hz > 0.0 { (1.0 / (rate_hz * period_s)).floor().clamp(1.0, 1e6) as u32 } else { 0 };
+        self.demand.set(period_ticks, wishes.iter().any(|wish| wish.vertices));
+    }
+
+    /// Serves one session's surface until `ended`. A new epoch begins.
+    pub async fn serve(
+        self: Arc<Self>,
+        session_id: String,
+        scene_name: String,
+        model: Arc<Model>,
+        mut surface: SurfaceEnd,
+        ended: CancellationToken,
+    ) {
+        let epoch = self.epoch.fetch_add(1, Ordering::Relaxed) + 1;
+        *self.tick_period_s.lock().unwrap_or_else(PoisonError::into_inner) = model.spec().settings.tick_period_s;
+        self.change_wishes(|_| ());
+        let keyframe = Arc::new(keyframe::chunks(&session_id, &scene_name, &model, epoch));
+        let (low, high) = keyframe::bounds_m(&model);
+        let mut quantiser = Quantiser::new(model.surface().nodes.len(), (high - low).length());
+        let mut number = 0;
+        loop {
+            tokio::select! {
+                () = ended.cancelled() => return,
+                rung = surface.ear.rung() => if rung.is_err() { return },
+            }
+            if !surface.slot.update() {
+                continue;
+            }
+            number += 1;
+            let snapshot = surface.slot.output_buffer_mut();
+            let shape = snapshot.has_vertices.then(|| quantiser.advance(number, &snapshot.displacements_m));
+            let numbers = numbers(epoch, snapshot);
+            let encoded = Mutex::new(Vec::new());
+            let frame = Frame { epoch, number, keyframe: Arc::clone(&keyframe), numbers, shape, encoded };
+            self.frames.send_replace(Some(Arc::new(frame)));
+        }
+    }
+}
+
+fn numbers(epoch: u32, snapshot: &SurfaceSnapshot) -> v1::SurfaceUpdate {
+    let largest_sq = if snapshot.has_vertices {
+        snapshot.displacements_m.iter().map(|d| d.iter().map(|c| f64::from(*c).powi(2)).sum()).fold(0.0, f64::max)
+    } else {
+        0.0
+    };
+    v1::SurfaceUpdate {
+        epoch,
+        tick: snapshot.tick,
+        time_s: snapshot.time_s,
+        sent_unix_ns: SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |d| d.as_nanos() as u64),
+        tools: snapshot.tools.iter().map(crate::grpc::convert::tool_state).collect(),
+        tick_cost_us: snapshot.tick_cost_us,
+        max_displacement_m: largest_sq.sqrt(),
+        ..Default::default()
+    }
+}

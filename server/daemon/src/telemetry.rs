@@ -1,0 +1,12 @@
+//! Logs: to standard error, filtered by `PALPATE_LOG` (for example `debug` or `palpated=trace,h2=warn`). Never from the loop.
+use tracing_subscriber::EnvFilter;
+
+/// Name of the variable that filters logs.
+pub const VARIABLE: &str = "PALPATE_LOG";
+
+/// Starts logging; later calls do nothing.
+pub fn init() {
+    let filter = EnvFilter::try_from_env(VARIABLE).unwrap_or_else(|_| EnvFilter::new("info"));
+    let _ =
+        tracing_subscriber::fmt().with_env_filter(filter).with_writer(std::io::stderr).with_target(false).try_init();
+}
