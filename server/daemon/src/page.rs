@@ -14,8 +14,8 @@ struct Bundle;
 pub const DESCRIPTOR_PATH: &str = "palpate.v1.binpb";
 
 /// Answers everything that is no gRPC call.
-pub async fn serve(method: Method, uri: Uri) -> Response<Body> {
-    if method != Method::GET && method != Method::HEAD {
+pub fn serve(method: &Method, uri: &Uri) -> Response<Body> {
+    if *method != Method::GET && *method != Method::HEAD {
         return text(StatusCode::METHOD_NOT_ALLOWED, "the page is read with GET; gRPC calls need a known service\n");
     }
     let path = uri.path().trim_start_matches('/');
@@ -62,18 +62,18 @@ fn mime_of(path: &str) -> &'static str {
 mod tests {
     use super::*;
 
-    async fn get(path: &str) -> (StatusCode, String) {
-        let response = serve(Method::GET, path.parse().unwrap()).await;
+    fn get(path: &str) -> (StatusCode, String) {
+        let response = serve(&Method::GET, &path.parse().unwrap());
         let mime = response.headers()[header::CONTENT_TYPE].to_str().unwrap().to_owned();
         (response.status(), mime)
     }
 
-    #[tokio::test]
-    async fn the_page_and_its_descriptor_set_are_there_and_nothing_else_is() {
-        assert_eq!(get("/").await, (StatusCode::OK, "text/html; charset=utf-8".into()));
-        assert_eq!(get("/palpate.v1.binpb").await, (StatusCode::OK, "application/octet-stream".into()));
-        assert_eq!(get("/../Cargo.toml").await.0, StatusCode::NOT_FOUND);
-        assert_eq!(serve(Method::POST, "/".parse().unwrap()).await.status(), StatusCode::METHOD_NOT_ALLOWED);
+    #[test]
+    fn the_page_and_its_descriptor_set_are_there_and_nothing_else_is() {
+        assert_eq!(get("/"), (StatusCode::OK, "text/html; charset=utf-8".into()));
+        assert_eq!(get("/palpate.v1.binpb"), (StatusCode::OK, "application/octet-stream".into()));
+        assert_eq!(get("/../Cargo.toml").0, StatusCode::NOT_FOUND);
+        assert_eq!(serve(&Method::POST, &"/".parse().unwrap()).status(), StatusCode::METHOD_NOT_ALLOWED);
     }
 
     #[test]

@@ -16,7 +16,7 @@ async fn a_pressed_block_pushes_back_within_the_limits() {
     assert_eq!(limits.coupling_stiffness_n_per_m, 500.0);
 
     let free = arm.hold_until(above(), |command| command.sample_sequence > 20).await;
-    assert_eq!(force_of(&free), DVec3::ZERO, "nothing is touched");
+    assert!(force_of(&free).length() < 1e-12, "nothing is touched");
     assert!(free.local_model.is_none());
 
     let pressed = arm.hold_until(pressing(), |command| force_of(command).z > 0.1).await;
@@ -181,7 +181,7 @@ async fn a_quarantined_body_is_told_and_reset_brings_it_back() {
     arm.hold_until(above(), |command| command.sample_sequence > 10).await;
     // Finite, and absurd: the sum overflows in the integrator.
     let force = v1::InjectedForce {
-        surface_vertex: 20,
+        surface_vertex: 17,
         force_n: Some(v1::Vec3 { x: 1e308, y: 1e308, z: 1e308 }),
         from_tick: 0,
         tick_count: 3,

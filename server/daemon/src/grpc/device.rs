@@ -42,20 +42,20 @@ impl Device for DeviceService {
     type AttachStream = Pin<Box<dyn Stream<Item = Result<v1::DeviceDown, Status>> + Send>>;
 
     async fn attach(&self, request: Request<Streaming<v1::DeviceUp>>) -> Result<Response<Self::AttachStream>, Status> {
-        let start = Phase::Hello(Arc::clone(&self.daemon), request.into_inner());
+        let start = Phase::Hello(Arc::clone(&self.daemon), Box::new(request.into_inner()));
         Ok(Response::new(Box::pin(stream::unfold(start, next))))
     }
 }
 
 enum Phase {
-    Hello(Arc<Daemon>, Streaming<v1::DeviceUp>),
+    Hello(Arc<Daemon>, Box<Streaming<v1::DeviceUp>>),
     Live(Box<Attachment>),
     Over,
 }
 
 async fn next(phase: Phase) -> Option<(Result<v1::DeviceDown, Status>, Phase)> {
     let (result, phase) = match phase {
-        Phase::Hello(daemon, messages) => match Attachment::begin(daemon, messages).await {
+        Phase::Hello(daemon, messages) => match Attachment::begin(daemon, *messages).await {
             Ok((welcome, attachment)) => (Ok(Message::Welcome(welcome)), Phase::Live(Box::new(attachment))),
             Err(status) => (Err(status), Phase::Over),
         },
@@ -74,7 +74,7 @@ struct Attachment {
     daemon: Arc<Daemon>,
     session: Arc<ActiveSession>,
     tool: usize,
-    attachment: u64,
+    number: u64,
     record: Arc<DeviceRecord>,
     /// Everything of the tool but the sample slot, which the way up has.
     end: Option<ToolEnd>,
@@ -127,7 +127,7 @@ impl Attachment {
     fn live(
         daemon: Arc<Daemon>,
         session: Arc<ActiveSession>,
-        (tool, attachment): (usize, u64),
+        (tool, number): (usize, u64),
         record: Arc<DeviceRecord>,
         end: ToolEnd,
         messages: Streaming<v1::DeviceUp>,
@@ -140,7 +140,7 @@ impl Attachment {
         let uplink = Uplink {
             messages,
             samples,
-            attachment,
+            attachment: number,
             record: Arc::clone(&record),
             daemon: Arc::clone(&daemon),
             faults: fault_in,
@@ -148,19 +148,7 @@ impl Attachment {
         };
         let uplink = Some(tokio::spawn(uplink.run(over.clone().drop_guard())));
         let end = Some(ToolEnd { samples: placeholder, outputs, ear, shared });
-        Self {
-            daemon,
-            session,
-            tool,
-            attachment,
-            record,
-            end,
-            uplink,
-            over,
-            faults,
-            told: Told::default(),
-            ending: false,
-        }
+        Self { daemon, session, tool, number, record, end, uplink, over, faults, told: Told::default(), ending: false }
     }
 
     /// The next message, `None` when the device has gone.
@@ -191,7 +179,7 @@ impl Attachment {
         let end = self.end.as_mut()?;
         end.outputs.update();
         let output = *end.outputs.output_buffer();
-        if output.attachment != self.attachment {
+        if output.attachment != self.number {
             return None;
         }
         if let Some(fault) = self.told.news(&output) {

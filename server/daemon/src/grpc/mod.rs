@@ -76,7 +76,7 @@ async fn page_or_unimplemented(request: axum::extract::Request) -> axum::respons
         let (parts, ()) = Status::unimplemented(text).into_http::<()>().into_parts();
         return axum::response::Response::from_parts(parts, axum::body::Body::empty());
     }
-    page::serve(request.method().clone(), request.uri().clone()).await
+    page::serve(request.method(), request.uri())
 }
 
 /// The session a request means: the current one, by its id or by an empty one.

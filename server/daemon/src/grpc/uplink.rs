@@ -56,21 +56,21 @@ impl Uplink {
                 Ok(None) => return (self.samples, Ok(())),
                 Err(status) => return (self.samples, Err(status)),
             };
-            if let Err((sequence, rejected)) = self.take(up, &mut last_sequence) {
+            if let Err((sequence, rejected)) = self.take(&up, &mut last_sequence) {
                 self.report(sequence, rejected, &mut counts);
             }
         }
     }
 
-    fn take(&mut self, up: v1::DeviceUp, last_sequence: &mut Option<u64>) -> Result<(), (u64, Rejected)> {
+    fn take(&mut self, up: &v1::DeviceUp, last_sequence: &mut Option<u64>) -> Result<(), (u64, Rejected)> {
         let missing = |message: &str| Rejected { code: DeviceFaultCode::MissingField, message: message.to_owned() };
-        let sample = match up.message {
+        let sample = match &up.message {
             Some(Message::Sample(sample)) => sample,
             Some(Message::Hello(_)) => return Err((0, missing("this stream said hello already: send samples"))),
             None => return Err((0, missing("the message carries neither hello nor sample"))),
         };
         let arrived_ns = Clock::Monotonic.now_ns();
-        let input = convert::device_sample(&sample, *last_sequence, self.attachment, arrived_ns)
+        let input = convert::device_sample(sample, *last_sequence, self.attachment, arrived_ns)
             .map_err(|rejected| (sample.sequence, rejected))?;
         *last_sequence = Some(input.sequence);
         self.samples.write(Some(input));

@@ -167,7 +167,7 @@ pub fn desk() -> io::Result<(Desk, Orders, Clerk)> {
 
 impl Desk {
     /// The next order.
-    pub fn next(&mut self) -> Option<Command> {
+    pub fn next_order(&mut self) -> Option<Command> {
         self.orders.pop().ok()
     }
 

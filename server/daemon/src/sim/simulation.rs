@@ -2,7 +2,7 @@
 use super::{
     arm::BuiltinArm,
     exchange::{self, SurfaceEnd, SurfacePort, SurfaceSnapshot, ToolEnd},
-    inject::Injections,
+    inject::{InjectRefusal, Injection, Injections},
     tool::{ArmLimits, ToolLoop},
 };
 use crate::stream::{hub::Demand, keyframe};
@@ -123,6 +123,14 @@ impl Simulation {
         self.state.reset(&self.model);
         self.injections.clear();
         self.tools.iter_mut().for_each(ToolLoop::reset);
+    }
+
+    /// Takes forces, all or none; see [`Injections::add`].
+    ///
+    /// # Errors
+    /// [`InjectRefusal`].
+    pub fn inject(&mut self, forces: &[Injection], next_tick: u64) -> Result<u64, InjectRefusal> {
+        self.injections.add(forces, next_tick)
     }
 
     /// Takes another state of the same model. Does not allocate. False when it is not one of this model's.

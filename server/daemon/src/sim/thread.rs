@@ -86,7 +86,7 @@ impl Loop {
             } else if self.stepping.is_some() {
                 self.work_on_steps();
             } else {
-                let (advance, order) = (!self.paused, if self.paused { Order::Release } else { Order::Render });
+                let (advance, order) = (!self.paused, if self.paused { Order::Hold } else { Order::Render });
                 self.tick(Plan { advance, order });
             }
         }
@@ -121,7 +121,7 @@ impl Loop {
                 return;
             }
             self.stepping = Some((command, left - 1));
-            self.tick(Plan { advance: true, order: Order::Release });
+            self.tick(Plan { advance: true, order: Order::Hold });
             if self.clock.now_ns() > until_ns {
                 return;
             }
@@ -129,7 +129,7 @@ impl Loop {
     }
 
     fn take_orders(&mut self) {
-        while let Some(mut command) = self.desk.next() {
+        while let Some(mut command) = self.desk.next_order() {
             if command.session != self.simulation.session {
                 self.desk.finish(command, Err(Refusal::OtherSession));
                 continue;
@@ -180,10 +180,10 @@ impl Loop {
             }
             Request::Inject(forces) => {
                 let next_tick = self.simulation.state.tick + 1;
-                first_tick = self.simulation.injections.add(forces, next_tick).map_err(Refusal::Inject)?;
+                first_tick = self.simulation.inject(forces, next_tick).map_err(Refusal::Inject)?;
             }
         }
-        Ok(Done { first_tick, was_paused, ..self.done() })
+        Ok(Done { was_paused, first_tick, ..self.done() })
     }
 
     fn interrupt_steps(&mut self) {

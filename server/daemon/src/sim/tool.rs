@@ -26,7 +26,9 @@ pub struct ArmLimits {
 pub enum Order {
     /// Render the force.
     Render,
-    /// Ramp to zero and stay there.
+    /// Time stands or is stepped by hand: devices are released. The simulated arm lives in simulated time and minds nothing.
+    Hold,
+    /// Every force ramps to zero and stays there.
     Release,
 }
 
@@ -128,11 +130,16 @@ impl ToolLoop {
 
     /// Limits the force after a tick (`advanced`), or of a standing body.
     pub fn couple(&mut self, tool: &ToolState, frame: &Moment, order: Order, advanced: bool) {
-        if !self.is_attached() && !advanced && order == Order::Render {
+        if !self.is_attached() && !advanced && order != Order::Release {
             return;
         }
         let quarantined = frame.quarantined;
-        let release = order == Order::Release || quarantined.is_some();
+        let ordered = match order {
+            Order::Render => false,
+            Order::Hold => self.is_attached(),
+            Order::Release => true,
+        };
+        let release = ordered || quarantined.is_some();
         let step = frame.period_s / self.limits.watchdog.ramp_to_zero_s;
         self.level = if release { (self.level - step).max(0.0) } else { (self.level + step).min(1.0) };
         if quarantined.is_none() {

@@ -102,7 +102,7 @@ impl Shape {
         for (vertex, (quanta, frame)) in self.quanta.iter().zip(&self.changed_in_frame).enumerate() {
             if *frame > since {
                 indices.put_u32_le(vertex as u32);
-                put(&mut displacements, quanta);
+                put(&mut displacements, *quanta);
             }
         }
         Delta { changed_u32le: indices.freeze(), displacements_i16le: displacements.freeze() }
@@ -111,15 +111,15 @@ impl Shape {
     fn everything(&self) -> Delta {
         let mut displacements = BytesMut::with_capacity(self.quanta.len() * 6);
         for quanta in &self.quanta {
-            put(&mut displacements, quanta);
+            put(&mut displacements, *quanta);
         }
         Delta { changed_u32le: Bytes::new(), displacements_i16le: displacements.freeze() }
     }
 }
 
-fn put(into: &mut BytesMut, quanta: &[i16; 3]) {
+fn put(into: &mut BytesMut, quanta: [i16; 3]) {
     for component in quanta {
-        into.put_i16_le(*component);
+        into.put_i16_le(component);
     }
 }
 

@@ -1,5 +1,5 @@
 //! A small scene, a daemon on it, and clients.
-#![allow(dead_code, clippy::unwrap_used, clippy::expect_used)] // each test file uses its own part
+#![allow(dead_code, unreachable_pub, clippy::unwrap_used, clippy::expect_used)] // each test file uses its own part
 use glam::DVec3;
 use palpate_physics::{
     ModelSpec, PrescribedSpec, Region, Settings,
@@ -106,6 +106,15 @@ pub fn path(keyframes: &[(f64, DVec3)]) -> MotionPath {
 pub fn pressed_scene(cells: u32) -> Scene {
     let mut scene = block_scene("pressed", cells);
     let path = path(&[(0.0, above()), (0.1, pressing())]);
+    scene.arm = Some(ScriptedHand { tool: 0, tool_name: "finger".into(), path });
+    scene
+}
+
+/// The scene with a hand that never rests: most vertices change all the time.
+pub fn kneaded_scene(cells: u32) -> Scene {
+    let mut scene = pressed_scene(cells);
+    let keyframes = [(0.0, above()), (0.05, pressing()), (0.1, above())];
+    let path = MotionPath::new(&keyframes, Interpolation::Smooth, true).unwrap();
     scene.arm = Some(ScriptedHand { tool: 0, tool_name: "finger".into(), path });
     scene
 }

@@ -1,0 +1,151 @@
+//! The tick neither allocates nor frees after warm-up, whatever happens around it: samples, contacts, injected forces, viewers,
+//! pauses, resets, quarantine.
+#![allow(clippy::unwrap_used, clippy::expect_used)]
+mod common;
+use common::{above, block_scene, path, pressing};
+use glam::DVec3;
+use palpate_physics::Model;
+use palpate_realtime::Clock;
+use palpate_scene::ScriptedHand;
+use palpated::{
+    serve::config::default_limits,
+    sim::{
+        exchange::DeviceInput,
+        inject::Injection,
+        simulation::{Ends, Parts, Simulation},
+        tick::Plan,
+        timing::Timing,
+        tool::Order,
+    },
+    stream::hub::Demand,
+};
+use std::{
+    alloc::{GlobalAlloc, Layout, System},
+    cell::Cell,
+    sync::Arc,
+};
+
+thread_local! {
+    static COUNT: Cell<Option<u64>> = const { Cell::new(None) };
+}
+
+/// Counts what this thread does while it is asked to.
+struct Counting;
+
+fn note() {
+    let _ = COUNT.try_with(|count| count.set(count.get().map(|n| n + 1)));
+}
+
+// SAFETY: every call goes to the system's allocator unchanged.
+#[allow(unsafe_code)]
+unsafe impl GlobalAlloc for Counting {
+    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
+        note();
+        unsafe { System.alloc(layout) }
+    }
+    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
+        note();
+        unsafe { System.dealloc(pointer, layout) }
+    }
+    unsafe fn realloc(&self, pointer: *mut u8, layout: Layout, size: usize) -> *mut u8 {
+        note();
+        unsafe { System.realloc(pointer, layout, size) }
+    }
+}
+
+#[global_allocator]
+static ALLOCATOR: Counting = Counting;
+
+/// How often `work` allocated or freed.
+fn allocations(work: impl FnOnce()) -> u64 {
+    COUNT.with(|count| count.set(Some(0)));
+    work();
+    COUNT.with(|count| count.take()).unwrap()
+}
+
+struct Bench {
+    simulation: Box<Simulation>,
+    ends: Ends,
+    demand: Arc<Demand>,
+    clock: Clock,
+    timing: Timing,
+}
+
+impl Bench {
+    fn new() -> Self {
+        let scene = block_scene("block", 4);
+        let demand = Arc::new(Demand::default());
+        let keyframes = [(0.0, above()), (0.1, pressing()), (0.2, above()), (0.3, pressing())];
+        let (simulation, ends) = Simulation::build(Parts {
+            session: 1,
+            model: Arc::new(Model::build(scene.model).unwrap()),
+            timeline: scene.timeline,
+            drivers: scene.drivers,
+            arm: Some(ScriptedHand { tool: 0, tool_name: "finger".into(), path: path(&keyframes) }),
+            limits: default_limits(),
+            demand: Arc::clone(&demand),
+        })
+        .unwrap();
+        Self { simulation, ends, demand, clock: Clock::Monotonic, timing: Timing::default() }
+    }
+
+    fn ticks(&mut self, ticks: u32, plan: Plan) -> u64 {
+        let Self { simulation, clock, timing, .. } = self;
+        allocations(|| (0..ticks).for_each(|_| simulation.tick(plan, clock, timing)))
+    }
+}
+
+const RUN: Plan = Plan { advance: true, order: Order::Render };
+const PAUSED: Plan = Plan { advance: false, order: Order::Hold };
+
+#[tokio::test]
+async fn the_counter_counts() {
+    assert!(allocations(|| drop(std::hint::black_box(Box::new(1)))) == 2);
+}
+
+#[tokio::test]
+async fn no_tick_allocates() {
+    let mut bench = Bench::new();
+    bench.ticks(400, RUN); // warm-up: every capacity has been reached once
+    assert_eq!(bench.ticks(400, RUN), 0, "simulated arm, in and out of contact");
+
+    bench.demand.set(8, true);
+    bench.ticks(20, RUN);
+    assert_eq!(bench.ticks(200, RUN), 0, "with viewers");
+
+    bench.ends.tools[0].shared.attach(7, 3.0);
+    for sequence in 1..300 {
+        let depth = 0.004 * (sequence as f64 * 0.05).sin();
+        bench.ends.tools[0].samples.write(Some(DeviceInput {
+            attachment: 7,
+            sequence,
+            device_time_ns: sequence,
+            arrived_ns: bench.clock.now_ns(),
+            position_m: pressing() + DVec3::Z * depth,
+            velocity_m_per_s: DVec3::ZERO,
+            buttons: 0,
+        }));
+        assert_eq!(bench.ticks(1, RUN), 0, "with a device, sample {sequence}");
+    }
+    bench.ends.tools[0].outputs.update();
+    assert!(bench.ends.tools[0].outputs.output_buffer().sample_sequence > 290, "the samples arrived");
+
+    let forces: Vec<Injection> = (0..64)
+        .map(|i| Injection { node: 60 + i % 8, force_n: DVec3::X * 1e-3, from_tick: 0, tick_count: 5 + i })
+        .collect();
+    let next_tick = bench.simulation.state().tick + 1;
+    let added = allocations(|| assert!(bench.simulation.inject(&forces, next_tick).is_ok()));
+    assert_eq!(added + bench.ticks(100, RUN), 0, "with injected forces");
+
+    assert_eq!(bench.ticks(50, PAUSED), 0, "paused");
+    bench.ends.tools[0].shared.detach();
+    assert_eq!(bench.ticks(50, RUN), 0, "detached");
+    let reset = allocations(|| bench.simulation.reset());
+    assert_eq!(reset + bench.ticks(50, RUN), 0, "reset");
+
+    let absurd = [Injection { node: 60, force_n: DVec3::splat(1e308), from_tick: 0, tick_count: 1 }];
+    let next_tick = bench.simulation.state().tick + 1;
+    bench.simulation.inject(&absurd, next_tick).unwrap();
+    assert_eq!(bench.ticks(50, RUN), 0, "quarantined");
+    assert!(bench.simulation.state().quarantine.is_some());
+}

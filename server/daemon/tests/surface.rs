@@ -1,0 +1,143 @@
+//! Viewers over a real socket.
+#![allow(clippy::unwrap_used, clippy::expect_used)]
+mod common;
+use common::{Daemon, Mirror, PATIENCE, block_scene, kneaded_scene, pressed_scene};
+use palpate_proto::v1::{self, LevelOfDetail};
+use std::time::Duration;
+use tokio::time::timeout;
+use tonic::{Code, Streaming};
+
+async fn watch(daemon: &Daemon, max_rate_hz: f64, level: LevelOfDetail) -> Streaming<v1::SurfaceEvent> {
+    let request = v1::WatchRequest { max_rate_hz, level_of_detail: level.into(), ..Default::default() };
+    daemon.surface().watch(request).await.unwrap().into_inner()
+}
+
+async fn event(stream: &mut Streaming<v1::SurfaceEvent>) -> v1::SurfaceEvent {
+    timeout(PATIENCE, stream.message()).await.expect("an event in time").unwrap().expect("the stream goes on")
+}
+
+/// Surface positions (m) of a snapshot, by way of the physics.
+fn positions_of(daemon: &Daemon, snapshot: &v1::SnapshotResponse) -> Vec<glam::DVec3> {
+    let session = daemon.running.as_ref().unwrap().daemon.session();
+    let state = palpate_physics::snapshot::restore(&session.model, &snapshot.state).unwrap();
+    session.model.surface().nodes.iter().map(|&node| state.x[node as usize]).collect()
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn keyframe_and_updates_give_the_daemons_own_surface() {
+    let daemon = Daemon::on(pressed_scene(4)).await;
+    let mut stream = watch(&daemon, 120.0, LevelOfDetail::Full).await;
+    let mut mirror = Mirror::default();
+    while mirror.updates < 60 {
+        mirror.apply(event(&mut stream).await);
+    }
+    daemon.pause().await;
+    let snapshot = daemon.snapshot().await;
+    while mirror.last.as_ref().unwrap().tick != snapshot.tick {
+        mirror.apply(event(&mut stream).await);
+    }
+    let half_quantum_m = f64::from(mirror.quantum_m) / 2.0;
+    let largest = mirror.last.as_ref().unwrap().max_displacement_m;
+    assert!(largest > 1e-4, "the block was pressed: {largest}");
+    for (vertex, exact) in positions_of(&daemon, &snapshot).into_iter().enumerate() {
+        let error = (mirror.position_m(vertex) - exact).abs().max_element();
+        // f32 carries the displacement from the loop to the hub.
+        assert!(error <= half_quantum_m + 1e-9, "vertex {vertex}: {error} m, quantum {} m", mirror.quantum_m);
+    }
+    let header = mirror.header.unwrap();
+    assert_eq!(header.scene_name, "pressed");
+    assert_eq!(header.tools.iter().map(|tool| tool.name.as_str()).collect::<Vec<_>>(), ["finger", "probe"]);
+    let tool = mirror.last.unwrap().tools[0];
+    assert!(tool.contacts > 0 && tool.contact_force_n.unwrap().z > 0.0);
+    daemon.finish().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn numbers_come_without_vertices_beside_viewers_that_have_them() {
+    let daemon = Daemon::on(pressed_scene(2)).await;
+    let mut numbers = watch(&daemon, 20.0, LevelOfDetail::Numbers).await;
+    let mut full = watch(&daemon, 240.0, LevelOfDetail::Full).await;
+    let mut seen = Vec::new();
+    while seen.len() < 6 {
+        tokio::select! {
+            event = event(&mut numbers) => if let Some(v1::surface_event::Message::Update(update)) = event.message {
+                assert!(update.displacements_i16le.is_empty() && update.changed_u32le.is_empty());
+                assert_eq!(update.tools.len(), 2);
+                seen.push(update.tick);
+            },
+            _ = event(&mut full) => {}
+        }
+    }
+    assert!(seen.windows(2).all(|pair| pair[0] < pair[1]), "{seen:?}");
+    daemon.finish().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_viewer_that_does_not_read_skips_and_still_ends_with_the_exact_surface() {
+    // Large enough that the transport's buffers hold only a few updates.
+    let daemon = Daemon::on(kneaded_scene(12)).await;
+    let mut lazy = watch(&daemon, 240.0, LevelOfDetail::Full).await;
+    let mut mirror = Mirror::default();
+    let before = daemon.status().await;
+    let until = tokio::time::Instant::now() + 3 * PATIENCE;
+    while mirror.last.as_ref().is_none_or(|update| update.skipped < 20) {
+        assert!(tokio::time::Instant::now() < until, "nothing was skipped");
+        // Not read for long, then read for a while: what passed in between shows as skipped.
+        tokio::time::sleep(Duration::from_millis(700)).await;
+        for _ in 0..60 {
+            mirror.apply(event(&mut lazy).await);
+        }
+    }
+    let after = daemon.status().await;
+    assert!(after.tick > before.tick);
+    daemon.pause().await;
+    let snapshot = daemon.snapshot().await;
+    while mirror.last.as_ref().unwrap().tick != snapshot.tick {
+        mirror.apply(event(&mut lazy).await);
+    }
+    assert!(after.frames_skipped >= 20);
+    let half_quantum_m = f64::from(mirror.quantum_m) / 2.0;
+    for (vertex, exact) in positions_of(&daemon, &snapshot).into_iter().enumerate() {
+        let error = (mirror.position_m(vertex) - exact).abs().max_element();
+        assert!(error <= half_quantum_m + 1e-9, "vertex {vertex}: {error} m");
+    }
+    daemon.finish().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn nothing_is_made_for_nobody() {
+    let daemon = Daemon::on(block_scene("block", 2)).await;
+    let shared = std::sync::Arc::clone(&daemon.running.as_ref().unwrap().daemon);
+    assert_eq!(shared.hub.demand.period_ticks(), 0);
+    let stream = watch(&daemon, 100.0, LevelOfDetail::Numbers).await;
+    assert_eq!(shared.hub.demand.period_ticks(), 10);
+    assert!(!shared.hub.demand.wants_vertices());
+    assert_eq!(daemon.status().await.viewers, 1);
+    drop(stream);
+    let until = tokio::time::Instant::now() + PATIENCE;
+    while shared.hub.demand.period_ticks() != 0 {
+        assert!(tokio::time::Instant::now() < until, "the viewer has gone, the demand stays");
+        tokio::time::sleep(Duration::from_millis(10)).await;
+    }
+    assert_eq!(daemon.status().await.viewers, 0);
+    daemon.finish().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn bad_requests_are_refused_and_streams_end_cleanly_at_the_stop() {
+    let daemon = Daemon::on(block_scene("block", 2)).await;
+    for (request, code) in [
+        (v1::WatchRequest { max_rate_hz: f64::NAN, ..Default::default() }, Code::InvalidArgument),
+        (v1::WatchRequest { max_rate_hz: 1e3, ..Default::default() }, Code::InvalidArgument),
+        (v1::WatchRequest { level_of_detail: 9, ..Default::default() }, Code::InvalidArgument),
+        (v1::WatchRequest { session_id: "gone".into(), ..Default::default() }, Code::NotFound),
+    ] {
+        assert_eq!(daemon.surface().watch(request).await.unwrap_err().code(), code);
+    }
+    let mut stream = watch(&daemon, 0.0, LevelOfDetail::Full).await;
+    event(&mut stream).await;
+    let reading = tokio::spawn(async move { while stream.message().await.expect("a clean end").is_some() {} });
+    let summary = daemon.finish().await;
+    reading.await.unwrap();
+    assert!(!summary.cut);
+}
