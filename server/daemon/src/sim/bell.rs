@@ -2,23 +2,21 @@
 //!
 //! Waking a task through its runtime would take the run queue's mutex inside the tick; a doorbell is one system call.
 use palpate_realtime::Doorbell;
-use std::io;
-use tokio::io::{Interest, unix::AsyncFd};
+use std::io::{self, ErrorKind};
+use tokio::net::unix::pipe::Receiver;
 
 /// The task's end; rings in between are merged into one.
 #[derive(Debug)]
-pub struct Ear(AsyncFd<Doorbell>);
+pub struct Ear(Receiver);
 
 /// A doorbell and its ear. Needs a runtime's context.
 ///
 /// # Errors
 /// The operating system's, when it has no descriptors left.
-// Deprecated for types whose descriptor may change or close under the reactor; a Doorbell's lives as long as it does. The
-// replacement is an unsafe function, and this crate has no unsafe code.
-#[allow(deprecated)]
 pub fn bell() -> io::Result<(Doorbell, Ear)> {
     let bell = Doorbell::new()?;
-    Ok((bell.clone(), Ear(AsyncFd::with_interest(bell, Interest::READABLE)?)))
+    let ear = Receiver::from_owned_fd_unchecked(bell.try_clone_fd()?)?;
+    Ok((bell, Ear(ear)))
 }
 
 impl Ear {
@@ -28,11 +26,11 @@ impl Ear {
     /// The runtime's, when it shuts down.
     pub async fn rung(&self) -> io::Result<()> {
         loop {
-            let mut ready = self.0.readable().await?;
-            // Readiness is cleared first: a ring after `answer` makes it ready again.
-            ready.clear_ready();
-            if self.0.get_ref().answer() > 0 {
-                return Ok(());
+            self.0.readable().await?;
+            // An eventfd gives its counter, eight bytes, and starts from zero again.
+            match self.0.try_read(&mut [0; 8]) {
+                Err(error) if error.kind() == ErrorKind::WouldBlock => {}
+                other => return other.map(|_| ()),
             }
         }
     }

@@ -148,7 +148,10 @@ mod tests {
         }
     }
 
-    fn frames() -> impl Strategy<Value = Vec<(bool, Vec<(usize, [f32; 3])>)>> {
+    /// Whether a frame is received, and which vertices change in it.
+    type Frame = (bool, Vec<(usize, [f32; 3])>);
+
+    fn frames() -> impl Strategy<Value = Vec<Frame>> {
         let component = prop_oneof![4 => -1e-3_f32..1e-3, 1 => -0.2_f32..0.2, 1 => Just(0.0_f32)];
         let change = (0..40_usize, [component.clone(), component.clone(), component]);
         prop::collection::vec((any::<bool>(), prop::collection::vec(change, 0..40)), 1..30)

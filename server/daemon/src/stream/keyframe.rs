@@ -89,7 +89,7 @@ mod tests {
     fn chunks_are_small_whole_and_in_order() {
         for (positions, triangles) in [(0, 0), (12, 12), (CHUNK_BYTES * 2 + 36, CHUNK_BYTES + 24), (CHUNK_BYTES, 12)] {
             let (positions, triangles) = (positions / 12 * 12, triangles / 12 * 12);
-            let source = |n: usize, seed: usize| Bytes::from_iter((0..n).map(|i| ((i * 7 + seed) % 251) as u8));
+            let source = |n: usize, seed: usize| (0..n).map(|i| ((i * 7 + seed) % 251) as u8).collect::<Bytes>();
             let (p, t) = (source(positions, 1), source(triangles, 2));
             let parts = split(p.clone(), t.clone());
             assert!(
