@@ -1,0 +1,181 @@
+//! Daemon, bridge and viewer as real processes over real sockets.
+#![allow(clippy::unwrap_used)] // a test that cannot start its subject has failed
+use palpate_system_tests::programs::{self, Program};
+use serde_json::Value;
+use std::{
+    fs,
+    path::Path,
+    process::{Command, Output},
+    thread,
+    time::{Duration, Instant},
+};
+
+/// Far longer than anything needs on an idle machine.
+const PATIENCE: Duration = Duration::from_mins(1);
+
+struct Daemon {
+    program: Program,
+    url: String,
+}
+
+impl Daemon {
+    fn start(arguments: &[&str]) -> Self {
+        let mut all = vec!["serve", "--listen", "127.0.0.1:0"];
+        all.extend(arguments);
+        let mut program = Program::start("palpated", &all);
+        let line = program.wait_for("http://127.0.0.1:", PATIENCE);
+        let from = line.find("http://").unwrap();
+        let url = line[from..].split_whitespace().next().unwrap().trim_end_matches(['/', ',', ')']).to_owned();
+        Self { program, url }
+    }
+
+    fn view(&self, arguments: &[&str]) -> Output {
+        view(&self.url, arguments)
+    }
+
+    fn status(&self) -> Value {
+        let output = self.view(&["status", "--json"]);
+        assert!(output.status.success(), "{}", text(&output.stderr));
+        serde_json::from_slice(&output.stdout).unwrap()
+    }
+
+    /// Asks for the status until it satisfies a condition.
+    fn wait_until(&self, what: &str, condition: impl Fn(&Value) -> bool) -> Value {
+        let end = Instant::now() + PATIENCE;
+        loop {
+            let status = self.status();
+            if condition(&status) {
+                return status;
+            }
+            assert!(Instant::now() < end, "never: {what}; last status:\n{status:#}");
+            thread::sleep(Duration::from_millis(100));
+        }
+    }
+}
+
+fn view(url: &str, arguments: &[&str]) -> Output {
+    Command::new(programs::path_of("palpate-view"))
+        .args(["--server", url])
+        .args(arguments)
+        .env("NO_COLOR", "1")
+        .output()
+        .unwrap()
+}
+
+fn text(bytes: &[u8]) -> String {
+    String::from_utf8_lossy(bytes).into_owned()
+}
+
+#[test]
+fn the_default_scene_is_pressed_and_every_view_shows_it() {
+    let daemon = Daemon::start(&[]);
+    let folder = tempfile::tempdir().unwrap();
+    let file = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
+
+    let status = daemon.wait_until("time goes on", |s| s["tick"].as_u64() > Some(500));
+    assert!(status["tets"].as_u64() > Some(100), "{status:#}");
+    assert_eq!(status["quarantine"], "");
+
+    let watch = daemon.view(&["watch", "--seconds", "4", "--json"]);
+    let seconds: Vec<Value> = text(&watch.stdout).lines().map(|l| serde_json::from_str(l).unwrap()).collect();
+    assert!(!seconds.is_empty(), "{}", text(&watch.stderr));
+    let largest = |key: &str| seconds.iter().filter_map(|s| s[key].as_f64()).fold(0.0, f64::max);
+    assert!(largest("max_displacement_mm") > 0.05, "nothing moves: {seconds:?}");
+    assert!(largest("rate_hz") > 5.0, "{seconds:?}");
+
+    for name in ["dent.png", "dent.vtu", "dent.obj", "dent.ply"] {
+        let command = if name.ends_with("png") { "snapshot" } else { "export" };
+        let output = daemon.view(&[command, &file(name)]);
+        assert!(output.status.success(), "{name}: {}", text(&output.stderr));
+        assert!(fs::metadata(file(name)).unwrap().len() > 1000, "{name} is nearly empty");
+        let again = daemon.view(&[command, &file(name)]);
+        assert!(!again.status.success() && text(&again.stderr).contains("--force"), "{name} was overwritten");
+    }
+    let png = fs::File::open(file("dent.png")).unwrap();
+    let mut reader = png::Decoder::new(std::io::BufReader::new(png)).read_info().unwrap();
+    let mut pixels = vec![0; reader.output_buffer_size().unwrap()];
+    reader.next_frame(&mut pixels).unwrap();
+    let ground = pixels[..3].to_vec();
+    let drawn = pixels.chunks(3).filter(|pixel| **pixel != *ground).count();
+    assert!(drawn > pixels.len() / 3 / 20, "only {drawn} pixels show the body");
+}
+
+#[test]
+fn a_bridge_takes_the_tool_and_gives_it_back() {
+    let mut daemon = Daemon::start(&[]);
+    let arguments = ["--server", &daemon.url, "--device", "simulated"];
+    let mut bridge = Program::start("palpate-bridge", &arguments);
+    let status = daemon.wait_until("the bridge streams", |s| {
+        s["devices"].as_array().is_some_and(|d| d.iter().any(|d| d["samples_accepted"].as_u64() > Some(500)))
+    });
+    assert_eq!(status["devices"].as_array().unwrap().len(), 1, "{status:#}");
+    bridge.terminate();
+    let code = bridge.wait(PATIENCE);
+    assert!(code.success(), "the bridge ended with {code}:\n{}", bridge.output);
+    daemon.wait_until("the device is gone", |s| s["devices"].as_array().is_some_and(Vec::is_empty));
+    daemon.program.terminate();
+    let code = daemon.program.wait(PATIENCE);
+    assert!(code.success(), "the daemon ended with {code}:\n{}", daemon.program.output);
+}
+
+#[test]
+fn the_daemon_drains_while_a_bridge_and_a_viewer_hang_on() {
+    let mut daemon = Daemon::start(&[]);
+    let bridge = Program::start("palpate-bridge", &["--server", &daemon.url, "--device", "simulated"]);
+    let viewer = Program::start("palpate-view", &["--server", &daemon.url, "watch"]);
+    daemon.wait_until("both are attached", |s| {
+        s["viewers"].as_u64() >= Some(1) && s["devices"].as_array().is_some_and(|d| d.len() == 1)
+    });
+    daemon.program.terminate();
+    let code = daemon.program.wait(PATIENCE);
+    assert!(code.success(), "{code}:\n{}", daemon.program.output);
+    let printed = &daemon.program.output;
+    assert!(printed.contains("p99"), "no histograms at exit:\n{printed}");
+    drop((bridge, viewer));
+}
+
+#[test]
+fn injected_forces_arrive() {
+    let daemon = Daemon::start(&["--arm", "none"]);
+    let folder = tempfile::tempdir().unwrap();
+    let script = folder.path().join("push.toml");
+    fs::write(
+        &script,
+        "[[force]]\nnearest_to_m = [0.0, 0.0, -0.02]\nforce_n = [0.0, 0.0, -0.05]\ntick_count = 100000\n",
+    )
+    .unwrap();
+    let output = daemon.view(&["inject", script.to_str().unwrap()]);
+    assert!(output.status.success(), "{}", text(&output.stderr));
+    daemon.wait_until("work is done on the body", |s| s["energies_j"]["external_work"].as_f64() > Some(1e-9));
+
+    fs::write(&script, "[[force]]\nsurface_vertex = 4000000000\nforce_n = [0.0, 0.0, 1.0]\ntick_count = 1\n").unwrap();
+    let refused = daemon.view(&["inject", script.to_str().unwrap()]);
+    assert!(!refused.status.success());
+    assert!(text(&refused.stderr).contains("4000000000"), "{}", text(&refused.stderr));
+    daemon.wait_until("the daemon goes on", |s| s["tick"].as_u64() > Some(0));
+}
+
+#[test]
+fn two_daemons_on_one_port_and_no_daemon_at_all_are_explained() {
+    let daemon = Daemon::start(&[]);
+    let address = daemon.url.trim_start_matches("http://").to_owned();
+    let mut second = Program::start("palpated", &["serve", "--listen", &address]);
+    assert!(!second.wait(PATIENCE).success());
+    assert!(second.output.contains(&address) && second.output.contains("--listen"), "{}", second.output);
+    drop(daemon);
+
+    let nobody = view(&format!("http://{address}"), &["status"]);
+    assert!(!nobody.status.success());
+    let message = text(&nobody.stderr);
+    assert!(message.contains("no daemon answers") && message.contains("palpated"), "{message}");
+}
+
+#[test]
+fn a_unix_socket_serves_as_well() {
+    let folder = tempfile::tempdir().unwrap();
+    let socket = folder.path().join("palpated.sock");
+    let _daemon = Daemon::start(&["--unix", socket.to_str().unwrap()]);
+    let output = view(&format!("unix://{}", socket.display()), &["status"]);
+    assert!(output.status.success(), "{}", text(&output.stderr));
+    assert!(Path::new(&socket).exists());
+}
