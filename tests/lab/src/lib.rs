@@ -1,1 +1,4 @@
-//! placeholder
+//! The lab: what Palpate costs, measured beside what it gets wrong.
+pub mod bodies;
+pub mod table;
+pub mod timing;
