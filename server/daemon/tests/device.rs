@@ -175,13 +175,13 @@ async fn stopping_ramps_to_zero_says_goodbye_and_ends_cleanly() {
 
 #[tokio::test(flavor = "multi_thread")]
 async fn a_quarantined_body_is_told_and_reset_brings_it_back() {
-    let daemon = Daemon::on(block_scene("block", 2)).await;
+    let daemon = Daemon::on(block_scene("block", 3)).await;
     let mut arm = daemon.attach(hello()).await;
     arm.welcome().await;
     arm.hold_until(above(), |command| command.sample_sequence > 10).await;
     // Finite, and absurd: the sum overflows in the integrator.
     let force = v1::InjectedForce {
-        surface_vertex: 17,
+        surface_vertex: 30,
         force_n: Some(v1::Vec3 { x: 1e308, y: 1e308, z: 1e308 }),
         from_tick: 0,
         tick_count: 3,
