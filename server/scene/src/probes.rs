@@ -1,6 +1,6 @@
 //! What a scene measures: named values with units, one row per sample.
 use glam::DVec3;
-use palpate_physics::{Energies, Model, Scratch, State, health, mesh::TetMesh};
+use palpate_physics::{Energies, Model, Scratch, State, contact::closest_weights, health, mesh::TetMesh};
 
 /// A named measurement.
 #[derive(Debug, Clone, PartialEq)]
@@ -69,27 +69,11 @@ impl MaterialPoint {
 
     pub(crate) fn on_triangle(mesh: &TetMesh, triangle: [u32; 3], point_m: DVec3) -> Self {
         let [a, b, c] = triangle.map(|node| mesh.positions_m()[node as usize]);
-        let w = closest_weights(point_m, a, b, c);
+        let w = closest_weights(point_m, [a, b, c]);
         let closest = a * w[0] + b * w[1] + c * w[2];
         let nodes = [triangle[0], triangle[1], triangle[2], triangle[2]];
         Self { nodes, weights: [w[0], w[1], w[2], 0.0], distance_m: closest.distance(point_m) }
     }
-}
-
-/// Barycentric weights of the point of triangle `abc` closest to `p`: the projection if it falls inside, else the
-/// closest point of the nearest edge.
-fn closest_weights(p: DVec3, a: DVec3, b: DVec3, c: DVec3) -> [f64; 3] {
-    let normal = (b - a).cross(c - a);
-    let area = |u: DVec3, v: DVec3| (u - p).cross(v - p).dot(normal) / normal.length_squared();
-    let inside = [area(b, c), area(c, a), area(a, b)];
-    if inside.iter().all(|&w| w >= 0.0) {
-        return inside;
-    }
-    let on_edge = |u: DVec3, v: DVec3| ((p - u).dot(v - u) / (v - u).length_squared()).clamp(0.0, 1.0);
-    let (ab, bc, ca) = (on_edge(a, b), on_edge(b, c), on_edge(c, a));
-    let candidates = [[1.0 - ab, ab, 0.0], [0.0, 1.0 - bc, bc], [ca, 0.0, 1.0 - ca]];
-    let distance = |w: &[f64; 3]| (a * w[0] + b * w[1] + c * w[2]).distance_squared(p);
-    candidates.into_iter().min_by(|u, v| distance(u).total_cmp(&distance(v))).unwrap_or([1.0, 0.0, 0.0])
 }
 
 const XYZ: &[&str] = &["x", "y", "z"];

@@ -47,7 +47,7 @@ pub struct SimulateArgs {
 pub enum FrameCount {
     /// None at all.
     None,
-    /// This many, evenly over the run; the first shows the start.
+    /// This many, evenly over the run, from its start to its end.
     Some(u32),
 }
 
@@ -57,8 +57,8 @@ impl std::str::FromStr for FrameCount {
         match text {
             "none" => Ok(Self::None),
             _ => match text.parse() {
-                Ok(count) if count > 0 => Ok(Self::Some(count)),
-                _ => Err("give a whole number of frames, 1 or more, or \"none\"".into()),
+                Ok(count) if count > 1 => Ok(Self::Some(count)),
+                _ => Err("give a whole number of frames, 2 or more, or \"none\"".into()),
             },
         }
     }
@@ -81,8 +81,8 @@ pub fn run(args: &SimulateArgs) -> miette::Result<ExitCode> {
     let out = args.out.as_deref().map(|out| folder::prepare(out, args.force)).transpose()?;
     let plan = Plan::new(&scene, &model, args);
     let mut rows = ProbeRows::new(&scene.probes, out.as_ref().map(|out| out.join(folder::PROBES)).as_deref())?;
-    let mut frames = match (&out, plan.frame_every) {
-        (Some(out), Some(_)) => Some(Frames::new(out, &model)?),
+    let mut frames = match (&out, plan.frames) {
+        (Some(out), FrameRule::Every(_) | FrameRule::Count(_)) => Some(Frames::new(out, &model)?),
         _ => None,
     };
     let mut run = Run::new(&scene, &model)?;
@@ -117,21 +117,37 @@ pub fn run(args: &SimulateArgs) -> miette::Result<ExitCode> {
 struct Plan {
     ticks: u64,
     sample_every: u64,
-    frame_every: Option<u64>,
+    frames: FrameRule,
+}
+
+/// When a frame is due.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum FrameRule {
+    Never,
+    Every(u64),
+    /// This many over the run, at least 2.
+    Count(u64),
 }
 
 impl Plan {
     fn new(scene: &Scene, model: &Model, args: &SimulateArgs) -> Self {
         let period_s = model.spec().settings.tick_period_s;
         let in_ticks = |time_s: f64| ((time_s / period_s).round() as u64).max(1);
-        let ticks = in_ticks(args.duration_s.unwrap_or(scene.output.duration_s));
-        let frame_every = match args.frames {
-            Some(FrameCount::None) => None,
-            // The first frame shows the start, the last one at the earliest possible the end.
-            Some(FrameCount::Some(count)) => Some(ticks.div_ceil(u64::from(count.max(2)) - 1).max(1)),
-            None => Some(in_ticks(scene.output.frame_interval_s)),
+        let frames = match args.frames {
+            Some(FrameCount::None) => FrameRule::Never,
+            Some(FrameCount::Some(count)) => FrameRule::Count(u64::from(count)),
+            None => FrameRule::Every(in_ticks(scene.output.frame_interval_s)),
         };
-        Self { ticks, sample_every: in_ticks(scene.output.sample_interval_s), frame_every }
+        let ticks = in_ticks(args.duration_s.unwrap_or(scene.output.duration_s));
+        Self { ticks, sample_every: in_ticks(scene.output.sample_interval_s), frames }
+    }
+
+    fn frame_is_due(&self, tick: u64, written: u64) -> bool {
+        match self.frames {
+            FrameRule::Never => false,
+            FrameRule::Every(ticks) => tick.is_multiple_of(ticks),
+            FrameRule::Count(count) => tick == written * self.ticks / (count - 1),
+        }
     }
 }
 
@@ -178,11 +194,11 @@ impl<'s> Run<'s> {
             }
             let time_s = self.state.time_s(self.model);
             let last = tick == plan.ticks || self.state.quarantine.is_some() || interrupt.is_set();
-            if tick % plan.sample_every == 0 || last {
+            if tick.is_multiple_of(plan.sample_every) || last {
                 rows.sample(time_s, self.model, &self.state, self.scratch.reactions_n())?;
             }
-            if let (Some(frames), Some(every)) = (&mut frames, plan.frame_every)
-                && tick % every == 0
+            if let Some(frames) = &mut frames
+                && plan.frame_is_due(tick, frames.count() as u64)
             {
                 frames.write(time_s, self.model, &self.state)?;
             }

@@ -181,18 +181,24 @@ impl<'b> Regions<'b> {
         (0..self.body.surface.triangles.len()).map(|triangle| self.body.surface.triangle_nodes(triangle))
     }
 
-    /// Tets that touch the surface count as being on it in no way: it has nodes and triangles only.
+    /// The boundary: nodes and triangles, no tets.
     fn surface(&self) -> Selection {
         let mut selection = Selection::all(self.body, false);
         selection.triangles.fill(true);
-        self.body.surface.nodes.iter().for_each(|&node| selection.nodes[node as usize] = true);
+        for &node in &self.body.surface.nodes {
+            selection.nodes[node as usize] = true;
+        }
         selection
     }
 
     fn part(&self, nodes: &[u32], triangles: &[[u32; 3]], tets: &[u32]) -> Selection {
         let mut selection = Selection::all(self.body, false);
-        nodes.iter().for_each(|&node| selection.nodes[node as usize] = true);
-        tets.iter().for_each(|&tet| selection.tets[tet as usize] = true);
+        for &node in nodes {
+            selection.nodes[node as usize] = true;
+        }
+        for &tet in tets {
+            selection.tets[tet as usize] = true;
+        }
         let sorted = |mut face: [u32; 3]| {
             face.sort_unstable();
             face

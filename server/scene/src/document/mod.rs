@@ -217,6 +217,7 @@ impl Default for NumericsTable {
 }
 
 /// Length and intervals of an offline run.
+#[expect(clippy::struct_field_names, reason = "keys carry their unit")]
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub(crate) struct OutputTable {

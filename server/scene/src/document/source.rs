@@ -127,8 +127,19 @@ impl<'t> Source<'t> {
         let track = serde_path_to_error::deserialize::<_, Document>(Value::Table(table));
         track.map_err(|error| {
             let at = where_of(error.path());
-            self.error(document_fault(at, error.inner().message()))
+            self.error(self.as_written(document_fault(at, error.inner().message())))
         })
+    }
+
+    /// Names a key as the user wrote it, in millimetres where it was.
+    fn as_written(&self, mut fault: Fault) -> Fault {
+        let written = self.span(&fault.at, true).and_then(|span| self.text.get(span)).filter(|_| fault.on_key);
+        if let (Some(written), Some(name)) = (written, fault.at.name())
+            && written.strip_suffix('m') == Some(name)
+        {
+            fault.message = fault.message.replacen(&format!("`{name}`"), &format!("`{written}`"), 1);
+        }
+        fault
     }
 
     /// A fault with its place in the text.

@@ -1,0 +1,212 @@
+//! The offline commands as a user runs them: the real program, real folders.
+use serde_json::Value;
+use std::{
+    fs,
+    path::{Path, PathBuf},
+    process::{Command, Output},
+};
+
+/// A short beam that comes to rest in a second and a half of simulated time.
+const BEAM: &str = r#"[scene]
+name = "beam"
+[body.box]
+size_mm = [40, 10, 10]
+cells = [8, 2, 2]
+[[material]]
+law = "stable-neo-hookean"
+young_modulus_pa = 100e3
+poisson_ratio = 0.3
+density_kg_per_m3 = 1000
+[[fixed]]
+region = "x_min"
+[[load]]
+region = "x_max"
+traction_pa = [0, 0, -100]
+amplitude.smooth_step.duration_s = 0.2
+[[probe]]
+name = "tip"
+measure = "displacement"
+point_mm = [40, 5, 5]
+[[probe]]
+name = "clamp"
+measure = "reaction"
+region = "x_min"
+[numerics]
+precision = "double"
+mass_damping_per_s = 60
+[output]
+duration_s = 1.5
+frame_interval_s = 0.5
+"#;
+
+fn palpated(arguments: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_palpated")).args(arguments).output().unwrap()
+}
+
+fn succeeds(arguments: &[&str]) -> String {
+    let output = palpated(arguments);
+    assert!(output.status.success(), "{arguments:?}: {}", String::from_utf8_lossy(&output.stderr));
+    String::from_utf8(output.stdout).unwrap()
+}
+
+/// What it prints on standard error, on one line and without the frame miette draws.
+fn fails(arguments: &[&str]) -> String {
+    let output = palpated(arguments);
+    assert_eq!(output.status.code(), Some(1), "{arguments:?}");
+    let text = String::from_utf8(output.stderr).unwrap();
+    text.split_whitespace().filter(|word| *word != "│").collect::<Vec<_>>().join(" ")
+}
+
+fn beam(folder: &Path) -> String {
+    let path = folder.join("beam.toml");
+    fs::write(&path, BEAM).unwrap();
+    path.to_str().unwrap().to_owned()
+}
+
+fn summary(out: &Path) -> Value {
+    serde_json::from_str(&fs::read_to_string(out.join("summary.json")).unwrap()).unwrap()
+}
+
+fn examples() -> PathBuf {
+    PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../deploy/scenes")
+}
+
+#[test]
+fn two_runs_give_the_same_bits_and_all_files() {
+    let folder = tempfile::tempdir().unwrap();
+    let scene = beam(folder.path());
+    let outs = ["a", "b"].map(|name| folder.path().join(name));
+    for out in &outs {
+        succeeds(&["simulate", &scene, "--out", out.to_str().unwrap()]);
+    }
+    let [a, b] = outs.each_ref().map(|out| fs::read(out.join("probes.csv")).unwrap());
+    assert!(a == b && a.starts_with(b"time_s,tip_x_m,tip_y_m,tip_z_m,clamp_x_n,clamp_y_n,clamp_z_n\n0,0,0,0,"));
+    assert_eq!(summary(&outs[0])["state_hash"], summary(&outs[1])["state_hash"]);
+    let last = |out: &Path| fs::read(out.join("frames/frame-000003.vtu")).unwrap();
+    assert!(last(&outs[0]) == last(&outs[1]));
+    assert!(fs::read_to_string(outs[0].join("frames.pvd")).unwrap().contains("frames/frame-000003.vtu"));
+    let summary = summary(&outs[0]);
+    assert_eq!((&summary["frames"], &summary["samples"]), (&Value::from(4), &Value::from(151)));
+    assert_eq!(summary["time"]["ticks"], Value::from(1500));
+    assert!(summary["time"]["tick_wall_us"]["p99"].as_f64() >= summary["time"]["tick_wall_us"]["p50"].as_f64());
+}
+
+#[test]
+fn static_and_simulate_agree_at_rest() {
+    let folder = tempfile::tempdir().unwrap();
+    let scene = beam(folder.path());
+    let moved: Value = serde_json::from_str(&succeeds(&["simulate", &scene, "--json"])).unwrap();
+    let still: Value = serde_json::from_str(&succeeds(&["static", &scene, "--json"])).unwrap();
+    for (probe, axis) in [("tip", "z"), ("tip", "x"), ("clamp", "z")] {
+        let value = |run: &Value| run["probes"][probe]["values"][axis].as_f64().unwrap();
+        let (a, b) = (value(&moved), value(&still));
+        assert!((a - b).abs() < 1e-8 * b.abs(), "{probe} {axis}: simulate {a}, static {b}");
+    }
+    let hold = still["probes"]["clamp"]["values"]["z"].as_f64().unwrap();
+    assert!((hold - 0.01).abs() < 1e-10, "100 Pa on 1 cm² are 10 mN, the clamp holds {hold} N");
+    let sag = still["probes"]["tip"]["values"]["z"].as_f64().unwrap();
+    assert!(sag < -1e-3, "{sag}");
+    assert_eq!(still["solve"]["stable"], Value::from(true));
+}
+
+#[test]
+fn frames_are_as_many_as_asked_for_or_none() {
+    let folder = tempfile::tempdir().unwrap();
+    let scene = beam(folder.path());
+    let run = |frames: &str| {
+        let out = folder.path().join(frames);
+        succeeds(&["simulate", &scene, "--duration-s", "0.1", "--frames", frames, "--out", out.to_str().unwrap()]);
+        (summary(&out)["frames"].as_u64().unwrap(), out.join("frames.pvd").exists())
+    };
+    assert_eq!(run("none"), (0, false));
+    assert_eq!(run("5"), (5, true));
+    assert_eq!(run("7"), (7, true));
+    let folly = palpated(&["simulate", &scene, "--frames", "-1"]);
+    assert_eq!(folly.status.code(), Some(2));
+}
+
+#[test]
+fn a_folder_with_something_in_it_is_kept_unless_forced() {
+    let folder = tempfile::tempdir().unwrap();
+    let scene = beam(folder.path());
+    let out = folder.path().join("out");
+    fs::create_dir(&out).unwrap();
+    fs::write(out.join("thesis.txt"), "mine").unwrap();
+    let arguments = ["simulate", &scene, "--duration-s", "0.01", "--out", out.to_str().unwrap()];
+    let message = fails(&arguments);
+    assert!(message.contains("is not empty (it holds thesis.txt)") && message.contains("--force"), "{message}");
+    assert!(!out.join("probes.csv").exists());
+    succeeds(&[&arguments[..], &["--force"]].concat());
+    assert_eq!(fs::read_to_string(out.join("thesis.txt")).unwrap(), "mine");
+}
+
+#[test]
+fn bad_scenes_are_shown_with_place_and_next_step() {
+    let message = fails(&["check", "ventrikle"]);
+    assert!(message.contains("there is no scene file \"ventrikle\""), "{message}");
+    assert!(message.contains("built-in scenes: ventricle, cantilever"), "{message}");
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("bad.toml");
+    fs::write(&path, BEAM.replace("poisson_ratio = 0.3", "poisson_ratio = 0.5")).unwrap();
+    for command in ["check", "simulate", "static"] {
+        let message = fails(&[command, path.to_str().unwrap()]);
+        assert!(message.contains("poisson_ratio = 0.5: must be larger than -1 and smaller than 0.5"), "{message}");
+        assert!(message.contains("bad.toml:9:17"), "{message}");
+    }
+    fs::write(
+        &path,
+        BEAM.replace("[[fixed]]\nregion = \"x_min\"\n", "")
+            .replace("[[probe]]\nname = \"clamp\"\nmeasure = \"reaction\"\nregion = \"x_min\"\n", ""),
+    )
+    .unwrap();
+    let message = fails(&["static", path.to_str().unwrap()]);
+    assert!(message.contains("is free to") && message.contains("add a [[fixed]] region"), "{message}");
+}
+
+#[test]
+fn the_schema_is_json_and_the_built_in_scenes_are_listed() {
+    let schema: Value = serde_json::from_str(&succeeds(&["schema"])).unwrap();
+    assert_eq!(schema["title"], Value::from("Document"));
+    assert_eq!(succeeds(&["check", "--list"]).lines().next(), Some("ventricle"));
+}
+
+#[test]
+fn every_example_passes_check_and_runs() {
+    let mut count = 0;
+    for entry in fs::read_dir(examples()).unwrap() {
+        let path = entry.unwrap().path();
+        if path.extension().is_none_or(|extension| extension != "toml") {
+            continue;
+        }
+        let path = path.to_str().unwrap();
+        let text = succeeds(&["check", path, "--strict"]);
+        assert!(text.contains("substeps") && text.contains("% of the tick"), "{text}");
+        let run: Value =
+            serde_json::from_str(&succeeds(&["simulate", path, "--duration-s", "0.02", "--json"])).unwrap();
+        assert_eq!(run["ended_by"], Value::from("duration"), "{path}");
+        count += 1;
+    }
+    assert!(count >= 6);
+}
+
+#[cfg(unix)]
+#[test]
+fn an_interrupted_run_keeps_what_is_there() {
+    let folder = tempfile::tempdir().unwrap();
+    let scene = beam(folder.path());
+    let out = folder.path().join("out");
+    let mut child = Command::new(env!("CARGO_BIN_EXE_palpated"))
+        .args(["simulate", &scene, "--duration-s", "100000", "--frames", "none", "--out", out.to_str().unwrap()])
+        .stdout(std::process::Stdio::null())
+        .spawn()
+        .unwrap();
+    while fs::metadata(out.join("probes.csv")).map_or(0, |file| file.len()) == 0 {
+        std::thread::sleep(std::time::Duration::from_millis(20));
+    }
+    let sent = Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap();
+    assert!(sent.success() && child.wait().unwrap().success());
+    let summary = summary(&out);
+    assert_eq!(summary["ended_by"], Value::from("interrupted"));
+    let rows = fs::read_to_string(out.join("probes.csv")).unwrap().lines().count() as u64;
+    assert_eq!(summary["samples"].as_u64(), Some(rows - 1));
+}
