@@ -1,4 +1,5 @@
 //! Every kind of bad scene gets a message that says what is wrong, where, and what to do: the whole message is looked at.
+#![allow(clippy::unwrap_used)] // helpers outside #[test] functions
 use palpate_scene::{SceneError, load_file, parse};
 use std::path::Path;
 

@@ -1,4 +1,5 @@
 //! Every scene we ship loads, builds, and says what its comments claim.
+#![allow(clippy::unwrap_used)] // helpers outside #[test] functions
 use palpate_physics::Model;
 use palpate_scene::{Scene, builtin, builtin_names, load_file};
 use std::path::PathBuf;

@@ -1,4 +1,5 @@
 //! The printed JSON schema describes the format that is read: shipped scenes fit it, and scenes with a mistake do not.
+#![allow(clippy::unwrap_used)] // helpers outside #[test] functions
 use palpate_scene::json_schema;
 use serde_json::Value;
 use std::path::PathBuf;

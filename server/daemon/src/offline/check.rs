@@ -28,7 +28,7 @@ pub struct CheckArgs {
 /// A scene that does not load.
 pub fn run(args: &CheckArgs) -> miette::Result<ExitCode> {
     let Some(name) = args.scene.as_deref().filter(|_| !args.list) else {
-        builtin_names().iter().for_each(|name| println!("{name}"));
+        println!("{}", builtin_names().join("\n"));
         return Ok(ExitCode::SUCCESS);
     };
     let scene = load::load_scene(name)?;

@@ -46,9 +46,7 @@ impl<'s> ProbeRows<'s> {
         }
         self.count += 1;
         let Some(file) = &mut self.file else { return Ok(()) };
-        // The shortest text that reads back to the same bits.
-        let cells: String = self.row.iter().map(|value| format!(",{value}")).collect();
-        writeln!(file, "{time_s}{cells}").into_diagnostic().wrap_err("cannot write probes.csv")
+        write_row(file, time_s, &self.row).into_diagnostic().wrap_err("cannot write probes.csv")
     }
 
     /// Rows so far.
@@ -71,9 +69,16 @@ impl<'s> ProbeRows<'s> {
 fn create(path: &Path, probes: &[Probe]) -> miette::Result<BufWriter<File>> {
     let refused = || format!("cannot write {}", path.display());
     let mut file = BufWriter::new(File::create(path).into_diagnostic().wrap_err_with(refused)?);
-    let names: String = probes.iter().flat_map(heads).map(|head| format!(",{head}")).collect();
-    writeln!(file, "time_s{names}").into_diagnostic().wrap_err_with(refused)?;
+    let columns: Vec<String> = std::iter::once("time_s".to_owned()).chain(probes.iter().flat_map(heads)).collect();
+    writeln!(file, "{}", columns.join(",")).into_diagnostic().wrap_err_with(refused)?;
     Ok(file)
+}
+
+/// Numbers as the shortest text that reads back to the same bits.
+fn write_row(file: &mut impl Write, time_s: f64, row: &[f64]) -> std::io::Result<()> {
+    write!(file, "{time_s}")?;
+    row.iter().try_for_each(|value| write!(file, ",{value}"))?;
+    writeln!(file)
 }
 
 /// Headings of a probe's columns: name, column, unit.

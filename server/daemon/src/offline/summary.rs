@@ -79,8 +79,9 @@ pub(super) struct EnergyNumbers {
     pub(super) gravitational: f64,
     pub(super) external_work: f64,
     pub(super) dissipated: f64,
-    /// Held − work + dissipated: 0 but for the error of time integration.
-    pub(super) balance: f64,
+    /// Held − work + dissipated: 0 but for the error of time integration. A static solve tracks no work and has none.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) balance: Option<f64>,
 }
 
 #[derive(Debug, Serialize)]
@@ -128,7 +129,7 @@ impl Summary {
                 gravitational: energies.gravitational_j,
                 external_work: energies.external_work_j,
                 dissipated: energies.dissipated_j,
-                balance: energies.balance_j(),
+                balance: (ending.command == "simulate").then(|| energies.balance_j()),
             },
             min_volume_ratio: health::min_volume_ratio(model, state).0,
             probes,
@@ -181,10 +182,10 @@ impl Summary {
                 probe.values.iter().map(|(column, value)| format!("{column} {value:.6e}")).collect();
             println!("  {name} ({}): {}", probe.unit, values.join(", "));
         }
-        println!(
-            "  smallest volume ratio {:.4}, energy balance {:.2e} J, state {}",
-            self.min_volume_ratio, self.energies_j.balance, self.state_hash
-        );
+        println!("  smallest volume ratio {:.4}, state {}", self.min_volume_ratio, self.state_hash);
+        if let Some(balance) = self.energies_j.balance {
+            println!("  energy balance {balance:.2e} J");
+        }
         match out {
             Some(out) => println!("  written to {}: {} rows, {} frames", out.display(), self.samples, self.frames),
             None => println!("  nothing was saved; add --out DIR for probes.csv, frames and summary.json"),
