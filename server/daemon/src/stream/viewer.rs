@@ -19,7 +19,6 @@ pub struct Viewer {
     epoch: Option<u32>,
     held: Option<u64>,
     next_due: Instant,
-    handed_over: Option<Instant>,
     skipped: u64,
 }
 
@@ -35,20 +34,17 @@ impl Viewer {
             epoch: None,
             held: None,
             next_due: Instant::now(),
-            handed_over: None,
             skipped: 0,
         }
     }
 
     /// The next event, `None` at the end.
     pub async fn next(&mut self) -> Option<v1::SurfaceEvent> {
-        self.count_what_passed();
         let stop = self.stop.clone();
         let event = tokio::select! {
             () = stop.cancelled() => None,
             event = self.next_event() => event,
         };
-        self.handed_over = Some(Instant::now());
         event.map(|message| v1::SurfaceEvent { message: Some(message) })
     }
 
@@ -78,6 +74,7 @@ impl Viewer {
     }
 
     fn take(&mut self, frame: &Arc<Frame>) -> Message {
+        self.count_what_passed(frame);
         let update = frame.update(self.held, self.with_vertices, self.skipped);
         self.held = Some(frame.number);
         // From the due time, not from now: the mean rate is the asked one. Never two at once to catch up.
@@ -85,14 +82,13 @@ impl Viewer {
         Message::Update(update)
     }
 
-    /// Frames this viewer would have had, had the transport not kept it waiting.
-    fn count_what_passed(&mut self) {
-        let (Some(since), Some(held)) = (self.handed_over, self.held) else { return };
-        let frames = self.seat.frames.borrow();
-        let passed = frames.as_ref().filter(|f| self.epoch == Some(f.epoch)).map_or(0, |f| f.number - held);
-        drop(frames);
-        let due = (since.elapsed().as_secs_f64() / self.interval.as_secs_f64()) as u64;
-        let skipped = passed.min(due).saturating_sub(1);
+    /// Frames this viewer would have had at its rate, had the transport asked for the next one when it was due. Counted when a
+    /// frame is taken: a transport may ask early and come back late.
+    fn count_what_passed(&mut self, frame: &Frame) {
+        let Some(held) = self.held else { return };
+        let late = Instant::now().saturating_duration_since(self.next_due);
+        let due = (late.as_secs_f64() / self.interval.as_secs_f64()) as u64 + 1;
+        let skipped = frame.number.saturating_sub(held).min(due).saturating_sub(1);
         self.skipped += skipped;
         self.seat.count_skipped(skipped);
     }
