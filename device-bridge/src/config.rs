@@ -239,7 +239,7 @@ pub struct KeyframeConfig {
 }
 
 impl Default for SimulatedConfig {
-    /// Presses the daemon's built-in ventricle and lets it go, once a second.
+    /// Presses the daemon's built-in ventricle and lets it go, every two seconds.
     fn default() -> Self {
         let arm = palpate_control::ArmSpec::default();
         Self {
@@ -247,9 +247,9 @@ impl Default for SimulatedConfig {
             damping_n_s_per_m: arm.damping_n_s_per_m,
             hand_stiffness_n_per_m: arm.hand_stiffness_n_per_m,
             hand_damping_n_s_per_m: arm.hand_damping_n_s_per_m,
-            period_s: Some(1.0),
-            keyframes: [(0.0, 0.055), (0.45, 0.030), (0.55, 0.030)]
-                .map(|(time_s, x)| KeyframeConfig { time_s, position_m: [x, 0.0, -0.015] })
+            period_s: Some(2.0),
+            keyframes: [(0.0, 0.055), (0.6, 0.028), (1.1, 0.028), (1.7, 0.055)]
+                .map(|(time_s, x)| KeyframeConfig { time_s, position_m: [x, 0.0, 0.0] })
                 .to_vec(),
         }
     }

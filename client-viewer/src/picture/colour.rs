@@ -1,25 +1,23 @@
-//! Displacement to colour: viridis, which keeps its order in grey and for colour-blind eyes.
+//! Displacement to colour: light flesh at rest to violet, darker with every step (magma reversed), so that it keeps its
+//! order in grey and for colour-blind eyes, and shading stays visible where nothing moves.
 
 /// sRGB components in 0..=1.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Rgb(pub(super) [f32; 3]);
 
-const STOPS: [[f32; 3]; 11] = [
-    [0.267, 0.005, 0.329],
-    [0.283, 0.141, 0.458],
-    [0.254, 0.265, 0.530],
-    [0.207, 0.372, 0.553],
-    [0.164, 0.471, 0.558],
-    [0.128, 0.567, 0.551],
-    [0.135, 0.659, 0.518],
-    [0.267, 0.749, 0.441],
-    [0.478, 0.821, 0.317],
-    [0.741, 0.873, 0.150],
-    [0.993, 0.906, 0.144],
+const STOPS: [[f32; 3]; 8] = [
+    [0.988, 0.922, 0.780],
+    [0.996, 0.800, 0.600],
+    [0.992, 0.655, 0.455],
+    [0.965, 0.490, 0.370],
+    [0.880, 0.345, 0.385],
+    [0.730, 0.245, 0.450],
+    [0.560, 0.180, 0.485],
+    [0.390, 0.120, 0.480],
 ];
 
 /// The colour of a fraction; outside values, and NaN, take the end colours.
-pub(super) fn viridis(fraction: f32) -> Rgb {
+pub(super) fn of_fraction(fraction: f32) -> Rgb {
     let at = fraction.clamp(0.0, 1.0).max(0.0) * (STOPS.len() - 1) as f32;
     let low = (at as usize).min(STOPS.len() - 2);
     let t = at - low as f32;
@@ -47,11 +45,11 @@ mod tests {
     }
 
     #[test]
-    fn lightness_grows() {
+    fn lightness_falls() {
         let grey = |f: f32| {
-            let Rgb([r, g, b]) = viridis(f);
+            let Rgb([r, g, b]) = of_fraction(f);
             0.2126 * r + 0.7152 * g + 0.0722 * b
         };
-        assert!((0..20).all(|i| grey((i + 1) as f32 / 20.0) > grey(i as f32 / 20.0)));
+        assert!((0..20).all(|i| grey((i + 1) as f32 / 20.0) < grey(i as f32 / 20.0)));
     }
 }

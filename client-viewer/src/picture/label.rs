@@ -1,6 +1,6 @@
 //! Legend and title, in an 8×8 bitmap font.
 use super::{
-    colour::{Rgb, viridis},
+    colour::{Rgb, of_fraction},
     raster::Canvas,
 };
 use font8x8::UnicodeFonts as _;
@@ -16,7 +16,7 @@ pub(super) fn legend(canvas: &mut Canvas, top_m: f32, ink: Rgb) {
     let height = canvas.height / 3;
     let top = canvas.height / 2 - height / 2;
     for row in 0..height {
-        let colour = viridis(1.0 - row as f32 / (height - 1) as f32);
+        let colour = of_fraction(1.0 - row as f32 / (height - 1) as f32);
         for column in 0..BAR_WIDTH * scale {
             canvas.paint(MARGIN + column, top + row, colour);
         }

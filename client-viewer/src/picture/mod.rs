@@ -18,7 +18,7 @@ const SUPERSAMPLING: usize = 2;
 const GROUND: Rgb = Rgb([0.078, 0.094, 0.110]);
 const INK: Rgb = Rgb([0.90, 0.89, 0.86]);
 const TOOL: Rgb = Rgb([0.91, 0.89, 0.85]);
-const ARROW: Rgb = Rgb([0.95, 0.72, 0.29]);
+const ARROW: Rgb = Rgb([0.44, 0.88, 0.76]);
 
 /// Arguments of `snapshot`.
 #[derive(Debug, Args)]
@@ -95,7 +95,7 @@ fn draw(surface: &Surface, (width, height): (usize, usize), from: Vec3, full_sca
         .iter()
         .zip(&normals)
         .zip(&surface.displacement_m)
-        .map(|((&position, &normal), d)| Vertex { position, normal, colour: colour::viridis(d.length() / top_m) })
+        .map(|((&position, &normal), d)| Vertex { position, normal, colour: colour::of_fraction(d.length() / top_m) })
         .collect();
     for t in &surface.triangles {
         canvas.triangle(&camera, t.map(|i| vertices[i as usize]));

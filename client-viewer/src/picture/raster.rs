@@ -99,10 +99,10 @@ impl Canvas {
 
 /// Diffuse light from above the eye, a little from everywhere, and a faint highlight.
 fn shade(vertex: Vertex, to_eye: Vec3) -> [f32; 3] {
-    let lamp = (to_eye + Vec3::new(0.2, -0.1, 0.7)).normalize();
+    let lamp = (to_eye + Vec3::new(-0.3, 0.0, 0.4)).normalize();
     // Both sides are lit: the inside of an open body is seen as well.
     let facing = if vertex.normal.dot(to_eye) < 0.0 { -vertex.normal } else { vertex.normal };
     let diffuse = facing.dot(lamp).max(0.0);
     let highlight = facing.dot((lamp + to_eye).normalize()).max(0.0).powi(40);
-    vertex.colour.0.map(|c| c * (0.32 + 0.72 * diffuse) + 0.12 * highlight)
+    vertex.colour.0.map(|c| c * (0.42 + 0.62 * diffuse) + 0.08 * highlight)
 }

@@ -8,9 +8,9 @@ it("rounds up to 1, 2, 5", () => {
   expect(niceCeiling(NaN, 1e-4)).toBe(1e-4);
 });
 
-it("gets lighter with displacement", () => {
+it("gets darker with displacement", () => {
   const grey = (f: number) => { const [r, g, b] = colourOf(f); return 0.2126 * r + 0.7152 * g + 0.0722 * b; };
-  for (let i = 0; i < 20; i++) expect(grey((i + 1) / 20)).toBeGreaterThan(grey(i / 20));
+  for (let i = 0; i < 20; i++) expect(grey((i + 1) / 20)).toBeLessThan(grey(i / 20));
 });
 
 it("grows at once and shrinks late", () => {

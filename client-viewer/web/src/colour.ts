@@ -1,8 +1,8 @@
-// Displacement to colour: viridis, which keeps its order in grey and for colour-blind eyes.
+// Displacement to colour: light flesh at rest to violet, darker with every step (magma reversed), so that it keeps its order
+// in grey and for colour-blind eyes, and shading stays visible where nothing moves.
 const STOPS: readonly (readonly [number, number, number])[] = [
-  [0.267, 0.005, 0.329], [0.283, 0.141, 0.458], [0.254, 0.265, 0.53], [0.207, 0.372, 0.553], [0.164, 0.471, 0.558],
-  [0.128, 0.567, 0.551], [0.135, 0.659, 0.518], [0.267, 0.749, 0.441], [0.478, 0.821, 0.318], [0.741, 0.873, 0.15],
-  [0.993, 0.906, 0.144],
+  [0.988, 0.922, 0.78], [0.996, 0.8, 0.6], [0.992, 0.655, 0.455], [0.965, 0.49, 0.37],
+  [0.88, 0.345, 0.385], [0.73, 0.245, 0.45], [0.56, 0.18, 0.485], [0.39, 0.12, 0.48],
 ];
 
 /** sRGB in 0..1 for a fraction; outside values take the end colours. */

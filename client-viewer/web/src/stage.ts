@@ -30,9 +30,11 @@ export class Stage {
 
   constructor(private readonly host: HTMLElement) {
     this.scene.background = new THREE.Color(0x14181c);
-    this.scene.add(new THREE.HemisphereLight(0xdfe9f2, 0x3a3028, 1.4));
-    const sun = new THREE.DirectionalLight(0xffffff, 2.2);
-    sun.position.set(0.6, -1, 1.4);
+    const sky = new THREE.HemisphereLight(0xf4f6f8, 0x6b5f55, 1.5);
+    sky.position.set(0, 0, 1);
+    this.scene.add(sky);
+    const sun = new THREE.DirectionalLight(0xffffff, 2.0);
+    sun.position.set(-0.5, 0.7, 1);
     // The lamp moves with the eye, so that a dent is shaded from wherever one looks.
     this.camera.add(sun);
     this.scene.add(this.camera, this.body);
@@ -141,7 +143,7 @@ export class Stage {
       const ball = new THREE.SphereGeometry(tool.radiusM, 48, 24);
       const proxy = new THREE.Mesh(ball, new THREE.MeshStandardMaterial({ color: 0xe9e4da, roughness: 0.35, transparent: true, opacity: 0.85 }));
       const device = new THREE.Mesh(ball, new THREE.MeshBasicMaterial({ color: 0x6fb7e9, wireframe: true, transparent: true, opacity: 0.12 }));
-      const arrow = new THREE.ArrowHelper(new THREE.Vector3(0, 0, 1), new THREE.Vector3(), 0.01, 0xf2b84b);
+      const arrow = new THREE.ArrowHelper(new THREE.Vector3(0, 0, 1), new THREE.Vector3(), 0.01, 0x6fe0c2);
       arrow.visible = false;
       this.scene.add(proxy, device, arrow);
       return { proxy, device, arrow };

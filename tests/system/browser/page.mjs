@@ -89,7 +89,7 @@ try {
   check("the scene has a name", (await page.textContent("#scene-name")).length > 2, await page.textContent("#scene-name"));
   check("the mesh is counted", /\d+ vertices, \d+ faces/.test(await page.textContent("#mesh")), await page.textContent("#mesh"));
 
-  // The simulated arm presses about once a second: wait for a firm press.
+  // The simulated arm presses every two seconds: wait for a firm press.
   let contact = 0;
   for (let i = 0; i < 400 && contact < 0.02; i++) {
     contact = await number(page, "contact-force");
