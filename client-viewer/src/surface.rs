@@ -100,7 +100,8 @@ impl Watcher {
         if chunk.chunk == 0 {
             self.chunks.clear();
         }
-        if chunk.chunk as usize != self.chunks.len() {
+        let other_epoch = self.chunks.first().is_some_and(|first| first.epoch != chunk.epoch);
+        if chunk.chunk as usize != self.chunks.len() || chunk.chunk >= chunk.chunk_count || other_epoch {
             return Err(broken(format!("brings keyframe chunk {} out of order", chunk.chunk)));
         }
         let count = chunk.chunk_count as usize;

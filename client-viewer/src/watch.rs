@@ -8,8 +8,8 @@ use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 #[derive(Debug, Args)]
 pub struct WatchArguments {
     /// Stop after so many seconds (until interrupted when absent)
-    #[arg(long, value_name = "SECONDS")]
-    seconds: Option<f64>,
+    #[arg(long, value_name = "SECONDS", value_parser = parse_seconds)]
+    seconds: Option<Duration>,
     /// Most updates per second to ask for
     #[arg(long, default_value_t = 60.0, value_name = "HZ")]
     rate_hz: f64,
@@ -19,6 +19,11 @@ pub struct WatchArguments {
     /// One JSON object a line instead of a table
     #[arg(long)]
     json: bool,
+}
+
+fn parse_seconds(text: &str) -> Result<Duration, String> {
+    let seconds: f64 = text.parse().map_err(|error| format!("{error}"))?;
+    Duration::try_from_secs_f64(seconds).map_err(|error| format!("{error}"))
 }
 
 /// What one second of the stream was like.
@@ -46,7 +51,7 @@ pub async fn run(server: &Server, arguments: &WatchArguments) -> Result<(), View
     let mut second = Window::new(begin);
     let mut named = false;
     loop {
-        let left = arguments.seconds.map(|s| Duration::from_secs_f64(s.max(0.0)).saturating_sub(begin.elapsed()));
+        let left = arguments.seconds.map(|seconds| seconds.saturating_sub(begin.elapsed()));
         if left.is_some_and(|left| left.is_zero()) {
             return Ok(());
         }

@@ -48,7 +48,9 @@ function begin(complete: Surface): void {
 }
 
 function take(update: SurfaceUpdate): void {
-  if (!surface?.apply(update)) return;
+  if (!surface || update.epoch !== surface.epoch) return;
+  // Later updates build on this one: a stream that does not fit must begin anew.
+  if (!surface.apply(update)) throw new Error(`update of tick ${update.tick} does not fit its keyframe`);
   newest = update;
   const tool = update.tools[0];
   const contact = magnitude(tool?.contactForceN);

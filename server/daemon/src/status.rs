@@ -89,10 +89,7 @@ fn probes(session: &ActiveSession, copy: &Copy) -> Vec<v1::NamedVector> {
 }
 
 fn quarantine(copy: &Copy) -> String {
-    copy.state.quarantine.map_or_else(String::new, |q| {
-        format!(
-            "tick {} was refused: node {} became non-finite; the last good state is held, forces are zero until Reset or Restore",
-            q.tick, q.node
-        )
+    copy.state.quarantine.map_or_else(String::new, |what| {
+        format!("{what}; the last good state is held, forces are zero until Reset or Restore")
     })
 }

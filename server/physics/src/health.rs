@@ -153,6 +153,15 @@ impl LastGood {
     }
 }
 
+impl std::fmt::Display for Quarantine {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self.node {
+            Self::NOT_A_NODE => write!(f, "tick {} was refused: a tool or a sum became non-finite", self.tick),
+            node => write!(f, "tick {} was refused: node {node} became non-finite", self.tick),
+        }
+    }
+}
+
 /// What in a state is not finite: a node whose position or velocity is not, or [`Quarantine::NOT_A_NODE`].
 pub fn first_non_finite(state: &State) -> Option<u32> {
     // One pass of additions: a sum is finite only if every term is (overflow of finite terms is caught as well).

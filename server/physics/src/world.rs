@@ -237,7 +237,7 @@ impl Model {
             omega,
             &spec.tools,
         );
-        let stretch_sq = stretch_factor_sq(&spec.settings);
+        let stretch_sq = stiffening(&spec.settings, &materials);
         // λ_max(s K + C) = s λ_max(K + C/s)
         let springs: Vec<f64> = contact.nodal_stiffness_n_per_m.iter().map(|k| k / stretch_sq).collect();
         let touched = if springs.is_empty() {
@@ -519,20 +519,24 @@ fn free_inverse_mass(mass_kg: &[f64], prescribed: &[PrescribedSpec]) -> Result<V
     Ok(inverse)
 }
 
-/// `(3s² − 1)/2`: how much the square of a frequency grows at stretch `s` (St. Venant-Kirchhoff, pulled).
-fn stretch_factor_sq(settings: &Settings) -> f64 {
-    (3.0 * settings.stretch_allowance.powi(2) - 1.0) / 2.0
+/// How much the square of a frequency grows at the allowed stretch: the worst of the laws ([`Material::stiffening`]).
+fn stiffening(settings: &Settings, materials: &[Material]) -> f64 {
+    materials.iter().map(|material| material.stiffening(settings.stretch_allowance)).fold(1.0, f64::max)
 }
 
-/// Substeps for a stable leapfrog: `dt = safety · (2/ω)(√(1 + ξ²) − ξ)` with the largest frequency ω of the body, stretched by
-/// s and touched everywhere, `ω² = λ_max(M^{-½} (½(3s² − 1) K + K_contact) M^{-½})`, and `ξ = ½ ω τ`, the damping ratio at ω: τ is the largest ratio of viscosity to
-/// stiffness over P-waves, shear and bulk, `(φ + 2ψ)/(λ + 2µ)`, `ψ/µ`, `(φ + ⅔ψ)/(λ + ⅔µ)`.
+/// Substeps for a stable leapfrog: `dt = safety · (2/ω)(√(1 + ξ²) − ξ)`.
+///
+/// ω is the largest frequency of the body stretched by s and touched everywhere, `ω² = λ_max(M^{-½} (χK + K_contact) M^{-½})` with
+/// the laws' stiffening χ. ξ is the damping ratio at ω: viscous stress grows with s⁴ (`P_v = F S_v`, `Ė = sym(Ḟᵀ F)`), so
+/// `ξ = ½ ω τ s⁴/χ`, with τ the largest ratio of viscosity to stiffness over P-waves, shear and bulk:
+/// `(φ + 2ψ)/(λ + 2µ)`, `ψ/µ`, `(φ + ⅔ψ)/(λ + ⅔µ)`.
 fn choose_substeps(spec: &ModelSpec, materials: &[Material], omega: f64) -> Result<u32, ModelError> {
     let settings = &spec.settings;
     if let Substeps::Fixed(substeps) = settings.substeps {
         return Ok(substeps);
     }
-    let xi = 0.5 * omega * materials.iter().map(relaxation_time_s).fold(0.0, f64::max);
+    let viscous_growth = settings.stretch_allowance.powi(4) / stiffening(settings, materials);
+    let xi = 0.5 * omega * viscous_growth * materials.iter().map(relaxation_time_s).fold(0.0, f64::max);
     let dt_s = settings.step_safety * 2.0 / omega * ((1.0 + xi * xi).sqrt() - xi);
     let substeps = (settings.tick_period_s / dt_s).ceil().max(1.0);
     if substeps <= f64::from(MAX_SUBSTEPS) {

@@ -180,3 +180,44 @@ fn viscous_stress_dissipates_and_is_objective() {
         assert!((of_forces - stated).abs() < 1e-11 * stated.max(1.0), "{of_forces} {stated}");
     }
 }
+
+/// `Material::stiffening` bounds the P-wave modulus of every state whose principal stretches stay below `s`, and is reached.
+#[test]
+fn stiffening_bounds_the_modulus_along_every_direction() {
+    for law in [Law::StVenantKirchhoff, Law::StableNeoHookean, Law::FixedCorotated] {
+        for nu in [0.0, 0.3, 0.45, 0.49] {
+            let lame = Lame::from_young_poisson(10e3, nu).unwrap();
+            let material = Material::new(law, lame, Viscosity::default(), Convention::Consistent);
+            for s in [1.0, 1.2, 1.5, 2.0] {
+                let bound = material.stiffening(s) * lame.p_wave_modulus_pa();
+                let mut worst = 0.0_f64;
+                // Principal stretches on a grid up to s; directions on another.
+                let grid = [0.6, 1.0, 0.5 * (1.0 + s), s];
+                for (a, b, c) in triples(&grid) {
+                    let f = DMat3::from_diagonal(DVec3::new(a, b, c));
+                    for (n, m) in directions().iter().flat_map(|n| directions().into_iter().map(move |m| (*n, m))) {
+                        let df = DMat3::from_cols(n * m.x, n * m.y, n * m.z);
+                        worst = worst.max(n.dot(material.piola_differential(&f, &df) * m));
+                    }
+                }
+                assert!(worst <= bound * (1.0 + 1e-9), "{law:?} nu {nu} s {s}: {worst} over {bound}");
+                assert!(worst >= 0.95 * bound, "{law:?} nu {nu} s {s}: {worst} far below {bound}");
+            }
+        }
+    }
+}
+
+fn triples(grid: &[f64]) -> Vec<(f64, f64, f64)> {
+    let pairs = |a: f64| grid.iter().flat_map(move |&b| grid.iter().map(move |&c| (a, b, c)));
+    grid.iter().flat_map(|&a| pairs(a)).collect()
+}
+
+fn directions() -> Vec<DVec3> {
+    let axis = [-1.0, 0.0, 1.0];
+    triples(&axis)
+        .into_iter()
+        .map(|(x, y, z)| DVec3::new(x, y, z))
+        .filter(|d| *d != DVec3::ZERO)
+        .map(DVec3::normalize)
+        .collect()
+}

@@ -43,6 +43,7 @@ fn an_enormous_force_leaves_the_last_good_state() {
         assert_eq!(rig.state.x, good.x);
         assert!(rig.state.v.iter().all(|v| *v == DVec3::ZERO));
         assert_eq!(rig.state.ledger, good.ledger);
+        assert!(rig.scratch.reactions_n().iter().all(|r| r.is_finite()));
         let tool = &rig.state.tools[0];
         assert_eq!((tool.device_force_n, tool.local_model, tool.contacts), (DVec3::ZERO, None, 0));
         assert_eq!(tool.centre_m, good.tools[0].centre_m);

@@ -46,14 +46,14 @@ fn built_in_scenes_are_the_shipped_files_and_need_no_other() {
 }
 
 #[test]
-fn the_default_scene_is_pressed_by_the_simulated_arm_once_a_second() {
+fn the_default_scene_is_pressed_by_the_simulated_arm_every_two_seconds() {
     let scene = load(&folder().join("ventricle.toml"));
     let arm = scene.arm.as_ref().unwrap();
-    assert_eq!(arm.path.duration_s(), 1.0);
+    assert_eq!(arm.path.duration_s(), 2.0);
     assert_eq!(scene.model.tools[arm.tool].name, arm.tool_name);
     let outer = scene.summary.parts.iter().find(|part| part.name == "outer").unwrap();
     assert!(outer.triangles > 100 && outer.tets == 0);
     // Offline the hand stands in for the arm, and comes round.
-    let (a, b) = (scene.offline_target(0, 0.25), scene.offline_target(0, 1.25));
+    let (a, b) = (scene.offline_target(0, 0.25), scene.offline_target(0, 2.25));
     assert!((a.position_m - b.position_m).length() < 1e-12 && a.velocity_m_per_s.x < 0.0);
 }

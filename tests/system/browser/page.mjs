@@ -91,7 +91,7 @@ try {
 
   // The simulated arm presses every two seconds: wait for a firm press.
   let contact = 0;
-  for (let i = 0; i < 400 && contact < 0.02; i++) {
+  for (let i = 0; i < 400 && !(contact >= 0.02); i++) {
     contact = await number(page, "contact-force");
     await sleep(25);
   }

@@ -122,6 +122,37 @@ fn unsafe_stays_in_its_two_places() {
     }
 }
 
+/// The top level is given: nothing else is committed there.
+#[test]
+fn the_top_level_holds_only_what_belongs_there() {
+    let allowed = [
+        ".ci",
+        ".gitattributes",
+        ".gitignore",
+        "ARCHITECTURE.md",
+        "CHANGELOG.md",
+        "CONTRIBUTING.md",
+        "Cargo.lock",
+        "Cargo.toml",
+        "LICENSE",
+        "README.md",
+        "client-viewer",
+        "clippy.toml",
+        "deny.toml",
+        "deploy",
+        "device-bridge",
+        "docs",
+        "proto",
+        "rustfmt.toml",
+        "server",
+        "tests",
+    ];
+    let found: BTreeSet<String> =
+        tracked().iter().filter_map(|path| path.split('/').next().map(str::to_owned)).collect();
+    let strangers: Vec<_> = found.iter().filter(|name| !allowed.contains(&name.as_str())).collect();
+    assert!(strangers.is_empty(), "at the top level: {strangers:?}");
+}
+
 fn tracked() -> Vec<String> {
     let output = Command::new("git").arg("ls-files").current_dir(root()).output().unwrap();
     String::from_utf8(output.stdout).unwrap().lines().map(str::to_owned).collect()

@@ -51,6 +51,7 @@ fn measure(scene: &Scene, model: &Model) -> miette::Result<TimeNumbers> {
     let started = Instant::now();
     loop {
         run.tick();
+        run.refuse_quarantined()?;
         if started.elapsed() > BUDGET || run.state.time_s(model) >= scene.output.duration_s {
             return Ok(run.cost());
         }

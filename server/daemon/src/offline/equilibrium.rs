@@ -13,7 +13,7 @@ use glam::DVec3;
 use miette::Diagnostic;
 use palpate_physics::{
     Model, State,
-    contact::ToolTarget,
+    contact::{Coupling, ToolTarget},
     solve::{self, SolveError, StaticSettings, StaticSolution},
 };
 use palpate_scene::Scene;
@@ -25,7 +25,8 @@ use thiserror::Error;
 #[command(after_help = "Examples:\n  \
     palpated static cantilever                 where the beam comes to rest\n  \
     palpated static cantilever --out rest      and keep probes.csv, frames.pvd and summary.json\n  \
-    palpated static ventricle --at-s 0.5       as pressed half a second into the scene")]
+    palpated static lame-sphere --json         a sphere under pressure, for other programs\n\n\
+    Tools are held where their device is, without friction; a coupling's spring does not give.")]
 pub struct StaticArgs {
     /// Scene file or name of a built-in scene
     pub scene: String,
@@ -63,10 +64,20 @@ struct NoEquilibrium {
 pub fn run(args: &StaticArgs) -> miette::Result<ExitCode> {
     let scene = load::load_with_warnings(&args.scene)?;
     let model = load::build(&scene)?;
-    let out = args.out.as_deref().map(|out| folder::prepare(out, args.force)).transpose()?;
+    if let Some(out) = &args.out {
+        folder::check(out, args.force)?;
+    }
+    for tool in scene.model.tools.iter().filter(|tool| matches!(tool.coupling, Coupling::Spring { .. })) {
+        eprintln!(
+            "warning: tool \"{}\" is coupled by a spring; static holds it at its device's position, simulate does not",
+            tool.name
+        );
+    }
     let started = Instant::now();
     let goal = Goal::of(&scene, args.at_s);
     let solution = solve(&scene, &model, &goal, args.residual)?;
+    // Only now that there is something to replace them with do earlier results go.
+    let out = args.out.as_deref().map(|out| folder::prepare(out, args.force)).transpose()?;
     let state = state_of(&model, &goal, &solution);
     let mut rows = ProbeRows::new(&scene.probes, out.as_ref().map(|out| out.join(folder::PROBES)).as_deref())?;
     rows.sample(goal.time_s, &model, &state, &solution.node_reactions_n)?;

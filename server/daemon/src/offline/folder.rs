@@ -20,21 +20,33 @@ struct NotEmpty {
     example: String,
 }
 
+/// Refuses a folder that holds something, unless `force` is given; changes nothing.
+///
+/// # Errors
+/// It holds something and `force` is not given, or the system refuses.
+pub(super) fn check(folder: &Path, force: bool) -> miette::Result<()> {
+    if force || !folder.exists() {
+        return Ok(());
+    }
+    let refused = || format!("cannot read the output folder {}", folder.display());
+    match fs::read_dir(folder).into_diagnostic().wrap_err_with(refused)?.next() {
+        None => Ok(()),
+        Some(entry) => {
+            let example = entry.into_diagnostic().wrap_err_with(refused)?.file_name().to_string_lossy().into_owned();
+            Err(NotEmpty { folder: folder.display().to_string(), example }.into())
+        }
+    }
+}
+
 /// Prepares an output folder. With `force` the results of an earlier run are removed; other files are left alone.
 ///
 /// # Errors
 /// It holds something and `force` is not given, or the system refuses.
 pub(super) fn prepare(folder: &Path, force: bool) -> miette::Result<PathBuf> {
     let refused = || format!("cannot prepare the output folder {}", folder.display());
+    check(folder, force)?;
     fs::create_dir_all(folder).into_diagnostic().wrap_err_with(refused)?;
-    let first = fs::read_dir(folder).into_diagnostic().wrap_err_with(refused)?.next();
-    if let Some(entry) = first {
-        if !force {
-            let example = entry.into_diagnostic().wrap_err_with(refused)?.file_name().to_string_lossy().into_owned();
-            return Err(NotEmpty { folder: folder.display().to_string(), example }.into());
-        }
-        remove_results(folder).into_diagnostic().wrap_err_with(refused)?;
-    }
+    remove_results(folder).into_diagnostic().wrap_err_with(refused)?;
     Ok(folder.to_path_buf())
 }
 

@@ -102,14 +102,7 @@ pub fn run(args: &SimulateArgs) -> miette::Result<ExitCode> {
         summary.write(out)?;
     }
     summary.print(args.json, out.as_deref())?;
-    if let Some(quarantine) = run.state.quarantine {
-        return Err(miette::miette!(
-            help = "the step may be unstable: leave `numerics.substeps` out, raise `stretch_allowance`, or press less hard",
-            "the state became non-finite in tick {} at node {}; the run stopped there",
-            quarantine.tick,
-            quarantine.node
-        ));
-    }
+    run.refuse_quarantined()?;
     Ok(ExitCode::SUCCESS)
 }
 
@@ -133,12 +126,13 @@ impl Plan {
     fn new(scene: &Scene, model: &Model, args: &SimulateArgs) -> Self {
         let period_s = model.spec().settings.tick_period_s;
         let in_ticks = |time_s: f64| ((time_s / period_s).round() as u64).max(1);
+        let ticks = in_ticks(args.duration_s.unwrap_or(scene.output.duration_s));
         let frames = match args.frames {
             Some(FrameCount::None) => FrameRule::Never,
-            Some(FrameCount::Some(count)) => FrameRule::Count(u64::from(count)),
+            // There are no more states than ticks and the start.
+            Some(FrameCount::Some(count)) => FrameRule::Count(u64::from(count).min(ticks + 1)),
             None => FrameRule::Every(in_ticks(scene.output.frame_interval_s)),
         };
-        let ticks = in_ticks(args.duration_s.unwrap_or(scene.output.duration_s));
         Self { ticks, sample_every: in_ticks(scene.output.sample_interval_s), frames }
     }
 
@@ -146,7 +140,9 @@ impl Plan {
         match self.frames {
             FrameRule::Never => false,
             FrameRule::Every(ticks) => tick.is_multiple_of(ticks),
-            FrameRule::Count(count) => tick == written * self.ticks / (count - 1),
+            FrameRule::Count(count) => {
+                tick as u128 >= u128::from(written) * u128::from(self.ticks) / u128::from(count - 1)
+            }
         }
     }
 }
@@ -214,6 +210,16 @@ impl<'s> Run<'s> {
         }
         bar.finish();
         Ok(ended_by)
+    }
+
+    /// An error when a tick's result was refused.
+    pub(super) fn refuse_quarantined(&self) -> miette::Result<()> {
+        self.state.quarantine.map_or(Ok(()), |what| {
+            Err(miette::miette!(
+                help = "the step may be unstable: leave `numerics.substeps` out, raise `stretch_allowance`, or press less hard",
+                "{what}; the run stopped there"
+            ))
+        })
     }
 
     /// One tick: the inputs at its end, then the step, whose wall time is recorded.

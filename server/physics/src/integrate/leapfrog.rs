@@ -37,7 +37,7 @@ pub fn step(model: &Model, state: &mut State, scratch: &mut Scratch, input: &Tic
 }
 
 /// Puts back the last good tick, at rest: a velocity that led here would lead here again.
-fn quarantine(state: &mut State, scratch: &Scratch, node: u32) -> Quarantine {
+fn quarantine(state: &mut State, scratch: &mut Scratch, node: u32) -> Quarantine {
     let what = Quarantine { tick: state.tick, node };
     scratch.last_good.put_back(state);
     state.v.fill(DVec3::ZERO);
@@ -45,6 +45,7 @@ fn quarantine(state: &mut State, scratch: &Scratch, node: u32) -> Quarantine {
     state.external_n.fill(DVec3::ZERO);
     state.force_is_current = false;
     state.contact.clear();
+    scratch.reaction_n.fill(DVec3::ZERO);
     for tool in &mut state.tools {
         tool.let_go();
     }

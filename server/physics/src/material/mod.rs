@@ -88,6 +88,24 @@ impl Material {
         }
     }
 
+    /// How much the P-wave modulus grows when no principal stretch exceeds `s ≥ 1`: the largest `n·(δP N)` for
+    /// `δF = n Nᵀ`, unit `n` and `N`, over its rest value `λ + 2µ`.
+    /// ```text
+    /// St. Venant-Kirchhoff:  N·S N + (λ + 2µ) s²,  N·S N ≤ (3λ + 2µ)(s² − 1)/2     (equal stretch)
+    /// stable neo-Hookean:    µ + (λ + µ)|cof F N|²,  |cof F N| ≤ s²                (J is linear along n Nᵀ)
+    /// fixed corotated:       2µ + λ |cof F N|² at most
+    /// ```
+    /// The square of the largest natural frequency grows by about as much.
+    pub fn stiffening(&self, stretch: f64) -> f64 {
+        let (lambda, mu, s2) = (self.lame.lambda_pa.max(0.0), self.lame.mu_pa, stretch * stretch);
+        let modulus = match self.law {
+            Law::StVenantKirchhoff => (1.5 * lambda + mu) * (s2 - 1.0) + (lambda + 2.0 * mu) * s2,
+            Law::StableNeoHookean => mu + (lambda + mu) * s2 * s2,
+            Law::FixedCorotated => 2.0 * mu + lambda * s2 * s2,
+        };
+        modulus / (lambda + 2.0 * mu)
+    }
+
     /// Differential `δP = ∂P/∂F : δF` (Pa).
     pub fn piola_differential(&self, f: &DMat3, df: &DMat3) -> DMat3 {
         match self.law {
