@@ -152,23 +152,41 @@ async fn stopping_ramps_to_zero_says_goodbye_and_ends_cleanly() {
     let daemon = Daemon::on(block_scene("block", 3)).await;
     let mut arm = daemon.attach(hello()).await;
     arm.welcome().await;
-    arm.hold_until(pressing(), |command| force_of(command).z > 0.1).await;
+    // Until the ramp up is over and the body is at rest.
+    arm.hold_until(pressing(), |command| command.sample_sequence > 500).await;
     let reading = tokio::spawn(async move {
-        let mut last = None;
+        let mut forces = Vec::new();
         let mut goodbye = None;
+        // Samples go on: it is the order, not silence, that ramps.
         while let Some(message) = arm.next().await.expect("the stream ends without an error") {
             match message {
-                Message::Command(command) => last = Some(command),
+                Message::Command(command) => {
+                    assert!(goodbye.is_none(), "nothing follows the goodbye");
+                    forces.push(force_of(&command));
+                    arm.sequence += 1;
+                    let next = device_up::Message::Sample(sample(arm.sequence, pressing()));
+                    let _ = arm.up.try_send(v1::DeviceUp { message: Some(next) });
+                }
                 Message::Fault(fault) => goodbye = Some(fault),
                 Message::Welcome(_) => panic!("a second welcome"),
             }
         }
-        (last, goodbye)
+        (forces, goodbye)
     });
+    tokio::time::sleep(std::time::Duration::from_millis(50)).await;
     let daemon_state = std::sync::Arc::clone(&daemon.running.as_ref().unwrap().daemon);
     let summary = daemon.finish().await;
-    let (_, goodbye) = reading.await.unwrap();
-    assert_eq!(goodbye.unwrap().code(), DeviceFaultCode::Detached);
+    let (forces, goodbye) = reading.await.unwrap();
+    let goodbye = goodbye.unwrap();
+    assert_eq!(goodbye.code(), DeviceFaultCode::Detached);
+    assert!(goodbye.message.contains("ramped to zero"), "{}", goodbye.message);
+    let forces: Vec<f64> = forces.iter().map(|force| force.length()).collect();
+    assert_eq!(forces.last(), Some(&0.0), "zero is sent, not only claimed");
+    let full = forces[0];
+    let last_full = forces.iter().rposition(|force| *force > 0.97 * full).unwrap();
+    let ramp = &forces[last_full..];
+    assert!(full > 0.1 && ramp.len() > 4, "a ramp, not a step: {ramp:?}");
+    assert!(ramp.windows(2).all(|pair| pair[1] <= pair[0]), "{ramp:?}");
     assert!(daemon_state.sign.is_released());
     assert!(!summary.cut, "every stream ended by itself");
 }

@@ -11,13 +11,14 @@ use crate::{
     sim::exchange::{DeviceInput, ToolEnd, ToolOutput},
 };
 use futures_util::{Stream, stream};
+use glam::DVec3;
 use palpate_physics::contact::Coupling;
 use palpate_proto::v1::{self, DeviceFaultCode, device_down::Message, device_server::Device};
 use std::{pin::Pin, sync::Arc, time::Duration};
 use tokio::{
     sync::mpsc,
     task::JoinHandle,
-    time::{Instant, timeout},
+    time::{Instant, timeout, timeout_at},
 };
 use tokio_util::sync::CancellationToken;
 use tonic::{Request, Response, Status, Streaming};
@@ -82,7 +83,21 @@ struct Attachment {
     over: CancellationToken,
     faults: mpsc::Receiver<v1::DeviceFault>,
     told: Told,
-    ending: bool,
+    /// Force of the last command (N).
+    sent_n: DVec3,
+    stage: Stage,
+}
+
+/// How far an attachment is.
+#[derive(Debug, Clone, Copy)]
+enum Stage {
+    Live,
+    /// The daemon ends it: commands go on until one carries zero force.
+    Releasing {
+        why: &'static str,
+        until: Instant,
+    },
+    Ended,
 }
 
 /// What the device was told already.
@@ -148,28 +163,53 @@ impl Attachment {
         };
         let uplink = Some(tokio::spawn(uplink.run(over.clone().drop_guard())));
         let end = Some(ToolEnd { samples: placeholder, outputs, ear, shared });
-        Self { daemon, session, tool, number, record, end, uplink, over, faults, told: Told::default(), ending: false }
+        Self {
+            daemon,
+            session,
+            tool,
+            number,
+            record,
+            end,
+            uplink,
+            over,
+            faults,
+            told: Told::default(),
+            sent_n: DVec3::ZERO,
+            stage: Stage::Live,
+        }
     }
 
     /// The next message, `None` when the device has gone.
     async fn next(&mut self) -> Option<Result<Message, Status>> {
-        if self.ending {
-            return None;
+        if let Stage::Live = self.stage {
+            let why = match self.next_of_live().await {
+                Live::Message(message) => return Some(Ok(message)),
+                Live::WayUpEnded => return self.how_the_way_up_ended().await,
+                Live::Over(why) => why,
+            };
+            self.stage = Stage::Releasing { why, until: Instant::now() + RELEASE_WITHIN };
         }
+        match self.stage {
+            Stage::Releasing { why, until } => Some(Ok(self.release(why, until).await)),
+            Stage::Live | Stage::Ended => None,
+        }
+    }
+
+    async fn next_of_live(&mut self) -> Live {
         let (stop, replaced) = (self.daemon.stop.clone(), self.session.ended.clone());
         let over = self.over.clone();
         loop {
-            let end = self.end.as_mut()?;
+            let Some(end) = self.end.as_mut() else { return Live::WayUpEnded };
             tokio::select! {
                 biased;
-                () = stop.cancelled() => return Some(Ok(self.detach("the daemon is shutting down").await)),
-                () = replaced.cancelled() => return Some(Ok(self.detach("another scene was loaded: attach again").await)),
-                () = over.cancelled() => return self.how_the_way_up_ended().await,
-                fault = self.faults.recv() => if let Some(fault) = fault { return Some(Ok(Message::Fault(fault))) },
-                rung = end.ear.rung() => rung.ok()?,
+                () = stop.cancelled() => return Live::Over("the daemon is shutting down"),
+                () = replaced.cancelled() => return Live::Over("another scene was loaded: attach again"),
+                () = over.cancelled() => return Live::WayUpEnded,
+                fault = self.faults.recv() => if let Some(fault) = fault { return Live::Message(Message::Fault(fault)) },
+                rung = end.ear.rung() => if rung.is_err() { return Live::Over("the simulation loop cannot be heard") },
             }
             if let Some(message) = self.newest() {
-                return Some(Ok(message));
+                return Live::Message(message);
             }
         }
     }
@@ -185,36 +225,69 @@ impl Attachment {
         if let Some(fault) = self.told.news(&output) {
             return Some(Message::Fault(fault));
         }
-        self.record.sent_force_n(output.force_n.length());
-        Some(Message::Command(convert::device_command(&output)))
+        Some(self.command(&output))
     }
 
-    /// Waits until the force is zero, then says goodbye.
-    async fn detach(&mut self, why: &str) -> Message {
-        self.ending = true;
-        let released = async {
-            while let Some(end) = self.end.as_mut() {
-                end.outputs.update();
-                if self.session.ended.is_cancelled() || end.outputs.output_buffer().force_n == glam::DVec3::ZERO {
-                    return;
-                }
-                if end.ear.rung().await.is_err() {
-                    return;
-                }
+    fn command(&mut self, output: &ToolOutput) -> Message {
+        self.sent_n = output.force_n;
+        self.record.sent_force_n(output.force_n.length());
+        Message::Command(convert::device_command(output))
+    }
+
+    /// The next command on the way to zero force; once zero was sent, or time is up, the goodbye.
+    async fn release(&mut self, why: &str, until: Instant) -> Message {
+        loop {
+            if let Some(output) = self.unsent() {
+                return self.command(&output);
             }
-        };
-        let _ = timeout(RELEASE_WITHIN, released).await;
-        Message::Fault(fault(DeviceFaultCode::Detached, format!("{why}; the force has been ramped to zero"), 1))
+            if self.sent_n == DVec3::ZERO {
+                break;
+            }
+            let rung = async {
+                match self.end.as_mut() {
+                    Some(end) => end.ear.rung().await.is_ok(),
+                    None => false,
+                }
+            };
+            if !matches!(timeout_at(until, rung).await, Ok(true)) {
+                // The last output may have come without a ring that was heard.
+                if let Some(output) = self.unsent() {
+                    return self.command(&output);
+                }
+                break;
+            }
+        }
+        self.stage = Stage::Ended;
+        Message::Fault(fault(DeviceFaultCode::Detached, farewell(why, self.sent_n), 1))
+    }
+
+    /// An output that was not sent yet.
+    fn unsent(&mut self) -> Option<ToolOutput> {
+        let (number, sent_n) = (self.number, self.sent_n);
+        let end = self.end.as_mut()?;
+        let fresh = end.outputs.update();
+        let output = *end.outputs.output_buffer();
+        // Before the first sample of this attachment the slot may hold another's.
+        (output.attachment == number && (fresh || output.force_n != sent_n)).then_some(output)
     }
 
     async fn how_the_way_up_ended(&mut self) -> Option<Result<Message, Status>> {
-        self.ending = true;
+        self.stage = Stage::Ended;
         let (samples, ended) = self.uplink.take()?.await.ok()?;
         if let Some(end) = self.end.take() {
             self.session.tools[self.tool].give_back(ToolEnd { samples, ..end });
         }
         ended.err().map(Err)
     }
+}
+
+/// What a live attachment comes to.
+enum Live {
+    Message(Message),
+    /// The device ended it.
+    WayUpEnded,
+    /// The daemon ends it, and why.
+    Over(&'static str),
 }
 
 impl Drop for Attachment {
@@ -266,6 +339,16 @@ impl Told {
         self.counts[which] += 1;
         fault(code, message, self.counts[which])
     }
+}
+
+fn farewell(why: &str, sent_n: DVec3) -> String {
+    if sent_n == DVec3::ZERO {
+        return format!("{why}; the force has been ramped to zero");
+    }
+    let (force_n, within_s) = (sent_n.length(), RELEASE_WITHIN.as_secs_f64());
+    format!(
+        "{why}; the force did not reach zero within {within_s} s (last sent: {force_n:.3} N): ramp it down yourself"
+    )
 }
 
 fn fault(code: DeviceFaultCode, message: String, count: u64) -> v1::DeviceFault {
