@@ -220,3 +220,40 @@ async fn a_quarantined_body_is_told_and_reset_brings_it_back() {
     again.hold_until(pressing(), |command| force_of(command).z > 0.1).await;
     daemon.finish().await;
 }
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_tool_is_free_again_however_abruptly_devices_go() {
+    let daemon = Daemon::on(block_scene("block", 2)).await;
+    for round in 0..200_u32 {
+        let mut arm = daemon.attach(hello()).await;
+        // Some go before the welcome, some after, some close one way first, some speak while they go.
+        if round % 4 != 0 {
+            let _ = arm.next().await;
+        }
+        let Arm { up, down, .. } = arm;
+        match round % 3 {
+            0 => drop((up, down)),
+            1 => {
+                drop(up);
+                tokio::time::sleep(std::time::Duration::from_micros(u64::from(round) * 5)).await;
+                drop(down);
+            }
+            _ => {
+                let _ = up.try_send(v1::DeviceUp { message: Some(device_up::Message::Sample(sample(1, above()))) });
+                drop(down);
+            }
+        }
+    }
+    let until = tokio::time::Instant::now() + common::PATIENCE;
+    loop {
+        let mut arm = daemon.attach(hello()).await;
+        match arm.next().await {
+            Ok(Some(Message::Welcome(_))) => break,
+            Err(status) => assert_eq!(status.code(), Code::AlreadyExists),
+            other => panic!("{other:?}"),
+        }
+        assert!(tokio::time::Instant::now() < until, "the tool is lost");
+        tokio::time::sleep(std::time::Duration::from_millis(10)).await;
+    }
+    daemon.finish().await;
+}

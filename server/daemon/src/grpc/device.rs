@@ -4,7 +4,7 @@
 //! few faults.
 use super::{
     convert,
-    uplink::{Ended, FAULTS_WAITING, Uplink},
+    uplink::{Ended, FAULTS_WAITING, Lent, Uplink},
 };
 use crate::{
     session::{ActiveSession, Daemon, DeviceRecord, ToolSeat},
@@ -16,7 +16,7 @@ use palpate_physics::contact::Coupling;
 use palpate_proto::v1::{self, DeviceFaultCode, device_down::Message, device_server::Device};
 use std::{pin::Pin, sync::Arc, time::Duration};
 use tokio::{
-    sync::mpsc,
+    sync::{mpsc, oneshot},
     task::JoinHandle,
     time::{Instant, timeout, timeout_at},
 };
@@ -79,7 +79,9 @@ struct Attachment {
     record: Arc<DeviceRecord>,
     /// Everything of the tool but the sample slot, which the way up has.
     end: Option<ToolEnd>,
-    uplink: Option<JoinHandle<(Input<Option<DeviceInput>>, Ended)>>,
+    uplink: JoinHandle<Ended>,
+    /// Comes when the way up has ended.
+    samples: Option<oneshot::Receiver<Input<Option<DeviceInput>>>>,
     over: CancellationToken,
     faults: mpsc::Receiver<v1::DeviceFault>,
     told: Told,
@@ -152,16 +154,17 @@ impl Attachment {
         // The way up has the real slot; what stands in its place is never read.
         let ToolEnd { samples, outputs, ear, shared } = end;
         let (placeholder, _) = triple_buffer::triple_buffer(&None);
+        let (lent, samples) = Lent::new(samples);
         let uplink = Uplink {
             messages,
-            samples,
+            samples: lent,
             attachment: number,
             record: Arc::clone(&record),
             daemon: Arc::clone(&daemon),
             faults: fault_in,
             over: over.clone(),
         };
-        let uplink = Some(tokio::spawn(uplink.run(over.clone().drop_guard())));
+        let uplink = tokio::spawn(uplink.run(over.clone().drop_guard()));
         let end = Some(ToolEnd { samples: placeholder, outputs, ear, shared });
         Self {
             daemon,
@@ -171,6 +174,7 @@ impl Attachment {
             record,
             end,
             uplink,
+            samples: Some(samples),
             over,
             faults,
             told: Told::default(),
@@ -273,10 +277,8 @@ impl Attachment {
 
     async fn how_the_way_up_ended(&mut self) -> Option<Result<Message, Status>> {
         self.stage = Stage::Ended;
-        let (samples, ended) = self.uplink.take()?.await.ok()?;
-        if let Some(end) = self.end.take() {
-            self.session.tools[self.tool].give_back(ToolEnd { samples, ..end });
-        }
+        // By reference: a stream that is dropped here still gives its tool back.
+        let ended = (&mut self.uplink).await.unwrap_or_else(|_| Err(Status::internal("reading samples failed")));
         ended.err().map(Err)
     }
 }
@@ -294,12 +296,12 @@ impl Drop for Attachment {
     fn drop(&mut self) {
         self.over.cancel();
         tracing::info!(device = self.record.name, tool = self.session.tools[self.tool].name, "device detached");
-        let (Some(end), Some(uplink)) = (self.end.take(), self.uplink.take()) else { return };
+        let (Some(end), Some(samples)) = (self.end.take(), self.samples.take()) else { return };
         end.shared.detach();
         let (session, tool) = (Arc::clone(&self.session), self.tool);
         // The slot is with the way up, which ends now.
         tokio::spawn(async move {
-            if let Ok((samples, _)) = uplink.await {
+            if let Ok(samples) = samples.await {
                 session.tools[tool].give_back(ToolEnd { samples, ..end });
             }
         });

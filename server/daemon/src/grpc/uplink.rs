@@ -10,7 +10,7 @@ use std::{
     collections::BTreeMap,
     sync::{Arc, atomic::Ordering},
 };
-use tokio::sync::mpsc;
+use tokio::sync::{mpsc, oneshot};
 use tokio_util::sync::{CancellationToken, DropGuard};
 use tonic::{Status, Streaming};
 use triple_buffer::Input;
@@ -18,13 +18,43 @@ use triple_buffer::Input;
 /// Faults that may wait for the way down; beyond it they are only counted.
 pub const FAULTS_WAITING: usize = 16;
 
+/// The loop's slot for samples. It finds its way back however the way up ends, by a panic too: without it no other device could
+/// take the tool.
+#[derive(Debug)]
+pub struct Lent {
+    slot: Option<Input<Option<DeviceInput>>>,
+    back: Option<oneshot::Sender<Input<Option<DeviceInput>>>>,
+}
+
+impl Lent {
+    /// The slot, and where it comes back.
+    pub fn new(slot: Input<Option<DeviceInput>>) -> (Self, oneshot::Receiver<Input<Option<DeviceInput>>>) {
+        let (back, returned) = oneshot::channel();
+        (Self { slot: Some(slot), back: Some(back) }, returned)
+    }
+
+    fn write(&mut self, input: DeviceInput) {
+        if let Some(slot) = &mut self.slot {
+            slot.write(Some(input));
+        }
+    }
+}
+
+impl Drop for Lent {
+    fn drop(&mut self) {
+        if let (Some(slot), Some(back)) = (self.slot.take(), self.back.take()) {
+            let _ = back.send(slot);
+        }
+    }
+}
+
 /// The way up of one attachment.
 #[derive(Debug)]
 pub struct Uplink {
     /// Messages of the device.
     pub messages: Streaming<v1::DeviceUp>,
     /// Slot of the loop.
-    pub samples: Input<Option<DeviceInput>>,
+    pub samples: Lent,
     /// Attachment.
     pub attachment: u64,
     /// What status shows.
@@ -41,20 +71,20 @@ pub struct Uplink {
 pub type Ended = Result<(), Status>;
 
 impl Uplink {
-    /// Reads until the device, or the way down, ends. Returns the slot for the next device.
-    pub async fn run(mut self, _ends_the_way_down: DropGuard) -> (Input<Option<DeviceInput>>, Ended) {
+    /// Reads until the device, or the way down, ends. The slot goes back then.
+    pub async fn run(mut self, _ends_the_way_down: DropGuard) -> Ended {
         let mut last_sequence = None;
         let mut counts: BTreeMap<i32, u64> = BTreeMap::new();
         let over = self.over.clone();
         loop {
             let message = tokio::select! {
-                () = over.cancelled() => return (self.samples, Ok(())),
+                () = over.cancelled() => return Ok(()),
                 message = self.messages.message() => message,
             };
             let up = match message {
                 Ok(Some(up)) => up,
-                Ok(None) => return (self.samples, Ok(())),
-                Err(status) => return (self.samples, Err(status)),
+                Ok(None) => return Ok(()),
+                Err(status) => return Err(status),
             };
             if let Err((sequence, rejected)) = self.take(&up, &mut last_sequence) {
                 self.report(sequence, rejected, &mut counts);
@@ -73,7 +103,7 @@ impl Uplink {
         let input = convert::device_sample(sample, *last_sequence, self.attachment, arrived_ns)
             .map_err(|rejected| (sample.sequence, rejected))?;
         *last_sequence = Some(input.sequence);
-        self.samples.write(Some(input));
+        self.samples.write(input);
         self.record.accepted.fetch_add(1, Ordering::Relaxed);
         self.record.newest_ns.store(arrived_ns, Ordering::Relaxed);
         Ok(())
