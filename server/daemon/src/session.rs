@@ -321,17 +321,8 @@ impl Daemon {
     pub async fn replace(&self, prepared: Prepared) -> Result<Arc<ActiveSession>, Refusal> {
         let Prepared { simulation, session, surface } = prepared;
         let old = self.session();
-        let (_, before) = self.orders.give(old.number, Request::Pause(true), false).await?;
-        let ramp = Duration::from_secs_f64(self.settings.limits.watchdog.ramp_to_zero_s);
-        tokio::time::sleep(ramp + Duration::from_millis(5)).await;
-        let loaded = self.orders.give(old.number, Request::Load(simulation), false).await;
-        let (old_simulation, _) = match loaded {
-            Ok(back) => back,
-            Err(refusal) => {
-                let _ = self.orders.give(old.number, Request::Pause(before.was_paused), false).await;
-                return Err(refusal);
-            }
-        };
+        // However long the release takes: a caller that gave up would not know which session runs.
+        let (old_simulation, _) = self.orders.give(old.number, Request::Load(simulation), true).await?;
         *self.current.write().unwrap_or_else(PoisonError::into_inner) = Arc::clone(&session);
         old.ended.cancel();
         self.show(&session, surface);

@@ -20,7 +20,8 @@ const PATIENCE: Duration = Duration::from_secs(5);
 /// What the loop shall do.
 #[derive(Debug)]
 pub enum Request {
-    /// Take another session; comes back with the old one.
+    /// Take another session; comes back with the old one. This, [`Request::Reset`] and [`Request::Restore`] wait until the
+    /// force of every device has ramped to zero.
     Load(Box<Simulation>),
     /// Back to rest at tick 0.
     Reset,
@@ -54,8 +55,6 @@ pub struct Done {
     pub time_s: f64,
     /// Whether time stands.
     pub paused: bool,
-    /// Whether it stood before.
-    pub was_paused: bool,
     /// After [`Request::Inject`]: first tick one of them acts in.
     pub first_tick: u64,
     /// Injected forces waiting or acting.

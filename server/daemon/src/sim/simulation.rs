@@ -118,6 +118,11 @@ impl Simulation {
         self.tools.iter().all(|tool| tool.force_n() == DVec3::ZERO)
     }
 
+    /// Whether no device has a force.
+    pub fn are_devices_released(&self) -> bool {
+        self.tools.iter().all(|tool| !tool.is_attached() || tool.force_n() == DVec3::ZERO)
+    }
+
     /// Back to rest at tick 0. Does not allocate.
     pub fn reset(&mut self) {
         self.state.reset(&self.model);

@@ -50,6 +50,8 @@ pub struct Loop {
     deadlines: Deadlines,
     paused: bool,
     stepping: Option<(Command, u32)>,
+    /// An order that puts the body elsewhere, until devices are released, and since when (ns).
+    waiting: Option<(Command, u64)>,
 }
 
 impl Loop {
@@ -65,7 +67,7 @@ impl Loop {
         clock: Clock,
     ) -> Result<Self, PeriodError> {
         let deadlines = Deadlines::new(clock.clone(), simulation.period_s())?;
-        Ok(Self { simulation, desk, sign, timing, clock, deadlines, paused: false, stepping: None })
+        Ok(Self { simulation, desk, sign, timing, clock, deadlines, paused: false, stepping: None, waiting: None })
     }
 
     /// Runs until the sign is raised and forces are zero.
@@ -83,6 +85,8 @@ impl Loop {
                 if self.release(since_ns) {
                     return;
                 }
+            } else if self.waiting.is_some() {
+                self.tick(Plan { advance: !self.paused, order: Order::Hold });
             } else if self.stepping.is_some() {
                 self.work_on_steps();
             } else {
@@ -99,6 +103,9 @@ impl Loop {
     /// Ticks with forces going to zero; true when the loop may end.
     fn release(&mut self, since_ns: u64) -> bool {
         if let Some((command, _)) = self.stepping.take() {
+            self.desk.finish(command, Err(Refusal::Stopping));
+        }
+        if let Some((command, _)) = self.waiting.take() {
             self.desk.finish(command, Err(Refusal::Stopping));
         }
         self.tick(Plan { advance: !self.paused, order: Order::Release });
@@ -128,28 +135,48 @@ impl Loop {
         }
     }
 
+    /// Orders are taken one after the other: what follows one that waits, waits as well.
     fn take_orders(&mut self) {
-        while let Some(mut command) = self.desk.next_order() {
+        while self.obey_waiting() {
+            let Some(mut command) = self.desk.next_order() else { return };
             if command.session != self.simulation.session {
                 self.desk.finish(command, Err(Refusal::OtherSession));
                 continue;
             }
-            if let Request::Step(ticks) = command.request {
-                match (self.paused, &self.stepping) {
-                    (false, _) => self.desk.finish(command, Err(Refusal::NotPaused)),
-                    (true, Some(_)) => self.desk.finish(command, Err(Refusal::Stepping)),
-                    (true, None) => self.stepping = Some((command, ticks)),
+            match &command.request {
+                Request::Step(ticks) => {
+                    let ticks = *ticks;
+                    match (self.paused, &self.stepping) {
+                        (false, _) => self.desk.finish(command, Err(Refusal::NotPaused)),
+                        (true, Some(_)) => self.desk.finish(command, Err(Refusal::Stepping)),
+                        (true, None) => self.stepping = Some((command, ticks)),
+                    }
                 }
-                continue;
+                Request::Load(_) | Request::Reset | Request::Restore(_) => {
+                    self.waiting = Some((command, self.clock.now_ns()));
+                }
+                Request::Pause(_) | Request::Copy(_) | Request::Inject(_) => {
+                    let outcome = self.obey(&mut command.request);
+                    self.desk.finish(command, outcome);
+                }
             }
-            let outcome = self.obey(&mut command.request);
-            self.desk.finish(command, outcome);
         }
+    }
+
+    /// Obeys the order that waits, if devices are released; true when none waits any more.
+    fn obey_waiting(&mut self) -> bool {
+        let Some((mut command, since_ns)) = self.waiting.take() else { return true };
+        if !self.simulation.are_devices_released() && self.clock.now_ns() - since_ns <= LONGEST_RELEASE_NS {
+            self.waiting = Some((command, since_ns));
+            return false;
+        }
+        let outcome = self.obey(&mut command.request);
+        self.desk.finish(command, outcome);
+        true
     }
 
     fn obey(&mut self, request: &mut Request) -> Result<Done, Refusal> {
         let mut first_tick = 0;
-        let was_paused = self.paused;
         match request {
             Request::Load(simulation) => {
                 self.interrupt_steps();
@@ -183,7 +210,7 @@ impl Loop {
                 first_tick = self.simulation.inject(forces, next_tick).map_err(Refusal::Inject)?;
             }
         }
-        Ok(Done { was_paused, first_tick, ..self.done() })
+        Ok(Done { first_tick, ..self.done() })
     }
 
     fn interrupt_steps(&mut self) {
@@ -206,7 +233,6 @@ impl Loop {
             tick: state.tick,
             time_s: state.time_s(&self.simulation.model),
             paused: self.paused,
-            was_paused: self.paused,
             first_tick: 0,
             pending: self.simulation.injections.pending(),
         }

@@ -43,6 +43,8 @@ pub struct ToolLoop {
     watchdog: Watchdog,
     /// Factor of the force by order, 0 to 1.
     level: f64,
+    /// When that was last changed (loop clock, ns).
+    levelled_ns: Option<u64>,
     attachment: u64,
     newest: Option<DeviceInput>,
     stale: bool,
@@ -61,6 +63,7 @@ impl ToolLoop {
             limiter: ForceLimiter::new(limits.force),
             watchdog: Watchdog::new(limits.watchdog),
             level: 1.0,
+            levelled_ns: None,
             attachment: 0,
             newest: None,
             stale: false,
@@ -140,8 +143,7 @@ impl ToolLoop {
             Order::Release => true,
         };
         let release = ordered || quarantined.is_some();
-        let step = frame.period_s / self.limits.watchdog.ramp_to_zero_s;
-        self.level = if release { (self.level - step).max(0.0) } else { (self.level + step).min(1.0) };
+        self.ramp(release, frame);
         if quarantined.is_none() {
             self.raw_n = tool.device_force_n;
         }
@@ -160,6 +162,20 @@ impl ToolLoop {
             limited: limited.saturated || limited.rate_limited || limited.non_finite,
             quarantined,
         };
+    }
+
+    /// Down in `ramp_to_zero_s` of the clock, however long ticks take; up in `ramp_up_s`, and never faster than ticks go.
+    fn ramp(&mut self, release: bool, frame: &Moment) {
+        let since_s = self.levelled_ns.map_or(frame.period_s, |last| frame.now_ns.saturating_sub(last) as f64 * 1e-9);
+        self.levelled_ns = Some(frame.now_ns);
+        let times = self.limits.watchdog;
+        if release {
+            self.level = (self.level - since_s / times.ramp_to_zero_s).max(0.0);
+        } else if times.ramp_up_s > 0.0 {
+            self.level = (self.level + since_s.min(frame.period_s) / times.ramp_up_s).min(1.0);
+        } else {
+            self.level = 1.0;
+        }
     }
 
     /// Hands the output to the device, if there is one.

@@ -1,0 +1,117 @@
+//! Whatever is ordered, the force on an arm neither jumps nor takes longer to vanish than it may. A clock by hand.
+#![allow(clippy::unwrap_used, clippy::expect_used)]
+mod common;
+use common::{above, block_scene, pressing};
+use glam::DVec3;
+use palpate_physics::Model;
+use palpate_realtime::{Clock, ManualClock};
+use palpated::{
+    serve::config::default_limits,
+    sim::{
+        exchange::{DeviceInput, ToolOutput},
+        simulation::{Ends, Parts, Simulation},
+        tick::Plan,
+        timing::Timing,
+        tool::Order,
+    },
+    stream::hub::Demand,
+};
+use std::sync::Arc;
+
+const RUN: Plan = Plan { advance: true, order: Order::Render };
+const PAUSED: Plan = Plan { advance: false, order: Order::Hold };
+
+struct Bench {
+    simulation: Box<Simulation>,
+    ends: Ends,
+    clock: Clock,
+    time: Arc<ManualClock>,
+    timing: Timing,
+    sequence: u64,
+}
+
+impl Bench {
+    fn new() -> Self {
+        let scene = block_scene("block", 3);
+        let (simulation, ends) = Simulation::build(Parts {
+            session: 1,
+            model: Arc::new(Model::build(scene.model).unwrap()),
+            timeline: scene.timeline,
+            drivers: scene.drivers,
+            arm: None,
+            limits: default_limits(),
+            demand: Arc::new(Demand::default()),
+        })
+        .unwrap();
+        let (clock, time) = Clock::manual();
+        time.advance(1_000_000_000);
+        ends.tools[0].shared.attach(7, 3.0);
+        Self { simulation, ends, clock, time, timing: Timing::default(), sequence: 0 }
+    }
+
+    /// A tick that took `took_ms`, with a fresh sample.
+    fn tick(&mut self, plan: Plan, position_m: DVec3, took_ms: u64) -> ToolOutput {
+        self.time.advance(took_ms * 1_000_000);
+        self.sequence += 1;
+        self.ends.tools[0].samples.write(Some(DeviceInput {
+            attachment: 7,
+            sequence: self.sequence,
+            device_time_ns: 0,
+            arrived_ns: self.clock.now_ns(),
+            position_m,
+            velocity_m_per_s: DVec3::ZERO,
+            buttons: 0,
+        }));
+        self.simulation.tick(plan, &self.clock, &self.timing);
+        self.ends.tools[0].outputs.update();
+        *self.ends.tools[0].outputs.output_buffer()
+    }
+
+    /// Pressed, at rest, at full force (N).
+    fn pressed() -> (Self, f64) {
+        let mut bench = Self::new();
+        for _ in 0..300 {
+            bench.tick(RUN, above(), 1);
+        }
+        let mut force_n = DVec3::ZERO;
+        for _ in 0..600 {
+            force_n = bench.tick(RUN, pressing(), 1).force_n;
+        }
+        assert!(force_n.z > 0.1, "it presses: {force_n}");
+        (bench, force_n.length())
+    }
+}
+
+#[tokio::test]
+async fn after_a_pause_the_force_comes_back_as_slowly_as_after_attaching() {
+    let (mut bench, full_n) = Bench::pressed();
+    let limits = default_limits();
+    let mut last_n = full_n;
+    for _ in 0..16 {
+        let now_n = bench.tick(PAUSED, pressing(), 1).force_n.length();
+        let most_n = full_n * 1e-3 / limits.watchdog.ramp_to_zero_s;
+        assert!(last_n - now_n <= 1.01 * most_n && now_n <= last_n, "{last_n} N to {now_n} N");
+        last_n = now_n;
+    }
+    assert_eq!(last_n, 0.0, "zero within ramp_to_zero_s");
+    let most_n = 1.5 * full_n * 1e-3 / limits.watchdog.ramp_up_s;
+    for _ in 0..400 {
+        let now_n = bench.tick(RUN, pressing(), 1).force_n.length();
+        assert!((now_n - last_n).abs() <= most_n, "{last_n} N to {now_n} N in a tick; at most {most_n} N");
+        last_n = now_n;
+    }
+    assert!(last_n > 0.9 * full_n, "and it comes back: {last_n} N of {full_n} N");
+}
+
+#[tokio::test]
+async fn a_slow_body_is_released_as_fast_as_a_quick_one() {
+    let (mut bench, full_n) = Bench::pressed();
+    // Ticks of 5 ms of the clock: three make the 15 ms.
+    let mut forces_n = Vec::new();
+    for _ in 0..4 {
+        forces_n.push(bench.tick(Plan { advance: true, order: Order::Release }, pressing(), 5).force_n.length());
+    }
+    assert!(forces_n[0] > 0.0 && forces_n[0] < full_n, "{forces_n:?}");
+    assert_eq!(forces_n[3], 0.0, "{forces_n:?}");
+    assert!(bench.simulation.is_released());
+}
