@@ -195,7 +195,7 @@ pub struct Daemon {
     pub samples_rejected: AtomicU64,
     pub(crate) current: RwLock<Arc<ActiveSession>>,
     pub(crate) numbers: Numbers,
-    pub(crate) loading: tokio::sync::Mutex<()>,
+    pub(crate) loading: Arc<tokio::sync::Mutex<()>>,
 }
 
 /// Counters that name things.

@@ -147,6 +147,49 @@ async fn silence_ramps_the_force_to_zero_and_samples_bring_it_back() {
     daemon.finish().await;
 }
 
+/// From the first force, held for a while, to zero in steps.
+fn assert_ramps_to_zero(forces: &[DVec3]) {
+    let forces: Vec<f64> = forces.iter().map(|force| force.length()).collect();
+    assert_eq!(forces.last(), Some(&0.0), "zero is sent, not only claimed");
+    let full = forces[0];
+    let last_full = forces.iter().rposition(|force| *force > 0.97 * full).unwrap();
+    let ramp = &forces[last_full..];
+    assert!(full > 0.1 && ramp.len() > 4, "a ramp, not a step: {ramp:?}");
+    assert!(ramp.windows(2).all(|pair| pair[1] <= pair[0]), "{ramp:?}");
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn reset_and_restore_wait_until_the_force_has_ramped_to_zero() {
+    let daemon = Daemon::on(block_scene("block", 3)).await;
+    let mut arm = daemon.attach(hello()).await;
+    arm.welcome().await;
+    let state = daemon.snapshot().await.state;
+    for restore in [false, true] {
+        let lifted_from = arm.sequence;
+        arm.hold_until(above(), |command| command.sample_sequence > lifted_from + 300).await;
+        let pressed_from = arm.sequence;
+        arm.hold_until(pressing(), |command| command.sample_sequence > pressed_from + 500).await;
+        let mut session = daemon.session();
+        let state = state.clone();
+        let order = tokio::spawn(async move {
+            if restore {
+                session.restore(v1::RestoreRequest { state, ..Default::default() }).await.unwrap();
+            } else {
+                session.reset(v1::ResetRequest::default()).await.unwrap();
+            }
+        });
+        let mut forces = Vec::new();
+        arm.hold_until(pressing(), |command| {
+            forces.push(force_of(command));
+            force_of(command) == DVec3::ZERO
+        })
+        .await;
+        assert_ramps_to_zero(&forces);
+        order.await.unwrap();
+    }
+    daemon.finish().await;
+}
+
 #[tokio::test(flavor = "multi_thread")]
 async fn stopping_ramps_to_zero_says_goodbye_and_ends_cleanly() {
     let daemon = Daemon::on(block_scene("block", 3)).await;
@@ -180,13 +223,7 @@ async fn stopping_ramps_to_zero_says_goodbye_and_ends_cleanly() {
     let goodbye = goodbye.unwrap();
     assert_eq!(goodbye.code(), DeviceFaultCode::Detached);
     assert!(goodbye.message.contains("ramped to zero"), "{}", goodbye.message);
-    let forces: Vec<f64> = forces.iter().map(|force| force.length()).collect();
-    assert_eq!(forces.last(), Some(&0.0), "zero is sent, not only claimed");
-    let full = forces[0];
-    let last_full = forces.iter().rposition(|force| *force > 0.97 * full).unwrap();
-    let ramp = &forces[last_full..];
-    assert!(full > 0.1 && ramp.len() > 4, "a ramp, not a step: {ramp:?}");
-    assert!(ramp.windows(2).all(|pair| pair[1] <= pair[0]), "{ramp:?}");
+    assert_ramps_to_zero(&forces);
     assert!(daemon_state.sign.is_released());
     assert!(!summary.cut, "every stream ended by itself");
 }

@@ -136,3 +136,21 @@ async fn a_browser_gets_the_page_and_grpc_web_on_the_same_port() {
     assert_eq!(scene_name(daemon.channel.clone()).await, "block");
     daemon.finish().await;
 }
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_loop_that_ends_by_itself_ends_the_daemon_as_a_failure() {
+    let daemon = Daemon::on(block_scene("block", 2)).await;
+    let mut health = HealthClient::new(daemon.channel.clone());
+    let mut watch = health.watch(HealthCheckRequest::default()).await.unwrap().into_inner();
+    assert_eq!(watch.message().await.unwrap().unwrap().status, 1, "SERVING");
+    // Nobody told the daemon to stop: only its loop ends.
+    let Daemon { running, stop, .. } = daemon;
+    let running = running.unwrap();
+    running.daemon.sign.raise();
+    let changed = tokio::time::timeout(common::PATIENCE, watch.message()).await.expect("it is noticed");
+    assert_eq!(changed.unwrap().unwrap().status, 2, "NOT_SERVING");
+    drop(watch);
+    let summary = tokio::time::timeout(common::PATIENCE, running.finished()).await.expect("it stops").unwrap();
+    assert!(summary.failure.is_some_and(|failure| failure.contains("loop")), "{:?}", summary.failure);
+    assert!(stop.is_cancelled(), "everybody is told");
+}

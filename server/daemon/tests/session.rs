@@ -182,3 +182,106 @@ async fn status_tells_the_probes_the_stages_and_the_energies() {
     assert!(status.devices.is_empty() && !status.paused);
     daemon.finish().await;
 }
+
+const OTHER: &str = r#"
+[scene]
+name = "another block"
+[body.box]
+size_m = [0.02, 0.02, 0.02]
+cells = [2, 2, 2]
+[[material]]
+law = "stable-neo-hookean"
+young_modulus_pa = 5000.0
+poisson_ratio = 0.4
+density_kg_per_m3 = 1000.0
+[[fixed]]
+region = "z_min"
+"#;
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_loaded_scene_reaches_its_viewers_and_lets_devices_go() {
+    let daemon = Daemon::on(block_scene("block", 3)).await;
+    let mut arm = daemon.attach(common::hello()).await;
+    arm.welcome().await;
+    arm.hold_until(common::above(), |command| command.sample_sequence > 20).await;
+    arm.hold_until(common::pressing(), |command| common::force_of(command).z > 0.1).await;
+    let mut viewer = daemon
+        .surface()
+        .watch(v1::WatchRequest { max_rate_hz: 60.0, ..Default::default() })
+        .await
+        .unwrap()
+        .into_inner();
+    let mut mirror = common::Mirror::default();
+    while !mirror.complete {
+        mirror.apply(viewer.message().await.unwrap().unwrap());
+    }
+    let (old_epoch, old_id) = (mirror.epoch, daemon.status().await.session.unwrap().session_id);
+
+    let reading = tokio::spawn(async move {
+        let (mut last_n, mut goodbye) = (None, None);
+        while let Some(message) = arm.next().await.expect("the stream ends without an error") {
+            match message {
+                v1::device_down::Message::Command(command) => {
+                    last_n = Some(common::force_of(&command).length());
+                    arm.sequence += 1;
+                    let next = common::sample(arm.sequence, common::pressing());
+                    let next = v1::DeviceUp { message: Some(v1::device_up::Message::Sample(next)) };
+                    let _ = arm.up.try_send(next);
+                }
+                v1::device_down::Message::Fault(fault) => goodbye = Some(fault),
+                v1::device_down::Message::Welcome(_) => panic!("a second welcome"),
+            }
+        }
+        (last_n, goodbye)
+    });
+    let source = Some(Source::Toml(OTHER.into()));
+    let loaded = daemon.session().load_scene(v1::LoadSceneRequest { source }).await.unwrap().into_inner();
+    let loaded = loaded.session.unwrap();
+    assert_ne!(loaded.session_id, old_id);
+    assert_eq!(daemon.status().await.session.unwrap(), loaded);
+    let (last_n, goodbye) = tokio::time::timeout(common::PATIENCE, reading).await.unwrap().unwrap();
+    let goodbye = goodbye.expect("a goodbye");
+    assert_eq!((last_n, goodbye.code()), (Some(0.0), v1::DeviceFaultCode::Detached), "{}", goodbye.message);
+    assert!(goodbye.message.contains("attach again"), "{}", goodbye.message);
+
+    let until = tokio::time::Instant::now() + common::PATIENCE;
+    while mirror.epoch == old_epoch || !mirror.complete {
+        assert!(tokio::time::Instant::now() < until, "no keyframe of the new scene");
+        let event = tokio::time::timeout(common::PATIENCE, viewer.message()).await.unwrap();
+        mirror.apply(event.unwrap().unwrap());
+    }
+    let header = mirror.header.as_ref().unwrap();
+    assert_eq!(header.session_id, loaded.session_id);
+    assert_eq!(3 * loaded.surface_triangle_count as usize, mirror.triangles.len());
+    daemon.finish().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_caller_that_goes_away_does_not_leave_half_a_replacement() {
+    let daemon = Daemon::on(block_scene("block", 2)).await;
+    let mut old = daemon.status().await.session.unwrap().session_id;
+    for delay_ms in [0, 1, 3, 10, 30, 100, 300] {
+        let mut session = daemon.session();
+        let source = Some(Source::Toml(OTHER.into()));
+        let call = tokio::spawn(async move { session.load_scene(v1::LoadSceneRequest { source }).await });
+        tokio::time::sleep(std::time::Duration::from_millis(delay_ms)).await;
+        call.abort();
+    }
+    // What was begun is finished, and the next one is served: nothing is locked, paused, or of two minds.
+    let until = tokio::time::Instant::now() + common::PATIENCE;
+    let loaded = loop {
+        let source = Some(Source::Toml(OTHER.into()));
+        match daemon.session().load_scene(v1::LoadSceneRequest { source }).await {
+            Ok(loaded) => break loaded.into_inner().session.unwrap(),
+            Err(status) => assert_eq!(status.code(), Code::Aborted, "{status:?}"),
+        }
+        assert!(tokio::time::Instant::now() < until, "still loading");
+        tokio::time::sleep(std::time::Duration::from_millis(20)).await;
+    };
+    assert_ne!(loaded.session_id, std::mem::take(&mut old));
+    let before = daemon.status().await;
+    assert_eq!((before.session.as_ref(), before.paused), (Some(&loaded), false));
+    tokio::time::sleep(std::time::Duration::from_millis(50)).await;
+    assert!(daemon.status().await.tick > before.tick, "time goes on");
+    daemon.finish().await;
+}

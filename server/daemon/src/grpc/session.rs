@@ -58,19 +58,36 @@ impl SessionService {
         }
     }
 
+    /// Loads a scene to the end, whether or not the caller stays: half a replacement would be worse than none.
     async fn load(&self, source: WireSource) -> Result<Arc<ActiveSession>, Status> {
-        let _one_at_a_time =
-            self.daemon.loading.try_lock().map_err(|_| Status::aborted("another scene is being loaded: try again"))?;
+        let one_at_a_time = Arc::clone(&self.daemon.loading)
+            .try_lock_owned()
+            .map_err(|_| Status::aborted("another scene is being loaded: try again"))?;
         let daemon = Arc::clone(&self.daemon);
-        let prepared = tokio::task::spawn_blocking(move || {
-            let scene = load::from_wire(source, &daemon.settings.scene_folders)?;
-            prepare(scene, &daemon.settings, &daemon.numbers, &daemon.hub)
-                .map_err(|error| Status::invalid_argument(error.to_string()))
-        })
-        .await
-        .map_err(|_| Status::internal("loading the scene failed unexpectedly; the running scene goes on"))??;
-        self.daemon.replace(prepared).await.map_err(refused)
+        let loading = tokio::spawn(async move {
+            let _one_at_a_time = one_at_a_time;
+            let session = replace_scene(&daemon, source).await?;
+            tracing::info!(scene = session.scene_name, session = session.id, "scene loaded");
+            Ok(session)
+        });
+        loading.await.unwrap_or_else(|_| Err(unexpected()))
     }
+}
+
+fn unexpected() -> Status {
+    Status::internal("loading the scene failed unexpectedly; the running scene goes on")
+}
+
+async fn replace_scene(daemon: &Arc<Daemon>, source: WireSource) -> Result<Arc<ActiveSession>, Status> {
+    let builder = Arc::clone(daemon);
+    let prepared = tokio::task::spawn_blocking(move || {
+        let scene = load::from_wire(source, &builder.settings.scene_folders)?;
+        prepare(scene, &builder.settings, &builder.numbers, &builder.hub)
+            .map_err(|error| Status::invalid_argument(error.to_string()))
+    })
+    .await
+    .map_err(|_| unexpected())??;
+    daemon.replace(prepared).await.map_err(refused)
 }
 
 /// Requests other than snapshots are small: what is larger was not meant for this daemon.
@@ -107,7 +124,6 @@ impl Session for SessionService {
             )));
         }
         let session = self.load(source).await?;
-        tracing::info!(scene = session.scene_name, session = session.id, "scene loaded");
         let response = v1::LoadSceneResponse { session: Some(session.info()), warnings: session.warnings.clone() };
         Ok(Response::new(response))
     }

@@ -45,6 +45,10 @@ async fn serve(config: ServeConfig, scene: Scene) -> Result<ExitCode, ServeError
         return Ok(ExitCode::FAILURE);
     };
     println!("{}", report::farewell(&summary));
+    if let Some(failure) = summary.failure {
+        eprintln!("stopped without being told to: {failure}");
+        return Ok(ExitCode::FAILURE);
+    }
     Ok(ExitCode::SUCCESS)
 }
 

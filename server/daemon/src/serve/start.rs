@@ -53,6 +53,8 @@ pub struct Summary {
     pub samples_rejected: u64,
     /// Connections that did not end in time and were cut.
     pub cut: bool,
+    /// What made the daemon stop without being told to.
+    pub failure: Option<&'static str>,
 }
 
 impl Running {
@@ -80,7 +82,7 @@ pub async fn start(config: ServeConfig, scene: Scene, stop: CancellationToken) -
     let (desk, orders, clerk) = desk().map_err(|source| ServeError::System { what: "order desk", source })?;
     let timing = Arc::new(Timing::default());
     let sign = StopSign::default();
-    let (notes, thread) =
+    let (notes, the_loop) =
         start_loop(simulation, desk, sign.clone(), Arc::clone(&timing), config.realtime.measures).await?;
     tokio::spawn(clerk.work());
     let daemon = Arc::new(Daemon {
@@ -94,14 +96,14 @@ pub async fn start(config: ServeConfig, scene: Scene, stop: CancellationToken) -
         samples_rejected: AtomicU64::new(0),
         current: RwLock::new(Arc::clone(&session)),
         numbers,
-        loading: tokio::sync::Mutex::new(()),
+        loading: Arc::default(),
     });
     daemon.show(&session, surface);
     let (routes, health) = grpc::routes(&daemon).await?;
     let address = doors.address;
     let closing = CancellationToken::new();
     let servers = doors.serve(&routes, &closing);
-    let ended = tokio::spawn(until_stopped(Arc::clone(&daemon), thread, health, servers, closing, config));
+    let ended = tokio::spawn(until_stopped(Arc::clone(&daemon), the_loop, health, servers, closing, config));
     Ok(Running { address, notes, daemon, ended })
 }
 
@@ -135,6 +137,13 @@ impl Doors {
     }
 }
 
+/// The loop's thread.
+struct LoopThread {
+    thread: thread::JoinHandle<()>,
+    /// Closed when the loop has ended, by a panic too.
+    gone: oneshot::Receiver<()>,
+}
+
 /// The loop's thread, once it has asked the operating system for its measures.
 async fn start_loop(
     simulation: Box<Simulation>,
@@ -142,11 +151,13 @@ async fn start_loop(
     sign: StopSign,
     timing: Arc<Timing>,
     measures: OsMeasures,
-) -> Result<(Vec<Note>, thread::JoinHandle<()>), ServeError> {
+) -> Result<(Vec<Note>, LoopThread), ServeError> {
     let the_loop = Loop::new(simulation, desk, sign, timing, Clock::Monotonic)
         .map_err(|error| ServeError::Prepare(error.into()))?;
     let (tell, told) = oneshot::channel();
+    let (alive, gone) = oneshot::channel();
     let body = move || {
+        let _alive: oneshot::Sender<()> = alive;
         let granted = measures.apply();
         let _ = tell.send(granted.notes.clone());
         the_loop.run();
@@ -154,27 +165,32 @@ async fn start_loop(
     };
     let system = |source| ServeError::System { what: "thread", source };
     let thread = thread::Builder::new().name("palpate-loop".into()).spawn(body).map_err(system)?;
-    Ok((told.await.unwrap_or_default(), thread))
+    Ok((told.await.unwrap_or_default(), LoopThread { thread, gone }))
 }
 
 /// Waits for the stop, then: forces to zero, streams end, sockets close, loop joins.
 async fn until_stopped(
     daemon: Arc<Daemon>,
-    thread: thread::JoinHandle<()>,
+    the_loop: LoopThread,
     health: tonic_health::server::HealthReporter,
     mut servers: Servers,
     closing: CancellationToken,
     config: ServeConfig,
 ) -> Summary {
-    let mut early = false;
+    let LoopThread { thread, gone } = the_loop;
+    let mut failure = None;
     tokio::select! {
         () = daemon.stop.cancelled() => {}
         ended = servers.join_next() => {
-            early = true;
             tracing::error!(?ended, "a server ended by itself: stopping");
-            daemon.stop.cancel();
+            failure = Some("a server ended by itself");
+        }
+        _ = gone => {
+            tracing::error!("the simulation loop ended by itself: stopping");
+            failure = Some("the simulation loop ended by itself");
         }
     }
+    daemon.stop.cancel();
     for service in ["palpate.v1.Device", "palpate.v1.Surface", "palpate.v1.Session", ""] {
         health.set_service_status(service, tonic_health::ServingStatus::NotServing).await;
     }
@@ -183,11 +199,12 @@ async fn until_stopped(
     let joined = tokio::task::spawn_blocking(move || thread.join().is_ok());
     if !matches!(joined.await, Ok(true)) {
         tracing::error!("the loop ended by a panic");
+        failure = Some("the simulation loop ended by a panic");
     }
     daemon.session().ended.cancel();
     closing.cancel();
     let all_ended = async { while servers.join_next().await.is_some() {} };
-    let cut = timeout(STREAMS_END_WITHIN, all_ended).await.is_err() || early;
+    let cut = timeout(STREAMS_END_WITHIN, all_ended).await.is_err();
     servers.abort_all();
     if let Some(path) = &config.unix {
         let _ = std::fs::remove_file(path);
@@ -197,5 +214,6 @@ async fn until_stopped(
         frames_skipped: daemon.hub.frames_skipped(),
         samples_rejected: daemon.samples_rejected.load(std::sync::atomic::Ordering::Relaxed),
         cut,
+        failure,
     }
 }
