@@ -139,6 +139,7 @@ async fn silence_ramps_the_force_to_zero_and_samples_bring_it_back() {
     let daemon = Daemon::on(block_scene("block", 3)).await;
     let mut arm = daemon.attach(hello()).await;
     arm.welcome().await;
+    arm.hold_until(above(), |command| command.sample_sequence > 20).await;
     arm.hold_until(pressing(), |command| force_of(command).z > 0.1).await;
     let mut faults = Vec::new();
     while force_of(&arm.command(&mut faults).await) != DVec3::ZERO {}
@@ -195,6 +196,7 @@ async fn stopping_ramps_to_zero_says_goodbye_and_ends_cleanly() {
     let daemon = Daemon::on(block_scene("block", 3)).await;
     let mut arm = daemon.attach(hello()).await;
     arm.welcome().await;
+    arm.hold_until(above(), |command| command.sample_sequence > 20).await;
     // Until the ramp up is over and the body is at rest.
     arm.hold_until(pressing(), |command| command.sample_sequence > 500).await;
     let reading = tokio::spawn(async move {
@@ -254,6 +256,11 @@ async fn a_quarantined_body_is_told_and_reset_brings_it_back() {
     daemon.reset().await;
     assert_eq!(daemon.status().await.quarantine, "");
     let mut again = Arm { ..arm };
+    // The tool has been put to the device, into the body at rest: it has to come out once.
+    let from = again.sequence;
+    let held = again.hold_until(pressing(), |command| command.sample_sequence > from + 50).await;
+    assert_eq!(force_of(&held), DVec3::ZERO);
+    again.hold_until(above(), |command| command.sample_sequence > from + 300).await;
     again.hold_until(pressing(), |command| force_of(command).z > 0.1).await;
     daemon.finish().await;
 }

@@ -115,3 +115,53 @@ async fn a_slow_body_is_released_as_fast_as_a_quick_one() {
     assert_eq!(forces_n[3], 0.0, "{forces_n:?}");
     assert!(bench.simulation.is_released());
 }
+
+/// Largest displacement of a node (m).
+fn deformation_m(bench: &Bench, rest_m: &[DVec3]) -> f64 {
+    bench.simulation.state().x.iter().zip(rest_m).map(|(x, rest)| x.distance(*rest)).fold(0.0, f64::max)
+}
+
+#[tokio::test]
+async fn a_device_that_attaches_beyond_the_body_does_not_drag_its_tool_through_it() {
+    let mut bench = Bench::new();
+    let rest_m = bench.simulation.state().x.clone();
+    // The tool hangs above the block; the device is beside it, low.
+    let beside = DVec3::new(-0.02, 0.02, 0.01);
+    let mut most_m = 0.0_f64;
+    for _ in 0..300 {
+        let output = bench.tick(RUN, beside, 1);
+        assert_eq!(output.force_n, DVec3::ZERO);
+        assert!(output.proxy_position_m.distance(beside) < 1e-9, "{}", output.proxy_position_m);
+        most_m = most_m.max(deformation_m(&bench, &rest_m));
+    }
+    assert!(most_m < 1e-9, "the body was moved by {most_m} m");
+    // After a reset the same: the tool's start lies across the block.
+    bench.simulation.reset();
+    for _ in 0..300 {
+        let output = bench.tick(RUN, beside, 1);
+        assert!(output.proxy_position_m.distance(beside) < 1e-9, "{}", output.proxy_position_m);
+        assert!(deformation_m(&bench, &rest_m) < 1e-9);
+    }
+}
+
+#[tokio::test]
+async fn a_device_that_attaches_in_the_body_gets_no_force_before_it_has_left_it() {
+    for start in [pressing(), DVec3::new(0.02, 0.02, 0.01)] {
+        let mut bench = Bench::new();
+        for _ in 0..500 {
+            let output = bench.tick(RUN, start, 1);
+            assert_eq!((output.force_n, output.local_model), (DVec3::ZERO, None), "{start}");
+        }
+        // Out it goes, at 0.1 m/s.
+        for step in 0..=250 {
+            let position_m = start.lerp(above(), f64::from(step) / 250.0);
+            let force_n = bench.tick(RUN, position_m, 1).force_n.length();
+            assert!(force_n < 0.1, "{force_n} N on the way out of {start}");
+        }
+        for _ in 0..300 {
+            bench.tick(RUN, above(), 1);
+        }
+        let force_n = (0..300).map(|_| bench.tick(RUN, pressing(), 1).force_n.z).fold(0.0, f64::max);
+        assert!(force_n > 0.1, "then it feels the body: {force_n} N");
+    }
+}

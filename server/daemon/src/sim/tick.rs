@@ -7,8 +7,11 @@ use super::{
     timing::Timing,
     tool::{Moment, Order},
 };
-use palpate_physics::{TickInput, step};
+use palpate_physics::{TickInput, contact::is_inside, step};
 use palpate_realtime::Clock;
+
+/// How often a tool that waits to be clear of the body is looked for in it; a look costs a pass over the surface.
+const LOOK_EVERY_TICKS: u64 = 16;
 
 /// What the loop wants of a tick.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -51,6 +54,9 @@ impl Simulation {
         let period_s = self.period_s();
         let time_s = (self.state.tick + 1) as f64 * period_s;
         for (index, target) in self.targets.iter_mut().enumerate() {
+            if let Some(position_m) = self.tools[index].new_place() {
+                self.state.place_tool(index, position_m);
+            }
             *target = self.tools[index].target(&self.state.tools[index], now_ns, time_s);
         }
         self.timeline.fill(time_s, &mut self.load_factors, &mut self.prescribed_m);
@@ -70,6 +76,10 @@ impl Simulation {
         let quarantined = self.state.quarantine.map(|q| q.tick);
         let moment = Moment { now_ns, tick: self.state.tick, period_s: self.period_s(), quarantined };
         for (tool, state) in self.tools.iter_mut().zip(&self.state.tools) {
+            let look = plan.advance && self.state.tick.is_multiple_of(LOOK_EVERY_TICKS) && tool.seems_clear(state);
+            if look && !is_inside(state.target.position_m, &self.model.surface().triangles, &self.state.x) {
+                tool.found_clear();
+            }
             tool.couple(state, &moment, plan.order, plan.advance);
         }
     }

@@ -32,6 +32,20 @@ pub enum Order {
     Release,
 }
 
+/// Force (N) in the coupling below which a tool that touches nothing follows its device freely.
+const FREE_N: f64 = 0.05;
+
+/// How far a tool has come to its device.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Place {
+    /// Somewhere else: the first sample says where it belongs.
+    Unknown,
+    /// At the device since the first sample, with no force yet: it may be in the body.
+    Held,
+    /// Has been clear of the body at least once.
+    Clear,
+}
+
 /// A tool in the loop.
 #[derive(Debug)]
 pub struct ToolLoop {
@@ -46,6 +60,9 @@ pub struct ToolLoop {
     /// When that was last changed (loop clock, ns).
     levelled_ns: Option<u64>,
     attachment: u64,
+    place: Place,
+    /// The simulated arm has to start where the device left the tool.
+    arm_takes_over: bool,
     newest: Option<DeviceInput>,
     stale: bool,
     raw_n: DVec3,
@@ -65,6 +82,8 @@ impl ToolLoop {
             level: 1.0,
             levelled_ns: None,
             attachment: 0,
+            place: Place::Clear,
+            arm_takes_over: false,
             newest: None,
             stale: false,
             raw_n: DVec3::ZERO,
@@ -101,6 +120,7 @@ impl ToolLoop {
     }
 
     fn change_hands(&mut self, attachment: u64) {
+        self.arm_takes_over = attachment == 0;
         self.attachment = attachment;
         self.newest = None;
         self.stale = false;
@@ -110,6 +130,32 @@ impl ToolLoop {
             if attachment == 0 { own.max_force_n } else { own.max_force_n.min(self.port.shared.max_force_n()) };
         self.limiter = ForceLimiter::new(ForceLimits { max_force_n, ..own });
         self.output = ToolOutput { attachment, ..ToolOutput::default() };
+        self.start_over();
+    }
+
+    /// A device's tool has to find its place, without force; any other has its own.
+    fn start_over(&mut self) {
+        let attached = self.is_attached();
+        self.level = if attached { 0.0 } else { 1.0 };
+        self.place = if attached { Place::Unknown } else { Place::Clear };
+    }
+
+    /// Where the tool has to be put (m, world), once, before its device moves it: it must not sweep through the body on its way
+    /// from where it was.
+    pub fn new_place(&mut self) -> Option<DVec3> {
+        let sample = self.newest.filter(|_| self.place == Place::Unknown && self.is_attached())?;
+        self.place = Place::Held;
+        Some(sample.position_m)
+    }
+
+    /// Whether it waits to be clear of the body and touches nothing now, as outside the body or deep inside it.
+    pub fn seems_clear(&self, tool: &ToolState) -> bool {
+        self.place == Place::Held && tool.contacts == 0 && tool.device_force_n.length() < FREE_N
+    }
+
+    /// It is outside the body: from now on there is force.
+    pub fn found_clear(&mut self) {
+        self.place = Place::Clear;
     }
 
     /// Where the tool shall be at the end of the tick, `time_s` (s of simulated time).
@@ -120,7 +166,12 @@ impl ToolLoop {
         let held = ToolTarget { velocity_m_per_s: DVec3::ZERO, ..tool.target };
         if !self.is_attached() {
             let force_n = self.output.force_n;
-            return self.arm.as_mut().map_or(held, |arm| arm.advance(time_s, force_n));
+            let takes_over = std::mem::take(&mut self.arm_takes_over);
+            let Some(arm) = self.arm.as_mut() else { return held };
+            if takes_over {
+                arm.place(held);
+            }
+            return arm.advance(time_s, force_n);
         }
         let Some(sample) = &self.newest else { return held };
         let verdict = self.watchdog.check(now_ns);
@@ -142,7 +193,7 @@ impl ToolLoop {
             Order::Hold => self.is_attached(),
             Order::Release => true,
         };
-        let release = ordered || quarantined.is_some();
+        let release = ordered || quarantined.is_some() || self.place != Place::Clear;
         self.ramp(release, frame);
         if quarantined.is_none() {
             self.raw_n = tool.device_force_n;
@@ -200,7 +251,8 @@ impl ToolLoop {
     /// Back to the start of time.
     pub fn reset(&mut self) {
         self.raw_n = DVec3::ZERO;
-        self.level = if self.is_attached() { 0.0 } else { 1.0 };
+        self.start_over();
+        self.arm_takes_over = false;
         self.limiter.reset();
         self.output = ToolOutput { attachment: self.attachment, ..ToolOutput::default() };
         if let Some(arm) = &mut self.arm {

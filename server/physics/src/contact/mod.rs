@@ -5,6 +5,7 @@
 //! Once a tick the contact is summed up for the servo loop ([`local_model`]).
 mod broad;
 mod foundation;
+mod inside;
 mod local_model;
 mod narrow;
 mod proxy;
@@ -14,6 +15,7 @@ mod tool;
 mod touching;
 mod triangle;
 
+pub use inside::is_inside;
 pub use proxy::SubstepTime;
 pub(crate) use resting::RestingContact;
 pub use state::ContactState;

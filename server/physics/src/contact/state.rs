@@ -96,6 +96,15 @@ impl ContactState {
         self.forget_geometry();
     }
 
+    /// One tool touches nothing. Allocates nothing.
+    pub(crate) fn clear_tool(&mut self, tool: usize) {
+        let part = &mut self.tools[tool];
+        part.touching.clear();
+        part.force_n = DVec3::ZERO;
+        part.estimate = StiffnessEstimate::default();
+        part.candidates.slack_m = f64::NEG_INFINITY;
+    }
+
     /// Makes the broad phase look at the positions anew.
     pub(crate) fn forget_geometry(&mut self) {
         self.boxes.fill(ClusterBox::UNFITTED);
