@@ -5,6 +5,7 @@ use common::{above, block_scene, pressing};
 use glam::DVec3;
 use palpate_physics::Model;
 use palpate_realtime::{Clock, ManualClock};
+use palpate_scene::ScriptedHand;
 use palpated::{
     serve::config::default_limits,
     sim::{
@@ -32,13 +33,20 @@ struct Bench {
 
 impl Bench {
     fn new() -> Self {
+        Self::with_arm(None)
+    }
+
+    /// With a simulated arm whose hand rests at a place while no device is attached.
+    fn with_arm(hand_m: Option<DVec3>) -> Self {
+        let hand =
+            |at| ScriptedHand { tool: 0, tool_name: "finger".into(), path: common::path(&[(0.0, at), (1.0, at)]) };
         let scene = block_scene("block", 3);
         let (simulation, ends) = Simulation::build(Parts {
             session: 1,
             model: Arc::new(Model::build(scene.model).unwrap()),
             timeline: scene.timeline,
             drivers: scene.drivers,
-            arm: None,
+            arm: hand_m.map(hand),
             limits: default_limits(),
             demand: Arc::new(Demand::default()),
         })
@@ -164,4 +172,23 @@ async fn a_device_that_attaches_in_the_body_gets_no_force_before_it_has_left_it(
         let force_n = (0..300).map(|_| bench.tick(RUN, pressing(), 1).force_n.z).fold(0.0, f64::max);
         assert!(force_n > 0.1, "then it feels the body: {force_n} N");
     }
+}
+
+#[tokio::test]
+async fn the_simulated_arm_takes_over_where_a_device_leaves() {
+    let mut bench = Bench::with_arm(Some(above()));
+    let beside = DVec3::new(-0.02, 0.02, 0.01);
+    for _ in 0..50 {
+        bench.tick(RUN, beside, 1);
+    }
+    bench.ends.tools[0].shared.detach();
+    let mut last_m = beside;
+    for _ in 0..200 {
+        bench.time.advance(1_000_000);
+        bench.simulation.tick(RUN, &bench.clock, &bench.timing);
+        let now_m = bench.simulation.state().tools[0].target.position_m;
+        assert!(now_m.distance(last_m) < 2e-3, "a hand does not go from {last_m} to {now_m} in a tick");
+        last_m = now_m;
+    }
+    assert!(last_m.distance(beside) > 1e-3, "its hand does lead it home: {last_m}");
 }

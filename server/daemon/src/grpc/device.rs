@@ -187,9 +187,9 @@ impl Attachment {
     async fn next(&mut self) -> Option<Result<Message, Status>> {
         if let Stage::Live = self.stage {
             let why = match self.next_of_live().await {
-                Live::Message(message) => return Some(Ok(message)),
-                Live::WayUpEnded => return self.how_the_way_up_ended().await,
-                Live::Over(why) => why,
+                Ok(message) => return Some(Ok(message)),
+                Err(End::WayUp) => return self.how_the_way_up_ended().await,
+                Err(End::Daemon(why)) => why,
             };
             self.stage = Stage::Releasing { why, until: Instant::now() + RELEASE_WITHIN };
         }
@@ -199,21 +199,21 @@ impl Attachment {
         }
     }
 
-    async fn next_of_live(&mut self) -> Live {
+    async fn next_of_live(&mut self) -> Result<Message, End> {
         let (stop, replaced) = (self.daemon.stop.clone(), self.session.ended.clone());
         let over = self.over.clone();
         loop {
-            let Some(end) = self.end.as_mut() else { return Live::WayUpEnded };
+            let Some(end) = self.end.as_mut() else { return Err(End::WayUp) };
             tokio::select! {
                 biased;
-                () = stop.cancelled() => return Live::Over("the daemon is shutting down"),
-                () = replaced.cancelled() => return Live::Over("another scene was loaded: attach again"),
-                () = over.cancelled() => return Live::WayUpEnded,
-                fault = self.faults.recv() => if let Some(fault) = fault { return Live::Message(Message::Fault(fault)) },
-                rung = end.ear.rung() => if rung.is_err() { return Live::Over("the simulation loop cannot be heard") },
+                () = stop.cancelled() => return Err(End::Daemon("the daemon is shutting down")),
+                () = replaced.cancelled() => return Err(End::Daemon("another scene was loaded: attach again")),
+                () = over.cancelled() => return Err(End::WayUp),
+                fault = self.faults.recv() => if let Some(fault) = fault { return Ok(Message::Fault(fault)) },
+                rung = end.ear.rung() => if rung.is_err() { return Err(End::Daemon("the simulation loop cannot be heard")) },
             }
             if let Some(message) = self.newest() {
-                return Live::Message(message);
+                return Ok(message);
             }
         }
     }
@@ -283,13 +283,12 @@ impl Attachment {
     }
 }
 
-/// What a live attachment comes to.
-enum Live {
-    Message(Message),
-    /// The device ended it.
-    WayUpEnded,
-    /// The daemon ends it, and why.
-    Over(&'static str),
+/// Who ends a live attachment.
+enum End {
+    /// The device.
+    WayUp,
+    /// The daemon, and why.
+    Daemon(&'static str),
 }
 
 impl Drop for Attachment {
