@@ -1,6 +1,30 @@
 //! Loads on nodes and on the boundary, each with its potential or its power known to the ledger.
-use crate::mesh::Surface;
+use crate::{mesh::Surface, world::LoadSpec};
 use glam::DVec3;
+
+/// Adds the nodal forces (N) of a load scaled by `factor`, with the body at rest and deformed at the given positions (m).
+pub fn add_load_n(
+    load: &LoadSpec,
+    factor: f64,
+    surface: &Surface,
+    (rest_m, deformed_m): (&[DVec3], &[DVec3]),
+    forces_n: &mut [DVec3],
+) {
+    match load {
+        LoadSpec::NodalForces(forces) => {
+            for &(node, force_n) in forces {
+                forces_n[node as usize] += force_n * factor;
+            }
+        }
+        LoadSpec::Traction { triangles, traction_pa } => {
+            add_traction_n(surface, triangles, *traction_pa * factor, rest_m, forces_n);
+        }
+        LoadSpec::Pressure { triangles, pressure_pa, follower } => {
+            let positions_m = if *follower { deformed_m } else { rest_m };
+            add_pressure_n(surface, triangles, pressure_pa * factor, positions_m, forces_n);
+        }
+    }
+}
 
 /// Adds the nodal forces of a pressure `p` (Pa, positive pushes inwards) on boundary triangles:
 /// each triangle gives `−p A n / 3` to its corners, `A n = ½ (x1−x0)×(x2−x0)`.

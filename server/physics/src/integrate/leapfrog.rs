@@ -8,15 +8,15 @@
 //!           v ← v + dt f/m                 kick (the last one is a half kick)
 //! ```
 //! Second order and symplectic without damping; `x` and `v` are synchronous at the end of a tick. Viscous forces see the
-//! velocity half a step late, which the step bound of `world::choose_substeps` accounts for.
+//! velocity half a step late, which the step bound of `world::substeps` accounts for.
 //!
 //! Ledger: the work of a force `g` over a kick of length `h` is exactly its share of the kinetic change,
 //! `h g·(v + ½h f/m)`; what viscous stress takes is an estimate ([`ViscousPower`]).
 use crate::{
     contact::{self, Body, SubstepTime, ToolTarget},
-    fem::loads,
+    fem::loads::add_load_n,
     health::{Quarantine, first_non_finite},
-    world::{LoadSpec, Model, PointForce, Scratch, State, StepReport, TickInput},
+    world::{Model, PointForce, Scratch, State, StepReport, TickInput},
 };
 use glam::DVec3;
 
@@ -169,7 +169,7 @@ fn evaluate(
     for (index, load) in model.spec().loads.iter().enumerate() {
         let factor = loads.factor(state.load_factors[index], input, index, fraction);
         if factor != 0.0 {
-            add_load(model, load, factor, &state.x, external);
+            add_load_n(load, factor, model.surface(), (model.rest_positions_m(), &state.x), external);
         }
     }
     for point in input.point_forces {
@@ -192,30 +192,6 @@ fn evaluate(
         *force += *external + gravity * *mass;
     }
     state.force_is_current = true;
-}
-
-/// Adds the forces of a load scaled by `factor`.
-pub(crate) fn add_load(model: &Model, load: &LoadSpec, factor: f64, x: &[DVec3], forces_n: &mut [DVec3]) {
-    match load {
-        LoadSpec::NodalForces(forces) => {
-            for &(node, force_n) in forces {
-                forces_n[node as usize] += force_n * factor;
-            }
-        }
-        LoadSpec::Traction { triangles, traction_pa } => {
-            loads::add_traction_n(
-                model.surface(),
-                triangles,
-                *traction_pa * factor,
-                model.rest_positions_m(),
-                forces_n,
-            );
-        }
-        LoadSpec::Pressure { triangles, pressure_pa, follower } => {
-            let positions = if *follower { x } else { model.rest_positions_m() };
-            loads::add_pressure_n(model.surface(), triangles, pressure_pa * factor, positions, forces_n);
-        }
-    }
 }
 
 /// `v ← (v e^{−c h/2} + h f/m) e^{−c h/2}`, and the ledger's share of it.

@@ -3,7 +3,6 @@ use super::{SolveError, follower, stiffness::FreeAxes};
 use crate::{
     contact::{RestingContact, ToolTarget},
     fem::{element::RestTet, loads},
-    integrate::leapfrog::add_load,
     world::{LoadSpec, Model},
 };
 use glam::DVec3;
@@ -41,7 +40,8 @@ impl Stage {
         for (load, &factor) in model.spec().loads.iter().zip(&load_factors) {
             let follows = matches!(load, LoadSpec::Pressure { follower: true, .. });
             if factor != 0.0 && !follows {
-                add_load(model, load, factor, model.rest_positions_m(), &mut dead_n);
+                let rest = model.rest_positions_m();
+                loads::add_load_n(load, factor, model.surface(), (rest, rest), &mut dead_n);
             }
         }
         let start = model.spec().tools.iter().map(|tool| tool.start_position_m);

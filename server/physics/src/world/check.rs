@@ -1,0 +1,83 @@
+//! The specification's ranges.
+use super::{LoadSpec, MAX_SUBSTEPS, ModelError, ModelSpec, Substeps};
+use crate::{
+    contact::{Coupling, ToolSpec},
+    mesh::Surface,
+};
+
+pub(super) fn spec(spec: &ModelSpec, surface: &Surface) -> Result<(), ModelError> {
+    regions(spec)?;
+    let nodes = spec.mesh.positions_m().len();
+    for set in &spec.prescribed {
+        indices("node", set.nodes.iter().map(|&n| n as usize), nodes)?;
+    }
+    for load in &spec.loads {
+        match load {
+            LoadSpec::NodalForces(forces) => indices("node", forces.iter().map(|f| f.0 as usize), nodes)?,
+            LoadSpec::Traction { triangles, .. } | LoadSpec::Pressure { triangles, .. } => {
+                let count = surface.triangles.len();
+                indices("surface triangle", triangles.iter().map(|&t| t as usize), count)?;
+            }
+        }
+    }
+    spec.tools.iter().try_for_each(tool)?;
+    settings(spec)
+}
+
+fn tool(tool: &ToolSpec) -> Result<(), ModelError> {
+    let positive =
+        |name, value: f64| setting(name, value, value > 0.0 && value.is_finite(), "must be finite and larger than 0");
+    let not_negative =
+        |name, value: f64| setting(name, value, value >= 0.0 && value.is_finite(), "must be finite and not negative");
+    positive("tool radius_m", tool.radius_m)?;
+    not_negative("friction_coefficient", tool.friction_coefficient)?;
+    if let Coupling::Spring { stiffness_n_per_m, damping_n_s_per_m, mass_kg } = tool.coupling {
+        positive("coupling_stiffness_n_per_m", stiffness_n_per_m)?;
+        not_negative("coupling_damping_n_s_per_m", damping_n_s_per_m)?;
+        positive("tool mass_kg", mass_kg)?;
+    }
+    let start = tool.start_position_m.length();
+    setting("tool start_position_m", start, start.is_finite(), "must be finite")
+}
+
+fn regions(spec: &ModelSpec) -> Result<(), ModelError> {
+    let (found, expected) = (spec.tet_region.len(), spec.mesh.tets().len());
+    if found != expected {
+        return Err(ModelError::RegionCount { found, expected });
+    }
+    indices("region", spec.tet_region.iter().map(|&r| r as usize), spec.regions.len())?;
+    for region in &spec.regions {
+        let density = region.density_kg_per_m3;
+        let ok = density > 0.0 && density.is_finite();
+        setting("density_kg_per_m3", density, ok, "must be finite and larger than 0")?;
+    }
+    Ok(())
+}
+
+fn settings(spec: &ModelSpec) -> Result<(), ModelError> {
+    let s = &spec.settings;
+    let period = s.tick_period_s;
+    setting("tick_period_s", period, period > 0.0 && period.is_finite(), "must be finite and larger than 0")?;
+    let safety = s.step_safety;
+    setting("step_safety", safety, safety > 0.0 && safety <= 1.0, "must be in (0, 1]")?;
+    let stretch = s.stretch_allowance;
+    setting("stretch_allowance", stretch, stretch >= 1.0 && stretch.is_finite(), "must be 1 or larger")?;
+    let damping = s.mass_damping_per_s;
+    setting("mass_damping_per_s", damping, damping >= 0.0 && damping.is_finite(), "must not be negative")?;
+    if let Substeps::Fixed(n) = s.substeps {
+        setting("substeps", f64::from(n), (1..=MAX_SUBSTEPS).contains(&n), "must be 1 to 100000")?;
+    }
+    let gravity = spec.gravity_m_per_s2.length();
+    setting("gravity_m_per_s2", gravity, gravity.is_finite(), "must be finite")
+}
+
+fn setting(name: &'static str, value: f64, ok: bool, rule: &'static str) -> Result<(), ModelError> {
+    if ok { Ok(()) } else { Err(ModelError::Setting { name, value, rule }) }
+}
+
+fn indices(what: &'static str, mut indices: impl Iterator<Item = usize>, count: usize) -> Result<(), ModelError> {
+    match indices.find(|&index| index >= count) {
+        Some(index) => Err(ModelError::OutOfRange { what, index, count }),
+        None => Ok(()),
+    }
+}

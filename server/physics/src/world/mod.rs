@@ -1,0 +1,15 @@
+//! [`Model`] (constant after load), [`State`] (what a tick changes) and [`Scratch`] (buffers, no meaning between ticks).
+mod check;
+mod error;
+mod model;
+mod spec;
+mod state;
+mod substeps;
+mod tick;
+
+pub use error::ModelError;
+pub use model::Model;
+pub use spec::{LoadSpec, ModelSpec, Precision, PrescribedSpec, Region, Settings, Substeps};
+pub use state::State;
+pub use substeps::MAX_SUBSTEPS;
+pub use tick::{PointForce, Scratch, StepReport, TickInput};

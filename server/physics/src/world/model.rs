@@ -1,0 +1,177 @@
+//! The model: constant after load.
+use super::{ModelError, ModelSpec, PrescribedSpec, check, substeps};
+use crate::{
+    contact::{ContactModel, SurfaceModuli, ToolState},
+    fem::{element::RestTet, mass},
+    integrate::spectrum,
+    material::Material,
+    mesh::{Surface, TetMesh},
+    simd::ForceKernel,
+};
+use glam::{DVec2, DVec3};
+
+/// A body with its loads, constraints and tools. Constant after [`Model::build`].
+#[derive(Debug, Clone)]
+pub struct Model {
+    spec: ModelSpec,
+    surface: Surface,
+    materials: Vec<Material>,
+    rest_tets: Vec<RestTet>,
+    mass_kg: Vec<f64>,
+    inverse_mass_per_kg: Vec<DVec3>,
+    kernel: ForceKernel,
+    contact: ContactModel,
+    max_natural_frequency_rad_per_s: f64,
+    substeps: u32,
+}
+
+impl Model {
+    /// Checks the specification, precomputes all that the rest state fixes, and chooses the substeps.
+    ///
+    /// # Errors
+    /// [`ModelError`], naming what is wrong; nothing is repaired silently.
+    pub fn build(spec: ModelSpec) -> Result<Self, ModelError> {
+        let surface = Surface::of(&spec.mesh)?;
+        check::spec(&spec, &surface)?;
+        let rest_tets: Vec<RestTet> =
+            (0..spec.mesh.tets().len()).map(|tet| RestTet::new(&spec.mesh.edge_matrix_m(tet))).collect();
+        let materials: Vec<Material> = spec.regions.iter().map(|region| region.material).collect();
+        let density = |tet: usize| spec.regions[spec.tet_region[tet] as usize].density_kg_per_m3;
+        let mass_kg = mass::lumped_kg(&spec.mesh, density);
+        let inverse_mass_per_kg = free_inverse_mass(&mass_kg, &spec.prescribed)?;
+        let kernel = ForceKernel::build(&spec.mesh, &rest_tets, &spec.tet_region, &materials, spec.settings.precision);
+        let omega = spectrum::max_natural_frequency_rad_per_s(
+            &spec.mesh,
+            &rest_tets,
+            &spec.tet_region,
+            &materials,
+            &inverse_mass_per_kg,
+        );
+        let contact = ContactModel::build(
+            &spec.mesh,
+            &surface,
+            &moduli_of_triangles(&spec, &surface),
+            &mass_kg,
+            omega,
+            &spec.tools,
+        );
+        let stretch_sq = substeps::stiffening(&spec.settings, &materials);
+        // λ_max(s K + C) = s λ_max(K + C/s)
+        let springs: Vec<f64> = contact.nodal_stiffness_n_per_m.iter().map(|k| k / stretch_sq).collect();
+        let touched = if springs.is_empty() {
+            omega
+        } else {
+            let (tets, regions) = (&rest_tets, &spec.tet_region);
+            let inverse = &inverse_mass_per_kg;
+            spectrum::max_frequency_on_springs_rad_per_s(&spec.mesh, tets, regions, &materials, inverse, &springs)
+        };
+        let omega_sq = stretch_sq * touched.max(omega).powi(2) + contact.tool_frequency_sq;
+        let substeps = substeps::choose(&spec, &materials, omega_sq.sqrt())?;
+        Ok(Self {
+            surface,
+            materials,
+            rest_tets,
+            mass_kg,
+            inverse_mass_per_kg,
+            kernel,
+            contact,
+            max_natural_frequency_rad_per_s: omega,
+            substeps,
+            spec,
+        })
+    }
+
+    /// What it was built from.
+    pub fn spec(&self) -> &ModelSpec {
+        &self.spec
+    }
+    /// Rest mesh.
+    pub fn mesh(&self) -> &TetMesh {
+        &self.spec.mesh
+    }
+    /// Boundary surface.
+    pub fn surface(&self) -> &Surface {
+        &self.surface
+    }
+    /// Rest positions (m) per node.
+    pub fn rest_positions_m(&self) -> &[DVec3] {
+        self.spec.mesh.positions_m()
+    }
+    /// Rest data of every tet.
+    pub fn rest_tets(&self) -> &[RestTet] {
+        &self.rest_tets
+    }
+    /// Material of a tet.
+    pub fn material_of(&self, tet: usize) -> &Material {
+        &self.materials[self.spec.tet_region[tet] as usize]
+    }
+    /// Lumped mass (kg) per node.
+    pub fn mass_kg(&self) -> &[f64] {
+        &self.mass_kg
+    }
+    /// `1/m` (1/kg) per node and axis, zero where prescribed.
+    pub fn inverse_mass_per_kg(&self) -> &[DVec3] {
+        &self.inverse_mass_per_kg
+    }
+    /// The force kernel.
+    pub fn kernel(&self) -> &ForceKernel {
+        &self.kernel
+    }
+    /// Contact.
+    pub fn contact(&self) -> &ContactModel {
+        &self.contact
+    }
+    /// Gravity (m/s²).
+    pub fn gravity_m_per_s2(&self) -> DVec3 {
+        self.spec.gravity_m_per_s2
+    }
+    /// Largest natural frequency (rad/s) at rest.
+    pub fn max_natural_frequency_rad_per_s(&self) -> f64 {
+        self.max_natural_frequency_rad_per_s
+    }
+    pub(super) fn tools_at_start(&self) -> Vec<ToolState> {
+        self.spec.tools.iter().map(ToolState::at_start).collect()
+    }
+    /// Substeps per tick.
+    pub fn substeps(&self) -> u32 {
+        self.substeps
+    }
+}
+
+/// Mean over a triangle's corners of the stiffest tet at each.
+fn moduli_of_triangles(spec: &ModelSpec, surface: &Surface) -> Vec<SurfaceModuli> {
+    let mut of_node = vec![DVec2::ZERO; spec.mesh.positions_m().len()];
+    for (tet, nodes) in spec.mesh.tets().iter().enumerate() {
+        let lame = spec.regions[spec.tet_region[tet] as usize].material.lame;
+        let indentation = lame.young_modulus_pa() / (1.0 - lame.poisson_ratio().powi(2));
+        for &node in nodes {
+            of_node[node as usize] = of_node[node as usize].max(DVec2::new(lame.p_wave_modulus_pa(), indentation));
+        }
+    }
+    let mean = |triangle| surface.triangle_nodes(triangle).iter().map(|&n| of_node[n as usize]).sum::<DVec2>() / 3.0;
+    (0..surface.triangles.len())
+        .map(|triangle| SurfaceModuli { p_wave_pa: mean(triangle).x, indentation_pa: mean(triangle).y })
+        .collect()
+}
+
+fn free_inverse_mass(mass_kg: &[f64], prescribed: &[PrescribedSpec]) -> Result<Vec<DVec3>, ModelError> {
+    let mut inverse: Vec<DVec3> = mass_kg.iter().map(|m| DVec3::splat(1.0 / m)).collect();
+    let mut owner: Vec<[Option<usize>; 3]> = vec![[None; 3]; mass_kg.len()];
+    for (set, spec) in prescribed.iter().enumerate() {
+        for &node in &spec.nodes {
+            for axis in (0..3).filter(|&axis| spec.axes[axis]) {
+                let slot = &mut owner[node as usize][axis];
+                if let Some(first) = slot.replace(set).filter(|&first| first != set) {
+                    return Err(ModelError::PrescribedTwice {
+                        node,
+                        axis: ['x', 'y', 'z'][axis],
+                        first: prescribed[first].name.clone(),
+                        second: spec.name.clone(),
+                    });
+                }
+                inverse[node as usize][axis] = 0.0;
+            }
+        }
+    }
+    Ok(inverse)
+}

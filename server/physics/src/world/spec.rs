@@ -1,0 +1,119 @@
+//! What a model is built from.
+use crate::{contact::ToolSpec, material::Material, mesh::TetMesh};
+use glam::DVec3;
+
+/// A material and density shared by some tets.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Region {
+    /// Name for messages.
+    pub name: String,
+    /// Constitutive law and constants.
+    pub material: Material,
+    /// Density (kg/m³).
+    pub density_kg_per_m3: f64,
+}
+
+/// A load at factor 1; every tick scales it ([`TickInput::load_factors`]).
+#[derive(Debug, Clone, PartialEq)]
+pub enum LoadSpec {
+    /// Forces on nodes (N, world).
+    NodalForces(Vec<(u32, DVec3)>),
+    /// Dead traction on surface triangles (Pa, world), per rest area.
+    Traction {
+        /// Surface triangle indices.
+        triangles: Vec<u32>,
+        /// Traction (Pa).
+        traction_pa: DVec3,
+    },
+    /// Pressure on surface triangles (Pa, positive pushes inwards).
+    Pressure {
+        /// Surface triangle indices.
+        triangles: Vec<u32>,
+        /// Pressure (Pa).
+        pressure_pa: f64,
+        /// Follows the deformed surface, or acts as at rest (dead).
+        follower: bool,
+    },
+}
+
+/// Nodes whose displacement is prescribed along some axes ([`TickInput::prescribed_displacements_m`]); fixed ones are prescribed zero.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PrescribedSpec {
+    /// Name for reactions.
+    pub name: String,
+    /// Nodes.
+    pub nodes: Vec<u32>,
+    /// Which of x, y, z are prescribed.
+    pub axes: [bool; 3],
+}
+
+/// Precision of the force kernel. State and time integration are f64 always.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Precision {
+    /// f32 forces, f64 state: the default of haptic scenes.
+    #[default]
+    Single,
+    /// f64 throughout.
+    Double,
+}
+
+/// How many substeps a tick takes.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub enum Substeps {
+    /// From the measured ω_max (see [`Model::substeps`]).
+    #[default]
+    Measured,
+    /// As given, stable or not.
+    Fixed(u32),
+}
+
+/// Numerical settings.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Settings {
+    /// Tick period T (s).
+    pub tick_period_s: f64,
+    /// Substeps per tick.
+    pub substeps: Substeps,
+    /// Fraction of the stable step used, in (0, 1].
+    pub step_safety: f64,
+    /// Largest principal stretch the step must stay stable at (≥ 1).
+    pub stretch_allowance: f64,
+    /// Precision of the force kernel.
+    pub precision: Precision,
+    /// Mass-proportional damping c (1/s): `v̇ = … − c v`.
+    pub mass_damping_per_s: f64,
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Self {
+            tick_period_s: 1e-3,
+            substeps: Substeps::Measured,
+            step_safety: 0.9,
+            stretch_allowance: 1.2,
+            precision: Precision::Single,
+            mass_damping_per_s: 0.0,
+        }
+    }
+}
+
+/// Everything a [`Model`] is built from.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ModelSpec {
+    /// Rest mesh.
+    pub mesh: TetMesh,
+    /// Materials.
+    pub regions: Vec<Region>,
+    /// Region of each tet.
+    pub tet_region: Vec<u16>,
+    /// Prescribed displacements; a node's axis may be prescribed once.
+    pub prescribed: Vec<PrescribedSpec>,
+    /// Loads.
+    pub loads: Vec<LoadSpec>,
+    /// Gravity (m/s²).
+    pub gravity_m_per_s2: DVec3,
+    /// Tools.
+    pub tools: Vec<ToolSpec>,
+    /// Numerical settings.
+    pub settings: Settings,
+}

@@ -1,0 +1,109 @@
+//! What a tick changes.
+use super::Model;
+use crate::{
+    contact::{ContactState, ToolState, ToolTarget},
+    health::{Ledger, Quarantine, ViscousPower},
+};
+use glam::DVec3;
+use serde::{Deserialize, Serialize};
+
+/// What a tick changes.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct State {
+    /// Ticks done since reset.
+    pub tick: u64,
+    /// Positions (m), one per node.
+    pub x: Vec<DVec3>,
+    /// Velocities (m/s), one per node, at the same time as `x`.
+    pub v: Vec<DVec3>,
+    /// Total force (N) at `x`: what the next half kick uses.
+    pub force_n: Vec<DVec3>,
+    /// The part of it that loads, tools and injected forces make (N).
+    pub external_n: Vec<DVec3>,
+    /// False: `force_n` must be computed anew before it is used.
+    pub force_is_current: bool,
+    /// Tools, one per [`ModelSpec::tools`].
+    pub tools: Vec<ToolState>,
+    /// What contact remembers: samples touched, friction springs, and geometry that follows from `x`.
+    pub contact: ContactState,
+    /// Factor of every load at the end of the last tick.
+    pub load_factors: Vec<f64>,
+    /// Work and dissipation since reset.
+    pub ledger: Ledger,
+    /// Power of viscous stress at the last two substeps.
+    pub viscous: ViscousPower,
+    /// Set when a tick's result was not finite.
+    pub quarantine: Option<Quarantine>,
+}
+
+impl State {
+    /// At rest, at tick 0.
+    pub fn at_rest(model: &Model) -> Self {
+        let nodes = model.rest_positions_m().len();
+        Self {
+            tick: 0,
+            x: model.rest_positions_m().to_vec(),
+            v: vec![DVec3::ZERO; nodes],
+            force_n: vec![DVec3::ZERO; nodes],
+            external_n: vec![DVec3::ZERO; nodes],
+            force_is_current: false,
+            tools: model.tools_at_start(),
+            contact: model.contact().state(),
+            load_factors: vec![0.0; model.spec().loads.len()],
+            ledger: Ledger::default(),
+            viscous: ViscousPower::default(),
+            quarantine: None,
+        }
+    }
+
+    /// Copies another state of the same model into the buffers it has: allocates nothing.
+    pub fn copy_from(&mut self, other: &Self) {
+        self.tick = other.tick;
+        self.x.copy_from_slice(&other.x);
+        self.v.copy_from_slice(&other.v);
+        self.force_n.copy_from_slice(&other.force_n);
+        self.external_n.copy_from_slice(&other.external_n);
+        self.force_is_current = other.force_is_current;
+        self.tools.clone_from_slice(&other.tools);
+        self.contact.copy_from(&other.contact);
+        self.load_factors.copy_from_slice(&other.load_factors);
+        self.ledger = other.ledger;
+        self.viscous = other.viscous;
+        self.quarantine = other.quarantine;
+    }
+
+    /// Back to rest at tick 0, as [`Self::at_rest`], in the buffers it has: allocates nothing.
+    pub fn reset(&mut self, model: &Model) {
+        self.tick = 0;
+        self.x.copy_from_slice(model.rest_positions_m());
+        for buffer in [&mut self.v, &mut self.force_n, &mut self.external_n] {
+            buffer.fill(DVec3::ZERO);
+        }
+        self.force_is_current = false;
+        for (tool, spec) in self.tools.iter_mut().zip(&model.spec().tools) {
+            *tool = ToolState::at_start(spec);
+        }
+        self.contact.clear();
+        self.load_factors.fill(0.0);
+        self.ledger = Ledger::default();
+        self.viscous = ViscousPower::default();
+        self.quarantine = None;
+    }
+
+    /// Puts a tool and its device at rest at `position_m` (m, world), as if it had always been there: it neither sweeps what
+    /// lies between nor keeps its contact. A position that is not finite, or a tool that is not there, changes nothing.
+    /// Allocates nothing.
+    pub fn place_tool(&mut self, tool: usize, position_m: DVec3) {
+        let Some(state) = self.tools.get_mut(tool).filter(|_| position_m.is_finite()) else { return };
+        state.target = ToolTarget { position_m, velocity_m_per_s: DVec3::ZERO };
+        state.let_go();
+        state.centre_m = position_m;
+        self.contact.clear_tool(tool);
+        self.force_is_current = false;
+    }
+
+    /// Simulated time (s) since reset.
+    pub fn time_s(&self, model: &Model) -> f64 {
+        self.tick as f64 * model.spec().settings.tick_period_s
+    }
+}

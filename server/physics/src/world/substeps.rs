@@ -1,0 +1,42 @@
+//! How many substeps a tick needs.
+use super::{ModelError, ModelSpec, Settings, Substeps};
+use crate::material::Material;
+
+/// More substeps than this are refused at load.
+pub const MAX_SUBSTEPS: u32 = 100_000;
+
+/// How much the square of a frequency grows at the allowed stretch: the worst of the laws ([`Material::stiffening`]).
+pub(super) fn stiffening(settings: &Settings, materials: &[Material]) -> f64 {
+    materials.iter().map(|material| material.stiffening(settings.stretch_allowance)).fold(1.0, f64::max)
+}
+
+/// Substeps for a stable leapfrog: `dt = safety · (2/ω)(√(1 + ξ²) − ξ)`.
+///
+/// ω is the largest frequency of the body stretched by s and touched everywhere, `ω² = λ_max(M^{-½} (χK + K_contact) M^{-½})` with
+/// the laws' stiffening χ. ξ is the damping ratio at ω: viscous stress grows with s⁴ (`P_v = F S_v`, `Ė = sym(Ḟᵀ F)`), so
+/// `ξ = ½ ω τ s⁴/χ`, with τ the largest ratio of viscosity to stiffness over P-waves, shear and bulk:
+/// `(φ + 2ψ)/(λ + 2µ)`, `ψ/µ`, `(φ + ⅔ψ)/(λ + ⅔µ)`.
+pub(super) fn choose(spec: &ModelSpec, materials: &[Material], omega: f64) -> Result<u32, ModelError> {
+    let settings = &spec.settings;
+    if let Substeps::Fixed(substeps) = settings.substeps {
+        return Ok(substeps);
+    }
+    let viscous_growth = settings.stretch_allowance.powi(4) / stiffening(settings, materials);
+    let xi = 0.5 * omega * viscous_growth * materials.iter().map(relaxation_time_s).fold(0.0, f64::max);
+    let dt_s = settings.step_safety * 2.0 / omega * ((1.0 + xi * xi).sqrt() - xi);
+    let substeps = (settings.tick_period_s / dt_s).ceil().max(1.0);
+    if substeps <= f64::from(MAX_SUBSTEPS) {
+        Ok(substeps as u32)
+    } else {
+        Err(ModelError::TooStiff { substeps: substeps as u64, omega_rad_per_s: omega, limit: MAX_SUBSTEPS })
+    }
+}
+
+/// Largest ratio of viscosity to stiffness (s) over P-waves, shear and bulk.
+fn relaxation_time_s(material: &Material) -> f64 {
+    let (lame, viscosity) = (material.lame, material.viscosity);
+    let ratio = |lambdas: f64, mus: f64| {
+        (lambdas * viscosity.phi_pa_s + mus * viscosity.psi_pa_s) / (lambdas * lame.lambda_pa + mus * lame.mu_pa)
+    };
+    ratio(1.0, 2.0).max(ratio(0.0, 1.0)).max(ratio(1.0, 2.0 / 3.0))
+}
