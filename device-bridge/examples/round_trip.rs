@@ -239,6 +239,7 @@ fn answer(up: &v1::DeviceUp) -> v1::DeviceDown {
         force_n: vector,
         stiffness_n_per_m: Some(v1::Mat3 { column_major: vec![1.0; 9] }),
         validity_radius_m: 0.01,
+        max_force_n: 3.0,
         tick: sequence,
     };
     let command = v1::DeviceCommand {

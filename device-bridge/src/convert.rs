@@ -35,8 +35,9 @@ pub struct Welcome {
 /// A checked command.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Command {
-    /// When it arrived (ns, this machine's monotonic clock).
-    pub received_ns: u64,
+    /// When the pose that it answers was read (ns, this machine's monotonic clock): from here its age counts, so that every
+    /// delay on the way up, in the daemon and on the way down makes it older.
+    pub answers_ns: u64,
     /// Tick that computed it.
     pub tick: u64,
     /// Force on the arm (N).
@@ -112,25 +113,32 @@ pub fn welcome(wire: &v1::DeviceWelcome) -> Result<Welcome, Rejection> {
     })
 }
 
-/// A command, received at `received_ns`.
+/// A command, received at `received_ns`; `None` before the daemon has had a first pose to answer.
 ///
 /// # Errors
-/// [`Rejection`] for the whole command when any part of it is bad: half a command is no command.
-pub fn command(wire: &v1::DeviceCommand, welcome: &Welcome, received_ns: u64) -> Result<Command, Rejection> {
+/// [`Rejection`] for the whole command when any part of it is bad: half a command is no command. So is one that answers a pose
+/// which was not read yet.
+pub fn command(wire: &v1::DeviceCommand, welcome: &Welcome, received_ns: u64) -> Result<Option<Command>, Rejection> {
     let wrench = wire.wrench.as_ref().ok_or(Rejection::Missing("wrench"))?;
     let force_n = vector("wrench.force_n", wrench.force_n.as_ref())?;
     // The arms of today have no motors for torque; a bad one still shows a daemon gone wrong.
     vector("wrench.torque_nm", wrench.torque_nm.as_ref().or(Some(&v1::Vec3::default())))?;
     let local_model = wire.local_model.as_ref().map(local_model).transpose()?;
+    if wire.sample_sequence == 0 {
+        return Ok(None);
+    }
+    if wire.echo_device_time_ns > received_ns {
+        return Err(Rejection::OutOfRange("echo_device_time_ns"));
+    }
     let model_ticks = wire.local_model.as_ref().map_or(0, |model| wire.tick.saturating_sub(model.tick));
-    Ok(Command {
-        received_ns,
+    Ok(Some(Command {
+        answers_ns: wire.echo_device_time_ns,
         tick: wire.tick,
         force_n,
         local_model,
         model_age_s: model_ticks as f64 * welcome.tick_period_s,
         limits: welcome.limits,
-    })
+    }))
 }
 
 fn local_model(wire: &v1::LocalContactModel) -> Result<LocalModel, Rejection> {
@@ -146,6 +154,7 @@ fn local_model(wire: &v1::LocalContactModel) -> Result<LocalModel, Rejection> {
         force_n: vector("local_model.force_n", wire.force_n.as_ref())?,
         stiffness_n_per_m: DMat3::from_cols_array(columns),
         validity_radius_m: positive("local_model.validity_radius_m", wire.validity_radius_m)?,
+        max_force_n: positive("local_model.max_force_n", wire.max_force_n)?,
     };
     if !model.stiffness_n_per_m.is_finite() {
         return Err(Rejection::NotFinite("local_model.stiffness_n_per_m"));
@@ -202,6 +211,7 @@ mod tests {
                 }),
                 validity_radius_m: 1e-3,
                 tick: 14,
+                max_force_n: 3.0,
             }),
             proxy_position_m: vec(0.1, 0.0, 0.0),
         }
@@ -209,17 +219,24 @@ mod tests {
 
     #[test]
     fn a_good_command_passes_whole() {
-        let command = command(&good(), &welcomed(), 99).unwrap();
-        assert_eq!((command.received_ns, command.tick, command.force_n), (99, 17, DVec3::Z));
+        let command = command(&good(), &welcomed(), 99).unwrap().unwrap();
+        assert_eq!((command.answers_ns, command.tick, command.force_n), (7, 17, DVec3::Z));
         assert!((command.model_age_s - 3e-3).abs() < 1e-15);
         let model = command.local_model.unwrap();
         assert_eq!(model.stiffness_n_per_m.z_axis, DVec3::new(0.0, 0.0, -400.0));
     }
 
     #[test]
+    fn a_command_without_a_pose_is_none_and_one_from_the_future_is_refused() {
+        let unasked = v1::DeviceCommand { sample_sequence: 0, echo_device_time_ns: 0, ..good() };
+        assert_eq!(command(&unasked, &welcomed(), 99), Ok(None));
+        assert_eq!(command(&good(), &welcomed(), 6), Err(Rejection::OutOfRange("echo_device_time_ns")));
+    }
+
+    #[test]
     fn every_bad_part_refuses_the_command_and_is_named() {
         type Spoil = fn(&mut v1::DeviceCommand);
-        let cases: [(Spoil, &str); 10] = [
+        let cases: [(Spoil, &str); 11] = [
             (|c| c.wrench = None, "wrench is missing"),
             (|c| c.wrench.as_mut().unwrap().force_n = None, "wrench.force_n is missing"),
             (|c| c.wrench.as_mut().unwrap().force_n.as_mut().unwrap().y = f64::NAN, "wrench.force_n is not finite"),
@@ -236,6 +253,7 @@ mod tests {
                 |c| c.local_model.as_mut().unwrap().validity_radius_m = 0.0,
                 "local_model.validity_radius_m is out of range",
             ),
+            (|c| c.local_model.as_mut().unwrap().max_force_n = 0.0, "local_model.max_force_n is out of range"),
             (|c| c.local_model.as_mut().unwrap().stiffness_n_per_m = None, "local_model.stiffness_n_per_m is missing"),
             (
                 |c| {
@@ -251,7 +269,7 @@ mod tests {
         for (spoil, message) in cases {
             let mut wire = good();
             spoil(&mut wire);
-            assert_eq!(command(&wire, &welcomed(), 0).unwrap_err().to_string(), message);
+            assert_eq!(command(&wire, &welcomed(), 99).unwrap_err().to_string(), message);
         }
     }
 

@@ -149,6 +149,8 @@ async fn start_servo(mut servo: Servo, settings: &Settings) -> Result<oneshot::R
             let mut granted = measures.apply();
             let _ = say.send(std::mem::take(&mut granted.notes));
             servo.run(&mut tick_loop);
+            // The arm is without force before anybody is told.
+            drop(servo);
             let _ = done.send(());
         })
         .map_err(|source| BridgeError::System { what: "start the servo thread", source })?;
@@ -205,8 +207,8 @@ impl Watcher {
 
     fn say(&self, link: Link) {
         match link {
-            Link::Waiting => tracing::info!("no force until the daemon sends a command"),
-            Link::Fresh | Link::Extrapolating => tracing::info!("commands arrive: the force ramps up"),
+            Link::Waiting => tracing::info!("no force until the daemon answers in time"),
+            Link::Fresh | Link::Extrapolating => tracing::info!("the daemon answers: the force ramps up"),
             Link::Ramping(fault) => tracing::warn!("{}: the force ramps to zero", reason(fault)),
             Link::Latched(fault) if self.auto_recover => {
                 tracing::warn!("{}: the force is zero until the daemon answers steadily", reason(fault));
@@ -227,7 +229,7 @@ fn phase(link: Link) -> Link {
 
 fn reason(fault: Fault) -> &'static str {
     match fault {
-        Fault::Stale => "no command for too long",
+        Fault::Stale => "no answer to a fresh pose for too long",
         Fault::NonFinite => "the arm's position is not finite",
         Fault::Peer => "the daemon stopped the force",
         Fault::Requested => "stopping",

@@ -15,7 +15,7 @@ use std::{
     sync::{Arc, atomic::Ordering},
 };
 
-/// With automatic recovery, commands must have come without a gap for so long (ns) since the fault was latched.
+/// With automatic recovery, poses must have been answered in time, without a gap, for so long (ns) since the fault was latched.
 const SETTLED_NS: u64 = 500_000_000;
 
 /// The law, free of threads and clocks.
@@ -57,7 +57,7 @@ impl ServoLaw {
 
     /// A new command.
     pub fn receive(&mut self, command: &Command) {
-        self.watchdog.sample_arrived(command.received_ns);
+        self.watchdog.sample_arrived(command.answers_ns);
         let (ours, theirs) = (self.settings.limits, command.limits);
         self.limiter.set_limits(ForceLimits {
             max_force_n: ours.max_force_n.min(theirs.max_force_n),
@@ -130,7 +130,7 @@ impl ServoLaw {
 
     fn recover_when_steady(&mut self, now_ns: u64) {
         let gap_ns = (self.settings.watchdog.stale_after_s * 1e9) as u64;
-        let alive = self.command.is_some_and(|command| now_ns.saturating_sub(command.received_ns) <= gap_ns);
+        let alive = self.command.is_some_and(|command| now_ns.saturating_sub(command.answers_ns) <= gap_ns);
         self.steady_since_ns = if alive { self.steady_since_ns.or(Some(now_ns)) } else { None };
         let steady = self.steady_since_ns.is_some_and(|since| now_ns - since >= SETTLED_NS);
         if self.settings.auto_recover && steady {
@@ -159,12 +159,11 @@ pub struct Servo {
 }
 
 impl Servo {
-    /// Runs on this thread until told to stop and the force is at zero.
+    /// Runs on this thread until told to stop and the force is at zero. Dropped afterwards, by a panic too, it leaves the arm
+    /// without force.
     pub fn run(&mut self, tick_loop: &mut TickLoop) {
         let clock = tick_loop.clock().clone();
         tick_loop.run(|wakeup| self.tick(wakeup, clock.now_ns()));
-        self.device.apply(DVec3::ZERO);
-        self.shared.stats.set_force(0.0);
     }
 
     fn tick(&mut self, wakeup: &Wakeup, now_ns: u64) -> ControlFlow<()> {
@@ -214,5 +213,72 @@ impl Servo {
         stats.dropped_down.set(self.down.overwritten());
         stats.set_force(tick.limited.force_n.length());
         stats.set_link(tick.verdict.link);
+    }
+}
+
+impl Drop for Servo {
+    fn drop(&mut self) {
+        self.device.apply(DVec3::ZERO);
+        self.shared.stats.set_force(0.0);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{Config, device::Witness, settings::Settings};
+    use palpate_realtime::{Clock, slot};
+
+    /// A servo in full force on an arm that a test looks at, and panics at its `reads`-th reading.
+    fn pressed(reads: u64) -> (Servo, Arc<Witness>, SlotWriter<Option<Command>>) {
+        let mut config = Config::default();
+        config.watchdog.ramp_up_s = 0.0;
+        let settings = Settings::new(&config).unwrap();
+        let (mut commands, down) = slot(&None);
+        let (up, _samples) = slot(&None);
+        let witness = Arc::new(Witness::panicking_at(reads));
+        commands.publish(Some(Command {
+            answers_ns: Clock::Monotonic.now_ns() + 60_000_000_000,
+            tick: 1,
+            force_n: DVec3::Z,
+            local_model: None,
+            model_age_s: 0.0,
+            limits: settings.servo.limits,
+        }));
+        let servo = Servo {
+            law: ServoLaw::new(settings.servo),
+            device: Device::Witness(Arc::clone(&witness)),
+            down,
+            up,
+            bell: Doorbell::new().unwrap(),
+            shared: Arc::default(),
+            sequence: 0,
+        };
+        (servo, witness, commands)
+    }
+
+    #[tokio::test]
+    async fn an_arm_has_no_force_once_its_servo_is_dropped() {
+        let (mut servo, witness, _commands) = pressed(u64::MAX);
+        let wakeup = Wakeup { tick: 0, deadline_ns: 0, woke_ns: 0, skipped: 0, overrun: false };
+        for _ in 0..3 {
+            assert!(servo.tick(&wakeup, Clock::Monotonic.now_ns()).is_continue());
+        }
+        assert!(witness.force_n() > 0.5, "{} N", witness.force_n());
+        let shared = Arc::clone(&servo.shared);
+        drop(servo);
+        assert_eq!((witness.force_n(), shared.stats.force_n()), (0.0, 0.0));
+    }
+
+    #[tokio::test]
+    async fn a_panic_in_the_servo_leaves_no_force_on_the_arm() {
+        let (mut servo, witness, _commands) = pressed(20);
+        let thread = std::thread::spawn(move || {
+            let mut tick_loop = TickLoop::new(Clock::Monotonic, 1e-3).unwrap();
+            servo.run(&mut tick_loop);
+        });
+        assert!(thread.join().is_err(), "the driver panicked");
+        assert!(witness.peak_n() > 0.5, "there was a force before: {} N", witness.peak_n());
+        assert_eq!(witness.force_n(), 0.0);
     }
 }

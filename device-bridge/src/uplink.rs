@@ -249,7 +249,9 @@ impl Uplink {
         let now_ns = Clock::Monotonic.now_ns();
         match message.message {
             Some(Message::Command(wire)) => match convert::command(&wire, welcome, now_ns) {
-                Ok(command) => {
+                // Nothing was answered: no force comes of it, and no time.
+                Ok(None) => {}
+                Ok(Some(command)) => {
                     self.shared.stats.received.increment();
                     if wire.sample_sequence > told.newest_sequence {
                         told.newest_sequence = wire.sample_sequence;

@@ -65,6 +65,31 @@ async fn a_silent_daemon_means_zero_force_until_recovered() {
     assert_eq!(bridge.stop().await.reconnects, 0);
 }
 
+/// The network may be as slow as it is steady: an answer to an old pose is old. The thresholds are the default ones times fifty,
+/// for busy test machines: 5 ms, 15 ms of ramp, answers 8 ms and 25 ms old.
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn the_delay_of_the_network_counts_as_age() {
+    let mock = Mock::default();
+    let (address, _stop, _serving) = mock.serve("127.0.0.1:0").await;
+    let mut config = config(&format!("http://{address}"));
+    (config.watchdog.stale_after_s, config.watchdog.ramp_to_zero_s) = (0.25, 0.75);
+    let bridge = start(config);
+    let stats = bridge.handle.stats();
+    until("the force is up", || stats.force_n() > 0.99).await;
+    mock.set(|behaviour| behaviour.delay = Duration::from_millis(400));
+    until("the force ramps", || stats.link() == Link::Ramping(Fault::Stale) && stats.force_n() < 0.85).await;
+    let received = stats.received.get();
+    until("late commands flow", || stats.received.get() > received + 100).await;
+    assert_eq!(stats.link(), Link::Ramping(Fault::Stale));
+    assert!((0.3..0.85).contains(&stats.force_n()), "1 − (0.4 − 0.25)/0.75 = 0.8 N: {} N", stats.force_n());
+    mock.set(|behaviour| behaviour.delay = Duration::from_millis(1250));
+    until("the fault is latched", || stats.link() == Link::Latched(Fault::Stale)).await;
+    let received = stats.received.get();
+    until("late commands flow", || stats.received.get() > received + 100).await;
+    assert_eq!((stats.link(), stats.force_n()), (Link::Latched(Fault::Stale), 0.0));
+    bridge.stop().await;
+}
+
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn with_auto_recover_the_force_comes_back_by_itself() {
     let mock = Mock::default();
@@ -152,6 +177,7 @@ async fn the_local_model_is_rendered_beside_the_arm() {
             stiffness_n_per_m: Some(v1::Mat3 { column_major: vec![0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, -500.0] }),
             validity_radius_m: 0.01,
             tick: 1_000_000,
+            max_force_n: 3.0,
         });
     });
     let (address, _stop, _serving) = mock.serve("127.0.0.1:0").await;

@@ -45,11 +45,12 @@ fn the_servo_allocates_nothing() {
         force_n: DVec3::Z,
         stiffness_n_per_m: DMat3::from_diagonal(DVec3::splat(-300.0)),
         validity_radius_m: 0.01,
+        max_force_n: 100.0,
     };
     for tick in 0..500 {
         std::thread::sleep(std::time::Duration::from_millis(1));
         commands.publish(Some(Command {
-            received_ns: Clock::Monotonic.now_ns(),
+            answers_ns: Clock::Monotonic.now_ns(),
             tick,
             force_n: DVec3::Z,
             local_model: (tick % 100 < 50).then_some(model),

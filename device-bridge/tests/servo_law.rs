@@ -16,9 +16,9 @@ fn law(change: impl FnOnce(&mut Config)) -> ServoLaw {
     ServoLaw::new(runtime.block_on(async { Settings::new(&config).unwrap() }).servo)
 }
 
-fn command(received_ns: u64, force_n: DVec3, local_model: Option<LocalModel>) -> Command {
+fn command(answers_ns: u64, force_n: DVec3, local_model: Option<LocalModel>) -> Command {
     Command {
-        received_ns,
+        answers_ns,
         tick: 0,
         force_n,
         local_model,
@@ -62,6 +62,47 @@ fn silence_is_held_ramped_and_latched_within_twenty_ticks() {
     assert_eq!(law.latched(), 1);
 }
 
+/// Commands came every millisecond, and so counted as fresh, however old the poses were that they answered.
+#[test]
+fn answers_to_old_poses_ramp_and_latch_however_steadily_they_come() {
+    for (delay_ms, link, force_n) in [
+        (2, Link::Fresh, 1.0),
+        (4, Link::Extrapolating, 1.0),
+        (8, Link::Ramping(Fault::Stale), 1.0 - 3.0 / 15.0),
+        (25, Link::Latched(Fault::Stale), 0.0),
+    ] {
+        let mut law = law(|_| {});
+        let last = up(&mut law);
+        let mut out = law.tick(last, &still());
+        for tick in 1..=1000_u64 {
+            let now = last + tick * MS;
+            law.receive(&command(now - delay_ms * MS, DVec3::Z, None));
+            out = law.tick(now, &still());
+        }
+        assert_eq!(out.verdict.link, link, "{delay_ms} ms");
+        assert!((out.limited.force_n.z - force_n).abs() < 1e-9, "{delay_ms} ms: {}", out.limited.force_n.z);
+    }
+}
+
+#[test]
+fn late_answers_from_the_start_give_no_force_and_no_fault_and_do_not_count_as_recovery() {
+    let mut law = law(|config| config.servo.auto_recover = true);
+    let mut run = |ticks: std::ops::Range<u64>, delay_ms: u64| {
+        let mut out = None;
+        for tick in ticks {
+            law.receive(&command((tick - delay_ms) * MS, DVec3::Z, None));
+            out = Some(law.tick(tick * MS, &still()));
+        }
+        out.unwrap()
+    };
+    let out = run(100..1000, 25);
+    assert_eq!((out.verdict.link, out.limited.force_n), (Link::Waiting, DVec3::ZERO));
+    assert!(run(1000..1500, 1).limited.force_n.z > 0.99);
+    let out = run(1500..3000, 25);
+    assert_eq!((out.verdict.link, out.limited.force_n), (Link::Latched(Fault::Stale), DVec3::ZERO));
+    assert!(run(3000..3800, 1).limited.force_n.z > 0.99, "recovered by answers in time");
+}
+
 #[test]
 fn a_fading_force_is_replaced_by_damping() {
     let mut law = law(|config| config.watchdog.fading_damping_n_s_per_m = 2.0);
@@ -99,6 +140,7 @@ fn an_old_model_in_a_fresh_command_fades() {
         force_n: DVec3::Z,
         stiffness_n_per_m: DMat3::from_diagonal(DVec3::splat(-100.0)),
         validity_radius_m: 0.01,
+        max_force_n: 100.0,
     };
     // hold 20 ms, forget 100 ms: half at 60 ms.
     for (age_s, expected_n) in [(0.0, 1.0), (0.06, 0.5), (0.2, 0.0)] {
@@ -169,6 +211,7 @@ fn the_local_model_is_stable_where_the_delayed_force_is_not() {
                 force_n: wall_n,
                 stiffness_n_per_m: DMat3::from_diagonal(DVec3::new(0.0, 0.0, -stiffness)),
                 validity_radius_m: 0.02,
+                max_force_n: 100.0,
             };
             law.receive(&command(tick as u64 * MS, wall_n, Some(model)));
             let out = law.tick(tick as u64 * MS, &arm.motion());

@@ -22,6 +22,9 @@ pub struct Reading {
 pub enum Device {
     /// No hardware.
     Simulated(SimulatedDevice),
+    /// No arm at all: a test looks at its force.
+    #[cfg(test)]
+    Witness(std::sync::Arc<Witness>),
 }
 
 impl Device {
@@ -36,6 +39,8 @@ impl Device {
     pub fn read(&mut self, periods: u64) -> Reading {
         match self {
             Self::Simulated(device) => device.read(periods),
+            #[cfg(test)]
+            Self::Witness(witness) => witness.read(),
         }
     }
 
@@ -43,6 +48,44 @@ impl Device {
     pub fn apply(&mut self, force_n: DVec3) {
         match self {
             Self::Simulated(device) => device.apply(force_n),
+            #[cfg(test)]
+            Self::Witness(witness) => witness.apply(force_n),
         }
+    }
+}
+
+/// A driver for tests: rests at the origin, remembers its force, and panics at a given reading.
+#[cfg(test)]
+#[derive(Debug)]
+pub struct Witness {
+    panics_at: u64,
+    reads: std::sync::atomic::AtomicU64,
+    /// Force now, and the largest so far (N).
+    force_n: std::sync::Mutex<(f64, f64)>,
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used, clippy::panic)]
+impl Witness {
+    pub(crate) fn panicking_at(reading: u64) -> Self {
+        Self { panics_at: reading, reads: 0.into(), force_n: (0.0, 0.0).into() }
+    }
+
+    pub(crate) fn force_n(&self) -> f64 {
+        self.force_n.lock().unwrap().0
+    }
+
+    pub(crate) fn peak_n(&self) -> f64 {
+        self.force_n.lock().unwrap().1
+    }
+
+    fn read(&self) -> Reading {
+        assert!(self.reads.fetch_add(1, std::sync::atomic::Ordering::Relaxed) < self.panics_at, "the driver fails");
+        Reading { motion: Motion::at(DVec3::ZERO), buttons: 0, measured_force_n: None }
+    }
+
+    fn apply(&self, force_n: DVec3) {
+        let mut held = self.force_n.lock().unwrap();
+        *held = (force_n.length(), held.1.max(force_n.length()));
     }
 }

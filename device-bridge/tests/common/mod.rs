@@ -33,6 +33,8 @@ pub struct Behaviour {
     /// Sent once, before the next command.
     pub fault: Option<v1::DeviceFaultCode>,
     pub max_force_n: f64,
+    /// How long each answer is on its way; the next ones are sent meanwhile.
+    pub delay: Duration,
 }
 
 impl Default for Behaviour {
@@ -45,6 +47,7 @@ impl Default for Behaviour {
             refuse: None,
             fault: None,
             max_force_n: 100.0,
+            delay: Duration::ZERO,
         }
     }
 }
@@ -148,6 +151,16 @@ impl Device for Mock {
                     None => Some(Vec::new()),
                 };
                 let Some(answers) = answers else { return };
+                let (delay, down) = (mock.behaviour.lock().unwrap().delay, down.clone());
+                if !delay.is_zero() {
+                    tokio::spawn(async move {
+                        tokio::time::sleep(delay).await;
+                        for answer in answers {
+                            let _ = down.send(Ok(answer)).await;
+                        }
+                    });
+                    continue;
+                }
                 for answer in answers {
                     if down.send(Ok(answer)).await.is_err() {
                         return;

@@ -104,7 +104,7 @@ impl ForceLimiter {
 }
 
 /// `v` shortened to `max` if it is longer, and whether it was. Also for lengths whose square overflows.
-fn clamp_length(v: DVec3, max: f64) -> (DVec3, bool) {
+pub(crate) fn clamp_length(v: DVec3, max: f64) -> (DVec3, bool) {
     let scale = v.abs().max_element();
     if scale <= max / 2.0 {
         return (v, false);

@@ -1,8 +1,12 @@
 //! A linear model of a contact, rendered beside the arm between two messages of the daemon.
-use crate::parameter::{ParameterError, not_negative, positive};
+use crate::{
+    limits::clamp_length,
+    parameter::{ParameterError, not_negative, positive},
+};
 use glam::{DMat3, DVec3};
 
-/// Force on the arm near `point_m`: `F(p) = force_n + stiffness (p − point_m)`, without its pulling part.
+/// Force on the arm near `point_m`: `F(p) = force_n + stiffness (p − point_m)`, without its pulling part, and shortened to
+/// `max_force_n` where it is longer.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LocalModel {
     /// Arm position about which it is expanded (m).
@@ -15,6 +19,8 @@ pub struct LocalModel {
     pub stiffness_n_per_m: DMat3,
     /// Radius inside which it holds (m).
     pub validity_radius_m: f64,
+    /// Largest force that may be rendered from it (N).
+    pub max_force_n: f64,
 }
 
 /// How a local model is rendered.
@@ -51,7 +57,7 @@ impl RenderSettings {
 /// A rendered force.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Rendered {
-    /// Force on the arm (N); its normal part never pulls.
+    /// Force on the arm (N); its normal part never pulls, and it is never longer than the model's largest.
     pub force_n: DVec3,
     /// How much the model counted, 0 to 1: by distance and by age.
     pub weight: f64,
@@ -63,15 +69,16 @@ pub struct Rendered {
 const FADE_END: f64 = 2.0;
 
 impl LocalModel {
-    /// Accepts a received model: finite, normal of length 1 (± 1e-3, then normalised), positive radius; the stiffness is made
-    /// symmetric (`(K + Kᵀ)/2`), because a spring that is not gives energy on a closed path. `None` otherwise.
+    /// Accepts a received model: finite, normal of length 1 (± 1e-3, then normalised), positive radius and largest force; the
+    /// stiffness is made symmetric (`(K + Kᵀ)/2`), because a spring that is not gives energy on a closed path. `None` otherwise.
     pub fn accept(self) -> Option<Self> {
         let finite = self.point_m.is_finite()
             && self.normal.is_finite()
             && self.force_n.is_finite()
             && self.stiffness_n_per_m.is_finite();
         let radius_ok = self.validity_radius_m.is_finite() && self.validity_radius_m > 0.0;
-        if !(finite && radius_ok && (self.normal.length() - 1.0).abs() <= 1e-3) {
+        let force_ok = self.max_force_n.is_finite() && self.max_force_n > 0.0;
+        if !(finite && radius_ok && force_ok && (self.normal.length() - 1.0).abs() <= 1e-3) {
             return None;
         }
         let stiffness_n_per_m = (self.stiffness_n_per_m + self.stiffness_n_per_m.transpose()) * 0.5;
@@ -101,10 +108,14 @@ impl LocalModel {
         let spring_n = self.force_n + self.bounded_stiffness(settings.max_stiffness_n_per_m) * inside_d;
         if spring_n.dot(self.normal) <= 0.0 {
             // Off the surface: nothing pulls, nothing damps; what is left acts along the surface.
-            return Rendered { force_n: weight * without_pull(spring_n, self.normal), weight, outside };
+            return Rendered { force_n: weight * self.bounded(spring_n), weight, outside };
         }
         let damping_n = -settings.damping_n_s_per_m * velocity_m_per_s.dot(self.normal) * self.normal;
-        Rendered { force_n: weight * without_pull(spring_n + damping_n, self.normal), weight, outside }
+        Rendered { force_n: weight * self.bounded(spring_n + damping_n), weight, outside }
+    }
+
+    fn bounded(&self, force_n: DVec3) -> DVec3 {
+        clamp_length(without_pull(force_n, self.normal), self.max_force_n).0
     }
 
     /// K scaled so that no direction is stiffer than `max_n_per_m`: the largest column sum of |K| bounds its eigenvalues.
@@ -153,6 +164,7 @@ mod tests {
             force_n: DVec3::new(0.0, 0.0, 0.5),
             stiffness_n_per_m: DMat3::from_diagonal(DVec3::new(-50.0, -50.0, -500.0)),
             validity_radius_m: 5e-3,
+            max_force_n: 10.0,
         }
     }
 
@@ -205,6 +217,8 @@ mod tests {
             LocalModel { normal: DVec3::ZERO, ..wall() },
             LocalModel { validity_radius_m: 0.0, ..wall() },
             LocalModel { validity_radius_m: f64::INFINITY, ..wall() },
+            LocalModel { max_force_n: 0.0, ..wall() },
+            LocalModel { max_force_n: f64::NAN, ..wall() },
             LocalModel { stiffness_n_per_m: DMat3::from_diagonal(DVec3::splat(f64::MAX)) * 10.0, ..wall() },
         ] {
             assert_eq!(bad.accept(), None, "{bad:?}");
@@ -212,6 +226,17 @@ mod tests {
         let skew = DMat3::from_cols(DVec3::new(-1.0, 2.0, 0.0), DVec3::new(0.0, -1.0, 0.0), DVec3::new(0.0, 0.0, -1.0));
         let accepted = LocalModel { stiffness_n_per_m: skew, ..wall() }.accept().unwrap();
         assert_eq!(accepted.stiffness_n_per_m.y_axis.x, accepted.stiffness_n_per_m.x_axis.y);
+    }
+
+    #[test]
+    fn no_place_gives_more_than_the_largest_force() {
+        let wall = LocalModel { max_force_n: 1.2, ..wall() };
+        let deep = wall.render(DVec3::new(0.0, 0.0, -5e-3), DVec3::ZERO, 0.0, &SETTINGS).force_n;
+        assert!((deep - DVec3::Z * 1.2).length() < 1e-12, "{deep}");
+        let fast = wall.render(wall.point_m, DVec3::new(0.0, 0.0, -1e3), 0.0, &SETTINGS).force_n;
+        assert!((fast - DVec3::Z * 1.2).length() < 1e-12, "{fast}");
+        let half_faded = wall.render(DVec3::new(0.0, 0.0, -8.5e-3), DVec3::ZERO, 0.0, &SETTINGS).force_n;
+        assert!((half_faded - DVec3::Z * 0.6).length() < 1e-12, "{half_faded}");
     }
 
     #[test]

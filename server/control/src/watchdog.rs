@@ -1,11 +1,12 @@
 //! Is the other side still there? From the age of the newest sample to a ramp on the force.
 //!
 //! ```text
-//! Waiting ──sample──▶ Fresh ◀─▶ Extrapolating ◀─▶ Ramping ──ramp at 0──▶ Latched ──recover()──▶ Waiting
-//!                       └───────────────trip()──────▶ Ramping (no way back) ──▶ Latched
+//! Waiting ──fresh sample──▶ Fresh ◀─▶ Extrapolating ◀─▶ Ramping ──ramp at 0──▶ Latched ──recover()──▶ Waiting
+//!                             └───────────────trip()──────▶ Ramping (no way back) ──▶ Latched
 //! ```
 //! A short gap is bridged by extrapolation at full force, a longer one ramps the force to zero, and once at zero the fault is
-//! latched: force comes back only after an explicit [`Watchdog::recover`], a fresh sample, and a slow ramp up.
+//! latched: force comes back only after an explicit [`Watchdog::recover`], a fresh sample, and a slow ramp up. A sample that is
+//! stale when it comes ends no waiting.
 use crate::parameter::{ParameterError, not_negative, positive};
 
 /// Times of the watchdog. libfranka, for comparison, stops an arm after 20 lost packets of 1 ms.
@@ -62,7 +63,7 @@ pub enum Fault {
 /// State of the link.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Link {
-    /// No sample yet.
+    /// No fresh sample yet.
     Waiting,
     /// The newest sample is at most `fresh_for_s` old.
     Fresh,
@@ -93,6 +94,8 @@ pub struct Verdict {
 pub struct Watchdog {
     settings: WatchdogSettings,
     newest_ns: Option<u64>,
+    /// No sample has been fresh enough yet for a force.
+    waiting: bool,
     checked_ns: Option<u64>,
     level: f64,
     tripped: Option<(Fault, u64)>,
@@ -103,7 +106,16 @@ pub struct Watchdog {
 impl Watchdog {
     /// Waiting for a first sample, force at zero.
     pub fn new(settings: WatchdogSettings) -> Self {
-        Self { settings, newest_ns: None, checked_ns: None, level: 0.0, tripped: None, latched: None, faults: 0 }
+        Self {
+            settings,
+            newest_ns: None,
+            waiting: true,
+            checked_ns: None,
+            level: 0.0,
+            tripped: None,
+            latched: None,
+            faults: 0,
+        }
     }
 
     /// The settings.
@@ -116,9 +128,9 @@ impl Watchdog {
         self.faults
     }
 
-    /// A valid sample arrived at `now_ns`.
-    pub fn sample_arrived(&mut self, now_ns: u64) {
-        self.newest_ns = Some(self.newest_ns.map_or(now_ns, |newest| newest.max(now_ns)));
+    /// A valid sample of the time `sample_ns`: when it was measured where that is known, else when it arrived.
+    pub fn sample_arrived(&mut self, sample_ns: u64) {
+        self.newest_ns = Some(self.newest_ns.map_or(sample_ns, |newest| newest.max(sample_ns)));
     }
 
     /// Ramps down from `now_ns` on, whatever samples arrive, and latches. The first reason stays.
@@ -133,6 +145,7 @@ impl Watchdog {
         let was_latched = self.latched.take().is_some();
         if was_latched {
             self.newest_ns = None;
+            self.waiting = true;
         }
         was_latched
     }
@@ -154,11 +167,13 @@ impl Watchdog {
         if let Some((fault, tripped_ns)) = self.tripped {
             return self.ramp_down(fault, seconds(now_ns.saturating_sub(tripped_ns)));
         }
-        if self.newest_ns.is_none() {
+        let stale = age_s > self.settings.stale_after_s;
+        if self.newest_ns.is_none() || (self.waiting && stale) {
             self.level = 0.0;
             return Link::Waiting;
         }
-        if age_s > self.settings.stale_after_s {
+        self.waiting = false;
+        if stale {
             return self.ramp_down(Fault::Stale, age_s - self.settings.stale_after_s);
         }
         let rise = if self.settings.ramp_up_s > 0.0 { since_check_s / self.settings.ramp_up_s } else { 1.0 };

@@ -24,6 +24,7 @@ fn a_tick_of_everything_allocates_nothing() {
         force_n: DVec3::ZERO,
         stiffness_n_per_m: DMat3::from_diagonal(DVec3::splat(-500.0)),
         validity_radius_m: 0.02,
+        max_force_n: 100.0,
     };
     let mut peak_n: f64 = 0.0;
     assert_no_alloc(|| {

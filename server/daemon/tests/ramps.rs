@@ -3,6 +3,7 @@
 mod common;
 use common::{above, block_scene, pressing};
 use glam::DVec3;
+use palpate_control::{LocalModel, RenderSettings};
 use palpate_physics::Model;
 use palpate_realtime::{Clock, ManualClock};
 use palpate_scene::ScriptedHand;
@@ -34,6 +35,13 @@ struct Bench {
 impl Bench {
     fn new() -> Self {
         Self::with_arm(None)
+    }
+
+    fn with_peak(max_force_n: f64) -> Self {
+        let bench = Self::new();
+        bench.ends.tools[0].shared.detach();
+        bench.ends.tools[0].shared.attach(7, max_force_n);
+        bench
     }
 
     /// With a simulated arm whose hand rests at a place while no device is attached.
@@ -122,6 +130,62 @@ async fn a_slow_body_is_released_as_fast_as_a_quick_one() {
     assert!(forces_n[0] > 0.0 && forces_n[0] < full_n, "{forces_n:?}");
     assert_eq!(forces_n[3], 0.0, "{forces_n:?}");
     assert!(bench.simulation.is_released());
+}
+
+/// The largest force (N) that a bridge renders from the output's model anywhere in its validity radius.
+fn most_rendered_n(output: &ToolOutput) -> f64 {
+    let Some(model) = output.local_model else { return 0.0 };
+    let rendering =
+        RenderSettings { hold_s: 1.0, forget_s: 2.0, damping_n_s_per_m: 0.0, max_stiffness_n_per_m: 1e9 }.checked();
+    let model = LocalModel {
+        point_m: model.point_m,
+        normal: model.normal,
+        force_n: model.force_n,
+        stiffness_n_per_m: model.stiffness_n_per_m,
+        validity_radius_m: model.validity_radius_m,
+        max_force_n: output.model_max_force_n,
+    };
+    let model = model.accept().expect("a bridge takes it");
+    let directions = [-1.0, 0.0, 1.0].map(|x| [-1.0, 0.0, 1.0].map(|y| [-1.0, 0.0, 1.0].map(|z| DVec3::new(x, y, z))));
+    let at = |direction: &DVec3| model.point_m + direction.normalize_or_zero() * model.validity_radius_m;
+    let rendered = directions.as_flattened().as_flattened().iter();
+    let force_n = |place_m| model.render(place_m, DVec3::ZERO, 0.0, rendering.as_ref().unwrap()).force_n.length();
+    rendered.map(|direction| force_n(at(direction))).fold(0.0, f64::max)
+}
+
+/// The local model went to the arm as stiff and strong as the body is, whatever the limit of the arm.
+#[tokio::test]
+async fn the_local_model_keeps_to_the_peak_and_the_ramp_wherever_it_is_rendered() {
+    let (mut bench, full_n) = Bench::pressed();
+    let free = bench.tick(RUN, pressing(), 1);
+    let model = free.local_model.unwrap();
+    assert!((model.force_n.length() - free.force_n.length()).abs() < 1e-9 * full_n, "not limited: the model's force");
+    assert!(most_rendered_n(&free) > 1.01 * full_n, "deeper is more: {} N", most_rendered_n(&free));
+    let stiffness = model.stiffness_n_per_m.z_axis.z;
+
+    // An arm that takes only half of it: half the force at the point, half as stiff, and no more anywhere.
+    let (mut bench, peak_n) = (Bench::with_peak(0.5 * full_n), 0.5 * full_n);
+    for _ in 0..300 {
+        assert!(most_rendered_n(&bench.tick(RUN, above(), 1)) <= peak_n);
+    }
+    let mut output = ToolOutput::default();
+    for _ in 0..600 {
+        output = bench.tick(RUN, pressing(), 1);
+        assert!(most_rendered_n(&output) <= peak_n * (1.0 + 1e-12), "{} N", most_rendered_n(&output));
+    }
+    let model = output.local_model.unwrap();
+    assert!((model.force_n.length() - peak_n).abs() < 1e-3 * peak_n, "{} N", model.force_n.length());
+    let softened = model.stiffness_n_per_m.z_axis.z / stiffness;
+    assert!((softened - 0.5).abs() < 0.05, "{softened}");
+
+    // On the way to zero: never more than the ramp leaves.
+    let limits = default_limits();
+    for tick in 1..=16_u32 {
+        let output = bench.tick(PAUSED, pressing(), 1);
+        let ramp = (1.0 - f64::from(tick) * 1e-3 / limits.watchdog.ramp_to_zero_s).max(0.0);
+        assert!(most_rendered_n(&output) <= ramp * peak_n + 1e-9, "{} N", most_rendered_n(&output));
+        assert!(tick < 16 || output.local_model.is_none());
+    }
 }
 
 /// Largest displacement of a node (m).

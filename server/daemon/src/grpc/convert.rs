@@ -210,12 +210,12 @@ pub fn device_command(output: &ToolOutput) -> v1::DeviceCommand {
         wrench: Some(v1::Wrench { force_n: Some(wire_vec3(output.force_n)), torque_nm: Some(wire_vec3(DVec3::ZERO)) }),
         sample_sequence: output.sample_sequence,
         echo_device_time_ns: output.echo_device_time_ns,
-        local_model: output.local_model.as_ref().map(|model| local_model(model, output.tick)),
+        local_model: output.local_model.as_ref().map(|model| local_model(model, output)),
         proxy_position_m: Some(wire_vec3(output.proxy_position_m)),
     }
 }
 
-fn local_model(model: &LocalContactModel, tick: u64) -> v1::LocalContactModel {
+fn local_model(model: &LocalContactModel, output: &ToolOutput) -> v1::LocalContactModel {
     let stiffness: &DMat3 = &model.stiffness_n_per_m;
     v1::LocalContactModel {
         point_m: Some(wire_vec3(model.point_m)),
@@ -223,7 +223,8 @@ fn local_model(model: &LocalContactModel, tick: u64) -> v1::LocalContactModel {
         force_n: Some(wire_vec3(model.force_n)),
         stiffness_n_per_m: Some(v1::Mat3 { column_major: stiffness.to_cols_array().to_vec() }),
         validity_radius_m: model.validity_radius_m,
-        tick,
+        tick: output.tick,
+        max_force_n: output.model_max_force_n,
     }
 }
 

@@ -45,8 +45,11 @@ pub struct ToolOutput {
     pub sample_sequence: u64,
     /// Its device time (ns).
     pub echo_device_time_ns: u64,
-    /// Contact around the device, scaled like the force; `None` out of contact or when the force is zero by order.
+    /// Contact around the device, its force and stiffness scaled as the wrench is; `None` out of contact or when the force is zero
+    /// by order.
     pub local_model: Option<LocalContactModel>,
+    /// Largest force (N) that may be rendered from the local model: the peak times the ramp.
+    pub model_max_force_n: f64,
     /// Centre of the proxy (m, world).
     pub proxy_position_m: DVec3,
     /// No sample for too long: the force ramps to zero.

@@ -175,7 +175,7 @@ impl ToolLoop {
         }
         let Some(sample) = &self.newest else { return held };
         let verdict = self.watchdog.check(now_ns);
-        self.stale = matches!(verdict.link, Link::Ramping(_) | Link::Latched(_));
+        self.stale = !matches!(verdict.link, Link::Fresh | Link::Extrapolating);
         let motion = Motion { velocity_m_per_s: sample.velocity_m_per_s, ..Motion::at(sample.position_m) };
         let there = extrapolate(&motion, verdict.extrapolate_s, self.limits.watchdog.stale_after_s);
         let velocity_m_per_s = if self.stale { DVec3::ZERO } else { there.velocity_m_per_s };
@@ -201,13 +201,20 @@ impl ToolLoop {
         let watched = if self.is_attached() { self.watchdog.check(frame.now_ns).ramp } else { 1.0 };
         let ramp = watched * self.level;
         let limited = self.limiter.limit(self.raw_n, ramp, frame.period_s);
+        let model_max_force_n = ramp * self.limiter.limits().max_force_n;
+        let rendered = tool.local_model.filter(|_| ramp > 0.0 && !limited.non_finite);
         self.output = ToolOutput {
             attachment: self.attachment,
             tick: frame.tick,
             force_n: limited.force_n,
             sample_sequence: self.newest.map_or(0, |s| s.sequence),
             echo_device_time_ns: self.newest.map_or(0, |s| s.device_time_ns),
-            local_model: tool.local_model.filter(|_| ramp > 0.0).map(|model| scaled(&model, ramp)),
+            local_model: rendered.map(|model| {
+                let cut = left_of(self.raw_n.length(), limited.force_n.length() / ramp);
+                let to_peak = left_of(model.force_n.length() * cut * ramp, model_max_force_n);
+                scaled(&model, ramp * cut * to_peak)
+            }),
+            model_max_force_n,
             proxy_position_m: tool.centre_m,
             stale: self.stale,
             limited: limited.saturated || limited.rate_limited || limited.non_finite,
@@ -282,6 +289,12 @@ pub struct Moment {
     pub quarantined: Option<u64>,
 }
 
+/// Share of `wanted_n` that `allowed_n` leaves, at most 1.
+fn left_of(wanted_n: f64, allowed_n: f64) -> f64 {
+    if wanted_n > allowed_n { allowed_n / wanted_n } else { 1.0 }
+}
+
+/// Force and stiffness are scaled together: a contact that is cut to half its force is rendered half as stiff.
 fn scaled(model: &LocalContactModel, by: f64) -> LocalContactModel {
     LocalContactModel { force_n: model.force_n * by, stiffness_n_per_m: model.stiffness_n_per_m * by, ..*model }
 }
