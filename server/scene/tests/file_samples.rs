@@ -1,7 +1,7 @@
 //! One mesh in every format, as other programs write it: each file must give the same mesh.
 #![allow(clippy::unwrap_used, clippy::expect_used)] // a test that cannot read its samples has failed
 use glam::DVec3;
-use palpate_scene::files::{GroupedMesh, SurfaceFile, UnusedNodes, read_surface, read_volume};
+use palpate_scene::files::{GroupedMesh, Members, SurfaceFile, UnusedNodes, read_surface, read_volume};
 use std::path::{Path, PathBuf};
 
 fn sample(name: &str) -> PathBuf {
@@ -12,6 +12,13 @@ fn sample(name: &str) -> PathBuf {
 fn mesh(name: &str) -> GroupedMesh {
     let file = read_volume(&sample(name)).unwrap_or_else(|error| panic!("{name}: {error}"));
     file.into_tet_mesh(1e-3, UnusedNodes::Drop).unwrap_or_else(|error| panic!("{name}: {error}"))
+}
+
+/// What belongs to the one group that a text means.
+fn members(mesh: &GroupedMesh, text: &str) -> Members {
+    let called: Vec<usize> = (0..mesh.groups.len()).filter(|&group| mesh.groups[group].is_called(text)).collect();
+    assert_eq!(called.len(), 1, "{text}: {:?}", mesh.groups);
+    mesh.members().swap_remove(called[0])
 }
 
 /// Tets as their corners' coordinates in units of 1e-9 m, each turned to begin with its least corner but one
@@ -117,7 +124,7 @@ fn physical_names_surfaces_and_points_are_kept() {
     ] {
         let mesh = mesh(name);
         let at = |group: &str, x_m: f64| {
-            let nodes = mesh.nodes_of(group);
+            let nodes = members(&mesh, group).nodes;
             assert!(!nodes.is_empty(), "{name}: {group}");
             assert!(
                 nodes.iter().all(|&n| (mesh.mesh.positions_m()[n as usize].x - x_m).abs() < 1e-12),
@@ -126,16 +133,16 @@ fn physical_names_surfaces_and_points_are_kept() {
         };
         at("base", 0.0);
         at("tip", 4e-3);
-        let corner = mesh.nodes_of("corner");
+        let corner = members(&mesh, "corner").nodes;
         assert_eq!(corner.len(), 1, "{name}");
         assert_eq!(mesh.mesh.positions_m()[corner[0] as usize], DVec3::ZERO, "{name}");
-        let half = |group: &str| mesh.tets_of(group).iter().map(|&tet| mesh.mesh.volume_m3(tet as usize)).sum::<f64>();
+        let half =
+            |group: &str| members(&mesh, group).tets.iter().map(|&tet| mesh.mesh.volume_m3(tet as usize)).sum::<f64>();
         assert!((half("left") - 2e-9).abs() < 1e-21 && (half("right") - 2e-9).abs() < 1e-21, "{name}");
-        assert_eq!(mesh.tets_of("left"), mesh.tets_of("11"), "{name}");
+        assert_eq!(members(&mesh, "left").tets, members(&mesh, "11").tets, "{name}");
         // A square millimetre of triangles.
         let area_m2 = |group: &str| -> f64 {
-            let (_, triangles) =
-                mesh.surface_groups.iter().find(|(g, _)| mesh.groups[*g].name == group).expect("the group");
+            let triangles = members(&mesh, group).triangles;
             let corners = |t: &[u32; 3]| t.map(|n| mesh.mesh.positions_m()[n as usize]);
             triangles.iter().map(corners).map(|[a, b, c]| (b - a).cross(c - a).length() / 2.0).sum()
         };
@@ -149,8 +156,22 @@ fn overlapping_groups_are_kept() {
     for name in ["bar_overlap_v41_ascii.msh", "bar_overlap_v22_ascii.msh"] {
         let mesh = mesh(name);
         assert_eq!(mesh.mesh.tets().len(), 91, "{name}");
-        assert_eq!(mesh.tets_of("all").len(), 91, "{name}");
-        assert_eq!(mesh.tets_of("left").len() + mesh.tets_of("right").len(), 91, "{name}");
+        assert_eq!(members(&mesh, "all").tets.len(), 91, "{name}");
+        assert_eq!(members(&mesh, "left").tets.len() + members(&mesh, "right").tets.len(), 91, "{name}");
+    }
+}
+
+/// Gmsh numbers the groups of each dimension apart: volume 1 is not surface 1.
+#[test]
+fn groups_of_one_number_in_two_dimensions_are_two() {
+    for name in ["bar_unnamed_v41_ascii.msh", "bar_unnamed_v22_ascii.msh"] {
+        let mesh = mesh(name);
+        let (volume, surface) = (members(&mesh, "volume 1"), members(&mesh, "surface 1"));
+        assert!(volume.triangles.is_empty() && surface.tets.is_empty(), "{name}");
+        assert_eq!(volume.tets.len() + members(&mesh, "right").tets.len(), 91, "{name}");
+        let x_m = |node: u32| mesh.mesh.positions_m()[node as usize].x;
+        assert!(surface.nodes.len() > 3 && surface.nodes.iter().all(|&node| x_m(node) == 0.0), "{name}");
+        assert!(volume.nodes.len() > surface.nodes.len(), "{name}");
     }
 }
 

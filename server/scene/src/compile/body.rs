@@ -1,14 +1,17 @@
 //! `[body]`: shapes, mesh files and surface pairs become one kind of body with named parts.
-use super::{Files, exactly_one};
+use super::{
+    Files, exactly_one,
+    parts::{self, Part},
+};
 use crate::{
     document::{
         body::{BodyTable, MeshTable, SurfacesTable},
         source::{Fault, Where},
     },
     error::Stage,
-    files::{self, FileError, GroupedMesh, SurfaceFile, UnusedNodes},
+    files::{self, FileError, SurfaceFile, UnusedNodes},
     fill::{self, FillOptions, SurfaceInput},
-    shapes::{self, BoundaryRegion, Shape, ShapeError},
+    shapes::{self, Shape, ShapeError},
 };
 use glam::DVec3;
 use palpate_physics::{MeshError, Surface, TetMesh};
@@ -21,18 +24,6 @@ pub(crate) struct Body {
     pub(crate) origin: String,
     pub(crate) report: Vec<String>,
     pub(crate) warnings: Vec<String>,
-}
-
-/// A named part of a body.
-#[derive(Debug, Clone, Default)]
-pub(crate) struct Part {
-    pub(crate) name: String,
-    /// Number of the physical group, if it is one.
-    pub(crate) tag: Option<i64>,
-    pub(crate) nodes: Vec<u32>,
-    /// Node triples, in any order.
-    pub(crate) triangles: Vec<[u32; 3]>,
-    pub(crate) tets: Vec<u32>,
 }
 
 impl Body {
@@ -109,23 +100,13 @@ fn of_shape(shape: Shape, kind: &str, at: &Where) -> Result<Body, Fault> {
     let surface = Surface::of(&shape.mesh).map_err(|error| mesh_fault(at, error))?;
     let report = if shape.layers > 0 { vec![format!("{} layers through the wall", shape.layers)] } else { Vec::new() };
     Ok(Body {
-        parts: boundary_parts(&shape.regions),
+        parts: parts::of_boundary(&shape.regions, &surface),
         surface,
         origin: format!("shape {kind}"),
         report,
         warnings: Vec::new(),
         mesh: shape.mesh,
     })
-}
-
-fn boundary_parts(regions: &[BoundaryRegion]) -> Vec<Part> {
-    let part = |region: &BoundaryRegion| Part {
-        name: region.name.to_owned(),
-        nodes: region.nodes(),
-        triangles: region.triangles.clone(),
-        ..Part::default()
-    };
-    regions.iter().map(part).collect()
 }
 
 fn file_fault(at: &Where, error: FileError) -> Fault {
@@ -157,7 +138,7 @@ fn from_surfaces(
     let surface = Surface::of(&filled.mesh).map_err(|error| mesh_fault(at, error))?;
     let warnings = inner.warnings.iter().chain(&outer.warnings).chain(&filled.report.warnings).cloned().collect();
     Ok(Body {
-        parts: boundary_parts(&filled.regions),
+        parts: parts::of_boundary(&filled.regions, &surface),
         surface,
         origin: format!("wall between {} and {}", table.inner_file, table.outer_file),
         report: filled.report.to_string().lines().map(str::to_owned).collect(),
@@ -178,27 +159,11 @@ fn from_file(table: &MeshTable, files: &Files<'_>, at: &Where) -> Result<Body, F
     let grouped = volume.into_tet_mesh(table.unit.in_m(), UnusedNodes::Drop).map_err(refused)?;
     let surface = Surface::of(&grouped.mesh).map_err(|error| mesh_fault(&at, error))?;
     Ok(Body {
-        parts: groups(&grouped),
+        parts: parts::of_groups(&grouped, &surface),
         surface,
         origin: format!("file {}", table.file),
         report: Vec::new(),
         warnings: grouped.warnings.clone(),
         mesh: grouped.mesh,
     })
-}
-
-/// The physical groups of a file; groups of one name are one part.
-fn groups(grouped: &GroupedMesh) -> Vec<Part> {
-    let mut parts: Vec<Part> = Vec::new();
-    for (index, group) in grouped.groups.iter().enumerate().filter(|(_, group)| !group.name.is_empty()) {
-        let position = parts.iter().position(|part| part.name == group.name).unwrap_or_else(|| {
-            let tets = grouped.tets_of(&group.name);
-            let nodes = grouped.nodes_of(&group.name);
-            parts.push(Part { name: group.name.clone(), tag: Some(group.tag), nodes, tets, triangles: Vec::new() });
-            parts.len() - 1
-        });
-        let own = grouped.surface_groups.iter().filter(|(of, _)| *of == index);
-        parts[position].triangles.extend(own.flat_map(|(_, triangles)| triangles));
-    }
-    parts
 }

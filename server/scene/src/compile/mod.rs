@@ -4,6 +4,7 @@ mod body;
 mod csv;
 mod loads;
 mod material;
+mod parts;
 mod probes;
 mod regions;
 mod tools;

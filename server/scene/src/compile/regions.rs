@@ -1,5 +1,9 @@
 //! Regions: which nodes, surface triangles and tets a selector chooses.
-use super::{body::Body, unique_names};
+use super::{
+    body::Body,
+    parts::{Part, SURFACE, WHOLE},
+    unique_names,
+};
 use crate::{
     document::{
         region::{NearestSelector, PlaneTable, RegionTable, Selector},
@@ -8,7 +12,6 @@ use crate::{
     probes::MaterialPoint,
 };
 use glam::DVec3;
-use std::collections::HashSet;
 
 /// Chosen nodes, surface triangles and tets.
 #[derive(Debug, Clone, PartialEq)]
@@ -45,26 +48,22 @@ fn chosen(flags: &[bool]) -> Vec<u32> {
     flags.iter().enumerate().filter(|(_, flag)| **flag).map(|(index, _)| index as u32).collect()
 }
 
-/// All named regions of a scene.
+/// All named regions of a scene: the body's parts, and those selected.
 pub(crate) struct Regions<'b> {
     body: &'b Body,
-    named: Vec<(String, Selection)>,
+    selected: Vec<(String, Selection)>,
 }
 
 impl<'b> Regions<'b> {
     /// The predefined regions, then the scene's in order; a region may refer to those before it.
     pub(crate) fn define(tables: &[RegionTable], body: &'b Body) -> Result<Self, Fault> {
         unique_names("region", tables.iter().map(|table| table.name.as_str()))?;
-        let mut regions = Self { body, named: vec![("whole".into(), Selection::all(body, true))] };
-        regions.named.push(("surface".into(), regions.surface()));
-        for part in &body.parts {
-            let selection = regions.part(&part.nodes, &part.triangles, &part.tets);
-            regions.named.push((part.name.clone(), selection));
-        }
-        let predefined = regions.named.len();
+        let mut regions = Self { body, selected: vec![(WHOLE.into(), Selection::all(body, true))] };
+        regions.selected.push((SURFACE.into(), regions.surface()));
         for (index, table) in tables.iter().enumerate() {
             let at = Where::root("region").index(index);
-            if regions.named[..predefined].iter().any(|(name, _)| *name == table.name) {
+            if [WHOLE, SURFACE].contains(&table.name.as_str()) || body.parts.iter().any(|part| part.name == table.name)
+            {
                 let message = format!("the region \"{}\" exists already: it is a part of the body", table.name);
                 return Err(Fault::value(at.key("name"), message).help("give your region another name"));
             }
@@ -74,32 +73,36 @@ impl<'b> Regions<'b> {
                     format!("the region \"{}\" selects nothing: no node, surface triangle or tet", table.name);
                 return Err(Fault::value(at.key("select"), message).help(body.extent()));
             }
-            regions.named.push((table.name.clone(), selection));
+            regions.selected.push((table.name.clone(), selection));
         }
         Ok(regions)
     }
 
     /// Counts of every region: nodes, surface triangles, tets.
     pub(crate) fn summaries(&self) -> impl Iterator<Item = (String, [usize; 3])> + '_ {
-        self.named.iter().map(|(name, selection)| (name.clone(), selection.counts()))
+        let counts = |part: &Part| [part.nodes.len(), part.triangles.len(), part.tets.len()];
+        let parts = self.body.parts.iter().map(move |part| (part.name.clone(), counts(part)));
+        let mut counted = self.selected.iter().map(|(name, selection)| (name.clone(), selection.counts()));
+        let always: Vec<_> = counted.by_ref().take(2).collect();
+        always.into_iter().chain(parts).chain(counted)
     }
 
     /// Nodes of a region; none is an error.
     pub(crate) fn nodes(&self, name: &str, at: &Where) -> Result<Vec<u32>, Fault> {
         let selection = self.named(name, at)?;
-        self.some(name, at, "nodes", &selection.nodes, selection)
+        self.some(name, at, "nodes", &selection.nodes, &selection)
     }
 
     /// Surface triangles of a region; none is an error.
     pub(crate) fn triangles(&self, name: &str, at: &Where) -> Result<Vec<u32>, Fault> {
         let selection = self.named(name, at)?;
-        self.some(name, at, "surface triangles", &selection.triangles, selection)
+        self.some(name, at, "surface triangles", &selection.triangles, &selection)
     }
 
     /// Tets of a region; none is an error.
     pub(crate) fn tets(&self, name: &str, at: &Where) -> Result<Vec<u32>, Fault> {
         let selection = self.named(name, at)?;
-        self.some(name, at, "tets", &selection.tets, selection)
+        self.some(name, at, "tets", &selection.tets, &selection)
     }
 
     fn some(&self, name: &str, at: &Where, what: &str, flags: &[bool], of: &Selection) -> Result<Vec<u32>, Fault> {
@@ -114,17 +117,26 @@ impl<'b> Regions<'b> {
         Err(Fault::value(at.clone(), message).help(self.body.extent()))
     }
 
-    fn named(&self, name: &str, at: &Where) -> Result<&Selection, Fault> {
-        self.named.iter().find(|(known, _)| known == name).map(|(_, selection)| selection).ok_or_else(|| {
-            let known: Vec<&str> = self.named.iter().map(|(known, _)| known.as_str()).collect();
-            Fault::value(at.clone(), format!("there is no region \"{name}\"")).help(did_you_mean(name, &known))
-        })
+    fn named(&self, name: &str, at: &Where) -> Result<Selection, Fault> {
+        if let Some((_, selection)) = self.selected.iter().find(|(known, _)| known == name) {
+            return Ok(selection.clone());
+        }
+        if let Some(part) = self.body.parts.iter().find(|part| part.name == name) {
+            return Ok(self.part(part));
+        }
+        let groups = self.groups_called(name);
+        if groups.len() > 1 {
+            return Err(ambiguous(name, &groups, at));
+        }
+        let parts = self.body.parts.iter().map(|part| part.name.as_str());
+        let known: Vec<&str> = parts.chain(self.selected.iter().map(|(known, _)| known.as_str())).collect();
+        Err(Fault::value(at.clone(), format!("there is no region \"{name}\"")).help(did_you_mean(name, &known)))
     }
 
     fn select(&self, selector: &Selector, at: &Where) -> Result<Selection, Fault> {
         let mut parts = Vec::new();
         if let Some(name) = &selector.region {
-            parts.push(self.named(name, &at.key("region"))?.clone());
+            parts.push(self.named(name, &at.key("region"))?);
         }
         if let Some(group) = &selector.physical_group {
             parts.push(self.physical_group(group, &at.key("physical_group"))?);
@@ -191,45 +203,47 @@ impl<'b> Regions<'b> {
         selection
     }
 
-    fn part(&self, nodes: &[u32], triangles: &[[u32; 3]], tets: &[u32]) -> Selection {
+    fn part(&self, part: &Part) -> Selection {
         let mut selection = Selection::all(self.body, false);
-        for &node in nodes {
-            selection.nodes[node as usize] = true;
-        }
-        for &tet in tets {
-            selection.tets[tet as usize] = true;
-        }
-        let sorted = |mut face: [u32; 3]| {
-            face.sort_unstable();
-            face
-        };
-        let faces: HashSet<[u32; 3]> = triangles.iter().copied().map(sorted).collect();
-        for (triangle, corners) in self.triangle_nodes().enumerate() {
-            // A group of tets owns the surface triangles whose corners are all in it.
-            let in_volume = !tets.is_empty() && corners.iter().all(|&node| selection.nodes[node as usize]);
-            selection.triangles[triangle] = in_volume || faces.contains(&sorted(corners));
+        for (flags, chosen) in [
+            (&mut selection.nodes, &part.nodes),
+            (&mut selection.triangles, &part.triangles),
+            (&mut selection.tets, &part.tets),
+        ] {
+            for &index in chosen {
+                flags[index as usize] = true;
+            }
         }
         selection
     }
 
-    fn physical_group(&self, group: &str, at: &Where) -> Result<Selection, Fault> {
-        let groups = || self.body.parts.iter().filter(|part| part.tag.is_some());
-        let number: Option<i64> = group.parse().ok();
-        let found = groups().find(|part| part.name == group || (number.is_some() && part.tag == number));
-        if let Some(part) = found {
-            return Ok(self.part(&part.nodes, &part.triangles, &part.tets));
-        }
-        let known: Vec<&str> = groups().map(|part| part.name.as_str()).collect();
-        let help =
-            if known.is_empty() { "the mesh has no physical groups".into() } else { did_you_mean(group, &known) };
-        Err(Fault::value(at.clone(), format!("there is no physical group \"{group}\"")).help(help))
+    /// The physical groups that a name or number means.
+    fn groups_called(&self, text: &str) -> Vec<&Part> {
+        let called = |part: &&Part| part.group.as_ref().is_some_and(|group| group.is_called(text));
+        self.body.parts.iter().filter(called).collect()
     }
 
-    /// Nodes by position, surface triangles by all three corners, tets by their centroid.
+    fn physical_group(&self, text: &str, at: &Where) -> Result<Selection, Fault> {
+        match self.groups_called(text).as_slice() {
+            [part] => Ok(self.part(part)),
+            [] => {
+                let groups = self.body.parts.iter().filter(|part| part.group.is_some());
+                let known: Vec<&str> = groups.map(|part| part.name.as_str()).collect();
+                let none = known.is_empty();
+                let help = if none { "the mesh has no physical groups".into() } else { did_you_mean(text, &known) };
+                Err(Fault::value(at.clone(), format!("there is no physical group \"{text}\"")).help(help))
+            }
+            several => Err(ambiguous(text, several, at)),
+        }
+    }
+
+    /// Nodes by position, surface triangles and tets by their centroid: every one of them is either in a set of points
+    /// or in its complement, and in the union of sets that together cover it.
     fn where_point(&self, inside: impl Fn(DVec3) -> bool) -> Selection {
         let positions = self.body.mesh.positions_m();
-        let nodes: Vec<bool> = positions.iter().map(|&p| inside(p)).collect();
-        let triangles = self.triangle_nodes().map(|corners| corners.iter().all(|&node| nodes[node as usize])).collect();
+        let nodes = positions.iter().map(|&p| inside(p)).collect();
+        let middle = |corners: [u32; 3]| corners.iter().map(|&node| positions[node as usize]).sum::<DVec3>() / 3.0;
+        let triangles = self.triangle_nodes().map(|corners| inside(middle(corners))).collect();
         let centroid = |tet| self.body.mesh.corners_m(tet).iter().sum::<DVec3>() / 4.0;
         let tets = (0..self.body.mesh.tets().len()).map(|tet| inside(centroid(tet))).collect();
         Selection { nodes, triangles, tets }
@@ -248,7 +262,13 @@ impl<'b> Regions<'b> {
 
     fn near_plane(&self, plane: &PlaneTable, at: &Where) -> Result<Selection, Fault> {
         let (side, tolerance) = self.side(plane, at)?;
-        Ok(self.where_point(|p| side(p).abs() <= tolerance))
+        let mut selection = self.where_point(|p| side(p).abs() <= tolerance);
+        // A triangle lies in a plane with all its corners: one that crosses it may have its centroid there.
+        let Selection { nodes, triangles, .. } = &mut selection;
+        for (chosen, corners) in triangles.iter_mut().zip(self.triangle_nodes()) {
+            *chosen = corners.iter().all(|&node| nodes[node as usize]);
+        }
+        Ok(selection)
     }
 
     fn nearest(&self, nearest: &NearestSelector) -> Selection {
@@ -270,6 +290,12 @@ impl<'b> Regions<'b> {
         });
         selection
     }
+}
+
+fn ambiguous(text: &str, groups: &[&Part], at: &Where) -> Fault {
+    let names: Vec<String> = groups.iter().map(|part| format!("\"{}\"", part.name)).collect();
+    Fault::value(at.clone(), format!("\"{text}\" means {} physical groups of the mesh", groups.len()))
+        .help(format!("write one of {}", names.join(", ")))
 }
 
 /// Marks the `count` candidates with the smallest distance; of equals the first.

@@ -13,13 +13,14 @@ pub(crate) struct RegionTable {
 }
 
 /// What belongs to a region. Several keys in one selector must all hold. Nodes are selected by position, surface
-/// triangles when all three corners are, tets by their centroid.
+/// triangles and tets by their centroid (triangles near a plane: with all three corners).
 #[derive(Debug, Clone, Default, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub(crate) struct Selector {
     /// Another region, or a part of the body.
     pub(crate) region: Option<String>,
-    /// A physical group of the mesh file, by name or by number.
+    /// A physical group of the mesh file, by name or by number; behind `volume `, `surface ` or `points ` where that
+    /// alone means several groups.
     pub(crate) physical_group: Option<String>,
     /// Near a plane.
     pub(crate) plane: Option<PlaneTable>,

@@ -21,7 +21,7 @@ mod vtk;
 mod write;
 
 pub use error::{FileError, Place, Problem};
-pub use tet_mesh::{GroupedMesh, UnusedNodes};
+pub use tet_mesh::{GroupedMesh, Members, UnusedNodes};
 pub use write::{Cells, Field, Values, VtuFrame, encode_vtu, write_obj, write_ply, write_pvd, write_stl, write_vtu};
 
 use builder::Builder;
@@ -34,8 +34,25 @@ pub struct Group {
     pub name: String,
     /// 3 tets, 2 triangles, 0 nodes.
     pub dimension: u8,
-    /// Its number in the file.
+    /// Its number in the file; groups of different dimensions may share it.
     pub tag: i64,
+}
+
+impl Group {
+    /// What stands before its name or number where that alone means several groups.
+    pub fn kind(&self) -> &'static str {
+        match self.dimension {
+            3 => "volume",
+            2 => "surface",
+            _ => "points",
+        }
+    }
+
+    /// Whether a text means it: its name or its number, alone or behind its kind (`surface 3`).
+    pub fn is_called(&self, text: &str) -> bool {
+        let own = |text: &str| text == self.name || text == self.tag.to_string();
+        own(text) || text.strip_prefix(self.kind()).and_then(|rest| rest.strip_prefix(' ')).is_some_and(own)
+    }
 }
 
 /// A tetrahedral mesh as its file gives it, checked for finite coordinates and existing nodes only.

@@ -33,43 +33,47 @@ pub struct GroupedMesh {
     pub warnings: Vec<String>,
 }
 
+/// What belongs to a group.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct Members {
+    /// Tets, ascending.
+    pub tets: Vec<u32>,
+    /// Triangles of the file, as nodes.
+    pub triangles: Vec<[u32; 3]>,
+    /// Its nodes and those of its tets and triangles, ascending.
+    pub nodes: Vec<u32>,
+}
+
 impl GroupedMesh {
-    /// Tets of the volume groups called `name`; where none is, of the one with this tag. Ascending.
-    pub fn tets_of(&self, name: &str) -> Vec<u32> {
-        self.tets_of_groups(&self.groups_called(name, |group| group.dimension == 3))
-    }
-
-    /// Nodes of the groups called `name`, of whatever dimension; where none is, of those with this tag. Ascending.
-    pub fn nodes_of(&self, name: &str) -> Vec<u32> {
-        let chosen = self.groups_called(name, |_| true);
-        let tets = self.tets_of_groups(&chosen);
-        let mut nodes: Vec<u32> = tets.iter().flat_map(|&tet| self.mesh.tets()[tet as usize]).collect();
-        nodes.extend(self.surface_groups.iter().filter(|(g, _)| chosen.contains(g)).flat_map(|(_, t)| t).flatten());
-        nodes.extend(self.node_groups.iter().filter(|(g, _)| chosen.contains(g)).flat_map(|(_, n)| n));
-        sorted(nodes)
-    }
-
-    fn tets_of_groups(&self, chosen: &[usize]) -> Vec<u32> {
-        let first = (0..self.tet_group.len()).filter(|&tet| chosen.contains(&(self.tet_group[tet] as usize)));
-        let more = self.more_tet_groups.iter().filter(|(g, _)| chosen.contains(g)).flat_map(|(_, tets)| tets);
-        sorted(first.map(|tet| tet as u32).chain(more.copied()).collect())
-    }
-
-    /// Indices of the groups that are `eligible` and meant by `name`. Tets without a group have none that is called.
-    fn groups_called(&self, name: &str, eligible: impl Fn(&Group) -> bool) -> Vec<usize> {
-        let that = |meant: &dyn Fn(&Group) -> bool| -> Vec<usize> {
-            let all = self.groups.iter().enumerate().filter(|(_, g)| !g.name.is_empty() && eligible(g) && meant(g));
-            all.map(|(index, _)| index).collect()
-        };
-        let named = that(&|group| group.name == name);
-        if named.is_empty() { that(&|group| group.tag.to_string() == name) } else { named }
+    /// What belongs to each of the groups.
+    pub fn members(&self) -> Vec<Members> {
+        let mut all = vec![Members::default(); self.groups.len()];
+        for (tet, &group) in self.tet_group.iter().enumerate() {
+            all[group as usize].tets.push(tet as u32);
+        }
+        for (group, tets) in &self.more_tet_groups {
+            all[*group].tets.extend(tets);
+        }
+        for (group, triangles) in &self.surface_groups {
+            all[*group].triangles.extend(triangles);
+        }
+        for (group, nodes) in &self.node_groups {
+            all[*group].nodes.extend(nodes);
+        }
+        for members in &mut all {
+            let Members { tets, triangles, nodes } = members;
+            sort(tets);
+            nodes.extend(tets.iter().flat_map(|&tet| self.mesh.tets()[tet as usize]));
+            nodes.extend(triangles.iter().flatten());
+            sort(nodes);
+        }
+        all
     }
 }
 
-fn sorted(mut indices: Vec<u32>) -> Vec<u32> {
+fn sort(indices: &mut Vec<u32>) {
     indices.sort_unstable();
     indices.dedup();
-    indices
 }
 
 impl VolumeFile {
@@ -197,23 +201,10 @@ mod tests {
         // A sixth of a cube and a third of it, in mm³.
         assert!((mesh.mesh.total_volume_m3() - 0.5e-9).abs() < 1e-22);
         assert_eq!(mesh.surface_groups, [(2, vec![[1, 2, 3]])]);
-        assert_eq!((mesh.tets_of("wall"), mesh.tets_of("7"), mesh.tets_of("8")), (vec![0], vec![0], vec![1]));
-        assert_eq!((mesh.tets_of("both"), mesh.tets_of("inside"), mesh.tets_of("")), (vec![0], vec![], vec![]));
-        assert_eq!(mesh.nodes_of("inside"), [1, 2, 3]);
+        let members = mesh.members();
+        assert_eq!([0, 1, 2, 3].map(|group| members[group].tets.as_slice()), [&[0][..], &[1], &[], &[0]]);
+        assert_eq!((&members[2].triangles, &members[2].nodes), (&vec![[1, 2, 3]], &vec![1, 2, 3]));
         assert!(mesh.warnings[0].starts_with("1 nodes that belong to no tet"));
-    }
-
-    /// A surface without a name is called by its tag, 1; the volume `wall` has the tag 1 too. The nodes of `1` were
-    /// those of both, so that fixing the surface fixed the whole body.
-    #[test]
-    fn a_name_goes_before_a_tag() {
-        let mut file = volume();
-        file.groups[0].tag = 1;
-        file.groups[2].name = "1".to_string();
-        file.groups[2].tag = 1;
-        let mesh = file.into_tet_mesh(1.0, UnusedNodes::Drop).unwrap();
-        assert_eq!(mesh.nodes_of("1"), [1, 2, 3]);
-        assert_eq!((mesh.tets_of("1"), mesh.tets_of("wall")), (vec![0], vec![0]));
     }
 
     #[test]

@@ -29,6 +29,19 @@ def bar():
     gmsh.model.mesh.renumberElements()
 
 
+def unnamed():
+    """Groups of the bar's volumes and surfaces that share their numbers, most without a name."""
+    at = lambda dim, x: [t for d, t in gmsh.model.getEntities(dim)
+                         if abs(gmsh.model.occ.getCenterOfMass(d, t)[0] - x) < 1e-9]
+    for dim, tag in gmsh.model.getPhysicalGroups():
+        gmsh.model.removePhysicalName(gmsh.model.getPhysicalName(dim, tag))
+    gmsh.model.removePhysicalGroups()
+    gmsh.model.addPhysicalGroup(3, at(3, 1), 1)
+    gmsh.model.addPhysicalGroup(3, at(3, 3), 2, "right")
+    gmsh.model.addPhysicalGroup(2, at(2, 0), 1)
+    gmsh.model.addPhysicalGroup(2, at(2, 4), 3)
+
+
 def save(name, version=4.1, binary=0):
     gmsh.option.setNumber("Mesh.MshFileVersion", version)
     gmsh.option.setNumber("Mesh.Binary", binary)
@@ -67,6 +80,11 @@ def by_gmsh():
     gmsh.model.mesh.setOrder(2)
     save("bar_quadratic_v41_ascii.msh", 4.1)
     save("bar_quadratic_v22_binary.msh", 2.2, 1)
+    gmsh.clear()
+    bar()
+    unnamed()
+    save("bar_unnamed_v41_ascii.msh", 4.1)
+    save("bar_unnamed_v22_ascii.msh", 2.2)
     gmsh.finalize()
 
 
