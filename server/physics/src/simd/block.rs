@@ -108,9 +108,9 @@ pub(super) fn add_forces<V: Vector<Scalar = T>, T: Scalar, L: LaneLaw, const VIS
     let mut power_w = 0.0;
     for batch in job.blocks.chunks(BATCH) {
         for (index, block) in batch.iter().enumerate() {
-            gather(&block.nodes, job.displacements, &mut edges[index]);
+            gather::<V, N>(&block.nodes, job.displacements, &mut edges[index]);
             if VISCOUS {
-                gather(&block.nodes, job.velocities, &mut edge_rates[index]);
+                gather::<V, N>(&block.nodes, job.velocities, &mut edge_rates[index]);
             }
         }
         for (index, block) in batch.iter().enumerate() {
@@ -235,18 +235,18 @@ fn corner_forces<V: Real>(b: &[V; 9], minus_volume: V, p: &M3<V>) -> [V; 9] {
 
 /// `a_i − a_0` of all lanes.
 #[inline(always)]
-fn gather<T: Scalar, const N: usize>(nodes: &[[u32; 4]; N], values: &[Node], edges: &mut Lanes<T, N>) {
+fn gather<V: Vector, const N: usize>(nodes: &[[u32; 4]; N], values: &[Node], edges: &mut Lanes<V::Scalar, N>) {
     for first in (0..N).step_by(4) {
-        let mut corners = [[Node::default(); 4]; 4];
+        let mut corners = [[&values[0]; 4]; 4];
         for tet in 0..4 {
             for corner in 0..4 {
                 let node = nodes[first + tet][corner] as usize;
                 debug_assert!(node < values.len());
                 // SAFETY: `Blocks::new` checked `node <= Blocks::nodes`, `Job::new` that `values` has one entry more than that.
-                corners[tet][corner] = unsafe { *values.get_unchecked(node) };
+                corners[tet][corner] = unsafe { values.get_unchecked(node) };
             }
         }
-        T::edges_to_lanes(&corners, edges, first);
+        V::edges_to_lanes(&corners, edges, first);
     }
 }
 

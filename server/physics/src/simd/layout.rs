@@ -9,7 +9,7 @@ use glam::DVec3;
 
 /// Consecutive tets along the space-filling curve are spread over the lanes of this many blocks, so that lanes of one
 /// block rarely share a node: sums of one node would wait for each other in the scatter.
-const BLOCKS_PER_WINDOW: usize = 4;
+const BLOCKS_PER_WINDOW: usize = 16;
 
 /// Blocks of all tets, and the runs of equal material among them.
 pub(super) fn blocks<T: Scalar, const N: usize>(

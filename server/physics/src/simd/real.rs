@@ -25,8 +25,6 @@ pub(super) trait Scalar: Real + Default + PartialOrd + From<f32> + Into<f64> {
     type Avx2: Vector<Scalar = Self>;
     /// Vectors of AVX-512.
     type Avx512: Vector<Scalar = Self>;
-    /// Rows `a_i − a_0` of four tets, taken in f64 and then rounded, to lanes `first..first + 4`: `edges[3(i − 1) + axis][first + tet]`.
-    fn edges_to_lanes<const N: usize>(corners: &[[Node; 4]; 4], edges: &mut Lanes<Self, N>, first: usize);
     /// Lanes `first..first + 4` back to rows: `[tet][i − 1]`.
     fn lanes_to_rows<const N: usize>(lanes: &Lanes<Self, N>, first: usize) -> [[Quad<Self>; 3]; 4];
 }
@@ -41,6 +39,8 @@ pub(super) trait Vector: Real {
     fn load(source: &[Self::Scalar]) -> Self;
     /// Lanes to the start of a slice that has at least [`Self::WIDTH`].
     fn store(self, target: &mut [Self::Scalar]);
+    /// Rows `a_i − a_0` of four tets, taken in f64 and then rounded, to lanes `first..first + 4`: `edges[3(i − 1) + axis][first + tet]`.
+    fn edges_to_lanes<const N: usize>(corners: &[[&Node; 4]; 4], edges: &mut Lanes<Self::Scalar, N>, first: usize);
 }
 
 macro_rules! scalar {
@@ -72,16 +72,20 @@ macro_rules! scalar {
             fn store(self, target: &mut [Self]) {
                 target[0] = self;
             }
+            #[inline(always)]
+            fn edges_to_lanes<const N: usize>(corners: &[[&Node; 4]; 4], edges: &mut Lanes<Self, N>, first: usize) {
+                edges_to_lanes(corners, edges, first);
+            }
         }
     };
 }
 scalar!(f32, 5);
 scalar!(f64, 6);
 
-/// [`Scalar::edges_to_lanes`] in plain code.
+/// [`Vector::edges_to_lanes`] in plain code.
 #[inline(always)]
 pub(super) fn edges_to_lanes<T: Scalar, const N: usize>(
-    corners: &[[Node; 4]; 4],
+    corners: &[[&Node; 4]; 4],
     edges: &mut Lanes<T, N>,
     first: usize,
 ) {
@@ -111,7 +115,7 @@ pub(super) fn lanes_to_rows<T: Scalar, const N: usize>(lanes: &Lanes<T, N>, firs
 #[cfg(not(target_arch = "x86_64"))]
 mod elsewhere {
     //! One lane at a time: the compiler vectorises the loop over lanes where it can.
-    use super::{Lanes, Node, Quad, Scalar};
+    use super::{Lanes, Quad, Scalar};
 
     macro_rules! plain {
         ($scalar:ident) => {
@@ -119,10 +123,6 @@ mod elsewhere {
                 type Baseline = Self;
                 type Avx2 = Self;
                 type Avx512 = Self;
-                #[inline(always)]
-                fn edges_to_lanes<const N: usize>(corners: &[[Node; 4]; 4], edges: &mut Lanes<Self, N>, first: usize) {
-                    super::edges_to_lanes(corners, edges, first);
-                }
                 #[inline(always)]
                 fn lanes_to_rows<const N: usize>(lanes: &Lanes<Self, N>, first: usize) -> [[Quad<Self>; 3]; 4] {
                     super::lanes_to_rows(lanes, first)

@@ -13,7 +13,8 @@ use std::ops::{Add, Div, Mul, Neg, Sub};
 
 macro_rules! vector {
     ($name:ident, $register:ident, $scalar:ident, $width:expr,
-     $add:ident, $sub:ident, $mul:ident, $div:ident, $sqrt:ident, $max:ident, $splat:ident, $load:ident, $store:ident) => {
+     $add:ident, $sub:ident, $mul:ident, $div:ident, $sqrt:ident, $max:ident, $splat:ident, $load:ident, $store:ident,
+     $edges:path) => {
         #[derive(Clone, Copy)]
         pub(super) struct $name($register);
 
@@ -64,6 +65,10 @@ macro_rules! vector {
                 // SAFETY: the slice has `WIDTH` elements; an unaligned store; the machine has the instruction.
                 unsafe { $store(target.as_mut_ptr(), self.0) }
             }
+            #[inline(always)]
+            fn edges_to_lanes<const N: usize>(corners: &[[&Node; 4]; 4], edges: &mut Lanes<$scalar, N>, first: usize) {
+                $edges(corners, edges, first);
+            }
         }
     };
     (@operator $name:ident, $trait:ident, $method:ident, $instruction:ident) => {
@@ -91,7 +96,8 @@ vector!(
     _mm_max_ps,
     _mm_set1_ps,
     _mm_loadu_ps,
-    _mm_storeu_ps
+    _mm_storeu_ps,
+    edges_f32_sse
 );
 vector!(
     F64x2,
@@ -106,7 +112,8 @@ vector!(
     _mm_max_pd,
     _mm_set1_pd,
     _mm_loadu_pd,
-    _mm_storeu_pd
+    _mm_storeu_pd,
+    real::edges_to_lanes
 );
 vector!(
     F32x8,
@@ -121,7 +128,8 @@ vector!(
     _mm256_max_ps,
     _mm256_set1_ps,
     _mm256_loadu_ps,
-    _mm256_storeu_ps
+    _mm256_storeu_ps,
+    edges_f32_avx
 );
 vector!(
     F64x4,
@@ -136,7 +144,8 @@ vector!(
     _mm256_max_pd,
     _mm256_set1_pd,
     _mm256_loadu_pd,
-    _mm256_storeu_pd
+    _mm256_storeu_pd,
+    edges_f64_avx
 );
 vector!(
     F32x16,
@@ -151,7 +160,8 @@ vector!(
     _mm512_max_ps,
     _mm512_set1_ps,
     _mm512_loadu_ps,
-    _mm512_storeu_ps
+    _mm512_storeu_ps,
+    edges_f32_avx
 );
 vector!(
     F64x8,
@@ -166,31 +176,14 @@ vector!(
     _mm512_max_pd,
     _mm512_set1_pd,
     _mm512_loadu_pd,
-    _mm512_storeu_pd
+    _mm512_storeu_pd,
+    edges_f64_avx
 );
 
 impl Scalar for f32 {
     type Baseline = F32x4;
     type Avx2 = F32x8;
     type Avx512 = F32x16;
-
-    #[inline(always)]
-    fn edges_to_lanes<const N: usize>(corners: &[[Node; 4]; 4], edges: &mut Lanes<Self, N>, first: usize) {
-        for edge in 0..3 {
-            let mut rows = [F32x4::of(0.0); 4];
-            for tet in 0..4 {
-                let mut row = [0.0; 4];
-                for axis in 0..4 {
-                    row[axis] = (corners[tet][edge + 1].0[axis] - corners[tet][0].0[axis]) as f32;
-                }
-                rows[tet] = F32x4::load(&row);
-            }
-            let [x, y, z, _] = transposed(rows);
-            x.store(&mut edges[3 * edge][first..first + 4]);
-            y.store(&mut edges[3 * edge + 1][first..first + 4]);
-            z.store(&mut edges[3 * edge + 2][first..first + 4]);
-        }
-    }
 
     #[inline(always)]
     fn lanes_to_rows<const N: usize>(lanes: &Lanes<Self, N>, first: usize) -> [[Quad<Self>; 3]; 4] {
@@ -203,6 +196,69 @@ impl Scalar for f32 {
             }
         }
         rows
+    }
+}
+
+#[inline(always)]
+fn edges_f32_sse<const N: usize>(corners: &[[&Node; 4]; 4], edges: &mut Lanes<f32, N>, first: usize) {
+    for edge in 0..3 {
+        let mut rows = [F32x4::of(0.0); 4];
+        for tet in 0..4 {
+            let mut row = [0.0; 4];
+            for axis in 0..4 {
+                row[axis] = (corners[tet][edge + 1].0[axis] - corners[tet][0].0[axis]) as f32;
+            }
+            rows[tet] = F32x4::load(&row);
+        }
+        store_axes(transposed(rows), edges, edge, first);
+    }
+}
+
+/// With a node in one register of AVX.
+#[inline(always)]
+fn edges_f32_avx<const N: usize>(corners: &[[&Node; 4]; 4], edges: &mut Lanes<f32, N>, first: usize) {
+    for edge in 0..3 {
+        let mut rows = [F32x4::of(0.0); 4];
+        for tet in 0..4 {
+            let difference = F64x4::load(&corners[tet][edge + 1].0) - F64x4::load(&corners[tet][0].0);
+            // SAFETY: see the module: the machine has the instruction.
+            rows[tet] = F32x4(unsafe { _mm256_cvtpd_ps(difference.0) });
+        }
+        store_axes(transposed(rows), edges, edge, first);
+    }
+}
+
+#[inline(always)]
+fn edges_f64_avx<const N: usize>(corners: &[[&Node; 4]; 4], edges: &mut Lanes<f64, N>, first: usize) {
+    for edge in 0..3 {
+        let mut rows = [F64x4::of(0.0); 4];
+        for tet in 0..4 {
+            rows[tet] = F64x4::load(&corners[tet][edge + 1].0) - F64x4::load(&corners[tet][0].0);
+        }
+        store_axes(transposed_f64(rows), edges, edge, first);
+    }
+}
+
+#[inline(always)]
+fn store_axes<V: Vector, const N: usize>(axes: [V; 4], edges: &mut Lanes<V::Scalar, N>, edge: usize, first: usize) {
+    for (axis, lanes) in axes.into_iter().take(3).enumerate() {
+        lanes.store(&mut edges[3 * edge + axis][first..first + 4]);
+    }
+}
+
+/// As [`transposed`], in f64.
+#[inline(always)]
+fn transposed_f64([a, b, c, d]: [F64x4; 4]) -> [F64x4; 4] {
+    // SAFETY: see the module: the machine has the instructions.
+    unsafe {
+        let (ab_even, ab_odd) = (_mm256_unpacklo_pd(a.0, b.0), _mm256_unpackhi_pd(a.0, b.0));
+        let (cd_even, cd_odd) = (_mm256_unpacklo_pd(c.0, d.0), _mm256_unpackhi_pd(c.0, d.0));
+        [
+            F64x4(_mm256_permute2f128_pd::<0x20>(ab_even, cd_even)),
+            F64x4(_mm256_permute2f128_pd::<0x20>(ab_odd, cd_odd)),
+            F64x4(_mm256_permute2f128_pd::<0x31>(ab_even, cd_even)),
+            F64x4(_mm256_permute2f128_pd::<0x31>(ab_odd, cd_odd)),
+        ]
     }
 }
 
@@ -226,11 +282,6 @@ impl Scalar for f64 {
     type Baseline = F64x2;
     type Avx2 = F64x4;
     type Avx512 = F64x8;
-
-    #[inline(always)]
-    fn edges_to_lanes<const N: usize>(corners: &[[Node; 4]; 4], edges: &mut Lanes<Self, N>, first: usize) {
-        real::edges_to_lanes(corners, edges, first);
-    }
 
     #[inline(always)]
     fn lanes_to_rows<const N: usize>(lanes: &Lanes<Self, N>, first: usize) -> [[Quad<Self>; 3]; 4] {
