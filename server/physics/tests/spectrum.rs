@@ -6,7 +6,7 @@ use glam::DVec3;
 use palpate_physics::{
     Model, ModelSpec, Precision, PrescribedSpec, Region, Scratch, Settings, State, Substeps, TetMesh, TickInput,
     fem::{element::RestTet, mass},
-    integrate::spectrum::{element_bound_rad_per_s, max_natural_frequency_rad_per_s},
+    integrate::spectrum::{RestStiffness, element_bound_rad_per_s, max_natural_frequency_rad_per_s},
     material::{Convention, Lame, Law, Material, Viscosity},
     step,
 };
@@ -36,12 +36,22 @@ impl Body {
         Self { mesh, rest, tet_material, materials, inverse_mass }
     }
 
+    fn stiffness<'a>(&'a self, springs_n_per_m: &'a [f64]) -> RestStiffness<'a> {
+        RestStiffness {
+            mesh: &self.mesh,
+            rest_tets: &self.rest,
+            tet_material: &self.tet_material,
+            materials: &self.materials,
+            springs_n_per_m,
+        }
+    }
+
     fn measured(&self) -> f64 {
-        max_natural_frequency_rad_per_s(&self.mesh, &self.rest, &self.tet_material, &self.materials, &self.inverse_mass)
+        max_natural_frequency_rad_per_s(&self.stiffness(&[]), &self.inverse_mass)
     }
 
     fn element_bound(&self) -> f64 {
-        element_bound_rad_per_s(&self.mesh, &self.rest, &self.tet_material, &self.materials, &self.inverse_mass)
+        element_bound_rad_per_s(&self.stiffness(&[]), &self.inverse_mass)
     }
 
     /// From the stiffness blocks at rest, assembled densely.
@@ -104,6 +114,19 @@ fn one_free_axis_has_the_frequency_of_the_formula() {
     let body = Body::new(mesh, vec![m], |node| [node != 1, true, true]);
     let expected = (4.0 * modulus / 1000.0).sqrt() / h;
     assert!((body.measured() / expected - 1.0).abs() < 1e-12, "{} {expected}", body.measured());
+}
+
+/// Springs of `k_i = c m_i` on the nodes of a free body move every eigenvalue by `c`: `ω² → ω² + c`.
+#[test]
+fn springs_as_strong_as_the_masses_shift_the_whole_spectrum() {
+    let mesh = block([3, 2, 2], 5e-3, 0.15, &mut Random(3));
+    let body = Body::new(mesh, vec![material(10e3, 0.45, Law::StableNeoHookean)], |_| [false; 3]);
+    let exact = body.dense();
+    for c in [0.5 * exact * exact, 20.0 * exact * exact] {
+        let springs: Vec<f64> = body.inverse_mass.iter().map(|inverse| c / inverse.x).collect();
+        let measured = max_natural_frequency_rad_per_s(&body.stiffness(&springs), &body.inverse_mass);
+        assert_agrees(measured, (exact * exact + c).sqrt());
+    }
 }
 
 /// Uniform stretch `u_x = ±1` of a cube that moves along x alone has `U = ½V(λ + 2µ)(2/h)²` and `T = ½ρV ω²`: Rayleigh's

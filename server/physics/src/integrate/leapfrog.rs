@@ -29,8 +29,9 @@ pub fn step(model: &Model, state: &mut State, scratch: &mut Scratch, input: &Tic
         return StepReport { substeps: 0, inputs_rejected: 0, quarantined: None };
     }
     scratch.last_good.keep(state);
-    let inputs_rejected = take_inputs(model, state, scratch, input);
-    run_substeps(model, state, scratch, input);
+    let loads = LoadRamp::new(state, input);
+    let inputs_rejected = take_inputs(model, state, scratch, input) + u32::from(!loads.usable);
+    run_substeps(model, state, scratch, input, &loads);
     state.tick = state.tick.saturating_add(1);
     let quarantined = first_non_finite(state).map(|node| quarantine(state, scratch, node));
     StepReport { substeps: model.substeps(), inputs_rejected, quarantined }
@@ -67,9 +68,6 @@ fn take_inputs(model: &Model, state: &mut State, scratch: &mut Scratch, input: &
         tool.target = if finite { target } else { ToolTarget { velocity_m_per_s: DVec3::ZERO, ..tool.target } };
     }
     model.contact().begin_tick(&mut state.tools, &mut scratch.contact);
-    let loads_ok =
-        input.load_factors.len() == state.load_factors.len() && input.load_factors.iter().all(|f| f.is_finite());
-    rejected += u32::from(!loads_ok);
     rejected += input.point_forces.iter().filter(|point| !is_usable(model, point)).count() as u32;
     let prescribed_ok = input.prescribed_displacements_m.len() == model.spec().prescribed.len()
         && input.prescribed_displacements_m.iter().all(|d| d.is_finite());
@@ -105,20 +103,19 @@ fn aim_prescribed(
     }
 }
 
-fn run_substeps(model: &Model, state: &mut State, scratch: &mut Scratch, input: &TickInput<'_>) {
+fn run_substeps(model: &Model, state: &mut State, scratch: &mut Scratch, input: &TickInput<'_>, loads: &LoadRamp) {
     let substeps = model.substeps();
     let dt_s = model.spec().settings.tick_period_s / f64::from(substeps);
-    let loads = LoadRamp::new(state, input);
     if !state.force_is_current {
         state.contact.forget_geometry();
-        evaluate(model, state, scratch, input, &loads, 0.0, 0.0);
+        evaluate(model, state, scratch, input, loads, 0.0, 0.0);
     }
     kick(model, state, 0.5 * dt_s);
     for substep in 1..=substeps {
         for (x, v) in state.x.iter_mut().zip(&state.v) {
             *x += *v * dt_s;
         }
-        evaluate(model, state, scratch, input, &loads, f64::from(substep) / f64::from(substeps), dt_s);
+        evaluate(model, state, scratch, input, loads, f64::from(substep) / f64::from(substeps), dt_s);
         kick(model, state, if substep == substeps { 0.5 * dt_s } else { dt_s });
     }
     loads.finish(state, input);
@@ -201,21 +198,32 @@ fn kick(model: &Model, state: &mut State, h_s: f64) {
     if let Some(factor) = half {
         damp(model, state, factor);
     }
-    let mut work_j = 0.0;
+    let mut power_w = DVec3::ZERO;
+    let external = &state.external_n;
     for (((v, force), inverse_mass), external) in
-        state.v.iter_mut().zip(&state.force_n).zip(model.inverse_mass_per_kg()).zip(&state.external_n)
+        state.v.iter_mut().zip(&state.force_n).zip(model.inverse_mass_per_kg()).zip(external)
     {
         let change = *force * *inverse_mass * h_s;
-        // On prescribed axes the holder's reaction, −f, does the work; on free ones the external force.
-        let worker = DVec3::select(inverse_mass.cmpeq(DVec3::ZERO), *external - *force, *external);
-        work_j += h_s * worker.dot(*v + change * 0.5);
+        power_w += *external * (*v + change * 0.5);
         *v += change;
     }
-    state.ledger.external_work_j += work_j;
+    state.ledger.external_work_j += h_s * (power_w.element_sum() + holders_power_w(model, state));
     state.ledger.dissipated_j += h_s * state.viscous.work_rate_w();
     if let Some(factor) = half {
         damp(model, state, factor);
     }
+}
+
+/// Power (W) of the holders' reactions, `−f` on prescribed axes, whose velocity a kick leaves alone.
+fn holders_power_w(model: &Model, state: &State) -> f64 {
+    let mut power_w = 0.0;
+    for set in &model.spec().prescribed {
+        let held = DVec3::from(set.axes.map(|axis| f64::from(u8::from(axis))));
+        for &node in &set.nodes {
+            power_w -= state.force_n[node as usize].dot(held * state.v[node as usize]);
+        }
+    }
+    power_w
 }
 
 fn damp(model: &Model, state: &mut State, factor: f64) {

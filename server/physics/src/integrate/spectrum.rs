@@ -22,52 +22,45 @@ const MAX_STEPS: usize = 400;
 /// Steps between looks at the tridiagonal's spectrum.
 const STEPS_PER_CHECK: usize = 10;
 
+/// `K` of a body at rest, and the springs that hold its nodes from outside, applied without being assembled.
+#[derive(Debug, Clone, Copy)]
+pub struct RestStiffness<'a> {
+    /// The body.
+    pub mesh: &'a TetMesh,
+    /// Rest data of its tets.
+    pub rest_tets: &'a [RestTet],
+    /// Index into `materials`, one per tet.
+    pub tet_material: &'a [u16],
+    /// Materials.
+    pub materials: &'a [Material],
+    /// `k_i ≥ 0` (N/m, in all directions), one per node, or none: `K + diag(k_i)`.
+    pub springs_n_per_m: &'a [f64],
+}
+
 /// ω_max (rad/s) of `K φ = ω² M φ` at rest, on the free degrees of freedom (`inverse_mass_per_kg` is zero on fixed ones);
 /// zero if none is free.
 ///
 /// A safe estimate: `√(θ + r)`, the upper end of the interval that holds the eigenvalue found, but never more than the
-/// provable [`element_bound_rad_per_s`]. With `r ≤ 1e-4 θ` it exceeds that eigenfrequency by at most 1e-4. What remains
-/// is the chance that the pseudo-random start vector misses the top of the spectrum; `Settings::step_safety` is there for it.
-pub fn max_natural_frequency_rad_per_s(
-    mesh: &TetMesh,
-    rest_tets: &[RestTet],
-    tet_material: &[u16],
-    materials: &[Material],
-    inverse_mass_per_kg: &[DVec3],
-) -> f64 {
-    let stiffness = RestStiffness { mesh, rest_tets, tet_material, materials, springs_n_per_m: &[] };
+/// provable `√(ω_e² + max k_i/m_i)` with ω_e of [`element_bound_rad_per_s`]. With `r ≤ 1e-4 θ` it exceeds that eigenfrequency
+/// by at most 1e-4. What remains is the chance that the pseudo-random start vector misses the top of the spectrum;
+/// `Settings::step_safety` is there for it.
+pub fn max_natural_frequency_rad_per_s(stiffness: &RestStiffness<'_>, inverse_mass_per_kg: &[DVec3]) -> f64 {
     let root_inverse_mass: Vec<DVec3> = inverse_mass_per_kg.iter().map(|m| m.map(f64::sqrt)).collect();
-    let (theta, residual) = lanczos(&stiffness, &root_inverse_mass);
-    let bound = element_bound_rad_per_s(mesh, rest_tets, tet_material, materials, inverse_mass_per_kg);
-    (theta + residual).sqrt().min(bound)
-}
-
-/// ω_max (rad/s) of the same body with every node `i` on a spring of `springs_n_per_m[i]` in all directions: `K + diag(k_i)`.
-pub fn max_frequency_on_springs_rad_per_s(
-    mesh: &TetMesh,
-    rest_tets: &[RestTet],
-    tet_material: &[u16],
-    materials: &[Material],
-    inverse_mass_per_kg: &[DVec3],
-    springs_n_per_m: &[f64],
-) -> f64 {
-    let stiffness = RestStiffness { mesh, rest_tets, tet_material, materials, springs_n_per_m };
-    let root_inverse_mass: Vec<DVec3> = inverse_mass_per_kg.iter().map(|m| m.map(f64::sqrt)).collect();
-    let (theta, residual) = lanczos(&stiffness, &root_inverse_mass);
-    (theta + residual).sqrt()
+    let (theta, residual) = lanczos(stiffness, &root_inverse_mass);
+    let bound = element_bound_rad_per_s(stiffness, inverse_mass_per_kg);
+    let springs = stiffness.springs_n_per_m.iter().zip(inverse_mass_per_kg);
+    let spring_bound_sq = springs.map(|(k, inverse_mass)| k * inverse_mass.max_element()).fold(0.0, f64::max);
+    (theta + residual).min(bound * bound + spring_bound_sq).sqrt()
 }
 
 /// `max_e ω_e ≥ ω_max` (rad/s): the frequency bound of single tets, each with its share `m_i V_e/Σ_{t∋i} V_t` of its nodes'
 /// masses (Irons & Treharne 1971: by Rayleigh's quotient no assembly of elements is faster than the fastest of them).
 ///
 /// Per tet `aᵀK_e a = V(λ tr²G + ½µ|G + Gᵀ|²) ≤ V(3λ⁺ + 2µ)|G|²` and `|G|² ≤ λ_max(Σ_i b_i b_iᵀ/m_i) aᵀM_e a`.
-pub fn element_bound_rad_per_s(
-    mesh: &TetMesh,
-    rest_tets: &[RestTet],
-    tet_material: &[u16],
-    materials: &[Material],
-    inverse_mass_per_kg: &[DVec3],
-) -> f64 {
+///
+/// The springs are left out.
+pub fn element_bound_rad_per_s(stiffness: &RestStiffness<'_>, inverse_mass_per_kg: &[DVec3]) -> f64 {
+    let RestStiffness { mesh, rest_tets, tet_material, materials, .. } = *stiffness;
     let mut volume_of_node = vec![0.0; inverse_mass_per_kg.len()];
     for (nodes, rest) in mesh.tets().iter().zip(rest_tets) {
         for &node in nodes {
@@ -98,16 +91,6 @@ fn largest_eigenvalue(a: &DMat3) -> f64 {
     }
     let half_det = (deviator * (1.0 / p)).determinant() * 0.5;
     q + 2.0 * p * (half_det.clamp(-1.0, 1.0).acos() / 3.0).cos()
-}
-
-/// `K` of linear elasticity at rest, applied without being assembled.
-struct RestStiffness<'a> {
-    mesh: &'a TetMesh,
-    rest_tets: &'a [RestTet],
-    tet_material: &'a [u16],
-    materials: &'a [Material],
-    /// One per node, or none.
-    springs_n_per_m: &'a [f64],
 }
 
 impl RestStiffness<'_> {

@@ -3,7 +3,7 @@ use super::{ModelError, ModelSpec, PrescribedSpec, check, substeps};
 use crate::{
     contact::{ContactModel, SurfaceModuli, ToolState},
     fem::{element::RestTet, mass},
-    integrate::spectrum,
+    integrate::spectrum::{RestStiffness, max_natural_frequency_rad_per_s},
     material::Material,
     mesh::{Surface, TetMesh},
     simd::ForceKernel,
@@ -40,13 +40,14 @@ impl Model {
         let mass_kg = mass::lumped_kg(&spec.mesh, density);
         let inverse_mass_per_kg = free_inverse_mass(&mass_kg, &spec.prescribed)?;
         let kernel = ForceKernel::build(&spec.mesh, &rest_tets, &spec.tet_region, &materials, spec.settings.precision);
-        let omega = spectrum::max_natural_frequency_rad_per_s(
-            &spec.mesh,
-            &rest_tets,
-            &spec.tet_region,
-            &materials,
-            &inverse_mass_per_kg,
-        );
+        let at_rest = RestStiffness {
+            mesh: &spec.mesh,
+            rest_tets: &rest_tets,
+            tet_material: &spec.tet_region,
+            materials: &materials,
+            springs_n_per_m: &[],
+        };
+        let omega = max_natural_frequency_rad_per_s(&at_rest, &inverse_mass_per_kg);
         let contact = ContactModel::build(
             &spec.mesh,
             &surface,
@@ -61,9 +62,8 @@ impl Model {
         let touched = if springs.is_empty() {
             omega
         } else {
-            let (tets, regions) = (&rest_tets, &spec.tet_region);
-            let inverse = &inverse_mass_per_kg;
-            spectrum::max_frequency_on_springs_rad_per_s(&spec.mesh, tets, regions, &materials, inverse, &springs)
+            let touched = RestStiffness { springs_n_per_m: &springs, ..at_rest };
+            max_natural_frequency_rad_per_s(&touched, &inverse_mass_per_kg)
         };
         let omega_sq = stretch_sq * touched.max(omega).powi(2) + contact.tool_frequency_sq;
         let substeps = substeps::choose(&spec, &materials, omega_sq.sqrt())?;
