@@ -111,6 +111,16 @@ fn static_and_simulate_agree_at_rest() {
 }
 
 #[test]
+fn a_wanted_residual_is_a_ratio() {
+    for folly in ["0", "1", "2", "-1", "nan", "inf"] {
+        let refused = palpated(&["static", "cantilever", &format!("--residual={folly}")]);
+        let message = String::from_utf8_lossy(&refused.stderr).into_owned();
+        assert_eq!(refused.status.code(), Some(2), "{message}");
+        assert!(message.contains("larger than 0 and smaller than 1"), "{message}");
+    }
+}
+
+#[test]
 fn frames_are_as_many_as_asked_for_or_none() {
     let folder = tempfile::tempdir().unwrap();
     let scene = beam(folder.path());

@@ -5,7 +5,6 @@ use common::{LAWS, block, equilibrium, held, material, mean_displacement_m, node
 use glam::DVec3;
 use palpate_physics::{
     LoadSpec, Model, Precision, PrescribedSpec, Scratch, State, Substeps, TetMesh, TickInput,
-    contact::{Coupling, ToolSpec, ToolTarget},
     material::Law,
     solve::{RigidMotion, SolveError, StaticSettings, solve_static},
     step,
@@ -191,7 +190,8 @@ fn an_unloaded_body_stays_where_it_is() {
     let model = Model::build(spec(mesh, material(Law::default(), YOUNG_PA, 0.3), prescribed, vec![])).unwrap();
     let found = equilibrium(&model, 1.0, &[]);
     assert_eq!(found.x, model.rest_positions_m());
-    assert_eq!(found.factorisations, 0);
+    // To see that it is stable.
+    assert!(found.stable && found.factorisations == 1);
 }
 
 #[test]
@@ -211,54 +211,4 @@ fn a_stvk_column_past_its_limit_point_is_reported_inverted() {
     println!("StVK past its limit point snaps to s = {s:.6}");
     assert!(s < -1.0 && (0.5 * s * (s * s - 1.0) + 0.25).abs() < 1e-9, "{s}");
     assert_eq!(found.inverted_tets, 6);
-}
-
-#[test]
-fn a_pressed_body_rests_in_the_same_contact_in_both() {
-    let mesh = block(DVec3::new(0.06, 0.06, 0.03), [6, 6, 3]);
-    let prescribed = vec![held(&mesh, "floor", [true; 3], |p| p.z == 0.0)];
-    let mut wanted = spec(mesh, material(Law::StableNeoHookean, YOUNG_PA, 0.45), prescribed, vec![]);
-    // Off every symmetry of the mesh.
-    let above = DVec3::new(0.0313, 0.0287, 0.0);
-    wanted.tools = vec![ToolSpec {
-        name: "sphere".into(),
-        radius_m: 0.01,
-        coupling: Coupling::Rigid,
-        friction_coefficient: 0.0,
-        start_position_m: above + DVec3::Z * 0.042,
-    }];
-    wanted.gravity_m_per_s2 = DVec3::new(0.0, 0.0, -9.81);
-    wanted.settings.substeps = Substeps::Measured;
-    wanted.settings.mass_damping_per_s = 150.0;
-    let model = Model::build(wanted).unwrap();
-    let target = ToolTarget { position_m: above + DVec3::Z * 0.036, velocity_m_per_s: DVec3::ZERO };
-    let settings = StaticSettings { relative_residual: 1e-12, ..StaticSettings::default() };
-    let mut go = |_: &_| ControlFlow::Continue(());
-    let found = solve_static(&model, &[], &[DVec3::ZERO], &[target], &settings, &mut go).unwrap();
-    let mut state = State::at_rest(&model);
-    let mut scratch = Scratch::new(&model);
-    for tick in 1..=600 {
-        let way = (f64::from(tick) / 100.0).min(1.0);
-        let tool = ToolTarget { position_m: above + DVec3::Z * (0.042 - 0.006 * way), ..target };
-        let input = TickInput {
-            tools: &[tool],
-            load_factors: &[],
-            prescribed_displacements_m: &[DVec3::ZERO],
-            point_forces: &[],
-        };
-        step(&model, &mut state, &mut scratch, &input);
-    }
-    let apart = state.x.iter().zip(&found.x).map(|(a, b)| a.distance(*b)).fold(0.0, f64::max);
-    let (at_rest, dynamic) = (found.tool_forces_n[0], state.tools[0].contact_force_n);
-    println!(
-        "contact: static {at_rest} N, dynamic {dynamic} N; positions differ by {apart:.2e} m; {} iterations, {} factorisations, {} load steps",
-        found.iterations, found.factorisations, found.load_steps
-    );
-    assert!(at_rest.z > 0.1, "{at_rest}");
-    assert!(apart < 1e-10 * 0.06, "{apart:e}");
-    assert!((at_rest - dynamic).length() < 1e-9 * at_rest.length());
-    // The floor carries the weight and the tool's push.
-    let weight = model.mass_kg().iter().sum::<f64>() * 9.81;
-    let sum = found.reactions_n[0] - at_rest - DVec3::Z * weight;
-    assert!(sum.length() < 1e-10 * at_rest.length(), "{sum}");
 }

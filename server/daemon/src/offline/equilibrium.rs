@@ -12,8 +12,8 @@ use super::{
 use glam::DVec3;
 use miette::Diagnostic;
 use palpate_physics::{
-    Model, State,
-    contact::{Coupling, ToolTarget},
+    Model,
+    contact::ToolTarget,
     solve::{self, SolveError, StaticSettings, StaticSolution},
 };
 use palpate_scene::Scene;
@@ -26,15 +26,15 @@ use thiserror::Error;
     palpated static cantilever                 where the beam comes to rest\n  \
     palpated static cantilever --out rest      and keep probes.csv, frames.pvd and summary.json\n  \
     palpated static lame-sphere --json         a sphere under pressure, for other programs\n\n\
-    Tools are held where their device is, without friction; a coupling's spring does not give.")]
+    Loads and tools arrive slowly, and without friction. A tool on a spring rests where the spring balances its contact.")]
 pub struct StaticArgs {
     /// Scene file or name of a built-in scene
     pub scene: String,
     /// Take loads, motions and tools as they are at this time, instead of what they settle to
     #[arg(long, value_name = "SECONDS", value_parser = positive)]
     pub at_s: Option<f64>,
-    /// Largest residual force relative to the forces in play
-    #[arg(long, value_name = "RATIO", value_parser = positive)]
+    /// Largest residual force relative to the forces in play, between 0 and 1
+    #[arg(long, value_name = "RATIO", value_parser = ratio)]
     pub residual: Option<f64>,
     /// Folder for probes.csv, summary.json and the frame; without it only the summary is printed
     #[arg(long, value_name = "DIR")]
@@ -67,18 +67,12 @@ pub fn run(args: &StaticArgs) -> miette::Result<ExitCode> {
     if let Some(out) = &args.out {
         folder::check(out, args.force)?;
     }
-    for tool in scene.model.tools.iter().filter(|tool| matches!(tool.coupling, Coupling::Spring { .. })) {
-        eprintln!(
-            "warning: tool \"{}\" is coupled by a spring; static holds it at its device's position, simulate does not",
-            tool.name
-        );
-    }
     let started = Instant::now();
     let goal = Goal::of(&scene, args.at_s);
     let solution = solve(&scene, &model, &goal, args.residual)?;
     // Only now that there is something to replace them with do earlier results go.
     let out = args.out.as_deref().map(|out| folder::prepare(out, args.force)).transpose()?;
-    let state = state_of(&model, &goal, &solution);
+    let state = solution.state(&model, &goal.load_factors);
     let mut rows = ProbeRows::new(&scene.probes, out.as_ref().map(|out| out.join(folder::PROBES)).as_deref())?;
     rows.sample(goal.time_s, &model, &state, &solution.node_reactions_n)?;
     rows.flush()?;
@@ -139,25 +133,34 @@ fn solve(scene: &Scene, model: &Model, goal: &Goal, residual: Option<f64>) -> mi
     };
     let solved = solve::solve_static(model, &goal.load_factors, &goal.prescribed_m, &goal.tools, &settings, &mut show);
     bar.finish();
-    solved.map_err(|cause| {
-        let advice = match &cause {
-            SolveError::UnderConstrained { .. } => "add a [[fixed]] region to the scene",
-            SolveError::Cancelled { .. } => "it was interrupted; nothing was written",
-            _ => "apply less load, or let `palpated simulate` find the way with viscosity or mass_damping_per_s",
-        };
-        NoEquilibrium { scene: scene.name.clone(), advice, cause }.into()
-    })
+    solved.map_err(|cause| NoEquilibrium { scene: scene.name.clone(), advice: advice(&cause), cause }.into())
 }
 
-/// The equilibrium as a state, for probes and frames.
-fn state_of(model: &Model, goal: &Goal, solution: &StaticSolution) -> State {
-    let mut state = State::at_rest(model);
-    state.x.copy_from_slice(&solution.x);
-    state.load_factors.copy_from_slice(&goal.load_factors);
-    for ((tool, target), force) in state.tools.iter_mut().zip(&goal.tools).zip(&solution.tool_forces_n) {
-        tool.centre_m = target.position_m;
-        tool.contact_force_n = *force;
-        tool.device_force_n = *force;
+/// What to do about it.
+fn advice(cause: &SolveError) -> &'static str {
+    match cause {
+        SolveError::UnderConstrained { .. } => "add a [[fixed]] region to the scene",
+        SolveError::Cancelled { .. } => "it was interrupted; nothing was written",
+        SolveError::ToolTooFar { .. } => {
+            "let the tool start nearer to where it is to rest, or leave it out of the scene"
+        }
+        SolveError::Factorisation { .. } => {
+            "use a coarser mesh or more memory, or let `palpated simulate` come to rest"
+        }
+        SolveError::NonFinite { .. } => "look for a load or a constant in the wrong unit",
+        SolveError::NoConvergence { .. } | SolveError::TooManySteps { .. } => {
+            "apply less load, or let `palpated simulate` find the way with viscosity or mass_damping_per_s"
+        }
+        SolveError::InputLength { .. } | SolveError::InputNotFinite { .. } | SolveError::Setting { .. } => {
+            "correct that value"
+        }
     }
-    state
+}
+
+/// A number between 0 and 1, neither of them.
+fn ratio(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(value) if value > 0.0 && value < 1.0 => Ok(value),
+        _ => Err("give a number larger than 0 and smaller than 1".into()),
+    }
 }

@@ -10,6 +10,7 @@ mod local_model;
 mod narrow;
 mod proxy;
 mod resting;
+mod spring;
 mod state;
 mod tool;
 mod touching;
@@ -17,7 +18,8 @@ mod triangle;
 
 pub use inside::is_inside;
 pub use proxy::SubstepTime;
-pub(crate) use resting::RestingContact;
+pub(crate) use resting::{Pressing, RestingContact};
+pub(crate) use spring::SaturatingSpring;
 pub use state::ContactState;
 pub use tool::{Coupling, LocalContactModel, ToolSpec, ToolState, ToolTarget};
 pub use triangle::{closest_point, closest_weights};
@@ -28,6 +30,7 @@ use foundation::{BodyAtRest, Foundation, SampleTables};
 use glam::DVec3;
 use local_model::MeanContact;
 use narrow::{Meeting, Pressed};
+
 use touching::Touching;
 
 /// Elastic moduli behind a boundary triangle.
@@ -104,6 +107,16 @@ impl ToolModel {
             foundation,
         }
     }
+
+    /// The coupling's spring; `None` of a rigid tool.
+    fn spring(&self) -> Option<SaturatingSpring> {
+        match self.spec.coupling {
+            Coupling::Rigid => None,
+            Coupling::Spring { stiffness_n_per_m, .. } => {
+                Some(SaturatingSpring { stiffness_n_per_m, limit_n: self.force_limit_n })
+            }
+        }
+    }
 }
 
 impl ContactModel {
@@ -144,10 +157,12 @@ impl ContactModel {
 
     /// Force (N) at which a tool's coupling saturates; infinite for a rigid tool.
     pub fn force_limit_n(&self, tool: usize) -> f64 {
-        match self.tools[tool].spec.coupling {
-            Coupling::Rigid => f64::INFINITY,
-            Coupling::Spring { .. } => self.tools[tool].force_limit_n,
-        }
+        self.spring(tool).map_or(f64::INFINITY, |spring| spring.limit_n)
+    }
+
+    /// The spring of a tool's coupling; `None` of a rigid tool.
+    pub(crate) fn spring(&self, tool: usize) -> Option<SaturatingSpring> {
+        self.tools[tool].spring()
     }
 
     /// Contact's part of the state, touching nothing.

@@ -5,12 +5,12 @@
 //! `v ← ḋ + (v − ḋ) e^{−B h/m}`, so no damping makes it unstable.
 //!
 //! What keeps it outside, whatever the device does:
-//! - The spring saturates at `F_max`, the force that presses the sphere [`SATURATION_DEPTH`]·R into the flat foundation; its
-//!   potential is then linear instead of quadratic, so it stays conservative. The damper is cut where the sum exceeds it.
+//! - The spring saturates ([`super::spring`]) at `F_max`, the force that presses the sphere [`SATURATION_DEPTH`]·R into the flat
+//!   foundation. The damper is cut where the sum exceeds it.
 //! - It moves at most `R/4` in a substep; within `R/4` of the surface it approaches the nearest point with at most the kinetic
 //!   energy that the flat foundation stores at depth [`IMPACT_DEPTH`]·R. The rest is taken from the (virtual) tool, never given
 //!   to the body.
-use super::{Coupling, ToolModel, ToolState, narrow::Pressed};
+use super::{Coupling, ToolModel, ToolState, narrow::Pressed, spring::shortened};
 use glam::DVec3;
 
 /// Depth over R at which the coupling's force saturates.
@@ -76,11 +76,11 @@ fn half_kick(
     (device_m, device_m_per_s): (DVec3, DVec3),
     h_s: f64,
 ) -> DVec3 {
-    let Coupling::Spring { stiffness_n_per_m, damping_n_s_per_m, mass_kg } = model.spec.coupling else {
+    let (Coupling::Spring { damping_n_s_per_m, mass_kg, .. }, Some(spring)) = (model.spec.coupling, model.spring())
+    else {
         return DVec3::ZERO;
     };
-    let limit_n = model.force_limit_n;
-    let spring_n = shortened(device_m - tool.centre_m, limit_n / stiffness_n_per_m) * stiffness_n_per_m;
+    let (limit_n, spring_n) = (spring.limit_n, spring.force_n(device_m - tool.centre_m));
     if h_s == 0.0 {
         return spring_n;
     }
@@ -92,12 +92,6 @@ fn half_kick(
     let damper_n = damper_n * share_within(spring_n, damper_n, limit_n);
     tool.velocity_m_per_s += damper_n * (h_s / mass_kg);
     spring_n + damper_n
-}
-
-/// The vector, cut to a length; safe for any finite vector, however long.
-fn shortened(a: DVec3, limit: f64) -> DVec3 {
-    let largest = a.abs().max_element();
-    if largest <= limit { a.clamp_length_max(limit) } else { (a / largest).normalize() * limit }
 }
 
 /// Largest `β ≤ 1` with `|s + β d| ≤ limit`, for `|s| ≤ limit`. A shortened damper still only takes energy.

@@ -1,19 +1,34 @@
-//! Contact at rest: the foundation's potential, force and stiffness for spheres held in place, without friction or history.
+//! Contact at rest: the foundation's potential, force and stiffness, without friction or history.
 //!
 //! `Φ = ½ Σ_s k_f a_s g_s²`, `g = R − |r|`, `r = y − c` (see [`super::foundation`]). With `n̂ = r/|r|`:
-//! `−∂Φ/∂y = k g n̂`, `∂²Φ/∂y² = k n̂n̂ᵀ − k (g/|r|)(I − n̂n̂ᵀ)`; nodes get both through the weights ζ.
+//! `−∂Φ/∂y = k g n̂ = ∂Φ/∂c`, `∂²Φ/∂r² = H = k n̂n̂ᵀ − k (g/|r|)(I − n̂n̂ᵀ)`; nodes get both through the weights ζ, so that with
+//! `w = (ζ, −1)` on (nodes, tool) the force is `−w ⊗ ∂Φ/∂r` and the stiffness `w wᵀ ⊗ H`.
 //!
-//! Which samples a tool may press is settled once, where it arrives: those whose outward side it is on, and those it pressed
-//! before it moved. So the potential is one smooth function while equilibrium is sought.
+//! A *configuration* holds the positions of all nodes, then the centres of all tools.
+//!
+//! Which samples a tool may press is settled where it arrives: those whose outward side it is on, and of those inside it
+//! before, the ones it pressed then. So the potential is one smooth function while equilibrium is sought.
 use super::ContactModel;
 use glam::{DMat3, DVec3};
 
-/// Spheres at rest against the surface.
+/// Which samples may be pressed.
 #[derive(Debug, Clone)]
 pub(crate) struct RestingContact {
-    centres_m: Vec<DVec3>,
-    /// Per tool and sample: may be pressed.
+    /// Per tool and sample.
     front: Vec<Vec<bool>>,
+}
+
+/// How a tool presses the surface.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub(crate) struct Pressing {
+    /// Force of the body on the tool (N).
+    pub(crate) force_n: DVec3,
+    /// Samples that carry force.
+    pub(crate) contacts: u32,
+    /// Deepest sample (m).
+    pub(crate) penetration_m: f64,
+    /// `Φ` (J).
+    pub(crate) energy_j: f64,
 }
 
 /// A sample inside a sphere.
@@ -29,99 +44,192 @@ struct PressedSample {
     normal: DVec3,
 }
 
+/// A sample, wherever it is.
+struct Sample {
+    number: usize,
+    /// `r = y − c` (m).
+    from_centre_m: DVec3,
+    /// Outward (m²), twice the triangle's area long.
+    outward: DVec3,
+}
+
 impl RestingContact {
-    /// Tools arriving at `centres_m` while the body is at `x`.
-    pub(crate) fn arrive(model: &ContactModel, centres_m: Vec<DVec3>, x: &[DVec3], before: Option<&Self>) -> Self {
-        let front = |tool: usize| {
-            let mut allowed = vec![false; model.tools[tool].foundation.samples];
-            for triangle in 0..model.triangles.len() {
-                let [a, b, c] = model.triangles.corners(triangle, x);
-                let outward = (b - a).cross(c - a);
-                let samples = model.tools[tool].foundation.of(triangle, &model.tables);
-                for (index, &[wb, wc]) in samples.weights.iter().enumerate() {
-                    let sample = samples.first as usize + index;
-                    let y = a + (b - a) * wb + (c - a) * wc;
-                    allowed[sample] = outward.dot(y - centres_m[tool]) < 0.0
-                        || before.is_some_and(|before| {
-                            let inside = y.distance(before.centres_m[tool]) < model.tools[tool].spec.radius_m;
-                            inside && before.front[tool][sample]
-                        });
-                }
+    /// Tools that appear where they are.
+    pub(crate) fn appear(model: &ContactModel, configuration: &[DVec3]) -> Self {
+        let nothing = Self { front: model.tools.iter().map(|tool| vec![false; tool.foundation.samples]).collect() };
+        nothing.settled(model, configuration, |_, sample| sample.outward.dot(sample.from_centre_m) < 0.0)
+    }
+
+    /// Tools that came from the configuration `before`, with this contact, to another.
+    pub(crate) fn arrive(&self, model: &ContactModel, before: &[DVec3], now: &[DVec3]) -> Self {
+        let was_inside = inside(model, before);
+        self.settled(model, now, |tool, sample| {
+            if was_inside[tool][sample.number] {
+                self.front[tool][sample.number]
+            } else {
+                sample.outward.dot(sample.from_centre_m) < 0.0
             }
-            allowed
-        };
-        Self { front: (0..model.tools.len()).map(front).collect(), centres_m }
+        })
+    }
+
+    /// Contact with the samples added that tools met from the outside between two configurations and could not press: `None` if
+    /// there are none.
+    pub(crate) fn widened(&self, model: &ContactModel, before: &[DVec3], now: &[DVec3]) -> Option<Self> {
+        let (was_inside, is_inside) = (inside(model, before), inside(model, now));
+        let mut widened = false;
+        let wider = self.settled(model, now, |tool, sample| {
+            let met = is_inside[tool][sample.number] && !was_inside[tool][sample.number];
+            let added = met && !self.front[tool][sample.number] && sample.outward.dot(sample.from_centre_m) < 0.0;
+            widened |= added;
+            added || self.front[tool][sample.number]
+        });
+        widened.then_some(wider)
+    }
+
+    fn settled(
+        &self,
+        model: &ContactModel,
+        configuration: &[DVec3],
+        mut may_press: impl FnMut(usize, &Sample) -> bool,
+    ) -> Self {
+        let mut settled = self.clone();
+        for_every_sample(model, configuration, |tool, sample| {
+            settled.front[tool][sample.number] = may_press(tool, sample);
+        });
+        settled
     }
 
     /// `Φ` (J) of all tools.
-    pub(crate) fn potential_j(&self, model: &ContactModel, x: &[DVec3]) -> f64 {
+    pub(crate) fn potential_j(&self, model: &ContactModel, configuration: &[DVec3]) -> f64 {
         let mut sum = 0.0;
-        self.for_each(model, x, |s| sum += 0.5 * s.stiffness_n_per_m * s.depth_m * s.depth_m);
+        self.for_each(model, configuration, |s| sum += 0.5 * s.stiffness_n_per_m * s.depth_m * s.depth_m);
         sum
     }
 
-    /// Adds the forces (N) on nodes, and returns that on every tool.
-    pub(crate) fn add_forces_n(&self, model: &ContactModel, x: &[DVec3], forces_n: &mut [DVec3]) -> Vec<DVec3> {
-        let mut on_tools = vec![DVec3::ZERO; self.centres_m.len()];
-        self.for_each(model, x, |s| {
+    /// Adds the forces (N) on nodes and tools, and says how every tool presses.
+    pub(crate) fn add_forces_n(
+        &self,
+        model: &ContactModel,
+        configuration: &[DVec3],
+        forces_n: &mut [DVec3],
+    ) -> Vec<Pressing> {
+        let mut tools = vec![Pressing::default(); model.tools.len()];
+        self.for_each(model, configuration, |s| {
             let force = s.normal * (s.stiffness_n_per_m * s.depth_m);
             for (&node, weight) in model.triangles.nodes[s.triangle].iter().zip(s.weights) {
                 forces_n[node as usize] += force * weight;
             }
-            on_tools[s.tool] -= force;
+            let tool = &mut tools[s.tool];
+            tool.force_n -= force;
+            tool.contacts += 1;
+            tool.penetration_m = tool.penetration_m.max(s.depth_m);
+            tool.energy_j += 0.5 * s.stiffness_n_per_m * s.depth_m * s.depth_m;
         });
-        on_tools
+        let nodes = configuration.len() - tools.len();
+        for (force, tool) in forces_n[nodes..].iter_mut().zip(&tools) {
+            *force += tool.force_n;
+        }
+        tools
     }
 
-    /// Calls `add(node_i, node_j, block)` with `∂²Φ/∂x_i∂x_j` (N/m), once per pair `i ≤ j` of a triangle's corners.
-    /// `definite` leaves out the part that pressing makes across the normal, which is negative.
+    /// Calls `add(i, j, block)` with `∂²Φ/∂q_i∂q_j` (N/m), once per pair `i ≤ j` of a triangle's corners and the tool (numbered as in
+    /// the configuration). `definite` leaves out the part that pressing makes across the normal, which is negative.
     pub(crate) fn for_each_block(
         &self,
         model: &ContactModel,
-        x: &[DVec3],
+        configuration: &[DVec3],
         definite: bool,
         mut add: impl FnMut(u32, u32, &DMat3),
     ) {
-        self.for_each(model, x, |s| {
+        let nodes = configuration.len() - model.tools.len();
+        self.for_each(model, configuration, |s| {
             let along = DMat3::from_cols(s.normal * s.normal.x, s.normal * s.normal.y, s.normal * s.normal.z);
             let across = if definite { 0.0 } else { s.depth_m / s.distance_m };
             let hessian = (along - (DMat3::IDENTITY - along) * across) * s.stiffness_n_per_m;
-            let nodes = model.triangles.nodes[s.triangle];
-            for i in 0..3 {
-                for j in i..3 {
-                    add(nodes[i], nodes[j], &(hessian * (s.weights[i] * s.weights[j])));
+            let [a, b, c] = model.triangles.nodes[s.triangle];
+            let [wa, wb, wc] = s.weights;
+            let ends = [(a, wa), (b, wb), (c, wc), ((nodes + s.tool) as u32, -1.0)];
+            for (i, (p, wp)) in ends.into_iter().enumerate() {
+                for (q, wq) in &ends[i..] {
+                    add(p, *q, &(hessian * (wp * wq)));
                 }
             }
         });
     }
 
-    fn for_each(&self, model: &ContactModel, x: &[DVec3], mut visit: impl FnMut(&PressedSample)) {
-        for (tool, &centre) in self.centres_m.iter().enumerate() {
+    fn for_each(&self, model: &ContactModel, configuration: &[DVec3], mut visit: impl FnMut(&PressedSample)) {
+        for_near_triangles(model, configuration, |tool, triangle, centre, [a, b, c]| {
             let radius_m = model.tools[tool].spec.radius_m;
-            for triangle in 0..model.triangles.len() {
-                let corners = model.triangles.corners(triangle, x);
-                let [a, b, c] = corners;
-                // No point of a triangle is nearer than its first corner less its longest edge from there.
-                if centre.distance(a) - a.distance(b).max(a.distance(c)) >= radius_m {
-                    continue;
-                }
-                let samples = model.tools[tool].foundation.of(triangle, &model.tables);
-                for (index, &[wb, wc]) in samples.weights.iter().enumerate() {
-                    let r = a - centre + (b - a) * wb + (c - a) * wc;
-                    let distance_m = r.length();
-                    if distance_m < radius_m && distance_m > 0.0 && self.front[tool][samples.first as usize + index] {
-                        visit(&PressedSample {
-                            tool,
-                            triangle,
-                            weights: [1.0 - wb - wc, wb, wc],
-                            stiffness_n_per_m: samples.stiffness_n_per_m,
-                            depth_m: radius_m - distance_m,
-                            distance_m,
-                            normal: r / distance_m,
-                        });
-                    }
+            let samples = model.tools[tool].foundation.of(triangle, &model.tables);
+            for (index, &[wb, wc]) in samples.weights.iter().enumerate() {
+                let r = a - centre + (b - a) * wb + (c - a) * wc;
+                let distance_m = r.length();
+                if distance_m < radius_m && distance_m > 0.0 && self.front[tool][samples.first as usize + index] {
+                    visit(&PressedSample {
+                        tool,
+                        triangle,
+                        weights: [1.0 - wb - wc, wb, wc],
+                        stiffness_n_per_m: samples.stiffness_n_per_m,
+                        depth_m: radius_m - distance_m,
+                        distance_m,
+                        normal: r / distance_m,
+                    });
                 }
             }
+        });
+    }
+}
+
+/// Which samples are inside each tool.
+fn inside(model: &ContactModel, configuration: &[DVec3]) -> Vec<Vec<bool>> {
+    let mut inside: Vec<Vec<bool>> = model.tools.iter().map(|tool| vec![false; tool.foundation.samples]).collect();
+    for_near_triangles(model, configuration, |tool, triangle, centre, corners| {
+        for_samples(model, tool, triangle, centre, corners, |sample| {
+            inside[tool][sample.number] = sample.from_centre_m.length() < model.tools[tool].spec.radius_m;
+        });
+    });
+    inside
+}
+
+fn for_every_sample(model: &ContactModel, configuration: &[DVec3], mut visit: impl FnMut(usize, &Sample)) {
+    for (tool, &centre) in configuration[configuration.len() - model.tools.len()..].iter().enumerate() {
+        for triangle in 0..model.triangles.len() {
+            let corners = model.triangles.corners(triangle, configuration);
+            for_samples(model, tool, triangle, centre, corners, |sample| visit(tool, sample));
         }
+    }
+}
+
+/// Calls `visit(tool, triangle, centre, corners)` for triangles that may reach into a tool.
+fn for_near_triangles(
+    model: &ContactModel,
+    configuration: &[DVec3],
+    mut visit: impl FnMut(usize, usize, DVec3, [DVec3; 3]),
+) {
+    for (tool, &centre) in configuration[configuration.len() - model.tools.len()..].iter().enumerate() {
+        for triangle in 0..model.triangles.len() {
+            let corners = model.triangles.corners(triangle, configuration);
+            let [a, b, c] = corners;
+            // No point of a triangle is nearer than its first corner less its longest edge from there.
+            if centre.distance(a) - a.distance(b).max(a.distance(c)) < model.tools[tool].spec.radius_m {
+                visit(tool, triangle, centre, corners);
+            }
+        }
+    }
+}
+
+fn for_samples(
+    model: &ContactModel,
+    tool: usize,
+    triangle: usize,
+    centre: DVec3,
+    [a, b, c]: [DVec3; 3],
+    mut visit: impl FnMut(&Sample),
+) {
+    let samples = model.tools[tool].foundation.of(triangle, &model.tables);
+    let outward = (b - a).cross(c - a);
+    for (index, &[wb, wc]) in samples.weights.iter().enumerate() {
+        let from_centre_m = a - centre + (b - a) * wb + (c - a) * wc;
+        visit(&Sample { number: samples.first as usize + index, from_centre_m, outward });
     }
 }

@@ -3,27 +3,34 @@
 //! Forces are those of `fem::element`, the materials and `fem::loads`, so an equilibrium found here is a resting state of
 //! [`crate::step`]. Everything is f64; linear systems go to faer's sparse Cholesky (docs/adr/static-solve.md).
 //!
-//! - `newton.rs`: load stepping and Newton's method with a line search
+//! - `load_path.rs`: load stepping
+//! - `newton.rs`: Newton's method with a line search at one load step
 //! - `equilibrium.rs`: forces and the change of potential along a line
 //! - `stiffness.rs`, `follower.rs`: the tangent stiffness in a fixed sparsity pattern
 //! - `rigid.rs`: which rigid motions the constraints leave free
 //! - `modes.rs`: natural frequencies by subspace iteration
 //! - `eigen.rs`: small symmetric eigenproblems
+//! - `solution.rs`, `error.rs`: what comes out
 mod eigen;
 mod equilibrium;
+mod error;
 mod factor;
 mod follower;
+mod load_path;
 mod modes;
 mod newton;
 mod rigid;
+mod solution;
 mod stiffness;
 
 use crate::{contact::ToolTarget, world::Model};
+pub use error::SolveError;
 use glam::DVec3;
+pub use load_path::MAX_LOAD_STEPS;
 pub use modes::{Mode, natural_modes};
 pub use rigid::RigidMotion;
+pub use solution::{StaticSolution, ToolAtRest};
 use std::ops::ControlFlow;
-use thiserror::Error;
 
 /// How far and how hard to solve.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -32,9 +39,10 @@ pub struct StaticSettings {
     pub relative_residual: f64,
     /// Newton iterations allowed at one load step.
     pub max_iterations: u32,
-    /// Load steps to begin with; failed ones are halved, and steps grow again after success.
+    /// Load steps to begin with, at least; failed ones are halved, and steps grow again after success. No solve tries more than
+    /// [`MAX_LOAD_STEPS`].
     pub load_steps: u32,
-    /// The smallest load step is `1 / (load_steps · 2^max_halvings)`.
+    /// The smallest load step is the first one over `2^max_halvings`.
     pub max_halvings: u32,
 }
 
@@ -57,124 +65,10 @@ pub struct Progress {
     pub relative_residual: f64,
 }
 
-/// An equilibrium.
-#[derive(Debug, Clone, PartialEq)]
-pub struct StaticSolution {
-    /// Positions (m), one per node.
-    pub x: Vec<DVec3>,
-    /// Force (N) of the holder on the body, summed over each prescribed set's axes.
-    pub reactions_n: Vec<DVec3>,
-    /// The same per node, zero on free axes.
-    pub node_reactions_n: Vec<DVec3>,
-    /// Force (N) of the body on each tool.
-    pub tool_forces_n: Vec<DVec3>,
-    /// Every Newton iteration, in order.
-    pub history: Vec<Progress>,
-    /// Newton iterations in all, failed load steps included.
-    pub iterations: u32,
-    /// Cholesky factorisations in all.
-    pub factorisations: u32,
-    /// Load steps that converged.
-    pub load_steps: u32,
-    /// `‖f_free‖₂` (N) at `x`.
-    pub residual_n: f64,
-    /// The same over its reference. Above the wanted one only where rounding of the positions allows no better: see
-    /// `rounding_n`.
-    pub relative_residual: f64,
-    /// Residual (N) that rounding of positions alone makes, `ε ‖diag K‖₂ max|x|`.
-    pub rounding_n: f64,
-    /// False when the last tangent stiffness was indefinite: the body would leave this equilibrium at the least push.
-    pub stable: bool,
-    /// Tets with `det F ≤ 0`. An equilibrium with any is one of the formulas, hardly one of a body.
-    pub inverted_tets: u32,
-}
-
-/// Why there is no equilibrium to show.
-#[derive(Debug, Clone, PartialEq, Error)]
-pub enum SolveError {
-    /// Arguments of the wrong number.
-    #[error("{what}: {found} given, the model has {expected}")]
-    InputLength {
-        /// What was counted.
-        what: &'static str,
-        /// Given.
-        found: usize,
-        /// Wanted.
-        expected: usize,
-    },
-    /// Arguments that are not finite.
-    #[error("{what} {index} is not finite")]
-    InputNotFinite {
-        /// What it is.
-        what: &'static str,
-        /// Which one.
-        index: usize,
-    },
-    /// A setting outside its range.
-    #[error("{name} = {value}: {rule}")]
-    Setting {
-        /// Name.
-        name: &'static str,
-        /// Value.
-        value: f64,
-        /// What it must satisfy.
-        rule: &'static str,
-    },
-    /// Rigid motions are left free.
-    #[error(
-        "the body (the part with node {node}) is free to {}; prescribe displacements that hold it",
-        rigid::list(motions)
-    )]
-    UnderConstrained {
-        /// A node of the part that is free.
-        node: u32,
-        /// Its free motions.
-        motions: Vec<RigidMotion>,
-    },
-    /// Newton's method failed at the smallest load step.
-    #[error(
-        "no equilibrium found beyond {:.4} % of the load: relative residual {relative_residual:.2e} after {iterations} \
-         iterations; {hint}", 100.0 * reached_fraction
-    )]
-    NoConvergence {
-        /// Load fraction of the last equilibrium.
-        reached_fraction: f64,
-        /// Load fraction that failed.
-        failed_fraction: f64,
-        /// Relative residual it ended with.
-        relative_residual: f64,
-        /// Iterations in all.
-        iterations: u32,
-        /// What may help.
-        hint: &'static str,
-    },
-    /// Forces at a finite position are not finite.
-    #[error("the force on node {node} is not finite at {:.4} % of the load; are the loads or constants too large?", 100.0 * load_fraction)]
-    NonFinite {
-        /// The node.
-        node: u32,
-        /// Load fraction.
-        load_fraction: f64,
-    },
-    /// The factorisation ran out of memory or indices.
-    #[error("the sparse factorisation of {unknowns} unknowns failed: {reason}")]
-    Factorisation {
-        /// Size of the system.
-        unknowns: usize,
-        /// What the library says.
-        reason: String,
-    },
-    /// The caller stopped it.
-    #[error("stopped at {:.4} % of the load", 100.0 * load_fraction)]
-    Cancelled {
-        /// Load fraction being solved.
-        load_fraction: f64,
-    },
-}
-
 /// Finds an equilibrium of `model` under its gravity, `load_factors` (one per load), `prescribed_displacements_m` (one per
-/// prescribed set) and rigid `tools` (one per tool, held at their target whatever their coupling), starting from rest with the tools at
-/// their start positions. A tool moves at most half its radius per load step, so it must come from outside.
+/// prescribed set) and devices at `tools` (one per tool), starting from rest with the tools at their start positions. A rigid tool is
+/// where its device is; a coupled one rests where its spring, saturated or not, balances its contact. A device moves at most half
+/// its tool's radius per load step, so the tool must come from outside.
 ///
 /// `progress` is called once per Newton iteration and may stop the solve. Friction and viscosity do not act at rest and are
 /// left out. The pressure's load stiffness enters with its symmetric part; where a follower pressure ends at a free rim the
@@ -194,7 +88,7 @@ pub fn solve_static(
     check(model, load_factors, prescribed_displacements_m, tools, settings)?;
     rigid::check_constrained(model)?;
     let goal = equilibrium::Goal { load_factors, prescribed_displacements_m, tools };
-    newton::solve(model, &goal, settings, progress)
+    load_path::solve(model, &goal, settings, progress)
 }
 
 fn check(
@@ -224,6 +118,7 @@ fn check(
     let tolerance = settings.relative_residual;
     setting("relative_residual", tolerance, tolerance > 0.0 && tolerance < 1.0, "must be in (0, 1)")?;
     setting("max_iterations", f64::from(settings.max_iterations), settings.max_iterations > 0, "must be 1 or more")?;
-    setting("load_steps", f64::from(settings.load_steps), settings.load_steps > 0, "must be 1 or more")?;
+    let steps = settings.load_steps;
+    setting("load_steps", f64::from(steps), (1..=MAX_LOAD_STEPS).contains(&steps), "must be 1 to 10000")?;
     setting("max_halvings", f64::from(settings.max_halvings), settings.max_halvings <= 40, "must be 40 or less")
 }

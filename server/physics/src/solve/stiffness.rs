@@ -1,7 +1,7 @@
 //! The tangent stiffness `K = −∂f/∂x` of the free degrees of freedom: lower triangle, compressed columns, one pattern for ever.
 use super::eigen;
 use crate::world::Model;
-use glam::{DMat3, DVec3};
+use glam::{BVec3, DMat3, DVec3};
 
 /// Marks an axis that is prescribed, or an entry above the diagonal.
 pub(super) const NONE: u32 = u32::MAX;
@@ -19,14 +19,24 @@ pub(super) struct FreeAxes {
 }
 
 impl FreeAxes {
+    /// Of the body.
     pub(super) fn of(model: &Model) -> Self {
+        Self::numbered(model.inverse_mass_per_kg().iter().map(|inverse_mass| inverse_mass.cmpne(DVec3::ZERO)))
+    }
+
+    /// Of a configuration: the body's, then those of coupled tools.
+    pub(super) fn with_tools(model: &Model) -> Self {
+        let nodes = model.inverse_mass_per_kg().iter().map(|inverse_mass| inverse_mass.cmpne(DVec3::ZERO));
+        let tools = (0..model.spec().tools.len()).map(|tool| BVec3::splat(model.contact().spring(tool).is_some()));
+        Self::numbered(nodes.chain(tools))
+    }
+
+    fn numbered(free: impl Iterator<Item = BVec3>) -> Self {
         let mut count = 0;
-        let number = model
-            .inverse_mass_per_kg()
-            .iter()
-            .map(|inverse_mass| {
+        let number = free
+            .map(|free| {
                 std::array::from_fn(|axis| {
-                    if inverse_mass[axis] == 0.0 {
+                    if !free.test(axis) {
                         return NONE;
                     }
                     count += 1;
@@ -73,12 +83,21 @@ pub(super) enum Definiteness {
 }
 
 impl Stiffness {
-    /// Lays out the pattern: two free axes share an entry when a tet joins their nodes.
+    /// Lays out the pattern: two free axes share an entry when a tet joins their nodes. A coupled tool, which may touch any part
+    /// of the surface, is joined to all its nodes: three dense rows, which come last in the elimination.
     pub(super) fn pattern(model: &Model, free: &FreeAxes) -> Self {
         let mut neighbours: Vec<Vec<u32>> = vec![Vec::new(); free.number.len()];
         for tet in model.mesh().tets() {
             for &node in tet {
                 neighbours[node as usize].extend(tet);
+            }
+        }
+        let tools = model.mass_kg().len() as u32..free.number.len() as u32;
+        for (node, near) in neighbours.iter_mut().enumerate().filter(|_| !tools.is_empty()) {
+            if tools.contains(&(node as u32)) {
+                near.push(node as u32);
+            } else if model.surface().vertex_of_node[node] != u32::MAX {
+                near.extend(tools.clone());
             }
         }
         let mut column_start = vec![0];

@@ -1,0 +1,97 @@
+//! Load stepping: from rest to the goal in stages, each an equilibrium.
+use super::{
+    Progress, SolveError, StaticSettings, StaticSolution,
+    equilibrium::{Goal, Stage},
+    newton::{Failure, Solver, Stop},
+};
+use crate::{contact::RestingContact, world::Model};
+use glam::DVec3;
+use std::ops::ControlFlow;
+
+/// More load steps than this, failed ones included, are not tried.
+pub const MAX_LOAD_STEPS: u32 = 10_000;
+/// How often contact may grow within a load step.
+const MAX_WIDENINGS: u32 = 20;
+
+/// Raises the load in steps: halved after a failure, doubled after a success.
+pub(super) fn solve(
+    model: &Model,
+    goal: &Goal<'_>,
+    settings: &StaticSettings,
+    progress: &mut dyn FnMut(&Progress) -> ControlFlow<()>,
+) -> Result<StaticSolution, SolveError> {
+    let largest = largest_step(model, goal)?;
+    let mut solver = Solver::new(model, settings, goal, progress)?;
+    let start = model.spec().tools.iter().map(|tool| tool.start_position_m);
+    let mut at: Vec<DVec3> = model.rest_positions_m().iter().copied().chain(start).collect();
+    let mut contact = RestingContact::appear(model.contact(), &at);
+    let mut step = largest.min(1.0 / f64::from(settings.load_steps));
+    // Rounding of the fraction is far below this.
+    let smallest = (step * 0.5_f64.powi(settings.max_halvings as i32)).max(1e-12);
+    let (mut reached, mut succeeded) = (0.0, 0);
+    for tried in 1..=MAX_LOAD_STEPS {
+        // What is left is taken in one step if rounding alone stands between.
+        let fraction = if 1.0 - reached <= step * (1.0 + 1e-9) { 1.0 } else { reached + step };
+        let (mut stage, begin) = Stage::enter(model, goal, fraction, &at, &contact);
+        match settle(&mut solver, goal, &mut stage, &begin) {
+            Ok(found) => {
+                succeeded += 1;
+                if fraction >= 1.0 {
+                    return Ok(StaticSolution::of(&mut solver, &stage, found, succeeded));
+                }
+                (at, reached, contact) = (found, fraction, stage.contact);
+                step = (2.0 * step).min(largest);
+            }
+            Err(Stop::Final(error)) => return Err(error),
+            Err(Stop::Step(failure)) => {
+                step = 0.5 * (fraction - reached);
+                if step < smallest {
+                    return Err(give_up(failure, reached, fraction, solver.history.len() as u32));
+                }
+            }
+        }
+        debug_assert!(succeeded <= tried);
+    }
+    Err(SolveError::TooManySteps { reached_fraction: reached, failed: MAX_LOAD_STEPS - succeeded })
+}
+
+/// Equilibrium of a stage: a coupled tool that moves may come upon samples that it was not in front of when it set out.
+fn settle(solver: &mut Solver<'_>, goal: &Goal<'_>, stage: &mut Stage, begin: &[DVec3]) -> Result<Vec<DVec3>, Stop> {
+    let mut found = solver.equilibrate(goal, stage, begin.to_vec())?;
+    for _ in 0..MAX_WIDENINGS {
+        let Some(wider) = stage.contact.widened(solver.model.contact(), begin, &found) else { return Ok(found) };
+        stage.contact = wider;
+        found = solver.equilibrate(goal, stage, found)?;
+    }
+    Err(Stop::Step(Failure::Contact))
+}
+
+fn give_up(failure: Failure, reached_fraction: f64, failed_fraction: f64, iterations: u32) -> SolveError {
+    let (relative_residual, hint) = match failure {
+        Failure::NotFinite { node } => return SolveError::NonFinite { node, load_fraction: failed_fraction },
+        Failure::Iterations { relative_residual } => {
+            (relative_residual, "allow more iterations or load steps, or look for a load the body cannot carry")
+        }
+        Failure::LineSearch { relative_residual } => (
+            relative_residual,
+            "the potential does not fall along Newton's direction: the load may be past a limit point, tets may have \
+             inverted (StVK softens in compression; neo-Hookean does not), or the residual asked for is below rounding",
+        ),
+        Failure::Contact => (f64::NAN, "a tool slides on without end; is it pushed past the body?"),
+    };
+    SolveError::NoConvergence { reached_fraction, failed_fraction, relative_residual, iterations, hint }
+}
+
+/// A device moves at most half its tool's radius per load step: the tool presses what it was outside of.
+fn largest_step(model: &Model, goal: &Goal<'_>) -> Result<f64, SolveError> {
+    let mut largest = 1.0_f64;
+    for (spec, target) in model.spec().tools.iter().zip(goal.tools) {
+        let distance_m = spec.start_position_m.distance(target.position_m);
+        let step = 0.5 * spec.radius_m / distance_m.max(f64::MIN_POSITIVE);
+        if step < 1.0 / f64::from(MAX_LOAD_STEPS) {
+            return Err(SolveError::ToolTooFar { tool: spec.name.clone(), distance_m, radius_m: spec.radius_m });
+        }
+        largest = largest.min(step);
+    }
+    Ok(largest)
+}

@@ -1,0 +1,126 @@
+//! What a static solve finds.
+use super::{
+    Progress,
+    equilibrium::{Forces, Stage},
+    newton::Solver,
+};
+use crate::{
+    contact::ToolTarget,
+    fem::element::RestTet,
+    health::Energies,
+    world::{Model, PrescribedSpec, State},
+};
+use glam::{BVec3, DVec3};
+
+/// An equilibrium.
+#[derive(Debug, Clone, PartialEq)]
+pub struct StaticSolution {
+    /// Positions (m), one per node.
+    pub x: Vec<DVec3>,
+    /// Force (N) of the holder on the body, summed over each prescribed set's axes.
+    pub reactions_n: Vec<DVec3>,
+    /// The same per node, zero on free axes.
+    pub node_reactions_n: Vec<DVec3>,
+    /// Every tool.
+    pub tools: Vec<ToolAtRest>,
+    /// Every Newton iteration, in order.
+    pub history: Vec<Progress>,
+    /// Newton iterations in all, failed load steps included.
+    pub iterations: u32,
+    /// Cholesky factorisations in all.
+    pub factorisations: u32,
+    /// Load steps that converged.
+    pub load_steps: u32,
+    /// `‖f_free‖₂` (N) at `x`.
+    pub residual_n: f64,
+    /// The same over its reference. Above the wanted one only where rounding of the positions allows no better: see
+    /// `rounding_n`.
+    pub relative_residual: f64,
+    /// Residual (N) that rounding of positions alone makes, `ε ‖diag K‖₂ max|x|`.
+    pub rounding_n: f64,
+    /// False when the tangent stiffness at `x` is not positive definite: the body would leave this equilibrium at the least push.
+    pub stable: bool,
+    /// Tets with `det F ≤ 0`. An equilibrium with any is one of the formulas, hardly one of a body.
+    pub inverted_tets: u32,
+}
+
+/// A tool in equilibrium.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ToolAtRest {
+    /// Where its device is (m).
+    pub device_m: DVec3,
+    /// Centre of the tool (m): the device's place if it is rigid.
+    pub centre_m: DVec3,
+    /// Force (N) of the body on it.
+    pub contact_force_n: DVec3,
+    /// Force (N) on its device: the coupling's, or the contact force of a rigid tool.
+    pub device_force_n: DVec3,
+    /// Contact samples that carry force.
+    pub contacts: u32,
+    /// Deepest penetration into the surface (m).
+    pub penetration_m: f64,
+    /// Energy stored in the contact's foundation (J).
+    pub contact_energy_j: f64,
+}
+
+impl StaticSolution {
+    /// The equilibrium under `load_factors` as a state at tick 0, from which [`crate::step`] goes on without moving. Its ledger
+    /// holds the work of a slow loading, which is what the body holds: `W = U + G`.
+    pub fn state(&self, model: &Model, load_factors: &[f64]) -> State {
+        let mut state = State::at_rest(model);
+        state.x.copy_from_slice(&self.x);
+        state.load_factors.copy_from_slice(load_factors);
+        for (tool, found) in state.tools.iter_mut().zip(&self.tools) {
+            tool.target = ToolTarget { position_m: found.device_m, velocity_m_per_s: DVec3::ZERO };
+            tool.previous_target = tool.target;
+            tool.centre_m = found.centre_m;
+            tool.contact_force_n = found.contact_force_n;
+            tool.device_force_n = found.device_force_n;
+            tool.contacts = found.contacts;
+            tool.penetration_m = found.penetration_m;
+            tool.contact_energy_j = found.contact_energy_j;
+        }
+        state.ledger.external_work_j = Energies::of(model, &state).held_j();
+        state
+    }
+
+    /// What the solver found in its last stage.
+    pub(super) fn of(solver: &mut Solver<'_>, stage: &Stage, mut configuration: Vec<DVec3>, load_steps: u32) -> Self {
+        let model = solver.model;
+        let forces = Forces::at(model, stage, &configuration);
+        let stable = solver.is_stable(stage, &configuration);
+        let residual = forces.free(&solver.axes);
+        let (residual_n, relative_residual) = forces.residual(&residual);
+        // The holder supplies what the other forces lack.
+        let hold = |(inverse_mass, f): (&DVec3, DVec3)| DVec3::select(inverse_mass.cmpeq(DVec3::ZERO), -f, DVec3::ZERO);
+        let node_reactions_n: Vec<DVec3> = model.inverse_mass_per_kg().iter().zip(forces.total_n()).map(hold).collect();
+        let of_set = |set: &PrescribedSpec| {
+            let sum: DVec3 = set.nodes.iter().map(|&n| node_reactions_n[n as usize]).sum();
+            DVec3::select(BVec3::from_array(set.axes), sum, DVec3::ZERO)
+        };
+        Self {
+            reactions_n: model.spec().prescribed.iter().map(of_set).collect(),
+            tools: stage.tools_at_rest(model, &forces, &configuration),
+            iterations: solver.history.len() as u32,
+            factorisations: solver.factorisations,
+            load_steps,
+            residual_n,
+            relative_residual,
+            rounding_n: solver.rounding_n,
+            stable,
+            inverted_tets: inverted_tets(model, &configuration),
+            history: std::mem::take(&mut solver.history),
+            x: {
+                configuration.truncate(model.mass_kg().len());
+                configuration
+            },
+            node_reactions_n,
+        }
+    }
+}
+
+fn inverted_tets(model: &Model, x: &[DVec3]) -> u32 {
+    let volume_ratio =
+        |(rest, nodes): (&RestTet, &[u32; 4])| rest.gradient_of(&nodes.map(|n| x[n as usize])).determinant();
+    model.rest_tets().iter().zip(model.mesh().tets()).map(volume_ratio).filter(|&j| j <= 0.0).count() as u32
+}
