@@ -48,7 +48,7 @@ pub fn to_text(status: &StatusResponse) -> String {
         line(&format!("  {}", stage.stage), percentiles(stage.cost_us.as_ref()));
     }
     line("wake-up / us", percentiles(status.wakeup_jitter_us.as_ref()));
-    line("overruns", status.overruns.to_string());
+    line("overruns", format!("{} ({} ticks skipped)", status.overruns, status.skipped_ticks));
     for note in &status.realtime_notes {
         line("real time", note.clone());
     }
@@ -110,6 +110,7 @@ fn to_json(status: &StatusResponse) -> serde_json::Value {
         "time_s": status.time_s,
         "paused": status.paused,
         "overruns": status.overruns,
+        "skipped_ticks": status.skipped_ticks,
         "wakeup_jitter_us": spread(status.wakeup_jitter_us.as_ref()),
         "tick_cost_us": spread(status.tick_cost_us.as_ref()),
         "stages_us": status.stages.iter().map(|s| json!({"stage": s.stage, "cost_us": spread(s.cost_us.as_ref())})).collect::<Vec<_>>(),

@@ -28,8 +28,8 @@ pub fn of(daemon: &Daemon, session: &ActiveSession, copy: &Copy, done: &Done) ->
         time_s: done.time_s,
         paused: done.paused,
         realtime_notes: daemon.realtime_notes.clone(),
-        overruns: daemon.timing.overruns(),
-        wakeup_jitter_us: Some(percentiles(&daemon.timing.wakeup)),
+        overruns: daemon.timing.the_loop.overruns(),
+        wakeup_jitter_us: Some(percentiles(&daemon.timing.the_loop.wakeup_lateness)),
         tick_cost_us: Some(percentiles(&daemon.timing.tick)),
         stages: STAGES.iter().zip(&daemon.timing.stages).map(stage).collect(),
         energies: Some(energies(session, copy)),
@@ -38,6 +38,7 @@ pub fn of(daemon: &Daemon, session: &ActiveSession, copy: &Copy, done: &Done) ->
         devices: devices(session),
         probes: probes(session, copy),
         quarantine: quarantine(copy),
+        skipped_ticks: daemon.timing.the_loop.skipped(),
         samples_rejected: daemon.samples_rejected.load(Ordering::Relaxed),
     }
 }

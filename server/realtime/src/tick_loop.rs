@@ -64,6 +64,21 @@ impl TickLoop {
         Ok(Self { deadlines: Deadlines::new(clock, period_s)?, monitor: Arc::new(LoopMonitor::default()) })
     }
 
+    /// Another period (s) from the next [`TickLoop::run`] on.
+    ///
+    /// # Errors
+    /// [`PeriodError`]; the period stays.
+    pub fn set_period(&mut self, period_s: f64) -> Result<(), PeriodError> {
+        self.deadlines = Deadlines::new(self.deadlines.clock().clone(), period_s)?;
+        Ok(())
+    }
+
+    /// Measures into `monitor` from now on.
+    #[must_use]
+    pub fn measured_in(self, monitor: Arc<LoopMonitor>) -> Self {
+        Self { monitor, ..self }
+    }
+
     /// The measurements.
     pub fn monitor(&self) -> Arc<LoopMonitor> {
         Arc::clone(&self.monitor)
@@ -114,8 +129,28 @@ mod tests {
         assert_eq!((monitor.ticks(), monitor.overruns(), monitor.skipped()), (12, 4, 4));
         let lateness = monitor.wakeup_lateness.percentiles();
         assert_eq!(lateness.count, 12);
-        assert_eq!(lateness.max_ns, 540_000, "40 us late, 3.5 ms of work: the tick at 3 ms is 0.54 ms late");
+        assert_eq!(
+            lateness.max_ns, 630_000,
+            "40 us late, 3.5 ms of work, 50 us of rest, 40 us late again: 0.63 ms after 7 ms"
+        );
         assert_eq!(monitor.tick_cost.percentiles().max_ns, 3_500_000);
+    }
+
+    #[test]
+    fn another_period_takes_another_grid_and_the_same_measurements() {
+        let (clock, time) = Clock::manual();
+        let mut tick_loop = TickLoop::new(clock.clone(), 1e-3).unwrap().measured_in(Arc::default());
+        let monitor = tick_loop.monitor();
+        tick_loop.run(|_| ControlFlow::Break(()));
+        time.advance(7_300_000);
+        assert!(tick_loop.set_period(f64::NAN).is_err());
+        tick_loop.set_period(5e-3).unwrap();
+        let before_ns = clock.now_ns();
+        tick_loop.run(|wakeup| {
+            assert_eq!(wakeup.woke_ns - before_ns, (wakeup.tick + 1) * 5_000_000);
+            if wakeup.tick == 2 { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+        });
+        assert_eq!((monitor.ticks(), monitor.overruns(), monitor.skipped()), (4, 0, 0));
     }
 
     #[test]

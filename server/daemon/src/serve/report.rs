@@ -60,16 +60,17 @@ pub fn farewell(summary: &Summary) -> String {
             us(p.max_ns)
         );
     };
-    row("wake-up lateness", &timing.wakeup);
+    row("wake-up lateness", &timing.the_loop.wakeup_lateness);
     row("tick", &timing.tick);
     for (name, histogram) in STAGES.iter().zip(&timing.stages) {
         row(&format!("  {name}"), histogram);
     }
     let _ = write!(
         text,
-        "{} ticks, {} overruns, {} inputs refused, {} samples rejected, {} frames skipped{}",
+        "{} ticks, {} overruns, {} ticks skipped, {} inputs refused, {} samples rejected, {} frames skipped{}",
         timing.tick.count(),
-        timing.overruns(),
+        timing.the_loop.overruns(),
+        timing.the_loop.skipped(),
         timing.inputs_rejected(),
         summary.samples_rejected,
         summary.frames_skipped,

@@ -11,7 +11,7 @@ use crate::{
     },
     stream::hub::Hub,
 };
-use palpate_realtime::{Clock, Note, OsMeasures};
+use palpate_realtime::{Clock, Note, OsMeasures, TickLoop};
 use palpate_scene::Scene;
 use std::{
     net::SocketAddr,
@@ -152,15 +152,17 @@ async fn start_loop(
     timing: Arc<Timing>,
     measures: OsMeasures,
 ) -> Result<(Vec<Note>, LoopThread), ServeError> {
-    let the_loop = Loop::new(simulation, desk, sign, timing, Clock::Monotonic)
-        .map_err(|error| ServeError::Prepare(error.into()))?;
+    let tick_loop = TickLoop::new(Clock::Monotonic, simulation.period_s());
+    let mut tick_loop =
+        tick_loop.map_err(|error| ServeError::Prepare(error.into()))?.measured_in(Arc::clone(&timing.the_loop));
+    let mut the_loop = Loop::new(simulation, desk, sign, timing, Clock::Monotonic);
     let (tell, told) = oneshot::channel();
     let (alive, gone) = oneshot::channel();
     let body = move || {
         let _alive: oneshot::Sender<()> = alive;
         let granted = measures.apply();
         let _ = tell.send(granted.notes.clone());
-        the_loop.run();
+        the_loop.run(&mut tick_loop);
         drop(granted);
     };
     let system = |source| ServeError::System { what: "thread", source };

@@ -6,10 +6,13 @@ use super::{
     timing::Timing,
     tool::Order,
 };
-use palpate_realtime::{Clock, Deadlines, PeriodError};
-use std::sync::{
-    Arc,
-    atomic::{AtomicBool, Ordering},
+use palpate_realtime::{Clock, TickLoop, Wakeup};
+use std::{
+    ops::ControlFlow,
+    sync::{
+        Arc,
+        atomic::{AtomicBool, Ordering},
+    },
 };
 
 /// How the loop is told to end, and tells that it has.
@@ -39,7 +42,7 @@ impl StopSign {
 /// Time after which the loop ends whatever the forces: several ramps.
 const LONGEST_RELEASE_NS: u64 = 500_000_000;
 
-/// The loop.
+/// The loop. Takes one order a tick at most: however many wait, a tick costs no more than one copy of a state.
 #[derive(Debug)]
 pub struct Loop {
     simulation: Box<Simulation>,
@@ -47,53 +50,61 @@ pub struct Loop {
     sign: StopSign,
     timing: Arc<Timing>,
     clock: Clock,
-    deadlines: Deadlines,
     paused: bool,
     stepping: Option<(Command, u32)>,
     /// An order that puts the body elsewhere, until devices are released, and since when (ns).
     waiting: Option<(Command, u64)>,
+    /// Another session has come, with a period of its own.
+    other_period: bool,
+    told_to_stop_ns: Option<u64>,
 }
 
 impl Loop {
-    /// A loop that has not begun.
-    ///
-    /// # Errors
-    /// [`PeriodError`] when the session's tick period cannot be kept by any loop.
-    pub fn new(
-        simulation: Box<Simulation>,
-        desk: Desk,
-        sign: StopSign,
-        timing: Arc<Timing>,
-        clock: Clock,
-    ) -> Result<Self, PeriodError> {
-        let deadlines = Deadlines::new(clock.clone(), simulation.period_s())?;
-        Ok(Self { simulation, desk, sign, timing, clock, deadlines, paused: false, stepping: None, waiting: None })
+    /// A loop that has not begun; `clock` is that of the [`TickLoop`] it will run on.
+    pub fn new(simulation: Box<Simulation>, desk: Desk, sign: StopSign, timing: Arc<Timing>, clock: Clock) -> Self {
+        Self {
+            simulation,
+            desk,
+            sign,
+            timing,
+            clock,
+            paused: false,
+            stepping: None,
+            waiting: None,
+            other_period: false,
+            told_to_stop_ns: None,
+        }
     }
 
     /// Runs until the sign is raised and forces are zero.
-    pub fn run(mut self) {
-        let mut told_to_stop_ns = None;
+    pub fn run(&mut self, tick_loop: &mut TickLoop) {
         loop {
-            let wakeup = self.deadlines.wait();
-            if !self.paused {
-                self.timing.wakeup.record(wakeup.lateness_ns());
-                self.timing.count_overruns(u64::from(wakeup.overrun) + wakeup.skipped);
+            tick_loop.run(|wakeup| self.turn(wakeup));
+            if !std::mem::take(&mut self.other_period) {
+                return;
             }
-            self.take_orders();
-            if self.sign.is_raised() {
-                let since_ns = *told_to_stop_ns.get_or_insert_with(|| self.clock.now_ns());
-                if self.release(since_ns) {
-                    return;
-                }
-            } else if self.waiting.is_some() {
-                self.tick(Plan { advance: !self.paused, order: Order::Hold });
-            } else if self.stepping.is_some() {
-                self.work_on_steps();
-            } else {
-                let (advance, order) = (!self.paused, if self.paused { Order::Hold } else { Order::Render });
-                self.tick(Plan { advance, order });
-            }
+            // The period was checked when the session was built.
+            let _ = tick_loop.set_period(self.simulation.period_s());
         }
+    }
+
+    fn turn(&mut self, wakeup: &Wakeup) -> ControlFlow<()> {
+        self.take_an_order();
+        if self.sign.is_raised() {
+            let since_ns = *self.told_to_stop_ns.get_or_insert(wakeup.woke_ns);
+            if self.release(since_ns) {
+                self.other_period = false;
+                return ControlFlow::Break(());
+            }
+        } else if self.waiting.is_some() {
+            self.tick(Plan { advance: !self.paused, order: Order::Hold });
+        } else if self.stepping.is_some() {
+            self.work_on_steps(wakeup);
+        } else {
+            let (advance, order) = (!self.paused, if self.paused { Order::Hold } else { Order::Render });
+            self.tick(Plan { advance, order });
+        }
+        if self.other_period { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     }
 
     fn tick(&mut self, plan: Plan) {
@@ -118,9 +129,11 @@ impl Loop {
         released
     }
 
-    /// Ticks as fast as they go for at most one period, so that orders are heard.
-    fn work_on_steps(&mut self) {
-        let until_ns = self.clock.now_ns() + self.deadlines.period_ns();
+    /// Ticks as fast as they go, as many as end before the next deadline, and one at least.
+    fn work_on_steps(&mut self, wakeup: &Wakeup) {
+        let period_ns = (self.simulation.period_s() * 1e9) as u64;
+        let next_ns = wakeup.deadline_ns + period_ns;
+        let mut begun_ns = wakeup.woke_ns;
         while let Some((command, left)) = self.stepping.take() {
             if left == 0 {
                 let done = self.done();
@@ -129,50 +142,54 @@ impl Loop {
             }
             self.stepping = Some((command, left - 1));
             self.tick(Plan { advance: true, order: Order::Hold });
-            if self.clock.now_ns() > until_ns {
+            let now_ns = self.clock.now_ns();
+            // The next one costs what this one did.
+            if now_ns + (now_ns - begun_ns) > next_ns {
                 return;
             }
+            begun_ns = now_ns;
         }
     }
 
-    /// Orders are taken one after the other: what follows one that waits, waits as well.
-    fn take_orders(&mut self) {
-        while self.obey_waiting() {
-            let Some(mut command) = self.desk.next_order() else { return };
-            if command.session != self.simulation.session {
-                self.desk.finish(command, Err(Refusal::OtherSession));
-                continue;
+    /// Orders are taken one after the other, one a tick: what follows one that waits, waits as well.
+    fn take_an_order(&mut self) {
+        if let Some((command, since_ns)) = self.waiting.take() {
+            self.obey_waiting(command, since_ns);
+            return;
+        }
+        let Some(mut command) = self.desk.next_order() else { return };
+        if command.session != self.simulation.session {
+            self.desk.finish(command, Err(Refusal::OtherSession));
+            return;
+        }
+        match &command.request {
+            Request::Step(ticks) => {
+                let ticks = *ticks;
+                match (self.paused, &self.stepping) {
+                    (false, _) => self.desk.finish(command, Err(Refusal::NotPaused)),
+                    (true, Some(_)) => self.desk.finish(command, Err(Refusal::Stepping)),
+                    (true, None) => self.stepping = Some((command, ticks)),
+                }
             }
-            match &command.request {
-                Request::Step(ticks) => {
-                    let ticks = *ticks;
-                    match (self.paused, &self.stepping) {
-                        (false, _) => self.desk.finish(command, Err(Refusal::NotPaused)),
-                        (true, Some(_)) => self.desk.finish(command, Err(Refusal::Stepping)),
-                        (true, None) => self.stepping = Some((command, ticks)),
-                    }
-                }
-                Request::Load(_) | Request::Reset | Request::Restore(_) => {
-                    self.waiting = Some((command, self.clock.now_ns()));
-                }
-                Request::Pause(_) | Request::Copy(_) | Request::Inject(_) => {
-                    let outcome = self.obey(&mut command.request);
-                    self.desk.finish(command, outcome);
-                }
+            Request::Load(_) | Request::Reset | Request::Restore(_) => {
+                let now_ns = self.clock.now_ns();
+                self.obey_waiting(command, now_ns);
+            }
+            Request::Pause(_) | Request::Copy(_) | Request::Inject(_) => {
+                let outcome = self.obey(&mut command.request);
+                self.desk.finish(command, outcome);
             }
         }
     }
 
-    /// Obeys the order that waits, if devices are released; true when none waits any more.
-    fn obey_waiting(&mut self) -> bool {
-        let Some((mut command, since_ns)) = self.waiting.take() else { return true };
+    /// Obeys an order that puts the body elsewhere, if devices are released; else it waits.
+    fn obey_waiting(&mut self, mut command: Command, since_ns: u64) {
         if !self.simulation.are_devices_released() && self.clock.now_ns() - since_ns <= LONGEST_RELEASE_NS {
             self.waiting = Some((command, since_ns));
-            return false;
+            return;
         }
         let outcome = self.obey(&mut command.request);
         self.desk.finish(command, outcome);
-        true
     }
 
     fn obey(&mut self, request: &mut Request) -> Result<Done, Refusal> {
@@ -182,10 +199,7 @@ impl Loop {
                 self.interrupt_steps();
                 std::mem::swap(simulation, &mut self.simulation);
                 self.paused = false;
-                // The period was checked when the session was built.
-                if let Ok(deadlines) = Deadlines::new(self.clock.clone(), self.simulation.period_s()) {
-                    self.deadlines = deadlines;
-                }
+                self.other_period = true;
             }
             Request::Reset => {
                 self.interrupt_steps();
