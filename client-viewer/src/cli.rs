@@ -56,8 +56,7 @@ enum Command {
 /// # Errors
 /// [`ViewError`], with the next step.
 pub fn run(arguments: &Arguments) -> Result<(), ViewError> {
-    let ca_pem = arguments.server.tls_ca.as_ref().map(read).transpose()?;
-    let server = Server { address: arguments.server.server.clone(), ca_pem };
+    let server = Server { address: arguments.server.server.clone(), tls_ca: arguments.server.tls_ca.clone() };
     let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().map_err(|source| {
         ViewError::File { action: "cannot start the runtime of", path: "palpate-view".into(), source }
     })?;

@@ -8,9 +8,10 @@ use palpate_control::{
     ArmSpec, ForceLimits, HandPath, Keyframe, ParameterError, PassivitySettings, RenderSettings, SimulatedArm,
     WatchdogSettings, coupling::SampledWall,
 };
+use palpate_proto::connect::{self, ConnectError};
 use palpate_realtime::OsMeasures;
 use std::time::Duration;
-use tonic::transport::{Certificate, ClientTlsConfig, Endpoint};
+use tonic::transport::Endpoint;
 
 /// The whole bridge.
 #[derive(Debug, Clone)]
@@ -73,11 +74,6 @@ pub enum DeviceSettings {
     /// The simulated one.
     Simulated(SimulatedArm),
 }
-
-/// Longest wait for one connection.
-const CONNECT_TIMEOUT: Duration = Duration::from_secs(5);
-/// Unanswered pings for so long end a connection that the network lost silently.
-const KEEP_ALIVE: Duration = Duration::from_secs(2);
 
 impl Settings {
     /// Checks a configuration, and reads the certificate it names.
@@ -173,7 +169,7 @@ fn uplink(config: &Config) -> Result<UplinkSettings, BridgeError> {
     }
     let give_up_after = server.give_up_after_s.map(|s| seconds("server.give_up_after_s", s)).transpose()?;
     Ok(UplinkSettings {
-        endpoint: endpoint(config)?,
+        endpoint: connect::endpoint(&server.url, server.tls_ca.as_deref()).map_err(unusable)?,
         address: server.url.clone(),
         tool: server.tool.clone(),
         device_name: server.device_name.clone(),
@@ -184,35 +180,12 @@ fn uplink(config: &Config) -> Result<UplinkSettings, BridgeError> {
     })
 }
 
-fn endpoint(config: &Config) -> Result<Endpoint, BridgeError> {
-    let server = &config.server;
-    let bad = |reason: String| BridgeError::Address { address: server.url.clone(), reason };
-    let scheme = server.url.split_once("://").map(|(scheme, _)| scheme);
-    if !matches!(scheme, Some("http" | "https" | "unix")) {
-        return Err(bad("it has no known scheme".to_owned()));
-    }
-    let endpoint = Endpoint::from_shared(server.url.clone())
-        .map_err(|error| bad(causes(&error)))?
-        .connect_timeout(CONNECT_TIMEOUT)
-        .tcp_nodelay(true)
-        .http2_keep_alive_interval(KEEP_ALIVE)
-        .keep_alive_timeout(KEEP_ALIVE);
-    match (&server.tls_ca, scheme) {
-        (None, Some("https")) => {
-            let reason = "https needs the certificate authority to trust: give --tls-ca FILE or server.tls_ca";
-            Err(bad(reason.to_owned()))
+fn unusable(error: ConnectError) -> BridgeError {
+    match error {
+        ConnectError::Address { address, reason } => BridgeError::Address { address, reason },
+        ConnectError::Authority { path, source } => {
+            BridgeError::Read { what: "the certificate authority", path, source }
         }
-        (Some(path), Some("https")) => {
-            let pem = std::fs::read(path).map_err(|source| BridgeError::Read {
-                what: "the certificate authority",
-                path: path.clone(),
-                source,
-            })?;
-            let tls = ClientTlsConfig::new().ca_certificate(Certificate::from_pem(pem));
-            endpoint.tls_config(tls).map_err(|error| bad(causes(&error)))
-        }
-        (Some(_), _) => Err(bad("a certificate authority is given, but the address is not https://".to_owned())),
-        (None, _) => Ok(endpoint),
     }
 }
 
@@ -270,20 +243,6 @@ fn parameter(section: &str, error: &ParameterError) -> BridgeError {
     value(&format!("{section}.{}", error.name), format!("{} {}", error.value, error.rule))
 }
 
-/// An error with its causes, in one line.
-pub(crate) fn causes(error: &dyn std::error::Error) -> String {
-    let mut text = error.to_string();
-    let mut cause = error.source();
-    while let Some(next) = cause {
-        let next_text = next.to_string();
-        if !text.contains(&next_text) {
-            text = format!("{text}: {next_text}");
-        }
-        cause = next.source();
-    }
-    text
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -323,12 +282,8 @@ mod tests {
     }
 
     #[test]
-    fn addresses_are_checked() {
-        for url in ["127.0.0.1:7411", "ftp://host", "", "http://"] {
-            assert!(refused(|c| c.server.url = url.into()).contains("no address of a daemon"), "{url}");
-        }
-        assert!(refused(|c| c.server.url = "https://host:7411".into()).contains("--tls-ca"));
-        assert!(refused(|c| c.server.tls_ca = Some("ca.pem".into())).contains("not https"));
+    fn a_bad_address_and_a_missing_authority_are_told_apart() {
+        assert!(refused(|c| c.server.url = "ftp://host".into()).contains("no address of a daemon"));
         let missing = refused(|c| {
             c.server.url = "https://host:7411".into();
             c.server.tls_ca = Some("/nowhere/ca.pem".into());

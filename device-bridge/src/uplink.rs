@@ -4,9 +4,12 @@ use crate::{
     backoff::Backoff,
     convert::{self, Command, Sample, Welcome},
     run::Shared,
-    settings::{UplinkSettings, causes},
+    settings::UplinkSettings,
 };
-use palpate_proto::v1::{self, device_client::DeviceClient, device_down::Message};
+use palpate_proto::{
+    connect::causes,
+    v1::{self, device_client::DeviceClient, device_down::Message},
+};
 use palpate_realtime::{Clock, Doorbell, SlotReader, SlotWriter};
 use std::{
     future::Future,

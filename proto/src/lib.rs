@@ -1,6 +1,9 @@
 //! The wire types of Palpate, generated from `proto/palpate/v1/*.proto` without protoc.
 //!
-//! Nothing but wire types: no validation, no conversion. The daemon converts in one place (`server/daemon/src/grpc/convert.rs`).
+//! No validation, no conversion: the daemon converts in one place (`server/daemon/src/grpc/convert.rs`). With the feature `connect`,
+//! also the way from a daemon's address to a connection, which every client shares.
+#[cfg(feature = "connect")]
+pub mod connect;
 
 /// `palpate.v1`: messages, clients and servers of `Device`, `Surface` and `Session`.
 #[allow(missing_docs, unreachable_pub, unused_qualifications, clippy::all, clippy::pedantic)]
