@@ -1,41 +1,39 @@
 //! Scenes by name, path or text.
+use miette::{Diagnostic, Report};
 use palpate_proto::v1::load_scene_request::Source as WireSource;
-use palpate_scene::{Scene, SceneError, builtin, builtin_names, load_file, parse};
+use palpate_scene::{Limits, Scene, builtin, builtin_names, load_file, parse};
 use std::path::{Path, PathBuf};
+use thiserror::Error;
 use tonic::Status;
 
-/// Where a scene comes from on the command line.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub enum Source {
-    /// Part of the program.
-    Builtin(String),
-    /// A file.
-    File(PathBuf),
+/// A name that is neither a file nor a built-in scene.
+#[derive(Debug, Error, Diagnostic)]
+#[error("there is no scene file \"{name}\", and no built-in scene of that name")]
+#[diagnostic(help("built-in scenes: {known}; a scene file ends in .toml (docs/scenes.md)"))]
+struct UnknownScene {
+    name: String,
+    known: String,
 }
 
-impl Source {
-    /// A built-in scene if one has this name and no such file exists, else a file.
-    pub fn of_argument(argument: &str) -> Self {
-        if builtin(argument).is_some() && !Path::new(argument).is_file() {
-            Self::Builtin(argument.to_owned())
-        } else {
-            Self::File(PathBuf::from(argument))
+/// Loads what a command line asks for: an existing file, else the built-in scene of this name.
+///
+/// # Errors
+/// Neither, or the scene is refused; the report points into the file.
+pub fn from_argument(name: &str, progress: &mut dyn FnMut(f64, &str)) -> miette::Result<Scene> {
+    let limits = Limits::local();
+    let path = Path::new(name);
+    let scene = match builtin(name) {
+        Some(text) if !path.is_file() => parse(text, name, None, &limits, progress),
+        None if !path.exists() => {
+            return Err(UnknownScene { name: name.to_owned(), known: builtin_names().join(", ") }.into());
         }
-    }
-
-    /// Loads it.
-    ///
-    /// # Errors
-    /// [`SceneError`].
-    pub fn load(&self, progress: &mut dyn FnMut(f64, &str)) -> Result<Scene, SceneError> {
-        match self {
-            Self::Builtin(name) => parse(builtin(name).unwrap_or_default(), name, None, progress),
-            Self::File(path) => load_file(path, progress),
-        }
-    }
+        _ => load_file(path, &limits, progress),
+    };
+    scene.map_err(Report::new)
 }
 
-/// Loads what a client asks for.
+/// Loads what a client asks for. Text from the network may be no larger than [`Limits::wire`]; what the daemon's owner
+/// put into its scene folders may.
 ///
 /// # Errors
 /// `NOT_FOUND`, `PERMISSION_DENIED` or `INVALID_ARGUMENT`, with the scene's own message.
@@ -46,10 +44,10 @@ pub fn from_wire(source: WireSource, folders: &[PathBuf]) -> Result<Scene, Statu
                 let known = builtin_names().join(", ");
                 Status::not_found(format!("there is no built-in scene \"{name}\"; there are: {known}"))
             })?;
-            parse(text, &name, None, &mut |_, _| ())
+            parse(text, &name, None, &Limits::wire(), &mut |_, _| ())
         }
-        WireSource::Path(path) => load_file(&allowed(Path::new(&path), folders)?, &mut |_, _| ()),
-        WireSource::Toml(text) => parse(&text, "request", None, &mut |_, _| ()),
+        WireSource::Path(path) => load_file(&allowed(Path::new(&path), folders)?, &Limits::local(), &mut |_, _| ()),
+        WireSource::Toml(text) => parse(&text, "request", None, &Limits::wire(), &mut |_, _| ()),
     };
     scene.map_err(|error| Status::invalid_argument(error.one_line()))
 }
@@ -76,6 +74,18 @@ fn allowed(path: &Path, folders: &[PathBuf]) -> Result<PathBuf, Status> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// A client could ask for fifty million tets in one line of text, and the daemon tried.
+    #[test]
+    fn text_from_the_network_is_limited_where_a_command_line_is_not() {
+        let text = "[scene]\nname = \"t\"\n[body.box]\nsize_mm = [10, 10, 10]\ncells = [100, 100, 100]\n\
+                    [[material]]\nlaw = \"stvk\"\nyoung_modulus_pa = 1e4\npoisson_ratio = 0.3\ndensity_kg_per_m3 = 1000\n";
+        let refused = from_wire(WireSource::Toml(text.to_owned()), &[]).unwrap_err();
+        let wanted = "request:5:9: body.box.cells gives 6000000 tets; at most 200000 are allowed here";
+        assert!(refused.message().starts_with(wanted), "{}", refused.message());
+        let names = builtin_names().iter().map(|&name| WireSource::Builtin(name.to_owned()));
+        assert!(names.into_iter().all(|name| from_wire(name, &[]).is_ok()));
+    }
 
     #[test]
     fn only_files_below_the_folders_are_allowed() {

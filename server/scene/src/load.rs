@@ -3,21 +3,22 @@ use crate::{
     compile::{self, Files},
     document::{schema, source::Source},
     error::{SceneError, Stage},
+    limits::Limits,
     scene::Scene,
 };
 use std::path::Path;
 
-/// Loads a scene file; files it refers to are looked for beside it. `progress` is told a fraction in [0, 1] and what is
+/// Loads a scene file of at most this size; files it refers to are looked for beside it. `progress` is told a fraction in [0, 1] and what is
 /// being done.
 ///
 /// # Errors
 /// [`SceneError`], pointing into the file where it can.
-pub fn load_file(path: &Path, progress: &mut dyn FnMut(f64, &str)) -> Result<Scene, SceneError> {
+pub fn load_file(path: &Path, limits: &Limits, progress: &mut dyn FnMut(f64, &str)) -> Result<Scene, SceneError> {
     let name = path.display().to_string();
-    let text = std::fs::read_to_string(path).map_err(|cause| {
+    let text = limits.read_text(path).map_err(|cause| {
         SceneError::new(Stage::Read, format!("cannot read the scene file {name}: {cause}")).with_cause(cause)
     })?;
-    parse(&text, &name, Some(path.parent().unwrap_or(Path::new("."))), progress)
+    parse(&text, &name, Some(path.parent().unwrap_or(Path::new("."))), limits, progress)
 }
 
 /// Loads a scene from its text. `source_name` appears in messages. Relative files are looked for in `base_dir`; without
@@ -29,11 +30,12 @@ pub fn parse(
     text: &str,
     source_name: &str,
     base_dir: Option<&Path>,
+    limits: &Limits,
     progress: &mut dyn FnMut(f64, &str),
 ) -> Result<Scene, SceneError> {
     progress(0.0, "reading the scene");
     let (source, document) = Source::read(source_name, text)?;
-    compile::compile(&document, &Files { base_dir }, progress).map_err(|fault| source.error(fault))
+    compile::compile(&document, &Files { base_dir, limits }, progress).map_err(|fault| source.error(fault))
 }
 
 /// JSON schema of the scene document.

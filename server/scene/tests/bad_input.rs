@@ -1,6 +1,6 @@
 //! Every kind of bad scene gets a message that says what is wrong, where, and what to do: the whole message is looked at.
 #![allow(clippy::unwrap_used)] // helpers outside #[test] functions
-use palpate_scene::{SceneError, load_file, parse};
+use palpate_scene::{Limits, SceneError, load_file, parse};
 use std::path::Path;
 
 const GOOD: &str = r#"[scene]
@@ -33,7 +33,7 @@ tool = "ball"
 "#;
 
 fn scene(text: &str) -> Result<palpate_scene::Scene, SceneError> {
-    parse(text, "t.toml", None, &mut |_, _| {})
+    parse(text, "t.toml", None, &Limits::local(), &mut |_, _| {})
 }
 
 /// The message for the good scene with one thing replaced.
@@ -239,13 +239,13 @@ fn numerics_and_output_outside_their_range() {
 #[test]
 fn files_that_are_missing_or_damaged() {
     let folder = tempfile::tempdir().unwrap();
-    let missing = load_file(&folder.path().join("none.toml"), &mut |_, _| {}).unwrap_err().one_line();
+    let missing = load_file(&folder.path().join("none.toml"), &Limits::local(), &mut |_, _| {}).unwrap_err().one_line();
     assert!(missing.starts_with("cannot read the scene file") && missing.contains("none.toml"), "{missing}");
 
     let with = |replace: &str, by: &str| {
         let path = folder.path().join("s.toml");
         std::fs::write(&path, GOOD.replace(replace, by)).unwrap();
-        let message = load_file(&path, &mut |_, _| {}).unwrap_err().one_line();
+        let message = load_file(&path, &Limits::local(), &mut |_, _| {}).unwrap_err().one_line();
         message.replace(&folder.path().display().to_string(), "DIR")
     };
     let body = "[body.box]\nsize_mm = [10, 10, 10]\ncells = [2, 2, 2]\n";
@@ -274,7 +274,42 @@ fn surfaces_that_cross_are_refused_with_the_place() {
     let swapped = text
         .replace("inner_file = \"data/ventricle-inner.stl\"", "inner_file = \"data/ventricle-outer.ply\"")
         .replace("outer_file = \"data/ventricle-outer.ply\"", "outer_file = \"data/ventricle-inner.stl\"");
-    let message = parse(&swapped, "s.toml", Some(&examples), &mut |_, _| {}).unwrap_err().one_line();
+    let message = parse(&swapped, "s.toml", Some(&examples), &Limits::local(), &mut |_, _| {}).unwrap_err().one_line();
     assert!(message.starts_with("s.toml:") && message.contains("does not lie inside the outer"), "{message}");
     assert!(message.contains("swapped"), "{message}");
+}
+
+/// One line of text could ask for fifty million tets, or for thousands of regions of a whole body each.
+#[test]
+fn what_is_larger_than_the_limits_is_refused_before_it_is_made() {
+    let limits = Limits { tets: 40, entries: 3, file_bytes: 100 };
+    let refused = |text: &str| parse(text, "t.toml", None, &limits, &mut |_, _| {}).unwrap_err().one_line();
+    assert_eq!(
+        refused(GOOD),
+        "t.toml:5:9: body.box.cells gives 48 tets; at most 40 are allowed here (coarsen it, or give the scene to palpated on its command line: there 10000000 are allowed)"
+    );
+    let shell = "[body.sphere_shell]\ninner_radius_mm = 5\nouter_radius_mm = 9\ntarget_tets = 400000";
+    let text = GOOD.replace("[body.box]\nsize_mm = [10, 10, 10]\ncells = [2, 2, 2]", shell);
+    assert!(refused(&text).starts_with("t.toml:6:15: body.sphere_shell.target_tets gives 400000 tets; at most 40"));
+    let text = GOOD.replace("cells = [2, 2, 2]", "cells = [4294967295, 4294967295, 4294967295]");
+    let message = scene(&text).unwrap_err().one_line();
+    assert!(message.contains("gives 18446744073709551615 tets; at most 10000000 are allowed here"), "{message}");
+
+    let small = GOOD.replace("cells = [2, 2, 2]", "cells = [1, 1, 1]");
+    let region = |index: usize| format!("[[region]]\nname = \"r{index}\"\nselect.region = \"whole\"\n");
+    let regions = (0..4).map(region).collect::<String>();
+    assert_eq!(
+        refused(&(small.clone() + &regions)),
+        "t.toml:37:1: there are 4 [[region]]; at most 3 are allowed here (leave some out)"
+    );
+    let nested =
+        "[[region]]\nname = \"r\"\nselect.any_of = [{ region = \"whole\" }, { not = { region = \"x_min\" } }]\n";
+    let message = refused(&(small + nested));
+    assert!(message.contains("the regions have 4 selectors up to here; at most 3 are allowed"), "{message}");
+
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("s.toml");
+    std::fs::write(&path, GOOD).unwrap();
+    let message = load_file(&path, &limits, &mut |_, _| {}).unwrap_err().one_line();
+    assert!(message.contains("cannot read the scene file") && message.contains("more than 100 bytes"), "{message}");
 }

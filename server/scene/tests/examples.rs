@@ -1,7 +1,7 @@
 //! Every scene we ship loads, builds, and says what its comments claim.
 #![allow(clippy::unwrap_used)] // helpers outside #[test] functions
 use palpate_physics::Model;
-use palpate_scene::{Scene, builtin, builtin_names, load_file};
+use palpate_scene::{Limits, Scene, builtin, builtin_names, load_file};
 use std::path::PathBuf;
 
 fn folder() -> PathBuf {
@@ -17,7 +17,7 @@ fn examples() -> Vec<PathBuf> {
 }
 
 fn load(path: &std::path::Path) -> Scene {
-    load_file(path, &mut |_, _| {}).unwrap_or_else(|error| panic!("{}", error.one_line()))
+    load_file(path, &Limits::local(), &mut |_, _| {}).unwrap_or_else(|error| panic!("{}", error.one_line()))
 }
 
 #[test]
@@ -39,7 +39,7 @@ fn built_in_scenes_are_the_shipped_files_and_need_no_other() {
     assert_eq!(builtin_names().first(), Some(&"ventricle"));
     for name in builtin_names() {
         let text = builtin(name).unwrap();
-        let scene = palpate_scene::parse(text, name, None, &mut |_, _| {}).unwrap();
+        let scene = palpate_scene::parse(text, name, None, &Limits::local(), &mut |_, _| {}).unwrap();
         assert_eq!(scene.name, *name);
     }
     assert!(builtin("nothing").is_none());

@@ -1,7 +1,7 @@
 //! What regions select: physical groups by dimension, and combinations that leave no hole and no overlap.
 #![allow(clippy::unwrap_used)] // helpers outside #[test] functions
 use palpate_physics::LoadSpec;
-use palpate_scene::{Scene, SceneError, parse};
+use palpate_scene::{Limits, Scene, SceneError, parse};
 use std::{collections::BTreeSet, path::Path};
 
 const MATERIAL: &str = "[[material]]\nlaw = \"stvk\"\nyoung_modulus_pa = 1e4\npoisson_ratio = 0.3\n\
@@ -9,7 +9,13 @@ const MATERIAL: &str = "[[material]]\nlaw = \"stvk\"\nyoung_modulus_pa = 1e4\npo
 
 fn load(body: &str, rest: &str) -> Result<Scene, SceneError> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/files");
-    parse(&format!("[scene]\nname = \"t\"\n{body}\n{MATERIAL}{rest}"), "t.toml", Some(&folder), &mut |_, _| {})
+    parse(
+        &format!("[scene]\nname = \"t\"\n{body}\n{MATERIAL}{rest}"),
+        "t.toml",
+        Some(&folder),
+        &Limits::local(),
+        &mut |_, _| {},
+    )
 }
 
 /// The bar of two boxes, 4 x 1 x 1 mm; volumes `1` and `right` (2), surfaces `1` (x = 0) and `3` (x = 4).

@@ -1,19 +1,10 @@
-//! A scene by path or by name, with progress and warnings on standard error.
+//! A scene for an offline command: progress and warnings on standard error, and its model.
 use super::progress::Progress;
-use miette::{Diagnostic, Report};
+use crate::load::from_argument;
+use miette::Diagnostic;
 use palpate_physics::{Model, ModelError};
-use palpate_scene::{Scene, builtin, builtin_names};
-use std::path::Path;
+use palpate_scene::Scene;
 use thiserror::Error;
-
-/// A name that is neither a file nor a built-in scene.
-#[derive(Debug, Error, Diagnostic)]
-#[error("there is no scene file \"{name}\", and no built-in scene of that name")]
-#[diagnostic(help("built-in scenes: {known}; a scene file ends in .toml (docs/scenes.md)"))]
-struct UnknownScene {
-    name: String,
-    known: String,
-}
 
 /// The physics' refusal of a scene.
 #[derive(Debug, Error, Diagnostic)]
@@ -25,27 +16,15 @@ struct Refused {
     cause: ModelError,
 }
 
-/// Loads a scene: an existing file, else a built-in name.
-///
-/// # Errors
-/// Neither, or the scene is refused; the report points into the file.
-pub fn load_scene(name: &str) -> miette::Result<Scene> {
+/// Loads a scene with a progress bar.
+pub(super) fn load_scene(name: &str) -> miette::Result<Scene> {
     let mut bar = Progress::new(name);
-    let mut show = |fraction: f64, what: &str| bar.show(fraction, what);
-    let path = Path::new(name);
-    let scene = match builtin(name) {
-        Some(text) if !path.is_file() => palpate_scene::parse(text, name, None, &mut show),
-        None if !path.exists() => {
-            let known = builtin_names().join(", ");
-            return Err(UnknownScene { name: name.to_owned(), known }.into());
-        }
-        _ => palpate_scene::load_file(path, &mut show),
-    };
+    let scene = from_argument(name, &mut |fraction, what| bar.show(fraction, what));
     bar.finish();
-    scene.map_err(Report::new)
+    scene
 }
 
-/// Loads a scene for an offline run: its warnings go to standard error.
+/// Loads a scene; its warnings go to standard error.
 pub(super) fn load_with_warnings(name: &str) -> miette::Result<Scene> {
     let scene = load_scene(name)?;
     for warning in &scene.warnings {

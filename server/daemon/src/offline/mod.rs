@@ -11,5 +11,3 @@ mod progress;
 pub mod schema;
 pub mod simulate;
 mod summary;
-
-pub use load::load_scene;

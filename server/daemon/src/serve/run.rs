@@ -1,6 +1,6 @@
 //! The process: load, start, tell, wait for a signal, say goodbye.
 use super::{ServeConfig, ServeError, args::ServeArgs, report, start};
-use crate::{load::Source, telemetry};
+use crate::{load, telemetry};
 use miette::IntoDiagnostic;
 use palpate_scene::Scene;
 use sd_notify::NotifyState;
@@ -18,7 +18,7 @@ use tokio_util::sync::CancellationToken;
 pub fn run(args: &ServeArgs) -> miette::Result<ExitCode> {
     telemetry::init();
     let config = args.config()?;
-    let scene = Source::of_argument(&args.scene).load(&mut |_, _| ())?;
+    let scene = load::from_argument(&args.scene, &mut |_, _| ())?;
     let runtime = runtime::Builder::new_multi_thread().enable_all().build().into_diagnostic()?;
     let code = runtime.block_on(serve(config, scene))?;
     // What still hangs on a socket is not waited for.

@@ -73,7 +73,7 @@ fn table_of(points: &PointsTable, at: &Where, files: &Files<'_>) -> Result<Ampli
         PointsTable { times_s: None, values: None, file: Some(file) } => {
             let at = at.key("file");
             let path = files.resolve(&at, file)?;
-            let rows = csv::read(&path, [csv::TIME, csv::number("value")])
+            let rows = csv::read(&path, files.limits, [csv::TIME, csv::number("value")])
                 .map_err(|error| Fault::value(at.clone(), error.to_string()).cause(error))?;
             rows.into_iter().map(|[time, value]| (time, value)).unzip()
         }

@@ -11,6 +11,7 @@ use crate::{
     error::Stage,
     files::{self, FileError, SurfaceFile, UnusedNodes},
     fill::{self, FillOptions, SurfaceInput},
+    limits::Limits,
     shapes::{self, Shape, ShapeError},
 };
 use glam::DVec3;
@@ -60,7 +61,7 @@ pub(crate) fn make(table: &BodyTable, files: &Files<'_>, progress: &mut dyn FnMu
     let mut body = match table {
         BodyTable { mesh: Some(mesh), .. } => from_file(mesh, files, &at)?,
         BodyTable { surfaces: Some(surfaces), .. } => from_surfaces(surfaces, files, &at, progress)?,
-        _ => from_shape(table, kind, &at)?,
+        _ => from_shape(table, kind, files.limits, &at)?,
     };
     let offset = DVec3::from(table.offset_m);
     if offset != DVec3::ZERO {
@@ -74,15 +75,21 @@ fn mesh_fault(at: &Where, error: MeshError) -> Fault {
     Fault::value(at.clone(), error.to_string()).of(Stage::Body).cause(error)
 }
 
-fn from_shape(table: &BodyTable, kind: &str, at: &Where) -> Result<Body, Fault> {
+fn from_shape(table: &BodyTable, kind: &str, limits: &Limits, at: &Where) -> Result<Body, Fault> {
+    let demand = |target_tets: u32| limits.check_tets(&at.key("target_tets"), target_tets.into());
     let shape = if let Some(block) = &table.block {
+        let tets = block.cells.iter().fold(6u64, |product, &cells| product.saturating_mul(cells.into()));
+        limits.check_tets(&at.key("cells"), tets)?;
         shapes::box_mesh(DVec3::from(block.size_m), block.cells)
     } else if let Some(shell) = &table.sphere_shell {
+        demand(shell.target_tets)?;
         shapes::sphere_shell(shell.inner_radius_m, shell.outer_radius_m, shell.target_tets)
     } else if let Some(shell) = &table.ellipsoid_shell {
+        demand(shell.target_tets)?;
         let (inner, outer) = (DVec3::from(shell.inner_semi_axes_m), DVec3::from(shell.outer_semi_axes_m));
         shapes::ellipsoid_shell(inner, outer, shell.target_tets)
     } else if let Some(ventricle) = &table.ventricle {
+        demand(ventricle.target_tets)?;
         let (outer, inner) = (ventricle.outer_semi_axes_m.into(), ventricle.inner_semi_axes_m.into());
         shapes::ventricle(outer, inner, ventricle.cut_z_m, ventricle.target_tets)
     } else {
@@ -120,6 +127,7 @@ fn from_surfaces(
     at: &Where,
     progress: &mut dyn FnMut(f64, &str),
 ) -> Result<Body, Fault> {
+    files.limits.check_tets(&at.key("target_tets"), table.target_tets.into())?;
     let read = |key: &str, file: &str| -> Result<SurfaceFile, Fault> {
         let at = at.key(key);
         let path = files.resolve(&at, file)?;
@@ -156,6 +164,7 @@ fn from_file(table: &MeshTable, files: &Files<'_>, at: &Where) -> Result<Body, F
     let path = files.resolve(&at, &table.file)?;
     let refused = |error| file_fault(&at, error);
     let volume = files::read_volume(&path).map_err(refused)?;
+    files.limits.check_tets(&at, volume.tets.len() as u64)?;
     let grouped = volume.into_tet_mesh(table.unit.in_m(), UnusedNodes::Drop).map_err(refused)?;
     let surface = Surface::of(&grouped.mesh).map_err(|error| mesh_fault(&at, error))?;
     Ok(Body {

@@ -1,5 +1,6 @@
 //! CSV files of numbers: a header that names columns with their unit, then one row per line. Separators are commas,
 //! semicolons or tabs; lines that start with `#` are comments.
+use crate::limits::Limits;
 use std::path::Path;
 
 /// What is wrong with a CSV file.
@@ -16,9 +17,13 @@ pub(crate) enum CsvError {
 }
 
 /// The wanted columns of a file in SI units, row by row. A column is named `name_unit`, its unit one of `units`.
-pub(crate) fn read<const N: usize>(path: &Path, wanted: [Column; N]) -> Result<Vec<[f64; N]>, CsvError> {
+pub(crate) fn read<const N: usize>(
+    path: &Path,
+    limits: &Limits,
+    wanted: [Column; N],
+) -> Result<Vec<[f64; N]>, CsvError> {
     let file = path.display().to_string();
-    let text = std::fs::read_to_string(path).map_err(|error| CsvError::Read { file: file.clone(), error })?;
+    let text = limits.read_text(path).map_err(|error| CsvError::Read { file: file.clone(), error })?;
     parse(&file, &text, wanted)
 }
 

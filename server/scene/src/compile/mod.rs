@@ -14,6 +14,7 @@ use crate::{
         Document, NumericsTable, OutputTable, PrecisionName,
         source::{Fault, Where},
     },
+    limits::Limits,
     scene::{BodySummary, OutputSettings, PartSummary, Scene},
 };
 use body::Body;
@@ -22,23 +23,30 @@ use palpate_physics::{ModelSpec, Precision, Settings, Substeps, mesh::quality, w
 use regions::Regions;
 use std::path::{Path, PathBuf};
 
-/// Where a scene's files are.
+/// Where a scene's files are, and how large they may be.
 pub(crate) struct Files<'a> {
     /// The folder relative paths start at; `None`: no file may be read.
     pub(crate) base_dir: Option<&'a Path>,
+    pub(crate) limits: &'a Limits,
 }
 
 impl Files<'_> {
     /// The path of a file named in a scene.
     fn resolve(&self, at: &Where, file: &str) -> Result<PathBuf, Fault> {
-        match self.base_dir {
-            Some(base) => Ok(base.join(file)),
-            None => Err(Fault::value(
-                at.clone(),
-                format!("{at} refers to the file {file}, but this scene came without a folder"),
-            )
-            .help("send scenes that need no file, or load the scene by its path on the daemon's machine")),
+        let Some(base) = self.base_dir else {
+            let message = format!("{at} refers to the file {file}, but this scene came without a folder");
+            return Err(Fault::value(at.clone(), message)
+                .help("send scenes that need no file, or load the scene by its path on the daemon's machine"));
+        };
+        let path = base.join(file);
+        // What cannot be asked is left to the reader, which says why.
+        let bytes = path.metadata().map_or(0, |metadata| metadata.len());
+        if bytes > self.limits.file_bytes {
+            let most = self.limits.file_bytes;
+            let message = format!("{at}: {} has {bytes} bytes; at most {most} are allowed here", path.display());
+            return Err(Fault::value(at.clone(), message));
         }
+        Ok(path)
     }
 }
 
@@ -48,6 +56,7 @@ pub(crate) fn compile(
     files: &Files<'_>,
     progress: &mut dyn FnMut(f64, &str),
 ) -> Result<Scene, Fault> {
+    files.limits.check_entries(document)?;
     let settings = settings(document)?;
     let output = output(&document.output)?;
     let body = body::make(&document.body, files, progress)?;

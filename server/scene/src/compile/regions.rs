@@ -171,16 +171,20 @@ impl<'b> Regions<'b> {
     }
 
     fn nested(&self, selector: &Selector, at: &Where, parts: &mut Vec<Selection>) -> Result<(), Fault> {
-        let every = |selectors: &[Selector], key: &str| -> Result<Vec<Selection>, Fault> {
-            let one = |(index, selector): (usize, &Selector)| self.select(selector, &at.key(key).index(index));
-            selectors.iter().enumerate().map(one).collect()
+        let fold = |key: &str, selectors: &[Selector], start: bool, rule: fn(bool, bool) -> bool| {
+            if selectors.is_empty() {
+                return Err(Fault::value(at.key(key), format!("`{key}` is empty")));
+            }
+            let mut selectors = selectors.iter().enumerate();
+            selectors.try_fold(Selection::all(self.body, start), |folded, (index, selector)| {
+                Ok(folded.combine(&self.select(selector, &at.key(key).index(index))?, rule))
+            })
         };
         if let Some(selectors) = &selector.all_of {
-            parts.extend(every(selectors, "all_of")?);
+            parts.push(fold("all_of", selectors, true, |a, b| a && b)?);
         }
         if let Some(selectors) = &selector.any_of {
-            let none = Selection::all(self.body, false);
-            parts.push(every(selectors, "any_of")?.iter().fold(none, |any, one| any.combine(one, |a, b| a || b)));
+            parts.push(fold("any_of", selectors, false, |a, b| a || b)?);
         }
         if let Some(selector) = &selector.not {
             let inside = self.select(selector, &at.key("not"))?;

@@ -149,7 +149,7 @@ fn driver(table: &ToolTable, at: &Where, files: &Files<'_>) -> Result<(Driver, D
 
 fn trajectory(file: &str, at: &Where, files: &Files<'_>) -> Result<Vec<(f64, DVec3)>, Fault> {
     let columns = [csv::TIME, csv::length("x"), csv::length("y"), csv::length("z")];
-    let rows = csv::read(&files.resolve(at, file)?, columns).map_err(|error| {
+    let rows = csv::read(&files.resolve(at, file)?, files.limits, columns).map_err(|error| {
         Fault::value(at.clone(), error.to_string())
             .help("a trajectory has the columns time_s, x_m, y_m, z_m (or time_ms, x_mm, y_mm, z_mm)")
             .cause(error)

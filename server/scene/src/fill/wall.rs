@@ -5,6 +5,7 @@ use super::relation;
 use super::remesh::Target;
 use super::repair::CleanSurface;
 use super::trimesh::TriMesh;
+use crate::limits::MOST_TETS;
 use crate::shapes::layers_for;
 use glam::DVec3;
 
@@ -12,8 +13,6 @@ use glam::DVec3;
 const LONGEST_EDGE: f64 = 5.0;
 /// Fewest triangles that follow a closed or cup-like surface at all.
 const FEWEST_TRIANGLES: f64 = 20.0;
-/// Most tets made.
-const MOST_TETS: u32 = 5_000_000;
 /// Sizes differ by more than this: mixed units. Real cavities are not 20 times smaller than their hearts.
 const UNIT_RATIO: f64 = 20.0;
 /// Thinnest wall, as part of the mean thickness.

@@ -1,10 +1,8 @@
 //! The box: a grid of cells, six tets each.
 use super::{BoundaryRegion, Shape, ShapeError, check};
+use crate::limits::MOST_TETS;
 use glam::DVec3;
 use palpate_physics::{MeshError, Surface, TetMesh};
-
-/// Most tets a box may have: enough for any convergence study, and indices stay small.
-const MAX_TETS: u64 = 50_000_000;
 
 /// Corner offsets of a cell on the six monotone paths from (0,0,0) to (1,1,1): Kuhn's subdivision. Neighbouring cells
 /// agree on their common face's diagonal because all cells are translates of one another.
@@ -21,7 +19,7 @@ const KUHN_PATHS: [[[u32; 3]; 4]; 6] = [
 /// 45°, 60° and 90° for cubic cells). Node (i, j, k) has index `i + (nx+1)·(j + (ny+1)·k)`. Regions `x_min` … `z_max`.
 ///
 /// # Errors
-/// A size that is not positive and finite, no cells along an axis, or more than 50 million tets.
+/// A size that is not positive and finite, no cells along an axis, or more than 10 million tets.
 pub fn box_mesh(size_m: DVec3, cells: [u32; 3]) -> Result<Shape, ShapeError> {
     for (name, value) in ["size_m.x", "size_m.y", "size_m.z"].into_iter().zip(size_m.to_array()) {
         check(name, value, value > 0.0, "must be finite and larger than 0")?;
@@ -30,7 +28,7 @@ pub fn box_mesh(size_m: DVec3, cells: [u32; 3]) -> Result<Shape, ShapeError> {
         check(name, f64::from(value), value > 0, "must be at least 1")?;
     }
     let tets = cells.iter().fold(6u64, |product, &n| product.saturating_mul(u64::from(n)));
-    check("cells", tets as f64 / 6.0, tets <= MAX_TETS, format!("at most {} cells", MAX_TETS / 6))?;
+    check("cells", tets as f64 / 6.0, tets <= MOST_TETS.into(), format!("at most {} cells", MOST_TETS / 6))?;
     let bad_mesh = |source: MeshError| ShapeError::Mesh { shape: "box", source };
 
     let [nx, ny, nz] = cells;

@@ -2,6 +2,7 @@
 use super::rings::{Cap, triangles_between};
 use super::{BoundaryRegion, Shape, ShapeError, check};
 use crate::fill::prisms::{Layers, split};
+use crate::limits::MOST_TETS;
 use glam::DVec3;
 use palpate_physics::TetMesh;
 use std::f64::consts::FRAC_PI_2;
@@ -12,8 +13,6 @@ const EDGE_PER_LAYER: f64 = 1.4;
 const COUNT_TOLERANCE: f64 = 0.10;
 /// Most layers through a wall.
 const MOST_LAYERS: u32 = 64;
-/// Most tets: beyond it the search for ring sizes and the mesh itself take minutes.
-const MOST_TETS: f64 = 10e6;
 /// A cut must keep the caps' rims away from the poles: sine of the steepest latitude.
 const LARGEST_CUT: f64 = 0.95;
 
@@ -113,7 +112,8 @@ impl Wall {
 
     fn mesh(&self, target_tets: u32) -> Result<Shape, ShapeError> {
         let count = f64::from(target_tets);
-        check("target_tets", count, (1.0..=MOST_TETS).contains(&count), format!("must be 1 to {MOST_TETS}"))?;
+        let possible = (1..=MOST_TETS).contains(&target_tets);
+        check("target_tets", count, possible, format!("must be 1 to {MOST_TETS}"))?;
         let cap = self.cap(self.middle_m());
         let layers = self.layers(target_tets);
         let sizes = cap.rings(f64::from(target_tets) / f64::from(3 * layers));
