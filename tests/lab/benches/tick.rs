@@ -1,10 +1,9 @@
 //! µs per 1 ms tick of ventricles and shells, free: `cargo bench -p palpate-lab`.
 #![allow(missing_docs)] // criterion's macros
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
-use glam::DVec3;
 use miette::Result;
-use palpate_lab::bodies;
-use palpate_physics::{Model, Scratch, State, TickInput, material::Law, step};
+use palpate_lab::{bodies, press::Press};
+use palpate_physics::material::Law;
 
 fn ticks(criterion: &mut Criterion) {
     bench(criterion).unwrap_or_else(|error| panic!("{error:?}"));
@@ -22,28 +21,13 @@ fn bench(criterion: &mut Criterion) -> Result<()> {
             group.throughput(Throughput::Elements(updates));
             let name = format!("{name}, {} substeps", model.substeps());
             group.bench_with_input(BenchmarkId::new(name, model.mesh().tets().len()), &model, |bencher, model| {
-                let (mut state, mut scratch) = ringing(model);
-                let prescribed = vec![DVec3::ZERO; model.spec().prescribed.len()];
-                let input = TickInput {
-                    tools: &[],
-                    load_factors: &[],
-                    prescribed_displacements_m: &prescribed,
-                    point_forces: &[],
-                };
-                bencher.iter(|| step(model, &mut state, &mut scratch, &input));
+                let mut ringing = Press::new(model, 0.0, 1);
+                bencher.iter(|| ringing.tick());
             });
         }
     }
     group.finish();
     Ok(())
-}
-
-fn ringing(model: &Model) -> (State, Scratch) {
-    let mut state = State::at_rest(model);
-    for (v, x) in state.v.iter_mut().zip(model.rest_positions_m()) {
-        *v = DVec3::new(x.y, x.x, 0.0);
-    }
-    (state, Scratch::new(model))
 }
 
 criterion_group!(benches, ticks);

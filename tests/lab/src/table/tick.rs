@@ -1,8 +1,7 @@
 //! µs per 1 ms tick of whole bodies, with their substeps, and the two aims.
-use crate::{bodies, timing::Summary};
-use glam::DVec3;
+use crate::{bodies, press::Press, timing::Summary};
 use miette::Result;
-use palpate_physics::{Model, Scratch, State, TickInput, contact::ToolTarget, material::Law, step};
+use palpate_physics::{Model, material::Law};
 use palpate_scene::shapes::Shape;
 use std::time::Instant;
 
@@ -46,30 +45,16 @@ fn row(name: &str, shape: &Shape, (young, nu): (f64, f64), tool_radius_m: Option
 /// during the ticks that are not counted, and stays; without one the body rings.
 fn run(model: &Model, radius_m: f64) -> (Summary, u32) {
     let ticks = (20_000_000 / (model.substeps() as usize * model.mesh().tets().len())).clamp(100, 2_000);
-    let mut state = State::at_rest(model);
-    let mut scratch = Scratch::new(model);
-    for (v, x) in state.v.iter_mut().zip(model.rest_positions_m()) {
-        *v = DVec3::new(x.y, x.x, 0.0);
-    }
-    let prescribed = vec![DVec3::ZERO; model.spec().prescribed.len()];
     let approach = ticks / 2;
+    let mut press = Press::new(model, 0.1 * radius_m, approach);
     let mut times = Vec::with_capacity(ticks);
     for tick in 0..approach + ticks {
-        let depth_m = 0.1 * radius_m * (tick as f64 / approach as f64).min(1.0);
-        let target = |start_m: DVec3| ToolTarget { position_m: start_m - DVec3::X * depth_m, ..ToolTarget::default() };
-        let targets: Vec<ToolTarget> = model.spec().tools.iter().map(|t| target(t.start_position_m)).collect();
-        let input = TickInput {
-            tools: &targets,
-            load_factors: &[],
-            prescribed_displacements_m: &prescribed,
-            point_forces: &[],
-        };
         let start = Instant::now();
-        step(model, &mut state, &mut scratch, &input);
+        let report = press.tick();
         if tick >= approach {
             times.push(start.elapsed().as_secs_f64());
         }
+        assert!(report.quarantined.is_none(), "the body did not survive its own benchmark");
     }
-    assert!(state.quarantine.is_none(), "the body did not survive its own benchmark");
-    (Summary::of(times), state.tools.first().map_or(0, |tool| tool.contacts))
+    (Summary::of(times), press.contacts())
 }

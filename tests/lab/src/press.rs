@@ -1,0 +1,57 @@
+//! A body at work: it rings, and a tool, if it has one, goes in and stays.
+use glam::DVec3;
+use palpate_physics::{Model, Scratch, State, StepReport, TickInput, contact::ToolTarget, step};
+
+/// A body under way. [`Press::tick`] does not allocate.
+#[derive(Debug)]
+pub struct Press<'m> {
+    model: &'m Model,
+    state: State,
+    scratch: Scratch,
+    prescribed_m: Vec<DVec3>,
+    targets: Vec<ToolTarget>,
+    depth_m: f64,
+    approach_ticks: usize,
+    tick: usize,
+}
+
+impl<'m> Press<'m> {
+    /// Tools go along −x from where they start, `depth_m` deep within `approach_ticks`.
+    pub fn new(model: &'m Model, depth_m: f64, approach_ticks: usize) -> Self {
+        let mut state = State::at_rest(model);
+        for (v, x) in state.v.iter_mut().zip(model.rest_positions_m()) {
+            *v = DVec3::new(x.y, x.x, 0.0);
+        }
+        Self {
+            state,
+            scratch: Scratch::new(model),
+            prescribed_m: vec![DVec3::ZERO; model.spec().prescribed.len()],
+            targets: vec![ToolTarget::default(); model.spec().tools.len()],
+            model,
+            depth_m,
+            approach_ticks,
+            tick: 0,
+        }
+    }
+
+    /// One tick.
+    pub fn tick(&mut self) -> StepReport {
+        let depth_m = self.depth_m * (self.tick as f64 / self.approach_ticks as f64).min(1.0);
+        for (target, tool) in self.targets.iter_mut().zip(&self.model.spec().tools) {
+            target.position_m = tool.start_position_m - DVec3::X * depth_m;
+        }
+        self.tick += 1;
+        let input = TickInput {
+            tools: &self.targets,
+            load_factors: &[],
+            prescribed_displacements_m: &self.prescribed_m,
+            point_forces: &[],
+        };
+        step(self.model, &mut self.state, &mut self.scratch, &input)
+    }
+
+    /// Contact samples of the first tool that carry force.
+    pub fn contacts(&self) -> u32 {
+        self.state.tools.first().map_or(0, |tool| tool.contacts)
+    }
+}
