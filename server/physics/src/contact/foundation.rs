@@ -26,9 +26,9 @@ const STIFFNESS_RATIO: f64 = 8.0;
 /// Largest share of the body's ω²_max that contact may add at a node.
 const FREQUENCY_SHARE: f64 = 1.5;
 /// Sample spacing wanted, as a fraction of the tool's radius.
-const SPACING: f64 = 1.0 / 3.0;
-/// Most subdivisions of a triangle's edge.
-const MAX_LEVEL: usize = 48;
+pub(super) const SPACING: f64 = 1.0 / 3.0;
+/// Most subdivisions of a triangle's edge; larger triangles are refused.
+pub(super) const MAX_LEVEL: usize = 48;
 
 /// Samples and stiffness of the surface as one tool meets it; indices are those of [`Triangles`].
 #[derive(Debug, Clone)]

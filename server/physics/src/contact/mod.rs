@@ -24,6 +24,9 @@ pub use state::ContactState;
 pub use tool::{Coupling, LocalContactModel, ToolSpec, ToolState, ToolTarget};
 pub use triangle::{closest_point, closest_weights};
 
+/// The longest edge of a surface triangle, over the radius of a tool, that can still be sampled as finely as contact needs.
+pub const LARGEST_TRIANGLE: f64 = foundation::MAX_LEVEL as f64 * foundation::SPACING;
+
 use crate::mesh::{Surface, TetMesh};
 use broad::Triangles;
 use foundation::{BodyAtRest, Foundation, SampleTables};
@@ -70,6 +73,8 @@ struct ToolModel {
 pub struct Body<'a> {
     /// Positions (m) of its nodes.
     pub x: &'a [DVec3],
+    /// Velocities (m/s) of its nodes.
+    pub v: &'a [DVec3],
     /// Bound of the speed (m/s) with which any node came here; see [`fastest_m_per_s`].
     pub fastest_m_per_s: f64,
 }
@@ -212,7 +217,7 @@ impl ContactModel {
             contact.tools[index].candidates.slack_m -= moved_m;
             self.list_candidates(index, tool.centre_m, body.x, contact, exhaustive);
             let pressed = self.press(index, tool.centre_m, body.x, contact, forces_n, scratch);
-            let coupling_n = proxy::finish(model, tool, &pressed, time);
+            let coupling_n = proxy::finish(model, tool, &pressed, self.surface_m_per_s(&pressed, body), time);
             tool.friction_heat_j += pressed.heat_j;
             tool.contacts = pressed.contacts;
             tool.contact_energy_j = pressed.energy_j;
@@ -253,11 +258,19 @@ impl ContactModel {
             centre_m,
             radius_m: model.spec.radius_m,
             friction_coefficient: model.spec.friction_coefficient,
+            just_put: std::mem::take(&mut part.just_put),
         };
         let candidates = part.candidates.triangles();
         let pressed = narrow::press(&meeting, candidates, &mut part.touching, &mut scratch.next, forces_n);
         part.force_n = pressed.force_n;
         pressed
+    }
+
+    /// Velocity (m/s) of the point of the surface nearest to a tool.
+    fn surface_m_per_s(&self, pressed: &Pressed, body: &Body<'_>) -> DVec3 {
+        let (triangle, weights) = pressed.nearest;
+        let corners = self.triangles.corners(triangle, body.v);
+        corners.into_iter().zip(weights).map(|(v, weight)| v * weight).sum()
     }
 
     /// Once a tick, at its end: means and local models.

@@ -3,7 +3,8 @@
 //! A sample enters contact when the sphere's surface passes over it from the outside, `n·(c − y) > 0` with the outward
 //! normal `n`; one that the sphere reaches from behind (the far wall of a thin shell) is ignored for as long as it stays
 //! inside. Once in, a sample is tracked until it leaves, so that neither the normal nor the order of events can make the
-//! energy jump.
+//! energy jump. A tool that is *put* into the surface (not moved there) presses nothing at first: its samples carry
+//! `k_f a (g − g₀)` from the depth `g₀` at which it was put, or the least depth since.
 //!
 //! Coulomb friction: every sample in contact has a tangential spring `e` (m) of stiffness `k_t = τ k_f a`, stretched by the
 //! sample's motion relative to the tool and cut at the cone:
@@ -16,7 +17,7 @@ use super::{
     broad::Triangles,
     foundation::{Foundation, SampleTables, TriangleSamples},
     touching::{Touch, Touching},
-    triangle::closest_point,
+    triangle::closest_weights,
 };
 use glam::DVec3;
 
@@ -34,6 +35,8 @@ pub(super) struct Meeting<'a> {
     pub(super) centre_m: DVec3,
     pub(super) radius_m: f64,
     pub(super) friction_coefficient: f64,
+    /// The tool was just put there: what is inside carries nothing as deep as it is.
+    pub(super) just_put: bool,
 }
 
 /// Sums over the samples in contact.
@@ -61,6 +64,8 @@ pub(super) struct Pressed {
     pub(super) penetration_m: f64,
     /// From the tool's centre to the nearest point of the surface (m); infinite when nothing is listed.
     pub(super) to_surface_m: DVec3,
+    /// The triangle of that point and its weights there; no weight when nothing is listed.
+    pub(super) nearest: (usize, [f64; 3]),
 }
 
 impl Pressed {
@@ -105,10 +110,12 @@ pub(super) fn press(
     for &triangle in candidates {
         let triangle = triangle as usize;
         let corners = meeting.triangles.corners(triangle, meeting.x);
-        let to_triangle_m = closest_point(meeting.centre_m, corners) - meeting.centre_m;
+        let weights = closest_weights(meeting.centre_m, corners);
+        let closest_m = corners[0] * weights[0] + corners[1] * weights[1] + corners[2] * weights[2];
+        let to_triangle_m = closest_m - meeting.centre_m;
         let distance_sq = to_triangle_m.length_squared();
         if distance_sq < nearest_sq {
-            (nearest_sq, pressed.to_surface_m) = (distance_sq, to_triangle_m);
+            (nearest_sq, pressed.to_surface_m, pressed.nearest) = (distance_sq, to_triangle_m, (triangle, weights));
         }
         if distance_sq >= meeting.radius_m * meeting.radius_m {
             continue;
@@ -150,11 +157,16 @@ fn press_triangle(
         let known = take(before, number);
         let from_behind = known.map_or(outward.dot(r) >= 0.0, |touch| touch.from_behind);
         if from_behind {
-            next.push(Touch { sample: number, from_behind, spring_origin_m: r });
+            next.push(Touch { sample: number, from_behind, free_depth_m: 0.0, spring_origin_m: r });
             continue;
         }
-        let origin = known.map_or(r, |touch| touch.spring_origin_m);
-        let force_n = press_sample(meeting, samples, r, distance_sq.sqrt(), origin, (number, next), pressed);
+        let distance_m = distance_sq.sqrt();
+        let depth_m = meeting.radius_m - distance_m;
+        let free_depth_m = if meeting.just_put { depth_m } else { 0.0 };
+        let mut touch = known.unwrap_or(Touch { sample: number, from_behind, free_depth_m, spring_origin_m: r });
+        touch.free_depth_m = touch.free_depth_m.min(depth_m);
+        let force_n = press_sample(meeting, samples, r, distance_m, &mut touch, pressed);
+        next.push(touch);
         nodal[0] += force_n * (1.0 - wb - wc);
         nodal[1] += force_n * wb;
         nodal[2] += force_n * wc;
@@ -169,25 +181,24 @@ fn press_sample(
     samples: &TriangleSamples<'_>,
     r: DVec3,
     distance_m: f64,
-    spring_origin_m: DVec3,
-    (number, next): (u32, &mut Touching),
+    touch: &mut Touch,
     pressed: &mut Pressed,
 ) -> DVec3 {
     // A sample exactly at the centre has no direction: it carries nothing for this instant.
     let normal = r / distance_m.max(f64::MIN_POSITIVE);
-    let depth_m = meeting.radius_m - distance_m;
-    // |f_n| = k_f a g, Φ = ½ k_f a g²
+    let depth_m = meeting.radius_m - distance_m - touch.free_depth_m;
+    // |f_n| = k_f a (g − g₀), Φ = ½ k_f a (g − g₀)²
     let f_n = samples.stiffness_n_per_m * depth_m;
     pressed.energy_j += 0.5 * f_n * depth_m;
     pressed.pressing_n += f_n;
     pressed.force_times_k_f += f_n * samples.foundation_pa_per_m;
     pressed.force_times_modulus += f_n * samples.indentation_modulus_pa;
     pressed.normal_n -= normal * f_n;
-    pressed.contacts += 1;
-    pressed.penetration_m = pressed.penetration_m.max(depth_m);
+    pressed.contacts += u32::from(depth_m > 0.0);
+    pressed.penetration_m = pressed.penetration_m.max(meeting.radius_m - distance_m);
 
     let k_t = TANGENTIAL_RATIO * samples.stiffness_n_per_m;
-    let trial = (r - spring_origin_m).reject_from_normalized(normal);
+    let trial = (r - touch.spring_origin_m).reject_from_normalized(normal);
     let (stretch_m, limit_m) = (trial.length(), meeting.friction_coefficient * f_n / k_t);
     let spring = if stretch_m > limit_m {
         pressed.heat_j += k_t * limit_m * (stretch_m - limit_m);
@@ -196,7 +207,7 @@ fn press_sample(
         pressed.sticking_n += f_n;
         trial
     };
-    next.push(Touch { sample: number, from_behind: false, spring_origin_m: r - spring });
+    touch.spring_origin_m = r - spring;
     normal * f_n - spring * k_t
 }
 
@@ -264,6 +275,7 @@ mod tests {
                 centre_m,
                 radius_m: RADIUS_M,
                 friction_coefficient: tool.spec.friction_coefficient,
+                just_put: false,
             };
             let mut forces = vec![DVec3::ZERO; 4];
             let all = [0, 1, 2, 3];

@@ -7,9 +7,10 @@
 //! What keeps it outside, whatever the device does:
 //! - The spring saturates ([`super::spring`]) at `F_max`, the force that presses the sphere [`SATURATION_DEPTH`]·R into the flat
 //!   foundation. The damper is cut where the sum exceeds it.
-//! - It moves at most `R/4` in a substep; within `R/4` of the surface it approaches the nearest point with at most the kinetic
-//!   energy that the flat foundation stores at depth [`IMPACT_DEPTH`]·R. The rest is taken from the (virtual) tool, never given
-//!   to the body.
+//! - It moves at most `R/4` in a substep; within `R/4` of the surface it approaches the nearest point, seen from there, with at
+//!   most the kinetic energy that the flat foundation stores at depth [`IMPACT_DEPTH`]·R. The rest is taken from the (virtual) tool,
+//!   never given to tool or body. In contact that point moves with the dent, which the body will stop: there a surface that gives
+//!   way allows no more speed than one at rest.
 use super::{Coupling, ToolModel, ToolState, narrow::Pressed, spring::shortened};
 use glam::DVec3;
 
@@ -59,11 +60,21 @@ pub(super) fn drift(model: &ToolModel, tool: &mut ToolState, contact_n: DVec3, t
 }
 
 /// Second half, with what the tool now meets. Returns the coupling's force on the tool (N).
-pub(super) fn finish(model: &ToolModel, tool: &mut ToolState, pressed: &Pressed, time: &SubstepTime) -> DVec3 {
+pub(super) fn finish(
+    model: &ToolModel,
+    tool: &mut ToolState,
+    pressed: &Pressed,
+    surface_m_per_s: DVec3,
+    time: &SubstepTime,
+) -> DVec3 {
     let Coupling::Spring { mass_kg, .. } = model.spec.coupling else { return DVec3::ZERO };
     let distance_m = pressed.to_surface_m.length();
     if distance_m < (1.0 + NEAR) * model.spec.radius_m {
-        limit_approach(tool, pressed.to_surface_m / distance_m, (2.0 * model.impact_energy_j / mass_kg).sqrt());
+        let limit_m_per_s = (2.0 * model.impact_energy_j / mass_kg).sqrt();
+        let towards = pressed.to_surface_m / distance_m;
+        let recedes_m_per_s = surface_m_per_s.dot(towards);
+        let base_m_per_s = if pressed.contacts > 0 { recedes_m_per_s.min(0.0) } else { recedes_m_per_s };
+        limit_approach(tool, towards, base_m_per_s + limit_m_per_s);
     }
     half_kick(model, tool, pressed.force_n, time.device(tool), 0.5 * time.dt_s)
 }
@@ -104,9 +115,11 @@ fn share_within(s: DVec3, d: DVec3, limit: f64) -> f64 {
     (((half * half + square * rest).sqrt() - half) / square).clamp(0.0, 1.0)
 }
 
-/// Cuts the velocity towards the surface; `towards` is not a direction when the centre lies on the surface.
+/// Cuts the velocity towards the surface, but no more than to a stop; `towards` is not a direction when the centre lies on the
+/// surface.
 fn limit_approach(tool: &mut ToolState, towards: DVec3, limit_m_per_s: f64) {
-    let excess = tool.velocity_m_per_s.dot(towards) - limit_m_per_s;
+    let own = tool.velocity_m_per_s.dot(towards);
+    let excess = (own - limit_m_per_s).min(own);
     if excess > 0.0 {
         tool.velocity_m_per_s -= towards * excess;
     }

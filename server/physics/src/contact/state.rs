@@ -26,6 +26,8 @@ pub struct ContactState {
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub(super) struct ToolContact {
     pub(super) touching: Touching,
+    /// It was just put where it is: what is inside it then carries nothing as deep as that.
+    pub(super) just_put: bool,
     /// Force of the body on the tool now (N).
     pub(super) force_n: DVec3,
     pub(super) estimate: StiffnessEstimate,
@@ -36,7 +38,7 @@ pub(super) struct ToolContact {
 impl PartialEq for ContactState {
     fn eq(&self, other: &Self) -> bool {
         let same = |(a, b): (&ToolContact, &ToolContact)| {
-            a.touching == b.touching && a.force_n == b.force_n && a.estimate == b.estimate
+            a.touching == b.touching && a.just_put == b.just_put && a.force_n == b.force_n && a.estimate == b.estimate
         };
         self.tools.len() == other.tools.len() && self.tools.iter().zip(&other.tools).all(same)
     }
@@ -46,6 +48,7 @@ impl ContactState {
     pub(super) fn new(model: &ContactModel) -> Self {
         let tool = |tool: &super::ToolModel| ToolContact {
             touching: Touching::with_capacity(tool.foundation.samples),
+            just_put: false,
             force_n: DVec3::ZERO,
             estimate: StiffnessEstimate::default(),
             candidates: Candidates::with_capacity(model.triangles.len()),
@@ -68,11 +71,11 @@ impl ContactState {
             let known = touches.last().is_none_or(|last| (last.sample as usize) < samples(index));
             let finite = saved.force_n.is_finite()
                 && saved.estimate.is_finite()
-                && touches.iter().all(|touch| touch.spring_origin_m.is_finite());
+                && touches.iter().all(|touch| touch.spring_origin_m.is_finite() && touch.free_depth_m.is_finite());
             if !(ascending && known && finite && touches.iter().all(|touch| own.touching.push(*touch))) {
                 return None;
             }
-            (own.force_n, own.estimate) = (saved.force_n, saved.estimate);
+            (own.just_put, own.force_n, own.estimate) = (saved.just_put, saved.force_n, saved.estimate);
         }
         Some(self)
     }
@@ -81,7 +84,7 @@ impl ContactState {
     pub(crate) fn copy_from(&mut self, other: &Self) {
         for (own, other) in self.tools.iter_mut().zip(&other.tools) {
             own.touching.copy_from(&other.touching);
-            (own.force_n, own.estimate) = (other.force_n, other.estimate);
+            (own.just_put, own.force_n, own.estimate) = (other.just_put, other.force_n, other.estimate);
         }
         self.forget_geometry();
     }
@@ -90,16 +93,18 @@ impl ContactState {
     pub(crate) fn clear(&mut self) {
         for tool in &mut self.tools {
             tool.touching.clear();
+            tool.just_put = false;
             tool.force_n = DVec3::ZERO;
             tool.estimate = StiffnessEstimate::default();
         }
         self.forget_geometry();
     }
 
-    /// One tool touches nothing. Allocates nothing.
-    pub(crate) fn clear_tool(&mut self, tool: usize) {
+    /// One tool was put somewhere, and has touched nothing yet. Allocates nothing.
+    pub(crate) fn put_tool(&mut self, tool: usize) {
         let part = &mut self.tools[tool];
         part.touching.clear();
+        part.just_put = true;
         part.force_n = DVec3::ZERO;
         part.estimate = StiffnessEstimate::default();
         part.candidates.slack_m = f64::NEG_INFINITY;

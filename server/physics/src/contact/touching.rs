@@ -12,6 +12,8 @@ pub(super) struct Touch {
     pub(super) sample: u32,
     /// The tool reached it from behind the surface: it carries nothing until it leaves.
     pub(super) from_behind: bool,
+    /// Depth (m) up to which it carries nothing: that at which the tool was put there, or the least since.
+    pub(super) free_depth_m: f64,
     /// Position relative to the tool's centre (m) where its friction spring is at rest.
     pub(super) spring_origin_m: DVec3,
 }
@@ -26,7 +28,7 @@ pub(super) struct Touching {
 
 impl Touching {
     pub(super) fn with_capacity(samples: usize) -> Self {
-        let empty = Touch { sample: 0, from_behind: false, spring_origin_m: DVec3::ZERO };
+        let empty = Touch { sample: 0, from_behind: false, free_depth_m: 0.0, spring_origin_m: DVec3::ZERO };
         Self { buffer: vec![empty; samples.min(MOST)].into_boxed_slice(), count: 0 }
     }
 

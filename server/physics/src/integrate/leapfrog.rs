@@ -176,7 +176,7 @@ fn evaluate(
     }
     let (x, v) = (&state.x, &state.v);
     if !state.tools.is_empty() {
-        let body = Body { x, fastest_m_per_s: contact::fastest_m_per_s(v) };
+        let body = Body { x, v, fastest_m_per_s: contact::fastest_m_per_s(v) };
         let time = SubstepTime { fraction, dt_s, tick_period_s: model.spec().settings.tick_period_s };
         let (tools, contact) = (&mut state.tools, &mut state.contact);
         model.contact().substep(&body, &time, tools, contact, external, &mut scratch.contact);

@@ -1,7 +1,7 @@
 //! The specification's ranges.
 use super::{LoadSpec, MAX_SUBSTEPS, ModelError, ModelSpec, Substeps};
 use crate::{
-    contact::{Coupling, ToolSpec},
+    contact::{Coupling, LARGEST_TRIANGLE, ToolSpec},
     mesh::Surface,
 };
 
@@ -21,7 +21,28 @@ pub(super) fn spec(spec: &ModelSpec, surface: &Surface) -> Result<(), ModelError
         }
     }
     spec.tools.iter().try_for_each(tool)?;
+    spec.tools.iter().try_for_each(|tool| fine_enough(spec, surface, tool))?;
     settings(spec)
+}
+
+/// No triangle of the surface is too large for the tool's contact samples.
+fn fine_enough(spec: &ModelSpec, surface: &Surface, tool: &ToolSpec) -> Result<(), ModelError> {
+    let corners = |t: usize| surface.triangle_nodes(t).map(|n| spec.mesh.positions_m()[n as usize]);
+    let longest_m = |t: usize| {
+        let [a, b, c] = corners(t);
+        a.distance(b).max(b.distance(c)).max(c.distance(a))
+    };
+    let all = 0..surface.triangles.len();
+    let Some((triangle, size_m)) = all.map(|t| (t, longest_m(t))).max_by(|a, b| a.1.total_cmp(&b.1)) else {
+        return Ok(());
+    };
+    let largest_m = LARGEST_TRIANGLE * tool.radius_m;
+    if size_m <= largest_m * (1.0 + 1e-9) {
+        return Ok(());
+    }
+    let [a, b, c] = corners(triangle);
+    let (tool, radius_m, centre_m) = (tool.name.clone(), tool.radius_m, (a + b + c) / 3.0);
+    Err(ModelError::SurfaceTooCoarse { tool, radius_m, triangle, centre_m, size_m, largest_m })
 }
 
 fn tool(tool: &ToolSpec) -> Result<(), ModelError> {

@@ -1,5 +1,6 @@
 //! Why a model cannot be built.
 use crate::mesh::MeshError;
+use glam::DVec3;
 use thiserror::Error;
 
 /// Why a model cannot be built.
@@ -48,6 +49,25 @@ pub enum ModelError {
         /// Second set.
         second: String,
     },
+    /// A triangle of the surface is too large for a tool to be felt between its contact samples.
+    #[error(
+        "tool \"{tool}\" (radius {radius_m} m) is too small for the surface: triangle {triangle}, at {}, is {size_m:.4} m long, and at \
+         most {largest_m:.4} m can be sampled; refine the surface there or take a larger tool", point(*centre_m)
+    )]
+    SurfaceTooCoarse {
+        /// Name of the tool.
+        tool: String,
+        /// Its radius (m).
+        radius_m: f64,
+        /// Index of the triangle in the surface.
+        triangle: usize,
+        /// Its centroid (m).
+        centre_m: DVec3,
+        /// Its longest edge (m).
+        size_m: f64,
+        /// The longest that this tool allows (m).
+        largest_m: f64,
+    },
     /// More substeps than any tick can bear.
     #[error(
         "the body needs {substeps} substeps per tick (largest natural frequency {omega_rad_per_s:.3e} rad/s); \
@@ -61,4 +81,8 @@ pub enum ModelError {
         /// Largest number allowed.
         limit: u32,
     },
+}
+
+fn point(p: DVec3) -> String {
+    format!("({:.4}, {:.4}, {:.4}) m", p.x, p.y, p.z)
 }

@@ -91,14 +91,15 @@ impl State {
     }
 
     /// Puts a tool and its device at rest at `position_m` (m, world), as if it had always been there: it neither sweeps what
-    /// lies between nor keeps its contact. A position that is not finite, or a tool that is not there, changes nothing.
+    /// lies between nor keeps its contact. Where it is put into the surface it presses nothing yet: it resists from that depth
+    /// on, and as from the outside once it has left. A position that is not finite, or a tool that is not there, changes nothing.
     /// Allocates nothing.
     pub fn place_tool(&mut self, tool: usize, position_m: DVec3) {
         let Some(state) = self.tools.get_mut(tool).filter(|_| position_m.is_finite()) else { return };
         state.target = ToolTarget { position_m, velocity_m_per_s: DVec3::ZERO };
         state.let_go();
         state.centre_m = position_m;
-        self.contact.clear_tool(tool);
+        self.contact.put_tool(tool);
         self.force_is_current = false;
     }
 
