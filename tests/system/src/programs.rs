@@ -27,7 +27,9 @@ fn profile_dir() -> PathBuf {
 fn build() {
     let release = profile_dir().file_name().is_some_and(|name| name == "release");
     let mut cargo = Command::new(env!("CARGO"));
-    cargo.args(["build", "--quiet", "-p", "palpated", "-p", "palpate-bridge", "-p", "palpate-view"]);
+    // With the tests, as `cargo test --workspace` builds them: the programs alone would choose other features of shared
+    // dependencies, and compile most of them once more.
+    cargo.args(["build", "--quiet", "--workspace", "--bins", "--tests"]);
     cargo.current_dir(crate::root()).env("CARGO_TARGET_DIR", profile_dir().parent().expect("target"));
     if release {
         cargo.arg("--release");
