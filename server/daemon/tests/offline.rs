@@ -132,8 +132,65 @@ fn frames_are_as_many_as_asked_for_or_none() {
     assert_eq!(run("none"), (0, false));
     assert_eq!(run("5"), (5, true));
     assert_eq!(run("7"), (7, true));
-    let folly = palpated(&["simulate", &scene, "--frames", "-1"]);
-    assert_eq!(folly.status.code(), Some(2));
+    let out = folder.path().join("folly");
+    let folly = palpated(&["simulate", &scene, "--frames=-1", "--out", out.to_str().unwrap()]);
+    assert_eq!((folly.status.code(), out.exists()), (Some(2), false));
+    for flags in [&["--frames", "5"][..], &["--force"]] {
+        let nowhere = palpated(&[&["simulate", &scene], flags].concat());
+        assert_eq!(nowhere.status.code(), Some(2));
+        let message = String::from_utf8(nowhere.stderr).unwrap();
+        assert!(message.contains("required") && message.contains("--out <DIR>"), "{message}");
+    }
+}
+
+/// The interval of frames need not divide the run.
+#[test]
+fn the_last_state_is_a_frame() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("odd.toml");
+    fs::write(&path, BEAM.replace("frame_interval_s = 0.5", "frame_interval_s = 0.04")).unwrap();
+    let out = folder.path().join("out");
+    succeeds(&["simulate", path.to_str().unwrap(), "--duration-s", "0.1", "--out", out.to_str().unwrap()]);
+    let index = fs::read_to_string(out.join("frames.pvd")).unwrap();
+    let times: Vec<&str> = index.split("timestep=\"").skip(1).filter_map(|rest| rest.split('"').next()).collect();
+    assert_eq!(times, ["0", "0.04", "0.08", "0.1"], "{index}");
+}
+
+#[test]
+fn a_solve_that_fails_keeps_the_results_that_are_there() {
+    let folder = tempfile::tempdir().unwrap();
+    let scene = beam(folder.path());
+    let out = folder.path().join("out");
+    succeeds(&["static", &scene, "--out", out.to_str().unwrap()]);
+    let names = ["probes.csv", "summary.json", "frames.pvd", "frames/frame-000000.vtu"];
+    let before = names.map(|name| fs::read(out.join(name)).unwrap());
+    // Nothing holds the body: there is no equilibrium to find.
+    let free = BEAM
+        .replace("[[fixed]]\nregion = \"x_min\"\n", "")
+        .replace("[[probe]]\nname = \"clamp\"\nmeasure = \"reaction\"\nregion = \"x_min\"\n", "");
+    fs::write(&scene, free).unwrap();
+    let message = fails(&["static", &scene, "--out", out.to_str().unwrap(), "--force"]);
+    assert!(message.contains("no equilibrium"), "{message}");
+    assert!(names.map(|name| fs::read(out.join(name)).unwrap()) == before);
+}
+
+/// A step fixed too long explodes. `check` said only that, and nothing of the body.
+#[test]
+fn a_scene_that_explodes_fails_its_check_and_its_run_keeps_what_led_there() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("unstable.toml");
+    fs::write(&path, BEAM.replace("[numerics]", "[numerics]\nsubsteps = 1")).unwrap();
+    let path = path.to_str().unwrap();
+    let check = palpated(&["check", path]);
+    assert_eq!(check.status.code(), Some(1));
+    let (shown, said) = (String::from_utf8_lossy(&check.stdout), String::from_utf8_lossy(&check.stderr));
+    assert!(shown.contains("192 tets") && shown.contains("dihedral"), "{shown}");
+    assert!(said.contains("the run stopped there") && said.contains("substeps"), "{said}");
+    let out = folder.path().join("out");
+    fails(&["simulate", path, "--out", out.to_str().unwrap()]);
+    let summary = summary(&out);
+    assert_eq!(summary["ended_by"], Value::from("quarantined"));
+    assert!(summary["samples"].as_u64() >= Some(2) && summary["frames"].as_u64() >= Some(2), "{summary}");
 }
 
 #[test]

@@ -2,8 +2,8 @@
 #![allow(clippy::unwrap_used, clippy::expect_used)] // a test that cannot read its samples has failed
 use glam::DVec3;
 use palpate_scene::files::{
-    Cells, Field, UnusedNodes, Values, VtuFrame, encode_vtu, parse_surface, parse_volume, read_surface, read_volume,
-    write_obj, write_ply, write_pvd, write_stl, write_vtu,
+    Cells, Field, PvdIndex, UnusedNodes, Values, VtuFrame, encode_vtu, parse_surface, parse_volume, read_surface,
+    read_volume, write_obj, write_ply, write_stl, write_vtu,
 };
 use proptest::prelude::*;
 use std::path::Path;
@@ -110,9 +110,20 @@ fn a_frame_is_a_mesh_again() {
     write_vtu(&path, &frame(first.mesh.positions_m(), Cells::Tets(first.mesh.tets()))).unwrap();
     let second = read_volume(&path).unwrap().into_tet_mesh(1.0, UnusedNodes::Refuse).unwrap();
     assert_eq!(first.mesh, second.mesh);
-    write_pvd(&folder.path().join("run.pvd"), &[(0.0, "frame_0000.vtu".to_string())]).unwrap();
-    let index = std::fs::read_to_string(folder.path().join("run.pvd")).unwrap();
-    assert!(index.contains("<DataSet timestep=\"0\" part=\"0\" file=\"frame_0000.vtu\"/>"), "{index}");
+    let path = folder.path().join("run.pvd");
+    let mut index = PvdIndex::create(&path).unwrap();
+    let head = "<?xml version=\"1.0\"?>\n<VTKFile type=\"Collection\" version=\"0.1\">\n<Collection>\n";
+    let tail = "</Collection>\n</VTKFile>\n";
+    let mut frames = String::new();
+    // Whole at every moment: a run may end there.
+    for (time_s, name) in [(0.0, "a&b.vtu"), (0.125, "frame_0001.vtu"), (10.0, "frame_0002.vtu")] {
+        assert_eq!(std::fs::read_to_string(&path).unwrap(), [head, &frames, tail].concat());
+        index.add(time_s, name).unwrap();
+        let name = name.replace('&', "&amp;");
+        let frame = format!("<DataSet timestep=\"{time_s}\" part=\"0\" file=\"{name}\"/>\n");
+        frames.push_str(&frame);
+    }
+    assert_eq!(std::fs::read_to_string(&path).unwrap(), [head, &frames, tail].concat());
 }
 
 #[test]

@@ -9,7 +9,9 @@ use std::{
 
 /// Flags of `palpated check`.
 #[derive(Debug, Clone, clap::Args)]
-#[command(after_help = "Exit code: 0 when the scene loads (1 with --strict if it has warnings), 1 when it does not.")]
+#[command(
+    after_help = "Exit code: 0 when the scene loads and its first half second holds (1 with --strict if it has warnings), else 1."
+)]
 pub struct CheckArgs {
     /// Scene file or name of a built-in scene
     #[arg(required_unless_present = "list")]
@@ -33,13 +35,12 @@ pub fn run(args: &CheckArgs) -> miette::Result<ExitCode> {
     };
     let scene = load::load_scene(name)?;
     let model = load::build(&scene)?;
-    let cost = measure(&scene, &model)?;
     print_body(&scene);
-    print_time(&model, &cost);
     print_contents(&scene);
     for warning in &scene.warnings {
         println!("warning: {warning}");
     }
+    print_time(&model, &measure(&scene, &model)?);
     let failed = args.strict && !scene.warnings.is_empty();
     Ok(if failed { ExitCode::FAILURE } else { ExitCode::SUCCESS })
 }

@@ -1,12 +1,12 @@
 //! `palpated static`: the equilibrium of a scene under its final loads.
 use super::{
+    args::{OutputArgs, positive},
     folder,
     frames::Frames,
     interrupt::Interrupt,
     load,
     probes::ProbeRows,
     progress::Progress,
-    simulate::positive,
     summary::{Ending, SolveNumbers, Summary},
 };
 use glam::DVec3;
@@ -17,7 +17,7 @@ use palpate_physics::{
     solve::{self, SolveError, StaticSettings, StaticSolution},
 };
 use palpate_scene::Scene;
-use std::{ops::ControlFlow, path::PathBuf, process::ExitCode, time::Instant};
+use std::{ops::ControlFlow, process::ExitCode, time::Instant};
 use thiserror::Error;
 
 /// Flags of `palpated static`.
@@ -28,23 +28,14 @@ use thiserror::Error;
     palpated static lame-sphere --json         a sphere under pressure, for other programs\n\n\
     Loads and tools arrive slowly, and without friction. A tool on a spring rests where the spring balances its contact.")]
 pub struct StaticArgs {
-    /// Scene file or name of a built-in scene
-    pub scene: String,
+    #[command(flatten)]
+    output: OutputArgs,
     /// Take loads, motions and tools as they are at this time, instead of what they settle to
     #[arg(long, value_name = "SECONDS", value_parser = positive)]
-    pub at_s: Option<f64>,
+    at_s: Option<f64>,
     /// Largest residual force relative to the forces in play, between 0 and 1
     #[arg(long, value_name = "RATIO", value_parser = ratio)]
-    pub residual: Option<f64>,
-    /// Folder for probes.csv, summary.json and the frame; without it only the summary is printed
-    #[arg(long, value_name = "DIR")]
-    pub out: Option<PathBuf>,
-    /// Print the summary as JSON
-    #[arg(long)]
-    pub json: bool,
-    /// Replace the results of an earlier run in the folder
-    #[arg(long)]
-    pub force: bool,
+    residual: Option<f64>,
 }
 
 #[derive(Debug, Error, Diagnostic)]
@@ -62,16 +53,17 @@ struct NoEquilibrium {
 /// # Errors
 /// A scene that does not load, no convergence, or a folder that cannot be written.
 pub fn run(args: &StaticArgs) -> miette::Result<ExitCode> {
-    let scene = load::load_with_warnings(&args.scene)?;
+    let output = &args.output;
+    let scene = load::load_with_warnings(&output.scene)?;
     let model = load::build(&scene)?;
-    if let Some(out) = &args.out {
-        folder::check(out, args.force)?;
+    if let Some(out) = &output.out {
+        folder::check(out, output.force)?;
     }
     let started = Instant::now();
     let goal = Goal::of(&scene, args.at_s);
     let solution = solve(&scene, &model, &goal, args.residual)?;
     // Only now that there is something to replace them with do earlier results go.
-    let out = args.out.as_deref().map(|out| folder::prepare(out, args.force)).transpose()?;
+    let out = output.out.as_deref().map(|out| folder::prepare(out, output.force)).transpose()?;
     let state = solution.state(&model, &goal.load_factors);
     let mut rows = ProbeRows::new(&scene.probes, out.as_ref().map(|out| out.join(folder::PROBES)).as_deref())?;
     rows.sample(goal.time_s, &model, &state, &solution.node_reactions_n)?;
@@ -95,7 +87,7 @@ pub fn run(args: &StaticArgs) -> miette::Result<ExitCode> {
     if let Some(out) = &out {
         summary.write(out)?;
     }
-    summary.print(args.json, out.as_deref())?;
+    summary.print(output.json, out.as_deref())?;
     Ok(ExitCode::SUCCESS)
 }
 

@@ -3,13 +3,14 @@ use super::folder;
 use glam::DVec3;
 use miette::{IntoDiagnostic, WrapErr};
 use palpate_physics::{Model, State};
-use palpate_scene::files::{Cells, Field, Values, VtuFrame, write_pvd, write_vtu};
+use palpate_scene::files::{Cells, Field, PvdIndex, Values, VtuFrame, write_vtu};
 use std::path::{Path, PathBuf};
 
 /// A growing series.
 pub(super) struct Frames {
     folder: PathBuf,
-    written: Vec<(f64, String)>,
+    index: PvdIndex,
+    count: usize,
     region: Vec<u32>,
     displacement_m: Vec<DVec3>,
 }
@@ -22,15 +23,16 @@ impl Frames {
             .into_diagnostic()
             .wrap_err_with(|| format!("cannot create {}", folder.display()))?;
         let region = model.spec().tet_region.iter().map(|&region| u32::from(region)).collect();
-        Ok(Self { folder: out.to_path_buf(), written: Vec::new(), region, displacement_m: Vec::new() })
+        let index = PvdIndex::create(&out.join(folder::INDEX))?;
+        Ok(Self { folder: out.to_path_buf(), index, count: 0, region, displacement_m: Vec::new() })
     }
 
-    /// Writes a frame and the index of all so far, so that an interrupted run can be opened.
+    /// Writes a frame and adds it to the index, so that an interrupted run can be opened.
     pub(super) fn write(&mut self, time_s: f64, model: &Model, state: &State) -> miette::Result<()> {
         let rest = model.rest_positions_m();
         self.displacement_m.clear();
         self.displacement_m.extend(state.x.iter().zip(rest).map(|(x, rest)| *x - *rest));
-        let name = format!("{}/frame-{:06}.vtu", folder::FRAMES, self.written.len());
+        let name = format!("{}/frame-{:06}.vtu", folder::FRAMES, self.count);
         let frame = VtuFrame {
             points: &state.x,
             cells: Cells::Tets(model.mesh().tets()),
@@ -42,13 +44,13 @@ impl Frames {
             time_s: Some(time_s),
         };
         write_vtu(&self.folder.join(&name), &frame)?;
-        self.written.push((time_s, name));
-        write_pvd(&self.folder.join(folder::INDEX), &self.written)?;
+        self.index.add(time_s, &name)?;
+        self.count += 1;
         Ok(())
     }
 
     /// Frames so far.
     pub(super) fn count(&self) -> usize {
-        self.written.len()
+        self.count
     }
 }

@@ -1,5 +1,6 @@
 //! `palpated simulate`: a scene headless, as fast as it goes, the same bits every time.
 use super::{
+    args::{OutputArgs, positive},
     folder,
     frames::Frames,
     interrupt::Interrupt,
@@ -13,7 +14,7 @@ use hdrhistogram::Histogram;
 use miette::IntoDiagnostic;
 use palpate_physics::{Model, Scratch, State, TickInput, contact::ToolTarget, step};
 use palpate_scene::Scene;
-use std::{path::PathBuf, process::ExitCode, time::Instant};
+use std::{process::ExitCode, time::Instant};
 
 /// Flags of `palpated simulate`.
 #[derive(Debug, Clone, clap::Args)]
@@ -23,23 +24,14 @@ use std::{path::PathBuf, process::ExitCode, time::Instant};
     palpated simulate my.toml --out run --frames none --duration-s 10\n\n\
     Nothing in a run is random: two runs of one scene give the same bits.")]
 pub struct SimulateArgs {
-    /// Scene file or name of a built-in scene
-    pub scene: String,
-    /// Folder for probes.csv, summary.json and frames; without it only the summary is printed
-    #[arg(long, value_name = "DIR")]
-    pub out: Option<PathBuf>,
+    #[command(flatten)]
+    output: OutputArgs,
     /// Simulated time in seconds, instead of the scene's
     #[arg(long, value_name = "SECONDS", value_parser = positive)]
-    pub duration_s: Option<f64>,
+    duration_s: Option<f64>,
     /// Number of frames over the whole run, or "none"; by default the scene's interval decides
-    #[arg(long, value_name = "N|none")]
-    pub frames: Option<FrameCount>,
-    /// Print the summary as JSON
-    #[arg(long)]
-    pub json: bool,
-    /// Replace the results of an earlier run in the folder
-    #[arg(long)]
-    pub force: bool,
+    #[arg(long, value_name = "N|none", requires = "out")]
+    frames: Option<FrameCount>,
 }
 
 /// How many frames a run writes.
@@ -64,22 +56,22 @@ impl std::str::FromStr for FrameCount {
     }
 }
 
-pub(super) fn positive(text: &str) -> Result<f64, String> {
-    match text.parse::<f64>() {
-        Ok(value) if value > 0.0 && value.is_finite() => Ok(value),
-        _ => Err("give a number larger than 0".into()),
-    }
-}
-
 /// Runs the command.
 ///
 /// # Errors
 /// A scene that does not load, or a folder that cannot be written.
 pub fn run(args: &SimulateArgs) -> miette::Result<ExitCode> {
-    let scene = load::load_with_warnings(&args.scene)?;
+    let output = &args.output;
+    let scene = load::load_with_warnings(&output.scene)?;
     let model = load::build(&scene)?;
-    let out = args.out.as_deref().map(|out| folder::prepare(out, args.force)).transpose()?;
-    let plan = Plan::new(&scene, &model, args);
+    let out = output.out.as_deref().map(|out| folder::prepare(out, output.force)).transpose()?;
+    let ticks = |time_s: f64| in_ticks(time_s, &model);
+    let plan = Plan::new(
+        ticks(args.duration_s.unwrap_or(scene.output.duration_s)),
+        ticks(scene.output.sample_interval_s),
+        ticks(scene.output.frame_interval_s),
+        args.frames,
+    );
     let mut rows = ProbeRows::new(&scene.probes, out.as_ref().map(|out| out.join(folder::PROBES)).as_deref())?;
     let mut frames = match (&out, plan.frames) {
         (Some(out), FrameRule::Every(_) | FrameRule::Count(_)) => Some(Frames::new(out, &model)?),
@@ -101,7 +93,7 @@ pub fn run(args: &SimulateArgs) -> miette::Result<ExitCode> {
     if let Some(out) = &out {
         summary.write(out)?;
     }
-    summary.print(args.json, out.as_deref())?;
+    summary.print(output.json, out.as_deref())?;
     run.refuse_quarantined()?;
     Ok(ExitCode::SUCCESS)
 }
@@ -122,26 +114,29 @@ enum FrameRule {
     Count(u64),
 }
 
+/// Ticks in a time, at least one.
+fn in_ticks(time_s: f64, model: &Model) -> u64 {
+    ((time_s / model.spec().settings.tick_period_s).round() as u64).max(1)
+}
+
 impl Plan {
-    fn new(scene: &Scene, model: &Model, args: &SimulateArgs) -> Self {
-        let period_s = model.spec().settings.tick_period_s;
-        let in_ticks = |time_s: f64| ((time_s / period_s).round() as u64).max(1);
-        let ticks = in_ticks(args.duration_s.unwrap_or(scene.output.duration_s));
-        let frames = match args.frames {
+    fn new(ticks: u64, sample_every: u64, frame_every: u64, frames: Option<FrameCount>) -> Self {
+        let frames = match frames {
             Some(FrameCount::None) => FrameRule::Never,
             // There are no more states than ticks and the start.
             Some(FrameCount::Some(count)) => FrameRule::Count(u64::from(count).min(ticks + 1)),
-            None => FrameRule::Every(in_ticks(scene.output.frame_interval_s)),
+            None => FrameRule::Every(frame_every),
         };
-        Self { ticks, sample_every: in_ticks(scene.output.sample_interval_s), frames }
+        Self { ticks, sample_every, frames }
     }
 
-    fn frame_is_due(&self, tick: u64, written: u64) -> bool {
+    /// Whether the state after a tick is a frame, `written` being there already. The last state always is.
+    fn frame_is_due(&self, tick: u64, written: u64, last: bool) -> bool {
         match self.frames {
             FrameRule::Never => false,
-            FrameRule::Every(ticks) => tick.is_multiple_of(ticks),
+            FrameRule::Every(ticks) => last || tick.is_multiple_of(ticks),
             FrameRule::Count(count) => {
-                tick as u128 >= u128::from(written) * u128::from(self.ticks) / u128::from(count - 1)
+                last || tick as u128 >= u128::from(written) * u128::from(self.ticks) / u128::from(count - 1)
             }
         }
     }
@@ -189,21 +184,21 @@ impl<'s> Run<'s> {
                 self.tick();
             }
             let time_s = self.state.time_s(self.model);
-            let last = tick == plan.ticks || self.state.quarantine.is_some() || interrupt.is_set();
+            if self.state.quarantine.is_some() {
+                ended_by = "quarantined";
+            } else if tick < plan.ticks && interrupt.is_set() {
+                ended_by = "interrupted";
+            }
+            let last = tick == plan.ticks || ended_by != "duration";
             if tick.is_multiple_of(plan.sample_every) || last {
                 rows.sample(time_s, self.model, &self.state, self.scratch.reactions_n())?;
             }
             if let Some(frames) = &mut frames
-                && plan.frame_is_due(tick, frames.count() as u64)
+                && plan.frame_is_due(tick, frames.count() as u64, last)
             {
                 frames.write(time_s, self.model, &self.state)?;
             }
-            if self.state.quarantine.is_some() {
-                ended_by = "quarantined";
-                break;
-            }
-            if interrupt.is_set() && tick < plan.ticks {
-                ended_by = "interrupted";
+            if last {
                 break;
             }
             bar.show(tick as f64 / plan.ticks as f64, "simulating");
@@ -257,5 +252,47 @@ impl<'s> Run<'s> {
             },
             real_time_factor: if wall.is_empty() { 0.0 } else { period_s * 1e9 / wall.mean() },
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Ticks whose states are frames, when the run ends after `ends`.
+    fn frames(plan: &Plan, ends: u64) -> Vec<u64> {
+        let mut due = Vec::new();
+        for tick in 0..=ends {
+            if plan.frame_is_due(tick, due.len() as u64, tick == ends) {
+                due.push(tick);
+            }
+        }
+        due
+    }
+
+    #[test]
+    fn the_wanted_number_of_frames_from_the_start_to_the_end() {
+        let plan = |ticks, count| Plan::new(ticks, 1, 1, Some(FrameCount::Some(count)));
+        assert_eq!(frames(&plan(10, 2), 10), [0, 10]);
+        assert_eq!(frames(&plan(10, 4), 10), [0, 3, 6, 10]);
+        for count in 2..=101 {
+            assert_eq!(frames(&plan(100, count), 100).len(), count as usize);
+        }
+    }
+
+    #[test]
+    fn more_frames_than_ticks_are_one_for_every_state() {
+        assert_eq!(frames(&Plan::new(3, 1, 1, Some(FrameCount::Some(1000))), 3), [0, 1, 2, 3]);
+        assert_eq!(frames(&Plan::new(1, 1, 1, Some(FrameCount::Some(u32::MAX))), 1), [0, 1]);
+    }
+
+    /// With an interval that does not divide the run, its end was in no frame.
+    #[test]
+    fn the_last_state_is_a_frame_whenever_the_run_ends() {
+        assert_eq!(frames(&Plan::new(10, 1, 4, None), 10), [0, 4, 8, 10]);
+        assert_eq!(frames(&Plan::new(10, 1, 5, None), 10), [0, 5, 10]);
+        assert_eq!(frames(&Plan::new(10, 1, 4, None), 7), [0, 4, 7]);
+        assert_eq!(frames(&Plan::new(10, 1, 4, Some(FrameCount::Some(3))), 7), [0, 5, 7]);
+        assert!(frames(&Plan::new(10, 1, 4, Some(FrameCount::None)), 10).is_empty());
     }
 }

@@ -22,7 +22,7 @@ mod write;
 
 pub use error::{FileError, Place, Problem};
 pub use tet_mesh::{GroupedMesh, Members, UnusedNodes};
-pub use write::{Cells, Field, Values, VtuFrame, encode_vtu, write_obj, write_ply, write_pvd, write_stl, write_vtu};
+pub use write::{Cells, Field, PvdIndex, Values, VtuFrame, encode_vtu, write_obj, write_ply, write_stl, write_vtu};
 
 use builder::Builder;
 use format::Format;

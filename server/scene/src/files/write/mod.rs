@@ -1,11 +1,13 @@
-//! Writers: VTU frames and their PVD index for ParaView, and surfaces as OBJ, PLY and STL.
+//! Writers: VTU frames for ParaView, and surfaces as OBJ, PLY and STL.
 use super::error::{FileError, Place, Problem};
 use glam::DVec3;
 use std::io::Write;
 use std::path::Path;
 
+mod pvd;
 mod vtu;
 
+pub use pvd::PvdIndex;
 pub use vtu::{Cells, Field, Values, VtuFrame, encode_vtu};
 
 /// Writes a frame as VTU.
@@ -15,20 +17,6 @@ pub use vtu::{Cells, Field, Values, VtuFrame, encode_vtu};
 pub fn write_vtu(path: &Path, frame: &VtuFrame) -> Result<(), FileError> {
     let bytes = encode_vtu(frame).map_err(|what| FileError::new(path, Place::File, Problem::Inconsistent { what }))?;
     store(path, &bytes)
-}
-
-/// Writes the index of a series: the time (s) and the file name, relative to the index, of each frame.
-///
-/// # Errors
-/// The file cannot be written.
-pub fn write_pvd(path: &Path, frames: &[(f64, String)]) -> Result<(), FileError> {
-    let mut text = b"<?xml version=\"1.0\"?>\n<VTKFile type=\"Collection\" version=\"0.1\">\n<Collection>\n".to_vec();
-    for (time_s, file) in frames {
-        // Writing to a vector does not fail.
-        let _ = writeln!(text, "<DataSet timestep=\"{time_s}\" part=\"0\" file=\"{}\"/>", vtu::escaped(file));
-    }
-    text.extend(b"</Collection>\n</VTKFile>\n");
-    store(path, &text)
 }
 
 /// Writes a triangulated surface as OBJ. Coordinates are written so that they read back to the same bits.
