@@ -101,6 +101,8 @@ async fn a_bad_hello_and_a_taken_tool_are_refused_with_a_reason() {
         (v1::DeviceHello { max_force_n: f64::NAN, ..hello() }, Code::InvalidArgument, "max_force_n"),
         (v1::DeviceHello { servo_rate_hz: 0.0, ..hello() }, Code::InvalidArgument, "servo_rate_hz"),
         (v1::DeviceHello { device_name: "x".repeat(65), ..hello() }, Code::InvalidArgument, "65 bytes"),
+        (v1::DeviceHello { device_name: "arm\u{1b}[2J".into(), ..hello() }, Code::InvalidArgument, "control character"),
+        (v1::DeviceHello { tool_name: "finger\n".into(), ..hello() }, Code::InvalidArgument, "control character"),
     ];
     for (hello, code, part) in cases {
         let status = daemon.attach(hello).await.next().await.unwrap_err();
@@ -146,6 +148,88 @@ async fn silence_ramps_the_force_to_zero_and_samples_bring_it_back() {
     assert!(faults.iter().any(|fault| fault.code() == DeviceFaultCode::Stale), "{faults:?}");
     arm.hold_until(pressing(), |command| force_of(command).z > 0.1).await;
     daemon.finish().await;
+}
+
+/// A silent device on a paused session was never told that it was stale, nor that the session was paused.
+#[tokio::test(flavor = "multi_thread")]
+async fn a_device_is_told_that_time_stands_and_that_it_is_stale_all_the_same() {
+    let daemon = Daemon::on(block_scene("block", 3)).await;
+    let mut arm = daemon.attach(hello()).await;
+    arm.welcome().await;
+    arm.hold_until(above(), |command| command.sample_sequence > 20).await;
+    arm.hold_until(pressing(), |command| force_of(command).z > 0.1).await;
+    daemon.pause().await;
+    let mut told = Vec::new();
+    while told.len() < 2 {
+        let code = arm.fault().await.code();
+        if code != DeviceFaultCode::Limited {
+            told.push(code);
+        }
+    }
+    told.sort();
+    assert_eq!(told, [DeviceFaultCode::Stale, DeviceFaultCode::Held]);
+    let from = arm.sequence;
+    let held = arm.hold_until(pressing(), |command| command.sample_sequence > from + 50).await;
+    assert_eq!((force_of(&held), held.local_model), (DVec3::ZERO, None));
+    daemon.finish().await;
+}
+
+/// The tick in which a fault was told had no command.
+#[tokio::test(flavor = "multi_thread")]
+async fn a_fault_takes_no_commands_place() {
+    let mut scene = block_scene("slow", 2);
+    scene.model.settings.tick_period_s = 0.1;
+    let daemon = Daemon::on(scene).await;
+    let mut arm = daemon.attach(hello()).await;
+    arm.welcome().await;
+    let mut faults = Vec::new();
+    let mut ticks = vec![arm.command(&mut faults).await.tick];
+    arm.move_to(above()).await;
+    while ticks.len() < 8 {
+        ticks.push(arm.command(&mut faults).await.tick);
+    }
+    assert!(faults.iter().any(|fault| fault.code() == DeviceFaultCode::Stale), "{faults:?}");
+    assert!(ticks.windows(2).all(|pair| pair[1] == pair[0] + 1), "{ticks:?}");
+    daemon.finish().await;
+}
+
+/// What a device hears until its stream ends: forces, and the goodbye.
+async fn to_the_end(arm: &mut Arm) -> (Vec<DVec3>, Option<v1::DeviceFault>) {
+    let (mut forces, mut goodbye) = (Vec::new(), None);
+    while let Some(message) = arm.next().await.expect("the stream ends without an error") {
+        match message {
+            Message::Command(command) => {
+                assert!(goodbye.is_none(), "nothing follows the goodbye");
+                forces.push(force_of(&command));
+                arm.sequence += 1;
+                let next = device_up::Message::Sample(sample(arm.sequence, pressing()));
+                let _ = arm.up.try_send(v1::DeviceUp { message: Some(next) });
+            }
+            Message::Fault(fault) if fault.code() == DeviceFaultCode::Detached => goodbye = Some(fault),
+            Message::Fault(fault) => assert_ne!(fault.code(), DeviceFaultCode::Unspecified),
+            Message::Welcome(_) => panic!("a second welcome"),
+        }
+    }
+    (forces, goodbye)
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn when_the_loop_fails_the_stream_ramps_to_zero_and_says_goodbye_and_the_daemon_stops_as_failed() {
+    let mut config = palpated::serve::ServeConfig::in_process();
+    config.realtime.fail_at_tick = Some(1500);
+    let mut daemon = Daemon::with(block_scene("block", 3), config).await;
+    let mut arm = daemon.attach(hello()).await;
+    arm.welcome().await;
+    arm.hold_until(above(), |command| command.tick > 300).await;
+    arm.hold_until(pressing(), |command| command.tick > 1300).await;
+    let (forces, goodbye) = to_the_end(&mut arm).await;
+    let goodbye = goodbye.expect("a goodbye");
+    assert!(goodbye.message.contains("loop failed"), "{}", goodbye.message);
+    assert_ramps_to_zero(&forces);
+    // Nobody told it to stop.
+    let running = daemon.running.take().unwrap();
+    let summary = tokio::time::timeout(common::PATIENCE, running.finished()).await.unwrap().unwrap();
+    assert!(summary.failure.is_some_and(|failure| failure.contains("panic")), "{:?}", summary.failure);
 }
 
 /// From the first force, held for a while, to zero in steps.
@@ -199,25 +283,8 @@ async fn stopping_ramps_to_zero_says_goodbye_and_ends_cleanly() {
     arm.hold_until(above(), |command| command.sample_sequence > 20).await;
     // Until the ramp up is over and the body is at rest.
     arm.hold_until(pressing(), |command| command.sample_sequence > 500).await;
-    let reading = tokio::spawn(async move {
-        let mut forces = Vec::new();
-        let mut goodbye = None;
-        // Samples go on: it is the order, not silence, that ramps.
-        while let Some(message) = arm.next().await.expect("the stream ends without an error") {
-            match message {
-                Message::Command(command) => {
-                    assert!(goodbye.is_none(), "nothing follows the goodbye");
-                    forces.push(force_of(&command));
-                    arm.sequence += 1;
-                    let next = device_up::Message::Sample(sample(arm.sequence, pressing()));
-                    let _ = arm.up.try_send(v1::DeviceUp { message: Some(next) });
-                }
-                Message::Fault(fault) => goodbye = Some(fault),
-                Message::Welcome(_) => panic!("a second welcome"),
-            }
-        }
-        (forces, goodbye)
-    });
+    // Samples go on: it is the order, not silence, that ramps.
+    let reading = tokio::spawn(async move { to_the_end(&mut arm).await });
     tokio::time::sleep(std::time::Duration::from_millis(50)).await;
     let daemon_state = std::sync::Arc::clone(&daemon.running.as_ref().unwrap().daemon);
     let summary = daemon.finish().await;
@@ -236,14 +303,14 @@ async fn a_quarantined_body_is_told_and_reset_brings_it_back() {
     let mut arm = daemon.attach(hello()).await;
     arm.welcome().await;
     arm.hold_until(above(), |command| command.sample_sequence > 10).await;
-    // Finite, and absurd: the sum overflows in the integrator.
+    // Each within its bound, and absurd in their sum: four meganewtons on a vertex of grams.
     let force = v1::InjectedForce {
         surface_vertex: 30,
-        force_n: Some(v1::Vec3 { x: 1e308, y: 1e308, z: 1e308 }),
+        force_n: Some(v1::Vec3 { x: 1e3, ..Default::default() }),
         from_tick: 0,
         tick_count: 3,
     };
-    let inject = v1::InjectForcesRequest { forces: vec![force], ..Default::default() };
+    let inject = v1::InjectForcesRequest { forces: vec![force; 4096], ..Default::default() };
     daemon.session().inject_forces(inject).await.unwrap();
     loop {
         if arm.fault().await.code() == DeviceFaultCode::Quarantined {

@@ -94,6 +94,10 @@ async fn injected_forces_act_in_their_ticks_and_are_taken_all_or_none() {
         (vec![push(14, 0, 0)], "tick_count"),
         (vec![v1::InjectedForce { force_n: None, ..push(14, 0, 1) }], "force_n"),
         (vec![v1::InjectedForce { force_n: Some(vec3(DVec3::NAN)), ..push(14, 0, 1) }], "not finite"),
+        (vec![v1::InjectedForce { force_n: Some(vec3(DVec3::splat(600.0))), ..push(14, 0, 1) }], "1000 N"),
+        (vec![v1::InjectedForce { force_n: Some(vec3(DVec3::splat(1e300))), ..push(14, 0, 1) }], "1000 N"),
+        (vec![push(14, 0, u32::MAX)], "tick_count = 4294967295 is more than"),
+        (vec![push(14, u64::MAX, 1)], "too far ahead"),
         (vec![push(14, 0, 1); 4097], "4097"),
     ] {
         let refused = inject(&daemon, bad).await.unwrap_err();

@@ -72,6 +72,31 @@ async fn numbers_come_without_vertices_beside_viewers_that_have_them() {
     daemon.finish().await;
 }
 
+/// Without vertices the largest displacement was told to be zero.
+#[tokio::test(flavor = "multi_thread")]
+async fn the_largest_displacement_is_the_same_with_and_without_vertices() {
+    let daemon = Daemon::on(pressed_scene(3)).await;
+    let mut full = watch(&daemon, 60.0, LevelOfDetail::Full).await;
+    while daemon.status().await.tick < 300 {
+        event(&mut full).await;
+    }
+    daemon.pause().await;
+    let tick = daemon.status().await.tick;
+    let largest_at = async |stream: &mut Streaming<v1::SurfaceEvent>| loop {
+        match event(stream).await.message {
+            Some(v1::surface_event::Message::Update(update)) if update.tick == tick => break update.max_displacement_m,
+            _ => {}
+        }
+    };
+    let with = largest_at(&mut full).await;
+    drop(full);
+    let mut numbers = watch(&daemon, 60.0, LevelOfDetail::Numbers).await;
+    let without = largest_at(&mut numbers).await;
+    assert!(with > 1e-4, "it is pressed: {with} m");
+    assert_eq!(with, without);
+    daemon.finish().await;
+}
+
 #[tokio::test(flavor = "multi_thread")]
 async fn a_viewer_that_does_not_read_skips_and_still_ends_with_the_exact_surface() {
     let daemon = Daemon::on(kneaded_scene(8)).await;

@@ -137,6 +137,20 @@ fn the_daemon_drains_while_a_bridge_and_a_viewer_hang_on() {
 }
 
 #[test]
+fn a_loop_that_fails_lets_the_arm_go_and_the_daemon_end_with_an_error() {
+    let mut daemon = Daemon::start(&["--fail-at-tick", "3000"]);
+    let mut bridge = Program::start("palpate-bridge", &["--server", &daemon.url, "--device", "simulated"]);
+    bridge.wait_for("attached to tool", PATIENCE);
+    let said = bridge.wait_for("DEVICE_FAULT_CODE_DETACHED", PATIENCE);
+    assert!(said.contains("loop failed") && said.contains("ramped to zero"), "{said}");
+    let code = daemon.program.wait(PATIENCE);
+    let printed = &daemon.program.output;
+    assert_eq!(code.code(), Some(1), "{printed}");
+    assert!(printed.contains("stopped without being told to: the simulation loop ended by a panic"), "{printed}");
+    assert!(printed.contains("p99"), "no histograms at exit:\n{printed}");
+}
+
+#[test]
 fn injected_forces_arrive() {
     let daemon = Daemon::start(&["--arm", "none"]);
     let folder = tempfile::tempdir().unwrap();

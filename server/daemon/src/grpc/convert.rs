@@ -25,6 +25,14 @@ pub const MAX_TOML_BYTES: usize = 1024 * 1024;
 pub const MAX_COORDINATE_M: f64 = 1e3;
 /// A tool faster than this (m/s) is no measurement.
 pub const MAX_SPEED_M_PER_S: f64 = 1e3;
+/// A tool that turns faster than this (rad/s) is no measurement.
+pub const MAX_TURN_RAD_PER_S: f64 = 1e4;
+/// A larger force on a handle (N) is no measurement.
+pub const MAX_MEASURED_FORCE_N: f64 = 1e5;
+/// Largest injected force on a vertex (N).
+pub const MAX_INJECTED_FORCE_N: f64 = 1e3;
+/// Longest time an injected force acts (ticks): a day and more at 1 kHz.
+pub const MAX_INJECTED_TICKS: u32 = 100_000_000;
 /// How far a quaternion's norm may be from 1.
 pub const QUATERNION_TOLERANCE: f64 = 1e-3;
 
@@ -66,11 +74,11 @@ pub fn device_sample(
     let orientation = pose.orientation.ok_or_else(|| missing("pose.orientation"))?;
     let twist = sample.twist.as_ref().ok_or_else(|| missing("twist"))?;
     let velocity_m_per_s = vec3(twist.linear_m_per_s.ok_or_else(|| missing("twist.linear_m_per_s"))?);
-    let angular = vec3(twist.angular_rad_per_s.unwrap_or_default());
+    let angular = vec3(twist.angular_rad_per_s.ok_or_else(|| missing("twist.angular_rad_per_s"))?);
     finite("pose.position_m", position_m, MAX_COORDINATE_M, "m")?;
     finite("twist.linear_m_per_s", velocity_m_per_s, MAX_SPEED_M_PER_S, "m/s")?;
-    finite("twist.angular_rad_per_s", angular, f64::MAX, "rad/s")?;
-    finite("measured_force_n", vec3(sample.measured_force_n.unwrap_or_default()), f64::MAX, "N")?;
+    finite("twist.angular_rad_per_s", angular, MAX_TURN_RAD_PER_S, "rad/s")?;
+    finite("measured_force_n", vec3(sample.measured_force_n.unwrap_or_default()), MAX_MEASURED_FORCE_N, "N")?;
     unit(orientation)?;
     if let Some(last) = last_sequence.filter(|last| sample.sequence <= *last) {
         let message = format!("sequence {} is not larger than the last accepted one, {last}", sample.sequence);
@@ -124,6 +132,12 @@ pub fn device_hello(message: Option<v1::DeviceUp>) -> Result<v1::DeviceHello, St
             "device_name has {bytes} bytes; at most {MAX_DEVICE_NAME_BYTES}"
         )));
     }
+    for (name, text) in [("device_name", &hello.device_name), ("tool_name", &hello.tool_name)] {
+        if text.chars().any(char::is_control) {
+            let shown: String = text.chars().take(64).flat_map(char::escape_debug).collect();
+            return Err(Status::invalid_argument(format!("hello.{name} holds a control character: \"{shown}\"")));
+        }
+    }
     for (name, value) in [("max_force_n", hello.max_force_n), ("servo_rate_hz", hello.servo_rate_hz)] {
         if !(value.is_finite() && value > 0.0) {
             return Err(Status::invalid_argument(format!("hello.{name} = {value} must be finite and larger than 0")));
@@ -173,8 +187,17 @@ pub fn injections(session: &ActiveSession, forces: &[v1::InjectedForce]) -> Resu
         if !force_n.is_finite() {
             return Err(refuse(index, format!("force_n = {force_n} is not finite")));
         }
+        if force_n.length() > MAX_INJECTED_FORCE_N {
+            return Err(refuse(
+                index,
+                format!("force_n = {force_n} is larger than the limit, {MAX_INJECTED_FORCE_N} N"),
+            ));
+        }
         if force.tick_count == 0 {
             return Err(refuse(index, "tick_count must be at least 1".into()));
+        }
+        if force.tick_count > MAX_INJECTED_TICKS {
+            return Err(refuse(index, format!("tick_count = {} is more than {MAX_INJECTED_TICKS}", force.tick_count)));
         }
         Ok(Injection { node, force_n, from_tick: force.from_tick, tick_count: force.tick_count })
     };
@@ -240,7 +263,10 @@ mod tests {
                 position_m: Some(v1::Vec3 { x: 0.1, y: 0.2, z: 0.3 }),
                 orientation: Some(v1::Quaternion { w: 1.0, ..Default::default() }),
             }),
-            twist: Some(v1::Twist { linear_m_per_s: Some(v1::Vec3::default()), angular_rad_per_s: None }),
+            twist: Some(v1::Twist {
+                linear_m_per_s: Some(v1::Vec3::default()),
+                angular_rad_per_s: Some(v1::Vec3::default()),
+            }),
             ..Default::default()
         }
     }
@@ -259,6 +285,8 @@ mod tests {
     fn every_rule_has_its_own_answer() {
         let nan = Some(v1::Vec3 { x: f64::NAN, ..Default::default() });
         let far = Some(v1::Vec3 { z: -2e3, ..Default::default() });
+        let fast = Some(v1::Vec3 { y: 2e4, ..Default::default() });
+        let huge = Some(v1::Vec3 { y: -1e300, ..Default::default() });
         assert_eq!(code(&sample(), Some(4)), None);
         let cases = [
             (changed(|s| s.pose = None), DeviceFaultCode::MissingField),
@@ -267,7 +295,10 @@ mod tests {
             (changed(|s| s.pose.as_mut().unwrap().position_m = nan), DeviceFaultCode::NonFinite),
             (changed(|s| s.pose.as_mut().unwrap().position_m = far), DeviceFaultCode::OutOfRange),
             (changed(|s| s.twist.as_mut().unwrap().angular_rad_per_s = nan), DeviceFaultCode::NonFinite),
+            (changed(|s| s.twist.as_mut().unwrap().angular_rad_per_s = None), DeviceFaultCode::MissingField),
+            (changed(|s| s.twist.as_mut().unwrap().angular_rad_per_s = fast), DeviceFaultCode::OutOfRange),
             (changed(|s| s.measured_force_n = nan), DeviceFaultCode::NonFinite),
+            (changed(|s| s.measured_force_n = huge), DeviceFaultCode::OutOfRange),
             (
                 changed(|s| s.pose.as_mut().unwrap().orientation = Some(v1::Quaternion::default())),
                 DeviceFaultCode::BadOrientation,

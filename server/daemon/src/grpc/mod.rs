@@ -1,7 +1,9 @@
 //! The services of `palpate.v1`, beside health, reflection and the page, on one port.
 pub mod convert;
 pub mod device;
+pub mod downlink;
 pub mod listen;
+pub mod news;
 pub mod session;
 pub mod surface;
 pub mod uplink;
@@ -89,7 +91,7 @@ pub fn current_session(daemon: &Daemon, id: &str) -> Result<Arc<ActiveSession>, 
         return Ok(session);
     }
     let current = &session.id;
-    let shown: String = id.chars().take(64).collect();
+    let shown: String = id.chars().take(64).flat_map(char::escape_debug).collect();
     Err(Status::not_found(format!(
         "there is no session \"{shown}\"; the current one is \"{current}\" (or leave it empty)"
     )))

@@ -33,6 +33,9 @@ fn refused(refusal: Refusal) -> Status {
         Refusal::Inject(InjectRefusal::Past { from_tick, next_tick }) => {
             Status::invalid_argument(format!("from_tick = {from_tick} is over: the next tick is {next_tick}"))
         }
+        Refusal::Inject(InjectRefusal::Far { from_tick, last_tick }) => {
+            Status::invalid_argument(format!("from_tick = {from_tick} is too far ahead: at most {last_tick}"))
+        }
         Refusal::Inject(InjectRefusal::Full { pending }) => {
             Status::resource_exhausted(format!("{pending} injected forces are waiting already: let them act first"))
         }
@@ -51,7 +54,8 @@ impl SessionService {
     }
 
     async fn copy(&self, session: &ActiveSession) -> Result<(Box<Copy>, Done), Status> {
-        let copy = Copy { state: State::at_rest(&session.model), scratch: Scratch::new(&session.model) };
+        let model = Arc::clone(&session.model);
+        let copy = blocking(move || Copy { state: State::at_rest(&model), scratch: Scratch::new(&model) }).await?;
         match self.order(session, Order::Copy(Box::new(copy))).await? {
             (Order::Copy(copy), done) => Ok((copy, done)),
             _ => Err(Status::internal("the loop answered another order")),
@@ -72,6 +76,11 @@ impl SessionService {
         });
         loading.await.unwrap_or_else(|_| Err(unexpected()))
     }
+}
+
+/// What takes as long as the body is large is not done on a thread that serves streams.
+async fn blocking<T: Send + 'static>(work: impl FnOnce() -> T + Send + 'static) -> Result<T, Status> {
+    tokio::task::spawn_blocking(work).await.map_err(|_| Status::internal("the request failed unexpectedly"))
 }
 
 fn unexpected() -> Status {
@@ -152,26 +161,25 @@ impl Session for SessionService {
     async fn snapshot(&self, request: Request<v1::SnapshotRequest>) -> Result<Response<v1::SnapshotResponse>, Status> {
         let session = current_session(&self.daemon, &small(request)?.session_id)?;
         let (copy, _) = self.copy(&session).await?;
-        let state = snapshot::save(&session.model, &copy.state);
+        let (tick, model) = (copy.state.tick, Arc::clone(&session.model));
+        let (state, state_hash) =
+            blocking(move || (snapshot::save(&model, &copy.state), snapshot::state_hash(&copy.state))).await?;
         if state.len() > super::MAX_SNAPSHOT_BYTES {
             let megabytes = state.len() / 1_000_000;
             return Err(Status::resource_exhausted(format!(
                 "the snapshot would have {megabytes} MB; too large to send"
             )));
         }
-        Ok(Response::new(v1::SnapshotResponse {
-            tick: copy.state.tick,
-            state_hash: snapshot::state_hash(&copy.state),
-            state: state.into(),
-        }))
+        Ok(Response::new(v1::SnapshotResponse { tick, state: state.into(), state_hash }))
     }
 
     async fn restore(&self, request: Request<v1::RestoreRequest>) -> Result<Response<v1::RestoreResponse>, Status> {
         let request = request.into_inner();
         let session = current_session(&self.daemon, &request.session_id)?;
-        let state = snapshot::restore(&session.model, &request.state)
-            .map_err(|error| Status::invalid_argument(error.to_string()))?;
-        let response = v1::RestoreResponse { tick: state.tick, state_hash: snapshot::state_hash(&state) };
+        let model = Arc::clone(&session.model);
+        let read = move || snapshot::restore(&model, &request.state).map(|state| (snapshot::state_hash(&state), state));
+        let (state_hash, state) = blocking(read).await?.map_err(|error| Status::invalid_argument(error.to_string()))?;
+        let response = v1::RestoreResponse { tick: state.tick, state_hash };
         self.order(&session, Order::Restore(Box::new(state))).await?;
         Ok(Response::new(response))
     }
@@ -190,6 +198,7 @@ impl Session for SessionService {
     async fn status(&self, request: Request<v1::StatusRequest>) -> Result<Response<v1::StatusResponse>, Status> {
         let session = current_session(&self.daemon, &small(request)?.session_id)?;
         let (copy, done) = self.copy(&session).await?;
-        Ok(Response::new(status::of(&self.daemon, &session, &copy, &done)))
+        let daemon = Arc::clone(&self.daemon);
+        Ok(Response::new(blocking(move || status::of(&daemon, &session, &copy, &done)).await?))
     }
 }

@@ -56,6 +56,9 @@ pub struct ServeArgs {
     /// Keep processors out of deep sleep: less jitter, more power
     #[arg(long)]
     pub stay_awake: bool,
+    /// Let the loop fail at this tick: to test what becomes of arms then
+    #[arg(long, value_name = "TICK", hide = true)]
+    pub fail_at_tick: Option<u64>,
 }
 
 impl ServeArgs {
@@ -82,7 +85,7 @@ impl ServeArgs {
             limits,
             display_rate_hz: self.display_rate_hz,
             scene_folders: self.scene_folders.clone(),
-            realtime: RealtimeConfig { measures },
+            realtime: RealtimeConfig { measures, fail_at_tick: self.fail_at_tick },
         }
         .checked()
     }

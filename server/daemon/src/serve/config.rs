@@ -13,6 +13,8 @@ use std::{
 pub struct RealtimeConfig {
     /// Priority, memory, processor.
     pub measures: OsMeasures,
+    /// Tick at which the loop panics, to test what becomes of arms then.
+    pub fail_at_tick: Option<u64>,
 }
 
 /// Configuration of a daemon.
@@ -55,7 +57,7 @@ impl ServeConfig {
             limits: default_limits(),
             display_rate_hz: 60.0,
             scene_folders: Vec::new(),
-            realtime: RealtimeConfig { measures: OsMeasures::NONE },
+            realtime: RealtimeConfig { measures: OsMeasures::NONE, fail_at_tick: None },
         }
     }
 

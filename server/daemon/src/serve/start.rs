@@ -1,5 +1,5 @@
 //! Wiring: prepare the session, start the loop, open the doors; and the way back when told to stop.
-use super::{ServeConfig, ServeError};
+use super::{ServeConfig, ServeError, config::RealtimeConfig};
 use crate::{
     grpc::{self, listen},
     session::{Daemon, Numbers, Prepared, SessionSettings, prepare},
@@ -11,7 +11,7 @@ use crate::{
     },
     stream::hub::Hub,
 };
-use palpate_realtime::{Clock, Note, OsMeasures, TickLoop};
+use palpate_realtime::{Clock, Note, TickLoop};
 use palpate_scene::Scene;
 use std::{
     net::SocketAddr,
@@ -82,8 +82,7 @@ pub async fn start(config: ServeConfig, scene: Scene, stop: CancellationToken) -
     let (desk, orders, clerk) = desk().map_err(|source| ServeError::System { what: "order desk", source })?;
     let timing = Arc::new(Timing::default());
     let sign = StopSign::default();
-    let (notes, the_loop) =
-        start_loop(simulation, desk, sign.clone(), Arc::clone(&timing), config.realtime.measures).await?;
+    let (notes, the_loop) = start_loop(simulation, desk, sign.clone(), Arc::clone(&timing), config.realtime).await?;
     tokio::spawn(clerk.work());
     let daemon = Arc::new(Daemon {
         orders,
@@ -137,57 +136,50 @@ impl Doors {
     }
 }
 
-/// The loop's thread.
-struct LoopThread {
-    thread: thread::JoinHandle<()>,
-    /// Closed when the loop has ended, by a panic too.
-    gone: oneshot::Receiver<()>,
-}
-
 /// The loop's thread, once it has asked the operating system for its measures.
 async fn start_loop(
     simulation: Box<Simulation>,
     desk: Desk,
     sign: StopSign,
     timing: Arc<Timing>,
-    measures: OsMeasures,
-) -> Result<(Vec<Note>, LoopThread), ServeError> {
+    realtime: RealtimeConfig,
+) -> Result<(Vec<Note>, thread::JoinHandle<()>), ServeError> {
     let tick_loop = TickLoop::new(Clock::Monotonic, simulation.period_s());
     let mut tick_loop =
         tick_loop.map_err(|error| ServeError::Prepare(error.into()))?.measured_in(Arc::clone(&timing.the_loop));
-    let mut the_loop = Loop::new(simulation, desk, sign, timing, Clock::Monotonic);
+    let mut the_loop =
+        Loop::new(simulation, desk, sign.clone(), timing, Clock::Monotonic).failing_at(realtime.fail_at_tick);
     let (tell, told) = oneshot::channel();
-    let (alive, gone) = oneshot::channel();
     let body = move || {
-        let _alive: oneshot::Sender<()> = alive;
-        let granted = measures.apply();
+        let _gone_when_dropped = sign.hold();
+        let granted = realtime.measures.apply();
         let _ = tell.send(granted.notes.clone());
         the_loop.run(&mut tick_loop);
         drop(granted);
     };
     let system = |source| ServeError::System { what: "thread", source };
     let thread = thread::Builder::new().name("palpate-loop".into()).spawn(body).map_err(system)?;
-    Ok((told.await.unwrap_or_default(), LoopThread { thread, gone }))
+    Ok((told.await.unwrap_or_default(), thread))
 }
 
 /// Waits for the stop, then: forces to zero, streams end, sockets close, loop joins.
 async fn until_stopped(
     daemon: Arc<Daemon>,
-    the_loop: LoopThread,
+    thread: thread::JoinHandle<()>,
     health: tonic_health::server::HealthReporter,
     mut servers: Servers,
     closing: CancellationToken,
     config: ServeConfig,
 ) -> Summary {
-    let LoopThread { thread, gone } = the_loop;
     let mut failure = None;
+    let gone = daemon.sign.gone();
     tokio::select! {
         () = daemon.stop.cancelled() => {}
         ended = servers.join_next() => {
             tracing::error!(?ended, "a server ended by itself: stopping");
             failure = Some("a server ended by itself");
         }
-        _ = gone => {
+        () = gone.cancelled() => {
             tracing::error!("the simulation loop ended by itself: stopping");
             failure = Some("the simulation loop ended by itself");
         }

@@ -54,8 +54,10 @@ pub struct ToolOutput {
     pub proxy_position_m: DVec3,
     /// No sample for too long: the force ramps to zero.
     pub stale: bool,
-    /// The force was saturated or its rate limited.
-    pub limited: bool,
+    /// Time stands, is stepped, or is about to jump: the force ramps to zero.
+    pub held: bool,
+    /// Ticks of this attachment in which the force was saturated or its rate limited.
+    pub limited_ticks: u64,
     /// Tick at which the body's state was quarantined.
     pub quarantined: Option<u64>,
 }
@@ -153,6 +155,8 @@ pub struct SurfaceSnapshot {
     pub time_s: f64,
     /// Wall-clock cost of the last tick (µs).
     pub tick_cost_us: f64,
+    /// Largest displacement of a surface vertex (m).
+    pub max_displacement_m: f64,
     /// Whether [`SurfaceSnapshot::displacements_m`] was filled.
     pub has_vertices: bool,
     /// Displacement of each surface vertex (m) from its f32 rest position.

@@ -4,6 +4,8 @@ use palpate_physics::PointForce;
 
 /// Forces that may wait or act at a time.
 pub const CAPACITY: usize = 16_384;
+/// How far ahead (ticks) a force may begin: a day and more at 1 kHz.
+pub const HORIZON_TICKS: u64 = 100_000_000;
 
 /// A force on a node over a span of ticks.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -27,6 +29,13 @@ pub enum InjectRefusal {
         from_tick: u64,
         /// The next tick.
         next_tick: u64,
+    },
+    /// One begins further ahead than [`HORIZON_TICKS`].
+    Far {
+        /// Its first tick.
+        from_tick: u64,
+        /// The last tick it might begin in.
+        last_tick: u64,
     },
     /// No room.
     Full {
@@ -61,6 +70,10 @@ impl Injections {
     pub fn add(&mut self, fresh: &[Injection], next_tick: u64) -> Result<u64, InjectRefusal> {
         if let Some(past) = fresh.iter().find(|f| f.from_tick != 0 && f.from_tick < next_tick) {
             return Err(InjectRefusal::Past { from_tick: past.from_tick, next_tick });
+        }
+        let last_tick = next_tick.saturating_add(HORIZON_TICKS);
+        if let Some(far) = fresh.iter().find(|f| f.from_tick > last_tick) {
+            return Err(InjectRefusal::Far { from_tick: far.from_tick, last_tick });
         }
         if self.pending.len() + fresh.len() > CAPACITY {
             return Err(InjectRefusal::Full { pending: self.pending() });
@@ -118,6 +131,9 @@ mod tests {
         let mut injections = Injections::default();
         let refused = injections.add(&[force(9, 1), force(4, 1)], 5);
         assert_eq!(refused, Err(InjectRefusal::Past { from_tick: 4, next_tick: 5 }));
+        let last_tick = 5 + HORIZON_TICKS;
+        let refused = injections.add(&[force(9, 1), force(last_tick + 1, 1)], 5);
+        assert_eq!(refused, Err(InjectRefusal::Far { from_tick: last_tick + 1, last_tick }));
         assert_eq!(injections.pending(), 0);
         let many = vec![force(0, 1); CAPACITY];
         assert!(injections.add(&many, 1).is_ok());

@@ -160,13 +160,16 @@ impl Simulation {
         for (view, (tool, state)) in snapshot.tools.iter_mut().zip(self.tools.iter().zip(&self.state.tools)) {
             *view = tool.view(state);
         }
-        if snapshot.has_vertices {
-            let nodes = &self.model.surface().nodes;
-            for ((displacement, node), rest) in snapshot.displacements_m.iter_mut().zip(nodes).zip(&self.rest_f32_m) {
-                let x = self.state.x[*node as usize].to_array();
-                *displacement = std::array::from_fn(|axis| (x[axis] - f64::from(rest[axis])) as f32);
+        let nodes = &self.model.surface().nodes;
+        let mut largest_sq = 0.0_f64;
+        for ((displacement, node), rest) in snapshot.displacements_m.iter_mut().zip(nodes).zip(&self.rest_f32_m) {
+            let moved = self.state.x[*node as usize] - DVec3::from(rest.map(f64::from));
+            largest_sq = largest_sq.max(moved.length_squared());
+            if snapshot.has_vertices {
+                *displacement = moved.to_array().map(|component| component as f32);
             }
         }
+        snapshot.max_displacement_m = largest_sq.sqrt();
         self.surface.slot.publish();
         self.surface.bell.ring();
     }

@@ -14,12 +14,14 @@ use std::{
         atomic::{AtomicBool, Ordering},
     },
 };
+use tokio_util::sync::{CancellationToken, DropGuard};
 
 /// How the loop is told to end, and tells that it has.
 #[derive(Debug, Clone, Default)]
 pub struct StopSign {
     stop: Arc<AtomicBool>,
     released: Arc<AtomicBool>,
+    gone: CancellationToken,
 }
 
 impl StopSign {
@@ -31,6 +33,16 @@ impl StopSign {
     /// Whether the loop was told to end.
     pub fn is_raised(&self) -> bool {
         self.stop.load(Ordering::Acquire)
+    }
+
+    /// Cancelled when the loop runs no more, whatever ended it.
+    pub fn gone(&self) -> CancellationToken {
+        self.gone.clone()
+    }
+
+    /// Held by the loop's thread: tells that the loop is gone when it is dropped, by a panic too.
+    pub fn hold(&self) -> DropGuard {
+        self.gone.clone().drop_guard()
     }
 
     /// Whether every force has reached zero.
@@ -57,6 +69,7 @@ pub struct Loop {
     /// Another session has come, with a period of its own.
     other_period: bool,
     told_to_stop_ns: Option<u64>,
+    fail_at_tick: Option<u64>,
 }
 
 impl Loop {
@@ -73,7 +86,14 @@ impl Loop {
             waiting: None,
             other_period: false,
             told_to_stop_ns: None,
+            fail_at_tick: None,
         }
+    }
+
+    /// For tests of what becomes of arms when the loop fails: it panics at this tick of the session.
+    #[must_use]
+    pub fn failing_at(self, fail_at_tick: Option<u64>) -> Self {
+        Self { fail_at_tick, ..self }
     }
 
     /// Runs until the sign is raised and forces are zero.
@@ -90,6 +110,10 @@ impl Loop {
 
     fn turn(&mut self, wakeup: &Wakeup) -> ControlFlow<()> {
         self.take_an_order();
+        assert!(
+            self.fail_at_tick.is_none_or(|tick| self.simulation.state.tick < tick),
+            "the loop was told to fail here"
+        );
         if self.sign.is_raised() {
             let since_ns = *self.told_to_stop_ns.get_or_insert(wakeup.woke_ns);
             if self.release(since_ns) {

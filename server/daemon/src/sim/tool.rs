@@ -7,7 +7,7 @@ use glam::DVec3;
 use palpate_control::{
     extrapolate::{Motion, extrapolate},
     limits::{ForceLimiter, ForceLimits},
-    watchdog::{Link, Watchdog, WatchdogSettings},
+    watchdog::{Link, Verdict, Watchdog, WatchdogSettings},
 };
 use palpate_physics::contact::{LocalContactModel, ToolState, ToolTarget};
 use palpate_scene::Driver;
@@ -64,7 +64,7 @@ pub struct ToolLoop {
     /// The simulated arm has to start where the device left the tool.
     arm_takes_over: bool,
     newest: Option<DeviceInput>,
-    stale: bool,
+    limited_ticks: u64,
     raw_n: DVec3,
     output: ToolOutput,
 }
@@ -85,7 +85,7 @@ impl ToolLoop {
             place: Place::Clear,
             arm_takes_over: false,
             newest: None,
-            stale: false,
+            limited_ticks: 0,
             raw_n: DVec3::ZERO,
             output: ToolOutput::default(),
         }
@@ -123,7 +123,7 @@ impl ToolLoop {
         self.arm_takes_over = attachment == 0;
         self.attachment = attachment;
         self.newest = None;
-        self.stale = false;
+        self.limited_ticks = 0;
         self.watchdog = Watchdog::new(self.limits.watchdog);
         let own = self.limits.force;
         let max_force_n =
@@ -175,10 +175,9 @@ impl ToolLoop {
         }
         let Some(sample) = &self.newest else { return held };
         let verdict = self.watchdog.check(now_ns);
-        self.stale = !matches!(verdict.link, Link::Fresh | Link::Extrapolating);
         let motion = Motion { velocity_m_per_s: sample.velocity_m_per_s, ..Motion::at(sample.position_m) };
         let there = extrapolate(&motion, verdict.extrapolate_s, self.limits.watchdog.stale_after_s);
-        let velocity_m_per_s = if self.stale { DVec3::ZERO } else { there.velocity_m_per_s };
+        let velocity_m_per_s = if is_stale(&verdict) { DVec3::ZERO } else { there.velocity_m_per_s };
         ToolTarget { position_m: there.position_m, velocity_m_per_s }
     }
 
@@ -198,10 +197,12 @@ impl ToolLoop {
         if quarantined.is_none() {
             self.raw_n = tool.device_force_n;
         }
-        let watched = if self.is_attached() { self.watchdog.check(frame.now_ns).ramp } else { 1.0 };
-        let ramp = watched * self.level;
+        let watched = self.is_attached().then(|| self.watchdog.check(frame.now_ns));
+        let ramp = watched.map_or(1.0, |verdict| verdict.ramp) * self.level;
         let limited = self.limiter.limit(self.raw_n, ramp, frame.period_s);
         let model_max_force_n = ramp * self.limiter.limits().max_force_n;
+        let limits_acted = limited.saturated || limited.rate_limited || limited.non_finite;
+        self.limited_ticks += u64::from(limits_acted && ramp > 0.0);
         let rendered = tool.local_model.filter(|_| ramp > 0.0 && !limited.non_finite);
         self.output = ToolOutput {
             attachment: self.attachment,
@@ -216,8 +217,9 @@ impl ToolLoop {
             }),
             model_max_force_n,
             proxy_position_m: tool.centre_m,
-            stale: self.stale,
-            limited: limited.saturated || limited.rate_limited || limited.non_finite,
+            stale: self.newest.is_some() && watched.is_some_and(|verdict| is_stale(&verdict)),
+            held: order == Order::Hold,
+            limited_ticks: self.limited_ticks,
             quarantined,
         };
     }
@@ -287,6 +289,10 @@ pub struct Moment {
     pub period_s: f64,
     /// Tick at which the body was quarantined, if it is.
     pub quarantined: Option<u64>,
+}
+
+fn is_stale(verdict: &Verdict) -> bool {
+    !matches!(verdict.link, Link::Fresh | Link::Extrapolating)
 }
 
 /// Share of `wanted_n` that `allowed_n` leaves, at most 1.

@@ -211,11 +211,6 @@ impl Hub {
 }
 
 fn numbers(epoch: u32, snapshot: &SurfaceSnapshot) -> v1::SurfaceUpdate {
-    let largest_sq = if snapshot.has_vertices {
-        snapshot.displacements_m.iter().map(|d| d.iter().map(|c| f64::from(*c).powi(2)).sum()).fold(0.0, f64::max)
-    } else {
-        0.0
-    };
     v1::SurfaceUpdate {
         epoch,
         tick: snapshot.tick,
@@ -223,7 +218,7 @@ fn numbers(epoch: u32, snapshot: &SurfaceSnapshot) -> v1::SurfaceUpdate {
         sent_unix_ns: SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |d| d.as_nanos() as u64),
         tools: snapshot.tools.iter().map(crate::grpc::convert::tool_state).collect(),
         tick_cost_us: snapshot.tick_cost_us,
-        max_displacement_m: largest_sq.sqrt(),
+        max_displacement_m: snapshot.max_displacement_m,
         ..Default::default()
     }
 }

@@ -1,0 +1,264 @@
+//! A device's way down. It is pulled: whenever the transport takes a message, the newest command is made into one, and after it
+//! what the device has to be told beside it. Nothing queues but a few faults of the way up.
+use super::{
+    convert,
+    news::{News, fault},
+    uplink::{Ended, FAULTS_WAITING, Lent, Uplink},
+};
+use crate::{
+    session::{ActiveSession, Daemon, DeviceRecord},
+    sim::exchange::{DeviceInput, ToolEnd, ToolOutput},
+};
+use glam::DVec3;
+use palpate_proto::v1::{self, DeviceFaultCode, device_down::Message};
+use std::{sync::Arc, time::Duration};
+use tokio::{
+    sync::{mpsc, oneshot},
+    task::JoinHandle,
+    time::{Instant, sleep, timeout_at},
+};
+use tokio_util::sync::CancellationToken;
+use tonic::{Status, Streaming};
+use triple_buffer::Input;
+
+/// How long a stream waits for the loop to bring the force to zero before it does so itself.
+const RELEASE_WITHIN: Duration = Duration::from_millis(500);
+/// Between two commands of a stream that brings the force to zero itself.
+const FADE_STEP: Duration = Duration::from_millis(1);
+
+/// A tool that was taken, and by whom.
+#[derive(Debug)]
+pub struct Taken {
+    /// Session of the tool.
+    pub session: Arc<ActiveSession>,
+    /// Which tool.
+    pub tool: usize,
+    /// Number of the attachment.
+    pub number: u64,
+    /// Who took it.
+    pub record: Arc<DeviceRecord>,
+    /// Its end.
+    pub end: ToolEnd,
+}
+
+/// A device on its tool.
+pub struct Attachment {
+    daemon: Arc<Daemon>,
+    session: Arc<ActiveSession>,
+    tool: usize,
+    number: u64,
+    record: Arc<DeviceRecord>,
+    /// Everything of the tool but the sample slot, which the way up has.
+    end: Option<ToolEnd>,
+    uplink: JoinHandle<Ended>,
+    /// Comes when the way up has ended.
+    samples: Option<oneshot::Receiver<Input<Option<DeviceInput>>>>,
+    over: CancellationToken,
+    faults: mpsc::Receiver<v1::DeviceFault>,
+    news: News,
+    /// The output of the last command, as long as it has news.
+    untold: Option<ToolOutput>,
+    /// What the last command was made of.
+    sent: ToolOutput,
+    stage: Stage,
+}
+
+/// How far an attachment is.
+#[derive(Debug, Clone, Copy)]
+enum Stage {
+    Live,
+    /// The daemon ends it: the loop's commands go on until one carries zero force.
+    Releasing {
+        why: &'static str,
+        until: Instant,
+    },
+    /// The loop does not bring the force (N) to zero: the stream does, since then.
+    Fading {
+        why: &'static str,
+        from_n: DVec3,
+        since: Instant,
+    },
+    Ended,
+}
+
+/// Who ends a live attachment.
+enum End {
+    /// The device.
+    WayUp,
+    /// The daemon, and why.
+    Daemon(&'static str),
+}
+
+impl Attachment {
+    /// Begins both ways.
+    pub fn live(daemon: Arc<Daemon>, taken: Taken, messages: Streaming<v1::DeviceUp>) -> Self {
+        let Taken { session, tool, number, record, end } = taken;
+        let over = CancellationToken::new();
+        let (fault_in, faults) = mpsc::channel(FAULTS_WAITING);
+        // The way up has the real slot; what stands in its place is never read.
+        let ToolEnd { samples, outputs, ear, shared } = end;
+        let (placeholder, _) = triple_buffer::triple_buffer(&None);
+        let (lent, samples) = Lent::new(samples);
+        let uplink = Uplink {
+            messages,
+            samples: lent,
+            attachment: number,
+            record: Arc::clone(&record),
+            daemon: Arc::clone(&daemon),
+            faults: fault_in,
+            over: over.clone(),
+        };
+        let uplink = tokio::spawn(uplink.run(over.clone().drop_guard()));
+        Self {
+            daemon,
+            session,
+            tool,
+            number,
+            record,
+            end: Some(ToolEnd { samples: placeholder, outputs, ear, shared }),
+            uplink,
+            samples: Some(samples),
+            over,
+            faults,
+            news: News::default(),
+            untold: None,
+            sent: ToolOutput::default(),
+            stage: Stage::Live,
+        }
+    }
+
+    /// The next message, `None` when the device has gone.
+    pub async fn next(&mut self) -> Option<Result<Message, Status>> {
+        if let Stage::Live = self.stage {
+            let why = match self.next_of_live().await {
+                Ok(message) => return Some(Ok(message)),
+                Err(End::WayUp) => return self.how_the_way_up_ended().await,
+                Err(End::Daemon(why)) => why,
+            };
+            self.stage = Stage::Releasing { why, until: Instant::now() + RELEASE_WITHIN };
+        }
+        if let Stage::Releasing { why, until } = self.stage {
+            if let Some(output) = self.released(until).await {
+                return Some(Ok(self.command(&output)));
+            }
+            self.stage = Stage::Fading { why, from_n: self.sent.force_n, since: Instant::now() };
+        }
+        match self.stage {
+            Stage::Fading { why, from_n, since } => Some(Ok(self.fade(why, from_n, since).await)),
+            _ => None,
+        }
+    }
+
+    async fn next_of_live(&mut self) -> Result<Message, End> {
+        let (stop, replaced) = (self.daemon.stop.clone(), self.session.ended.clone());
+        let (over, loop_gone) = (self.over.clone(), self.daemon.sign.gone());
+        loop {
+            if let Some(fault) = self.untold.and_then(|output| self.news.of(&output, Instant::now().into_std())) {
+                return Ok(Message::Fault(fault));
+            }
+            self.untold = None;
+            let Some(end) = self.end.as_mut() else { return Err(End::WayUp) };
+            tokio::select! {
+                biased;
+                () = loop_gone.cancelled() => return Err(End::Daemon(self.why_the_loop_is_gone())),
+                () = stop.cancelled() => return Err(End::Daemon("the daemon is shutting down")),
+                () = replaced.cancelled() => return Err(End::Daemon("another scene was loaded: attach again")),
+                () = over.cancelled() => return Err(End::WayUp),
+                fault = self.faults.recv() => if let Some(fault) = fault { return Ok(Message::Fault(fault)) },
+                rung = end.ear.rung() => if rung.is_err() { return Err(End::Daemon("the simulation loop cannot be heard")) },
+            }
+            if let Some(output) = self.newest() {
+                self.untold = Some(output);
+                return Ok(self.command(&output));
+            }
+        }
+    }
+
+    fn why_the_loop_is_gone(&self) -> &'static str {
+        // A loop that ends as it should says first that it has released all arms.
+        if self.daemon.sign.is_released() {
+            return "the daemon is shutting down";
+        }
+        "the simulation loop failed and the daemon is shutting down"
+    }
+
+    fn newest(&mut self) -> Option<ToolOutput> {
+        let end = self.end.as_mut()?;
+        end.outputs.update();
+        // Before the first tick of this attachment the slot may hold another's.
+        Some(*end.outputs.output_buffer()).filter(|output| output.attachment == self.number)
+    }
+
+    fn command(&mut self, output: &ToolOutput) -> Message {
+        self.sent = *output;
+        self.record.sent_force_n(output.force_n.length());
+        Message::Command(convert::device_command(output))
+    }
+
+    /// The loop's next output on the way to zero force; `None` once zero was sent, or when it does not come.
+    async fn released(&mut self, until: Instant) -> Option<ToolOutput> {
+        loop {
+            if let Some(output) = self.unsent() {
+                return Some(output);
+            }
+            if self.sent.force_n == DVec3::ZERO {
+                return None;
+            }
+            let loop_gone = self.daemon.sign.gone();
+            let end = self.end.as_mut()?;
+            let rung = async {
+                tokio::select! {
+                    rung = end.ear.rung() => rung.is_ok(),
+                    () = loop_gone.cancelled() => false,
+                }
+            };
+            if !matches!(timeout_at(until, rung).await, Ok(true)) {
+                // The last output may have come without a ring that was heard.
+                return self.unsent();
+            }
+        }
+    }
+
+    /// An output that was not sent yet.
+    fn unsent(&mut self) -> Option<ToolOutput> {
+        let fresh = self.end.as_mut()?.outputs.update();
+        let sent_n = self.sent.force_n;
+        self.newest().filter(|output| fresh || output.force_n != sent_n)
+    }
+
+    /// The last force, ramped to zero over the time the loop takes for it; then the goodbye.
+    async fn fade(&mut self, why: &str, from_n: DVec3, since: Instant) -> Message {
+        if self.sent.force_n == DVec3::ZERO {
+            self.stage = Stage::Ended;
+            let text = format!("{why}; the force has been ramped to zero");
+            return Message::Fault(fault(DeviceFaultCode::Detached, text, 1));
+        }
+        sleep(FADE_STEP).await;
+        let ramp_s = self.daemon.settings.limits.watchdog.ramp_to_zero_s;
+        let left = (1.0 - since.elapsed().as_secs_f64() / ramp_s).max(0.0);
+        self.command(&ToolOutput { force_n: from_n * left, local_model: None, ..self.sent })
+    }
+
+    async fn how_the_way_up_ended(&mut self) -> Option<Result<Message, Status>> {
+        self.stage = Stage::Ended;
+        // By reference: a stream that is dropped here still gives its tool back.
+        let ended = (&mut self.uplink).await.unwrap_or_else(|_| Err(Status::internal("reading samples failed")));
+        ended.err().map(Err)
+    }
+}
+
+impl Drop for Attachment {
+    fn drop(&mut self) {
+        self.over.cancel();
+        tracing::info!(device = self.record.name, tool = self.session.tools[self.tool].name, "device detached");
+        let (Some(end), Some(samples)) = (self.end.take(), self.samples.take()) else { return };
+        end.shared.detach();
+        let (session, tool) = (Arc::clone(&self.session), self.tool);
+        // The slot is with the way up, which ends now.
+        tokio::spawn(async move {
+            if let Ok(samples) = samples.await {
+                session.tools[tool].give_back(ToolEnd { samples, ..end });
+            }
+        });
+    }
+}
