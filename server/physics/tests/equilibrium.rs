@@ -212,3 +212,47 @@ fn a_stvk_column_past_its_limit_point_is_reported_inverted() {
     assert!(s < -1.0 && (0.5 * s * (s * s - 1.0) + 0.25).abs() < 1e-9, "{s}");
     assert_eq!(found.inverted_tets, 6);
 }
+
+/// The flag was that of the last factorisation, wherever that had been: at an earlier position, or nowhere.
+#[test]
+fn a_column_compressed_past_its_buckling_load_is_an_unstable_equilibrium() {
+    let mesh = block(DVec3::new(0.1, 0.01, 0.01), [20, 2, 2]);
+    let prescribed =
+        vec![held(&mesh, "foot", [true; 3], |p| p.x == 0.0), held(&mesh, "head", [true; 3], |p| p.x > 0.099_999)];
+    let model = Model::build(spec(mesh, material(Law::StableNeoHookean, YOUNG_PA, 0.3), prescribed, vec![])).unwrap();
+    // Clamped at both ends: it buckles at a strain of π²h²/3L² = 3.3 %; two tets across it are too stiff in bending.
+    for (strain, stable) in [(0.01, true), (0.1, false)] {
+        let found = equilibrium(&model, 1.0, &[DVec3::ZERO, DVec3::X * (-0.1 * strain)]);
+        let aside =
+            found.x.iter().zip(model.rest_positions_m()).map(|(x, rest)| (x.z - rest.z).abs()).fold(0.0, f64::max);
+        println!("compressed by {strain}: stable {}, {aside:.1e} m aside, {:?}", found.stable, found.reactions_n[1]);
+        assert!(aside < 1e-3, "still straight");
+        assert_eq!(found.stable, stable);
+    }
+}
+
+/// With settings that let only the smallest steps succeed, the load was raised for ever.
+#[test]
+fn a_load_is_raised_in_a_bounded_number_of_steps() {
+    let mesh = block(DVec3::splat(0.1), [1, 1, 1]);
+    let prescribed = vec![held(&mesh, "clamp", [true; 3], |p| p.x == 0.0)];
+    let end = triangles_where(&mesh, |p| p.x == 0.1);
+    let loads = vec![LoadSpec::Traction { triangles: end, traction_pa: DVec3::Z * 2e3 }];
+    let model = Model::build(spec(mesh, material(Law::StableNeoHookean, YOUNG_PA, 0.3), prescribed, loads)).unwrap();
+    let stopped = |max_iterations, max_halvings| {
+        let settings = StaticSettings { relative_residual: 1e-10, max_iterations, load_steps: 1, max_halvings };
+        let mut calls = 0;
+        let error = solve_static(&model, &[1.0], &[DVec3::ZERO], &[], &settings, &mut |_| {
+            calls += 1;
+            ControlFlow::Continue(())
+        })
+        .unwrap_err();
+        println!("{calls} iterations: {error}");
+        (error, calls)
+    };
+    let (error, calls) = stopped(1, 40);
+    let SolveError::TooManySteps { reached_fraction, failed } = error else { panic!("{error}") };
+    assert!(reached_fraction > 0.0 && reached_fraction < 1.0 && failed > 0 && calls <= 20_000);
+    let (error, calls) = stopped(1, 3);
+    assert!(matches!(error, SolveError::NoConvergence { reached_fraction: 0.0, .. }) && calls <= 10, "{error}");
+}

@@ -17,18 +17,25 @@ impl Surface {
     /// Extracts the faces that belong to exactly one tet, in order of tet and face.
     ///
     /// # Errors
-    /// [`MeshError::NonManifoldFace`] when a face belongs to more than two tets.
+    /// [`MeshError::NonManifoldFace`] when a face belongs to more than two tets, [`MeshError::Overlapping`] when two lie on the same side
+    /// of one.
     pub fn of(mesh: &TetMesh) -> Result<Self, MeshError> {
-        let mut owners: BTreeMap<[u32; 3], u32> = BTreeMap::new();
+        // Of each face: the first tet that has it, its sense there, and how many have it.
+        let mut owners: BTreeMap<[u32; 3], (usize, bool, u32)> = BTreeMap::new();
         let faces = || mesh.tets().iter().flat_map(|tet| FACES.map(|face| face.map(|corner| tet[corner])));
-        for face in faces() {
-            let count = owners.entry(sorted(face)).or_insert(0);
-            *count += 1;
-            if *count > 2 {
+        for (index, face) in faces().enumerate() {
+            let (tet, sense) = (index / FACES.len(), is_ascending_cycle(face));
+            let owner = owners.entry(sorted(face)).or_insert((tet, sense, 0));
+            owner.2 += 1;
+            if owner.2 > 2 {
                 return Err(MeshError::NonManifoldFace { face: sorted(face) });
             }
+            // Seen from outside, two neighbours go round their face in opposite senses.
+            if owner.1 == sense && owner.2 == 2 {
+                return Err(MeshError::Overlapping { tets: [owner.0, tet], face: sorted(face) });
+            }
         }
-        let boundary: Vec<[u32; 3]> = faces().filter(|&face| owners[&sorted(face)] == 1).collect();
+        let boundary: Vec<[u32; 3]> = faces().filter(|&face| owners[&sorted(face)].2 == 1).collect();
         let mut nodes: Vec<u32> = boundary.iter().flatten().copied().collect();
         nodes.sort_unstable();
         nodes.dedup();
@@ -46,6 +53,11 @@ impl Surface {
     }
 }
 
+/// Whether the corners follow each other, round and round, in ascending order.
+fn is_ascending_cycle([a, b, c]: [u32; 3]) -> bool {
+    !((a < b) ^ (b < c) ^ (c < a))
+}
+
 fn sorted(mut face: [u32; 3]) -> [u32; 3] {
     face.sort_unstable();
     face
@@ -55,6 +67,16 @@ fn sorted(mut face: [u32; 3]) -> [u32; 3] {
 mod tests {
     use super::*;
     use glam::DVec3;
+
+    #[test]
+    fn tets_on_the_same_side_of_a_face_are_refused() {
+        let p = vec![DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::Z, DVec3::new(0.3, 0.3, 0.7)];
+        for twin in [[0, 1, 2, 3], [1, 2, 0, 3], [0, 1, 2, 4]] {
+            let mesh = TetMesh::new(p.clone(), vec![[0, 1, 2, 3], twin, [1, 2, 3, 4]]).unwrap();
+            let error = Surface::of(&mesh).unwrap_err();
+            assert!(matches!(error, MeshError::Overlapping { .. }), "{error}");
+        }
+    }
 
     #[test]
     fn two_tets_share_one_face_and_show_six() {

@@ -78,6 +78,17 @@ pub enum MeshError {
         /// How many there are.
         count: usize,
     },
+    /// Two tets lie on the same side of a face.
+    #[error(
+        "tets {} and {} overlap: both lie on the same side of face ({}, {}, {}); is one there twice?",
+        tets[0], tets[1], face[0], face[1], face[2]
+    )]
+    Overlapping {
+        /// Their indices.
+        tets: [usize; 2],
+        /// Node indices of the face, ascending.
+        face: [u32; 3],
+    },
     /// A face belongs to more than two tets.
     #[error("face ({}, {}, {}) belongs to more than two tets; the mesh is not a manifold", face[0], face[1], face[2])]
     NonManifoldFace {
