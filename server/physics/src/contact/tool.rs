@@ -61,7 +61,7 @@ pub struct ToolState {
     pub device_force_n: DVec3,
     /// Contact samples that carry force, at the end of the tick.
     pub contacts: u32,
-    /// Deepest penetration of the tool into the surface during the tick (m).
+    /// Deepest penetration of the tool into the surface during the tick (m), whether it carries force or not.
     pub penetration_m: f64,
     /// Energy stored in the contact's foundation at the end of the tick (J).
     pub contact_energy_j: f64,
