@@ -97,8 +97,10 @@ pub async fn run_with(config: &Config, shutdown: CancellationToken, handle: Hand
         shared: Arc::clone(&shared),
         sequence: 0,
     };
+    let _no_servo_alone = StopOnDrop(Arc::clone(&shared));
     let mut servo_done = start_servo(servo, &settings).await?;
     let end = CancellationToken::new();
+    let _no_stream_alone = end.clone().drop_guard();
     let uplink = Uplink::new(settings.uplink.clone(), source, commands, Arc::clone(&shared), end.clone());
     let mut uplink = tokio::spawn(uplink.run());
     let mut watcher = Watcher::new(&settings);
@@ -125,6 +127,15 @@ pub async fn run_with(config: &Config, shutdown: CancellationToken, handle: Hand
     match ended {
         Ok(result) => result.map(|()| shared.stats.summary()),
         Err(panic) => Err(BridgeError::System { what: "run the uplink", source: std::io::Error::other(panic) }),
+    }
+}
+
+/// Whoever drops a running bridge drops it whole: the servo's thread ramps to zero and ends too.
+struct StopOnDrop(Arc<Shared>);
+
+impl Drop for StopOnDrop {
+    fn drop(&mut self) {
+        self.0.stop.store(true, Ordering::Relaxed);
     }
 }
 

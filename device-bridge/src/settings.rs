@@ -167,6 +167,11 @@ fn uplink(config: &Config) -> Result<UplinkSettings, BridgeError> {
     if server.device_name.len() > 64 {
         return Err(value("server.device_name", format!("is {} bytes long, at most 64", server.device_name.len())));
     }
+    for (key, text) in [("server.device_name", &server.device_name), ("server.tool", &server.tool)] {
+        if text.chars().any(char::is_control) {
+            return Err(value(key, format!("\"{}\" holds a control character", text.escape_debug())));
+        }
+    }
     let give_up_after = server.give_up_after_s.map(|s| seconds("server.give_up_after_s", s)).transpose()?;
     Ok(UplinkSettings {
         endpoint: connect::endpoint(&server.url, server.tls_ca.as_deref()).map_err(unusable)?,
@@ -275,6 +280,8 @@ mod tests {
         assert!(refused(|c| c.realtime.fifo_priority = 100).starts_with("realtime.fifo_priority"));
         assert!(refused(|c| c.server.longest_pause_s = 0.0).starts_with("server.longest_pause_s"));
         assert!(refused(|c| c.server.device_name = "x".repeat(65)).starts_with("server.device_name"));
+        assert!(refused(|c| c.server.device_name = "a\u{1b}b".into()).starts_with("server.device_name"));
+        assert!(refused(|c| c.server.tool = "a\n".into()).starts_with("server.tool"));
         let DeviceConfig::Simulated(simulated) = DeviceConfig::default();
         let bad = KeyframeConfig { time_s: -1.0, position_m: [0.0; 3] };
         let device = SimulatedConfig { keyframes: vec![bad], ..simulated };

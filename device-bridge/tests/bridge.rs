@@ -46,6 +46,20 @@ async fn stopping_ramps_to_zero_and_ends_the_stream() {
     until("the daemon saw the end", || mock.seen(|seen| seen.ended == 1)).await;
 }
 
+/// A bridge whose caller dropped it went on pressing, with nobody left to stop it.
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn a_bridge_that_is_dropped_lets_the_arm_go() {
+    let mock = Mock::default();
+    let (address, _stop, _serving) = mock.serve("127.0.0.1:0").await;
+    let bridge = start(config(&format!("http://{address}")));
+    let handle = bridge.handle.clone();
+    until("the force is up", || handle.stats().force_n() > 0.99).await;
+    bridge.task.abort();
+    until("the force is gone", || handle.stats().link() == Link::Latched(Fault::Requested)).await;
+    assert_eq!(handle.stats().force_n(), 0.0);
+    until("the daemon saw the end", || mock.seen(|seen| seen.ended == 1)).await;
+}
+
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn a_silent_daemon_means_zero_force_until_recovered() {
     let mock = Mock::default();

@@ -172,6 +172,22 @@ fn automatic_recovery_needs_half_a_second_without_a_gap() {
     assert_eq!(feed(&mut law, 30, 0), Link::Fresh);
 }
 
+#[test]
+fn without_automatic_recovery_no_steadiness_brings_the_force_back() {
+    let mut law = law(|_| {});
+    let last = up(&mut law);
+    for tick in 100..3000_u64 {
+        law.receive(&command(last + tick * MS, DVec3::Z, None));
+        let out = law.tick(last + (tick + 50) * MS, &still());
+        assert_eq!(out.limited.force_n, DVec3::ZERO);
+    }
+    for tick in 3050..6000_u64 {
+        law.receive(&command(last + tick * MS, DVec3::Z, None));
+        let out = law.tick(last + tick * MS, &still());
+        assert_eq!((out.limited.force_n, out.verdict.link), (DVec3::ZERO, Link::Latched(Fault::Stale)));
+    }
+}
+
 /// A fault of the daemon while its commands go on: the force once came back in the very tick after the fault was latched, because
 /// the commands had been steady for long.
 #[test]

@@ -277,6 +277,16 @@ mod tests {
     }
 
     #[test]
+    fn a_sample_that_is_stale_when_it_comes_ends_no_waiting_and_is_no_fault() {
+        let mut watchdog = Watchdog::new(WatchdogSettings::default());
+        watchdog.sample_arrived(0);
+        let verdict = watchdog.check(100 * MS);
+        assert_eq!((verdict.link, verdict.ramp, watchdog.faults()), (Link::Waiting, 0.0, 0));
+        watchdog.sample_arrived(200 * MS);
+        assert_eq!(watchdog.check(200 * MS).link, Link::Fresh);
+    }
+
+    #[test]
     fn a_trip_ramps_down_although_samples_arrive() {
         let (mut watchdog, last) = running();
         watchdog.trip(last, Fault::Requested);
