@@ -53,17 +53,18 @@ impl SceneError {
         self
     }
 
-    /// Keeps the error underneath.
+    /// Keeps the error underneath, unless the message says all of it already: a report shows both.
     #[must_use]
-    pub fn with_cause(mut self, cause: impl std::error::Error + Send + Sync + 'static) -> Self {
-        self.cause = Some(Box::new(cause));
-        self
+    pub fn with_cause(self, cause: impl std::error::Error + Send + Sync + 'static) -> Self {
+        self.with_boxed_cause(Box::new(cause))
     }
 
-    /// Keeps the error underneath, already boxed.
+    /// The same, already boxed.
     #[must_use]
     pub fn with_boxed_cause(mut self, cause: Box<dyn std::error::Error + Send + Sync>) -> Self {
-        self.cause = Some(cause);
+        if !self.message.contains(&cause.to_string()) {
+            self.cause = Some(cause);
+        }
         self
     }
 
@@ -125,6 +126,16 @@ impl Diagnostic for SceneError {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// A report printed "the file is empty" twice, once as the message and once as its cause.
+    #[test]
+    fn a_cause_that_the_message_tells_is_not_told_again() {
+        use std::{error::Error, io};
+        let cause = || io::Error::other("no room");
+        let told = SceneError::new(Stage::Read, format!("cannot read a.msh: {}", cause())).with_cause(cause());
+        let untold = SceneError::new(Stage::Read, "cannot read a.msh").with_cause(cause());
+        assert!(told.source().is_none() && untold.source().is_some());
+    }
 
     #[test]
     fn one_line_names_file_line_and_column() {

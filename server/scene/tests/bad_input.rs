@@ -106,8 +106,21 @@ fn missing_keys_and_wrong_types() {
     );
     assert_eq!(
         refused("pressure_pa = 10", "pressure_pa = \"10 Pa\""),
-        "t.toml:15:15: load[0].pressure_pa: invalid type: string \"10 Pa\", expected f64"
+        "t.toml:15:15: load[0].pressure_pa: invalid type: string \"10 Pa\", expected a number"
     );
+    assert_eq!(
+        refused("cells = [2, 2, 2]", "cells = [2, 2, -2]"),
+        "t.toml:5:16: body.box.cells[2]: invalid value: integer `-2`, expected a whole number, not negative"
+    );
+    assert_eq!(
+        refused("amplitude.constant = 1", "amplitude = 1"),
+        "t.toml:17:13: load[0].amplitude: invalid type: integer `1`, expected a table"
+    );
+    assert_eq!(
+        refused("[[fixed]]", "[fixed]"),
+        "t.toml:11:2: fixed is a table, and should be a list of them (write [[fixed]])"
+    );
+    assert_eq!(refused("law = \"stvk\"", "law = 3"), "t.toml:7:7: material[0].law: must be a text in quotes");
     assert_eq!(refused("[scene]", "[scene"), "t.toml:1:7: this is not TOML: unclosed table, expected `]`");
 }
 

@@ -10,7 +10,7 @@ use std::{
 /// Flags of `palpated check`.
 #[derive(Debug, Clone, clap::Args)]
 #[command(
-    after_help = "Exit code: 0 when the scene loads and its first half second holds (1 with --strict if it has warnings), else 1."
+    after_help = "Exit code: 0 when the scene loads and the body survives up to half a second of it (1 with --strict if it has warnings), else 1."
 )]
 pub struct CheckArgs {
     /// Scene file or name of a built-in scene

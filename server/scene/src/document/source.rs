@@ -273,8 +273,29 @@ fn document_fault(at: Where, message: &str) -> Fault {
             let length = if key.ends_with("_m") { format!(" (or `{key}m`)") } else { String::new() };
             fault(at, format!("{table} lacks the key `{key}`{length}")).help("docs/scenes.md describes every key")
         }
-        _ => fault(at.clone(), format!("{at}: {message}")),
+        _ if message == "invalid type: map, expected a sequence" => {
+            fault(at.clone(), format!("{at} is a table, and should be a list of them")).help(format!("write [[{at}]]"))
+        }
+        _ => fault(at.clone(), format!("{at}: {}", in_words(message))),
     }
+}
+
+/// A message of the deserialiser without the names of its types.
+fn in_words(message: &str) -> String {
+    let Some((found, wanted)) = message.rsplit_once(", expected ") else { return message.to_owned() };
+    let wanted = match wanted {
+        "f64" => "a number",
+        "u32" => "a whole number, not negative",
+        "a sequence" => "a list",
+        "a string" => "a text in quotes",
+        table if table.starts_with("struct ") => "a table",
+        other => other,
+    };
+    // An enumeration's word was wanted, and what is there is none.
+    if found == "invalid type: unit variant" {
+        return "must be a text in quotes".to_owned();
+    }
+    format!("{found}, expected {wanted}").replace("invalid type: map", "invalid type: table")
 }
 
 /// The nearest known word if one is near, else all of them.
