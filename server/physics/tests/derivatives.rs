@@ -37,6 +37,7 @@ fn stress_and_stiffness_are_derivatives_of_the_energy() {
     let mut random = Random(1);
     let h = 1e-5;
     for law in LAWS {
+        let (mut worst_stress, mut worst_stiffness) = (0.0_f64, 0.0_f64);
         for nu in [-0.2, 0.0, 0.3, 0.45, 0.49] {
             let m = material(law, nu);
             for f in gradients(&mut random) {
@@ -46,11 +47,14 @@ fn stress_and_stiffness_are_derivatives_of_the_energy() {
                 let measured = (m.energy_density(&plus) - m.energy_density(&minus)) / (2.0 * h);
                 let stated = contract(&m.piola(&f), &df);
                 assert!((measured - stated).abs() < 1e-8 * scale, "{law:?} ν {nu}: {measured} {stated} at {f}");
+                worst_stress = worst_stress.max((measured - stated).abs() / scale);
                 let measured = (m.piola(&plus) - m.piola(&minus)) * (0.5 / h);
                 let difference = norm(&(measured - m.piola_differential(&f, &df)));
                 assert!(difference < 1e-7 * scale, "{law:?} ν {nu}: off by {difference:e} at {f}");
+                worst_stiffness = worst_stiffness.max(difference / scale);
             }
         }
+        println!("{law:?}: energy to stress {worst_stress:.1e}, stress to stiffness {worst_stiffness:.1e}");
     }
 }
 
@@ -67,6 +71,7 @@ fn forces_and_stiffness_of_a_tet_are_derivatives_of_its_energy() {
     let h = 1e-5;
     for law in LAWS {
         let m = material(law, 0.4);
+        let (mut worst_force, mut worst_stiffness) = (0.0_f64, 0.0_f64);
         for f in gradients(&mut random) {
             let x = corners.map(|c| f * c + DVec3::new(3.0, -1.0, 2.0));
             let scale = norm(&f).powi(3).max(1.0) * m.lame.p_wave_modulus_pa();
@@ -82,6 +87,7 @@ fn forces_and_stiffness_of_a_tet_are_derivatives_of_its_energy() {
                     let energy = |by: f64| rest.energy_j(&m, &moved(by));
                     let measured = -(energy(h) - energy(-h)) / (2.0 * h);
                     assert!((measured - forces[j].dot(axis)).abs() < 1e-8 * scale, "{law:?}");
+                    worst_force = worst_force.max((measured - forces[j].dot(axis)).abs() / scale);
                     let (plus, minus) = (moved(h), moved(-h));
                     let (plus, minus) =
                         (rest.forces_n(&m, &plus, &[DVec3::ZERO; 4]), rest.forces_n(&m, &minus, &[DVec3::ZERO; 4]));
@@ -89,10 +95,12 @@ fn forces_and_stiffness_of_a_tet_are_derivatives_of_its_energy() {
                         let measured = (plus[i] - minus[i]) * (0.5 / h);
                         let stated = rest.stiffness_block(&m, &rest.gradient_of(&x), i, j) * axis;
                         assert!((measured - stated).length() < 1e-7 * scale, "{law:?} {measured} {stated}");
+                        worst_stiffness = worst_stiffness.max((measured - stated).length() / scale);
                     }
                 }
             }
         }
+        println!("{law:?}: energy to force {worst_force:.1e}, force to stiffness {worst_stiffness:.1e}");
     }
 }
 

@@ -121,19 +121,25 @@ fn cases() -> Vec<(String, Case)> {
 #[test]
 fn kernels_agree_with_the_oracle() {
     for (precision, tolerance) in [(Precision::Single, 1e-5), (Precision::Double, 1e-13)] {
-        let mut worst = 0.0_f64;
+        let (mut worst, mut worst_of_force) = (0.0_f64, 0.0_f64);
         for (name, case) in cases() {
             let (expected, expected_power) = case.oracle();
             let (forces, power) = case.run(&case.kernel(precision));
             let error = largest_difference(&forces, &expected);
             let allowed = tolerance * case.largest_tet_force() + 4.0 * case.force_of_rounding(precision);
             worst = worst.max(error / allowed);
+            // At tiny strain the force itself is of the size of rounding.
+            if !name.contains("strain 0.000001") {
+                worst_of_force = worst_of_force.max(error / case.largest_tet_force());
+            }
             println!("{:8.1e} {precision:?} {name}", error / allowed);
             assert!(error < allowed, "{precision:?} {name}: {error:e} of {allowed:e}");
             let close = (power - expected_power).abs() <= 10.0 * tolerance * expected_power;
             assert!(close, "{precision:?} {name}: {power} {expected_power}");
         }
-        println!("worst {precision:?} error {worst:.2} of what is allowed");
+        println!(
+            "worst {precision:?} error {worst:.2} of what is allowed, {worst_of_force:.1e} of the largest force of a tet"
+        );
     }
 }
 
