@@ -152,6 +152,31 @@ async fn nothing_is_made_for_nobody() {
     daemon.finish().await;
 }
 
+/// A viewer that came after a time without viewers got the last frame of the one before as its first: a snapshot showed
+/// the body of minutes ago.
+#[tokio::test(flavor = "multi_thread")]
+async fn the_first_update_is_of_now_after_nobody_watched() {
+    let daemon = Daemon::on(pressed_scene(2)).await;
+    let mut first = watch(&daemon, 60.0, LevelOfDetail::Full).await;
+    event(&mut first).await;
+    drop(first);
+    while daemon.status().await.viewers > 0 {
+        tokio::time::sleep(Duration::from_millis(5)).await;
+    }
+    let now = daemon.status().await.tick;
+    while daemon.status().await.tick < now + 100 {
+        tokio::time::sleep(Duration::from_millis(5)).await;
+    }
+    let mut second = watch(&daemon, 60.0, LevelOfDetail::Full).await;
+    let update = loop {
+        if let Some(v1::surface_event::Message::Update(update)) = event(&mut second).await.message {
+            break update;
+        }
+    };
+    assert!(update.tick >= now + 100, "tick {} was shown at tick {}", update.tick, now + 100);
+    daemon.finish().await;
+}
+
 #[tokio::test(flavor = "multi_thread")]
 async fn bad_requests_are_refused_and_streams_end_cleanly_at_the_stop() {
     let daemon = Daemon::on(block_scene("block", 2)).await;

@@ -162,7 +162,13 @@ impl Hub {
     pub fn join(self: &Arc<Self>, rate_hz: f64, vertices: bool) -> Seat {
         let viewer = self.next_viewer.fetch_add(1, Ordering::Relaxed);
         let frames = self.frames.subscribe();
-        self.change_wishes(|wishes| wishes.push(Wish { viewer, rate_hz, vertices }));
+        self.change_wishes(|wishes| {
+            if wishes.is_empty() {
+                // Nobody watched: the newest frame may be minutes old, or of another scene.
+                self.frames.send_replace(None);
+            }
+            wishes.push(Wish { viewer, rate_hz, vertices });
+        });
         Seat { hub: Arc::clone(self), viewer, frames }
     }
 
