@@ -1,7 +1,11 @@
 //! Arguments, and which file does what.
 use crate::{ViewError, connect::Server, export, inject, picture, status, watch};
 use clap::{Args, Parser, Subcommand};
-use std::{fs, path::PathBuf};
+use std::{
+    fs,
+    io::{ErrorKind, Write as _},
+    path::PathBuf,
+};
 
 /// Looks at a running palpated: status, live numbers, pictures, exports; injects scripted forces.
 #[derive(Debug, Parser)]
@@ -60,7 +64,7 @@ pub fn run(arguments: &Arguments) -> Result<(), ViewError> {
     let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().map_err(|source| {
         ViewError::File { action: "cannot start the runtime of", path: "palpate-view".into(), source }
     })?;
-    runtime.block_on(async {
+    let done = runtime.block_on(async {
         match &arguments.command {
             Command::Status { json } => status::run(&server, *json).await,
             Command::Watch(arguments) => watch::run(&server, arguments).await,
@@ -68,6 +72,21 @@ pub fn run(arguments: &Arguments) -> Result<(), ViewError> {
             Command::Export(arguments) => export::run(&server, arguments).await,
             Command::Inject(arguments) => inject::run(&server, arguments).await,
         }
+    });
+    match done {
+        Err(ViewError::Unread) => Ok(()),
+        done => done,
+    }
+}
+
+/// Prints a line.
+///
+/// # Errors
+/// [`ViewError::Unread`] when the reader has gone, or [`ViewError::File`].
+pub fn say(line: &str) -> Result<(), ViewError> {
+    writeln!(std::io::stdout(), "{line}").map_err(|source| match source.kind() {
+        ErrorKind::BrokenPipe => ViewError::Unread,
+        _ => ViewError::File { action: "cannot write to", path: "standard output".into(), source },
     })
 }
 
@@ -89,9 +108,24 @@ pub fn write_new(path: &PathBuf, bytes: &[u8], force: bool) -> Result<(), ViewEr
     }
     let mut beside = path.clone().into_os_string();
     beside.push(".part");
-    fs::write(&beside, bytes).and_then(|()| fs::rename(&beside, path)).map_err(|source| ViewError::File {
-        action: "cannot write",
-        path: path.clone(),
-        source,
+    fs::write(&beside, bytes).and_then(|()| fs::rename(&beside, path)).map_err(|source| {
+        // Half a file helps nobody; that it may not be there is no second error.
+        let _ = fs::remove_file(&beside);
+        ViewError::File { action: "cannot write", path: path.clone(), source }
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_file_that_cannot_be_written_leaves_nothing_behind() {
+        let folder = tempfile::tempdir().unwrap();
+        let target = folder.path().join("taken.ply");
+        fs::create_dir(&target).unwrap();
+        assert!(matches!(write_new(&target, b"ply", false), Err(ViewError::Exists(_))));
+        assert!(matches!(write_new(&target, b"ply", true), Err(ViewError::File { .. })));
+        assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
+    }
 }

@@ -1,5 +1,6 @@
 //! What can go wrong, with the next step.
 use miette::Diagnostic;
+use palpate_proto::connect::causes;
 use std::path::PathBuf;
 use thiserror::Error;
 
@@ -32,13 +33,27 @@ pub enum ViewError {
         /// Its message.
         message: String,
     },
+    /// The connection broke while it was used.
+    #[error("the connection to the daemon broke: {0}")]
+    #[diagnostic(help("the daemon was stopped, or the network failed: `palpate-view status` says whether it is back"))]
+    Lost(String),
+    /// The daemon is connected and says nothing.
+    #[error("the daemon has sent nothing for {silence_s:.1} s, though it sends updates even while time stands")]
+    #[diagnostic(help("it hangs, or the network does: `palpate-view status` says whether it answers"))]
+    Silent {
+        /// How long nothing came (s).
+        silence_s: f64,
+    },
+    /// Nobody reads what is printed (`| head`): the end, and no error.
+    #[error("nobody reads the output")]
+    Unread,
     /// The stream broke the protocol, or ended.
     #[error("the stream of the surface {0}")]
     Stream(String),
     /// A file could not be read or written.
-    #[error("{action} {path}: {source}", path = path.display())]
+    #[error("{action} {path}", path = path.display())]
     File {
-        /// `cannot read` or `cannot write`.
+        /// `cannot read` or `cannot write`; `source` is shown below.
         action: &'static str,
         /// The file.
         path: PathBuf,
@@ -73,6 +88,10 @@ pub enum ViewError {
 
 impl From<tonic::Status> for ViewError {
     fn from(status: tonic::Status) -> Self {
+        // What the daemon answered has no cause on this side; what the transport made up has.
+        if let Some(cause) = std::error::Error::source(&status) {
+            return Self::Lost(causes(cause));
+        }
         Self::Refused { code: format!("{:?}", status.code()), message: status.message().to_owned() }
     }
 }

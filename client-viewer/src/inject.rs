@@ -37,12 +37,14 @@ struct Force {
 /// # Errors
 /// A wrong script, an unreachable daemon, or its refusal.
 pub async fn run(server: &Server, arguments: &InjectArguments) -> Result<(), ViewError> {
-    let text = String::from_utf8_lossy(&cli::read(&arguments.script)?).into_owned();
+    let no_text = |_| ViewError::Script { path: arguments.script.clone(), reason: "is no text (UTF-8)".into() };
+    let text = String::from_utf8(cli::read(&arguments.script)?).map_err(no_text)?;
     let script = parse(&arguments.script, &text)?;
     let channel = server.connect().await?;
     let surface = if script.force.iter().any(|force| force.nearest_to_m.is_some()) {
         let mut watcher = Watcher::start(channel.clone(), 0.0, LevelOfDetail::Full).await?;
-        watcher.next().await?.cloned()
+        let ended = || ViewError::Stream("ended before the first surface".into());
+        Some(watcher.next().await?.cloned().ok_or_else(ended)?)
     } else {
         None
     };
@@ -53,14 +55,20 @@ pub async fn run(server: &Server, arguments: &InjectArguments) -> Result<(), Vie
         .map(|(index, force)| resolve(&arguments.script, index, force, surface.as_ref()))
         .collect::<Result<Vec<_>, _>>()?;
     let count = forces.len();
-    let request = InjectForcesRequest { session_id: String::new(), forces };
+    // A vertex found in one body must not be pushed in another that was loaded in between.
+    let session_id = surface.map_or_else(String::new, |surface| surface.header.session_id);
+    let request = InjectForcesRequest { session_id, forces };
     let answer = SessionClient::new(channel).inject_forces(request).await?.into_inner();
-    println!("{count} forces accepted; the first acts at tick {}; {} pending", answer.first_tick, answer.pending);
-    Ok(())
+    cli::say(&format!(
+        "{count} forces accepted; the first acts at tick {}; {} pending",
+        answer.first_tick, answer.pending
+    ))
 }
 
 fn parse(path: &Path, text: &str) -> Result<Script, ViewError> {
-    toml::from_str(text).map_err(|error| ViewError::Script { path: path.into(), reason: error.to_string() })
+    let bad = |reason| ViewError::Script { path: path.into(), reason };
+    let script: Script = toml::from_str(text).map_err(|error| bad(error.to_string()))?;
+    if script.force.is_empty() { Err(bad("has no [[force]]".into())) } else { Ok(script) }
 }
 
 fn resolve(path: &Path, index: usize, force: &Force, surface: Option<&Surface>) -> Result<InjectedForce, ViewError> {
@@ -70,6 +78,9 @@ fn resolve(path: &Path, index: usize, force: &Force, surface: Option<&Surface>) 
     };
     let surface_vertex = match (force.surface_vertex, force.nearest_to_m) {
         (Some(vertex), None) => vertex,
+        (None, Some(point)) if !point.iter().all(|x| x.is_finite()) => {
+            return Err(bad("nearest_to_m must be finite".into()));
+        }
         (None, Some(point)) => {
             nearest(surface, Vec3::from_array(point)).ok_or_else(|| bad("there is no surface".into()))?
         }
@@ -126,6 +137,11 @@ mod tests {
         assert!(message("[[force]]\nforce_n = [0, 0, 1]\ntick_count = 1\n").contains("exactly one"));
         assert!(message("[[force]]\nsurface_vertex = 1\nforce_n = [0, 0, 1]\ntick_count = 0\n").contains("at least 1"));
         assert!(message("[[force]]\nsurface_vertex = 1\nforce = [0, 0, 1]\ntick_count = 1\n").contains("force"));
+        assert!(message("force = []\n").contains("no [[force]]"));
+        assert!(
+            message("[[force]]\nnearest_to_m = [nan, 0, 0]\nforce_n = [0, 0, 1]\ntick_count = 1\n")
+                .contains("nearest_to_m")
+        );
         assert!(message("[[force]]\nsurface_vertex = 1\nforce_n = [0, nan, 1]\ntick_count = 1\n").contains("finite"));
     }
 }

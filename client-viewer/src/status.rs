@@ -1,5 +1,5 @@
 //! `status`: what the daemon runs, how well it keeps time, and who is attached.
-use crate::{ViewError, connect::Server};
+use crate::{ViewError, cli, connect::Server};
 use palpate_proto::v1::{Percentiles, StatusRequest, StatusResponse, session_client::SessionClient};
 use serde_json::json;
 use std::fmt::Write as _;
@@ -11,8 +11,7 @@ use std::fmt::Write as _;
 pub async fn run(server: &Server, as_json: bool) -> Result<(), ViewError> {
     let mut client = SessionClient::new(server.connect().await?);
     let status = client.status(StatusRequest::default()).await?.into_inner();
-    println!("{}", if as_json { to_json(&status).to_string() } else { to_text(&status) });
-    Ok(())
+    cli::say(&if as_json { to_json(&status).to_string() } else { to_text(&status) })
 }
 
 /// The status for people.

@@ -5,7 +5,11 @@ use palpate_proto::v1::{
     KeyframeChunk, KeyframeHeader, LevelOfDetail, SurfaceUpdate, WatchRequest, surface_client::SurfaceClient,
     surface_event::Message,
 };
+use std::time::Duration;
 use tonic::{Streaming, transport::Channel};
+
+/// A daemon sends updates at the asked rate, even while time stands: silence for so much longer is a fault.
+const PATIENCE: Duration = Duration::from_secs(5);
 
 /// A surface as last seen.
 #[derive(Debug, Clone, Default)]
@@ -62,6 +66,8 @@ impl Surface {
 pub struct Watcher {
     stream: Streaming<palpate_proto::v1::SurfaceEvent>,
     chunks: Vec<KeyframeChunk>,
+    /// Longest silence that is not taken for a fault.
+    pub patience: Duration,
     /// The surface, once its keyframe is complete.
     pub surface: Option<Surface>,
 }
@@ -70,20 +76,25 @@ impl Watcher {
     /// Starts to watch the current session.
     ///
     /// # Errors
-    /// The daemon's refusal.
+    /// The daemon's refusal, among them a rate that it does not give.
     pub async fn start(channel: Channel, max_rate_hz: f64, detail: LevelOfDetail) -> Result<Self, ViewError> {
         let request = WatchRequest { session_id: String::new(), max_rate_hz, level_of_detail: detail as i32 };
         let stream = SurfaceClient::new(channel).watch(request).await?.into_inner();
-        Ok(Self { stream, chunks: Vec::new(), surface: None })
+        // The daemon has taken the rate: 0 (its own) or up to 240 Hz.
+        let period_s = if max_rate_hz > 0.0 { 1.0 / max_rate_hz } else { 0.0 };
+        let patience = PATIENCE.saturating_add(Duration::try_from_secs_f64(period_s).unwrap_or(Duration::MAX));
+        Ok(Self { stream, chunks: Vec::new(), patience, surface: None })
     }
 
     /// Waits for the next update and applies it; `None` when the daemon ends the stream.
     ///
     /// # Errors
-    /// A broken stream.
+    /// A broken or silent stream.
     pub async fn next(&mut self) -> Result<Option<&Surface>, ViewError> {
         loop {
-            let Some(event) = self.stream.message().await? else { return Ok(None) };
+            let silent = |_| ViewError::Silent { silence_s: self.patience.as_secs_f64() };
+            let event = tokio::time::timeout(self.patience, self.stream.message()).await.map_err(silent)??;
+            let Some(event) = event else { return Ok(None) };
             match event.message {
                 Some(Message::Keyframe(chunk)) => self.push(chunk)?,
                 Some(Message::Update(update)) => {

@@ -1,17 +1,18 @@
 //! `watch`: one line a second of what a viewer feels.
-use crate::{ViewError, connect::Server, surface::Watcher};
+use crate::surface::Surface;
+use crate::{ViewError, cli, connect::Server, surface::Watcher};
 use clap::Args;
-use palpate_proto::v1::{LevelOfDetail, SurfaceUpdate, Vec3};
+use palpate_proto::v1::{LevelOfDetail, Vec3};
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
 /// Arguments of `watch`.
 #[derive(Debug, Args)]
 pub struct WatchArguments {
     /// Stop after so many seconds (until interrupted when absent)
-    #[arg(long, value_name = "SECONDS", value_parser = parse_seconds)]
+    #[arg(long, value_name = "SECONDS", value_parser = parse_seconds, allow_negative_numbers = true)]
     seconds: Option<Duration>,
-    /// Most updates per second to ask for
-    #[arg(long, default_value_t = 60.0, value_name = "HZ")]
+    /// Most updates per second to ask for, up to 240; 0: the daemon's display rate
+    #[arg(long, default_value_t = 60.0, value_name = "HZ", allow_negative_numbers = true)]
     rate_hz: f64,
     /// Ask for numbers only, without the surface
     #[arg(long)]
@@ -29,6 +30,8 @@ fn parse_seconds(text: &str) -> Result<Duration, String> {
 /// What one second of the stream was like.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
 struct Second {
+    scene_name: String,
+    session_id: String,
     time_s: f64,
     rate_hz: f64,
     delay_ms_median: f64,
@@ -49,7 +52,7 @@ pub async fn run(server: &Server, arguments: &WatchArguments) -> Result<(), View
     let mut watcher = Watcher::start(server.connect().await?, arguments.rate_hz, detail).await?;
     let begin = Instant::now();
     let mut second = Window::new(begin);
-    let mut named = false;
+    let mut named = None;
     loop {
         let left = arguments.seconds.map(|seconds| seconds.saturating_sub(begin.elapsed()));
         if left.is_some_and(|left| left.is_zero()) {
@@ -60,27 +63,49 @@ pub async fn run(server: &Server, arguments: &WatchArguments) -> Result<(), View
         let Some(surface) = next? else {
             return Err(ViewError::Stream("was ended by the daemon".into()));
         };
-        if !named && !arguments.json {
-            println!("{}: {} vertices", surface.header.scene_name, surface.header.vertex_count);
-            println!(
-                "{:>9} {:>7} {:>16} {:>8} {:>10} {:>10} {:>10} {:>8}",
-                "time s", "Hz", "delay ms (worst)", "skipped", "contact N", "arm N", "max mm", "tick us"
-            );
-            named = true;
+        if named != Some(surface.epoch) {
+            named = Some(surface.epoch);
+            // Numbers of two scenes make no mean.
+            second = Window::new(Instant::now());
+            if !arguments.json {
+                cli::say(&heading(surface))?;
+            }
         }
-        if let Some(done) = second.take(&surface.last, Instant::now()) {
-            print(&done, arguments.json);
+        if let Some(done) = second.take(surface, Instant::now()) {
+            cli::say(&row(&done, arguments.json))?;
         }
     }
 }
 
-fn print(second: &Second, json: bool) {
+/// The scene, whose forces are shown, and the columns.
+fn heading(surface: &Surface) -> String {
+    let header = &surface.header;
+    let tool = match header.tools.as_slice() {
+        [] => "no tool".to_owned(),
+        [tool] => format!("tool {}", tool.name),
+        [tool, others @ ..] => format!("forces of tool {}, not of the {} others", tool.name, others.len()),
+    };
+    format!(
+        "{}: {} vertices, {tool}\n{:>9} {:>7} {:>16} {:>8} {:>10} {:>10} {:>10} {:>8}",
+        header.scene_name,
+        header.vertex_count,
+        "time s",
+        "Hz",
+        "delay ms (worst)",
+        "skipped",
+        "contact N",
+        "arm N",
+        "max mm",
+        "tick us"
+    )
+}
+
+fn row(second: &Second, json: bool) -> String {
     if json {
-        // A struct of numbers always has a JSON form.
-        println!("{}", serde_json::to_string(second).unwrap_or_default());
-        return;
+        // A struct of numbers and a name always has a JSON form.
+        return serde_json::to_string(second).unwrap_or_default();
     }
-    println!(
+    format!(
         "{:>9.2} {:>7.1} {:>8.1} ({:>5.1}) {:>8} {:>10.4} {:>10.4} {:>10.3} {:>8.0}",
         second.time_s,
         second.rate_hz,
@@ -91,7 +116,7 @@ fn print(second: &Second, json: bool) {
         second.device_force_n,
         second.max_displacement_mm,
         second.tick_cost_us
-    );
+    )
 }
 
 /// Collects updates over a second.
@@ -105,7 +130,8 @@ impl Window {
         Self { begin, delays_ms: Vec::new() }
     }
 
-    fn take(&mut self, update: &SurfaceUpdate, now: Instant) -> Option<Second> {
+    fn take(&mut self, surface: &Surface, now: Instant) -> Option<Second> {
+        let update = &surface.last;
         self.delays_ms.push(delay_ms(update.sent_unix_ns));
         let span_s = (now - self.begin).as_secs_f64();
         if span_s < 1.0 {
@@ -114,6 +140,8 @@ impl Window {
         self.delays_ms.sort_by(f64::total_cmp);
         let tool = update.tools.first();
         let second = Second {
+            scene_name: surface.header.scene_name.clone(),
+            session_id: surface.header.session_id.clone(),
             time_s: update.time_s,
             rate_hz: self.delays_ms.len() as f64 / span_s,
             delay_ms_median: self.delays_ms[self.delays_ms.len() / 2],
@@ -142,6 +170,7 @@ fn delay_ms(sent_unix_ns: u64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use palpate_proto::v1::SurfaceUpdate;
 
     #[test]
     fn a_second_counts_its_updates() {
@@ -149,11 +178,12 @@ mod tests {
         let mut window = Window::new(begin);
         let force = Vec3 { x: 3.0, y: 0.0, z: 4.0 };
         let tool = palpate_proto::v1::ToolState { contact_force_n: Some(force), ..Default::default() };
-        let update = SurfaceUpdate { tools: vec![tool], skipped: 3, max_displacement_m: 0.002, ..Default::default() };
+        let last = SurfaceUpdate { tools: vec![tool], skipped: 3, max_displacement_m: 0.002, ..Default::default() };
+        let surface = Surface { last, ..Default::default() };
         for i in 0..10 {
-            assert!(window.take(&update, begin + Duration::from_millis(100 * i)).is_none());
+            assert!(window.take(&surface, begin + Duration::from_millis(100 * i)).is_none());
         }
-        let second = window.take(&update, begin + Duration::from_secs(1)).unwrap();
+        let second = window.take(&surface, begin + Duration::from_secs(1)).unwrap();
         assert!((second.rate_hz - 11.0).abs() < 1e-9);
         assert_eq!((second.contact_force_n, second.skipped, second.max_displacement_mm), (5.0, 3, 2.0));
         assert!(window.delays_ms.is_empty());

@@ -30,14 +30,13 @@ pub async fn run(server: &Server, arguments: &ExportArguments) -> Result<(), Vie
     let write = writer_for(&arguments.file)?;
     let surface = present_surface(server).await?;
     cli::write_new(&arguments.file, write(&surface).as_bytes(), arguments.force)?;
-    println!(
+    cli::say(&format!(
         "{}: {} vertices, {} triangles at tick {}",
         arguments.file.display(),
         surface.rest_m.len(),
         surface.triangles.len(),
         surface.last.tick
-    );
-    Ok(())
+    ))
 }
 
 fn writer_for(path: &Path) -> Result<fn(&Surface) -> String, ViewError> {
@@ -70,6 +69,14 @@ mod tests {
             triangles: vec![[0, 1, 2]],
             ..Default::default()
         }
+    }
+
+    #[test]
+    fn a_scene_name_of_two_lines_stays_in_the_comment() {
+        let mut surface = surface();
+        surface.header.scene_name = "heart\nv 9 9 9".into();
+        assert_eq!(obj::to_text(&surface).lines().filter(|line| line.starts_with("v ")).count(), 3);
+        assert!(ply::to_text(&surface).lines().all(|line| line != "v 9 9 9 at tick 0, metres"));
     }
 
     #[test]

@@ -4,7 +4,8 @@ use std::fmt::Write as _;
 
 /// Deformed positions (m) and triangles.
 pub(super) fn to_text(surface: &Surface) -> String {
-    let mut text = format!("# {} at tick {}, metres\n", surface.header.scene_name, surface.last.tick);
+    let name = surface.header.scene_name.replace(['\n', '\r'], " ");
+    let mut text = format!("# {name} at tick {}, metres\n", surface.last.tick);
     for p in surface.positions_m() {
         // Writing into a String cannot fail.
         let _ = writeln!(text, "v {} {} {}", p.x, p.y, p.z);

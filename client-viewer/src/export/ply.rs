@@ -8,7 +8,7 @@ pub(super) fn to_text(surface: &Surface) -> String {
         "ply\nformat ascii 1.0\ncomment {} at tick {}, metres\nelement vertex {}\nproperty float x\nproperty float y\n\
          property float z\nproperty float displacement_m\nelement face {}\nproperty list uchar uint vertex_indices\n\
          end_header\n",
-        surface.header.scene_name.replace('\n', " "),
+        surface.header.scene_name.replace(['\n', '\r'], " "),
         surface.last.tick,
         surface.rest_m.len(),
         surface.triangles.len()

@@ -36,6 +36,13 @@ pub(super) fn title(canvas: &mut Canvas, scene: &str, time_s: f64, ink: Rgb) {
     write(canvas, MARGIN, MARGIN, &format!("{scene}  t = {time_s:.3} s"), scale, ink);
 }
 
+/// What the arrow of one tool stands for, in its colour, below the title.
+pub(super) fn force(canvas: &mut Canvas, line: usize, tool: &str, force_n: f32, ink: Rgb) {
+    let scale = text_scale(canvas);
+    let top = MARGIN + (line + 1) * 2 * GLYPH * scale;
+    write(canvas, MARGIN, top, &format!("contact force on {tool} {force_n:.3} N"), scale, ink);
+}
+
 fn text_scale(canvas: &Canvas) -> usize {
     (canvas.height / 400).clamp(1, 6)
 }

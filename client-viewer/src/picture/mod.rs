@@ -16,6 +16,8 @@ use std::path::PathBuf;
 /// Each pixel is the mean of this many squared.
 const SUPERSAMPLING: usize = 2;
 const GROUND: Rgb = Rgb([0.078, 0.094, 0.110]);
+/// Forces written below the title: more tools would run into the legend.
+const LABELLED_TOOLS: usize = 4;
 const INK: Rgb = Rgb([0.90, 0.89, 0.86]);
 const TOOL: Rgb = Rgb([0.91, 0.89, 0.85]);
 const ARROW: Rgb = Rgb([0.44, 0.88, 0.76]);
@@ -32,7 +34,7 @@ pub struct SnapshotArguments {
     #[arg(long, default_value = "0.75,-1.35,0.55", value_parser = parse_direction, allow_hyphen_values = true, value_name = "X,Y,Z")]
     from: Vec3,
     /// Displacement (mm) of the last colour; a round number above the largest when absent
-    #[arg(long, value_name = "MM")]
+    #[arg(long, value_parser = parse_full_scale, allow_negative_numbers = true, value_name = "MM")]
     full_scale_mm: Option<f32>,
     /// Replace the file if it exists
     #[arg(long)]
@@ -48,6 +50,11 @@ fn parse_size(text: &str) -> Result<(usize, usize), String> {
     } else {
         Err("both must be between 64 and 8192 pixels".into())
     }
+}
+
+fn parse_full_scale(text: &str) -> Result<f32, String> {
+    let mm: f32 = text.parse().map_err(|error| format!("{error}"))?;
+    if (1e-6..=1e6).contains(&mm) { Ok(mm) } else { Err("must be between 0.000001 and 1000000 mm".into()) }
 }
 
 fn parse_direction(text: &str) -> Result<Vec3, String> {
@@ -66,18 +73,20 @@ fn parse_direction(text: &str) -> Result<Vec3, String> {
 /// # Errors
 /// An unreachable daemon or a file that cannot be written.
 pub async fn run(server: &Server, arguments: &SnapshotArguments) -> Result<(), ViewError> {
+    if !arguments.file.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("png")) {
+        return Err(ViewError::Ending { path: arguments.file.clone(), known: ".png" });
+    }
     let surface = export::present_surface(server).await?;
-    let full_scale_m = arguments.full_scale_mm.map(|mm| mm.max(1e-6) * 1e-3);
+    let full_scale_m = arguments.full_scale_mm.map(|mm| mm * 1e-3);
     let (canvas, top_m) = draw(&surface, arguments.size, arguments.from, full_scale_m);
     cli::write_new(&arguments.file, &encode(&canvas)?, arguments.force)?;
-    println!(
+    cli::say(&format!(
         "{}: tick {}, largest displacement {:.3} mm, full colour at {:.3} mm",
         arguments.file.display(),
         surface.last.tick,
         1e3 * largest(&surface),
         1e3 * top_m
-    );
-    Ok(())
+    ))
 }
 
 fn largest(surface: &Surface) -> f32 {
@@ -88,7 +97,9 @@ fn largest(surface: &Surface) -> f32 {
 fn draw(surface: &Surface, (width, height): (usize, usize), from: Vec3, full_scale_m: Option<f32>) -> (Canvas, f32) {
     let top_m = full_scale_m.unwrap_or_else(|| colour::nice_ceiling(largest(surface), 1e-4));
     let positions = surface.positions_m();
-    let camera = Camera::looking_at(&surface.rest_m, from, width as f32 / height as f32);
+    // The rest shape too: pictures of small displacements are all taken from the same place.
+    let seen: Vec<Vec3> = surface.rest_m.iter().chain(&positions).copied().collect();
+    let camera = Camera::looking_at(&seen, from, width as f32 / height as f32);
     let mut canvas = Canvas::new(width * SUPERSAMPLING, height * SUPERSAMPLING, GROUND);
     let normals = vertex_normals(&positions, &surface.triangles);
     let vertices: Vec<Vertex> = positions
@@ -104,12 +115,20 @@ fn draw(surface: &Surface, (width, height): (usize, usize), from: Vec3, full_sca
     let mut canvas = canvas.reduced(SUPERSAMPLING);
     label::legend(&mut canvas, top_m, INK);
     label::title(&mut canvas, &surface.header.scene_name, surface.last.time_s, INK);
+    let tools = surface.header.tools.iter().zip(&surface.last.tools);
+    for (line, (shape, state)) in tools.take(LABELLED_TOOLS).enumerate() {
+        let force_n = vector(state.contact_force_n).unwrap_or(Vec3::ZERO).length();
+        label::force(&mut canvas, line, &shape.name, force_n, ARROW);
+    }
     (canvas, top_m)
+}
+
+fn vector(v: Option<palpate_proto::v1::Vec3>) -> Option<Vec3> {
+    v.map(|v| Vec3::new(v.x as f32, v.y as f32, v.z as f32))
 }
 
 fn draw_tools(canvas: &mut Canvas, camera: &Camera, surface: &Surface) {
     for (shape, state) in surface.header.tools.iter().zip(&surface.last.tools) {
-        let vector = |v: Option<palpate_proto::v1::Vec3>| v.map(|v| Vec3::new(v.x as f32, v.y as f32, v.z as f32));
         let Some(centre) = vector(state.proxy_position_m) else { continue };
         for t in solids::sphere(centre, shape.radius_m as f32, TOOL) {
             canvas.triangle(camera, t);
@@ -171,6 +190,29 @@ mod tests {
         assert_eq!(canvas.pixel(2, 148), GROUND.0.map(|c| (c * 255.0).round() as u8));
     }
 
+    /// The camera saw the rest shape only: a body that had moved far was outside the picture.
+    #[test]
+    fn a_body_that_moved_far_is_in_the_picture() {
+        let mut moved = square();
+        moved.displacement_m = vec![Vec3::new(5.0, 0.0, 0.0); 4];
+        let (canvas, _) = draw(&moved, (200, 150), Vec3::new(0.0, -0.01, 1.0), None);
+        let ground = GROUND.0.map(|c| (c * 255.0).round() as u8);
+        assert!((100..200).any(|column| canvas.pixel(column, 75) != ground));
+    }
+
+    #[test]
+    fn the_force_is_written_beside_its_arrow() {
+        let mut pressed = square();
+        pressed.header.tools = vec![palpate_proto::v1::ToolShape { name: "finger".into(), radius_m: 0.01 }];
+        let force = Some(palpate_proto::v1::Vec3 { x: 0.0, y: 0.0, z: 0.5 });
+        pressed.last.tools = vec![palpate_proto::v1::ToolState { contact_force_n: force, ..Default::default() }];
+        let arrow = ARROW.0.map(|c| (c * 255.0).round() as u8);
+        let (canvas, _) = draw(&pressed, (400, 300), Vec3::new(0.0, -0.01, 1.0), None);
+        let written =
+            (0..400).flat_map(|x| (24..48).map(move |y| (x, y))).filter(|&(x, y)| canvas.pixel(x, y) == arrow);
+        assert!(written.count() > 100);
+    }
+
     #[test]
     fn the_picture_is_a_png() {
         let (canvas, _) = draw(&square(), (64, 64), Vec3::ONE, Some(0.05));
@@ -185,6 +227,8 @@ mod tests {
     #[test]
     fn sizes_and_directions_are_checked() {
         assert_eq!(parse_size("640x480"), Ok((640, 480)));
+        assert_eq!(parse_full_scale("2.5"), Ok(2.5));
+        assert!(["nan", "-5", "0", "inf", "x"].iter().all(|text| parse_full_scale(text).is_err()));
         assert!(parse_size("640").is_err() && parse_size("1x1").is_err());
         assert!(parse_direction("0,0,0").is_err() && parse_direction("1,2").is_err());
         assert_eq!(parse_direction("1, -2, 3"), Ok(Vec3::new(1.0, -2.0, 3.0)));
