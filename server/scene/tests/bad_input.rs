@@ -245,7 +245,7 @@ fn numerics_and_output_outside_their_range() {
     );
     assert_eq!(
         refused("name = \"t\"", "name = \"t\"\ntick_period_s = 0"),
-        "t.toml:3:17: scene.tick_period_s = 0: must be larger than 0"
+        "t.toml:3:17: scene.tick_period_s = 0: must be between 1e-5 and 10"
     );
 }
 

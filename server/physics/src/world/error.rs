@@ -70,12 +70,12 @@ pub enum ModelError {
     },
     /// More substeps than any tick can bear.
     #[error(
-        "the body needs {substeps} substeps per tick (largest natural frequency {omega_rad_per_s:.3e} rad/s); \
+        "the body needs {substeps:.3e} substeps per tick (largest natural frequency {omega_rad_per_s:.3e} rad/s); \
          coarsen or improve the mesh, soften the material, or lengthen the tick (limit {limit})"
     )]
     TooStiff {
         /// Substeps needed.
-        substeps: u64,
+        substeps: f64,
         /// ω_max (rad/s).
         omega_rad_per_s: f64,
         /// Largest number allowed.

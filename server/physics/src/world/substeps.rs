@@ -28,7 +28,7 @@ pub(super) fn choose(spec: &ModelSpec, materials: &[Material], omega: f64) -> Re
     if substeps <= f64::from(MAX_SUBSTEPS) {
         Ok(substeps as u32)
     } else {
-        Err(ModelError::TooStiff { substeps: substeps as u64, omega_rad_per_s: omega, limit: MAX_SUBSTEPS })
+        Err(ModelError::TooStiff { substeps, omega_rad_per_s: omega, limit: MAX_SUBSTEPS })
     }
 }
 

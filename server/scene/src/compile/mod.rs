@@ -101,7 +101,12 @@ fn settings(document: &Document) -> Result<Settings, Fault> {
     let at = Where::root("numerics");
     let NumericsTable { precision, substeps, step_safety, stretch_allowance, mass_damping_per_s } = document.numerics;
     let period = document.scene.tick_period_s;
-    check(&Where::root("scene").key("tick_period_s"), period, period > 0.0, "must be larger than 0")?;
+    check(
+        &Where::root("scene").key("tick_period_s"),
+        period,
+        (1e-5..=10.0).contains(&period),
+        "must be between 1e-5 and 10",
+    )?;
     check(&at.key("step_safety"), step_safety, step_safety > 0.0 && step_safety <= 1.0, "must be in (0, 1]")?;
     check(&at.key("stretch_allowance"), stretch_allowance, stretch_allowance >= 1.0, "must be 1 or larger")?;
     check(&at.key("mass_damping_per_s"), mass_damping_per_s, mass_damping_per_s >= 0.0, "must not be negative")?;

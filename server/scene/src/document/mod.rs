@@ -58,7 +58,7 @@ pub(crate) struct SceneTable {
     /// What the scene shows.
     #[serde(default)]
     pub(crate) description: String,
-    /// Period of the haptic tick (s).
+    /// Period of the haptic tick (s, 10 µs to 10 s).
     #[serde(default = "default_tick_period_s")]
     pub(crate) tick_period_s: f64,
     /// Gravity (m/s², world); none by default.
