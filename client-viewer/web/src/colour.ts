@@ -23,20 +23,33 @@ export function niceCeiling(value: number, least: number): number {
   return 10 * power;
 }
 
-/** Range of the legend: grows at once, shrinks only after the values stayed small for a while. */
-export class LegendRange {
-  /** Upper end (m). */
-  top = 1e-4;
-  private quietSince = 0;
+const QUIET_MS = 6000;
 
-  update(max: number, nowMs: number): boolean {
-    const wanted = niceCeiling(max, 1e-4);
-    if (wanted >= this.top) this.quietSince = nowMs;
-    const shrink = nowMs - this.quietSince > 6000;
-    if (wanted <= this.top && !shrink) return false;
-    if (wanted === this.top) return false;
-    this.top = wanted;
+/** Upper end of a scale: grows at once, shrinks only when the values stayed small for a while, and then to the largest of them. */
+export class ScaleRange {
+  top: number;
+  private quietSince: number | undefined;
+  private largest = 0;
+
+  /** `least` is the smallest upper end. */
+  constructor(private readonly least: number) {
+    this.top = least;
+  }
+
+  /** Takes a value; true when the upper end is another one. */
+  update(value: number, nowMs: number): boolean {
+    const wanted = niceCeiling(value, this.least);
+    this.quietSince ??= nowMs;
+    if (wanted >= this.top) return this.set(wanted, nowMs);
+    this.largest = Math.max(this.largest, wanted);
+    return nowMs - this.quietSince > QUIET_MS && this.set(this.largest, nowMs);
+  }
+
+  private set(top: number, nowMs: number): boolean {
+    const differs = top !== this.top;
+    this.top = top;
+    this.largest = 0;
     this.quietSince = nowMs;
-    return true;
+    return differs;
   }
 }

@@ -25,10 +25,11 @@ async function loop(onEvent: (event: SurfaceEvent) => void, onState: (state: Con
         onState({ state: "live", text: "live" });
       });
     } catch (error) {
-      reason = error instanceof Error ? error.message : String(error);
+      // A browser calls every failure of the network a TypeError, in words of its own.
+      reason = error instanceof TypeError ? "no daemon answers" : error instanceof Error ? error.message : String(error);
+      console.info(error);
     }
-    console.info(`stream lost: ${reason}`);
-    onState({ state: "lost", text: `lost – trying again in ${(pauseMs / 1000).toFixed(1)} s` });
+    onState({ state: "lost", text: `lost: ${reason} – trying again in ${pauseMs / 1000} s` });
     await new Promise((resolve) => setTimeout(resolve, pauseMs));
     pauseMs = Math.min(2 * pauseMs, LONGEST_PAUSE_MS);
   }
@@ -36,7 +37,8 @@ async function loop(onEvent: (event: SurfaceEvent) => void, onState: (state: Con
 
 async function watchOnce(onEvent: (event: SurfaceEvent) => void, onFirst: () => void): Promise<void> {
   const abort = new AbortController();
-  let watchdog = window.setTimeout(() => abort.abort(new Error("silence")), SILENCE_MS);
+  const silence = new Error(`the daemon said nothing for ${SILENCE_MS / 1000} s`);
+  let watchdog = window.setTimeout(() => abort.abort(silence), SILENCE_MS);
   try {
     const service = await fetchSurfaceService(abort.signal);
     const transport = createGrpcWebTransport({ baseUrl: new URL(".", window.location.href).href.replace(/\/$/, "") });
@@ -48,7 +50,7 @@ async function watchOnce(onEvent: (event: SurfaceEvent) => void, onFirst: () => 
       if (first) onFirst();
       first = false;
       window.clearTimeout(watchdog);
-      watchdog = window.setTimeout(() => abort.abort(new Error("silence")), SILENCE_MS);
+      watchdog = window.setTimeout(() => abort.abort(silence), SILENCE_MS);
       onEvent(event);
     }
   } finally {

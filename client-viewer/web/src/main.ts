@@ -1,9 +1,11 @@
 // Wires the stream to the view. One frame of the screen draws the newest update, however many came.
-import { LegendRange, colourOf, niceCeiling } from "./colour";
+import { ScaleRange, colourOf } from "./colour";
 import { watchForever } from "./connection";
+import { delayText } from "./delay";
 import { ForcePlot } from "./plot";
 import { Stage } from "./stage";
 import { KeyframeAssembler, type Surface } from "./surface";
+import { Trace } from "./trace";
 import type { SurfaceUpdate, Vec3 } from "./wire";
 
 const element = <T extends HTMLElement>(id: string) => document.getElementById(id) as T;
@@ -13,13 +15,19 @@ const write = (id: string, text: string) => {
 };
 const magnitude = (v: Vec3 | undefined) => Math.hypot(v?.x ?? 0, v?.y ?? 0, v?.z ?? 0);
 
-const stage = new Stage(element("view"));
-const plot = new ForcePlot(element<HTMLCanvasElement>("plot-canvas"));
-const legend = new LegendRange();
+const stage = makeStage();
+const trace = new Trace();
+const plot = new ForcePlot(element<HTMLCanvasElement>("plot-canvas"), trace);
+/** Displacement (m) of the last colour. */
+let legend = new ScaleRange(1e-4);
+/** Force (N) of the longest arrow. */
+let arrow = new ScaleRange(0.1);
 const assembler = new KeyframeAssembler();
 let surface: Surface | undefined;
 let newest: SurfaceUpdate | undefined;
-let largestForce = 0.1;
+const STANDS_MS = 1000;
+/** When simulated time last went on (ms of this page's clock). */
+let movedAt = 0;
 const arrivals: number[] = [];
 
 watchForever(
@@ -34,14 +42,36 @@ watchForever(
   ({ state, text }) => {
     element("connection").dataset["state"] = state;
     write("connection", text);
+    if (state === "live") return;
+    // What is seen is the past: the style sheet greys it, and what would pretend to be measured now goes.
+    trace.interrupt();
+    arrivals.length = 0;
+    for (const id of ["rate", "delay"]) write(id, "–");
   },
 );
 
+/** The stage; without WebGL the numbers and the plot go on. */
+function makeStage(): Stage | undefined {
+  try {
+    return new Stage(element("view"));
+  } catch (error) {
+    write("view", "This browser gives no WebGL, so the surface is not drawn; the numbers are live.");
+    console.warn(error);
+    return undefined;
+  }
+}
+
 function begin(complete: Surface): void {
+  if (surface?.header.sessionId !== complete.header.sessionId) {
+    trace.clear();
+    legend = new ScaleRange(1e-4);
+    arrow = new ScaleRange(0.1);
+    drawLegend();
+  }
   surface = complete;
   newest = undefined;
-  largestForce = 0.1;
-  stage.show(complete);
+  stage?.show(complete);
+  stage?.refresh(legend.top);
   document.title = `${complete.header.sceneName} – Palpate`;
   write("scene-name", complete.header.sceneName);
   write("mesh", `${complete.header.vertexCount} vertices, ${complete.header.triangleCount} faces`);
@@ -51,27 +81,30 @@ function take(update: SurfaceUpdate): void {
   if (!surface || update.epoch !== surface.epoch) return;
   // Later updates build on this one: a stream that does not fit must begin anew.
   if (!surface.apply(update)) throw new Error(`update of tick ${update.tick} does not fit its keyframe`);
+  const now = performance.now();
+  if (update.timeS !== newest?.timeS) movedAt = now;
   newest = update;
   const tool = update.tools[0];
   const contact = magnitude(tool?.contactForceN);
-  largestForce = Math.max(largestForce, contact);
-  plot.push(update.timeS, contact, magnitude(tool?.deviceForceN));
-  const now = performance.now();
+  trace.push(update.timeS, contact, magnitude(tool?.deviceForceN));
   arrivals.push(now);
   while (arrivals.length > 0 && now - (arrivals[0] ?? now) > 2000) arrivals.shift();
 }
 
 function numbers(update: SurfaceUpdate): void {
   const tool = update.tools[0];
-  write("time", `${update.timeS.toFixed(2)} s`);
-  write("contact-force", tool ? `${magnitude(tool.contactForceN).toFixed(3)} N` : "no tool");
-  write("device-force", tool ? `${magnitude(tool.deviceForceN).toFixed(3)} N` : "no tool");
-  write("max-displacement", `${(1e3 * update.maxDisplacementM).toFixed(2)} mm`);
+  // The numbers and the plot are of the first tool: with several, it is named.
+  const name = update.tools.length > 1 ? `${surface?.header.tools[0]?.name ?? "first tool"}: ` : "";
+  // Paused, or held after a fault: the stream lives, the body does not.
+  write("time", `${update.timeS.toFixed(2)} s${performance.now() - movedAt > STANDS_MS ? ", stands" : ""}`);
+  write("contact-force", tool ? `${name}${magnitude(tool.contactForceN).toFixed(3)} N` : "no tool");
+  write("device-force", tool ? `${name}${magnitude(tool.deviceForceN).toFixed(3)} N` : "no tool");
+  write("max-displacement", `${(1e3 * update.maxDisplacementM).toFixed(3)} mm`);
   write("tick-cost", `${update.tickCostUs.toFixed(0)} µs`);
   const first = arrivals[0];
   const span = first === undefined ? 0 : (arrivals[arrivals.length - 1]! - first) / 1000;
   write("rate", span > 0.2 ? `${((arrivals.length - 1) / span).toFixed(0)} Hz` : "–");
-  write("delay", `${Math.max(0, Date.now() - Number(update.sentUnixNs / 1000n) / 1000).toFixed(0)} ms`);
+  write("delay", delayText(Date.now() - Number(update.sentUnixNs / 1000n) / 1000));
   write("skipped", String(update.skipped));
 }
 
@@ -90,26 +123,33 @@ function drawLegend(): void {
     return item;
   });
   element("legend-ticks").replaceChildren(...ticks);
+  write("arrow-scale", `longest arrow ${Number(arrow.top.toPrecision(3))} N`);
 }
 
 let drawn: SurfaceUpdate | undefined;
 function frame(): void {
   if (newest && newest !== drawn) {
     drawn = newest;
-    if (legend.update(newest.maxDisplacementM, performance.now())) drawLegend();
-    stage.refresh(legend.top);
-    stage.moveTools(newest.tools, niceCeiling(largestForce, 0.1));
+    const now = performance.now();
+    const forces = newest.tools.map((tool) => magnitude(tool.contactForceN));
+    const rescaled = arrow.update(Math.max(0, ...forces), now);
+    if (legend.update(newest.maxDisplacementM, now) || rescaled) drawLegend();
+    stage?.refresh(legend.top);
+    stage?.moveTools(newest.tools, arrow.top);
     numbers(newest);
     plot.draw();
   }
-  stage.render();
+  stage?.render();
+  // For the browser's tests: surfaces that went must not stay on the graphics card.
+  const held = String(stage?.geometries ?? 0);
+  if (element("view").dataset["geometries"] !== held) element("view").dataset["geometries"] = held;
   requestAnimationFrame(frame);
 }
 
-element<HTMLInputElement>("wireframe").addEventListener("change", (e) => stage.setEdges((e.target as HTMLInputElement).checked));
-element<HTMLInputElement>("ghost").addEventListener("change", (e) => stage.setGhost((e.target as HTMLInputElement).checked));
-element("recentre").addEventListener("click", () => stage.recentre());
-stage.setEdges(false);
-stage.setGhost(false);
+element<HTMLInputElement>("wireframe").addEventListener("change", (e) => stage?.setEdges((e.target as HTMLInputElement).checked));
+element<HTMLInputElement>("ghost").addEventListener("change", (e) => stage?.setGhost((e.target as HTMLInputElement).checked));
+element("recentre").addEventListener("click", () => stage?.recentre());
+stage?.setEdges(element<HTMLInputElement>("wireframe").checked);
+stage?.setGhost(element<HTMLInputElement>("ghost").checked);
 drawLegend();
 requestAnimationFrame(frame);

@@ -1,41 +1,29 @@
 // Force over time, the last ten seconds.
 import { niceCeiling } from "./colour";
-
-const SPAN_S = 10;
-const CAPACITY = 60 * SPAN_S * 2;
-
-interface Sample { time: number; contact: number; device: number }
+import { SPAN_S, type Sample, type Trace } from "./trace";
 
 export class ForcePlot {
-  private samples: Sample[] = [];
   private readonly canvas: HTMLCanvasElement;
 
-  constructor(canvas: HTMLCanvasElement) {
+  constructor(canvas: HTMLCanvasElement, private readonly trace: Trace) {
     this.canvas = canvas;
-  }
-
-  push(time: number, contact: number, device: number): void {
-    const last = this.samples[this.samples.length - 1];
-    // Time runs backwards after a reset or another scene: begin anew.
-    if (last && time < last.time) this.samples = [];
-    this.samples.push({ time, contact, device });
-    if (this.samples.length > CAPACITY) this.samples.splice(0, this.samples.length - CAPACITY);
+    new ResizeObserver(() => this.draw()).observe(canvas);
   }
 
   draw(): void {
     const ratio = window.devicePixelRatio || 1;
     const width = this.canvas.clientWidth;
     const height = this.canvas.clientHeight;
-    if (this.canvas.width !== Math.round(width * ratio)) {
+    if (this.canvas.width !== Math.round(width * ratio) || this.canvas.height !== Math.round(height * ratio)) {
       this.canvas.width = Math.round(width * ratio);
       this.canvas.height = Math.round(height * ratio);
     }
     const context = this.canvas.getContext("2d");
-    const last = this.samples[this.samples.length - 1];
+    const shown = this.trace.samples;
+    const last = shown.at(-1);
     if (!context || !last) return;
     context.setTransform(ratio, 0, 0, ratio, 0, 0);
     context.clearRect(0, 0, width, height);
-    const shown = this.samples.filter((sample) => sample.time > last.time - SPAN_S);
     const top = niceCeiling(Math.max(...shown.map((s) => Math.max(s.contact, s.device))), 0.1);
     const left = 44;
     const x = (time: number) => left + ((time - last.time + SPAN_S) / SPAN_S) * (width - left - 4);
@@ -65,7 +53,7 @@ export class ForcePlot {
     context.strokeStyle = colour;
     context.lineWidth = 1.5;
     context.beginPath();
-    samples.forEach((s, i) => (i ? context.lineTo(x(s.time), y(value(s))) : context.moveTo(x(s.time), y(value(s)))));
+    samples.forEach((s) => (!s.gap ? context.lineTo(x(s.time), y(value(s))) : context.moveTo(x(s.time), y(value(s)))));
     context.stroke();
     context.lineWidth = 1;
   }

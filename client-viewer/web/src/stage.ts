@@ -7,12 +7,15 @@ import type { ToolState, Vec3 } from "./wire";
 
 const vector = (v: Vec3 | undefined) => new THREE.Vector3(v?.x ?? 0, v?.y ?? 0, v?.z ?? 0);
 
+/** Of the smaller direction of the window. */
+const FIELD_OF_VIEW_DEG = 35;
+
 interface ToolView { proxy: THREE.Mesh; device: THREE.Mesh; arrow: THREE.ArrowHelper }
 
 export class Stage {
   private readonly renderer = new THREE.WebGLRenderer({ antialias: true });
   private readonly scene = new THREE.Scene();
-  private readonly camera = new THREE.PerspectiveCamera(35, 1, 0.001, 10);
+  private readonly camera = new THREE.PerspectiveCamera(FIELD_OF_VIEW_DEG, 1, 0.001, 10);
   private readonly controls: OrbitControls;
   private readonly body = new THREE.Group();
   private readonly material = new THREE.MeshStandardMaterial({
@@ -39,6 +42,7 @@ export class Stage {
     this.camera.add(sun);
     this.scene.add(this.camera, this.body);
     this.renderer.setPixelRatio(Math.min(window.devicePixelRatio, 2));
+    this.renderer.domElement.addEventListener("webglcontextrestored", () => (this.dirty = true));
     host.append(this.renderer.domElement);
     this.camera.up.set(0, 0, 1);
     this.controls = new OrbitControls(this.camera, this.renderer.domElement);
@@ -48,9 +52,12 @@ export class Stage {
     this.resize();
   }
 
+  /** Shows another surface; looks at its middle unless it is the same session's, seen as the user left it. */
   show(surface: Surface): void {
+    const known = this.surface?.header.sessionId === surface.header.sessionId;
     this.body.clear();
     this.geometry?.dispose();
+    this.ghostMesh?.geometry.dispose();
     this.surface = surface;
     const geometry = new THREE.BufferGeometry();
     geometry.setIndex(new THREE.BufferAttribute(surface.triangles, 1));
@@ -69,7 +76,7 @@ export class Stage {
     this.setEdges(this.edges.visible);
     this.setGhost(this.ghost.visible);
     this.makeTools(surface);
-    this.recentre();
+    if (!known) this.recentre();
   }
 
   setEdges(on: boolean): void {
@@ -114,7 +121,7 @@ export class Stage {
   moveTools(states: ToolState[], fullScaleN: number): void {
     this.tools.forEach((view, index) => {
       const state = states[index];
-      view.proxy.visible = view.device.visible = state !== undefined;
+      view.proxy.visible = view.device.visible = view.arrow.visible = state !== undefined;
       if (!state) return;
       view.proxy.position.copy(vector(state.proxyPositionM));
       view.device.position.copy(vector(state.devicePositionM));
@@ -130,6 +137,11 @@ export class Stage {
     this.dirty = true;
   }
 
+  /** Geometries that the graphics card holds: constant however many surfaces were shown. */
+  get geometries(): number {
+    return this.renderer.info.memory.geometries;
+  }
+
   render(): void {
     this.controls.update();
     if (!this.dirty) return;
@@ -138,13 +150,19 @@ export class Stage {
   }
 
   private makeTools(surface: Surface): void {
-    for (const view of this.tools) this.scene.remove(view.proxy, view.device, view.arrow);
+    for (const view of this.tools) {
+      this.scene.remove(view.proxy, view.device, view.arrow);
+      view.proxy.geometry.dispose();
+      for (const mesh of [view.proxy, view.device]) (mesh.material as THREE.Material).dispose();
+      view.arrow.dispose();
+    }
     this.tools = surface.header.tools.map((tool) => {
       const ball = new THREE.SphereGeometry(tool.radiusM, 48, 24);
       const proxy = new THREE.Mesh(ball, new THREE.MeshStandardMaterial({ color: 0xe9e4da, roughness: 0.35, transparent: true, opacity: 0.85 }));
       const device = new THREE.Mesh(ball, new THREE.MeshBasicMaterial({ color: 0x6fb7e9, wireframe: true, transparent: true, opacity: 0.12 }));
       const arrow = new THREE.ArrowHelper(new THREE.Vector3(0, 0, 1), new THREE.Vector3(), 0.01, 0x6fe0c2);
-      arrow.visible = false;
+      // Nobody knows yet where they are.
+      proxy.visible = device.visible = arrow.visible = false;
       this.scene.add(proxy, device, arrow);
       return { proxy, device, arrow };
     });
@@ -153,7 +171,10 @@ export class Stage {
   private resize(): void {
     const { clientWidth, clientHeight } = this.host;
     this.renderer.setSize(clientWidth, clientHeight);
-    this.camera.aspect = clientWidth / Math.max(clientHeight, 1);
+    this.camera.aspect = Math.max(clientWidth, 1) / Math.max(clientHeight, 1);
+    // The same view in the smaller direction, so that the whole body is seen in a window that is higher than wide.
+    const half = Math.tan(THREE.MathUtils.degToRad(FIELD_OF_VIEW_DEG / 2)) / Math.min(this.camera.aspect, 1);
+    this.camera.fov = 2 * THREE.MathUtils.radToDeg(Math.atan(half));
     this.camera.updateProjectionMatrix();
     this.dirty = true;
   }

@@ -28,6 +28,8 @@ describe("keyframe", () => {
     const assembler = new KeyframeAssembler();
     expect(() => assembler.push(chunk(1, 2, {}))).toThrow(/out of order/);
     expect(() => assembler.push(chunk(0, 1, { header }))).toThrow(/announces 3/);
+    const triangles = bytes(new Uint32Array([0, 1, 3]));
+    expect(() => assembler.push(chunk(0, 1, { header, restPositionsMF32le: bytes(rest), trianglesU32le: triangles }))).toThrow(/does not bring/);
   });
 });
 

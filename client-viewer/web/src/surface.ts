@@ -63,6 +63,7 @@ export class KeyframeAssembler {
     if (rest.length !== 3 * header.vertexCount || triangles.length !== 3 * header.triangleCount) {
       throw new Error(`the keyframe announces ${header.vertexCount} vertices and brings ${rest.length / 3}`);
     }
+    if (triangles.some((vertex) => vertex >= header.vertexCount)) throw new Error("the keyframe has triangles of vertices that it does not bring");
     this.chunks = [];
     return new Surface(header, chunk.epoch, rest, triangles);
   }

@@ -70,6 +70,26 @@ function colours(png, x0, y0, x1, y1) {
 const number = async (page, id) => Number.parseFloat((await page.textContent(`#${id}`)).replace(",", ""));
 const state = (page) => page.getAttribute("#connection", "data-state");
 
+/** Session.Pause over gRPC-Web: a frame of two bytes, field 2 true or false. */
+async function pause(paused) {
+  const answer = await fetch(`${url}palpate.v1.Session/Pause`, {
+    method: "POST",
+    headers: { "content-type": "application/grpc-web+proto" },
+    body: new Uint8Array([0, 0, 0, 0, 2, 0x10, paused ? 1 : 0]),
+  });
+  assert.ok(answer.ok && !answer.headers.has("grpc-message"), `Pause: ${answer.status} ${answer.headers.get("grpc-message")}`);
+}
+
+/** Waits for a firm press and gives its force (N). */
+async function pressure(page) {
+  let contact = 0;
+  for (let i = 0; i < 400 && !(contact >= 0.02); i++) {
+    contact = await number(page, "contact-force");
+    await sleep(25);
+  }
+  return contact;
+}
+
 let daemon = await startDaemon();
 const browser = await chromium.launch({
   executablePath,
@@ -86,15 +106,11 @@ try {
   await page.goto(url);
   await page.waitForSelector('#connection[data-state="live"]', { timeout: 20_000 });
   check("the page goes live", true);
-  check("the scene has a name", (await page.textContent("#scene-name")).length > 2, await page.textContent("#scene-name"));
+  check("the scene has its name", (await page.textContent("#scene-name")) === "ventricle");
   check("the mesh is counted", /\d+ vertices, \d+ faces/.test(await page.textContent("#mesh")), await page.textContent("#mesh"));
 
   // The simulated arm presses every two seconds: wait for a firm press.
-  let contact = 0;
-  for (let i = 0; i < 400 && !(contact >= 0.02); i++) {
-    contact = await number(page, "contact-force");
-    await sleep(25);
-  }
+  const contact = await pressure(page);
   const pressed = await page.screenshot({ path: join(artefacts, "page-pressed.png") });
   check("the arm presses", contact >= 0.02, `${contact} N`);
   check("the surface dents", (await number(page, "max-displacement")) > 0.05, await page.textContent("#max-displacement"));
@@ -104,6 +120,12 @@ try {
 
   const ticks = await page.$$eval("#legend-ticks li", (items) => items.map((item) => Number(item.textContent)));
   check("the legend falls from top to 0", ticks.length === 5 && ticks[4] === 0 && ticks[0] > ticks[1], ticks.join(" "));
+  // In one go: both are written in the same frame.
+  const [top, largest] = await page.evaluate(() =>
+    ["#legend-ticks li", "#max-displacement"].map((part) => Number.parseFloat(document.querySelector(part).textContent)));
+  check("the legend reaches the largest displacement", top >= largest && top <= 20, `${top} mm of ${largest} mm`);
+  const scale = await page.textContent("#arrow-scale");
+  check("the arrow has a scale", /longest arrow (0\.[125]|[125]0?) N/.test(scale), scale);
   const caption = await page.textContent("#legend figcaption");
   check("the legend has a unit", caption.includes("mm"), caption);
   await sleep(1500);
@@ -115,20 +137,49 @@ try {
   const plot = colours(PNG.sync.read(await page.locator("#plot-canvas").screenshot()), 60, 5, 900, 95);
   check("the force is plotted", plot.saturated > 100, JSON.stringify(plot));
 
+  await pause(true);
+  await sleep(2000);
+  check("time that stands is told", (await page.textContent("#time")).endsWith("stands"), await page.textContent("#time"));
+  check("the stream goes on while time stands", (await state(page)) === "live");
+  await pause(false);
+  await sleep(500);
+  check("time that goes on is told", !(await page.textContent("#time")).includes("stands"), await page.textContent("#time"));
+
   await page.check("#wireframe");
   await page.check("#ghost");
   await sleep(300);
   await page.screenshot({ path: join(artefacts, "page-edges.png") });
   await page.click("#recentre");
 
+  // A narrow window: the numbers leave the middle of the body free, and nothing lies over anything.
+  for (const [width, height] of [[400, 760], [720, 420]]) {
+    await page.setViewportSize({ width, height });
+    await sleep(300);
+    await page.screenshot({ path: join(artefacts, `page-${width}.png`) });
+    const boxes = await Promise.all(["header", "aside", "#legend", "#plot"].map((part) => page.locator(part).boundingBox()));
+    const apart = (a, b) => a.x + a.width <= b.x || b.x + b.width <= a.x || a.y + a.height <= b.y || b.y + b.height <= a.y;
+    const inside = (a) => a.x >= 0 && a.y >= 0 && a.x + a.width <= width && a.y + a.height <= height;
+    const free = boxes.every((a, i) => inside(a) && boxes.slice(i + 1).every((b) => apart(a, b)));
+    const middle = { x: width / 2, y: 0.45 * height, width: 1, height: 1 };
+    check(`all parts have room in ${width}x${height}`, free && boxes.every((a) => apart(a, middle)), JSON.stringify(boxes));
+  }
+  await page.setViewportSize({ width: 1280, height: 860 });
+  const geometries = await page.getAttribute("#view", "data-geometries");
+
   const code = await stopDaemon(daemon);
   check("the daemon drains with an open page", code === 0, `exit code ${code}`);
   for (let i = 0; i < 100 && (await state(page)) === "live"; i++) await sleep(100);
   check("the page says that the stream is lost", (await state(page)) !== "live", await page.textContent("#connection"));
-  await page.screenshot({ path: join(artefacts, "page-lost.png") });
+  const lost = PNG.sync.read(await page.screenshot({ path: join(artefacts, "page-lost.png") }));
+  const past = colours(lost, 250, 100, 900, 640);
+  check("a picture of the past is grey", past.saturated < body.saturated / 10, JSON.stringify(past));
+  check("nothing of the past is called a delay or a rate", (await page.textContent("#delay")) + (await page.textContent("#rate")) === "––");
   daemon = await startDaemon();
   await page.waitForSelector('#connection[data-state="live"]', { timeout: 20_000 });
   check("the page comes back by itself", true);
+  check("the arm presses again", (await pressure(page)) >= 0.02);
+  const after = await page.getAttribute("#view", "data-geometries");
+  check("the old surface has left the graphics card", Number(after) > 0 && after === geometries, `${geometries} before, ${after} after`);
 
   const serious = complaints.filter((text) => !/Failed to load resource|ERR_|network error|Failed to fetch/i.test(text));
   check("no error in the console but for the lost connection", serious.length === 0, serious.join("\n"));
