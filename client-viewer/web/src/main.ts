@@ -66,9 +66,9 @@ function begin(complete: Surface): void {
     trace.clear();
     legend = new ScaleRange(1e-4);
     arrow = new ScaleRange(0.1);
-    drawLegend();
   }
   surface = complete;
+  drawLegend();
   newest = undefined;
   stage?.show(complete);
   stage?.refresh(legend.top);
@@ -123,7 +123,8 @@ function drawLegend(): void {
     return item;
   });
   element("legend-ticks").replaceChildren(...ticks);
-  write("arrow-scale", `longest arrow ${Number(arrow.top.toPrecision(3))} N`);
+  const tools = surface?.header.tools.length ?? 0;
+  write("arrow-scale", tools > 0 ? `longest arrow ${Number(arrow.top.toPrecision(3))} N` : "");
 }
 
 let drawn: SurfaceUpdate | undefined;

@@ -20,7 +20,7 @@ const BORDERS: [(&str, &[&str]); 10] = [
     ("palpated", &["palpate-scene", "palpate-physics", "palpate-control", "palpate-realtime", "palpate-proto"]),
     ("palpate-bridge", &["palpate-control", "palpate-realtime", "palpate-proto"]),
     ("palpate-view", &["palpate-proto"]),
-    ("palpate-lab", &["palpate-scene", "palpate-physics"]),
+    ("palpate-lab", &["palpate-physics", "palpate-realtime", "palpate-scene"]),
     ("palpate-system-tests", &[]),
 ];
 
