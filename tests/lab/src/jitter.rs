@@ -8,13 +8,12 @@ use palpate_realtime::{Clock, LoopMonitor, OsMeasures, Percentiles, TickLoop};
 use std::{collections::BTreeMap, ops::ControlFlow, process::Command, sync::Arc};
 
 const RATE_HZ: u64 = 1000;
-const TURNS: u64 = 5;
 
 /// What is measured.
 #[derive(Debug, Clone, Copy, Args)]
 pub struct Options {
-    /// Seconds for each of the two
-    #[arg(long, default_value_t = 20, value_parser = clap::value_parser!(u64).range(TURNS..=3600))]
+    /// Seconds for each of the two, in turns of one second
+    #[arg(long, default_value_t = 20, value_parser = clap::value_parser!(u64).range(1..=3600))]
     seconds: u64,
     /// Priority under SCHED_FIFO
     #[arg(long, default_value_t = 80, value_parser = clap::value_parser!(u8).range(1..=99))]
@@ -36,7 +35,7 @@ pub fn print(options: &Options) -> Result<()> {
     let tool = bodies::tool_beside(&shape, 10e-3);
     let model = bodies::model(&shape, bodies::material(Law::StableNeoHookean, 10e3, 0.45)?, Some(tool))?;
     println!(
-        "{} s at {RATE_HZ} Hz each, in {TURNS} turns, SCHED_FIFO {}; body: ventricle, 90 mm, {} tets, {} substeps, pressed 1 mm",
+        "{} s at {RATE_HZ} Hz each, in turns of 1 s, SCHED_FIFO {}; body: ventricle, 90 mm, {} tets, {} substeps, pressed 1 mm",
         options.seconds,
         options.priority,
         model.mesh().tets().len(),
@@ -44,7 +43,7 @@ pub fn print(options: &Options) -> Result<()> {
     );
     let ours = Arc::new(LoopMonitor::default());
     let mut theirs = Ok(BTreeMap::new());
-    for turn in 0..TURNS {
+    for turn in 0..options.seconds {
         // One after the other: on a machine with few processors they would measure each other.
         std::thread::scope(|scope| {
             scope
@@ -77,19 +76,18 @@ fn row(name: &str, p: &Percentiles) {
 }
 
 fn palpate(options: &Options, model: &Model, monitor: &Arc<LoopMonitor>, first: bool) -> Result<()> {
-    let Options { seconds, priority, processor, .. } = *options;
+    let Options { priority, processor, .. } = *options;
     let measures = OsMeasures { fifo_priority: Some(priority), lock_memory: true, processor, stay_awake: true };
     let granted = measures.apply();
     for note in granted.notes.iter().filter(|_| first) {
         println!("  {note}");
     }
-    let mut press = Press::new(model, 1e-3, 500);
+    let mut press = Press::new(model, 1e-3, 200);
     press.tick();
     let tick_loop = TickLoop::new(Clock::Monotonic, 1.0 / RATE_HZ as f64).into_diagnostic()?;
-    let last = seconds * RATE_HZ / TURNS;
     tick_loop.measured_in(Arc::clone(monitor)).run(|wakeup| {
         press.tick();
-        if wakeup.tick >= last { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+        if wakeup.tick + 1 >= RATE_HZ { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     });
     Ok(())
 }
@@ -99,7 +97,7 @@ fn cyclictest(options: &Options, mut counts: BTreeMap<u64, u64>) -> Result<BTree
     let mut command = Command::new("cyclictest");
     command.args(["--quiet", "--mlockall", "--threads=1", "--histogram=100000", "--policy=fifo"]);
     command.arg(format!("--interval={}", 1_000_000 / RATE_HZ)).arg(format!("--priority={}", options.priority));
-    command.arg(format!("--loops={}", options.seconds * RATE_HZ / TURNS));
+    command.arg(format!("--loops={}", RATE_HZ));
     if let Some(processor) = options.processor {
         command.arg(format!("--affinity={processor}"));
     }

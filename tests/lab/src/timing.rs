@@ -22,12 +22,14 @@ impl Summary {
     }
 }
 
-/// Runs every contender `rounds` times in turn, after `rounds/10 + 1` turns that are not counted.
+/// Runs every contender `rounds` times in turn, after `rounds/10 + 1` turns that are not counted. A turn is two runs, of which the
+/// second is timed: the first fetches back what the others pushed out of the caches.
 pub fn interleaved(contenders: &mut [Box<dyn FnMut() + '_>], rounds: usize) -> Vec<Summary> {
     let warm_up = rounds / 10 + 1;
     let mut times = vec![Vec::with_capacity(rounds); contenders.len()];
     for round in 0..warm_up + rounds {
         for (contender, times) in contenders.iter_mut().zip(&mut times) {
+            contender();
             let start = Instant::now();
             contender();
             let elapsed = start.elapsed().as_secs_f64();
