@@ -97,7 +97,7 @@ fn cyclictest(options: &Options, mut counts: BTreeMap<u64, u64>) -> Result<BTree
     let mut command = Command::new("cyclictest");
     command.args(["--quiet", "--mlockall", "--threads=1", "--histogram=100000", "--policy=fifo"]);
     command.arg(format!("--interval={}", 1_000_000 / RATE_HZ)).arg(format!("--priority={}", options.priority));
-    command.arg(format!("--loops={}", RATE_HZ));
+    command.arg(format!("--loops={RATE_HZ}"));
     if let Some(processor) = options.processor {
         command.arg(format!("--affinity={processor}"));
     }
