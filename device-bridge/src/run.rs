@@ -191,9 +191,12 @@ async fn stop_servo(
     }
 }
 
-/// Says every change of the link once, and the counters now and then.
+const SAY_AT_MOST_EVERY: Duration = Duration::from_secs(1);
+
+/// Says changes of the link once, and the counters now and then.
 struct Watcher {
     link: Link,
+    said_at: Option<time::Instant>,
     auto_recover: bool,
     report: Option<time::Interval>,
 }
@@ -201,14 +204,17 @@ struct Watcher {
 impl Watcher {
     fn new(settings: &Settings) -> Self {
         let report = settings.report_every.map(|pause| time::interval_at(time::Instant::now() + pause, pause));
-        Self { link: Link::Waiting, auto_recover: settings.servo.auto_recover, report }
+        Self { link: Link::Waiting, said_at: None, auto_recover: settings.servo.auto_recover, report }
     }
 
     fn look(&mut self, shared: &Shared) {
         let link = shared.stats.link();
-        if phase(link) != phase(self.link) {
+        // A link at the edge of what is fresh changes every few ticks: a latched fault is said at once, the rest once a second.
+        let quiet = self.said_at.is_some_and(|said| said.elapsed() < SAY_AT_MOST_EVERY);
+        if phase(link) != phase(self.link) && (!quiet || matches!(link, Link::Latched(_))) {
             self.say(link);
             self.link = link;
+            self.said_at = Some(time::Instant::now());
         }
         let mut cx = std::task::Context::from_waker(std::task::Waker::noop());
         if self.report.as_mut().is_some_and(|report| report.poll_tick(&mut cx).is_ready()) {
@@ -220,7 +226,7 @@ impl Watcher {
         match link {
             Link::Waiting => tracing::info!("no force until the daemon answers in time"),
             Link::Fresh | Link::Extrapolating => tracing::info!("the daemon answers: the force ramps up"),
-            Link::Ramping(fault) => tracing::warn!("{}: the force ramps to zero", reason(fault)),
+            Link::Ramping(fault) => tracing::warn!("{}: the force is reduced", reason(fault)),
             Link::Latched(fault) if self.auto_recover => {
                 tracing::warn!("{}: the force is zero until the daemon answers steadily", reason(fault));
             }

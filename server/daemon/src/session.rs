@@ -45,10 +45,34 @@ pub enum PrepareError {
     /// The loop cannot keep its tick.
     #[error(transparent)]
     Period(#[from] palpate_realtime::PeriodError),
+    /// Nobody could stop or ask a loop that is in one tick for so long.
+    #[error(
+        "a tick of {tets} tets in {substeps} substeps takes too long for a session (at most {MOST_TET_UPDATES} tets times substeps): coarsen the \
+         mesh, soften the material or shorten the tick; palpated simulate takes it as it is"
+    )]
+    TooHeavy {
+        /// Tets of the body.
+        tets: usize,
+        /// Substeps of a tick.
+        substeps: u32,
+    },
+    /// Orders and viewers wait for the tick's end.
+    #[error(
+        "scene.tick_period_s = {period_s}: a session needs ticks of {LONGEST_PERIOD_S} s at most; palpated simulate takes it as it is"
+    )]
+    TooSlow {
+        /// The period (s).
+        period_s: f64,
+    },
     /// The operating system.
     #[error("no descriptors for the session's slots: {0}")]
     Slots(#[from] io::Error),
 }
+
+/// Longest tick of a session (s).
+const LONGEST_PERIOD_S: f64 = 0.5;
+/// Most tets times substeps in a tick of a session: some quarter of a second of work.
+const MOST_TET_UPDATES: u64 = 50_000_000;
 
 /// A running session.
 #[derive(Debug)]
@@ -236,6 +260,13 @@ pub fn prepare(
     let model = Arc::new(Model::build(scene.model)?);
     let period_s = model.spec().settings.tick_period_s;
     palpate_realtime::Deadlines::new(palpate_realtime::Clock::Monotonic, period_s)?;
+    if period_s > LONGEST_PERIOD_S {
+        return Err(PrepareError::TooSlow { period_s });
+    }
+    let (tets, substeps) = (model.mesh().tets().len(), model.substeps());
+    if tets as u64 * u64::from(substeps) > MOST_TET_UPDATES {
+        return Err(PrepareError::TooHeavy { tets, substeps });
+    }
     let mut warnings = scene.warnings;
     warnings.extend(too_heavy(&model));
     let (number, id) = numbers.next_session();

@@ -193,6 +193,34 @@ async fn a_fault_takes_no_commands_place() {
     daemon.finish().await;
 }
 
+/// A device whose samples were refused faster than it read heard of nothing else.
+#[tokio::test(flavor = "multi_thread")]
+async fn refused_samples_take_no_commands_place() {
+    let daemon = Daemon::on(block_scene("block", 2)).await;
+    let mut arm = daemon.attach(hello()).await;
+    arm.welcome().await;
+    arm.move_to(above()).await;
+    let up = arm.up.clone();
+    let flood = tokio::spawn(async move {
+        let old = v1::DeviceUp { message: Some(device_up::Message::Sample(sample(1, above()))) };
+        while up.send(old.clone()).await.is_ok() {}
+    });
+    let mut faults = Vec::new();
+    let first = arm.command(&mut faults).await.tick;
+    let commands = async {
+        for _ in 0..100 {
+            arm.command(&mut faults).await;
+        }
+        arm.command(&mut faults).await.tick
+    };
+    let last =
+        tokio::time::timeout(std::time::Duration::from_secs(5), commands).await.expect("commands come all the same");
+    flood.abort();
+    assert!(last >= first + 101, "{first} to {last}");
+    assert!(!faults.is_empty());
+    daemon.finish().await;
+}
+
 /// What a device hears until its stream ends: forces with their ticks, and the goodbye.
 async fn to_the_end(arm: &mut Arm) -> (Vec<(DVec3, u64)>, Option<v1::DeviceFault>) {
     let (mut forces, mut goodbye) = (Vec::new(), None);

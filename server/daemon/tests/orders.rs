@@ -166,7 +166,7 @@ async fn the_loop_touches_no_heap_whatever_it_is_asked() {
 
 /// A step order is worked on until shortly before the next deadline: the loop is on time for whoever comes next, and sleeps.
 #[tokio::test(flavor = "multi_thread")]
-async fn a_long_step_leaves_the_loop_its_deadlines_and_its_sleep() {
+async fn a_long_step_is_spread_over_turns() {
     let (simulation, _ends, _) = session(1, block_scene("block", 2), &Arc::default());
     let running = Running::on(simulation);
     running.begin();

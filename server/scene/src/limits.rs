@@ -16,6 +16,8 @@ pub struct Limits {
     pub tets: u32,
     /// Tables of one kind (`[[region]]`, `[[load]]`, …), and selectors in all regions together.
     pub entries: usize,
+    /// Tools, each of which carries tables as large as the surface.
+    pub tools: usize,
     /// Bytes of the scene, and of each file it names.
     pub file_bytes: u64,
 }
@@ -23,12 +25,12 @@ pub struct Limits {
 impl Limits {
     /// For scenes of whoever started the program.
     pub fn local() -> Self {
-        Self { tets: MOST_TETS, entries: 10_000, file_bytes: 4 << 30 }
+        Self { tets: MOST_TETS, entries: 10_000, tools: 64, file_bytes: 4 << 30 }
     }
 
-    /// For scenes that come over the network: loaded in seconds, in some hundred megabytes.
+    /// For scenes that come over the network: loaded in seconds.
     pub fn wire() -> Self {
-        Self { tets: 200_000, entries: 256, file_bytes: 1 << 20 }
+        Self { tets: 200_000, entries: 256, tools: 8, file_bytes: 1 << 20 }
     }
 
     /// Refuses a body of too many tets, wanted or present, at its key.
@@ -50,7 +52,6 @@ impl Limits {
             ("fixed", document.fixed.len()),
             ("prescribed", document.prescribed.len()),
             ("load", document.load.len()),
-            ("tool", document.tool.len()),
             ("probe", document.probe.len()),
         ];
         for (key, count) in lists {
@@ -58,6 +59,11 @@ impl Limits {
                 let message = format!("there are {count} [[{key}]]; at most {} are allowed here", self.entries);
                 return Err(Fault::value(Where::root(key).index(self.entries), message).help("leave some out"));
             }
+        }
+        let tools = document.tool.len();
+        if tools > self.tools {
+            let message = format!("there are {tools} [[tool]]; at most {} are allowed here", self.tools);
+            return Err(Fault::value(Where::root("tool").index(self.tools), message).help("leave some out"));
         }
         let mut selectors = 0;
         for (index, region) in document.region.iter().enumerate() {

@@ -241,7 +241,7 @@ fn numerics_and_output_outside_their_range() {
     );
     assert_eq!(
         refused("[[probe]]", "[output]\nduration_s = -1\n[[probe]]"),
-        "t.toml:25:14: output.duration_s = -1: must be larger than 0"
+        "t.toml:25:14: output.duration_s = -1: must be finite and larger than 0"
     );
     assert_eq!(
         refused("name = \"t\"", "name = \"t\"\ntick_period_s = 0"),
@@ -295,7 +295,7 @@ fn surfaces_that_cross_are_refused_with_the_place() {
 /// One line of text could ask for fifty million tets, or for thousands of regions of a whole body each.
 #[test]
 fn what_is_larger_than_the_limits_is_refused_before_it_is_made() {
-    let limits = Limits { tets: 40, entries: 3, file_bytes: 100 };
+    let limits = Limits { tets: 40, entries: 3, tools: 2, file_bytes: 100 };
     let refused = |text: &str| parse(text, "t.toml", None, &limits, &mut |_, _| {}).unwrap_err().one_line();
     assert_eq!(
         refused(GOOD),
@@ -319,6 +319,15 @@ fn what_is_larger_than_the_limits_is_refused_before_it_is_made() {
         "[[region]]\nname = \"r\"\nselect.any_of = [{ region = \"whole\" }, { not = { region = \"x_min\" } }]\n";
     let message = refused(&(small + nested));
     assert!(message.contains("the regions have 4 selectors up to here; at most 3 are allowed"), "{message}");
+
+    let tool = |index: usize| {
+        format!(
+            "[[tool]]\nname = \"t{index}\"\nradius_mm = 1\ncoupling = \"rigid\"\nstart_mm = [0, 0, 20]\ndriver = \"device\"\n"
+        )
+    };
+    let message =
+        refused(&(0..3).map(tool).fold(GOOD.replace("cells = [2, 2, 2]", "cells = [1, 1, 1]"), |text, t| text + &t));
+    assert!(message.contains("[[tool]]; at most 2 are allowed here"), "{message}");
 
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("s.toml");

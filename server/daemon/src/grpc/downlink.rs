@@ -164,8 +164,9 @@ impl Attachment {
                 () = stop.cancelled() => return Err(End::Daemon("the daemon is shutting down")),
                 () = replaced.cancelled() => return Err(End::Daemon("another scene was loaded: attach again")),
                 () = over.cancelled() => return Err(End::WayUp),
-                fault = self.faults.recv() => if let Some(fault) = fault { return Ok(Message::Fault(fault)) },
+                // Before faults: a device whose samples are refused faster than it reads would hear of nothing else.
                 rung = end.ear.rung() => if rung.is_err() { return Err(End::Daemon("the simulation loop cannot be heard")) },
+                fault = self.faults.recv() => if let Some(fault) = fault { return Ok(Message::Fault(fault)) },
             }
             if let Some(output) = self.newest() {
                 self.untold = Some(output);

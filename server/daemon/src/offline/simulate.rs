@@ -124,7 +124,7 @@ impl Plan {
         let frames = match frames {
             Some(FrameCount::None) => FrameRule::Never,
             // There are no more states than ticks and the start.
-            Some(FrameCount::Some(count)) => FrameRule::Count(u64::from(count).min(ticks + 1)),
+            Some(FrameCount::Some(count)) => FrameRule::Count(u64::from(count).min(ticks.saturating_add(1))),
             None => FrameRule::Every(frame_every),
         };
         Self { ticks, sample_every, frames }

@@ -258,6 +258,7 @@ impl ContactModel {
             centre_m,
             radius_m: model.spec.radius_m,
             friction_coefficient: model.spec.friction_coefficient,
+            put_into: part.just_put || part.touching.records().iter().any(|touch| touch.free_depth_m > 0.0),
             just_put: std::mem::take(&mut part.just_put),
         };
         let candidates = part.candidates.triangles();

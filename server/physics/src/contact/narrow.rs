@@ -37,6 +37,8 @@ pub(super) struct Meeting<'a> {
     pub(super) friction_coefficient: f64,
     /// The tool was just put there: what is inside carries nothing as deep as it is.
     pub(super) just_put: bool,
+    /// It was put there, now or before, and has not left yet: what cannot be recorded carries nothing.
+    pub(super) put_into: bool,
 }
 
 /// Sums over the samples in contact.
@@ -156,6 +158,9 @@ fn press_triangle(
         let number = samples.first + index as u32;
         let known = take(before, number);
         let from_behind = known.map_or(outward.dot(r) >= 0.0, |touch| touch.from_behind);
+        if meeting.put_into && next.is_full() {
+            continue;
+        }
         if from_behind {
             next.push(Touch { sample: number, from_behind, free_depth_m: 0.0, spring_origin_m: r });
             continue;
@@ -276,6 +281,7 @@ mod tests {
                 radius_m: RADIUS_M,
                 friction_coefficient: tool.spec.friction_coefficient,
                 just_put: false,
+                put_into: false,
             };
             let mut forces = vec![DVec3::ZERO; 4];
             let all = [0, 1, 2, 3];

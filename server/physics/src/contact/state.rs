@@ -71,7 +71,9 @@ impl ContactState {
             let known = touches.last().is_none_or(|last| (last.sample as usize) < samples(index));
             let finite = saved.force_n.is_finite()
                 && saved.estimate.is_finite()
-                && touches.iter().all(|touch| touch.spring_origin_m.is_finite() && touch.free_depth_m.is_finite());
+                && touches.iter().all(|touch| {
+                    touch.spring_origin_m.is_finite() && (0.0..f64::INFINITY).contains(&touch.free_depth_m)
+                });
             if !(ascending && known && finite && touches.iter().all(|touch| own.touching.push(*touch))) {
                 return None;
             }

@@ -2,7 +2,8 @@
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
-/// More samples than this inside one tool are pressed without friction and without memory.
+/// More samples than this inside one tool are pressed without friction and without memory, or not at all where the tool was put
+/// into the surface.
 const MOST: usize = 16_384;
 
 /// A sample inside the tool.
@@ -34,6 +35,11 @@ impl Touching {
 
     pub(super) fn records(&self) -> &[Touch] {
         &self.buffer[..self.count]
+    }
+
+    /// No further record fits.
+    pub(super) fn is_full(&self) -> bool {
+        self.count == self.buffer.len()
     }
 
     pub(super) fn clear(&mut self) {

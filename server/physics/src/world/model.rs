@@ -161,7 +161,7 @@ fn free_inverse_mass(mass_kg: &[f64], prescribed: &[PrescribedSpec]) -> Result<V
         for &node in &spec.nodes {
             for axis in (0..3).filter(|&axis| spec.axes[axis]) {
                 let slot = &mut owner[node as usize][axis];
-                if let Some(first) = slot.replace(set).filter(|&first| first != set) {
+                if let Some(first) = slot.replace(set) {
                     return Err(ModelError::PrescribedTwice {
                         node,
                         axis: ['x', 'y', 'z'][axis],

@@ -137,7 +137,7 @@ fn output(table: &OutputTable) -> Result<OutputSettings, Fault> {
     for (key, value) in
         [("duration_s", duration_s), ("sample_interval_s", sample_interval_s), ("frame_interval_s", frame_interval_s)]
     {
-        check(&at.key(key), value, value > 0.0, "must be larger than 0")?;
+        check(&at.key(key), value, value > 0.0 && value.is_finite(), "must be finite and larger than 0")?;
     }
     Ok(OutputSettings { duration_s, sample_interval_s, frame_interval_s })
 }
