@@ -112,10 +112,14 @@ fn print_time(model: &Model, cost: &TimeNumbers) {
 
 fn print_contents(scene: &Scene) {
     let held: usize = scene.model.prescribed.iter().map(|set| set.nodes.len()).sum();
+    let loads = scene.model.loads.len();
     if held == 0 {
-        println!("held       nothing: any force moves the body as a whole, and static refuses it; see [[fixed]]");
+        println!(
+            "held       nothing; {loads} loads. Any force moves the body as a whole, and static refuses it: see [[fixed]]"
+        );
+    } else {
+        println!("held       {held} nodes in {} sets; {loads} loads", scene.model.prescribed.len());
     }
-    println!("held       {held} nodes in {} sets; {} loads", scene.model.prescribed.len(), scene.model.loads.len());
     for (tool, driver) in scene.model.tools.iter().zip(&scene.drivers) {
         let driver = match driver {
             palpate_scene::Driver::Device => "a device",
