@@ -240,6 +240,8 @@ fn messages_name_line_node_and_element() {
     let msh = "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Nodes\n4\n1 0 0 0\n2 1 0 0\n3 0 1 0\n";
     let nan = refused("a.msh", &format!("{msh}4 0 0 nan\n$EndNodes\n"));
     assert!(nan.starts_with("a.msh, line 9: node 4 has a coordinate that is not finite: (0, 0, NaN)"), "{nan}");
+    let tiny = refused("a.msh", &format!("{msh}4 1e-300 0 nan\n$EndNodes\n"));
+    assert!(tiny.contains("not finite: (1e-300, 0, NaN)"), "{tiny}");
     let whole = format!("{msh}4 0 0 1\n$EndNodes\n$Elements\n1\n");
     let range = refused("b.msh", &format!("{whole}7 4 2 1 1 1 2 3 5\n$EndElements\n"));
     assert!(range.contains("b.msh, line 13: element 7 refers to node 5") && range.contains("tags 1 to 4"), "{range}");

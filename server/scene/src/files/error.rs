@@ -94,7 +94,7 @@ pub enum Problem {
         room: usize,
     },
     /// A coordinate is NaN or infinite.
-    #[error("node {node} has a coordinate that is not finite: ({}, {}, {})", position.x, position.y, position.z)]
+    #[error("node {node} has a coordinate that is not finite: ({}, {}, {})", number(position.x), number(position.y), number(position.z))]
     NonFinite {
         /// The node's number in the file.
         node: i64,
@@ -205,4 +205,10 @@ impl Problem {
         }
         .to_string()
     }
+}
+
+/// As written by people: in full while that is short.
+fn number(x: f64) -> String {
+    let full = x.to_string();
+    if full.len() <= 24 { full } else { format!("{x:e}") }
 }
