@@ -161,6 +161,14 @@ async fn a_scene_that_cannot_be_loaded_leaves_the_running_one_alone() {
         let refused = session.load_scene(v1::LoadSceneRequest { source }).await.unwrap_err();
         assert_eq!(refused.code(), code, "{shown}: {refused:?}");
     }
+    // A loop could be neither asked nor stopped during such ticks.
+    let slow = OTHER.replace("[body.box]", "tick_period_s = 0.6\n[body.box]");
+    let heavy = format!("{}\n[numerics]\nsubsteps = 100000", OTHER.replace("[2, 2, 2]", "[5, 5, 5]"));
+    for (toml, message) in [(slow, "needs ticks of 0.5 s at most"), (heavy, "750 tets in 100000 substeps")] {
+        let source = Some(Source::Toml(toml));
+        let refused = session.load_scene(v1::LoadSceneRequest { source }).await.unwrap_err();
+        assert!(refused.message().contains(message), "{refused:?}");
+    }
     assert_eq!(daemon.status().await.session.unwrap(), before);
     daemon.finish().await;
 }
