@@ -33,7 +33,6 @@ use foundation::{BodyAtRest, Foundation, SampleTables};
 use glam::DVec3;
 use local_model::MeanContact;
 use narrow::{Meeting, Pressed};
-
 use touching::Touching;
 
 /// Elastic moduli behind a boundary triangle.
