@@ -44,6 +44,21 @@ pub enum ViewError {
         /// How long nothing came (s).
         silence_s: f64,
     },
+    /// The force that was waited for did not come.
+    #[error(
+        "no tool was pressed with {wanted_n} N within {waited_s} s; the largest contact force was {largest_n:.3} N"
+    )]
+    #[diagnostic(help(
+        "`palpate-view watch` shows the forces; ask for less with --min-force-n, or wait longer with --timeout-s"
+    ))]
+    NotPressed {
+        /// Force waited for (N).
+        wanted_n: f64,
+        /// How long (s).
+        waited_s: f64,
+        /// Largest force seen meanwhile (N).
+        largest_n: f64,
+    },
     /// Nobody reads what is printed (`| head`): the end, and no error.
     #[error("nobody reads the output")]
     Unread,
@@ -75,8 +90,8 @@ pub enum ViewError {
     /// A force script is wrong.
     #[error("{path}: {reason}", path = path.display())]
     #[diagnostic(help(
-        "a script is TOML: [[force]] with surface_vertex = 12 or nearest_to_m = [x, y, z], force_n = [x, y, z], \
-         from_tick = 0, tick_count = 100"
+        "a script is TOML: [[force]] with surface_vertex = 12, nearest_to_mm = [x, y, z] or nearest_to_m = [x, y, z], \
+         force_n = [x, y, z], from_tick = 0, tick_count = 100; `palpate-view inject --help` shows one"
     ))]
     Script {
         /// The script.

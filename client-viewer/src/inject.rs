@@ -6,10 +6,23 @@ use palpate_proto::v1::{self, InjectForcesRequest, InjectedForce, LevelOfDetail,
 use serde::Deserialize;
 use std::path::{Path, PathBuf};
 
+const SCRIPT: &str = "\
+A script has one [[force]] or more:
+
+  [[force]]
+  nearest_to_mm = [30, 0, -20]  # at the surface vertex nearest to this point of the rest shape
+  force_n = [0, 0, -0.05]       # force on that vertex, world frame, at most 1000 N
+  from_tick = 0                 # first tick it acts in; 0, or left out: as soon as possible
+  tick_count = 1000             # ticks it acts for: one second at 1 kHz
+
+The point may be given in metres (nearest_to_m), or the vertex by its number in the surface stream
+(surface_vertex). All forces of a script are taken, or none.";
+
 /// Arguments of `inject`.
 #[derive(Debug, Args)]
+#[command(after_help = SCRIPT)]
 pub struct InjectArguments {
-    /// The script (TOML): [[force]] with surface_vertex or nearest_to_m, force_n, from_tick, tick_count
+    /// The script (TOML)
     script: PathBuf,
 }
 
@@ -26,10 +39,19 @@ struct Script {
 struct Force {
     surface_vertex: Option<u32>,
     nearest_to_m: Option<[f32; 3]>,
+    nearest_to_mm: Option<[f32; 3]>,
     force_n: [f64; 3],
     #[serde(default)]
     from_tick: u64,
     tick_count: u32,
+}
+
+impl Force {
+    /// The point (m) whose nearest vertex is meant, from either key.
+    fn point_m(&self) -> Option<Vec3> {
+        let in_mm = self.nearest_to_mm.map(|mm| Vec3::from_array(mm) * 1e-3);
+        self.nearest_to_m.map(Vec3::from_array).or(in_mm)
+    }
 }
 
 /// Runs `inject`.
@@ -41,7 +63,7 @@ pub async fn run(server: &Server, arguments: &InjectArguments) -> Result<(), Vie
     let text = String::from_utf8(cli::read(&arguments.script)?).map_err(no_text)?;
     let script = parse(&arguments.script, &text)?;
     let channel = server.connect().await?;
-    let surface = if script.force.iter().any(|force| force.nearest_to_m.is_some()) {
+    let surface = if script.force.iter().any(|force| force.point_m().is_some()) {
         let mut watcher = Watcher::start(channel.clone(), 0.0, LevelOfDetail::Full).await?;
         let ended = || ViewError::Stream("ended before the first surface".into());
         Some(watcher.next().await?.cloned().ok_or_else(ended)?)
@@ -54,15 +76,30 @@ pub async fn run(server: &Server, arguments: &InjectArguments) -> Result<(), Vie
         .enumerate()
         .map(|(index, force)| resolve(&arguments.script, index, force, surface.as_ref()))
         .collect::<Result<Vec<_>, _>>()?;
+    let found = found(&script, &forces, surface.as_ref());
     let count = forces.len();
     // A vertex found in one body must not be pushed in another that was loaded in between.
     let session_id = surface.map_or_else(String::new, |surface| surface.header.session_id);
     let request = InjectForcesRequest { session_id, forces };
     let answer = SessionClient::new(channel).inject_forces(request).await?.into_inner();
+    let plural = if count == 1 { "" } else { "s" };
     cli::say(&format!(
-        "{count} forces accepted; the first acts at tick {}; {} pending",
+        "{count} force{plural} accepted; the first acts at tick {}; {} pending",
         answer.first_tick, answer.pending
-    ))
+    ))?;
+    found.iter().try_for_each(|line| cli::say(line))
+}
+
+/// Which vertices the points of a script stand for, and how far away: a point in another unit or outside the body shows here.
+fn found(script: &Script, forces: &[InjectedForce], surface: Option<&Surface>) -> Vec<String> {
+    let points = script.force.iter().zip(forces).enumerate();
+    points
+        .filter_map(|(index, (asked, force))| {
+            let vertex = force.surface_vertex;
+            let distance_mm = 1e3 * surface?.rest_m.get(vertex as usize)?.distance(asked.point_m()?);
+            Some(format!("[[force]] number {}: surface vertex {vertex}, {distance_mm:.3} mm from the point", index + 1))
+        })
+        .collect()
 }
 
 fn parse(path: &Path, text: &str) -> Result<Script, ViewError> {
@@ -76,15 +113,16 @@ fn resolve(path: &Path, index: usize, force: &Force, surface: Option<&Surface>) 
         path: path.into(),
         reason: format!("[[force]] number {}: {reason}", index + 1),
     };
-    let surface_vertex = match (force.surface_vertex, force.nearest_to_m) {
-        (Some(vertex), None) => vertex,
-        (None, Some(point)) if !point.iter().all(|x| x.is_finite()) => {
-            return Err(bad("nearest_to_m must be finite".into()));
+    let surface_vertex = match (force.surface_vertex, force.nearest_to_m, force.nearest_to_mm) {
+        (Some(vertex), None, None) => vertex,
+        (None, Some(point), None) | (None, None, Some(point)) if !point.iter().all(|x| x.is_finite()) => {
+            return Err(bad("the point must be finite".into()));
         }
-        (None, Some(point)) => {
-            nearest(surface, Vec3::from_array(point)).ok_or_else(|| bad("there is no surface".into()))?
+        (None, Some(_), None) | (None, None, Some(_)) => {
+            let vertex = force.point_m().and_then(|point_m| nearest(surface, point_m));
+            vertex.ok_or_else(|| bad("there is no surface".into()))?
         }
-        _ => return Err(bad("give exactly one of surface_vertex and nearest_to_m".into())),
+        _ => return Err(bad("give exactly one of surface_vertex, nearest_to_mm and nearest_to_m".into())),
     };
     if force.tick_count == 0 {
         return Err(bad("tick_count = 0: must be at least 1".into()));
@@ -124,9 +162,11 @@ mod tests {
     fn vertices_are_named_or_found() {
         let forces = read(
             "[[force]]\nsurface_vertex = 2\nforce_n = [0, 0, -1]\ntick_count = 5\n\
-             [[force]]\nnearest_to_m = [0.9, 0.1, 0]\nforce_n = [1, 0, 0]\nfrom_tick = 9\ntick_count = 1\n",
+             [[force]]\nnearest_to_m = [0.9, 0.1, 0]\nforce_n = [1, 0, 0]\nfrom_tick = 9\ntick_count = 1\n\
+             [[force]]\nnearest_to_mm = [0, 600, 0]\nforce_n = [1, 0, 0]\ntick_count = 1\n",
         )
         .unwrap();
+        assert_eq!(forces[2].surface_vertex, 2, "600 mm are nearer to 1 m than to 0");
         assert_eq!((forces[0].surface_vertex, forces[0].tick_count), (2, 5));
         assert_eq!((forces[1].surface_vertex, forces[1].from_tick), (1, 9));
     }
@@ -139,8 +179,13 @@ mod tests {
         assert!(message("[[force]]\nsurface_vertex = 1\nforce = [0, 0, 1]\ntick_count = 1\n").contains("force"));
         assert!(message("force = []\n").contains("no [[force]]"));
         assert!(
-            message("[[force]]\nnearest_to_m = [nan, 0, 0]\nforce_n = [0, 0, 1]\ntick_count = 1\n")
-                .contains("nearest_to_m")
+            message("[[force]]\nnearest_to_m = [nan, 0, 0]\nforce_n = [0, 0, 1]\ntick_count = 1\n").contains("finite")
+        );
+        assert!(
+            message(
+                "[[force]]\nnearest_to_mm = [1, 0, 0]\nnearest_to_m = [1, 0, 0]\nforce_n = [0, 0, 1]\ntick_count = 1\n"
+            )
+            .contains("exactly one")
         );
         assert!(message("[[force]]\nsurface_vertex = 1\nforce_n = [0, nan, 1]\ntick_count = 1\n").contains("finite"));
     }

@@ -6,6 +6,7 @@ pub mod connect;
 pub mod error;
 pub mod export;
 pub mod inject;
+pub mod moment;
 pub mod picture;
 pub mod status;
 pub mod surface;

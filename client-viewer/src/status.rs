@@ -16,12 +16,21 @@ pub async fn run(server: &Server, as_json: bool) -> Result<(), ViewError> {
 
 /// The status for people.
 pub fn to_text(status: &StatusResponse) -> String {
-    let mut text = String::new();
-    let mut line = |name: &str, value: String| {
+    let mut text = table(&facts(status));
+    text.push_str("\n\n");
+    text.push_str(&table(&timings(status)));
+    if !status.quarantine.is_empty() {
         // Writing into a String cannot fail.
-        let _ = writeln!(text, "{name:<18} {value}");
-    };
+        let _ = write!(text, "\n\nQUARANTINED: {}", status.quarantine);
+    }
+    text
+}
+
+/// Rows of a name and what there is to say of it.
+fn facts(status: &StatusResponse) -> Vec<Vec<String>> {
     let session = status.session.clone().unwrap_or_default();
+    let mut rows = Vec::new();
+    let mut line = |name: &str, value: String| rows.push(vec![name.to_owned(), value]);
     line("palpated", status.daemon_version.clone());
     line("scene", format!("{} (session {})", session.scene_name, session.session_id));
     line(
@@ -34,31 +43,22 @@ pub fn to_text(status: &StatusResponse) -> String {
     line(
         "time",
         format!(
-            "tick {} = {:.3} s, {:.3} ms in {} substeps{}",
-            status.tick,
+            "{:.3} s; {} ticks of {} ms, {} substeps each{}",
             status.time_s,
+            status.tick,
             1e3 * session.tick_period_s,
             session.substeps_per_tick,
             if status.paused { ", paused" } else { "" }
         ),
     );
-    line("tick cost / us", percentiles(status.tick_cost_us.as_ref()));
-    for stage in &status.stages {
-        line(&format!("  {}", stage.stage), percentiles(stage.cost_us.as_ref()));
-    }
-    line("wake-up / us", percentiles(status.wakeup_jitter_us.as_ref()));
     line("overruns", format!("{} ({} ticks skipped)", status.overruns, status.skipped_ticks));
     for note in &status.realtime_notes {
         line("real time", note.clone());
     }
     if let Some(e) = &status.energies {
-        line(
-            "energy / J",
-            format!(
-                "kinetic {:.3e}, elastic {:.3e}, gravity {:.3e}; work {:.3e}, dissipated {:.3e}",
-                e.kinetic_j, e.elastic_j, e.gravitational_j, e.external_work_j, e.dissipated_j
-            ),
-        );
+        let energies = [e.kinetic_j, e.elastic_j, e.gravitational_j, e.external_work_j, e.dissipated_j];
+        let names = ["kinetic", "elastic", "gravity", "work", "dissipated"].map(str::to_owned);
+        line("energy", measured(&names, &energies, "J"));
     }
     for device in &status.devices {
         line(
@@ -75,21 +75,52 @@ pub fn to_text(status: &StatusResponse) -> String {
         );
     }
     for probe in &status.probes {
-        let values: Vec<String> = probe.values.iter().map(|v| format!("{v:.6e}")).collect();
-        line("probe", format!("{} = {} {}", probe.name, values.join(" "), probe.unit));
+        line("probe", format!("{}: {}", probe.name, measured(&probe.components, &probe.values, &probe.unit)));
     }
     line("viewers", format!("{} ({} frames skipped)", status.viewers, status.frames_skipped));
-    if !status.quarantine.is_empty() {
-        line("QUARANTINED", status.quarantine.clone());
-    }
-    text.trim_end().to_owned()
+    rows
 }
 
-fn percentiles(p: Option<&Percentiles>) -> String {
-    p.filter(|p| p.count > 0).map_or_else(
-        || "not measured yet".into(),
-        |p| format!("p50 {:.1}  p99 {:.1}  p99.9 {:.1}  max {:.1}  ({} ticks)", p.p50, p.p99, p.p999, p.max, p.count),
-    )
+/// Values with their names where they have one, and their unit; the unit of a plain number is not written.
+fn measured(names: &[String], values: &[f64], unit: &str) -> String {
+    let name = |i: usize| names.get(i).filter(|name| *name != "value").map_or(String::new(), |name| format!("{name} "));
+    let unit = if unit == "1" { String::new() } else { format!(" {unit}") };
+    let named: Vec<String> =
+        values.iter().enumerate().map(|(i, v)| format!("{}{v:.3e}", name(i).replace('_', " "))).collect();
+    named.join(", ") + &unit
+}
+
+/// How long what takes.
+fn timings(status: &StatusResponse) -> Vec<Vec<String>> {
+    let heading = ["us", "p50", "p99", "p99.9", "max", "ticks"].map(str::to_owned).to_vec();
+    let row = |name: String, p: Option<&Percentiles>| {
+        let measured = p.filter(|p| p.count > 0);
+        let numbers = measured.map(|p| [p.p50, p.p99, p.p999, p.max].map(|us| format!("{us:.1}")));
+        let numbers = numbers.unwrap_or_else(|| ["-"; 4].map(str::to_owned));
+        let count = p.map_or(0, |p| p.count).to_string();
+        std::iter::once(name).chain(numbers).chain([count]).collect()
+    };
+    let mut rows = vec![heading, row("tick".to_owned(), status.tick_cost_us.as_ref())];
+    let stages = status.stages.iter();
+    rows.extend(stages.map(|stage| row(format!("  {}", stage.stage.replace('_', " ")), stage.cost_us.as_ref())));
+    rows.push(row("wake-up late by".to_owned(), status.wakeup_jitter_us.as_ref()));
+    rows
+}
+
+/// Rows as columns, each as wide as the longest of its cells: the first to the left, and the others to the right where there are more
+/// than two.
+fn table(rows: &[Vec<String>]) -> String {
+    let columns = rows.iter().map(Vec::len).max().unwrap_or(0);
+    let width_of = |column: usize| rows.iter().filter_map(|row| row.get(column)).map(|cell| cell.chars().count()).max();
+    let widths: Vec<usize> = (0..columns).map(|column| width_of(column).unwrap_or(0)).collect();
+    let line = |row: &Vec<String>| {
+        let cells = row.iter().zip(&widths).enumerate().map(|(column, (cell, &width))| match (column, columns) {
+            (0, _) | (_, 2) => format!("{cell:<width$}"),
+            _ => format!("{cell:>width$}"),
+        });
+        cells.collect::<Vec<_>>().join("  ").trim_end().to_owned()
+    };
+    rows.iter().map(line).collect::<Vec<_>>().join("\n")
 }
 
 fn to_json(status: &StatusResponse) -> serde_json::Value {
@@ -122,10 +153,57 @@ fn to_json(status: &StatusResponse) -> serde_json::Value {
             "device_name": d.device_name, "tool_name": d.tool_name, "samples_accepted": d.samples_accepted,
             "samples_rejected": d.samples_rejected, "newest_sample_age_s": d.newest_sample_age_s, "force_n": d.force_n,
         })).collect::<Vec<_>>(),
-        "probes": status.probes.iter().map(|p| json!({"name": p.name, "unit": p.unit, "values": p.values})).collect::<Vec<_>>(),
+        "probes": status.probes.iter().map(|p| json!({"name": p.name, "unit": p.unit, "components": p.components, "values": p.values})).collect::<Vec<_>>(),
         "viewers": status.viewers,
         "frames_skipped": status.frames_skipped,
         "samples_rejected": status.samples_rejected,
         "quarantine": status.quarantine,
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use palpate_proto::v1::{NamedVector, StageTime};
+
+    fn status() -> StatusResponse {
+        let cost = |p50, max| Some(Percentiles { p50, p99: p50, p999: p50, max, count: 12_345 });
+        let stage = |name: &str, p50| StageTime { stage: name.to_owned(), cost_us: cost(p50, 1234.5) };
+        let names = |names: &[&str]| names.iter().map(|&name| name.to_owned()).collect();
+        StatusResponse {
+            tick_cost_us: cost(20.0, 98_765.4),
+            stages: vec![stage("input", 0.1), stage("contact_and_dynamics", 19.0)],
+            probes: vec![
+                NamedVector {
+                    name: "ledger".into(),
+                    unit: "J".into(),
+                    values: vec![1.0, 2.0, 3.0, 4.0, 5.0],
+                    components: names(&["kinetic", "elastic", "gravitational", "external_work", "dissipated"]),
+                },
+                NamedVector { name: "J".into(), unit: "1".into(), values: vec![0.5], components: names(&["value"]) },
+            ],
+            ..Default::default()
+        }
+    }
+
+    /// The name of one stage was longer than its column, and its numbers stood beside those of the others.
+    #[test]
+    fn numbers_stand_under_their_headings() {
+        let text = to_text(&status());
+        let times: Vec<&str> = text.lines().skip_while(|line| !line.starts_with("us ")).collect();
+        assert_eq!(times.len(), 5, "{text}");
+        let ends = |line: &str, cell: &str| line.find(cell).map_or_else(|| panic!("{text}"), |at| at + cell.len());
+        assert_eq!(ends(times[0], "max"), ends(times[1], "98765.4"), "{text}");
+        assert_eq!(ends(times[0], "max"), ends(times[3], "1234.5"), "{text}");
+        assert_eq!(ends(times[0], "ticks"), ends(times[3], "12345"), "{text}");
+        assert!(times[3].starts_with("  contact and dynamics  ") && times[4].ends_with(" 0"), "{text}");
+    }
+
+    #[test]
+    fn values_of_a_probe_have_names_and_unit() {
+        let text = to_text(&status());
+        let ledger = "ledger: kinetic 1.000e0, elastic 2.000e0, gravitational 3.000e0, external work 4.000e0, dissipated 5.000e0 J";
+        assert!(text.contains(ledger), "{text}");
+        assert!(text.lines().any(|line| line.ends_with("J: 5.000e-1")), "{text}");
+    }
 }

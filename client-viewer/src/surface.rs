@@ -149,6 +149,11 @@ pub fn assemble(chunks: &[KeyframeChunk]) -> Result<Surface, ViewError> {
     Ok(Surface { epoch, header, rest_m, displacement_m, triangles, last: SurfaceUpdate::default() })
 }
 
+/// Length of a vector of the wire; 0 when it is not there.
+pub fn magnitude(v: Option<&palpate_proto::v1::Vec3>) -> f64 {
+    v.map_or(0.0, |v| (v.x * v.x + v.y * v.y + v.z * v.z).sqrt())
+}
+
 fn values<const N: usize, T>(bytes: &[u8], of: fn([u8; N]) -> T) -> Result<Vec<T>, ViewError> {
     let (whole, rest) = bytes.as_chunks::<N>();
     if rest.is_empty() {

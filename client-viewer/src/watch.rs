@@ -1,8 +1,11 @@
 //! `watch`: one line a second of what a viewer feels.
-use crate::surface::Surface;
-use crate::{ViewError, cli, connect::Server, surface::Watcher};
+use crate::{
+    ViewError, cli,
+    connect::Server,
+    surface::{Surface, Watcher, magnitude},
+};
 use clap::Args;
-use palpate_proto::v1::{LevelOfDetail, Vec3};
+use palpate_proto::v1::LevelOfDetail;
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
 /// Arguments of `watch`.
@@ -95,7 +98,7 @@ fn heading(surface: &Surface) -> String {
         "skipped",
         "contact N",
         "arm N",
-        "max mm",
+        "moved mm",
         "tick us"
     )
 }
@@ -157,10 +160,6 @@ impl Window {
     }
 }
 
-fn magnitude(v: Option<&Vec3>) -> f64 {
-    v.map_or(0.0, |v| (v.x * v.x + v.y * v.y + v.z * v.z).sqrt())
-}
-
 /// Age of a time stamp on this machine's clock (ms); meaningful when daemon and viewer share it.
 fn delay_ms(sent_unix_ns: u64) -> f64 {
     let now_ns = SystemTime::now().duration_since(UNIX_EPOCH).map_or(0.0, |d| d.as_nanos() as f64);
@@ -170,7 +169,7 @@ fn delay_ms(sent_unix_ns: u64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use palpate_proto::v1::SurfaceUpdate;
+    use palpate_proto::v1::{SurfaceUpdate, Vec3};
 
     #[test]
     fn a_second_counts_its_updates() {

@@ -1,7 +1,11 @@
 //! The command line.
 use crate::{BridgeError, Config, Handle, config::DeviceConfig, run::run_with};
 use clap::{Parser, ValueEnum};
-use std::{io::IsTerminal, path::PathBuf, process::ExitCode};
+use std::{
+    io::{IsTerminal, Write as _},
+    path::PathBuf,
+    process::ExitCode,
+};
 use tokio::signal::unix::{SignalKind, signal};
 use tokio_util::sync::CancellationToken;
 use tracing_subscriber::EnvFilter;
@@ -44,16 +48,16 @@ pub struct Cli {
     device: Option<DeviceKind>,
     /// Largest force on the arm (N)
     #[arg(long, value_name = "N")]
-    max_force: Option<f64>,
+    max_force_n: Option<f64>,
     /// Let the force come back by itself after a latched fault
     #[arg(long)]
     auto_recover: bool,
     /// Stop with an error when no daemon answers for so long (s) [default: wait for ever]
     #[arg(long, value_name = "S")]
-    give_up_after: Option<f64>,
+    give_up_after_s: Option<f64>,
     /// Pause between lines of counters (s), 0: only at exit
     #[arg(long, value_name = "S")]
-    report_every: Option<f64>,
+    report_every_s: Option<f64>,
     /// Print the configuration that would be used, and stop
     #[arg(long)]
     print_config: bool,
@@ -81,7 +85,7 @@ impl Cli {
         tracing_subscriber::fmt()
             .with_env_filter(filter)
             .with_writer(std::io::stderr)
-            .with_ansi(std::io::stderr().is_terminal())
+            .with_ansi(colours_wanted())
             .with_target(false)
             .init();
         // One thread: the stream's reader, writer and transport wake each other without crossing processors.
@@ -93,7 +97,8 @@ impl Cli {
             let (shutdown, handle) = (CancellationToken::new(), Handle::new());
             obey_signals(shutdown.clone(), handle.clone())?;
             let summary = run_with(&config, shutdown, handle).await?;
-            println!("{summary}");
+            // A reader that has gone misses the counters, no more.
+            let _ = writeln!(std::io::stdout(), "{summary}");
             Ok(ExitCode::SUCCESS)
         })
     }
@@ -106,15 +111,20 @@ impl Cli {
         replace(&mut server.tool, self.tool.clone());
         replace(&mut server.device_name, self.name.clone());
         server.tls_ca = self.tls_ca.clone().or(server.tls_ca.take());
-        server.give_up_after_s = self.give_up_after.or(server.give_up_after_s);
-        replace(&mut config.servo.report_every_s, self.report_every);
-        replace(&mut config.limits.max_force_n, self.max_force);
+        server.give_up_after_s = self.give_up_after_s.or(server.give_up_after_s);
+        replace(&mut config.servo.report_every_s, self.report_every_s);
+        replace(&mut config.limits.max_force_n, self.max_force_n);
         config.servo.auto_recover |= self.auto_recover;
         match (self.device, &config.device) {
             (None, _) | (Some(DeviceKind::Simulated), DeviceConfig::Simulated(_)) => {}
         }
         Ok(config)
     }
+}
+
+/// Logs have colours on a terminal only, and not when `NO_COLOR` asks for none.
+fn colours_wanted() -> bool {
+    std::io::stderr().is_terminal() && std::env::var_os("NO_COLOR").is_none_or(|value| value.is_empty())
 }
 
 fn replace<T>(value: &mut T, with: Option<T>) {
@@ -160,10 +170,13 @@ mod tests {
         let file = tempfile::NamedTempFile::new().unwrap();
         std::fs::write(file.path(), "[server]\nurl = \"http://file:1\"\ntool = \"left\"\n").unwrap();
         let path = file.path().to_str().unwrap();
-        let cli = Cli::try_parse_from(["palpate-bridge", "--config", path, "--server", "http://flag:2"]).unwrap();
+        let flags =
+            ["--server", "http://flag:2", "--max-force-n", "2.5", "--give-up-after-s", "3", "--report-every-s", "7"];
+        let cli = Cli::try_parse_from([["palpate-bridge", "--config", path].as_slice(), &flags].concat()).unwrap();
         let config = cli.config().unwrap();
         assert_eq!((config.server.url.as_str(), config.server.tool.as_str()), ("http://flag:2", "left"));
-        assert!(!config.servo.auto_recover);
+        assert_eq!((config.limits.max_force_n, config.server.give_up_after_s), (2.5, Some(3.0)));
+        assert!(config.servo.report_every_s == 7.0 && !config.servo.auto_recover);
     }
 
     #[test]

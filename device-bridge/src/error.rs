@@ -44,8 +44,8 @@ pub enum BridgeError {
     /// Nobody answered within the time allowed.
     #[error("no daemon answered at {address} for {seconds} s: {reason}")]
     #[diagnostic(help(
-        "is `palpated` running there? it prints its address when it starts; give it with --server. Without --give-up-after the \
-         bridge waits for it"
+        "is `palpated` running there? it prints its address when it starts; give it with --server. Without --give-up-after-s \
+         the bridge waits for it"
     ))]
     Unreachable {
         /// Address tried.

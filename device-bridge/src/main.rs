@@ -4,5 +4,7 @@ use palpate_bridge::cli::Cli;
 use std::process::ExitCode;
 
 fn main() -> miette::Result<ExitCode> {
+    // Messages are not wrapped: flags and paths stay whole, and a log has one line for one message.
+    miette::set_hook(Box::new(|_| Box::new(miette::MietteHandlerOpts::new().wrap_lines(false).build())))?;
     Cli::parse().run().map_err(miette::Report::new)
 }

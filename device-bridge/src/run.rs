@@ -4,16 +4,17 @@ use crate::{
     device::Device,
     servo::{Servo, ServoLaw},
     settings::{ServoSettings, Settings},
+    stats::reason,
     uplink::{SampleSource, Uplink},
 };
-use palpate_control::{Fault, Link};
+use palpate_control::Link;
 use palpate_realtime::{Clock, Doorbell, Note, OsMeasures, TickLoop, slot};
 use std::{
     sync::{
         Arc,
         atomic::{AtomicBool, Ordering},
     },
-    time::Duration,
+    time::{Duration, Instant},
 };
 use tokio::{sync::oneshot, task::JoinError, time};
 use tokio_util::sync::CancellationToken;
@@ -196,7 +197,7 @@ const SAY_AT_MOST_EVERY: Duration = Duration::from_secs(1);
 /// Says changes of the link once, and the counters now and then.
 struct Watcher {
     link: Link,
-    said_at: Option<time::Instant>,
+    said_at: Option<Instant>,
     auto_recover: bool,
     report: Option<time::Interval>,
 }
@@ -209,17 +210,25 @@ impl Watcher {
 
     fn look(&mut self, shared: &Shared) {
         let link = shared.stats.link();
-        // A link at the edge of what is fresh changes every few ticks: a latched fault is said at once, the rest once a second.
-        let quiet = self.said_at.is_some_and(|said| said.elapsed() < SAY_AT_MOST_EVERY);
-        if phase(link) != phase(self.link) && (!quiet || matches!(link, Link::Latched(_))) {
+        if self.is_news(link, Instant::now()) {
             self.say(link);
-            self.link = link;
-            self.said_at = Some(time::Instant::now());
         }
         let mut cx = std::task::Context::from_waker(std::task::Waker::noop());
         if self.report.as_mut().is_some_and(|report| report.poll_tick(&mut cx).is_ready()) {
-            tracing::info!("\n{}", shared.stats.summary());
+            tracing::info!("{}", shared.stats.summary().line());
         }
+    }
+
+    /// Whether the link is to be spoken of now, and takes it for said. A link at the edge of what is fresh changes every few ticks:
+    /// a latched fault is said at once, the rest once a second.
+    fn is_news(&mut self, link: Link, now: Instant) -> bool {
+        let quiet = self.said_at.is_some_and(|said| now.saturating_duration_since(said) < SAY_AT_MOST_EVERY);
+        let news = phase(link) != phase(self.link) && (!quiet || matches!(link, Link::Latched(_)));
+        if news {
+            self.link = link;
+            self.said_at = Some(now);
+        }
+        news
     }
 
     fn say(&self, link: Link) {
@@ -244,11 +253,33 @@ fn phase(link: Link) -> Link {
     if link == Link::Extrapolating { Link::Fresh } else { link }
 }
 
-fn reason(fault: Fault) -> &'static str {
-    match fault {
-        Fault::Stale => "no answer to a fresh pose for too long",
-        Fault::NonFinite => "the arm's position is not finite",
-        Fault::Peer => "the daemon stopped the force",
-        Fault::Requested => "stopping",
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use palpate_control::Fault;
+
+    /// What is said of a link that is looked at every 20 ms: the number of the look, and the link.
+    fn said(link_at: impl Fn(u32) -> Link, looks: u32) -> Vec<(u32, Link)> {
+        let mut watcher = Watcher { link: Link::Waiting, said_at: None, auto_recover: false, report: None };
+        let start = Instant::now();
+        let every = (0..looks).map(|look| (look, link_at(look)));
+        every.filter(|&(look, link)| watcher.is_news(link, start + WATCH_PERIOD * look)).collect()
+    }
+
+    /// Answers at the edge of what is fresh made two lines of log of every gap, some 25 a second.
+    #[test]
+    fn a_link_that_flaps_is_said_once_a_second_and_its_last_state_is_said() {
+        let flapping = |look: u32| if look.is_multiple_of(2) { Link::Fresh } else { Link::Ramping(Fault::Stale) };
+        // Ten seconds of flapping, then two of a ramp: 50 looks a second.
+        let lines = said(|look| if look < 500 { flapping(look) } else { Link::Ramping(Fault::Stale) }, 600);
+        assert!((5..=12).contains(&lines.len()), "{lines:?}");
+        assert!(lines.windows(2).all(|pair| pair[1].0 - pair[0].0 >= 50), "{lines:?}");
+        assert_eq!(lines.last().unwrap().1, Link::Ramping(Fault::Stale), "{lines:?}");
+    }
+
+    #[test]
+    fn a_latched_fault_is_said_at_once_and_once() {
+        let lines = said(|look| if look == 0 { Link::Fresh } else { Link::Latched(Fault::Stale) }, 200);
+        assert_eq!(lines, [(0, Link::Fresh), (1, Link::Latched(Fault::Stale))]);
     }
 }

@@ -115,6 +115,7 @@ impl Stats {
             damped: self.damped.get(),
             peak_force_n: f64::from_bits(self.peak_force_n.load(Ordering::Relaxed)),
             final_force_n: self.force_n(),
+            link: self.link(),
             round_trip: self.round_trip.percentiles(),
             ticks: servo.map_or(0, LoopMonitor::ticks),
             overruns: servo.map_or(0, LoopMonitor::overruns),
@@ -167,12 +168,49 @@ pub struct Summary {
     pub damped: u64,
     pub peak_force_n: f64,
     pub final_force_n: f64,
+    pub link: Link,
     pub round_trip: Percentiles,
     pub ticks: u64,
     pub overruns: u64,
     pub skipped: u64,
     pub wakeup_lateness: Percentiles,
     pub tick_cost: Percentiles,
+}
+
+/// Why a force goes down, in words.
+pub(crate) fn reason(fault: Fault) -> &'static str {
+    match fault {
+        Fault::Stale => "no answer to a fresh pose for too long",
+        Fault::NonFinite => "the arm's position is not finite",
+        Fault::Peer => "the daemon stopped the force",
+        Fault::Requested => "stopping",
+    }
+}
+
+impl Summary {
+    /// The fault that keeps the arm without force; a stop that was asked for is none.
+    pub fn latched_fault(&self) -> Option<Fault> {
+        match self.link {
+            Link::Latched(fault) if fault != Fault::Requested => Some(fault),
+            _ => None,
+        }
+    }
+
+    /// The most important counters in one line, for logs while the bridge runs.
+    pub fn line(&self) -> String {
+        let us = |ns: u64| ns as f64 / 1e3;
+        let trip = match &self.round_trip {
+            trip if trip.count == 0 => "no trip measured".to_owned(),
+            trip => format!("pose to force p50 {:.0} us, p99 {:.0} us", us(trip.p50_ns), us(trip.p99_ns)),
+        };
+        let state = self
+            .latched_fault()
+            .map_or_else(String::new, |fault| format!("; the force stays at zero until recovered: {}", reason(fault)));
+        format!(
+            "force {:.3} N, peak {:.3} N; {} samples sent, {} commands received, {trip}; {} overruns, {} reconnects{state}",
+            self.final_force_n, self.peak_force_n, self.sent, self.received, self.overruns, self.reconnects
+        )
+    }
 }
 
 impl fmt::Display for Summary {
@@ -203,8 +241,8 @@ impl fmt::Display for Summary {
         )?;
         write!(
             f,
-            "force    peak {:.3} N; ticks limited: peak {}, rate {}, passivity {}, not finite {}; faults: {} latched, {} from the \
-             daemon",
+            "force    peak {:.3} N; ticks limited: peak {}, rate {}, passivity {}, not finite {}; faults: {} latched, {} reported \
+             by the daemon",
             self.peak_force_n,
             self.saturated,
             self.rate_limited,
@@ -212,7 +250,16 @@ impl fmt::Display for Summary {
             self.non_finite,
             self.latched,
             self.peer_faults
-        )
+        )?;
+        if let Some(fault) = self.latched_fault() {
+            write!(
+                f,
+                "\nstate    without force at the end, since a latched fault: {}. SIGUSR1 while the bridge runs, a new start, or \
+                 --auto-recover lets the force come back",
+                reason(fault)
+            )?;
+        }
+        Ok(())
     }
 }
 
@@ -226,6 +273,20 @@ mod tests {
         for link in states.chain([Link::Waiting, Link::Fresh, Link::Extrapolating]) {
             assert_eq!(link_of(code_of(link)), link);
         }
+    }
+
+    /// The line of counters was an empty message with the table below it: a log that is searched by line had nothing of it.
+    #[test]
+    fn the_counters_in_one_line_say_force_and_fault() {
+        let stats = Stats::default();
+        stats.set_force(0.5);
+        stats.set_link(Link::Fresh);
+        let line = stats.summary().line();
+        assert!(line.starts_with("force 0.500 N, peak 0.500 N; 0 samples") && !line.contains('\n'), "{line}");
+        assert!(!line.contains("zero"), "{line}");
+        stats.set_link(Link::Latched(Fault::Peer));
+        let line = stats.summary().line();
+        assert!(line.ends_with("; the force stays at zero until recovered: the daemon stopped the force"), "{line}");
     }
 
     #[test]

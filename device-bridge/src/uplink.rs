@@ -213,12 +213,13 @@ impl Uplink {
 
     async fn attached(&mut self, mut down: Streaming<v1::DeviceDown>, welcome: &Welcome) -> Ended {
         tracing::info!(
-            "attached to tool \"{}\" of session {} at {}: tick {} ms, at most {} N",
+            "attached to tool \"{}\" of session {} at {}: tick {} ms, force at most {} N, changing by at most {} N/s",
             welcome.tool_name,
             welcome.session_id,
             self.settings.address,
             welcome.tick_period_s * 1e3,
-            welcome.limits.max_force_n
+            welcome.limits.max_force_n,
+            welcome.limits.max_force_rate_n_per_s
         );
         self.last_said.clear();
         self.shared.stats.attached.increment();
@@ -264,13 +265,15 @@ impl Uplink {
                 }
                 Err(rejection) => {
                     self.shared.stats.rejected.increment();
-                    told.once(&format!("a command of the daemon was refused: {rejection}"));
+                    let text = format!("a command of the daemon was refused: {rejection}");
+                    told.once(&text, &text);
                 }
             },
             Some(Message::Fault(fault)) => self.take_fault(&fault, told),
             Some(Message::Welcome(_)) | None => {
                 self.shared.stats.rejected.increment();
-                told.once("the daemon sent a message that has no place here");
+                let text = "the daemon sent a message that has no place here";
+                told.once(text, text);
             }
         }
     }
@@ -278,7 +281,8 @@ impl Uplink {
     fn take_fault(&self, fault: &v1::DeviceFault, told: &mut Told) {
         use v1::DeviceFaultCode::{Detached, Quarantined};
         self.shared.stats.peer_faults.increment();
-        told.once(&format!("the daemon reports {}: {}", fault.code().as_str_name(), fault.message));
+        // Messages of one code differ in their numbers only.
+        told.once(fault.code().as_str_name(), &format!("the daemon reports: {}", fault.message));
         if matches!(fault.code(), Detached | Quarantined) {
             self.shared.peer_fault.store(true, Ordering::Relaxed);
         }
@@ -293,13 +297,13 @@ struct Told {
 }
 
 impl Told {
-    /// More different texts than this are not from a healthy peer.
+    /// More different subjects than this are not from a healthy peer.
     const MOST: usize = 32;
 
-    fn once(&mut self, text: &str) {
-        if self.said.len() < Self::MOST && !self.said.iter().any(|said| said == text) {
+    fn once(&mut self, subject: &str, text: &str) {
+        if self.said.len() < Self::MOST && !self.said.iter().any(|said| said == subject) {
             tracing::warn!("{text}");
-            self.said.push(text.to_owned());
+            self.said.push(subject.to_owned());
         }
     }
 }

@@ -43,7 +43,24 @@ async fn stopping_ramps_to_zero_and_ends_the_stream() {
     until("the force is up", || handle.stats().force_n() > 0.99).await;
     let summary = bridge.stop().await;
     assert_eq!((summary.final_force_n, handle.stats().link()), (0.0, Link::Latched(Fault::Requested)));
+    assert!(!summary.to_string().contains("without force"), "a stop is no fault: {summary}");
     until("the daemon saw the end", || mock.seen(|seen| seen.ended == 1)).await;
+}
+
+/// The counters at the end did not say that the arm had been without force for an hour.
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn an_end_in_a_latched_fault_says_so_and_how_to_recover() {
+    let mock = Mock::default();
+    let (address, _stop, _serving) = mock.serve("127.0.0.1:0").await;
+    let bridge = start(config(&format!("http://{address}")));
+    let stats = bridge.handle.stats();
+    until("the force is up", || stats.force_n() > 0.99).await;
+    mock.set(|behaviour| behaviour.silent = true);
+    until("the fault is latched", || stats.link() == Link::Latched(Fault::Stale)).await;
+    let shown = bridge.stop().await.to_string();
+    for part in ["without force at the end", "no answer to a fresh pose", "SIGUSR1", "--auto-recover"] {
+        assert!(shown.contains(part), "{part} is missing in:\n{shown}");
+    }
 }
 
 /// A bridge whose caller dropped it went on pressing, with nobody left to stop it.

@@ -3,13 +3,8 @@ mod obj;
 mod ply;
 mod vtu;
 
-use crate::{
-    ViewError, cli,
-    connect::Server,
-    surface::{Surface, Watcher},
-};
+use crate::{ViewError, cli, connect::Server, moment::Moment, surface::Surface};
 use clap::Args;
-use palpate_proto::v1::LevelOfDetail;
 use std::path::{Path, PathBuf};
 
 /// Arguments of `export`.
@@ -20,6 +15,8 @@ pub struct ExportArguments {
     /// Replace the file if it exists
     #[arg(long)]
     force: bool,
+    #[command(flatten)]
+    moment: Moment,
 }
 
 /// Runs `export`.
@@ -28,7 +25,7 @@ pub struct ExportArguments {
 /// An unknown ending, an unreachable daemon, or a file that cannot be written.
 pub async fn run(server: &Server, arguments: &ExportArguments) -> Result<(), ViewError> {
     let write = writer_for(&arguments.file)?;
-    let surface = present_surface(server).await?;
+    let surface = arguments.moment.surface(server).await?;
     cli::write_new(&arguments.file, write(&surface).as_bytes(), arguments.force)?;
     cli::say(&format!(
         "{}: {} vertices, {} triangles at tick {}",
@@ -46,15 +43,6 @@ fn writer_for(path: &Path) -> Result<fn(&Surface) -> String, ViewError> {
         Some("ply") => Ok(ply::to_text),
         _ => Err(ViewError::Ending { path: path.into(), known: ".vtu, .obj, .ply" }),
     }
-}
-
-/// The surface as it is now.
-///
-/// # Errors
-/// An unreachable daemon or a broken stream.
-pub async fn present_surface(server: &Server) -> Result<Surface, ViewError> {
-    let mut watcher = Watcher::start(server.connect().await?, 0.0, LevelOfDetail::Full).await?;
-    watcher.next().await?.cloned().ok_or_else(|| ViewError::Stream("ended before the first surface".into()))
 }
 
 #[cfg(test)]

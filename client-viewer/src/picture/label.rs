@@ -10,8 +10,8 @@ const MARGIN: usize = 16;
 const BAR_WIDTH: usize = 16;
 const TICKS: usize = 4;
 
-/// Colours over displacement in mm, at the left edge.
-pub(super) fn legend(canvas: &mut Canvas, top_m: f32, ink: Rgb) {
+/// Colours over displacement in mm, at the left edge, with remarks below.
+pub(super) fn legend(canvas: &mut Canvas, top_m: f32, remarks: &[&str], ink: Rgb) {
     let scale = text_scale(canvas);
     let height = canvas.height / 3;
     let top = canvas.height / 2 - height / 2;
@@ -28,6 +28,9 @@ pub(super) fn legend(canvas: &mut Canvas, top_m: f32, ink: Rgb) {
         write(canvas, MARGIN + BAR_WIDTH * scale + 6, row - GLYPH * scale / 2, &text, scale, ink);
     }
     write(canvas, MARGIN, top - 2 * GLYPH * scale, "displacement / mm", scale, ink);
+    for (line, remark) in remarks.iter().enumerate() {
+        write(canvas, MARGIN, top + height + (3 * line + 2) * GLYPH * scale / 2, remark, scale, ink);
+    }
 }
 
 /// Scene and simulated time, at the top left.
@@ -48,7 +51,7 @@ fn text_scale(canvas: &Canvas) -> usize {
 }
 
 /// Three significant digits without trailing zeros.
-fn trimmed(value: f32) -> String {
+pub(super) fn trimmed(value: f32) -> String {
     let decimals = if value == 0.0 { 0 } else { (2 - value.abs().log10().floor() as i32).max(0) as usize };
     let text = format!("{value:.decimals$}");
     if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').to_owned() } else { text }

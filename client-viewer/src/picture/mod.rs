@@ -5,7 +5,7 @@ mod label;
 mod raster;
 mod solids;
 
-use crate::{ViewError, cli, connect::Server, export, surface::Surface};
+use crate::{ViewError, cli, connect::Server, moment::Moment, surface::Surface};
 use camera::Camera;
 use clap::Args;
 use colour::Rgb;
@@ -15,6 +15,8 @@ use std::path::PathBuf;
 
 /// Each pixel is the mean of this many squared.
 const SUPERSAMPLING: usize = 2;
+/// The least scale, as a part of the body's size (the diagonal of its box at rest).
+const LEAST_SCALE: f32 = 0.01;
 const GROUND: Rgb = Rgb([0.078, 0.094, 0.110]);
 /// Forces written below the title: more tools would run into the legend.
 const LABELLED_TOOLS: usize = 4;
@@ -33,12 +35,14 @@ pub struct SnapshotArguments {
     /// Direction to look from, seen from the body's middle
     #[arg(long, default_value = "0.75,-1.35,0.55", value_parser = parse_direction, allow_hyphen_values = true, value_name = "X,Y,Z")]
     from: Vec3,
-    /// Displacement (mm) of the last colour; a round number above the largest when absent
+    /// Displacement (mm) of the last colour [default: the largest one, rounded up, and at least 1 % of the body's size]
     #[arg(long, value_parser = parse_full_scale, allow_negative_numbers = true, value_name = "MM")]
     full_scale_mm: Option<f32>,
     /// Replace the file if it exists
     #[arg(long)]
     force: bool,
+    #[command(flatten)]
+    moment: Moment,
 }
 
 fn parse_size(text: &str) -> Result<(usize, usize), String> {
@@ -76,26 +80,49 @@ pub async fn run(server: &Server, arguments: &SnapshotArguments) -> Result<(), V
     if !arguments.file.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("png")) {
         return Err(ViewError::Ending { path: arguments.file.clone(), known: ".png" });
     }
-    let surface = export::present_surface(server).await?;
-    let full_scale_m = arguments.full_scale_mm.map(|mm| mm * 1e-3);
-    let (canvas, top_m) = draw(&surface, arguments.size, arguments.from, full_scale_m);
+    let surface = arguments.moment.surface(server).await?;
+    let scale = Scale::of(&surface, arguments.full_scale_mm.map(|mm| mm * 1e-3));
+    let canvas = draw(&surface, arguments.size, arguments.from, scale);
     cli::write_new(&arguments.file, &encode(&canvas)?, arguments.force)?;
     cli::say(&format!(
-        "{}: tick {}, largest displacement {:.3} mm, full colour at {:.3} mm",
+        "{}: tick {}, largest displacement {:.3} mm, last colour at {:.3} mm ({})",
         arguments.file.display(),
         surface.last.tick,
-        1e3 * largest(&surface),
-        1e3 * top_m
+        1e3 * scale.largest_m,
+        1e3 * scale.top_m,
+        scale.rule
     ))
 }
 
-fn largest(surface: &Surface) -> f32 {
-    surface.displacement_m.iter().map(|d| d.length()).fold(0.0, f32::max)
+/// What the colours stand for.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Scale {
+    /// Displacement (m) of the last colour.
+    top_m: f32,
+    /// Largest displacement (m) of the surface.
+    largest_m: f32,
+    /// Where the end of the scale comes from.
+    rule: &'static str,
 }
 
-/// Draws; also returns the displacement (m) of the last colour.
-fn draw(surface: &Surface, (width, height): (usize, usize), from: Vec3, full_scale_m: Option<f32>) -> (Canvas, f32) {
-    let top_m = full_scale_m.unwrap_or_else(|| colour::nice_ceiling(largest(surface), 1e-4));
+impl Scale {
+    /// The largest displacement, rounded up, but never less than 1 % of the body's size: a body at rest, which sags or trembles by
+    /// micrometres, has the colours of rest.
+    fn of(surface: &Surface, asked_m: Option<f32>) -> Self {
+        let largest_m = surface.displacement_m.iter().map(|d| d.length()).fold(0.0, f32::max);
+        let low = surface.rest_m.iter().copied().reduce(Vec3::min).unwrap_or(Vec3::ZERO);
+        let high = surface.rest_m.iter().copied().reduce(Vec3::max).unwrap_or(Vec3::ZERO);
+        let least_m = colour::nice_ceiling(LEAST_SCALE * low.distance(high), f32::MIN_POSITIVE);
+        let (top_m, rule) = match asked_m {
+            Some(top_m) => (top_m, "as asked"),
+            None if largest_m <= least_m => (least_m, "1 % of the body, rounded up"),
+            None => (colour::nice_ceiling(largest_m, least_m), "largest, rounded up"),
+        };
+        Self { top_m, largest_m, rule }
+    }
+}
+
+fn draw(surface: &Surface, (width, height): (usize, usize), from: Vec3, scale: Scale) -> Canvas {
     let positions = surface.positions_m();
     // The rest shape too: pictures of small displacements are all taken from the same place.
     let seen: Vec<Vec3> = surface.rest_m.iter().chain(&positions).copied().collect();
@@ -106,21 +133,30 @@ fn draw(surface: &Surface, (width, height): (usize, usize), from: Vec3, full_sca
         .iter()
         .zip(&normals)
         .zip(&surface.displacement_m)
-        .map(|((&position, &normal), d)| Vertex { position, normal, colour: colour::of_fraction(d.length() / top_m) })
+        .map(|((&position, &normal), d)| Vertex {
+            position,
+            normal,
+            colour: colour::of_fraction(d.length() / scale.top_m),
+        })
         .collect();
     for t in &surface.triangles {
         canvas.triangle(&camera, t.map(|i| vertices[i as usize]));
     }
     draw_tools(&mut canvas, &camera, surface);
     let mut canvas = canvas.reduced(SUPERSAMPLING);
-    label::legend(&mut canvas, top_m, INK);
+    label::legend(
+        &mut canvas,
+        scale.top_m,
+        &[&format!("largest now {} mm", label::trimmed(1e3 * scale.largest_m)), &format!("scale: {}", scale.rule)],
+        INK,
+    );
     label::title(&mut canvas, &surface.header.scene_name, surface.last.time_s, INK);
     let tools = surface.header.tools.iter().zip(&surface.last.tools);
     for (line, (shape, state)) in tools.take(LABELLED_TOOLS).enumerate() {
         let force_n = vector(state.contact_force_n).unwrap_or(Vec3::ZERO).length();
         label::force(&mut canvas, line, &shape.name, force_n, ARROW);
     }
-    (canvas, top_m)
+    canvas
 }
 
 fn vector(v: Option<palpate_proto::v1::Vec3>) -> Option<Vec3> {
@@ -184,10 +220,28 @@ mod tests {
 
     #[test]
     fn the_middle_shows_the_body_and_the_corner_the_ground() {
-        let (canvas, top_m) = draw(&square(), (200, 150), Vec3::new(0.0, -0.01, 1.0), None);
-        assert!((top_m - 0.02).abs() < 1e-6);
+        let scale = Scale::of(&square(), None);
+        let canvas = draw(&square(), (200, 150), Vec3::new(0.0, -0.01, 1.0), scale);
         assert_ne!(canvas.pixel(100, 75), canvas.pixel(2, 2));
         assert_eq!(canvas.pixel(2, 148), GROUND.0.map(|c| (c * 255.0).round() as u8));
+    }
+
+    /// A body that trembled by a micrometre was drawn in all colours.
+    #[test]
+    fn the_scale_ends_at_the_largest_displacement_but_never_below_a_hundredth_of_the_body() {
+        let moved_m = |z: f32| Surface { displacement_m: vec![Vec3::new(0.0, 0.0, z); 4], ..square() };
+        // The square's diagonal is 1.41 m.
+        for (z, asked_m, top_m, rule) in [
+            (1e-6, None, 0.02, "1 % of the body, rounded up"),
+            (0.019, None, 0.02, "1 % of the body, rounded up"),
+            (0.03, None, 0.05, "largest, rounded up"),
+            (0.03, Some(0.001), 0.001, "as asked"),
+        ] {
+            let scale = Scale::of(&moved_m(z), asked_m);
+            assert!((scale.top_m / top_m - 1.0).abs() < 1e-4 && scale.rule == rule, "{z}: {scale:?}");
+        }
+        let nothing = Scale::of(&Surface::default(), None);
+        assert!(nothing.top_m > 0.0, "{nothing:?}");
     }
 
     /// The camera saw the rest shape only: a body that had moved far was outside the picture.
@@ -195,7 +249,7 @@ mod tests {
     fn a_body_that_moved_far_is_in_the_picture() {
         let mut moved = square();
         moved.displacement_m = vec![Vec3::new(5.0, 0.0, 0.0); 4];
-        let (canvas, _) = draw(&moved, (200, 150), Vec3::new(0.0, -0.01, 1.0), None);
+        let canvas = draw(&moved, (200, 150), Vec3::new(0.0, -0.01, 1.0), Scale::of(&moved, None));
         let ground = GROUND.0.map(|c| (c * 255.0).round() as u8);
         assert!((100..200).any(|column| canvas.pixel(column, 75) != ground));
     }
@@ -207,7 +261,7 @@ mod tests {
         let force = Some(palpate_proto::v1::Vec3 { x: 0.0, y: 0.0, z: 0.5 });
         pressed.last.tools = vec![palpate_proto::v1::ToolState { contact_force_n: force, ..Default::default() }];
         let arrow = ARROW.0.map(|c| (c * 255.0).round() as u8);
-        let (canvas, _) = draw(&pressed, (400, 300), Vec3::new(0.0, -0.01, 1.0), None);
+        let canvas = draw(&pressed, (400, 300), Vec3::new(0.0, -0.01, 1.0), Scale::of(&pressed, None));
         let written =
             (0..400).flat_map(|x| (24..48).map(move |y| (x, y))).filter(|&(x, y)| canvas.pixel(x, y) == arrow);
         assert!(written.count() > 100);
@@ -215,7 +269,7 @@ mod tests {
 
     #[test]
     fn the_picture_is_a_png() {
-        let (canvas, _) = draw(&square(), (64, 64), Vec3::ONE, Some(0.05));
+        let canvas = draw(&square(), (64, 64), Vec3::ONE, Scale::of(&square(), Some(0.05)));
         let bytes = encode(&canvas).unwrap();
         let mut reader = png::Decoder::new(std::io::Cursor::new(bytes)).read_info().unwrap();
         let mut pixels = vec![0; reader.output_buffer_size().unwrap()];

@@ -84,7 +84,8 @@ fn probes(session: &ActiveSession, copy: &Copy) -> Vec<v1::NamedVector> {
         let mut values = vec![0.0; MAX_COLUMNS];
         probe.evaluate(&session.model, &copy.state, &copy.scratch, &mut values);
         values.truncate(probe.columns().len());
-        v1::NamedVector { name: probe.name().to_owned(), unit: probe.unit().to_owned(), values }
+        let components = probe.columns().iter().map(|&column| column.to_owned()).collect();
+        v1::NamedVector { name: probe.name().to_owned(), unit: probe.unit().to_owned(), values, components }
     };
     session.probes.iter().map(read).collect()
 }

@@ -1,4 +1,5 @@
 //! Logs: to standard error, filtered by `PALPATE_LOG` (for example `debug` or `palpated=trace,h2=warn`). Never from the loop.
+use std::io::IsTerminal as _;
 use tracing_subscriber::EnvFilter;
 
 /// Name of the variable that filters logs.
@@ -7,6 +8,12 @@ pub const VARIABLE: &str = "PALPATE_LOG";
 /// Starts logging; later calls do nothing.
 pub fn init() {
     let filter = EnvFilter::try_from_env(VARIABLE).unwrap_or_else(|_| EnvFilter::new("info"));
-    let _ =
-        tracing_subscriber::fmt().with_env_filter(filter).with_writer(std::io::stderr).with_target(false).try_init();
+    // Colours on a terminal only, and not when `NO_COLOR` asks for none.
+    let colours = std::io::stderr().is_terminal() && std::env::var_os("NO_COLOR").is_none_or(|value| value.is_empty());
+    let _ = tracing_subscriber::fmt()
+        .with_env_filter(filter)
+        .with_writer(std::io::stderr)
+        .with_ansi(colours)
+        .with_target(false)
+        .try_init();
 }

@@ -53,7 +53,6 @@ impl Program {
             .stdin(Stdio::null())
             .stdout(Stdio::piped())
             .stderr(Stdio::piped())
-            .env("NO_COLOR", "1")
             .spawn()
             .expect("the program starts");
         let (send, lines) = mpsc::channel();

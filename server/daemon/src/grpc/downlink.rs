@@ -10,6 +10,7 @@ use crate::{
     sim::exchange::{DeviceInput, ToolEnd, ToolOutput},
 };
 use glam::DVec3;
+use palpate_control::ForceLimits;
 use palpate_proto::v1::{self, DeviceFaultCode, device_down::Message};
 use std::{sync::Arc, time::Duration};
 use tokio::{
@@ -97,6 +98,7 @@ impl Attachment {
         let (fault_in, faults) = mpsc::channel(FAULTS_WAITING);
         // The way up has the real slot; what stands in its place is never read.
         let ToolEnd { samples, outputs, ear, shared } = end;
+        let limits = ForceLimits { max_force_n: shared.max_force_n(), ..daemon.settings.limits.force };
         let (placeholder, _) = triple_buffer::triple_buffer(&None);
         let (lent, samples) = Lent::new(samples);
         let uplink = Uplink {
@@ -120,7 +122,7 @@ impl Attachment {
             samples: Some(samples),
             over,
             faults,
-            news: News::default(),
+            news: News::new(limits),
             untold: None,
             sent: ToolOutput::default(),
             stage: Stage::Live,

@@ -1,5 +1,6 @@
 //! What a device has to be told beside its commands, each thing once.
-use crate::sim::exchange::ToolOutput;
+use crate::sim::exchange::{LimitedTicks, ToolOutput};
+use palpate_control::ForceLimits;
 use palpate_proto::v1::{DeviceFault, DeviceFaultCode};
 use std::time::{Duration, Instant};
 
@@ -7,8 +8,9 @@ use std::time::{Duration, Instant};
 const LIMITED_EVERY: Duration = Duration::from_secs(1);
 
 /// What one device was told already.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub struct News {
+    limits: ForceLimits,
     quarantined: Option<u64>,
     held: bool,
     stale: bool,
@@ -18,6 +20,11 @@ pub struct News {
 }
 
 impl News {
+    /// For a device under these limits that was told nothing yet.
+    pub fn new(limits: ForceLimits) -> Self {
+        Self { limits, quarantined: None, held: false, stale: false, limited: None, counts: [0; 3] }
+    }
+
     /// The next thing that an output tells and the device does not know; `None` when it knows all.
     pub fn of(&mut self, output: &ToolOutput, now: Instant) -> Option<DeviceFault> {
         if output.quarantined != self.quarantined {
@@ -43,17 +50,22 @@ impl News {
                 return Some(self.count(2, DeviceFaultCode::Stale, text.to_owned()));
             }
         }
-        self.limiting(output.limited_ticks, now)
+        self.limiting(output.limited, now)
     }
 
-    fn limiting(&mut self, ticks: u64, now: Instant) -> Option<DeviceFault> {
+    fn limiting(&mut self, ticks: LimitedTicks, now: Instant) -> Option<DeviceFault> {
         let (told, known) = self.limited.map_or((None, 0), |(at, known)| (Some(at), known));
-        if ticks <= known || told.is_some_and(|at| now.saturating_duration_since(at) < LIMITED_EVERY) {
+        if ticks.total <= known || told.is_some_and(|at| now.saturating_duration_since(at) < LIMITED_EVERY) {
             return None;
         }
-        self.limited = Some((now, ticks));
-        let text = format!("the force was limited in {ticks} ticks so far (the welcome says to what)");
-        Some(fault(DeviceFaultCode::Limited, text, ticks))
+        self.limited = Some((now, ticks.total));
+        let ForceLimits { max_force_n, max_force_rate_n_per_s } = self.limits;
+        let by_peak = (ticks.by_peak > 0).then(|| format!(", in {} by its peak of {max_force_n} N", ticks.by_peak));
+        let by_rate =
+            (ticks.by_rate > 0).then(|| format!(", in {} by its rate of {max_force_rate_n_per_s} N/s", ticks.by_rate));
+        let (total, by_peak, by_rate) = (ticks.total, by_peak.unwrap_or_default(), by_rate.unwrap_or_default());
+        let text = format!("ticks so far in which the force was held back: {total}{by_peak}{by_rate}");
+        Some(fault(DeviceFaultCode::Limited, text, ticks.total))
     }
 
     fn count(&mut self, which: usize, code: DeviceFaultCode, message: String) -> DeviceFault {
@@ -72,13 +84,15 @@ mod tests {
     use super::*;
     use DeviceFaultCode::{Held, Limited, Quarantined, Stale};
 
+    const LIMITS: ForceLimits = ForceLimits { max_force_n: 3.0, max_force_rate_n_per_s: 2000.0 };
+
     fn told(news: &mut News, output: &ToolOutput, now: Instant) -> Vec<(DeviceFaultCode, u64)> {
         std::iter::from_fn(|| news.of(output, now)).map(|fault| (fault.code(), fault.count)).collect()
     }
 
     #[test]
     fn each_change_is_told_once_and_counted() {
-        let (mut news, now) = (News::default(), Instant::now());
+        let (mut news, now) = (News::new(LIMITS), Instant::now());
         let fine = ToolOutput::default();
         let bad = ToolOutput { quarantined: Some(7), held: true, stale: true, ..fine };
         assert_eq!(told(&mut news, &fine, now), []);
@@ -91,14 +105,28 @@ mod tests {
     /// The count was that of the reports, one a second, whatever had happened between them.
     #[test]
     fn limiting_is_told_once_a_second_with_all_ticks_so_far() {
-        let (mut news, start) = (News::default(), Instant::now());
+        let (mut news, start) = (News::new(LIMITS), Instant::now());
         let after = |ms| start + Duration::from_millis(ms);
-        let limited = |limited_ticks| ToolOutput { limited_ticks, ..ToolOutput::default() };
+        let limited = |total| {
+            let limited = LimitedTicks { total, ..LimitedTicks::default() };
+            ToolOutput { limited, ..ToolOutput::default() }
+        };
         assert_eq!(told(&mut news, &limited(3), start), [(Limited, 3)]);
         assert_eq!(told(&mut news, &limited(400), after(999)), []);
         // Over since, but not told yet.
         assert_eq!(told(&mut news, &limited(400), after(1000)), [(Limited, 400)]);
         assert_eq!(told(&mut news, &limited(400), after(5000)), []);
         assert_eq!(told(&mut news, &limited(401), after(5001)), [(Limited, 401)]);
+    }
+
+    /// It said "the welcome says to what", which nobody who reads a log has seen.
+    #[test]
+    fn limiting_says_what_was_limited_and_to_what() {
+        let limited = LimitedTicks { total: 7, by_peak: 3, by_rate: 5 };
+        let fault = News::new(LIMITS).of(&ToolOutput { limited, ..ToolOutput::default() }, Instant::now()).unwrap();
+        assert_eq!(
+            fault.message,
+            "ticks so far in which the force was held back: 7, in 3 by its peak of 3 N, in 5 by its rate of 2000 N/s"
+        );
     }
 }

@@ -56,10 +56,21 @@ pub struct ToolOutput {
     pub stale: bool,
     /// Time stands, is stepped, or is about to jump: the force ramps to zero.
     pub held: bool,
-    /// Ticks of this attachment in which the force was saturated or its rate limited.
-    pub limited_ticks: u64,
+    /// Ticks of this attachment in which the force was limited.
+    pub limited: LimitedTicks,
     /// Tick at which the body's state was quarantined.
     pub quarantined: Option<u64>,
+}
+
+/// In how many ticks of an attachment the force was limited, and by what; one tick may be limited by both.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct LimitedTicks {
+    /// By anything.
+    pub total: u64,
+    /// By the peak.
+    pub by_peak: u64,
+    /// By the rate.
+    pub by_rate: u64,
 }
 
 /// What both sides know of a tool.

@@ -1,7 +1,7 @@
 //! One tool's side of the tick: where it shall go, and what force its arm gets.
 use super::{
     arm::BuiltinArm,
-    exchange::{DeviceInput, ToolOutput, ToolPort, ToolView},
+    exchange::{DeviceInput, LimitedTicks, ToolOutput, ToolPort, ToolView},
 };
 use glam::DVec3;
 use palpate_control::{
@@ -64,7 +64,7 @@ pub struct ToolLoop {
     /// The simulated arm has to start where the device left the tool.
     arm_takes_over: bool,
     newest: Option<DeviceInput>,
-    limited_ticks: u64,
+    limited: LimitedTicks,
     raw_n: DVec3,
     output: ToolOutput,
 }
@@ -85,7 +85,7 @@ impl ToolLoop {
             place: Place::Clear,
             arm_takes_over: false,
             newest: None,
-            limited_ticks: 0,
+            limited: LimitedTicks::default(),
             raw_n: DVec3::ZERO,
             output: ToolOutput::default(),
         }
@@ -123,7 +123,7 @@ impl ToolLoop {
         self.arm_takes_over = attachment == 0;
         self.attachment = attachment;
         self.newest = None;
-        self.limited_ticks = 0;
+        self.limited = LimitedTicks::default();
         self.watchdog = Watchdog::new(self.limits.watchdog);
         let own = self.limits.force;
         let max_force_n =
@@ -202,8 +202,12 @@ impl ToolLoop {
         let ramp = watched.map_or(1.0, |verdict| verdict.ramp) * self.level;
         let limited = self.limiter.limit(self.raw_n, ramp, frame.period_s);
         let model_max_force_n = ramp * self.limiter.limits().max_force_n;
-        let limits_acted = limited.saturated || limited.rate_limited || limited.non_finite;
-        self.limited_ticks += u64::from(limits_acted && ramp > 0.0);
+        if ramp > 0.0 {
+            let count = &mut self.limited;
+            count.total += u64::from(limited.saturated || limited.rate_limited || limited.non_finite);
+            count.by_peak += u64::from(limited.saturated);
+            count.by_rate += u64::from(limited.rate_limited);
+        }
         let rendered = tool.local_model.filter(|_| ramp > 0.0 && !limited.non_finite);
         self.output = ToolOutput {
             attachment: self.attachment,
@@ -220,7 +224,7 @@ impl ToolLoop {
             proxy_position_m: tool.centre_m,
             stale: self.newest.is_some() && watched.is_some_and(|verdict| is_stale(&verdict)),
             held: order == Order::Hold,
-            limited_ticks: self.limited_ticks,
+            limited: self.limited,
             quarantined,
         };
     }
