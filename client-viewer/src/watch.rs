@@ -44,6 +44,8 @@ struct Second {
     device_force_n: f64,
     max_displacement_mm: f64,
     tick_cost_us: f32,
+    /// Why the body stands, in the daemon's words; empty: it does not.
+    quarantine: String,
 }
 
 /// Runs `watch`.
@@ -108,7 +110,7 @@ fn row(second: &Second, json: bool) -> String {
         // A struct of numbers and a name always has a JSON form.
         return serde_json::to_string(second).unwrap_or_default();
     }
-    format!(
+    let numbers = format!(
         "{:>9.2} {:>7.1} {:>8.1} ({:>5.1}) {:>8} {:>10.4} {:>10.4} {:>10.3} {:>8.0}",
         second.time_s,
         second.rate_hz,
@@ -119,7 +121,8 @@ fn row(second: &Second, json: bool) -> String {
         second.device_force_n,
         second.max_displacement_mm,
         second.tick_cost_us
-    )
+    );
+    if second.quarantine.is_empty() { numbers } else { format!("{numbers}\nQUARANTINED: {}", second.quarantine) }
 }
 
 /// Collects updates over a second.
@@ -154,6 +157,7 @@ impl Window {
             device_force_n: tool.map_or(0.0, |t| magnitude(t.device_force_n.as_ref())),
             max_displacement_mm: 1e3 * update.max_displacement_m,
             tick_cost_us: update.tick_cost_us as f32,
+            quarantine: update.quarantine.clone(),
         };
         *self = Self::new(now);
         Some(second)
@@ -186,5 +190,16 @@ mod tests {
         assert!((second.rate_hz - 11.0).abs() < 1e-9);
         assert_eq!((second.contact_force_n, second.skipped, second.max_displacement_mm), (5.0, 3, 2.0));
         assert!(window.delays_ms.is_empty());
+        assert_eq!(row(&second, false).lines().count(), 1);
+    }
+
+    #[test]
+    fn a_quarantine_is_said_with_the_numbers() {
+        let last = SurfaceUpdate { quarantine: "tick 7 was refused".into(), ..Default::default() };
+        let begin = Instant::now();
+        let second = Window::new(begin).take(&Surface { last, ..Default::default() }, begin + Duration::from_secs(1));
+        let second = second.unwrap();
+        assert!(row(&second, false).ends_with("\nQUARANTINED: tick 7 was refused"));
+        assert!(row(&second, true).contains(r#""quarantine":"tick 7 was refused""#));
     }
 }

@@ -15,6 +15,11 @@ export function colourOf(fraction: number): [number, number, number] {
   return [a[0] + (b[0] - a[0]) * t, a[1] + (b[1] - a[1]) * t, a[2] + (b[2] - a[2]) * t];
 }
 
+/** The colours as stops of a CSS gradient. */
+export function gradient(): string {
+  return STOPS.map((stop) => `rgb(${stop.map((part) => 255 * part).join(" ")})`).join(", ");
+}
+
 /** The smallest of 1, 2, 5 × 10ⁿ that is not below `value`; `least` for nothing. */
 export function niceCeiling(value: number, least: number): number {
   if (!(value > least)) return least;

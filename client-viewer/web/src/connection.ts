@@ -1,6 +1,7 @@
 // The stream of the surface, with reconnection: whatever happens, the page comes back by itself.
 import { createClient } from "@connectrpc/connect";
 import { createGrpcWebTransport } from "@connectrpc/connect-web";
+import { isBug, reasonOf } from "./reason";
 import { fetchSurfaceService, type SurfaceEvent } from "./wire";
 
 export type ConnectionState = { state: "connecting" | "live" | "lost"; text: string };
@@ -25,9 +26,9 @@ async function loop(onEvent: (event: SurfaceEvent) => void, onState: (state: Con
         onState({ state: "live", text: "live" });
       });
     } catch (error) {
-      // A browser calls every failure of the network a TypeError, in words of its own.
-      reason = error instanceof TypeError ? "no daemon answers" : error instanceof Error ? error.message : String(error);
-      console.info(error);
+      reason = reasonOf(error);
+      if (isBug(error)) console.error(error);
+      else console.info(error);
     }
     onState({ state: "lost", text: `lost: ${reason} – trying again in ${pauseMs / 1000} s` });
     await new Promise((resolve) => setTimeout(resolve, pauseMs));

@@ -1,5 +1,5 @@
 // Wires the stream to the view. One frame of the screen draws the newest update, however many came.
-import { ScaleRange, colourOf } from "./colour";
+import { ScaleRange, gradient } from "./colour";
 import { watchForever } from "./connection";
 import { delayText } from "./delay";
 import { ForcePlot } from "./plot";
@@ -47,6 +47,7 @@ watchForever(
     trace.interrupt();
     arrivals.length = 0;
     for (const id of ["rate", "delay"]) write(id, "–");
+    showFault("");
   },
 );
 
@@ -106,25 +107,24 @@ function numbers(update: SurfaceUpdate): void {
   write("rate", span > 0.2 ? `${((arrivals.length - 1) / span).toFixed(0)} Hz` : "–");
   write("delay", delayText(Date.now() - Number(update.sentUnixNs / 1000n) / 1000));
   write("skipped", String(update.skipped));
+  showFault(update.quarantine);
 }
 
 function drawLegend(): void {
-  const bar = element<HTMLCanvasElement>("legend-bar");
-  const context = bar.getContext("2d");
-  if (!context) return;
-  for (let row = 0; row < bar.height; row++) {
-    const [r, g, b] = colourOf(1 - row / (bar.height - 1));
-    context.fillStyle = `rgb(${r * 255} ${g * 255} ${b * 255})`;
-    context.fillRect(0, row, bar.width, 1);
-  }
   const ticks = [1, 0.75, 0.5, 0.25, 0].map((fraction) => {
     const item = document.createElement("li");
     item.textContent = String(Number((fraction * legend.top * 1e3).toPrecision(3)));
     return item;
   });
   element("legend-ticks").replaceChildren(...ticks);
-  const tools = surface?.header.tools.length ?? 0;
-  write("arrow-scale", tools > 0 ? `longest arrow ${Number(arrow.top.toPrecision(3))} N` : "");
+  element("key").hidden = (surface?.header.tools.length ?? 0) === 0;
+  write("arrow-scale", `longest arrow ${Number(arrow.top.toPrecision(3))} N`);
+}
+
+/** A banner while the body's state is quarantined: a surface that stands would look like one at rest. */
+function showFault(quarantine: string): void {
+  element("fault").hidden = quarantine === "";
+  write("fault-text", quarantine);
 }
 
 let drawn: SurfaceUpdate | undefined;
@@ -141,15 +141,15 @@ function frame(): void {
     plot.draw();
   }
   stage?.render();
-  // For the browser's tests: surfaces that went must not stay on the graphics card.
-  const held = String(stage?.geometries ?? 0);
-  if (element("view").dataset["geometries"] !== held) element("view").dataset["geometries"] = held;
   requestAnimationFrame(frame);
 }
 
 element<HTMLInputElement>("wireframe").addEventListener("change", (e) => stage?.setEdges((e.target as HTMLInputElement).checked));
 element<HTMLInputElement>("ghost").addEventListener("change", (e) => stage?.setGhost((e.target as HTMLInputElement).checked));
 element("recentre").addEventListener("click", () => stage?.recentre());
+element("legend-bar").style.background = `linear-gradient(to top, ${gradient()})`;
+// For the browser's tests, and for whoever looks under the page.
+Object.assign(window, { stage });
 stage?.setEdges(element<HTMLInputElement>("wireframe").checked);
 stage?.setGhost(element<HTMLInputElement>("ghost").checked);
 drawLegend();

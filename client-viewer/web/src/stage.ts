@@ -1,19 +1,46 @@
 // The three-dimensional view: surface, rest shape, tools and force arrows.
 import * as THREE from "three";
 import { OrbitControls } from "three/addons/controls/OrbitControls.js";
+import { Arrow } from "./arrow";
 import { colourOf } from "./colour";
 import type { Surface } from "./surface";
 import type { ToolState, Vec3 } from "./wire";
 
 const vector = (v: Vec3 | undefined) => new THREE.Vector3(v?.x ?? 0, v?.y ?? 0, v?.z ?? 0);
 
-/** Of the smaller direction of the window. */
+/** Length of the longest arrow, in sizes of the body. */
+const LONGEST_ARROW = 0.25;
+
+/** Three circles around the origin, one in each plane. */
+function rings(radius: number): THREE.BufferGeometry {
+  const points: number[] = [];
+  for (let axis = 0; axis < 3; axis++) {
+    for (let i = 0; i < 128; i++) {
+      // Both ends of each of 64 segments.
+      const angle = (2 * Math.PI * Math.ceil(i / 2)) / 64;
+      const at = [0, 0, 0];
+      at[(axis + 1) % 3] = radius * Math.cos(angle);
+      at[(axis + 2) % 3] = radius * Math.sin(angle);
+      points.push(...at);
+    }
+  }
+  return new THREE.BufferGeometry().setAttribute("position", new THREE.Float32BufferAttribute(points, 3));
+}
+
+/** A rectangle of the window (CSS pixels). */
+export interface Extent { left: number; top: number; right: number; bottom: number }
+
+/** Of the smaller direction of the view. */
 const FIELD_OF_VIEW_DEG = 35;
 
-interface ToolView { proxy: THREE.Mesh; device: THREE.Mesh; arrow: THREE.ArrowHelper }
+function corners({ min, max }: THREE.Box3): THREE.Vector3[] {
+  return [min.x, max.x].flatMap((x) => [min.y, max.y].flatMap((y) => [min.z, max.z].map((z) => new THREE.Vector3(x, y, z))));
+}
+
+interface ToolView { radiusM: number; proxy: THREE.Mesh; device: THREE.LineSegments; arrow: Arrow }
 
 export class Stage {
-  private readonly renderer = new THREE.WebGLRenderer({ antialias: true });
+  private readonly renderer = new THREE.WebGLRenderer({ antialias: true, alpha: true });
   private readonly scene = new THREE.Scene();
   private readonly camera = new THREE.PerspectiveCamera(FIELD_OF_VIEW_DEG, 1, 0.001, 10);
   private readonly controls: OrbitControls;
@@ -22,7 +49,7 @@ export class Stage {
     vertexColors: true, roughness: 0.55, metalness: 0, side: THREE.DoubleSide,
   });
   private readonly edges = new THREE.MeshBasicMaterial({ color: 0x0d1013, wireframe: true, transparent: true, opacity: 0.35 });
-  private readonly ghost = new THREE.MeshBasicMaterial({ color: 0x9aa4ad, wireframe: true, transparent: true, opacity: 0.18 });
+  private readonly ghost = new THREE.MeshBasicMaterial({ color: 0x9aa4ad, wireframe: true, transparent: true, opacity: 0.3 });
   private geometry: THREE.BufferGeometry | undefined;
   private surface: Surface | undefined;
   private ghostMesh: THREE.Mesh | undefined;
@@ -32,7 +59,6 @@ export class Stage {
   private dirty = true;
 
   constructor(private readonly host: HTMLElement) {
-    this.scene.background = new THREE.Color(0x14181c);
     const sky = new THREE.HemisphereLight(0xf4f6f8, 0x6b5f55, 1.5);
     sky.position.set(0, 0, 1);
     this.scene.add(sky);
@@ -41,7 +67,6 @@ export class Stage {
     // The lamp moves with the eye, so that a dent is shaded from wherever one looks.
     this.camera.add(sun);
     this.scene.add(this.camera, this.body);
-    this.renderer.setPixelRatio(Math.min(window.devicePixelRatio, 2));
     this.renderer.domElement.addEventListener("webglcontextrestored", () => (this.dirty = true));
     host.append(this.renderer.domElement);
     this.camera.up.set(0, 0, 1);
@@ -75,6 +100,7 @@ export class Stage {
     this.body.add(body, this.edgeMesh, this.ghostMesh);
     this.setEdges(this.edges.visible);
     this.setGhost(this.ghost.visible);
+    this.size = Math.max(vector(surface.header.boundsMaxM).distanceTo(vector(surface.header.boundsMinM)), 1e-4);
     this.makeTools(surface);
     if (!known) this.recentre();
   }
@@ -92,11 +118,14 @@ export class Stage {
   recentre(): void {
     const low = vector(this.surface?.header.boundsMinM);
     const high = vector(this.surface?.header.boundsMaxM);
-    this.size = Math.max(high.distanceTo(low), 1e-4);
     const centre = low.clone().add(high).multiplyScalar(0.5);
+    // The sphere around the body's box fits whichever way one turns, with some room for a tool beside it.
+    const distance = (0.55 * this.size) / Math.sin(THREE.MathUtils.degToRad(FIELD_OF_VIEW_DEG / 2));
     this.camera.near = this.size / 100;
     this.camera.far = this.size * 40;
-    this.camera.position.copy(centre).add(new THREE.Vector3(0.75, -1.35, 0.55).normalize().multiplyScalar(this.size * 1.9));
+    this.controls.minDistance = this.size / 10;
+    this.controls.maxDistance = this.size * 20;
+    this.camera.position.copy(centre).add(new THREE.Vector3(0.75, -1.35, 0.55).normalize().multiplyScalar(distance));
     this.camera.updateProjectionMatrix();
     this.controls.target.copy(centre);
     this.dirty = true;
@@ -129,12 +158,25 @@ export class Stage {
       const length = force.length();
       view.arrow.visible = length > 1e-6;
       if (!view.arrow.visible) return;
-      view.arrow.position.copy(view.proxy.position);
-      view.arrow.setDirection(force.clone().normalize());
-      const shown = this.size * 0.45 * Math.min(length / fullScaleN, 1) + this.size * 0.02;
-      view.arrow.setLength(shown, Math.min(this.size * 0.05, shown), Math.min(this.size * 0.03, shown));
+      force.normalize();
+      // From the ball's surface: a small arrow would be inside.
+      const from = view.proxy.position.clone().addScaledVector(force, view.radiusM);
+      view.arrow.point(from, force, this.size * LONGEST_ARROW * Math.min(length / fullScaleN, 1));
     });
     this.dirty = true;
+  }
+
+  /** Where the window shows the body's box at rest, and the tools with their arrows. */
+  extent(): { body: Extent; tools: Extent } {
+    this.camera.updateMatrixWorld();
+    const box = new THREE.Box3(vector(this.surface?.header.boundsMinM), vector(this.surface?.header.boundsMaxM));
+    const tools = this.tools.filter((view) => view.proxy.visible).flatMap((view) => {
+      // The ends of each ball across and up the window.
+      const ends = [view.proxy, view.device].flatMap((ball) => [0, 1].flatMap((axis) => [-1, 1].map((sign) =>
+        new THREE.Vector3().setFromMatrixColumn(this.camera.matrixWorld, axis).multiplyScalar(sign * view.radiusM).add(ball.position))));
+      return [...ends, ...(view.arrow.visible ? [view.arrow.tip()] : [])];
+    });
+    return { body: this.onScreen(corners(box)), tools: this.onScreen(tools) };
   }
 
   /** Geometries that the graphics card holds: constant however many surfaces were shown. */
@@ -149,27 +191,43 @@ export class Stage {
     this.renderer.render(this.scene, this.camera);
   }
 
+  private onScreen(points: THREE.Vector3[]): Extent {
+    const view = this.renderer.domElement.getBoundingClientRect();
+    const xs: number[] = [];
+    const ys: number[] = [];
+    for (const point of points) {
+      const { x, y } = point.clone().project(this.camera);
+      xs.push(view.left + (view.width * (1 + x)) / 2);
+      ys.push(view.top + (view.height * (1 - y)) / 2);
+    }
+    return { left: Math.min(...xs), top: Math.min(...ys), right: Math.max(...xs), bottom: Math.max(...ys) };
+  }
+
   private makeTools(surface: Surface): void {
     for (const view of this.tools) {
       this.scene.remove(view.proxy, view.device, view.arrow);
       view.proxy.geometry.dispose();
-      for (const mesh of [view.proxy, view.device]) (mesh.material as THREE.Material).dispose();
+      view.device.geometry.dispose();
+      for (const drawn of [view.proxy, view.device]) (drawn.material as THREE.Material).dispose();
       view.arrow.dispose();
     }
     this.tools = surface.header.tools.map((tool) => {
       const ball = new THREE.SphereGeometry(tool.radiusM, 48, 24);
       const proxy = new THREE.Mesh(ball, new THREE.MeshStandardMaterial({ color: 0xe9e4da, roughness: 0.35, transparent: true, opacity: 0.85 }));
-      const device = new THREE.Mesh(ball, new THREE.MeshBasicMaterial({ color: 0x6fb7e9, wireframe: true, transparent: true, opacity: 0.12 }));
-      const arrow = new THREE.ArrowHelper(new THREE.Vector3(0, 0, 1), new THREE.Vector3(), 0.01, 0x6fe0c2);
+      // Seen through the body: there it is while the arm presses.
+      const device = new THREE.LineSegments(rings(tool.radiusM), new THREE.LineBasicMaterial({ color: 0x6fb7e9, depthTest: false, transparent: true }));
+      device.renderOrder = 1;
+      const arrow = new Arrow(0.012 * this.size);
       // Nobody knows yet where they are.
       proxy.visible = device.visible = arrow.visible = false;
       this.scene.add(proxy, device, arrow);
-      return { proxy, device, arrow };
+      return { radiusM: tool.radiusM, proxy, device, arrow };
     });
   }
 
   private resize(): void {
     const { clientWidth, clientHeight } = this.host;
+    this.renderer.setPixelRatio(Math.min(window.devicePixelRatio, 2));
     this.renderer.setSize(clientWidth, clientHeight);
     this.camera.aspect = Math.max(clientWidth, 1) / Math.max(clientHeight, 1);
     // The same view in the smaller direction, so that the whole body is seen in a window that is higher than wide.

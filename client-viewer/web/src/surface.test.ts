@@ -10,7 +10,7 @@ const chunk = (n: number, of: number, part: Partial<KeyframeChunk>): KeyframeChu
 });
 const update = (part: Partial<SurfaceUpdate>): SurfaceUpdate => ({
   epoch: 5, tick: 1n, timeS: 0, sentUnixNs: 0n, skipped: 0n, displacementQuantumM: 0.001, changedU32le: new Uint8Array(),
-  displacementsI16le: new Uint8Array(), tools: [], tickCostUs: 0, maxDisplacementM: 0, ...part,
+  displacementsI16le: new Uint8Array(), tools: [], tickCostUs: 0, maxDisplacementM: 0, quarantine: "", ...part,
 });
 
 describe("keyframe", () => {

@@ -2,6 +2,7 @@
 // never disagree about the wire; these interfaces only give the fields their types.
 import { createFileRegistry, fromBinary, type DescService } from "@bufbuild/protobuf";
 import { FileDescriptorSetSchema } from "@bufbuild/protobuf/wkt";
+import { Unreachable } from "./reason";
 
 export interface Vec3 { x: number; y: number; z: number }
 
@@ -45,6 +46,7 @@ export interface SurfaceUpdate {
   tools: ToolState[];
   tickCostUs: number;
   maxDisplacementM: number;
+  quarantine: string;
 }
 
 export interface SurfaceEvent {
@@ -55,7 +57,9 @@ export interface SurfaceEvent {
 export const DESCRIPTOR_PATH = "palpate.v1.binpb";
 
 export async function fetchSurfaceService(signal: AbortSignal): Promise<DescService> {
-  const answer = await fetch(DESCRIPTOR_PATH, { signal, cache: "no-cache" });
+  const answer = await fetch(DESCRIPTOR_PATH, { signal, cache: "no-cache" }).catch((error: unknown) => {
+    throw error instanceof TypeError ? new Unreachable(error) : error;
+  });
   if (!answer.ok) throw new Error(`${DESCRIPTOR_PATH}: ${answer.status} ${answer.statusText}`);
   const bytes = new Uint8Array(await answer.arrayBuffer());
   const service = createFileRegistry(fromBinary(FileDescriptorSetSchema, bytes)).getService("palpate.v1.Surface");

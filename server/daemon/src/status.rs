@@ -1,5 +1,6 @@
 //! The daemon's status: computed outside the loop, from a copy of the state that the loop made in one go.
 use crate::{
+    grpc::convert,
     session::{ActiveSession, Daemon},
     sim::{
         command::{Copy, Done},
@@ -37,7 +38,7 @@ pub fn of(daemon: &Daemon, session: &ActiveSession, copy: &Copy, done: &Done) ->
         frames_skipped: daemon.hub.frames_skipped(),
         devices: devices(session),
         probes: probes(session, copy),
-        quarantine: quarantine(copy),
+        quarantine: convert::quarantine(copy.state.quarantine),
         skipped_ticks: daemon.timing.the_loop.skipped(),
         samples_rejected: daemon.samples_rejected.load(Ordering::Relaxed),
     }
@@ -88,10 +89,4 @@ fn probes(session: &ActiveSession, copy: &Copy) -> Vec<v1::NamedVector> {
         v1::NamedVector { name: probe.name().to_owned(), unit: probe.unit().to_owned(), values, components }
     };
     session.probes.iter().map(read).collect()
-}
-
-fn quarantine(copy: &Copy) -> String {
-    copy.state.quarantine.map_or_else(String::new, |what| {
-        format!("{what}; the last good state is held, forces are zero until Reset or Restore")
-    })
 }

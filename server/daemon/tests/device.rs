@@ -333,15 +333,7 @@ async fn a_quarantined_body_is_told_and_reset_brings_it_back() {
     arm.welcome().await;
     arm.hold_until(above(), |command| command.sample_sequence > 20).await;
     arm.hold_until(pressing(), |command| force_of(command).z > 0.1).await;
-    // Each within its bound, and absurd in their sum: four meganewtons on a vertex of grams.
-    let force = v1::InjectedForce {
-        surface_vertex: 30,
-        force_n: Some(v1::Vec3 { x: 1e3, ..Default::default() }),
-        from_tick: 0,
-        tick_count: 3,
-    };
-    let inject = v1::InjectForcesRequest { forces: vec![force; 4096], ..Default::default() };
-    daemon.session().inject_forces(inject).await.unwrap();
+    daemon.break_the_body().await;
     let (mut faults, until) = (Vec::new(), tokio::time::Instant::now() + common::PATIENCE);
     // Samples go on: it is the quarantine that takes the force away, not silence.
     loop {

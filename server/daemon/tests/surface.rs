@@ -16,6 +16,20 @@ async fn event(stream: &mut Streaming<v1::SurfaceEvent>) -> v1::SurfaceEvent {
     timeout(PATIENCE, stream.message()).await.expect("an event in time").unwrap().expect("the stream goes on")
 }
 
+/// The next update that is `wanted`.
+async fn next_update(
+    stream: &mut Streaming<v1::SurfaceEvent>,
+    wanted: impl Fn(&v1::SurfaceUpdate) -> bool,
+) -> v1::SurfaceUpdate {
+    let until = tokio::time::Instant::now() + PATIENCE;
+    loop {
+        match event(stream).await.message {
+            Some(v1::surface_event::Message::Update(update)) if wanted(&update) => return update,
+            _ => assert!(tokio::time::Instant::now() < until, "no such update"),
+        }
+    }
+}
+
 /// Surface positions (m) of a snapshot, by way of the physics.
 fn positions_of(daemon: &Daemon, snapshot: &v1::SnapshotResponse) -> Vec<glam::DVec3> {
     let session = daemon.running.as_ref().unwrap().daemon.session();
@@ -129,6 +143,31 @@ async fn a_viewer_that_does_not_read_skips_and_still_ends_with_the_exact_surface
     for (vertex, exact) in positions_of(&daemon, &snapshot).into_iter().enumerate() {
         let error = (mirror.position_m(vertex) - exact).abs().max_element();
         assert!(error <= half_quantum_m + 1e-9, "vertex {vertex}: {error} m");
+    }
+    daemon.finish().await;
+}
+
+/// A body that was quarantined stood still before its viewers without a word.
+#[tokio::test(flavor = "multi_thread")]
+async fn a_quarantine_is_on_the_stream_until_reset() {
+    let daemon = Daemon::on(block_scene("block", 3)).await;
+    for level in [LevelOfDetail::Full, LevelOfDetail::Numbers] {
+        let mut stream = watch(&daemon, 60.0, level).await;
+        let update = next_update(&mut stream, |_| true).await;
+        assert_eq!(update.quarantine, "");
+        daemon.break_the_body().await;
+        let held = next_update(&mut stream, |update| !update.quarantine.is_empty()).await;
+        assert!(held.quarantine.contains("non-finite"), "{}", held.quarantine);
+        assert_eq!(held.quarantine, daemon.status().await.quarantine);
+        assert!(held.max_displacement_m.is_finite());
+        let later = next_update(&mut stream, |_| true).await;
+        assert_eq!(
+            (later.time_s, later.max_displacement_m),
+            (held.time_s, held.max_displacement_m),
+            "the state stands"
+        );
+        daemon.reset().await;
+        next_update(&mut stream, |update| update.quarantine.is_empty() && update.tick > 0).await;
     }
     daemon.finish().await;
 }

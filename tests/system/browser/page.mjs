@@ -70,24 +70,35 @@ function colours(png, x0, y0, x1, y1) {
 const number = async (page, id) => Number.parseFloat((await page.textContent(`#${id}`)).replace(",", ""));
 const state = (page) => page.getAttribute("#connection", "data-state");
 
-/** Session.Pause over gRPC-Web: a frame of two bytes, field 2 true or false. */
-async function pause(paused) {
-  const answer = await fetch(`${url}palpate.v1.Session/Pause`, {
-    method: "POST",
-    headers: { "content-type": "application/grpc-web+proto" },
-    body: new Uint8Array([0, 0, 0, 0, 2, 0x10, paused ? 1 : 0]),
-  });
-  assert.ok(answer.ok && !answer.headers.has("grpc-message"), `Pause: ${answer.status} ${answer.headers.get("grpc-message")}`);
+/** A call of Session over gRPC-Web with an encoded message. */
+async function session(method, message) {
+  const frame = Buffer.concat([Buffer.from([0, 0, 0, 0, 0]), message]);
+  frame.writeUInt32BE(message.length, 1);
+  const headers = { "content-type": "application/grpc-web+proto" };
+  const answer = await fetch(`${url}palpate.v1.Session/${method}`, { method: "POST", headers, body: frame });
+  assert.ok(answer.ok && !answer.headers.has("grpc-message"), `${method}: ${answer.status} ${answer.headers.get("grpc-message")}`);
 }
 
-/** Waits for a firm press and gives its force (N). */
-async function pressure(page) {
-  let contact = 0;
-  for (let i = 0; i < 400 && !(contact >= 0.02); i++) {
-    contact = await number(page, "contact-force");
+/** Field 2 true or false. */
+const pause = (paused) => session("Pause", Buffer.from([0x10, paused ? 1 : 0]));
+
+/** 4096 forces (field 2) of 1000 N along x (fields 2, 1) on vertex 30 (field 1) for 3 ticks (field 4). */
+function breakTheBody() {
+  const x = Buffer.alloc(9, 0x09);
+  x.writeDoubleLE(1000, 1);
+  const force = Buffer.concat([Buffer.from([0x08, 30, 0x12, x.length]), x, Buffer.from([0x20, 3])]);
+  return session("InjectForces", Buffer.concat(Array(4096).fill(Buffer.concat([Buffer.from([0x12, force.length]), force]))));
+}
+
+/** Waits for a firm press and gives its force (N) and displacement (mm), read in one go: it lasts a second. */
+async function press(page) {
+  let [force, displacement] = [0, 0];
+  for (let i = 0; i < 400 && !(force >= 0.02); i++) {
+    [force, displacement] = await page.evaluate(() =>
+      ["#contact-force", "#max-displacement"].map((part) => Number.parseFloat(document.querySelector(part).textContent)));
     await sleep(25);
   }
-  return contact;
+  return { force, displacement };
 }
 
 let daemon = await startDaemon();
@@ -110,10 +121,10 @@ try {
   check("the mesh is counted", /\d+ vertices, \d+ faces/.test(await page.textContent("#mesh")), await page.textContent("#mesh"));
 
   // The simulated arm presses every two seconds: wait for a firm press.
-  const contact = await pressure(page);
+  const { force, displacement } = await press(page);
   const pressed = await page.screenshot({ path: join(artefacts, "page-pressed.png") });
-  check("the arm presses", contact >= 0.02, `${contact} N`);
-  check("the surface dents", (await number(page, "max-displacement")) > 0.05, await page.textContent("#max-displacement"));
+  check("the arm presses", force >= 0.02, `${force} N`);
+  check("the surface dents", displacement > 0.05, `${displacement} mm`);
   const shot = PNG.sync.read(pressed);
   const body = colours(shot, 250, 100, 1000, 640);
   check("the body is drawn in colours", body.different > 300 && body.saturated > 10_000, JSON.stringify(body));
@@ -151,20 +162,39 @@ try {
   await page.screenshot({ path: join(artefacts, "page-edges.png") });
   await page.click("#recentre");
 
-  // A narrow window: the numbers leave the middle of the body free, and nothing lies over anything.
-  for (const [width, height] of [[400, 760], [720, 420]]) {
+  // The end of the body lay behind the plot, and the arrow behind the numbers, in windows of little height.
+  for (const [width, height] of [[400, 760], [420, 800], [720, 420], [800, 457], [1920, 1080], [1280, 717]]) {
     await page.setViewportSize({ width, height });
     await sleep(300);
-    await page.screenshot({ path: join(artefacts, `page-${width}.png`) });
-    const boxes = await Promise.all(["header", "aside", "#legend", "#plot"].map((part) => page.locator(part).boundingBox()));
-    const apart = (a, b) => a.x + a.width <= b.x || b.x + b.width <= a.x || a.y + a.height <= b.y || b.y + b.height <= a.y;
-    const inside = (a) => a.x >= 0 && a.y >= 0 && a.x + a.width <= width && a.y + a.height <= height;
-    const free = boxes.every((a, i) => inside(a) && boxes.slice(i + 1).every((b) => apart(a, b)));
-    const middle = { x: width / 2, y: 0.45 * height, width: 1, height: 1 };
-    check(`all parts have room in ${width}x${height}`, free && boxes.every((a) => apart(a, middle)), JSON.stringify(boxes));
+    await press(page);
+    const { body, tools, parts } = await page.evaluate(() => {
+      const box = (part) => document.querySelector(part).getBoundingClientRect();
+      const plain = ({ left, top, right, bottom }) => ({ left, top, right, bottom });
+      return { ...stage.extent(), parts: ["header", "aside", "#legend", "#plot", "#view"].map(box).map(plain) };
+    });
+    await page.screenshot({ path: join(artefacts, `page-${width}x${height}.png`) });
+    const apart = (a, b) => a.right <= b.left || b.right <= a.left || a.bottom <= b.top || b.bottom <= a.top;
+    const inside = (a, b) => a.left >= b.left && a.top >= b.top && a.right <= b.right && a.bottom <= b.bottom;
+    const whole = { left: 0, top: 0, right: width, bottom: height };
+    const free = parts.every((a, i) => inside(a, whole) && parts.slice(i + 1).every((b) => apart(a, b)));
+    check(`all parts have room in ${width}x${height}`, free, free ? "" : JSON.stringify(parts));
+    const panels = parts.slice(0, 4);
+    const seen = [body, tools].every((a) => inside(a, parts[4]) && panels.every((b) => apart(a, b)));
+    check("body, tool and arrow are in sight", seen, seen ? "" : JSON.stringify({ body, tools, view: parts[4] }));
+    const filled = Math.max((body.right - body.left) / (parts[4].right - parts[4].left), (body.bottom - body.top) / (parts[4].bottom - parts[4].top));
+    check("the body fills its place", filled > 0.5, filled.toFixed(2));
   }
+
+  await breakTheBody();
+  await page.waitForSelector("#fault", { state: "visible", timeout: 10_000 });
+  const fault = await page.textContent("#fault");
+  await page.screenshot({ path: join(artefacts, "page-fault.png") });
+  check("a quarantined body is told", /held.*tick \d+ was refused.*until Reset/.test(fault), fault);
+  await session("Reset", Buffer.alloc(0));
+  await page.waitForSelector("#fault", { state: "hidden", timeout: 10_000 });
+  check("the word goes with the quarantine", true);
   await page.setViewportSize({ width: 1280, height: 860 });
-  const geometries = await page.getAttribute("#view", "data-geometries");
+  const geometries = await page.evaluate(() => stage.geometries);
 
   const code = await stopDaemon(daemon);
   check("the daemon drains with an open page", code === 0, `exit code ${code}`);
@@ -177,9 +207,9 @@ try {
   daemon = await startDaemon();
   await page.waitForSelector('#connection[data-state="live"]', { timeout: 20_000 });
   check("the page comes back by itself", true);
-  check("the arm presses again", (await pressure(page)) >= 0.02);
-  const after = await page.getAttribute("#view", "data-geometries");
-  check("the old surface has left the graphics card", Number(after) > 0 && after === geometries, `${geometries} before, ${after} after`);
+  check("the arm presses again", (await press(page)).force >= 0.02);
+  const after = await page.evaluate(() => stage.geometries);
+  check("the old surface has left the graphics card", after > 0 && after === geometries, `${geometries} before, ${after} after`);
 
   const serious = complaints.filter((text) => !/Failed to load resource|ERR_|network error|Failed to fetch/i.test(text));
   check("no error in the console but for the lost connection", serious.length === 0, serious.join("\n"));

@@ -7,7 +7,7 @@ use crate::{
     },
 };
 use glam::{DMat3, DVec3};
-use palpate_physics::contact::LocalContactModel;
+use palpate_physics::{Quarantine, contact::LocalContactModel};
 use palpate_proto::v1::{self, DeviceFaultCode};
 use tonic::Status;
 
@@ -224,6 +224,13 @@ pub fn tool_state(view: &ToolView) -> v1::ToolState {
         device_force_n: Some(wire_vec3(view.device_force_n)),
         contacts: view.contacts,
     }
+}
+
+/// A quarantine for people; empty: none.
+pub fn quarantine(what: Option<Quarantine>) -> String {
+    what.map_or_else(String::new, |what| {
+        format!("{what}; the last good state is held, forces are zero until Reset or Restore")
+    })
 }
 
 /// A force for an arm.

@@ -2,7 +2,7 @@
 //! allocates on the loop's side once built.
 use super::bell::{Ear, bell};
 use glam::DVec3;
-use palpate_physics::{Model, contact::LocalContactModel};
+use palpate_physics::{Model, Quarantine, contact::LocalContactModel};
 use palpate_realtime::Doorbell;
 use std::{
     io,
@@ -168,6 +168,8 @@ pub struct SurfaceSnapshot {
     pub tick_cost_us: f64,
     /// Largest displacement of a surface vertex (m).
     pub max_displacement_m: f64,
+    /// Why the state stands, if it is quarantined.
+    pub quarantine: Option<Quarantine>,
     /// Whether [`SurfaceSnapshot::displacements_m`] was filled.
     pub has_vertices: bool,
     /// Displacement of each surface vertex (m) from its f32 rest position.

@@ -156,6 +156,7 @@ impl Simulation {
         snapshot.tick = self.state.tick;
         snapshot.time_s = self.state.time_s(&self.model);
         snapshot.tick_cost_us = tick_cost_us;
+        snapshot.quarantine = self.state.quarantine;
         snapshot.has_vertices = self.demand.wants_vertices();
         for (view, (tool, state)) in snapshot.tools.iter_mut().zip(self.tools.iter().zip(&self.state.tools)) {
             *view = tool.view(state);

@@ -225,6 +225,7 @@ fn numbers(epoch: u32, snapshot: &SurfaceSnapshot) -> v1::SurfaceUpdate {
         tools: snapshot.tools.iter().map(crate::grpc::convert::tool_state).collect(),
         tick_cost_us: snapshot.tick_cost_us,
         max_displacement_m: snapshot.max_displacement_m,
+        quarantine: crate::grpc::convert::quarantine(snapshot.quarantine),
         ..Default::default()
     }
 }

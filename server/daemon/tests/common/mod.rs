@@ -158,6 +158,18 @@ impl Daemon {
         self.session().reset(v1::ResetRequest::default()).await.unwrap();
     }
 
+    /// Injects forces, each within its bound and absurd in their sum: four meganewtons on a vertex of grams.
+    pub async fn break_the_body(&self) {
+        let force = v1::InjectedForce {
+            surface_vertex: 30,
+            force_n: Some(v1::Vec3 { x: 1e3, ..Default::default() }),
+            from_tick: 0,
+            tick_count: 3,
+        };
+        let inject = v1::InjectForcesRequest { forces: vec![force; 4096], ..Default::default() };
+        self.session().inject_forces(inject).await.unwrap();
+    }
+
     pub async fn step(&self, ticks: u32) -> u64 {
         self.session().step(v1::StepRequest { ticks, ..Default::default() }).await.unwrap().into_inner().tick
     }
