@@ -1,6 +1,9 @@
 //! Where the daemon is, and a channel to it.
 use crate::ViewError;
-use palpate_proto::connect::{self, ConnectError, causes};
+use palpate_proto::{
+    connect::{self, ConnectError, is_transport, why_no_answer, why_unreachable},
+    v1::{ListRequest, session_client::SessionClient},
+};
 use std::path::PathBuf;
 use tonic::transport::Channel;
 
@@ -20,8 +23,13 @@ impl Server {
     /// [`ViewError::Address`], [`ViewError::File`] or [`ViewError::Unreachable`].
     pub async fn connect(&self) -> Result<Channel, ViewError> {
         let endpoint = connect::endpoint(&self.address, self.tls_ca.as_deref())?;
-        let unreachable = |error| ViewError::Unreachable { address: self.address.clone(), reason: causes(&error) };
-        endpoint.connect().await.map_err(unreachable)
+        let unreachable = |reason| ViewError::Unreachable { address: self.address.clone(), reason };
+        let channel = endpoint.connect().await.map_err(|error| unreachable(why_unreachable(&error)))?;
+        // A connection says nothing of who is at its other end; any answer does, a refusal too.
+        match SessionClient::new(channel.clone()).list(ListRequest {}).await {
+            Err(status) if is_transport(&status) => Err(unreachable(why_no_answer(&status))),
+            _ => Ok(channel),
+        }
     }
 }
 

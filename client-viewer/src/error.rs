@@ -103,7 +103,6 @@ pub enum ViewError {
 
 impl From<tonic::Status> for ViewError {
     fn from(status: tonic::Status) -> Self {
-        // What the daemon answered has no cause on this side; what the transport made up has.
         if let Some(cause) = std::error::Error::source(&status) {
             return Self::Lost(causes(cause));
         }

@@ -7,7 +7,7 @@ use palpate_proto::v1::{
 };
 use palpate_view::{ViewError, connect::Server, surface::Watcher};
 use std::time::Duration;
-use tokio::{net::TcpListener, sync::mpsc, task::JoinHandle};
+use tokio::{io::AsyncWriteExt as _, net::TcpListener, sync::mpsc, task::JoinHandle};
 use tokio_stream::wrappers::{ReceiverStream, TcpListenerStream};
 use tonic::{Request, Response, Status};
 
@@ -71,6 +71,27 @@ async fn a_stream_that_the_daemon_ends_is_an_end() {
     let mut watcher = watch(&server).await;
     drop(streams.recv().await.unwrap());
     assert!(watcher.next().await.unwrap().is_none());
+}
+
+/// A web server was a daemon whose connection "broke: frame with invalid size".
+#[tokio::test]
+async fn a_server_of_another_kind_and_no_server_are_told_apart() {
+    let listener = TcpListener::bind("127.0.0.1:0").await.unwrap();
+    let server = Server { address: format!("http://{}", listener.local_addr().unwrap()), tls_ca: None };
+    let web = tokio::spawn(async move {
+        while let Ok((mut stream, _)) = listener.accept().await {
+            let _ = stream.write_all(b"HTTP/1.1 400 Bad Request\r\nContent-Length: 0\r\n\r\n").await;
+        }
+    });
+    let error = server.connect().await.unwrap_err();
+    assert!(matches!(&error, ViewError::Unreachable { reason, .. } if reason.contains("another program")), "{error}");
+    web.abort();
+    let _ = web.await;
+    let error = server.connect().await.unwrap_err();
+    assert!(matches!(&error, ViewError::Unreachable { reason, .. } if reason.contains("nothing listens")), "{error}");
+    let server = Server { address: "unix:///nowhere/palpate.sock".into(), tls_ca: None };
+    let error = server.connect().await.unwrap_err();
+    assert!(matches!(&error, ViewError::Unreachable { reason, .. } if reason.contains("no such socket")), "{error}");
 }
 
 /// A daemon that was killed "refused", in the words of the transport.

@@ -7,7 +7,7 @@ use crate::{
     settings::UplinkSettings,
 };
 use palpate_proto::{
-    connect::causes,
+    connect::{causes, is_transport, why_no_answer, why_unreachable},
     v1::{self, device_client::DeviceClient, device_down::Message},
 };
 use palpate_realtime::{Clock, Doorbell, SlotReader, SlotWriter};
@@ -161,7 +161,7 @@ impl Uplink {
                 }
                 match ended {
                     Ended::Lost(_) => format!("lost the daemon at {address} ({reason}); the force is ramped to zero"),
-                    _ => format!("no daemon answers at {address} ({reason}): is `palpated` running there"),
+                    _ => format!("no daemon answers at {address}: {reason}"),
                 }
             }
         };
@@ -182,7 +182,7 @@ impl Uplink {
         };
         let channel = match connected {
             Ok(channel) => channel,
-            Err(error) => return Ended::Unreachable(causes(&error)),
+            Err(error) => return Ended::Unreachable(why_unreachable(&error)),
         };
         let up = UpStream {
             hello: Some(convert::hello(&self.settings)),
@@ -202,7 +202,11 @@ impl Uplink {
         };
         match attached {
             Err(_) => Ended::Unreachable(format!("it sent no welcome within {ANSWER_TIMEOUT:?}")),
-            Ok(Err(status)) if is_transport(&status) => Ended::Unreachable(causes(&status)),
+            Ok(Err(status)) if is_transport(&status) => Ended::Unreachable(why_no_answer(&status)),
+            // What stands before a daemon that is down says so in these.
+            Ok(Err(status)) if matches!(status.code(), Code::Unavailable | Code::Unknown) => {
+                Ended::Unreachable(status.message().to_owned())
+            }
             Ok(Err(status)) => Ended::Refused(status),
             Ok(Ok((down, first))) => match welcome_of(first) {
                 Ok(welcome) => self.attached(down, &welcome).await,
@@ -316,11 +320,6 @@ fn welcome_of(first: Option<v1::DeviceDown>) -> Result<Welcome, String> {
         Some(Message::Fault(fault)) => Err(fault.message),
         Some(Message::Command(_)) | None => Err("its first message was no welcome".to_owned()),
     }
-}
-
-/// Unavailable and Unknown come from the transport when a connection breaks.
-fn is_transport(status: &Status) -> bool {
-    matches!(status.code(), Code::Unavailable | Code::Unknown)
 }
 
 /// What to do about refusals that trying again does not change.

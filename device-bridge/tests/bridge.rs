@@ -6,6 +6,7 @@ use palpate_bridge::BridgeError;
 use palpate_control::{Fault, Link};
 use palpate_proto::v1;
 use std::time::Duration;
+use tokio::io::AsyncWriteExt as _;
 use tonic::Status;
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
@@ -250,6 +251,23 @@ async fn an_unreachable_daemon_is_an_error_that_says_what_to_do() {
     for part in [&format!("http://{address}"), "no daemon answered", "refused", "palpated", "--server"] {
         assert!(shown.contains(part), "{part} is missing in: {shown}");
     }
+}
+
+/// It said "refused the arm: h2 protocol error", and then, of the same server, "code: 'Unknown error', … BrokenPipe".
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn a_server_of_another_kind_is_told_from_a_daemon() {
+    let listener = tokio::net::TcpListener::bind("127.0.0.1:0").await.unwrap();
+    let address = listener.local_addr().unwrap();
+    tokio::spawn(async move {
+        while let Ok((mut stream, _)) = listener.accept().await {
+            let _ = stream.write_all(b"HTTP/1.1 400 Bad Request\r\nContent-Length: 0\r\n\r\n").await;
+        }
+    });
+    let mut config = config(&format!("http://{address}"));
+    config.server.give_up_after_s = Some(0.2);
+    let error = start(config).task.await.unwrap().unwrap_err().to_string();
+    assert!(error.contains(&format!("no daemon answered at http://{address}")), "{error}");
+    assert!(error.contains("another program") && error.contains("https://") && !error.contains("Custom"), "{error}");
 }
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]

@@ -38,12 +38,33 @@ async fn over_tls_only_with_the_right_authority() {
     until("the force is up", || bridge.handle.stats().force_n() > 0.99).await;
     bridge.stop().await;
 
+    let refusal = |config: palpate_bridge::Config| async { start(config).task.await.unwrap().unwrap_err().to_string() };
+    let mut without = trusted.clone();
+    (without.server.url, without.server.tls_ca) = (format!("http://localhost:{port}"), None);
+    without.server.give_up_after_s = Some(0.1);
+    let error = refusal(without).await;
+    assert!(error.contains("or a daemon that wants https://"), "{error}");
+
+    let plain = tokio::net::TcpListener::bind("127.0.0.1:0").await.unwrap();
+    let plain_port = plain.local_addr().unwrap().port();
+    let server = Server::builder().add_service(DeviceServer::new(Mock::default()));
+    tokio::spawn(server.serve_with_incoming(TcpIncoming::from(plain)));
+    let mut needless = trusted.clone();
+    needless.server.url = format!("https://localhost:{plain_port}");
+    needless.server.give_up_after_s = Some(0.1);
+    let error = refusal(needless).await;
+    assert!(error.contains("does not speak TLS: write http://"), "{error}");
+
     let other = rcgen::generate_simple_self_signed(["localhost".to_owned()]).unwrap();
     let other_ca = folder.path().join("other.pem");
     std::fs::write(&other_ca, other.cert.pem()).unwrap();
     let mut stranger = trusted;
     stranger.server.tls_ca = Some(other_ca);
     stranger.server.give_up_after_s = Some(0.1);
-    let error = start(stranger).task.await.unwrap().unwrap_err().to_string();
-    assert!(error.contains("certificate"), "{error}");
+    let error = refusal(stranger.clone()).await;
+    assert!(error.contains("certificate is not signed by the authority given with --tls-ca"), "{error}");
+
+    std::fs::write(folder.path().join("other.pem"), "not a certificate").unwrap();
+    let error = refusal(stranger).await;
+    assert!(error.contains("other.pem: it holds no certificate in PEM form"), "{error}");
 }

@@ -6,7 +6,10 @@ use std::{
     time::Duration,
 };
 use thiserror::Error;
-use tonic::transport::{Certificate, ClientTlsConfig, Endpoint};
+use tonic::{
+    Status,
+    transport::{Certificate, ClientTlsConfig, Endpoint},
+};
 
 /// Longest wait for a connection.
 const CONNECT_TIMEOUT: Duration = Duration::from_secs(5);
@@ -42,7 +45,7 @@ pub fn endpoint(address: &str, authority: Option<&Path>) -> Result<Endpoint, Con
     let bad = |reason: String| ConnectError::Address { address: address.to_owned(), reason };
     let scheme = address.split_once("://").map(|(scheme, _)| scheme);
     if !matches!(scheme, Some("http" | "https" | "unix")) {
-        return Err(bad("it has no known scheme".to_owned()));
+        return Err(bad("it does not begin with http://, https:// or unix://".to_owned()));
     }
     let endpoint = Endpoint::from_shared(address.to_owned())
         .map_err(|error| bad(causes(&error)))?
@@ -50,18 +53,57 @@ pub fn endpoint(address: &str, authority: Option<&Path>) -> Result<Endpoint, Con
         .tcp_nodelay(true)
         .http2_keep_alive_interval(KEEP_ALIVE)
         .keep_alive_timeout(KEEP_ALIVE);
+    if scheme != Some("unix") && endpoint.uri().port_u16().is_none() {
+        return Err(bad("it names no port, 1 to 65535; `palpated` takes 7411 unless it is told another".to_owned()));
+    }
     match (authority, scheme) {
         (None, Some("https")) => {
             Err(bad("https needs the certificate authority to trust: give its PEM file with --tls-ca".to_owned()))
         }
         (Some(path), Some("https")) => {
-            let pem = fs::read(path).map_err(|source| ConnectError::Authority { path: path.to_owned(), source })?;
+            let unread = |source| ConnectError::Authority { path: path.to_owned(), source };
+            let pem = fs::read(path).map_err(unread)?;
+            if !String::from_utf8_lossy(&pem).contains("-----BEGIN CERTIFICATE-----") {
+                let none = "it holds no certificate in PEM form, which has a line -----BEGIN CERTIFICATE-----";
+                return Err(unread(io::Error::new(io::ErrorKind::InvalidData, none)));
+            }
             let tls = ClientTlsConfig::new().ca_certificate(Certificate::from_pem(pem));
             endpoint.tls_config(tls).map_err(|error| bad(causes(&error)))
         }
         (Some(_), _) => Err(bad("a certificate authority is given, but the address is not https://".to_owned())),
         (None, _) => Ok(endpoint),
     }
+}
+
+/// Why a connection was not made: what that means, and the transport's words.
+pub fn why_unreachable(error: &(dyn std::error::Error + 'static)) -> String {
+    let words = causes(error).trim_start_matches("transport error: ").to_owned();
+    let chain = std::iter::successors(Some(error), |error| error.source());
+    let kind = chain.filter_map(|error| error.downcast_ref::<io::Error>()).map(io::Error::kind).last();
+    let meaning = match kind {
+        // What the TLS library finds wrong has no kind of its own.
+        _ if words.contains("InvalidContentType") => "it does not speak TLS: write http:// in its place",
+        _ if words.contains("UnknownIssuer") || words.contains("BadSignature") => {
+            "its certificate is not signed by the authority given with --tls-ca"
+        }
+        Some(io::ErrorKind::ConnectionRefused) => "nothing listens there",
+        Some(io::ErrorKind::NotFound) => "there is no such socket",
+        _ => return words,
+    };
+    format!("{meaning} ({words})")
+}
+
+/// Why a connection that was made is no daemon's, when it broke before the first answer.
+pub fn why_no_answer(status: &Status) -> String {
+    format!(
+        "what listens there broke the connection off without an answer: it is another program, or a daemon that wants https:// ({})",
+        std::error::Error::source(status).map_or_else(|| status.message().to_owned(), causes)
+    )
+}
+
+/// Whether a status was made up on this side because the transport failed; what a daemon answers has no cause here.
+pub fn is_transport(status: &Status) -> bool {
+    std::error::Error::source(status).is_some()
 }
 
 /// An error with its causes, in one line.
@@ -88,7 +130,8 @@ mod tests {
 
     #[test]
     fn addresses_are_checked() {
-        for address in ["127.0.0.1:7411", "ftp://host", "", "http://"] {
+        // A port that is none was taken for none, and 80 was called.
+        for address in ["127.0.0.1:7411", "ftp://host", "", "http://", "http://host", "http://host:99999"] {
             assert!(refused(address, None).contains("no address of a daemon"), "{address}");
         }
         assert!(refused("https://host:7411", None).contains("--tls-ca"));
