@@ -1,6 +1,6 @@
 //! What can go wrong, with the next step.
 use miette::Diagnostic;
-use palpate_proto::connect::causes;
+use palpate_proto::connect::{is_transport, words_of};
 use std::path::PathBuf;
 use thiserror::Error;
 
@@ -103,8 +103,8 @@ pub enum ViewError {
 
 impl From<tonic::Status> for ViewError {
     fn from(status: tonic::Status) -> Self {
-        if let Some(cause) = std::error::Error::source(&status) {
-            return Self::Lost(causes(cause));
+        if is_transport(&status) {
+            return Self::Lost(words_of(&status));
         }
         Self::Refused { code: format!("{:?}", status.code()), message: status.message().to_owned() }
     }

@@ -30,6 +30,9 @@ fn parse_seconds(text: &str) -> Result<Duration, String> {
     Duration::try_from_secs_f64(seconds).map_err(|error| format!("{error}"))
 }
 
+/// Less than this (s) is no rate.
+const SHORTEST_S: f64 = 0.5;
+
 /// What one second of the stream was like.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
 struct Second {
@@ -61,10 +64,10 @@ pub async fn run(server: &Server, arguments: &WatchArguments) -> Result<(), View
     loop {
         let left = arguments.seconds.map(|seconds| seconds.saturating_sub(begin.elapsed()));
         if left.is_some_and(|left| left.is_zero()) {
-            return Ok(());
+            break;
         }
         let next = tokio::time::timeout(left.unwrap_or(Duration::MAX), watcher.next());
-        let Ok(next) = next.await else { return Ok(()) };
+        let Ok(next) = next.await else { break };
         let Some(surface) = next? else {
             return Err(ViewError::Stream("was ended by the daemon".into()));
         };
@@ -80,6 +83,9 @@ pub async fn run(server: &Server, arguments: &WatchArguments) -> Result<(), View
             cli::say(&row(&done, arguments.json))?;
         }
     }
+    // The last second ends a little early: with the time that was asked for.
+    let last = watcher.surface.as_ref().and_then(|surface| second.close(surface, Instant::now(), SHORTEST_S));
+    last.map_or(Ok(()), |last| cli::say(&row(&last, arguments.json)))
 }
 
 /// The scene, whose forces are shown, and the columns.
@@ -137,10 +143,15 @@ impl Window {
     }
 
     fn take(&mut self, surface: &Surface, now: Instant) -> Option<Second> {
+        self.delays_ms.push(delay_ms(surface.last.sent_unix_ns));
+        self.close(surface, now, 1.0)
+    }
+
+    /// What was collected, when that took so long at least (s).
+    fn close(&mut self, surface: &Surface, now: Instant, least_s: f64) -> Option<Second> {
         let update = &surface.last;
-        self.delays_ms.push(delay_ms(update.sent_unix_ns));
         let span_s = (now - self.begin).as_secs_f64();
-        if span_s < 1.0 {
+        if span_s < least_s || self.delays_ms.is_empty() {
             return None;
         }
         self.delays_ms.sort_by(f64::total_cmp);
@@ -190,6 +201,12 @@ mod tests {
         assert!((second.rate_hz - 11.0).abs() < 1e-9);
         assert_eq!((second.contact_force_n, second.skipped, second.max_displacement_mm), (5.0, 3, 2.0));
         assert!(window.delays_ms.is_empty());
+        // `--seconds 1` showed nothing: its second was never over.
+        let end = begin + Duration::from_millis(1990);
+        assert!(window.close(&surface, end, SHORTEST_S).is_none(), "no updates, no numbers");
+        assert!(window.take(&surface, begin + Duration::from_millis(1500)).is_none());
+        assert!(window.close(&surface, begin + Duration::from_millis(1499), SHORTEST_S).is_none(), "too short");
+        assert!((window.close(&surface, end, SHORTEST_S).unwrap().rate_hz - 1.0 / 0.99).abs() < 1e-9);
         assert_eq!(row(&second, false).lines().count(), 1);
     }
 

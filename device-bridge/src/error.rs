@@ -7,7 +7,7 @@ use thiserror::Error;
 #[derive(Debug, Error, Diagnostic)]
 pub enum BridgeError {
     /// A file cannot be read.
-    #[error("cannot read {what} {path}: {source}", path = path.display())]
+    #[error("cannot read {what} {path}", path = path.display())]
     #[diagnostic(help(
         "check the path and its permissions; `palpate-bridge --print-config` prints a complete configuration"
     ))]
@@ -69,7 +69,7 @@ pub enum BridgeError {
         help: &'static str,
     },
     /// The operating system refused something the bridge cannot do without.
-    #[error("cannot {what}: {source}")]
+    #[error("cannot {what}")]
     System {
         /// What.
         what: &'static str,

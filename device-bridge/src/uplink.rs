@@ -7,7 +7,7 @@ use crate::{
     settings::UplinkSettings,
 };
 use palpate_proto::{
-    connect::{causes, is_transport, why_no_answer, why_unreachable},
+    connect::{is_transport, why_no_answer, why_unreachable, words_of},
     v1::{self, device_client::DeviceClient, device_down::Message},
 };
 use palpate_realtime::{Clock, Doorbell, SlotReader, SlotWriter};
@@ -238,7 +238,7 @@ impl Uplink {
             match message {
                 Ok(Some(message)) => self.take(message, welcome, &mut told),
                 Ok(None) => return Ended::Lost("it ended the stream".to_owned()),
-                Err(status) => return Ended::Lost(causes(&status)),
+                Err(status) => return Ended::Lost(words_of(&status)),
             }
         }
     }

@@ -97,8 +97,13 @@ pub fn why_unreachable(error: &(dyn std::error::Error + 'static)) -> String {
 pub fn why_no_answer(status: &Status) -> String {
     format!(
         "what listens there broke the connection off without an answer: it is another program, or a daemon that wants https:// ({})",
-        std::error::Error::source(status).map_or_else(|| status.message().to_owned(), causes)
+        words_of(status)
     )
+}
+
+/// What went wrong with the transport, or what the daemon answered.
+pub fn words_of(status: &Status) -> String {
+    std::error::Error::source(status).map_or_else(|| status.message().to_owned(), causes)
 }
 
 /// Whether a status was made up on this side because the transport failed; what a daemon answers has no cause here.
