@@ -163,7 +163,7 @@ try {
   await page.click("#recentre");
 
   // The end of the body lay behind the plot, and the arrow behind the numbers, in windows of little height.
-  for (const [width, height] of [[400, 760], [420, 800], [720, 420], [800, 457], [1920, 1080], [1280, 717]]) {
+  for (const [width, height] of [[400, 760], [420, 800], [660, 900], [720, 420], [800, 457], [1920, 1080], [1280, 717]]) {
     await page.setViewportSize({ width, height });
     await sleep(300);
     await press(page);
