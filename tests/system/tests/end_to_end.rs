@@ -145,8 +145,8 @@ fn a_loop_that_fails_lets_the_arm_go_and_the_daemon_end_with_an_error() {
     let mut daemon = Daemon::start(&["--fail-at-tick", "3000"]);
     let mut bridge = Program::start("palpate-bridge", &["--server", &daemon.url, "--device", "simulated"]);
     bridge.wait_for("attached to tool", PATIENCE);
-    let said = bridge.wait_for("the daemon reports: ", PATIENCE);
-    assert!(said.contains("loop failed") && said.contains("ramped to zero"), "{said}");
+    let said = bridge.wait_for("loop failed", PATIENCE);
+    assert!(said.contains("the daemon reports: ") && said.contains("ramped to zero"), "{said}");
     let code = daemon.program.wait(PATIENCE);
     let printed = &daemon.program.output;
     assert_eq!(code.code(), Some(1), "{printed}");
