@@ -13,7 +13,7 @@ use tracing_subscriber::EnvFilter;
 const EXAMPLES: &str = "\
 Examples:
   palpate-bridge                                   the simulated arm, on a daemon on this machine
-  palpate-bridge --config bridge.toml              your arm, limits and hand path (deploy/bridge.toml is an example)
+  palpate-bridge --config bridge.toml              your arm, limits and path: see deploy/bridge.toml
   palpate-bridge --server https://lab:7411 --tls-ca ca.pem
   palpate-bridge --server unix:///run/palpate/palpate.sock --tool left
   palpate-bridge --print-config > bridge.toml      every key with its default
