@@ -61,13 +61,12 @@ impl Energies {
     /// Kinetic, elastic and gravitational energy now (O(tets)), beside the ledger's work and dissipation.
     pub fn of(model: &Model, state: &State) -> Self {
         let kinetic_j = (0..state.x.len()).map(|i| 0.5 * model.mass_kg()[i] * state.v[i].length_squared()).sum();
-        let gravitational_j = (0..state.x.len())
-            .map(|i| -model.mass_kg()[i] * model.gravity_m_per_s2().dot(state.x[i] - model.rest_positions_m()[i]))
-            .sum();
+        let along_gravity = |i: usize| model.gravity_m_per_s2().dot(state.x[i] - model.rest_positions_m()[i]);
+        let fallen_j: f64 = (0..state.x.len()).map(|i| model.mass_kg()[i] * along_gravity(i)).sum();
         Self {
             kinetic_j,
             elastic_j: elastic_energy_j(model, state),
-            gravitational_j,
+            gravitational_j: 0.0 - fallen_j,
             external_work_j: state.ledger.external_work_j,
             dissipated_j: state.ledger.dissipated_j,
         }

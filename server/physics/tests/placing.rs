@@ -2,7 +2,7 @@
 #![allow(clippy::unwrap_used)]
 mod rig;
 use glam::DVec3;
-use palpate_physics::{Model, ModelError, ModelSpec, contact::Coupling, material::Law, snapshot};
+use palpate_physics::{Model, ModelError, ModelSpec, State, contact::Coupling, material::Law, snapshot};
 use rig::{Rig, body, bricks, even, hold, material, nodes_where, sphere};
 
 const RADIUS_M: f64 = 0.005;
@@ -81,6 +81,30 @@ fn a_tool_put_into_contact_resists_from_there_and_forgets_it_when_it_leaves() {
     assert!(first_um < 0.005 * whole);
     assert!(part > 0.3 * whole && part < whole);
     assert!((again / whole - 1.0).abs() < 1e-3);
+}
+
+/// What cannot be kept carries nothing, as deep as it is.
+#[test]
+fn a_tool_put_into_more_samples_than_can_be_kept_does_not_kick() {
+    // A plate of 1.6 mm on a floor, with 20 000 triangles above and as many below, all inside the tool: its whole force would
+    // be some hundred newtons.
+    let (side, thickness_m) = (even(-0.01, 0.01, 100), 0.0016);
+    let mut spec = body(bricks(&side, &side, &even(-thickness_m, 0.0, 1)), material(Law::StableNeoHookean, 10e3, 0.45));
+    spec.tools = vec![sphere(0.02, DVec3::Z * 0.021, Coupling::Rigid)];
+    spec.prescribed = vec![hold("floor", nodes_where(&spec.mesh, |p| p.z < -0.0015), [true; 3])];
+    let mut rig = Rig::new(spec);
+    for (from_m, way) in [(0.006, 1.0), (-0.006 - thickness_m, -1.0)] {
+        rig.state = State::at_rest(&rig.model);
+        rig.state.place_tool(0, DVec3::Z * from_m);
+        for tick in 1..=3 {
+            rig.tick_at(DVec3::Z * (from_m - way * 1e-7 * f64::from(tick)));
+            let tool = &rig.state.tools[0];
+            let force_n = tool.contact_force_n.length();
+            println!("tick {tick} from {from_m} m: {force_n:.1e} N on {} samples", tool.contacts);
+            assert!(force_n < 0.1 && tool.contacts <= 16_384 && rig.state.quarantine.is_none());
+            assert!(tool.penetration_m > 0.005, "it is in the surface all the same: {}", tool.penetration_m);
+        }
+    }
 }
 
 /// A proxy near a body that moves was slowed down to what the foundation can stop at rest, as if the body stood still.

@@ -74,7 +74,7 @@ pub struct Body<'a> {
     pub x: &'a [DVec3],
     /// Velocities (m/s) of its nodes.
     pub v: &'a [DVec3],
-    /// Bound of the speed (m/s) with which any node came here; see [`fastest_m_per_s`].
+    /// Bound of the speed (m/s) with which any node came here.
     pub fastest_m_per_s: f64,
 }
 
@@ -257,8 +257,7 @@ impl ContactModel {
             centre_m,
             radius_m: model.spec.radius_m,
             friction_coefficient: model.spec.friction_coefficient,
-            put_into: part.just_put || part.touching.records().iter().any(|touch| touch.free_depth_m > 0.0),
-            just_put: std::mem::take(&mut part.just_put),
+            put_into: std::mem::take(&mut part.just_put) || part.touching.tells_it_was_put(),
         };
         let candidates = part.candidates.triangles();
         let pressed = narrow::press(&meeting, candidates, &mut part.touching, &mut scratch.next, forces_n);
@@ -294,18 +293,4 @@ impl ContactModel {
             tool.local_model = local_model::update(model, tool, &mut contact.tools[index].estimate, &mean);
         }
     }
-}
-
-/// Largest speed (m/s) of any node.
-pub fn fastest_m_per_s(v: &[DVec3]) -> f64 {
-    // Four running maxima, so that one does not wait for the other.
-    let mut most = [0.0_f64; 4];
-    let mut chunks = v.chunks_exact(4);
-    for chunk in &mut chunks {
-        for lane in 0..4 {
-            most[lane] = most[lane].max(chunk[lane].length_squared());
-        }
-    }
-    let rest = chunks.remainder().iter().map(|v| v.length_squared());
-    most.into_iter().chain(rest).fold(0.0, f64::max).sqrt()
 }

@@ -35,9 +35,8 @@ pub(super) struct Meeting<'a> {
     pub(super) centre_m: DVec3,
     pub(super) radius_m: f64,
     pub(super) friction_coefficient: f64,
-    /// The tool was just put there: what is inside carries nothing as deep as it is.
-    pub(super) just_put: bool,
-    /// It was put there, now or before, and has not left yet: what cannot be recorded carries nothing.
+    /// The tool was put there, now or before, and has not left yet: what is not known carries nothing as deep as it is, which for
+    /// what cannot be recorded is nothing at all.
     pub(super) put_into: bool,
 }
 
@@ -158,16 +157,14 @@ fn press_triangle(
         let number = samples.first + index as u32;
         let known = take(before, number);
         let from_behind = known.map_or(outward.dot(r) >= 0.0, |touch| touch.from_behind);
-        if meeting.put_into && next.is_full() {
-            continue;
-        }
-        if from_behind {
-            next.push(Touch { sample: number, from_behind, free_depth_m: 0.0, spring_origin_m: r });
-            continue;
-        }
         let distance_m = distance_sq.sqrt();
         let depth_m = meeting.radius_m - distance_m;
-        let free_depth_m = if meeting.just_put { depth_m } else { 0.0 };
+        let free_depth_m = if meeting.put_into { depth_m } else { 0.0 };
+        if from_behind {
+            // It carries nothing anyway, but tells the next tick that the tool was put there.
+            next.push(Touch { sample: number, from_behind, free_depth_m, spring_origin_m: r });
+            continue;
+        }
         let mut touch = known.unwrap_or(Touch { sample: number, from_behind, free_depth_m, spring_origin_m: r });
         touch.free_depth_m = touch.free_depth_m.min(depth_m);
         let force_n = press_sample(meeting, samples, r, distance_m, &mut touch, pressed);
@@ -271,6 +268,10 @@ mod tests {
         }
 
         fn press(&mut self, centre_m: DVec3) -> (Pressed, Vec<DVec3>) {
+            self.meet(centre_m, false)
+        }
+
+        fn meet(&mut self, centre_m: DVec3, just_put: bool) -> (Pressed, Vec<DVec3>) {
             let tool = &self.model.tools[0];
             let meeting = Meeting {
                 triangles: &self.model.triangles,
@@ -280,8 +281,7 @@ mod tests {
                 centre_m,
                 radius_m: RADIUS_M,
                 friction_coefficient: tool.spec.friction_coefficient,
-                just_put: false,
-                put_into: false,
+                put_into: just_put || self.touching.tells_it_was_put(),
             };
             let mut forces = vec![DVec3::ZERO; 4];
             let all = [0, 1, 2, 3];
@@ -377,5 +377,23 @@ mod tests {
         bench.press(DVec3::Z);
         assert!(bench.touching.records().is_empty());
         assert!(bench.press(above(0.1 * RADIUS_M)).0.force_n.z > 0.0);
+    }
+
+    /// Where all that could be kept was met from behind, nothing told in the next tick that the tool was put there, and what could
+    /// not be kept pressed with its full depth.
+    #[test]
+    fn a_tool_put_into_the_surface_is_known_by_the_samples_it_met_from_behind() {
+        let mut bench = Bench::new(0.0);
+        let deep = DVec3::new(0.004, 0.004, -0.6 * RADIUS_M);
+        bench.meet(deep, true);
+        assert!(bench.touching.records().iter().all(|touch| touch.from_behind));
+        let kept = bench.touching.records().len() / 2;
+        (bench.touching, bench.next) = (Touching::with_capacity(kept), Touching::with_capacity(kept));
+        bench.meet(deep, true);
+        for step in 0..=20 {
+            // Up and out: the upper face is met from the front by those that were not kept.
+            let (pressed, _) = bench.meet(deep + DVec3::Z * (0.1 * RADIUS_M * f64::from(step)), false);
+            assert_eq!((pressed.contacts, pressed.force_n), (0, DVec3::ZERO), "step {step}");
+        }
     }
 }

@@ -13,7 +13,8 @@ pub(super) struct Touch {
     pub(super) sample: u32,
     /// The tool reached it from behind the surface: it carries nothing until it leaves.
     pub(super) from_behind: bool,
-    /// Depth (m) up to which it carries nothing: that at which the tool was put there, or the least since.
+    /// Depth (m) up to which it carries nothing: that at which the tool was put there, or the least since. From behind too: it
+    /// tells that the tool was put there.
     pub(super) free_depth_m: f64,
     /// Position relative to the tool's centre (m) where its friction spring is at rest.
     pub(super) spring_origin_m: DVec3,
@@ -37,9 +38,9 @@ impl Touching {
         &self.buffer[..self.count]
     }
 
-    /// No further record fits.
-    pub(super) fn is_full(&self) -> bool {
-        self.count == self.buffer.len()
+    /// The tool was put where it is, and has not left yet.
+    pub(super) fn tells_it_was_put(&self) -> bool {
+        self.records().iter().any(|touch| touch.free_depth_m > 0.0)
     }
 
     pub(super) fn clear(&mut self) {

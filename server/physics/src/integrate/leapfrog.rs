@@ -13,7 +13,7 @@
 //! Ledger: the work of a force `g` over a kick of length `h` is exactly its share of the kinetic change,
 //! `h g·(v + ½h f/m)`; what viscous stress takes is an estimate ([`ViscousPower`]).
 use crate::{
-    contact::{self, Body, SubstepTime, ToolTarget},
+    contact::{Body, SubstepTime, ToolTarget},
     fem::loads::add_load_n,
     health::{Quarantine, first_non_finite},
     world::{Model, PointForce, Scratch, State, StepReport, TickInput},
@@ -108,14 +108,13 @@ fn run_substeps(model: &Model, state: &mut State, scratch: &mut Scratch, input: 
     let dt_s = model.spec().settings.tick_period_s / f64::from(substeps);
     if !state.force_is_current {
         state.contact.forget_geometry();
-        evaluate(model, state, scratch, input, loads, 0.0, 0.0);
+        evaluate(model, state, scratch, input, loads, &Instant { fraction: 0.0, dt_s: 0.0, fastest_m_per_s: 0.0 });
     }
     kick(model, state, 0.5 * dt_s);
     for substep in 1..=substeps {
-        for (x, v) in state.x.iter_mut().zip(&state.v) {
-            *x += *v * dt_s;
-        }
-        evaluate(model, state, scratch, input, loads, f64::from(substep) / f64::from(substeps), dt_s);
+        let fastest_m_per_s = drift(state, dt_s);
+        let fraction = f64::from(substep) / f64::from(substeps);
+        evaluate(model, state, scratch, input, loads, &Instant { fraction, dt_s, fastest_m_per_s });
         kick(model, state, if substep == substeps { 0.5 * dt_s } else { dt_s });
     }
     loads.finish(state, input);
@@ -126,6 +125,29 @@ fn run_substeps(model: &Model, state: &mut State, scratch: &mut Scratch, input: 
         // The holder supplies what the other forces lack: r = −f on prescribed axes.
         *reaction = DVec3::select(inverse_mass.cmpeq(DVec3::ZERO), -*force, DVec3::ZERO);
     }
+}
+
+/// `x ← x + dt v`; returns the largest speed (m/s) of any node.
+fn drift(state: &mut State, dt_s: f64) -> f64 {
+    // Four running maxima, so that one does not wait for the other.
+    let mut most = [0.0_f64; 4];
+    for (xs, vs) in state.x.chunks_mut(4).zip(state.v.chunks(4)) {
+        for ((x, v), most) in xs.iter_mut().zip(vs).zip(&mut most) {
+            *x += *v * dt_s;
+            *most = most.max(v.length_squared());
+        }
+    }
+    most.into_iter().fold(0.0, f64::max).sqrt()
+}
+
+/// When forces are evaluated.
+struct Instant {
+    /// Part of the tick that is over.
+    fraction: f64,
+    /// Step that led here (s); 0 at the start.
+    dt_s: f64,
+    /// Bound of the speed (m/s) with which any node came here.
+    fastest_m_per_s: f64,
 }
 
 /// Load factors between the last tick's and this one's.
@@ -158,13 +180,12 @@ fn evaluate(
     scratch: &mut Scratch,
     input: &TickInput<'_>,
     loads: &LoadRamp,
-    fraction: f64,
-    dt_s: f64,
+    now: &Instant,
 ) {
     let external = &mut state.external_n;
     external.fill(DVec3::ZERO);
     for (index, load) in model.spec().loads.iter().enumerate() {
-        let factor = loads.factor(state.load_factors[index], input, index, fraction);
+        let factor = loads.factor(state.load_factors[index], input, index, now.fraction);
         if factor != 0.0 {
             add_load_n(load, factor, model.surface(), (model.rest_positions_m(), &state.x), external);
         }
@@ -176,14 +197,15 @@ fn evaluate(
     }
     let (x, v) = (&state.x, &state.v);
     if !state.tools.is_empty() {
-        let body = Body { x, v, fastest_m_per_s: contact::fastest_m_per_s(v) };
-        let time = SubstepTime { fraction, dt_s, tick_period_s: model.spec().settings.tick_period_s };
+        let body = Body { x, v, fastest_m_per_s: now.fastest_m_per_s };
+        let tick_period_s = model.spec().settings.tick_period_s;
+        let time = SubstepTime { fraction: now.fraction, dt_s: now.dt_s, tick_period_s };
         let (tools, contact) = (&mut state.tools, &mut state.contact);
         model.contact().substep(&body, &time, tools, contact, external, &mut scratch.contact);
     }
     let force = &mut state.force_n;
     let viscous_power_w = model.kernel().forces_n(model.rest_positions_m(), x, v, force, &mut scratch.kernel);
-    state.viscous.record(viscous_power_w, dt_s > 0.0);
+    state.viscous.record(viscous_power_w, now.dt_s > 0.0);
     let gravity = model.gravity_m_per_s2();
     for ((force, external), mass) in force.iter_mut().zip(external.iter()).zip(model.mass_kg()) {
         *force += *external + gravity * *mass;

@@ -165,10 +165,15 @@ impl Forces {
         self.internal_n.iter().zip(&self.external_n).map(|(a, b)| *a + *b).collect()
     }
 
+    /// `max(‖f_internal‖₂, ‖f_external‖₂)` (N), prescribed axes included.
+    pub(super) fn reference_n(&self) -> f64 {
+        norm(&self.internal_n).max(norm(&self.external_n))
+    }
+
     /// `‖f_free‖₂` (N), and the same over `max(‖f_internal‖₂, ‖f_external‖₂)`, prescribed axes included.
     pub(super) fn residual(&self, free: &[f64]) -> (f64, f64) {
         let residual_n = free.iter().map(|r| r * r).sum::<f64>().sqrt();
-        let reference_n = norm(&self.internal_n).max(norm(&self.external_n));
+        let reference_n = self.reference_n();
         // Nothing left of nothing is converged; a reference that is not finite is none.
         let nothing = residual_n == 0.0 && reference_n == 0.0;
         let relative = if nothing { 0.0 } else { residual_n / reference_n };

@@ -12,6 +12,9 @@ use crate::{
 };
 use glam::{BVec3, DVec3};
 
+/// Forces up to so many times `rounding_n` are rounding: that bounds the free axes, and held ones have theirs too.
+const ROUNDING_ONLY: f64 = 10.0;
+
 /// An equilibrium.
 #[derive(Debug, Clone, PartialEq)]
 pub struct StaticSolution {
@@ -36,6 +39,8 @@ pub struct StaticSolution {
     /// The same over its reference. Above the wanted one only where rounding of the positions allows no better: see
     /// `rounding_n`.
     pub relative_residual: f64,
+    /// What the residual is relative to (N): `max(‖f_internal‖₂, ‖f_external‖₂)` over all axes.
+    pub reference_n: f64,
     /// Residual (N) that rounding of positions alone makes, `ε ‖diag K‖₂ max|x|`.
     pub rounding_n: f64,
     /// False when the tangent stiffness at `x` is not positive definite: the body would leave this equilibrium at the least push.
@@ -64,6 +69,12 @@ pub struct ToolAtRest {
 }
 
 impl StaticSolution {
+    /// Whether there is no force above rounding: `relative_residual` then compares rounding with itself, and `residual_n` is to be
+    /// held against `rounding_n`.
+    pub fn is_unloaded(&self) -> bool {
+        self.reference_n <= ROUNDING_ONLY * self.rounding_n
+    }
+
     /// The equilibrium under `load_factors` as a state at tick 0, from which [`crate::step`] goes on without moving. Its ledger
     /// holds the work of a slow loading, which is what the body holds: `W = U + G`.
     pub fn state(&self, model: &Model, load_factors: &[f64]) -> State {
@@ -106,6 +117,7 @@ impl StaticSolution {
             load_steps,
             residual_n,
             relative_residual,
+            reference_n: forces.reference_n(),
             rounding_n: solver.rounding_n,
             stable,
             inverted_tets: inverted_tets(model, &configuration),
