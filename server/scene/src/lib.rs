@@ -17,6 +17,7 @@ pub mod probes;
 pub mod scene;
 pub mod shapes;
 pub mod timeline;
+pub mod wording;
 
 pub use builtin::{builtin, builtin_names};
 pub use drivers::{Driver, ScriptedHand};

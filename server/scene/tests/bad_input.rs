@@ -49,6 +49,50 @@ fn the_good_scene_is_good() {
     assert_eq!(scene.summary.tets, 48);
 }
 
+/// A mesh in millimetres taken for metres loaded without a word.
+#[test]
+fn a_body_in_the_wrong_unit_is_told_with_the_key_to_change() {
+    let warnings = |from: &str, to: &str| scene(&GOOD.replace(from, to)).unwrap().warnings;
+    let far = ("position_mm = [5, 5, 20]", "position_m = [5, 5, 20]");
+    let text = GOOD.replace(far.0, far.1).replace("radius_mm = 2", "radius_m = 2");
+    assert_eq!(
+        scene(&text.replace("size_mm", "size_m")).unwrap().warnings,
+        ["the body is 10.0000 m long: if millimetres were meant in [body.box], write `size_mm`"]
+    );
+    let small = warnings("size_mm = [10, 10, 10]", "size_mm = [0.02, 0.01, 0.01]");
+    assert_eq!(small[0], "the body is 2.000e-2 mm long: if metres were meant in [body.box], write `size_m`");
+
+    let folder = tempfile::tempdir().unwrap();
+    let nodes = "4 3 0 0\n0 0 0 0\n1 80 0 0\n2 0 80 0\n3 0 0 80\n";
+    std::fs::write(folder.path().join("heart.node"), nodes).unwrap();
+    std::fs::write(folder.path().join("heart.ele"), "1 4 0\n0 0 1 2 3\n").unwrap();
+    let of_unit = |unit: &str| {
+        let head = "[scene]\nname = \"t\"\n[body.mesh]\nfile = \"heart.node\"\n";
+        let material =
+            "[[material]]\nlaw = \"stvk\"\nyoung_modulus_pa = 1e4\npoisson_ratio = 0.3\ndensity_kg_per_m3 = 1000\n";
+        let text = format!("{head}unit = \"{unit}\"\n{material}");
+        parse(&text, "t.toml", Some(folder.path()), &Limits::local(), &mut |_, _| {}).unwrap().warnings
+    };
+    assert_eq!(of_unit("mm"), Vec::<String>::new());
+    let wanted = "the body is 80.0000 m long: [body.mesh] says unit = \"m\"; should it be unit = \"mm\"?";
+    assert_eq!(of_unit("m"), [wanted]);
+    let wanted = "the body is 8.000e-2 mm long: [body.mesh] says unit = \"um\"; should it be unit = \"mm\"?";
+    assert_eq!(of_unit("um"), [wanted]);
+}
+
+/// Only `check` said that nothing holds a body; `simulate` and `serve` let it fly.
+#[test]
+fn a_body_that_nothing_holds_is_told() {
+    let free = GOOD.replace("[[fixed]]\nregion = \"z_min\"\n", "");
+    let told = |text: &str| scene(text).unwrap().warnings;
+    let warnings = told(&free);
+    assert!(warnings[0].starts_with("nothing holds the body: any load moves it as a whole"), "{warnings:?}");
+    let falling = free.replace("name = \"t\"", "name = \"t\"\ngravity_m_per_s2 = [0, 0, -9.81]");
+    assert!(told(&falling)[0].contains("gravity moves it"));
+    let alone = &free[..free.find("[[load]]").unwrap()];
+    assert_eq!(told(alone), Vec::<String>::new(), "it rests");
+}
+
 #[test]
 fn material_constants_outside_their_range() {
     assert_eq!(

@@ -5,7 +5,7 @@ use super::{
 };
 use crate::{
     document::{
-        body::{BodyTable, MeshTable, SurfacesTable},
+        body::{BodyTable, LengthUnit, MeshTable, SurfacesTable},
         source::{Fault, Where},
     },
     error::Stage,
@@ -13,6 +13,7 @@ use crate::{
     fill::{self, FillOptions, SurfaceInput},
     limits::Limits,
     shapes::{self, Shape, ShapeError},
+    wording::counted,
 };
 use glam::DVec3;
 use palpate_physics::{MeshError, Surface, TetMesh};
@@ -68,7 +69,41 @@ pub(crate) fn make(table: &BodyTable, files: &Files<'_>, progress: &mut dyn FnMu
         let moved = body.mesh.positions_m().iter().map(|p| *p + offset).collect();
         body.mesh = TetMesh::new(moved, body.mesh.tets().to_vec()).map_err(|error| mesh_fault(&at, error))?;
     }
+    let warning = implausible_size(table, kind, &body);
+    body.warnings.extend(warning);
     Ok(body)
+}
+
+/// A body whose size (m) lies outside these was probably given in another unit.
+const PLAUSIBLE_SIZE_M: std::ops::RangeInclusive<f64> = 1e-3..=2.0;
+
+/// Says so when a body is as large or small as one in the wrong unit, with the key to change.
+fn implausible_size(table: &BodyTable, kind: &str, body: &Body) -> Option<String> {
+    let (low, high) = body.mesh.bounds_m();
+    let size_m = (high - low).max_element();
+    if PLAUSIBLE_SIZE_M.contains(&size_m) {
+        return None;
+    }
+    let size = if size_m > 1.0 { format!("{size_m:.4} m") } else { format!("{:.3e} mm", size_m * 1e3) };
+    let unit = table.mesh.as_ref().map(|mesh| mesh.unit).or(table.surfaces.as_ref().map(|surfaces| surfaces.unit));
+    let change = match unit {
+        Some(unit) => {
+            let fits = |other: &LengthUnit| PLAUSIBLE_SIZE_M.contains(&(size_m / unit.in_m() * other.in_m()));
+            let other = LengthUnit::BY_USE.into_iter().find(fits);
+            let wanted = other.map_or(String::new(), |other| format!("; should it be unit = \"{}\"?", other.word()));
+            format!("[body.{kind}] says unit = \"{}\"{wanted}", unit.word())
+        }
+        None => {
+            let key = match kind {
+                "box" => "size",
+                "sphere_shell" => "outer_radius",
+                _ => "outer_semi_axes",
+            };
+            let (suffix, name) = if size_m > 1.0 { ("mm", "millimetres") } else { ("m", "metres") };
+            format!("if {name} were meant in [body.{kind}], write `{key}_{suffix}`")
+        }
+    };
+    Some(format!("the body is {size} long: {change}"))
 }
 
 fn mesh_fault(at: &Where, error: MeshError) -> Fault {
@@ -105,7 +140,11 @@ fn shape_fault(at: &Where, error: ShapeError) -> Fault {
 
 fn of_shape(shape: Shape, kind: &str, at: &Where) -> Result<Body, Fault> {
     let surface = Surface::of(&shape.mesh).map_err(|error| mesh_fault(at, error))?;
-    let report = if shape.layers > 0 { vec![format!("{} layers through the wall", shape.layers)] } else { Vec::new() };
+    let report = if shape.layers > 0 {
+        vec![format!("{} through the wall", counted(shape.layers as usize, "layer"))]
+    } else {
+        Vec::new()
+    };
     Ok(Body {
         parts: parts::of_boundary(&shape.regions, &surface),
         surface,
@@ -144,7 +183,7 @@ fn from_surfaces(
     )
     .map_err(|error| Fault::value(at.clone(), error.to_string()).of(Stage::Body).cause(error))?;
     let surface = Surface::of(&filled.mesh).map_err(|error| mesh_fault(at, error))?;
-    let warnings = inner.warnings.iter().chain(&outer.warnings).chain(&filled.report.warnings).cloned().collect();
+    let warnings = inner.warnings.iter().chain(&outer.warnings).cloned().collect();
     Ok(Body {
         parts: parts::of_boundary(&filled.regions, &surface),
         surface,

@@ -73,6 +73,7 @@ pub(crate) fn compile(
     let probes = probes::compile(&document.probe, &regions, &body, &tools.specs, &constraints, &mut warnings)?;
     let summary = summary(&body, &regions, &materials.tet_region, &materials.regions);
     warn_of_shape(&summary, &mut warnings);
+    warnings.extend(nothing_held(document));
     progress(1.0, "done");
     Ok(Scene {
         name: document.scene.name.clone(),
@@ -199,6 +200,21 @@ fn summary(
             .map(|(name, [nodes, triangles, tets])| PartSummary { name, nodes, triangles, tets })
             .collect(),
     }
+}
+
+/// Says so when what acts on a body moves it as a whole.
+fn nothing_held(document: &Document) -> Option<String> {
+    let acts = [
+        (document.scene.gravity_m_per_s2 != [0.0; 3], "gravity moves"),
+        (!document.load.is_empty(), "any load moves"),
+        (!document.tool.is_empty(), "any tool moves"),
+    ];
+    let (_, moves) = acts.into_iter().find(|(given, _)| *given)?;
+    (document.fixed.is_empty() && document.prescribed.is_empty()).then(|| {
+        format!(
+            "nothing holds the body: {moves} it as a whole, and `palpated static` refuses it; add a [[fixed]] region"
+        )
+    })
 }
 
 fn warn_of_shape(summary: &BodySummary, warnings: &mut Vec<String>) {

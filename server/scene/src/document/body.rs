@@ -106,6 +106,19 @@ pub(crate) enum LengthUnit {
 }
 
 impl LengthUnit {
+    /// The likeliest first.
+    pub(crate) const BY_USE: [Self; 4] = [Self::Millimetre, Self::Metre, Self::Centimetre, Self::Micrometre];
+
+    /// As it is written.
+    pub(crate) fn word(self) -> &'static str {
+        match self {
+            Self::Metre => "m",
+            Self::Centimetre => "cm",
+            Self::Millimetre => "mm",
+            Self::Micrometre => "um",
+        }
+    }
+
     /// Metres per unit.
     pub(crate) fn in_m(self) -> f64 {
         match self {

@@ -138,6 +138,9 @@ impl<'t> Source<'t> {
             && written.strip_suffix('m') == Some(name)
         {
             fault.message = fault.message.replacen(&format!("`{name}`"), &format!("`{written}`"), 1);
+            // In the unit that was used: the other one is a thousand times off.
+            let near = fault.help.take().filter(|help| !help.contains("_per_m`"));
+            fault.help = near.map(|help| help.replacen("_m`?", "_mm`?", 1));
         }
         fault
     }
@@ -298,14 +301,45 @@ fn in_words(message: &str) -> String {
     format!("{found}, expected {wanted}").replace("invalid type: map", "invalid type: table")
 }
 
-/// The nearest known word if one is near, else all of them.
+/// The nearest known word if one is near, else all of them. Of keys, what they are called counts before their unit.
 fn suggestion(word: &str, known: &[&str]) -> String {
-    let nearest = known.iter().max_by(|a, b| strsim::jaro_winkler(word, a).total_cmp(&strsim::jaro_winkler(word, b)));
-    match nearest.filter(|near| strsim::jaro_winkler(word, near) > 0.8) {
-        Some(near) => format!("did you mean `{near}`?"),
+    let likeness = |near: &str| {
+        let names = strsim::jaro_winkler(name_and_unit(word).0, name_and_unit(near).0);
+        (names, strsim::jaro_winkler(word, near))
+    };
+    let order = |a: &(f64, f64), b: &(f64, f64)| a.0.total_cmp(&b.0).then(a.1.total_cmp(&b.1));
+    let nearest = known.iter().max_by(|a, b| order(&likeness(a), &likeness(b)));
+    match nearest.filter(|near| likeness(near).0 > 0.8) {
+        Some(near) => did_you_mean_key(word, near),
         None if known.is_empty() => "nothing may be given here".into(),
         None => format!("known: {}", known.join(", ")),
     }
+}
+
+/// A length in a foreign unit is answered in millimetres, one without in both.
+fn did_you_mean_key(word: &str, near: &str) -> String {
+    let (unit, wanted) = (name_and_unit(word).1, name_and_unit(near).1);
+    let per = |unit: &str| unit.replace("per_", "");
+    match (unit, wanted) {
+        ("", "m") => format!("did you mean `{near}` or `{near}m`?"),
+        ("m", _) | (_, "") | ("", _) => format!("did you mean `{near}`?"),
+        (_, "m") => format!("did you mean `{near}m`? Convert the number"),
+        _ if per(unit) == per(wanted) => format!("did you mean `{near}`?"),
+        _ => format!("did you mean `{near}`? Convert the number"),
+    }
+}
+
+/// A key without its unit, and the unit: `density` and `kg_per_m3`.
+fn name_and_unit(key: &str) -> (&str, &str) {
+    const UNITS: &str = " per m mm cm dm km um nm m2 mm2 cm2 m3 mm3 cm3 ml s s2 ms us ns hz khz rad deg n mn kn \
+                         pa kpa mpa gpa hpa bar mmhg j mj kg g mg ";
+    let mut name = key;
+    while let Some((rest, last)) = name.rsplit_once('_')
+        && UNITS.contains(&format!(" {last} "))
+    {
+        name = rest;
+    }
+    (name, key[name.len()..].trim_start_matches('_'))
 }
 
 /// `Nearest known name` for references between tables.
@@ -339,6 +373,41 @@ mod tests {
         );
         let text = format!("{MINIMAL}[outptu]\n");
         assert_eq!(refused(&text), "s.toml:11:2: unknown key `outptu` in the scene (did you mean `output`?)");
+    }
+
+    /// `radius_cm` was answered with whatever key had the most letters in common, and a length misspelt in millimetres with
+    /// one in metres.
+    #[test]
+    fn keys_in_another_unit_are_answered_by_what_they_are_called() {
+        let shell =
+            MINIMAL.replace("[body.box]\nsize_mm = [10, 20, 30]\ncells = [1, 1, 1]", "[body.sphere_shell]\nKEY = 1");
+        let cases = [
+            (&shell, "outer_radius_cm", "did you mean `outer_radius_mm`? Convert the number"),
+            (&shell, "outer_radius", "did you mean `outer_radius_m` or `outer_radius_mm`?"),
+            (&shell, "outer_raduis_mm", "did you mean `outer_radius_mm`?"),
+            (&shell, "outer_raduis_m", "did you mean `outer_radius_m`?"),
+            (
+                &MINIMAL.replace("young_modulus_pa", "KEY"),
+                "young_kpa",
+                "did you mean `young_modulus_pa`? Convert the number",
+            ),
+            (
+                &MINIMAL.replace("young_modulus_pa", "KEY"),
+                "young_modulus_kpa",
+                "did you mean `young_modulus_pa`? Convert the number",
+            ),
+            (
+                &MINIMAL.replace("density_kg_per_m3", "KEY"),
+                "density_g_per_cm3",
+                "did you mean `density_kg_per_m3`? Convert the number",
+            ),
+            (&MINIMAL.replace("density_kg_per_m3", "KEY"), "density_kg_m3", "did you mean `density_kg_per_m3`?"),
+        ];
+        for (text, key, help) in cases {
+            let message = refused(&text.replace("KEY", key));
+            assert!(message.contains(&format!("unknown key `{key}`")), "{message}");
+            assert!(message.ends_with(&format!("({help})")), "{message}");
+        }
     }
 
     #[test]

@@ -5,13 +5,11 @@ use super::relation::enclosed_volume;
 use super::repair::{CleanSurface, Repairs};
 use super::trimesh::TriMesh;
 use super::wall::Wall;
+use crate::wording::counted;
 use glam::DVec3;
 use palpate_physics::TetMesh;
 use palpate_physics::mesh::quality::{Quality, measure as measure_quality};
 use std::fmt;
-
-/// A body longer than this (m) is probably in the wrong unit; shorter than the second, too.
-const PLAUSIBLE_SIZE_M: (f64, f64) = (1e-3, 2.0);
 
 /// How a surface was repaired and met.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -54,28 +52,20 @@ pub struct FillReport {
     pub volume_m3: f64,
     /// Volume (m³) between the surfaces as given and, where they are open, the mesh's base.
     pub input_volume_m3: f64,
-    /// Hints for the user, such as an implausible size.
-    pub warnings: Vec<String>,
 }
 
+/// What is not said of every body: layers, how much of the volume is met, and how well either surface.
 impl fmt::Display for FillReport {
     fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let layers = if self.layers == 1 { "layer" } else { "layers" };
-        writeln!(out, "{} tets, {} nodes, {} {layers}", self.tets, self.nodes, self.layers)?;
-        let q = &self.quality;
-        writeln!(
-            out,
-            "dihedral angles {:.1}° to {:.1}°, volume-length ratio at least {:.3}, mean {:.3}",
-            q.min_dihedral_deg, q.max_dihedral_deg, q.min_volume_length, q.mean_volume_length
-        )?;
         let percent = 100.0 * (self.volume_m3 / self.input_volume_m3 - 1.0);
-        writeln!(out, "volume {:.3} ml, {percent:+.2} % of the input's", self.volume_m3 * 1e6)?;
+        let layers = counted(self.layers as usize, "layer");
+        writeln!(out, "{layers} through the wall; volume {percent:+.2} % of the surfaces'")?;
         for (name, surface) in [("inner", &self.inner), ("outer", &self.outer)] {
             let distance = surface.hausdorff_m();
             let part = 100.0 * distance / self.outer_edge_m;
             writeln!(out, "{name}: {}; within {:.3} mm ({part:.0} % of an edge)", surface.repairs, distance * 1e3)?;
         }
-        self.warnings.iter().try_for_each(|warning| writeln!(out, "{warning}"))
+        Ok(())
     }
 }
 
@@ -90,13 +80,6 @@ pub(super) fn measure(mesh: &TetMesh, parts: &Split, wall: &Wall, layers: u32) -
         ),
         mesh_to_input_m: farthest(mesh.positions_m(), triangles, input),
     };
-    let mut warnings = Vec::new();
-    let (low, high) = mesh.bounds_m();
-    let size = (high - low).max_element();
-    if !(PLAUSIBLE_SIZE_M.0..=PLAUSIBLE_SIZE_M.1).contains(&size) {
-        let unit = if size > 1.0 { "millimetres" } else { "metres" };
-        warnings.push(format!("the body is {size:.3e} m long; are the files in {unit}?"));
-    }
     FillReport {
         tets: mesh.tets().len(),
         nodes: mesh.positions_m().len(),
@@ -108,7 +91,6 @@ pub(super) fn measure(mesh: &TetMesh, parts: &Split, wall: &Wall, layers: u32) -
         outer: surface(&wall.outer, &wall.outer_target.surface, outer),
         volume_m3: mesh.total_volume_m3(),
         input_volume_m3: input_volume(mesh, parts, wall),
-        warnings,
     }
 }
 

@@ -5,6 +5,7 @@ mod weld;
 
 use super::error::FillError;
 use super::trimesh::TriMesh;
+use crate::wording::counted;
 use glam::DVec3;
 use std::fmt;
 
@@ -37,16 +38,17 @@ pub struct Repairs {
 impl fmt::Display for Repairs {
     fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
         let counts = [
-            (self.welded_points, "points welded"),
-            (self.joined_gap_points, "gap points joined"),
-            (self.degenerate_triangles, "degenerate triangles dropped"),
-            (self.duplicate_triangles, "duplicate triangles dropped"),
-            (self.non_manifold_triangles, "non-manifold triangles dropped"),
-            (self.turned_triangles, "triangles turned"),
-            (self.dropped_parts, "small parts dropped"),
-            (self.filled_holes, "holes filled"),
+            (self.welded_points, "point", "welded"),
+            (self.joined_gap_points, "gap point", "joined"),
+            (self.degenerate_triangles, "degenerate triangle", "dropped"),
+            (self.duplicate_triangles, "duplicate triangle", "dropped"),
+            (self.non_manifold_triangles, "non-manifold triangle", "dropped"),
+            (self.turned_triangles, "triangle", "turned"),
+            (self.dropped_parts, "small part", "dropped"),
+            (self.filled_holes, "hole", "filled"),
         ];
-        let done: Vec<String> = counts.iter().filter(|(n, _)| *n > 0).map(|(n, what)| format!("{n} {what}")).collect();
+        let told = |&(count, what, done): &(usize, &str, &str)| format!("{} {done}", counted(count, what));
+        let done: Vec<String> = counts.iter().filter(|(count, ..)| *count > 0).map(told).collect();
         if done.is_empty() { out.write_str("nothing to repair") } else { out.write_str(&done.join(", ")) }
     }
 }
