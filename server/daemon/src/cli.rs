@@ -1,7 +1,7 @@
 //! The command line: subcommands and their flags, parsed once into types.
 use crate::{offline, serve};
-use clap::{Parser, Subcommand};
-use std::process::ExitCode;
+use clap::{CommandFactory, Parser, Subcommand, error::ErrorKind};
+use std::{ffi::OsString, path::Path, process::ExitCode};
 
 const EXAMPLES: &str = "\
 Examples:
@@ -42,6 +42,18 @@ enum Command {
 }
 
 impl Cli {
+    /// Reads a command line, the program's name first. A misspelt command is told as such, and not taken for a scene to serve.
+    ///
+    /// # Errors
+    /// What clap shows: a mistake, or the help that was asked for.
+    pub fn read(arguments: Vec<OsString>) -> Result<Self, clap::Error> {
+        if let Some((word, near)) = arguments.get(1).and_then(|word| misspelt(word.to_str()?)) {
+            let message = format!("there is no command '{word}'; did you mean '{near}'?");
+            return Err(Self::command().error(ErrorKind::InvalidSubcommand, message));
+        }
+        Self::try_parse_from(arguments)
+    }
+
     /// Runs the chosen command.
     ///
     /// # Errors
@@ -58,10 +70,21 @@ impl Cli {
     }
 }
 
+/// A word that is nearly a command, and neither a scene nor a path; and that command.
+fn misspelt(word: &str) -> Option<(&str, String)> {
+    let is_other = word.contains(['-', '.', '/']) || Path::new(word).exists() || palpate_scene::builtin(word).is_some();
+    let commands = Cli::command();
+    let names = commands.get_subcommands().map(clap::Command::get_name).chain(["help"]);
+    let likeness = |name: &str| strsim::jaro_winkler(word, name);
+    let near = names
+        .max_by(|a, b| likeness(a).total_cmp(&likeness(b)))
+        .filter(|near| likeness(near) > 0.8 && *near != word)?;
+    (!is_other).then(|| (word, near.to_owned()))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
-    use clap::CommandFactory;
 
     #[test]
     fn the_command_line_is_consistent() {
@@ -73,5 +96,23 @@ mod tests {
         assert!(Cli::try_parse_from(["palpated"]).unwrap().command.is_none());
         let cli = Cli::try_parse_from(["palpated", "simulate", "ventricle", "--json"]).unwrap();
         assert!(matches!(cli.command, Some(Command::Simulate(_))));
+    }
+    /// `palpated chek` looked for a scene of that name.
+    #[test]
+    fn a_misspelt_command_is_answered_with_the_nearest() {
+        let read = |words: &[&str]| {
+            let words = ["palpated"].iter().chain(words).map(OsString::from).collect();
+            Cli::read(words).map_err(|error| error.to_string())
+        };
+        for (words, near) in
+            [(&["chek"][..], "check"), (&["simulat", "ventricle", "--json"], "simulate"), (&["sheme"], "schema")]
+        {
+            let message = read(words).unwrap_err();
+            assert!(message.contains(&format!("did you mean '{near}'?")), "{message}");
+        }
+        for scene in ["ventricle", "organ", "check.toml", "./simulat"] {
+            assert_eq!(read(&[scene]).unwrap().serve.scene, scene);
+        }
+        assert!(matches!(read(&["check", "ventricle"]).unwrap().command, Some(Command::Check(_))));
     }
 }

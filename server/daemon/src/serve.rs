@@ -8,5 +8,5 @@ mod start;
 
 pub use config::ServeConfig;
 pub use error::ServeError;
-pub use run::run;
-pub use start::{Running, Summary, start};
+pub use run::{run, run_with};
+pub use start::{Runner, Running, Summary, start, start_with};

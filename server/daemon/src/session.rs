@@ -66,7 +66,7 @@ pub enum PrepareError {
     },
     /// The operating system.
     #[error("no descriptors for the session's slots: {0}")]
-    Slots(#[from] io::Error),
+    Slots(io::Error),
 }
 
 /// Longest tick of a session (s).
@@ -279,7 +279,8 @@ pub fn prepare(
         arm: scene.arm.filter(|_| settings.simulated_arm),
         limits: settings.limits,
         demand: Arc::clone(&hub.demand),
-    })?;
+    })
+    .map_err(PrepareError::Slots)?;
     let seat = |((end, spec), for_devices): ((ToolEnd, &palpate_physics::contact::ToolSpec), bool)| ToolSeat {
         name: spec.name.clone(),
         for_devices,

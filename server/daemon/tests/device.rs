@@ -4,6 +4,7 @@ mod common;
 use common::{Arm, Daemon, above, block_scene, force_of, hello, pressing, sample};
 use glam::DVec3;
 use palpate_proto::v1::{self, DeviceFaultCode, device_down::Message, device_up};
+use palpated::serve::ServeConfig;
 use tonic::Code;
 
 #[tokio::test(flavor = "multi_thread")]
@@ -243,9 +244,15 @@ async fn to_the_end(arm: &mut Arm) -> (Vec<(DVec3, u64)>, Option<v1::DeviceFault
 
 #[tokio::test(flavor = "multi_thread")]
 async fn when_the_loop_fails_the_stream_ramps_to_zero_and_says_goodbye_and_the_daemon_stops_as_failed() {
-    let mut config = palpated::serve::ServeConfig::in_process();
-    config.realtime.fail_at_tick = Some(1500);
-    let mut daemon = Daemon::with(block_scene("block", 3), config).await;
+    let mut daemon = Daemon::running(block_scene("block", 3), ServeConfig::in_process(), |the_loop, tick_loop| {
+        let mut turns = 0;
+        tick_loop.run(|wakeup| {
+            turns += 1;
+            assert!(turns < 1500, "the loop fails here, as it was meant to");
+            the_loop.turn(wakeup)
+        });
+    })
+    .await;
     let mut arm = daemon.attach(hello()).await;
     arm.welcome().await;
     arm.hold_until(above(), |command| command.tick > 300).await;

@@ -12,7 +12,7 @@ use std::{
 
 static BUILD: Once = Once::new();
 
-/// Path of a program of this workspace, built if need be.
+/// Path of a program of this workspace (`examples/NAME`: of an example), built if need be.
 pub fn path_of(program: &str) -> PathBuf {
     BUILD.call_once(build);
     profile_dir().join(program)
@@ -29,7 +29,7 @@ fn build() {
     let mut cargo = Command::new(env!("CARGO"));
     // With the tests, as `cargo test --workspace` builds them: the programs alone would choose other features of shared
     // dependencies, and compile most of them once more.
-    cargo.args(["build", "--quiet", "--workspace", "--bins", "--tests"]);
+    cargo.args(["build", "--quiet", "--workspace", "--bins", "--examples", "--tests"]);
     cargo.current_dir(crate::root()).env("CARGO_TARGET_DIR", profile_dir().parent().expect("target"));
     if release {
         cargo.arg("--release");

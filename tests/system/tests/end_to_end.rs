@@ -20,9 +20,11 @@ struct Daemon {
 
 impl Daemon {
     fn start(arguments: &[&str]) -> Self {
-        let mut all = vec!["serve", "--listen", "127.0.0.1:0"];
-        all.extend(arguments);
-        let mut program = Program::start("palpated", &all);
+        Self::of("palpated", &[&["serve"], arguments].concat())
+    }
+
+    fn of(program: &str, arguments: &[&str]) -> Self {
+        let mut program = Program::start(program, &[arguments, &["--listen", "127.0.0.1:0"]].concat());
         let line = program.wait_for("http://127.0.0.1:", PATIENCE);
         let from = line.find("http://").unwrap();
         let url = line[from..].split_whitespace().next().unwrap().trim_end_matches(['/', ',', ')']).to_owned();
@@ -142,7 +144,7 @@ fn the_daemon_drains_while_a_bridge_and_a_viewer_hang_on() {
 
 #[test]
 fn a_loop_that_fails_lets_the_arm_go_and_the_daemon_end_with_an_error() {
-    let mut daemon = Daemon::start(&["--fail-at-tick", "3000"]);
+    let mut daemon = Daemon::of("examples/failing_loop", &[]);
     let mut bridge = Program::start("palpate-bridge", &["--server", &daemon.url, "--device", "simulated"]);
     bridge.wait_for("attached to tool", PATIENCE);
     let said = bridge.wait_for("loop failed", PATIENCE);
@@ -152,6 +154,7 @@ fn a_loop_that_fails_lets_the_arm_go_and_the_daemon_end_with_an_error() {
     assert_eq!(code.code(), Some(1), "{printed}");
     assert!(printed.contains("stopped without being told to: the simulation loop ended by a panic"), "{printed}");
     assert!(printed.contains("p99"), "no histograms at exit:\n{printed}");
+    assert!(printed.contains("ERROR") && !printed.contains('\u{1b}'), "a log in a pipe has no colours:\n{printed}");
 }
 
 #[test]

@@ -37,7 +37,7 @@ pub enum ListenError {
         address: SocketAddr,
     },
     /// The address cannot be bound for another reason.
-    #[error("cannot listen on {address}: {source}")]
+    #[error("cannot listen on {address}")]
     #[diagnostic(help("--listen takes an address of this machine and a port, such as 127.0.0.1:7411 or 0.0.0.0:7411"))]
     Bind {
         /// The address.
@@ -46,7 +46,7 @@ pub enum ListenError {
         source: io::Error,
     },
     /// The Unix socket cannot be made.
-    #[error("cannot listen on the Unix socket {}: {source}", path.display())]
+    #[error("cannot listen on the Unix socket {}", path.display())]
     #[diagnostic(help("the folder must exist and be writable, and no other daemon may listen there"))]
     Unix {
         /// Its path.
@@ -55,7 +55,7 @@ pub enum ListenError {
         source: io::Error,
     },
     /// A certificate or key cannot be read.
-    #[error("cannot read the {what} {}: {source}", path.display())]
+    #[error("cannot read the {what} {}", path.display())]
     #[diagnostic(help("--tls-cert and --tls-key take PEM files"))]
     TlsFile {
         /// `certificate` or `key`.

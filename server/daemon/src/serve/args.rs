@@ -1,5 +1,5 @@
 //! Flags of `palpated serve`.
-use super::config::{RealtimeConfig, ServeConfig, default_limits};
+use super::config::{ServeConfig, default_limits};
 use crate::grpc::listen::TlsFiles;
 use clap::ValueEnum;
 use palpate_realtime::OsMeasures;
@@ -56,9 +56,6 @@ pub struct ServeArgs {
     /// Keep processors out of deep sleep: less jitter, more power
     #[arg(long)]
     pub stay_awake: bool,
-    /// Let the loop fail at this tick: to test what becomes of arms then
-    #[arg(long, value_name = "TICK", hide = true)]
-    pub fail_at_tick: Option<u64>,
 }
 
 impl ServeArgs {
@@ -85,7 +82,7 @@ impl ServeArgs {
             limits,
             display_rate_hz: self.display_rate_hz,
             scene_folders: self.scene_folders.clone(),
-            realtime: RealtimeConfig { measures, fail_at_tick: self.fail_at_tick },
+            measures,
         }
         .checked()
     }

@@ -8,15 +8,6 @@ use std::{
     path::PathBuf,
 };
 
-/// What the loop asks of the operating system.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct RealtimeConfig {
-    /// Priority, memory, processor.
-    pub measures: OsMeasures,
-    /// Tick at which the loop panics, to test what becomes of arms then.
-    pub fail_at_tick: Option<u64>,
-}
-
 /// Configuration of a daemon.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ServeConfig {
@@ -34,8 +25,8 @@ pub struct ServeConfig {
     pub display_rate_hz: f64,
     /// Folders whose scene files viewers may load.
     pub scene_folders: Vec<PathBuf>,
-    /// Of the operating system.
-    pub realtime: RealtimeConfig,
+    /// What the loop asks of the operating system.
+    pub measures: OsMeasures,
 }
 
 /// Peak 8 N (a desktop arm's is 3 to 9 N), 2000 N/s, and the watchdog's own times.
@@ -57,7 +48,7 @@ impl ServeConfig {
             limits: default_limits(),
             display_rate_hz: 60.0,
             scene_folders: Vec::new(),
-            realtime: RealtimeConfig { measures: OsMeasures::NONE, fail_at_tick: None },
+            measures: OsMeasures::NONE,
         }
     }
 

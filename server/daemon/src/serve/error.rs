@@ -17,14 +17,14 @@ pub enum ServeError {
         reason: String,
     },
     /// The scene cannot be run.
-    #[error("the scene cannot be run: {0}")]
+    #[error("the scene cannot be run")]
     Prepare(#[from] PrepareError),
     /// A socket.
     #[error(transparent)]
     #[diagnostic(transparent)]
     Listen(#[from] ListenError),
     /// The loop's thread or slots.
-    #[error("the operating system refused the loop's {what}: {source}")]
+    #[error("the operating system refused the loop's {what}")]
     System {
         /// What was asked.
         what: &'static str,

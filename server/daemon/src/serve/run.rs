@@ -1,6 +1,6 @@
 //! The process: load, start, tell, wait for a signal, say goodbye.
-use super::{ServeConfig, ServeError, args::ServeArgs, report, start};
-use crate::{load, telemetry};
+use super::{Runner, ServeConfig, ServeError, args::ServeArgs, report, start_with};
+use crate::{load, sim::thread::Loop, telemetry};
 use miette::IntoDiagnostic;
 use palpate_scene::Scene;
 use sd_notify::NotifyState;
@@ -16,21 +16,29 @@ use tokio_util::sync::CancellationToken;
 /// # Errors
 /// A scene that does not load, a setting out of range, or an address that cannot be bound.
 pub fn run(args: &ServeArgs) -> miette::Result<ExitCode> {
+    run_with(args, Loop::run)
+}
+
+/// The same with a loop that runs otherwise: see [`start_with`].
+///
+/// # Errors
+/// As [`run`].
+pub fn run_with(args: &ServeArgs, runner: Runner) -> miette::Result<ExitCode> {
     telemetry::init();
     let config = args.config()?;
     let scene = load::from_argument(&args.scene, &mut |_, _| ())?;
     let runtime = runtime::Builder::new_multi_thread().enable_all().build().into_diagnostic()?;
-    let code = runtime.block_on(serve(config, scene))?;
+    let code = runtime.block_on(serve(config, scene, runner))?;
     // What still hangs on a socket is not waited for.
     runtime.shutdown_background();
     Ok(code)
 }
 
-async fn serve(config: ServeConfig, scene: Scene) -> Result<ExitCode, ServeError> {
+async fn serve(config: ServeConfig, scene: Scene, runner: Runner) -> Result<ExitCode, ServeError> {
     let description = scene.description.clone();
     let stop = CancellationToken::new();
     let signals = Signals::new().map_err(|source| ServeError::System { what: "signal handlers", source })?;
-    let running = start(config.clone(), scene, stop.clone()).await?;
+    let running = start_with(config.clone(), scene, stop.clone(), runner).await?;
     println!("{}", report::startup(&running, &config, &description));
     notify(&[NotifyState::Ready]);
     let told = stop.clone();

@@ -1,5 +1,5 @@
 //! Wiring: prepare the session, start the loop, open the doors; and the way back when told to stop.
-use super::{ServeConfig, ServeError, config::RealtimeConfig};
+use super::{ServeConfig, ServeError};
 use crate::{
     grpc::{self, listen},
     session::{Daemon, Numbers, Prepared, SessionSettings, prepare},
@@ -11,7 +11,7 @@ use crate::{
     },
     stream::hub::Hub,
 };
-use palpate_realtime::{Clock, Note, TickLoop};
+use palpate_realtime::{Clock, Note, OsMeasures, TickLoop};
 use palpate_scene::Scene;
 use std::{
     net::SocketAddr,
@@ -64,11 +64,27 @@ impl Running {
     }
 }
 
+/// How the loop's thread runs the loop.
+pub type Runner = fn(&mut Loop, &mut TickLoop);
+
 /// Starts a daemon on a scene; it stops gracefully when `stop` is cancelled.
 ///
 /// # Errors
 /// [`ServeError`]; nothing keeps running.
 pub async fn start(config: ServeConfig, scene: Scene, stop: CancellationToken) -> Result<Running, ServeError> {
+    start_with(config, scene, stop, Loop::run).await
+}
+
+/// The same with a loop that runs otherwise: for tests of what becomes of arms when it fails.
+///
+/// # Errors
+/// [`ServeError`]; nothing keeps running.
+pub async fn start_with(
+    config: ServeConfig,
+    scene: Scene,
+    stop: CancellationToken,
+    run: Runner,
+) -> Result<Running, ServeError> {
     let config = config.checked()?;
     let doors = Doors::open(&config).await?;
     let hub = Hub::new(config.display_rate_hz);
@@ -82,7 +98,8 @@ pub async fn start(config: ServeConfig, scene: Scene, stop: CancellationToken) -
     let (desk, orders, clerk) = desk().map_err(|source| ServeError::System { what: "order desk", source })?;
     let timing = Arc::new(Timing::default());
     let sign = StopSign::default();
-    let (notes, the_loop) = start_loop(simulation, desk, sign.clone(), Arc::clone(&timing), config.realtime).await?;
+    let (notes, the_loop) =
+        start_loop(simulation, desk, sign.clone(), Arc::clone(&timing), config.measures, run).await?;
     tokio::spawn(clerk.work());
     let daemon = Arc::new(Daemon {
         orders,
@@ -142,19 +159,19 @@ async fn start_loop(
     desk: Desk,
     sign: StopSign,
     timing: Arc<Timing>,
-    realtime: RealtimeConfig,
+    measures: OsMeasures,
+    run: Runner,
 ) -> Result<(Vec<Note>, thread::JoinHandle<()>), ServeError> {
     let tick_loop = TickLoop::new(Clock::Monotonic, simulation.period_s());
     let mut tick_loop =
         tick_loop.map_err(|error| ServeError::Prepare(error.into()))?.measured_in(Arc::clone(&timing.the_loop));
-    let mut the_loop =
-        Loop::new(simulation, desk, sign.clone(), timing, Clock::Monotonic).failing_at(realtime.fail_at_tick);
+    let mut the_loop = Loop::new(simulation, desk, sign.clone(), timing, Clock::Monotonic);
     let (tell, told) = oneshot::channel();
     let body = move || {
         let _gone_when_dropped = sign.hold();
-        let granted = realtime.measures.apply();
+        let granted = measures.apply();
         let _ = tell.send(granted.notes.clone());
-        the_loop.run(&mut tick_loop);
+        run(&mut the_loop, &mut tick_loop);
         drop(granted);
     };
     let system = |source| ServeError::System { what: "thread", source };

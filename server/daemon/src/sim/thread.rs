@@ -69,7 +69,6 @@ pub struct Loop {
     /// Another session has come, with a period of its own.
     other_period: bool,
     told_to_stop_ns: Option<u64>,
-    fail_at_tick: Option<u64>,
 }
 
 impl Loop {
@@ -86,14 +85,7 @@ impl Loop {
             waiting: None,
             other_period: false,
             told_to_stop_ns: None,
-            fail_at_tick: None,
         }
-    }
-
-    /// For tests of what becomes of arms when the loop fails: it panics at this tick of the session.
-    #[must_use]
-    pub fn failing_at(self, fail_at_tick: Option<u64>) -> Self {
-        Self { fail_at_tick, ..self }
     }
 
     /// Runs until the sign is raised and forces are zero.
@@ -108,12 +100,9 @@ impl Loop {
         }
     }
 
-    fn turn(&mut self, wakeup: &Wakeup) -> ControlFlow<()> {
+    /// What is done at one wake-up; breaks when the loop is to end, or to go on with another period.
+    pub fn turn(&mut self, wakeup: &Wakeup) -> ControlFlow<()> {
         self.take_an_order();
-        assert!(
-            self.fail_at_tick.is_none_or(|tick| self.simulation.state.tick < tick),
-            "the loop was told to fail here"
-        );
         if self.sign.is_raised() {
             let since_ns = *self.told_to_stop_ns.get_or_insert(wakeup.woke_ns);
             if self.release(since_ns) {

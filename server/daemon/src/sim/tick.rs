@@ -7,12 +7,7 @@ use super::{
     timing::Timing,
     tool::{Moment, Order},
 };
-use glam::DVec3;
-use palpate_physics::{
-    TickInput,
-    contact::{closest_point, is_inside},
-    step,
-};
+use palpate_physics::{TickInput, contact::is_inside, step};
 use palpate_realtime::Clock;
 
 /// How often a tool that waits to be clear of the body is looked for in it; a look costs a pass over the surface.
@@ -80,10 +75,10 @@ impl Simulation {
     fn couple(&mut self, plan: Plan, now_ns: u64) {
         let quarantined = self.state.quarantine.map(|q| q.tick);
         let moment = Moment { now_ns, tick: self.state.tick, period_s: self.period_s(), quarantined };
-        let (specs, surface) = (&self.model.spec().tools, &self.model.surface().triangles);
-        for ((tool, state), spec) in self.tools.iter_mut().zip(&self.state.tools).zip(specs) {
-            let look = plan.advance && self.state.tick.is_multiple_of(LOOK_EVERY_TICKS) && tool.seems_clear(state);
-            if look && is_clear(state.target.position_m, spec.radius_m, surface, &self.state.x) {
+        let surface = &self.model.surface().triangles;
+        for (tool, state) in self.tools.iter_mut().zip(&self.state.tools) {
+            let look = plan.advance && self.state.tick.is_multiple_of(LOOK_EVERY_TICKS) && tool.touches_nothing(state);
+            if look && !is_inside(state.target.position_m, surface, &self.state.x) {
                 tool.found_clear();
             }
             tool.couple(state, &moment, plan.order, plan.advance);
@@ -106,13 +101,4 @@ impl Simulation {
         }
         self.ticks_to_frame -= 1;
     }
-}
-
-/// Whether a sphere touches nothing of the body: a tool that was put into the surface presses nothing there, and is in it.
-fn is_clear(centre_m: DVec3, radius_m: f64, surface: &[[u32; 3]], x: &[DVec3]) -> bool {
-    let is_near = |corners: &[u32; 3]| {
-        let nearest_m = closest_point(centre_m, corners.map(|corner| x[corner as usize]));
-        nearest_m.distance_squared(centre_m) < radius_m * radius_m
-    };
-    !surface.iter().any(is_near) && !is_inside(centre_m, surface, x)
 }

@@ -15,7 +15,10 @@ use palpate_scene::{
     BodySummary, Driver, Interpolation, MotionPath, OutputSettings, Probe, Scene, ScriptedHand, Timeline,
     probes::Measure, shapes::box_mesh,
 };
-use palpated::serve::{Running, ServeConfig, Summary, start};
+use palpated::{
+    serve::{Runner, Running, ServeConfig, Summary, start_with},
+    sim::thread::Loop,
+};
 use std::time::Duration;
 use tokio::{sync::mpsc, time::timeout};
 use tokio_stream::wrappers::ReceiverStream;
@@ -132,8 +135,12 @@ impl Daemon {
     }
 
     pub async fn with(scene: Scene, config: ServeConfig) -> Self {
+        Self::running(scene, config, Loop::run).await
+    }
+
+    pub async fn running(scene: Scene, config: ServeConfig, run: Runner) -> Self {
         let stop = CancellationToken::new();
-        let running = start(config, scene, stop.clone()).await.unwrap();
+        let running = start_with(config, scene, stop.clone(), run).await.unwrap();
         let channel = Channel::from_shared(format!("http://{}", running.address)).unwrap().connect().await.unwrap();
         Self { running: Some(running), stop, channel }
     }
