@@ -9,9 +9,10 @@ use tonic::Status;
 /// A name that is neither a file nor a built-in scene.
 #[derive(Debug, Error, Diagnostic)]
 #[error("there is no scene file \"{name}\", and no built-in scene of that name")]
-#[diagnostic(help("built-in scenes: {known}; a scene file ends in .toml (docs/scenes.md)"))]
+#[diagnostic(help("{near}built-in scenes: {known}; a scene file ends in .toml (docs/scenes.md)"))]
 struct UnknownScene {
     name: String,
+    near: String,
     known: String,
 }
 
@@ -25,7 +26,9 @@ pub fn from_argument(name: &str, progress: &mut dyn FnMut(f64, &str)) -> miette:
     let scene = match builtin(name) {
         Some(text) if !path.is_file() => parse(text, name, None, &limits, progress),
         None if !path.exists() => {
-            return Err(UnknownScene { name: name.to_owned(), known: builtin_names().join(", ") }.into());
+            let near = builtin_names().iter().find(|known| strsim::jaro_winkler(name, known) > 0.8);
+            let near = near.map_or(String::new(), |near| format!("did you mean {near}? "));
+            return Err(UnknownScene { name: name.to_owned(), near, known: builtin_names().join(", ") }.into());
         }
         _ => load_file(path, &limits, progress),
     };

@@ -110,6 +110,43 @@ fn static_and_simulate_agree_at_rest() {
     assert_eq!(still["solve"]["stable"], Value::from(true));
 }
 
+/// Without a load the residual was compared with itself, and printed as "9.5e-1 of the forces".
+#[test]
+fn without_a_load_the_residual_is_held_against_rounding() {
+    let folder = tempfile::tempdir().unwrap();
+    let scene = beam(folder.path());
+    fs::write(&scene, BEAM.replace("traction_pa = [0, 0, -100]", "traction_pa = [0, 0, 0]")).unwrap();
+    let shown = succeeds(&["static", &scene]);
+    assert!(shown.contains("no load") && !shown.contains("of the forces"), "{shown}");
+    let solved: Value = serde_json::from_str(&succeeds(&["static", &scene, "--json"])).unwrap();
+    let solve = &solved["solve"];
+    assert!(solve["relative_residual"].is_null() && solve["residual_n"].as_f64() <= solve["rounding_n"].as_f64());
+    assert!(solve["rounding_n"].as_f64() < Some(1e-9), "{solve}");
+}
+
+/// Only the last values were told: of a press that was over, zeros.
+#[test]
+fn probes_tell_their_peak_and_when() {
+    let folder = tempfile::tempdir().unwrap();
+    let scene = beam(folder.path());
+    let pulse = BEAM.replace(
+        "amplitude.smooth_step.duration_s = 0.2",
+        "amplitude.table = { times_s = [0, 0.1, 0.2], values = [0, 1, 0] }",
+    );
+    fs::write(&scene, pulse).unwrap();
+    let out = folder.path().join("out");
+    let shown = succeeds(&["simulate", &scene, "--out", out.to_str().unwrap()]);
+    assert_eq!(shown.matches("peak: magnitude").count(), 2, "{shown}");
+    let peak = &summary(&out)["probes"]["tip"]["peaks"]["magnitude"];
+    let rows = fs::read_to_string(out.join("probes.csv")).unwrap();
+    let row = |line: &str| -> Vec<f64> { line.split(',').map(|number| number.parse().unwrap()).collect() };
+    let length = |row: &[f64]| row[1..4].iter().map(|x| x * x).sum::<f64>().sqrt();
+    let largest = rows.lines().skip(1).map(row).max_by(|a, b| length(a).total_cmp(&length(b))).unwrap();
+    assert_eq!(peak["time_s"].as_f64(), Some(largest[0]));
+    assert!((peak["value"].as_f64().unwrap() / length(&largest) - 1.0).abs() < 1e-12);
+    assert!(largest[0] > 0.02 && largest[0] < 0.3, "{largest:?}");
+}
+
 #[test]
 fn a_wanted_residual_is_a_ratio() {
     for folly in ["0", "1", "2", "-1", "nan", "inf"] {
@@ -212,7 +249,7 @@ fn a_folder_with_something_in_it_is_kept_unless_forced() {
 fn bad_scenes_are_shown_with_place_and_next_step() {
     let message = fails(&["check", "ventrikle"]);
     assert!(message.contains("there is no scene file \"ventrikle\""), "{message}");
-    assert!(message.contains("built-in scenes: ventricle, cantilever"), "{message}");
+    assert!(message.contains("did you mean ventricle? built-in scenes: ventricle, cantilever"), "{message}");
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("bad.toml");
     fs::write(&path, BEAM.replace("poisson_ratio = 0.3", "poisson_ratio = 0.5")).unwrap();

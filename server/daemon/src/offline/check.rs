@@ -1,7 +1,7 @@
 //! `palpated check`: what a scene's body is like, and what a tick costs on this machine.
 use super::{load, simulate::Run, summary::TimeNumbers};
-use palpate_physics::Model;
-use palpate_scene::{Scene, builtin_names};
+use palpate_physics::{Model, material::Law};
+use palpate_scene::{Scene, builtin_names, wording::counted};
 use std::{
     process::ExitCode,
     time::{Duration, Instant},
@@ -62,10 +62,11 @@ fn measure(scene: &Scene, model: &Model) -> miette::Result<TimeNumbers> {
 fn print_body(scene: &Scene) {
     let body = &scene.summary;
     let quality = &body.quality;
-    println!("{}: {}", scene.name, scene.description);
+    println!("{}", [scene.name.as_str(), &scene.description].map(str::trim).join(": ").trim_end_matches([':', ' ']));
     println!("body       {}", body.origin);
-    println!("           {} tets, {} nodes, {} surface triangles", body.tets, body.nodes, body.surface_triangles);
-    println!("           volume {:.4} ml, mass {:.4} g", body.volume_m3 * 1e6, body.mass_kg * 1e3);
+    let surface = counted(body.surface_triangles, "surface triangle");
+    println!("           {}, {}, {surface}", counted(body.tets, "tet"), counted(body.nodes, "node"));
+    println!("           volume {} ml, mass {} g", short(body.volume_m3 * 1e6), short(body.mass_kg * 1e3));
     println!(
         "quality    dihedral angles {:.1}° to {:.1}°, volume-length ratio {:.3} at worst, {:.3} in the mean",
         quality.min_dihedral_deg, quality.max_dihedral_deg, quality.min_volume_length, quality.mean_volume_length
@@ -75,16 +76,17 @@ fn print_body(scene: &Scene) {
         println!("           {line}");
     }
     for part in &body.parts {
-        println!("region     {:<16} {} nodes, {} triangles, {} tets", part.name, part.nodes, part.triangles, part.tets);
+        let sets = [(part.nodes, "node"), (part.triangles, "triangle"), (part.tets, "tet")];
+        println!("region     {:<16} {}", part.name, sets.map(|(count, what)| counted(count, what)).join(", "));
     }
     for region in &scene.model.regions {
         let lame = region.material.lame;
         println!(
-            "material   {:<16} {:?}, E {:.4e} Pa, nu {:.4}, {} kg/m3",
+            "material   {:<16} {}, E {} Pa, nu {}, {} kg/m3",
             region.name,
-            region.material.law,
-            lame.young_modulus_pa(),
-            lame.poisson_ratio(),
+            law(region.material.law),
+            short(lame.young_modulus_pa()),
+            short(lame.poisson_ratio()),
             region.density_kg_per_m3
         );
     }
@@ -93,13 +95,19 @@ fn print_body(scene: &Scene) {
 fn print_time(model: &Model, cost: &TimeNumbers) {
     let period_us = cost.tick_period_s * 1e6;
     println!(
-        "time       tick {period_us} us, omega_max {:.4e} rad/s, {} substeps",
-        model.max_natural_frequency_rad_per_s(),
-        cost.substeps_per_tick
+        "time       tick {} ms, {}; highest natural frequency {} Hz",
+        short(period_us * 1e-3),
+        counted(cost.substeps_per_tick as usize, "substep"),
+        short(model.max_natural_frequency_rad_per_s() / std::f64::consts::TAU)
     );
     let us = cost.tick_wall_us;
     let build = if cfg!(debug_assertions) { ", in an UNOPTIMISED build" } else { "" };
-    println!("           a tick costs {:.1} us here (p99 {:.1} us over {} ticks{build})", us.p50, us.p99, cost.ticks);
+    println!(
+        "           a tick costs {:.1} us here (p99 {:.1} us over {}{build})",
+        us.p50,
+        us.p99,
+        counted(cost.ticks as usize, "tick")
+    );
     let verdict = if us.p50 > 0.8 * period_us {
         "does NOT fit: coarsen the mesh or lengthen tick_period_s"
     } else if us.p99 > period_us {
@@ -112,13 +120,11 @@ fn print_time(model: &Model, cost: &TimeNumbers) {
 
 fn print_contents(scene: &Scene) {
     let held: usize = scene.model.prescribed.iter().map(|set| set.nodes.len()).sum();
-    let loads = scene.model.loads.len();
-    if held == 0 {
-        println!(
-            "held       nothing; {loads} loads. Any force moves the body as a whole, and static refuses it: see [[fixed]]"
-        );
-    } else {
-        println!("held       {held} nodes in {} sets; {loads} loads", scene.model.prescribed.len());
+    let loads = counted(scene.model.loads.len(), "load");
+    match scene.model.prescribed.len() {
+        0 => println!("held       nothing; {loads}"),
+        1 => println!("held       {}; {loads}", counted(held, "node")),
+        sets => println!("held       {} in {}; {loads}", counted(held, "node"), counted(sets, "set")),
     }
     for (tool, driver) in scene.model.tools.iter().zip(&scene.drivers) {
         let driver = match driver {
@@ -130,4 +136,40 @@ fn print_contents(scene: &Scene) {
     }
     let probes: Vec<&str> = scene.probes.iter().map(palpate_scene::Probe::name).collect();
     println!("probes     {}", if probes.is_empty() { "none".to_owned() } else { probes.join(", ") });
+}
+
+/// A law as scenes name it.
+fn law(law: Law) -> &'static str {
+    match law {
+        Law::StVenantKirchhoff => "stvk",
+        Law::StableNeoHookean => "stable-neo-hookean",
+        Law::FixedCorotated => "fixed-corotated",
+    }
+}
+
+/// Four significant digits, without the zeros behind them.
+fn short(value: f64) -> String {
+    let rounded: f64 = format!("{value:.3e}").parse().unwrap_or(value);
+    if rounded == 0.0 || (1e-4..1e7).contains(&rounded.abs()) { rounded.to_string() } else { format!("{rounded:e}") }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_have_the_digits_they_need() {
+        let cases = [
+            (256.0, "256"),
+            (3614.465, "3614"),
+            (0.45, "0.45"),
+            (4999.6, "5000"),
+            (1e4, "10000"),
+            (1.5e9, "1.5e9"),
+            (0.0, "0"),
+        ];
+        for (value, text) in cases {
+            assert_eq!(short(value), text);
+        }
+    }
 }

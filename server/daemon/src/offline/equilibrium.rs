@@ -80,7 +80,8 @@ pub fn run(args: &StaticArgs) -> miette::Result<ExitCode> {
         iterations: solution.iterations,
         load_steps: solution.load_steps,
         residual_n: solution.residual_n,
-        relative_residual: solution.relative_residual,
+        relative_residual: (!solution.is_unloaded()).then_some(solution.relative_residual),
+        rounding_n: solution.rounding_n,
         stable: solution.stable,
         inverted_tets: solution.inverted_tets,
     });
@@ -120,7 +121,13 @@ fn solve(scene: &Scene, model: &Model, goal: &Goal, residual: Option<f64>) -> mi
     let interrupt = Interrupt::listen();
     let mut bar = Progress::new(&scene.name);
     let mut show = |progress: &solve::Progress| {
-        bar.show(progress.load_fraction, &format!("residual {:.1e}", progress.relative_residual));
+        bar.show_work(&format!(
+            "{:.1} % of the load, iteration {}, residual {:.1e} of {:.0e}",
+            100.0 * progress.load_fraction,
+            progress.iteration,
+            progress.relative_residual,
+            settings.relative_residual
+        ));
         if interrupt.is_set() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     };
     let solved = solve::solve_static(model, &goal.load_factors, &goal.prescribed_m, &goal.tools, &settings, &mut show);

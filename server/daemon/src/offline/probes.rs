@@ -2,7 +2,10 @@
 use glam::DVec3;
 use miette::{IntoDiagnostic, WrapErr};
 use palpate_physics::{Model, State};
-use palpate_scene::{Probe, probes::MAX_COLUMNS};
+use palpate_scene::{
+    Probe,
+    probes::{MAX_COLUMNS, Measure},
+};
 use std::{
     fs::File,
     io::{BufWriter, Write},
@@ -13,8 +16,31 @@ use std::{
 pub(super) struct ProbeRows<'s> {
     probes: &'s [Probe],
     row: Vec<f64>,
+    peaks: Vec<Peak>,
     file: Option<BufWriter<File>>,
     count: u64,
+}
+
+/// The row in which something was largest.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Peak {
+    /// Largest magnitude, or for the volume ratio smallest value.
+    pub(super) value: f64,
+    /// When (s).
+    pub(super) time_s: f64,
+}
+
+/// What a probe's peaks are of: the length of a vector, or each value.
+fn peaks_of(probe: &Probe) -> &'static [&'static str] {
+    if probe.columns() == ["x", "y", "z"] { &["magnitude"] } else { probe.columns() }
+}
+
+/// Whether a value is further than the peak so far.
+fn is_further(probe: &Probe, value: f64, peak: f64) -> bool {
+    match probe.measure() {
+        Measure::MinVolumeRatio => value < peak,
+        _ => value.abs() > peak.abs(),
+    }
 }
 
 impl<'s> ProbeRows<'s> {
@@ -25,7 +51,9 @@ impl<'s> ProbeRows<'s> {
             Some(path) => Some(create(path, probes)?),
             None => None,
         };
-        Ok(Self { probes, row: vec![0.0; columns], file, count: 0 })
+        let peaks = probes.iter().map(|probe| peaks_of(probe).len()).sum();
+        let none = Peak { value: 0.0, time_s: 0.0 };
+        Ok(Self { probes, row: vec![0.0; columns], peaks: vec![none; peaks], file, count: 0 })
     }
 
     /// Evaluates at a state; `reactions_n` is the force (N) that holds each node.
@@ -36,13 +64,20 @@ impl<'s> ProbeRows<'s> {
         state: &State,
         reactions_n: &[DVec3],
     ) -> miette::Result<()> {
-        let mut place = 0;
+        let (mut place, mut peaks) = (0, self.peaks.iter_mut());
         for probe in self.probes {
             let mut values = [0.0; MAX_COLUMNS];
             probe.evaluate_with(model, state, reactions_n, &mut values);
             let columns = probe.columns().len();
             self.row[place..place + columns].copy_from_slice(&values[..columns]);
             place += columns;
+            let vector_length = DVec3::new(values[0], values[1], values[2]).length();
+            for (&of, (peak, value)) in peaks_of(probe).iter().zip(peaks.by_ref().zip(values)) {
+                let value = if of == "magnitude" { vector_length } else { value };
+                if self.count == 0 || is_further(probe, value, peak.value) {
+                    *peak = Peak { value, time_s };
+                }
+            }
         }
         self.count += 1;
         let Some(file) = &mut self.file else { return Ok(()) };
@@ -58,6 +93,12 @@ impl<'s> ProbeRows<'s> {
     pub(super) fn newest(&self) -> impl Iterator<Item = (&Probe, &'static str, f64)> + '_ {
         let columns = self.probes.iter().flat_map(|probe| probe.columns().iter().map(move |column| (probe, *column)));
         columns.zip(&self.row).map(|((probe, column), value)| (probe, column, *value))
+    }
+
+    /// The peaks over all rows: probe, of what, and which.
+    pub(super) fn peaks(&self) -> impl Iterator<Item = (&Probe, &'static str, Peak)> + '_ {
+        let names = self.probes.iter().flat_map(|probe| peaks_of(probe).iter().map(move |of| (probe, *of)));
+        names.zip(&self.peaks).map(|((probe, of), peak)| (probe, of, *peak))
     }
 
     /// Writes what is buffered.

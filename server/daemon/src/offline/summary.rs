@@ -2,7 +2,7 @@
 use super::{folder, probes::ProbeRows};
 use miette::{IntoDiagnostic, WrapErr};
 use palpate_physics::{Energies, Model, State, health, snapshot};
-use palpate_scene::Scene;
+use palpate_scene::{Scene, wording::counted};
 use serde::Serialize;
 use std::{collections::BTreeMap, path::Path};
 
@@ -67,7 +67,11 @@ pub(super) struct SolveNumbers {
     pub(super) iterations: u32,
     pub(super) load_steps: u32,
     pub(super) residual_n: f64,
-    pub(super) relative_residual: f64,
+    /// Residual over the forces in play; absent when there are none.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) relative_residual: Option<f64>,
+    /// What rounding of positions alone leaves (N).
+    pub(super) rounding_n: f64,
     pub(super) stable: bool,
     pub(super) inverted_tets: u32,
 }
@@ -88,6 +92,15 @@ pub(super) struct EnergyNumbers {
 pub(super) struct ProbeNumbers {
     pub(super) unit: &'static str,
     pub(super) values: BTreeMap<&'static str, f64>,
+    /// In a run over time, the row with the largest magnitude of the vector or of each value (the volume ratio's smallest).
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    pub(super) peaks: BTreeMap<&'static str, PeakNumbers>,
+}
+
+#[derive(Debug, Serialize)]
+pub(super) struct PeakNumbers {
+    pub(super) value: f64,
+    pub(super) time_s: f64,
 }
 
 /// How a run ended.
@@ -104,8 +117,13 @@ impl Summary {
         let energies = Energies::of(model, state);
         let mut probes: BTreeMap<String, ProbeNumbers> = BTreeMap::new();
         for (probe, column, value) in rows.newest() {
-            let new = || ProbeNumbers { unit: probe.unit(), values: BTreeMap::new() };
+            let new = || ProbeNumbers { unit: probe.unit(), values: BTreeMap::new(), peaks: BTreeMap::new() };
             probes.entry(probe.name().to_owned()).or_insert_with(new).values.insert(column, value);
+        }
+        for (probe, of, peak) in rows.peaks().filter(|_| rows.count() > 1) {
+            if let Some(numbers) = probes.get_mut(probe.name()) {
+                numbers.peaks.insert(of, PeakNumbers { value: peak.value, time_s: peak.time_s });
+            }
         }
         Self {
             palpate_version: env!("CARGO_PKG_VERSION"),
@@ -155,12 +173,17 @@ impl Summary {
             println!("{}", serde_json::to_string_pretty(self).into_diagnostic()?);
             return Ok(());
         }
-        println!("{}: {} tets, {} nodes, ended by {}", self.scene, self.body.tets, self.body.nodes, self.ended_by);
+        let ended =
+            if self.ended_by == "equilibrium" { "in equilibrium" } else { &format!("ended by {}", self.ended_by) };
+        println!("{}: {} tets, {} nodes, {ended}", self.scene, self.body.tets, self.body.nodes);
         if let Some(time) = &self.time {
             let us = time.tick_wall_us;
             println!(
-                "  {:.3} s simulated in {:.3} s, {} ticks of {} substeps",
-                self.simulated_s, self.wall_s, time.ticks, time.substeps_per_tick
+                "  {:.3} s simulated in {:.3} s, {} of {}",
+                self.simulated_s,
+                self.wall_s,
+                counted(time.ticks as usize, "tick"),
+                counted(time.substeps_per_tick as usize, "substep")
             );
             println!(
                 "  tick: p50 {:.1} us, p99 {:.1} us, max {:.1} us; {:.1} times real time",
@@ -168,28 +191,56 @@ impl Summary {
             );
         }
         if let Some(solve) = &self.solve {
-            println!(
-                "  {} Newton iterations, residual {:.2e} N ({:.2e} of the forces), {}, in {:.3} s",
-                solve.iterations,
-                solve.residual_n,
-                solve.relative_residual,
-                if solve.stable { "stable" } else { "NOT stable" },
-                self.wall_s
-            );
+            println!("  {}, in {:.3} s", solve.line(), self.wall_s);
         }
         for (name, probe) in &self.probes {
-            let values: Vec<String> =
-                probe.values.iter().map(|(column, value)| format!("{column} {value:.6e}")).collect();
-            println!("  {name} ({}): {}", probe.unit, values.join(", "));
+            print_probe(name, probe);
         }
         println!("  smallest volume ratio {:.4}, state {}", self.min_volume_ratio, self.state_hash);
         if let Some(balance) = self.energies_j.balance {
             println!("  energy balance {balance:.2e} J");
         }
         match out {
-            Some(out) => println!("  written to {}: {} rows, {} frames", out.display(), self.samples, self.frames),
+            Some(out) => println!(
+                "  written to {}: {}, {}",
+                out.display(),
+                counted(self.samples as usize, "row"),
+                counted(self.frames, "frame")
+            ),
             None => println!("  nothing was saved; add --out DIR for probes.csv, frames and summary.json"),
         }
         Ok(())
+    }
+}
+
+impl SolveNumbers {
+    fn line(&self) -> String {
+        let stable = if self.stable { "stable" } else { "NOT stable" };
+        let iterations = counted(self.iterations as usize, "Newton iteration");
+        match self.relative_residual {
+            Some(relative) => {
+                format!("{iterations}, residual {:.2e} N ({relative:.2e} of the forces), {stable}", self.residual_n)
+            }
+            None => format!(
+                "no load: nothing presses, pulls or moves the body; residual {:.2e} N, rounding {:.2e} N, {stable}",
+                self.residual_n, self.rounding_n
+            ),
+        }
+    }
+}
+
+fn print_probe(name: &str, probe: &ProbeNumbers) {
+    let unit = if probe.unit == "1" { String::new() } else { format!(" ({})", probe.unit) };
+    let told = |column: &str, value: f64| {
+        // The sign of zero says nothing.
+        let value = if value == 0.0 { "0".to_owned() } else { format!("{value:.6e}") };
+        if column == "value" { value } else { format!("{column} {value}") }
+    };
+    let values: Vec<String> = probe.values.iter().map(|(column, value)| told(column, *value)).collect();
+    println!("  {name}{unit}: {}", values.join(", "));
+    let peak = |(of, peak): (&&str, &PeakNumbers)| format!("{} at {} s", told(of, peak.value), peak.time_s);
+    let peaks: Vec<String> = probe.peaks.iter().map(peak).collect();
+    if !peaks.is_empty() {
+        println!("    peak: {}", peaks.join(", "));
     }
 }

@@ -2,6 +2,7 @@
 use super::{Running, ServeConfig, Summary};
 use crate::sim::timing::STAGES;
 use palpate_realtime::Histogram;
+use palpate_scene::wording::counted;
 use std::fmt::Write as _;
 
 /// Lines for the start.
@@ -9,7 +10,8 @@ pub fn startup(running: &Running, config: &ServeConfig, description: &str) -> St
     let session = running.daemon.session();
     let info = session.info();
     let mut text = String::new();
-    let _ = writeln!(text, "scene      {} — {description}", info.scene_name);
+    let dash = if description.is_empty() { "" } else { " — " };
+    let _ = writeln!(text, "scene      {}{dash}{description}", info.scene_name);
     let _ = writeln!(
         text,
         "body       {} nodes, {} tets, {} surface triangles, {:.1} g; highest natural frequency {:.0} Hz",
@@ -21,9 +23,9 @@ pub fn startup(running: &Running, config: &ServeConfig, description: &str) -> St
     );
     let _ = writeln!(
         text,
-        "loop       {:.2} ms per tick, {} substeps; tools: {}",
+        "loop       {:.2} ms per tick, {}; tools: {}",
         info.tick_period_s * 1e3,
-        info.substeps_per_tick,
+        counted(info.substeps_per_tick as usize, "substep"),
         if info.tool_names.is_empty() { "none".to_owned() } else { info.tool_names.join(", ") },
     );
     for note in &running.notes {

@@ -86,22 +86,19 @@ fn implausible_size(table: &BodyTable, kind: &str, body: &Body) -> Option<String
     }
     let size = if size_m > 1.0 { format!("{size_m:.4} m") } else { format!("{:.3e} mm", size_m * 1e3) };
     let unit = table.mesh.as_ref().map(|mesh| mesh.unit).or(table.surfaces.as_ref().map(|surfaces| surfaces.unit));
-    let change = match unit {
-        Some(unit) => {
-            let fits = |other: &LengthUnit| PLAUSIBLE_SIZE_M.contains(&(size_m / unit.in_m() * other.in_m()));
-            let other = LengthUnit::BY_USE.into_iter().find(fits);
-            let wanted = other.map_or(String::new(), |other| format!("; should it be unit = \"{}\"?", other.word()));
-            format!("[body.{kind}] says unit = \"{}\"{wanted}", unit.word())
-        }
-        None => {
-            let key = match kind {
-                "box" => "size",
-                "sphere_shell" => "outer_radius",
-                _ => "outer_semi_axes",
-            };
-            let (suffix, name) = if size_m > 1.0 { ("mm", "millimetres") } else { ("m", "metres") };
-            format!("if {name} were meant in [body.{kind}], write `{key}_{suffix}`")
-        }
+    let change = if let Some(unit) = unit {
+        let fits = |other: &LengthUnit| PLAUSIBLE_SIZE_M.contains(&(size_m / unit.in_m() * other.in_m()));
+        let other = LengthUnit::BY_USE.into_iter().find(fits);
+        let wanted = other.map_or(String::new(), |other| format!("; should it be unit = \"{}\"?", other.word()));
+        format!("[body.{kind}] says unit = \"{}\"{wanted}", unit.word())
+    } else {
+        let key = match kind {
+            "box" => "size",
+            "sphere_shell" => "outer_radius",
+            _ => "outer_semi_axes",
+        };
+        let (suffix, name) = if size_m > 1.0 { ("mm", "millimetres") } else { ("m", "metres") };
+        format!("if {name} were meant in [body.{kind}], write `{key}_{suffix}`")
     };
     Some(format!("the body is {size} long: {change}"))
 }

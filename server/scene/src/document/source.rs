@@ -322,7 +322,7 @@ fn did_you_mean_key(word: &str, near: &str) -> String {
     let per = |unit: &str| unit.replace("per_", "");
     match (unit, wanted) {
         ("", "m") => format!("did you mean `{near}` or `{near}m`?"),
-        ("m", _) | (_, "") | ("", _) => format!("did you mean `{near}`?"),
+        ("m" | "", _) | (_, "") => format!("did you mean `{near}`?"),
         (_, "m") => format!("did you mean `{near}m`? Convert the number"),
         _ if per(unit) == per(wanted) => format!("did you mean `{near}`?"),
         _ => format!("did you mean `{near}`? Convert the number"),
