@@ -285,7 +285,7 @@ fn every_example_passes_check_and_runs() {
         }
         let path = path.to_str().unwrap();
         let text = succeeds(&["check", path, "--strict"]);
-        assert!(text.contains("substeps") && text.contains("% of the tick"), "{text}");
+        assert!(text.contains("substep") && text.contains("% of the tick"), "{text}");
         let run: Value =
             serde_json::from_str(&succeeds(&["simulate", path, "--duration-s", "0.02", "--json"])).unwrap();
         assert_eq!(run["ended_by"], Value::from("duration"), "{path}");

@@ -264,7 +264,8 @@ mod tests {
         let mut places: Vec<Place> = (0..CAPACITY).map(|_| orders.place().unwrap()).collect();
         assert_eq!(orders.place().unwrap_err(), Refusal::Busy);
         assert_eq!(orders.give(1, Request::Reset, true).await.unwrap_err(), Refusal::Busy);
-        let held = places.pop().map(|place| place.clone());
+        let held = places[0].clone();
+        drop(places.swap_remove(0));
         assert_eq!(orders.place().unwrap_err(), Refusal::Busy, "as long as anybody holds it");
         drop(held);
         assert!(orders.place().is_ok());

@@ -57,9 +57,9 @@ pub struct FillReport {
 /// What is not said of every body: layers, how much of the volume is met, and how well either surface.
 impl fmt::Display for FillReport {
     fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let percent = 100.0 * (self.volume_m3 / self.input_volume_m3 - 1.0);
+        let percent = 100.0 * (self.volume_m3 / self.input_volume_m3 - 1.0).abs();
         let layers = counted(self.layers as usize, "layer");
-        writeln!(out, "{layers} through the wall; volume {percent:+.2} % of the surfaces'")?;
+        writeln!(out, "{layers} through the wall; volume {percent:.2} % off that between the surfaces")?;
         for (name, surface) in [("inner", &self.inner), ("outer", &self.outer)] {
             let distance = surface.hausdorff_m();
             let part = 100.0 * distance / self.outer_edge_m;
