@@ -2,5 +2,6 @@
 pub mod bodies;
 pub mod jitter;
 pub mod press;
+pub mod reference;
 pub mod table;
 pub mod timing;

@@ -1,0 +1,130 @@
+//! The bodies of the contact problems as graded grids, cut at their planes of symmetry.
+use super::grid::{HexGrid, Side, graded};
+use glam::DVec3;
+use std::f64::consts::{FRAC_PI_2, PI};
+
+/// How much of a body a grid holds, and which of its sides is what.
+#[derive(Debug, Clone)]
+pub struct Body {
+    /// The grid.
+    pub grid: HexGrid,
+    /// Planes of symmetry and holders: sides whose nodes cannot move along some axes.
+    pub held: Vec<(Side, [bool; 3])>,
+    /// The side that is touched.
+    pub touched: Side,
+    /// The whole body over what is modelled: 2 per plane of symmetry.
+    pub multiplicity: f64,
+    /// Where it is touched (m), and the unit normal there, outwards.
+    pub touch_m: DVec3,
+    /// Outward unit normal there.
+    pub normal: DVec3,
+}
+
+/// A block `width × width × height` (m) held at its lower face, touched in the middle of the upper one: a quarter of it, in `n`
+/// elements each way, half of them within one and a half times `contact_m`, the radius of the contact.
+pub fn block(width_m: f64, height_m: f64, contact_m: f64, n: usize) -> Body {
+    let across = from_contact(contact_m, 0.5 * width_m, n);
+    let down = from_contact(contact_m, height_m, n).iter().rev().map(|depth| height_m - depth).collect();
+    let grid = HexGrid::new([across.clone(), across, down], |p| p);
+    let side = |parameter, upper| Side { parameter, upper };
+    Body {
+        grid,
+        held: vec![
+            (side(0, false), [true, false, false]),
+            (side(1, false), [false, true, false]),
+            (side(2, false), [true; 3]),
+        ],
+        touched: side(2, true),
+        multiplicity: 4.0,
+        touch_m: DVec3::Z * height_m,
+        normal: DVec3::Z,
+    }
+}
+
+/// `n` intervals from 0 to `length`: half of them equal, over one and a half radii of the contact, and beyond each longer than the
+/// last by one factor.
+fn from_contact(contact: f64, length: f64, n: usize) -> Vec<f64> {
+    let near = 1.5 * contact;
+    let equal = n.div_ceil(2);
+    let (first, beyond) = (near / equal as f64, (n - equal) as i32);
+    if first * n as f64 >= length || beyond == 0 {
+        return graded(0.0, length, n, 1.0);
+    }
+    // first · (q + q² + … + q^beyond) = length − near
+    let reach = |q: f64| (1..=beyond).map(|i| first * q.powi(i)).sum::<f64>();
+    let (mut low, mut high) = (1.0, 100.0);
+    for _ in 0..80 {
+        let middle = f64::midpoint(low, high);
+        if reach(middle) < length - near { low = middle } else { high = middle }
+    }
+    let mut breaks = graded(0.0, near, equal, 1.0);
+    breaks.pop();
+    breaks.extend(graded(near, length, n - equal, low.powi(beyond - 1)));
+    breaks
+}
+
+/// The truncated-ellipsoid ventricle of `shapes::ventricle` with semi-axes (short, long) in metres, held at its base and
+/// touched from +x at z = 0 by a contact of radius `contact_m`: the half with y ≥ 0. `n` elements from the touched meridian to the
+/// opposite one, about `n` from the touch to the apex and half as many to the base, and `layers` through the wall.
+pub fn ventricle(
+    outer_m: (f64, f64),
+    inner_m: (f64, f64),
+    cut_z_m: f64,
+    contact_m: f64,
+    (n, layers): (usize, usize),
+) -> Body {
+    let place = |p: DVec3| {
+        let (azimuth, t, s) = (p.x, p.y, p.z);
+        let on = |(short, long): (f64, f64)| {
+            let top = (cut_z_m / long).asin();
+            let (sin, cos) = (t * (top + FRAC_PI_2) - FRAC_PI_2).sin_cos();
+            DVec3::new(short * cos * azimuth.cos(), short * cos * azimuth.sin(), long * sin)
+        };
+        on(inner_m).lerp(on(outer_m), s)
+    };
+    let span = (cut_z_m / outer_m.1).asin() + FRAC_PI_2;
+    let at_touch = FRAC_PI_2 / span;
+    // On the equator a metre along the meridian is 1/(c span) of the parameter.
+    let contact_t = contact_m / (outer_m.1 * span);
+    let down = from_contact(contact_t, at_touch, n);
+    let up = from_contact(contact_t, 1.0 - at_touch, n.div_ceil(2));
+    let mut along: Vec<f64> = down.iter().skip(1).rev().map(|t| at_touch - t).collect();
+    along.extend(up.iter().map(|t| at_touch + t));
+    let around = from_contact(contact_m / outer_m.0, PI, n);
+    let through = graded(0.0, 1.0, layers, 1.0);
+    let side = |parameter, upper| Side { parameter, upper };
+    Body {
+        grid: HexGrid::new([around, along, through], place),
+        held: vec![
+            (side(0, false), [false, true, false]),
+            (side(0, true), [false, true, false]),
+            (side(1, true), [true; 3]),
+        ],
+        touched: side(2, true),
+        multiplicity: 2.0,
+        touch_m: DVec3::X * outer_m.0,
+        normal: DVec3::X,
+    }
+}
+
+/// An octant of a sphere shell between two radii (m), `n` elements each way: the reference's own test against Lamé.
+pub fn sphere_octant(inner_m: f64, outer_m: f64, n: usize) -> Body {
+    let place = |p: DVec3| {
+        let (azimuth, latitude) = (p.x, p.y);
+        DVec3::new(latitude.cos() * azimuth.cos(), latitude.cos() * azimuth.sin(), latitude.sin()) * p.z
+    };
+    let quarter = graded(0.0, FRAC_PI_2, n, 1.0);
+    let side = |parameter, upper| Side { parameter, upper };
+    Body {
+        grid: HexGrid::new([quarter.clone(), quarter, graded(inner_m, outer_m, n, 1.5)], place),
+        held: vec![
+            (side(0, false), [false, true, false]),
+            (side(0, true), [true, false, false]),
+            (side(1, false), [false, false, true]),
+        ],
+        touched: side(2, false),
+        multiplicity: 8.0,
+        touch_m: DVec3::X * inner_m,
+        normal: DVec3::NEG_X,
+    }
+}

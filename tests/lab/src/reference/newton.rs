@@ -1,0 +1,234 @@
+//! Newton's method on a reference grid, with load stepping and a line search on the potential.
+use super::{bodies::Body, matrix::System, solid::Solid, sphere::Sphere};
+use glam::{BVec3, DVec3};
+use miette::{Result, bail};
+
+/// Converged when `‖f_free‖ ≤ TOLERANCE · ‖f_elastic‖`.
+const TOLERANCE: f64 = 1e-9;
+/// Or when it is below this fraction and an iteration no longer halves it: rounding of the stress in large elements far from a
+/// small load allows no better.
+const ROUNDED_OFF: f64 = 1e-6;
+const MAX_ITERATIONS: usize = 40;
+const MAX_BACKTRACKS: usize = 20;
+/// The first load step over the smallest.
+const MAX_HALVINGS: u32 = 8;
+/// At each load a sphere's penalty is raised in these shares of it: Newton finds the contact's rim from a soft one.
+const PENALTIES: [f64; 3] = [0.01, 0.1, 1.0];
+/// Sufficient decrease of the potential (Armijo).
+const DECREASE: f64 = 1e-4;
+/// Rounding of the potential over the body's largest energy scale, `(λ + 2µ) V`: a sum over points of differences of such numbers.
+const ROUNDING: f64 = 16.0 * f64::EPSILON;
+/// Largest motion of a node in one iteration, over the body's size.
+const LARGEST_STEP: f64 = 0.1;
+
+/// What acts on a reference body.
+#[derive(Debug, Clone)]
+pub enum Action {
+    /// Dead forces on nodes (N).
+    Forces(Vec<DVec3>),
+    /// A sphere pressed in along the line of its touch, by a depth (m).
+    Sphere {
+        /// The sphere.
+        sphere: Sphere,
+        /// Its way (m) past first touch.
+        depth_m: f64,
+    },
+}
+
+/// An equilibrium of a reference body.
+#[derive(Debug, Clone)]
+pub struct Equilibrium {
+    /// Positions (m).
+    pub x: Vec<DVec3>,
+    /// Force of the whole body on the sphere along the outward normal (N); 0 without a sphere.
+    pub sphere_n: f64,
+    /// Newton iterations in all.
+    pub iterations: usize,
+}
+
+struct Problem<'a> {
+    solid: &'a Solid,
+    body: &'a Body,
+    action: Action,
+    free: Vec<BVec3>,
+    system: System,
+    size_m: f64,
+    /// What rounding alone may do to the potential (J).
+    rounding_j: f64,
+}
+
+/// Finds the equilibrium, from rest. `tell` hears of every iteration.
+///
+/// # Errors
+/// No convergence at the smallest load step.
+pub fn solve(solid: &Solid, body: &Body, action: &Action, tell: &mut dyn FnMut(&str)) -> Result<Equilibrium> {
+    let mut problem = Problem::new(solid, body, action)?;
+    let mut x = solid.grid.positions_m.clone();
+    let (mut reached, mut step, mut iterations) = (0.0_f64, 1.0_f64, 0);
+    while reached < 1.0 {
+        let fraction = (reached + step).min(1.0);
+        match problem.through_penalties(fraction, &x, &mut iterations, tell) {
+            Some(found) => {
+                (x, reached) = (found, fraction);
+                step *= 2.0;
+            }
+            None => {
+                step *= 0.5;
+                if step < 0.5_f64.powi(MAX_HALVINGS as i32) {
+                    bail!("the reference does not converge past {:.1} % of the load", 100.0 * reached);
+                }
+            }
+        }
+    }
+    let mut forces = vec![DVec3::ZERO; x.len()];
+    let sphere_n = match action {
+        Action::Forces(_) => 0.0,
+        Action::Sphere { sphere, .. } => {
+            let on_sphere = sphere.add_forces_n(&x, problem.centre_m(1.0), &mut forces);
+            on_sphere.dot(body.normal) * body.multiplicity
+        }
+    };
+    Ok(Equilibrium { x, sphere_n, iterations })
+}
+
+impl<'a> Problem<'a> {
+    fn new(solid: &'a Solid, body: &'a Body, action: &'a Action) -> Result<Self> {
+        let mut free = vec![BVec3::TRUE; solid.grid.positions_m.len()];
+        for (side, axes) in &body.held {
+            for node in solid.grid.faces(*side).into_iter().flatten() {
+                free[node as usize] &= !BVec3::from_array(*axes);
+            }
+        }
+        let elements = solid.grid.elements.iter().map(|nodes| nodes.to_vec());
+        let groups = match action {
+            Action::Forces(_) => elements.collect(),
+            Action::Sphere { sphere, .. } => elements.chain(sphere.groups()).collect(),
+        };
+        let system = System::new(&free, groups)?;
+        let low = solid.grid.positions_m.iter().copied().fold(DVec3::INFINITY, DVec3::min);
+        let high = solid.grid.positions_m.iter().copied().fold(DVec3::NEG_INFINITY, DVec3::max);
+        Ok(Self {
+            solid,
+            body,
+            action: action.clone(),
+            free,
+            system,
+            size_m: (high - low).max_element(),
+            rounding_j: ROUNDING * solid.stiffest_j(),
+        })
+    }
+
+    fn centre_m(&self, fraction: f64) -> DVec3 {
+        match &self.action {
+            Action::Forces(_) => DVec3::ZERO,
+            Action::Sphere { sphere, depth_m } => {
+                self.body.touch_m + self.body.normal * (sphere.radius_m - depth_m * fraction)
+            }
+        }
+    }
+
+    fn potential_j(&self, fraction: f64, x: &[DVec3]) -> f64 {
+        let load = match &self.action {
+            Action::Forces(forces) => {
+                let moved = x.iter().zip(&self.solid.grid.positions_m).map(|(x, rest)| *x - *rest);
+                -fraction * forces.iter().zip(moved).map(|(f, u)| f.dot(u)).sum::<f64>()
+            }
+            Action::Sphere { sphere, .. } => sphere.energy_j(x, self.centre_m(fraction)),
+        };
+        self.solid.energy_j(x) + load
+    }
+
+    /// Total force on free axes (N), and the norm (N) it is measured by.
+    fn residual_n(&self, fraction: f64, x: &[DVec3]) -> (Vec<DVec3>, f64) {
+        let mut forces = self.solid.forces_n(x);
+        let scale = forces.iter().map(|f| f.length_squared()).sum::<f64>().sqrt();
+        let mut applied = 0.0;
+        match &self.action {
+            Action::Forces(loads) => {
+                for (force, load) in forces.iter_mut().zip(loads) {
+                    *force += *load * fraction;
+                    applied += (*load * fraction).length_squared();
+                }
+            }
+            Action::Sphere { sphere, .. } => {
+                sphere.add_forces_n(x, self.centre_m(fraction), &mut forces);
+            }
+        }
+        for (force, free) in forces.iter_mut().zip(&self.free) {
+            *force = DVec3::select(*free, *force, DVec3::ZERO);
+        }
+        (forces, scale.max(applied.sqrt()))
+    }
+
+    fn through_penalties(
+        &mut self,
+        fraction: f64,
+        x: &[DVec3],
+        iterations: &mut usize,
+        tell: &mut dyn FnMut(&str),
+    ) -> Option<Vec<DVec3>> {
+        let Action::Sphere { sphere, .. } = &self.action else {
+            return self.equilibrate(fraction, x.to_vec(), iterations, tell);
+        };
+        let wanted = sphere.penalty_pa_per_m;
+        let mut found = Some(x.to_vec());
+        for share in PENALTIES {
+            if let Action::Sphere { sphere, .. } = &mut self.action {
+                sphere.penalty_pa_per_m = share * wanted;
+            }
+            found = found.and_then(|x| self.equilibrate(fraction, x, iterations, tell));
+        }
+        found
+    }
+
+    fn equilibrate(
+        &self,
+        fraction: f64,
+        mut x: Vec<DVec3>,
+        iterations: &mut usize,
+        tell: &mut dyn FnMut(&str),
+    ) -> Option<Vec<DVec3>> {
+        let mut before = f64::INFINITY;
+        for _ in 0..MAX_ITERATIONS {
+            let (force, scale) = self.residual_n(fraction, &x);
+            let norm = force.iter().map(|f| f.length_squared()).sum::<f64>().sqrt();
+            tell(&format!(
+                "load {fraction:.3}, iteration {iterations}: residual {:.1e}",
+                norm / scale.max(f64::MIN_POSITIVE)
+            ));
+            if norm <= TOLERANCE * scale || (norm <= ROUNDED_OFF * scale && norm > 0.5 * before) {
+                return Some(x);
+            }
+            before = norm;
+            *iterations += 1;
+            let mut blocks = self.solid.stiffness(&x);
+            if let Action::Sphere { sphere, .. } = &self.action {
+                blocks.extend(sphere.stiffness(&x, self.centre_m(fraction)));
+            }
+            let direction = self.system.solve(&blocks, &force)?;
+            x = self.search(fraction, &x, &force, &direction)?;
+        }
+        None
+    }
+
+    /// Backtracks until the potential falls enough, or, where rounding hides that, the residual does.
+    fn search(&self, fraction: f64, x: &[DVec3], force: &[DVec3], direction: &[DVec3]) -> Option<Vec<DVec3>> {
+        let slope: f64 = force.iter().zip(direction).map(|(f, d)| f.dot(*d)).sum();
+        let longest = direction.iter().map(|d| d.length()).fold(0.0, f64::max);
+        let norm = |f: &[DVec3]| f.iter().map(|f| f.length_squared()).sum::<f64>();
+        let before_j = self.potential_j(fraction, x);
+        let mut alpha = (LARGEST_STEP * self.size_m / longest).min(1.0);
+        for _ in 0..MAX_BACKTRACKS {
+            let next: Vec<DVec3> = x.iter().zip(direction).map(|(x, d)| *x + *d * alpha).collect();
+            let change_j = self.potential_j(fraction, &next) - before_j;
+            let hidden = change_j.abs() <= self.rounding_j;
+            if change_j <= -DECREASE * alpha * slope
+                || (hidden && norm(&self.residual_n(fraction, &next).0) < norm(force))
+            {
+                return Some(next);
+            }
+            alpha *= 0.5;
+        }
+        None
+    }
+}

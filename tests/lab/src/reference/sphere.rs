@@ -1,0 +1,111 @@
+//! A rigid sphere without friction on a side of a grid.
+//!
+//! Every surface point inside the sphere (depth `g = R − |y − c| > 0`) is pushed out with the pressure `κ g` on its rest area,
+//! `Φ = ½ Σ κ a g²`. κ is so large that what it lets in is some 1e-4 of the depth: contact is as good as a constraint, and its
+//! error is far below that of the grid.
+use super::{
+    grid::{Face, HexGrid},
+    solid::{SurfacePoint, surface_points},
+};
+use glam::{DMat3, DVec3};
+use palpate_physics::fem::element::outer;
+
+/// Parts of a face each way on which contact is integrated: the rim of the contact runs through faces.
+const PARTS: usize = 3;
+
+/// The sphere and the faces it may touch.
+#[derive(Debug, Clone)]
+pub struct Sphere {
+    /// Radius (m).
+    pub radius_m: f64,
+    /// κ (Pa/m).
+    pub penalty_pa_per_m: f64,
+    faces: Vec<(Face, Vec<SurfacePoint>)>,
+}
+
+/// One surface point inside the sphere.
+struct Pressed<'a> {
+    face: &'a Face,
+    weights: &'a [f64; 9],
+    /// `κ a` (N/m).
+    stiffness_n_per_m: f64,
+    depth_m: f64,
+    distance_m: f64,
+    /// From the centre to the point.
+    outwards: DVec3,
+}
+
+impl Sphere {
+    /// A sphere that may touch these faces.
+    pub fn new(grid: &HexGrid, faces: Vec<Face>, radius_m: f64, penalty_pa_per_m: f64) -> Self {
+        let faces = faces.into_iter().map(|face| (face, surface_points(grid, &face, PARTS))).collect();
+        Self { radius_m, penalty_pa_per_m, faces }
+    }
+
+    /// Nodes of every face, in the order of [`Self::stiffness`].
+    pub fn groups(&self) -> impl Iterator<Item = Vec<u32>> {
+        self.faces.iter().map(|(face, _)| face.to_vec())
+    }
+
+    /// `Φ` (J).
+    pub fn energy_j(&self, x: &[DVec3], centre_m: DVec3) -> f64 {
+        let mut energy = 0.0;
+        self.for_pressed(x, centre_m, |_, p| energy += 0.5 * p.stiffness_n_per_m * p.depth_m * p.depth_m);
+        energy
+    }
+
+    /// Adds the forces on nodes (N) and returns the force on the sphere (N).
+    pub fn add_forces_n(&self, x: &[DVec3], centre_m: DVec3, forces_n: &mut [DVec3]) -> DVec3 {
+        let mut on_sphere = DVec3::ZERO;
+        self.for_pressed(x, centre_m, |_, p| {
+            let force = p.outwards * (p.stiffness_n_per_m * p.depth_m);
+            for (&node, weight) in p.face.iter().zip(p.weights) {
+                forces_n[node as usize] += force * *weight;
+            }
+            on_sphere -= force;
+        });
+        on_sphere
+    }
+
+    /// Stiffness (N/m) of every face, row-major 27 × 27: `κ a (n nᵀ − (g/|r|)(I − n nᵀ))`.
+    pub fn stiffness(&self, x: &[DVec3], centre_m: DVec3) -> Vec<Vec<f64>> {
+        let mut blocks = vec![vec![0.0; 27 * 27]; self.faces.len()];
+        self.for_pressed(x, centre_m, |face, p| {
+            let along = outer(p.outwards, p.outwards);
+            let hessian = (along - (DMat3::IDENTITY - along) * (p.depth_m / p.distance_m)) * p.stiffness_n_per_m;
+            for (a, wa) in p.weights.iter().enumerate() {
+                for (b, wb) in p.weights.iter().enumerate() {
+                    for r in 0..3 {
+                        for c in 0..3 {
+                            blocks[face][(3 * a + r) * 27 + 3 * b + c] += hessian.col(c)[r] * wa * wb;
+                        }
+                    }
+                }
+            }
+        });
+        blocks
+    }
+
+    fn for_pressed(&self, x: &[DVec3], centre_m: DVec3, mut visit: impl FnMut(usize, &Pressed<'_>)) {
+        for (index, (face, points)) in self.faces.iter().enumerate() {
+            let corners = face.map(|node| x[node as usize]);
+            for point in points {
+                let y: DVec3 = corners.iter().zip(&point.weights).map(|(x, weight)| *x * *weight).sum();
+                let distance_m = y.distance(centre_m);
+                if distance_m < self.radius_m {
+                    visit(
+                        index,
+                        &Pressed {
+                            face,
+                            weights: &point.weights,
+                            stiffness_n_per_m: self.penalty_pa_per_m * point.area_m2,
+                            depth_m: self.radius_m - distance_m,
+                            distance_m,
+                            outwards: (y - centre_m) / distance_m,
+                        },
+                    );
+                }
+            }
+        }
+    }
+}

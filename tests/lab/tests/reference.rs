@@ -1,0 +1,141 @@
+//! The reference against answers that are known without it.
+use glam::DVec3;
+use palpate_lab::{
+    bodies::material,
+    reference::{
+        bodies::{Body, block, sphere_octant, ventricle},
+        grid::{HexGrid, graded},
+        newton::{Action, Equilibrium, solve},
+        solid::{Solid, surface_points},
+        sphere::Sphere,
+    },
+};
+use palpate_physics::material::Law;
+
+fn solve_quietly(solid: &Solid, body: &Body, action: &Action) -> Equilibrium {
+    solve(solid, body, action, &mut |_| {}).unwrap()
+}
+
+/// Dead pressure (Pa) on the touched side.
+fn pressure(solid: &Solid, body: &Body, pressure_pa: f64) -> Action {
+    let mut forces = vec![DVec3::ZERO; solid.grid.positions_m.len()];
+    for face in solid.grid.faces(body.touched) {
+        for point in surface_points(&solid.grid, &face, 1) {
+            for (&node, weight) in face.iter().zip(point.weights) {
+                forces[node as usize] -= point.normal * (pressure_pa * point.area_m2 * weight);
+            }
+        }
+    }
+    Action::Forces(forces)
+}
+
+#[test]
+fn forces_are_the_energys_slope_and_stiffness_the_forces() {
+    let skew = |p: DVec3| p + DVec3::new(0.1 * p.y * p.z, 0.2 * p.x, 0.1 * p.x * p.x);
+    let grid = HexGrid::new([graded(0.0, 1.0, 1, 1.0), graded(0.0, 0.8, 1, 1.0), graded(0.0, 1.1, 1, 1.0)], skew);
+    let solid = Solid::new(grid, material(Law::StableNeoHookean, 1.0, 0.4).unwrap()).unwrap();
+    let wavy = |p: &DVec3| *p + DVec3::new((3.0 * p.y).sin(), (2.0 * p.x * p.z).cos(), p.y * p.x) * 0.1;
+    let x: Vec<DVec3> = solid.grid.positions_m.iter().map(wavy).collect();
+    let (forces, stiffness) = (solid.forces_n(&x), solid.stiffness(&x));
+    let scale = forces.iter().map(|f| f.length()).fold(0.0, f64::max);
+    let step = 1e-6;
+    for (local, axis) in [(0, 0), (13, 1), (26, 2), (5, 0)] {
+        let node = solid.grid.elements[0][local] as usize;
+        let moved = |sign: f64| {
+            let mut x = x.clone();
+            x[node][axis] += sign * step;
+            x
+        };
+        let slope = (solid.energy_j(&moved(1.0)) - solid.energy_j(&moved(-1.0))) / (2.0 * step);
+        assert!((slope + forces[node][axis]).abs() < 1e-8 * scale, "{slope} {}", forces[node]);
+        let (up, down) = (solid.forces_n(&moved(1.0)), solid.forces_n(&moved(-1.0)));
+        for other in 0..27 {
+            let n = solid.grid.elements[0][other] as usize;
+            for r in 0..3 {
+                let difference = (down[n][r] - up[n][r]) / (2.0 * step);
+                let entry = stiffness[0][(3 * other + r) * 81 + 3 * local + axis];
+                assert!((difference - entry).abs() < 1e-7 * scale, "{difference} {entry}");
+            }
+        }
+    }
+}
+
+#[test]
+fn homogeneous_strain_is_in_equilibrium_on_curved_and_collapsed_grids() {
+    let body = ventricle((0.01, 0.02), (0.007, 0.017), 0.005, 0.001, (6, 2));
+    let solid = Solid::new(body.grid.clone(), material(Law::StVenantKirchhoff, 1e4, 0.45).unwrap()).unwrap();
+    let strain = |p: &DVec3| *p + DVec3::new(0.1 * p.x + 0.05 * p.z, -0.08 * p.y, 0.1 * p.y + 0.02 * p.z);
+    let x: Vec<DVec3> = solid.grid.positions_m.iter().map(strain).collect();
+    let forces = solid.forces_n(&x);
+    let largest = forces.iter().map(|f| f.length()).fold(0.0, f64::max);
+    let mut on_side = vec![false; x.len()];
+    for parameter in 0..3 {
+        for upper in [false, true] {
+            let side = palpate_lab::reference::grid::Side { parameter, upper };
+            // The pole, a side of the lattice, is inside the body.
+            if (parameter, upper) != (1, false) {
+                for node in solid.grid.faces(side).into_iter().flatten() {
+                    on_side[node as usize] = true;
+                }
+            }
+        }
+    }
+    assert!(on_side.iter().any(|on| !on));
+    for (force, _) in forces.iter().zip(&on_side).filter(|(_, on)| !**on) {
+        assert!(force.length() < 1e-12 * largest, "{force} of {largest}");
+    }
+}
+
+#[test]
+fn the_ventricles_volume_is_met() {
+    // ∫ π r² dz of an ellipsoid of revolution from the pole to the cut.
+    let below =
+        |(a, c): (f64, f64), z: f64| std::f64::consts::PI * a * a * (z + 2.0 * c / 3.0 - z.powi(3) / (3.0 * c * c));
+    let exact = 0.5 * (below((0.01, 0.02), 0.005) - below((0.007, 0.017), 0.005));
+    let error = |n| {
+        let body = ventricle((0.01, 0.02), (0.007, 0.017), 0.005, 0.002, (n, 2));
+        Solid::new(body.grid, material(Law::StableNeoHookean, 1e4, 0.3).unwrap()).unwrap().volume_m3() / exact - 1.0
+    };
+    // Of third order at least: curved sides are met by parabolas.
+    let (coarse, fine) = (error(8), error(16));
+    println!("{coarse:.1e} {fine:.1e}");
+    assert!(fine.abs() < 1e-3 && (coarse / fine).log2() > 3.0, "{coarse:e} {fine:e}");
+}
+
+/// Lamé's thick sphere, u(a) in µm for a pressure of 1 Pa at E = 10 kPa.
+#[test]
+fn lame_also_near_incompressibility() {
+    for (nu, exact) in [(0.3_f64, 4.0), (0.45, 4.214_285_714), (0.49, 4.271_428_571)] {
+        let error = |n| {
+            let body = sphere_octant(0.05, 0.1, n);
+            let solid = Solid::new(body.grid.clone(), material(Law::StableNeoHookean, 1e4, nu).unwrap()).unwrap();
+            let found = solve_quietly(&solid, &body, &pressure(&solid, &body, 1.0));
+            let [(node, _), ..] = solid.grid.on_side(body.touched, [0.0, 0.0]);
+            (found.x[node as usize].x - 0.05) * 1e6 / exact - 1.0
+        };
+        let (coarse, fine) = (error(3), error(6));
+        println!("nu {nu}: {:+.3} {:+.4} %, order {:.2}", 100.0 * coarse, 100.0 * fine, (coarse / fine).log2());
+        assert!(fine.abs() < 1e-3 && (coarse / fine).log2() > 3.0, "ν = {nu}: {coarse:e} {fine:e}");
+    }
+}
+
+/// Hertz at small depth on a block so large that it is a half space to 2 %, by Dimitriadis' series for a bonded layer.
+#[test]
+fn hertz_at_small_depth() {
+    let (young, nu, radius, depth, height) = (1e4, 0.45_f64, 40e-3_f64, 0.1e-3_f64, 40e-3_f64);
+    let body = block(160e-3, height, (radius * depth).sqrt(), 9);
+    let solid = Solid::new(body.grid.clone(), material(Law::StableNeoHookean, young, nu).unwrap()).unwrap();
+    let contact = (radius * depth).sqrt();
+    let modulus = young / (1.0 - nu * nu);
+    let sphere = Sphere::new(&solid.grid, solid.grid.faces(body.touched), radius, 4e3 * modulus / contact);
+    let found = solve_quietly(&solid, &body, &Action::Sphere { sphere, depth_m: depth });
+    let chi = contact / height;
+    let pi = std::f64::consts::PI;
+    let alpha = -(1.2876 - 1.4678 * nu + 1.3442 * nu * nu) / (1.0 - nu);
+    let beta = (0.6387 - 1.0277 * nu + 1.5164 * nu * nu) / (1.0 - nu);
+    let series = 1.0 - 2.0 * alpha / pi * chi + 4.0 * alpha * alpha / (pi * pi) * chi * chi
+        - 8.0 / pi.powi(3) * (alpha.powi(3) + 4.0 * pi * pi / 15.0 * beta) * chi.powi(3);
+    let exact = 4.0 / 3.0 * modulus * radius.sqrt() * depth.powf(1.5) * series;
+    println!("{:.5e} N against {exact:.5e}, {:+.2} %", found.sphere_n, 100.0 * (found.sphere_n / exact - 1.0));
+    assert!((found.sphere_n / exact - 1.0).abs() < 0.01, "{} {exact}", found.sphere_n);
+}
