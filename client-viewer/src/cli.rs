@@ -1,5 +1,5 @@
 //! Arguments, and which file does what.
-use crate::{ViewError, connect::Server, export, inject, picture, status, watch};
+use crate::{ViewError, connect::Server, control, export, inject, picture, status, watch};
 use clap::{Args, Parser, Subcommand};
 use std::{
     fs,
@@ -7,12 +7,12 @@ use std::{
     path::PathBuf,
 };
 
-/// Looks at a running palpated: status, live numbers, pictures, exports; injects scripted forces.
+/// Looks at a running palpated: status, live numbers, pictures, exports; pauses, resets and pushes what runs there.
 #[derive(Debug, Parser)]
 #[command(
     name = "palpate-view",
     version,
-    after_help = "Examples:\n  palpate-view status\n  palpate-view watch --seconds 10\n  palpate-view snapshot dent.png --size 1200x900\n  palpate-view export dent.vtu\n  palpate-view inject push.toml"
+    after_help = "Examples:\n  palpate-view status\n  palpate-view watch --seconds 10\n  palpate-view snapshot dent.png --size 1200x900\n  palpate-view export dent.vtu\n  palpate-view inject push.toml\n  palpate-view pause"
 )]
 pub struct Arguments {
     #[command(flatten)]
@@ -53,6 +53,8 @@ enum Command {
     Export(export::ExportArguments),
     /// Injects the forces of a script
     Inject(inject::InjectArguments),
+    #[command(flatten)]
+    Control(control::Control),
 }
 
 /// Runs the command.
@@ -71,6 +73,7 @@ pub fn run(arguments: &Arguments) -> Result<(), ViewError> {
             Command::Snapshot(arguments) => picture::run(&server, arguments).await,
             Command::Export(arguments) => export::run(&server, arguments).await,
             Command::Inject(arguments) => inject::run(&server, arguments).await,
+            Command::Control(control) => control::run(&server, control).await,
         }
     });
     match done {

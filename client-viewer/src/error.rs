@@ -87,6 +87,14 @@ pub enum ViewError {
         /// Endings that work.
         known: &'static str,
     },
+    /// No scene to load.
+    #[error("no scene \"{scene}\": {known}")]
+    NoScene {
+        /// As given.
+        scene: String,
+        /// What there is.
+        known: String,
+    },
     /// A force script is wrong.
     #[error("{path}: {reason}", path = path.display())]
     #[diagnostic(help(

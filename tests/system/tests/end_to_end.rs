@@ -185,6 +185,43 @@ fn injected_forces_arrive() {
 }
 
 #[test]
+fn a_session_is_paused_stepped_saved_restored_reset_and_loaded() {
+    let daemon = Daemon::start(&["--arm", "none"]);
+    let folder = tempfile::tempdir().unwrap();
+    let file = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
+    let said = |arguments: &[&str]| {
+        let output = daemon.view(arguments);
+        assert!(output.status.success(), "{arguments:?}: {}", text(&output.stderr));
+        text(&output.stdout)
+    };
+    let state = |said: &str| said.trim().rsplit(' ').next().unwrap().to_owned();
+    daemon.wait_until("time goes on", |s| s["tick"].as_u64() > Some(100));
+    said(&["pause"]);
+    let paused = daemon.status();
+    assert_eq!(paused["paused"], true);
+    fs::write(file("push.toml"), "[[force]]\nsurface_vertex = 3\nforce_n = [0.01, 0.0, 0.0]\ntick_count = 50\n")
+        .unwrap();
+    said(&["inject", &file("push.toml")]);
+    said(&["step", "40"]);
+    assert_eq!(daemon.status()["tick"].as_u64(), paused["tick"].as_u64().map(|tick| tick + 40));
+    let saved = state(&said(&["save", &file("moved.state")]));
+    assert!(!daemon.view(&["save", &file("moved.state")]).status.success(), "a saved state was overwritten");
+    said(&["step", "10"]);
+    assert_ne!(state(&said(&["save", "--force", &file("later.state")])), saved);
+    assert_eq!(state(&said(&["restore", &file("moved.state")])), saved, "the same bits");
+    assert!(said(&["reset"]).contains("tick 0"));
+    said(&["resume"]);
+    daemon.wait_until("time goes on from rest", |s| s["paused"] == false && s["tick"].as_u64() > Some(10));
+    assert!(said(&["load", "cantilever"]).starts_with("cantilever"));
+    assert_eq!(daemon.status()["scene_name"], "cantilever");
+    let refused = daemon.view(&["restore", &file("moved.state")]);
+    assert!(!refused.status.success(), "the state of another scene was taken");
+    let refused = daemon.view(&["load", "nothing"]);
+    let message = text(&refused.stderr);
+    assert!(!refused.status.success() && message.contains("built-in scenes are"), "{message}");
+}
+
+#[test]
 fn two_daemons_on_one_port_and_no_daemon_at_all_are_explained() {
     let daemon = Daemon::start(&[]);
     let address = daemon.url.trim_start_matches("http://").to_owned();

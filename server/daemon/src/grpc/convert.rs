@@ -229,7 +229,7 @@ pub fn tool_state(view: &ToolView) -> v1::ToolState {
 /// A quarantine for people; empty: none.
 pub fn quarantine(what: Option<Quarantine>) -> String {
     what.map_or_else(String::new, |what| {
-        format!("{what}; the last good state is held, forces are zero until Reset or Restore")
+        format!("{what}; the last good state is held, forces are zero until Reset or Restore (`palpate-view reset`)")
     })
 }
 

@@ -31,7 +31,7 @@ impl News {
             self.quarantined = output.quarantined;
             if let Some(tick) = output.quarantined {
                 let text = format!(
-                    "the body's state became non-finite in tick {tick}; the force is zero until Reset or Restore"
+                    "the body's state became non-finite in tick {tick}; the force is zero until Reset or Restore (`palpate-view reset`)"
                 );
                 return Some(self.count(0, DeviceFaultCode::Quarantined, text));
             }
