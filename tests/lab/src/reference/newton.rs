@@ -11,7 +11,7 @@ const ROUNDED_OFF: f64 = 1e-6;
 const MAX_ITERATIONS: usize = 40;
 const MAX_BACKTRACKS: usize = 20;
 /// The first load step over the smallest.
-const MAX_HALVINGS: u32 = 8;
+const MAX_HALVINGS: i32 = 8;
 /// At each load a sphere's penalty is raised in these shares of it: Newton finds the contact's rim from a soft one.
 const PENALTIES: [f64; 3] = [0.01, 0.1, 1.0];
 /// Sufficient decrease of the potential (Armijo).
@@ -67,17 +67,14 @@ pub fn solve(solid: &Solid, body: &Body, action: &Action, tell: &mut dyn FnMut(&
     let (mut reached, mut step, mut iterations) = (0.0_f64, 1.0_f64, 0);
     while reached < 1.0 {
         let fraction = (reached + step).min(1.0);
-        match problem.through_penalties(fraction, &x, &mut iterations, tell) {
-            Some(found) => {
-                (x, reached) = (found, fraction);
-                step *= 2.0;
-            }
-            None => {
-                step *= 0.5;
-                if step < 0.5_f64.powi(MAX_HALVINGS as i32) {
-                    bail!("the reference does not converge past {:.1} % of the load", 100.0 * reached);
-                }
-            }
+        if let Some(found) = problem.through_penalties(fraction, &x, &mut iterations, tell) {
+            (x, reached) = (found, fraction);
+            step *= 2.0;
+            continue;
+        }
+        step *= 0.5;
+        if step < 0.5_f64.powi(MAX_HALVINGS) {
+            bail!("the reference does not converge past {:.1} % of the load", 100.0 * reached);
         }
     }
     let mut forces = vec![DVec3::ZERO; x.len()];
