@@ -238,7 +238,7 @@ fn print_probe(name: &str, probe: &ProbeNumbers) {
     };
     let values: Vec<String> = probe.values.iter().map(|(column, value)| told(column, *value)).collect();
     println!("  {name}{unit}: {}", values.join(", "));
-    let peak = |(of, peak): (&&str, &PeakNumbers)| format!("{} at {} s", told(of, peak.value), peak.time_s);
+    let peak = |(of, peak): (&&str, &PeakNumbers)| format!("{} at {:.3} s", told(of, peak.value), peak.time_s);
     let peaks: Vec<String> = probe.peaks.iter().map(peak).collect();
     if !peaks.is_empty() {
         println!("    peak: {}", peaks.join(", "));
