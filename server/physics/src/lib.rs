@@ -19,9 +19,9 @@ pub mod solve;
 pub mod world;
 
 pub use health::{Energies, Ledger, Quarantine};
-pub use integrate::leapfrog::step;
+pub use integrate::step;
 pub use mesh::{MeshError, Surface, TetMesh};
 pub use world::{
-    LoadSpec, Model, ModelError, ModelSpec, PointForce, Precision, PrescribedSpec, Region, Scratch, Settings, State,
-    StepReport, Substeps, TickInput,
+    Integrator, LoadSpec, Model, ModelError, ModelSpec, PointForce, Precision, PrescribedSpec, Region, Scratch,
+    Settings, State, StepReport, Substeps, TickInput,
 };

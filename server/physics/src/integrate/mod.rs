@@ -1,3 +1,12 @@
-//! Time integrators, and the spectrum that bounds their step.
-pub mod leapfrog;
+//! Time integrators, one file each, and the spectrum that bounds the explicit ones' step.
+mod forces;
+mod leapfrog;
+mod motion;
+mod scheme;
+pub mod seed_semi_implicit;
+mod seed_verlet;
 pub mod spectrum;
+mod tick;
+
+pub(crate) use scheme::{Body, Scheme};
+pub use tick::step;

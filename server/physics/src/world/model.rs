@@ -3,7 +3,10 @@ use super::{ModelError, ModelSpec, PrescribedSpec, check, substeps};
 use crate::{
     contact::{ContactModel, SurfaceModuli, ToolState},
     fem::{element::RestTet, mass},
-    integrate::spectrum::{RestStiffness, max_natural_frequency_rad_per_s},
+    integrate::{
+        Body, Scheme,
+        spectrum::{RestStiffness, max_natural_frequency_rad_per_s},
+    },
     material::Material,
     mesh::{Surface, TetMesh},
     simd::ForceKernel,
@@ -23,6 +26,7 @@ pub struct Model {
     contact: ContactModel,
     max_natural_frequency_rad_per_s: f64,
     substeps: u32,
+    scheme: Scheme,
 }
 
 impl Model {
@@ -67,6 +71,9 @@ impl Model {
         };
         let omega_sq = stretch_sq * touched.max(omega).powi(2) + contact.tool_frequency_sq;
         let substeps = substeps::choose(&spec, &materials, omega_sq.sqrt())?;
+        let dt_s = spec.settings.tick_period_s / f64::from(substeps);
+        let body = Body { at_rest, mass_kg: &mass_kg, inverse_mass_per_kg: &inverse_mass_per_kg, dt_s };
+        let scheme = Scheme::build(spec.settings.integrator, &body);
         Ok(Self {
             surface,
             materials,
@@ -77,6 +84,7 @@ impl Model {
             contact,
             max_natural_frequency_rad_per_s: omega,
             substeps,
+            scheme,
             spec,
         })
     }
@@ -131,6 +139,9 @@ impl Model {
     }
     pub(super) fn tools_at_start(&self) -> Vec<ToolState> {
         self.spec.tools.iter().map(ToolState::at_start).collect()
+    }
+    pub(crate) fn scheme(&self) -> &Scheme {
+        &self.scheme
     }
     /// Substeps per tick.
     pub fn substeps(&self) -> u32 {

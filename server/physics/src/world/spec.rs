@@ -67,11 +67,26 @@ pub enum Substeps {
     Fixed(u32),
 }
 
+/// How time is integrated; `docs/adr/integrators.md` compares them.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Integrator {
+    /// Explicit leapfrog (velocity Verlet): second order, conserves momentum, energy bounded.
+    #[default]
+    Leapfrog,
+    /// The seeds' position Verlet (hybrid 2006, eq. 33): leapfrog's positions, velocities half a step ahead of them.
+    SeedVerlet,
+    /// The seeds' semi-implicit Euler with nodewise Jacobian (eq. 34): first order, drags the body's motion as a whole. Measured
+    /// substeps are leapfrog's, which always suffice; the paper takes one step, `Substeps::Fixed(1)`, stable or not.
+    SeedSemiImplicit,
+}
+
 /// Numerical settings.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Settings {
     /// Tick period T (s).
     pub tick_period_s: f64,
+    /// How time is integrated.
+    pub integrator: Integrator,
     /// Substeps per tick.
     pub substeps: Substeps,
     /// Fraction of the stable step used, in (0, 1].
@@ -88,6 +103,7 @@ impl Default for Settings {
     fn default() -> Self {
         Self {
             tick_period_s: 1e-3,
+            integrator: Integrator::Leapfrog,
             substeps: Substeps::Measured,
             step_safety: 0.9,
             stretch_allowance: 1.2,

@@ -11,7 +11,7 @@ mod tools;
 
 use crate::{
     document::{
-        Document, NumericsTable, OutputTable, PrecisionName,
+        Document, IntegratorName, NumericsTable, OutputTable, PrecisionName,
         source::{Fault, Where},
     },
     limits::Limits,
@@ -19,7 +19,7 @@ use crate::{
 };
 use body::Body;
 use glam::DVec3;
-use palpate_physics::{ModelSpec, Precision, Settings, Substeps, mesh::quality, world::MAX_SUBSTEPS};
+use palpate_physics::{Integrator, ModelSpec, Precision, Settings, Substeps, mesh::quality, world::MAX_SUBSTEPS};
 use regions::Regions;
 use std::path::{Path, PathBuf};
 
@@ -100,7 +100,8 @@ pub(crate) fn compile(
 
 fn settings(document: &Document) -> Result<Settings, Fault> {
     let at = Where::root("numerics");
-    let NumericsTable { precision, substeps, step_safety, stretch_allowance, mass_damping_per_s } = document.numerics;
+    let NumericsTable { precision, integrator, substeps, step_safety, stretch_allowance, mass_damping_per_s } =
+        document.numerics;
     let period = document.scene.tick_period_s;
     check(
         &Where::root("scene").key("tick_period_s"),
@@ -121,6 +122,11 @@ fn settings(document: &Document) -> Result<Settings, Fault> {
     }
     Ok(Settings {
         tick_period_s: period,
+        integrator: match integrator {
+            IntegratorName::Leapfrog => Integrator::Leapfrog,
+            IntegratorName::SeedVerlet => Integrator::SeedVerlet,
+            IntegratorName::SeedSemiImplicit => Integrator::SeedSemiImplicit,
+        },
         substeps: substeps.map_or(Substeps::Measured, Substeps::Fixed),
         step_safety,
         stretch_allowance,

@@ -41,7 +41,7 @@ pub(crate) struct Document {
     /// What is measured.
     #[serde(default)]
     pub(crate) probe: Vec<tool::ProbeTable>,
-    /// Time step and precision.
+    /// Integrator, time step and precision.
     #[serde(default)]
     pub(crate) numerics: NumericsTable,
     /// Length and intervals of an offline run.
@@ -187,12 +187,27 @@ pub(crate) enum PrecisionName {
     Double,
 }
 
-/// Time step and precision.
+/// How time is integrated.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub(crate) enum IntegratorName {
+    /// Explicit leapfrog.
+    #[default]
+    Leapfrog,
+    /// Position Verlet of the hybrid method's 2006 paper (eq. 33).
+    SeedVerlet,
+    /// Semi-implicit Euler with one Jacobian per node, of the same paper (eq. 34).
+    SeedSemiImplicit,
+}
+
+/// Integrator, time step and precision.
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub(crate) struct NumericsTable {
     /// Precision of the force kernel.
     pub(crate) precision: PrecisionName,
+    /// How time is integrated.
+    pub(crate) integrator: IntegratorName,
     /// Substeps per tick, 1 to 100000; measured from the largest natural frequency by default.
     pub(crate) substeps: Option<u32>,
     /// Fraction of the stable step used, in (0, 1].
@@ -208,6 +223,7 @@ impl Default for NumericsTable {
         let settings = palpate_physics::Settings::default();
         Self {
             precision: PrecisionName::Single,
+            integrator: IntegratorName::Leapfrog,
             substeps: None,
             step_safety: settings.step_safety,
             stretch_allowance: settings.stretch_allowance,

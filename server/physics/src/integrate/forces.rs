@@ -1,0 +1,107 @@
+//! The force at an instant of a tick, for every integrator.
+use crate::{
+    contact::{Body, SubstepTime},
+    fem::loads::add_load_n,
+    world::{Model, PointForce, Scratch, State, TickInput},
+};
+use glam::DVec3;
+
+/// What is the same during all of a tick.
+pub(super) struct Tick<'a> {
+    pub(super) model: &'a Model,
+    pub(super) input: &'a TickInput<'a>,
+    pub(super) loads: LoadRamp,
+}
+
+/// When forces are evaluated.
+pub(super) struct Instant {
+    /// Part of the tick that is over.
+    pub(super) fraction: f64,
+    /// Step that led here (s); 0 at the start.
+    pub(super) dt_s: f64,
+    /// Bound of the speed (m/s) with which any node came here.
+    pub(super) fastest_m_per_s: f64,
+}
+
+impl Tick<'_> {
+    /// Substep `dt` (s).
+    pub(super) fn dt_s(&self) -> f64 {
+        self.model.spec().settings.tick_period_s / f64::from(self.model.substeps())
+    }
+
+    /// Forces at the start of the tick, unless the last tick left them.
+    pub(super) fn make_force_current(&self, state: &mut State, scratch: &mut Scratch) {
+        if !state.force_is_current {
+            state.contact.forget_geometry();
+            self.evaluate(state, scratch, &Instant { fraction: 0.0, dt_s: 0.0, fastest_m_per_s: 0.0 });
+        }
+    }
+
+    /// Forces at the end of substep `number` (from 1), to which the nodes came with at most `fastest_m_per_s`.
+    pub(super) fn evaluate_after(&self, number: u32, fastest_m_per_s: f64, state: &mut State, scratch: &mut Scratch) {
+        let fraction = f64::from(number) / f64::from(self.model.substeps());
+        self.evaluate(state, scratch, &Instant { fraction, dt_s: self.dt_s(), fastest_m_per_s });
+    }
+
+    /// Total force at the present positions into `state.force_n`, its external part into `state.external_n`.
+    fn evaluate(&self, state: &mut State, scratch: &mut Scratch, now: &Instant) {
+        let Self { model, input, loads } = self;
+        let external = &mut state.external_n;
+        external.fill(DVec3::ZERO);
+        for (index, load) in model.spec().loads.iter().enumerate() {
+            let factor = loads.factor(state.load_factors[index], input, index, now.fraction);
+            if factor != 0.0 {
+                add_load_n(load, factor, model.surface(), (model.rest_positions_m(), &state.x), external);
+            }
+        }
+        for point in input.point_forces {
+            if is_usable(model, point) {
+                external[point.node as usize] += point.force_n;
+            }
+        }
+        let (x, v) = (&state.x, &state.v);
+        if !state.tools.is_empty() {
+            let body = Body { x, v, fastest_m_per_s: now.fastest_m_per_s };
+            let tick_period_s = model.spec().settings.tick_period_s;
+            let time = SubstepTime { fraction: now.fraction, dt_s: now.dt_s, tick_period_s };
+            let (tools, contact) = (&mut state.tools, &mut state.contact);
+            model.contact().substep(&body, &time, tools, contact, external, &mut scratch.contact);
+        }
+        let force = &mut state.force_n;
+        let viscous_power_w = model.kernel().forces_n(model.rest_positions_m(), x, v, force, &mut scratch.kernel);
+        state.viscous.record(viscous_power_w, now.dt_s > 0.0);
+        let gravity = model.gravity_m_per_s2();
+        for ((force, external), mass) in force.iter_mut().zip(external.iter()).zip(model.mass_kg()) {
+            *force += *external + gravity * *mass;
+        }
+        state.force_is_current = true;
+    }
+}
+
+/// Load factors between the last tick's and this one's.
+pub(super) struct LoadRamp {
+    pub(super) usable: bool,
+}
+
+impl LoadRamp {
+    pub(super) fn new(state: &State, input: &TickInput<'_>) -> Self {
+        let usable =
+            input.load_factors.len() == state.load_factors.len() && input.load_factors.iter().all(|f| f.is_finite());
+        Self { usable }
+    }
+
+    fn factor(&self, from: f64, input: &TickInput<'_>, load: usize, fraction: f64) -> f64 {
+        if self.usable { from + (input.load_factors[load] - from) * fraction } else { from }
+    }
+
+    pub(super) fn finish(&self, state: &mut State, input: &TickInput<'_>) {
+        if self.usable {
+            state.load_factors.copy_from_slice(input.load_factors);
+        }
+    }
+}
+
+/// A force on a node that there is.
+pub(super) fn is_usable(model: &Model, point: &PointForce) -> bool {
+    (point.node as usize) < model.mass_kg().len() && point.force_n.is_finite()
+}

@@ -1,0 +1,61 @@
+//! What integrators do to positions and velocities, and what the ledger hears of it.
+use crate::world::{Model, State};
+use glam::DVec3;
+
+/// `x ← x + dt v`; returns the largest speed (m/s) of any node.
+pub(super) fn drift(state: &mut State, dt_s: f64) -> f64 {
+    // Four running maxima, so that one does not wait for the other.
+    let mut most = [0.0_f64; 4];
+    for (xs, vs) in state.x.chunks_mut(4).zip(state.v.chunks(4)) {
+        for ((x, v), most) in xs.iter_mut().zip(vs).zip(&mut most) {
+            *x += *v * dt_s;
+            *most = most.max(v.length_squared());
+        }
+    }
+    most.into_iter().fold(0.0, f64::max).sqrt()
+}
+
+/// `v ← (v e^{−c h/2} + h f/m) e^{−c h/2}`, and the ledger's share of it.
+pub(super) fn kick(model: &Model, state: &mut State, h_s: f64) {
+    let damping = model.spec().settings.mass_damping_per_s;
+    let half = (damping > 0.0).then(|| (-0.5 * damping * h_s).exp());
+    if let Some(factor) = half {
+        damp(model, state, factor);
+    }
+    let mut power_w = DVec3::ZERO;
+    let external = &state.external_n;
+    for (((v, force), inverse_mass), external) in
+        state.v.iter_mut().zip(&state.force_n).zip(model.inverse_mass_per_kg()).zip(external)
+    {
+        let change = *force * *inverse_mass * h_s;
+        power_w += *external * (*v + change * 0.5);
+        *v += change;
+    }
+    state.ledger.external_work_j += h_s * (power_w.element_sum() + holders_power_w(model, state));
+    state.ledger.dissipated_j += h_s * state.viscous.work_rate_w();
+    if let Some(factor) = half {
+        damp(model, state, factor);
+    }
+}
+
+/// Power (W) of the holders' reactions, `−f` on prescribed axes, whose velocity a kick leaves alone.
+pub(super) fn holders_power_w(model: &Model, state: &State) -> f64 {
+    let mut power_w = 0.0;
+    for set in &model.spec().prescribed {
+        let held = DVec3::from(set.axes.map(|axis| f64::from(u8::from(axis))));
+        for &node in &set.nodes {
+            power_w -= state.force_n[node as usize].dot(held * state.v[node as usize]);
+        }
+    }
+    power_w
+}
+
+pub(super) fn damp(model: &Model, state: &mut State, factor: f64) {
+    let mut taken_j = 0.0;
+    for ((v, inverse_mass), mass) in state.v.iter_mut().zip(model.inverse_mass_per_kg()).zip(model.mass_kg()) {
+        let damped = DVec3::select(inverse_mass.cmpeq(DVec3::ZERO), *v, *v * factor);
+        taken_j += 0.5 * mass * (v.length_squared() - damped.length_squared());
+        *v = damped;
+    }
+    state.ledger.dissipated_j += taken_j;
+}

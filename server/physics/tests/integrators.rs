@@ -1,0 +1,235 @@
+//! Every integrator: order in time, momentum, drag, equilibrium, and what does not depend on the scheme.
+#![allow(clippy::unwrap_used)]
+mod rig;
+use glam::DVec3;
+use palpate_physics::{
+    Energies, Integrator, ModelSpec, PointForce, Substeps, contact::Coupling,
+    integrate::seed_semi_implicit::nodal_stiffness_n_per_m, integrate::spectrum::RestStiffness, material::Law,
+    snapshot, solve,
+};
+use rig::{Drive, Rig, at, body, bricks, even, hold, material, nodes_where, sphere};
+
+const ALL: [Integrator; 3] = [Integrator::Leapfrog, Integrator::SeedVerlet, Integrator::SeedSemiImplicit];
+
+fn block(h_m: f64, poisson: f64) -> ModelSpec {
+    let side = even(-2.0 * h_m, 2.0 * h_m, 4);
+    let mesh = bricks(&side, &side, &even(-2.0 * h_m, 0.0, 2));
+    body(mesh, material(Law::StableNeoHookean, 10e3, poisson))
+}
+
+fn held_block(integrator: Integrator) -> ModelSpec {
+    let mut spec = block(0.01, 0.4);
+    let bottom = nodes_where(&spec.mesh, |p| p.z < -0.0199);
+    spec.prescribed = vec![hold("bottom", bottom, [true; 3])];
+    spec.settings.integrator = integrator;
+    spec
+}
+
+fn distance(p: &[DVec3], q: &[DVec3]) -> f64 {
+    p.iter().zip(q).map(|(p, q)| p.distance_squared(*q)).sum::<f64>().sqrt()
+}
+
+/// Positions after 30 ms of large strain under sideways gravity.
+fn swung(integrator: Integrator, substeps: u32) -> Vec<DVec3> {
+    let mut spec = held_block(integrator);
+    spec.settings.substeps = Substeps::Fixed(substeps);
+    spec.gravity_m_per_s2 = DVec3::new(20.0, 0.0, -30.0);
+    let mut rig = Rig::new(spec);
+    for _ in 0..30 {
+        let drive = rig.still();
+        assert!(rig.tick(&drive).quarantined.is_none());
+    }
+    rig.state.x
+}
+
+#[test]
+fn orders_in_time() {
+    for (integrator, wanted, coarsest) in
+        [(Integrator::Leapfrog, 2.0, 8), (Integrator::SeedVerlet, 2.0, 8), (Integrator::SeedSemiImplicit, 1.0, 64)]
+    {
+        let [a, b, c] = [1, 2, 4].map(|times| swung(integrator, coarsest * times));
+        let order = (distance(&a, &b) / distance(&b, &c)).log2();
+        println!("{integrator:?}: order {order:.3}");
+        assert!((order - wanted).abs() < 0.12, "{integrator:?}: {order}");
+    }
+}
+
+/// The seeds' Verlet is leapfrog's positions, bit for bit but for rounding.
+#[test]
+fn seed_verlet_goes_where_leapfrog_goes() {
+    let (a, b) = (swung(Integrator::Leapfrog, 16), swung(Integrator::SeedVerlet, 16));
+    assert!(distance(&a, &b) < 1e-12, "{:e}", distance(&a, &b));
+}
+
+/// Share of momentum (along x) left after one tick of one step of a free body moving as a whole.
+fn momentum_left(integrator: Integrator, h_m: f64, substeps: u32) -> f64 {
+    let mut spec = block(h_m, 0.45);
+    spec.settings.integrator = integrator;
+    spec.settings.substeps = Substeps::Fixed(substeps);
+    let mut rig = Rig::new(spec);
+    rig.state.v.fill(DVec3::X);
+    let momentum = |rig: &Rig| rig.state.v.iter().zip(rig.model.mass_kg()).map(|(v, m)| v.x * m).sum::<f64>();
+    let before = momentum(&rig);
+    let drive = rig.still();
+    rig.tick(&drive);
+    momentum(&rig) / before
+}
+
+#[test]
+fn only_the_semi_implicit_seed_drags_rigid_motion() {
+    for integrator in [Integrator::Leapfrog, Integrator::SeedVerlet] {
+        let left = momentum_left(integrator, 0.005, 8);
+        assert!((left - 1.0).abs() < 1e-12, "{integrator:?}: {left}");
+    }
+    let left = momentum_left(Integrator::SeedSemiImplicit, 0.005, 1);
+    println!("E = 10 kPa, nu = 0.45, h = 5 mm, 1 ms: {:.1} % of momentum lost", 100.0 * (1.0 - left));
+    assert!((0.70..0.95).contains(&(1.0 - left)), "{left}");
+}
+
+/// λ_max(D⁻¹K), by power iteration on `D⁻¹K`, which is similar to a symmetric matrix.
+fn block_jacobi_spectral_radius(spec: ModelSpec) -> f64 {
+    let model = palpate_physics::Model::build(spec).unwrap();
+    let (materials, regions) = ([*model.material_of(0)], &model.spec().tet_region);
+    let body = RestStiffness {
+        mesh: model.mesh(),
+        rest_tets: model.rest_tets(),
+        tet_material: regions,
+        materials: &materials,
+        springs_n_per_m: &[],
+    };
+    let inverse: Vec<_> = nodal_stiffness_n_per_m(&body).iter().map(|d| d.inverse()).collect();
+    let mut a: Vec<DVec3> = (0..inverse.len())
+        .map(|i| DVec3::new((i as f64).sin(), (2.3 * i as f64).cos(), (0.7 * i as f64).sin()))
+        .collect();
+    let mut lambda = 0.0;
+    for _ in 0..2000 {
+        let mut ka = vec![DVec3::ZERO; a.len()];
+        for (tet, nodes) in model.mesh().tets().iter().enumerate() {
+            let rest = &model.rest_tets()[tet];
+            let gradient = rest.gradient_of(&nodes.map(|n| a[n as usize]));
+            let dp = materials[0].piola_differential(&glam::DMat3::IDENTITY, &gradient);
+            for (&node, force) in nodes.iter().zip(rest.corner_forces_n(&dp)) {
+                ka[node as usize] -= force;
+            }
+        }
+        let next: Vec<DVec3> = inverse.iter().zip(&ka).map(|(inverse, ka)| *inverse * *ka).collect();
+        let length = |b: &[DVec3]| b.iter().map(|b| b.length_squared()).sum::<f64>().sqrt();
+        lambda = length(&next) / length(&a);
+        a = next.iter().map(|b| *b / length(&next)).collect();
+    }
+    lambda
+}
+
+/// Beyond 2 the nodewise Jacobian does not make every step stable.
+#[test]
+fn the_nodal_jacobian_is_less_than_stability_needs() {
+    for poisson in [0.0, 0.3, 0.45] {
+        let lambda = block_jacobi_spectral_radius(block(0.005, poisson));
+        println!("nu = {poisson}: lambda_max(D^-1 K) = {lambda:.3}");
+        assert!((2.0..3.5).contains(&lambda), "{lambda}");
+    }
+}
+
+#[test]
+fn rest_is_rest_and_equilibrium_does_not_depend_on_the_scheme() {
+    let reference = {
+        let model = Rig::new(heavy(Integrator::Leapfrog)).model;
+        let settings = solve::StaticSettings { relative_residual: 1e-12, ..solve::StaticSettings::default() };
+        solve::solve_static(&model, &[], &[DVec3::ZERO], &[], &settings, &mut |_| std::ops::ControlFlow::Continue(()))
+            .unwrap()
+            .x
+    };
+    for integrator in ALL {
+        let mut still = Rig::new(held_block(integrator));
+        let rest = still.state.x.clone();
+        for _ in 0..20 {
+            let drive = still.still();
+            still.tick(&drive);
+        }
+        assert!(distance(&still.state.x, &rest) < 1e-15, "{integrator:?}");
+        let mut rig = Rig::new(heavy(integrator));
+        for _ in 0..600 {
+            let drive = rig.still();
+            rig.tick(&drive);
+        }
+        let error = distance(&rig.state.x, &reference);
+        println!("{integrator:?}: {error:.1e} m from the static solution");
+        assert!(error < 1e-9 && distance(&reference, &rest) > 1e-3, "{integrator:?}: {error:e}");
+    }
+}
+
+fn heavy(integrator: Integrator) -> ModelSpec {
+    let mut spec = held_block(integrator);
+    spec.gravity_m_per_s2 = DVec3::new(5.0, 0.0, -9.81);
+    spec.settings.mass_damping_per_s = 80.0;
+    spec
+}
+
+fn pressed(integrator: Integrator) -> Rig {
+    let mut spec = held_block(integrator);
+    let coupling = Coupling::Spring { stiffness_n_per_m: 200.0, damping_n_s_per_m: 2.0, mass_kg: 0.02 };
+    spec.tools = vec![sphere(0.008, DVec3::new(0.0, 0.0, 0.0085), coupling)];
+    spec.tools[0].friction_coefficient = 0.3;
+    let mut rig = Rig::new(spec);
+    for _ in 0..60 {
+        rig.tick_at(DVec3::Z * 0.005);
+    }
+    assert!(rig.state.tools[0].contacts > 0, "{integrator:?}");
+    rig
+}
+
+#[test]
+fn a_restored_run_continues_with_the_same_bits() {
+    for integrator in ALL {
+        let mut first = pressed(integrator);
+        let bytes = snapshot::save(&first.model, &first.state);
+        let mut second = Rig::new(first.model.spec().clone());
+        second.state = snapshot::restore(&second.model, &bytes).unwrap();
+        for tick in 0..40 {
+            let device = DVec3::new(1e-4 * f64::from(tick), 0.0, 0.005);
+            first.tick_at(device);
+            second.tick_at(device);
+        }
+        assert_eq!(first.state, second.state, "{integrator:?}");
+    }
+}
+
+#[test]
+fn an_enormous_force_is_quarantined() {
+    for integrator in ALL {
+        let mut rig = pressed(integrator);
+        let good = rig.state.clone();
+        let mut drive: Drive = rig.still();
+        drive.point_forces.push(PointForce { node: 60, force_n: DVec3::Z * 1e300 });
+        assert!(rig.tick(&drive).quarantined.is_some(), "{integrator:?}");
+        assert_eq!(rig.state.x, good.x);
+        rig.state.reset(&rig.model);
+        drive = Drive { tools: vec![at(DVec3::Z * 0.0085)], ..rig.still() };
+        assert!(rig.tick(&drive).quarantined.is_none());
+    }
+}
+
+/// What the ledger says while the block swings: second order for leapfrog, first for the seeds.
+#[test]
+fn the_ledger_balances_to_the_scheme_s_order() {
+    for (integrator, wanted) in
+        [(Integrator::Leapfrog, 1.9), (Integrator::SeedVerlet, 0.9), (Integrator::SeedSemiImplicit, 0.9)]
+    {
+        let imbalance = |substeps: u32| {
+            let mut spec = held_block(integrator);
+            spec.settings.substeps = Substeps::Fixed(substeps);
+            spec.gravity_m_per_s2 = DVec3::new(20.0, 0.0, -30.0);
+            let mut rig = Rig::new(spec);
+            let mut worst = 0.0_f64;
+            for _ in 0..30 {
+                let drive = rig.still();
+                rig.tick(&drive);
+                worst = worst.max(Energies::of(&rig.model, &rig.state).balance_j().abs());
+            }
+            worst
+        };
+        let [a, b] = [32, 64].map(imbalance);
+        println!("{integrator:?}: {a:.2e} {b:.2e} J, order {:.2}", (a / b).log2());
+        assert!((a / b).log2() > wanted, "{integrator:?}: {a:e} {b:e}");
+    }
+}

@@ -1,0 +1,62 @@
+//! `[numerics] integrator`: every name is read, runs, and another one is answered with those there are.
+#![allow(clippy::unwrap_used)] // helpers outside #[test] functions
+use palpate_physics::{Integrator, Model, Scratch, State, TickInput, step};
+use palpate_scene::{Limits, Scene, SceneError, json_schema, parse};
+
+fn scene(integrator: &str) -> Result<Scene, SceneError> {
+    let text = format!(
+        r#"[scene]
+name = "t"
+gravity_m_per_s2 = [0, 0, -9.81]
+[body.box]
+size_mm = [10, 10, 10]
+cells = [2, 2, 2]
+[[material]]
+law = "stable-neo-hookean"
+young_modulus_pa = 1e4
+poisson_ratio = 0.3
+density_kg_per_m3 = 1000
+[[fixed]]
+region = "z_min"
+[numerics]
+integrator = "{integrator}"
+"#
+    );
+    parse(&text, "t.toml", None, &Limits::local(), &mut |_, _| {})
+}
+
+const NAMES: [(&str, Integrator); 3] = [
+    ("leapfrog", Integrator::Leapfrog),
+    ("seed-verlet", Integrator::SeedVerlet),
+    ("seed-semi-implicit", Integrator::SeedSemiImplicit),
+];
+
+#[test]
+fn every_name_is_read_and_runs() {
+    let schema = json_schema().to_string();
+    for (name, integrator) in NAMES {
+        let spec = scene(name).unwrap_or_else(|error| panic!("{}", error.one_line())).model;
+        assert_eq!(spec.settings.integrator, integrator);
+        assert!(schema.contains(&format!("\"{name}\"")), "{name}");
+        let model = Model::build(spec).unwrap();
+        let (mut state, mut scratch) = (State::at_rest(&model), Scratch::new(&model));
+        let input = TickInput {
+            tools: &[],
+            load_factors: &[],
+            prescribed_displacements_m: &vec![glam::DVec3::ZERO; model.spec().prescribed.len()],
+            point_forces: &[],
+        };
+        for _ in 0..10 {
+            assert!(step(&model, &mut state, &mut scratch, &input).quarantined.is_none());
+        }
+        assert!(state.x.iter().zip(model.rest_positions_m()).any(|(x, rest)| x.z < rest.z), "{name} stands still");
+    }
+}
+
+#[test]
+fn another_name_is_answered_with_those_there_are() {
+    let message = scene("midpoint").unwrap_err().one_line();
+    for (name, _) in NAMES {
+        assert!(message.contains(name), "{message}");
+    }
+}
