@@ -1,9 +1,12 @@
 //! `load`, `reset`, `pause`, `resume`, `step`, `save`, `restore`: what happens to the session.
 use crate::{ViewError, cli, connect::Server};
 use clap::{Args, Subcommand};
-use palpate_proto::v1::{
-    ListRequest, LoadSceneRequest, PauseRequest, ResetRequest, RestoreRequest, SnapshotRequest, StepRequest,
-    load_scene_request::Source, session_client::SessionClient,
+use palpate_proto::{
+    MAX_SNAPSHOT_BYTES,
+    v1::{
+        ListRequest, LoadSceneRequest, PauseRequest, ResetRequest, RestoreRequest, SnapshotRequest, StepRequest,
+        load_scene_request::Source, session_client::SessionClient,
+    },
 };
 use std::path::PathBuf;
 use tonic::transport::Channel;
@@ -55,7 +58,9 @@ pub struct SaveArguments {
 /// # Errors
 /// A file, an unreachable daemon, or its refusal.
 pub async fn run(server: &Server, control: &Control) -> Result<(), ViewError> {
-    let mut client = SessionClient::new(server.connect().await?);
+    let mut client = SessionClient::new(server.connect().await?)
+        .max_decoding_message_size(MAX_SNAPSHOT_BYTES)
+        .max_encoding_message_size(MAX_SNAPSHOT_BYTES);
     // The daemon has one session; no name means that one.
     let session_id = String::new();
     let said = match control {

@@ -84,7 +84,8 @@ pub async fn run(server: &Server, arguments: &WatchArguments) -> Result<(), View
         }
     }
     // The last second ends a little early: with the time that was asked for.
-    let last = watcher.surface.as_ref().and_then(|surface| second.close(surface, Instant::now(), SHORTEST_S));
+    let last = watcher.surface.as_ref().filter(|surface| named == Some(surface.epoch));
+    let last = last.and_then(|surface| second.close(surface, Instant::now(), SHORTEST_S));
     last.map_or(Ok(()), |last| cli::say(&row(&last, arguments.json)))
 }
 

@@ -285,9 +285,16 @@ impl Uplink {
     fn take_fault(&self, fault: &v1::DeviceFault, told: &mut Told) {
         use v1::DeviceFaultCode::{Detached, Quarantined};
         self.shared.stats.peer_faults.increment();
-        // Messages of one code differ in their numbers only.
-        told.once(fault.code().as_str_name(), &format!("the daemon reports: {}", fault.message));
-        if matches!(fault.code(), Detached | Quarantined) {
+        let text = format!("the daemon reports: {}", fault.message);
+        let stops = matches!(fault.code(), Detached | Quarantined);
+        if stops {
+            // It tells each of these once itself.
+            tracing::warn!("{text}");
+        } else {
+            // A count or a time in it makes no other message of it.
+            told.once(&text.replace(|c: char| c.is_ascii_digit(), ""), &text);
+        }
+        if stops {
             self.shared.peer_fault.store(true, Ordering::Relaxed);
         }
     }

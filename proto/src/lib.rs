@@ -14,6 +14,9 @@ pub mod v1 {
 /// The encoded `FileDescriptorSet` of the package, for server reflection and for the web page.
 pub const DESCRIPTOR_SET: &[u8] = include_bytes!(concat!(env!("OUT_DIR"), "/palpate_descriptor.bin"));
 
+/// Largest snapshot that is sent and may be restored (bytes): some 600 000 nodes. Clients have to raise tonic's limit of 4 MiB to it.
+pub const MAX_SNAPSHOT_BYTES: usize = 64 * 1024 * 1024;
+
 #[cfg(test)]
 mod tests {
     use prost::Message;

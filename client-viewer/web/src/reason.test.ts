@@ -22,6 +22,9 @@ it("calls a fetch that fails an unreachable daemon, and an abort what it is", as
   const failed = await fetchSurfaceService(new AbortController().signal).catch((error: unknown) => error);
   expect(failed).toBeInstanceOf(Unreachable);
   expect(reasonOf(failed)).toBe("no daemon answers");
+  vi.stubGlobal("fetch", () => Promise.resolve({ ok: true, arrayBuffer: () => Promise.reject(new TypeError("network error")) }));
+  const cut = await fetchSurfaceService(new AbortController().signal).catch((error: unknown) => error);
+  expect(cut).toBeInstanceOf(Unreachable);
   const silence = new Error("the daemon said nothing for 5 s");
   vi.stubGlobal("fetch", () => Promise.reject(silence));
   expect(await fetchSurfaceService(new AbortController().signal).catch((error: unknown) => error)).toBe(silence);

@@ -57,11 +57,13 @@ export interface SurfaceEvent {
 export const DESCRIPTOR_PATH = "palpate.v1.binpb";
 
 export async function fetchSurfaceService(signal: AbortSignal): Promise<DescService> {
-  const answer = await fetch(DESCRIPTOR_PATH, { signal, cache: "no-cache" }).catch((error: unknown) => {
+  // A browser calls a failure of the network a TypeError, at the answer's head and in its body alike.
+  const unreachable = (error: unknown): never => {
     throw error instanceof TypeError ? new Unreachable(error) : error;
-  });
+  };
+  const answer = await fetch(DESCRIPTOR_PATH, { signal, cache: "no-cache" }).catch(unreachable);
   if (!answer.ok) throw new Error(`${DESCRIPTOR_PATH}: ${answer.status} ${answer.statusText}`);
-  const bytes = new Uint8Array(await answer.arrayBuffer());
+  const bytes = new Uint8Array(await answer.arrayBuffer().catch(unreachable));
   const service = createFileRegistry(fromBinary(FileDescriptorSetSchema, bytes)).getService("palpate.v1.Surface");
   if (!service) throw new Error("the daemon's descriptor set has no palpate.v1.Surface");
   return service;

@@ -220,6 +220,8 @@ pub struct Daemon {
     pub(crate) current: RwLock<Arc<ActiveSession>>,
     pub(crate) numbers: Numbers,
     pub(crate) loading: Arc<tokio::sync::Mutex<()>>,
+    /// One permit per state that requests may hold beside the running one.
+    pub(crate) room_for_states: Arc<tokio::sync::Semaphore>,
 }
 
 /// Counters that name things.

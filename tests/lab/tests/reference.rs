@@ -120,7 +120,7 @@ fn lame_also_near_incompressibility() {
     }
 }
 
-/// Hertz at small depth on a block so large that it is a half space to 2 %, by Dimitriadis' series for a bonded layer.
+/// Hertz at small depth, with Dimitriadis' series for a layer bonded below (here 5 % on the half space).
 #[test]
 fn hertz_at_small_depth() {
     let (young, nu, radius, depth, height) = (1e4, 0.45_f64, 40e-3_f64, 0.1e-3_f64, 40e-3_f64);

@@ -13,7 +13,7 @@ use crate::{
     session::{ActiveSession, Daemon},
 };
 use palpate_proto::{
-    DESCRIPTOR_SET,
+    DESCRIPTOR_SET, MAX_SNAPSHOT_BYTES,
     v1::{device_server::DeviceServer, session_server::SessionServer, surface_server::SurfaceServer},
 };
 use std::sync::Arc;
@@ -25,8 +25,6 @@ use tower::Layer;
 
 /// Largest message a client may send (bytes), snapshots apart.
 pub const MAX_REQUEST_BYTES: usize = 2 * 1024 * 1024;
-/// Largest snapshot that may be restored (bytes): some 600 000 nodes.
-pub const MAX_SNAPSHOT_BYTES: usize = 64 * 1024 * 1024;
 /// Largest message of a device's stream (bytes): a sample has some 150.
 pub const MAX_SAMPLE_BYTES: usize = 16 * 1024;
 

@@ -4,15 +4,19 @@ use crate::{
     load,
     session::{ActiveSession, Daemon, prepare},
     sim::{
-        command::{Copy, Done, Place, Refusal, Request as Order},
+        command::{Copy, Done, Refusal, Request as Order},
         inject::InjectRefusal,
     },
     status,
 };
 use palpate_physics::{Scratch, State, snapshot};
-use palpate_proto::v1::{self, load_scene_request::Source as WireSource, session_server::Session};
+use palpate_proto::{
+    MAX_SNAPSHOT_BYTES,
+    v1::{self, load_scene_request::Source as WireSource, session_server::Session},
+};
 use prost::Message;
 use std::sync::Arc;
+use tokio::sync::OwnedSemaphorePermit;
 use tonic::{Request, Response, Status};
 
 /// The service.
@@ -46,28 +50,27 @@ fn refused(refusal: Refusal) -> Status {
 
 impl SessionService {
     async fn order(&self, session: &ActiveSession, order: Order) -> Result<(Order, Done), Status> {
-        self.order_at(self.place()?, session, order).await
-    }
-
-    fn place(&self) -> Result<Place, Status> {
-        self.daemon.orders.place().map_err(refused)
-    }
-
-    async fn order_at(&self, place: Place, session: &ActiveSession, order: Order) -> Result<(Order, Done), Status> {
         let patient = matches!(order, Order::Step(_));
         tokio::select! {
-            result = self.daemon.orders.give_at(place, session.number, order, patient) => result.map_err(refused),
+            result = self.daemon.orders.give(session.number, order, patient) => result.map_err(refused),
             () = self.daemon.stop.cancelled() => Err(refused(Refusal::Stopping)),
         }
     }
 
-    /// A copy of the state, and the place of its order: it is held until the copy is gone, so there are no more copies than places.
-    async fn copy(&self, session: &ActiveSession) -> Result<(Box<Copy>, Done, Place), Status> {
-        let place = self.place()?;
-        let model = Arc::clone(&session.model);
-        let copy = blocking(move || Copy { state: State::at_rest(&model), scratch: Scratch::new(&model) }).await?;
-        match self.order_at(place.clone(), session, Order::Copy(Box::new(copy))).await? {
-            (Order::Copy(copy), done) => Ok((copy, done, place)),
+    /// Waits for room for one more state beside the running one.
+    async fn room(&self) -> Result<OwnedSemaphorePermit, Status> {
+        let room = Arc::clone(&self.daemon.room_for_states).acquire_owned().await;
+        room.map_err(|_| refused(Refusal::Stopping))
+    }
+
+    /// A copy of the state, with its room. The room is taken before the memory is, and goes with it: a caller that goes away while
+    /// memory is being got frees neither.
+    async fn copy(&self, session: &ActiveSession) -> Result<(Box<Copy>, Done, OwnedSemaphorePermit), Status> {
+        let (room, model) = (self.room().await?, Arc::clone(&session.model));
+        let empty = move || (Copy { state: State::at_rest(&model), scratch: Scratch::new(&model) }, room);
+        let (copy, room) = blocking(empty).await?;
+        match self.order(session, Order::Copy(Box::new(copy))).await? {
+            (Order::Copy(copy), done) => Ok((copy, done, room)),
             _ => Err(Status::internal("the loop answered another order")),
         }
     }
@@ -170,15 +173,15 @@ impl Session for SessionService {
 
     async fn snapshot(&self, request: Request<v1::SnapshotRequest>) -> Result<Response<v1::SnapshotResponse>, Status> {
         let session = current_session(&self.daemon, &small(request)?.session_id)?;
-        let (copy, _, place) = self.copy(&session).await?;
+        let (copy, _, room) = self.copy(&session).await?;
         let (tick, model) = (copy.state.tick, Arc::clone(&session.model));
         let save = move || {
             let saved = (snapshot::save(&model, &copy.state), snapshot::state_hash(&copy.state));
-            drop((copy, place));
+            drop((copy, room));
             saved
         };
         let (state, state_hash) = blocking(save).await?;
-        if state.len() > super::MAX_SNAPSHOT_BYTES {
+        if state.len() > MAX_SNAPSHOT_BYTES {
             let megabytes = state.len() / 1_000_000;
             return Err(Status::resource_exhausted(format!(
                 "the snapshot would have {megabytes} MB; too large to send"
@@ -190,12 +193,15 @@ impl Session for SessionService {
     async fn restore(&self, request: Request<v1::RestoreRequest>) -> Result<Response<v1::RestoreResponse>, Status> {
         let request = request.into_inner();
         let session = current_session(&self.daemon, &request.session_id)?;
-        let place = self.place()?;
-        let model = Arc::clone(&session.model);
-        let read = move || snapshot::restore(&model, &request.state).map(|state| (snapshot::state_hash(&state), state));
-        let (state_hash, state) = blocking(read).await?.map_err(|error| Status::invalid_argument(error.to_string()))?;
+        let (room, model) = (self.room().await?, Arc::clone(&session.model));
+        let read = move || {
+            let read = snapshot::restore(&model, &request.state);
+            read.map(|state| (snapshot::state_hash(&state), state, room))
+        };
+        let (state_hash, state, _room) =
+            blocking(read).await?.map_err(|error| Status::invalid_argument(error.to_string()))?;
         let response = v1::RestoreResponse { tick: state.tick, state_hash };
-        self.order_at(place, &session, Order::Restore(Box::new(state))).await?;
+        self.order(&session, Order::Restore(Box::new(state))).await?;
         Ok(Response::new(response))
     }
 
@@ -212,11 +218,11 @@ impl Session for SessionService {
 
     async fn status(&self, request: Request<v1::StatusRequest>) -> Result<Response<v1::StatusResponse>, Status> {
         let session = current_session(&self.daemon, &small(request)?.session_id)?;
-        let (copy, done, place) = self.copy(&session).await?;
+        let (copy, done, room) = self.copy(&session).await?;
         let daemon = Arc::clone(&self.daemon);
         let tell = move || {
             let status = status::of(&daemon, &session, &copy, &done);
-            drop((copy, place));
+            drop((copy, room));
             status
         };
         Ok(Response::new(blocking(tell).await?))

@@ -1,7 +1,7 @@
 //! How far a long command is: a bar on a terminal, a line now and then where standard error is a file or a pipe.
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::{
-    io::IsTerminal,
+    io::{IsTerminal, Write as _},
     time::{Duration, Instant},
 };
 
@@ -44,7 +44,8 @@ impl Progress {
             bar.set_message(format!("{what}, {}", times(elapsed, fraction)));
         } else if !self.on_terminal && elapsed >= self.next_line {
             self.next_line = next_line(elapsed);
-            eprintln!("{}", line(&self.title, elapsed, fraction, what));
+            // Who closed the standard error does not want to know.
+            let _ = writeln!(std::io::stderr(), "{}", line(&self.title, elapsed, fraction, what));
         }
     }
 

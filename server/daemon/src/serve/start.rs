@@ -20,13 +20,15 @@ use std::{
     time::{Duration, SystemTime, UNIX_EPOCH},
 };
 use tokio::{
-    sync::oneshot,
+    sync::{Semaphore, oneshot},
     task::{JoinHandle, JoinSet},
     time::timeout,
 };
 use tokio_util::sync::CancellationToken;
 use tonic::service::Routes;
 
+/// States that requests may hold beside the running one: copies for status and snapshots, and restored ones.
+const MOST_STATES: usize = 8;
 /// How long open streams may take to end once forces are zero.
 const STREAMS_END_WITHIN: Duration = Duration::from_secs(2);
 
@@ -113,6 +115,7 @@ pub async fn start_with(
         current: RwLock::new(Arc::clone(&session)),
         numbers,
         loading: Arc::default(),
+        room_for_states: Arc::new(Semaphore::new(MOST_STATES)),
     });
     daemon.show(&session, surface);
     let (routes, health) = grpc::routes(&daemon).await?;

@@ -10,7 +10,7 @@ use palpate_realtime::Doorbell;
 use rtrb::{Consumer, Producer, RingBuffer};
 use std::{io, sync::Arc, time::Duration};
 use thiserror::Error;
-use tokio::sync::{Mutex, OwnedSemaphorePermit, Semaphore, oneshot};
+use tokio::sync::{Mutex, Semaphore, oneshot};
 
 /// Orders that may wait or be worked on at a time.
 pub const CAPACITY: usize = 64;
@@ -196,40 +196,13 @@ impl Clerk {
     }
 }
 
-/// A place among the orders that wait. What an order needs is allocated after it was got, so that only so much is; it is kept
-/// until the order is back, even when the caller goes away before, and as long as the caller holds on to it.
-#[derive(Debug, Clone)]
-pub struct Place(#[expect(dead_code, reason = "held")] Arc<OwnedSemaphorePermit>);
-
 impl Orders {
-    /// A place for an order.
-    ///
-    /// # Errors
-    /// [`Refusal::Busy`].
-    pub fn place(&self) -> Result<Place, Refusal> {
-        let permit = Arc::clone(&self.room).try_acquire_owned().map_err(|_| Refusal::Busy)?;
-        Ok(Place(Arc::new(permit)))
-    }
-
     /// Gives an order to a session and waits for it to come back. Orders that take long (`patient`) are waited for without limit.
     ///
     /// # Errors
     /// [`Refusal`].
     pub async fn give(&self, session: u64, request: Request, patient: bool) -> Result<(Request, Done), Refusal> {
-        self.give_at(self.place()?, session, request, patient).await
-    }
-
-    /// The same at a place that was got before.
-    ///
-    /// # Errors
-    /// [`Refusal`].
-    pub async fn give_at(
-        &self,
-        place: Place,
-        session: u64,
-        request: Request,
-        patient: bool,
-    ) -> Result<(Request, Done), Refusal> {
+        let permit = Arc::clone(&self.room).try_acquire_owned().map_err(|_| Refusal::Busy)?;
         let (reply, answer) = oneshot::channel();
         {
             let mut queue = self.queue.lock().await;
@@ -238,9 +211,10 @@ impl Orders {
             }
             queue.push(Command { session, request, reply }).map_err(|_| Refusal::Busy)?;
         }
+        // The permit lives until the order is back, even when the caller goes away before.
         let waiting = tokio::spawn(async move {
             let answer = answer.await;
-            drop(place);
+            drop(permit);
             answer
         });
         let answer = if patient {
@@ -250,24 +224,5 @@ impl Orders {
         };
         let answer = answer.map_err(|_| Refusal::Stopping)?.map_err(|_| Refusal::Stopping)?;
         answer.outcome.map(|done| (answer.request, done))
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// Every `Status` allocated a copy of the state before it was known whether there was room for its order.
-    #[tokio::test]
-    async fn there_are_no_more_places_than_orders_may_wait() {
-        let (_desk, orders, _clerk) = desk().unwrap();
-        let mut places: Vec<Place> = (0..CAPACITY).map(|_| orders.place().unwrap()).collect();
-        assert_eq!(orders.place().unwrap_err(), Refusal::Busy);
-        assert_eq!(orders.give(1, Request::Reset, true).await.unwrap_err(), Refusal::Busy);
-        let held = places[0].clone();
-        drop(places.swap_remove(0));
-        assert_eq!(orders.place().unwrap_err(), Refusal::Busy, "as long as anybody holds it");
-        drop(held);
-        assert!(orders.place().is_ok());
     }
 }

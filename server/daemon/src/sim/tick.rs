@@ -76,9 +76,11 @@ impl Simulation {
         let quarantined = self.state.quarantine.map(|q| q.tick);
         let moment = Moment { now_ns, tick: self.state.tick, period_s: self.period_s(), quarantined };
         let surface = &self.model.surface().triangles;
-        for (tool, state) in self.tools.iter_mut().zip(&self.state.tools) {
-            let look = plan.advance && self.state.tick.is_multiple_of(LOOK_EVERY_TICKS) && tool.touches_nothing(state);
-            if look && !is_inside(state.target.position_m, surface, &self.state.x) {
+        let look = plan.advance && self.state.tick.is_multiple_of(LOOK_EVERY_TICKS);
+        for (index, (tool, state)) in self.tools.iter_mut().zip(&self.state.tools).enumerate() {
+            // One that touches nothing is outside the body, or deep inside it.
+            let free = look && tool.waits_to_be_clear(state) && !self.state.contact.touches(index);
+            if free && !is_inside(state.target.position_m, surface, &self.state.x) {
                 tool.found_clear();
             }
             tool.couple(state, &moment, plan.order, plan.advance);

@@ -148,10 +148,9 @@ impl ToolLoop {
         Some(sample.position_m)
     }
 
-    /// Whether it waits to be clear of the body and touches nothing now: it is outside the body, or deep inside it. (One that was
-    /// put into the surface carries no force there, but does touch.)
-    pub fn touches_nothing(&self, tool: &ToolState) -> bool {
-        self.place == Place::Held && tool.penetration_m == 0.0 && tool.device_force_n.length() < FREE_N
+    /// Whether it waits to be clear of the body, at rest on its device.
+    pub fn waits_to_be_clear(&self, tool: &ToolState) -> bool {
+        self.place == Place::Held && tool.device_force_n.length() < FREE_N
     }
 
     /// It is outside the body: from now on there is force.

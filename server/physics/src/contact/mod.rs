@@ -22,7 +22,7 @@ pub(crate) use resting::{Pressing, RestingContact};
 pub(crate) use spring::SaturatingSpring;
 pub use state::ContactState;
 pub use tool::{Coupling, LocalContactModel, ToolSpec, ToolState, ToolTarget};
-pub use triangle::{closest_point, closest_weights};
+pub use triangle::closest_weights;
 
 /// The longest edge of a surface triangle, over the radius of a tool, that can still be sampled as finely as contact needs.
 pub const LARGEST_TRIANGLE: f64 = foundation::MAX_LEVEL as f64 * foundation::SPACING;

@@ -386,14 +386,18 @@ mod tests {
         let mut bench = Bench::new(0.0);
         let deep = DVec3::new(0.004, 0.004, -0.6 * RADIUS_M);
         bench.meet(deep, true);
+        assert!(bench.touching.records().len() > 3, "the ball is in the surface");
         assert!(bench.touching.records().iter().all(|touch| touch.from_behind));
         let kept = bench.touching.records().len() / 2;
         (bench.touching, bench.next) = (Touching::with_capacity(kept), Touching::with_capacity(kept));
         bench.meet(deep, true);
+        let mut met_from_the_front = false;
         for step in 0..=20 {
             // Up and out: the upper face is met from the front by those that were not kept.
             let (pressed, _) = bench.meet(deep + DVec3::Z * (0.1 * RADIUS_M * f64::from(step)), false);
             assert_eq!((pressed.contacts, pressed.force_n), (0, DVec3::ZERO), "step {step}");
+            met_from_the_front |= pressed.penetration_m > 0.0;
         }
+        assert!(met_from_the_front, "those that were not kept are met anew");
     }
 }

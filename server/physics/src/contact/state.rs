@@ -45,6 +45,11 @@ impl PartialEq for ContactState {
 }
 
 impl ContactState {
+    /// Whether a tool has any of the surface inside it, pressing or not; false for one that is not there.
+    pub fn touches(&self, tool: usize) -> bool {
+        self.tools.get(tool).is_some_and(|tool| !tool.touching.records().is_empty())
+    }
+
     pub(super) fn new(model: &ContactModel) -> Self {
         let tool = |tool: &super::ToolModel| ToolContact {
             touching: Touching::with_capacity(tool.foundation.samples),

@@ -13,7 +13,8 @@ pub(super) struct Touch {
     pub(super) sample: u32,
     /// The tool reached it from behind the surface: it carries nothing until it leaves.
     pub(super) from_behind: bool,
-    /// Depth (m) up to which it carries nothing: that at which the tool was put there, or the least since. From behind too: it
+    /// Depth (m) up to which it carries nothing: that at which the tool was put there, or the least since; of a
+    /// sample met before a tool that was put there was clear of all, that at which it was met. From behind too: it
     /// tells that the tool was put there.
     pub(super) free_depth_m: f64,
     /// Position relative to the tool's centre (m) where its friction spring is at rest.

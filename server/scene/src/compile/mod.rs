@@ -208,12 +208,12 @@ fn summary(
     }
 }
 
-/// Says so when what acts on a body moves it as a whole.
+/// Says so when what acts on a body may move it as a whole.
 fn nothing_held(document: &Document) -> Option<String> {
     let acts = [
-        (document.scene.gravity_m_per_s2 != [0.0; 3], "gravity moves"),
-        (!document.load.is_empty(), "any load moves"),
-        (!document.tool.is_empty(), "any tool moves"),
+        (document.scene.gravity_m_per_s2 != [0.0; 3], "gravity will move"),
+        (!document.load.is_empty(), "a load may move"),
+        (!document.tool.is_empty(), "a tool will move"),
     ];
     let (_, moves) = acts.into_iter().find(|(given, _)| *given)?;
     (document.fixed.is_empty() && document.prescribed.is_empty()).then(|| {

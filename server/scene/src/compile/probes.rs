@@ -2,8 +2,9 @@
 use super::{body::Body, loads::Constraints, regions::Regions, unique_names};
 use crate::{
     document::{
-        source::{Fault, Where, did_you_mean},
+        source::{Fault, Where},
         tool::{ProbeKind, ProbeTable},
+        words::did_you_mean,
     },
     probes::{MaterialPoint, Measure, Probe},
 };

@@ -7,7 +7,8 @@ use super::{
 use crate::{
     document::{
         region::{NearestSelector, PlaneTable, RegionTable, Selector},
-        source::{Fault, Where, did_you_mean},
+        source::{Fault, Where},
+        words::did_you_mean,
     },
     probes::MaterialPoint,
 };

@@ -4,8 +4,9 @@ use crate::{
     document::{
         Document,
         motion::{InterpolationName, KeyframeTable},
-        source::{Fault, Where, did_you_mean},
+        source::{Fault, Where},
         tool::{ArmTable, CouplingName, DriverName, ToolTable},
+        words::did_you_mean,
     },
     drivers::{Driver, ScriptedHand},
     path::{Interpolation, MotionPath},

@@ -6,6 +6,7 @@ pub(crate) mod region;
 pub(crate) mod schema;
 pub(crate) mod source;
 pub(crate) mod tool;
+pub(crate) mod words;
 
 use motion::{AmplitudeTable, AxesText};
 use schemars::JsonSchema;

@@ -1,6 +1,9 @@
 //! The text of a scene, and where in it a key stands. Faults found anywhere in loading carry a [`Where`] (the path of
 //! keys) and are turned here into errors that point at line and column.
-use super::Document;
+use super::{
+    Document,
+    words::{did_you_mean, did_you_mean_key},
+};
 use crate::error::{SceneError, Stage};
 use std::{fmt, ops::Range};
 use toml::{
@@ -267,10 +270,10 @@ fn document_fault(at: Where, message: &str) -> Fault {
                 _ => at,
             };
             let unknown = format!("unknown key `{}` in {}", key, parent.table());
-            Fault { on_key: true, ..fault(parent.key(key), unknown).help(suggestion(key, known)) }
+            Fault { on_key: true, ..fault(parent.key(key), unknown).help(did_you_mean_key(key, known)) }
         }
         Some((word, known)) if message.starts_with("unknown variant") => {
-            fault(at.clone(), format!("{at} = \"{word}\" is not known")).help(suggestion(word, known))
+            fault(at.clone(), format!("{at} = \"{word}\" is not known")).help(did_you_mean(word, known))
         }
         Some((key, _)) if message.starts_with("missing field") => {
             let length = if key.ends_with("_m") { format!(" (or `{key}m`)") } else { String::new() };
@@ -299,52 +302,6 @@ fn in_words(message: &str) -> String {
         return "must be a text in quotes".to_owned();
     }
     format!("{found}, expected {wanted}").replace("invalid type: map", "invalid type: table")
-}
-
-/// The nearest known word if one is near, else all of them. Of keys, what they are called counts before their unit.
-fn suggestion(word: &str, known: &[&str]) -> String {
-    let likeness = |near: &str| {
-        let names = strsim::jaro_winkler(name_and_unit(word).0, name_and_unit(near).0);
-        (names, strsim::jaro_winkler(word, near))
-    };
-    let order = |a: &(f64, f64), b: &(f64, f64)| a.0.total_cmp(&b.0).then(a.1.total_cmp(&b.1));
-    let nearest = known.iter().max_by(|a, b| order(&likeness(a), &likeness(b)));
-    match nearest.filter(|near| likeness(near).0 > 0.8) {
-        Some(near) => did_you_mean_key(word, near),
-        None if known.is_empty() => "nothing may be given here".into(),
-        None => format!("known: {}", known.join(", ")),
-    }
-}
-
-/// A length in a foreign unit is answered in millimetres, one without in both.
-fn did_you_mean_key(word: &str, near: &str) -> String {
-    let (unit, wanted) = (name_and_unit(word).1, name_and_unit(near).1);
-    let per = |unit: &str| unit.replace("per_", "");
-    match (unit, wanted) {
-        ("", "m") => format!("did you mean `{near}` or `{near}m`?"),
-        ("m" | "", _) | (_, "") => format!("did you mean `{near}`?"),
-        (_, "m") => format!("did you mean `{near}m`? Convert the number"),
-        _ if per(unit) == per(wanted) => format!("did you mean `{near}`?"),
-        _ => format!("did you mean `{near}`? Convert the number"),
-    }
-}
-
-/// A key without its unit, and the unit: `density` and `kg_per_m3`.
-fn name_and_unit(key: &str) -> (&str, &str) {
-    const UNITS: &str = " per m mm cm dm km um nm m2 mm2 cm2 m3 mm3 cm3 ml s s2 ms us ns hz khz rad deg n mn kn \
-                         pa kpa mpa gpa hpa bar mmhg j mj kg g mg ";
-    let mut name = key;
-    while let Some((rest, last)) = name.rsplit_once('_')
-        && UNITS.contains(&format!(" {last} "))
-    {
-        name = rest;
-    }
-    (name, key[name.len()..].trim_start_matches('_'))
-}
-
-/// `Nearest known name` for references between tables.
-pub(crate) fn did_you_mean(word: &str, known: &[&str]) -> String {
-    suggestion(word, known)
 }
 
 #[cfg(test)]

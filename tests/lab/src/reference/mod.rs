@@ -3,7 +3,7 @@
 //! Where there is no formula, answers come from triquadratic hexahedra (27 nodes, 27 quadrature points), fitted to the
 //! true geometry and graded towards the contact, solved in f64 by Newton's method with a sparse Cholesky factorisation. They
 //! share nothing with the product but the materials' energy densities, whose derivatives have tests of their own. Elements of
-//! second order hardly lock at ν = 0.49, and where linear tets need a million unknowns for 1 %, these need some ten thousand.
+//! second order hardly lock: Lamé's sphere at ν = 0.49 is 0.07 % off with 216 of them (`tests/reference.rs`).
 //!
 //! - `grid.rs`: graded grids of hexahedra and their sides; `bodies.rs`: the block and the ventricle
 //! - `shape.rs`: shape functions and quadrature
