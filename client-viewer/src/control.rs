@@ -16,11 +16,14 @@ use tonic::transport::Channel;
 pub enum Control {
     /// Loads another scene: one of the daemon's built-in scenes, or a scene file from here
     ///
-    /// A file is sent as text, so its body must be a built-in shape: mesh files are found by the daemon alone. On any error the
-    /// running scene goes on.
+    /// A file from here is sent as text, and may refer to no other file. One that names mesh files has to be where the daemon is
+    /// (--on-daemon). On any error the running scene goes on.
     Load {
         /// Name of a built-in scene, or a scene file (.toml)
         scene: PathBuf,
+        /// The file is on the daemon's machine, below a folder that `palpated --scene-folder` names
+        #[arg(long)]
+        on_daemon: bool,
     },
     /// Puts the body back to rest at tick 0; ends a quarantine
     Reset,
@@ -64,7 +67,7 @@ pub async fn run(server: &Server, control: &Control) -> Result<(), ViewError> {
     // The daemon has one session; no name means that one.
     let session_id = String::new();
     let said = match control {
-        Control::Load { scene } => load(&mut client, scene).await?,
+        Control::Load { scene, on_daemon } => load(&mut client, scene, *on_daemon).await?,
         Control::Reset => {
             let tick = client.reset(ResetRequest { session_id }).await?.into_inner().tick;
             format!("at rest, at tick {tick}")
@@ -95,10 +98,12 @@ pub async fn run(server: &Server, control: &Control) -> Result<(), ViewError> {
     cli::say(&said)
 }
 
-async fn load(client: &mut SessionClient<Channel>, scene: &PathBuf) -> Result<String, ViewError> {
+async fn load(client: &mut SessionClient<Channel>, scene: &PathBuf, on_daemon: bool) -> Result<String, ViewError> {
     let name = scene.to_string_lossy().into_owned();
     let builtin = client.list(ListRequest {}).await?.into_inner().builtin_scenes;
-    let source = if builtin.contains(&name) {
+    let source = if on_daemon {
+        Source::Path(name)
+    } else if builtin.contains(&name) {
         Source::Builtin(name)
     } else if scene.exists() {
         let no_text = |_| ViewError::NoScene { scene: name.clone(), known: "the file is no text (UTF-8)".into() };

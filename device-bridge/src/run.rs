@@ -215,7 +215,8 @@ impl Watcher {
         }
         let mut cx = std::task::Context::from_waker(std::task::Waker::noop());
         if self.report.as_mut().is_some_and(|report| report.poll_tick(&mut cx).is_ready()) {
-            tracing::info!("{}", shared.stats.summary().line());
+            let recent_peak_n = shared.stats.take_recent_peak_n();
+            tracing::info!("{}", shared.stats.summary().line(recent_peak_n));
         }
     }
 
@@ -234,7 +235,7 @@ impl Watcher {
     fn say(&self, link: Link) {
         match link {
             Link::Waiting => tracing::info!("no force until the daemon answers in time"),
-            Link::Fresh | Link::Extrapolating => tracing::info!("the daemon answers: the force ramps up"),
+            Link::Fresh | Link::Extrapolating => tracing::info!("the daemon answers: its force is ramped up"),
             Link::Ramping(fault) => tracing::warn!("{}: the force is reduced", reason(fault)),
             Link::Latched(fault) if self.auto_recover => {
                 tracing::warn!("{}: the force is zero until the daemon answers steadily", reason(fault));

@@ -62,6 +62,8 @@ pub struct Stats {
     /// From reading the arm to receiving the first command that used it (ns).
     pub round_trip: Histogram,
     peak_force_n: AtomicU64,
+    /// Since it was last reported: the force of a moment says nothing of a press that comes and goes.
+    recent_peak_n: AtomicU64,
     force_n: AtomicU64,
     link: AtomicU8,
     servo: OnceLock<Arc<LoopMonitor>>,
@@ -91,6 +93,12 @@ impl Stats {
         // The bits of numbers that are not negative are ordered as the numbers are.
         self.force_n.store(magnitude_n.to_bits(), Ordering::Relaxed);
         self.peak_force_n.fetch_max(magnitude_n.to_bits(), Ordering::Relaxed);
+        self.recent_peak_n.fetch_max(magnitude_n.to_bits(), Ordering::Relaxed);
+    }
+
+    /// Largest force (N) on the arm since this was last asked.
+    pub(crate) fn take_recent_peak_n(&self) -> f64 {
+        f64::from_bits(self.recent_peak_n.swap(0, Ordering::Relaxed))
     }
 
     pub(crate) fn set_link(&self, link: Link) {
@@ -197,7 +205,8 @@ impl Summary {
     }
 
     /// The most important counters in one line, for logs while the bridge runs.
-    pub fn line(&self) -> String {
+    /// `recent_peak_n` is [`Stats::take_recent_peak_n`].
+    pub fn line(&self, recent_peak_n: f64) -> String {
         let us = |ns: u64| ns as f64 / 1e3;
         let trip = match &self.round_trip {
             trip if trip.count == 0 => "no trip measured".to_owned(),
@@ -205,10 +214,11 @@ impl Summary {
         };
         let state = self
             .latched_fault()
-            .map_or_else(String::new, |fault| format!("; the force stays at zero until recovered: {}", reason(fault)));
+            .map_or_else(String::new, |fault| format!("; without force, a fault is latched: {}", reason(fault)));
         format!(
-            "force {:.3} N, peak {:.3} N; {} samples sent, {} commands received, {trip}; {} overruns, {} reconnects{state}",
-            self.final_force_n, self.peak_force_n, self.sent, self.received, self.overruns, self.reconnects
+            "force up to {:.3} N since the last report, {:.3} N since the start; {} samples sent, {} commands received, {trip}; \
+             {} overruns, {} reconnects{state}",
+            recent_peak_n, self.peak_force_n, self.sent, self.received, self.overruns, self.reconnects
         )
     }
 }
@@ -254,8 +264,8 @@ impl fmt::Display for Summary {
         if let Some(fault) = self.latched_fault() {
             write!(
                 f,
-                "\nstate    without force at the end, since a latched fault: {}. SIGUSR1 while the bridge runs, a new start, or \
-                 --auto-recover lets the force come back",
+                "\nstate    without force at the end, since a fault is latched: {}. SIGUSR1 while the bridge runs, or a new start, \
+                 lets the force come back; under --auto-recover it comes back by itself once the daemon answers steadily",
                 reason(fault)
             )?;
         }
@@ -281,12 +291,16 @@ mod tests {
         let stats = Stats::default();
         stats.set_force(0.5);
         stats.set_link(Link::Fresh);
-        let line = stats.summary().line();
-        assert!(line.starts_with("force 0.500 N, peak 0.500 N; 0 samples") && !line.contains('\n'), "{line}");
+        let line = stats.summary().line(stats.take_recent_peak_n());
+        assert!(
+            line.starts_with("force up to 0.500 N since the last report, 0.500 N since the start; 0 samples")
+                && !line.contains('\n'),
+            "{line}"
+        );
         assert!(!line.contains("zero"), "{line}");
         stats.set_link(Link::Latched(Fault::Peer));
-        let line = stats.summary().line();
-        assert!(line.ends_with("; the force stays at zero until recovered: the daemon stopped the force"), "{line}");
+        let line = stats.summary().line(stats.take_recent_peak_n());
+        assert!(line.ends_with("; without force, a fault is latched: the daemon stopped the force"), "{line}");
     }
 
     #[test]

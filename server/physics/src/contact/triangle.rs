@@ -65,7 +65,7 @@ fn closest_on_edges(p: DVec3, corners: [DVec3; 3]) -> [f64; 3] {
 }
 
 /// The point of the triangle (m) closest to `p`.
-pub fn closest_point(p: DVec3, corners: [DVec3; 3]) -> DVec3 {
+pub(super) fn closest_point(p: DVec3, corners: [DVec3; 3]) -> DVec3 {
     let [wa, wb, wc] = closest_weights(p, corners);
     corners[0] * wa + corners[1] * wb + corners[2] * wc
 }

@@ -36,7 +36,7 @@ impl Files<'_> {
         let Some(base) = self.base_dir else {
             let message = format!("{at} refers to the file {file}, but this scene came without a folder");
             return Err(Fault::value(at.clone(), message)
-                .help("send scenes that need no file, or load the scene by its path on the daemon's machine"));
+                .help("send scenes that need no file, or have the daemon load the file from its own disk (`palpate-view load --on-daemon`)"));
         };
         let path = base.join(file);
         // What cannot be asked is left to the reader, which says why.

@@ -109,7 +109,7 @@ pub enum FillError {
         pairs: usize,
     },
     /// The inner surface is not inside the outer.
-    #[error("the inner surface does not lie inside the outer, e.g. at {}{}", mm(at_m), if *swapped { ": the two are swapped" } else { "; check positions and units" })]
+    #[error("the inner surface does not lie inside the outer, e.g. at {}{}", mm(at_m), if *swapped { ": the two are swapped, or in different units" } else { "; check positions and units" })]
     NotInside {
         /// A point of the inner surface outside (m).
         at_m: DVec3,
