@@ -1,9 +1,12 @@
-//! `palpate-lab`: benchmark tables.
+//! `palpate-lab`: run time beside error.
 use clap::{Parser, Subcommand};
-use palpate_lab::jitter;
+use palpate_lab::{jitter, references, report};
 
 #[derive(Parser)]
-#[command(name = "palpate-lab", about = "Run time beside error: benchmark tables of Palpate's physics")]
+#[command(
+    name = "palpate-lab",
+    about = "Run time beside error: problems, references and benchmark tables of Palpate's physics"
+)]
 struct Arguments {
     #[command(subcommand)]
     command: Command,
@@ -11,6 +14,12 @@ struct Arguments {
 
 #[derive(Subcommand)]
 enum Command {
+    /// Runs methods on problems and writes report.html and results.csv
+    Run(report::Options),
+    /// What got slower or less accurate between two results.csv, beyond noise; exit code 1 then
+    Compare(report::CompareOptions),
+    /// Makes the problems' reference answers, where they are missing, and prints them
+    References(references::Options),
     /// Cost of the force kernel per tet and of a tick per body, each with its error or its aim
     Table,
     /// How late a 1 kHz loop wakes and what its ticks cost, with a pressed body in it, beside `cyclictest`
@@ -22,6 +31,9 @@ enum Command {
 
 fn main() -> miette::Result<()> {
     match Arguments::parse().command {
+        Command::Run(options) => report::run(&options),
+        Command::Compare(options) => report::run_compare(&options),
+        Command::References(options) => references::run(&options),
         Command::Table => palpate_lab::table::print(),
         Command::Jitter(options) => jitter::print(&options),
     }

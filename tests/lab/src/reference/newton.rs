@@ -8,7 +8,9 @@ const TOLERANCE: f64 = 1e-9;
 /// Or when it is below this fraction and an iteration no longer halves it: rounding of the stress in large elements far from a
 /// small load allows no better.
 const ROUNDED_OFF: f64 = 1e-6;
-const MAX_ITERATIONS: usize = 40;
+const MAX_ITERATIONS: usize = 60;
+/// Shares of the largest diagonal entry that are added, one after the other, to a tangent that is not positive definite.
+const SHIFTS: [f64; 4] = [1e-4, 1e-3, 1e-2, 1e-1];
 const MAX_BACKTRACKS: usize = 20;
 /// The first load step over the smallest.
 const MAX_HALVINGS: i32 = 8;
@@ -202,8 +204,28 @@ impl<'a> Problem<'a> {
             if let Action::Sphere { sphere, .. } = &self.action {
                 blocks.extend(sphere.stiffness(&x, self.centre_m(fraction)));
             }
-            let direction = self.system.solve(&blocks, &force)?;
+            let direction = self.direction(&mut blocks, &force)?;
             x = self.search(fraction, &x, &force, &direction)?;
+        }
+        None
+    }
+
+    /// Newton's direction; where the tangent is not positive definite, one of descent, with so much added to its diagonal that it is.
+    fn direction(&self, blocks: &mut [Vec<f64>], force: &[DVec3]) -> Option<Vec<DVec3>> {
+        if let Some(direction) = self.system.solve(blocks, force) {
+            return Some(direction);
+        }
+        let elements = &mut blocks[..self.solid.grid.elements.len()];
+        let diagonal = |index: usize| index.is_multiple_of(81 + 1);
+        let entries = elements.iter().flat_map(|b| b.iter().enumerate().filter(|(i, _)| diagonal(*i)));
+        let largest = entries.map(|(_, k)| *k).fold(0.0, f64::max);
+        for shift in SHIFTS {
+            for block in &mut blocks[..self.solid.grid.elements.len()] {
+                block.iter_mut().step_by(81 + 1).for_each(|k| *k += shift * largest);
+            }
+            if let Some(direction) = self.system.solve(blocks, force) {
+                return Some(direction);
+            }
         }
         None
     }

@@ -1,0 +1,77 @@
+//! What was measured of one method at one resolution on one problem.
+
+/// A row of the results. What was not measured is `None`.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Row {
+    /// Problem.
+    pub problem: String,
+    /// Method.
+    pub method: String,
+    /// Whether its material is the problem's: otherwise errors may cancel, and it is shown out of competition.
+    pub competes: bool,
+    /// Resolution, in the unit of its body.
+    pub resolution: u32,
+    /// Elements.
+    pub elements: usize,
+    /// Nodes.
+    pub nodes: usize,
+    /// Substeps per tick.
+    pub substeps: usize,
+    /// Median time per tick (µs).
+    pub median_us: Option<f64>,
+    /// 99th percentile (µs).
+    pub p99_us: Option<f64>,
+    /// Worst (µs).
+    pub worst_us: Option<f64>,
+    /// How far the medians of the two halves of the turns are apart, over the median.
+    pub unrest: Option<f64>,
+    /// Memory it holds (bytes).
+    pub memory_bytes: usize,
+    /// Answer (N or m), mean over the last ticks.
+    pub answer: Option<f64>,
+    /// `answer/reference − 1`.
+    pub answer_error: Option<f64>,
+    /// Displacement field against the reference's, relative L2.
+    pub field_l2: Option<f64>,
+    /// The same in the maximum.
+    pub field_max: Option<f64>,
+    /// Change of the answer over the last ticks, over the answer: how far it still moves.
+    pub drift: Option<f64>,
+    /// Energy that the ledger misses, over the work done.
+    pub energy_error: Option<f64>,
+    /// Why it has no answer.
+    pub failure: String,
+}
+
+impl Row {
+    /// The error of the answer without sign.
+    pub fn error(&self) -> Option<f64> {
+        self.answer_error.map(f64::abs)
+    }
+
+    /// Whether no competing row is both faster and nearer to the answer; false without time or answer, or out of competition.
+    pub fn is_on_front(&self, all: &[&Self]) -> bool {
+        let (Some(time), Some(error), true) = (self.median_us, self.error(), self.competes) else { return false };
+        let better = |other: &&Self| match (other.median_us, other.error()) {
+            (Some(t), Some(e)) if other.competes => t <= time && e <= error && (t < time || e < error),
+            _ => false,
+        };
+        !all.iter().any(better)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_front_has_what_nothing_beats() {
+        let row =
+            |time, error| Row { median_us: Some(time), answer_error: Some(error), competes: true, ..Row::default() };
+        let unfair = Row { competes: false, ..row(0.5, 0.01) };
+        let rows = [row(1.0, -0.5), row(2.0, 0.1), row(3.0, -0.2), row(4.0, 0.05), Row::default(), unfair];
+        let all: Vec<&Row> = rows.iter().collect();
+        let front: Vec<bool> = rows.iter().map(|r| r.is_on_front(&all)).collect();
+        assert_eq!(front, [true, true, false, true, false, false]);
+    }
+}

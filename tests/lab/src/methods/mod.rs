@@ -1,0 +1,73 @@
+//! The methods that are judged. A new model registers itself in [`all`], by a [`Method`] that builds a [`Running`].
+//!
+//! - `tetrahedra.rs`: linear tetrahedra, as the server runs them, in all variants
+mod pace;
+mod tetrahedra;
+
+pub use pace::Pace;
+
+use crate::problems::{Problem, body::Body};
+use glam::DVec3;
+use miette::Result;
+use tetrahedra::Tetrahedra;
+
+/// A way to solve problems in real time.
+pub trait Method {
+    /// Short name, without commas.
+    fn name(&self) -> &str;
+    /// What it is, in a sentence.
+    fn what(&self) -> &str;
+    /// Whether its material is the problem's. Where it is not, errors may cancel: the method is shown out of competition.
+    fn competes(&self, _problem: &Problem) -> bool {
+        true
+    }
+    /// Resolutions it is run at, in the unit of [`Body::resolution_unit`], ascending.
+    fn resolutions(&self, body: Body, full: bool) -> Vec<u32> {
+        body.resolutions(full).to_vec()
+    }
+    /// Builds it for a problem.
+    ///
+    /// # Errors
+    /// A body or model that cannot be built.
+    fn build(&self, problem: &Problem, resolution: u32, pace: &Pace) -> Result<Box<dyn Running>>;
+}
+
+/// A problem under way.
+pub trait Running {
+    /// One tick of 1 ms, at whose end the tool's way or the load is at this fraction. Nothing else may be done in it: it is timed.
+    fn tick(&mut self, fraction: f64);
+    /// The problem's answer now (N or m).
+    fn answer(&self) -> f64;
+    /// Displacements (m) of the problem's material points now.
+    fn displacements_m(&self) -> Vec<DVec3>;
+    /// Energy that came from nowhere or went there since the start, over the work done; `None` if it keeps no ledger.
+    fn energy_error(&self) -> Option<f64>;
+    /// Elements, nodes and substeps per tick.
+    fn size(&self) -> [usize; 3];
+    /// Why it is not running any more.
+    fn failure(&self) -> Option<String>;
+}
+
+/// The method that a scene gets when it does not ask for another.
+pub const DEFAULT: &str = "leapfrog f32";
+
+/// Every method.
+pub fn all() -> Vec<Box<dyn Method>> {
+    Tetrahedra::variants().into_iter().map(|method| Box::new(method) as Box<dyn Method>).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_are_unique_and_the_default_is_one() {
+        let methods = all();
+        let mut names: Vec<&str> = methods.iter().map(|m| m.name()).collect();
+        assert!(names.contains(&DEFAULT));
+        names.sort_unstable();
+        names.dedup();
+        assert_eq!(names.len(), methods.len());
+        assert!(names.iter().all(|name| !name.contains(',')));
+    }
+}

@@ -1,0 +1,129 @@
+//! All problems. A new one is added here, and `palpate-lab references` makes its reference.
+use super::{Action, Problem, body::Body};
+use palpate_physics::material::Law;
+
+const YOUNG_PA: f64 = 10e3;
+const BEAM_YOUNG_PA: f64 = 100e3;
+const TOOL_RADIUS_M: f64 = 10e-3;
+const PATCH_RADIUS_M: f64 = 7.5e-3;
+const POISSON_RATIOS: [f64; 3] = [0.3, 0.45, 0.49];
+/// Depths (m) of the sphere past first touch.
+const DEPTHS: [(&str, f64); 2] = [("small", 0.5e-3), ("large", 5e-3)];
+/// Sums (N) of the patch on the block and on the ventricle, whose wall gives way more.
+const FORCES: [(&str, [f64; 2]); 2] = [("small", [0.02, 0.02]), ("large", [0.15, 0.1])];
+
+/// Every problem.
+pub fn all() -> Vec<Problem> {
+    let mut problems = Vec::new();
+    for body in [Body::Block, Body::Ventricle] {
+        for nu in POISSON_RATIOS {
+            problems.extend(DEPTHS.map(|(size, depth_m)| sphere(body, size, depth_m, nu, Law::StableNeoHookean)));
+            problems.extend(FORCES.map(|(size, forces)| patch(body, size, forces, nu, Law::StableNeoHookean)));
+        }
+    }
+    let (small, large) = (DEPTHS[0], DEPTHS[1]);
+    problems.push(sphere(Body::Block, small.0, small.1, 0.45, Law::StVenantKirchhoff));
+    problems.push(patch(Body::Block, FORCES[0].0, FORCES[0].1, 0.45, Law::StVenantKirchhoff));
+    problems.push(sphere(Body::Block, large.0, large.1, 0.45, Law::FixedCorotated));
+    problems.extend(POISSON_RATIOS.map(lame));
+    problems.extend([cantilever(), elastica()]);
+    problems
+}
+
+fn sphere(body: Body, size: &str, depth_m: f64, nu: f64, law: Law) -> Problem {
+    Problem {
+        name: format!("{}-sphere-{size}-nu{nu:.2}{}", body.name(), suffix(law)),
+        sentence: format!(
+            "A rigid sphere of 10 mm radius, without friction, is pressed {} mm deep into {}; the answer is its force.",
+            depth_m * 1e3,
+            body.sentence()
+        ),
+        body,
+        action: Action::Sphere { radius_m: TOOL_RADIUS_M, depth_m },
+        law,
+        young_modulus_pa: YOUNG_PA,
+        poisson_ratio: nu,
+    }
+}
+
+fn patch(body: Body, size: &str, forces_n: [f64; 2], nu: f64, law: Law) -> Problem {
+    let force_n = if body == Body::Block { forces_n[0] } else { forces_n[1] };
+    Problem {
+        name: format!("{}-patch-{size}-nu{nu:.2}{}", body.name(), suffix(law)),
+        sentence: format!(
+            "A smooth dead pressure of {force_n} N on a patch of 7.5 mm radius presses {}; the answer is the displacement \
+             conjugate to it.",
+            body.sentence()
+        ),
+        body,
+        action: Action::Patch { radius_m: PATCH_RADIUS_M, force_n },
+        law,
+        young_modulus_pa: YOUNG_PA,
+        poisson_ratio: nu,
+    }
+}
+
+fn suffix(law: Law) -> &'static str {
+    match law {
+        Law::StableNeoHookean => "",
+        Law::StVenantKirchhoff => "-stvk",
+        Law::FixedCorotated => "-corotated",
+    }
+}
+
+fn lame(nu: f64) -> Problem {
+    Problem {
+        name: format!("lame-nu{nu:.2}"),
+        sentence: "A thick sphere (50 to 100 mm) under a small pressure inside, one octant of it; the answer is how far the inner \
+                   surface moves, which Lamé's formula gives."
+            .into(),
+        body: Body::Octant,
+        action: Action::Pressure { pressure_pa: 1.0 },
+        law: Law::StableNeoHookean,
+        young_modulus_pa: YOUNG_PA,
+        poisson_ratio: nu,
+    }
+}
+
+fn cantilever() -> Problem {
+    Problem {
+        name: "cantilever".into(),
+        sentence: "A beam of 100 × 10 × 10 mm, clamped at one end, with a small force across the other; the answer is the deflection \
+                   there, which Timoshenko's theory gives."
+            .into(),
+        body: Body::Beam { slenderness: 10 },
+        action: Action::Shear { force_n: 1e-5 },
+        law: Law::StableNeoHookean,
+        young_modulus_pa: BEAM_YOUNG_PA,
+        poisson_ratio: 0.0,
+    }
+}
+
+fn elastica() -> Problem {
+    let body = Body::Beam { slenderness: 20 };
+    Problem {
+        name: "elastica".into(),
+        sentence: "A beam twenty times as long as it is thick, bent by half its length by a dead force with PL²/EI = 2; the answer is \
+                   the deflection of its end, which Reissner's beam (the elastica with stretch and shear) gives."
+            .into(),
+        body,
+        action: Action::Shear { force_n: super::exact::elastica_force_n(2.0, BEAM_YOUNG_PA, 20.0) },
+        law: Law::FixedCorotated,
+        young_modulus_pa: BEAM_YOUNG_PA,
+        poisson_ratio: 0.0,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_are_unique() {
+        let mut names: Vec<String> = all().into_iter().map(|p| p.name).collect();
+        let count = names.len();
+        names.sort();
+        names.dedup();
+        assert_eq!(names.len(), count);
+    }
+}

@@ -1,0 +1,190 @@
+//! The material points at which displacement fields are compared: a polar pattern on the rest surface about the touch.
+use super::body::{BLOCK_M, Body, OCTANT_M, TetBody, VENTRICLE_M};
+use glam::DVec3;
+use palpate_physics::contact::closest_weights;
+use std::f64::consts::{FRAC_PI_2, TAU};
+
+const RINGS: u32 = 8;
+const SPOKES: u32 = 16;
+/// Radius (m) of the pattern: twice the tool's.
+const REACH_M: f64 = 20e-3;
+/// Directions along each arc of the octant.
+const ON_OCTANT: u32 = 12;
+
+/// A material point of the touched surface.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Sample {
+    /// Where it is at rest (m).
+    pub rest_m: DVec3,
+    /// Its share of the area (m²).
+    pub area_m2: f64,
+    /// Its parameters on the reference grid's touched side, mirrored into the part that is modelled.
+    pub parameters: [f64; 2],
+    /// −1 along axes whose displacement is mirrored.
+    pub mirror: DVec3,
+}
+
+/// The points of a body; none for beams.
+pub fn points(body: Body) -> Vec<Sample> {
+    match body {
+        Body::Block => polar().map(|(a, b, area)| on_block(a, b, area)).collect(),
+        Body::Ventricle => polar().map(|(a, b, area)| on_ventricle(a, b, area)).collect(),
+        Body::Octant => on_octant(),
+        Body::Beam { .. } => vec![],
+    }
+}
+
+/// Offsets (m) in the middles of the cells of a polar grid, with their areas (m²).
+fn polar() -> impl Iterator<Item = (f64, f64, f64)> {
+    let width = REACH_M / f64::from(RINGS);
+    (0..RINGS).flat_map(move |ring| {
+        let r = width * (f64::from(ring) + 0.5);
+        (0..SPOKES).map(move |spoke| {
+            // Off the planes of symmetry, and every second ring turned.
+            let angle = TAU * (f64::from(spoke) + 0.25 + 0.5 * f64::from(ring % 2)) / f64::from(SPOKES);
+            (r * angle.cos(), r * angle.sin(), TAU * r * width / f64::from(SPOKES))
+        })
+    })
+}
+
+fn sign(value: f64) -> f64 {
+    if value < 0.0 { -1.0 } else { 1.0 }
+}
+
+fn on_block(x: f64, y: f64, area_m2: f64) -> Sample {
+    Sample {
+        rest_m: DVec3::new(x, y, BLOCK_M[1]),
+        area_m2,
+        parameters: [x.abs(), y.abs()],
+        mirror: DVec3::new(sign(x), sign(y), 1.0),
+    }
+}
+
+/// Offsets along the parallel and the meridian, as long as on the equator.
+fn on_ventricle(across: f64, up: f64, area_m2: f64) -> Sample {
+    let ((short, long), _, cut) = VENTRICLE_M;
+    let (azimuth, latitude) = (across / short, up / long);
+    let top = (cut / long).asin();
+    let (sin, cos) = latitude.sin_cos();
+    // dA = short cosφ dθ · √(short² sin²φ + long² cos²φ) dφ
+    let stretch = cos * (short * sin).hypot(long * cos) / long;
+    Sample {
+        rest_m: DVec3::new(short * cos * azimuth.cos(), short * cos * azimuth.sin(), long * sin),
+        area_m2: area_m2 * stretch,
+        parameters: [azimuth.abs(), (latitude + FRAC_PI_2) / (top + FRAC_PI_2)],
+        mirror: DVec3::new(1.0, sign(azimuth), 1.0),
+    }
+}
+
+fn on_octant() -> Vec<Sample> {
+    let step = FRAC_PI_2 / f64::from(ON_OCTANT);
+    let point = |index: u32| {
+        let (i, j) = (index % ON_OCTANT, index / ON_OCTANT);
+        let (azimuth, latitude) = (step * (f64::from(i) + 0.5), step * (f64::from(j) + 0.5));
+        let direction = DVec3::new(latitude.cos() * azimuth.cos(), latitude.cos() * azimuth.sin(), latitude.sin());
+        Sample {
+            rest_m: direction * OCTANT_M[0],
+            area_m2: (OCTANT_M[0] * step).powi(2) * latitude.cos(),
+            parameters: [azimuth, latitude],
+            mirror: DVec3::ONE,
+        }
+    };
+    (0..ON_OCTANT * ON_OCTANT).map(point).collect()
+}
+
+/// Nodes and weights of the point of a mesh's touched side that is closest to each sample at rest.
+#[derive(Debug, Clone)]
+pub struct Probe(Vec<([u32; 3], [f64; 3])>);
+
+impl Probe {
+    /// Finds the points.
+    pub fn new(body: &TetBody, samples: &[Sample]) -> Self {
+        let find = |sample: &Sample| {
+            let mut best = (f64::INFINITY, [0; 3], [0.0; 3]);
+            for (triangle, corners) in body.touched.iter().zip(body.touched_corners_m()) {
+                let weights = closest_weights(sample.rest_m, corners);
+                let point: DVec3 = corners.iter().zip(weights).map(|(c, w)| *c * w).sum();
+                let distance = point.distance_squared(sample.rest_m);
+                if distance < best.0 {
+                    best = (distance, *triangle, weights);
+                }
+            }
+            (best.1, best.2)
+        };
+        Self(samples.iter().map(find).collect())
+    }
+
+    /// Displacements (m) there.
+    pub fn displacements_m(&self, rest_m: &[DVec3], x: &[DVec3]) -> Vec<DVec3> {
+        let of_node = |n: u32| x[n as usize] - rest_m[n as usize];
+        self.0.iter().map(|(nodes, weights)| nodes.iter().zip(weights).map(|(&n, w)| of_node(n) * *w).sum()).collect()
+    }
+}
+
+/// Error of a field: the norm of the difference over the norm of the reference.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct FieldError {
+    /// In L2 over the area.
+    pub l2: f64,
+    /// In the largest displacement.
+    pub max: f64,
+}
+
+impl FieldError {
+    /// Of `found` against `reference` at some samples; `None` without samples.
+    pub fn of(samples: &[Sample], found: &[DVec3], reference: &[DVec3]) -> Option<Self> {
+        if samples.is_empty() || samples.len() != reference.len() {
+            return None;
+        }
+        let l2 = |of: &dyn Fn(usize) -> DVec3| {
+            samples.iter().enumerate().map(|(i, s)| s.area_m2 * of(i).length_squared()).sum::<f64>().sqrt()
+        };
+        let max = |of: &dyn Fn(usize) -> DVec3| (0..samples.len()).map(|i| of(i).length()).fold(0.0, f64::max);
+        let (difference, whole) = (|i: usize| found[i] - reference[i], |i: usize| reference[i]);
+        Some(Self { l2: l2(&difference) / l2(&whole), max: max(&difference) / max(&whole) })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::reference::{bodies, solid::surface_points};
+    use std::f64::consts::PI;
+
+    #[test]
+    fn points_cover_their_part_of_the_surface() {
+        let area = |body| points(body).iter().map(|s| s.area_m2).sum::<f64>();
+        assert!((area(Body::Block) / (PI * REACH_M * REACH_M) - 1.0).abs() < 1e-12);
+        assert!((area(Body::Octant) / (0.5 * PI * 0.05 * 0.05) - 1.0).abs() < 1e-3);
+        assert_eq!(points(Body::Ventricle).len(), 128);
+    }
+
+    #[test]
+    fn the_reference_grids_parameters_name_the_same_points() {
+        let (outer, inner, cut) = VENTRICLE_M;
+        let hex = [
+            (Body::Block, bodies::block(BLOCK_M[0], BLOCK_M[1], 5e-3, 4)),
+            (Body::Ventricle, bodies::ventricle(outer, inner, cut, 5e-3, (8, 2))),
+        ];
+        for (body, hex) in hex {
+            for sample in points(body) {
+                let found = hex.grid.on_side(hex.touched, sample.parameters);
+                let at: DVec3 = found.iter().map(|&(n, w)| hex.grid.positions_m[n as usize] * w).sum();
+                assert!((at * sample.mirror).distance(sample.rest_m) < 2e-5, "{at} {}", sample.rest_m);
+            }
+            assert!(!surface_points(&hex.grid, &hex.grid.faces(hex.touched)[0], 1).is_empty());
+        }
+    }
+
+    #[test]
+    fn a_probe_reads_a_linear_field_of_a_flat_side_exactly() {
+        let body = Body::Block.tets(8).unwrap();
+        let samples = points(Body::Block);
+        let linear = |p: DVec3| DVec3::new(0.1 * p.y, 0.2 * p.x, 0.3 * p.x - 0.1 * p.y);
+        let rest = body.mesh.positions_m();
+        let x: Vec<DVec3> = rest.iter().map(|p| *p + linear(*p)).collect();
+        let found = Probe::new(&body, &samples).displacements_m(rest, &x);
+        let want: Vec<DVec3> = samples.iter().map(|s| linear(s.rest_m)).collect();
+        assert!(FieldError::of(&samples, &found, &want).unwrap().max < 1e-12);
+    }
+}

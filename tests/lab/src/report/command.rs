@@ -1,0 +1,129 @@
+//! `palpate-lab run`.
+use super::page;
+use crate::{
+    machine::{Machine, Noise},
+    measure::{self, Effort, Run, Turn},
+    methods,
+    problems::{self, Problem},
+};
+use clap::Args;
+use indicatif::{ProgressBar, ProgressStyle};
+use miette::{Context, IntoDiagnostic, Result, ensure};
+use palpate_realtime::OsMeasures;
+use std::{collections::BTreeMap, path::PathBuf, time::Duration};
+
+/// What is run.
+#[derive(Debug, Clone, Args)]
+pub struct Options {
+    /// A dozen problems, three resolutions, few repetitions: under two minutes
+    #[arg(long, conflicts_with = "full")]
+    quick: bool,
+    /// Every problem and resolution (the default is every problem at the quick run's resolutions)
+    #[arg(long)]
+    full: bool,
+    /// Directory for report.html and results.csv
+    #[arg(long, default_value = "lab-results")]
+    out: PathBuf,
+    /// Only problems whose name contains this
+    #[arg(long)]
+    problem: Option<String>,
+    /// Only methods whose name contains this
+    #[arg(long)]
+    method: Option<String>,
+    /// Processor to be held to
+    #[arg(long)]
+    processor: Option<usize>,
+}
+
+/// Problems of a quick run: those of rubber-like tissue, and the extremes of ν where they hurt most.
+fn is_quick(problem: &Problem) -> bool {
+    let name = &problem.name;
+    name.contains("nu0.45")
+        || ["block-sphere-large-nu0.30", "block-sphere-large-nu0.49", "cantilever"].contains(&name.as_str())
+}
+
+/// Measures, and writes the page and the table.
+///
+/// # Errors
+/// Nothing chosen, a missing reference, or a file that cannot be written.
+pub fn run(options: &Options) -> Result<()> {
+    let chosen = |name: &str, filter: &Option<String>| filter.as_deref().is_none_or(|f| name.contains(f));
+    let mut problems = problems::all();
+    problems.retain(|p| chosen(&p.name, &options.problem) && (!options.quick || is_quick(p)));
+    let mut methods = methods::all();
+    methods.retain(|m| chosen(m.name(), &options.method));
+    ensure!(!problems.is_empty() && !methods.is_empty(), "no problem or method has such a name");
+    let effort = match (options.quick, options.full) {
+        (true, _) => Effort { full: false, rounds: 60, budget_s: 1.5 },
+        (_, true) => Effort { full: true, rounds: 1_000, budget_s: 120.0 },
+        _ => Effort { full: false, rounds: 300, budget_s: 20.0 },
+    };
+    let pinned = OsMeasures { processor: options.processor, ..OsMeasures::NONE }.apply();
+    let noise = Noise::measure(2_000);
+    let bar = ProgressBar::new(problems.len() as u64);
+    bar.set_style(ProgressStyle::with_template("{bar:20} {pos}/{len} {elapsed} {prefix}: {msg}").into_diagnostic()?);
+    bar.enable_steady_tick(Duration::from_millis(200));
+    let mut rows = Vec::new();
+    for problem in &problems {
+        bar.set_prefix(problem.name.clone());
+        let mut tell = |turn: Turn<'_>| bar.set_message(format!("{} {} {}", turn.method, turn.resolution, turn.what));
+        rows.extend(measure::problem(problem, &methods, &effort, &mut tell)?);
+        bar.inc(1);
+    }
+    bar.finish_and_clear();
+    let mut circumstances = circumstances(options, &effort, &noise);
+    for (index, note) in pinned.notes.iter().enumerate() {
+        circumstances.insert(format!("system {}", index + 1), note.text.clone());
+    }
+    let run = Run { circumstances, rows };
+    write(options, &run, &problems, &methods)?;
+    for row in run.rows.iter().filter(|row| !row.failure.is_empty()) {
+        println!("{} by {} at {}: {}", row.problem, row.method, row.resolution, row.failure);
+    }
+    println!("{} rows; read {}", run.rows.len(), options.out.join("report.html").display());
+    Ok(())
+}
+
+fn circumstances(options: &Options, effort: &Effort, noise: &Noise) -> BTreeMap<String, String> {
+    let machine = Machine::here();
+    let extent = if options.quick {
+        "quick"
+    } else if options.full {
+        "full"
+    } else {
+        "normal"
+    };
+    let held = options.processor.map_or_else(|| "not held to a processor".into(), |p| format!("held to processor {p}"));
+    [
+        ("processor", format!("{}, {} threads", machine.processor, machine.threads)),
+        ("system", machine.system),
+        ("commit", machine.commit),
+        ("date", machine.date),
+        ("build", machine.build),
+        (
+            "options",
+            format!("{extent}, {} timed turns, {} s a problem and method, {held}", effort.rounds, effort.budget_s),
+        ),
+        (
+            "noise",
+            format!(
+                "a fixed piece of arithmetic (some 50 us): p99 {:+.1} %, worst {:+.1} % of its median",
+                100.0 * noise.p99_over_median,
+                100.0 * noise.worst_over_median
+            ),
+        ),
+    ]
+    .map(|(key, value)| (key.to_owned(), value))
+    .into()
+}
+
+fn write(options: &Options, run: &Run, problems: &[Problem], methods: &[Box<dyn methods::Method>]) -> Result<()> {
+    let out = &options.out;
+    std::fs::create_dir_all(out).into_diagnostic().wrap_err_with(|| format!("cannot make {}", out.display()))?;
+    let save = |name: &str, text: String| {
+        let path = out.join(name);
+        std::fs::write(&path, text).into_diagnostic().wrap_err_with(|| format!("cannot write {}", path.display()))
+    };
+    save("results.csv", measure::write(run))?;
+    save("report.html", page::page(run, problems, methods)?)
+}

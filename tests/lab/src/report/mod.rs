@@ -1,0 +1,8 @@
+//! `palpate-lab run` and `palpate-lab compare`: the run's CSV, its page, and what changed between two runs.
+mod command;
+mod compare;
+mod page;
+mod plot;
+
+pub use command::{Options, run};
+pub use compare::{Options as CompareOptions, compare, run as run_compare};
