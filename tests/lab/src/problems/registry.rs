@@ -8,29 +8,31 @@ const TOOL_RADIUS_M: f64 = 10e-3;
 const PATCH_RADIUS_M: f64 = 7.5e-3;
 const POISSON_RATIOS: [f64; 3] = [0.3, 0.45, 0.49];
 /// Depths (m) of the sphere past first touch.
-const DEPTHS: [(&str, f64); 2] = [("small", 0.5e-3), ("large", 5e-3)];
-/// Sums (N) of the patch on the block and on the ventricle, whose wall gives way more.
-const FORCES: [(&str, [f64; 2]); 2] = [("small", [0.02, 0.02]), ("large", [0.15, 0.1])];
+const SMALL: (&str, f64) = ("small", 0.5e-3);
+const LARGE: (&str, f64) = ("large", 5e-3);
+/// Sum (N) of the patch's pressure.
+const PATCH_FORCE_N: f64 = 0.02;
 
 /// Every problem.
 pub fn all() -> Vec<Problem> {
     let mut problems = Vec::new();
+    let default = Law::StableNeoHookean;
     for body in [Body::Block, Body::Ventricle] {
         for nu in POISSON_RATIOS {
-            problems.extend(DEPTHS.map(|(size, depth_m)| sphere(body, size, depth_m, nu, Law::StableNeoHookean)));
-            problems.extend(FORCES.map(|(size, forces)| patch(body, size, forces, nu, Law::StableNeoHookean)));
+            problems.push(sphere(body, SMALL, nu, default));
+            problems.push(patch(body, nu, default));
         }
+        problems.push(sphere(body, LARGE, 0.45, default));
     }
-    let (small, large) = (DEPTHS[0], DEPTHS[1]);
-    problems.push(sphere(Body::Block, small.0, small.1, 0.45, Law::StVenantKirchhoff));
-    problems.push(patch(Body::Block, FORCES[0].0, FORCES[0].1, 0.45, Law::StVenantKirchhoff));
-    problems.push(sphere(Body::Block, large.0, large.1, 0.45, Law::FixedCorotated));
+    problems.push(sphere(Body::Block, SMALL, 0.45, Law::StVenantKirchhoff));
+    problems.push(patch(Body::Block, 0.45, Law::StVenantKirchhoff));
+    problems.push(sphere(Body::Block, LARGE, 0.45, Law::FixedCorotated));
     problems.extend(POISSON_RATIOS.map(lame));
     problems.extend([cantilever(), elastica()]);
     problems
 }
 
-fn sphere(body: Body, size: &str, depth_m: f64, nu: f64, law: Law) -> Problem {
+fn sphere(body: Body, (size, depth_m): (&str, f64), nu: f64, law: Law) -> Problem {
     Problem {
         name: format!("{}-sphere-{size}-nu{nu:.2}{}", body.name(), suffix(law)),
         sentence: format!(
@@ -46,17 +48,16 @@ fn sphere(body: Body, size: &str, depth_m: f64, nu: f64, law: Law) -> Problem {
     }
 }
 
-fn patch(body: Body, size: &str, forces_n: [f64; 2], nu: f64, law: Law) -> Problem {
-    let force_n = if body == Body::Block { forces_n[0] } else { forces_n[1] };
+fn patch(body: Body, nu: f64, law: Law) -> Problem {
     Problem {
-        name: format!("{}-patch-{size}-nu{nu:.2}{}", body.name(), suffix(law)),
+        name: format!("{}-patch-small-nu{nu:.2}{}", body.name(), suffix(law)),
         sentence: format!(
-            "A smooth dead pressure of {force_n} N on a patch of 7.5 mm radius presses {}; the answer is the displacement \
+            "A smooth dead pressure of {PATCH_FORCE_N} N on a patch of 7.5 mm radius presses {}; the answer is the displacement \
              conjugate to it.",
             body.sentence()
         ),
         body,
-        action: Action::Patch { radius_m: PATCH_RADIUS_M, force_n },
+        action: Action::Patch { radius_m: PATCH_RADIUS_M, force_n: PATCH_FORCE_N },
         law,
         young_modulus_pa: YOUNG_PA,
         poisson_ratio: nu,
