@@ -1,5 +1,9 @@
 //! What was measured of one method at one resolution on one problem.
 
+/// Differences of time and of error, as fractions, that are ties: what two runs of one method differ by.
+const TIE_TIME: f64 = 0.10;
+const TIE_ERROR: f64 = 0.01;
+
 /// A row of the results. What was not measured is `None`.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Row {
@@ -49,11 +53,14 @@ impl Row {
         self.answer_error.map(f64::abs)
     }
 
-    /// Whether no competing row is both faster and nearer to the answer; false without time or answer, or out of competition.
+    /// Whether no competing row is both faster and nearer to the answer, beyond ties; false without time or answer, or out of competition.
     pub fn is_on_front(&self, all: &[&Self]) -> bool {
         let (Some(time), Some(error), true) = (self.median_us, self.error(), self.competes) else { return false };
         let better = |other: &&Self| match (other.median_us, other.error()) {
-            (Some(t), Some(e)) if other.competes => t <= time && e <= error && (t < time || e < error),
+            (Some(t), Some(e)) if other.competes => {
+                t < (1.0 - TIE_TIME) * time && e <= (1.0 + TIE_ERROR) * error
+                    || t <= time && e < (1.0 - TIE_ERROR) * error
+            }
             _ => false,
         };
         !all.iter().any(better)

@@ -1,7 +1,7 @@
 //! The problems' bodies in tetrahedra.
 use glam::DVec3;
 use miette::{IntoDiagnostic, Result, miette};
-use palpate_physics::{PrescribedSpec, Surface, TetMesh, contact::closest_point};
+use palpate_physics::{PrescribedSpec, Surface, TetMesh, contact::closest_weights};
 use palpate_scene::shapes::{self, BoundaryRegion};
 use std::collections::BTreeMap;
 
@@ -81,12 +81,11 @@ impl Body {
     /// Its resolutions, ascending: those of a quick run, and all.
     pub fn resolutions(self, full: bool) -> &'static [u32] {
         match (self, full) {
-            (Self::Block, false) => &[4, 8, 16],
+            (Self::Block, false) | (Self::Octant, true) => &[4, 8, 16],
             (Self::Block, true) => &[4, 8, 12, 16, 24],
             (Self::Ventricle, false) => &[188, 1_352, 5_000],
             (Self::Ventricle, true) => &[188, 1_352, 5_000, 10_000, 50_000],
             (Self::Octant, false) => &[4, 8],
-            (Self::Octant, true) => &[4, 8, 16],
             (Self::Beam { .. }, false) => &[2, 4],
             (Self::Beam { .. }, true) => &[2, 4, 8],
         }
@@ -133,7 +132,10 @@ impl TetBody {
     pub fn first_touch_m(&self, radius_m: f64) -> DVec3 {
         let distance_m = |along: f64| {
             let centre = self.touch_m + self.normal * along;
-            let distances = self.touched_corners_m().map(|corners| closest_point(centre, corners).distance(centre));
+            let distances = self.touched_corners_m().map(|corners| {
+                let weights = closest_weights(centre, corners);
+                (corners[0] * weights[0] + corners[1] * weights[1] + corners[2] * weights[2]).distance(centre)
+            });
             distances.fold(f64::INFINITY, f64::min)
         };
         let (mut inside, mut outside) = (0.0, 2.0 * radius_m);
