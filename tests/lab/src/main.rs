@@ -1,6 +1,6 @@
 //! `palpate-lab`: run time beside error.
 use clap::{Parser, Subcommand};
-use palpate_lab::{jitter, references, report};
+use palpate_lab::{jitter, references, report, stress};
 
 #[derive(Parser)]
 #[command(
@@ -27,6 +27,8 @@ enum Command {
     /// The two take turns, so that a slow moment of the machine strikes both. Run it as a user with real-time privileges, on
     /// a machine that is doing what it will do in use.
     Jitter(jitter::Options),
+    /// Numerical stress: every row with its pass criterion
+    Stress(stress::Command),
 }
 
 fn main() -> miette::Result<()> {
@@ -36,5 +38,6 @@ fn main() -> miette::Result<()> {
         Command::References(options) => references::run(&options),
         Command::Table => palpate_lab::table::print(),
         Command::Jitter(options) => jitter::print(&options),
+        Command::Stress(command) => stress::run(&command),
     }
 }

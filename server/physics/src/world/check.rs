@@ -2,6 +2,7 @@
 use super::{LoadSpec, MAX_SUBSTEPS, ModelError, ModelSpec, Substeps};
 use crate::{
     contact::{Coupling, LARGEST_TRIANGLE, ToolSpec},
+    material::{Lame, Material, Viscosity},
     mesh::Surface,
 };
 
@@ -11,18 +12,29 @@ pub(super) fn spec(spec: &ModelSpec, surface: &Surface) -> Result<(), ModelError
     for set in &spec.prescribed {
         indices("node", set.nodes.iter().map(|&n| n as usize), nodes)?;
     }
-    for load in &spec.loads {
-        match load {
-            LoadSpec::NodalForces(forces) => indices("node", forces.iter().map(|f| f.0 as usize), nodes)?,
-            LoadSpec::Traction { triangles, .. } | LoadSpec::Pressure { triangles, .. } => {
-                let count = surface.triangles.len();
-                indices("surface triangle", triangles.iter().map(|&t| t as usize), count)?;
-            }
-        }
-    }
+    spec.loads.iter().try_for_each(|load| loaded(load, nodes, surface.triangles.len()))?;
     spec.tools.iter().try_for_each(tool)?;
     spec.tools.iter().try_for_each(|tool| fine_enough(spec, surface, tool))?;
     settings(spec)
+}
+
+fn loaded(load: &LoadSpec, nodes: usize, triangles: usize) -> Result<(), ModelError> {
+    let finite = |name, value: f64| setting(name, value, value.is_finite(), "must be finite");
+    let on = |list: &[u32]| indices("surface triangle", list.iter().map(|&t| t as usize), triangles);
+    match load {
+        LoadSpec::NodalForces(forces) => {
+            indices("node", forces.iter().map(|f| f.0 as usize), nodes)?;
+            forces.iter().try_for_each(|(_, force_n)| finite("nodal force (N)", force_n.length()))
+        }
+        LoadSpec::Traction { triangles, traction_pa } => {
+            on(triangles)?;
+            finite("traction_pa", traction_pa.length())
+        }
+        LoadSpec::Pressure { triangles, pressure_pa, .. } => {
+            on(triangles)?;
+            finite("pressure_pa", *pressure_pa)
+        }
+    }
 }
 
 /// No triangle of the surface is too large for the tool's contact samples.
@@ -68,6 +80,10 @@ fn regions(spec: &ModelSpec) -> Result<(), ModelError> {
     }
     indices("region", spec.tet_region.iter().map(|&r| r as usize), spec.regions.len())?;
     for region in &spec.regions {
+        let Material { lame, viscosity, law: _ } = region.material;
+        let constants =
+            Lame::new(lame.lambda_pa, lame.mu_pa).and(Viscosity::new(viscosity.phi_pa_s, viscosity.psi_pa_s));
+        constants.map_err(|source| ModelError::Material { region: region.name.clone(), source })?;
         let density = region.density_kg_per_m3;
         let ok = density > 0.0 && density.is_finite();
         setting("density_kg_per_m3", density, ok, "must be finite and larger than 0")?;

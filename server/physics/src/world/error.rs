@@ -1,5 +1,5 @@
 //! Why a model cannot be built.
-use crate::mesh::MeshError;
+use crate::{material::ParameterError, mesh::MeshError};
 use glam::DVec3;
 use thiserror::Error;
 
@@ -26,6 +26,14 @@ pub enum ModelError {
         found: usize,
         /// Tets in the mesh.
         expected: usize,
+    },
+    /// A material's constants are impossible.
+    #[error("region \"{region}\": {source}")]
+    Material {
+        /// Name of the region.
+        region: String,
+        /// Which constant and why.
+        source: ParameterError,
     },
     /// A setting outside its range.
     #[error("{name} = {value}: {rule}")]

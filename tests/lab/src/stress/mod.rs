@@ -1,0 +1,141 @@
+//! Numerical stress: every row with its pass criterion, deterministic from a seed, short in CI and long on demand.
+//!
+//! - `outcome.rs`: numbers, limits, known shortfalls
+//! - `table.rs`: the printed table and `stress.csv`
+//! - `rig.rs`, `meshes.rs`, `random.rs`: what rows share
+//! - one file per row
+mod bad_input;
+mod impulses;
+mod incompressible;
+mod meshes;
+mod outcome;
+mod random;
+mod random_scenes;
+mod recovery;
+mod rig;
+mod slivers;
+mod soak;
+mod stiffness_ratio;
+mod table;
+mod time_step;
+
+use clap::Args;
+use miette::{Result, bail};
+pub use outcome::{Measured, Outcome};
+use std::path::PathBuf;
+
+/// How much of a row is run.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Extent {
+    /// For tests: seconds for all rows, unoptimised callers.
+    Reduced,
+    /// The default: about a minute for all rows.
+    #[default]
+    Short,
+    /// On demand: hours.
+    Long,
+}
+
+/// What a row is run with.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Options {
+    /// How much of it.
+    pub extent: Extent,
+    /// Where its random numbers start.
+    pub seed: u64,
+}
+
+impl Options {
+    /// The value for this extent.
+    pub(crate) fn pick<T>(&self, reduced: T, short: T, long: T) -> T {
+        match self.extent {
+            Extent::Reduced => reduced,
+            Extent::Short => short,
+            Extent::Long => long,
+        }
+    }
+}
+
+/// One row of the suite.
+#[derive(Debug, Clone, Copy)]
+pub struct Row {
+    /// Name on the command line.
+    pub name: &'static str,
+    /// What passes, in words.
+    pub criterion: &'static str,
+    /// Runs it.
+    pub run: fn(&Options) -> Result<Outcome>,
+}
+
+/// Every row, in the order of the table.
+pub const ROWS: [Row; 9] = [
+    Row { name: "time-step", criterion: time_step::CRITERION, run: time_step::run },
+    Row { name: "stiffness-ratio", criterion: stiffness_ratio::CRITERION, run: stiffness_ratio::run },
+    Row { name: "incompressible", criterion: incompressible::CRITERION, run: incompressible::run },
+    Row { name: "recovery", criterion: recovery::CRITERION, run: recovery::run },
+    Row { name: "impulses", criterion: impulses::CRITERION, run: impulses::run },
+    Row { name: "soak", criterion: soak::CRITERION, run: soak::run },
+    Row { name: "bad-input", criterion: bad_input::CRITERION, run: bad_input::run },
+    Row { name: "slivers", criterion: slivers::CRITERION, run: slivers::run },
+    Row { name: "random-scenes", criterion: random_scenes::CRITERION, run: random_scenes::run },
+];
+
+/// What the suite should have and cannot have yet: name and reason.
+pub const NOT_BUILT: [(&str, &str); 1] = [("activation", "not built yet: hybrid model")];
+
+/// `palpate-lab stress`.
+#[derive(Debug, Clone, Args)]
+pub struct Command {
+    /// Rows to run; all of them if none is named
+    rows: Vec<String>,
+    /// Long form: a soak of ten million ticks, ten thousand random scenes
+    #[arg(long)]
+    long: bool,
+    /// Seed of all random numbers
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// Folder for stress.csv
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+}
+
+/// Runs rows and prints them; writes `stress.csv` if asked to.
+///
+/// # Errors
+/// A row that falls short without being known to, an unknown name, or a file that cannot be written.
+pub fn run(command: &Command) -> Result<()> {
+    let rows = selected(&command.rows)?;
+    let options = Options { extent: if command.long { Extent::Long } else { Extent::Short }, seed: command.seed };
+    let mut results = Vec::with_capacity(rows.len());
+    for row in rows {
+        let started = std::time::Instant::now();
+        let outcome = (row.run)(&options)?;
+        table::print(&row, &outcome, started.elapsed().as_secs_f64());
+        results.push((row, outcome));
+    }
+    for (name, reason) in NOT_BUILT.iter().filter(|_| command.rows.is_empty()) {
+        println!("{name}: {reason}");
+    }
+    if let Some(folder) = &command.out {
+        println!("wrote {}", table::write_csv(folder, &options, &results)?.display());
+    }
+    let surprises: Vec<&str> = results.iter().filter(|(_, o)| o.surprises()).map(|(row, _)| row.name).collect();
+    if surprises.is_empty() {
+        return Ok(());
+    }
+    let again = format!("again with: palpate-lab stress {} --seed {}", surprises.join(" "), options.seed);
+    bail!(help = again, "fell short without being known to: {}", surprises.join(", "))
+}
+
+fn selected(names: &[String]) -> Result<Vec<Row>> {
+    if names.is_empty() {
+        return Ok(ROWS.to_vec());
+    }
+    let find = |name: &String| {
+        ROWS.iter().find(|row| row.name == name).copied().ok_or_else(|| {
+            let known: Vec<&str> = ROWS.iter().map(|row| row.name).collect();
+            miette::miette!("no row is called \"{name}\"; there are: {}", known.join(", "))
+        })
+    };
+    names.iter().map(find).collect()
+}

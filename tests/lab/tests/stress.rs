@@ -1,0 +1,77 @@
+//! The rows of the stress suite in reduced size: each comes out as the documentation says.
+#![allow(clippy::unwrap_used)]
+use palpate_lab::stress::{Extent, Options, Outcome, ROWS};
+
+fn outcome(name: &str, seed: u64) -> Outcome {
+    let row = ROWS.iter().find(|row| row.name == name).unwrap();
+    let outcome = (row.run)(&Options { extent: Extent::Reduced, seed }).unwrap();
+    for m in &outcome.measured {
+        println!("{name}: {} = {:e} {} (limit {:?})", m.name, m.value, m.unit, m.limit);
+    }
+    println!("{name}: {}", outcome.reason());
+    outcome
+}
+
+fn passes(name: &str) {
+    for seed in [1, 1000] {
+        let outcome = outcome(name, seed);
+        assert!(outcome.passed() && outcome.measured.iter().any(|m| m.limit.is_some()), "{name}: {}", outcome.reason());
+    }
+}
+
+/// What exceeds its limit is known to, and is exactly this many numbers.
+fn falls_short_as_known(name: &str, numbers: usize) {
+    let outcome = outcome(name, 1);
+    assert!(!outcome.surprises(), "{name}: {}", outcome.reason());
+    let over = outcome.measured.iter().filter(|m| !m.holds()).count();
+    assert_eq!(over, numbers, "{name}: {}", outcome.reason());
+}
+
+/// Bounded below the limit; above it nothing notices what grows before it overflows.
+#[test]
+fn time_step() {
+    falls_short_as_known("time-step", 3);
+}
+
+#[test]
+fn stiffness_ratio() {
+    falls_short_as_known("stiffness-ratio", 5);
+}
+
+/// Linear tetrahedra lock: on so coarse a mesh at every ν of the row.
+#[test]
+fn incompressible() {
+    falls_short_as_known("incompressible", 4);
+}
+
+#[test]
+fn recovery() {
+    passes("recovery");
+}
+
+#[test]
+fn impulses() {
+    falls_short_as_known("impulses", 4);
+}
+
+/// The default step's energy oscillates; that it does not drift and repeats itself bit by bit is asked of both steps.
+#[test]
+fn soak() {
+    let outcome = outcome("soak", 1);
+    assert!(!outcome.surprises(), "{}", outcome.reason());
+}
+
+#[test]
+fn bad_input() {
+    passes("bad-input");
+}
+
+#[test]
+fn slivers() {
+    passes("slivers");
+}
+
+#[test]
+fn random_scenes() {
+    passes("random-scenes");
+}
