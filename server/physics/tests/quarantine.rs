@@ -3,7 +3,7 @@
 mod rig;
 use glam::DVec3;
 use palpate_physics::{
-    ModelSpec, PointForce, State, StepReport,
+    LoadSpec, Model, ModelSpec, PointForce, State, StepReport,
     contact::{Coupling, ToolTarget},
     material::Law,
     snapshot,
@@ -107,4 +107,24 @@ fn inputs_of_the_wrong_length_are_replaced_and_counted() {
     let drive = Drive { tools: vec![at(DVec3::ONE); 2], load_factors: vec![1.0], ..Drive::default() };
     assert_eq!(bad.tick(&drive).inputs_rejected, 3);
     assert_eq!(bad.state, good.state);
+}
+
+/// Constants and loads that are not finite were once taken into the model, and spoilt its first tick instead.
+#[test]
+fn a_model_of_what_is_not_finite_is_refused_by_name() {
+    let spoilt = |spoil: &dyn Fn(&mut ModelSpec)| {
+        let mut spec = pressed_block();
+        spoil(&mut spec);
+        Model::build(spec).unwrap_err().to_string()
+    };
+    let load = |load: LoadSpec| spoilt(&|spec: &mut ModelSpec| spec.loads = vec![load.clone()]);
+    for bad in [f64::NAN, f64::INFINITY] {
+        assert!(spoilt(&|spec| spec.regions[0].material.lame.mu_pa = bad).contains("region \"all\": lambda_pa"));
+        assert!(spoilt(&|spec| spec.regions[0].material.viscosity.psi_pa_s = bad).contains("viscosity_psi_pa_s"));
+        assert!(load(LoadSpec::NodalForces(vec![(0, DVec3::X * bad)])).contains("nodal force"));
+        assert!(load(LoadSpec::Traction { triangles: vec![0], traction_pa: DVec3::X * bad }).contains("traction_pa"));
+        assert!(
+            load(LoadSpec::Pressure { triangles: vec![0], pressure_pa: bad, follower: true }).contains("pressure_pa")
+        );
+    }
 }

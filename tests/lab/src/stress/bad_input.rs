@@ -34,7 +34,7 @@ pub(super) fn run(options: &Options) -> Result<Outcome> {
             match built {
                 Ok(()) => outcome.demand(false, || format!("{} = {bad} was accepted", FIELDS[field])),
                 Err(text) => {
-                    outcome.demand(text.len() > 10, || format!("{} = {bad}: says only \"{text}\"", FIELDS[field]))
+                    outcome.demand(text.len() > 10, || format!("{} = {bad}: says only \"{text}\"", FIELDS[field]));
                 }
             }
         }
@@ -80,7 +80,9 @@ fn pressed(options: &Options) -> Result<Rig> {
 
 fn pressing(model: &Model) -> Drive {
     let mut drive = Drive::still(model);
-    drive.tools.iter_mut().for_each(|tool| tool.position_m.z -= 0.002);
+    for tool in &mut drive.tools {
+        tool.position_m.z -= 0.002;
+    }
     drive.load_factors.fill(1.0);
     drive
 }

@@ -51,7 +51,9 @@ pub(super) fn shell_octant(inner_m: f64, outer_m: f64, cells: usize, layers: usi
         }
     }
     // The diagonals of a prism's sides go from the lower number below to the higher above: neighbours agree.
-    triangles.iter_mut().for_each(|triangle| triangle.sort_unstable());
+    for triangle in &mut triangles {
+        triangle.sort_unstable();
+    }
     let radius_m = |layer: usize| inner_m + (outer_m - inner_m) * layer as f64 / layers as f64;
     let positions = (0..=layers).flat_map(|layer| directions.iter().map(move |d| *d * radius_m(layer))).collect();
     let mut tets = Vec::with_capacity(3 * layers * triangles.len());
