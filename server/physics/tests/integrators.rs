@@ -9,7 +9,8 @@ use palpate_physics::{
 };
 use rig::{Drive, Rig, at, body, bricks, even, hold, material, nodes_where, sphere};
 
-const ALL: [Integrator; 3] = [Integrator::Leapfrog, Integrator::SeedVerlet, Integrator::SeedSemiImplicit];
+const ALL: [Integrator; 4] =
+    [Integrator::Leapfrog, Integrator::SeedVerlet, Integrator::SeedSemiImplicit, Integrator::BackwardEuler];
 
 fn block(h_m: f64, poisson: f64) -> ModelSpec {
     let side = even(-2.0 * h_m, 2.0 * h_m, 4);
@@ -33,6 +34,7 @@ fn distance(p: &[DVec3], q: &[DVec3]) -> f64 {
 fn swung(integrator: Integrator, substeps: u32) -> Vec<DVec3> {
     let mut spec = held_block(integrator);
     spec.settings.substeps = Substeps::Fixed(substeps);
+    spec.settings.solver_tolerance = 1e-10;
     spec.gravity_m_per_s2 = DVec3::new(20.0, 0.0, -30.0);
     let mut rig = Rig::new(spec);
     for _ in 0..30 {
@@ -44,9 +46,12 @@ fn swung(integrator: Integrator, substeps: u32) -> Vec<DVec3> {
 
 #[test]
 fn orders_in_time() {
-    for (integrator, wanted, coarsest) in
-        [(Integrator::Leapfrog, 2.0, 8), (Integrator::SeedVerlet, 2.0, 8), (Integrator::SeedSemiImplicit, 1.0, 64)]
-    {
+    for (integrator, wanted, coarsest) in [
+        (Integrator::Leapfrog, 2.0, 8),
+        (Integrator::SeedVerlet, 2.0, 8),
+        (Integrator::SeedSemiImplicit, 1.0, 64),
+        (Integrator::BackwardEuler, 1.0, 16),
+    ] {
         let [a, b, c] = [1, 2, 4].map(|times| swung(integrator, coarsest * times));
         let order = (distance(&a, &b) / distance(&b, &c)).log2();
         println!("{integrator:?}: order {order:.3}");
@@ -77,7 +82,7 @@ fn momentum_left(integrator: Integrator, h_m: f64, substeps: u32) -> f64 {
 
 #[test]
 fn only_the_semi_implicit_seed_drags_rigid_motion() {
-    for integrator in [Integrator::Leapfrog, Integrator::SeedVerlet] {
+    for integrator in [Integrator::Leapfrog, Integrator::SeedVerlet, Integrator::BackwardEuler] {
         let left = momentum_left(integrator, 0.005, 8);
         assert!((left - 1.0).abs() < 1e-12, "{integrator:?}: {left}");
     }
@@ -212,9 +217,12 @@ fn an_enormous_force_is_quarantined() {
 /// What the ledger says while the block swings: second order for leapfrog, first for the seeds.
 #[test]
 fn the_ledger_balances_to_the_scheme_s_order() {
-    for (integrator, wanted) in
-        [(Integrator::Leapfrog, 1.9), (Integrator::SeedVerlet, 0.9), (Integrator::SeedSemiImplicit, 0.9)]
-    {
+    for (integrator, wanted) in [
+        (Integrator::Leapfrog, 1.9),
+        (Integrator::SeedVerlet, 0.9),
+        (Integrator::SeedSemiImplicit, 0.9),
+        (Integrator::BackwardEuler, 1.9),
+    ] {
         let imbalance = |substeps: u32| {
             let mut spec = held_block(integrator);
             spec.settings.substeps = Substeps::Fixed(substeps);
@@ -232,4 +240,109 @@ fn the_ledger_balances_to_the_scheme_s_order() {
         println!("{integrator:?}: {a:.2e} {b:.2e} J, order {:.2}", (a / b).log2());
         assert!((a / b).log2() > wanted, "{integrator:?}: {a:e} {b:e}");
     }
+}
+
+/// A free block thrown into vibration: what backward Euler does to momentum is what its solver leaves.
+#[test]
+fn backward_euler_keeps_momentum_to_its_solver_s_tolerance() {
+    for law in [Law::StVenantKirchhoff, Law::StableNeoHookean, Law::FixedCorotated] {
+        let mut spec = block(0.01, 0.4);
+        spec.regions[0].material = material(law, 10e3, 0.4);
+        spec.settings.integrator = Integrator::BackwardEuler;
+        spec.settings.solver_tolerance = 1e-9;
+        let mut rig = Rig::new(spec);
+        for (v, x) in rig.state.v.iter_mut().zip(&rig.state.x) {
+            *v = DVec3::X + DVec3::new((90.0 * x.y).sin(), (70.0 * x.z).cos(), (80.0 * x.x).sin()) * 0.2;
+        }
+        let momentum = |rig: &Rig| rig.state.v.iter().zip(rig.model.mass_kg()).map(|(v, m)| *v * *m).sum::<DVec3>();
+        let before = momentum(&rig);
+        for _ in 0..50 {
+            let drive = rig.still();
+            rig.tick(&drive);
+        }
+        let change = (momentum(&rig) - before).length() / before.length();
+        println!("{law:?}: momentum changed by {change:.1e} in 50 steps");
+        assert!(change < 1e-8, "{change:e}");
+    }
+}
+
+/// Steps of 1, 10 and 100 times leapfrog's limit: the energy of a body that nothing drives only falls.
+#[test]
+fn backward_euler_is_bounded_at_a_hundred_times_the_explicit_limit() {
+    for law in [Law::StVenantKirchhoff, Law::StableNeoHookean, Law::FixedCorotated] {
+        for times in [1.0, 10.0, 100.0] {
+            let mut spec = held_block(Integrator::BackwardEuler);
+            spec.regions[0].material = material(law, 10e3, 0.4);
+            let omega = Rig::new(spec.clone()).model.max_natural_frequency_rad_per_s();
+            spec.settings.tick_period_s = times * 2.0 / omega;
+            let mut rig = Rig::new(spec);
+            for (v, x) in rig.state.v.iter_mut().zip(rig.model.rest_positions_m()) {
+                let alternating = if ((x.x + x.y) * 100.0).round() as i64 % 2 == 0 { 1.0 } else { -1.0 };
+                if x.z > -0.0199 {
+                    *v = DVec3::new(alternating, -alternating, 0.5) * 0.2;
+                }
+            }
+            let mut before = Energies::of(&rig.model, &rig.state);
+            let start = before.held_j();
+            for tick in 0..200 {
+                let drive = rig.still();
+                assert!(rig.tick(&drive).quarantined.is_none(), "{law:?} {times}");
+                let now = Energies::of(&rig.model, &rig.state);
+                let grown = (now.held_j() - before.held_j()) / start;
+                assert!(grown < 1e-9, "{law:?} {times} x, tick {tick}: energy grew by {grown:e}");
+                before = now;
+            }
+            assert!(before.held_j() < start, "{law:?} {times}");
+        }
+    }
+}
+
+/// A block pressed by a rigid sphere that rests: the implicit step and leapfrog come to the same force and shape.
+#[test]
+fn backward_euler_presses_as_leapfrog_does() {
+    let settle = |integrator: Integrator| {
+        let mut spec = held_block(integrator);
+        spec.settings.mass_damping_per_s = 100.0;
+        spec.tools = vec![sphere(0.008, DVec3::new(0.0, 0.0, 0.0085), Coupling::Rigid)];
+        let mut rig = Rig::new(spec);
+        for tick in 0..800 {
+            let z = 0.0085 - 0.003 * (f64::from(tick) / 100.0).min(1.0);
+            assert!(rig.tick_at(DVec3::Z * z).quarantined.is_none());
+        }
+        (rig.state.tools[0].device_force_n, rig.state.x)
+    };
+    let (explicit, implicit) = (settle(Integrator::Leapfrog), settle(Integrator::BackwardEuler));
+    println!("{} N, {} N, {:.1e} m apart", explicit.0, implicit.0, distance(&explicit.1, &implicit.1));
+    assert!(explicit.0.z > 0.02);
+    assert!((explicit.0 - implicit.0).length() < 1e-6 * explicit.0.z);
+    assert!(distance(&explicit.1, &implicit.1) < 1e-7);
+}
+
+/// Stiff, viscous and pressed fast at one step a tick: what leapfrog needs hundreds of substeps for stays finite and pushes back.
+#[test]
+fn backward_euler_bears_stiff_viscous_contact_at_one_step_a_tick() {
+    let mut spec = held_block(Integrator::BackwardEuler);
+    spec.regions[0].material = material(Law::StableNeoHookean, 1e6, 0.45);
+    spec.regions[0].material.viscosity = palpate_physics::material::Viscosity { phi_pa_s: 500.0, psi_pa_s: 500.0 };
+    spec.tools = vec![sphere(0.008, DVec3::new(0.0, 0.0, 0.0085), Coupling::Rigid)];
+    spec.tools[0].friction_coefficient = 0.5;
+    let explicit = {
+        let mut explicit = spec.clone();
+        explicit.settings.integrator = Integrator::Leapfrog;
+        Rig::new(explicit).model.substeps()
+    };
+    let mut rig = Rig::new(spec);
+    assert_eq!(rig.model.substeps(), 1);
+    let mut largest = 0.0_f64;
+    for tick in 0..500 {
+        let t = f64::from(tick) * 1e-3;
+        let device = DVec3::new(0.004 * (60.0 * t).sin(), 0.0, 0.0085 - 0.002 * (30.0 * t).sin());
+        assert!(rig.tick_at(device).quarantined.is_none());
+        largest = largest.max(rig.state.tools[0].device_force_n.length());
+        let moved =
+            rig.state.x.iter().zip(rig.model.rest_positions_m()).map(|(x, r)| x.distance(*r)).fold(0.0, f64::max);
+        assert!(moved < 0.004, "tick {tick}: {moved}");
+    }
+    println!("leapfrog would take {explicit} substeps; largest force {largest:.2} N");
+    assert!(explicit > 100 && largest > 1.0 && largest < 100.0, "{explicit} {largest}");
 }

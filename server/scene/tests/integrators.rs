@@ -25,10 +25,11 @@ integrator = "{integrator}"
     parse(&text, "t.toml", None, &Limits::local(), &mut |_, _| {})
 }
 
-const NAMES: [(&str, Integrator); 3] = [
+const NAMES: [(&str, Integrator); 4] = [
     ("leapfrog", Integrator::Leapfrog),
     ("seed-verlet", Integrator::SeedVerlet),
     ("seed-semi-implicit", Integrator::SeedSemiImplicit),
+    ("backward-euler", Integrator::BackwardEuler),
 ];
 
 #[test]
@@ -58,5 +59,16 @@ fn another_name_is_answered_with_those_there_are() {
     let message = scene("midpoint").unwrap_err().one_line();
     for (name, _) in NAMES {
         assert!(message.contains(name), "{message}");
+    }
+}
+
+#[test]
+fn the_solver_s_keys_are_read_and_held_to_their_ranges() {
+    let with = |keys: &str| scene(&format!("backward-euler\"\n{keys}#"));
+    let settings = with("solver_iterations = 7\nsolver_tolerance = 0.25").unwrap().model.settings;
+    assert_eq!((settings.solver_iterations, settings.solver_tolerance), (7, 0.25));
+    for wrong in ["solver_iterations = 0", "solver_tolerance = 0", "solver_tolerance = 1.5"] {
+        let message = with(wrong).unwrap_err().one_line();
+        assert!(message.contains(wrong.split(' ').next().unwrap()), "{message}");
     }
 }

@@ -147,6 +147,12 @@ impl Foundation {
         }
     }
 
+    /// The triangle of a sample, and the number after its last one.
+    pub(super) fn triangle_of(&self, sample: u32) -> (usize, u32) {
+        let next = self.first_sample.partition_point(|&first| first <= sample);
+        (next - 1, self.first_sample.get(next).copied().unwrap_or(self.samples as u32))
+    }
+
     /// Force (N) that presses a sphere to depth `d` into a flat foundation: `∫ k_f (d − r²/2R) dA = π k_f R d²`.
     pub(super) fn flat_force_n(&self, radius_m: f64, depth_m: f64) -> f64 {
         PI * self.typical_pa_per_m * radius_m * depth_m * depth_m

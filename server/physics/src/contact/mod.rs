@@ -12,6 +12,7 @@ mod proxy;
 mod resting;
 mod spring;
 mod state;
+mod tangent;
 mod tool;
 mod touching;
 mod triangle;
@@ -21,6 +22,7 @@ pub use proxy::SubstepTime;
 pub(crate) use resting::{Pressing, RestingContact};
 pub(crate) use spring::SaturatingSpring;
 pub use state::ContactState;
+pub(crate) use tangent::{ContactTangents, StepAhead};
 pub use tool::{Coupling, LocalContactModel, ToolSpec, ToolState, ToolTarget};
 pub use triangle::closest_weights;
 

@@ -23,7 +23,7 @@ use glam::DVec3;
 
 /// τ: tangential over normal stiffness of the foundation; Mindlin's ratio 2(1 − ν)/(2 − ν) is 0.71 at ν = 0.45 and 0.82 at 0.3.
 /// At most 1, or the bound of the frequency fails.
-const TANGENTIAL_RATIO: f64 = 0.75;
+pub(super) const TANGENTIAL_RATIO: f64 = 0.75;
 
 /// What one tool meets at one instant.
 #[derive(Debug, Clone, Copy)]

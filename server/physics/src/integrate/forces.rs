@@ -14,13 +14,15 @@ pub(super) struct Tick<'a> {
 }
 
 /// When forces are evaluated.
-pub(super) struct Instant {
+struct Instant {
     /// Part of the tick that is over.
-    pub(super) fraction: f64,
+    fraction: f64,
+    /// The same for loads.
+    load_fraction: f64,
     /// Step that led here (s); 0 at the start.
-    pub(super) dt_s: f64,
+    dt_s: f64,
     /// Bound of the speed (m/s) with which any node came here.
-    pub(super) fastest_m_per_s: f64,
+    fastest_m_per_s: f64,
 }
 
 impl Tick<'_> {
@@ -33,14 +35,29 @@ impl Tick<'_> {
     pub(super) fn make_force_current(&self, state: &mut State, scratch: &mut Scratch) {
         if !state.force_is_current {
             state.contact.forget_geometry();
-            self.evaluate(state, scratch, &Instant { fraction: 0.0, dt_s: 0.0, fastest_m_per_s: 0.0 });
+            self.evaluate(
+                state,
+                scratch,
+                &Instant { fraction: 0.0, load_fraction: 0.0, dt_s: 0.0, fastest_m_per_s: 0.0 },
+            );
         }
+    }
+
+    /// Forces at the start of substep `number` (from 1), with loads and injected forces as at its end.
+    pub(super) fn evaluate_before(&self, number: u32, state: &mut State, scratch: &mut Scratch) {
+        if !state.force_is_current {
+            state.contact.forget_geometry();
+        }
+        let part = |substeps_done: u32| f64::from(substeps_done) / f64::from(self.model.substeps());
+        let (fraction, load_fraction) = (part(number - 1), part(number));
+        self.evaluate(state, scratch, &Instant { fraction, load_fraction, dt_s: 0.0, fastest_m_per_s: 0.0 });
     }
 
     /// Forces at the end of substep `number` (from 1), to which the nodes came with at most `fastest_m_per_s`.
     pub(super) fn evaluate_after(&self, number: u32, fastest_m_per_s: f64, state: &mut State, scratch: &mut Scratch) {
         let fraction = f64::from(number) / f64::from(self.model.substeps());
-        self.evaluate(state, scratch, &Instant { fraction, dt_s: self.dt_s(), fastest_m_per_s });
+        let now = Instant { fraction, load_fraction: fraction, dt_s: self.dt_s(), fastest_m_per_s };
+        self.evaluate(state, scratch, &now);
     }
 
     /// Total force at the present positions into `state.force_n`, its external part into `state.external_n`.
@@ -49,7 +66,7 @@ impl Tick<'_> {
         let external = &mut state.external_n;
         external.fill(DVec3::ZERO);
         for (index, load) in model.spec().loads.iter().enumerate() {
-            let factor = loads.factor(state.load_factors[index], input, index, now.fraction);
+            let factor = loads.factor(state.load_factors[index], input, index, now.load_fraction);
             if factor != 0.0 {
                 add_load_n(load, factor, model.surface(), (model.rest_positions_m(), &state.x), external);
             }

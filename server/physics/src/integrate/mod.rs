@@ -1,12 +1,14 @@
 //! Time integrators, one file each, and the spectrum that bounds the explicit ones' step.
+mod backward_euler;
 mod forces;
 mod leapfrog;
 mod motion;
+mod pcg;
 mod scheme;
 pub mod seed_semi_implicit;
 mod seed_verlet;
 pub mod spectrum;
 mod tick;
 
-pub(crate) use scheme::{Body, Scheme};
+pub(crate) use scheme::{Body, ImplicitScratch, Scheme};
 pub use tick::step;

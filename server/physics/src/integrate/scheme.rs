@@ -1,13 +1,17 @@
 //! The integrator of a model with all that its rest state fixes.
 use super::{
+    backward_euler,
     forces::Tick,
     leapfrog,
+    pcg::PcgScratch,
     seed_semi_implicit::{self, NodalImplicit, nodal_stiffness_n_per_m},
     seed_verlet,
+    spectrum::RestStiffness,
 };
 use crate::{
-    integrate::spectrum::RestStiffness,
-    world::{Integrator, Scratch, State},
+    contact::ContactTangents,
+    material::{Lame, Law, Material, Viscosity},
+    world::{Integrator, Model, Scratch, State},
 };
 use glam::DVec3;
 
@@ -17,6 +21,7 @@ pub(crate) enum Scheme {
     Leapfrog,
     SeedVerlet,
     SeedSemiImplicit(NodalImplicit),
+    BackwardEuler(NodalImplicit),
 }
 
 /// What it is made for.
@@ -37,7 +42,13 @@ impl Scheme {
             Integrator::SeedVerlet => Self::SeedVerlet,
             Integrator::SeedSemiImplicit => {
                 let nodal = nodal_stiffness_n_per_m(&body.at_rest);
-                Self::SeedSemiImplicit(NodalImplicit::new(&nodal, body.inverse_mass_per_kg, body.mass_kg, body.dt_s))
+                Self::SeedSemiImplicit(NodalImplicit::new(&nodal, None, body))
+            }
+            Integrator::BackwardEuler => {
+                let nodal = nodal_stiffness_n_per_m(&body.at_rest);
+                let as_elastic: Vec<Material> = body.at_rest.materials.iter().map(viscosity_as_stiffness).collect();
+                let viscous = nodal_stiffness_n_per_m(&RestStiffness { materials: &as_elastic, ..body.at_rest });
+                Self::BackwardEuler(NodalImplicit::new(&nodal, Some(&viscous), body))
             }
         }
     }
@@ -48,6 +59,35 @@ impl Scheme {
             Self::Leapfrog => leapfrog::run(tick, state, scratch),
             Self::SeedVerlet => seed_verlet::run(tick, state, scratch),
             Self::SeedSemiImplicit(nodal) => seed_semi_implicit::run(tick, nodal, state, scratch),
+            Self::BackwardEuler(nodal) => backward_euler::run(tick, nodal, state, scratch),
+        }
+    }
+}
+
+/// A material that at rest answers strain as this one's viscosity answers its rate: λ = φ, µ = ψ.
+fn viscosity_as_stiffness(material: &Material) -> Material {
+    let Viscosity { phi_pa_s, psi_pa_s } = material.viscosity;
+    Material { lame: Lame { lambda_pa: phi_pa_s, mu_pa: psi_pa_s }, law: Law::StVenantKirchhoff, ..*material }
+}
+
+/// Buffers of implicit schemes; empty for others.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct ImplicitScratch {
+    pub(super) pcg: PcgScratch,
+    pub(super) tangents: ContactTangents,
+    /// Products with the matrix since this scratch was made.
+    pub(crate) products: u64,
+}
+
+impl ImplicitScratch {
+    pub(crate) fn new(model: &Model) -> Self {
+        match model.spec().settings.integrator {
+            Integrator::BackwardEuler => Self {
+                pcg: PcgScratch::new(model.mass_kg().len()),
+                tangents: ContactTangents::new(model.contact()),
+                products: 0,
+            },
+            _ => Self::default(),
         }
     }
 }

@@ -14,7 +14,7 @@
 //! - It is not unconditionally stable. For a mode with `k = dt²κ/m`, `d = dt²δ/m`: `(1 + d)z² − (2 + d − k)z + 1 = 0`, so
 //!   `|z| ≤ 1` needs `k ≤ 4 + 2d`: any step only where λ_max(D⁻¹K) ≤ 2, and tets have 2.2 to 3.3. Leapfrog's condition `k ≤ 4`
 //!   always suffices, and is what measured substeps keep; `Substeps::Fixed(1)` is what the paper runs.
-//! - It is of first order in time.
+//! - It is of first order in time, and what pushes during a step acts in the next one.
 //!
 //! On a held axis the velocity is given and its coupling to the node's other axes left out. Forces other than the body's
 //! own (contact, viscous stress) are explicit.
@@ -25,6 +25,7 @@
 use super::{
     forces::Tick,
     motion::{damp, drift, holders_power_w},
+    scheme::Body,
     spectrum::RestStiffness,
 };
 use crate::world::{Model, Scratch, State};
@@ -40,31 +41,30 @@ pub(crate) struct NodalImplicit {
 }
 
 impl NodalImplicit {
-    /// For steps `dt_s`. `inverse_mass_per_kg` is zero on held axes.
-    pub(crate) fn new(
-        nodal_stiffness_n_per_m: &[DMat3],
-        inverse_mass_per_kg: &[DVec3],
-        mass_kg: &[f64],
-        dt_s: f64,
-    ) -> Self {
-        let free = |inverse_mass: &DVec3| DVec3::select(inverse_mass.cmpeq(DVec3::ZERO), DVec3::ZERO, DVec3::ONE);
-        let stiffness_n_per_m: Vec<DMat3> = nodal_stiffness_n_per_m
-            .iter()
-            .zip(inverse_mass_per_kg)
-            .map(|(stiffness, inverse_mass)| {
-                let free = DMat3::from_diagonal(free(inverse_mass));
-                free * *stiffness * free
-            })
-            .collect();
-        let inverse_per_kg = stiffness_n_per_m
-            .iter()
-            .zip(inverse_mass_per_kg.iter().zip(mass_kg))
-            .map(|(stiffness, (inverse_mass, mass))| {
-                let matrix = DMat3::from_diagonal(DVec3::splat(*mass)) + *stiffness * (dt_s * dt_s);
-                matrix.inverse() * DMat3::from_diagonal(free(inverse_mass))
-            })
-            .collect();
+    /// For steps `dt_s`, with a further matrix `dt C_i` inside the inverse where a scheme has one.
+    pub(super) fn new(nodal_n_per_m: &[DMat3], viscous_n_s_per_m: Option<&[DMat3]>, body: &Body<'_>) -> Self {
+        let Body { inverse_mass_per_kg, mass_kg, dt_s, .. } = *body;
+        let free = |inverse_mass: DVec3| {
+            DMat3::from_diagonal(DVec3::select(inverse_mass.cmpeq(DVec3::ZERO), DVec3::ZERO, DVec3::ONE))
+        };
+        let on_free = |blocks: &[DMat3]| -> Vec<DMat3> {
+            blocks.iter().zip(inverse_mass_per_kg).map(|(block, m)| free(*m) * *block * free(*m)).collect()
+        };
+        let stiffness_n_per_m = on_free(nodal_n_per_m);
+        let viscous = viscous_n_s_per_m.map(on_free);
+        let inverse_of = |node: usize| {
+            let viscous = viscous.as_ref().map_or(DMat3::ZERO, |viscous| viscous[node]);
+            let matrix =
+                DMat3::from_diagonal(DVec3::splat(mass_kg[node])) + (stiffness_n_per_m[node] * dt_s + viscous) * dt_s;
+            matrix.inverse() * free(inverse_mass_per_kg[node])
+        };
+        let inverse_per_kg = (0..mass_kg.len()).map(inverse_of).collect();
         Self { stiffness_n_per_m, inverse_per_kg }
+    }
+
+    /// `(M + dt² D + dt C)⁻¹` (1/kg) per node.
+    pub(super) fn inverse_per_kg(&self) -> &[DMat3] {
+        &self.inverse_per_kg
     }
 }
 

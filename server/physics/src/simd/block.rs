@@ -6,7 +6,9 @@
 #![allow(unsafe_code)] // unchecked node indices in gather and scatter: 10 % of the kernel's time (docs/adr)
 use super::{
     laws::{Constants, LaneLaw, M3, columns, plus, rows, viscous},
+    products,
     real::{Real, Scalar, Vector},
+    tangents::LaneTangent,
 };
 use crate::material::Material;
 use glam::DMat3;
@@ -69,6 +71,8 @@ pub(super) struct Job<'a, T, const N: usize> {
     displacements: &'a [Node],
     velocities: &'a [Node],
     sums: &'a mut [Sum],
+    /// Factors of elastic and viscous stiffness; products only.
+    factors: [f64; 2],
 }
 
 impl<'a, T: Scalar, const N: usize> Job<'a, T, N> {
@@ -84,7 +88,20 @@ impl<'a, T: Scalar, const N: usize> Job<'a, T, N> {
         let entries = blocks.nodes + 1;
         assert!(displacements.len() == entries && sums.len() == entries, "buffers of another kernel");
         assert!(run.material.viscosity.is_zero() || velocities.len() == entries, "buffers of another kernel");
-        Self { blocks: blocks.of(run), constants: run.constants, displacements, velocities, sums }
+        Self { blocks: blocks.of(run), constants: run.constants, displacements, velocities, sums, factors: [1.0; 2] }
+    }
+
+    /// The same for products with `directions`, which every run needs.
+    pub(super) fn for_products(
+        blocks: &'a Blocks<T, N>,
+        run: &Run<T>,
+        displacements: &'a [Node],
+        directions: &'a [Node],
+        sums: &'a mut [Sum],
+        factors: [f64; 2],
+    ) -> Self {
+        assert!(directions.len() == blocks.nodes + 1, "buffers of another kernel");
+        Self { factors, ..Self::new(blocks, run, displacements, directions, sums) }
     }
 }
 
@@ -97,9 +114,40 @@ pub(super) type Lanes<T, const N: usize> = [[T; N]; 9];
 /// Blocks that are gathered, computed and scattered together.
 const BATCH: usize = 4;
 
-/// Adds the forces of all blocks to the sums, computed in vectors `V`; returns the viscous power (W).
+/// One pass over the blocks of a run.
+pub(super) trait Pass {
+    /// Adds what each tet gives to the sums, computed in vectors `V`; returns the viscous power (W) if forces are what it adds.
+    fn run<V: Vector<Scalar = T>, T: Scalar, L: LaneTangent, const VISCOUS: bool, const N: usize>(
+        job: &mut Job<'_, T, N>,
+    ) -> f64;
+}
+
+/// Forces of elastic and viscous stress.
+pub(super) struct Forces;
+
+/// Products `−(α K + β C) a`, with the factors of the job and its velocities as `a`.
+pub(super) struct Products;
+
+impl Pass for Forces {
+    #[inline(always)]
+    fn run<V: Vector<Scalar = T>, T: Scalar, L: LaneTangent, const VISCOUS: bool, const N: usize>(
+        job: &mut Job<'_, T, N>,
+    ) -> f64 {
+        add::<V, T, L, VISCOUS, false, N>(job)
+    }
+}
+
+impl Pass for Products {
+    #[inline(always)]
+    fn run<V: Vector<Scalar = T>, T: Scalar, L: LaneTangent, const VISCOUS: bool, const N: usize>(
+        job: &mut Job<'_, T, N>,
+    ) -> f64 {
+        add::<V, T, L, VISCOUS, true, N>(job)
+    }
+}
+
 #[inline(always)]
-pub(super) fn add_forces<V: Vector<Scalar = T>, T: Scalar, L: LaneLaw, const VISCOUS: bool, const N: usize>(
+fn add<V: Vector<Scalar = T>, T: Scalar, L: LaneTangent, const VISCOUS: bool, const PRODUCTS: bool, const N: usize>(
     job: &mut Job<'_, T, N>,
 ) -> f64 {
     let mut edges: [Lanes<T, N>; BATCH] = [[[T::of(0.0); N]; 9]; BATCH];
@@ -109,13 +157,17 @@ pub(super) fn add_forces<V: Vector<Scalar = T>, T: Scalar, L: LaneLaw, const VIS
     for batch in job.blocks.chunks(BATCH) {
         for (index, block) in batch.iter().enumerate() {
             gather::<V, N>(&block.nodes, job.displacements, &mut edges[index]);
-            if VISCOUS {
+            if VISCOUS || PRODUCTS {
                 gather::<V, N>(&block.nodes, job.velocities, &mut edge_rates[index]);
             }
         }
         for (index, block) in batch.iter().enumerate() {
             let input = Input { block, edges: &edges[index], edge_rates: &edge_rates[index] };
-            power_w += compute::<V, T, L, VISCOUS, N>(&job.constants, &input, &mut forces[index]);
+            if PRODUCTS {
+                products::compute::<V, T, L, VISCOUS, N>(&job.constants, job.factors, &input, &mut forces[index]);
+            } else {
+                power_w += compute::<V, T, L, VISCOUS, N>(&job.constants, &input, &mut forces[index]);
+            }
         }
         for (index, block) in batch.iter().enumerate() {
             scatter(&block.nodes, &forces[index], job.sums);
@@ -125,10 +177,10 @@ pub(super) fn add_forces<V: Vector<Scalar = T>, T: Scalar, L: LaneLaw, const VIS
 }
 
 /// One block, gathered.
-struct Input<'a, T, const N: usize> {
-    block: &'a Block<T, N>,
-    edges: &'a Lanes<T, N>,
-    edge_rates: &'a Lanes<T, N>,
+pub(super) struct Input<'a, T, const N: usize> {
+    pub(super) block: &'a Block<T, N>,
+    pub(super) edges: &'a Lanes<T, N>,
+    pub(super) edge_rates: &'a Lanes<T, N>,
 }
 
 /// Forces of one block; returns the viscous power (W).
@@ -200,7 +252,7 @@ fn redo_outside<T: Scalar, L: LaneLaw, const VISCOUS: bool, const N: usize>(
 }
 
 #[inline(always)]
-fn load<V: Vector, const N: usize>(lanes: &Lanes<V::Scalar, N>, first: usize) -> [V; 9] {
+pub(super) fn load<V: Vector, const N: usize>(lanes: &Lanes<V::Scalar, N>, first: usize) -> [V; 9] {
     let mut loaded = [V::of(0.0); 9];
     for component in 0..9 {
         loaded[component] = V::load(&lanes[component][first..]);
@@ -210,7 +262,7 @@ fn load<V: Vector, const N: usize>(lanes: &Lanes<V::Scalar, N>, first: usize) ->
 
 /// `Σ_{i=1..3} (a_i − a_0) b_iᵀ`.
 #[inline(always)]
-fn gradient<V: Real>(b: &[V; 9], edges: &[V; 9]) -> M3<V> {
+pub(super) fn gradient<V: Real>(b: &[V; 9], edges: &[V; 9]) -> M3<V> {
     let mut h = [[V::of(0.0); 3]; 3];
     for row in 0..3 {
         for column in 0..3 {
@@ -222,7 +274,7 @@ fn gradient<V: Real>(b: &[V; 9], edges: &[V; 9]) -> M3<V> {
 
 /// `f_i = −V P b_i`, `i = 1, 2, 3`.
 #[inline(always)]
-fn corner_forces<V: Real>(b: &[V; 9], minus_volume: V, p: &M3<V>) -> [V; 9] {
+pub(super) fn corner_forces<V: Real>(b: &[V; 9], minus_volume: V, p: &M3<V>) -> [V; 9] {
     let mut f = *b;
     for corner in 0..3 {
         for row in 0..3 {

@@ -1,9 +1,10 @@
 //! One body of code, compiled for several instruction sets, chosen at run time.
 #![allow(unsafe_code)] // calls into functions compiled for an instruction set that was detected
 use super::{
-    block::{Job, add_forces},
-    laws::{FixedCorotated, LaneLaw, StVenantKirchhoff, StableNeoHookean},
+    block::{Job, Pass},
+    laws::{FixedCorotated, StVenantKirchhoff, StableNeoHookean},
     real::Scalar,
+    tangents::LaneTangent,
 };
 use crate::material::{Law, Material};
 
@@ -51,42 +52,52 @@ impl InstructionSet {
     }
 }
 
-/// Adds the forces of one run's blocks to the sums; returns the viscous power (W).
-pub(super) fn run<T: Scalar, const N: usize>(set: Available, material: &Material, job: &mut Job<'_, T, N>) -> f64 {
+/// A pass over one run's blocks.
+pub(super) fn run<P: Pass, T: Scalar, const N: usize>(
+    set: Available,
+    material: &Material,
+    job: &mut Job<'_, T, N>,
+) -> f64 {
     match (material.law, material.viscosity.is_zero()) {
-        (Law::StVenantKirchhoff, true) => pick::<T, StVenantKirchhoff, false, N>(set, job),
-        (Law::StVenantKirchhoff, false) => pick::<T, StVenantKirchhoff, true, N>(set, job),
-        (Law::StableNeoHookean, true) => pick::<T, StableNeoHookean, false, N>(set, job),
-        (Law::StableNeoHookean, false) => pick::<T, StableNeoHookean, true, N>(set, job),
-        (Law::FixedCorotated, true) => pick::<T, FixedCorotated, false, N>(set, job),
-        (Law::FixedCorotated, false) => pick::<T, FixedCorotated, true, N>(set, job),
+        (Law::StVenantKirchhoff, true) => pick::<P, T, StVenantKirchhoff, false, N>(set, job),
+        (Law::StVenantKirchhoff, false) => pick::<P, T, StVenantKirchhoff, true, N>(set, job),
+        (Law::StableNeoHookean, true) => pick::<P, T, StableNeoHookean, false, N>(set, job),
+        (Law::StableNeoHookean, false) => pick::<P, T, StableNeoHookean, true, N>(set, job),
+        (Law::FixedCorotated, true) => pick::<P, T, FixedCorotated, false, N>(set, job),
+        (Law::FixedCorotated, false) => pick::<P, T, FixedCorotated, true, N>(set, job),
     }
 }
 
 #[cfg(target_arch = "x86_64")]
-fn pick<T: Scalar, L: LaneLaw, const VISCOUS: bool, const N: usize>(set: Available, job: &mut Job<'_, T, N>) -> f64 {
+fn pick<P: Pass, T: Scalar, L: LaneTangent, const VISCOUS: bool, const N: usize>(
+    set: Available,
+    job: &mut Job<'_, T, N>,
+) -> f64 {
     match set.0 {
-        InstructionSet::Baseline => add_forces::<T::Baseline, T, L, VISCOUS, N>(job),
+        InstructionSet::Baseline => P::run::<T::Baseline, T, L, VISCOUS, N>(job),
         // SAFETY: `Available` holds only what was detected.
-        InstructionSet::Avx2 => unsafe { avx2::<T, L, VISCOUS, N>(job) },
+        InstructionSet::Avx2 => unsafe { avx2::<P, T, L, VISCOUS, N>(job) },
         // SAFETY: `Available` holds only what was detected.
-        InstructionSet::Avx512 => unsafe { avx512::<T, L, VISCOUS, N>(job) },
+        InstructionSet::Avx512 => unsafe { avx512::<P, T, L, VISCOUS, N>(job) },
     }
 }
 
 #[cfg(not(target_arch = "x86_64"))]
-fn pick<T: Scalar, L: LaneLaw, const VISCOUS: bool, const N: usize>(_: Available, job: &mut Job<'_, T, N>) -> f64 {
-    add_forces::<T::Baseline, T, L, VISCOUS, N>(job)
+fn pick<P: Pass, T: Scalar, L: LaneTangent, const VISCOUS: bool, const N: usize>(
+    _: Available,
+    job: &mut Job<'_, T, N>,
+) -> f64 {
+    P::run::<T::Baseline, T, L, VISCOUS, N>(job)
 }
 
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx2")]
-fn avx2<T: Scalar, L: LaneLaw, const VISCOUS: bool, const N: usize>(job: &mut Job<'_, T, N>) -> f64 {
-    add_forces::<T::Avx2, T, L, VISCOUS, N>(job)
+fn avx2<P: Pass, T: Scalar, L: LaneTangent, const VISCOUS: bool, const N: usize>(job: &mut Job<'_, T, N>) -> f64 {
+    P::run::<T::Avx2, T, L, VISCOUS, N>(job)
 }
 
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx512f,avx512bw,avx512dq,avx512vl")]
-fn avx512<T: Scalar, L: LaneLaw, const VISCOUS: bool, const N: usize>(job: &mut Job<'_, T, N>) -> f64 {
-    add_forces::<T::Avx512, T, L, VISCOUS, N>(job)
+fn avx512<P: Pass, T: Scalar, L: LaneTangent, const VISCOUS: bool, const N: usize>(job: &mut Job<'_, T, N>) -> f64 {
+    P::run::<T::Avx512, T, L, VISCOUS, N>(job)
 }

@@ -115,14 +115,53 @@ impl LaneLaw for FixedCorotated {
     const DOMAIN: Option<f64> = Some(0.2);
     #[inline(always)]
     fn piola<T: Real>(c: &Constants<T>, h: &M3<T>) -> (M3<T>, T) {
-        let one = T::of(1.0);
-        let two = T::of(2.0);
         let cof_h = cofactor(h);
         let volume_change = volume_change(h, &cof_h);
         let cof_f = cofactor_of_sum(h, &cof_h, trace(h));
         let e2 = twice_green_strain(h);
-        let (f, cg) = (plus_identity(h), plus_identity(&e2));
-        let i1 = T::of(3.0) + trace(&e2);
+        let Rotation { r, f, domain, .. } = Rotation::of(&e2, &cof_f, volume_change, h);
+        let g = stretch(&r, &f);
+        let g2 = symmetric_square(&g);
+        let mut doubled = e2;
+        for a in 0..3 {
+            for b in 0..3 {
+                doubled[a][b] = c.mu * (e2[a][b] - g2[a][b]);
+            }
+        }
+        let mut p = product(&r, &doubled);
+        let pressure = c.lambda * volume_change;
+        for a in 0..3 {
+            for b in 0..3 {
+                p[a][b] = p[a][b] + pressure * cof_f[a][b];
+            }
+        }
+        (p, domain)
+    }
+    fn piola_outside(c: &Constants<f64>, f: &DMat3) -> DMat3 {
+        fixed_corotated::piola(crate::material::Lame { lambda_pa: c.lambda, mu_pa: c.mu }, f)
+    }
+}
+
+/// The rotation nearest to `F`, as [`FixedCorotated`] finds it.
+pub(super) struct Rotation<T> {
+    /// `R`.
+    pub(super) r: M3<T>,
+    /// `F`.
+    pub(super) f: M3<T>,
+    /// `(σ₁+σ₂)(σ₂+σ₃)(σ₁+σ₃)`, doubled.
+    pub(super) q: T,
+    /// What the law's domain bounds from below.
+    pub(super) domain: T,
+}
+
+impl<T: Real> Rotation<T> {
+    /// From `2E`, `cof F`, `J − 1` and `H`.
+    #[inline(always)]
+    pub(super) fn of(e2: &M3<T>, cof_f: &M3<T>, volume_change: T, h: &M3<T>) -> Self {
+        let one = T::of(1.0);
+        let two = T::of(2.0);
+        let (f, cg) = (plus_identity(h), plus_identity(e2));
+        let i1 = T::of(3.0) + trace(e2);
         let j = one + volume_change;
         let constant = two * contract(&cg, &cg) - i1 * i1;
         let mut t = (T::of(3.0) * i1).sqrt();
@@ -142,25 +181,7 @@ impl LaneLaw for FixedCorotated {
                 r[a][b] = (linear * f[a][b] + two * (t * cof_f[a][b] - cubic[a][b])) * inverse;
             }
         }
-        let g = stretch(&r, &f);
-        let g2 = symmetric_square(&g);
-        let mut doubled = e2;
-        for a in 0..3 {
-            for b in 0..3 {
-                doubled[a][b] = c.mu * (e2[a][b] - g2[a][b]);
-            }
-        }
-        let mut p = product(&r, &doubled);
-        let pressure = c.lambda * volume_change;
-        for a in 0..3 {
-            for b in 0..3 {
-                p[a][b] = p[a][b] + pressure * cof_f[a][b];
-            }
-        }
-        (p, q / (t * t * t).max(one))
-    }
-    fn piola_outside(c: &Constants<f64>, f: &DMat3) -> DMat3 {
-        fixed_corotated::piola(crate::material::Lame { lambda_pa: c.lambda, mu_pa: c.mu }, f)
+        Self { r, f, q, domain: q / (t * t * t).max(one) }
     }
 }
 
@@ -187,7 +208,7 @@ pub(super) fn viscous<T: Real>(c: &Constants<T>, h: &M3<T>, h_dot: &M3<T>) -> (M
 
 /// `H + Hᵀ + HᵀH`.
 #[inline(always)]
-fn twice_green_strain<T: Real>(h: &M3<T>) -> M3<T> {
+pub(super) fn twice_green_strain<T: Real>(h: &M3<T>) -> M3<T> {
     let mut e = *h;
     for i in 0..3 {
         for j in i..3 {
@@ -204,7 +225,7 @@ fn twice_green_strain<T: Real>(h: &M3<T>) -> M3<T> {
 
 /// `sym(RᵀF) − I`.
 #[inline(always)]
-fn stretch<T: Real>(r: &M3<T>, f: &M3<T>) -> M3<T> {
+pub(super) fn stretch<T: Real>(r: &M3<T>, f: &M3<T>) -> M3<T> {
     let mut g = *f;
     for i in 0..3 {
         for j in i..3 {
@@ -235,14 +256,14 @@ fn symmetric_square<T: Real>(g: &M3<T>) -> M3<T> {
 
 /// `J − 1 = tr H + tr cof H + det H`.
 #[inline(always)]
-fn volume_change<T: Real>(h: &M3<T>, cof_h: &M3<T>) -> T {
+pub(super) fn volume_change<T: Real>(h: &M3<T>, cof_h: &M3<T>) -> T {
     let det = h[0][0] * cof_h[0][0] + h[0][1] * cof_h[0][1] + h[0][2] * cof_h[0][2];
     trace(h) + (trace(cof_h) + det)
 }
 
 /// `cof(I + H) = (1 + tr H) I − Hᵀ + cof H`.
 #[inline(always)]
-fn cofactor_of_sum<T: Real>(h: &M3<T>, cof_h: &M3<T>, tr: T) -> M3<T> {
+pub(super) fn cofactor_of_sum<T: Real>(h: &M3<T>, cof_h: &M3<T>, tr: T) -> M3<T> {
     let mut cof = *h;
     for i in 0..3 {
         for j in 0..3 {
@@ -254,7 +275,7 @@ fn cofactor_of_sum<T: Real>(h: &M3<T>, cof_h: &M3<T>, tr: T) -> M3<T> {
 }
 
 #[inline(always)]
-fn cofactor<T: Real>(a: &M3<T>) -> M3<T> {
+pub(super) fn cofactor<T: Real>(a: &M3<T>) -> M3<T> {
     [
         [minor(a, [1, 2], [1, 2]), minor(a, [1, 2], [2, 0]), minor(a, [1, 2], [0, 1])],
         [minor(a, [2, 0], [1, 2]), minor(a, [2, 0], [2, 0]), minor(a, [2, 0], [0, 1])],
@@ -264,12 +285,12 @@ fn cofactor<T: Real>(a: &M3<T>) -> M3<T> {
 
 /// `a_ij a_kl − a_il a_kj` for rows `i, k` and columns `j, l`.
 #[inline(always)]
-fn minor<T: Real>(a: &M3<T>, [i, k]: [usize; 2], [j, l]: [usize; 2]) -> T {
+pub(super) fn minor<T: Real>(a: &M3<T>, [i, k]: [usize; 2], [j, l]: [usize; 2]) -> T {
     a[i][j] * a[k][l] - a[i][l] * a[k][j]
 }
 
 #[inline(always)]
-fn plus_identity<T: Real>(a: &M3<T>) -> M3<T> {
+pub(super) fn plus_identity<T: Real>(a: &M3<T>) -> M3<T> {
     let mut sum = *a;
     for i in 0..3 {
         sum[i][i] = sum[i][i] + T::of(1.0);
@@ -278,13 +299,13 @@ fn plus_identity<T: Real>(a: &M3<T>) -> M3<T> {
 }
 
 #[inline(always)]
-fn trace<T: Real>(a: &M3<T>) -> T {
+pub(super) fn trace<T: Real>(a: &M3<T>) -> T {
     a[0][0] + a[1][1] + a[2][2]
 }
 
 /// `A:B`.
 #[inline(always)]
-fn contract<T: Real>(a: &M3<T>, b: &M3<T>) -> T {
+pub(super) fn contract<T: Real>(a: &M3<T>, b: &M3<T>) -> T {
     let mut sum = T::of(0.0);
     for i in 0..3 {
         sum = sum + (a[i][0] * b[i][0] + a[i][1] * b[i][1] + a[i][2] * b[i][2]);
@@ -294,12 +315,12 @@ fn contract<T: Real>(a: &M3<T>, b: &M3<T>) -> T {
 
 /// `(AᵀB)_ij`.
 #[inline(always)]
-fn column_dot<T: Real>(a: &M3<T>, i: usize, b: &M3<T>, j: usize) -> T {
+pub(super) fn column_dot<T: Real>(a: &M3<T>, i: usize, b: &M3<T>, j: usize) -> T {
     a[0][i] * b[0][j] + a[1][i] * b[1][j] + a[2][i] * b[2][j]
 }
 
 #[inline(always)]
-fn scaled<T: Real>(a: &M3<T>, s: T) -> M3<T> {
+pub(super) fn scaled<T: Real>(a: &M3<T>, s: T) -> M3<T> {
     let mut product = *a;
     for i in 0..3 {
         for j in 0..3 {
@@ -321,7 +342,7 @@ pub(super) fn plus<T: Real>(a: &M3<T>, b: &M3<T>) -> M3<T> {
 }
 
 #[inline(always)]
-fn product<T: Real>(a: &M3<T>, b: &M3<T>) -> M3<T> {
+pub(super) fn product<T: Real>(a: &M3<T>, b: &M3<T>) -> M3<T> {
     let mut ab = *a;
     for i in 0..3 {
         for j in 0..3 {

@@ -11,12 +11,14 @@ mod dispatch;
 mod laws;
 mod layout;
 mod oracle;
+mod products;
 mod real;
+mod tangents;
 #[cfg(target_arch = "x86_64")]
 mod x86;
 
 use crate::{fem::element::RestTet, material::Material, mesh::TetMesh, world::Precision};
-use block::{Blocks, Job, Node, Run, Sum};
+use block::{Blocks, Forces, Job, Node, Products, Run, Sum};
 use dispatch::Available;
 pub use dispatch::InstructionSet;
 use glam::DVec3;
@@ -47,6 +49,8 @@ enum Layout {
 pub struct KernelScratch {
     displacements: Vec<Node>,
     velocities: Vec<Node>,
+    /// Empty unless made for products.
+    directions: Vec<Node>,
     sums: Vec<Sum>,
 }
 
@@ -91,6 +95,7 @@ impl ForceKernel {
         KernelScratch {
             displacements: vec![Node::default(); count],
             velocities: vec![Node::default(); rates],
+            directions: Vec::new(),
             sums: vec![Sum::default(); count],
         }
     }
@@ -105,9 +110,7 @@ impl ForceKernel {
         forces_n: &mut [DVec3],
         scratch: &mut KernelScratch,
     ) -> f64 {
-        for ((u, x), rest) in scratch.displacements.iter_mut().zip(x).zip(rest_positions_m) {
-            *u = node(*x - *rest);
-        }
+        self.linearise_at(rest_positions_m, x, scratch);
         for (rate, v) in scratch.velocities.iter_mut().zip(v) {
             *rate = node(*v);
         }
@@ -123,17 +126,59 @@ impl ForceKernel {
         power_w
     }
 
+    /// Buffers for [`Self::products_n`] too.
+    pub fn scratch_for_products(&self) -> KernelScratch {
+        KernelScratch { directions: vec![Node::default(); self.nodes + 1], ..self.scratch() }
+    }
+
+    /// Takes the positions `x` (m) about which [`Self::products_n`] linearises.
+    pub fn linearise_at(&self, rest_positions_m: &[DVec3], x: &[DVec3], scratch: &mut KernelScratch) {
+        for ((u, x), rest) in scratch.displacements.iter_mut().zip(x).zip(rest_positions_m) {
+            *u = node(*x - *rest);
+        }
+    }
+
+    /// Overwrites `products_n` (N) with `−(α K + β C) a`: the tangent stiffness `K = −∂f/∂x` (N/m) of elastic stress and the
+    /// matrix `C = −∂f/∂v` (N s/m) of viscous stress, at the positions of the last [`Self::linearise_at`] with this scratch.
+    pub fn products_n(&self, factors: [f64; 2], a: &[DVec3], products_n: &mut [DVec3], scratch: &mut KernelScratch) {
+        for (direction, a) in scratch.directions.iter_mut().zip(a) {
+            *direction = node(*a);
+        }
+        scratch.sums.fill(Sum::default());
+        match &self.layout {
+            Layout::Single(blocks, runs) => self.add_products(factors, blocks, runs, scratch),
+            Layout::Double(blocks, runs) => self.add_products(factors, blocks, runs, scratch),
+        }
+        for (product, Sum([x, y, z, _])) in products_n.iter_mut().zip(&scratch.sums) {
+            *product = DVec3::new(*x, *y, *z);
+        }
+    }
+
+    fn add_products<T: Scalar, const N: usize>(
+        &self,
+        factors: [f64; 2],
+        blocks: &Blocks<T, N>,
+        runs: &[Run<T>],
+        scratch: &mut KernelScratch,
+    ) {
+        let KernelScratch { displacements, directions, sums, .. } = scratch;
+        for run in runs {
+            let mut job = Job::for_products(blocks, run, displacements, directions, sums, factors);
+            dispatch::run::<Products, _, _>(self.instruction_set, &run.material, &mut job);
+        }
+    }
+
     fn add_forces<T: Scalar, const N: usize>(
         &self,
         blocks: &Blocks<T, N>,
         runs: &[Run<T>],
         scratch: &mut KernelScratch,
     ) -> f64 {
-        let KernelScratch { displacements, velocities, sums } = scratch;
+        let KernelScratch { displacements, velocities, sums, .. } = scratch;
         let mut power_w = 0.0;
         for run in runs {
             let mut job = Job::new(blocks, run, displacements, velocities, sums);
-            power_w += dispatch::run(self.instruction_set, &run.material, &mut job);
+            power_w += dispatch::run::<Forces, _, _>(self.instruction_set, &run.material, &mut job);
         }
         power_w
     }

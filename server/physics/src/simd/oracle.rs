@@ -1,5 +1,9 @@
 //! The scalar f64 oracle of the force kernel: plain loops over [`RestTet`], slow and easy to believe.
-use crate::{fem::element::RestTet, material::Material, mesh::TetMesh};
+use crate::{
+    fem::element::RestTet,
+    material::{Material, viscous},
+    mesh::TetMesh,
+};
 use glam::DVec3;
 
 /// Internal forces, tet by tet.
@@ -38,5 +42,20 @@ impl Oracle {
             }
         }
         viscous_power_w
+    }
+
+    /// As [`super::ForceKernel::products_n`]: overwrites `products_n` with `−(α K + β C) a` at positions `x`.
+    pub fn products_n(&self, [elastic, viscosity]: [f64; 2], x: &[DVec3], a: &[DVec3], products_n: &mut [DVec3]) {
+        products_n.fill(DVec3::ZERO);
+        for ((rest, nodes), &material) in self.rest_tets.iter().zip(&self.tets).zip(&self.tet_material) {
+            let material = &self.materials[material as usize];
+            let f = rest.gradient_of(&nodes.map(|n| x[n as usize]));
+            let df = rest.gradient_of(&nodes.map(|n| a[n as usize]));
+            let p = material.piola_differential(&f, &df) * elastic
+                + viscous::piola(material.viscosity, &f, &df) * viscosity;
+            for (&node, force) in nodes.iter().zip(rest.corner_forces_n(&p)) {
+                products_n[node as usize] += force;
+            }
+        }
     }
 }

@@ -101,6 +101,9 @@ fn settings(spec: &ModelSpec) -> Result<(), ModelError> {
     setting("stretch_allowance", stretch, stretch >= 1.0 && stretch.is_finite(), "must be 1 or larger")?;
     let damping = s.mass_damping_per_s;
     setting("mass_damping_per_s", damping, damping >= 0.0 && damping.is_finite(), "must not be negative")?;
+    setting("solver_iterations", f64::from(s.solver_iterations), s.solver_iterations >= 1, "must be 1 or more")?;
+    let tolerance = s.solver_tolerance;
+    setting("solver_tolerance", tolerance, tolerance > 0.0 && tolerance < 1.0, "must be in (0, 1)")?;
     if let Substeps::Fixed(n) = s.substeps {
         setting("substeps", f64::from(n), (1..=MAX_SUBSTEPS).contains(&n), "must be 1 to 100000")?;
     }

@@ -1,5 +1,5 @@
 //! The model: constant after load.
-use super::{ModelError, ModelSpec, PrescribedSpec, check, substeps};
+use super::{Integrator, ModelError, ModelSpec, PrescribedSpec, check, substeps};
 use crate::{
     contact::{ContactModel, SurfaceModuli, ToolState},
     fem::{element::RestTet, mass},
@@ -69,7 +69,12 @@ impl Model {
             let touched = RestStiffness { springs_n_per_m: &springs, ..at_rest };
             max_natural_frequency_rad_per_s(&touched, &inverse_mass_per_kg)
         };
-        let omega_sq = stretch_sq * touched.max(omega).powi(2) + contact.tool_frequency_sq;
+        let explicit_sq = match spec.settings.integrator {
+            // The body and its contact are implicit; tools on couplings are not.
+            Integrator::BackwardEuler => 0.0,
+            _ => stretch_sq * touched.max(omega).powi(2),
+        };
+        let omega_sq = explicit_sq + contact.tool_frequency_sq;
         let substeps = substeps::choose(&spec, &materials, omega_sq.sqrt())?;
         let dt_s = spec.settings.tick_period_s / f64::from(substeps);
         let body = Body { at_rest, mass_kg: &mass_kg, inverse_mass_per_kg: &inverse_mass_per_kg, dt_s };

@@ -78,6 +78,9 @@ pub enum Integrator {
     /// The seeds' semi-implicit Euler with nodewise Jacobian (eq. 34): first order, drags the body's motion as a whole. Measured
     /// substeps are leapfrog's, which always suffice; the paper takes one step, `Substeps::Fixed(1)`, stable or not.
     SeedSemiImplicit,
+    /// Backward Euler, one Newton step per substep by preconditioned conjugate gradients: first order, stable at any step by
+    /// damping what the step cannot resolve. Measured substeps are what tools on couplings need, one without.
+    BackwardEuler,
 }
 
 /// Numerical settings.
@@ -97,6 +100,10 @@ pub struct Settings {
     pub precision: Precision,
     /// Mass-proportional damping c (1/s): `v̇ = … − c v`.
     pub mass_damping_per_s: f64,
+    /// Most iterations of an implicit scheme's solver per substep (≥ 1).
+    pub solver_iterations: u32,
+    /// Where that solver stops: residual over its start, in the preconditioner's norm, in (0, 1).
+    pub solver_tolerance: f64,
 }
 
 impl Default for Settings {
@@ -109,6 +116,8 @@ impl Default for Settings {
             stretch_allowance: 1.2,
             precision: Precision::Single,
             mass_damping_per_s: 0.0,
+            solver_iterations: 100,
+            solver_tolerance: 1e-3,
         }
     }
 }

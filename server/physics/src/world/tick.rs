@@ -1,8 +1,9 @@
 //! What goes into a tick and what comes out of it, beside the state; and the buffers it works in.
-use super::Model;
+use super::{Integrator, Model};
 use crate::{
     contact::{ContactScratch, ToolTarget},
     health::{LastGood, Quarantine},
+    integrate::ImplicitScratch,
     simd::KernelScratch,
 };
 use glam::DVec3;
@@ -48,6 +49,7 @@ pub struct Scratch {
     pub(crate) last_good: LastGood,
     pub(crate) kernel: KernelScratch,
     pub(crate) contact: ContactScratch,
+    pub(crate) implicit: ImplicitScratch,
 }
 
 impl Scratch {
@@ -57,14 +59,23 @@ impl Scratch {
         Self {
             reaction_n: vec![DVec3::ZERO; nodes],
             last_good: LastGood::new(nodes, model.tools_at_start(), model.spec().loads.len()),
-            kernel: model.kernel().scratch(),
+            kernel: match model.spec().settings.integrator {
+                Integrator::BackwardEuler => model.kernel().scratch_for_products(),
+                _ => model.kernel().scratch(),
+            },
             contact: model.contact().scratch(),
+            implicit: ImplicitScratch::new(model),
         }
     }
 
     /// Off switch of contact's broad phase ([`ContactScratch::set_exhaustive`]): same bits, only slower.
     pub fn set_exhaustive_contact(&mut self, on: bool) {
         self.contact.set_exhaustive(on);
+    }
+
+    /// Products with the matrix of implicit schemes since this scratch was made: the solver's iterations.
+    pub fn solver_products(&self) -> u64 {
+        self.implicit.products
     }
 
     /// Force (N) that holds each prescribed degree of freedom, at the end of the last tick; zero on free ones.

@@ -98,10 +98,21 @@ pub(crate) fn compile(
     })
 }
 
+/// A solver that needs more is not meant for a tick.
+const MAX_SOLVER_ITERATIONS: u32 = 10_000;
+
 fn settings(document: &Document) -> Result<Settings, Fault> {
     let at = Where::root("numerics");
-    let NumericsTable { precision, integrator, substeps, step_safety, stretch_allowance, mass_damping_per_s } =
-        document.numerics;
+    let NumericsTable {
+        precision,
+        integrator,
+        substeps,
+        step_safety,
+        stretch_allowance,
+        mass_damping_per_s,
+        solver_iterations,
+        solver_tolerance,
+    } = document.numerics;
     let period = document.scene.tick_period_s;
     check(
         &Where::root("scene").key("tick_period_s"),
@@ -112,6 +123,10 @@ fn settings(document: &Document) -> Result<Settings, Fault> {
     check(&at.key("step_safety"), step_safety, step_safety > 0.0 && step_safety <= 1.0, "must be in (0, 1]")?;
     check(&at.key("stretch_allowance"), stretch_allowance, stretch_allowance >= 1.0, "must be 1 or larger")?;
     check(&at.key("mass_damping_per_s"), mass_damping_per_s, mass_damping_per_s >= 0.0, "must not be negative")?;
+    let iterations_ok = (1..=MAX_SOLVER_ITERATIONS).contains(&solver_iterations);
+    check(&at.key("solver_iterations"), solver_iterations, iterations_ok, "must be 1 to 10000")?;
+    let tolerance_ok = solver_tolerance > 0.0 && solver_tolerance < 1.0;
+    check(&at.key("solver_tolerance"), solver_tolerance, tolerance_ok, "must be in (0, 1)")?;
     if let Some(n) = substeps {
         check(
             &at.key("substeps"),
@@ -126,6 +141,7 @@ fn settings(document: &Document) -> Result<Settings, Fault> {
             IntegratorName::Leapfrog => Integrator::Leapfrog,
             IntegratorName::SeedVerlet => Integrator::SeedVerlet,
             IntegratorName::SeedSemiImplicit => Integrator::SeedSemiImplicit,
+            IntegratorName::BackwardEuler => Integrator::BackwardEuler,
         },
         substeps: substeps.map_or(Substeps::Measured, Substeps::Fixed),
         step_safety,
@@ -135,6 +151,8 @@ fn settings(document: &Document) -> Result<Settings, Fault> {
             PrecisionName::Double => Precision::Double,
         },
         mass_damping_per_s,
+        solver_iterations,
+        solver_tolerance,
     })
 }
 

@@ -199,6 +199,8 @@ pub(crate) enum IntegratorName {
     SeedVerlet,
     /// Semi-implicit Euler with one Jacobian per node, of the same paper (eq. 34).
     SeedSemiImplicit,
+    /// Backward Euler, linearised, by preconditioned conjugate gradients.
+    BackwardEuler,
 }
 
 /// Integrator, time step and precision.
@@ -217,6 +219,10 @@ pub(crate) struct NumericsTable {
     pub(crate) stretch_allowance: f64,
     /// Mass-proportional damping (1/s).
     pub(crate) mass_damping_per_s: f64,
+    /// Most iterations of an implicit integrator's solver per substep, 1 to 10000.
+    pub(crate) solver_iterations: u32,
+    /// Where that solver stops, relative to where it starts, in (0, 1).
+    pub(crate) solver_tolerance: f64,
 }
 
 impl Default for NumericsTable {
@@ -229,6 +235,8 @@ impl Default for NumericsTable {
             step_safety: settings.step_safety,
             stretch_allowance: settings.stretch_allowance,
             mass_damping_per_s: settings.mass_damping_per_s,
+            solver_iterations: settings.solver_iterations,
+            solver_tolerance: settings.solver_tolerance,
         }
     }
 }
