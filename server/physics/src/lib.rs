@@ -23,5 +23,5 @@ pub use integrate::step;
 pub use mesh::{MeshError, Surface, TetMesh};
 pub use world::{
     Integrator, LoadSpec, Model, ModelError, ModelSpec, PointForce, Precision, PrescribedSpec, Region, Scratch,
-    Settings, State, StepReport, Substeps, TickInput,
+    Settings, Skips, State, StepReport, Substeps, TickInput,
 };

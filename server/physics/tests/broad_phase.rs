@@ -31,8 +31,9 @@ fn devices(tick: u32) -> Vec<palpate_physics::contact::ToolTarget> {
 }
 
 fn run(exhaustive: bool, forget_at: Option<u32>) -> (State, u32) {
-    let mut rig = Rig::new(falling_block());
-    rig.scratch.set_exhaustive_contact(exhaustive);
+    let mut spec = falling_block();
+    spec.settings.skips.distant_contact = !exhaustive;
+    let mut rig = Rig::new(spec);
     let mut touched = 0;
     for tick in 0..250 {
         if forget_at.is_some_and(|every| tick % every == 0) {

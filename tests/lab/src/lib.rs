@@ -9,6 +9,7 @@ pub mod problems;
 pub mod reference;
 pub mod references;
 pub mod report;
+pub mod skips;
 pub mod stress;
 pub mod table;
 pub mod timing;

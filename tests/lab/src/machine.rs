@@ -1,4 +1,5 @@
 //! On which machine, at which commit and when something was measured, and how restless the machine was.
+use crate::timing::quantiles;
 use std::{
     process::Command,
     time::{Instant, SystemTime, UNIX_EPOCH},
@@ -87,10 +88,8 @@ impl Noise {
             }
             times.push(start.elapsed().as_secs_f64());
         }
-        times.sort_by(f64::total_cmp);
-        let at = |fraction: f64| times[((times.len() - 1) as f64 * fraction).round() as usize];
-        let median = at(0.5);
-        Self { p99_over_median: at(0.99) / median - 1.0, worst_over_median: at(1.0) / median - 1.0 }
+        let [median, p99, worst] = quantiles(&mut times, [0.5, 0.99, 1.0]);
+        Self { p99_over_median: p99 / median - 1.0, worst_over_median: worst / median - 1.0 }
     }
 }
 

@@ -50,6 +50,11 @@ impl<'m> Press<'m> {
         step(self.model, &mut self.state, &mut self.scratch, &input)
     }
 
+    /// Its state now.
+    pub fn state(&self) -> &State {
+        &self.state
+    }
+
     /// Contact samples of the first tool that carry force.
     pub fn contacts(&self) -> u32 {
         self.state.tools.first().map_or(0, |tool| tool.contacts)

@@ -1,4 +1,4 @@
-//! Interleaved timing: contenders take turns, so that a slow moment of the machine strikes all of them.
+//! Quantiles, and interleaved timing: contenders take turns, so that a slow moment of the machine strikes all of them.
 use std::time::Instant;
 
 /// Median and 99th percentile of a contender's times (s).
@@ -13,13 +13,16 @@ pub struct Summary {
 impl Summary {
     /// Of a list of times (s); zeros for an empty one.
     pub fn of(mut times_s: Vec<f64>) -> Self {
-        times_s.sort_by(f64::total_cmp);
-        let at = |fraction: f64| {
-            let index = (fraction * times_s.len().saturating_sub(1) as f64).round() as usize;
-            times_s.get(index).copied().unwrap_or(0.0)
-        };
-        Self { median_s: at(0.5), p99_s: at(0.99) }
+        let [median_s, p99_s] = quantiles(&mut times_s, [0.5, 0.99]);
+        Self { median_s, p99_s }
     }
+}
+
+/// Values below which these fractions of `values` lie, by the nearest rank; zeros for an empty list. Sorts the values.
+pub fn quantiles<const N: usize>(values: &mut [f64], fractions: [f64; N]) -> [f64; N] {
+    values.sort_by(f64::total_cmp);
+    let last = values.len().saturating_sub(1) as f64;
+    fractions.map(|fraction| values.get((fraction * last).round() as usize).copied().unwrap_or(0.0))
 }
 
 /// Runs every contender `rounds` times in turn, after `rounds/10 + 1` turns that are not counted. A turn is two runs, of which the

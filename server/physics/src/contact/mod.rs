@@ -84,6 +84,7 @@ pub struct Body<'a> {
 #[derive(Debug, Clone, Default)]
 pub struct ContactScratch {
     tools: Vec<ToolScratch>,
+    /// Every triangle is looked at in every substep: no broad phase. Same bits, only slower.
     exhaustive: bool,
 }
 
@@ -92,13 +93,6 @@ struct ToolScratch {
     next: Touching,
     sum: Pressed,
     coupling_sum_n: DVec3,
-}
-
-impl ContactScratch {
-    /// Off switch of the broad phase: every triangle is looked at in every substep. Same bits, only slower.
-    pub fn set_exhaustive(&mut self, on: bool) {
-        self.exhaustive = on;
-    }
 }
 
 impl ToolModel {
@@ -182,13 +176,13 @@ impl ContactModel {
     }
 
     /// Buffers large enough for every tick.
-    pub fn scratch(&self) -> ContactScratch {
+    pub fn scratch(&self, skip_distant: bool) -> ContactScratch {
         let tool = |tool: &ToolModel| ToolScratch {
             next: Touching::with_capacity(tool.foundation.samples),
             sum: Pressed::default(),
             coupling_sum_n: DVec3::ZERO,
         };
-        ContactScratch { tools: self.tools.iter().map(tool).collect(), exhaustive: false }
+        ContactScratch { tools: self.tools.iter().map(tool).collect(), exhaustive: !skip_distant }
     }
 
     /// Once a tick, before its first substep.

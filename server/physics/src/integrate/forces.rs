@@ -13,8 +13,8 @@ pub(super) struct Tick<'a> {
     pub(super) loads: LoadRamp,
 }
 
-/// When forces are evaluated.
-struct Instant {
+/// When forces are evaluated, and how the body came there.
+struct Evaluation {
     /// Part of the tick that is over.
     fraction: f64,
     /// The same for loads.
@@ -38,7 +38,7 @@ impl Tick<'_> {
             self.evaluate(
                 state,
                 scratch,
-                &Instant { fraction: 0.0, load_fraction: 0.0, dt_s: 0.0, fastest_m_per_s: 0.0 },
+                &Evaluation { fraction: 0.0, load_fraction: 0.0, dt_s: 0.0, fastest_m_per_s: 0.0 },
             );
         }
     }
@@ -50,18 +50,18 @@ impl Tick<'_> {
         }
         let part = |substeps_done: u32| f64::from(substeps_done) / f64::from(self.model.substeps());
         let (fraction, load_fraction) = (part(number - 1), part(number));
-        self.evaluate(state, scratch, &Instant { fraction, load_fraction, dt_s: 0.0, fastest_m_per_s: 0.0 });
+        self.evaluate(state, scratch, &Evaluation { fraction, load_fraction, dt_s: 0.0, fastest_m_per_s: 0.0 });
     }
 
     /// Forces at the end of substep `number` (from 1), to which the nodes came with at most `fastest_m_per_s`.
     pub(super) fn evaluate_after(&self, number: u32, fastest_m_per_s: f64, state: &mut State, scratch: &mut Scratch) {
         let fraction = f64::from(number) / f64::from(self.model.substeps());
-        let now = Instant { fraction, load_fraction: fraction, dt_s: self.dt_s(), fastest_m_per_s };
+        let now = Evaluation { fraction, load_fraction: fraction, dt_s: self.dt_s(), fastest_m_per_s };
         self.evaluate(state, scratch, &now);
     }
 
     /// Total force at the present positions into `state.force_n`, its external part into `state.external_n`.
-    fn evaluate(&self, state: &mut State, scratch: &mut Scratch, now: &Instant) {
+    fn evaluate(&self, state: &mut State, scratch: &mut Scratch, now: &Evaluation) {
         let Self { model, input, loads } = self;
         let external = &mut state.external_n;
         external.fill(DVec3::ZERO);

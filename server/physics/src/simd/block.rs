@@ -211,15 +211,18 @@ fn compute<V: Vector<Scalar = T>, T: Scalar, L: LaneLaw, const VISCOUS: bool, co
             f[component].store(&mut forces[component][first..]);
         }
     }
-    if let Some(limit) = L::DOMAIN {
-        let limit = T::of(limit);
-        // Counted without an early exit: a vector loop. NaN is outside.
-        let count = inside.iter().map(|&domain| u32::from(domain >= limit)).sum::<u32>();
-        if count < N as u32 {
-            redo_outside::<T, L, VISCOUS, N>(constants, input, &inside, forces);
-        }
+    if any_outside(&inside, L::DOMAIN) {
+        redo_outside::<T, L, VISCOUS, N>(constants, input, &inside, forces);
     }
     if VISCOUS { power.iter().fold(0.0, |sum, &p| sum + p.into()) } else { 0.0 }
+}
+
+/// Whether any lane is outside a law's domain, if it has one. NaN is outside.
+#[inline(always)]
+pub(super) fn any_outside<T: Scalar, const N: usize>(inside: &[T; N], domain: Option<f64>) -> bool {
+    let Some(limit) = domain.map(T::of) else { return false };
+    // Counted without an early exit: a vector loop.
+    inside.iter().map(|&domain| u32::from(domain >= limit)).sum::<u32>() < N as u32
 }
 
 /// Lanes outside the law's domain, once more, in f64.

@@ -6,7 +6,7 @@ use super::{
     real::Scalar,
     tangents::LaneTangent,
 };
-use crate::material::{Law, Material};
+use crate::material::Law;
 
 /// Instruction sets a kernel is compiled for. All of them give the same bits.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -55,16 +55,16 @@ impl InstructionSet {
 /// A pass over one run's blocks.
 pub(super) fn run<P: Pass, T: Scalar, const N: usize>(
     set: Available,
-    material: &Material,
+    (law, with_viscosity): (Law, bool),
     job: &mut Job<'_, T, N>,
 ) -> f64 {
-    match (material.law, material.viscosity.is_zero()) {
-        (Law::StVenantKirchhoff, true) => pick::<P, T, StVenantKirchhoff, false, N>(set, job),
-        (Law::StVenantKirchhoff, false) => pick::<P, T, StVenantKirchhoff, true, N>(set, job),
-        (Law::StableNeoHookean, true) => pick::<P, T, StableNeoHookean, false, N>(set, job),
-        (Law::StableNeoHookean, false) => pick::<P, T, StableNeoHookean, true, N>(set, job),
-        (Law::FixedCorotated, true) => pick::<P, T, FixedCorotated, false, N>(set, job),
-        (Law::FixedCorotated, false) => pick::<P, T, FixedCorotated, true, N>(set, job),
+    match (law, with_viscosity) {
+        (Law::StVenantKirchhoff, false) => pick::<P, T, StVenantKirchhoff, false, N>(set, job),
+        (Law::StVenantKirchhoff, true) => pick::<P, T, StVenantKirchhoff, true, N>(set, job),
+        (Law::StableNeoHookean, false) => pick::<P, T, StableNeoHookean, false, N>(set, job),
+        (Law::StableNeoHookean, true) => pick::<P, T, StableNeoHookean, true, N>(set, job),
+        (Law::FixedCorotated, false) => pick::<P, T, FixedCorotated, false, N>(set, job),
+        (Law::FixedCorotated, true) => pick::<P, T, FixedCorotated, true, N>(set, job),
     }
 }
 

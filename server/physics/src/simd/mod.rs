@@ -17,7 +17,12 @@ mod tangents;
 #[cfg(target_arch = "x86_64")]
 mod x86;
 
-use crate::{fem::element::RestTet, material::Material, mesh::TetMesh, world::Precision};
+use crate::{
+    fem::element::RestTet,
+    material::{Law, Material},
+    mesh::TetMesh,
+    world::Precision,
+};
 use block::{Blocks, Forces, Job, Node, Products, Run, Sum};
 use dispatch::Available;
 pub use dispatch::InstructionSet;
@@ -35,6 +40,8 @@ pub struct ForceKernel {
     layout: Layout,
     nodes: usize,
     any_viscosity: bool,
+    /// Off switch of the skip of viscous terms where a material has none.
+    every_viscosity: bool,
     instruction_set: Available,
 }
 
@@ -77,8 +84,15 @@ impl ForceKernel {
             layout,
             nodes: mesh.positions_m().len(),
             any_viscosity: materials.iter().any(|m| !m.viscosity.is_zero()),
+            every_viscosity: false,
             instruction_set: Available::at_most(InstructionSet::best()),
         }
+    }
+
+    /// The same kernel, computing viscous terms also where φ = ψ = 0: the same forces, only slower.
+    #[must_use]
+    pub fn with_every_viscosity(self) -> Self {
+        Self { any_viscosity: true, every_viscosity: true, ..self }
     }
 
     /// The same kernel, held to an instruction set or the best below it that there is (for tests and benchmarks).
@@ -164,7 +178,7 @@ impl ForceKernel {
         let KernelScratch { displacements, directions, sums, .. } = scratch;
         for run in runs {
             let mut job = Job::for_products(blocks, run, displacements, directions, sums, factors);
-            dispatch::run::<Products, _, _>(self.instruction_set, &run.material, &mut job);
+            dispatch::run::<Products, _, _>(self.instruction_set, self.pass_of(&run.material), &mut job);
         }
     }
 
@@ -178,9 +192,14 @@ impl ForceKernel {
         let mut power_w = 0.0;
         for run in runs {
             let mut job = Job::new(blocks, run, displacements, velocities, sums);
-            power_w += dispatch::run::<Forces, _, _>(self.instruction_set, &run.material, &mut job);
+            power_w += dispatch::run::<Forces, _, _>(self.instruction_set, self.pass_of(&run.material), &mut job);
         }
         power_w
+    }
+
+    /// The law, and whether viscous terms are computed.
+    fn pass_of(&self, material: &Material) -> (Law, bool) {
+        (material.law, self.every_viscosity || !material.viscosity.is_zero())
     }
 }
 

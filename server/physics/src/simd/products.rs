@@ -1,6 +1,6 @@
 //! Products of the tangent stiffness and the viscous matrix with a vector, one block of lanes at a time.
 use super::{
-    block::{Input, Lanes, corner_forces, gradient, load},
+    block::{Input, Lanes, any_outside, corner_forces, gradient, load},
     laws::{Constants, M3, columns, plus, rows, scaled, viscous},
     real::{Scalar, Vector},
     tangents::LaneTangent,
@@ -36,12 +36,8 @@ pub(super) fn compute<V: Vector<Scalar = T>, T: Scalar, L: LaneTangent, const VI
             f[component].store(&mut forces[component][first..]);
         }
     }
-    if let Some(limit) = L::DOMAIN {
-        let limit = T::of(limit);
-        let count = inside.iter().map(|&domain| u32::from(domain >= limit)).sum::<u32>();
-        if count < N as u32 {
-            redo_outside::<T, L, VISCOUS, N>(constants, [elastic, viscosity], input, &inside, forces);
-        }
+    if any_outside(&inside, L::DOMAIN) {
+        redo_outside::<T, L, VISCOUS, N>(constants, [elastic, viscosity], input, &inside, forces);
     }
 }
 

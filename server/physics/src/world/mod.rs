@@ -9,7 +9,7 @@ mod tick;
 
 pub use error::ModelError;
 pub use model::Model;
-pub use spec::{Integrator, LoadSpec, ModelSpec, Precision, PrescribedSpec, Region, Settings, Substeps};
+pub use spec::{Integrator, LoadSpec, ModelSpec, Precision, PrescribedSpec, Region, Settings, Skips, Substeps};
 pub use state::State;
 pub use substeps::MAX_SUBSTEPS;
 pub use tick::{PointForce, Scratch, StepReport, TickInput};

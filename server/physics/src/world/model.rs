@@ -44,6 +44,7 @@ impl Model {
         let mass_kg = mass::lumped_kg(&spec.mesh, density);
         let inverse_mass_per_kg = free_inverse_mass(&mass_kg, &spec.prescribed)?;
         let kernel = ForceKernel::build(&spec.mesh, &rest_tets, &spec.tet_region, &materials, spec.settings.precision);
+        let kernel = if spec.settings.skips.viscous_terms { kernel } else { kernel.with_every_viscosity() };
         let at_rest = RestStiffness {
             mesh: &spec.mesh,
             rest_tets: &rest_tets,

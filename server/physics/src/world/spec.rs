@@ -83,6 +83,22 @@ pub enum Integrator {
     BackwardEuler,
 }
 
+/// What is left out where a scene does not need it. Results are the same bit for bit; the switches are for tests and benchmarks
+/// that prove it and tell the time saved.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Skips {
+    /// Viscous terms of materials with φ = ψ = 0.
+    pub viscous_terms: bool,
+    /// Contact tests of triangles that a tool cannot have reached yet.
+    pub distant_contact: bool,
+}
+
+impl Default for Skips {
+    fn default() -> Self {
+        Self { viscous_terms: true, distant_contact: true }
+    }
+}
+
 /// Numerical settings.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Settings {
@@ -104,6 +120,8 @@ pub struct Settings {
     pub solver_iterations: u32,
     /// Where that solver stops: residual over its start, in the preconditioner's norm, in (0, 1).
     pub solver_tolerance: f64,
+    /// What is left out.
+    pub skips: Skips,
 }
 
 impl Default for Settings {
@@ -118,6 +136,7 @@ impl Default for Settings {
             mass_damping_per_s: 0.0,
             solver_iterations: 100,
             solver_tolerance: 1e-3,
+            skips: Skips::default(),
         }
     }
 }

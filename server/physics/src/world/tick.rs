@@ -63,14 +63,9 @@ impl Scratch {
                 Integrator::BackwardEuler => model.kernel().scratch_for_products(),
                 _ => model.kernel().scratch(),
             },
-            contact: model.contact().scratch(),
+            contact: model.contact().scratch(model.spec().settings.skips.distant_contact),
             implicit: ImplicitScratch::new(model),
         }
-    }
-
-    /// Off switch of contact's broad phase ([`ContactScratch::set_exhaustive`]): same bits, only slower.
-    pub fn set_exhaustive_contact(&mut self, on: bool) {
-        self.contact.set_exhaustive(on);
     }
 
     /// Products with the matrix of implicit schemes since this scratch was made: the solver's iterations.

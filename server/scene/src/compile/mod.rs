@@ -19,7 +19,9 @@ use crate::{
 };
 use body::Body;
 use glam::DVec3;
-use palpate_physics::{Integrator, ModelSpec, Precision, Settings, Substeps, mesh::quality, world::MAX_SUBSTEPS};
+use palpate_physics::{
+    Integrator, ModelSpec, Precision, Settings, Skips, Substeps, mesh::quality, world::MAX_SUBSTEPS,
+};
 use regions::Regions;
 use std::path::{Path, PathBuf};
 
@@ -153,6 +155,7 @@ fn settings(document: &Document) -> Result<Settings, Fault> {
         mass_damping_per_s,
         solver_iterations,
         solver_tolerance,
+        skips: Skips::default(),
     })
 }
 

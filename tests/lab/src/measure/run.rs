@@ -7,6 +7,7 @@ use crate::{
         sample::{self, FieldError},
     },
     references::Reference,
+    timing::quantiles,
 };
 use miette::Result;
 use std::time::Instant;
@@ -153,18 +154,14 @@ impl Contender {
         if times_s.is_empty() {
             return Row { failure, ..row };
         }
-        let quantile = |times: &[f64], fraction: f64| {
-            let mut times = times.to_vec();
-            times.sort_by(f64::total_cmp);
-            times[((times.len() - 1) as f64 * fraction).round() as usize] * 1e6
-        };
-        let median = quantile(&times_s, 0.5);
+        let micros = |times: &[f64]| quantiles(&mut times.to_vec(), [0.5, 0.99, 1.0]).map(|time_s| time_s * 1e6);
+        let [median, p99, worst] = micros(&times_s);
         let (first, second) = times_s.split_at(times_s.len() / 2);
-        let apart = if first.is_empty() { 0.0 } else { (quantile(first, 0.5) - quantile(second, 0.5)).abs() };
+        let apart = if first.is_empty() { 0.0 } else { (micros(first)[0] - micros(second)[0]).abs() };
         Row {
             median_us: Some(median),
-            p99_us: Some(quantile(&times_s, 0.99)),
-            worst_us: Some(quantile(&times_s, 1.0)),
+            p99_us: Some(p99),
+            worst_us: Some(worst),
             unrest: Some(apart / median),
             failure,
             ..row

@@ -1,10 +1,12 @@
 //! `palpate-lab run`.
-use super::page;
+use super::page::{self, Results};
 use crate::{
     machine::{Machine, Noise},
     measure::{self, Effort, Run, Turn},
     methods,
     problems::{self, Problem},
+    skips::{self, Found, Skip},
+    stress::{self, Extent, Outcome},
 };
 use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
@@ -21,7 +23,7 @@ pub struct Options {
     /// Every problem and resolution (the default is every problem at the quick run's resolutions)
     #[arg(long)]
     full: bool,
-    /// Directory for report.html and results.csv
+    /// Directory for report.html, results.csv, skips.csv and stress.csv
     #[arg(long, default_value = "lab-results")]
     out: PathBuf,
     /// Only problems whose name contains this
@@ -68,13 +70,16 @@ pub fn run(options: &Options) -> Result<()> {
         rows.extend(measure::problem(problem, &methods, &effort, &mut tell)?);
         bar.inc(1);
     }
+    // Whoever asks for one problem or method wants its rows, not a minute of stress.
+    let whole = options.problem.is_none() && options.method.is_none();
+    let (skips, stress) = if whole { (skips(options, &bar)?, stress(options, &bar)?) } else { (vec![], vec![]) };
     bar.finish_and_clear();
     let mut circumstances = circumstances(options, &effort, &noise);
     for (index, note) in pinned.notes.iter().enumerate() {
         circumstances.insert(format!("system {}", index + 1), note.text.clone());
     }
     let run = Run { circumstances, rows };
-    write(options, &run, &problems, &methods)?;
+    write(options, &Results { run: &run, problems: &problems, methods: &methods, skips: &skips, stress: &stress })?;
     for row in run.rows.iter().filter(|row| !row.failure.is_empty()) {
         println!("{} by {} at {}: {}", row.problem, row.method, row.resolution, row.failure);
     }
@@ -115,13 +120,43 @@ fn circumstances(options: &Options, effort: &Effort, noise: &Noise) -> BTreeMap<
     .into()
 }
 
-fn write(options: &Options, run: &Run, problems: &[Problem], methods: &[Box<dyn methods::Method>]) -> Result<()> {
+fn skips(options: &Options, bar: &ProgressBar) -> Result<Vec<(Skip, Found)>> {
+    let rounds = if options.quick { 200 } else { 1_000 };
+    let measure = |skip: Skip| {
+        bar.set_prefix("skips");
+        bar.set_message(skip.name);
+        Ok((skip, (skip.run)(rounds)?))
+    };
+    skips::ALL.into_iter().map(measure).collect()
+}
+
+/// The extent in which a run goes through the stress suite.
+fn stress_options(options: &Options) -> stress::Options {
+    stress::Options { extent: if options.quick { Extent::Reduced } else { Extent::Short }, seed: 1 }
+}
+
+fn stress(options: &Options, bar: &ProgressBar) -> Result<Vec<(stress::Row, Outcome)>> {
+    let go_through = |row: stress::Row| {
+        bar.set_prefix("stress");
+        bar.set_message(row.name);
+        Ok((row, (row.run)(&stress_options(options))?))
+    };
+    stress::ROWS.into_iter().map(go_through).collect()
+}
+
+fn write(options: &Options, results: &Results<'_>) -> Result<()> {
     let out = &options.out;
     std::fs::create_dir_all(out).into_diagnostic().wrap_err_with(|| format!("cannot make {}", out.display()))?;
     let save = |name: &str, text: String| {
         let path = out.join(name);
         std::fs::write(&path, text).into_diagnostic().wrap_err_with(|| format!("cannot write {}", path.display()))
     };
-    save("results.csv", measure::write(run))?;
-    save("report.html", page::page(run, problems, methods)?)
+    if !results.skips.is_empty() {
+        save("skips.csv", skips::csv(results.skips))?;
+    }
+    if !results.stress.is_empty() {
+        stress::write_csv(out, &stress_options(options), results.stress)?;
+    }
+    save("results.csv", measure::write(results.run))?;
+    save("report.html", page::page(results)?)
 }

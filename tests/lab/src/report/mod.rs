@@ -3,6 +3,8 @@ mod command;
 mod compare;
 mod page;
 mod plot;
+mod skips;
+mod stress;
 
 pub use command::{Options, run};
 pub use compare::{Options as CompareOptions, compare, run as run_compare};

@@ -1,10 +1,15 @@
 //! The page: one file that needs nothing else, for a reader who was not there.
-use super::plot::{self, Point, Series};
+use super::{
+    plot::{self, Point, Series},
+    skips, stress,
+};
 use crate::{
     measure::{Row, Run},
     methods::{self, Method},
     problems::{Action, Problem},
     references::Reference,
+    skips::{Found, Skip},
+    stress::{Outcome, Row as StressRow},
 };
 use miette::Result;
 use std::fmt::Write as _;
@@ -29,11 +34,23 @@ td:first-child,th:first-child{text-align:left}.text td,.text th{text-align:left;
 .legend span{display:inline-block;margin-right:1.2em}.legend i{display:inline-block;width:.8em;height:.8em;border-radius:50%;margin-right:.35em}
 details{margin:.3em 0 1em}summary{cursor:pointer}.wide{overflow-x:auto}";
 
+/// What a page shows.
+pub(super) struct Results<'a> {
+    pub(super) run: &'a Run,
+    pub(super) problems: &'a [Problem],
+    pub(super) methods: &'a [Box<dyn Method>],
+    /// Empty: not measured.
+    pub(super) skips: &'a [(Skip, Found)],
+    /// Empty: not run.
+    pub(super) stress: &'a [(StressRow, Outcome)],
+}
+
 /// The page of a run.
 ///
 /// # Errors
-/// A problem without reference.
-pub(super) fn page(run: &Run, problems: &[Problem], methods: &[Box<dyn Method>]) -> Result<String> {
+/// A problem without reference, or a record that cannot be read.
+pub(super) fn page(results: &Results<'_>) -> Result<String> {
+    let Results { run, problems, methods, .. } = results;
     let mut out = format!(
         "<!doctype html><html lang=\"en\"><meta charset=\"utf-8\"><meta name=\"viewport\" content=\"width=device-width\">\
          <title>Palpate: run time against error</title><style>{STYLE}</style><body><h1>Run time against error</h1>"
@@ -41,13 +58,15 @@ pub(super) fn page(run: &Run, problems: &[Problem], methods: &[Box<dyn Method>])
     introduction(&mut out, run);
     summary(&mut out, run, problems);
     out.push_str("<h2>Methods</h2><table class=\"text\"><tr><th>method</th><th>what it is</th></tr>");
-    for method in methods {
+    for method in *methods {
         let _ = write!(out, "<tr><td>{}</td><td>{}</td></tr>", escape(method.name()), escape(method.what()));
     }
     out.push_str("</table><h2>Problems</h2>");
-    for problem in problems {
+    for problem in *problems {
         section(&mut out, run, problem, methods)?;
     }
+    skips::section(&mut out, results.skips);
+    stress::section(&mut out, results.stress)?;
     out.push_str("</body></html>");
     Ok(out)
 }
@@ -241,7 +260,8 @@ mod tests {
         };
         let bad = Row { failure: "became <non-finite>".into(), median_us: None, ..good.clone() };
         let run = Run { circumstances: [("date".into(), "today".into())].into(), rows: vec![good, bad] };
-        let page = page(&run, &[problem], &methods::all()).unwrap();
+        let results = Results { run: &run, problems: &[problem], methods: &methods::all(), skips: &[], stress: &[] };
+        let page = page(&results).unwrap();
         assert!(
             page.contains("-5.00 %") && page.contains("became &lt;non-finite&gt;") && page.contains("class=\"yes\"")
         );

@@ -3,6 +3,7 @@
 //! That the arm's force ramps to zero within 5 ms is the control law's and the daemon's (`palpate-control`, `palpated` test it); physics
 //! takes the force of a refused tick away at once.
 use super::{Measured, Options, Outcome, meshes, random::Random, rig, rig::Drive, rig::Rig};
+use crate::bodies::material;
 use glam::DVec3;
 use miette::Result;
 use palpate_physics::{
@@ -52,7 +53,7 @@ fn pressed(options: &Options) -> Result<Rig> {
     let floor = meshes::nodes_where(&mesh, |p| p.z < -0.0199);
     let top = meshes::triangles_where(&mesh, |p| p.z > -1e-9)?;
     let corner = meshes::nodes_where(&mesh, |p| p.z > -1e-9 && p.x > 0.0199);
-    let mut spec = rig::body(options, mesh, rig::material(Law::StableNeoHookean, 10e3, 0.4)?);
+    let mut spec = rig::body(options, mesh, material(Law::StableNeoHookean, 10e3, 0.4)?);
     spec.regions[0].material.viscosity = Viscosity { phi_pa_s: 0.2, psi_pa_s: 0.2 };
     spec.prescribed = vec![rig::hold("floor", floor)];
     spec.gravity_m_per_s2 = DVec3::NEG_Z * 9.81;

@@ -1,5 +1,6 @@
 //! Random impulses on random nodes of a free body, in bursts and pauses.
 use super::{Measured, Options, Outcome, meshes, random::Random, rig, rig::Drive, rig::Rig};
+use crate::bodies::material;
 use miette::Result;
 use palpate_physics::{PointForce, Substeps, material::Law};
 
@@ -39,7 +40,7 @@ struct Excess {
 }
 
 fn excess(options: &Options, substeps: u32, force_n: f64, count: u32, outcome: &mut Outcome) -> Result<Excess> {
-    let mut spec = rig::body(options, meshes::block(4)?, rig::material(Law::StableNeoHookean, 10e3, 0.4)?);
+    let mut spec = rig::body(options, meshes::block(4)?, material(Law::StableNeoHookean, 10e3, 0.4)?);
     spec.settings.substeps = Substeps::Fixed(substeps);
     let mut rig = Rig::new(spec)?;
     let mut random = Random::new(options.seed);

@@ -1,9 +1,8 @@
-//! Meshes of the stress suite: bricks with any spacing, jittered and slivered ones, an octant of a shell.
+//! Meshes of the stress suite: bricks with any spacing, jittered and slivered ones.
 use super::random::Random;
 use glam::DVec3;
 use miette::{IntoDiagnostic, Result};
 use palpate_physics::{Surface, TetMesh};
-use std::collections::BTreeMap;
 
 /// Evenly spaced coordinates (m).
 pub(super) fn even(from_m: f64, to_m: f64, cells: usize) -> Vec<f64> {
@@ -35,36 +34,6 @@ pub(super) fn bricks(xs: &[f64], ys: &[f64], zs: &[f64]) -> Result<TetMesh> {
 pub(super) fn block(cells: usize) -> Result<TetMesh> {
     let side = even(-0.02, 0.02, cells);
     bricks(&side, &side, &even(-0.02, 0.0, cells.div_ceil(2)))
-}
-
-/// One octant, `x, y, z ≥ 0`, of a spherical shell: `cells` along each arc, `layers` through the wall, three tets to a prism.
-pub(super) fn shell_octant(inner_m: f64, outer_m: f64, cells: usize, layers: usize) -> Result<TetMesh> {
-    let arc = || (0..=cells).flat_map(|i| (0..=cells - i).map(move |j| (i, j)));
-    let number: BTreeMap<(usize, usize), usize> = arc().enumerate().map(|(n, at)| (at, n)).collect();
-    let directions: Vec<DVec3> =
-        arc().map(|(i, j)| DVec3::new(i as f64, j as f64, (cells - i - j) as f64).normalize()).collect();
-    let mut triangles = Vec::with_capacity(cells * cells);
-    for (i, j) in arc().filter(|(i, j)| i + j < cells) {
-        triangles.push([(i, j), (i + 1, j), (i, j + 1)].map(|at| number[&at]));
-        if i + j + 1 < cells {
-            triangles.push([(i + 1, j), (i + 1, j + 1), (i, j + 1)].map(|at| number[&at]));
-        }
-    }
-    // The diagonals of a prism's sides go from the lower number below to the higher above: neighbours agree.
-    for triangle in &mut triangles {
-        triangle.sort_unstable();
-    }
-    let radius_m = |layer: usize| inner_m + (outer_m - inner_m) * layer as f64 / layers as f64;
-    let positions = (0..=layers).flat_map(|layer| directions.iter().map(move |d| *d * radius_m(layer))).collect();
-    let mut tets = Vec::with_capacity(3 * layers * triangles.len());
-    for layer in 0..layers {
-        for triangle in &triangles {
-            let [a, b, c] = triangle.map(|n| (layer * directions.len() + n) as u32);
-            let [d, e, f] = [a, b, c].map(|n| n + directions.len() as u32);
-            tets.extend([[a, b, c, f], [a, b, e, f], [a, d, e, f]]);
-        }
-    }
-    oriented(positions, tets)
 }
 
 /// The mesh with its inner nodes moved at random by up to `amount_m` along each axis; a move that makes a tet smaller than a
@@ -149,9 +118,6 @@ mod tests {
     fn meshes_fill_what_they_should() {
         let block = block(4).unwrap();
         assert!((block.total_volume_m3() / 32e-6 - 1.0).abs() < 1e-12);
-        let octant = shell_octant(0.05, 0.1, 24, 12).unwrap();
-        let exact = std::f64::consts::PI / 6.0 * (1e-3 - 1.25e-4);
-        assert!((octant.total_volume_m3() / exact - 1.0).abs() < 5e-3);
         let shaken = jittered(&block, 2e-3, &mut Random::new(3)).unwrap();
         assert!((shaken.total_volume_m3() / 32e-6 - 1.0).abs() < 1e-12 && shaken != block);
     }

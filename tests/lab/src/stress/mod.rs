@@ -2,6 +2,7 @@
 //!
 //! - `outcome.rs`: numbers, limits, known shortfalls
 //! - `table.rs`: the printed table and `stress.csv`
+//! - `record.rs`: long runs, kept in the source tree
 //! - `rig.rs`, `meshes.rs`, `random.rs`: what rows share
 //! - one file per row
 mod bad_input;
@@ -11,6 +12,7 @@ mod meshes;
 mod outcome;
 mod random;
 mod random_scenes;
+mod record;
 mod recovery;
 mod rig;
 mod slivers;
@@ -22,7 +24,9 @@ mod time_step;
 use clap::Args;
 use miette::{Result, bail};
 pub use outcome::{Measured, Outcome};
+pub use record::{Record, records};
 use std::path::PathBuf;
+pub use table::{number, verdict, write_csv};
 
 /// How much of a row is run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -97,6 +101,9 @@ pub struct Command {
     /// Folder for stress.csv
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
+    /// Keep the numbers in the source tree (tests/lab/records), where the page of `palpate-lab run` shows them
+    #[arg(long)]
+    record: bool,
 }
 
 /// Runs rows and prints them; writes `stress.csv` if asked to.
@@ -110,14 +117,18 @@ pub fn run(command: &Command) -> Result<()> {
     for row in rows {
         let started = std::time::Instant::now();
         let outcome = (row.run)(&options)?;
-        table::print(&row, &outcome, started.elapsed().as_secs_f64());
+        let elapsed_s = started.elapsed().as_secs_f64();
+        table::print(&row, &outcome, elapsed_s);
+        if command.record {
+            println!("kept in {}", Record::of(&row, &options, &outcome, elapsed_s).write()?.display());
+        }
         results.push((row, outcome));
     }
     for (name, reason) in NOT_BUILT.iter().filter(|_| command.rows.is_empty()) {
         println!("{name}: {reason}");
     }
     if let Some(folder) = &command.out {
-        println!("wrote {}", table::write_csv(folder, &options, &results)?.display());
+        println!("wrote {}", write_csv(folder, &options, &results)?.display());
     }
     let surprises: Vec<&str> = results.iter().filter(|(_, o)| o.surprises()).map(|(row, _)| row.name).collect();
     if surprises.is_empty() {

@@ -1,6 +1,7 @@
 //! Scenes made at random: meshes, materials, loads, tools and blows. Scene k of a run has the seed `--seed` + k, so that
 //! `palpate-lab stress random-scenes --seed N` begins with the scene that failed as N.
 use super::{Measured, Options, Outcome, meshes, random::Random, rig, rig::Drive, rig::Rig};
+use crate::bodies::material;
 use glam::DVec3;
 use miette::{IntoDiagnostic, Result};
 use palpate_physics::{
@@ -161,7 +162,7 @@ fn scene(options: &Options, random: &mut Random) -> Result<ModelSpec> {
     let (low, high) = mesh.bounds_m();
     let young_pa = random.log_within(1e3, 100e3);
     let law = [Law::StableNeoHookean, Law::FixedCorotated, Law::StVenantKirchhoff][random.below(3)];
-    let mut spec = rig::body(options, mesh, rig::material(law, young_pa, random.within(0.0, 0.49))?);
+    let mut spec = rig::body(options, mesh, material(law, young_pa, random.within(0.0, 0.49))?);
     if random.chance(0.5) {
         // Relaxation times of up to a millisecond.
         let most = 1e-3 * young_pa;

@@ -2,6 +2,7 @@
 //!
 //! A block held on its floor with mass damping. Its free nodes are put wrong at rest and let go for five seconds.
 use super::{Measured, Options, Outcome, meshes, random::Random, rig, rig::Drive, rig::Rig};
+use crate::bodies::material;
 use glam::DVec3;
 use miette::Result;
 use palpate_physics::{Settings, material::Law};
@@ -52,7 +53,7 @@ pub(super) fn run(options: &Options) -> Result<Outcome> {
 fn held(options: &Options, law: Law, stretch_allowance: f64) -> Result<Rig> {
     let mesh = meshes::block(4)?;
     let floor = meshes::nodes_where(&mesh, |p| p.z < -0.0199);
-    let mut spec = rig::body(options, mesh, rig::material(law, 10e3, 0.4)?);
+    let mut spec = rig::body(options, mesh, material(law, 10e3, 0.4)?);
     spec.prescribed = vec![rig::hold("floor", floor)];
     spec.settings.mass_damping_per_s = DAMPING_PER_S;
     spec.settings.stretch_allowance = stretch_allowance;

@@ -4,11 +4,7 @@ use glam::DVec3;
 use miette::{IntoDiagnostic, Result};
 use palpate_physics::{
     Energies, Model, ModelSpec, PointForce, Precision, PrescribedSpec, Region, Scratch, Settings, State, StepReport,
-    TetMesh, TickInput,
-    contact::ToolTarget,
-    health,
-    material::{Lame, Law, Material, Viscosity},
-    step,
+    TetMesh, TickInput, contact::ToolTarget, health, material::Material, step,
 };
 
 /// A body and its state.
@@ -117,11 +113,6 @@ pub(super) fn body(options: &Options, mesh: TetMesh, material: Material) -> Mode
         tools: Vec::new(),
         settings: settings(options),
     }
-}
-
-pub(super) fn material(law: Law, young_modulus_pa: f64, poisson_ratio: f64) -> Result<Material> {
-    let lame = Lame::from_young_poisson(young_modulus_pa, poisson_ratio).into_diagnostic()?;
-    Ok(Material { law, lame, viscosity: Viscosity::default() })
 }
 
 /// Nodes held in all directions.

@@ -1,5 +1,6 @@
 //! Meshes no one should use: a sliver of 1°, edges in a ratio of 1000:1. The step comes from their spectrum.
 use super::{Measured, Options, Outcome, meshes, random::Random, rig, rig::Drive, rig::Rig};
+use crate::bodies::material;
 use miette::Result;
 use palpate_physics::{TetMesh, material::Law, mesh::quality};
 
@@ -19,7 +20,7 @@ pub(super) fn run(options: &Options) -> Result<Outcome> {
 /// A free body with this mesh rings; its energy stays.
 fn ring(options: &Options, name: &str, mesh: TetMesh, outcome: &mut Outcome) -> Result<()> {
     let shape = quality::measure(&mesh);
-    let mut rig = Rig::new(rig::body(options, mesh, rig::material(Law::StableNeoHookean, 10e3, 0.4)?))?;
+    let mut rig = Rig::new(rig::body(options, mesh, material(Law::StableNeoHookean, 10e3, 0.4)?))?;
     let mut random = Random::new(options.seed);
     for (v, x) in rig.state.v.iter_mut().zip(&rig.state.x) {
         *v = *x * 1.0 + random.vector() * 1e-3;

@@ -3,6 +3,7 @@
 //! The energy `K + U` of the moment oscillates by O((ω dt)²), so drift is of means: over the last hundredth of the run, or second, against
 //! the first. Beside it stands the same of the energy that leapfrog conserves, `K + U − ⅛ dt² Σ f²/m`.
 use super::{Extent, Measured, Options, Outcome, meshes, random::Random, rig, rig::Drive, rig::Rig};
+use crate::bodies::material;
 use assert_no_alloc::assert_no_alloc;
 use glam::DVec3;
 use indicatif::{ProgressBar, ProgressStyle};
@@ -67,7 +68,7 @@ pub(super) fn run(options: &Options) -> Result<Outcome> {
 
 /// A free block that spins slowly and rings in all its modes, with `finer` times the substeps of its spectrum.
 fn ringing(options: &Options, finer: u32) -> Result<Rig> {
-    let mut spec = rig::body(options, meshes::block(3)?, rig::material(Law::StableNeoHookean, 10e3, 0.4)?);
+    let mut spec = rig::body(options, meshes::block(3)?, material(Law::StableNeoHookean, 10e3, 0.4)?);
     let measured = Rig::new(spec.clone())?.model.substeps();
     spec.settings.substeps = Substeps::Fixed(finer * measured);
     let mut rig = Rig::new(spec)?;

@@ -1,5 +1,6 @@
 //! Two regions whose Young's moduli differ by up to 1:10⁴, pulled and let go.
 use super::{Measured, Options, Outcome, meshes, rig, rig::Drive, rig::Rig};
+use crate::bodies::material;
 use glam::DVec3;
 use miette::Result;
 use palpate_physics::{LoadSpec, Region, material::Law};
@@ -41,8 +42,8 @@ pub(super) fn run(options: &Options) -> Result<Outcome> {
 /// A block, held below, its lower half soft and its upper half stiff, with a dead traction along x on its top.
 fn layered(options: &Options, ratio: f64) -> Result<Rig> {
     let mesh = meshes::block(4)?;
-    let soft = rig::material(Law::StableNeoHookean, SOFT_PA, 0.4)?;
-    let stiff = rig::material(Law::StableNeoHookean, SOFT_PA * ratio, 0.4)?;
+    let soft = material(Law::StableNeoHookean, SOFT_PA, 0.4)?;
+    let stiff = material(Law::StableNeoHookean, SOFT_PA * ratio, 0.4)?;
     let centre_z = |tet: usize| mesh.corners_m(tet).iter().map(|p| p.z).sum::<f64>() / 4.0;
     let tet_region = (0..mesh.tets().len()).map(|tet| u16::from(centre_z(tet) > -0.01)).collect();
     let floor = meshes::nodes_where(&mesh, |p| p.z < -0.0199);

@@ -11,7 +11,8 @@ use std::{
 /// to fall short), `FAILS` (not known to) or `not built` of the whole row; `holds` is of the number, empty if it has no limit.
 const COLUMNS: &str = "row,criterion,verdict,reason,quantity,value,unit,limit,holds,extent,seed";
 
-pub(super) fn verdict(outcome: &Outcome) -> &'static str {
+/// `passes`, `fails` (known to fall short) or `FAILS` (not known to).
+pub fn verdict(outcome: &Outcome) -> &'static str {
     match (outcome.passed(), outcome.surprises()) {
         (true, _) => "passes",
         (false, false) => "fails",
@@ -35,7 +36,7 @@ pub(super) fn print(row: &Row, outcome: &Outcome, elapsed_s: f64) {
 }
 
 /// Four digits, as people read them.
-fn number(value: f64) -> String {
+pub fn number(value: f64) -> String {
     if !value.is_finite() {
         return if value.is_nan() { "NaN".into() } else { "never".into() };
     }
@@ -47,7 +48,10 @@ fn number(value: f64) -> String {
 }
 
 /// Writes `stress.csv` and returns its path.
-pub(super) fn write_csv(folder: &Path, options: &Options, results: &[(Row, Outcome)]) -> Result<PathBuf> {
+///
+/// # Errors
+/// A folder or file that cannot be written.
+pub fn write_csv(folder: &Path, options: &Options, results: &[(Row, Outcome)]) -> Result<PathBuf> {
     let path = folder.join("stress.csv");
     fs::create_dir_all(folder).into_diagnostic().wrap_err_with(|| format!("cannot make {}", folder.display()))?;
     let text = csv(options, results);

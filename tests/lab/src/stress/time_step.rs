@@ -3,6 +3,7 @@
 //! Up to the limit velocity Verlet conserves `½v² + ½ω²(1 − r²)x²` of every mode, so its energy never exceeds `E₀/(1 − r²)`: the
 //! bound asked for, sharp, at any number of steps. The body moves by about 1e-6 of its size, so that it is linear.
 use super::{Measured, Options, Outcome, meshes, random::Random, rig, rig::Drive, rig::Rig};
+use crate::bodies::material;
 use miette::Result;
 use palpate_physics::{Substeps, material::Law};
 
@@ -59,7 +60,7 @@ pub(super) fn run(options: &Options) -> Result<Outcome> {
 }
 
 fn sweep(options: &Options, ratio: f64, steps: u32) -> Result<Sweep> {
-    let mut spec = rig::body(options, meshes::block(4)?, rig::material(Law::StableNeoHookean, 10e3, 0.4)?);
+    let mut spec = rig::body(options, meshes::block(4)?, material(Law::StableNeoHookean, 10e3, 0.4)?);
     spec.settings.substeps = Substeps::Fixed(1);
     let omega = Rig::new(spec.clone())?.model.max_natural_frequency_rad_per_s();
     spec.settings.tick_period_s = 2.0 * ratio / omega;

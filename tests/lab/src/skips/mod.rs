@@ -1,0 +1,82 @@
+//! What is skipped because a scene does not need it: the time saved by each skip, and that it changes nothing.
+//!
+//! - `pair.rs`: one scene twice, with the skip and without, tick by tick in turns
+//! - `rest_data.rs`: what follows from the rest state, at load instead of in every substep
+//! - `table.rs`: `skips.csv`
+mod pair;
+mod rest_data;
+mod table;
+
+use crate::timing::Summary;
+use miette::Result;
+pub use table::csv;
+
+/// A skip.
+#[derive(Debug, Clone, Copy)]
+pub struct Skip {
+    /// Name.
+    pub name: &'static str,
+    /// What is left out, and when.
+    pub what: &'static str,
+    /// In which scene it is measured.
+    pub scene: &'static str,
+    /// Measures it over so many timed ticks.
+    pub run: fn(usize) -> Result<Found>,
+}
+
+/// What was found of a skip.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Found {
+    /// Time per tick with the skip.
+    pub with: Summary,
+    /// Time per tick with it switched off.
+    pub without: Summary,
+    /// Whether both end in the same state, bit for bit.
+    pub same_bits: bool,
+}
+
+impl Found {
+    /// Part of the time without the skip that it saves.
+    pub fn saved(&self) -> f64 {
+        1.0 - self.with.median_s / self.without.median_s
+    }
+}
+
+/// Every skip that there is. All are exact: nothing but time may change.
+pub const ALL: [Skip; 4] = [
+    Skip {
+        name: "viscous terms",
+        what: "strain rates and viscous stress of materials with phi = psi = 0",
+        scene: "ventricle of 1 352 tets, ringing, a sphere pressed in",
+        run: pair::viscous_terms,
+    },
+    Skip {
+        name: "distant contact, tool away",
+        what: "contact tests of triangles that a tool cannot have reached since they were last looked at",
+        scene: "ventricle of 10 000 tets, ringing, a sphere 20 mm away",
+        run: pair::distant_contact_away,
+    },
+    Skip {
+        name: "distant contact, tool pressed in",
+        what: "the same",
+        scene: "the same ventricle, the sphere pressed in",
+        run: pair::distant_contact_pressed,
+    },
+    Skip {
+        name: "rest data",
+        what: "inverse edge matrices, shape gradients and volumes: computed at load, not in every substep",
+        scene: "ventricle of 1 352 tets; off: the tick and all rest data once a substep",
+        run: rest_data::run,
+    },
+];
+
+/// What is to be skipped and cannot be yet, or is not the lab's to measure: name and reason.
+pub const ELSEWHERE: [(&str, &str); 4] = [
+    (
+        "surfaces nobody watches",
+        "encoded by palpated, outside its loop; its tests count that nothing is made for nobody",
+    ),
+    ("inactive particles", "not built yet: hybrid model"),
+    ("coarse level at fewer substeps", "not built yet: hybrid model"),
+    ("sleeping regions", "not built yet: a body at rest is computed like one that moves"),
+];

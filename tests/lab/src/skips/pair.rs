@@ -1,0 +1,53 @@
+//! One scene twice, with a skip and without: tick by tick in turns, then compared bit for bit.
+use super::Found;
+use crate::{bodies, press::Press, timing::interleaved};
+use glam::DVec3;
+use miette::{IntoDiagnostic, Result};
+use palpate_physics::{Model, Skips, material::Law, snapshot};
+
+const TOOL_RADIUS_M: f64 = 10e-3;
+const DEPTH_M: f64 = 2e-3;
+const AWAY_M: f64 = 20e-3;
+const APPROACH_TICKS: usize = 50;
+/// Ventricles are of human size: 4.5 times the tables' small one.
+const SCALE: f64 = 4.5;
+
+pub(super) fn viscous_terms(rounds: usize) -> Result<Found> {
+    compare(1_352, 0.0, Skips { viscous_terms: false, ..Skips::default() }, rounds)
+}
+
+pub(super) fn distant_contact_away(rounds: usize) -> Result<Found> {
+    compare(10_000, AWAY_M, Skips { distant_contact: false, ..Skips::default() }, rounds)
+}
+
+pub(super) fn distant_contact_pressed(rounds: usize) -> Result<Found> {
+    compare(10_000, 0.0, Skips { distant_contact: false, ..Skips::default() }, rounds)
+}
+
+/// A ventricle of so many tets that rings, with a tool so far away (m) or, at 0, pressed in.
+pub(super) fn scene(tets: u32, away_m: f64, skips: Skips) -> Result<Model> {
+    let shape = bodies::ventricle(SCALE, tets)?;
+    let mut tool = bodies::tool_beside(&shape, TOOL_RADIUS_M);
+    tool.start_position_m += DVec3::X * away_m;
+    let mut spec =
+        bodies::model(&shape, bodies::material(Law::StableNeoHookean, 10e3, 0.45)?, Some(tool))?.spec().clone();
+    spec.settings.skips = skips;
+    Model::build(spec).into_diagnostic()
+}
+
+fn compare(tets: u32, away_m: f64, off: Skips, rounds: usize) -> Result<Found> {
+    let models = [scene(tets, away_m, Skips::default())?, scene(tets, away_m, off)?];
+    let depth_m = if away_m > 0.0 { 0.0 } else { DEPTH_M };
+    let mut presses = models.each_ref().map(|model| Press::new(model, depth_m, APPROACH_TICKS));
+    for press in &mut presses {
+        for _ in 0..APPROACH_TICKS {
+            press.tick();
+        }
+    }
+    let mut contenders: Vec<Box<dyn FnMut() + '_>> =
+        presses.iter_mut().map(|press| Box::new(|| _ = press.tick()) as Box<dyn FnMut() + '_>).collect();
+    let times = interleaved(&mut contenders, rounds);
+    drop(contenders);
+    let [with, without] = presses.each_ref().map(|press| snapshot::state_hash(press.state()));
+    Ok(Found { with: times[0], without: times[1], same_bits: with == without })
+}

@@ -1,0 +1,26 @@
+//! Rest data of every tet, computed once at load; without that, once a substep.
+use super::{Found, pair};
+use crate::{press::Press, timing::interleaved};
+use miette::Result;
+use palpate_physics::{Skips, fem::element::RestTet};
+
+const TETS: u32 = 1_352;
+
+pub(super) fn run(rounds: usize) -> Result<Found> {
+    let model = pair::scene(TETS, 0.0, Skips::default())?;
+    let mesh = model.mesh();
+    let mut once = Press::new(&model, 0.0, 1);
+    let mut again = Press::new(&model, 0.0, 1);
+    let mut rest_tets = model.rest_tets().to_vec();
+    let mut recompute = || {
+        for _ in 0..model.substeps() {
+            for (tet, rest) in rest_tets.iter_mut().enumerate() {
+                *rest = RestTet::new(&mesh.edge_matrix_m(tet));
+            }
+            std::hint::black_box(&rest_tets);
+        }
+        again.tick();
+    };
+    let times = interleaved(&mut [Box::new(|| _ = once.tick()), Box::new(&mut recompute)], rounds);
+    Ok(Found { with: times[0], without: times[1], same_bits: rest_tets == model.rest_tets() })
+}
