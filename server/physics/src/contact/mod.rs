@@ -69,6 +69,17 @@ struct ToolModel {
     impact_energy_j: f64,
 }
 
+/// The foundation on one boundary triangle, as one tool meets it: for methods with a contact of their own.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct TriangleFoundation<'a> {
+    /// Corners, counter-clockwise from outside.
+    pub nodes: [u32; 3],
+    /// Weights of the second and third corner in every sample.
+    pub weights: &'a [[f64; 2]],
+    /// `k_f a` (N/m) of each sample.
+    pub stiffness_n_per_m: f64,
+}
+
 /// The body at one instant.
 #[derive(Debug, Clone, Copy)]
 pub struct Body<'a> {
@@ -158,6 +169,16 @@ impl ContactModel {
     /// Force (N) at which a tool's coupling saturates; infinite for a rigid tool.
     pub fn force_limit_n(&self, tool: usize) -> f64 {
         self.spring(tool).map_or(f64::INFINITY, |spring| spring.limit_n)
+    }
+
+    /// The foundation under a tool, triangle by triangle; nothing for a tool that is not there.
+    pub fn foundation(&self, tool: usize) -> impl Iterator<Item = TriangleFoundation<'_>> {
+        self.tools.get(tool).into_iter().flat_map(move |tool| {
+            self.triangles.nodes.iter().enumerate().map(move |(triangle, &nodes)| {
+                let samples = tool.foundation.of(triangle, &self.tables);
+                TriangleFoundation { nodes, weights: samples.weights, stiffness_n_per_m: samples.stiffness_n_per_m }
+            })
+        })
     }
 
     /// The spring of a tool's coupling; `None` of a rigid tool.

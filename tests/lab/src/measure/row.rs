@@ -3,6 +3,10 @@
 /// Differences of time and of error, as fractions, that are ties: what two runs of one method differ by.
 const TIE_TIME: f64 = 0.10;
 const TIE_ERROR: f64 = 0.01;
+/// How many times the unrest of two rows a difference of their times must be to be believed.
+const SIGMAS: f64 = 3.0;
+/// No difference of time beyond this is a tie, however noisy the run: such a run has to be repeated.
+const WIDEST_TIE_TIME: f64 = 0.3;
 
 /// A row of the results. What was not measured is `None`.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -53,12 +57,17 @@ impl Row {
         self.answer_error.map(f64::abs)
     }
 
+    /// Difference of its time to another row's, as a fraction, that may be noise: `SIGMAS` times the unrest of both.
+    pub fn noise_with(&self, other: &Self) -> f64 {
+        SIGMAS * (self.unrest.unwrap_or(0.0) + other.unrest.unwrap_or(0.0))
+    }
+
     /// Whether no competing row is both faster and nearer to the answer, beyond ties; false without time or answer, or out of competition.
     pub fn is_on_front(&self, all: &[&Self]) -> bool {
         let (Some(time), Some(error), true) = (self.median_us, self.error(), self.competes) else { return false };
         let better = |other: &&Self| match (other.median_us, other.error()) {
             (Some(t), Some(e)) if other.competes => {
-                t < (1.0 - TIE_TIME) * time && e <= (1.0 + TIE_ERROR) * error
+                t < (1.0 - self.noise_with(other).clamp(TIE_TIME, WIDEST_TIE_TIME)) * time && e <= (1.0 + TIE_ERROR) * error
                     || t <= time && e < (1.0 - TIE_ERROR) * error
             }
             _ => false,
@@ -80,5 +89,24 @@ mod tests {
         let all: Vec<&Row> = rows.iter().collect();
         let front: Vec<bool> = rows.iter().map(|r| r.is_on_front(&all)).collect();
         assert_eq!(front, [true, true, false, true, false, false]);
+    }
+
+    #[test]
+    fn a_row_is_not_pushed_off_the_front_by_noise() {
+        let row = |time, unrest| Row {
+            median_us: Some(time),
+            answer_error: Some(0.1),
+            unrest: Some(unrest),
+            competes: true,
+            ..Row::default()
+        };
+        let on_front = |unrest| {
+            let rows = [row(100.0, unrest), row(85.0, 0.01)];
+            rows[0].is_on_front(&rows.iter().collect::<Vec<_>>())
+        };
+        assert!(!on_front(0.03), "15 % faster, and 12 % of noise");
+        assert!(on_front(0.05), "15 % faster, and 18 % of noise");
+        let noisy = [row(100.0, 1.0), row(65.0, 1.0)];
+        assert!(!noisy[0].is_on_front(&noisy.iter().collect::<Vec<_>>()), "35 % faster: no noise excuses that");
     }
 }

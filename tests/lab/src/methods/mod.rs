@@ -1,15 +1,26 @@
 //! The methods that are judged. A new model registers itself in [`all`], by a [`Method`] that builds a [`Running`].
 //!
-//! - `tetrahedra.rs`: linear tetrahedra, as the server runs them, in all variants
+//! - `subject.rs`: a problem on linear tetrahedra, which all of these share
+//! - `tetrahedra.rs`: as the server runs them, in all variants
+//! - `quasi_newton/`: backward Euler as a minimisation, prefactored, with L-BFGS
+//! - `xpbd/`: position-based dynamics with small steps
+//! - `pace.rs`: how fast a problem is gone through
 mod pace;
+mod quasi_newton;
+mod subject;
+#[cfg(test)]
+mod testing;
 mod tetrahedra;
+mod xpbd;
 
 pub use pace::Pace;
 
 use crate::problems::{Problem, body::Body};
 use glam::DVec3;
 use miette::Result;
+use quasi_newton::QuasiNewton;
 use tetrahedra::Tetrahedra;
+use xpbd::Xpbd;
 
 /// A way to solve problems in real time.
 pub trait Method {
@@ -53,11 +64,16 @@ pub const DEFAULT: &str = "leapfrog f32";
 
 /// Every method.
 pub fn all() -> Vec<Box<dyn Method>> {
-    Tetrahedra::variants().into_iter().map(|method| Box::new(method) as Box<dyn Method>).collect()
+    let mut methods: Vec<Box<dyn Method>> = Vec::new();
+    methods.extend(Tetrahedra::variants().into_iter().map(|method| Box::new(method) as Box<dyn Method>));
+    methods.extend(QuasiNewton::variants().into_iter().map(|method| Box::new(method) as Box<dyn Method>));
+    methods.extend(Xpbd::variants().into_iter().map(|method| Box::new(method) as Box<dyn Method>));
+    methods
 }
 
 #[cfg(test)]
 mod tests {
+    #![allow(clippy::unwrap_used)] // a test that cannot build its subject has failed
     use super::*;
 
     #[test]
@@ -69,5 +85,26 @@ mod tests {
         names.dedup();
         assert_eq!(names.len(), methods.len());
         assert!(names.iter().all(|name| !name.contains(',')));
+    }
+
+    /// Of every kind of problem: a tool, a load, and each law.
+    #[test]
+    fn no_tick_allocates() {
+        for name in
+            ["block-sphere-large-nu0.45", "block-patch-small-nu0.45-stvk", "block-sphere-large-nu0.45-corotated"]
+        {
+            let problem = testing::problem(name);
+            let pace = Pace::of(&problem).unwrap();
+            for method in all() {
+                let Ok(mut running) = method.build(&problem, 4, &pace) else { continue };
+                assert_no_alloc::assert_no_alloc(|| {
+                    for tick in 1..=20 {
+                        running.tick(f64::from(tick) / 20.0);
+                    }
+                });
+                let answer = running.answer();
+                assert!(answer > 0.0, "{name} by {}: {answer} {:?}", method.name(), running.failure());
+            }
+        }
     }
 }

@@ -1,5 +1,5 @@
 //! How fast a problem is gone through and how it comes to rest: the same for all methods.
-use super::tetrahedra;
+use super::subject;
 use crate::problems::Problem;
 use miette::{IntoDiagnostic, Result, miette};
 use palpate_physics::solve::natural_modes;
@@ -35,7 +35,7 @@ impl Pace {
     /// A body that cannot be built, or whose modes cannot be found.
     pub fn of(problem: &Problem) -> Result<Self> {
         let body = problem.body.tets(problem.body.resolutions(false)[0])?;
-        let unloaded = tetrahedra::unloaded(problem, &body)?;
+        let unloaded = subject::unloaded(problem, &body)?;
         let modes = natural_modes(&unloaded, 1).into_diagnostic()?;
         let lowest = modes.first().ok_or_else(|| miette!("{} has no mode", problem.name))?;
         let omega = TAU * lowest.frequency_hz;

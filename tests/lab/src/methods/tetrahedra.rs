@@ -1,16 +1,14 @@
 //! Linear tetrahedra with lumped mass, as the server runs them: laws, factor conventions, integrators, precisions.
-use super::{Method, Pace, Running};
-use crate::problems::{
-    Action, Problem,
-    body::TetBody,
-    load::{self, NodalLoad},
-    sample::{self, Probe},
+use super::{
+    Method, Pace, Running,
+    subject::{Subject, Tool},
 };
+use crate::problems::Problem;
 use glam::DVec3;
 use miette::{IntoDiagnostic, Result};
 use palpate_physics::{
-    Energies, Integrator, LoadSpec, Model, ModelSpec, Precision, Region, Scratch, Settings, State, TickInput,
-    contact::{Coupling, ToolSpec, ToolTarget},
+    Energies, Integrator, Precision, Scratch, Settings, State, Substeps, TickInput,
+    contact::ToolTarget,
     material::{Convention, Lame, Law, Material, Viscosity},
     step,
 };
@@ -49,6 +47,33 @@ impl Tetrahedra {
                 settings: || Settings { integrator: Integrator::SeedSemiImplicit, ..Settings::default() },
             },
             Self {
+                name: "seed semi-implicit once",
+                what: "The same in one step per tick, as the 2006 paper takes it, stable or not.",
+                law: None,
+                settings: || Settings {
+                    integrator: Integrator::SeedSemiImplicit,
+                    substeps: Substeps::Fixed(1),
+                    ..Settings::default()
+                },
+            },
+            Self {
+                name: "backward Euler",
+                what: "Linearised backward Euler with the problem's law: one step per tick, solved by preconditioned conjugate gradients \
+                       to a thousandth of the first residual.",
+                law: None,
+                settings: || Settings { integrator: Integrator::BackwardEuler, ..Settings::default() },
+            },
+            Self {
+                name: "backward Euler loose",
+                what: "The same to a tenth.",
+                law: None,
+                settings: || Settings {
+                    integrator: Integrator::BackwardEuler,
+                    solver_tolerance: 0.1,
+                    ..Settings::default()
+                },
+            },
+            Self {
                 name: "StVK as in 2006",
                 what: "The seeds' St. Venant-Kirchhoff law with the elastic factor that the 2006 paper prints (half of the consistent \
                        one), by leapfrog in f32.",
@@ -85,94 +110,39 @@ impl Method for Tetrahedra {
     }
 
     fn build(&self, problem: &Problem, resolution: u32, pace: &Pace) -> Result<Box<dyn Running>> {
-        let body = problem.body.tets(resolution)?;
         let settings = Settings { mass_damping_per_s: pace.damping_per_s, ..(self.settings)() };
-        let load = load::on_tets(problem.action, &body);
-        let mut spec = spec(self.material(problem)?, &body, settings);
-        spec.loads = load.iter().map(|load| LoadSpec::NodalForces(load.forces_n.clone())).collect();
-        let tool = match problem.action {
-            Action::Sphere { radius_m, depth_m } => Some(Tool {
-                touch_m: body.first_touch_m(radius_m),
-                way_m: body.normal * -depth_m,
-                normal: body.normal,
-                radius_m,
-            }),
-            _ => None,
-        };
-        spec.tools = tool.iter().map(Tool::spec).collect();
-        let probe = Probe::new(&body, &sample::points(problem.body));
-        let model = Model::build(spec).into_diagnostic()?;
+        let subject = Subject::new(problem, resolution, self.material(problem)?, settings)?;
+        let model = &subject.model;
+        let target = |tool: &Tool| ToolTarget { position_m: tool.touch_m, velocity_m_per_s: DVec3::ZERO };
         Ok(Box::new(Body {
-            state: State::at_rest(&model),
-            scratch: Scratch::new(&model),
-            targets: tool.iter().map(|t| ToolTarget { position_m: t.touch_m, velocity_m_per_s: DVec3::ZERO }).collect(),
+            state: State::at_rest(model),
+            scratch: Scratch::new(model),
+            targets: subject.tool.iter().map(target).collect(),
             factors: vec![0.0; model.spec().loads.len()],
             prescribed_m: vec![DVec3::ZERO; model.spec().prescribed.len()],
             failure: None,
-            model,
-            load,
-            tool,
-            probe,
+            subject,
         }))
     }
 }
 
-fn spec(material: Material, body: &TetBody, settings: Settings) -> ModelSpec {
-    ModelSpec {
-        mesh: body.mesh.clone(),
-        regions: vec![Region { name: "body".into(), material, density_kg_per_m3: 1000.0 }],
-        tet_region: vec![0; body.mesh.tets().len()],
-        prescribed: body.prescribed.clone(),
-        loads: vec![],
-        gravity_m_per_s2: DVec3::ZERO,
-        tools: vec![],
-        settings,
-    }
-}
-
-/// A problem's body with nothing that acts on it.
-pub(super) fn unloaded(problem: &Problem, body: &TetBody) -> Result<Model> {
-    Model::build(spec(problem.material()?, body, Settings::default())).into_diagnostic()
-}
-
-struct Tool {
-    touch_m: DVec3,
-    way_m: DVec3,
-    normal: DVec3,
-    radius_m: f64,
-}
-
-impl Tool {
-    fn spec(&self) -> ToolSpec {
-        ToolSpec {
-            name: "tool".into(),
-            radius_m: self.radius_m,
-            coupling: Coupling::Rigid,
-            friction_coefficient: 0.0,
-            start_position_m: self.touch_m,
-        }
-    }
-}
-
 struct Body {
-    model: Model,
+    subject: Subject,
     state: State,
     scratch: Scratch,
     targets: Vec<ToolTarget>,
     factors: Vec<f64>,
     prescribed_m: Vec<DVec3>,
-    load: Option<NodalLoad>,
-    tool: Option<Tool>,
-    probe: Probe,
     failure: Option<String>,
 }
 
 impl Running for Body {
     fn tick(&mut self, fraction: f64) {
-        if let Some(tool) = &self.tool {
-            let period_s = self.model.spec().settings.tick_period_s;
+        let model = &self.subject.model;
+        if let Some(tool) = &self.subject.tool {
+            let period_s = model.spec().settings.tick_period_s;
             for target in &mut self.targets {
-                let position_m = tool.touch_m + tool.way_m * fraction;
+                let position_m = tool.centre_m(fraction);
                 target.velocity_m_per_s = (position_m - target.position_m) / period_s;
                 target.position_m = position_m;
             }
@@ -184,32 +154,28 @@ impl Running for Body {
             prescribed_displacements_m: &self.prescribed_m,
             point_forces: &[],
         };
-        let report = step(&self.model, &mut self.state, &mut self.scratch, &input);
+        let report = step(model, &mut self.state, &mut self.scratch, &input);
         if let Some(quarantine) = report.quarantined {
             self.failure = Some(quarantine.to_string());
         }
     }
 
     fn answer(&self) -> f64 {
-        match (&self.tool, &self.load) {
-            (Some(tool), _) => self.state.tools.iter().map(|t| t.contact_force_n.dot(tool.normal)).sum(),
-            (None, Some(load)) => load.displacement_m(self.model.rest_positions_m(), &self.state.x),
-            (None, None) => 0.0,
-        }
+        let force_n = self.state.tools.iter().map(|tool| tool.contact_force_n).sum();
+        self.subject.answer(&self.state.x, force_n)
     }
 
     fn displacements_m(&self) -> Vec<DVec3> {
-        self.probe.displacements_m(self.model.rest_positions_m(), &self.state.x)
+        self.subject.displacements_m(&self.state.x)
     }
 
     fn energy_error(&self) -> Option<f64> {
-        let energies = Energies::of(&self.model, &self.state);
+        let energies = Energies::of(&self.subject.model, &self.state);
         Some((energies.balance_j() / energies.external_work_j).abs()).filter(|error| error.is_finite())
     }
 
     fn size(&self) -> [usize; 3] {
-        let mesh = self.model.mesh();
-        [mesh.tets().len(), mesh.positions_m().len(), self.model.substeps() as usize]
+        self.subject.size(self.subject.model.substeps() as usize)
     }
 
     fn failure(&self) -> Option<String> {

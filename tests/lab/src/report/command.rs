@@ -54,7 +54,7 @@ pub fn run(options: &Options) -> Result<()> {
     methods.retain(|m| chosen(m.name(), &options.method));
     ensure!(!problems.is_empty() && !methods.is_empty(), "no problem or method has such a name");
     let effort = match (options.quick, options.full) {
-        (true, _) => Effort { full: false, rounds: 60, budget_s: 2.0 },
+        (true, _) => Effort { full: false, rounds: 60, budget_s: 1.2 },
         (_, true) => Effort { full: true, rounds: 1_000, budget_s: 120.0 },
         _ => Effort { full: false, rounds: 300, budget_s: 20.0 },
     };

@@ -19,9 +19,6 @@ pub struct Options {
     less_accurate: f64,
 }
 
-/// How many times the unrest of two rows a difference must be to be believed.
-const SIGMAS: f64 = 3.0;
-
 /// What changed for the worse, and what for the better, a sentence each.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Comparison {
@@ -52,8 +49,7 @@ pub fn compare(old: &Run, new: &Run, slower: f64, less_accurate: f64) -> Compari
             _ => {}
         }
         if let (Some(b), Some(a)) = (before.median_us, after.median_us) {
-            let noise = SIGMAS * (before.unrest.unwrap_or(0.0) + after.unrest.unwrap_or(0.0));
-            let limit = slower.max(noise);
+            let limit = slower.max(before.noise_with(after));
             let text = format!(
                 "{name}: {b:.1} us → {a:.1} us a tick ({:+.0} %; noise {:.0} %)",
                 100.0 * (a / b - 1.0),
