@@ -67,7 +67,8 @@ impl Row {
         let (Some(time), Some(error), true) = (self.median_us, self.error(), self.competes) else { return false };
         let better = |other: &&Self| match (other.median_us, other.error()) {
             (Some(t), Some(e)) if other.competes => {
-                t < (1.0 - self.noise_with(other).clamp(TIE_TIME, WIDEST_TIE_TIME)) * time && e <= (1.0 + TIE_ERROR) * error
+                t < (1.0 - self.noise_with(other).clamp(TIE_TIME, WIDEST_TIE_TIME)) * time
+                    && e <= (1.0 + TIE_ERROR) * error
                     || t <= time && e < (1.0 - TIE_ERROR) * error
             }
             _ => false,

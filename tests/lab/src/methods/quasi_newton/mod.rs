@@ -121,7 +121,7 @@ impl Body {
             history: History::new(nodes),
             iterations,
             contact: model.contact().state(),
-            contact_scratch: model.contact().scratch(),
+            contact_scratch: model.contact().scratch(true),
             kernel_scratch: model.kernel().scratch(),
             tools: state.tools,
             before: state.x.clone(),
