@@ -4,6 +4,7 @@ pub mod jitter;
 pub mod machine;
 pub mod measure;
 pub mod methods;
+pub mod peers;
 pub mod press;
 pub mod problems;
 pub mod reference;

@@ -4,5 +4,5 @@ mod row;
 mod run;
 
 pub use csv::{Run, read, write};
-pub use row::Row;
-pub use run::{Effort, Turn, problem};
+pub use row::{Row, TIE_ERROR};
+pub use run::{Effort, LAST, Turn, problem};

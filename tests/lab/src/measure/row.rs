@@ -1,8 +1,9 @@
 //! What was measured of one method at one resolution on one problem.
 
-/// Differences of time and of error, as fractions, that are ties: what two runs of one method differ by.
+/// A difference of time, as a fraction, that is a tie: what two runs of one method differ by.
 const TIE_TIME: f64 = 0.10;
-const TIE_ERROR: f64 = 0.01;
+/// The same of the error.
+pub const TIE_ERROR: f64 = 0.01;
 /// How many times the unrest of two rows a difference of their times must be to be believed.
 const SIGMAS: f64 = 3.0;
 /// No difference of time beyond this is a tie, however noisy the run: such a run has to be repeated.

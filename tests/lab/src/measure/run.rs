@@ -1,14 +1,19 @@
 //! Going through a problem with every method, and timing them in turns.
+//!
+//! Peers run in processes of their own, which would cost them and us the caches at every tick: they and our methods take turns in
+//! [`BLOCKS`] blocks, so that a slow moment of the machine still strikes all.
 use super::Row;
 use crate::{
     methods::{Method, Pace, Running},
+    peers::{Peers, Session, Variant},
     problems::{
         Problem,
-        sample::{self, FieldError},
+        sample::{self, FieldError, Probe, Sample},
     },
     references::Reference,
     timing::quantiles,
 };
+use glam::DVec3;
 use miette::Result;
 use std::time::Instant;
 
@@ -35,9 +40,13 @@ pub struct Turn<'a> {
 }
 
 /// Ticks over which the answer is averaged.
-const LAST: usize = 20;
+pub const LAST: usize = 20;
 /// Ticks after which it is known whether the budget will do.
 const TRIAL: usize = 10;
+/// Blocks of turns, where peers are measured beside our methods.
+const BLOCKS: usize = 10;
+/// Time for the turns of a peer's variant in a block, over what it has to come to rest.
+const PEERS_SHARE: f64 = 0.03;
 
 struct Contender {
     row: Row,
@@ -45,13 +54,14 @@ struct Contender {
     times_s: Vec<f64>,
 }
 
-/// Measures every method on a problem.
+/// Measures every method on a problem, and peers beside them.
 ///
 /// # Errors
 /// No reference, or a body that cannot be built.
 pub fn problem(
     problem: &Problem,
     methods: &[Box<dyn Method>],
+    peers: &mut Peers,
     effort: &Effort,
     tell: &mut dyn FnMut(Turn<'_>),
 ) -> Result<Vec<Row>> {
@@ -64,9 +74,19 @@ pub fn problem(
             contenders.push(settle(problem, method.as_ref(), resolution, (&pace, effort), &reference));
         }
     }
+    let mut sessions = peers.start(problem, &pace, effort.budget_s, &mut |peer, resolution| {
+        tell(Turn { what: "settles", method: peer, resolution });
+    });
     tell(Turn { what: "takes turns with the others", method: "each", resolution: 0 });
-    take_turns(&mut contenders, effort.rounds);
-    Ok(contenders.into_iter().map(Contender::finish).collect())
+    let blocks = if sessions.is_empty() { 1 } else { BLOCKS };
+    for _ in 0..blocks {
+        take_turns(&mut contenders, effort.rounds.div_ceil(blocks));
+        for session in &mut sessions {
+            session.time(effort.rounds.div_ceil(blocks), PEERS_SHARE * effort.budget_s);
+        }
+    }
+    let judged = sessions.iter().flat_map(Session::variants).map(|variant| judge(problem, variant, &reference));
+    Ok(contenders.into_iter().chain(judged.collect::<Result<Vec<_>>>()?).map(Contender::finish).collect())
 }
 
 fn settle(
@@ -110,19 +130,38 @@ fn settle(
             last.push(running.answer());
         }
     }
+    let row = answered(sized, &last, &sample::points(problem.body), &running.displacements_m(), reference);
+    let row = Row { energy_error: running.energy_error(), ..row };
+    Contender { row, running: Some(running), times_s: Vec::with_capacity(effort.rounds) }
+}
+
+/// The answer over the last ticks and the field at some material points, against the reference.
+fn answered(row: Row, last: &[f64], samples: &[Sample], displacements_m: &[DVec3], reference: &Reference) -> Row {
     let answer = last.iter().sum::<f64>() / last.len() as f64;
     let spread = last.iter().map(|a| (a - answer).abs()).fold(0.0, f64::max);
-    let field = FieldError::of(&sample::points(problem.body), &running.displacements_m(), &reference.displacements_m());
-    let row = Row {
+    let field = FieldError::of(samples, displacements_m, &reference.displacements_m());
+    Row {
         answer: Some(answer),
         answer_error: Some(answer / reference.value - 1.0),
         field_l2: field.map(|f| f.l2),
         field_max: field.map(|f| f.max),
         drift: Some(spread / answer.abs()),
-        energy_error: running.energy_error(),
-        ..sized
-    };
-    Contender { row, running: Some(running), times_s: Vec::with_capacity(effort.rounds) }
+        ..row
+    }
+}
+
+/// A peer's variant: its nodes' displacements are read at the same material points as ours.
+fn judge(problem: &Problem, variant: Variant, reference: &Reference) -> Result<Contender> {
+    let Variant { row, answers, displacements_m, times_s } = variant;
+    if answers.is_empty() {
+        return Ok(Contender::failed(row));
+    }
+    let body = problem.body.tets(row.resolution)?;
+    let samples = sample::points(problem.body);
+    let rest_m = body.mesh.positions_m();
+    let x: Vec<DVec3> = rest_m.iter().zip(&displacements_m).map(|(rest, u)| *rest + *u).collect();
+    let at_samples_m = Probe::new(&body, &samples).displacements_m(rest_m, &x);
+    Ok(Contender { row: answered(row, &answers, &samples, &at_samples_m, reference), running: None, times_s })
 }
 
 /// A slow moment of the machine strikes all of them. A turn is two ticks, of which the second is timed: the first fetches back

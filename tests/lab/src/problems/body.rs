@@ -5,10 +5,15 @@ use palpate_physics::{PrescribedSpec, Surface, TetMesh, contact::closest_weights
 use palpate_scene::shapes::{self, BoundaryRegion};
 use std::collections::BTreeMap;
 
+/// Semi-axes (short, long) of a ventricle outside and inside, and the height of its cut (m).
+pub type VentricleM = ((f64, f64), (f64, f64), f64);
+
 /// Width and height (m) of the block.
 pub const BLOCK_M: [f64; 2] = [80e-3, 40e-3];
-/// Semi-axes (short, long) of the ventricle outside and inside, and the height of its cut (m).
-pub const VENTRICLE_M: ((f64, f64), (f64, f64), f64) = ((36e-3, 72e-3), (25.2e-3, 61.2e-3), 18e-3);
+/// The ventricle of human size.
+pub const VENTRICLE_M: VentricleM = ((36e-3, 72e-3), (25.2e-3, 61.2e-3), 18e-3);
+/// The same of the small ventricle.
+pub const SMALL_VENTRICLE_M: VentricleM = ((10e-3, 20e-3), (7e-3, 17e-3), 5e-3);
 /// Inner and outer radius (m) of Lamé's sphere.
 pub const OCTANT_M: [f64; 2] = [50e-3, 100e-3];
 /// Length (m) of the beams.
@@ -21,6 +26,8 @@ pub enum Body {
     Block,
     /// Truncated ellipsoid shell of human size, held at its base, touched from +x at y = z = 0.
     Ventricle,
+    /// The same of 20 mm, with semi-axes 10 and 20 mm outside: an animal's.
+    SmallVentricle,
     /// An octant of Lamé's sphere.
     Octant,
     /// A square beam along x, its length over its thickness.
@@ -53,6 +60,7 @@ impl Body {
         match self {
             Self::Block => "block",
             Self::Ventricle => "ventricle",
+            Self::SmallVentricle => "ventricle-20mm",
             Self::Octant => "octant",
             Self::Beam { .. } => "beam",
         }
@@ -63,6 +71,7 @@ impl Body {
         match self {
             Self::Block => "the middle of a block of 80 × 80 × 40 mm held at its lower face",
             Self::Ventricle => "the side of a ventricle of human size (90 mm long, wall 11 mm) held at its base",
+            Self::SmallVentricle => "the side of a ventricle of 20 mm (25 mm long, wall 3 mm) held at its base",
             Self::Octant => "a thick sphere",
             Self::Beam { .. } => "a clamped beam",
         }
@@ -72,7 +81,7 @@ impl Body {
     pub fn resolution_unit(self) -> &'static str {
         match self {
             Self::Block => "cells along 80 mm",
-            Self::Ventricle => "tets, about",
+            Self::Ventricle | Self::SmallVentricle => "tets, about",
             Self::Octant => "cells along an arc",
             Self::Beam { .. } => "cells through the thickness",
         }
@@ -83,8 +92,8 @@ impl Body {
         match (self, full) {
             (Self::Block, false) | (Self::Octant, true) => &[4, 8, 16],
             (Self::Block, true) => &[4, 8, 12, 16, 24],
-            (Self::Ventricle, false) => &[188, 1_352, 5_000],
-            (Self::Ventricle, true) => &[188, 1_352, 5_000, 10_000, 50_000],
+            (Self::Ventricle | Self::SmallVentricle, false) => &[188, 1_352, 5_000],
+            (Self::Ventricle | Self::SmallVentricle, true) => &[188, 1_352, 5_000, 10_000, 50_000],
             (Self::Octant, false) => &[4, 8],
             (Self::Beam { .. }, false) => &[2, 4],
             (Self::Beam { .. }, true) => &[2, 4, 8],
@@ -98,13 +107,8 @@ impl Body {
     pub fn tets(self, resolution: u32) -> Result<TetBody> {
         match self {
             Self::Block => block(resolution),
-            Self::Ventricle => {
-                let (outer, inner, cut) = VENTRICLE_M;
-                let shape = shapes::ventricle(outer, inner, cut, resolution).into_diagnostic()?;
-                let held = vec![held("base", region(&shape, "base")?.nodes(), [true; 3])];
-                let touched = region(&shape, "outer")?.triangles.clone();
-                TetBody::new(shape.mesh, held, touched, (DVec3::X * outer.0, DVec3::X))
-            }
+            Self::Ventricle => ventricle(VENTRICLE_M, resolution),
+            Self::SmallVentricle => ventricle(SMALL_VENTRICLE_M, resolution),
             Self::Octant => octant(resolution as usize),
             Self::Beam { slenderness } => beam(slenderness, resolution),
         }
@@ -164,6 +168,13 @@ fn block(cells: u32) -> Result<TetBody> {
     let mesh = TetMesh::new(centred, shape.mesh.tets().to_vec()).into_diagnostic()?;
     let prescribed = vec![held("floor", region(&shape, "z_min")?.nodes(), [true; 3])];
     TetBody::new(mesh, prescribed, region(&shape, "z_max")?.triangles.clone(), (DVec3::Z * height, DVec3::Z))
+}
+
+fn ventricle((outer, inner, cut): VentricleM, tets: u32) -> Result<TetBody> {
+    let shape = shapes::ventricle(outer, inner, cut, tets).into_diagnostic()?;
+    let held = vec![held("base", region(&shape, "base")?.nodes(), [true; 3])];
+    let touched = region(&shape, "outer")?.triangles.clone();
+    TetBody::new(shape.mesh, held, touched, (DVec3::X * outer.0, DVec3::X))
 }
 
 fn beam(slenderness: u32, cells: u32) -> Result<TetBody> {

@@ -29,6 +29,7 @@ pub fn all() -> Vec<Problem> {
     problems.push(sphere(Body::Block, LARGE, 0.45, Law::FixedCorotated));
     problems.extend(POISSON_RATIOS.map(lame));
     problems.extend([cantilever(), elastica()]);
+    problems.push(small_ventricle());
     problems
 }
 
@@ -61,6 +62,21 @@ fn patch(body: Body, nu: f64, law: Law) -> Problem {
         law,
         young_modulus_pa: YOUNG_PA,
         poisson_ratio: nu,
+    }
+}
+
+/// The peers' problem: small enough that every law of theirs is Hooke's to first order.
+fn small_ventricle() -> Problem {
+    let (radius_m, force_n) = (4e-3, 0.01);
+    Problem {
+        name: "ventricle-20mm-patch-nu0.40".into(),
+        sentence: format!(
+            "A smooth dead pressure of {force_n} N on a patch of 4 mm radius presses {}; the answer is the displacement conjugate to it.",
+            Body::SmallVentricle.sentence()
+        ),
+        action: Action::Patch { radius_m, force_n },
+        young_modulus_pa: 30e3,
+        ..patch(Body::SmallVentricle, 0.4, Law::StableNeoHookean)
     }
 }
 

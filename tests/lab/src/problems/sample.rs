@@ -1,13 +1,14 @@
 //! The material points at which displacement fields are compared: a polar pattern on the rest surface about the touch.
-use super::body::{BLOCK_M, Body, OCTANT_M, TetBody, VENTRICLE_M};
+use super::body::{BLOCK_M, Body, OCTANT_M, SMALL_VENTRICLE_M, TetBody, VENTRICLE_M, VentricleM};
 use glam::DVec3;
 use palpate_physics::contact::closest_weights;
 use std::f64::consts::{FRAC_PI_2, TAU};
 
 const RINGS: u32 = 8;
 const SPOKES: u32 = 16;
-/// Radius (m) of the pattern: twice the tool's.
+/// Radius (m) of the pattern: twice the tool's, and on the small ventricle twice the patch's.
 const REACH_M: f64 = 20e-3;
+const SMALL_REACH_M: f64 = 8e-3;
 /// Directions along each arc of the octant.
 const ON_OCTANT: u32 = 12;
 
@@ -27,20 +28,23 @@ pub struct Sample {
 /// The points of a body; none for beams.
 pub fn points(body: Body) -> Vec<Sample> {
     match body {
-        Body::Block => polar().map(|(a, b, area)| on_block(a, b, area)).collect(),
-        // The pattern reaches past the cut, where there is no body.
-        Body::Ventricle => {
-            let on_body = |sample: &Sample| sample.rest_m.z < VENTRICLE_M.2;
-            polar().map(|(a, b, area)| on_ventricle(a, b, area)).filter(on_body).collect()
-        }
+        Body::Block => polar(REACH_M).map(|(a, b, area)| on_block(a, b, area)).collect(),
+        Body::Ventricle => on_ventricle(VENTRICLE_M, REACH_M),
+        Body::SmallVentricle => on_ventricle(SMALL_VENTRICLE_M, SMALL_REACH_M),
         Body::Octant => on_octant(),
         Body::Beam { .. } => vec![],
     }
 }
 
+/// The pattern where there is body: it may reach past the cut.
+fn on_ventricle(ventricle: VentricleM, reach_m: f64) -> Vec<Sample> {
+    let on_body = |sample: &Sample| sample.rest_m.z < ventricle.2;
+    polar(reach_m).map(|(a, b, area)| at_ventricle(ventricle, a, b, area)).filter(on_body).collect()
+}
+
 /// Offsets (m) in the middles of the cells of a polar grid, with their areas (m²).
-fn polar() -> impl Iterator<Item = (f64, f64, f64)> {
-    let width = REACH_M / f64::from(RINGS);
+fn polar(reach_m: f64) -> impl Iterator<Item = (f64, f64, f64)> {
+    let width = reach_m / f64::from(RINGS);
     (0..RINGS).flat_map(move |ring| {
         let r = width * (f64::from(ring) + 0.5);
         (0..SPOKES).map(move |spoke| {
@@ -65,8 +69,7 @@ fn on_block(x: f64, y: f64, area_m2: f64) -> Sample {
 }
 
 /// Offsets along the parallel and the meridian, as long as on the equator.
-fn on_ventricle(across: f64, up: f64, area_m2: f64) -> Sample {
-    let ((short, long), _, cut) = VENTRICLE_M;
+fn at_ventricle(((short, long), _, cut): VentricleM, across: f64, up: f64, area_m2: f64) -> Sample {
     let (azimuth, latitude) = (across / short, up / long);
     let top = (cut / long).asin();
     let (sin, cos) = latitude.sin_cos();
@@ -165,10 +168,12 @@ mod tests {
 
     #[test]
     fn the_reference_grids_parameters_name_the_same_points() {
-        let (outer, inner, cut) = VENTRICLE_M;
+        let ventricle =
+            |(outer, inner, cut): VentricleM, contact_m| bodies::ventricle(outer, inner, cut, contact_m, (8, 2));
         let hex = [
             (Body::Block, bodies::block(BLOCK_M[0], BLOCK_M[1], 5e-3, 4)),
-            (Body::Ventricle, bodies::ventricle(outer, inner, cut, 5e-3, (8, 2))),
+            (Body::Ventricle, ventricle(VENTRICLE_M, 5e-3)),
+            (Body::SmallVentricle, ventricle(SMALL_VENTRICLE_M, 2e-3)),
         ];
         for (body, hex) in hex {
             for sample in points(body) {

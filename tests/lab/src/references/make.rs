@@ -3,7 +3,7 @@ use super::{Grid, Provenance, Reference, limit};
 use crate::{
     problems::{
         Action, Problem,
-        body::{BLOCK_M, Body, VENTRICLE_M},
+        body::{BLOCK_M, Body, SMALL_VENTRICLE_M, VENTRICLE_M},
         load,
         sample::{self, FieldError},
     },
@@ -41,8 +41,8 @@ pub fn on_grid(problem: &Problem, n: usize, penalty: f64, tell: &mut dyn FnMut(&
     let contact_m = problem.contact_radius_m();
     let body = match problem.body {
         Body::Block => bodies::block(BLOCK_M[0], BLOCK_M[1], contact_m, n),
-        Body::Ventricle => {
-            let (outer, inner, cut) = VENTRICLE_M;
+        Body::Ventricle | Body::SmallVentricle => {
+            let (outer, inner, cut) = if problem.body == Body::Ventricle { VENTRICLE_M } else { SMALL_VENTRICLE_M };
             bodies::ventricle(outer, inner, cut, contact_m, (n, n.div_ceil(2)))
         }
         Body::Octant | Body::Beam { .. } => bail!("{} has an answer by formula", problem.name),

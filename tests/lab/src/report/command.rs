@@ -1,9 +1,13 @@
 //! `palpate-lab run`.
-use super::page::{self, Results};
+use super::{
+    page::{self, Results},
+    peers,
+};
 use crate::{
     machine::{Machine, Noise},
     measure::{self, Effort, Run, Turn},
     methods,
+    peers::Peers,
     problems::{self, Problem},
     skips::{self, Found, Skip},
     stress::{self, Extent, Outcome},
@@ -35,6 +39,15 @@ pub struct Options {
     /// Processor to be held to
     #[arg(long)]
     processor: Option<usize>,
+    /// Other simulators beside ours, on the problems with a patch: MuJoCo's flex and PositionBasedDynamics' XPBD
+    ///
+    /// Needs python3 with venv and, the first time, the network: the packages are installed into an environment of the lab's own.
+    /// What is missing is skipped with a line. tests/lab/peers/README.md tells how to add another.
+    #[arg(long)]
+    peers: bool,
+    /// Folder of the peers' Python environment; may be deleted at any time [default: palpate-lab-peers in the user's cache folder]
+    #[arg(long, requires = "peers")]
+    peers_env: Option<PathBuf>,
 }
 
 /// Problems of a quick run: those of rubber-like tissue, and the beam.
@@ -58,6 +71,10 @@ pub fn run(options: &Options) -> Result<()> {
         (_, true) => Effort { full: true, rounds: 1_000, budget_s: 120.0 },
         _ => Effort { full: false, rounds: 300, budget_s: 20.0 },
     };
+    let mut peers = if options.peers { Peers::install(options.peers_env.as_deref()) } else { Peers::default() };
+    for (peer, note) in &peers.notes {
+        println!("{peer}: {note}");
+    }
     let pinned = OsMeasures { processor: options.processor, ..OsMeasures::NONE }.apply();
     let noise = Noise::measure(2_000);
     let bar = ProgressBar::new(problems.len() as u64);
@@ -67,7 +84,7 @@ pub fn run(options: &Options) -> Result<()> {
     for problem in &problems {
         bar.set_prefix(problem.name.clone());
         let mut tell = |turn: Turn<'_>| bar.set_message(format!("{} {} {}", turn.method, turn.resolution, turn.what));
-        rows.extend(measure::problem(problem, &methods, &effort, &mut tell)?);
+        rows.extend(measure::problem(problem, &methods, &mut peers, &effort, &mut tell)?);
         bar.inc(1);
     }
     // Whoever asks for one problem or method wants its rows, not a minute of stress.
@@ -78,10 +95,14 @@ pub fn run(options: &Options) -> Result<()> {
     for (index, note) in pinned.notes.iter().enumerate() {
         circumstances.insert(format!("system {}", index + 1), note.text.clone());
     }
+    circumstances.extend(peers.notes);
     let run = Run { circumstances, rows };
     write(options, &Results { run: &run, problems: &problems, methods: &methods, skips: &skips, stress: &stress })?;
     for row in run.rows.iter().filter(|row| !row.failure.is_empty()) {
         println!("{} by {} at {}: {}", row.problem, row.method, row.resolution, row.failure);
+    }
+    for sentence in peers::sentences(&run.rows) {
+        println!("{sentence}");
     }
     println!("{} rows; read {}", run.rows.len(), options.out.join("report.html").display());
     Ok(())

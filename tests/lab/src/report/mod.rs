@@ -2,6 +2,7 @@
 mod command;
 mod compare;
 mod page;
+mod peers;
 mod plot;
 mod skips;
 mod stress;

@@ -1,5 +1,6 @@
 //! The page: one file that needs nothing else, for a reader who was not there.
 use super::{
+    peers,
     plot::{self, Point, Series},
     skips, stress,
 };
@@ -61,7 +62,9 @@ pub(super) fn page(results: &Results<'_>) -> Result<String> {
     for method in *methods {
         let _ = write!(out, "<tr><td>{}</td><td>{}</td></tr>", escape(method.name()), escape(method.what()));
     }
-    out.push_str("</table><h2>Problems</h2>");
+    out.push_str("</table>");
+    peers::section(&mut out, run);
+    out.push_str("<h2>Problems</h2>");
     for problem in *problems {
         section(&mut out, run, problem, methods)?;
     }
@@ -158,19 +161,30 @@ fn section(out: &mut String, run: &Run, problem: &Problem, methods: &[Box<dyn Me
     );
     let mut series = Vec::new();
     out.push_str("<div class=\"legend\">");
-    for (index, method) in methods.iter().enumerate() {
+    for (index, name) in names(run, methods).into_iter().enumerate() {
         let colour = COLOURS[index % COLOURS.len()];
-        let of_method = rows.iter().filter(|row| row.method == method.name());
+        let of_method = rows.iter().filter(|row| row.method == name);
         let points: Vec<Point> = of_method.filter_map(|row| point(row, &rows)).collect();
         if !points.is_empty() {
-            let _ = write!(out, "<span><i style=\"background:{colour}\"></i>{}</span>", escape(method.name()));
-            series.push(Series { name: method.name(), colour, points });
+            let _ = write!(out, "<span><i style=\"background:{colour}\"></i>{}</span>", escape(name));
+            series.push(Series { name, colour, points });
         }
     }
     let floor = reference.uncertainty / reference.value.abs();
     let _ = write!(out, "</div>{}", plot::svg(&series, floor));
     table(out, problem, &rows);
     Ok(())
+}
+
+/// Methods, then peers as they come.
+fn names<'a>(run: &'a Run, methods: &'a [Box<dyn Method>]) -> Vec<&'a str> {
+    let mut names: Vec<&str> = methods.iter().map(|method| method.name()).collect();
+    for row in &run.rows {
+        if !names.contains(&row.method.as_str()) {
+            names.push(&row.method);
+        }
+    }
+    names
 }
 
 fn point(row: &Row, rows: &[&Row]) -> Option<Point> {
@@ -225,11 +239,11 @@ fn table(out: &mut String, problem: &Problem, rows: &[&Row]) {
     }
 }
 
-fn number(value: Option<f64>, digits: usize) -> String {
+pub(super) fn number(value: Option<f64>, digits: usize) -> String {
     value.map_or_else(|| "–".into(), |v| format!("{v:.digits$}"))
 }
 
-fn percent(value: Option<f64>) -> String {
+pub(super) fn percent(value: Option<f64>) -> String {
     value.map_or_else(|| "–".into(), |v| format!("{:+.2} %", 100.0 * v))
 }
 
