@@ -10,7 +10,7 @@ use crate::{
         Problem,
         sample::{self, FieldError, Probe, Sample},
     },
-    references::Reference,
+    references::{Reference, series},
     timing::quantiles,
 };
 use glam::DVec3;
@@ -112,7 +112,9 @@ fn settle(
     let memory_bytes = crate::MEMORY.allocated().saturating_sub(before);
     let sized = Row { elements, nodes, substeps, memory_bytes, ..named };
     let ticks = pace.ramp_ticks + pace.rest_ticks;
-    let mut last = Vec::with_capacity(LAST);
+    // A dynamic problem is judged by every tick.
+    let kept = pace.motion.ticks().unwrap_or(LAST);
+    let mut answers = Vec::with_capacity(kept);
     let mut fastest_s = f64::INFINITY;
     for tick in 1..=ticks {
         let start = Instant::now();
@@ -126,12 +128,20 @@ fn settle(
             let failure = format!("would take {projected_s:.1} s to come to rest; {} s are allowed", effort.budget_s);
             return Contender::failed(Row { failure, ..sized });
         }
-        if tick + LAST > ticks {
-            last.push(running.answer());
+        if tick + kept > ticks {
+            answers.push(running.answer());
         }
     }
-    let row = answered(sized, &last, &sample::points(problem.body), &running.displacements_m(), reference);
-    let row = Row { energy_error: running.energy_error(), ..row };
+    let sized = Row { energy_error: running.energy_error(), ..sized };
+    let row = if pace.motion.ticks().is_some() {
+        Row {
+            answer: Some(series::rms(&answers)),
+            answer_error: Some(series::relative_difference(&answers, &reference.series_m())),
+            ..sized
+        }
+    } else {
+        answered(sized, &answers, &sample::points(problem.body), &running.displacements_m(), reference)
+    };
     Contender { row, running: Some(running), times_s: Vec::with_capacity(effort.rounds) }
 }
 

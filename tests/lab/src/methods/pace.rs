@@ -1,6 +1,9 @@
 //! How fast a problem is gone through and how it comes to rest: the same for all methods.
 use super::subject;
-use crate::problems::Problem;
+use crate::problems::{
+    Motion, Problem,
+    motion::{RATE_HZ, RINGING_DAMPING_PER_S, smooth},
+};
 use miette::{IntoDiagnostic, Result, miette};
 use palpate_physics::solve::natural_modes;
 use std::f64::consts::TAU;
@@ -14,6 +17,8 @@ pub struct Pace {
     pub rest_ticks: usize,
     /// Mass damping (1/s).
     pub damping_per_s: f64,
+    /// What happens in those ticks.
+    pub motion: Motion,
 }
 
 /// Damping over the lowest frequency ω of the coarsest mesh. 2 is critical; coarse meshes are too stiff, and finer ones, whose ω is
@@ -25,15 +30,17 @@ const REST: f64 = 15.0;
 const RAMP: (f64, usize) = (5.0, 100);
 /// Least rest (ticks).
 const LEAST_REST: usize = 200;
-/// Ticks per second.
-const RATE_HZ: f64 = 1000.0;
 
 impl Pace {
-    /// From the lowest natural frequency of the problem's coarsest mesh.
+    /// That of a dynamic problem; otherwise from the lowest natural frequency of the problem's coarsest mesh.
     ///
     /// # Errors
     /// A body that cannot be built, or whose modes cannot be found.
     pub fn of(problem: &Problem) -> Result<Self> {
+        let motion = problem.motion;
+        if let Some(rest_ticks) = motion.ticks() {
+            return Ok(Self { ramp_ticks: 0, rest_ticks, damping_per_s: RINGING_DAMPING_PER_S, motion });
+        }
         let body = problem.body.tets(problem.body.resolutions(false)[0])?;
         let unloaded = subject::unloaded(problem, &body)?;
         let modes = natural_modes(&unloaded, 1).into_diagnostic()?;
@@ -44,12 +51,15 @@ impl Pace {
             ramp_ticks: ticks(RAMP.0, RAMP.1),
             rest_ticks: ticks(REST, LEAST_REST),
             damping_per_s: DAMPING * omega,
+            motion,
         })
     }
 
-    /// How much of the action is there after some ticks: `6s⁵ − 15s⁴ + 10s³`, at rest at both ends.
-    pub fn fraction(&self, ticks: usize) -> f64 {
-        let s = (ticks as f64 / self.ramp_ticks as f64).min(1.0);
-        s * s * s * (10.0 + s * (6.0 * s - 15.0))
+    /// How much of the action is there in a tick, counted from 1.
+    pub fn fraction(&self, tick: usize) -> f64 {
+        match self.motion {
+            Motion::ToRest => smooth(tick as f64 / self.ramp_ticks as f64),
+            motion => motion.fraction(tick),
+        }
     }
 }

@@ -2,17 +2,20 @@
 //!
 //! - `registry.rs`: all of them, by name
 //! - `body.rs`: their bodies in tetrahedra, at any resolution, and where a tool first touches them
+//! - `motion.rs`: how the action comes in time
 //! - `load.rs`: loads as nodal forces on any mesh, and the displacement that is conjugate to them
 //! - `sample.rs`: the material points at which displacement fields are compared
 //! - `exact.rs`: answers by formula
 pub mod body;
 pub mod exact;
 pub mod load;
+pub mod motion;
 mod registry;
 pub mod sample;
 
 use body::Body;
 use miette::Result;
+pub use motion::Motion;
 use palpate_physics::material::{Law, Material};
 pub use registry::all;
 
@@ -75,6 +78,8 @@ pub struct Problem {
     pub body: Body,
     /// What is done.
     pub action: Action,
+    /// When.
+    pub motion: Motion,
     /// By which law the body answers.
     pub law: Law,
     /// Young's modulus (Pa).

@@ -1,5 +1,5 @@
 //! All problems. A new one is added here, and `palpate-lab references` makes its reference.
-use super::{Action, Problem, body::Body};
+use super::{Action, Motion, Problem, body::Body};
 use palpate_physics::material::Law;
 
 const YOUNG_PA: f64 = 10e3;
@@ -10,8 +10,13 @@ const POISSON_RATIOS: [f64; 3] = [0.3, 0.45, 0.49];
 /// Depths (m) of the sphere past first touch.
 const SMALL: (&str, f64) = ("small", 0.5e-3);
 const LARGE: (&str, f64) = ("large", 5e-3);
-/// Sum (N) of the patch's pressure.
-const PATCH_FORCE_N: f64 = 0.02;
+/// Sum (N) of the patch's pressure. A large one dents the block by some 1 mm, the ventricle by 2 mm.
+const SMALL_PATCH: (&str, f64) = ("small", 0.02);
+const LARGE_BLOCK_PATCH: (&str, f64) = ("large", 0.15);
+const LARGE_VENTRICLE_PATCH: (&str, f64) = ("large", 0.1);
+/// A press that comes in 5 ms, and one that swings up to where the block's own modes are.
+const STEP: Motion = Motion::Step { rise_ticks: 5, ticks: 300 };
+const SWEEP: Motion = Motion::Sweep { hz: [5.0, 60.0], ticks: 1000 };
 
 /// Every problem.
 pub fn all() -> Vec<Problem> {
@@ -20,13 +25,16 @@ pub fn all() -> Vec<Problem> {
     for body in [Body::Block, Body::Ventricle] {
         for nu in POISSON_RATIOS {
             problems.push(sphere(body, SMALL, nu, default));
-            problems.push(patch(body, nu, default));
+            problems.push(patch(body, SMALL_PATCH, nu, default));
+            problems.push(sphere(body, LARGE, nu, default));
+            let large = if body == Body::Block { LARGE_BLOCK_PATCH } else { LARGE_VENTRICLE_PATCH };
+            problems.push(patch(body, large, nu, default));
         }
-        problems.push(sphere(body, LARGE, 0.45, default));
     }
     problems.push(sphere(Body::Block, SMALL, 0.45, Law::StVenantKirchhoff));
-    problems.push(patch(Body::Block, 0.45, Law::StVenantKirchhoff));
+    problems.push(patch(Body::Block, SMALL_PATCH, 0.45, Law::StVenantKirchhoff));
     problems.push(sphere(Body::Block, LARGE, 0.45, Law::FixedCorotated));
+    problems.extend([in_time("step", STEP), in_time("sweep", SWEEP)]);
     problems.extend(POISSON_RATIOS.map(lame));
     problems.extend([cantilever(), elastica()]);
     problems.push(small_ventricle());
@@ -42,6 +50,7 @@ fn sphere(body: Body, (size, depth_m): (&str, f64), nu: f64, law: Law) -> Proble
             body.sentence()
         ),
         body,
+        motion: Motion::ToRest,
         action: Action::Sphere { radius_m: TOOL_RADIUS_M, depth_m },
         law,
         young_modulus_pa: YOUNG_PA,
@@ -49,16 +58,17 @@ fn sphere(body: Body, (size, depth_m): (&str, f64), nu: f64, law: Law) -> Proble
     }
 }
 
-fn patch(body: Body, nu: f64, law: Law) -> Problem {
+fn patch(body: Body, (size, force_n): (&str, f64), nu: f64, law: Law) -> Problem {
     Problem {
-        name: format!("{}-patch-small-nu{nu:.2}{}", body.name(), suffix(law)),
+        name: format!("{}-patch-{size}-nu{nu:.2}{}", body.name(), suffix(law)),
         sentence: format!(
-            "A smooth dead pressure of {PATCH_FORCE_N} N on a patch of 7.5 mm radius presses {}; the answer is the displacement \
+            "A smooth dead pressure of {force_n} N on a patch of 7.5 mm radius presses {}; the answer is the displacement \
              conjugate to it.",
             body.sentence()
         ),
         body,
-        action: Action::Patch { radius_m: PATCH_RADIUS_M, force_n: PATCH_FORCE_N },
+        motion: Motion::ToRest,
+        action: Action::Patch { radius_m: PATCH_RADIUS_M, force_n },
         law,
         young_modulus_pa: YOUNG_PA,
         poisson_ratio: nu,
@@ -76,7 +86,33 @@ fn small_ventricle() -> Problem {
         ),
         action: Action::Patch { radius_m, force_n },
         young_modulus_pa: 30e3,
-        ..patch(Body::SmallVentricle, 0.4, Law::StableNeoHookean)
+        ..patch(Body::SmallVentricle, SMALL_PATCH, 0.4, Law::StableNeoHookean)
+    }
+}
+
+/// The small patch on the block, in time.
+fn in_time(name: &str, motion: Motion) -> Problem {
+    let how = match motion {
+        Motion::Step { rise_ticks, ticks } => {
+            format!("comes within {rise_ticks} ms and stays; the block rings for {ticks} ms")
+        }
+        Motion::Sweep { hz: [from, to], ticks } => {
+            format!("swings as a sine, pressing and pulling, from {from} to {to} Hz within {ticks} ms")
+        }
+        Motion::ToRest => "comes to rest".into(),
+    };
+    let still = patch(Body::Block, SMALL_PATCH, 0.45, Law::StableNeoHookean);
+    Problem {
+        name: format!("block-{name}-nu0.45"),
+        sentence: format!(
+            "A smooth dead load of {} N on a patch of 7.5 mm radius in {} {how}. Mass damping is {} 1/s. The answer is the displacement \
+             conjugate to the load at every millisecond; its error is the L2 norm in time of the difference over that of the reference.",
+            SMALL_PATCH.1,
+            Body::Block.sentence(),
+            super::motion::RINGING_DAMPING_PER_S
+        ),
+        motion,
+        ..still
     }
 }
 
@@ -95,6 +131,7 @@ fn lame(nu: f64) -> Problem {
                    surface moves, which Lamé's formula gives."
             .into(),
         body: Body::Octant,
+        motion: Motion::ToRest,
         action: Action::Pressure { pressure_pa: 1.0 },
         law: Law::StableNeoHookean,
         young_modulus_pa: YOUNG_PA,
@@ -109,6 +146,7 @@ fn cantilever() -> Problem {
                    there, which Timoshenko's theory gives."
             .into(),
         body: Body::Beam { slenderness: 10 },
+        motion: Motion::ToRest,
         action: Action::Shear { force_n: 1e-5 },
         law: Law::StableNeoHookean,
         young_modulus_pa: BEAM_YOUNG_PA,
@@ -124,6 +162,7 @@ fn elastica() -> Problem {
                    the deflection of its end, which Reissner's beam (the elastica with stretch and shear) gives."
             .into(),
         body,
+        motion: Motion::ToRest,
         action: Action::Shear { force_n: super::exact::elastica_force_n(2.0, BEAM_YOUNG_PA, 20.0) },
         law: Law::FixedCorotated,
         young_modulus_pa: BEAM_YOUNG_PA,

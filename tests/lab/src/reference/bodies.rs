@@ -1,6 +1,6 @@
 //! The bodies of the contact problems as graded grids, cut at their planes of symmetry.
 use super::grid::{HexGrid, Side, graded};
-use glam::DVec3;
+use glam::{BVec3, DVec3};
 use std::f64::consts::{FRAC_PI_2, PI};
 
 /// How much of a body a grid holds, and which of its sides is what.
@@ -20,11 +20,24 @@ pub struct Body {
     pub normal: DVec3,
 }
 
-/// A block `width × width × height` (m) held at its lower face, touched in the middle of the upper one: a quarter of it, in `n`
-/// elements each way, half of them within one and a half times `contact_m`, the radius of the contact.
+impl Body {
+    /// Of every node, the axes along which it can move.
+    pub fn free_axes(&self) -> Vec<BVec3> {
+        let mut free = vec![BVec3::TRUE; self.grid.positions_m.len()];
+        for (side, axes) in &self.held {
+            for node in self.grid.faces(*side).into_iter().flatten() {
+                free[node as usize] &= !BVec3::from_array(*axes);
+            }
+        }
+        free
+    }
+}
+
+/// A block `width × width × height` (m) held at its lower face, touched in the middle of the upper one: a quarter of it, each way
+/// in `n` elements over one and a half times `contact_m`, the radius of the contact, and `n` beyond.
 pub fn block(width_m: f64, height_m: f64, contact_m: f64, n: usize) -> Body {
-    let across = from_contact(contact_m, 0.5 * width_m, n);
-    let down = from_contact(contact_m, height_m, n).iter().rev().map(|depth| height_m - depth).collect();
+    let across = from_contact(contact_m, 0.5 * width_m, (n, n));
+    let down = from_contact(contact_m, height_m, (n, n)).iter().rev().map(|depth| height_m - depth).collect();
     let grid = HexGrid::new([across.clone(), across, down], |p| p);
     let side = |parameter, upper| Side { parameter, upper };
     Body {
@@ -41,38 +54,32 @@ pub fn block(width_m: f64, height_m: f64, contact_m: f64, n: usize) -> Body {
     }
 }
 
-/// `n` intervals from 0 to `length`: half of them equal, over one and a half radii of the contact, and beyond each longer than the
-/// last by one factor.
-fn from_contact(contact: f64, length: f64, n: usize) -> Vec<f64> {
-    let near = 1.5 * contact;
-    let equal = n.div_ceil(2);
-    let (first, beyond) = (near / equal as f64, (n - equal) as i32);
-    if first * n as f64 >= length || beyond == 0 {
-        return graded(0.0, length, n, 1.0);
+/// Intervals from 0 to `length`: `near` equal ones over one and a half radii of the contact, and `far` beyond, each longer than the last,
+/// `x(t) = x₁ + h·far (e^{at} − 1)/a` for t from 0 to 1, which goes on from the equal ones' length h. Grids with `near` and `far` in the
+/// same proportion so are refinements of one another, as Richardson's extrapolation supposes.
+fn from_contact(contact: f64, length: f64, (near, far): (usize, usize)) -> Vec<f64> {
+    let equal = 1.5 * contact;
+    let first = equal / near as f64;
+    // (eᵃ − 1)/a = (length − x₁)/(h·far)
+    let stretch = (length - equal) / (first * far as f64);
+    if stretch <= 1.0 {
+        return graded(0.0, length, near + far, 1.0);
     }
-    // first · (q + q² + … + q^beyond) = length − near
-    let reach = |q: f64| (1..=beyond).map(|i| first * q.powi(i)).sum::<f64>();
-    let (mut low, mut high) = (1.0, 100.0);
+    let (mut low, mut high) = (0.0_f64, 20.0_f64);
     for _ in 0..80 {
         let middle = f64::midpoint(low, high);
-        if reach(middle) < length - near { low = middle } else { high = middle }
+        if middle.exp_m1() < stretch * middle { low = middle } else { high = middle }
     }
-    let mut breaks = graded(0.0, near, equal, 1.0);
-    breaks.pop();
-    breaks.extend(graded(near, length, n - equal, low.powi(beyond - 1)));
+    let beyond = |i: usize| equal + (length - equal) * (high * i as f64 / far as f64).exp_m1() / high.exp_m1();
+    let mut breaks = graded(0.0, equal, near, 1.0);
+    breaks.extend((1..=far).map(beyond));
     breaks
 }
 
 /// The truncated-ellipsoid ventricle of `shapes::ventricle` with semi-axes (short, long) in metres, held at its base and
-/// touched from +x at z = 0 by a contact of radius `contact_m`: the half with y ≥ 0. `n` elements from the touched meridian to the
-/// opposite one, about `n` from the touch to the apex and half as many to the base, and `layers` through the wall.
-pub fn ventricle(
-    outer_m: (f64, f64),
-    inner_m: (f64, f64),
-    cut_z_m: f64,
-    contact_m: f64,
-    (n, layers): (usize, usize),
-) -> Body {
+/// touched from +x at z = 0 by a contact of radius `contact_m`: the half with y ≥ 0. `n` elements over one and a half times that
+/// radius each way, inwards too; beyond, `2n` to the opposite meridian and to the apex, `n` to the base and through the wall.
+pub fn ventricle(outer_m: (f64, f64), inner_m: (f64, f64), cut_z_m: f64, contact_m: f64, n: usize) -> Body {
     let place = |p: DVec3| {
         let (azimuth, t, s) = (p.x, p.y, p.z);
         let on = |(short, long): (f64, f64)| {
@@ -86,12 +93,13 @@ pub fn ventricle(
     let at_touch = FRAC_PI_2 / span;
     // On the equator a metre along the meridian is 1/(c span) of the parameter.
     let contact_t = contact_m / (outer_m.1 * span);
-    let down = from_contact(contact_t, at_touch, n);
-    let up = from_contact(contact_t, 1.0 - at_touch, n.div_ceil(2));
+    let down = from_contact(contact_t, at_touch, (n, 2 * n));
+    let up = from_contact(contact_t, 1.0 - at_touch, (n, n));
     let mut along: Vec<f64> = down.iter().skip(1).rev().map(|t| at_touch - t).collect();
     along.extend(up.iter().map(|t| at_touch + t));
-    let around = from_contact(contact_m / outer_m.0, PI, n);
-    let through = graded(0.0, 1.0, layers, 1.0);
+    let around = from_contact(contact_m / outer_m.0, PI, (n, 2 * n));
+    let wall = outer_m.0 - inner_m.0;
+    let through = from_contact(contact_m / wall, 1.0, (n, n)).iter().rev().map(|depth| 1.0 - depth).collect();
     let side = |parameter, upper| Side { parameter, upper };
     Body {
         grid: HexGrid::new([around, along, through], place),

@@ -99,6 +99,12 @@ impl HexGrid {
         })
     }
 
+    /// An element's place in the lattice.
+    pub fn cell(&self, element: usize) -> [usize; 3] {
+        let cells = self.cells();
+        [element % cells[0], element / cells[0] % cells[1], element / cells[0] / cells[1]]
+    }
+
     fn cells(&self) -> [usize; 3] {
         [0, 1, 2].map(|axis| self.breaks[axis].len() - 1)
     }

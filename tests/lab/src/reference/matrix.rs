@@ -1,10 +1,14 @@
 //! The tangent stiffness as a sum of dense blocks over groups of nodes, and its sparse Cholesky factorisation.
 use faer::{
-    Mat, Side,
-    linalg::solvers::Solve,
+    Conj, MatMut, Par, Side, Spec,
+    dyn_stack::{MemBuffer, MemStack},
+    linalg::cholesky::llt::factor::LltRegularization,
+    perm::PermRef,
     sparse::{
         Argsort, Pair, SparseColMat, SymbolicSparseColMat,
-        linalg::solvers::{Llt, SymbolicLlt},
+        linalg::cholesky::{
+            CholeskySymbolicParams, LltRef, SymbolicCholesky, SymmetricOrdering, factorize_symbolic_cholesky,
+        },
     },
 };
 use glam::{BVec3, DVec3};
@@ -20,49 +24,74 @@ pub(super) struct System {
     pattern: SymbolicSparseColMat<usize>,
     order: Argsort<usize>,
     entries: usize,
-    symbolic: SymbolicLlt<usize>,
+    symbolic: SymbolicCholesky<usize>,
+    factor: Vec<f64>,
+    memory: MemBuffer,
 }
 
 impl System {
-    /// `free[node]` says which axes move; every group's nodes are joined with each other. A node may be in a group more than once.
-    pub(super) fn new(free: &[BVec3], groups: Vec<Vec<u32>>) -> Result<Self> {
+    /// `free[node]` says which axes move; `node_order` has all nodes in the order of elimination; every group's nodes are joined with
+    /// each other. A node may be in a group more than once.
+    pub(super) fn new(free: &[BVec3], node_order: &[u32], groups: Vec<Vec<u32>>) -> Result<Self> {
         let mut count = 0;
-        let mut next = |is_free: bool| {
-            if is_free {
+        let mut number = vec![[HELD; 3]; free.len()];
+        for &node in node_order {
+            for axis in (0..3).filter(|&axis| free[node as usize].test(axis)) {
+                number[node as usize][axis] = count;
                 count += 1;
-                count - 1
-            } else {
-                HELD
             }
-        };
-        let number: Vec<[usize; 3]> = free.iter().map(|f| [next(f.x), next(f.y), next(f.z)]).collect();
+        }
         let mut places = Vec::new();
         for group in &groups {
             for_entries(&number, group, |row, column, _, _| places.push(Pair { row, col: column }));
         }
         let (pattern, order) = SymbolicSparseColMat::try_new_from_indices(count, count, &places).into_diagnostic()?;
-        let symbolic = SymbolicLlt::try_new(pattern.as_ref(), Side::Lower).into_diagnostic()?;
-        Ok(Self { number, count, groups, pattern, order, entries: places.len(), symbolic })
+        // Unknowns have their order already.
+        let as_numbered: Vec<usize> = (0..count).collect();
+        let symbolic = factorize_symbolic_cholesky(
+            pattern.as_ref(),
+            Side::Lower,
+            SymmetricOrdering::Custom(PermRef::new_checked(&as_numbered, &as_numbered, count)),
+            CholeskySymbolicParams::default(),
+        )
+        .into_diagnostic()?;
+        let numeric = symbolic.factorize_numeric_llt_scratch::<f64>(Par::Seq, Spec::default());
+        let memory = MemBuffer::new(numeric.or(symbolic.solve_in_place_scratch::<f64>(1, Par::Seq)));
+        let factor = vec![0.0; symbolic.len_val()];
+        Ok(Self { number, count, groups, pattern, order, entries: places.len(), symbolic, factor, memory })
     }
 
     /// Solves `K u = f` on the free axes; `blocks` are the groups' symmetric matrices (N/m), row-major, `3m × 3m`. `None` when K is not
     /// positive definite.
-    pub(super) fn solve(&self, blocks: &[Vec<f64>], forces_n: &[DVec3]) -> Option<Vec<DVec3>> {
+    pub(super) fn solve(&mut self, blocks: &[Vec<f64>], forces_n: &[DVec3]) -> Option<Vec<DVec3>> {
         let mut values = Vec::with_capacity(self.entries);
         for (group, block) in self.groups.iter().zip(blocks) {
             let width = 3 * group.len();
             for_entries(&self.number, group, |_, _, i, j| values.push(block[i * width + j]));
         }
         let matrix = SparseColMat::new_from_argsort(self.pattern.clone(), &self.order, &values).ok()?;
-        let factor = Llt::try_new_with_symbolic(self.symbolic.clone(), matrix.as_ref(), Side::Lower).ok()?;
-        let mut right = Mat::<f64>::zeros(self.count, 1);
+        let stack = MemStack::new(&mut self.memory);
+        let (regular, spec) = (LltRegularization::default(), Spec::default());
+        let factorised = self.symbolic.factorize_numeric_llt(
+            &mut self.factor,
+            matrix.as_ref(),
+            Side::Lower,
+            regular,
+            Par::Seq,
+            stack,
+            spec,
+        );
+        factorised.ok()?;
+        let mut right = vec![0.0; self.count];
         for (numbers, force) in self.number.iter().zip(forces_n) {
             for axis in (0..3).filter(|&axis| numbers[axis] != HELD) {
-                right[(numbers[axis], 0)] = force[axis];
+                right[numbers[axis]] = force[axis];
             }
         }
-        factor.solve_in_place(right.as_mut());
-        let value = |n: usize| if n == HELD { 0.0 } else { right[(n, 0)] };
+        let factor = LltRef::<usize, f64>::new(&self.symbolic, &self.factor);
+        let columns = MatMut::from_column_major_slice_mut(&mut right, self.count, 1);
+        factor.solve_in_place_with_conj(Conj::No, columns, Par::Seq, MemStack::new(&mut self.memory));
+        let value = |n: usize| if n == HELD { 0.0 } else { right[n] };
         Some(self.number.iter().map(|n| DVec3::new(value(n[0]), value(n[1]), value(n[2]))).collect())
     }
 }

@@ -7,13 +7,16 @@
 //!
 //! - `grid.rs`: graded grids of hexahedra and their sides; `bodies.rs`: the block and the ventricle
 //! - `shape.rs`: shape functions and quadrature
-//! - `solid.rs`: elastic forces and stiffness
+//! - `solid.rs`: elastic forces and stiffness; `volume.rs`: volume's change, projected against locking
 //! - `sphere.rs`: a rigid sphere without friction, by a stiff penalty on the surface
-//! - `matrix.rs`, `newton.rs`: the solve
+//! - `matrix.rs`, `ordering.rs`, `newton.rs`: the solve; `dynamics.rs`: motion in time
 pub mod bodies;
+pub mod dynamics;
 pub mod grid;
 mod matrix;
 pub mod newton;
+mod ordering;
 pub mod shape;
 pub mod solid;
 pub mod sphere;
+mod volume;

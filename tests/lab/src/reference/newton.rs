@@ -1,5 +1,5 @@
 //! Newton's method on a reference grid, with load stepping and a line search on the potential.
-use super::{bodies::Body, matrix::System, solid::Solid, sphere::Sphere};
+use super::{bodies::Body, matrix::System, ordering, solid::Solid, sphere::Sphere};
 use glam::{BVec3, DVec3};
 use miette::{Result, bail};
 
@@ -92,18 +92,13 @@ pub fn solve(solid: &Solid, body: &Body, action: &Action, tell: &mut dyn FnMut(&
 
 impl<'a> Problem<'a> {
     fn new(solid: &'a Solid, body: &'a Body, action: &'a Action) -> Result<Self> {
-        let mut free = vec![BVec3::TRUE; solid.grid.positions_m.len()];
-        for (side, axes) in &body.held {
-            for node in solid.grid.faces(*side).into_iter().flatten() {
-                free[node as usize] &= !BVec3::from_array(*axes);
-            }
-        }
+        let free = body.free_axes();
         let elements = solid.grid.elements.iter().map(|nodes| nodes.to_vec());
         let groups = match action {
             Action::Forces(_) => elements.collect(),
             Action::Sphere { sphere, .. } => elements.chain(sphere.groups()).collect(),
         };
-        let system = System::new(&free, groups)?;
+        let system = System::new(&free, &ordering::nested_dissection(&solid.grid), groups)?;
         let low = solid.grid.positions_m.iter().copied().fold(DVec3::INFINITY, DVec3::min);
         let high = solid.grid.positions_m.iter().copied().fold(DVec3::NEG_INFINITY, DVec3::max);
         Ok(Self {
@@ -181,7 +176,7 @@ impl<'a> Problem<'a> {
     }
 
     fn equilibrate(
-        &self,
+        &mut self,
         fraction: f64,
         mut x: Vec<DVec3>,
         iterations: &mut usize,
@@ -211,7 +206,7 @@ impl<'a> Problem<'a> {
     }
 
     /// Newton's direction; where the tangent is not positive definite, one of descent, with so much added to its diagonal that it is.
-    fn direction(&self, blocks: &mut [Vec<f64>], force: &[DVec3]) -> Option<Vec<DVec3>> {
+    fn direction(&mut self, blocks: &mut [Vec<f64>], force: &[DVec3]) -> Option<Vec<DVec3>> {
         if let Some(direction) = self.system.solve(blocks, force) {
             return Some(direction);
         }

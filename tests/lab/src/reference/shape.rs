@@ -26,6 +26,12 @@ pub fn face_slopes(a: f64, b: f64) -> [[f64; 2]; 9] {
     std::array::from_fn(|n| [da[n % 3] * lb[n / 3], la[n % 3] * db[n / 3]])
 }
 
+/// Values of the 27 functions of a hexahedron at (ξ, η, ζ), node `i + 3j + 9k`.
+pub fn solid_values(at: [f64; 3]) -> [f64; 27] {
+    let l = at.map(values);
+    std::array::from_fn(|n| l[0][n % 3] * l[1][n / 3 % 3] * l[2][n / 9])
+}
+
 /// Derivatives of the 27 functions of a hexahedron at (ξ, η, ζ), node `i + 3j + 9k`.
 pub fn solid_slopes(at: [f64; 3]) -> [[f64; 3]; 27] {
     let (l, d) = (at.map(values), at.map(slopes));

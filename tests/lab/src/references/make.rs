@@ -1,5 +1,5 @@
 //! Makes references on triquadratic hexahedra.
-use super::{Grid, Provenance, Reference, limit};
+use super::{Grid, Provenance, Reference, in_time, limit};
 use crate::{
     problems::{
         Action, Problem,
@@ -17,9 +17,14 @@ use crate::{
 use glam::DVec3;
 use miette::{Context, Result, bail, miette};
 
-/// Elements each way of the three grids: each one and a half times as fine as the last.
-pub(super) const GRIDS: [usize; 3] = [4, 6, 9];
-const RATIO: f64 = 1.5;
+/// Elements over one and a half radii of the contact (`n` of `reference::bodies`) of a body's three grids.
+pub(super) fn grids(body: Body) -> [usize; 3] {
+    match body {
+        Body::Ventricle => [2, 3, 4],
+        _ => [3, 4, 6],
+    }
+}
+
 /// κ of the sphere's penalty over `E/((1 − ν²)√(Rδ))`: the first lets in some 1e-4 of the depth. Deep presses on coarse grids may
 /// need a softer one, since Newton's method then sees points enter and leave; its error goes as its inverse.
 pub(super) const PENALTIES: [f64; 3] = [4e3, 1e3, 2.5e2];
@@ -33,7 +38,7 @@ pub struct Solved {
     pub displacements_m: Vec<DVec3>,
 }
 
-/// Solves a problem on a grid of `n` elements each way, a sphere pressing with `penalty`; `tell` hears how it goes.
+/// Solves a problem on a grid with `n` elements over one and a half radii of the contact, a sphere pressing with `penalty`; `tell` hears how it goes.
 ///
 /// # Errors
 /// A problem that has no such grid, or no convergence.
@@ -43,7 +48,7 @@ pub fn on_grid(problem: &Problem, n: usize, penalty: f64, tell: &mut dyn FnMut(&
         Body::Block => bodies::block(BLOCK_M[0], BLOCK_M[1], contact_m, n),
         Body::Ventricle | Body::SmallVentricle => {
             let (outer, inner, cut) = if problem.body == Body::Ventricle { VENTRICLE_M } else { SMALL_VENTRICLE_M };
-            bodies::ventricle(outer, inner, cut, contact_m, (n, n.div_ceil(2)))
+            bodies::ventricle(outer, inner, cut, contact_m, n)
         }
         Body::Octant | Body::Beam { .. } => bail!("{} has an answer by formula", problem.name),
     };
@@ -61,12 +66,12 @@ pub fn on_grid(problem: &Problem, n: usize, penalty: f64, tell: &mut dyn FnMut(&
         }
         Action::Pressure { .. } | Action::Shear { .. } => bail!("{} has an answer by formula", problem.name),
     };
-    let found =
-        solve(&solid, &body, &action, tell).wrap_err_with(|| format!("{n} elements each way, penalty {penalty}"))?;
+    let found = solve(&solid, &body, &action, tell)
+        .wrap_err_with(|| format!("{n} elements over the contact, penalty {penalty}"))?;
     let value = load.map_or(found.sphere_n, |load| load.displacement_m(&solid.grid.positions_m, &found.x));
     let unknowns = 3 * solid.grid.positions_m.len();
     Ok(Solved {
-        grid: Grid { elements_each_way: n, unknowns, value, iterations: found.iterations },
+        grid: Grid { elements_over_contact: n, unknowns, value, iterations: found.iterations },
         displacements_m: field_m(problem, &solid, &body, &found.x),
     })
 }
@@ -85,7 +90,8 @@ fn on_all_grids(problem: &Problem, tell: &mut dyn FnMut(&str)) -> Result<(Vec<So
     let mut last = Err(miette!("no penalty"));
     for penalty in PENALTIES {
         let mut grid = |n| on_grid(problem, n, penalty, &mut |text| tell(&format!("n = {n}: {text}")));
-        last = GRIDS.into_iter().map(&mut grid).collect::<Result<Vec<_>>>().map(|solved| (solved, penalty));
+        last =
+            grids(problem.body).into_iter().map(&mut grid).collect::<Result<Vec<_>>>().map(|solved| (solved, penalty));
         if last.is_ok() || !matches!(problem.action, Action::Sphere { .. }) {
             return last;
         }
@@ -98,9 +104,13 @@ fn on_all_grids(problem: &Problem, tell: &mut dyn FnMut(&str)) -> Result<(Vec<So
 /// # Errors
 /// A grid that is not solved.
 pub fn remake(problem: &Problem, tell: &mut dyn FnMut(&str)) -> Result<Reference> {
+    if problem.motion.ticks().is_some() {
+        return in_time::remake(problem, tell);
+    }
     let (solved, penalty) = on_all_grids(problem, tell)?;
     let [first, second, third] = &solved[..] else { return Err(miette!("three grids are needed")) };
-    let limit = limit([first, second, third].map(|s| s.grid.value), RATIO);
+    let sizes = grids(problem.body).map(|n| 1.0 / n as f64);
+    let limit = limit([first, second, third].map(|s| s.grid.value), sizes);
     let samples = sample::points(problem.body);
     let difference = FieldError::of(&samples, &second.displacements_m, &third.displacements_m);
     let in_um = |u: &DVec3| (*u * 1e9).round().to_array().map(|nm| nm * 1e-3);
@@ -119,8 +129,8 @@ pub fn remake(problem: &Problem, tell: &mut dyn FnMut(&str)) -> Result<Reference
         provenance: Provenance {
             date: crate::machine::today_utc(),
             command: format!("cargo run --release -p palpate-lab -- references --remake {}", problem.name),
-            discretisation: "triquadratic hexahedra (27 nodes, 27 Gauss points) graded to the contact, symmetric part, f64, Newton to a \
-                             relative residual of 1e-9; displacements of the finest grid"
+            discretisation: "triquadratic hexahedra (27 nodes, 27 Gauss points) with linear pressure (Q2/P1) graded to the contact, symmetric \
+                             part, f64, Newton to a relative residual of 1e-9; displacements of the finest grid"
                 .into(),
             law: format!("{:?}", problem.law),
             young_modulus_pa: problem.young_modulus_pa,
@@ -131,6 +141,7 @@ pub fn remake(problem: &Problem, tell: &mut dyn FnMut(&str)) -> Result<Reference
             },
         },
         displacements_um: third.displacements_m.iter().map(in_um).collect(),
+        series_um: vec![],
         grids: solved.into_iter().map(|s| s.grid).collect(),
     })
 }

@@ -1,8 +1,10 @@
 //! What every problem's answer is: by formula where there is one, otherwise a converged reference, stored with its provenance in
 //! `references/NAME.toml` and made again by `palpate-lab references --remake`.
 mod command;
+mod in_time;
 mod make;
 mod richardson;
+pub mod series;
 
 pub use command::{Options, run};
 pub use make::{Solved, on_grid, remake};
@@ -38,8 +40,11 @@ pub struct Reference {
     pub provenance: Provenance,
     /// Grids, coarse to fine.
     pub grids: Vec<Grid>,
-    /// Displacements (µm) of the problem's material points on the finest grid.
+    /// Displacements (µm) of the problem's material points on the finest grid; none in time.
     pub displacements_um: Vec<[f64; 3]>,
+    /// The answer (µm) at the end of every tick of a dynamic problem. The value is its root mean square.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub series_um: Vec<f64>,
 }
 
 /// How a reference was made.
@@ -66,13 +71,13 @@ pub struct Provenance {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Grid {
-    /// Elements each way (`n` of `reference::bodies`).
-    pub elements_each_way: usize,
+    /// Elements over one and a half radii of the contact (`n` of `reference::bodies`).
+    pub elements_over_contact: usize,
     /// Unknowns.
     pub unknowns: usize,
     /// Answer.
     pub value: f64,
-    /// Newton iterations.
+    /// Newton iterations; substeps per tick in time.
     pub iterations: usize,
 }
 
@@ -80,6 +85,11 @@ impl Reference {
     /// Displacements (m) of the problem's material points.
     pub fn displacements_m(&self) -> Vec<DVec3> {
         self.displacements_um.iter().map(|u| DVec3::from(*u) * 1e-6).collect()
+    }
+
+    /// The answer (m) of a dynamic problem at the end of every tick.
+    pub fn series_m(&self) -> Vec<f64> {
+        self.series_um.iter().map(|u| u * 1e-6).collect()
     }
 
     /// The answer of a problem: by formula, or as stored.
@@ -127,5 +137,6 @@ fn by_formula(problem: &Problem) -> Option<Reference> {
         provenance: Provenance::default(),
         grids: vec![],
         displacements_um: sample::points(problem.body).iter().map(radial).collect(),
+        series_um: vec![],
     })
 }
