@@ -1,5 +1,6 @@
 //! The lab: what Palpate costs, measured beside what it gets wrong.
 pub mod bodies;
+pub mod convergence;
 pub mod jitter;
 pub mod machine;
 pub mod measure;

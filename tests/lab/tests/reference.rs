@@ -5,7 +5,8 @@ use palpate_lab::{
     bodies::material,
     reference::{
         bodies::{Body, block, sphere_octant, ventricle},
-        grid::{HexGrid, graded},
+        dynamics::{Clock, Dynamics},
+        grid::{HexGrid, Side, graded},
         newton::{Action, Equilibrium, solve},
         solid::{Solid, surface_points},
         sphere::Sphere,
@@ -139,4 +140,61 @@ fn hertz_at_small_depth() {
     let exact = 4.0 / 3.0 * modulus * radius.sqrt() * depth.powf(1.5) * series;
     println!("{:.5e} N against {exact:.5e}, {:+.2} %", found.sphere_n, 100.0 * (found.sphere_n / exact - 1.0));
     assert!((found.sphere_n / exact - 1.0).abs() < 0.01, "{} {exact}", found.sphere_n);
+}
+
+/// A bar 100 mm long that only stretches (E = 100 kPa, ν = 0, held at one end), pulled to its first shape and let go.
+fn bar() -> (Solid, Body) {
+    let grid = HexGrid::new([graded(0.0, 0.1, 6, 1.0), graded(0.0, 0.01, 1, 1.0), graded(0.0, 0.01, 1, 1.0)], |p| p);
+    let root = Side { parameter: 0, upper: false };
+    let sides = [1, 2].map(|parameter| Side { parameter, upper: false });
+    let body = Body {
+        grid: grid.clone(),
+        held: vec![(root, [true; 3]), (sides[0], [false, true, false]), (sides[1], [false, false, true])],
+        touched: Side { parameter: 0, upper: true },
+        multiplicity: 1.0,
+        touch_m: DVec3::X * 0.1,
+        normal: DVec3::X,
+    };
+    (Solid::new(grid, material(Law::FixedCorotated, 100e3, 0.0).unwrap()).unwrap(), body)
+}
+
+/// Displacement (m) of the bar's end after some steps; and the largest change of energy on the way, relative.
+fn swing(solid: &Solid, body: &Body, dt_s: f64, steps: usize) -> (Vec<f64>, f64) {
+    let mut dynamics = Dynamics::new(solid, body, 1000.0).unwrap();
+    for x in &mut dynamics.x {
+        x.x += 1e-6 * (std::f64::consts::PI * x.x / 0.2).sin();
+    }
+    let end = (0..dynamics.x.len()).find(|&n| dynamics.x[n].x > 0.1).unwrap();
+    let (start, none) = (dynamics.energy_j(), vec![DVec3::ZERO; dynamics.x.len()]);
+    let clock = Clock { dt_s, damping_per_s: 0.0 };
+    let (mut moved, mut worst) = (vec![], 0.0_f64);
+    for _ in 0..steps {
+        dynamics.step(&none, &clock);
+        moved.push(dynamics.x[end].x - 0.1);
+        worst = worst.max((dynamics.energy_j() / start - 1.0).abs());
+    }
+    (moved, worst)
+}
+
+#[test]
+fn a_bar_swings_at_its_frequency_keeps_its_energy_and_time_is_of_second_order() {
+    let (solid, body) = bar();
+    let stable_s = Dynamics::new(&solid, &body, 1000.0).unwrap().stable_step_s();
+    // f = √(E/ρ)/4L = 25 Hz: after 40 ms all is as it was, after 10 and 30 ms the end passes its rest.
+    let steps = (0.04 / stable_s).ceil() as usize;
+    let (moved, energy) = swing(&solid, &body, 0.04 / steps as f64, steps);
+    let crossing = |from: usize| {
+        let i = (from..steps - 1).find(|&i| moved[i] * moved[i + 1] <= 0.0).unwrap();
+        i as f64 + 1.0 + moved[i] / (moved[i] - moved[i + 1])
+    };
+    let first = crossing(0);
+    let second = crossing(first as usize + 1);
+    let hz = steps as f64 / 0.04 / (2.0 * (second - first));
+    println!("{hz:.4} Hz, energy within {energy:.1e}, {steps} steps");
+    assert!((hz / 25.0 - 1.0).abs() < 1e-3 && energy < 1e-2, "{hz} Hz, {energy}");
+    let end = |factor: usize| *swing(&solid, &body, 0.011 / (steps * factor) as f64, steps * factor).0.last().unwrap();
+    let [a, b, c] = [1, 2, 4].map(end);
+    let order = ((a - b) / (b - c)).log2();
+    println!("order in time {order:.3}");
+    assert!((order - 2.0).abs() < 0.05, "{order}");
 }

@@ -14,8 +14,8 @@ const LARGE: (&str, f64) = ("large", 5e-3);
 const SMALL_PATCH: (&str, f64) = ("small", 0.02);
 const LARGE_BLOCK_PATCH: (&str, f64) = ("large", 0.15);
 const LARGE_VENTRICLE_PATCH: (&str, f64) = ("large", 0.1);
-/// A press that comes in 5 ms, and one that swings up to where the block's own modes are.
-const STEP: Motion = Motion::Step { rise_ticks: 5, ticks: 300 };
+/// A press that comes in 10 ms, and one that swings up to where the block's own modes are.
+const STEP: Motion = Motion::Step { rise_ticks: 10, ticks: 300 };
 const SWEEP: Motion = Motion::Sweep { hz: [5.0, 60.0], ticks: 1000 };
 
 /// Every problem.

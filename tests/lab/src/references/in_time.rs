@@ -1,5 +1,5 @@
 //! Makes the references of dynamic problems: the same elements with lumped mass, in time.
-use super::{Grid, Provenance, Reference, richardson, series};
+use super::{Grid, Provenance, Reference, make::GRIDS, richardson, series};
 use crate::{
     problems::{
         Action, Problem,
@@ -15,8 +15,6 @@ use crate::{
 };
 use miette::{Result, bail};
 
-/// Elements over one and a half radii of the contact.
-const GRIDS: [usize; 3] = [2, 3, 4];
 const DENSITY_KG_PER_M3: f64 = 1000.0;
 
 struct Series {

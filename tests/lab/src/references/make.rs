@@ -17,14 +17,8 @@ use crate::{
 use glam::DVec3;
 use miette::{Context, Result, bail, miette};
 
-/// Elements over one and a half radii of the contact (`n` of `reference::bodies`) of a body's three grids.
-pub(super) fn grids(body: Body) -> [usize; 3] {
-    match body {
-        Body::Ventricle => [2, 3, 4],
-        _ => [3, 4, 6],
-    }
-}
-
+/// Elements over one and a half radii of the contact (`n` of `reference::bodies`) of the three grids.
+pub(super) const GRIDS: [usize; 3] = [2, 3, 4];
 /// κ of the sphere's penalty over `E/((1 − ν²)√(Rδ))`: the first lets in some 1e-4 of the depth. Deep presses on coarse grids may
 /// need a softer one, since Newton's method then sees points enter and leave; its error goes as its inverse.
 pub(super) const PENALTIES: [f64; 3] = [4e3, 1e3, 2.5e2];
@@ -90,8 +84,7 @@ fn on_all_grids(problem: &Problem, tell: &mut dyn FnMut(&str)) -> Result<(Vec<So
     let mut last = Err(miette!("no penalty"));
     for penalty in PENALTIES {
         let mut grid = |n| on_grid(problem, n, penalty, &mut |text| tell(&format!("n = {n}: {text}")));
-        last =
-            grids(problem.body).into_iter().map(&mut grid).collect::<Result<Vec<_>>>().map(|solved| (solved, penalty));
+        last = GRIDS.into_iter().map(&mut grid).collect::<Result<Vec<_>>>().map(|solved| (solved, penalty));
         if last.is_ok() || !matches!(problem.action, Action::Sphere { .. }) {
             return last;
         }
@@ -109,7 +102,7 @@ pub fn remake(problem: &Problem, tell: &mut dyn FnMut(&str)) -> Result<Reference
     }
     let (solved, penalty) = on_all_grids(problem, tell)?;
     let [first, second, third] = &solved[..] else { return Err(miette!("three grids are needed")) };
-    let sizes = grids(problem.body).map(|n| 1.0 / n as f64);
+    let sizes = GRIDS.map(|n| 1.0 / n as f64);
     let limit = limit([first, second, third].map(|s| s.grid.value), sizes);
     let samples = sample::points(problem.body);
     let difference = FieldError::of(&samples, &second.displacements_m, &third.displacements_m);

@@ -1,6 +1,7 @@
 //! `palpate-lab run` and `palpate-lab compare`: the run's CSV, its page, and what changed between two runs.
 mod command;
 mod compare;
+mod convergence;
 mod page;
 mod peers;
 mod plot;

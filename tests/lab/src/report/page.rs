@@ -1,10 +1,11 @@
 //! The page: one file that needs nothing else, for a reader who was not there.
 use super::{
-    peers,
+    convergence, peers,
     plot::{self, Point, Series},
     skips, stress,
 };
 use crate::{
+    convergence::Convergence,
     measure::{Row, Run},
     methods::{self, Method},
     problems::{Action, Problem},
@@ -40,6 +41,8 @@ pub(super) struct Results<'a> {
     pub(super) run: &'a Run,
     pub(super) problems: &'a [Problem],
     pub(super) methods: &'a [Box<dyn Method>],
+    /// Empty: not computed.
+    pub(super) convergence: &'a [Convergence],
     /// Empty: not measured.
     pub(super) skips: &'a [(Skip, Found)],
     /// Empty: not run.
@@ -58,6 +61,7 @@ pub(super) fn page(results: &Results<'_>) -> Result<String> {
     );
     introduction(&mut out, run);
     summary(&mut out, run, problems);
+    convergence::section(&mut out, results.convergence);
     out.push_str("<h2>Methods</h2><table class=\"text\"><tr><th>method</th><th>what it is</th></tr>");
     for method in *methods {
         let _ = write!(out, "<tr><td>{}</td><td>{}</td></tr>", escape(method.name()), escape(method.what()));
@@ -87,7 +91,9 @@ fn introduction(out: &mut String, run: &Run) {
          has. In the shaded strip at the bottom errors are below the reference's own uncertainty and say nothing. An error that falls and rises \
          again along a line has changed its sign.</p><p><b>How it was measured.</b> The tool or load comes smoothly and rests, with mass \
          damping near critical for the body's slowest mode, the same for every method; the answer is the mean over the last 20 ticks, and \
-         the table says how far it still moves. Then all methods of a problem take turns, one untimed tick to warm the caches and one timed, \
+         the table says how far it still moves. In dynamic problems (a step, a sweep) the body rings under light damping instead; \
+         the answer is compared at every tick, its error is the L2 norm in time of the difference over that of the reference (never negative: a \
+         phase that is lost weighs like a missing amplitude), and the table shows the root mean square as the answer. Then all methods of a problem take turns, one untimed tick to warm the caches and one timed, \
          so that a slow moment of the machine strikes all of them.</p><table class=\"text\">",
     );
     for (key, value) in &run.circumstances {
@@ -274,11 +280,28 @@ mod tests {
             ..Row::default()
         };
         let bad = Row { failure: "became <non-finite>".into(), median_us: None, ..good.clone() };
+        let study = Convergence {
+            quantity: "what <converges>",
+            refined: "cells",
+            sizes: vec![1, 2],
+            errors: vec![0.4, 0.1],
+            demand: 2.1,
+        };
         let run = Run { circumstances: [("date".into(), "today".into())].into(), rows: vec![good, bad] };
-        let results = Results { run: &run, problems: &[problem], methods: &methods::all(), skips: &[], stress: &[] };
+        let results = Results {
+            run: &run,
+            problems: &[problem],
+            methods: &methods::all(),
+            convergence: &[study],
+            skips: &[],
+            stress: &[],
+        };
         let page = page(&results).unwrap();
         assert!(
             page.contains("-5.00 %") && page.contains("became &lt;non-finite&gt;") && page.contains("class=\"yes\"")
+        );
+        assert!(
+            page.contains("what &lt;converges&gt;") && page.contains("<td>2.00</td><td>≥ 2.1</td><td class=\"no\">")
         );
         assert!(!page.contains("src=") && !page.contains("@import") && !page.contains("<link"));
     }

@@ -10,7 +10,7 @@ mod impulses;
 mod incompressible;
 mod meshes;
 mod outcome;
-mod random;
+pub(crate) mod random;
 mod random_scenes;
 mod record;
 mod recovery;
