@@ -97,7 +97,7 @@ impl Solid {
 
     /// With `δP = ∂P/∂F δF + κ(Πθ − θ) δ(cof F) − κ (cof F : δF) cof F`.
     fn add_stiffness(&self, f: &DMat3, extra_pa: f64, point: &Point, block: &mut [f64]) {
-        let (cof, kappa) = (cofactor(f), self.material.lame.lambda_pa);
+        let (cof, kappa) = (cofactor(f), volume::modulus_pa(&self.material));
         // differential[c][l] = ∂P/∂F_cl (Pa)
         let differential = [0, 1, 2].map(|c| {
             [0, 1, 2].map(|l| {
@@ -123,7 +123,7 @@ impl Solid {
 
     /// `κ Σ_k s_k s_kᵀ`, `s_k = ∂c_k/∂x_a = Σ_q w_q p_k cof F ∇N_a`.
     fn add_projected(&self, element: usize, f: &[DMat3; POINTS], block: &mut [f64]) {
-        let kappa = self.material.lame.lambda_pa;
+        let kappa = volume::modulus_pa(&self.material);
         let mut slopes = [[DVec3::ZERO; 27]; volume::MODES];
         for (point, (f, modes)) in self.points[element].iter().zip(f.iter().zip(&self.modes[element])) {
             let cof = cofactor(f) * point.weight_m3;
@@ -148,7 +148,7 @@ impl Solid {
         let (nodes, points) = (&self.grid.elements[element], &self.points[element]);
         let f: [DMat3; POINTS] = std::array::from_fn(|q| deformation_gradient(nodes, &points[q], x));
         let weights = std::array::from_fn(|q| points[q].weight_m3);
-        (f, Volume::of(&f, &weights, &self.modes[element], self.material.lame.lambda_pa))
+        (f, Volume::of(&f, &weights, &self.modes[element], volume::modulus_pa(&self.material)))
     }
 
     /// `(λ + 2µ) V` (J): the energy of unit strain.

@@ -1,16 +1,25 @@
 //! The change of volume, projected on linear functions in each element: what keeps nearly incompressible bodies from locking.
 //!
 //! `θ = J − 1`; Πθ is its L2 projection on `span{1, X, Y, Z}` of the element at rest. The energy is
-//! `U = Σ_q w_q [Ψ(F_q) − ½κ θ_q²] + ½κ Σ_q w_q (Πθ)_q²`, with κ = λ: what is left of the
-//! law where Πθ = 0 is `µ|ε|²` at small strain, which is positive. This is the mixed element of triquadratic displacements and linear discontinuous pressure (Q2/P1), its pressure eliminated, which is stable and of full order at
-//! any ν; `θ − Πθ` falls as h², so the limit is the law's. With functions `p_k` that are orthonormal over the element,
-//! `Πθ = Σ_k c_k p_k`, `c_k = Σ_q w_q p_k θ_q`, and `½κ ∫(Πθ)² = ½κ Σ_k c_k²`.
+//! `U = Σ_q w_q [Ψ(F_q) − ½κ θ_q²] + ½κ Σ_q w_q (Πθ)_q²`, with κ = λ: what is left of the law where Πθ = 0 is `µ|ε|²` at small
+//! strain, which is positive. This is the mixed element of triquadratic displacements and linear discontinuous pressure (Q2/P1), its
+//! pressure eliminated, which is stable and of full order at any ν; `θ − Πθ` falls as h², so the limit is the law's. With functions
+//! `p_k` that are orthonormal over the element, `Πθ = Σ_k c_k p_k`, `c_k = Σ_q w_q p_k θ_q`, and `½κ ∫(Πθ)² = ½κ Σ_k c_k²`.
 use glam::{DMat3, DVec3};
+use palpate_physics::material::{Law, Material};
 
 /// Quadrature points of an element.
 pub(super) const POINTS: usize = 27;
 /// Linear functions of an element.
 pub(super) const MODES: usize = 4;
+
+/// κ (Pa). None for St. Venant-Kirchhoff: it softens in compression, where what is left of it would lose its sign.
+pub(super) fn modulus_pa(material: &Material) -> f64 {
+    match material.law {
+        Law::StVenantKirchhoff => 0.0,
+        Law::StableNeoHookean | Law::FixedCorotated => material.lame.lambda_pa,
+    }
+}
 
 /// Values at the points of `1, X, Y, Z`, made orthonormal over the element (Gram and Schmidt).
 pub(super) fn modes(at_m: [DVec3; POINTS], weights_m3: [f64; POINTS]) -> [[f64; MODES]; POINTS] {
