@@ -1,6 +1,6 @@
 //! Energy ledger, inversion, and quarantine of non-finite state.
 use crate::{
-    contact::ToolState,
+    contact::{ContactState, ToolState},
     world::{Model, State},
 };
 use glam::DVec3;
@@ -124,6 +124,9 @@ impl Quarantine {
 #[derive(Debug, Clone)]
 pub(crate) struct LastGood {
     x: Vec<DVec3>,
+    v: Vec<DVec3>,
+    force_is_current: bool,
+    contact: ContactState,
     tools: Vec<ToolState>,
     load_factors: Vec<f64>,
     ledger: Ledger,
@@ -131,17 +134,42 @@ pub(crate) struct LastGood {
 }
 
 impl LastGood {
-    pub(crate) fn new(nodes: usize, tools: Vec<ToolState>, loads: usize) -> Self {
-        let (ledger, viscous) = (Ledger::default(), ViscousPower::default());
-        Self { x: vec![DVec3::ZERO; nodes], tools, load_factors: vec![0.0; loads], ledger, viscous }
+    pub(crate) fn new(model: &Model) -> Self {
+        let State { x, v, force_is_current, contact, tools, load_factors, ledger, viscous, .. } = State::at_rest(model);
+        Self { x, v, force_is_current, contact, tools, load_factors, ledger, viscous }
     }
 
-    /// Copies what a tick may spoil. Allocates nothing.
+    /// Copies what quarantine goes back to. Allocates nothing.
     pub(crate) fn keep(&mut self, state: &State) {
         self.x.copy_from_slice(&state.x);
         self.tools.clone_from_slice(&state.tools);
         self.load_factors.copy_from_slice(&state.load_factors);
         (self.ledger, self.viscous) = (state.ledger, state.viscous);
+    }
+
+    /// Copies the rest of what a tick of leapfrog changes, but its forces, so that it can be repeated. Allocates nothing.
+    pub(crate) fn keep_for_repetition(&mut self, state: &State) {
+        self.v.copy_from_slice(&state.v);
+        self.force_is_current = state.force_is_current;
+        self.contact.keep_memory_of(&state.contact);
+    }
+
+    /// Positions (m).
+    pub(crate) fn x(&self) -> &[DVec3] {
+        &self.x
+    }
+
+    /// Velocities (m/s), where kept for repetition.
+    pub(crate) fn v(&self) -> &[DVec3] {
+        &self.v
+    }
+
+    /// Everything of [`Self::keep`] and [`Self::keep_for_repetition`].
+    pub(crate) fn put_all_back(&self, state: &mut State) {
+        self.put_back(state);
+        state.v.copy_from_slice(&self.v);
+        state.force_is_current = self.force_is_current;
+        state.contact.copy_from(&self.contact);
     }
 
     pub(crate) fn put_back(&self, state: &mut State) {

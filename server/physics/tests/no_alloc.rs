@@ -4,9 +4,9 @@ mod rig;
 use assert_no_alloc::{AllocDisabler, assert_no_alloc};
 use glam::DVec3;
 use palpate_physics::{
-    Integrator, LoadSpec, PointForce, TickInput,
+    Integrator, LoadSpec, PointForce, Substeps, TickInput,
     contact::{Coupling, ToolTarget},
-    material::{Law, Viscosity},
+    material::{Lame, Law, Viscosity},
 };
 use rig::{Rig, at, body, bricks, even, hold, material, nodes_where, sphere};
 
@@ -59,8 +59,23 @@ fn nor_do_ticks_of_the_other_integrators() {
     }
 }
 
+/// One step per tick is too long for a body of 200 kPa.
+#[test]
+fn nor_do_ticks_that_are_repeated() {
+    let mut spec = rig(Integrator::Leapfrog).model.spec().clone();
+    spec.settings.substeps = Substeps::Fixed(1);
+    spec.regions[0].material.lame = Lame::from_young_poisson(200e3, 0.45).unwrap();
+    let rig = Rig::new(spec);
+    assert!(run_without_allocating(rig, 2000) > 0);
+}
+
 fn ticks_allocate_nothing(integrator: Integrator, ticks: u32) {
-    let mut rig = rig(integrator);
+    assert_eq!(run_without_allocating(rig(integrator), ticks), 0);
+}
+
+/// Returns how many ticks were repeated.
+fn run_without_allocating(mut rig: Rig, ticks: u32) -> u32 {
+    let mut repeated = 0;
     let (mut touched, mut far, mut poison) = (0, 0, 0);
     let mut saved = rig.state.clone();
     assert_no_alloc(|| {
@@ -82,6 +97,7 @@ fn ticks_allocate_nothing(integrator: Integrator, ticks: u32) {
             let report = palpate_physics::step(&rig.model, &mut rig.state, &mut rig.scratch, &input);
             assert!(report.quarantined.is_none());
             poison += report.inputs_rejected;
+            repeated += report.repeated;
             touched += u32::from(rig.state.tools.iter().any(|t| t.contacts > 0));
             far += u32::from(rig.state.tools.iter().all(|t| t.contacts == 0));
             if tick == 1500 {
@@ -92,6 +108,7 @@ fn ticks_allocate_nothing(integrator: Integrator, ticks: u32) {
     });
     let least = ticks / 50;
     assert!(touched > 5 * least && far > 5 * least && poison > least, "{touched} {far} {poison}");
+    repeated
 }
 
 #[test]

@@ -51,7 +51,7 @@ fn an_enormous_force_leaves_the_last_good_state() {
         let held = rig.state.clone();
         for _ in 0..20 {
             let report = rig.tick_at(DVec3::Z * 0.001);
-            assert_eq!(report, StepReport { substeps: 0, inputs_rejected: 0, quarantined: None });
+            assert_eq!(report, StepReport { substeps: 0, repeated: 0, inputs_rejected: 0, quarantined: None });
         }
         assert_eq!(rig.state, held);
         // It can be saved and looked at, and reset.

@@ -166,6 +166,7 @@ fn growth(fraction: f64, ticks: u32) -> f64 {
             tick_period_s,
             substeps: Substeps::Fixed(1),
             precision: Precision::Double,
+            subcycle_unstable: false,
             ..Settings::default()
         },
         mesh: mesh.clone(),

@@ -63,6 +63,12 @@ fn another_name_is_answered_with_those_there_are() {
 }
 
 #[test]
+fn repeating_unstable_ticks_is_on_unless_switched_off() {
+    assert!(scene("leapfrog").unwrap().model.settings.subcycle_unstable);
+    assert!(!scene("leapfrog\"\nsubcycle_unstable = false#").unwrap().model.settings.subcycle_unstable);
+}
+
+#[test]
 fn the_solver_s_keys_are_read_and_held_to_their_ranges() {
     let with = |keys: &str| scene(&format!("backward-euler\"\n{keys}#"));
     let settings = with("solver_iterations = 7\nsolver_tolerance = 0.25").unwrap().model.settings;

@@ -27,10 +27,9 @@ fn falls_short_as_known(name: &str, numbers: usize) {
     assert_eq!(over, numbers, "{name}: {}", outcome.reason());
 }
 
-/// Bounded below the limit; above it nothing notices what grows before it overflows.
 #[test]
 fn time_step() {
-    falls_short_as_known("time-step", 3);
+    passes("time-step");
 }
 
 #[test]

@@ -89,11 +89,16 @@ impl ContactState {
 
     /// Copies another state of the same model. Allocates nothing.
     pub(crate) fn copy_from(&mut self, other: &Self) {
+        self.keep_memory_of(other);
+        self.forget_geometry();
+    }
+
+    /// Copies what another state remembers; its own geometry then fits neither.
+    pub(crate) fn keep_memory_of(&mut self, other: &Self) {
         for (own, other) in self.tools.iter_mut().zip(&other.tools) {
             own.touching.copy_from(&other.touching);
             (own.just_put, own.force_n, own.estimate) = (other.just_put, other.force_n, other.estimate);
         }
-        self.forget_geometry();
     }
 
     /// Touching nothing. Allocates nothing.

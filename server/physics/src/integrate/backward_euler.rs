@@ -32,7 +32,7 @@ use glam::DVec3;
 pub(super) fn run(tick: &Tick<'_>, nodal: &NodalImplicit, state: &mut State, scratch: &mut Scratch) {
     let (model, dt_s) = (tick.model, tick.dt_s());
     let damping = model.spec().settings.mass_damping_per_s;
-    for substep in 1..=model.substeps() {
+    for substep in 1..=tick.substeps {
         if damping > 0.0 {
             damp(model, state, (-damping * dt_s).exp());
         }

@@ -11,6 +11,8 @@ pub(super) struct Tick<'a> {
     pub(super) model: &'a Model,
     pub(super) input: &'a TickInput<'a>,
     pub(super) loads: LoadRamp,
+    /// Substeps it is taken in.
+    pub(super) substeps: u32,
 }
 
 /// When forces are evaluated, and how the body came there.
@@ -28,7 +30,7 @@ struct Evaluation {
 impl Tick<'_> {
     /// Substep `dt` (s).
     pub(super) fn dt_s(&self) -> f64 {
-        self.model.spec().settings.tick_period_s / f64::from(self.model.substeps())
+        self.model.spec().settings.tick_period_s / f64::from(self.substeps)
     }
 
     /// Forces at the start of the tick, unless the last tick left them.
@@ -48,21 +50,21 @@ impl Tick<'_> {
         if !state.force_is_current {
             state.contact.forget_geometry();
         }
-        let part = |substeps_done: u32| f64::from(substeps_done) / f64::from(self.model.substeps());
+        let part = |substeps_done: u32| f64::from(substeps_done) / f64::from(self.substeps);
         let (fraction, load_fraction) = (part(number - 1), part(number));
         self.evaluate(state, scratch, &Evaluation { fraction, load_fraction, dt_s: 0.0, fastest_m_per_s: 0.0 });
     }
 
     /// Forces at the end of substep `number` (from 1), to which the nodes came with at most `fastest_m_per_s`.
     pub(super) fn evaluate_after(&self, number: u32, fastest_m_per_s: f64, state: &mut State, scratch: &mut Scratch) {
-        let fraction = f64::from(number) / f64::from(self.model.substeps());
+        let fraction = f64::from(number) / f64::from(self.substeps);
         let now = Evaluation { fraction, load_fraction: fraction, dt_s: self.dt_s(), fastest_m_per_s };
         self.evaluate(state, scratch, &now);
     }
 
     /// Total force at the present positions into `state.force_n`, its external part into `state.external_n`.
     fn evaluate(&self, state: &mut State, scratch: &mut Scratch, now: &Evaluation) {
-        let Self { model, input, loads } = self;
+        let Self { model, input, loads, .. } = self;
         let external = &mut state.external_n;
         external.fill(DVec3::ZERO);
         for (index, load) in model.spec().loads.iter().enumerate() {

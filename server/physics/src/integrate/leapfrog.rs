@@ -20,11 +20,12 @@ use crate::world::{Scratch, State};
 
 /// All substeps of a tick.
 pub(super) fn run(tick: &Tick<'_>, state: &mut State, scratch: &mut Scratch) {
-    let (substeps, dt_s) = (tick.model.substeps(), tick.dt_s());
+    let (substeps, dt_s) = (tick.substeps, tick.dt_s());
     tick.make_force_current(state, scratch);
     kick(tick.model, state, 0.5 * dt_s);
     for substep in 1..=substeps {
         let fastest_m_per_s = drift(state, dt_s);
+        scratch.history.set_aside(substep, substeps, state);
         tick.evaluate_after(substep, fastest_m_per_s, state, scratch);
         kick(tick.model, state, if substep == substeps { 0.5 * dt_s } else { dt_s });
     }

@@ -8,7 +8,10 @@ mod scheme;
 pub mod seed_semi_implicit;
 mod seed_verlet;
 pub mod spectrum;
+mod stability;
 mod tick;
 
 pub(crate) use scheme::{Body, ImplicitScratch, Scheme};
+pub(crate) use stability::ForceHistory;
+pub use stability::{InstantForces, Pace};
 pub use tick::step;

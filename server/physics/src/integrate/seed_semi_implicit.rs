@@ -84,7 +84,7 @@ pub fn nodal_stiffness_n_per_m(body: &RestStiffness<'_>) -> Vec<DMat3> {
 pub(super) fn run(tick: &Tick<'_>, nodal: &NodalImplicit, state: &mut State, scratch: &mut Scratch) {
     let dt_s = tick.dt_s();
     tick.make_force_current(state, scratch);
-    for substep in 1..=tick.model.substeps() {
+    for substep in 1..=tick.substeps {
         kick(tick.model, nodal, state, dt_s);
         let fastest_m_per_s = drift(state, dt_s);
         tick.evaluate_after(substep, fastest_m_per_s, state, scratch);

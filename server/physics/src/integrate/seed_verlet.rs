@@ -28,7 +28,7 @@ pub(super) fn run(tick: &Tick<'_>, state: &mut State, scratch: &mut Scratch) {
     if state.tick == 0 {
         kick(tick.model, state, 0.5 * dt_s);
     }
-    for substep in 1..=tick.model.substeps() {
+    for substep in 1..=tick.substeps {
         let fastest_m_per_s = drift(state, dt_s);
         tick.evaluate_after(substep, fastest_m_per_s, state, scratch);
         kick(tick.model, state, dt_s);

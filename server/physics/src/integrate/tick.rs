@@ -1,5 +1,8 @@
 //! One tick: inputs, quarantine, the integrator of the model's settings, reactions.
-use super::forces::{LoadRamp, Tick, is_usable};
+use super::{
+    forces::{LoadRamp, Tick, is_usable},
+    stability::{is_judged, substeps_for},
+};
 use crate::{
     contact::ToolTarget,
     health::{Quarantine, first_non_finite},
@@ -7,31 +10,65 @@ use crate::{
 };
 use glam::DVec3;
 
+/// Most repetitions of a tick.
+const MOST_REPETITIONS: u32 = 3;
+
 /// Advances `state` by one tick. Allocates nothing; same arguments, same bits.
 ///
-/// A result that is not finite is refused: the last good state is kept, at rest, and marked as quarantined until it is
+/// A tick of leapfrog whose step proves too long ([`super::stability`]), or whose result is not finite, is taken back and repeated from
+/// its start in more substeps, at most three times; the ticks after it keep to them until fewer would do.
+///
+/// A result that is not finite even so is refused: the last good state is kept, at rest, and marked as quarantined until it is
 /// reset or restored. Inputs that are not finite, or of the wrong length, are replaced by the previous tick's and counted.
 pub fn step(model: &Model, state: &mut State, scratch: &mut Scratch, input: &TickInput<'_>) -> StepReport {
     if state.quarantine.is_some() {
-        return StepReport { substeps: 0, inputs_rejected: 0, quarantined: None };
+        return StepReport { substeps: 0, repeated: 0, inputs_rejected: 0, quarantined: None };
     }
+    let judged = is_judged(model);
     scratch.last_good.keep(state);
-    let loads = LoadRamp::new(state, input);
-    let inputs_rejected = take_inputs(model, state, scratch, input) + u32::from(!loads.usable);
-    run(&Tick { model, input, loads }, state, scratch);
-    state.tick = state.tick.saturating_add(1);
-    let quarantined = first_non_finite(state).map(|node| quarantine(state, scratch, node));
-    StepReport { substeps: model.substeps(), inputs_rejected, quarantined }
+    if judged {
+        scratch.last_good.keep_for_repetition(state);
+    }
+    let mut repeated = 0;
+    loop {
+        let substeps = state.pace.substeps;
+        state.pace.before_is_usable &= state.force_is_current;
+        let loads = LoadRamp::new(state, input);
+        let inputs_rejected = take_inputs(model, state, scratch, input) + u32::from(!loads.usable);
+        run(&Tick { model, input, loads, substeps }, state, scratch);
+        let spoilt = first_non_finite(state);
+        if judged {
+            let evidence = scratch.history.evidence(model, state, &scratch.last_good, substeps);
+            let unstable = spoilt.is_some() || evidence.is_unstable(model, state);
+            let quotient = spoilt.is_none().then(|| evidence.quotient());
+            let more = substeps_for(model, substeps, quotient).filter(|_| unstable && repeated < MOST_REPETITIONS);
+            if let Some(more) = more {
+                scratch.last_good.put_all_back(state);
+                scratch.history.put_back(state);
+                state.pace.start_again(more);
+                repeated += 1;
+                continue;
+            }
+            if substeps > model.substeps() && !unstable && repeated == 0 {
+                state.pace.calm(model, evidence.quotient());
+            }
+            scratch.history.hand_on(&mut state.pace, substeps);
+        }
+        state.tick = state.tick.saturating_add(1);
+        let quarantined = spoilt.map(|node| quarantine(model, state, scratch, node));
+        return StepReport { substeps, repeated, inputs_rejected, quarantined };
+    }
 }
 
 /// Puts back the last good tick, at rest: a velocity that led here would lead here again.
-fn quarantine(state: &mut State, scratch: &mut Scratch, node: u32) -> Quarantine {
+fn quarantine(model: &Model, state: &mut State, scratch: &mut Scratch, node: u32) -> Quarantine {
     let what = Quarantine { tick: state.tick, node };
     scratch.last_good.put_back(state);
     state.v.fill(DVec3::ZERO);
     state.force_n.fill(DVec3::ZERO);
     state.external_n.fill(DVec3::ZERO);
     state.force_is_current = false;
+    state.pace.reset(model);
     state.contact.clear();
     scratch.reaction_n.fill(DVec3::ZERO);
     for tool in &mut state.tools {
@@ -59,15 +96,16 @@ fn take_inputs(model: &Model, state: &mut State, scratch: &mut Scratch, input: &
     let prescribed_ok = input.prescribed_displacements_m.len() == model.spec().prescribed.len()
         && input.prescribed_displacements_m.iter().all(|d| d.is_finite());
     rejected += u32::from(!prescribed_ok);
+    scratch.history.held_jump = 0.0;
     for (set, spec) in model.spec().prescribed.iter().enumerate() {
         let displacement = prescribed_ok.then(|| input.prescribed_displacements_m[set]);
-        aim_prescribed(model, state, &spec.nodes, spec.axes, displacement, period_s);
+        scratch.history.held_jump += aim_prescribed(model, state, &spec.nodes, spec.axes, displacement, period_s);
     }
     rejected
 }
 
 /// Sets the constant velocity, on prescribed axes, that takes nodes to `X + displacement` in one tick (`None`: hold).
-/// The kinetic energy this gives is work done from outside.
+/// The kinetic energy this gives is work done from outside. Returns `Σ m (Δv)²`.
 fn aim_prescribed(
     model: &Model,
     state: &mut State,
@@ -75,15 +113,19 @@ fn aim_prescribed(
     axes: [bool; 3],
     displacement_m: Option<DVec3>,
     period_s: f64,
-) {
+) -> f64 {
+    let mut jump = 0.0;
     for node in nodes.iter().map(|&n| n as usize) {
-        let before = state.v[node].length_squared();
+        let before = state.v[node];
         for axis in (0..3).filter(|&axis| axes[axis]) {
             let target = displacement_m.map(|d| model.rest_positions_m()[node][axis] + d[axis]);
             state.v[node][axis] = target.map_or(0.0, |target| (target - state.x[node][axis]) / period_s);
         }
-        state.ledger.external_work_j += 0.5 * model.mass_kg()[node] * (state.v[node].length_squared() - before);
+        state.ledger.external_work_j +=
+            0.5 * model.mass_kg()[node] * (state.v[node].length_squared() - before.length_squared());
+        jump += model.mass_kg()[node] * (state.v[node] - before).length_squared();
     }
+    jump
 }
 
 /// All substeps, then what is summed up once a tick.
@@ -91,7 +133,7 @@ fn run(tick: &Tick<'_>, state: &mut State, scratch: &mut Scratch) {
     let model = tick.model;
     model.scheme().run(tick, state, scratch);
     tick.loads.finish(state, tick.input);
-    model.contact().end_tick(&mut state.tools, &mut state.contact, model.substeps(), &mut scratch.contact);
+    model.contact().end_tick(&mut state.tools, &mut state.contact, tick.substeps, &mut scratch.contact);
     for (reaction, (force, inverse_mass)) in
         scratch.reaction_n.iter_mut().zip(state.force_n.iter().zip(model.inverse_mass_per_kg()))
     {

@@ -4,6 +4,7 @@ use super::{
     block::{Job, Pass},
     laws::{FixedCorotated, StVenantKirchhoff, StableNeoHookean},
     real::Scalar,
+    step_forces::StepForces,
     tangents::LaneTangent,
 };
 use crate::material::Law;
@@ -50,6 +51,31 @@ impl InstructionSet {
     pub fn available() -> Vec<Self> {
         [Self::Baseline, Self::Avx2, Self::Avx512].into_iter().filter(|&set| set <= Self::best()).collect()
     }
+}
+
+/// [`StepForces::sums`].
+pub(super) fn step_force_sums(set: Available, forces: &StepForces<'_>) -> [f64; 3] {
+    match set.0 {
+        // SAFETY: `Available` holds only what was detected.
+        #[cfg(target_arch = "x86_64")]
+        InstructionSet::Avx2 => unsafe { sums_avx2(forces) },
+        // SAFETY: `Available` holds only what was detected.
+        #[cfg(target_arch = "x86_64")]
+        InstructionSet::Avx512 => unsafe { sums_avx512(forces) },
+        _ => forces.sums(),
+    }
+}
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx2")]
+fn sums_avx2(forces: &StepForces<'_>) -> [f64; 3] {
+    forces.sums()
+}
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx512f,avx512bw,avx512dq,avx512vl")]
+fn sums_avx512(forces: &StepForces<'_>) -> [f64; 3] {
+    forces.sums()
 }
 
 /// A pass over one run's blocks.

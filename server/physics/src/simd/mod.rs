@@ -13,6 +13,7 @@ mod layout;
 mod oracle;
 mod products;
 mod real;
+mod step_forces;
 mod tangents;
 #[cfg(target_arch = "x86_64")]
 mod x86;
@@ -29,6 +30,7 @@ pub use dispatch::InstructionSet;
 use glam::DVec3;
 pub use oracle::Oracle;
 use real::Scalar;
+pub(crate) use step_forces::StepForces;
 
 /// Lanes of a block: a block is one or more whole vectors on every instruction set.
 const LANES_F32: usize = 16;
@@ -99,6 +101,16 @@ impl ForceKernel {
     #[must_use]
     pub fn with_instruction_set(self, instruction_set: InstructionSet) -> Self {
         Self { instruction_set: Available::at_most(instruction_set), ..self }
+    }
+
+    /// See [`StepForces::sums`].
+    pub(crate) fn step_force_sums(&self, forces: &StepForces<'_>) -> [f64; 3] {
+        dispatch::step_force_sums(self.instruction_set, forces)
+    }
+
+    /// Whether any material is viscous.
+    pub fn is_viscous(&self) -> bool {
+        self.any_viscosity
     }
 
     /// Buffers for [`Self::forces_n`].

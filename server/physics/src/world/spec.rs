@@ -63,7 +63,7 @@ pub enum Substeps {
     /// From the measured ω_max (see [`Model::substeps`]).
     #[default]
     Measured,
-    /// As given, stable or not.
+    /// As given, at rest stable or not; [`Settings::subcycle_unstable`].
     Fixed(u32),
 }
 
@@ -110,6 +110,8 @@ pub struct Settings {
     pub substeps: Substeps,
     /// Fraction of the stable step used, in (0, 1].
     pub step_safety: f64,
+    /// Takes back a tick of leapfrog that proves unstable and repeats it in more substeps.
+    pub subcycle_unstable: bool,
     /// Largest principal stretch the step must stay stable at (≥ 1).
     pub stretch_allowance: f64,
     /// Precision of the force kernel.
@@ -131,6 +133,7 @@ impl Default for Settings {
             integrator: Integrator::Leapfrog,
             substeps: Substeps::Measured,
             step_safety: 0.9,
+            subcycle_unstable: true,
             stretch_allowance: 1.2,
             precision: Precision::Single,
             mass_damping_per_s: 0.0,

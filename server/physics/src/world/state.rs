@@ -3,6 +3,7 @@ use super::Model;
 use crate::{
     contact::{ContactState, ToolState, ToolTarget},
     health::{Ledger, Quarantine, ViscousPower},
+    integrate::Pace,
 };
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
@@ -32,6 +33,8 @@ pub struct State {
     pub ledger: Ledger,
     /// Power of viscous stress at the last two substeps.
     pub viscous: ViscousPower,
+    /// In how many substeps ticks are taken.
+    pub pace: Pace,
     /// Set when a tick's result was not finite.
     pub quarantine: Option<Quarantine>,
 }
@@ -52,6 +55,7 @@ impl State {
             load_factors: vec![0.0; model.spec().loads.len()],
             ledger: Ledger::default(),
             viscous: ViscousPower::default(),
+            pace: Pace::at_start(model),
             quarantine: None,
         }
     }
@@ -69,6 +73,7 @@ impl State {
         self.load_factors.copy_from_slice(&other.load_factors);
         self.ledger = other.ledger;
         self.viscous = other.viscous;
+        self.pace.copy_from(&other.pace);
         self.quarantine = other.quarantine;
     }
 
@@ -87,6 +92,7 @@ impl State {
         self.load_factors.fill(0.0);
         self.ledger = Ledger::default();
         self.viscous = ViscousPower::default();
+        self.pace.reset(model);
         self.quarantine = None;
     }
 

@@ -3,7 +3,7 @@ use super::{Integrator, Model};
 use crate::{
     contact::{ContactScratch, ToolTarget},
     health::{LastGood, Quarantine},
-    integrate::ImplicitScratch,
+    integrate::{ForceHistory, ImplicitScratch},
     simd::KernelScratch,
 };
 use glam::DVec3;
@@ -33,8 +33,10 @@ pub struct TickInput<'a> {
 /// What a tick did.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct StepReport {
-    /// Substeps taken; 0 while quarantined.
+    /// Substeps that the tick was taken in; 0 while quarantined.
     pub substeps: u32,
+    /// How often it was taken back and repeated in more substeps, because it proved unstable.
+    pub repeated: u32,
     /// Inputs that were not finite or of the wrong length, and so were replaced by the previous tick's.
     pub inputs_rejected: u32,
     /// Set when this tick's result was refused.
@@ -47,6 +49,7 @@ pub struct Scratch {
     /// Reaction forces (N) of constrained axes at the end of the tick.
     pub(crate) reaction_n: Vec<DVec3>,
     pub(crate) last_good: LastGood,
+    pub(crate) history: ForceHistory,
     pub(crate) kernel: KernelScratch,
     pub(crate) contact: ContactScratch,
     pub(crate) implicit: ImplicitScratch,
@@ -58,7 +61,8 @@ impl Scratch {
         let nodes = model.rest_positions_m().len();
         Self {
             reaction_n: vec![DVec3::ZERO; nodes],
-            last_good: LastGood::new(nodes, model.tools_at_start(), model.spec().loads.len()),
+            last_good: LastGood::new(model),
+            history: ForceHistory::new(model),
             kernel: match model.spec().settings.integrator {
                 Integrator::BackwardEuler => model.kernel().scratch_for_products(),
                 _ => model.kernel().scratch(),

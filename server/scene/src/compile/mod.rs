@@ -110,6 +110,7 @@ fn settings(document: &Document) -> Result<Settings, Fault> {
         integrator,
         substeps,
         step_safety,
+        subcycle_unstable,
         stretch_allowance,
         mass_damping_per_s,
         solver_iterations,
@@ -147,6 +148,7 @@ fn settings(document: &Document) -> Result<Settings, Fault> {
         },
         substeps: substeps.map_or(Substeps::Measured, Substeps::Fixed),
         step_safety,
+        subcycle_unstable,
         stretch_allowance,
         precision: match precision {
             PrecisionName::Single => Precision::Single,

@@ -215,6 +215,8 @@ pub(crate) struct NumericsTable {
     pub(crate) substeps: Option<u32>,
     /// Fraction of the stable step used, in (0, 1].
     pub(crate) step_safety: f64,
+    /// Leapfrog takes back a tick that proves unstable and repeats it in more substeps.
+    pub(crate) subcycle_unstable: bool,
     /// Largest principal stretch the step must stay stable at, 1 or larger.
     pub(crate) stretch_allowance: f64,
     /// Mass-proportional damping (1/s).
@@ -233,6 +235,7 @@ impl Default for NumericsTable {
             integrator: IntegratorName::Leapfrog,
             substeps: None,
             step_safety: settings.step_safety,
+            subcycle_unstable: settings.subcycle_unstable,
             stretch_allowance: settings.stretch_allowance,
             mass_damping_per_s: settings.mass_damping_per_s,
             solver_iterations: settings.solver_iterations,

@@ -32,12 +32,14 @@ struct Found {
     touched: bool,
     min_j: f64,
     substeps: u32,
+    repeated: u32,
 }
 
 pub(super) fn run(options: &Options) -> Result<Outcome> {
     let scenes = options.pick(12, 150, 10_000);
     let mut outcome = Outcome::passing();
     let (mut gain, mut loss, mut touched, mut inverted, mut most_substeps) = (0.0_f64, 0.0_f64, 0, 0, 0);
+    let mut repeated = 0;
     for scene in 0..scenes {
         let seed = options.seed.wrapping_add(scene);
         match catch_unwind(AssertUnwindSafe(|| one(options, seed))) {
@@ -46,6 +48,7 @@ pub(super) fn run(options: &Options) -> Result<Outcome> {
                 (gain, loss) = (gain.max(found.gain), loss.max(found.loss));
                 touched += u32::from(found.touched);
                 inverted += u32::from(found.min_j <= 0.0);
+                repeated += found.repeated;
                 most_substeps = most_substeps.max(found.substeps);
                 outcome.demand(found.finite, || format!("seed {seed}: not finite"));
                 outcome.demand(found.refused.is_none(), || {
@@ -65,6 +68,7 @@ pub(super) fn run(options: &Options) -> Result<Outcome> {
     outcome.push(Measured::value("scenes in which a tool touched", f64::from(touched), "1"));
     outcome.push(Measured::value("scenes with an inverted tet at the end", f64::from(inverted), "1"));
     outcome.push(Measured::value("most substeps", f64::from(most_substeps), "1/tick"));
+    outcome.push(Measured::value("ticks taken back", f64::from(repeated), "ticks"));
     outcome.push(Measured::bounded("most energy from nowhere over what moved", gain, "1", BALANCE));
     outcome.push(Measured::bounded("most energy to nowhere over what moved", loss, "1", BALANCE));
     Ok(outcome)
@@ -98,6 +102,7 @@ fn one(options: &Options, seed: u64) -> Result<Found> {
             drive.point_forces.push(PointForce { node, force_n });
         }
         let report = rig.tick(&drive);
+        found.repeated += u32::from(report.repeated > 0);
         let energies = rig.energies();
         found.finite &= energies.balance_j().is_finite() && rig.is_finite();
         if report.quarantined.is_some() {

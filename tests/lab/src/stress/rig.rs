@@ -13,6 +13,8 @@ pub(super) struct Rig {
     pub(super) model: Model,
     pub(super) state: State,
     pub(super) scratch: Scratch,
+    /// Substeps of the last tick.
+    substeps: u32,
 }
 
 /// What a tick is given.
@@ -41,7 +43,7 @@ impl Drive {
 impl Rig {
     pub(super) fn new(spec: ModelSpec) -> Result<Self> {
         let model = Model::build(spec).into_diagnostic()?;
-        Ok(Self { state: State::at_rest(&model), scratch: Scratch::new(&model), model })
+        Ok(Self { state: State::at_rest(&model), scratch: Scratch::new(&model), substeps: model.substeps(), model })
     }
 
     /// One tick. Allocates nothing.
@@ -52,7 +54,9 @@ impl Rig {
             prescribed_displacements_m: &drive.prescribed_m,
             point_forces: &drive.point_forces,
         };
-        step(&self.model, &mut self.state, &mut self.scratch, &input)
+        let report = step(&self.model, &mut self.state, &mut self.scratch, &input);
+        self.substeps = report.substeps.max(1);
+        report
     }
 
     pub(super) fn energies(&self) -> Energies {
@@ -84,7 +88,7 @@ impl Rig {
     /// (the last term in W's own share is `+⅛ dt² g·f/m`, since the ledger stands half a kick before the end of a step). So this
     /// is by how much the energy held may exceed the work done although nothing is wrong: second order in dt.
     pub(super) fn leapfrog_excess_j(&self) -> f64 {
-        let dt_s = self.model.spec().settings.tick_period_s / f64::from(self.model.substeps());
+        let dt_s = self.model.spec().settings.tick_period_s / f64::from(self.substeps);
         let weight = self.model.gravity_m_per_s2();
         let nodes = self.state.force_n.iter().zip(&self.state.external_n);
         let masses = self.model.mass_kg().iter().zip(self.model.inverse_mass_per_kg());

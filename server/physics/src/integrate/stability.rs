@@ -1,0 +1,259 @@
+//! Whether leapfrog's step was too long, read from the forces that the tick evaluates anyway.
+//!
+//! With lumped mass `M`, internal force `g` (elastic and viscous), the force `f` of everything, and positions at three instants
+//! one step `dt` apart, leapfrog gives `y = x₊ − 2x + x₋ = dt² M⁻¹ f`, whatever the loads. Stress answers `y` alone,
+//! ```text
+//! Δ²g = g₊ − 2g + g₋ = −K y − (C/dt)(y − y₋)
+//! ‖Δ²g‖ ≤ q max(‖f‖, ‖f₋‖)        ‖a‖² = Σ aᵀ M⁻¹ a over free axes,  q = dt² λ_max(M⁻¹K) + 2 dt λ_max(M⁻¹C)       (1)
+//! ```
+//! The step is stable while `k + 2d ≤ 4` in every mode, `k = dt²κ/m`, `d = dt c/m` (`world::substeps`). So
+//! `Q = ‖Δ²g‖/max(‖f‖, ‖f₋‖)` above 4 proves that it is too long, for a body that is linear between the three instants and whose
+//! stiffest mode is its most viscous one. A mode that grows as `z = −|z|` has `Q = 2 + |z| + 1/|z| > 4` exactly.
+//!
+//! Rigid and slow motion is filtered out twice: a mode counts with `ω⁸` above and `ω⁴` below the line, so that a small
+//! tremble at the limit is seen beside a large motion. What contact, loads and tools do is in `f`, not in `g`: it cannot alarm, and a
+//! step that is too long for contact alone is not seen. On held axes that change their speed between ticks `y` is not zero;
+//! `m Δv/dt` stands for the force there, and `λ_max` in (1) is then that of the body not held.
+//!
+//! A tick of two or more substeps is judged by its last three instants; one of a single step by its own two and the one
+//! before ([`Pace::before`]). Compare Park & Underwood 1980 and Bergan & Mollestad 1985, who choose steps by the quotient
+//! `Δxᵀ Δg/Δxᵀ M Δx`, which has neither filter.
+use crate::{
+    health::LastGood,
+    simd::StepForces,
+    world::{Integrator, MAX_SUBSTEPS, Model, Precision, State},
+};
+use glam::DVec3;
+use serde::{Deserialize, Serialize};
+
+/// `Q` above this is unstable: the limit 4 at a step of 0.975 of the longest.
+const LIMIT: f64 = 3.8;
+/// Part of the stable step that a repetition aims at.
+const SAFETY: f64 = 0.9;
+/// More substeps than this many times the model's are not tried.
+const MOST_TIMES: u32 = 64;
+/// A tick whose result is not finite is repeated with so many times its substeps.
+const TIMES_IF_NOT_FINITE: u32 = 4;
+/// So many ticks must show that fewer substeps would do before fewer are tried.
+const CALM_TICKS: u32 = 100;
+
+/// In how many substeps ticks are taken, and what a tick of one step is judged by.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Pace {
+    /// Substeps of the next tick; the model's unless a tick proved unstable.
+    pub substeps: u32,
+    /// Ticks in a row in which fewer would have done.
+    pub calm_ticks: u32,
+    /// InstantForces one step before those of the state; empty unless the model takes one step per tick.
+    pub before: InstantForces,
+    /// `before` is that, with nothing put elsewhere in between.
+    pub before_is_usable: bool,
+}
+
+impl Pace {
+    pub(crate) fn at_start(model: &Model) -> Self {
+        let before = if judges_across_ticks(model) {
+            InstantForces::zero(model.mass_kg().len())
+        } else {
+            InstantForces::default()
+        };
+        Self { substeps: model.substeps(), calm_ticks: 0, before, before_is_usable: false }
+    }
+
+    /// As at the start, in the buffers it has.
+    pub(crate) fn reset(&mut self, model: &Model) {
+        (self.substeps, self.calm_ticks, self.before_is_usable) = (model.substeps(), 0, false);
+        self.before.total_n.fill(DVec3::ZERO);
+        self.before.external_n.fill(DVec3::ZERO);
+    }
+
+    pub(crate) fn copy_from(&mut self, other: &Self) {
+        self.before.total_n.copy_from_slice(&other.before.total_n);
+        self.before.external_n.copy_from_slice(&other.before.external_n);
+        (self.substeps, self.calm_ticks) = (other.substeps, other.calm_ticks);
+        self.before_is_usable = other.before_is_usable;
+    }
+
+    /// Of the model's size, and in a range of substeps that it may have.
+    pub(crate) fn fits(&self, model: &Model) -> bool {
+        let nodes = if judges_across_ticks(model) { model.mass_kg().len() } else { 0 };
+        let most = if is_judged(model) { most_substeps(model) } else { model.substeps() };
+        [&self.before.total_n, &self.before.external_n].iter().all(|list| list.len() == nodes)
+            && (model.substeps()..=most).contains(&self.substeps)
+    }
+
+    /// The tick is repeated in `substeps`.
+    pub(super) fn start_again(&mut self, substeps: u32) {
+        (self.substeps, self.calm_ticks, self.before_is_usable) = (substeps, 0, false);
+    }
+
+    /// Takes note of a tick of `self.substeps` that was accepted at once.
+    pub(super) fn calm(&mut self, model: &Model, quotient: f64) {
+        let fewer = (self.substeps - (self.substeps / 8).max(1)).max(model.substeps());
+        // Q grows at most with dt².
+        let then = quotient * (f64::from(self.substeps) / f64::from(fewer)).powi(2);
+        self.calm_ticks = if then <= SAFETY * LIMIT { self.calm_ticks + 1 } else { 0 };
+        if self.calm_ticks >= CALM_TICKS {
+            (self.substeps, self.calm_ticks) = (fewer, 0);
+        }
+    }
+}
+
+/// Only leapfrog's ticks are judged and repeated: the seeds' schemes run as their authors describe them, backward Euler needs none.
+pub(crate) fn is_judged(model: &Model) -> bool {
+    let settings = &model.spec().settings;
+    settings.subcycle_unstable && settings.integrator == Integrator::Leapfrog
+}
+
+fn judges_across_ticks(model: &Model) -> bool {
+    is_judged(model) && model.substeps() == 1
+}
+
+/// The most substeps that are tried.
+fn most_substeps(model: &Model) -> u32 {
+    model.substeps().saturating_mul(MOST_TIMES).min(MAX_SUBSTEPS.max(model.substeps()))
+}
+
+/// Forces at an instant.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+pub struct InstantForces {
+    /// All of it (N), one per node.
+    pub total_n: Vec<DVec3>,
+    /// The part of loads, tools and injected forces (N).
+    pub external_n: Vec<DVec3>,
+}
+
+impl InstantForces {
+    fn zero(nodes: usize) -> Self {
+        Self { total_n: vec![DVec3::ZERO; nodes], external_n: vec![DVec3::ZERO; nodes] }
+    }
+
+    fn swap(&mut self, state: &mut State) {
+        std::mem::swap(&mut self.total_n, &mut state.force_n);
+        std::mem::swap(&mut self.external_n, &mut state.external_n);
+    }
+}
+
+/// InstantForces at the instants of a tick that are wanted again; empty unless ticks are judged.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct ForceHistory {
+    start: InstantForces,
+    two_before: InstantForces,
+    one_before: InstantForces,
+    /// `Σ m (Δv)²` of held axes at the tick's start (kg m²/s²).
+    pub(super) held_jump: f64,
+}
+
+impl ForceHistory {
+    pub(crate) fn new(model: &Model) -> Self {
+        if !is_judged(model) {
+            return Self::default();
+        }
+        let forces = || InstantForces::zero(model.mass_kg().len());
+        Self { start: forces(), two_before: forces(), one_before: forces(), held_jump: 0.0 }
+    }
+
+    /// Before forces are evaluated at the end of substep `number` of `substeps`: what the state holds is set aside if it is wanted
+    /// again. The state is given a buffer to be overwritten.
+    pub(super) fn set_aside(&mut self, number: u32, substeps: u32, state: &mut State) {
+        if self.start.total_n.is_empty() {
+        } else if number == 1 {
+            self.start.swap(state);
+        } else if number == substeps {
+            self.one_before.swap(state);
+        } else if number + 1 == substeps {
+            self.two_before.swap(state);
+        }
+    }
+
+    /// Puts back the forces at the start of a tick that was run.
+    pub(super) fn put_back(&mut self, state: &mut State) {
+        self.start.swap(state);
+    }
+
+    /// What the tick that was run in `substeps` shows. `start` is the state at its start.
+    pub(super) fn evidence(&self, model: &Model, state: &State, start: &LastGood, substeps: u32) -> Evidence {
+        let (one, two) = match substeps {
+            1 if !state.pace.before_is_usable => return self.evidence_of_first_step(model, state, start),
+            1 => (&self.start, &state.pace.before),
+            2 => (&self.one_before, &self.start),
+            _ => (&self.one_before, &self.two_before),
+        };
+        let [answer_sq, one_sq, two_sq] = model.kernel().step_force_sums(&StepForces {
+            total_n: [&state.force_n, &one.total_n, &two.total_n],
+            external_n: [&state.external_n, &one.external_n, &two.external_n],
+            inverse_mass_per_kg: model.inverse_mass_per_kg(),
+        });
+        let period_s = model.spec().settings.tick_period_s;
+        let held_sq = if substeps == 1 { self.held_jump / (period_s * period_s) } else { 0.0 };
+        Evidence { answer_sq, cause_sq: one_sq.max(two_sq) + held_sq }
+    }
+
+    /// After a tick that was accepted: what the next one is judged by.
+    pub(super) fn hand_on(&mut self, pace: &mut Pace, substeps: u32) {
+        pace.before_is_usable = substeps == 1 && !pace.before.total_n.is_empty();
+        if pace.before_is_usable {
+            std::mem::swap(&mut pace.before, &mut self.start);
+        }
+    }
+
+    /// Without a force before: `‖Δg‖ ≤ q max(‖M Δx‖, dt ‖M v‖)/dt²`, which slow motion hides more.
+    fn evidence_of_first_step(&self, model: &Model, state: &State, start: &LastGood) -> Evidence {
+        let dt_s = model.spec().settings.tick_period_s;
+        let (mut change_sq, mut moved_sq, mut speed_sq) = (0.0, 0.0, 0.0);
+        for node in 0..state.x.len() {
+            let now = state.force_n[node] - state.external_n[node];
+            let change = now - (self.start.total_n[node] - self.start.external_n[node]);
+            change_sq += (change * change * model.inverse_mass_per_kg()[node]).element_sum();
+            moved_sq += model.mass_kg()[node] * state.x[node].distance_squared(start.x()[node]);
+            speed_sq += model.mass_kg()[node] * start.v()[node].length_squared();
+        }
+        Evidence { answer_sq: change_sq, cause_sq: (moved_sq / (dt_s * dt_s)).max(speed_sq) / (dt_s * dt_s) }
+    }
+}
+
+/// Both sides of (1), squared (N²/kg).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Evidence {
+    answer_sq: f64,
+    cause_sq: f64,
+}
+
+impl Evidence {
+    /// `Q`; not finite where forces are not.
+    pub(super) fn quotient(&self) -> f64 {
+        if self.answer_sq == 0.0 { 0.0 } else { (self.answer_sq / self.cause_sq).sqrt() }
+    }
+
+    /// `Q` is above the limit, and not by rounding: the answer stands above the last digits of the internal forces themselves.
+    pub(super) fn is_unstable(&self, model: &Model, state: &State) -> bool {
+        if self.answer_sq <= LIMIT * LIMIT * self.cause_sq {
+            return false;
+        }
+        let digits = match model.spec().settings.precision {
+            Precision::Single => 1e-5,
+            Precision::Double => 1e-12,
+        };
+        let mut internal_sq = 0.0;
+        for ((force, external), mass) in state.force_n.iter().zip(&state.external_n).zip(model.mass_kg()) {
+            // Reactions of held nodes included: between them a body may be stretched without a force on any other node.
+            internal_sq += (*force - *external - model.gravity_m_per_s2() * *mass).length_squared() / mass;
+        }
+        !(self.answer_sq <= digits * digits * internal_sq)
+    }
+}
+
+/// With how many substeps to repeat a tick that proved unstable in `substeps`; `None` if no more are tried.
+///
+/// Stress's part of `Q` falls with dt², viscosity's with dt.
+pub(super) fn substeps_for(model: &Model, substeps: u32, quotient: Option<f64>) -> Option<u32> {
+    let most = most_substeps(model);
+    let wanted = match quotient.filter(|q| q.is_finite()) {
+        None => substeps.saturating_mul(TIMES_IF_NOT_FINITE),
+        Some(quotient) => {
+            let times = if model.kernel().is_viscous() { 0.25 * quotient } else { (0.25 * quotient).sqrt() };
+            (f64::from(substeps) * times / SAFETY).ceil().min(f64::from(most)) as u32
+        }
+    };
+    (substeps < most).then(|| wanted.clamp(substeps + 1, most))
+}
