@@ -239,7 +239,7 @@ impl Evidence {
             // Reactions of held nodes included: between them a body may be stretched without a force on any other node.
             internal_sq += (*force - *external - model.gravity_m_per_s2() * *mass).length_squared() / mass;
         }
-        !(self.answer_sq <= digits * digits * internal_sq)
+        self.answer_sq > digits * digits * internal_sq
     }
 }
 

@@ -62,20 +62,20 @@ pub(super) fn step_force_sums(set: Available, forces: &StepForces<'_>) -> [f64; 
         // SAFETY: `Available` holds only what was detected.
         #[cfg(target_arch = "x86_64")]
         InstructionSet::Avx512 => unsafe { sums_avx512(forces) },
-        _ => forces.sums(),
+        _ => forces.sums::<<f64 as Scalar>::Baseline>(),
     }
 }
 
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx2")]
 fn sums_avx2(forces: &StepForces<'_>) -> [f64; 3] {
-    forces.sums()
+    forces.sums::<<f64 as Scalar>::Avx2>()
 }
 
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx512f,avx512bw,avx512dq,avx512vl")]
 fn sums_avx512(forces: &StepForces<'_>) -> [f64; 3] {
-    forces.sums()
+    forces.sums::<<f64 as Scalar>::Avx512>()
 }
 
 /// A pass over one run's blocks.

@@ -1,5 +1,5 @@
-//! Sums over all nodes that judge a step (`integrate::stability`): plain loops, compiled for several instruction sets, whose lanes are
-//! added in the same order on all of them.
+//! Sums over all nodes that judge a step (`integrate::stability`), in as many lanes on every instruction set: the same bits.
+use super::real::Vector;
 use bytemuck::cast_slice;
 use glam::DVec3;
 
@@ -16,11 +16,11 @@ pub(crate) struct StepForces<'a> {
 impl StepForces<'_> {
     /// `‖Δ²(f − e)‖²`, and `‖f‖²` at the two older instants, with `‖a‖² = aᵀ M⁻¹ a` (N²/kg).
     #[inline(always)]
-    pub(crate) fn sums(&self) -> [f64; 3] {
+    pub(super) fn sums<V: Vector<Scalar = f64>>(&self) -> [f64; 3] {
         let [f0, f1, f2] = self.total_n.map(|list| cast_slice::<DVec3, f64>(list).as_chunks::<LANES>());
         let [e0, e1, e2] = self.external_n.map(|list| cast_slice::<DVec3, f64>(list).as_chunks::<LANES>());
         let w = cast_slice::<DVec3, f64>(self.inverse_mass_per_kg).as_chunks::<LANES>();
-        let mut sums = [[0.0_f64; LANES]; 3];
+        let mut sums = [[V::of(0.0); LANES]; 3];
         for ((w, (f0, e0)), ((f1, e1), (f2, e2))) in
             w.0.iter().zip(f0.0.iter().zip(e0.0)).zip(f1.0.iter().zip(e1.0).zip(f2.0.iter().zip(e2.0)))
         {
@@ -28,29 +28,36 @@ impl StepForces<'_> {
         }
         let [f, e] = [[f0.1, f1.1, f2.1], [e0.1, e1.1, e2.1]].map(|rest| rest.map(filled));
         add(&mut sums, &filled(w.1), [&f[0], &f[1], &f[2]], [&e[0], &e[1], &e[2]]);
-        sums.map(|lanes| lanes.iter().sum())
+        sums.map(|vectors| {
+            let mut lanes = [0.0; LANES];
+            for (vector, lanes) in vectors.into_iter().zip(lanes.chunks_exact_mut(V::WIDTH)) {
+                vector.store(lanes);
+            }
+            lanes.iter().sum()
+        })
     }
 }
 
 /// The last few, with zeros behind them.
-#[inline(always)]
 fn filled(rest: &[f64]) -> [f64; LANES] {
     std::array::from_fn(|lane| rest.get(lane).copied().unwrap_or(0.0))
 }
 
 #[inline(always)]
-fn add(
-    sums: &mut [[f64; LANES]; 3],
+fn add<V: Vector<Scalar = f64>>(
+    [answer, one, two]: &mut [[V; LANES]; 3],
     w: &[f64; LANES],
     [f0, f1, f2]: [&[f64; LANES]; 3],
     [e0, e1, e2]: [&[f64; LANES]; 3],
 ) {
-    let [answer, one, two] = sums;
-    for lane in 0..LANES {
-        let second = (f0[lane] - e0[lane]) - 2.0 * (f1[lane] - e1[lane]) + (f2[lane] - e2[lane]);
-        answer[lane] += second * second * w[lane];
-        one[lane] += f1[lane] * f1[lane] * w[lane];
-        two[lane] += f2[lane] * f2[lane] * w[lane];
+    for part in 0..LANES / V::WIDTH {
+        let at = |list: &[f64; LANES]| V::load(&list[part * V::WIDTH..]);
+        let (w, f1, f2) = (at(w), at(f1), at(f2));
+        let middle = f1 - at(e1);
+        let second = (at(f0) - at(e0)) - (middle + middle) + (f2 - at(e2));
+        answer[part] = answer[part] + second * second * w;
+        one[part] = one[part] + f1 * f1 * w;
+        two[part] = two[part] + f2 * f2 * w;
     }
 }
 
@@ -84,7 +91,7 @@ mod tests {
                 *sum += (a * a).dot(*w);
             }
         }
-        let sums = forces.sums();
+        let sums = forces.sums::<f64>();
         for (sum, by_node) in sums.iter().zip(by_node) {
             assert!((sum - by_node).abs() < 1e-13 * by_node, "{sum} {by_node}");
         }
