@@ -66,7 +66,7 @@ impl Task {
         Ok(Self {
             format: FORMAT,
             problem: problem.name.clone(),
-            rest_positions_m: body.mesh.positions_m().iter().map(|p| p.to_array()).collect(),
+            rest_positions_m: body.mesh.positions_m().iter().map(DVec3::to_array).collect(),
             tets: body.mesh.tets().to_vec(),
             held_nodes: held.flat_map(|held| held.nodes.iter().copied()).collect(),
             masses_kg,
