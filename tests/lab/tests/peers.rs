@@ -37,7 +37,7 @@ fn python() -> Option<PathBuf> {
 
 fn task() -> Task {
     let problem = problems::all().into_iter().find(|p| p.name == "block-patch-small-nu0.45").unwrap();
-    let pace = Pace { ramp_ticks: 3, rest_ticks: 2, damping_per_s: 4.0, motion: Motion::ToRest };
+    let pace = Pace { ramp_ticks: 3, rest_ticks: 2, damping_per_s: 4.0, motion: problems::Motion::ToRest };
     Task::new(&problem, 4, &pace, 1.0).unwrap()
 }
 

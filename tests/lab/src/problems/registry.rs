@@ -26,7 +26,10 @@ pub fn all() -> Vec<Problem> {
         for nu in POISSON_RATIOS {
             problems.push(sphere(body, SMALL, nu, default));
             problems.push(patch(body, SMALL_PATCH, nu, default));
-            problems.push(sphere(body, LARGE, nu, default));
+            // On the ventricle a deep sphere has a reference at ν = 0.3 alone.
+            if body == Body::Block || nu == 0.3 {
+                problems.push(sphere(body, LARGE, nu, default));
+            }
             let large = if body == Body::Block { LARGE_BLOCK_PATCH } else { LARGE_VENTRICLE_PATCH };
             problems.push(patch(body, large, nu, default));
         }

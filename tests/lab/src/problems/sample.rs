@@ -168,8 +168,7 @@ mod tests {
 
     #[test]
     fn the_reference_grids_parameters_name_the_same_points() {
-        let ventricle =
-            |(outer, inner, cut): VentricleM, contact_m| bodies::ventricle(outer, inner, cut, contact_m, 3);
+        let ventricle = |(outer, inner, cut): VentricleM, contact_m| bodies::ventricle(outer, inner, cut, contact_m, 3);
         let hex = [
             (Body::Block, bodies::block(BLOCK_M[0], BLOCK_M[1], 5e-3, 4)),
             (Body::Ventricle, ventricle(VENTRICLE_M, 5e-3)),

@@ -51,7 +51,7 @@ impl Solid {
         ensure!(bad == 0, "{bad} quadrature points of the reference grid have no positive volume");
         let modes = points.iter().map(|points| {
             let at = |k: usize| points[k].at_m;
-            volume::modes(std::array::from_fn(at), std::array::from_fn(|k| points[k].weight_m3))
+            volume::modes(&std::array::from_fn(at), &std::array::from_fn(|k| points[k].weight_m3))
         });
         Ok(Self { modes: modes.collect(), grid, material, points })
     }

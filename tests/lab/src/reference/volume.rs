@@ -13,7 +13,8 @@ pub(super) const POINTS: usize = 27;
 /// Linear functions of an element.
 pub(super) const MODES: usize = 4;
 
-/// κ (Pa). None for St. Venant-Kirchhoff: it softens in compression, where what is left of it would lose its sign.
+/// κ (Pa). None for St. Venant-Kirchhoff: Newton's method did not bear a sphere on it at any penalty, perhaps because the law softens in
+/// compression, where what is left of it would lose its sign.
 pub(super) fn modulus_pa(material: &Material) -> f64 {
     match material.law {
         Law::StVenantKirchhoff => 0.0,
@@ -22,7 +23,7 @@ pub(super) fn modulus_pa(material: &Material) -> f64 {
 }
 
 /// Values at the points of `1, X, Y, Z`, made orthonormal over the element (Gram and Schmidt).
-pub(super) fn modes(at_m: [DVec3; POINTS], weights_m3: [f64; POINTS]) -> [[f64; MODES]; POINTS] {
+pub(super) fn modes(at_m: &[DVec3; POINTS], weights_m3: &[f64; POINTS]) -> [[f64; MODES]; POINTS] {
     let volume: f64 = weights_m3.iter().sum();
     let centre = at_m.iter().zip(weights_m3).map(|(at, w)| *at * w).sum::<DVec3>() / volume;
     let product = |a: &[f64; POINTS], b: &[f64; POINTS]| (0..POINTS).map(|q| weights_m3[q] * a[q] * b[q]).sum::<f64>();
