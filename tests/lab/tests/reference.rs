@@ -73,7 +73,7 @@ fn homogeneous_strain_is_in_equilibrium_on_curved_and_collapsed_grids() {
     let mut on_side = vec![false; x.len()];
     for parameter in 0..3 {
         for upper in [false, true] {
-            let side = palpate_lab::reference::grid::Side { parameter, upper };
+            let side = Side { parameter, upper };
             // The pole, a side of the lattice, is inside the body.
             if (parameter, upper) != (1, false) {
                 for node in solid.grid.faces(side).into_iter().flatten() {
