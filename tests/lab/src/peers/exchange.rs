@@ -131,7 +131,7 @@ mod tests {
     #[test]
     fn a_task_is_whole_and_comes_back_as_it_was() {
         let problem = problems::all().into_iter().find(|p| p.name == "ventricle-20mm-patch-nu0.40").unwrap();
-        let pace = Pace { ramp_ticks: 3, rest_ticks: 2, damping_per_s: 4.0, motion: crate::problems::Motion::ToRest };
+        let pace = Pace { ramp_ticks: 3, rest_ticks: 2, damping_per_s: 4.0, motion: problems::Motion::ToRest };
         let task = Task::new(&problem, 188, &pace, 1.0).unwrap();
         let text = serde_json::to_string(&task).unwrap();
         assert_eq!(serde_json::from_str::<Task>(&text).unwrap(), task);
