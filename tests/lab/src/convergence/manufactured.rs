@@ -1,7 +1,10 @@
 //! A manufactured solution on the unit block: `u = A sin πX sin πY sin πZ · (1, −½, ¾)`, zero on the boundary, at finite strain. The body force
 //! that makes it an equilibrium is `−Div P`, `(Div P)_i = Σ_k [δP(F; ∂F/∂X_k) e_k]_i`, integrated against the shape functions.
 use super::Convergence;
-use crate::{bodies, stress::random::Random};
+use crate::{
+    bodies,
+    stress::{meshes, random::Random},
+};
 use glam::{DMat3, DVec3};
 use miette::{IntoDiagnostic, Result};
 use palpate_physics::{
@@ -11,7 +14,6 @@ use palpate_physics::{
     mesh::tet::EDGES,
     solve::{StaticSettings, solve_static},
 };
-use palpate_scene::shapes;
 use std::{f64::consts::PI, ops::ControlFlow};
 
 const CELLS: [u32; 3] = [4, 8, 16];
@@ -86,9 +88,10 @@ fn at(corners: &[DVec3; 4], weights: &[f64; 4]) -> DVec3 {
     corners.iter().zip(weights).map(|(c, w)| *c * *w).sum()
 }
 
-/// The unit block with its interior nodes shifted, always in the same way.
+/// The unit block, neighbouring cells mirrored, with its interior nodes shifted, always in the same way.
 fn jittered(cells: u32) -> Result<(TetMesh, Vec<u32>)> {
-    let regular = shapes::box_mesh(DVec3::ONE, [cells; 3]).into_diagnostic()?.mesh;
+    let side = meshes::even(0.0, 1.0, cells as usize);
+    let regular = meshes::bricks(&side, &side, &side)?;
     let boundary = Surface::of(&regular).into_diagnostic()?.nodes;
     let mut random = Random::new(11);
     let shift = JITTER / f64::from(cells);

@@ -5,12 +5,12 @@ use miette::{IntoDiagnostic, Result};
 use palpate_physics::{Surface, TetMesh};
 
 /// Evenly spaced coordinates (m).
-pub(super) fn even(from_m: f64, to_m: f64, cells: usize) -> Vec<f64> {
+pub(crate) fn even(from_m: f64, to_m: f64, cells: usize) -> Vec<f64> {
     (0..=cells).map(|i| from_m + (to_m - from_m) * i as f64 / cells as f64).collect()
 }
 
 /// Bricks between the given coordinates (m), six tets each, every second brick mirrored so that no direction is preferred.
-pub(super) fn bricks(xs: &[f64], ys: &[f64], zs: &[f64]) -> Result<TetMesh> {
+pub(crate) fn bricks(xs: &[f64], ys: &[f64], zs: &[f64]) -> Result<TetMesh> {
     let (nx, ny, nz) = (xs.len() - 1, ys.len() - 1, zs.len() - 1);
     let mut positions = Vec::with_capacity((nx + 1) * (ny + 1) * (nz + 1));
     for &z in zs {

@@ -8,7 +8,7 @@
 mod bad_input;
 mod impulses;
 mod incompressible;
-mod meshes;
+pub(crate) mod meshes;
 mod outcome;
 pub(crate) mod random;
 mod random_scenes;
