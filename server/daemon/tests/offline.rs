@@ -211,12 +211,12 @@ fn a_solve_that_fails_keeps_the_results_that_are_there() {
     assert!(names.map(|name| fs::read(out.join(name)).unwrap()) == before);
 }
 
-/// A step fixed too long explodes. `check` said only that, and nothing of the body.
+/// A step fixed too long, and left so, explodes. `check` said only that, and nothing of the body.
 #[test]
 fn a_scene_that_explodes_fails_its_check_and_its_run_keeps_what_led_there() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("unstable.toml");
-    fs::write(&path, BEAM.replace("[numerics]", "[numerics]\nsubsteps = 1")).unwrap();
+    fs::write(&path, BEAM.replace("[numerics]", "[numerics]\nsubsteps = 1\nsubcycle_unstable = false")).unwrap();
     let path = path.to_str().unwrap();
     let check = palpated(&["check", path]);
     assert_eq!(check.status.code(), Some(1));

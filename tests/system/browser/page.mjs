@@ -194,6 +194,8 @@ try {
   await page.waitForSelector("#fault", { state: "hidden", timeout: 10_000 });
   check("the word goes with the quarantine", true);
   await page.setViewportSize({ width: 1280, height: 860 });
+  // What is counted now is compared with what is there when the arm presses again.
+  check("the arm presses after the reset", (await press(page)).force >= 0.02);
   const geometries = await page.evaluate(() => stage.geometries);
 
   const code = await stopDaemon(daemon);
