@@ -52,6 +52,12 @@ fn facts(status: &StatusResponse) -> Vec<Vec<String>> {
         ),
     );
     line("overruns", format!("{} ({} ticks skipped)", status.overruns, status.skipped_ticks));
+    if status.repeated_ticks > 0 {
+        line(
+            "unstable",
+            format!("{} ticks repeated in more substeps; {} substeps now", status.repeated_ticks, status.substeps_now),
+        );
+    }
     for note in &status.realtime_notes {
         line("real time", note.clone());
     }
@@ -141,6 +147,8 @@ fn to_json(status: &StatusResponse) -> serde_json::Value {
         "paused": status.paused,
         "overruns": status.overruns,
         "skipped_ticks": status.skipped_ticks,
+        "repeated_ticks": status.repeated_ticks,
+        "substeps_now": status.substeps_now,
         "wakeup_jitter_us": spread(status.wakeup_jitter_us.as_ref()),
         "tick_cost_us": spread(status.tick_cost_us.as_ref()),
         "stages_us": status.stages.iter().map(|s| json!({"stage": s.stage, "cost_us": spread(s.cost_us.as_ref())})).collect::<Vec<_>>(),
@@ -171,6 +179,8 @@ mod tests {
         let stage = |name: &str, p50| StageTime { stage: name.to_owned(), cost_us: cost(p50, 1234.5) };
         let names = |names: &[&str]| names.iter().map(|&name| name.to_owned()).collect();
         StatusResponse {
+            repeated_ticks: 2,
+            substeps_now: 5,
             tick_cost_us: cost(20.0, 98_765.4),
             stages: vec![stage("input", 0.1), stage("contact_and_dynamics", 19.0)],
             probes: vec![
@@ -205,5 +215,12 @@ mod tests {
         let ledger = "ledger: kinetic 1.000e0, elastic 2.000e0, gravitational 3.000e0, external work 4.000e0, dissipated 5.000e0 J";
         assert!(text.contains(ledger), "{text}");
         assert!(text.lines().any(|line| line.ends_with("J: 5.000e-1")), "{text}");
+    }
+
+    #[test]
+    fn repeated_ticks_are_said_when_there_are_any() {
+        let shown =
+            |status: &StatusResponse| to_text(status).contains("2 ticks repeated in more substeps; 5 substeps now");
+        assert!(shown(&status()) && !shown(&StatusResponse { repeated_ticks: 0, ..status() }));
     }
 }

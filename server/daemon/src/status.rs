@@ -41,6 +41,8 @@ pub fn of(daemon: &Daemon, session: &ActiveSession, copy: &Copy, done: &Done) ->
         quarantine: convert::quarantine(copy.state.quarantine),
         skipped_ticks: daemon.timing.the_loop.skipped(),
         samples_rejected: daemon.samples_rejected.load(Ordering::Relaxed),
+        repeated_ticks: daemon.timing.repeated_ticks(),
+        substeps_now: copy.state.pace.substeps,
     }
 }
 

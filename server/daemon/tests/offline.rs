@@ -230,6 +230,19 @@ fn a_scene_that_explodes_fails_its_check_and_its_run_keeps_what_led_there() {
     assert!(summary["samples"].as_u64() >= Some(2) && summary["frames"].as_u64() >= Some(2), "{summary}");
 }
 
+/// The same step is mended by default, and the summary says so.
+#[test]
+fn a_step_fixed_too_long_is_repeated_and_counted() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("one.toml");
+    fs::write(&path, BEAM.replace("[numerics]", "[numerics]\nsubsteps = 1")).unwrap();
+    let out = folder.path().join("out");
+    let shown = succeeds(&["simulate", path.to_str().unwrap(), "--out", out.to_str().unwrap()]);
+    assert!(shown.contains("proved unstable and"), "{shown}");
+    let time = &summary(&out)["time"];
+    assert!(time["repeated_ticks"].as_u64() >= Some(1) && time["substeps_per_tick"] == 1, "{time}");
+}
+
 #[test]
 fn a_folder_with_something_in_it_is_kept_unless_forced() {
     let folder = tempfile::tempdir().unwrap();

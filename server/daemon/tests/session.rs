@@ -195,6 +195,25 @@ async fn status_tells_the_probes_the_stages_and_the_energies() {
     daemon.finish().await;
 }
 
+/// A block so stiff that one step a tick is too long.
+#[tokio::test(flavor = "multi_thread")]
+async fn status_tells_of_ticks_that_were_repeated() {
+    let mut scene = block_scene("stiff", 2);
+    scene.model.settings.substeps = palpate_physics::Substeps::Fixed(1);
+    for region in &mut scene.model.regions {
+        region.material.lame.mu_pa *= 400.0;
+        region.material.lame.lambda_pa *= 400.0;
+    }
+    let daemon = Daemon::on(scene).await;
+    daemon.pause().await;
+    inject(&daemon, vec![push(14, 0, 1)]).await.unwrap();
+    daemon.step(50).await;
+    let status = daemon.status().await;
+    assert!(status.repeated_ticks >= 1 && status.quarantine.is_empty(), "{status:?}");
+    assert!(status.substeps_now > 1 && status.session.unwrap().substeps_per_tick == 1);
+    daemon.finish().await;
+}
+
 const OTHER: &str = r#"
 [scene]
 name = "another block"

@@ -57,6 +57,36 @@ fn with_and_without_the_broad_phase_the_bits_are_the_same() {
     assert_eq!(skipping, exhaustive);
 }
 
+/// A tool on a spring that flies straight at a body at rest: no motion of the body makes the bound on distances generous.
+#[test]
+fn a_straight_approach_is_noticed_in_the_same_substep() {
+    let run = |exhaustive: bool, height_m: f64| {
+        let mut spec = falling_block();
+        spec.gravity_m_per_s2 = DVec3::ZERO;
+        spec.tools.truncate(1);
+        spec.tools[0].coupling = Coupling::Spring { stiffness_n_per_m: 300.0, damping_n_s_per_m: 2.0, mass_kg: 0.01 };
+        let place = |t: f64| DVec3::new(0.001, 0.002, height_m - t);
+        spec.tools[0].start_position_m = place(0.0);
+        spec.settings.skips.distant_contact = !exhaustive;
+        let mut rig = Rig::new(spec);
+        let mut touched = 0;
+        for tick in 0..60 {
+            let device = palpate_physics::contact::ToolTarget {
+                velocity_m_per_s: DVec3::NEG_Z,
+                ..at(place(f64::from(tick + 1) * 1e-3))
+            };
+            rig.tick(&Drive { tools: vec![device], ..rig.still() });
+            touched += u32::from(rig.state.tools[0].contacts > 0);
+        }
+        assert!(touched > 3, "{touched}");
+        rig.state
+    };
+    for step in 0..8 {
+        let height_m = 0.03 + 1.7e-4 * f64::from(step);
+        assert_eq!(run(false, height_m), run(true, height_m), "{height_m}");
+    }
+}
+
 #[test]
 fn two_runs_give_the_same_bits() {
     assert_eq!(run(false, None).0, run(false, None).0);

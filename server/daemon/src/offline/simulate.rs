@@ -152,6 +152,7 @@ pub(super) struct Run<'s> {
     load_factors: Vec<f64>,
     prescribed_m: Vec<DVec3>,
     tick_wall_ns: Histogram<u64>,
+    repeated_ticks: u64,
 }
 
 impl<'s> Run<'s> {
@@ -166,6 +167,7 @@ impl<'s> Run<'s> {
             load_factors: vec![0.0; scene.model.loads.len()],
             prescribed_m: vec![DVec3::ZERO; scene.model.prescribed.len()],
             tick_wall_ns: Histogram::new_with_bounds(1, LONGEST_TICK_NS, 3).into_diagnostic()?,
+            repeated_ticks: 0,
         })
     }
 
@@ -231,7 +233,8 @@ impl<'s> Run<'s> {
             point_forces: &[],
         };
         let started = Instant::now();
-        step(self.model, &mut self.state, &mut self.scratch, &input);
+        let report = step(self.model, &mut self.state, &mut self.scratch, &input);
+        self.repeated_ticks += u64::from(report.repeated > 0);
         self.tick_wall_ns.saturating_record(started.elapsed().as_nanos() as u64);
     }
 
@@ -244,6 +247,7 @@ impl<'s> Run<'s> {
             tick_period_s: period_s,
             ticks: self.state.tick,
             substeps_per_tick: self.model.substeps(),
+            repeated_ticks: self.repeated_ticks,
             tick_wall_us: Percentiles {
                 mean: wall.mean() * 1e-3,
                 p50: us(wall.value_at_quantile(0.5)),

@@ -48,6 +48,8 @@ pub(super) struct TimeNumbers {
     pub(super) tick_period_s: f64,
     pub(super) ticks: u64,
     pub(super) substeps_per_tick: u32,
+    /// Ticks that proved unstable and were repeated in more substeps.
+    pub(super) repeated_ticks: u64,
     pub(super) tick_wall_us: Percentiles,
     /// Simulated time over the wall time of its ticks.
     pub(super) real_time_factor: f64,
@@ -185,6 +187,10 @@ impl Summary {
                 counted(time.ticks as usize, "tick"),
                 counted(time.substeps_per_tick as usize, "substep")
             );
+            if time.repeated_ticks > 0 {
+                let ticks = counted(time.repeated_ticks as usize, "tick");
+                println!("  {ticks} proved unstable and had to be repeated in more substeps");
+            }
             println!(
                 "  tick: p50 {:.1} us, p99 {:.1} us, max {:.1} us; {:.1} times real time",
                 us.p50, us.p99, us.max, time.real_time_factor

@@ -69,10 +69,11 @@ pub fn farewell(summary: &Summary) -> String {
     }
     let _ = write!(
         text,
-        "{} ticks, {} overruns, {} ticks skipped, {} inputs refused, {} samples rejected, {} frames skipped{}",
+        "{} ticks, {} overruns, {} ticks skipped, {} ticks repeated, {} inputs refused, {} samples rejected, {} frames skipped{}",
         timing.tick.count(),
         timing.the_loop.overruns(),
         timing.the_loop.skipped(),
+        timing.repeated_ticks(),
         timing.inputs_rejected(),
         summary.samples_rejected,
         summary.frames_skipped,

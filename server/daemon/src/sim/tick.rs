@@ -7,7 +7,7 @@ use super::{
     timing::Timing,
     tool::{Moment, Order},
 };
-use palpate_physics::{TickInput, contact::is_inside, step};
+use palpate_physics::{StepReport, TickInput, contact::is_inside, step};
 use palpate_realtime::Clock;
 
 /// How often a tool that waits to be clear of the body is looked for in it; a look costs a pass over the surface.
@@ -34,7 +34,7 @@ impl Simulation {
         }
         let input_done_ns = clock.now_ns();
         if plan.advance {
-            timing.count_rejected_inputs(self.advance());
+            timing.count(&self.advance());
         }
         let step_done_ns = clock.now_ns();
         self.couple(plan, begun_ns);
@@ -62,14 +62,14 @@ impl Simulation {
         self.timeline.fill(time_s, &mut self.load_factors, &mut self.prescribed_m);
     }
 
-    fn advance(&mut self) -> u32 {
+    fn advance(&mut self) -> StepReport {
         let input = TickInput {
             tools: &self.targets,
             load_factors: &self.load_factors,
             prescribed_displacements_m: &self.prescribed_m,
             point_forces: self.injections.acting_in(self.state.tick + 1),
         };
-        step(&self.model, &mut self.state, &mut self.scratch, &input).inputs_rejected
+        step(&self.model, &mut self.state, &mut self.scratch, &input)
     }
 
     fn couple(&mut self, plan: Plan, now_ns: u64) {

@@ -1,4 +1,5 @@
 //! Where a tick's time goes: recorded by the loop, read by anybody.
+use palpate_physics::StepReport;
 use palpate_realtime::{Histogram, LoopMonitor};
 use std::sync::{
     Arc,
@@ -18,16 +19,22 @@ pub struct Timing {
     /// One per [`STAGES`].
     pub stages: [Histogram; 4],
     inputs_rejected: AtomicU64,
+    repeated_ticks: AtomicU64,
 }
 
 impl Timing {
-    /// Counts inputs that the physics refused.
-    pub fn count_rejected_inputs(&self, inputs: u32) {
-        self.inputs_rejected.fetch_add(u64::from(inputs), Ordering::Relaxed);
+    /// Counts what the physics refused and repeated.
+    pub fn count(&self, report: &StepReport) {
+        self.inputs_rejected.fetch_add(u64::from(report.inputs_rejected), Ordering::Relaxed);
+        self.repeated_ticks.fetch_add(u64::from(report.repeated > 0), Ordering::Relaxed);
     }
 
     /// Inputs that the physics refused.
     pub fn inputs_rejected(&self) -> u64 {
         self.inputs_rejected.load(Ordering::Relaxed)
+    }
+    /// Ticks that proved unstable and were repeated in more substeps.
+    pub fn repeated_ticks(&self) -> u64 {
+        self.repeated_ticks.load(Ordering::Relaxed)
     }
 }

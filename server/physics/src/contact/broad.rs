@@ -235,4 +235,28 @@ mod tests {
         }
         assert!(queries < 600, "{queries} queries in 2000 steps");
     }
+    /// A tool flying straight at what stands still: what was listed is renewed in the very step in which it runs out.
+    #[test]
+    fn a_straight_approach_uses_all_of_the_slack_and_no_more() {
+        let (surface, x) = strip(50);
+        let triangles = Triangles::of(&surface, &x);
+        let mut boxes = vec![ClusterBox::UNFITTED; triangles.clusters()];
+        let mut candidates = Candidates::with_capacity(triangles.len());
+        let (inner, motion) = (1.2, DVec3::X * 1e-3);
+        let mut centre = DVec3::X * -5.0;
+        let (mut found_at, mut queries) = (None, 0);
+        for _ in 0..5000 {
+            centre += motion;
+            candidates.slack_m -= motion.length();
+            if candidates.slack_m <= 0.0 {
+                triangles.query(&x, (&mut boxes, 0.0), centre, (1.5, inner), &mut candidates);
+                queries += 1;
+            }
+            let needed = within(&triangles, &x, centre, inner);
+            assert!(needed.iter().all(|t| candidates.triangles().contains(t)), "{centre}");
+            found_at = found_at.or((!needed.is_empty()).then_some(centre.x));
+        }
+        let found_at = found_at.unwrap();
+        assert!((found_at + inner).abs() < 2e-3 && queries < 30, "{found_at}, {queries} queries");
+    }
 }

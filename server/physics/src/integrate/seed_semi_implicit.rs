@@ -12,8 +12,9 @@
 //! - A body that moves as a whole is dragged as if every node hung on the resting frame by a damper `dt D`: at E = 10 kPa,
 //!   ν = 0.45 and h = 5 mm one step of 1 ms takes about three quarters of its momentum.
 //! - It is not unconditionally stable. For a mode with `k = dt²κ/m`, `d = dt²δ/m`: `(1 + d)z² − (2 + d − k)z + 1 = 0`, so
-//!   `|z| ≤ 1` needs `k ≤ 4 + 2d`: any step only where λ_max(D⁻¹K) ≤ 2, and a block of tets has 2.02, 2.08 and 2.80 at ν = 0, 0.3 and 0.45. Leapfrog's condition `k ≤ 4`
-//!   always suffices, and is what measured substeps keep; `Substeps::Fixed(1)` is what the paper runs.
+//!   `|z| ≤ 1` needs `k ≤ 4 + 2d`: any step only where λ_max(D⁻¹K) ≤ 2, and a block of tets has 2.02, 2.08 and 2.80 at
+//!   ν = 0, 0.3 and 0.45. Leapfrog's condition `k ≤ 4` always suffices, and is what measured substeps keep;
+//!   `Substeps::Fixed(1)` is what the paper runs.
 //! - It is of first order in time, and what pushes during a step acts in the next one.
 //!
 //! On a held axis the velocity is given and its coupling to the node's other axes left out. Forces other than the body's

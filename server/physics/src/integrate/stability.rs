@@ -44,7 +44,7 @@ pub struct Pace {
     pub substeps: u32,
     /// Ticks in a row in which fewer would have done.
     pub calm_ticks: u32,
-    /// InstantForces one step before those of the state; empty unless the model takes one step per tick.
+    /// Forces one step before those of the state; empty unless the model takes one step per tick.
     pub before: InstantForces,
     /// `before` is that, with nothing put elsewhere in between.
     pub before_is_usable: bool,
@@ -134,7 +134,7 @@ impl InstantForces {
     }
 }
 
-/// InstantForces at the instants of a tick that are wanted again; empty unless ticks are judged.
+/// Forces at the instants of a tick that are wanted again; empty unless ticks are judged.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct ForceHistory {
     start: InstantForces,
@@ -157,7 +157,9 @@ impl ForceHistory {
     /// again. The state is given a buffer to be overwritten.
     pub(super) fn set_aside(&mut self, number: u32, substeps: u32, state: &mut State) {
         if self.start.total_n.is_empty() {
-        } else if number == 1 {
+            return;
+        }
+        if number == 1 {
             self.start.swap(state);
         } else if number == substeps {
             self.one_before.swap(state);

@@ -76,8 +76,7 @@ pub(super) struct Job<'a, T, const N: usize> {
 }
 
 impl<'a, T: Scalar, const N: usize> Job<'a, T, N> {
-    /// `displacements`, `velocities` and `sums` have an entry per node and a spare one; `velocities` is empty unless the
-    /// run's material is viscous.
+    /// `displacements` and `sums` have an entry per node and a spare one; so have `velocities`, unless no pass reads them.
     pub(super) fn new(
         blocks: &'a Blocks<T, N>,
         run: &Run<T>,
@@ -87,11 +86,10 @@ impl<'a, T: Scalar, const N: usize> Job<'a, T, N> {
     ) -> Self {
         let entries = blocks.nodes + 1;
         assert!(displacements.len() == entries && sums.len() == entries, "buffers of another kernel");
-        assert!(run.material.viscosity.is_zero() || velocities.len() == entries, "buffers of another kernel");
         Self { blocks: blocks.of(run), constants: run.constants, displacements, velocities, sums, factors: [1.0; 2] }
     }
 
-    /// The same for products with `directions`, which every run needs.
+    /// The same for products with `directions`.
     pub(super) fn for_products(
         blocks: &'a Blocks<T, N>,
         run: &Run<T>,
@@ -100,7 +98,6 @@ impl<'a, T: Scalar, const N: usize> Job<'a, T, N> {
         sums: &'a mut [Sum],
         factors: [f64; 2],
     ) -> Self {
-        assert!(directions.len() == blocks.nodes + 1, "buffers of another kernel");
         Self { factors, ..Self::new(blocks, run, displacements, directions, sums) }
     }
 }
@@ -150,6 +147,8 @@ impl Pass for Products {
 fn add<V: Vector<Scalar = T>, T: Scalar, L: LaneTangent, const VISCOUS: bool, const PRODUCTS: bool, const N: usize>(
     job: &mut Job<'_, T, N>,
 ) -> f64 {
+    let reads_velocities = VISCOUS || PRODUCTS;
+    assert!(!reads_velocities || job.velocities.len() == job.displacements.len(), "buffers of another kernel");
     let mut edges: [Lanes<T, N>; BATCH] = [[[T::of(0.0); N]; 9]; BATCH];
     let mut edge_rates = edges;
     let mut forces = edges;
@@ -157,7 +156,7 @@ fn add<V: Vector<Scalar = T>, T: Scalar, L: LaneTangent, const VISCOUS: bool, co
     for batch in job.blocks.chunks(BATCH) {
         for (index, block) in batch.iter().enumerate() {
             gather::<V, N>(&block.nodes, job.displacements, &mut edges[index]);
-            if VISCOUS || PRODUCTS {
+            if reads_velocities {
                 gather::<V, N>(&block.nodes, job.velocities, &mut edge_rates[index]);
             }
         }
@@ -297,7 +296,7 @@ fn gather<V: Vector, const N: usize>(nodes: &[[u32; 4]; N], values: &[Node], edg
             for corner in 0..4 {
                 let node = nodes[first + tet][corner] as usize;
                 debug_assert!(node < values.len());
-                // SAFETY: `Blocks::new` checked `node <= Blocks::nodes`, `Job::new` that `values` has one entry more than that.
+                // SAFETY: `Blocks::new` checked `node <= Blocks::nodes`, `Job::new` and `add` that `values` has one entry more than that.
                 corners[tet][corner] = unsafe { values.get_unchecked(node) };
             }
         }

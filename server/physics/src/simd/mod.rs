@@ -41,7 +41,8 @@ const LANES_F64: usize = 8;
 pub struct ForceKernel {
     layout: Layout,
     nodes: usize,
-    any_viscosity: bool,
+    /// Whether some material is viscous.
+    is_viscous: bool,
     /// Off switch of the skip of viscous terms where a material has none.
     every_viscosity: bool,
     instruction_set: Available,
@@ -85,7 +86,7 @@ impl ForceKernel {
         Self {
             layout,
             nodes: mesh.positions_m().len(),
-            any_viscosity: materials.iter().any(|m| !m.viscosity.is_zero()),
+            is_viscous: materials.iter().any(|m| !m.viscosity.is_zero()),
             every_viscosity: false,
             instruction_set: Available::at_most(InstructionSet::best()),
         }
@@ -94,7 +95,7 @@ impl ForceKernel {
     /// The same kernel, computing viscous terms also where φ = ψ = 0: the same forces, only slower.
     #[must_use]
     pub fn with_every_viscosity(self) -> Self {
-        Self { any_viscosity: true, every_viscosity: true, ..self }
+        Self { every_viscosity: true, ..self }
     }
 
     /// The same kernel, held to an instruction set or the best below it that there is (for tests and benchmarks).
@@ -110,14 +111,14 @@ impl ForceKernel {
 
     /// Whether any material is viscous.
     pub fn is_viscous(&self) -> bool {
-        self.any_viscosity
+        self.is_viscous
     }
 
     /// Buffers for [`Self::forces_n`].
     pub fn scratch(&self) -> KernelScratch {
         // One spare node more, for the lanes of padding.
         let count = self.nodes + 1;
-        let rates = if self.any_viscosity { count } else { 0 };
+        let rates = if self.is_viscous || self.every_viscosity { count } else { 0 };
         KernelScratch {
             displacements: vec![Node::default(); count],
             velocities: vec![Node::default(); rates],
