@@ -43,12 +43,13 @@ fn facts(status: &StatusResponse) -> Vec<Vec<String>> {
     line(
         "time",
         format!(
-            "{:.3} s; {} ticks of {} ms, {} substeps each{}",
+            "{:.3} s; {} ticks of {} ms, {} substeps each{}{}",
             status.time_s,
             status.tick,
             1e3 * session.tick_period_s,
             session.substeps_per_tick,
-            if status.paused { ", paused" } else { "" }
+            if status.paused { ", paused" } else { "" },
+            if status.asleep { ", at rest and asleep" } else { "" }
         ),
     );
     line("overruns", format!("{} ({} ticks skipped)", status.overruns, status.skipped_ticks));
@@ -149,6 +150,7 @@ fn to_json(status: &StatusResponse) -> serde_json::Value {
         "skipped_ticks": status.skipped_ticks,
         "repeated_ticks": status.repeated_ticks,
         "substeps_now": status.substeps_now,
+        "asleep": status.asleep,
         "wakeup_jitter_us": spread(status.wakeup_jitter_us.as_ref()),
         "tick_cost_us": spread(status.tick_cost_us.as_ref()),
         "stages_us": status.stages.iter().map(|s| json!({"stage": s.stage, "cost_us": spread(s.cost_us.as_ref())})).collect::<Vec<_>>(),

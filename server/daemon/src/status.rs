@@ -43,6 +43,7 @@ pub fn of(daemon: &Daemon, session: &ActiveSession, copy: &Copy, done: &Done) ->
         samples_rejected: daemon.samples_rejected.load(Ordering::Relaxed),
         repeated_ticks: daemon.timing.repeated_ticks(),
         substeps_now: copy.state.pace.substeps,
+        asleep: copy.state.sleep.asleep,
     }
 }
 

@@ -214,6 +214,21 @@ async fn status_tells_of_ticks_that_were_repeated() {
     daemon.finish().await;
 }
 
+#[tokio::test(flavor = "multi_thread")]
+async fn a_body_at_rest_sleeps_and_an_injected_force_wakes_it() {
+    let mut scene = block_scene("sleepy", 2);
+    scene.model.settings.sleep_tolerance_m = 1e-7;
+    let daemon = Daemon::on(scene).await;
+    daemon.pause().await;
+    daemon.step(200).await;
+    assert!(daemon.status().await.asleep);
+    inject(&daemon, vec![push(14, 0, 1)]).await.unwrap();
+    daemon.step(2).await;
+    let status = daemon.status().await;
+    assert!(!status.asleep && status.energies.unwrap().kinetic_j > 0.0);
+    daemon.finish().await;
+}
+
 const OTHER: &str = r#"
 [scene]
 name = "another block"

@@ -154,6 +154,15 @@ impl LastGood {
         self.contact.keep_memory_of(&state.contact);
     }
 
+    /// Copies the tools only. Allocates nothing.
+    pub(crate) fn keep_tools(&mut self, state: &State) {
+        self.tools.clone_from_slice(&state.tools);
+    }
+
+    pub(crate) fn put_tools_back(&self, state: &mut State) {
+        state.tools.clone_from_slice(&self.tools);
+    }
+
     /// Positions (m).
     pub(crate) fn x(&self) -> &[DVec3] {
         &self.x

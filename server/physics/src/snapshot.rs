@@ -12,7 +12,7 @@ use thiserror::Error;
 const MAGIC: [u8; 4] = *b"PLPS";
 const HEADER: usize = 24;
 /// Version of the layout; another one is refused.
-pub const VERSION: u32 = 3;
+pub const VERSION: u32 = 4;
 
 /// Why bytes are not a state of a body.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
@@ -93,7 +93,8 @@ fn check(model: &Model, state: &State) -> Result<(), SnapshotError> {
     let counts = [&state.x, &state.v, &state.force_n, &state.external_n].iter().all(|v| v.len() == nodes)
         && state.tools.len() == model.spec().tools.len()
         && state.load_factors.len() == model.spec().loads.len()
-        && state.pace.fits(model);
+        && state.pace.fits(model)
+        && state.sleep.fits(model);
     if !counts {
         return Err(SnapshotError::OtherBody);
     }
@@ -102,7 +103,8 @@ fn check(model: &Model, state: &State) -> Result<(), SnapshotError> {
 
 fn is_finite(state: &State) -> bool {
     let before = &state.pace.before;
-    let vectors = [&state.x, &state.v, &state.force_n, &state.external_n, &before.total_n, &before.external_n];
+    let held_m = &state.sleep.held_m;
+    let vectors = [&state.x, &state.v, &state.force_n, &state.external_n, &before.total_n, &before.external_n, held_m];
     let (ledger, viscous) = (&state.ledger, &state.viscous);
     let sums = [ledger.external_work_j, ledger.dissipated_j, viscous.latest_w, viscous.before_w];
     vectors.iter().all(|list| list.iter().all(|a| a.is_finite()))

@@ -69,6 +69,31 @@ fn nor_do_ticks_that_are_repeated() {
     assert!(run_without_allocating(rig, 2000) > 0);
 }
 
+/// Falls asleep, sleeps, and wakes for a load.
+#[test]
+fn nor_does_sleep() {
+    let mut spec = rig(Integrator::Leapfrog).model.spec().clone();
+    spec.settings.mass_damping_per_s = 60.0;
+    spec.settings.sleep_tolerance_m = 1e-6;
+    let mut rig = Rig::new(spec);
+    let mut slept = 0;
+    assert_no_alloc(|| {
+        for tick in 0..3000 {
+            let factor = if tick < 2000 { 0.0 } else { 1.0 };
+            let input = TickInput {
+                tools: &[at(DVec3::Z * 0.3), at(DVec3::Z * (0.3 + 1e-4 * f64::from(tick)))],
+                load_factors: &[factor; 3],
+                prescribed_displacements_m: &[DVec3::ZERO],
+                point_forces: &[],
+            };
+            palpate_physics::step(&rig.model, &mut rig.state, &mut rig.scratch, &input);
+            slept += u32::from(rig.state.sleep.asleep);
+            assert!(!(2000..2050).contains(&tick) || !rig.state.sleep.asleep);
+        }
+    });
+    assert!(slept > 200, "{slept}");
+}
+
 fn ticks_allocate_nothing(integrator: Integrator, ticks: u32) {
     assert_eq!(run_without_allocating(rig(integrator), ticks), 0);
 }

@@ -78,3 +78,14 @@ fn the_solver_s_keys_are_read_and_held_to_their_ranges() {
         assert!(message.contains(wrong.split(' ').next().unwrap()), "{message}");
     }
 }
+
+#[test]
+fn sleep_is_off_unless_asked_for_and_not_for_the_papers_schemes() {
+    let tolerance_m = |rest: &str| scene(rest).map(|scene| scene.model.settings.sleep_tolerance_m);
+    assert_eq!(tolerance_m("leapfrog").unwrap(), 0.0);
+    assert!((tolerance_m("backward-euler\"\nsleep_tolerance_um = 0.1#").unwrap() - 1e-7).abs() < 1e-20);
+    for bad in ["seed-verlet\"\nsleep_tolerance_um = 0.1#", "leapfrog\"\nsleep_tolerance_um = -1#"] {
+        let message = scene(bad).unwrap_err().one_line();
+        assert!(message.contains("sleep_tolerance_um") && message.contains("must be 0"), "{message}");
+    }
+}

@@ -36,6 +36,7 @@ use glam::DVec3;
 use local_model::MeanContact;
 use narrow::{Meeting, Pressed};
 use touching::Touching;
+use triangle::closest_point;
 
 /// Elastic moduli behind a boundary triangle.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -229,9 +230,7 @@ impl ContactModel {
         let exhaustive = scratch.exhaustive;
         for (index, (tool, scratch)) in tools.iter_mut().zip(&mut scratch.tools).enumerate() {
             let model = &self.tools[index];
-            let moved_m = proxy::drift(model, tool, contact.tools[index].force_n, time);
-            contact.tools[index].candidates.slack_m -= moved_m;
-            self.list_candidates(index, tool.centre_m, body.x, contact, exhaustive);
+            self.drift(index, tool, body.x, time, contact, exhaustive);
             let pressed = self.press(index, tool.centre_m, body.x, contact, forces_n, scratch);
             let coupling_n = proxy::finish(model, tool, &pressed, self.surface_m_per_s(&pressed, body), time);
             tool.friction_heat_j += pressed.heat_j;
@@ -243,6 +242,55 @@ impl ContactModel {
                 scratch.coupling_sum_n += coupling_n;
             }
         }
+    }
+
+    /// [`Self::substep`] where the body does not move and no tool is near it, of which there is nothing but the tools' motion. Stops and
+    /// returns false as soon as one is near.
+    pub fn substep_apart(
+        &self,
+        x: &[DVec3],
+        time: &SubstepTime,
+        tools: &mut [ToolState],
+        contact: &mut ContactState,
+        scratch: &mut ContactScratch,
+    ) -> bool {
+        let exhaustive = scratch.exhaustive;
+        for (index, (tool, scratch)) in tools.iter_mut().zip(&mut scratch.tools).enumerate() {
+            self.drift(index, tool, x, time, contact, exhaustive);
+            if self.is_near(index, tool.centre_m, x, contact) {
+                return false;
+            }
+            let nothing = Pressed { to_surface_m: DVec3::INFINITY, ..Pressed::default() };
+            scratch.coupling_sum_n += proxy::finish(&self.tools[index], tool, &nothing, DVec3::ZERO, time);
+        }
+        true
+    }
+
+    /// Whether no tool is within a quarter of its radius of the surface. The lists must be of the present positions.
+    pub fn is_apart(&self, x: &[DVec3], tools: &[ToolState], contact: &ContactState) -> bool {
+        tools.iter().enumerate().all(|(index, tool)| !self.is_near(index, tool.centre_m, x, contact))
+    }
+
+    /// By distances, not by what is listed: which triangles beyond the zone are on a list depends on when it was made.
+    fn is_near(&self, tool: usize, centre_m: DVec3, x: &[DVec3], contact: &ContactState) -> bool {
+        let zone_m = (1.0 + proxy::NEAR) * self.tools[tool].spec.radius_m;
+        contact.tools[tool].candidates.triangles().iter().any(|&triangle| {
+            centre_m.distance(closest_point(centre_m, self.triangles.corners(triangle as usize, x))) < zone_m
+        })
+    }
+
+    fn drift(
+        &self,
+        index: usize,
+        tool: &mut ToolState,
+        x: &[DVec3],
+        time: &SubstepTime,
+        contact: &mut ContactState,
+        exhaustive: bool,
+    ) {
+        let moved_m = proxy::drift(&self.tools[index], tool, contact.tools[index].force_n, time);
+        contact.tools[index].candidates.slack_m -= moved_m;
+        self.list_candidates(index, tool.centre_m, x, contact, exhaustive);
     }
 
     fn list_candidates(&self, tool: usize, centre_m: DVec3, x: &[DVec3], contact: &mut ContactState, exhaustive: bool) {

@@ -7,11 +7,14 @@ mod pcg;
 mod scheme;
 pub mod seed_semi_implicit;
 mod seed_verlet;
+mod sleep;
 pub mod spectrum;
 mod stability;
 mod tick;
 
 pub(crate) use scheme::{Body, ImplicitScratch, Scheme};
+pub(crate) use sleep::RestBound;
+pub use sleep::Sleep;
 pub(crate) use stability::ForceHistory;
 pub use stability::{InstantForces, Pace};
 pub use tick::step;

@@ -1,6 +1,7 @@
 //! One tick: inputs, quarantine, the integrator of the model's settings, reactions.
 use super::{
     forces::{LoadRamp, Tick, is_usable},
+    sleep,
     stability::{is_judged, substeps_for},
 };
 use crate::{
@@ -24,6 +25,12 @@ pub fn step(model: &Model, state: &mut State, scratch: &mut Scratch, input: &Tic
     if state.quarantine.is_some() {
         return StepReport { substeps: 0, repeated: 0, inputs_rejected: 0, quarantined: None };
     }
+    if state.sleep.asleep
+        && let Some(report) = sleep::doze(model, state, scratch, input)
+    {
+        return report;
+    }
+    let was_quiet = state.sleep.is_quiet(&state.load_factors, input);
     let judged = is_judged(model);
     scratch.last_good.keep(state);
     if judged {
@@ -56,6 +63,9 @@ pub fn step(model: &Model, state: &mut State, scratch: &mut Scratch, input: &Tic
         }
         state.tick = state.tick.saturating_add(1);
         let quarantined = spoilt.map(|node| quarantine(model, state, scratch, node));
+        if quarantined.is_none() {
+            sleep::consider(model, state, input, was_quiet && inputs_rejected == 0);
+        }
         return StepReport { substeps, repeated, inputs_rejected, quarantined };
     }
 }
@@ -69,6 +79,7 @@ fn quarantine(model: &Model, state: &mut State, scratch: &mut Scratch, node: u32
     state.external_n.fill(DVec3::ZERO);
     state.force_is_current = false;
     state.pace.reset(model);
+    state.sleep.wake();
     state.contact.clear();
     scratch.reaction_n.fill(DVec3::ZERO);
     for tool in &mut state.tools {
@@ -78,10 +89,9 @@ fn quarantine(model: &Model, state: &mut State, scratch: &mut Scratch, node: u32
     what
 }
 
-/// Checks the inputs, starts the tools' tick, and gives prescribed nodes the velocity that reaches their target at its end.
-fn take_inputs(model: &Model, state: &mut State, scratch: &mut Scratch, input: &TickInput<'_>) -> u32 {
+/// Gives the tools their targets, and starts their tick. Returns how many were refused.
+pub(super) fn take_tools(model: &Model, state: &mut State, scratch: &mut Scratch, input: &TickInput<'_>) -> u32 {
     let mut rejected = 0;
-    let period_s = model.spec().settings.tick_period_s;
     let tools_ok = input.tools.len() == state.tools.len();
     rejected += u32::from(!tools_ok);
     for (index, tool) in state.tools.iter_mut().enumerate() {
@@ -92,6 +102,13 @@ fn take_inputs(model: &Model, state: &mut State, scratch: &mut Scratch, input: &
         tool.target = if finite { target } else { ToolTarget { velocity_m_per_s: DVec3::ZERO, ..tool.target } };
     }
     model.contact().begin_tick(&mut state.tools, &mut scratch.contact);
+    rejected
+}
+
+/// Checks the inputs, starts the tools' tick, and gives prescribed nodes the velocity that reaches their target at its end.
+fn take_inputs(model: &Model, state: &mut State, scratch: &mut Scratch, input: &TickInput<'_>) -> u32 {
+    let mut rejected = take_tools(model, state, scratch, input);
+    let period_s = model.spec().settings.tick_period_s;
     rejected += input.point_forces.iter().filter(|point| !is_usable(model, point)).count() as u32;
     let prescribed_ok = input.prescribed_displacements_m.len() == model.spec().prescribed.len()
         && input.prescribed_displacements_m.iter().all(|d| d.is_finite());
@@ -134,10 +151,13 @@ fn run(tick: &Tick<'_>, state: &mut State, scratch: &mut Scratch) {
     model.scheme().run(tick, state, scratch);
     tick.loads.finish(state, tick.input);
     model.contact().end_tick(&mut state.tools, &mut state.contact, tick.substeps, &mut scratch.contact);
-    for (reaction, (force, inverse_mass)) in
-        scratch.reaction_n.iter_mut().zip(state.force_n.iter().zip(model.inverse_mass_per_kg()))
-    {
-        // The holder supplies what the other forces lack: r = −f on prescribed axes.
-        *reaction = DVec3::select(inverse_mass.cmpeq(DVec3::ZERO), -*force, DVec3::ZERO);
+    write_reactions(model, state, scratch);
+}
+
+/// The holder supplies what the other forces lack: `r = −f` on prescribed axes.
+pub(super) fn write_reactions(model: &Model, state: &State, scratch: &mut Scratch) {
+    for node in model.spec().prescribed.iter().flat_map(|set| &set.nodes).map(|&node| node as usize) {
+        let held = model.inverse_mass_per_kg()[node].cmpeq(DVec3::ZERO);
+        scratch.reaction_n[node] = DVec3::select(held, -state.force_n[node], DVec3::ZERO);
     }
 }

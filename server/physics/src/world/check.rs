@@ -1,5 +1,5 @@
 //! The specification's ranges.
-use super::{LoadSpec, MAX_SUBSTEPS, ModelError, ModelSpec, Substeps};
+use super::{Integrator, LoadSpec, MAX_SUBSTEPS, ModelError, ModelSpec, Substeps};
 use crate::{
     contact::{Coupling, LARGEST_TRIANGLE, ToolSpec},
     material::{Lame, Material, Viscosity},
@@ -104,6 +104,15 @@ fn settings(spec: &ModelSpec) -> Result<(), ModelError> {
     setting("solver_iterations", f64::from(s.solver_iterations), s.solver_iterations >= 1, "must be 1 or more")?;
     let tolerance = s.solver_tolerance;
     setting("solver_tolerance", tolerance, tolerance > 0.0 && tolerance < 1.0, "must be in (0, 1)")?;
+    let sleep = s.sleep_tolerance_m;
+    setting("sleep_tolerance_m", sleep, sleep >= 0.0 && sleep.is_finite(), "must not be negative")?;
+    let sleeps = matches!(s.integrator, Integrator::Leapfrog | Integrator::BackwardEuler);
+    setting(
+        "sleep_tolerance_m",
+        sleep,
+        sleep == 0.0 || sleeps,
+        "must be 0 with the seeds' schemes, which never sleep",
+    )?;
     if let Substeps::Fixed(n) = s.substeps {
         setting("substeps", f64::from(n), (1..=MAX_SUBSTEPS).contains(&n), "must be 1 to 100000")?;
     }

@@ -1,5 +1,5 @@
 //! Why a model cannot be built.
-use crate::{material::ParameterError, mesh::MeshError};
+use crate::{material::ParameterError, mesh::MeshError, solve::SolveError};
 use glam::DVec3;
 use thiserror::Error;
 
@@ -44,6 +44,14 @@ pub enum ModelError {
         value: f64,
         /// What it must satisfy.
         rule: &'static str,
+    },
+    /// A body that cannot tell how near to rest it is.
+    #[error(
+        "sleep_tolerance_m needs the lowest natural frequency: {source}; hold the body, or leave the tolerance out"
+    )]
+    Sleep {
+        /// Why there is none.
+        source: Box<SolveError>,
     },
     /// Two prescriptions for one degree of freedom.
     #[error("node {node} is prescribed along axis {axis} by both \"{first}\" and \"{second}\"")]

@@ -4,7 +4,7 @@ use crate::{
     contact::{ContactModel, SurfaceModuli, ToolState},
     fem::{element::RestTet, mass},
     integrate::{
-        Body, Scheme,
+        Body, RestBound, Scheme,
         spectrum::{RestStiffness, max_natural_frequency_rad_per_s},
     },
     material::Material,
@@ -27,6 +27,7 @@ pub struct Model {
     max_natural_frequency_rad_per_s: f64,
     substeps: u32,
     scheme: Scheme,
+    rest_bound: Option<RestBound>,
 }
 
 impl Model {
@@ -80,7 +81,7 @@ impl Model {
         let dt_s = spec.settings.tick_period_s / f64::from(substeps);
         let body = Body { at_rest, mass_kg: &mass_kg, inverse_mass_per_kg: &inverse_mass_per_kg, dt_s };
         let scheme = Scheme::build(spec.settings.integrator, &body);
-        Ok(Self {
+        let mut model = Self {
             surface,
             materials,
             rest_tets,
@@ -91,8 +92,11 @@ impl Model {
             max_natural_frequency_rad_per_s: omega,
             substeps,
             scheme,
+            rest_bound: None,
             spec,
-        })
+        };
+        model.rest_bound = RestBound::new(&model).map_err(|source| ModelError::Sleep { source: Box::new(source) })?;
+        Ok(model)
     }
 
     /// What it was built from.
@@ -148,6 +152,10 @@ impl Model {
     }
     pub(crate) fn scheme(&self) -> &Scheme {
         &self.scheme
+    }
+    /// How near to rest the body is left alone; `None`: never.
+    pub(crate) fn rest_bound(&self) -> Option<&RestBound> {
+        self.rest_bound.as_ref()
     }
     /// Substeps per tick.
     pub fn substeps(&self) -> u32 {

@@ -122,6 +122,9 @@ pub struct Settings {
     pub solver_iterations: u32,
     /// Where that solver stops: residual over its start, in the preconditioner's norm, in (0, 1).
     pub solver_tolerance: f64,
+    /// A body that is at rest to within this (m), every node of it, and that no tool is near is not computed (`integrate::sleep`);
+    /// 0: never.
+    pub sleep_tolerance_m: f64,
     /// What is left out.
     pub skips: Skips,
 }
@@ -139,6 +142,7 @@ impl Default for Settings {
             mass_damping_per_s: 0.0,
             solver_iterations: 100,
             solver_tolerance: 1e-3,
+            sleep_tolerance_m: 0.0,
             skips: Skips::default(),
         }
     }

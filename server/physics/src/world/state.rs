@@ -3,7 +3,7 @@ use super::Model;
 use crate::{
     contact::{ContactState, ToolState, ToolTarget},
     health::{Ledger, Quarantine, ViscousPower},
-    integrate::Pace,
+    integrate::{Pace, Sleep},
 };
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
@@ -35,6 +35,8 @@ pub struct State {
     pub viscous: ViscousPower,
     /// In how many substeps ticks are taken.
     pub pace: Pace,
+    /// Whether the body sleeps.
+    pub sleep: Sleep,
     /// Set when a tick's result was not finite.
     pub quarantine: Option<Quarantine>,
 }
@@ -56,6 +58,7 @@ impl State {
             ledger: Ledger::default(),
             viscous: ViscousPower::default(),
             pace: Pace::at_start(model),
+            sleep: Sleep::at_start(model),
             quarantine: None,
         }
     }
@@ -74,6 +77,7 @@ impl State {
         self.ledger = other.ledger;
         self.viscous = other.viscous;
         self.pace.copy_from(&other.pace);
+        self.sleep.copy_from(&other.sleep);
         self.quarantine = other.quarantine;
     }
 
@@ -93,6 +97,7 @@ impl State {
         self.ledger = Ledger::default();
         self.viscous = ViscousPower::default();
         self.pace.reset(model);
+        self.sleep.reset();
         self.quarantine = None;
     }
 

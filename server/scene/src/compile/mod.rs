@@ -115,6 +115,7 @@ fn settings(document: &Document) -> Result<Settings, Fault> {
         mass_damping_per_s,
         solver_iterations,
         solver_tolerance,
+        sleep_tolerance_um,
     } = document.numerics;
     let period = document.scene.tick_period_s;
     check(
@@ -130,6 +131,15 @@ fn settings(document: &Document) -> Result<Settings, Fault> {
     check(&at.key("solver_iterations"), solver_iterations, iterations_ok, "must be 1 to 10000")?;
     let tolerance_ok = solver_tolerance > 0.0 && solver_tolerance < 1.0;
     check(&at.key("solver_tolerance"), solver_tolerance, tolerance_ok, "must be in (0, 1)")?;
+    let sleep_ok = sleep_tolerance_um >= 0.0 && sleep_tolerance_um.is_finite();
+    check(&at.key("sleep_tolerance_um"), sleep_tolerance_um, sleep_ok, "must be 0 (never sleeps) or larger")?;
+    let seeds = matches!(integrator, IntegratorName::SeedVerlet | IntegratorName::SeedSemiImplicit);
+    check(
+        &at.key("sleep_tolerance_um"),
+        sleep_tolerance_um,
+        sleep_tolerance_um == 0.0 || !seeds,
+        "must be 0 with the papers' integrators, which never sleep",
+    )?;
     if let Some(n) = substeps {
         check(
             &at.key("substeps"),
@@ -157,6 +167,7 @@ fn settings(document: &Document) -> Result<Settings, Fault> {
         mass_damping_per_s,
         solver_iterations,
         solver_tolerance,
+        sleep_tolerance_m: 1e-6 * sleep_tolerance_um,
         skips: Skips::default(),
     })
 }

@@ -225,6 +225,9 @@ pub(crate) struct NumericsTable {
     pub(crate) solver_iterations: u32,
     /// Where that solver stops, relative to where it starts, in (0, 1).
     pub(crate) solver_tolerance: f64,
+    /// A held body that is at rest to within so many micrometres, and that no tool is near, is not computed until something
+    /// changes. 0: always computed.
+    pub(crate) sleep_tolerance_um: f64,
 }
 
 impl Default for NumericsTable {
@@ -240,6 +243,7 @@ impl Default for NumericsTable {
             mass_damping_per_s: settings.mass_damping_per_s,
             solver_iterations: settings.solver_iterations,
             solver_tolerance: settings.solver_tolerance,
+            sleep_tolerance_um: 1e6 * settings.sleep_tolerance_m,
         }
     }
 }

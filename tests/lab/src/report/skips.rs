@@ -9,9 +9,9 @@ pub(super) fn section(out: &mut String, found: &[(Skip, Found)]) {
     }
     out.push_str(
         "<h2 id=\"skips\">What is skipped</h2><p>What a scene does not need is not computed. Each line is one scene run twice, in turns: with \
-         the skip, and with it switched off. Skips are exact: both runs must end in the same state, bit for bit.</p><div class=\"wide\">\
+         the skip, and with it switched off. Exact skips must end in the same state, bit for bit; a bounded one may be as far from it as is said.</p><div class=\"wide\">\
          <table class=\"text\"><tr><th>skip</th><th>what is left out</th><th>measured in</th><th>µs a tick</th><th>without</th><th>saved</th>\
-         <th>same bits</th></tr>",
+         <th>the same?</th></tr>",
     );
     for (skip, found) in found {
         let _ = write!(
@@ -23,11 +23,21 @@ pub(super) fn section(out: &mut String, found: &[(Skip, Found)]) {
             found.with.median_s * 1e6,
             found.without.median_s * 1e6,
             100.0 * found.saved(),
-            if found.same_bits { "<td class=\"yes\">yes</td>" } else { "<td class=\"no\">no</td>" }
+            sameness(skip, found)
         );
     }
     for (name, reason) in ELSEWHERE {
         let _ = write!(out, "<tr><td>{}</td><td colspan=\"6\">{}</td></tr>", escape(name), escape(reason));
     }
     out.push_str("</table></div>");
+}
+
+fn sameness(skip: &Skip, found: &Found) -> String {
+    let class = if skip.is_kept(found) { "yes" } else { "no" };
+    let text = match skip.tolerance_m {
+        None if found.same_bits => "bit for bit".to_owned(),
+        None => format!("no, {:.1e} m apart", found.farthest_m),
+        Some(tolerance_m) => format!("within {:.1e} m (allowed {tolerance_m:.0e} m)", found.farthest_m),
+    };
+    format!("<td class=\"{class}\">{text}</td>")
 }

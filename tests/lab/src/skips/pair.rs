@@ -3,7 +3,7 @@ use super::Found;
 use crate::{bodies, press::Press, timing::interleaved};
 use glam::DVec3;
 use miette::{IntoDiagnostic, Result};
-use palpate_physics::{Model, Skips, material::Law, snapshot};
+use palpate_physics::{Model, Skips, State, material::Law, snapshot};
 
 const TOOL_RADIUS_M: f64 = 10e-3;
 const DEPTH_M: f64 = 2e-3;
@@ -35,6 +35,11 @@ pub(super) fn scene(tets: u32, away_m: f64, skips: Skips) -> Result<Model> {
     Model::build(spec).into_diagnostic()
 }
 
+/// The largest distance (m) between the places of a node in two states.
+pub(super) fn farthest_m(a: &State, b: &State) -> f64 {
+    a.x.iter().zip(&b.x).map(|(a, b)| a.distance(*b)).fold(0.0, f64::max)
+}
+
 fn compare(tets: u32, away_m: f64, off: Skips, rounds: usize) -> Result<Found> {
     let models = [scene(tets, away_m, Skips::default())?, scene(tets, away_m, off)?];
     let depth_m = if away_m > 0.0 { 0.0 } else { DEPTH_M };
@@ -49,5 +54,6 @@ fn compare(tets: u32, away_m: f64, off: Skips, rounds: usize) -> Result<Found> {
     let times = interleaved(&mut contenders, rounds);
     drop(contenders);
     let [with, without] = presses.each_ref().map(|press| snapshot::state_hash(press.state()));
-    Ok(Found { with: times[0], without: times[1], same_bits: with == without })
+    let farthest_m = farthest_m(presses[0].state(), presses[1].state());
+    Ok(Found { with: times[0], without: times[1], same_bits: with == without, farthest_m })
 }

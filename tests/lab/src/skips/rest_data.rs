@@ -22,5 +22,5 @@ pub(super) fn run(rounds: usize) -> Result<Found> {
         again.tick();
     };
     let times = interleaved(&mut [Box::new(|| _ = once.tick()), Box::new(&mut recompute)], rounds);
-    Ok(Found { with: times[0], without: times[1], same_bits: rest_tets == model.rest_tets() })
+    Ok(Found { with: times[0], without: times[1], same_bits: rest_tets == model.rest_tets(), farthest_m: 0.0 })
 }

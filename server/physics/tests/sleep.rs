@@ -1,0 +1,192 @@
+//! A body at rest is left alone: never further from the truth than the tolerance, and awake when anything changes.
+#![allow(clippy::unwrap_used)] // helpers outside #[test] functions
+mod rig;
+use glam::DVec3;
+use palpate_physics::{
+    Energies, Integrator, LoadSpec, Model, ModelError, ModelSpec, PointForce, PrescribedSpec, contact::Coupling,
+    material::Law, snapshot,
+};
+use rig::{Drive, Rig, at, body, bricks, even, hold, material, nodes_where, sphere};
+
+const TOLERANCE_M: f64 = 1e-7;
+const RADIUS_M: f64 = 0.006;
+const AWAY: DVec3 = DVec3::new(0.001, 0.002, 0.03);
+
+/// A damped block on its floor under gravity, with a load that may push its top sideways, and a tool above it.
+fn block(tolerance_m: f64) -> ModelSpec {
+    let side = even(-0.02, 0.02, 4);
+    let mesh = bricks(&side, &side, &even(-0.02, 0.0, 3));
+    let floor = nodes_where(&mesh, |p| p.z < -0.0199);
+    let top = nodes_where(&mesh, |p| p.z > -1e-9);
+    let mut spec = body(mesh, material(Law::StableNeoHookean, 10e3, 0.45));
+    spec.gravity_m_per_s2 = DVec3::NEG_Z * 9.81;
+    spec.prescribed = vec![hold("floor", floor, [true; 3])];
+    spec.loads = vec![LoadSpec::NodalForces(top.into_iter().map(|node| (node, DVec3::X * 1e-3)).collect())];
+    spec.tools = vec![sphere(RADIUS_M, AWAY, Coupling::Rigid)];
+    spec.settings.mass_damping_per_s = 60.0;
+    spec.settings.sleep_tolerance_m = tolerance_m;
+    spec
+}
+
+/// What is done in a tick.
+type Script = fn(u32) -> (DVec3, f64, Option<PointForce>);
+
+fn drive(rig: &Rig, (tool, load, force): (DVec3, f64, Option<PointForce>)) -> Drive {
+    Drive { tools: vec![at(tool)], load_factors: vec![load], point_forces: force.into_iter().collect(), ..rig.still() }
+}
+
+fn farthest_m(a: &Rig, b: &Rig) -> f64 {
+    a.state.x.iter().zip(&b.state.x).map(|(a, b)| a.distance(*b)).fold(0.0, f64::max)
+}
+
+/// Runs the script with and without sleep; returns the ticks slept and the largest distance between the two bodies.
+fn compare(spec: impl Fn(f64) -> ModelSpec, ticks: u32, script: Script) -> (Vec<u32>, f64) {
+    let (mut sleepy, mut awake) = (Rig::new(spec(TOLERANCE_M)), Rig::new(spec(0.0)));
+    let (mut slept, mut worst_m) = (Vec::new(), 0.0_f64);
+    for tick in 0..ticks {
+        let before = sleepy.state.x.clone();
+        let was_asleep = sleepy.state.sleep.asleep;
+        for rig in [&mut sleepy, &mut awake] {
+            let input = drive(rig, script(tick));
+            rig.tick(&input);
+        }
+        if was_asleep && sleepy.state.sleep.asleep {
+            assert_eq!(sleepy.state.x, before);
+            slept.push(tick);
+        }
+        worst_m = worst_m.max(farthest_m(&sleepy, &awake));
+    }
+    assert!(!awake.state.sleep.asleep && awake.state.tick == sleepy.state.tick);
+    (slept, worst_m)
+}
+
+/// Still; pushed at 1 s; back at 1.5 s; touched from 2.5 s.
+fn scripted(tick: u32) -> (DVec3, f64, Option<PointForce>) {
+    let depth = 0.002 * (f64::from(tick.saturating_sub(2500)) / 200.0).min(1.0);
+    let tool = if tick < 2500 { AWAY } else { DVec3::new(0.001, 0.002, RADIUS_M + 0.001 - depth) };
+    let load = if (1000..1500).contains(&tick) { 1.0 } else { 0.0 };
+    (tool, load, None)
+}
+
+#[test]
+fn a_sleeping_body_is_where_it_would_be_and_wakes_for_loads_and_tools() {
+    for integrator in [Integrator::Leapfrog, Integrator::BackwardEuler] {
+        let spec = |tolerance_m| {
+            let mut spec = block(tolerance_m);
+            spec.settings.integrator = integrator;
+            spec
+        };
+        let (slept, worst_m) = compare(spec, 3000, scripted);
+        println!("{integrator:?}: slept {} of 3000 ticks, {worst_m:.1e} m off at worst", slept.len());
+        let sleeps_in = |range: std::ops::Range<u32>| slept.iter().filter(|tick| range.contains(tick)).count();
+        assert!(sleeps_in(0..1000) > 200 && sleeps_in(1500..2500) > 200, "{integrator:?}");
+        assert_eq!(sleeps_in(1000..1100) + sleeps_in(1500..1600), 0, "it is pushed: {integrator:?}");
+        assert_eq!(sleeps_in(2500..3000), 0, "a tool is near: {integrator:?}");
+        assert!(worst_m <= 2.0 * TOLERANCE_M, "{integrator:?}: {worst_m}");
+        assert!(worst_m > 0.0, "{integrator:?}: sleeping must change something, or it was not compared");
+    }
+}
+
+#[test]
+fn an_injected_force_and_a_prescribed_motion_wake_it_in_their_tick() {
+    for moved in [false, true] {
+        let mut rig = Rig::new(block(TOLERANCE_M));
+        while !rig.state.sleep.asleep {
+            let input = drive(&rig, (AWAY, 0.0, None));
+            rig.tick(&input);
+            assert!(rig.state.tick < 3000);
+        }
+        let kinetic_j = Energies::of(&rig.model, &rig.state).kinetic_j;
+        assert_eq!(kinetic_j, 0.0);
+        let force = PointForce { node: rig.state.x.len() as u32 - 1, force_n: DVec3::X * 0.01 };
+        let mut input = drive(&rig, (AWAY, 0.0, (!moved).then_some(force)));
+        if moved {
+            input.prescribed[0] = DVec3::X * 1e-4;
+        }
+        let before = rig.state.x.clone();
+        rig.tick(&input);
+        assert!(!rig.state.sleep.asleep && rig.state.x != before, "moved {moved}");
+    }
+}
+
+/// A tool on a spring, thrown at the sleeping body, goes on moving and meets it awake.
+#[test]
+fn a_tool_on_its_coupling_moves_while_the_body_sleeps() {
+    let spec = |tolerance_m| {
+        let mut spec = block(tolerance_m);
+        spec.tools[0].coupling = Coupling::Spring { stiffness_n_per_m: 200.0, damping_n_s_per_m: 1.0, mass_kg: 0.02 };
+        spec
+    };
+    let script: Script = |tick| {
+        let z = AWAY.z - f64::from(tick.saturating_sub(1500)).min(240.0) * 1e-4;
+        (DVec3::new(AWAY.x, AWAY.y, z), 0.0, None)
+    };
+    let (slept, worst_m) = compare(spec, 2000, script);
+    assert!(slept.iter().any(|tick| (1520..1600).contains(tick)), "it sleeps while the tool comes");
+    assert!(slept.iter().all(|tick| *tick < 1760), "and not when it is there");
+    assert!(worst_m <= 2.0 * TOLERANCE_M, "{worst_m}");
+}
+
+#[test]
+fn what_rings_does_not_sleep() {
+    let undamped = |tolerance_m| {
+        let mut spec = block(tolerance_m);
+        spec.settings.mass_damping_per_s = 0.0;
+        spec
+    };
+    assert_eq!(compare(undamped, 2000, |_| (AWAY, 0.0, None)), (vec![], 0.0));
+}
+
+/// Saved asleep and in every other state, and restored into a fresh model's buffers: the same bits as without.
+#[test]
+fn a_restored_sleeper_goes_on_bit_for_bit() {
+    let run = |every: Option<u32>| {
+        let mut rig = Rig::new(block(TOLERANCE_M));
+        for tick in 0..2700 {
+            if every.is_some_and(|every| tick % every == 0) {
+                let bytes = snapshot::save(&rig.model, &rig.state);
+                rig = Rig::new(block(TOLERANCE_M));
+                rig.state = snapshot::restore(&rig.model, &bytes).unwrap();
+            }
+            let input = drive(&rig, scripted(tick));
+            rig.tick(&input);
+            assert!(rig.scratch.reactions_n().iter().any(|r| *r != DVec3::ZERO), "the floor carries the weight");
+        }
+        rig.state
+    };
+    assert_eq!(run(None), run(Some(97)));
+}
+
+#[test]
+fn the_ledger_balances_over_sleep() {
+    let mut rig = Rig::new(block(TOLERANCE_M));
+    let mut balance = Vec::new();
+    for tick in 0..2400 {
+        let input = drive(&rig, scripted(tick));
+        rig.tick(&input);
+        if [999, 2399].contains(&tick) {
+            assert!(rig.state.sleep.asleep);
+            balance.push(Energies::of(&rig.model, &rig.state).balance_j());
+        }
+    }
+    let moved_j = rig.state.ledger.dissipated_j;
+    assert!(balance.iter().all(|b| b.abs() < 1e-3 * moved_j), "{balance:?} of {moved_j}");
+}
+
+#[test]
+fn what_cannot_sleep_is_told() {
+    let free = ModelSpec { prescribed: vec![], ..block(TOLERANCE_M) };
+    assert!(matches!(Model::build(free), Err(ModelError::Sleep { .. })));
+    let one_axis = |spec: &ModelSpec| vec![PrescribedSpec { axes: [false, false, true], ..spec.prescribed[0].clone() }];
+    let sliding = ModelSpec { prescribed: one_axis(&block(TOLERANCE_M)), ..block(TOLERANCE_M) };
+    let told = Model::build(sliding).unwrap_err().to_string();
+    assert!(told.contains("hold the body"), "{told}");
+    for integrator in [Integrator::SeedVerlet, Integrator::SeedSemiImplicit] {
+        let mut spec = block(TOLERANCE_M);
+        spec.settings.integrator = integrator;
+        assert!(matches!(Model::build(spec), Err(ModelError::Setting { name: "sleep_tolerance_m", .. })));
+    }
+    let mut spec = block(TOLERANCE_M);
+    spec.settings.sleep_tolerance_m = -1.0;
+    assert!(Model::build(spec).is_err());
+}
