@@ -17,7 +17,11 @@ use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
 use miette::{Context, IntoDiagnostic, Result, ensure};
 use palpate_realtime::OsMeasures;
-use std::{collections::BTreeMap, path::PathBuf, time::Duration};
+use std::{
+    collections::BTreeMap,
+    path::{Path, PathBuf},
+    time::Duration,
+};
 
 /// What is run.
 #[derive(Debug, Clone, Args)]
@@ -74,6 +78,10 @@ pub fn run(options: &Options) -> Result<()> {
         (_, true) => Effort { full: true, rounds: 1_000, budget_s: 120.0 },
         _ => Effort { full: false, rounds: 300, budget_s: 20.0 },
     };
+    // What cannot be kept should not be measured.
+    let out = &options.out;
+    std::fs::create_dir_all(out).into_diagnostic().wrap_err_with(|| format!("cannot make {}", out.display()))?;
+    save(out, "results.csv", measure::write(&Run::default()))?;
     let mut peers = if options.peers { Peers::install(options.peers_env.as_deref()) } else { Peers::default() };
     for (peer, note) in &peers.notes {
         println!("{peer}: {note}");
@@ -83,11 +91,19 @@ pub fn run(options: &Options) -> Result<()> {
     let bar = ProgressBar::new(problems.len() as u64);
     bar.set_style(ProgressStyle::with_template("{bar:20} {pos}/{len} {elapsed} {prefix}: {msg}").into_diagnostic()?);
     bar.enable_steady_tick(Duration::from_millis(200));
-    let mut rows = Vec::new();
-    for problem in &problems {
+    let mut run = Run { circumstances: circumstances(options, &effort, &noise), rows: Vec::new() };
+    for (index, note) in pinned.notes.iter().enumerate() {
+        run.circumstances.insert(format!("system {}", index + 1), note.text.clone());
+    }
+    for (index, problem) in problems.iter().enumerate() {
+        if bar.is_hidden() {
+            println!("{} of {}: {}", index + 1, problems.len(), problem.name);
+        }
         bar.set_prefix(problem.name.clone());
         let mut tell = |turn: Turn<'_>| bar.set_message(format!("{} {} {}", turn.method, turn.resolution, turn.what));
-        rows.extend(measure::problem(problem, &methods, &mut peers, &effort, &mut tell)?);
+        run.rows.extend(measure::problem(problem, &methods, &mut peers, &effort, &mut tell)?);
+        // A run that is interrupted keeps the problems that were done.
+        save(out, "results.csv", measure::write(&run))?;
         bar.inc(1);
     }
     // Whoever asks for one problem or method wants its rows, not a minute of what concerns none in particular.
@@ -95,12 +111,7 @@ pub fn run(options: &Options) -> Result<()> {
     let convergence = if whole { convergence::all()? } else { vec![] };
     let (skips, stress) = if whole { (skips(options, &bar)?, stress(options, &bar)?) } else { (vec![], vec![]) };
     bar.finish_and_clear();
-    let mut circumstances = circumstances(options, &effort, &noise);
-    for (index, note) in pinned.notes.iter().enumerate() {
-        circumstances.insert(format!("system {}", index + 1), note.text.clone());
-    }
-    circumstances.extend(peers.notes);
-    let run = Run { circumstances, rows };
+    run.circumstances.extend(peers.notes);
     let results = Results {
         run: &run,
         problems: &problems,
@@ -180,22 +191,22 @@ fn stress(options: &Options, bar: &ProgressBar) -> Result<Vec<(stress::Row, Outc
     stress::ROWS.into_iter().map(go_through).collect()
 }
 
+fn save(out: &Path, name: &str, text: String) -> Result<()> {
+    let path = out.join(name);
+    std::fs::write(&path, text).into_diagnostic().wrap_err_with(|| format!("cannot write {}", path.display()))
+}
+
 fn write(options: &Options, results: &Results<'_>) -> Result<()> {
     let out = &options.out;
-    std::fs::create_dir_all(out).into_diagnostic().wrap_err_with(|| format!("cannot make {}", out.display()))?;
-    let save = |name: &str, text: String| {
-        let path = out.join(name);
-        std::fs::write(&path, text).into_diagnostic().wrap_err_with(|| format!("cannot write {}", path.display()))
-    };
     if !results.convergence.is_empty() {
-        save("convergence.csv", convergence::csv(results.convergence))?;
+        save(out, "convergence.csv", convergence::csv(results.convergence))?;
     }
     if !results.skips.is_empty() {
-        save("skips.csv", skips::csv(results.skips))?;
+        save(out, "skips.csv", skips::csv(results.skips))?;
     }
     if !results.stress.is_empty() {
         stress::write_csv(out, &stress_options(options), results.stress)?;
     }
-    save("results.csv", measure::write(results.run))?;
-    save("report.html", page::page(results)?)
+    save(out, "results.csv", measure::write(results.run))?;
+    save(out, "report.html", page::page(results)?)
 }
