@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 pub struct Ledger {
     /// Work done on the body by tools, loads, injected forces and prescribed motion (J).
     pub external_work_j: f64,
-    /// Energy taken by viscous stress and mass damping (J).
+    /// Energy taken by viscous stress, mass damping and what else a scheme damps, and dropped where a body falls asleep (J).
     pub dissipated_j: f64,
 }
 

@@ -49,7 +49,7 @@ fn with_and_without_viscous_terms_that_are_zero_the_bits_are_the_same() {
             let upper = Viscosity { phi_pa_s: upper.0, psi_pa_s: upper.1 };
             let spec = pressed_block(law, upper);
             let (skipping, all) = (run(spec.clone(), true), run(spec, false));
-            assert_eq!(snapshot::state_hash(&skipping), snapshot::state_hash(&all), "{law:?}, {upper:?}");
+            assert!(skipping == all, "{law:?}, {upper:?}");
         }
     }
 }

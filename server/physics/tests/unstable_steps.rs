@@ -83,6 +83,31 @@ fn settings(precision: Precision) -> palpate_physics::Settings {
     palpate_physics::Settings { precision, ..block().settings }
 }
 
+/// Mass damping answers a step as stress does, and is not taken for it; nor does it hide a step that is too long.
+#[test]
+fn mass_damping_neither_alarms_nor_hides() {
+    for damping_per_s in [60.0, 500.0, 1000.0] {
+        for seed in 0..4 {
+            let struck = |ratio: f64| {
+                let mut spec = block();
+                spec.settings.mass_damping_per_s = damping_per_s;
+                let mut rig = one_step(spec, ratio);
+                strike(&mut rig, 1e-5, seed);
+                rig
+            };
+            for ratio in [0.5, 0.9, 0.97] {
+                assert_eq!(ring(struck(ratio), 500).0, None, "{damping_per_s} /s, r = {ratio}, seed {seed}");
+            }
+            // |z| = 1 at k = 4 cosh ½c dt: what is damped is stable a little further.
+            let omega = struck(1.0).model.max_natural_frequency_rad_per_s();
+            let ratio =
+                (100..200).map(|r| 0.01 * f64::from(r)).find(|r| r * r > 1.2 * (damping_per_s * r / omega).cosh());
+            let (first, _, growth) = ring(struck(ratio.unwrap()), 500);
+            assert!(first.is_some() && growth < 20.0, "{damping_per_s} /s, seed {seed}: {first:?}, {growth}");
+        }
+    }
+}
+
 /// With viscosity the limit is `k + 2d ≤ 4`: at `k = 4r²` and `C = τK`, `d = kτ/dt`, so `τ = ½dt (1/r² − 1)` is its edge.
 #[test]
 fn viscosity_shortens_the_step_that_is_noticed() {

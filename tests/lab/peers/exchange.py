@@ -4,6 +4,7 @@ A script calls `serve(peer, variants)`: it reads the problem (the file named by 
 one line of JSON, and then times ticks whenever it is asked to, one line of JSON per request.
 """
 
+import itertools
 import json
 import math
 import sys
@@ -47,10 +48,10 @@ class Problem:
 
 class Variant:
     """One way to run a peer. `tick(fraction)` goes through 1 ms under this fraction of the load and returns the time (s) that the peer's
-    own code took; `positions_m()` gives all nodes."""
+    own code took; `positions_m()` gives all nodes. `law` is for people, `obeys` one of the lab's names of laws."""
 
-    def __init__(self, name, settings, law, same_law, steps_per_tick, build):
-        self.name, self.settings, self.law, self.same_law = name, settings, law, same_law
+    def __init__(self, name, settings, law, obeys, steps_per_tick, build):
+        self.name, self.settings, self.law, self.obeys = name, settings, law, obeys
         self.steps_per_tick, self.build, self.running = steps_per_tick, build, None
 
     def settle(self, problem):
@@ -59,7 +60,7 @@ class Variant:
             "name": self.name,
             "settings": self.settings,
             "law": self.law,
-            "same_law": self.same_law,
+            "same_law": self.obeys == problem.law,
             "answers_m": [],
             "displacements_m": [],
             "failure": "",
@@ -122,19 +123,21 @@ def serve(peer, variants):
     with open(sys.argv[1], encoding="utf-8") as file:
         problem = Problem(json.load(file))
     answer({"format": FORMAT, "peer": peer, "rows": [variant.settle(problem) for variant in variants]})
+    # Each goes on where it was: some take fewer turns than others.
+    contenders = [(variant.running, itertools.cycle(problem.timed_fractions)) for variant in variants]
     for line in sys.stdin:
         _, rounds, seconds = line.split()
-        answer({"times_s": take_turns([variant.running for variant in variants], int(rounds), float(seconds))})
+        answer({"times_s": take_turns(contenders, int(rounds), float(seconds))})
 
 
 def take_turns(contenders, rounds, seconds):
     times_s = [[] for _ in contenders]
     for _ in range(rounds):
-        for running, times in zip(contenders, times_s):
+        for (running, fractions), times in zip(contenders, times_s):
             if running is not None and 2 * sum(times) < seconds:
                 # Untimed: fetches back what the others pushed out of the caches.
-                running.tick(1.0)
-                times.append(running.tick(1.0))
+                running.tick(next(fractions))
+                times.append(running.tick(next(fractions)))
     return times_s
 
 

@@ -57,8 +57,9 @@ def variant(short, law, integrator, solver, steps, settings):
         return Flex(problem, law, integrators[f"mjINT_{integrator.upper()}"], solvers[f"mjSOL_{solver.upper()}"], steps)
 
     words = ("St. Venant-Kirchhoff", "simplified stable neo-Hookean")[law]
+    obeys = ("StVenantKirchhoff", "StableNeoHookean")[law]
     settings = f"dof full, integrator {integrator}, solver {solver} (tolerance 1e-8, 100 iterations), {settings}; no contact, no gravity"
-    return Variant(short, settings, words, law == SNH, steps, build)
+    return Variant(short, settings, words, obeys, steps, build)
 
 
 def variants():

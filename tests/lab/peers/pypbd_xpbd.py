@@ -63,7 +63,7 @@ class Solid:
 def variant(steps):
     name = f"XPBD {steps} step{'s' if steps > 1 else ''}"
     settings = f"solid method 3 (FEM based XPBD), {steps} steps a tick, 1 iteration each, first-order velocity update, double precision"
-    return Variant(name, settings, "St. Venant-Kirchhoff", False, steps, Solid)
+    return Variant(name, settings, "St. Venant-Kirchhoff", "StVenantKirchhoff", steps, Solid)
 
 
 if __name__ == "__main__":

@@ -1,12 +1,14 @@
 //! A body at rest sleeps: nothing of it is computed until something changes.
 //!
-//! Near an equilibrium `x*` the body obeys `M δẍ + C δẋ + K δx = 0`, `δx = x − x*`. With the residual `r = f` on free axes (so
-//! `K δx = −r` to first order), the lowest natural frequency `ω₁`, and `K ≥ ω₁² M`:
+//! Near an equilibrium `x*` the body obeys `M δẍ + C δẋ + K δx = 0`, `δx = x − x*`, with `C` of viscous stress and mass damping. The energy
+//! `½ v·M v + ½ δx·K δx` does not grow, and `K ≥ ω₁² M` with the lowest natural frequency `ω₁`. So with the residual `r = −K δx` on free axes:
 //! ```text
-//! ‖M^½ δx‖ ≤ ‖M^-½ r‖/ω₁²                              distance to the equilibrium
-//! ‖M^½ δx(t)‖ ≤ ‖M^½ δx‖ + ‖M^½ v‖/ω₁                   at any later time: energy does not grow
-//! |δx_i(t)| ≤ (‖M^-½ r‖/ω₁² + ‖M^½ v‖/ω₁)/√m_min         of every node                                        (1)
+//! ω₁² ‖M^½ δx(t)‖² ≤ δx(t)·K δx(t) ≤ ‖M^½ v‖² + r·K⁻¹ r ≤ ‖M^½ v‖² + ‖M^-½ r‖²/ω₁²
+//! |δx_i(t)| ≤ (‖M^-½ r‖/ω₁² + ‖M^½ v‖/ω₁)/√m_min         of every node, now and later                           (1)
 //! ```
+//! The force that is at hand is `f = r − C_v v`, with the viscous stress' part. `C_v ≤ τ K` with the largest ratio `τ` of viscosity to stiffness, so
+//! `‖M^-½ r‖ ≤ ‖M^-½ f‖ + τ ω_max² ‖M^½ v‖`: a viscous body that creeps is not taken for one at rest.
+//!
 //! Where (1) stays below the tolerance over [`CALM_CHECKS`] looks in a row, with no tool near and no input that changes, no node will
 //! ever be further from where it is than twice the tolerance, so it is left there. `ω₁` is that of the body at rest; a load that
 //! softens it (towards buckling) makes (1) too small by the square of the ratio of frequencies.
@@ -21,7 +23,7 @@ use crate::{
     contact::{SubstepTime, ToolState},
     health::ViscousPower,
     solve::{SolveError, natural_modes},
-    world::{Model, Scratch, State, StepReport, TickInput},
+    world::{Model, Scratch, State, StepReport, TickInput, relaxation_time_s},
 };
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
@@ -81,6 +83,8 @@ impl Sleep {
 pub(crate) struct RestBound {
     tolerance_m: f64,
     lowest_rad_per_s: f64,
+    /// `τ ω_max²` (1/s).
+    viscous_per_s: f64,
     root_of_smallest_mass: f64,
 }
 
@@ -98,7 +102,14 @@ impl RestBound {
         let largest = model.inverse_mass_per_kg().iter().filter(free).map(|m| m.max_element()).fold(0.0, f64::max);
         // Without a free node there is no mode, and nothing that could move.
         let lowest = natural_modes(model, 1)?.first().map_or(f64::INFINITY, |mode| TAU * mode.frequency_hz);
-        Ok(Some(Self { tolerance_m, lowest_rad_per_s: lowest, root_of_smallest_mass: largest.sqrt().recip() }))
+        let relaxation_s =
+            model.spec().regions.iter().map(|region| relaxation_time_s(&region.material)).fold(0.0, f64::max);
+        Ok(Some(Self {
+            tolerance_m,
+            lowest_rad_per_s: lowest,
+            viscous_per_s: relaxation_s * model.max_natural_frequency_rad_per_s().powi(2),
+            root_of_smallest_mass: largest.sqrt().recip(),
+        }))
     }
 
     /// The right side of (1) (m).
@@ -110,8 +121,9 @@ impl RestBound {
             residual_sq += (*force * *force).dot(*inverse_mass);
             speed_sq += mass * v.length_squared();
         }
-        let omega = self.lowest_rad_per_s;
-        (residual_sq.sqrt() / (omega * omega) + speed_sq.sqrt() / omega) / self.root_of_smallest_mass
+        let (omega, speed) = (self.lowest_rad_per_s, speed_sq.sqrt());
+        let residual = residual_sq.sqrt() + self.viscous_per_s * speed;
+        (residual / (omega * omega) + speed / omega) / self.root_of_smallest_mass
     }
 }
 
@@ -121,7 +133,7 @@ pub(super) fn consider(model: &Model, state: &mut State, input: &TickInput<'_>, 
     if !was_quiet {
         state.sleep.calm_checks = 0;
         let given = input.prescribed_displacements_m;
-        if given.len() == state.sleep.held_m.len() {
+        if given.len() == state.sleep.held_m.len() && given.iter().all(|d| d.is_finite()) {
             state.sleep.held_m.copy_from_slice(given);
         }
         return;

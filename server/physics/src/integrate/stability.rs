@@ -10,6 +10,12 @@
 //! `Q = ‖Δ²g‖/max(‖f‖, ‖f₋‖)` above 4 proves that it is too long, for a body that is linear between the three instants and whose
 //! stiffest mode is its most viscous one. A mode that grows as `z = −|z|` has `Q = 2 + |z| + 1/|z| > 4` exactly.
 //!
+//! With mass damping `c`, `e = e^{−c dt}`, leapfrog gives `y = √e dt² M⁻¹ f − (1 − e)(x − x₋)` and is stable while `k ≤ 2 (1 + e)/√e`. Then
+//! ```text
+//! ‖Δ²g‖ ≤ 2 (1 + e) max(‖f‖, ‖f₋‖) + (1 − e) ‖g − g₋‖                                                            (2)
+//! ```
+//! which is (1)'s 4 again where `‖g − g₋‖ ≤ 2 max(‖f‖, ‖f₋‖)`. Loads may make it larger: what it is above that raises the limit.
+//!
 //! Rigid and slow motion is filtered out twice: a mode counts with `ω⁸` above and `ω⁴` below the line, so that a small
 //! tremble at the limit is seen beside a large motion. What contact, loads and tools do is in `f`, not in `g`: it cannot alarm, and a
 //! step that is too long for contact alone is not seen. On held axes that change their speed between ticks `y` is not zero;
@@ -175,11 +181,8 @@ impl ForceHistory {
 
     /// What the tick that was run in `substeps` shows. `start` is the state at its start.
     pub(super) fn evidence(&self, model: &Model, state: &State, start: &LastGood, substeps: u32) -> Evidence {
-        let (one, two) = match substeps {
-            1 if !state.pace.before_is_usable => return self.evidence_of_first_step(model, state, start),
-            1 => (&self.start, &state.pace.before),
-            2 => (&self.one_before, &self.start),
-            _ => (&self.one_before, &self.two_before),
+        let Some((one, two)) = self.before_the_end(state, substeps) else {
+            return self.evidence_of_first_step(model, state, start);
         };
         let [answer_sq, one_sq, two_sq] = model.kernel().step_force_sums(&StepForces {
             total_n: [&state.force_n, &one.total_n, &two.total_n],
@@ -189,6 +192,26 @@ impl ForceHistory {
         let period_s = model.spec().settings.tick_period_s;
         let held_sq = if substeps == 1 { self.held_jump / (period_s * period_s) } else { 0.0 };
         Evidence { answer_sq, cause_sq: one_sq.max(two_sq) + held_sq }
+    }
+
+    /// `‖g − g₋‖` of the two instants before the tick's end; 0 in a tick that has no such two.
+    fn last_change(&self, model: &Model, state: &State, substeps: u32) -> f64 {
+        let Some((one, two)) = self.before_the_end(state, substeps) else { return 0.0 };
+        let internal = |forces: &InstantForces, node: usize| forces.total_n[node] - forces.external_n[node];
+        let change_sq = |(node, inverse_mass): (usize, &DVec3)| {
+            let change = internal(one, node) - internal(two, node);
+            (change * change).dot(*inverse_mass)
+        };
+        model.inverse_mass_per_kg().iter().enumerate().map(change_sq).sum::<f64>().sqrt()
+    }
+
+    /// Forces one and two steps before the end of a tick that was run.
+    fn before_the_end<'a>(&'a self, state: &'a State, substeps: u32) -> Option<(&'a InstantForces, &'a InstantForces)> {
+        match substeps {
+            1 => state.pace.before_is_usable.then_some((&self.start, &state.pace.before)),
+            2 => Some((&self.one_before, &self.start)),
+            _ => Some((&self.one_before, &self.two_before)),
+        }
     }
 
     /// After a tick that was accepted: what the next one is judged by.
@@ -227,9 +250,17 @@ impl Evidence {
         if self.answer_sq == 0.0 { 0.0 } else { (self.answer_sq / self.cause_sq).sqrt() }
     }
 
-    /// `Q` is above the limit, and not by rounding: the answer stands above the last digits of the internal forces themselves.
-    pub(super) fn is_unstable(&self, model: &Model, state: &State) -> bool {
+    /// `Q` is above the limit, and not by mass damping or by rounding: the answer stands above the last digits of the internal forces
+    /// themselves.
+    pub(super) fn is_unstable(&self, model: &Model, state: &State, history: &ForceHistory, substeps: u32) -> bool {
         if self.answer_sq <= LIMIT * LIMIT * self.cause_sq {
+            return false;
+        }
+        let settings = &model.spec().settings;
+        let damped = -(-settings.mass_damping_per_s * settings.tick_period_s / f64::from(substeps)).exp_m1();
+        let cause = self.cause_sq.sqrt();
+        let beyond = (history.last_change(model, state, substeps) - 0.5 * LIMIT * cause).max(0.0);
+        if self.answer_sq.sqrt() <= LIMIT * cause + damped * beyond {
             return false;
         }
         let digits = match model.spec().settings.precision {

@@ -46,7 +46,7 @@ pub fn step(model: &Model, state: &mut State, scratch: &mut Scratch, input: &Tic
         let spoilt = first_non_finite(state);
         if judged {
             let evidence = scratch.history.evidence(model, state, &scratch.last_good, substeps);
-            let unstable = spoilt.is_some() || evidence.is_unstable(model, state);
+            let unstable = spoilt.is_some() || evidence.is_unstable(model, state, &scratch.history, substeps);
             let quotient = spoilt.is_none().then(|| evidence.quotient());
             let more = substeps_for(model, substeps, quotient).filter(|_| unstable && repeated < MOST_REPETITIONS);
             if let Some(more) = more {

@@ -47,7 +47,7 @@ pub enum ModelError {
     },
     /// A body that cannot tell how near to rest it is.
     #[error(
-        "sleep_tolerance_m needs the lowest natural frequency: {source}; hold the body, or leave the tolerance out"
+        "whether a body may sleep follows from its lowest natural frequency: {source}; or let it never sleep (sleep tolerance 0)"
     )]
     Sleep {
         /// Why there is none.

@@ -12,4 +12,5 @@ pub use model::Model;
 pub use spec::{Integrator, LoadSpec, ModelSpec, Precision, PrescribedSpec, Region, Settings, Skips, Substeps};
 pub use state::State;
 pub use substeps::MAX_SUBSTEPS;
+pub(crate) use substeps::relaxation_time_s;
 pub use tick::{PointForce, Scratch, StepReport, TickInput};

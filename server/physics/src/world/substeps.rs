@@ -33,7 +33,7 @@ pub(super) fn choose(spec: &ModelSpec, materials: &[Material], omega: f64) -> Re
 }
 
 /// Largest ratio of viscosity to stiffness (s) over P-waves, shear and bulk.
-fn relaxation_time_s(material: &Material) -> f64 {
+pub(crate) fn relaxation_time_s(material: &Material) -> f64 {
     let (lame, viscosity) = (material.lame, material.viscosity);
     let ratio = |lambdas: f64, mus: f64| {
         (lambdas * viscosity.phi_pa_s + mus * viscosity.psi_pa_s) / (lambdas * lame.lambda_pa + mus * lame.mu_pa)

@@ -33,7 +33,7 @@ pub struct TickInput<'a> {
 /// What a tick did.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct StepReport {
-    /// Substeps that the tick was taken in; 0 while quarantined.
+    /// Substeps that the tick was taken in; 0 while quarantined or asleep.
     pub substeps: u32,
     /// How often it was taken back and repeated in more substeps, because it proved unstable.
     pub repeated: u32,

@@ -63,11 +63,23 @@ impl Row {
         SIGMAS * (self.unrest.unwrap_or(0.0) + other.unrest.unwrap_or(0.0))
     }
 
+    /// Whether its answer stands, to within what counts as a tie of errors: of one that still moves by more the error is not known.
+    pub fn stands(&self) -> bool {
+        self.drift.is_none_or(|drift| drift <= TIE_ERROR)
+    }
+
+    /// Whether it has a part in the front.
+    pub fn is_in_competition(&self) -> bool {
+        self.competes && self.stands()
+    }
+
     /// Whether no competing row is both faster and nearer to the answer, beyond ties; false without time or answer, or out of competition.
     pub fn is_on_front(&self, all: &[&Self]) -> bool {
-        let (Some(time), Some(error), true) = (self.median_us, self.error(), self.competes) else { return false };
+        let (Some(time), Some(error), true) = (self.median_us, self.error(), self.is_in_competition()) else {
+            return false;
+        };
         let better = |other: &&Self| match (other.median_us, other.error()) {
-            (Some(t), Some(e)) if other.competes => {
+            (Some(t), Some(e)) if other.is_in_competition() => {
                 t < (1.0 - self.noise_with(other).clamp(TIE_TIME, WIDEST_TIE_TIME)) * time
                     && e <= (1.0 + TIE_ERROR) * error
                     || t <= time && e < (1.0 - TIE_ERROR) * error
@@ -91,6 +103,20 @@ mod tests {
         let all: Vec<&Row> = rows.iter().collect();
         let front: Vec<bool> = rows.iter().map(|r| r.is_on_front(&all)).collect();
         assert_eq!(front, [true, true, false, true, false, false]);
+    }
+
+    #[test]
+    fn an_answer_that_still_moves_is_out_of_competition() {
+        let row = |error, drift| Row {
+            median_us: Some(1.0 - error),
+            answer_error: Some(error),
+            drift: Some(drift),
+            competes: true,
+            ..Row::default()
+        };
+        let rows = [row(0.2, 1e-3), row(0.1, 0.5)];
+        let front: Vec<bool> = rows.iter().map(|r| r.is_on_front(&rows.iter().collect::<Vec<_>>())).collect();
+        assert_eq!(front, [true, false]);
     }
 
     #[test]

@@ -4,7 +4,7 @@
 //! [`BLOCKS`] blocks, so that a slow moment of the machine still strikes all.
 use super::Row;
 use crate::{
-    methods::{Method, Pace, Running},
+    methods::{Method, Pace, Running, tremor},
     peers::{Peers, Session, Variant},
     problems::{
         Problem,
@@ -78,9 +78,10 @@ pub fn problem(
         tell(Turn { what: "settles", method: peer, resolution });
     });
     tell(Turn { what: "takes turns with the others", method: "each", resolution: 0 });
+    let mut fractions = tremor().cycle();
     let blocks = if sessions.is_empty() { 1 } else { BLOCKS };
     for _ in 0..blocks {
-        take_turns(&mut contenders, effort.rounds.div_ceil(blocks));
+        take_turns(&mut contenders, &mut fractions, effort.rounds.div_ceil(blocks));
         for session in &mut sessions {
             session.time(effort.rounds.div_ceil(blocks), PEERS_SHARE * effort.budget_s);
         }
@@ -175,15 +176,16 @@ fn judge(problem: &Problem, variant: Variant, reference: &Reference) -> Result<C
 }
 
 /// A slow moment of the machine strikes all of them. A turn is two ticks, of which the second is timed: the first fetches back
-/// what the others pushed out of the caches.
-fn take_turns(contenders: &mut [Contender], rounds: usize) {
+/// what the others pushed out of the caches. The action trembles meanwhile, as a hand does.
+fn take_turns(contenders: &mut [Contender], fractions: &mut impl Iterator<Item = f64>, rounds: usize) {
     let warm_up = rounds / 10 + 1;
     for round in 0..warm_up + rounds {
+        let [first, second] = [0, 1].map(|_| fractions.next().unwrap_or(1.0));
         for contender in contenders.iter_mut() {
             let Some(running) = &mut contender.running else { continue };
-            running.tick(1.0);
+            running.tick(first);
             let start = Instant::now();
-            running.tick(1.0);
+            running.tick(second);
             let elapsed = start.elapsed().as_secs_f64();
             if round >= warm_up {
                 contender.times_s.push(elapsed);

@@ -13,7 +13,7 @@ mod testing;
 mod tetrahedra;
 mod xpbd;
 
-pub use pace::Pace;
+pub use pace::{Pace, tremor};
 
 use crate::problems::{Problem, body::Body};
 use glam::DVec3;

@@ -28,8 +28,18 @@ const DAMPING: f64 = 1.4;
 const REST: f64 = 15.0;
 /// Ramp, in 1/ω, and its least ticks.
 const RAMP: (f64, usize) = (5.0, 100);
+/// Tremor of a hand that presses: its share of the action, and its frequency (Hz), that of physiological tremor.
+const TREMOR: f64 = 0.05;
+const TREMOR_HZ: f64 = 8.0;
 /// Least rest (ticks).
 const LEAST_REST: usize = 200;
+
+/// A hand does not stand still: how much of the action is there in timed ticks, one period of a tremor. Solvers that begin where they
+/// were would otherwise be timed with nothing to do.
+pub fn tremor() -> impl Iterator<Item = f64> + Clone {
+    let period_ticks = (RATE_HZ / TREMOR_HZ).round() as usize;
+    (0..period_ticks).map(move |tick| 1.0 + TREMOR * (TAU * tick as f64 / period_ticks as f64).sin())
+}
 
 impl Pace {
     /// That of a dynamic problem; otherwise from the lowest natural frequency of the problem's coarsest mesh.

@@ -1,7 +1,7 @@
 //! What the lab and a peer's script tell each other; `tests/lab/peers/README.md` describes it for those who write one.
 use crate::{
     measure::LAST,
-    methods::Pace,
+    methods::{Pace, tremor},
     problems::{Problem, load},
 };
 use miette::{Result, miette};
@@ -44,6 +44,8 @@ pub struct Task {
     pub tick_s: f64,
     /// Fraction of the load, tick by tick: ramp and rest.
     pub fractions: Vec<f64>,
+    /// The same of timed ticks, over and over: a tremor.
+    pub timed_fractions: Vec<f64>,
     /// Mass damping (1/s).
     pub damping_per_s: f64,
     /// Ticks at the end over which the answer is averaged.
@@ -77,6 +79,7 @@ impl Task {
             force_sum_n: load.sum_n,
             tick_s: TICK_S,
             fractions: (1..=ticks).map(|tick| pace.fraction(tick)).collect(),
+            timed_fractions: tremor().collect(),
             damping_per_s: pace.damping_per_s,
             last_ticks: LAST,
             budget_s,

@@ -79,9 +79,9 @@ impl Peers {
         peers
     }
 
-    /// Whether peers can be given this problem: dead forces on nodes are the same for all, contact is not.
+    /// Whether peers can be given this problem: dead forces on nodes are the same for all, contact is not; and they are judged at rest.
     pub fn take(problem: &Problem) -> bool {
-        matches!(problem.action, Action::Patch { .. })
+        matches!(problem.action, Action::Patch { .. }) && problem.motion.ticks().is_none()
     }
 
     /// Starts every peer on a problem at every resolution of the quick run, one after the other, and lets it come to rest.

@@ -17,7 +17,7 @@ use body::Body;
 use miette::Result;
 pub use motion::Motion;
 use palpate_physics::material::{Law, Material};
-pub use registry::all;
+pub use registry::{OF_PEERS, all};
 
 /// What is done to a body.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -6,7 +6,8 @@ pub const RATE_HZ: f64 = 1000.0;
 /// Mass damping (1/s) of dynamic problems: free motion falls to a third in a fifth of a second, so that the body rings.
 pub const RINGING_DAMPING_PER_S: f64 = 10.0;
 
-/// How much of an action is there at a time. Within a tick it stands still, as it does in a daemon, for references too.
+/// How much of an action is there at a time. Between the ends of two ticks it goes straight, as [`palpate_physics::TickInput`] has it, for
+/// references too.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Motion {
     /// It comes smoothly and stays until the body rests: how fast, each body has its own pace.
@@ -36,7 +37,7 @@ impl Motion {
         }
     }
 
-    /// Share of the action in a dynamic problem's tick, counted from 1; all of it where the body comes to rest.
+    /// Share of the action at the end of a dynamic problem's tick, counted from 1 (0: before the first); all of it where the body comes to rest.
     pub fn fraction(self, tick: usize) -> f64 {
         match self {
             Self::ToRest => 1.0,

@@ -79,10 +79,12 @@ fn patch(body: Body, (size, force_n): (&str, f64), nu: f64, law: Law) -> Problem
 }
 
 /// The peers' problem: small enough that every law of theirs is Hooke's to first order.
+pub const OF_PEERS: &str = "ventricle-20mm-patch-nu0.40";
+
 fn small_ventricle() -> Problem {
     let (radius_m, force_n) = (4e-3, 0.01);
     Problem {
-        name: "ventricle-20mm-patch-nu0.40".into(),
+        name: OF_PEERS.into(),
         sentence: format!(
             "A smooth dead pressure of {force_n} N on a patch of 4 mm radius presses {}; the answer is the displacement conjugate to it.",
             Body::SmallVentricle.sentence()

@@ -42,12 +42,17 @@ fn on_grid(
     let substeps = substeps.unwrap_or_else(|| (tick_s / dynamics.stable_step_s()).ceil() as usize);
     let clock = Clock { dt_s: tick_s / substeps as f64, damping_per_s: RINGING_DAMPING_PER_S };
     let forces = load.dense(solid.grid.positions_m.len());
+    let mut now = forces.clone();
     let mut values_m = Vec::with_capacity(ticks);
     for tick in 1..=ticks {
         tell(&format!("n = {n}, {substeps} substeps: tick {tick} of {ticks}"));
-        let fraction = problem.motion.fraction(tick);
-        let now: Vec<_> = forces.iter().map(|f| *f * fraction).collect();
-        (0..substeps).for_each(|_| dynamics.step(&now, &clock));
+        let [from, to] = [tick - 1, tick].map(|tick| problem.motion.fraction(tick));
+        for substep in 0..substeps {
+            // At the middle of the step, where leapfrog's force acts.
+            let fraction = from + (to - from) * (substep as f64 + 0.5) / substeps as f64;
+            now.iter_mut().zip(&forces).for_each(|(now, full)| *now = *full * fraction);
+            dynamics.step(&now, &clock);
+        }
         values_m.push(load.displacement_m(&solid.grid.positions_m, &dynamics.x));
     }
     Ok((Series { unknowns: 3 * solid.grid.positions_m.len(), values_m }, substeps))

@@ -122,9 +122,15 @@ pub fn remake(problem: &Problem, tell: &mut dyn FnMut(&str)) -> Result<Reference
         provenance: Provenance {
             date: crate::machine::today_utc(),
             command: format!("cargo run --release -p palpate-lab -- references --remake {}", problem.name),
-            discretisation: "triquadratic hexahedra (27 nodes, 27 Gauss points) with linear pressure (Q2/P1) graded to the contact, symmetric \
-                             part, f64, Newton to a relative residual of 1e-9; displacements of the finest grid"
-                .into(),
+            discretisation: format!(
+                "triquadratic hexahedra (27 nodes, 27 Gauss points){} graded to the contact, symmetric part, f64, Newton to a relative \
+                 residual of 1e-9; displacements of the finest grid",
+                if problem.law == palpate_physics::material::Law::StVenantKirchhoff {
+                    ""
+                } else {
+                    " with linear pressure (Q2/P1)"
+                }
+            ),
             law: format!("{:?}", problem.law),
             young_modulus_pa: problem.young_modulus_pa,
             poisson_ratio: problem.poisson_ratio,

@@ -15,7 +15,7 @@ use crate::{
 };
 use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
-use miette::{Context, IntoDiagnostic, Result, ensure};
+use miette::{Context, IntoDiagnostic, Result, bail, ensure};
 use palpate_realtime::OsMeasures;
 use std::{
     collections::BTreeMap,
@@ -55,7 +55,7 @@ pub struct Options {
     peers_env: Option<PathBuf>,
 }
 
-/// Problems of a quick run: most of those of rubber-like tissue, and the beam.
+/// Problems of a quick run: most of those of rubber-like tissue, and the beam; with peers theirs too.
 fn is_quick(problem: &Problem) -> bool {
     let rubber = problem.name.contains("nu0.45");
     let long = problem.name.contains("patch-large") || problem.name.contains("sweep");
@@ -69,10 +69,28 @@ fn is_quick(problem: &Problem) -> bool {
 pub fn run(options: &Options) -> Result<()> {
     let chosen = |name: &str, filter: &Option<String>| filter.as_deref().is_none_or(|f| name.contains(f));
     let mut problems = problems::all();
-    problems.retain(|p| chosen(&p.name, &options.problem) && (!options.quick || is_quick(p)));
+    let in_extent = |p: &Problem| !options.quick || is_quick(p) || options.peers && p.name == problems::OF_PEERS;
+    problems.retain(|p| chosen(&p.name, &options.problem) && in_extent(p));
     let mut methods = methods::all();
     methods.retain(|m| chosen(m.name(), &options.method));
-    ensure!(!problems.is_empty() && !methods.is_empty(), "no problem or method has such a name");
+    if problems.is_empty() {
+        let names: Vec<String> = problems::all().into_iter().map(|p| p.name).collect();
+        let left_out = options.quick && names.iter().any(|name| chosen(name, &options.problem));
+        ensure!(!left_out, "no such problem is in a quick run: leave out --quick");
+        bail!(
+            "no problem has \"{}\" in its name; there are {}",
+            options.problem.as_deref().unwrap_or_default(),
+            names.join(", ")
+        );
+    }
+    if methods.is_empty() {
+        let names: Vec<String> = methods::all().iter().map(|m| m.name().to_owned()).collect();
+        bail!(
+            "no method has \"{}\" in its name; there are {}",
+            options.method.as_deref().unwrap_or_default(),
+            names.join(", ")
+        );
+    }
     let effort = match (options.quick, options.full) {
         (true, _) => Effort { full: false, rounds: 60, budget_s: 1.2 },
         (_, true) => Effort { full: true, rounds: 1_000, budget_s: 120.0 },

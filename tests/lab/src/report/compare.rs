@@ -30,16 +30,20 @@ pub struct Comparison {
     pub compared: usize,
 }
 
-/// Compares two runs row by row; rows that only one has are regressions if the old one had an answer there.
+/// Compares two runs row by row. A row that only the old one has is a regression if it had an answer there and the new run, of the same
+/// extent, has the problem: a smaller run leaves out whole problems and resolutions, which says nothing.
 pub fn compare(old: &Run, new: &Run, slower: f64, less_accurate: f64) -> Comparison {
     let mut found = Comparison::default();
+    let same_extent = extent(old) == extent(new);
     for before in &old.rows {
         let same = |row: &&Row| {
             (&row.problem, &row.method, row.resolution) == (&before.problem, &before.method, before.resolution)
         };
         let name = format!("{} by {} at {}", before.problem, before.method, before.resolution);
         let Some(after) = new.rows.iter().find(same) else {
-            // A smaller run leaves out whole problems or methods, which says nothing.
+            if same_extent && before.answer.is_some() && new.rows.iter().any(|row| row.problem == before.problem) {
+                found.worse.push(format!("{name}: the row is gone"));
+            }
             continue;
         };
         found.compared += 1;
@@ -66,6 +70,11 @@ pub fn compare(old: &Run, new: &Run, slower: f64, less_accurate: f64) -> Compari
     found
 }
 
+/// How much was run; `None` where it is not stated.
+fn extent(run: &Run) -> Option<&str> {
+    run.circumstances.get("options")?.split(',').next()
+}
+
 fn accuracy(found: &mut Comparison, name: &str, before: &Row, after: &Row, limit: f64) {
     let kinds = [
         ("answer", before.error(), after.error()),
@@ -76,7 +85,7 @@ fn accuracy(found: &mut Comparison, name: &str, before: &Row, after: &Row, limit
     for (kind, b, a) in kinds {
         let (Some(b), Some(a)) = (b, a) else { continue };
         let text = format!("{name}: error of the {kind} {:.3} % → {:.3} %", 100.0 * b, 100.0 * a);
-        if a > b + limit {
+        if a > b + limit || a.is_nan() && !b.is_nan() {
             found.worse.push(text);
         } else if b > a + limit {
             found.better.push(text);
@@ -97,6 +106,11 @@ pub fn run(options: &Options) -> Result<()> {
             println!("{key}: {value} → {now}");
         }
     }
+    for key in ["processor", "build"] {
+        if old.circumstances.get(key) != new.circumstances.get(key) {
+            println!("WARNING the two runs differ in {key}: differences of time say nothing about the code");
+        }
+    }
     for text in &found.better {
         println!("better  {text}");
     }
@@ -105,7 +119,11 @@ pub fn run(options: &Options) -> Result<()> {
     }
     println!("{} rows compared, {} worse, {} better", found.compared, found.worse.len(), found.better.len());
     if found.compared == 0 {
-        bail!("the two runs have no row in common");
+        bail!(
+            "the two runs have no row in common ({} and {}): run both with the same options",
+            extent(&old).unwrap_or("extent not stated"),
+            extent(&new).unwrap_or("extent not stated")
+        );
     }
     if found.worse.is_empty() {
         return Ok(());

@@ -87,14 +87,15 @@ fn introduction(out: &mut String, run: &Run) {
          is nearer to the answer; both axes are logarithmic. Lines join a method's resolutions. Ringed points on the grey band are the \
          Pareto front: nothing is both faster and nearer (1 % of the error counts as a tie, and 10 % of the time, or three times the unrest of both where that is more, but \
          no more than 30 %). Hollow points are out of competition: their material is not the problem's, so that errors may cancel (the 2006 paper's \
-         factors halve the stiffness, and coarse meshes are too stiff). Right of the dashed red line a tick takes longer than the millisecond it \
+         factors halve the stiffness, and coarse meshes are too stiff), or their answer still moves by more than 1 %, so that its error is not known. Right of the dashed red line a tick takes longer than the millisecond it \
          has. In the shaded strip at the bottom errors are below the reference's own uncertainty and say nothing. An error that falls and rises \
          again along a line has changed its sign.</p><p><b>How it was measured.</b> The tool or load comes smoothly and rests, with mass \
          damping near critical for the body's slowest mode, the same for every method; the answer is the mean over the last 20 ticks, and \
          the table says how far it still moves. In dynamic problems (a step, a sweep) the body rings under light damping instead; \
          the answer is compared at every tick, its error is the L2 norm in time of the difference over that of the reference (never negative: a \
          phase that is lost weighs like a missing amplitude), and the table shows the root mean square as the answer. Then all methods of a problem take turns, one untimed tick to warm the caches and one timed, \
-         so that a slow moment of the machine strikes all of them.</p><table class=\"text\">",
+         so that a slow moment of the machine strikes all of them. A hand does not stand still, and solvers that begin where they were would have nothing \
+         to do if it did: in these ticks tool or load trembles by 5 % at 8 Hz.</p><table class=\"text\">",
     );
     for (key, value) in &run.circumstances {
         let _ = write!(out, "<tr><td>{}</td><td>{}</td></tr>", escape(key), escape(value));
@@ -117,7 +118,7 @@ fn summary(out: &mut String, run: &Run, problems: &[Problem]) {
     for problem in problems {
         let rows: Vec<&Row> = rows_of(run, problem)
             .into_iter()
-            .filter(|r| r.competes && r.median_us.is_some_and(|t| t < 1000.0))
+            .filter(|r| r.is_in_competition() && r.median_us.is_some_and(|t| t < 1000.0))
             .collect();
         let best = |rows: &[&Row]| {
             rows.iter()
@@ -196,7 +197,7 @@ fn names<'a>(run: &'a Run, methods: &'a [Box<dyn Method>]) -> Vec<&'a str> {
 fn point(row: &Row, rows: &[&Row]) -> Option<Point> {
     let (time_us, error) = (row.median_us?, row.error()?);
     let label = format!("{} elements, {time_us:.1} µs, {}", row.elements, percent(row.answer_error));
-    Some(Point { time_us, error, on_front: row.is_on_front(rows), competes: row.competes, label })
+    Some(Point { time_us, error, on_front: row.is_on_front(rows), competes: row.is_in_competition(), label })
 }
 
 fn table(out: &mut String, problem: &Problem, rows: &[&Row]) {

@@ -109,7 +109,7 @@ pub(super) fn section(out: &mut String, run: &Run) {
         "<h2>Peers</h2><p>Other people's simulators on the same meshes, masses and nodal forces, one thread each, through their Python \
          packages. They run in processes of their own, so that they and our methods took turns in ten blocks rather than tick by tick; \
          within a block a turn is again one untimed tick and one timed. Only the call that steps their simulation is timed: loads and mass \
-         damping are set outside it. They are timed at rest, where iterative solvers have little to do. Only dead loads are given to them: \
+         damping are set outside it. They are timed under the same tremor. Only dead loads are given to them: \
          what a sphere feels would measure how soft their contact is set, for neither has contact as an unyielding surface.</p><p>Where a \
          peer's law is not the problem's its points are hollow. At small strain all these laws are Hooke's, so that the difference is of the \
          order of the strain. Linear tetrahedra are alike for all: on the same mesh a converged peer has our error.</p>\

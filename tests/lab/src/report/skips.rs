@@ -9,7 +9,7 @@ pub(super) fn section(out: &mut String, found: &[(Skip, Found)]) {
     }
     out.push_str(
         "<h2 id=\"skips\">What is skipped</h2><p>What a scene does not need is not computed. Each line is one scene run twice, in turns: with \
-         the skip, and with it switched off. Exact skips must end in the same state, bit for bit; a bounded one may be as far from it as is said.</p><div class=\"wide\">\
+         the skip, and with it switched off or, for rest data, with what is skipped done beside it. Exact skips must end in the same state, bit for bit; a bounded one may be as far from it as is said.</p><div class=\"wide\">\
          <table class=\"text\"><tr><th>skip</th><th>what is left out</th><th>measured in</th><th>µs a tick</th><th>without</th><th>saved</th>\
          <th>the same?</th></tr>",
     );

@@ -60,14 +60,14 @@ pub const ALL: [Skip; 5] = [
     Skip {
         name: "viscous terms",
         what: "strain rates and viscous stress of materials with phi = psi = 0",
-        scene: "ventricle of 1 352 tets, ringing, a sphere pressed in",
+        scene: "ventricle of about 1 352 tets, ringing, a sphere pressed in",
         tolerance_m: None,
         run: pair::viscous_terms,
     },
     Skip {
         name: "distant contact, tool away",
         what: "contact tests of triangles that a tool cannot have reached since they were last looked at",
-        scene: "ventricle of 10 000 tets, ringing, a sphere 20 mm away",
+        scene: "ventricle of about 10 000 tets, ringing, a sphere 20 mm away",
         tolerance_m: None,
         run: pair::distant_contact_away,
     },
@@ -81,14 +81,14 @@ pub const ALL: [Skip; 5] = [
     Skip {
         name: "rest data",
         what: "inverse edge matrices, shape gradients and volumes: computed at load, not in every substep",
-        scene: "ventricle of 1 352 tets; off: the tick and all rest data once a substep",
+        scene: "ventricle of about 1 352 tets; off: the tick and all rest data once a substep",
         tolerance_m: None,
         run: rest_data::run,
     },
     Skip {
         name: "sleep",
         what: "all of a body that is at rest, while no tool is near and nothing acts on it that did not before",
-        scene: "ventricle of 1 352 tets, damped, come to rest, a sphere 20 mm away",
+        scene: "ventricle of about 1 352 tets, damped, come to rest, a sphere 20 mm away",
         // Twice the body's distance from rest when it is left: it would go to the other side.
         tolerance_m: Some(2.0 * sleep::TOLERANCE_M),
         run: sleep::run,

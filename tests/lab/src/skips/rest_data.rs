@@ -22,5 +22,7 @@ pub(super) fn run(rounds: usize) -> Result<Found> {
         again.tick();
     };
     let times = interleaved(&mut [Box::new(|| _ = once.tick()), Box::new(&mut recompute)], rounds);
-    Ok(Found { with: times[0], without: times[1], same_bits: rest_tets == model.rest_tets(), farthest_m: 0.0 })
+    let same_bits = rest_tets == model.rest_tets() && once.state() == again.state();
+    let farthest_m = pair::farthest_m(once.state(), again.state());
+    Ok(Found { with: times[0], without: times[1], same_bits, farthest_m })
 }

@@ -155,7 +155,7 @@ fn blows(good: &Rig, outcome: &mut Outcome) {
     }
 }
 
-const FIELDS: [&str; 21] = [
+const FIELDS: [&str; 23] = [
     "a node's position",
     "young_modulus_pa",
     "poisson_ratio",
@@ -177,6 +177,8 @@ const FIELDS: [&str; 21] = [
     "tick_period_s",
     "step_safety or stretch_allowance",
     "mass_damping_per_s",
+    "solver_tolerance",
+    "sleep_tolerance_m",
 ];
 
 /// Builds the model with one bad number in one of [`FIELDS`]; the error's text if it was refused.
@@ -220,7 +222,9 @@ fn spoil_field(spec: &mut ModelSpec, field: usize, bad: f64, axis: usize, random
         18 => spec.settings.tick_period_s = bad,
         19 if axis == 0 => spec.settings.step_safety = bad,
         19 => spec.settings.stretch_allowance = bad,
-        _ => spec.settings.mass_damping_per_s = bad,
+        20 => spec.settings.mass_damping_per_s = bad,
+        21 => spec.settings.solver_tolerance = bad,
+        _ => spec.settings.sleep_tolerance_m = bad,
     }
 }
 

@@ -26,13 +26,13 @@ const PRESSURE_PA: f64 = 1.0;
 const LOCKING: &str = "linear tetrahedra lock as nu -> 1/2: one volume constraint per tet leaves too few free displacements; \
                        nodal smoothing is not built yet";
 
-/// ν and the largest error of u(a) (%).
-const ALLOWED: [(f64, f64); 4] = [(0.45, 2.0), (0.49, 3.0), (0.499, 5.0), (0.4999, 8.0)];
+/// ν, the largest error of u(a) (%), and the largest that locking is known to make of it on the coarsest of the last meshes.
+const ALLOWED: [(f64, f64, f64); 4] = [(0.45, 2.0, 20.0), (0.49, 3.0, 33.0), (0.499, 5.0, 40.0), (0.4999, 8.0, 40.0)];
 
 pub(super) fn run(options: &Options) -> Result<Outcome> {
     let meshes: &[usize] = options.pick(&[4, 8], &[6, 12, 24], &[12, 24, 48]);
     let mut outcome = Outcome::passing();
-    for (poisson, allowed_percent) in ALLOWED {
+    for (poisson, allowed_percent, locked_percent) in ALLOWED {
         let exact_m = exact::lame_m(OCTANT_M[0], PRESSURE_PA, YOUNG_PA, poisson);
         let mut last = None;
         for (index, &cells) in meshes.iter().enumerate() {
@@ -42,7 +42,7 @@ pub(super) fn run(options: &Options) -> Result<Outcome> {
             outcome.push(if index + 1 < meshes.len() {
                 Measured::value(name, percent.abs(), "%")
             } else {
-                Measured::bounded(name, percent.abs(), "%", allowed_percent).known_to_exceed(LOCKING)
+                Measured::bounded(name, percent.abs(), "%", allowed_percent).known_to_exceed(LOCKING, locked_percent)
             });
             if let Some(before_m) = last.replace(inner_m)
                 && index + 1 == meshes.len()

@@ -11,8 +11,8 @@ pub struct Measured {
     pub unit: &'static str,
     /// The most it may be; none of a number that is only told.
     pub limit: Option<f64>,
-    /// Why it is known to exceed its limit.
-    pub shortfall: Option<&'static str>,
+    /// Why it is known to exceed its limit, and by what it may at most.
+    pub shortfall: Option<(&'static str, f64)>,
 }
 
 impl Measured {
@@ -26,10 +26,16 @@ impl Measured {
         Self { limit: Some(limit), ..Self::value(name, value, unit) }
     }
 
-    /// The same, known to exceed it for a reason.
+    /// The same, known to exceed it for a reason, but not to exceed `at_most`.
     #[must_use]
-    pub fn known_to_exceed(self, reason: &'static str) -> Self {
-        Self { shortfall: Some(reason), ..self }
+    pub fn known_to_exceed(self, reason: &'static str, at_most: f64) -> Self {
+        Self { shortfall: Some((reason, at_most)), ..self }
+    }
+
+    /// Beyond its limit, and not as is known of it.
+    fn surprises(&self) -> bool {
+        let is_known = self.shortfall.is_some_and(|(_, at_most)| self.value <= at_most);
+        !self.holds() && !is_known
     }
 
     /// Within its limit, if it has one. NaN never is.
@@ -70,7 +76,7 @@ impl Outcome {
 
     /// Something falls short that is not known to.
     pub fn surprises(&self) -> bool {
-        !self.broken.is_empty() || self.measured.iter().any(|m| !m.holds() && m.shortfall.is_none())
+        !self.broken.is_empty() || self.measured.iter().any(Measured::surprises)
     }
 
     /// Why it does not pass; empty if it does.
@@ -78,8 +84,8 @@ impl Outcome {
         let mut reasons: Vec<String> = self.broken.clone();
         for measured in self.measured.iter().filter(|m| !m.holds()) {
             let reason = match measured.shortfall {
-                Some(known) => known.to_owned(),
-                None => format!("{} is too large", measured.name),
+                Some((known, _)) if !measured.surprises() => known.to_owned(),
+                _ => format!("{} is too large", measured.name),
             };
             if !reasons.contains(&reason) {
                 reasons.push(reason);
@@ -95,10 +101,14 @@ mod tests {
 
     #[test]
     fn a_known_shortfall_fails_but_does_not_surprise() {
-        let known = Measured::bounded("a", 2.0, "1", 1.0).known_to_exceed("it is so");
-        let outcome = Outcome { measured: vec![known], broken: vec![] };
+        let known = Measured::bounded("a", 2.0, "1", 1.0).known_to_exceed("it is so", 3.0);
+        let outcome = Outcome { measured: vec![known.clone()], broken: vec![] };
         assert!(!outcome.passed() && !outcome.surprises());
         assert_eq!(outcome.reason(), "it is so");
+        for value in [3.1, f64::NAN] {
+            let more = Outcome { measured: vec![Measured { value, ..known.clone() }], broken: vec![] };
+            assert!(more.surprises() && more.reason() == "a is too large");
+        }
         let nan = Outcome { measured: vec![Measured::bounded("b", f64::NAN, "1", 1.0)], broken: vec![] };
         assert!(!nan.passed() && nan.surprises());
     }
