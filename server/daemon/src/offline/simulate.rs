@@ -153,6 +153,7 @@ pub(super) struct Run<'s> {
     prescribed_m: Vec<DVec3>,
     tick_wall_ns: Histogram<u64>,
     repeated_ticks: u64,
+    asleep_ticks: u64,
 }
 
 impl<'s> Run<'s> {
@@ -168,6 +169,7 @@ impl<'s> Run<'s> {
             prescribed_m: vec![DVec3::ZERO; scene.model.prescribed.len()],
             tick_wall_ns: Histogram::new_with_bounds(1, LONGEST_TICK_NS, 3).into_diagnostic()?,
             repeated_ticks: 0,
+            asleep_ticks: 0,
         })
     }
 
@@ -235,6 +237,7 @@ impl<'s> Run<'s> {
         let started = Instant::now();
         let report = step(self.model, &mut self.state, &mut self.scratch, &input);
         self.repeated_ticks += u64::from(report.repeated > 0);
+        self.asleep_ticks += u64::from(report.substeps == 0);
         self.tick_wall_ns.saturating_record(started.elapsed().as_nanos() as u64);
     }
 
@@ -248,6 +251,7 @@ impl<'s> Run<'s> {
             ticks: self.state.tick,
             substeps_per_tick: self.model.substeps(),
             repeated_ticks: self.repeated_ticks,
+            asleep_ticks: self.asleep_ticks,
             tick_wall_us: Percentiles {
                 mean: wall.mean() * 1e-3,
                 p50: us(wall.value_at_quantile(0.5)),

@@ -50,6 +50,8 @@ pub(super) struct TimeNumbers {
     pub(super) substeps_per_tick: u32,
     /// Ticks that proved unstable and were repeated in more substeps.
     pub(super) repeated_ticks: u64,
+    /// Ticks that a body at rest slept through.
+    pub(super) asleep_ticks: u64,
     pub(super) tick_wall_us: Percentiles,
     /// Simulated time over the wall time of its ticks.
     pub(super) real_time_factor: f64,
@@ -187,6 +189,9 @@ impl Summary {
                 counted(time.ticks as usize, "tick"),
                 counted(time.substeps_per_tick as usize, "substep")
             );
+            if time.asleep_ticks > 0 {
+                println!("  {} slept through, at rest", counted(time.asleep_ticks as usize, "tick"));
+            }
             if time.repeated_ticks > 0 {
                 let ticks = counted(time.repeated_ticks as usize, "tick");
                 println!("  {ticks} proved unstable and had to be repeated in more substeps");

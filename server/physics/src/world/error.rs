@@ -47,7 +47,7 @@ pub enum ModelError {
     },
     /// A body that cannot tell how near to rest it is.
     #[error(
-        "whether a body may sleep follows from its lowest natural frequency: {source}; or let it never sleep (sleep tolerance 0)"
+        "whether a body may sleep follows from its lowest natural frequency, which it has where it is held (or let it never sleep)"
     )]
     Sleep {
         /// Why there is none.

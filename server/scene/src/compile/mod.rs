@@ -100,6 +100,8 @@ pub(crate) fn compile(
     })
 }
 
+/// A hand would feel a body that is further from rest.
+const MAX_SLEEP_TOLERANCE_UM: f64 = 100.0;
 /// A solver that needs more is not meant for a tick.
 const MAX_SOLVER_ITERATIONS: u32 = 10_000;
 
@@ -131,8 +133,8 @@ fn settings(document: &Document) -> Result<Settings, Fault> {
     check(&at.key("solver_iterations"), solver_iterations, iterations_ok, "must be 1 to 10000")?;
     let tolerance_ok = solver_tolerance > 0.0 && solver_tolerance < 1.0;
     check(&at.key("solver_tolerance"), solver_tolerance, tolerance_ok, "must be in (0, 1)")?;
-    let sleep_ok = sleep_tolerance_um >= 0.0 && sleep_tolerance_um.is_finite();
-    check(&at.key("sleep_tolerance_um"), sleep_tolerance_um, sleep_ok, "must be 0 (never sleeps) or larger")?;
+    let sleep_ok = (0.0..=MAX_SLEEP_TOLERANCE_UM).contains(&sleep_tolerance_um);
+    check(&at.key("sleep_tolerance_um"), sleep_tolerance_um, sleep_ok, "must be 0 (never sleeps) to 100")?;
     let seeds = matches!(integrator, IntegratorName::SeedVerlet | IntegratorName::SeedSemiImplicit);
     check(
         &at.key("sleep_tolerance_um"),

@@ -105,6 +105,9 @@ pub fn run(options: &Options) -> Result<()> {
         println!("{peer}: {note}");
     }
     let pinned = OsMeasures { processor: options.processor, ..OsMeasures::NONE }.apply();
+    if let Some(refused) = pinned.notes.iter().find(|note| options.processor.is_some() && !note.granted) {
+        bail!("{}", refused.text);
+    }
     let noise = Noise::measure(2_000);
     let bar = ProgressBar::new(problems.len() as u64);
     bar.set_style(ProgressStyle::with_template("{bar:20} {pos}/{len} {elapsed} {prefix}: {msg}").into_diagnostic()?);

@@ -7,9 +7,9 @@ use std::path::{Path, PathBuf};
 /// Two runs.
 #[derive(Debug, Clone, Args)]
 pub struct Options {
-    /// results.csv of the run before
+    /// results.csv of the run before, or its folder
     old: PathBuf,
-    /// results.csv of the run after
+    /// results.csv of the run after, or its folder
     new: PathBuf,
     /// Slower counts from this fraction on, also where noise is less
     #[arg(long, default_value_t = 0.10)]
@@ -118,6 +118,10 @@ pub fn run(options: &Options) -> Result<()> {
         println!("WORSE   {text}");
     }
     println!("{} rows compared, {} worse, {} better", found.compared, found.worse.len(), found.better.len());
+    let alone = (old.rows.len() - found.compared, new.rows.len() - found.compared);
+    if alone != (0, 0) {
+        println!("{} rows are in the old run alone, {} in the new one alone", alone.0, alone.1);
+    }
     if found.compared == 0 {
         bail!(
             "the two runs have no row in common ({} and {}): run both with the same options",
@@ -128,10 +132,11 @@ pub fn run(options: &Options) -> Result<()> {
     if found.worse.is_empty() {
         return Ok(());
     }
-    bail!("{} regressions", found.worse.len())
+    bail!("worse in {} respect{}", found.worse.len(), if found.worse.len() == 1 { "" } else { "s" })
 }
 
 fn load(path: &Path) -> Result<Run> {
+    let path = &if path.is_dir() { path.join("results.csv") } else { path.to_owned() };
     let text =
         std::fs::read_to_string(path).into_diagnostic().wrap_err_with(|| format!("cannot read {}", path.display()))?;
     measure::read(&text).wrap_err_with(|| path.display().to_string())

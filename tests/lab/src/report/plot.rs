@@ -24,7 +24,7 @@ pub(super) struct Point {
 const WIDTH: f64 = 640.0;
 const HEIGHT: f64 = 380.0;
 const LEFT: f64 = 62.0;
-const RIGHT: f64 = 14.0;
+const RIGHT: f64 = 30.0;
 const TOP: f64 = 14.0;
 const BOTTOM: f64 = 46.0;
 /// The tick that all is about (µs).
@@ -72,7 +72,8 @@ pub(super) fn svg(series: &[Series<'_>], floor: f64) -> String {
     let place = |p: &Point| format!("{:.1},{:.1}", x.at(p.time_us), y.at(p.error));
     let line: Vec<String> = front.iter().map(|p| place(p)).collect();
     let _ = write!(out, "<polyline class=\"front\" points=\"{}\"/>", line.join(" "));
-    for s in series {
+    // The first, the default, on top.
+    for s in series.iter().rev() {
         let line: Vec<String> = s.points.iter().map(place).collect();
         let _ = write!(out, "<polyline class=\"series\" stroke=\"{}\" points=\"{}\"/>", s.colour, line.join(" "));
         for p in &s.points {

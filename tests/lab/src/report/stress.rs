@@ -1,20 +1,24 @@
 //! The page's section on numerical stress.
 use super::page::escape;
+use crate::measure::Run;
 use crate::stress::{Measured, NOT_BUILT, Outcome, Record, Row, number, records, verdict};
 use miette::Result;
 use std::fmt::Write as _;
 
-pub(super) fn section(out: &mut String, results: &[(Row, Outcome)]) -> Result<()> {
+pub(super) fn section(out: &mut String, results: &[(Row, Outcome)], run: &Run) -> Result<()> {
     if results.is_empty() {
         return Ok(());
     }
     out.push_str(
         "<h2 id=\"stress\">Numerical stress</h2><p>What the numerics are put through, and what passes. A row that fails says why; \
-         <code>docs/stress.md</code> tells more. Open a row for its numbers.</p>",
+         <code>docs/stress.md</code> tells more. Open a row for its numbers, which are of the form that is named: <code>palpate-lab stress</code> goes through the short one, with \
+         <code>--long</code> through the one that the criterion names; a quick run reduces it further.</p>",
     );
+    let quick = run.circumstances.get("options").is_some_and(|options| options.starts_with("quick"));
+    let form = if quick { "reduced form" } else { "short form" };
     for (row, outcome) in results {
         let numbers = outcome.measured.iter().map(|m: &Measured| (m.name.as_str(), m.value, m.unit, m.limit));
-        entry(out, [row.name, row.criterion, verdict(outcome), &outcome.reason()], numbers);
+        entry(out, [row.name, row.criterion, verdict(outcome), &outcome.reason(), form], numbers);
     }
     for (name, reason) in NOT_BUILT {
         let _ = write!(out, "<p><b>{}</b>: {}</p>", escape(name), escape(reason));
@@ -25,7 +29,7 @@ pub(super) fn section(out: &mut String, results: &[(Row, Outcome)]) -> Result<()
     }
     for Record { row, criterion, verdict, reason, command, date, commit, processor, elapsed_s, numbers } in &records {
         let numbers = numbers.iter().map(|n| (n.name.as_str(), n.value, n.unit.as_str(), n.limit));
-        entry(out, [row, criterion, verdict, reason], numbers);
+        entry(out, [row, criterion, verdict, reason, "long form"], numbers);
         let circumstances = format!("{date}, commit {commit}, {processor}, {elapsed_s} s, by {command}");
         let _ = write!(out, "<p>{}</p>", escape(&circumstances));
     }
@@ -34,14 +38,14 @@ pub(super) fn section(out: &mut String, results: &[(Row, Outcome)]) -> Result<()
 
 fn entry<'a>(
     out: &mut String,
-    [name, criterion, verdict, reason]: [&str; 4],
+    [name, criterion, verdict, reason, form]: [&str; 5],
     numbers: impl Iterator<Item = (&'a str, f64, &'a str, Option<f64>)>,
 ) {
     let class = if verdict == "passes" { "yes" } else { "no" };
     let because = if reason.is_empty() { String::new() } else { format!(" Because: {reason}.") };
     let _ = write!(
         out,
-        "<details><summary><b>{}</b> <span class=\"{class}\">{verdict}</span>: {}.{}</summary><table><tr><th>number</th>\
+        "<details><summary><b>{}</b> <span class=\"{class}\">{verdict}</span> ({form}): {}.{}</summary><table><tr><th>number</th>\
          <th>value</th><th>at most</th><th>unit</th></tr>",
         escape(name),
         escape(criterion),
