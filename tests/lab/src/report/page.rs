@@ -62,7 +62,10 @@ pub(super) fn page(results: &Results<'_>) -> Result<String> {
     introduction(&mut out, run);
     summary(&mut out, run, problems);
     convergence::section(&mut out, results.convergence);
-    out.push_str("<h2>Methods</h2><table class=\"text\"><tr><th>method</th><th>what it is</th></tr>");
+    out.push_str(
+        "<h2>Methods</h2><p>The seeds are the two papers on hybrid deformable models for haptics, of 2005 and 2006, that Palpate sets out from; \
+         their schemes are run as they print them.</p><table class=\"text\"><tr><th>method</th><th>what it is</th></tr>",
+    );
     for method in *methods {
         let _ = write!(out, "<tr><td>{}</td><td>{}</td></tr>", escape(method.name()), escape(method.what()));
     }
@@ -95,7 +98,8 @@ fn introduction(out: &mut String, run: &Run) {
          the answer is compared at every tick, its error is the L2 norm in time of the difference over that of the reference (never negative: a \
          phase that is lost weighs like a missing amplitude), and the table shows the root mean square as the answer. Then all methods of a problem take turns, one untimed tick to warm the caches and one timed, \
          so that a slow moment of the machine strikes all of them. A hand does not stand still, and solvers that begin where they were would have nothing \
-         to do if it did: in these ticks tool or load trembles by 5 % at 8 Hz.</p><table class=\"text\">",
+         to do if it did: in these ticks tool or load trembles by 5 % at 8 Hz. The unrest of a row is how far the medians of the two halves of its turns are \
+         apart: a problem whose rows have more than some 10 % should be run again on a quieter machine.</p><table class=\"text\">",
     );
     for (key, value) in &run.circumstances {
         let _ = write!(out, "<tr><td>{}</td><td>{}</td></tr>", escape(key), escape(value));
