@@ -15,27 +15,41 @@ pub(super) fn drift(state: &mut State, dt_s: f64) -> f64 {
     most.into_iter().fold(0.0, f64::max).sqrt()
 }
 
-/// `v ← (v e^{−c h/2} + h f/m) e^{−c h/2}`, and the ledger's share of it.
+/// `v ← (v e^{−c h/2} + h f/m) e^{−c h/2}`, and the ledger's share of it: what damping takes, `½ (1 − e^{−c h}) m v²` of the velocity before and
+/// of that after the force.
 pub(super) fn kick(model: &Model, state: &mut State, h_s: f64) {
     let damping = model.spec().settings.mass_damping_per_s;
-    let half = (damping > 0.0).then(|| (-0.5 * damping * h_s).exp());
-    if let Some(factor) = half {
-        damp(model, state, factor);
-    }
     let mut power_w = DVec3::ZERO;
-    let external = &state.external_n;
-    for (((v, force), inverse_mass), external) in
-        state.v.iter_mut().zip(&state.force_n).zip(model.inverse_mass_per_kg()).zip(external)
-    {
-        let change = *force * *inverse_mass * h_s;
-        power_w += *external * (*v + change * 0.5);
-        *v += change;
+    let nodes = state.v.iter_mut().zip(&state.force_n).zip(model.inverse_mass_per_kg()).zip(&state.external_n);
+    if damping > 0.0 {
+        let factor = (-0.5 * damping * h_s).exp();
+        let mut twice_kinetic_j = [DVec3::ZERO; 2];
+        for ((((v, force), inverse_mass), external), mass) in nodes.zip(model.mass_kg()) {
+            let held = inverse_mass.cmpeq(DVec3::ZERO);
+            let (factor, mass) = (
+                DVec3::select(held, DVec3::ONE, DVec3::splat(factor)),
+                DVec3::select(held, DVec3::ZERO, DVec3::splat(*mass)),
+            );
+            twice_kinetic_j[0] += *v * *v * mass;
+            let damped = *v * factor;
+            let change = *force * *inverse_mass * h_s;
+            power_w += *external * (damped + change * 0.5);
+            let kicked = damped + change;
+            twice_kinetic_j[1] += kicked * kicked * mass;
+            *v = kicked * factor;
+        }
+        let taken = -(-damping * h_s).exp_m1();
+        state.ledger.dissipated_j += 0.5 * taken * (twice_kinetic_j[0] + twice_kinetic_j[1]).element_sum();
+    } else {
+        for (((v, force), inverse_mass), external) in nodes {
+            let change = *force * *inverse_mass * h_s;
+            power_w += *external * (*v + change * 0.5);
+            *v += change;
+        }
     }
-    state.ledger.external_work_j += h_s * (power_w.element_sum() + holders_power_w(model, state));
+    state.ledger.external_work_j += h_s * power_w.element_sum();
     state.ledger.dissipated_j += h_s * state.viscous.work_rate_w();
-    if let Some(factor) = half {
-        damp(model, state, factor);
-    }
+    state.ledger.external_work_j += h_s * holders_power_w(model, state);
 }
 
 /// Power (W) of the holders' reactions, `−f` on prescribed axes, whose velocity a kick leaves alone.
