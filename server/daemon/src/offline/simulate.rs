@@ -237,7 +237,7 @@ impl<'s> Run<'s> {
         let started = Instant::now();
         let report = step(self.model, &mut self.state, &mut self.scratch, &input);
         self.repeated_ticks += u64::from(report.repeated > 0);
-        self.asleep_ticks += u64::from(report.substeps == 0);
+        self.asleep_ticks += u64::from(report.substeps == 0 && self.state.sleep.asleep);
         self.tick_wall_ns.saturating_record(started.elapsed().as_nanos() as u64);
     }
 

@@ -30,7 +30,7 @@ pub fn step(model: &Model, state: &mut State, scratch: &mut Scratch, input: &Tic
     {
         return report;
     }
-    let was_quiet = state.sleep.is_quiet(&state.load_factors, input);
+    let was_quiet = model.rest_bound().is_some() && state.sleep.is_quiet(&state.load_factors, input);
     let judged = is_judged(model);
     scratch.last_good.keep(state);
     if judged {

@@ -34,8 +34,7 @@ impl Oracle {
             let material = &self.materials[material as usize];
             let corners = nodes.map(|n| x[n as usize]);
             let velocities = nodes.map(|n| v[n as usize]);
-            // Not by `Viscosity::is_zero`, which the kernel trusts.
-            if material.viscosity.phi_pa_s != 0.0 || material.viscosity.psi_pa_s != 0.0 {
+            if !material.viscosity.is_zero() {
                 viscous_power_w += rest.viscous_power_w(material, &corners, &velocities);
             }
             for (&node, force) in nodes.iter().zip(rest.forces_n(material, &corners, &velocities)) {

@@ -31,7 +31,7 @@ pub struct Comparison {
 }
 
 /// Compares two runs row by row. A row that only the old one has is a regression if it had an answer there and the new run, of the same
-/// extent, has the problem: a smaller run leaves out whole problems and resolutions, which says nothing.
+/// extent, has the problem and the method elsewhere: a smaller run leaves out whole problems, methods or resolutions, which says nothing.
 pub fn compare(old: &Run, new: &Run, slower: f64, less_accurate: f64) -> Comparison {
     let mut found = Comparison::default();
     let same_extent = extent(old) == extent(new);
@@ -41,7 +41,8 @@ pub fn compare(old: &Run, new: &Run, slower: f64, less_accurate: f64) -> Compari
         };
         let name = format!("{} by {} at {}", before.problem, before.method, before.resolution);
         let Some(after) = new.rows.iter().find(same) else {
-            if same_extent && before.answer.is_some() && new.rows.iter().any(|row| row.problem == before.problem) {
+            let has = |same: fn(&Row) -> &String| new.rows.iter().any(|row| same(row) == same(before));
+            if same_extent && before.answer.is_some() && has(|row| &row.problem) && has(|row| &row.method) {
                 found.worse.push(format!("{name}: the row is gone"));
             }
             continue;
@@ -162,6 +163,19 @@ mod tests {
         let run = |row| Run { rows: vec![row], ..Run::default() };
         let found = compare(&run(old), &run(new), 0.1, 1e-3);
         (found.worse.len(), found.better.len())
+    }
+
+    #[test]
+    fn a_row_that_is_gone_counts_unless_the_run_was_a_smaller_one() {
+        let at = |method: &str, resolution| Row { method: method.into(), resolution, ..row(100.0, 0.0, 0.1) };
+        let run = |rows| Run { rows, ..Run::default() };
+        let old = run(vec![at("m", 1), at("m", 2), at("n", 1)]);
+        let worse = |new: &Run| compare(&old, new, 0.1, 1e-3).worse.len();
+        assert_eq!(worse(&run(vec![at("m", 1), at("n", 1)])), 1, "a resolution is gone");
+        assert_eq!(worse(&run(vec![at("m", 1), at("m", 2)])), 0, "a method was left out");
+        let mut quick = run(vec![at("m", 1), at("n", 1)]);
+        quick.circumstances.insert("options".into(), "quick, 60 timed turns".into());
+        assert_eq!(worse(&quick), 0, "a smaller extent");
     }
 
     #[test]
