@@ -10,6 +10,7 @@
 pub mod contact;
 pub mod fem;
 pub mod health;
+pub mod hybrid;
 pub mod integrate;
 pub mod material;
 pub mod mesh;
