@@ -46,9 +46,7 @@ impl RestTet {
 
     /// Power `V S_v : Ė` (W ≥ 0) that viscous stress takes.
     pub fn viscous_power_w(&self, material: &Material, x: &[DVec3; 4], v: &[DVec3; 4]) -> f64 {
-        let e_dot = viscous::strain_rate(&self.gradient_of(x), &self.gradient_of(v));
-        let s = viscous::second_piola(material.viscosity, &e_dot);
-        self.volume_m3 * crate::material::stvk::contract(&s, &e_dot)
+        self.volume_m3 * viscous::power_density(material.viscosity, &self.gradient_of(x), &self.gradient_of(v))
     }
 
     /// `f_i = −V P b_i` (N).

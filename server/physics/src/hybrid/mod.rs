@@ -1,5 +1,11 @@
 //! The hybrid body: coarse tetrahedra throughout, and particles of which only those near a contact are awake.
+pub mod cell;
+pub mod composite;
+mod locate;
 pub mod moments;
+pub mod partition;
+pub mod patch;
+pub mod share;
 pub mod sites;
 pub mod skin;
 #[cfg(test)]

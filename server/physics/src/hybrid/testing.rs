@@ -1,5 +1,9 @@
 //! Shapes for tests.
-use super::skin::Skin;
+use super::{composite::Composite, moments::integrate, partition::Partition, sites::Sites, skin::Skin};
+use crate::{
+    material::{Convention, Lame, Law, Material, Viscosity},
+    mesh::TetMesh,
+};
 use glam::DVec3;
 use std::collections::BTreeMap;
 
@@ -37,4 +41,73 @@ pub(crate) fn ball(radius_m: f64, centre_m: DVec3, rounds: u32) -> Skin {
     }
     let on_sphere = points.iter().map(|p| centre_m + p.normalize() * radius_m).collect();
     Skin::new(on_sphere, triangles).unwrap()
+}
+
+/// Numbers without a pattern (xorshift64).
+pub(crate) struct Random(pub(crate) u64);
+
+impl Random {
+    /// In [0, 1).
+    pub(crate) fn unit(&mut self) -> f64 {
+        for shift in [13_i32, -7, 17] {
+            self.0 ^= if shift > 0 { self.0 << shift } else { self.0 >> -shift };
+        }
+        (self.0 >> 11) as f64 / (1_u64 << 53) as f64
+    }
+
+    /// Components in (−1, 1).
+    pub(crate) fn vector(&mut self) -> DVec3 {
+        DVec3::new(self.unit(), self.unit(), self.unit()) * 2.0 - DVec3::ONE
+    }
+}
+
+/// A box of `cells` of six tets each.
+pub(crate) fn tet_box(low: DVec3, size: DVec3, cells: [usize; 3]) -> TetMesh {
+    let count = cells.map(|n| n + 1);
+    let number = |[i, j, k]: [usize; 3]| ((k * count[1] + j) * count[0] + i) as u32;
+    let places = |n: [usize; 3]| {
+        (0..n[2]).flat_map(move |k| (0..n[1]).flat_map(move |j| (0..n[0]).map(move |i| [i, j, k])))
+    };
+    let positions: Vec<DVec3> = places(count)
+        .map(|at| low + size * DVec3::from(std::array::from_fn(|axis| at[axis] as f64 / cells[axis] as f64)))
+        .collect();
+    let mut tets = Vec::new();
+    for place in places(cells) {
+        for order in [[0, 1, 2], [0, 2, 1], [1, 0, 2], [1, 2, 0], [2, 0, 1], [2, 1, 0]] {
+            let mut at = place;
+            let mut tet = [number(at); 4];
+            for (step, axis) in order.into_iter().enumerate() {
+                at[axis] += 1;
+                tet[step + 1] = number(at);
+            }
+            let [a, b, c, d] = tet.map(|n| positions[n as usize]);
+            if (b - a).cross(c - a).dot(d - a) < 0.0 {
+                tet.swap(2, 3);
+            }
+            tets.push(tet);
+        }
+    }
+    TetMesh::new(positions, tets).unwrap()
+}
+
+/// 80 × 80 × 40 mm in 2 × 2 × 1 cells.
+pub(crate) fn slab() -> TetMesh {
+    tet_box(DVec3::ZERO, DVec3::new(0.08, 0.08, 0.04), [2, 2, 1])
+}
+
+/// A ball of 10 mm radius off the lattice, in a box of coarse tets that reaches past it.
+pub(crate) fn ball_in_cage() -> Partition {
+    let skin = ball(0.01, DVec3::new(0.2e-3, -0.3e-3, 0.1e-3), 3);
+    let sites = Sites::covering(skin.bounds_m(), 1.1e-3, DVec3::splat(0.4e-3));
+    let cage = tet_box(DVec3::splat(-0.0125), DVec3::splat(0.025), [3, 3, 3]);
+    let moments = integrate(&skin, &sites, &mut |_| {});
+    Partition::new(sites, Composite::new(&cage), &moments)
+}
+
+/// One material of each law, nearly incompressible and viscous.
+pub(crate) fn tissue() -> [Material; 3] {
+    let lame = Lame::from_young_poisson(10e3, 0.45).unwrap();
+    let viscosity = Viscosity::new(3.0, 2.0).unwrap();
+    [Law::StVenantKirchhoff, Law::StableNeoHookean, Law::FixedCorotated]
+        .map(|law| Material::new(law, lame, viscosity, Convention::Consistent))
 }

@@ -1,5 +1,8 @@
 //! The papers' viscous stress, for every law: `S_v = φ tr(Ė) I + 2ψĖ`, `Ė = sym(Ḟᵀ F)`; `P_v = F S_v`.
-use super::{Viscosity, stvk::trace};
+use super::{
+    Viscosity,
+    stvk::{contract, trace},
+};
 use glam::{DMat3, DVec3};
 
 /// `Ė = sym(Ḟᵀ F)` (1/s), the rate of Green's strain.
@@ -16,4 +19,10 @@ pub fn second_piola(viscosity: Viscosity, e_dot: &DMat3) -> DMat3 {
 /// First Piola-Kirchhoff viscous stress `P_v = F S_v` (Pa).
 pub fn piola(viscosity: Viscosity, f: &DMat3, f_dot: &DMat3) -> DMat3 {
     *f * second_piola(viscosity, &strain_rate(f, f_dot))
+}
+
+/// Power density `S_v : Ė` (W/m³ ≥ 0) that viscous stress takes.
+pub fn power_density(viscosity: Viscosity, f: &DMat3, f_dot: &DMat3) -> f64 {
+    let e_dot = strain_rate(f, f_dot);
+    contract(&second_piola(viscosity, &e_dot), &e_dot)
 }

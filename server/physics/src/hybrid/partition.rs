@@ -1,0 +1,218 @@
+//! Who owns which volume: the cells of the lattice, the coarse tets they are counted to, and the particles between them.
+//!
+//! The coarse level has no geometry of its own. Its energy is that of the lattice's cells, moved by the coarse nodes and integrated with few points:
+//! cells are counted to the part (`composite`) that holds their middle, and a part `g` has the mean gradient of its cells,
+//! ```text
+//! F_g = (1/V_g) Σ_i x_i T_giᵀ        T_gi = Σ_{c∈g} V_c Σ_p ζ_pi b_cp        V_g = Σ_{c∈g} V_c
+//! ```
+//! Affine motion is reproduced (`Σ_i T_gi = 0`, `Σ_i X_i T_giᵀ = V_g I`), whether or not the coarse tets follow the body's shape, and since cells balance at
+//! interior particles, the `T_gi` of all parts sum to zero at interior nodes.
+use super::{
+    composite::{Anchor, Composite},
+    moments::{CellMoments, full_gradients_m2},
+    share::Share,
+    sites::Sites,
+};
+use glam::DVec3;
+
+/// Not there.
+pub const NONE: u32 = u32::MAX;
+
+/// A cell that holds some of the body.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Cell {
+    /// Its number in the lattice's box.
+    pub site_cell: u32,
+    /// The coarse tet it is counted to.
+    pub tet: u32,
+    /// The part of it.
+    pub part: u8,
+    /// Where its moments are, [`NONE`] of a full one.
+    cut: u32,
+}
+
+/// The lattice's cells and particles on the coarse tets.
+#[derive(Debug, Clone)]
+pub struct Partition {
+    sites: Sites,
+    coarse: Composite,
+    cells: Vec<Cell>,
+    /// Of cut cells: `V_c` and `V_c b_cp`.
+    cut: Vec<(f64, [DVec3; 8])>,
+    /// Index in `cells` of every cell of the box.
+    cell_at: Vec<u32>,
+    /// Site of every particle, ascending.
+    particles: Vec<u32>,
+    /// Index in `particles` of every site of the box.
+    particle_at: Vec<u32>,
+    /// The coarse tet that each particle follows.
+    tet_of_particle: Vec<u32>,
+    shares: Vec<Share>,
+}
+
+impl Partition {
+    /// Counts every cell to a coarse tet.
+    pub fn new(sites: Sites, coarse: Composite, moments: &[CellMoments]) -> Self {
+        let mut partition = Self {
+            sites,
+            cells: Vec::with_capacity(moments.len()),
+            cut: Vec::new(),
+            cell_at: vec![NONE; sites.cell_count()],
+            particles: Vec::new(),
+            particle_at: vec![NONE; sites.site_count()],
+            tet_of_particle: Vec::new(),
+            shares: vec![Share::default(); coarse.tets().len()],
+            coarse,
+        };
+        let half = DVec3::splat(0.5 * sites.spacing_m());
+        for moments in moments {
+            let Anchor { tet, part, .. } = partition.coarse.anchor(sites.cell_m(moments.cell) + half);
+            let cut = moments.gradients_m2.as_ref().map_or(NONE, |gradients| {
+                partition.cut.push((moments.volume_m3, **gradients));
+                partition.cut.len() as u32 - 1
+            });
+            partition.cell_at[moments.cell] = partition.cells.len() as u32;
+            partition.cells.push(Cell { site_cell: moments.cell as u32, tet, part, cut });
+            for site in sites.corners(moments.cell) {
+                partition.particle_at[site] = 0;
+            }
+        }
+        for site in 0..partition.particle_at.len() {
+            if partition.particle_at[site] != NONE {
+                partition.particle_at[site] = partition.particles.len() as u32;
+                partition.particles.push(site as u32);
+                partition.tet_of_particle.push(partition.coarse.anchor(sites.site_m(site)).tet);
+            }
+        }
+        for cell in 0..partition.cells.len() {
+            let (volume_m3, gradients_m2) = partition.moments(cell);
+            let anchors = partition.corners(cell).map(|particle| partition.anchor(particle));
+            let Cell { tet, part, .. } = partition.cells[cell];
+            partition.shares[tet as usize].add(part, 1.0, volume_m3, &gradients_m2, &anchors);
+        }
+        partition
+    }
+
+    /// The lattice.
+    pub fn sites(&self) -> &Sites {
+        &self.sites
+    }
+
+    /// The coarse level.
+    pub fn coarse(&self) -> &Composite {
+        &self.coarse
+    }
+
+    /// Cells that hold some of the body.
+    pub fn cells(&self) -> &[Cell] {
+        &self.cells
+    }
+
+    /// Number of particles.
+    pub fn particle_count(&self) -> usize {
+        self.particles.len()
+    }
+
+    /// Rest position (m) of a particle.
+    pub fn particle_m(&self, particle: u32) -> DVec3 {
+        self.sites.site_m(self.particles[particle as usize] as usize)
+    }
+
+    /// What a particle follows while it sleeps.
+    pub fn anchor(&self, particle: u32) -> Anchor {
+        self.coarse.anchor_in(self.tet_of_particle[particle as usize], self.particle_m(particle))
+    }
+
+    /// Particles at the corners of a cell.
+    pub fn corners(&self, cell: usize) -> [u32; 8] {
+        self.sites.corners(self.cells[cell].site_cell as usize).map(|site| self.particle_at[site])
+    }
+
+    /// `V_c` (m³) and `V_c b_cp` (m²) of a cell.
+    pub fn moments(&self, cell: usize) -> (f64, [DVec3; 8]) {
+        match self.cells[cell].cut {
+            NONE => (self.sites.spacing_m().powi(3), full_gradients_m2(self.sites.spacing_m())),
+            cut => self.cut[cut as usize],
+        }
+    }
+
+    /// Cells around a particle.
+    pub fn cells_at(&self, particle: u32) -> impl Iterator<Item = usize> + '_ {
+        let site = self.particles[particle as usize] as usize;
+        let [nx, ny, nz] = self.sites.cells();
+        let at = [site % (nx + 1), site / (nx + 1) % (ny + 1), site / ((nx + 1) * (ny + 1))];
+        (0..8_usize).filter_map(move |corner| {
+            let from = |axis: usize| at[axis].checked_sub(corner >> axis & 1);
+            let (i, j, k) = (from(0)?, from(1)?, from(2)?);
+            let inside = i < nx && j < ny && k < nz;
+            let cell = inside.then(|| self.cell_at[self.sites.cell([i, j, k])])?;
+            (cell != NONE).then_some(cell as usize)
+        })
+    }
+
+    /// What of the body each coarse tet has when all particles sleep.
+    pub fn shares(&self) -> &[Share] {
+        &self.shares
+    }
+
+    /// Volume of all cells (m³).
+    pub fn volume_m3(&self) -> f64 {
+        (0..self.cells.len()).map(|cell| self.moments(cell).0).sum()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::hybrid::{composite::PARTS, testing::ball_in_cage};
+
+    #[test]
+    fn parts_reproduce_affine_motion_and_balance_at_interior_nodes() {
+        let partition = ball_in_cage();
+        let coarse = partition.coarse();
+        let mut total = vec![DVec3::ZERO; coarse.positions_m().len()];
+        for share in partition.shares() {
+            for part in 0..PARTS {
+                let sum: DVec3 = share.moments_m2.iter().map(|m| m[part]).sum();
+                assert!(sum.length() < 1e-18);
+                for axis in 0..3 {
+                    let column: DVec3 = share.nodes.iter().zip(&share.moments_m2)
+                        .map(|(&n, m)| m[part] * coarse.positions_m()[n as usize][axis])
+                        .sum();
+                    let expected = DVec3::AXES[axis] * share.volume_m3[part];
+                    assert!((column - expected).length() < 1e-12 * 1e-6, "{column} {expected}");
+                }
+            }
+            for (&node, moments) in share.nodes.iter().zip(&share.moments_m2) {
+                total[node as usize] += moments.iter().sum::<DVec3>();
+            }
+        }
+        let volume: f64 = partition.shares().iter().flat_map(|s| s.volume_m3).sum();
+        assert!((volume / partition.volume_m3() - 1.0).abs() < 1e-12);
+        // Nodes whose whole support lies within the body: none of its cut cells' particles follows them.
+        let mut at_surface = vec![false; total.len()];
+        for (cell, _) in partition.cells().iter().enumerate().filter(|(_, c)| c.cut != NONE) {
+            for particle in partition.corners(cell) {
+                let anchor = partition.anchor(particle);
+                anchor.nodes.iter().for_each(|&n| at_surface[n as usize] = true);
+            }
+        }
+        let interior: Vec<usize> = (0..total.len()).filter(|&n| !at_surface[n]).collect();
+        assert!(interior.len() > 3, "{}", interior.len());
+        for node in interior {
+            assert!(total[node].length() < 1e-14 * 1e-4, "{node}: {}", total[node]);
+        }
+    }
+
+    #[test]
+    fn cells_and_particles_know_each_other() {
+        let partition = ball_in_cage();
+        for particle in 0..partition.particle_count() as u32 {
+            let around: Vec<usize> = partition.cells_at(particle).collect();
+            assert!(!around.is_empty());
+            assert!(around.iter().all(|&cell| partition.corners(cell).contains(&particle)));
+        }
+        let pairs: usize = (0..partition.particle_count() as u32).map(|p| partition.cells_at(p).count()).sum();
+        assert_eq!(pairs, 8 * partition.cells().len());
+    }
+}
