@@ -2,6 +2,7 @@
 pub mod cell;
 pub mod composite;
 mod locate;
+pub mod metric;
 pub mod moments;
 pub mod partition;
 pub mod patch;
