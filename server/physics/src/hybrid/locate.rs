@@ -85,6 +85,11 @@ impl Locator {
         self.tets[tet].barycentric(point_m)
     }
 
+    /// Least distance (m) of such a point over the faces of the tet, negative outside.
+    pub(super) fn inside_m(&self, tet: usize, barycentric: &[f64; 4]) -> f64 {
+        self.tets[tet].inside_m(barycentric)
+    }
+
     /// The tet that holds a point, or the one it is least far outside of, and the point's barycentric coordinates there.
     pub(super) fn nearest(&self, point_m: DVec3) -> (usize, [f64; 4]) {
         let [x, y, z] = self.box_of(point_m);

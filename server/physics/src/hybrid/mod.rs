@@ -1,4 +1,5 @@
 //! The hybrid body: coarse tetrahedra throughout, and particles of which only those near a contact are awake.
+pub mod cage;
 pub mod cell;
 pub mod composite;
 mod locate;
