@@ -17,7 +17,7 @@ use glam::{DMat3, DVec3};
 /// χ.
 pub const HOURGLASS: f64 = 0.5;
 /// `w_k`.
-const MODE_WEIGHTS: [f64; 4] = [1.0, 1.0, 1.0, 0.5];
+pub const MODE_WEIGHTS: [f64; 4] = [1.0, 1.0, 1.0, 0.5];
 
 /// A cell at rest.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -11,6 +11,6 @@ pub mod share;
 pub mod sites;
 pub mod skin;
 #[cfg(test)]
-mod testing;
+pub(crate) mod testing;
 
 pub use skin::{Skin, SkinError};

@@ -1,5 +1,5 @@
 //! Shapes for tests.
-use super::{composite::Composite, moments::integrate, partition::Partition, sites::Sites, skin::Skin};
+use super::{cell::RestCell, composite::Composite, moments::integrate, partition::Partition, sites::Sites, skin::Skin};
 use crate::{
     material::{Convention, Lame, Law, Material, Viscosity},
     mesh::TetMesh,
@@ -110,4 +110,13 @@ pub(crate) fn tissue() -> [Material; 3] {
     let viscosity = Viscosity::new(3.0, 2.0).unwrap();
     [Law::StVenantKirchhoff, Law::StableNeoHookean, Law::FixedCorotated]
         .map(|law| Material::new(law, lame, viscosity, Convention::Consistent))
+}
+
+/// The cells of that ball, all awake, and their particles at rest (m).
+pub(crate) fn ball_cells() -> (Vec<([u32; 8], RestCell)>, Vec<DVec3>) {
+    let partition = ball_in_cage();
+    let rest = (0..partition.particle_count() as u32).map(|p| partition.particle_m(p)).collect();
+    let spacing_m = partition.sites().spacing_m();
+    let cell = |c: usize| (partition.corners(c), RestCell::new(spacing_m, 0.98, &partition.moments(c)));
+    ((0..partition.cells().len()).map(cell).collect(), rest)
 }

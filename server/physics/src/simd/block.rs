@@ -5,6 +5,7 @@
 //! load waits for the narrow stores it overlaps until they have left the store buffer.
 #![allow(unsafe_code)] // unchecked node indices in gather and scatter: 10 % of the kernel's time (docs/adr)
 use super::{
+    dispatch::Pass,
     laws::{Constants, LaneLaw, M3, columns, plus, rows, viscous},
     products,
     real::{Real, Scalar, Vector},
@@ -111,35 +112,23 @@ pub(super) type Lanes<T, const N: usize> = [[T; N]; 9];
 /// Blocks that are gathered, computed and scattered together.
 const BATCH: usize = 4;
 
-/// One pass over the blocks of a run.
-pub(super) trait Pass {
-    /// Adds what each tet gives to the sums, computed in vectors `V`; returns the viscous power (W) if forces are what it adds.
-    fn run<V: Vector<Scalar = T>, T: Scalar, L: LaneTangent, const VISCOUS: bool, const N: usize>(
-        job: &mut Job<'_, T, N>,
-    ) -> f64;
-}
-
 /// Forces of elastic and viscous stress.
-pub(super) struct Forces;
+pub(super) struct Forces<'a, 'b, T, const N: usize>(pub(super) &'b mut Job<'a, T, N>);
 
 /// Products `−(α K + β C) a`, with the factors of the job and its velocities as `a`.
-pub(super) struct Products;
+pub(super) struct Products<'a, 'b, T, const N: usize>(pub(super) &'b mut Job<'a, T, N>);
 
-impl Pass for Forces {
+impl<T: Scalar, const N: usize> Pass<T> for Forces<'_, '_, T, N> {
     #[inline(always)]
-    fn run<V: Vector<Scalar = T>, T: Scalar, L: LaneTangent, const VISCOUS: bool, const N: usize>(
-        job: &mut Job<'_, T, N>,
-    ) -> f64 {
-        add::<V, T, L, VISCOUS, false, N>(job)
+    fn run<V: Vector<Scalar = T>, L: LaneTangent, const VISCOUS: bool>(&mut self) -> f64 {
+        add::<V, T, L, VISCOUS, false, N>(self.0)
     }
 }
 
-impl Pass for Products {
+impl<T: Scalar, const N: usize> Pass<T> for Products<'_, '_, T, N> {
     #[inline(always)]
-    fn run<V: Vector<Scalar = T>, T: Scalar, L: LaneTangent, const VISCOUS: bool, const N: usize>(
-        job: &mut Job<'_, T, N>,
-    ) -> f64 {
-        add::<V, T, L, VISCOUS, true, N>(job)
+    fn run<V: Vector<Scalar = T>, L: LaneTangent, const VISCOUS: bool>(&mut self) -> f64 {
+        add::<V, T, L, VISCOUS, true, N>(self.0)
     }
 }
 

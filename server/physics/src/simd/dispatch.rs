@@ -1,9 +1,8 @@
 //! One body of code, compiled for several instruction sets, chosen at run time.
 #![allow(unsafe_code)] // calls into functions compiled for an instruction set that was detected
 use super::{
-    block::{Job, Pass},
     laws::{FixedCorotated, StVenantKirchhoff, StableNeoHookean},
-    real::Scalar,
+    real::{Scalar, Vector},
     step_forces::StepForces,
     tangents::LaneTangent,
 };
@@ -78,52 +77,48 @@ fn sums_avx512(forces: &StepForces<'_>) -> [f64; 3] {
     forces.sums::<<f64 as Scalar>::Avx512>()
 }
 
-/// A pass over one run's blocks.
-pub(super) fn run<P: Pass, T: Scalar, const N: usize>(
-    set: Available,
-    (law, with_viscosity): (Law, bool),
-    job: &mut Job<'_, T, N>,
-) -> f64 {
+/// A pass over blocks, written once for all vectors and laws.
+pub(super) trait Pass<T: Scalar> {
+    /// Adds what the blocks give, computed in vectors `V`; returns the viscous power (W) if forces are what it adds.
+    fn run<V: Vector<Scalar = T>, L: LaneTangent, const VISCOUS: bool>(&mut self) -> f64;
+}
+
+/// Runs a pass with a law, with or without viscous terms.
+pub(super) fn run<P: Pass<T>, T: Scalar>(set: Available, (law, with_viscosity): (Law, bool), pass: &mut P) -> f64 {
     match (law, with_viscosity) {
-        (Law::StVenantKirchhoff, false) => pick::<P, T, StVenantKirchhoff, false, N>(set, job),
-        (Law::StVenantKirchhoff, true) => pick::<P, T, StVenantKirchhoff, true, N>(set, job),
-        (Law::StableNeoHookean, false) => pick::<P, T, StableNeoHookean, false, N>(set, job),
-        (Law::StableNeoHookean, true) => pick::<P, T, StableNeoHookean, true, N>(set, job),
-        (Law::FixedCorotated, false) => pick::<P, T, FixedCorotated, false, N>(set, job),
-        (Law::FixedCorotated, true) => pick::<P, T, FixedCorotated, true, N>(set, job),
+        (Law::StVenantKirchhoff, false) => pick::<P, T, StVenantKirchhoff, false>(set, pass),
+        (Law::StVenantKirchhoff, true) => pick::<P, T, StVenantKirchhoff, true>(set, pass),
+        (Law::StableNeoHookean, false) => pick::<P, T, StableNeoHookean, false>(set, pass),
+        (Law::StableNeoHookean, true) => pick::<P, T, StableNeoHookean, true>(set, pass),
+        (Law::FixedCorotated, false) => pick::<P, T, FixedCorotated, false>(set, pass),
+        (Law::FixedCorotated, true) => pick::<P, T, FixedCorotated, true>(set, pass),
     }
 }
 
 #[cfg(target_arch = "x86_64")]
-fn pick<P: Pass, T: Scalar, L: LaneTangent, const VISCOUS: bool, const N: usize>(
-    set: Available,
-    job: &mut Job<'_, T, N>,
-) -> f64 {
+fn pick<P: Pass<T>, T: Scalar, L: LaneTangent, const VISCOUS: bool>(set: Available, pass: &mut P) -> f64 {
     match set.0 {
-        InstructionSet::Baseline => P::run::<T::Baseline, T, L, VISCOUS, N>(job),
+        InstructionSet::Baseline => pass.run::<T::Baseline, L, VISCOUS>(),
         // SAFETY: `Available` holds only what was detected.
-        InstructionSet::Avx2 => unsafe { avx2::<P, T, L, VISCOUS, N>(job) },
+        InstructionSet::Avx2 => unsafe { avx2::<P, T, L, VISCOUS>(pass) },
         // SAFETY: `Available` holds only what was detected.
-        InstructionSet::Avx512 => unsafe { avx512::<P, T, L, VISCOUS, N>(job) },
+        InstructionSet::Avx512 => unsafe { avx512::<P, T, L, VISCOUS>(pass) },
     }
 }
 
 #[cfg(not(target_arch = "x86_64"))]
-fn pick<P: Pass, T: Scalar, L: LaneTangent, const VISCOUS: bool, const N: usize>(
-    _: Available,
-    job: &mut Job<'_, T, N>,
-) -> f64 {
-    P::run::<T::Baseline, T, L, VISCOUS, N>(job)
+fn pick<P: Pass<T>, T: Scalar, L: LaneTangent, const VISCOUS: bool>(_: Available, pass: &mut P) -> f64 {
+    pass.run::<T::Baseline, L, VISCOUS>()
 }
 
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx2")]
-fn avx2<P: Pass, T: Scalar, L: LaneTangent, const VISCOUS: bool, const N: usize>(job: &mut Job<'_, T, N>) -> f64 {
-    P::run::<T::Avx2, T, L, VISCOUS, N>(job)
+fn avx2<P: Pass<T>, T: Scalar, L: LaneTangent, const VISCOUS: bool>(pass: &mut P) -> f64 {
+    pass.run::<T::Avx2, L, VISCOUS>()
 }
 
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx512f,avx512bw,avx512dq,avx512vl")]
-fn avx512<P: Pass, T: Scalar, L: LaneTangent, const VISCOUS: bool, const N: usize>(job: &mut Job<'_, T, N>) -> f64 {
-    P::run::<T::Avx512, T, L, VISCOUS, N>(job)
+fn avx512<P: Pass<T>, T: Scalar, L: LaneTangent, const VISCOUS: bool>(pass: &mut P) -> f64 {
+    pass.run::<T::Avx512, L, VISCOUS>()
 }

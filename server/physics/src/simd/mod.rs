@@ -7,6 +7,7 @@
 // A vector type is only fast where it is inlined into a function compiled for its instruction set.
 #![allow(clippy::inline_always)]
 mod block;
+mod cells;
 mod dispatch;
 mod laws;
 mod layout;
@@ -25,6 +26,7 @@ use crate::{
     world::Precision,
 };
 use block::{Blocks, Forces, Job, Node, Products, Run, Sum};
+pub use cells::{CellKernel, CellScratch, KernelCell};
 use dispatch::Available;
 pub use dispatch::InstructionSet;
 use glam::DVec3;
@@ -191,7 +193,7 @@ impl ForceKernel {
         let KernelScratch { displacements, directions, sums, .. } = scratch;
         for run in runs {
             let mut job = Job::for_products(blocks, run, displacements, directions, sums, factors);
-            dispatch::run::<Products, _, _>(self.instruction_set, self.pass_of(&run.material), &mut job);
+            dispatch::run(self.instruction_set, self.pass_of(&run.material), &mut Products(&mut job));
         }
     }
 
@@ -205,7 +207,7 @@ impl ForceKernel {
         let mut power_w = 0.0;
         for run in runs {
             let mut job = Job::new(blocks, run, displacements, velocities, sums);
-            power_w += dispatch::run::<Forces, _, _>(self.instruction_set, self.pass_of(&run.material), &mut job);
+            power_w += dispatch::run(self.instruction_set, self.pass_of(&run.material), &mut Forces(&mut job));
         }
         power_w
     }
