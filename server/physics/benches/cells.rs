@@ -1,6 +1,7 @@
 //! The kernel of a hybrid body's cells, beside its oracle, on 1 000 full cells and on the 1 331 of the same box off the lattice, of which 602 are cut:
 //! `cargo bench -p palpate-physics --bench cells`.
 #![allow(missing_docs)] // criterion's macros
+#![allow(clippy::unwrap_used)] // helpers of a benchmark
 #[path = "../tests/support/mod.rs"]
 mod support;
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
@@ -21,8 +22,11 @@ use palpate_physics::{
 
 const SPACING_M: f64 = 2.5e-3;
 
+/// Particles, rest data, and whether it is full.
+type Cell = ([u32; 8], RestCell, bool);
+
 /// A box of ten cells each way, whose corner is `offset` cells from a site.
-fn cells(offset: f64) -> (Vec<([u32; 8], RestCell, bool)>, Vec<DVec3>) {
+fn cells(offset: f64) -> (Vec<Cell>, Vec<DVec3>) {
     let p = CORNERS.map(|c| c * (10.0 * SPACING_M)).to_vec();
     let quads = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
     let triangles = quads.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]).collect();

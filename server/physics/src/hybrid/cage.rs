@@ -49,7 +49,8 @@ pub fn cover(mesh: &TetMesh, surface: &Surface, held: &BTreeSet<u32>, points_m: 
         }
         covering = next;
     }
-    let moved_m = covering.positions_m().iter().zip(mesh.positions_m()).map(|(a, b)| a.distance(*b)).fold(0.0, f64::max);
+    let moved_m =
+        covering.positions_m().iter().zip(mesh.positions_m()).map(|(a, b)| a.distance(*b)).fold(0.0, f64::max);
     needs(&covering, surface, &mut waiting);
     Cage { mesh: covering, moved_m, outside: waiting.len() }
 }

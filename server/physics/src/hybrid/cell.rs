@@ -141,7 +141,8 @@ mod tests {
             let (forces, _) = cell.forces_n(&material, &y, &rest);
             let work: f64 = forces.iter().zip(a).map(|(f, a)| f.dot(a)).sum();
             assert!((slope + work).abs() < 1e-6 * work.abs(), "{slope} {work}");
-            let (ahead, behind) = (cell.forces_n(&material, &at(s), &rest).0, cell.forces_n(&material, &at(-s), &rest).0);
+            let (ahead, behind) =
+                (cell.forces_n(&material, &at(s), &rest).0, cell.forces_n(&material, &at(-s), &rest).0);
             let products = cell.products_n(&material, &y, &a);
             for p in 0..8 {
                 let slope = (ahead[p] - behind[p]) / (2.0 * s);

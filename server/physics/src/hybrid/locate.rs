@@ -21,14 +21,14 @@ pub(super) struct Locator {
 #[derive(Debug, Clone, Copy)]
 struct Frame {
     corner_m: DVec3,
-    inverse_per_m: DMat3,
+    inverse: DMat3,
     /// Height (m) of each corner over the face opposite.
     heights_m: [f64; 4],
 }
 
 impl Frame {
     fn barycentric(&self, point_m: DVec3) -> [f64; 4] {
-        let l = self.inverse_per_m * (point_m - self.corner_m);
+        let l = self.inverse * (point_m - self.corner_m);
         [1.0 - l.x - l.y - l.z, l.x, l.y, l.z]
     }
 
@@ -45,7 +45,7 @@ impl Locator {
             let rows = inverse_per_m.transpose();
             let gradients = [-(rows.x_axis + rows.y_axis + rows.z_axis), rows.x_axis, rows.y_axis, rows.z_axis];
             let corner_m = mesh.corners_m(tet)[0];
-            Frame { corner_m, inverse_per_m, heights_m: gradients.map(|g| g.length().recip()) }
+            Frame { corner_m, inverse: inverse_per_m, heights_m: gradients.map(|g| g.length().recip()) }
         };
         let count = mesh.tets().len();
         let (low_m, high_m) = mesh.bounds_m();
@@ -58,7 +58,8 @@ impl Locator {
         let mean_m: DVec3 = (0..count).map(|tet| extent(tet).1 - extent(tet).0).sum::<DVec3>() / count as f64;
         let boxes = ((high_m - low_m) / mean_m).to_array().map(|n| (n.ceil() as usize).clamp(1, MOST_BOXES));
         let box_m = (high_m - low_m) / DVec3::from(boxes.map(|n| n as f64));
-        let mut locator = Self { tets: (0..count).map(frame).collect(), low_m, box_m, boxes, first: vec![], list: vec![] };
+        let mut locator =
+            Self { tets: (0..count).map(frame).collect(), low_m, box_m, boxes, first: vec![], list: vec![] };
         let mut in_box = vec![Vec::new(); boxes.iter().product()];
         for tet in 0..count {
             // Half a tet of margin, so that a point outside finds its neighbours in its box.

@@ -307,7 +307,10 @@ mod tests {
         let materials = Materials { materials: &material, of_tet: &body.of_tet };
         let mut random = Random(13);
         let rest = body.partition.coarse().positions_m();
-        let v: Vec<DVec3> = rest.iter().map(|p| DVec3::new(0.5, 0.0, 0.0) + DVec3::Z.cross(*p) * 30.0 + random.vector() * 0.05).collect();
+        let v: Vec<DVec3> = rest
+            .iter()
+            .map(|p| DVec3::new(0.5, 0.0, 0.0) + DVec3::Z.cross(*p) * 30.0 + random.vector() * 0.05)
+            .collect();
         let mut flight = Flight::new(&body, &some(&body, |p| p.x > 2e-3), rest.to_vec(), v);
         let (linear, angular) = flight.momentum();
         let start = flight.fly(&body, &materials, 5e-5, 1);

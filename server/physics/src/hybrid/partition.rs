@@ -176,7 +176,10 @@ mod tests {
                 let sum: DVec3 = share.moments_m2.iter().map(|m| m[part]).sum();
                 assert!(sum.length() < 1e-18);
                 for axis in 0..3 {
-                    let column: DVec3 = share.nodes.iter().zip(&share.moments_m2)
+                    let column: DVec3 = share
+                        .nodes
+                        .iter()
+                        .zip(&share.moments_m2)
                         .map(|(&n, m)| m[part] * coarse.positions_m()[n as usize][axis])
                         .sum();
                     let expected = DVec3::AXES[axis] * share.volume_m3[part];

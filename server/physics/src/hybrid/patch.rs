@@ -118,7 +118,8 @@ impl Patch {
     /// Elastic energy (J).
     pub fn energy_j(&self, materials: &Materials<'_>, at: &Field) -> f64 {
         let points = self.points(at);
-        let cells = self.cells.iter().map(|cell| cell.rest.energy_j(materials.of(cell.tet as usize), &cell.of(&points)));
+        let cells =
+            self.cells.iter().map(|cell| cell.rest.energy_j(materials.of(cell.tet as usize), &cell.of(&points)));
         let shares = self.shares.iter().enumerate().map(|(tet, share)| share.energy_j(materials.of(tet), &at.nodes));
         cells.sum::<f64>() + shares.sum::<f64>()
     }
@@ -197,7 +198,10 @@ mod tests {
     }
 
     fn moved(field: &Field, map: impl Fn(DVec3) -> DVec3) -> Field {
-        Field { nodes: field.nodes.iter().map(|p| map(*p)).collect(), particles: field.particles.iter().map(|p| map(*p)).collect() }
+        Field {
+            nodes: field.nodes.iter().map(|p| map(*p)).collect(),
+            particles: field.particles.iter().map(|p| map(*p)).collect(),
+        }
     }
 
     fn random_like(field: &Field, size: f64, random: &mut Random) -> Field {

@@ -77,7 +77,8 @@ impl Share {
         }
         let (of_shape, of_volume) = split(material);
         let gradients = self.gradients(x, DMat3::IDENTITY);
-        let shape: f64 = gradients.iter().zip(self.volume_m3).map(|(f, volume)| volume * of_shape.energy_density(f)).sum();
+        let shape: f64 =
+            gradients.iter().zip(self.volume_m3).map(|(f, volume)| volume * of_shape.energy_density(f)).sum();
         shape + self.total_m3() * of_volume.energy_density(&self.mean(&gradients))
     }
 

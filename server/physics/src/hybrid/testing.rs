@@ -65,9 +65,8 @@ impl Random {
 pub(crate) fn tet_box(low: DVec3, size: DVec3, cells: [usize; 3]) -> TetMesh {
     let count = cells.map(|n| n + 1);
     let number = |[i, j, k]: [usize; 3]| ((k * count[1] + j) * count[0] + i) as u32;
-    let places = |n: [usize; 3]| {
-        (0..n[2]).flat_map(move |k| (0..n[1]).flat_map(move |j| (0..n[0]).map(move |i| [i, j, k])))
-    };
+    let places =
+        |n: [usize; 3]| (0..n[2]).flat_map(move |k| (0..n[1]).flat_map(move |j| (0..n[0]).map(move |i| [i, j, k])));
     let positions: Vec<DVec3> = places(count)
         .map(|at| low + size * DVec3::from(std::array::from_fn(|axis| at[axis] as f64 / cells[axis] as f64)))
         .collect();

@@ -6,7 +6,7 @@
 //! Displacements are taken as differences to the first particle in f64 and rounded then; forces are summed in f64, that on the first particle
 //! as minus the sum of the others.
 use super::{
-    block::{Lanes, Node, Sum},
+    block::{Lanes, Node, Sum, any_outside},
     dispatch::{self, Available, InstructionSet, Pass},
     laws::{Constants, LaneLaw, M3, columns, plus, rows, viscous},
     real::{Scalar, Vector},
@@ -21,6 +21,11 @@ use glam::{DMat3, DVec3};
 
 const LANES_F32: usize = 16;
 const LANES_F64: usize = 8;
+
+/// Consecutive cells are spread over the lanes of this many blocks.
+const BLOCKS_PER_WINDOW: usize = 16;
+/// Blocks that are gathered, computed and scattered together: a wide load waits for the narrow stores it overlaps.
+const BATCH: usize = 4;
 
 /// Particles 1 to 3, 4 to 6, and 7 of a block's cells, three components each; what is over stays zero.
 type Corners<T, const N: usize> = [Lanes<T, N>; 3];
@@ -156,19 +161,14 @@ impl CellKernel {
     }
 }
 
-fn runs<T: Scalar, const N: usize>(
-    cells: &[KernelCell<'_>],
-    points: usize,
-    materials: &[Material],
-) -> Vec<Run<T, N>> {
+fn runs<T: Scalar, const N: usize>(cells: &[KernelCell<'_>], points: usize, materials: &[Material]) -> Vec<Run<T, N>> {
     let spare = [points as u32; 8];
     let of_material = |(index, material): (usize, &Material)| {
-        let select = |is_full: bool| {
-            cells.iter().filter(move |cell| cell.material as usize == index && cell.is_full == is_full)
-        };
+        let select =
+            |is_full: bool| cells.iter().filter(move |cell| cell.material as usize == index && cell.is_full == is_full);
         let all_full: Vec<_> = select(true).collect();
         let all_cut: Vec<_> = select(false).collect();
-        let full = all_full.chunks(N).map(|lanes| FullBlock {
+        let full = spread::<_, N>(&all_full).map(|lanes| FullBlock {
             points: std::array::from_fn(|lane| lanes.get(lane).map_or(spare, |cell| cell.points)),
         });
         let mu = material.lame.mu_pa;
@@ -179,11 +179,19 @@ fn runs<T: Scalar, const N: usize>(
             material: *material,
             constants: Constants::of(material),
             full: full.collect(),
-            cut: all_cut.chunks(N).map(|lanes| cut_block(lanes, spare, mu)).collect(),
+            cut: spread::<_, N>(&all_cut).map(|lanes| cut_block(&lanes, spare, mu)).collect(),
             full_cell,
         }
     };
     materials.iter().enumerate().map(of_material).collect()
+}
+
+/// Neighbours in different blocks: sums of one particle would wait for each other in the scatter.
+fn spread<C: Copy, const N: usize>(cells: &[C]) -> impl Iterator<Item = Vec<C>> {
+    cells.chunks(N * BLOCKS_PER_WINDOW).flat_map(|window| {
+        let count = window.len().div_ceil(N);
+        (0..count).map(move |first| window.iter().skip(first).step_by(count).copied().collect())
+    })
 }
 
 fn cut_block<T: Scalar, const N: usize>(cells: &[&KernelCell<'_>], spare: [u32; 8], mu_pa: f64) -> CutBlock<T, N> {
@@ -222,25 +230,39 @@ struct CellForces<'a, T, const N: usize> {
 impl<T: Scalar, const N: usize> Pass<T> for CellForces<'_, T, N> {
     #[inline(always)]
     fn run<V: Vector<Scalar = T>, L: LaneTangent, const VISCOUS: bool>(&mut self) -> f64 {
-        let mut edges: Corners<T, N> = [[[T::of(0.0); N]; 9]; 3];
+        let mut edges: [Corners<T, N>; BATCH] = [[[[T::of(0.0); N]; 9]; 3]; BATCH];
         let mut rates = edges;
         let mut forces = edges;
         let mut power_w = 0.0;
-        for block in &self.run.full {
-            gather::<V, N>(&block.points, self.displacements, &mut edges);
-            if VISCOUS {
-                gather::<V, N>(&block.points, self.velocities, &mut rates);
+        for batch in self.run.full.chunks(BATCH) {
+            for (index, block) in batch.iter().enumerate() {
+                gather::<V, N>(&block.points, self.displacements, &mut edges[index]);
+                if VISCOUS {
+                    gather::<V, N>(&block.points, self.velocities, &mut rates[index]);
+                }
             }
-            power_w += full::<V, T, L, VISCOUS, N>(self.run, &edges, &rates, &mut forces);
-            scatter(&block.points, &forces, self.sums);
+            for index in 0..batch.len() {
+                power_w += full::<V, T, L, VISCOUS, N>(self.run, &edges[index], &rates[index], &mut forces[index]);
+            }
+            for (block, forces) in batch.iter().zip(&forces) {
+                scatter(&block.points, forces, self.sums);
+            }
         }
-        for block in &self.run.cut {
-            gather::<V, N>(&block.points, self.displacements, &mut edges);
-            if VISCOUS {
-                gather::<V, N>(&block.points, self.velocities, &mut rates);
+        for batch in self.run.cut.chunks(BATCH) {
+            for (index, block) in batch.iter().enumerate() {
+                gather::<V, N>(&block.points, self.displacements, &mut edges[index]);
+                if VISCOUS {
+                    gather::<V, N>(&block.points, self.velocities, &mut rates[index]);
+                }
             }
-            power_w += cut::<V, T, L, VISCOUS, N>(&self.run.constants, block, &edges, &rates, &mut forces);
-            scatter(&block.points, &forces, self.sums);
+            for (index, block) in batch.iter().enumerate() {
+                let constants = &self.run.constants;
+                power_w +=
+                    cut::<V, T, L, VISCOUS, N>(constants, block, &edges[index], &rates[index], &mut forces[index]);
+            }
+            for (block, forces) in batch.iter().zip(&forces) {
+                scatter(&block.points, forces, self.sums);
+            }
         }
         power_w
     }
@@ -326,7 +348,8 @@ fn full<V: Vector<Scalar = T>, T: Scalar, L: LaneLaw, const VISCOUS: bool, const
         if VISCOUS {
             (density * V::of(-minus_volume)).store(&mut power[first..]);
         }
-        let (of_stress, of_modes) = (V::of(minus_volume * quarter), MODE_WEIGHTS.map(|w| V::of(minus_kappa * w / 64.0)));
+        let (of_stress, of_modes) =
+            (V::of(minus_volume * quarter), MODE_WEIGHTS.map(|w| V::of(minus_kappa * w / 64.0)));
         for axis in 0..3 {
             let mut c = [V::of(0.0); 7];
             for column in 0..3 {
@@ -408,8 +431,8 @@ fn stress<V: Vector<Scalar = T>, T: Scalar, L: LaneLaw, const VISCOUS: bool>(
     if let Some(limit) = L::DOMAIN {
         let mut inside = [T::of(limit); LANES_F32];
         domain.store(&mut inside);
-        if inside.iter().any(|&lane| !(lane >= T::of(limit))) {
-            redo_outside::<V, T, L>(constants, h, &inside, limit, &mut p);
+        if any_outside(&inside, L::DOMAIN) {
+            redo_outside::<V, T, L>(constants, h, &inside, &mut p);
         }
     }
     if VISCOUS {
@@ -426,7 +449,6 @@ fn redo_outside<V: Vector<Scalar = T>, T: Scalar, L: LaneLaw>(
     constants: &Constants<T>,
     h: &M3<V>,
     inside: &[T; LANES_F32],
-    limit: f64,
     p: &mut M3<V>,
 ) {
     let lanes = |m: &M3<V>| {
@@ -439,7 +461,11 @@ fn redo_outside<V: Vector<Scalar = T>, T: Scalar, L: LaneLaw>(
         stored
     };
     let (h, mut redone) = (lanes(h), lanes(p));
-    for lane in (0..V::WIDTH).filter(|&lane| !(inside[lane] >= T::of(limit))) {
+    let limit = T::of(L::DOMAIN.unwrap_or(0.0));
+    for lane in 0..V::WIDTH {
+        if inside[lane] >= limit {
+            continue;
+        }
         let of_lane: M3<f64> = h.map(|row| row.map(|entry| entry[lane].into()));
         let f = columns(&of_lane) + DMat3::IDENTITY;
         let stress = rows(&L::piola_outside(&constants.converted(), &f));
@@ -456,13 +482,17 @@ fn redo_outside<V: Vector<Scalar = T>, T: Scalar, L: LaneLaw>(
 #[inline(always)]
 fn gather<V: Vector, const N: usize>(points: &[[u32; 8]; N], values: &[Node], edges: &mut Corners<V::Scalar, N>) {
     for first in (0..N).step_by(4) {
-        for (group, corners) in edges.iter_mut().enumerate() {
-            let at = |cell: usize, edge: usize| match edge {
-                0 => &values[points[first + cell][0] as usize],
-                _ => &values[points[first + cell][(3 * group + edge).min(7)] as usize],
-            };
-            let four = std::array::from_fn(|cell| std::array::from_fn(|edge| at(cell, edge)));
-            V::edges_to_lanes(&four, corners, first);
+        for group in 0..3 {
+            let mut corners = [[&values[0]; 4]; 4];
+            for cell in 0..4 {
+                corners[cell][0] = &values[points[first + cell][0] as usize];
+                for edge in 1..4 {
+                    if 3 * group + edge < 8 {
+                        corners[cell][edge] = &values[points[first + cell][3 * group + edge] as usize];
+                    }
+                }
+            }
+            V::edges_to_lanes(&corners, &mut edges[group], first);
         }
     }
 }
@@ -471,21 +501,26 @@ fn gather<V: Vector, const N: usize>(points: &[[u32; 8]; N], values: &[Node], ed
 #[inline(always)]
 fn scatter<T: Scalar, const N: usize>(points: &[[u32; 8]; N], forces: &Corners<T, N>, sums: &mut [Sum]) {
     for first in (0..N).step_by(4) {
-        let groups = [0, 1, 2].map(|group| T::lanes_to_rows(&forces[group], first));
-        for cell in 0..4 {
-            let mut total = [0.0; 4];
-            for p in 1..8 {
-                let force = groups[(p - 1) / 3][cell][(p - 1) % 3];
-                let sum = &mut sums[points[first + cell][p] as usize].0;
-                for axis in 0..4 {
-                    let component: f64 = force[axis].into();
-                    total[axis] += component;
-                    sum[axis] += component;
+        let mut total = [[0.0; 4]; 4];
+        for group in 0..3 {
+            let rows = T::lanes_to_rows(&forces[group], first);
+            for cell in 0..4 {
+                for corner in 0..3 {
+                    if 3 * group + corner < 7 {
+                        let sum = &mut sums[points[first + cell][3 * group + corner + 1] as usize].0;
+                        for axis in 0..4 {
+                            let component: f64 = rows[cell][corner][axis].into();
+                            total[cell][axis] += component;
+                            sum[axis] += component;
+                        }
+                    }
                 }
             }
+        }
+        for cell in 0..4 {
             let sum = &mut sums[points[first + cell][0] as usize].0;
             for axis in 0..4 {
-                sum[axis] -= total[axis];
+                sum[axis] -= total[cell][axis];
             }
         }
     }
@@ -524,7 +559,12 @@ mod tests {
                 let whole = cells.iter().map(|(_, c)| c.volume_m3).fold(0.0, f64::max) * (1.0 - 1e-12);
                 let listed: Vec<KernelCell<'_>> = cells
                     .iter()
-                    .map(|(points, rest)| KernelCell { points: *points, rest, is_full: rest.volume_m3 > whole, material: 0 })
+                    .map(|(points, rest)| KernelCell {
+                        points: *points,
+                        rest,
+                        is_full: rest.volume_m3 > whole,
+                        material: 0,
+                    })
                     .collect();
                 for (precision, bound) in [(Precision::Double, 1e-11), (Precision::Single, 2e-5)] {
                     let kernel = CellKernel::build(&listed, rest.len(), &[material], precision);
@@ -536,7 +576,11 @@ mod tests {
                     };
                     let (forces, power) = run(InstructionSet::Baseline);
                     let worst = forces.iter().zip(&expected).map(|(a, b)| a.distance(*b)).fold(0.0, f64::max);
-                    assert!(worst < bound * largest, "{:?} {precision:?} {size}: {worst:e} of {largest:e}", material.law);
+                    assert!(
+                        worst < bound * largest,
+                        "{:?} {precision:?} {size}: {worst:e} of {largest:e}",
+                        material.law
+                    );
                     assert!((power / expected_w - 1.0).abs() < 10.0 * bound, "{power} {expected_w}");
                     for set in InstructionSet::available() {
                         assert_eq!(run(set), (forces.clone(), power), "{set:?}");
