@@ -17,6 +17,8 @@ const ROUNDS: usize = 12;
 const ROUNDING: f64 = 1e-9;
 /// A node moves along its normal by what its faces need, over how far they face away from it, at least this.
 const LEAST_COSINE: f64 = 0.3;
+/// A face moves for a point where its free nodes carry more than this of it.
+const LEAST_SHARE: f64 = 0.3;
 /// What is moved is moved by so much too far, that rounds end.
 const SURPLUS: f64 = 1.05;
 /// No tet may lose more than this part of its volume in a round.
@@ -38,7 +40,7 @@ pub fn cover(mesh: &TetMesh, surface: &Surface, held: &BTreeSet<u32>, points_m: 
     let mut covering = mesh.clone();
     let mut waiting: Vec<DVec3> = points_m.to_vec();
     for _ in 0..ROUNDS {
-        let needs = needs(&covering, surface, &mut waiting);
+        let needs = needs(&covering, surface, held, &mut waiting);
         if waiting.is_empty() {
             break;
         }
@@ -51,12 +53,12 @@ pub fn cover(mesh: &TetMesh, surface: &Surface, held: &BTreeSet<u32>, points_m: 
     }
     let moved_m =
         covering.positions_m().iter().zip(mesh.positions_m()).map(|(a, b)| a.distance(*b)).fold(0.0, f64::max);
-    needs(&covering, surface, &mut waiting);
+    needs(&covering, surface, held, &mut waiting);
     Cage { mesh: covering, moved_m, outside: waiting.len() }
 }
 
 /// How far (m) each node's faces would have to move, from the points outside; the points inside are taken off the list.
-fn needs(mesh: &TetMesh, surface: &Surface, waiting: &mut Vec<DVec3>) -> Vec<f64> {
+fn needs(mesh: &TetMesh, surface: &Surface, held: &BTreeSet<u32>, waiting: &mut Vec<DVec3>) -> Vec<f64> {
     let locator = Locator::new(mesh);
     let mut needs = vec![0.0_f64; mesh.positions_m().len()];
     waiting.retain(|&point| {
@@ -64,16 +66,33 @@ fn needs(mesh: &TetMesh, surface: &Surface, waiting: &mut Vec<DVec3>) -> Vec<f64
         if locator.inside_m(tet, &barycentric) > -ROUNDING * mesh.longest_edge_m(tet) {
             return false;
         }
-        let (triangle, above_m) = nearest_face(mesh, surface, point);
-        surface.triangle_nodes(triangle).iter().for_each(|&n| needs[n as usize] = needs[n as usize].max(above_m));
+        let near = nearest_face(mesh, surface, point);
+        let nodes = surface.triangle_nodes(near.triangle);
+        // Beside held nodes the face hardly moves with its free ones: such a point stays outside.
+        let moves = |(node, weight): (&u32, f64)| if held.contains(node) { 0.0 } else { weight };
+        let share: f64 = nodes.iter().zip(near.weights).map(moves).sum();
+        if share > LEAST_SHARE {
+            for node in nodes {
+                needs[node as usize] = needs[node as usize].max(near.above_m / share);
+            }
+        }
         true
     });
     needs
 }
 
-/// The boundary triangle nearest to a point outside, and how far (m) the point is above its plane: of several as near, the one with the most.
-fn nearest_face(mesh: &TetMesh, surface: &Surface, point_m: DVec3) -> (usize, f64) {
-    let (mut best, mut nearest_m) = ((0, 0.0), f64::INFINITY);
+/// A boundary triangle near a point outside.
+struct Near {
+    triangle: usize,
+    /// Of its corners, at its point nearest to that one.
+    weights: [f64; 3],
+    /// How far (m) that one is above its plane.
+    above_m: f64,
+}
+
+/// The nearest of all; of several as near, the one with the point highest above it.
+fn nearest_face(mesh: &TetMesh, surface: &Surface, point_m: DVec3) -> Near {
+    let (mut best, mut nearest_m) = (Near { triangle: 0, weights: [0.0; 3], above_m: 0.0 }, f64::INFINITY);
     for triangle in 0..surface.triangles.len() {
         let corners = surface.triangle_nodes(triangle).map(|n| mesh.positions_m()[n as usize]);
         let weights = closest_weights(point_m, corners);
@@ -82,8 +101,8 @@ fn nearest_face(mesh: &TetMesh, surface: &Surface, point_m: DVec3) -> (usize, f6
         let normal = (corners[1] - corners[0]).cross(corners[2] - corners[0]).normalize_or_zero();
         let above_m = (point_m - corners[0]).dot(normal);
         let tie = (distance_m - nearest_m).abs() <= ROUNDING * nearest_m;
-        if if tie { above_m > best.1 } else { distance_m < nearest_m } {
-            (best, nearest_m) = ((triangle, above_m), distance_m);
+        if if tie { above_m > best.above_m } else { distance_m < nearest_m } {
+            (best, nearest_m) = (Near { triangle, weights, above_m }, distance_m);
         }
     }
     best

@@ -10,7 +10,7 @@
 use super::sites::CORNERS;
 use crate::{
     fem::element::outer,
-    material::{Material, viscous},
+    material::{Lame, Material, viscous},
 };
 use glam::{DMat3, DVec3};
 
@@ -82,6 +82,17 @@ impl RestCell {
     pub fn products_n(&self, material: &Material, y: &[DVec3; 8], a: &[DVec3; 8]) -> [DVec3; 8] {
         let change = material.piola_differential(&self.gradient_of(y), &self.gradient_of(a));
         self.corner_forces_n(material, &change, &self.amplitudes(a))
+    }
+
+    /// Diagonal blocks (N/m) of the stiffness at rest, `V ((λ + µ) b_p b_pᵀ + µ |b_p|² I) + κ Σ_k w_k γ_kp² I`.
+    pub fn diagonal_n_per_m(&self, material: &Material) -> [DMat3; 8] {
+        let Lame { lambda_pa, mu_pa } = material.lame;
+        std::array::from_fn(|p| {
+            let b = self.gradients_per_m[p];
+            let modes: f64 = (0..4).map(|k| MODE_WEIGHTS[k] * self.modes[k][p] * self.modes[k][p]).sum();
+            let all_round = mu_pa * (self.volume_m3 * b.length_squared() + self.hourglass_m * modes);
+            outer(b, b) * (self.volume_m3 * (lambda_pa + mu_pa)) + DMat3::from_diagonal(DVec3::splat(all_round))
+        })
     }
 
     fn corner_forces_n(&self, material: &Material, stress: &DMat3, amplitudes: &[DVec3; 4]) -> [DVec3; 8] {

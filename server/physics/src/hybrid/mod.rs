@@ -2,11 +2,13 @@
 pub mod cage;
 pub mod cell;
 pub mod composite;
+pub mod equilibrium;
 mod locate;
 pub mod metric;
 pub mod moments;
 pub mod partition;
 pub mod patch;
+pub mod place;
 pub mod share;
 pub mod sites;
 pub mod skin;

@@ -108,6 +108,11 @@ impl Partition {
         &self.cells
     }
 
+    /// Index in [`Self::cells`] of a cell of the lattice's box, [`NONE`] where there is none of the body.
+    pub fn cell_at(&self, site_cell: usize) -> u32 {
+        self.cell_at[site_cell]
+    }
+
     /// Number of particles.
     pub fn particle_count(&self) -> usize {
         self.particles.len()

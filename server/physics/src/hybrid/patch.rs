@@ -8,7 +8,7 @@
 //! This is plain f64 code: the oracle of what runs in the loop.
 use super::{cell::RestCell, composite::Anchor, partition::Partition, share::Share};
 use crate::material::Material;
-use glam::DVec3;
+use glam::{DMat3, DVec3};
 use std::collections::{BTreeMap, BTreeSet};
 
 /// ε.
@@ -157,6 +157,31 @@ impl Patch {
         self.handed_back(nodes, of_points)
     }
 
+    /// Diagonal blocks (N/m) of the stiffness at rest, of the coarse nodes and then of the active particles; the identity where there is none.
+    pub fn diagonal_n_per_m(&self, materials: &Materials<'_>, nodes: usize) -> Vec<DMat3> {
+        let mut of_nodes = vec![DMat3::ZERO; nodes];
+        let mut of_particles = vec![DMat3::ZERO; self.active.len()];
+        for cell in &self.cells {
+            let blocks = cell.rest.diagonal_n_per_m(materials.of(cell.tet as usize));
+            for (&point, block) in cell.points.iter().zip(blocks) {
+                match (point as usize).checked_sub(self.active.len()) {
+                    None => of_particles[point as usize] += block,
+                    Some(at) => {
+                        let anchor = &self.border[at];
+                        for (&node, weight) in anchor.nodes.iter().zip(anchor.weights) {
+                            of_nodes[node as usize] += block * (weight * weight);
+                        }
+                    }
+                }
+            }
+        }
+        for (tet, share) in self.shares.iter().enumerate() {
+            share.add_diagonal_n_per_m(materials.of(tet), &mut of_nodes);
+        }
+        let filled = |block: DMat3| if block == DMat3::ZERO { DMat3::IDENTITY } else { block };
+        of_nodes.into_iter().chain(of_particles).map(filled).collect()
+    }
+
     /// Of active particles, then of those of the border.
     fn points(&self, a: &Field) -> Vec<DVec3> {
         a.particles.iter().copied().chain(self.border.iter().map(|anchor| anchor.of(&a.nodes))).collect()
@@ -190,7 +215,7 @@ impl PatchCell {
 mod tests {
     use super::*;
     use crate::hybrid::testing::{Random, ball_in_cage, tissue};
-    use glam::{DMat3, DQuat};
+    use glam::DQuat;
 
     fn half_awake(partition: &Partition) -> Patch {
         let right = |&p: &u32| partition.particle_m(p).x > 0.2e-3;

@@ -117,6 +117,21 @@ impl Share {
         self.scatter(&stresses, products_n);
     }
 
+    /// Adds the diagonal blocks (N/m) of the stiffness at rest.
+    pub fn add_diagonal_n_per_m(&self, material: &Material, blocks: &mut [DMat3]) {
+        let (of_shape, of_volume) = split(material);
+        let Lame { lambda_pa, mu_pa } = of_shape.lame;
+        for (&node, moments) in self.nodes.iter().zip(&self.moments_m2) {
+            let block = &mut blocks[node as usize];
+            let all: DVec3 = moments.iter().sum();
+            *block += outer(all, all) * (of_volume.lame.lambda_pa / self.total_m3());
+            for (t, volume) in moments.iter().zip(self.volume_m3).filter(|(_, volume)| *volume > 0.0) {
+                let all_round = DMat3::from_diagonal(DVec3::splat(mu_pa * t.length_squared()));
+                *block += (outer(*t, *t) * (lambda_pa + mu_pa) + all_round) * (1.0 / volume);
+            }
+        }
+    }
+
     fn scatter(&self, stresses: &[DMat3; PARTS], forces_n: &mut [DVec3]) {
         for (&node, moments) in self.nodes.iter().zip(&self.moments_m2) {
             for (stress, moment) in stresses.iter().zip(moments) {

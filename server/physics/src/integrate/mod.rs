@@ -3,7 +3,7 @@ mod backward_euler;
 mod forces;
 mod leapfrog;
 mod motion;
-mod pcg;
+pub(crate) mod pcg;
 mod scheme;
 pub mod seed_semi_implicit;
 mod seed_verlet;

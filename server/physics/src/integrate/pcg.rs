@@ -3,18 +3,18 @@ use glam::{DMat3, DVec3};
 
 /// When to stop.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Stop {
+pub(crate) struct Stop {
     /// Most products with `A`.
-    pub(super) iterations: u32,
+    pub(crate) iterations: u32,
     /// `√(rᵀP⁻¹r)` over its value at the start.
-    pub(super) tolerance: f64,
+    pub(crate) tolerance: f64,
 }
 
 /// The vectors of the iteration; the right side goes into `residual`.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct PcgScratch {
-    pub(super) residual: Vec<DVec3>,
-    pub(super) solution: Vec<DVec3>,
+    pub(crate) residual: Vec<DVec3>,
+    pub(crate) solution: Vec<DVec3>,
     preconditioned: Vec<DVec3>,
     direction: Vec<DVec3>,
     product: Vec<DVec3>,
@@ -37,7 +37,7 @@ impl PcgScratch {
 ///
 /// Where `A` turns out to be indefinite along a direction (`pᵀAp ≤ 0`: the tangent of a law under compression), it stops at what it
 /// has (Steihaug 1983), or at `P⁻¹r` if it has nothing: still a descent of the energy that the positive directions make.
-pub(super) fn solve(
+pub(crate) fn solve(
     mut apply: impl FnMut(&[DVec3], &mut [DVec3]),
     inverse_blocks: &[DMat3],
     stop: Stop,
