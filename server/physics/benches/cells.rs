@@ -17,7 +17,7 @@ use palpate_physics::{
         sites::{CORNERS, Sites},
     },
     material::{Convention, Lame, Law, Material, Viscosity},
-    simd::{CellKernel, InstructionSet, KernelCell},
+    simd::{CellKernel, CellWindow, InstructionSet, KernelCell},
 };
 
 const SPACING_M: f64 = 2.5e-3;
@@ -73,6 +73,19 @@ fn kernels(criterion: &mut Criterion) {
                 .collect();
             for precision in [Precision::Single, Precision::Double] {
                 for set in InstructionSet::available() {
+                    if offset == 0.0 {
+                        let all: Vec<([usize; 3], u16)> =
+                            (0..1000).map(|c| ([c % 10, c / 10 % 10, c / 100], 0)).collect();
+                        let window = CellWindow::build([10; 3], SPACING_M, 1.0, &all, &[material], precision);
+                        let window = window.with_instruction_set(set);
+                        let mut scratch = window.scratch();
+                        for (p, (u, v)) in u.iter().zip(&v).enumerate() {
+                            scratch.set(window.particle([p % 11, p / 11 % 11, p / 121]), *u, *v);
+                        }
+                        group.bench_function(format!("{precision:?} {set:?}, window"), |b| {
+                            b.iter(|| window.add_forces(&mut scratch));
+                        });
+                    }
                     let kernel = CellKernel::build(&listed, rest.len(), &[material], precision);
                     let kernel = kernel.with_instruction_set(set);
                     let mut scratch = kernel.scratch();

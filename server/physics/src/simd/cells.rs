@@ -270,7 +270,7 @@ impl<T: Scalar, const N: usize> Pass<T> for CellForces<'_, T, N> {
 
 /// Sums and differences of eight values along the three axes, the first of which is zero: `x, y, z, yz, zx, xy, xyz`.
 #[inline(always)]
-fn patterns<V: Vector>(v: &[V; 7]) -> [V; 7] {
+pub(super) fn patterns<V: Vector>(v: &[V; 7]) -> [V; 7] {
     let [v1, v2, v3, v4, v5, v6, v7] = *v;
     // Along x: sums and differences of pairs (0 1), (2 3), (4 5), (6 7).
     let (s23, d23) = (v3 + v2, v3 - v2);
@@ -285,7 +285,7 @@ fn patterns<V: Vector>(v: &[V; 7]) -> [V; 7] {
 
 /// What the factors of [`patterns`] give particles 1 to 7.
 #[inline(always)]
-fn particles<V: Vector>(c: &[V; 7]) -> [V; 7] {
+pub(super) fn particles<V: Vector>(c: &[V; 7]) -> [V; 7] {
     let [x, y, z, yz, zx, xy, xyz] = *c;
     // For (y, z) = (−, −), (+, −), (−, +), (+, +): the part that is even in x, and the odd one.
     let even = [yz - y - z, y - z - yz, z - y - yz, y + z + yz];
@@ -421,7 +421,7 @@ fn cut<V: Vector<Scalar = T>, T: Scalar, L: LaneLaw, const VISCOUS: bool, const 
 
 /// Elastic and viscous stress (Pa), and the power density (W/m³) of the latter.
 #[inline(always)]
-fn stress<V: Vector<Scalar = T>, T: Scalar, L: LaneLaw, const VISCOUS: bool>(
+pub(super) fn stress<V: Vector<Scalar = T>, T: Scalar, L: LaneLaw, const VISCOUS: bool>(
     constants: &Constants<T>,
     h: &M3<V>,
     h_dot: &M3<V>,

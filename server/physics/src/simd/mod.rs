@@ -16,6 +16,7 @@ mod products;
 mod real;
 mod step_forces;
 mod tangents;
+mod window;
 #[cfg(target_arch = "x86_64")]
 mod x86;
 
@@ -33,6 +34,7 @@ use glam::DVec3;
 pub use oracle::Oracle;
 use real::Scalar;
 pub(crate) use step_forces::StepForces;
+pub use window::{CellWindow, WindowScratch};
 
 /// Lanes of a block: a block is one or more whole vectors on every instruction set.
 const LANES_F32: usize = 16;
