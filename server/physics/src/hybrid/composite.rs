@@ -47,6 +47,13 @@ impl Anchor {
     pub fn of(&self, a: &[DVec3]) -> DVec3 {
         self.nodes.iter().zip(self.weights).map(|(&node, weight)| a[node as usize] * weight).sum()
     }
+
+    /// Hands a force (N) back to the nodes.
+    pub fn push(&self, force_n: DVec3, forces_n: &mut [DVec3]) {
+        for (&node, weight) in self.nodes.iter().zip(self.weights) {
+            forces_n[node as usize] += force_n * weight;
+        }
+    }
 }
 
 impl Composite {

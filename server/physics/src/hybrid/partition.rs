@@ -133,6 +133,11 @@ impl Partition {
         self.sites.corners(self.cells[cell].site_cell as usize).map(|site| self.particle_at[site])
     }
 
+    /// Whether the surface cuts a cell.
+    pub fn is_cut(&self, cell: usize) -> bool {
+        self.cells[cell].cut != NONE
+    }
+
     /// `V_c` (m³) and `V_c b_cp` (m²) of a cell.
     pub fn moments(&self, cell: usize) -> (f64, [DVec3; 8]) {
         match self.cells[cell].cut {

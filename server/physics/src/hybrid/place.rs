@@ -6,6 +6,15 @@ use super::{
 };
 use glam::DVec3;
 
+/// The cell that a point of the skin belongs to, and where in it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SkinPlace {
+    /// Index of the cell.
+    pub cell: u32,
+    /// In units of the spacing from its first corner.
+    pub local: DVec3,
+}
+
 /// A point in a cell: it moves with the cell's particles by their trilinear weights, and hands forces to them by the same.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Place {
@@ -15,7 +24,7 @@ pub struct Place {
     pub weights: [f64; 8],
 }
 
-impl Place {
+impl SkinPlace {
     /// Of a point (m); one that lies in no cell of the body belongs to the nearest.
     pub fn new(partition: &Partition, point_m: DVec3) -> Self {
         let sites = partition.sites();
@@ -42,7 +51,24 @@ impl Place {
             reach += 1;
         };
         let local = (point_m - sites.cell_m(cell)) / sites.spacing_m();
-        Self { particles: partition.corners(partition.cell_at(cell) as usize), weights: trilinear(local) }
+        Self { cell: partition.cell_at(cell), local }
+    }
+
+    /// How much faster than the fastest of its particles the point can be: `Σ |w_p|`, 1 inside a cell.
+    pub fn amplification(&self) -> f64 {
+        trilinear(self.local).iter().map(|w| w.abs()).sum()
+    }
+
+    /// With its particles and weights.
+    pub fn place(&self, partition: &Partition) -> Place {
+        Place { particles: partition.corners(self.cell as usize), weights: trilinear(self.local) }
+    }
+}
+
+impl Place {
+    /// Of a point (m); one that lies in no cell of the body belongs to the nearest.
+    pub fn new(partition: &Partition, point_m: DVec3) -> Self {
+        SkinPlace::new(partition, point_m).place(partition)
     }
 
     /// Of anything with three components.

@@ -1,8 +1,12 @@
 //! Shapes for tests.
-use super::{cell::RestCell, composite::Composite, moments::integrate, partition::Partition, sites::Sites, skin::Skin};
+use super::{
+    Hybrid, ParticleSpec, Waking, cell::RestCell, composite::Composite, moments::integrate, partition::Partition,
+    sites::Sites, skin::Skin,
+};
 use crate::{
     material::{Convention, Lame, Law, Material, Viscosity},
-    mesh::TetMesh,
+    mesh::{Surface, TetMesh},
+    world::PrescribedSpec,
 };
 use glam::DVec3;
 use std::collections::BTreeMap;
@@ -101,6 +105,27 @@ pub(crate) fn ball_in_cage() -> Partition {
     let cage = tet_box(DVec3::splat(-0.0125), DVec3::splat(0.025), [3, 3, 3]);
     let moments = integrate(&skin, &sites, &mut |_| {});
     Partition::new(sites, Composite::new(&cage), &moments)
+}
+
+/// That ball as a body of two materials; the coarse nodes below −9 mm are held.
+pub(crate) fn hybrid_ball(materials: &[Material; 2]) -> Hybrid {
+    let cage = tet_box(DVec3::splat(-0.0125), DVec3::splat(0.025), [3, 3, 3]);
+    let spec = ParticleSpec {
+        skin: ball(0.01, DVec3::new(0.2e-3, -0.3e-3, 0.1e-3), 3),
+        spacing_m: 1.1e-3,
+        lattice_through_m: DVec3::splat(0.4e-3),
+        most_active: 2000,
+        waking: Waking::ByHand,
+    };
+    let middle = |tet: usize| cage.corners_m(tet).iter().sum::<DVec3>() / 4.0;
+    let of_tet: Vec<u16> = (0..cage.tets().len()).map(|tet| u16::from(middle(tet).y > 0.0)).collect();
+    let low = (0..cage.positions_m().len() as u32).filter(|&n| cage.positions_m()[n as usize].z < -9e-3).collect();
+    let held = PrescribedSpec { name: "low".into(), nodes: low, axes: [true, false, true] };
+    let surface = Surface::of(&cage).unwrap();
+    let densities = [1000.0, 1200.0];
+    let built =
+        Hybrid::build(&spec, (&cage, &surface), &[held], (materials, &densities), &of_tet, &mut |_| {}).unwrap();
+    built.hybrid
 }
 
 /// One material of each law, nearly incompressible and viscous.

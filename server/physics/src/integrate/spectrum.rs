@@ -82,7 +82,7 @@ pub fn element_bound_rad_per_s(stiffness: &RestStiffness<'_>, inverse_mass_per_k
 
 /// Largest eigenvalue of a symmetric positive semi-definite 3×3 matrix, in closed form: with `q = tr A/3`,
 /// `p = √(|A − qI|²/6)`, `B = (A − qI)/p`: `λ_max = q + 2p cos(⅓ arccos(½ det B))`.
-fn largest_eigenvalue(a: &DMat3) -> f64 {
+pub(crate) fn largest_eigenvalue(a: &DMat3) -> f64 {
     let q = trace(a) / 3.0;
     let deviator = *a - DMat3::from_diagonal(DVec3::splat(q));
     let p = (crate::material::stvk::contract(&deviator, &deviator) / 6.0).sqrt();

@@ -7,6 +7,7 @@
 // A vector type is only fast where it is inlined into a function compiled for its instruction set.
 #![allow(clippy::inline_always)]
 mod block;
+mod cell_stress;
 mod cells;
 mod dispatch;
 mod laws;
@@ -14,9 +15,9 @@ mod layout;
 mod oracle;
 mod products;
 mod real;
+mod rows;
 mod step_forces;
 mod tangents;
-mod window;
 #[cfg(target_arch = "x86_64")]
 mod x86;
 
@@ -27,14 +28,14 @@ use crate::{
     world::Precision,
 };
 use block::{Blocks, Forces, Job, Node, Products, Run, Sum};
-pub use cells::{CellKernel, CellScratch, KernelCell};
+pub use cells::CutCells;
 use dispatch::Available;
 pub use dispatch::InstructionSet;
 use glam::DVec3;
 pub use oracle::Oracle;
 use real::Scalar;
 pub(crate) use step_forces::StepForces;
-pub use window::{CellWindow, WindowScratch};
+pub use rows::{CellRow, RowKernel, RowValues};
 
 /// Lanes of a block: a block is one or more whole vectors on every instruction set.
 const LANES_F32: usize = 16;

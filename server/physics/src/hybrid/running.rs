@@ -1,0 +1,345 @@
+//! The patch as the loop runs it: rebuilt without allocating when other particles wake, its cells in lanes. Its oracle is `patch`.
+//!
+//! *Points* are the particles of awake cells, ascending: those that are active, and those of the border, which follow the coarse nodes.
+use super::{
+    body::Hybrid,
+    cell::RestCell,
+    composite::Anchor,
+    partition::{Cell, NONE},
+    patch::KEPT,
+    running_metric::RunningMetric,
+    share::Share,
+};
+use crate::{
+    simd::{CellRow, CutCells, RowKernel, RowValues},
+    world::Precision,
+};
+use glam::DVec3;
+
+/// A patch with room for the most active particles there may be.
+#[derive(Debug, Clone)]
+pub(crate) struct RunningPatch {
+    /// Active particles, ascending.
+    active: Vec<u32>,
+    points: Vec<Point>,
+    /// Displacements (m) of the points, less that of the first.
+    displacements_m: Vec<DVec3>,
+    /// Awake cells, ascending.
+    cells: Vec<u32>,
+    kernel: RowKernel,
+    rows: Vec<CellRow>,
+    values: RowValues,
+    cut: CutCells,
+    /// What is left to each coarse tet.
+    shares: Vec<Share>,
+    /// Of which tets something was taken.
+    taken_from: Vec<u32>,
+    pub(super) metric: RunningMetric,
+    /// Displacements (m) of coarse nodes.
+    node_displacements_m: Vec<DVec3>,
+    /// Number of every particle among the points.
+    point_of: Vec<u32>,
+    is_awake: Vec<bool>,
+    is_viscous: bool,
+}
+
+#[derive(Debug, Clone, Copy)]
+struct Point {
+    particle: u32,
+    /// Its number among the active ones, [`NONE`] of the border's.
+    active: u32,
+    rest_m: DVec3,
+    anchor: Anchor,
+}
+
+impl RunningPatch {
+    /// Room for `most_active` particles, none awake.
+    pub(crate) fn new(hybrid: &Hybrid, most_active: usize, precision: Precision) -> Self {
+        let partition = &hybrid.partition;
+        let most_cells = (8 * most_active).min(partition.cells().len());
+        let most_points = (27 * most_active).min(partition.particle_count());
+        let kernel = RowKernel::new(partition.sites().spacing_m(), 1.0 - KEPT, &hybrid.materials, precision);
+        Self {
+            active: Vec::with_capacity(most_active),
+            points: Vec::with_capacity(most_points),
+            displacements_m: Vec::with_capacity(most_points),
+            cells: Vec::with_capacity(most_cells),
+            rows: Vec::with_capacity(most_cells),
+            values: kernel.values(most_points),
+            kernel,
+            cut: CutCells::with_capacity(most_cells, most_points, &hybrid.materials, precision),
+            shares: partition.shares().to_vec(),
+            taken_from: Vec::with_capacity(partition.shares().len()),
+            metric: RunningMetric::new(hybrid, most_active),
+            node_displacements_m: vec![DVec3::ZERO; hybrid.node_count()],
+            point_of: vec![NONE; partition.particle_count()],
+            is_awake: vec![false; partition.cells().len()],
+            is_viscous: hybrid.materials.iter().any(|m| !m.viscosity.is_zero()),
+        }
+    }
+
+    /// Active particles, ascending.
+    pub(crate) fn active(&self) -> &[u32] {
+        &self.active
+    }
+
+    /// Wakes these particles (ascending, no more than there is room for) and no others. Allocates nothing.
+    pub(crate) fn wake(&mut self, hybrid: &Hybrid, active: &[u32]) {
+        self.forget(hybrid);
+        self.active.extend_from_slice(active);
+        self.find_cells(hybrid);
+        self.find_points(hybrid);
+        self.lay_out(hybrid);
+        self.take_from_shares(hybrid);
+        let points = &self.points;
+        let followed = points.iter().filter(|point| point.active != NONE).map(|point| (point.particle, point.anchor));
+        self.metric.factorise(hybrid, followed);
+    }
+
+    fn forget(&mut self, hybrid: &Hybrid) {
+        for point in &self.points {
+            self.point_of[point.particle as usize] = NONE;
+        }
+        for &cell in &self.cells {
+            self.is_awake[cell as usize] = false;
+        }
+        for &tet in &self.taken_from {
+            let (share, whole) = (&mut self.shares[tet as usize], &hybrid.partition.shares()[tet as usize]);
+            share.volume_m3 = whole.volume_m3;
+            share.moments_m2.copy_from_slice(&whole.moments_m2);
+        }
+        self.taken_from.clear();
+        self.active.clear();
+        self.points.clear();
+        self.cells.clear();
+        self.rows.clear();
+        self.cut.clear();
+    }
+
+    fn find_cells(&mut self, hybrid: &Hybrid) {
+        for &particle in &self.active {
+            for cell in hybrid.partition.cells_at(particle) {
+                if !self.is_awake[cell] {
+                    self.is_awake[cell] = true;
+                    self.cells.push(cell as u32);
+                }
+            }
+        }
+        self.cells.sort_unstable();
+    }
+
+    fn find_points(&mut self, hybrid: &Hybrid) {
+        for &cell in &self.cells {
+            for particle in hybrid.partition.corners(cell as usize) {
+                if self.point_of[particle as usize] == NONE {
+                    self.point_of[particle as usize] = 0;
+                    let anchor = hybrid.partition.anchor(particle);
+                    let rest_m = hybrid.partition.particle_m(particle);
+                    self.points.push(Point { particle, active: NONE, rest_m, anchor });
+                }
+            }
+        }
+        self.points.sort_unstable_by_key(|point| point.particle);
+        let mut next = 0;
+        for (number, point) in self.points.iter_mut().enumerate() {
+            self.point_of[point.particle as usize] = number as u32;
+            if self.active.get(next) == Some(&point.particle) {
+                point.active = next as u32;
+                next += 1;
+            }
+        }
+        self.displacements_m.resize(self.points.len(), DVec3::ZERO);
+    }
+
+    /// Rows of full cells and blocks of cut ones, material by material.
+    fn lay_out(&mut self, hybrid: &Hybrid) {
+        let partition = &hybrid.partition;
+        let spacing_m = partition.sites().spacing_m();
+        for material in 0..hybrid.materials.len() as u16 {
+            let point_of = &self.point_of;
+            let of_material = |is_cut: bool| {
+                self.cells.iter().map(|&cell| cell as usize).filter(move |&cell| {
+                    let Cell { tet, .. } = partition.cells()[cell];
+                    partition.is_cut(cell) == is_cut && hybrid.of_tet[tet as usize] == material
+                })
+            };
+            let points_of = |cell: usize| partition.corners(cell).map(|particle| point_of[particle as usize]);
+            let first_row = self.rows.len();
+            for cell in of_material(false) {
+                let points = points_of(cell);
+                let points = [points[0], points[2], points[4], points[6]];
+                match self.rows[first_row..].last_mut() {
+                    Some(row) if row.points.map(|point| point + row.cells) == points => row.cells += 1,
+                    _ => self.rows.push(CellRow { points, cells: 1, material }),
+                }
+            }
+            let count = of_material(true).count();
+            self.cut.start(material, count);
+            for (number, cell) in of_material(true).enumerate() {
+                let rest = RestCell::new(spacing_m, 1.0 - KEPT, &partition.moments(cell));
+                self.cut.put(number, points_of(cell), &rest);
+            }
+        }
+    }
+
+    /// `V_g ← V_g − (1 − ε) V_c` and likewise `T_gi`.
+    fn take_from_shares(&mut self, hybrid: &Hybrid) {
+        let partition = &hybrid.partition;
+        for &cell in &self.cells {
+            let Cell { tet, part, .. } = partition.cells()[cell as usize];
+            if !self.taken_from.contains(&tet) {
+                self.taken_from.push(tet);
+            }
+            let (volume_m3, gradients_m2) = partition.moments(cell as usize);
+            let anchors = partition
+                .corners(cell as usize)
+                .map(|particle| self.points[self.point_of[particle as usize] as usize].anchor);
+            // Every node is known already: nothing is pushed.
+            self.shares[tet as usize].add(part, KEPT - 1.0, volume_m3, &gradients_m2, &anchors);
+        }
+    }
+
+    /// Overwrites `forces_n` (N) with those of elastic and viscous stress at positions `x` and velocities `v` of coarse nodes and then active
+    /// particles; returns the power (W) that viscous stress takes.
+    pub(crate) fn forces_n(&mut self, hybrid: &Hybrid, x: &[DVec3], v: &[DVec3], forces_n: &mut [DVec3]) -> f64 {
+        let nodes = hybrid.node_count();
+        let (x_nodes, x_particles) = x.split_at(nodes);
+        let (v_nodes, v_particles) = v.split_at(nodes);
+        forces_n.fill(DVec3::ZERO);
+        let mut power_w = 0.0;
+        for (tet, share) in self.shares.iter().enumerate() {
+            let material = &hybrid.materials[hybrid.of_tet[tet] as usize];
+            power_w += share.add_forces_n(material, x_nodes, v_nodes, forces_n);
+        }
+        if self.active.is_empty() {
+            return power_w;
+        }
+        self.displace(hybrid, x_nodes, x_particles);
+        // Less that of one of them: far from rest, their differences would be rounded too coarsely.
+        let first_m = self.displacements_m[0];
+        for (number, displacement) in self.displacements_m.iter().enumerate() {
+            let displacement_m = *displacement - first_m;
+            self.values.set_displacement(number, displacement_m);
+            self.cut.set_displacement(number, displacement_m);
+        }
+        if self.is_viscous {
+            for (number, point) in self.points.iter().enumerate() {
+                let velocity = if point.active == NONE { point.anchor.of(v_nodes) } else { v_particles[point.active as usize] };
+                self.values.set_velocity(number, velocity);
+                self.cut.set_velocity(number, velocity);
+            }
+        }
+        power_w += self.kernel.forces(&self.rows, self.points.len(), &mut self.values);
+        power_w += self.cut.forces(self.points.len());
+        let (f_nodes, f_particles) = forces_n.split_at_mut(nodes);
+        for (number, point) in self.points.iter().enumerate() {
+            let force_n = self.values.force_n(number) + self.cut.force_n(number);
+            if point.active == NONE {
+                point.anchor.push(force_n, f_nodes);
+            } else {
+                f_particles[point.active as usize] += force_n;
+            }
+        }
+        power_w
+    }
+
+    fn displace(&mut self, hybrid: &Hybrid, x_nodes: &[DVec3], x_particles: &[DVec3]) {
+        let rest = hybrid.partition.coarse().positions_m();
+        for ((u, x), rest) in self.node_displacements_m.iter_mut().zip(x_nodes).zip(rest) {
+            *u = *x - *rest;
+        }
+        for (u, point) in self.displacements_m.iter_mut().zip(&self.points) {
+            *u = if point.active == NONE {
+                point.anchor.of(&self.node_displacements_m)
+            } else {
+                x_particles[point.active as usize] - point.rest_m
+            };
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{
+        hybrid::{
+            metric::Metric,
+            patch::{Field, Patch},
+            testing::{Random, hybrid_ball, tissue},
+        },
+        material::Material,
+    };
+    use std::collections::BTreeSet;
+
+    fn some(hybrid: &Hybrid, wanted: impl Fn(DVec3) -> bool) -> Vec<u32> {
+        let particles = 0..hybrid.partition.particle_count() as u32;
+        particles.filter(|&p| hybrid.may_wake(p) && wanted(hybrid.partition.particle_m(p))).collect()
+    }
+
+    fn largest(list: &[DVec3]) -> f64 {
+        list.iter().map(|a| a.length()).fold(0.0, f64::max)
+    }
+
+    /// Whichever particles were awake before: forces, power, accelerations and momenta are the oracle's.
+    #[test]
+    fn running_patch_and_oracle_agree() {
+        let [stvk, neo, corotated] = tissue();
+        let mut random = Random(51);
+        for materials in [[neo, stvk], [corotated, neo].map(|m: Material| Material { viscosity: Default::default(), ..m })] {
+            let hybrid = hybrid_ball(&materials);
+            for (precision, bound) in [(Precision::Double, 1e-11), (Precision::Single, 3e-5)] {
+                let mut running = RunningPatch::new(&hybrid, 2000, precision);
+                let near = |p: DVec3| p.distance(DVec3::new(2e-3, 1e-3, 9e-3)) < 4e-3;
+                let far = |p: DVec3| near(p) || p.distance(DVec3::new(-8e-3, 0.0, 0.0)) < 3e-3;
+                for active in [some(&hybrid, near), some(&hybrid, far), vec![], some(&hybrid, |p| p.x > 0.2e-3)] {
+                    running.wake(&hybrid, &active);
+                    let set: BTreeSet<u32> = active.iter().copied().collect();
+                    let patch = Patch::new(&hybrid.partition, &set);
+                    let rest = patch.at_rest(&hybrid.partition);
+                    let shaken = |list: &[DVec3], size: f64, random: &mut Random| -> Vec<DVec3> {
+                        list.iter().map(|p| *p + DVec3::new(3.0, 2.0, 1.0) * size + random.vector() * size).collect()
+                    };
+                    let at = Field {
+                        nodes: shaken(&rest.nodes, 0.1e-3, &mut random),
+                        particles: shaken(&rest.particles, 0.1e-3, &mut random),
+                    };
+                    let zero = |list: &[DVec3]| vec![DVec3::ZERO; list.len()];
+                    let rate = Field {
+                        nodes: shaken(&zero(&rest.nodes), 0.1, &mut random),
+                        particles: shaken(&zero(&rest.particles), 0.1, &mut random),
+                    };
+                    let (expected, expected_w) = patch.forces_n(&hybrid.materials(), &at, &rate);
+                    let joined = |field: &Field| [&field.nodes[..], &field.particles].concat();
+                    let (expected, x, v) = (joined(&expected), joined(&at), joined(&rate));
+                    let mut forces = x.clone();
+                    let power_w = running.forces_n(&hybrid, &x, &v, &mut forces);
+                    let worst = forces.iter().zip(&expected).map(|(a, b)| a.distance(*b)).fold(0.0, f64::max);
+                    assert!(worst < bound * largest(&expected), "{precision:?}, {}: {worst:e}", active.len());
+                    assert!((power_w - expected_w).abs() <= 10.0 * bound * expected_w, "{power_w} {expected_w}");
+
+                    let metric = Metric::new(&hybrid.partition, &hybrid.masses, &set, &hybrid.free).unwrap();
+                    let nodes = hybrid.node_count();
+                    let mut accelerations = expected[..nodes].to_vec();
+                    metric.accelerate(&hybrid.free, &mut accelerations);
+                    let particles = expected[nodes..].iter().zip(metric.particle_kg()).map(|(f, m)| *f / *m);
+                    accelerations.extend(particles);
+                    let mut found = expected.clone();
+                    running.metric.accelerate(&mut found);
+                    let worst = found.iter().zip(&accelerations).map(|(a, b)| a.distance(*b)).fold(0.0, f64::max);
+                    assert!(worst < 1e-9 * largest(&accelerations), "{worst:e} of {:e}", largest(&accelerations));
+                    let mut momenta = v.clone();
+                    running.metric.momenta(&hybrid, &v, &mut momenta);
+                    let of_nodes = metric.momenta(&v[..nodes]);
+                    let worst = momenta.iter().zip(&of_nodes).map(|(a, b)| a.distance(*b)).fold(0.0, f64::max);
+                    assert!(worst < 1e-12 * largest(&of_nodes), "{worst:e}");
+                    // Gravity moves everything alike.
+                    let mut weight = zero(&x);
+                    running.metric.add_weight_n(DVec3::X, &mut weight);
+                    running.metric.momenta(&hybrid, &vec![DVec3::X; x.len()], &mut momenta);
+                    let worst = weight.iter().zip(&momenta).map(|(a, b)| a.distance(*b)).fold(0.0, f64::max);
+                    assert!(worst < 1e-12 * largest(&weight), "{worst:e}");
+                }
+            }
+        }
+    }
+}

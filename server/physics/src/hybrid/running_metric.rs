@@ -1,0 +1,186 @@
+//! The coarse mass matrix `M'` as the loop runs it: factorised anew, without allocating, when other particles wake. Its oracle is `metric`.
+use super::{
+    body::{Hybrid, NO_WEIGHT},
+    composite::Anchor,
+    partition::NONE,
+    patch::KEPT,
+};
+use glam::DVec3;
+
+/// `M'` and its factor.
+///
+/// Active particles follow free nodes only, so that one factor serves the three axes.
+#[derive(Debug, Clone)]
+pub(crate) struct RunningMetric {
+    /// `(1 − ε) m_p` (kg) of active particles.
+    particle_kg: Vec<f64>,
+    /// What gravity pulls coarse nodes with (kg): the row sums of `M'`.
+    weight_kg: Vec<f64>,
+    /// `1/M_i` (1/kg), 0 on held axes.
+    inverse_node_per_kg: Vec<DVec3>,
+    /// Nodes that active particles follow: the rows of the block.
+    touched: Vec<u32>,
+    row_of: Vec<u32>,
+    /// The dense block of `M'` (kg), row by row.
+    block_kg: Vec<f64>,
+    /// Its lower Cholesky factor by columns, each from the diagonal down, whose entry is inverted.
+    factor: Vec<f64>,
+    right: Vec<DVec3>,
+}
+
+/// Nodes that a particle does follow.
+fn weighty(anchor: &Anchor) -> impl Iterator<Item = (u32, f64)> {
+    anchor.nodes.into_iter().zip(anchor.weights).filter(|(_, weight)| *weight >= NO_WEIGHT)
+}
+
+impl RunningMetric {
+    pub(super) fn new(hybrid: &Hybrid, most_active: usize) -> Self {
+        let nodes = hybrid.node_count();
+        let most_touched = (4 * most_active).min(nodes);
+        let inverse = |(mass, free): (&f64, &glam::BVec3)| {
+            DVec3::select(*free, DVec3::splat(1.0 / mass.max(f64::MIN_POSITIVE)), DVec3::ZERO)
+        };
+        Self {
+            particle_kg: Vec::with_capacity(most_active),
+            weight_kg: hybrid.masses.node_kg.clone(),
+            inverse_node_per_kg: hybrid.masses.node_kg.iter().zip(&hybrid.free).map(inverse).collect(),
+            touched: Vec::with_capacity(most_touched),
+            row_of: vec![NONE; nodes],
+            block_kg: Vec::with_capacity(most_touched * most_touched),
+            factor: Vec::with_capacity(most_touched * most_touched),
+            right: Vec::with_capacity(most_touched),
+        }
+    }
+
+    /// Takes the active particles, in order, with what they follow. Allocates nothing.
+    pub(super) fn factorise(&mut self, hybrid: &Hybrid, followed: impl Iterator<Item = (u32, Anchor)> + Clone) {
+        for &node in &self.touched {
+            self.row_of[node as usize] = NONE;
+            self.weight_kg[node as usize] = hybrid.masses.node_kg[node as usize];
+        }
+        self.touched.clear();
+        self.particle_kg.clear();
+        for (_, anchor) in followed.clone() {
+            for (node, _) in weighty(&anchor) {
+                if self.row_of[node as usize] == NONE {
+                    self.row_of[node as usize] = 0;
+                    self.touched.push(node);
+                }
+            }
+        }
+        self.touched.sort_unstable();
+        let size = self.touched.len();
+        self.block_kg.clear();
+        self.block_kg.resize(size * size, 0.0);
+        for (row, &node) in self.touched.iter().enumerate() {
+            self.row_of[node as usize] = row as u32;
+            self.block_kg[row * size + row] = hybrid.masses.node_kg[node as usize];
+        }
+        for (particle, anchor) in followed {
+            let mass = (1.0 - KEPT) * hybrid.masses.particle_kg[particle as usize];
+            self.particle_kg.push(mass);
+            for (node, weight) in weighty(&anchor) {
+                self.weight_kg[node as usize] -= mass * weight;
+                let row = self.row_of[node as usize] as usize;
+                for (other, other_weight) in weighty(&anchor) {
+                    let column = self.row_of[other as usize] as usize;
+                    self.block_kg[row * size + column] -= mass * weight * other_weight;
+                }
+            }
+        }
+        self.cholesky();
+        self.right.resize(size, DVec3::ZERO);
+    }
+
+    /// Column after column, left-looking from what the ones before leave of it.
+    ///
+    /// Pivots are positive where no weight is negative (`metric`), which [`Hybrid::may_wake`] sees to; rounding that says otherwise is raised to a
+    /// little more than nothing.
+    fn cholesky(&mut self) {
+        let size = self.touched.len();
+        self.factor.clear();
+        self.factor.resize(size * size, 0.0);
+        for column in 0..size {
+            let (before, now) = self.factor.split_at_mut(column * size);
+            let now = &mut now[..size];
+            now[column..].copy_from_slice(&self.block_kg[column * size + column..(column + 1) * size]);
+            for earlier in before.chunks_exact(size) {
+                let scale = earlier[column];
+                if scale != 0.0 {
+                    for (entry, other) in now[column..].iter_mut().zip(&earlier[column..]) {
+                        *entry -= scale * other;
+                    }
+                }
+            }
+            let least = 1e-12 * self.block_kg[column * size + column];
+            let inverse = now[column].max(least).sqrt().recip();
+            for entry in &mut now[column + 1..] {
+                *entry *= inverse;
+            }
+            now[column] = inverse;
+        }
+    }
+
+    /// `M'⁻¹ f` (m/s²) on free axes, zero on the others, in place of forces (N) on coarse nodes and then on active particles.
+    pub(crate) fn accelerate(&mut self, forces_n: &mut [DVec3]) {
+        let size = self.touched.len();
+        let (nodes, particles) = forces_n.split_at_mut(self.inverse_node_per_kg.len());
+        for (right, &node) in self.right.iter_mut().zip(&self.touched) {
+            *right = nodes[node as usize];
+        }
+        for (force, inverse) in nodes.iter_mut().zip(&self.inverse_node_per_kg) {
+            *force *= *inverse;
+        }
+        for (force, mass) in particles.iter_mut().zip(&self.particle_kg) {
+            *force /= *mass;
+        }
+        // L y = f
+        for column in 0..size {
+            let entries = &self.factor[column * size..(column + 1) * size];
+            let (done, rest) = self.right.split_at_mut(column + 1);
+            done[column] *= entries[column];
+            let y = done[column];
+            for (right, entry) in rest.iter_mut().zip(&entries[column + 1..]) {
+                *right -= y * *entry;
+            }
+        }
+        // Lᵀ a = y
+        for column in (0..size).rev() {
+            let entries = &self.factor[column * size..(column + 1) * size];
+            let (done, rest) = self.right.split_at_mut(column + 1);
+            let mut sum = done[column];
+            for (right, entry) in rest.iter().zip(&entries[column + 1..]) {
+                sum -= *right * *entry;
+            }
+            done[column] = sum * entries[column];
+        }
+        for (acceleration, &node) in self.right.iter().zip(&self.touched) {
+            nodes[node as usize] = *acceleration;
+        }
+    }
+
+    /// Adds the weight `m g` (N) of coarse nodes and active particles.
+    pub(crate) fn add_weight_n(&self, gravity_m_per_s2: DVec3, forces_n: &mut [DVec3]) {
+        for (force, mass) in forces_n.iter_mut().zip(self.weight_kg.iter().chain(&self.particle_kg)) {
+            *force += gravity_m_per_s2 * *mass;
+        }
+    }
+
+    /// `(1 − ε) m_p` (kg) of the active particles.
+    pub(crate) fn particle_kg(&self) -> &[f64] {
+        &self.particle_kg
+    }
+
+    /// Momenta `M' v` (kg m/s) of coarse nodes and then of active particles.
+    pub(crate) fn momenta(&self, hybrid: &Hybrid, v: &[DVec3], momenta: &mut [DVec3]) {
+        let masses = hybrid.masses.node_kg.iter().chain(&self.particle_kg);
+        for ((momentum, v), mass) in momenta.iter_mut().zip(v).zip(masses) {
+            *momentum = *v * *mass;
+        }
+        let size = self.touched.len();
+        for (row, &node) in self.touched.iter().enumerate() {
+            let entries = self.block_kg[row * size..(row + 1) * size].iter().zip(&self.touched);
+            momenta[node as usize] = entries.map(|(mass, &other)| v[other as usize] * *mass).sum();
+        }
+    }
+}

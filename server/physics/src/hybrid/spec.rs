@@ -1,0 +1,96 @@
+//! What a body's particles are made from.
+use super::skin::Skin;
+use glam::DVec3;
+use thiserror::Error;
+
+/// More cells than this in the lattice's box are refused: their numbers, and memory.
+pub const MOST_CELLS: f64 = 5e8;
+/// More active particles than this are refused.
+pub const MOST_ACTIVE: usize = 20_000;
+
+/// The particles of a hybrid body, whose coarse level is the model's mesh.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ParticleSpec {
+    /// The body's surface at rest: what bounds its volume, what tools touch and viewers see. As fine as the lattice, or finer.
+    pub skin: Skin,
+    /// Spacing h (m) of the lattice.
+    pub spacing_m: f64,
+    /// A point (m) that planes of the lattice pass through; best on a surface that is held, so that no cell reaches past it.
+    pub lattice_through_m: DVec3,
+    /// Most particles awake at once.
+    pub most_active: usize,
+    /// What wakes them.
+    pub waking: Waking,
+}
+
+/// What wakes particles.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Waking {
+    /// Nothing but [`crate::State::wake_only`].
+    ByHand,
+    /// Tools near the skin: those within `reach_m` (m, at rest) of where it is touched or about to be.
+    ByTools {
+        /// Radius (m) at rest.
+        reach_m: f64,
+    },
+}
+
+/// Why particles cannot be made.
+#[derive(Debug, Clone, PartialEq, Error)]
+pub enum HybridError {
+    /// A number outside its range.
+    #[error("{name} = {value}: {rule}")]
+    Setting {
+        /// Name.
+        name: &'static str,
+        /// Value.
+        value: f64,
+        /// What it must satisfy.
+        rule: &'static str,
+    },
+    /// The lattice is too fine for the body.
+    #[error("a lattice of {spacing_m} m over this body has {cells:.1e} cells, more than {MOST_CELLS:.0e}; take a larger spacing")]
+    TooMany {
+        /// Spacing (m).
+        spacing_m: f64,
+        /// Cells in its box.
+        cells: f64,
+    },
+    /// The lattice is too coarse for the body.
+    #[error("no cell of a lattice of {spacing_m} m holds any of the body; take a smaller spacing")]
+    Nothing {
+        /// Spacing (m).
+        spacing_m: f64,
+    },
+    /// Something that only bodies without particles have.
+    #[error("{what} is not there for bodies with particles; {instead}")]
+    NotForParticles {
+        /// What.
+        what: &'static str,
+        /// What to do.
+        instead: &'static str,
+    },
+}
+
+impl ParticleSpec {
+    pub(crate) fn check(&self) -> Result<(), HybridError> {
+        let setting = |name, value: f64, ok: bool, rule| {
+            if ok { Ok(()) } else { Err(HybridError::Setting { name, value, rule }) }
+        };
+        let h = self.spacing_m;
+        setting("spacing_m", h, h > 0.0 && h.is_finite(), "must be finite and larger than 0")?;
+        let through = self.lattice_through_m.length();
+        setting("lattice_through_m", through, through.is_finite(), "must be finite")?;
+        let most = self.most_active;
+        setting("most_active", most as f64, (1..=MOST_ACTIVE).contains(&most), "must be 1 to 20000")?;
+        if let Waking::ByTools { reach_m } = self.waking {
+            setting("reach_m", reach_m, reach_m > 0.0 && reach_m.is_finite(), "must be finite and larger than 0")?;
+        }
+        let (low, high) = self.skin.bounds_m();
+        let cells = ((high - low) / h + 1.0).to_array().iter().product();
+        if cells > MOST_CELLS {
+            return Err(HybridError::TooMany { spacing_m: h, cells });
+        }
+        Ok(())
+    }
+}

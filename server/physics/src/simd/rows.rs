@@ -1,0 +1,336 @@
+//! The full cells of a hybrid body's patch, row by row along x; their oracle is `hybrid::cell`.
+//!
+//! Points (the particles of awake cells) are numbered by their sites, x first, so the particles of neighbouring cells of a row are neighbours in
+//! memory: the eight of a lane are eight shifted loads, and nothing is gathered or scattered. Lanes past a row's end are given no strain and weight 0.
+//! What cells give their particles on the left and on the right is summed apart, that loads never overlap a store just made, and put
+//! together at the end: `f_i = l_i + r_{i−1}`.
+use super::{
+    cell_stress::{particles, patterns, stress},
+    dispatch::{self, Available, InstructionSet, Pass},
+    laws::Constants,
+    real::{Real, Scalar, Vector},
+    tangents::LaneTangent,
+};
+use crate::{
+    hybrid::cell::{HOURGLASS, MODE_WEIGHTS},
+    material::Material,
+    world::Precision,
+};
+use glam::DVec3;
+
+/// The widest vector: arrays end on so many entries of no point.
+const LANES: usize = 16;
+
+/// Full cells, one after the other along x.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct CellRow {
+    /// The first cell's points 0, 2, 4 and 6; the others follow them.
+    pub points: [u32; 4],
+    /// How many cells.
+    pub cells: u32,
+    /// Index of their material.
+    pub material: u16,
+}
+
+/// Materials of full cells, which all are of one size.
+#[derive(Debug, Clone)]
+pub struct RowKernel {
+    layout: Layout,
+    instruction_set: Available,
+    is_viscous: bool,
+}
+
+#[derive(Debug, Clone)]
+enum Layout {
+    Single(Vec<CellMaterial<f32>>),
+    Double(Vec<CellMaterial<f64>>),
+}
+
+#[derive(Debug, Clone)]
+struct CellMaterial<T> {
+    material: Material,
+    constants: Constants<T>,
+    /// `1/(4h)` (1/m), `−V` (m³) and `−κ` (N/m).
+    cell: [f64; 3],
+}
+
+/// Displacements, velocities and forces of points.
+#[derive(Debug, Clone)]
+pub struct RowValues {
+    values: Values,
+}
+
+#[derive(Debug, Clone)]
+enum Values {
+    Single(Arrays<f32>),
+    Double(Arrays<f64>),
+}
+
+#[derive(Debug, Clone)]
+struct Arrays<T> {
+    displacements: [Vec<T>; 3],
+    /// Empty unless something is viscous.
+    velocities: [Vec<T>; 3],
+    left: [Vec<T>; 3],
+    right: [Vec<T>; 3],
+}
+
+impl<T: Scalar> Arrays<T> {
+    fn new(points: usize, is_viscous: bool) -> Self {
+        // One before the first point, whose left neighbour gives it nothing.
+        let zeros = |count: usize| std::array::from_fn(|_| vec![T::of(0.0); count]);
+        let entries = 1 + points + LANES;
+        Self {
+            displacements: zeros(entries),
+            velocities: zeros(if is_viscous { entries } else { 0 }),
+            left: zeros(entries),
+            right: zeros(entries),
+        }
+    }
+}
+
+impl RowKernel {
+    /// For cells of spacing `h` (m) that answer for the share `handed` of their volume.
+    pub fn new(spacing_m: f64, handed: f64, materials: &[Material], precision: Precision) -> Self {
+        let cell = |material: &Material| {
+            let volume_m3 = handed * spacing_m.powi(3);
+            let kappa = HOURGLASS * 4.0 / 3.0 * material.lame.mu_pa * volume_m3 / (spacing_m * spacing_m);
+            [0.25 / spacing_m, -volume_m3, -kappa]
+        };
+        let layout = match precision {
+            Precision::Single => Layout::Single(of_materials(materials, cell)),
+            Precision::Double => Layout::Double(of_materials(materials, cell)),
+        };
+        let is_viscous = materials.iter().any(|m| !m.viscosity.is_zero());
+        Self { layout, is_viscous, instruction_set: Available::at_most(InstructionSet::best()) }
+    }
+
+    /// The same kernel, held to an instruction set or the best below it that there is (for tests and benchmarks).
+    #[must_use]
+    pub fn with_instruction_set(self, instruction_set: InstructionSet) -> Self {
+        Self { instruction_set: Available::at_most(instruction_set), ..self }
+    }
+
+    /// Buffers for up to `points` points, at rest.
+    pub fn values(&self, points: usize) -> RowValues {
+        let values = match &self.layout {
+            Layout::Single(_) => Values::Single(Arrays::new(points, self.is_viscous)),
+            Layout::Double(_) => Values::Double(Arrays::new(points, self.is_viscous)),
+        };
+        RowValues { values }
+    }
+
+    /// Sums up the forces (N) of elastic and viscous stress on the first `points` points; returns the power (W) that viscous stress takes.
+    pub fn forces(&self, rows: &[CellRow], points: usize, values: &mut RowValues) -> f64 {
+        match (&self.layout, &mut values.values) {
+            (Layout::Single(materials), Values::Single(arrays)) => self.sum_up(materials, rows, points, arrays),
+            (Layout::Double(materials), Values::Double(arrays)) => self.sum_up(materials, rows, points, arrays),
+            _ => 0.0,
+        }
+    }
+
+    fn sum_up<T: Scalar>(
+        &self,
+        materials: &[CellMaterial<T>],
+        rows: &[CellRow],
+        points: usize,
+        arrays: &mut Arrays<T>,
+    ) -> f64 {
+        for sums in arrays.left.iter_mut().chain(&mut arrays.right) {
+            sums[..1 + points + LANES].fill(T::of(0.0));
+        }
+        let mut power_w = 0.0;
+        for same in rows.chunk_by(|a, b| a.material == b.material) {
+            let material = &materials[same[0].material as usize];
+            let law = (material.material.law, !material.material.viscosity.is_zero());
+            power_w += dispatch::run(self.instruction_set, law, &mut RowForces { material, rows: same, arrays });
+        }
+        power_w
+    }
+}
+
+fn of_materials<T: Scalar>(materials: &[Material], cell: impl Fn(&Material) -> [f64; 3]) -> Vec<CellMaterial<T>> {
+    let of = |m: &Material| CellMaterial { material: *m, constants: Constants::of(m), cell: cell(m) };
+    materials.iter().map(of).collect()
+}
+
+impl RowValues {
+    /// Displacement (m) of a point.
+    pub fn set_displacement(&mut self, point: usize, displacement_m: DVec3) {
+        match &mut self.values {
+            Values::Single(arrays) => put(&mut arrays.displacements, point, displacement_m),
+            Values::Double(arrays) => put(&mut arrays.displacements, point, displacement_m),
+        }
+    }
+
+    /// Velocity (m/s) of a point; of use only where a material is viscous.
+    pub fn set_velocity(&mut self, point: usize, v: DVec3) {
+        match &mut self.values {
+            Values::Single(arrays) if !arrays.velocities[0].is_empty() => put(&mut arrays.velocities, point, v),
+            Values::Double(arrays) if !arrays.velocities[0].is_empty() => put(&mut arrays.velocities, point, v),
+            _ => {}
+        }
+    }
+
+    /// Force (N) on a point.
+    pub fn force_n(&self, point: usize) -> DVec3 {
+        match &self.values {
+            Values::Single(arrays) => total(arrays, point),
+            Values::Double(arrays) => total(arrays, point),
+        }
+    }
+}
+
+fn put<T: Scalar>(arrays: &mut [Vec<T>; 3], point: usize, a: DVec3) {
+    for axis in 0..3 {
+        arrays[axis][1 + point] = T::of(a[axis]);
+    }
+}
+
+fn total<T: Scalar>(arrays: &Arrays<T>, point: usize) -> DVec3 {
+    let sum = |axis: usize| -> f64 {
+        let (left, right): (f64, f64) = (arrays.left[axis][1 + point].into(), arrays.right[axis][point].into());
+        left + right
+    };
+    DVec3::new(sum(0), sum(1), sum(2))
+}
+
+/// The pass over the rows of one material.
+struct RowForces<'a, T> {
+    material: &'a CellMaterial<T>,
+    rows: &'a [CellRow],
+    arrays: &'a mut Arrays<T>,
+}
+
+impl<T: Scalar> Pass<T> for RowForces<'_, T> {
+    #[inline(always)]
+    fn run<V: Vector<Scalar = T>, L: LaneTangent, const VISCOUS: bool>(&mut self) -> f64 {
+        let mut power_w = 0.0;
+        for row in self.rows {
+            for first in (0..row.cells as usize).step_by(V::WIDTH) {
+                let at = row.points.map(|point| 1 + point as usize + first);
+                self.lanes::<V, L, VISCOUS>(at, row.cells as usize - first, &mut power_w);
+            }
+        }
+        power_w
+    }
+}
+
+impl<T: Scalar> RowForces<'_, T> {
+    /// Cells whose points 0, 2, 4, 6 are at `at` and what follows; there are `cells` of them, or more than lanes.
+    #[inline(always)]
+    fn lanes<V: Vector<Scalar = T>, L: LaneTangent, const VISCOUS: bool>(
+        &mut self,
+        at: [usize; 4],
+        cells: usize,
+        power_w: &mut f64,
+    ) {
+        let [quarter, minus_volume, minus_kappa] = self.material.cell;
+        let weight = first_lanes::<V>(cells);
+        let of_strain = weight * V::of(quarter);
+        let mut h = [[V::of(0.0); 3]; 3];
+        let mut modes = [[V::of(0.0); 4]; 3];
+        let mut h_dot = h;
+        for axis in 0..3 {
+            let found = patterns(&differences::<V>(&self.arrays.displacements[axis], at));
+            for column in 0..3 {
+                h[axis][column] = found[column] * of_strain;
+            }
+            modes[axis].copy_from_slice(&found[3..]);
+            if VISCOUS {
+                let found = patterns(&differences::<V>(&self.arrays.velocities[axis], at));
+                for column in 0..3 {
+                    h_dot[axis][column] = found[column] * of_strain;
+                }
+            }
+        }
+        let (p, density) = stress::<V, T, L, VISCOUS>(&self.material.constants, &h, &h_dot);
+        let of_stress = weight * V::of(minus_volume * quarter);
+        let of_modes = MODE_WEIGHTS.map(|w| weight * V::of(minus_kappa * w / 64.0));
+        for axis in 0..3 {
+            let mut c = [V::of(0.0); 7];
+            for column in 0..3 {
+                c[column] = p[axis][column] * of_stress;
+            }
+            for mode in 0..4 {
+                c[3 + mode] = modes[axis][mode] * of_modes[mode];
+            }
+            let [f1, f2, f3, f4, f5, f6, f7] = particles(&c);
+            let f0 = V::of(0.0) - ((f1 + f2) + (f3 + f4) + ((f5 + f6) + f7));
+            let (left, right) = (&mut self.arrays.left[axis], &mut self.arrays.right[axis]);
+            for (at, (on_left, on_right)) in at.into_iter().zip([(f0, f1), (f2, f3), (f4, f5), (f6, f7)]) {
+                add(&mut left[at..at + V::WIDTH], on_left);
+                add(&mut right[at..at + V::WIDTH], on_right);
+            }
+        }
+        if VISCOUS {
+            let mut power = [T::of(0.0); LANES];
+            (density * weight * V::of(-minus_volume)).store(&mut power);
+            // One after the other, so that the width of the vectors does not show.
+            for &lane in &power[..V::WIDTH] {
+                *power_w += lane.into();
+            }
+        }
+    }
+}
+
+#[inline(always)]
+fn add<V: Vector>(sums: &mut [V::Scalar], a: V) {
+    (V::load(sums) + a).store(sums);
+}
+
+/// 1 in the first lanes, 0 in the others.
+#[inline(always)]
+fn first_lanes<V: Vector>(count: usize) -> V {
+    let (one, zero) = (V::Scalar::of(1.0), V::Scalar::of(0.0));
+    let lanes: [V::Scalar; LANES] = std::array::from_fn(|lane| if lane < count { one } else { zero });
+    V::load(&lanes)
+}
+
+/// `a_p − a_0` of points 1 to 7.
+#[inline(always)]
+fn differences<V: Vector>(values: &[V::Scalar], at: [usize; 4]) -> [V; 7] {
+    let rows = at.map(|at| &values[at..at + V::WIDTH + 1]);
+    let zero = V::load(rows[0]);
+    let mut found = [V::of(0.0); 7];
+    for p in 1..8 {
+        found[p - 1] = V::load(&rows[p >> 1][p & 1..]) - zero;
+    }
+    found
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::simd::cells::testing::{Answer, Question, agrees_with_oracle};
+
+    #[test]
+    fn rows_and_oracle_agree() {
+        agrees_with_oracle(true, |question: &Question<'_>| {
+            let Question { cells, u, v, material, precision, set, spacing_m, handed } = question;
+            // Points are numbered along x, as the ball's particles are.
+            let mut rows: Vec<CellRow> = Vec::new();
+            for (points, _) in *cells {
+                match rows.last_mut() {
+                    Some(row) if row.points[0] + row.cells == points[0] && row.points[3] + row.cells == points[6] => {
+                        row.cells += 1;
+                    }
+                    _ => {
+                        let points = [points[0], points[2], points[4], points[6]];
+                        rows.push(CellRow { points, cells: 1, material: 0 });
+                    }
+                }
+            }
+            assert!(rows.len() < cells.len() / 4);
+            let kernel = RowKernel::new(*spacing_m, *handed, &[*material], *precision);
+            let kernel = kernel.with_instruction_set(*set);
+            let mut values = kernel.values(u.len());
+            for point in 0..u.len() {
+                values.set_displacement(point, u[point]);
+                values.set_velocity(point, v[point]);
+            }
+            let power_w = kernel.forces(&rows, u.len(), &mut values);
+            Answer { forces_n: (0..u.len()).map(|point| values.force_n(point)).collect(), power_w }
+        });
+    }
+}
