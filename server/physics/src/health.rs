@@ -60,6 +60,9 @@ pub struct Energies {
 impl Energies {
     /// Kinetic, elastic and gravitational energy now (O(tets)), beside the ledger's work and dissipation.
     pub fn of(model: &Model, state: &State) -> Self {
+        if let Some(hybrid) = model.hybrid() {
+            return hybrid.energies(model.gravity_m_per_s2(), state);
+        }
         let kinetic_j = (0..state.x.len()).map(|i| 0.5 * model.mass_kg()[i] * state.v[i].length_squared()).sum();
         let along_gravity = |i: usize| model.gravity_m_per_s2().dot(state.x[i] - model.rest_positions_m()[i]);
         let fallen_j: f64 = (0..state.x.len()).map(|i| model.mass_kg()[i] * along_gravity(i)).sum();
@@ -85,6 +88,9 @@ impl Energies {
 
 /// `Σ V Ψ(F)` (J).
 pub fn elastic_energy_j(model: &Model, state: &State) -> f64 {
+    if let Some(hybrid) = model.hybrid() {
+        return hybrid.energies(DVec3::ZERO, state).elastic_j;
+    }
     (0..model.mesh().tets().len())
         .map(|tet| {
             let corners = model.mesh().tets()[tet].map(|n| state.x[n as usize]);
@@ -93,8 +99,11 @@ pub fn elastic_energy_j(model: &Model, state: &State) -> f64 {
         .sum()
 }
 
-/// Smallest `J = det F` over all tets, and its tet. Below zero: inverted.
+/// Smallest `J = det F` over all tets, and its tet; of a hybrid body, over the coarse tets' means and the awake cells. Below zero: inverted.
 pub fn min_volume_ratio(model: &Model, state: &State) -> (f64, usize) {
+    if let Some(hybrid) = model.hybrid() {
+        return hybrid.min_volume_ratio(state);
+    }
     let mut worst = (f64::INFINITY, 0);
     for (tet, nodes) in model.mesh().tets().iter().enumerate() {
         let corners = nodes.map(|n| state.x[n as usize]);
@@ -141,7 +150,7 @@ impl LastGood {
 
     /// Copies what quarantine goes back to. Allocates nothing.
     pub(crate) fn keep(&mut self, state: &State) {
-        self.x.copy_from_slice(&state.x);
+        self.x.clone_from(&state.x);
         self.tools.clone_from_slice(&state.tools);
         self.load_factors.copy_from_slice(&state.load_factors);
         (self.ledger, self.viscous) = (state.ledger, state.viscous);
@@ -149,7 +158,7 @@ impl LastGood {
 
     /// Copies the rest of what a tick of leapfrog changes, but its forces, so that it can be repeated. Allocates nothing.
     pub(crate) fn keep_for_repetition(&mut self, state: &State) {
-        self.v.copy_from_slice(&state.v);
+        self.v.clone_from(&state.v);
         self.force_is_current = state.force_is_current;
         self.contact.keep_memory_of(&state.contact);
     }

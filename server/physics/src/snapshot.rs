@@ -12,7 +12,7 @@ use thiserror::Error;
 const MAGIC: [u8; 4] = *b"PLPS";
 const HEADER: usize = 24;
 /// Version of the layout; another one is refused.
-pub const VERSION: u32 = 4;
+pub const VERSION: u32 = 5;
 
 /// Why bytes are not a state of a body.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
@@ -89,8 +89,9 @@ pub fn restore(model: &Model, bytes: &[u8]) -> Result<State, SnapshotError> {
 }
 
 fn check(model: &Model, state: &State) -> Result<(), SnapshotError> {
-    let nodes = model.rest_positions_m().len();
-    let counts = [&state.x, &state.v, &state.force_n, &state.external_n].iter().all(|v| v.len() == nodes)
+    let nodes = model.rest_positions_m().len() + state.active.len();
+    let counts = state.active.fit(model)
+        && [&state.x, &state.v, &state.force_n, &state.external_n].iter().all(|v| v.len() == nodes)
         && state.tools.len() == model.spec().tools.len()
         && state.load_factors.len() == model.spec().loads.len()
         && state.pace.fits(model)
@@ -124,10 +125,10 @@ fn fingerprint(model: &Model) -> u64 {
     let positions =
         model.rest_positions_m().iter().flat_map(glam::DVec3::to_array).flat_map(|c| c.to_bits().to_le_bytes());
     let tets = model.mesh().tets().iter().flatten().flat_map(|n| n.to_le_bytes());
-    let ModelSpec { mesh: _, regions, tet_region, prescribed, loads, gravity_m_per_s2, tools, settings } = model.spec();
+    let ModelSpec { mesh: _, particles, regions, tet_region, prescribed, loads, gravity_m_per_s2, tools, settings } = model.spec();
     let mut hash = Fnv(fnv(OFFSET, positions.chain(tets)));
     // A float prints as the shortest text that reads back to its bits. Writing to the hash cannot fail.
-    let rest = (regions, tet_region, prescribed, loads, gravity_m_per_s2, tools, settings);
+    let rest = (particles, regions, tet_region, prescribed, loads, gravity_m_per_s2, tools, settings);
     let _ = write!(hash, "{rest:?}");
     hash.0
 }
@@ -172,6 +173,7 @@ mod tests {
         };
         Model::build(ModelSpec {
             mesh: TetMesh::new(p, vec![[0, 1, 2, 3]]).unwrap(),
+            particles: None,
             regions: vec![Region { name: "all".into(), material, density_kg_per_m3: 1e3 }],
             tet_region: vec![0],
             prescribed: Vec::new(),

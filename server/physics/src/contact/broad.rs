@@ -10,12 +10,14 @@
 //! long as the tool's path plus the travel stay below that slack, the list holds every triangle that can be touched: far
 //! from the body a tick costs two additions per tool and substep.
 use super::triangle::closest_point;
-use crate::mesh::Surface;
+use crate::{hybrid::SkinView, mesh::Surface};
 use glam::DVec3;
 use std::ops::Range;
 
 /// Triangles per cluster.
-const CLUSTER: usize = 32;
+pub(crate) const CLUSTER: usize = 32;
+/// Triangles per group of clusters, on the skin of a hybrid body.
+pub(crate) const GROUP: usize = 32 * CLUSTER;
 /// Rounding of the travel sums is far below this (m).
 const ROUNDING_M: f64 = 1e-12;
 
@@ -151,6 +153,44 @@ impl Triangles {
         candidates.slack_m = others_m - inner_m - ROUNDING_M;
     }
 
+    /// [`Self::query`] on the skin of a hybrid body, whose positions are not at hand.
+    pub(super) fn query_skin(
+        &self,
+        skin: &mut SkinView<'_>,
+        centre: DVec3,
+        (reach_m, inner_m): (f64, f64),
+        candidates: &mut Candidates,
+    ) {
+        candidates.count = 0;
+        skin.begin();
+        let mut others_m = f64::INFINITY;
+        for group in (0..self.len()).step_by(GROUP) {
+            let end = (group + GROUP).min(self.len());
+            let bound_m = skin.group_distance_m(group / GROUP, centre);
+            if bound_m >= reach_m {
+                others_m = others_m.min(bound_m);
+                continue;
+            }
+            for cluster in (group..end).step_by(CLUSTER) {
+                let bound_m = skin.cluster_distance_m(cluster / CLUSTER, centre);
+                if bound_m >= reach_m {
+                    others_m = others_m.min(bound_m);
+                    continue;
+                }
+                for triangle in self.cluster_range(cluster / CLUSTER) {
+                    let corners = self.nodes[triangle].map(|node| skin.position_m(node));
+                    let distance_m = centre.distance(closest_point(centre, corners));
+                    if distance_m >= reach_m {
+                        others_m = others_m.min(distance_m);
+                    } else {
+                        candidates.push(triangle);
+                    }
+                }
+            }
+        }
+        candidates.slack_m = others_m - inner_m - ROUNDING_M;
+    }
+
     /// The oracle of [`Self::query`]: every triangle.
     pub(super) fn list_all(&self, candidates: &mut Candidates) {
         candidates.count = 0;
@@ -161,7 +201,7 @@ impl Triangles {
     }
 }
 
-fn box_distance_m(p: DVec3, lo: DVec3, hi: DVec3) -> f64 {
+pub(crate) fn box_distance_m(p: DVec3, lo: DVec3, hi: DVec3) -> f64 {
     (lo - p).max(p - hi).max(DVec3::ZERO).length()
 }
 

@@ -3,7 +3,7 @@
 //! Once a substep, for every tool: it moves ([`proxy`]), the broad phase lists the triangles near it ([`broad`]), samples
 //! fixed in the surface press and rub ([`foundation`], [`narrow`]), and the forces go to nodes and tool by the transpose.
 //! Once a tick the contact is summed up for the servo loop ([`local_model`]).
-mod broad;
+pub(crate) mod broad;
 mod foundation;
 mod inside;
 mod local_model;
@@ -29,7 +29,10 @@ pub use triangle::closest_weights;
 /// The longest edge of a surface triangle, over the radius of a tool, that can still be sampled as finely as contact needs.
 pub const LARGEST_TRIANGLE: f64 = foundation::MAX_LEVEL as f64 * foundation::SPACING;
 
-use crate::mesh::{Surface, TetMesh};
+use crate::{
+    hybrid::SkinView,
+    mesh::Surface,
+};
 use broad::Triangles;
 use foundation::{BodyAtRest, Foundation, SampleTables};
 use glam::DVec3;
@@ -135,7 +138,7 @@ impl ContactModel {
     /// Precomputes contact samples and the foundation stiffness of a body at rest, whose largest natural frequency without
     /// contact is given. `moduli[triangle]` are those of the tets behind it.
     pub fn build(
-        mesh: &TetMesh,
+        rest_positions_m: &[DVec3],
         surface: &Surface,
         moduli: &[SurfaceModuli],
         mass_kg: &[f64],
@@ -145,10 +148,10 @@ impl ContactModel {
         if tools.is_empty() {
             return Self::default();
         }
-        let triangles = Triangles::of(surface, mesh.positions_m());
+        let triangles = Triangles::of(surface, rest_positions_m);
         let body = BodyAtRest {
             triangles: &triangles,
-            positions_m: mesh.positions_m(),
+            positions_m: rest_positions_m,
             moduli,
             mass_kg,
             // A body without a free node has none; its foundation is then of no consequence, but must be finite.
@@ -226,13 +229,75 @@ impl ContactModel {
         forces_n: &mut [DVec3],
         scratch: &mut ContactScratch,
     ) {
-        contact.travelled(body.fastest_m_per_s * time.dt_s);
-        let exhaustive = scratch.exhaustive;
+        self.move_tools(body.fastest_m_per_s, time, tools, contact);
+        for (index, tool) in tools.iter().enumerate() {
+            self.list_candidates(index, tool.centre_m, body.x, contact, scratch.exhaustive);
+        }
+        self.press_tools(body.x, &|node| body.v[node as usize], time, tools, contact, forces_n, scratch);
+    }
+
+    /// The first part of a substep: the body drifted with up to `fastest_m_per_s`, the tools follow.
+    pub(crate) fn move_tools(
+        &self,
+        fastest_m_per_s: f64,
+        time: &SubstepTime,
+        tools: &mut [ToolState],
+        contact: &mut ContactState,
+    ) {
+        contact.travelled(fastest_m_per_s * time.dt_s);
+        for (index, tool) in tools.iter_mut().enumerate() {
+            self.drift(index, tool, time, contact);
+        }
+    }
+
+    /// The second part, on the skin of a hybrid body: lists anew where a list is out of date. Whether any was.
+    pub(crate) fn list_on_skin(
+        &self,
+        skin: &mut SkinView<'_>,
+        tools: &[ToolState],
+        contact: &mut ContactState,
+        scratch: &ContactScratch,
+    ) -> bool {
+        let mut renewed = false;
+        for (index, tool) in tools.iter().enumerate() {
+            let candidates = &mut contact.split(index).0.candidates;
+            if scratch.exhaustive {
+                renewed |= candidates.triangles().len() != self.triangles.len();
+                self.triangles.list_all(candidates);
+            } else if candidates.slack_m <= 0.0 {
+                self.triangles.query_skin(skin, tool.centre_m, self.reach_m(index), candidates);
+                renewed = true;
+            }
+        }
+        renewed
+    }
+
+    /// Nodes of the triangles that any tool may touch, some of them several times.
+    pub(crate) fn listed_nodes<'a>(&'a self, contact: &'a ContactState) -> impl Iterator<Item = u32> + 'a {
+        contact.listed().flat_map(|triangle| self.triangles.nodes[triangle as usize])
+    }
+
+    /// Nodes of all triangles, in the order of the broad phase.
+    pub(crate) fn triangles(&self) -> &[[u32; 3]] {
+        &self.triangles.nodes
+    }
+
+    /// The last part: presses the tools on what is listed, at positions `x` (m), and adds the forces (N) on nodes.
+    pub(crate) fn press_tools(
+        &self,
+        x: &[DVec3],
+        velocity_m_per_s: &dyn Fn(u32) -> DVec3,
+        time: &SubstepTime,
+        tools: &mut [ToolState],
+        contact: &mut ContactState,
+        forces_n: &mut [DVec3],
+        scratch: &mut ContactScratch,
+    ) {
         for (index, (tool, scratch)) in tools.iter_mut().zip(&mut scratch.tools).enumerate() {
             let model = &self.tools[index];
-            self.drift(index, tool, body.x, time, contact, exhaustive);
-            let pressed = self.press(index, tool.centre_m, body.x, contact, forces_n, scratch);
-            let coupling_n = proxy::finish(model, tool, &pressed, self.surface_m_per_s(&pressed, body), time);
+            let pressed = self.press(index, tool.centre_m, x, contact, forces_n, scratch);
+            let surface_m_per_s = self.surface_m_per_s(&pressed, velocity_m_per_s);
+            let coupling_n = proxy::finish(model, tool, &pressed, surface_m_per_s, time);
             tool.friction_heat_j += pressed.heat_j;
             tool.contacts = pressed.contacts;
             tool.contact_energy_j = pressed.energy_j;
@@ -256,7 +321,8 @@ impl ContactModel {
     ) -> bool {
         let exhaustive = scratch.exhaustive;
         for (index, (tool, scratch)) in tools.iter_mut().zip(&mut scratch.tools).enumerate() {
-            self.drift(index, tool, x, time, contact, exhaustive);
+            self.drift(index, tool, time, contact);
+            self.list_candidates(index, tool.centre_m, x, contact, exhaustive);
             if self.is_near(index, tool.centre_m, x, contact) {
                 return false;
             }
@@ -279,29 +345,24 @@ impl ContactModel {
         })
     }
 
-    fn drift(
-        &self,
-        index: usize,
-        tool: &mut ToolState,
-        x: &[DVec3],
-        time: &SubstepTime,
-        contact: &mut ContactState,
-        exhaustive: bool,
-    ) {
+    fn drift(&self, index: usize, tool: &mut ToolState, time: &SubstepTime, contact: &mut ContactState) {
         let moved_m = proxy::drift(&self.tools[index], tool, contact.tools[index].force_n, time);
         contact.tools[index].candidates.slack_m -= moved_m;
-        self.list_candidates(index, tool.centre_m, x, contact, exhaustive);
     }
 
     fn list_candidates(&self, tool: usize, centre_m: DVec3, x: &[DVec3], contact: &mut ContactState, exhaustive: bool) {
-        let radius_m = self.tools[tool].spec.radius_m;
-        let (inner_m, reach_m) = ((1.0 + proxy::NEAR) * radius_m, (1.0 + 2.0 * proxy::NEAR) * radius_m);
         let (part, boxes, travel_m) = contact.split(tool);
         if exhaustive {
             self.triangles.list_all(&mut part.candidates);
         } else if part.candidates.slack_m <= 0.0 {
-            self.triangles.query(x, (boxes, travel_m), centre_m, (reach_m, inner_m), &mut part.candidates);
+            self.triangles.query(x, (boxes, travel_m), centre_m, self.reach_m(tool), &mut part.candidates);
         }
+    }
+
+    /// How far from a tool's centre (m) triangles are listed, and within what none may be missing.
+    fn reach_m(&self, tool: usize) -> (f64, f64) {
+        let radius_m = self.tools[tool].spec.radius_m;
+        ((1.0 + 2.0 * proxy::NEAR) * radius_m, (1.0 + proxy::NEAR) * radius_m)
     }
 
     fn press(
@@ -331,10 +392,13 @@ impl ContactModel {
     }
 
     /// Velocity (m/s) of the point of the surface nearest to a tool.
-    fn surface_m_per_s(&self, pressed: &Pressed, body: &Body<'_>) -> DVec3 {
+    fn surface_m_per_s(&self, pressed: &Pressed, velocity_m_per_s: &dyn Fn(u32) -> DVec3) -> DVec3 {
         let (triangle, weights) = pressed.nearest;
-        let corners = self.triangles.corners(triangle, body.v);
-        corners.into_iter().zip(weights).map(|(v, weight)| v * weight).sum()
+        if weights == [0.0; 3] {
+            return DVec3::ZERO;
+        }
+        let corners = self.triangles.nodes[triangle];
+        corners.into_iter().zip(weights).map(|(node, weight)| velocity_m_per_s(node) * weight).sum()
     }
 
     /// Once a tick, at its end: means and local models.

@@ -261,7 +261,7 @@ mod tests {
                 start_position_m: DVec3::Z,
             };
             let moduli = vec![SurfaceModuli { p_wave_pa: 38e3, indentation_pa: 12.5e3 }; 4];
-            let model = ContactModel::build(&mesh, &surface, &moduli, &[1.0; 4], 1e6, &[tool]);
+            let model = ContactModel::build(mesh.positions_m(), &surface, &moduli, &[1.0; 4], 1e6, &[tool]);
             let samples = model.tools[0].foundation.samples;
             let buffer = || Touching::with_capacity(samples);
             Self { model, x, touching: buffer(), next: buffer() }

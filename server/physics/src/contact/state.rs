@@ -139,6 +139,11 @@ impl ContactState {
         }
     }
 
+    /// Triangles that any tool may touch.
+    pub(super) fn listed(&self) -> impl Iterator<Item = u32> + '_ {
+        self.tools.iter().flat_map(|tool| tool.candidates.triangles().iter().copied())
+    }
+
     /// One tool's part, and the boxes with the travel.
     pub(super) fn split(&mut self, tool: usize) -> (&mut ToolContact, &mut [ClusterBox], f64) {
         (&mut self.tools[tool], &mut self.boxes, self.travel_m)

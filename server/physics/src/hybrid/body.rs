@@ -1,24 +1,23 @@
 //! A hybrid body: all that its rest state fixes.
 use super::{
     cage::{self, Cage},
-    cell::{HOURGLASS, MODE_WEIGHTS, RestCell},
+    clusters::SkinClusters,
     composite::Composite,
     metric::Masses,
     moments::{CellMoments, integrate},
     partition::Partition,
-    patch::{KEPT, Materials},
-    place::SkinPlace,
+    patch::Materials,
+    place::{Place, SkinPlace},
     sites::Sites,
+    skin::Skin,
     spec::{HybridError, ParticleSpec},
 };
 use crate::{
-    fem::element::outer,
-    integrate::spectrum::largest_eigenvalue,
     material::Material,
     mesh::{Surface, TetMesh, tet::EDGES},
     world::PrescribedSpec,
 };
-use glam::{BVec3, DMat3, DVec3};
+use glam::{BVec3, DVec3};
 use std::collections::BTreeSet;
 
 /// A particle follows no coarse node with less than this.
@@ -39,7 +38,9 @@ pub struct Hybrid {
     pub(super) places: Vec<SkinPlace>,
     /// How much faster than the fastest node or particle a vertex of the skin can be.
     pub(super) amplification: f64,
-    frequency_rad_per_s: f64,
+    /// Bounds of the skin's triangles.
+    pub(super) clusters: SkinClusters,
+    pub(super) densities_kg_per_m3: Vec<f64>,
     cage: CageSummary,
 }
 
@@ -104,16 +105,16 @@ impl Hybrid {
         let of_anchors = (0..partition.particle_count() as u32)
             .map(|p| partition.anchor(p).weights.iter().map(|w| w.abs()).sum())
             .fold(1.0, f64::max);
-        let frequency = cells_frequency_rad_per_s(&partition, of_tet, materials, densities_kg_per_m3);
         let hybrid = Self {
             masses,
             materials: materials.to_vec(),
+            densities_kg_per_m3: densities_kg_per_m3.to_vec(),
             of_tet: of_tet.to_vec(),
             free,
             may_wake,
             places,
             amplification: of_places * of_anchors,
-            frequency_rad_per_s: frequency / (1.0 - KEPT).sqrt(),
+            clusters: SkinClusters::default(),
             cage,
             partition,
         };
@@ -150,18 +151,67 @@ impl Hybrid {
         self.may_wake.get(particle as usize).copied().unwrap_or(false)
     }
 
+    /// Where a vertex of the skin is.
+    pub fn place(&self, vertex: u32) -> SkinPlace {
+        self.places[vertex as usize]
+    }
+
+    /// How much faster than the fastest node or particle a vertex of the skin can be.
+    pub(crate) fn amplification(&self) -> f64 {
+        self.amplification
+    }
+
+    /// Takes the skin's triangles in the order of contact's broad phase.
+    pub(crate) fn cluster(&mut self, skin: &Skin, triangles: &[[u32; 3]]) {
+        self.clusters = SkinClusters::new(self, skin.positions_m(), triangles);
+    }
+
+    /// What contact may take for the mass (kg) of a vertex of the skin: with its area `A_v`, `A_v min_p m_p/A_p` over its particles, `A_p = Σ_v w_vp A_v`.
+    /// What a foundation can bear per area at the vertex, each of its particles then can.
+    pub(crate) fn vertex_masses_kg(&self, skin: &Skin) -> Vec<f64> {
+        let mut vertex_m2 = vec![0.0; self.places.len()];
+        for triangle in 0..skin.triangles().len() {
+            let [a, b, c] = skin.corners_m(triangle);
+            let third = (b - a).cross(c - a).length() / 6.0;
+            skin.triangles()[triangle].iter().for_each(|&vertex| vertex_m2[vertex as usize] += third);
+        }
+        let places = || self.places.iter().map(|place| place.place(&self.partition)).zip(&vertex_m2);
+        let mut particle_m2 = vec![0.0; self.partition.particle_count()];
+        for (place, area_m2) in places() {
+            for (particle, weight) in place.particles.into_iter().zip(place.weights) {
+                particle_m2[particle as usize] += weight.max(0.0) * area_m2;
+            }
+        }
+        let per_area = |particle: u32| self.masses.particle_kg[particle as usize] / particle_m2[particle as usize];
+        let of_vertex = |(place, area_m2): (Place, &f64)| {
+            let carriers = place.particles.into_iter().zip(place.weights).filter(|(_, weight)| *weight > 1e-6);
+            area_m2 * carriers.map(|(particle, _)| per_area(particle)).fold(f64::INFINITY, f64::min)
+        };
+        places().map(of_vertex).collect()
+    }
+
+    /// Springs (N/m) at vertices of the skin as their particles feel them: the row sums of `Σ_v k_v w_v w_vᵀ`.
+    pub(crate) fn particle_springs_n_per_m(&self, of_vertices_n_per_m: &[f64]) -> Vec<f64> {
+        let mut springs = vec![0.0; self.partition.particle_count()];
+        for (place, stiffness) in self.places.iter().zip(of_vertices_n_per_m) {
+            let amplification = place.amplification();
+            let place = place.place(&self.partition);
+            for (particle, weight) in place.particles.into_iter().zip(place.weights) {
+                springs[particle as usize] += stiffness * weight.abs() * amplification;
+            }
+        }
+        springs
+    }
+
+    /// The material of the tet that a vertex of the skin is in.
+    pub(crate) fn material_at(&self, vertex: u32) -> &Material {
+        let cell = self.partition.cells()[self.place(vertex).cell as usize];
+        &self.materials[self.of_tet[cell.tet as usize] as usize]
+    }
+
     /// What became of the coarse mesh's boundary.
     pub fn cage(&self) -> CageSummary {
         self.cage
-    }
-
-    /// Bound (rad/s) of the body's natural frequencies at rest, whichever particles are awake.
-    ///
-    /// No assembly of cells is faster than the fastest of them with its share of the particles' masses, `ρV_c/8` each: by Rayleigh's quotient. The
-    /// full cell's bound is reached, `ω² = 4 (3λ + 2µ)/(ρh²)`, where neighbours swell and shrink in turn. No set of active particles is
-    /// faster than all of them, over √(1 − ε) (`docs/adr/hybrid.md`).
-    pub fn frequency_rad_per_s(&self) -> f64 {
-        self.frequency_rad_per_s
     }
 }
 
@@ -212,30 +262,4 @@ fn may_wake(partition: &Partition, free: &[BVec3], particle: u32) -> bool {
     anchor.nodes.iter().zip(anchor.weights).all(|(&node, weight)| {
         weight > -NO_WEIGHT && (weight < NO_WEIGHT || free[node as usize] == BVec3::TRUE)
     })
-}
-
-/// `max_c ω_c` with `ω_c² ≤ 8/ρ ((3λ⁺ + 2µ) λ_max(Σ_p b_p b_pᵀ) + κ/V Σ_k w_k Σ_p γ_kp²)`.
-fn cells_frequency_rad_per_s(
-    partition: &Partition,
-    of_tet: &[u16],
-    materials: &[Material],
-    densities_kg_per_m3: &[f64],
-) -> f64 {
-    let spacing_m = partition.sites().spacing_m();
-    // Of what a cell's shape contributes, only the largest of each material counts.
-    let mut largest = vec![[0.0_f64; 2]; materials.len()];
-    for (number, cell) in partition.cells().iter().enumerate() {
-        let rest = RestCell::new(spacing_m, 1.0, &partition.moments(number));
-        let gram = rest.gradients_per_m.iter().fold(DMat3::ZERO, |sum, b| sum + outer(*b, *b));
-        let modes = rest.modes.iter().zip(MODE_WEIGHTS);
-        let modes: f64 = modes.map(|(mode, w)| w * mode.iter().map(|g| g * g).sum::<f64>()).fold(0.0, f64::max);
-        let of = &mut largest[of_tet[cell.tet as usize] as usize];
-        *of = [of[0].max(largest_eigenvalue(&gram)), of[1].max(modes)];
-    }
-    let hourglass_per_m2 = HOURGLASS * 4.0 / 3.0 / (spacing_m * spacing_m);
-    let squares = largest.iter().zip(materials).zip(densities_kg_per_m3).map(|(([gram, modes], material), density)| {
-        let (lambda_pa, mu_pa) = (material.lame.lambda_pa.max(0.0), material.lame.mu_pa);
-        8.0 / density * ((3.0 * lambda_pa + 2.0 * mu_pa) * gram + hourglass_per_m2 * mu_pa * modes)
-    });
-    squares.fold(0.0, f64::max).sqrt()
 }

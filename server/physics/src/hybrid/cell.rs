@@ -95,7 +95,7 @@ impl RestCell {
         })
     }
 
-    fn corner_forces_n(&self, material: &Material, stress: &DMat3, amplitudes: &[DVec3; 4]) -> [DVec3; 8] {
+    pub(super) fn corner_forces_n(&self, material: &Material, stress: &DMat3, amplitudes: &[DVec3; 4]) -> [DVec3; 8] {
         let kappa = self.hourglass_m * material.lame.mu_pa;
         std::array::from_fn(|p| {
             let modes: DVec3 = (0..4).map(|k| amplitudes[k] * (MODE_WEIGHTS[k] * self.modes[k][p])).sum();

@@ -124,6 +124,15 @@ impl Patch {
         cells.sum::<f64>() + shares.sum::<f64>()
     }
 
+    /// Smallest `det F` of coarse tets' means and cells, and its tet.
+    pub fn min_volume_ratio(&self, at: &Field) -> (f64, usize) {
+        let points = self.points(at);
+        let cells =
+            self.cells.iter().map(|cell| (cell.rest.gradient_of(&cell.of(&points)).determinant(), cell.tet as usize));
+        let shares = self.shares.iter().enumerate().map(|(tet, share)| (share.volume_ratio(&at.nodes), tet));
+        cells.chain(shares).fold((f64::INFINITY, 0), |least, found| if found.0 < least.0 { found } else { least })
+    }
+
     /// Forces (N) of elastic and viscous stress at positions `at` and velocities `rate`, and the power (W) that viscous stress takes.
     pub fn forces_n(&self, materials: &Materials<'_>, at: &Field, rate: &Field) -> (Field, f64) {
         let (points, rates) = (self.points(at), self.points(rate));

@@ -22,7 +22,7 @@ pub(crate) struct RunningPatch {
     /// Active particles, ascending.
     active: Vec<u32>,
     points: Vec<Point>,
-    /// Displacements (m) of the points, less that of the first.
+    /// Displacements (m) of the points.
     displacements_m: Vec<DVec3>,
     /// Awake cells, ascending.
     cells: Vec<u32>,
@@ -34,13 +34,15 @@ pub(crate) struct RunningPatch {
     shares: Vec<Share>,
     /// Of which tets something was taken.
     taken_from: Vec<u32>,
-    pub(super) metric: RunningMetric,
+    metric: RunningMetric,
     /// Displacements (m) of coarse nodes.
     node_displacements_m: Vec<DVec3>,
     /// Number of every particle among the points.
     point_of: Vec<u32>,
     is_awake: Vec<bool>,
     is_viscous: bool,
+    /// Counts the sets of active particles.
+    number: u64,
 }
 
 #[derive(Debug, Clone, Copy)]
@@ -75,6 +77,54 @@ impl RunningPatch {
             point_of: vec![NONE; partition.particle_count()],
             is_awake: vec![false; partition.cells().len()],
             is_viscous: hybrid.materials.iter().any(|m| !m.viscosity.is_zero()),
+            number: 0,
+        }
+    }
+
+    /// The mass matrix.
+    pub(crate) fn metric(&self) -> &RunningMetric {
+        &self.metric
+    }
+
+    /// The same, to be solved with.
+    pub(crate) fn metric_mut(&mut self) -> &mut RunningMetric {
+        &mut self.metric
+    }
+
+    /// Counts the sets of active particles there have been.
+    pub(super) fn number(&self) -> u64 {
+        self.number
+    }
+
+    /// Number of a particle among the points, [`NONE`] of one that is none.
+    pub(super) fn point_of(&self, particle: u32) -> u32 {
+        self.point_of[particle as usize]
+    }
+
+    /// Displacements (m) of the points after [`Self::displace`].
+    pub(super) fn displacements_m(&self) -> &[DVec3] {
+        &self.displacements_m
+    }
+
+    /// Displacements (m) of the coarse nodes after [`Self::displace`].
+    pub(super) fn node_displacements_m(&self) -> &[DVec3] {
+        &self.node_displacements_m
+    }
+
+    /// How far (m) any active particle is from where it would be asleep.
+    pub(super) fn deviation_m(&self) -> f64 {
+        let active = self.points.iter().zip(&self.displacements_m).filter(|(point, _)| point.active != NONE);
+        let deviation = active.map(|(point, u)| u.distance_squared(point.anchor.of(&self.node_displacements_m)));
+        deviation.fold(0.0, f64::max).sqrt()
+    }
+
+    /// Hands a force (N) on a point to the particle or the coarse nodes that move it.
+    pub(super) fn push(&self, point: u32, force_n: DVec3, nodes: usize, forces_n: &mut [DVec3]) {
+        let point = &self.points[point as usize];
+        if point.active == NONE {
+            point.anchor.push(force_n, forces_n);
+        } else {
+            forces_n[nodes + point.active as usize] += force_n;
         }
     }
 
@@ -86,6 +136,7 @@ impl RunningPatch {
     /// Wakes these particles (ascending, no more than there is room for) and no others. Allocates nothing.
     pub(crate) fn wake(&mut self, hybrid: &Hybrid, active: &[u32]) {
         self.forget(hybrid);
+        self.number += 1;
         self.active.extend_from_slice(active);
         self.find_cells(hybrid);
         self.find_points(hybrid);
@@ -200,10 +251,10 @@ impl RunningPatch {
     }
 
     /// Overwrites `forces_n` (N) with those of elastic and viscous stress at positions `x` and velocities `v` of coarse nodes and then active
-    /// particles; returns the power (W) that viscous stress takes.
+    /// particles; returns the power (W) that viscous stress takes. [`Self::displace`] has been called.
     pub(crate) fn forces_n(&mut self, hybrid: &Hybrid, x: &[DVec3], v: &[DVec3], forces_n: &mut [DVec3]) -> f64 {
         let nodes = hybrid.node_count();
-        let (x_nodes, x_particles) = x.split_at(nodes);
+        let x_nodes = &x[..nodes];
         let (v_nodes, v_particles) = v.split_at(nodes);
         forces_n.fill(DVec3::ZERO);
         let mut power_w = 0.0;
@@ -214,7 +265,6 @@ impl RunningPatch {
         if self.active.is_empty() {
             return power_w;
         }
-        self.displace(hybrid, x_nodes, x_particles);
         // Less that of one of them: far from rest, their differences would be rounded too coarsely.
         let first_m = self.displacements_m[0];
         for (number, displacement) in self.displacements_m.iter().enumerate() {
@@ -243,7 +293,9 @@ impl RunningPatch {
         power_w
     }
 
-    fn displace(&mut self, hybrid: &Hybrid, x_nodes: &[DVec3], x_particles: &[DVec3]) {
+    /// Takes positions (m) of coarse nodes and then active particles.
+    pub(crate) fn displace(&mut self, hybrid: &Hybrid, x: &[DVec3]) {
+        let (x_nodes, x_particles) = x.split_at(hybrid.node_count());
         let rest = hybrid.partition.coarse().positions_m();
         for ((u, x), rest) in self.node_displacements_m.iter_mut().zip(x_nodes).zip(rest) {
             *u = *x - *rest;
@@ -312,6 +364,7 @@ mod tests {
                     let joined = |field: &Field| [&field.nodes[..], &field.particles].concat();
                     let (expected, x, v) = (joined(&expected), joined(&at), joined(&rate));
                     let mut forces = x.clone();
+                    running.displace(&hybrid, &x);
                     let power_w = running.forces_n(&hybrid, &x, &v, &mut forces);
                     let worst = forces.iter().zip(&expected).map(|(a, b)| a.distance(*b)).fold(0.0, f64::max);
                     assert!(worst < bound * largest(&expected), "{precision:?}, {}: {worst:e}", active.len());

@@ -5,7 +5,7 @@ use super::{
     partition::NONE,
     patch::KEPT,
 };
-use glam::DVec3;
+use glam::{BVec3, DVec3};
 
 /// `M'` and its factor.
 ///
@@ -37,7 +37,7 @@ impl RunningMetric {
     pub(super) fn new(hybrid: &Hybrid, most_active: usize) -> Self {
         let nodes = hybrid.node_count();
         let most_touched = (4 * most_active).min(nodes);
-        let inverse = |(mass, free): (&f64, &glam::BVec3)| {
+        let inverse = |(mass, free): (&f64, &BVec3)| {
             DVec3::select(*free, DVec3::splat(1.0 / mass.max(f64::MIN_POSITIVE)), DVec3::ZERO)
         };
         Self {
@@ -169,6 +169,20 @@ impl RunningMetric {
     /// `(1 − ε) m_p` (kg) of the active particles.
     pub(crate) fn particle_kg(&self) -> &[f64] {
         &self.particle_kg
+    }
+
+    /// Multiplies velocities on free axes by a factor; returns what they had before, `v·M' v` (J). `momenta` is a buffer.
+    pub(crate) fn damped(&self, hybrid: &Hybrid, v: &mut [DVec3], factor: f64, momenta: &mut Vec<DVec3>) -> f64 {
+        momenta.clear();
+        momenta.resize(v.len(), DVec3::ZERO);
+        self.momenta(hybrid, v, momenta);
+        let mut twice_kinetic_j = 0.0;
+        for (number, (v, momentum)) in v.iter_mut().zip(momenta.iter()).enumerate() {
+            let free = hybrid.free.get(number).copied().unwrap_or(BVec3::TRUE);
+            twice_kinetic_j += DVec3::select(free, *v, DVec3::ZERO).dot(*momentum);
+            *v = DVec3::select(free, *v * factor, *v);
+        }
+        twice_kinetic_j
     }
 
     /// Momenta `M' v` (kg m/s) of coarse nodes and then of active particles.

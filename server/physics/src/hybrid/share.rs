@@ -65,6 +65,11 @@ impl Share {
         sum * (1.0 / self.total_m3())
     }
 
+    /// `det F̄`; 1 of a tet without a share.
+    pub fn volume_ratio(&self, x: &[DVec3]) -> f64 {
+        if self.nodes.is_empty() { 1.0 } else { self.mean(&self.gradients(x, DMat3::IDENTITY)).determinant() }
+    }
+
     /// `V_e` (m³).
     pub fn total_m3(&self) -> f64 {
         self.volume_m3.iter().sum()

@@ -1,4 +1,5 @@
 //! The force at an instant of a tick, for every integrator.
+use super::hybrid;
 use crate::{
     contact::{Body, SubstepTime},
     fem::loads::add_load_n,
@@ -16,15 +17,15 @@ pub(super) struct Tick<'a> {
 }
 
 /// When forces are evaluated, and how the body came there.
-struct Evaluation {
+pub(super) struct Evaluation {
     /// Part of the tick that is over.
-    fraction: f64,
+    pub(super) fraction: f64,
     /// The same for loads.
-    load_fraction: f64,
+    pub(super) load_fraction: f64,
     /// Step that led here (s); 0 at the start.
-    dt_s: f64,
+    pub(super) dt_s: f64,
     /// Bound of the speed (m/s) with which any node came here.
-    fastest_m_per_s: f64,
+    pub(super) fastest_m_per_s: f64,
 }
 
 impl Tick<'_> {
@@ -65,6 +66,9 @@ impl Tick<'_> {
     /// Total force at the present positions into `state.force_n`, its external part into `state.external_n`.
     fn evaluate(&self, state: &mut State, scratch: &mut Scratch, now: &Evaluation) {
         let Self { model, input, loads, .. } = self;
+        if let (Some(body), Some(own)) = (model.hybrid(), &mut scratch.hybrid) {
+            return hybrid::evaluate(self, body, state, (own, &mut scratch.contact), now);
+        }
         let external = &mut state.external_n;
         external.fill(DVec3::ZERO);
         for (index, load) in model.spec().loads.iter().enumerate() {
@@ -109,7 +113,7 @@ impl LoadRamp {
         Self { usable }
     }
 
-    fn factor(&self, from: f64, input: &TickInput<'_>, load: usize, fraction: f64) -> f64 {
+    pub(super) fn factor(&self, from: f64, input: &TickInput<'_>, load: usize, fraction: f64) -> f64 {
         if self.usable { from + (input.load_factors[load] - from) * fraction } else { from }
     }
 
@@ -122,5 +126,6 @@ impl LoadRamp {
 
 /// A force on a node that there is.
 pub(super) fn is_usable(model: &Model, point: &PointForce) -> bool {
-    (point.node as usize) < model.mass_kg().len() && point.force_n.is_finite()
+    let nodes = if model.hybrid().is_some() { model.surface().nodes.len() } else { model.mass_kg().len() };
+    (point.node as usize) < nodes && point.force_n.is_finite()
 }

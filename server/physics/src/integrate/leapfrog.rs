@@ -14,19 +14,27 @@
 //! `h g·(v + ½h f/m)`; what viscous stress takes is an estimate ([`crate::health::ViscousPower`]).
 use super::{
     forces::Tick,
-    motion::{drift, kick},
+    hybrid,
+    motion::{self, drift},
 };
-use crate::world::{Scratch, State};
+use crate::world::{Model, Scratch, State};
 
 /// All substeps of a tick.
 pub(super) fn run(tick: &Tick<'_>, state: &mut State, scratch: &mut Scratch) {
     let (substeps, dt_s) = (tick.substeps, tick.dt_s());
     tick.make_force_current(state, scratch);
-    kick(tick.model, state, 0.5 * dt_s);
+    kick(tick.model, state, scratch, 0.5 * dt_s);
     for substep in 1..=substeps {
         let fastest_m_per_s = drift(state, dt_s);
         scratch.history.set_aside(substep, substeps, state);
         tick.evaluate_after(substep, fastest_m_per_s, state, scratch);
-        kick(tick.model, state, if substep == substeps { 0.5 * dt_s } else { dt_s });
+        kick(tick.model, state, scratch, if substep == substeps { 0.5 * dt_s } else { dt_s });
+    }
+}
+
+fn kick(model: &Model, state: &mut State, scratch: &mut Scratch, h_s: f64) {
+    match (model.hybrid(), &mut scratch.hybrid) {
+        (Some(body), Some(own)) => hybrid::kick(model, body, state, own, h_s),
+        _ => motion::kick(model, state, h_s),
     }
 }

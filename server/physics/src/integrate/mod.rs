@@ -1,6 +1,7 @@
 //! Time integrators, one file each, and the spectrum that bounds the explicit ones' step.
 mod backward_euler;
 mod forces;
+mod hybrid;
 mod leapfrog;
 mod motion;
 pub(crate) mod pcg;

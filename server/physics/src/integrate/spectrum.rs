@@ -46,7 +46,7 @@ pub struct RestStiffness<'a> {
 /// `Settings::step_safety` is there for it.
 pub fn max_natural_frequency_rad_per_s(stiffness: &RestStiffness<'_>, inverse_mass_per_kg: &[DVec3]) -> f64 {
     let root_inverse_mass: Vec<DVec3> = inverse_mass_per_kg.iter().map(|m| m.map(f64::sqrt)).collect();
-    let (theta, residual) = lanczos(stiffness, &root_inverse_mass);
+    let (theta, residual) = lanczos(&mut |a, out| stiffness.apply(a, out), &root_inverse_mass);
     let bound = element_bound_rad_per_s(stiffness, inverse_mass_per_kg);
     let springs = stiffness.springs_n_per_m.iter().zip(inverse_mass_per_kg);
     let spring_bound_sq = springs.map(|(k, inverse_mass)| k * inverse_mass.max_element()).fold(0.0, f64::max);
@@ -111,8 +111,9 @@ impl RestStiffness<'_> {
     }
 }
 
-/// Largest eigenvalue θ of `A = D K D`, `D = M^{-½}`, and its residual `r` (both rad²/s²).
-fn lanczos(stiffness: &RestStiffness<'_>, root_inverse_mass: &[DVec3]) -> (f64, f64) {
+/// Largest eigenvalue θ of `A = D K D`, `D = M^{-½}`, and its residual `r` (both rad²/s²). `apply` overwrites its second argument with K times its
+/// first.
+pub(crate) fn lanczos(apply: &mut dyn FnMut(&[DVec3], &mut [DVec3]), root_inverse_mass: &[DVec3]) -> (f64, f64) {
     let free = root_inverse_mass.iter().flat_map(DVec3::to_array).filter(|&d| d > 0.0).count();
     let mut current = start_vector(root_inverse_mass);
     let mut previous = vec![DVec3::ZERO; current.len()];
@@ -127,7 +128,7 @@ fn lanczos(stiffness: &RestStiffness<'_>, root_inverse_mass: &[DVec3]) -> (f64, 
         for ((scaled, q), d) in scaled.iter_mut().zip(&current).zip(root_inverse_mass) {
             *scaled = *q * *d;
         }
-        stiffness.apply(&scaled, &mut next);
+        apply(&scaled, &mut next);
         for ((w, d), p) in next.iter_mut().zip(root_inverse_mass).zip(&previous) {
             *w = *w * *d - *p * beta;
         }

@@ -47,6 +47,12 @@ impl Surface {
         Ok(Self { nodes, triangles, vertex_of_node })
     }
 
+    /// A surface by itself: every vertex is its own node.
+    pub fn alone(vertices: usize, triangles: Vec<[u32; 3]>) -> Self {
+        let nodes: Vec<u32> = (0..vertices as u32).collect();
+        Self { vertex_of_node: nodes.clone(), nodes, triangles }
+    }
+
     /// Nodes of a triangle.
     pub fn triangle_nodes(&self, triangle: usize) -> [u32; 3] {
         self.triangles[triangle].map(|vertex| self.nodes[vertex as usize])

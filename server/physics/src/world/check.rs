@@ -2,19 +2,22 @@
 use super::{Integrator, LoadSpec, MAX_SUBSTEPS, ModelError, ModelSpec, Substeps};
 use crate::{
     contact::{Coupling, LARGEST_TRIANGLE, ToolSpec},
+    hybrid::HybridError,
     material::{Lame, Material, Viscosity},
     mesh::Surface,
 };
+use glam::DVec3;
 
-pub(super) fn spec(spec: &ModelSpec, surface: &Surface) -> Result<(), ModelError> {
+/// `surface` is what tools and loads are at, its nodes at `rest_positions_m` (m).
+pub(super) fn spec(spec: &ModelSpec, surface: &Surface, rest_positions_m: &[DVec3]) -> Result<(), ModelError> {
     regions(spec)?;
     let nodes = spec.mesh.positions_m().len();
     for set in &spec.prescribed {
         indices("node", set.nodes.iter().map(|&n| n as usize), nodes)?;
     }
-    spec.loads.iter().try_for_each(|load| loaded(load, nodes, surface.triangles.len()))?;
+    spec.loads.iter().try_for_each(|load| loaded(load, rest_positions_m.len(), surface.triangles.len()))?;
     spec.tools.iter().try_for_each(tool)?;
-    spec.tools.iter().try_for_each(|tool| fine_enough(spec, surface, tool))?;
+    spec.tools.iter().try_for_each(|tool| fine_enough(surface, rest_positions_m, tool))?;
     settings(spec)
 }
 
@@ -38,8 +41,8 @@ fn loaded(load: &LoadSpec, nodes: usize, triangles: usize) -> Result<(), ModelEr
 }
 
 /// No triangle of the surface is too large for the tool's contact samples.
-fn fine_enough(spec: &ModelSpec, surface: &Surface, tool: &ToolSpec) -> Result<(), ModelError> {
-    let corners = |t: usize| surface.triangle_nodes(t).map(|n| spec.mesh.positions_m()[n as usize]);
+fn fine_enough(surface: &Surface, rest_positions_m: &[DVec3], tool: &ToolSpec) -> Result<(), ModelError> {
+    let corners = |t: usize| surface.triangle_nodes(t).map(|n| rest_positions_m[n as usize]);
     let longest_m = |t: usize| {
         let [a, b, c] = corners(t);
         a.distance(b).max(b.distance(c)).max(c.distance(a))
@@ -129,4 +132,17 @@ fn indices(what: &'static str, mut indices: impl Iterator<Item = usize>, count: 
         Some(index) => Err(ModelError::OutOfRange { what, index, count }),
         None => Ok(()),
     }
+}
+
+/// What a body with particles cannot have.
+pub(super) fn particles(spec: &ModelSpec) -> Result<(), ModelError> {
+    let settings = &spec.settings;
+    let refused = |what, instead| Err(HybridError::NotForParticles { what, instead }.into());
+    if settings.integrator != Integrator::Leapfrog {
+        return refused("this integrator", "take leapfrog");
+    }
+    if settings.sleep_tolerance_m > 0.0 {
+        return refused("a body that sleeps as a whole", "leave sleep_tolerance at 0: its particles sleep where nothing touches them");
+    }
+    Ok(())
 }

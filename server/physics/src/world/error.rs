@@ -1,5 +1,5 @@
 //! Why a model cannot be built.
-use crate::{material::ParameterError, mesh::MeshError, solve::SolveError};
+use crate::{hybrid::HybridError, material::ParameterError, mesh::MeshError, solve::SolveError};
 use glam::DVec3;
 use thiserror::Error;
 
@@ -84,6 +84,9 @@ pub enum ModelError {
         /// The longest that this tool allows (m).
         largest_m: f64,
     },
+    /// The particles cannot be made.
+    #[error(transparent)]
+    Hybrid(#[from] HybridError),
     /// More substeps than any tick can bear.
     #[error(
         "the body needs {substeps:.3e} substeps per tick (largest natural frequency {omega_rad_per_s:.3e} rad/s); \

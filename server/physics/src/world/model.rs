@@ -1,8 +1,9 @@
 //! The model: constant after load.
-use super::{Integrator, ModelError, ModelSpec, PrescribedSpec, check, substeps};
+use super::{Integrator, ModelError, ModelSpec, PrescribedSpec, State, check, substeps};
 use crate::{
     contact::{ContactModel, SurfaceModuli, ToolState},
     fem::{element::RestTet, mass},
+    hybrid::{Hybrid, ParticleSpec, body::Built},
     integrate::{
         Body, RestBound, Scheme,
         spectrum::{RestStiffness, max_natural_frequency_rad_per_s},
@@ -28,6 +29,7 @@ pub struct Model {
     substeps: u32,
     scheme: Scheme,
     rest_bound: Option<RestBound>,
+    hybrid: Option<Box<Hybrid>>,
 }
 
 impl Model {
@@ -36,8 +38,23 @@ impl Model {
     /// # Errors
     /// [`ModelError`], naming what is wrong; nothing is repaired silently.
     pub fn build(spec: ModelSpec) -> Result<Self, ModelError> {
+        Self::build_with(spec, &mut |_| {})
+    }
+
+    /// The same; `progress` is told the part done of what takes long.
+    ///
+    /// # Errors
+    /// As [`Self::build`].
+    pub fn build_with(spec: ModelSpec, progress: &mut dyn FnMut(f64)) -> Result<Self, ModelError> {
         let surface = Surface::of(&spec.mesh)?;
-        check::spec(&spec, &surface)?;
+        match spec.particles.clone() {
+            None => Self::of_tets(spec, surface),
+            Some(particles) => Self::of_particles(spec, &surface, &particles, progress),
+        }
+    }
+
+    fn of_tets(spec: ModelSpec, surface: Surface) -> Result<Self, ModelError> {
+        check::spec(&spec, &surface, spec.mesh.positions_m())?;
         let rest_tets: Vec<RestTet> =
             (0..spec.mesh.tets().len()).map(|tet| RestTet::new(&spec.mesh.edge_matrix_m(tet))).collect();
         let materials: Vec<Material> = spec.regions.iter().map(|region| region.material).collect();
@@ -55,7 +72,7 @@ impl Model {
         };
         let omega = max_natural_frequency_rad_per_s(&at_rest, &inverse_mass_per_kg);
         let contact = ContactModel::build(
-            &spec.mesh,
+            spec.mesh.positions_m(),
             &surface,
             &moduli_of_triangles(&spec, &surface),
             &mass_kg,
@@ -93,6 +110,7 @@ impl Model {
             substeps,
             scheme,
             rest_bound: None,
+            hybrid: None,
             spec,
         };
         model.rest_bound = RestBound::new(&model).map_err(|source| ModelError::Sleep { source: Box::new(source) })?;
@@ -103,17 +121,42 @@ impl Model {
     pub fn spec(&self) -> &ModelSpec {
         &self.spec
     }
-    /// Rest mesh.
+    /// Rest mesh; of a hybrid body, the coarse one.
     pub fn mesh(&self) -> &TetMesh {
         &self.spec.mesh
     }
-    /// Boundary surface.
+    /// What tools touch and viewers see: the mesh's boundary; of a hybrid body, its skin, whose vertices are their own nodes.
     pub fn surface(&self) -> &Surface {
         &self.surface
     }
-    /// Rest positions (m) per node.
+    /// Rest positions (m) of what the surface's nodes are numbered by.
+    pub fn surface_rest_positions_m(&self) -> &[DVec3] {
+        match &self.spec.particles {
+            None => self.spec.mesh.positions_m(),
+            Some(particles) => particles.skin.positions_m(),
+        }
+    }
+    /// Where the surface is (m): writes one position for each of its vertices. Of a hybrid body, each is worked out from some particles.
+    pub fn surface_positions_m(&self, state: &State, positions_m: &mut Vec<DVec3>) {
+        positions_m.clear();
+        match &self.hybrid {
+            None => positions_m.extend(self.surface.nodes.iter().map(|&node| state.x[node as usize])),
+            Some(hybrid) => {
+                let rest = self.surface_rest_positions_m().iter().zip(0..);
+                positions_m.extend(rest.map(|(rest_m, vertex)| hybrid.vertex_m(vertex, *rest_m, state)));
+            }
+        }
+    }
+    /// Rest positions (m) per node; of a hybrid body, of its coarse nodes.
     pub fn rest_positions_m(&self) -> &[DVec3] {
-        self.spec.mesh.positions_m()
+        match &self.hybrid {
+            None => self.spec.mesh.positions_m(),
+            Some(hybrid) => hybrid.partition().coarse().positions_m(),
+        }
+    }
+    /// The particles, where there are some.
+    pub fn hybrid(&self) -> Option<&Hybrid> {
+        self.hybrid.as_deref()
     }
     /// Rest data of every tet.
     pub fn rest_tets(&self) -> &[RestTet] {
@@ -131,7 +174,7 @@ impl Model {
     pub fn inverse_mass_per_kg(&self) -> &[DVec3] {
         &self.inverse_mass_per_kg
     }
-    /// The force kernel.
+    /// The force kernel of the tets; of a hybrid body, of none.
     pub fn kernel(&self) -> &ForceKernel {
         &self.kernel
     }
@@ -163,16 +206,83 @@ impl Model {
     }
 }
 
+impl Model {
+    fn of_particles(
+        spec: ModelSpec,
+        boundary: &Surface,
+        particles: &ParticleSpec,
+        progress: &mut dyn FnMut(f64),
+    ) -> Result<Self, ModelError> {
+        let skin = &particles.skin;
+        let surface = Surface::alone(skin.positions_m().len(), skin.triangles().to_vec());
+        check::spec(&spec, &surface, skin.positions_m())?;
+        check::particles(&spec)?;
+        let materials: Vec<Material> = spec.regions.iter().map(|region| region.material).collect();
+        let densities: Vec<f64> = spec.regions.iter().map(|region| region.density_kg_per_m3).collect();
+        let of = (&spec.mesh, boundary);
+        let built = Hybrid::build(particles, of, &spec.prescribed, (&materials, &densities), &spec.tet_region, progress)?;
+        let Built { mut hybrid, mesh, prescribed } = built;
+        let spec = ModelSpec { mesh, prescribed, ..spec };
+        let mass_kg = hybrid.masses().node_kg.clone();
+        let mut inverse_mass_per_kg = free_inverse_mass(&mass_kg, &spec.prescribed)?;
+        for (inverse, mass) in inverse_mass_per_kg.iter_mut().zip(&mass_kg) {
+            // A node that nothing follows stays where it is.
+            *inverse = if *mass > 0.0 { *inverse } else { DVec3::ZERO };
+        }
+        let omega = hybrid.frequency_rad_per_s(&[]);
+        let moduli: Vec<DVec2> = (0..skin.positions_m().len() as u32).map(|v| moduli(hybrid.material_at(v))).collect();
+        let vertex_masses_kg = hybrid.vertex_masses_kg(skin);
+        let moduli = mean_of_triangles(&moduli, &surface);
+        let contact =
+            ContactModel::build(skin.positions_m(), &surface, &moduli, &vertex_masses_kg, omega, &spec.tools);
+        hybrid.cluster(skin, contact.triangles());
+        let stretch_sq = substeps::stiffening(&spec.settings, &materials);
+        let touched = if contact.nodal_stiffness_n_per_m.is_empty() {
+            omega
+        } else {
+            let springs = hybrid.particle_springs_n_per_m(&contact.nodal_stiffness_n_per_m);
+            // λ_max(s K + C) = s λ_max(K + C/s)
+            hybrid.frequency_rad_per_s(&springs.iter().map(|k| k / stretch_sq).collect::<Vec<f64>>())
+        };
+        let omega_sq = stretch_sq * touched.max(omega).powi(2) + contact.tool_frequency_sq;
+        let substeps = substeps::choose(&spec, &materials, omega_sq.sqrt())?;
+        Ok(Self {
+            kernel: ForceKernel::build(&spec.mesh, &[], &[], &materials, spec.settings.precision),
+            rest_tets: Vec::new(),
+            surface,
+            materials,
+            mass_kg,
+            inverse_mass_per_kg,
+            contact,
+            max_natural_frequency_rad_per_s: omega,
+            substeps,
+            scheme: Scheme::Leapfrog,
+            rest_bound: None,
+            hybrid: Some(Box::new(hybrid)),
+            spec,
+        })
+    }
+}
+
+/// `λ + 2µ` and `E/(1 − ν²)` (Pa).
+fn moduli(material: &Material) -> DVec2 {
+    let lame = material.lame;
+    DVec2::new(lame.p_wave_modulus_pa(), lame.young_modulus_pa() / (1.0 - lame.poisson_ratio().powi(2)))
+}
+
 /// Mean over a triangle's corners of the stiffest tet at each.
 fn moduli_of_triangles(spec: &ModelSpec, surface: &Surface) -> Vec<SurfaceModuli> {
     let mut of_node = vec![DVec2::ZERO; spec.mesh.positions_m().len()];
     for (tet, nodes) in spec.mesh.tets().iter().enumerate() {
-        let lame = spec.regions[spec.tet_region[tet] as usize].material.lame;
-        let indentation = lame.young_modulus_pa() / (1.0 - lame.poisson_ratio().powi(2));
+        let moduli = moduli(&spec.regions[spec.tet_region[tet] as usize].material);
         for &node in nodes {
-            of_node[node as usize] = of_node[node as usize].max(DVec2::new(lame.p_wave_modulus_pa(), indentation));
+            of_node[node as usize] = of_node[node as usize].max(moduli);
         }
     }
+    mean_of_triangles(&of_node, surface)
+}
+
+fn mean_of_triangles(of_node: &[DVec2], surface: &Surface) -> Vec<SurfaceModuli> {
     let mean = |triangle| surface.triangle_nodes(triangle).iter().map(|&n| of_node[n as usize]).sum::<DVec2>() / 3.0;
     (0..surface.triangles.len())
         .map(|triangle| SurfaceModuli { p_wave_pa: mean(triangle).x, indentation_pa: mean(triangle).y })

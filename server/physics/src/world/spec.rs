@@ -1,5 +1,5 @@
 //! What a model is built from.
-use crate::{contact::ToolSpec, material::Material, mesh::TetMesh};
+use crate::{hybrid::ParticleSpec, contact::ToolSpec, material::Material, mesh::TetMesh};
 use glam::DVec3;
 
 /// A material and density shared by some tets.
@@ -151,8 +151,10 @@ impl Default for Settings {
 /// Everything a [`Model`] is built from.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ModelSpec {
-    /// Rest mesh.
+    /// Rest mesh; of a hybrid body, the coarse one.
     pub mesh: TetMesh,
+    /// Particles that make it a hybrid body. Its surface is their skin: loads are at the skin's vertices and triangles.
+    pub particles: Option<ParticleSpec>,
     /// Materials.
     pub regions: Vec<Region>,
     /// Region of each tet.

@@ -1,6 +1,7 @@
 //! What a tick changes.
 use super::Model;
 use crate::{
+    hybrid::ActiveParticles,
     contact::{ContactState, ToolState, ToolTarget},
     health::{Ledger, Quarantine, ViscousPower},
     integrate::{Pace, Sleep},
@@ -13,10 +14,12 @@ use serde::{Deserialize, Serialize};
 pub struct State {
     /// Ticks done since reset.
     pub tick: u64,
-    /// Positions (m), one per node.
+    /// Positions (m), one per node, and then one per active particle.
     pub x: Vec<DVec3>,
-    /// Velocities (m/s), one per node, at the same time as `x`.
+    /// Velocities (m/s), at the same time as `x`.
     pub v: Vec<DVec3>,
+    /// Active particles.
+    pub active: ActiveParticles,
     /// Total force (N) at `x`: what the next half kick uses.
     pub force_n: Vec<DVec3>,
     /// The part of it that loads, tools and injected forces make (N).
@@ -45,12 +48,14 @@ impl State {
     /// At rest, at tick 0.
     pub fn at_rest(model: &Model) -> Self {
         let nodes = model.rest_positions_m().len();
+        let zeros = || with_room(model, std::iter::repeat_n(DVec3::ZERO, nodes));
         Self {
             tick: 0,
-            x: model.rest_positions_m().to_vec(),
-            v: vec![DVec3::ZERO; nodes],
-            force_n: vec![DVec3::ZERO; nodes],
-            external_n: vec![DVec3::ZERO; nodes],
+            x: with_room(model, model.rest_positions_m().iter().copied()),
+            v: zeros(),
+            active: ActiveParticles::none(model),
+            force_n: zeros(),
+            external_n: zeros(),
             force_is_current: false,
             tools: model.tools_at_start(),
             contact: model.contact().state(),
@@ -66,10 +71,11 @@ impl State {
     /// Copies another state of the same model into the buffers it has: allocates nothing.
     pub fn copy_from(&mut self, other: &Self) {
         self.tick = other.tick;
-        self.x.copy_from_slice(&other.x);
-        self.v.copy_from_slice(&other.v);
-        self.force_n.copy_from_slice(&other.force_n);
-        self.external_n.copy_from_slice(&other.external_n);
+        self.x.clone_from(&other.x);
+        self.v.clone_from(&other.v);
+        self.active.copy_from(&other.active);
+        self.force_n.clone_from(&other.force_n);
+        self.external_n.clone_from(&other.external_n);
         self.force_is_current = other.force_is_current;
         self.tools.clone_from_slice(&other.tools);
         self.contact.copy_from(&other.contact);
@@ -84,10 +90,13 @@ impl State {
     /// Back to rest at tick 0, as [`Self::at_rest`], in the buffers it has: allocates nothing.
     pub fn reset(&mut self, model: &Model) {
         self.tick = 0;
-        self.x.copy_from_slice(model.rest_positions_m());
-        for buffer in [&mut self.v, &mut self.force_n, &mut self.external_n] {
+        let nodes = model.rest_positions_m().len();
+        for buffer in [&mut self.x, &mut self.v, &mut self.force_n, &mut self.external_n] {
+            buffer.truncate(nodes);
             buffer.fill(DVec3::ZERO);
         }
+        self.x.copy_from_slice(model.rest_positions_m());
+        self.active.clear();
         self.force_is_current = false;
         for (tool, spec) in self.tools.iter_mut().zip(&model.spec().tools) {
             *tool = ToolState::at_start(spec);
@@ -118,4 +127,12 @@ impl State {
     pub fn time_s(&self, model: &Model) -> f64 {
         self.tick as f64 * model.spec().settings.tick_period_s
     }
+}
+
+/// A list for nodes with room for active particles: it never grows beyond.
+fn with_room(model: &Model, of_nodes: impl ExactSizeIterator<Item = DVec3>) -> Vec<DVec3> {
+    let room = model.spec().particles.as_ref().map_or(0, |particles| particles.most_active);
+    let mut list = Vec::with_capacity(of_nodes.len() + room);
+    list.extend(of_nodes);
+    list
 }

@@ -3,6 +3,7 @@ use super::{Integrator, Model};
 use crate::{
     contact::{ContactScratch, ToolTarget},
     health::{LastGood, Quarantine},
+    hybrid::HybridScratch,
     integrate::{ForceHistory, ImplicitScratch},
     simd::KernelScratch,
 };
@@ -11,7 +12,7 @@ use glam::DVec3;
 /// A force injected on a node for one tick.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PointForce {
-    /// Node.
+    /// Node of the surface ([`Model::surface`]) or, of a body without particles, any.
     pub node: u32,
     /// Force (N, world).
     pub force_n: DVec3,
@@ -53,6 +54,7 @@ pub struct Scratch {
     pub(crate) kernel: KernelScratch,
     pub(crate) contact: ContactScratch,
     pub(crate) implicit: ImplicitScratch,
+    pub(crate) hybrid: Option<Box<HybridScratch>>,
 }
 
 impl Scratch {
@@ -69,6 +71,7 @@ impl Scratch {
             },
             contact: model.contact().scratch(model.spec().settings.skips.distant_contact),
             implicit: ImplicitScratch::new(model),
+            hybrid: HybridScratch::new(model).map(Box::new),
         }
     }
 

@@ -82,6 +82,7 @@ pub(crate) fn compile(
         description: document.scene.description.trim().to_owned(),
         model: ModelSpec {
             mesh: body.mesh,
+            particles: None,
             regions: materials.regions,
             tet_region: materials.tet_region,
             prescribed: constraints.specs,

@@ -65,6 +65,7 @@ impl Subject {
 pub(super) fn spec(material: Material, body: &TetBody, settings: Settings) -> ModelSpec {
     ModelSpec {
         mesh: body.mesh.clone(),
+        particles: None,
         regions: vec![Region { name: "body".into(), material, density_kg_per_m3: 1000.0 }],
         tet_region: vec![0; body.mesh.tets().len()],
         prescribed: body.prescribed.clone(),

@@ -110,6 +110,7 @@ pub(super) fn body(options: &Options, mesh: TetMesh, material: Material) -> Mode
     ModelSpec {
         tet_region: vec![0; mesh.tets().len()],
         mesh,
+        particles: None,
         regions: vec![Region { name: "body".into(), material, density_kg_per_m3: 1000.0 }],
         prescribed: Vec::new(),
         loads: Vec::new(),

@@ -1,0 +1,95 @@
+//! Bounds of the skin's triangles that need none of their positions.
+//!
+//! A vertex of the skin moves by a mean of the displacements of what it follows, so a cluster's box is its box at rest, shifted and widened by the
+//! least and largest displacement of the coarse nodes it follows, and by how far any active particle is from where it would be asleep:
+//! ```text
+//! x = X + Σ_i w_i u_i + Σ_p w_p d_p,   Σ w_i = 1, Σ |w_i| ≤ a:   x − X ∈ ū ± (a ½(u_max − u_min) + a max |d_p|),   ū = ½(u_min + u_max)
+//! ```
+use super::body::Hybrid;
+use crate::contact::broad::{CLUSTER, GROUP, box_distance_m};
+use glam::DVec3;
+
+/// Boxes at rest of clusters, and of groups of them, with the coarse nodes that they follow.
+#[derive(Debug, Clone, Default)]
+pub struct SkinClusters {
+    clusters: Boxes,
+    groups: Boxes,
+}
+
+#[derive(Debug, Clone, Default)]
+struct Boxes {
+    low_m: Vec<DVec3>,
+    high_m: Vec<DVec3>,
+    /// First entry of each in `nodes`, and the end of the last.
+    first: Vec<u32>,
+    nodes: Vec<u32>,
+}
+
+impl SkinClusters {
+    /// Of triangles in the order of the broad phase.
+    pub(crate) fn new(hybrid: &Hybrid, rest_positions_m: &[DVec3], triangles: &[[u32; 3]]) -> Self {
+        let boxes = |size: usize| {
+            let mut boxes = Boxes { first: vec![0], ..Boxes::default() };
+            for triangles in triangles.chunks(size) {
+                boxes.push(hybrid, rest_positions_m, triangles);
+            }
+            boxes
+        };
+        Self { clusters: boxes(CLUSTER), groups: boxes(GROUP) }
+    }
+
+    /// Lower bound (m) of the distance of a cluster from a point, at `displacements_m` of the coarse nodes; see the module's documentation for the others.
+    pub(super) fn cluster_distance_m(&self, cluster: usize, from_m: DVec3, bounds: &Displaced<'_>) -> f64 {
+        self.clusters.distance_m(cluster, from_m, bounds)
+    }
+
+    /// The same of a group.
+    pub(super) fn group_distance_m(&self, group: usize, from_m: DVec3, bounds: &Displaced<'_>) -> f64 {
+        self.groups.distance_m(group, from_m, bounds)
+    }
+}
+
+/// What bounds how the skin moved.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Displaced<'a> {
+    /// Of the coarse nodes (m).
+    pub(super) displacements_m: &'a [DVec3],
+    /// `max |d_p|` (m).
+    pub(super) deviation_m: f64,
+    /// `a`.
+    pub(super) amplification: f64,
+}
+
+impl Boxes {
+    fn push(&mut self, hybrid: &Hybrid, rest_positions_m: &[DVec3], triangles: &[[u32; 3]]) {
+        let (mut low, mut high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
+        let start = self.nodes.len();
+        for &vertex in triangles.iter().flatten() {
+            let rest_m = rest_positions_m[vertex as usize];
+            (low, high) = (low.min(rest_m), high.max(rest_m));
+            let partition = hybrid.partition();
+            for particle in partition.corners(hybrid.place(vertex).cell as usize) {
+                for node in partition.anchor(particle).nodes {
+                    if !self.nodes[start..].contains(&node) {
+                        self.nodes.push(node);
+                    }
+                }
+            }
+        }
+        self.low_m.push(low);
+        self.high_m.push(high);
+        self.first.push(self.nodes.len() as u32);
+    }
+
+    fn distance_m(&self, number: usize, from_m: DVec3, bounds: &Displaced<'_>) -> f64 {
+        let nodes = &self.nodes[self.first[number] as usize..self.first[number + 1] as usize];
+        let (mut least, mut most) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
+        for &node in nodes {
+            let u = bounds.displacements_m[node as usize];
+            (least, most) = (least.min(u), most.max(u));
+        }
+        let middle = (least + most) * 0.5;
+        let reach = ((most - least) * 0.5 + bounds.deviation_m) * bounds.amplification;
+        box_distance_m(from_m, self.low_m[number] + middle - reach, self.high_m[number] + middle + reach)
+    }
+}

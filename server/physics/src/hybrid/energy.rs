@@ -1,0 +1,62 @@
+//! What a hybrid body holds: by the oracle, for a look now and then.
+use super::{
+    body::Hybrid,
+    metric::Metric,
+    patch::{Field, Patch},
+};
+use crate::{health::Energies, world::State};
+use glam::DVec3;
+use std::collections::BTreeSet;
+
+impl Hybrid {
+    fn patch_of(&self, state: &State) -> (Patch, BTreeSet<u32>) {
+        let active: BTreeSet<u32> = state.active.ids().iter().copied().collect();
+        (Patch::new(&self.partition, &active), active)
+    }
+
+    fn field(&self, list: &[DVec3]) -> Field {
+        let (nodes, particles) = list.split_at(self.node_count());
+        Field { nodes: nodes.to_vec(), particles: particles.to_vec() }
+    }
+
+    /// Kinetic, elastic and gravitational energy, beside the ledger's work and dissipation.
+    pub(crate) fn energies(&self, gravity_m_per_s2: DVec3, state: &State) -> Energies {
+        let (patch, active) = self.patch_of(state);
+        let (at, rate) = (self.field(&state.x), self.field(&state.v));
+        let rest = patch.at_rest(&self.partition);
+        // Active particles follow free nodes within the coarse tets only: the matrix is positive.
+        let metric = Metric::new(&self.partition, &self.masses, &active, &self.free);
+        let (kinetic_j, gravitational_j) = metric.map_or((f64::NAN, f64::NAN), |metric| {
+            let moved = |list: &[DVec3], rest: &[DVec3]| -> Vec<DVec3> { list.iter().zip(rest).map(|(x, rest)| *x - *rest).collect() };
+            let of_nodes: DVec3 = metric.momenta(&moved(&at.nodes, &rest.nodes)).iter().sum();
+            let particles = moved(&at.particles, &rest.particles);
+            let of_particles: DVec3 = particles.iter().zip(metric.particle_kg()).map(|(u, m)| *u * *m).sum();
+            (metric.kinetic_j(&rate.nodes, &rate.particles), 0.0 - gravity_m_per_s2.dot(of_nodes + of_particles))
+        });
+        Energies {
+            kinetic_j,
+            elastic_j: patch.energy_j(&self.materials(), &at),
+            gravitational_j,
+            external_work_j: state.ledger.external_work_j,
+            dissipated_j: state.ledger.dissipated_j,
+        }
+    }
+
+    /// Smallest `det F` of coarse tets' means and awake cells, and its tet.
+    pub(crate) fn min_volume_ratio(&self, state: &State) -> (f64, usize) {
+        self.patch_of(state).0.min_volume_ratio(&self.field(&state.x))
+    }
+
+    /// Momentum (kg m/s) and angular momentum about the origin (kg m²/s).
+    pub fn momentum(&self, state: &State) -> (DVec3, DVec3) {
+        let active = self.patch_of(state).1;
+        let (at, rate) = (self.field(&state.x), self.field(&state.v));
+        let Ok(metric) = Metric::new(&self.partition, &self.masses, &active, &self.free) else {
+            return (DVec3::NAN, DVec3::NAN);
+        };
+        let of_nodes = metric.momenta(&rate.nodes);
+        let of_particles = rate.particles.iter().zip(metric.particle_kg()).map(|(w, m)| *w * *m);
+        let pairs = at.nodes.iter().chain(&at.particles).zip(of_nodes.into_iter().chain(of_particles));
+        pairs.fold((DVec3::ZERO, DVec3::ZERO), |(linear, angular), (x, p)| (linear + p, angular + x.cross(p)))
+    }
+}

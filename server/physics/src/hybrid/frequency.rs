@@ -1,0 +1,105 @@
+//! The largest natural frequency that a hybrid body can have, whichever particles are awake: that of all of them, over √(1 − ε).
+//!
+//! With no negative weight, a set of active particles has `U ≤ U_all` and `K ≥ (1 − ε) K_all` for the field it describes (Jensen, twice;
+//! `docs/adr/hybrid.md`).
+use super::{body::Hybrid, cell::{HOURGLASS, MODE_WEIGHTS, RestCell}, patch::KEPT};
+use crate::{
+    fem::element::outer,
+    integrate::spectrum::{lanczos, largest_eigenvalue},
+    material::{Lame, Material, stvk::trace},
+};
+use glam::{DMat3, DVec3};
+
+/// Bodies of more cells than this are given the bound of single cells, which takes one look at each.
+const MOST_CELLS: usize = 200_000;
+
+impl Hybrid {
+    /// Largest natural frequency (rad/s) at rest, on springs (N/m, in all directions; one per particle, or none).
+    ///
+    /// Lanczos' estimate with its residual, and no more than the bound of single cells, each with its share `ρV_c/8` of its particles' masses (by Rayleigh's
+    /// quotient no assembly is faster than the fastest cell): `ω_c² ≤ 8/ρ ((3λ⁺ + 2µ) λ_max(Σ_p b_p b_pᵀ) + κ/V Σ_p w_k γ_kp²)`. Of full cells
+    /// it is `4 (3λ + 2µ)/(ρh²)`, which neighbours reach that swell and shrink in turn.
+    pub fn frequency_rad_per_s(&self, springs_n_per_m: &[f64]) -> f64 {
+        let spring = |(k, m): (&f64, &f64)| k / m;
+        let of_springs = springs_n_per_m.iter().zip(&self.masses.particle_kg).map(spring).fold(0.0, f64::max);
+        let bound_sq = self.cells_bound_sq() + of_springs;
+        let estimate_sq = if self.partition.cells().len() > MOST_CELLS {
+            f64::INFINITY
+        } else {
+            let root = |m: &f64| DVec3::splat(m.sqrt().recip());
+            let root_inverse_mass: Vec<DVec3> = self.masses.particle_kg.iter().map(root).collect();
+            let cells = self.rest_cells();
+            let (theta, residual) = lanczos(&mut |a, out| self.apply(&cells, springs_n_per_m, a, out), &root_inverse_mass);
+            theta + residual
+        };
+        (estimate_sq.min(bound_sq) / (1.0 - KEPT)).sqrt()
+    }
+
+    fn rest_cells(&self) -> Vec<RestCell> {
+        let spacing_m = self.partition.sites().spacing_m();
+        (0..self.partition.cells().len()).map(|cell| RestCell::new(spacing_m, 1.0, &self.partition.moments(cell))).collect()
+    }
+
+    fn material_of_cell(&self, cell: usize) -> &Material {
+        &self.materials[self.of_tet[self.partition.cells()[cell].tet as usize] as usize]
+    }
+
+    /// `out ← K a` with all particles awake.
+    fn apply(&self, cells: &[RestCell], springs_n_per_m: &[f64], a: &[DVec3], out: &mut [DVec3]) {
+        out.fill(DVec3::ZERO);
+        for (number, rest) in cells.iter().enumerate() {
+            let corners = self.partition.corners(number);
+            let material = self.material_of_cell(number);
+            let Lame { lambda_pa, mu_pa } = material.lame;
+            let of = corners.map(|particle| a[particle as usize]);
+            let g = rest.gradient_of(&of);
+            let sigma = (g + g.transpose()) * mu_pa + DMat3::from_diagonal(DVec3::splat(lambda_pa * trace(&g)));
+            let forces = rest.corner_forces_n(material, &sigma, &rest.amplitudes(&of));
+            for (&particle, force) in corners.iter().zip(forces) {
+                out[particle as usize] -= force;
+            }
+        }
+        for ((out, a), spring) in out.iter_mut().zip(a).zip(springs_n_per_m) {
+            *out += *a * *spring;
+        }
+    }
+
+    fn cells_bound_sq(&self) -> f64 {
+        let spacing_m = self.partition.sites().spacing_m();
+        let hourglass_per_m2 = HOURGLASS * 4.0 / 3.0 / (spacing_m * spacing_m);
+        let of_cell = |number: usize| {
+            let cell = self.partition.cells()[number];
+            let rest = RestCell::new(spacing_m, 1.0, &self.partition.moments(number));
+            let gram = rest.gradients_per_m.iter().fold(DMat3::ZERO, |sum, b| sum + outer(*b, *b));
+            let modes = rest.modes.iter().zip(MODE_WEIGHTS);
+            let modes = modes.map(|(mode, w)| w * mode.iter().map(|g| g * g).sum::<f64>()).fold(0.0, f64::max);
+            let Lame { lambda_pa, mu_pa } = self.material_of_cell(number).lame;
+            let density = self.densities_kg_per_m3[self.of_tet[cell.tet as usize] as usize];
+            let of_strain = (3.0 * lambda_pa.max(0.0) + 2.0 * mu_pa) * largest_eigenvalue(&gram);
+            8.0 / density * (of_strain + hourglass_per_m2 * mu_pa * modes)
+        };
+        (0..self.partition.cells().len()).map(of_cell).fold(0.0, f64::max)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::hybrid::testing::{hybrid_ball, tissue};
+
+    /// The lattice's highest frequency is known; cut cells add to it, but no more than their bound says.
+    #[test]
+    fn the_lattice_has_its_known_frequency_and_springs_raise_it() {
+        let material = tissue()[1];
+        let hybrid = hybrid_ball(&[material; 2]);
+        let Lame { lambda_pa, mu_pa } = material.lame;
+        let full_sq = 4.0 * (3.0 * lambda_pa + 2.0 * mu_pa) / (1000.0 * 1.1e-3_f64.powi(2));
+        let found_sq = hybrid.frequency_rad_per_s(&[]).powi(2) * (1.0 - KEPT);
+        let bound_sq = hybrid.cells_bound_sq();
+        println!("{} {}", found_sq / full_sq, bound_sq / full_sq);
+        assert!(found_sq > 0.9 * full_sq && found_sq <= bound_sq, "{found_sq} {full_sq} {bound_sq}");
+        let springs: Vec<f64> = hybrid.masses.particle_kg.iter().map(|m| m * full_sq).collect();
+        let held_sq = hybrid.frequency_rad_per_s(&springs).powi(2) * (1.0 - KEPT);
+        assert!((held_sq / (found_sq + full_sq) - 1.0).abs() < 1e-3, "{held_sq}");
+    }
+}

@@ -1,0 +1,100 @@
+//! Forces and kicks of a hybrid body, for leapfrog.
+use super::{
+    forces::{Evaluation, Tick, is_usable},
+    motion::holders_power_w,
+};
+use crate::{
+    contact::{ContactScratch, SubstepTime},
+    fem::loads::add_load_n,
+    hybrid::{Hybrid, HybridScratch, SkinView},
+    world::{LoadSpec, Model, State},
+};
+use glam::DVec3;
+
+/// Total force at the present positions into `state.force_n`, its external part into `state.external_n`.
+pub(super) fn evaluate(
+    tick: &Tick<'_>,
+    body: &Hybrid,
+    state: &mut State,
+    (own, contact_scratch): (&mut HybridScratch, &mut ContactScratch),
+    now: &Evaluation,
+) {
+    let Tick { model, input, loads, .. } = tick;
+    let HybridScratch { patch, skin, .. } = own;
+    patch.displace(body, &state.x);
+    let tick_period_s = model.spec().settings.tick_period_s;
+    let time = SubstepTime { fraction: now.fraction, dt_s: now.dt_s, tick_period_s };
+    let rest_m = model.surface_rest_positions_m();
+    let contact = model.contact();
+    contact.move_tools(now.fastest_m_per_s * body.amplification(), &time, &mut state.tools, &mut state.contact);
+    let mut view = SkinView::new(body, patch, rest_m);
+    let mut renewed = contact.list_on_skin(&mut view, &state.tools, &mut state.contact, contact_scratch);
+    renewed |= skin.is_outdated(patch);
+    renewed |= input.point_forces.iter().any(|point| is_usable(model, point) && !skin.is_listed(point.node));
+    if renewed {
+        skin.start(patch);
+        let mut list = |vertex: u32| skin.list(body, patch, rest_m, vertex);
+        contact.listed_nodes(&state.contact).for_each(&mut list);
+        model.spec().loads.iter().for_each(|load| vertices_of(model, load, &mut list));
+        input.point_forces.iter().filter(|point| is_usable(model, point)).for_each(|point| list(point.node));
+    }
+    skin.refresh(patch);
+    for (index, load) in model.spec().loads.iter().enumerate() {
+        let factor = loads.factor(state.load_factors[index], input, index, now.load_fraction);
+        if factor != 0.0 {
+            add_load_n(load, factor, model.surface(), (rest_m, &skin.x), &mut skin.forces_n);
+        }
+    }
+    for point in input.point_forces.iter().filter(|point| is_usable(model, point)) {
+        skin.forces_n[point.node as usize] += point.force_n;
+    }
+    let v = &state.v;
+    let velocity = |vertex: u32| body.velocity_m_per_s(patch, vertex, v);
+    let (tools, touching) = (&mut state.tools, &mut state.contact);
+    contact.press_tools(&skin.x, &velocity, &time, tools, touching, &mut skin.forces_n, contact_scratch);
+    state.external_n.fill(DVec3::ZERO);
+    skin.hand_over(body.node_count(), patch, &mut state.external_n);
+    let viscous_power_w = patch.forces_n(body, &state.x, &state.v, &mut state.force_n);
+    state.viscous.record(viscous_power_w, now.dt_s > 0.0);
+    patch.metric().add_weight_n(model.gravity_m_per_s2(), &mut state.force_n);
+    for (force, external) in state.force_n.iter_mut().zip(&state.external_n) {
+        *force += *external;
+    }
+    state.force_is_current = true;
+}
+
+fn vertices_of(model: &Model, load: &LoadSpec, list: &mut impl FnMut(u32)) {
+    match load {
+        LoadSpec::NodalForces(forces) => forces.iter().for_each(|(vertex, _)| list(*vertex)),
+        LoadSpec::Traction { triangles, .. } | LoadSpec::Pressure { triangles, .. } => {
+            triangles.iter().flat_map(|&t| model.surface().triangle_nodes(t as usize)).for_each(list);
+        }
+    }
+}
+
+/// `v ← (v e^{−c h/2} + h M'⁻¹ f) e^{−c h/2}`, and the ledger's share of it, as of a body of tets.
+pub(super) fn kick(model: &Model, body: &Hybrid, state: &mut State, own: &mut HybridScratch, h_s: f64) {
+    let HybridScratch { patch, accelerations, momenta, .. } = own;
+    accelerations.clear();
+    accelerations.extend_from_slice(&state.force_n);
+    patch.metric_mut().accelerate(accelerations);
+    let damping = model.spec().settings.mass_damping_per_s;
+    let factor = (-0.5 * damping * h_s).exp();
+    let mut twice_kinetic_j = 0.0;
+    if damping > 0.0 {
+        twice_kinetic_j += patch.metric().damped(body, &mut state.v, factor, momenta);
+    }
+    let mut power_w = 0.0;
+    for ((v, acceleration), external) in state.v.iter_mut().zip(accelerations.iter()).zip(&state.external_n) {
+        let change = *acceleration * h_s;
+        power_w += external.dot(*v + change * 0.5);
+        *v += change;
+    }
+    if damping > 0.0 {
+        twice_kinetic_j += patch.metric().damped(body, &mut state.v, factor, momenta);
+        state.ledger.dissipated_j += 0.5 * twice_kinetic_j * -(-damping * h_s).exp_m1();
+    }
+    state.ledger.external_work_j += h_s * power_w;
+    state.ledger.dissipated_j += h_s * state.viscous.work_rate_w();
+    state.ledger.external_work_j += h_s * holders_power_w(model, state);
+}
