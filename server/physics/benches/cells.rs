@@ -1,4 +1,4 @@
-//! The kernel of a hybrid body's cells, beside its oracle, on 1 000 full cells and on the 1 331 of the same box off the lattice, of which 602 are cut:
+//! The kernels of a hybrid body's cells, beside their oracle, on 1 000 full cells and on the 1 331 of the same box off the lattice, of which 602 are cut:
 //! `cargo bench -p palpate-physics --bench cells`.
 #![allow(missing_docs)] // criterion's macros
 #![allow(clippy::unwrap_used)] // helpers of a benchmark
@@ -17,13 +17,13 @@ use palpate_physics::{
         sites::{CORNERS, Sites},
     },
     material::{Convention, Lame, Law, Material, Viscosity},
-    simd::{CellKernel, CellWindow, InstructionSet, KernelCell},
+    simd::{CellRow, CutCells, InstructionSet, RowKernel},
 };
 
 const SPACING_M: f64 = 2.5e-3;
 
-/// Particles, rest data, and whether it is full.
-type Cell = ([u32; 8], RestCell, bool);
+/// Particles and rest data.
+type Cell = ([u32; 8], RestCell);
 
 /// A box of ten cells each way, whose corner is `offset` cells from a site.
 fn cells(offset: f64) -> (Vec<Cell>, Vec<DVec3>) {
@@ -39,7 +39,7 @@ fn cells(offset: f64) -> (Vec<Cell>, Vec<DVec3>) {
     let partition = Partition::new(sites, Composite::new(&coarse), &moments);
     let cell = |c: usize| {
         let moments = partition.moments(c);
-        (partition.corners(c), RestCell::new(SPACING_M, 1.0, &moments), moments.0 > SPACING_M.powi(3) * (1.0 - 1e-12))
+        (partition.corners(c), RestCell::new(SPACING_M, 1.0, &moments))
     };
     let rest = (0..partition.particle_count() as u32).map(|p| partition.particle_m(p)).collect();
     ((0..partition.cells().len()).map(cell).collect(), rest)
@@ -50,7 +50,6 @@ fn kernels(criterion: &mut Criterion) {
     for (name, offset) in [("full", 0.0), ("some cut", 0.5)] {
         let (cells, rest) = cells(offset);
         let u: Vec<DVec3> = rest.iter().map(|_| random.vector() * 2e-4).collect();
-        let v: Vec<DVec3> = rest.iter().map(|_| random.vector()).collect();
         let mut forces = vec![DVec3::ZERO; rest.len()];
         for law in [Law::StVenantKirchhoff, Law::StableNeoHookean, Law::FixedCorotated] {
             let lame = Lame { lambda_pa: 30e3, mu_pa: 3e3 };
@@ -60,38 +59,34 @@ fn kernels(criterion: &mut Criterion) {
             group.bench_function("oracle", |b| {
                 b.iter(|| {
                     forces.fill(DVec3::ZERO);
-                    for (points, cell, _) in &cells {
+                    for (points, cell) in &cells {
                         let y = points.map(|p| rest[p as usize] + u[p as usize]);
                         let found = cell.forces_n(&material, &y, &y).0;
                         points.iter().zip(found).for_each(|(&p, f)| forces[p as usize] += f);
                     }
                 });
             });
-            let listed: Vec<KernelCell<'_>> = cells
-                .iter()
-                .map(|(points, rest, is_full)| KernelCell { points: *points, rest, is_full: *is_full, material: 0 })
-                .collect();
             for precision in [Precision::Single, Precision::Double] {
                 for set in InstructionSet::available() {
                     if offset == 0.0 {
-                        let all: Vec<([usize; 3], u16)> =
-                            (0..1000).map(|c| ([c % 10, c / 10 % 10, c / 100], 0)).collect();
-                        let window = CellWindow::build([10; 3], SPACING_M, 1.0, &all, &[material], precision);
-                        let window = window.with_instruction_set(set);
-                        let mut scratch = window.scratch();
-                        for (p, (u, v)) in u.iter().zip(&v).enumerate() {
-                            scratch.set(window.particle([p % 11, p / 11 % 11, p / 121]), *u, *v);
-                        }
-                        group.bench_function(format!("{precision:?} {set:?}, window"), |b| {
-                            b.iter(|| window.add_forces(&mut scratch));
+                        let row = |r: u32| {
+                            let at = |j: u32, k: u32| ((r / 10 + k) * 11 + r % 10 + j) * 11;
+                            CellRow { points: [at(0, 0), at(1, 0), at(0, 1), at(1, 1)], cells: 10, material: 0 }
+                        };
+                        let rows: Vec<CellRow> = (0..100).map(row).collect();
+                        let kernel = RowKernel::new(SPACING_M, 1.0, &[material], precision).with_instruction_set(set);
+                        let mut values = kernel.values(rest.len());
+                        u.iter().enumerate().for_each(|(p, u)| values.set_displacement(p, *u));
+                        group.bench_function(format!("{precision:?} {set:?}, rows of 10"), |b| {
+                            b.iter(|| kernel.forces(&rows, rest.len(), &mut values));
                         });
                     }
-                    let kernel = CellKernel::build(&listed, rest.len(), &[material], precision);
-                    let kernel = kernel.with_instruction_set(set);
-                    let mut scratch = kernel.scratch();
-                    group.bench_function(format!("{precision:?} {set:?}"), |b| {
-                        b.iter(|| kernel.forces_n(&u, &v, &mut forces, &mut scratch));
-                    });
+                    let mut kernel = CutCells::with_capacity(cells.len(), rest.len(), &[material], precision);
+                    kernel = kernel.with_instruction_set(set);
+                    kernel.start(0, cells.len());
+                    cells.iter().enumerate().for_each(|(c, (points, rest))| kernel.put(c, *points, rest));
+                    u.iter().enumerate().for_each(|(p, u)| kernel.set_displacement(p, *u));
+                    group.bench_function(format!("{precision:?} {set:?}, as cut"), |b| b.iter(|| kernel.forces(rest.len())));
                 }
             }
         }

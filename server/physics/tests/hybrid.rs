@@ -93,7 +93,7 @@ fn damped_the_loop_comes_to_rest_where_newtons_method_says() {
         worst = worst.max(x.distance(expected));
         largest = largest.max(expected.distance(skin[v]));
     }
-    assert!(largest > 1e-3 && worst < 1e-6 * largest, "{worst:e} of {largest:e}");
+    assert!(largest > 2e-4 && worst < 1e-9 * largest, "{worst:e} of {largest:e}");
 }
 
 #[test]
@@ -188,4 +188,24 @@ fn looking_only_where_the_tool_may_be_costs_no_bit() {
         rig.state
     };
     assert_eq!(run(true), run(false));
+}
+
+#[test]
+fn zz_numbers() {
+    let spec = held(block(0.45));
+    let rig = Rig::new(spec);
+    let hybrid = rig.model.hybrid().unwrap();
+    let mu = 10e3 / 2.9;
+    let full = (4.0 * (3.0 * 9.0 + 2.0) * mu / (1000.0 * H_M * H_M)).sqrt();
+    println!("untouched: {} substeps, full {full}, omega {}", rig.model.substeps(), rig.model.max_natural_frequency_rad_per_s());
+    let mut counts: Vec<usize> = hybrid.partition().shares().iter().map(|s| s.nodes.len()).collect();
+    counts.sort_unstable();
+    println!("nodes per share {counts:?}");
+    let pairs: Vec<usize> = hybrid.partition().shares().iter().map(|s| s.moments_m2.iter().flatten().filter(|m| m.length() > 1e-15).count()).collect();
+    println!("pairs {pairs:?}");
+    for share in [1] { let _ = share; }
+    let rig = pressed(Precision::Single);
+    println!("touched: {} substeps", rig.model.substeps());
+    let springs = hybrid.frequency_rad_per_s(&vec![0.0; hybrid.partition().particle_count()]);
+    println!("{springs}");
 }

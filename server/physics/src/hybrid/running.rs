@@ -11,7 +11,7 @@ use super::{
     share::Share,
 };
 use crate::{
-    simd::{CellRow, CutCells, RowKernel, RowValues},
+    simd::{CellRow, CutCells, RowKernel, RowValues, ShareKernel},
     world::Precision,
 };
 use glam::DVec3;
@@ -32,6 +32,7 @@ pub(crate) struct RunningPatch {
     cut: CutCells,
     /// What is left to each coarse tet.
     shares: Vec<Share>,
+    share_kernel: ShareKernel,
     /// Of which tets something was taken.
     taken_from: Vec<u32>,
     metric: RunningMetric,
@@ -70,6 +71,13 @@ impl RunningPatch {
             values: kernel.values(most_points),
             kernel,
             cut: CutCells::with_capacity(most_cells, most_points, &hybrid.materials, precision),
+            share_kernel: ShareKernel::build(
+                (partition.shares(), partition.coarse().tets()),
+                hybrid.node_count(),
+                &hybrid.of_tet,
+                &hybrid.materials,
+                precision,
+            ),
             shares: partition.shares().to_vec(),
             taken_from: Vec::with_capacity(partition.shares().len()),
             metric: RunningMetric::new(hybrid, most_active),
@@ -158,6 +166,7 @@ impl RunningPatch {
             let (share, whole) = (&mut self.shares[tet as usize], &hybrid.partition.shares()[tet as usize]);
             share.volume_m3 = whole.volume_m3;
             share.moments_m2.copy_from_slice(&whole.moments_m2);
+            self.share_kernel.put(tet as usize, whole);
         }
         self.taken_from.clear();
         self.active.clear();
@@ -248,20 +257,18 @@ impl RunningPatch {
             // Every node is known already: nothing is pushed.
             self.shares[tet as usize].add(part, KEPT - 1.0, volume_m3, &gradients_m2, &anchors);
         }
+        for &tet in &self.taken_from {
+            self.share_kernel.put(tet as usize, &self.shares[tet as usize]);
+        }
     }
 
-    /// Overwrites `forces_n` (N) with those of elastic and viscous stress at positions `x` and velocities `v` of coarse nodes and then active
-    /// particles; returns the power (W) that viscous stress takes. [`Self::displace`] has been called.
-    pub(crate) fn forces_n(&mut self, hybrid: &Hybrid, x: &[DVec3], v: &[DVec3], forces_n: &mut [DVec3]) -> f64 {
+    /// Overwrites `forces_n` (N) with those of elastic and viscous stress where [`Self::displace`] put coarse nodes and active particles, at their
+    /// velocities `v`; returns the power (W) that viscous stress takes.
+    pub(crate) fn forces_n(&mut self, hybrid: &Hybrid, v: &[DVec3], forces_n: &mut [DVec3]) -> f64 {
         let nodes = hybrid.node_count();
-        let x_nodes = &x[..nodes];
         let (v_nodes, v_particles) = v.split_at(nodes);
         forces_n.fill(DVec3::ZERO);
-        let mut power_w = 0.0;
-        for (tet, share) in self.shares.iter().enumerate() {
-            let material = &hybrid.materials[hybrid.of_tet[tet] as usize];
-            power_w += share.add_forces_n(material, x_nodes, v_nodes, forces_n);
-        }
+        let mut power_w = self.share_kernel.add_forces_n(&self.node_displacements_m, v_nodes, forces_n);
         if self.active.is_empty() {
             return power_w;
         }
@@ -365,7 +372,7 @@ mod tests {
                     let (expected, x, v) = (joined(&expected), joined(&at), joined(&rate));
                     let mut forces = x.clone();
                     running.displace(&hybrid, &x);
-                    let power_w = running.forces_n(&hybrid, &x, &v, &mut forces);
+                    let power_w = running.forces_n(&hybrid, &v, &mut forces);
                     let worst = forces.iter().zip(&expected).map(|(a, b)| a.distance(*b)).fold(0.0, f64::max);
                     assert!(worst < bound * largest(&expected), "{precision:?}, {}: {worst:e}", active.len());
                     assert!((power_w - expected_w).abs() <= 10.0 * bound * expected_w, "{power_w} {expected_w}");

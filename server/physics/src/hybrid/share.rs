@@ -147,7 +147,7 @@ impl Share {
 }
 
 /// The material of the parts' shape, and that of the tet's volume.
-fn split(material: &Material) -> (Material, Material) {
+pub(crate) fn split(material: &Material) -> (Material, Material) {
     let Lame { lambda_pa, mu_pa } = material.lame;
     let of_parts = lambda_pa.min(0.0);
     (

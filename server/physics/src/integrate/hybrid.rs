@@ -54,7 +54,7 @@ pub(super) fn evaluate(
     contact.press_tools(&skin.x, &velocity, &time, tools, touching, &mut skin.forces_n, contact_scratch);
     state.external_n.fill(DVec3::ZERO);
     skin.hand_over(body.node_count(), patch, &mut state.external_n);
-    let viscous_power_w = patch.forces_n(body, &state.x, &state.v, &mut state.force_n);
+    let viscous_power_w = patch.forces_n(body, &state.v, &mut state.force_n);
     state.viscous.record(viscous_power_w, now.dt_s > 0.0);
     patch.metric().add_weight_n(model.gravity_m_per_s2(), &mut state.force_n);
     for (force, external) in state.force_n.iter_mut().zip(&state.external_n) {

@@ -16,6 +16,7 @@ mod oracle;
 mod products;
 mod real;
 mod rows;
+mod shares;
 mod step_forces;
 mod tangents;
 #[cfg(target_arch = "x86_64")]
@@ -36,6 +37,7 @@ pub use oracle::Oracle;
 use real::Scalar;
 pub(crate) use step_forces::StepForces;
 pub use rows::{CellRow, RowKernel, RowValues};
+pub use shares::ShareKernel;
 
 /// Lanes of a block: a block is one or more whole vectors on every instruction set.
 const LANES_F32: usize = 16;

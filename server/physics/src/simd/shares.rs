@@ -1,0 +1,474 @@
+//! The coarse tets of a hybrid body (`hybrid::share`, which is the oracle), in blocks of lanes: one tet a lane.
+//!
+//! A lane's nodes are its tet's ten first, then those that its cells reach into its neighbours for. The parts' moments are kept only where some lane of a block
+//! has one, part by part; a first node needs none, for they sum to zero. What wakes takes from a lane's moments and volumes, in place.
+use super::{
+    block::{Lanes, Node, Sum},
+    cell_stress::stress,
+    dispatch::{self, Available, InstructionSet, Pass},
+    laws::{Constants, LaneLaw, M3, plus},
+    node,
+    real::{Scalar, Vector},
+    tangents::LaneTangent,
+};
+use crate::{
+    hybrid::{
+        composite::{NODES, PARTS},
+        share::{self, Share},
+    },
+    material::Material,
+    world::Precision,
+};
+use glam::DVec3;
+use std::ops::Range;
+
+const LANES_F32: usize = 16;
+const LANES_F64: usize = 8;
+
+/// Tets in lanes. Lanes of padding have the spare node throughout, and zeros.
+#[derive(Debug, Clone)]
+struct ShareBlock<T, const N: usize> {
+    /// Of every place among a lane's nodes; as many as fill groups of three behind the first.
+    nodes: Vec<[u32; N]>,
+    /// Entries of `places` and `moments` of every part.
+    parts: [Range<usize>; PARTS],
+    /// Place of each entry, from 1.
+    places: Vec<u8>,
+    /// `T_gi` (m²).
+    moments: Vec<[[T; N]; 3]>,
+    /// `1/V_g` (1/m³), 0 of an empty part.
+    inverse_volume: [[T; N]; PARTS],
+    /// `V_g/V_e`.
+    weight: [[T; N]; PARTS],
+    /// `V_g` (m³).
+    volume: [[T; N]; PARTS],
+}
+
+/// Blocks of one material.
+#[derive(Debug, Clone)]
+struct Run<T> {
+    law: (crate::material::Law, bool),
+    of_shape: Constants<T>,
+    of_volume: Constants<T>,
+    blocks: Range<usize>,
+}
+
+#[derive(Debug, Clone)]
+struct Blocks<T, const N: usize> {
+    blocks: Vec<ShareBlock<T, N>>,
+    runs: Vec<Run<T>>,
+    /// Block and lane of every tet.
+    lane_of: Vec<(u32, u32)>,
+    /// Place, in its lane, of every node of a tet's share.
+    places_of: Vec<Vec<u8>>,
+    edges: Vec<Lanes<T, N>>,
+    rates: Vec<Lanes<T, N>>,
+    forces: Vec<Lanes<T, N>>,
+}
+
+#[derive(Debug, Clone)]
+enum Layout {
+    Single(Blocks<f32, LANES_F32>),
+    Double(Blocks<f64, LANES_F64>),
+}
+
+/// Forces of what is left to the coarse tets.
+#[derive(Debug, Clone)]
+pub struct ShareKernel {
+    layout: Layout,
+    instruction_set: Available,
+    displacements: Vec<Node>,
+    /// Empty unless something is viscous.
+    velocities: Vec<Node>,
+    sums: Vec<Sum>,
+}
+
+impl ShareKernel {
+    /// Lays out shares of tets whose own nodes are `tets`; `of_tet` indexes `materials`.
+    pub fn build(
+        (shares, tets): (&[Share], &[[u32; NODES]]),
+        nodes: usize,
+        of_tet: &[u16],
+        materials: &[Material],
+        precision: Precision,
+    ) -> Self {
+        let layout = match precision {
+            Precision::Single => Layout::Single(Blocks::build(shares, tets, nodes, of_tet, materials)),
+            Precision::Double => Layout::Double(Blocks::build(shares, tets, nodes, of_tet, materials)),
+        };
+        let is_viscous = materials.iter().any(|m| !m.viscosity.is_zero());
+        // One spare node more, for the lanes of padding.
+        let count = nodes + 1;
+        Self {
+            layout,
+            instruction_set: Available::at_most(InstructionSet::best()),
+            displacements: vec![Node::default(); count],
+            velocities: vec![Node::default(); if is_viscous { count } else { 0 }],
+            sums: vec![Sum::default(); count],
+        }
+    }
+
+    /// The same, held to an instruction set or the best below it that there is (for tests and benchmarks).
+    #[must_use]
+    pub fn with_instruction_set(self, instruction_set: InstructionSet) -> Self {
+        Self { instruction_set: Available::at_most(instruction_set), ..self }
+    }
+
+    /// What is left to a tet; its nodes are those it had. Allocates nothing.
+    pub fn put(&mut self, tet: usize, share: &Share) {
+        match &mut self.layout {
+            Layout::Single(blocks) => blocks.put(tet, share),
+            Layout::Double(blocks) => blocks.put(tet, share),
+        }
+    }
+
+    /// Adds forces (N) of elastic and viscous stress to `forces_n` at `displacements_m` and velocities `v` of the coarse nodes; returns the
+    /// power (W) that viscous stress takes.
+    pub fn add_forces_n(&mut self, displacements_m: &[DVec3], v: &[DVec3], forces_n: &mut [DVec3]) -> f64 {
+        let Self { layout, instruction_set, displacements, velocities, sums } = self;
+        for (to, from) in displacements.iter_mut().zip(displacements_m) {
+            *to = node(*from);
+        }
+        for (to, from) in velocities.iter_mut().zip(v.iter().take(displacements_m.len())) {
+            *to = node(*from);
+        }
+        sums.fill(Sum::default());
+        let power_w = match layout {
+            Layout::Single(blocks) => blocks.sum_up(*instruction_set, displacements, velocities, sums),
+            Layout::Double(blocks) => blocks.sum_up(*instruction_set, displacements, velocities, sums),
+        };
+        for (force, Sum([x, y, z, _])) in forces_n.iter_mut().zip(&sums[..displacements_m.len()]) {
+            *force += DVec3::new(*x, *y, *z);
+        }
+        power_w
+    }
+}
+
+impl<T: Scalar, const N: usize> Blocks<T, N> {
+    fn build(
+        shares: &[Share],
+        tets: &[[u32; NODES]],
+        nodes: usize,
+        of_tet: &[u16],
+        materials: &[Material],
+    ) -> Self {
+        let is_viscous = materials.iter().any(|m| !m.viscosity.is_zero());
+        // Tets that reach for as many nodes share a block; one that holds nothing of the body needs no lane.
+        let mut order: Vec<usize> = (0..shares.len()).filter(|&tet| !shares[tet].nodes.is_empty()).collect();
+        let extra = |tet: usize| shares[tet].nodes.iter().filter(|node| !tets[tet].contains(node)).count();
+        order.sort_by_key(|&tet| (of_tet[tet], extra(tet), tet));
+        let mut built = Self {
+            blocks: Vec::new(),
+            runs: Vec::new(),
+            lane_of: vec![(u32::MAX, 0); shares.len()],
+            places_of: vec![Vec::new(); shares.len()],
+            edges: Vec::new(),
+            rates: Vec::new(),
+            forces: Vec::new(),
+        };
+        for same in order.chunk_by(|&a, &b| of_tet[a] == of_tet[b]) {
+            let first = built.blocks.len();
+            for lanes in same.chunks(N) {
+                built.push_block(lanes, shares, tets, nodes as u32);
+            }
+            let material = &materials[of_tet[same[0]] as usize];
+            let (of_shape, of_volume) = share::split(material);
+            built.runs.push(Run {
+                law: (material.law, !material.viscosity.is_zero()),
+                of_shape: Constants::of(&of_shape),
+                of_volume: Constants::of(&of_volume),
+                blocks: first..built.blocks.len(),
+            });
+        }
+        for &tet in &order {
+            built.put(tet, &shares[tet]);
+        }
+        let groups = built.blocks.iter().map(|block| block.nodes.len() / 3).max().unwrap_or(0);
+        let zeros = [[T::of(0.0); N]; 9];
+        built.edges = vec![zeros; groups];
+        built.rates = vec![zeros; if is_viscous { groups } else { 0 }];
+        built.forces = vec![zeros; groups];
+        built
+    }
+
+    fn push_block(&mut self, tets_of_lanes: &[usize], shares: &[Share], tets: &[[u32; NODES]], spare: u32) {
+        let zero = T::of(0.0);
+        let mut nodes: Vec<[u32; N]> = Vec::new();
+        let mut has_moment = vec![[false; PARTS]; usize::from(u8::MAX)];
+        for (lane, &tet) in tets_of_lanes.iter().enumerate() {
+            let share = &shares[tet];
+            let others = share.nodes.iter().copied().filter(|node| !tets[tet].contains(node));
+            let of_lane: Vec<u32> = tets[tet].iter().copied().chain(others).collect();
+            if nodes.len() < of_lane.len() {
+                nodes.resize(of_lane.len(), [spare; N]);
+            }
+            for (place, &node) in of_lane.iter().enumerate() {
+                nodes[place][lane] = node;
+            }
+            let place_of = |node: &u32| of_lane.iter().position(|n| n == node).unwrap_or(0) as u8;
+            self.places_of[tet] = share.nodes.iter().map(place_of).collect();
+            self.lane_of[tet] = (self.blocks.len() as u32, lane as u32);
+            for (&place, moments) in self.places_of[tet].iter().zip(&share.moments_m2) {
+                for (part, moment) in moments.iter().enumerate() {
+                    has_moment[place as usize][part] |= *moment != DVec3::ZERO;
+                }
+            }
+        }
+        // The first node is gathered with groups of three others.
+        nodes.resize(1 + (nodes.len() - 1).next_multiple_of(3), [spare; N]);
+        for places in 1..nodes.len() {
+            for lane in 0..tets_of_lanes.len() {
+                // A place that a lane has no use for is its first node: no difference, no force.
+                if nodes[places][lane] == spare {
+                    nodes[places][lane] = nodes[0][lane];
+                }
+            }
+        }
+        let mut places = Vec::new();
+        let parts = std::array::from_fn(|part| {
+            let first = places.len();
+            places.extend((1..nodes.len().min(has_moment.len())).filter(|&p| has_moment[p][part]).map(|p| p as u8));
+            first..places.len()
+        });
+        self.blocks.push(ShareBlock {
+            moments: vec![[[zero; N]; 3]; places.len()],
+            nodes,
+            parts,
+            places,
+            inverse_volume: [[zero; N]; PARTS],
+            weight: [[zero; N]; PARTS],
+            volume: [[zero; N]; PARTS],
+        });
+    }
+
+    fn put(&mut self, tet: usize, share: &Share) {
+        let (block, lane) = self.lane_of[tet];
+        let Some(block) = self.blocks.get_mut(block as usize) else { return };
+        let lane = lane as usize;
+        let total_m3 = share.total_m3();
+        for part in 0..PARTS {
+            let volume_m3 = share.volume_m3[part];
+            let inverse = if volume_m3 > 0.0 { 1.0 / volume_m3 } else { 0.0 };
+            block.inverse_volume[part][lane] = T::of(inverse);
+            block.weight[part][lane] = T::of(volume_m3 / total_m3);
+            block.volume[part][lane] = T::of(volume_m3);
+        }
+        for (&place, moments) in self.places_of[tet].iter().zip(&share.moments_m2) {
+            for (part, moment) in moments.iter().enumerate() {
+                let of_part = block.parts[part].clone();
+                if let Ok(entry) = block.places[of_part.clone()].binary_search(&place) {
+                    for axis in 0..3 {
+                        block.moments[of_part.start + entry][axis][lane] = T::of(moment[axis]);
+                    }
+                }
+            }
+        }
+    }
+
+    fn sum_up(&mut self, set: Available, displacements: &[Node], velocities: &[Node], sums: &mut [Sum]) -> f64 {
+        let Self { blocks, runs, edges, rates, forces, .. } = self;
+        let mut power_w = 0.0;
+        for run in runs.iter() {
+            let blocks = &blocks[run.blocks.clone()];
+            let mut pass = ShareForces { run, blocks, edges, rates, forces, displacements, velocities, sums };
+            power_w += dispatch::run(set, run.law, &mut pass);
+        }
+        power_w
+    }
+}
+
+/// The pass over the tets of one material.
+struct ShareForces<'a, T, const N: usize> {
+    run: &'a Run<T>,
+    blocks: &'a [ShareBlock<T, N>],
+    edges: &'a mut [Lanes<T, N>],
+    rates: &'a mut [Lanes<T, N>],
+    forces: &'a mut [Lanes<T, N>],
+    displacements: &'a [Node],
+    velocities: &'a [Node],
+    sums: &'a mut [Sum],
+}
+
+impl<T: Scalar, const N: usize> Pass<T> for ShareForces<'_, T, N> {
+    #[inline(always)]
+    fn run<V: Vector<Scalar = T>, L: LaneTangent, const VISCOUS: bool>(&mut self) -> f64 {
+        let mut power_w = 0.0;
+        for block in self.blocks {
+            gather::<V, N>(&block.nodes, self.displacements, self.edges);
+            if VISCOUS {
+                gather::<V, N>(&block.nodes, self.velocities, self.rates);
+            }
+            for forces in &mut self.forces[..block.nodes.len() / 3] {
+                *forces = [[T::of(0.0); N]; 9];
+            }
+            let mut power = [T::of(0.0); N];
+            for first in (0..N).step_by(V::WIDTH) {
+                self.lanes::<V, L, VISCOUS>(block, first, &mut power);
+            }
+            power_w = power.iter().fold(power_w, |sum, &lane| sum + lane.into());
+            scatter(&block.nodes, self.forces, self.sums);
+        }
+        power_w
+    }
+}
+
+impl<T: Scalar, const N: usize> ShareForces<'_, T, N> {
+    #[inline(always)]
+    fn lanes<V: Vector<Scalar = T>, L: LaneLaw, const VISCOUS: bool>(
+        &mut self,
+        block: &ShareBlock<T, N>,
+        first: usize,
+        power: &mut [T; N],
+    ) {
+        let zero = [[V::of(0.0); 3]; 3];
+        let (mut strains, mut mean) = ([zero; PARTS], zero);
+        for part in 0..PARTS {
+            strains[part] = gradient::<V, N>(block, part, self.edges, first);
+            let weight = V::load(&block.weight[part][first..]);
+            for row in 0..3 {
+                for column in 0..3 {
+                    mean[row][column] = mean[row][column] + strains[part][row][column] * weight;
+                }
+            }
+        }
+        let pressure = stress::<V, T, L, false>(&self.run.of_volume, &mean, &mean).0;
+        for part in 0..PARTS {
+            let h_dot = if VISCOUS { gradient::<V, N>(block, part, self.rates, first) } else { zero };
+            let (p, density) = stress::<V, T, L, VISCOUS>(&self.run.of_shape, &strains[part], &h_dot);
+            let p = plus(&p, &pressure);
+            for entry in block.parts[part].clone() {
+                let t = block.moments[entry].each_ref().map(|axis| V::load(&axis[first..]));
+                let place = block.places[entry] as usize - 1;
+                let forces = &mut self.forces[place / 3];
+                for row in 0..3 {
+                    let along = p[row][0] * t[0] + p[row][1] * t[1] + p[row][2] * t[2];
+                    let lanes = &mut forces[3 * (place % 3) + row][first..];
+                    (V::load(lanes) - along).store(lanes);
+                }
+            }
+            if VISCOUS {
+                let sum = V::load(&power[first..]) + density * V::load(&block.volume[part][first..]);
+                sum.store(&mut power[first..]);
+            }
+        }
+    }
+}
+
+/// `1/V_g Σ_i (a_i − a_0) T_giᵀ`.
+#[inline(always)]
+fn gradient<V: Vector, const N: usize>(
+    block: &ShareBlock<V::Scalar, N>,
+    part: usize,
+    edges: &[Lanes<V::Scalar, N>],
+    first: usize,
+) -> M3<V> {
+    let mut sum = [[V::of(0.0); 3]; 3];
+    for entry in block.parts[part].clone() {
+        let t = block.moments[entry].each_ref().map(|axis| V::load(&axis[first..]));
+        let place = block.places[entry] as usize - 1;
+        for row in 0..3 {
+            let a = V::load(&edges[place / 3][3 * (place % 3) + row][first..]);
+            for column in 0..3 {
+                sum[row][column] = sum[row][column] + a * t[column];
+            }
+        }
+    }
+    let inverse = V::load(&block.inverse_volume[part][first..]);
+    sum.map(|row| row.map(|entry| entry * inverse))
+}
+
+/// `a_i − a_0` of all lanes.
+#[inline(always)]
+fn gather<V: Vector, const N: usize>(nodes: &[[u32; N]], values: &[Node], edges: &mut [Lanes<V::Scalar, N>]) {
+    for (group, edges) in edges.iter_mut().enumerate().take(nodes.len() / 3) {
+        for first in (0..N).step_by(4) {
+            let mut corners = [[&values[0]; 4]; 4];
+            for lane in 0..4 {
+                corners[lane][0] = &values[nodes[0][first + lane] as usize];
+                for edge in 1..4 {
+                    corners[lane][edge] = &values[nodes[3 * group + edge][first + lane] as usize];
+                }
+            }
+            V::edges_to_lanes(&corners, edges, first);
+        }
+    }
+}
+
+/// Adds the nodes' forces, lane after lane: the same order, hence the same bits, always. `f_0 = −Σ f_i` in f64.
+#[inline(always)]
+fn scatter<T: Scalar, const N: usize>(nodes: &[[u32; N]], forces: &[Lanes<T, N>], sums: &mut [Sum]) {
+    for first in (0..N).step_by(4) {
+        let mut total = [[0.0; 4]; 4];
+        for (group, forces) in forces.iter().enumerate().take(nodes.len() / 3) {
+            let rows = T::lanes_to_rows(forces, first);
+            for lane in 0..4 {
+                for edge in 0..3 {
+                    let sum = &mut sums[nodes[3 * group + edge + 1][first + lane] as usize].0;
+                    for axis in 0..4 {
+                        let component: f64 = rows[lane][edge][axis].into();
+                        total[lane][axis] += component;
+                        sum[axis] += component;
+                    }
+                }
+            }
+        }
+        for lane in 0..4 {
+            let sum = &mut sums[nodes[0][first + lane] as usize].0;
+            for axis in 0..4 {
+                sum[axis] -= total[lane][axis];
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::hybrid::testing::{Random, ball_in_cage, tissue};
+
+    /// Whatever the law, the precision and the instruction set, also after a part of some shares was taken: the forces of the plain code, and the same bits.
+    #[test]
+    fn shares_and_oracle_agree() {
+        let partition = ball_in_cage();
+        let nodes = partition.coarse().positions_m().len();
+        let of_tet: Vec<u16> = (0..partition.shares().len()).map(|tet| (tet / 5 % 2) as u16).collect();
+        let mut random = Random(71);
+        let [stvk, neo, corotated] = tissue();
+        for materials in [[neo, stvk], [corotated, neo]] {
+            let mut shares = partition.shares().to_vec();
+            for size in [1e-5, 1e-3, 6e-3] {
+                let u: Vec<DVec3> = (0..nodes).map(|_| random.vector() * size).collect();
+                let v: Vec<DVec3> = (0..nodes).map(|_| random.vector() * 0.1).collect();
+                let x: Vec<DVec3> = u.iter().zip(partition.coarse().positions_m()).map(|(u, rest)| *u + *rest).collect();
+                let mut expected = vec![DVec3::ZERO; nodes];
+                let power = |(share, &m): (&Share, &u16)| share.add_forces_n(&materials[m as usize], &x, &v, &mut expected);
+                let expected_w: f64 = shares.iter().zip(&of_tet).map(power).sum();
+                let largest = expected.iter().map(|f| f.length()).fold(0.0, f64::max);
+                for (precision, bound) in [(Precision::Double, 1e-11), (Precision::Single, 3e-5)] {
+                    let run = |set| {
+                        let of = (partition.shares(), partition.coarse().tets());
+                        let mut kernel = ShareKernel::build(of, nodes, &of_tet, &materials, precision);
+                        kernel = kernel.with_instruction_set(set);
+                        shares.iter().enumerate().for_each(|(tet, share)| kernel.put(tet, share));
+                        let mut forces = vec![DVec3::ZERO; nodes];
+                        let power_w = kernel.add_forces_n(&u, &v, &mut forces);
+                        (forces, power_w)
+                    };
+                    let baseline = run(InstructionSet::Baseline);
+                    let worst = baseline.0.iter().zip(&expected).map(|(a, b)| a.distance(*b)).fold(0.0, f64::max);
+                    assert!(worst < bound * largest, "{precision:?} {size}: {worst:e} of {largest:e}");
+                    assert!((baseline.1 / expected_w - 1.0).abs() < 10.0 * bound, "{} {expected_w}", baseline.1);
+                    for set in InstructionSet::available() {
+                        assert!(run(set) == baseline, "{set:?}");
+                    }
+                }
+                // What is left where most was taken from some parts, and as good as all of others.
+                for (number, share) in shares.iter_mut().enumerate().filter(|(number, _)| number % 3 > 0) {
+                    let left = if number % 3 == 1 { 0.3 } else { 0.02 };
+                    share.volume_m3[number % PARTS] *= left;
+                    share.moments_m2.iter_mut().for_each(|moments| moments[number % PARTS] *= left);
+                }
+            }
+        }
+    }
+}
