@@ -15,7 +15,8 @@ use palpate_physics::{
 use rig::{Rig, body, bricks, even, hold, material, nodes_where, sphere};
 
 fn pressed(active: usize) -> Rig {
-    let axes = |cells: usize| bricks(&even(-0.04, 0.04, 2 * cells), &even(-0.04, 0.04, 2 * cells), &even(-0.04, 0.0, cells));
+    let axes =
+        |cells: usize| bricks(&even(-0.04, 0.04, 2 * cells), &even(-0.04, 0.04, 2 * cells), &even(-0.04, 0.0, cells));
     let (coarse, fine) = (axes(2), axes(16));
     let surface = Surface::of(&fine).unwrap();
     let positions = surface.nodes.iter().map(|&n| fine.positions_m()[n as usize]).collect();
@@ -33,7 +34,9 @@ fn pressed(active: usize) -> Rig {
     let mut rig = Rig::new(spec);
     let partition = rig.model.hybrid().unwrap().partition();
     let mut near: Vec<u32> = (0..partition.particle_count() as u32).collect();
-    near.sort_by(|&a, &b| partition.particle_m(a).length_squared().total_cmp(&partition.particle_m(b).length_squared()));
+    near.sort_by(|&a, &b| {
+        partition.particle_m(a).length_squared().total_cmp(&partition.particle_m(b).length_squared())
+    });
     near.truncate(active);
     rig.state.wake_only(&rig.model, near);
     for tick in 0..200 {

@@ -125,7 +125,8 @@ fn fingerprint(model: &Model) -> u64 {
     let positions =
         model.rest_positions_m().iter().flat_map(glam::DVec3::to_array).flat_map(|c| c.to_bits().to_le_bytes());
     let tets = model.mesh().tets().iter().flatten().flat_map(|n| n.to_le_bytes());
-    let ModelSpec { mesh: _, particles, regions, tet_region, prescribed, loads, gravity_m_per_s2, tools, settings } = model.spec();
+    let ModelSpec { mesh: _, particles, regions, tet_region, prescribed, loads, gravity_m_per_s2, tools, settings } =
+        model.spec();
     let mut hash = Fnv(fnv(OFFSET, positions.chain(tets)));
     // A float prints as the shortest text that reads back to its bits. Writing to the hash cannot fail.
     let rest = (particles, regions, tet_region, prescribed, loads, gravity_m_per_s2, tools, settings);

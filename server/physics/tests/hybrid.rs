@@ -182,7 +182,10 @@ fn looking_only_where_the_tool_may_be_costs_no_bit() {
                 rig.state.wake_only(&rig.model, awake);
             }
             let s = f64::from(tick) * 0.02;
-            rig.tick(&rig::Drive { tools: vec![at(DVec3::new(0.01 * s.sin(), 0.0, 6e-3 - 3e-3 * s.sin()))], ..rig.still() });
+            rig.tick(&rig::Drive {
+                tools: vec![at(DVec3::new(0.01 * s.sin(), 0.0, 6e-3 - 3e-3 * s.sin()))],
+                ..rig.still()
+            });
         }
         assert!(rig.state.tools[0].contact_force_n.length() > 0.01);
         rig.state
@@ -190,22 +193,67 @@ fn looking_only_where_the_tool_may_be_costs_no_bit() {
     assert_eq!(run(true), run(false));
 }
 
+/// A sphere comes from far, presses, slides and leaves. Particles wake before it touches, follow it, and sleep in the end.
 #[test]
-fn zz_numbers() {
-    let spec = held(block(0.45));
-    let rig = Rig::new(spec);
-    let hybrid = rig.model.hybrid().unwrap();
-    let mu = 10e3 / 2.9;
-    let full = (4.0 * (3.0 * 9.0 + 2.0) * mu / (1000.0 * H_M * H_M)).sqrt();
-    println!("untouched: {} substeps, full {full}, omega {}", rig.model.substeps(), rig.model.max_natural_frequency_rad_per_s());
-    let mut counts: Vec<usize> = hybrid.partition().shares().iter().map(|s| s.nodes.len()).collect();
-    counts.sort_unstable();
-    println!("nodes per share {counts:?}");
-    let pairs: Vec<usize> = hybrid.partition().shares().iter().map(|s| s.moments_m2.iter().flatten().filter(|m| m.length() > 1e-15).count()).collect();
-    println!("pairs {pairs:?}");
-    for share in [1] { let _ = share; }
-    let rig = pressed(Precision::Single);
-    println!("touched: {} substeps", rig.model.substeps());
-    let springs = hybrid.frequency_rad_per_s(&vec![0.0; hybrid.partition().particle_count()]);
-    println!("{springs}");
+fn particles_wake_before_the_touch_follow_it_and_sleep_again() {
+    let mut spec = pressed(Precision::Double).model.spec().clone();
+    spec.gravity_m_per_s2 = DVec3::ZERO;
+    spec = held(ModelSpec { mesh: block(0.45).mesh, prescribed: vec![], ..spec });
+    spec.tools[0].start_position_m = DVec3::new(-5e-3, 0.0, 40e-3);
+    let particles = spec.particles.as_mut().unwrap();
+    particles.waking = Waking::ByTools { reach_m: 8e-3 };
+    particles.most_active = 250;
+    let mut rig = Rig::new(spec);
+    let way = |tick: u32| {
+        let t = f64::from(tick) * 1e-3;
+        let x = -5e-3 + 10e-3 * (t - 0.6).clamp(0.0, 0.5) / 0.5;
+        let z = if t < 0.5 { 40e-3 - 36e-3 * t / 0.5 } else { 4e-3 + 40e-3 * (t - 1.2).max(0.0) / 0.4 };
+        DVec3::new(x, 0.0, z.min(60e-3))
+    };
+    let (mut touched_at, mut woke_at, mut most, mut force_n, mut middles) = (None, None, 0, 0.0_f64, vec![]);
+    for tick in 0..3500 {
+        rig.tick_at(way(tick));
+        let active = &rig.state.active;
+        most = most.max(active.len());
+        woke_at = woke_at.or((!active.is_empty()).then_some(tick));
+        touched_at = touched_at.or((rig.state.tools[0].contacts > 0).then_some(tick));
+        if (500..1200).contains(&tick) {
+            force_n = rig.state.tools[0].contact_force_n.z;
+            let partition = rig.model.hybrid().unwrap().partition();
+            let sum: DVec3 = active.ids().iter().map(|&p| partition.particle_m(p)).sum();
+            middles.push(sum.x / active.len() as f64);
+        }
+    }
+    let (touched_at, woke_at) = (touched_at.unwrap(), woke_at.unwrap());
+    assert!(woke_at + 40 < touched_at && touched_at < 500, "{woke_at} {touched_at}");
+    assert!(most > 100 && most <= 250 && force_n > 0.01, "{most} {force_n}");
+    assert!(middles[0] < -2e-3 && middles[middles.len() - 1] > 2e-3, "{middles:?}");
+    assert!(rig.state.active.is_empty(), "{} still awake", rig.state.active.len());
+}
+
+/// A tool passes a turning, trembling body in free flight and touches nothing.
+#[test]
+fn momenta_stay_while_particles_wake_and_sleep_in_free_flight() {
+    let mut spec = block(0.45);
+    spec.particles.as_mut().unwrap().waking = Waking::ByTools { reach_m: 8e-3 };
+    spec.tools = vec![sphere(6e-3, DVec3::new(-60e-3, 0.0, 7.2e-3), Coupling::Rigid)];
+    let mut rig = Rig::new(spec);
+    for (x, v) in rig.state.x.iter().zip(&mut rig.state.v) {
+        *v = DVec3::new(0.0, 0.02, -0.01) + DVec3::new(0.1, 0.3, 0.2).cross(*x) + DVec3::new(x.z, x.x, -x.y) * 3.0;
+    }
+    let (linear, angular) = rig.model.hybrid().unwrap().momentum(&rig.state);
+    let (mut sets, mut before) = (0, vec![]);
+    for tick in 0..800 {
+        let x = -60e-3 + 120e-3 * f64::from(tick) / 600.0;
+        rig.tick_at(DVec3::new(x.min(60e-3), 2e-5 * f64::from(tick), 14e-3));
+        assert_eq!(rig.state.tools[0].contacts, 0);
+        if rig.state.active.ids() != before {
+            sets += 1;
+            before = rig.state.active.ids().to_vec();
+        }
+    }
+    assert!(sets > 8, "{sets} sets");
+    let (p, l) = rig.model.hybrid().unwrap().momentum(&rig.state);
+    assert!((p - linear).length() < 1e-12 * linear.length(), "{p} {linear}");
+    assert!((l - angular).length() < 1e-12 * angular.length(), "{l} {angular}");
 }

@@ -29,10 +29,7 @@ pub use triangle::closest_weights;
 /// The longest edge of a surface triangle, over the radius of a tool, that can still be sampled as finely as contact needs.
 pub const LARGEST_TRIANGLE: f64 = foundation::MAX_LEVEL as f64 * foundation::SPACING;
 
-use crate::{
-    hybrid::SkinView,
-    mesh::Surface,
-};
+use crate::{hybrid::SkinView, mesh::Surface};
 use broad::Triangles;
 use foundation::{BodyAtRest, Foundation, SampleTables};
 use glam::DVec3;

@@ -1,5 +1,10 @@
 //! Which particles are active, as the state keeps it; and what the loop works in.
-use super::{body::Hybrid, listed::ListedSkin, running::RunningPatch};
+use super::{
+    body::Hybrid,
+    listed::ListedSkin,
+    running::RunningPatch,
+    switching::{Ball, Looking},
+};
 use crate::world::{Model, State};
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
@@ -8,11 +13,13 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct ActiveParticles {
     ids: Vec<u32>,
+    /// Of every tool.
+    pub(super) balls: Vec<Option<Ball>>,
 }
 
 impl ActiveParticles {
     pub(crate) fn none(model: &Model) -> Self {
-        Self { ids: Vec::with_capacity(room(model)) }
+        Self { ids: Vec::with_capacity(room(model)), balls: vec![None; tools(model)] }
     }
 
     /// Their numbers.
@@ -32,22 +39,34 @@ impl ActiveParticles {
 
     pub(crate) fn clear(&mut self) {
         self.ids.clear();
+        self.balls.fill(None);
     }
 
     pub(crate) fn copy_from(&mut self, other: &Self) {
         self.ids.clone_from(&other.ids);
+        self.balls.clone_from(&other.balls);
     }
 
     /// Whether they are ascending, may be awake, and have room.
     pub(crate) fn fit(&self, model: &Model) -> bool {
         let may_wake = |id: &u32| model.hybrid().is_some_and(|body| body.may_wake(*id));
-        self.ids.len() <= room(model) && self.ids.is_sorted_by(|a, b| a < b) && self.ids.iter().all(may_wake)
+        let finite = |ball: &Ball| ball.rest_m.is_finite();
+        self.balls.len() == tools(model)
+            && self.balls.iter().flatten().all(finite)
+            && self.ids.len() <= room(model)
+            && self.ids.is_sorted_by(|a, b| a < b)
+            && self.ids.iter().all(may_wake)
     }
 }
 
 /// Most active particles of a model.
 fn room(model: &Model) -> usize {
     model.spec().particles.as_ref().map_or(0, |particles| particles.most_active)
+}
+
+/// Tools that may keep particles awake.
+fn tools(model: &Model) -> usize {
+    if model.hybrid().is_some() { model.spec().tools.len() } else { 0 }
 }
 
 /// Buffers for hybrid bodies.
@@ -57,9 +76,7 @@ pub(crate) struct HybridScratch {
     pub(crate) skin: ListedSkin,
     pub(crate) accelerations: Vec<DVec3>,
     pub(crate) momenta: Vec<DVec3>,
-    /// Active particles to be.
-    wanted: Vec<u32>,
-    moved: Vec<DVec3>,
+    pub(super) looking: Looking,
 }
 
 impl HybridScratch {
@@ -73,13 +90,12 @@ impl HybridScratch {
             skin: ListedSkin::new(body),
             accelerations: Vec::with_capacity(entries),
             momenta: Vec::with_capacity(entries),
-            wanted: Vec::with_capacity(most),
-            moved: Vec::with_capacity(most),
+            looking: Looking::new(model, body),
         })
     }
 
     /// Makes the patch that of the state's active particles. Allocates nothing.
-    pub(crate) fn follow(&mut self, body: &Hybrid, active: &ActiveParticles) {
+    pub(super) fn follow(&mut self, body: &Hybrid, active: &ActiveParticles) {
         if self.patch.active() != active.ids() {
             self.patch.wake(body, active.ids());
         }
@@ -99,7 +115,7 @@ impl State {
     }
 
     /// `wanted` is ascending; `moved` a buffer. Allocates nothing where there is room.
-    fn switch(&mut self, body: &Hybrid, wanted: &[u32], moved: &mut Vec<DVec3>) {
+    pub(super) fn switch(&mut self, body: &Hybrid, wanted: &[u32], moved: &mut Vec<DVec3>) {
         if self.active.ids == wanted {
             return;
         }

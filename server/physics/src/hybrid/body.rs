@@ -259,7 +259,9 @@ fn covering(
 
 fn may_wake(partition: &Partition, free: &[BVec3], particle: u32) -> bool {
     let anchor = partition.anchor(particle);
-    anchor.nodes.iter().zip(anchor.weights).all(|(&node, weight)| {
-        weight > -NO_WEIGHT && (weight < NO_WEIGHT || free[node as usize] == BVec3::TRUE)
-    })
+    anchor
+        .nodes
+        .iter()
+        .zip(anchor.weights)
+        .all(|(&node, weight)| weight > -NO_WEIGHT && (weight < NO_WEIGHT || free[node as usize] == BVec3::TRUE))
 }

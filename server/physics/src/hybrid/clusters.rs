@@ -8,6 +8,7 @@
 use super::body::Hybrid;
 use crate::contact::broad::{CLUSTER, GROUP, box_distance_m};
 use glam::DVec3;
+use std::ops::Range;
 
 /// Boxes at rest of clusters, and of groups of them, with the coarse nodes that they follow.
 #[derive(Debug, Clone, Default)]
@@ -23,19 +24,39 @@ struct Boxes {
     /// First entry of each in `nodes`, and the end of the last.
     first: Vec<u32>,
     nodes: Vec<u32>,
+    /// The same of vertices; of clusters only.
+    first_vertex: Vec<u32>,
+    vertices: Vec<u32>,
 }
 
 impl SkinClusters {
     /// Of triangles in the order of the broad phase.
     pub(crate) fn new(hybrid: &Hybrid, rest_positions_m: &[DVec3], triangles: &[[u32; 3]]) -> Self {
         let boxes = |size: usize| {
-            let mut boxes = Boxes { first: vec![0], ..Boxes::default() };
+            let mut boxes = Boxes { first: vec![0], first_vertex: vec![0], ..Boxes::default() };
             for triangles in triangles.chunks(size) {
                 boxes.push(hybrid, rest_positions_m, triangles);
             }
             boxes
         };
         Self { clusters: boxes(CLUSTER), groups: boxes(GROUP) }
+    }
+
+    /// Number of groups.
+    pub(super) fn groups(&self) -> usize {
+        self.groups.low_m.len()
+    }
+
+    /// The clusters of a group.
+    pub(super) fn of_group(&self, group: usize) -> Range<usize> {
+        let in_group = GROUP / CLUSTER;
+        group * in_group..((group + 1) * in_group).min(self.clusters.low_m.len())
+    }
+
+    /// The vertices of a cluster.
+    pub(super) fn vertices(&self, cluster: usize) -> &[u32] {
+        let first = &self.clusters.first_vertex;
+        &self.clusters.vertices[first[cluster] as usize..first[cluster + 1] as usize]
     }
 
     /// Lower bound (m) of the distance of a cluster from a point, at `displacements_m` of the coarse nodes; see the module's documentation for the others.
@@ -63,11 +84,14 @@ pub(super) struct Displaced<'a> {
 impl Boxes {
     fn push(&mut self, hybrid: &Hybrid, rest_positions_m: &[DVec3], triangles: &[[u32; 3]]) {
         let (mut low, mut high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
-        let start = self.nodes.len();
+        let (start, first_vertex) = (self.nodes.len(), self.vertices.len());
         for &vertex in triangles.iter().flatten() {
             let rest_m = rest_positions_m[vertex as usize];
             (low, high) = (low.min(rest_m), high.max(rest_m));
             let partition = hybrid.partition();
+            if triangles.len() <= CLUSTER && !self.vertices[first_vertex..].contains(&vertex) {
+                self.vertices.push(vertex);
+            }
             for particle in partition.corners(hybrid.place(vertex).cell as usize) {
                 for node in partition.anchor(particle).nodes {
                     if !self.nodes[start..].contains(&node) {
@@ -79,6 +103,7 @@ impl Boxes {
         self.low_m.push(low);
         self.high_m.push(high);
         self.first.push(self.nodes.len() as u32);
+        self.first_vertex.push(self.vertices.len() as u32);
     }
 
     fn distance_m(&self, number: usize, from_m: DVec3, bounds: &Displaced<'_>) -> f64 {

@@ -27,7 +27,9 @@ impl Hybrid {
         // Active particles follow free nodes within the coarse tets only: the matrix is positive.
         let metric = Metric::new(&self.partition, &self.masses, &active, &self.free);
         let (kinetic_j, gravitational_j) = metric.map_or((f64::NAN, f64::NAN), |metric| {
-            let moved = |list: &[DVec3], rest: &[DVec3]| -> Vec<DVec3> { list.iter().zip(rest).map(|(x, rest)| *x - *rest).collect() };
+            let moved = |list: &[DVec3], rest: &[DVec3]| -> Vec<DVec3> {
+                list.iter().zip(rest).map(|(x, rest)| *x - *rest).collect()
+            };
             let of_nodes: DVec3 = metric.momenta(&moved(&at.nodes, &rest.nodes)).iter().sum();
             let particles = moved(&at.particles, &rest.particles);
             let of_particles: DVec3 = particles.iter().zip(metric.particle_kg()).map(|(u, m)| *u * *m).sum();

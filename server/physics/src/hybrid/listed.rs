@@ -1,5 +1,7 @@
 //! The skin's vertices that something acts on, and where any other is when asked.
-use super::{body::Hybrid, clusters::Displaced, composite::Anchor, partition::NONE, running::RunningPatch, sites::trilinear};
+use super::{
+    body::Hybrid, clusters::Displaced, composite::Anchor, partition::NONE, running::RunningPatch, sites::trilinear,
+};
 use crate::world::State;
 use glam::DVec3;
 
@@ -144,6 +146,30 @@ impl<'a> SkinView<'a> {
     /// The same of a cluster.
     pub(crate) fn cluster_distance_m(&self, cluster: usize, from_m: DVec3) -> f64 {
         self.hybrid.clusters.cluster_distance_m(cluster, from_m, &self.displaced())
+    }
+
+    /// The vertex nearest to a point, if one is within a distance (m): its rest position (m), and how far it is (m).
+    pub(super) fn nearest(&self, from_m: DVec3, within_m: f64) -> Option<(DVec3, f64)> {
+        let displaced = Displaced { deviation_m: self.patch.deviation_m(), ..self.displaced() };
+        let clusters = &self.hybrid.clusters;
+        let (mut nearest, mut nearest_m) = (None, within_m);
+        for group in 0..clusters.groups() {
+            if clusters.group_distance_m(group, from_m, &displaced) >= nearest_m {
+                continue;
+            }
+            for cluster in clusters.of_group(group) {
+                if clusters.cluster_distance_m(cluster, from_m, &displaced) >= nearest_m {
+                    continue;
+                }
+                for &vertex in clusters.vertices(cluster) {
+                    let distance_m = self.position_m(vertex).distance(from_m);
+                    if distance_m < nearest_m {
+                        (nearest, nearest_m) = (Some(self.rest_positions_m[vertex as usize]), distance_m);
+                    }
+                }
+            }
+        }
+        nearest.map(|rest_m| (rest_m, nearest_m))
     }
 
     /// Where a vertex is (m).

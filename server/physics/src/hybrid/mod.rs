@@ -15,12 +15,13 @@ pub mod moments;
 pub mod partition;
 pub mod patch;
 pub mod place;
-pub mod share;
 mod running;
 mod running_metric;
+pub mod share;
 pub mod sites;
 pub mod skin;
 pub mod spec;
+mod switching;
 #[cfg(test)]
 pub(crate) mod testing;
 

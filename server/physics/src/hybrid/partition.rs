@@ -123,6 +123,24 @@ impl Partition {
         self.sites.site_m(self.particles[particle as usize] as usize)
     }
 
+    /// Tells the particles within a distance of a point (both m, at rest), with their squared distances.
+    pub fn particles_within(&self, point_m: DVec3, reach_m: f64, mut tell: impl FnMut(u32, f64)) {
+        let [nx, ny, nz] = self.sites.cells();
+        let from = self.sites.cell_near(point_m - reach_m);
+        let to = self.sites.cell_near(point_m + reach_m);
+        for k in from[2]..=(to[2] + 1).min(nz) {
+            for j in from[1]..=(to[1] + 1).min(ny) {
+                for i in from[0]..=(to[0] + 1).min(nx) {
+                    let site = self.sites.site([i, j, k]);
+                    let distance_sq = self.sites.site_m(site).distance_squared(point_m);
+                    if self.particle_at[site] != NONE && distance_sq <= reach_m * reach_m {
+                        tell(self.particle_at[site], distance_sq);
+                    }
+                }
+            }
+        }
+    }
+
     /// What a particle follows while it sleeps.
     pub fn anchor(&self, particle: u32) -> Anchor {
         self.coarse.anchor_in(self.tet_of_particle[particle as usize], self.particle_m(particle))

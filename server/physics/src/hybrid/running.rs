@@ -24,6 +24,8 @@ pub(crate) struct RunningPatch {
     points: Vec<Point>,
     /// Displacements (m) of the points.
     displacements_m: Vec<DVec3>,
+    /// A buffer for the kernels' values of points.
+    of_points: Vec<DVec3>,
     /// Awake cells, ascending.
     cells: Vec<u32>,
     kernel: RowKernel,
@@ -66,6 +68,7 @@ impl RunningPatch {
             active: Vec::with_capacity(most_active),
             points: Vec::with_capacity(most_points),
             displacements_m: Vec::with_capacity(most_points),
+            of_points: Vec::with_capacity(most_points),
             cells: Vec::with_capacity(most_cells),
             rows: Vec::with_capacity(most_cells),
             values: kernel.values(most_points),
@@ -119,11 +122,15 @@ impl RunningPatch {
         &self.node_displacements_m
     }
 
-    /// How far (m) any active particle is from where it would be asleep.
-    pub(super) fn deviation_m(&self) -> f64 {
+    /// How far (m) each active particle is from where it would be asleep.
+    pub(super) fn deviations_m(&self) -> impl Iterator<Item = (u32, f64)> + '_ {
         let active = self.points.iter().zip(&self.displacements_m).filter(|(point, _)| point.active != NONE);
-        let deviation = active.map(|(point, u)| u.distance_squared(point.anchor.of(&self.node_displacements_m)));
-        deviation.fold(0.0, f64::max).sqrt()
+        active.map(|(point, u)| (point.particle, u.distance(point.anchor.of(&self.node_displacements_m))))
+    }
+
+    /// The largest of [`Self::deviations_m`].
+    pub(super) fn deviation_m(&self) -> f64 {
+        self.deviations_m().map(|(_, deviation_m)| deviation_m).fold(0.0, f64::max)
     }
 
     /// Hands a force (N) on a point to the particle or the coarse nodes that move it.
@@ -274,27 +281,33 @@ impl RunningPatch {
         }
         // Less that of one of them: far from rest, their differences would be rounded too coarsely.
         let first_m = self.displacements_m[0];
-        for (number, displacement) in self.displacements_m.iter().enumerate() {
-            let displacement_m = *displacement - first_m;
-            self.values.set_displacement(number, displacement_m);
-            self.cut.set_displacement(number, displacement_m);
+        self.of_points.clear();
+        self.of_points.extend(self.displacements_m.iter().map(|displacement| *displacement - first_m));
+        self.values.set_displacements(&self.of_points);
+        let has_cut = !self.cut.is_empty();
+        if has_cut {
+            self.cut.set_displacements(&self.of_points);
         }
         if self.is_viscous {
-            for (number, point) in self.points.iter().enumerate() {
-                let velocity = if point.active == NONE { point.anchor.of(v_nodes) } else { v_particles[point.active as usize] };
-                self.values.set_velocity(number, velocity);
-                self.cut.set_velocity(number, velocity);
+            for (velocity, point) in self.of_points.iter_mut().zip(&self.points) {
+                let particle = v_particles.get(point.active as usize);
+                *velocity = particle.copied().unwrap_or_else(|| point.anchor.of(v_nodes));
             }
+            self.values.set_velocities(&self.of_points);
+            self.cut.set_velocities(&self.of_points);
         }
         power_w += self.kernel.forces(&self.rows, self.points.len(), &mut self.values);
-        power_w += self.cut.forces(self.points.len());
+        self.values.forces_n(&mut self.of_points);
+        if has_cut {
+            power_w += self.cut.forces(self.points.len());
+            self.cut.add_forces_n(&mut self.of_points);
+        }
         let (f_nodes, f_particles) = forces_n.split_at_mut(nodes);
-        for (number, point) in self.points.iter().enumerate() {
-            let force_n = self.values.force_n(number) + self.cut.force_n(number);
+        for (point, force_n) in self.points.iter().zip(&self.of_points) {
             if point.active == NONE {
-                point.anchor.push(force_n, f_nodes);
+                point.anchor.push(*force_n, f_nodes);
             } else {
-                f_particles[point.active as usize] += force_n;
+                f_particles[point.active as usize] = *force_n;
             }
         }
         power_w
@@ -344,7 +357,9 @@ mod tests {
     fn running_patch_and_oracle_agree() {
         let [stvk, neo, corotated] = tissue();
         let mut random = Random(51);
-        for materials in [[neo, stvk], [corotated, neo].map(|m: Material| Material { viscosity: Default::default(), ..m })] {
+        for materials in
+            [[neo, stvk], [corotated, neo].map(|m: Material| Material { viscosity: Default::default(), ..m })]
+        {
             let hybrid = hybrid_ball(&materials);
             for (precision, bound) in [(Precision::Double, 1e-11), (Precision::Single, 3e-5)] {
                 let mut running = RunningPatch::new(&hybrid, 2000, precision);

@@ -166,11 +166,6 @@ impl RunningMetric {
         }
     }
 
-    /// `(1 − ε) m_p` (kg) of the active particles.
-    pub(crate) fn particle_kg(&self) -> &[f64] {
-        &self.particle_kg
-    }
-
     /// Multiplies velocities on free axes by a factor; returns what they had before, `v·M' v` (J). `momenta` is a buffer.
     pub(crate) fn damped(&self, hybrid: &Hybrid, v: &mut [DVec3], factor: f64, momenta: &mut Vec<DVec3>) -> f64 {
         momenta.clear();

@@ -49,7 +49,9 @@ pub enum HybridError {
         rule: &'static str,
     },
     /// The lattice is too fine for the body.
-    #[error("a lattice of {spacing_m} m over this body has {cells:.1e} cells, more than {MOST_CELLS:.0e}; take a larger spacing")]
+    #[error(
+        "a lattice of {spacing_m} m over this body has {cells:.1e} cells, more than {MOST_CELLS:.0e}; take a larger spacing"
+    )]
     TooMany {
         /// Spacing (m).
         spacing_m: f64,

@@ -31,7 +31,7 @@ pub fn step(model: &Model, state: &mut State, scratch: &mut Scratch, input: &Tic
         return report;
     }
     if let (Some(body), Some(own)) = (model.hybrid(), &mut scratch.hybrid) {
-        own.follow(body, &state.active);
+        own.prepare(model, body, state);
     }
     let was_quiet = model.rest_bound().is_some() && state.sleep.is_quiet(&state.load_factors, input);
     let judged = is_judged(model);

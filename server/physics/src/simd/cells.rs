@@ -128,15 +128,25 @@ impl CutCells {
         }
     }
 
-    /// Displacement (m) of a point.
-    pub fn set_displacement(&mut self, point: usize, displacement_m: DVec3) {
-        self.displacements[point] = node(displacement_m);
+    /// Whether there are none.
+    pub fn is_empty(&self) -> bool {
+        match &self.layout {
+            Layout::Single(blocks) => blocks.blocks.is_empty(),
+            Layout::Double(blocks) => blocks.blocks.is_empty(),
+        }
     }
 
-    /// Velocity (m/s) of a point; of use only where a material is viscous.
-    pub fn set_velocity(&mut self, point: usize, v: DVec3) {
-        if let Some(rate) = self.velocities.get_mut(point) {
-            *rate = node(v);
+    /// Displacements (m) of the points.
+    pub fn set_displacements(&mut self, displacements_m: &[DVec3]) {
+        for (to, from) in self.displacements.iter_mut().zip(displacements_m) {
+            *to = node(*from);
+        }
+    }
+
+    /// Velocities (m/s) of the points; of use only where a material is viscous.
+    pub fn set_velocities(&mut self, v: &[DVec3]) {
+        for (to, from) in self.velocities.iter_mut().zip(v) {
+            *to = node(*from);
         }
     }
 
@@ -150,10 +160,11 @@ impl CutCells {
         }
     }
 
-    /// Force (N) on a point.
-    pub fn force_n(&self, point: usize) -> DVec3 {
-        let Sum([x, y, z, _]) = self.sums[point];
-        DVec3::new(x, y, z)
+    /// Adds the forces (N) on the points.
+    pub fn add_forces_n(&self, forces_n: &mut [DVec3]) {
+        for (force, Sum([x, y, z, _])) in forces_n.iter_mut().zip(&self.sums) {
+            *force += DVec3::new(*x, *y, *z);
+        }
     }
 }
 
@@ -462,12 +473,12 @@ mod tests {
             for (number, (points, rest)) in cells.iter().enumerate() {
                 kernel.put(number, *points, rest);
             }
-            for point in 0..u.len() {
-                kernel.set_displacement(point, u[point]);
-                kernel.set_velocity(point, v[point]);
-            }
+            kernel.set_displacements(u);
+            kernel.set_velocities(v);
             let power_w = kernel.forces(u.len());
-            Answer { forces_n: (0..u.len()).map(|point| kernel.force_n(point)).collect(), power_w }
+            let mut forces_n = vec![DVec3::ZERO; u.len()];
+            kernel.add_forces_n(&mut forces_n);
+            Answer { forces_n, power_w }
         });
     }
 }

@@ -35,9 +35,9 @@ pub use dispatch::InstructionSet;
 use glam::DVec3;
 pub use oracle::Oracle;
 use real::Scalar;
-pub(crate) use step_forces::StepForces;
 pub use rows::{CellRow, RowKernel, RowValues};
 pub use shares::ShareKernel;
+pub(crate) use step_forces::StepForces;
 
 /// Lanes of a block: a block is one or more whole vectors on every instruction set.
 const LANES_F32: usize = 16;

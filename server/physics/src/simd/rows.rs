@@ -155,44 +155,46 @@ fn of_materials<T: Scalar>(materials: &[Material], cell: impl Fn(&Material) -> [
 }
 
 impl RowValues {
-    /// Displacement (m) of a point.
-    pub fn set_displacement(&mut self, point: usize, displacement_m: DVec3) {
+    /// Displacements (m) of the points.
+    pub fn set_displacements(&mut self, displacements_m: &[DVec3]) {
         match &mut self.values {
-            Values::Single(arrays) => put(&mut arrays.displacements, point, displacement_m),
-            Values::Double(arrays) => put(&mut arrays.displacements, point, displacement_m),
+            Values::Single(arrays) => put(&mut arrays.displacements, displacements_m),
+            Values::Double(arrays) => put(&mut arrays.displacements, displacements_m),
         }
     }
 
-    /// Velocity (m/s) of a point; of use only where a material is viscous.
-    pub fn set_velocity(&mut self, point: usize, v: DVec3) {
+    /// Velocities (m/s) of the points; of use only where a material is viscous.
+    pub fn set_velocities(&mut self, v: &[DVec3]) {
         match &mut self.values {
-            Values::Single(arrays) if !arrays.velocities[0].is_empty() => put(&mut arrays.velocities, point, v),
-            Values::Double(arrays) if !arrays.velocities[0].is_empty() => put(&mut arrays.velocities, point, v),
+            Values::Single(arrays) if !arrays.velocities[0].is_empty() => put(&mut arrays.velocities, v),
+            Values::Double(arrays) if !arrays.velocities[0].is_empty() => put(&mut arrays.velocities, v),
             _ => {}
         }
     }
 
-    /// Force (N) on a point.
-    pub fn force_n(&self, point: usize) -> DVec3 {
+    /// Overwrites `forces_n` (N) with those on the points.
+    pub fn forces_n(&self, forces_n: &mut [DVec3]) {
         match &self.values {
-            Values::Single(arrays) => total(arrays, point),
-            Values::Double(arrays) => total(arrays, point),
+            Values::Single(arrays) => totals(arrays, forces_n),
+            Values::Double(arrays) => totals(arrays, forces_n),
         }
     }
 }
 
-fn put<T: Scalar>(arrays: &mut [Vec<T>; 3], point: usize, a: DVec3) {
-    for axis in 0..3 {
-        arrays[axis][1 + point] = T::of(a[axis]);
+fn put<T: Scalar>([x, y, z]: &mut [Vec<T>; 3], list: &[DVec3]) {
+    for (((x, y), z), a) in x[1..].iter_mut().zip(&mut y[1..]).zip(&mut z[1..]).zip(list) {
+        (*x, *y, *z) = (T::of(a.x), T::of(a.y), T::of(a.z));
     }
 }
 
-fn total<T: Scalar>(arrays: &Arrays<T>, point: usize) -> DVec3 {
-    let sum = |axis: usize| -> f64 {
-        let (left, right): (f64, f64) = (arrays.left[axis][1 + point].into(), arrays.right[axis][point].into());
-        left + right
-    };
-    DVec3::new(sum(0), sum(1), sum(2))
+fn totals<T: Scalar>(arrays: &Arrays<T>, forces_n: &mut [DVec3]) {
+    for axis in 0..3 {
+        let sums = arrays.left[axis][1..].iter().zip(&arrays.right[axis]);
+        for (force, (left, right)) in forces_n.iter_mut().zip(sums) {
+            let (left, right): (f64, f64) = ((*left).into(), (*right).into());
+            force[axis] = left + right;
+        }
+    }
 }
 
 /// The pass over the rows of one material.
@@ -208,7 +210,9 @@ impl<T: Scalar> Pass<T> for RowForces<'_, T> {
         let mut power_w = 0.0;
         for row in self.rows {
             for first in (0..row.cells as usize).step_by(V::WIDTH) {
-                let at = row.points.map(|point| 1 + point as usize + first);
+                let [a, b, c, d] = row.points;
+                let at =
+                    [1 + a as usize + first, 1 + b as usize + first, 1 + c as usize + first, 1 + d as usize + first];
                 self.lanes::<V, L, VISCOUS>(at, row.cells as usize - first, &mut power_w);
             }
         }
@@ -246,7 +250,10 @@ impl<T: Scalar> RowForces<'_, T> {
         }
         let (p, density) = stress::<V, T, L, VISCOUS>(&self.material.constants, &h, &h_dot);
         let of_stress = weight * V::of(minus_volume * quarter);
-        let of_modes = MODE_WEIGHTS.map(|w| weight * V::of(minus_kappa * w / 64.0));
+        let mut of_modes = [weight; 4];
+        for mode in 0..4 {
+            of_modes[mode] = weight * V::of(minus_kappa * MODE_WEIGHTS[mode] / 64.0);
+        }
         for axis in 0..3 {
             let mut c = [V::of(0.0); 7];
             for column in 0..3 {
@@ -258,9 +265,10 @@ impl<T: Scalar> RowForces<'_, T> {
             let [f1, f2, f3, f4, f5, f6, f7] = particles(&c);
             let f0 = V::of(0.0) - ((f1 + f2) + (f3 + f4) + ((f5 + f6) + f7));
             let (left, right) = (&mut self.arrays.left[axis], &mut self.arrays.right[axis]);
-            for (at, (on_left, on_right)) in at.into_iter().zip([(f0, f1), (f2, f3), (f4, f5), (f6, f7)]) {
-                add(&mut left[at..at + V::WIDTH], on_left);
-                add(&mut right[at..at + V::WIDTH], on_right);
+            let (on_left, on_right) = ([f0, f2, f4, f6], [f1, f3, f5, f7]);
+            for row in 0..4 {
+                add(&mut left[at[row]..at[row] + V::WIDTH], on_left[row]);
+                add(&mut right[at[row]..at[row] + V::WIDTH], on_right[row]);
             }
         }
         if VISCOUS {
@@ -282,19 +290,26 @@ fn add<V: Vector>(sums: &mut [V::Scalar], a: V) {
 /// 1 in the first lanes, 0 in the others.
 #[inline(always)]
 fn first_lanes<V: Vector>(count: usize) -> V {
-    let (one, zero) = (V::Scalar::of(1.0), V::Scalar::of(0.0));
-    let lanes: [V::Scalar; LANES] = std::array::from_fn(|lane| if lane < count { one } else { zero });
+    let mut lanes = [V::Scalar::of(0.0); LANES];
+    for lane in 0..LANES {
+        if lane < count {
+            lanes[lane] = V::Scalar::of(1.0);
+        }
+    }
     V::load(&lanes)
 }
 
 /// `a_p − a_0` of points 1 to 7.
 #[inline(always)]
 fn differences<V: Vector>(values: &[V::Scalar], at: [usize; 4]) -> [V; 7] {
-    let rows = at.map(|at| &values[at..at + V::WIDTH + 1]);
-    let zero = V::load(rows[0]);
+    let zero = V::load(&values[at[0]..]);
     let mut found = [V::of(0.0); 7];
-    for p in 1..8 {
-        found[p - 1] = V::load(&rows[p >> 1][p & 1..]) - zero;
+    for row in 0..4 {
+        let values = &values[at[row]..at[row] + V::WIDTH + 1];
+        if row > 0 {
+            found[2 * row - 1] = V::load(values) - zero;
+        }
+        found[2 * row] = V::load(&values[1..]) - zero;
     }
     found
 }
@@ -325,12 +340,12 @@ mod tests {
             let kernel = RowKernel::new(*spacing_m, *handed, &[*material], *precision);
             let kernel = kernel.with_instruction_set(*set);
             let mut values = kernel.values(u.len());
-            for point in 0..u.len() {
-                values.set_displacement(point, u[point]);
-                values.set_velocity(point, v[point]);
-            }
+            values.set_displacements(u);
+            values.set_velocities(v);
             let power_w = kernel.forces(&rows, u.len(), &mut values);
-            Answer { forces_n: (0..u.len()).map(|point| values.force_n(point)).collect(), power_w }
+            let mut forces_n = vec![DVec3::NAN; u.len()];
+            values.forces_n(&mut forces_n);
+            Answer { forces_n, power_w }
         });
     }
 }

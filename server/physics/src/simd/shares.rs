@@ -145,13 +145,7 @@ impl ShareKernel {
 }
 
 impl<T: Scalar, const N: usize> Blocks<T, N> {
-    fn build(
-        shares: &[Share],
-        tets: &[[u32; NODES]],
-        nodes: usize,
-        of_tet: &[u16],
-        materials: &[Material],
-    ) -> Self {
+    fn build(shares: &[Share], tets: &[[u32; NODES]], nodes: usize, of_tet: &[u16], materials: &[Material]) -> Self {
         let is_viscous = materials.iter().any(|m| !m.viscosity.is_zero());
         // Tets that reach for as many nodes share a block; one that holds nothing of the body needs no lane.
         let mut order: Vec<usize> = (0..shares.len()).filter(|&tet| !shares[tet].nodes.is_empty()).collect();
@@ -337,7 +331,7 @@ impl<T: Scalar, const N: usize> ShareForces<'_, T, N> {
             let (p, density) = stress::<V, T, L, VISCOUS>(&self.run.of_shape, &strains[part], &h_dot);
             let p = plus(&p, &pressure);
             for entry in block.parts[part].clone() {
-                let t = block.moments[entry].each_ref().map(|axis| V::load(&axis[first..]));
+                let t = moment::<V, N>(&block.moments[entry], first);
                 let place = block.places[entry] as usize - 1;
                 let forces = &mut self.forces[place / 3];
                 for row in 0..3 {
@@ -364,7 +358,7 @@ fn gradient<V: Vector, const N: usize>(
 ) -> M3<V> {
     let mut sum = [[V::of(0.0); 3]; 3];
     for entry in block.parts[part].clone() {
-        let t = block.moments[entry].each_ref().map(|axis| V::load(&axis[first..]));
+        let t = moment::<V, N>(&block.moments[entry], first);
         let place = block.places[entry] as usize - 1;
         for row in 0..3 {
             let a = V::load(&edges[place / 3][3 * (place % 3) + row][first..]);
@@ -374,7 +368,18 @@ fn gradient<V: Vector, const N: usize>(
         }
     }
     let inverse = V::load(&block.inverse_volume[part][first..]);
-    sum.map(|row| row.map(|entry| entry * inverse))
+    for row in &mut sum {
+        for entry in row {
+            *entry = *entry * inverse;
+        }
+    }
+    sum
+}
+
+/// Written out: a closure would not be inlined into a function compiled for its vectors' instruction set.
+#[inline(always)]
+fn moment<V: Vector, const N: usize>(moment: &[[V::Scalar; N]; 3], first: usize) -> [V; 3] {
+    [V::load(&moment[0][first..]), V::load(&moment[1][first..]), V::load(&moment[2][first..])]
 }
 
 /// `a_i − a_0` of all lanes.
@@ -439,9 +444,11 @@ mod tests {
             for size in [1e-5, 1e-3, 6e-3] {
                 let u: Vec<DVec3> = (0..nodes).map(|_| random.vector() * size).collect();
                 let v: Vec<DVec3> = (0..nodes).map(|_| random.vector() * 0.1).collect();
-                let x: Vec<DVec3> = u.iter().zip(partition.coarse().positions_m()).map(|(u, rest)| *u + *rest).collect();
+                let x: Vec<DVec3> =
+                    u.iter().zip(partition.coarse().positions_m()).map(|(u, rest)| *u + *rest).collect();
                 let mut expected = vec![DVec3::ZERO; nodes];
-                let power = |(share, &m): (&Share, &u16)| share.add_forces_n(&materials[m as usize], &x, &v, &mut expected);
+                let power =
+                    |(share, &m): (&Share, &u16)| share.add_forces_n(&materials[m as usize], &x, &v, &mut expected);
                 let expected_w: f64 = shares.iter().zip(&of_tet).map(power).sum();
                 let largest = expected.iter().map(|f| f.length()).fold(0.0, f64::max);
                 for (precision, bound) in [(Precision::Double, 1e-11), (Precision::Single, 3e-5)] {

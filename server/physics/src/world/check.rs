@@ -142,7 +142,10 @@ pub(super) fn particles(spec: &ModelSpec) -> Result<(), ModelError> {
         return refused("this integrator", "take leapfrog");
     }
     if settings.sleep_tolerance_m > 0.0 {
-        return refused("a body that sleeps as a whole", "leave sleep_tolerance at 0: its particles sleep where nothing touches them");
+        return refused(
+            "a body that sleeps as a whole",
+            "leave sleep_tolerance at 0: its particles sleep where nothing touches them",
+        );
     }
     Ok(())
 }

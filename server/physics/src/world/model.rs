@@ -220,7 +220,8 @@ impl Model {
         let materials: Vec<Material> = spec.regions.iter().map(|region| region.material).collect();
         let densities: Vec<f64> = spec.regions.iter().map(|region| region.density_kg_per_m3).collect();
         let of = (&spec.mesh, boundary);
-        let built = Hybrid::build(particles, of, &spec.prescribed, (&materials, &densities), &spec.tet_region, progress)?;
+        let built =
+            Hybrid::build(particles, of, &spec.prescribed, (&materials, &densities), &spec.tet_region, progress)?;
         let Built { mut hybrid, mesh, prescribed } = built;
         let spec = ModelSpec { mesh, prescribed, ..spec };
         let mass_kg = hybrid.masses().node_kg.clone();
@@ -233,8 +234,7 @@ impl Model {
         let moduli: Vec<DVec2> = (0..skin.positions_m().len() as u32).map(|v| moduli(hybrid.material_at(v))).collect();
         let vertex_masses_kg = hybrid.vertex_masses_kg(skin);
         let moduli = mean_of_triangles(&moduli, &surface);
-        let contact =
-            ContactModel::build(skin.positions_m(), &surface, &moduli, &vertex_masses_kg, omega, &spec.tools);
+        let contact = ContactModel::build(skin.positions_m(), &surface, &moduli, &vertex_masses_kg, omega, &spec.tools);
         hybrid.cluster(skin, contact.triangles());
         let stretch_sq = substeps::stiffening(&spec.settings, &materials);
         let touched = if contact.nodal_stiffness_n_per_m.is_empty() {

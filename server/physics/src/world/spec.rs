@@ -1,5 +1,5 @@
 //! What a model is built from.
-use crate::{hybrid::ParticleSpec, contact::ToolSpec, material::Material, mesh::TetMesh};
+use crate::{contact::ToolSpec, hybrid::ParticleSpec, material::Material, mesh::TetMesh};
 use glam::DVec3;
 
 /// A material and density shared by some tets.

@@ -1,9 +1,9 @@
 //! What a tick changes.
 use super::Model;
 use crate::{
-    hybrid::ActiveParticles,
     contact::{ContactState, ToolState, ToolTarget},
     health::{Ledger, Quarantine, ViscousPower},
+    hybrid::ActiveParticles,
     integrate::{Pace, Sleep},
 };
 use glam::DVec3;

@@ -1,0 +1,223 @@
+//! Which particles are awake: those near where a tool touches the skin or is about to, and those that have not come to rest yet.
+//!
+//! A tool wants the particles within a ball at rest, about the vertex of the skin nearest to it, from a gap of `g₀ + v·50 ms` on and until the gap
+//! has been twice that for 100 ms; the ball follows it in steps of a spacing. A particle that no tool wants any more sleeps once it is as
+//! good as where it would be asleep, or when its room is needed.
+//!
+//! Momentum through a switch: what wakes moves as it was moved (`metric`). What falls asleep hands over impulses, and all of it together a couple: with
+//! `m = (1 − ε) m_p`, the place `x_p = Σ_i ζ_pi x_i` where a particle is then, and the free nodes of its tets, of masses `M_i` about their middle `x̄`,
+//! ```text
+//! J_i = Σ_p m ζ_pi (w_p − Σ_j ζ_pj v_j) + M_i α × (x_i − x̄)       Σ_i M_i (x_i − x̄) × (α × (x_i − x̄)) = Σ_p m (y_p − x_p) × w_p
+//! v ← v + M''⁻¹ J
+//! ```
+//! with the matrix `M''` of what stays awake: linear and angular momentum are kept.
+use super::{
+    active::{ActiveParticles, HybridScratch},
+    body::Hybrid,
+    listed::SkinView,
+    patch::KEPT,
+    running::RunningPatch,
+    spec::Waking,
+};
+use crate::world::{Model, State};
+use glam::{BVec3, DMat3, DVec3};
+use serde::{Deserialize, Serialize};
+
+/// Ticks between two looks.
+const LOOK_EVERY_TICKS: u64 = 10;
+/// Time (s) ahead of which an approaching tool is seen.
+const AHEAD_S: f64 = 0.05;
+/// Ticks for which a tool has to be away.
+const AWAY_TICKS: u32 = 100;
+/// Gap over the tool's radius, and over the spacing, from which its particles are awake.
+const GAP: f64 = 0.25;
+/// Deviation over the spacing below which a particle may fall asleep.
+const SETTLED: f64 = 0.01;
+
+/// The ball that a tool keeps awake.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub(crate) struct Ball {
+    /// Its middle at rest (m).
+    pub(super) rest_m: DVec3,
+    /// For how many ticks the tool has been away.
+    away_ticks: u32,
+}
+
+/// Buffers of a look.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Looking {
+    /// Squared distance (m²) and number of particles in a ball.
+    found: Vec<(f64, u32)>,
+    /// Active particles to be.
+    wanted: Vec<u32>,
+    /// Active particles that nobody wants, with how far (m) they are from where they would be asleep.
+    unwanted: Vec<(f64, u32)>,
+    moved: Vec<DVec3>,
+    /// Momenta (kg m/s) handed to coarse nodes.
+    impulses: Vec<DVec3>,
+    /// Masses (kg) of the free nodes of tets in which particles fall asleep, 0 of others.
+    weights_kg: Vec<f64>,
+}
+
+impl Looking {
+    pub(super) fn new(model: &Model, body: &Hybrid) -> Self {
+        let Some(particles) = &model.spec().particles else { return Self::default() };
+        let in_ball = match particles.waking {
+            Waking::ByHand => 0,
+            Waking::ByTools { reach_m } => (2.0 * reach_m / particles.spacing_m + 2.0).powi(3) as usize,
+        };
+        let most = particles.most_active;
+        let tools = model.spec().tools.len().max(1);
+        Self {
+            found: Vec::with_capacity(in_ball.min(body.partition.particle_count())),
+            wanted: Vec::with_capacity(tools * most),
+            unwanted: Vec::with_capacity(most),
+            moved: Vec::with_capacity(most),
+            impulses: Vec::with_capacity(body.node_count() + most),
+            weights_kg: Vec::with_capacity(body.node_count()),
+        }
+    }
+}
+
+impl HybridScratch {
+    /// Before a tick: makes the patch that of the state's active particles, and now and then looks which should be. Allocates nothing.
+    pub(crate) fn prepare(&mut self, model: &Model, body: &Hybrid, state: &mut State) {
+        self.follow(body, &state.active);
+        let Some(particles) = &model.spec().particles else { return };
+        let Waking::ByTools { reach_m } = particles.waking else { return };
+        if !state.tick.is_multiple_of(LOOK_EVERY_TICKS) {
+            return;
+        }
+        self.patch.displace(body, &state.x);
+        let view = SkinView::new(body, &self.patch, model.surface_rest_positions_m());
+        place_balls(model, &view, particles.spacing_m, state);
+        self.looking.want(body, &state.active, reach_m, particles.most_active);
+        self.looking.keep_unsettled(&self.patch, particles);
+        if self.looking.wanted != state.active.ids() {
+            self.switch(body, state);
+        }
+    }
+
+    /// Goes over to the particles in `looking.wanted`.
+    fn switch(&mut self, body: &Hybrid, state: &mut State) {
+        let Self { patch, looking, .. } = self;
+        let nodes = body.node_count();
+        looking.impulses.clear();
+        looking.impulses.resize(nodes, DVec3::ZERO);
+        looking.weights_kg.clear();
+        looking.weights_kg.resize(nodes, 0.0);
+        let (mut some_sleep, mut couple) = (false, DVec3::ZERO);
+        for (number, id) in state.active.ids().iter().enumerate() {
+            if looking.wanted.binary_search(id).is_err() {
+                let (y, w) = (state.x[nodes + number], state.v[nodes + number]);
+                couple += looking.hand_over(body, *id, (y, w), state);
+                some_sleep = true;
+            }
+        }
+        looking.turn(couple, &state.x);
+        state.switch(body, &looking.wanted, &mut looking.moved);
+        patch.wake(body, state.active.ids());
+        if some_sleep {
+            looking.impulses.resize(state.v.len(), DVec3::ZERO);
+            patch.metric_mut().accelerate(&mut looking.impulses);
+            for (v, change) in state.v.iter_mut().zip(&looking.impulses[..nodes]) {
+                *v += *change;
+            }
+        }
+    }
+}
+
+/// Where the tools' balls are now.
+fn place_balls(model: &Model, view: &SkinView<'_>, spacing_m: f64, state: &mut State) {
+    let State { tools, active, .. } = state;
+    for ((tool, spec), ball) in tools.iter().zip(&model.spec().tools).zip(&mut active.balls) {
+        let near_m = (GAP * spec.radius_m).max(GAP * spacing_m) + AHEAD_S * tool.velocity_m_per_s.length();
+        let nearest = view.nearest(tool.centre_m, spec.radius_m + 2.0 * near_m);
+        let gap_m = nearest.map_or(f64::INFINITY, |(_, distance_m)| distance_m - spec.radius_m);
+        match (ball.as_mut(), nearest) {
+            (_, Some((rest_m, _))) if gap_m < near_m => {
+                let moved = ball.is_none_or(|ball| ball.rest_m.distance(rest_m) > spacing_m);
+                let rest_m = if moved { rest_m } else { ball.map_or(rest_m, |ball| ball.rest_m) };
+                *ball = Some(Ball { rest_m, away_ticks: 0 });
+            }
+            (Some(own), _) if gap_m > 2.0 * near_m => {
+                own.away_ticks += LOOK_EVERY_TICKS as u32;
+                if own.away_ticks >= AWAY_TICKS {
+                    *ball = None;
+                }
+            }
+            (Some(own), _) => own.away_ticks = 0,
+            (None, _) => {}
+        }
+    }
+}
+
+impl Looking {
+    /// Takes the impulse of a particle that falls asleep, and the nodes of its tet; returns its couple (kg m²/s).
+    fn hand_over(&mut self, body: &Hybrid, particle: u32, (y, w): (DVec3, DVec3), state: &State) -> DVec3 {
+        let anchor = body.partition.anchor(particle);
+        let mass_kg = (1.0 - KEPT) * body.masses.particle_kg[particle as usize];
+        anchor.push((w - anchor.of(&state.v)) * mass_kg, &mut self.impulses);
+        for node in body.partition.coarse().tets()[anchor.tet as usize].map(|node| node as usize) {
+            if body.free[node] == BVec3::TRUE {
+                self.weights_kg[node] = body.masses.node_kg[node];
+            }
+        }
+        (y - anchor.of(&state.x)).cross(w) * mass_kg
+    }
+
+    /// Takes the couple of all of them; none where too few of those nodes are free.
+    fn turn(&mut self, couple: DVec3, x: &[DVec3]) {
+        let weighty = || self.weights_kg.iter().zip(x).filter(|(weight, _)| **weight > 0.0);
+        let total: f64 = weighty().map(|(weight, _)| weight).sum();
+        let middle = weighty().map(|(weight, x)| *x * *weight).sum::<DVec3>() / total;
+        // Σ M (|r|² I − r rᵀ)
+        let inertia = weighty().fold(DMat3::ZERO, |sum, (weight, x)| {
+            let r = *x - middle;
+            let outer = DMat3::from_cols(r * r.x, r * r.y, r * r.z);
+            sum + (DMat3::from_diagonal(DVec3::splat(r.length_squared())) - outer) * *weight
+        });
+        let turn = inertia.inverse() * couple;
+        if turn.is_finite() {
+            for ((impulse, weight), x) in self.impulses.iter_mut().zip(&self.weights_kg).zip(x) {
+                *impulse += turn.cross(*x - middle) * *weight;
+            }
+        }
+    }
+
+    /// The particles in the tools' balls, ascending; the nearest ones where there is no room for all.
+    fn want(&mut self, body: &Hybrid, active: &ActiveParticles, reach_m: f64, most: usize) {
+        self.wanted.clear();
+        let balls = active.balls.iter().flatten().count().max(1);
+        for ball in active.balls.iter().flatten() {
+            self.found.clear();
+            body.partition.particles_within(ball.rest_m, reach_m, |particle, distance_sq| {
+                if body.may_wake(particle) {
+                    self.found.push((distance_sq, particle));
+                }
+            });
+            let room = most / balls;
+            if self.found.len() > room {
+                self.found.select_nth_unstable_by(room, |a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+                self.found.truncate(room);
+            }
+            self.wanted.extend(self.found.iter().map(|(_, particle)| *particle));
+        }
+        self.wanted.sort_unstable();
+        self.wanted.dedup();
+    }
+
+    /// Keeps those awake that nobody wants but that are not settled, the farthest off first, as long as there is room.
+    fn keep_unsettled(&mut self, patch: &RunningPatch, particles: &super::spec::ParticleSpec) {
+        self.unwanted.clear();
+        for (particle, deviation_m) in patch.deviations_m() {
+            if deviation_m > SETTLED * particles.spacing_m && self.wanted.binary_search(&particle).is_err() {
+                self.unwanted.push((deviation_m, particle));
+            }
+        }
+        self.unwanted.sort_unstable_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
+        let room = particles.most_active.saturating_sub(self.wanted.len());
+        self.wanted.extend(self.unwanted.iter().take(room).map(|(_, particle)| *particle));
+        self.wanted.sort_unstable();
+    }
+}
