@@ -3,15 +3,20 @@ pub mod cage;
 pub mod cell;
 pub mod composite;
 pub mod equilibrium;
+pub mod kernels;
+mod least_squares;
 mod locate;
+pub mod methods;
 pub mod metric;
 pub mod moments;
 pub mod partition;
 pub mod patch;
 pub mod place;
+pub mod points;
 pub mod share;
 pub mod sites;
 pub mod skin;
+mod smoothing;
 #[cfg(test)]
 pub(crate) mod testing;
 

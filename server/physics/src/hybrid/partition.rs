@@ -155,6 +155,24 @@ impl Partition {
         })
     }
 
+    /// Particles nearer than a radius to a point, ascending.
+    pub fn particles_near(&self, point_m: DVec3, radius_m: f64) -> Vec<u32> {
+        let [low, high] = [-radius_m, radius_m].map(|by| self.sites.cell_near(point_m + DVec3::splat(by)));
+        let ranges: [_; 3] = std::array::from_fn(|axis| low[axis]..=high[axis] + 1);
+        let [x, y, z] = ranges;
+        let around = z.flat_map(|k| {
+            let x = x.clone();
+            y.clone().flat_map(move |j| x.clone().map(move |i| [i, j, k]))
+        });
+        let particles = around.map(|at| self.particle_at[self.sites.site(at)]).filter(|&particle| particle != NONE);
+        particles.filter(|&p| self.particle_m(p).distance_squared(point_m) < radius_m * radius_m).collect()
+    }
+
+    /// `Σ_c V_c/8` (m³) over the cells around a particle.
+    pub fn particle_m3(&self, particle: u32) -> f64 {
+        self.cells_at(particle).map(|cell| self.moments(cell).0 / 8.0).sum()
+    }
+
     /// What of the body each coarse tet has when all particles sleep.
     pub fn shares(&self) -> &[Share] {
         &self.shares
@@ -220,6 +238,13 @@ mod tests {
             assert!(!around.is_empty());
             assert!(around.iter().all(|&cell| partition.corners(cell).contains(&particle)));
         }
+        let all = || 0..partition.particle_count() as u32;
+        for at in [DVec3::new(0.3e-3, 2e-3, -1e-3), DVec3::new(9.5e-3, 0.0, 1e-3), DVec3::splat(-0.02)] {
+            let near: Vec<u32> = all().filter(|&p| partition.particle_m(p).distance(at) < 2.3e-3).collect();
+            assert_eq!(partition.particles_near(at, 2.3e-3), near);
+        }
+        let volume_m3: f64 = all().map(|particle| partition.particle_m3(particle)).sum();
+        assert!((volume_m3 / partition.volume_m3() - 1.0).abs() < 1e-12);
         let pairs: usize = (0..partition.particle_count() as u32).map(|p| partition.cells_at(p).count()).sum();
         assert_eq!(pairs, 8 * partition.cells().len());
     }

@@ -1,5 +1,8 @@
 //! Shapes for tests.
-use super::{cell::RestCell, composite::Composite, moments::integrate, partition::Partition, sites::Sites, skin::Skin};
+use super::{
+    cell::RestCell, composite::Composite, moments::integrate, partition::Partition, patch::Field, sites::Sites,
+    skin::Skin,
+};
 use crate::{
     material::{Convention, Lame, Law, Material, Viscosity},
     mesh::TetMesh,
@@ -109,6 +112,26 @@ pub(crate) fn tissue() -> [Material; 3] {
     let viscosity = Viscosity::new(3.0, 2.0).unwrap();
     [Law::StVenantKirchhoff, Law::StableNeoHookean, Law::FixedCorotated]
         .map(|law| Material::new(law, lame, viscosity, Convention::Consistent))
+}
+
+/// Every position mapped.
+pub(crate) fn moved(field: &Field, map: impl Fn(DVec3) -> DVec3) -> Field {
+    Field {
+        nodes: field.nodes.iter().map(|p| map(*p)).collect(),
+        particles: field.particles.iter().map(|p| map(*p)).collect(),
+    }
+}
+
+/// Random vectors in place of a field's.
+pub(crate) fn random_like(field: &Field, size: f64, random: &mut Random) -> Field {
+    let mut shaken = |list: &[DVec3]| list.iter().map(|_| random.vector() * size).collect::<Vec<_>>();
+    Field { nodes: shaken(&field.nodes), particles: shaken(&field.particles) }
+}
+
+/// `a + s b`.
+pub(crate) fn plus(a: &Field, b: &Field, s: f64) -> Field {
+    let sum = |a: &[DVec3], b: &[DVec3]| a.iter().zip(b).map(|(a, b)| *a + *b * s).collect();
+    Field { nodes: sum(&a.nodes, &b.nodes), particles: sum(&a.particles, &b.particles) }
 }
 
 /// The cells of that ball, all awake, and their particles at rest (m).
