@@ -59,6 +59,7 @@ impl Kernel {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use glam::DVec3;
 
     const BOTH: [Kernel; 2] = [Kernel::Cone, Kernel::WendlandC2];
 
@@ -75,6 +76,21 @@ mod tests {
             };
             let integral: f64 = (0..steps).map(shell).sum();
             assert!((integral - 1.0).abs() < 1e-7, "{kernel:?}: {integral}");
+        }
+    }
+
+    /// `Σ V ∇W` gives the identity map on a lattice, along an axis, a gradient of one only by chance.
+    #[test]
+    fn the_cones_gradient_jumps_when_sites_at_two_spacings_come_into_its_support() {
+        let of_identity = |kernel: Kernel, smoothing_m: f64| -> f64 {
+            let sites =
+                (0..343_i32).map(|n| DVec3::new(f64::from(n % 7), f64::from(n / 7 % 7), f64::from(n / 49)) - 3.0);
+            let term = |at: DVec3| -at.x * at.x / at.length() * kernel.slope_per_m4(at.length(), smoothing_m);
+            sites.filter(|at| *at != DVec3::ZERO).map(term).sum()
+        };
+        for (smoothing, cone, wendland) in [(0.999, 0.736, 0.982), (1.001, 0.968, 0.983), (SMOOTHING, 0.799, 0.998)] {
+            let found = [Kernel::Cone, Kernel::WendlandC2].map(|kernel| of_identity(kernel, smoothing));
+            assert!((found[0] - cone).abs() < 1e-3 && (found[1] - wendland).abs() < 1e-3, "{smoothing}: {found:?}");
         }
     }
 

@@ -12,9 +12,8 @@
 use super::{
     cell::RestCell,
     composite::Anchor,
-    methods::{Handed, Method},
     partition::Partition,
-    points::Operator,
+    points::{Handed, Operator, Points},
     share::Share,
 };
 use crate::material::Material;
@@ -111,20 +110,19 @@ impl Patch {
         Self { active, border, fine: Fine::Cells(cells), shares }
     }
 
-    /// Wakes these particles, with another method.
-    pub fn with_method(partition: &Partition, active: &BTreeSet<u32>, method: Method) -> Self {
-        let (rows, handed) = method.rows(partition, active);
+    /// Wakes these particles, with the points of a method.
+    pub fn with_points(partition: &Partition, active: &BTreeSet<u32>, points: &Points) -> Self {
         let active: Vec<u32> = active.iter().copied().collect();
         let mut point_of: BTreeMap<u32, u32> = active.iter().copied().zip(0..).collect();
         let mut border = Vec::new();
-        let operator = Operator::new(&rows, 1.0 - KEPT, |particle| {
+        let operator = Operator::new(&points.rows, 1.0 - KEPT, |particle| {
             *point_of.entry(particle).or_insert_with(|| {
                 border.push(partition.anchor(particle));
                 (active.len() + border.len()) as u32 - 1
             })
         });
         let mut shares = partition.shares().to_vec();
-        for Handed { cell: number, part } in handed {
+        for &Handed { cell: number, part } in &points.handed {
             let (cell, moments) = (&partition.cells()[number], partition.moments(number));
             let anchors = partition.corners(number).map(|particle| partition.anchor(particle));
             shares[cell.tet as usize].add(cell.part, part * (KEPT - 1.0), moments.0, &moments.1, &anchors);

@@ -55,7 +55,25 @@ impl Role {
     }
 }
 
-/// A point of integration, as a method makes it.
+/// Points of integration over what is awake, as a method makes them.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Points {
+    /// Their rows.
+    pub rows: Vec<Row>,
+    /// The volume that they answer for.
+    pub handed: Vec<Handed>,
+}
+
+/// A part of a cell's volume.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Handed {
+    /// Index of the cell.
+    pub cell: usize,
+    /// The part.
+    pub part: f64,
+}
+
+/// A point of integration.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Row {
     /// `V_q` (m³).

@@ -9,9 +9,8 @@
 //! The sums run over the particles n that are awake, so that volume is counted once in either law: a tet has a quarter for each of its corners that is. With γ = 0
 //! fields that alternate from particle to particle cost nothing.
 use super::{
-    methods::Handed,
     partition::Partition,
-    points::{Role, Row, Term},
+    points::{Handed, Points, Role, Row, Term},
 };
 use glam::DVec3;
 use std::collections::{BTreeMap, BTreeSet};
@@ -29,8 +28,8 @@ fn gradients(tet: [usize; 4]) -> [DVec3; 4] {
     [-a, a - b, b - c, c]
 }
 
-/// Rows at the particles whose tets touch an active one, and in those tets; and the volume that they answer for.
-pub(super) fn rows(partition: &Partition, gamma: f64, active: &BTreeSet<u32>) -> (Vec<Row>, Vec<Handed>) {
+/// The particles whose tets touch an active one, and those tets.
+pub(super) fn points(partition: &Partition, gamma: f64, active: &BTreeSet<u32>) -> Points {
     let cells = active.iter().flat_map(|&particle| partition.cells_at(particle));
     let near: BTreeSet<u32> = cells.flat_map(|cell| partition.corners(cell)).collect();
     let (mut rows, mut handed) = (Vec::new(), Vec::new());
@@ -49,7 +48,7 @@ pub(super) fn rows(partition: &Partition, gamma: f64, active: &BTreeSet<u32>) ->
     if gamma > 0.0 {
         rows.extend(quarters.into_iter().map(|((cell, tet), count)| in_tet(partition, gamma, cell, tet, count)));
     }
-    (rows, handed)
+    Points { rows, handed }
 }
 
 /// Cells and which of their tets.

@@ -1,6 +1,11 @@
 //! Shapes for tests.
 use super::{
-    cell::RestCell, composite::Composite, moments::integrate, partition::Partition, patch::Field, sites::Sites,
+    cell::RestCell,
+    composite::Composite,
+    moments::integrate,
+    partition::Partition,
+    patch::Field,
+    sites::{CORNERS, Sites},
     skin::Skin,
 };
 use crate::{
@@ -104,6 +109,18 @@ pub(crate) fn ball_in_cage() -> Partition {
     let cage = tet_box(DVec3::splat(-0.0125), DVec3::splat(0.025), [3, 3, 3]);
     let moments = integrate(&skin, &sites, &mut |_| {});
     Partition::new(sites, Composite::new(&cage), &moments)
+}
+
+/// A block of full cells of spacing 1 mm, in a box of coarse tets.
+pub(crate) fn block_in_cage(cells: [usize; 3]) -> Partition {
+    let size = DVec3::from(cells.map(|n| n as f64)) * 1e-3;
+    let corners = CORNERS.map(|corner| corner * size).to_vec();
+    let faces = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
+    let triangles = faces.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]).collect();
+    let skin = Skin::new(corners, triangles).unwrap();
+    let sites = Sites::covering(skin.bounds_m(), 1e-3, DVec3::ZERO);
+    let moments = integrate(&skin, &sites, &mut |_| {});
+    Partition::new(sites, Composite::new(&tet_box(DVec3::ZERO, size, [1, 1, 1])), &moments)
 }
 
 /// One material of each law, nearly incompressible and viscous.

@@ -17,29 +17,36 @@ use palpate_physics::{
         cage::{self, Cage},
         composite::Composite,
         equilibrium::equilibrium,
-        methods::Method,
         moments::integrate,
         partition::Partition,
         patch::{Field, Materials, Patch},
         place::Place,
+        points::Points,
         sites::Sites,
     },
 };
 use std::collections::BTreeSet;
 
 /// A hybrid body whose skin is the boundary of a fine mesh.
-pub struct Case {
-    pub coarse_tets: u32,
-    pub skin_tets: u32,
-    pub spacing_m: f64,
+pub(crate) struct Case {
+    pub(crate) coarse_tets: u32,
+    pub(crate) skin_tets: u32,
+    pub(crate) spacing_m: f64,
     /// Active particles: those nearest to the touch.
-    pub active: usize,
-    /// In place of cells.
-    pub method: Option<Method>,
+    pub(crate) active: usize,
+    /// What integrates the fine level in place of cells.
+    pub(crate) points: Option<MakePoints>,
+    /// What points of the skin move with, in place of the particles of their cell.
+    pub(crate) places: Option<MakePlaces>,
 }
 
+/// Points over the active particles.
+pub(crate) type MakePoints = Box<dyn Fn(&Partition, &BTreeSet<u32>) -> Points>;
+/// What a point (m) moves with: the sum of these.
+pub(crate) type MakePlaces = fn(&Partition, DVec3) -> Vec<Place>;
+
 /// Relative error of the answer, and of the field in L2.
-pub fn error(problem: &Problem, case: &Case) -> (f64, f64) {
+pub(crate) fn error(problem: &Problem, case: &Case) -> (f64, f64) {
     let coarse = problem.body.tets(case.coarse_tets).unwrap();
     let fine = problem.body.tets(case.skin_tets).unwrap();
     let rest = fine.mesh.positions_m();
@@ -65,16 +72,22 @@ pub fn error(problem: &Problem, case: &Case) -> (f64, f64) {
     let distance = |p: &u32| partition.particle_m(*p).distance_squared(fine.touch_m);
     near.sort_by(|a, b| distance(a).total_cmp(&distance(b)));
     let active = near.into_iter().take(case.active).collect();
-    let patch = match case.method {
+    let patch = match &case.points {
         None => Patch::new(&partition, &active),
-        Some(method) => Patch::with_method(&partition, &active, method),
+        Some(points) => Patch::with_points(&partition, &active, &points(&partition, &active)),
     };
     let at_rest = patch.at_rest(&partition);
     let load = load::on_tets(problem.action, &fine).unwrap();
+    let places = |at: DVec3| match case.places {
+        None => vec![Place::new(&partition, at)],
+        Some(places) => places(&partition, at),
+    };
     let zero = |list: &[DVec3]| vec![DVec3::ZERO; list.len()];
     let mut loads_n = Field { nodes: zero(&at_rest.nodes), particles: zero(&at_rest.particles) };
     for &(node, force_n) in &load.forces_n {
-        Place::new(&partition, rest[node as usize]).push(&partition, &patch, force_n, &mut loads_n);
+        for place in places(rest[node as usize]) {
+            place.push(&partition, &patch, force_n, &mut loads_n);
+        }
     }
     let material = problem.material().unwrap();
     let of_tet = vec![0; partition.shares().len()];
@@ -82,7 +95,7 @@ pub fn error(problem: &Problem, case: &Case) -> (f64, f64) {
     let found = equilibrium(&partition, &patch, &materials, &free, &loads_n, 1e-6).unwrap();
     let mut x = rest.to_vec();
     for &node in &fine.surface.nodes {
-        x[node as usize] = Place::new(&partition, rest[node as usize]).of(&partition, &patch, &found);
+        x[node as usize] = places(rest[node as usize]).iter().map(|p| p.of(&partition, &patch, &found)).sum();
     }
     let reference = Reference::of(problem).unwrap();
     let answer = load.displacement_m(rest, &x) / reference.value - 1.0;
@@ -90,7 +103,7 @@ pub fn error(problem: &Problem, case: &Case) -> (f64, f64) {
     let displacements = Probe::new(&fine, &samples).displacements_m(rest, &x);
     let field = FieldError::of(&samples, &displacements, &reference.displacements_m()).unwrap();
     println!(
-        "{}: {} coarse tets (boundary moved by up to {:.1} mm, {outside} corners outside), {} particles, {} active, {} cells{}: \
+        "{}: {} coarse tets (boundary moved by up to {:.1} mm, {outside} corners outside), {} particles, {} active, {} cells or points: \
          answer {:+.1} %, field {:.1} %",
         problem.name,
         coarse.mesh.tets().len(),
@@ -98,7 +111,6 @@ pub fn error(problem: &Problem, case: &Case) -> (f64, f64) {
         partition.particle_count(),
         patch.active().len(),
         patch.cell_count(),
-        case.method.map_or(String::new(), |method| format!(" of {method:?}")),
         100.0 * answer,
         100.0 * field.l2
     );
@@ -128,6 +140,6 @@ fn free_axes(composite: &Composite, held: &BTreeSet<u32>, surface: &Surface) -> 
     free
 }
 
-pub fn problem(name: &str) -> Problem {
+pub(crate) fn problem(name: &str) -> Problem {
     problems::all().into_iter().find(|p| p.name == name).unwrap()
 }
