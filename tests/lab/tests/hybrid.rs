@@ -3,10 +3,14 @@ mod hybrid_body;
 
 use hybrid_body::{Case, error, problem};
 
+fn cells(coarse_tets: u32, skin_tets: u32, spacing_m: f64) -> Case {
+    Case { name: "cells".into(), coarse_tets, skin_tets, spacing_m, active: 600, points: None, places: None }
+}
+
 #[test]
 fn with_six_hundred_particles_the_block_answers_as_the_fine_solid() {
     for (nu, most) in [("0.30", 0.02), ("0.45", 0.02), ("0.49", 0.05)] {
-        let case = Case { coarse_tets: 4, skin_tets: 32, spacing_m: 2.5e-3, active: 600, points: None, places: None };
+        let case = cells(4, 32, 2.5e-3);
         let (answer, field) = error(&problem(&format!("block-patch-small-nu{nu}")), &case);
         assert!(answer.abs() < most && field < 0.08, "{nu}: {answer} {field}");
     }
@@ -15,8 +19,7 @@ fn with_six_hundred_particles_the_block_answers_as_the_fine_solid() {
 #[test]
 fn with_six_hundred_particles_the_ventricle_answers_as_the_fine_solid() {
     for nu in ["0.30", "0.45", "0.49"] {
-        let case =
-            Case { coarse_tets: 400, skin_tets: 150_000, spacing_m: 3.2e-3, active: 600, points: None, places: None };
+        let case = cells(400, 150_000, 3.2e-3);
         let (answer, field) = error(&problem(&format!("ventricle-patch-small-nu{nu}")), &case);
         assert!(answer.abs() < 0.05 && field < 0.06, "{nu}: {answer} {field}");
     }

@@ -6,6 +6,8 @@ pub mod equilibrium;
 pub mod kernels;
 mod least_squares;
 mod locate;
+#[cfg(test)]
+mod method_checks;
 pub mod methods;
 pub mod metric;
 pub mod moments;
@@ -17,6 +19,7 @@ pub mod share;
 pub mod sites;
 pub mod skin;
 mod smoothing;
+mod sph;
 #[cfg(test)]
 pub(crate) mod testing;
 

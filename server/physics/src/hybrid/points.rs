@@ -6,7 +6,7 @@
 //! f_p = −Σ_q (V_q P_q − µ H_q) b_qp − µ Σ_q k_qp e_qp          H_q = Σ_p k_qp e_qp ⊗ (X_p − X_o),  origins the opposite
 //! ```
 //! What fills `b_qp`, `V_q` and `k_qp` is the method (`methods`). Where a method reproduces affine motion, `O_q = 0`; where it does not (raw SPH), `O_q` makes
-//! it measure strain from gradients of displacement, `F_q = I + Σ_p (u_p − u_o) ⊗ b_qp`: free of stress at rest, not under rotation.
+//! it measure strain from gradients of displacement, `F_q = I + Σ_p (u_p − u_o) ⊗ b_qp`: free of stress at rest, but not when turned.
 //! The second term of U is the control of zero-energy modes (Ganzenmüller 2015, CMAME 286, 87-106): it costs what neighbours move beside the motion that
 //! `F_q` tells. There it is an explicit force along `y_p − y_o`; here it is an energy, quadratic in y, so its force is its transpose like the rest.
 //!

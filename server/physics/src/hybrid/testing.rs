@@ -2,9 +2,11 @@
 use super::{
     cell::RestCell,
     composite::Composite,
+    kernels::Kernel,
+    methods::{CONTROL, Method},
     moments::integrate,
     partition::Partition,
-    patch::Field,
+    patch::{Field, Patch},
     sites::{CORNERS, Sites},
     skin::Skin,
 };
@@ -12,8 +14,8 @@ use crate::{
     material::{Convention, Lame, Law, Material, Viscosity},
     mesh::TetMesh,
 };
-use glam::DVec3;
-use std::collections::BTreeMap;
+use glam::{DMat3, DVec3};
+use std::collections::{BTreeMap, BTreeSet};
 
 /// A sphere: an icosahedron whose triangles are split in four `rounds` times.
 pub(crate) fn ball(radius_m: f64, centre_m: DVec3, rounds: u32) -> Skin {
@@ -149,6 +151,33 @@ pub(crate) fn random_like(field: &Field, size: f64, random: &mut Random) -> Fiel
 pub(crate) fn plus(a: &Field, b: &Field, s: f64) -> Field {
     let sum = |a: &[DVec3], b: &[DVec3]| a.iter().zip(b).map(|(a, b)| *a + *b * s).collect();
     Field { nodes: sum(&a.nodes, &b.nodes), particles: sum(&a.particles, &b.particles) }
+}
+
+/// Those that do not.
+pub(crate) const RAW: [Method; 2] = [Method::RawSph(Kernel::Cone), Method::RawSph(Kernel::WendlandC2)];
+/// Methods that reproduce affine motion.
+pub(crate) const CORRECTED: [Method; 5] = [
+    Method::CorrectedSph { kernel: Kernel::Cone, control: CONTROL },
+    Method::CorrectedSph { kernel: Kernel::WendlandC2, control: CONTROL },
+    Method::MovingLeastSquares { control: CONTROL },
+    Method::ElementFreeGalerkin,
+    Method::NodalSmoothing { gamma: 0.5 },
+];
+
+/// Half of a ball.
+pub(crate) fn half(partition: &Partition) -> BTreeSet<u32> {
+    (0..partition.particle_count() as u32).filter(|&p| partition.particle_m(p).x > 0.2e-3).collect()
+}
+
+/// And that half awake.
+pub(crate) fn half_awake(partition: &Partition, method: Method) -> Patch {
+    let active = half(partition);
+    Patch::with_points(partition, &active, &method.points(partition, &active))
+}
+
+/// A matrix not far from the identity.
+pub(crate) fn stretch(random: &mut Random) -> DMat3 {
+    DMat3::IDENTITY + DMat3::from_cols(random.vector(), random.vector(), random.vector()) * 0.1
 }
 
 /// The cells of that ball, all awake, and their particles at rest (m).

@@ -29,6 +29,8 @@ use std::collections::BTreeSet;
 
 /// A hybrid body whose skin is the boundary of a fine mesh.
 pub(crate) struct Case {
+    /// What is said of it.
+    pub(crate) name: String,
     pub(crate) coarse_tets: u32,
     pub(crate) skin_tets: u32,
     pub(crate) spacing_m: f64,
@@ -103,8 +105,9 @@ pub(crate) fn error(problem: &Problem, case: &Case) -> (f64, f64) {
     let displacements = Probe::new(&fine, &samples).displacements_m(rest, &x);
     let field = FieldError::of(&samples, &displacements, &reference.displacements_m()).unwrap();
     println!(
-        "{}: {} coarse tets (boundary moved by up to {:.1} mm, {outside} corners outside), {} particles, {} active, {} cells or points: \
+        "{}, {}: {} coarse tets (boundary moved by up to {:.1} mm, {outside} corners outside), {} particles, {} active, {} cells or points: \
          answer {:+.1} %, field {:.1} %",
+        case.name,
         problem.name,
         coarse.mesh.tets().len(),
         moved_m * 1e3,
