@@ -76,8 +76,8 @@ fn uniform_stress_is_nearly_in_balance_at_a_cut_surface_and_at_the_rim() {
     }
 }
 
-/// Least ratio of a plane wave's energy to that in the solid, over one period of the lattice, waves a and directions.
-fn least_stiffness(partition: &Partition, method: Method) -> (f64, [usize; 3]) {
+/// Least ratio of a plane wave's energy to that in the solid, of all waves of one period, and the wave.
+fn least_stiffness(partition: &Partition, method: Method) -> (f64, [i32; 3]) {
     const PERIOD: usize = 6;
     let all: BTreeSet<u32> = (0..partition.particle_count() as u32).collect();
     let rest: Vec<DVec3> = all.iter().map(|&p| partition.particle_m(p)).collect();
@@ -92,9 +92,9 @@ fn least_stiffness(partition: &Partition, method: Method) -> (f64, [usize; 3]) {
     let of_tet = vec![0; partition.shares().len()];
     let materials = Materials { materials: &[material], of_tet: &of_tet };
     let volume_m3 = (PERIOD as f64 * h).powi(3);
-    let waves = (1..64_usize).map(|n| [n % 4, n / 4 % 4, n / 16]);
-    let ratio = |wave: [usize; 3]| {
-        let k = DVec3::from(wave.map(|n| n as f64)) * (2.0 * PI / (PERIOD as f64 * h));
+    let waves = (0..216_i32).map(|n| [n % 6 - 2, n / 6 % 6 - 2, n / 36 - 2]).filter(|wave| *wave != [0; 3]);
+    let ratio = |wave: [i32; 3]| {
+        let k = DVec3::from(wave.map(f64::from)) * (2.0 * PI / (PERIOD as f64 * h));
         let energy = |a: DVec3| {
             let size = 1e-6 * h;
             let of_phase = |phase: f64| {
