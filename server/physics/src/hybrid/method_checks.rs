@@ -1,13 +1,13 @@
-//! What the methods satisfy, and what not: balance of uniform stress, and plane waves.
+//! What the methods satisfy, and what not: balance of uniform stress, plane waves, frequencies.
 use super::{
     kernels::Kernel,
     methods::Method,
     partition::Partition,
-    patch::{Materials, Patch},
+    patch::{Field, KEPT, Materials, Patch},
     points::Operator,
     testing::{CORRECTED, RAW, Random, ball_in_cage, block_in_cage, half, half_awake, moved, stretch, tissue},
 };
-use crate::material::Material;
+use crate::material::{Lame, Material};
 use glam::DVec3;
 use std::{collections::BTreeSet, f64::consts::PI};
 
@@ -129,5 +129,39 @@ fn control_leaves_no_mode_without_energy() {
     for method in CORRECTED {
         let (least, wave) = least_stiffness(&partition, method);
         assert!(least > 1e-3, "{method:?}: {least} {wave:?}");
+    }
+}
+
+/// Square of the largest natural frequency (rad²/s²) of all particles awake, by power iteration.
+fn largest_square(partition: &Partition, patch: &Patch, material: &Material) -> f64 {
+    let of_tet = vec![0; partition.shares().len()];
+    let materials = Materials { materials: &[*material], of_tet: &of_tet };
+    let rest = patch.at_rest(partition);
+    let still = vec![DVec3::ZERO; rest.nodes.len()];
+    let masses: Vec<f64> = patch.active().iter().map(|&p| 1000.0 * (1.0 - KEPT) * partition.particle_m3(p)).collect();
+    let mut random = Random(67);
+    let mut a = Field { particles: masses.iter().map(|_| random.vector()).collect(), nodes: still.clone() };
+    let mut square = 0.0;
+    for _ in 0..300 {
+        let product = patch.products_n(&materials, &rest, &a).particles;
+        let mut next: Vec<DVec3> = product.iter().zip(&masses).map(|(f, m)| -*f / *m).collect();
+        square = next.iter().map(|v| v.length_squared()).sum::<f64>().sqrt();
+        next.iter_mut().for_each(|v| *v /= square);
+        a.particles = next;
+    }
+    square
+}
+
+#[test]
+fn the_largest_frequency_is_about_that_of_cells_or_less() {
+    let partition = block_in_cage([10, 10, 6]);
+    let all: BTreeSet<u32> = (0..partition.particle_count() as u32).collect();
+    let material = Material { lame: Lame::from_young_poisson(10e3, 0.45).unwrap(), ..tissue()[1] };
+    let of_cells = largest_square(&partition, &Patch::new(&partition, &all), &material).sqrt();
+    let ratios = [0.36, 0.58, 0.72, 0.91, 1.03, 0.91, 0.96];
+    for (method, expected) in RAW.into_iter().chain(CORRECTED).zip(ratios) {
+        let patch = Patch::with_points(&partition, &all, &method.points(&partition, &all));
+        let ratio = largest_square(&partition, &patch, &material).sqrt() / of_cells;
+        assert!((ratio - expected).abs() < 0.01, "{method:?}: {ratio}");
     }
 }

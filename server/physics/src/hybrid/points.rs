@@ -170,11 +170,6 @@ impl Operator {
         self.rows.len()
     }
 
-    /// Number of `b_qp`.
-    pub fn term_count(&self) -> usize {
-        self.points.len()
-    }
-
     /// Elastic energy (J) at positions of the points.
     pub fn energy_j(&self, materials: &Materials<'_>, y: &[DVec3]) -> f64 {
         let of_row = |(row, head): (usize, &Head)| {

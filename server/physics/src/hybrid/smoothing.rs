@@ -36,13 +36,16 @@ pub(super) fn points(partition: &Partition, gamma: f64, active: &BTreeSet<u32>) 
     let mut quarters: BTreeMap<(usize, usize), u32> = BTreeMap::new();
     for node in near {
         let tets = tets_at(partition, node);
-        let row = at_node(partition, gamma, node, &tets);
-        if row.touches(|particle| active.contains(&particle)) {
+        let is_active = |&(cell, tet): &(usize, usize)| {
+            let corners = partition.corners(cell);
+            TETS[tet].iter().any(|&corner| active.contains(&corners[corner]))
+        };
+        if tets.iter().any(is_active) {
+            rows.push(at_node(partition, gamma, node, &tets));
             for tet in tets {
                 *quarters.entry(tet).or_default() += 1;
                 handed.push(Handed { cell: tet.0, part: 1.0 / 24.0 });
             }
-            rows.push(row);
         }
     }
     if gamma > 0.0 {
