@@ -146,7 +146,9 @@ fn largest_square(partition: &Partition, patch: &Patch, material: &Material) -> 
         let product = patch.products_n(&materials, &rest, &a).particles;
         let mut next: Vec<DVec3> = product.iter().zip(&masses).map(|(f, m)| -*f / *m).collect();
         square = next.iter().map(|v| v.length_squared()).sum::<f64>().sqrt();
-        next.iter_mut().for_each(|v| *v /= square);
+        for v in &mut next {
+            *v /= square;
+        }
         a.particles = next;
     }
     square
