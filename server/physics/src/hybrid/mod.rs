@@ -8,19 +8,27 @@ pub mod composite;
 mod energy;
 pub mod equilibrium;
 mod frequency;
+pub mod kernels;
+mod least_squares;
 mod listed;
 mod locate;
+#[cfg(test)]
+mod method_checks;
+pub mod methods;
 pub mod metric;
 pub mod moments;
 pub mod partition;
 pub mod patch;
 pub mod place;
+pub mod points;
 mod running;
 mod running_metric;
 pub mod share;
 pub mod sites;
 pub mod skin;
+mod smoothing;
 pub mod spec;
+mod sph;
 mod switching;
 #[cfg(test)]
 pub(crate) mod testing;

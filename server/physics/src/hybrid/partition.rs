@@ -178,6 +178,22 @@ impl Partition {
         })
     }
 
+    /// Particles nearer than a radius to a point, ascending.
+    pub fn particles_near(&self, point_m: DVec3, radius_m: f64) -> Vec<u32> {
+        let mut near = Vec::new();
+        self.particles_within(point_m, radius_m, |particle, distance_sq| {
+            if distance_sq < radius_m * radius_m {
+                near.push(particle);
+            }
+        });
+        near
+    }
+
+    /// `Σ_c V_c/8` (m³) over the cells around a particle.
+    pub fn particle_m3(&self, particle: u32) -> f64 {
+        self.cells_at(particle).map(|cell| self.moments(cell).0 / 8.0).sum()
+    }
+
     /// What of the body each coarse tet has when all particles sleep.
     pub fn shares(&self) -> &[Share] {
         &self.shares
@@ -243,6 +259,13 @@ mod tests {
             assert!(!around.is_empty());
             assert!(around.iter().all(|&cell| partition.corners(cell).contains(&particle)));
         }
+        let all = || 0..partition.particle_count() as u32;
+        for at in [DVec3::new(0.3e-3, 2e-3, -1e-3), DVec3::new(9.5e-3, 0.0, 1e-3), DVec3::splat(-0.02)] {
+            let near: Vec<u32> = all().filter(|&p| partition.particle_m(p).distance(at) < 2.3e-3).collect();
+            assert_eq!(partition.particles_near(at, 2.3e-3), near);
+        }
+        let volume_m3: f64 = all().map(|particle| partition.particle_m3(particle)).sum();
+        assert!((volume_m3 / partition.volume_m3() - 1.0).abs() < 1e-12);
         let pairs: usize = (0..partition.particle_count() as u32).map(|p| partition.cells_at(p).count()).sum();
         assert_eq!(pairs, 8 * partition.cells().len());
     }

@@ -5,8 +5,17 @@
 //! balance whichever particles are awake. The `ε` that stays keeps a coarse node whose surroundings are all awake from having neither stiffness nor mass.
 //! Particles of such cells that are not active themselves (the border) follow the coarse nodes, and hand forces back to them by the same weights.
 //!
+//! In place of cells, particle methods (`methods`) may integrate the awake volume at points of theirs. Such a point answers for the same share of the parts of cells that
+//! are its own, and these go from the coarse tets by the cells' moments: what is left to them stays a mean over cells, however little it is.
+//!
 //! This is plain f64 code: the oracle of what runs in the loop.
-use super::{cell::RestCell, composite::Anchor, partition::Partition, share::Share};
+use super::{
+    cell::RestCell,
+    composite::Anchor,
+    partition::Partition,
+    points::{Handed, Operator, Points},
+    share::Share,
+};
 use crate::material::Material;
 use glam::{DMat3, DVec3};
 use std::collections::{BTreeMap, BTreeSet};
@@ -21,9 +30,16 @@ pub struct Patch {
     active: Vec<u32>,
     /// What the particles of the border follow; they are numbered after the active ones.
     border: Vec<Anchor>,
-    cells: Vec<PatchCell>,
+    fine: Fine,
     /// What is left to each coarse tet.
     shares: Vec<Share>,
+}
+
+/// What integrates the awake volume.
+#[derive(Debug, Clone)]
+enum Fine {
+    Cells(Vec<PatchCell>),
+    Points(Operator),
 }
 
 #[derive(Debug, Clone)]
@@ -44,7 +60,7 @@ pub struct Materials<'a> {
 }
 
 impl Materials<'_> {
-    fn of(&self, tet: usize) -> &Material {
+    pub(super) fn of(&self, tet: usize) -> &Material {
         &self.materials[self.of_tet[tet] as usize]
     }
 }
@@ -67,7 +83,7 @@ impl Field {
 }
 
 impl Patch {
-    /// Wakes these particles.
+    /// Wakes these particles, with cells.
     pub fn new(partition: &Partition, active: &BTreeSet<u32>) -> Self {
         let active: Vec<u32> = active.iter().copied().collect();
         let awake: BTreeSet<usize> = active.iter().flat_map(|&particle| partition.cells_at(particle)).collect();
@@ -91,7 +107,27 @@ impl Patch {
                 PatchCell { rest: RestCell::new(spacing_m, 1.0 - KEPT, &moments), points, tet: cell.tet }
             })
             .collect();
-        Self { active, border, cells, shares }
+        Self { active, border, fine: Fine::Cells(cells), shares }
+    }
+
+    /// Wakes these particles, with the points of a method.
+    pub fn with_points(partition: &Partition, active: &BTreeSet<u32>, points: &Points) -> Self {
+        let active: Vec<u32> = active.iter().copied().collect();
+        let mut point_of: BTreeMap<u32, u32> = active.iter().copied().zip(0..).collect();
+        let mut border = Vec::new();
+        let operator = Operator::new(&points.rows, 1.0 - KEPT, |particle| {
+            *point_of.entry(particle).or_insert_with(|| {
+                border.push(partition.anchor(particle));
+                (active.len() + border.len()) as u32 - 1
+            })
+        });
+        let mut shares = partition.shares().to_vec();
+        for &Handed { cell: number, part } in &points.handed {
+            let (cell, moments) = (&partition.cells()[number], partition.moments(number));
+            let anchors = partition.corners(number).map(|particle| partition.anchor(particle));
+            shares[cell.tet as usize].add(cell.part, part * (KEPT - 1.0), moments.0, &moments.1, &anchors);
+        }
+        Self { active, border, fine: Fine::Points(operator), shares }
     }
 
     /// Active particles, ascending.
@@ -99,9 +135,12 @@ impl Patch {
         &self.active
     }
 
-    /// Cells that touch them.
+    /// Cells that touch them, or points of another method.
     pub fn cell_count(&self) -> usize {
-        self.cells.len()
+        match &self.fine {
+            Fine::Cells(cells) => cells.len(),
+            Fine::Points(operator) => operator.row_count(),
+        }
     }
 
     /// The coarse nodes at rest, and the particles where they follow them to.
@@ -118,19 +157,26 @@ impl Patch {
     /// Elastic energy (J).
     pub fn energy_j(&self, materials: &Materials<'_>, at: &Field) -> f64 {
         let points = self.points(at);
-        let cells =
-            self.cells.iter().map(|cell| cell.rest.energy_j(materials.of(cell.tet as usize), &cell.of(&points)));
+        let of_cell = |cell: &PatchCell| cell.rest.energy_j(materials.of(cell.tet as usize), &cell.of(&points));
+        let fine: f64 = match &self.fine {
+            Fine::Cells(cells) => cells.iter().map(of_cell).sum(),
+            Fine::Points(operator) => operator.energy_j(materials, &points),
+        };
         let shares = self.shares.iter().enumerate().map(|(tet, share)| share.energy_j(materials.of(tet), &at.nodes));
-        cells.sum::<f64>() + shares.sum::<f64>()
+        fine + shares.sum::<f64>()
     }
 
     /// Smallest `det F` of coarse tets' means and cells, and its tet.
     pub fn min_volume_ratio(&self, at: &Field) -> (f64, usize) {
         let points = self.points(at);
-        let cells =
-            self.cells.iter().map(|cell| (cell.rest.gradient_of(&cell.of(&points)).determinant(), cell.tet as usize));
-        let shares = self.shares.iter().enumerate().map(|(tet, share)| (share.volume_ratio(&at.nodes), tet));
-        cells.chain(shares).fold((f64::INFINITY, 0), |least, found| if found.0 < least.0 { found } else { least })
+        let of_cell = |cell: &PatchCell| (cell.rest.gradient_of(&cell.of(&points)).determinant(), cell.tet as usize);
+        let of_share = |(tet, share): (usize, &Share)| (share.volume_ratio(&at.nodes), tet);
+        let fine: Vec<(f64, usize)> = match &self.fine {
+            Fine::Cells(cells) => cells.iter().map(of_cell).collect(),
+            Fine::Points(operator) => operator.volume_ratios(&points).collect(),
+        };
+        let all = fine.into_iter().chain(self.shares.iter().enumerate().map(of_share));
+        all.fold((f64::INFINITY, 0), |least, found| if found.0 < least.0 { found } else { least })
     }
 
     /// Forces (N) of elastic and viscous stress at positions `at` and velocities `rate`, and the power (W) that viscous stress takes.
@@ -139,11 +185,16 @@ impl Patch {
         let mut nodes = vec![DVec3::ZERO; at.nodes.len()];
         let mut of_points = vec![DVec3::ZERO; points.len()];
         let mut power_w = 0.0;
-        for cell in &self.cells {
-            let (forces, power) =
-                cell.rest.forces_n(materials.of(cell.tet as usize), &cell.of(&points), &cell.of(&rates));
-            cell.add(&forces, &mut of_points);
-            power_w += power;
+        match &self.fine {
+            Fine::Cells(cells) => {
+                for cell in cells {
+                    let (forces, power) =
+                        cell.rest.forces_n(materials.of(cell.tet as usize), &cell.of(&points), &cell.of(&rates));
+                    cell.add(&forces, &mut of_points);
+                    power_w += power;
+                }
+            }
+            Fine::Points(operator) => power_w += operator.add_forces_n(materials, &points, &rates, &mut of_points),
         }
         for (tet, share) in self.shares.iter().enumerate() {
             power_w += share.add_forces_n(materials.of(tet), &at.nodes, &rate.nodes, &mut nodes);
@@ -156,9 +207,14 @@ impl Patch {
         let (points, changes) = (self.points(at), self.points(a));
         let mut nodes = vec![DVec3::ZERO; at.nodes.len()];
         let mut of_points = vec![DVec3::ZERO; points.len()];
-        for cell in &self.cells {
-            let material = materials.of(cell.tet as usize);
-            cell.add(&cell.rest.products_n(material, &cell.of(&points), &cell.of(&changes)), &mut of_points);
+        match &self.fine {
+            Fine::Cells(cells) => {
+                for cell in cells {
+                    let material = materials.of(cell.tet as usize);
+                    cell.add(&cell.rest.products_n(material, &cell.of(&points), &cell.of(&changes)), &mut of_points);
+                }
+            }
+            Fine::Points(operator) => operator.add_products_n(materials, &points, &changes, &mut of_points),
         }
         for (tet, share) in self.shares.iter().enumerate() {
             share.add_products_n(materials.of(tet), &at.nodes, &a.nodes, &mut nodes);
@@ -169,26 +225,26 @@ impl Patch {
     /// Diagonal blocks (N/m) of the stiffness at rest, of the coarse nodes and then of the active particles; the identity where there is none.
     pub fn diagonal_n_per_m(&self, materials: &Materials<'_>, nodes: usize) -> Vec<DMat3> {
         let mut of_nodes = vec![DMat3::ZERO; nodes];
-        let mut of_particles = vec![DMat3::ZERO; self.active.len()];
-        for cell in &self.cells {
-            let blocks = cell.rest.diagonal_n_per_m(materials.of(cell.tet as usize));
-            for (&point, block) in cell.points.iter().zip(blocks) {
-                match (point as usize).checked_sub(self.active.len()) {
-                    None => of_particles[point as usize] += block,
-                    Some(at) => {
-                        let anchor = &self.border[at];
-                        for (&node, weight) in anchor.nodes.iter().zip(anchor.weights) {
-                            of_nodes[node as usize] += block * (weight * weight);
-                        }
-                    }
+        let mut of_points = vec![DMat3::ZERO; self.active.len() + self.border.len()];
+        match &self.fine {
+            Fine::Cells(cells) => {
+                for cell in cells {
+                    let blocks = cell.rest.diagonal_n_per_m(materials.of(cell.tet as usize));
+                    cell.points.iter().zip(blocks).for_each(|(&point, block)| of_points[point as usize] += block);
                 }
+            }
+            Fine::Points(operator) => operator.add_diagonal_n_per_m(materials, &mut of_points),
+        }
+        for (anchor, block) in self.border.iter().zip(of_points.split_off(self.active.len())) {
+            for (&node, weight) in anchor.nodes.iter().zip(anchor.weights) {
+                of_nodes[node as usize] += block * (weight * weight);
             }
         }
         for (tet, share) in self.shares.iter().enumerate() {
             share.add_diagonal_n_per_m(materials.of(tet), &mut of_nodes);
         }
         let filled = |block: DMat3| if block == DMat3::ZERO { DMat3::IDENTITY } else { block };
-        of_nodes.into_iter().chain(of_particles).map(filled).collect()
+        of_nodes.into_iter().chain(of_points).map(filled).collect()
     }
 
     /// Of active particles, then of those of the border.
@@ -223,29 +279,12 @@ impl PatchCell {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::hybrid::testing::{Random, ball_in_cage, tissue};
+    use crate::hybrid::testing::{Random, ball_in_cage, moved, plus, random_like, tissue};
     use glam::DQuat;
 
     fn half_awake(partition: &Partition) -> Patch {
         let right = |&p: &u32| partition.particle_m(p).x > 0.2e-3;
         Patch::new(partition, &(0..partition.particle_count() as u32).filter(right).collect())
-    }
-
-    fn moved(field: &Field, map: impl Fn(DVec3) -> DVec3) -> Field {
-        Field {
-            nodes: field.nodes.iter().map(|p| map(*p)).collect(),
-            particles: field.particles.iter().map(|p| map(*p)).collect(),
-        }
-    }
-
-    fn random_like(field: &Field, size: f64, random: &mut Random) -> Field {
-        let mut shaken = |list: &[DVec3]| list.iter().map(|_| random.vector() * size).collect::<Vec<_>>();
-        Field { nodes: shaken(&field.nodes), particles: shaken(&field.particles) }
-    }
-
-    fn plus(a: &Field, b: &Field, s: f64) -> Field {
-        let sum = |a: &[DVec3], b: &[DVec3]| a.iter().zip(b).map(|(a, b)| *a + *b * s).collect();
-        Field { nodes: sum(&a.nodes, &b.nodes), particles: sum(&a.particles, &b.particles) }
     }
 
     /// Particles and nodes that no cut cell has anything to do with.
