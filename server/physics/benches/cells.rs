@@ -83,7 +83,7 @@ fn kernels(criterion: &mut Criterion) {
                     }
                     let mut kernel = CutCells::with_capacity(cells.len(), rest.len(), &[material], precision);
                     kernel = kernel.with_instruction_set(set);
-                    kernel.start(0, cells.len());
+                    kernel.start(0, cells.len(), false);
                     cells.iter().enumerate().for_each(|(c, (points, rest))| kernel.put(c, *points, rest));
                     kernel.set_displacements(&u);
                     group.bench_function(format!("{precision:?} {set:?}, as cut"), |b| {

@@ -9,7 +9,7 @@ use glam::DVec3;
 use palpate_physics::{
     Precision, Surface,
     contact::Coupling,
-    hybrid::{ParticleSpec, Skin, Waking},
+    hybrid::{ParticleSpec, Skin, Waking, wake_only},
     material::Law,
 };
 use rig::{Rig, body, bricks, even, hold, material, nodes_where, sphere};
@@ -38,7 +38,7 @@ fn pressed(active: usize) -> Rig {
         partition.particle_m(a).length_squared().total_cmp(&partition.particle_m(b).length_squared())
     });
     near.truncate(active);
-    rig.state.wake_only(&rig.model, near);
+    wake_only(&rig.model, &mut rig.state, &mut rig.scratch, near);
     for tick in 0..200 {
         rig.tick_at(DVec3::Z * (8e-3 - 2e-3 * f64::from(tick) / 200.0));
     }

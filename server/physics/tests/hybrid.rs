@@ -10,6 +10,7 @@ use palpate_physics::{
         equilibrium::equilibrium,
         patch::{Field, Patch},
         place::Place,
+        wake_only,
     },
     material::Law,
     snapshot,
@@ -67,7 +68,7 @@ fn damped_the_loop_comes_to_rest_where_newtons_method_says() {
     spec.settings.mass_damping_per_s = 40.0;
     let mut rig = Rig::new(spec);
     let awake = near(&rig, DVec3::ZERO, 10e-3);
-    rig.state.wake_only(&rig.model, awake);
+    wake_only(&rig.model, &mut rig.state, &mut rig.scratch, awake);
     assert!(rig.state.active.len() > 120, "{}", rig.state.active.len());
     let mut drive = rig.still();
     drive.load_factors = vec![1.0];
@@ -104,7 +105,7 @@ fn free_flight_keeps_momenta_and_energy() {
     for (x, v) in rig.state.x.iter().zip(&mut rig.state.v) {
         *v = DVec3::new(0.3, 0.0, 0.0) + DVec3::new(5.0, 0.0, 20.0).cross(*x) + DVec3::new(x.z, 0.0, x.x) * 8.0;
     }
-    rig.state.wake_only(&rig.model, awake);
+    wake_only(&rig.model, &mut rig.state, &mut rig.scratch, awake);
     assert!(rig.state.x.len() > nodes + 120);
     let hybrid = rig.model.hybrid().unwrap();
     let (linear, angular) = hybrid.momentum(&rig.state);
@@ -135,7 +136,7 @@ fn pressed(precision: Precision) -> Rig {
 fn a_sphere_is_pushed_back_with_the_work_it_does() {
     let mut rig = pressed(Precision::Double);
     let awake = near(&rig, DVec3::ZERO, 10e-3);
-    rig.state.wake_only(&rig.model, awake);
+    wake_only(&rig.model, &mut rig.state, &mut rig.scratch, awake);
     let balance = Energies::of(&rig.model, &rig.state).balance_j();
     for tick in 0..600 {
         let depth_m = 2e-3 * f64::from(tick.min(300)) / 300.0;
@@ -152,7 +153,7 @@ fn a_sphere_is_pushed_back_with_the_work_it_does() {
 fn what_was_saved_goes_on_with_the_same_bits() {
     let mut rig = pressed(Precision::Single);
     let awake = near(&rig, DVec3::ZERO, 9e-3);
-    rig.state.wake_only(&rig.model, awake);
+    wake_only(&rig.model, &mut rig.state, &mut rig.scratch, awake);
     let way = |tick: u32| DVec3::Z * (6e-3 - 2e-3 * (f64::from(tick) * 0.02).sin());
     for tick in 0..100 {
         rig.tick_at(way(tick));
@@ -179,7 +180,7 @@ fn looking_only_where_the_tool_may_be_costs_no_bit() {
         for tick in 0..400_u32 {
             if tick % 100 == 50 {
                 let awake = near(&rig, DVec3::X * 1e-4 * f64::from(tick), 8e-3);
-                rig.state.wake_only(&rig.model, awake);
+                wake_only(&rig.model, &mut rig.state, &mut rig.scratch, awake);
             }
             let s = f64::from(tick) * 0.02;
             rig.tick(&rig::Drive {
@@ -212,7 +213,8 @@ fn particles_wake_before_the_touch_follow_it_and_sleep_again() {
     };
     let (mut touched_at, mut woke_at, mut most, mut force_n, mut middles) = (None, None, 0, 0.0_f64, vec![]);
     for tick in 0..3500 {
-        rig.tick_at(way(tick));
+        let report = rig.tick_at(way(tick));
+        assert!(report.quarantined.is_none(), "{tick}: {:?}", report.quarantined);
         let active = &rig.state.active;
         most = most.max(active.len());
         woke_at = woke_at.or((!active.is_empty()).then_some(tick));
@@ -227,7 +229,7 @@ fn particles_wake_before_the_touch_follow_it_and_sleep_again() {
     let (touched_at, woke_at) = (touched_at.unwrap(), woke_at.unwrap());
     assert!(woke_at + 40 < touched_at && touched_at < 500, "{woke_at} {touched_at}");
     assert!(most > 100 && most <= 250 && force_n > 0.01, "{most} {force_n}");
-    assert!(middles[0] < -2e-3 && middles[middles.len() - 1] > 2e-3, "{middles:?}");
+    assert!(middles[0] < -3e-3 && middles[middles.len() - 1] > 2e-3, "{middles:?}");
     assert!(rig.state.active.is_empty(), "{} still awake", rig.state.active.len());
 }
 
@@ -256,4 +258,58 @@ fn momenta_stay_while_particles_wake_and_sleep_in_free_flight() {
     let (p, l) = rig.model.hybrid().unwrap().momentum(&rig.state);
     assert!((p - linear).length() < 1e-12 * linear.length(), "{p} {linear}");
     assert!((l - angular).length() < 1e-12 * angular.length(), "{l} {angular}");
+}
+
+/// Beside a sphere that presses, and moves a little, a region is switched on and off a hundred times a second.
+#[test]
+fn switching_a_strained_region_keeps_force_and_books_its_energy() {
+    let mut rig = pressed(Precision::Double);
+    let touched = near(&rig, DVec3::ZERO, 8e-3);
+    wake_only(&rig.model, &mut rig.state, &mut rig.scratch, touched.iter().copied());
+    for tick in 0..400 {
+        rig.tick_at(DVec3::Z * (6e-3 - 2.5e-3 * f64::from(tick.min(200)) / 200.0));
+    }
+    let beside: Vec<u32> = near(&rig, DVec3::X * 5e-3, 8e-3).into_iter().chain(touched.iter().copied()).collect();
+    let start = Energies::of(&rig.model, &rig.state);
+    let (mut worst_step, mut worst_residual, mut worst_jump) = (0.0_f64, 0.0_f64, f64::NEG_INFINITY);
+    for number in 0..100_u32 {
+        let awake = if number.is_multiple_of(2) { &beside } else { &touched };
+        let before = Energies::of(&rig.model, &rig.state);
+        wake_only(&rig.model, &mut rig.state, &mut rig.scratch, awake.iter().copied());
+        let after = Energies::of(&rig.model, &rig.state);
+        worst_residual = worst_residual.max((after.balance_j() - before.balance_j()).abs() / before.elastic_j);
+        worst_jump = worst_jump.max((after.held_j() - before.held_j()) / before.elastic_j);
+        for tick in 0..5 {
+            let force_n = rig.state.tools[0].contact_force_n;
+            rig.tick_at(DVec3::Z * (3.5e-3 + 1e-4 * (f64::from(5 * number + tick) * 0.02).sin()));
+            let now_n = rig.state.tools[0].contact_force_n;
+            worst_step = worst_step.max(now_n.distance(force_n) / force_n.length());
+        }
+    }
+    let end = Energies::of(&rig.model, &rig.state);
+    let drift = (end.balance_j() - start.balance_j()) / start.elastic_j;
+    assert!(drift.abs() < 2e-2, "{drift:e}");
+    assert!(worst_residual < 1e-9, "{worst_residual:e}");
+    assert!(worst_jump < 1e-9, "{worst_jump:e}");
+    assert!(worst_step < 1e-2, "{worst_step:e}");
+}
+
+/// All particles beneath a sphere that already presses wake at once: it feels them come within some hundredths of a second.
+#[test]
+fn waking_beneath_the_tool_is_not_felt_as_a_step() {
+    let mut rig = pressed(Precision::Double);
+    for tick in 0..500 {
+        rig.tick_at(DVec3::Z * (6e-3 - 1.5e-3 * f64::from(tick.min(200)) / 200.0));
+    }
+    let coarse_n = rig.state.tools[0].contact_force_n.z;
+    let touched = near(&rig, DVec3::ZERO, 10e-3);
+    wake_only(&rig.model, &mut rig.state, &mut rig.scratch, touched);
+    let mut worst = 0.0_f64;
+    for _ in 0..300 {
+        let before_n = rig.state.tools[0].contact_force_n;
+        rig.tick_at(DVec3::Z * 4.5e-3);
+        worst = worst.max(rig.state.tools[0].contact_force_n.distance(before_n) / before_n.length());
+    }
+    let fine_n = rig.state.tools[0].contact_force_n.z;
+    assert!(fine_n < 0.8 * coarse_n && worst < 0.05, "{coarse_n} {fine_n} {worst}");
 }

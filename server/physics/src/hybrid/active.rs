@@ -1,6 +1,9 @@
 //! Which particles are active, as the state keeps it; and what the loop works in.
 use super::{
+    balance::Balance,
     body::Hybrid,
+    fade::Fading,
+    handover::Before,
     listed::ListedSkin,
     running::RunningPatch,
     switching::{Ball, Looking},
@@ -15,16 +18,24 @@ pub struct ActiveParticles {
     ids: Vec<u32>,
     /// Of every tool.
     pub(super) balls: Vec<Option<Ball>>,
+    pub(super) fading: Fading,
+    /// Balancing forces (N), as many as positions, or none.
+    pub(super) balance_n: Vec<DVec3>,
 }
 
 impl ActiveParticles {
     pub(crate) fn none(model: &Model) -> Self {
-        Self { ids: Vec::with_capacity(room(model)), balls: vec![None; tools(model)] }
+        Self { ids: Vec::with_capacity(room(model)), balls: vec![None; tools(model)], fading: fading_with_room(model), balance_n: Vec::with_capacity(entries(model)) }
     }
 
     /// Their numbers.
     pub fn ids(&self) -> &[u32] {
         &self.ids
+    }
+
+    /// What of them and of the coarse tets woke or fell asleep strained.
+    pub fn fading(&self) -> &Fading {
+        &self.fading
     }
 
     /// How many.
@@ -37,14 +48,25 @@ impl ActiveParticles {
         self.ids.is_empty()
     }
 
+    /// Whether an active particle is at a cell.
+    fn touches(&self, model: &Model, cell: u32) -> bool {
+        let Some(partition) = model.hybrid().map(Hybrid::partition) else { return false };
+        let is_active = |particle: &u32| self.ids.binary_search(particle).is_ok();
+        (cell as usize) < partition.cells().len() && partition.corners(cell as usize).iter().any(is_active)
+    }
+
     pub(crate) fn clear(&mut self) {
         self.ids.clear();
         self.balls.fill(None);
+        self.fading.clear();
+        self.balance_n.clear();
     }
 
     pub(crate) fn copy_from(&mut self, other: &Self) {
         self.ids.clone_from(&other.ids);
         self.balls.clone_from(&other.balls);
+        self.fading.copy_from(&other.fading);
+        self.balance_n.clone_from(&other.balance_n);
     }
 
     /// Whether they are ascending, may be awake, and have room.
@@ -53,6 +75,13 @@ impl ActiveParticles {
         let finite = |ball: &Ball| ball.rest_m.is_finite();
         self.balls.len() == tools(model)
             && self.balls.iter().flatten().all(finite)
+            && self.fading.is_finite()
+            && [0, model.rest_positions_m().len() + self.ids.len()].contains(&self.balance_n.len())
+            && self.balance_n.iter().all(|force| force.is_finite())
+            && self.fading.cells.is_sorted_by(|a, b| a.cell < b.cell)
+            && self.fading.tets.is_sorted_by(|a, b| a.tet < b.tet)
+            && self.fading.cells.iter().all(|fade| self.touches(model, fade.cell))
+            && self.fading.tets.iter().all(|fade| (fade.tet as usize) < model.mesh().tets().len())
             && self.ids.len() <= room(model)
             && self.ids.is_sorted_by(|a, b| a < b)
             && self.ids.iter().all(may_wake)
@@ -60,8 +89,23 @@ impl ActiveParticles {
 }
 
 /// Most active particles of a model.
-fn room(model: &Model) -> usize {
+pub(super) fn room(model: &Model) -> usize {
     model.spec().particles.as_ref().map_or(0, |particles| particles.most_active)
+}
+
+/// Most coarse nodes and active particles of a model.
+fn entries(model: &Model) -> usize {
+    model.hybrid().map_or(0, |body| body.node_count() + room(model))
+}
+
+/// Most awake cells of a model.
+pub(super) fn room_for_cells(body: &Hybrid, most_active: usize) -> usize {
+    (8 * most_active).min(body.partition().cells().len())
+}
+
+fn fading_with_room(model: &Model) -> Fading {
+    let of = |body: &Hybrid| Fading::with_room(room_for_cells(body, room(model)), body.partition().shares().len());
+    model.hybrid().map_or_else(Fading::default, of)
 }
 
 /// Tools that may keep particles awake.
@@ -77,13 +121,17 @@ pub(crate) struct HybridScratch {
     pub(crate) accelerations: Vec<DVec3>,
     pub(crate) momenta: Vec<DVec3>,
     pub(super) looking: Looking,
+    pub(super) before: Before,
+    pub(crate) balance: Balance,
+    /// Something faded since the state's forces were computed.
+    pub(crate) forces_are_stale: bool,
 }
 
 impl HybridScratch {
     pub(crate) fn new(model: &Model) -> Option<Self> {
         let (body, most) = (model.hybrid()?, room(model));
         let mut patch = RunningPatch::new(body, most, model.spec().settings.precision);
-        patch.wake(body, &[]);
+        patch.wake(body, &[], &Fading::default());
         let entries = body.node_count() + most;
         Some(Self {
             patch,
@@ -91,29 +139,21 @@ impl HybridScratch {
             accelerations: Vec::with_capacity(entries),
             momenta: Vec::with_capacity(entries),
             looking: Looking::new(model, body),
+            before: Before::with_room(room_for_cells(body, most), body.partition().shares().len()),
+            balance: Balance::with_room(entries),
+            forces_are_stale: false,
         })
     }
 
     /// Makes the patch that of the state's active particles. Allocates nothing.
     pub(super) fn follow(&mut self, body: &Hybrid, active: &ActiveParticles) {
-        if self.patch.active() != active.ids() {
-            self.patch.wake(body, active.ids());
+        if self.patch.active() != active.ids() || !self.patch.is_laid_out_for(&active.fading) {
+            self.patch.wake(body, active.ids(), &active.fading);
         }
     }
 }
 
 impl State {
-    /// Wakes these particles and no others: what was active goes on, what wakes moves as the coarse nodes have moved it. Particles that may not wake
-    /// ([`Hybrid::may_wake`]), and those for which there is no room, are left out.
-    pub fn wake_only(&mut self, model: &Model, particles: impl IntoIterator<Item = u32>) {
-        let Some(body) = model.hybrid() else { return };
-        let mut wanted: Vec<u32> = particles.into_iter().filter(|&particle| body.may_wake(particle)).collect();
-        wanted.sort_unstable();
-        wanted.dedup();
-        wanted.truncate(room(model));
-        self.switch(body, &wanted, &mut Vec::with_capacity(wanted.len()));
-    }
-
     /// `wanted` is ascending; `moved` a buffer. Allocates nothing where there is room.
     pub(super) fn switch(&mut self, body: &Hybrid, wanted: &[u32], moved: &mut Vec<DVec3>) {
         if self.active.ids == wanted {
@@ -135,6 +175,7 @@ impl State {
         }
         self.active.ids.clear();
         self.active.ids.extend_from_slice(wanted);
+        self.active.balance_n.clear();
         self.force_is_current = false;
     }
 }

@@ -1,12 +1,14 @@
 //! A hybrid body: all that its rest state fixes.
 use super::{
+    balance::is_free,
     cage::{self, Cage},
+    cell::RestCell,
     clusters::SkinClusters,
     composite::Composite,
     metric::Masses,
     moments::{CellMoments, integrate},
     partition::Partition,
-    patch::Materials,
+    patch::{KEPT, Materials},
     place::{Place, SkinPlace},
     sites::Sites,
     skin::Skin,
@@ -32,6 +34,8 @@ pub struct Hybrid {
     pub(super) of_tet: Vec<u16>,
     /// Axes along which coarse nodes may move.
     pub(super) free: Vec<BVec3>,
+    /// It is held nowhere.
+    pub(super) is_free: bool,
     /// Which particles may wake: those that follow only free nodes, and lie within the coarse tets.
     pub(super) may_wake: Vec<bool>,
     /// Where the skin's vertices are.
@@ -106,10 +110,10 @@ impl Hybrid {
             .map(|p| partition.anchor(p).weights.iter().map(|w| w.abs()).sum())
             .fold(1.0, f64::max);
         let hybrid = Self {
-            masses,
             materials: materials.to_vec(),
             densities_kg_per_m3: densities_kg_per_m3.to_vec(),
             of_tet: of_tet.to_vec(),
+            is_free: is_free(&masses.node_kg, &free),
             free,
             may_wake,
             places,
@@ -117,6 +121,7 @@ impl Hybrid {
             clusters: SkinClusters::default(),
             cage,
             partition,
+            masses,
         };
         Ok(Built { hybrid, mesh, prescribed })
     }
@@ -149,6 +154,21 @@ impl Hybrid {
     /// Whether a particle may wake.
     pub fn may_wake(&self, particle: u32) -> bool {
         self.may_wake.get(particle as usize).copied().unwrap_or(false)
+    }
+
+    /// Rest data of a cell that is awake.
+    pub(super) fn awake_cell(&self, cell: usize) -> RestCell {
+        RestCell::new(self.partition.sites().spacing_m(), 1.0 - KEPT, &self.partition.moments(cell))
+    }
+
+    /// The material of a coarse tet.
+    pub(super) fn material_of_tet(&self, tet: u32) -> &Material {
+        &self.materials[self.of_tet[tet as usize] as usize]
+    }
+
+    /// The material of a cell.
+    pub(super) fn material_of_cell(&self, cell: usize) -> &Material {
+        self.material_of_tet(self.partition.cells()[cell].tet)
     }
 
     /// Where a vertex of the skin is.

@@ -11,7 +11,7 @@ use std::collections::BTreeSet;
 impl Hybrid {
     fn patch_of(&self, state: &State) -> (Patch, BTreeSet<u32>) {
         let active: BTreeSet<u32> = state.active.ids().iter().copied().collect();
-        (Patch::new(&self.partition, &active), active)
+        (Patch::new(&self.partition, &active).with_fading(state.active.fading().clone()), active)
     }
 
     fn field(&self, list: &[DVec3]) -> Field {

@@ -11,7 +11,7 @@ use super::{
 use crate::{
     fem::element::outer,
     integrate::spectrum::{lanczos, largest_eigenvalue},
-    material::{Lame, Material, stvk::trace},
+    material::{Lame, stvk::trace},
 };
 use glam::{DMat3, DVec3};
 
@@ -29,10 +29,6 @@ impl Hybrid {
         let root_inverse_mass: Vec<DVec3> = self.masses.particle_kg.iter().map(root).collect();
         let (theta, residual) = lanczos(&mut |a, out| self.apply(springs_n_per_m, a, out), &root_inverse_mass);
         ((theta + residual).min(bound_sq) / (1.0 - KEPT)).sqrt()
-    }
-
-    fn material_of_cell(&self, cell: usize) -> &Material {
-        &self.materials[self.of_tet[self.partition.cells()[cell].tet as usize] as usize]
     }
 
     /// `out ← K a` with all particles awake.

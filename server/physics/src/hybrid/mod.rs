@@ -1,5 +1,6 @@
 //! The hybrid body: coarse tetrahedra throughout, and particles of which only those near a contact are awake.
 mod active;
+mod balance;
 pub mod body;
 pub mod cage;
 pub mod cell;
@@ -7,7 +8,9 @@ pub mod clusters;
 pub mod composite;
 mod energy;
 pub mod equilibrium;
+pub mod fade;
 mod frequency;
+mod handover;
 pub mod kernels;
 mod least_squares;
 mod listed;
@@ -38,4 +41,5 @@ pub(crate) use active::HybridScratch;
 pub use body::Hybrid;
 pub(crate) use listed::SkinView;
 pub use skin::{Skin, SkinError};
+pub use switching::wake_only;
 pub use spec::{HybridError, ParticleSpec, Waking};

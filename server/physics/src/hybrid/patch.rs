@@ -12,6 +12,7 @@
 use super::{
     cell::RestCell,
     composite::Anchor,
+    fade::Fading,
     partition::Partition,
     points::{Handed, Operator, Points},
     share::Share,
@@ -33,6 +34,8 @@ pub struct Patch {
     fine: Fine,
     /// What is left to each coarse tet.
     shares: Vec<Share>,
+    /// What woke or fell asleep strained.
+    fading: Fading,
 }
 
 /// What integrates the awake volume.
@@ -44,6 +47,7 @@ enum Fine {
 
 #[derive(Debug, Clone)]
 struct PatchCell {
+    number: u32,
     rest: RestCell,
     /// Active particles, then those of the border.
     points: [u32; 8],
@@ -104,10 +108,10 @@ impl Patch {
                         (active.len() + border.len()) as u32 - 1
                     })
                 });
-                PatchCell { rest: RestCell::new(spacing_m, 1.0 - KEPT, &moments), points, tet: cell.tet }
+                PatchCell { number: number as u32, rest: RestCell::new(spacing_m, 1.0 - KEPT, &moments), points, tet: cell.tet }
             })
             .collect();
-        Self { active, border, fine: Fine::Cells(cells), shares }
+        Self { active, border, fine: Fine::Cells(cells), shares, fading: Fading::default() }
     }
 
     /// Wakes these particles, with the points of a method.
@@ -127,7 +131,13 @@ impl Patch {
             let anchors = partition.corners(number).map(|particle| partition.anchor(particle));
             shares[cell.tet as usize].add(cell.part, part * (KEPT - 1.0), moments.0, &moments.1, &anchors);
         }
-        Self { active, border, fine: Fine::Points(operator), shares }
+        Self { active, border, fine: Fine::Points(operator), shares, fading: Fading::default() }
+    }
+
+    /// The same patch with what fades in it; products leave that out.
+    #[must_use]
+    pub fn with_fading(self, fading: Fading) -> Self {
+        Self { fading, ..self }
     }
 
     /// Active particles, ascending.
@@ -157,13 +167,22 @@ impl Patch {
     /// Elastic energy (J).
     pub fn energy_j(&self, materials: &Materials<'_>, at: &Field) -> f64 {
         let points = self.points(at);
-        let of_cell = |cell: &PatchCell| cell.rest.energy_j(materials.of(cell.tet as usize), &cell.of(&points));
+        let of_cell = |cell: &PatchCell| {
+            let (material, y) = (materials.of(cell.tet as usize), cell.of(&points));
+            match self.fading.of_cell(cell.number) {
+                Some(fade) => fade.energy_j(&cell.rest, material, &y),
+                None => cell.rest.energy_j(material, &y),
+            }
+        };
         let fine: f64 = match &self.fine {
             Fine::Cells(cells) => cells.iter().map(of_cell).sum(),
             Fine::Points(operator) => operator.energy_j(materials, &points),
         };
-        let shares = self.shares.iter().enumerate().map(|(tet, share)| share.energy_j(materials.of(tet), &at.nodes));
-        fine + shares.sum::<f64>()
+        let of_share = |(tet, share): (usize, &Share)| match self.fading.of_tet(tet as u32) {
+            Some(fade) => fade.energy_j(share, materials.of(tet), &at.nodes),
+            None => share.energy_j(materials.of(tet), &at.nodes),
+        };
+        fine + self.shares.iter().enumerate().map(of_share).sum::<f64>()
     }
 
     /// Smallest `det F` of coarse tets' means and cells, and its tet.
@@ -188,8 +207,11 @@ impl Patch {
         match &self.fine {
             Fine::Cells(cells) => {
                 for cell in cells {
-                    let (forces, power) =
-                        cell.rest.forces_n(materials.of(cell.tet as usize), &cell.of(&points), &cell.of(&rates));
+                    let (material, y, rate) = (materials.of(cell.tet as usize), cell.of(&points), cell.of(&rates));
+                    let (forces, power) = match self.fading.of_cell(cell.number) {
+                        Some(fade) => fade.forces_n(&cell.rest, material, &y, &rate),
+                        None => cell.rest.forces_n(material, &y, &rate),
+                    };
                     cell.add(&forces, &mut of_points);
                     power_w += power;
                 }
@@ -197,7 +219,11 @@ impl Patch {
             Fine::Points(operator) => power_w += operator.add_forces_n(materials, &points, &rates, &mut of_points),
         }
         for (tet, share) in self.shares.iter().enumerate() {
-            power_w += share.add_forces_n(materials.of(tet), &at.nodes, &rate.nodes, &mut nodes);
+            let material = materials.of(tet);
+            power_w += match self.fading.of_tet(tet as u32) {
+                Some(fade) => fade.add_forces_n(share, material, &at.nodes, &rate.nodes, &mut nodes),
+                None => share.add_forces_n(material, &at.nodes, &rate.nodes, &mut nodes),
+            };
         }
         (self.handed_back(nodes, of_points), power_w)
     }

@@ -2,9 +2,11 @@
 //!
 //! *Points* are the particles of awake cells, ascending: those that are active, and those of the border, which follow the coarse nodes.
 use super::{
+    active::room_for_cells,
     body::Hybrid,
     cell::RestCell,
     composite::Anchor,
+    fade::Fading,
     partition::{Cell, NONE},
     patch::KEPT,
     running_metric::RunningMetric,
@@ -32,6 +34,8 @@ pub(crate) struct RunningPatch {
     rows: Vec<CellRow>,
     values: RowValues,
     cut: CutCells,
+    fading_cells: Vec<FadingCell>,
+    fading_tets: Vec<u32>,
     /// What is left to each coarse tet.
     shares: Vec<Share>,
     share_kernel: ShareKernel,
@@ -48,6 +52,24 @@ pub(crate) struct RunningPatch {
     number: u64,
 }
 
+/// How a cell is laid out.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Kind {
+    Full,
+    Cut,
+    Fading,
+}
+
+/// Where a cell that fades is laid out.
+#[derive(Debug, Clone)]
+pub(super) struct FadingCell {
+    pub(super) cell: u32,
+    run: usize,
+    number: usize,
+    pub(super) points: [u32; 8],
+    pub(super) rest: RestCell,
+}
+
 #[derive(Debug, Clone, Copy)]
 struct Point {
     particle: u32,
@@ -61,7 +83,7 @@ impl RunningPatch {
     /// Room for `most_active` particles, none awake.
     pub(crate) fn new(hybrid: &Hybrid, most_active: usize, precision: Precision) -> Self {
         let partition = &hybrid.partition;
-        let most_cells = (8 * most_active).min(partition.cells().len());
+        let most_cells = room_for_cells(hybrid, most_active);
         let most_points = (27 * most_active).min(partition.particle_count());
         let kernel = RowKernel::new(partition.sites().spacing_m(), 1.0 - KEPT, &hybrid.materials, precision);
         Self {
@@ -82,6 +104,8 @@ impl RunningPatch {
                 precision,
             ),
             shares: partition.shares().to_vec(),
+            fading_cells: Vec::with_capacity(most_cells),
+            fading_tets: Vec::with_capacity(partition.shares().len()),
             taken_from: Vec::with_capacity(partition.shares().len()),
             metric: RunningMetric::new(hybrid, most_active),
             node_displacements_m: vec![DVec3::ZERO; hybrid.node_count()],
@@ -133,6 +157,46 @@ impl RunningPatch {
         self.deviations_m().map(|(_, deviation_m)| deviation_m).fold(0.0, f64::max)
     }
 
+    /// Awake cells, ascending.
+    pub(super) fn cells(&self) -> &[u32] {
+        &self.cells
+    }
+
+    /// Whether a cell is awake.
+    pub(super) fn is_awake(&self, cell: u32) -> bool {
+        self.is_awake[cell as usize]
+    }
+
+    /// Coarse tets that have lost some of their cells.
+    pub(super) fn taken_from(&self) -> &[u32] {
+        &self.taken_from
+    }
+
+    /// What is left to a coarse tet.
+    pub(super) fn share(&self, tet: u32) -> &Share {
+        &self.shares[tet as usize]
+    }
+
+    /// Cells laid out to fade, ascending.
+    pub(super) fn fading_cells(&self) -> &[FadingCell] {
+        &self.fading_cells
+    }
+
+    /// Coarse tets that fade.
+    pub(super) fn fading_tets(&self) -> &[u32] {
+        &self.fading_tets
+    }
+
+    /// Positions (m) of points.
+    pub(super) fn positions_m(&self, points: [u32; 8]) -> [DVec3; 8] {
+        points.map(|point| self.points[point as usize].rest_m + self.displacements_m[point as usize])
+    }
+
+    /// Positions (m) of the particles of an awake cell.
+    pub(super) fn corners_m(&self, hybrid: &Hybrid, cell: u32) -> [DVec3; 8] {
+        self.positions_m(hybrid.partition.corners(cell as usize).map(|particle| self.point_of[particle as usize]))
+    }
+
     /// Hands a force (N) on a point to the particle or the coarse nodes that move it.
     pub(super) fn push(&self, point: u32, force_n: DVec3, nodes: usize, forces_n: &mut [DVec3]) {
         let point = &self.points[point as usize];
@@ -148,14 +212,19 @@ impl RunningPatch {
         &self.active
     }
 
-    /// Wakes these particles (ascending, no more than there is room for) and no others. Allocates nothing.
-    pub(crate) fn wake(&mut self, hybrid: &Hybrid, active: &[u32]) {
+    /// Wakes these particles (ascending, no more than there is room for) and no others, of which this fades. Allocates nothing.
+    pub(crate) fn wake(&mut self, hybrid: &Hybrid, active: &[u32], fading: &Fading) {
+        self.set(hybrid, active);
+        self.lay_out(hybrid, fading);
+    }
+
+    /// The first part of [`Self::wake`]: all but the kernels' layout of cells.
+    pub(super) fn set(&mut self, hybrid: &Hybrid, active: &[u32]) {
         self.forget(hybrid);
         self.number += 1;
         self.active.extend_from_slice(active);
         self.find_cells(hybrid);
         self.find_points(hybrid);
-        self.lay_out(hybrid);
         self.take_from_shares(hybrid);
         let points = &self.points;
         let followed = points.iter().filter(|point| point.active != NONE).map(|point| (point.particle, point.anchor));
@@ -179,8 +248,6 @@ impl RunningPatch {
         self.active.clear();
         self.points.clear();
         self.cells.clear();
-        self.rows.clear();
-        self.cut.clear();
     }
 
     fn find_cells(&mut self, hybrid: &Hybrid) {
@@ -218,21 +285,28 @@ impl RunningPatch {
         self.displacements_m.resize(self.points.len(), DVec3::ZERO);
     }
 
-    /// Rows of full cells and blocks of cut ones, material by material.
-    fn lay_out(&mut self, hybrid: &Hybrid) {
+    /// Rows of full cells, blocks of cut ones and blocks of those that fade, material by material.
+    pub(super) fn lay_out(&mut self, hybrid: &Hybrid, fading: &Fading) {
         let partition = &hybrid.partition;
-        let spacing_m = partition.sites().spacing_m();
+        self.rows.clear();
+        self.cut.clear();
+        self.fading_cells.clear();
+        let point_of = &self.point_of;
+        let points_of = |cell: usize| partition.corners(cell).map(|particle| point_of[particle as usize]);
         for material in 0..hybrid.materials.len() as u16 {
-            let point_of = &self.point_of;
-            let of_material = |is_cut: bool| {
+            let kind_of = |cell: usize| match fading.of_cell(cell as u32) {
+                Some(_) => Kind::Fading,
+                None if partition.is_cut(cell) => Kind::Cut,
+                None => Kind::Full,
+            };
+            let of_kind = |kind: Kind| {
                 self.cells.iter().map(|&cell| cell as usize).filter(move |&cell| {
-                    let Cell { tet, .. } = partition.cells()[cell];
-                    partition.is_cut(cell) == is_cut && hybrid.of_tet[tet as usize] == material
+                    let tet = partition.cells()[cell].tet;
+                    hybrid.of_tet[tet as usize] == material && kind_of(cell) == kind
                 })
             };
-            let points_of = |cell: usize| partition.corners(cell).map(|particle| point_of[particle as usize]);
             let first_row = self.rows.len();
-            for cell in of_material(false) {
+            for cell in of_kind(Kind::Full) {
                 let points = points_of(cell);
                 let points = [points[0], points[2], points[4], points[6]];
                 match self.rows[first_row..].last_mut() {
@@ -240,12 +314,45 @@ impl RunningPatch {
                     _ => self.rows.push(CellRow { points, cells: 1, material }),
                 }
             }
-            let count = of_material(true).count();
-            self.cut.start(material, count);
-            for (number, cell) in of_material(true).enumerate() {
-                let rest = RestCell::new(spacing_m, 1.0 - KEPT, &partition.moments(cell));
-                self.cut.put(number, points_of(cell), &rest);
+            for kind in [Kind::Cut, Kind::Fading] {
+                let count = of_kind(kind).count();
+                if count == 0 {
+                    continue;
+                }
+                let run = self.cut.runs();
+                self.cut.start(material, count, kind == Kind::Fading);
+                for (number, cell) in of_kind(kind).enumerate() {
+                    let (rest, points) = (hybrid.awake_cell(cell), points_of(cell));
+                    self.cut.put(number, points, &rest);
+                    if kind == Kind::Fading {
+                        self.fading_cells.push(FadingCell { cell: cell as u32, run, number, points, rest });
+                    }
+                }
             }
+        }
+        self.fading_cells.sort_unstable_by_key(|fading| fading.cell);
+        self.put_fades(fading);
+    }
+
+    /// Whether the cells that fade are those that are laid out so.
+    pub(super) fn is_laid_out_for(&self, fading: &Fading) -> bool {
+        self.fading_cells.iter().map(|own| own.cell).eq(fading.cells.iter().map(|fade| fade.cell))
+    }
+
+    /// Gives the kernels how far everything has faded. The cells are those of [`Self::lay_out`].
+    pub(super) fn put_fades(&mut self, fading: &Fading) {
+        for (own, fade) in self.fading_cells.iter().zip(&fading.cells) {
+            self.cut.put_fade(own.run, own.number, fade);
+        }
+        for &tet in &self.fading_tets {
+            if fading.of_tet(tet).is_none() {
+                self.share_kernel.put_fade(tet as usize, None);
+            }
+        }
+        self.fading_tets.clear();
+        for fade in &fading.tets {
+            self.fading_tets.push(fade.tet);
+            self.share_kernel.put_fade(fade.tet as usize, Some(fade));
         }
     }
 
@@ -366,7 +473,7 @@ mod tests {
                 let near = |p: DVec3| p.distance(DVec3::new(2e-3, 1e-3, 9e-3)) < 4e-3;
                 let far = |p: DVec3| near(p) || p.distance(DVec3::new(-8e-3, 0.0, 0.0)) < 3e-3;
                 for active in [some(&hybrid, near), some(&hybrid, far), vec![], some(&hybrid, |p| p.x > 0.2e-3)] {
-                    running.wake(&hybrid, &active);
+                    running.wake(&hybrid, &active, &Fading::default());
                     let set: BTreeSet<u32> = active.iter().copied().collect();
                     let patch = Patch::new(&hybrid.partition, &set);
                     let rest = patch.at_rest(&hybrid.partition);

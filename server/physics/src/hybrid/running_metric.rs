@@ -166,6 +166,23 @@ impl RunningMetric {
         }
     }
 
+    /// Kinetic and gravitational energy (J) of coarse nodes and active particles. `momenta` is a buffer.
+    pub(super) fn moving_j(
+        &self,
+        hybrid: &Hybrid,
+        (x, v): (&[DVec3], &[DVec3]),
+        gravity_m_per_s2: DVec3,
+        momenta: &mut Vec<DVec3>,
+    ) -> f64 {
+        momenta.clear();
+        momenta.resize(v.len(), DVec3::ZERO);
+        self.momenta(hybrid, v, momenta);
+        let kinetic_j: f64 = momenta.iter().zip(v).map(|(p, v)| 0.5 * p.dot(*v)).sum();
+        // Rest positions are left out: what falls asleep and what wakes has the same ones.
+        let moment: DVec3 = x.iter().zip(self.weight_kg.iter().chain(&self.particle_kg)).map(|(x, m)| *x * *m).sum();
+        kinetic_j - gravity_m_per_s2.dot(moment)
+    }
+
     /// Multiplies velocities on free axes by a factor; returns what they had before, `v·M' v` (J). `momenta` is a buffer.
     pub(crate) fn damped(&self, hybrid: &Hybrid, v: &mut [DVec3], factor: f64, momenta: &mut Vec<DVec3>) -> f64 {
         momenta.clear();

@@ -43,7 +43,7 @@ impl Share {
     }
 
     /// `F_g` of every part of positions, or its rate of velocities; the identity's or zero where a part is empty.
-    fn gradients(&self, a: &[DVec3], empty: DMat3) -> [DMat3; PARTS] {
+    pub(super) fn gradients(&self, a: &[DVec3], empty: DMat3) -> [DMat3; PARTS] {
         let mut gradients = [DMat3::ZERO; PARTS];
         let Some(&first) = self.nodes.first() else { return [empty; PARTS] };
         for (&node, moments) in self.nodes.iter().zip(&self.moments_m2) {
@@ -60,7 +60,7 @@ impl Share {
     }
 
     /// `Σ_g V_g A_g / V_e`.
-    fn mean(&self, of_parts: &[DMat3; PARTS]) -> DMat3 {
+    pub(super) fn mean(&self, of_parts: &[DMat3; PARTS]) -> DMat3 {
         let sum = of_parts.iter().zip(self.volume_m3).fold(DMat3::ZERO, |sum, (a, volume)| sum + *a * volume);
         sum * (1.0 / self.total_m3())
     }
@@ -98,14 +98,27 @@ impl Share {
         let mut stresses = gradients.map(|f| of_shape.piola(&f) + pressure);
         let mut power_w = 0.0;
         if !material.viscosity.is_zero() {
-            let rates = self.gradients(v, DMat3::ZERO);
-            for part in 0..PARTS {
-                let (f, rate) = (&gradients[part], &rates[part]);
-                stresses[part] += viscous::piola(material.viscosity, f, rate);
-                power_w += self.volume_m3[part] * viscous::power_density(material.viscosity, f, rate);
-            }
+            power_w = self.add_viscous_pa(material, &gradients, v, &mut stresses);
         }
         self.scatter(&stresses, forces_n);
+        power_w
+    }
+
+    /// Adds viscous stress (Pa) to the parts'; returns the power (W) that it takes.
+    pub(super) fn add_viscous_pa(
+        &self,
+        material: &Material,
+        gradients: &[DMat3; PARTS],
+        v: &[DVec3],
+        stresses: &mut [DMat3; PARTS],
+    ) -> f64 {
+        let rates = self.gradients(v, DMat3::ZERO);
+        let mut power_w = 0.0;
+        for part in 0..PARTS {
+            let (f, rate) = (&gradients[part], &rates[part]);
+            stresses[part] += viscous::piola(material.viscosity, f, rate);
+            power_w += self.volume_m3[part] * viscous::power_density(material.viscosity, f, rate);
+        }
         power_w
     }
 
@@ -137,7 +150,7 @@ impl Share {
         }
     }
 
-    fn scatter(&self, stresses: &[DMat3; PARTS], forces_n: &mut [DVec3]) {
+    pub(super) fn scatter(&self, stresses: &[DMat3; PARTS], forces_n: &mut [DVec3]) {
         for (&node, moments) in self.nodes.iter().zip(&self.moments_m2) {
             for (stress, moment) in stresses.iter().zip(moments) {
                 forces_n[node as usize] -= *stress * *moment;

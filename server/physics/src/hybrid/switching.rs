@@ -12,15 +12,17 @@
 //! ```
 //! with the matrix `M''` of what stays awake: linear and angular momentum are kept.
 use super::{
-    active::{ActiveParticles, HybridScratch},
+    active::{ActiveParticles, HybridScratch, room},
+    balance::{Turn, turn_of},
     body::Hybrid,
+    fade,
     listed::SkinView,
     patch::KEPT,
     running::RunningPatch,
     spec::Waking,
 };
-use crate::world::{Model, State};
-use glam::{BVec3, DMat3, DVec3};
+use crate::world::{Model, Scratch, State};
+use glam::{BVec3, DVec3};
 use serde::{Deserialize, Serialize};
 
 /// Ticks between two looks.
@@ -31,6 +33,8 @@ const AHEAD_S: f64 = 0.05;
 const AWAY_TICKS: u32 = 100;
 /// Gap over the tool's radius, and over the spacing, from which its particles are awake.
 const GAP: f64 = 0.25;
+/// Way over the spacing that the skin's nearest point goes before a ball follows.
+const FOLLOW: f64 = 0.9;
 /// Deviation over the spacing below which a particle may fall asleep.
 const SETTLED: f64 = 0.01;
 
@@ -55,6 +59,10 @@ pub(super) struct Looking {
     moved: Vec<DVec3>,
     /// Momenta (kg m/s) handed to coarse nodes.
     impulses: Vec<DVec3>,
+    /// Forces (N) handed to them.
+    handed_n: Vec<DVec3>,
+    /// Active particles that were.
+    left: Vec<u32>,
     /// Masses (kg) of the free nodes of tets in which particles fall asleep, 0 of others.
     weights_kg: Vec<f64>,
 }
@@ -74,6 +82,8 @@ impl Looking {
             unwanted: Vec::with_capacity(most),
             moved: Vec::with_capacity(most),
             impulses: Vec::with_capacity(body.node_count() + most),
+            handed_n: Vec::with_capacity(body.node_count()),
+            left: Vec::with_capacity(most),
             weights_kg: Vec::with_capacity(body.node_count()),
         }
     }
@@ -83,6 +93,9 @@ impl HybridScratch {
     /// Before a tick: makes the patch that of the state's active particles, and now and then looks which should be. Allocates nothing.
     pub(crate) fn prepare(&mut self, model: &Model, body: &Hybrid, state: &mut State) {
         self.follow(body, &state.active);
+        if !state.active.fading.is_empty() || !state.active.balance_n.is_empty() {
+            self.fade(model, body, state);
+        }
         let Some(particles) = &model.spec().particles else { return };
         let Waking::ByTools { reach_m } = particles.waking else { return };
         if !state.tick.is_multiple_of(LOOK_EVERY_TICKS) {
@@ -94,29 +107,62 @@ impl HybridScratch {
         self.looking.want(body, &state.active, reach_m, particles.most_active);
         self.looking.keep_unsettled(&self.patch, particles);
         if self.looking.wanted != state.active.ids() {
-            self.switch(body, state);
+            self.switch(model, body, state);
         }
     }
 
+    /// A tick's fading, and what it gives or takes.
+    fn fade(&mut self, model: &Model, body: &Hybrid, state: &mut State) {
+        let State { x, active, ledger, .. } = state;
+        self.patch.displace(body, x);
+        let before_j = self.patch.fading_j(body, x, &active.fading);
+        let factor = fade::factor(model.spec().settings.tick_period_s);
+        active.fading.fade(factor);
+        active.balance_n.iter_mut().for_each(|balance| *balance *= factor);
+        let has_faded = active.fading.forget_faded();
+        ledger.dissipated_j += before_j - self.patch.fading_j(body, x, &active.fading);
+        if has_faded {
+            self.patch.lay_out(body, &active.fading);
+        } else {
+            self.patch.put_fades(&active.fading);
+        }
+        self.forces_are_stale = true;
+    }
+
     /// Goes over to the particles in `looking.wanted`.
-    fn switch(&mut self, body: &Hybrid, state: &mut State) {
-        let Self { patch, looking, .. } = self;
+    fn switch(&mut self, model: &Model, body: &Hybrid, state: &mut State) {
+        let Self { patch, looking, before, momenta, balance, .. } = self;
         let nodes = body.node_count();
+        let gravity = model.gravity_m_per_s2();
+        patch.displace(body, &state.x);
+        before.take(body, patch, &state.x, &state.active.fading);
+        let mut held_j = patch.elastic_j(body, &state.x, &state.active.fading, before.tets());
+        held_j += patch.metric().moving_j(body, (&state.x, &state.v), gravity, momenta);
         looking.impulses.clear();
         looking.impulses.resize(nodes, DVec3::ZERO);
         looking.weights_kg.clear();
         looking.weights_kg.resize(nodes, 0.0);
+        looking.handed_n.clear();
+        looking.handed_n.resize(nodes, DVec3::ZERO);
+        balance.take(patch.metric_mut(), state);
         let (mut some_sleep, mut couple) = (false, DVec3::ZERO);
         for (number, id) in state.active.ids().iter().enumerate() {
             if looking.wanted.binary_search(id).is_err() {
                 let (y, w) = (state.x[nodes + number], state.v[nodes + number]);
                 couple += looking.hand_over(body, *id, (y, w), state);
+                balance.hand_over(body, (number, *id), &mut looking.handed_n);
                 some_sleep = true;
             }
         }
         looking.turn(couple, &state.x);
+        looking.left.clear();
+        looking.left.extend_from_slice(state.active.ids());
         state.switch(body, &looking.wanted, &mut looking.moved);
-        patch.wake(body, state.active.ids());
+        patch.set(body, state.active.ids());
+        patch.displace(body, &state.x);
+        before.fade_into(body, patch, &state.x, &mut state.active.fading);
+        patch.lay_out(body, &state.active.fading);
+        balance.demand(body, patch.metric(), &looking.left, state.active.ids(), &looking.handed_n);
         if some_sleep {
             looking.impulses.resize(state.v.len(), DVec3::ZERO);
             patch.metric_mut().accelerate(&mut looking.impulses);
@@ -124,6 +170,34 @@ impl HybridScratch {
                 *v += *change;
             }
         }
+        // Tets that have lost cells only now were whole.
+        let whole = |tet: u32| {
+            let (share, material) = (&body.partition.shares()[tet as usize], body.material_of_tet(tet));
+            before.faded().of_tet(tet).map_or_else(
+                || share.energy_j(material, &state.x),
+                |fade| fade.energy_j(share, material, &state.x),
+            )
+        };
+        held_j += before.first_lost().iter().map(|&tet| whole(tet)).sum::<f64>();
+        held_j -= patch.elastic_j(body, &state.x, &state.active.fading, before.tets());
+        held_j -= patch.metric().moving_j(body, (&state.x, &state.v), gravity, momenta);
+        state.ledger.dissipated_j += held_j;
+        state.force_is_current = false;
+    }
+}
+
+/// Wakes these particles and no others, as tools would: what was active goes on, what wakes moves as the coarse nodes have moved it. Particles that may
+/// not wake ([`Hybrid::may_wake`]), and those for which there is no room, are left out.
+pub fn wake_only(model: &Model, state: &mut State, scratch: &mut Scratch, particles: impl IntoIterator<Item = u32>) {
+    let (Some(body), Some(own)) = (model.hybrid(), &mut scratch.hybrid) else { return };
+    own.follow(body, &state.active);
+    own.looking.wanted.clear();
+    own.looking.wanted.extend(particles.into_iter().filter(|&particle| body.may_wake(particle)));
+    own.looking.wanted.sort_unstable();
+    own.looking.wanted.dedup();
+    own.looking.wanted.truncate(room(model));
+    if own.looking.wanted != state.active.ids() {
+        own.switch(model, body, state);
     }
 }
 
@@ -136,7 +210,7 @@ fn place_balls(model: &Model, view: &SkinView<'_>, spacing_m: f64, state: &mut S
         let gap_m = nearest.map_or(f64::INFINITY, |(_, distance_m)| distance_m - spec.radius_m);
         match (ball.as_mut(), nearest) {
             (_, Some((rest_m, _))) if gap_m < near_m => {
-                let moved = ball.is_none_or(|ball| ball.rest_m.distance(rest_m) > spacing_m);
+                let moved = ball.is_none_or(|ball| ball.rest_m.distance(rest_m) > FOLLOW * spacing_m);
                 let rest_m = if moved { rest_m } else { ball.map_or(rest_m, |ball| ball.rest_m) };
                 *ball = Some(Ball { rest_m, away_ticks: 0 });
             }
@@ -168,20 +242,9 @@ impl Looking {
 
     /// Takes the couple of all of them; none where too few of those nodes are free.
     fn turn(&mut self, couple: DVec3, x: &[DVec3]) {
-        let weighty = || self.weights_kg.iter().zip(x).filter(|(weight, _)| **weight > 0.0);
-        let total: f64 = weighty().map(|(weight, _)| weight).sum();
-        let middle = weighty().map(|(weight, x)| *x * *weight).sum::<DVec3>() / total;
-        // Σ M (|r|² I − r rᵀ)
-        let inertia = weighty().fold(DMat3::ZERO, |sum, (weight, x)| {
-            let r = *x - middle;
-            let outer = DMat3::from_cols(r * r.x, r * r.y, r * r.z);
-            sum + (DMat3::from_diagonal(DVec3::splat(r.length_squared())) - outer) * *weight
-        });
-        let turn = inertia.inverse() * couple;
-        if turn.is_finite() {
-            for ((impulse, weight), x) in self.impulses.iter_mut().zip(&self.weights_kg).zip(x) {
-                *impulse += turn.cross(*x - middle) * *weight;
-            }
+        let Turn { turn, middle } = turn_of(&self.weights_kg, x, couple);
+        for ((impulse, weight), x) in self.impulses.iter_mut().zip(&self.weights_kg).zip(x) {
+            *impulse += turn.cross(*x - middle) * *weight;
         }
     }
 

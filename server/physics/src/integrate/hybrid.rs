@@ -60,6 +60,7 @@ pub(super) fn evaluate(
     for (force, external) in state.force_n.iter_mut().zip(&state.external_n) {
         *force += *external;
     }
+    own.balance.apply(body, state);
     state.force_is_current = true;
 }
 
@@ -74,7 +75,7 @@ fn vertices_of(model: &Model, load: &LoadSpec, list: &mut impl FnMut(u32)) {
 
 /// `v ← (v e^{−c h/2} + h M'⁻¹ f) e^{−c h/2}`, and the ledger's share of it, as of a body of tets.
 pub(super) fn kick(model: &Model, body: &Hybrid, state: &mut State, own: &mut HybridScratch, h_s: f64) {
-    let HybridScratch { patch, accelerations, momenta, .. } = own;
+    let HybridScratch { patch, accelerations, momenta, balance, .. } = own;
     accelerations.clear();
     accelerations.extend_from_slice(&state.force_n);
     patch.metric_mut().accelerate(accelerations);
@@ -84,6 +85,7 @@ pub(super) fn kick(model: &Model, body: &Hybrid, state: &mut State, own: &mut Hy
     if damping > 0.0 {
         twice_kinetic_j += patch.metric().damped(body, &mut state.v, factor, momenta);
     }
+    state.ledger.dissipated_j += balance.work_j(&state.v, accelerations, h_s);
     let mut power_w = 0.0;
     for ((v, acceleration), external) in state.v.iter_mut().zip(accelerations.iter()).zip(&state.external_n) {
         let change = *acceleration * h_s;

@@ -4,15 +4,19 @@
 //! rounded then; forces are summed in f64, that on the first point as minus the sum of the others.
 use super::{
     block::{Lanes, Node, Sum},
-    cell_stress::stress,
+    cell_stress::{faded_stress, load_matrix, stress},
     dispatch::{self, Available, InstructionSet, Pass},
-    laws::{Constants, LaneLaw},
+    laws::{Constants, LaneLaw, plus},
     node,
     real::{Scalar, Vector},
     tangents::LaneTangent,
 };
 use crate::{
-    hybrid::cell::{MODE_WEIGHTS, RestCell},
+    hybrid::{
+        cell::{MODE_WEIGHTS, RestCell},
+        fade::CellFade,
+        share,
+    },
     material::Material,
     world::Precision,
 };
@@ -45,19 +49,41 @@ struct CutBlock<T, const N: usize> {
     minus_kappa: [T; N],
 }
 
-/// Cells of one material.
+/// What fades in the cells of a block (`hybrid::fade`), entries of matrices row by row.
+#[derive(Debug, Clone)]
+#[repr(C, align(64))]
+struct FadeBlock<T, const N: usize> {
+    shape: [[T; N]; 9],
+    volume: [[T; N]; 9],
+    /// `1 − a`.
+    modes: [T; N],
+}
+
+/// Cells of one material, all of which fade, or none.
 #[derive(Debug, Clone)]
 struct Run {
     material: u16,
     blocks: Range<usize>,
     cells: usize,
+    /// First of as many blocks of what fades.
+    fades: Option<usize>,
+}
+
+/// Constants of a material: whole, of its shape and of its volume.
+#[derive(Debug, Clone)]
+struct Split<T> {
+    material: Material,
+    whole: Constants<T>,
+    shape: Constants<T>,
+    volume: Constants<T>,
 }
 
 /// Blocks of the materials, of which `N` lanes each.
 #[derive(Debug, Clone)]
 struct Blocks<T, const N: usize> {
-    materials: Vec<(Material, Constants<T>)>,
+    materials: Vec<Split<T>>,
     blocks: Vec<CutBlock<T, N>>,
+    fades: Vec<FadeBlock<T, N>>,
     runs: Vec<Run>,
     spare: u32,
 }
@@ -112,11 +138,28 @@ impl CutCells {
         }
     }
 
-    /// Makes place for `cells` cells of one material, to be filled by [`Self::put`]. Does not allocate within the capacity.
-    pub fn start(&mut self, material: u16, cells: usize) {
+    /// Makes place for `cells` cells of one material, to be filled by [`Self::put`] and, if they are `fading`, [`Self::put_fade`]. Does not allocate
+    /// within the capacity.
+    pub fn start(&mut self, material: u16, cells: usize, fading: bool) {
         match &mut self.layout {
-            Layout::Single(blocks) => blocks.start(material, cells),
-            Layout::Double(blocks) => blocks.start(material, cells),
+            Layout::Single(blocks) => blocks.start(material, cells, fading),
+            Layout::Double(blocks) => blocks.start(material, cells, fading),
+        }
+    }
+
+    /// Number of [`Self::start`]s since all cells were left.
+    pub fn runs(&self) -> usize {
+        match &self.layout {
+            Layout::Single(blocks) => blocks.runs.len(),
+            Layout::Double(blocks) => blocks.runs.len(),
+        }
+    }
+
+    /// What fades in a cell of a run (from 0) of fading ones.
+    pub fn put_fade(&mut self, run: usize, number: usize, fade: &CellFade) {
+        match &mut self.layout {
+            Layout::Single(blocks) => blocks.put_fade(run, number, fade),
+            Layout::Double(blocks) => blocks.put_fade(run, number, fade),
         }
     }
 
@@ -171,20 +214,22 @@ impl CutCells {
 impl<T: Scalar, const N: usize> Blocks<T, N> {
     fn with_capacity(cells: usize, points: usize, materials: &[Material]) -> Self {
         Self {
-            materials: materials.iter().map(|m| (*m, Constants::of(m))).collect(),
-            // Every material may leave one block in part empty.
-            blocks: Vec::with_capacity(cells.div_ceil(N) + materials.len()),
-            runs: Vec::with_capacity(materials.len()),
+            materials: materials.iter().map(Split::of).collect(),
+            // Every run may leave one block in part empty.
+            blocks: Vec::with_capacity(cells.div_ceil(N) + 2 * materials.len()),
+            fades: Vec::with_capacity(cells.div_ceil(N) + materials.len()),
+            runs: Vec::with_capacity(2 * materials.len()),
             spare: points as u32,
         }
     }
 
     fn clear(&mut self) {
         self.blocks.clear();
+        self.fades.clear();
         self.runs.clear();
     }
 
-    fn start(&mut self, material: u16, cells: usize) {
+    fn start(&mut self, material: u16, cells: usize, fading: bool) {
         let zero = T::of(0.0);
         let first = self.blocks.len();
         for _ in 0..cells.div_ceil(N) {
@@ -196,17 +241,32 @@ impl<T: Scalar, const N: usize> Blocks<T, N> {
                 minus_kappa: [zero; N],
             });
         }
-        self.runs.push(Run { material, blocks: first..self.blocks.len(), cells });
+        let fades = fading.then_some(self.fades.len());
+        if fading {
+            let nothing = FadeBlock { shape: [[zero; N]; 9], volume: [[zero; N]; 9], modes: [zero; N] };
+            self.fades.extend(std::iter::repeat_n(nothing, cells.div_ceil(N)));
+        }
+        self.runs.push(Run { material, blocks: first..self.blocks.len(), cells, fades });
+    }
+
+    fn put_fade(&mut self, run: usize, number: usize, fade: &CellFade) {
+        let run = &self.runs[run];
+        let Some(first) = run.fades else { return };
+        let (block, lane) = run.lane::<N>(number);
+        let block = &mut self.fades[first + block];
+        for row in 0..3 {
+            for column in 0..3 {
+                block.shape[3 * row + column][lane] = T::of(fade.shape.col(column)[row]);
+                block.volume[3 * row + column][lane] = T::of(fade.volume.col(column)[row]);
+            }
+        }
+        block.modes[lane] = T::of(1.0 - fade.modes);
     }
 
     fn put(&mut self, number: usize, points: [u32; 8], rest: &RestCell) {
         let Some(run) = self.runs.last() else { return };
-        // The blocks of this cell's window, and its place in them: neighbours go to different blocks.
-        let (window, within) = (number / (N * BLOCKS_PER_WINDOW), number % (N * BLOCKS_PER_WINDOW));
-        let first = window * BLOCKS_PER_WINDOW;
-        let count = (run.cells - first * N).div_ceil(N).min(BLOCKS_PER_WINDOW);
-        let block = &mut self.blocks[run.blocks.start + first + within % count];
-        let lane = within / count;
+        let (block, lane) = run.lane::<N>(number);
+        let block = &mut self.blocks[run.blocks.start + block];
         block.points[lane] = points;
         for p in 1..8 {
             for axis in 0..3 {
@@ -217,26 +277,47 @@ impl<T: Scalar, const N: usize> Blocks<T, N> {
             }
         }
         block.minus_volume[lane] = T::of(-rest.volume_m3);
-        let mu_pa = self.materials[run.material as usize].0.lame.mu_pa;
+        let mu_pa = self.materials[run.material as usize].material.lame.mu_pa;
         block.minus_kappa[lane] = T::of(-rest.hourglass_m * mu_pa);
     }
 
     fn sum_up(&self, set: Available, displacements: &[Node], velocities: &[Node], sums: &mut [Sum]) -> f64 {
         let mut power_w = 0.0;
         for run in &self.runs {
-            let (material, constants) = &self.materials[run.material as usize];
+            let split = &self.materials[run.material as usize];
             let blocks = &self.blocks[run.blocks.clone()];
-            let mut pass = CutForces { constants, blocks, displacements, velocities, sums };
-            power_w += dispatch::run(set, (material.law, !material.viscosity.is_zero()), &mut pass);
+            let fades = run.fades.map_or(&[][..], |first| &self.fades[first..first + blocks.len()]);
+            let mut pass = CutForces { split, blocks, fades, displacements, velocities, sums };
+            power_w += dispatch::run(set, (split.material.law, !split.material.viscosity.is_zero()), &mut pass);
         }
         power_w
     }
 }
 
+impl Run {
+    /// Block and lane of a cell: neighbours go to different blocks.
+    fn lane<const N: usize>(&self, number: usize) -> (usize, usize) {
+        let (window, within) = (number / (N * BLOCKS_PER_WINDOW), number % (N * BLOCKS_PER_WINDOW));
+        let first = window * BLOCKS_PER_WINDOW;
+        let count = (self.cells - first * N).div_ceil(N).min(BLOCKS_PER_WINDOW);
+        (first + within % count, within / count)
+    }
+}
+
+impl<T: Scalar> Split<T> {
+    fn of(material: &Material) -> Self {
+        let (shape, volume) = share::split(material);
+        let [whole, shape, volume] = [material, &shape, &volume].map(Constants::of);
+        Self { material: *material, whole, shape, volume }
+    }
+}
+
 /// The pass over the cells of one material.
 struct CutForces<'a, T, const N: usize> {
-    constants: &'a Constants<T>,
+    split: &'a Split<T>,
     blocks: &'a [CutBlock<T, N>],
+    /// As many, or none.
+    fades: &'a [FadeBlock<T, N>],
     displacements: &'a [Node],
     velocities: &'a [Node],
     sums: &'a mut [Sum],
@@ -249,7 +330,7 @@ impl<T: Scalar, const N: usize> Pass<T> for CutForces<'_, T, N> {
         let mut rates = edges;
         let mut forces = edges;
         let mut power_w = 0.0;
-        for batch in self.blocks.chunks(BATCH) {
+        for (number, batch) in self.blocks.chunks(BATCH).enumerate() {
             for (index, block) in batch.iter().enumerate() {
                 gather::<V, N>(&block.points, self.displacements, &mut edges[index]);
                 if VISCOUS {
@@ -257,8 +338,9 @@ impl<T: Scalar, const N: usize> Pass<T> for CutForces<'_, T, N> {
                 }
             }
             for (index, block) in batch.iter().enumerate() {
-                let (edges, rates) = (&edges[index], &rates[index]);
-                power_w += cut::<V, T, L, VISCOUS, N>(self.constants, block, edges, rates, &mut forces[index]);
+                let (of, forces) = ([&edges[index], &rates[index]], &mut forces[index]);
+                let fade = self.fades.get(number * BATCH + index);
+                power_w += cut::<V, T, L, VISCOUS, N>(self.split, (block, fade), of, forces);
             }
             for (block, forces) in batch.iter().zip(&forces) {
                 scatter(&block.points, forces, self.sums);
@@ -287,10 +369,9 @@ fn store<V: Vector, const N: usize>(values: &[V; 7], corners: &mut Corners<V::Sc
 
 #[inline(always)]
 fn cut<V: Vector<Scalar = T>, T: Scalar, L: LaneLaw, const VISCOUS: bool, const N: usize>(
-    constants: &Constants<T>,
-    block: &CutBlock<T, N>,
-    edges: &Corners<T, N>,
-    rates: &Corners<T, N>,
+    split: &Split<T>,
+    (block, fade): (&CutBlock<T, N>, Option<&FadeBlock<T, N>>),
+    [edges, rates]: [&Corners<T, N>; 2],
     forces: &mut Corners<T, N>,
 ) -> f64 {
     let mut power = [T::of(0.0); N];
@@ -310,12 +391,21 @@ fn cut<V: Vector<Scalar = T>, T: Scalar, L: LaneLaw, const VISCOUS: bool, const 
         };
         let h = gradient(edges);
         let h_dot = if VISCOUS { gradient(rates) } else { h };
-        let (p, density) = stress::<V, T, L, VISCOUS>(constants, &h, &h_dot);
+        let mut minus_kappa = V::load(&block.minus_kappa[first..]);
+        let (p, density) = if let Some(fade) = fade {
+            minus_kappa = minus_kappa * V::load(&fade.modes[first..]);
+            let of_shape = (&split.shape, &load_matrix::<V, N>(&fade.shape, first));
+            let of_volume = (&split.volume, &load_matrix::<V, N>(&fade.volume, first));
+            let (shape, density) = faded_stress::<V, T, L, VISCOUS>(of_shape, &h, &h_dot);
+            let volume = faded_stress::<V, T, L, false>(of_volume, &h, &h).0;
+            (plus(&shape, &volume), density)
+        } else {
+            stress::<V, T, L, VISCOUS>(&split.whole, &h, &h_dot)
+        };
         let minus_volume = V::load(&block.minus_volume[first..]);
         if VISCOUS {
             (V::of(0.0) - density * minus_volume).store(&mut power[first..]);
         }
-        let minus_kappa = V::load(&block.minus_kappa[first..]);
         for axis in 0..3 {
             let a = load::<V, N>(edges, axis, first);
             let mut f = [V::of(0.0); 7];
@@ -466,10 +556,10 @@ mod tests {
             let mut kernel = CutCells::with_capacity(cells.len(), u.len(), &[*material], *precision);
             kernel = kernel.with_instruction_set(*set);
             // Others before: nothing of them may stay.
-            kernel.start(0, 3);
+            kernel.start(0, 3, true);
             (0..3).for_each(|number| kernel.put(number, cells[number].0, &cells[number].1));
             kernel.clear();
-            kernel.start(0, cells.len());
+            kernel.start(0, cells.len(), false);
             for (number, (points, rest)) in cells.iter().enumerate() {
                 kernel.put(number, *points, rest);
             }

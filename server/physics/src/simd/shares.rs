@@ -4,7 +4,7 @@
 //! has one, part by part; a first node needs none, for they sum to zero. What wakes takes from a lane's moments and volumes, in place.
 use super::{
     block::{Lanes, Node, Sum},
-    cell_stress::stress,
+    cell_stress::{faded_stress, load_matrix, stress},
     dispatch::{self, Available, InstructionSet, Pass},
     laws::{Constants, LaneLaw, M3, plus},
     node,
@@ -14,12 +14,13 @@ use super::{
 use crate::{
     hybrid::{
         composite::{NODES, PARTS},
+        fade::ShareFade,
         share::{self, Share},
     },
     material::Material,
     world::Precision,
 };
-use glam::DVec3;
+use glam::{DMat3, DVec3};
 use std::ops::Range;
 
 const LANES_F32: usize = 16;
@@ -42,6 +43,10 @@ struct ShareBlock<T, const N: usize> {
     weight: [[T; N]; PARTS],
     /// `V_g` (m³).
     volume: [[T; N]; PARTS],
+    /// What fades of the parts' shape and of the tet's volume (`hybrid::fade`), entries row by row.
+    fades: [[[T; N]; 9]; PARTS + 1],
+    /// How many lanes have something that fades.
+    fading: u32,
 }
 
 /// Blocks of one material.
@@ -59,6 +64,7 @@ struct Blocks<T, const N: usize> {
     runs: Vec<Run<T>>,
     /// Block and lane of every tet.
     lane_of: Vec<(u32, u32)>,
+    is_fading: Vec<bool>,
     /// Place, in its lane, of every node of a tet's share.
     places_of: Vec<Vec<u8>>,
     edges: Vec<Lanes<T, N>>,
@@ -122,6 +128,14 @@ impl ShareKernel {
         }
     }
 
+    /// What fades in a tet; `None`: nothing any more. Allocates nothing.
+    pub fn put_fade(&mut self, tet: usize, fade: Option<&ShareFade>) {
+        match &mut self.layout {
+            Layout::Single(blocks) => blocks.put_fade(tet, fade),
+            Layout::Double(blocks) => blocks.put_fade(tet, fade),
+        }
+    }
+
     /// Adds forces (N) of elastic and viscous stress to `forces_n` at `displacements_m` and velocities `v` of the coarse nodes; returns the
     /// power (W) that viscous stress takes.
     pub fn add_forces_n(&mut self, displacements_m: &[DVec3], v: &[DVec3], forces_n: &mut [DVec3]) -> f64 {
@@ -155,6 +169,7 @@ impl<T: Scalar, const N: usize> Blocks<T, N> {
             blocks: Vec::new(),
             runs: Vec::new(),
             lane_of: vec![(u32::MAX, 0); shares.len()],
+            is_fading: vec![false; shares.len()],
             places_of: vec![Vec::new(); shares.len()],
             edges: Vec::new(),
             rates: Vec::new(),
@@ -232,6 +247,8 @@ impl<T: Scalar, const N: usize> Blocks<T, N> {
             inverse_volume: [[zero; N]; PARTS],
             weight: [[zero; N]; PARTS],
             volume: [[zero; N]; PARTS],
+            fades: [[[zero; N]; 9]; PARTS + 1],
+            fading: 0,
         });
     }
 
@@ -254,6 +271,23 @@ impl<T: Scalar, const N: usize> Blocks<T, N> {
                     for axis in 0..3 {
                         block.moments[of_part.start + entry][axis][lane] = T::of(moment[axis]);
                     }
+                }
+            }
+        }
+    }
+
+    fn put_fade(&mut self, tet: usize, fade: Option<&ShareFade>) {
+        let (block, lane) = self.lane_of[tet];
+        let Some(block) = self.blocks.get_mut(block as usize) else { return };
+        let lane = lane as usize;
+        let was = self.is_fading[tet];
+        block.fading = block.fading + u32::from(fade.is_some() && !was) - u32::from(fade.is_none() && was);
+        self.is_fading[tet] = fade.is_some();
+        for (number, lanes) in block.fades.iter_mut().enumerate() {
+            let a = fade.map_or(DMat3::ZERO, |fade| fade.parts.get(number).copied().unwrap_or(fade.whole));
+            for row in 0..3 {
+                for column in 0..3 {
+                    lanes[3 * row + column][lane] = T::of(a.col(column)[row]);
                 }
             }
         }
@@ -325,10 +359,22 @@ impl<T: Scalar, const N: usize> ShareForces<'_, T, N> {
                 }
             }
         }
-        let pressure = stress::<V, T, L, false>(&self.run.of_volume, &mean, &mean).0;
+        let fading = block.fading > 0;
+        let (of_shape, of_volume) = (&self.run.of_shape, &self.run.of_volume);
+        let pressure = if fading {
+            let a = load_matrix::<V, N>(&block.fades[PARTS], first);
+            faded_stress::<V, T, L, false>((of_volume, &a), &mean, &mean).0
+        } else {
+            stress::<V, T, L, false>(of_volume, &mean, &mean).0
+        };
         for part in 0..PARTS {
             let h_dot = if VISCOUS { gradient::<V, N>(block, part, self.rates, first) } else { zero };
-            let (p, density) = stress::<V, T, L, VISCOUS>(&self.run.of_shape, &strains[part], &h_dot);
+            let (p, density) = if fading {
+                let a = load_matrix::<V, N>(&block.fades[part], first);
+                faded_stress::<V, T, L, VISCOUS>((of_shape, &a), &strains[part], &h_dot)
+            } else {
+                stress::<V, T, L, VISCOUS>(of_shape, &strains[part], &h_dot)
+            };
             let p = plus(&p, &pressure);
             for entry in block.parts[part].clone() {
                 let t = moment::<V, N>(&block.moments[entry], first);

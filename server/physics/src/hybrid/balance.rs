@@ -1,0 +1,159 @@
+//! Forces that keep accelerations from jumping where particles wake or fall asleep under load, and fade.
+//!
+//! A particle that wakes under load is not in balance: what was carried by the coarse nodes is not carried by it. At a switch, everything is to accelerate as
+//! it did; with the new matrix `M''` and the accelerations `a` before, what wakes following the nodes,
+//! ```text
+//! c = f − (M'' a + Σ_{p asleep now} ζ_p (1 − ε) m_p (a_p − ζ_pᵀ a))       f ← f − c       c ← e^{−T/τ} c every tick
+//! ```
+//! `Σ c = 0`, since neither momentum nor external force changed. Their torque is zero at first; as the body moves on it is taken from them again by forces
+//! `M_i α × (x_i − x̄)` on the coarse nodes of a body that is held nowhere. The work of these forces is booked in the ledger.
+use super::{body::Hybrid, composite::Anchor, patch::KEPT, running_metric::RunningMetric};
+use crate::world::State;
+use glam::{BVec3, DMat3, DVec3};
+
+/// Balancing forces smaller than this, over the largest force, are none.
+const NOTHING: f64 = 1e-9;
+
+/// Buffers for them.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Balance {
+    /// Accelerations (m/s²) before a switch.
+    before: Vec<DVec3>,
+    /// Forces (N) with which they go on after it; empty unless they are to be balanced by the next evaluation.
+    due_n: Vec<DVec3>,
+    /// The forces (N) taken away at the last evaluation.
+    taken_n: Vec<DVec3>,
+}
+
+impl Balance {
+    pub(super) fn with_room(entries: usize) -> Self {
+        let list = || Vec::with_capacity(entries);
+        Self { before: list(), due_n: list(), taken_n: list() }
+    }
+
+    /// Before a switch.
+    pub(super) fn take(&mut self, metric: &mut RunningMetric, state: &State) {
+        self.before.clear();
+        if state.force_is_current {
+            self.before.extend_from_slice(&state.force_n);
+            metric.accelerate(&mut self.before);
+        }
+    }
+
+    /// A particle, the `number`th active one before the switch, falls asleep: `impulses` takes what the coarse nodes are to be pushed with for it (N).
+    pub(super) fn hand_over(&self, body: &Hybrid, (number, particle): (usize, u32), forces_n: &mut [DVec3]) {
+        if self.before.is_empty() {
+            return;
+        }
+        let anchor = body.partition.anchor(particle);
+        let mass_kg = (1.0 - KEPT) * body.masses.particle_kg[particle as usize];
+        let own = self.before[body.node_count() + number];
+        anchor.push((own - anchor.of(&self.before)) * mass_kg, forces_n);
+    }
+
+    /// After a switch from particles `before` to those of the state: what the forces are to be at the next evaluation. `handed_n` comes from
+    /// [`Self::hand_over`].
+    pub(super) fn demand(
+        &mut self,
+        body: &Hybrid,
+        metric: &RunningMetric,
+        before: &[u32],
+        after: &[u32],
+        handed_n: &[DVec3],
+    ) {
+        self.due_n.clear();
+        if self.before.is_empty() {
+            return;
+        }
+        let nodes = body.node_count();
+        self.taken_n.clear();
+        self.taken_n.extend_from_slice(&self.before[..nodes]);
+        self.taken_n.extend(after.iter().map(|id| match before.binary_search(id) {
+            Ok(number) => self.before[nodes + number],
+            Err(_) => {
+                let anchor: Anchor = body.partition.anchor(*id);
+                anchor.of(&self.before)
+            }
+        }));
+        self.due_n.resize(self.taken_n.len(), DVec3::ZERO);
+        metric.momenta(body, &self.taken_n, &mut self.due_n);
+        for (due, handed) in self.due_n.iter_mut().zip(handed_n) {
+            *due += *handed;
+        }
+    }
+
+    /// At an evaluation: takes balancing forces away from the total forces, after working them out if that is due.
+    pub(crate) fn apply(&mut self, body: &Hybrid, state: &mut State) {
+        let State { x, force_n, active, .. } = state;
+        let balance_n = &mut active.balance_n;
+        if self.due_n.len() == force_n.len() {
+            balance_n.clear();
+            balance_n.extend(force_n.iter().zip(&self.due_n).map(|(force, due)| *force - *due));
+            for (balance, free) in balance_n.iter_mut().zip(&body.free) {
+                *balance = DVec3::select(*free, *balance, DVec3::ZERO);
+            }
+        }
+        self.due_n.clear();
+        self.taken_n.clear();
+        if balance_n.len() != force_n.len() {
+            balance_n.clear();
+            return;
+        }
+        if largest(balance_n) <= NOTHING * largest(force_n) {
+            balance_n.clear();
+            return;
+        }
+        self.taken_n.extend_from_slice(balance_n);
+        if body.is_free {
+            self.without_torque(body, x);
+        }
+        for (force, taken) in force_n.iter_mut().zip(&self.taken_n) {
+            *force -= *taken;
+        }
+    }
+
+    fn without_torque(&mut self, body: &Hybrid, x: &[DVec3]) {
+        let torque: DVec3 = x.iter().zip(&self.taken_n).map(|(x, taken)| x.cross(*taken)).sum();
+        let turn = turn_of(&body.masses.node_kg, x, torque);
+        for ((taken, mass), x) in self.taken_n.iter_mut().zip(&body.masses.node_kg).zip(x) {
+            *taken -= turn.turn.cross(*x - turn.middle) * *mass;
+        }
+    }
+
+    /// Work (J) over a kick of length `h_s` that the body's velocities, with accelerations (m/s²), do against them.
+    pub(crate) fn work_j(&self, v: &[DVec3], accelerations: &[DVec3], h_s: f64) -> f64 {
+        let power = |((taken, v), a): ((&DVec3, &DVec3), &DVec3)| taken.dot(*v + *a * (0.5 * h_s));
+        h_s * self.taken_n.iter().zip(v).zip(accelerations).map(power).sum::<f64>()
+    }
+}
+
+fn largest(list: &[DVec3]) -> f64 {
+    list.iter().map(|a| a.length_squared()).fold(0.0, f64::max).sqrt()
+}
+
+/// A turn about a middle.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Turn {
+    pub(super) turn: DVec3,
+    pub(super) middle: DVec3,
+}
+
+/// `α` and `x̄` with `Σ_i W_i (x_i − x̄) × (α × (x_i − x̄))` the given moment; none where the weighty points lie on a line.
+pub(super) fn turn_of(weights: &[f64], x: &[DVec3], moment: DVec3) -> Turn {
+    let weighty = || weights.iter().zip(x).filter(|(weight, _)| **weight > 0.0);
+    let total: f64 = weighty().map(|(weight, _)| weight).sum();
+    let middle = weighty().map(|(weight, x)| *x * *weight).sum::<DVec3>() / total;
+    // Σ W (|r|² I − r rᵀ)
+    let inertia = weighty().fold(DMat3::ZERO, |sum, (weight, x)| {
+        let r = *x - middle;
+        let outer = DMat3::from_cols(r * r.x, r * r.y, r * r.z);
+        sum + (DMat3::from_diagonal(DVec3::splat(r.length_squared())) - outer) * *weight
+    });
+    let turn = inertia.inverse() * moment;
+    if turn.is_finite() { Turn { turn, middle } } else { Turn { turn: DVec3::ZERO, middle: DVec3::ZERO } }
+}
+
+/// Whether a body is held nowhere.
+pub(super) fn is_free(node_kg: &[f64], free: &[BVec3]) -> bool {
+    node_kg.iter().zip(free).all(|(mass, free)| *mass == 0.0 || *free == BVec3::TRUE)
+}
