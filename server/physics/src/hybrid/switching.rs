@@ -36,7 +36,7 @@ const GAP: f64 = 0.25;
 /// Way over the spacing that the skin's nearest point goes before a ball follows.
 const FOLLOW: f64 = 0.9;
 /// Deviation over the spacing below which a particle may fall asleep.
-const SETTLED: f64 = 0.01;
+const SETTLED: f64 = 0.04;
 
 /// The ball that a tool keeps awake.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
