@@ -22,6 +22,8 @@
 //! | eq. 25 differentiated strains what only moves | differences to particle i | `sph.rs` |
 //! | eq. 4 on positions strains what rests | displacements, as eqs. 1 and 5 have them | `sph.rs` |
 //! | eq. 13 of 2005: sign | gradient at i | `sph.rs` |
+//! | eq. 29: the neighbour's stress alone; flutters | both particles' stress | `sph.rs` |
+//! | border force towards the nearest border voxel; pumps energy | towards the particle's own | `region.rs` |
 //! | eq. 27's mass matrix has no place in eq. 33 | m = ρV/N | `layer.rs` |
 //! | exchange "from conservation of linear momentum" moves without masses | impulses | `exchange.rs` |
 //! | eq. 25 on the surface: weights sum to ½ | divided by their sum | `region.rs` |
@@ -49,6 +51,7 @@ pub mod voxels;
 pub use error::SeedError;
 pub use model::SeedModel;
 pub use spec::{
-    Exchange, LayerSpec, PARTICLES, PairStress, PaperModel, SHELL_TETS, SeedParameters, SeedSpec, VENTRICLE_TETS,
+    BorderForce, Exchange, LayerSpec, PARTICLES, PairStress, PaperModel, SHELL_TETS, SeedParameters, SeedSpec,
+    VENTRICLE_TETS,
 };
 pub use state::{AtVertex, Motion, SeedContact, SeedReport, SeedScratch, SeedState};

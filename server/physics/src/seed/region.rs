@@ -7,7 +7,14 @@
 //! RV is embedded in a box of voxels B(ps). Its *border* are the voxels of RV beside a voxel of the body outside RV: at the sides other
 //! particles, below the core. Towards the skin it has none ("inner boundaries"). Every voxel of B knows the nearest border voxel; the
 //! vector there is the gradient field.
+//!
+//! *Border force, as printed* ([`BorderForce::NearestVoxel`]): k times the gradient at the particle's voxel, on particles that started at
+//! the border and on those beyond it. It is constant within a voxel, jumps between voxels and changes its aim where another border
+//! voxel becomes the nearest: it has no potential and pumps energy, at any step. *Repaired* ([`BorderForce::OwnVoxel`]): a particle of the
+//! border is drawn to its own voxel, `k (c − x)` with c the voxel's point nearest to x: zero within, continuous, of potential
+//! `½k|x − c|²`. Nothing draws the others, which no border voxel is proper to.
 use super::{
+    BorderForce,
     kernel::Stencil,
     layer::{Holds, Layer},
     radial::Foot,
@@ -148,20 +155,22 @@ impl Region {
         self.riders.iter().find(|rider| rider.vertex == vertex)
     }
 
-    /// Force (N) of the border on a slot's particle at `x` (m): `k` times the gradient at its voxel.
-    ///
-    /// "Applied to the boundary particles and also to the ones which traverse a boundary voxel": those that started at the border wherever
-    /// they are, the others where they are beyond it. A particle outside B feels what its edge does.
-    pub fn border_force_n(&self, stiffness_n_per_m: f64, slot: usize, x_m: DVec3) -> DVec3 {
-        let size = DVec3::from(self.voxels.size.map(|n| n as f64 - 0.5)) * self.voxels.spacing_m;
-        let margin = DVec3::splat(0.5 * self.voxels.spacing_m);
-        let within = (x_m - self.voxels.origin_m).clamp(margin, size) + self.voxels.origin_m;
-        let Some(voxel) = self.voxels.holding(within) else { return DVec3::ZERO };
+    /// Force (N) of the border on a slot's particle at `x` (m).
+    pub fn border_force_n(&self, law: BorderForce, stiffness_n_per_m: f64, slot: usize, x_m: DVec3) -> DVec3 {
         let started_there = self.places[self.voxel_of[slot] as usize] == Place::Border;
-        if !started_there && self.places[voxel] != Place::Beyond {
-            return DVec3::ZERO;
-        }
-        self.gradient_m(voxel) * stiffness_n_per_m
+        let away_m = match law {
+            BorderForce::OwnVoxel if started_there => {
+                let (centre, half) = (self.rest_m(slot), DVec3::splat(0.5 * self.voxels.spacing_m));
+                x_m.clamp(centre - half, centre + half) - x_m
+            }
+            BorderForce::OwnVoxel => DVec3::ZERO,
+            BorderForce::NearestVoxel => {
+                let voxel = self.voxels.nearest(x_m);
+                let crossed = self.places[voxel] == Place::Beyond;
+                if started_there || crossed { self.gradient_m(voxel) } else { DVec3::ZERO }
+            }
+        };
+        away_m * stiffness_n_per_m
     }
 
     /// The gradient field: from a voxel to the nearest of the border (m).

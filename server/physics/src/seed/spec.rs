@@ -35,14 +35,24 @@ pub enum Exchange {
     Displacements,
 }
 
-/// Which stress makes the force between two particles.
+/// Which stress makes the force between two particles (`seed::sph`).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum PairStress {
-    /// As printed (eq. 29): the neighbour's, `σ_j`. Conserves no momentum.
+    /// Repaired: `σ_i + σ_j`. Conserves linear momentum and, at small strain, energy.
     #[default]
-    Neighbour,
-    /// `σ_i + σ_j`: conserves linear momentum, and at small strain is the derivative of an energy.
     Both,
+    /// As printed (eq. 29): the neighbour's, `σ_j`. The layer flutters until it bursts.
+    Neighbour,
+}
+
+/// What keeps particles within their region (`seed::region`).
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum BorderForce {
+    /// Repaired: particles of the border are drawn back to their own voxels.
+    #[default]
+    OwnVoxel,
+    /// As printed: those, and particles beyond the border, are drawn by the gradient field to the nearest border voxel. Pumps energy.
+    NearestVoxel,
 }
 
 /// Constants. All of one papers' model: [`SeedParameters::paper_2005`], [`SeedParameters::paper_2006`].
@@ -62,7 +72,7 @@ pub struct SeedParameters {
     pub smoothing_ratio: f64,
     /// Whether nv(ps) reaches to the first-connected vertices ("eventually, … depending on the mesh size").
     pub first_neighbours: bool,
-    /// Border force per distance to the border, over `(λ + 2µ) · spacing`. Not printed.
+    /// Border force per distance, over `(λ + 2µ) · spacing`. Not printed.
     pub border_stiffness_ratio: f64,
     /// Stiffness of the surface's links, over that of the column of layer between their ends. Not printed.
     pub link_stiffness_ratio: f64,
@@ -72,6 +82,8 @@ pub struct SeedParameters {
     pub exchange: Exchange,
     /// Which stress makes the force between two particles.
     pub pair_stress: PairStress,
+    /// What keeps particles within their region.
+    pub border_force: BorderForce,
 }
 
 /// The layer of particles and the surface outside it.
@@ -128,6 +140,18 @@ impl SeedParameters {
             link_damping_ratio: 1.0,
             exchange: Exchange::default(),
             pair_stress: PairStress::default(),
+            border_force: BorderForce::default(),
+        }
+    }
+
+    /// The same without the repairs that can be left out. It bursts within seconds.
+    #[must_use]
+    pub fn as_printed(self) -> Self {
+        Self {
+            exchange: Exchange::Displacements,
+            pair_stress: PairStress::Neighbour,
+            border_force: BorderForce::NearestVoxel,
+            ..self
         }
     }
 

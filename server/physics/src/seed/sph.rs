@@ -13,9 +13,12 @@
 //!
 //! Force (eq. 29), with σ as it is, without F, and added: `∇W` taken at i points from i to j, so a layer under tension pulls i to j.
 //! ```text
-//! f_i = + ΔV_i Σ_j σ_j b_ij
+//! f_i = ΔV_i Σ_j (σ_i + σ_j) b_ij        as printed: ΔV_i Σ_j σ_j b_ij
 //! ```
-//! 2005's eq. 13 is the same with the gradient at j, and the other sign. Neighbours are awake particles: what sleeps is not there.
+//! 2005's eq. 13 is the printed one with the gradient at j, and the other sign. With `σ_j` alone ([`PairStress::Neighbour`]) forces between two
+//! particles are not opposite: momentum is lost at the border, the stiffness is not symmetric, and a layer at rest flutters: any small motion
+//! grows, at any step. `σ_i` ([`PairStress::Both`]) costs nothing within, where `Σ_j b_ij = 0`; with it the force is, at small strain,
+//! `−∂U/∂x` of `U = ΔV Σ_i ½ E_i:σ_i`, because `b_ji = −b_ij`. Neighbours are awake particles: what sleeps is not there.
 //! Rest positions never change, so neither do neighbours and weights: "whose connectivity must be determined for each time step" is
 //! what eq. 25, with rest positions in W, does not need.
 use super::{PairStress, SeedParameters, kernel::Stencil, region::Region, voxels::NONE};

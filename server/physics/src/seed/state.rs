@@ -114,6 +114,7 @@ pub struct SeedScratch {
     pub(super) skin_force_n: Vec<DVec3>,
     pub(super) displacement_m: Vec<DVec3>,
     pub(super) force_n: Vec<DVec3>,
+    pub(super) goal_sums: Vec<(DVec3, f64)>,
     pub(super) stress_pa: Vec<DMat3>,
     /// Particles as they were before the touched triangle changed.
     pub(super) before: Motion,
@@ -132,6 +133,7 @@ impl SeedScratch {
             skin_force_n: zeros(vertices),
             displacement_m: zeros(awake),
             force_n: zeros(awake),
+            goal_sums: vec![(DVec3::ZERO, 0.0); awake],
             stress_pa: vec![DMat3::ZERO; awake],
             before: Motion { x: zeros(awake), v: zeros(awake) },
         }

@@ -19,9 +19,6 @@ use super::{
 };
 use glam::DVec3;
 
-/// Rounds in which several displaced vertices, which share particles, are brought to their places.
-const ROUNDS: usize = 8;
-
 impl SeedModel {
     /// Advances a state of this model by Δt.
     pub fn step(&self, state: &mut SeedState, scratch: &mut SeedScratch, contact: &SeedContact<'_>) -> SeedReport {
@@ -56,15 +53,9 @@ impl SeedModel {
             }
         }
 
-        let rounds = if awake.is_some() && contact.displaced_m.len() > 1 { ROUNDS } else { 1 };
-        for round in 0..rounds {
-            for goal in contact.displaced_m {
-                match self.displace(awake, goal, state) {
-                    Some(holder_n) => report.reaction_n -= holder_n,
-                    None => report.inputs_rejected += u32::from(round == 0),
-                }
-            }
-        }
+        let (holder_n, rejected) = self.displace(awake, contact.displaced_m, state, scratch);
+        report.reaction_n = -holder_n;
+        report.inputs_rejected += rejected;
 
         if let (Some(hull), Some(region)) = (self.hull(), awake) {
             self.exchange(hull, region, state, scratch);
@@ -149,7 +140,8 @@ impl SeedModel {
         let forces = &mut scratch.force_n;
         sph::forces_n(region, stencil, hull.layer.volume_m3, pair_stress, &scratch.stress_pa, forces);
         for (slot, force) in forces.iter_mut().enumerate().take(region.len()) {
-            *force += region.border_force_n(hull.border_stiffness_n_per_m, slot, state.particles.x[slot]);
+            let (law, stiffness) = (self.parameters().border_force, hull.border_stiffness_n_per_m);
+            *force += region.border_force_n(law, stiffness, slot, state.particles.x[slot]);
         }
     }
 
@@ -171,30 +163,55 @@ impl SeedModel {
         true
     }
 
-    /// Brings a vertex to where it is held, by the smallest change (in kinetic energy) of what it moves with:
-    /// `Δ_j = w_j µ/m`, `µ = m g/Σw²` for the gap g. Returns the holder's force `µ/dt²` (N); `None` if it cannot.
-    fn displace(&self, awake: Option<&Region>, goal: &AtVertex, state: &mut SeedState) -> Option<DVec3> {
+    /// Brings displaced vertices to where they are held. Returns the holder's force (N), `m Δ/dt²` of all that it moves by Δ beyond what it
+    /// would do by itself, and how many vertices it cannot displace.
+    ///
+    /// Particles in the support of displaced vertices move with them, each by the mean of their displacements, weighted as eq. 25
+    /// does. To move them only as far as the vertices need, `Σ_j w_j d_j`, would leave patterns open that raw SPH does not resist:
+    /// a particle then goes four times as far as its vertex.
+    fn displace(
+        &self,
+        awake: Option<&Region>,
+        goals: &[AtVertex],
+        state: &mut SeedState,
+        scratch: &mut SeedScratch,
+    ) -> (DVec3, u32) {
         let dt_s = self.parameters().dt_s;
-        let vertex = goal.vertex as usize;
-        let rest = *self.surface_rest_m().get(vertex).filter(|_| goal.value.is_finite())?;
-        let Some(hull) = self.hull() else {
-            let node = self.node_of(goal.vertex);
-            let gap = goal.value - state.core.x[node];
-            state.core.shift(node, gap, dt_s);
-            return Some(self.core().force_for_n(node, gap, dt_s));
-        };
-        let Some((region, rider)) = riding(awake, goal.vertex) else {
-            let gap = goal.value - state.skin.x[vertex];
-            state.skin.shift(vertex, gap, dt_s);
-            return Some(gap * (hull.links.mass_kg[vertex] / (dt_s * dt_s)));
-        };
-        let (by, _) = region.carried(rider, &state.particles.x, &state.particles.v);
-        let squares: f64 = region.terms_of(rider).iter().map(|(_, weight)| weight * weight).sum();
-        let per_weight = (goal.value - rest - by) / squares;
-        for &(slot, weight) in region.terms_of(rider) {
-            state.particles.shift(slot as usize, per_weight * weight, dt_s);
+        let (mut holder_n, mut rejected) = (DVec3::ZERO, 0);
+        for goal in goals {
+            let vertex = goal.vertex as usize;
+            let Some(rest) = self.surface_rest_m().get(vertex).filter(|_| goal.value.is_finite()) else {
+                rejected += 1;
+                continue;
+            };
+            if let Some((region, rider)) = riding(awake, goal.vertex) {
+                for &(slot, weight) in region.terms_of(rider) {
+                    let (sum, weights) = &mut scratch.goal_sums[slot as usize];
+                    *sum += (goal.value - *rest) * weight;
+                    *weights += weight;
+                }
+            } else if let Some(hull) = self.hull() {
+                let by = goal.value - state.skin.x[vertex];
+                state.skin.shift(vertex, by, dt_s);
+                holder_n += by * (hull.links.mass_kg[vertex] / (dt_s * dt_s));
+            } else {
+                let node = self.node_of(goal.vertex);
+                let by = goal.value - state.core.x[node];
+                state.core.shift(node, by, dt_s);
+                holder_n += self.core().force_for_n(node, by, dt_s);
+            }
         }
-        Some(per_weight * (hull.layer.mass_kg / (dt_s * dt_s)))
+        if let (Some(hull), Some(region)) = (self.hull(), awake) {
+            for slot in 0..region.len() {
+                let (sum, weights) = std::mem::take(&mut scratch.goal_sums[slot]);
+                if weights > 0.0 {
+                    let by = region.rest_m(slot) + sum / weights - state.particles.x[slot];
+                    state.particles.shift(slot, by, dt_s);
+                    holder_n += by * (hull.layer.mass_kg / (dt_s * dt_s));
+                }
+            }
+        }
+        (holder_n, rejected)
     }
 
     fn exchange(&self, hull: &Hull, region: &Region, state: &mut SeedState, scratch: &mut SeedScratch) {

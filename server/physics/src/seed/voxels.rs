@@ -56,6 +56,13 @@ impl Voxels {
         inside.then(|| self.number(at.to_array().map(|a| a as usize)))
     }
 
+    /// The voxel that holds a point (m) or is nearest to it.
+    pub fn nearest(&self, point_m: DVec3) -> usize {
+        let at = ((point_m - self.origin_m) / self.spacing_m).to_array();
+        // NaN becomes 0.
+        self.number(std::array::from_fn(|axis| (at[axis] as usize).min(self.size[axis] - 1)))
+    }
+
     /// The box of voxels from `low` to `high`, both included.
     pub fn part(&self, low: [usize; 3], high: [usize; 3]) -> Self {
         Self {
@@ -173,6 +180,7 @@ mod tests {
         }
         assert_eq!(voxels.holding(DVec3::splat(-1.0)), None);
         assert_eq!(voxels.holding(DVec3::NAN), None);
+        assert_eq!(voxels.place(voxels.nearest(DVec3::new(-9.0, 0.15, 9.0))), [0, 3, 7]);
         let part = voxels.part([1, 2, 3], [3, 3, 3]);
         assert!((part.centre_m(0) - voxels.centre_m(voxels.number([1, 2, 3]))).length() < 1e-15);
         assert_eq!((part.size, part.beside(0).count()), ([3, 2, 1], 2));
