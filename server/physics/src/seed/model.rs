@@ -172,7 +172,7 @@ fn check_closed(spec: &LayerSpec) -> Result<(), SeedError> {
     if open > 0 || edges.is_empty() {
         return Err(SeedError::Open { edges: open });
     }
-    let finite = spec.skin_m.iter().flat_map(|p| p.to_array()).find(|a| !a.is_finite());
+    let finite = spec.skin_m.iter().flat_map(DVec3::to_array).find(|a| !a.is_finite());
     match finite {
         Some(value) => Err(SeedError::Parameter { name: "skin_m", value, rule: "all coordinates must be finite" }),
         None => Ok(()),

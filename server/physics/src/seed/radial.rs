@@ -35,8 +35,8 @@ impl Radial {
             let [a, b, c] = corners.map(|n| positions_m[n as usize] - centre_m);
             let cone = DMat3::from_cols(a, b, c);
             // Six times the volume towards the centre, beside what rounding could make of a flat one.
-            let size = a.length() * b.length() * c.length();
-            if !(cone.determinant() > 1e-12 * size) {
+            let faces_away = cone.determinant() > 1e-12 * a.length() * b.length() * c.length();
+            if !faces_away {
                 return Err(SeedError::NotStarShaped { surface, triangle });
             }
             inverse_per_m.push(cone.inverse());

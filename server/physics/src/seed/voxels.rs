@@ -64,6 +64,7 @@ impl Voxels {
     }
 
     /// The box of voxels from `low` to `high`, both included.
+    #[must_use]
     pub fn part(&self, low: [usize; 3], high: [usize; 3]) -> Self {
         Self {
             origin_m: self.origin_m + DVec3::from(low.map(|n| n as f64)) * self.spacing_m,
