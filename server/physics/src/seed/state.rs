@@ -1,9 +1,10 @@
 //! What a step changes, what goes into it and comes out of it, and the buffers it works in.
 use super::SeedModel;
 use glam::{DMat3, DVec3};
+use serde::{Deserialize, Serialize};
 
 /// Positions and velocities of some points.
-#[derive(Debug, Clone, PartialEq, Default)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct Motion {
     /// Positions (m).
     pub x: Vec<DVec3>,
@@ -34,7 +35,7 @@ impl Motion {
 }
 
 /// What a step changes. Lists do not change their length.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct SeedState {
     /// Steps done.
     pub step: u64,
@@ -99,7 +100,7 @@ pub struct SeedReport {
     pub reaction_n: DVec3,
     /// Particles that were computed. Sleeping ones are not looked at.
     pub particles_touched: u32,
-    /// Inputs that were left out because they were not finite, or named what there is not.
+    /// Inputs that were left out because they were not finite, named what there is not, or displaced what is held.
     pub inputs_rejected: u32,
     /// False: the state, or some of it, is no longer finite. Go back to an earlier one.
     pub is_finite: bool,

@@ -196,6 +196,10 @@ impl SeedModel {
                 holder_n += by * (hull.links.mass_kg[vertex] / (dt_s * dt_s));
             } else {
                 let node = self.node_of(goal.vertex);
+                if self.core().inverse_mass_per_kg()[node] == 0.0 {
+                    rejected += 1;
+                    continue;
+                }
                 let by = goal.value - state.core.x[node];
                 state.core.shift(node, by, dt_s);
                 holder_n += self.core().force_for_n(node, by, dt_s);
