@@ -172,3 +172,27 @@ fn a_touch_that_walks_over_the_surface_stays_finite() {
     }
     println!("{} touches, farthest particle {:.2} mm", visited.len(), farthest * 1e3);
 }
+
+/// The papers' "external force": 30 µN on a triangle, reached in 2 s.
+#[test]
+fn an_external_force_dents_the_surface() {
+    let model = ball();
+    let triangle = touched(&model).0;
+    let corners = model.surface_triangles()[triangle as usize];
+    let rest = corners.map(|v| model.surface_rest_m()[v as usize]);
+    let outwards = (rest[1] - rest[0]).cross(rest[2] - rest[0]).normalize();
+    let (mut state, mut scratch) = (SeedState::at_rest(&model), SeedScratch::new(&model));
+    let mut depths = Vec::new();
+    for step in 0..300 {
+        let force = outwards * (-10e-6 * (f64::from(step) / 285.0).min(1.0));
+        let push = corners.map(|vertex| AtVertex { vertex, value: force });
+        let contact = SeedContact { triangle: Some(triangle), forces_n: &push, ..SeedContact::default() };
+        assert!(model.step(&mut state, &mut scratch, &contact).is_finite, "step {step}");
+        if step % 60 == 59 {
+            let sunk = |i: usize| (rest[i] - model.surface_m(&state, corners[i])).dot(outwards);
+            depths.push((sunk(0) + sunk(1) + sunk(2)) / 3.0);
+        }
+    }
+    println!("sunk by {:?} mm", depths.iter().map(|d| (d * 1e6).round() / 1e3).collect::<Vec<_>>());
+    assert!(depths[0] > 0.0 && depths.windows(2).all(|pair| pair[1] > pair[0]), "{depths:?}");
+}
