@@ -14,6 +14,7 @@ pub mod hybrid;
 pub mod integrate;
 pub mod material;
 pub mod mesh;
+pub mod seed;
 pub mod simd;
 pub mod snapshot;
 pub mod solve;

@@ -84,7 +84,9 @@ fn damped_the_loop_comes_to_rest_where_newtons_method_says() {
     let mut loads_n = Field { nodes: zero(&rest.nodes), particles: zero(&rest.particles) };
     let skin = rig.model.surface_rest_positions_m();
     let place = |v: u32| Place::new(hybrid.partition(), skin[v as usize]);
-    pressed.iter().for_each(|&v| place(v).push(hybrid.partition(), &patch, force_n, &mut loads_n));
+    for &v in &pressed {
+        place(v).push(hybrid.partition(), &patch, force_n, &mut loads_n);
+    }
     let found = equilibrium(hybrid.partition(), &patch, &hybrid.materials(), hybrid.free(), &loads_n, 1e-10).unwrap();
     let mut positions = Vec::new();
     rig.model.surface_positions_m(&rig.state, &mut positions);

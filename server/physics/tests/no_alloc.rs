@@ -6,6 +6,7 @@ use glam::DVec3;
 use palpate_physics::{
     Integrator, LoadSpec, PointForce, Substeps, TickInput,
     contact::{Coupling, ToolTarget},
+    hybrid::{ParticleSpec, Skin, Waking},
     material::{Lame, Law, Viscosity},
 };
 use rig::{Rig, at, body, bricks, even, hold, material, nodes_where, sphere};
@@ -67,6 +68,49 @@ fn nor_do_ticks_that_are_repeated() {
     spec.regions[0].material.lame = Lame::from_young_poisson(200e3, 0.45).unwrap();
     let rig = Rig::new(spec);
     assert!(run_without_allocating(rig, 2000) > 0);
+}
+
+/// Two tools rub and tap on a body with particles, which wake and sleep under load.
+#[test]
+fn nor_does_waking_particles() {
+    let tets = rig(Integrator::Leapfrog);
+    let mut spec = tets.model.spec().clone();
+    let surface = tets.model.surface();
+    let positions = surface.nodes.iter().map(|&n| tets.model.rest_positions_m()[n as usize]).collect();
+    spec.particles = Some(ParticleSpec {
+        skin: Skin::new(positions, surface.triangles.clone()).unwrap(),
+        spacing_m: 2e-3,
+        lattice_through_m: DVec3::ZERO,
+        most_active: 300,
+        waking: Waking::ByTools { reach_m: 7e-3 },
+    });
+    spec.mesh = bricks(&even(-0.02, 0.02, 2), &even(-0.02, 0.02, 2), &even(-0.02, 0.0, 1));
+    spec.tet_region = vec![0; spec.mesh.tets().len()];
+    spec.prescribed[0].nodes = nodes_where(&spec.mesh, |p| p.z < -0.0199);
+    spec.loads[0] = LoadSpec::NodalForces(vec![(7, DVec3::X * 0.01)]);
+    let mut rig = Rig::new(spec);
+    let mut saved = rig.state.clone();
+    saved.copy_from(&rig.state);
+    let (mut sets, mut faded, mut count) = (0, 0, 0);
+    assert_no_alloc(|| {
+        for tick in 0..3000 {
+            let factor = (f64::from(tick) * 0.003).sin();
+            let input = TickInput {
+                tools: &targets(tick),
+                load_factors: &[factor; 3],
+                prescribed_displacements_m: &[DVec3::X * 1e-3 * factor],
+                point_forces: &[PointForce { node: tick % 50, force_n: DVec3::Z * 1e-3 }],
+            };
+            palpate_physics::step(&rig.model, &mut rig.state, &mut rig.scratch, &input);
+            sets += u32::from(rig.state.active.len() != count);
+            count = rig.state.active.len();
+            faded += u32::from(!rig.state.active.fading().is_empty());
+            if tick == 1500 {
+                rig.state.reset(&rig.model);
+            }
+        }
+    });
+    assert!(rig.state.quarantine.is_none() && sets > 20 && faded > 100, "{sets} {faded}");
 }
 
 /// Falls asleep, sleeps, and wakes for a load.

@@ -92,6 +92,14 @@ pub struct Body<'a> {
     pub fastest_m_per_s: f64,
 }
 
+/// The surface at one instant.
+pub(crate) struct SurfaceNow<'a> {
+    /// Positions (m) of its nodes, of use at those that are listed.
+    pub(crate) x: &'a [DVec3],
+    /// Velocity (m/s) of any of them.
+    pub(crate) velocity_m_per_s: &'a dyn Fn(u32) -> DVec3,
+}
+
 /// Buffers of contact.
 #[derive(Debug, Clone, Default)]
 pub struct ContactScratch {
@@ -230,7 +238,8 @@ impl ContactModel {
         for (index, tool) in tools.iter().enumerate() {
             self.list_candidates(index, tool.centre_m, body.x, contact, scratch.exhaustive);
         }
-        self.press_tools(body.x, &|node| body.v[node as usize], time, tools, contact, forces_n, scratch);
+        let surface = SurfaceNow { x: body.x, velocity_m_per_s: &|node| body.v[node as usize] };
+        self.press_tools(&surface, time, tools, contact, forces_n, scratch);
     }
 
     /// The first part of a substep: the body drifted with up to `fastest_m_per_s`, the tools follow.
@@ -279,11 +288,10 @@ impl ContactModel {
         &self.triangles.nodes
     }
 
-    /// The last part: presses the tools on what is listed, at positions `x` (m), and adds the forces (N) on nodes.
+    /// The last part: presses the tools on what is listed, and adds the forces (N) on nodes.
     pub(crate) fn press_tools(
         &self,
-        x: &[DVec3],
-        velocity_m_per_s: &dyn Fn(u32) -> DVec3,
+        SurfaceNow { x, velocity_m_per_s }: &SurfaceNow<'_>,
         time: &SubstepTime,
         tools: &mut [ToolState],
         contact: &mut ContactState,
@@ -293,7 +301,7 @@ impl ContactModel {
         for (index, (tool, scratch)) in tools.iter_mut().zip(&mut scratch.tools).enumerate() {
             let model = &self.tools[index];
             let pressed = self.press(index, tool.centre_m, x, contact, forces_n, scratch);
-            let surface_m_per_s = self.surface_m_per_s(&pressed, velocity_m_per_s);
+            let surface_m_per_s = self.surface_m_per_s(&pressed, *velocity_m_per_s);
             let coupling_n = proxy::finish(model, tool, &pressed, surface_m_per_s, time);
             tool.friction_heat_j += pressed.heat_j;
             tool.contacts = pressed.contacts;

@@ -25,7 +25,12 @@ pub struct ActiveParticles {
 
 impl ActiveParticles {
     pub(crate) fn none(model: &Model) -> Self {
-        Self { ids: Vec::with_capacity(room(model)), balls: vec![None; tools(model)], fading: fading_with_room(model), balance_n: Vec::with_capacity(entries(model)) }
+        Self {
+            ids: Vec::with_capacity(room(model)),
+            balls: vec![None; tools(model)],
+            fading: fading_with_room(model),
+            balance_n: Vec::with_capacity(entries(model)),
+        }
     }
 
     /// Their numbers.

@@ -7,7 +7,7 @@
 //! ```
 //! `Σ c = 0`, since neither momentum nor external force changed. Their torque is zero at first; as the body moves on it is taken from them again by forces
 //! `M_i α × (x_i − x̄)` on the coarse nodes of a body that is held nowhere. The work of these forces is booked in the ledger.
-use super::{body::Hybrid, composite::Anchor, patch::KEPT, running_metric::RunningMetric};
+use super::{body::Hybrid, patch::KEPT, running_metric::RunningMetric};
 use crate::world::State;
 use glam::{BVec3, DMat3, DVec3};
 
@@ -68,13 +68,11 @@ impl Balance {
         let nodes = body.node_count();
         self.taken_n.clear();
         self.taken_n.extend_from_slice(&self.before[..nodes]);
-        self.taken_n.extend(after.iter().map(|id| match before.binary_search(id) {
-            Ok(number) => self.before[nodes + number],
-            Err(_) => {
-                let anchor: Anchor = body.partition.anchor(*id);
-                anchor.of(&self.before)
-            }
-        }));
+        let of = |id: &u32| {
+            let number = before.binary_search(id).ok();
+            number.map_or_else(|| body.partition.anchor(*id).of(&self.before), |number| self.before[nodes + number])
+        };
+        self.taken_n.extend(after.iter().map(of));
         self.due_n.resize(self.taken_n.len(), DVec3::ZERO);
         metric.momenta(body, &self.taken_n, &mut self.due_n);
         for (due, handed) in self.due_n.iter_mut().zip(handed_n) {

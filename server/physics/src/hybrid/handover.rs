@@ -47,7 +47,12 @@ struct TetBefore {
 impl Before {
     pub(super) fn with_room(cells: usize, tets: usize) -> Self {
         let next = Fading::with_room(cells, tets);
-        Self { cells: Vec::with_capacity(cells), tets: Vec::with_capacity(2 * tets), next, first_lost: Vec::with_capacity(tets) }
+        Self {
+            cells: Vec::with_capacity(cells),
+            tets: Vec::with_capacity(2 * tets),
+            next,
+            first_lost: Vec::with_capacity(tets),
+        }
     }
 
     /// Takes how everything awake is strained, and the coarse tets that lost some of it. The patch is displaced.
@@ -111,15 +116,15 @@ impl Before {
 
     /// A cell that is awake now: strained as it was, or as its part was. The particles around one that was awake may have fallen asleep.
     fn of_cell(&self, body: &Hybrid, patch: &RunningPatch, cell: u32) -> CellFade {
-        let (shape, volume, before_m2) = match self.cells.binary_search_by_key(&cell, |before| before.cell) {
-            Ok(at) => (self.cells[at].shape, self.cells[at].volume, self.cells[at].modes_m2),
-            Err(_) => {
-                let Cell { tet, part, .. } = body.partition.cells()[cell as usize];
-                let Ok(at) = self.tets.binary_search_by_key(&tet, |before| before.tet) else {
-                    return CellFade::none(cell);
-                };
-                (self.tets[at].parts[part as usize], self.tets[at].whole, 0.0)
-            }
+        let own = self.cells.binary_search_by_key(&cell, |before| before.cell);
+        let (shape, volume, before_m2) = if let Ok(at) = own {
+            (self.cells[at].shape, self.cells[at].volume, self.cells[at].modes_m2)
+        } else {
+            let Cell { tet, part, .. } = body.partition.cells()[cell as usize];
+            let Ok(at) = self.tets.binary_search_by_key(&tet, |before| before.tet) else {
+                return CellFade::none(cell);
+            };
+            (self.tets[at].parts[part as usize], self.tets[at].whole, 0.0)
         };
         let (rest, y) = (body.awake_cell(cell as usize), patch.corners_m(body, cell));
         let f = rest.gradient_of(&y);

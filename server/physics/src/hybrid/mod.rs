@@ -41,5 +41,5 @@ pub(crate) use active::HybridScratch;
 pub use body::Hybrid;
 pub(crate) use listed::SkinView;
 pub use skin::{Skin, SkinError};
-pub use switching::wake_only;
 pub use spec::{HybridError, ParticleSpec, Waking};
+pub use switching::wake_only;

@@ -108,7 +108,12 @@ impl Patch {
                         (active.len() + border.len()) as u32 - 1
                     })
                 });
-                PatchCell { number: number as u32, rest: RestCell::new(spacing_m, 1.0 - KEPT, &moments), points, tet: cell.tet }
+                PatchCell {
+                    number: number as u32,
+                    rest: RestCell::new(spacing_m, 1.0 - KEPT, &moments),
+                    points,
+                    tet: cell.tet,
+                }
             })
             .collect();
         Self { active, border, fine: Fine::Cells(cells), shares, fading: Fading::default() }

@@ -173,10 +173,10 @@ impl HybridScratch {
         // Tets that have lost cells only now were whole.
         let whole = |tet: u32| {
             let (share, material) = (&body.partition.shares()[tet as usize], body.material_of_tet(tet));
-            before.faded().of_tet(tet).map_or_else(
-                || share.energy_j(material, &state.x),
-                |fade| fade.energy_j(share, material, &state.x),
-            )
+            before
+                .faded()
+                .of_tet(tet)
+                .map_or_else(|| share.energy_j(material, &state.x), |fade| fade.energy_j(share, material, &state.x))
         };
         held_j += before.first_lost().iter().map(|&tet| whole(tet)).sum::<f64>();
         held_j -= patch.elastic_j(body, &state.x, &state.active.fading, before.tets());

@@ -4,7 +4,7 @@ use super::{
     motion::holders_power_w,
 };
 use crate::{
-    contact::{ContactScratch, SubstepTime},
+    contact::{ContactScratch, SubstepTime, SurfaceNow},
     fem::loads::add_load_n,
     hybrid::{Hybrid, HybridScratch, SkinView},
     world::{LoadSpec, Model, State},
@@ -51,7 +51,8 @@ pub(super) fn evaluate(
     let v = &state.v;
     let velocity = |vertex: u32| body.velocity_m_per_s(patch, vertex, v);
     let (tools, touching) = (&mut state.tools, &mut state.contact);
-    contact.press_tools(&skin.x, &velocity, &time, tools, touching, &mut skin.forces_n, contact_scratch);
+    let surface = SurfaceNow { x: &skin.x, velocity_m_per_s: &velocity };
+    contact.press_tools(&surface, &time, tools, touching, &mut skin.forces_n, contact_scratch);
     state.external_n.fill(DVec3::ZERO);
     skin.hand_over(body.node_count(), patch, &mut state.external_n);
     let viscous_power_w = patch.forces_n(body, &state.v, &mut state.force_n);

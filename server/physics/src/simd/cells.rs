@@ -28,7 +28,7 @@ const LANES_F64: usize = 8;
 
 /// Consecutive cells are spread over the lanes of this many blocks: sums of one point would wait for each other in the scatter.
 const BLOCKS_PER_WINDOW: usize = 16;
-/// Blocks that are gathered, computed and scattered together: a wide load waits for the narrow stores it overlaps.
+/// Tables that are gathered, computed and scattered together: a wide load waits for the narrow stores it overlaps.
 const BATCH: usize = 4;
 
 /// Points 1 to 3, 4 to 6, and 7 of a block's cells, three components each; what is over stays zero.
@@ -78,9 +78,9 @@ struct Split<T> {
     volume: Constants<T>,
 }
 
-/// Blocks of the materials, of which `N` lanes each.
+/// Blocks of all materials.
 #[derive(Debug, Clone)]
-struct Blocks<T, const N: usize> {
+struct Tables<T, const N: usize> {
     materials: Vec<Split<T>>,
     blocks: Vec<CutBlock<T, N>>,
     fades: Vec<FadeBlock<T, N>>,
@@ -90,8 +90,8 @@ struct Blocks<T, const N: usize> {
 
 #[derive(Debug, Clone)]
 enum Layout {
-    Single(Blocks<f32, LANES_F32>),
-    Double(Blocks<f64, LANES_F64>),
+    Single(Tables<f32, LANES_F32>),
+    Double(Tables<f64, LANES_F64>),
 }
 
 /// Forces of cut cells, which may be exchanged for others without allocating.
@@ -109,8 +109,8 @@ impl CutCells {
     /// Room for `cells` cells over `points` points.
     pub fn with_capacity(cells: usize, points: usize, materials: &[Material], precision: Precision) -> Self {
         let layout = match precision {
-            Precision::Single => Layout::Single(Blocks::with_capacity(cells, points, materials)),
-            Precision::Double => Layout::Double(Blocks::with_capacity(cells, points, materials)),
+            Precision::Single => Layout::Single(Tables::with_capacity(cells, points, materials)),
+            Precision::Double => Layout::Double(Tables::with_capacity(cells, points, materials)),
         };
         let is_viscous = materials.iter().any(|m| !m.viscosity.is_zero());
         // One spare point more, for the lanes of padding.
@@ -211,7 +211,7 @@ impl CutCells {
     }
 }
 
-impl<T: Scalar, const N: usize> Blocks<T, N> {
+impl<T: Scalar, const N: usize> Tables<T, N> {
     fn with_capacity(cells: usize, points: usize, materials: &[Material]) -> Self {
         Self {
             materials: materials.iter().map(Split::of).collect(),

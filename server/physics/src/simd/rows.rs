@@ -305,7 +305,7 @@ fn differences<V: Vector>(values: &[V::Scalar], at: [usize; 4]) -> [V; 7] {
     let zero = V::load(&values[at[0]..]);
     let mut found = [V::of(0.0); 7];
     for row in 0..4 {
-        let values = &values[at[row]..at[row] + V::WIDTH + 1];
+        let values = &values[at[row]..=at[row] + V::WIDTH];
         if row > 0 {
             found[2 * row - 1] = V::load(values) - zero;
         }

@@ -49,7 +49,7 @@ struct ShareBlock<T, const N: usize> {
     fading: u32,
 }
 
-/// Blocks of one material.
+/// Tables of one material.
 #[derive(Debug, Clone)]
 struct Run<T> {
     law: (crate::material::Law, bool),
@@ -59,7 +59,7 @@ struct Run<T> {
 }
 
 #[derive(Debug, Clone)]
-struct Blocks<T, const N: usize> {
+struct Tables<T, const N: usize> {
     blocks: Vec<ShareBlock<T, N>>,
     runs: Vec<Run<T>>,
     /// Block and lane of every tet.
@@ -74,8 +74,8 @@ struct Blocks<T, const N: usize> {
 
 #[derive(Debug, Clone)]
 enum Layout {
-    Single(Blocks<f32, LANES_F32>),
-    Double(Blocks<f64, LANES_F64>),
+    Single(Tables<f32, LANES_F32>),
+    Double(Tables<f64, LANES_F64>),
 }
 
 /// Forces of what is left to the coarse tets.
@@ -99,8 +99,8 @@ impl ShareKernel {
         precision: Precision,
     ) -> Self {
         let layout = match precision {
-            Precision::Single => Layout::Single(Blocks::build(shares, tets, nodes, of_tet, materials)),
-            Precision::Double => Layout::Double(Blocks::build(shares, tets, nodes, of_tet, materials)),
+            Precision::Single => Layout::Single(Tables::build(shares, tets, nodes, of_tet, materials)),
+            Precision::Double => Layout::Double(Tables::build(shares, tets, nodes, of_tet, materials)),
         };
         let is_viscous = materials.iter().any(|m| !m.viscosity.is_zero());
         // One spare node more, for the lanes of padding.
@@ -158,7 +158,7 @@ impl ShareKernel {
     }
 }
 
-impl<T: Scalar, const N: usize> Blocks<T, N> {
+impl<T: Scalar, const N: usize> Tables<T, N> {
     fn build(shares: &[Share], tets: &[[u32; NODES]], nodes: usize, of_tet: &[u16], materials: &[Material]) -> Self {
         let is_viscous = materials.iter().any(|m| !m.viscosity.is_zero());
         // Tets that reach for as many nodes share a block; one that holds nothing of the body needs no lane.

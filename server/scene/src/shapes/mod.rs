@@ -1,9 +1,10 @@
-//! Built-in bodies: box, sphere and ellipsoid shells, and the truncated-ellipsoid ventricle.
+//! Built-in bodies: box, sphere and ellipsoid shells, the truncated-ellipsoid ventricle, and the seeds' models.
 //!
 //! Shells are layers of prisms over one triangulation of the wall's middle surface, so that a coarse mesh still has a
 //! whole number of layers through the wall. All lengths in metres, z is the long axis, the apex lies at negative z.
 mod block;
 mod rings;
+pub mod seeds;
 mod shell;
 
 pub use block::box_mesh;

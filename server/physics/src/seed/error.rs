@@ -1,0 +1,69 @@
+//! Why a seed model cannot be built.
+use crate::mesh::MeshError;
+use thiserror::Error;
+
+/// Why a seed model cannot be built.
+#[derive(Debug, Clone, PartialEq, Error)]
+pub enum SeedError {
+    /// The core's boundary is bad.
+    #[error("the core: {0}")]
+    Core(#[from] MeshError),
+    /// A parameter outside its range.
+    #[error("{name} = {value}: {rule}")]
+    Parameter {
+        /// Its name, with its unit.
+        name: &'static str,
+        /// Its value.
+        value: f64,
+        /// What it must satisfy.
+        rule: &'static str,
+    },
+    /// An index points nowhere.
+    #[error("{what} names {index}, but there are only {count} (counting from 0)")]
+    OutOfRange {
+        /// What names it.
+        what: &'static str,
+        /// The index.
+        index: u32,
+        /// How many there are.
+        count: usize,
+    },
+    /// A triangle's back is not turned to the mass centre.
+    #[error(
+        "triangle {triangle} of the {surface} does not face away from the mass centre: the papers project along rays from it, so \
+         every ray must leave the {surface} once; use a shape like a shell between ellipsoids"
+    )]
+    NotStarShaped {
+        /// Which surface.
+        surface: &'static str,
+        /// Index of the triangle.
+        triangle: usize,
+    },
+    /// The surface is not closed.
+    #[error("the skin is not closed: {edges} of its edges do not belong to two triangles; close it, without holes")]
+    Open {
+        /// How many edges.
+        edges: usize,
+    },
+    /// No room for particles.
+    #[error(
+        "between core and skin there are {found} voxels for {wanted} particles (layer {volume_m3:e} m³); make the skin larger than \
+         the core, or ask for more particles"
+    )]
+    NoLayer {
+        /// Voxels found.
+        found: usize,
+        /// Particles asked for.
+        wanted: u32,
+        /// Volume (m³) between core and skin.
+        volume_m3: f64,
+    },
+    /// A region without particles.
+    #[error(
+        "no particle lies under triangle {triangle} of the skin and its neighbours; ask for more particles or fewer triangles"
+    )]
+    EmptyRegion {
+        /// Index of the triangle.
+        triangle: usize,
+    },
+}

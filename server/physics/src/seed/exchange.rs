@@ -1,0 +1,88 @@
+//! What passes between the particles and the core's faces (2006, section 6.1).
+//!
+//! *As printed*: "the displacement of MFM particles that cross a boundary voxel through a tetrahedron face is averaged by using their
+//! barycentric coordinates and applied to the FEM nodes in this face. Analogously, the displacement of the faces of the tetrahedra moves all
+//! the activated MFM particles that are in the boundary voxels using the normal face direction." ([`nodes_follow`],
+//! [`particles_follow`].) A displacement without its mass is no momentum: a node of mass M that takes over the step Δ of a particle of
+//! mass m changes the momentum by MΔ/dt where the particle had mΔ/dt, and the way back leaves out what is tangential.
+//!
+//! *Repaired* ([`tie`]), "from conservation of Linear Momentum" as the paper announces: every particle of the border beside the core is
+//! tied to the point of its face below it. With the face's normal n and weights ζ, the gap that a step opens
+//! ```text
+//! g = n·(d_p − Σ_i ζ_i d_i)        µ = g/(1/m_p + Σ_i ζ_i²/m_i)        d_p ← d_p − µ n/m_p        d_i ← d_i + ζ_i µ n/m_i
+//! ```
+//! is closed by the impulse µ/dt, which the particle loses and the nodes get: Σζ = 1, so linear momentum is exact. Both of the printed
+//! ways are in it, and the normal direction. A heavy node hardly moves, a light particle follows.
+use super::{SeedState, core::Core, region::Region};
+use glam::DVec3;
+
+/// Unit normal of a face, outwards; zero of one without area.
+fn normal(corners: [DVec3; 3]) -> DVec3 {
+    (corners[1] - corners[0]).cross(corners[2] - corners[0]).normalize_or_zero()
+}
+
+/// The repaired exchange: ties every particle of the border beside the core to its face.
+pub fn tie(core: &Core, region: &Region, particle_mass_kg: f64, dt_s: f64, state: &mut SeedState) {
+    let per_mass = 1.0 / particle_mass_kg;
+    for on_core in &region.on_core {
+        let slot = on_core.slot as usize;
+        let nodes = core.outer_triangles()[on_core.foot.triangle as usize].map(|n| n as usize);
+        let weights = on_core.foot.weights;
+        let face_normal = normal(nodes.map(|n| state.core.x[n]));
+        let mut opened = state.particles.x[slot] - region.rest_m(slot);
+        let mut compliance = per_mass;
+        for (&node, weight) in nodes.iter().zip(weights) {
+            opened -= (state.core.x[node] - core.rest_m()[node]) * weight;
+            compliance += weight * weight * core.inverse_mass_per_kg()[node];
+        }
+        // µ n (kg m).
+        let shift = face_normal * (opened.dot(face_normal) / compliance);
+        state.particles.shift(slot, shift * -per_mass, dt_s);
+        for (&node, weight) in nodes.iter().zip(weights) {
+            state.core.shift(node, shift * (weight * core.inverse_mass_per_kg()[node]), dt_s);
+        }
+    }
+}
+
+/// As printed, particles to core: nodes of a face move by the barycentric mean of the step (m) of the particles that crossed it,
+/// `Δ_i = Σ_p ζ_pi Δ_p / Σ_p ζ_pi`. `crossed` says of each slot how far it came in this step if it crossed. Held nodes stay.
+pub fn nodes_follow(
+    core: &Core,
+    region: &Region,
+    crossed: impl Fn(usize) -> Option<DVec3>,
+    sums: &mut [(DVec3, f64)],
+    x: &mut [DVec3],
+) {
+    let nodes_of = |triangle: u32| core.outer_triangles()[triangle as usize].map(|n| n as usize);
+    for on_core in &region.on_core {
+        for node in nodes_of(on_core.foot.triangle) {
+            sums[node] = (DVec3::ZERO, 0.0);
+        }
+    }
+    for on_core in &region.on_core {
+        let Some(step) = crossed(on_core.slot as usize) else { continue };
+        for (node, weight) in nodes_of(on_core.foot.triangle).into_iter().zip(on_core.foot.weights) {
+            sums[node].0 += step * weight;
+            sums[node].1 += weight;
+        }
+    }
+    for on_core in &region.on_core {
+        for node in nodes_of(on_core.foot.triangle) {
+            let (sum, weight) = std::mem::take(&mut sums[node]);
+            if weight > 0.0 && core.inverse_mass_per_kg()[node] > 0.0 {
+                x[node] += sum / weight;
+            }
+        }
+    }
+}
+
+/// As printed, core to particles: every particle of the border beside the core moves by the normal part of its face's step (m), the
+/// mean of its corners'. `before` are the nodes' positions before the step.
+pub fn particles_follow(core: &Core, region: &Region, before: &[DVec3], now: &[DVec3], particles: &mut [DVec3]) {
+    for on_core in &region.on_core {
+        let nodes = core.outer_triangles()[on_core.foot.triangle as usize].map(|n| n as usize);
+        let face_normal = normal(nodes.map(|n| now[n]));
+        let step: DVec3 = nodes.into_iter().map(|n| now[n] - before[n]).sum::<DVec3>() / 3.0;
+        particles[on_core.slot as usize] += face_normal * step.dot(face_normal);
+    }
+}

@@ -1,0 +1,225 @@
+//! The model: constant after load.
+use super::{
+    LayerSpec, SeedError, SeedParameters, SeedSpec,
+    core::Core,
+    layer::{Layer, Walls, enclosed_m3, enclosed_moment_m4},
+    links::{LinkMaterial, Links},
+    radial::Radial,
+    region::Region,
+    sph::LayerStress,
+};
+use glam::DVec3;
+use std::collections::BTreeMap;
+
+/// A seed body: a core, and around it, unless it is a core alone, particles and a skin.
+#[derive(Debug, Clone)]
+pub struct SeedModel {
+    parameters: SeedParameters,
+    core: Core,
+    hull: Option<Hull>,
+    surface_rest_m: Vec<DVec3>,
+    surface_triangles: Vec<[u32; 3]>,
+    /// Without a layer: the core's node of each vertex of the surface.
+    vertex_nodes: Vec<u32>,
+}
+
+/// What lies around the core.
+#[derive(Debug, Clone)]
+pub(super) struct Hull {
+    pub(super) layer: Layer,
+    pub(super) links: Links,
+    /// One per triangle of the skin.
+    pub(super) regions: Vec<Region>,
+    pub(super) stress: LayerStress,
+    pub(super) most_awake: usize,
+    pub(super) border_stiffness_n_per_m: f64,
+}
+
+impl SeedModel {
+    /// Checks the specification and precomputes all that the rest state fixes, every triangle's region included.
+    ///
+    /// # Errors
+    /// [`SeedError`], naming what is wrong.
+    pub fn build(spec: SeedSpec) -> Result<Self, SeedError> {
+        let SeedSpec { core, held_nodes, layer, parameters } = spec;
+        parameters.check()?;
+        let core = Core::new(&core, &held_nodes, &parameters)?;
+        match layer {
+            None => Ok(Self::without_layer(parameters, core)),
+            Some(layer) => {
+                let hull = Hull::new(&core, &layer, &parameters)?;
+                let LayerSpec { skin_m, skin_triangles, .. } = layer;
+                let (surface_rest_m, surface_triangles) = (skin_m, skin_triangles);
+                Ok(Self {
+                    parameters,
+                    core,
+                    hull: Some(hull),
+                    surface_rest_m,
+                    surface_triangles,
+                    vertex_nodes: Vec::new(),
+                })
+            }
+        }
+    }
+
+    fn without_layer(parameters: SeedParameters, core: Core) -> Self {
+        let mut vertex_nodes: Vec<u32> = core.outer_triangles().iter().flatten().copied().collect();
+        vertex_nodes.sort_unstable();
+        vertex_nodes.dedup();
+        let vertex = |node: u32| vertex_nodes.binary_search(&node).map_or(0, |vertex| vertex as u32);
+        let surface_triangles = core.outer_triangles().iter().map(|triangle| triangle.map(vertex)).collect();
+        let surface_rest_m = vertex_nodes.iter().map(|&node| core.rest_m()[node as usize]).collect();
+        Self { parameters, core, hull: None, surface_rest_m, surface_triangles, vertex_nodes }
+    }
+
+    /// Constants.
+    pub fn parameters(&self) -> &SeedParameters {
+        &self.parameters
+    }
+
+    /// The core.
+    pub fn core(&self) -> &Core {
+        &self.core
+    }
+
+    /// The particles, if there are any.
+    pub fn layer(&self) -> Option<&Layer> {
+        self.hull.as_ref().map(|hull| &hull.layer)
+    }
+
+    /// The surface's links; none without a layer.
+    pub fn links(&self) -> Option<&Links> {
+        self.hull.as_ref().map(|hull| &hull.links)
+    }
+
+    /// Regions, one per triangle of the surface; none without a layer.
+    pub fn regions(&self) -> &[Region] {
+        self.hull.as_ref().map_or(&[], |hull| &hull.regions)
+    }
+
+    /// Most particles of a region.
+    pub fn most_awake(&self) -> usize {
+        self.hull.as_ref().map_or(0, |hull| hull.most_awake)
+    }
+
+    /// Rest positions (m) of the touchable surface's vertices: the skin's, or without a layer those of the core's outer surface.
+    pub fn surface_rest_m(&self) -> &[DVec3] {
+        &self.surface_rest_m
+    }
+
+    /// Triangles of the touchable surface, counter-clockwise seen from outside.
+    pub fn surface_triangles(&self) -> &[[u32; 3]] {
+        &self.surface_triangles
+    }
+
+    pub(super) fn hull(&self) -> Option<&Hull> {
+        self.hull.as_ref()
+    }
+
+    /// Without a layer: the core's node of a vertex.
+    pub(super) fn node_of(&self, vertex: u32) -> usize {
+        self.vertex_nodes[vertex as usize] as usize
+    }
+}
+
+impl Hull {
+    fn new(core: &Core, spec: &LayerSpec, parameters: &SeedParameters) -> Result<Self, SeedError> {
+        check_closed(spec)?;
+        let (core_m, core_triangles) = (core.rest_m(), core.outer_triangles());
+        let centre_m = mass_centre_m(core, spec);
+        let skin_fan = Radial::new("skin", centre_m, &spec.skin_m, &spec.skin_triangles)?;
+        let core_fan = Radial::new("core's outer surface", centre_m, core_m, core_triangles)?;
+        let walls = Walls { core_m, core_triangles, core: &core_fan, skin: &skin_fan };
+        let layer = Layer::new(spec, &walls, parameters)?;
+        let regions = regions(spec, &layer, parameters.first_neighbours)?;
+        let stress = LayerStress::new(parameters);
+        let modulus_pa = stress.lame().p_wave_modulus_pa();
+        let feet: Vec<_> = spec.skin_m.iter().map(|&vertex| core_fan.foot(vertex)).collect();
+        let links = Links::new(
+            (&spec.skin_m, &spec.skin_triangles),
+            &feet,
+            (core_m, core_triangles),
+            &LinkMaterial {
+                modulus_pa: modulus_pa * parameters.link_stiffness_ratio,
+                damping_ratio: parameters.link_damping_ratio,
+                layer_mass_kg: layer.mass_kg * layer.particle_count() as f64,
+            },
+        );
+        Ok(Self {
+            most_awake: regions.iter().map(Region::len).max().unwrap_or(0),
+            border_stiffness_n_per_m: parameters.border_stiffness_ratio * modulus_pa * layer.voxels.spacing_m,
+            layer,
+            links,
+            regions,
+            stress,
+        })
+    }
+}
+
+fn check_closed(spec: &LayerSpec) -> Result<(), SeedError> {
+    let count = spec.skin_m.len();
+    let mut edges: BTreeMap<[u32; 2], [u32; 2]> = BTreeMap::new();
+    for triangle in &spec.skin_triangles {
+        for side in 0..3 {
+            let [a, b] = [triangle[side], triangle[(side + 1) % 3]];
+            if a as usize >= count {
+                return Err(SeedError::OutOfRange { what: "a triangle of the skin", index: a, count });
+            }
+            edges.entry([a.min(b), a.max(b)]).or_default()[usize::from(a < b)] += 1;
+        }
+    }
+    let open = edges.values().filter(|sides| **sides != [1, 1]).count();
+    if open > 0 || edges.is_empty() {
+        return Err(SeedError::Open { edges: open });
+    }
+    let finite = spec.skin_m.iter().flat_map(DVec3::to_array).find(|a| !a.is_finite());
+    match finite {
+        Some(value) => Err(SeedError::Parameter { name: "skin_m", value, rule: "all coordinates must be finite" }),
+        None => Ok(()),
+    }
+}
+
+/// Of core and layer, which have the same density.
+fn mass_centre_m(core: &Core, spec: &LayerSpec) -> DVec3 {
+    let (core_m, faces) = (core.rest_m(), core.outer_triangles());
+    let of_core: f64 = core.mass_kg().iter().sum();
+    let core_centre = core.mass_kg().iter().zip(core_m).map(|(m, x)| *x * *m).sum::<DVec3>() / of_core;
+    let core_m3 = core.mesh().total_volume_m3();
+    let layer_m3 = enclosed_m3(&spec.skin_m, &spec.skin_triangles) - enclosed_m3(core_m, faces);
+    let layer_m4 = enclosed_moment_m4(&spec.skin_m, &spec.skin_triangles) - enclosed_moment_m4(core_m, faces);
+    (core_centre * core_m3 + layer_m4) / (core_m3 + layer_m3)
+}
+
+/// The region of every triangle: the particles under it and, with `first_neighbours`, under all triangles that share a corner with it.
+fn regions(spec: &LayerSpec, layer: &Layer, first_neighbours: bool) -> Result<Vec<Region>, SeedError> {
+    let mut around: Vec<Vec<u32>> = vec![Vec::new(); spec.skin_m.len()];
+    for (triangle, corners) in spec.skin_triangles.iter().enumerate() {
+        for &corner in corners {
+            around[corner as usize].push(triangle as u32);
+        }
+    }
+    let mut under: Vec<Vec<u32>> = vec![Vec::new(); spec.skin_triangles.len()];
+    for (particle, &triangle) in layer.triangle_over.iter().enumerate() {
+        under[triangle as usize].push(particle as u32);
+    }
+    let region = |(triangle, corners): (usize, &[u32; 3])| {
+        let mut patch: Vec<u32> = if first_neighbours {
+            corners.iter().flat_map(|&corner| around[corner as usize].iter().copied()).collect()
+        } else {
+            vec![triangle as u32]
+        };
+        patch.sort_unstable();
+        patch.dedup();
+        let mut particles: Vec<u32> = patch.iter().flat_map(|&t| under[t as usize].iter().copied()).collect();
+        particles.sort_unstable();
+        if particles.is_empty() {
+            return Err(SeedError::EmptyRegion { triangle });
+        }
+        let mut vertices: Vec<u32> = patch.iter().flat_map(|&t| spec.skin_triangles[t as usize]).collect();
+        vertices.sort_unstable();
+        vertices.dedup();
+        let riders: Vec<(u32, DVec3)> = vertices.iter().map(|&v| (v, spec.skin_m[v as usize])).collect();
+        Ok(Region::new(layer, particles, &riders))
+    };
+    spec.skin_triangles.iter().enumerate().map(region).collect()
+}
