@@ -87,7 +87,7 @@ fn kernels(criterion: &mut Criterion) {
                     cells.iter().enumerate().for_each(|(c, (points, rest))| kernel.put(c, *points, rest));
                     kernel.set_displacements(&u);
                     group.bench_function(format!("{precision:?} {set:?}, as cut"), |b| {
-                        b.iter(|| kernel.forces(rest.len()))
+                        b.iter(|| kernel.forces(rest.len()));
                     });
                 }
             }

@@ -446,7 +446,7 @@ mod tests {
             patch::{Field, Patch},
             testing::{Random, hybrid_ball, tissue},
         },
-        material::Material,
+        material::{Material, Viscosity},
     };
     use std::collections::BTreeSet;
 
@@ -465,7 +465,7 @@ mod tests {
         let [stvk, neo, corotated] = tissue();
         let mut random = Random(51);
         for materials in
-            [[neo, stvk], [corotated, neo].map(|m: Material| Material { viscosity: Default::default(), ..m })]
+            [[neo, stvk], [corotated, neo].map(|m: Material| Material { viscosity: Viscosity::default(), ..m })]
         {
             let hybrid = hybrid_ball(&materials);
             for (precision, bound) in [(Precision::Double, 1e-11), (Precision::Single, 3e-5)] {
