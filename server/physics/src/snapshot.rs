@@ -94,7 +94,7 @@ fn check(model: &Model, state: &State) -> Result<(), SnapshotError> {
         && [&state.x, &state.v, &state.force_n, &state.external_n].iter().all(|v| v.len() == nodes)
         && state.tools.len() == model.spec().tools.len()
         && state.load_factors.len() == model.spec().loads.len()
-        && state.pace.fits(model)
+        && state.pace.fits(model, nodes)
         && state.sleep.fits(model);
     if !counts {
         return Err(SnapshotError::OtherBody);

@@ -3,7 +3,7 @@
 mod rig;
 use glam::DVec3;
 use palpate_physics::{
-    Energies, LoadSpec, ModelSpec, Precision, Settings, Surface,
+    Energies, LoadSpec, ModelSpec, Precision, Settings, Substeps, Surface,
     contact::Coupling,
     hybrid::{
         ParticleSpec, Skin, Waking,
@@ -314,4 +314,35 @@ fn waking_beneath_the_tool_is_not_felt_as_a_step() {
     }
     let fine_n = rig.state.tools[0].contact_force_n.z;
     assert!(fine_n < 0.8 * coarse_n && worst < 0.05, "{coarse_n} {fine_n} {worst}");
+}
+
+/// One step a tick, over and under the longest that is stable with any particles awake: noticed, and left alone. With a part of them awake it is a little longer.
+#[test]
+fn a_step_that_is_too_long_is_noticed_and_taken_back() {
+    for (ratio, noticed) in [(1.4, true), (0.8, false)] {
+        let mut spec = block(0.45);
+        let omega = Rig::new(spec.clone()).model.max_natural_frequency_rad_per_s();
+        spec.settings.substeps = Substeps::Fixed(1);
+        spec.settings.tick_period_s = 2.0 * ratio / omega;
+        let mut rig = Rig::new(spec);
+        let some = near(&rig, DVec3::ZERO, 12e-3);
+        wake_only(&rig.model, &mut rig.state, &mut rig.scratch, some);
+        for (number, v) in rig.state.v.iter_mut().enumerate() {
+            *v = DVec3::new((number as f64 * 0.7).sin(), (number as f64 * 1.9).cos(), (number as f64 * 2.3).sin())
+                * 1e-4;
+        }
+        for (v, inverse) in rig.state.v.iter_mut().zip(rig.model.inverse_mass_per_kg()) {
+            *v = if *inverse == DVec3::ZERO { DVec3::ZERO } else { *v };
+        }
+        let (start_j, mut repeated) = (Energies::of(&rig.model, &rig.state).held_j(), 0);
+        let drive = rig.still();
+        for _ in 0..400 {
+            let report = rig.tick(&drive);
+            assert!(report.quarantined.is_none());
+            repeated += report.repeated;
+        }
+        let end_j = Energies::of(&rig.model, &rig.state).held_j();
+        assert_eq!(repeated > 0, noticed, "{ratio}: {repeated}");
+        assert!(end_j < 6.0 * start_j, "{ratio}: {start_j:e} {end_j:e}");
+    }
 }

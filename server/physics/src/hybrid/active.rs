@@ -150,6 +150,33 @@ impl HybridScratch {
         })
     }
 
+    /// `aᵀ M'⁻¹ a` of forces (N²/kg) on free axes.
+    pub(crate) fn size_sq(&mut self, forces_n: impl Iterator<Item = DVec3>) -> f64 {
+        let Self { patch, accelerations, momenta, .. } = self;
+        momenta.clear();
+        momenta.extend(forces_n);
+        accelerations.clear();
+        accelerations.extend_from_slice(momenta);
+        patch.metric_mut().accelerate(accelerations);
+        momenta.iter().zip(accelerations.iter()).map(|(force, acceleration)| force.dot(*acceleration)).sum()
+    }
+
+    /// `vᵀ M' v` (J) of velocities, or of displacements (kg m²).
+    pub(crate) fn twice_kinetic(&mut self, body: &Hybrid, v: impl Iterator<Item = DVec3>) -> f64 {
+        let Self { patch, accelerations, momenta, .. } = self;
+        accelerations.clear();
+        accelerations.extend(v);
+        momenta.clear();
+        momenta.resize(accelerations.len(), DVec3::ZERO);
+        patch.metric().momenta(body, accelerations, momenta);
+        momenta.iter().zip(accelerations.iter()).map(|(p, v)| p.dot(*v)).sum()
+    }
+
+    /// `(1 − ε) m_p` (kg) of the active particles.
+    pub(crate) fn particle_kg(&self) -> &[f64] {
+        self.patch.metric().particle_kg()
+    }
+
     /// Makes the patch that of the state's active particles. Allocates nothing.
     pub(super) fn follow(&mut self, body: &Hybrid, active: &ActiveParticles) {
         if self.patch.active() != active.ids() || !self.patch.is_laid_out_for(&active.fading) {

@@ -166,6 +166,11 @@ impl RunningMetric {
         }
     }
 
+    /// `(1 − ε) m_p` (kg) of the active particles.
+    pub(super) fn particle_kg(&self) -> &[f64] {
+        &self.particle_kg
+    }
+
     /// Kinetic and gravitational energy (J) of coarse nodes and active particles. `momenta` is a buffer.
     pub(super) fn moving_j(
         &self,

@@ -26,8 +26,9 @@
 //! `Δxᵀ Δg/Δxᵀ M Δx`, which has neither filter.
 use crate::{
     health::LastGood,
+    hybrid::HybridScratch,
     simd::StepForces,
-    world::{Integrator, MAX_SUBSTEPS, Model, Precision, State},
+    world::{Integrator, MAX_SUBSTEPS, Model, Precision, State, with_room},
 };
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
@@ -58,11 +59,7 @@ pub struct Pace {
 
 impl Pace {
     pub(crate) fn at_start(model: &Model) -> Self {
-        let before = if judges_across_ticks(model) {
-            InstantForces::zero(model.mass_kg().len())
-        } else {
-            InstantForces::default()
-        };
+        let before = if judges_across_ticks(model) { InstantForces::zero(model) } else { InstantForces::default() };
         Self { substeps: model.substeps(), calm_ticks: 0, before, before_is_usable: false }
     }
 
@@ -74,15 +71,15 @@ impl Pace {
     }
 
     pub(crate) fn copy_from(&mut self, other: &Self) {
-        self.before.total_n.copy_from_slice(&other.before.total_n);
-        self.before.external_n.copy_from_slice(&other.before.external_n);
+        self.before.total_n.clone_from(&other.before.total_n);
+        self.before.external_n.clone_from(&other.before.external_n);
         (self.substeps, self.calm_ticks) = (other.substeps, other.calm_ticks);
         self.before_is_usable = other.before_is_usable;
     }
 
-    /// Of the model's size, and in a range of substeps that it may have.
-    pub(crate) fn fits(&self, model: &Model) -> bool {
-        let nodes = if judges_across_ticks(model) { model.mass_kg().len() } else { 0 };
+    /// For so many positions, and in a range of substeps that the model may have.
+    pub(crate) fn fits(&self, model: &Model, positions: usize) -> bool {
+        let nodes = if judges_across_ticks(model) { positions } else { 0 };
         let most = if is_judged(model) { most_substeps(model) } else { model.substeps() };
         [&self.before.total_n, &self.before.external_n].iter().all(|list| list.len() == nodes)
             && (model.substeps()..=most).contains(&self.substeps)
@@ -108,7 +105,7 @@ impl Pace {
 /// Only leapfrog's ticks are judged and repeated: the seeds' schemes run as their authors describe them, backward Euler needs none.
 pub(crate) fn is_judged(model: &Model) -> bool {
     let settings = &model.spec().settings;
-    settings.subcycle_unstable && settings.integrator == Integrator::Leapfrog && model.hybrid().is_none()
+    settings.subcycle_unstable && settings.integrator == Integrator::Leapfrog
 }
 
 fn judges_across_ticks(model: &Model) -> bool {
@@ -130,8 +127,18 @@ pub struct InstantForces {
 }
 
 impl InstantForces {
-    fn zero(nodes: usize) -> Self {
-        Self { total_n: vec![DVec3::ZERO; nodes], external_n: vec![DVec3::ZERO; nodes] }
+    fn zero(model: &Model) -> Self {
+        let zeros = || with_room(model, std::iter::repeat_n(DVec3::ZERO, model.mass_kg().len()));
+        Self { total_n: zeros(), external_n: zeros() }
+    }
+
+    fn resize(&mut self, positions: usize) {
+        self.total_n.resize(positions, DVec3::ZERO);
+        self.external_n.resize(positions, DVec3::ZERO);
+    }
+
+    fn internal_n(&self) -> impl Iterator<Item = DVec3> {
+        self.total_n.iter().zip(&self.external_n).map(|(force, external)| *force - *external)
     }
 
     fn swap(&mut self, state: &mut State) {
@@ -155,8 +162,23 @@ impl ForceHistory {
         if !is_judged(model) {
             return Self::default();
         }
-        let forces = || InstantForces::zero(model.mass_kg().len());
+        let forces = || InstantForces::zero(model);
         Self { start: forces(), two_before: forces(), one_before: forces(), held_jump: 0.0 }
+    }
+
+    /// Before a tick: makes everything as long as the state's positions, of which there may be more or fewer than before. What was held is then of
+    /// no use, which [`State::force_is_current`] tells.
+    pub(super) fn fit(&mut self, state: &mut State) {
+        let positions = state.x.len();
+        if self.start.total_n.is_empty() || self.start.total_n.len() == positions {
+            return;
+        }
+        for forces in [&mut self.start, &mut self.one_before, &mut self.two_before] {
+            forces.resize(positions);
+        }
+        if !state.pace.before.total_n.is_empty() {
+            state.pace.before.resize(positions);
+        }
     }
 
     /// Before forces are evaluated at the end of substep `number` of `substeps`: what the state holds is set aside if it is wanted
@@ -180,23 +202,39 @@ impl ForceHistory {
     }
 
     /// What the tick that was run in `substeps` shows. `start` is the state at its start.
-    pub(super) fn evidence(&self, model: &Model, state: &State, start: &LastGood, substeps: u32) -> Evidence {
+    pub(super) fn evidence(
+        &self,
+        model: &Model,
+        state: &State,
+        (start, own): (&LastGood, Option<&mut HybridScratch>),
+        substeps: u32,
+    ) -> Evidence {
         let Some((one, two)) = self.before_the_end(state, substeps) else {
-            return self.evidence_of_first_step(model, state, start);
+            return self.evidence_of_first_step(model, state, start, own);
         };
+        let period_s = model.spec().settings.tick_period_s;
+        let held_sq = if substeps == 1 { self.held_jump / (period_s * period_s) } else { 0.0 };
+        if let Some(own) = own {
+            let now = state.force_n.iter().zip(&state.external_n).map(|(force, external)| *force - *external);
+            let second = now.zip(one.internal_n()).zip(two.internal_n()).map(|((g0, g1), g2)| g0 - g1 * 2.0 + g2);
+            let answer_sq = own.size_sq(second);
+            let [one_sq, two_sq] = [one, two].map(|forces| own.size_sq(forces.total_n.iter().copied()));
+            return Evidence { answer_sq, cause_sq: one_sq.max(two_sq) + held_sq };
+        }
         let [answer_sq, one_sq, two_sq] = model.kernel().step_force_sums(&StepForces {
             total_n: [&state.force_n, &one.total_n, &two.total_n],
             external_n: [&state.external_n, &one.external_n, &two.external_n],
             inverse_mass_per_kg: model.inverse_mass_per_kg(),
         });
-        let period_s = model.spec().settings.tick_period_s;
-        let held_sq = if substeps == 1 { self.held_jump / (period_s * period_s) } else { 0.0 };
         Evidence { answer_sq, cause_sq: one_sq.max(two_sq) + held_sq }
     }
 
     /// `‖g − g₋‖` of the two instants before the tick's end; 0 in a tick that has no such two.
-    fn last_change(&self, model: &Model, state: &State, substeps: u32) -> f64 {
+    fn last_change(&self, model: &Model, state: &State, own: Option<&mut HybridScratch>, substeps: u32) -> f64 {
         let Some((one, two)) = self.before_the_end(state, substeps) else { return 0.0 };
+        if let Some(own) = own {
+            return own.size_sq(one.internal_n().zip(two.internal_n()).map(|(g, before)| g - before)).sqrt();
+        }
         let internal = |forces: &InstantForces, node: usize| forces.total_n[node] - forces.external_n[node];
         let change_sq = |(node, inverse_mass): (usize, &DVec3)| {
             let change = internal(one, node) - internal(two, node);
@@ -223,8 +261,21 @@ impl ForceHistory {
     }
 
     /// Without a force before: `‖Δg‖ ≤ q max(‖M Δx‖, dt ‖M v‖)/dt²`, which slow motion hides more.
-    fn evidence_of_first_step(&self, model: &Model, state: &State, start: &LastGood) -> Evidence {
+    fn evidence_of_first_step(
+        &self,
+        model: &Model,
+        state: &State,
+        start: &LastGood,
+        own: Option<&mut HybridScratch>,
+    ) -> Evidence {
         let dt_s = model.spec().settings.tick_period_s;
+        if let (Some(own), Some(body)) = (own, model.hybrid()) {
+            let now = state.force_n.iter().zip(&state.external_n).map(|(force, external)| *force - *external);
+            let answer_sq = own.size_sq(now.zip(self.start.internal_n()).map(|(g, before)| g - before));
+            let moved_sq = own.twice_kinetic(body, state.x.iter().zip(start.x()).map(|(x, before)| *x - *before));
+            let speed_sq = own.twice_kinetic(body, start.v().iter().copied());
+            return Evidence { answer_sq, cause_sq: (moved_sq / (dt_s * dt_s)).max(speed_sq) / (dt_s * dt_s) };
+        }
         let (mut change_sq, mut moved_sq, mut speed_sq) = (0.0, 0.0, 0.0);
         for node in 0..state.x.len() {
             let now = state.force_n[node] - state.external_n[node];
@@ -252,14 +303,21 @@ impl Evidence {
 
     /// `Q` is above the limit, and not by mass damping or by rounding: the answer stands above the last digits of the internal forces
     /// themselves.
-    pub(super) fn is_unstable(&self, model: &Model, state: &State, history: &ForceHistory, substeps: u32) -> bool {
+    pub(super) fn is_unstable(
+        &self,
+        model: &Model,
+        state: &State,
+        (history, mut own): (&ForceHistory, Option<&mut HybridScratch>),
+        substeps: u32,
+    ) -> bool {
         if self.answer_sq <= LIMIT * LIMIT * self.cause_sq {
             return false;
         }
         let settings = &model.spec().settings;
         let damped = -(-settings.mass_damping_per_s * settings.tick_period_s / f64::from(substeps)).exp_m1();
         let cause = self.cause_sq.sqrt();
-        let beyond = (history.last_change(model, state, substeps) - 0.5 * LIMIT * cause).max(0.0);
+        let last_change = history.last_change(model, state, own.as_deref_mut(), substeps);
+        let beyond = (last_change - 0.5 * LIMIT * cause).max(0.0);
         if self.answer_sq.sqrt() <= LIMIT * cause + damped * beyond {
             return false;
         }
@@ -268,7 +326,9 @@ impl Evidence {
             Precision::Double => 1e-12,
         };
         let mut internal_sq = 0.0;
-        for ((force, external), mass) in state.force_n.iter().zip(&state.external_n).zip(model.mass_kg()) {
+        let particle_kg = own.as_deref().map_or(&[][..], HybridScratch::particle_kg);
+        let masses = model.mass_kg().iter().chain(particle_kg).filter(|mass| **mass > 0.0);
+        for ((force, external), mass) in state.force_n.iter().zip(&state.external_n).zip(masses) {
             // Reactions of held nodes included: between them a body may be stretched without a force on any other node.
             internal_sq += (*force - *external - model.gravity_m_per_s2() * *mass).length_squared() / mass;
         }

@@ -32,6 +32,7 @@ pub fn step(model: &Model, state: &mut State, scratch: &mut Scratch, input: &Tic
     }
     if let (Some(body), Some(own)) = (model.hybrid(), &mut scratch.hybrid) {
         own.prepare(model, body, state);
+        scratch.history.fit(state);
     }
     let was_quiet = model.rest_bound().is_some() && state.sleep.is_quiet(&state.load_factors, input);
     let judged = is_judged(model);
@@ -48,8 +49,10 @@ pub fn step(model: &Model, state: &mut State, scratch: &mut Scratch, input: &Tic
         run(&Tick { model, input, loads, substeps }, state, scratch);
         let spoilt = first_non_finite(state);
         if judged {
-            let evidence = scratch.history.evidence(model, state, &scratch.last_good, substeps);
-            let unstable = spoilt.is_some() || evidence.is_unstable(model, state, &scratch.history, substeps);
+            let Scratch { history, last_good, hybrid, .. } = &mut *scratch;
+            let evidence = history.evidence(model, state, (last_good, hybrid.as_deref_mut()), substeps);
+            let unstable =
+                spoilt.is_some() || evidence.is_unstable(model, state, (history, hybrid.as_deref_mut()), substeps);
             let quotient = spoilt.is_none().then(|| evidence.quotient());
             let more = substeps_for(model, substeps, quotient).filter(|_| unstable && repeated < MOST_REPETITIONS);
             if let Some(more) = more {

@@ -130,7 +130,7 @@ impl State {
 }
 
 /// A list for nodes with room for active particles: it never grows beyond.
-fn with_room(model: &Model, of_nodes: impl ExactSizeIterator<Item = DVec3>) -> Vec<DVec3> {
+pub(crate) fn with_room(model: &Model, of_nodes: impl ExactSizeIterator<Item = DVec3>) -> Vec<DVec3> {
     let room = model.spec().particles.as_ref().map_or(0, |particles| particles.most_active);
     let mut list = Vec::with_capacity(of_nodes.len() + room);
     list.extend(of_nodes);
