@@ -2,9 +2,11 @@
 //!
 //! - `subject.rs`: a problem on linear tetrahedra, which all of these share
 //! - `tetrahedra.rs`: as the server runs them, in all variants
+//! - `hybrid.rs`: coarse tets and particles
 //! - `quasi_newton/`: backward Euler as a minimisation, prefactored, with L-BFGS
 //! - `xpbd/`: position-based dynamics with small steps
 //! - `pace.rs`: how fast a problem is gone through
+mod hybrid;
 mod pace;
 mod quasi_newton;
 mod subject;
@@ -17,6 +19,7 @@ pub use pace::{Pace, tremor};
 
 use crate::problems::{Problem, body::Body};
 use glam::DVec3;
+use hybrid::Hybrid;
 use miette::Result;
 use quasi_newton::QuasiNewton;
 use tetrahedra::Tetrahedra;
@@ -66,6 +69,7 @@ pub const DEFAULT: &str = "leapfrog f32";
 pub fn all() -> Vec<Box<dyn Method>> {
     let mut methods: Vec<Box<dyn Method>> = Vec::new();
     methods.extend(Tetrahedra::variants().into_iter().map(|method| Box::new(method) as Box<dyn Method>));
+    methods.extend(Hybrid::variants().into_iter().map(|method| Box::new(method) as Box<dyn Method>));
     methods.extend(QuasiNewton::variants().into_iter().map(|method| Box::new(method) as Box<dyn Method>));
     methods.extend(Xpbd::variants().into_iter().map(|method| Box::new(method) as Box<dyn Method>));
     methods

@@ -95,7 +95,7 @@ impl Tool {
         self.touch_m + self.way_m * fraction
     }
 
-    fn spec(&self) -> ToolSpec {
+    pub(super) fn spec(&self) -> ToolSpec {
         ToolSpec {
             name: "tool".into(),
             radius_m: self.radius_m,

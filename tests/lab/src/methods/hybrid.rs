@@ -1,0 +1,205 @@
+//! Hybrid bodies as the server runs them: coarse tets, and the particles nearest to the touch awake.
+use super::{Method, Pace, Running, subject::Tool};
+use crate::problems::{
+    Action, Problem,
+    body::{Body, TetBody},
+    load::{self, NodalLoad},
+    sample::{self, Probe},
+};
+use glam::DVec3;
+use miette::{IntoDiagnostic, Result, miette};
+use palpate_physics::{
+    Energies, LoadSpec, Model, ModelSpec, Scratch, Settings, State, TickInput,
+    contact::ToolTarget,
+    hybrid::{ParticleSpec, Skin, Waking, wake_only},
+    step,
+};
+
+/// So many particles awake.
+pub(super) struct Hybrid {
+    name: String,
+    what: String,
+    active: usize,
+}
+
+impl Hybrid {
+    pub(super) fn variants() -> Vec<Self> {
+        let of = |active: usize| Self {
+            name: format!("hybrid {active}"),
+            what: format!(
+                "Composite coarse tets and {active} active particles on a lattice (cells), explicit leapfrog, forces in f32."
+            ),
+            active,
+        };
+        [50, 200, 600, 1400].map(of).into()
+    }
+}
+
+/// Spacing of the lattice (m), and the resolution of the mesh whose boundary is the skin.
+fn fineness(body: Body) -> Option<(f64, u32)> {
+    match body {
+        Body::Block => Some((2.5e-3, 32)),
+        Body::Ventricle => Some((3.2e-3, 150_000)),
+        Body::SmallVentricle => Some((0.9e-3, 150_000)),
+        Body::Octant | Body::Beam { .. } => None,
+    }
+}
+
+impl Method for Hybrid {
+    fn name(&self) -> &str {
+        &self.name
+    }
+
+    fn what(&self) -> &str {
+        &self.what
+    }
+
+    fn resolutions(&self, body: Body, full: bool) -> Vec<u32> {
+        match (body, full) {
+            (Body::Block, false) => vec![4],
+            (Body::Block, true) => vec![4, 8],
+            (Body::Ventricle | Body::SmallVentricle, false) => vec![188, 400],
+            (Body::Ventricle | Body::SmallVentricle, true) => vec![188, 300, 400, 800],
+            (Body::Octant | Body::Beam { .. }, _) => vec![],
+        }
+    }
+
+    fn build(&self, problem: &Problem, resolution: u32, pace: &Pace) -> Result<Box<dyn Running>> {
+        let (spacing_m, fine) =
+            fineness(problem.body).ok_or_else(|| miette!("the {} has no particles", problem.body.name()))?;
+        let (coarse, fine) = (problem.body.tets(resolution)?, problem.body.tets(fine)?);
+        let settings = Settings { mass_damping_per_s: pace.damping_per_s, ..Settings::default() };
+        let mut spec = ModelSpec {
+            particles: Some(particles(problem.body, &fine, spacing_m, self.active)?),
+            ..super::subject::spec(problem.material()?, &coarse, settings)
+        };
+        let load = load::on_tets(problem.action, &fine);
+        let vertex = |node: u32| fine.surface.vertex_of_node[node as usize];
+        let on_skin = |load: &NodalLoad| load.forces_n.iter().map(|&(node, force)| (vertex(node), force)).collect();
+        spec.loads = load.iter().map(|load| LoadSpec::NodalForces(on_skin(load))).collect();
+        let tool = match problem.action {
+            Action::Sphere { radius_m, depth_m } => Some(Tool {
+                touch_m: fine.first_touch_m(radius_m),
+                way_m: fine.normal * -depth_m,
+                normal: fine.normal,
+                radius_m,
+            }),
+            _ => None,
+        };
+        spec.tools = tool.iter().map(Tool::spec).collect();
+        let model = Model::build(spec).into_diagnostic()?;
+        let (mut state, mut scratch) = (State::at_rest(&model), Scratch::new(&model));
+        wake_only(&model, &mut state, &mut scratch, nearest(&model, fine.touch_m, self.active));
+        let target = |tool: &Tool| ToolTarget { position_m: tool.touch_m, velocity_m_per_s: DVec3::ZERO };
+        Ok(Box::new(Pressed {
+            targets: tool.iter().map(target).collect(),
+            factors: vec![0.0; model.spec().loads.len()],
+            prescribed_m: vec![DVec3::ZERO; model.spec().prescribed.len()],
+            failure: None,
+            probe: Probe::new(&fine, &sample::points(problem.body)),
+            fine,
+            load,
+            tool,
+            state,
+            scratch,
+            model,
+        }))
+    }
+}
+
+fn particles(body: Body, fine: &TetBody, spacing_m: f64, most_active: usize) -> Result<ParticleSpec> {
+    let rest = fine.mesh.positions_m();
+    let on_skin = fine.surface.nodes.iter().map(|&node| rest[node as usize]).collect();
+    let skin = Skin::new(on_skin, fine.surface.triangles.clone()).into_diagnostic()?;
+    // The planes that are held lie on the lattice.
+    let off_axis = DVec3::new(0.5, 0.5, 0.0) * spacing_m + DVec3::Z * skin.bounds_m().1.z;
+    let lattice_through_m = if body == Body::Block { DVec3::ZERO } else { off_axis };
+    Ok(ParticleSpec { skin, spacing_m, lattice_through_m, most_active, waking: Waking::ByHand })
+}
+
+/// The particles nearest to a point that may wake.
+fn nearest(model: &Model, point_m: DVec3, count: usize) -> Vec<u32> {
+    let Some(body) = model.hybrid() else { return vec![] };
+    let partition = body.partition();
+    let mut near: Vec<u32> = (0..partition.particle_count() as u32).filter(|&p| body.may_wake(p)).collect();
+    let distance = |p: &u32| partition.particle_m(*p).distance_squared(point_m);
+    near.sort_by(|a, b| distance(a).total_cmp(&distance(b)));
+    near.truncate(count);
+    near
+}
+
+struct Pressed {
+    model: Model,
+    state: State,
+    scratch: Scratch,
+    tool: Option<Tool>,
+    load: Option<NodalLoad>,
+    fine: TetBody,
+    probe: Probe,
+    targets: Vec<ToolTarget>,
+    factors: Vec<f64>,
+    prescribed_m: Vec<DVec3>,
+    failure: Option<String>,
+}
+
+impl Pressed {
+    /// Positions (m) of the fine mesh's nodes; those within stay at rest.
+    fn positions_m(&self) -> Vec<DVec3> {
+        let (mut x, mut skin) = (self.fine.mesh.positions_m().to_vec(), Vec::new());
+        self.model.surface_positions_m(&self.state, &mut skin);
+        for (&node, position) in self.fine.surface.nodes.iter().zip(skin) {
+            x[node as usize] = position;
+        }
+        x
+    }
+}
+
+impl Running for Pressed {
+    fn tick(&mut self, fraction: f64) {
+        if let Some(tool) = &self.tool {
+            let period_s = self.model.spec().settings.tick_period_s;
+            for target in &mut self.targets {
+                let position_m = tool.centre_m(fraction);
+                target.velocity_m_per_s = (position_m - target.position_m) / period_s;
+                target.position_m = position_m;
+            }
+        }
+        self.factors.fill(fraction);
+        let input = TickInput {
+            tools: &self.targets,
+            load_factors: &self.factors,
+            prescribed_displacements_m: &self.prescribed_m,
+            point_forces: &[],
+        };
+        let report = step(&self.model, &mut self.state, &mut self.scratch, &input);
+        if let Some(quarantine) = report.quarantined {
+            self.failure = Some(quarantine.to_string());
+        }
+    }
+
+    fn answer(&self) -> f64 {
+        let force_n: DVec3 = self.state.tools.iter().map(|tool| tool.contact_force_n).sum();
+        match (&self.tool, &self.load) {
+            (Some(tool), _) => force_n.dot(tool.normal),
+            (None, Some(load)) => load.displacement_m(self.fine.mesh.positions_m(), &self.positions_m()),
+            (None, None) => 0.0,
+        }
+    }
+
+    fn displacements_m(&self) -> Vec<DVec3> {
+        self.probe.displacements_m(self.fine.mesh.positions_m(), &self.positions_m())
+    }
+
+    fn energy_error(&self) -> Option<f64> {
+        let energies = Energies::of(&self.model, &self.state);
+        Some((energies.balance_j() / energies.external_work_j).abs()).filter(|error| error.is_finite())
+    }
+
+    fn size(&self) -> [usize; 3] {
+        [self.model.mesh().tets().len(), self.state.x.len(), self.model.substeps() as usize]
+    }
+
+    fn failure(&self) -> Option<String> {
+        self.failure.clone()
+    }
+}
