@@ -1,6 +1,6 @@
 //! `palpated check`: what a scene's body is like, and what a tick costs on this machine.
 use super::{load, simulate::Run, summary::TimeNumbers};
-use palpate_physics::{Model, material::Law};
+use palpate_physics::{Model, hybrid::Waking, material::Law};
 use palpate_scene::{Scene, builtin_names, wording::counted};
 use std::{
     process::ExitCode,
@@ -36,6 +36,7 @@ pub fn run(args: &CheckArgs) -> miette::Result<ExitCode> {
     let scene = load::load_scene(name)?;
     let model = load::build(&scene)?;
     print_body(&scene);
+    print_particles(&model);
     print_contents(&scene);
     for warning in &scene.warnings {
         println!("warning: {warning}");
@@ -98,6 +99,26 @@ fn print_body(scene: &Scene) {
             region.density_kg_per_m3
         );
     }
+}
+
+fn print_particles(model: &Model) {
+    let (Some(hybrid), Some(spec)) = (model.hybrid(), &model.spec().particles) else { return };
+    let cage = hybrid.cage();
+    println!(
+        "particles  {}, {} mm apart, at most {} awake; skin of {}",
+        hybrid.partition().particle_count(),
+        short(spec.spacing_m * 1e3),
+        spec.most_active,
+        counted(spec.skin.triangles().len(), "triangle")
+    );
+    if let Waking::ByTools { reach_m } = spec.waking {
+        println!("           those within {} mm of a tool's contact wake", short(reach_m * 1e3));
+    }
+    println!(
+        "           the coarse tets' surface was moved by up to {} mm to hold them; {} outside never wake",
+        short(cage.moved_m * 1e3),
+        cage.outside
+    );
 }
 
 fn print_time(model: &Model, cost: &TimeNumbers) {

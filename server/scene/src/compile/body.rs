@@ -1,6 +1,7 @@
 //! `[body]`: shapes, mesh files and surface pairs become one kind of body with named parts.
 use super::{
     Files, exactly_one,
+    particles,
     parts::{self, Part},
 };
 use crate::{
@@ -12,16 +13,22 @@ use crate::{
     files::{self, FileError, SurfaceFile, UnusedNodes},
     fill::{self, FillOptions, SurfaceInput},
     limits::Limits,
+    probes::MaterialPoint,
     shapes::{self, Shape, ShapeError},
+    skin::FineSurface,
     wording::counted,
 };
 use glam::DVec3;
-use palpate_physics::{MeshError, Surface, TetMesh};
+use palpate_physics::{MeshError, Surface, TetMesh, contact::is_inside};
 
 /// A body before regions, materials and loads.
 pub(crate) struct Body {
     pub(crate) mesh: TetMesh,
     pub(crate) surface: Surface,
+    /// The fine surface of a body with particles: what loads and tools act on.
+    pub(crate) skin: Option<FineSurface>,
+    /// Where the shape has flat sides that a lattice should lie on: a point (m) of them.
+    pub(crate) lattice_m: Option<DVec3>,
     pub(crate) parts: Vec<Part>,
     pub(crate) origin: String,
     pub(crate) report: Vec<String>,
@@ -29,6 +36,35 @@ pub(crate) struct Body {
 }
 
 impl Body {
+    /// Triangles of the surface: of the skin, where there is one.
+    pub(crate) fn triangle_count(&self) -> usize {
+        self.skin.as_ref().map_or(self.surface.triangles.len(), |skin| skin.triangles.len())
+    }
+
+    /// Corners of the surface's triangles: nodes, or vertices of the skin.
+    pub(crate) fn triangles(&self) -> impl Iterator<Item = [u32; 3]> + '_ {
+        (0..self.triangle_count()).map(|triangle| match &self.skin {
+            None => self.surface.triangle_nodes(triangle),
+            Some(skin) => skin.triangles[triangle],
+        })
+    }
+
+    /// Positions (m) of what the surface's triangles have for corners.
+    pub(crate) fn surface_positions_m(&self) -> &[DVec3] {
+        self.skin.as_ref().map_or(self.mesh.positions_m(), |skin| &skin.positions_m)
+    }
+
+    /// The point of the body nearest to a position (m). With a skin, only its distance means something for a point inside.
+    pub(crate) fn locate(&self, point_m: DVec3) -> MaterialPoint {
+        match &self.skin {
+            None => MaterialPoint::locate(&self.mesh, &self.triangles().collect::<Vec<_>>(), point_m),
+            Some(skin) if is_inside(point_m, &skin.triangles, &skin.positions_m) => {
+                MaterialPoint { nodes: [0; 4], weights: [1.0, 0.0, 0.0, 0.0], distance_m: 0.0 }
+            }
+            Some(skin) => MaterialPoint::nearest(&skin.positions_m, skin.triangles.iter().copied(), point_m),
+        }
+    }
+
     /// Diagonal of the bounding box (m).
     pub(crate) fn diagonal_m(&self) -> f64 {
         let (low, high) = self.mesh.bounds_m();
@@ -64,10 +100,21 @@ pub(crate) fn make(table: &BodyTable, files: &Files<'_>, progress: &mut dyn FnMu
         BodyTable { surfaces: Some(surfaces), .. } => from_surfaces(surfaces, files, &at, progress)?,
         _ => from_shape(table, kind, files.limits, &at)?,
     };
+    if let Some(wanted) = &table.particles {
+        particles::demand(wanted, &body, files.limits)?;
+        progress(0.75, "making the skin");
+        let skin = match body.skin.take() {
+            Some(skin) => skin,
+            None => particles::skin_of(table, &body, wanted.spacing_m).map_err(|error| shape_fault(&at, error))?,
+        };
+        particles::put_on(&mut body, table, skin);
+    }
     let offset = DVec3::from(table.offset_m);
     if offset != DVec3::ZERO {
         let moved = body.mesh.positions_m().iter().map(|p| *p + offset).collect();
         body.mesh = TetMesh::new(moved, body.mesh.tets().to_vec()).map_err(|error| mesh_fault(&at, error))?;
+        body.skin.iter_mut().flat_map(|skin| &mut skin.positions_m).for_each(|p| *p += offset);
+        body.lattice_m.iter_mut().for_each(|p| *p += offset);
     }
     let warning = implausible_size(table, kind, &body);
     body.warnings.extend(warning);
@@ -128,7 +175,12 @@ fn from_shape(table: &BodyTable, kind: &str, limits: &Limits, at: &Where) -> Res
         return Err(Fault::value(at.clone(), "there is no such shape"));
     };
     let shape = shape.map_err(|error| shape_fault(at, error))?;
-    of_shape(shape, kind, at)
+    let flat_m = match table {
+        BodyTable { block: Some(_), .. } => Some(DVec3::ZERO),
+        BodyTable { ventricle: Some(ventricle), .. } => Some(DVec3::Z * ventricle.cut_z_m),
+        _ => None,
+    };
+    Ok(Body { lattice_m: flat_m, ..of_shape(shape, kind, at)? })
 }
 
 fn shape_fault(at: &Where, error: ShapeError) -> Fault {
@@ -145,6 +197,8 @@ fn of_shape(shape: Shape, kind: &str, at: &Where) -> Result<Body, Fault> {
     Ok(Body {
         parts: parts::of_boundary(&shape.regions, &surface),
         surface,
+        skin: None,
+        lattice_m: None,
         origin: format!("shape {kind}"),
         report,
         warnings: Vec::new(),
@@ -184,6 +238,8 @@ fn from_surfaces(
     Ok(Body {
         parts: parts::of_boundary(&filled.regions, &surface),
         surface,
+        skin: None,
+        lattice_m: None,
         origin: format!("wall between {} and {}", table.inner_file, table.outer_file),
         report: filled.report.to_string().lines().map(str::to_owned).collect(),
         warnings,
@@ -206,6 +262,8 @@ fn from_file(table: &MeshTable, files: &Files<'_>, at: &Where) -> Result<Body, F
     Ok(Body {
         parts: parts::of_groups(&grouped, &surface),
         surface,
+        skin: None,
+        lattice_m: None,
         origin: format!("file {}", table.file),
         report: Vec::new(),
         warnings: grouped.warnings.clone(),
