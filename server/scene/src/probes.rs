@@ -54,9 +54,9 @@ impl MaterialPoint {
     /// The material point at a rest position (m): barycentric in the first tet that contains it, else the nearest
     /// point of the boundary triangles (node triples).
     pub fn locate(mesh: &TetMesh, boundary: &[[u32; 3]], point_m: DVec3) -> Self {
-        (0..mesh.tets().len()).find_map(|tet| Self::inside(mesh, tet, point_m)).unwrap_or_else(|| {
-            Self::nearest(mesh.positions_m(), boundary.iter().copied(), point_m)
-        })
+        (0..mesh.tets().len())
+            .find_map(|tet| Self::inside(mesh, tet, point_m))
+            .unwrap_or_else(|| Self::nearest(mesh.positions_m(), boundary.iter().copied(), point_m))
     }
 
     /// The nearest point of triangles.
@@ -113,7 +113,8 @@ impl Probe {
         match self.measure {
             Measure::Displacement(_)
             | Measure::LatticeDisplacement(_)
-            | Measure::ToolPosition(_) | Measure::Penetration(_) => "m",
+            | Measure::ToolPosition(_)
+            | Measure::Penetration(_) => "m",
             Measure::Reaction(_) | Measure::ContactForce(_) | Measure::DeviceForce(_) => "N",
             Measure::Energy => "J",
             Measure::MinVolumeRatio => "1",

@@ -50,6 +50,7 @@ pub fn run(args: &CheckArgs) -> miette::Result<ExitCode> {
         measure(&scene, &model)?
     };
     print_time(&model, &cost);
+    print_memory();
     let failed = args.strict && !scene.warnings.is_empty();
     Ok(if failed { ExitCode::FAILURE } else { ExitCode::SUCCESS })
 }
@@ -145,6 +146,15 @@ fn print_time(model: &Model, cost: &TimeNumbers) {
         "fits"
     };
     println!("           {:.1} % of the tick: {verdict}", 100.0 * us.p50 / period_us);
+}
+
+/// What this process holds of the machine's memory, the body and its buffers being most of it.
+fn print_memory() {
+    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
+    let resident = status.lines().find_map(|line| line.strip_prefix("VmRSS:")?.trim().strip_suffix(" kB"));
+    if let Some(kilobytes) = resident.and_then(|text| text.trim().parse::<f64>().ok()) {
+        println!("memory     {:.0} MB in this process", kilobytes * 1.024e-3);
+    }
 }
 
 fn print_contents(scene: &Scene) {

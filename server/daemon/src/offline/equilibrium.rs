@@ -58,7 +58,8 @@ pub fn run(args: &StaticArgs) -> miette::Result<ExitCode> {
     if scene.model.particles.is_some() {
         return Err(miette::miette!(
             help = "let `palpated simulate` come to rest with mass_damping_per_s, or leave [body.particles] out",
-            "\"{}\" is a body with particles, whose equilibrium is not solved for", scene.name
+            "\"{}\" is a body with particles, whose equilibrium is not solved for",
+            scene.name
         ));
     }
     let model = load::build(&scene)?;

@@ -51,3 +51,35 @@ fn is_in_a_cell(hybrid: &Hybrid, rest_m: DVec3) -> bool {
     let in_box = local.cmpge(DVec3::ZERO).all() && local.cmple(DVec3::ONE).all();
     in_box && hybrid.partition().cell_at(cell) != NONE
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use palpate_scene::{Limits, parse};
+
+    fn model(particles: &str) -> Model {
+        let text = format!(
+            "[scene]\nname = \"t\"\n[body.ventricle]\nouter_semi_axes_mm = [45, 90]\ninner_semi_axes_mm = [31.5, 76.5]\n\
+             cut_z_mm = 22.5\ntarget_tets = 3000\n{particles}\n[[material]]\nlaw = \"stvk\"\nyoung_modulus_pa = 1e4\n\
+             poisson_ratio = 0.3\ndensity_kg_per_m3 = 1000\n[[fixed]]\nregion = \"base\"\n"
+        );
+        Model::build(parse(&text, "t", None, &Limits::local(), &mut |_, _| ()).unwrap().model).unwrap()
+    }
+
+    /// A tool was looked for among triangles of surface vertices at the positions of nodes, which are numbered otherwise: of a body
+    /// with nodes inside, it was in or out by chance.
+    #[test]
+    fn walls_hold_what_is_in_them_and_cavities_do_not() {
+        for particles in ["", "[body.particles]\nspacing_mm = 4"] {
+            let model = model(particles);
+            let inside = Inside::new(&model);
+            let mut state = State::at_rest(&model);
+            let turn = glam::DQuat::from_rotation_y(1.0);
+            state.x.iter_mut().for_each(|x| *x = turn * *x + DVec3::X);
+            let holds = |x: f64, y: f64, z: f64| inside.holds(&model, &state, turn * DVec3::new(x, y, z) + DVec3::X);
+            assert!(holds(0.038, 0.0, 0.0) && holds(0.0, -0.038, 0.01) && holds(0.0, 0.0, -0.083));
+            assert!(!holds(0.0, 0.0, 0.0) && !holds(0.0, 0.02, -0.04), "the cavity is outside");
+            assert!(!holds(0.06, 0.0, 0.0) && !holds(0.0, 0.0, -0.1) && !holds(0.038, 0.0, 0.04));
+        }
+    }
+}

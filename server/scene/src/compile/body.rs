@@ -1,17 +1,16 @@
 //! `[body]`: shapes, mesh files and surface pairs become one kind of body with named parts.
 use super::{
-    Files, exactly_one,
-    particles,
+    Files, exactly_one, particles,
     parts::{self, Part},
 };
 use crate::{
     document::{
-        body::{BodyTable, LengthUnit, MeshTable, SurfacesTable},
+        body::{BodyTable, LengthUnit, MeshTable, ParticlesTable, SurfacesTable},
         source::{Fault, Where},
     },
     error::Stage,
     files::{self, FileError, SurfaceFile, UnusedNodes},
-    fill::{self, FillOptions, SurfaceInput},
+    fill::{self, FillError, FillOptions, SurfaceInput},
     limits::Limits,
     probes::MaterialPoint,
     shapes::{self, Shape, ShapeError},
@@ -97,15 +96,18 @@ pub(crate) fn make(table: &BodyTable, files: &Files<'_>, progress: &mut dyn FnMu
     progress(0.05, "making the body");
     let mut body = match table {
         BodyTable { mesh: Some(mesh), .. } => from_file(mesh, files, &at)?,
-        BodyTable { surfaces: Some(surfaces), .. } => from_surfaces(surfaces, files, &at, progress)?,
+        BodyTable { surfaces: Some(surfaces), particles, .. } => {
+            from_surfaces(surfaces, particles.as_ref(), files, &at, progress)?
+        }
         _ => from_shape(table, kind, files.limits, &at)?,
     };
     if let Some(wanted) = &table.particles {
-        particles::demand(wanted, &body, files.limits)?;
         progress(0.75, "making the skin");
-        let skin = match body.skin.take() {
-            Some(skin) => skin,
-            None => particles::skin_of(table, &body, wanted.spacing_m).map_err(|error| shape_fault(&at, error))?,
+        let skin = if let Some(skin) = body.skin.take() {
+            skin
+        } else {
+            particles::demand(wanted, &body, files.limits)?;
+            particles::skin_of(table, &body, wanted.spacing_m).map_err(|error| shape_fault(&at, error))?
         };
         particles::put_on(&mut body, table, skin);
     }
@@ -213,6 +215,7 @@ fn file_fault(at: &Where, error: FileError) -> Fault {
 /// Reads both surfaces and fills the wall between them.
 fn from_surfaces(
     table: &SurfacesTable,
+    wanted: Option<&ParticlesTable>,
     files: &Files<'_>,
     at: &Where,
     progress: &mut dyn FnMut(f64, &str),
@@ -226,16 +229,13 @@ fn from_surfaces(
     let (inner, outer) = (read("inner_file", &table.inner_file)?, read("outer_file", &table.outer_file)?);
     let options = FillOptions { layers: table.layers, ..FillOptions::new(table.target_tets) };
     let mut part_of_load = |part: f64, what: &str| progress(0.1 + 0.65 * part, what);
-    let filled = fill::fill(
-        input(&inner, table.inner_unit.unwrap_or(table.unit).in_m()),
-        input(&outer, table.unit.in_m()),
-        options,
-        &mut part_of_load,
-    )
-    .map_err(|error| Fault::value(at.clone(), error.to_string()).of(Stage::Body).cause(error))?;
+    let inner_input = input(&inner, table.inner_unit.unwrap_or(table.unit).in_m());
+    let outer_input = input(&outer, table.unit.in_m());
+    let refused = |error: FillError| Fault::value(at.clone(), error.to_string()).of(Stage::Body).cause(error);
+    let filled = fill::fill(inner_input, outer_input, options, &mut part_of_load).map_err(refused)?;
     let surface = Surface::of(&filled.mesh).map_err(|error| mesh_fault(at, error))?;
     let warnings = inner.warnings.iter().chain(&outer.warnings).cloned().collect();
-    Ok(Body {
+    let mut body = Body {
         parts: parts::of_boundary(&filled.regions, &surface),
         surface,
         skin: None,
@@ -244,7 +244,12 @@ fn from_surfaces(
         report: filled.report.to_string().lines().map(str::to_owned).collect(),
         warnings,
         mesh: filled.mesh,
-    })
+    };
+    if let Some(wanted) = wanted {
+        particles::demand(wanted, &body, files.limits)?;
+        body.skin = Some(fill::around(inner_input, outer_input, wanted.spacing_m).map_err(refused)?);
+    }
+    Ok(body)
 }
 
 fn input(file: &SurfaceFile, metres_per_unit: f64) -> SurfaceInput<'_> {

@@ -19,8 +19,8 @@ use crate::{
     scene::{BodySummary, OutputSettings, PartSummary, Scene},
 };
 use body::Body;
-use material::Materials;
 use glam::DVec3;
+use material::Materials;
 use palpate_physics::{
     Integrator, ModelSpec, Precision, Settings, Skips, Substeps, hybrid::ParticleSpec, mesh::quality,
     world::MAX_SUBSTEPS,
@@ -225,12 +225,7 @@ fn unique_names<'n>(table: &str, names: impl Iterator<Item = &'n str>) -> Result
     Ok(())
 }
 
-fn summary(
-    body: &Body,
-    regions: &Regions<'_>,
-    materials: &Materials,
-    particles: Option<&ParticleSpec>,
-) -> BodySummary {
+fn summary(body: &Body, regions: &Regions<'_>, materials: &Materials, particles: Option<&ParticleSpec>) -> BodySummary {
     let mesh = &body.mesh;
     let mass_of =
         |(tet, region): (usize, &u16)| mesh.volume_m3(tet) * materials.regions[*region as usize].density_kg_per_m3;

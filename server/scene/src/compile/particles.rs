@@ -54,7 +54,8 @@ pub(super) fn demand(table: &ParticlesTable, body: &Body, limits: &Limits) -> Re
     ];
     for (count, what, most) in counts {
         if count > most {
-            let message = format!("{key} = {spacing_m} gives about {count:.1e} {what}; at most {most:.0e} are allowed here");
+            let message =
+                format!("{key} = {spacing_m} gives about {count:.1e} {what}; at most {most:.0e} are allowed here");
             return Err(Fault::value(key, message).help("take a larger spacing"));
         }
     }
@@ -160,8 +161,7 @@ fn lattice_through_m(body: &Body, skin: &Skin, constraints: &Constraints) -> DVe
     let slack_m = FLAT * low.distance(high);
     for set in constraints.specs.iter().rev().filter(|set| !set.nodes.is_empty()) {
         let held = set.nodes.iter().map(|&node| body.mesh.positions_m()[node as usize]);
-        let (low, high) =
-            held.fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(low, high), p| (low.min(p), high.max(p)));
+        let (low, high) = held.fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(low, high), p| (low.min(p), high.max(p)));
         through_m = DVec3::select((high - low).cmple(DVec3::splat(slack_m)), low, through_m);
     }
     through_m

@@ -79,8 +79,18 @@ impl Wall {
     pub(super) fn of_ventricle(outer_m: (f64, f64), inner_m: (f64, f64), cut_z_m: f64) -> Result<Self, ShapeError> {
         check("inner_m.short", inner_m.0, inner_m.0 > 0.0, "must be finite and larger than 0")?;
         check("inner_m.long", inner_m.1, inner_m.1 > 0.0, "must be finite and larger than 0")?;
-        check("outer_m.short", outer_m.0, outer_m.0 > inner_m.0, format!("must be larger than the inner {}", inner_m.0))?;
-        check("outer_m.long", outer_m.1, outer_m.1 > inner_m.1, format!("must be larger than the inner {}", inner_m.1))?;
+        check(
+            "outer_m.short",
+            outer_m.0,
+            outer_m.0 > inner_m.0,
+            format!("must be larger than the inner {}", inner_m.0),
+        )?;
+        check(
+            "outer_m.long",
+            outer_m.1,
+            outer_m.1 > inner_m.1,
+            format!("must be larger than the inner {}", inner_m.1),
+        )?;
         let limit = LARGEST_CUT * inner_m.1;
         check("cut_z_m", cut_z_m, cut_z_m.abs() <= limit, format!("must lie between {} and {limit}", -limit))?;
         let revolve = |(short, long): (f64, f64)| DVec3::new(short, short, long);

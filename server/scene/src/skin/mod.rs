@@ -20,6 +20,22 @@ pub(crate) struct FineSurface {
 }
 
 impl FineSurface {
+    /// Without vertices that no triangle has.
+    pub(crate) fn compact(mut self) -> Self {
+        let mut is_used = vec![false; self.positions_m.len()];
+        self.triangles.iter().flatten().for_each(|&vertex| is_used[vertex as usize] = true);
+        let mut number = Vec::with_capacity(is_used.len());
+        let mut used = 0;
+        for is_used in &is_used {
+            number.push(used);
+            used += u32::from(*is_used);
+        }
+        let mut keep = is_used.iter();
+        self.positions_m.retain(|_| keep.next() == Some(&true));
+        self.triangles.iter_mut().flatten().for_each(|vertex| *vertex = number[*vertex as usize]);
+        self
+    }
+
     /// The triangles that came from something wanted.
     pub(crate) fn triangles_from(&self, wanted: impl Fn(u32) -> bool) -> Vec<u32> {
         let from = self.origins.iter().zip(0..).filter(|(origin, _)| wanted(**origin));

@@ -97,7 +97,9 @@ mod tests {
 
     fn longest_m(surface: &FineSurface) -> f64 {
         let edges = surface.triangles.iter().flat_map(|&[a, b, c]| [[a, b], [b, c], [c, a]]);
-        edges.map(|[a, b]| surface.positions_m[a as usize].distance(surface.positions_m[b as usize])).fold(0.0, f64::max)
+        edges
+            .map(|[a, b]| surface.positions_m[a as usize].distance(surface.positions_m[b as usize]))
+            .fold(0.0, f64::max)
     }
 
     /// A tetrahedron with edges of very different length.
@@ -123,7 +125,8 @@ mod tests {
 
     #[test]
     fn middles_go_where_they_are_put() {
-        let corners = [DVec3::ONE, DVec3::new(-1.0, -1.0, 1.0), DVec3::new(-1.0, 1.0, -1.0), DVec3::new(1.0, -1.0, -1.0)];
+        let corners =
+            [DVec3::ONE, DVec3::new(-1.0, -1.0, 1.0), DVec3::new(-1.0, 1.0, -1.0), DVec3::new(1.0, -1.0, -1.0)];
         let coarse = FineSurface {
             positions_m: corners.map(DVec3::normalize).to_vec(),
             triangles: vec![[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]],

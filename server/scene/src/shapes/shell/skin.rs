@@ -50,12 +50,17 @@ impl Wall {
         let shrunk = (cap.area_m2() / self.cap(self.outer_m).area_m2()).sqrt();
         let sphere = cap.triangulate(&cap.rings_of(EDGE * longest_m * shrunk));
         let placed = |axes| sphere.directions.iter().map(|&d| self.place(axes, d)).collect::<Vec<_>>();
-        let levels = [placed(self.inner_m), placed(self.outer_m)];
+        let (inner, outer) = (placed(self.inner_m), placed(self.outer_m));
+        // Levels between give the base triangles as good as the others.
+        let thickness_m = (self.outer_m - self.inner_m).max_element();
+        let layers = if self.cut_z_m.is_some() { (thickness_m / (EDGE * longest_m)).ceil().max(1.0) } else { 1.0 };
+        let level = |k: usize| inner.iter().zip(&outer).map(|(a, b)| a.lerp(*b, k as f64 / layers)).collect();
+        let levels: Vec<Vec<DVec3>> = (0..=layers as usize).map(level).collect();
         let parts = split(&Layers { triangles: &sphere.triangles, levels: &levels });
         let of_parts = [(parts.inner, INNER), (parts.outer, OUTER), (parts.base, BASE)];
         let origins = of_parts.iter().flat_map(|(triangles, origin)| repeat_n(*origin, triangles.len())).collect();
         let triangles = of_parts.into_iter().flat_map(|(triangles, _)| triangles).collect();
-        let surface = FineSurface { positions_m: levels.concat(), triangles, origins };
+        let surface = FineSurface { positions_m: levels.concat(), triangles, origins }.compact();
         refine(surface, longest_m, &|sides, middle| self.onto(sides, middle))
     }
 
