@@ -47,12 +47,12 @@ pub enum PrepareError {
     Period(#[from] palpate_realtime::PeriodError),
     /// Nobody could stop or ask a loop that is in one tick for so long.
     #[error(
-        "a tick of {tets} tets and particles in {substeps} substeps takes too long for a session (at most {MOST_TET_UPDATES} tets times substeps): coarsen the \
+        "a tick of {work} in {substeps} substeps takes too long for a session (at most {MOST_TET_UPDATES} tets times substeps): coarsen the \
          mesh, soften the material or shorten the tick; palpated simulate takes it as it is"
     )]
     TooHeavy {
-        /// Tets of the body and its active particles.
-        tets: usize,
+        /// Tets of the body, and particles that may be awake.
+        work: String,
         /// Substeps of a tick.
         substeps: u32,
     },
@@ -268,10 +268,11 @@ pub fn prepare(
     if period_s > LONGEST_PERIOD_S {
         return Err(PrepareError::TooSlow { period_s });
     }
+    let (tets, active, substeps) = (model.mesh().tets().len(), most_active(&model), model.substeps());
     // A particle costs about what a tet does.
-    let (tets, substeps) = (model.mesh().tets().len() + most_active(&model), model.substeps());
-    if tets as u64 * u64::from(substeps) > MOST_TET_UPDATES {
-        return Err(PrepareError::TooHeavy { tets, substeps });
+    if (tets + active) as u64 * u64::from(substeps) > MOST_TET_UPDATES {
+        let work = if active > 0 { format!("{tets} tets and {active} particles") } else { format!("{tets} tets") };
+        return Err(PrepareError::TooHeavy { work, substeps });
     }
     let mut warnings = scene.warnings;
     warnings.extend(too_heavy(&model));

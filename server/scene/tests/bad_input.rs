@@ -418,7 +418,7 @@ fn particles_that_cannot_be_are_told_at_their_key() {
         (
             "",
             "",
-            "t.toml:6:2: [body.particles] lacks the key `spacing_m` (or `spacing_mm`) (docs/scenes.md describes every key)",
+            "t.toml:6:7: [body.particles] lacks the key `spacing_m` (or `spacing_mm`) (docs/scenes.md describes every key)",
         ),
     ];
     for (spacing, more, wanted) in cases {
