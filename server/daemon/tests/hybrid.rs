@@ -1,7 +1,11 @@
 //! A hybrid body in the daemon: over real sockets, and with the bits of `palpated simulate`.
 #![allow(clippy::unwrap_used, clippy::expect_used)]
 mod common;
-use common::{Daemon, HYBRID, Mirror, PATIENCE, hybrid_scene, vec3};
+use common::{
+    Daemon, Mirror, PATIENCE,
+    hybrid::{HYBRID, hybrid_scene},
+    vec3,
+};
 use glam::DVec3;
 use palpate_physics::snapshot;
 use palpate_proto::v1::{self, LevelOfDetail};

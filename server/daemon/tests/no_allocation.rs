@@ -3,7 +3,7 @@
 #![allow(clippy::unwrap_used, clippy::expect_used)]
 mod common;
 use assert_no_alloc::{AllocDisabler, assert_no_alloc};
-use common::{above, block_scene, hybrid_scene, path, pressing};
+use common::{above, block_scene, hybrid::hybrid_scene, path, pressing};
 use glam::DVec3;
 use palpate_physics::{Model, State, snapshot};
 use palpate_realtime::Clock;

@@ -163,3 +163,78 @@ fn two_surfaces_become_a_skin_and_coarse_tets() {
     assert!(parts("base").nodes > 4 && parts("base").triangles > 20);
     Model::build(scene.model).unwrap();
 }
+
+/// A small block with particles, and one line of theirs more.
+fn small(spacing: &str, more: &str) -> String {
+    let body = "[body.box]\nsize_mm = [10, 10, 10]\ncells = [2, 2, 2]\n[body.particles]";
+    format!("[scene]\nname = \"t\"\n{body}\n{spacing}\n{more}\n{}", &TAIL[..TAIL.find("[[probe]]").unwrap()])
+}
+
+fn loaded(text: &str) -> Result<Scene, String> {
+    parse(text, "t.toml", None, &Limits::local(), &mut |_, _| {}).map_err(|error| error.one_line())
+}
+
+#[test]
+fn particles_that_cannot_be_are_told_at_their_key() {
+    let good = loaded(&small("spacing_mm = 1.25", "")).unwrap();
+    let particles = good.model.particles.unwrap();
+    assert_eq!(particles.most_active, 600);
+    assert_eq!(good.summary.surface_triangles, particles.skin.triangles().len());
+    assert!((particles.skin.volume_m3() - 1e-6).abs() < 1e-15);
+    let refused = |spacing: &str, more: &str| loaded(&small(spacing, more)).unwrap_err();
+    let cases = [
+        ("spacing_mm = 0", "", "t.toml:7:14: body.particles.spacing_m = 0: must be larger than 0"),
+        ("spacing_m = -1", "", "t.toml:7:13: body.particles.spacing_m = -1: must be larger than 0"),
+        (
+            "spacing_mm = 11",
+            "",
+            "t.toml:7:14: body.particles.spacing_m = 0.011: the lattice is coarser than the body, whose smallest extent is \
+             1.000e-2 m (take a spacing with several particles through the thinnest part)",
+        ),
+        (
+            "spacing_mm = 0.01",
+            "",
+            "t.toml:7:14: body.particles.spacing_m = 0.00001 gives about 1.0e9 particles; at most 1e7 are allowed here (take a \
+             larger spacing)",
+        ),
+        ("spacing_mm = 1", "most_active = 0", "t.toml:8:15: body.particles.most_active = 0: must be 1 to 20000"),
+        ("spacing_mm = 1", "reach_mm = 0", "t.toml:8:12: body.particles.reach_m = 0: must be larger than 0"),
+        (
+            "spacing_mm = 1",
+            "spaceing = 2",
+            "t.toml:8:1: unknown key `spaceing` in [body.particles] (did you mean `spacing_m` or `spacing_mm`?)",
+        ),
+        (
+            "",
+            "",
+            "t.toml:6:7: [body.particles] lacks the key `spacing_m` (or `spacing_mm`) (docs/scenes.md describes every key)",
+        ),
+    ];
+    for (spacing, more, wanted) in cases {
+        assert_eq!(refused(spacing, more), wanted);
+    }
+    let implicit = format!("{}[numerics]\nintegrator = \"backward-euler\"\n", small("spacing_mm = 1", ""));
+    let message = loaded(&implicit).unwrap_err();
+    assert!(message.ends_with(
+        "a body with particles is integrated by leapfrog only (leave `integrator` out, or [body.particles])"
+    ));
+    let sleeping = format!("{}[numerics]\nsleep_tolerance_um = 1\n", small("spacing_mm = 1", ""));
+    assert!(loaded(&sleeping).unwrap_err().contains("its particles sleep where nothing touches them"));
+}
+
+#[test]
+fn a_mesh_files_boundary_becomes_a_fine_skin() {
+    let folder = tempfile::tempdir().unwrap();
+    let nodes = "4 3 0 0\n0 0 0 0\n1 80 0 0\n2 0 80 0\n3 0 0 80\n";
+    std::fs::write(folder.path().join("heart.node"), nodes).unwrap();
+    std::fs::write(folder.path().join("heart.ele"), "1 4 0\n0 0 1 2 3\n").unwrap();
+    let text = "[scene]\nname = \"t\"\n[body.mesh]\nfile = \"heart.node\"\nunit = \"mm\"\n[body.particles]\nspacing_mm = 8\n\
+                [[material]]\nlaw = \"stvk\"\nyoung_modulus_pa = 1e4\npoisson_ratio = 0.3\ndensity_kg_per_m3 = 1000\n";
+    let scene = parse(text, "t.toml", Some(folder.path()), &Limits::local(), &mut |_, _| {}).unwrap();
+    let skin = scene.model.particles.unwrap().skin;
+    assert!((skin.volume_m3() / (0.08_f64.powi(3) / 6.0) - 1.0).abs() < 1e-12);
+    for triangle in 0..skin.triangles().len() {
+        let [a, b, c] = skin.corners_m(triangle);
+        assert!(a.distance(b).max(b.distance(c)).max(c.distance(a)) <= 8e-3 * 1.000_001);
+    }
+}

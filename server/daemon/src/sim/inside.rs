@@ -6,6 +6,9 @@ use palpate_physics::{
     hybrid::{Hybrid, partition::NONE},
 };
 
+/// A point between two tets or cells is in one of them, whatever rounding says.
+const ROUNDING: f64 = 1e-9;
+
 /// What is looked at.
 #[derive(Debug)]
 pub struct Inside {
@@ -39,8 +42,7 @@ fn at_rest<'a>(model: &'a Model, state: &'a State, point_m: DVec3) -> impl Itera
         let [a, b, c, d] = tet.map(|node| state.x[node as usize]);
         let local = DMat3::from_cols(b - a, c - a, d - a).inverse() * (point_m - a);
         let weights = [1.0 - local.element_sum(), local.x, local.y, local.z];
-        // A point between two tets is in one of them, whatever rounding says.
-        let held = weights.iter().all(|&weight| weight >= -1e-9);
+        let held = weights.iter().all(|&weight| weight >= -ROUNDING);
         held.then(|| tet.iter().zip(weights).map(|(&node, weight)| rest[node as usize] * weight).sum())
     })
 }
@@ -49,7 +51,8 @@ fn is_in_a_cell(hybrid: &Hybrid, rest_m: DVec3) -> bool {
     let sites = hybrid.partition().sites();
     let cell = sites.cell(sites.cell_near(rest_m));
     let local = (rest_m - sites.cell_m(cell)) / sites.spacing_m();
-    let in_box = local.cmpge(DVec3::ZERO).all() && local.cmple(DVec3::ONE).all();
+    // The nearest cell of a point outside the lattice's box does not hold it.
+    let in_box = (local - 0.5).abs().max_element() <= 0.5 + ROUNDING;
     in_box && hybrid.partition().cell_at(cell) != NONE
 }
 

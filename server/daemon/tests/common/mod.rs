@@ -1,5 +1,7 @@
 //! A small scene, a daemon on it, and clients.
 #![allow(dead_code, unreachable_pub, clippy::unwrap_used, clippy::expect_used)] // each test file uses its own part
+pub mod hybrid;
+
 use glam::DVec3;
 use palpate_physics::{
     ModelSpec, PrescribedSpec, Region, Settings,
@@ -89,48 +91,6 @@ pub fn block_scene(name: &str, cells: u32) -> Scene {
         warnings: Vec::new(),
         summary,
     }
-}
-
-/// A block with particles, touched, pressed and left by a tool that the scene moves.
-pub const HYBRID: &str = r#"
-[scene]
-name = "hybrid"
-[body.box]
-size_mm = [40, 40, 20]
-cells = [2, 2, 1]
-[body.particles]
-spacing_mm = 2.5
-most_active = 200
-[[material]]
-law = "stable-neo-hookean"
-young_modulus_pa = 10e3
-poisson_ratio = 0.4
-density_kg_per_m3 = 1000
-[[fixed]]
-region = "z_min"
-[[tool]]
-name = "indenter"
-radius_mm = 6
-coupling = "rigid"
-driver = "script"
-keyframe = [
-    { time_s = 0, position_mm = [20, 20, 30] },
-    { time_s = 0.2, position_mm = [20, 20, 25] },
-    { time_s = 0.4, position_mm = [22, 20, 24] },
-    { time_s = 0.6, position_mm = [20, 20, 45] },
-]
-[[probe]]
-name = "table"
-measure = "reaction"
-region = "z_min"
-[numerics]
-mass_damping_per_s = 40
-"#;
-
-/// The scene of [`HYBRID`].
-pub fn hybrid_scene() -> Scene {
-    let limits = palpate_scene::Limits::wire();
-    palpate_scene::parse(HYBRID, "hybrid", None, &limits, &mut |_, _| ()).unwrap()
 }
 
 fn tool(name: &str, start_position_m: DVec3) -> ToolSpec {

@@ -76,6 +76,7 @@ pub(crate) fn compile(
     let mut warnings = body.warnings.clone();
     warnings.extend(materials.warnings.iter().cloned());
     warnings.extend(tools.warnings);
+    particles::warn_of_fine_tets(&body, &mut warnings);
     let probes = probes::compile(&document.probe, &regions, &body, &tools.specs, &constraints, &mut warnings)?;
     let summary = summary(&body, &regions, &materials, particles.as_ref());
     warn_of_shape(&summary, &mut warnings);
