@@ -40,6 +40,10 @@ fn facts(status: &StatusResponse) -> Vec<Vec<String>> {
             session.node_count, session.tet_count, session.surface_triangle_count, session.mass_kg
         ),
     );
+    if session.particle_count > 0 {
+        let (awake, most) = (status.active_particles, session.most_active_particles);
+        line("particles", format!("{}, {awake} of at most {most} awake", session.particle_count));
+    }
     line(
         "time",
         format!(
@@ -141,6 +145,8 @@ fn to_json(status: &StatusResponse) -> serde_json::Value {
         "scene_name": session.scene_name,
         "nodes": session.node_count,
         "tets": session.tet_count,
+        "particles": session.particle_count,
+        "active_particles": status.active_particles,
         "substeps_per_tick": session.substeps_per_tick,
         "tick_period_s": session.tick_period_s,
         "tick": status.tick,

@@ -4,6 +4,7 @@ pub mod grpc;
 pub mod load;
 pub mod offline;
 pub mod page;
+mod progress;
 pub mod serve;
 pub mod session;
 pub mod sim;

@@ -47,12 +47,12 @@ pub enum PrepareError {
     Period(#[from] palpate_realtime::PeriodError),
     /// Nobody could stop or ask a loop that is in one tick for so long.
     #[error(
-        "a tick of {tets} tets in {substeps} substeps takes too long for a session (at most {MOST_TET_UPDATES} tets times substeps): coarsen the \
+        "a tick of {work} in {substeps} substeps takes too long for a session (at most {MOST_TET_UPDATES} tets times substeps): coarsen the \
          mesh, soften the material or shorten the tick; palpated simulate takes it as it is"
     )]
     TooHeavy {
-        /// Tets of the body.
-        tets: usize,
+        /// Tets of the body, and particles that may be awake.
+        work: String,
         /// Substeps of a tick.
         substeps: u32,
     },
@@ -183,6 +183,8 @@ impl ActiveSession {
             mass_kg: model.mass_kg().iter().sum(),
             max_natural_frequency_rad_per_s: model.max_natural_frequency_rad_per_s(),
             tool_names: self.tools.iter().map(|tool| tool.name.clone()).collect(),
+            particle_count: model.hybrid().map_or(0, |hybrid| hybrid.partition().particle_count() as u32),
+            most_active_particles: most_active(model) as u32,
         }
     }
 }
@@ -249,7 +251,7 @@ impl Numbers {
     }
 }
 
-/// Builds all of a session. Takes as long as the mesh is large; needs a runtime's context.
+/// Builds all of a session; `progress` is told the part done of what takes long. Takes as long as the mesh is large; needs a runtime's context.
 ///
 /// # Errors
 /// [`PrepareError`].
@@ -258,16 +260,19 @@ pub fn prepare(
     settings: &SessionSettings,
     numbers: &Numbers,
     hub: &Hub,
+    progress: &mut dyn FnMut(f64),
 ) -> Result<Prepared, PrepareError> {
-    let model = Arc::new(Model::build(scene.model)?);
+    let model = Arc::new(Model::build_with(scene.model, progress)?);
     let period_s = model.spec().settings.tick_period_s;
     palpate_realtime::Deadlines::new(palpate_realtime::Clock::Monotonic, period_s)?;
     if period_s > LONGEST_PERIOD_S {
         return Err(PrepareError::TooSlow { period_s });
     }
-    let (tets, substeps) = (model.mesh().tets().len(), model.substeps());
-    if tets as u64 * u64::from(substeps) > MOST_TET_UPDATES {
-        return Err(PrepareError::TooHeavy { tets, substeps });
+    let (tets, active, substeps) = (model.mesh().tets().len(), most_active(&model), model.substeps());
+    // A particle costs about what a tet does.
+    if (tets + active) as u64 * u64::from(substeps) > MOST_TET_UPDATES {
+        let work = if active > 0 { format!("{tets} tets and {active} particles") } else { format!("{tets} tets") };
+        return Err(PrepareError::TooHeavy { work, substeps });
     }
     let mut warnings = scene.warnings;
     warnings.extend(too_heavy(&model));
@@ -303,7 +308,12 @@ pub fn prepare(
     Ok(Prepared { simulation, session: Arc::new(session), surface: ends.surface })
 }
 
-/// Measures some ticks of the body at rest, and says so when they do not fit their period.
+/// Most particles awake at once; 0 of a body of tets.
+fn most_active(model: &Model) -> usize {
+    model.spec().particles.as_ref().map_or(0, |particles| particles.most_active)
+}
+
+/// Measures some ticks of the body at rest, all particles awake that may be at once, and says so when they do not fit their period.
 fn too_heavy(model: &Model) -> Option<String> {
     let cost_s = median_tick_s(model);
     let period_s = model.spec().settings.tick_period_s;
@@ -330,10 +340,15 @@ fn median_tick_s(model: &Model) -> f64 {
         prescribed_displacements_m: &prescribed,
         point_forces: &[],
     };
+    state.wake_only(model, 0..model.hybrid().map_or(0, |hybrid| hybrid.partition().particle_count() as u32));
     let begun = Instant::now();
     let mut costs = Vec::new();
     // A few at least, more while they are cheap.
     while costs.len() < 5 || (costs.len() < 51 && begun.elapsed() < Duration::from_millis(50)) {
+        if model.hybrid().is_some() {
+            // At other ticks than every tenth nobody looks which particles are to be awake.
+            state.tick = 1;
+        }
         let before = Instant::now();
         step(model, &mut state, &mut scratch, &input);
         costs.push(before.elapsed().as_secs_f64());

@@ -44,6 +44,7 @@ pub fn of(daemon: &Daemon, session: &ActiveSession, copy: &Copy, done: &Done) ->
         repeated_ticks: daemon.timing.repeated_ticks(),
         substeps_now: copy.state.pace.substeps,
         asleep: copy.state.sleep.asleep,
+        active_particles: copy.state.active.len() as u32,
     }
 }
 
@@ -86,7 +87,7 @@ fn devices(session: &ActiveSession) -> Vec<v1::AttachedDevice> {
 fn probes(session: &ActiveSession, copy: &Copy) -> Vec<v1::NamedVector> {
     let read = |probe: &palpate_scene::Probe| {
         let mut values = vec![0.0; MAX_COLUMNS];
-        probe.evaluate(&session.model, &copy.state, &copy.scratch, &mut values);
+        probe.evaluate_with(&session.model, &copy.state, &copy.reactions_n, &mut values);
         values.truncate(probe.columns().len());
         let components = probe.columns().iter().map(|&column| column.to_owned()).collect();
         v1::NamedVector { name: probe.name().to_owned(), unit: probe.unit().to_owned(), values, components }

@@ -3,9 +3,9 @@
 #![allow(clippy::unwrap_used, clippy::expect_used)]
 mod common;
 use assert_no_alloc::{AllocDisabler, assert_no_alloc};
-use common::{above, block_scene, path, pressing};
+use common::{above, block_scene, hybrid::hybrid_scene, path, pressing};
 use glam::DVec3;
-use palpate_physics::Model;
+use palpate_physics::{Model, State, snapshot};
 use palpate_realtime::Clock;
 use palpate_scene::ScriptedHand;
 use palpated::{
@@ -13,7 +13,7 @@ use palpated::{
     sim::{
         exchange::DeviceInput,
         inject::Injection,
-        simulation::{Ends, Parts, Simulation},
+        simulation::{Ends, Parts, Simulation, copy_state},
         tick::Plan,
         timing::Timing,
         tool::Order,
@@ -24,6 +24,37 @@ use std::sync::Arc;
 
 #[global_allocator]
 static ALLOCATOR: AllocDisabler = AllocDisabler;
+
+/// A hybrid body: particles wake and sleep, viewers watch, states come and go.
+#[tokio::test]
+async fn no_tick_of_a_hybrid_body_allocates() {
+    let scene = hybrid_scene();
+    let demand = Arc::new(Demand::default());
+    let model = Arc::new(Model::build(scene.model).unwrap());
+    let (simulation, ends) = Simulation::build(Parts {
+        session: 1,
+        model: Arc::clone(&model),
+        timeline: scene.timeline,
+        drivers: scene.drivers,
+        arm: None,
+        limits: default_limits(),
+        demand: Arc::clone(&demand),
+    })
+    .unwrap();
+    let mut bench = Bench { simulation, ends, demand, clock: Clock::Monotonic, timing: Timing::default() };
+    bench.ticks(300, RUN);
+    assert!(!bench.simulation.state().active.is_empty());
+    bench.demand.set(8, true);
+    let mut copy = State::at_rest(&model);
+    assert!(assert_no_alloc(|| copy_state(bench.simulation.state(), &mut copy)));
+    bench.ticks(1200, RUN);
+    assert!(bench.simulation.state().active.is_empty());
+    let saved = snapshot::restore(&model, &snapshot::save(&model, &copy)).unwrap();
+    assert!(assert_no_alloc(|| bench.simulation.restore(&saved)));
+    bench.ticks(300, RUN);
+    assert_no_alloc(|| bench.simulation.reset());
+    bench.ticks(300, RUN);
+}
 
 struct Bench {
     simulation: Box<Simulation>,

@@ -4,7 +4,7 @@ mod common;
 use assert_no_alloc::{AllocDisabler, assert_no_alloc};
 use common::{above, block_scene, path, pressing};
 use glam::DVec3;
-use palpate_physics::{Model, Scratch, State, snapshot};
+use palpate_physics::{Model, State, snapshot};
 use palpate_realtime::{Clock, TickLoop};
 use palpate_scene::{Scene, ScriptedHand};
 use palpated::{
@@ -84,7 +84,7 @@ impl Running {
 }
 
 fn copy_of(model: &Model) -> Request {
-    Request::Copy(Box::new(Copy { state: State::at_rest(model), scratch: Scratch::new(model) }))
+    Request::Copy(Box::new(Copy::of(model)))
 }
 
 /// Sixty-four viewers that ask for the status at once cost one tick sixty-four copies of the state.

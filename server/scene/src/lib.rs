@@ -16,6 +16,7 @@ pub mod path;
 pub mod probes;
 pub mod scene;
 pub mod shapes;
+mod skin;
 pub mod timeline;
 pub mod wording;
 

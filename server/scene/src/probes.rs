@@ -1,6 +1,8 @@
 //! What a scene measures: named values with units, one row per sample.
 use glam::DVec3;
-use palpate_physics::{Energies, Model, Scratch, State, contact::closest_weights, health, mesh::TetMesh};
+use palpate_physics::{
+    Energies, Model, Scratch, State, contact::closest_weights, health, hybrid::place::Place, mesh::TetMesh,
+};
 
 /// A named measurement.
 #[derive(Debug, Clone, PartialEq)]
@@ -14,6 +16,8 @@ pub struct Probe {
 pub enum Measure {
     /// Displacement of a material point (m).
     Displacement(MaterialPoint),
+    /// The same of a hybrid body's, by its rest position (m).
+    LatticeDisplacement(DVec3),
     /// Force (N) that holds the prescribed degrees of freedom of these nodes.
     Reaction(Vec<u32>),
     /// The energy ledger (J).
@@ -50,11 +54,16 @@ impl MaterialPoint {
     /// The material point at a rest position (m): barycentric in the first tet that contains it, else the nearest
     /// point of the boundary triangles (node triples).
     pub fn locate(mesh: &TetMesh, boundary: &[[u32; 3]], point_m: DVec3) -> Self {
-        (0..mesh.tets().len()).find_map(|tet| Self::inside(mesh, tet, point_m)).unwrap_or_else(|| {
-            let candidates = boundary.iter().map(|&triangle| Self::on_triangle(mesh, triangle, point_m));
-            candidates.fold(Self { nodes: [0; 4], weights: [1.0, 0.0, 0.0, 0.0], distance_m: f64::INFINITY }, |a, b| {
-                if b.distance_m < a.distance_m { b } else { a }
-            })
+        (0..mesh.tets().len())
+            .find_map(|tet| Self::inside(mesh, tet, point_m))
+            .unwrap_or_else(|| Self::nearest(mesh.positions_m(), boundary.iter().copied(), point_m))
+    }
+
+    /// The nearest point of triangles.
+    pub(crate) fn nearest(positions_m: &[DVec3], triangles: impl Iterator<Item = [u32; 3]>, point_m: DVec3) -> Self {
+        let candidates = triangles.map(|triangle| Self::on_triangle(positions_m, triangle, point_m));
+        candidates.fold(Self { nodes: [0; 4], weights: [1.0, 0.0, 0.0, 0.0], distance_m: f64::INFINITY }, |a, b| {
+            if b.distance_m < a.distance_m { b } else { a }
         })
     }
 
@@ -67,8 +76,8 @@ impl MaterialPoint {
         inside.then(|| Self { nodes: mesh.tets()[tet], weights, distance_m: 0.0 })
     }
 
-    pub(crate) fn on_triangle(mesh: &TetMesh, triangle: [u32; 3], point_m: DVec3) -> Self {
-        let [a, b, c] = triangle.map(|node| mesh.positions_m()[node as usize]);
+    pub(crate) fn on_triangle(positions_m: &[DVec3], triangle: [u32; 3], point_m: DVec3) -> Self {
+        let [a, b, c] = triangle.map(|node| positions_m[node as usize]);
         let w = closest_weights(point_m, [a, b, c]);
         let closest = a * w[0] + b * w[1] + c * w[2];
         let nodes = [triangle[0], triangle[1], triangle[2], triangle[2]];
@@ -102,7 +111,10 @@ impl Probe {
     /// Unit of its values: `m`, `N`, `J` or `1`.
     pub fn unit(&self) -> &'static str {
         match self.measure {
-            Measure::Displacement(_) | Measure::ToolPosition(_) | Measure::Penetration(_) => "m",
+            Measure::Displacement(_)
+            | Measure::LatticeDisplacement(_)
+            | Measure::ToolPosition(_)
+            | Measure::Penetration(_) => "m",
             Measure::Reaction(_) | Measure::ContactForce(_) | Measure::DeviceForce(_) => "N",
             Measure::Energy => "J",
             Measure::MinVolumeRatio => "1",
@@ -128,6 +140,7 @@ impl Probe {
     pub fn evaluate_with(&self, model: &Model, state: &State, reactions_n: &[DVec3], out: &mut [f64]) {
         match &self.measure {
             Measure::Displacement(point) => put(out, point.of(&state.x) - point.of(model.rest_positions_m())),
+            Measure::LatticeDisplacement(point_m) => put(out, lattice_displacement_m(model, state, *point_m)),
             Measure::Reaction(nodes) => {
                 put(out, nodes.iter().map(|&node| reactions_n[node as usize]).sum());
             }
@@ -143,6 +156,22 @@ impl Probe {
             Measure::MinVolumeRatio => copy(out, &[health::min_volume_ratio(model, state).0]),
         }
     }
+}
+
+/// Displacement (m) of a point at rest of a hybrid body, between the particles that carry it.
+fn lattice_displacement_m(model: &Model, state: &State, point_m: DVec3) -> DVec3 {
+    let Some(hybrid) = model.hybrid() else { return DVec3::ZERO };
+    let partition = hybrid.partition();
+    let (of_nodes, of_particles) = state.x.split_at(hybrid.node_count());
+    let moved = |particle: u32| {
+        let x = match state.active.ids().binary_search(&particle) {
+            Ok(number) => of_particles[number],
+            Err(_) => partition.anchor(particle).of(of_nodes),
+        };
+        x - partition.particle_m(particle)
+    };
+    let place = Place::new(partition, point_m);
+    place.particles.into_iter().zip(place.weights).map(|(particle, weight)| moved(particle) * weight).sum()
 }
 
 fn put(out: &mut [f64], value: DVec3) {

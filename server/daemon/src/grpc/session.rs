@@ -9,7 +9,7 @@ use crate::{
     },
     status,
 };
-use palpate_physics::{Scratch, State, snapshot};
+use palpate_physics::snapshot;
 use palpate_proto::{
     MAX_SNAPSHOT_BYTES,
     v1::{self, load_scene_request::Source as WireSource, session_server::Session},
@@ -67,7 +67,7 @@ impl SessionService {
     /// memory is being got frees neither.
     async fn copy(&self, session: &ActiveSession) -> Result<(Box<Copy>, Done, OwnedSemaphorePermit), Status> {
         let (room, model) = (self.room().await?, Arc::clone(&session.model));
-        let empty = move || (Copy { state: State::at_rest(&model), scratch: Scratch::new(&model) }, room);
+        let empty = move || (Copy::of(&model), room);
         let (copy, room) = blocking(empty).await?;
         match self.order(session, Order::Copy(Box::new(copy))).await? {
             (Order::Copy(copy), done) => Ok((copy, done, room)),
@@ -104,7 +104,7 @@ async fn replace_scene(daemon: &Arc<Daemon>, source: WireSource) -> Result<Arc<A
     let builder = Arc::clone(daemon);
     let prepared = tokio::task::spawn_blocking(move || {
         let scene = load::from_wire(source, &builder.settings.scene_folders)?;
-        prepare(scene, &builder.settings, &builder.numbers, &builder.hub)
+        prepare(scene, &builder.settings, &builder.numbers, &builder.hub, &mut |_| ())
             .map_err(|error| Status::invalid_argument(error.to_string()))
     })
     .await

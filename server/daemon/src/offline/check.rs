@@ -1,6 +1,6 @@
 //! `palpated check`: what a scene's body is like, and what a tick costs on this machine.
 use super::{load, simulate::Run, summary::TimeNumbers};
-use palpate_physics::{Model, material::Law};
+use palpate_physics::{Model, hybrid::Waking, material::Law};
 use palpate_scene::{Scene, builtin_names, wording::counted};
 use std::{
     process::ExitCode,
@@ -36,6 +36,7 @@ pub fn run(args: &CheckArgs) -> miette::Result<ExitCode> {
     let scene = load::load_scene(name)?;
     let model = load::build(&scene)?;
     print_body(&scene);
+    print_particles(&model);
     print_contents(&scene);
     for warning in &scene.warnings {
         println!("warning: {warning}");
@@ -49,6 +50,7 @@ pub fn run(args: &CheckArgs) -> miette::Result<ExitCode> {
         measure(&scene, &model)?
     };
     print_time(&model, &cost);
+    print_memory();
     let failed = args.strict && !scene.warnings.is_empty();
     Ok(if failed { ExitCode::FAILURE } else { ExitCode::SUCCESS })
 }
@@ -100,6 +102,26 @@ fn print_body(scene: &Scene) {
     }
 }
 
+fn print_particles(model: &Model) {
+    let (Some(hybrid), Some(spec)) = (model.hybrid(), &model.spec().particles) else { return };
+    let cage = hybrid.cage();
+    println!(
+        "particles  {}, {} mm apart, at most {} awake; skin of {}",
+        hybrid.partition().particle_count(),
+        short(spec.spacing_m * 1e3),
+        spec.most_active,
+        counted(spec.skin.triangles().len(), "triangle")
+    );
+    if let Waking::ByTools { reach_m } = spec.waking {
+        println!("           those within {} mm of a tool's contact wake", short(reach_m * 1e3));
+    }
+    println!(
+        "           the coarse tets' surface was moved by up to {} mm to hold them; {} outside never wake",
+        short(cage.moved_m * 1e3),
+        cage.outside
+    );
+}
+
 fn print_time(model: &Model, cost: &TimeNumbers) {
     let period_us = cost.tick_period_s * 1e6;
     println!(
@@ -124,6 +146,15 @@ fn print_time(model: &Model, cost: &TimeNumbers) {
         "fits"
     };
     println!("           {:.1} % of the tick: {verdict}", 100.0 * us.p50 / period_us);
+}
+
+/// What this process holds of the machine's memory, the body and its buffers being most of it.
+fn print_memory() {
+    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
+    let resident = status.lines().find_map(|line| line.strip_prefix("VmRSS:")?.trim().strip_suffix(" kB"));
+    if let Some(kilobytes) = resident.and_then(|text| text.trim().parse::<f64>().ok()) {
+        println!("memory     {:.0} MB in this process", kilobytes * 1.024e-3);
+    }
 }
 
 fn print_contents(scene: &Scene) {

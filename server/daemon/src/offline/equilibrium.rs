@@ -6,9 +6,9 @@ use super::{
     interrupt::Interrupt,
     load,
     probes::ProbeRows,
-    progress::Progress,
     summary::{Ending, SolveNumbers, Summary},
 };
+use crate::progress::Progress;
 use glam::DVec3;
 use miette::Diagnostic;
 use palpate_physics::{
@@ -55,6 +55,13 @@ struct NoEquilibrium {
 pub fn run(args: &StaticArgs) -> miette::Result<ExitCode> {
     let output = &args.output;
     let scene = load::load_with_warnings(&output.scene)?;
+    if scene.model.particles.is_some() {
+        return Err(miette::miette!(
+            help = "let `palpated simulate` come to rest with mass_damping_per_s, or leave [body.particles] out",
+            "\"{}\" is a body with particles, whose equilibrium is not solved for",
+            scene.name
+        ));
+    }
     let model = load::build(&scene)?;
     if let Some(out) = &output.out {
         folder::check(out, output.force)?;

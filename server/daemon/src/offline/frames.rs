@@ -13,6 +13,16 @@ pub(super) struct Frames {
     count: usize,
     region: Vec<u32>,
     displacement_m: Vec<DVec3>,
+    /// Positions (m) of a hybrid body's skin.
+    skin_m: Vec<DVec3>,
+}
+
+fn add(folder: &Path, index: &mut PvdIndex, count: &mut usize, frame: &VtuFrame<'_>) -> miette::Result<()> {
+    let name = format!("{}/frame-{count:06}.vtu", folder::FRAMES);
+    write_vtu(&folder.join(&name), frame)?;
+    index.add(frame.time_s.unwrap_or_default(), &name)?;
+    *count += 1;
+    Ok(())
 }
 
 impl Frames {
@@ -24,15 +34,17 @@ impl Frames {
             .wrap_err_with(|| format!("cannot create {}", folder.display()))?;
         let region = model.spec().tet_region.iter().map(|&region| u32::from(region)).collect();
         let index = PvdIndex::create(&out.join(folder::INDEX))?;
-        Ok(Self { folder: out.to_path_buf(), index, count: 0, region, displacement_m: Vec::new() })
+        Ok(Self { folder: out.to_path_buf(), index, count: 0, region, displacement_m: Vec::new(), skin_m: Vec::new() })
     }
 
     /// Writes a frame and adds it to the index, so that an interrupted run can be opened.
     pub(super) fn write(&mut self, time_s: f64, model: &Model, state: &State) -> miette::Result<()> {
+        if model.hybrid().is_some() {
+            return self.write_skin(time_s, model, state);
+        }
         let rest = model.rest_positions_m();
         self.displacement_m.clear();
         self.displacement_m.extend(state.x.iter().zip(rest).map(|(x, rest)| *x - *rest));
-        let name = format!("{}/frame-{:06}.vtu", folder::FRAMES, self.count);
         let frame = VtuFrame {
             points: &state.x,
             cells: Cells::Tets(model.mesh().tets()),
@@ -43,10 +55,23 @@ impl Frames {
             cell_data: &[Field { name: "material", values: Values::Integers(&self.region) }],
             time_s: Some(time_s),
         };
-        write_vtu(&self.folder.join(&name), &frame)?;
-        self.index.add(time_s, &name)?;
-        self.count += 1;
-        Ok(())
+        add(&self.folder, &mut self.index, &mut self.count, &frame)
+    }
+
+    /// Of a hybrid body, its skin.
+    fn write_skin(&mut self, time_s: f64, model: &Model, state: &State) -> miette::Result<()> {
+        model.surface_positions_m(state, &mut self.skin_m);
+        let rest = model.surface_rest_positions_m();
+        self.displacement_m.clear();
+        self.displacement_m.extend(self.skin_m.iter().zip(rest).map(|(x, rest)| *x - *rest));
+        let frame = VtuFrame {
+            points: &self.skin_m,
+            cells: Cells::Triangles(&model.surface().triangles),
+            point_data: &[Field { name: "displacement_m", values: Values::Vectors(&self.displacement_m) }],
+            cell_data: &[],
+            time_s: Some(time_s),
+        };
+        add(&self.folder, &mut self.index, &mut self.count, &frame)
     }
 
     /// Frames so far.

@@ -1,6 +1,8 @@
 //! A scene for an offline command: progress and warnings on standard error, and its model.
-use super::progress::Progress;
-use crate::load::from_argument;
+use crate::{
+    load::from_argument,
+    progress::{BUILDING, Progress},
+};
 use miette::Diagnostic;
 use palpate_physics::{Model, ModelError};
 use palpate_scene::Scene;
@@ -33,7 +35,10 @@ pub(super) fn load_with_warnings(name: &str) -> miette::Result<Scene> {
     Ok(scene)
 }
 
-/// Builds the model of a scene.
+/// Builds the model of a scene, with a progress bar.
 pub(super) fn build(scene: &Scene) -> miette::Result<Model> {
-    Model::build(scene.model.clone()).map_err(|cause| Refused { scene: scene.name.clone(), cause }.into())
+    let mut bar = Progress::new(&scene.name);
+    let model = Model::build_with(scene.model.clone(), &mut |part| bar.show(part, BUILDING));
+    bar.finish();
+    model.map_err(|cause| Refused { scene: scene.name.clone(), cause }.into())
 }

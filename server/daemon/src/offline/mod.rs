@@ -8,7 +8,6 @@ mod frames;
 mod interrupt;
 mod load;
 mod probes;
-mod progress;
 pub mod schema;
 pub mod simulate;
 mod summary;

@@ -6,9 +6,9 @@ use super::{
     interrupt::Interrupt,
     load,
     probes::ProbeRows,
-    progress::Progress,
     summary::{Ending, Percentiles, Summary, TimeNumbers},
 };
+use crate::progress::Progress;
 use glam::DVec3;
 use hdrhistogram::Histogram;
 use miette::IntoDiagnostic;

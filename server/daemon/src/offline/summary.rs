@@ -40,6 +40,37 @@ pub(super) struct BodyNumbers {
     pub(super) tets: usize,
     pub(super) volume_m3: f64,
     pub(super) mass_kg: f64,
+    /// Of a hybrid body.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) particles: Option<ParticleNumbers>,
+}
+
+/// The particles of a hybrid body.
+#[derive(Debug, Serialize)]
+pub(super) struct ParticleNumbers {
+    pub(super) count: usize,
+    pub(super) spacing_m: f64,
+    /// Most awake at once.
+    pub(super) most_active: usize,
+    /// Awake at the end.
+    pub(super) active: usize,
+    /// Those that never wake, because the coarse tets do not hold them.
+    pub(super) outside: usize,
+    pub(super) skin_triangles: usize,
+}
+
+impl ParticleNumbers {
+    pub(super) fn of(model: &Model, state: &State) -> Option<Self> {
+        let (hybrid, spec) = (model.hybrid()?, model.spec().particles.as_ref()?);
+        Some(Self {
+            count: hybrid.partition().particle_count(),
+            spacing_m: spec.spacing_m,
+            most_active: spec.most_active,
+            active: state.active.len(),
+            outside: hybrid.cage().outside,
+            skin_triangles: spec.skin.triangles().len(),
+        })
+    }
 }
 
 /// The cost of time integration.
@@ -139,6 +170,7 @@ impl Summary {
                 tets: scene.summary.tets,
                 volume_m3: scene.summary.volume_m3,
                 mass_kg: scene.summary.mass_kg,
+                particles: ParticleNumbers::of(model, state),
             },
             ended_by: ending.by,
             simulated_s: ending.simulated_s,
@@ -180,6 +212,15 @@ impl Summary {
         let ended =
             if self.ended_by == "equilibrium" { "in equilibrium" } else { &format!("ended by {}", self.ended_by) };
         println!("{}: {} tets, {} nodes, {ended}", self.scene, self.body.tets, self.body.nodes);
+        if let Some(particles) = &self.body.particles {
+            println!(
+                "  {} particles {:.3} mm apart, {} of at most {} awake at the end",
+                particles.count,
+                particles.spacing_m * 1e3,
+                particles.active,
+                particles.most_active
+            );
+        }
         if let Some(time) = &self.time {
             let us = time.tick_wall_us;
             println!(

@@ -21,6 +21,15 @@ pub fn startup(running: &Running, config: &ServeConfig, description: &str) -> St
         info.mass_kg * 1e3,
         info.max_natural_frequency_rad_per_s / std::f64::consts::TAU,
     );
+    if info.particle_count > 0 {
+        let _ = writeln!(
+            text,
+            "particles  {}, {:.2} mm apart, at most {} awake",
+            info.particle_count,
+            session.model.spec().particles.as_ref().map_or(0.0, |particles| particles.spacing_m) * 1e3,
+            info.most_active_particles,
+        );
+    }
     let _ = writeln!(
         text,
         "loop       {:.2} ms per tick, {}; tools: {}",

@@ -1,6 +1,6 @@
 //! The process: load, start, tell, wait for a signal, say goodbye.
 use super::{Runner, ServeConfig, ServeError, args::ServeArgs, report, start_with};
-use crate::{load, sim::thread::Loop, telemetry};
+use crate::{load, progress::Progress, sim::thread::Loop, telemetry};
 use miette::IntoDiagnostic;
 use palpate_scene::Scene;
 use sd_notify::NotifyState;
@@ -26,7 +26,10 @@ pub fn run(args: &ServeArgs) -> miette::Result<ExitCode> {
 pub fn run_with(args: &ServeArgs, runner: Runner) -> miette::Result<ExitCode> {
     telemetry::init();
     let config = args.config()?;
-    let scene = load::from_argument(&args.scene, &mut |_, _| ())?;
+    let mut bar = Progress::new(&args.scene);
+    let scene = load::from_argument(&args.scene, &mut |fraction, what| bar.show(fraction, what));
+    bar.finish();
+    let scene = scene?;
     let runtime = runtime::Builder::new_multi_thread().enable_all().build().into_diagnostic()?;
     let code = runtime.block_on(serve(config, scene, runner))?;
     // What still hangs on a socket is not waited for.

@@ -2,6 +2,7 @@
 use super::{ServeConfig, ServeError};
 use crate::{
     grpc::{self, listen},
+    progress::{BUILDING, Progress},
     session::{Daemon, Numbers, Prepared, SessionSettings, prepare},
     sim::{
         command::{Desk, desk},
@@ -96,7 +97,10 @@ pub async fn start_with(
         simulated_arm: config.simulated_arm,
         scene_folders: config.scene_folders.clone(),
     };
-    let Prepared { simulation, session, surface } = prepare(scene, &settings, &numbers, &hub)?;
+    let mut bar = Progress::new(&scene.name);
+    let prepared = prepare(scene, &settings, &numbers, &hub, &mut |part| bar.show(part, BUILDING));
+    bar.finish();
+    let Prepared { simulation, session, surface } = prepared?;
     let (desk, orders, clerk) = desk().map_err(|source| ServeError::System { what: "order desk", source })?;
     let timing = Arc::new(Timing::default());
     let sign = StopSign::default();

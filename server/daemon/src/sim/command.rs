@@ -5,7 +5,8 @@ use super::{
     inject::{InjectRefusal, Injection},
     simulation::Simulation,
 };
-use palpate_physics::{Scratch, State};
+use glam::DVec3;
+use palpate_physics::{Model, State};
 use palpate_realtime::Doorbell;
 use rtrb::{Consumer, Producer, RingBuffer};
 use std::{io, sync::Arc, time::Duration};
@@ -42,8 +43,15 @@ pub enum Request {
 pub struct Copy {
     /// The state.
     pub state: State,
-    /// Reactions only.
-    pub scratch: Scratch,
+    /// Force (N) that holds each prescribed degree of freedom; as long as the model has nodes.
+    pub reactions_n: Vec<DVec3>,
+}
+
+impl Copy {
+    /// Room for a model's.
+    pub fn of(model: &Model) -> Self {
+        Self { state: State::at_rest(model), reactions_n: vec![DVec3::ZERO; model.rest_positions_m().len()] }
+    }
 }
 
 /// How time stands after an order.

@@ -166,7 +166,7 @@ pub struct SurfaceSnapshot {
     pub time_s: f64,
     /// Wall-clock cost of the last tick (µs).
     pub tick_cost_us: f64,
-    /// Largest displacement of a surface vertex (m).
+    /// Largest displacement of a surface vertex (m); of a hybrid body, the hub works it out.
     pub max_displacement_m: f64,
     /// Why the state stands, if it is quarantined.
     pub quarantine: Option<Quarantine>,
@@ -174,8 +174,28 @@ pub struct SurfaceSnapshot {
     pub has_vertices: bool,
     /// Displacement of each surface vertex (m) from its f32 rest position.
     pub displacements_m: Vec<[f32; 3]>,
+    /// Of a hybrid body, in place of displacements.
+    pub lattice: LatticeSnapshot,
     /// Tools.
     pub tools: Vec<ToolView>,
+}
+
+/// What the skin of a hybrid body follows.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct LatticeSnapshot {
+    /// Positions (m) of coarse nodes and then of active particles.
+    pub x: Vec<DVec3>,
+    /// Active particles, ascending.
+    pub active: Vec<u32>,
+}
+
+impl LatticeSnapshot {
+    /// Filled to the most it will ever hold: copies of it then have that room, too.
+    fn full(model: &Model) -> Self {
+        let (Some(hybrid), Some(particles)) = (model.hybrid(), &model.spec().particles) else { return Self::default() };
+        let most = particles.most_active;
+        Self { x: vec![DVec3::ZERO; hybrid.node_count() + most], active: vec![0; most] }
+    }
 }
 
 /// The loop's end of the surface.
@@ -203,7 +223,12 @@ pub struct SurfaceEnd {
 pub fn surface(model: &Model) -> io::Result<(SurfacePort, SurfaceEnd)> {
     let (bell, ear) = bell()?;
     let (input, output) = triple_buffer(&SurfaceSnapshot {
-        displacements_m: vec![[0.0; 3]; model.surface().nodes.len()],
+        displacements_m: if model.hybrid().is_some() {
+            Vec::new()
+        } else {
+            vec![[0.0; 3]; model.surface().nodes.len()]
+        },
+        lattice: LatticeSnapshot::full(model),
         tools: vec![ToolView::default(); model.spec().tools.len()],
         ..Default::default()
     });

@@ -4,6 +4,7 @@ pub mod bell;
 pub mod command;
 pub mod exchange;
 pub mod inject;
+pub mod inside;
 pub mod simulation;
 pub mod thread;
 pub mod tick;

@@ -3,6 +3,7 @@ use super::{
     arm::BuiltinArm,
     exchange::{self, SurfaceEnd, SurfacePort, SurfaceSnapshot, ToolEnd},
     inject::{InjectRefusal, Injection, Injections},
+    inside::Inside,
     tool::{ArmLimits, ToolLoop},
 };
 use crate::stream::{hub::Demand, keyframe};
@@ -27,6 +28,7 @@ pub struct Simulation {
     pub(super) injections: Injections,
     pub(super) surface: SurfacePort,
     pub(super) rest_f32_m: Vec<[f32; 3]>,
+    pub(super) inside: Inside,
     pub(super) demand: Arc<Demand>,
     pub(super) ticks_to_frame: u32,
 }
@@ -90,6 +92,7 @@ impl Simulation {
             injections: Injections::default(),
             surface,
             rest_f32_m: keyframe::rest_positions_f32(&model),
+            inside: Inside::new(&model),
             demand,
             ticks_to_frame: 0,
             state,
@@ -161,6 +164,14 @@ impl Simulation {
         for (view, (tool, state)) in snapshot.tools.iter_mut().zip(self.tools.iter().zip(&self.state.tools)) {
             *view = tool.view(state);
         }
+        if self.model.hybrid().is_some() {
+            snapshot.lattice.x.clone_from(&self.state.x);
+            snapshot.lattice.active.clear();
+            snapshot.lattice.active.extend_from_slice(self.state.active.ids());
+            self.surface.slot.publish();
+            self.surface.bell.ring();
+            return;
+        }
         let nodes = &self.model.surface().nodes;
         let mut largest_sq = 0.0_f64;
         for ((displacement, node), rest) in snapshot.displacements_m.iter_mut().zip(nodes).zip(&self.rest_f32_m) {
@@ -176,9 +187,13 @@ impl Simulation {
     }
 }
 
-/// Copies a state of the same model without allocating; false, and nothing is copied, when the shapes differ.
+/// Copies a state of the same model without allocating; false, and nothing is copied, when the shapes differ. Active particles come and
+/// go: nodes must agree, and there must be room for particles.
 pub fn copy_state(from: &State, to: &mut State) -> bool {
-    let same = from.x.len() == to.x.len()
+    let nodes = |state: &State| state.x.len().checked_sub(state.active.len());
+    let room = [&to.x, &to.v, &to.force_n, &to.external_n].iter().map(|list| list.capacity()).min();
+    let same = nodes(from) == nodes(to)
+        && room.is_some_and(|room| from.x.len() <= room)
         && from.tools.len() == to.tools.len()
         && from.load_factors.len() == to.load_factors.len();
     if same {

@@ -250,7 +250,9 @@ impl Loop {
         if !copy_state(&self.simulation.state, &mut copy.state) {
             return Err(Refusal::OtherBody);
         }
-        copy.scratch.copy_reactions_from(&self.simulation.scratch);
+        for (copied, reaction_n) in copy.reactions_n.iter_mut().zip(self.simulation.scratch.reactions_n()) {
+            *copied = *reaction_n;
+        }
         Ok(())
     }
 

@@ -7,7 +7,7 @@ use super::{
     timing::Timing,
     tool::{Moment, Order},
 };
-use palpate_physics::{StepReport, TickInput, contact::is_inside, step};
+use palpate_physics::{StepReport, TickInput, step};
 use palpate_realtime::Clock;
 
 /// How often a tool that waits to be clear of the body is looked for in it; a look costs a pass over the surface.
@@ -75,12 +75,11 @@ impl Simulation {
     fn couple(&mut self, plan: Plan, now_ns: u64) {
         let quarantined = self.state.quarantine.map(|q| q.tick);
         let moment = Moment { now_ns, tick: self.state.tick, period_s: self.period_s(), quarantined };
-        let surface = &self.model.surface().triangles;
         let look = plan.advance && self.state.tick.is_multiple_of(LOOK_EVERY_TICKS);
         for (index, (tool, state)) in self.tools.iter_mut().zip(&self.state.tools).enumerate() {
             // One that touches nothing is outside the body, or deep inside it.
             let free = look && tool.waits_to_be_clear(state) && !self.state.contact.touches(index);
-            if free && !is_inside(state.target.position_m, surface, &self.state.x) {
+            if free && !self.inside.holds(&self.model, &self.state, state.target.position_m) {
                 tool.found_clear();
             }
             tool.couple(state, &moment, plan.order, plan.advance);

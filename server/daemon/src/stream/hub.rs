@@ -2,6 +2,7 @@
 use super::{
     encode::{Delta, Quantiser, Shape},
     keyframe,
+    skin::SkinReader,
 };
 use crate::sim::exchange::{SurfaceEnd, SurfaceSnapshot};
 use palpate_physics::Model;
@@ -195,6 +196,7 @@ impl Hub {
         self.change_wishes(|_| ());
         let keyframe = Arc::new(keyframe::chunks(&session_id, &scene_name, &model, epoch));
         let (low, high) = keyframe::bounds_m(&model);
+        let mut skin = SkinReader::new(&model, &keyframe::rest_positions_f32(&model));
         let mut quantiser = Quantiser::new(model.surface().nodes.len(), (high - low).length());
         let mut number = 0;
         loop {
@@ -207,7 +209,11 @@ impl Hub {
             }
             number += 1;
             let snapshot = surface.slot.output_buffer_mut();
-            let shape = snapshot.has_vertices.then(|| quantiser.advance(number, &snapshot.displacements_m));
+            if let Some(skin) = &mut skin {
+                snapshot.max_displacement_m = skin.read(&snapshot.lattice);
+            }
+            let displacements_m = skin.as_ref().map_or(&snapshot.displacements_m[..], SkinReader::displacements_m);
+            let shape = snapshot.has_vertices.then(|| quantiser.advance(number, displacements_m));
             let numbers = numbers(epoch, snapshot);
             let encoded = Mutex::new(Vec::new());
             let frame = Frame { epoch, number, keyframe: Arc::clone(&keyframe), numbers, shape, encoded };

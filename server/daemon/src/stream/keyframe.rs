@@ -9,14 +9,14 @@ pub const CHUNK_BYTES: usize = 256 * 1024;
 
 /// Rest positions of surface vertices as the viewer has them (f32, m): displacements are taken from these.
 pub fn rest_positions_f32(model: &Model) -> Vec<[f32; 3]> {
-    let rest = model.rest_positions_m();
+    let rest = model.surface_rest_positions_m();
     model.surface().nodes.iter().map(|&node| rest[node as usize].to_array().map(|c| c as f32)).collect()
 }
 
 /// Corners of the rest bounding box (m).
 pub fn bounds_m(model: &Model) -> (DVec3, DVec3) {
     let start = (DVec3::INFINITY, DVec3::NEG_INFINITY);
-    model.rest_positions_m().iter().fold(start, |(low, high), x| (low.min(*x), high.max(*x)))
+    model.surface_rest_positions_m().iter().fold(start, |(low, high), x| (low.min(*x), high.max(*x)))
 }
 
 /// All chunks of a session's keyframe, in order.

@@ -2,4 +2,5 @@
 pub mod encode;
 pub mod hub;
 pub mod keyframe;
+pub mod skin;
 pub mod viewer;

@@ -1,27 +1,33 @@
 //! `[body]`: shapes, mesh files and surface pairs become one kind of body with named parts.
 use super::{
-    Files, exactly_one,
+    Files, exactly_one, particles,
     parts::{self, Part},
 };
 use crate::{
     document::{
-        body::{BodyTable, LengthUnit, MeshTable, SurfacesTable},
+        body::{BodyTable, LengthUnit, MeshTable, ParticlesTable, SurfacesTable},
         source::{Fault, Where},
     },
     error::Stage,
     files::{self, FileError, SurfaceFile, UnusedNodes},
-    fill::{self, FillOptions, SurfaceInput},
+    fill::{self, FillError, FillOptions, SurfaceInput},
     limits::Limits,
+    probes::MaterialPoint,
     shapes::{self, Shape, ShapeError},
+    skin::FineSurface,
     wording::counted,
 };
 use glam::DVec3;
-use palpate_physics::{MeshError, Surface, TetMesh};
+use palpate_physics::{MeshError, Surface, TetMesh, contact::is_inside};
 
 /// A body before regions, materials and loads.
 pub(crate) struct Body {
     pub(crate) mesh: TetMesh,
     pub(crate) surface: Surface,
+    /// The fine surface of a body with particles: what loads and tools act on.
+    pub(crate) skin: Option<FineSurface>,
+    /// Where the shape has flat sides that a lattice should lie on: a point (m) of them.
+    pub(crate) lattice_m: Option<DVec3>,
     pub(crate) parts: Vec<Part>,
     pub(crate) origin: String,
     pub(crate) report: Vec<String>,
@@ -29,6 +35,35 @@ pub(crate) struct Body {
 }
 
 impl Body {
+    /// Triangles of the surface: of the skin, where there is one.
+    pub(crate) fn triangle_count(&self) -> usize {
+        self.skin.as_ref().map_or(self.surface.triangles.len(), |skin| skin.triangles.len())
+    }
+
+    /// Corners of the surface's triangles: nodes, or vertices of the skin.
+    pub(crate) fn triangles(&self) -> impl Iterator<Item = [u32; 3]> + '_ {
+        (0..self.triangle_count()).map(|triangle| match &self.skin {
+            None => self.surface.triangle_nodes(triangle),
+            Some(skin) => skin.triangles[triangle],
+        })
+    }
+
+    /// Positions (m) of what the surface's triangles have for corners.
+    pub(crate) fn surface_positions_m(&self) -> &[DVec3] {
+        self.skin.as_ref().map_or(self.mesh.positions_m(), |skin| &skin.positions_m)
+    }
+
+    /// The point of the body nearest to a position (m). With a skin, only its distance means something for a point inside.
+    pub(crate) fn locate(&self, point_m: DVec3) -> MaterialPoint {
+        match &self.skin {
+            None => MaterialPoint::locate(&self.mesh, &self.triangles().collect::<Vec<_>>(), point_m),
+            Some(skin) if is_inside(point_m, &skin.triangles, &skin.positions_m) => {
+                MaterialPoint { nodes: [0; 4], weights: [1.0, 0.0, 0.0, 0.0], distance_m: 0.0 }
+            }
+            Some(skin) => MaterialPoint::nearest(&skin.positions_m, skin.triangles.iter().copied(), point_m),
+        }
+    }
+
     /// Diagonal of the bounding box (m).
     pub(crate) fn diagonal_m(&self) -> f64 {
         let (low, high) = self.mesh.bounds_m();
@@ -61,13 +96,27 @@ pub(crate) fn make(table: &BodyTable, files: &Files<'_>, progress: &mut dyn FnMu
     progress(0.05, "making the body");
     let mut body = match table {
         BodyTable { mesh: Some(mesh), .. } => from_file(mesh, files, &at)?,
-        BodyTable { surfaces: Some(surfaces), .. } => from_surfaces(surfaces, files, &at, progress)?,
+        BodyTable { surfaces: Some(surfaces), particles, .. } => {
+            from_surfaces(surfaces, particles.as_ref(), files, &at, progress)?
+        }
         _ => from_shape(table, kind, files.limits, &at)?,
     };
+    if let Some(wanted) = &table.particles {
+        progress(0.75, "making the skin");
+        let skin = if let Some(skin) = body.skin.take() {
+            skin
+        } else {
+            particles::demand(wanted, &body, files.limits)?;
+            particles::skin_of(table, &body, wanted.spacing_m).map_err(|error| shape_fault(&at, error))?
+        };
+        particles::put_on(&mut body, table, skin);
+    }
     let offset = DVec3::from(table.offset_m);
     if offset != DVec3::ZERO {
         let moved = body.mesh.positions_m().iter().map(|p| *p + offset).collect();
         body.mesh = TetMesh::new(moved, body.mesh.tets().to_vec()).map_err(|error| mesh_fault(&at, error))?;
+        body.skin.iter_mut().flat_map(|skin| &mut skin.positions_m).for_each(|p| *p += offset);
+        body.lattice_m.iter_mut().for_each(|p| *p += offset);
     }
     let warning = implausible_size(table, kind, &body);
     body.warnings.extend(warning);
@@ -128,7 +177,12 @@ fn from_shape(table: &BodyTable, kind: &str, limits: &Limits, at: &Where) -> Res
         return Err(Fault::value(at.clone(), "there is no such shape"));
     };
     let shape = shape.map_err(|error| shape_fault(at, error))?;
-    of_shape(shape, kind, at)
+    let flat_m = match table {
+        BodyTable { block: Some(_), .. } => Some(DVec3::ZERO),
+        BodyTable { ventricle: Some(ventricle), .. } => Some(DVec3::Z * ventricle.cut_z_m),
+        _ => None,
+    };
+    Ok(Body { lattice_m: flat_m, ..of_shape(shape, kind, at)? })
 }
 
 fn shape_fault(at: &Where, error: ShapeError) -> Fault {
@@ -145,6 +199,8 @@ fn of_shape(shape: Shape, kind: &str, at: &Where) -> Result<Body, Fault> {
     Ok(Body {
         parts: parts::of_boundary(&shape.regions, &surface),
         surface,
+        skin: None,
+        lattice_m: None,
         origin: format!("shape {kind}"),
         report,
         warnings: Vec::new(),
@@ -159,6 +215,7 @@ fn file_fault(at: &Where, error: FileError) -> Fault {
 /// Reads both surfaces and fills the wall between them.
 fn from_surfaces(
     table: &SurfacesTable,
+    wanted: Option<&ParticlesTable>,
     files: &Files<'_>,
     at: &Where,
     progress: &mut dyn FnMut(f64, &str),
@@ -172,23 +229,27 @@ fn from_surfaces(
     let (inner, outer) = (read("inner_file", &table.inner_file)?, read("outer_file", &table.outer_file)?);
     let options = FillOptions { layers: table.layers, ..FillOptions::new(table.target_tets) };
     let mut part_of_load = |part: f64, what: &str| progress(0.1 + 0.65 * part, what);
-    let filled = fill::fill(
-        input(&inner, table.inner_unit.unwrap_or(table.unit).in_m()),
-        input(&outer, table.unit.in_m()),
-        options,
-        &mut part_of_load,
-    )
-    .map_err(|error| Fault::value(at.clone(), error.to_string()).of(Stage::Body).cause(error))?;
+    let inner_input = input(&inner, table.inner_unit.unwrap_or(table.unit).in_m());
+    let outer_input = input(&outer, table.unit.in_m());
+    let refused = |error: FillError| Fault::value(at.clone(), error.to_string()).of(Stage::Body).cause(error);
+    let filled = fill::fill(inner_input, outer_input, options, &mut part_of_load).map_err(refused)?;
     let surface = Surface::of(&filled.mesh).map_err(|error| mesh_fault(at, error))?;
     let warnings = inner.warnings.iter().chain(&outer.warnings).cloned().collect();
-    Ok(Body {
+    let mut body = Body {
         parts: parts::of_boundary(&filled.regions, &surface),
         surface,
+        skin: None,
+        lattice_m: None,
         origin: format!("wall between {} and {}", table.inner_file, table.outer_file),
         report: filled.report.to_string().lines().map(str::to_owned).collect(),
         warnings,
         mesh: filled.mesh,
-    })
+    };
+    if let Some(wanted) = wanted {
+        particles::demand(wanted, &body, files.limits)?;
+        body.skin = Some(fill::around(inner_input, outer_input, wanted.spacing_m).map_err(refused)?);
+    }
+    Ok(body)
 }
 
 fn input(file: &SurfaceFile, metres_per_unit: f64) -> SurfaceInput<'_> {
@@ -206,6 +267,8 @@ fn from_file(table: &MeshTable, files: &Files<'_>, at: &Where) -> Result<Body, F
     Ok(Body {
         parts: parts::of_groups(&grouped, &surface),
         surface,
+        skin: None,
+        lattice_m: None,
         origin: format!("file {}", table.file),
         report: Vec::new(),
         warnings: grouped.warnings.clone(),

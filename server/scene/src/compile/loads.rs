@@ -139,7 +139,7 @@ fn load(table: &LoadTable, regions: &Regions<'_>, at: &Where) -> Result<LoadSpec
         let triangles = regions.triangles(region, &on)?;
         return Ok(LoadSpec::Traction { triangles, traction_pa: DVec3::from(*traction) });
     }
-    let nodes = regions.nodes(region, &on)?;
+    let nodes = regions.loaded(region, &on)?;
     let each = match (total_force_n, force_per_node_n) {
         (Some(total), _) => DVec3::from(*total) / nodes.len() as f64,
         (None, each) => DVec3::from(each.unwrap_or_default()),

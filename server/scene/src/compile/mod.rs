@@ -4,6 +4,7 @@ mod body;
 mod csv;
 mod loads;
 mod material;
+mod particles;
 mod parts;
 mod probes;
 mod regions;
@@ -19,8 +20,10 @@ use crate::{
 };
 use body::Body;
 use glam::DVec3;
+use material::Materials;
 use palpate_physics::{
-    Integrator, ModelSpec, Precision, Settings, Skips, Substeps, mesh::quality, world::MAX_SUBSTEPS,
+    Integrator, ModelSpec, Precision, Settings, Skips, Substeps, hybrid::ParticleSpec, mesh::quality,
+    world::MAX_SUBSTEPS,
 };
 use regions::Regions;
 use std::path::{Path, PathBuf};
@@ -67,13 +70,15 @@ pub(crate) fn compile(
     let materials = material::compile(&document.material, &regions, &body)?;
     let constraints = loads::constraints(document, &regions, files)?;
     let loads = loads::loads(document, &regions, files)?;
+    let particles = particles::spec(document, &body, &constraints, files)?;
     progress(0.9, "placing tools and probes");
     let tools = tools::compile(document, &body, files)?;
     let mut warnings = body.warnings.clone();
-    warnings.extend(materials.warnings);
+    warnings.extend(materials.warnings.iter().cloned());
     warnings.extend(tools.warnings);
+    particles::warn_of_fine_tets(&body, &mut warnings);
     let probes = probes::compile(&document.probe, &regions, &body, &tools.specs, &constraints, &mut warnings)?;
-    let summary = summary(&body, &regions, &materials.tet_region, &materials.regions);
+    let summary = summary(&body, &regions, &materials, particles.as_ref());
     warn_of_shape(&summary, &mut warnings);
     warnings.extend(nothing_held(document));
     progress(1.0, "done");
@@ -82,7 +87,7 @@ pub(crate) fn compile(
         description: document.scene.description.trim().to_owned(),
         model: ModelSpec {
             mesh: body.mesh,
-            particles: None,
+            particles,
             regions: materials.regions,
             tet_region: materials.tet_region,
             prescribed: constraints.specs,
@@ -221,21 +226,20 @@ fn unique_names<'n>(table: &str, names: impl Iterator<Item = &'n str>) -> Result
     Ok(())
 }
 
-fn summary(
-    body: &Body,
-    regions: &Regions<'_>,
-    tet_region: &[u16],
-    materials: &[palpate_physics::Region],
-) -> BodySummary {
+fn summary(body: &Body, regions: &Regions<'_>, materials: &Materials, particles: Option<&ParticleSpec>) -> BodySummary {
     let mesh = &body.mesh;
-    let mass_of = |(tet, region): (usize, &u16)| mesh.volume_m3(tet) * materials[*region as usize].density_kg_per_m3;
+    let mass_of =
+        |(tet, region): (usize, &u16)| mesh.volume_m3(tet) * materials.regions[*region as usize].density_kg_per_m3;
+    let mass_kg: f64 = materials.tet_region.iter().enumerate().map(mass_of).sum();
+    // Coarse tets need not have the volume of the body that its skin encloses.
+    let volume_m3 = particles.map_or(mesh.total_volume_m3(), |particles| particles.skin.volume_m3());
     BodySummary {
         origin: body.origin.clone(),
         nodes: mesh.positions_m().len(),
         tets: mesh.tets().len(),
-        surface_triangles: body.surface.triangles.len(),
-        volume_m3: mesh.total_volume_m3(),
-        mass_kg: tet_region.iter().enumerate().map(mass_of).sum(),
+        surface_triangles: body.triangle_count(),
+        volume_m3,
+        mass_kg: mass_kg * volume_m3 / mesh.total_volume_m3(),
         quality: quality::measure(mesh),
         fill_report: body.report.clone(),
         parts: regions

@@ -2,6 +2,7 @@
 use crate::{
     files::{Group, GroupedMesh, Members},
     shapes::BoundaryRegion,
+    skin::FineSurface,
 };
 use palpate_physics::{Surface, TetMesh, mesh::tet::FACES};
 use std::collections::{BTreeSet, HashMap};
@@ -18,9 +19,20 @@ pub(crate) struct Part {
     /// The physical group it is, if it is one.
     pub(crate) group: Option<Group>,
     pub(crate) nodes: Vec<u32>,
-    /// Triangles of the surface.
+    /// Vertices of the skin; none of a body of tets.
+    pub(crate) vertices: Vec<u32>,
+    /// Triangles of the surface: of the skin, where there is one.
     pub(crate) triangles: Vec<u32>,
     pub(crate) tets: Vec<u32>,
+}
+
+impl Part {
+    /// Goes over to a skin: of its triangles, those that came from what is wanted.
+    pub(crate) fn go_over_to(&mut self, skin: &FineSurface, wanted: impl Fn(u32) -> bool) {
+        self.triangles = skin.triangles_from(wanted);
+        let corners = self.triangles.iter().flat_map(|&triangle| skin.triangles[triangle as usize]);
+        self.vertices = corners.collect::<BTreeSet<u32>>().into_iter().collect();
+    }
 }
 
 /// Surface triangles by their nodes.
@@ -52,6 +64,7 @@ pub(crate) fn of_boundary(regions: &[BoundaryRegion], surface: &Surface) -> Vec<
         name: region.name.to_owned(),
         group: None,
         nodes: region.nodes(),
+        vertices: Vec::new(),
         triangles: boundary.among(region.triangles.iter().copied()).collect(),
         tets: Vec::new(),
     };
@@ -69,6 +82,7 @@ pub(crate) fn of_groups(grouped: &GroupedMesh, surface: &Surface) -> Vec<Part> {
             name,
             group: Some(group.clone()),
             nodes: members.nodes,
+            vertices: Vec::new(),
             triangles: triangles.into_iter().collect(),
             tets: members.tets,
         }

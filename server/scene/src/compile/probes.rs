@@ -1,12 +1,12 @@
 //! `[[probe]]`: measurements with their points, regions and tools found.
-use super::{body::Body, loads::Constraints, regions::Regions, unique_names};
+use super::{body::Body, loads::Constraints, particles, regions::Regions, unique_names};
 use crate::{
     document::{
         source::{Fault, Where},
         tool::{ProbeKind, ProbeTable},
         words::did_you_mean,
     },
-    probes::{MaterialPoint, Measure, Probe},
+    probes::{Measure, Probe},
 };
 use glam::DVec3;
 use palpate_physics::contact::ToolSpec;
@@ -27,8 +27,7 @@ pub(crate) fn compile(
         demand_own_key(table, &at)?;
         let measure = match table.measure {
             ProbeKind::Displacement => {
-                let point = DVec3::from(table.point_m.unwrap_or_default());
-                Measure::Displacement(material_point(&table.name, point, body, warnings))
+                displacement(&table.name, DVec3::from(table.point_m.unwrap_or_default()), body, warnings)
             }
             ProbeKind::Reaction => {
                 let nodes = regions.nodes(table.region.as_deref().unwrap_or_default(), &at.key("region"))?;
@@ -36,7 +35,10 @@ pub(crate) fn compile(
                     let message = "no node of this region is fixed or prescribed: it has no reaction";
                     return Err(Fault::value(at.key("region"), message));
                 }
-                Measure::Reaction(nodes)
+                Measure::Reaction(match &body.skin {
+                    Some(_) => particles::with_middles(&body.mesh, nodes),
+                    None => nodes,
+                })
             }
             ProbeKind::Energy => Measure::Energy,
             ProbeKind::MinVolumeRatio => Measure::MinVolumeRatio,
@@ -77,18 +79,21 @@ fn demand_own_key(table: &ProbeTable, at: &Where) -> Result<(), Fault> {
     Ok(())
 }
 
-fn material_point(name: &str, point_m: DVec3, body: &Body, warnings: &mut Vec<String>) -> MaterialPoint {
+/// Of the material point there, or the nearest of the surface.
+fn displacement(name: &str, point_m: DVec3, body: &Body, warnings: &mut Vec<String>) -> Measure {
     const OUTSIDE: f64 = 1e-2;
-    let faces: Vec<[u32; 3]> =
-        (0..body.surface.triangles.len()).map(|triangle| body.surface.triangle_nodes(triangle)).collect();
-    let point = MaterialPoint::locate(&body.mesh, &faces, point_m);
+    let point = body.locate(point_m);
     if point.distance_m > OUTSIDE * body.diagonal_m() {
         warnings.push(format!(
             "the probe \"{name}\" lies {:.3} mm outside the body; it measures the nearest point of the surface",
             point.distance_m * 1e3
         ));
     }
-    point
+    match &body.skin {
+        None => Measure::Displacement(point),
+        Some(_) if point.distance_m == 0.0 => Measure::LatticeDisplacement(point_m),
+        Some(skin) => Measure::LatticeDisplacement(point.of(&skin.positions_m)),
+    }
 }
 
 fn tool(table: &ProbeTable, tools: &[ToolSpec], at: &Where) -> Result<usize, Fault> {

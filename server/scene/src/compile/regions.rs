@@ -14,10 +14,12 @@ use crate::{
 };
 use glam::DVec3;
 
-/// Chosen nodes, surface triangles and tets.
+/// Chosen nodes, vertices of the skin, surface triangles and tets.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Selection {
     nodes: Vec<bool>,
+    /// None of a body of tets, whose surface has nodes.
+    vertices: Vec<bool>,
     triangles: Vec<bool>,
     tets: Vec<bool>,
 }
@@ -26,15 +28,19 @@ impl Selection {
     fn all(body: &Body, value: bool) -> Self {
         Self {
             nodes: vec![value; body.mesh.positions_m().len()],
-            triangles: vec![value; body.surface.triangles.len()],
+            vertices: vec![value; body.skin.as_ref().map_or(0, |skin| skin.positions_m.len())],
+            triangles: vec![value; body.triangle_count()],
             tets: vec![value; body.mesh.tets().len()],
         }
     }
 
     fn combine(mut self, other: &Self, rule: impl Fn(bool, bool) -> bool) -> Self {
-        for (mine, theirs) in
-            [(&mut self.nodes, &other.nodes), (&mut self.triangles, &other.triangles), (&mut self.tets, &other.tets)]
-        {
+        for (mine, theirs) in [
+            (&mut self.nodes, &other.nodes),
+            (&mut self.vertices, &other.vertices),
+            (&mut self.triangles, &other.triangles),
+            (&mut self.tets, &other.tets),
+        ] {
             mine.iter_mut().zip(theirs).for_each(|(a, b)| *a = rule(*a, *b));
         }
         self
@@ -42,6 +48,10 @@ impl Selection {
 
     fn counts(&self) -> [usize; 3] {
         [&self.nodes, &self.triangles, &self.tets].map(|flags| flags.iter().filter(|&&flag| flag).count())
+    }
+
+    fn is_empty(&self) -> bool {
+        self.counts() == [0; 3] && !self.vertices.contains(&true)
     }
 }
 
@@ -69,7 +79,7 @@ impl<'b> Regions<'b> {
                 return Err(Fault::value(at.key("name"), message).help("give your region another name"));
             }
             let selection = regions.select(&table.select, &at.key("select"))?;
-            if selection.counts() == [0; 3] {
+            if selection.is_empty() {
                 let message =
                     format!("the region \"{}\" selects nothing: no node, surface triangle or tet", table.name);
                 return Err(Fault::value(at.key("select"), message).help(body.extent()));
@@ -92,6 +102,15 @@ impl<'b> Regions<'b> {
     pub(crate) fn nodes(&self, name: &str, at: &Where) -> Result<Vec<u32>, Fault> {
         let selection = self.named(name, at)?;
         self.some(name, at, "nodes", &selection.nodes, &selection)
+    }
+
+    /// What forces on a region's nodes act at: vertices of the skin, where there is one; none is an error.
+    pub(crate) fn loaded(&self, name: &str, at: &Where) -> Result<Vec<u32>, Fault> {
+        if self.body.skin.is_none() {
+            return self.nodes(name, at);
+        }
+        let selection = self.named(name, at)?;
+        self.some(name, at, "vertices of the skin", &selection.vertices, &selection)
     }
 
     /// Surface triangles of a region; none is an error.
@@ -194,13 +213,10 @@ impl<'b> Regions<'b> {
         Ok(())
     }
 
-    fn triangle_nodes(&self) -> impl Iterator<Item = [u32; 3]> + '_ {
-        (0..self.body.surface.triangles.len()).map(|triangle| self.body.surface.triangle_nodes(triangle))
-    }
-
-    /// The boundary: nodes and triangles, no tets.
+    /// The boundary: nodes, vertices and triangles, no tets.
     fn surface(&self) -> Selection {
         let mut selection = Selection::all(self.body, false);
+        selection.vertices.fill(true);
         selection.triangles.fill(true);
         for &node in &self.body.surface.nodes {
             selection.nodes[node as usize] = true;
@@ -212,6 +228,7 @@ impl<'b> Regions<'b> {
         let mut selection = Selection::all(self.body, false);
         for (flags, chosen) in [
             (&mut selection.nodes, &part.nodes),
+            (&mut selection.vertices, &part.vertices),
             (&mut selection.triangles, &part.triangles),
             (&mut selection.tets, &part.tets),
         ] {
@@ -242,16 +259,19 @@ impl<'b> Regions<'b> {
         }
     }
 
-    /// Nodes by position, surface triangles and tets by their centroid: every one of them is either in a set of points
+    /// Nodes and vertices by position, surface triangles and tets by their centroid: every one of them is either in a set of points
     /// or in its complement, and in the union of sets that together cover it.
     fn where_point(&self, inside: impl Fn(DVec3) -> bool) -> Selection {
         let positions = self.body.mesh.positions_m();
         let nodes = positions.iter().map(|&p| inside(p)).collect();
-        let middle = |corners: [u32; 3]| corners.iter().map(|&node| positions[node as usize]).sum::<DVec3>() / 3.0;
-        let triangles = self.triangle_nodes().map(|corners| inside(middle(corners))).collect();
+        let skin = self.body.skin.as_ref().map_or(&[][..], |skin| &skin.positions_m);
+        let vertices = skin.iter().map(|&p| inside(p)).collect();
+        let corners_m = self.body.surface_positions_m();
+        let middle = |corners: [u32; 3]| corners.iter().map(|&corner| corners_m[corner as usize]).sum::<DVec3>() / 3.0;
+        let triangles = self.body.triangles().map(|corners| inside(middle(corners))).collect();
         let centroid = |tet| self.body.mesh.corners_m(tet).iter().sum::<DVec3>() / 4.0;
         let tets = (0..self.body.mesh.tets().len()).map(|tet| inside(centroid(tet))).collect();
-        Selection { nodes, triangles, tets }
+        Selection { nodes, vertices, triangles, tets }
     }
 
     /// Signed distance (m) from a plane, and its tolerance (m).
@@ -269,9 +289,10 @@ impl<'b> Regions<'b> {
         let (side, tolerance) = self.side(plane, at)?;
         let mut selection = self.where_point(|p| side(p).abs() <= tolerance);
         // A triangle lies in a plane with all its corners: one that crosses it may have its centroid there.
-        let Selection { nodes, triangles, .. } = &mut selection;
-        for (chosen, corners) in triangles.iter_mut().zip(self.triangle_nodes()) {
-            *chosen = corners.iter().all(|&node| nodes[node as usize]);
+        let Selection { nodes, vertices, triangles, .. } = &mut selection;
+        let corners_chosen = if self.body.skin.is_some() { vertices } else { nodes };
+        for (chosen, corners) in triangles.iter_mut().zip(self.body.triangles()) {
+            *chosen = corners.iter().all(|&corner| corners_chosen[corner as usize]);
         }
         Ok(selection)
     }
@@ -284,10 +305,16 @@ impl<'b> Regions<'b> {
         let all: Vec<u32> = (0..mesh.positions_m().len() as u32).collect();
         let nodes = if nearest.on_surface { &self.body.surface.nodes } else { &all };
         mark(&mut selection.nodes, nodes, nearest.count, distance);
-        let faces: Vec<[u32; 3]> = self.triangle_nodes().collect();
+        if let Some(skin) = &self.body.skin {
+            let vertices: Vec<u32> = (0..skin.positions_m.len() as u32).collect();
+            mark(&mut selection.vertices, &vertices, nearest.count, |&vertex| {
+                skin.positions_m[vertex as usize].distance(point)
+            });
+        }
+        let faces: Vec<[u32; 3]> = self.body.triangles().collect();
         let triangles: Vec<u32> = (0..faces.len() as u32).collect();
         mark(&mut selection.triangles, &triangles, nearest.count, |&triangle| {
-            MaterialPoint::on_triangle(mesh, faces[triangle as usize], point).distance_m
+            MaterialPoint::on_triangle(self.body.surface_positions_m(), faces[triangle as usize], point).distance_m
         });
         let tets: Vec<u32> = (0..mesh.tets().len() as u32).collect();
         mark(&mut selection.tets, &tets, nearest.count, |&tet| {

@@ -10,7 +10,6 @@ use crate::{
     },
     drivers::{Driver, ScriptedHand},
     path::{Interpolation, MotionPath},
-    probes::MaterialPoint,
 };
 use glam::DVec3;
 use palpate_physics::contact::{Coupling, ToolSpec};
@@ -58,9 +57,7 @@ pub(crate) fn compile(document: &Document, body: &Body, files: &Files<'_>) -> Re
 
 impl Tools {
     fn warn_of_start(&mut self, tool: &ToolSpec, body: &Body) {
-        let faces: Vec<[u32; 3]> =
-            (0..body.surface.triangles.len()).map(|triangle| body.surface.triangle_nodes(triangle)).collect();
-        let distance_m = MaterialPoint::locate(&body.mesh, &faces, tool.start_position_m).distance_m;
+        let distance_m = body.locate(tool.start_position_m).distance_m;
         if distance_m < tool.radius_m {
             self.warnings.push(format!(
                 "the tool \"{}\" starts inside the body or touching it (gap {:.3} mm): the first tick pushes hard",

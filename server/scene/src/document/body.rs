@@ -19,9 +19,29 @@ pub(crate) struct BodyTable {
     pub(crate) mesh: Option<MeshTable>,
     /// The volume between two surface files. Parts: inner, outer, base.
     pub(crate) surfaces: Option<SurfacesTable>,
+    /// Particles on a lattice within it, of which those near tools are awake: it becomes a hybrid body.
+    pub(crate) particles: Option<ParticlesTable>,
     /// Moves the body (m, world); zero by default.
     #[serde(default)]
     pub(crate) offset_m: [f64; 3],
+}
+
+/// The particles of a hybrid body, whose tets are then the coarse level.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct ParticlesTable {
+    /// Spacing of the lattice (m), larger than 0. The skin is made as fine.
+    pub(crate) spacing_m: f64,
+    /// Most particles awake at once, 1 to 20000.
+    #[serde(default = "default_most_active")]
+    pub(crate) most_active: u32,
+    /// Particles within this distance (m, at rest) of where a tool touches the skin are awake; by default the radius of the half ball
+    /// that holds `most_active` of them.
+    pub(crate) reach_m: Option<f64>,
+}
+
+fn default_most_active() -> u32 {
+    600
 }
 
 /// A box from the origin, six tets per cell.

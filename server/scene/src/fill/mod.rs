@@ -14,12 +14,14 @@ mod remesh;
 mod repair;
 mod report;
 mod settle;
+mod skin;
 pub(crate) mod trimesh;
 mod wall;
 
 pub use error::FillError;
 pub use repair::Repairs;
 pub use report::{FillReport, SurfaceReport};
+pub(crate) use skin::around;
 
 use crate::shapes::BoundaryRegion;
 use glam::DVec3;

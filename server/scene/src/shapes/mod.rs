@@ -9,7 +9,7 @@ mod shell;
 
 pub use block::box_mesh;
 pub use shell::{ellipsoid_shell, sphere_shell, ventricle};
-pub(crate) use shell::{graded, layers_for};
+pub(crate) use shell::{ellipsoid_shell_skin, graded, layers_for, sphere_shell_skin, ventricle_skin};
 
 use palpate_physics::{MeshError, TetMesh};
 use std::collections::BTreeSet;

@@ -97,6 +97,11 @@ impl Cap {
         sizes
     }
 
+    /// Ring sizes for edges of about this length (m).
+    pub(super) fn rings_of(&self, edge_m: f64) -> Vec<u32> {
+        self.ring_sizes(edge_m, &self.meridian(), self.equator()[SAMPLES])
+    }
+
     /// Ring sizes whose triangulation has as nearly as possible the wanted number of triangles.
     pub(super) fn rings(&self, wanted_triangles: f64) -> Vec<u32> {
         let meridian = self.meridian();

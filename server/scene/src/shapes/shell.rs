@@ -17,7 +17,7 @@ const MOST_LAYERS: u32 = 64;
 const LARGEST_CUT: f64 = 0.95;
 
 /// An ellipsoid's part below a latitude, on which a point is named by direction as seen on the middle surface.
-struct Wall {
+pub(super) struct Wall {
     shape: &'static str,
     inner_m: DVec3,
     outer_m: DVec3,
@@ -30,11 +30,7 @@ struct Wall {
 /// # Errors
 /// Radii that are not 0 < inner < outer, or a count no shell has.
 pub fn sphere_shell(inner_m: f64, outer_m: f64, target_tets: u32) -> Result<Shape, ShapeError> {
-    check("inner_m", inner_m, inner_m > 0.0, "must be finite and larger than 0")?;
-    check("outer_m", outer_m, outer_m > inner_m, format!("must be larger than the inner radius {inner_m}"))?;
-    let wall =
-        Wall { shape: "sphere shell", inner_m: DVec3::splat(inner_m), outer_m: DVec3::splat(outer_m), cut_z_m: None };
-    wall.mesh(target_tets)
+    Wall::between_spheres(inner_m, outer_m)?.mesh(target_tets)
 }
 
 /// A closed shell between two ellipsoids about the origin with semi-axes in metres. `target_tets` is met within 10 %.
@@ -43,15 +39,7 @@ pub fn sphere_shell(inner_m: f64, outer_m: f64, target_tets: u32) -> Result<Shap
 /// # Errors
 /// Axes that are not 0 < inner < outer, or a count no shell has.
 pub fn ellipsoid_shell(inner_axes_m: DVec3, outer_axes_m: DVec3, target_tets: u32) -> Result<Shape, ShapeError> {
-    const INNER: [&str; 3] = ["inner_axes_m.x", "inner_axes_m.y", "inner_axes_m.z"];
-    const OUTER: [&str; 3] = ["outer_axes_m.x", "outer_axes_m.y", "outer_axes_m.z"];
-    for axis in 0..3 {
-        let (inner, outer) = (inner_axes_m[axis], outer_axes_m[axis]);
-        check(INNER[axis], inner, inner > 0.0, "must be finite and larger than 0")?;
-        check(OUTER[axis], outer, outer > inner, format!("must be larger than the inner one, {inner}"))?;
-    }
-    let wall = Wall { shape: "ellipsoid shell", inner_m: inner_axes_m, outer_m: outer_axes_m, cut_z_m: None };
-    wall.mesh(target_tets)
+    Wall::between_ellipsoids(inner_axes_m, outer_axes_m)?.mesh(target_tets)
 }
 
 /// The truncated-ellipsoid ventricle: a shell between two ellipsoids of revolution with semi-axes (short, long) in
@@ -66,16 +54,7 @@ pub fn ventricle(
     cut_z_m: f64,
     target_tets: u32,
 ) -> Result<Shape, ShapeError> {
-    check("inner_m.short", inner_m.0, inner_m.0 > 0.0, "must be finite and larger than 0")?;
-    check("inner_m.long", inner_m.1, inner_m.1 > 0.0, "must be finite and larger than 0")?;
-    check("outer_m.short", outer_m.0, outer_m.0 > inner_m.0, format!("must be larger than the inner {}", inner_m.0))?;
-    check("outer_m.long", outer_m.1, outer_m.1 > inner_m.1, format!("must be larger than the inner {}", inner_m.1))?;
-    let limit = LARGEST_CUT * inner_m.1;
-    check("cut_z_m", cut_z_m, cut_z_m.abs() <= limit, format!("must lie between {} and {limit}", -limit))?;
-    let revolve = |(short, long): (f64, f64)| DVec3::new(short, short, long);
-    let wall =
-        Wall { shape: "ventricle", inner_m: revolve(inner_m), outer_m: revolve(outer_m), cut_z_m: Some(cut_z_m) };
-    wall.mesh(target_tets)
+    Wall::of_ventricle(outer_m, inner_m, cut_z_m)?.mesh(target_tets)
 }
 
 /// A closed ellipsoid about the origin with these semi-axes (m), of about so many triangles: vertices (m) and triangles,
@@ -87,6 +66,45 @@ pub(super) fn ellipsoid_surface(axes_m: DVec3, target_triangles: u32) -> (Vec<DV
 }
 
 impl Wall {
+    pub(super) fn between_spheres(inner_m: f64, outer_m: f64) -> Result<Self, ShapeError> {
+        check("inner_m", inner_m, inner_m > 0.0, "must be finite and larger than 0")?;
+        check("outer_m", outer_m, outer_m > inner_m, format!("must be larger than the inner radius {inner_m}"))?;
+        let [inner_m, outer_m] = [inner_m, outer_m].map(DVec3::splat);
+        Ok(Self { shape: "sphere shell", inner_m, outer_m, cut_z_m: None })
+    }
+
+    pub(super) fn between_ellipsoids(inner_m: DVec3, outer_m: DVec3) -> Result<Self, ShapeError> {
+        const INNER: [&str; 3] = ["inner_axes_m.x", "inner_axes_m.y", "inner_axes_m.z"];
+        const OUTER: [&str; 3] = ["outer_axes_m.x", "outer_axes_m.y", "outer_axes_m.z"];
+        for axis in 0..3 {
+            let (inner, outer) = (inner_m[axis], outer_m[axis]);
+            check(INNER[axis], inner, inner > 0.0, "must be finite and larger than 0")?;
+            check(OUTER[axis], outer, outer > inner, format!("must be larger than the inner one, {inner}"))?;
+        }
+        Ok(Self { shape: "ellipsoid shell", inner_m, outer_m, cut_z_m: None })
+    }
+
+    pub(super) fn of_ventricle(outer_m: (f64, f64), inner_m: (f64, f64), cut_z_m: f64) -> Result<Self, ShapeError> {
+        check("inner_m.short", inner_m.0, inner_m.0 > 0.0, "must be finite and larger than 0")?;
+        check("inner_m.long", inner_m.1, inner_m.1 > 0.0, "must be finite and larger than 0")?;
+        check(
+            "outer_m.short",
+            outer_m.0,
+            outer_m.0 > inner_m.0,
+            format!("must be larger than the inner {}", inner_m.0),
+        )?;
+        check(
+            "outer_m.long",
+            outer_m.1,
+            outer_m.1 > inner_m.1,
+            format!("must be larger than the inner {}", inner_m.1),
+        )?;
+        let limit = LARGEST_CUT * inner_m.1;
+        check("cut_z_m", cut_z_m, cut_z_m.abs() <= limit, format!("must lie between {} and {limit}", -limit))?;
+        let revolve = |(short, long): (f64, f64)| DVec3::new(short, short, long);
+        Ok(Self { shape: "ventricle", inner_m: revolve(inner_m), outer_m: revolve(outer_m), cut_z_m: Some(cut_z_m) })
+    }
+
     fn top_latitude(&self, axes_m: DVec3) -> f64 {
         self.cut_z_m.map_or(FRAC_PI_2, |z| (z / axes_m.z).asin())
     }
@@ -176,5 +194,8 @@ pub(crate) fn graded(growth: f64, fraction: f64) -> f64 {
     }
 }
 
+mod skin;
 #[cfg(test)]
 mod tests;
+
+pub(crate) use skin::{ellipsoid_shell_skin, sphere_shell_skin, ventricle_skin};

@@ -10,9 +10,11 @@ const PATIENCE: Duration = Duration::from_secs(2);
 /// A file gets its first line after this time, and one every so often; see [`next_line`].
 const LINE_EVERY: Duration = Duration::from_secs(10);
 const RESOLUTION: u64 = 1000;
+/// What a model's own progress is about.
+pub(crate) const BUILDING: &str = "laying particles";
 
 /// Shows nothing of what is over in two seconds.
-pub(super) struct Progress {
+pub(crate) struct Progress {
     started: Instant,
     title: String,
     bar: Option<ProgressBar>,
@@ -21,18 +23,18 @@ pub(super) struct Progress {
 }
 
 impl Progress {
-    pub(super) fn new(title: &str) -> Self {
+    pub(crate) fn new(title: &str) -> Self {
         let on_terminal = std::io::stderr().is_terminal();
         Self { started: Instant::now(), title: title.to_owned(), bar: None, on_terminal, next_line: LINE_EVERY }
     }
 
     /// Shows a fraction in [0, 1] and what is being done.
-    pub(super) fn show(&mut self, fraction: f64, what: &str) {
+    pub(crate) fn show(&mut self, fraction: f64, what: &str) {
         self.tell(Some(fraction.clamp(0.0, 1.0)), what);
     }
 
     /// Shows what is being done where nobody knows how much of it is left.
-    pub(super) fn show_work(&mut self, what: &str) {
+    pub(crate) fn show_work(&mut self, what: &str) {
         self.tell(None, what);
     }
 
@@ -49,7 +51,7 @@ impl Progress {
         }
     }
 
-    pub(super) fn finish(&mut self) {
+    pub(crate) fn finish(&mut self) {
         if let Some(bar) = self.bar.take() {
             bar.finish_and_clear();
         }

@@ -1,0 +1,92 @@
+//! The skin of a hybrid body for viewers. The loop hands over coarse nodes and active particles only; where each of the skin's many vertices
+//! is, is worked out here, beside the loop.
+use crate::sim::exchange::LatticeSnapshot;
+use glam::DVec3;
+use palpate_physics::{
+    Model,
+    hybrid::{composite::Anchor, place::Place},
+};
+use std::collections::BTreeMap;
+
+/// Displacements of the skin's vertices, frame by frame.
+#[derive(Debug)]
+pub struct SkinReader {
+    /// Particles that carry vertices, ascending.
+    particles: Vec<Carrier>,
+    vertices: Vec<Vertex>,
+    /// Displacement (m) of every carrier.
+    carried_m: Vec<DVec3>,
+    /// Displacement (m) of every vertex from its f32 rest position.
+    displacements_m: Vec<[f32; 3]>,
+}
+
+#[derive(Debug)]
+struct Carrier {
+    particle: u32,
+    rest_m: DVec3,
+    anchor: Anchor,
+}
+
+#[derive(Debug)]
+struct Vertex {
+    /// Indices in `particles`.
+    carriers: [u32; 8],
+    weights: [f64; 8],
+    /// Rest position less the one that viewers have (m).
+    rounding_m: DVec3,
+}
+
+impl SkinReader {
+    /// `None` of a body of tets. `rest_f32_m` is what viewers have.
+    pub fn new(model: &Model, rest_f32_m: &[[f32; 3]]) -> Option<Self> {
+        let hybrid = model.hybrid()?;
+        let partition = hybrid.partition();
+        let rest = model.surface_rest_positions_m();
+        let places: Vec<Place> = (0..rest.len() as u32).map(|vertex| hybrid.place(vertex).place(partition)).collect();
+        let mut number: BTreeMap<u32, u32> =
+            places.iter().flat_map(|place| place.particles).map(|particle| (particle, 0)).collect();
+        number.values_mut().zip(0..).for_each(|(slot, index)| *slot = index);
+        let carrier = |&particle: &u32| Carrier {
+            particle,
+            rest_m: partition.particle_m(particle),
+            anchor: partition.anchor(particle),
+        };
+        let vertex = |((place, rest), rest_f32): ((&Place, &DVec3), &[f32; 3])| Vertex {
+            carriers: place.particles.map(|particle| number[&particle]),
+            weights: place.weights,
+            rounding_m: *rest - DVec3::from(rest_f32.map(f64::from)),
+        };
+        Some(Self {
+            vertices: places.iter().zip(rest).zip(rest_f32_m).map(vertex).collect(),
+            carried_m: vec![DVec3::ZERO; number.len()],
+            displacements_m: vec![[0.0; 3]; places.len()],
+            particles: number.keys().map(carrier).collect(),
+        })
+    }
+
+    /// Works out a frame; returns the largest displacement (m).
+    pub fn read(&mut self, lattice: &LatticeSnapshot) -> f64 {
+        // Active particles follow the coarse nodes.
+        let (nodes, active) = lattice.x.split_at(lattice.x.len() - lattice.active.len());
+        for (carried_m, Carrier { particle, rest_m, anchor }) in self.carried_m.iter_mut().zip(&self.particles) {
+            let x = match lattice.active.binary_search(particle) {
+                Ok(number) => active[number],
+                Err(_) => anchor.of(nodes),
+            };
+            *carried_m = x - *rest_m;
+        }
+        let mut largest_sq = 0.0_f64;
+        for (displacement_m, vertex) in self.displacements_m.iter_mut().zip(&self.vertices) {
+            let carried = vertex.carriers.iter().map(|&carrier| self.carried_m[carrier as usize]);
+            let moved = carried.zip(vertex.weights).map(|(u, weight)| u * weight).sum::<DVec3>() + vertex.rounding_m;
+            largest_sq = largest_sq.max(moved.length_squared());
+            *displacement_m = moved.to_array().map(|component| component as f32);
+        }
+        largest_sq.sqrt()
+    }
+
+    /// Displacements (m) from the f32 rest positions, after [`Self::read`].
+    pub fn displacements_m(&self) -> &[[f32; 3]] {
+        &self.displacements_m
+    }
+}

@@ -1,0 +1,194 @@
+//! `[body.particles]`: the skin and the lattice of a hybrid body.
+use super::{Files, body::Body, check, loads::Constraints};
+use crate::{
+    document::{
+        Document, IntegratorName,
+        body::{BodyTable, ParticlesTable},
+        source::{Fault, Where},
+    },
+    error::Stage,
+    limits::Limits,
+    shapes::{self, ShapeError},
+    skin::{FineSurface, refine},
+};
+use glam::DVec3;
+use palpate_physics::{
+    TetMesh,
+    hybrid::{ParticleSpec, Skin, Waking, composite::Composite, spec::MOST_ACTIVE},
+    mesh::tet::EDGES,
+};
+use std::{collections::BTreeSet, f64::consts::PI};
+
+/// Cells of the lattice's box for each tet that is allowed: a body fills little of the box around it.
+const CELLS_PER_TET: f64 = 50.0;
+/// Held nodes lie in a plane when they are no further from it than this part of the body's size.
+const FLAT: f64 = 1e-9;
+
+fn at() -> Where {
+    Where::root("body").key("particles")
+}
+
+/// Refuses numbers out of range, and a lattice too fine or too coarse for the body, before it is laid.
+pub(super) fn demand(table: &ParticlesTable, body: &Body, limits: &Limits) -> Result<(), Fault> {
+    let (key, spacing_m) = (at().key("spacing_m"), table.spacing_m);
+    check(&key, spacing_m, spacing_m > 0.0, "must be larger than 0")?;
+    let most_ok = (1..=MOST_ACTIVE).contains(&(table.most_active as usize));
+    check(&at().key("most_active"), table.most_active, most_ok, "must be 1 to 20000")?;
+    if let Some(reach_m) = table.reach_m {
+        check(&at().key("reach_m"), reach_m, reach_m > 0.0, "must be larger than 0")?;
+    }
+    let (low, high) = body.mesh.bounds_m();
+    let smallest_m = (high - low).min_element();
+    if spacing_m > smallest_m {
+        let message = format!(
+            "{key} = {spacing_m}: the lattice is coarser than the body, whose smallest extent is {smallest_m:.3e} m"
+        );
+        return Err(Fault::value(key, message).help("take a spacing with several particles through the thinnest part"));
+    }
+    let boundary_m2: f64 = body.triangles().map(|corners| area_m2(corners, body.mesh.positions_m())).sum();
+    let most = f64::from(limits.tets);
+    let counts = [
+        (body.mesh.total_volume_m3() / spacing_m.powi(3), "particles", most),
+        (((high - low) / spacing_m).ceil().element_product(), "cells in the box around the body", CELLS_PER_TET * most),
+        (boundary_m2 / (0.25 * spacing_m * spacing_m), "triangles of the skin", most),
+    ];
+    for (count, what, most) in counts {
+        if count > most {
+            let message =
+                format!("{key} = {spacing_m} gives about {count:.1e} {what}; at most {most:.0e} are allowed here");
+            return Err(Fault::value(key, message).help("take a larger spacing"));
+        }
+    }
+    Ok(())
+}
+
+fn area_m2(corners: [u32; 3], positions_m: &[DVec3]) -> f64 {
+    let [a, b, c] = corners.map(|node| positions_m[node as usize]);
+    0.5 * (b - a).cross(c - a).length()
+}
+
+/// The skin of a shape or a mesh file. Shells are triangulated anew on their true surface; flat sides and the triangles of a file are
+/// what they are, and only refined.
+pub(super) fn skin_of(table: &BodyTable, body: &Body, spacing_m: f64) -> Result<FineSurface, ShapeError> {
+    if let Some(shell) = &table.sphere_shell {
+        shapes::sphere_shell_skin(shell.inner_radius_m, shell.outer_radius_m, spacing_m)
+    } else if let Some(shell) = &table.ellipsoid_shell {
+        shapes::ellipsoid_shell_skin(shell.inner_semi_axes_m.into(), shell.outer_semi_axes_m.into(), spacing_m)
+    } else if let Some(ventricle) = &table.ventricle {
+        let (outer_m, inner_m) = (ventricle.outer_semi_axes_m.into(), ventricle.inner_semi_axes_m.into());
+        shapes::ventricle_skin(outer_m, inner_m, ventricle.cut_z_m, spacing_m)
+    } else {
+        Ok(boundary(body, spacing_m))
+    }
+}
+
+/// The boundary of the tets, refined; its triangles come from the boundary's.
+fn boundary(body: &Body, spacing_m: f64) -> FineSurface {
+    let surface = &body.surface;
+    let coarse = FineSurface {
+        positions_m: surface.nodes.iter().map(|&node| body.mesh.positions_m()[node as usize]).collect(),
+        triangles: surface.triangles.clone(),
+        origins: (0..surface.triangles.len() as u32).collect(),
+    };
+    refine(coarse, spacing_m, &|_, middle| middle)
+}
+
+/// Gives the body its skin: parts go over to it, and what acts on its surface acts there.
+pub(super) fn put_on(body: &mut Body, table: &BodyTable, skin: FineSurface) {
+    let of_regions = table.block.is_none() && table.mesh.is_none();
+    for (number, part) in (0..).zip(&mut body.parts) {
+        if of_regions {
+            part.go_over_to(&skin, |origin| origin == number);
+            continue;
+        }
+        let of_part: BTreeSet<u32> = part.triangles.iter().copied().collect();
+        part.go_over_to(&skin, |origin| of_part.contains(&origin));
+        // Nodes that are points or lie on edges of a file keep their numbers on the boundary.
+        let kept = part.nodes.iter().map(|&node| body.surface.vertex_of_node[node as usize]);
+        part.vertices.extend(kept.filter(|&vertex| vertex != u32::MAX));
+        part.vertices.sort_unstable();
+        part.vertices.dedup();
+    }
+    body.skin = Some(skin);
+}
+
+/// What particles are made from; `None` of a body of tets.
+pub(super) fn spec(
+    document: &Document,
+    body: &Body,
+    constraints: &Constraints,
+    files: &Files<'_>,
+) -> Result<Option<ParticleSpec>, Fault> {
+    let (Some(table), Some(fine)) = (&document.body.particles, &body.skin) else { return Ok(None) };
+    demand_numerics(document)?;
+    files.limits.check_tets(&at().key("spacing_m"), fine.triangles.len() as u64)?;
+    let skin = Skin::new(fine.positions_m.clone(), fine.triangles.clone()).map_err(|error| {
+        Fault::value(at(), format!("particles need a surface that encloses the body: {error}"))
+            .of(Stage::Body)
+            .help("repair the file so that every edge of its surface has one triangle on either side")
+            .cause(error)
+    })?;
+    // Half a ball of radius r holds (4π/6) r³/h³ particles.
+    let radius_m = || table.spacing_m * (f64::from(table.most_active) * 6.0 / (4.0 * PI)).cbrt();
+    Ok(Some(ParticleSpec {
+        lattice_through_m: lattice_through_m(body, &skin, constraints),
+        skin,
+        spacing_m: table.spacing_m,
+        most_active: table.most_active as usize,
+        waking: Waking::ByTools { reach_m: table.reach_m.unwrap_or_else(radius_m) },
+    }))
+}
+
+/// Says so when the coarse level is none.
+pub(super) fn warn_of_fine_tets(body: &Body, warnings: &mut Vec<String>) {
+    const MANY_TETS: usize = 5000;
+    let tets = body.mesh.tets().len();
+    if body.skin.is_some() && tets > MANY_TETS {
+        warnings.push(format!(
+            "{tets} tets are many for the coarse level of a body with particles, and all of them are computed all the time: a few hundred do"
+        ));
+    }
+}
+
+/// What bodies with particles cannot have, at its key.
+fn demand_numerics(document: &Document) -> Result<(), Fault> {
+    let at = Where::root("numerics");
+    if document.numerics.integrator != IntegratorName::Leapfrog {
+        let message = "a body with particles is integrated by leapfrog only";
+        return Err(Fault::value(at.key("integrator"), message).help("leave `integrator` out, or [body.particles]"));
+    }
+    if document.numerics.sleep_tolerance_um > 0.0 {
+        let message = "a body with particles does not sleep as a whole: its particles sleep where nothing touches them";
+        return Err(Fault::value(at.key("sleep_tolerance_um"), message).help("leave `sleep_tolerance_um` out"));
+    }
+    Ok(())
+}
+
+/// A point (m) that the lattice's planes pass through: on flat sides that are held, so that no cell reaches past them; else where the shape
+/// is flat; else the middle.
+fn lattice_through_m(body: &Body, skin: &Skin, constraints: &Constraints) -> DVec3 {
+    let (low, high) = skin.bounds_m();
+    let mut through_m = body.lattice_m.unwrap_or(0.5 * (low + high));
+    let slack_m = FLAT * low.distance(high);
+    for set in constraints.specs.iter().rev().filter(|set| !set.nodes.is_empty()) {
+        let held = set.nodes.iter().map(|&node| body.mesh.positions_m()[node as usize]);
+        let (low, high) = held.fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(low, high), p| (low.min(p), high.max(p)));
+        through_m = DVec3::select((high - low).cmple(DVec3::splat(slack_m)), low, through_m);
+    }
+    through_m
+}
+
+/// Nodes with those in the middle of edges between two of them, which composite tets have.
+pub(super) fn with_middles(mesh: &TetMesh, mut nodes: Vec<u32>) -> Vec<u32> {
+    let chosen: BTreeSet<u32> = nodes.iter().copied().collect();
+    let mut middles = BTreeSet::new();
+    for (corners, numbers) in mesh.tets().iter().zip(Composite::new(mesh).tets()) {
+        for (edge, number) in EDGES.iter().zip(&numbers[4..]) {
+            if edge.iter().all(|&corner| chosen.contains(&corners[corner])) {
+                middles.insert(*number);
+            }
+        }
+    }
+    nodes.extend(middles);
+    nodes
+}

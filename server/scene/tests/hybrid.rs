@@ -1,0 +1,240 @@
+//! Hybrid bodies in scenes: what regions choose of coarse tets and skin, where the lattice lies, what probes measure.
+#![allow(clippy::unwrap_used)] // helpers outside #[test] functions
+use glam::DVec3;
+use palpate_physics::{LoadSpec, Model, Scratch, State, TickInput, hybrid::Waking, step};
+use palpate_scene::{Limits, Scene, parse};
+
+const TAIL: &str = r#"[[material]]
+law = "stable-neo-hookean"
+young_modulus_pa = 1e4
+poisson_ratio = 0.3
+density_kg_per_m3 = 1000
+[[probe]]
+name = "top"
+measure = "displacement"
+point_mm = [20, 20, 20]
+[numerics]
+mass_damping_per_s = 40
+"#;
+
+fn scene(body: &str) -> Scene {
+    let text = format!("[scene]\nname = \"t\"\n{body}\n{TAIL}");
+    parse(&text, "t.toml", None, &Limits::local(), &mut |_, _| {})
+        .unwrap_or_else(|error| panic!("{}", error.one_line()))
+}
+
+const BLOCK: &str = r#"
+[body]
+offset_mm = [0, 0, 1]
+[body.box]
+size_mm = [40, 40, 20]
+cells = [2, 2, 1]
+[body.particles]
+spacing_mm = 2.5
+most_active = 200
+[[region]]
+name = "patch"
+select = { region = "z_max", box = { min_mm = [14, 14, 0], max_mm = [26, 26, 40] } }
+[[fixed]]
+region = "z_min"
+[[load]]
+region = "patch"
+traction_pa = [0, 0, -100]
+amplitude.constant = 1
+[[load]]
+region = "z_max"
+total_force_n = [0, 0, -0.01]
+amplitude.constant = 0
+[[probe]]
+name = "table"
+measure = "reaction"
+region = "z_min"
+"#;
+
+/// Held are coarse nodes, loaded is the skin, and what is on one side of the body is on the other.
+#[test]
+fn regions_choose_nodes_of_the_tets_and_triangles_of_the_skin() {
+    let scene = scene(BLOCK);
+    let particles = scene.model.particles.as_ref().unwrap();
+    let held = &scene.model.prescribed[0].nodes;
+    assert_eq!(held.len(), 9);
+    assert!(held.iter().all(|&node| scene.model.mesh.positions_m()[node as usize].z == 1e-3));
+    let LoadSpec::Traction { triangles, .. } = &scene.model.loads[0] else { panic!("a traction") };
+    let area = |&triangle: &u32| {
+        let [a, b, c] = particles.skin.corners_m(triangle as usize);
+        0.5 * (b - a).cross(c - a).length()
+    };
+    // Triangles are in by their centroids.
+    let loaded_m2: f64 = triangles.iter().map(area).sum();
+    assert!((loaded_m2 / 144e-6 - 1.0).abs() < 0.25, "{loaded_m2}");
+    let LoadSpec::NodalForces(forces) = &scene.model.loads[1] else { panic!("forces") };
+    let total: DVec3 = forces.iter().map(|(_, force_n)| *force_n).sum();
+    assert!(forces.len() > 200 && (total.z + 0.01).abs() < 1e-12);
+    assert!(forces.iter().all(|&(v, _)| (particles.skin.positions_m()[v as usize].z - 21e-3).abs() < 1e-12));
+    assert!((particles.lattice_through_m - DVec3::Z * 1e-3).length() < 1e-12);
+    let Waking::ByTools { reach_m } = particles.waking else { panic!("tools wake them") };
+    // Half a ball of this radius holds as many as may be awake.
+    let held = 2.0 / 3.0 * std::f64::consts::PI * (reach_m / 2.5e-3).powi(3);
+    assert!((held - 200.0).abs() < 1e-9, "{held}");
+    assert!((scene.summary.mass_kg - 0.032).abs() < 1e-12);
+}
+
+/// The reaction is what was loaded, once the block is at rest; the probe follows the lattice.
+#[test]
+fn the_table_bears_what_the_skin_is_loaded_with() {
+    let scene = scene(BLOCK);
+    let model = Model::build(scene.model).unwrap();
+    let (mut state, mut scratch) = (State::at_rest(&model), Scratch::new(&model));
+    for _ in 0..1500 {
+        let input = TickInput {
+            tools: &[],
+            load_factors: &[1.0, 0.0],
+            prescribed_displacements_m: &[DVec3::ZERO],
+            point_forces: &[],
+        };
+        step(&model, &mut state, &mut scratch, &input);
+    }
+    let value = |name: &str| {
+        let probe = scene.probes.iter().find(|probe| probe.name() == name).unwrap();
+        let mut values = [0.0; 5];
+        probe.evaluate(&model, &state, &scratch, &mut values);
+        DVec3::new(values[0], values[1], values[2])
+    };
+    let mut surface_m = Vec::new();
+    model.surface_positions_m(&state, &mut surface_m);
+    let rest = model.surface_rest_positions_m();
+    let point = DVec3::new(0.02, 0.02, 0.021);
+    let nearest = (0..rest.len()).min_by(|&a, &b| rest[a].distance(point).total_cmp(&rest[b].distance(point))).unwrap();
+    let moved = surface_m[nearest] - rest[nearest];
+    assert!(moved.z < -1e-5 && (value("top") - moved).length() < 0.1 * moved.length(), "{moved} {}", value("top"));
+    let reaction = value("table");
+    assert!(reaction.z > 0.01 && reaction.truncate().length() < 1e-2 * reaction.z, "{reaction}");
+    let LoadSpec::Traction { triangles, .. } = &model.spec().loads[0] else { panic!("a traction") };
+    let skin = &model.spec().particles.as_ref().unwrap().skin;
+    let area: f64 = triangles
+        .iter()
+        .map(|&t| {
+            let [a, b, c] = skin.corners_m(t as usize);
+            0.5 * (b - a).cross(c - a).length()
+        })
+        .sum();
+    assert!((reaction.z / (100.0 * area) - 1.0).abs() < 1e-3, "{} {}", reaction.z, 100.0 * area);
+}
+
+/// The lattice lies in the plane of the cut, which is held, and its middle on the axis.
+#[test]
+fn the_ventricles_lattice_lies_in_its_cut() {
+    let scene = scene(
+        "[body.ventricle]\nouter_semi_axes_mm = [45, 90]\ninner_semi_axes_mm = [31.5, 76.5]\ncut_z_mm = 22.5\ntarget_tets = 188\n\
+         [body.particles]\nspacing_mm = 5\n[[fixed]]\nregion = \"base\"\n[[load]]\nregion = \"inner\"\npressure_pa = 10\n\
+         follower = true\namplitude.constant = 1\n",
+    );
+    let particles = scene.model.particles.as_ref().unwrap();
+    assert!((particles.lattice_through_m - DVec3::new(0.0, 0.0, 0.0225)).length() < 1e-9);
+    let LoadSpec::Pressure { triangles, .. } = &scene.model.loads[0] else { panic!("a pressure") };
+    let axes = DVec3::new(0.0315, 0.0315, 0.0765);
+    for &triangle in triangles {
+        assert!(particles.skin.corners_m(triangle as usize).iter().all(|p| ((*p / axes).length() - 1.0).abs() < 1e-9));
+    }
+    Model::build(scene.model).unwrap();
+}
+
+/// Two surface files: the skin is both of them, the inner one turned, and the strip between their rims.
+#[test]
+fn two_surfaces_become_a_skin_and_coarse_tets() {
+    let data = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../deploy/scenes/data");
+    let text = format!(
+        "[scene]\nname = \"t\"\n[body.surfaces]\ninner_file = \"ventricle-inner.stl\"\nouter_file = \"ventricle-outer.ply\"\nunit = \"mm\"\n\
+         target_tets = 500\n[body.particles]\nspacing_mm = 4\n[[fixed]]\nregion = \"base\"\n[[load]]\nregion = \"inner\"\n\
+         pressure_pa = 10\nfollower = true\namplitude.constant = 1\n{TAIL}"
+    );
+    let scene = parse(&text, "t.toml", Some(&data), &Limits::local(), &mut |_, _| {})
+        .unwrap_or_else(|error| panic!("{}", error.one_line()));
+    let skin = &scene.model.particles.as_ref().unwrap().skin;
+    let volume = scene.model.mesh.total_volume_m3();
+    assert!((skin.volume_m3() / volume - 1.0).abs() < 0.02, "{} {volume}", skin.volume_m3());
+    for triangle in 0..skin.triangles().len() {
+        let [a, b, c] = skin.corners_m(triangle);
+        assert!(a.distance(b).max(b.distance(c)).max(c.distance(a)) <= 4e-3 * 1.000_001);
+    }
+    let parts = |name: &str| scene.summary.parts.iter().find(|part| part.name == name).unwrap();
+    let total: usize = ["inner", "outer", "base"].iter().map(|name| parts(name).triangles).sum();
+    assert_eq!(total, skin.triangles().len());
+    assert!(parts("base").nodes > 4 && parts("base").triangles > 20);
+    Model::build(scene.model).unwrap();
+}
+
+/// A small block with particles, and one line of theirs more.
+fn small(spacing: &str, more: &str) -> String {
+    let body = "[body.box]\nsize_mm = [10, 10, 10]\ncells = [2, 2, 2]\n[body.particles]";
+    format!("[scene]\nname = \"t\"\n{body}\n{spacing}\n{more}\n{}", &TAIL[..TAIL.find("[[probe]]").unwrap()])
+}
+
+fn loaded(text: &str) -> Result<Scene, String> {
+    parse(text, "t.toml", None, &Limits::local(), &mut |_, _| {}).map_err(|error| error.one_line())
+}
+
+#[test]
+fn particles_that_cannot_be_are_told_at_their_key() {
+    let good = loaded(&small("spacing_mm = 1.25", "")).unwrap();
+    let particles = good.model.particles.unwrap();
+    assert_eq!(particles.most_active, 600);
+    assert_eq!(good.summary.surface_triangles, particles.skin.triangles().len());
+    assert!((particles.skin.volume_m3() - 1e-6).abs() < 1e-15);
+    let refused = |spacing: &str, more: &str| loaded(&small(spacing, more)).unwrap_err();
+    let cases = [
+        ("spacing_mm = 0", "", "t.toml:7:14: body.particles.spacing_m = 0: must be larger than 0"),
+        ("spacing_m = -1", "", "t.toml:7:13: body.particles.spacing_m = -1: must be larger than 0"),
+        (
+            "spacing_mm = 11",
+            "",
+            "t.toml:7:14: body.particles.spacing_m = 0.011: the lattice is coarser than the body, whose smallest extent is \
+             1.000e-2 m (take a spacing with several particles through the thinnest part)",
+        ),
+        (
+            "spacing_mm = 0.01",
+            "",
+            "t.toml:7:14: body.particles.spacing_m = 0.00001 gives about 1.0e9 particles; at most 1e7 are allowed here (take a \
+             larger spacing)",
+        ),
+        ("spacing_mm = 1", "most_active = 0", "t.toml:8:15: body.particles.most_active = 0: must be 1 to 20000"),
+        ("spacing_mm = 1", "reach_mm = 0", "t.toml:8:12: body.particles.reach_m = 0: must be larger than 0"),
+        (
+            "spacing_mm = 1",
+            "spaceing = 2",
+            "t.toml:8:1: unknown key `spaceing` in [body.particles] (did you mean `spacing_m` or `spacing_mm`?)",
+        ),
+        (
+            "",
+            "",
+            "t.toml:6:7: [body.particles] lacks the key `spacing_m` (or `spacing_mm`) (docs/scenes.md describes every key)",
+        ),
+    ];
+    for (spacing, more, wanted) in cases {
+        assert_eq!(refused(spacing, more), wanted);
+    }
+    let implicit = format!("{}[numerics]\nintegrator = \"backward-euler\"\n", small("spacing_mm = 1", ""));
+    let message = loaded(&implicit).unwrap_err();
+    assert!(message.ends_with(
+        "a body with particles is integrated by leapfrog only (leave `integrator` out, or [body.particles])"
+    ));
+    let sleeping = format!("{}[numerics]\nsleep_tolerance_um = 1\n", small("spacing_mm = 1", ""));
+    assert!(loaded(&sleeping).unwrap_err().contains("its particles sleep where nothing touches them"));
+}
+
+#[test]
+fn a_mesh_files_boundary_becomes_a_fine_skin() {
+    let folder = tempfile::tempdir().unwrap();
+    let nodes = "4 3 0 0\n0 0 0 0\n1 80 0 0\n2 0 80 0\n3 0 0 80\n";
+    std::fs::write(folder.path().join("heart.node"), nodes).unwrap();
+    std::fs::write(folder.path().join("heart.ele"), "1 4 0\n0 0 1 2 3\n").unwrap();
+    let text = "[scene]\nname = \"t\"\n[body.mesh]\nfile = \"heart.node\"\nunit = \"mm\"\n[body.particles]\nspacing_mm = 8\n\
+                [[material]]\nlaw = \"stvk\"\nyoung_modulus_pa = 1e4\npoisson_ratio = 0.3\ndensity_kg_per_m3 = 1000\n";
+    let scene = parse(text, "t.toml", Some(folder.path()), &Limits::local(), &mut |_, _| {}).unwrap();
+    let skin = scene.model.particles.unwrap().skin;
+    assert!((skin.volume_m3() / (0.08_f64.powi(3) / 6.0) - 1.0).abs() < 1e-12);
+    for triangle in 0..skin.triangles().len() {
+        let [a, b, c] = skin.corners_m(triangle);
+        assert!(a.distance(b).max(b.distance(c)).max(c.distance(a)) <= 8e-3 * 1.000_001);
+    }
+}
