@@ -10,7 +10,7 @@ use crate::{
     },
     stream::hub::Hub,
 };
-use palpate_physics::{Model, ModelError, Scratch, State, TickInput, step};
+use palpate_physics::{Model, ModelError, Scratch, State, TickInput, hybrid::wake_only, step};
 use palpate_proto::v1;
 use palpate_scene::{Driver, Probe, Scene};
 use std::{
@@ -340,7 +340,8 @@ fn median_tick_s(model: &Model) -> f64 {
         prescribed_displacements_m: &prescribed,
         point_forces: &[],
     };
-    state.wake_only(model, 0..model.hybrid().map_or(0, |hybrid| hybrid.partition().particle_count() as u32));
+    let particles = model.hybrid().map_or(0, |hybrid| hybrid.partition().particle_count() as u32);
+    wake_only(model, &mut state, &mut scratch, 0..particles);
     let begun = Instant::now();
     let mut costs = Vec::new();
     // A few at least, more while they are cheap.
