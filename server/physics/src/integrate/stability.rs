@@ -327,8 +327,10 @@ impl Evidence {
         };
         let mut internal_sq = 0.0;
         let particle_kg = own.as_deref().map_or(&[][..], HybridScratch::particle_kg);
-        let masses = model.mass_kg().iter().chain(particle_kg).filter(|mass| **mass > 0.0);
-        for ((force, external), mass) in state.force_n.iter().zip(&state.external_n).zip(masses) {
+        let masses = model.mass_kg().iter().chain(particle_kg);
+        let nodes = state.force_n.iter().zip(&state.external_n).zip(masses);
+        // Coarse nodes that nothing follows have no mass.
+        for ((force, external), mass) in nodes.filter(|(_, mass)| **mass > 0.0) {
             // Reactions of held nodes included: between them a body may be stretched without a force on any other node.
             internal_sq += (*force - *external - model.gravity_m_per_s2() * *mass).length_squared() / mass;
         }

@@ -1,5 +1,5 @@
 //! Hybrid bodies as the server runs them: coarse tets, and the particles nearest to the touch awake.
-use super::{Method, Pace, Running, subject::Tool};
+use super::{Method, Pace, Running, driven::Driven, subject::Tool};
 use crate::problems::{
     Action, Problem,
     body::{Body, TetBody},
@@ -9,10 +9,8 @@ use crate::problems::{
 use glam::DVec3;
 use miette::{IntoDiagnostic, Result, miette};
 use palpate_physics::{
-    Energies, LoadSpec, Model, ModelSpec, Scratch, Settings, State, TickInput,
-    contact::ToolTarget,
+    LoadSpec, Model, ModelSpec, Settings,
     hybrid::{ParticleSpec, Skin, Waking, wake_only},
-    step,
 };
 
 /// So many particles awake.
@@ -88,20 +86,15 @@ impl Method for Hybrid {
         };
         spec.tools = tool.iter().map(Tool::spec).collect();
         let model = Model::build(spec).into_diagnostic()?;
-        let (mut state, mut scratch) = (State::at_rest(&model), Scratch::new(&model));
-        wake_only(&model, &mut state, &mut scratch, nearest(&model, fine.touch_m, self.active));
-        let target = |tool: &Tool| ToolTarget { position_m: tool.touch_m, velocity_m_per_s: DVec3::ZERO };
+        let mut driven = Driven::at_rest(&model, tool.as_ref());
+        let touched = nearest(&model, fine.touch_m, self.active);
+        wake_only(&model, &mut driven.state, &mut driven.scratch, touched);
         Ok(Box::new(Pressed {
-            targets: tool.iter().map(target).collect(),
-            factors: vec![0.0; model.spec().loads.len()],
-            prescribed_m: vec![DVec3::ZERO; model.spec().prescribed.len()],
-            failure: None,
             probe: Probe::new(&fine, &sample::points(problem.body)),
             fine,
             load,
             tool,
-            state,
-            scratch,
+            driven,
             model,
         }))
     }
@@ -130,23 +123,18 @@ fn nearest(model: &Model, point_m: DVec3, count: usize) -> Vec<u32> {
 
 struct Pressed {
     model: Model,
-    state: State,
-    scratch: Scratch,
+    driven: Driven,
     tool: Option<Tool>,
     load: Option<NodalLoad>,
     fine: TetBody,
     probe: Probe,
-    targets: Vec<ToolTarget>,
-    factors: Vec<f64>,
-    prescribed_m: Vec<DVec3>,
-    failure: Option<String>,
 }
 
 impl Pressed {
     /// Positions (m) of the fine mesh's nodes; those within stay at rest.
     fn positions_m(&self) -> Vec<DVec3> {
         let (mut x, mut skin) = (self.fine.mesh.positions_m().to_vec(), Vec::new());
-        self.model.surface_positions_m(&self.state, &mut skin);
+        self.model.surface_positions_m(&self.driven.state, &mut skin);
         for (&node, position) in self.fine.surface.nodes.iter().zip(skin) {
             x[node as usize] = position;
         }
@@ -156,31 +144,12 @@ impl Pressed {
 
 impl Running for Pressed {
     fn tick(&mut self, fraction: f64) {
-        if let Some(tool) = &self.tool {
-            let period_s = self.model.spec().settings.tick_period_s;
-            for target in &mut self.targets {
-                let position_m = tool.centre_m(fraction);
-                target.velocity_m_per_s = (position_m - target.position_m) / period_s;
-                target.position_m = position_m;
-            }
-        }
-        self.factors.fill(fraction);
-        let input = TickInput {
-            tools: &self.targets,
-            load_factors: &self.factors,
-            prescribed_displacements_m: &self.prescribed_m,
-            point_forces: &[],
-        };
-        let report = step(&self.model, &mut self.state, &mut self.scratch, &input);
-        if let Some(quarantine) = report.quarantined {
-            self.failure = Some(quarantine.to_string());
-        }
+        self.driven.tick(&self.model, self.tool.as_ref(), fraction);
     }
 
     fn answer(&self) -> f64 {
-        let force_n: DVec3 = self.state.tools.iter().map(|tool| tool.contact_force_n).sum();
         match (&self.tool, &self.load) {
-            (Some(tool), _) => force_n.dot(tool.normal),
+            (Some(tool), _) => self.driven.tool_force_n().dot(tool.normal),
             (None, Some(load)) => load.displacement_m(self.fine.mesh.positions_m(), &self.positions_m()),
             (None, None) => 0.0,
         }
@@ -191,15 +160,14 @@ impl Running for Pressed {
     }
 
     fn energy_error(&self) -> Option<f64> {
-        let energies = Energies::of(&self.model, &self.state);
-        Some((energies.balance_j() / energies.external_work_j).abs()).filter(|error| error.is_finite())
+        self.driven.energy_error(&self.model)
     }
 
     fn size(&self) -> [usize; 3] {
-        [self.model.mesh().tets().len(), self.state.x.len(), self.model.substeps() as usize]
+        [self.model.mesh().tets().len(), self.driven.state.x.len(), self.model.substeps() as usize]
     }
 
     fn failure(&self) -> Option<String> {
-        self.failure.clone()
+        self.driven.failure()
     }
 }

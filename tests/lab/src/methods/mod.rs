@@ -6,6 +6,7 @@
 //! - `quasi_newton/`: backward Euler as a minimisation, prefactored, with L-BFGS
 //! - `xpbd/`: position-based dynamics with small steps
 //! - `pace.rs`: how fast a problem is gone through
+mod driven;
 mod hybrid;
 mod pace;
 mod quasi_newton;

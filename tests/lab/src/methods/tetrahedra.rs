@@ -1,16 +1,11 @@
 //! Linear tetrahedra with lumped mass, as the server runs them: laws, factor conventions, integrators, precisions.
-use super::{
-    Method, Pace, Running,
-    subject::{Subject, Tool},
-};
+use super::{Method, Pace, Running, driven::Driven, subject::Subject};
 use crate::problems::Problem;
 use glam::DVec3;
 use miette::{IntoDiagnostic, Result};
 use palpate_physics::{
-    Energies, Integrator, Precision, Scratch, Settings, State, Substeps, TickInput,
-    contact::ToolTarget,
+    Integrator, Precision, Settings, Substeps,
     material::{Convention, Lame, Law, Material, Viscosity},
-    step,
 };
 
 /// One variant.
@@ -112,66 +107,30 @@ impl Method for Tetrahedra {
     fn build(&self, problem: &Problem, resolution: u32, pace: &Pace) -> Result<Box<dyn Running>> {
         let settings = Settings { mass_damping_per_s: pace.damping_per_s, ..(self.settings)() };
         let subject = Subject::new(problem, resolution, self.material(problem)?, settings)?;
-        let model = &subject.model;
-        let target = |tool: &Tool| ToolTarget { position_m: tool.touch_m, velocity_m_per_s: DVec3::ZERO };
-        Ok(Box::new(Body {
-            state: State::at_rest(model),
-            scratch: Scratch::new(model),
-            targets: subject.tool.iter().map(target).collect(),
-            factors: vec![0.0; model.spec().loads.len()],
-            prescribed_m: vec![DVec3::ZERO; model.spec().prescribed.len()],
-            failure: None,
-            subject,
-        }))
+        Ok(Box::new(Body { driven: Driven::at_rest(&subject.model, subject.tool.as_ref()), subject }))
     }
 }
 
 struct Body {
     subject: Subject,
-    state: State,
-    scratch: Scratch,
-    targets: Vec<ToolTarget>,
-    factors: Vec<f64>,
-    prescribed_m: Vec<DVec3>,
-    failure: Option<String>,
+    driven: Driven,
 }
 
 impl Running for Body {
     fn tick(&mut self, fraction: f64) {
-        let model = &self.subject.model;
-        if let Some(tool) = &self.subject.tool {
-            let period_s = model.spec().settings.tick_period_s;
-            for target in &mut self.targets {
-                let position_m = tool.centre_m(fraction);
-                target.velocity_m_per_s = (position_m - target.position_m) / period_s;
-                target.position_m = position_m;
-            }
-        }
-        self.factors.fill(fraction);
-        let input = TickInput {
-            tools: &self.targets,
-            load_factors: &self.factors,
-            prescribed_displacements_m: &self.prescribed_m,
-            point_forces: &[],
-        };
-        let report = step(model, &mut self.state, &mut self.scratch, &input);
-        if let Some(quarantine) = report.quarantined {
-            self.failure = Some(quarantine.to_string());
-        }
+        self.driven.tick(&self.subject.model, self.subject.tool.as_ref(), fraction);
     }
 
     fn answer(&self) -> f64 {
-        let force_n = self.state.tools.iter().map(|tool| tool.contact_force_n).sum();
-        self.subject.answer(&self.state.x, force_n)
+        self.subject.answer(&self.driven.state.x, self.driven.tool_force_n())
     }
 
     fn displacements_m(&self) -> Vec<DVec3> {
-        self.subject.displacements_m(&self.state.x)
+        self.subject.displacements_m(&self.driven.state.x)
     }
 
     fn energy_error(&self) -> Option<f64> {
-        let energies = Energies::of(&self.subject.model, &self.state);
-        Some((energies.balance_j() / energies.external_work_j).abs()).filter(|error| error.is_finite())
+        self.driven.energy_error(&self.subject.model)
     }
 
     fn size(&self) -> [usize; 3] {
@@ -179,6 +138,6 @@ impl Running for Body {
     }
 
     fn failure(&self) -> Option<String> {
-        self.failure.clone()
+        self.driven.failure()
     }
 }
