@@ -7,7 +7,7 @@ mod rig;
 use criterion::{Criterion, criterion_group, criterion_main};
 use glam::DVec3;
 use palpate_physics::{
-    Precision, Surface,
+    Settings, Surface,
     contact::Coupling,
     hybrid::{ParticleSpec, Skin, Waking, wake_only},
     material::Law,
@@ -29,7 +29,7 @@ fn pressed(active: usize) -> Rig {
         waking: Waking::ByHand,
     });
     spec.prescribed = vec![hold("bottom", nodes_where(&spec.mesh, |p| p.z < -0.0399), [true; 3])];
-    spec.settings.precision = Precision::Single;
+    spec.settings = Settings::for_particles();
     spec.tools = vec![sphere(8e-3, DVec3::Z * 9e-3, Coupling::Rigid)];
     let mut rig = Rig::new(spec);
     let partition = rig.model.hybrid().unwrap().partition();
@@ -50,7 +50,10 @@ fn ticks(criterion: &mut Criterion) {
     for active in [0, 50, 200, 600, 1400] {
         let mut rig = pressed(active);
         let (substeps, awake) = (rig.model.substeps(), rig.state.active.len());
-        println!("{awake} awake, {substeps} substeps, pressed with {:.4} N", rig.state.tools[0].contact_force_n.z);
+        println!(
+            "{awake} awake, {substeps} substeps, pressed with {:.4} N, {} samples",
+            rig.state.tools[0].contact_force_n.z, rig.state.tools[0].contacts
+        );
         group.bench_function(format!("{active} active"), |b| b.iter(|| rig.tick_at(DVec3::Z * 6e-3)));
     }
 }

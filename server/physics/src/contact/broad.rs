@@ -52,6 +52,8 @@ impl ClusterBox {
 #[derive(Debug, Clone)]
 pub(super) struct Candidates {
     list: Box<[u32]>,
+    /// What each triangle's distance (m) was above the slack when it was looked at last; −∞: never.
+    above_slack_m: Box<[f64]>,
     count: usize,
     /// What relative motion (m) is left until the list must be renewed.
     pub(super) slack_m: f64,
@@ -65,7 +67,12 @@ impl Default for Candidates {
 
 impl Candidates {
     pub(super) fn with_capacity(triangles: usize) -> Self {
-        Self { list: vec![0; triangles].into_boxed_slice(), count: 0, slack_m: f64::NEG_INFINITY }
+        Self {
+            list: vec![0; triangles].into_boxed_slice(),
+            above_slack_m: vec![f64::NEG_INFINITY; triangles].into_boxed_slice(),
+            count: 0,
+            slack_m: f64::NEG_INFINITY,
+        }
     }
 
     /// Triangles, ascending.
@@ -75,7 +82,19 @@ impl Candidates {
 
     fn push(&mut self, triangle: usize) {
         self.list[self.count] = triangle as u32;
+        self.above_slack_m[self.count] = f64::NEG_INFINITY;
         self.count += 1;
+    }
+
+    /// Lower bound (m) of the distance from the tool's centre to a listed triangle: what it was when looked at last, less the motion since. Not a number
+    /// where all are listed whatever moves.
+    pub(super) fn least_distance_m(&self, number: usize) -> f64 {
+        self.above_slack_m[number] + self.slack_m - ROUNDING_M
+    }
+
+    /// How far (m) a listed triangle is now.
+    pub(super) fn set_distance_m(&mut self, number: usize, distance_m: f64) {
+        self.above_slack_m[number] = distance_m - self.slack_m;
     }
 }
 

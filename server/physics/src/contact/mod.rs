@@ -390,8 +390,7 @@ impl ContactModel {
             friction_coefficient: model.spec.friction_coefficient,
             put_into: std::mem::take(&mut part.just_put) || part.touching.tells_it_was_put(),
         };
-        let candidates = part.candidates.triangles();
-        let pressed = narrow::press(&meeting, candidates, &mut part.touching, &mut scratch.next, forces_n);
+        let pressed = narrow::press(&meeting, &mut part.candidates, &mut part.touching, &mut scratch.next, forces_n);
         part.force_n = pressed.force_n;
         pressed
     }

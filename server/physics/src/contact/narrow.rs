@@ -14,7 +14,7 @@
 //! f_t = −k_t e,  q ← r − e
 //! ```
 use super::{
-    broad::Triangles,
+    broad::{Candidates, Triangles},
     foundation::{Foundation, SampleTables, TriangleSamples},
     touching::{Touch, Touching},
     triangle::closest_weights,
@@ -96,29 +96,28 @@ impl Pressed {
     }
 }
 
-/// Presses a tool on the listed triangles (ascending): adds the forces on nodes, updates what it touches, returns the sums.
+/// Presses a tool on the listed triangles (ascending): adds the forces on nodes, updates what it touches, returns the sums. A triangle that cannot have
+/// come within the radius since it was looked at is looked at only where the nearest one is asked for, and no other is within.
 pub(super) fn press(
     meeting: &Meeting<'_>,
-    candidates: &[u32],
+    candidates: &mut Candidates,
     touching: &mut Touching,
     next: &mut Touching,
     forces_n: &mut [DVec3],
 ) -> Pressed {
     let mut pressed = Pressed { to_surface_m: DVec3::INFINITY, ..Pressed::default() };
-    let mut nearest_sq = f64::INFINITY;
+    let mut nearest = Nearest { distance_m: f64::INFINITY, ..Nearest::default() };
     let mut before = touching.records();
     next.clear();
-    for &triangle in candidates {
-        let triangle = triangle as usize;
-        let corners = meeting.triangles.corners(triangle, meeting.x);
-        let weights = closest_weights(meeting.centre_m, corners);
-        let closest_m = corners[0] * weights[0] + corners[1] * weights[1] + corners[2] * weights[2];
-        let to_triangle_m = closest_m - meeting.centre_m;
-        let distance_sq = to_triangle_m.length_squared();
-        if distance_sq < nearest_sq {
-            (nearest_sq, pressed.to_surface_m, pressed.nearest) = (distance_sq, to_triangle_m, (triangle, weights));
+    for number in 0..candidates.triangles().len() {
+        if candidates.least_distance_m(number) >= meeting.radius_m {
+            continue;
         }
-        if distance_sq >= meeting.radius_m * meeting.radius_m {
+        let triangle = candidates.triangles()[number] as usize;
+        let corners = meeting.triangles.corners(triangle, meeting.x);
+        let distance_m = nearest.look_at(meeting.centre_m, triangle, corners);
+        candidates.set_distance_m(number, distance_m);
+        if distance_m >= meeting.radius_m {
             continue;
         }
         let samples = meeting.foundation.of(triangle, meeting.tables);
@@ -131,7 +130,41 @@ pub(super) fn press(
         }
     }
     std::mem::swap(touching, next);
+    if nearest.distance_m >= meeting.radius_m {
+        for number in 0..candidates.triangles().len() {
+            if candidates.least_distance_m(number) <= nearest.distance_m {
+                let triangle = candidates.triangles()[number] as usize;
+                let corners = meeting.triangles.corners(triangle, meeting.x);
+                candidates.set_distance_m(number, nearest.look_at(meeting.centre_m, triangle, corners));
+            }
+        }
+    }
+    if nearest.distance_m < f64::INFINITY {
+        (pressed.to_surface_m, pressed.nearest) = (nearest.to_point_m, (nearest.triangle, nearest.weights));
+    }
     pressed
+}
+
+/// The nearest point of the triangles looked at; of equally near ones that of the first triangle.
+#[derive(Debug, Clone, Copy, Default)]
+struct Nearest {
+    distance_m: f64,
+    to_point_m: DVec3,
+    triangle: usize,
+    weights: [f64; 3],
+}
+
+impl Nearest {
+    /// Returns how far (m) the triangle is from `p`.
+    fn look_at(&mut self, p: DVec3, triangle: usize, corners: [DVec3; 3]) -> f64 {
+        let weights = closest_weights(p, corners);
+        let to_point_m = corners[0] * weights[0] + corners[1] * weights[1] + corners[2] * weights[2] - p;
+        let distance_m = to_point_m.length();
+        if distance_m < self.distance_m || (distance_m == self.distance_m && triangle < self.triangle) {
+            *self = Self { distance_m, to_point_m, triangle, weights };
+        }
+        distance_m
+    }
 }
 
 /// Forces (N) on the corners of one triangle.
@@ -284,8 +317,9 @@ mod tests {
                 put_into: just_put || self.touching.tells_it_was_put(),
             };
             let mut forces = vec![DVec3::ZERO; 4];
-            let all = [0, 1, 2, 3];
-            let pressed = press(&meeting, &all, &mut self.touching, &mut self.next, &mut forces);
+            let mut all = Candidates::with_capacity(4);
+            self.model.triangles.list_all(&mut all);
+            let pressed = press(&meeting, &mut all, &mut self.touching, &mut self.next, &mut forces);
             (pressed, forces)
         }
     }

@@ -5,6 +5,7 @@ use super::{
     fade::Fading,
     handover::Before,
     listed::ListedSkin,
+    long_steps::{LongStepHistory, LongSteps},
     running::RunningPatch,
     switching::{Ball, Looking},
 };
@@ -21,6 +22,7 @@ pub struct ActiveParticles {
     pub(super) fading: Fading,
     /// Balancing forces (N), as many as positions, or none.
     pub(super) balance_n: Vec<DVec3>,
+    pub(crate) long_steps: LongSteps,
 }
 
 impl ActiveParticles {
@@ -30,6 +32,7 @@ impl ActiveParticles {
             balls: vec![None; tools(model)],
             fading: fading_with_room(model),
             balance_n: Vec::with_capacity(entries(model)),
+            long_steps: LongSteps::with_room(model.hybrid().map_or(0, Hybrid::node_count), entries(model)),
         }
     }
 
@@ -65,6 +68,7 @@ impl ActiveParticles {
         self.balls.fill(None);
         self.fading.clear();
         self.balance_n.clear();
+        self.long_steps.forget();
     }
 
     pub(crate) fn copy_from(&mut self, other: &Self) {
@@ -72,6 +76,7 @@ impl ActiveParticles {
         self.balls.clone_from(&other.balls);
         self.fading.copy_from(&other.fading);
         self.balance_n.clone_from(&other.balance_n);
+        self.long_steps.copy_from(&other.long_steps);
     }
 
     /// Whether they are ascending, may be awake, and have room.
@@ -83,6 +88,7 @@ impl ActiveParticles {
             && self.fading.is_finite()
             && [0, model.rest_positions_m().len() + self.ids.len()].contains(&self.balance_n.len())
             && self.balance_n.iter().all(|force| force.is_finite())
+            && self.long_steps.fit(model.rest_positions_m().len(), model.rest_positions_m().len() + self.ids.len())
             && self.fading.cells.is_sorted_by(|a, b| a.cell < b.cell)
             && self.fading.tets.is_sorted_by(|a, b| a.tet < b.tet)
             && self.fading.cells.iter().all(|fade| self.touches(model, fade.cell))
@@ -125,9 +131,12 @@ pub(crate) struct HybridScratch {
     pub(crate) skin: ListedSkin,
     pub(crate) accelerations: Vec<DVec3>,
     pub(crate) momenta: Vec<DVec3>,
+    /// `fᵀ M'⁻¹ f` (N²/kg) at the last three kicks, the last one first.
+    pub(crate) kick_sq: [f64; 3],
     pub(super) looking: Looking,
     pub(super) before: Before,
     pub(crate) balance: Balance,
+    pub(super) long_steps: LongStepHistory,
     /// Something faded since the state's forces were computed.
     pub(crate) forces_are_stale: bool,
 }
@@ -143,22 +152,20 @@ impl HybridScratch {
             skin: ListedSkin::new(body),
             accelerations: Vec::with_capacity(entries),
             momenta: Vec::with_capacity(entries),
+            kick_sq: [0.0; 3],
             looking: Looking::new(model, body),
             before: Before::with_room(room_for_cells(body, most), body.partition().shares().len()),
             balance: Balance::with_room(entries),
+            long_steps: LongStepHistory::with_room(body.node_count(), entries),
             forces_are_stale: false,
         })
     }
 
     /// `aᵀ M'⁻¹ a` of forces (N²/kg) on free axes.
     pub(crate) fn size_sq(&mut self, forces_n: impl Iterator<Item = DVec3>) -> f64 {
-        let Self { patch, accelerations, momenta, .. } = self;
-        momenta.clear();
-        momenta.extend(forces_n);
-        accelerations.clear();
-        accelerations.extend_from_slice(momenta);
-        patch.metric_mut().accelerate(accelerations);
-        momenta.iter().zip(accelerations.iter()).map(|(force, acceleration)| force.dot(*acceleration)).sum()
+        self.accelerations.clear();
+        self.accelerations.extend(forces_n);
+        self.patch.metric_mut().accelerate(&mut self.accelerations)
     }
 
     /// `vᵀ M' v` (J) of velocities, or of displacements (kg m²).
@@ -208,6 +215,7 @@ impl State {
         self.active.ids.clear();
         self.active.ids.extend_from_slice(wanted);
         self.active.balance_n.clear();
+        self.active.long_steps.forget();
         self.force_is_current = false;
     }
 }

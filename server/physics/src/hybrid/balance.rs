@@ -36,6 +36,7 @@ impl Balance {
         self.before.clear();
         if state.force_is_current {
             self.before.extend_from_slice(&state.force_n);
+            state.active.long_steps.add_beyond_n(1.0, &mut self.before);
             metric.accelerate(&mut self.before);
         }
     }
@@ -103,18 +104,10 @@ impl Balance {
         }
         self.taken_n.extend_from_slice(balance_n);
         if body.is_free {
-            self.without_torque(body, x);
+            without_torque(body, x, &mut self.taken_n);
         }
         for (force, taken) in force_n.iter_mut().zip(&self.taken_n) {
             *force -= *taken;
-        }
-    }
-
-    fn without_torque(&mut self, body: &Hybrid, x: &[DVec3]) {
-        let torque: DVec3 = x.iter().zip(&self.taken_n).map(|(x, taken)| x.cross(*taken)).sum();
-        let turn = turn_of(&body.masses.node_kg, x, torque);
-        for ((taken, mass), x) in self.taken_n.iter_mut().zip(&body.masses.node_kg).zip(x) {
-            *taken -= turn.turn.cross(*x - turn.middle) * *mass;
         }
     }
 
@@ -122,6 +115,15 @@ impl Balance {
     pub(crate) fn work_j(&self, v: &[DVec3], accelerations: &[DVec3], h_s: f64) -> f64 {
         let power = |((taken, v), a): ((&DVec3, &DVec3), &DVec3)| taken.dot(*v + *a * (0.5 * h_s));
         h_s * self.taken_n.iter().zip(v).zip(accelerations).map(power).sum::<f64>()
+    }
+}
+
+/// Takes from forces (N) their torque at positions `x`, by forces on the coarse nodes that have no sum.
+pub(super) fn without_torque(body: &Hybrid, x: &[DVec3], forces_n: &mut [DVec3]) {
+    let torque: DVec3 = x.iter().zip(&*forces_n).map(|(x, force)| x.cross(*force)).sum();
+    let turn = turn_of(&body.masses.node_kg, x, torque);
+    for ((force, mass), x) in forces_n.iter_mut().zip(&body.masses.node_kg).zip(x) {
+        *force -= turn.turn.cross(*x - turn.middle) * *mass;
     }
 }
 

@@ -13,7 +13,7 @@ use crate::{
     integrate::spectrum::{lanczos, largest_eigenvalue},
     material::{Lame, stvk::trace},
 };
-use glam::{DMat3, DVec3};
+use glam::{BVec3, DMat3, DVec3};
 
 impl Hybrid {
     /// Largest natural frequency (rad/s) at rest, on springs (N/m, in all directions; one per particle, or none).
@@ -29,6 +29,26 @@ impl Hybrid {
         let root_inverse_mass: Vec<DVec3> = self.masses.particle_kg.iter().map(root).collect();
         let (theta, residual) = lanczos(&mut |a, out| self.apply(springs_n_per_m, a, out), &root_inverse_mass);
         ((theta + residual).min(bound_sq) / (1.0 - KEPT)).sqrt()
+    }
+
+    /// The same of the coarse level alone, while all particles sleep.
+    pub fn coarse_frequency_rad_per_s(&self) -> f64 {
+        let root = |(mass, free): (&f64, &BVec3)| {
+            DVec3::select(*free, DVec3::splat(mass.max(f64::MIN_POSITIVE).sqrt().recip()), DVec3::ZERO)
+        };
+        let root_inverse_mass: Vec<DVec3> = self.masses.node_kg.iter().zip(&self.free).map(root).collect();
+        let at_rest_m = self.partition.coarse().positions_m();
+        let mut apply = |a: &[DVec3], out: &mut [DVec3]| {
+            out.fill(DVec3::ZERO);
+            for (tet, share) in self.partition.shares().iter().enumerate() {
+                share.add_products_n(self.material_of_tet(tet as u32), at_rest_m, a, out);
+            }
+            for product in out {
+                *product = -*product;
+            }
+        };
+        let (theta, residual) = lanczos(&mut apply, &root_inverse_mass);
+        (theta + residual).sqrt()
     }
 
     /// `out ← K a` with all particles awake.
@@ -76,7 +96,55 @@ impl Hybrid {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::hybrid::testing::{hybrid_ball, tissue};
+    use crate::{
+        hybrid::{
+            fade::Fading,
+            running::RunningPatch,
+            testing::{Random, hybrid_ball, tissue},
+        },
+        world::Precision,
+    };
+
+    /// The largest frequency (rad/s) of what is left to the coarse level, with the mass matrix of these active particles: powers of `M'⁻¹ K_c`.
+    fn left_rad_per_s(hybrid: &Hybrid, active: &[u32]) -> f64 {
+        let mut running = RunningPatch::new(hybrid, active.len(), Precision::Double);
+        running.wake(hybrid, active, &Fading::default());
+        let (nodes, mut random) = (hybrid.node_count(), Random(7));
+        let mut a: Vec<DVec3> = (0..nodes + active.len()).map(|_| random.vector()).collect();
+        let mut found = 0.0;
+        for _ in 0..600 {
+            let mut products = vec![DVec3::ZERO; a.len()];
+            for tet in 0..hybrid.partition.shares().len() as u32 {
+                let (share, material) = (running.share(tet), hybrid.material_of_tet(tet));
+                share.add_products_n(material, hybrid.partition.coarse().positions_m(), &a, &mut products);
+            }
+            let before: f64 = a.iter().map(|a| a.length_squared()).sum();
+            running.metric_mut().accelerate(&mut products);
+            let size = products.iter().map(|a| a.length_squared()).sum::<f64>().sqrt();
+            found = size / before.sqrt();
+            a = products.iter().map(|product| *product / size).collect();
+        }
+        found.sqrt()
+    }
+
+    #[test]
+    fn what_is_left_to_the_coarse_level_is_no_faster_than_all_of_it() {
+        let material = tissue()[1];
+        let hybrid = hybrid_ball(&[material; 2]);
+        let all = hybrid.coarse_frequency_rad_per_s();
+        let particles = || (0..hybrid.partition.particle_count() as u32).filter(|&p| hybrid.may_wake(p));
+        let near = |middle: DVec3, distance_m: f64| -> Vec<u32> {
+            particles().filter(|&p| hybrid.partition.particle_m(p).distance(middle) < distance_m).collect()
+        };
+        let none = left_rad_per_s(&hybrid, &[]);
+        assert!((none / all - 1.0).abs() < 1e-2, "{none} {all}");
+        for active in
+            [near(DVec3::Z * 9e-3, 3e-3), near(DVec3::X * 8e-3, 5e-3), near(DVec3::ZERO, 7e-3), particles().collect()]
+        {
+            let left = left_rad_per_s(&hybrid, &active);
+            assert!(left < 1.01 * all, "{} awake: {left} {all}", active.len());
+        }
+    }
 
     #[test]
     fn it_lies_between_a_known_mode_and_the_bound_and_springs_raise_it() {

@@ -15,6 +15,7 @@ pub mod kernels;
 mod least_squares;
 mod listed;
 mod locate;
+mod long_steps;
 #[cfg(test)]
 mod method_checks;
 pub mod methods;

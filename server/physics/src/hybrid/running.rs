@@ -299,13 +299,18 @@ impl RunningPatch {
         }
     }
 
-    /// Overwrites `forces_n` (N) with those of elastic and viscous stress where [`Self::displace`] put coarse nodes and active particles, at their
+    /// Adds forces (N) on coarse nodes of elastic and viscous stress in what is left to the coarse level, where [`Self::displace`] put them, at their
     /// velocities `v`; returns the power (W) that viscous stress takes.
-    pub(crate) fn forces_n(&mut self, hybrid: &Hybrid, v: &[DVec3], forces_n: &mut [DVec3]) -> f64 {
+    pub(crate) fn add_coarse_forces_n(&mut self, v: &[DVec3], forces_n: &mut [DVec3]) -> f64 {
+        let v_nodes = &v[..self.node_displacements_m.len()];
+        self.share_kernel.add_forces_n(&self.node_displacements_m, v_nodes, forces_n)
+    }
+
+    /// The same of awake cells, on coarse nodes and active particles; whose forces were none.
+    pub(crate) fn add_cell_forces_n(&mut self, hybrid: &Hybrid, v: &[DVec3], forces_n: &mut [DVec3]) -> f64 {
         let nodes = hybrid.node_count();
         let (v_nodes, v_particles) = v.split_at(nodes);
-        forces_n.fill(DVec3::ZERO);
-        let mut power_w = self.share_kernel.add_forces_n(&self.node_displacements_m, v_nodes, forces_n);
+        let mut power_w = 0.0;
         if self.active.is_empty() {
             return power_w;
         }
@@ -417,7 +422,9 @@ mod tests {
                     let (expected, x, v) = (joined(&expected), joined(&at), joined(&rate));
                     let mut forces = x.clone();
                     running.displace(&hybrid, &x);
-                    let power_w = running.forces_n(&hybrid, &v, &mut forces);
+                    forces.fill(DVec3::ZERO);
+                    let power_w = running.add_coarse_forces_n(&v, &mut forces)
+                        + running.add_cell_forces_n(&hybrid, &v, &mut forces);
                     let worst = forces.iter().zip(&expected).map(|(a, b)| a.distance(*b)).fold(0.0, f64::max);
                     assert!(worst < bound * largest(&expected), "{precision:?}, {}: {worst:e}", active.len());
                     assert!((power_w - expected_w).abs() <= 10.0 * bound * expected_w, "{power_w} {expected_w}");

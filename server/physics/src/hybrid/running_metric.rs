@@ -121,18 +121,23 @@ impl RunningMetric {
         }
     }
 
-    /// `M'⁻¹ f` (m/s²) on free axes, zero on the others, in place of forces (N) on coarse nodes and then on active particles.
-    pub(crate) fn accelerate(&mut self, forces_n: &mut [DVec3]) {
+    /// `M'⁻¹ f` (m/s²) on free axes, zero on the others, in place of forces (N) on coarse nodes and then on active particles; returns `fᵀ M'⁻¹ f` (N²/kg).
+    pub(crate) fn accelerate(&mut self, forces_n: &mut [DVec3]) -> f64 {
         let size = self.touched.len();
         let (nodes, particles) = forces_n.split_at_mut(self.inverse_node_per_kg.len());
         for (right, &node) in self.right.iter_mut().zip(&self.touched) {
-            *right = nodes[node as usize];
+            *right = std::mem::take(&mut nodes[node as usize]);
         }
+        let mut size_sq = 0.0;
         for (force, inverse) in nodes.iter_mut().zip(&self.inverse_node_per_kg) {
-            *force *= *inverse;
+            let acceleration = *force * *inverse;
+            size_sq += force.dot(acceleration);
+            *force = acceleration;
         }
         for (force, mass) in particles.iter_mut().zip(&self.particle_kg) {
-            *force /= *mass;
+            let acceleration = *force / *mass;
+            size_sq += force.dot(acceleration);
+            *force = acceleration;
         }
         // L y = f
         for column in 0..size {
@@ -140,6 +145,8 @@ impl RunningMetric {
             let (done, rest) = self.right.split_at_mut(column + 1);
             done[column] *= entries[column];
             let y = done[column];
+            // fᵀ (L Lᵀ)⁻¹ f = yᵀ y
+            size_sq += y.length_squared();
             for (right, entry) in rest.iter_mut().zip(&entries[column + 1..]) {
                 *right -= y * *entry;
             }
@@ -157,6 +164,7 @@ impl RunningMetric {
         for (acceleration, &node) in self.right.iter().zip(&self.touched) {
             nodes[node as usize] = *acceleration;
         }
+        size_sq
     }
 
     /// Adds the weight `m g` (N) of coarse nodes and active particles.

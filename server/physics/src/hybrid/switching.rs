@@ -93,6 +93,7 @@ impl HybridScratch {
     /// Before a tick: makes the patch that of the state's active particles, and now and then looks which should be. Allocates nothing.
     pub(crate) fn prepare(&mut self, model: &Model, body: &Hybrid, state: &mut State) {
         self.follow(body, &state.active);
+        state.follow_coarse_forces(model.spec().settings.tick_period_s);
         if !state.active.fading.is_empty() || !state.active.balance_n.is_empty() {
             self.fade(model, body, state);
         }

@@ -91,7 +91,7 @@ fn kick(model: &Model, state: &mut State, change: &[DVec3]) -> f64 {
 
 /// Half a substep's work (J) along `dt v` of external forces, holders' included, and of all forces on free axes.
 fn half_work_j(model: &Model, state: &State, dt_s: f64) -> (f64, f64) {
-    let (mut external_w, mut total_w) = (holders_power_w(model, state), 0.0);
+    let (mut external_w, mut total_w) = (holders_power_w(model, &state.force_n, &state.v), 0.0);
     for (((v, force), external), inverse_mass) in
         state.v.iter().zip(&state.force_n).zip(&state.external_n).zip(model.inverse_mass_per_kg())
     {

@@ -26,9 +26,22 @@ pub(super) struct Evaluation {
     pub(super) dt_s: f64,
     /// Bound of the speed (m/s) with which any node came here.
     pub(super) fastest_m_per_s: f64,
+    /// Whether a long step of a hybrid body's coarse level ends here.
+    pub(super) ends_long_step: bool,
+}
+
+impl Evaluation {
+    fn before_a_step(fraction: f64, load_fraction: f64) -> Self {
+        Self { fraction, load_fraction, dt_s: 0.0, fastest_m_per_s: 0.0, ends_long_step: true }
+    }
 }
 
 impl Tick<'_> {
+    /// Whether a long step of a hybrid body's coarse level ends with substep `number` (from 1).
+    pub(super) fn ends_long_step(&self, number: u32) -> bool {
+        number.is_multiple_of(self.model.substeps_per_long_step())
+    }
+
     /// Substep `dt` (s).
     pub(super) fn dt_s(&self) -> f64 {
         self.model.spec().settings.tick_period_s / f64::from(self.substeps)
@@ -41,11 +54,7 @@ impl Tick<'_> {
             if !state.force_is_current {
                 state.contact.forget_geometry();
             }
-            self.evaluate(
-                state,
-                scratch,
-                &Evaluation { fraction: 0.0, load_fraction: 0.0, dt_s: 0.0, fastest_m_per_s: 0.0 },
-            );
+            self.evaluate(state, scratch, &Evaluation::before_a_step(0.0, 0.0));
         }
     }
 
@@ -56,13 +65,14 @@ impl Tick<'_> {
         }
         let part = |substeps_done: u32| f64::from(substeps_done) / f64::from(self.substeps);
         let (fraction, load_fraction) = (part(number - 1), part(number));
-        self.evaluate(state, scratch, &Evaluation { fraction, load_fraction, dt_s: 0.0, fastest_m_per_s: 0.0 });
+        self.evaluate(state, scratch, &Evaluation::before_a_step(fraction, load_fraction));
     }
 
     /// Forces at the end of substep `number` (from 1), to which the nodes came with at most `fastest_m_per_s`.
     pub(super) fn evaluate_after(&self, number: u32, fastest_m_per_s: f64, state: &mut State, scratch: &mut Scratch) {
         let fraction = f64::from(number) / f64::from(self.substeps);
-        let now = Evaluation { fraction, load_fraction: fraction, dt_s: self.dt_s(), fastest_m_per_s };
+        let ends_long_step = self.ends_long_step(number);
+        let now = Evaluation { fraction, load_fraction: fraction, dt_s: self.dt_s(), fastest_m_per_s, ends_long_step };
         self.evaluate(state, scratch, &now);
     }
 

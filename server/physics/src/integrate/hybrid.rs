@@ -55,9 +55,23 @@ pub(super) fn evaluate(
     contact.press_tools(&surface, &time, tools, touching, &mut skin.forces_n, contact_scratch);
     state.external_n.fill(DVec3::ZERO);
     skin.hand_over(body.node_count(), patch, &mut state.external_n);
-    let viscous_power_w = patch.forces_n(body, &state.v, &mut state.force_n);
+    let State { x, v, active, force_n, .. } = &mut *state;
+    let every = model.substeps_per_long_step();
+    let mut viscous_power_w = 0.0;
+    active.long_steps.turn_with(body, x);
+    if every > 1 && now.ends_long_step {
+        let of_coarse = |forces_n: &mut [DVec3]| patch.add_coarse_forces_n(v, forces_n);
+        viscous_power_w += f64::from(every) * active.long_steps.evaluate(body.node_count(), of_coarse);
+    }
+    active.long_steps.start_with_steady_n(force_n);
+    if every == 1 {
+        viscous_power_w += patch.add_coarse_forces_n(v, force_n);
+    }
+    viscous_power_w += patch.add_cell_forces_n(body, v, force_n);
     state.viscous.record(viscous_power_w, now.dt_s > 0.0);
-    patch.metric().add_weight_n(model.gravity_m_per_s2(), &mut state.force_n);
+    if model.gravity_m_per_s2() != DVec3::ZERO {
+        patch.metric().add_weight_n(model.gravity_m_per_s2(), &mut state.force_n);
+    }
     for (force, external) in state.force_n.iter_mut().zip(&state.external_n) {
         *force += *external;
     }
@@ -75,11 +89,21 @@ fn vertices_of(model: &Model, load: &LoadSpec, list: &mut impl FnMut(u32)) {
 }
 
 /// `v ← (v e^{−c h/2} + h M'⁻¹ f) e^{−c h/2}`, and the ledger's share of it, as of a body of tets.
-pub(super) fn kick(model: &Model, body: &Hybrid, state: &mut State, own: &mut HybridScratch, h_s: f64) {
-    let HybridScratch { patch, accelerations, momenta, balance, .. } = own;
+pub(super) fn kick(
+    model: &Model,
+    body: &Hybrid,
+    state: &mut State,
+    own: &mut HybridScratch,
+    (h_s, ends_long_step): (f64, bool),
+) {
+    let HybridScratch { patch, accelerations, momenta, kick_sq, balance, .. } = own;
     accelerations.clear();
     accelerations.extend_from_slice(&state.force_n);
-    patch.metric_mut().accelerate(accelerations);
+    if ends_long_step {
+        state.active.long_steps.add_beyond_n(f64::from(model.substeps_per_long_step()), accelerations);
+    }
+    let of_holders_w = holders_power_w(model, accelerations, &state.v);
+    *kick_sq = [patch.metric_mut().accelerate(accelerations), kick_sq[0], kick_sq[1]];
     let damping = model.spec().settings.mass_damping_per_s;
     let factor = (-0.5 * damping * h_s).exp();
     let mut twice_kinetic_j = 0.0;
@@ -99,5 +123,5 @@ pub(super) fn kick(model: &Model, body: &Hybrid, state: &mut State, own: &mut Hy
     }
     state.ledger.external_work_j += h_s * power_w;
     state.ledger.dissipated_j += h_s * state.viscous.work_rate_w();
-    state.ledger.external_work_j += h_s * holders_power_w(model, state);
+    state.ledger.external_work_j += h_s * of_holders_w;
 }

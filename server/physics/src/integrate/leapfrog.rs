@@ -23,18 +23,30 @@ use crate::world::{Model, Scratch, State};
 pub(super) fn run(tick: &Tick<'_>, state: &mut State, scratch: &mut Scratch) {
     let (substeps, dt_s) = (tick.substeps, tick.dt_s());
     tick.make_force_current(state, scratch);
-    kick(tick.model, state, scratch, 0.5 * dt_s);
+    kick(tick.model, state, scratch, (0.5 * dt_s, true));
     for substep in 1..=substeps {
+        note_long_step(tick, substep - 1, state, scratch);
         let fastest_m_per_s = drift(state, dt_s);
         scratch.history.set_aside(substep, substeps, state);
         tick.evaluate_after(substep, fastest_m_per_s, state, scratch);
-        kick(tick.model, state, scratch, if substep == substeps { 0.5 * dt_s } else { dt_s });
+        let h_s = if substep == substeps { 0.5 * dt_s } else { dt_s };
+        kick(tick.model, state, scratch, (h_s, tick.ends_long_step(substep)));
     }
 }
 
-fn kick(model: &Model, state: &mut State, scratch: &mut Scratch, h_s: f64) {
+/// After `done` substeps: notes what a long step of a hybrid body's coarse level is judged by, where one begins.
+fn note_long_step(tick: &Tick<'_>, done: u32, state: &State, scratch: &mut Scratch) {
+    if tick.model.substeps_per_long_step() > 1
+        && tick.ends_long_step(done)
+        && let Some(own) = &mut scratch.hybrid
+    {
+        own.note_long_step(state);
+    }
+}
+
+fn kick(model: &Model, state: &mut State, scratch: &mut Scratch, (h_s, ends_long_step): (f64, bool)) {
     match (model.hybrid(), &mut scratch.hybrid) {
-        (Some(body), Some(own)) => hybrid::kick(model, body, state, own, h_s),
+        (Some(body), Some(own)) => hybrid::kick(model, body, state, own, (h_s, ends_long_step)),
         _ => motion::kick(model, state, h_s),
     }
 }

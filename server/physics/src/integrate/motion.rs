@@ -49,16 +49,16 @@ pub(super) fn kick(model: &Model, state: &mut State, h_s: f64) {
     }
     state.ledger.external_work_j += h_s * power_w.element_sum();
     state.ledger.dissipated_j += h_s * state.viscous.work_rate_w();
-    state.ledger.external_work_j += h_s * holders_power_w(model, state);
+    state.ledger.external_work_j += h_s * holders_power_w(model, &state.force_n, &state.v);
 }
 
 /// Power (W) of the holders' reactions, `−f` on prescribed axes, whose velocity a kick leaves alone.
-pub(super) fn holders_power_w(model: &Model, state: &State) -> f64 {
+pub(super) fn holders_power_w(model: &Model, forces_n: &[DVec3], v: &[DVec3]) -> f64 {
     let mut power_w = 0.0;
     for set in &model.spec().prescribed {
         let held = DVec3::from(set.axes.map(|axis| f64::from(u8::from(axis))));
         for &node in &set.nodes {
-            power_w -= state.force_n[node as usize].dot(held * state.v[node as usize]);
+            power_w -= forces_n[node as usize].dot(held * v[node as usize]);
         }
     }
     power_w

@@ -107,6 +107,6 @@ fn kick(model: &Model, nodal: &NodalImplicit, state: &mut State, dt_s: f64) {
         external_w += state.external_n[node].dot(mean);
         drag_w += dt_s * (stiffness * *v).dot(mean);
     }
-    state.ledger.external_work_j += dt_s * (external_w + holders_power_w(model, state));
+    state.ledger.external_work_j += dt_s * (external_w + holders_power_w(model, &state.force_n, &state.v));
     state.ledger.dissipated_j += dt_s * (drag_w + state.viscous.latest_w);
 }

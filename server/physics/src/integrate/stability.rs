@@ -35,6 +35,9 @@ use serde::{Deserialize, Serialize};
 
 /// `Q` above this is unstable: the limit 4 at a step of 0.975 of the longest.
 const LIMIT: f64 = 3.8;
+/// `(k h ω)²` of long steps above this is taken for unstable, half of what would be for linear bodies: they are few, and what a body does that is strained by
+/// half in one of them is far from linear.
+const LONG_STEP_LIMIT: f64 = 2.0;
 /// Part of the stable step that a repetition aims at.
 const SAFETY: f64 = 0.9;
 /// More substeps than this many times the model's are not tried.
@@ -83,6 +86,7 @@ impl Pace {
         let most = if is_judged(model) { most_substeps(model) } else { model.substeps() };
         [&self.before.total_n, &self.before.external_n].iter().all(|list| list.len() == nodes)
             && (model.substeps()..=most).contains(&self.substeps)
+            && self.substeps.is_multiple_of(model.substeps_per_long_step())
     }
 
     /// The tick is repeated in `substeps`.
@@ -93,6 +97,7 @@ impl Pace {
     /// Takes note of a tick of `self.substeps` that was accepted at once.
     pub(super) fn calm(&mut self, model: &Model, quotient: f64) {
         let fewer = (self.substeps - (self.substeps / 8).max(1)).max(model.substeps());
+        let fewer = fewer.next_multiple_of(model.substeps_per_long_step()).min(self.substeps);
         // Q grows at most with dt².
         let then = quotient * (f64::from(self.substeps) / f64::from(fewer)).powi(2);
         self.calm_ticks = if then <= SAFETY * LIMIT { self.calm_ticks + 1 } else { 0 };
@@ -114,7 +119,8 @@ fn judges_across_ticks(model: &Model) -> bool {
 
 /// The most substeps that are tried.
 fn most_substeps(model: &Model) -> u32 {
-    model.substeps().saturating_mul(MOST_TIMES).min(MAX_SUBSTEPS.max(model.substeps()))
+    let most = model.substeps().saturating_mul(MOST_TIMES).min(MAX_SUBSTEPS.max(model.substeps()));
+    most - most % model.substeps_per_long_step()
 }
 
 /// Forces at an instant.
@@ -218,15 +224,20 @@ impl ForceHistory {
             let now = state.force_n.iter().zip(&state.external_n).map(|(force, external)| *force - *external);
             let second = now.zip(one.internal_n()).zip(two.internal_n()).map(|((g0, g1), g2)| g0 - g1 * 2.0 + g2);
             let answer_sq = own.size_sq(second);
-            let [one_sq, two_sq] = [one, two].map(|forces| own.size_sq(forces.total_n.iter().copied()));
-            return Evidence { answer_sq, cause_sq: one_sq.max(two_sq) + held_sq };
+            let [_, one_sq, two_sq] = if substeps == 1 {
+                [one, one, two].map(|forces| own.size_sq(forces.total_n.iter().copied()))
+            } else {
+                own.kick_sq
+            };
+            let long_step = long_step_quotient(model, state, own, substeps);
+            return Evidence { answer_sq, cause_sq: one_sq.max(two_sq) + held_sq, long_step };
         }
         let [answer_sq, one_sq, two_sq] = model.kernel().step_force_sums(&StepForces {
             total_n: [&state.force_n, &one.total_n, &two.total_n],
             external_n: [&state.external_n, &one.external_n, &two.external_n],
             inverse_mass_per_kg: model.inverse_mass_per_kg(),
         });
-        Evidence { answer_sq, cause_sq: one_sq.max(two_sq) + held_sq }
+        Evidence { answer_sq, cause_sq: one_sq.max(two_sq) + held_sq, long_step: 0.0 }
     }
 
     /// `‖g − g₋‖` of the two instants before the tick's end; 0 in a tick that has no such two.
@@ -274,7 +285,8 @@ impl ForceHistory {
             let answer_sq = own.size_sq(now.zip(self.start.internal_n()).map(|(g, before)| g - before));
             let moved_sq = own.twice_kinetic(body, state.x.iter().zip(start.x()).map(|(x, before)| *x - *before));
             let speed_sq = own.twice_kinetic(body, start.v().iter().copied());
-            return Evidence { answer_sq, cause_sq: (moved_sq / (dt_s * dt_s)).max(speed_sq) / (dt_s * dt_s) };
+            let cause_sq = (moved_sq / (dt_s * dt_s)).max(speed_sq) / (dt_s * dt_s);
+            return Evidence { answer_sq, cause_sq, long_step: 0.0 };
         }
         let (mut change_sq, mut moved_sq, mut speed_sq) = (0.0, 0.0, 0.0);
         for node in 0..state.x.len() {
@@ -284,7 +296,26 @@ impl ForceHistory {
             moved_sq += model.mass_kg()[node] * state.x[node].distance_squared(start.x()[node]);
             speed_sq += model.mass_kg()[node] * start.v()[node].length_squared();
         }
-        Evidence { answer_sq: change_sq, cause_sq: (moved_sq / (dt_s * dt_s)).max(speed_sq) / (dt_s * dt_s) }
+        let cause_sq = (moved_sq / (dt_s * dt_s)).max(speed_sq) / (dt_s * dt_s);
+        Evidence { answer_sq: change_sq, cause_sq, long_step: 0.0 }
+    }
+}
+
+/// `(k h ω)²` of the coarse level's long steps, as far as a tick shows it, as large as to have [`LIMIT`]; 0 where there are none.
+fn long_step_quotient(model: &Model, state: &State, own: &mut HybridScratch, substeps: u32) -> f64 {
+    let every = model.substeps_per_long_step();
+    if every == 1 {
+        return 0.0;
+    }
+    let long_step_s = model.spec().settings.tick_period_s * f64::from(every) / f64::from(substeps);
+    LIMIT / LONG_STEP_LIMIT * own.long_step_quotient(model, state, (long_step_s, digits(model)))
+}
+
+/// To how many digits internal forces are known.
+fn digits(model: &Model) -> f64 {
+    match model.spec().settings.precision {
+        Precision::Single => 1e-5,
+        Precision::Double => 1e-12,
     }
 }
 
@@ -293,12 +324,15 @@ impl ForceHistory {
 pub(super) struct Evidence {
     answer_sq: f64,
     cause_sq: f64,
+    /// What long steps of a coarse level have for `Q`, from another quotient (`hybrid::long_steps`).
+    long_step: f64,
 }
 
 impl Evidence {
     /// `Q`; not finite where forces are not.
     pub(super) fn quotient(&self) -> f64 {
-        if self.answer_sq == 0.0 { 0.0 } else { (self.answer_sq / self.cause_sq).sqrt() }
+        let of_step = if self.answer_sq == 0.0 { 0.0 } else { (self.answer_sq / self.cause_sq).sqrt() };
+        if of_step.is_finite() { of_step.max(self.long_step) } else { of_step }
     }
 
     /// `Q` is above the limit, and not by mass damping or by rounding: the answer stands above the last digits of the internal forces
@@ -310,6 +344,9 @@ impl Evidence {
         (history, mut own): (&ForceHistory, Option<&mut HybridScratch>),
         substeps: u32,
     ) -> bool {
+        if self.long_step > LIMIT {
+            return true;
+        }
         if self.answer_sq <= LIMIT * LIMIT * self.cause_sq {
             return false;
         }
@@ -321,10 +358,7 @@ impl Evidence {
         if self.answer_sq.sqrt() <= LIMIT * cause + damped * beyond {
             return false;
         }
-        let digits = match model.spec().settings.precision {
-            Precision::Single => 1e-5,
-            Precision::Double => 1e-12,
-        };
+        let digits = digits(model);
         let mut internal_sq = 0.0;
         let particle_kg = own.as_deref().map_or(&[][..], HybridScratch::particle_kg);
         let masses = model.mass_kg().iter().chain(particle_kg);
@@ -350,5 +384,6 @@ pub(super) fn substeps_for(model: &Model, substeps: u32, quotient: Option<f64>) 
             (f64::from(substeps) * times / SAFETY).ceil().min(f64::from(most)) as u32
         }
     };
-    (substeps < most).then(|| wanted.clamp(substeps + 1, most))
+    let every = model.substeps_per_long_step();
+    (substeps < most).then(|| wanted.clamp(substeps + 1, most).next_multiple_of(every))
 }

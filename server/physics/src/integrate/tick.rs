@@ -39,6 +39,9 @@ pub fn step(model: &Model, state: &mut State, scratch: &mut Scratch, input: &Tic
     scratch.last_good.keep(state);
     if judged {
         scratch.last_good.keep_for_repetition(state);
+        if let Some(own) = &mut scratch.hybrid {
+            own.keep_long_steps(state);
+        }
     }
     let mut repeated = 0;
     loop {
@@ -58,6 +61,9 @@ pub fn step(model: &Model, state: &mut State, scratch: &mut Scratch, input: &Tic
             if let Some(more) = more {
                 scratch.last_good.put_all_back(state);
                 scratch.history.put_back(state);
+                if let Some(own) = &mut scratch.hybrid {
+                    own.put_long_steps_back(state);
+                }
                 state.pace.start_again(more);
                 repeated += 1;
                 continue;
@@ -66,6 +72,9 @@ pub fn step(model: &Model, state: &mut State, scratch: &mut Scratch, input: &Tic
                 state.pace.calm(model, evidence.quotient());
             }
             scratch.history.hand_on(&mut state.pace, substeps);
+            if let Some(own) = &mut scratch.hybrid {
+                own.hand_on_long_step(state);
+            }
         }
         state.tick = state.tick.saturating_add(1);
         let quarantined = spoilt.map(|node| quarantine(model, state, scratch, node));
@@ -83,6 +92,7 @@ fn quarantine(model: &Model, state: &mut State, scratch: &mut Scratch, node: u32
     state.v.fill(DVec3::ZERO);
     state.force_n.fill(DVec3::ZERO);
     state.external_n.fill(DVec3::ZERO);
+    state.active.long_steps.forget();
     state.force_is_current = false;
     state.pace.reset(model);
     state.sleep.wake();
@@ -164,6 +174,7 @@ fn run(tick: &Tick<'_>, state: &mut State, scratch: &mut Scratch) {
 pub(super) fn write_reactions(model: &Model, state: &State, scratch: &mut Scratch) {
     for node in model.spec().prescribed.iter().flat_map(|set| &set.nodes).map(|&node| node as usize) {
         let held = model.inverse_mass_per_kg()[node].cmpeq(DVec3::ZERO);
-        scratch.reaction_n[node] = DVec3::select(held, -state.force_n[node], DVec3::ZERO);
+        let total_n = state.force_n[node] + state.active.long_steps.beyond_of(node);
+        scratch.reaction_n[node] = DVec3::select(held, -total_n, DVec3::ZERO);
     }
 }

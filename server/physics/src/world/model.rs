@@ -27,6 +27,7 @@ pub struct Model {
     contact: ContactModel,
     max_natural_frequency_rad_per_s: f64,
     substeps: u32,
+    substeps_per_long_step: u32,
     scheme: Scheme,
     rest_bound: Option<RestBound>,
     hybrid: Option<Box<Hybrid>>,
@@ -108,6 +109,7 @@ impl Model {
             contact,
             max_natural_frequency_rad_per_s: omega,
             substeps,
+            substeps_per_long_step: 1,
             scheme,
             rest_bound: None,
             hybrid: None,
@@ -204,6 +206,10 @@ impl Model {
     pub fn substeps(&self) -> u32 {
         self.substeps
     }
+    /// Substeps in a step of a hybrid body's coarse level.
+    pub fn substeps_per_long_step(&self) -> u32 {
+        self.substeps_per_long_step
+    }
 }
 
 impl Model {
@@ -246,6 +252,8 @@ impl Model {
         };
         let omega_sq = stretch_sq * touched.max(omega).powi(2) + contact.tool_frequency_sq;
         let substeps = substeps::choose(&spec, &materials, omega_sq.sqrt())?;
+        let coarse_omega = stretch_sq.sqrt() * hybrid.coarse_frequency_rad_per_s();
+        let (substeps, substeps_per_long_step) = substeps::long_steps(&spec, &materials, coarse_omega, substeps);
         Ok(Self {
             kernel: ForceKernel::build(&spec.mesh, &[], &[], &materials, spec.settings.precision),
             rest_tets: Vec::new(),
@@ -256,6 +264,7 @@ impl Model {
             contact,
             max_natural_frequency_rad_per_s: omega,
             substeps,
+            substeps_per_long_step,
             scheme: Scheme::Leapfrog,
             rest_bound: None,
             hybrid: Some(Box::new(hybrid)),

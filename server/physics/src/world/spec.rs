@@ -112,6 +112,8 @@ pub struct Settings {
     pub step_safety: f64,
     /// Takes back a tick of leapfrog that proves unstable and repeats it in more substeps.
     pub subcycle_unstable: bool,
+    /// Takes the coarse level of a hybrid body in steps of its own, as long as it stays stable in (`hybrid::long_steps`).
+    pub long_coarse_steps: bool,
     /// Largest principal stretch the step must stay stable at (≥ 1).
     pub stretch_allowance: f64,
     /// Precision of the force kernel.
@@ -129,6 +131,13 @@ pub struct Settings {
     pub skips: Skips,
 }
 
+impl Settings {
+    /// The defaults for bodies with particles: whether a step is stable is judged as they run, and room for stretch costs them more than it does others.
+    pub fn for_particles() -> Self {
+        Self { stretch_allowance: 1.1, ..Self::default() }
+    }
+}
+
 impl Default for Settings {
     fn default() -> Self {
         Self {
@@ -137,6 +146,7 @@ impl Default for Settings {
             substeps: Substeps::Measured,
             step_safety: 0.9,
             subcycle_unstable: true,
+            long_coarse_steps: true,
             stretch_allowance: 1.2,
             precision: Precision::Single,
             mass_damping_per_s: 0.0,

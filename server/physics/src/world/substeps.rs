@@ -5,6 +5,9 @@ use crate::material::Material;
 /// More substeps than this are refused at load.
 pub const MAX_SUBSTEPS: u32 = 100_000;
 
+/// Part of its stable step that a hybrid body's coarse level takes: below what ticks are judged unstable by (`integrate::stability`).
+const LONG_STEP_SHARE: f64 = 0.85;
+
 /// How much the square of a frequency grows at the allowed stretch: the worst of the laws ([`Material::stiffening`]).
 pub(super) fn stiffening(settings: &Settings, materials: &[Material]) -> f64 {
     materials.iter().map(|material| material.stiffening(settings.stretch_allowance)).fold(1.0, f64::max)
@@ -21,15 +24,39 @@ pub(super) fn choose(spec: &ModelSpec, materials: &[Material], omega: f64) -> Re
     if let Substeps::Fixed(substeps) = settings.substeps {
         return Ok(substeps);
     }
-    let viscous_growth = settings.stretch_allowance.powi(4) / stiffening(settings, materials);
-    let xi = 0.5 * omega * viscous_growth * materials.iter().map(relaxation_time_s).fold(0.0, f64::max);
-    let dt_s = settings.step_safety * 2.0 / omega * ((1.0 + xi * xi).sqrt() - xi);
-    let substeps = (settings.tick_period_s / dt_s).ceil().max(1.0);
+    let substeps = wanted(settings, materials, omega);
     if substeps <= f64::from(MAX_SUBSTEPS) {
         Ok(substeps as u32)
     } else {
         Err(ModelError::TooStiff { substeps, omega_rad_per_s: omega, limit: MAX_SUBSTEPS })
     }
+}
+
+/// Substeps of a hybrid body that needs so many, and how many of them make a step of its coarse level, whose largest frequency is `omega` when stretched.
+pub(super) fn long_steps(spec: &ModelSpec, materials: &[Material], omega: f64, substeps: u32) -> (u32, u32) {
+    let settings = &spec.settings;
+    let least = wanted(settings, materials, omega / LONG_STEP_SHARE);
+    if !settings.long_coarse_steps || least >= f64::from(substeps) {
+        return (substeps, 1);
+    }
+    let least = least as u32;
+    match settings.substeps {
+        Substeps::Measured => {
+            let every = substeps.div_ceil(least);
+            (every * least, every)
+        }
+        Substeps::Fixed(_) => {
+            let long_steps = (least..=substeps).find(|long_steps| substeps.is_multiple_of(*long_steps));
+            (substeps, substeps / long_steps.unwrap_or(substeps))
+        }
+    }
+}
+
+fn wanted(settings: &Settings, materials: &[Material], omega: f64) -> f64 {
+    let viscous_growth = settings.stretch_allowance.powi(4) / stiffening(settings, materials);
+    let xi = 0.5 * omega * viscous_growth * materials.iter().map(relaxation_time_s).fold(0.0, f64::max);
+    let dt_s = settings.step_safety * 2.0 / omega * ((1.0 + xi * xi).sqrt() - xi);
+    (settings.tick_period_s / dt_s).ceil().max(1.0)
 }
 
 /// Largest ratio of viscosity to stiffness (s) over P-waves, shear and bulk.

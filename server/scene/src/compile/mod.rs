@@ -119,12 +119,15 @@ fn settings(document: &Document) -> Result<Settings, Fault> {
         substeps,
         step_safety,
         subcycle_unstable,
+        long_coarse_steps,
         stretch_allowance,
         mass_damping_per_s,
         solver_iterations,
         solver_tolerance,
         sleep_tolerance_um,
     } = document.numerics;
+    let defaults = if document.body.particles.is_some() { Settings::for_particles() } else { Settings::default() };
+    let stretch_allowance = stretch_allowance.unwrap_or(defaults.stretch_allowance);
     let period = document.scene.tick_period_s;
     check(
         &Where::root("scene").key("tick_period_s"),
@@ -167,6 +170,7 @@ fn settings(document: &Document) -> Result<Settings, Fault> {
         substeps: substeps.map_or(Substeps::Measured, Substeps::Fixed),
         step_safety,
         subcycle_unstable,
+        long_coarse_steps,
         stretch_allowance,
         precision: match precision {
             PrecisionName::Single => Precision::Single,

@@ -217,8 +217,10 @@ pub(crate) struct NumericsTable {
     pub(crate) step_safety: f64,
     /// Leapfrog takes back a tick that proves unstable and repeats it in more substeps.
     pub(crate) subcycle_unstable: bool,
-    /// Largest principal stretch the step must stay stable at, 1 or larger.
-    pub(crate) stretch_allowance: f64,
+    /// The coarse tets of a body with particles are taken in steps of their own, as long as are stable for them.
+    pub(crate) long_coarse_steps: bool,
+    /// Largest principal stretch the step must stay stable at, 1 or larger; 1.2 by default, 1.1 of a body with particles.
+    pub(crate) stretch_allowance: Option<f64>,
     /// Mass-proportional damping (1/s).
     pub(crate) mass_damping_per_s: f64,
     /// Most iterations of an implicit integrator's solver per substep, 1 to 10000.
@@ -239,7 +241,8 @@ impl Default for NumericsTable {
             substeps: None,
             step_safety: settings.step_safety,
             subcycle_unstable: settings.subcycle_unstable,
-            stretch_allowance: settings.stretch_allowance,
+            long_coarse_steps: settings.long_coarse_steps,
+            stretch_allowance: None,
             mass_damping_per_s: settings.mass_damping_per_s,
             solver_iterations: settings.solver_iterations,
             solver_tolerance: settings.solver_tolerance,

@@ -66,7 +66,7 @@ impl Method for Hybrid {
         let (spacing_m, fine) =
             fineness(problem.body).ok_or_else(|| miette!("the {} has no particles", problem.body.name()))?;
         let (coarse, fine) = (problem.body.tets(resolution)?, problem.body.tets(fine)?);
-        let settings = Settings { mass_damping_per_s: pace.damping_per_s, ..Settings::default() };
+        let settings = Settings { mass_damping_per_s: pace.damping_per_s, ..Settings::for_particles() };
         let mut spec = ModelSpec {
             particles: Some(particles(problem.body, &fine, spacing_m, self.active)?),
             ..super::subject::spec(problem.material()?, &coarse, settings)

@@ -1,0 +1,138 @@
+//! The coarse level of a body with particles in steps of its own.
+#![allow(clippy::unwrap_used)]
+mod rig;
+use glam::DVec3;
+use palpate_physics::{
+    Energies, ModelSpec, Precision, Settings, Substeps, Surface,
+    contact::Coupling,
+    hybrid::{ParticleSpec, Skin, Waking, wake_only},
+    material::Law,
+};
+use rig::{Rig, body, bricks, even, hold, material, nodes_where, sphere};
+
+/// 80 × 80 × 40 mm in 192 coarse tets, particles 2.5 mm apart, held below.
+fn block(substeps: u32, long_coarse_steps: bool) -> ModelSpec {
+    let axes = |cells: usize| {
+        let side = even(-0.04, 0.04, 2 * cells);
+        bricks(&side, &side, &even(-0.04, 0.0, cells))
+    };
+    let (coarse, fine) = (axes(2), axes(16));
+    let surface = Surface::of(&fine).unwrap();
+    let positions = surface.nodes.iter().map(|&n| fine.positions_m()[n as usize]).collect();
+    let mut spec = body(coarse, material(Law::StableNeoHookean, 10e3, 0.45));
+    spec.particles = Some(ParticleSpec {
+        skin: Skin::new(positions, surface.triangles).unwrap(),
+        spacing_m: 2.5e-3,
+        lattice_through_m: DVec3::ZERO,
+        most_active: 300,
+        waking: Waking::ByHand,
+    });
+    spec.prescribed = vec![hold("bottom", nodes_where(&spec.mesh, |p| p.z < -0.0399), [true; 3])];
+    spec.settings =
+        Settings { precision: Precision::Double, substeps: Substeps::Fixed(substeps), ..Settings::for_particles() };
+    spec.settings.long_coarse_steps = long_coarse_steps;
+    spec
+}
+
+/// The particles nearest to the middle of the upper face awake.
+fn with_awake(spec: ModelSpec, count: usize) -> Rig {
+    let mut rig = Rig::new(spec);
+    let partition = rig.model.hybrid().unwrap().partition();
+    let mut near: Vec<u32> = (0..partition.particle_count() as u32).collect();
+    let distance_sq = |particle: u32| partition.particle_m(particle).length_squared();
+    near.sort_by(|&a, &b| distance_sq(a).total_cmp(&distance_sq(b)));
+    near.truncate(count);
+    wake_only(&rig.model, &mut rig.state, &mut rig.scratch, near);
+    rig
+}
+
+/// Forces (N) on a sphere that presses 2 mm deep within `ramp` ticks and stays.
+fn pressed_n(substeps: u32, long_coarse_steps: bool, ramp: u32) -> Vec<f64> {
+    let mut spec = block(substeps, long_coarse_steps);
+    spec.settings.mass_damping_per_s = 20.0;
+    spec.tools = vec![sphere(8e-3, DVec3::Z * 8.01e-3, Coupling::Rigid)];
+    let mut rig = with_awake(spec, 200);
+    let every = if long_coarse_steps { substeps } else { 1 };
+    assert_eq!((rig.model.substeps(), rig.model.substeps_per_long_step()), (substeps, every));
+    let force_n = |tick: u32| {
+        let report = rig.tick_at(DVec3::Z * (8e-3 - 2e-3 * f64::from(tick.min(ramp)) / f64::from(ramp)));
+        assert_eq!(report.repeated, 0);
+        rig.state.tools[0].contact_force_n.z
+    };
+    (0..400).map(force_n).collect()
+}
+
+/// Against half of the step: one step a tick of the coarse level is as near as six, while the sphere comes, just after, and at rest.
+#[test]
+fn one_long_step_a_tick_presses_as_short_ones_do() {
+    for ramp in [20, 100] {
+        let reference = pressed_n(12, false, ramp);
+        let last = reference[399];
+        let worst = |forces: &[f64], ticks: std::ops::Range<usize>| {
+            ticks.map(|t| (forces[t] - reference[t]).abs() / last).fold(0.0, f64::max)
+        };
+        let (short, long) = (pressed_n(6, false, ramp), pressed_n(6, true, ramp));
+        for ticks in [0..ramp as usize, ramp as usize..ramp as usize + 100] {
+            let [short, long] = [&short, &long].map(|forces| worst(forces, ticks.clone()));
+            assert!(long < short + 2e-3, "ramp of {ramp}, ticks {ticks:?}: {long:e}, short steps {short:e}");
+        }
+        assert!((long[399] / last - 1.0).abs() < 1e-3, "{} {last}", long[399]);
+    }
+}
+
+/// What `b` follows late feeds a body that nothing damps: less than a per cent of its energy in a second.
+#[test]
+fn a_trembling_body_hardly_gains_energy() {
+    let mut rig = with_awake(block(4, true), 300);
+    assert_eq!(rig.model.substeps_per_long_step(), 4);
+    let nodes = rig.model.mass_kg().len();
+    for (number, v) in rig.state.v.iter_mut().enumerate() {
+        let s = number as f64;
+        let free = number >= nodes || rig.model.inverse_mass_per_kg()[number] != DVec3::ZERO;
+        *v = if free { DVec3::new((s * 0.7).sin(), (s * 1.9).cos(), (s * 2.3).sin()) * 1e-4 } else { DVec3::ZERO };
+    }
+    let drive = rig.still();
+    let mut means = vec![];
+    for _ in 0..4 {
+        let mut sum = 0.0;
+        for tick in 0..500 {
+            rig.tick(&drive);
+            if tick % 10 == 0 {
+                sum += Energies::of(&rig.model, &rig.state).held_j();
+            }
+        }
+        means.push(sum);
+    }
+    let gain_per_s = (means[3] / means[1]).ln();
+    assert!(gain_per_s.abs() < 1e-2, "{gain_per_s:e} a second");
+}
+
+/// Far beyond what its steps are made for: noticed, taken back and repeated in more of them.
+#[test]
+fn a_long_step_that_is_too_long_is_noticed() {
+    let run = |subcycle_unstable: bool| {
+        let mut spec = block(4, true);
+        spec.settings.subcycle_unstable = subcycle_unstable;
+        let mut rig = with_awake(spec, 0);
+        assert_eq!(rig.model.substeps_per_long_step(), 4);
+        for (x, inverse) in rig.state.x.iter_mut().zip(rig.model.inverse_mass_per_kg()) {
+            if *inverse != DVec3::ZERO {
+                *x = *x * 1.5 + DVec3::Z * 0.02;
+            }
+        }
+        rig.state.force_is_current = false;
+        let drive = rig.still();
+        let (start_j, mut most_j, mut repeated) = (Energies::of(&rig.model, &rig.state).held_j(), 0.0_f64, 0);
+        for _ in 0..60 {
+            let report = rig.tick(&drive);
+            repeated += report.repeated;
+            let now_j = Energies::of(&rig.model, &rig.state).held_j();
+            most_j = most_j.max(if report.quarantined.is_some() { f64::INFINITY } else { now_j / start_j });
+        }
+        (most_j, repeated)
+    };
+    let (most, repeated) = run(false);
+    assert!(most > 3.0 && repeated == 0, "{most} {repeated}");
+    let (most, repeated) = run(true);
+    assert!(most < 1.1 && (1..5).contains(&repeated), "{most} {repeated}");
+}
