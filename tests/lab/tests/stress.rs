@@ -33,6 +33,11 @@ fn time_step() {
 }
 
 #[test]
+fn activation() {
+    passes("activation");
+}
+
+#[test]
 fn stiffness_ratio() {
     falls_short_as_known("stiffness-ratio", 5);
 }

@@ -20,7 +20,7 @@ use glam::{DMat3, DVec3};
 use serde::{Deserialize, Serialize};
 
 /// τ (s).
-const FADING_S: f64 = 0.02;
+const FADING_S: f64 = 0.03;
 /// A change of rest state smaller than this is none.
 const NOTHING: f64 = 1e-9;
 

@@ -100,7 +100,8 @@ impl Method for Hybrid {
     }
 }
 
-fn particles(body: Body, fine: &TetBody, spacing_m: f64, most_active: usize) -> Result<ParticleSpec> {
+/// Particles in a body whose skin is the boundary of a fine mesh.
+pub(crate) fn particles(body: Body, fine: &TetBody, spacing_m: f64, most_active: usize) -> Result<ParticleSpec> {
     let rest = fine.mesh.positions_m();
     let on_skin = fine.surface.nodes.iter().map(|&node| rest[node as usize]).collect();
     let skin = Skin::new(on_skin, fine.surface.triangles.clone()).into_diagnostic()?;
@@ -111,7 +112,7 @@ fn particles(body: Body, fine: &TetBody, spacing_m: f64, most_active: usize) -> 
 }
 
 /// The particles nearest to a point that may wake.
-fn nearest(model: &Model, point_m: DVec3, count: usize) -> Vec<u32> {
+pub(crate) fn nearest(model: &Model, point_m: DVec3, count: usize) -> Vec<u32> {
     let Some(body) = model.hybrid() else { return vec![] };
     let partition = body.partition();
     let mut near: Vec<u32> = (0..partition.particle_count() as u32).filter(|&p| body.may_wake(p)).collect();

@@ -16,6 +16,7 @@ mod testing;
 mod tetrahedra;
 mod xpbd;
 
+pub(crate) use hybrid::{nearest, particles};
 pub use pace::{Pace, tremor};
 
 use crate::problems::{Problem, body::Body};

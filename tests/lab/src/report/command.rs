@@ -38,9 +38,9 @@ pub struct Options {
     /// Only problems whose name contains this
     #[arg(long)]
     problem: Option<String>,
-    /// Only methods whose name contains this
+    /// Only methods whose name contains this, or another such that is given
     #[arg(long)]
-    method: Option<String>,
+    method: Vec<String>,
     /// Processor to be held to
     #[arg(long)]
     processor: Option<usize>,
@@ -72,7 +72,7 @@ pub fn run(options: &Options) -> Result<()> {
     let in_extent = |p: &Problem| !options.quick || is_quick(p) || options.peers && p.name == problems::OF_PEERS;
     problems.retain(|p| chosen(&p.name, &options.problem) && in_extent(p));
     let mut methods = methods::all();
-    methods.retain(|m| chosen(m.name(), &options.method));
+    methods.retain(|m| options.method.is_empty() || options.method.iter().any(|filter| m.name().contains(filter)));
     if problems.is_empty() {
         let names: Vec<String> = problems::all().into_iter().map(|p| p.name).collect();
         let left_out = options.quick && names.iter().any(|name| chosen(name, &options.problem));
@@ -85,11 +85,7 @@ pub fn run(options: &Options) -> Result<()> {
     }
     if methods.is_empty() {
         let names: Vec<String> = methods::all().iter().map(|m| m.name().to_owned()).collect();
-        bail!(
-            "no method has \"{}\" in its name; there are {}",
-            options.method.as_deref().unwrap_or_default(),
-            names.join(", ")
-        );
+        bail!("no method has \"{}\" in its name; there are {}", options.method.join("\" or \""), names.join(", "));
     }
     let effort = match (options.quick, options.full) {
         (true, _) => Effort { full: false, rounds: 60, budget_s: 1.2 },
@@ -128,7 +124,7 @@ pub fn run(options: &Options) -> Result<()> {
         bar.inc(1);
     }
     // Whoever asks for one problem or method wants its rows, not a minute of what concerns none in particular.
-    let whole = options.problem.is_none() && options.method.is_none();
+    let whole = options.problem.is_none() && options.method.is_empty();
     let convergence = if whole { convergence::all()? } else { vec![] };
     let (skips, stress) = if whole { (skips(options, &bar)?, stress(options, &bar)?) } else { (vec![], vec![]) };
     bar.finish_and_clear();

@@ -1,7 +1,7 @@
 //! The page's section on numerical stress.
 use super::page::escape;
 use crate::measure::Run;
-use crate::stress::{Measured, NOT_BUILT, Outcome, Record, Row, number, records, verdict};
+use crate::stress::{Measured, Outcome, Record, Row, number, records, verdict};
 use miette::Result;
 use std::fmt::Write as _;
 
@@ -19,9 +19,6 @@ pub(super) fn section(out: &mut String, results: &[(Row, Outcome)], run: &Run) -
     for (row, outcome) in results {
         let numbers = outcome.measured.iter().map(|m: &Measured| (m.name.as_str(), m.value, m.unit, m.limit));
         entry(out, [row.name, row.criterion, verdict(outcome), &outcome.reason(), form], numbers);
-    }
-    for (name, reason) in NOT_BUILT {
-        let _ = write!(out, "<p><b>{}</b>: {}</p>", escape(name), escape(reason));
     }
     let records = records()?;
     if !records.is_empty() {

@@ -5,6 +5,7 @@
 //! - `record.rs`: long runs, kept in the source tree
 //! - `rig.rs`, `meshes.rs`, `random.rs`: what rows share
 //! - one file per row
+mod activation;
 mod bad_input;
 mod impulses;
 mod incompressible;
@@ -72,7 +73,7 @@ pub struct Row {
 }
 
 /// Every row, in the order of the table.
-pub const ROWS: [Row; 9] = [
+pub const ROWS: [Row; 10] = [
     Row { name: "time-step", criterion: time_step::CRITERION, run: time_step::run },
     Row { name: "stiffness-ratio", criterion: stiffness_ratio::CRITERION, run: stiffness_ratio::run },
     Row { name: "incompressible", criterion: incompressible::CRITERION, run: incompressible::run },
@@ -82,10 +83,8 @@ pub const ROWS: [Row; 9] = [
     Row { name: "bad-input", criterion: bad_input::CRITERION, run: bad_input::run },
     Row { name: "slivers", criterion: slivers::CRITERION, run: slivers::run },
     Row { name: "random-scenes", criterion: random_scenes::CRITERION, run: random_scenes::run },
+    Row { name: "activation", criterion: activation::CRITERION, run: activation::run },
 ];
-
-/// What the suite should have and cannot have yet: name and reason.
-pub const NOT_BUILT: [(&str, &str); 1] = [("activation", "not built yet: hybrid model")];
 
 /// `palpate-lab stress`.
 #[derive(Debug, Clone, Args)]
@@ -123,9 +122,6 @@ pub fn run(command: &Command) -> Result<()> {
             println!("kept in {}", Record::of(&row, &options, &outcome, elapsed_s).write()?.display());
         }
         results.push((row, outcome));
-    }
-    for (name, reason) in NOT_BUILT.iter().filter(|_| command.rows.is_empty()) {
-        println!("{name}: {reason}");
     }
     if let Some(folder) = &command.out {
         println!("wrote {}", write_csv(folder, &options, &results)?.display());
