@@ -100,7 +100,12 @@ mod tests {
             "{}",
             lines[1]
         );
-        assert_eq!(lines[1].matches(',').count(), COLUMNS.matches(',').count() + 1, "the reason has one");
+        // Commas count where an even number of quotes stands before them.
+        let separators = |line: &str| {
+            let outside = line.split('"').step_by(2);
+            outside.map(|text| text.matches(',').count()).sum::<usize>()
+        };
+        assert_eq!(separators(lines[1]), separators(COLUMNS));
     }
 
     #[test]
