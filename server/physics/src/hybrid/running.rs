@@ -2,6 +2,8 @@
 //!
 //! *Points* are the particles of awake cells, ascending: those that are active, and those of the border, which follow the coarse nodes.
 mod layout;
+#[cfg(test)]
+mod tests;
 
 use super::{
     active::room_for_cells,
@@ -361,97 +363,6 @@ impl RunningPatch {
             } else {
                 x_particles[point.active as usize] - point.rest_m
             };
-        }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::{
-        hybrid::{
-            metric::Metric,
-            patch::{Field, Patch},
-            testing::{Random, hybrid_ball, tissue},
-        },
-        material::{Material, Viscosity},
-    };
-    use std::collections::BTreeSet;
-
-    fn some(hybrid: &Hybrid, wanted: impl Fn(DVec3) -> bool) -> Vec<u32> {
-        let particles = 0..hybrid.partition.particle_count() as u32;
-        particles.filter(|&p| hybrid.may_wake(p) && wanted(hybrid.partition.particle_m(p))).collect()
-    }
-
-    fn largest(list: &[DVec3]) -> f64 {
-        list.iter().map(|a| a.length()).fold(0.0, f64::max)
-    }
-
-    /// Whichever particles were awake before: forces, power, accelerations and momenta are the oracle's.
-    #[test]
-    fn running_patch_and_oracle_agree() {
-        let [stvk, neo, corotated] = tissue();
-        let mut random = Random(51);
-        for materials in
-            [[neo, stvk], [corotated, neo].map(|m: Material| Material { viscosity: Viscosity::default(), ..m })]
-        {
-            let hybrid = hybrid_ball(&materials);
-            for (precision, bound) in [(Precision::Double, 1e-11), (Precision::Single, 3e-5)] {
-                let mut running = RunningPatch::new(&hybrid, 2000, precision);
-                let near = |p: DVec3| p.distance(DVec3::new(2e-3, 1e-3, 9e-3)) < 4e-3;
-                let far = |p: DVec3| near(p) || p.distance(DVec3::new(-8e-3, 0.0, 0.0)) < 3e-3;
-                for active in [some(&hybrid, near), some(&hybrid, far), vec![], some(&hybrid, |p| p.x > 0.2e-3)] {
-                    running.wake(&hybrid, &active, &Fading::default());
-                    let set: BTreeSet<u32> = active.iter().copied().collect();
-                    let patch = Patch::new(&hybrid.partition, &set);
-                    let rest = patch.at_rest(&hybrid.partition);
-                    let shaken = |list: &[DVec3], size: f64, random: &mut Random| -> Vec<DVec3> {
-                        list.iter().map(|p| *p + DVec3::new(3.0, 2.0, 1.0) * size + random.vector() * size).collect()
-                    };
-                    let at = Field {
-                        nodes: shaken(&rest.nodes, 0.1e-3, &mut random),
-                        particles: shaken(&rest.particles, 0.1e-3, &mut random),
-                    };
-                    let zero = |list: &[DVec3]| vec![DVec3::ZERO; list.len()];
-                    let rate = Field {
-                        nodes: shaken(&zero(&rest.nodes), 0.1, &mut random),
-                        particles: shaken(&zero(&rest.particles), 0.1, &mut random),
-                    };
-                    let (expected, expected_w) = patch.forces_n(&hybrid.materials(), &at, &rate);
-                    let joined = |field: &Field| [&field.nodes[..], &field.particles].concat();
-                    let (expected, x, v) = (joined(&expected), joined(&at), joined(&rate));
-                    let mut forces = x.clone();
-                    running.displace(&hybrid, &x);
-                    forces.fill(DVec3::ZERO);
-                    let power_w = running.add_coarse_forces_n(&v, &mut forces)
-                        + running.add_cell_forces_n(&hybrid, &v, &mut forces);
-                    let worst = forces.iter().zip(&expected).map(|(a, b)| a.distance(*b)).fold(0.0, f64::max);
-                    assert!(worst < bound * largest(&expected), "{precision:?}, {}: {worst:e}", active.len());
-                    assert!((power_w - expected_w).abs() <= 10.0 * bound * expected_w, "{power_w} {expected_w}");
-
-                    let metric = Metric::new(&hybrid.partition, &hybrid.masses, &set, &hybrid.free).unwrap();
-                    let nodes = hybrid.node_count();
-                    let mut accelerations = expected[..nodes].to_vec();
-                    metric.accelerate(&hybrid.free, &mut accelerations);
-                    let particles = expected[nodes..].iter().zip(metric.particle_kg()).map(|(f, m)| *f / *m);
-                    accelerations.extend(particles);
-                    let mut found = expected.clone();
-                    running.metric.accelerate(&mut found);
-                    let worst = found.iter().zip(&accelerations).map(|(a, b)| a.distance(*b)).fold(0.0, f64::max);
-                    assert!(worst < 1e-9 * largest(&accelerations), "{worst:e} of {:e}", largest(&accelerations));
-                    let mut momenta = v.clone();
-                    running.metric.momenta(&hybrid, &v, &mut momenta);
-                    let of_nodes = metric.momenta(&v[..nodes]);
-                    let worst = momenta.iter().zip(&of_nodes).map(|(a, b)| a.distance(*b)).fold(0.0, f64::max);
-                    assert!(worst < 1e-12 * largest(&of_nodes), "{worst:e}");
-                    // Gravity moves everything alike.
-                    let mut weight = zero(&x);
-                    running.metric.add_weight_n(DVec3::X, &mut weight);
-                    running.metric.momenta(&hybrid, &vec![DVec3::X; x.len()], &mut momenta);
-                    let worst = weight.iter().zip(&momenta).map(|(a, b)| a.distance(*b)).fold(0.0, f64::max);
-                    assert!(worst < 1e-12 * largest(&weight), "{worst:e}");
-                }
-            }
         }
     }
 }

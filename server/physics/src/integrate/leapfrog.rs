@@ -16,6 +16,7 @@ use super::{
     forces::Tick,
     hybrid,
     motion::{self, drift},
+    stability::is_judged,
 };
 use crate::world::{Model, Scratch, State};
 
@@ -37,6 +38,7 @@ pub(super) fn run(tick: &Tick<'_>, state: &mut State, scratch: &mut Scratch) {
 /// After `done` substeps: notes what a long step of a hybrid body's coarse level is judged by, where one begins.
 fn note_long_step(tick: &Tick<'_>, done: u32, state: &State, scratch: &mut Scratch) {
     if tick.model.substeps_per_long_step() > 1
+        && is_judged(tick.model)
         && tick.ends_long_step(done)
         && let Some(own) = &mut scratch.hybrid
     {

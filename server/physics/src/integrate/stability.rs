@@ -224,10 +224,11 @@ impl ForceHistory {
             let now = state.force_n.iter().zip(&state.external_n).map(|(force, external)| *force - *external);
             let second = now.zip(one.internal_n()).zip(two.internal_n()).map(|((g0, g1), g2)| g0 - g1 * 2.0 + g2);
             let answer_sq = own.size_sq(second);
-            let [_, one_sq, two_sq] = if substeps == 1 {
-                [one, one, two].map(|forces| own.size_sq(forces.total_n.iter().copied()))
+            let [one_sq, two_sq] = if substeps == 1 {
+                [one, two].map(|forces| own.size_sq(forces.total_n.iter().copied()))
             } else {
-                own.kick_sq
+                let [_, one_sq, two_sq] = own.kick_sq;
+                [one_sq, two_sq]
             };
             let long_step = long_step_quotient(model, state, own, substeps);
             return Evidence { answer_sq, cause_sq: one_sq.max(two_sq) + held_sq, long_step };
