@@ -296,6 +296,28 @@ fn switching_a_strained_region_keeps_force_and_books_its_energy() {
     assert!(worst_step < 1e-2, "{worst_step:e}");
 }
 
+/// A region beneath a sphere that presses is switched in every tick, which nothing but this does: what fading gives is limited.
+#[test]
+fn switching_in_every_tick_shakes_a_body_but_little() {
+    let mut rig = pressed(Precision::Double);
+    let touched = near(&rig, DVec3::ZERO, 8e-3);
+    wake_only(&rig.model, &mut rig.state, &mut rig.scratch, touched.iter().copied());
+    for tick in 0..400 {
+        rig.tick_at(DVec3::Z * (6e-3 - 2.5e-3 * f64::from(tick.min(200)) / 200.0));
+    }
+    let beside = near(&rig, DVec3::X * 5e-3, 8e-3);
+    let elastic_j = Energies::of(&rig.model, &rig.state).elastic_j;
+    let mut most_j = 0.0_f64;
+    for tick in 0..1000_u32 {
+        let awake = if tick.is_multiple_of(2) { &beside } else { &touched };
+        wake_only(&rig.model, &mut rig.state, &mut rig.scratch, awake.iter().copied());
+        let report = rig.tick_at(DVec3::Z * 3.5e-3);
+        assert!(report.quarantined.is_none(), "{tick}: {:?}", report.quarantined);
+        most_j = most_j.max(Energies::of(&rig.model, &rig.state).kinetic_j);
+    }
+    assert!(most_j < 0.1 * elastic_j, "{most_j:e} {elastic_j:e}");
+}
+
 /// All particles beneath a sphere that already presses wake at once: it feels them come within some hundredths of a second.
 #[test]
 fn waking_beneath_the_tool_is_not_felt_as_a_step() {

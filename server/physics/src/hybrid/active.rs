@@ -22,6 +22,8 @@ pub struct ActiveParticles {
     pub(super) fading: Fading,
     /// Balancing forces (N), as many as positions, or none.
     pub(super) balance_n: Vec<DVec3>,
+    /// Energy (J) that fading strains and balancing forces gave lately, beyond what they and switches took.
+    pub(crate) given_j: f64,
     pub(crate) long_steps: LongSteps,
 }
 
@@ -32,6 +34,7 @@ impl ActiveParticles {
             balls: vec![None; tools(model)],
             fading: fading_with_room(model),
             balance_n: Vec::with_capacity(entries(model)),
+            given_j: 0.0,
             long_steps: LongSteps::with_room(model.hybrid().map_or(0, Hybrid::node_count), entries(model)),
         }
     }
@@ -68,6 +71,7 @@ impl ActiveParticles {
         self.balls.fill(None);
         self.fading.clear();
         self.balance_n.clear();
+        self.given_j = 0.0;
         self.long_steps.forget();
     }
 
@@ -76,6 +80,7 @@ impl ActiveParticles {
         self.balls.clone_from(&other.balls);
         self.fading.copy_from(&other.fading);
         self.balance_n.clone_from(&other.balance_n);
+        self.given_j = other.given_j;
         self.long_steps.copy_from(&other.long_steps);
     }
 
@@ -88,6 +93,7 @@ impl ActiveParticles {
             && self.fading.is_finite()
             && [0, model.rest_positions_m().len() + self.ids.len()].contains(&self.balance_n.len())
             && self.balance_n.iter().all(|force| force.is_finite())
+            && self.given_j.is_finite()
             && self.long_steps.fit(model.rest_positions_m().len(), model.rest_positions_m().len() + self.ids.len())
             && self.fading.cells.is_sorted_by(|a, b| a.cell < b.cell)
             && self.fading.tets.is_sorted_by(|a, b| a.tet < b.tet)

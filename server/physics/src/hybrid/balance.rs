@@ -7,10 +7,21 @@
 //! ```
 //! `Σ c = 0`, since neither momentum nor external force changed. Their torque is zero at first; as the body moves on it is taken from them again by forces
 //! `M_i α × (x_i − x̄)` on the coarse nodes of a body that is held nowhere. The work of these forces is booked in the ledger.
-use super::{body::Hybrid, patch::KEPT, running_metric::RunningMetric};
+//!
+//! They are dead loads: on what swings while regions are switched they may do work without end, as may strains that fade (`fade`). What both gave lately, beyond what they and
+//! switches took, is kept; where it is more than a tenth of the elastic energy of what fades, forces are balanced no more, and jump.
+use super::{active::ActiveParticles, body::Hybrid, fade, patch::KEPT, running_metric::RunningMetric};
 use crate::world::State;
 use glam::{BVec3, DMat3, DVec3};
 
+/// τ (s): less than that of strains, since forces that go on pushing what swings may feed it.
+const FADING_S: f64 = 0.02;
+/// The same where it did (s).
+const HURRIED_S: f64 = 0.003;
+/// How fast what fading gave is forgotten (s).
+const FORGETTING_S: f64 = 1.0;
+/// Fading that gave more than this, over the elastic energy of what fades, is not helped on by balancing forces.
+const MOST_GIVEN: f64 = 0.1;
 /// Balancing forces smaller than this, over the largest force, are none.
 const NOTHING: f64 = 1e-9;
 
@@ -115,6 +126,21 @@ impl Balance {
     pub(crate) fn work_j(&self, v: &[DVec3], accelerations: &[DVec3], h_s: f64) -> f64 {
         let power = |((taken, v), a): ((&DVec3, &DVec3), &DVec3)| taken.dot(*v + *a * (0.5 * h_s));
         h_s * self.taken_n.iter().zip(v).zip(accelerations).map(power).sum::<f64>()
+    }
+}
+
+impl ActiveParticles {
+    /// Whether fading gave little beside the elastic energy (J) of what fades.
+    pub(super) fn may_balance(&self, elastic_j: f64) -> bool {
+        self.given_j <= MOST_GIVEN * elastic_j
+    }
+
+    /// A tick's fading of balancing forces, while what fades holds `elastic_j` (J).
+    pub(super) fn fade_balance(&mut self, period_s: f64, elastic_j: f64) {
+        self.given_j *= fade::factor(period_s, FORGETTING_S);
+        let time_constant_s = if self.may_balance(elastic_j) { FADING_S } else { HURRIED_S };
+        let factor = fade::factor(period_s, time_constant_s);
+        self.balance_n.iter_mut().for_each(|balance| *balance *= factor);
     }
 }
 

@@ -10,6 +10,7 @@ use super::{
     partition::Partition,
     patch::{KEPT, Materials},
     place::{Place, SkinPlace},
+    projection::Lumping,
     sites::Sites,
     skin::Skin,
     spec::{HybridError, ParticleSpec},
@@ -29,7 +30,11 @@ pub(super) const NO_WEIGHT: f64 = 1e-9;
 #[derive(Debug, Clone)]
 pub struct Hybrid {
     pub(super) partition: Partition,
+    /// Rest data of a cell that the surface does not cut.
+    full_cell: RestCell,
     pub(super) masses: Masses,
+    /// What lumping adds to them.
+    pub(super) lumping: Lumping,
     pub(super) materials: Vec<Material>,
     pub(super) of_tet: Vec<u16>,
     /// Axes along which coarse nodes may move.
@@ -110,6 +115,8 @@ impl Hybrid {
             .map(|p| partition.anchor(p).weights.iter().map(|w| w.abs()).sum())
             .fold(1.0, f64::max);
         let hybrid = Self {
+            lumping: Lumping::new(&partition, &masses),
+            full_cell: awake_cell(&partition, partition.full_moments()),
             materials: materials.to_vec(),
             densities_kg_per_m3: densities_kg_per_m3.to_vec(),
             of_tet: of_tet.to_vec(),
@@ -158,7 +165,11 @@ impl Hybrid {
 
     /// Rest data of a cell that is awake.
     pub(super) fn awake_cell(&self, cell: usize) -> RestCell {
-        RestCell::new(self.partition.sites().spacing_m(), 1.0 - KEPT, &self.partition.moments(cell))
+        if self.partition.is_cut(cell) {
+            awake_cell(&self.partition, self.partition.moments(cell))
+        } else {
+            self.full_cell
+        }
     }
 
     /// The material of a coarse tet.
@@ -275,6 +286,11 @@ fn covering(
     let points: Vec<DVec3> = corners.into_iter().map(|site| sites.site_m(site)).collect();
     let held: BTreeSet<u32> = prescribed.iter().flat_map(|set| &set.nodes).copied().collect();
     cage::cover(mesh, surface, &held, &points)
+}
+
+/// A cell's rest data from its integrals.
+fn awake_cell(partition: &Partition, moments: (f64, [DVec3; 8])) -> RestCell {
+    RestCell::new(partition.sites().spacing_m(), 1.0 - KEPT, &moments)
 }
 
 fn may_wake(partition: &Partition, free: &[BVec3], particle: u32) -> bool {

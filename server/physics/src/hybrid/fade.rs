@@ -20,7 +20,7 @@ use glam::{DMat3, DVec3};
 use serde::{Deserialize, Serialize};
 
 /// τ (s).
-const FADING_S: f64 = 0.03;
+pub(super) const FADING_S: f64 = 0.03;
 /// A change of rest state smaller than this is none.
 const NOTHING: f64 = 1e-9;
 
@@ -58,8 +58,8 @@ pub struct Fading {
 }
 
 /// `e^{−T/τ}`.
-pub(super) fn factor(period_s: f64) -> f64 {
-    (-period_s / FADING_S).exp()
+pub(super) fn factor(period_s: f64, time_constant_s: f64) -> f64 {
+    (-period_s / time_constant_s).exp()
 }
 
 /// `F (I + A)`.

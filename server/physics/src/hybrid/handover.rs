@@ -23,8 +23,8 @@ pub(super) struct Before {
     tets: Vec<TetBefore>,
     /// What fades after it, and before.
     next: Fading,
-    /// Tets that lose cells first.
-    first_lost: Vec<u32>,
+    /// Tets that are touched first.
+    first_touched: Vec<u32>,
 }
 
 #[derive(Debug, Clone, Copy)]
@@ -51,7 +51,7 @@ impl Before {
             cells: Vec::with_capacity(cells),
             tets: Vec::with_capacity(2 * tets),
             next,
-            first_lost: Vec::with_capacity(tets),
+            first_touched: Vec::with_capacity(tets),
         }
     }
 
@@ -69,14 +69,23 @@ impl Before {
         self.tets.sort_unstable_by_key(|before| before.tet);
     }
 
-    /// Takes the tets, too, that lose cells first now, and works out what fades: `patch` is the next one, displaced, `fading` what faded before.
-    pub(super) fn fade_into(&mut self, body: &Hybrid, patch: &RunningPatch, x: &[DVec3], fading: &mut Fading) {
+    /// Takes the tets, too, that lose cells first now or whose nodes have moved from where they were, and works out what fades: `patch` is the next one,
+    /// displaced, `fading` what faded before.
+    pub(super) fn fade_into(
+        &mut self,
+        body: &Hybrid,
+        patch: &RunningPatch,
+        (were_m, x): (&[DVec3], &[DVec3]),
+        fading: &mut Fading,
+    ) {
         let known = self.tets.len();
-        self.first_lost.clear();
-        for &tet in patch.taken_from() {
-            if self.tets[..known].binary_search_by_key(&tet, |before| before.tet).is_err() {
-                self.first_lost.push(tet);
-                self.tets.push(TetBefore::of(tet, &body.partition.shares()[tet as usize], x, fading));
+        self.first_touched.clear();
+        let has_moved = |node: &u32| were_m[*node as usize] != x[*node as usize];
+        for (tet, share) in (0..).zip(body.partition.shares()) {
+            let is_touched = patch.taken_from().contains(&tet) || share.nodes.iter().any(has_moved);
+            if is_touched && self.tets[..known].binary_search_by_key(&tet, |before| before.tet).is_err() {
+                self.first_touched.push(tet);
+                self.tets.push(TetBefore::of(tet, share, were_m, fading));
             }
         }
         self.tets.sort_unstable_by_key(|before| before.tet);
@@ -99,14 +108,14 @@ impl Before {
         std::mem::swap(fading, &mut self.next);
     }
 
-    /// Tets that lost cells, before or after.
+    /// Tets that lost cells, before or after, or whose nodes have moved.
     pub(super) fn tets(&self) -> impl Iterator<Item = u32> + '_ {
         self.tets.iter().map(|before| before.tet)
     }
 
     /// Those of them that had lost none before.
-    pub(super) fn first_lost(&self) -> &[u32] {
-        &self.first_lost
+    pub(super) fn first_touched(&self) -> &[u32] {
+        &self.first_touched
     }
 
     /// What faded before.

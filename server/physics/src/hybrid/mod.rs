@@ -25,6 +25,7 @@ pub mod partition;
 pub mod patch;
 pub mod place;
 pub mod points;
+mod projection;
 mod running;
 mod running_metric;
 pub mod share;

@@ -159,9 +159,14 @@ impl Partition {
     /// `V_c` (m³) and `V_c b_cp` (m²) of a cell.
     pub fn moments(&self, cell: usize) -> (f64, [DVec3; 8]) {
         match self.cells[cell].cut {
-            NONE => (self.sites.spacing_m().powi(3), full_gradients_m2(self.sites.spacing_m())),
+            NONE => self.full_moments(),
             cut => self.cut[cut as usize],
         }
+    }
+
+    /// The same of a cell that the surface does not cut.
+    pub fn full_moments(&self) -> (f64, [DVec3; 8]) {
+        (self.sites.spacing_m().powi(3), full_gradients_m2(self.sites.spacing_m()))
     }
 
     /// Cells around a particle.

@@ -10,7 +10,8 @@
 //! J_i = Σ_p m ζ_pi (w_p − Σ_j ζ_pj v_j) + M_i α × (x_i − x̄)       Σ_i M_i (x_i − x̄) × (α × (x_i − x̄)) = Σ_p m (y_p − x_p) × w_p
 //! v ← v + M''⁻¹ J
 //! ```
-//! with the matrix `M''` of what stays awake: linear and angular momentum are kept.
+//! with the matrix `M''` of what stays awake: linear and angular momentum are kept. Coarse nodes are moved by `Δ_i` then (`projection`), for which the couple on the right has
+//! `−Σ_i Δ_i × P_i`, of the momenta `P = M'' v + J`.
 use super::{
     active::{ActiveParticles, HybridScratch, room},
     balance::{Turn, turn_of},
@@ -18,7 +19,9 @@ use super::{
     fade,
     listed::SkinView,
     patch::KEPT,
+    projection::Projection,
     running::RunningPatch,
+    running_metric::RunningMetric,
     spec::Waking,
 };
 use crate::world::{Model, Scratch, State};
@@ -61,6 +64,9 @@ pub(super) struct Looking {
     impulses: Vec<DVec3>,
     /// Forces (N) handed to them.
     handed_n: Vec<DVec3>,
+    projection: Projection,
+    /// Positions (m) of the coarse nodes before.
+    were_m: Vec<DVec3>,
     /// Active particles that were.
     left: Vec<u32>,
     /// Masses (kg) of the free nodes of tets in which particles fall asleep, 0 of others.
@@ -83,6 +89,8 @@ impl Looking {
             moved: Vec::with_capacity(most),
             impulses: Vec::with_capacity(body.node_count() + most),
             handed_n: Vec::with_capacity(body.node_count()),
+            projection: Projection::with_room(body.node_count(), most),
+            were_m: Vec::with_capacity(body.node_count()),
             left: Vec::with_capacity(most),
             weights_kg: Vec::with_capacity(body.node_count()),
         }
@@ -117,11 +125,13 @@ impl HybridScratch {
         let State { x, active, ledger, .. } = state;
         self.patch.displace(body, x);
         let before_j = self.patch.fading_j(body, x, &active.fading);
-        let factor = fade::factor(model.spec().settings.tick_period_s);
-        active.fading.fade(factor);
-        active.balance_n.iter_mut().for_each(|balance| *balance *= factor);
+        let period_s = model.spec().settings.tick_period_s;
+        active.fading.fade(fade::factor(period_s, fade::FADING_S));
+        active.fade_balance(period_s, before_j);
         let has_faded = active.fading.forget_faded();
-        ledger.dissipated_j += before_j - self.patch.fading_j(body, x, &active.fading);
+        let taken_j = before_j - self.patch.fading_j(body, x, &active.fading);
+        ledger.dissipated_j += taken_j;
+        active.given_j -= taken_j;
         if has_faded {
             self.patch.lay_out(body, &active.fading);
         } else {
@@ -145,6 +155,9 @@ impl HybridScratch {
         looking.weights_kg.resize(nodes, 0.0);
         looking.handed_n.clear();
         looking.handed_n.resize(nodes, DVec3::ZERO);
+        looking.projection.start(nodes);
+        looking.were_m.clear();
+        looking.were_m.extend_from_slice(&state.x[..nodes]);
         balance.take(patch.metric_mut(), state);
         let (mut some_sleep, mut couple) = (false, DVec3::ZERO);
         for (number, id) in state.active.ids().iter().enumerate() {
@@ -155,15 +168,17 @@ impl HybridScratch {
                 some_sleep = true;
             }
         }
-        looking.turn(couple, &state.x);
         looking.left.clear();
         looking.left.extend_from_slice(state.active.ids());
         state.switch(body, &looking.wanted, &mut looking.moved);
         patch.set(body, state.active.ids());
+        if some_sleep {
+            couple -= looking.shift(body, patch.metric_mut(), state, momenta);
+            looking.turn(couple, &state.x);
+        }
         patch.displace(body, &state.x);
-        before.fade_into(body, patch, &state.x, &mut state.active.fading);
+        before.fade_into(body, patch, (&looking.were_m, &state.x), &mut state.active.fading);
         patch.lay_out(body, &state.active.fading);
-        balance.demand(body, patch.metric(), &looking.left, state.active.ids(), &looking.handed_n);
         if some_sleep {
             looking.impulses.resize(state.v.len(), DVec3::ZERO);
             patch.metric_mut().accelerate(&mut looking.impulses);
@@ -171,19 +186,25 @@ impl HybridScratch {
                 *v += *change;
             }
         }
-        // Tets that have lost cells only now were whole.
+        // Tets that are touched only now were whole.
+        let (whole, were_m) = (body.partition.shares(), &looking.were_m);
         let whole = |tet: u32| {
-            let (share, material) = (&body.partition.shares()[tet as usize], body.material_of_tet(tet));
+            let (share, material) = (&whole[tet as usize], body.material_of_tet(tet));
             before
                 .faded()
                 .of_tet(tet)
-                .map_or_else(|| share.energy_j(material, &state.x), |fade| fade.energy_j(share, material, &state.x))
+                .map_or_else(|| share.energy_j(material, were_m), |fade| fade.energy_j(share, material, were_m))
         };
-        held_j += before.first_lost().iter().map(|&tet| whole(tet)).sum::<f64>();
-        held_j -= patch.elastic_j(body, &state.x, &state.active.fading, before.tets());
+        held_j += before.first_touched().iter().map(|&tet| whole(tet)).sum::<f64>();
+        let elastic_j = patch.elastic_j(body, &state.x, &state.active.fading, before.tets());
+        held_j -= elastic_j;
         held_j -= patch.metric().moving_j(body, (&state.x, &state.v), gravity, momenta);
         state.ledger.dissipated_j += held_j;
+        state.active.given_j -= held_j;
         state.force_is_current = false;
+        if state.active.may_balance(elastic_j) {
+            balance.demand(body, patch.metric(), &looking.left, state.active.ids(), &looking.handed_n);
+        }
     }
 }
 
@@ -233,12 +254,33 @@ impl Looking {
         let anchor = body.partition.anchor(particle);
         let mass_kg = (1.0 - KEPT) * body.masses.particle_kg[particle as usize];
         anchor.push((w - anchor.of(&state.v)) * mass_kg, &mut self.impulses);
+        self.projection.hand_over(&anchor, mass_kg, y - anchor.of(&state.x));
         for node in body.partition.coarse().tets()[anchor.tet as usize].map(|node| node as usize) {
             if body.free[node] == BVec3::TRUE {
                 self.weights_kg[node] = body.masses.node_kg[node];
             }
         }
         (y - anchor.of(&state.x)).cross(w) * mass_kg
+    }
+
+    /// Moves the coarse nodes to what is nearest to what has fallen asleep; returns the angular momentum (kg m²/s) that they gain by it.
+    fn shift(
+        &mut self,
+        body: &Hybrid,
+        metric: &mut RunningMetric,
+        state: &mut State,
+        momenta: &mut Vec<DVec3>,
+    ) -> DVec3 {
+        momenta.clear();
+        momenta.resize(state.v.len(), DVec3::ZERO);
+        metric.momenta(body, &state.v, momenta);
+        let shifts_m = self.projection.solve(body, metric);
+        let mut gained = DVec3::ZERO;
+        for (((x, shift), momentum), impulse) in state.x.iter_mut().zip(shifts_m).zip(&*momenta).zip(&self.impulses) {
+            *x += *shift;
+            gained += shift.cross(*momentum + *impulse);
+        }
+        gained
     }
 
     /// Takes the couple of all of them; none where too few of those nodes are free.

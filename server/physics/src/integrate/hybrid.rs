@@ -110,7 +110,9 @@ pub(super) fn kick(
     if damping > 0.0 {
         twice_kinetic_j += patch.metric().damped(body, &mut state.v, factor, momenta);
     }
-    state.ledger.dissipated_j += balance.work_j(&state.v, accelerations, h_s);
+    let taken_j = balance.work_j(&state.v, accelerations, h_s);
+    state.ledger.dissipated_j += taken_j;
+    state.active.given_j -= taken_j;
     let mut power_w = 0.0;
     for ((v, acceleration), external) in state.v.iter_mut().zip(accelerations.iter()).zip(&state.external_n) {
         let change = *acceleration * h_s;
