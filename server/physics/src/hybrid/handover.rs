@@ -82,8 +82,8 @@ impl Before {
         self.first_touched.clear();
         let has_moved = |node: &u32| were_m[*node as usize] != x[*node as usize];
         for (tet, share) in (0..).zip(body.partition.shares()) {
-            let is_touched = patch.taken_from().contains(&tet) || share.nodes.iter().any(has_moved);
-            if is_touched && self.tets[..known].binary_search_by_key(&tet, |before| before.tet).is_err() {
+            let is_known = self.tets[..known].binary_search_by_key(&tet, |before| before.tet).is_ok();
+            if !is_known && (share.nodes.iter().any(has_moved) || patch.taken_from().contains(&tet)) {
                 self.first_touched.push(tet);
                 self.tets.push(TetBefore::of(tet, share, were_m, fading));
             }

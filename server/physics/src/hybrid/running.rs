@@ -43,6 +43,8 @@ pub(crate) struct RunningPatch {
     /// What is left to each coarse tet.
     shares: Vec<Share>,
     share_kernel: ShareKernel,
+    /// Number of every coarse node among those of a share, while something is taken from it.
+    number_of_node: Vec<u32>,
     /// Of which tets something was taken.
     taken_from: Vec<u32>,
     metric: RunningMetric,
@@ -102,6 +104,7 @@ impl RunningPatch {
             shares: partition.shares().to_vec(),
             fading_cells: Vec::with_capacity(most_cells),
             fading_tets: Vec::with_capacity(partition.shares().len()),
+            number_of_node: vec![0; hybrid.node_count()],
             taken_from: Vec::with_capacity(partition.shares().len()),
             metric: RunningMetric::new(hybrid, most_active),
             node_displacements_m: vec![DVec3::ZERO; hybrid.node_count()],
@@ -284,17 +287,24 @@ impl RunningPatch {
     /// `V_g ← V_g − (1 − ε) V_c` and likewise `T_gi`.
     fn take_from_shares(&mut self, hybrid: &Hybrid) {
         let partition = &hybrid.partition;
+        let mut last = NONE;
         for &cell in &self.cells {
             let Cell { tet, part, .. } = partition.cells()[cell as usize];
-            if !self.taken_from.contains(&tet) {
-                self.taken_from.push(tet);
+            if tet != last {
+                last = tet;
+                if !self.taken_from.contains(&tet) {
+                    self.taken_from.push(tet);
+                }
+                for (number, node) in (0..).zip(&self.shares[tet as usize].nodes) {
+                    self.number_of_node[*node as usize] = number;
+                }
             }
             let (volume_m3, gradients_m2) = partition.moments(cell as usize);
             let anchors = partition
                 .corners(cell as usize)
                 .map(|particle| self.points[self.point_of[particle as usize] as usize].anchor);
-            // Every node is known already: nothing is pushed.
-            self.shares[tet as usize].add(part, KEPT - 1.0, volume_m3, &gradients_m2, &anchors);
+            let number_of = |node: u32| self.number_of_node[node as usize] as usize;
+            self.shares[tet as usize].add_known(part, KEPT - 1.0, (volume_m3, &gradients_m2), &anchors, number_of);
         }
         for &tet in &self.taken_from {
             self.share_kernel.put(tet as usize, &self.shares[tet as usize]);
