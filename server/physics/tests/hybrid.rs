@@ -262,15 +262,21 @@ fn momenta_stay_while_particles_wake_and_sleep_in_free_flight() {
     assert!((l - angular).length() < 1e-12 * angular.length(), "{l} {angular}");
 }
 
-/// Beside a sphere that presses, and moves a little, a region is switched on and off a hundred times a second.
-#[test]
-fn switching_a_strained_region_keeps_force_and_books_its_energy() {
+/// A sphere that has been pressed 2.5 mm deep, and the particles awake beneath it.
+fn pressed_deep() -> (Rig, Vec<u32>) {
     let mut rig = pressed(Precision::Double);
     let touched = near(&rig, DVec3::ZERO, 8e-3);
     wake_only(&rig.model, &mut rig.state, &mut rig.scratch, touched.iter().copied());
     for tick in 0..400 {
         rig.tick_at(DVec3::Z * (6e-3 - 2.5e-3 * f64::from(tick.min(200)) / 200.0));
     }
+    (rig, touched)
+}
+
+/// Beside a sphere that presses, and moves a little, a region is switched on and off a hundred times a second.
+#[test]
+fn switching_a_strained_region_keeps_force_and_books_its_energy() {
+    let (mut rig, touched) = pressed_deep();
     let beside: Vec<u32> = near(&rig, DVec3::X * 5e-3, 8e-3).into_iter().chain(touched.iter().copied()).collect();
     let start = Energies::of(&rig.model, &rig.state);
     let (mut worst_step, mut worst_residual, mut worst_jump) = (0.0_f64, 0.0_f64, f64::NEG_INFINITY);
@@ -299,12 +305,7 @@ fn switching_a_strained_region_keeps_force_and_books_its_energy() {
 /// A region beneath a sphere that presses is switched in every tick, which nothing but this does: what fading gives is limited.
 #[test]
 fn switching_in_every_tick_shakes_a_body_but_little() {
-    let mut rig = pressed(Precision::Double);
-    let touched = near(&rig, DVec3::ZERO, 8e-3);
-    wake_only(&rig.model, &mut rig.state, &mut rig.scratch, touched.iter().copied());
-    for tick in 0..400 {
-        rig.tick_at(DVec3::Z * (6e-3 - 2.5e-3 * f64::from(tick.min(200)) / 200.0));
-    }
+    let (mut rig, touched) = pressed_deep();
     let beside = near(&rig, DVec3::X * 5e-3, 8e-3);
     let elastic_j = Energies::of(&rig.model, &rig.state).elastic_j;
     let mut most_j = 0.0_f64;

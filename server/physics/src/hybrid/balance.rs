@@ -130,7 +130,7 @@ impl Balance {
 }
 
 impl ActiveParticles {
-    /// Whether fading gave little beside the elastic energy (J) of what fades.
+    /// Whether fading gave little beside the elastic energy (J) of what fades, or of what a switch touches.
     pub(super) fn may_balance(&self, elastic_j: f64) -> bool {
         self.given_j <= MOST_GIVEN * elastic_j
     }

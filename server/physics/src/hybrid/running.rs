@@ -303,8 +303,8 @@ impl RunningPatch {
             let anchors = partition
                 .corners(cell as usize)
                 .map(|particle| self.points[self.point_of[particle as usize] as usize].anchor);
-            let number_of = |node: u32| self.number_of_node[node as usize] as usize;
-            self.shares[tet as usize].add_known(part, KEPT - 1.0, (volume_m3, &gradients_m2), &anchors, number_of);
+            let numbers = anchors.map(|anchor| anchor.nodes.map(|node| self.number_of_node[node as usize]));
+            self.shares[tet as usize].add_numbered(part, KEPT - 1.0, (volume_m3, &gradients_m2), &anchors, &numbers);
         }
         for &tet in &self.taken_from {
             self.share_kernel.put(tet as usize, &self.shares[tet as usize]);

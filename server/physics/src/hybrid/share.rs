@@ -28,32 +28,34 @@ pub struct Share {
 impl Share {
     /// Adds a cell's `factor V_c` to a part; `corners` are its particles' anchors.
     pub fn add(&mut self, part: u8, factor: f64, volume_m3: f64, gradients_m2: &[DVec3; 8], corners: &[Anchor; 8]) {
-        for &node in corners.iter().flat_map(|anchor| &anchor.nodes) {
-            if !self.nodes.contains(&node) {
-                self.nodes.push(node);
-                self.moments_m2.push([DVec3::ZERO; PARTS]);
-            }
-        }
-        let nodes = std::mem::take(&mut self.nodes);
-        let number_of = |node: u32| nodes.iter().position(|&own| own == node).unwrap_or(0);
-        self.add_known(part, factor, (volume_m3, gradients_m2), corners, number_of);
-        self.nodes = nodes;
+        let numbers = corners.map(|anchor| anchor.nodes.map(|node| self.number_of(node)));
+        self.add_numbered(part, factor, (volume_m3, gradients_m2), corners, &numbers);
     }
 
-    /// The same where all nodes are known, `number_of` tells which.
-    pub(super) fn add_known(
+    /// Number of a node among its own, as which it is taken in if need be.
+    fn number_of(&mut self, node: u32) -> u32 {
+        let number = self.nodes.iter().position(|&own| own == node).unwrap_or_else(|| {
+            self.nodes.push(node);
+            self.moments_m2.push([DVec3::ZERO; PARTS]);
+            self.nodes.len() - 1
+        });
+        number as u32
+    }
+
+    /// The same as [`Self::add`] where the numbers of the nodes are known.
+    pub(super) fn add_numbered(
         &mut self,
         part: u8,
         factor: f64,
         (volume_m3, gradients_m2): (f64, &[DVec3; 8]),
         corners: &[Anchor; 8],
-        number_of: impl Fn(u32) -> usize,
+        numbers: &[[u32; 4]; 8],
     ) {
         let part = part as usize;
         self.volume_m3[part] += factor * volume_m3;
-        for (anchor, gradient) in corners.iter().zip(gradients_m2) {
-            for (&node, weight) in anchor.nodes.iter().zip(anchor.weights) {
-                self.moments_m2[number_of(node)][part] += *gradient * (factor * weight);
+        for ((anchor, gradient), numbers) in corners.iter().zip(gradients_m2).zip(numbers) {
+            for (&number, weight) in numbers.iter().zip(anchor.weights) {
+                self.moments_m2[number as usize][part] += *gradient * (factor * weight);
             }
         }
     }
