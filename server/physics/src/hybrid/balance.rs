@@ -68,7 +68,7 @@ impl Balance {
     pub(super) fn demand(
         &mut self,
         body: &Hybrid,
-        metric: &RunningMetric,
+        metric: &mut RunningMetric,
         before: &[u32],
         after: &[u32],
         handed_n: &[DVec3],
@@ -130,15 +130,15 @@ impl Balance {
 }
 
 impl ActiveParticles {
-    /// Whether fading gave little beside the elastic energy (J) of what fades, or of what a switch touches.
-    pub(super) fn may_balance(&self, elastic_j: f64) -> bool {
-        self.given_j <= MOST_GIVEN * elastic_j
+    /// Whether fading gave little beside the elastic energy of what fades, or of what a switch touched.
+    pub(super) fn may_balance(&self) -> bool {
+        self.given_j <= MOST_GIVEN * self.fading_j.iter().sum::<f64>()
     }
 
-    /// A tick's fading of balancing forces, while what fades holds `elastic_j` (J).
-    pub(super) fn fade_balance(&mut self, period_s: f64, elastic_j: f64) {
+    /// A tick's fading of balancing forces.
+    pub(super) fn fade_balance(&mut self, period_s: f64) {
         self.given_j *= fade::factor(period_s, FORGETTING_S);
-        let time_constant_s = if self.may_balance(elastic_j) { FADING_S } else { HURRIED_S };
+        let time_constant_s = if self.may_balance() { FADING_S } else { HURRIED_S };
         let factor = fade::factor(period_s, time_constant_s);
         self.balance_n.iter_mut().for_each(|balance| *balance *= factor);
     }

@@ -3,9 +3,10 @@
 //! A coarse part strains less than the cells in it do, so a cell that woke as it is would raise the energy. It is given the strain that its part had by a
 //! change of its rest state, which then fades: with `A = F⁻¹ F_before − I` at first, the effective gradient is
 //! ```text
-//! F̃ = F (I + A)       P = P̃(F̃) (I + A)ᵀ       A ← e^{−T/τ} A every tick
+//! F̃ = F (I + A)       P = P̃(F̃) (I + A)ᵀ       A ← e^{−T/τ} A per tick T
 //! ```
-//! one `A` for its shape and one for its volume, which is the tet's (`share`), and hourglass stiffness `κ (1 − a)`, `a` from 1 to 0. What is left of a part,
+//! one `A` for its shape and one for its volume, which is the tet's (`share`), and hourglass stiffness `κ (1 − a)`, `a` from 1 to 0. Only one in [`GROUPS`]
+//! cells and tets fades in a tick, by as much more: what it gives has to be worked out exactly. What is left of a part,
 //! or what it gets back, has an `A` of its own: its effective gradient is at first the mean of what it is made of, by volume, and by Jensen its energy no more than
 //! theirs. Changes of the rest state are objective: momentum does not hear of them. What fading gives or takes is booked in the ledger.
 //!
@@ -22,7 +23,9 @@ use serde::{Deserialize, Serialize};
 /// τ (s).
 pub(super) const FADING_S: f64 = 0.03;
 /// A change of rest state smaller than this is none.
-const NOTHING: f64 = 1e-9;
+const NOTHING: f64 = 1e-6;
+/// Into how many groups cells and tets fall that take turns.
+pub(super) const GROUPS: u32 = 4;
 
 /// A cell that woke strained.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -107,23 +110,10 @@ impl Fading {
         cells && self.tets.iter().all(|t| t.whole.is_finite() && t.parts.iter().all(DMat3::is_finite))
     }
 
-    /// A tick's fading, by [`factor`].
-    pub(super) fn fade(&mut self, factor: f64) {
-        for cell in &mut self.cells {
-            (cell.shape, cell.volume, cell.modes) = (cell.shape * factor, cell.volume * factor, cell.modes * factor);
-        }
-        for tet in &mut self.tets {
-            tet.whole *= factor;
-            tet.parts.iter_mut().for_each(|part| *part *= factor);
-        }
-    }
-
-    /// Leaves out what has faded; whether anything had.
-    pub(super) fn forget_faded(&mut self) -> bool {
-        let before = (self.cells.len(), self.tets.len());
+    /// Leaves out what has faded.
+    pub(super) fn forget_faded(&mut self) {
         self.cells.retain(CellFade::is_something);
         self.tets.retain(ShareFade::is_something);
-        before != (self.cells.len(), self.tets.len())
     }
 
     /// Of a cell, if it fades.
@@ -138,12 +128,23 @@ impl Fading {
 }
 
 impl CellFade {
+    /// After fading by a factor.
+    pub(super) fn faded(&self, factor: f64) -> Self {
+        let faded = Self {
+            cell: self.cell,
+            shape: self.shape * factor,
+            volume: self.volume * factor,
+            modes: self.modes * factor,
+        };
+        if faded.is_something() { faded } else { Self::none(self.cell) }
+    }
+
     pub(super) fn is_something(&self) -> bool {
         largest(&self.shape).max(largest(&self.volume)).max(self.modes * NOTHING.sqrt()) > NOTHING
     }
 
     /// Nothing of a cell.
-    pub(super) fn none(cell: u32) -> Self {
+    pub(crate) fn none(cell: u32) -> Self {
         Self { cell, shape: DMat3::ZERO, volume: DMat3::ZERO, modes: 0.0 }
     }
 
@@ -186,6 +187,12 @@ impl CellFade {
 }
 
 impl ShareFade {
+    /// After fading by a factor.
+    pub(super) fn faded(&self, factor: f64) -> Self {
+        let faded = Self { tet: self.tet, parts: self.parts.map(|part| part * factor), whole: self.whole * factor };
+        if faded.is_something() { faded } else { Self::none(self.tet) }
+    }
+
     pub(super) fn is_something(&self) -> bool {
         self.parts.iter().chain([&self.whole]).any(|a| largest(a) > NOTHING)
     }

@@ -103,27 +103,30 @@ pub(super) fn kick(
         state.active.long_steps.add_beyond_n(f64::from(model.substeps_per_long_step()), accelerations);
     }
     let of_holders_w = holders_power_w(model, accelerations, &state.v);
-    *kick_sq = [patch.metric_mut().accelerate(accelerations), kick_sq[0], kick_sq[1]];
     let damping = model.spec().settings.mass_damping_per_s;
     let factor = (-0.5 * damping * h_s).exp();
-    let mut twice_kinetic_j = 0.0;
+    let (mut before_j, mut power_w) = (0.0, 0.0);
     if damping > 0.0 {
-        twice_kinetic_j += patch.metric().damped(body, &mut state.v, factor, momenta);
+        before_j = patch.metric_mut().damped(body, &mut state.v, factor, momenta);
+        power_w = of_holders_w + state.v.iter().zip(accelerations.iter()).map(|(v, f)| v.dot(*f)).sum::<f64>();
     }
+    *kick_sq = [patch.metric_mut().accelerate(accelerations), kick_sq[0], kick_sq[1]];
+    // (v + h M'⁻¹f)ᵀ M' (v + h M'⁻¹f) = vᵀM'v + 2h v·f + h² fᵀM'⁻¹f
+    let between_j = factor * factor * before_j + h_s * (2.0 * power_w + h_s * kick_sq[0]);
     let taken_j = balance.work_j(&state.v, accelerations, h_s);
     state.ledger.dissipated_j += taken_j;
     state.active.given_j -= taken_j;
-    let mut power_w = 0.0;
+    let mut external_w = 0.0;
     for ((v, acceleration), external) in state.v.iter_mut().zip(accelerations.iter()).zip(&state.external_n) {
         let change = *acceleration * h_s;
-        power_w += external.dot(*v + change * 0.5);
+        external_w += external.dot(*v + change * 0.5);
         *v += change;
     }
     if damping > 0.0 {
-        twice_kinetic_j += patch.metric().damped(body, &mut state.v, factor, momenta);
-        state.ledger.dissipated_j += 0.5 * twice_kinetic_j * -(-damping * h_s).exp_m1();
+        body.damp(&mut state.v, factor);
+        state.ledger.dissipated_j += 0.5 * (before_j + between_j) * -(-damping * h_s).exp_m1();
     }
-    state.ledger.external_work_j += h_s * power_w;
+    state.ledger.external_work_j += h_s * external_w;
     state.ledger.dissipated_j += h_s * state.viscous.work_rate_w();
     state.ledger.external_work_j += h_s * of_holders_w;
 }

@@ -98,7 +98,7 @@ pub(super) fn faded_stress<V: Vector<Scalar = T>, T: Scalar, L: LaneLaw, const V
 
 /// Lanes of nine entries, row by row.
 #[inline(always)]
-pub(super) fn load_matrix<V: Vector, const N: usize>(lanes: &[[V::Scalar; N]; 9], first: usize) -> M3<V> {
+pub(super) fn load_matrix<V: Vector, const N: usize>(lanes: &[[V::Scalar; N]], first: usize) -> M3<V> {
     let mut m = [[V::of(0.0); 3]; 3];
     for row in 0..3 {
         for column in 0..3 {

@@ -10,6 +10,7 @@ mod block;
 mod cell_stress;
 mod cells;
 mod dispatch;
+mod fades;
 mod laws;
 mod layout;
 mod oracle;

@@ -7,12 +7,16 @@
 use super::{
     cell_stress::{particles, patterns, stress},
     dispatch::{self, Available, InstructionSet, Pass},
-    laws::Constants,
+    fades::{ENTRIES, Split, entries, fading_stress},
+    laws::M3,
     real::{Real, Scalar, Vector},
     tangents::LaneTangent,
 };
 use crate::{
-    hybrid::cell::{HOURGLASS, MODE_WEIGHTS},
+    hybrid::{
+        cell::{HOURGLASS, MODE_WEIGHTS},
+        fade::CellFade,
+    },
     material::Material,
     world::Precision,
 };
@@ -30,6 +34,10 @@ pub struct CellRow {
     pub cells: u32,
     /// Index of their material.
     pub material: u16,
+    /// Number of the first cell among all of the rows, one after the other.
+    pub first: u32,
+    /// Whether something fades in any of them ([`RowValues::put_fade`]).
+    pub fading: bool,
 }
 
 /// Materials of full cells, which all are of one size.
@@ -48,8 +56,7 @@ enum Layout {
 
 #[derive(Debug, Clone)]
 struct CellMaterial<T> {
-    material: Material,
-    constants: Constants<T>,
+    split: Split<T>,
     /// `1/(4h)` (1/m), `−V` (m³) and `−κ` (N/m).
     cell: [f64; 3],
 }
@@ -73,10 +80,12 @@ struct Arrays<T> {
     velocities: [Vec<T>; 3],
     left: [Vec<T>; 3],
     right: [Vec<T>; 3],
+    /// Of every cell.
+    fades: [Vec<T>; ENTRIES],
 }
 
 impl<T: Scalar> Arrays<T> {
-    fn new(points: usize, is_viscous: bool) -> Self {
+    fn new(points: usize, cells: usize, is_viscous: bool) -> Self {
         // One before the first point, whose left neighbour gives it nothing.
         let zeros = |count: usize| std::array::from_fn(|_| vec![T::of(0.0); count]);
         let entries = 1 + points + LANES;
@@ -85,6 +94,7 @@ impl<T: Scalar> Arrays<T> {
             velocities: zeros(if is_viscous { entries } else { 0 }),
             left: zeros(entries),
             right: zeros(entries),
+            fades: self::entries(None).map(|entry| vec![T::of(entry); cells + LANES]),
         }
     }
 }
@@ -111,11 +121,11 @@ impl RowKernel {
         Self { instruction_set: Available::at_most(instruction_set), ..self }
     }
 
-    /// Buffers for up to `points` points, at rest.
-    pub fn values(&self, points: usize) -> RowValues {
+    /// Buffers for up to `points` points, at rest, and `cells` cells.
+    pub fn values(&self, points: usize, cells: usize) -> RowValues {
         let values = match &self.layout {
-            Layout::Single(_) => Values::Single(Arrays::new(points, self.is_viscous)),
-            Layout::Double(_) => Values::Double(Arrays::new(points, self.is_viscous)),
+            Layout::Single(_) => Values::Single(Arrays::new(points, cells, self.is_viscous)),
+            Layout::Double(_) => Values::Double(Arrays::new(points, cells, self.is_viscous)),
         };
         RowValues { values }
     }
@@ -142,7 +152,8 @@ impl RowKernel {
         let mut power_w = 0.0;
         for same in rows.chunk_by(|a, b| a.material == b.material) {
             let material = &materials[same[0].material as usize];
-            let law = (material.material.law, !material.material.viscosity.is_zero());
+            let Material { law, viscosity, .. } = &material.split.material;
+            let law = (*law, !viscosity.is_zero());
             power_w += dispatch::run(self.instruction_set, law, &mut RowForces { material, rows: same, arrays });
         }
         power_w
@@ -150,7 +161,7 @@ impl RowKernel {
 }
 
 fn of_materials<T: Scalar>(materials: &[Material], cell: impl Fn(&Material) -> [f64; 3]) -> Vec<CellMaterial<T>> {
-    let of = |m: &Material| CellMaterial { material: *m, constants: Constants::of(m), cell: cell(m) };
+    let of = |m: &Material| CellMaterial { split: Split::of(m), cell: cell(m) };
     materials.iter().map(of).collect()
 }
 
@@ -172,6 +183,14 @@ impl RowValues {
         }
     }
 
+    /// What fades in a cell.
+    pub fn put_fade(&mut self, cell: u32, fade: Option<&CellFade>) {
+        match &mut self.values {
+            Values::Single(arrays) => put_fade(&mut arrays.fades, cell, fade),
+            Values::Double(arrays) => put_fade(&mut arrays.fades, cell, fade),
+        }
+    }
+
     /// Overwrites `forces_n` (N) with those on the points.
     pub fn forces_n(&self, forces_n: &mut [DVec3]) {
         match &self.values {
@@ -184,6 +203,12 @@ impl RowValues {
 fn put<T: Scalar>([x, y, z]: &mut [Vec<T>; 3], list: &[DVec3]) {
     for (((x, y), z), a) in x[1..].iter_mut().zip(&mut y[1..]).zip(&mut z[1..]).zip(list) {
         (*x, *y, *z) = (T::of(a.x), T::of(a.y), T::of(a.z));
+    }
+}
+
+fn put_fade<T: Scalar>(fades: &mut [Vec<T>; ENTRIES], cell: u32, fade: Option<&CellFade>) {
+    for (list, entry) in fades.iter_mut().zip(entries(fade)) {
+        list[cell as usize] = T::of(entry);
     }
 }
 
@@ -213,7 +238,8 @@ impl<T: Scalar> Pass<T> for RowForces<'_, T> {
                 let [a, b, c, d] = row.points;
                 let at =
                     [1 + a as usize + first, 1 + b as usize + first, 1 + c as usize + first, 1 + d as usize + first];
-                self.lanes::<V, L, VISCOUS>(at, row.cells as usize - first, &mut power_w);
+                let fades = row.fading.then_some(row.first as usize + first);
+                self.lanes::<V, L, VISCOUS>(at, row.cells as usize - first, fades, &mut power_w);
             }
         }
         power_w
@@ -221,12 +247,13 @@ impl<T: Scalar> Pass<T> for RowForces<'_, T> {
 }
 
 impl<T: Scalar> RowForces<'_, T> {
-    /// Cells whose points 0, 2, 4, 6 are at `at` and what follows; there are `cells` of them, or more than lanes.
+    /// Cells whose points 0, 2, 4, 6 are at `at` and what follows; there are `cells` of them, or more than lanes. What fades of them, if any, starts at `fades`.
     #[inline(always)]
     fn lanes<V: Vector<Scalar = T>, L: LaneTangent, const VISCOUS: bool>(
         &mut self,
         at: [usize; 4],
         cells: usize,
+        fades: Option<usize>,
         power_w: &mut f64,
     ) {
         let [quarter, minus_volume, minus_kappa] = self.material.cell;
@@ -248,11 +275,18 @@ impl<T: Scalar> RowForces<'_, T> {
                 }
             }
         }
-        let (p, density) = stress::<V, T, L, VISCOUS>(&self.material.constants, &h, &h_dot);
+        let mut kept_modes = weight;
+        let (p, density) = if let Some(first) = fades {
+            let a = [matrix::<V>(&self.arrays.fades[..9], first), matrix::<V>(&self.arrays.fades[9..18], first)];
+            kept_modes = weight * V::load(&self.arrays.fades[18][first..]);
+            fading_stress::<V, T, L, VISCOUS>(&self.material.split, &a, &h, &h_dot)
+        } else {
+            stress::<V, T, L, VISCOUS>(&self.material.split.whole, &h, &h_dot)
+        };
         let of_stress = weight * V::of(minus_volume * quarter);
-        let mut of_modes = [weight; 4];
+        let mut of_modes = [kept_modes; 4];
         for mode in 0..4 {
-            of_modes[mode] = weight * V::of(minus_kappa * MODE_WEIGHTS[mode] / 64.0);
+            of_modes[mode] = kept_modes * V::of(minus_kappa * MODE_WEIGHTS[mode] / 64.0);
         }
         for axis in 0..3 {
             let mut c = [V::of(0.0); 7];
@@ -280,6 +314,17 @@ impl<T: Scalar> RowForces<'_, T> {
             }
         }
     }
+}
+
+#[inline(always)]
+fn matrix<V: Vector>(entries: &[Vec<V::Scalar>], first: usize) -> M3<V> {
+    let mut m = [[V::of(0.0); 3]; 3];
+    for row in 0..3 {
+        for column in 0..3 {
+            m[row][column] = V::load(&entries[3 * row + column][first..]);
+        }
+    }
+    m
 }
 
 #[inline(always)]
@@ -332,14 +377,15 @@ mod tests {
                     }
                     _ => {
                         let points = [points[0], points[2], points[4], points[6]];
-                        rows.push(CellRow { points, cells: 1, material: 0 });
+                        let first = rows.last().map_or(0, |row| row.first + row.cells);
+                        rows.push(CellRow { points, cells: 1, material: 0, first, fading: false });
                     }
                 }
             }
             assert!(rows.len() < cells.len() / 4);
             let kernel = RowKernel::new(*spacing_m, *handed, &[*material], *precision);
             let kernel = kernel.with_instruction_set(*set);
-            let mut values = kernel.values(u.len());
+            let mut values = kernel.values(u.len(), cells.len());
             values.set_displacements(u);
             values.set_velocities(v);
             let power_w = kernel.forces(&rows, u.len(), &mut values);

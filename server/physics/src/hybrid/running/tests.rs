@@ -2,12 +2,15 @@
 use super::*;
 use crate::{
     hybrid::{
+        composite::PARTS,
+        fade::{CellFade, ShareFade},
         metric::Metric,
         patch::{Field, Patch},
         testing::{Random, hybrid_ball, tissue},
     },
     material::{Material, Viscosity},
 };
+use glam::DMat3;
 use std::collections::BTreeSet;
 
 fn some(hybrid: &Hybrid, wanted: impl Fn(DVec3) -> bool) -> Vec<u32> {
@@ -19,7 +22,18 @@ fn largest(list: &[DVec3]) -> f64 {
     list.iter().map(|a| a.length()).fold(0.0, f64::max)
 }
 
-/// Whichever particles were awake before: forces, power, accelerations and momenta are the oracle's.
+/// Something in some of the cells and tets, of the size of its strains.
+fn some_fading(hybrid: &Hybrid, cells: &[u32], random: &mut Random) -> Fading {
+    let mut matrix = || DMat3::from_cols(random.vector(), random.vector(), random.vector()) * 0.1;
+    let cells = cells.iter().filter(|cell| **cell / 7 % 3 == 1);
+    let tets = (0..hybrid.partition.shares().len() as u32).filter(|tet| tet % 4 == 1);
+    Fading {
+        cells: cells.map(|&cell| CellFade { cell, shape: matrix(), volume: matrix(), modes: 0.3 }).collect(),
+        tets: tets.map(|tet| ShareFade { tet, parts: [(); PARTS].map(|()| matrix()), whole: matrix() }).collect(),
+    }
+}
+
+/// Whichever particles were awake, and whatever faded, before: forces, power, accelerations and momenta are the oracle's.
 #[test]
 fn running_patch_and_oracle_agree() {
     let [stvk, neo, corotated] = tissue();
@@ -32,10 +46,14 @@ fn running_patch_and_oracle_agree() {
             let mut running = RunningPatch::new(&hybrid, 2000, precision);
             let near = |p: DVec3| p.distance(DVec3::new(2e-3, 1e-3, 9e-3)) < 4e-3;
             let far = |p: DVec3| near(p) || p.distance(DVec3::new(-8e-3, 0.0, 0.0)) < 3e-3;
-            for active in [some(&hybrid, near), some(&hybrid, far), vec![], some(&hybrid, |p| p.x > 0.2e-3)] {
-                running.wake(&hybrid, &active, &Fading::default());
+            let sets = [some(&hybrid, near), some(&hybrid, far), vec![], some(&hybrid, |p| p.x > 0.2e-3)];
+            for (active, fades) in sets.iter().flat_map(|set| [(set, true), (set, false)]) {
+                running.wake(&hybrid, active, &Fading::default());
+                let fading = some_fading(&hybrid, running.cells(), &mut random);
+                let fading = if fades { fading } else { Fading::default() };
+                running.put_fades(&fading);
                 let set: BTreeSet<u32> = active.iter().copied().collect();
-                let patch = Patch::new(&hybrid.partition, &set);
+                let patch = Patch::new(&hybrid.partition, &set).with_fading(fading);
                 let rest = patch.at_rest(&hybrid.partition);
                 let shaken = |list: &[DVec3], size: f64, random: &mut Random| -> Vec<DVec3> {
                     list.iter().map(|p| *p + DVec3::new(3.0, 2.0, 1.0) * size + random.vector() * size).collect()

@@ -1,12 +1,13 @@
 //! The pass over cut cells: gather, stress, scatter.
-use super::{CutBlock, FadeBlock, Split};
+use super::{CutBlock, FadeBlock};
 use crate::{
     hybrid::cell::MODE_WEIGHTS,
     simd::{
         block::{Lanes, Node, Sum},
-        cell_stress::{faded_stress, load_matrix, stress},
+        cell_stress::{load_matrix, stress},
         dispatch::Pass,
-        laws::{LaneLaw, plus},
+        fades::{Split, fading_stress},
+        laws::LaneLaw,
         real::{Scalar, Vector},
         tangents::LaneTangent,
     },
@@ -22,7 +23,7 @@ type Corners<T, const N: usize> = [Lanes<T, N>; 3];
 pub(super) struct CutForces<'a, T, const N: usize> {
     pub(super) split: &'a Split<T>,
     pub(super) blocks: &'a [CutBlock<T, N>],
-    /// As many, or none.
+    /// As many.
     pub(super) fades: &'a [FadeBlock<T, N>],
     pub(super) displacements: &'a [Node],
     pub(super) velocities: &'a [Node],
@@ -45,7 +46,7 @@ impl<T: Scalar, const N: usize> Pass<T> for CutForces<'_, T, N> {
             }
             for (index, block) in batch.iter().enumerate() {
                 let (of, forces) = ([&edges[index], &rates[index]], &mut forces[index]);
-                let fade = self.fades.get(number * BATCH + index);
+                let fade = Some(&self.fades[number * BATCH + index]).filter(|fade| fade.lanes != 0);
                 power_w += cut::<V, T, L, VISCOUS, N>(self.split, (block, fade), of, forces);
             }
             for (block, forces) in batch.iter().zip(&forces) {
@@ -99,12 +100,9 @@ fn cut<V: Vector<Scalar = T>, T: Scalar, L: LaneLaw, const VISCOUS: bool, const 
         let h_dot = if VISCOUS { gradient(rates) } else { h };
         let mut minus_kappa = V::load(&block.minus_kappa[first..]);
         let (p, density) = if let Some(fade) = fade {
-            minus_kappa = minus_kappa * V::load(&fade.modes[first..]);
-            let of_shape = (&split.shape, &load_matrix::<V, N>(&fade.shape, first));
-            let of_volume = (&split.volume, &load_matrix::<V, N>(&fade.volume, first));
-            let (shape, density) = faded_stress::<V, T, L, VISCOUS>(of_shape, &h, &h_dot);
-            let volume = faded_stress::<V, T, L, false>(of_volume, &h, &h).0;
-            (plus(&shape, &volume), density)
+            minus_kappa = minus_kappa * V::load(&fade.entries[18][first..]);
+            let a = [load_matrix::<V, N>(&fade.entries[..9], first), load_matrix::<V, N>(&fade.entries[9..18], first)];
+            fading_stress::<V, T, L, VISCOUS>(split, &a, &h, &h_dot)
         } else {
             stress::<V, T, L, VISCOUS>(&split.whole, &h, &h_dot)
         };
