@@ -84,11 +84,11 @@ fn kernels(criterion: &mut Criterion) {
                         let mut values = kernel.values(rest.len(), cells.len());
                         values.set_displacements(&u);
                         group.bench_function(format!("{precision:?} {set:?}, rows of 10"), |b| {
-                            b.iter(|| kernel.forces(&rows, rest.len(), &mut values));
+                            b.iter(|| kernel.forces(&rows, (rest.len(), 0.5), &mut values));
                         });
                         rows.iter_mut().for_each(|row| row.fading = true);
                         group.bench_function(format!("{precision:?} {set:?}, rows of 10 that fade"), |b| {
-                            b.iter(|| kernel.forces(&rows, rest.len(), &mut values));
+                            b.iter(|| kernel.forces(&rows, (rest.len(), 0.5), &mut values));
                         });
                     }
                     let mut kernel = CutCells::with_capacity(cells.len(), rest.len(), &[material], precision);
@@ -97,7 +97,7 @@ fn kernels(criterion: &mut Criterion) {
                     cells.iter().enumerate().for_each(|(c, (points, rest))| kernel.put(c, *points, rest));
                     kernel.set_displacements(&u);
                     group.bench_function(format!("{precision:?} {set:?}, as cut"), |b| {
-                        b.iter(|| kernel.forces(rest.len()));
+                        b.iter(|| kernel.forces(rest.len(), 0.5));
                     });
                 }
             }

@@ -3,7 +3,7 @@ use super::{
     balance::Balance,
     body::Hybrid,
     coming::Coming,
-    fade::{Fading, GROUPS},
+    fade::Fading,
     handover::Before,
     listed::ListedSkin,
     long_steps::{LongStepHistory, LongSteps},
@@ -23,13 +23,13 @@ pub struct ActiveParticles {
     pub(super) is_switching: bool,
     /// Of every tool.
     pub(super) balls: Vec<Option<Ball>>,
-    pub(super) fading: Fading,
+    pub(crate) fading: Fading,
     /// Balancing forces (N), as many as positions, or none.
     pub(super) balance_n: Vec<DVec3>,
     /// Energy (J) that fading strains and balancing forces gave lately, beyond what they and switches took.
     pub(crate) given_j: f64,
-    /// Elastic energy (J) of each group of what fades (`fade`) when it last did.
-    pub(super) fading_j: [f64; GROUPS as usize],
+    /// Elastic energy (J) of what the last switch changed.
+    pub(super) switched_j: f64,
     pub(crate) long_steps: LongSteps,
 }
 
@@ -43,7 +43,7 @@ impl ActiveParticles {
             fading: fading_with_room(model),
             balance_n: Vec::with_capacity(entries(model)),
             given_j: 0.0,
-            fading_j: [0.0; GROUPS as usize],
+            switched_j: 0.0,
             long_steps: LongSteps::with_room(model.hybrid().map_or(0, Hybrid::node_count), entries(model)),
         }
     }
@@ -83,7 +83,7 @@ impl ActiveParticles {
         self.fading.clear();
         self.balance_n.clear();
         self.given_j = 0.0;
-        self.fading_j = [0.0; GROUPS as usize];
+        self.switched_j = 0.0;
         self.long_steps.forget();
     }
 
@@ -95,7 +95,7 @@ impl ActiveParticles {
         self.fading.copy_from(&other.fading);
         self.balance_n.clone_from(&other.balance_n);
         self.given_j = other.given_j;
-        self.fading_j = other.fading_j;
+        self.switched_j = other.switched_j;
         self.long_steps.copy_from(&other.long_steps);
     }
 
@@ -109,15 +109,14 @@ impl ActiveParticles {
             && [0, model.rest_positions_m().len() + self.ids.len()].contains(&self.balance_n.len())
             && self.balance_n.iter().all(|force| force.is_finite())
             && self.given_j.is_finite()
-            && self.fading_j.iter().all(|energy| energy.is_finite())
+            && self.switched_j.is_finite()
             && self.long_steps.fit(model.rest_positions_m().len(), model.rest_positions_m().len() + self.ids.len())
-            && self.fading.cells.is_sorted_by(|a, b| a.cell < b.cell)
-            && self.fading.tets.is_sorted_by(|a, b| a.tet < b.tet)
-            && self.fading.cells.iter().all(|fade| self.touches(model, fade.cell))
-            && self.fading.tets.iter().all(|fade| (fade.tet as usize) < model.mesh().tets().len())
-            && [&self.ids, &self.next].into_iter().all(|list| {
-                list.len() <= room(model) && list.is_sorted_by(|a, b| a < b) && list.iter().all(may_wake)
-            })
+            && self.fading.is_sorted()
+            && self.fading.cells().iter().all(|fade| self.touches(model, fade.cell))
+            && self.fading.tets().iter().all(|fade| (fade.tet as usize) < model.mesh().tets().len())
+            && [&self.ids, &self.next]
+                .into_iter()
+                .all(|list| list.len() <= room(model) && list.is_sorted_by(|a, b| a < b) && list.iter().all(may_wake))
     }
 }
 
@@ -160,16 +159,14 @@ pub(crate) struct HybridScratch {
     pub(super) before: Before,
     pub(crate) balance: Balance,
     pub(super) long_steps: LongStepHistory,
-    /// Something faded since the state's forces were computed.
-    pub(crate) forces_are_stale: bool,
 }
 
 impl HybridScratch {
     pub(crate) fn new(model: &Model) -> Option<Self> {
         let (body, most) = (model.hybrid()?, room(model));
-        let mut patch = RunningPatch::new(body, most, model.spec().settings.precision);
+        let patch = || RunningPatch::new(body, most, model.spec().settings.precision);
+        let (mut patch, coming) = (patch(), Coming::new(patch()));
         patch.wake(body, &[], &Fading::default());
-        let coming = Coming::new(patch.clone());
         let entries = body.node_count() + most;
         Some(Self {
             coming,
@@ -182,7 +179,6 @@ impl HybridScratch {
             before: Before::with_room(room_for_cells(body, most), body.partition().shares().len()),
             balance: Balance::with_room(entries),
             long_steps: LongStepHistory::with_room(body.node_count(), entries),
-            forces_are_stale: false,
         })
     }
 
@@ -213,7 +209,7 @@ impl HybridScratch {
     pub(super) fn follow(&mut self, body: &Hybrid, active: &ActiveParticles) {
         if self.patch.active() != active.ids() {
             self.patch.wake(body, active.ids(), &active.fading);
-        } else if active.fading.is_empty() && self.patch.is_fading() {
+        } else if !self.patch.knows(&active.fading) {
             self.patch.put_fades(&active.fading);
         }
     }

@@ -5,7 +5,7 @@ use super::{
     body::Hybrid,
     cell::{MODE_WEIGHTS, RestCell},
     composite::PARTS,
-    fade::{CellFade, Fading, GROUPS, ShareFade, change, effective},
+    fade::{CellFade, Fading, ShareFade, change, effective},
     partition::{Cell, Partition},
     patch::KEPT,
     running::RunningPatch,
@@ -76,7 +76,7 @@ impl Before {
             if stays(body, [patch, next], some_sleep, cell) {
                 continue;
             }
-            let fade = fading.of_cell(cell).copied().unwrap_or(CellFade::none(cell));
+            let fade = fading.of_cell(cell).unwrap_or(CellFade::none(cell));
             let (rest, y) = (body.awake_cell(cell as usize), patch.corners_m(body, cell));
             let [shape, volume] = fade.effective(&rest, &y);
             let modes_m2 = (1.0 - fade.modes) * modes_m2(&rest, &y);
@@ -99,7 +99,7 @@ impl Before {
     }
 
     fn take_tet(&mut self, body: &Hybrid, tet: u32, share: &Share, x: &[DVec3], fading: &Fading) -> f64 {
-        let fade = fading.of_tet(tet).copied().unwrap_or(ShareFade::none(tet));
+        let fade = fading.of_tet(tet).unwrap_or(ShareFade::none(tet));
         let (parts, whole) = fade.effective(share, x);
         self.tets.push(TetBefore { tet, parts, whole });
         share_j(share, body.material_of_tet(tet), &parts, &whole)
@@ -126,25 +126,25 @@ impl Before {
         self.next.clear();
         for &cell in next.cells() {
             if stays(body, [patch, next], self.some_sleep, cell) {
-                self.next.cells.extend(fading.of_cell(cell));
+                fading.of_cell(cell).filter(CellFade::is_trace).into_iter().for_each(|fade| self.next.push_cell(fade));
                 continue;
             }
             let (fade, energy_j) = self.of_cell(body, next, cell);
             now_j += energy_j;
-            self.next.cells.extend(fade);
+            fade.into_iter().for_each(|fade| self.next.push_cell(fade));
         }
         for number in 0..self.tets.len() {
             let (fade, energy_j) = self.of_tet(body, next, x, &self.tets[number]);
             now_j += energy_j;
-            self.next.tets.extend(fade);
+            fade.into_iter().for_each(|fade| self.next.push_tet(fade));
         }
         // Tets that this leaves alone go on.
-        for fade in &fading.tets {
+        for fade in fading.left_of_tets().filter(ShareFade::is_trace) {
             if self.tets.binary_search_by_key(&fade.tet, |before| before.tet).is_err() {
-                self.next.tets.push(*fade);
+                self.next.push_tet(fade);
             }
         }
-        self.next.tets.sort_unstable_by_key(|fade| fade.tet);
+        self.next.start();
         std::mem::swap(fading, &mut self.next);
         (moved_j, now_j)
     }
@@ -174,13 +174,7 @@ impl Before {
     }
 
     /// What is left of a tet, with what fell asleep in it; and its energy (J).
-    fn of_tet(
-        &self,
-        body: &Hybrid,
-        patch: &RunningPatch,
-        x: &[DVec3],
-        before: &TetBefore,
-    ) -> (Option<ShareFade>, f64) {
+    fn of_tet(&self, body: &Hybrid, patch: &RunningPatch, x: &[DVec3], before: &TetBefore) -> (Option<ShareFade>, f64) {
         let share = patch.share(before.tet);
         let mut kept_m3 = share.volume_m3;
         let (mut parts, mut whole) = ([DMat3::ZERO; PARTS], DMat3::ZERO);
@@ -244,46 +238,4 @@ fn modes_m2(rest: &RestCell, y: &[DVec3; 8]) -> f64 {
 /// `(1 − ε) V_c` (m³).
 fn handed_m3(partition: &Partition, cell: u32) -> f64 {
     (1.0 - KEPT) * partition.moments(cell as usize).0
-}
-
-impl RunningPatch {
-    /// A group fades by a factor, and what has faded is forgotten. Returns the elastic energy (J) it had, where [`Self::displace`] put it, and what that lost.
-    pub(super) fn fade(
-        &self,
-        body: &Hybrid,
-        x: &[DVec3],
-        fading: &mut Fading,
-        (group, factor): (u32, f64),
-    ) -> (f64, f64) {
-        let (mut held_j, mut left_j) = (0.0, 0.0);
-        for fade in fading.cells.iter_mut().filter(|fade| fade.cell % GROUPS == group) {
-            let (rest, y) = (body.awake_cell(fade.cell as usize), self.corners_m(body, fade.cell));
-            let (f, modes_m2) = (rest.gradient_of(&y), modes_m2(&rest, &y));
-            let material = body.material_of_cell(fade.cell as usize);
-            let energy_j = |fade: &CellFade| {
-                let gradients = [&effective(&f, &fade.shape), &effective(&f, &fade.volume)];
-                cell_j(&rest, material, gradients, (1.0 - fade.modes) * modes_m2)
-            };
-            held_j += energy_j(fade);
-            *fade = fade.faded(factor);
-            left_j += energy_j(fade);
-        }
-        for fade in fading.tets.iter_mut().filter(|fade| fade.tet % GROUPS == group) {
-            let (share, material) = (self.share(fade.tet), body.material_of_tet(fade.tet));
-            if share.nodes.is_empty() {
-                continue;
-            }
-            let gradients = share.gradients(x, DMat3::IDENTITY);
-            let mean = share.mean(&gradients);
-            let energy_j = |fade: &ShareFade| {
-                let shapes = std::array::from_fn(|part| effective(&gradients[part], &fade.parts[part]));
-                share_j(share, material, &shapes, &effective(&mean, &fade.whole))
-            };
-            held_j += energy_j(fade);
-            *fade = fade.faded(factor);
-            left_j += energy_j(fade);
-        }
-        fading.forget_faded();
-        (held_j, held_j - left_j)
-    }
 }

@@ -16,7 +16,7 @@ use super::{
     share::Share,
 };
 use crate::{
-    simd::{CellRow, CutCells, RowKernel, RowValues, ShareKernel},
+    simd::{CellRow, CutCells, Found, RowKernel, RowValues, ShareKernel},
     world::Precision,
 };
 use glam::DVec3;
@@ -43,6 +43,7 @@ pub(crate) struct RunningPatch {
     /// Numbers, among the awake cells, of those that fade.
     fading_cells: Vec<u32>,
     fading_tets: Vec<u32>,
+    fading_mark: u64,
     /// What is left to each coarse tet.
     shares: Vec<Share>,
     share_kernel: ShareKernel,
@@ -98,6 +99,7 @@ impl RunningPatch {
             slots: Vec::with_capacity(most_cells),
             fading_cells: Vec::with_capacity(most_cells),
             fading_tets: Vec::with_capacity(partition.shares().len()),
+            fading_mark: 0,
             number_of_node: vec![0; hybrid.node_count()],
             taken_from: Vec::with_capacity(partition.shares().len()),
             metric: RunningMetric::new(hybrid, most_active),
@@ -316,19 +318,24 @@ impl RunningPatch {
     }
 
     /// Adds forces (N) on coarse nodes of elastic and viscous stress in what is left to the coarse level, where [`Self::displace`] put them, at their
-    /// velocities `v`; returns the power (W) that viscous stress takes.
-    pub(crate) fn add_coarse_forces_n(&mut self, v: &[DVec3], forces_n: &mut [DVec3]) -> f64 {
+    /// velocities `v`, with `left` left of what fades.
+    pub(crate) fn add_coarse_forces_n(&mut self, v: &[DVec3], left: f64, forces_n: &mut [DVec3]) -> Found {
         let v_nodes = &v[..self.node_displacements_m.len()];
-        self.share_kernel.add_forces_n(&self.node_displacements_m, v_nodes, forces_n)
+        self.share_kernel.add_forces_n(&self.node_displacements_m, v_nodes, left, forces_n)
     }
 
     /// The same of awake cells, on coarse nodes and active particles; whose forces were none.
-    pub(crate) fn add_cell_forces_n(&mut self, hybrid: &Hybrid, v: &[DVec3], forces_n: &mut [DVec3]) -> f64 {
+    pub(crate) fn add_cell_forces_n(
+        &mut self,
+        hybrid: &Hybrid,
+        v: &[DVec3],
+        left: f64,
+        forces_n: &mut [DVec3],
+    ) -> Found {
         let nodes = hybrid.node_count();
         let (v_nodes, v_particles) = v.split_at(nodes);
-        let mut power_w = 0.0;
         if self.active.is_empty() {
-            return power_w;
+            return Found::default();
         }
         // Less that of one of them: far from rest, their differences would be rounded too coarsely.
         let first_m = self.displacements_m[0];
@@ -347,10 +354,10 @@ impl RunningPatch {
             self.values.set_velocities(&self.of_points);
             self.cut.set_velocities(&self.of_points);
         }
-        power_w += self.kernel.forces(&self.rows, self.points.len(), &mut self.values);
+        let mut found = self.kernel.forces(&self.rows, (self.points.len(), left), &mut self.values);
         self.values.forces_n(&mut self.of_points);
         if has_cut {
-            power_w += self.cut.forces(self.points.len());
+            found += self.cut.forces(self.points.len(), left);
             self.cut.add_forces_n(&mut self.of_points);
         }
         let (f_nodes, f_particles) = forces_n.split_at_mut(nodes);
@@ -361,7 +368,7 @@ impl RunningPatch {
                 f_particles[point.active as usize] = *force_n;
             }
         }
-        power_w
+        found
     }
 
     /// Takes positions (m) of coarse nodes and then active particles.

@@ -16,7 +16,6 @@ use super::{
     active::{ActiveParticles, HybridScratch, room},
     balance::{Turn, turn_of},
     body::Hybrid,
-    fade::{self, GROUPS},
     listed::SkinView,
     patch::KEPT,
     projection::Projection,
@@ -103,7 +102,7 @@ impl HybridScratch {
         self.follow(body, &state.active);
         state.follow_coarse_forces(model.spec().settings.tick_period_s);
         if !state.active.fading.is_empty() || !state.active.balance_n.is_empty() {
-            self.fade(model, body, state);
+            self.fade(model, state);
         }
         let Some(particles) = &model.spec().particles else { return };
         let Waking::ByTools { reach_m } = particles.waking else { return };
@@ -125,20 +124,16 @@ impl HybridScratch {
         state.active.next.clone_from(&self.looking.wanted);
     }
 
-    /// A tick's fading, and what it gives or takes.
-    fn fade(&mut self, model: &Model, body: &Hybrid, state: &mut State) {
-        let State { x, active, ledger, .. } = state;
-        self.patch.displace(body, x);
-        let group = (state.tick % u64::from(GROUPS)) as u32;
-        let period_s = model.spec().settings.tick_period_s;
-        let factor = fade::factor(f64::from(GROUPS) * period_s, fade::FADING_S);
-        let (held_j, taken_j) = self.patch.fade(body, x, &mut active.fading, (group, factor));
-        active.fading_j[group as usize] = held_j;
-        active.fade_balance(period_s);
-        ledger.dissipated_j += taken_j;
-        active.given_j -= taken_j;
-        self.patch.put_fades(&active.fading);
-        self.forces_are_stale = true;
+    /// A tick's fading of balancing forces; strains fade with the substeps, until nothing is left to speak of.
+    fn fade(&mut self, model: &Model, state: &mut State) {
+        let State { active, ledger, .. } = state;
+        active.fade_balance(model.spec().settings.tick_period_s);
+        if active.fading.has_faded() {
+            ledger.dissipated_j += active.fading.along_j();
+            active.given_j -= active.fading.along_j();
+            active.fading.clear();
+            self.patch.put_fades(&active.fading);
+        }
     }
 
     /// Goes over to the particles that are to be active next.
@@ -193,7 +188,7 @@ impl HybridScratch {
         state.ledger.dissipated_j += held_j;
         state.active.given_j -= held_j;
         state.force_is_current = false;
-        state.active.fading_j = [elastic_j / f64::from(GROUPS); GROUPS as usize];
+        state.active.switched_j = elastic_j;
         if state.active.may_balance() {
             balance.demand(body, next.metric_mut(), &looking.left, state.active.ids(), &looking.handed_n);
         }

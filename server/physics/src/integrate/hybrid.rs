@@ -55,20 +55,30 @@ pub(super) fn evaluate(
     contact.press_tools(&surface, &time, tools, touching, &mut skin.forces_n, contact_scratch);
     state.external_n.fill(DVec3::ZERO);
     skin.hand_over(body.node_count(), patch, &mut state.external_n);
-    let State { x, v, active, force_n, .. } = &mut *state;
+    let State { x, v, active, force_n, viscous, ledger, .. } = &mut *state;
     let every = model.substeps_per_long_step();
-    let mut viscous_power_w = 0.0;
+    let (mut viscous_w, mut taken_j) = (0.0, 0.0);
+    active.fading.go_on(now.dt_s);
+    let left = active.fading.left();
     active.long_steps.turn_with(body, x);
     if every > 1 && now.ends_long_step {
-        let of_coarse = |forces_n: &mut [DVec3]| patch.add_coarse_forces_n(v, forces_n);
-        viscous_power_w += f64::from(every) * active.long_steps.evaluate(body.node_count(), of_coarse);
+        let of_coarse = |forces_n: &mut [DVec3]| patch.add_coarse_forces_n(v, left, forces_n);
+        let found = active.long_steps.evaluate(body.node_count(), of_coarse);
+        viscous_w += f64::from(every) * found.viscous_w;
+        taken_j += active.fading.take_along(0, found.fading_j, f64::from(every) * now.dt_s);
     }
     active.long_steps.start_with_steady_n(force_n);
     if every == 1 {
-        viscous_power_w += patch.add_coarse_forces_n(v, force_n);
+        let found = patch.add_coarse_forces_n(v, left, force_n);
+        viscous_w += found.viscous_w;
+        taken_j += active.fading.take_along(0, found.fading_j, now.dt_s);
     }
-    viscous_power_w += patch.add_cell_forces_n(body, v, force_n);
-    state.viscous.record(viscous_power_w, now.dt_s > 0.0);
+    let found = patch.add_cell_forces_n(body, v, left, force_n);
+    viscous_w += found.viscous_w;
+    taken_j += active.fading.take_along(1, found.fading_j, now.dt_s);
+    viscous.record(viscous_w, now.dt_s > 0.0);
+    ledger.dissipated_j += taken_j;
+    active.given_j -= taken_j;
     if model.gravity_m_per_s2() != DVec3::ZERO {
         patch.metric().add_weight_n(model.gravity_m_per_s2(), &mut state.force_n);
     }

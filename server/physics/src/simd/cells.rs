@@ -9,7 +9,7 @@ pub(super) mod testing;
 use super::{
     block::{Node, Sum},
     dispatch::{self, Available, InstructionSet},
-    fades::{ENTRIES, Split, entries},
+    fades::{ENTRIES, Found, Split, entries},
     node,
     real::Scalar,
 };
@@ -174,13 +174,13 @@ impl CutCells {
         }
     }
 
-    /// Sums up the forces (N) of elastic and viscous stress on the first `points` points; returns the power (W) that viscous stress takes.
-    pub fn forces(&mut self, points: usize) -> f64 {
+    /// Sums up the forces (N) of elastic and viscous stress on the first `points` points, where `left` is left of what fades.
+    pub fn forces(&mut self, points: usize, left: f64) -> Found {
         let Self { layout, instruction_set, displacements, velocities, sums } = self;
         sums[..points].fill(Sum::default());
         match layout {
-            Layout::Single(blocks) => blocks.sum_up(*instruction_set, displacements, velocities, sums),
-            Layout::Double(blocks) => blocks.sum_up(*instruction_set, displacements, velocities, sums),
+            Layout::Single(blocks) => blocks.sum_up(*instruction_set, left, [displacements, velocities], sums),
+            Layout::Double(blocks) => blocks.sum_up(*instruction_set, left, [displacements, velocities], sums),
         }
     }
 
@@ -255,16 +255,17 @@ impl<T: Scalar, const N: usize> Tables<T, N> {
         block.minus_kappa[lane] = T::of(-rest.hourglass_m * mu_pa);
     }
 
-    fn sum_up(&self, set: Available, displacements: &[Node], velocities: &[Node], sums: &mut [Sum]) -> f64 {
-        let mut power_w = 0.0;
+    fn sum_up(&self, set: Available, left: f64, [displacements, velocities]: [&[Node]; 2], sums: &mut [Sum]) -> Found {
+        let mut found = Found::default();
         for run in &self.runs {
             let split = &self.materials[run.material as usize];
             let blocks = &self.blocks[run.blocks.clone()];
             let fades = &self.fades[run.blocks.clone()];
-            let mut pass = CutForces { split, blocks, fades, displacements, velocities, sums };
-            power_w += dispatch::run(set, (split.material.law, !split.material.viscosity.is_zero()), &mut pass);
+            let mut pass = CutForces { split, blocks, fades, left, displacements, velocities, sums, fading_j: 0.0 };
+            let viscous_w = dispatch::run(set, (split.material.law, !split.material.viscosity.is_zero()), &mut pass);
+            found += Found { viscous_w, fading_j: pass.fading_j };
         }
-        power_w
+        found
     }
 }
 
@@ -302,7 +303,7 @@ mod tests {
             }
             kernel.set_displacements(u);
             kernel.set_velocities(v);
-            let power_w = kernel.forces(u.len());
+            let power_w = kernel.forces(u.len(), 0.0).viscous_w;
             let mut forces_n = vec![DVec3::ZERO; u.len()];
             kernel.add_forces_n(&mut forces_n);
             Answer { forces_n, power_w }

@@ -33,6 +33,7 @@ use block::{Blocks, Forces, Job, Node, Products, Run, Sum};
 pub use cells::CutCells;
 use dispatch::Available;
 pub use dispatch::InstructionSet;
+pub use fades::Found;
 use glam::DVec3;
 pub use oracle::Oracle;
 use real::Scalar;

@@ -7,7 +7,7 @@
 use super::{
     cell_stress::{particles, patterns, stress},
     dispatch::{self, Available, InstructionSet, Pass},
-    fades::{ENTRIES, Split, entries, fading_stress},
+    fades::{ENTRIES, Found, Split, add_lanes, entries, fading_stress, scaled},
     laws::M3,
     real::{Real, Scalar, Vector},
     tangents::LaneTangent,
@@ -130,12 +130,12 @@ impl RowKernel {
         RowValues { values }
     }
 
-    /// Sums up the forces (N) of elastic and viscous stress on the first `points` points; returns the power (W) that viscous stress takes.
-    pub fn forces(&self, rows: &[CellRow], points: usize, values: &mut RowValues) -> f64 {
+    /// Sums up the forces (N) of elastic and viscous stress on the first `points` points, where `left` is left of what fades.
+    pub fn forces(&self, rows: &[CellRow], (points, left): (usize, f64), values: &mut RowValues) -> Found {
         match (&self.layout, &mut values.values) {
-            (Layout::Single(materials), Values::Single(arrays)) => self.sum_up(materials, rows, points, arrays),
-            (Layout::Double(materials), Values::Double(arrays)) => self.sum_up(materials, rows, points, arrays),
-            _ => 0.0,
+            (Layout::Single(materials), Values::Single(arrays)) => self.sum_up(materials, rows, (points, left), arrays),
+            (Layout::Double(materials), Values::Double(arrays)) => self.sum_up(materials, rows, (points, left), arrays),
+            _ => Found::default(),
         }
     }
 
@@ -143,20 +143,22 @@ impl RowKernel {
         &self,
         materials: &[CellMaterial<T>],
         rows: &[CellRow],
-        points: usize,
+        (points, left): (usize, f64),
         arrays: &mut Arrays<T>,
-    ) -> f64 {
+    ) -> Found {
         for sums in arrays.left.iter_mut().chain(&mut arrays.right) {
             sums[..1 + points + LANES].fill(T::of(0.0));
         }
-        let mut power_w = 0.0;
+        let mut found = Found::default();
         for same in rows.chunk_by(|a, b| a.material == b.material) {
             let material = &materials[same[0].material as usize];
             let Material { law, viscosity, .. } = &material.split.material;
             let law = (*law, !viscosity.is_zero());
-            power_w += dispatch::run(self.instruction_set, law, &mut RowForces { material, rows: same, arrays });
+            let mut pass = RowForces { material, rows: same, arrays, left, fading_j: 0.0 };
+            let viscous_w = dispatch::run(self.instruction_set, law, &mut pass);
+            found += Found { viscous_w, fading_j: pass.fading_j };
         }
-        power_w
+        found
     }
 }
 
@@ -227,6 +229,8 @@ struct RowForces<'a, T> {
     material: &'a CellMaterial<T>,
     rows: &'a [CellRow],
     arrays: &'a mut Arrays<T>,
+    left: f64,
+    fading_j: f64,
 }
 
 impl<T: Scalar> Pass<T> for RowForces<'_, T> {
@@ -277,9 +281,23 @@ impl<T: Scalar> RowForces<'_, T> {
         }
         let mut kept_modes = weight;
         let (p, density) = if let Some(first) = fades {
-            let a = [matrix::<V>(&self.arrays.fades[..9], first), matrix::<V>(&self.arrays.fades[9..18], first)];
-            kept_modes = weight * V::load(&self.arrays.fades[18][first..]);
-            fading_stress::<V, T, L, VISCOUS>(&self.material.split, &a, &h, &h_dot)
+            let (left, entries) = (V::of(self.left), &self.arrays.fades);
+            let of_shape = scaled(&matrix::<V>(&entries[..9], first), left);
+            let of_volume = scaled(&matrix::<V>(&entries[9..18], first), left);
+            let gone = V::load(&entries[18][first..]) * left;
+            kept_modes = weight * (V::of(1.0) - gone);
+            let (p, density, fading) =
+                fading_stress::<V, T, L, VISCOUS>(&self.material.split, &[of_shape, of_volume], &h, &h_dot);
+            let mut squares = V::of(0.0);
+            for axis in 0..3 {
+                for mode in 0..4 {
+                    squares = squares + modes[axis][mode] * modes[axis][mode] * V::of(MODE_WEIGHTS[mode]);
+                }
+            }
+            // s ∂U/∂s = V P̃ : F A − ½ κ a Σ w |q|²
+            let of_modes = squares * gone * V::of(minus_kappa / 128.0);
+            add_lanes(weight * (fading * V::of(-minus_volume) + of_modes), &mut self.fading_j);
+            (p, density)
         } else {
             stress::<V, T, L, VISCOUS>(&self.material.split.whole, &h, &h_dot)
         };
@@ -306,12 +324,7 @@ impl<T: Scalar> RowForces<'_, T> {
             }
         }
         if VISCOUS {
-            let mut power = [T::of(0.0); LANES];
-            (density * weight * V::of(-minus_volume)).store(&mut power);
-            // One after the other, so that the width of the vectors does not show.
-            for &lane in &power[..V::WIDTH] {
-                *power_w += lane.into();
-            }
+            add_lanes(density * weight * V::of(-minus_volume), power_w);
         }
     }
 }
@@ -388,7 +401,7 @@ mod tests {
             let mut values = kernel.values(u.len(), cells.len());
             values.set_displacements(u);
             values.set_velocities(v);
-            let power_w = kernel.forces(&rows, u.len(), &mut values);
+            let power_w = kernel.forces(&rows, (u.len(), 0.0), &mut values).viscous_w;
             let mut forces_n = vec![DVec3::NAN; u.len()];
             values.forces_n(&mut forces_n);
             Answer { forces_n, power_w }

@@ -66,13 +66,14 @@ impl RunningPatch {
         }
     }
 
-    /// Whether the kernels have something that fades.
-    pub(in crate::hybrid) fn is_fading(&self) -> bool {
-        !self.fading_cells.is_empty() || !self.fading_tets.is_empty()
+    /// Whether this is what the kernels were told of last.
+    pub(in crate::hybrid) fn knows(&self, fading: &Fading) -> bool {
+        self.fading_mark == fading.mark()
     }
 
-    /// Tells the kernels how far everything has faded.
+    /// Tells the kernels what fades.
     pub(in crate::hybrid) fn put_fades(&mut self, fading: &Fading) {
+        self.fading_mark = fading.mark();
         let Self { rows, slots, values, cut, fading_cells, cells, .. } = self;
         for row in rows.iter_mut() {
             row.fading = false;
@@ -91,7 +92,7 @@ impl RunningPatch {
         }
         fading_cells.clear();
         let mut number = 0;
-        for fade in &fading.cells {
+        for fade in fading.cells() {
             while cells.get(number).is_some_and(|&cell| cell < fade.cell) {
                 number += 1;
             }
@@ -106,7 +107,7 @@ impl RunningPatch {
             }
         }
         self.fading_tets.clear();
-        for fade in &fading.tets {
+        for fade in fading.tets() {
             self.fading_tets.push(fade.tet);
             self.share_kernel.put_fade(fade.tet as usize, Some(fade));
         }
