@@ -28,7 +28,7 @@ pub struct ActiveParticles {
     pub(super) balance_n: Vec<DVec3>,
     /// Energy (J) that fading strains and balancing forces gave lately, beyond what they and switches took.
     pub(crate) given_j: f64,
-    /// Elastic energy (J) of what the last switch changed.
+    /// Elastic energy (J) of what a switch lately changed, the most of any.
     pub(super) switched_j: f64,
     pub(crate) long_steps: LongSteps,
 }

@@ -9,7 +9,7 @@
 //! `M_i α × (x_i − x̄)` on the coarse nodes of a body that is held nowhere. The work of these forces is booked in the ledger.
 //!
 //! They are dead loads: on what swings while regions are switched they may do work without end, as may strains that fade (`fade`). What both gave lately, beyond what they and
-//! switches took, is kept; where it is more than a twentieth of the elastic energy of what the last switch changed, forces are balanced no more, and jump.
+//! switches took, is kept; where it is more than [`MOST_GIVEN`] of the elastic energy that switches lately changed, forces are balanced no more, and jump.
 use super::{active::ActiveParticles, body::Hybrid, fade, patch::KEPT, running_metric::RunningMetric};
 use crate::world::State;
 use glam::{BVec3, DMat3, DVec3};
@@ -20,8 +20,8 @@ const FADING_S: f64 = 0.02;
 const HURRIED_S: f64 = 0.003;
 /// How fast what fading gave is forgotten (s).
 const FORGETTING_S: f64 = 1.0;
-/// Fading that gave more than this, over the elastic energy of what a switch changes, is not helped on by balancing forces.
-const MOST_GIVEN: f64 = 0.05;
+/// Fading that gave more than this, over the elastic energy that a switch lately changed, is not helped on by balancing forces.
+const MOST_GIVEN: f64 = 0.07;
 /// Balancing forces smaller than this, over the largest force, are none.
 const NOTHING: f64 = 1e-9;
 
@@ -130,14 +130,16 @@ impl Balance {
 }
 
 impl ActiveParticles {
-    /// Whether fading gave little beside the elastic energy of what the last switch changed.
+    /// Whether fading gave little beside the elastic energy that switches changed lately.
     pub(super) fn may_balance(&self) -> bool {
         self.given_j <= MOST_GIVEN * self.switched_j
     }
 
     /// A tick's fading of balancing forces.
     pub(super) fn fade_balance(&mut self, period_s: f64) {
-        self.given_j *= fade::factor(period_s, FORGETTING_S);
+        let forgotten = fade::factor(period_s, FORGETTING_S);
+        self.given_j *= forgotten;
+        self.switched_j *= forgotten;
         let time_constant_s = if self.may_balance() { FADING_S } else { HURRIED_S };
         let factor = fade::factor(period_s, time_constant_s);
         self.balance_n.iter_mut().for_each(|balance| *balance *= factor);

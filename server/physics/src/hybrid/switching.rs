@@ -188,7 +188,7 @@ impl HybridScratch {
         state.ledger.dissipated_j += held_j;
         state.active.given_j -= held_j;
         state.force_is_current = false;
-        state.active.switched_j = elastic_j;
+        state.active.switched_j = state.active.switched_j.max(elastic_j);
         if state.active.may_balance() {
             balance.demand(body, next.metric_mut(), &looking.left, state.active.ids(), &looking.handed_n);
         }
