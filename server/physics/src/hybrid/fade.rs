@@ -20,7 +20,7 @@ use glam::{DMat3, DVec3};
 use serde::{Deserialize, Serialize};
 
 /// τ (s).
-pub(super) const FADING_S: f64 = 0.03;
+pub(super) const FADING_S: f64 = 0.04;
 /// A change of rest state smaller than this is none.
 const NOTHING: f64 = 1e-6;
 /// One smaller than this has no energy to speak of.
