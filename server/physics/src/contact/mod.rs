@@ -113,6 +113,8 @@ struct ToolScratch {
     next: Touching,
     sum: Pressed,
     coupling_sum_n: DVec3,
+    /// Triangle (as the broad phase numbers them) nearest to the centre when it was last pressed.
+    nearest: usize,
 }
 
 impl ToolModel {
@@ -211,6 +213,7 @@ impl ContactModel {
             next: Touching::with_capacity(tool.foundation.samples),
             sum: Pressed::default(),
             coupling_sum_n: DVec3::ZERO,
+            nearest: 0,
         };
         ContactScratch { tools: self.tools.iter().map(tool).collect(), exhaustive: !skip_distant }
     }
@@ -303,6 +306,7 @@ impl ContactModel {
             let pressed = self.press(index, tool.centre_m, x, contact, forces_n, scratch);
             let surface_m_per_s = self.surface_m_per_s(&pressed, *velocity_m_per_s);
             let coupling_n = proxy::finish(model, tool, &pressed, surface_m_per_s, time);
+            scratch.nearest = pressed.nearest.0;
             tool.friction_heat_j += pressed.heat_j;
             tool.contacts = pressed.contacts;
             tool.contact_energy_j = pressed.energy_j;
@@ -312,6 +316,15 @@ impl ContactModel {
                 scratch.coupling_sum_n += coupling_n;
             }
         }
+    }
+
+    /// The triangle of the surface that the hardest pressed tool is nearest to; `None` where no tool has any of the surface inside it. The
+    /// buffers must be those that contact was just looked at with.
+    pub(crate) fn touched_triangle(&self, contact: &ContactState, scratch: &ContactScratch) -> Option<u32> {
+        let touching = (0..self.tools.len()).filter(|&tool| contact.touches(tool));
+        let force_sq = |tool: usize| contact.tools[tool].force_n.length_squared();
+        let hardest = touching.reduce(|a, b| if force_sq(b) > force_sq(a) { b } else { a })?;
+        Some(self.triangles.surface_triangle[scratch.tools[hardest].nearest])
     }
 
     /// [`Self::substep`] where the body does not move and no tool is near it, of which there is nothing but the tools' motion. Stops and

@@ -4,7 +4,7 @@ use crate::{
     contact::{ContactScratch, ToolTarget},
     health::{LastGood, Quarantine},
     hybrid::HybridScratch,
-    integrate::{ForceHistory, ImplicitScratch},
+    integrate::{ForceHistory, ImplicitScratch, SeedBodyScratch},
     simd::KernelScratch,
 };
 use glam::DVec3;
@@ -55,6 +55,7 @@ pub struct Scratch {
     pub(crate) contact: ContactScratch,
     pub(crate) implicit: ImplicitScratch,
     pub(crate) hybrid: Option<Box<HybridScratch>>,
+    pub(crate) seed: Option<Box<SeedBodyScratch>>,
 }
 
 impl Scratch {
@@ -72,6 +73,7 @@ impl Scratch {
             contact: model.contact().scratch(model.spec().settings.skips.distant_contact),
             implicit: ImplicitScratch::new(model),
             hybrid: HybridScratch::new(model).map(Box::new),
+            seed: model.seed().map(|seed| Box::new(SeedBodyScratch::new(seed))),
         }
     }
 
