@@ -148,6 +148,12 @@ impl SeedModel {
         mass_kg
     }
 
+    /// The triangle whose touch wakes the most particles.
+    pub fn largest_region(&self) -> Option<u32> {
+        let sizes = self.regions().iter().map(Region::len).zip(0..);
+        sizes.max_by_key(|(size, _)| *size).map(|(_, triangle)| triangle)
+    }
+
     /// A third (m²) of the triangles around each vertex of the surface.
     fn vertex_areas_m2(&self) -> Vec<f64> {
         let mut area_m2 = vec![0.0; self.surface_rest_m().len()];
