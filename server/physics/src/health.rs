@@ -219,7 +219,9 @@ impl LastGood {
 impl std::fmt::Display for Quarantine {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self.node {
-            Self::NOT_A_NODE => write!(f, "tick {} was refused: a tool, a sum or a particle became non-finite", self.tick),
+            Self::NOT_A_NODE => {
+                write!(f, "tick {} was refused: a tool, a sum or a particle became non-finite", self.tick)
+            }
             node => write!(f, "tick {} was refused: node {node} became non-finite", self.tick),
         }
     }

@@ -68,7 +68,8 @@ fn a_tick_is_the_papers_step_with_what_tools_do_as_external_forces() {
 /// A tick of two steps is two ticks of one; a step that does not fit is shortened, never lengthened.
 #[test]
 fn a_tick_is_taken_in_equal_steps_that_are_no_longer_than_wanted() {
-    let push = |rig: &Rig| vec![PointForce { node: rig.model.surface().nodes[2], force_n: DVec3::new(3e-6, -2e-5, 0.0) }];
+    let push =
+        |rig: &Rig| vec![PointForce { node: rig.model.surface().nodes[2], force_n: DVec3::new(3e-6, -2e-5, 0.0) }];
     let steps = |tick_period_s: f64| {
         let mut spec = layered();
         (spec.tools, spec.settings.tick_period_s) = (Vec::new(), tick_period_s);

@@ -17,8 +17,7 @@ static ALLOCATOR: AllocDisabler = AllocDisabler;
 
 #[test]
 fn a_step_does_not_allocate() {
-    let spec =
-        SeedSpec { core: core(0.01, 0.02), held_nodes: vec![0], layer: Some(layer()), parameters: parameters() };
+    let spec = SeedSpec { core: core(0.01, 0.02), held_nodes: vec![0], layer: Some(layer()), parameters: parameters() };
     for parameters in [spec.parameters, spec.parameters.as_printed()] {
         let model = SeedModel::build(SeedSpec { parameters, ..spec.clone() }).unwrap();
         let (mut state, mut scratch) = (SeedState::at_rest(&model), SeedScratch::new(&model));

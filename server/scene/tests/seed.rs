@@ -80,7 +80,8 @@ fn the_shipped_scenes_run_and_push_back() {
 const BODY: &str = "[scene]\nname = \"t\"\ntick_period_s = 7e-3\n[body]\noffset_mm = [0, 0, 5]\n[body.sphere_shell]\ninner_radius_mm = 12\n\
                     outer_radius_mm = 20\ntarget_tets = 188\n";
 const SEED: &str = "[body.seed]\nstep_ms = 3.5\n[body.seed.layer]\nouter_semi_axes_mm = [30, 30, 30]\ntriangles = 300\nparticles = 8000\n";
-const MATERIAL: &str = "[[material]]\nlaw = \"stvk\"\nlambda_pa = 6\nmu_pa = 3\nviscosity_phi_pa_s = 1e-3\ndensity_kg_per_m3 = 900\n";
+const MATERIAL: &str =
+    "[[material]]\nlaw = \"stvk\"\nlambda_pa = 6\nmu_pa = 3\nviscosity_phi_pa_s = 1e-3\ndensity_kg_per_m3 = 900\n";
 
 fn text(seed: &str, material: &str, rest: &str) -> String {
     format!("{BODY}{}{material}{rest}", seed.replace("step_ms = 3.5", "step_s = 3.5e-3"))

@@ -5,7 +5,8 @@
 //! The papers displace what the user touches. Here tools press as on every body, with forces on vertices; they act on awake particles by
 //! eq. 25's weights (`seed::step`). Contact is explicit, so it must not be stiffer than the step can bear: [`SeedModel::contact_mass_kg`].
 use super::{
-    LayerSpec, SeedModel, SeedParameters, SeedState, core::outer_part, layer::enclosed_m3, region::Region, state::Motion,
+    LayerSpec, SeedModel, SeedParameters, SeedState, core::outer_part, layer::enclosed_m3, region::Region,
+    state::Motion,
 };
 use crate::mesh::{Surface, TetMesh};
 use glam::DVec3;

@@ -56,9 +56,10 @@ impl Model {
             (None, None) => Self::of_tets(spec, surface),
             (Some(particles), None) => Self::of_particles(spec, &surface, &particles, progress),
             (None, Some(seed)) => Self::of_seed(spec, seed),
-            (Some(_), Some(_)) => {
-                Err(ModelError::NotForSeeds { what: "particles on a lattice", instead: "choose one of the two hybrids" })
-            }
+            (Some(_), Some(_)) => Err(ModelError::NotForSeeds {
+                what: "particles on a lattice",
+                instead: "choose one of the two hybrids",
+            }),
         }
     }
 

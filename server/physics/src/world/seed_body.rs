@@ -45,7 +45,11 @@ fn demand(spec: &ModelSpec, parameters: &SeedParameters) -> Result<(), ModelErro
         (is_its, "other materials than the one of its parameters", "give it one St. Venant-Kirchhoff material"),
         (spec.gravity_m_per_s2 == DVec3::ZERO, "gravity", "its particles have none; leave it out"),
         (spec.prescribed.iter().all(|set| set.axes == [true; 3]), "nodes held along some axes", "hold all three"),
-        (settings.integrator == Integrator::Leapfrog, "another integrator", "it has its own two; leave this at leapfrog"),
+        (
+            settings.integrator == Integrator::Leapfrog,
+            "another integrator",
+            "it has its own two; leave this at leapfrog",
+        ),
         (settings.substeps == Substeps::Measured, "a number of substeps", "give its step dt_s"),
         (settings.mass_damping_per_s == 0.0, "mass damping", "its viscosities damp it; leave it at 0"),
         (settings.sleep_tolerance_m == 0.0, "sleep of the whole body", "leave sleep_tolerance_m at 0"),

@@ -23,8 +23,8 @@ use body::Body;
 use glam::DVec3;
 use material::Materials;
 use palpate_physics::{
-    Integrator, ModelSpec, Precision, Settings, Skips, Substeps, hybrid::ParticleSpec, mesh::quality, seed::SeedBodySpec,
-    world::MAX_SUBSTEPS,
+    Integrator, ModelSpec, Precision, Settings, Skips, Substeps, hybrid::ParticleSpec, mesh::quality,
+    seed::SeedBodySpec, world::MAX_SUBSTEPS,
 };
 use regions::Regions;
 use std::path::{Path, PathBuf};

@@ -78,7 +78,11 @@ fn demand(document: &Document) -> Result<(), Fault> {
     let materials = Where::root("material");
     match document.material.as_slice() {
         [one] if one.law != LawName::Stvk => {
-            return refuse(materials.index(0).key("law"), "a seed body is of St. Venant-Kirchhoff material", "write law = \"stvk\"");
+            return refuse(
+                materials.index(0).key("law"),
+                "a seed body is of St. Venant-Kirchhoff material",
+                "write law = \"stvk\"",
+            );
         }
         [_] => {}
         _ => {
