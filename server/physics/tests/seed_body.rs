@@ -39,7 +39,8 @@ fn oracle(spec: &ModelSpec, dt_s: f64) -> SeedModel {
 #[test]
 fn a_tick_is_the_papers_step_with_what_tools_do_as_external_forces() {
     for layer in [Some(layer()), None] {
-        let outer_m = if layer.is_some() { 0.02 } else { 0.03 };
+        let is_layered = layer.is_some();
+        let outer_m = if is_layered { 0.02 } else { 0.03 };
         let spec = body_spec(outer_m, layer, parameters());
         let model = oracle(&spec, spec.settings.tick_period_s);
         let (mut state, mut scratch) = (SeedState::at_rest(&model), SeedScratch::new(&model));
@@ -54,6 +55,7 @@ fn a_tick_is_the_papers_step_with_what_tools_do_as_external_forces() {
             let triangle = rig.state.seed.as_ref().unwrap().touched;
             touched += u32::from(!forces_n.is_empty());
             sides.extend(triangle);
+            assert!(tick >= 150 || triangle.is_none_or(|triangle| triangle == 0 || !is_layered), "{triangle:?}");
             model.step(&mut state, &mut scratch, &SeedContact { triangle, forces_n: &forces_n, displaced_m: &[] });
             rig.tick_at(device_m(tick));
             assert_eq!(rig.state.seed.as_ref().unwrap().now, state, "tick {tick}");
