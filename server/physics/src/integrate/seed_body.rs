@@ -6,7 +6,7 @@
 //! f at t + dt   tools follow, contact is looked at anew
 //! ```
 //! Which triangle is touched: the one nearest to the centre of the tool that is pressed hardest, as long as samples of the surface are
-//! inside it.
+//! inside it. Without tools it stays what it is set to.
 //!
 //! Ledger: forces work along what their vertices went. What the scheme, viscosity and exchange take is not known.
 use super::forces::Tick;
@@ -45,6 +45,9 @@ pub(super) fn run(tick: &Tick<'_>, state: &mut State, scratch: &mut Scratch) {
 }
 
 fn note_touch(tick: &Tick<'_>, state: &mut State, scratch: &Scratch) {
+    if state.tools.is_empty() {
+        return;
+    }
     let touched = tick.model.contact().touched_triangle(&state.contact, &scratch.contact);
     if let Some(motion) = &mut state.seed {
         motion.touched = touched;

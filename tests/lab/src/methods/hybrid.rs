@@ -137,7 +137,7 @@ impl Pressed {
         Self { driven: Driven::at_rest(&model, tool.as_ref()), model, tool, load, fine, probe }
     }
 
-    /// Of a seed body that nothing touches but a load: the triangle that is taken for touched in the next tick.
+    /// Of a seed body that no tool touches, but a load: its particles under this triangle are awake.
     pub(super) fn touch(&mut self, triangle: Option<u32>) {
         if let (Some(seed), true) = (&mut self.driven.state.seed, self.load.is_some()) {
             seed.touched = triangle;
@@ -173,6 +173,9 @@ impl Running for Pressed {
     }
 
     fn energy_error(&self) -> Option<f64> {
+        if self.model.seed().is_some() {
+            return None;
+        }
         self.driven.energy_error(&self.model)
     }
 

@@ -129,8 +129,10 @@ impl Method for SeedHybrid {
         spec.tools = tool.iter().map(Tool::spec).collect();
         let probe = Probe::new(&skin, &sample::points(problem.body));
         let touched = touched_triangle(&skin);
-        let pressed = Pressed::new(Model::build(spec).into_diagnostic()?, tool, load, (skin, probe));
-        Ok(Box::new(Touched { pressed, triangle: touched }))
+        let mut pressed = Pressed::new(Model::build(spec).into_diagnostic()?, tool, load, (skin, probe));
+        // A load touches where a tool would.
+        pressed.touch(touched);
+        Ok(Box::new(pressed))
     }
 }
 
@@ -163,37 +165,4 @@ fn touched_triangle(skin: &TetBody) -> Option<u32> {
     let from_touch_m = |triangle: &usize| middle_m(*triangle).distance(skin.touch_m);
     let triangles = 0..skin.surface.triangles.len();
     triangles.min_by(|a, b| from_touch_m(a).total_cmp(&from_touch_m(b))).map(|triangle| triangle as u32)
-}
-
-/// A load touches where a tool would.
-struct Touched {
-    pressed: Pressed,
-    triangle: Option<u32>,
-}
-
-impl Running for Touched {
-    fn tick(&mut self, fraction: f64) {
-        self.pressed.touch(self.triangle);
-        self.pressed.tick(fraction);
-    }
-
-    fn answer(&self) -> f64 {
-        self.pressed.answer()
-    }
-
-    fn displacements_m(&self) -> Vec<DVec3> {
-        self.pressed.displacements_m()
-    }
-
-    fn energy_error(&self) -> Option<f64> {
-        None
-    }
-
-    fn size(&self) -> [usize; 3] {
-        self.pressed.size()
-    }
-
-    fn failure(&self) -> Option<String> {
-        self.pressed.failure()
-    }
 }
