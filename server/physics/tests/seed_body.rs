@@ -212,6 +212,8 @@ fn what_bursts_is_contained() {
     assert_eq!(rig.state, State::at_rest(&rig.model));
 }
 
+type Change<'a> = &'a dyn Fn(&mut ModelSpec);
+
 #[test]
 fn what_it_cannot_have_is_refused_by_name() {
     let message = |change: &dyn Fn(&mut ModelSpec)| {
@@ -222,7 +224,7 @@ fn what_it_cannot_have_is_refused_by_name() {
     let parameters_of = |spec: &mut ModelSpec, change: &dyn Fn(&mut SeedParameters)| {
         change(&mut spec.seed.as_mut().unwrap().parameters);
     };
-    let refused: &[(&dyn Fn(&mut ModelSpec), &str)] = &[
+    let refused: [(Change<'_>, &str); 11] = [
         (&|spec| spec.gravity_m_per_s2 = DVec3::NEG_Z, "cannot have gravity"),
         (&|spec| spec.regions[0].density_kg_per_m3 = 900.0, "one St. Venant-Kirchhoff material"),
         (&|spec| spec.prescribed[0].axes[1] = false, "hold all three"),
@@ -242,7 +244,7 @@ fn what_it_cannot_have_is_refused_by_name() {
         ),
     ];
     for (change, wanted) in refused {
-        let message = message(*change);
+        let message = message(change);
         assert!(message.contains(wanted), "{message}");
     }
 }

@@ -1,6 +1,6 @@
 //! `palpated check`: what a scene's body is like, and what a tick costs on this machine.
 use super::{load, simulate::Run, summary::TimeNumbers};
-use palpate_physics::{Model, hybrid::Waking, material::Law};
+use palpate_physics::{Model, hybrid::Waking, material::Law, seed::region::Region};
 use palpate_scene::{Scene, builtin_names, wording::counted};
 use std::{
     process::ExitCode,
@@ -130,7 +130,7 @@ fn print_seed(model: &Model) {
     println!("seed       the papers' own hybrid; steps of {} ms", short(parameters.dt_s * 1e3));
     if let Some(layer) = seed.layer() {
         let spacing_m = layer.voxels.spacing_m;
-        let sizes = seed.regions().iter().map(|region| region.len());
+        let sizes = seed.regions().iter().map(Region::len);
         println!(
             "particles  {}, {} mm apart; {} to {} awake, {:.0} on average over {}",
             layer.particle_count(),

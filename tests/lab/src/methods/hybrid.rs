@@ -90,7 +90,7 @@ impl Method for Hybrid {
         let touched = nearest(&model, fine.touch_m, self.active);
         wake_only(&model, &mut driven.state, &mut driven.scratch, touched);
         let probe = Probe::new(&fine, &sample::points(problem.body));
-        Ok(Box::new(Pressed { probe, fine, load, tool, driven, model }))
+        Ok(Box::new(Pressed { model, driven, tool, load, fine, probe }))
     }
 }
 
