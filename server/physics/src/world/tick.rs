@@ -12,7 +12,7 @@ use glam::DVec3;
 /// A force injected on a node for one tick.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PointForce {
-    /// Node of the surface ([`Model::surface`]) or, of a body without particles, any.
+    /// Node of the surface ([`Model::surface`]) or, of a body of tets alone, any.
     pub node: u32,
     /// Force (N, world).
     pub force_n: DVec3,

@@ -8,7 +8,7 @@ use serde::Deserialize;
 pub(crate) struct SeedTable {
     /// Longest step (s), the papers' Δt; the tick's period by default. A tick is taken in equal steps that are no longer.
     pub(crate) step_s: Option<f64>,
-    /// False: without the three repairs that can be left out. It then bursts within seconds.
+    /// False: without the three repairs that can be left out. It then flutters, and may burst.
     #[serde(default = "default_repairs")]
     pub(crate) repairs: bool,
     /// Particles around the core, and the surface outside them; without it the core's boundary is touched.
