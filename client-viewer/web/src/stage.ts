@@ -13,7 +13,7 @@ const vector = (v: Vec3 | undefined) => new THREE.Vector3(v?.x ?? 0, v?.y ?? 0, 
 const LONGEST_ARROW = 0.25;
 
 /** Of the surface while what is in it shall be seen. */
-const TRANSLUCENT = 0.4;
+const TRANSLUCENT = 0.3;
 
 /** Three circles around the origin, one in each plane. */
 function rings(radius: number): THREE.BufferGeometry {
