@@ -60,7 +60,10 @@ fn ending(path: &Path) -> Option<String> {
     path.extension().and_then(|e| e.to_str()).map(str::to_ascii_lowercase)
 }
 
-fn particle_writer_for(path: &Path) -> Result<fn(&Surface, &[DVec3]) -> String, ViewError> {
+/// The text of a file with points at these positions (m).
+type ParticleWriter = fn(&Surface, &[DVec3]) -> String;
+
+fn particle_writer_for(path: &Path) -> Result<ParticleWriter, ViewError> {
     match ending(path).as_deref() {
         Some("vtu") => Ok(points::to_vtu),
         Some("ply") => Ok(points::to_ply),

@@ -39,7 +39,13 @@ pub(super) fn to_ply(surface: &Surface, positions_m: &[DVec3]) -> String {
 /// VTK unstructured grid (XML, ASCII), a cell a particle.
 pub(super) fn to_vtu(_: &Surface, positions_m: &[DVec3]) -> String {
     let count = positions_m.len();
-    let each = |of: fn(usize) -> usize| (0..count).map(|i| format!("{}\n", of(i))).collect::<String>();
+    let each = |of: fn(usize) -> usize| {
+        (0..count).fold(String::new(), |mut text, i| {
+            // Writing into a String cannot fail.
+            let _ = writeln!(text, "{}", of(i));
+            text
+        })
+    };
     format!(
         "<?xml version=\"1.0\"?>\n<VTKFile type=\"UnstructuredGrid\" version=\"1.0\" byte_order=\"LittleEndian\">\n\
          <UnstructuredGrid>\n<Piece NumberOfPoints=\"{count}\" NumberOfCells=\"{count}\">\n<Points>\n\
@@ -57,7 +63,7 @@ pub(super) fn to_vtu(_: &Surface, positions_m: &[DVec3]) -> String {
 
 fn rows(positions_m: &[DVec3]) -> String {
     positions_m.iter().fold(String::new(), |mut text, p| {
-        // Writing into a String cannot fail. To a tenth of a micrometre: the stream's own quantum is of that size.
+        // To a tenth of a micrometre: the stream's own quantum is of that size. Writing into a String cannot fail.
         let _ = writeln!(text, "{:.7} {:.7} {:.7}", p.x, p.y, p.z);
         text
     })
