@@ -1,5 +1,5 @@
 //! The page in a real browser: headless Chromium, driven by `browser/*.mjs`, against the real daemon.
-#![allow(clippy::unwrap_used)] // a test that cannot start its subject has failed
+#![allow(clippy::unwrap_used, clippy::expect_used)] // a test that cannot start its subject has failed
 use palpate_system_tests::{programs, root};
 use std::{path::Path, process::Command};
 
