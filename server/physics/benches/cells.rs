@@ -71,23 +71,33 @@ fn kernels(criterion: &mut Criterion) {
                     if offset == 0.0 {
                         let row = |r: u32| {
                             let at = |j: u32, k: u32| ((r / 10 + k) * 11 + r % 10 + j) * 11;
-                            CellRow { points: [at(0, 0), at(1, 0), at(0, 1), at(1, 1)], cells: 10, material: 0 }
+                            CellRow {
+                                points: [at(0, 0), at(1, 0), at(0, 1), at(1, 1)],
+                                cells: 10,
+                                material: 0,
+                                first: 10 * r,
+                                fading: false,
+                            }
                         };
-                        let rows: Vec<CellRow> = (0..100).map(row).collect();
+                        let mut rows: Vec<CellRow> = (0..100).map(row).collect();
                         let kernel = RowKernel::new(SPACING_M, 1.0, &[material], precision).with_instruction_set(set);
-                        let mut values = kernel.values(rest.len());
+                        let mut values = kernel.values(rest.len(), cells.len());
                         values.set_displacements(&u);
                         group.bench_function(format!("{precision:?} {set:?}, rows of 10"), |b| {
-                            b.iter(|| kernel.forces(&rows, rest.len(), &mut values));
+                            b.iter(|| kernel.forces(&rows, (rest.len(), 0.5), &mut values));
+                        });
+                        rows.iter_mut().for_each(|row| row.fading = true);
+                        group.bench_function(format!("{precision:?} {set:?}, rows of 10 that fade"), |b| {
+                            b.iter(|| kernel.forces(&rows, (rest.len(), 0.5), &mut values));
                         });
                     }
                     let mut kernel = CutCells::with_capacity(cells.len(), rest.len(), &[material], precision);
                     kernel = kernel.with_instruction_set(set);
-                    kernel.start(0, cells.len(), false);
+                    kernel.start(0, cells.len());
                     cells.iter().enumerate().for_each(|(c, (points, rest))| kernel.put(c, *points, rest));
                     kernel.set_displacements(&u);
                     group.bench_function(format!("{precision:?} {set:?}, as cut"), |b| {
-                        b.iter(|| kernel.forces(rest.len()));
+                        b.iter(|| kernel.forces(rest.len(), 0.5));
                     });
                 }
             }

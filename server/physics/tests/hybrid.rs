@@ -3,48 +3,23 @@
 mod rig;
 use glam::DVec3;
 use palpate_physics::{
-    Energies, LoadSpec, ModelSpec, Precision, Settings, Substeps, Surface,
+    Energies, LoadSpec, ModelSpec, Precision, Settings, Substeps,
     contact::Coupling,
     hybrid::{
-        ParticleSpec, Skin, Waking,
+        Waking,
         equilibrium::equilibrium,
         patch::{Field, Patch},
         place::Place,
         wake_only,
     },
-    material::Law,
     snapshot,
 };
-use rig::{Rig, at, body, bricks, even, hold, material, nodes_where, sphere};
+use rig::{Rig, at, held_below, hybrid_block, sphere};
 use std::collections::BTreeSet;
-
-const H_M: f64 = 2.5e-3;
 
 /// 40 × 40 × 20 mm in 24 coarse tets, particles 2.5 mm apart, its lower face at z = −20 mm.
 fn block(poisson_ratio: f64) -> ModelSpec {
-    let axes = |cells: usize| {
-        let side = even(-0.02, 0.02, 2 * cells);
-        bricks(&side, &side, &even(-0.02, 0.0, cells))
-    };
-    let (coarse, fine) = (axes(1), axes(8));
-    let surface = Surface::of(&fine).unwrap();
-    let positions = surface.nodes.iter().map(|&n| fine.positions_m()[n as usize]).collect();
-    let skin = Skin::new(positions, surface.triangles).unwrap();
-    let mut spec = body(coarse, material(Law::StableNeoHookean, 10e3, poisson_ratio));
-    spec.particles = Some(ParticleSpec {
-        skin,
-        spacing_m: H_M,
-        lattice_through_m: DVec3::ZERO,
-        most_active: 400,
-        waking: Waking::ByHand,
-    });
-    spec
-}
-
-fn held(mut spec: ModelSpec) -> ModelSpec {
-    let bottom = nodes_where(&spec.mesh, |p| p.z < -0.0199);
-    spec.prescribed = vec![hold("bottom", bottom, [true; 3])];
-    spec
+    hybrid_block((0.02, 1, 8), poisson_ratio, 400, Waking::ByHand)
 }
 
 /// Particles within a distance of a point, at rest.
@@ -61,7 +36,7 @@ fn vertices_near(spec: &ModelSpec, point: DVec3, distance_m: f64) -> Vec<u32> {
 
 #[test]
 fn damped_the_loop_comes_to_rest_where_newtons_method_says() {
-    let mut spec = held(block(0.45));
+    let mut spec = held_below(block(0.45));
     let pressed = vertices_near(&spec, DVec3::ZERO, 5e-3);
     let force_n = DVec3::new(2e-3, 0.0, -2e-2) / pressed.len() as f64;
     spec.loads = vec![LoadSpec::NodalForces(pressed.iter().map(|&v| (v, force_n)).collect())];
@@ -126,7 +101,7 @@ fn free_flight_keeps_momenta_and_energy() {
 
 /// A sphere pressed on the block.
 fn pressed(precision: Precision) -> Rig {
-    let mut spec = held(block(0.45));
+    let mut spec = held_below(block(0.45));
     spec.settings = Settings { precision, mass_damping_per_s: 20.0, ..spec.settings };
     spec.tools = vec![sphere(6e-3, DVec3::Z * 7e-3, Coupling::Rigid)];
     spec.tools[0].friction_coefficient = 0.3;
@@ -178,7 +153,7 @@ fn looking_only_where_the_tool_may_be_costs_no_bit() {
         let mut rig = pressed(Precision::Double);
         let mut spec = rig.model.spec().clone();
         spec.settings.skips.distant_contact = distant_contact;
-        rig = Rig::new(held(ModelSpec { mesh: block(0.45).mesh, prescribed: vec![], ..spec }));
+        rig = Rig::new(held_below(ModelSpec { mesh: block(0.45).mesh, prescribed: vec![], ..spec }));
         for tick in 0..400_u32 {
             if tick % 100 == 50 {
                 let awake = near(&rig, DVec3::X * 1e-4 * f64::from(tick), 8e-3);
@@ -201,7 +176,7 @@ fn looking_only_where_the_tool_may_be_costs_no_bit() {
 fn particles_wake_before_the_touch_follow_it_and_sleep_again() {
     let mut spec = pressed(Precision::Double).model.spec().clone();
     spec.gravity_m_per_s2 = DVec3::ZERO;
-    spec = held(ModelSpec { mesh: block(0.45).mesh, prescribed: vec![], ..spec });
+    spec = held_below(ModelSpec { mesh: block(0.45).mesh, prescribed: vec![], ..spec });
     spec.tools[0].start_position_m = DVec3::new(-5e-3, 0.0, 40e-3);
     let particles = spec.particles.as_mut().unwrap();
     particles.waking = Waking::ByTools { reach_m: 8e-3 };

@@ -2,32 +2,12 @@
 #![allow(clippy::unwrap_used)]
 mod rig;
 use glam::DVec3;
-use palpate_physics::{
-    Energies, ModelSpec, Precision, Settings, Substeps, Surface,
-    contact::Coupling,
-    hybrid::{ParticleSpec, Skin, Waking, wake_only},
-    material::Law,
-};
-use rig::{Rig, body, bricks, even, hold, material, nodes_where, sphere};
+use palpate_physics::{Energies, ModelSpec, Precision, Settings, Substeps, contact::Coupling, hybrid::Waking};
+use rig::{Rig, held_below, hybrid_block, sphere, wake_nearest};
 
 /// 80 × 80 × 40 mm in 192 coarse tets, particles 2.5 mm apart, held below.
 fn block(substeps: u32, long_coarse_steps: bool) -> ModelSpec {
-    let axes = |cells: usize| {
-        let side = even(-0.04, 0.04, 2 * cells);
-        bricks(&side, &side, &even(-0.04, 0.0, cells))
-    };
-    let (coarse, fine) = (axes(2), axes(16));
-    let surface = Surface::of(&fine).unwrap();
-    let positions = surface.nodes.iter().map(|&n| fine.positions_m()[n as usize]).collect();
-    let mut spec = body(coarse, material(Law::StableNeoHookean, 10e3, 0.45));
-    spec.particles = Some(ParticleSpec {
-        skin: Skin::new(positions, surface.triangles).unwrap(),
-        spacing_m: 2.5e-3,
-        lattice_through_m: DVec3::ZERO,
-        most_active: 300,
-        waking: Waking::ByHand,
-    });
-    spec.prescribed = vec![hold("bottom", nodes_where(&spec.mesh, |p| p.z < -0.0399), [true; 3])];
+    let mut spec = held_below(hybrid_block((0.04, 2, 16), 0.45, 300, Waking::ByHand));
     spec.settings =
         Settings { precision: Precision::Double, substeps: Substeps::Fixed(substeps), ..Settings::for_particles() };
     spec.settings.long_coarse_steps = long_coarse_steps;
@@ -37,12 +17,7 @@ fn block(substeps: u32, long_coarse_steps: bool) -> ModelSpec {
 /// The particles nearest to the middle of the upper face awake.
 fn with_awake(spec: ModelSpec, count: usize) -> Rig {
     let mut rig = Rig::new(spec);
-    let partition = rig.model.hybrid().unwrap().partition();
-    let mut near: Vec<u32> = (0..partition.particle_count() as u32).collect();
-    let distance_sq = |particle: u32| partition.particle_m(particle).length_squared();
-    near.sort_by(|&a, &b| distance_sq(a).total_cmp(&distance_sq(b)));
-    near.truncate(count);
-    wake_only(&rig.model, &mut rig.state, &mut rig.scratch, near);
+    wake_nearest(&mut rig, count);
     rig
 }
 

@@ -2,6 +2,7 @@
 use super::{
     balance::Balance,
     body::Hybrid,
+    coming::Coming,
     fade::Fading,
     handover::Before,
     listed::ListedSkin,
@@ -17,13 +18,18 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct ActiveParticles {
     ids: Vec<u32>,
+    /// Those to be, while a switch is coming.
+    pub(super) next: Vec<u32>,
+    pub(super) is_switching: bool,
     /// Of every tool.
     pub(super) balls: Vec<Option<Ball>>,
-    pub(super) fading: Fading,
+    pub(crate) fading: Fading,
     /// Balancing forces (N), as many as positions, or none.
     pub(super) balance_n: Vec<DVec3>,
     /// Energy (J) that fading strains and balancing forces gave lately, beyond what they and switches took.
     pub(crate) given_j: f64,
+    /// Elastic energy (J) of what a switch lately changed, the most of any.
+    pub(super) switched_j: f64,
     pub(crate) long_steps: LongSteps,
 }
 
@@ -31,10 +37,13 @@ impl ActiveParticles {
     pub(crate) fn none(model: &Model) -> Self {
         Self {
             ids: Vec::with_capacity(room(model)),
+            next: Vec::with_capacity(room(model)),
+            is_switching: false,
             balls: vec![None; tools(model)],
             fading: fading_with_room(model),
             balance_n: Vec::with_capacity(entries(model)),
             given_j: 0.0,
+            switched_j: 0.0,
             long_steps: LongSteps::with_room(model.hybrid().map_or(0, Hybrid::node_count), entries(model)),
         }
     }
@@ -68,19 +77,25 @@ impl ActiveParticles {
 
     pub(crate) fn clear(&mut self) {
         self.ids.clear();
+        self.next.clear();
+        self.is_switching = false;
         self.balls.fill(None);
         self.fading.clear();
         self.balance_n.clear();
         self.given_j = 0.0;
+        self.switched_j = 0.0;
         self.long_steps.forget();
     }
 
     pub(crate) fn copy_from(&mut self, other: &Self) {
         self.ids.clone_from(&other.ids);
+        self.next.clone_from(&other.next);
+        self.is_switching = other.is_switching;
         self.balls.clone_from(&other.balls);
         self.fading.copy_from(&other.fading);
         self.balance_n.clone_from(&other.balance_n);
         self.given_j = other.given_j;
+        self.switched_j = other.switched_j;
         self.long_steps.copy_from(&other.long_steps);
     }
 
@@ -94,14 +109,14 @@ impl ActiveParticles {
             && [0, model.rest_positions_m().len() + self.ids.len()].contains(&self.balance_n.len())
             && self.balance_n.iter().all(|force| force.is_finite())
             && self.given_j.is_finite()
+            && self.switched_j.is_finite()
             && self.long_steps.fit(model.rest_positions_m().len(), model.rest_positions_m().len() + self.ids.len())
-            && self.fading.cells.is_sorted_by(|a, b| a.cell < b.cell)
-            && self.fading.tets.is_sorted_by(|a, b| a.tet < b.tet)
-            && self.fading.cells.iter().all(|fade| self.touches(model, fade.cell))
-            && self.fading.tets.iter().all(|fade| (fade.tet as usize) < model.mesh().tets().len())
-            && self.ids.len() <= room(model)
-            && self.ids.is_sorted_by(|a, b| a < b)
-            && self.ids.iter().all(may_wake)
+            && self.fading.is_sorted()
+            && self.fading.cells().iter().all(|fade| self.touches(model, fade.cell))
+            && self.fading.tets().iter().all(|fade| (fade.tet as usize) < model.mesh().tets().len())
+            && [&self.ids, &self.next]
+                .into_iter()
+                .all(|list| list.len() <= room(model) && list.is_sorted_by(|a, b| a < b) && list.iter().all(may_wake))
     }
 }
 
@@ -140,20 +155,21 @@ pub(crate) struct HybridScratch {
     /// `fᵀ M'⁻¹ f` (N²/kg) at the last three kicks, the last one first.
     pub(crate) kick_sq: [f64; 3],
     pub(super) looking: Looking,
+    pub(super) coming: Coming,
     pub(super) before: Before,
     pub(crate) balance: Balance,
     pub(super) long_steps: LongStepHistory,
-    /// Something faded since the state's forces were computed.
-    pub(crate) forces_are_stale: bool,
 }
 
 impl HybridScratch {
     pub(crate) fn new(model: &Model) -> Option<Self> {
         let (body, most) = (model.hybrid()?, room(model));
-        let mut patch = RunningPatch::new(body, most, model.spec().settings.precision);
+        let patch = || RunningPatch::new(body, most, model.spec().settings.precision);
+        let (mut patch, coming) = (patch(), Coming::new(patch()));
         patch.wake(body, &[], &Fading::default());
         let entries = body.node_count() + most;
         Some(Self {
+            coming,
             patch,
             skin: ListedSkin::new(body),
             accelerations: Vec::with_capacity(entries),
@@ -163,7 +179,6 @@ impl HybridScratch {
             before: Before::with_room(room_for_cells(body, most), body.partition().shares().len()),
             balance: Balance::with_room(entries),
             long_steps: LongStepHistory::with_room(body.node_count(), entries),
-            forces_are_stale: false,
         })
     }
 
@@ -181,7 +196,7 @@ impl HybridScratch {
         accelerations.extend(v);
         momenta.clear();
         momenta.resize(accelerations.len(), DVec3::ZERO);
-        patch.metric().momenta(body, accelerations, momenta);
+        patch.metric_mut().momenta(body, accelerations, momenta);
         momenta.iter().zip(accelerations.iter()).map(|(p, v)| p.dot(*v)).sum()
     }
 
@@ -192,18 +207,19 @@ impl HybridScratch {
 
     /// Makes the patch that of the state's active particles. Allocates nothing.
     pub(super) fn follow(&mut self, body: &Hybrid, active: &ActiveParticles) {
-        if self.patch.active() != active.ids() || !self.patch.is_laid_out_for(&active.fading) {
+        if self.patch.active() != active.ids() {
             self.patch.wake(body, active.ids(), &active.fading);
+        } else if !self.patch.knows(&active.fading) {
+            self.patch.put_fades(&active.fading);
         }
     }
 }
 
 impl State {
-    /// `wanted` is ascending; `moved` a buffer. Allocates nothing where there is room.
-    pub(super) fn switch(&mut self, body: &Hybrid, wanted: &[u32], moved: &mut Vec<DVec3>) {
-        if self.active.ids == wanted {
-            return;
-        }
+    /// Goes over to the particles that are to be active next. `moved` is a buffer. Allocates nothing where there is room.
+    pub(super) fn switch(&mut self, body: &Hybrid, moved: &mut Vec<DVec3>) {
+        self.active.is_switching = false;
+        let wanted = &self.active.next;
         let nodes = body.node_count();
         for list in [&mut self.x, &mut self.v] {
             moved.clear();
@@ -218,8 +234,7 @@ impl State {
         for list in [&mut self.force_n, &mut self.external_n] {
             list.resize(nodes + wanted.len(), DVec3::ZERO);
         }
-        self.active.ids.clear();
-        self.active.ids.extend_from_slice(wanted);
+        self.active.ids.clone_from(&self.active.next);
         self.active.balance_n.clear();
         self.active.long_steps.forget();
         self.force_is_current = false;

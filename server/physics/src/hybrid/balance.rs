@@ -9,7 +9,7 @@
 //! `M_i α × (x_i − x̄)` on the coarse nodes of a body that is held nowhere. The work of these forces is booked in the ledger.
 //!
 //! They are dead loads: on what swings while regions are switched they may do work without end, as may strains that fade (`fade`). What both gave lately, beyond what they and
-//! switches took, is kept; where it is more than a tenth of the elastic energy of what fades, forces are balanced no more, and jump.
+//! switches took, is kept; where it is more than [`MOST_GIVEN`] of the elastic energy that switches lately changed, forces are balanced no more, and jump.
 use super::{active::ActiveParticles, body::Hybrid, fade, patch::KEPT, running_metric::RunningMetric};
 use crate::world::State;
 use glam::{BVec3, DMat3, DVec3};
@@ -20,8 +20,8 @@ const FADING_S: f64 = 0.02;
 const HURRIED_S: f64 = 0.003;
 /// How fast what fading gave is forgotten (s).
 const FORGETTING_S: f64 = 1.0;
-/// Fading that gave more than this, over the elastic energy of what fades, is not helped on by balancing forces.
-const MOST_GIVEN: f64 = 0.1;
+/// Fading that gave more than this, over the elastic energy that a switch lately changed, is not helped on by balancing forces.
+const MOST_GIVEN: f64 = 0.07;
 /// Balancing forces smaller than this, over the largest force, are none.
 const NOTHING: f64 = 1e-9;
 
@@ -68,7 +68,7 @@ impl Balance {
     pub(super) fn demand(
         &mut self,
         body: &Hybrid,
-        metric: &RunningMetric,
+        metric: &mut RunningMetric,
         before: &[u32],
         after: &[u32],
         handed_n: &[DVec3],
@@ -130,15 +130,17 @@ impl Balance {
 }
 
 impl ActiveParticles {
-    /// Whether fading gave little beside the elastic energy (J) of what fades, or of what a switch touches.
-    pub(super) fn may_balance(&self, elastic_j: f64) -> bool {
-        self.given_j <= MOST_GIVEN * elastic_j
+    /// Whether fading gave little beside the elastic energy that switches changed lately.
+    pub(super) fn may_balance(&self) -> bool {
+        self.given_j <= MOST_GIVEN * self.switched_j
     }
 
-    /// A tick's fading of balancing forces, while what fades holds `elastic_j` (J).
-    pub(super) fn fade_balance(&mut self, period_s: f64, elastic_j: f64) {
-        self.given_j *= fade::factor(period_s, FORGETTING_S);
-        let time_constant_s = if self.may_balance(elastic_j) { FADING_S } else { HURRIED_S };
+    /// A tick's fading of balancing forces.
+    pub(super) fn fade_balance(&mut self, period_s: f64) {
+        let forgotten = fade::factor(period_s, FORGETTING_S);
+        self.given_j *= forgotten;
+        self.switched_j *= forgotten;
+        let time_constant_s = if self.may_balance() { FADING_S } else { HURRIED_S };
         let factor = fade::factor(period_s, time_constant_s);
         self.balance_n.iter_mut().for_each(|balance| *balance *= factor);
     }

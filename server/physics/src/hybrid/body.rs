@@ -172,6 +172,13 @@ impl Hybrid {
         }
     }
 
+    /// Multiplies the velocities of coarse nodes, on free axes, and of active particles by a factor.
+    pub(crate) fn damp(&self, v: &mut [DVec3], factor: f64) {
+        for (v, free) in v.iter_mut().zip(self.free.iter().chain(std::iter::repeat(&BVec3::TRUE))) {
+            *v = DVec3::select(*free, *v * factor, *v);
+        }
+    }
+
     /// The material of a coarse tet.
     pub(super) fn material_of_tet(&self, tet: u32) -> &Material {
         &self.materials[self.of_tet[tet as usize] as usize]

@@ -3,11 +3,11 @@
 //! A coarse part strains less than the cells in it do, so a cell that woke as it is would raise the energy. It is given the strain that its part had by a
 //! change of its rest state, which then fades: with `A = F⁻¹ F_before − I` at first, the effective gradient is
 //! ```text
-//! F̃ = F (I + A)       P = P̃(F̃) (I + A)ᵀ       A ← e^{−T/τ} A every tick
+//! F̃ = F (I + A)       P = P̃(F̃) (I + A)ᵀ       A = s A_0,  s = e^{−t/τ}
 //! ```
 //! one `A` for its shape and one for its volume, which is the tet's (`share`), and hourglass stiffness `κ (1 − a)`, `a` from 1 to 0. What is left of a part,
 //! or what it gets back, has an `A` of its own: its effective gradient is at first the mean of what it is made of, by volume, and by Jensen its energy no more than
-//! theirs. Changes of the rest state are objective: momentum does not hear of them. What fading gives or takes is booked in the ledger.
+//! theirs. Changes of the rest state are objective: momentum does not hear of them. What fading takes, `−ds/dt ∂U/∂s`, is booked in the ledger.
 //!
 //! Nor do accelerations jump (`balance`).
 use super::{
@@ -22,9 +22,11 @@ use serde::{Deserialize, Serialize};
 /// τ (s).
 pub(super) const FADING_S: f64 = 0.03;
 /// A change of rest state smaller than this is none.
-const NOTHING: f64 = 1e-9;
+const NOTHING: f64 = 1e-6;
+/// One smaller than this has no energy to speak of.
+const TRACE: f64 = 1e-13;
 
-/// A cell that woke strained.
+/// A cell that woke strained; `A` and `a` when it did.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct CellFade {
     /// Index of the cell.
@@ -48,13 +50,25 @@ pub struct ShareFade {
     pub whole: DMat3,
 }
 
-/// All that fades, ascending.
+/// All that fades.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct Fading {
-    /// Cells.
-    pub cells: Vec<CellFade>,
-    /// Coarse tets.
-    pub tets: Vec<ShareFade>,
+    cells: Vec<CellFade>,
+    tets: Vec<ShareFade>,
+    progress: Progress,
+    /// The largest entry of all.
+    most: f64,
+    /// A checksum of cells and tets, to know them by.
+    mark: u64,
+}
+
+/// How far.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+pub(super) struct Progress {
+    /// `s`.
+    left: f64,
+    /// `s ∂U/∂s` (J) of coarse tets and of cells when their forces were last computed.
+    along_j: [f64; 2],
 }
 
 /// `e^{−T/τ}`.
@@ -84,7 +98,42 @@ fn largest(a: &DMat3) -> f64 {
 
 impl Fading {
     pub(super) fn with_room(cells: usize, tets: usize) -> Self {
-        Self { cells: Vec::with_capacity(cells), tets: Vec::with_capacity(tets) }
+        Self { cells: Vec::with_capacity(cells), tets: Vec::with_capacity(tets), ..Self::default() }
+    }
+
+    /// Of these cells and tets, ascending.
+    pub fn new(cells: Vec<CellFade>, tets: Vec<ShareFade>) -> Self {
+        let mut fading = Self { cells, tets, ..Self::default() };
+        fading.start();
+        fading
+    }
+
+    /// Cells, as they woke.
+    pub fn cells(&self) -> &[CellFade] {
+        &self.cells
+    }
+
+    /// Coarse tets, as they were left.
+    pub fn tets(&self) -> &[ShareFade] {
+        &self.tets
+    }
+
+    /// `s`.
+    pub fn left(&self) -> f64 {
+        self.progress.left
+    }
+
+    pub(super) fn progress(&self) -> Progress {
+        self.progress
+    }
+
+    /// Goes back to what [`Self::progress`] was.
+    pub(super) fn go_back(&mut self, progress: Progress) {
+        self.progress = progress;
+    }
+
+    pub(super) fn mark(&self) -> u64 {
+        self.mark
     }
 
     /// Whether nothing fades.
@@ -95,55 +144,117 @@ impl Fading {
     pub(super) fn clear(&mut self) {
         self.cells.clear();
         self.tets.clear();
+        self.start();
+    }
+
+    /// Takes a cell, or a tet, of those that were [`Self::clear`]ed.
+    pub(super) fn push_cell(&mut self, fade: CellFade) {
+        self.cells.push(fade);
+    }
+
+    /// The same of a tet.
+    pub(super) fn push_tet(&mut self, fade: ShareFade) {
+        self.tets.push(fade);
+    }
+
+    /// From now on it fades: all has been taken.
+    pub(super) fn start(&mut self) {
+        self.tets.sort_unstable_by_key(|fade| fade.tet);
+        self.progress = Progress { left: 1.0, along_j: [0.0; 2] };
+        let of_cells = self.cells.iter().map(CellFade::largest);
+        self.most = of_cells.chain(self.tets.iter().map(ShareFade::largest)).fold(0.0, f64::max);
+        // FNV-1a, word by word.
+        let mix = |mark: u64, word: u64| (mark ^ word).wrapping_mul(0x0100_0000_01b3);
+        let of_matrix =
+            |mark: u64, a: &DMat3| a.to_cols_array().iter().fold(mark, |mark, entry| mix(mark, entry.to_bits()));
+        let of_cell = |mark: u64, fade: &CellFade| {
+            let mark = mix(mix(mark, u64::from(fade.cell)), fade.modes.to_bits());
+            of_matrix(of_matrix(mark, &fade.shape), &fade.volume)
+        };
+        let of_tet = |mark: u64, fade: &ShareFade| {
+            fade.parts.iter().chain([&fade.whole]).fold(mix(mark, u64::from(fade.tet)), of_matrix)
+        };
+        let mark = self.cells.iter().fold(0xcbf2_9ce4_8422_2325, of_cell);
+        self.mark = self.tets.iter().fold(mix(mark, self.cells.len() as u64), of_tet);
+    }
+
+    /// Time (s) goes on.
+    pub(crate) fn go_on(&mut self, time_s: f64) {
+        self.progress.left *= factor(time_s, FADING_S);
+    }
+
+    /// Whether so little is left that it is nothing.
+    pub(super) fn has_faded(&self) -> bool {
+        !self.is_empty() && self.most * self.left() < NOTHING
+    }
+
+    /// `s ∂U/∂s` (J) when forces were last computed.
+    pub(super) fn along_j(&self) -> f64 {
+        self.progress.along_j.iter().sum()
+    }
+
+    /// Takes `s ∂U/∂s` (J) of coarse tets (0) or of cells (1); returns the energy (J) that fading took within the time (s) since the last one.
+    pub(crate) fn take_along(&mut self, level: usize, along_j: f64, time_s: f64) -> f64 {
+        let before_j = std::mem::replace(&mut self.progress.along_j[level], along_j);
+        0.5 * (before_j + along_j) * time_s / FADING_S
     }
 
     pub(super) fn copy_from(&mut self, other: &Self) {
         self.cells.clone_from(&other.cells);
         self.tets.clone_from(&other.tets);
+        (self.progress, self.most, self.mark) = (other.progress, other.most, other.mark);
     }
 
     pub(super) fn is_finite(&self) -> bool {
-        let cells = self.cells.iter().all(|c| c.shape.is_finite() && c.volume.is_finite() && c.modes.is_finite());
+        let rest = [self.left(), self.most, self.along_j()].iter().all(|a| a.is_finite());
+        let cells =
+            rest && self.cells.iter().all(|c| c.shape.is_finite() && c.volume.is_finite() && c.modes.is_finite());
         cells && self.tets.iter().all(|t| t.whole.is_finite() && t.parts.iter().all(DMat3::is_finite))
     }
 
-    /// A tick's fading, by [`factor`].
-    pub(super) fn fade(&mut self, factor: f64) {
-        for cell in &mut self.cells {
-            (cell.shape, cell.volume, cell.modes) = (cell.shape * factor, cell.volume * factor, cell.modes * factor);
-        }
-        for tet in &mut self.tets {
-            tet.whole *= factor;
-            tet.parts.iter_mut().for_each(|part| *part *= factor);
-        }
+    /// What is left of a cell's, if it fades.
+    pub(super) fn of_cell(&self, cell: u32) -> Option<CellFade> {
+        let at = self.cells.binary_search_by_key(&cell, |fade| fade.cell).ok()?;
+        let CellFade { shape, volume, modes, .. } = self.cells[at];
+        let left = self.left();
+        Some(CellFade { cell, shape: shape * left, volume: volume * left, modes: modes * left })
     }
 
-    /// Leaves out what has faded; whether anything had.
-    pub(super) fn forget_faded(&mut self) -> bool {
-        let before = (self.cells.len(), self.tets.len());
-        self.cells.retain(CellFade::is_something);
-        self.tets.retain(ShareFade::is_something);
-        before != (self.cells.len(), self.tets.len())
+    /// What is left of a tet's, if it fades.
+    pub(super) fn of_tet(&self, tet: u32) -> Option<ShareFade> {
+        let at = self.tets.binary_search_by_key(&tet, |fade| fade.tet).ok()?;
+        let ShareFade { parts, whole, .. } = self.tets[at];
+        Some(ShareFade { tet, parts: parts.map(|part| part * self.left()), whole: whole * self.left() })
     }
 
-    /// Of a cell, if it fades.
-    pub(super) fn of_cell(&self, cell: u32) -> Option<&CellFade> {
-        self.cells.binary_search_by_key(&cell, |fade| fade.cell).ok().map(|at| &self.cells[at])
+    /// All that is left of tets', ascending.
+    pub(super) fn left_of_tets(&self) -> impl Iterator<Item = ShareFade> + '_ {
+        self.tets.iter().filter_map(|fade| self.of_tet(fade.tet))
     }
 
-    /// Of a tet, if it fades.
-    pub(super) fn of_tet(&self, tet: u32) -> Option<&ShareFade> {
-        self.tets.binary_search_by_key(&tet, |fade| fade.tet).ok().map(|at| &self.tets[at])
+    /// Whether cells and tets ascend.
+    pub(super) fn is_sorted(&self) -> bool {
+        self.cells.is_sorted_by(|a, b| a.cell < b.cell) && self.tets.is_sorted_by(|a, b| a.tet < b.tet)
     }
 }
 
 impl CellFade {
+    fn largest(&self) -> f64 {
+        // Stiffness of modes that is too small by so little shows less than a strain would.
+        largest(&self.shape).max(largest(&self.volume)).max(self.modes * NOTHING.sqrt())
+    }
+
     pub(super) fn is_something(&self) -> bool {
-        largest(&self.shape).max(largest(&self.volume)).max(self.modes * NOTHING.sqrt()) > NOTHING
+        self.largest() > NOTHING
+    }
+
+    /// Whether it is more than what may be left out without being booked.
+    pub(super) fn is_trace(&self) -> bool {
+        self.largest() > TRACE
     }
 
     /// Nothing of a cell.
-    pub(super) fn none(cell: u32) -> Self {
+    pub(crate) fn none(cell: u32) -> Self {
         Self { cell, shape: DMat3::ZERO, volume: DMat3::ZERO, modes: 0.0 }
     }
 
@@ -186,8 +297,17 @@ impl CellFade {
 }
 
 impl ShareFade {
+    fn largest(&self) -> f64 {
+        self.parts.iter().chain([&self.whole]).map(largest).fold(0.0, f64::max)
+    }
+
     pub(super) fn is_something(&self) -> bool {
-        self.parts.iter().chain([&self.whole]).any(|a| largest(a) > NOTHING)
+        self.largest() > NOTHING
+    }
+
+    /// Whether it is more than what may be left out without being booked.
+    pub(super) fn is_trace(&self) -> bool {
+        self.largest() > TRACE
     }
 
     /// Nothing of a tet.

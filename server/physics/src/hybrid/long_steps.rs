@@ -13,8 +13,11 @@
 //!
 //! `k h` is stable for the coarse level alone, `h` for the whole. That does not prove both together to be (modes of the fine level with `ω k h` near `nπ` resonate with what they
 //! feel of the coarse one); `docs/adr/hybrid.md` has what was measured.
-use super::{HybridScratch, balance::without_torque, body::Hybrid};
-use crate::world::{Model, State};
+use super::{HybridScratch, balance::without_torque, body::Hybrid, fade::Progress};
+use crate::{
+    simd::Found,
+    world::{Model, State},
+};
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
@@ -74,10 +77,10 @@ impl LongSteps {
     }
 
     /// Takes what `add_forces_n` adds for `f_c`; returns what that returns.
-    pub(crate) fn evaluate(&mut self, nodes: usize, add_forces_n: impl FnOnce(&mut [DVec3]) -> f64) -> f64 {
+    pub(crate) fn evaluate(&mut self, nodes: usize, add_forces_n: impl FnOnce(&mut [DVec3]) -> Found) -> Found {
         self.beyond_n.clear();
         self.beyond_n.resize(nodes, DVec3::ZERO);
-        let power_w = add_forces_n(&mut self.beyond_n);
+        let found = add_forces_n(&mut self.beyond_n);
         if self.steady_n.is_empty() {
             std::mem::swap(&mut self.steady_n, &mut self.beyond_n);
             self.beyond_n.resize(nodes, DVec3::ZERO);
@@ -86,7 +89,7 @@ impl LongSteps {
                 *beyond -= *steady;
             }
         }
-        power_w
+        found
     }
 
     /// `b`, which is nothing where there is none, and nothing on what follows, in place of the forces (N).
@@ -163,18 +166,29 @@ pub(super) struct LongStepHistory {
     /// How many of a tick began so far.
     begun: u32,
     at_start: LongSteps,
+    fading_at_start: Progress,
+    /// [`super::ActiveParticles::given_j`].
+    given_at_start_j: f64,
 }
 
 impl LongStepHistory {
     pub(super) fn with_room(nodes: usize, entries: usize) -> Self {
         let instant = || Instant::with_room(nodes, entries);
-        Self { recent: [instant(), instant()], begun: 0, at_start: LongSteps::with_room(nodes, entries) }
+        Self {
+            recent: [instant(), instant()],
+            begun: 0,
+            at_start: LongSteps::with_room(nodes, entries),
+            fading_at_start: Progress::default(),
+            given_at_start_j: 0.0,
+        }
     }
 }
 
 impl HybridScratch {
     /// Before a tick that may be repeated.
     pub(crate) fn keep_long_steps(&mut self, state: &mut State) {
+        self.long_steps.fading_at_start = state.active.fading.progress();
+        self.long_steps.given_at_start_j = state.active.given_j;
         let LongStepHistory { begun, at_start, .. } = &mut self.long_steps;
         *begun = 0;
         at_start.steady_n.clone_from(&state.active.long_steps.steady_n);
@@ -186,6 +200,8 @@ impl HybridScratch {
 
     /// As it was then, to be taken in more long steps.
     pub(crate) fn put_long_steps_back(&mut self, state: &mut State) {
+        state.active.fading.go_back(self.long_steps.fading_at_start);
+        state.active.given_j = self.long_steps.given_at_start_j;
         let LongStepHistory { begun, at_start, .. } = &mut self.long_steps;
         *begun = 0;
         state.active.long_steps.steady_n.clone_from(&at_start.steady_n);

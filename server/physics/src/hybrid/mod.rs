@@ -5,6 +5,7 @@ pub mod body;
 pub mod cage;
 pub mod cell;
 pub mod clusters;
+mod coming;
 pub mod composite;
 mod energy;
 pub mod equilibrium;

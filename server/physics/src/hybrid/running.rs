@@ -8,7 +8,6 @@ mod tests;
 use super::{
     active::room_for_cells,
     body::Hybrid,
-    cell::RestCell,
     composite::Anchor,
     fade::Fading,
     partition::{Cell, NONE},
@@ -17,10 +16,11 @@ use super::{
     share::Share,
 };
 use crate::{
-    simd::{CellRow, CutCells, RowKernel, RowValues, ShareKernel},
+    simd::{CellRow, CutCells, Found, RowKernel, RowValues, ShareKernel},
     world::Precision,
 };
 use glam::DVec3;
+use layout::Slot;
 
 /// A patch with room for the most active particles there may be.
 #[derive(Debug, Clone)]
@@ -38,8 +38,12 @@ pub(crate) struct RunningPatch {
     rows: Vec<CellRow>,
     values: RowValues,
     cut: CutCells,
-    fading_cells: Vec<FadingCell>,
+    /// Where every awake cell is laid out.
+    slots: Vec<Slot>,
+    /// Numbers, among the awake cells, of those that fade.
+    fading_cells: Vec<u32>,
     fading_tets: Vec<u32>,
+    fading_mark: u64,
     /// What is left to each coarse tet.
     shares: Vec<Share>,
     share_kernel: ShareKernel,
@@ -56,16 +60,6 @@ pub(crate) struct RunningPatch {
     is_viscous: bool,
     /// Counts the sets of active particles.
     number: u64,
-}
-
-/// Where a cell that fades is laid out.
-#[derive(Debug, Clone)]
-pub(super) struct FadingCell {
-    pub(super) cell: u32,
-    run: usize,
-    number: usize,
-    pub(super) points: [u32; 8],
-    pub(super) rest: RestCell,
 }
 
 #[derive(Debug, Clone, Copy)]
@@ -91,7 +85,7 @@ impl RunningPatch {
             of_points: Vec::with_capacity(most_points),
             cells: Vec::with_capacity(most_cells),
             rows: Vec::with_capacity(most_cells),
-            values: kernel.values(most_points),
+            values: kernel.values(most_points, most_cells),
             kernel,
             cut: CutCells::with_capacity(most_cells, most_points, &hybrid.materials, precision),
             share_kernel: ShareKernel::build(
@@ -102,8 +96,10 @@ impl RunningPatch {
                 precision,
             ),
             shares: partition.shares().to_vec(),
+            slots: Vec::with_capacity(most_cells),
             fading_cells: Vec::with_capacity(most_cells),
             fading_tets: Vec::with_capacity(partition.shares().len()),
+            fading_mark: 0,
             number_of_node: vec![0; hybrid.node_count()],
             taken_from: Vec::with_capacity(partition.shares().len()),
             metric: RunningMetric::new(hybrid, most_active),
@@ -176,24 +172,20 @@ impl RunningPatch {
         &self.shares[tet as usize]
     }
 
-    /// Cells laid out to fade, ascending.
-    pub(super) fn fading_cells(&self) -> &[FadingCell] {
-        &self.fading_cells
-    }
-
-    /// Coarse tets that fade.
-    pub(super) fn fading_tets(&self) -> &[u32] {
-        &self.fading_tets
-    }
-
-    /// Positions (m) of points.
-    pub(super) fn positions_m(&self, points: [u32; 8]) -> [DVec3; 8] {
-        points.map(|point| self.points[point as usize].rest_m + self.displacements_m[point as usize])
-    }
-
     /// Positions (m) of the particles of an awake cell.
     pub(super) fn corners_m(&self, hybrid: &Hybrid, cell: u32) -> [DVec3; 8] {
-        self.positions_m(hybrid.partition.corners(cell as usize).map(|particle| self.point_of[particle as usize]))
+        hybrid.partition.corners(cell as usize).map(|particle| {
+            let point = self.point_of[particle as usize] as usize;
+            self.points[point].rest_m + self.displacements_m[point]
+        })
+    }
+
+    /// Whether all particles of a cell are active.
+    pub(super) fn is_inside(&self, hybrid: &Hybrid, cell: u32) -> bool {
+        let is_active = |particle: u32| {
+            self.points.get(self.point_of[particle as usize] as usize).is_some_and(|point| point.active != NONE)
+        };
+        hybrid.partition.corners(cell as usize).into_iter().all(is_active)
     }
 
     /// Hands a force (N) on a point to the particle or the coarse nodes that move it.
@@ -213,21 +205,35 @@ impl RunningPatch {
 
     /// Wakes these particles (ascending, no more than there is room for) and no others, of which this fades. Allocates nothing.
     pub(crate) fn wake(&mut self, hybrid: &Hybrid, active: &[u32], fading: &Fading) {
-        self.set(hybrid, active);
-        self.lay_out(hybrid, fading);
+        (0..Self::SLICES).for_each(|slice| self.set_slice(hybrid, active, slice));
+        self.put_fades(fading);
     }
 
-    /// The first part of [`Self::wake`]: all but the kernels' layout of cells.
-    pub(super) fn set(&mut self, hybrid: &Hybrid, active: &[u32]) {
-        self.forget(hybrid);
-        self.number += 1;
-        self.active.extend_from_slice(active);
-        self.find_cells(hybrid);
-        self.find_points(hybrid);
-        self.take_from_shares(hybrid);
-        let points = &self.points;
-        let followed = points.iter().filter(|point| point.active != NONE).map(|point| (point.particle, point.anchor));
-        self.metric.factorise(hybrid, followed);
+    /// In how many slices particles wake.
+    pub(super) const SLICES: u32 = 3;
+
+    /// A slice of [`Self::wake`], one after the other, before it is told what fades.
+    pub(super) fn set_slice(&mut self, hybrid: &Hybrid, active: &[u32], slice: u32) {
+        match slice {
+            0 => {
+                self.forget(hybrid);
+                self.number += 1;
+                self.active.extend_from_slice(active);
+                self.find_cells(hybrid);
+                self.find_points(hybrid);
+            }
+            1 => self.take_from_shares(hybrid),
+            _ => {
+                self.lay_out(hybrid);
+                let points = self.points.iter().filter(|point| point.active != NONE);
+                self.metric.factorise(hybrid, points.map(|point| (point.particle, point.anchor)));
+            }
+        }
+    }
+
+    /// Counts this one as the one after another.
+    pub(super) fn number_after(&mut self, other: &Self) {
+        self.number = other.number + 1;
     }
 
     fn forget(&mut self, hybrid: &Hybrid) {
@@ -312,19 +318,24 @@ impl RunningPatch {
     }
 
     /// Adds forces (N) on coarse nodes of elastic and viscous stress in what is left to the coarse level, where [`Self::displace`] put them, at their
-    /// velocities `v`; returns the power (W) that viscous stress takes.
-    pub(crate) fn add_coarse_forces_n(&mut self, v: &[DVec3], forces_n: &mut [DVec3]) -> f64 {
+    /// velocities `v`, with `left` left of what fades.
+    pub(crate) fn add_coarse_forces_n(&mut self, v: &[DVec3], left: f64, forces_n: &mut [DVec3]) -> Found {
         let v_nodes = &v[..self.node_displacements_m.len()];
-        self.share_kernel.add_forces_n(&self.node_displacements_m, v_nodes, forces_n)
+        self.share_kernel.add_forces_n(&self.node_displacements_m, v_nodes, left, forces_n)
     }
 
     /// The same of awake cells, on coarse nodes and active particles; whose forces were none.
-    pub(crate) fn add_cell_forces_n(&mut self, hybrid: &Hybrid, v: &[DVec3], forces_n: &mut [DVec3]) -> f64 {
+    pub(crate) fn add_cell_forces_n(
+        &mut self,
+        hybrid: &Hybrid,
+        v: &[DVec3],
+        left: f64,
+        forces_n: &mut [DVec3],
+    ) -> Found {
         let nodes = hybrid.node_count();
         let (v_nodes, v_particles) = v.split_at(nodes);
-        let mut power_w = 0.0;
         if self.active.is_empty() {
-            return power_w;
+            return Found::default();
         }
         // Less that of one of them: far from rest, their differences would be rounded too coarsely.
         let first_m = self.displacements_m[0];
@@ -343,10 +354,10 @@ impl RunningPatch {
             self.values.set_velocities(&self.of_points);
             self.cut.set_velocities(&self.of_points);
         }
-        power_w += self.kernel.forces(&self.rows, self.points.len(), &mut self.values);
+        let mut found = self.kernel.forces(&self.rows, (self.points.len(), left), &mut self.values);
         self.values.forces_n(&mut self.of_points);
         if has_cut {
-            power_w += self.cut.forces(self.points.len());
+            found += self.cut.forces(self.points.len(), left);
             self.cut.add_forces_n(&mut self.of_points);
         }
         let (f_nodes, f_particles) = forces_n.split_at_mut(nodes);
@@ -357,7 +368,7 @@ impl RunningPatch {
                 f_particles[point.active as usize] = *force_n;
             }
         }
-        power_w
+        found
     }
 
     /// Takes positions (m) of coarse nodes and then active particles.

@@ -181,7 +181,7 @@ impl RunningMetric {
 
     /// Kinetic and gravitational energy (J) of coarse nodes and active particles. `momenta` is a buffer.
     pub(super) fn moving_j(
-        &self,
+        &mut self,
         hybrid: &Hybrid,
         (x, v): (&[DVec3], &[DVec3]),
         gravity_m_per_s2: DVec3,
@@ -197,29 +197,28 @@ impl RunningMetric {
     }
 
     /// Multiplies velocities on free axes by a factor; returns what they had before, `v·M' v` (J). `momenta` is a buffer.
-    pub(crate) fn damped(&self, hybrid: &Hybrid, v: &mut [DVec3], factor: f64, momenta: &mut Vec<DVec3>) -> f64 {
+    pub(crate) fn damped(&mut self, hybrid: &Hybrid, v: &mut [DVec3], factor: f64, momenta: &mut Vec<DVec3>) -> f64 {
         momenta.clear();
         momenta.resize(v.len(), DVec3::ZERO);
         self.momenta(hybrid, v, momenta);
-        let mut twice_kinetic_j = 0.0;
-        for (number, (v, momentum)) in v.iter_mut().zip(momenta.iter()).enumerate() {
-            let free = hybrid.free.get(number).copied().unwrap_or(BVec3::TRUE);
-            twice_kinetic_j += DVec3::select(free, *v, DVec3::ZERO).dot(*momentum);
-            *v = DVec3::select(free, *v * factor, *v);
-        }
+        let free = hybrid.free.iter().chain(std::iter::repeat(&BVec3::TRUE));
+        let of_free = free.zip(&*v).zip(&*momenta).map(|((free, v), p)| DVec3::select(*free, *v, DVec3::ZERO).dot(*p));
+        let twice_kinetic_j = of_free.sum();
+        hybrid.damp(v, factor);
         twice_kinetic_j
     }
 
     /// Momenta `M' v` (kg m/s) of coarse nodes and then of active particles.
-    pub(crate) fn momenta(&self, hybrid: &Hybrid, v: &[DVec3], momenta: &mut [DVec3]) {
+    pub(crate) fn momenta(&mut self, hybrid: &Hybrid, v: &[DVec3], momenta: &mut [DVec3]) {
         let masses = hybrid.masses.node_kg.iter().chain(&self.particle_kg);
         for ((momentum, v), mass) in momenta.iter_mut().zip(v).zip(masses) {
             *momentum = *v * *mass;
         }
-        let size = self.touched.len();
-        for (row, &node) in self.touched.iter().enumerate() {
-            let entries = self.block_kg[row * size..(row + 1) * size].iter().zip(&self.touched);
-            momenta[node as usize] = entries.map(|(mass, &other)| v[other as usize] * *mass).sum();
+        for (own, &node) in self.right.iter_mut().zip(&self.touched) {
+            *own = v[node as usize];
+        }
+        for (row, &node) in self.block_kg.chunks_exact(self.touched.len().max(1)).zip(&self.touched) {
+            momenta[node as usize] = row.iter().zip(&self.right).map(|(mass, v)| *v * *mass).sum();
         }
     }
 }

@@ -16,7 +16,6 @@ use super::{
     active::{ActiveParticles, HybridScratch, room},
     balance::{Turn, turn_of},
     body::Hybrid,
-    fade,
     listed::SkinView,
     patch::KEPT,
     projection::Projection,
@@ -103,11 +102,17 @@ impl HybridScratch {
         self.follow(body, &state.active);
         state.follow_coarse_forces(model.spec().settings.tick_period_s);
         if !state.active.fading.is_empty() || !state.active.balance_n.is_empty() {
-            self.fade(model, body, state);
+            self.fade(model, state);
         }
         let Some(particles) = &model.spec().particles else { return };
         let Waking::ByTools { reach_m } = particles.waking else { return };
-        if !state.tick.is_multiple_of(LOOK_EVERY_TICKS) {
+        let since_look = state.tick % LOOK_EVERY_TICKS;
+        if since_look > 0 {
+            if state.active.is_switching && since_look <= u64::from(RunningPatch::SLICES) {
+                self.coming.go_on(body, &state.active.next);
+            } else if state.active.is_switching {
+                self.switch(model, body, state);
+            }
             return;
         }
         self.patch.displace(body, &state.x);
@@ -115,40 +120,33 @@ impl HybridScratch {
         place_balls(model, &view, particles.spacing_m, state);
         self.looking.want(body, &state.active, reach_m, particles.most_active);
         self.looking.keep_unsettled(&self.patch, particles);
-        if self.looking.wanted != state.active.ids() {
-            self.switch(model, body, state);
-        }
+        state.active.is_switching = self.looking.wanted != state.active.ids();
+        state.active.next.clone_from(&self.looking.wanted);
     }
 
-    /// A tick's fading, and what it gives or takes.
-    fn fade(&mut self, model: &Model, body: &Hybrid, state: &mut State) {
-        let State { x, active, ledger, .. } = state;
-        self.patch.displace(body, x);
-        let before_j = self.patch.fading_j(body, x, &active.fading);
-        let period_s = model.spec().settings.tick_period_s;
-        active.fading.fade(fade::factor(period_s, fade::FADING_S));
-        active.fade_balance(period_s, before_j);
-        let has_faded = active.fading.forget_faded();
-        let taken_j = before_j - self.patch.fading_j(body, x, &active.fading);
-        ledger.dissipated_j += taken_j;
-        active.given_j -= taken_j;
-        if has_faded {
-            self.patch.lay_out(body, &active.fading);
-        } else {
+    /// A tick's fading of balancing forces; strains fade with the substeps, until nothing is left to speak of.
+    fn fade(&mut self, model: &Model, state: &mut State) {
+        let State { active, ledger, .. } = state;
+        active.fade_balance(model.spec().settings.tick_period_s);
+        if active.fading.has_faded() {
+            ledger.dissipated_j += active.fading.along_j();
+            active.given_j -= active.fading.along_j();
+            active.fading.clear();
             self.patch.put_fades(&active.fading);
         }
-        self.forces_are_stale = true;
     }
 
-    /// Goes over to the particles in `looking.wanted`.
+    /// Goes over to the particles that are to be active next.
     fn switch(&mut self, model: &Model, body: &Hybrid, state: &mut State) {
-        let Self { patch, looking, before, momenta, balance, .. } = self;
+        self.coming.finish(body, &state.active.next);
+        let Self { patch, coming, looking, before, momenta, balance, .. } = self;
+        let next = &mut coming.patch;
         let nodes = body.node_count();
         let gravity = model.gravity_m_per_s2();
         patch.displace(body, &state.x);
-        before.take(body, patch, &state.x, &state.active.fading);
-        let mut held_j = patch.elastic_j(body, &state.x, &state.active.fading, before.tets());
-        held_j += patch.metric().moving_j(body, (&state.x, &state.v), gravity, momenta);
+        let some_sleep = state.active.ids().iter().any(|id| state.active.next.binary_search(id).is_err());
+        let mut held_j = before.take(body, [patch, next], some_sleep, &state.x, &state.active.fading);
+        held_j += patch.metric_mut().moving_j(body, (&state.x, &state.v), gravity, momenta);
         looking.impulses.clear();
         looking.impulses.resize(nodes, DVec3::ZERO);
         looking.weights_kg.clear();
@@ -159,52 +157,42 @@ impl HybridScratch {
         looking.were_m.clear();
         looking.were_m.extend_from_slice(&state.x[..nodes]);
         balance.take(patch.metric_mut(), state);
-        let (mut some_sleep, mut couple) = (false, DVec3::ZERO);
+        let mut couple = DVec3::ZERO;
         for (number, id) in state.active.ids().iter().enumerate() {
-            if looking.wanted.binary_search(id).is_err() {
+            if state.active.next.binary_search(id).is_err() {
                 let (y, w) = (state.x[nodes + number], state.v[nodes + number]);
                 couple += looking.hand_over(body, *id, (y, w), state);
                 balance.hand_over(body, (number, *id), &mut looking.handed_n);
-                some_sleep = true;
             }
         }
         looking.left.clear();
         looking.left.extend_from_slice(state.active.ids());
-        state.switch(body, &looking.wanted, &mut looking.moved);
-        patch.set(body, state.active.ids());
+        state.switch(body, &mut looking.moved);
         if some_sleep {
-            couple -= looking.shift(body, patch.metric_mut(), state, momenta);
+            couple -= looking.shift(body, next.metric_mut(), state, momenta);
             looking.turn(couple, &state.x);
         }
-        patch.displace(body, &state.x);
-        before.fade_into(body, patch, (&looking.were_m, &state.x), &mut state.active.fading);
-        patch.lay_out(body, &state.active.fading);
+        next.displace(body, &state.x);
+        let places = (&looking.were_m[..], &state.x[..]);
+        let (first_moved_j, elastic_j) = before.fade_into(body, [patch, next], places, &mut state.active.fading);
+        next.put_fades(&state.active.fading);
         if some_sleep {
             looking.impulses.resize(state.v.len(), DVec3::ZERO);
-            patch.metric_mut().accelerate(&mut looking.impulses);
+            next.metric_mut().accelerate(&mut looking.impulses);
             for (v, change) in state.v.iter_mut().zip(&looking.impulses[..nodes]) {
                 *v += *change;
             }
         }
-        // Tets that are touched only now were whole.
-        let (whole, were_m) = (body.partition.shares(), &looking.were_m);
-        let whole = |tet: u32| {
-            let (share, material) = (&whole[tet as usize], body.material_of_tet(tet));
-            before
-                .faded()
-                .of_tet(tet)
-                .map_or_else(|| share.energy_j(material, were_m), |fade| fade.energy_j(share, material, were_m))
-        };
-        held_j += before.first_touched().iter().map(|&tet| whole(tet)).sum::<f64>();
-        let elastic_j = patch.elastic_j(body, &state.x, &state.active.fading, before.tets());
-        held_j -= elastic_j;
-        held_j -= patch.metric().moving_j(body, (&state.x, &state.v), gravity, momenta);
+        held_j += first_moved_j - elastic_j;
+        held_j -= next.metric_mut().moving_j(body, (&state.x, &state.v), gravity, momenta);
         state.ledger.dissipated_j += held_j;
         state.active.given_j -= held_j;
         state.force_is_current = false;
-        if state.active.may_balance(elastic_j) {
-            balance.demand(body, patch.metric(), &looking.left, state.active.ids(), &looking.handed_n);
+        state.active.switched_j = state.active.switched_j.max(elastic_j);
+        if state.active.may_balance() {
+            balance.demand(body, next.metric_mut(), &looking.left, state.active.ids(), &looking.handed_n);
         }
+        coming.swap(patch);
     }
 }
 
@@ -213,14 +201,16 @@ impl HybridScratch {
 pub fn wake_only(model: &Model, state: &mut State, scratch: &mut Scratch, particles: impl IntoIterator<Item = u32>) {
     let (Some(body), Some(own)) = (model.hybrid(), &mut scratch.hybrid) else { return };
     own.follow(body, &state.active);
-    own.looking.wanted.clear();
-    own.looking.wanted.extend(particles.into_iter().filter(|&particle| body.may_wake(particle)));
-    own.looking.wanted.sort_unstable();
-    own.looking.wanted.dedup();
-    own.looking.wanted.truncate(room(model));
-    if own.looking.wanted != state.active.ids() {
+    let next = &mut state.active.next;
+    next.clear();
+    next.extend(particles.into_iter().filter(|&particle| body.may_wake(particle)));
+    next.sort_unstable();
+    next.dedup();
+    next.truncate(room(model));
+    if state.active.next != state.active.ids() {
         own.switch(model, body, state);
     }
+    state.active.is_switching = false;
 }
 
 /// Where the tools' balls are now.

@@ -55,20 +55,30 @@ pub(super) fn evaluate(
     contact.press_tools(&surface, &time, tools, touching, &mut skin.forces_n, contact_scratch);
     state.external_n.fill(DVec3::ZERO);
     skin.hand_over(body.node_count(), patch, &mut state.external_n);
-    let State { x, v, active, force_n, .. } = &mut *state;
+    let State { x, v, active, force_n, viscous, ledger, .. } = &mut *state;
     let every = model.substeps_per_long_step();
-    let mut viscous_power_w = 0.0;
+    let (mut viscous_w, mut taken_j) = (0.0, 0.0);
+    active.fading.go_on(now.dt_s);
+    let left = active.fading.left();
     active.long_steps.turn_with(body, x);
     if every > 1 && now.ends_long_step {
-        let of_coarse = |forces_n: &mut [DVec3]| patch.add_coarse_forces_n(v, forces_n);
-        viscous_power_w += f64::from(every) * active.long_steps.evaluate(body.node_count(), of_coarse);
+        let of_coarse = |forces_n: &mut [DVec3]| patch.add_coarse_forces_n(v, left, forces_n);
+        let found = active.long_steps.evaluate(body.node_count(), of_coarse);
+        viscous_w += f64::from(every) * found.viscous_w;
+        taken_j += active.fading.take_along(0, found.fading_j, f64::from(every) * now.dt_s);
     }
     active.long_steps.start_with_steady_n(force_n);
     if every == 1 {
-        viscous_power_w += patch.add_coarse_forces_n(v, force_n);
+        let found = patch.add_coarse_forces_n(v, left, force_n);
+        viscous_w += found.viscous_w;
+        taken_j += active.fading.take_along(0, found.fading_j, now.dt_s);
     }
-    viscous_power_w += patch.add_cell_forces_n(body, v, force_n);
-    state.viscous.record(viscous_power_w, now.dt_s > 0.0);
+    let found = patch.add_cell_forces_n(body, v, left, force_n);
+    viscous_w += found.viscous_w;
+    taken_j += active.fading.take_along(1, found.fading_j, now.dt_s);
+    viscous.record(viscous_w, now.dt_s > 0.0);
+    ledger.dissipated_j += taken_j;
+    active.given_j -= taken_j;
     if model.gravity_m_per_s2() != DVec3::ZERO {
         patch.metric().add_weight_n(model.gravity_m_per_s2(), &mut state.force_n);
     }
@@ -103,27 +113,30 @@ pub(super) fn kick(
         state.active.long_steps.add_beyond_n(f64::from(model.substeps_per_long_step()), accelerations);
     }
     let of_holders_w = holders_power_w(model, accelerations, &state.v);
-    *kick_sq = [patch.metric_mut().accelerate(accelerations), kick_sq[0], kick_sq[1]];
     let damping = model.spec().settings.mass_damping_per_s;
     let factor = (-0.5 * damping * h_s).exp();
-    let mut twice_kinetic_j = 0.0;
+    let (mut before_j, mut power_w) = (0.0, 0.0);
     if damping > 0.0 {
-        twice_kinetic_j += patch.metric().damped(body, &mut state.v, factor, momenta);
+        before_j = patch.metric_mut().damped(body, &mut state.v, factor, momenta);
+        power_w = of_holders_w + state.v.iter().zip(accelerations.iter()).map(|(v, f)| v.dot(*f)).sum::<f64>();
     }
+    *kick_sq = [patch.metric_mut().accelerate(accelerations), kick_sq[0], kick_sq[1]];
+    // (v + h M'⁻¹f)ᵀ M' (v + h M'⁻¹f) = vᵀM'v + 2h v·f + h² fᵀM'⁻¹f
+    let between_j = factor * factor * before_j + h_s * (2.0 * power_w + h_s * kick_sq[0]);
     let taken_j = balance.work_j(&state.v, accelerations, h_s);
     state.ledger.dissipated_j += taken_j;
     state.active.given_j -= taken_j;
-    let mut power_w = 0.0;
+    let mut external_w = 0.0;
     for ((v, acceleration), external) in state.v.iter_mut().zip(accelerations.iter()).zip(&state.external_n) {
         let change = *acceleration * h_s;
-        power_w += external.dot(*v + change * 0.5);
+        external_w += external.dot(*v + change * 0.5);
         *v += change;
     }
     if damping > 0.0 {
-        twice_kinetic_j += patch.metric().damped(body, &mut state.v, factor, momenta);
-        state.ledger.dissipated_j += 0.5 * twice_kinetic_j * -(-damping * h_s).exp_m1();
+        body.damp(&mut state.v, factor);
+        state.ledger.dissipated_j += 0.5 * (before_j + between_j) * -(-damping * h_s).exp_m1();
     }
-    state.ledger.external_work_j += h_s * power_w;
+    state.ledger.external_work_j += h_s * external_w;
     state.ledger.dissipated_j += h_s * state.viscous.work_rate_w();
     state.ledger.external_work_j += h_s * of_holders_w;
 }

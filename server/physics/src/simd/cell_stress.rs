@@ -67,38 +67,41 @@ pub(super) fn stress<V: Vector<Scalar = T>, T: Scalar, L: LaneLaw, const VISCOUS
     (p, V::of(0.0))
 }
 
-/// The same of a rest state changed by `A` (`hybrid::fade`): `P̃(F (I + A)) (I + A)ᵀ`, with `F (I + A) − I = H + A + H A`; viscous stress is that of `F`.
+/// The same of a rest state changed by `A` (`hybrid::fade`): `P̃(F (I + A)) (I + A)ᵀ`, with `F (I + A) − I = H + A + H A`; viscous stress is that of `F`. And
+/// `P̃ : F A` (J/m³).
 #[inline(always)]
 pub(super) fn faded_stress<V: Vector<Scalar = T>, T: Scalar, L: LaneLaw, const VISCOUS: bool>(
     (constants, a): (&Constants<T>, &M3<V>),
     h: &M3<V>,
     h_dot: &M3<V>,
-) -> (M3<V>, V) {
-    let mut effective = *h;
+) -> (M3<V>, V, V) {
+    let (mut effective, mut changes) = (*h, *h);
     for row in 0..3 {
         for column in 0..3 {
             let product = h[row][0] * a[0][column] + h[row][1] * a[1][column] + h[row][2] * a[2][column];
-            effective[row][column] = h[row][column] + a[row][column] + product;
+            changes[row][column] = a[row][column] + product;
+            effective[row][column] = h[row][column] + changes[row][column];
         }
     }
     let p = stress::<V, T, L, false>(constants, &effective, &effective).0;
-    let mut back = p;
+    let (mut back, mut along) = (p, V::of(0.0));
     for row in 0..3 {
         for column in 0..3 {
+            along = along + p[row][column] * changes[row][column];
             let product = p[row][0] * a[column][0] + p[row][1] * a[column][1] + p[row][2] * a[column][2];
             back[row][column] = p[row][column] + product;
         }
     }
     if VISCOUS {
         let (viscous_p, density) = viscous(&constants.converted(), h, h_dot);
-        return (plus(&back, &viscous_p), density);
+        return (plus(&back, &viscous_p), density, along);
     }
-    (back, V::of(0.0))
+    (back, V::of(0.0), along)
 }
 
 /// Lanes of nine entries, row by row.
 #[inline(always)]
-pub(super) fn load_matrix<V: Vector, const N: usize>(lanes: &[[V::Scalar; N]; 9], first: usize) -> M3<V> {
+pub(super) fn load_matrix<V: Vector, const N: usize>(lanes: &[[V::Scalar; N]], first: usize) -> M3<V> {
     let mut m = [[V::of(0.0); 3]; 3];
     for row in 0..3 {
         for column in 0..3 {

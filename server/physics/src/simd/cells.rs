@@ -9,12 +9,12 @@ pub(super) mod testing;
 use super::{
     block::{Node, Sum},
     dispatch::{self, Available, InstructionSet},
-    laws::Constants,
+    fades::{ENTRIES, Found, Split, entries},
     node,
     real::Scalar,
 };
 use crate::{
-    hybrid::{cell::RestCell, fade::CellFade, share},
+    hybrid::{cell::RestCell, fade::CellFade},
     material::Material,
     world::Precision,
 };
@@ -42,33 +42,21 @@ struct CutBlock<T, const N: usize> {
     minus_kappa: [T; N],
 }
 
-/// What fades in the cells of a block (`hybrid::fade`), entries of matrices row by row.
+/// What fades in the cells of a block.
 #[derive(Debug, Clone)]
 #[repr(C, align(64))]
 struct FadeBlock<T, const N: usize> {
-    shape: [[T; N]; 9],
-    volume: [[T; N]; 9],
-    /// `1 − a`.
-    modes: [T; N],
+    entries: [[T; N]; ENTRIES],
+    /// Bits of the lanes in which something does.
+    lanes: u32,
 }
 
-/// Cells of one material, all of which fade, or none.
+/// Cells of one material.
 #[derive(Debug, Clone)]
 struct Run {
     material: u16,
     blocks: Range<usize>,
     cells: usize,
-    /// First of as many blocks of what fades.
-    fades: Option<usize>,
-}
-
-/// Constants of a material: whole, of its shape and of its volume.
-#[derive(Debug, Clone)]
-struct Split<T> {
-    material: Material,
-    whole: Constants<T>,
-    shape: Constants<T>,
-    volume: Constants<T>,
 }
 
 /// Blocks of all materials.
@@ -76,6 +64,7 @@ struct Split<T> {
 struct Tables<T, const N: usize> {
     materials: Vec<Split<T>>,
     blocks: Vec<CutBlock<T, N>>,
+    /// As many.
     fades: Vec<FadeBlock<T, N>>,
     runs: Vec<Run>,
     spare: u32,
@@ -131,12 +120,11 @@ impl CutCells {
         }
     }
 
-    /// Makes place for `cells` cells of one material, to be filled by [`Self::put`] and, if they are `fading`, [`Self::put_fade`]. Does not allocate
-    /// within the capacity.
-    pub fn start(&mut self, material: u16, cells: usize, fading: bool) {
+    /// Makes place for `cells` cells of one material, in which nothing fades, to be filled by [`Self::put`]. Does not allocate within the capacity.
+    pub fn start(&mut self, material: u16, cells: usize) {
         match &mut self.layout {
-            Layout::Single(blocks) => blocks.start(material, cells, fading),
-            Layout::Double(blocks) => blocks.start(material, cells, fading),
+            Layout::Single(blocks) => blocks.start(material, cells),
+            Layout::Double(blocks) => blocks.start(material, cells),
         }
     }
 
@@ -148,8 +136,8 @@ impl CutCells {
         }
     }
 
-    /// What fades in a cell of a run (from 0) of fading ones.
-    pub fn put_fade(&mut self, run: usize, number: usize, fade: &CellFade) {
+    /// What fades in a cell of a run (from 0).
+    pub fn put_fade(&mut self, run: usize, number: usize, fade: Option<&CellFade>) {
         match &mut self.layout {
             Layout::Single(blocks) => blocks.put_fade(run, number, fade),
             Layout::Double(blocks) => blocks.put_fade(run, number, fade),
@@ -186,13 +174,13 @@ impl CutCells {
         }
     }
 
-    /// Sums up the forces (N) of elastic and viscous stress on the first `points` points; returns the power (W) that viscous stress takes.
-    pub fn forces(&mut self, points: usize) -> f64 {
+    /// Sums up the forces (N) of elastic and viscous stress on the first `points` points, where `left` is left of what fades.
+    pub fn forces(&mut self, points: usize, left: f64) -> Found {
         let Self { layout, instruction_set, displacements, velocities, sums } = self;
         sums[..points].fill(Sum::default());
         match layout {
-            Layout::Single(blocks) => blocks.sum_up(*instruction_set, displacements, velocities, sums),
-            Layout::Double(blocks) => blocks.sum_up(*instruction_set, displacements, velocities, sums),
+            Layout::Single(blocks) => blocks.sum_up(*instruction_set, left, [displacements, velocities], sums),
+            Layout::Double(blocks) => blocks.sum_up(*instruction_set, left, [displacements, velocities], sums),
         }
     }
 
@@ -209,9 +197,9 @@ impl<T: Scalar, const N: usize> Tables<T, N> {
         Self {
             materials: materials.iter().map(Split::of).collect(),
             // Every run may leave one block in part empty.
-            blocks: Vec::with_capacity(cells.div_ceil(N) + 2 * materials.len()),
+            blocks: Vec::with_capacity(cells.div_ceil(N) + materials.len()),
             fades: Vec::with_capacity(cells.div_ceil(N) + materials.len()),
-            runs: Vec::with_capacity(2 * materials.len()),
+            runs: Vec::with_capacity(materials.len()),
             spare: points as u32,
         }
     }
@@ -222,7 +210,7 @@ impl<T: Scalar, const N: usize> Tables<T, N> {
         self.runs.clear();
     }
 
-    fn start(&mut self, material: u16, cells: usize, fading: bool) {
+    fn start(&mut self, material: u16, cells: usize) {
         let zero = T::of(0.0);
         let first = self.blocks.len();
         for _ in 0..cells.div_ceil(N) {
@@ -234,26 +222,19 @@ impl<T: Scalar, const N: usize> Tables<T, N> {
                 minus_kappa: [zero; N],
             });
         }
-        let fades = fading.then_some(self.fades.len());
-        if fading {
-            let nothing = FadeBlock { shape: [[zero; N]; 9], volume: [[zero; N]; 9], modes: [zero; N] };
-            self.fades.extend(std::iter::repeat_n(nothing, cells.div_ceil(N)));
-        }
-        self.runs.push(Run { material, blocks: first..self.blocks.len(), cells, fades });
+        let nothing = FadeBlock { entries: entries(None).map(|entry| [T::of(entry); N]), lanes: 0 };
+        self.fades.resize(self.blocks.len(), nothing);
+        self.runs.push(Run { material, blocks: first..self.blocks.len(), cells });
     }
 
-    fn put_fade(&mut self, run: usize, number: usize, fade: &CellFade) {
+    fn put_fade(&mut self, run: usize, number: usize, fade: Option<&CellFade>) {
         let run = &self.runs[run];
-        let Some(first) = run.fades else { return };
         let (block, lane) = run.lane::<N>(number);
-        let block = &mut self.fades[first + block];
-        for row in 0..3 {
-            for column in 0..3 {
-                block.shape[3 * row + column][lane] = T::of(fade.shape.col(column)[row]);
-                block.volume[3 * row + column][lane] = T::of(fade.volume.col(column)[row]);
-            }
+        let block = &mut self.fades[run.blocks.start + block];
+        for (lanes, entry) in block.entries.iter_mut().zip(entries(fade)) {
+            lanes[lane] = T::of(entry);
         }
-        block.modes[lane] = T::of(1.0 - fade.modes);
+        block.lanes = block.lanes & !(1 << lane) | u32::from(fade.is_some()) << lane;
     }
 
     fn put(&mut self, number: usize, points: [u32; 8], rest: &RestCell) {
@@ -274,16 +255,17 @@ impl<T: Scalar, const N: usize> Tables<T, N> {
         block.minus_kappa[lane] = T::of(-rest.hourglass_m * mu_pa);
     }
 
-    fn sum_up(&self, set: Available, displacements: &[Node], velocities: &[Node], sums: &mut [Sum]) -> f64 {
-        let mut power_w = 0.0;
+    fn sum_up(&self, set: Available, left: f64, [displacements, velocities]: [&[Node]; 2], sums: &mut [Sum]) -> Found {
+        let mut found = Found::default();
         for run in &self.runs {
             let split = &self.materials[run.material as usize];
             let blocks = &self.blocks[run.blocks.clone()];
-            let fades = run.fades.map_or(&[][..], |first| &self.fades[first..first + blocks.len()]);
-            let mut pass = CutForces { split, blocks, fades, displacements, velocities, sums };
-            power_w += dispatch::run(set, (split.material.law, !split.material.viscosity.is_zero()), &mut pass);
+            let fades = &self.fades[run.blocks.clone()];
+            let mut pass = CutForces { split, blocks, fades, left, displacements, velocities, sums, fading_j: 0.0 };
+            let viscous_w = dispatch::run(set, (split.material.law, !split.material.viscosity.is_zero()), &mut pass);
+            found += Found { viscous_w, fading_j: pass.fading_j };
         }
-        power_w
+        found
     }
 }
 
@@ -294,14 +276,6 @@ impl Run {
         let first = window * BLOCKS_PER_WINDOW;
         let count = (self.cells - first * N).div_ceil(N).min(BLOCKS_PER_WINDOW);
         (first + within % count, within / count)
-    }
-}
-
-impl<T: Scalar> Split<T> {
-    fn of(material: &Material) -> Self {
-        let (shape, volume) = share::split(material);
-        let [whole, shape, volume] = [material, &shape, &volume].map(Constants::of);
-        Self { material: *material, whole, shape, volume }
     }
 }
 
@@ -319,16 +293,17 @@ mod tests {
             let mut kernel = CutCells::with_capacity(cells.len(), u.len(), &[*material], *precision);
             kernel = kernel.with_instruction_set(*set);
             // Others before: nothing of them may stay.
-            kernel.start(0, 3, true);
+            kernel.start(0, 3);
             (0..3).for_each(|number| kernel.put(number, cells[number].0, &cells[number].1));
+            (0..3).for_each(|number| kernel.put_fade(0, number, Some(&CellFade::none(0))));
             kernel.clear();
-            kernel.start(0, cells.len(), false);
+            kernel.start(0, cells.len());
             for (number, (points, rest)) in cells.iter().enumerate() {
                 kernel.put(number, *points, rest);
             }
             kernel.set_displacements(u);
             kernel.set_velocities(v);
-            let power_w = kernel.forces(u.len());
+            let power_w = kernel.forces(u.len(), 0.0).viscous_w;
             let mut forces_n = vec![DVec3::ZERO; u.len()];
             kernel.add_forces_n(&mut forces_n);
             Answer { forces_n, power_w }

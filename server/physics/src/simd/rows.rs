@@ -7,12 +7,16 @@
 use super::{
     cell_stress::{particles, patterns, stress},
     dispatch::{self, Available, InstructionSet, Pass},
-    laws::Constants,
+    fades::{ENTRIES, Found, Split, add_lanes, entries, fading_stress, scaled},
+    laws::M3,
     real::{Real, Scalar, Vector},
     tangents::LaneTangent,
 };
 use crate::{
-    hybrid::cell::{HOURGLASS, MODE_WEIGHTS},
+    hybrid::{
+        cell::{HOURGLASS, MODE_WEIGHTS},
+        fade::CellFade,
+    },
     material::Material,
     world::Precision,
 };
@@ -30,6 +34,10 @@ pub struct CellRow {
     pub cells: u32,
     /// Index of their material.
     pub material: u16,
+    /// Number of the first cell among all of the rows, one after the other.
+    pub first: u32,
+    /// Whether something fades in any of them ([`RowValues::put_fade`]).
+    pub fading: bool,
 }
 
 /// Materials of full cells, which all are of one size.
@@ -48,8 +56,7 @@ enum Layout {
 
 #[derive(Debug, Clone)]
 struct CellMaterial<T> {
-    material: Material,
-    constants: Constants<T>,
+    split: Split<T>,
     /// `1/(4h)` (1/m), `−V` (m³) and `−κ` (N/m).
     cell: [f64; 3],
 }
@@ -73,10 +80,12 @@ struct Arrays<T> {
     velocities: [Vec<T>; 3],
     left: [Vec<T>; 3],
     right: [Vec<T>; 3],
+    /// Of every cell.
+    fades: [Vec<T>; ENTRIES],
 }
 
 impl<T: Scalar> Arrays<T> {
-    fn new(points: usize, is_viscous: bool) -> Self {
+    fn new(points: usize, cells: usize, is_viscous: bool) -> Self {
         // One before the first point, whose left neighbour gives it nothing.
         let zeros = |count: usize| std::array::from_fn(|_| vec![T::of(0.0); count]);
         let entries = 1 + points + LANES;
@@ -85,6 +94,7 @@ impl<T: Scalar> Arrays<T> {
             velocities: zeros(if is_viscous { entries } else { 0 }),
             left: zeros(entries),
             right: zeros(entries),
+            fades: self::entries(None).map(|entry| vec![T::of(entry); cells + LANES]),
         }
     }
 }
@@ -111,21 +121,21 @@ impl RowKernel {
         Self { instruction_set: Available::at_most(instruction_set), ..self }
     }
 
-    /// Buffers for up to `points` points, at rest.
-    pub fn values(&self, points: usize) -> RowValues {
+    /// Buffers for up to `points` points, at rest, and `cells` cells.
+    pub fn values(&self, points: usize, cells: usize) -> RowValues {
         let values = match &self.layout {
-            Layout::Single(_) => Values::Single(Arrays::new(points, self.is_viscous)),
-            Layout::Double(_) => Values::Double(Arrays::new(points, self.is_viscous)),
+            Layout::Single(_) => Values::Single(Arrays::new(points, cells, self.is_viscous)),
+            Layout::Double(_) => Values::Double(Arrays::new(points, cells, self.is_viscous)),
         };
         RowValues { values }
     }
 
-    /// Sums up the forces (N) of elastic and viscous stress on the first `points` points; returns the power (W) that viscous stress takes.
-    pub fn forces(&self, rows: &[CellRow], points: usize, values: &mut RowValues) -> f64 {
+    /// Sums up the forces (N) of elastic and viscous stress on the first `points` points, where `left` is left of what fades.
+    pub fn forces(&self, rows: &[CellRow], (points, left): (usize, f64), values: &mut RowValues) -> Found {
         match (&self.layout, &mut values.values) {
-            (Layout::Single(materials), Values::Single(arrays)) => self.sum_up(materials, rows, points, arrays),
-            (Layout::Double(materials), Values::Double(arrays)) => self.sum_up(materials, rows, points, arrays),
-            _ => 0.0,
+            (Layout::Single(materials), Values::Single(arrays)) => self.sum_up(materials, rows, (points, left), arrays),
+            (Layout::Double(materials), Values::Double(arrays)) => self.sum_up(materials, rows, (points, left), arrays),
+            _ => Found::default(),
         }
     }
 
@@ -133,24 +143,27 @@ impl RowKernel {
         &self,
         materials: &[CellMaterial<T>],
         rows: &[CellRow],
-        points: usize,
+        (points, left): (usize, f64),
         arrays: &mut Arrays<T>,
-    ) -> f64 {
+    ) -> Found {
         for sums in arrays.left.iter_mut().chain(&mut arrays.right) {
             sums[..1 + points + LANES].fill(T::of(0.0));
         }
-        let mut power_w = 0.0;
+        let mut found = Found::default();
         for same in rows.chunk_by(|a, b| a.material == b.material) {
             let material = &materials[same[0].material as usize];
-            let law = (material.material.law, !material.material.viscosity.is_zero());
-            power_w += dispatch::run(self.instruction_set, law, &mut RowForces { material, rows: same, arrays });
+            let Material { law, viscosity, .. } = &material.split.material;
+            let law = (*law, !viscosity.is_zero());
+            let mut pass = RowForces { material, rows: same, arrays, left, fading_j: 0.0 };
+            let viscous_w = dispatch::run(self.instruction_set, law, &mut pass);
+            found += Found { viscous_w, fading_j: pass.fading_j };
         }
-        power_w
+        found
     }
 }
 
 fn of_materials<T: Scalar>(materials: &[Material], cell: impl Fn(&Material) -> [f64; 3]) -> Vec<CellMaterial<T>> {
-    let of = |m: &Material| CellMaterial { material: *m, constants: Constants::of(m), cell: cell(m) };
+    let of = |m: &Material| CellMaterial { split: Split::of(m), cell: cell(m) };
     materials.iter().map(of).collect()
 }
 
@@ -172,6 +185,14 @@ impl RowValues {
         }
     }
 
+    /// What fades in a cell.
+    pub fn put_fade(&mut self, cell: u32, fade: Option<&CellFade>) {
+        match &mut self.values {
+            Values::Single(arrays) => put_fade(&mut arrays.fades, cell, fade),
+            Values::Double(arrays) => put_fade(&mut arrays.fades, cell, fade),
+        }
+    }
+
     /// Overwrites `forces_n` (N) with those on the points.
     pub fn forces_n(&self, forces_n: &mut [DVec3]) {
         match &self.values {
@@ -184,6 +205,12 @@ impl RowValues {
 fn put<T: Scalar>([x, y, z]: &mut [Vec<T>; 3], list: &[DVec3]) {
     for (((x, y), z), a) in x[1..].iter_mut().zip(&mut y[1..]).zip(&mut z[1..]).zip(list) {
         (*x, *y, *z) = (T::of(a.x), T::of(a.y), T::of(a.z));
+    }
+}
+
+fn put_fade<T: Scalar>(fades: &mut [Vec<T>; ENTRIES], cell: u32, fade: Option<&CellFade>) {
+    for (list, entry) in fades.iter_mut().zip(entries(fade)) {
+        list[cell as usize] = T::of(entry);
     }
 }
 
@@ -202,6 +229,8 @@ struct RowForces<'a, T> {
     material: &'a CellMaterial<T>,
     rows: &'a [CellRow],
     arrays: &'a mut Arrays<T>,
+    left: f64,
+    fading_j: f64,
 }
 
 impl<T: Scalar> Pass<T> for RowForces<'_, T> {
@@ -213,7 +242,8 @@ impl<T: Scalar> Pass<T> for RowForces<'_, T> {
                 let [a, b, c, d] = row.points;
                 let at =
                     [1 + a as usize + first, 1 + b as usize + first, 1 + c as usize + first, 1 + d as usize + first];
-                self.lanes::<V, L, VISCOUS>(at, row.cells as usize - first, &mut power_w);
+                let fades = row.fading.then_some(row.first as usize + first);
+                self.lanes::<V, L, VISCOUS>(at, row.cells as usize - first, fades, &mut power_w);
             }
         }
         power_w
@@ -221,12 +251,13 @@ impl<T: Scalar> Pass<T> for RowForces<'_, T> {
 }
 
 impl<T: Scalar> RowForces<'_, T> {
-    /// Cells whose points 0, 2, 4, 6 are at `at` and what follows; there are `cells` of them, or more than lanes.
+    /// Cells whose points 0, 2, 4, 6 are at `at` and what follows; there are `cells` of them, or more than lanes. What fades of them, if any, starts at `fades`.
     #[inline(always)]
     fn lanes<V: Vector<Scalar = T>, L: LaneTangent, const VISCOUS: bool>(
         &mut self,
         at: [usize; 4],
         cells: usize,
+        fades: Option<usize>,
         power_w: &mut f64,
     ) {
         let [quarter, minus_volume, minus_kappa] = self.material.cell;
@@ -248,11 +279,32 @@ impl<T: Scalar> RowForces<'_, T> {
                 }
             }
         }
-        let (p, density) = stress::<V, T, L, VISCOUS>(&self.material.constants, &h, &h_dot);
+        let mut kept_modes = weight;
+        let (p, density) = if let Some(first) = fades {
+            let (left, entries) = (V::of(self.left), &self.arrays.fades);
+            let of_shape = scaled(&matrix::<V>(&entries[..9], first), left);
+            let of_volume = scaled(&matrix::<V>(&entries[9..18], first), left);
+            let gone = V::load(&entries[18][first..]) * left;
+            kept_modes = weight * (V::of(1.0) - gone);
+            let (p, density, fading) =
+                fading_stress::<V, T, L, VISCOUS>(&self.material.split, &[of_shape, of_volume], &h, &h_dot);
+            let mut squares = V::of(0.0);
+            for axis in 0..3 {
+                for mode in 0..4 {
+                    squares = squares + modes[axis][mode] * modes[axis][mode] * V::of(MODE_WEIGHTS[mode]);
+                }
+            }
+            // s ∂U/∂s = V P̃ : F A − ½ κ a Σ w |q|²
+            let of_modes = squares * gone * V::of(minus_kappa / 128.0);
+            add_lanes(weight * (fading * V::of(-minus_volume) + of_modes), &mut self.fading_j);
+            (p, density)
+        } else {
+            stress::<V, T, L, VISCOUS>(&self.material.split.whole, &h, &h_dot)
+        };
         let of_stress = weight * V::of(minus_volume * quarter);
-        let mut of_modes = [weight; 4];
+        let mut of_modes = [kept_modes; 4];
         for mode in 0..4 {
-            of_modes[mode] = weight * V::of(minus_kappa * MODE_WEIGHTS[mode] / 64.0);
+            of_modes[mode] = kept_modes * V::of(minus_kappa * MODE_WEIGHTS[mode] / 64.0);
         }
         for axis in 0..3 {
             let mut c = [V::of(0.0); 7];
@@ -272,14 +324,20 @@ impl<T: Scalar> RowForces<'_, T> {
             }
         }
         if VISCOUS {
-            let mut power = [T::of(0.0); LANES];
-            (density * weight * V::of(-minus_volume)).store(&mut power);
-            // One after the other, so that the width of the vectors does not show.
-            for &lane in &power[..V::WIDTH] {
-                *power_w += lane.into();
-            }
+            add_lanes(density * weight * V::of(-minus_volume), power_w);
         }
     }
+}
+
+#[inline(always)]
+fn matrix<V: Vector>(entries: &[Vec<V::Scalar>], first: usize) -> M3<V> {
+    let mut m = [[V::of(0.0); 3]; 3];
+    for row in 0..3 {
+        for column in 0..3 {
+            m[row][column] = V::load(&entries[3 * row + column][first..]);
+        }
+    }
+    m
 }
 
 #[inline(always)]
@@ -332,17 +390,18 @@ mod tests {
                     }
                     _ => {
                         let points = [points[0], points[2], points[4], points[6]];
-                        rows.push(CellRow { points, cells: 1, material: 0 });
+                        let first = rows.last().map_or(0, |row| row.first + row.cells);
+                        rows.push(CellRow { points, cells: 1, material: 0, first, fading: false });
                     }
                 }
             }
             assert!(rows.len() < cells.len() / 4);
             let kernel = RowKernel::new(*spacing_m, *handed, &[*material], *precision);
             let kernel = kernel.with_instruction_set(*set);
-            let mut values = kernel.values(u.len());
+            let mut values = kernel.values(u.len(), cells.len());
             values.set_displacements(u);
             values.set_velocities(v);
-            let power_w = kernel.forces(&rows, u.len(), &mut values);
+            let power_w = kernel.forces(&rows, (u.len(), 0.0), &mut values).viscous_w;
             let mut forces_n = vec![DVec3::NAN; u.len()];
             values.forces_n(&mut forces_n);
             Answer { forces_n, power_w }

@@ -7,6 +7,7 @@ mod forces;
 use super::{
     block::{Lanes, Node, Sum},
     dispatch::{self, Available, InstructionSet},
+    fades::Found,
     laws::Constants,
     node,
     real::Scalar,
@@ -137,9 +138,9 @@ impl ShareKernel {
         }
     }
 
-    /// Adds forces (N) of elastic and viscous stress to `forces_n` at `displacements_m` and velocities `v` of the coarse nodes; returns the
-    /// power (W) that viscous stress takes.
-    pub fn add_forces_n(&mut self, displacements_m: &[DVec3], v: &[DVec3], forces_n: &mut [DVec3]) -> f64 {
+    /// Adds forces (N) of elastic and viscous stress to `forces_n` at `displacements_m` and velocities `v` of the coarse nodes, where `left` is left of
+    /// what fades.
+    pub fn add_forces_n(&mut self, displacements_m: &[DVec3], v: &[DVec3], left: f64, forces_n: &mut [DVec3]) -> Found {
         let Self { layout, instruction_set, displacements, velocities, sums } = self;
         for (to, from) in displacements.iter_mut().zip(displacements_m) {
             *to = node(*from);
@@ -148,14 +149,14 @@ impl ShareKernel {
             *to = node(*from);
         }
         sums.fill(Sum::default());
-        let power_w = match layout {
-            Layout::Single(blocks) => blocks.sum_up(*instruction_set, displacements, velocities, sums),
-            Layout::Double(blocks) => blocks.sum_up(*instruction_set, displacements, velocities, sums),
+        let found = match layout {
+            Layout::Single(blocks) => blocks.sum_up(*instruction_set, left, [displacements, velocities], sums),
+            Layout::Double(blocks) => blocks.sum_up(*instruction_set, left, [displacements, velocities], sums),
         };
         for (force, Sum([x, y, z, _])) in forces_n.iter_mut().zip(&sums[..displacements_m.len()]) {
             *force += DVec3::new(*x, *y, *z);
         }
-        power_w
+        found
     }
 }
 
@@ -294,15 +295,23 @@ impl<T: Scalar, const N: usize> Tables<T, N> {
         }
     }
 
-    fn sum_up(&mut self, set: Available, displacements: &[Node], velocities: &[Node], sums: &mut [Sum]) -> f64 {
+    fn sum_up(
+        &mut self,
+        set: Available,
+        left: f64,
+        [displacements, velocities]: [&[Node]; 2],
+        sums: &mut [Sum],
+    ) -> Found {
         let Self { blocks, runs, edges, rates, forces, .. } = self;
-        let mut power_w = 0.0;
+        let mut found = Found::default();
         for run in runs.iter() {
             let blocks = &blocks[run.blocks.clone()];
-            let mut pass = ShareForces { run, blocks, edges, rates, forces, displacements, velocities, sums };
-            power_w += dispatch::run(set, run.law, &mut pass);
+            let mut pass =
+                ShareForces { run, blocks, edges, rates, forces, displacements, velocities, sums, left, fading_j: 0.0 };
+            let viscous_w = dispatch::run(set, run.law, &mut pass);
+            found += Found { viscous_w, fading_j: pass.fading_j };
         }
-        power_w
+        found
     }
 }
 
@@ -338,7 +347,7 @@ mod tests {
                         kernel = kernel.with_instruction_set(set);
                         shares.iter().enumerate().for_each(|(tet, share)| kernel.put(tet, share));
                         let mut forces = vec![DVec3::ZERO; nodes];
-                        let power_w = kernel.add_forces_n(&u, &v, &mut forces);
+                        let power_w = kernel.add_forces_n(&u, &v, 0.0, &mut forces).viscous_w;
                         (forces, power_w)
                     };
                     let baseline = run(InstructionSet::Baseline);

@@ -2,9 +2,10 @@
 #![allow(dead_code, missing_docs, unreachable_pub, clippy::expect_used, clippy::unwrap_used)]
 use glam::DVec3;
 use palpate_physics::{
-    Model, ModelSpec, PointForce, Precision, PrescribedSpec, Region, Scratch, Settings, State, StepReport, TetMesh,
-    TickInput,
+    Model, ModelSpec, PointForce, Precision, PrescribedSpec, Region, Scratch, Settings, State, StepReport, Surface,
+    TetMesh, TickInput,
     contact::{Coupling, ToolSpec, ToolTarget},
+    hybrid::{ParticleSpec, Skin, Waking, wake_only},
     material::{Lame, Law, Material, Viscosity},
 };
 
@@ -95,6 +96,49 @@ pub fn nodes_where(mesh: &TetMesh, wanted: impl Fn(DVec3) -> bool) -> Vec<u32> {
 
 pub fn hold(name: &str, nodes: Vec<u32>, axes: [bool; 3]) -> PrescribedSpec {
     PrescribedSpec { name: name.into(), nodes, axes }
+}
+
+/// A block of `2a × 2a × a` whose upper face has the origin in its middle, a stable neo-Hookean solid of 10 kPa: 24 n³ coarse tets, and particles as
+/// far apart as `cells` to the side `a` says, of which `most_active` may be awake.
+pub fn hybrid_block(
+    (a_m, n, cells): (f64, usize, usize),
+    poisson_ratio: f64,
+    most_active: usize,
+    waking: Waking,
+) -> ModelSpec {
+    let block = |cells: usize| {
+        let side = even(-a_m, a_m, 2 * cells);
+        bricks(&side, &side, &even(-a_m, 0.0, cells))
+    };
+    let fine = block(cells);
+    let surface = Surface::of(&fine).unwrap();
+    let positions = surface.nodes.iter().map(|&n| fine.positions_m()[n as usize]).collect();
+    let mut spec = body(block(n), material(Law::StableNeoHookean, 10e3, poisson_ratio));
+    spec.particles = Some(ParticleSpec {
+        skin: Skin::new(positions, surface.triangles).unwrap(),
+        spacing_m: a_m / cells as f64,
+        lattice_through_m: DVec3::ZERO,
+        most_active,
+        waking,
+    });
+    spec
+}
+
+/// Holds the lowest nodes of a body.
+pub fn held_below(mut spec: ModelSpec) -> ModelSpec {
+    let low_m = spec.mesh.positions_m().iter().map(|p| p.z).fold(f64::INFINITY, f64::min);
+    spec.prescribed = vec![hold("bottom", nodes_where(&spec.mesh, |p| p.z < low_m + 1e-4), [true; 3])];
+    spec
+}
+
+/// Wakes the particles nearest to the origin.
+pub fn wake_nearest(rig: &mut Rig, count: usize) {
+    let partition = rig.model.hybrid().unwrap().partition();
+    let mut near: Vec<u32> = (0..partition.particle_count() as u32).collect();
+    let distance_sq = |particle: u32| partition.particle_m(particle).length_squared();
+    near.sort_by(|&a, &b| distance_sq(a).total_cmp(&distance_sq(b)));
+    near.truncate(count);
+    wake_only(&rig.model, &mut rig.state, &mut rig.scratch, near);
 }
 
 /// Evenly spaced coordinates.

@@ -1,77 +1,105 @@
 //! The kernels' layout of a patch's cells.
-use super::{FadingCell, RunningPatch};
+use super::RunningPatch;
 use crate::{
-    hybrid::{body::Hybrid, fade::Fading},
+    hybrid::{
+        body::Hybrid,
+        fade::{CellFade, Fading},
+    },
     simd::CellRow,
 };
 
-/// How a cell is laid out.
+/// Where a cell is laid out.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Kind {
-    Full,
-    Cut,
-    Fading,
+pub(super) enum Slot {
+    /// A full cell: its row, and its number among the cells of all rows.
+    Row { row: u32, cell: u32 },
+    /// A cut one: its run, and its number in it.
+    Cut { run: u32, number: u32 },
 }
 
 impl RunningPatch {
-    /// Rows of full cells, blocks of cut ones and blocks of those that fade, material by material.
-    pub(in crate::hybrid) fn lay_out(&mut self, hybrid: &Hybrid, fading: &Fading) {
+    /// Rows of full cells and blocks of cut ones, material by material; nothing fades in them.
+    pub(super) fn lay_out(&mut self, hybrid: &Hybrid) {
         let partition = &hybrid.partition;
+        for &cell in &self.fading_cells {
+            if let Slot::Row { cell, .. } = self.slots[cell as usize] {
+                self.values.put_fade(cell, None);
+            }
+        }
+        self.fading_cells.clear();
         self.rows.clear();
         self.cut.clear();
-        self.fading_cells.clear();
+        self.slots.clear();
+        self.slots.resize(self.cells.len(), Slot::Row { row: 0, cell: 0 });
         let point_of = &self.point_of;
         let points_of = |cell: usize| partition.corners(cell).map(|particle| point_of[particle as usize]);
+        let mut in_rows = 0;
         for material in 0..hybrid.materials.len() as u16 {
-            let kind_of = |cell: usize| match fading.of_cell(cell as u32) {
-                Some(_) => Kind::Fading,
-                None if partition.is_cut(cell) => Kind::Cut,
-                None => Kind::Full,
-            };
-            let of_kind = |kind: Kind| {
-                self.cells.iter().map(|&cell| cell as usize).filter(move |&cell| {
+            let some = |is_cut: bool| {
+                let cells = self.cells.iter().map(|&cell| cell as usize).enumerate();
+                cells.filter(move |&(_, cell)| {
                     let tet = partition.cells()[cell].tet;
-                    hybrid.of_tet[tet as usize] == material && kind_of(cell) == kind
+                    partition.is_cut(cell) == is_cut && hybrid.of_tet[tet as usize] == material
                 })
             };
             let first_row = self.rows.len();
-            for cell in of_kind(Kind::Full) {
+            for (number, cell) in some(false) {
                 let points = points_of(cell);
                 let points = [points[0], points[2], points[4], points[6]];
                 match self.rows[first_row..].last_mut() {
                     Some(row) if row.points.map(|point| point + row.cells) == points => row.cells += 1,
-                    _ => self.rows.push(CellRow { points, cells: 1, material }),
+                    _ => self.rows.push(CellRow { points, cells: 1, material, first: in_rows, fading: false }),
                 }
+                self.slots[number] = Slot::Row { row: self.rows.len() as u32 - 1, cell: in_rows };
+                in_rows += 1;
             }
-            for kind in [Kind::Cut, Kind::Fading] {
-                let count = of_kind(kind).count();
-                if count == 0 {
-                    continue;
-                }
-                let run = self.cut.runs();
-                self.cut.start(material, count, kind == Kind::Fading);
-                for (number, cell) in of_kind(kind).enumerate() {
-                    let (rest, points) = (hybrid.awake_cell(cell), points_of(cell));
-                    self.cut.put(number, points, &rest);
-                    if kind == Kind::Fading {
-                        self.fading_cells.push(FadingCell { cell: cell as u32, run, number, points, rest });
-                    }
-                }
+            let count = some(true).count();
+            if count == 0 {
+                continue;
+            }
+            let run = self.cut.runs() as u32;
+            self.cut.start(material, count);
+            for (at, (number, cell)) in some(true).enumerate() {
+                self.cut.put(at, points_of(cell), &hybrid.awake_cell(cell));
+                self.slots[number] = Slot::Cut { run, number: at as u32 };
             }
         }
-        self.fading_cells.sort_unstable_by_key(|fading| fading.cell);
-        self.put_fades(fading);
     }
 
-    /// Whether the cells that fade are those that are laid out so.
-    pub(in crate::hybrid) fn is_laid_out_for(&self, fading: &Fading) -> bool {
-        self.fading_cells.iter().map(|own| own.cell).eq(fading.cells.iter().map(|fade| fade.cell))
+    /// Whether this is what the kernels were told of last.
+    pub(in crate::hybrid) fn knows(&self, fading: &Fading) -> bool {
+        self.fading_mark == fading.mark()
     }
 
-    /// Gives the kernels how far everything has faded. The cells are those of [`Self::lay_out`].
+    /// Tells the kernels what fades.
     pub(in crate::hybrid) fn put_fades(&mut self, fading: &Fading) {
-        for (own, fade) in self.fading_cells.iter().zip(&fading.cells) {
-            self.cut.put_fade(own.run, own.number, fade);
+        self.fading_mark = fading.mark();
+        let Self { rows, slots, values, cut, fading_cells, cells, .. } = self;
+        for row in rows.iter_mut() {
+            row.fading = false;
+        }
+        let mut put = |number: u32, fade: Option<&CellFade>| match slots[number as usize] {
+            Slot::Row { row, cell } => {
+                rows[row as usize].fading |= fade.is_some();
+                values.put_fade(cell, fade);
+            }
+            Slot::Cut { run, number } => cut.put_fade(run as usize, number as usize, fade),
+        };
+        for &number in fading_cells.iter() {
+            if fading.of_cell(cells[number as usize]).is_none() {
+                put(number, None);
+            }
+        }
+        fading_cells.clear();
+        let mut number = 0;
+        for fade in fading.cells() {
+            while cells.get(number).is_some_and(|&cell| cell < fade.cell) {
+                number += 1;
+            }
+            if cells.get(number) == Some(&fade.cell) {
+                put(number as u32, Some(fade));
+                fading_cells.push(number as u32);
+            }
         }
         for &tet in &self.fading_tets {
             if fading.of_tet(tet).is_none() {
@@ -79,7 +107,7 @@ impl RunningPatch {
             }
         }
         self.fading_tets.clear();
-        for fade in &fading.tets {
+        for fade in fading.tets() {
             self.fading_tets.push(fade.tet);
             self.share_kernel.put_fade(fade.tet as usize, Some(fade));
         }

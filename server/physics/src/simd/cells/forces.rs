@@ -1,12 +1,13 @@
 //! The pass over cut cells: gather, stress, scatter.
-use super::{CutBlock, FadeBlock, Split};
+use super::{CutBlock, FadeBlock};
 use crate::{
     hybrid::cell::MODE_WEIGHTS,
     simd::{
         block::{Lanes, Node, Sum},
-        cell_stress::{faded_stress, load_matrix, stress},
+        cell_stress::{load_matrix, stress},
         dispatch::Pass,
-        laws::{LaneLaw, plus},
+        fades::{Split, add_lanes, fading_stress, scaled},
+        laws::LaneLaw,
         real::{Scalar, Vector},
         tangents::LaneTangent,
     },
@@ -22,11 +23,15 @@ type Corners<T, const N: usize> = [Lanes<T, N>; 3];
 pub(super) struct CutForces<'a, T, const N: usize> {
     pub(super) split: &'a Split<T>,
     pub(super) blocks: &'a [CutBlock<T, N>],
-    /// As many, or none.
+    /// As many.
     pub(super) fades: &'a [FadeBlock<T, N>],
     pub(super) displacements: &'a [Node],
     pub(super) velocities: &'a [Node],
     pub(super) sums: &'a mut [Sum],
+    /// What is left of what fades.
+    pub(super) left: f64,
+    /// `s ∂U/∂s` (J), added to.
+    pub(super) fading_j: f64,
 }
 
 impl<T: Scalar, const N: usize> Pass<T> for CutForces<'_, T, N> {
@@ -45,8 +50,9 @@ impl<T: Scalar, const N: usize> Pass<T> for CutForces<'_, T, N> {
             }
             for (index, block) in batch.iter().enumerate() {
                 let (of, forces) = ([&edges[index], &rates[index]], &mut forces[index]);
-                let fade = self.fades.get(number * BATCH + index);
-                power_w += cut::<V, T, L, VISCOUS, N>(self.split, (block, fade), of, forces);
+                let fade = Some(&self.fades[number * BATCH + index]).filter(|fade| fade.lanes != 0);
+                let fading = fade.map(|fade| (fade, self.left, &mut self.fading_j));
+                power_w += cut::<V, T, L, VISCOUS, N>(self.split, (block, fading), of, forces);
             }
             for (block, forces) in batch.iter().zip(&forces) {
                 scatter(&block.points, forces, self.sums);
@@ -76,7 +82,7 @@ fn store<V: Vector, const N: usize>(values: &[V; 7], corners: &mut Corners<V::Sc
 #[inline(always)]
 fn cut<V: Vector<Scalar = T>, T: Scalar, L: LaneLaw, const VISCOUS: bool, const N: usize>(
     split: &Split<T>,
-    (block, fade): (&CutBlock<T, N>, Option<&FadeBlock<T, N>>),
+    (block, mut fading): (&CutBlock<T, N>, Option<(&FadeBlock<T, N>, f64, &mut f64)>),
     [edges, rates]: [&Corners<T, N>; 2],
     forces: &mut Corners<T, N>,
 ) -> f64 {
@@ -97,17 +103,22 @@ fn cut<V: Vector<Scalar = T>, T: Scalar, L: LaneLaw, const VISCOUS: bool, const 
         };
         let h = gradient(edges);
         let h_dot = if VISCOUS { gradient(rates) } else { h };
-        let mut minus_kappa = V::load(&block.minus_kappa[first..]);
-        let (p, density) = if let Some(fade) = fade {
-            minus_kappa = minus_kappa * V::load(&fade.modes[first..]);
-            let of_shape = (&split.shape, &load_matrix::<V, N>(&fade.shape, first));
-            let of_volume = (&split.volume, &load_matrix::<V, N>(&fade.volume, first));
-            let (shape, density) = faded_stress::<V, T, L, VISCOUS>(of_shape, &h, &h_dot);
-            let volume = faded_stress::<V, T, L, false>(of_volume, &h, &h).0;
-            (plus(&shape, &volume), density)
+        let whole = V::load(&block.minus_kappa[first..]);
+        let mut gone = V::of(0.0);
+        let mut faded = V::of(0.0);
+        let (p, density) = if let Some((fade, left, _)) = &fading {
+            let left = V::of(*left);
+            gone = V::load(&fade.entries[18][first..]) * left;
+            let of_shape = scaled(&load_matrix::<V, N>(&fade.entries[..9], first), left);
+            let of_volume = scaled(&load_matrix::<V, N>(&fade.entries[9..18], first), left);
+            let (p, density, along) = fading_stress::<V, T, L, VISCOUS>(split, &[of_shape, of_volume], &h, &h_dot);
+            faded = V::of(0.0) - along * V::load(&block.minus_volume[first..]);
+            (p, density)
         } else {
             stress::<V, T, L, VISCOUS>(&split.whole, &h, &h_dot)
         };
+        let minus_kappa = whole * (V::of(1.0) - gone);
+        let half_gone = whole * gone * V::of(0.5);
         let minus_volume = V::load(&block.minus_volume[first..]);
         if VISCOUS {
             (V::of(0.0) - density * minus_volume).store(&mut power[first..]);
@@ -125,12 +136,17 @@ fn cut<V: Vector<Scalar = T>, T: Scalar, L: LaneLaw, const VISCOUS: bool, const 
                 for point in 0..7 {
                     q = q + a[point] * gamma(point);
                 }
+                // s ∂U/∂s = V P̃ : F A − ½ κ a Σ w |q|²
+                faded = faded + q * q * half_gone * V::of(MODE_WEIGHTS[mode]);
                 let q = q * minus_kappa * V::of(MODE_WEIGHTS[mode]);
                 for point in 0..7 {
                     f[point] = f[point] + q * gamma(point);
                 }
             }
             store(&f, forces, axis, first);
+        }
+        if let Some((_, _, sum)) = &mut fading {
+            add_lanes(faded, sum);
         }
     }
     power.iter().fold(0.0, |sum, &p| sum + p.into())

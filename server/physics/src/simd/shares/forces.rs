@@ -6,6 +6,7 @@ use crate::{
         block::{Lanes, Node, Sum},
         cell_stress::{faded_stress, load_matrix, stress},
         dispatch::Pass,
+        fades::{add_lanes, scaled},
         laws::{LaneLaw, M3, plus},
         real::{Scalar, Vector},
         tangents::LaneTangent,
@@ -22,6 +23,10 @@ pub(super) struct ShareForces<'a, T, const N: usize> {
     pub(super) displacements: &'a [Node],
     pub(super) velocities: &'a [Node],
     pub(super) sums: &'a mut [Sum],
+    /// What is left of what fades.
+    pub(super) left: f64,
+    /// `s ∂U/∂s` (J), added to.
+    pub(super) fading_j: f64,
 }
 
 impl<T: Scalar, const N: usize> Pass<T> for ShareForces<'_, T, N> {
@@ -68,17 +73,27 @@ impl<T: Scalar, const N: usize> ShareForces<'_, T, N> {
         }
         let fading = block.fading > 0;
         let (of_shape, of_volume) = (&self.run.of_shape, &self.run.of_volume);
+        let mut faded = V::of(0.0);
+        let left = V::of(self.left);
         let pressure = if fading {
-            let a = load_matrix::<V, N>(&block.fades[PARTS], first);
-            faded_stress::<V, T, L, false>((of_volume, &a), &mean, &mean).0
+            let a = scaled(&load_matrix::<V, N>(&block.fades[PARTS], first), left);
+            let (p, _, along) = faded_stress::<V, T, L, false>((of_volume, &a), &mean, &mean);
+            let mut volume = V::of(0.0);
+            for part in 0..PARTS {
+                volume = volume + V::load(&block.volume[part][first..]);
+            }
+            faded = along * volume;
+            p
         } else {
             stress::<V, T, L, false>(of_volume, &mean, &mean).0
         };
         for part in 0..PARTS {
             let h_dot = if VISCOUS { gradient::<V, N>(block, part, self.rates, first) } else { zero };
             let (p, density) = if fading {
-                let a = load_matrix::<V, N>(&block.fades[part], first);
-                faded_stress::<V, T, L, VISCOUS>((of_shape, &a), &strains[part], &h_dot)
+                let a = scaled(&load_matrix::<V, N>(&block.fades[part], first), left);
+                let (p, density, along) = faded_stress::<V, T, L, VISCOUS>((of_shape, &a), &strains[part], &h_dot);
+                faded = faded + along * V::load(&block.volume[part][first..]);
+                (p, density)
             } else {
                 stress::<V, T, L, VISCOUS>(of_shape, &strains[part], &h_dot)
             };
@@ -97,6 +112,9 @@ impl<T: Scalar, const N: usize> ShareForces<'_, T, N> {
                 let sum = V::load(&power[first..]) + density * V::load(&block.volume[part][first..]);
                 sum.store(&mut power[first..]);
             }
+        }
+        if fading {
+            add_lanes(faded, &mut self.fading_j);
         }
     }
 }
