@@ -87,6 +87,10 @@ pub enum ViewError {
         /// Endings that work.
         known: &'static str,
     },
+    /// Particles are wanted of a body of tets.
+    #[error("the body of \"{0}\" has no particles")]
+    #[diagnostic(help("particles are written of hybrid bodies only: those whose scene has [body.particles]"))]
+    NoParticles(String),
     /// No scene to load.
     #[error("no scene \"{scene}\": {known}")]
     NoScene {

@@ -5,7 +5,7 @@ use crate::{
     surface::{Surface, Watcher, magnitude},
 };
 use clap::Args;
-use palpate_proto::v1::LevelOfDetail;
+use palpate_proto::v1::WatchRequest;
 use std::time::Duration;
 
 /// The moment wanted.
@@ -25,12 +25,13 @@ fn parse_positive(text: &str) -> Result<f64, String> {
 }
 
 impl Moment {
-    /// The surface at that moment.
+    /// The surface at that moment, its last update with active particles if they are asked for.
     ///
     /// # Errors
     /// An unreachable daemon, a broken stream, or [`ViewError::NotPressed`].
-    pub async fn surface(&self, server: &Server) -> Result<Surface, ViewError> {
-        let mut watcher = Watcher::start(server.connect().await?, 0.0, LevelOfDetail::Full).await?;
+    pub async fn surface(&self, server: &Server, active_particles: bool) -> Result<Surface, ViewError> {
+        let request = WatchRequest { active_particles, ..Default::default() };
+        let mut watcher = Watcher::ask(server.connect().await?, request).await?;
         self.wait(&mut watcher).await
     }
 

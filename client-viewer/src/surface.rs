@@ -78,7 +78,16 @@ impl Watcher {
     /// # Errors
     /// The daemon's refusal, among them a rate that it does not give.
     pub async fn start(channel: Channel, max_rate_hz: f64, detail: LevelOfDetail) -> Result<Self, ViewError> {
-        let request = WatchRequest { session_id: String::new(), max_rate_hz, level_of_detail: detail as i32 };
+        let level_of_detail = detail as i32;
+        Self::ask(channel, WatchRequest { max_rate_hz, level_of_detail, ..Default::default() }).await
+    }
+
+    /// Starts to watch what is asked for.
+    ///
+    /// # Errors
+    /// The daemon's refusal, among them a rate that it does not give.
+    pub async fn ask(channel: Channel, request: WatchRequest) -> Result<Self, ViewError> {
+        let max_rate_hz = request.max_rate_hz;
         let stream = SurfaceClient::new(channel).watch(request).await?.into_inner();
         // The daemon has taken the rate: 0 (its own) or up to 240 Hz.
         let period_s = if max_rate_hz > 0.0 { 1.0 / max_rate_hz } else { 0.0 };

@@ -1,10 +1,12 @@
-//! `export`: the deformed surface as a file for other programs. One file per format.
+//! `export`: the deformed surface, or the active particles, as a file for other programs. One file per format.
 mod obj;
 mod ply;
+mod points;
 mod vtu;
 
 use crate::{ViewError, cli, connect::Server, moment::Moment, surface::Surface};
 use clap::Args;
+use glam::DVec3;
 use std::path::{Path, PathBuf};
 
 /// Arguments of `export`.
@@ -15,6 +17,9 @@ pub struct ExportArguments {
     /// Replace the file if it exists
     #[arg(long)]
     force: bool,
+    /// Write the active particles of a hybrid body as points, in place of the surface (.vtu, .ply)
+    #[arg(long)]
+    particles: bool,
     #[command(flatten)]
     moment: Moment,
 }
@@ -24,8 +29,11 @@ pub struct ExportArguments {
 /// # Errors
 /// An unknown ending, an unreachable daemon, or a file that cannot be written.
 pub async fn run(server: &Server, arguments: &ExportArguments) -> Result<(), ViewError> {
+    if arguments.particles {
+        return run_particles(server, arguments).await;
+    }
     let write = writer_for(&arguments.file)?;
-    let surface = arguments.moment.surface(server).await?;
+    let surface = arguments.moment.surface(server, false).await?;
     cli::write_new(&arguments.file, write(&surface).as_bytes(), arguments.force)?;
     cli::say(&format!(
         "{}: {} vertices, {} triangles at tick {}",
@@ -36,8 +44,35 @@ pub async fn run(server: &Server, arguments: &ExportArguments) -> Result<(), Vie
     ))
 }
 
+async fn run_particles(server: &Server, arguments: &ExportArguments) -> Result<(), ViewError> {
+    let write = particle_writer_for(&arguments.file)?;
+    let surface = arguments.moment.surface(server, true).await?;
+    if surface.header.particle_spacing_m == 0.0 {
+        return Err(ViewError::NoParticles(surface.header.scene_name));
+    }
+    let positions_m = points::positions_m(&surface)?;
+    cli::write_new(&arguments.file, write(&surface, &positions_m).as_bytes(), arguments.force)?;
+    let (file, count, tick) = (arguments.file.display(), positions_m.len(), surface.last.tick);
+    cli::say(&format!("{file}: {count} active particles at tick {tick}"))
+}
+
+fn ending(path: &Path) -> Option<String> {
+    path.extension().and_then(|e| e.to_str()).map(str::to_ascii_lowercase)
+}
+
+/// The text of a file with points at these positions (m).
+type ParticleWriter = fn(&Surface, &[DVec3]) -> String;
+
+fn particle_writer_for(path: &Path) -> Result<ParticleWriter, ViewError> {
+    match ending(path).as_deref() {
+        Some("vtu") => Ok(points::to_vtu),
+        Some("ply") => Ok(points::to_ply),
+        _ => Err(ViewError::Ending { path: path.into(), known: ".vtu and .ply for particles" }),
+    }
+}
+
 fn writer_for(path: &Path) -> Result<fn(&Surface) -> String, ViewError> {
-    match path.extension().and_then(|e| e.to_str()).map(str::to_ascii_lowercase).as_deref() {
+    match ending(path).as_deref() {
         Some("vtu") => Ok(vtu::to_text),
         Some("obj") => Ok(obj::to_text),
         Some("ply") => Ok(ply::to_text),
@@ -82,7 +117,33 @@ mod tests {
     }
 
     #[test]
+    fn particles_are_written_as_points() {
+        let mut surface = surface();
+        let positions_u16le = [0_u16, 1, 2, 4, 0, 0].iter().flat_map(|n| n.to_le_bytes()).collect::<Vec<u8>>();
+        let corner_m = Some(palpate_proto::v1::Vec3 { x: -1.0, y: 0.0, z: 0.5 });
+        let particles = |bytes: &[u8]| palpate_proto::v1::ActiveParticles {
+            corner_m,
+            quantum_m: 0.25,
+            positions_u16le: bytes.to_vec().into(),
+        };
+        assert!(points::positions_m(&surface).unwrap().is_empty());
+        surface.last.active_particles = Some(particles(&positions_u16le));
+        let positions_m = points::positions_m(&surface).unwrap();
+        assert_eq!(positions_m, [DVec3::new(-1.0, 0.25, 1.0), DVec3::new(0.0, 0.0, 0.5)]);
+        let ply = points::to_ply(&surface, &positions_m);
+        assert!(ply.contains("element vertex 2\n") && ply.ends_with("\n0.0000000 0.0000000 0.5000000\n"), "{ply}");
+        let vtu = points::to_vtu(&surface, &positions_m);
+        assert!(
+            vtu.contains("NumberOfPoints=\"2\" NumberOfCells=\"2\"") && vtu.contains(">\n1\n2\n</DataArray>"),
+            "{vtu}"
+        );
+        surface.last.active_particles = Some(particles(&positions_u16le[..7]));
+        assert!(points::positions_m(&surface).is_err());
+    }
+
+    #[test]
     fn unknown_endings_are_refused() {
+        assert!(particle_writer_for(Path::new("awake.obj")).is_err());
         assert!(writer_for(Path::new("dent.docx")).is_err());
         assert!(writer_for(Path::new("dent.VTU")).is_ok());
     }

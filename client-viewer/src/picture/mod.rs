@@ -80,7 +80,7 @@ pub async fn run(server: &Server, arguments: &SnapshotArguments) -> Result<(), V
     if !arguments.file.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("png")) {
         return Err(ViewError::Ending { path: arguments.file.clone(), known: ".png" });
     }
-    let surface = arguments.moment.surface(server).await?;
+    let surface = arguments.moment.surface(server, false).await?;
     let scale = Scale::of(&surface, arguments.full_scale_mm.map(|mm| mm * 1e-3));
     let canvas = draw(&surface, arguments.size, arguments.from, scale);
     cli::write_new(&arguments.file, &encode(&canvas)?, arguments.force)?;

@@ -2,6 +2,7 @@
 import { ScaleRange, gradient } from "./colour";
 import { watchForever } from "./connection";
 import { delayText } from "./delay";
+import { positionsOf } from "./particles";
 import { ForcePlot } from "./plot";
 import { Stage } from "./stage";
 import { KeyframeAssembler, type Surface } from "./surface";
@@ -30,8 +31,11 @@ const STANDS_MS = 1000;
 let movedAt = 0;
 const arrivals: number[] = [];
 
-watchForever(
-  (event) => {
+const particlesBox = element<HTMLInputElement>("particles");
+
+const askAnew = watchForever({
+  request: () => ({ maxRateHz: 60, activeParticles: particlesBox.checked }),
+  onEvent: (event) => {
     if (event.message.case === "keyframe") {
       const complete = assembler.push(event.message.value);
       if (complete) begin(complete);
@@ -39,7 +43,7 @@ watchForever(
       take(event.message.value);
     }
   },
-  ({ state, text }) => {
+  onState: ({ state, text }) => {
     element("connection").dataset["state"] = state;
     write("connection", text);
     if (state === "live") return;
@@ -48,8 +52,9 @@ watchForever(
     arrivals.length = 0;
     for (const id of ["rate", "delay"]) write(id, "–");
     showFault("");
+    layOutParticles();
   },
-);
+});
 
 /** The stage; without WebGL the numbers and the plot go on. */
 function makeStage(): Stage | undefined {
@@ -63,6 +68,8 @@ function makeStage(): Stage | undefined {
 }
 
 function begin(complete: Surface): void {
+  // Asked anew, the daemon tells what is known; the first update moves every vertex.
+  if (surface?.header.sessionId === complete.header.sessionId && surface.epoch === complete.epoch) return;
   if (surface?.header.sessionId !== complete.header.sessionId) {
     trace.clear();
     legend = new ScaleRange(1e-4);
@@ -73,6 +80,7 @@ function begin(complete: Surface): void {
   newest = undefined;
   stage?.show(complete);
   stage?.refresh(legend.top);
+  layOutParticles();
   document.title = `${complete.header.sceneName} – Palpate`;
   write("scene-name", complete.header.sceneName);
   write("mesh", `${complete.header.vertexCount} vertices, ${complete.header.triangleCount} faces`);
@@ -127,6 +135,22 @@ function showFault(quarantine: string): void {
   write("fault-text", quarantine);
 }
 
+/** The layer of particles as the body allows and the box says; their count comes with the next update. */
+function layOutParticles(): void {
+  const none = surface?.header.particleSpacingM === 0;
+  particlesBox.disabled = none;
+  const on = particlesBox.checked && !none;
+  stage?.setParticles(on);
+  write("particle-count", none ? ": none in this body" : on ? ": –" : "");
+}
+
+function showParticles({ activeParticles }: SurfaceUpdate): void {
+  if (!activeParticles || !surface || !particlesBox.checked) return;
+  const positions = positionsOf(activeParticles);
+  stage?.moveParticles(positions, surface.header.particleSpacingM);
+  write("particle-count", `: ${positions.length / 3}`);
+}
+
 let drawn: SurfaceUpdate | undefined;
 function frame(): void {
   if (newest && newest !== drawn) {
@@ -137,6 +161,7 @@ function frame(): void {
     if (legend.update(newest.maxDisplacementM, now) || rescaled) drawLegend();
     stage?.refresh(legend.top);
     stage?.moveTools(newest.tools, arrow.top);
+    showParticles(newest);
     numbers(newest);
     plot.draw();
   }
@@ -146,6 +171,10 @@ function frame(): void {
 
 element<HTMLInputElement>("wireframe").addEventListener("change", (e) => stage?.setEdges((e.target as HTMLInputElement).checked));
 element<HTMLInputElement>("ghost").addEventListener("change", (e) => stage?.setGhost((e.target as HTMLInputElement).checked));
+particlesBox.addEventListener("change", () => {
+  layOutParticles();
+  askAnew();
+});
 element("recentre").addEventListener("click", () => stage?.recentre());
 element("legend-bar").style.background = `linear-gradient(to top, ${gradient()})`;
 // For the browser's tests, and for whoever looks under the page.

@@ -2,6 +2,7 @@
 import * as THREE from "three";
 import { OrbitControls } from "three/addons/controls/OrbitControls.js";
 import { Arrow } from "./arrow";
+import { Cloud } from "./cloud";
 import { colourOf } from "./colour";
 import type { Surface } from "./surface";
 import type { ToolState, Vec3 } from "./wire";
@@ -10,6 +11,9 @@ const vector = (v: Vec3 | undefined) => new THREE.Vector3(v?.x ?? 0, v?.y ?? 0, 
 
 /** Length of the longest arrow, in sizes of the body. */
 const LONGEST_ARROW = 0.25;
+
+/** Of the surface while what is in it shall be seen. */
+const TRANSLUCENT = 0.3;
 
 /** Three circles around the origin, one in each plane. */
 function rings(radius: number): THREE.BufferGeometry {
@@ -54,6 +58,7 @@ export class Stage {
   private surface: Surface | undefined;
   private ghostMesh: THREE.Mesh | undefined;
   private edgeMesh: THREE.Mesh | undefined;
+  private readonly particles = new Cloud(0xd4f23c);
   private tools: ToolView[] = [];
   private size = 0.05;
   private dirty = true;
@@ -66,7 +71,8 @@ export class Stage {
     sun.position.set(-0.5, 0.7, 1);
     // The lamp moves with the eye, so that a dent is shaded from wherever one looks.
     this.camera.add(sun);
-    this.scene.add(this.camera, this.body);
+    this.particles.visible = false;
+    this.scene.add(this.camera, this.body, this.particles);
     this.renderer.domElement.addEventListener("webglcontextrestored", () => (this.dirty = true));
     host.append(this.renderer.domElement);
     this.camera.up.set(0, 0, 1);
@@ -112,6 +118,24 @@ export class Stage {
 
   setGhost(on: boolean): void {
     this.ghost.visible = on;
+    this.dirty = true;
+  }
+
+  /** Draws active particles, and the surface so that they are seen through it. */
+  setParticles(on: boolean): void {
+    if (this.particles.visible === on) return;
+    this.particles.visible = on;
+    this.particles.move(new Float32Array(), 0);
+    this.material.transparent = on;
+    this.material.opacity = on ? TRANSLUCENT : 1;
+    this.material.depthWrite = !on;
+    this.material.needsUpdate = true;
+    this.dirty = true;
+  }
+
+  /** Takes over positions (m) of active particles, `spacing` (m) apart at rest. */
+  moveParticles(positions: Float32Array, spacing: number): void {
+    this.particles.move(positions, spacing);
     this.dirty = true;
   }
 

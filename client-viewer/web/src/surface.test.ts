@@ -2,7 +2,7 @@ import { describe, expect, it } from "vitest";
 import { KeyframeAssembler, Surface } from "./surface";
 import type { KeyframeChunk, KeyframeHeader, SurfaceUpdate } from "./wire";
 
-const header: KeyframeHeader = { sessionId: "s", sceneName: "t", vertexCount: 3, triangleCount: 1, tickPeriodS: 1e-3, tools: [] };
+const header: KeyframeHeader = { sessionId: "s", sceneName: "t", vertexCount: 3, triangleCount: 1, tickPeriodS: 1e-3, tools: [], particleSpacingM: 0 };
 const rest = new Float32Array([0, 0, 0, 1, 0, 0, 0, 1, 0]);
 const bytes = (array: ArrayBufferView) => new Uint8Array(array.buffer);
 const chunk = (n: number, of: number, part: Partial<KeyframeChunk>): KeyframeChunk => ({

@@ -15,6 +15,8 @@ export interface KeyframeHeader {
   boundsMinM?: Vec3;
   boundsMaxM?: Vec3;
   tools: { name: string; radiusM: number }[];
+  /** 0: the body has no particles. */
+  particleSpacingM: number;
 }
 
 export interface KeyframeChunk {
@@ -47,7 +49,17 @@ export interface SurfaceUpdate {
   tickCostUs: number;
   maxDisplacementM: number;
   quarantine: string;
+  activeParticles?: ActiveParticles;
 }
+
+export interface ActiveParticles {
+  cornerM?: Vec3;
+  quantumM: number;
+  positionsU16le: Uint8Array;
+}
+
+/** What the page asks of `Watch`. */
+export interface WatchRequest { maxRateHz: number; activeParticles: boolean }
 
 export interface SurfaceEvent {
   message: { case: "keyframe"; value: KeyframeChunk } | { case: "update"; value: SurfaceUpdate } | { case: undefined };

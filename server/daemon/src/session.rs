@@ -183,8 +183,8 @@ impl ActiveSession {
             mass_kg: model.mass_kg().iter().sum(),
             max_natural_frequency_rad_per_s: model.max_natural_frequency_rad_per_s(),
             tool_names: self.tools.iter().map(|tool| tool.name.clone()).collect(),
-            particle_count: model.hybrid().map_or(0, |hybrid| hybrid.partition().particle_count() as u32),
-            most_active_particles: most_active(model) as u32,
+            particle_count: model.particle_count() as u32,
+            most_active_particles: model.most_awake_particles() as u32,
         }
     }
 }
@@ -268,7 +268,7 @@ pub fn prepare(
     if period_s > LONGEST_PERIOD_S {
         return Err(PrepareError::TooSlow { period_s });
     }
-    let (tets, active, substeps) = (model.mesh().tets().len(), most_active(&model), model.substeps());
+    let (tets, active, substeps) = (model.mesh().tets().len(), model.most_awake_particles(), model.substeps());
     // A particle costs about what a tet does.
     if (tets + active) as u64 * u64::from(substeps) > MOST_TET_UPDATES {
         let work = if active > 0 { format!("{tets} tets and {active} particles") } else { format!("{tets} tets") };
@@ -308,11 +308,6 @@ pub fn prepare(
     Ok(Prepared { simulation, session: Arc::new(session), surface: ends.surface })
 }
 
-/// Most particles awake at once; 0 of a body of tets.
-fn most_active(model: &Model) -> usize {
-    model.spec().particles.as_ref().map_or(0, |particles| particles.most_active)
-}
-
 /// Measures some ticks of the body at rest, all particles awake that may be at once, and says so when they do not fit their period.
 fn too_heavy(model: &Model) -> Option<String> {
     let cost_s = median_tick_s(model);
@@ -349,6 +344,9 @@ fn median_tick_s(model: &Model) -> f64 {
         if model.hybrid().is_some() {
             // At other ticks than every tenth nobody looks which particles are to be awake.
             state.tick = 1;
+        }
+        if let (Some(motion), Some(seed)) = (&mut state.seed, model.seed()) {
+            motion.touched = seed.largest_region();
         }
         let before = Instant::now();
         step(model, &mut state, &mut scratch, &input);

@@ -44,7 +44,7 @@ pub fn of(daemon: &Daemon, session: &ActiveSession, copy: &Copy, done: &Done) ->
         repeated_ticks: daemon.timing.repeated_ticks(),
         substeps_now: copy.state.pace.substeps,
         asleep: copy.state.sleep.asleep,
-        active_particles: copy.state.active.len() as u32,
+        active_particles: copy.state.awake_particles() as u32,
     }
 }
 

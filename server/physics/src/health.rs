@@ -1,6 +1,7 @@
 //! Energy ledger, inversion, and quarantine of non-finite state.
 use crate::{
     contact::{ContactState, ToolState},
+    seed::SeedMotion,
     world::{Model, State},
 };
 use glam::DVec3;
@@ -58,10 +59,19 @@ pub struct Energies {
 }
 
 impl Energies {
-    /// Kinetic, elastic and gravitational energy now (O(tets)), beside the ledger's work and dissipation.
+    /// Kinetic, elastic and gravitational energy now (O(tets)), beside the ledger's work and dissipation. Of a seed body the elastic energy is
+    /// its core's, for its particles and links have none that is known, and so is no dissipation.
     pub fn of(model: &Model, state: &State) -> Self {
         if let Some(hybrid) = model.hybrid() {
             return hybrid.energies(model.gravity_m_per_s2(), state);
+        }
+        if let (Some(seed), Some(motion)) = (model.seed(), &state.seed) {
+            return Self {
+                kinetic_j: seed.kinetic_energy_j(&motion.now),
+                elastic_j: elastic_energy_j(model, state),
+                external_work_j: state.ledger.external_work_j,
+                ..Self::default()
+            };
         }
         let kinetic_j = (0..state.x.len()).map(|i| 0.5 * model.mass_kg()[i] * state.v[i].length_squared()).sum();
         let along_gravity = |i: usize| model.gravity_m_per_s2().dot(state.x[i] - model.rest_positions_m()[i]);
@@ -125,7 +135,7 @@ pub struct Quarantine {
 }
 
 impl Quarantine {
-    /// In place of a node: a tool, a load's work or a sum was not finite.
+    /// In place of a node: a tool, a load's work, a sum or a seed body's particle was not finite.
     pub const NOT_A_NODE: u32 = u32::MAX;
 }
 
@@ -140,12 +150,14 @@ pub(crate) struct LastGood {
     load_factors: Vec<f64>,
     ledger: Ledger,
     viscous: ViscousPower,
+    seed: Option<SeedMotion>,
 }
 
 impl LastGood {
     pub(crate) fn new(model: &Model) -> Self {
-        let State { x, v, force_is_current, contact, tools, load_factors, ledger, viscous, .. } = State::at_rest(model);
-        Self { x, v, force_is_current, contact, tools, load_factors, ledger, viscous }
+        let State { x, v, force_is_current, contact, tools, load_factors, ledger, viscous, seed, .. } =
+            State::at_rest(model);
+        Self { x, v, force_is_current, contact, tools, load_factors, ledger, viscous, seed }
     }
 
     /// Copies what quarantine goes back to. Allocates nothing.
@@ -154,6 +166,9 @@ impl LastGood {
         self.tools.clone_from_slice(&state.tools);
         self.load_factors.copy_from_slice(&state.load_factors);
         (self.ledger, self.viscous) = (state.ledger, state.viscous);
+        if let (Some(own), Some(seed)) = (&mut self.seed, &state.seed) {
+            own.copy_from(seed);
+        }
     }
 
     /// Copies the rest of what a tick of leapfrog changes, but its forces, so that it can be repeated. Allocates nothing.
@@ -195,13 +210,18 @@ impl LastGood {
         state.tools.clone_from_slice(&self.tools);
         state.load_factors.copy_from_slice(&self.load_factors);
         (state.ledger, state.viscous) = (self.ledger, self.viscous);
+        if let (Some(seed), Some(own)) = (&mut state.seed, &self.seed) {
+            seed.copy_from(own);
+        }
     }
 }
 
 impl std::fmt::Display for Quarantine {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self.node {
-            Self::NOT_A_NODE => write!(f, "tick {} was refused: a tool or a sum became non-finite", self.tick),
+            Self::NOT_A_NODE => {
+                write!(f, "tick {} was refused: a tool, a sum or a particle became non-finite", self.tick)
+            }
             node => write!(f, "tick {} was refused: node {node} became non-finite", self.tick),
         }
     }
@@ -213,7 +233,8 @@ pub fn first_non_finite(state: &State) -> Option<u32> {
     let sum: DVec3 = state.x.iter().zip(&state.v).map(|(x, v)| *x + *v).sum();
     let tools: DVec3 = state.tools.iter().map(|tool| tool.centre_m + tool.velocity_m_per_s + tool.device_force_n).sum();
     let work = state.ledger.external_work_j + state.ledger.dissipated_j;
-    if sum.is_finite() && tools.is_finite() && work.is_finite() {
+    let particles_are_finite = state.seed.as_ref().is_none_or(SeedMotion::particles_are_finite);
+    if sum.is_finite() && tools.is_finite() && work.is_finite() && particles_are_finite {
         return None;
     }
     let node = state.x.iter().zip(&state.v).position(|(x, v)| !x.is_finite() || !v.is_finite());

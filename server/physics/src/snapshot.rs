@@ -4,6 +4,7 @@
 //! (postcard). A state goes back only into the body it came from: same mesh, materials, loads, tools and settings.
 use crate::{
     contact::ToolState,
+    seed::SeedMotion,
     world::{Model, ModelSpec, State},
 };
 use std::fmt::Write;
@@ -95,7 +96,11 @@ fn check(model: &Model, state: &State) -> Result<(), SnapshotError> {
         && state.tools.len() == model.spec().tools.len()
         && state.load_factors.len() == model.spec().loads.len()
         && state.pace.fits(model, nodes)
-        && state.sleep.fits(model);
+        && state.sleep.fits(model)
+        && match (&state.seed, model.seed()) {
+            (Some(motion), Some(seed)) => motion.fits(seed, &state.x, &state.v),
+            (motion, seed) => motion.is_none() && seed.is_none(),
+        };
     if !counts {
         return Err(SnapshotError::OtherBody);
     }
@@ -105,11 +110,13 @@ fn check(model: &Model, state: &State) -> Result<(), SnapshotError> {
 fn is_finite(state: &State) -> bool {
     let before = &state.pace.before;
     let held_m = &state.sleep.held_m;
+    let of_seed = || state.seed.iter().flat_map(SeedMotion::vectors);
     let vectors = [&state.x, &state.v, &state.force_n, &state.external_n, &before.total_n, &before.external_n, held_m];
     let (ledger, viscous) = (&state.ledger, &state.viscous);
     let sums = [ledger.external_work_j, ledger.dissipated_j, viscous.latest_w, viscous.before_w];
     vectors.iter().all(|list| list.iter().all(|a| a.is_finite()))
         && state.tools.iter().all(ToolState::is_finite)
+        && of_seed().all(|a| a.is_finite())
         && state.load_factors.iter().chain(&sums).all(|n| n.is_finite())
 }
 
@@ -125,11 +132,21 @@ fn fingerprint(model: &Model) -> u64 {
     let positions =
         model.rest_positions_m().iter().flat_map(glam::DVec3::to_array).flat_map(|c| c.to_bits().to_le_bytes());
     let tets = model.mesh().tets().iter().flatten().flat_map(|n| n.to_le_bytes());
-    let ModelSpec { mesh: _, particles, regions, tet_region, prescribed, loads, gravity_m_per_s2, tools, settings } =
-        model.spec();
+    let ModelSpec {
+        mesh: _,
+        particles,
+        seed,
+        regions,
+        tet_region,
+        prescribed,
+        loads,
+        gravity_m_per_s2,
+        tools,
+        settings,
+    } = model.spec();
     let mut hash = Fnv(fnv(OFFSET, positions.chain(tets)));
     // A float prints as the shortest text that reads back to its bits. Writing to the hash cannot fail.
-    let rest = (particles, regions, tet_region, prescribed, loads, gravity_m_per_s2, tools, settings);
+    let rest = ((particles, seed), regions, tet_region, prescribed, loads, gravity_m_per_s2, tools, settings);
     let _ = write!(hash, "{rest:?}");
     hash.0
 }
@@ -150,9 +167,10 @@ fn fnv(start: u64, bytes: impl Iterator<Item = u8>) -> u64 {
     bytes.fold(start, |hash, byte| (hash ^ u64::from(byte)).wrapping_mul(0x0000_0100_0000_01b3))
 }
 
-/// FNV-1a over the bits of tick, positions and velocities: equal states give equal hashes on every machine.
+/// FNV-1a over the bits of tick, positions and velocities, a seed body's particles included: equal states give equal hashes on every machine.
 pub fn state_hash(state: &State) -> u64 {
-    let components = state.x.iter().chain(&state.v).flat_map(glam::DVec3::to_array);
+    let of_seed = state.seed.iter().flat_map(SeedMotion::vectors);
+    let components = state.x.iter().chain(&state.v).chain(of_seed).flat_map(glam::DVec3::to_array);
     fnv(OFFSET, state.tick.to_le_bytes().into_iter().chain(components.flat_map(|c| c.to_bits().to_le_bytes())))
 }
 
@@ -175,6 +193,7 @@ mod tests {
         Model::build(ModelSpec {
             mesh: TetMesh::new(p, vec![[0, 1, 2, 3]]).unwrap(),
             particles: None,
+            seed: None,
             regions: vec![Region { name: "all".into(), material, density_kg_per_m3: 1e3 }],
             tet_region: vec![0],
             prescribed: Vec::new(),

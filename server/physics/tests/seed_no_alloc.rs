@@ -1,50 +1,23 @@
 //! A step of the seeds' hybrid neither allocates nor frees, whatever is touched.
 #![allow(clippy::unwrap_used)]
+mod octahedra;
+mod rig;
 use assert_no_alloc::{AllocDisabler, assert_no_alloc};
 use glam::DVec3;
+use octahedra::{body_spec, core, device_m, layer, parameters};
 use palpate_physics::{
-    TetMesh,
-    seed::{AtVertex, LayerSpec, PaperModel, SeedContact, SeedModel, SeedParameters, SeedScratch, SeedSpec, SeedState},
+    PointForce, TickInput,
+    contact::ToolTarget,
+    seed::{AtVertex, SeedContact, SeedModel, SeedScratch, SeedSpec, SeedState},
 };
+use rig::Rig;
 
 #[global_allocator]
 static ALLOCATOR: AllocDisabler = AllocDisabler;
 
-/// Corners of an octahedron of radius 1, x, −x, y, −y, z, −z, and its triangles seen from outside.
-const CORNERS: [DVec3; 6] = [DVec3::X, DVec3::NEG_X, DVec3::Y, DVec3::NEG_Y, DVec3::Z, DVec3::NEG_Z];
-const FACES: [[u32; 3]; 8] = [[0, 2, 4], [2, 1, 4], [1, 3, 4], [3, 0, 4], [2, 0, 5], [1, 2, 5], [3, 1, 5], [0, 3, 5]];
-
-/// The wall between two octahedra, three tets a side.
-fn core(inner_m: f64, outer_m: f64) -> TetMesh {
-    let positions: Vec<DVec3> =
-        CORNERS.iter().map(|c| *c * inner_m).chain(CORNERS.iter().map(|c| *c * outer_m)).collect();
-    let mut tets = Vec::new();
-    for mut face in FACES {
-        face.sort_unstable();
-        let [a, b, c] = face;
-        for mut tet in [[a, b, c, c + 6], [a, b, b + 6, c + 6], [a, a + 6, b + 6, c + 6]] {
-            let [p, q, r, s] = tet.map(|n| positions[n as usize]);
-            if (q - p).cross(r - p).dot(s - p) < 0.0 {
-                tet.swap(2, 3);
-            }
-            tets.push(tet);
-        }
-    }
-    TetMesh::new(positions, tets).unwrap()
-}
-
 #[test]
 fn a_step_does_not_allocate() {
-    let spec = SeedSpec {
-        core: core(0.01, 0.02),
-        held_nodes: vec![0],
-        layer: Some(LayerSpec {
-            skin_m: CORNERS.iter().map(|c| *c * 0.03).collect(),
-            skin_triangles: FACES.to_vec(),
-            particles: 2000,
-        }),
-        parameters: SeedParameters { first_neighbours: false, ..SeedParameters::paper_2006(PaperModel::Hybrid) },
-    };
+    let spec = SeedSpec { core: core(0.01, 0.02), held_nodes: vec![0], layer: Some(layer()), parameters: parameters() };
     for parameters in [spec.parameters, spec.parameters.as_printed()] {
         let model = SeedModel::build(SeedSpec { parameters, ..spec.clone() }).unwrap();
         let (mut state, mut scratch) = (SeedState::at_rest(&model), SeedScratch::new(&model));
@@ -62,4 +35,44 @@ fn a_step_does_not_allocate() {
         }
         assert!(touched > 1000);
     }
+}
+
+/// As a body of the loop: pressed, touched on another side and left, with inputs that are refused, quarantined and reset.
+#[test]
+fn a_tick_does_not_allocate() {
+    let mut rig = Rig::new(body_spec(0.02, Some(layer()), parameters()));
+    let first = rig.model.surface().nodes[0];
+    let mut saved = rig.state.clone();
+    let (mut awake, mut asleep, mut rejected, mut quarantined) = (0, 0, 0, 0);
+    assert_no_alloc(|| {
+        for tick in 0..400 {
+            let odd = tick % 97 == 0;
+            let blow = DVec3::X * if tick == 380 { 1e300 } else { 1e-6 };
+            let tools = [ToolTarget { position_m: device_m(tick), velocity_m_per_s: DVec3::ZERO }];
+            let forces = [
+                PointForce { node: first, force_n: if odd { DVec3::NAN } else { blow } },
+                // A node of the core, which nothing can push.
+                PointForce { node: 0, force_n: DVec3::X },
+            ];
+            let input = TickInput {
+                tools: if odd { &[] } else { &tools },
+                load_factors: &[],
+                prescribed_displacements_m: &[if odd { DVec3::X } else { DVec3::ZERO }],
+                point_forces: &forces[..if odd { 2 } else { 1 }],
+            };
+            let report = palpate_physics::step(&rig.model, &mut rig.state, &mut rig.scratch, &input);
+            rejected += report.inputs_rejected;
+            quarantined += u32::from(report.quarantined.is_some());
+            awake += u32::from(rig.state.awake_particles() > 0);
+            asleep += u32::from(rig.state.awake_particles() == 0);
+            if tick == 200 {
+                saved.copy_from(&rig.state);
+            }
+        }
+        rig.state.copy_from(&saved);
+        rig.state.reset(&rig.model);
+    });
+    // Four odd ticks before it blows up, in each of which the tools, the holder's displacement and both forces are refused.
+    assert_eq!((rejected, quarantined), (4 * 4, 1));
+    assert!(awake > 100 && asleep > 30, "{awake} {asleep}");
 }

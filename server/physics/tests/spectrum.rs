@@ -153,6 +153,7 @@ fn growth(fraction: f64, ticks: u32) -> f64 {
     let mesh = block([4, 3, 3], 5e-3, 0.15, &mut random);
     let spec = |tick_period_s: f64| ModelSpec {
         particles: None,
+        seed: None,
         regions: vec![Region {
             name: "body".into(),
             material: material(10e3, 0.45, Law::StableNeoHookean),

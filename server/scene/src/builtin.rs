@@ -8,7 +8,17 @@ macro_rules! scenes {
     };
 }
 
-scenes!("ventricle", "cantilever", "lame-sphere", "paper-2006", "hybrid-ventricle", "hybrid-block");
+scenes!(
+    "ventricle",
+    "cantilever",
+    "lame-sphere",
+    "paper-2006",
+    "hybrid-ventricle",
+    "hybrid-block",
+    "seed-ellipsoids",
+    "seed-full-fem",
+    "seed-hybrid"
+);
 
 /// Text of a built-in scene.
 pub fn builtin(name: &str) -> Option<&'static str> {

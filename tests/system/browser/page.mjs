@@ -1,14 +1,11 @@
 // Drives the page in headless Chromium against a real daemon.
 // Usage: node page.mjs PALPATED ARTEFACTS [CHROMIUM]
 // Each check prints a line; the first that fails ends the run with exit code 1.
-import assert from "node:assert/strict";
-import { spawn } from "node:child_process";
 import { mkdirSync } from "node:fs";
-import { createServer } from "node:net";
 import { join } from "node:path";
 import { setTimeout as sleep } from "node:timers/promises";
-import { chromium } from "playwright-core";
 import { PNG } from "pngjs";
+import { check, colours, freePort, launch, session, startDaemon, stopDaemon } from "./common.mjs";
 
 const [palpated, artefacts, executablePath = "/usr/bin/chromium"] = process.argv.slice(2);
 mkdirSync(artefacts, { recursive: true });
@@ -16,78 +13,18 @@ mkdirSync(artefacts, { recursive: true });
 const port = await freePort();
 const url = `http://127.0.0.1:${port}/`;
 
-async function freePort() {
-  const server = createServer();
-  await new Promise((resolve) => server.listen(0, "127.0.0.1", resolve));
-  const { port: free } = server.address();
-  await new Promise((resolve) => server.close(resolve));
-  return free;
-}
-
-async function startDaemon() {
-  const child = spawn(palpated, ["serve", "--listen", `127.0.0.1:${port}`], { stdio: ["ignore", "pipe", "pipe"] });
-  let output = "";
-  for (const stream of [child.stdout, child.stderr]) stream.on("data", (data) => (output += data));
-  for (let i = 0; i < 300; i++) {
-    assert.equal(child.exitCode, null, `palpated ended:\n${output}`);
-    try {
-      if ((await fetch(url)).ok) return child;
-    } catch {
-      // not listening yet
-    }
-    await sleep(100);
-  }
-  child.kill("SIGKILL");
-  throw new Error(`palpated does not answer at ${url}:\n${output}`);
-}
-
-async function stopDaemon(child) {
-  const ended = new Promise((resolve) => child.once("exit", (code) => resolve(code)));
-  child.kill("SIGTERM");
-  return ended;
-}
-
-function check(what, ok, detail = "") {
-  assert.ok(ok, `${what} ${detail}`);
-  console.log(`ok  ${what} ${detail}`);
-}
-
-/** How many different colours a screenshot shows inside a box, and how many of its pixels are saturated. */
-function colours(png, x0, y0, x1, y1) {
-  const seen = new Set();
-  let saturated = 0;
-  for (let y = y0; y < y1; y++) {
-    for (let x = x0; x < x1; x++) {
-      const at = 4 * (y * png.width + x);
-      const [r, g, b] = png.data.subarray(at, at + 3);
-      seen.add((r << 16) | (g << 8) | b);
-      if (Math.max(r, g, b) - Math.min(r, g, b) > 40) saturated++;
-    }
-  }
-  return { different: seen.size, saturated };
-}
-
 const number = async (page, id) => Number.parseFloat((await page.textContent(`#${id}`)).replace(",", ""));
 const state = (page) => page.getAttribute("#connection", "data-state");
 
-/** A call of Session over gRPC-Web with an encoded message. */
-async function session(method, message) {
-  const frame = Buffer.concat([Buffer.from([0, 0, 0, 0, 0]), message]);
-  frame.writeUInt32BE(message.length, 1);
-  const headers = { "content-type": "application/grpc-web+proto" };
-  const answer = await fetch(`${url}palpate.v1.Session/${method}`, { method: "POST", headers, body: frame });
-  assert.ok(answer.ok && !answer.headers.has("grpc-message"), `${method}: ${answer.status} ${answer.headers.get("grpc-message")}`);
-}
-
 /** Field 2 true or false. */
-const pause = (paused) => session("Pause", Buffer.from([0x10, paused ? 1 : 0]));
+const pause = (paused) => session(url, "Pause", Buffer.from([0x10, paused ? 1 : 0]));
 
 /** 4096 forces (field 2) of 1000 N along x (fields 2, 1) on vertex 30 (field 1) for 3 ticks (field 4). */
 function breakTheBody() {
   const x = Buffer.alloc(9, 0x09);
   x.writeDoubleLE(1000, 1);
   const force = Buffer.concat([Buffer.from([0x08, 30, 0x12, x.length]), x, Buffer.from([0x20, 3])]);
-  return session("InjectForces", Buffer.concat(Array(4096).fill(Buffer.concat([Buffer.from([0x12, force.length]), force]))));
+  return session(url, "InjectForces", Buffer.concat(Array(4096).fill(Buffer.concat([Buffer.from([0x12, force.length]), force]))));
 }
 
 /** Waits for a firm press and gives its force (N) and displacement (mm), read in one go: it lasts a second. */
@@ -101,14 +38,8 @@ async function press(page) {
   return { force, displacement };
 }
 
-let daemon = await startDaemon();
-const browser = await chromium.launch({
-  executablePath,
-  args: [
-    "--headless=new", "--no-sandbox", "--disable-quic", "--no-first-run", "--disable-background-networking",
-    "--disable-component-update", "--disable-sync", "--use-angle=swiftshader", "--enable-unsafe-swiftshader",
-  ],
-});
+let daemon = await startDaemon(palpated, port);
+const browser = await launch(executablePath);
 try {
   const page = await browser.newPage({ viewport: { width: 1280, height: 860 } });
   const complaints = [];
@@ -190,7 +121,7 @@ try {
   const fault = await page.textContent("#fault");
   await page.screenshot({ path: join(artefacts, "page-fault.png") });
   check("a quarantined body is told", /held.*tick \d+ was refused.*until Reset/.test(fault), fault);
-  await session("Reset", Buffer.alloc(0));
+  await session(url, "Reset", Buffer.alloc(0));
   await page.waitForSelector("#fault", { state: "hidden", timeout: 10_000 });
   check("the word goes with the quarantine", true);
   await page.setViewportSize({ width: 1280, height: 860 });
@@ -206,7 +137,7 @@ try {
   const past = colours(lost, 250, 100, 900, 640);
   check("a picture of the past is grey", past.saturated < body.saturated / 10, JSON.stringify(past));
   check("nothing of the past is called a delay or a rate", (await page.textContent("#delay")) + (await page.textContent("#rate")) === "––");
-  daemon = await startDaemon();
+  daemon = await startDaemon(palpated, port);
   await page.waitForSelector('#connection[data-state="live"]', { timeout: 20_000 });
   check("the page comes back by itself", true);
   check("the arm presses again", (await press(page)).force >= 0.02);

@@ -5,6 +5,7 @@ use crate::{
         exchange::{DeviceInput, ToolOutput, ToolView},
         inject::Injection,
     },
+    stream::hub::Layers,
 };
 use glam::{DMat3, DVec3};
 use palpate_physics::{Quarantine, contact::LocalContactModel};
@@ -146,17 +147,17 @@ pub fn device_hello(message: Option<v1::DeviceUp>) -> Result<v1::DeviceHello, St
     Ok(hello)
 }
 
-/// The rate (Hz) and whether vertices are wanted.
+/// The rate (Hz) and what is wanted beside numbers.
 ///
 /// # Errors
 /// `INVALID_ARGUMENT`.
-pub fn watch_request(request: &v1::WatchRequest, display_rate_hz: f64) -> Result<(f64, bool), Status> {
+pub fn watch_request(request: &v1::WatchRequest, display_rate_hz: f64) -> Result<(f64, Layers), Status> {
     let rate = request.max_rate_hz;
     if !(0.0..=MAX_WATCH_RATE_HZ).contains(&rate) {
         let rule = format!("max_rate_hz = {rate} must be 0 (the daemon's display rate) to {MAX_WATCH_RATE_HZ}");
         return Err(Status::invalid_argument(rule));
     }
-    let with_vertices = match v1::LevelOfDetail::try_from(request.level_of_detail) {
+    let vertices = match v1::LevelOfDetail::try_from(request.level_of_detail) {
         Ok(v1::LevelOfDetail::Unspecified | v1::LevelOfDetail::Full) => true,
         Ok(v1::LevelOfDetail::Numbers) => false,
         Err(_) => {
@@ -165,7 +166,10 @@ pub fn watch_request(request: &v1::WatchRequest, display_rate_hz: f64) -> Result
         }
     };
     // Below one update in 1000 s a rate is a mistake of units, and its interval would overflow.
-    Ok((if rate == 0.0 { display_rate_hz } else { rate.max(1e-3) }, with_vertices))
+    Ok((
+        if rate == 0.0 { display_rate_hz } else { rate.max(1e-3) },
+        Layers { vertices, particles: request.active_particles },
+    ))
 }
 
 /// Forces on surface vertices become forces on nodes.
@@ -343,7 +347,9 @@ mod tests {
             assert!(watch_request(&request, 60.0).is_err(), "{rate}");
         }
         let request = |level_of_detail| v1::WatchRequest { level_of_detail, ..Default::default() };
-        assert_eq!(watch_request(&request(2), 60.0).unwrap(), (60.0, false));
+        assert_eq!(watch_request(&request(2), 60.0).unwrap(), (60.0, Layers::default()));
+        let particles = v1::WatchRequest { active_particles: true, ..request(2) };
+        assert_eq!(watch_request(&particles, 60.0).unwrap().1, Layers { vertices: false, particles: true });
         assert!(watch_request(&request(7), 60.0).is_err());
     }
 }

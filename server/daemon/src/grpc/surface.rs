@@ -20,9 +20,9 @@ impl Surface for SurfaceService {
     async fn watch(&self, request: Request<v1::WatchRequest>) -> Result<Response<Self::WatchStream>, Status> {
         let request = request.into_inner();
         current_session(&self.daemon, &request.session_id)?;
-        let (rate_hz, with_vertices) = convert::watch_request(&request, self.daemon.hub.display_rate_hz())?;
-        let seat = self.daemon.hub.join(rate_hz, with_vertices);
-        let viewer = Viewer::new(seat, rate_hz, with_vertices, self.daemon.stop.clone());
+        let (rate_hz, layers) = convert::watch_request(&request, self.daemon.hub.display_rate_hz())?;
+        let seat = self.daemon.hub.join(rate_hz, layers);
+        let viewer = Viewer::new(seat, rate_hz, layers, self.daemon.stop.clone());
         let events = stream::unfold(viewer, |mut viewer| async move { viewer.next().await.map(|e| (Ok(e), viewer)) });
         Ok(Response::new(Box::pin(events)))
     }

@@ -1,6 +1,6 @@
 //! `palpated check`: what a scene's body is like, and what a tick costs on this machine.
 use super::{load, simulate::Run, summary::TimeNumbers};
-use palpate_physics::{Model, hybrid::Waking, material::Law};
+use palpate_physics::{Model, hybrid::Waking, material::Law, seed::region::Region};
 use palpate_scene::{Scene, builtin_names, wording::counted};
 use std::{
     process::ExitCode,
@@ -37,6 +37,7 @@ pub fn run(args: &CheckArgs) -> miette::Result<ExitCode> {
     let model = load::build(&scene)?;
     print_body(&scene);
     print_particles(&model);
+    print_seed(&model);
     print_contents(&scene);
     for warning in &scene.warnings {
         println!("warning: {warning}");
@@ -120,6 +121,31 @@ fn print_particles(model: &Model) {
         short(cage.moved_m * 1e3),
         cage.outside
     );
+}
+
+/// Of the papers' hybrid.
+fn print_seed(model: &Model) {
+    let Some(seed) = model.seed() else { return };
+    let parameters = seed.parameters();
+    println!("seed       the papers' own hybrid; steps of {} ms", short(parameters.dt_s * 1e3));
+    if let Some(layer) = seed.layer() {
+        let spacing_m = layer.voxels.spacing_m;
+        let sizes = seed.regions().iter().map(Region::len);
+        println!(
+            "particles  {}, {} mm apart; {} to {} awake, {:.0} on average over {}",
+            layer.particle_count(),
+            short(spacing_m * 1e3),
+            sizes.clone().min().unwrap_or_default(),
+            seed.most_awake(),
+            sizes.sum::<usize>() as f64 / seed.regions().len() as f64,
+            counted(seed.regions().len(), "triangle")
+        );
+        println!(
+            "           waves cross a spacing in {} ms, by the papers' formula in {} ms",
+            short(parameters.courant_s(spacing_m) * 1e3),
+            short(parameters.courant_as_printed_s(spacing_m) * 1e3)
+        );
+    }
 }
 
 fn print_time(model: &Model, cost: &TimeNumbers) {

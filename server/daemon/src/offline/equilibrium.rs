@@ -62,6 +62,13 @@ pub fn run(args: &StaticArgs) -> miette::Result<ExitCode> {
             scene.name
         ));
     }
+    if scene.model.seed.is_some() {
+        return Err(miette::miette!(
+            help = "let `palpated simulate` come to rest, or leave [body.seed] out",
+            "\"{}\" is the papers' hybrid, whose forces have no equilibrium that is solved for",
+            scene.name
+        ));
+    }
     let model = load::build(&scene)?;
     if let Some(out) = &output.out {
         folder::check(out, output.force)?;

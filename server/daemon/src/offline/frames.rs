@@ -13,7 +13,7 @@ pub(super) struct Frames {
     count: usize,
     region: Vec<u32>,
     displacement_m: Vec<DVec3>,
-    /// Positions (m) of a hybrid body's skin.
+    /// Positions (m) of the skin of a body with particles.
     skin_m: Vec<DVec3>,
 }
 
@@ -39,7 +39,7 @@ impl Frames {
 
     /// Writes a frame and adds it to the index, so that an interrupted run can be opened.
     pub(super) fn write(&mut self, time_s: f64, model: &Model, state: &State) -> miette::Result<()> {
-        if model.hybrid().is_some() {
+        if model.particle_count() > 0 {
             return self.write_skin(time_s, model, state);
         }
         let rest = model.rest_positions_m();
@@ -58,12 +58,12 @@ impl Frames {
         add(&self.folder, &mut self.index, &mut self.count, &frame)
     }
 
-    /// Of a hybrid body, its skin.
+    /// Of a body with particles, its skin.
     fn write_skin(&mut self, time_s: f64, model: &Model, state: &State) -> miette::Result<()> {
         model.surface_positions_m(state, &mut self.skin_m);
-        let rest = model.surface_rest_positions_m();
+        let rest = model.surface().nodes.iter().map(|&node| model.surface_rest_positions_m()[node as usize]);
         self.displacement_m.clear();
-        self.displacement_m.extend(self.skin_m.iter().zip(rest).map(|(x, rest)| *x - *rest));
+        self.displacement_m.extend(self.skin_m.iter().zip(rest).map(|(x, rest)| *x - rest));
         let frame = VtuFrame {
             points: &self.skin_m,
             cells: Cells::Triangles(&model.surface().triangles),

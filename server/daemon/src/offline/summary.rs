@@ -40,12 +40,12 @@ pub(super) struct BodyNumbers {
     pub(super) tets: usize,
     pub(super) volume_m3: f64,
     pub(super) mass_kg: f64,
-    /// Of a hybrid body.
+    /// Of a hybrid or seed body.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) particles: Option<ParticleNumbers>,
 }
 
-/// The particles of a hybrid body.
+/// The particles of a hybrid or seed body.
 #[derive(Debug, Serialize)]
 pub(super) struct ParticleNumbers {
     pub(super) count: usize,
@@ -54,21 +54,20 @@ pub(super) struct ParticleNumbers {
     pub(super) most_active: usize,
     /// Awake at the end.
     pub(super) active: usize,
-    /// Those that never wake, because the coarse tets do not hold them.
+    /// Those that never wake, because the coarse tets do not hold them; 0 of a seed body.
     pub(super) outside: usize,
     pub(super) skin_triangles: usize,
 }
 
 impl ParticleNumbers {
     pub(super) fn of(model: &Model, state: &State) -> Option<Self> {
-        let (hybrid, spec) = (model.hybrid()?, model.spec().particles.as_ref()?);
-        Some(Self {
-            count: hybrid.partition().particle_count(),
-            spacing_m: spec.spacing_m,
-            most_active: spec.most_active,
-            active: state.active.len(),
-            outside: hybrid.cage().outside,
-            skin_triangles: spec.skin.triangles().len(),
+        (model.particle_count() > 0).then(|| Self {
+            count: model.particle_count(),
+            spacing_m: model.particle_spacing_m(),
+            most_active: model.most_awake_particles(),
+            active: state.awake_particles(),
+            outside: model.hybrid().map_or(0, |hybrid| hybrid.cage().outside),
+            skin_triangles: model.surface().triangles.len(),
         })
     }
 }
@@ -118,7 +117,7 @@ pub(super) struct EnergyNumbers {
     pub(super) gravitational: f64,
     pub(super) external_work: f64,
     pub(super) dissipated: f64,
-    /// Held − work + dissipated: 0 but for the error of time integration. A static solve tracks no work and has none.
+    /// Held − work + dissipated: 0 but for the error of time integration. A static solve tracks no work and has none, nor has a seed body.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) balance: Option<f64>,
 }
@@ -183,7 +182,7 @@ impl Summary {
                 gravitational: energies.gravitational_j,
                 external_work: energies.external_work_j,
                 dissipated: energies.dissipated_j,
-                balance: (ending.command == "simulate").then(|| energies.balance_j()),
+                balance: (ending.command == "simulate" && model.seed().is_none()).then(|| energies.balance_j()),
             },
             min_volume_ratio: health::min_volume_ratio(model, state).0,
             probes,

@@ -196,6 +196,11 @@ impl LatticeSnapshot {
         let most = particles.most_active;
         Self { x: vec![DVec3::ZERO; hybrid.node_count() + most], active: vec![0; most] }
     }
+
+    /// Positions (m) of the active particles.
+    pub fn particles_m(&self) -> &[DVec3] {
+        &self.x[self.x.len() - self.active.len()..]
+    }
 }
 
 /// The loop's end of the surface.

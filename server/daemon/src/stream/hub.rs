@@ -1,7 +1,7 @@
 //! One surface for all viewers: the loop fills a slot only while somebody watches; the hub turns it into a [`Frame`] once.
 use super::{
     encode::{Delta, Quantiser, Shape},
-    keyframe,
+    keyframe, particles,
     skin::SkinReader,
 };
 use crate::sim::exchange::{SurfaceEnd, SurfaceSnapshot};
@@ -42,6 +42,26 @@ impl Demand {
     }
 }
 
+/// What a viewer wants beside numbers.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Layers {
+    /// Vertices of the surface.
+    pub vertices: bool,
+    /// Active particles.
+    pub particles: bool,
+}
+
+impl Layers {
+    fn and(self, other: Self) -> Self {
+        Self { vertices: self.vertices || other.vertices, particles: self.particles || other.particles }
+    }
+
+    /// Whether all that the other wants is among these.
+    pub fn has(self, other: Self) -> bool {
+        self.and(other) == self
+    }
+}
+
 /// A moment of the surface, as all viewers see it.
 #[derive(Debug)]
 pub struct Frame {
@@ -53,17 +73,22 @@ pub struct Frame {
     pub keyframe: Arc<Vec<v1::KeyframeChunk>>,
     /// Everything but vertices and the viewer's own counters.
     pub numbers: v1::SurfaceUpdate,
+    /// What it was made for.
+    pub layers: Layers,
     /// The vertices, when somebody asked for them.
     pub shape: Option<Shape>,
+    /// Active particles, when somebody asked for them and the body has particles.
+    pub particles: Option<v1::ActiveParticles>,
     /// Encoded once, for the viewers that hold the frame before (`Some`) or none (`None`).
     encoded: Mutex<Vec<(Option<u64>, Delta)>>,
 }
 
 impl Frame {
     /// The update for a viewer that holds frame `since` of this epoch, or nothing yet.
-    pub fn update(&self, since: Option<u64>, with_vertices: bool, skipped: u64) -> v1::SurfaceUpdate {
+    pub fn update(&self, since: Option<u64>, layers: Layers, skipped: u64) -> v1::SurfaceUpdate {
         let mut update = v1::SurfaceUpdate { skipped, ..self.numbers.clone() };
-        if let Some(shape) = self.shape.as_ref().filter(|_| with_vertices) {
+        update.active_particles = self.particles.clone().filter(|_| layers.particles);
+        if let Some(shape) = self.shape.as_ref().filter(|_| layers.vertices) {
             let delta = self.delta(shape, since);
             update.displacement_quantum_m = shape.quantum_m;
             update.changed_u32le = delta.changed_u32le;
@@ -94,6 +119,8 @@ pub struct Hub {
     tick_period_s: Mutex<f64>,
     frames: watch::Sender<Option<Arc<Frame>>>,
     viewers: Mutex<Vec<Wish>>,
+    /// Whether anybody wants active particles.
+    particles: AtomicBool,
     next_viewer: AtomicU64,
     epoch: AtomicU32,
     skipped: AtomicU64,
@@ -103,7 +130,7 @@ pub struct Hub {
 struct Wish {
     viewer: u64,
     rate_hz: f64,
-    vertices: bool,
+    layers: Layers,
 }
 
 /// A viewer as long as it lives.
@@ -138,6 +165,7 @@ impl Hub {
             tick_period_s: Mutex::new(1e-3),
             frames: watch::Sender::new(None),
             viewers: Mutex::new(Vec::new()),
+            particles: AtomicBool::new(false),
             next_viewer: AtomicU64::new(1),
             epoch: AtomicU32::new(0),
             skipped: AtomicU64::new(0),
@@ -159,8 +187,8 @@ impl Hub {
         self.skipped.load(Ordering::Relaxed)
     }
 
-    /// Adds a viewer that wants so many updates per second (Hz), with or without vertices.
-    pub fn join(self: &Arc<Self>, rate_hz: f64, vertices: bool) -> Seat {
+    /// Adds a viewer that wants so many updates per second (Hz), with these layers.
+    pub fn join(self: &Arc<Self>, rate_hz: f64, layers: Layers) -> Seat {
         let viewer = self.next_viewer.fetch_add(1, Ordering::Relaxed);
         let frames = self.frames.subscribe();
         self.change_wishes(|wishes| {
@@ -168,7 +196,7 @@ impl Hub {
                 // Nobody watched: the newest frame may be minutes old, or of another scene.
                 self.frames.send_replace(None);
             }
-            wishes.push(Wish { viewer, rate_hz, vertices });
+            wishes.push(Wish { viewer, rate_hz, layers });
         });
         Seat { hub: Arc::clone(self), viewer, frames }
     }
@@ -179,7 +207,9 @@ impl Hub {
         let rate_hz = wishes.iter().fold(0.0_f64, |rate, wish| rate.max(wish.rate_hz));
         let period_s = *self.tick_period_s.lock().unwrap_or_else(PoisonError::into_inner);
         let period_ticks = if rate_hz > 0.0 { (1.0 / (rate_hz * period_s)).floor().clamp(1.0, 1e6) as u32 } else { 0 };
-        self.demand.set(period_ticks, wishes.iter().any(|wish| wish.vertices));
+        let wanted = wishes.iter().fold(Layers::default(), |layers, wish| layers.and(wish.layers));
+        self.particles.store(wanted.particles, Ordering::Relaxed);
+        self.demand.set(period_ticks, wanted.vertices);
     }
 
     /// Serves one session's surface until `ended`. A new epoch begins.
@@ -214,9 +244,13 @@ impl Hub {
             }
             let displacements_m = skin.as_ref().map_or(&snapshot.displacements_m[..], SkinReader::displacements_m);
             let shape = snapshot.has_vertices.then(|| quantiser.advance(number, displacements_m));
+            let layers = Layers { vertices: snapshot.has_vertices, particles: self.particles.load(Ordering::Relaxed) };
+            let has_particles = layers.particles && model.hybrid().is_some();
+            let particles = has_particles.then(|| particles::encode(&snapshot.lattice));
             let numbers = numbers(epoch, snapshot);
             let encoded = Mutex::new(Vec::new());
-            let frame = Frame { epoch, number, keyframe: Arc::clone(&keyframe), numbers, shape, encoded };
+            let frame =
+                Frame { epoch, number, keyframe: Arc::clone(&keyframe), numbers, layers, shape, particles, encoded };
             self.frames.send_replace(Some(Arc::new(frame)));
         }
     }

@@ -2,5 +2,6 @@
 pub mod encode;
 pub mod hub;
 pub mod keyframe;
+pub mod particles;
 pub mod skin;
 pub mod viewer;

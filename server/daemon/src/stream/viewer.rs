@@ -2,7 +2,7 @@
 //!
 //! The stream is pulled: nothing is queued for a viewer. One that reads slowly is asked late, gets the newest frame then, and
 //! what passed in between is counted as skipped. Frames left out because the viewer asked for a lower rate are not.
-use super::hub::{Frame, Seat};
+use super::hub::{Frame, Layers, Seat};
 use palpate_proto::v1::{self, surface_event::Message};
 use std::{collections::VecDeque, sync::Arc, time::Duration};
 use tokio::time::Instant;
@@ -12,7 +12,7 @@ use tokio_util::sync::CancellationToken;
 #[derive(Debug)]
 pub struct Viewer {
     seat: Seat,
-    with_vertices: bool,
+    layers: Layers,
     interval: Duration,
     stop: CancellationToken,
     chunks: VecDeque<v1::KeyframeChunk>,
@@ -24,10 +24,10 @@ pub struct Viewer {
 
 impl Viewer {
     /// A viewer of at most `rate_hz` (Hz, > 0) until `stop`.
-    pub fn new(seat: Seat, rate_hz: f64, with_vertices: bool, stop: CancellationToken) -> Self {
+    pub fn new(seat: Seat, rate_hz: f64, layers: Layers, stop: CancellationToken) -> Self {
         Self {
             seat,
-            with_vertices,
+            layers,
             interval: Duration::from_secs_f64(1.0 / rate_hz),
             stop,
             chunks: VecDeque::new(),
@@ -69,13 +69,13 @@ impl Viewer {
 
     fn wants(&self, frame: &Arc<Frame>) -> bool {
         let is_new = self.epoch != Some(frame.epoch) || self.held.is_none_or(|held| held < frame.number);
-        // A frame made for viewers without vertices has none: the next one will.
-        is_new && (frame.shape.is_some() || !self.with_vertices)
+        // A frame made for viewers that want less has less: the next one will have it.
+        is_new && frame.layers.has(self.layers)
     }
 
     fn take(&mut self, frame: &Arc<Frame>) -> Message {
         self.count_what_passed(frame);
-        let update = frame.update(self.held, self.with_vertices, self.skipped);
+        let update = frame.update(self.held, self.layers, self.skipped);
         self.held = Some(frame.number);
         // From the due time, not from now: the mean rate is the asked one. Never two at once to catch up.
         self.next_due = (self.next_due + self.interval).max(Instant::now());

@@ -70,6 +70,7 @@ pub fn block_scene(name: &str, cells: u32) -> Scene {
             tet_region: vec![0; tets],
             mesh: shape.mesh,
             particles: None,
+            seed: None,
             regions: vec![Region { name: "all".into(), material, density_kg_per_m3: 1e3 }],
             prescribed: vec![PrescribedSpec { name: "table".into(), nodes: bottom.clone(), axes: [true; 3] }],
             loads: Vec::new(),

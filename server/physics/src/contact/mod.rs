@@ -14,6 +14,7 @@ mod spring;
 mod state;
 mod tangent;
 mod tool;
+mod touched;
 mod touching;
 mod triangle;
 
@@ -113,6 +114,8 @@ struct ToolScratch {
     next: Touching,
     sum: Pressed,
     coupling_sum_n: DVec3,
+    /// Triangle (as the broad phase numbers them) nearest to the centre when it was last pressed.
+    nearest: usize,
 }
 
 impl ToolModel {
@@ -211,6 +214,7 @@ impl ContactModel {
             next: Touching::with_capacity(tool.foundation.samples),
             sum: Pressed::default(),
             coupling_sum_n: DVec3::ZERO,
+            nearest: 0,
         };
         ContactScratch { tools: self.tools.iter().map(tool).collect(), exhaustive: !skip_distant }
     }
@@ -303,6 +307,7 @@ impl ContactModel {
             let pressed = self.press(index, tool.centre_m, x, contact, forces_n, scratch);
             let surface_m_per_s = self.surface_m_per_s(&pressed, *velocity_m_per_s);
             let coupling_n = proxy::finish(model, tool, &pressed, surface_m_per_s, time);
+            scratch.nearest = pressed.nearest.0;
             tool.friction_heat_j += pressed.heat_j;
             tool.contacts = pressed.contacts;
             tool.contact_energy_j = pressed.energy_j;

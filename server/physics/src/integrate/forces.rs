@@ -100,6 +100,11 @@ impl Tick<'_> {
             let (tools, contact) = (&mut state.tools, &mut state.contact);
             model.contact().substep(&body, &time, tools, contact, external, &mut scratch.contact);
         }
+        state.force_is_current = true;
+        if model.seed().is_some() {
+            // Its steps make the other forces.
+            return;
+        }
         let force = &mut state.force_n;
         let viscous_power_w = model.kernel().forces_n(model.rest_positions_m(), x, v, force, &mut scratch.kernel);
         state.viscous.record(viscous_power_w, now.dt_s > 0.0);
@@ -107,7 +112,6 @@ impl Tick<'_> {
         for ((force, external), mass) in force.iter_mut().zip(external.iter()).zip(model.mass_kg()) {
             *force += *external + gravity * *mass;
         }
-        state.force_is_current = true;
     }
 }
 
@@ -134,8 +138,9 @@ impl LoadRamp {
     }
 }
 
-/// A force on a node that there is.
+/// A force on a node that there is; of a seed body, on one of its surface.
 pub(super) fn is_usable(model: &Model, point: &PointForce) -> bool {
     let nodes = if model.hybrid().is_some() { model.surface().nodes.len() } else { model.mass_kg().len() };
-    (point.node as usize) < nodes && point.force_n.is_finite()
+    let of_surface = || model.surface().vertex_of_node.get(point.node as usize).is_some_and(|&v| v != u32::MAX);
+    (point.node as usize) < nodes && point.force_n.is_finite() && (model.seed().is_none() || of_surface())
 }

@@ -6,6 +6,7 @@ mod leapfrog;
 mod motion;
 pub(crate) mod pcg;
 mod scheme;
+mod seed_body;
 pub mod seed_semi_implicit;
 mod seed_verlet;
 mod sleep;
@@ -14,6 +15,7 @@ mod stability;
 mod tick;
 
 pub(crate) use scheme::{Body, ImplicitScratch, Scheme};
+pub(crate) use seed_body::SeedBodyScratch;
 pub(crate) use sleep::RestBound;
 pub use sleep::Sleep;
 pub(crate) use stability::ForceHistory;

@@ -4,6 +4,7 @@ use super::{
     forces::Tick,
     leapfrog,
     pcg::PcgScratch,
+    seed_body,
     seed_semi_implicit::{self, NodalImplicit, nodal_stiffness_n_per_m},
     seed_verlet,
     spectrum::RestStiffness,
@@ -22,6 +23,8 @@ pub(crate) enum Scheme {
     SeedVerlet,
     SeedSemiImplicit(NodalImplicit),
     BackwardEuler(NodalImplicit),
+    /// The steps of a seed body.
+    Seed,
 }
 
 /// What it is made for.
@@ -60,6 +63,7 @@ impl Scheme {
             Self::SeedVerlet => seed_verlet::run(tick, state, scratch),
             Self::SeedSemiImplicit(nodal) => seed_semi_implicit::run(tick, nodal, state, scratch),
             Self::BackwardEuler(nodal) => backward_euler::run(tick, nodal, state, scratch),
+            Self::Seed => seed_body::run(tick, state, scratch),
         }
     }
 }

@@ -110,7 +110,7 @@ impl Pace {
 /// Only leapfrog's ticks are judged and repeated: the seeds' schemes run as their authors describe them, backward Euler needs none.
 pub(crate) fn is_judged(model: &Model) -> bool {
     let settings = &model.spec().settings;
-    settings.subcycle_unstable && settings.integrator == Integrator::Leapfrog
+    settings.subcycle_unstable && settings.integrator == Integrator::Leapfrog && model.seed().is_none()
 }
 
 fn judges_across_ticks(model: &Model) -> bool {

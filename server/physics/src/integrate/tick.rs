@@ -96,6 +96,9 @@ fn quarantine(model: &Model, state: &mut State, scratch: &mut Scratch, node: u32
     state.force_is_current = false;
     state.pace.reset(model);
     state.sleep.wake();
+    if let Some(seed) = &mut state.seed {
+        seed.stop();
+    }
     state.contact.clear();
     scratch.reaction_n.fill(DVec3::ZERO);
     for tool in &mut state.tools {
@@ -130,6 +133,11 @@ fn take_inputs(model: &Model, state: &mut State, scratch: &mut Scratch, input: &
         && input.prescribed_displacements_m.iter().all(|d| d.is_finite());
     rejected += u32::from(!prescribed_ok);
     scratch.history.held_jump = 0.0;
+    if model.seed().is_some() {
+        // What it holds stands still.
+        let moved = prescribed_ok && input.prescribed_displacements_m.iter().any(|d| *d != DVec3::ZERO);
+        return rejected + u32::from(moved);
+    }
     for (set, spec) in model.spec().prescribed.iter().enumerate() {
         let displacement = prescribed_ok.then(|| input.prescribed_displacements_m[set]);
         scratch.history.held_jump += aim_prescribed(model, state, &spec.nodes, spec.axes, displacement, period_s);

@@ -25,6 +25,7 @@ pub struct Core {
     stiffness_n_per_m: Vec<DMat3>,
     /// `(m_i I + dt² D_i)⁻¹` (1/kg); 0 of held nodes.
     implicit_per_kg: Vec<DMat3>,
+    boundary: Surface,
     outer_triangles: Vec<[u32; 3]>,
 }
 
@@ -55,9 +56,9 @@ impl Core {
             inverse_mass_per_kg[node as usize] = 0.0;
             implicit_per_kg[node as usize] = DMat3::ZERO;
         }
-        let surface = Surface::of(mesh)?;
-        let boundary: Vec<[u32; 3]> = (0..surface.triangles.len()).map(|t| surface.triangle_nodes(t)).collect();
-        let outer_triangles = outer_part(mesh.positions_m(), &boundary);
+        let boundary = Surface::of(mesh)?;
+        let triangles: Vec<[u32; 3]> = (0..boundary.triangles.len()).map(|t| boundary.triangle_nodes(t)).collect();
+        let outer_triangles = outer_part(mesh.positions_m(), &triangles);
         Ok(Self {
             mesh: mesh.clone(),
             rest_tets,
@@ -66,6 +67,7 @@ impl Core {
             inverse_mass_per_kg,
             stiffness_n_per_m,
             implicit_per_kg,
+            boundary,
             outer_triangles,
         })
     }
@@ -88,6 +90,21 @@ impl Core {
     /// 1/m (1/kg) of its nodes; 0 of held ones.
     pub fn inverse_mass_per_kg(&self) -> &[f64] {
         &self.inverse_mass_per_kg
+    }
+
+    /// Its rest data, in the order of the tets.
+    pub fn rest_tets(&self) -> &[RestTet] {
+        &self.rest_tets
+    }
+
+    /// What it is made of.
+    pub fn material(&self) -> &Material {
+        &self.material
+    }
+
+    /// Its boundary, the walls of cavities included.
+    pub fn boundary(&self) -> &Surface {
+        &self.boundary
     }
 
     /// The outer part of its boundary, as nodes, counter-clockwise seen from outside.
@@ -122,7 +139,7 @@ impl Core {
 }
 
 /// Of the closed surfaces that make a boundary the one that encloses most: not the wall of a cavity.
-fn outer_part(positions_m: &[DVec3], boundary: &[[u32; 3]]) -> Vec<[u32; 3]> {
+pub(super) fn outer_part(positions_m: &[DVec3], boundary: &[[u32; 3]]) -> Vec<[u32; 3]> {
     let mut part: Vec<u32> = (0..positions_m.len() as u32).collect();
     loop {
         let mut changed = false;

@@ -14,6 +14,7 @@
 //! | exchange between particles and core | 6.1 | `exchange.rs` |
 //! | links of the outer surface | 6.1 | `links.rs` |
 //! | the step Δt, Verlet | 33 | `step.rs`, `state.rs` |
+//! | as a body of the loop: tools press it | | `body.rs`, `integrate/seed_body.rs` |
 //!
 //! | what cannot work as printed | smallest repair | where |
 //! |---|---|---|
@@ -29,6 +30,7 @@
 //! | eq. 25 on the surface: weights sum to ½ | divided by their sum | `region.rs` |
 //! | no mass, stiffness or damping of links | from the layer | `links.rs` |
 //! | particles woken at rest under a core that moved | start with the core | `step.rs` |
+mod body;
 pub mod core;
 mod error;
 pub mod exchange;
@@ -48,6 +50,7 @@ pub(crate) mod testing;
 mod tests;
 pub mod voxels;
 
+pub use body::{SeedBodySpec, SeedMotion};
 pub use error::SeedError;
 pub use model::SeedModel;
 pub use spec::{

@@ -8,6 +8,7 @@ use super::{
     region::Region,
     sph::LayerStress,
 };
+use crate::mesh::Surface;
 use glam::DVec3;
 use std::collections::BTreeMap;
 
@@ -63,13 +64,9 @@ impl SeedModel {
     }
 
     fn without_layer(parameters: SeedParameters, core: Core) -> Self {
-        let mut vertex_nodes: Vec<u32> = core.outer_triangles().iter().flatten().copied().collect();
-        vertex_nodes.sort_unstable();
-        vertex_nodes.dedup();
-        let vertex = |node: u32| vertex_nodes.binary_search(&node).map_or(0, |vertex| vertex as u32);
-        let surface_triangles = core.outer_triangles().iter().map(|triangle| triangle.map(vertex)).collect();
-        let surface_rest_m = vertex_nodes.iter().map(|&node| core.rest_m()[node as usize]).collect();
-        Self { parameters, core, hull: None, surface_rest_m, surface_triangles, vertex_nodes }
+        let Surface { nodes, triangles, .. } = core.boundary().clone();
+        let surface_rest_m = nodes.iter().map(|&node| core.rest_m()[node as usize]).collect();
+        Self { parameters, core, hull: None, surface_rest_m, surface_triangles: triangles, vertex_nodes: nodes }
     }
 
     /// Constants.
@@ -102,7 +99,7 @@ impl SeedModel {
         self.hull.as_ref().map_or(0, |hull| hull.most_awake)
     }
 
-    /// Rest positions (m) of the touchable surface's vertices: the skin's, or without a layer those of the core's outer surface.
+    /// Rest positions (m) of the touchable surface's vertices: the skin's, or without a layer those of the core's boundary.
     pub fn surface_rest_m(&self) -> &[DVec3] {
         &self.surface_rest_m
     }

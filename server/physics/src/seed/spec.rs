@@ -104,7 +104,7 @@ pub struct SeedSpec {
     pub core: TetMesh,
     /// Nodes of the core that stay where they are. The papers do not say what holds their bodies.
     pub held_nodes: Vec<u32>,
-    /// The particles Ω_p; without them the core's own outer surface is touched.
+    /// The particles Ω_p; without them the core's own boundary is touched.
     pub layer: Option<LayerSpec>,
     /// Constants.
     pub parameters: SeedParameters,

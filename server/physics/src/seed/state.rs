@@ -17,6 +17,19 @@ impl Motion {
         Self { x: positions_m.to_vec(), v: vec![DVec3::ZERO; positions_m.len()] }
     }
 
+    /// Copies another of the same length. Allocates nothing.
+    pub(super) fn copy_from(&mut self, other: &Self) {
+        self.x.copy_from_slice(&other.x);
+        self.v.copy_from_slice(&other.v);
+    }
+
+    /// At rest, in the buffers it has; at the origin where no position is given.
+    pub(super) fn rest(&mut self, positions_m: &[DVec3]) {
+        self.x.fill(DVec3::ZERO);
+        self.x.iter_mut().zip(positions_m).for_each(|(x, rest)| *x = *rest);
+        self.v.fill(DVec3::ZERO);
+    }
+
     /// Moves a point within a step: by `by` (m), which is a velocity of `by/dt` more.
     pub(super) fn shift(&mut self, point: usize, by_m: DVec3, dt_s: f64) {
         self.x[point] += by_m;
@@ -122,6 +135,11 @@ pub struct SeedScratch {
 }
 
 impl SeedScratch {
+    /// Forces (N) on the core's nodes in the last step, external ones included.
+    pub fn core_forces_n(&self) -> &[DVec3] {
+        &self.core_force_n
+    }
+
     /// For a model.
     pub fn new(model: &SeedModel) -> Self {
         let (nodes, awake) = (model.core().rest_m().len(), model.most_awake());

@@ -1,5 +1,5 @@
 //! Why a model cannot be built.
-use crate::{hybrid::HybridError, material::ParameterError, mesh::MeshError, solve::SolveError};
+use crate::{hybrid::HybridError, material::ParameterError, mesh::MeshError, seed::SeedError, solve::SolveError};
 use glam::DVec3;
 use thiserror::Error;
 
@@ -87,6 +87,28 @@ pub enum ModelError {
     /// The particles cannot be made.
     #[error(transparent)]
     Hybrid(#[from] HybridError),
+    /// The papers' hybrid cannot be made.
+    #[error(transparent)]
+    Seed(#[from] SeedError),
+    /// A seed body cannot have it.
+    #[error("a body of the papers' hybrid (seed) cannot have {what}: {instead}")]
+    NotForSeeds {
+        /// What.
+        what: &'static str,
+        /// What to do.
+        instead: &'static str,
+    },
+    /// A tool's coupling and contact, as a mass on springs, need a shorter step than the body's.
+    #[error(
+        "the tools' couplings need steps of {longest_s:.2e} s at most, and the seed body takes {dt_s:.2e} s: make them softer or the tools \
+         heavier, take rigid tools, or shorten its step"
+    )]
+    CouplingTooStiff {
+        /// The body's step (s).
+        dt_s: f64,
+        /// The longest that couplings bear (s).
+        longest_s: f64,
+    },
     /// More substeps than any tick can bear.
     #[error(
         "the body needs {substeps:.3e} substeps per tick (largest natural frequency {omega_rad_per_s:.3e} rad/s); \

@@ -2,6 +2,7 @@
 mod check;
 mod error;
 mod model;
+mod seed_body;
 mod spec;
 mod state;
 mod substeps;

@@ -1,5 +1,5 @@
 //! The model: constant after load.
-use super::{Integrator, ModelError, ModelSpec, PrescribedSpec, State, check, substeps};
+use super::{Integrator, ModelError, ModelSpec, PrescribedSpec, State, check, seed_body, substeps};
 use crate::{
     contact::{ContactModel, SurfaceModuli, ToolState},
     fem::{element::RestTet, mass},
@@ -10,6 +10,7 @@ use crate::{
     },
     material::Material,
     mesh::{Surface, TetMesh},
+    seed::{SeedBodySpec, SeedModel, layer::Layer},
     simd::ForceKernel,
 };
 use glam::{DVec2, DVec3};
@@ -31,6 +32,9 @@ pub struct Model {
     scheme: Scheme,
     rest_bound: Option<RestBound>,
     hybrid: Option<Box<Hybrid>>,
+    seed: Option<Box<SeedModel>>,
+    /// Of a seed body: rest positions (m) of core and skin.
+    seed_rest_m: Vec<DVec3>,
 }
 
 impl Model {
@@ -48,9 +52,14 @@ impl Model {
     /// As [`Self::build`].
     pub fn build_with(spec: ModelSpec, progress: &mut dyn FnMut(f64)) -> Result<Self, ModelError> {
         let surface = Surface::of(&spec.mesh)?;
-        match spec.particles.clone() {
-            None => Self::of_tets(spec, surface),
-            Some(particles) => Self::of_particles(spec, &surface, &particles, progress),
+        match (spec.particles.clone(), spec.seed.clone()) {
+            (None, None) => Self::of_tets(spec, surface),
+            (Some(particles), None) => Self::of_particles(spec, &surface, &particles, progress),
+            (None, Some(seed)) => Self::of_seed(spec, seed),
+            (Some(_), Some(_)) => Err(ModelError::NotForSeeds {
+                what: "particles on a lattice",
+                instead: "choose one of the two hybrids",
+            }),
         }
     }
 
@@ -113,6 +122,8 @@ impl Model {
             scheme,
             rest_bound: None,
             hybrid: None,
+            seed: None,
+            seed_rest_m: Vec::new(),
             spec,
         };
         model.rest_bound = RestBound::new(&model).map_err(|source| ModelError::Sleep { source: Box::new(source) })?;
@@ -134,7 +145,7 @@ impl Model {
     /// Rest positions (m) of what the surface's nodes are numbered by.
     pub fn surface_rest_positions_m(&self) -> &[DVec3] {
         match &self.spec.particles {
-            None => self.spec.mesh.positions_m(),
+            None => self.rest_positions_m(),
             Some(particles) => particles.skin.positions_m(),
         }
     }
@@ -149,9 +160,10 @@ impl Model {
             }
         }
     }
-    /// Rest positions (m) per node; of a hybrid body, of its coarse nodes.
+    /// Rest positions (m) per node; of a hybrid body, of its coarse nodes; of a seed body, of its core's and then its skin's.
     pub fn rest_positions_m(&self) -> &[DVec3] {
         match &self.hybrid {
+            None if self.seed.is_some() => &self.seed_rest_m,
             None => self.spec.mesh.positions_m(),
             Some(hybrid) => hybrid.partition().coarse().positions_m(),
         }
@@ -159,6 +171,25 @@ impl Model {
     /// The particles, where there are some.
     pub fn hybrid(&self) -> Option<&Hybrid> {
         self.hybrid.as_deref()
+    }
+    /// The papers' hybrid, where the body is one.
+    pub fn seed(&self) -> Option<&SeedModel> {
+        self.seed.as_deref()
+    }
+    /// Particles, awake or not.
+    pub fn particle_count(&self) -> usize {
+        let of_seed = self.seed().and_then(SeedModel::layer).map_or(0, Layer::particle_count);
+        self.hybrid().map_or(of_seed, |hybrid| hybrid.partition().particle_count())
+    }
+    /// Most particles awake at once.
+    pub fn most_awake_particles(&self) -> usize {
+        let of_seed = self.seed().map_or(0, SeedModel::most_awake);
+        self.spec.particles.as_ref().map_or(of_seed, |particles| particles.most_active)
+    }
+    /// How far particles are apart (m); 0 where there are none.
+    pub fn particle_spacing_m(&self) -> f64 {
+        let of_seed = self.seed().and_then(SeedModel::layer).map_or(0.0, |layer| layer.voxels.spacing_m);
+        self.spec.particles.as_ref().map_or(of_seed, |particles| particles.spacing_m)
     }
     /// Rest data of every tet.
     pub fn rest_tets(&self) -> &[RestTet] {
@@ -213,6 +244,50 @@ impl Model {
 }
 
 impl Model {
+    fn of_seed(spec: ModelSpec, wanted: SeedBodySpec) -> Result<Self, ModelError> {
+        let (seed, substeps) = seed_body::build(&spec, wanted)?;
+        let (surface, seed_rest_m, mass_kg) = (seed.node_surface(), seed.node_rest_m(), seed.node_mass_kg());
+        check::spec(&spec, &surface, &seed_rest_m)?;
+        let materials = vec![*seed.core().material()];
+        let inverse_mass_per_kg = free_inverse_mass(&mass_kg, &spec.prescribed)?;
+        let of_core = RestStiffness {
+            mesh: &spec.mesh,
+            rest_tets: seed.core().rest_tets(),
+            tet_material: &spec.tet_region,
+            materials: &materials,
+            springs_n_per_m: &[],
+        };
+        let core_nodes = spec.mesh.positions_m().len();
+        let omega = max_natural_frequency_rad_per_s(&of_core, &inverse_mass_per_kg[..core_nodes]);
+        let contact = ContactModel::build(
+            &seed_rest_m,
+            &surface,
+            &seed_body::moduli(&seed),
+            &seed.contact_mass_kg(),
+            seed_body::contact_frequency_rad_per_s(&seed),
+            &spec.tools,
+        );
+        seed_body::demand_soft_couplings(&contact, &seed)?;
+        Ok(Self {
+            kernel: ForceKernel::build(&spec.mesh, &[], &[], &materials, spec.settings.precision),
+            rest_tets: seed.core().rest_tets().to_vec(),
+            surface,
+            materials,
+            mass_kg,
+            inverse_mass_per_kg,
+            contact,
+            max_natural_frequency_rad_per_s: omega,
+            substeps,
+            substeps_per_long_step: 1,
+            scheme: Scheme::Seed,
+            rest_bound: None,
+            hybrid: None,
+            seed: Some(Box::new(seed)),
+            seed_rest_m,
+            spec,
+        })
+    }
+
     fn of_particles(
         spec: ModelSpec,
         boundary: &Surface,
@@ -268,6 +343,8 @@ impl Model {
             scheme: Scheme::Leapfrog,
             rest_bound: None,
             hybrid: Some(Box::new(hybrid)),
+            seed: None,
+            seed_rest_m: Vec::new(),
             spec,
         })
     }

@@ -1,5 +1,5 @@
 //! What a model is built from.
-use crate::{contact::ToolSpec, hybrid::ParticleSpec, material::Material, mesh::TetMesh};
+use crate::{contact::ToolSpec, hybrid::ParticleSpec, material::Material, mesh::TetMesh, seed::SeedBodySpec};
 use glam::DVec3;
 
 /// A material and density shared by some tets.
@@ -165,6 +165,8 @@ pub struct ModelSpec {
     pub mesh: TetMesh,
     /// Particles that make it a hybrid body. Its surface is their skin: loads are at the skin's vertices and triangles.
     pub particles: Option<ParticleSpec>,
+    /// Makes its tets the core of the papers' hybrid; there is one material then, and what is prescribed is held.
+    pub seed: Option<SeedBodySpec>,
     /// Materials.
     pub regions: Vec<Region>,
     /// Region of each tet.

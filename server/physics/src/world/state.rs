@@ -5,6 +5,7 @@ use crate::{
     health::{Ledger, Quarantine, ViscousPower},
     hybrid::ActiveParticles,
     integrate::{Pace, Sleep},
+    seed::SeedMotion,
 };
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
@@ -40,6 +41,8 @@ pub struct State {
     pub pace: Pace,
     /// Whether the body sleeps.
     pub sleep: Sleep,
+    /// Of a seed body: all that its steps change. `x` and `v` are copies of its nodes'.
+    pub seed: Option<SeedMotion>,
     /// Set when a tick's result was not finite.
     pub quarantine: Option<Quarantine>,
 }
@@ -64,6 +67,7 @@ impl State {
             viscous: ViscousPower::default(),
             pace: Pace::at_start(model),
             sleep: Sleep::at_start(model),
+            seed: model.seed().map(SeedMotion::at_rest),
             quarantine: None,
         }
     }
@@ -84,6 +88,9 @@ impl State {
         self.viscous = other.viscous;
         self.pace.copy_from(&other.pace);
         self.sleep.copy_from(&other.sleep);
+        if let (Some(own), Some(other)) = (&mut self.seed, &other.seed) {
+            own.copy_from(other);
+        }
         self.quarantine = other.quarantine;
     }
 
@@ -107,6 +114,9 @@ impl State {
         self.viscous = ViscousPower::default();
         self.pace.reset(model);
         self.sleep.reset();
+        if let (Some(own), Some(seed)) = (&mut self.seed, model.seed()) {
+            own.reset(seed);
+        }
         self.quarantine = None;
     }
 
@@ -121,6 +131,11 @@ impl State {
         state.centre_m = position_m;
         self.contact.put_tool(tool);
         self.force_is_current = false;
+    }
+
+    /// Particles that are awake.
+    pub fn awake_particles(&self) -> usize {
+        self.seed.as_ref().map_or(self.active.len(), |seed| seed.awake as usize)
     }
 
     /// Simulated time (s) since reset.

@@ -4,7 +4,7 @@ use crate::{
     contact::{ContactScratch, ToolTarget},
     health::{LastGood, Quarantine},
     hybrid::HybridScratch,
-    integrate::{ForceHistory, ImplicitScratch},
+    integrate::{ForceHistory, ImplicitScratch, SeedBodyScratch},
     simd::KernelScratch,
 };
 use glam::DVec3;
@@ -12,7 +12,7 @@ use glam::DVec3;
 /// A force injected on a node for one tick.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PointForce {
-    /// Node of the surface ([`Model::surface`]) or, of a body without particles, any.
+    /// Node of the surface ([`Model::surface`]) or, of a body of tets alone, any.
     pub node: u32,
     /// Force (N, world).
     pub force_n: DVec3,
@@ -55,6 +55,7 @@ pub struct Scratch {
     pub(crate) contact: ContactScratch,
     pub(crate) implicit: ImplicitScratch,
     pub(crate) hybrid: Option<Box<HybridScratch>>,
+    pub(crate) seed: Option<Box<SeedBodyScratch>>,
 }
 
 impl Scratch {
@@ -72,6 +73,7 @@ impl Scratch {
             contact: model.contact().scratch(model.spec().settings.skips.distant_contact),
             implicit: ImplicitScratch::new(model),
             hybrid: HybridScratch::new(model).map(Box::new),
+            seed: model.seed().map(|seed| Box::new(SeedBodyScratch::new(seed))),
         }
     }
 

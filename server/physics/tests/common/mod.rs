@@ -156,6 +156,7 @@ pub(crate) fn spec(
         tet_region: vec![0; mesh.tets().len()],
         mesh,
         particles: None,
+        seed: None,
         regions: vec![Region { name: "body".into(), material, density_kg_per_m3: 1000.0 }],
         prescribed,
         loads,

@@ -2,6 +2,7 @@
 use super::{
     Files, exactly_one, particles,
     parts::{self, Part},
+    seed,
 };
 use crate::{
     document::{
@@ -24,8 +25,10 @@ use palpate_physics::{MeshError, Surface, TetMesh, contact::is_inside};
 pub(crate) struct Body {
     pub(crate) mesh: TetMesh,
     pub(crate) surface: Surface,
-    /// The fine surface of a body with particles: what loads and tools act on.
+    /// The surface over particles: what loads and tools act on.
     pub(crate) skin: Option<FineSurface>,
+    /// Of a skin over a seed body's layer: the number of its first vertex, after the tets' nodes. Other skins have numbers of their own.
+    pub(crate) first_vertex: Option<u32>,
     /// Where the shape has flat sides that a lattice should lie on: a point (m) of them.
     pub(crate) lattice_m: Option<DVec3>,
     pub(crate) parts: Vec<Part>,
@@ -57,11 +60,26 @@ impl Body {
     pub(crate) fn locate(&self, point_m: DVec3) -> MaterialPoint {
         match &self.skin {
             None => MaterialPoint::locate(&self.mesh, &self.triangles().collect::<Vec<_>>(), point_m),
+            Some(skin) if self.first_vertex.is_some() => self.locate_in_seed(skin, point_m),
             Some(skin) if is_inside(point_m, &skin.triangles, &skin.positions_m) => {
                 MaterialPoint { nodes: [0; 4], weights: [1.0, 0.0, 0.0, 0.0], distance_m: 0.0 }
             }
             Some(skin) => MaterialPoint::nearest(&skin.positions_m, skin.triangles.iter().copied(), point_m),
         }
+    }
+
+    /// In the core, or the nearest of the skin: nothing is known between them.
+    fn locate_in_seed(&self, skin: &FineSurface, point_m: DVec3) -> MaterialPoint {
+        let in_core = |tet| MaterialPoint::inside(&self.mesh, tet, point_m);
+        (0..self.mesh.tets().len()).find_map(in_core).unwrap_or_else(|| {
+            let nearest = MaterialPoint::nearest(&skin.positions_m, skin.triangles.iter().copied(), point_m);
+            let is_inside = is_inside(point_m, &skin.triangles, &skin.positions_m);
+            MaterialPoint {
+                nodes: nearest.nodes.map(|vertex| vertex + self.first_vertex.unwrap_or_default()),
+                distance_m: if is_inside { 0.0 } else { nearest.distance_m },
+                ..nearest
+            }
+        })
     }
 
     /// Diagonal of the bounding box (m).
@@ -110,6 +128,10 @@ pub(crate) fn make(table: &BodyTable, files: &Files<'_>, progress: &mut dyn FnMu
             particles::skin_of(table, &body, wanted.spacing_m).map_err(|error| shape_fault(&at, error))?
         };
         particles::put_on(&mut body, table, skin);
+    }
+    if let Some(layer) = table.seed.as_ref().and_then(|seed| seed.layer.as_ref()) {
+        progress(0.75, "making the skin");
+        seed::put_on(&mut body, layer, files.limits)?;
     }
     let offset = DVec3::from(table.offset_m);
     if offset != DVec3::ZERO {
@@ -200,6 +222,7 @@ fn of_shape(shape: Shape, kind: &str, at: &Where) -> Result<Body, Fault> {
         parts: parts::of_boundary(&shape.regions, &surface),
         surface,
         skin: None,
+        first_vertex: None,
         lattice_m: None,
         origin: format!("shape {kind}"),
         report,
@@ -239,6 +262,7 @@ fn from_surfaces(
         parts: parts::of_boundary(&filled.regions, &surface),
         surface,
         skin: None,
+        first_vertex: None,
         lattice_m: None,
         origin: format!("wall between {} and {}", table.inner_file, table.outer_file),
         report: filled.report.to_string().lines().map(str::to_owned).collect(),
@@ -268,6 +292,7 @@ fn from_file(table: &MeshTable, files: &Files<'_>, at: &Where) -> Result<Body, F
         parts: parts::of_groups(&grouped, &surface),
         surface,
         skin: None,
+        first_vertex: None,
         lattice_m: None,
         origin: format!("file {}", table.file),
         report: Vec::new(),

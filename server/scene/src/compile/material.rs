@@ -45,20 +45,35 @@ pub(crate) fn compile(tables: &[MaterialTable], regions: &Regions<'_>, body: &Bo
     Ok(Materials { regions: found, tet_region: owner.into_iter().flatten().collect(), warnings })
 }
 
-fn material(table: &MaterialTable, region: &str, at: &Where) -> Result<Region, Fault> {
+/// A material's constants before its convention's factors.
+pub(super) struct Constants {
+    pub(super) lame: Lame,
+    pub(super) viscosity: Viscosity,
+    pub(super) convention: Convention,
+    pub(super) density_kg_per_m3: f64,
+}
+
+/// The constants, checked.
+pub(super) fn constants(table: &MaterialTable, at: &Where) -> Result<Constants, Fault> {
     let refused = |error: ParameterError| parameter_fault(at, error);
-    let lame = lame(table, at)?;
-    let viscosity = Viscosity::new(table.viscosity_phi_pa_s, table.viscosity_psi_pa_s).map_err(refused)?;
-    let density_kg_per_m3 = parameters::checked_density(table.density_kg_per_m3).map_err(refused)?;
+    Ok(Constants {
+        lame: lame(table, at)?,
+        viscosity: Viscosity::new(table.viscosity_phi_pa_s, table.viscosity_psi_pa_s).map_err(refused)?,
+        convention: match table.convention {
+            ConventionName::Consistent => Convention::Consistent,
+            ConventionName::Paper2006 => Convention::Paper2006,
+            ConventionName::Paper2005 => Convention::Paper2005,
+        },
+        density_kg_per_m3: parameters::checked_density(table.density_kg_per_m3).map_err(refused)?,
+    })
+}
+
+fn material(table: &MaterialTable, region: &str, at: &Where) -> Result<Region, Fault> {
+    let Constants { lame, viscosity, convention, density_kg_per_m3 } = constants(table, at)?;
     let law = match table.law {
         LawName::Stvk => Law::StVenantKirchhoff,
         LawName::StableNeoHookean => Law::StableNeoHookean,
         LawName::FixedCorotated => Law::FixedCorotated,
-    };
-    let convention = match table.convention {
-        ConventionName::Consistent => Convention::Consistent,
-        ConventionName::Paper2006 => Convention::Paper2006,
-        ConventionName::Paper2005 => Convention::Paper2005,
     };
     let material = Material::new(law, lame, viscosity, convention);
     Ok(Region { name: table.name.clone().unwrap_or_else(|| region.to_owned()), material, density_kg_per_m3 })

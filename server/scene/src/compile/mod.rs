@@ -8,6 +8,7 @@ mod particles;
 mod parts;
 mod probes;
 mod regions;
+mod seed;
 mod tools;
 
 use crate::{
@@ -23,7 +24,7 @@ use glam::DVec3;
 use material::Materials;
 use palpate_physics::{
     Integrator, ModelSpec, Precision, Settings, Skips, Substeps, hybrid::ParticleSpec, mesh::quality,
-    world::MAX_SUBSTEPS,
+    seed::SeedBodySpec, world::MAX_SUBSTEPS,
 };
 use regions::Regions;
 use std::path::{Path, PathBuf};
@@ -71,14 +72,17 @@ pub(crate) fn compile(
     let constraints = loads::constraints(document, &regions, files)?;
     let loads = loads::loads(document, &regions, files)?;
     let particles = particles::spec(document, &body, &constraints, files)?;
+    let seed = seed::spec(document, &body)?;
     progress(0.9, "placing tools and probes");
     let tools = tools::compile(document, &body, files)?;
     let mut warnings = body.warnings.clone();
     warnings.extend(materials.warnings.iter().cloned());
     warnings.extend(tools.warnings);
-    particles::warn_of_fine_tets(&body, &mut warnings);
+    if particles.is_some() {
+        particles::warn_of_fine_tets(&body, &mut warnings);
+    }
     let probes = probes::compile(&document.probe, &regions, &body, &tools.specs, &constraints, &mut warnings)?;
-    let summary = summary(&body, &regions, &materials, particles.as_ref());
+    let summary = summary(&body, &regions, &materials, (particles.as_ref(), seed.as_ref()));
     warn_of_shape(&summary, &mut warnings);
     warnings.extend(nothing_held(document));
     progress(1.0, "done");
@@ -88,6 +92,7 @@ pub(crate) fn compile(
         model: ModelSpec {
             mesh: body.mesh,
             particles,
+            seed,
             regions: materials.regions,
             tet_region: materials.tet_region,
             prescribed: constraints.specs,
@@ -230,13 +235,19 @@ fn unique_names<'n>(table: &str, names: impl Iterator<Item = &'n str>) -> Result
     Ok(())
 }
 
-fn summary(body: &Body, regions: &Regions<'_>, materials: &Materials, particles: Option<&ParticleSpec>) -> BodySummary {
+fn summary(
+    body: &Body,
+    regions: &Regions<'_>,
+    materials: &Materials,
+    (particles, seed): (Option<&ParticleSpec>, Option<&SeedBodySpec>),
+) -> BodySummary {
     let mesh = &body.mesh;
     let mass_of =
         |(tet, region): (usize, &u16)| mesh.volume_m3(tet) * materials.regions[*region as usize].density_kg_per_m3;
     let mass_kg: f64 = materials.tet_region.iter().enumerate().map(mass_of).sum();
     // Coarse tets need not have the volume of the body that its skin encloses.
-    let volume_m3 = particles.map_or(mesh.total_volume_m3(), |particles| particles.skin.volume_m3());
+    let of_tets_m3 = seed.map_or(mesh.total_volume_m3(), |seed| seed.volume_m3(mesh, &body.surface));
+    let volume_m3 = particles.map_or(of_tets_m3, |particles| particles.skin.volume_m3());
     BodySummary {
         origin: body.origin.clone(),
         nodes: mesh.positions_m().len(),

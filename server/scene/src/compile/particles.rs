@@ -143,7 +143,7 @@ pub(super) fn spec(
 pub(super) fn warn_of_fine_tets(body: &Body, warnings: &mut Vec<String>) {
     const MANY_TETS: usize = 5000;
     let tets = body.mesh.tets().len();
-    if body.skin.is_some() && tets > MANY_TETS {
+    if tets > MANY_TETS {
         warnings.push(format!(
             "{tets} tets are many for the coarse level of a body with particles, and all of them are computed all the time: a few hundred do"
         ));

@@ -36,8 +36,8 @@ pub(crate) fn compile(
                     return Err(Fault::value(at.key("region"), message));
                 }
                 Measure::Reaction(match &body.skin {
-                    Some(_) => particles::with_middles(&body.mesh, nodes),
-                    None => nodes,
+                    Some(_) if body.first_vertex.is_none() => particles::with_middles(&body.mesh, nodes),
+                    _ => nodes,
                 })
             }
             ProbeKind::Energy => Measure::Energy,
@@ -91,6 +91,7 @@ fn displacement(name: &str, point_m: DVec3, body: &Body, warnings: &mut Vec<Stri
     }
     match &body.skin {
         None => Measure::Displacement(point),
+        Some(_) if body.first_vertex.is_some() => Measure::Displacement(point),
         Some(_) if point.distance_m == 0.0 => Measure::LatticeDisplacement(point_m),
         Some(skin) => Measure::LatticeDisplacement(point.of(&skin.positions_m)),
     }

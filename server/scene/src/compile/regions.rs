@@ -110,7 +110,9 @@ impl<'b> Regions<'b> {
             return self.nodes(name, at);
         }
         let selection = self.named(name, at)?;
-        self.some(name, at, "vertices of the skin", &selection.vertices, &selection)
+        let vertices = self.some(name, at, "vertices of the skin", &selection.vertices, &selection)?;
+        let first = self.body.first_vertex.unwrap_or_default();
+        Ok(vertices.into_iter().map(|vertex| vertex + first).collect())
     }
 
     /// Surface triangles of a region; none is an error.

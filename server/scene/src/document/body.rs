@@ -1,4 +1,5 @@
 //! `[body]`: where the tetrahedra come from.
+use super::seed::SeedTable;
 use schemars::JsonSchema;
 use serde::Deserialize;
 
@@ -21,6 +22,8 @@ pub(crate) struct BodyTable {
     pub(crate) surfaces: Option<SurfacesTable>,
     /// Particles on a lattice within it, of which those near tools are awake: it becomes a hybrid body.
     pub(crate) particles: Option<ParticlesTable>,
+    /// Makes it the papers' hybrid, whose core its tets are.
+    pub(crate) seed: Option<SeedTable>,
     /// Moves the body (m, world); zero by default.
     #[serde(default)]
     pub(crate) offset_m: [f64; 3],

@@ -4,6 +4,7 @@ pub(crate) mod body;
 pub(crate) mod motion;
 pub(crate) mod region;
 pub(crate) mod schema;
+pub(crate) mod seed;
 pub(crate) mod source;
 pub(crate) mod tool;
 pub(crate) mod words;
@@ -204,7 +205,7 @@ pub(crate) enum IntegratorName {
 }
 
 /// Integrator, time step and precision.
-#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub(crate) struct NumericsTable {
     /// Precision of the force kernel.

@@ -7,7 +7,8 @@
 //! | Hybrid (HM1) | 188 | 186, 66 | 27 988, of which 50 to 600 awake, 200 on average | 27 988, 122 to 274, 202 |
 //!
 //! A connected mesh has at most three nodes more than tets, and 188 tets in one layer about 66.
-use super::{ShapeError, ellipsoid_shell, shell::ellipsoid_surface};
+pub(crate) use super::shell::ellipsoid_surface;
+use super::{ShapeError, ellipsoid_shell};
 use glam::DVec3;
 use palpate_physics::{
     TetMesh,

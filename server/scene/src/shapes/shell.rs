@@ -59,7 +59,7 @@ pub fn ventricle(
 
 /// A closed ellipsoid about the origin with these semi-axes (m), of about so many triangles: vertices (m) and triangles,
 /// counter-clockwise seen from outside.
-pub(super) fn ellipsoid_surface(axes_m: DVec3, target_triangles: u32) -> (Vec<DVec3>, Vec<[u32; 3]>) {
+pub(crate) fn ellipsoid_surface(axes_m: DVec3, target_triangles: u32) -> (Vec<DVec3>, Vec<[u32; 3]>) {
     let cap = Cap { axes_m, top_latitude: FRAC_PI_2 };
     let sphere = cap.triangulate(&cap.rings(f64::from(target_triangles)));
     (sphere.directions.iter().map(|&d| d * axes_m).collect(), sphere.triangles)

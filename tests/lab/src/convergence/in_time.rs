@@ -38,6 +38,7 @@ fn swung(substeps: u32) -> Result<Vec<DVec3>> {
         tet_region: vec![0; body.mesh.tets().len()],
         mesh: body.mesh,
         particles: None,
+        seed: None,
         prescribed: body.prescribed,
         loads: load.into_iter().map(|load| LoadSpec::NodalForces(load.forces_n)).collect(),
         gravity_m_per_s2: DVec3::ZERO,

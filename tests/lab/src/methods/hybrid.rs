@@ -89,14 +89,8 @@ impl Method for Hybrid {
         let mut driven = Driven::at_rest(&model, tool.as_ref());
         let touched = nearest(&model, fine.touch_m, self.active);
         wake_only(&model, &mut driven.state, &mut driven.scratch, touched);
-        Ok(Box::new(Pressed {
-            probe: Probe::new(&fine, &sample::points(problem.body)),
-            fine,
-            load,
-            tool,
-            driven,
-            model,
-        }))
+        let probe = Probe::new(&fine, &sample::points(problem.body));
+        Ok(Box::new(Pressed { model, driven, tool, load, fine, probe }))
     }
 }
 
@@ -122,7 +116,8 @@ pub(crate) fn nearest(model: &Model, point_m: DVec3, count: usize) -> Vec<u32> {
     near
 }
 
-struct Pressed {
+/// A body whose surface is the boundary of a fine mesh.
+pub(super) struct Pressed {
     model: Model,
     driven: Driven,
     tool: Option<Tool>,
@@ -132,6 +127,23 @@ struct Pressed {
 }
 
 impl Pressed {
+    /// At rest; with the fine mesh and where it is looked at.
+    pub(super) fn new(
+        model: Model,
+        tool: Option<Tool>,
+        load: Option<NodalLoad>,
+        (fine, probe): (TetBody, Probe),
+    ) -> Self {
+        Self { driven: Driven::at_rest(&model, tool.as_ref()), model, tool, load, fine, probe }
+    }
+
+    /// Of a seed body that no tool touches, but a load: its particles under this triangle are awake.
+    pub(super) fn touch(&mut self, triangle: Option<u32>) {
+        if let (Some(seed), true) = (&mut self.driven.state.seed, self.load.is_some()) {
+            seed.touched = triangle;
+        }
+    }
+
     /// Positions (m) of the fine mesh's nodes; those within stay at rest.
     fn positions_m(&self) -> Vec<DVec3> {
         let (mut x, mut skin) = (self.fine.mesh.positions_m().to_vec(), Vec::new());
@@ -161,11 +173,15 @@ impl Running for Pressed {
     }
 
     fn energy_error(&self) -> Option<f64> {
+        if self.model.seed().is_some() {
+            return None;
+        }
         self.driven.energy_error(&self.model)
     }
 
     fn size(&self) -> [usize; 3] {
-        [self.model.mesh().tets().len(), self.driven.state.x.len(), self.model.substeps() as usize]
+        let awake = self.driven.state.seed.as_ref().map_or(0, |_| self.model.most_awake_particles());
+        [self.model.mesh().tets().len(), self.driven.state.x.len() + awake, self.model.substeps() as usize]
     }
 
     fn failure(&self) -> Option<String> {

@@ -3,6 +3,7 @@
 //! - `subject.rs`: a problem on linear tetrahedra, which all of these share
 //! - `tetrahedra.rs`: as the server runs them, in all variants
 //! - `hybrid.rs`: coarse tets and particles
+//! - `seed.rs`: the papers' own hybrid
 //! - `quasi_newton/`: backward Euler as a minimisation, prefactored, with L-BFGS
 //! - `xpbd/`: position-based dynamics with small steps
 //! - `pace.rs`: how fast a problem is gone through
@@ -10,6 +11,7 @@ mod driven;
 mod hybrid;
 mod pace;
 mod quasi_newton;
+mod seed;
 mod subject;
 #[cfg(test)]
 mod testing;
@@ -24,6 +26,7 @@ use glam::DVec3;
 use hybrid::Hybrid;
 use miette::Result;
 use quasi_newton::QuasiNewton;
+use seed::SeedHybrid;
 use tetrahedra::Tetrahedra;
 use xpbd::Xpbd;
 
@@ -72,6 +75,7 @@ pub fn all() -> Vec<Box<dyn Method>> {
     let mut methods: Vec<Box<dyn Method>> = Vec::new();
     methods.extend(Tetrahedra::variants().into_iter().map(|method| Box::new(method) as Box<dyn Method>));
     methods.extend(Hybrid::variants().into_iter().map(|method| Box::new(method) as Box<dyn Method>));
+    methods.extend(SeedHybrid::variants().into_iter().map(|method| Box::new(method) as Box<dyn Method>));
     methods.extend(QuasiNewton::variants().into_iter().map(|method| Box::new(method) as Box<dyn Method>));
     methods.extend(Xpbd::variants().into_iter().map(|method| Box::new(method) as Box<dyn Method>));
     methods

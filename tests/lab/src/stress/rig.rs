@@ -111,6 +111,7 @@ pub(super) fn body(options: &Options, mesh: TetMesh, material: Material) -> Mode
         tet_region: vec![0; mesh.tets().len()],
         mesh,
         particles: None,
+        seed: None,
         regions: vec![Region { name: "body".into(), material, density_kg_per_m3: 1000.0 }],
         prescribed: Vec::new(),
         loads: Vec::new(),

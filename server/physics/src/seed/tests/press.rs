@@ -92,7 +92,7 @@ fn bad_inputs_are_left_out_and_counted() {
 #[test]
 fn a_core_alone_pushes_back_too() {
     let model = ball_with(|spec| spec.layer = None);
-    assert_eq!((model.surface_triangles().len(), model.most_awake()), (80, 0));
+    assert_eq!((model.surface_triangles().len(), model.most_awake()), (160, 0));
     let (reactions, _) = press(&model, 2e-3, 300);
     assert!(reactions[9] > 0.0 && reactions[9] > reactions[4], "{reactions:?}");
 }

@@ -1,0 +1,101 @@
+//! The papers' hybrid in the daemon, as its shipped scene: over real sockets, and with the bits of `palpated simulate`.
+#![allow(clippy::unwrap_used, clippy::expect_used)]
+mod common;
+use common::{Daemon, Mirror, PATIENCE, vec3};
+use glam::DVec3;
+use palpate_physics::snapshot;
+use palpate_proto::v1::{self, LevelOfDetail};
+use palpate_scene::{Limits, Scene, builtin, parse};
+use serde_json::Value;
+use std::process::Command;
+use tokio::time::timeout;
+
+const NAME: &str = "seed-hybrid";
+
+fn scene() -> Scene {
+    parse(builtin(NAME).unwrap(), NAME, None, &Limits::wire(), &mut |_, _| ()).unwrap()
+}
+
+/// The same scene offline, to a number of ticks.
+fn simulated(ticks: u64) -> Value {
+    let output = Command::new(env!("CARGO_BIN_EXE_palpated"))
+        .args(["simulate", NAME, "--json", "--duration-s", &(ticks as f64 * 7e-3).to_string()])
+        .output()
+        .unwrap();
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    serde_json::from_slice(&output.stdout).unwrap()
+}
+
+/// With particles awake, and asleep again.
+#[tokio::test(flavor = "multi_thread")]
+async fn the_live_loop_and_simulate_reach_the_same_bits() {
+    let daemon = Daemon::on(scene()).await;
+    daemon.pause().await;
+    daemon.reset().await;
+    for (ticks, some_awake) in [(400, true), (350, false)] {
+        let done = daemon.step(ticks).await;
+        let status = daemon.status().await;
+        assert_eq!(status.active_particles > 0, some_awake, "{} at tick {done}", status.active_particles);
+        assert_eq!(status.quarantine, "");
+        let offline = simulated(done);
+        let hash = daemon.snapshot().await.state_hash;
+        assert_eq!(offline["state_hash"], format!("{hash:016x}"), "at tick {done}");
+        assert_eq!(offline["body"]["particles"]["active"], status.active_particles);
+    }
+    let info = daemon.status().await.session.unwrap();
+    assert_eq!((info.tet_count, info.particle_count, info.most_active_particles), (186, 27_988, 274));
+    assert_eq!((info.tick_period_s, info.substeps_per_tick), (7e-3, 1));
+    daemon.finish().await;
+}
+
+/// The loop keeps the papers' period by the clock.
+#[tokio::test(flavor = "multi_thread")]
+async fn a_live_session_runs_at_the_papers_step() {
+    let daemon = Daemon::on(scene()).await;
+    let (first, begun) = (daemon.status().await, std::time::Instant::now());
+    tokio::time::sleep(std::time::Duration::from_millis(700)).await;
+    let last = daemon.status().await;
+    let ticks = (last.tick - first.tick) as f64;
+    // Ticks that a busy machine misses are skipped, so there may be fewer, but never more.
+    assert!(ticks >= 10.0 && ticks * 7e-3 <= begun.elapsed().as_secs_f64() + 0.02, "{ticks} ticks");
+    assert!((last.time_s - last.tick as f64 * 7e-3).abs() < 1e-9);
+    daemon.finish().await;
+}
+
+/// Viewers see the skin where the physics has it; a force on one of its vertices acts there.
+#[tokio::test(flavor = "multi_thread")]
+async fn viewers_see_the_skin_and_forces_act_on_it() {
+    let daemon = Daemon::on(scene()).await;
+    daemon.pause().await;
+    daemon.reset().await;
+    let session = daemon.running.as_ref().unwrap().daemon.session();
+    let rest_m = session.model.seed().unwrap().surface_rest_m();
+    let apex = (0..rest_m.len()).min_by(|&a, &b| rest_m[a].z.total_cmp(&rest_m[b].z)).unwrap();
+    let force = v1::InjectedForce {
+        surface_vertex: apex as u32,
+        force_n: Some(vec3(DVec3::Z * 1e-4)),
+        from_tick: 0,
+        tick_count: 400,
+    };
+    let request = v1::InjectForcesRequest { forces: vec![force], ..Default::default() };
+    daemon.session().inject_forces(request).await.unwrap();
+    daemon.step(400).await;
+    let request = v1::WatchRequest { level_of_detail: LevelOfDetail::Full.into(), ..Default::default() };
+    let mut stream = daemon.surface().watch(request).await.unwrap().into_inner();
+    let mut mirror = Mirror::default();
+    let snapshot = daemon.snapshot().await;
+    while mirror.last.as_ref().is_none_or(|last| last.tick != snapshot.tick) {
+        mirror.apply(timeout(PATIENCE, stream.message()).await.unwrap().unwrap().unwrap());
+    }
+    let state = snapshot::restore(&session.model, &snapshot.state).unwrap();
+    assert!(state.awake_particles() > 0);
+    let mut exact_m = Vec::new();
+    session.model.surface_positions_m(&state, &mut exact_m);
+    assert_eq!(exact_m.len(), rest_m.len());
+    for (vertex, exact) in exact_m.iter().enumerate() {
+        let error = (mirror.position_m(vertex) - *exact).abs().max_element();
+        assert!(error <= f64::from(mirror.quantum_m) / 2.0 + 1e-9, "vertex {vertex}: {error} m");
+    }
+    assert!(exact_m[apex].z - rest_m[apex].z > 1e-4, "{}", exact_m[apex] - rest_m[apex]);
+    daemon.finish().await;
+}
