@@ -86,7 +86,9 @@ fn kernels(criterion: &mut Criterion) {
                         group.bench_function(format!("{precision:?} {set:?}, rows of 10"), |b| {
                             b.iter(|| kernel.forces(&rows, (rest.len(), 0.5), &mut values));
                         });
-                        rows.iter_mut().for_each(|row| row.fading = true);
+                        for row in &mut rows {
+                            row.fading = true;
+                        }
                         group.bench_function(format!("{precision:?} {set:?}, rows of 10 that fade"), |b| {
                             b.iter(|| kernel.forces(&rows, (rest.len(), 0.5), &mut values));
                         });

@@ -53,8 +53,9 @@ pub struct ShareFade {
 /// All that fades.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct Fading {
-    cells: Vec<CellFade>,
-    tets: Vec<ShareFade>,
+    /// Ascending, as are the tets; after changing either, [`Self::start`].
+    pub(super) cells: Vec<CellFade>,
+    pub(super) tets: Vec<ShareFade>,
     progress: Progress,
     /// The largest entry of all.
     most: f64,
@@ -147,17 +148,7 @@ impl Fading {
         self.start();
     }
 
-    /// Takes a cell, or a tet, of those that were [`Self::clear`]ed.
-    pub(super) fn push_cell(&mut self, fade: CellFade) {
-        self.cells.push(fade);
-    }
-
-    /// The same of a tet.
-    pub(super) fn push_tet(&mut self, fade: ShareFade) {
-        self.tets.push(fade);
-    }
-
-    /// From now on it fades: all has been taken.
+    /// From now on it fades: all has been taken, but for the order of tets.
     pub(super) fn start(&mut self) {
         self.tets.sort_unstable_by_key(|fade| fade.tet);
         self.progress = Progress { left: 1.0, along_j: [0.0; 2] };

@@ -126,22 +126,22 @@ impl Before {
         self.next.clear();
         for &cell in next.cells() {
             if stays(body, [patch, next], self.some_sleep, cell) {
-                fading.of_cell(cell).filter(CellFade::is_trace).into_iter().for_each(|fade| self.next.push_cell(fade));
+                self.next.cells.extend(fading.of_cell(cell).filter(CellFade::is_trace));
                 continue;
             }
             let (fade, energy_j) = self.of_cell(body, next, cell);
             now_j += energy_j;
-            fade.into_iter().for_each(|fade| self.next.push_cell(fade));
+            self.next.cells.extend(fade);
         }
         for number in 0..self.tets.len() {
             let (fade, energy_j) = self.of_tet(body, next, x, &self.tets[number]);
             now_j += energy_j;
-            fade.into_iter().for_each(|fade| self.next.push_tet(fade));
+            self.next.tets.extend(fade);
         }
         // Tets that this leaves alone go on.
         for fade in fading.left_of_tets().filter(ShareFade::is_trace) {
             if self.tets.binary_search_by_key(&fade.tet, |before| before.tet).is_err() {
-                self.next.push_tet(fade);
+                self.next.tets.push(fade);
             }
         }
         self.next.start();

@@ -19,6 +19,14 @@ const BATCH: usize = 4;
 /// Points 1 to 3, 4 to 6, and 7 of a block's cells, three components each; what is over stays zero.
 type Corners<T, const N: usize> = [Lanes<T, N>; 3];
 
+/// A block of which something fades.
+struct FadingBlock<'a, T, const N: usize> {
+    block: &'a FadeBlock<T, N>,
+    left: f64,
+    /// `s ∂U/∂s` (J), added to.
+    along_j: &'a mut f64,
+}
+
 /// The pass over the cells of one material.
 pub(super) struct CutForces<'a, T, const N: usize> {
     pub(super) split: &'a Split<T>,
@@ -51,7 +59,7 @@ impl<T: Scalar, const N: usize> Pass<T> for CutForces<'_, T, N> {
             for (index, block) in batch.iter().enumerate() {
                 let (of, forces) = ([&edges[index], &rates[index]], &mut forces[index]);
                 let fade = Some(&self.fades[number * BATCH + index]).filter(|fade| fade.lanes != 0);
-                let fading = fade.map(|fade| (fade, self.left, &mut self.fading_j));
+                let fading = fade.map(|block| FadingBlock { block, left: self.left, along_j: &mut self.fading_j });
                 power_w += cut::<V, T, L, VISCOUS, N>(self.split, (block, fading), of, forces);
             }
             for (block, forces) in batch.iter().zip(&forces) {
@@ -82,7 +90,7 @@ fn store<V: Vector, const N: usize>(values: &[V; 7], corners: &mut Corners<V::Sc
 #[inline(always)]
 fn cut<V: Vector<Scalar = T>, T: Scalar, L: LaneLaw, const VISCOUS: bool, const N: usize>(
     split: &Split<T>,
-    (block, mut fading): (&CutBlock<T, N>, Option<(&FadeBlock<T, N>, f64, &mut f64)>),
+    (block, mut fading): (&CutBlock<T, N>, Option<FadingBlock<'_, T, N>>),
     [edges, rates]: [&Corners<T, N>; 2],
     forces: &mut Corners<T, N>,
 ) -> f64 {
@@ -106,7 +114,7 @@ fn cut<V: Vector<Scalar = T>, T: Scalar, L: LaneLaw, const VISCOUS: bool, const 
         let whole = V::load(&block.minus_kappa[first..]);
         let mut gone = V::of(0.0);
         let mut faded = V::of(0.0);
-        let (p, density) = if let Some((fade, left, _)) = &fading {
+        let (p, density) = if let Some(FadingBlock { block: fade, left, .. }) = &fading {
             let left = V::of(*left);
             gone = V::load(&fade.entries[18][first..]) * left;
             let of_shape = scaled(&load_matrix::<V, N>(&fade.entries[..9], first), left);
@@ -145,8 +153,8 @@ fn cut<V: Vector<Scalar = T>, T: Scalar, L: LaneLaw, const VISCOUS: bool, const 
             }
             store(&f, forces, axis, first);
         }
-        if let Some((_, _, sum)) = &mut fading {
-            add_lanes(faded, sum);
+        if let Some(fading) = &mut fading {
+            add_lanes(faded, fading.along_j);
         }
     }
     power.iter().fold(0.0, |sum, &p| sum + p.into())
