@@ -145,7 +145,7 @@ impl Fading {
     pub(super) fn clear(&mut self) {
         self.cells.clear();
         self.tets.clear();
-        self.start();
+        (self.progress, self.most, self.mark) = (Progress::default(), 0.0, 0);
     }
 
     /// From now on it fades: all has been taken, but for the order of tets.
