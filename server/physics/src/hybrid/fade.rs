@@ -93,6 +93,25 @@ fn piola(material: &Material, f: &DMat3, a: &DMat3) -> DMat3 {
     p + p * a.transpose()
 }
 
+/// `U_c` (J) of effective gradients, and of modes' `(1 − a) Σ_k w_k |q_k|²` (m²).
+pub(super) fn cell_j(rest: &RestCell, material: &Material, [shape, volume]: [&DMat3; 2], modes_m2: f64) -> f64 {
+    let (of_shape, of_volume) = split(material);
+    let density = of_shape.energy_density(shape) + of_volume.energy_density(volume);
+    rest.volume_m3 * density + 0.5 * rest.hourglass_m * material.lame.mu_pa * modes_m2
+}
+
+/// `U_e` (J) of effective gradients.
+pub(super) fn share_j(share: &Share, material: &Material, shapes: &[DMat3; PARTS], whole: &DMat3) -> f64 {
+    let (of_shape, of_volume) = split(material);
+    let shape: f64 = shapes.iter().zip(share.volume_m3).map(|(f, v)| v * of_shape.energy_density(f)).sum();
+    shape + share.total_m3() * of_volume.energy_density(whole)
+}
+
+/// `Σ_k w_k |q_k|²` (m²).
+pub(super) fn modes_m2(rest: &RestCell, y: &[DVec3; 8]) -> f64 {
+    rest.amplitudes(y).iter().zip(MODE_WEIGHTS).map(|(q, w)| w * q.length_squared()).sum()
+}
+
 fn largest(a: &DMat3) -> f64 {
     a.to_cols_array().iter().fold(0.0, |most, entry| most.max(entry.abs()))
 }
@@ -197,7 +216,7 @@ impl Fading {
     }
 
     pub(super) fn is_finite(&self) -> bool {
-        let rest = [self.left(), self.most, self.along_j()].iter().all(|a| a.is_finite());
+        let rest = (0.0..=1.0).contains(&self.left()) && self.most.is_finite() && self.along_j().is_finite();
         let cells =
             rest && self.cells.iter().all(|c| c.shape.is_finite() && c.volume.is_finite() && c.modes.is_finite());
         cells && self.tets.iter().all(|t| t.whole.is_finite() && t.parts.iter().all(DMat3::is_finite))
@@ -257,12 +276,8 @@ impl CellFade {
 
     /// `U_c` (J).
     pub(super) fn energy_j(&self, rest: &RestCell, material: &Material, y: &[DVec3; 8]) -> f64 {
-        let (of_shape, of_volume) = split(material);
         let [shape, volume] = self.effective(rest, y);
-        let density = of_shape.energy_density(&shape) + of_volume.energy_density(&volume);
-        let kappa = rest.hourglass_m * material.lame.mu_pa * (1.0 - self.modes);
-        let modes = rest.amplitudes(y).iter().zip(MODE_WEIGHTS).map(|(q, w)| w * q.length_squared()).sum::<f64>();
-        rest.volume_m3 * density + 0.5 * kappa * modes
+        cell_j(rest, material, [&shape, &volume], (1.0 - self.modes) * modes_m2(rest, y))
     }
 
     /// `f_p` (N), and the power (W) that viscous stress takes.
@@ -318,10 +333,8 @@ impl ShareFade {
         if share.nodes.is_empty() {
             return 0.0;
         }
-        let (of_shape, of_volume) = split(material);
         let (shapes, whole) = self.effective(share, x);
-        let shape: f64 = shapes.iter().zip(share.volume_m3).map(|(f, v)| v * of_shape.energy_density(f)).sum();
-        shape + share.total_m3() * of_volume.energy_density(&whole)
+        share_j(share, material, &shapes, &whole)
     }
 
     /// Adds forces (N) to `forces_n`; returns the power (W) that viscous stress takes.

@@ -3,15 +3,13 @@
 //! Left alone is what cannot change: cells that stay awake and whose particles stay where they are, and coarse tets that keep what they have and whose nodes do.
 use super::{
     body::Hybrid,
-    cell::{MODE_WEIGHTS, RestCell},
     composite::PARTS,
-    fade::{CellFade, Fading, ShareFade, change, effective},
+    fade::{CellFade, Fading, ShareFade, cell_j, change, effective, modes_m2, share_j},
     partition::{Cell, Partition},
     patch::KEPT,
     running::RunningPatch,
-    share::{Share, split},
+    share::Share,
 };
-use crate::material::Material;
 use glam::{DMat3, DVec3};
 
 /// Hourglasses smaller than this, over the spacing, are none.
@@ -211,28 +209,6 @@ impl Before {
 /// Whether a switch changes nothing about an awake cell: its particles stay where they are. Where some fall asleep coarse nodes move, and with them those that follow.
 fn stays(body: &Hybrid, [before, after]: [&RunningPatch; 2], some_sleep: bool, cell: u32) -> bool {
     before.is_awake(cell) && after.is_awake(cell) && (!some_sleep || after.is_inside(body, cell))
-}
-
-/// `U_c` (J) of effective gradients, and of modes' `(1 − a) Σ_k w_k |q_k|²` (m²).
-fn cell_j(rest: &RestCell, material: &Material, [shape, volume]: [&DMat3; 2], modes_m2: f64) -> f64 {
-    let (of_shape, of_volume) = split(material);
-    let density = of_shape.energy_density(shape) + of_volume.energy_density(volume);
-    rest.volume_m3 * density + 0.5 * rest.hourglass_m * material.lame.mu_pa * modes_m2
-}
-
-/// `U_e` (J) of effective gradients.
-fn share_j(share: &Share, material: &Material, shapes: &[DMat3; PARTS], whole: &DMat3) -> f64 {
-    if share.nodes.is_empty() {
-        return 0.0;
-    }
-    let (of_shape, of_volume) = split(material);
-    let shape: f64 = shapes.iter().zip(share.volume_m3).map(|(f, v)| v * of_shape.energy_density(f)).sum();
-    shape + share.total_m3() * of_volume.energy_density(whole)
-}
-
-/// `Σ_k w_k |q_k|²` (m²).
-fn modes_m2(rest: &RestCell, y: &[DVec3; 8]) -> f64 {
-    rest.amplitudes(y).iter().zip(MODE_WEIGHTS).map(|(q, w)| w * q.length_squared()).sum()
 }
 
 /// `(1 − ε) V_c` (m³).
