@@ -210,6 +210,30 @@ fn particles_wake_before_the_touch_follow_it_and_sleep_again() {
     assert!(rig.state.active.is_empty(), "{} still awake", rig.state.active.len());
 }
 
+/// Contact goes on with what it knew of the skin where particles wake and fall asleep beneath a sliding tool, and misses nothing.
+#[test]
+fn switches_are_followed_by_contact_as_if_it_looked_at_all_triangles() {
+    let run = |distant_contact: bool| {
+        let mut spec = pressed(Precision::Double).model.spec().clone();
+        let particles = spec.particles.as_mut().unwrap();
+        particles.waking = Waking::ByTools { reach_m: 8e-3 };
+        particles.most_active = 250;
+        spec = held_below(ModelSpec { mesh: block(0.45).mesh, prescribed: vec![], ..spec });
+        spec.settings.skips.distant_contact = distant_contact;
+        let mut rig = Rig::new(spec);
+        let mut sets = 0;
+        for tick in 0..1500 {
+            let (t, before) = (f64::from(tick) * 1e-3, rig.state.active.ids().to_vec());
+            rig.tick_at(DVec3::new(6e-3 * (5.0 * t).sin(), 3e-3 * (7.0 * t).sin(), 6e-3 - 2e-3 * (t / 0.2).min(1.0)));
+            sets += u32::from(rig.state.active.ids() != before);
+        }
+        (sets, rig.state.x)
+    };
+    let (sets, x) = run(true);
+    assert!(sets > 10, "{sets}");
+    assert_eq!((sets, x), run(false));
+}
+
 /// A tool passes a turning, trembling body in free flight and touches nothing.
 #[test]
 fn momenta_stay_while_particles_wake_and_sleep_in_free_flight() {

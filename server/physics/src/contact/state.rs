@@ -132,7 +132,7 @@ impl ContactState {
     }
 
     /// The surface moved by at most this much (m).
-    pub(super) fn travelled(&mut self, distance_m: f64) {
+    pub(crate) fn travelled(&mut self, distance_m: f64) {
         self.travel_m += distance_m;
         for tool in &mut self.tools {
             tool.candidates.slack_m -= distance_m;

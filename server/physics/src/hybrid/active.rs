@@ -159,6 +159,8 @@ pub(crate) struct HybridScratch {
     pub(super) before: Before,
     pub(crate) balance: Balance,
     pub(super) long_steps: LongStepHistory,
+    /// Forces are not current only because particles woke or fell asleep at the start of this tick, and contact knows how far the skin moved by that.
+    pub(crate) skin_is_tracked: bool,
 }
 
 impl HybridScratch {
@@ -179,6 +181,7 @@ impl HybridScratch {
             before: Before::with_room(room_for_cells(body, most), body.partition().shares().len()),
             balance: Balance::with_room(entries),
             long_steps: LongStepHistory::with_room(body.node_count(), entries),
+            skin_is_tracked: false,
         })
     }
 

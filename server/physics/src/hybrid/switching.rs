@@ -99,6 +99,7 @@ impl Looking {
 impl HybridScratch {
     /// Before a tick: makes the patch that of the state's active particles, and now and then looks which should be. Allocates nothing.
     pub(crate) fn prepare(&mut self, model: &Model, body: &Hybrid, state: &mut State) {
+        self.skin_is_tracked = false;
         self.follow(body, &state.active);
         state.follow_coarse_forces(model.spec().settings.tick_period_s);
         if !state.active.fading.is_empty() || !state.active.balance_n.is_empty() {
@@ -111,7 +112,10 @@ impl HybridScratch {
             if state.active.is_switching && since_look <= u64::from(RunningPatch::SLICES) {
                 self.coming.go_on(body, &state.active.next);
             } else if state.active.is_switching {
-                self.switch(model, body, state);
+                let was_current = state.force_is_current;
+                let moved_m = self.switch(model, body, state);
+                state.contact.travelled(moved_m);
+                self.skin_is_tracked = was_current;
             }
             return;
         }
@@ -136,8 +140,9 @@ impl HybridScratch {
         }
     }
 
-    /// Goes over to the particles that are to be active next.
-    fn switch(&mut self, model: &Model, body: &Hybrid, state: &mut State) {
+    /// Goes over to the particles that are to be active next; returns a bound of how far (m) that moves any vertex of the skin: particles that fall asleep
+    /// go where they follow to, and coarse nodes, with what follows them, to what is nearest to those.
+    fn switch(&mut self, model: &Model, body: &Hybrid, state: &mut State) -> f64 {
         self.coming.finish(body, &state.active.next);
         let Self { patch, coming, looking, before, momenta, balance, .. } = self;
         let next = &mut coming.patch;
@@ -157,10 +162,11 @@ impl HybridScratch {
         looking.were_m.clear();
         looking.were_m.extend_from_slice(&state.x[..nodes]);
         balance.take(patch.metric_mut(), state);
-        let mut couple = DVec3::ZERO;
+        let (mut couple, mut farthest_m) = (DVec3::ZERO, 0.0_f64);
         for (number, id) in state.active.ids().iter().enumerate() {
             if state.active.next.binary_search(id).is_err() {
                 let (y, w) = (state.x[nodes + number], state.v[nodes + number]);
+                farthest_m = farthest_m.max(y.distance(body.partition.anchor(*id).of(&state.x)));
                 couple += looking.hand_over(body, *id, (y, w), state);
                 balance.hand_over(body, (number, *id), &mut looking.handed_n);
             }
@@ -172,6 +178,8 @@ impl HybridScratch {
             couple -= looking.shift(body, next.metric_mut(), state, momenta);
             looking.turn(couple, &state.x);
         }
+        let shifts = looking.were_m.iter().zip(&state.x).map(|(were_m, x)| were_m.distance(*x));
+        farthest_m += shifts.fold(0.0, f64::max);
         next.displace(body, &state.x);
         let places = (&looking.were_m[..], &state.x[..]);
         let (first_moved_j, elastic_j) = before.fade_into(body, [patch, next], places, &mut state.active.fading);
@@ -193,6 +201,7 @@ impl HybridScratch {
             balance.demand(body, next.metric_mut(), &looking.left, state.active.ids(), &looking.handed_n);
         }
         coming.swap(patch);
+        body.amplification() * farthest_m
     }
 }
 

@@ -49,8 +49,11 @@ impl Tick<'_> {
 
     /// Forces at the start of the tick, unless the last tick left them.
     pub(super) fn make_force_current(&self, state: &mut State, scratch: &mut Scratch) {
+        let is_tracked = scratch.hybrid.as_mut().is_some_and(|own| std::mem::take(&mut own.skin_is_tracked));
         if !state.force_is_current {
-            state.contact.forget_geometry();
+            if !is_tracked {
+                state.contact.forget_geometry();
+            }
             self.evaluate(state, scratch, &Evaluation::before_a_step(0.0, 0.0));
         }
     }
