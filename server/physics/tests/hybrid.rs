@@ -3,7 +3,7 @@
 mod rig;
 use glam::DVec3;
 use palpate_physics::{
-    Energies, LoadSpec, ModelSpec, Precision, Settings, Substeps,
+    Energies, LoadSpec, ModelSpec, Precision, Scratch, Settings, Substeps,
     contact::Coupling,
     hybrid::{
         Waking,
@@ -210,23 +210,57 @@ fn particles_wake_before_the_touch_follow_it_and_sleep_again() {
     assert!(rig.state.active.is_empty(), "{} still awake", rig.state.active.len());
 }
 
+/// A tool that wakes particles and is to slide.
+fn about_to_slide(distant_contact: bool) -> Rig {
+    let mut spec = pressed(Precision::Double).model.spec().clone();
+    let particles = spec.particles.as_mut().unwrap();
+    particles.waking = Waking::ByTools { reach_m: 8e-3 };
+    particles.most_active = 250;
+    spec = held_below(ModelSpec { mesh: block(0.45).mesh, prescribed: vec![], ..spec });
+    spec.settings.skips.distant_contact = distant_contact;
+    Rig::new(spec)
+}
+
+/// A tick of it; whether other particles are awake after it.
+fn slide(rig: &mut Rig) -> bool {
+    let (t, before) = (rig.state.tick as f64 * 1e-3, rig.state.active.ids().to_vec());
+    rig.tick_at(DVec3::new(6e-3 * (5.0 * t).sin(), 3e-3 * (7.0 * t).sin(), 6e-3 - 2e-3 * (t / 0.2).min(1.0)));
+    rig.state.active.ids() != before
+}
+
+/// The patch that a switch goes over to is made in ticks before it, beside the state: without it a state goes on no differently, wherever it was saved.
+#[test]
+fn what_is_saved_while_a_switch_is_coming_goes_on_with_the_same_bits() {
+    let mut rig = about_to_slide(true);
+    (0..300).for_each(|_| _ = slide(&mut rig));
+    let mut switched = None;
+    let mut states = Vec::new();
+    // To the first switch that has come as a whole since, and on from there.
+    while switched.is_none_or(|at| states.len() < at + 20) {
+        let has_switched = slide(&mut rig);
+        if has_switched && states.len() > 12 {
+            switched = switched.or(Some(states.len()));
+        }
+        states.push(rig.state.clone());
+    }
+    let switched = switched.unwrap();
+    for start in switched - 12..switched + 3 {
+        let bytes = snapshot::save(&rig.model, &states[start]);
+        rig.state = snapshot::restore(&rig.model, &bytes).unwrap();
+        rig.scratch = Scratch::new(&rig.model);
+        for expected in &states[start + 1..] {
+            slide(&mut rig);
+            assert_eq!(snapshot::state_hash(&rig.state), snapshot::state_hash(expected), "from {start} of {switched}");
+        }
+    }
+}
+
 /// Contact goes on with what it knew of the skin where particles wake and fall asleep beneath a sliding tool, and misses nothing.
 #[test]
 fn switches_are_followed_by_contact_as_if_it_looked_at_all_triangles() {
     let run = |distant_contact: bool| {
-        let mut spec = pressed(Precision::Double).model.spec().clone();
-        let particles = spec.particles.as_mut().unwrap();
-        particles.waking = Waking::ByTools { reach_m: 8e-3 };
-        particles.most_active = 250;
-        spec = held_below(ModelSpec { mesh: block(0.45).mesh, prescribed: vec![], ..spec });
-        spec.settings.skips.distant_contact = distant_contact;
-        let mut rig = Rig::new(spec);
-        let mut sets = 0;
-        for tick in 0..1500 {
-            let (t, before) = (f64::from(tick) * 1e-3, rig.state.active.ids().to_vec());
-            rig.tick_at(DVec3::new(6e-3 * (5.0 * t).sin(), 3e-3 * (7.0 * t).sin(), 6e-3 - 2e-3 * (t / 0.2).min(1.0)));
-            sets += u32::from(rig.state.active.ids() != before);
-        }
+        let mut rig = about_to_slide(distant_contact);
+        let sets = (0..1500).filter(|_| slide(&mut rig)).count();
         (sets, rig.state.x)
     };
     let (sets, x) = run(true);

@@ -18,9 +18,8 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct ActiveParticles {
     ids: Vec<u32>,
-    /// Those to be, while a switch is coming.
+    /// Those to be: others while a switch is coming.
     pub(super) next: Vec<u32>,
-    pub(super) is_switching: bool,
     /// Of every tool.
     pub(super) balls: Vec<Option<Ball>>,
     pub(crate) fading: Fading,
@@ -38,7 +37,6 @@ impl ActiveParticles {
         Self {
             ids: Vec::with_capacity(room(model)),
             next: Vec::with_capacity(room(model)),
-            is_switching: false,
             balls: vec![None; tools(model)],
             fading: fading_with_room(model),
             balance_n: Vec::with_capacity(entries(model)),
@@ -63,6 +61,10 @@ impl ActiveParticles {
         self.ids.len()
     }
 
+    pub(super) fn is_switching(&self) -> bool {
+        self.next != self.ids
+    }
+
     /// Whether all sleep.
     pub fn is_empty(&self) -> bool {
         self.ids.is_empty()
@@ -78,7 +80,6 @@ impl ActiveParticles {
     pub(crate) fn clear(&mut self) {
         self.ids.clear();
         self.next.clear();
-        self.is_switching = false;
         self.balls.fill(None);
         self.fading.clear();
         self.balance_n.clear();
@@ -90,7 +91,6 @@ impl ActiveParticles {
     pub(crate) fn copy_from(&mut self, other: &Self) {
         self.ids.clone_from(&other.ids);
         self.next.clone_from(&other.next);
-        self.is_switching = other.is_switching;
         self.balls.clone_from(&other.balls);
         self.fading.copy_from(&other.fading);
         self.balance_n.clone_from(&other.balance_n);
@@ -112,8 +112,8 @@ impl ActiveParticles {
             && self.switched_j.is_finite()
             && self.long_steps.fit(model.rest_positions_m().len(), model.rest_positions_m().len() + self.ids.len())
             && self.fading.is_sorted()
-            && self.fading.cells().iter().all(|fade| self.touches(model, fade.cell))
-            && self.fading.tets().iter().all(|fade| (fade.tet as usize) < model.mesh().tets().len())
+            && self.fading.cells.iter().all(|fade| self.touches(model, fade.cell))
+            && self.fading.tets.iter().all(|fade| (fade.tet as usize) < model.mesh().tets().len())
             && [&self.ids, &self.next]
                 .into_iter()
                 .all(|list| list.len() <= room(model) && list.is_sorted_by(|a, b| a < b) && list.iter().all(may_wake))
@@ -221,7 +221,6 @@ impl HybridScratch {
 impl State {
     /// Goes over to the particles that are to be active next. `moved` is a buffer. Allocates nothing where there is room.
     pub(super) fn switch(&mut self, body: &Hybrid, moved: &mut Vec<DVec3>) {
-        self.active.is_switching = false;
         let wanted = &self.active.next;
         let nodes = body.node_count();
         for list in [&mut self.x, &mut self.v] {

@@ -128,16 +128,6 @@ impl Fading {
         fading
     }
 
-    /// Cells, as they woke.
-    pub fn cells(&self) -> &[CellFade] {
-        &self.cells
-    }
-
-    /// Coarse tets, as they were left.
-    pub fn tets(&self) -> &[ShareFade] {
-        &self.tets
-    }
-
     /// `s`.
     pub fn left(&self) -> f64 {
         self.progress.left
@@ -259,7 +249,7 @@ impl CellFade {
     }
 
     /// Whether it is more than what may be left out without being booked.
-    pub(super) fn is_trace(&self) -> bool {
+    pub(super) fn exceeds_a_trace(&self) -> bool {
         self.largest() > TRACE
     }
 
@@ -312,7 +302,7 @@ impl ShareFade {
     }
 
     /// Whether it is more than what may be left out without being booked.
-    pub(super) fn is_trace(&self) -> bool {
+    pub(super) fn exceeds_a_trace(&self) -> bool {
         self.largest() > TRACE
     }
 

@@ -124,7 +124,7 @@ impl Before {
         self.next.clear();
         for &cell in next.cells() {
             if stays(body, [patch, next], self.some_sleep, cell) {
-                self.next.cells.extend(fading.of_cell(cell).filter(CellFade::is_trace));
+                self.next.cells.extend(fading.of_cell(cell).filter(CellFade::exceeds_a_trace));
                 continue;
             }
             let (fade, energy_j) = self.of_cell(body, next, cell);
@@ -137,7 +137,7 @@ impl Before {
             self.next.tets.extend(fade);
         }
         // Tets that this leaves alone go on.
-        for fade in fading.left_of_tets().filter(ShareFade::is_trace) {
+        for fade in fading.left_of_tets().filter(ShareFade::exceeds_a_trace) {
             if self.tets.binary_search_by_key(&fade.tet, |before| before.tet).is_err() {
                 self.next.tets.push(fade);
             }

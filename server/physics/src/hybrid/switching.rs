@@ -109,13 +109,8 @@ impl HybridScratch {
         let Waking::ByTools { reach_m } = particles.waking else { return };
         let since_look = state.tick % LOOK_EVERY_TICKS;
         if since_look > 0 {
-            if state.active.is_switching && since_look <= u64::from(RunningPatch::SLICES) {
-                self.coming.go_on(body, &state.active.next);
-            } else if state.active.is_switching {
-                let was_current = state.force_is_current;
-                let moved_m = self.switch(model, body, state);
-                state.contact.travelled(moved_m);
-                self.skin_is_tracked = was_current;
+            if state.active.is_switching() {
+                self.go_on_switching(model, body, state, since_look);
             }
             return;
         }
@@ -124,8 +119,19 @@ impl HybridScratch {
         place_balls(model, &view, particles.spacing_m, state);
         self.looking.want(body, &state.active, reach_m, particles.most_active);
         self.looking.keep_unsettled(&self.patch, particles);
-        state.active.is_switching = self.looking.wanted != state.active.ids();
         state.active.next.clone_from(&self.looking.wanted);
+    }
+
+    /// Lays the coming patch out, a slice a tick after a look, then goes over to it.
+    fn go_on_switching(&mut self, model: &Model, body: &Hybrid, state: &mut State, since_look: u64) {
+        if since_look <= u64::from(RunningPatch::SLICES) {
+            self.coming.go_on(body, &state.active.next);
+        } else {
+            let was_current = state.force_is_current;
+            let moved_m = self.switch(model, body, state);
+            state.contact.travelled(moved_m);
+            self.skin_is_tracked = was_current;
+        }
     }
 
     /// A tick's fading of balancing forces; strains fade with the substeps, until nothing is left to speak of.
@@ -165,9 +171,10 @@ impl HybridScratch {
         let (mut couple, mut farthest_m) = (DVec3::ZERO, 0.0_f64);
         for (number, id) in state.active.ids().iter().enumerate() {
             if state.active.next.binary_search(id).is_err() {
-                let (y, w) = (state.x[nodes + number], state.v[nodes + number]);
-                farthest_m = farthest_m.max(y.distance(body.partition.anchor(*id).of(&state.x)));
-                couple += looking.hand_over(body, *id, (y, w), state);
+                let (taken, away_m) =
+                    looking.hand_over(body, *id, (state.x[nodes + number], state.v[nodes + number]), state);
+                couple += taken;
+                farthest_m = farthest_m.max(away_m);
                 balance.hand_over(body, (number, *id), &mut looking.handed_n);
             }
         }
@@ -216,10 +223,9 @@ pub fn wake_only(model: &Model, state: &mut State, scratch: &mut Scratch, partic
     next.sort_unstable();
     next.dedup();
     next.truncate(room(model));
-    if state.active.next != state.active.ids() {
+    if state.active.is_switching() {
         own.switch(model, body, state);
     }
-    state.active.is_switching = false;
 }
 
 /// Where the tools' balls are now.
@@ -248,18 +254,19 @@ fn place_balls(model: &Model, view: &SkinView<'_>, spacing_m: f64, state: &mut S
 }
 
 impl Looking {
-    /// Takes the impulse of a particle that falls asleep, and the nodes of its tet; returns its couple (kg m²/s).
-    fn hand_over(&mut self, body: &Hybrid, particle: u32, (y, w): (DVec3, DVec3), state: &State) -> DVec3 {
+    /// Takes the impulse of a particle that falls asleep, and the nodes of its tet; returns its couple (kg m²/s), and how far (m) it is from where it goes.
+    fn hand_over(&mut self, body: &Hybrid, particle: u32, (y, w): (DVec3, DVec3), state: &State) -> (DVec3, f64) {
         let anchor = body.partition.anchor(particle);
         let mass_kg = (1.0 - KEPT) * body.masses.particle_kg[particle as usize];
         anchor.push((w - anchor.of(&state.v)) * mass_kg, &mut self.impulses);
-        self.projection.hand_over(&anchor, mass_kg, y - anchor.of(&state.x));
+        let away_m = y - anchor.of(&state.x);
+        self.projection.hand_over(&anchor, mass_kg, away_m);
         for node in body.partition.coarse().tets()[anchor.tet as usize].map(|node| node as usize) {
             if body.free[node] == BVec3::TRUE {
                 self.weights_kg[node] = body.masses.node_kg[node];
             }
         }
-        (y - anchor.of(&state.x)).cross(w) * mass_kg
+        (away_m.cross(w) * mass_kg, away_m.length())
     }
 
     /// Moves the coarse nodes to what is nearest to what has fallen asleep; returns the angular momentum (kg m²/s) that they gain by it.

@@ -222,7 +222,7 @@ impl<T: Scalar, const N: usize> Tables<T, N> {
                 minus_kappa: [zero; N],
             });
         }
-        let nothing = FadeBlock { entries: entries(None).map(|entry| [T::of(entry); N]), lanes: 0 };
+        let nothing = FadeBlock { entries: [[zero; N]; ENTRIES], lanes: 0 };
         self.fades.resize(self.blocks.len(), nothing);
         self.runs.push(Run { material, blocks: first..self.blocks.len(), cells });
     }

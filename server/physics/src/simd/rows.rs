@@ -94,7 +94,7 @@ impl<T: Scalar> Arrays<T> {
             velocities: zeros(if is_viscous { entries } else { 0 }),
             left: zeros(entries),
             right: zeros(entries),
-            fades: self::entries(None).map(|entry| vec![T::of(entry); cells + LANES]),
+            fades: std::array::from_fn(|_| vec![T::of(0.0); cells + LANES]),
         }
     }
 }

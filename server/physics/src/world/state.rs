@@ -138,6 +138,12 @@ impl State {
         self.seed.as_ref().map_or(self.active.len(), |seed| seed.awake as usize)
     }
 
+    /// Positions (m) of the awake particles.
+    pub fn awake_particles_m(&self) -> &[DVec3] {
+        let of_hybrid = &self.x[self.x.len() - self.active.len()..];
+        self.seed.as_ref().map_or(of_hybrid, |seed| &seed.now.particles.x[..seed.awake as usize])
+    }
+
     /// Simulated time (s) since reset.
     pub fn time_s(&self, model: &Model) -> f64 {
         self.tick as f64 * model.spec().settings.tick_period_s

@@ -92,7 +92,7 @@ impl RunningPatch {
         }
         fading_cells.clear();
         let mut number = 0;
-        for fade in fading.cells() {
+        for fade in &fading.cells {
             while cells.get(number).is_some_and(|&cell| cell < fade.cell) {
                 number += 1;
             }
@@ -107,7 +107,7 @@ impl RunningPatch {
             }
         }
         self.fading_tets.clear();
-        for fade in fading.tets() {
+        for fade in &fading.tets {
             self.fading_tets.push(fade.tet);
             self.share_kernel.put_fade(fade.tet as usize, Some(fade));
         }
