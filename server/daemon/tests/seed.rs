@@ -1,35 +1,19 @@
 //! The papers' hybrid in the daemon, as its shipped scene: over real sockets, and with the bits of `palpated simulate`.
 #![allow(clippy::unwrap_used, clippy::expect_used)]
 mod common;
-use common::{Daemon, Mirror, PATIENCE, vec3};
+use common::{
+    Daemon,
+    hybrid::{SEED, seed_scene},
+    seen::{Seen, simulated},
+    vec3,
+};
 use glam::DVec3;
-use palpate_physics::snapshot;
-use palpate_proto::v1::{self, LevelOfDetail};
-use palpate_scene::{Limits, Scene, builtin, parse};
-use serde_json::Value;
-use std::process::Command;
-use tokio::time::timeout;
-
-const NAME: &str = "seed-hybrid";
-
-fn scene() -> Scene {
-    parse(builtin(NAME).unwrap(), NAME, None, &Limits::wire(), &mut |_, _| ()).unwrap()
-}
-
-/// The same scene offline, to a number of ticks.
-fn simulated(ticks: u64) -> Value {
-    let output = Command::new(env!("CARGO_BIN_EXE_palpated"))
-        .args(["simulate", NAME, "--json", "--duration-s", &(ticks as f64 * 7e-3).to_string()])
-        .output()
-        .unwrap();
-    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
-    serde_json::from_slice(&output.stdout).unwrap()
-}
+use palpate_proto::v1;
 
 /// With particles awake, and asleep again.
 #[tokio::test(flavor = "multi_thread")]
 async fn the_live_loop_and_simulate_reach_the_same_bits() {
-    let daemon = Daemon::on(scene()).await;
+    let daemon = Daemon::on(seed_scene()).await;
     daemon.pause().await;
     daemon.reset().await;
     for (ticks, some_awake) in [(400, true), (350, false)] {
@@ -37,7 +21,7 @@ async fn the_live_loop_and_simulate_reach_the_same_bits() {
         let status = daemon.status().await;
         assert_eq!(status.active_particles > 0, some_awake, "{} at tick {done}", status.active_particles);
         assert_eq!(status.quarantine, "");
-        let offline = simulated(done);
+        let offline = simulated(SEED, done as f64 * 7e-3);
         let hash = daemon.snapshot().await.state_hash;
         assert_eq!(offline["state_hash"], format!("{hash:016x}"), "at tick {done}");
         assert_eq!(offline["body"]["particles"]["active"], status.active_particles);
@@ -51,7 +35,7 @@ async fn the_live_loop_and_simulate_reach_the_same_bits() {
 /// The loop keeps the papers' period by the clock.
 #[tokio::test(flavor = "multi_thread")]
 async fn a_live_session_runs_at_the_papers_step() {
-    let daemon = Daemon::on(scene()).await;
+    let daemon = Daemon::on(seed_scene()).await;
     let (first, begun) = (daemon.status().await, std::time::Instant::now());
     tokio::time::sleep(std::time::Duration::from_millis(700)).await;
     let last = daemon.status().await;
@@ -65,7 +49,7 @@ async fn a_live_session_runs_at_the_papers_step() {
 /// Viewers see the skin where the physics has it; a force on one of its vertices acts there.
 #[tokio::test(flavor = "multi_thread")]
 async fn viewers_see_the_skin_and_forces_act_on_it() {
-    let daemon = Daemon::on(scene()).await;
+    let daemon = Daemon::on(seed_scene()).await;
     daemon.pause().await;
     daemon.reset().await;
     let session = daemon.running.as_ref().unwrap().daemon.session();
@@ -80,22 +64,9 @@ async fn viewers_see_the_skin_and_forces_act_on_it() {
     let request = v1::InjectForcesRequest { forces: vec![force], ..Default::default() };
     daemon.session().inject_forces(request).await.unwrap();
     daemon.step(400).await;
-    let request = v1::WatchRequest { level_of_detail: LevelOfDetail::Full.into(), ..Default::default() };
-    let mut stream = daemon.surface().watch(request).await.unwrap().into_inner();
-    let mut mirror = Mirror::default();
-    let snapshot = daemon.snapshot().await;
-    while mirror.last.as_ref().is_none_or(|last| last.tick != snapshot.tick) {
-        mirror.apply(timeout(PATIENCE, stream.message()).await.unwrap().unwrap().unwrap());
-    }
-    let state = snapshot::restore(&session.model, &snapshot.state).unwrap();
+    let Seen { state, surface_m, .. } = daemon.see_the_surface().await;
     assert!(state.awake_particles() > 0);
-    let mut exact_m = Vec::new();
-    session.model.surface_positions_m(&state, &mut exact_m);
-    assert_eq!(exact_m.len(), rest_m.len());
-    for (vertex, exact) in exact_m.iter().enumerate() {
-        let error = (mirror.position_m(vertex) - *exact).abs().max_element();
-        assert!(error <= f64::from(mirror.quantum_m) / 2.0 + 1e-9, "vertex {vertex}: {error} m");
-    }
-    assert!(exact_m[apex].z - rest_m[apex].z > 1e-4, "{}", exact_m[apex] - rest_m[apex]);
+    assert_eq!(surface_m.len(), rest_m.len());
+    assert!(surface_m[apex].z - rest_m[apex].z > 1e-4, "{}", surface_m[apex] - rest_m[apex]);
     daemon.finish().await;
 }

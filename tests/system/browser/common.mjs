@@ -43,6 +43,17 @@ export function check(what, ok, detail = "") {
   console.log(`ok  ${what} ${detail}`);
 }
 
+/** Listens for errors of a page; what it returns checks that there were none but those of a connection that a test cut. */
+export function complaintsOf(page) {
+  const complaints = [];
+  page.on("pageerror", (error) => complaints.push(String(error)));
+  page.on("console", (message) => message.type() === "error" && complaints.push(message.text()));
+  return () => {
+    const serious = complaints.filter((text) => !/Failed to load resource|ERR_|network error|Failed to fetch/i.test(text));
+    check("no error in the console but for the lost connection", serious.length === 0, serious.join("\n"));
+  };
+}
+
 /** How many different colours a screenshot shows inside a box, and how many of its pixels are saturated. */
 export function colours(png, x0, y0, x1, y1) {
   const seen = new Set();

@@ -5,7 +5,7 @@ import { mkdirSync } from "node:fs";
 import { join } from "node:path";
 import { setTimeout as sleep } from "node:timers/promises";
 import { PNG } from "pngjs";
-import { check, colours, freePort, launch, session, startDaemon, stopDaemon } from "./common.mjs";
+import { check, colours, complaintsOf, freePort, launch, session, startDaemon, stopDaemon } from "./common.mjs";
 
 const [palpated, artefacts, executablePath = "/usr/bin/chromium"] = process.argv.slice(2);
 mkdirSync(artefacts, { recursive: true });
@@ -42,9 +42,7 @@ let daemon = await startDaemon(palpated, port);
 const browser = await launch(executablePath);
 try {
   const page = await browser.newPage({ viewport: { width: 1280, height: 860 } });
-  const complaints = [];
-  page.on("pageerror", (error) => complaints.push(String(error)));
-  page.on("console", (message) => message.type() === "error" && complaints.push(message.text()));
+  const noComplaints = complaintsOf(page);
   await page.goto(url);
   await page.waitForSelector('#connection[data-state="live"]', { timeout: 20_000 });
   check("the page goes live", true);
@@ -144,8 +142,7 @@ try {
   const after = await page.evaluate(() => stage.geometries);
   check("the old surface has left the graphics card", after > 0 && after === geometries, `${geometries} before, ${after} after`);
 
-  const serious = complaints.filter((text) => !/Failed to load resource|ERR_|network error|Failed to fetch/i.test(text));
-  check("no error in the console but for the lost connection", serious.length === 0, serious.join("\n"));
+  noComplaints();
 } finally {
   await browser.close();
   if (daemon.exitCode === null) await stopDaemon(daemon);

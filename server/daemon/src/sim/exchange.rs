@@ -2,7 +2,7 @@
 //! allocates on the loop's side once built.
 use super::bell::{Ear, bell};
 use glam::DVec3;
-use palpate_physics::{Model, Quarantine, contact::LocalContactModel};
+use palpate_physics::{Model, Quarantine, contact::LocalContactModel, seed::SeedModel};
 use palpate_realtime::Doorbell;
 use std::{
     io,
@@ -176,8 +176,18 @@ pub struct SurfaceSnapshot {
     pub displacements_m: Vec<[f32; 3]>,
     /// Of a hybrid body, in place of displacements.
     pub lattice: LatticeSnapshot,
+    /// Positions (m) of a seed body's awake particles.
+    pub seed_particles_m: Vec<DVec3>,
     /// Tools.
     pub tools: Vec<ToolView>,
+}
+
+impl SurfaceSnapshot {
+    /// Positions (m) of the awake particles.
+    pub fn particles_m(&self) -> &[DVec3] {
+        let LatticeSnapshot { x, active } = &self.lattice;
+        if active.is_empty() { &self.seed_particles_m } else { &x[x.len() - active.len()..] }
+    }
 }
 
 /// What the skin of a hybrid body follows.
@@ -195,11 +205,6 @@ impl LatticeSnapshot {
         let (Some(hybrid), Some(particles)) = (model.hybrid(), &model.spec().particles) else { return Self::default() };
         let most = particles.most_active;
         Self { x: vec![DVec3::ZERO; hybrid.node_count() + most], active: vec![0; most] }
-    }
-
-    /// Positions (m) of the active particles.
-    pub fn particles_m(&self) -> &[DVec3] {
-        &self.x[self.x.len() - self.active.len()..]
     }
 }
 
@@ -234,6 +239,7 @@ pub fn surface(model: &Model) -> io::Result<(SurfacePort, SurfaceEnd)> {
             vec![[0.0; 3]; model.surface().nodes.len()]
         },
         lattice: LatticeSnapshot::full(model),
+        seed_particles_m: vec![DVec3::ZERO; model.seed().map_or(0, SeedModel::most_awake)],
         tools: vec![ToolView::default(); model.spec().tools.len()],
         ..Default::default()
     });

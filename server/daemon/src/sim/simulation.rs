@@ -172,6 +172,10 @@ impl Simulation {
             self.surface.bell.ring();
             return;
         }
+        if self.model.seed().is_some() {
+            snapshot.seed_particles_m.clear();
+            snapshot.seed_particles_m.extend_from_slice(self.state.awake_particles_m());
+        }
         let nodes = &self.model.surface().nodes;
         let mut largest_sq = 0.0_f64;
         for ((displacement, node), rest) in snapshot.displacements_m.iter_mut().zip(nodes).zip(&self.rest_f32_m) {

@@ -245,8 +245,8 @@ impl Hub {
             let displacements_m = skin.as_ref().map_or(&snapshot.displacements_m[..], SkinReader::displacements_m);
             let shape = snapshot.has_vertices.then(|| quantiser.advance(number, displacements_m));
             let layers = Layers { vertices: snapshot.has_vertices, particles: self.particles.load(Ordering::Relaxed) };
-            let has_particles = layers.particles && model.hybrid().is_some();
-            let particles = has_particles.then(|| particles::encode(&snapshot.lattice));
+            let has_particles = layers.particles && model.particle_count() > 0;
+            let particles = has_particles.then(|| particles::encode(snapshot.particles_m()));
             let numbers = numbers(epoch, snapshot);
             let encoded = Mutex::new(Vec::new());
             let frame =

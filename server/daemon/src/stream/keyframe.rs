@@ -63,7 +63,7 @@ fn header(session_id: &str, scene_name: &str, model: &Model) -> v1::KeyframeHead
             .iter()
             .map(|tool| v1::ToolShape { name: tool.name.clone(), radius_m: tool.radius_m })
             .collect(),
-        particle_spacing_m: model.spec().particles.as_ref().map_or(0.0, |particles| particles.spacing_m),
+        particle_spacing_m: model.particle_spacing_m(),
     }
 }
 

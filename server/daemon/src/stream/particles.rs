@@ -1,16 +1,14 @@
-//! The active particles of a hybrid body as 16-bit places in the box that holds them.
+//! The active particles of a hybrid or seed body as 16-bit places in the box that holds them.
 //!
 //! `x = corner + q n` with `q = 2^k` m, the smallest for which the longest side of the box fits 16 bits: the error of a component is at
 //! most `q/2 ≤ side/65535`. Those near a contact move in every tick and come and go, so each update has all of them: 6 bytes a
 //! particle, where naming what changed would cost 10.
-use crate::sim::exchange::LatticeSnapshot;
 use bytes::{BufMut, BytesMut};
 use glam::DVec3;
 use palpate_proto::v1;
 
-/// The particles of a frame.
-pub fn encode(lattice: &LatticeSnapshot) -> v1::ActiveParticles {
-    let positions_m = lattice.particles_m();
+/// The particles of a frame, by their positions (m).
+pub fn encode(positions_m: &[DVec3]) -> v1::ActiveParticles {
     let start = (DVec3::INFINITY, DVec3::NEG_INFINITY);
     let (low, high) = positions_m.iter().fold(start, |(low, high), x| (low.min(*x), high.max(*x)));
     let (corner_m, side_m) =
@@ -36,10 +34,6 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    fn lattice(nodes: &[DVec3], particles: &[DVec3]) -> LatticeSnapshot {
-        LatticeSnapshot { x: [nodes, particles].concat(), active: (0..particles.len() as u32).collect() }
-    }
-
     /// What a viewer does.
     fn decode(message: &v1::ActiveParticles) -> Vec<DVec3> {
         let corner = message.corner_m.unwrap();
@@ -53,12 +47,12 @@ mod tests {
 
     proptest! {
         #[test]
-        fn particles_come_back_within_half_a_quantum_and_nodes_do_not(
+        fn particles_come_back_within_half_a_quantum(
             points in prop::collection::vec(prop::array::uniform3(-0.2_f64..0.3), 0..60),
             scale in prop_oneof![Just(1.0), Just(1e-6), Just(0.0)],
         ) {
             let points: Vec<DVec3> = points.iter().map(|p| DVec3::from(*p) * scale).collect();
-            let message = encode(&lattice(&[DVec3::splat(9.0)], &points));
+            let message = encode(&points);
             let seen = decode(&message);
             prop_assert_eq!(seen.len(), points.len());
             let quantum_m = f64::from(message.quantum_m);
@@ -72,7 +66,7 @@ mod tests {
     #[test]
     fn absurd_places_saturate_and_do_not_panic() {
         let far = [DVec3::ZERO, DVec3::new(f64::INFINITY, f64::NAN, 1e300)];
-        let message = encode(&lattice(&[], &far));
+        let message = encode(&far);
         assert_eq!(message.positions_u16le.len(), 12);
         assert!(message.quantum_m.is_finite());
     }

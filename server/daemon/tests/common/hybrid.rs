@@ -1,5 +1,5 @@
-//! A scene with a hybrid body.
-use palpate_scene::{Limits, Scene, parse};
+//! Scenes with hybrid bodies.
+use palpate_scene::{Limits, Scene, builtin, parse};
 
 /// A block with particles, touched, pressed and left by a tool that the scene moves.
 pub const HYBRID: &str = r#"
@@ -40,4 +40,12 @@ mass_damping_per_s = 40
 /// The scene of [`HYBRID`].
 pub fn hybrid_scene() -> Scene {
     parse(HYBRID, "hybrid", None, &Limits::wire(), &mut |_, _| ()).unwrap()
+}
+
+/// The papers' hybrid, which is built in.
+pub const SEED: &str = "seed-hybrid";
+
+/// The scene of [`SEED`].
+pub fn seed_scene() -> Scene {
+    parse(builtin(SEED).unwrap(), SEED, None, &Limits::wire(), &mut |_, _| ()).unwrap()
 }

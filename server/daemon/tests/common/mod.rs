@@ -1,6 +1,7 @@
 //! A small scene, a daemon on it, and clients.
 #![allow(dead_code, unreachable_pub, clippy::unwrap_used, clippy::expect_used)] // each test file uses its own part
 pub mod hybrid;
+pub mod seen;
 
 use glam::DVec3;
 use palpate_physics::{
