@@ -20,6 +20,8 @@ pub struct ActiveParticles {
     ids: Vec<u32>,
     /// Those to be: others while a switch is coming.
     pub(super) next: Vec<u32>,
+    /// Those to be after that: what is to sleep does so first, what is to wake follows.
+    pub(super) wanted: Vec<u32>,
     /// Of every tool.
     pub(super) balls: Vec<Option<Ball>>,
     pub(crate) fading: Fading,
@@ -37,6 +39,7 @@ impl ActiveParticles {
         Self {
             ids: Vec::with_capacity(room(model)),
             next: Vec::with_capacity(room(model)),
+            wanted: Vec::with_capacity(room(model)),
             balls: vec![None; tools(model)],
             fading: fading_with_room(model),
             balance_n: Vec::with_capacity(entries(model)),
@@ -61,6 +64,20 @@ impl ActiveParticles {
         self.ids.len()
     }
 
+    /// Takes what is wanted: at first those of it that are awake, where others are, too.
+    pub(super) fn want(&mut self, wanted: &[u32]) {
+        self.wanted.clear();
+        self.wanted.extend_from_slice(wanted);
+        let Self { ids, next, wanted, .. } = self;
+        let is_wanted = |id: &&u32| wanted.binary_search(id).is_ok();
+        next.clear();
+        if ids.iter().all(|id| is_wanted(&id)) {
+            next.extend_from_slice(wanted);
+        } else {
+            next.extend(ids.iter().filter(is_wanted));
+        }
+    }
+
     pub(super) fn is_switching(&self) -> bool {
         self.next != self.ids
     }
@@ -80,6 +97,7 @@ impl ActiveParticles {
     pub(crate) fn clear(&mut self) {
         self.ids.clear();
         self.next.clear();
+        self.wanted.clear();
         self.balls.fill(None);
         self.fading.clear();
         self.balance_n.clear();
@@ -91,6 +109,7 @@ impl ActiveParticles {
     pub(crate) fn copy_from(&mut self, other: &Self) {
         self.ids.clone_from(&other.ids);
         self.next.clone_from(&other.next);
+        self.wanted.clone_from(&other.wanted);
         self.balls.clone_from(&other.balls);
         self.fading.copy_from(&other.fading);
         self.balance_n.clone_from(&other.balance_n);
@@ -114,7 +133,7 @@ impl ActiveParticles {
             && self.fading.is_sorted()
             && self.fading.cells.iter().all(|fade| self.touches(model, fade.cell))
             && self.fading.tets.iter().all(|fade| (fade.tet as usize) < model.mesh().tets().len())
-            && [&self.ids, &self.next]
+            && [&self.ids, &self.next, &self.wanted]
                 .into_iter()
                 .all(|list| list.len() <= room(model) && list.is_sorted_by(|a, b| a < b) && list.iter().all(may_wake))
     }

@@ -312,9 +312,8 @@ impl ShareFade {
     }
 
     /// Effective gradients of the parts' shape, and of the tet's volume.
-    pub(super) fn effective(&self, share: &Share, x: &[DVec3]) -> ([DMat3; PARTS], DMat3) {
-        let gradients = share.gradients(x, DMat3::IDENTITY);
-        let mean = share.mean(&gradients);
+    pub(super) fn effective(&self, share: &Share, gradients: &[DMat3; PARTS]) -> ([DMat3; PARTS], DMat3) {
+        let mean = share.mean(gradients);
         (std::array::from_fn(|part| effective(&gradients[part], &self.parts[part])), effective(&mean, &self.whole))
     }
 
@@ -323,7 +322,7 @@ impl ShareFade {
         if share.nodes.is_empty() {
             return 0.0;
         }
-        let (shapes, whole) = self.effective(share, x);
+        let (shapes, whole) = self.effective(share, &share.gradients(x, DMat3::IDENTITY));
         share_j(share, material, &shapes, &whole)
     }
 

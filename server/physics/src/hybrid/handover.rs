@@ -18,8 +18,6 @@ const NO_MODES: f64 = 1e-9;
 /// What a switch changes, strained as it was.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Before {
-    /// Whether particles fall asleep: coarse nodes move then.
-    some_sleep: bool,
     /// Awake cells, ascending.
     cells: Vec<CellBefore>,
     /// Those of them that fall asleep: tet, and number among the cells.
@@ -42,6 +40,11 @@ struct CellBefore {
 #[derive(Debug, Clone, Copy)]
 struct TetBefore {
     tet: u32,
+    /// `F_g`.
+    gradients: [DMat3; PARTS],
+    /// Whether its share changes, not only where its nodes are.
+    is_new: bool,
+    /// Effective ones.
     parts: [DMat3; PARTS],
     whole: DMat3,
 }
@@ -49,7 +52,6 @@ struct TetBefore {
 impl Before {
     pub(super) fn with_room(cells: usize, tets: usize) -> Self {
         Self {
-            some_sleep: false,
             cells: Vec::with_capacity(cells),
             asleep: Vec::with_capacity(cells),
             tets: Vec::with_capacity(tets),
@@ -57,21 +59,21 @@ impl Before {
         }
     }
 
-    /// Takes how all is strained that changes between two patches; returns its elastic energy (J). The patch before is displaced.
+    /// Takes how all is strained that changes between two patches, or because coarse nodes are moved; returns its elastic energy (J). The patch before is
+    /// displaced.
     pub(super) fn take(
         &mut self,
         body: &Hybrid,
         [patch, next]: [&RunningPatch; 2],
-        some_sleep: bool,
+        is_moved: &[bool],
         x: &[DVec3],
         fading: &Fading,
     ) -> f64 {
         let mut held_j = 0.0;
-        self.some_sleep = some_sleep;
         self.cells.clear();
         self.asleep.clear();
         for &cell in patch.cells() {
-            if stays(body, [patch, next], some_sleep, cell) {
+            if stays(body, [patch, next], is_moved, cell) {
                 continue;
             }
             let fade = fading.of_cell(cell).unwrap_or(CellFade::none(cell));
@@ -89,41 +91,50 @@ impl Before {
         let first = next.taken_from().iter().filter(|&tet| !patch.taken_from().contains(tet));
         for &tet in patch.taken_from().iter().chain(first) {
             if patch.share(tet) != next.share(tet) {
-                held_j += self.take_tet(body, tet, patch.share(tet), x, fading);
+                held_j += self.take_tet(body, (tet, true), patch.share(tet), x, fading);
             }
         }
         self.tets.sort_unstable_by_key(|before| before.tet);
         held_j
     }
 
-    fn take_tet(&mut self, body: &Hybrid, tet: u32, share: &Share, x: &[DVec3], fading: &Fading) -> f64 {
+    fn take_tet(
+        &mut self,
+        body: &Hybrid,
+        (tet, is_new): (u32, bool),
+        share: &Share,
+        x: &[DVec3],
+        fading: &Fading,
+    ) -> f64 {
         let fade = fading.of_tet(tet).unwrap_or(ShareFade::none(tet));
-        let (parts, whole) = fade.effective(share, x);
-        self.tets.push(TetBefore { tet, parts, whole });
+        let gradients = share.gradients(x, DMat3::IDENTITY);
+        let (parts, whole) = fade.effective(share, &gradients);
+        self.tets.push(TetBefore { tet, gradients, is_new, parts, whole });
         share_j(share, body.material_of_tet(tet), &parts, &whole)
     }
 
-    /// Takes the tets, too, whose nodes have moved from where they were, and works out what fades: the next patch is displaced, `fading` is what faded before.
-    /// Returns the elastic energy (J) that those tets had, and what all that changes has now.
+    /// Takes the tets, too, whose nodes have moved from where they were by `shifts_m`, and works out what fades: the next patch is displaced, `fading` is what
+    /// faded before. Returns the elastic energy (J) that those tets had, and what all that changes has now.
     pub(super) fn fade_into(
         &mut self,
         body: &Hybrid,
         [patch, next]: [&RunningPatch; 2],
-        (were_m, x): (&[DVec3], &[DVec3]),
+        is_moved: &[bool],
+        (were_m, shifts_m, x): (&[DVec3], &[DVec3], &[DVec3]),
         fading: &mut Fading,
     ) -> (f64, f64) {
         let (known, mut moved_j, mut now_j) = (self.tets.len(), 0.0, 0.0);
-        let has_moved = |node: &u32| were_m[*node as usize] != x[*node as usize];
+        let has_moved = |node: &u32| shifts_m[*node as usize] != DVec3::ZERO;
         for tet in 0..body.partition.shares().len() as u32 {
             let is_known = self.tets[..known].binary_search_by_key(&tet, |before| before.tet).is_ok();
             if !is_known && next.share(tet).nodes.iter().any(has_moved) {
-                moved_j += self.take_tet(body, tet, next.share(tet), were_m, fading);
+                moved_j += self.take_tet(body, (tet, false), next.share(tet), were_m, fading);
             }
         }
         self.tets.sort_unstable_by_key(|before| before.tet);
         self.next.clear();
         for &cell in next.cells() {
-            if stays(body, [patch, next], self.some_sleep, cell) {
+            if stays(body, [patch, next], is_moved, cell) {
                 self.next.cells.extend(fading.of_cell(cell).filter(CellFade::exceeds_a_trace));
                 continue;
             }
@@ -132,7 +143,7 @@ impl Before {
             self.next.cells.extend(fade);
         }
         for number in 0..self.tets.len() {
-            let (fade, energy_j) = self.of_tet(body, next, x, &self.tets[number]);
+            let (fade, energy_j) = self.of_tet(body, next, (shifts_m, x), &self.tets[number]);
             now_j += energy_j;
             self.next.tets.extend(fade);
         }
@@ -172,7 +183,13 @@ impl Before {
     }
 
     /// What is left of a tet, with what fell asleep in it; and its energy (J).
-    fn of_tet(&self, body: &Hybrid, patch: &RunningPatch, x: &[DVec3], before: &TetBefore) -> (Option<ShareFade>, f64) {
+    fn of_tet(
+        &self,
+        body: &Hybrid,
+        patch: &RunningPatch,
+        (shifts_m, x): (&[DVec3], &[DVec3]),
+        before: &TetBefore,
+    ) -> (Option<ShareFade>, f64) {
         let share = patch.share(before.tet);
         let mut kept_m3 = share.volume_m3;
         let (mut parts, mut whole) = ([DMat3::ZERO; PARTS], DMat3::ZERO);
@@ -189,7 +206,11 @@ impl Before {
             parts[part] += before.parts[part] * kept_m3[part];
             whole += before.whole * kept_m3[part];
         }
-        let gradients = share.gradients(x, DMat3::IDENTITY);
+        let gradients = if before.is_new {
+            share.gradients(x, DMat3::IDENTITY)
+        } else {
+            share.gradients_after(&before.gradients, shifts_m)
+        };
         let mean = share.mean(&gradients);
         let mut fade = ShareFade::none(before.tet);
         for part in 0..PARTS {
@@ -206,9 +227,9 @@ impl Before {
     }
 }
 
-/// Whether a switch changes nothing about an awake cell: its particles stay where they are. Where some fall asleep coarse nodes move, and with them those that follow.
-fn stays(body: &Hybrid, [before, after]: [&RunningPatch; 2], some_sleep: bool, cell: u32) -> bool {
-    before.is_awake(cell) && after.is_awake(cell) && (!some_sleep || after.is_inside(body, cell))
+/// Whether a switch changes nothing about an awake cell: its particles stay where they are. Those that follow coarse nodes are moved with them.
+fn stays(body: &Hybrid, [before, after]: [&RunningPatch; 2], is_moved: &[bool], cell: u32) -> bool {
+    before.is_awake(cell) && after.is_awake(cell) && !after.follows(body, cell, is_moved)
 }
 
 /// `(1 − ε) V_c` (m³).

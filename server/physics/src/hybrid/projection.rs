@@ -61,14 +61,9 @@ impl Lumping {
         Self { pairs }
     }
 
-    /// Adds `scale L a`.
-    fn add(&self, scale: f64, a: &[DVec3], sum: &mut [DVec3]) {
-        for &([i, j], kg) in &self.pairs {
-            let (i, j) = (i as usize, j as usize);
-            let flow = (a[i] - a[j]) * (scale * kg);
-            sum[i] += flow;
-            sum[j] -= flow;
-        }
+    /// The pairs of some nodes.
+    fn pairs_of<'a>(&'a self, nodes: &'a [bool]) -> impl Iterator<Item = ([u32; 2], f64)> + 'a {
+        self.pairs.iter().copied().filter(|([i, j], _)| nodes[*i as usize] || nodes[*j as usize])
     }
 }
 
@@ -79,6 +74,8 @@ pub(super) struct Projection {
     moments: Vec<DVec3>,
     /// Whether a node is moved.
     is_moved: Vec<bool>,
+    /// Pairs of `L` with a node that is moved.
+    pairs: Vec<([u32; 2], f64)>,
     /// `Δ` (m).
     shifts_m: Vec<DVec3>,
     preconditioned: Vec<DVec3>,
@@ -87,12 +84,14 @@ pub(super) struct Projection {
 }
 
 impl Projection {
-    /// Room for so many coarse nodes, and active particles.
-    pub(super) fn with_room(nodes: usize, most_active: usize) -> Self {
+    /// Room for the coarse nodes, and so many active particles.
+    pub(super) fn with_room(body: &Hybrid, most_active: usize) -> Self {
+        let nodes = body.node_count();
         let list = || Vec::with_capacity(nodes + most_active);
         Self {
             moments: list(),
             is_moved: Vec::with_capacity(nodes),
+            pairs: Vec::with_capacity(body.lumping.pairs.len()),
             shifts_m: list(),
             preconditioned: list(),
             direction: list(),
@@ -116,6 +115,11 @@ impl Projection {
         }
     }
 
+    /// Coarse nodes that will be moved: those that particles followed which fall asleep.
+    pub(super) fn is_moved(&self) -> &[bool] {
+        &self.is_moved
+    }
+
     /// `Δ` (m) of the coarse nodes, with the mass matrix after the switch. Allocates nothing.
     pub(super) fn solve(&mut self, body: &Hybrid, metric: &mut RunningMetric) -> &[DVec3] {
         let nodes = self.moments.len();
@@ -124,6 +128,8 @@ impl Projection {
             list.clear();
             list.resize(all, DVec3::ZERO);
         }
+        self.pairs.clear();
+        self.pairs.extend(body.lumping.pairs_of(&self.is_moved));
         let (mut before, mut most) = (f64::INFINITY, 0.0);
         for _ in 0..STEPS {
             // z = M''⁻¹ r, on the nodes that are moved
@@ -147,7 +153,12 @@ impl Projection {
             self.product.clear();
             self.product.resize(all, DVec3::ZERO);
             metric.momenta(body, &self.direction, &mut self.product);
-            body.lumping.add(HOLD - 1.0, &self.direction[..nodes], &mut self.product);
+            for &([i, j], kg) in &self.pairs {
+                let (i, j) = (i as usize, j as usize);
+                let flow = (self.direction[i] - self.direction[j]) * ((HOLD - 1.0) * kg);
+                self.product[i] += flow;
+                self.product[j] -= flow;
+            }
             let step = now / dot(&self.direction[..nodes], &self.product);
             for (shift, direction) in self.shifts_m.iter_mut().zip(&self.direction) {
                 *shift += *direction * step;
@@ -189,7 +200,7 @@ mod tests {
         let kg = |p: u32| (1.0 - KEPT) * body.masses.particle_kg[p as usize];
         let mut random = Random(21);
         let away: Vec<DVec3> = fell.iter().map(|&p| away(partition.particle_m(p), &mut random)).collect();
-        let mut projection = Projection::with_room(body.node_count(), waking.len());
+        let mut projection = Projection::with_room(&body, waking.len());
         projection.start(body.node_count());
         for (&p, away) in fell.iter().zip(&away) {
             projection.hand_over(&partition.anchor(p), kg(p), *away);

@@ -180,12 +180,14 @@ impl RunningPatch {
         })
     }
 
-    /// Whether all particles of a cell are active.
-    pub(super) fn is_inside(&self, hybrid: &Hybrid, cell: u32) -> bool {
-        let is_active = |particle: u32| {
-            self.points.get(self.point_of[particle as usize] as usize).is_some_and(|point| point.active != NONE)
-        };
-        hybrid.partition.corners(cell as usize).into_iter().all(is_active)
+    /// Whether some particle of an awake cell follows one of these coarse nodes.
+    pub(super) fn follows(&self, hybrid: &Hybrid, cell: u32, nodes: &[bool]) -> bool {
+        hybrid.partition.corners(cell as usize).into_iter().any(|particle| {
+            let point = &self.points[self.point_of[particle as usize] as usize];
+            let anchor = &point.anchor;
+            point.active == NONE
+                && anchor.nodes.iter().zip(anchor.weights).any(|(node, weight)| weight != 0.0 && nodes[*node as usize])
+        })
     }
 
     /// Hands a force (N) on a point to the particle or the coarse nodes that move it.

@@ -77,6 +77,21 @@ impl Share {
         })
     }
 
+    /// `F_g` where some nodes are moved by `Δ_i` (m) from where it was that: `F_g + Σ_i Δ_i T_giᵀ / V_g`.
+    pub(super) fn gradients_after(&self, gradients: &[DMat3; PARTS], shifts_m: &[DVec3]) -> [DMat3; PARTS] {
+        let mut after = *gradients;
+        let moved =
+            self.nodes.iter().zip(&self.moments_m2).filter(|(node, _)| shifts_m[**node as usize] != DVec3::ZERO);
+        for (&node, moments) in moved {
+            for ((gradient, moment), volume) in after.iter_mut().zip(moments).zip(self.volume_m3) {
+                if volume > 0.0 {
+                    *gradient += outer(shifts_m[node as usize], *moment * (1.0 / volume));
+                }
+            }
+        }
+        after
+    }
+
     /// `Σ_g V_g A_g / V_e`.
     pub(super) fn mean(&self, of_parts: &[DMat3; PARTS]) -> DMat3 {
         let sum = of_parts.iter().zip(self.volume_m3).fold(DMat3::ZERO, |sum, (a, volume)| sum + *a * volume);

@@ -27,8 +27,10 @@ use crate::world::{Model, Scratch, State};
 use glam::{BVec3, DVec3};
 use serde::{Deserialize, Serialize};
 
-/// Ticks between two looks.
-const LOOK_EVERY_TICKS: u64 = 10;
+/// Ticks in which a switch is prepared and done.
+const SWITCH_TICKS: u64 = 2 + RunningPatch::SLICES as u64;
+/// Ticks between two looks: after each, what is to sleep falls asleep, and then what is to wake wakes. Both in one tick would take it as long as both.
+const LOOK_EVERY_TICKS: u64 = 2 * SWITCH_TICKS;
 /// Time (s) ahead of which an approaching tool is seen.
 const AHEAD_S: f64 = 0.05;
 /// Ticks for which a tool has to be away.
@@ -64,8 +66,9 @@ pub(super) struct Looking {
     /// Forces (N) handed to them.
     handed_n: Vec<DVec3>,
     projection: Projection,
-    /// Positions (m) of the coarse nodes before.
+    /// Positions (m) of the coarse nodes before, and how far they are moved (m).
     were_m: Vec<DVec3>,
+    shifts_m: Vec<DVec3>,
     /// Active particles that were.
     left: Vec<u32>,
     /// Masses (kg) of the free nodes of tets in which particles fall asleep, 0 of others.
@@ -88,8 +91,9 @@ impl Looking {
             moved: Vec::with_capacity(most),
             impulses: Vec::with_capacity(body.node_count() + most),
             handed_n: Vec::with_capacity(body.node_count()),
-            projection: Projection::with_room(body.node_count(), most),
+            projection: Projection::with_room(body, most),
             were_m: Vec::with_capacity(body.node_count()),
+            shifts_m: Vec::with_capacity(body.node_count()),
             left: Vec::with_capacity(most),
             weights_kg: Vec::with_capacity(body.node_count()),
         }
@@ -107,10 +111,12 @@ impl HybridScratch {
         }
         let Some(particles) = &model.spec().particles else { return };
         let Waking::ByTools { reach_m } = particles.waking else { return };
-        let since_look = state.tick % LOOK_EVERY_TICKS;
-        if since_look > 0 {
+        if state.tick % LOOK_EVERY_TICKS == SWITCH_TICKS {
+            state.active.next.clone_from(&state.active.wanted);
+        }
+        if state.tick % LOOK_EVERY_TICKS > 0 {
             if state.active.is_switching() {
-                self.go_on_switching(model, body, state, since_look);
+                self.go_on_switching(model, body, state);
             }
             return;
         }
@@ -119,18 +125,20 @@ impl HybridScratch {
         place_balls(model, &view, particles.spacing_m, state);
         self.looking.want(body, &state.active, reach_m, particles.most_active);
         self.looking.keep_unsettled(&self.patch, particles);
-        state.active.next.clone_from(&self.looking.wanted);
+        state.active.want(&self.looking.wanted);
     }
 
-    /// Lays the coming patch out, a slice a tick after a look, then goes over to it.
-    fn go_on_switching(&mut self, model: &Model, body: &Hybrid, state: &mut State, since_look: u64) {
-        if since_look <= u64::from(RunningPatch::SLICES) {
-            self.coming.go_on(body, &state.active.next);
-        } else {
-            let was_current = state.force_is_current;
-            let moved_m = self.switch(model, body, state);
-            state.contact.travelled(moved_m);
-            self.skin_is_tracked = was_current;
+    /// Lays the coming patch out, a slice a tick, then goes over to it.
+    fn go_on_switching(&mut self, model: &Model, body: &Hybrid, state: &mut State) {
+        match state.tick % SWITCH_TICKS {
+            0 => {}
+            slice if slice <= u64::from(RunningPatch::SLICES) => self.coming.go_on(body, &state.active.next),
+            _ => {
+                let was_current = state.force_is_current;
+                let moved_m = self.switch(model, body, state);
+                state.contact.travelled(moved_m);
+                self.skin_is_tracked = was_current;
+            }
         }
     }
 
@@ -155,9 +163,6 @@ impl HybridScratch {
         let nodes = body.node_count();
         let gravity = model.gravity_m_per_s2();
         patch.displace(body, &state.x);
-        let some_sleep = state.active.ids().iter().any(|id| state.active.next.binary_search(id).is_err());
-        let mut held_j = before.take(body, [patch, next], some_sleep, &state.x, &state.active.fading);
-        held_j += patch.metric_mut().moving_j(body, (&state.x, &state.v), gravity, momenta);
         looking.impulses.clear();
         looking.impulses.resize(nodes, DVec3::ZERO);
         looking.weights_kg.clear();
@@ -178,6 +183,10 @@ impl HybridScratch {
                 balance.hand_over(body, (number, *id), &mut looking.handed_n);
             }
         }
+        let mut held_j =
+            before.take(body, [patch, next], looking.projection.is_moved(), &state.x, &state.active.fading);
+        held_j += patch.metric_mut().moving_j(body, (&state.x, &state.v), gravity, momenta);
+        let some_sleep = state.active.ids().iter().any(|id| state.active.next.binary_search(id).is_err());
         looking.left.clear();
         looking.left.extend_from_slice(state.active.ids());
         state.switch(body, &mut looking.moved);
@@ -185,11 +194,14 @@ impl HybridScratch {
             couple -= looking.shift(body, next.metric_mut(), state, momenta);
             looking.turn(couple, &state.x);
         }
-        let shifts = looking.were_m.iter().zip(&state.x).map(|(were_m, x)| were_m.distance(*x));
-        farthest_m += shifts.fold(0.0, f64::max);
+        looking.shifts_m.clear();
+        looking.shifts_m.extend(looking.were_m.iter().zip(&state.x).map(|(were_m, x)| *x - *were_m));
+        farthest_m += looking.shifts_m.iter().map(|shift| shift.length()).fold(0.0, f64::max);
         next.displace(body, &state.x);
-        let places = (&looking.were_m[..], &state.x[..]);
-        let (first_moved_j, elastic_j) = before.fade_into(body, [patch, next], places, &mut state.active.fading);
+        let places = (&looking.were_m[..], &looking.shifts_m[..], &state.x[..]);
+        let is_moved = looking.projection.is_moved();
+        let (first_moved_j, elastic_j) =
+            before.fade_into(body, [patch, next], is_moved, places, &mut state.active.fading);
         next.put_fades(&state.active.fading);
         if some_sleep {
             looking.impulses.resize(state.v.len(), DVec3::ZERO);
@@ -223,6 +235,7 @@ pub fn wake_only(model: &Model, state: &mut State, scratch: &mut Scratch, partic
     next.sort_unstable();
     next.dedup();
     next.truncate(room(model));
+    state.active.wanted.clone_from(&state.active.next);
     if state.active.is_switching() {
         own.switch(model, body, state);
     }
