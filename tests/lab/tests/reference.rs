@@ -64,7 +64,7 @@ fn forces_are_the_energys_slope_and_stiffness_the_forces() {
 
 #[test]
 fn homogeneous_strain_is_in_equilibrium_on_curved_and_collapsed_grids() {
-    let body = ventricle((0.01, 0.02), (0.007, 0.017), 0.005, 0.001, 2);
+    let body = ventricle(((0.01, 0.02), (0.007, 0.017), 0.005), 0.0, 0.001, 2);
     let solid = Solid::new(body.grid.clone(), material(Law::StVenantKirchhoff, 1e4, 0.45).unwrap()).unwrap();
     let strain = |p: &DVec3| *p + DVec3::new(0.1 * p.x + 0.05 * p.z, -0.08 * p.y, 0.1 * p.y + 0.02 * p.z);
     let x: Vec<DVec3> = solid.grid.positions_m.iter().map(strain).collect();
@@ -95,7 +95,7 @@ fn the_ventricles_volume_is_met() {
         |(a, c): (f64, f64), z: f64| std::f64::consts::PI * a * a * (z + 2.0 * c / 3.0 - z.powi(3) / (3.0 * c * c));
     let exact = 0.5 * (below((0.01, 0.02), 0.005) - below((0.007, 0.017), 0.005));
     let error = |n| {
-        let body = ventricle((0.01, 0.02), (0.007, 0.017), 0.005, 0.002, n);
+        let body = ventricle(((0.01, 0.02), (0.007, 0.017), 0.005), 0.0, 0.002, n);
         Solid::new(body.grid, material(Law::StableNeoHookean, 1e4, 0.3).unwrap()).unwrap().volume_m3() / exact - 1.0
     };
     // Of third order at least: curved sides are met by parabolas.

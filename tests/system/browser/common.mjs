@@ -43,6 +43,12 @@ export function check(what, ok, detail = "") {
   console.log(`ok  ${what} ${detail}`);
 }
 
+/** Waits until the page has been laid out and drawn as it is now, however long a busy machine takes: the observer of sizes is heard after a frame. */
+export const drawn = (page) =>
+  page.evaluate(async () => {
+    for (let frames = 0; frames < 4; frames++) await new Promise((next) => requestAnimationFrame(next));
+  });
+
 /** Listens for errors of a page; what it returns checks that there were none but those of a connection that a test cut. */
 export function complaintsOf(page) {
   const complaints = [];

@@ -5,7 +5,7 @@ import { mkdirSync } from "node:fs";
 import { join } from "node:path";
 import { setTimeout as sleep } from "node:timers/promises";
 import { PNG } from "pngjs";
-import { check, colours, complaintsOf, freePort, launch, session, startDaemon, stopDaemon } from "./common.mjs";
+import { check, colours, complaintsOf, drawn, freePort, launch, session, startDaemon, stopDaemon } from "./common.mjs";
 
 const [palpated, artefacts, executablePath = "/usr/bin/chromium"] = process.argv.slice(2);
 mkdirSync(artefacts, { recursive: true });
@@ -94,7 +94,7 @@ try {
   // The end of the body lay behind the plot, and the arrow behind the numbers, in windows of little height.
   for (const [width, height] of [[400, 760], [420, 800], [660, 900], [720, 420], [800, 457], [1920, 1080], [1280, 717]]) {
     await page.setViewportSize({ width, height });
-    await sleep(300);
+    await drawn(page);
     await press(page);
     const { body, tools, parts } = await page.evaluate(() => {
       const box = (part) => document.querySelector(part).getBoundingClientRect();

@@ -37,7 +37,7 @@ impl Hybrid {
 fn fineness(body: Body) -> Option<(f64, u32)> {
     match body {
         Body::Block => Some((2.5e-3, 32)),
-        Body::Ventricle => Some((3.2e-3, 150_000)),
+        Body::Ventricle(_) => Some((3.2e-3, 150_000)),
         Body::SmallVentricle => Some((0.9e-3, 150_000)),
         Body::Octant | Body::Beam { .. } => None,
     }
@@ -56,8 +56,8 @@ impl Method for Hybrid {
         match (body, full) {
             (Body::Block, false) => vec![4],
             (Body::Block, true) => vec![4, 8],
-            (Body::Ventricle | Body::SmallVentricle, false) => vec![188, 400],
-            (Body::Ventricle | Body::SmallVentricle, true) => vec![188, 300, 400, 800],
+            (Body::Ventricle(_) | Body::SmallVentricle, false) => vec![188, 400],
+            (Body::Ventricle(_) | Body::SmallVentricle, true) => vec![188, 300, 400, 800],
             (Body::Octant | Body::Beam { .. }, _) => vec![],
         }
     }

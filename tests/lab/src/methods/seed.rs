@@ -172,7 +172,7 @@ mod tests {
     #![allow(clippy::unwrap_used)] // a test that cannot build its subject has failed
     use super::super::{all, testing};
     use super::*;
-    use crate::references::Reference;
+    use crate::{problems::place::Place, references::Reference};
 
     /// The answer over the reference's, or why there is none.
     fn over_reference(name: &str) -> Result<f64, String> {
@@ -199,7 +199,7 @@ mod tests {
     #[test]
     fn bodies_that_are_not_seen_whole_from_within_are_refused() {
         let mut problem = testing::problem("block-patch-small-nu0.45-stvk");
-        problem.body = Body::Ventricle;
+        problem.body = Body::Ventricle(Place::Side);
         let pace = Pace::of(&testing::problem("block-patch-small-nu0.45-stvk")).unwrap();
         let refused = SeedHybrid::variants()[0].build(&problem, 188, &pace).err().unwrap().to_string();
         assert!(refused.contains("mass centre"), "{refused}");

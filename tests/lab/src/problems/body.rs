@@ -1,4 +1,5 @@
 //! The problems' bodies in tetrahedra.
+use super::place::{Meridian, Place};
 use glam::DVec3;
 use miette::{IntoDiagnostic, Result, miette};
 use palpate_physics::{PrescribedSpec, Surface, TetMesh, contact::closest_weights};
@@ -24,9 +25,9 @@ pub const BEAM_LENGTH_M: f64 = 0.1;
 pub enum Body {
     /// 80 × 80 × 40 mm, centred on the z axis, held at z = 0, touched at the middle of its top.
     Block,
-    /// Truncated ellipsoid shell of human size, held at its base, touched from +x at y = z = 0.
-    Ventricle,
-    /// The same of 20 mm, with semi-axes 10 and 20 mm outside: an animal's.
+    /// Truncated ellipsoid shell of human size, held at its base, touched somewhere.
+    Ventricle(Place),
+    /// The same of 20 mm, with semi-axes 10 and 20 mm outside: an animal's; touched from the side.
     SmallVentricle,
     /// An octant of Lamé's sphere.
     Octant,
@@ -59,7 +60,7 @@ impl Body {
     pub fn name(self) -> &'static str {
         match self {
             Self::Block => "block",
-            Self::Ventricle => "ventricle",
+            Self::Ventricle(place) => place.name(),
             Self::SmallVentricle => "ventricle-20mm",
             Self::Octant => "octant",
             Self::Beam { .. } => "beam",
@@ -70,7 +71,7 @@ impl Body {
     pub fn sentence(self) -> &'static str {
         match self {
             Self::Block => "the middle of a block of 80 × 80 × 40 mm held at its lower face",
-            Self::Ventricle => "the side of a ventricle of human size (90 mm long, wall 11 mm) held at its base",
+            Self::Ventricle(place) => place.sentence(),
             Self::SmallVentricle => "the side of a ventricle of 20 mm (25 mm long, wall 3 mm) held at its base",
             Self::Octant => "a thick sphere",
             Self::Beam { .. } => "a clamped beam",
@@ -81,7 +82,7 @@ impl Body {
     pub fn resolution_unit(self) -> &'static str {
         match self {
             Self::Block => "cells along 80 mm",
-            Self::Ventricle | Self::SmallVentricle => "tets, about",
+            Self::Ventricle(_) | Self::SmallVentricle => "tets, about",
             Self::Octant => "cells along an arc",
             Self::Beam { .. } => "cells through the thickness",
         }
@@ -92,8 +93,8 @@ impl Body {
         match (self, full) {
             (Self::Block, false) | (Self::Octant, true) => &[4, 8, 16],
             (Self::Block, true) => &[4, 8, 12, 16, 24],
-            (Self::Ventricle | Self::SmallVentricle, false) => &[188, 1_352, 5_000],
-            (Self::Ventricle | Self::SmallVentricle, true) => &[188, 1_352, 5_000, 10_000, 50_000],
+            (Self::Ventricle(_) | Self::SmallVentricle, false) => &[188, 1_352, 5_000],
+            (Self::Ventricle(_) | Self::SmallVentricle, true) => &[188, 1_352, 5_000, 10_000, 50_000],
             (Self::Octant, false) => &[4, 8],
             (Self::Beam { .. }, false) => &[2, 4],
             (Self::Beam { .. }, true) => &[2, 4, 8],
@@ -107,8 +108,8 @@ impl Body {
     pub fn tets(self, resolution: u32) -> Result<TetBody> {
         match self {
             Self::Block => block(resolution),
-            Self::Ventricle => ventricle(VENTRICLE_M, resolution),
-            Self::SmallVentricle => ventricle(SMALL_VENTRICLE_M, resolution),
+            Self::Ventricle(place) => ventricle(VENTRICLE_M, place, resolution),
+            Self::SmallVentricle => ventricle(SMALL_VENTRICLE_M, Place::Side, resolution),
             Self::Octant => octant(resolution as usize),
             Self::Beam { slenderness } => beam(slenderness, resolution),
         }
@@ -170,11 +171,12 @@ fn block(cells: u32) -> Result<TetBody> {
     TetBody::new(mesh, prescribed, region(&shape, "z_max")?.triangles.clone(), (DVec3::Z * height, DVec3::Z))
 }
 
-fn ventricle((outer, inner, cut): VentricleM, tets: u32) -> Result<TetBody> {
+fn ventricle((outer, inner, cut): VentricleM, place: Place, tets: u32) -> Result<TetBody> {
     let shape = shapes::ventricle(outer, inner, cut, tets).into_diagnostic()?;
     let held = vec![held("base", region(&shape, "base")?.nodes(), [true; 3])];
     let touched = region(&shape, "outer")?.triangles.clone();
-    TetBody::new(shape.mesh, held, touched, (DVec3::X * outer.0, DVec3::X))
+    let (meridian, latitude, turn) = (Meridian(outer), place.latitude_rad(), place.turn());
+    TetBody::new(shape.mesh, held, touched, (turn * meridian.point_m(latitude), turn * meridian.normal(latitude)))
 }
 
 fn beam(slenderness: u32, cells: u32) -> Result<TetBody> {
@@ -246,7 +248,7 @@ mod tests {
     fn a_sphere_first_touches_the_true_place_in_the_limit() {
         let block = Body::Block.tets(4).unwrap();
         assert!((block.first_touch_m(0.01) - DVec3::Z * 0.05).length() < 1e-12);
-        let gap = |tets| Body::Ventricle.tets(tets).unwrap().first_touch_m(0.01).x - 0.046;
+        let gap = |tets| Body::Ventricle(Place::Side).tets(tets).unwrap().first_touch_m(0.01).x - 0.046;
         let (coarse, fine) = (gap(188), gap(5_000));
         assert!(coarse <= 1e-12 && fine <= 1e-12 && fine > -0.5e-3 && coarse > -4e-3, "{coarse} {fine}");
     }

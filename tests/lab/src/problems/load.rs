@@ -133,7 +133,7 @@ pub fn patch_on_hexahedra(grid: &HexGrid, body: &HexBody, radius_m: f64, force_n
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::problems::body::Body;
+    use crate::problems::{body::Body, place::Place};
     use std::f64::consts::PI;
 
     #[test]
@@ -147,7 +147,7 @@ mod tests {
     /// The sum is ∫ p dA of the projected disc on any mesh, before it is made so: π a² / 3 for p₀ = 1.
     #[test]
     fn the_patch_is_integrated_on_any_mesh() {
-        for (body, resolution) in [(Body::Block, 4), (Body::Block, 8), (Body::Ventricle, 1_352)] {
+        for (body, resolution) in [(Body::Block, 4), (Body::Block, 8), (Body::Ventricle(Place::NearTip), 1_352)] {
             let body = body.tets(resolution).unwrap();
             let a = 7.5e-3;
             let load = on_tets(Action::Patch { radius_m: a, force_n: 1.0 }, &body).unwrap();

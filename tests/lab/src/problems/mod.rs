@@ -3,6 +3,7 @@
 //! - `registry.rs`: all of them, by name
 //! - `body.rs`: their bodies in tetrahedra, at any resolution, and where a tool first touches them
 //! - `motion.rs`: how the action comes in time
+//! - `place.rs`: where the ventricle is touched
 //! - `load.rs`: loads as nodal forces on any mesh, and the displacement that is conjugate to them
 //! - `sample.rs`: the material points at which displacement fields are compared
 //! - `exact.rs`: answers by formula
@@ -10,6 +11,7 @@ pub mod body;
 pub mod exact;
 pub mod load;
 pub mod motion;
+pub mod place;
 mod registry;
 pub mod sample;
 

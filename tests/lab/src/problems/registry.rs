@@ -1,5 +1,5 @@
 //! All problems. A new one is added here, and `palpate-lab references` makes its reference.
-use super::{Action, Motion, Problem, body::Body};
+use super::{Action, Motion, Problem, body::Body, place::Place};
 use palpate_physics::material::Law;
 
 const YOUNG_PA: f64 = 10e3;
@@ -22,7 +22,7 @@ const SWEEP: Motion = Motion::Sweep { hz: [5.0, 60.0], ticks: 1000 };
 pub fn all() -> Vec<Problem> {
     let mut problems = Vec::new();
     let default = Law::StableNeoHookean;
-    for body in [Body::Block, Body::Ventricle] {
+    for body in [Body::Block, Body::Ventricle(Place::Side)] {
         for nu in POISSON_RATIOS {
             problems.push(sphere(body, SMALL, nu, default));
             problems.push(patch(body, SMALL_PATCH, nu, default));
@@ -34,6 +34,8 @@ pub fn all() -> Vec<Problem> {
             problems.push(patch(body, large, nu, default));
         }
     }
+    let elsewhere = Place::ALL.into_iter().filter(|place| *place != Place::Side).map(Body::Ventricle);
+    problems.extend(elsewhere.map(|body| patch(body, SMALL_PATCH, 0.45, default)));
     problems.push(sphere(Body::Block, SMALL, 0.45, Law::StVenantKirchhoff));
     problems.push(patch(Body::Block, SMALL_PATCH, 0.45, Law::StVenantKirchhoff));
     problems.push(sphere(Body::Block, LARGE, 0.45, Law::FixedCorotated));

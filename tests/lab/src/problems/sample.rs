@@ -1,6 +1,9 @@
 //! The material points at which displacement fields are compared: a polar pattern on the rest surface about the touch.
-use super::body::{BLOCK_M, Body, OCTANT_M, SMALL_VENTRICLE_M, TetBody, VENTRICLE_M, VentricleM};
-use glam::DVec3;
+use super::{
+    body::{BLOCK_M, Body, OCTANT_M, SMALL_VENTRICLE_M, TetBody, VENTRICLE_M, VentricleM},
+    place::{Meridian, Place},
+};
+use glam::{DMat3, DVec3};
 use palpate_physics::contact::closest_weights;
 use std::f64::consts::{FRAC_PI_2, TAU};
 
@@ -21,25 +24,25 @@ pub struct Sample {
     pub area_m2: f64,
     /// Its parameters on the reference grid's touched side, mirrored into the part that is modelled.
     pub parameters: [f64; 2],
-    /// −1 along axes whose displacement is mirrored.
-    pub mirror: DVec3,
+    /// From displacements of the part that is modelled to those of the body: mirrored, and turned to where it is touched.
+    pub frame: DMat3,
 }
 
 /// The points of a body; none for beams.
 pub fn points(body: Body) -> Vec<Sample> {
     match body {
         Body::Block => polar(REACH_M).map(|(a, b, area)| on_block(a, b, area)).collect(),
-        Body::Ventricle => on_ventricle(VENTRICLE_M, REACH_M),
-        Body::SmallVentricle => on_ventricle(SMALL_VENTRICLE_M, SMALL_REACH_M),
+        Body::Ventricle(place) => on_ventricle(VENTRICLE_M, place, REACH_M),
+        Body::SmallVentricle => on_ventricle(SMALL_VENTRICLE_M, Place::Side, SMALL_REACH_M),
         Body::Octant => on_octant(),
         Body::Beam { .. } => vec![],
     }
 }
 
 /// The pattern where there is body: it may reach past the cut.
-fn on_ventricle(ventricle: VentricleM, reach_m: f64) -> Vec<Sample> {
+fn on_ventricle(ventricle: VentricleM, place: Place, reach_m: f64) -> Vec<Sample> {
     let on_body = |sample: &Sample| sample.rest_m.z < ventricle.2;
-    polar(reach_m).map(|(a, b, area)| at_ventricle(ventricle, a, b, area)).filter(on_body).collect()
+    polar(reach_m).map(|(a, b, area)| at_ventricle(ventricle, place, [a, b], area)).filter(on_body).collect()
 }
 
 /// Offsets (m) in the middles of the cells of a polar grid, with their areas (m²).
@@ -64,22 +67,28 @@ fn on_block(x: f64, y: f64, area_m2: f64) -> Sample {
         rest_m: DVec3::new(x, y, BLOCK_M[1]),
         area_m2,
         parameters: [x.abs(), y.abs()],
-        mirror: DVec3::new(sign(x), sign(y), 1.0),
+        frame: mirror(sign(x), sign(y)),
     }
 }
 
-/// Offsets along the parallel and the meridian, as long as on the equator.
-fn at_ventricle(((short, long), _, cut): VentricleM, across: f64, up: f64, area_m2: f64) -> Sample {
-    let (azimuth, latitude) = (across / short, up / long);
-    let top = (cut / long).asin();
-    let (sin, cos) = latitude.sin_cos();
+fn mirror(x: f64, y: f64) -> DMat3 {
+    DMat3::from_diagonal(DVec3::new(x, y, 1.0))
+}
+
+/// Offsets along the parallel and the meridian, as long as where it is touched.
+fn at_ventricle((outer, _, cut): VentricleM, place: Place, [across, up]: [f64; 2], area_m2: f64) -> Sample {
+    let (meridian, touched) = (Meridian(outer), place.latitude_rad());
     // dA = short cosφ dθ · √(short² sin²φ + long² cos²φ) dφ
-    let stretch = cos * (short * sin).hypot(long * cos) / long;
+    let per_radians = |latitude: f64| [meridian.point_m(latitude).x, meridian.metres_per_radian(latitude)];
+    let [per_azimuth, per_latitude] = per_radians(touched);
+    let (azimuth, latitude) = (across / per_azimuth, touched + up / per_latitude);
+    let stretch = per_radians(latitude).iter().product::<f64>() / (per_azimuth * per_latitude);
+    let top = (cut / outer.1).asin();
     Sample {
-        rest_m: DVec3::new(short * cos * azimuth.cos(), short * cos * azimuth.sin(), long * sin),
+        rest_m: place.turn() * DMat3::from_rotation_z(azimuth) * meridian.point_m(latitude),
         area_m2: area_m2 * stretch,
         parameters: [azimuth.abs(), (latitude + FRAC_PI_2) / (top + FRAC_PI_2)],
-        mirror: DVec3::new(1.0, sign(azimuth), 1.0),
+        frame: place.turn() * mirror(1.0, sign(azimuth)),
     }
 }
 
@@ -93,7 +102,7 @@ fn on_octant() -> Vec<Sample> {
             rest_m: direction * OCTANT_M[0],
             area_m2: (OCTANT_M[0] * step).powi(2) * latitude.cos(),
             parameters: [azimuth, latitude],
-            mirror: DVec3::ONE,
+            frame: DMat3::IDENTITY,
         }
     };
     (0..ON_OCTANT * ON_OCTANT).map(point).collect()
@@ -163,22 +172,22 @@ mod tests {
         let area = |body| points(body).iter().map(|s| s.area_m2).sum::<f64>();
         assert!((area(Body::Block) / (PI * REACH_M * REACH_M) - 1.0).abs() < 1e-12);
         assert!((area(Body::Octant) / (0.5 * PI * 0.05 * 0.05) - 1.0).abs() < 1e-3);
-        assert_eq!(points(Body::Ventricle).len(), 127);
+        assert_eq!(points(Body::Ventricle(Place::Side)).len(), 127);
     }
 
     #[test]
     fn the_reference_grids_parameters_name_the_same_points() {
-        let ventricle = |(outer, inner, cut): VentricleM, contact_m| bodies::ventricle(outer, inner, cut, contact_m, 3);
-        let hex = [
+        let mut hex = vec![
             (Body::Block, bodies::block(BLOCK_M[0], BLOCK_M[1], 5e-3, 4)),
-            (Body::Ventricle, ventricle(VENTRICLE_M, 5e-3)),
-            (Body::SmallVentricle, ventricle(SMALL_VENTRICLE_M, 2e-3)),
+            (Body::SmallVentricle, bodies::ventricle(SMALL_VENTRICLE_M, 0.0, 2e-3, 3)),
         ];
+        let at = |place: Place| bodies::ventricle(VENTRICLE_M, place.latitude_rad(), 5e-3, 4);
+        hex.extend(Place::ALL.map(|place| (Body::Ventricle(place), at(place))));
         for (body, hex) in hex {
             for sample in points(body) {
                 let found = hex.grid.on_side(hex.touched, sample.parameters);
                 let at: DVec3 = found.iter().map(|&(n, w)| hex.grid.positions_m[n as usize] * w).sum();
-                assert!((at * sample.mirror).distance(sample.rest_m) < 2e-5, "{at} {}", sample.rest_m);
+                assert!((sample.frame * at).distance(sample.rest_m) < 2e-5, "{body:?}: {at} {}", sample.rest_m);
             }
             assert!(!surface_points(&hex.grid, &hex.grid.faces(hex.touched)[0], 1).is_empty());
         }

@@ -1,5 +1,6 @@
 //! The bodies of the contact problems as graded grids, cut at their planes of symmetry.
 use super::grid::{HexGrid, Side, graded};
+use crate::problems::{body::VentricleM, place::Meridian};
 use glam::{BVec3, DVec3};
 use std::f64::consts::{FRAC_PI_2, PI};
 
@@ -77,9 +78,10 @@ fn from_contact(contact: f64, length: f64, (near, far): (usize, usize)) -> Vec<f
 }
 
 /// The truncated-ellipsoid ventricle of `shapes::ventricle` with semi-axes (short, long) in metres, held at its base and
-/// touched from +x at z = 0 by a contact of radius `contact_m`: the half with y ≥ 0. `n` elements over one and a half times that
+/// touched in the plane of +x and z, at a latitude (rad) of its outer ellipsoid, by a contact of radius `contact_m`: the half with y ≥ 0. `n` elements over one and a half times that
 /// radius each way, inwards too; beyond, `2n` to the opposite meridian and to the apex, `n` to the base and through the wall.
-pub fn ventricle(outer_m: (f64, f64), inner_m: (f64, f64), cut_z_m: f64, contact_m: f64, n: usize) -> Body {
+pub fn ventricle((outer_m, inner_m, cut_z_m): VentricleM, latitude_rad: f64, contact_m: f64, n: usize) -> Body {
+    let outer = Meridian(outer_m);
     let place = |p: DVec3| {
         let (azimuth, t, s) = (p.x, p.y, p.z);
         let on = |(short, long): (f64, f64)| {
@@ -90,14 +92,14 @@ pub fn ventricle(outer_m: (f64, f64), inner_m: (f64, f64), cut_z_m: f64, contact
         on(inner_m).lerp(on(outer_m), s)
     };
     let span = (cut_z_m / outer_m.1).asin() + FRAC_PI_2;
-    let at_touch = FRAC_PI_2 / span;
-    // On the equator a metre along the meridian is 1/(c span) of the parameter.
-    let contact_t = contact_m / (outer_m.1 * span);
+    let at_touch = (latitude_rad + FRAC_PI_2) / span;
+    // A metre along the meridian is so much of the parameter where it is touched.
+    let contact_t = contact_m / (outer.metres_per_radian(latitude_rad) * span);
     let down = from_contact(contact_t, at_touch, (n, 2 * n));
-    let up = from_contact(contact_t, 1.0 - at_touch, (n, n));
+    let up = from_contact(contact_t, 1.0 - at_touch, (n, if latitude_rad < 0.0 { 2 * n } else { n }));
     let mut along: Vec<f64> = down.iter().skip(1).rev().map(|t| at_touch - t).collect();
     along.extend(up.iter().map(|t| at_touch + t));
-    let around = from_contact(contact_m / outer_m.0, PI, (n, 2 * n));
+    let around = from_contact(contact_m / outer.point_m(latitude_rad).x, PI, (n, 2 * n));
     let wall = outer_m.0 - inner_m.0;
     let through = from_contact(contact_m / wall, 1.0, (n, n)).iter().rev().map(|depth| 1.0 - depth).collect();
     let side = |parameter, upper| Side { parameter, upper };
@@ -110,8 +112,8 @@ pub fn ventricle(outer_m: (f64, f64), inner_m: (f64, f64), cut_z_m: f64, contact
         ],
         touched: side(2, true),
         multiplicity: 2.0,
-        touch_m: DVec3::X * outer_m.0,
-        normal: DVec3::X,
+        touch_m: outer.point_m(latitude_rad),
+        normal: outer.normal(latitude_rad),
     }
 }
 

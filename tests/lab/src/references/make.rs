@@ -40,10 +40,8 @@ pub fn on_grid(problem: &Problem, n: usize, penalty: f64, tell: &mut dyn FnMut(&
     let contact_m = problem.contact_radius_m();
     let body = match problem.body {
         Body::Block => bodies::block(BLOCK_M[0], BLOCK_M[1], contact_m, n),
-        Body::Ventricle | Body::SmallVentricle => {
-            let (outer, inner, cut) = if problem.body == Body::Ventricle { VENTRICLE_M } else { SMALL_VENTRICLE_M };
-            bodies::ventricle(outer, inner, cut, contact_m, n)
-        }
+        Body::Ventricle(place) => bodies::ventricle(VENTRICLE_M, place.latitude_rad(), contact_m, n),
+        Body::SmallVentricle => bodies::ventricle(SMALL_VENTRICLE_M, 0.0, contact_m, n),
         Body::Octant | Body::Beam { .. } => bail!("{} has an answer by formula", problem.name),
     };
     let solid = Solid::new(body.grid.clone(), problem.material()?)?;
@@ -74,7 +72,7 @@ fn field_m(problem: &Problem, solid: &Solid, body: &HexBody, x: &[DVec3]) -> Vec
     let of_node = |n: u32| x[n as usize] - solid.grid.positions_m[n as usize];
     let at = |sample: &sample::Sample| {
         let nodes = solid.grid.on_side(body.touched, sample.parameters);
-        nodes.iter().map(|&(n, w)| of_node(n) * w).sum::<DVec3>() * sample.mirror
+        sample.frame * nodes.iter().map(|&(n, w)| of_node(n) * w).sum::<DVec3>()
     };
     sample::points(problem.body).iter().map(at).collect()
 }
