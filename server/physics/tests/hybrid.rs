@@ -99,6 +99,33 @@ fn free_flight_keeps_momenta_and_energy() {
     assert!((end / start - 1.0).abs() < 1e-3, "{start} {end}");
 }
 
+/// Particles wake beside a floor that is held, and that shakes: the body is softer there, and the work of what moves the floor is all there is.
+#[test]
+fn what_follows_holders_in_part_wakes_and_their_work_is_booked() {
+    for mass_damping_per_s in [0.0, 30.0] {
+        let mut spec = held_below(block(0.45));
+        spec.settings.mass_damping_per_s = mass_damping_per_s;
+        let mut rig = Rig::new(spec);
+        let awake: Vec<u32> = near(&rig, DVec3::new(8e-3, 0.0, -20e-3), 10e-3);
+        wake_only(&rig.model, &mut rig.state, &mut rig.scratch, awake.iter().copied());
+        let partition = rig.model.hybrid().unwrap().partition();
+        let ids = rig.state.active.ids();
+        let floor_m = |particle: &u32| partition.particle_m(*particle).z + 20e-3;
+        assert!(ids.len() > 60 && ids.iter().all(|p| floor_m(p) > 1e-3), "{} of {}", ids.len(), awake.len());
+        assert!(ids.iter().any(|p| floor_m(p) < 3e-3));
+        let start = Energies::of(&rig.model, &rig.state).balance_j();
+        for tick in 0..400 {
+            let s = f64::from(tick) * 0.1;
+            let floor = DVec3::new(5e-4 * s.sin(), 0.0, 2e-4 * (1.7 * s).sin());
+            let report = rig.tick(&rig::Drive { prescribed: vec![floor], ..rig.still() });
+            assert!(report.quarantined.is_none());
+        }
+        let energies = Energies::of(&rig.model, &rig.state);
+        let error = (energies.balance_j() - start).abs() / energies.external_work_j;
+        assert!(error < 2e-3, "{error:e}");
+    }
+}
+
 /// A sphere pressed on the block.
 fn pressed(precision: Precision) -> Rig {
     let mut spec = held_below(block(0.45));

@@ -41,7 +41,7 @@ pub struct Hybrid {
     pub(super) free: Vec<BVec3>,
     /// It is held nowhere.
     pub(super) is_free: bool,
-    /// Which particles may wake: those that follow only free nodes, and lie within the coarse tets.
+    /// Which particles may wake: those that follow some node that is free, none that is held along some axes only, and lie within the coarse tets.
     pub(super) may_wake: Vec<bool>,
     /// Where the skin's vertices are.
     pub(super) places: Vec<SkinPlace>,
@@ -302,9 +302,8 @@ fn awake_cell(partition: &Partition, moments: (f64, [DVec3; 8])) -> RestCell {
 
 fn may_wake(partition: &Partition, free: &[BVec3], particle: u32) -> bool {
     let anchor = partition.anchor(particle);
-    anchor
-        .nodes
-        .iter()
-        .zip(anchor.weights)
-        .all(|(&node, weight)| weight > -NO_WEIGHT && (weight < NO_WEIGHT || free[node as usize] == BVec3::TRUE))
+    let mut follows = anchor.nodes.iter().zip(anchor.weights).filter(|(_, weight)| *weight >= NO_WEIGHT);
+    anchor.weights.iter().all(|&weight| weight > -NO_WEIGHT)
+        && follows.clone().all(|(&node, _)| free[node as usize].all() || !free[node as usize].any())
+        && follows.any(|(&node, _)| free[node as usize].all())
 }

@@ -9,7 +9,8 @@ use glam::{BVec3, DVec3};
 
 /// `M'` and its factor.
 ///
-/// Active particles follow free nodes only, so that one factor serves the three axes.
+/// Active particles follow nodes that are free or held along all axes, so that one factor serves the three. With accelerations `a` of free nodes `f` and none of
+/// held ones `h`, `M'_ff a = f_f`; what moves the holders feels `M'_hf a`.
 #[derive(Debug, Clone)]
 pub(crate) struct RunningMetric {
     /// `(1 − ε) m_p` (kg) of active particles.
@@ -18,8 +19,10 @@ pub(crate) struct RunningMetric {
     weight_kg: Vec<f64>,
     /// `1/M_i` (1/kg), 0 on held axes.
     inverse_node_per_kg: Vec<DVec3>,
-    /// Nodes that active particles follow: the rows of the block.
+    /// Nodes that active particles follow: the rows of the block. Free ones first, each ascending.
     touched: Vec<u32>,
+    /// How many of them are free: the rows of the factor.
+    free_rows: usize,
     row_of: Vec<u32>,
     /// The dense block of `M'` (kg), row by row.
     block_kg: Vec<f64>,
@@ -45,6 +48,7 @@ impl RunningMetric {
             weight_kg: hybrid.masses.node_kg.clone(),
             inverse_node_per_kg: hybrid.masses.node_kg.iter().zip(&hybrid.free).map(inverse).collect(),
             touched: Vec::with_capacity(most_touched),
+            free_rows: 0,
             row_of: vec![NONE; nodes],
             block_kg: Vec::with_capacity(most_touched * most_touched),
             factor: Vec::with_capacity(most_touched * most_touched),
@@ -68,7 +72,9 @@ impl RunningMetric {
                 }
             }
         }
-        self.touched.sort_unstable();
+        let is_held = |node: u32| !hybrid.free[node as usize].any();
+        self.touched.sort_unstable_by_key(|&node| (is_held(node), node));
+        self.free_rows = self.touched.partition_point(|&node| !is_held(node));
         let size = self.touched.len();
         self.block_kg.clear();
         self.block_kg.resize(size * size, 0.0);
@@ -97,13 +103,13 @@ impl RunningMetric {
     /// Pivots are positive where no weight is negative (`metric`), which [`Hybrid::may_wake`] sees to; rounding that says otherwise is raised to a
     /// little more than nothing.
     fn cholesky(&mut self) {
-        let size = self.touched.len();
+        let (size, stride) = (self.free_rows, self.touched.len());
         self.factor.clear();
         self.factor.resize(size * size, 0.0);
         for column in 0..size {
             let (before, now) = self.factor.split_at_mut(column * size);
             let now = &mut now[..size];
-            now[column..].copy_from_slice(&self.block_kg[column * size + column..(column + 1) * size]);
+            now[column..].copy_from_slice(&self.block_kg[column * stride + column..column * stride + size]);
             for earlier in before.chunks_exact(size) {
                 let scale = earlier[column];
                 if scale != 0.0 {
@@ -112,7 +118,7 @@ impl RunningMetric {
                     }
                 }
             }
-            let least = 1e-12 * self.block_kg[column * size + column];
+            let least = 1e-12 * self.block_kg[column * stride + column];
             let inverse = now[column].max(least).sqrt().recip();
             for entry in &mut now[column + 1..] {
                 *entry *= inverse;
@@ -123,9 +129,9 @@ impl RunningMetric {
 
     /// `M'⁻¹ f` (m/s²) on free axes, zero on the others, in place of forces (N) on coarse nodes and then on active particles; returns `fᵀ M'⁻¹ f` (N²/kg).
     pub(crate) fn accelerate(&mut self, forces_n: &mut [DVec3]) -> f64 {
-        let size = self.touched.len();
+        let size = self.free_rows;
         let (nodes, particles) = forces_n.split_at_mut(self.inverse_node_per_kg.len());
-        for (right, &node) in self.right.iter_mut().zip(&self.touched) {
+        for (right, &node) in self.right.iter_mut().zip(&self.touched[..size]) {
             *right = std::mem::take(&mut nodes[node as usize]);
         }
         let mut size_sq = 0.0;
@@ -142,7 +148,7 @@ impl RunningMetric {
         // L y = f
         for column in 0..size {
             let entries = &self.factor[column * size..(column + 1) * size];
-            let (done, rest) = self.right.split_at_mut(column + 1);
+            let (done, rest) = self.right[..size].split_at_mut(column + 1);
             done[column] *= entries[column];
             let y = done[column];
             // fᵀ (L Lᵀ)⁻¹ f = yᵀ y
@@ -154,14 +160,14 @@ impl RunningMetric {
         // Lᵀ a = y
         for column in (0..size).rev() {
             let entries = &self.factor[column * size..(column + 1) * size];
-            let (done, rest) = self.right.split_at_mut(column + 1);
+            let (done, rest) = self.right[..size].split_at_mut(column + 1);
             let mut sum = done[column];
             for (right, entry) in rest.iter().zip(&entries[column + 1..]) {
                 sum -= *right * *entry;
             }
             done[column] = sum * entries[column];
         }
-        for (acceleration, &node) in self.right.iter().zip(&self.touched) {
+        for (acceleration, &node) in self.right.iter().zip(&self.touched[..size]) {
             nodes[node as usize] = *acceleration;
         }
         size_sq
@@ -196,16 +202,49 @@ impl RunningMetric {
         kinetic_j - gravity_m_per_s2.dot(moment)
     }
 
-    /// Multiplies velocities on free axes by a factor; returns what they had before, `v·M' v` (J). `momenta` is a buffer.
-    pub(crate) fn damped(&mut self, hybrid: &Hybrid, v: &mut [DVec3], factor: f64, momenta: &mut Vec<DVec3>) -> f64 {
+    /// `v_h·M'_hf a_f` of velocities, or of accelerations: with these, what the holders have to give (W) to what follows them in part.
+    pub(crate) fn of_holders(&self, v: &[DVec3], a: &[DVec3]) -> f64 {
+        let (free, held) = self.touched.split_at(self.free_rows);
+        let rows = self.block_kg.chunks_exact(self.touched.len().max(1)).skip(self.free_rows).zip(held);
+        let of_row = |(row, &node): (&[f64], &u32)| {
+            let v = v[node as usize];
+            if v == DVec3::ZERO {
+                return 0.0;
+            }
+            row.iter().zip(free).map(|(mass, &other)| v.dot(a[other as usize]) * mass).sum::<f64>()
+        };
+        rows.map(of_row).sum()
+    }
+
+    /// Kinetic energy (J) of velocities less that of lumped masses, as far as held nodes have to do with it.
+    pub(crate) fn of_held_j(&self, hybrid: &Hybrid, v: &[DVec3]) -> f64 {
+        let held = &self.touched[self.free_rows..];
+        let rows = self.block_kg.chunks_exact(self.touched.len().max(1)).skip(self.free_rows).zip(held);
+        let of_row = |(row, &node): (&[f64], &u32)| {
+            let among = |(mass, &other): (&f64, &u32)| v[node as usize].dot(v[other as usize]) * mass;
+            let among_held: f64 = row.iter().zip(&self.touched).skip(self.free_rows).map(among).sum();
+            0.5 * (among_held - hybrid.masses.node_kg[node as usize] * v[node as usize].length_squared())
+        };
+        rows.map(of_row).sum::<f64>() + self.of_holders(v, v)
+    }
+
+    /// Multiplies velocities on free axes by a factor; returns what they had before, `v_f·M'_ff v_f` and `v_h·M'_hf v_f` (J). `momenta` is a buffer.
+    pub(crate) fn damped(
+        &mut self,
+        hybrid: &Hybrid,
+        v: &mut [DVec3],
+        factor: f64,
+        momenta: &mut Vec<DVec3>,
+    ) -> (f64, f64) {
         momenta.clear();
         momenta.resize(v.len(), DVec3::ZERO);
         self.momenta(hybrid, v, momenta);
         let free = hybrid.free.iter().chain(std::iter::repeat(&BVec3::TRUE));
         let of_free = free.zip(&*v).zip(&*momenta).map(|((free, v), p)| DVec3::select(*free, *v, DVec3::ZERO).dot(*p));
-        let twice_kinetic_j = of_free.sum();
+        let of_holders_j = self.of_holders(v, v);
+        let twice_kinetic_j = of_free.sum::<f64>() - of_holders_j;
         hybrid.damp(v, factor);
-        twice_kinetic_j
+        (twice_kinetic_j, of_holders_j)
     }
 
     /// Momenta `M' v` (kg m/s) of coarse nodes and then of active particles.

@@ -273,7 +273,7 @@ impl Looking {
         let mass_kg = (1.0 - KEPT) * body.masses.particle_kg[particle as usize];
         anchor.push((w - anchor.of(&state.v)) * mass_kg, &mut self.impulses);
         let away_m = y - anchor.of(&state.x);
-        self.projection.hand_over(&anchor, mass_kg, away_m);
+        self.projection.hand_over(body, &anchor, mass_kg, away_m);
         for node in body.partition.coarse().tets()[anchor.tet as usize].map(|node| node as usize) {
             if body.free[node] == BVec3::TRUE {
                 self.weights_kg[node] = body.masses.node_kg[node];

@@ -115,7 +115,7 @@ pub(crate) fn ball_in_cage() -> Partition {
     Partition::new(sites, Composite::new(&cage), &moments)
 }
 
-/// That ball as a body of two materials; the coarse nodes below −9 mm are held.
+/// That ball as a body of two materials; the coarse nodes below −9 mm are held along two axes, those beyond 9 mm along y along all.
 pub(crate) fn hybrid_ball(materials: &[Material; 2]) -> Hybrid {
     let cage = tet_box(DVec3::splat(-0.0125), DVec3::splat(0.025), [3, 3, 3]);
     let spec = ParticleSpec {
@@ -127,12 +127,15 @@ pub(crate) fn hybrid_ball(materials: &[Material; 2]) -> Hybrid {
     };
     let middle = |tet: usize| cage.corners_m(tet).iter().sum::<DVec3>() / 4.0;
     let of_tet: Vec<u16> = (0..cage.tets().len()).map(|tet| u16::from(middle(tet).y > 0.0)).collect();
-    let low = (0..cage.positions_m().len() as u32).filter(|&n| cage.positions_m()[n as usize].z < -9e-3).collect();
-    let held = PrescribedSpec { name: "low".into(), nodes: low, axes: [true, false, true] };
+    let nodes = |of: &dyn Fn(DVec3) -> bool| -> Vec<u32> {
+        (0..cage.positions_m().len() as u32).filter(|&n| of(cage.positions_m()[n as usize])).collect()
+    };
+    let low = PrescribedSpec { name: "low".into(), nodes: nodes(&|p| p.z < -9e-3), axes: [true, false, true] };
+    let far = PrescribedSpec { name: "far".into(), nodes: nodes(&|p| p.y > 9e-3), axes: [true; 3] };
     let surface = Surface::of(&cage).unwrap();
     let densities = [1000.0, 1200.0];
     let built =
-        Hybrid::build(&spec, (&cage, &surface), &[held], (materials, &densities), &of_tet, &mut |_| {}).unwrap();
+        Hybrid::build(&spec, (&cage, &surface), &[low, far], (materials, &densities), &of_tet, &mut |_| {}).unwrap();
     built.hybrid
 }
 

@@ -115,12 +115,13 @@ pub(super) fn kick(
     let of_holders_w = holders_power_w(model, accelerations, &state.v);
     let damping = model.spec().settings.mass_damping_per_s;
     let factor = (-0.5 * damping * h_s).exp();
-    let (mut before_j, mut power_w) = (0.0, 0.0);
+    let (mut before_j, mut with_holders_j, mut power_w) = (0.0, 0.0, 0.0);
     if damping > 0.0 {
-        before_j = patch.metric_mut().damped(body, &mut state.v, factor, momenta);
+        (before_j, with_holders_j) = patch.metric_mut().damped(body, &mut state.v, factor, momenta);
         power_w = of_holders_w + state.v.iter().zip(accelerations.iter()).map(|(v, f)| v.dot(*f)).sum::<f64>();
     }
     *kick_sq = [patch.metric_mut().accelerate(accelerations), kick_sq[0], kick_sq[1]];
+    let inertia_w = patch.metric().of_holders(&state.v, accelerations);
     // (v + h M'⁻¹f)ᵀ M' (v + h M'⁻¹f) = vᵀM'v + 2h v·f + h² fᵀM'⁻¹f
     let between_j = factor * factor * before_j + h_s * (2.0 * power_w + h_s * kick_sq[0]);
     let taken_j = balance.work_j(&state.v, accelerations, h_s);
@@ -135,8 +136,11 @@ pub(super) fn kick(
     if damping > 0.0 {
         body.damp(&mut state.v, factor);
         state.ledger.dissipated_j += 0.5 * (before_j + between_j) * -(-damping * h_s).exp_m1();
+        // What free velocities have with those of holders is linear in them.
+        let between_holders_j = factor * with_holders_j + h_s * inertia_w;
+        state.ledger.dissipated_j += (with_holders_j + between_holders_j) * (1.0 - factor);
     }
     state.ledger.external_work_j += h_s * external_w;
     state.ledger.dissipated_j += h_s * state.viscous.work_rate_w();
-    state.ledger.external_work_j += h_s * of_holders_w;
+    state.ledger.external_work_j += h_s * (of_holders_w + inertia_w);
 }

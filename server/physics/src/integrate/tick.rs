@@ -138,10 +138,16 @@ fn take_inputs(model: &Model, state: &mut State, scratch: &mut Scratch, input: &
         let moved = prescribed_ok && input.prescribed_displacements_m.iter().any(|d| *d != DVec3::ZERO);
         return rejected + u32::from(moved);
     }
+    let of_held_j = |state: &State, scratch: &Scratch| match (model.hybrid(), &scratch.hybrid) {
+        (Some(body), Some(own)) => own.patch.metric().of_held_j(body, &state.v),
+        _ => 0.0,
+    };
+    let before_j = of_held_j(state, scratch);
     for (set, spec) in model.spec().prescribed.iter().enumerate() {
         let displacement = prescribed_ok.then(|| input.prescribed_displacements_m[set]);
         scratch.history.held_jump += aim_prescribed(model, state, &spec.nodes, spec.axes, displacement, period_s);
     }
+    state.ledger.external_work_j += of_held_j(state, scratch) - before_j;
     rejected
 }
 
