@@ -46,15 +46,15 @@ fn methods_that_reproduce_affine_motion_answer_nearly_as_the_fine_solid() {
     }
 }
 
-/// Where the surface cuts cells no method is as near as cells, which are within 3 % (`hybrid.rs`).
+/// Where the surface cuts cells no method is as near as cells, which are within 1 % (`hybrid.rs`).
 #[test]
 fn on_the_ventricle_methods_are_stiffer_and_raw_sums_soft() {
     for (method, answers, most) in [
         (Method::CorrectedSph { kernel: Kernel::WendlandC2, control: CONTROL }, -0.07..-0.03, 0.09),
-        (Method::MovingLeastSquares { control: CONTROL }, -0.06..-0.03, 0.11),
-        (Method::ElementFreeGalerkin, -0.09..-0.03, 0.10),
+        (Method::MovingLeastSquares { control: CONTROL }, -0.07..-0.03, 0.11),
+        (Method::ElementFreeGalerkin, -0.09..-0.02, 0.10),
         (Method::NodalSmoothing { gamma: 0.3 }, -0.09..-0.05, 0.08),
-        (RAW, 0.45..0.8, 0.5),
+        (RAW, 0.6..1.0, 0.7),
     ] {
         for nu in NU {
             let (name, points) = (format!("{method:?}"), Some(of(method)));

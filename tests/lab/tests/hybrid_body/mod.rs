@@ -69,7 +69,8 @@ pub(crate) fn error(problem: &Problem, case: &Case) -> (f64, f64) {
     let mut near: Vec<u32> = (0..partition.particle_count() as u32).collect();
     near.retain(|&p| {
         let anchor = partition.anchor(p);
-        anchor.weights.iter().all(|&w| w > -1e-9) && anchor.nodes.iter().all(|&n| free[n as usize] == BVec3::TRUE)
+        let mut follows = anchor.nodes.iter().zip(anchor.weights).filter(|(_, w)| *w >= 1e-9);
+        anchor.weights.iter().all(|&w| w > -1e-9) && follows.any(|(&n, _)| free[n as usize].all())
     });
     let distance = |p: &u32| partition.particle_m(*p).distance_squared(fine.touch_m);
     near.sort_by(|a, b| distance(a).total_cmp(&distance(b)));
