@@ -111,35 +111,33 @@ impl HybridScratch {
         }
         let Some(particles) = &model.spec().particles else { return };
         let Waking::ByTools { reach_m } = particles.waking else { return };
-        if state.tick % LOOK_EVERY_TICKS == SWITCH_TICKS {
-            state.active.next.clone_from(&state.active.wanted);
-        }
-        if state.tick % LOOK_EVERY_TICKS > 0 {
-            if state.active.is_switching() {
-                self.go_on_switching(model, body, state);
+        match state.tick % LOOK_EVERY_TICKS {
+            0 => {
+                self.patch.displace(body, &state.x);
+                let view = SkinView::new(body, &self.patch, model.surface_rest_positions_m());
+                place_balls(model, &view, particles.spacing_m, state);
+                self.looking.want(body, &state.active, reach_m, particles.most_active);
+                self.looking.keep_unsettled(&self.patch, particles);
+                state.active.want(&self.looking.wanted);
             }
-            return;
+            SWITCH_TICKS => state.active.next.clone_from(&state.active.wanted),
+            since_look if state.active.is_switching() => {
+                self.go_on_switching(model, body, state, since_look % SWITCH_TICKS);
+            }
+            _ => {}
         }
-        self.patch.displace(body, &state.x);
-        let view = SkinView::new(body, &self.patch, model.surface_rest_positions_m());
-        place_balls(model, &view, particles.spacing_m, state);
-        self.looking.want(body, &state.active, reach_m, particles.most_active);
-        self.looking.keep_unsettled(&self.patch, particles);
-        state.active.want(&self.looking.wanted);
     }
 
     /// Lays the coming patch out, a slice a tick, then goes over to it.
-    fn go_on_switching(&mut self, model: &Model, body: &Hybrid, state: &mut State) {
-        match state.tick % SWITCH_TICKS {
-            0 => {}
-            slice if slice <= u64::from(RunningPatch::SLICES) => self.coming.go_on(body, &state.active.next),
-            _ => {
-                let was_current = state.force_is_current;
-                let moved_m = self.switch(model, body, state);
-                state.contact.travelled(moved_m);
-                self.skin_is_tracked = was_current;
-            }
+    fn go_on_switching(&mut self, model: &Model, body: &Hybrid, state: &mut State, slice: u64) {
+        if slice <= u64::from(RunningPatch::SLICES) {
+            self.coming.go_on(body, &state.active.next);
+            return;
         }
+        let was_current = state.force_is_current;
+        let moved_m = self.switch(model, body, state);
+        state.contact.travelled(moved_m);
+        self.skin_is_tracked = was_current;
     }
 
     /// A tick's fading of balancing forces; strains fade with the substeps, until nothing is left to speak of.
