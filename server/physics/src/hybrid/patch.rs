@@ -203,6 +203,18 @@ impl Patch {
         all.fold((f64::INFINITY, 0), |least, found| if found.0 < least.0 { found } else { least })
     }
 
+    /// How many coarse tets' means and cells have `det F ≤ 0`.
+    pub fn inverted(&self, at: &Field) -> u32 {
+        let points = self.points(at);
+        let fine = match &self.fine {
+            Fine::Cells(cells) => {
+                cells.iter().filter(|cell| cell.rest.gradient_of(&cell.of(&points)).determinant() <= 0.0).count()
+            }
+            Fine::Points(operator) => operator.volume_ratios(&points).filter(|(ratio, _)| *ratio <= 0.0).count(),
+        };
+        (fine + self.shares.iter().filter(|share| share.volume_ratio(&at.nodes) <= 0.0).count()) as u32
+    }
+
     /// Forces (N) of elastic and viscous stress at positions `at` and velocities `rate`, and the power (W) that viscous stress takes.
     pub fn forces_n(&self, materials: &Materials<'_>, at: &Field, rate: &Field) -> (Field, f64) {
         let (points, rates) = (self.points(at), self.points(rate));
