@@ -67,7 +67,7 @@ fn scene(folder: &Path, text: &str) -> String {
     path.to_str().unwrap().to_owned()
 }
 
-/// The loop damped for two seconds, the solver to 1e-10 of the forces: 1e-12 apart, 1e-9 promised.
+/// The loop damped for two seconds, the solver to 1e-10 of the forces: they are 1e-12 apart.
 #[test]
 fn static_and_simulate_agree_at_rest_with_the_same_particles_awake() {
     let folder = tempfile::tempdir().unwrap();

@@ -71,6 +71,7 @@ fn damped_the_loop_comes_to_rest_where_newtons_method_says() {
         worst = worst.max(x.distance(expected));
         largest = largest.max(expected.distance(skin[v]));
     }
+    println!("at rest: {worst:.1e} m of {largest:.1e}");
     assert!(largest > 2e-4 && worst < 1e-9 * largest, "{worst:e} of {largest:e}");
 }
 
@@ -96,6 +97,8 @@ fn free_flight_keeps_momenta_and_energy() {
     assert!((p - linear).length() < 1e-12 * linear.length(), "{p} {linear}");
     assert!((l - angular).length() < 1e-12 * angular.length(), "{l} {angular}");
     let end = Energies::of(&rig.model, &rig.state).held_j();
+    let changed = |a: DVec3, b: DVec3| (a - b).length() / b.length();
+    println!("flight: {:.1e} {:.1e} {:.1e}", changed(p, linear), changed(l, angular), end / start - 1.0);
     assert!((end / start - 1.0).abs() < 1e-3, "{start} {end}");
 }
 
@@ -123,6 +126,7 @@ fn a_sphere_is_pushed_back_with_the_work_it_does() {
     assert!(tool.contact_force_n.z > 0.05 && tool.contact_force_n.y < 0.0, "{}", tool.contact_force_n);
     let energies = Energies::of(&rig.model, &rig.state);
     let error = (energies.balance_j() - balance).abs() / energies.external_work_j;
+    println!("ledger of a press: {error:.1e} of the work");
     assert!(error < 2e-3, "{error:e}");
 }
 
@@ -291,6 +295,8 @@ fn momenta_stay_while_particles_wake_and_sleep_in_free_flight() {
     }
     assert!(sets > 8, "{sets} sets");
     let (p, l) = rig.model.hybrid().unwrap().momentum(&rig.state);
+    let changed = |a: DVec3, b: DVec3| (a - b).length() / b.length();
+    println!("{sets} sets: {:.1e} {:.1e}", changed(p, linear), changed(l, angular));
     assert!((p - linear).length() < 1e-12 * linear.length(), "{p} {linear}");
     assert!((l - angular).length() < 1e-12 * angular.length(), "{l} {angular}");
 }
@@ -329,6 +335,9 @@ fn switching_a_strained_region_keeps_force_and_books_its_energy() {
     }
     let end = Energies::of(&rig.model, &rig.state);
     let drift = (end.balance_j() - start.balance_j()) / start.elastic_j;
+    println!(
+        "switching: ledger {worst_residual:.1e} at a switch, {drift:.1e} over all; energy {worst_jump:.1e}, force {worst_step:.1e}"
+    );
     assert!(drift.abs() < 2e-2, "{drift:e}");
     assert!(worst_residual < 1e-9, "{worst_residual:e}");
     assert!(worst_jump < 1e-9, "{worst_jump:e}");
@@ -369,6 +378,7 @@ fn waking_beneath_the_tool_is_not_felt_as_a_step() {
         worst = worst.max(rig.state.tools[0].contact_force_n.distance(before_n) / before_n.length());
     }
     let fine_n = rig.state.tools[0].contact_force_n.z;
+    println!("waking beneath: {coarse_n:.3} to {fine_n:.3} N, at most {worst:.1e} in a tick");
     assert!(fine_n < 0.8 * coarse_n && worst < 0.05, "{coarse_n} {fine_n} {worst}");
 }
 
