@@ -412,3 +412,30 @@ fn a_step_that_is_too_long_is_noticed_and_taken_back() {
         assert!(end_j < 6.0 * start_j, "{ratio}: {start_j:e} {end_j:e}");
     }
 }
+
+/// The ledger of a body with particles awake, in 6 substeps and more: what leapfrog leaves, of second order.
+#[test]
+fn the_ledger_balances_to_second_order() {
+    let balance = |substeps: u32| {
+        let mut spec = held_below(block(0.45));
+        spec.settings = Settings { substeps: Substeps::Fixed(substeps), mass_damping_per_s: 0.0, ..spec.settings };
+        spec.settings.long_coarse_steps = false;
+        spec.tools = vec![sphere(6e-3, DVec3::Z * 7e-3, Coupling::Rigid)];
+        spec.gravity_m_per_s2 = DVec3::Z * -9.81;
+        let mut rig = Rig::new(spec);
+        let awake = near(&rig, DVec3::ZERO, 10e-3);
+        wake_only(&rig.model, &mut rig.state, &mut rig.scratch, awake);
+        let (mut worst, mut largest) = (0.0_f64, 0.0_f64);
+        for tick in 0..60 {
+            rig.tick_at(DVec3::Z * (7e-3 - 2e-3 * f64::from(tick) / 60.0));
+            let energies = Energies::of(&rig.model, &rig.state);
+            worst = worst.max(energies.balance_j().abs());
+            largest = largest.max(energies.elastic_j.abs()).max(energies.gravitational_j.abs());
+        }
+        worst / largest
+    };
+    let errors = [10, 20, 40].map(balance);
+    let orders = [(errors[0] / errors[1]).log2(), (errors[1] / errors[2]).log2()];
+    println!("ledger: {errors:?}, orders {orders:?}");
+    assert!(errors[0] < 1e-3 && orders.iter().all(|order| *order > 1.8), "{errors:?} {orders:?}");
+}

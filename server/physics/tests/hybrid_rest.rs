@@ -6,13 +6,12 @@ use palpate_physics::{
     Energies, LoadSpec, Model, ModelSpec, Settings,
     contact::{Coupling, ToolTarget},
     hybrid::{Waking, wake_only},
-    material::Law,
     solve::{SolveError, StaticSettings, StaticSolution, solve_static, solve_static_with},
 };
-use rig::{Drive, Rig, at, held_below, hold, hybrid_block, material, nodes_where, sphere};
+use rig::{Drive, Rig, at, held_below, hold, hybrid_block, nodes_where, sphere};
 use std::ops::ControlFlow;
 
-/// 40 × 40 × 20 mm in 24 coarse tets, 3 289 particles 2.5 mm apart in 24 coarse tets, its upper face at z = 0.
+/// 40 × 40 × 20 mm in 24 coarse tets, particles 2.5 mm apart, its upper face at z = 0.
 fn block(waking: Waking) -> ModelSpec {
     let mut spec = hybrid_block((0.02, 1, 8), 0.45, 400, waking);
     spec.settings.mass_damping_per_s = 40.0;

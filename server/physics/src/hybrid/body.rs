@@ -27,9 +27,9 @@ use std::collections::BTreeSet;
 pub(super) const NO_WEIGHT: f64 = 1e-9;
 
 /// Parts of the time to build a body: by when its cells are integrated, counted to coarse tets, and their particles known.
-const INTEGRATED: f64 = 0.25;
-const SHARED: f64 = 0.8;
-const MAY_WAKE: f64 = 0.9;
+const INTEGRATED: f64 = 0.15;
+const SHARED: f64 = 0.85;
+const MAY_WAKE: f64 = 0.95;
 
 /// What a hybrid body is made of. Constant after load.
 #[derive(Debug, Clone)]
@@ -102,7 +102,9 @@ impl Hybrid {
         let cage = CageSummary { moved_m, outside };
         let composite = Composite::new(&mesh);
         let prescribed = with_edges(&mesh, surface, &composite, prescribed);
-        let partition = Partition::new(sites, composite, &moments);
+        let partition = Partition::new_with(sites, composite, &moments, &mut |part| {
+            progress(INTEGRATED + (SHARED - INTEGRATED) * part);
+        });
         progress(SHARED);
         let masses = Masses::new(&partition, |tet| densities_kg_per_m3[of_tet[tet] as usize]);
         let mut free: Vec<BVec3> = masses.node_kg.iter().map(|&mass| BVec3::splat(mass > 0.0)).collect();

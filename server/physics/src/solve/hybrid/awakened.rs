@@ -140,13 +140,13 @@ impl<'a> Awakened<'a> {
         let at = self.field(place);
         let still = self.field(&vec![DVec3::ZERO; place.len()]);
         let forces = self.patch.forces_n(&self.body.materials(), &at, &still).0;
-        self.list(forces, place.len())
+        Self::list(forces, place.len())
     }
 
     /// Their change along a direction.
     pub(super) fn elastic_change_n(&self, place: &[DVec3], direction: &[DVec3]) -> Vec<DVec3> {
         let changes = self.patch.products_n(&self.body.materials(), &self.field(place), &self.field(direction));
-        self.list(changes, place.len())
+        Self::list(changes, place.len())
     }
 
     /// Elastic energy (J).
@@ -154,7 +154,7 @@ impl<'a> Awakened<'a> {
         self.patch.energy_j(&self.body.materials(), &self.field(place))
     }
 
-    fn list(&self, field: Field, length: usize) -> Vec<DVec3> {
+    fn list(field: Field, length: usize) -> Vec<DVec3> {
         let mut list = field.nodes;
         list.extend(field.particles);
         list.resize(length, DVec3::ZERO);

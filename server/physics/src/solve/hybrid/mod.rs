@@ -89,8 +89,8 @@ pub(super) fn solve(
 }
 
 /// The equilibrium at a fraction, with the particles awake that it keeps awake itself.
-fn stage_from<'a>(
-    awakened: &mut Awakened<'a>,
+fn stage_from(
+    awakened: &mut Awakened<'_>,
     solver: &mut Solver<'_>,
     goal: &Goal<'_>,
     fraction: f64,

@@ -193,7 +193,9 @@ impl Outer {
             }
         }
         for (carriers, product) in self.carriers.iter().zip(products) {
-            carriers.iter().for_each(|&(e, w)| out[e as usize] += product * w);
+            for &(entry, weight) in carriers {
+                out[entry as usize] += product * weight;
+            }
         }
     }
 
