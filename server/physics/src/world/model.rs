@@ -1,5 +1,5 @@
 //! The model: constant after load.
-use super::{Integrator, ModelError, ModelSpec, PrescribedSpec, State, check, seed_body, substeps};
+use super::{Integrator, ModelError, ModelSpec, PrescribedSpec, State, building, check, seed_body, substeps};
 use crate::{
     contact::{ContactModel, SurfaceModuli, ToolState},
     fem::{element::RestTet, mass},
@@ -14,10 +14,6 @@ use crate::{
     simd::ForceKernel,
 };
 use glam::{DVec2, DVec3};
-
-/// Parts of the time to build a body: to lay it out, and to find its largest frequency, untouched and then touched.
-const LAID: f64 = 0.4;
-const UNTOUCHED: f64 = 0.3;
 
 /// A body with its loads, constraints and tools. Constant after [`Model::build`].
 #[derive(Debug, Clone)]
@@ -84,8 +80,7 @@ impl Model {
             materials: &materials,
             springs_n_per_m: &[],
         };
-        let mut tell = |part: f64| progress(LAID + UNTOUCHED * part);
-        let omega = max_natural_frequency_with(&at_rest, &inverse_mass_per_kg, &mut tell);
+        let omega = max_natural_frequency_with(&at_rest, &inverse_mass_per_kg, &mut building::untouched(progress));
         let contact = ContactModel::build(
             spec.mesh.positions_m(),
             &surface,
@@ -101,8 +96,7 @@ impl Model {
             omega
         } else {
             let touched = RestStiffness { springs_n_per_m: &springs, ..at_rest };
-            let mut tell = |part: f64| progress(LAID + UNTOUCHED + UNTOUCHED * part);
-            max_natural_frequency_with(&touched, &inverse_mass_per_kg, &mut tell)
+            max_natural_frequency_with(&touched, &inverse_mass_per_kg, &mut building::touched(progress))
         };
         let explicit_sq = match spec.settings.integrator {
             // The body and its contact are implicit; tools on couplings are not.
@@ -307,10 +301,10 @@ impl Model {
         let materials: Vec<Material> = spec.regions.iter().map(|region| region.material).collect();
         let densities: Vec<f64> = spec.regions.iter().map(|region| region.density_kg_per_m3).collect();
         let of = (&spec.mesh, boundary);
-        let built =
-            Hybrid::build(particles, of, &spec.prescribed, (&materials, &densities), &spec.tet_region, &mut |part| {
-                progress(LAID * part);
-            })?;
+        let built = {
+            let (tell, made_of) = (&mut building::laying(progress), (&materials[..], &densities[..]));
+            Hybrid::build(particles, of, &spec.prescribed, made_of, &spec.tet_region, tell)?
+        };
         let Built { mut hybrid, mesh, prescribed } = built;
         let spec = ModelSpec { mesh, prescribed, ..spec };
         let mass_kg = hybrid.masses().node_kg.clone();
@@ -319,7 +313,7 @@ impl Model {
             // A node that nothing follows stays where it is.
             *inverse = if *mass > 0.0 { *inverse } else { DVec3::ZERO };
         }
-        let omega = hybrid.frequency_rad_per_s(&[], &mut |part| progress(LAID + UNTOUCHED * part));
+        let omega = hybrid.frequency_rad_per_s(&[], &mut building::untouched(progress));
         let moduli: Vec<DVec2> = (0..skin.positions_m().len() as u32).map(|v| moduli(hybrid.material_at(v))).collect();
         let vertex_masses_kg = hybrid.vertex_masses_kg(skin);
         let moduli = mean_of_triangles(&moduli, &surface);
@@ -332,7 +326,7 @@ impl Model {
             let springs = hybrid.particle_springs_n_per_m(&contact.nodal_stiffness_n_per_m);
             // λ_max(s K + C) = s λ_max(K + C/s)
             let springs: Vec<f64> = springs.iter().map(|k| k / stretch_sq).collect();
-            hybrid.frequency_rad_per_s(&springs, &mut |part| progress(LAID + UNTOUCHED + UNTOUCHED * part))
+            hybrid.frequency_rad_per_s(&springs, &mut building::touched(progress))
         };
         let omega_sq = stretch_sq * touched.max(omega).powi(2) + contact.tool_frequency_sq;
         let substeps = substeps::choose(&spec, &materials, omega_sq.sqrt())?;
