@@ -299,8 +299,10 @@ fn covering(
     sites: &Sites,
     moments: &[CellMoments],
 ) -> Cage {
-    let corners: BTreeSet<usize> = moments.iter().flat_map(|m| sites.corners(m.cell)).collect();
-    let points: Vec<DVec3> = corners.into_iter().map(|site| sites.site_m(site)).collect();
+    let mut is_corner = vec![false; sites.site_count()];
+    moments.iter().flat_map(|m| sites.corners(m.cell)).for_each(|site| is_corner[site] = true);
+    let points: Vec<DVec3> =
+        (0..is_corner.len()).filter(|&site| is_corner[site]).map(|site| sites.site_m(site)).collect();
     let held: BTreeSet<u32> = prescribed.iter().flat_map(|set| &set.nodes).copied().collect();
     cage::cover(mesh, surface, &held, &points)
 }
