@@ -11,7 +11,7 @@ const PATIENCE: Duration = Duration::from_secs(2);
 const LINE_EVERY: Duration = Duration::from_secs(10);
 const RESOLUTION: u64 = 1000;
 /// What a model's own progress is about.
-pub(crate) const BUILDING: &str = "laying particles";
+pub(crate) const BUILDING: &str = "building the body";
 
 /// Shows nothing of what is over in two seconds.
 pub(crate) struct Progress {

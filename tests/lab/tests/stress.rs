@@ -4,7 +4,7 @@ use palpate_lab::stress::{Extent, Options, Outcome, ROWS};
 
 fn outcome(name: &str, seed: u64) -> Outcome {
     let row = ROWS.iter().find(|row| row.name == name).unwrap();
-    let outcome = (row.run)(&Options { extent: Extent::Reduced, seed }).unwrap();
+    let outcome = (row.run)(&Options { extent: Extent::Reduced, seed, ..Options::default() }).unwrap();
     for m in &outcome.measured {
         println!("{name}: {} = {:e} {} (limit {:?})", m.name, m.value, m.unit, m.limit);
     }

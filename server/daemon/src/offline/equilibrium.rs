@@ -26,7 +26,8 @@ use thiserror::Error;
     palpated static cantilever                 where the beam comes to rest\n  \
     palpated static cantilever --out rest      and keep probes.csv, frames.pvd and summary.json\n  \
     palpated static lame-sphere --json         a sphere under pressure, for other programs\n\n\
-    Loads and tools arrive slowly, and without friction. A tool on a spring rests where the spring balances its contact.")]
+    Loads and tools arrive slowly, and without friction. A tool on a spring rests where the spring balances its contact.\n\
+    Of a body with particles those are awake that tools would keep awake where they rest, and those within the same reach of a load.")]
 pub struct StaticArgs {
     #[command(flatten)]
     output: OutputArgs,
@@ -55,16 +56,9 @@ struct NoEquilibrium {
 pub fn run(args: &StaticArgs) -> miette::Result<ExitCode> {
     let output = &args.output;
     let scene = load::load_with_warnings(&output.scene)?;
-    if scene.model.particles.is_some() {
-        return Err(miette::miette!(
-            help = "let `palpated simulate` come to rest with mass_damping_per_s, or leave [body.particles] out",
-            "\"{}\" is a body with particles, whose equilibrium is not solved for",
-            scene.name
-        ));
-    }
     if scene.model.seed.is_some() {
         return Err(miette::miette!(
-            help = "let `palpated simulate` come to rest, or leave [body.seed] out",
+            help = "let `palpated simulate` come to rest, or put [body.particles] in place of [body.seed]: that hybrid's equilibrium is solved for",
             "\"{}\" is the papers' hybrid, whose forces have no equilibrium that is solved for",
             scene.name
         ));
@@ -98,6 +92,7 @@ pub fn run(args: &StaticArgs) -> miette::Result<ExitCode> {
         rounding_n: solution.rounding_n,
         stable: solution.stable,
         inverted_tets: solution.inverted_tets,
+        spread_loads: scene.model.particles.is_some().then_some(solution.awake.spread_loads),
     });
     if let Some(out) = &out {
         summary.write(out)?;

@@ -108,6 +108,9 @@ pub(super) struct SolveNumbers {
     pub(super) rounding_n: f64,
     pub(super) stable: bool,
     pub(super) inverted_tets: u32,
+    /// Of a body with particles: loads on more of the skin than may be awake, which the coarse tets carry alone.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) spread_loads: Option<u32>,
 }
 
 #[derive(Debug, Serialize)]
@@ -243,6 +246,12 @@ impl Summary {
         }
         if let Some(solve) = &self.solve {
             println!("  {}, in {:.3} s", solve.line(), self.wall_s);
+            if let Some(spread) = solve.spread_loads.filter(|spread| *spread > 0) {
+                println!(
+                    "  {} on more of the skin than may be awake: carried by the coarse tets alone",
+                    counted(spread as usize, "load")
+                );
+            }
         }
         for (name, probe) in &self.probes {
             print_probe(name, probe);

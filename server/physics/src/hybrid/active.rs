@@ -238,6 +238,16 @@ impl HybridScratch {
 }
 
 impl State {
+    /// Goes over to these particles, which have room and may wake, of a body at rest.
+    pub(crate) fn wake_at_rest(&mut self, ids: &[u32]) {
+        self.active.ids.clear();
+        self.active.ids.extend_from_slice(ids);
+        self.active.next.clone_from(&self.active.ids);
+        for list in [&mut self.x, &mut self.v, &mut self.force_n, &mut self.external_n] {
+            list.resize(list.len() + ids.len(), DVec3::ZERO);
+        }
+    }
+
     /// Goes over to the particles that are to be active next. `moved` is a buffer. Allocates nothing where there is room.
     pub(super) fn switch(&mut self, body: &Hybrid, moved: &mut Vec<DVec3>) {
         let wanted = &self.active.next;

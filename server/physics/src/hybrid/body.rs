@@ -26,6 +26,11 @@ use std::collections::BTreeSet;
 /// A particle follows no coarse node with less than this.
 pub(super) const NO_WEIGHT: f64 = 1e-9;
 
+/// Parts of the time to build a body: by when its cells are integrated, counted to coarse tets, and their particles known.
+const INTEGRATED: f64 = 0.15;
+const SHARED: f64 = 0.85;
+const MAY_WAKE: f64 = 0.95;
+
 /// What a hybrid body is made of. Constant after load.
 #[derive(Debug, Clone)]
 pub struct Hybrid {
@@ -89,7 +94,7 @@ impl Hybrid {
         spec.check()?;
         let spacing_m = spec.spacing_m;
         let sites = Sites::covering(spec.skin.bounds_m(), spacing_m, spec.lattice_through_m);
-        let moments = integrate(&spec.skin, &sites, progress);
+        let moments = integrate(&spec.skin, &sites, &mut |part| progress(INTEGRATED * part));
         if moments.is_empty() {
             return Err(HybridError::Nothing { spacing_m });
         }
@@ -97,7 +102,10 @@ impl Hybrid {
         let cage = CageSummary { moved_m, outside };
         let composite = Composite::new(&mesh);
         let prescribed = with_edges(&mesh, surface, &composite, prescribed);
-        let partition = Partition::new(sites, composite, &moments);
+        let partition = Partition::new_with(sites, composite, &moments, &mut |part| {
+            progress(INTEGRATED + (SHARED - INTEGRATED) * part);
+        });
+        progress(SHARED);
         let masses = Masses::new(&partition, |tet| densities_kg_per_m3[of_tet[tet] as usize]);
         let mut free: Vec<BVec3> = masses.node_kg.iter().map(|&mass| BVec3::splat(mass > 0.0)).collect();
         for set in &prescribed {
@@ -108,6 +116,7 @@ impl Hybrid {
             }
         }
         let may_wake = (0..partition.particle_count() as u32).map(|p| may_wake(&partition, &free, p)).collect();
+        progress(MAY_WAKE);
         let places: Vec<SkinPlace> =
             spec.skin.positions_m().iter().map(|&point| SkinPlace::new(&partition, point)).collect();
         let of_places = places.iter().map(SkinPlace::amplification).fold(1.0, f64::max);
@@ -130,6 +139,7 @@ impl Hybrid {
             partition,
             masses,
         };
+        progress(1.0);
         Ok(Built { hybrid, mesh, prescribed })
     }
 
@@ -289,8 +299,10 @@ fn covering(
     sites: &Sites,
     moments: &[CellMoments],
 ) -> Cage {
-    let corners: BTreeSet<usize> = moments.iter().flat_map(|m| sites.corners(m.cell)).collect();
-    let points: Vec<DVec3> = corners.into_iter().map(|site| sites.site_m(site)).collect();
+    let mut is_corner = vec![false; sites.site_count()];
+    moments.iter().flat_map(|m| sites.corners(m.cell)).for_each(|site| is_corner[site] = true);
+    let points: Vec<DVec3> =
+        (0..is_corner.len()).filter(|&site| is_corner[site]).map(|site| sites.site_m(site)).collect();
     let held: BTreeSet<u32> = prescribed.iter().flat_map(|set| &set.nodes).copied().collect();
     cage::cover(mesh, surface, &held, &points)
 }

@@ -2,6 +2,8 @@
 use crate::mesh::TetMesh;
 use glam::{DMat3, DVec3};
 
+/// A point so far (m) within a tet is in no other, whatever is rounded.
+const SURELY_INSIDE_M: f64 = 1e-12;
 /// Most boxes along an axis.
 const MOST_BOXES: usize = 64;
 
@@ -111,6 +113,10 @@ impl Locator {
             let inside_m = frame.inside_m(&barycentric);
             if inside_m > best.2 {
                 best = (tet, barycentric, inside_m);
+            }
+            // Tets do not overlap: no other holds it as well.
+            if inside_m > SURELY_INSIDE_M {
+                break;
             }
         }
         (best.0, best.1)

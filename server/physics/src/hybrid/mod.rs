@@ -35,7 +35,7 @@ pub mod skin;
 mod smoothing;
 pub mod spec;
 mod sph;
-mod switching;
+pub(crate) mod switching;
 #[cfg(test)]
 pub(crate) mod testing;
 

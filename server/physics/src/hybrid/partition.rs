@@ -31,6 +31,9 @@ pub struct Cell {
     cut: u32,
 }
 
+/// Progress is told whenever so many cells or sites are done.
+const TELL_EVERY: usize = 1 << 15;
+
 /// The lattice's cells and particles on the coarse tets.
 #[derive(Debug, Clone)]
 pub struct Partition {
@@ -53,6 +56,21 @@ pub struct Partition {
 impl Partition {
     /// Counts every cell to a coarse tet.
     pub fn new(sites: Sites, coarse: Composite, moments: &[CellMoments]) -> Self {
+        Self::new_with(sites, coarse, moments, &mut |_| {})
+    }
+
+    /// The same; `progress` is told the part done.
+    pub(super) fn new_with(
+        sites: Sites,
+        coarse: Composite,
+        moments: &[CellMoments],
+        progress: &mut dyn FnMut(f64),
+    ) -> Self {
+        let mut tell = |third: f64, done: usize, all: usize| {
+            if done.is_multiple_of(TELL_EVERY) {
+                progress((third + done as f64 / all as f64) / 3.0);
+            }
+        };
         let mut partition = Self {
             sites,
             cells: Vec::with_capacity(moments.len()),
@@ -65,7 +83,9 @@ impl Partition {
             coarse,
         };
         let half = DVec3::splat(0.5 * sites.spacing_m());
+        let count = moments.len();
         for moments in moments {
+            tell(0.0, partition.cells.len(), count);
             let Anchor { tet, part, .. } = partition.coarse.anchor(sites.cell_m(moments.cell) + half);
             let cut = moments.gradients_m2.as_ref().map_or(NONE, |gradients| {
                 partition.cut.push((moments.volume_m3, **gradients));
@@ -78,6 +98,7 @@ impl Partition {
             }
         }
         for site in 0..partition.particle_at.len() {
+            tell(1.0, site, partition.particle_at.len());
             if partition.particle_at[site] != NONE {
                 partition.particle_at[site] = partition.particles.len() as u32;
                 partition.particles.push(site as u32);
@@ -85,6 +106,7 @@ impl Partition {
             }
         }
         for cell in 0..partition.cells.len() {
+            tell(2.0, cell, count);
             let (volume_m3, gradients_m2) = partition.moments(cell);
             let anchors = partition.corners(cell).map(|particle| partition.anchor(particle));
             let Cell { tet, part, .. } = partition.cells[cell];

@@ -203,6 +203,18 @@ impl Patch {
         all.fold((f64::INFINITY, 0), |least, found| if found.0 < least.0 { found } else { least })
     }
 
+    /// How many coarse tets' means and cells have `det F ≤ 0`.
+    pub fn inverted(&self, at: &Field) -> u32 {
+        let points = self.points(at);
+        let fine = match &self.fine {
+            Fine::Cells(cells) => {
+                cells.iter().filter(|cell| cell.rest.gradient_of(&cell.of(&points)).determinant() <= 0.0).count()
+            }
+            Fine::Points(operator) => operator.volume_ratios(&points).filter(|(ratio, _)| *ratio <= 0.0).count(),
+        };
+        (fine + self.shares.iter().filter(|share| share.volume_ratio(&at.nodes) <= 0.0).count()) as u32
+    }
+
     /// Forces (N) of elastic and viscous stress at positions `at` and velocities `rate`, and the power (W) that viscous stress takes.
     pub fn forces_n(&self, materials: &Materials<'_>, at: &Field, rate: &Field) -> (Field, f64) {
         let (points, rates) = (self.points(at), self.points(rate));
@@ -359,9 +371,11 @@ mod tests {
                 // What balances at a particle is eight times P h²/4, at a node as much as its surroundings are wide.
                 let at_particle = stress.x_axis.length().max(stress.y_axis.length()) * h * h;
                 let worst = particles.iter().map(|&p| forces.particles[p].length()).fold(0.0, f64::max);
+                print!("{:.1e} ", worst / at_particle);
                 assert!(worst < 1e-12 * at_particle, "particles: {worst:e} of {at_particle:e}");
                 let at_node = stress.x_axis.length() * 8e-3 * 8e-3;
                 let worst = nodes.iter().map(|&n| forces.nodes[n].length()).fold(0.0, f64::max);
+                println!("{:.1e}", worst / at_node);
                 assert!(worst < 1e-12 * at_node, "nodes: {worst:e} of {at_node:e}");
             }
         }
@@ -382,6 +396,7 @@ mod tests {
             let (forces, _) = patch.forces_n(&materials, &at, &still);
             let scale = 10e3 * partition.sites().spacing_m().powi(2);
             let largest = forces.nodes.iter().chain(&forces.particles).map(|f| f.length()).fold(0.0, f64::max);
+            print!("rigid {:.1e}", largest / scale);
             assert!(largest < 1e-11 * scale, "{largest:e}");
             let at = plus(&at, &random_like(&rest, 0.3e-3, &mut random), 1.0);
             let (forces, _) = patch.forces_n(&materials, &at, &random_like(&rest, 0.1, &mut random));
@@ -389,6 +404,7 @@ mod tests {
             let total: DVec3 = pairs().map(|(_, f)| *f).sum();
             let torque: DVec3 = pairs().map(|(x, f)| x.cross(*f)).sum();
             let sizes: f64 = pairs().map(|(_, f)| f.length()).sum();
+            println!(" sum {:.1e} torque {:.1e}", total.length() / sizes, torque.length() / sizes);
             assert!(total.length() < 1e-13 * sizes && torque.length() < 1e-13 * sizes, "{total} {torque} {sizes}");
         }
     }

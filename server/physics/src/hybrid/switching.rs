@@ -36,9 +36,9 @@ const AHEAD_S: f64 = 0.05;
 /// Ticks for which a tool has to be away.
 const AWAY_TICKS: u32 = 100;
 /// Gap over the tool's radius, and over the spacing, from which its particles are awake.
-const GAP: f64 = 0.25;
+pub(crate) const GAP: f64 = 0.25;
 /// Way over the spacing that the skin's nearest point goes before a ball follows.
-const FOLLOW: f64 = 0.9;
+pub(crate) const FOLLOW: f64 = 0.9;
 /// Deviation over the spacing below which a particle may fall asleep.
 const SETTLED: f64 = 0.04;
 

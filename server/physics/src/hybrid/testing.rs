@@ -117,10 +117,15 @@ pub(crate) fn ball_in_cage() -> Partition {
 
 /// That ball as a body of two materials; the coarse nodes below −9 mm are held along two axes, those beyond 9 mm along y along all.
 pub(crate) fn hybrid_ball(materials: &[Material; 2]) -> Hybrid {
+    hybrid_ball_of(materials, 1.1e-3)
+}
+
+/// The same of another spacing.
+pub(crate) fn hybrid_ball_of(materials: &[Material; 2], spacing_m: f64) -> Hybrid {
     let cage = tet_box(DVec3::splat(-0.0125), DVec3::splat(0.025), [3, 3, 3]);
     let spec = ParticleSpec {
         skin: ball(0.01, DVec3::new(0.2e-3, -0.3e-3, 0.1e-3), 3),
-        spacing_m: 1.1e-3,
+        spacing_m,
         lattice_through_m: DVec3::splat(0.4e-3),
         most_active: 2000,
         waking: Waking::ByHand,

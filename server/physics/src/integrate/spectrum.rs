@@ -45,8 +45,18 @@ pub struct RestStiffness<'a> {
 /// by at most 1e-4. What remains is the chance that the pseudo-random start vector misses the top of the spectrum;
 /// `Settings::step_safety` is there for it.
 pub fn max_natural_frequency_rad_per_s(stiffness: &RestStiffness<'_>, inverse_mass_per_kg: &[DVec3]) -> f64 {
+    max_natural_frequency_with(stiffness, inverse_mass_per_kg, &mut |_| {})
+}
+
+/// The same; `progress` is told the part done.
+pub(crate) fn max_natural_frequency_with(
+    stiffness: &RestStiffness<'_>,
+    inverse_mass_per_kg: &[DVec3],
+    progress: &mut dyn FnMut(f64),
+) -> f64 {
     let root_inverse_mass: Vec<DVec3> = inverse_mass_per_kg.iter().map(|m| m.map(f64::sqrt)).collect();
-    let (theta, residual) = lanczos(&mut |a, out| stiffness.apply(a, out), &root_inverse_mass);
+    let mut apply = telling(progress, |a, out| stiffness.apply(a, out));
+    let (theta, residual) = lanczos(&mut apply, &root_inverse_mass);
     let bound = element_bound_rad_per_s(stiffness, inverse_mass_per_kg);
     let springs = stiffness.springs_n_per_m.iter().zip(inverse_mass_per_kg);
     let spring_bound_sq = springs.map(|(k, inverse_mass)| k * inverse_mass.max_element()).fold(0.0, f64::max);
@@ -111,9 +121,31 @@ impl RestStiffness<'_> {
     }
 }
 
+/// Products that tell how far Lanczos' method is; how many it takes is not known beforehand, some 30 to 80.
+pub(crate) fn telling<'a>(
+    progress: &'a mut dyn FnMut(f64),
+    mut apply: impl FnMut(&[DVec3], &mut [DVec3]) + 'a,
+) -> impl FnMut(&[DVec3], &mut [DVec3]) + 'a {
+    let mut products = 0.0;
+    move |a, out| {
+        apply(a, out);
+        products += 1.0;
+        progress(1.0 - f64::exp(-products / 30.0));
+    }
+}
+
 /// Largest eigenvalue θ of `A = D K D`, `D = M^{-½}`, and its residual `r` (both rad²/s²). `apply` overwrites its second argument with K times its
 /// first.
 pub(crate) fn lanczos(apply: &mut dyn FnMut(&[DVec3], &mut [DVec3]), root_inverse_mass: &[DVec3]) -> (f64, f64) {
+    lanczos_to(TOLERANCE, apply, root_inverse_mass)
+}
+
+/// The same until the residual is below a fraction of θ.
+pub(crate) fn lanczos_to(
+    tolerance: f64,
+    apply: &mut dyn FnMut(&[DVec3], &mut [DVec3]),
+    root_inverse_mass: &[DVec3],
+) -> (f64, f64) {
     let free = root_inverse_mass.iter().flat_map(DVec3::to_array).filter(|&d| d > 0.0).count();
     let mut current = start_vector(root_inverse_mass);
     let mut previous = vec![DVec3::ZERO; current.len()];
@@ -142,7 +174,7 @@ pub(crate) fn lanczos(apply: &mut dyn FnMut(&[DVec3], &mut [DVec3]), root_invers
         if exhausted || step % STEPS_PER_CHECK == 0 {
             let (theta, last) = largest_of_tridiagonal(&diagonal, &off_diagonal);
             best = (theta, beta * last);
-            if exhausted || best.1 <= TOLERANCE * theta {
+            if exhausted || best.1 <= tolerance * theta {
                 break;
             }
         }

@@ -109,15 +109,7 @@ impl Stage {
         let at_rest = |(tool, pressing): (usize, &Pressing)| {
             let (device_m, centre_m) = (self.devices_m[tool], centres[tool]);
             let spring_n = model.contact().spring(tool).map(|spring| spring.force_n(device_m - centre_m));
-            ToolAtRest {
-                device_m,
-                centre_m,
-                contact_force_n: pressing.force_n,
-                device_force_n: spring_n.map_or(pressing.force_n, |spring_n| DVec3::ZERO - spring_n),
-                contacts: pressing.contacts,
-                penetration_m: pressing.penetration_m,
-                contact_energy_j: pressing.energy_j,
-            }
+            ToolAtRest::pressing(device_m, centre_m, pressing, spring_n)
         };
         forces.tools.iter().enumerate().map(at_rest).collect()
     }

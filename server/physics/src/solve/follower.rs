@@ -5,7 +5,7 @@
 //! corner `i`. Summed over a surface the skew parts cancel inside; what is left on a free rim is dropped.
 use super::stiffness::{FreeAxes, Stiffness, cross_matrix, symmetric_part};
 use crate::world::{LoadSpec, Model};
-use glam::DVec3;
+use glam::{DMat3, DVec3};
 
 /// Follower pressures with a factor that is not zero: triangles and pressure (Pa).
 pub(super) fn active<'a>(model: &'a Model, factors: &'a [f64]) -> impl Iterator<Item = (&'a [u32], f64)> {
@@ -19,6 +19,11 @@ pub(super) fn active<'a>(model: &'a Model, factors: &'a [f64]) -> impl Iterator<
 
 /// Adds the symmetric part of `∂(−f)/∂x`.
 pub(super) fn add_stiffness(model: &Model, factors: &[f64], x: &[DVec3], free: &FreeAxes, stiffness: &mut Stiffness) {
+    for_each_block(model, factors, x, &mut |i, j, block| stiffness.add_block(free, i, j, block));
+}
+
+/// Calls `add(i, j, block)` with the symmetric part of `∂(−f_i)/∂x_j`, once for a pair of corners.
+pub(super) fn for_each_block(model: &Model, factors: &[f64], x: &[DVec3], add: &mut impl FnMut(u32, u32, &DMat3)) {
     for (triangles, pressure_pa) in active(model, factors) {
         for &triangle in triangles {
             let nodes = model.surface().triangle_nodes(triangle as usize);
@@ -29,9 +34,9 @@ pub(super) fn add_stiffness(model: &Model, factors: &[f64], x: &[DVec3], free: &
                 for j in i + 1..3 {
                     // K_ij = D_j, K_ji = D_i; both D are skew.
                     let block = (derivative[j] + derivative[i].transpose()) * 0.5;
-                    stiffness.add_block(free, nodes[i], nodes[j], &block);
+                    add(nodes[i], nodes[j], &block);
                 }
-                debug_assert!(symmetric_part(&derivative[i]).abs_diff_eq(glam::DMat3::ZERO, 0.0));
+                debug_assert!(symmetric_part(&derivative[i]).abs_diff_eq(DMat3::ZERO, 0.0));
             }
         }
     }

@@ -11,7 +11,7 @@ use std::ops::ControlFlow;
 /// More load steps than this, failed ones included, are not tried.
 pub const MAX_LOAD_STEPS: u32 = 10_000;
 /// How often contact may grow within a load step.
-const MAX_WIDENINGS: u32 = 20;
+pub(super) const MAX_WIDENINGS: u32 = 20;
 
 /// Raises the load in steps: halved after a failure, doubled after a success.
 pub(super) fn solve(
@@ -66,7 +66,7 @@ fn settle(solver: &mut Solver<'_>, goal: &Goal<'_>, stage: &mut Stage, begin: &[
     Err(Stop::Step(Failure::Contact))
 }
 
-fn give_up(failure: Failure, reached_fraction: f64, failed_fraction: f64, iterations: u32) -> SolveError {
+pub(super) fn give_up(failure: Failure, reached_fraction: f64, failed_fraction: f64, iterations: u32) -> SolveError {
     let (relative_residual, hint) = match failure {
         Failure::NotFinite { node } => return SolveError::NonFinite { node, load_fraction: failed_fraction },
         Failure::Iterations { relative_residual } => {
@@ -83,7 +83,7 @@ fn give_up(failure: Failure, reached_fraction: f64, failed_fraction: f64, iterat
 }
 
 /// A device moves at most half its tool's radius per load step: the tool presses what it was outside of.
-fn largest_step(model: &Model, goal: &Goal<'_>) -> Result<f64, SolveError> {
+pub(super) fn largest_step(model: &Model, goal: &Goal<'_>) -> Result<f64, SolveError> {
     let mut largest = 1.0_f64;
     for (spec, target) in model.spec().tools.iter().zip(goal.tools) {
         let distance_m = spec.start_position_m.distance(target.position_m);

@@ -10,12 +10,14 @@
 //! - `rigid.rs`: which rigid motions the constraints leave free
 //! - `modes.rs`: natural frequencies by subspace iteration
 //! - `eigen.rs`: small symmetric eigenproblems
+//! - `hybrid/`: the same for bodies with particles, by conjugate gradients
 //! - `solution.rs`, `error.rs`: what comes out
 mod eigen;
 mod equilibrium;
 mod error;
 mod factor;
 mod follower;
+mod hybrid;
 mod load_path;
 mod modes;
 mod newton;
@@ -29,7 +31,7 @@ use glam::DVec3;
 pub use load_path::MAX_LOAD_STEPS;
 pub use modes::{Mode, natural_modes};
 pub use rigid::RigidMotion;
-pub use solution::{StaticSolution, ToolAtRest};
+pub use solution::{AwakeParticles, StaticSolution, ToolAtRest};
 use std::ops::ControlFlow;
 
 /// How far and how hard to solve.
@@ -75,6 +77,8 @@ pub struct Progress {
 /// unsymmetric rest slows Newton's method from quadratic to linear convergence, the more the further the rim turns, but does not
 /// change the equilibrium.
 ///
+/// Of a hybrid body, the particles that tools would keep awake where they rest are awake, and those as near to vertices that a load acts on.
+///
 /// # Errors
 /// [`SolveError`].
 pub fn solve_static(
@@ -88,7 +92,31 @@ pub fn solve_static(
     check(model, load_factors, prescribed_displacements_m, tools, settings)?;
     rigid::check_constrained(model)?;
     let goal = equilibrium::Goal { load_factors, prescribed_displacements_m, tools };
-    load_path::solve(model, &goal, settings, progress)
+    match model.hybrid() {
+        Some(body) => hybrid::solve(model, body, &goal, None, settings, progress),
+        None => load_path::solve(model, &goal, settings, progress),
+    }
+}
+
+/// The same of a hybrid body with these particles awake and no others; those that may not wake are left out. `None` of any other body.
+///
+/// # Errors
+/// [`SolveError`].
+pub fn solve_static_with(
+    model: &Model,
+    particles: impl IntoIterator<Item = u32>,
+    (load_factors, prescribed_displacements_m, tools): (&[f64], &[DVec3], &[ToolTarget]),
+    settings: &StaticSettings,
+    progress: &mut dyn FnMut(&Progress) -> ControlFlow<()>,
+) -> Result<Option<StaticSolution>, SolveError> {
+    let Some(body) = model.hybrid() else { return Ok(None) };
+    check(model, load_factors, prescribed_displacements_m, tools, settings)?;
+    rigid::check_constrained(model)?;
+    let goal = equilibrium::Goal { load_factors, prescribed_displacements_m, tools };
+    let mut ids: Vec<u32> = particles.into_iter().filter(|&particle| body.may_wake(particle)).collect();
+    ids.sort_unstable();
+    ids.dedup();
+    hybrid::solve(model, body, &goal, Some(ids), settings, progress).map(Some)
 }
 
 fn check(

@@ -18,9 +18,9 @@ use glam::DVec3;
 use std::ops::ControlFlow;
 
 /// Armijo's and the curvature constant.
-const SUFFICIENT_DECREASE: f64 = 1e-4;
-const CURVATURE: f64 = 0.9;
-const MAX_BACKTRACKS: u32 = 40;
+pub(super) const SUFFICIENT_DECREASE: f64 = 1e-4;
+pub(super) const CURVATURE: f64 = 0.9;
+pub(super) const MAX_BACKTRACKS: u32 = 40;
 /// A factor is reused while an iteration with it cuts the residual to less than this.
 const REUSE_BELOW: f64 = 0.1;
 
@@ -256,7 +256,7 @@ impl<'a> Solver<'a> {
 }
 
 /// Factor on α: the minimum of the parabola through value, slope and new value, kept in [0.1, 0.5].
-fn shorter(alpha: f64, slope: f64, change: f64) -> f64 {
+pub(super) fn shorter(alpha: f64, slope: f64, change: f64) -> f64 {
     let parabola = -slope * alpha / (2.0 * (change - slope * alpha));
     if parabola.is_finite() { parabola.clamp(0.1, 0.5) } else { 0.1 }
 }

@@ -61,6 +61,10 @@ pub(super) fn check_constrained(model: &Model) -> Result<(), SolveError> {
     let part_of = parts(model);
     for part in 0..part_of.iter().copied().max().map_or(0, |last| last + 1) {
         let nodes: Vec<usize> = (0..part_of.len()).filter(|&node| part_of[node] == part).collect();
+        // Coarse nodes that nothing follows are no part of the body.
+        if nodes.iter().all(|&node| model.mass_kg()[node] == 0.0) {
+            continue;
+        }
         let motions = free_motions(model, &nodes);
         if !motions.is_empty() {
             return Err(SolveError::UnderConstrained { node: nodes[0] as u32, motions });
@@ -73,11 +77,15 @@ pub(super) fn check_constrained(model: &Model) -> Result<(), SolveError> {
 fn parts(model: &Model) -> Vec<usize> {
     let nodes = model.rest_positions_m().len();
     let mut root: Vec<usize> = (0..nodes).collect();
-    for tet in model.mesh().tets() {
-        for &node in &tet[1..] {
-            let (a, b) = (find(&mut root, tet[0] as usize), find(&mut root, node as usize));
+    let mut join = |element: &[u32]| {
+        for pair in element.windows(2) {
+            let (a, b) = (find(&mut root, pair[0] as usize), find(&mut root, pair[1] as usize));
             root[a.max(b)] = a.min(b);
         }
+    };
+    match model.hybrid() {
+        Some(body) => body.partition().shares().iter().for_each(|share| join(&share.nodes)),
+        None => model.mesh().tets().iter().for_each(|tet| join(tet)),
     }
     let mut number = vec![usize::MAX; nodes];
     let mut count = 0;

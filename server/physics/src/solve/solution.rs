@@ -5,7 +5,7 @@ use super::{
     newton::Solver,
 };
 use crate::{
-    contact::ToolTarget,
+    contact::{Pressing, ToolTarget},
     fem::element::RestTet,
     health::Energies,
     world::{Model, PrescribedSpec, State},
@@ -18,8 +18,10 @@ const ROUNDING_ONLY: f64 = 10.0;
 /// An equilibrium.
 #[derive(Debug, Clone, PartialEq)]
 pub struct StaticSolution {
-    /// Positions (m), one per node.
+    /// Positions (m), one per node; of a hybrid body, of its coarse nodes and then of the particles that are awake.
     pub x: Vec<DVec3>,
+    /// Of a hybrid body.
+    pub awake: AwakeParticles,
     /// Force (N) of the holder on the body, summed over each prescribed set's axes.
     pub reactions_n: Vec<DVec3>,
     /// The same per node, zero on free axes.
@@ -30,7 +32,7 @@ pub struct StaticSolution {
     pub history: Vec<Progress>,
     /// Newton iterations in all, failed load steps included.
     pub iterations: u32,
-    /// Cholesky factorisations in all.
+    /// Cholesky factorisations in all; none of a hybrid body.
     pub factorisations: u32,
     /// Load steps that converged.
     pub load_steps: u32,
@@ -45,8 +47,17 @@ pub struct StaticSolution {
     pub rounding_n: f64,
     /// False when the tangent stiffness at `x` is not positive definite: the body would leave this equilibrium at the least push.
     pub stable: bool,
-    /// Tets with `det F ≤ 0`. An equilibrium with any is one of the formulas, hardly one of a body.
+    /// Tets, or coarse tets and awake cells, with `det F ≤ 0`. An equilibrium with any is one of the formulas, hardly one of a body.
     pub inverted_tets: u32,
+}
+
+/// The particles awake in an equilibrium of a hybrid body.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct AwakeParticles {
+    /// Ascending.
+    pub ids: Vec<u32>,
+    /// Loads that act on too much of the skin for all particles within a spacing of it to be awake, so that none is for them.
+    pub spread_loads: u32,
 }
 
 /// A tool in equilibrium.
@@ -68,6 +79,21 @@ pub struct ToolAtRest {
     pub contact_energy_j: f64,
 }
 
+impl ToolAtRest {
+    /// A tool that presses; `spring_n` is the force (N) of its coupling, if it has one.
+    pub(super) fn pressing(device_m: DVec3, centre_m: DVec3, pressing: &Pressing, spring_n: Option<DVec3>) -> Self {
+        Self {
+            device_m,
+            centre_m,
+            contact_force_n: pressing.force_n,
+            device_force_n: spring_n.map_or(pressing.force_n, |spring_n| DVec3::ZERO - spring_n),
+            contacts: pressing.contacts,
+            penetration_m: pressing.penetration_m,
+            contact_energy_j: pressing.energy_j,
+        }
+    }
+}
+
 impl StaticSolution {
     /// Whether there is no force above rounding: `relative_residual` then compares rounding with itself, and `residual_n` is to be
     /// held against `rounding_n`.
@@ -79,6 +105,7 @@ impl StaticSolution {
     /// holds the work of a slow loading, which is what the body holds: `W = U + G`.
     pub fn state(&self, model: &Model, load_factors: &[f64]) -> State {
         let mut state = State::at_rest(model);
+        state.wake_at_rest(&self.awake.ids);
         state.x.copy_from_slice(&self.x);
         state.load_factors.copy_from_slice(load_factors);
         for (tool, found) in state.tools.iter_mut().zip(&self.tools) {
@@ -121,6 +148,7 @@ impl StaticSolution {
             rounding_n: solver.rounding_n,
             stable,
             inverted_tets: inverted_tets(model, &configuration),
+            awake: AwakeParticles::default(),
             history: std::mem::take(&mut solver.history),
             x: {
                 configuration.truncate(model.mass_kg().len());

@@ -1,4 +1,5 @@
 //! [`Model`] (constant after load), [`State`] (what a tick changes) and [`Scratch`] (buffers, no meaning between ticks).
+mod building;
 mod check;
 mod error;
 mod model;

@@ -1,12 +1,12 @@
 //! The model: constant after load.
-use super::{Integrator, ModelError, ModelSpec, PrescribedSpec, State, check, seed_body, substeps};
+use super::{Integrator, ModelError, ModelSpec, PrescribedSpec, State, building, check, seed_body, substeps};
 use crate::{
     contact::{ContactModel, SurfaceModuli, ToolState},
     fem::{element::RestTet, mass},
     hybrid::{Hybrid, ParticleSpec, body::Built},
     integrate::{
         Body, RestBound, Scheme,
-        spectrum::{RestStiffness, max_natural_frequency_rad_per_s},
+        spectrum::{RestStiffness, max_natural_frequency_rad_per_s, max_natural_frequency_with},
     },
     material::Material,
     mesh::{Surface, TetMesh},
@@ -53,7 +53,7 @@ impl Model {
     pub fn build_with(spec: ModelSpec, progress: &mut dyn FnMut(f64)) -> Result<Self, ModelError> {
         let surface = Surface::of(&spec.mesh)?;
         match (spec.particles.clone(), spec.seed.clone()) {
-            (None, None) => Self::of_tets(spec, surface),
+            (None, None) => Self::of_tets(spec, surface, progress),
             (Some(particles), None) => Self::of_particles(spec, &surface, &particles, progress),
             (None, Some(seed)) => Self::of_seed(spec, seed),
             (Some(_), Some(_)) => Err(ModelError::NotForSeeds {
@@ -63,7 +63,7 @@ impl Model {
         }
     }
 
-    fn of_tets(spec: ModelSpec, surface: Surface) -> Result<Self, ModelError> {
+    fn of_tets(spec: ModelSpec, surface: Surface, progress: &mut dyn FnMut(f64)) -> Result<Self, ModelError> {
         check::spec(&spec, &surface, spec.mesh.positions_m())?;
         let rest_tets: Vec<RestTet> =
             (0..spec.mesh.tets().len()).map(|tet| RestTet::new(&spec.mesh.edge_matrix_m(tet))).collect();
@@ -80,7 +80,7 @@ impl Model {
             materials: &materials,
             springs_n_per_m: &[],
         };
-        let omega = max_natural_frequency_rad_per_s(&at_rest, &inverse_mass_per_kg);
+        let omega = max_natural_frequency_with(&at_rest, &inverse_mass_per_kg, &mut building::untouched(progress));
         let contact = ContactModel::build(
             spec.mesh.positions_m(),
             &surface,
@@ -96,7 +96,7 @@ impl Model {
             omega
         } else {
             let touched = RestStiffness { springs_n_per_m: &springs, ..at_rest };
-            max_natural_frequency_rad_per_s(&touched, &inverse_mass_per_kg)
+            max_natural_frequency_with(&touched, &inverse_mass_per_kg, &mut building::touched(progress))
         };
         let explicit_sq = match spec.settings.integrator {
             // The body and its contact are implicit; tools on couplings are not.
@@ -301,8 +301,10 @@ impl Model {
         let materials: Vec<Material> = spec.regions.iter().map(|region| region.material).collect();
         let densities: Vec<f64> = spec.regions.iter().map(|region| region.density_kg_per_m3).collect();
         let of = (&spec.mesh, boundary);
-        let built =
-            Hybrid::build(particles, of, &spec.prescribed, (&materials, &densities), &spec.tet_region, progress)?;
+        let built = {
+            let (tell, made_of) = (&mut building::laying(progress), (&materials[..], &densities[..]));
+            Hybrid::build(particles, of, &spec.prescribed, made_of, &spec.tet_region, tell)?
+        };
         let Built { mut hybrid, mesh, prescribed } = built;
         let spec = ModelSpec { mesh, prescribed, ..spec };
         let mass_kg = hybrid.masses().node_kg.clone();
@@ -311,7 +313,7 @@ impl Model {
             // A node that nothing follows stays where it is.
             *inverse = if *mass > 0.0 { *inverse } else { DVec3::ZERO };
         }
-        let omega = hybrid.frequency_rad_per_s(&[]);
+        let omega = hybrid.frequency_rad_per_s(&[], &mut building::untouched(progress));
         let moduli: Vec<DVec2> = (0..skin.positions_m().len() as u32).map(|v| moduli(hybrid.material_at(v))).collect();
         let vertex_masses_kg = hybrid.vertex_masses_kg(skin);
         let moduli = mean_of_triangles(&moduli, &surface);
@@ -323,7 +325,8 @@ impl Model {
         } else {
             let springs = hybrid.particle_springs_n_per_m(&contact.nodal_stiffness_n_per_m);
             // λ_max(s K + C) = s λ_max(K + C/s)
-            hybrid.frequency_rad_per_s(&springs.iter().map(|k| k / stretch_sq).collect::<Vec<f64>>())
+            let springs: Vec<f64> = springs.iter().map(|k| k / stretch_sq).collect();
+            hybrid.frequency_rad_per_s(&springs, &mut building::touched(progress))
         };
         let omega_sq = stretch_sq * touched.max(omega).powi(2) + contact.tool_frequency_sq;
         let substeps = substeps::choose(&spec, &materials, omega_sq.sqrt())?;

@@ -196,7 +196,8 @@ fn skips(options: &Options, bar: &ProgressBar) -> Result<Vec<(Skip, Found)>> {
 
 /// The extent in which a run goes through the stress suite.
 fn stress_options(options: &Options) -> stress::Options {
-    stress::Options { extent: if options.quick { Extent::Reduced } else { Extent::Short }, seed: 1 }
+    let extent = if options.quick { Extent::Reduced } else { Extent::Short };
+    stress::Options { extent, seed: 1, ..stress::Options::default() }
 }
 
 fn stress(options: &Options, bar: &ProgressBar) -> Result<Vec<(stress::Row, Outcome)>> {

@@ -19,14 +19,29 @@ const DEPTH_M: f64 = 4e-3;
 /// The tool's tremor (m) and how many ticks a turn of it takes.
 const TREMOR_M: f64 = 1e-4;
 const TREMOR_TICKS: f64 = 300.0;
-const TICKS_PER_SWITCH: u32 = 5;
 const RAMP_TICKS: u32 = 200;
 const SPACING_M: f64 = 2.5e-3;
 
+/// What is switched, and how often.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Switching {
+    /// Ticks (ms) from one switch to the next.
+    pub every_ms: u32,
+    /// Of the body.
+    pub poisson_ratio: f64,
+}
+
+impl Default for Switching {
+    fn default() -> Self {
+        Self { every_ms: 5, poisson_ratio: 0.45 }
+    }
+}
+
 pub(super) fn run(options: &Options) -> Result<Outcome> {
+    let Switching { every_ms, poisson_ratio } = options.switching;
     let switches = options.pick(60, 400, 100_000);
     let (coarse, fine) = (Body::Block.tets(4)?, Body::Block.tets(32)?);
-    let mut spec = rig::body(options, coarse.mesh, bodies::material(Law::StableNeoHookean, 10e3, 0.45)?);
+    let mut spec = rig::body(options, coarse.mesh, bodies::material(Law::StableNeoHookean, 10e3, poisson_ratio)?);
     spec.prescribed = coarse.prescribed;
     spec.particles = Some(methods::particles(Body::Block, &fine, SPACING_M, 600)?);
     spec.settings = Settings { mass_damping_per_s: 20.0, ..spec.settings };
@@ -62,9 +77,9 @@ pub(super) fn run(options: &Options) -> Result<Outcome> {
         let after = rig.energies();
         residual = residual.max((after.balance_j() - before.balance_j()).abs() / before.elastic_j);
         jump = jump.max((after.held_j() - before.held_j()) / before.elastic_j);
-        for tick in 0..TICKS_PER_SWITCH {
+        for tick in 0..every_ms {
             let force_n = rig.state.tools[0].contact_force_n;
-            let phase = TAU * f64::from(TICKS_PER_SWITCH * number + tick) / TREMOR_TICKS;
+            let phase = TAU * f64::from(every_ms * number + tick) / TREMOR_TICKS;
             if let Some(quarantine) = press(&mut rig, DEPTH_M - TREMOR_M * phase.sin()) {
                 outcome.broken.push(quarantine.to_string());
                 return Ok(outcome);

@@ -22,6 +22,7 @@ mod stiffness_ratio;
 mod table;
 mod time_step;
 
+pub use activation::Switching;
 use clap::Args;
 use miette::{Result, bail};
 pub use outcome::{Measured, Outcome};
@@ -42,12 +43,14 @@ pub enum Extent {
 }
 
 /// What a row is run with.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Options {
     /// How much of it.
     pub extent: Extent,
     /// Where its random numbers start.
     pub seed: u64,
+    /// What `activation` does, if not what its criterion says.
+    pub switching: Switching,
 }
 
 impl Options {
@@ -97,6 +100,12 @@ pub struct Command {
     /// Seed of all random numbers
     #[arg(long, default_value_t = 1)]
     seed: u64,
+    /// Of `activation`: switch every so many ticks of a millisecond
+    #[arg(long, value_name = "MS", default_value_t = Switching::default().every_ms, value_parser = clap::value_parser!(u32).range(1..=1000))]
+    every_ms: u32,
+    /// Of `activation`: Poisson's ratio
+    #[arg(long, value_name = "NU", default_value_t = Switching::default().poisson_ratio)]
+    poisson_ratio: f64,
     /// Folder for stress.csv
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
@@ -111,7 +120,12 @@ pub struct Command {
 /// A row that falls short without being known to, an unknown name, or a file that cannot be written.
 pub fn run(command: &Command) -> Result<()> {
     let rows = selected(&command.rows)?;
-    let options = Options { extent: if command.long { Extent::Long } else { Extent::Short }, seed: command.seed };
+    let extent = if command.long { Extent::Long } else { Extent::Short };
+    let switching = Switching { every_ms: command.every_ms, poisson_ratio: command.poisson_ratio };
+    if command.record && switching != Switching::default() {
+        bail!("only what the criterion asks for is kept; leave --record out, or --every-ms and --poisson-ratio");
+    }
+    let options = Options { extent, seed: command.seed, switching };
     let mut results = Vec::with_capacity(rows.len());
     for row in rows {
         let started = std::time::Instant::now();

@@ -91,7 +91,7 @@ mod tests {
     #[test]
     fn the_csv_has_a_line_per_number_and_as_many_fields_in_each() {
         let outcome = Outcome { measured: vec![Measured::bounded("a, \"b\"", 2.0, "m", 1.0)], broken: vec![] };
-        let options = Options { extent: Extent::Short, seed: 7 };
+        let options = Options { extent: Extent::Short, seed: 7, ..Options::default() };
         let text = csv(&options, &[(ROWS[0], outcome)]);
         let lines: Vec<&str> = text.lines().collect();
         assert_eq!(lines.len(), 2);

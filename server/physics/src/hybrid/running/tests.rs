@@ -77,6 +77,7 @@ fn running_patch_and_oracle_agree() {
                 let mut found = running.add_coarse_forces_n(&v, fading.left(), &mut forces);
                 found += running.add_cell_forces_n(&hybrid, &v, fading.left(), &mut forces);
                 let worst = forces.iter().zip(&expected).map(|(a, b)| a.distance(*b)).fold(0.0, f64::max);
+                println!("{precision:?}: {:.1e}", worst / largest(&expected));
                 assert!(worst < bound * largest(&expected), "{precision:?}, {}: {worst:e}", active.len());
                 assert!((found.viscous_w - expected_w).abs() <= 10.0 * bound * expected_w, "{found:?} {expected_w}");
                 // s ∂U/∂s
