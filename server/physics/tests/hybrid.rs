@@ -205,6 +205,25 @@ fn slide(rig: &mut Rig) -> bool {
     rig.state.active.ids() != before
 }
 
+/// In a dent many vertices are as near to the tool's centre, and which is nearest changes with the particles that are awake: what is awake may not.
+#[test]
+fn beneath_a_tool_that_stands_still_the_same_particles_stay_awake() {
+    for (across_m, depth_m) in [(0.0, 2e-3), (0.0, 3e-3), (0.125e-3, 2e-3), (0.375e-3, 2e-3), (0.625e-3, 2e-3)] {
+        let mut spec = held_below(hybrid_block((0.02, 1, 8), 0.45, 400, Waking::ByTools { reach_m: 11e-3 }));
+        spec.settings.mass_damping_per_s = 40.0;
+        spec.tools = vec![sphere(6e-3, DVec3::Z * 9e-3, Coupling::Rigid)];
+        let mut rig = Rig::new(spec);
+        let mut switches = 0;
+        for tick in 0..1500_u32 {
+            let before = rig.state.active.ids().to_vec();
+            let depth_m = depth_m * f64::from(tick.min(300)) / 300.0;
+            rig.tick_at(DVec3::new(across_m, 0.75 * across_m, 6e-3 - depth_m));
+            switches += u32::from(tick > 1000 && rig.state.active.ids() != before);
+        }
+        assert_eq!(switches, 0, "{across_m} {depth_m}");
+    }
+}
+
 /// The patch that a switch goes over to is made in ticks before it, beside the state: without it a state goes on no differently, wherever it was saved.
 #[test]
 fn what_is_saved_while_a_switch_is_coming_goes_on_with_the_same_bits() {

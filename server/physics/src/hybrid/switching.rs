@@ -1,6 +1,6 @@
 //! Which particles are awake: those near where a tool touches the skin or is about to, and those that have not come to rest yet.
 //!
-//! A tool wants the particles within a ball at rest, about the vertex of the skin nearest to it, from a gap of `g₀ + v·50 ms` on and until the gap
+//! A tool wants the particles within a ball at rest, about the vertex of the skin nearest to it, or to where it is deepest in the body, from a gap of `g₀ + v·50 ms` on and until the gap
 //! has been twice that for 100 ms; the ball follows it in steps of a spacing. A particle that no tool wants any more sleeps once it is as
 //! good as where it would be asleep, or when its room is needed.
 //!
@@ -239,13 +239,21 @@ pub fn wake_only(model: &Model, state: &mut State, scratch: &mut Scratch, partic
     }
 }
 
+/// Where a tool that touches is deepest in the body, by the force on it (N): in a dent many vertices are as near to its centre, and which is nearest would
+/// change with the particles that are awake.
+pub(crate) fn deepest_m(centre_m: DVec3, radius_m: f64, contact_force_n: DVec3) -> Option<DVec3> {
+    contact_force_n.try_normalize().map(|outwards| centre_m - outwards * radius_m)
+}
+
 /// Where the tools' balls are now.
 fn place_balls(model: &Model, view: &SkinView<'_>, spacing_m: f64, state: &mut State) {
     let State { tools, active, .. } = state;
     for ((tool, spec), ball) in tools.iter().zip(&model.spec().tools).zip(&mut active.balls) {
         let near_m = (GAP * spec.radius_m).max(GAP * spacing_m) + AHEAD_S * tool.velocity_m_per_s.length();
-        let nearest = view.nearest(tool.centre_m, spec.radius_m + 2.0 * near_m);
+        let deepest_m = deepest_m(tool.centre_m, spec.radius_m, tool.contact_force_n);
+        let nearest = view.nearest(deepest_m.unwrap_or(tool.centre_m), spec.radius_m + 2.0 * near_m);
         let gap_m = nearest.map_or(f64::INFINITY, |(_, distance_m)| distance_m - spec.radius_m);
+        let gap_m = if deepest_m.is_some() { 0.0 } else { gap_m };
         match (ball.as_mut(), nearest) {
             (_, Some((rest_m, _))) if gap_m < near_m => {
                 let moved = ball.is_none_or(|ball| ball.rest_m.distance(rest_m) > FOLLOW * spacing_m);

@@ -1,6 +1,7 @@
 //! Which particles are awake in an equilibrium.
 //!
-//! Those that a tool would keep awake where it rests, by the rules of the loop (`hybrid::switching`): a ball about the vertex of the skin nearest to it. And
+//! Those that a tool would keep awake where it rests, by the rules of the loop (`hybrid::switching`): a ball about the vertex of the skin nearest to where it is
+//! deepest, or to it. And
 //! those within the same reach of vertices that a load acts on, as its press is as local as a tool's. Where there is no room for all of a claim, the nearest;
 //! but if there is none even for those within a spacing of a load, it is spread wide, and left to the coarse tets: some of the particles beneath it, chosen by
 //! nothing, would make a pattern of it.
@@ -8,7 +9,7 @@ use super::awakened::Awakened;
 use crate::{
     hybrid::{
         Hybrid, Waking,
-        switching::{FOLLOW, GAP},
+        switching::{FOLLOW, GAP, deepest_m},
     },
     solve::equilibrium::Goal,
     world::{LoadSpec, Model},
@@ -37,8 +38,8 @@ impl Claims {
         Self::ByRule { reach_m, balls: vec![None; model.spec().tools.len()], loads, spread: 0 }
     }
 
-    /// Looks at where tools are in an equilibrium: the particles that are to be awake, ascending.
-    pub(super) fn look(&mut self, awakened: &Awakened<'_>, place: &[DVec3]) -> Vec<u32> {
+    /// Looks at where tools are in an equilibrium, with these forces (N) on them: the particles that are to be awake, ascending.
+    pub(super) fn look(&mut self, awakened: &Awakened<'_>, place: &[DVec3], contact_n: &[DVec3]) -> Vec<u32> {
         let (model, body) = (awakened.model, awakened.body);
         let (most, spacing_m) = model.spec().particles.as_ref().map_or((0, 0.0), |p| (p.most_active, p.spacing_m));
         let (reach_m, balls, loads, spread) = match self {
@@ -47,9 +48,11 @@ impl Claims {
         };
         let configuration = awakened.configuration(place);
         let (skin_m, tools_m) = configuration.split_at(awakened.vertices());
-        for ((ball, centre_m), tool) in balls.iter_mut().zip(tools_m).zip(&model.spec().tools) {
+        let all = balls.iter_mut().zip(tools_m).zip(&model.spec().tools).zip(contact_n);
+        for (((ball, centre_m), tool), contact_n) in all {
             let near_m = (GAP * tool.radius_m).max(GAP * spacing_m);
-            *ball = ball_of(*ball, model, skin_m, (*centre_m, tool.radius_m), (near_m, FOLLOW * spacing_m));
+            let touch = (*centre_m, tool.radius_m, *contact_n);
+            *ball = ball_of(*ball, model, skin_m, touch, (near_m, FOLLOW * spacing_m));
         }
         let claims = (balls.iter().flatten().count() + loads.len()).max(1);
         let room = most / claims;
@@ -93,12 +96,14 @@ fn ball_of(
     ball: Option<DVec3>,
     model: &Model,
     skin_m: &[DVec3],
-    (centre_m, radius_m): (DVec3, f64),
+    (centre_m, radius_m, contact_force_n): (DVec3, f64, DVec3),
     (near_m, follow_m): (f64, f64),
 ) -> Option<DVec3> {
-    let distances = skin_m.iter().map(|y| y.distance(centre_m)).zip(model.surface_rest_positions_m());
+    let deepest_m = deepest_m(centre_m, radius_m, contact_force_n);
+    let from_m = deepest_m.unwrap_or(centre_m);
+    let distances = skin_m.iter().map(|y| y.distance(from_m)).zip(model.surface_rest_positions_m());
     let (distance_m, rest_m) = distances.min_by(|a, b| a.0.total_cmp(&b.0))?;
-    let gap_m = distance_m - radius_m;
+    let gap_m = if deepest_m.is_some() { 0.0 } else { distance_m - radius_m };
     match ball {
         Some(_) if gap_m > 2.0 * near_m => None,
         Some(own_m) if gap_m >= near_m || own_m.distance(*rest_m) <= follow_m => Some(own_m),

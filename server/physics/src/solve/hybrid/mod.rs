@@ -55,7 +55,7 @@ pub(super) fn solve(
     let mut solver = Solver { settings, history: Vec::new(), linear_systems: 0, progress };
     let asleep = Awakened::new(model, body, &[]);
     let mut claims = given.map_or_else(|| Claims::of(model, body, goal), Claims::Given);
-    let ids = claims.look(&asleep, &asleep.at_rest());
+    let ids = claims.look(&asleep, &asleep.at_rest(), &vec![DVec3::ZERO; model.spec().tools.len()]);
     let mut awakened = Awakened::new(model, body, &ids);
     let place = awakened.at_rest();
     let contact = RestingContact::appear(model.contact(), &awakened.configuration(&place));
@@ -106,7 +106,9 @@ fn stage_from(
         let (mut stage, begin) = Stage::enter(awakened, goal, fraction, &now.place, &now.contact);
         now.place = settle(awakened, solver, goal, &mut stage, &begin)?;
         now.contact = stage.contact.clone();
-        let wanted = now.claims.look(awakened, &now.place);
+        let tools = stage.tools_at_rest(awakened, &stage.forces(awakened, &now.place), &now.place);
+        let contact_n: Vec<DVec3> = tools.iter().map(|tool| tool.contact_force_n).collect();
+        let wanted = now.claims.look(awakened, &now.place, &contact_n);
         if tried.contains(&wanted) || tried.len() == MAX_LOOKS {
             return Ok((now, stage));
         }
