@@ -243,6 +243,7 @@ impl State {
         self.active.ids.clear();
         self.active.ids.extend_from_slice(ids);
         self.active.next.clone_from(&self.active.ids);
+        self.active.wanted.clone_from(&self.active.ids);
         for list in [&mut self.x, &mut self.v, &mut self.force_n, &mut self.external_n] {
             list.resize(list.len() + ids.len(), DVec3::ZERO);
         }

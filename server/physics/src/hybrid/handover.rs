@@ -42,8 +42,8 @@ struct TetBefore {
     tet: u32,
     /// `F_g`.
     gradients: [DMat3; PARTS],
-    /// Whether its share changes, not only where its nodes are.
-    is_new: bool,
+    /// Not only where its nodes are.
+    share_changes: bool,
     /// Effective ones.
     parts: [DMat3; PARTS],
     whole: DMat3,
@@ -101,7 +101,7 @@ impl Before {
     fn take_tet(
         &mut self,
         body: &Hybrid,
-        (tet, is_new): (u32, bool),
+        (tet, share_changes): (u32, bool),
         share: &Share,
         x: &[DVec3],
         fading: &Fading,
@@ -109,7 +109,7 @@ impl Before {
         let fade = fading.of_tet(tet).unwrap_or(ShareFade::none(tet));
         let gradients = share.gradients(x, DMat3::IDENTITY);
         let (parts, whole) = fade.effective(share, &gradients);
-        self.tets.push(TetBefore { tet, gradients, is_new, parts, whole });
+        self.tets.push(TetBefore { tet, gradients, share_changes, parts, whole });
         share_j(share, body.material_of_tet(tet), &parts, &whole)
     }
 
@@ -206,7 +206,7 @@ impl Before {
             parts[part] += before.parts[part] * kept_m3[part];
             whole += before.whole * kept_m3[part];
         }
-        let gradients = if before.is_new {
+        let gradients = if before.share_changes {
             share.gradients(x, DMat3::IDENTITY)
         } else {
             share.gradients_after(&before.gradients, shifts_m)

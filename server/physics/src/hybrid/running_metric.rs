@@ -221,6 +221,9 @@ impl RunningMetric {
         let held = &self.touched[self.free_rows..];
         let rows = self.block_kg.chunks_exact(self.touched.len().max(1)).skip(self.free_rows).zip(held);
         let of_row = |(row, &node): (&[f64], &u32)| {
+            if v[node as usize] == DVec3::ZERO {
+                return 0.0;
+            }
             let among = |(mass, &other): (&f64, &u32)| v[node as usize].dot(v[other as usize]) * mass;
             let among_held: f64 = row.iter().zip(&self.touched).skip(self.free_rows).map(among).sum();
             0.5 * (among_held - hybrid.masses.node_kg[node as usize] * v[node as usize].length_squared())

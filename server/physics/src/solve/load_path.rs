@@ -13,7 +13,7 @@ pub const MAX_LOAD_STEPS: u32 = 10_000;
 /// How often contact may grow within a load step.
 pub(super) const MAX_WIDENINGS: u32 = 20;
 
-/// Raises the load in steps: halved after a failure, doubled after a success.
+/// From rest to the goal.
 pub(super) fn solve(
     model: &Model,
     goal: &Goal<'_>,
@@ -25,32 +25,46 @@ pub(super) fn solve(
     let start = model.spec().tools.iter().map(|tool| tool.start_position_m);
     let mut at: Vec<DVec3> = model.rest_positions_m().iter().copied().chain(start).collect();
     let mut contact = RestingContact::appear(model.contact(), &at);
+    let (stage, load_steps) = raise(largest, settings, |fraction| {
+        let (mut stage, begin) = Stage::enter(model, goal, fraction, &at, &contact);
+        at = settle(&mut solver, goal, &mut stage, &begin).map_err(|stop| (stop, solver.history.len() as u32))?;
+        contact = stage.contact.clone();
+        Ok(stage)
+    })?;
+    Ok(StaticSolution::of(&mut solver, &stage, at, load_steps))
+}
+
+/// Raises the load in steps: halved after a failure, doubled after a success. `attempt` finds the equilibrium at a fraction of the goal from the last that it found, or
+/// tells why not and how many iterations there were in all. Returns what it had at the goal, and how many steps led there.
+pub(super) fn raise<T>(
+    largest: f64,
+    settings: &StaticSettings,
+    mut attempt: impl FnMut(f64) -> Result<T, (Stop, u32)>,
+) -> Result<(T, u32), SolveError> {
     let mut step = largest.min(1.0 / f64::from(settings.load_steps));
     // Rounding of the fraction is far below this.
     let smallest = (step * 0.5_f64.powi(settings.max_halvings as i32)).max(1e-12);
     let (mut reached, mut succeeded) = (0.0, 0);
-    for tried in 1..=MAX_LOAD_STEPS {
+    for _ in 0..MAX_LOAD_STEPS {
         // What is left is taken in one step if rounding alone stands between.
         let fraction = if 1.0 - reached <= step * (1.0 + 1e-9) { 1.0 } else { reached + step };
-        let (mut stage, begin) = Stage::enter(model, goal, fraction, &at, &contact);
-        match settle(&mut solver, goal, &mut stage, &begin) {
+        match attempt(fraction) {
             Ok(found) => {
                 succeeded += 1;
                 if fraction >= 1.0 {
-                    return Ok(StaticSolution::of(&mut solver, &stage, found, succeeded));
+                    return Ok((found, succeeded));
                 }
-                (at, reached, contact) = (found, fraction, stage.contact);
+                reached = fraction;
                 step = (2.0 * step).min(largest);
             }
-            Err(Stop::Final(error)) => return Err(error),
-            Err(Stop::Step(failure)) => {
+            Err((Stop::Final(error), _)) => return Err(error),
+            Err((Stop::Step(failure), iterations)) => {
                 step = 0.5 * (fraction - reached);
                 if step < smallest {
-                    return Err(give_up(failure, reached, fraction, solver.history.len() as u32));
+                    return Err(give_up(failure, reached, fraction, iterations));
                 }
             }
         }
-        debug_assert!(succeeded <= tried);
     }
     Err(SolveError::TooManySteps { reached_fraction: reached, failed: MAX_LOAD_STEPS - succeeded })
 }
@@ -66,7 +80,7 @@ fn settle(solver: &mut Solver<'_>, goal: &Goal<'_>, stage: &mut Stage, begin: &[
     Err(Stop::Step(Failure::Contact))
 }
 
-pub(super) fn give_up(failure: Failure, reached_fraction: f64, failed_fraction: f64, iterations: u32) -> SolveError {
+fn give_up(failure: Failure, reached_fraction: f64, failed_fraction: f64, iterations: u32) -> SolveError {
     let (relative_residual, hint) = match failure {
         Failure::NotFinite { node } => return SolveError::NonFinite { node, load_fraction: failed_fraction },
         Failure::Iterations { relative_residual } => {

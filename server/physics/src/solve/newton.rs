@@ -18,9 +18,9 @@ use glam::DVec3;
 use std::ops::ControlFlow;
 
 /// Armijo's and the curvature constant.
-pub(super) const SUFFICIENT_DECREASE: f64 = 1e-4;
-pub(super) const CURVATURE: f64 = 0.9;
-pub(super) const MAX_BACKTRACKS: u32 = 40;
+const SUFFICIENT_DECREASE: f64 = 1e-4;
+const CURVATURE: f64 = 0.9;
+const MAX_BACKTRACKS: u32 = 40;
 /// A factor is reused while an iteration with it cuts the residual to less than this.
 const REUSE_BELOW: f64 = 0.1;
 
@@ -236,27 +236,34 @@ impl<'a> Solver<'a> {
         }
         let d = self.axes.scatter(&d);
         let line = Line::new(self.model, stage, x, &d);
-        let mut alpha = self.longest_step(&d);
-        for _ in 0..MAX_BACKTRACKS {
-            let next = line.at(alpha);
-            let (change, rounding) = line.potential_change_j(alpha);
-            if change <= SUFFICIENT_DECREASE * alpha * slope {
-                return Some(next);
-            }
-            if change <= 8.0 * rounding {
-                let slope_there = -dot(&Forces::at(self.model, stage, &next).total_n(), &d);
-                if slope_there.abs() <= CURVATURE * slope.abs() {
-                    return Some(next);
-                }
-            }
-            alpha *= shorter(alpha, slope, change);
-        }
-        None
+        let change = |alpha: f64| line.potential_change_j(alpha);
+        let slope_at = |alpha: f64| -dot(&Forces::at(self.model, stage, &line.at(alpha)).total_n(), &d);
+        search(self.longest_step(&d), slope, change, slope_at).map(|alpha| line.at(alpha))
     }
 }
 
+/// How far to go along a direction of descent, from `longest` down: where the potential has sunk enough, or, where rounding hides that, has become flat.
+/// `change_j` tells its change and the size of rounding in it, `slope_at` its slope there; `slope` is that at the start.
+pub(super) fn search(
+    longest: f64,
+    slope: f64,
+    change_j: impl Fn(f64) -> (f64, f64),
+    slope_at: impl Fn(f64) -> f64,
+) -> Option<f64> {
+    let mut alpha = longest;
+    for _ in 0..MAX_BACKTRACKS {
+        let (change, rounding) = change_j(alpha);
+        let is_flat = || slope_at(alpha).abs() <= CURVATURE * slope.abs();
+        if change <= SUFFICIENT_DECREASE * alpha * slope || change <= 8.0 * rounding && is_flat() {
+            return Some(alpha);
+        }
+        alpha *= shorter(alpha, slope, change);
+    }
+    None
+}
+
 /// Factor on α: the minimum of the parabola through value, slope and new value, kept in [0.1, 0.5].
-pub(super) fn shorter(alpha: f64, slope: f64, change: f64) -> f64 {
+fn shorter(alpha: f64, slope: f64, change: f64) -> f64 {
     let parabola = -slope * alpha / (2.0 * (change - slope * alpha));
     if parabola.is_finite() { parabola.clamp(0.1, 0.5) } else { 0.1 }
 }

@@ -15,7 +15,7 @@ mod stage;
 use super::{
     AwakeParticles, Progress, SolveError, StaticSettings, StaticSolution,
     equilibrium::Goal,
-    load_path::{self, MAX_LOAD_STEPS},
+    load_path,
     newton::{Failure, Stop},
 };
 use crate::{
@@ -60,32 +60,13 @@ pub(super) fn solve(
     let place = awakened.at_rest();
     let contact = RestingContact::appear(model.contact(), &awakened.configuration(&place));
     let mut at = Reached { place, claims, ids, contact };
-    let mut step = largest.min(1.0 / f64::from(settings.load_steps));
-    // Rounding of the fraction is far below this.
-    let smallest = (step * 0.5_f64.powi(settings.max_halvings as i32)).max(1e-12);
-    let (mut reached, mut succeeded) = (0.0, 0);
-    for _ in 0..MAX_LOAD_STEPS {
-        // What is left is taken in one step if rounding alone stands between.
-        let fraction = if 1.0 - reached <= step * (1.0 + 1e-9) { 1.0 } else { reached + step };
-        match stage_from(&mut awakened, &mut solver, goal, fraction, &at) {
-            Ok((next, stage)) => {
-                succeeded += 1;
-                if fraction >= 1.0 {
-                    return Ok(solution(&awakened, solver, &stage, next, succeeded));
-                }
-                (at, reached) = (next, fraction);
-                step = (2.0 * step).min(largest);
-            }
-            Err(Stop::Final(error)) => return Err(error),
-            Err(Stop::Step(failure)) => {
-                step = 0.5 * (fraction - reached);
-                if step < smallest {
-                    return Err(load_path::give_up(failure, reached, fraction, solver.history.len() as u32));
-                }
-            }
-        }
-    }
-    Err(SolveError::TooManySteps { reached_fraction: reached, failed: MAX_LOAD_STEPS - succeeded })
+    let (stage, load_steps) = load_path::raise(largest, settings, |fraction| {
+        let found = stage_from(&mut awakened, &mut solver, goal, fraction, &at);
+        let (next, stage) = found.map_err(|stop| (stop, solver.history.len() as u32))?;
+        at = next;
+        Ok(stage)
+    })?;
+    Ok(solution(&awakened, solver, &stage, at, load_steps))
 }
 
 /// The equilibrium at a fraction, with the particles awake that it keeps awake itself.
@@ -100,14 +81,14 @@ fn stage_from(
     if awakened.patch.active() != now.ids {
         *awakened = Awakened::new(awakened.model, awakened.body, &now.ids);
     }
-    // A tool may be nearest to one vertex with these awake, and to another with those: it keeps what it came to first.
+    // A tool may be deepest at one vertex with these awake, and at another with those: it keeps what it came to first.
     let mut tried = vec![now.ids.clone()];
     loop {
         let (mut stage, begin) = Stage::enter(awakened, goal, fraction, &now.place, &now.contact);
         now.place = settle(awakened, solver, goal, &mut stage, &begin)?;
         now.contact = stage.contact.clone();
-        let tools = stage.tools_at_rest(awakened, &stage.forces(awakened, &now.place), &now.place);
-        let contact_n: Vec<DVec3> = tools.iter().map(|tool| tool.contact_force_n).collect();
+        let pressing = stage.forces(awakened, &now.place).tools;
+        let contact_n: Vec<DVec3> = pressing.iter().map(|pressing| pressing.force_n).collect();
         let wanted = now.claims.look(awakened, &now.place, &contact_n);
         if tried.contains(&wanted) || tried.len() == MAX_LOOKS {
             return Ok((now, stage));

@@ -11,7 +11,7 @@ use crate::{
     solve::{
         Progress, SolveError, StaticSettings,
         equilibrium::{Goal, dot},
-        newton::{CURVATURE, Failure, MAX_BACKTRACKS, SUFFICIENT_DECREASE, Stop, shorter},
+        newton::{Failure, Stop, search},
     },
 };
 use glam::{BVec3, DMat3, DVec3};
@@ -192,22 +192,9 @@ fn descend(
         return None;
     }
     let line = Line::new(awakened, stage, place, d);
-    let mut alpha = longest_step(awakened, d);
-    for _ in 0..MAX_BACKTRACKS {
-        let next = line.at(alpha);
-        let (change, rounding) = line.potential_change_j(alpha);
-        if change <= SUFFICIENT_DECREASE * alpha * slope {
-            return Some(next);
-        }
-        if change <= 8.0 * rounding {
-            let slope_there = -dot(&stage.forces(awakened, &next).total_n(), d);
-            if slope_there.abs() <= CURVATURE * slope.abs() {
-                return Some(next);
-            }
-        }
-        alpha *= shorter(alpha, slope, change);
-    }
-    None
+    let change = |alpha: f64| line.potential_change_j(alpha);
+    let slope_at = |alpha: f64| -dot(&stage.forces(awakened, &line.at(alpha)).total_n(), d);
+    search(longest_step(awakened, d), slope, change, slope_at).map(|alpha| line.at(alpha))
 }
 
 /// Share of a motion in which no coupled tool moves further than a quarter of its radius: contact is not known further ahead.
