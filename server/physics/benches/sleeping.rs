@@ -64,6 +64,7 @@ fn pressed(n: usize) -> Rig {
     spec.particles = Some(ParticleSpec {
         skin,
         spacing_m: SPACING_M,
+        fine_depth_m: None,
         lattice_through_m: DVec3::ZERO,
         most_active: ACTIVE,
         waking: Waking::ByHand,

@@ -80,6 +80,7 @@ fn nor_does_waking_particles() {
     spec.particles = Some(ParticleSpec {
         skin: Skin::new(positions, surface.triangles.clone()).unwrap(),
         spacing_m: 2e-3,
+        fine_depth_m: None,
         lattice_through_m: DVec3::ZERO,
         most_active: 300,
         waking: Waking::ByTools { reach_m: 7e-3 },

@@ -151,7 +151,7 @@ fn entries(model: &Model) -> usize {
 
 /// Most awake cells of a model.
 pub(super) fn room_for_cells(body: &Hybrid, most_active: usize) -> usize {
-    (8 * most_active).min(body.partition().cells().len())
+    (body.partition().most_cells_at() * most_active).min(body.partition().cells().len())
 }
 
 fn fading_with_room(model: &Model) -> Fading {

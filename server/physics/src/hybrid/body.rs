@@ -6,12 +6,13 @@ use super::{
     clusters::SkinClusters,
     composite::Composite,
     metric::Masses,
-    moments::{CellMoments, integrate},
+    moments::{CellMoments, full_gradients_m2, integrate},
     partition::Partition,
     patch::{KEPT, Materials},
     place::{Place, SkinPlace},
     projection::Lumping,
     sites::Sites,
+    sizes,
     skin::Skin,
     spec::{HybridError, ParticleSpec},
 };
@@ -35,7 +36,7 @@ const MAY_WAKE: f64 = 0.95;
 #[derive(Debug, Clone)]
 pub struct Hybrid {
     pub(super) partition: Partition,
-    /// Rest data of a cell that the surface does not cut.
+    /// Rest data of a plain cell.
     full_cell: RestCell,
     pub(super) masses: Masses,
     /// What lumping adds to them.
@@ -102,6 +103,10 @@ impl Hybrid {
         let cage = CageSummary { moved_m, outside };
         let composite = Composite::new(&mesh);
         let prescribed = with_edges(&mesh, surface, &composite, prescribed);
+        let moments = match spec.fine_cells() {
+            Some(fine_cells) => merged(&sites, &composite, moments, fine_cells, of_tet),
+            None => moments,
+        };
         let partition = Partition::new_with(sites, composite, &moments, &mut |part| {
             progress(INTEGRATED + (SHARED - INTEGRATED) * part);
         });
@@ -125,7 +130,7 @@ impl Hybrid {
             .fold(1.0, f64::max);
         let hybrid = Self {
             lumping: Lumping::new(&partition, &masses),
-            full_cell: awake_cell(&partition, partition.full_moments()),
+            full_cell: RestCell::new(spacing_m, 1.0 - KEPT, &(spacing_m.powi(3), full_gradients_m2(spacing_m))),
             materials: materials.to_vec(),
             densities_kg_per_m3: densities_kg_per_m3.to_vec(),
             of_tet: of_tet.to_vec(),
@@ -175,11 +180,7 @@ impl Hybrid {
 
     /// Rest data of a cell that is awake.
     pub(super) fn awake_cell(&self, cell: usize) -> RestCell {
-        if self.partition.is_cut(cell) {
-            awake_cell(&self.partition, self.partition.moments(cell))
-        } else {
-            self.full_cell
-        }
+        if self.partition.is_plain(cell) { self.full_cell } else { self.partition.rest_cell(cell, 1.0 - KEPT) }
     }
 
     /// Multiplies the velocities of coarse nodes, on free axes, and of active particles by a factor.
@@ -293,6 +294,22 @@ fn with_edges(
     prescribed.iter().map(extended).collect()
 }
 
+/// With cells deeper than so many merged, where they are of one material.
+fn merged(
+    sites: &Sites,
+    composite: &Composite,
+    moments: Vec<CellMoments>,
+    fine_cells: usize,
+    of_tet: &[u16],
+) -> Vec<CellMoments> {
+    let half = DVec3::splat(0.5 * sites.spacing_m());
+    let material = |cell: usize| of_tet[composite.anchor(sites.cell_m(cell) + half).tet as usize];
+    let is_one = of_tet.iter().all(|one| *one == of_tet[0]);
+    sizes::merge(sites, moments, fine_cells, |block| {
+        is_one || block.iter().all(|&cell| material(cell) == material(block[0]))
+    })
+}
+
 fn covering(
     (mesh, surface): (&TetMesh, &Surface),
     prescribed: &[PrescribedSpec],
@@ -305,11 +322,6 @@ fn covering(
         (0..is_corner.len()).filter(|&site| is_corner[site]).map(|site| sites.site_m(site)).collect();
     let held: BTreeSet<u32> = prescribed.iter().flat_map(|set| &set.nodes).copied().collect();
     cage::cover(mesh, surface, &held, &points)
-}
-
-/// A cell's rest data from its integrals.
-fn awake_cell(partition: &Partition, moments: (f64, [DVec3; 8])) -> RestCell {
-    RestCell::new(partition.sites().spacing_m(), 1.0 - KEPT, &moments)
 }
 
 fn may_wake(partition: &Partition, free: &[BVec3], particle: u32) -> bool {

@@ -7,7 +7,7 @@
 //! f_p = −V P b_p − κ Σ_k w_k γ_kp q_k
 //! ```
 //! `χ = 2` is what the first three cost in shear when they bend a cell out of its plane. A cell then is too stiff in bending; [`HOURGLASS`] is a quarter of it.
-use super::sites::CORNERS;
+use super::{sites::CORNERS, sizes::Hanging};
 use crate::{
     fem::element::outer,
     material::{Lame, Material, viscous},
@@ -34,16 +34,27 @@ pub struct RestCell {
 
 impl RestCell {
     /// From `V_c` (m³) and `V_c b_cp` (m²) of the part of it that is body, of which it shall answer for the share `handed`.
-    pub fn new(spacing_m: f64, handed: f64, (volume_m3, gradients_m2): &(f64, [DVec3; 8])) -> Self {
+    pub fn new(edge_m: f64, handed: f64, moments: &(f64, [DVec3; 8])) -> Self {
+        Self::with_hanging(edge_m, handed, moments, Hanging::NONE)
+    }
+
+    /// The same of a cell with corners that hang, in terms of its particles, as the moments are.
+    pub fn with_hanging(
+        edge_m: f64,
+        handed: f64,
+        (volume_m3, gradients_m2): &(f64, [DVec3; 8]),
+        hanging: Hanging,
+    ) -> Self {
         let gradients_per_m = gradients_m2.map(|g| g * (1.0 / volume_m3));
         let patterns: [fn(DVec3) -> f64; 4] = [|s| s.y * s.z, |s| s.z * s.x, |s| s.x * s.y, |s| s.x * s.y * s.z];
         let modes = patterns.map(|pattern| {
             let raw = CORNERS.map(|corner| pattern(corner * 2.0 - DVec3::ONE) / 8.0);
-            let linear: DVec3 = raw.iter().zip(CORNERS).map(|(r, corner)| corner * (*r * spacing_m)).sum();
+            let linear: DVec3 = raw.iter().zip(CORNERS).map(|(r, corner)| corner * (*r * edge_m)).sum();
+            let raw = hanging.to_particles(raw);
             std::array::from_fn(|p| raw[p] - linear.dot(gradients_per_m[p]))
         });
         let volume_m3 = handed * volume_m3;
-        let hourglass_m = HOURGLASS * 4.0 / 3.0 * volume_m3 / (spacing_m * spacing_m);
+        let hourglass_m = HOURGLASS * 4.0 / 3.0 * volume_m3 / (edge_m * edge_m);
         Self { volume_m3, gradients_per_m, modes, hourglass_m }
     }
 

@@ -4,7 +4,7 @@
 //! `docs/adr/hybrid.md`).
 use super::{
     body::Hybrid,
-    cell::{HOURGLASS, MODE_WEIGHTS, RestCell},
+    cell::{HOURGLASS, MODE_WEIGHTS},
     patch::KEPT,
 };
 use crate::{
@@ -22,8 +22,8 @@ const ROUGH: f64 = 1e-2;
 impl Hybrid {
     /// Largest natural frequency (rad/s) at rest, on springs (N/m, in all directions; one per particle, or none).
     ///
-    /// Lanczos' estimate with its residual, and no more than the bound of single cells, each with its share `ρV_c/8` of its particles' masses (by Rayleigh's
-    /// quotient no assembly is faster than the fastest cell): `ω_c² ≤ 8/ρ ((3λ⁺ + 2µ) λ_max(Σ_p b_p b_pᵀ) + κ/V Σ_p w_k γ_kp²)`. Of full cells
+    /// Lanczos' estimate with its residual, and no more than the bound of single cells, each with its share `ρV_cp`, an eighth a corner, of its particles' masses (by Rayleigh's
+    /// quotient no assembly is faster than the fastest cell): `ω_c² ≤ V_c/ρ ((3λ⁺ + 2µ) λ_max(Σ_p b_p b_pᵀ/V_cp) + κ/V_c Σ_p w_k γ_kp²/V_cp)`. Of full cells
     /// that is `4 (3λ + 2µ)/(ρh²)`: all swell at once. Neighbours hinder each other, so that a lattice has some two thirds of it.
     ///
     /// Of very many cells the estimate is rougher, and as safe: its residual, which is added, may be a hundredth. `progress` is told the part done.
@@ -66,15 +66,14 @@ impl Hybrid {
     /// `out ← K a` with all particles awake.
     fn apply(&self, springs_n_per_m: &[f64], a: &[DVec3], out: &mut [DVec3]) {
         out.fill(DVec3::ZERO);
-        let spacing_m = self.partition.sites().spacing_m();
         for number in 0..self.partition.cells().len() {
             let corners = self.partition.corners(number);
             let material = self.material_of_cell(number);
-            if !self.partition.is_cut(number) {
-                add_full_products(spacing_m, material, &corners, a, out);
+            if self.partition.is_whole(number) {
+                add_full_products(self.partition.edge_m(number), material, &corners, a, out);
                 continue;
             }
-            let rest = RestCell::new(spacing_m, 1.0, &self.partition.moments(number));
+            let rest = self.partition.rest_cell(number, 1.0);
             let of = corners.map(|particle| a[particle as usize]);
             let g = rest.gradient_of(&of);
             let forces = rest.corner_forces_n(material, &stress_pa(material, &g), &rest.amplitudes(&of));
@@ -88,18 +87,20 @@ impl Hybrid {
     }
 
     fn cells_bound_sq(&self) -> f64 {
-        let spacing_m = self.partition.sites().spacing_m();
-        let hourglass_per_m2 = HOURGLASS * 4.0 / 3.0 / (spacing_m * spacing_m);
         let of_cell = |number: usize| {
             let cell = self.partition.cells()[number];
-            let rest = RestCell::new(spacing_m, 1.0, &self.partition.moments(number));
-            let gram = rest.gradients_per_m.iter().fold(DMat3::ZERO, |sum, b| sum + outer(*b, *b));
-            let modes = rest.modes.iter().zip(MODE_WEIGHTS);
-            let modes = modes.map(|(mode, w)| w * mode.iter().map(|g| g * g).sum::<f64>()).fold(0.0, f64::max);
+            let rest = self.partition.rest_cell(number, 1.0);
+            // V over V_p, eight unless corners hang.
+            let per_volume = self.partition.particles_m3(number).map(|volume_m3| rest.volume_m3 / volume_m3);
+            let grams = rest.gradients_per_m.iter().zip(per_volume);
+            let gram = grams.fold(DMat3::ZERO, |sum, (b, per_volume)| sum + outer(*b, *b) * per_volume);
+            let mode =
+                |mode: &[f64; 8]| mode.iter().zip(per_volume).map(|(g, per_volume)| g * g * per_volume).sum::<f64>();
+            let modes = rest.modes.iter().zip(MODE_WEIGHTS).map(|(of, w)| w * mode(of)).fold(0.0, f64::max);
             let Lame { lambda_pa, mu_pa } = self.material_of_cell(number).lame;
             let density = self.densities_kg_per_m3[self.of_tet[cell.tet as usize] as usize];
             let of_strain = (3.0 * lambda_pa.max(0.0) + 2.0 * mu_pa) * largest_eigenvalue(&gram);
-            8.0 / density * (of_strain + hourglass_per_m2 * mu_pa * modes)
+            (of_strain + rest.hourglass_m / rest.volume_m3 * mu_pa * modes) / density
         };
         (0..self.partition.cells().len()).map(of_cell).fold(0.0, f64::max)
     }
@@ -152,6 +153,7 @@ mod tests {
     use super::*;
     use crate::{
         hybrid::{
+            cell::RestCell,
             fade::Fading,
             moments::full_gradients_m2,
             running::RunningPatch,
@@ -205,7 +207,7 @@ mod tests {
     #[test]
     fn a_rough_estimate_is_as_safe_and_little_more() {
         for spacing_m in [1.1e-3, 0.5e-3] {
-            let hybrid = hybrid_ball_of(&[tissue()[1]; 2], spacing_m);
+            let hybrid = hybrid_ball_of(&[tissue()[1]; 2], spacing_m, None);
             let fine = hybrid.frequency_to(FINE, &[], &mut |_| {});
             let on_third = |(number, mass): (usize, &f64)| if number % 3 == 0 { 0.3 * mass * fine * fine } else { 0.0 };
             let springs: Vec<f64> = hybrid.masses.particle_kg.iter().enumerate().map(on_third).collect();

@@ -1,7 +1,5 @@
 //! The skin's vertices that something acts on, and where any other is when asked.
-use super::{
-    body::Hybrid, clusters::Displaced, composite::Anchor, partition::NONE, running::RunningPatch, sites::trilinear,
-};
+use super::{body::Hybrid, clusters::Displaced, composite::Anchor, partition::NONE, running::RunningPatch};
 use crate::world::State;
 use glam::DVec3;
 
@@ -77,7 +75,7 @@ impl ListedSkin {
             NONE => Carrier::Nodes(hybrid.partition.anchor(particle)),
             point => Carrier::Point(point),
         });
-        let (rest_m, weights) = (rest_positions_m[vertex as usize], trilinear(place.local));
+        let (rest_m, weights) = (rest_positions_m[vertex as usize], place.weights(&hybrid.partition));
         self.listed.push(Listed { vertex, rest_m, weights, carriers });
     }
 
@@ -181,7 +179,7 @@ impl<'a> SkinView<'a> {
             point => self.patch.displacements_m()[point as usize],
         };
         let particles = partition.corners(place.cell as usize);
-        let moved: DVec3 = particles.into_iter().zip(trilinear(place.local)).map(|(p, w)| of(p) * w).sum();
+        let moved: DVec3 = particles.into_iter().zip(place.weights(partition)).map(|(p, w)| of(p) * w).sum();
         self.rest_positions_m[vertex as usize] + moved
     }
 }
@@ -195,7 +193,7 @@ impl Hybrid {
             Err(_) => self.partition.anchor(particle).of(v),
         };
         let particles = self.partition.corners(place.cell as usize);
-        particles.into_iter().zip(trilinear(place.local)).map(|(p, w)| of(p) * w).sum()
+        particles.into_iter().zip(place.weights(&self.partition)).map(|(p, w)| of(p) * w).sum()
     }
 
     /// Where a vertex of the skin is (m).

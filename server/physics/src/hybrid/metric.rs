@@ -28,9 +28,9 @@ impl Masses {
     pub fn new(partition: &Partition, density_kg_per_m3: impl Fn(usize) -> f64) -> Self {
         let mut particle_kg = vec![0.0; partition.particle_count()];
         for (number, cell) in partition.cells().iter().enumerate() {
-            let eighth = density_kg_per_m3(cell.tet as usize) * partition.moments(number).0 / 8.0;
-            for particle in partition.corners(number) {
-                particle_kg[particle as usize] += eighth;
+            let density = density_kg_per_m3(cell.tet as usize);
+            for (particle, volume_m3) in partition.corners(number).into_iter().zip(partition.particles_m3(number)) {
+                particle_kg[particle as usize] += density * volume_m3;
             }
         }
         let mut node_kg = vec![0.0; partition.coarse().positions_m().len()];
@@ -183,7 +183,7 @@ mod tests {
     use super::*;
     use crate::hybrid::{
         patch::{Field, Materials, Patch},
-        testing::{Random, ball_in_cage, tissue},
+        testing::{Random, balls_in_cage, tissue},
     };
     use crate::material::{Material, Viscosity};
 
@@ -194,11 +194,13 @@ mod tests {
         of_tet: Vec<u16>,
     }
 
-    fn body() -> Body {
-        let partition = ball_in_cage();
-        let masses = Masses::new(&partition, |_| 1000.0);
-        let free = masses.node_kg.iter().map(|&m| BVec3::splat(m > 0.0)).collect();
-        Body { of_tet: vec![0; partition.shares().len()], masses, free, partition }
+    /// With cells of one size and of two.
+    fn bodies() -> [Body; 2] {
+        balls_in_cage().map(|partition| {
+            let masses = Masses::new(&partition, |_| 1000.0);
+            let free = masses.node_kg.iter().map(|&m| BVec3::splat(m > 0.0)).collect();
+            Body { of_tet: vec![0; partition.shares().len()], masses, free, partition }
+        })
     }
 
     /// A set of particles awake, in motion.
@@ -261,67 +263,72 @@ mod tests {
 
     #[test]
     fn masses_are_the_bodys() {
-        let body = body();
-        let volume = body.partition.volume_m3();
-        for list in [&body.masses.particle_kg, &body.masses.node_kg] {
-            assert!((list.iter().sum::<f64>() / (1000.0 * volume) - 1.0).abs() < 1e-12);
+        for body in bodies() {
+            let volume = body.partition.volume_m3();
+            for list in [&body.masses.particle_kg, &body.masses.node_kg] {
+                assert!((list.iter().sum::<f64>() / (1000.0 * volume) - 1.0).abs() < 1e-12);
+            }
         }
     }
 
     #[test]
     fn waking_changes_neither_kinetic_energy_nor_momentum() {
-        let body = body();
-        let mut random = Random(11);
-        let rest = body.partition.coarse().positions_m();
-        let x: Vec<DVec3> = rest.iter().map(|p| *p + random.vector() * 1e-3).collect();
-        let v: Vec<DVec3> = rest.iter().map(|p| DVec3::new(0.0, 3.0, 40.0).cross(*p) + random.vector() * 0.3).collect();
-        let asleep = Flight::new(&body, &BTreeSet::new(), x.clone(), v.clone());
-        let ((linear, angular), kinetic) = (asleep.momentum(), asleep.kinetic_j());
-        for active in [some(&body, |p| p.x > 2e-3), some(&body, |p| p.length() < 5e-3), some(&body, |_| true)] {
-            let awake = Flight::new(&body, &active, x.clone(), v.clone());
-            let (p, l) = awake.momentum();
-            assert!((p - linear).length() < 1e-13 * linear.length(), "{p} {linear}");
-            assert!((l - angular).length() < 1e-13 * angular.length(), "{l} {angular}");
-            assert!((awake.kinetic_j() / kinetic - 1.0).abs() < 1e-13);
+        for body in bodies() {
+            let mut random = Random(11);
+            let rest = body.partition.coarse().positions_m();
+            let x: Vec<DVec3> = rest.iter().map(|p| *p + random.vector() * 1e-3).collect();
+            let v: Vec<DVec3> =
+                rest.iter().map(|p| DVec3::new(0.0, 3.0, 40.0).cross(*p) + random.vector() * 0.3).collect();
+            let asleep = Flight::new(&body, &BTreeSet::new(), x.clone(), v.clone());
+            let ((linear, angular), kinetic) = (asleep.momentum(), asleep.kinetic_j());
+            for active in [some(&body, |p| p.x > 2e-3), some(&body, |p| p.length() < 5e-3), some(&body, |_| true)] {
+                let awake = Flight::new(&body, &active, x.clone(), v.clone());
+                let (p, l) = awake.momentum();
+                assert!((p - linear).length() < 1e-13 * linear.length(), "{p} {linear}");
+                assert!((l - angular).length() < 1e-13 * angular.length(), "{l} {angular}");
+                assert!((awake.kinetic_j() / kinetic - 1.0).abs() < 1e-13);
+            }
         }
     }
 
     #[test]
     fn momenta_undo_accelerations() {
-        let body = body();
-        let metric = Metric::new(&body.partition, &body.masses, &some(&body, |p| p.y > 0.0), &body.free).unwrap();
-        let mut random = Random(12);
-        let forces: Vec<DVec3> =
-            body.free.iter().map(|free| DVec3::select(*free, random.vector(), DVec3::ZERO)).collect();
-        let mut accelerations = forces.clone();
-        metric.accelerate(&body.free, &mut accelerations);
-        for (p, f) in metric.momenta(&accelerations).iter().zip(&forces) {
-            assert!((*p - *f).length() < 1e-10, "{p} {f}");
+        for body in bodies() {
+            let metric = Metric::new(&body.partition, &body.masses, &some(&body, |p| p.y > 0.0), &body.free).unwrap();
+            let mut random = Random(12);
+            let forces: Vec<DVec3> =
+                body.free.iter().map(|free| DVec3::select(*free, random.vector(), DVec3::ZERO)).collect();
+            let mut accelerations = forces.clone();
+            metric.accelerate(&body.free, &mut accelerations);
+            for (p, f) in metric.momenta(&accelerations).iter().zip(&forces) {
+                assert!((*p - *f).length() < 1e-10, "{p} {f}");
+            }
         }
     }
 
     #[test]
     fn free_flight_keeps_momentum_and_energy() {
-        let body = body();
-        let material = [tissue()[1]].map(|m| Material { viscosity: Viscosity::new(0.0, 0.0).unwrap(), ..m });
-        let materials = Materials { materials: &material, of_tet: &body.of_tet };
-        let mut random = Random(13);
-        let rest = body.partition.coarse().positions_m();
-        let v: Vec<DVec3> = rest
-            .iter()
-            .map(|p| DVec3::new(0.5, 0.0, 0.0) + DVec3::Z.cross(*p) * 30.0 + random.vector() * 0.05)
-            .collect();
-        let mut flight = Flight::new(&body, &some(&body, |p| p.x > 2e-3), rest.to_vec(), v);
-        let (linear, angular) = flight.momentum();
-        let start = flight.fly(&body, &materials, 5e-5, 1);
-        let mut worst = 0.0_f64;
-        for _ in 0..10 {
-            let energy = flight.fly(&body, &materials, 5e-5, 20);
-            worst = worst.max((energy / start - 1.0).abs());
+        for body in bodies() {
+            let material = [tissue()[1]].map(|m| Material { viscosity: Viscosity::new(0.0, 0.0).unwrap(), ..m });
+            let materials = Materials { materials: &material, of_tet: &body.of_tet };
+            let mut random = Random(13);
+            let rest = body.partition.coarse().positions_m();
+            let v: Vec<DVec3> = rest
+                .iter()
+                .map(|p| DVec3::new(0.5, 0.0, 0.0) + DVec3::Z.cross(*p) * 30.0 + random.vector() * 0.05)
+                .collect();
+            let mut flight = Flight::new(&body, &some(&body, |p| p.x > 2e-3), rest.to_vec(), v);
+            let (linear, angular) = flight.momentum();
+            let start = flight.fly(&body, &materials, 5e-5, 1);
+            let mut worst = 0.0_f64;
+            for _ in 0..10 {
+                let energy = flight.fly(&body, &materials, 5e-5, 20);
+                worst = worst.max((energy / start - 1.0).abs());
+            }
+            let (p, l) = flight.momentum();
+            assert!((p - linear).length() < 1e-12 * linear.length(), "{p} {linear}");
+            assert!((l - angular).length() < 1e-12 * angular.length(), "{l} {angular}");
+            assert!(worst < 1e-3, "{worst:e}");
         }
-        let (p, l) = flight.momentum();
-        assert!((p - linear).length() < 1e-12 * linear.length(), "{p} {linear}");
-        assert!((l - angular).length() < 1e-12 * angular.length(), "{l} {angular}");
-        assert!(worst < 1e-3, "{worst:e}");
     }
 }

@@ -31,6 +31,7 @@ mod running;
 mod running_metric;
 pub mod share;
 pub mod sites;
+pub mod sizes;
 pub mod skin;
 mod smoothing;
 pub mod spec;

@@ -25,6 +25,8 @@ const FULL: f64 = 1.0 - 1e-9;
 pub struct CellMoments {
     /// Number of the cell.
     pub cell: usize,
+    /// It is eight merged into one, of which this is the first (`sizes`).
+    pub doubled: bool,
     /// `V_c` (m³).
     pub volume_m3: f64,
     /// `V_c b_cp` (m²); none of a full cell, which has [`full_gradients_m2`].
@@ -156,6 +158,7 @@ impl<'a> Row<'a> {
                 let cut = sums.volume < FULL;
                 found.push(CellMoments {
                     cell: self.sites.cell([at % nx, j, at / nx]),
+                    doubled: false,
                     volume_m3: if cut { sums.volume * h.powi(3) } else { h.powi(3) },
                     gradients_m2: cut.then(|| Box::new(sums.gradients.map(|g| g * (h * h)))),
                 });

@@ -11,7 +11,7 @@ use glam::DVec3;
 pub struct SkinPlace {
     /// Index of the cell.
     pub cell: u32,
-    /// In units of the spacing from its first corner.
+    /// In units of the cell's edge from its first corner.
     pub local: DVec3,
 }
 
@@ -50,8 +50,14 @@ impl SkinPlace {
             }
             reach += 1;
         };
-        let local = (point_m - sites.cell_m(cell)) / sites.spacing_m();
-        Self { cell: partition.cell_at(cell), local }
+        let cell = partition.cell_at(cell);
+        let first_m = sites.cell_m(partition.cells()[cell as usize].site_cell as usize);
+        Self { cell, local: (point_m - first_m) / partition.edge_m(cell as usize) }
+    }
+
+    /// Weights of its cell's particles.
+    pub fn weights(&self, partition: &Partition) -> [f64; 8] {
+        partition.hanging(self.cell as usize).to_particles(trilinear(self.local))
     }
 
     /// How much faster than the fastest of its particles the point can be: `Σ |w_p|`, 1 inside a cell.
@@ -61,7 +67,7 @@ impl SkinPlace {
 
     /// With its particles and weights.
     pub fn place(&self, partition: &Partition) -> Place {
-        Place { particles: partition.corners(self.cell as usize), weights: trilinear(self.local) }
+        Place { particles: partition.corners(self.cell as usize), weights: self.weights(partition) }
     }
 }
 
@@ -98,28 +104,31 @@ impl Place {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::hybrid::testing::{Random, ball, ball_in_cage};
+    use crate::hybrid::testing::{Random, ball, balls_in_cage};
 
     #[test]
     fn points_of_the_skin_move_affinely_and_hand_over_all_of_a_force() {
-        let partition = ball_in_cage();
-        let skin = ball(0.01, DVec3::new(0.2e-3, -0.3e-3, 0.1e-3), 3);
-        let active = (0..partition.particle_count() as u32).filter(|&p| partition.particle_m(p).z > 3e-3).collect();
-        let patch = Patch::new(&partition, &active);
-        let rest = patch.at_rest(&partition);
-        let mut random = Random(31);
-        for &point in skin.positions_m() {
-            let place = Place::new(&partition, point);
-            assert!(place.weights.iter().all(|&w| w > -0.5));
-            assert!((place.of(&partition, &patch, &rest) - point).length() < 1e-15);
-            let force = random.vector();
-            let zero = |list: &[DVec3]| vec![DVec3::ZERO; list.len()];
-            let mut forces = Field { nodes: zero(&rest.nodes), particles: zero(&rest.particles) };
-            place.push(&partition, &patch, force, &mut forces);
-            let all = || forces.nodes.iter().zip(&rest.nodes).chain(forces.particles.iter().zip(&rest.particles));
-            let total: DVec3 = all().map(|(f, _)| *f).sum();
-            let torque: DVec3 = all().map(|(f, x)| x.cross(*f)).sum();
-            assert!((total - force).length() < 1e-14 && (torque - point.cross(force)).length() < 1e-16);
+        for partition in balls_in_cage() {
+            let skin = ball(0.01, DVec3::new(0.2e-3, -0.3e-3, 0.1e-3), 3);
+            let active = (0..partition.particle_count() as u32).filter(|&p| partition.particle_m(p).z > 3e-3).collect();
+            let patch = Patch::new(&partition, &active);
+            let rest = patch.at_rest(&partition);
+            let mut random = Random(31);
+            // Some lie deep in the body.
+            for (number, &point) in skin.positions_m().iter().enumerate() {
+                let point = point * if number % 3 == 0 { 0.1 * (number % 10) as f64 } else { 1.0 };
+                let place = Place::new(&partition, point);
+                assert!(place.weights.iter().all(|&w| w > -0.5));
+                assert!((place.of(&partition, &patch, &rest) - point).length() < 1e-15);
+                let force = random.vector();
+                let zero = |list: &[DVec3]| vec![DVec3::ZERO; list.len()];
+                let mut forces = Field { nodes: zero(&rest.nodes), particles: zero(&rest.particles) };
+                place.push(&partition, &patch, force, &mut forces);
+                let all = || forces.nodes.iter().zip(&rest.nodes).chain(forces.particles.iter().zip(&rest.particles));
+                let total: DVec3 = all().map(|(f, _)| *f).sum();
+                let torque: DVec3 = all().map(|(f, x)| x.cross(*f)).sum();
+                assert!((total - force).length() < 1e-14 && (torque - point.cross(force)).length() < 1e-16);
+            }
         }
     }
 }

@@ -15,6 +15,8 @@ pub struct ParticleSpec {
     pub skin: Skin,
     /// Spacing h (m) of the lattice.
     pub spacing_m: f64,
+    /// Cells no nearer to the surface than this (m) are merged, where a block of eight is, into cells of twice the spacing (`sizes`). None of them where it is `None`.
+    pub fine_depth_m: Option<f64>,
     /// A point (m) that planes of the lattice pass through; best on a surface that is held, so that no cell reaches past it.
     pub lattice_through_m: DVec3,
     /// Most particles awake at once.
@@ -75,6 +77,12 @@ pub enum HybridError {
 }
 
 impl ParticleSpec {
+    /// Cells of the lattice's spacing beneath the surface, where deeper ones are merged.
+    pub(super) fn fine_cells(&self) -> Option<usize> {
+        // A depth of whole cells, but for rounding, is that many.
+        self.fine_depth_m.map(|depth_m| (depth_m / self.spacing_m - 1e-9).ceil().max(0.0) as usize)
+    }
+
     pub(crate) fn check(&self) -> Result<(), HybridError> {
         let setting = |name, value: f64, ok: bool, rule| {
             if ok { Ok(()) } else { Err(HybridError::Setting { name, value, rule }) }
@@ -83,6 +91,9 @@ impl ParticleSpec {
         setting("spacing_m", h, h > 0.0 && h.is_finite(), "must be finite and larger than 0")?;
         let through = self.lattice_through_m.length();
         setting("lattice_through_m", through, through.is_finite(), "must be finite")?;
+        if let Some(depth_m) = self.fine_depth_m {
+            setting("fine_depth_m", depth_m, depth_m >= 0.0 && depth_m.is_finite(), "must be finite and not negative")?;
+        }
         let most = self.most_active;
         setting("most_active", most as f64, (1..=MOST_ACTIVE).contains(&most), "must be 1 to 20000")?;
         if let Waking::ByTools { reach_m } = self.waking {

@@ -9,6 +9,7 @@ use super::{
     partition::Partition,
     patch::{Field, Patch},
     sites::{CORNERS, Sites},
+    sizes,
     skin::Skin,
 };
 use crate::{
@@ -108,24 +109,32 @@ pub(crate) fn slab() -> TetMesh {
 
 /// A ball of 10 mm radius off the lattice, in a box of coarse tets that reaches past it.
 pub(crate) fn ball_in_cage() -> Partition {
+    balls_in_cage()[0].clone()
+}
+
+/// The same, and with cells deeper than one beneath its surface merged.
+pub(crate) fn balls_in_cage() -> [Partition; 2] {
     let skin = ball(0.01, DVec3::new(0.2e-3, -0.3e-3, 0.1e-3), 3);
     let sites = Sites::covering(skin.bounds_m(), 1.1e-3, DVec3::splat(0.4e-3));
     let cage = tet_box(DVec3::splat(-0.0125), DVec3::splat(0.025), [3, 3, 3]);
     let moments = integrate(&skin, &sites, &mut |_| {});
-    Partition::new(sites, Composite::new(&cage), &moments)
+    let composite = Composite::new(&cage);
+    let two_sizes = sizes::merge(&sites, moments.clone(), 1, |_| true);
+    [moments, two_sizes].map(|moments| Partition::new(sites, composite.clone(), &moments))
 }
 
 /// That ball as a body of two materials; the coarse nodes below −9 mm are held along two axes, those beyond 9 mm along y along all.
 pub(crate) fn hybrid_ball(materials: &[Material; 2]) -> Hybrid {
-    hybrid_ball_of(materials, 1.1e-3)
+    hybrid_ball_of(materials, 1.1e-3, None)
 }
 
-/// The same of another spacing.
-pub(crate) fn hybrid_ball_of(materials: &[Material; 2], spacing_m: f64) -> Hybrid {
+/// The same of another spacing, or with cells that are merged deeper than that (m).
+pub(crate) fn hybrid_ball_of(materials: &[Material; 2], spacing_m: f64, fine_depth_m: Option<f64>) -> Hybrid {
     let cage = tet_box(DVec3::splat(-0.0125), DVec3::splat(0.025), [3, 3, 3]);
     let spec = ParticleSpec {
         skin: ball(0.01, DVec3::new(0.2e-3, -0.3e-3, 0.1e-3), 3),
         spacing_m,
+        fine_depth_m,
         lattice_through_m: DVec3::splat(0.4e-3),
         most_active: 2000,
         waking: Waking::ByHand,
@@ -215,7 +224,6 @@ pub(crate) fn stretch(random: &mut Random) -> DMat3 {
 pub(crate) fn ball_cells() -> (Vec<([u32; 8], RestCell)>, Vec<DVec3>) {
     let partition = ball_in_cage();
     let rest = (0..partition.particle_count() as u32).map(|p| partition.particle_m(p)).collect();
-    let spacing_m = partition.sites().spacing_m();
-    let cell = |c: usize| (partition.corners(c), RestCell::new(spacing_m, 0.98, &partition.moments(c)));
+    let cell = |c: usize| (partition.corners(c), partition.rest_cell(c, 0.98));
     ((0..partition.cells().len()).map(cell).collect(), rest)
 }

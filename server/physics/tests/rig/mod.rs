@@ -117,6 +117,7 @@ pub fn hybrid_block(
     spec.particles = Some(ParticleSpec {
         skin: Skin::new(positions, surface.triangles).unwrap(),
         spacing_m: a_m / cells as f64,
+        fine_depth_m: None,
         lattice_through_m: DVec3::ZERO,
         most_active,
         waking,

@@ -34,6 +34,9 @@ pub(super) fn demand(table: &ParticlesTable, body: &Body, limits: &Limits) -> Re
     check(&key, spacing_m, spacing_m > 0.0, "must be larger than 0")?;
     let most_ok = (1..=MOST_ACTIVE).contains(&(table.most_active as usize));
     check(&at().key("most_active"), table.most_active, most_ok, "must be 1 to 20000")?;
+    if let Some(depth_m) = table.fine_depth_m {
+        check(&at().key("fine_depth_m"), depth_m, depth_m >= 0.0, "must not be negative")?;
+    }
     if let Some(reach_m) = table.reach_m {
         check(&at().key("reach_m"), reach_m, reach_m > 0.0, "must be larger than 0")?;
     }
@@ -128,15 +131,36 @@ pub(super) fn spec(
             .help("repair the file so that every edge of its surface has one triangle on either side")
             .cause(error)
     })?;
-    // Half a ball of radius r holds (4π/6) r³/h³ particles.
-    let radius_m = || table.spacing_m * (f64::from(table.most_active) * 6.0 / (4.0 * PI)).cbrt();
     Ok(Some(ParticleSpec {
         lattice_through_m: lattice_through_m(body, &skin, constraints),
         skin,
         spacing_m: table.spacing_m,
+        fine_depth_m: table.fine_depth_m,
         most_active: table.most_active as usize,
-        waking: Waking::ByTools { reach_m: table.reach_m.unwrap_or_else(radius_m) },
+        waking: Waking::ByTools { reach_m: table.reach_m.unwrap_or_else(|| half_ball_m(table)) },
     }))
+}
+
+/// The radius r (m) of the half ball, as at a flat surface, that holds `most_active` particles: one in every h³ down to the depth d of the fine ones, one in every 8 h³ below,
+/// ```text
+/// n h³ = ⅛ (2π/3) r³ + ⅞ π d (r² − d²/3),  d ≤ r
+/// ```
+fn half_ball_m(table: &ParticlesTable) -> f64 {
+    let Some(depth_m) = table.fine_depth_m else {
+        return table.spacing_m * (f64::from(table.most_active) * 6.0 / (4.0 * PI)).cbrt();
+    };
+    let all_m3 = f64::from(table.most_active) * table.spacing_m.powi(3);
+    let held_m3 = |r: f64| {
+        let d = depth_m.min(r);
+        PI * (r.powi(3) / 12.0 + 7.0 / 8.0 * d * (r * r - d * d / 3.0))
+    };
+    // It is the largest where all are 8 h³ apart.
+    let (mut low, mut high) = (0.0, (all_m3 * 12.0 / PI).cbrt());
+    for _ in 0..60 {
+        let middle = f64::midpoint(low, high);
+        *(if held_m3(middle) < all_m3 { &mut low } else { &mut high }) = middle;
+    }
+    f64::midpoint(low, high)
 }
 
 /// Says so when the coarse level is none.

@@ -35,6 +35,8 @@ pub(crate) struct BodyTable {
 pub(crate) struct ParticlesTable {
     /// Spacing of the lattice (m), larger than 0. The skin is made as fine.
     pub(crate) spacing_m: f64,
+    /// Cells of the lattice deeper than this (m) beneath the surface are merged into cells of twice the spacing; by default none is.
+    pub(crate) fine_depth_m: Option<f64>,
     /// Most particles awake at once, 1 to 20000.
     #[serde(default = "default_most_active")]
     pub(crate) most_active: u32,

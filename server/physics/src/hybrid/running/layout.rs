@@ -39,7 +39,7 @@ impl RunningPatch {
                 let cells = self.cells.iter().map(|&cell| cell as usize).enumerate();
                 cells.filter(move |&(_, cell)| {
                     let tet = partition.cells()[cell].tet;
-                    partition.is_cut(cell) == is_cut && hybrid.of_tet[tet as usize] == material
+                    partition.is_plain(cell) != is_cut && hybrid.of_tet[tet as usize] == material
                 })
             };
             let first_row = self.rows.len();

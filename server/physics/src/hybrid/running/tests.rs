@@ -6,7 +6,7 @@ use crate::{
         fade::{CellFade, FADING_S, ShareFade},
         metric::Metric,
         patch::{Field, Patch},
-        testing::{Random, hybrid_ball, tissue},
+        testing::{Random, hybrid_ball_of, tissue},
     },
     material::{Material, Viscosity},
 };
@@ -39,10 +39,11 @@ fn some_fading(hybrid: &Hybrid, cells: &[u32], random: &mut Random) -> Fading {
 fn running_patch_and_oracle_agree() {
     let [stvk, neo, corotated] = tissue();
     let mut random = Random(51);
-    for materials in
-        [[neo, stvk], [corotated, neo].map(|m: Material| Material { viscosity: Viscosity::default(), ..m })]
-    {
-        let hybrid = hybrid_ball(&materials);
+    let still = [corotated, neo].map(|m: Material| Material { viscosity: Viscosity::default(), ..m });
+    for (materials, fine_depth_m) in [([neo, stvk], None), (still, None), ([neo, stvk], Some(1.1e-3))] {
+        let hybrid = hybrid_ball_of(&materials, 1.1e-3, fine_depth_m);
+        let doubled = hybrid.partition.cells().iter().filter(|cell| cell.doubled).count();
+        assert_eq!(doubled > 20, fine_depth_m.is_some(), "{doubled}");
         for (precision, bound) in [(Precision::Double, 1e-11), (Precision::Single, 3e-5)] {
             let mut running = RunningPatch::new(&hybrid, 2000, precision);
             let near = |p: DVec3| p.distance(DVec3::new(2e-3, 1e-3, 9e-3)) < 4e-3;

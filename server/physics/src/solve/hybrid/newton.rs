@@ -240,6 +240,7 @@ mod tests {
             particles: Some(ParticleSpec {
                 skin: Skin::new(corners, triangles).unwrap(),
                 spacing_m: 5e-3,
+                fine_depth_m: None,
                 lattice_through_m: DVec3::ZERO,
                 most_active: 300,
                 waking: Waking::ByHand,
