@@ -124,8 +124,9 @@ fn damped_the_loop_comes_to_rest_where_a_patch_and_its_loads_do() {
 }
 
 /// A sphere of 6 mm above the block, which weighs, with particles that it wakes.
-fn pressed(coupling: Coupling) -> Rig {
+fn pressed(coupling: Coupling, fine_depth_m: Option<f64>) -> Rig {
     let mut spec = held_below(block(Waking::ByTools { reach_m: 11e-3 }));
+    spec.particles.as_mut().unwrap().fine_depth_m = fine_depth_m;
     spec.settings = Settings { mass_damping_per_s: 60.0, ..spec.settings };
     spec.tools = vec![sphere(6e-3, DVec3::new(0.4e-3, 0.3e-3, 9e-3), coupling)];
     spec.gravity_m_per_s2 = DVec3::Z * -9.81;
@@ -137,15 +138,19 @@ fn solved(model: &Model, device_m: DVec3) -> StaticSolution {
     solve_static(model, &[], &moved, &[at(device_m)], &settings(), &mut |_| ControlFlow::Continue(())).unwrap()
 }
 
-fn a_tool_rests_where_the_loop_has_it(coupling: Coupling, device_z_m: f64) -> StaticSolution {
-    let mut rig = pressed(coupling);
+fn a_tool_rests_where_the_loop_has_it(
+    coupling: Coupling,
+    fine_depth_m: Option<f64>,
+    device_z_m: f64,
+) -> StaticSolution {
+    let mut rig = pressed(coupling, fine_depth_m);
     let (start, device) = (DVec3::new(0.4e-3, 0.3e-3, 9e-3), DVec3::new(0.4e-3, 0.3e-3, device_z_m));
     for tick in 1..=2500 {
         rig.tick_at(start.lerp(device, (f64::from(tick) / 500.0).min(1.0)));
     }
     let found = solved(&rig.model, device);
     assert_eq!(found.awake.ids, rig.state.active.ids(), "{} {}", found.awake.ids.len(), rig.state.active.len());
-    assert!(found.awake.ids.len() > 150 && found.stable && found.inverted_tets == 0, "{found:?}");
+    assert!(found.awake.ids.len() > 120 && found.stable && found.inverted_tets == 0, "{found:?}");
     let (apart, moved) = apart_m(&rig, &found);
     let (still, moving) = (found.tools[0], &rig.state.tools[0]);
     let force = still.contact_force_n.distance(moving.contact_force_n) / still.contact_force_n.length();
@@ -172,8 +177,10 @@ fn a_tool_rests_where_the_loop_has_it(coupling: Coupling, device_z_m: f64) -> St
 
 #[test]
 fn a_rigid_tool_wakes_what_it_would_in_the_loop_and_rests_as_there() {
-    let found = a_tool_rests_where_the_loop_has_it(Coupling::Rigid, 5e-3);
-    assert!(found.tools[0].contact_force_n.z > 0.02);
+    for fine_depth_m in [None, Some(2.5e-3)] {
+        let found = a_tool_rests_where_the_loop_has_it(Coupling::Rigid, fine_depth_m, 5e-3);
+        assert!(found.tools[0].contact_force_n.z > 0.02);
+    }
 }
 
 #[test]
@@ -181,7 +188,7 @@ fn a_tool_on_a_spring_too() {
     let (mass_kg, stiffness_n_per_m) = (0.02_f64, 100.0);
     let damping_n_s_per_m = 2.0 * (stiffness_n_per_m * mass_kg).sqrt();
     let spring = Coupling::Spring { stiffness_n_per_m, damping_n_s_per_m, mass_kg };
-    let found = a_tool_rests_where_the_loop_has_it(spring, 4e-3);
+    let found = a_tool_rests_where_the_loop_has_it(spring, None, 4e-3);
     assert!((found.tools[0].contact_force_n - found.tools[0].device_force_n).length() < 1e-10);
 }
 

@@ -73,6 +73,12 @@ fn nor_do_ticks_that_are_repeated() {
 /// Two tools rub and tap on a body with particles, which wake and sleep under load.
 #[test]
 fn nor_does_waking_particles() {
+    for fine_depth_m in [None, Some(2e-3)] {
+        wake_and_sleep(fine_depth_m);
+    }
+}
+
+fn wake_and_sleep(fine_depth_m: Option<f64>) {
     let tets = rig(Integrator::Leapfrog);
     let mut spec = tets.model.spec().clone();
     let surface = tets.model.surface();
@@ -80,7 +86,7 @@ fn nor_does_waking_particles() {
     spec.particles = Some(ParticleSpec {
         skin: Skin::new(positions, surface.triangles.clone()).unwrap(),
         spacing_m: 2e-3,
-        fine_depth_m: None,
+        fine_depth_m,
         lattice_through_m: DVec3::ZERO,
         most_active: 300,
         waking: Waking::ByTools { reach_m: 7e-3 },

@@ -113,6 +113,16 @@ fn print_particles(model: &Model) {
         spec.most_active,
         counted(spec.skin.triangles().len(), "triangle")
     );
+    if let Some(depth_m) = spec.fine_depth_m {
+        let doubled = hybrid.partition().cells().iter().filter(|cell| cell.doubled).count();
+        println!(
+            "           {} mm apart deeper than {} mm ({} of {})",
+            short(spec.spacing_m * 2e3),
+            short(depth_m * 1e3),
+            doubled,
+            counted(hybrid.partition().cells().len(), "cell")
+        );
+    }
     if let Waking::ByTools { reach_m } = spec.waking {
         println!("           those within {} mm of a tool's contact wake", short(reach_m * 1e3));
     }

@@ -103,8 +103,8 @@ impl Hybrid {
         let cage = CageSummary { moved_m, outside };
         let composite = Composite::new(&mesh);
         let prescribed = with_edges(&mesh, surface, &composite, prescribed);
-        let moments = match spec.fine_cells() {
-            Some(fine_cells) => merged(&sites, &composite, moments, fine_cells, of_tet),
+        let moments = match spec.fine_layers() {
+            Some(layers) => merged(&sites, &composite, moments, layers, of_tet),
             None => moments,
         };
         let partition = Partition::new_with(sites, composite, &moments, &mut |part| {
@@ -294,18 +294,18 @@ fn with_edges(
     prescribed.iter().map(extended).collect()
 }
 
-/// With cells deeper than so many merged, where they are of one material.
+/// With cells beneath so many layers merged, where they are of one material.
 fn merged(
     sites: &Sites,
     composite: &Composite,
     moments: Vec<CellMoments>,
-    fine_cells: usize,
+    layers: usize,
     of_tet: &[u16],
 ) -> Vec<CellMoments> {
     let half = DVec3::splat(0.5 * sites.spacing_m());
     let material = |cell: usize| of_tet[composite.anchor(sites.cell_m(cell) + half).tet as usize];
     let is_one = of_tet.iter().all(|one| *one == of_tet[0]);
-    sizes::merge(sites, moments, fine_cells, |block| {
+    sizes::merge(sites, moments, layers, |block| {
         is_one || block.iter().all(|&cell| material(cell) == material(block[0]))
     })
 }

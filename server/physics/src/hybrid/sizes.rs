@@ -67,18 +67,21 @@ pub fn corner_of_block(sites: &Sites, cell: [usize; 3], corner: usize) -> usize 
     sites.site(std::array::from_fn(|axis| (cell[axis] & !1) + 2 * (corner >> axis & 1)))
 }
 
-/// Merges blocks of eight whole cells, none of which is within `fine_cells` cells, along any axes, of one that is not whole or not there, where `may_merge` allows it of the cells' numbers.
+/// Merges blocks of eight cells that lie beneath so many layers, where `may_merge` allows it of the cells' numbers. The first layer are the cells that the surface cuts, and those that touch one that is
+/// not there; those of the next touch them.
 pub fn merge(
     sites: &Sites,
     cells: Vec<CellMoments>,
-    fine_cells: usize,
+    layers: usize,
     may_merge: impl Fn(&[usize; 8]) -> bool,
 ) -> Vec<CellMoments> {
     let mut is_deep = vec![false; sites.cell_count()];
-    for cell in &cells {
-        is_deep[cell.cell] = cell.gradients_m2.is_none();
+    cells.iter().for_each(|cell| is_deep[cell.cell] = true);
+    (0..3).for_each(|axis| erode(sites, &mut is_deep, axis, 1));
+    for cell in cells.iter().filter(|cell| cell.gradients_m2.is_some()) {
+        is_deep[cell.cell] = false;
     }
-    (0..3).for_each(|axis| erode(sites, &mut is_deep, axis, fine_cells));
+    (0..3).for_each(|axis| erode(sites, &mut is_deep, axis, layers.saturating_sub(1)));
     let block_of = |cell: usize| {
         let first = sites.cell_at(cell).map(|n| n & !1);
         let inside = (0..3).all(|axis| first[axis] + 1 < sites.cells()[axis]);
@@ -264,22 +267,28 @@ mod tests {
                 gradients_m2: (!one_size.is_whole(number)).then(|| Box::new(one_size.moments(number).1)),
             })
             .collect();
-        for depth in 0..3 {
-            let merged = merge(&sites, moments.clone(), depth, |_| true);
+        for layers in 1..4 {
+            let merged = merge(&sites, moments.clone(), layers, |_| true);
             let found: Vec<usize> = merged.iter().filter(|cell| cell.doubled).map(|cell| cell.cell).collect();
-            let deep = |at: [usize; 3]| {
-                let within = 2 * depth + 2;
-                (0..within.pow(3)).all(|n| {
-                    let n = [n % within, n / within % within, n / within / within];
-                    (0..3).all(|axis| at[axis] + n[axis] >= depth && at[axis] + n[axis] - depth < sites.cells()[axis])
-                        && is_whole(std::array::from_fn(|axis| at[axis] + n[axis] - depth))
+            let around = |at: [usize; 3], reach: usize, of: &dyn Fn([usize; 3]) -> bool| {
+                let wide = 2 * reach + 1;
+                (0..wide.pow(3)).all(|n| {
+                    let n = [n % wide, n / wide % wide, n / wide / wide];
+                    (0..3).all(|axis| at[axis] + n[axis] >= reach && at[axis] + n[axis] - reach < sites.cells()[axis])
+                        && of(std::array::from_fn(|axis| at[axis] + n[axis] - reach))
                 })
+            };
+            let is_there = |at: [usize; 3]| one_size.cell_at(sites.cell(at)) != NONE;
+            let is_beneath = |at: [usize; 3]| is_whole(at) && around(at, 1, &is_there);
+            let deep = |first: [usize; 3]| {
+                let mut cells = (0..8).map(|c| [first[0] + (c & 1), first[1] + (c >> 1 & 1), first[2] + (c >> 2)]);
+                cells.all(|at| around(at, layers - 1, &is_beneath))
             };
             let firsts = (0..sites.cell_count()).filter(|&cell| sites.cell_at(cell).iter().all(|n| n % 2 == 0));
             let expected: Vec<usize> = firsts.filter(|&cell| deep(sites.cell_at(cell))).collect();
             assert_eq!(found, expected);
             assert!(!found.is_empty());
         }
-        assert_eq!(merge(&sites, moments.clone(), 0, |_| false), moments);
+        assert_eq!(merge(&sites, moments.clone(), 1, |_| false), moments);
     }
 }

@@ -15,7 +15,8 @@ pub struct ParticleSpec {
     pub skin: Skin,
     /// Spacing h (m) of the lattice.
     pub spacing_m: f64,
-    /// Cells no nearer to the surface than this (m) are merged, where a block of eight is, into cells of twice the spacing (`sizes`). None of them where it is `None`.
+    /// How thick (m) the layer of cells of this spacing is at the surface: so many as begin within it, and at least one. Deeper down blocks of eight are merged into cells of twice the
+    /// spacing (`sizes`); none is where this is `None`.
     pub fine_depth_m: Option<f64>,
     /// A point (m) that planes of the lattice pass through; best on a surface that is held, so that no cell reaches past it.
     pub lattice_through_m: DVec3,
@@ -77,10 +78,10 @@ pub enum HybridError {
 }
 
 impl ParticleSpec {
-    /// Cells of the lattice's spacing beneath the surface, where deeper ones are merged.
-    pub(super) fn fine_cells(&self) -> Option<usize> {
+    /// Layers of cells of the lattice's spacing at the surface, where deeper ones are merged.
+    pub(super) fn fine_layers(&self) -> Option<usize> {
         // A depth of whole cells, but for rounding, is that many.
-        self.fine_depth_m.map(|depth_m| (depth_m / self.spacing_m - 1e-9).ceil().max(0.0) as usize)
+        self.fine_depth_m.map(|depth_m| (depth_m / self.spacing_m - 1e-9).ceil().max(1.0) as usize)
     }
 
     pub(crate) fn check(&self) -> Result<(), HybridError> {

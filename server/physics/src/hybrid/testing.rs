@@ -112,7 +112,7 @@ pub(crate) fn ball_in_cage() -> Partition {
     balls_in_cage()[0].clone()
 }
 
-/// The same, and with cells deeper than one beneath its surface merged.
+/// The same, and with cells merged that its surface does not cut.
 pub(crate) fn balls_in_cage() -> [Partition; 2] {
     let skin = ball(0.01, DVec3::new(0.2e-3, -0.3e-3, 0.1e-3), 3);
     let sites = Sites::covering(skin.bounds_m(), 1.1e-3, DVec3::splat(0.4e-3));

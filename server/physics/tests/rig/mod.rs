@@ -132,6 +132,23 @@ pub fn held_below(mut spec: ModelSpec) -> ModelSpec {
     spec
 }
 
+/// A sphere above a weighing block of 40 × 40 × 20 mm in 24 coarse tets, particles 2.5 mm apart, its lower face held.
+pub fn pressed_block(precision: Precision, fine_depth_m: Option<f64>) -> ModelSpec {
+    let mut spec = held_below(hybrid_block((0.02, 1, 8), 0.45, 400, Waking::ByHand));
+    spec.particles.as_mut().unwrap().fine_depth_m = fine_depth_m;
+    spec.settings = Settings { precision, mass_damping_per_s: 20.0, ..spec.settings };
+    spec.tools = vec![sphere(6e-3, DVec3::Z * 7e-3, Coupling::Rigid)];
+    spec.tools[0].friction_coefficient = 0.3;
+    spec.gravity_m_per_s2 = DVec3::Z * -9.81;
+    spec
+}
+
+/// Particles within a distance of a point, at rest.
+pub fn near(rig: &Rig, point: DVec3, distance_m: f64) -> Vec<u32> {
+    let partition = rig.model.hybrid().unwrap().partition();
+    (0..partition.particle_count() as u32).filter(|&p| partition.particle_m(p).distance(point) < distance_m).collect()
+}
+
 /// Wakes the particles nearest to the origin.
 pub fn wake_nearest(rig: &mut Rig, count: usize) {
     let partition = rig.model.hybrid().unwrap().partition();

@@ -125,7 +125,7 @@ pub(crate) fn make(table: &BodyTable, files: &Files<'_>, progress: &mut dyn FnMu
             skin
         } else {
             particles::demand(wanted, &body, files.limits)?;
-            particles::skin_of(table, &body, wanted.spacing_m).map_err(|error| shape_fault(&at, error))?
+            particles::skin_of(table, &body, wanted.longest_edge_m()).map_err(|error| shape_fault(&at, error))?
         };
         particles::put_on(&mut body, table, skin);
     }

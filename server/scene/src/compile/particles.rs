@@ -34,6 +34,10 @@ pub(super) fn demand(table: &ParticlesTable, body: &Body, limits: &Limits) -> Re
     check(&key, spacing_m, spacing_m > 0.0, "must be larger than 0")?;
     let most_ok = (1..=MOST_ACTIVE).contains(&(table.most_active as usize));
     check(&at().key("most_active"), table.most_active, most_ok, "must be 1 to 20000")?;
+    if let Some(edge_m) = table.skin_edge_m {
+        let (key, ok) = (at().key("skin_edge_m"), edge_m > 0.0 && edge_m <= spacing_m);
+        check(&key, edge_m, ok, "must be larger than 0 and no larger than the spacing")?;
+    }
     if let Some(depth_m) = table.fine_depth_m {
         check(&at().key("fine_depth_m"), depth_m, depth_m >= 0.0, "must not be negative")?;
     }
@@ -50,16 +54,20 @@ pub(super) fn demand(table: &ParticlesTable, body: &Body, limits: &Limits) -> Re
     }
     let boundary_m2: f64 = body.triangles().map(|corners| area_m2(corners, body.mesh.positions_m())).sum();
     let most = f64::from(limits.tets);
+    let edge_m = table.longest_edge_m();
+    let in_box = ((high - low) / spacing_m).ceil().element_product();
     let counts = [
-        (body.mesh.total_volume_m3() / spacing_m.powi(3), "particles", most),
-        (((high - low) / spacing_m).ceil().element_product(), "cells in the box around the body", CELLS_PER_TET * most),
-        (boundary_m2 / (0.25 * spacing_m * spacing_m), "triangles of the skin", most),
+        (body.mesh.total_volume_m3() / spacing_m.powi(3), "particles", most, spacing_m),
+        (in_box, "cells in the box around the body", CELLS_PER_TET * most, spacing_m),
+        (boundary_m2 / (0.25 * edge_m * edge_m), "triangles of the skin", most, edge_m),
     ];
-    for (count, what, most) in counts {
+    for (count, what, most, value) in counts {
         if count > most {
+            let of_skin = table.skin_edge_m == Some(value);
+            let (key, help) = if of_skin { (at().key("skin_edge_m"), "edge") } else { (key, "spacing") };
             let message =
-                format!("{key} = {spacing_m} gives about {count:.1e} {what}; at most {most:.0e} are allowed here");
-            return Err(Fault::value(key, message).help("take a larger spacing"));
+                format!("{key} = {value} gives about {count:.1e} {what}; at most {most:.0e} are allowed here");
+            return Err(Fault::value(key, message).help(format!("take a larger {help}")));
         }
     }
     Ok(())
@@ -72,16 +80,16 @@ fn area_m2(corners: [u32; 3], positions_m: &[DVec3]) -> f64 {
 
 /// The skin of a shape or a mesh file. Shells are triangulated anew on their true surface; flat sides and the triangles of a file are
 /// what they are, and only refined.
-pub(super) fn skin_of(table: &BodyTable, body: &Body, spacing_m: f64) -> Result<FineSurface, ShapeError> {
+pub(super) fn skin_of(table: &BodyTable, body: &Body, edge_m: f64) -> Result<FineSurface, ShapeError> {
     if let Some(shell) = &table.sphere_shell {
-        shapes::sphere_shell_skin(shell.inner_radius_m, shell.outer_radius_m, spacing_m)
+        shapes::sphere_shell_skin(shell.inner_radius_m, shell.outer_radius_m, edge_m)
     } else if let Some(shell) = &table.ellipsoid_shell {
-        shapes::ellipsoid_shell_skin(shell.inner_semi_axes_m.into(), shell.outer_semi_axes_m.into(), spacing_m)
+        shapes::ellipsoid_shell_skin(shell.inner_semi_axes_m.into(), shell.outer_semi_axes_m.into(), edge_m)
     } else if let Some(ventricle) = &table.ventricle {
         let (outer_m, inner_m) = (ventricle.outer_semi_axes_m.into(), ventricle.inner_semi_axes_m.into());
-        shapes::ventricle_skin(outer_m, inner_m, ventricle.cut_z_m, spacing_m)
+        shapes::ventricle_skin(outer_m, inner_m, ventricle.cut_z_m, edge_m)
     } else {
-        Ok(boundary(body, spacing_m))
+        Ok(boundary(body, edge_m))
     }
 }
 
@@ -139,6 +147,13 @@ pub(super) fn spec(
         most_active: table.most_active as usize,
         waking: Waking::ByTools { reach_m: table.reach_m.unwrap_or_else(|| half_ball_m(table)) },
     }))
+}
+
+impl ParticlesTable {
+    /// Of the skin's triangles (m).
+    pub(super) fn longest_edge_m(&self) -> f64 {
+        self.skin_edge_m.unwrap_or(self.spacing_m)
+    }
 }
 
 /// The radius r (m) of the half ball, as at a flat surface, that holds `most_active` particles: one in every h³ down to the depth d of the fine ones, one in every 8 h³ below,

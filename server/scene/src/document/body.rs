@@ -33,9 +33,11 @@ pub(crate) struct BodyTable {
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct ParticlesTable {
-    /// Spacing of the lattice (m), larger than 0. The skin is made as fine.
+    /// Spacing of the lattice (m), larger than 0.
     pub(crate) spacing_m: f64,
-    /// Cells of the lattice deeper than this (m) beneath the surface are merged into cells of twice the spacing; by default none is.
+    /// The longest edge (m) of the skin's triangles; by default, and at most, the spacing.
+    pub(crate) skin_edge_m: Option<f64>,
+    /// How thick (m) the layer of cells of this spacing is at the surface, at least one cell; deeper down they are twice as large. By default all are of one size.
     pub(crate) fine_depth_m: Option<f64>,
     /// Most particles awake at once, 1 to 20000.
     #[serde(default = "default_most_active")]

@@ -17,29 +17,69 @@ use palpate_physics::{
 pub(super) struct Hybrid {
     name: String,
     what: String,
+    lattice: Lattice,
     active: usize,
+}
+
+/// Cells of the lattice.
+#[derive(Debug, Clone, Copy)]
+enum Lattice {
+    /// All of one size.
+    Same,
+    /// Beneath the first layer of twice the size.
+    Doubled,
+    /// In the first layer, and wherever eight make no whole one, of half the size; the skin is as fine.
+    Halved,
+}
+
+/// What a body's particles are made of.
+struct Fineness {
+    /// Spacing of the lattice (m).
+    spacing_m: f64,
+    fine_depth_m: Option<f64>,
+    /// Resolution of the mesh whose boundary is the skin.
+    skin: u32,
 }
 
 impl Hybrid {
     pub(super) fn variants() -> Vec<Self> {
-        let of = |active: usize| Self {
-            name: format!("hybrid {active}"),
-            what: format!(
-                "Composite coarse tets and {active} active particles on a lattice (cells), explicit leapfrog, forces in f32."
-            ),
-            active,
+        let of = |(lattice, active): (Lattice, usize)| {
+            let (name, cells) = match lattice {
+                Lattice::Same => ("hybrid", "cells"),
+                Lattice::Doubled => ("hybrid doubled", "cells, deeper down twice as large"),
+                Lattice::Halved => ("hybrid halved", "cells, at the surface half as large"),
+            };
+            Self {
+                name: format!("{name} {active}"),
+                what: format!(
+                    "Composite coarse tets and {active} active particles on a lattice ({cells}), explicit leapfrog, forces in f32."
+                ),
+                lattice,
+                active,
+            }
         };
-        [50, 200, 600, 1400].map(of).into()
+        let same = [50, 200, 600, 1400].map(|active| (Lattice::Same, active));
+        let others = [200, 600].into_iter().flat_map(|n| [(Lattice::Doubled, n), (Lattice::Halved, n)]);
+        same.into_iter().chain(others).map(of).collect()
     }
-}
 
-/// Spacing of the lattice (m), and the resolution of the mesh whose boundary is the skin.
-fn fineness(body: Body) -> Option<(f64, u32)> {
-    match body {
-        Body::Block => Some((2.5e-3, 32)),
-        Body::Ventricle(_) => Some((3.2e-3, 150_000)),
-        Body::SmallVentricle => Some((0.9e-3, 150_000)),
-        Body::Octant | Body::Beam { .. } => None,
+    fn fineness(&self, body: Body) -> Option<Fineness> {
+        let (spacing_m, skin) = match body {
+            Body::Block => (2.5e-3, 32),
+            Body::Ventricle(_) => (3.2e-3, 150_000),
+            Body::SmallVentricle => (0.9e-3, 150_000),
+            Body::Octant | Body::Beam { .. } => return None,
+        };
+        Some(match self.lattice {
+            Lattice::Same => Fineness { spacing_m, fine_depth_m: None, skin },
+            Lattice::Doubled => Fineness { spacing_m, fine_depth_m: Some(spacing_m), skin },
+            // Tets grow in number with the third power of the block's resolution, which is the number of its cells along an edge.
+            Lattice::Halved => Fineness {
+                spacing_m: 0.5 * spacing_m,
+                fine_depth_m: Some(0.5 * spacing_m),
+                skin: if body == Body::Block { 2 * skin } else { 8 * skin },
+            },
+        })
     }
 }
 
@@ -63,12 +103,12 @@ impl Method for Hybrid {
     }
 
     fn build(&self, problem: &Problem, resolution: u32, pace: &Pace) -> Result<Box<dyn Running>> {
-        let (spacing_m, fine) =
-            fineness(problem.body).ok_or_else(|| miette!("the {} has no particles", problem.body.name()))?;
-        let (coarse, fine) = (problem.body.tets(resolution)?, problem.body.tets(fine)?);
+        let Fineness { spacing_m, fine_depth_m, skin } =
+            self.fineness(problem.body).ok_or_else(|| miette!("the {} has no particles", problem.body.name()))?;
+        let (coarse, fine) = (problem.body.tets(resolution)?, problem.body.tets(skin)?);
         let settings = Settings { mass_damping_per_s: pace.damping_per_s, ..Settings::for_particles() };
         let mut spec = ModelSpec {
-            particles: Some(particles(problem.body, &fine, spacing_m, self.active)?),
+            particles: Some(ParticleSpec { fine_depth_m, ..particles(problem.body, &fine, spacing_m, self.active)? }),
             ..super::subject::spec(problem.material()?, &coarse, settings)
         };
         let load = load::on_tets(problem.action, &fine);
