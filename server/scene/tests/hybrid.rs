@@ -1,8 +1,13 @@
 //! Hybrid bodies in scenes: what regions choose of coarse tets and skin, where the lattice lies, what probes measure.
 #![allow(clippy::unwrap_used)] // helpers outside #[test] functions
 use glam::DVec3;
-use palpate_physics::{LoadSpec, Model, Scratch, State, TickInput, hybrid::Waking, step};
+use palpate_physics::{
+    LoadSpec, Model, Scratch, State, TickInput,
+    hybrid::{ParticleSpec, Waking},
+    step,
+};
 use palpate_scene::{Limits, Scene, parse};
+use std::f64::consts::PI;
 
 const TAIL: &str = r#"[[material]]
 law = "stable-neo-hookean"
@@ -198,6 +203,22 @@ fn particles_that_cannot_be_are_told_at_their_key() {
              larger spacing)",
         ),
         ("spacing_mm = 1", "most_active = 0", "t.toml:8:15: body.particles.most_active = 0: must be 1 to 20000"),
+        (
+            "spacing_mm = 1",
+            "skin_edge_mm = 1.5",
+            "t.toml:8:16: body.particles.skin_edge_m = 0.0015: must be larger than 0 and no larger than the spacing",
+        ),
+        (
+            "spacing_mm = 1",
+            "skin_edge_mm = 0.01",
+            "t.toml:8:16: body.particles.skin_edge_m = 0.00001 gives about 2.4e7 triangles of the skin; at most 1e7 are allowed here \
+             (take a larger edge)",
+        ),
+        (
+            "spacing_mm = 1",
+            "fine_depth_mm = -1",
+            "t.toml:8:17: body.particles.fine_depth_m = -0.001: must not be negative",
+        ),
         ("spacing_mm = 1", "reach_mm = 0", "t.toml:8:12: body.particles.reach_m = 0: must be larger than 0"),
         (
             "spacing_mm = 1",
@@ -220,6 +241,33 @@ fn particles_that_cannot_be_are_told_at_their_key() {
     ));
     let sleeping = format!("{}[numerics]\nsleep_tolerance_um = 1\n", small("spacing_mm = 1", ""));
     assert!(loaded(&sleeping).unwrap_err().contains("its particles sleep where nothing touches them"));
+}
+
+#[test]
+fn a_finer_skin_and_larger_cells_deep_down_are_what_was_asked_for() {
+    let of = |more: &str| loaded(&small("spacing_mm = 1.25", more)).unwrap().model.particles.unwrap();
+    let (same, two_sizes, finer) = (of(""), of("fine_depth_mm = 1.25"), of("skin_edge_mm = 0.6"));
+    assert_eq!((same.fine_depth_m, two_sizes.fine_depth_m), (None, Some(1.25e-3)));
+    let longest_m = |particles: &ParticleSpec| {
+        let edges = (0..particles.skin.triangles().len()).flat_map(|t| {
+            let [a, b, c] = particles.skin.corners_m(t);
+            [a.distance(b), b.distance(c), c.distance(a)]
+        });
+        edges.fold(0.0, f64::max)
+    };
+    assert!(longest_m(&same) > 0.6e-3 && longest_m(&same) < 1.2501e-3, "{}", longest_m(&same));
+    assert!(longest_m(&finer) > 0.3e-3 && longest_m(&finer) < 0.6001e-3, "{}", longest_m(&finer));
+    // Half a ball that holds as many particles reaches farther: 600 in 1.25³ mm³ each down to 1.25 mm, in eight times that below.
+    let reach_mm = |particles: &ParticleSpec| match particles.waking {
+        Waking::ByTools { reach_m } => reach_m * 1e3,
+        Waking::ByHand => f64::NAN,
+    };
+    let (small, large) = (reach_mm(&same), reach_mm(&two_sizes));
+    let layer_mm3 = |r: f64| PI * 1.25 * (r * r - 1.25 * 1.25 / 3.0);
+    let ball_mm3 = |r: f64| 2.0 / 3.0 * PI * r.powi(3);
+    assert!((ball_mm3(small) / 1.25_f64.powi(3) - 600.0).abs() < 1e-6, "{small}");
+    let count = (layer_mm3(large) + (ball_mm3(large) - layer_mm3(large)) / 8.0) / 1.25_f64.powi(3);
+    assert!((count - 600.0).abs() < 1e-6 && large > 1.3 * small, "{count} {small} {large}");
 }
 
 #[test]

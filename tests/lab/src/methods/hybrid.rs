@@ -63,22 +63,23 @@ impl Hybrid {
         same.into_iter().chain(others).map(of).collect()
     }
 
-    fn fineness(&self, body: Body) -> Option<Fineness> {
-        let (spacing_m, skin) = match body {
-            Body::Block => (2.5e-3, 32),
-            Body::Ventricle(_) => (3.2e-3, 150_000),
-            Body::SmallVentricle => (0.9e-3, 150_000),
+    fn fineness(&self, problem: &Problem) -> Option<Fineness> {
+        // Of the block cells along an edge, of the ventricle tets.
+        let (spacing_m, skin, finer) = match problem.body {
+            Body::Block => (2.5e-3, 32, 64),
+            Body::Ventricle(_) => (3.2e-3, 150_000, 1_200_000),
+            Body::SmallVentricle => (0.9e-3, 150_000, 1_200_000),
             Body::Octant | Body::Beam { .. } => return None,
         };
+        // Triangles as large as what a sphere touches are as a flat surface to it, whose middle lies too deep.
+        let is_round = problem.body != Body::Block && matches!(problem.action, Action::Sphere { .. });
+        let skin = if is_round { finer } else { skin };
         Some(match self.lattice {
             Lattice::Same => Fineness { spacing_m, fine_depth_m: None, skin },
             Lattice::Doubled => Fineness { spacing_m, fine_depth_m: Some(spacing_m), skin },
-            // Tets grow in number with the third power of the block's resolution, which is the number of its cells along an edge.
-            Lattice::Halved => Fineness {
-                spacing_m: 0.5 * spacing_m,
-                fine_depth_m: Some(0.5 * spacing_m),
-                skin: if body == Body::Block { 2 * skin } else { 8 * skin },
-            },
+            Lattice::Halved => {
+                Fineness { spacing_m: 0.5 * spacing_m, fine_depth_m: Some(0.5 * spacing_m), skin: finer }
+            }
         })
     }
 }
@@ -104,7 +105,7 @@ impl Method for Hybrid {
 
     fn build(&self, problem: &Problem, resolution: u32, pace: &Pace) -> Result<Box<dyn Running>> {
         let Fineness { spacing_m, fine_depth_m, skin } =
-            self.fineness(problem.body).ok_or_else(|| miette!("the {} has no particles", problem.body.name()))?;
+            self.fineness(problem).ok_or_else(|| miette!("the {} has no particles", problem.body.name()))?;
         let (coarse, fine) = (problem.body.tets(resolution)?, problem.body.tets(skin)?);
         let settings = Settings { mass_damping_per_s: pace.damping_per_s, ..Settings::for_particles() };
         let mut spec = ModelSpec {

@@ -58,10 +58,7 @@ pub(crate) fn error(problem: &Problem, case: &Case) -> (f64, f64) {
     let on_m = DVec3::new(0.5, 0.5, 0.0) * case.spacing_m + DVec3::Z * skin.bounds_m().1.z;
     let on_m = if problem.body == Body::Block { DVec3::ZERO } else { on_m };
     let sites = Sites::covering(skin.bounds_m(), case.spacing_m, on_m);
-    let mut moments = integrate(&skin, &sites, &mut |_| {});
-    if let Ok(n) = std::env::var("FINE_CELLS") {
-        moments = palpate_physics::hybrid::sizes::merge(&sites, moments, n.parse().unwrap(), |_| true);
-    }
+    let moments = integrate(&skin, &sites, &mut |_| {});
     let points: Vec<DVec3> =
         moments.iter().flat_map(|m| sites.corners(m.cell)).map(|site| sites.site_m(site)).collect();
     let held: BTreeSet<u32> = coarse.prescribed.iter().flat_map(|set| set.nodes.clone()).collect();
