@@ -171,6 +171,8 @@ pub(crate) struct HybridScratch {
     pub(crate) skin: ListedSkin,
     pub(crate) accelerations: Vec<DVec3>,
     pub(crate) momenta: Vec<DVec3>,
+    /// `v_f·M'_ff v_f` and `v_h·M'_hf v_f` (J) since the last kick of this tick.
+    pub(crate) of_free_j: Option<(f64, f64)>,
     /// `fᵀ M'⁻¹ f` (N²/kg) at the last three kicks, the last one first.
     pub(crate) kick_sq: [f64; 3],
     pub(super) looking: Looking,
@@ -195,6 +197,7 @@ impl HybridScratch {
             skin: ListedSkin::new(body),
             accelerations: Vec::with_capacity(entries),
             momenta: Vec::with_capacity(entries),
+            of_free_j: None,
             kick_sq: [0.0; 3],
             looking: Looking::new(model, body),
             before: Before::with_room(room_for_cells(body, most), body.partition().shares().len()),

@@ -122,9 +122,9 @@ impl Balance {
         }
     }
 
-    /// Work (J) over a kick of length `h_s` that the body's velocities, with accelerations (m/s²), do against them.
-    pub(crate) fn work_j(&self, v: &[DVec3], accelerations: &[DVec3], h_s: f64) -> f64 {
-        let power = |((taken, v), a): ((&DVec3, &DVec3), &DVec3)| taken.dot(*v + *a * (0.5 * h_s));
+    /// Work (J) over a kick of length `h_s` that the body's velocities, times a factor on free axes, with accelerations (m/s²), do against them.
+    pub(crate) fn work_j(&self, (v, factor): (&[DVec3], f64), accelerations: &[DVec3], h_s: f64) -> f64 {
+        let power = |((taken, v), a): ((&DVec3, &DVec3), &DVec3)| taken.dot(*v * factor + *a * (0.5 * h_s));
         h_s * self.taken_n.iter().zip(v).zip(accelerations).map(power).sum::<f64>()
     }
 }

@@ -45,6 +45,7 @@ pub struct Hybrid {
     pub(super) of_tet: Vec<u16>,
     /// Axes along which coarse nodes may move.
     pub(super) free: Vec<BVec3>,
+    free_parts: Vec<DVec3>,
     /// It is held nowhere.
     pub(super) is_free: bool,
     /// Which particles may wake: those that follow some node that is free, none that is held along some axes only, and lie within the coarse tets.
@@ -135,6 +136,7 @@ impl Hybrid {
             densities_kg_per_m3: densities_kg_per_m3.to_vec(),
             of_tet: of_tet.to_vec(),
             is_free: is_free(&masses.node_kg, &free),
+            free_parts: free.iter().map(|free| DVec3::select(*free, DVec3::ONE, DVec3::ZERO)).collect(),
             free,
             may_wake,
             places,
@@ -183,11 +185,9 @@ impl Hybrid {
         if self.partition.is_plain(cell) { self.full_cell } else { self.partition.rest_cell(cell, 1.0 - KEPT) }
     }
 
-    /// Multiplies the velocities of coarse nodes, on free axes, and of active particles by a factor.
-    pub(crate) fn damp(&self, v: &mut [DVec3], factor: f64) {
-        for (v, free) in v.iter_mut().zip(self.free.iter().chain(std::iter::repeat(&BVec3::TRUE))) {
-            *v = DVec3::select(*free, *v * factor, *v);
-        }
+    /// The same as numbers: 1 along an axis on which a coarse node may move, 0 along others.
+    pub(crate) fn free_parts(&self) -> &[DVec3] {
+        &self.free_parts
     }
 
     /// The material of a coarse tet.

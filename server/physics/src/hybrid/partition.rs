@@ -129,7 +129,9 @@ impl Partition {
         self.cell_at[moments.cell] = number;
         let mut hanging = Hanging::NONE;
         if moments.doubled {
-            sizes::eight(&sites, at).into_iter().for_each(|cell| self.cell_at[cell] = number);
+            for cell in sizes::eight(&sites, at) {
+                self.cell_at[cell] = number;
+            }
         } else if self.has_doubled {
             let corners = sites.corners(moments.cell);
             hanging = Hanging::new(at, |corner| marks[corners[corner]] == Site::Hangs);

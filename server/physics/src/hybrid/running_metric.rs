@@ -19,6 +19,8 @@ pub(crate) struct RunningMetric {
     weight_kg: Vec<f64>,
     /// `1/M_i` (1/kg), 0 on held axes.
     inverse_node_per_kg: Vec<DVec3>,
+    /// What active particles take from the nodes they follow.
+    followed: Vec<Followed>,
     /// Nodes that active particles follow: the rows of the block. Free ones first, each ascending.
     touched: Vec<u32>,
     /// How many of them are free: the rows of the factor.
@@ -29,6 +31,15 @@ pub(crate) struct RunningMetric {
     /// Its lower Cholesky factor by columns, each from the diagonal down, whose entry is inverted.
     factor: Vec<f64>,
     right: Vec<DVec3>,
+}
+
+/// An active particle that follows coarse nodes, with no weight where there are fewer than four.
+#[derive(Debug, Clone, Copy)]
+struct Followed {
+    /// `(1 − ε) m_p` (kg).
+    mass_kg: f64,
+    nodes: [u32; 4],
+    weights: [f64; 4],
 }
 
 /// Nodes that a particle does follow.
@@ -47,6 +58,7 @@ impl RunningMetric {
             particle_kg: Vec::with_capacity(most_active),
             weight_kg: hybrid.masses.node_kg.clone(),
             inverse_node_per_kg: hybrid.masses.node_kg.iter().zip(&hybrid.free).map(inverse).collect(),
+            followed: Vec::with_capacity(most_active),
             touched: Vec::with_capacity(most_touched),
             free_rows: 0,
             row_of: vec![NONE; nodes],
@@ -64,6 +76,7 @@ impl RunningMetric {
         }
         self.touched.clear();
         self.particle_kg.clear();
+        self.followed.clear();
         for (_, anchor) in followed.clone() {
             for (node, _) in weighty(&anchor) {
                 if self.row_of[node as usize] == NONE {
@@ -85,6 +98,8 @@ impl RunningMetric {
         for (particle, anchor) in followed {
             let mass = (1.0 - KEPT) * hybrid.masses.particle_kg[particle as usize];
             self.particle_kg.push(mass);
+            let weights = anchor.weights.map(|weight| if weight >= NO_WEIGHT { weight } else { 0.0 });
+            self.followed.push(Followed { mass_kg: mass, nodes: anchor.nodes, weights });
             for (node, weight) in weighty(&anchor) {
                 self.weight_kg[node as usize] -= mass * weight;
                 let row = self.row_of[node as usize] as usize;
@@ -161,11 +176,7 @@ impl RunningMetric {
         for column in (0..size).rev() {
             let entries = &self.factor[column * size..(column + 1) * size];
             let (done, rest) = self.right[..size].split_at_mut(column + 1);
-            let mut sum = done[column];
-            for (right, entry) in rest.iter().zip(&entries[column + 1..]) {
-                sum -= *right * *entry;
-            }
-            done[column] = sum * entries[column];
+            done[column] = (done[column] - weighted(rest, &entries[column + 1..])) * entries[column];
         }
         for (acceleration, &node) in self.right.iter().zip(&self.touched[..size]) {
             nodes[node as usize] = *acceleration;
@@ -187,7 +198,7 @@ impl RunningMetric {
 
     /// Kinetic and gravitational energy (J) of coarse nodes and active particles. `momenta` is a buffer.
     pub(super) fn moving_j(
-        &mut self,
+        &self,
         hybrid: &Hybrid,
         (x, v): (&[DVec3], &[DVec3]),
         gravity_m_per_s2: DVec3,
@@ -231,36 +242,39 @@ impl RunningMetric {
         rows.map(of_row).sum::<f64>() + self.of_holders(v, v)
     }
 
-    /// Multiplies velocities on free axes by a factor; returns what they had before, `v_f·M'_ff v_f` and `v_h·M'_hf v_f` (J). `momenta` is a buffer.
-    pub(crate) fn damped(
-        &mut self,
-        hybrid: &Hybrid,
-        v: &mut [DVec3],
-        factor: f64,
-        momenta: &mut Vec<DVec3>,
-    ) -> (f64, f64) {
+    /// What velocities have on free axes: `v_f·M'_ff v_f` and `v_h·M'_hf v_f` (J). `momenta` is a buffer.
+    pub(crate) fn of_free_j(&self, hybrid: &Hybrid, v: &[DVec3], momenta: &mut Vec<DVec3>) -> (f64, f64) {
         momenta.clear();
         momenta.resize(v.len(), DVec3::ZERO);
         self.momenta(hybrid, v, momenta);
         let free = hybrid.free.iter().chain(std::iter::repeat(&BVec3::TRUE));
-        let of_free = free.zip(&*v).zip(&*momenta).map(|((free, v), p)| DVec3::select(*free, *v, DVec3::ZERO).dot(*p));
+        let of_free = free.zip(v).zip(&*momenta).map(|((free, v), p)| DVec3::select(*free, *v, DVec3::ZERO).dot(*p));
         let of_holders_j = self.of_holders(v, v);
-        let twice_kinetic_j = of_free.sum::<f64>() - of_holders_j;
-        hybrid.damp(v, factor);
-        (twice_kinetic_j, of_holders_j)
+        (of_free.sum::<f64>() - of_holders_j, of_holders_j)
     }
 
-    /// Momenta `M' v` (kg m/s) of coarse nodes and then of active particles.
-    pub(crate) fn momenta(&mut self, hybrid: &Hybrid, v: &[DVec3], momenta: &mut [DVec3]) {
+    /// Momenta `M' v` (kg m/s) of coarse nodes and then of active particles: particle by particle, which are fewer than the block's entries.
+    pub(crate) fn momenta(&self, hybrid: &Hybrid, v: &[DVec3], momenta: &mut [DVec3]) {
         let masses = hybrid.masses.node_kg.iter().chain(&self.particle_kg);
         for ((momentum, v), mass) in momenta.iter_mut().zip(v).zip(masses) {
             *momentum = *v * *mass;
         }
-        for (own, &node) in self.right.iter_mut().zip(&self.touched) {
-            *own = v[node as usize];
-        }
-        for (row, &node) in self.block_kg.chunks_exact(self.touched.len().max(1)).zip(&self.touched) {
-            momenta[node as usize] = row.iter().zip(&self.right).map(|(mass, v)| *v * *mass).sum();
+        for Followed { mass_kg, nodes, weights } in &self.followed {
+            let with: DVec3 = nodes.iter().zip(weights).map(|(node, weight)| v[*node as usize] * *weight).sum();
+            for (node, weight) in nodes.iter().zip(weights) {
+                momenta[*node as usize] -= with * (mass_kg * weight);
+            }
         }
     }
+}
+
+/// `Σ_i w_i a_i`, in four sums of which none waits for the others.
+fn weighted(list: &[DVec3], weights: &[f64]) -> DVec3 {
+    let mut sums = [DVec3::ZERO; 4];
+    for (list, weights) in list.chunks(4).zip(weights.chunks(4)) {
+        for ((sum, a), weight) in sums.iter_mut().zip(list).zip(weights) {
+            *sum += *a * *weight;
+        }
+    }
+    (sums[0] + sums[1]) + (sums[2] + sums[3])
 }

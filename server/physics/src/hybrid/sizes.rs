@@ -76,7 +76,9 @@ pub fn merge(
     may_merge: impl Fn(&[usize; 8]) -> bool,
 ) -> Vec<CellMoments> {
     let mut is_deep = vec![false; sites.cell_count()];
-    cells.iter().for_each(|cell| is_deep[cell.cell] = true);
+    for cell in &cells {
+        is_deep[cell.cell] = true;
+    }
     (0..3).for_each(|axis| erode(sites, &mut is_deep, axis, 1));
     for cell in cells.iter().filter(|cell| cell.gradients_m2.is_some()) {
         is_deep[cell.cell] = false;

@@ -106,7 +106,7 @@ pub(super) fn kick(
     own: &mut HybridScratch,
     (h_s, ends_long_step): (f64, bool),
 ) {
-    let HybridScratch { patch, accelerations, momenta, kick_sq, balance, .. } = own;
+    let HybridScratch { patch, accelerations, momenta, of_free_j, kick_sq, balance, .. } = own;
     accelerations.clear();
     accelerations.extend_from_slice(&state.force_n);
     if ends_long_step {
@@ -117,28 +117,35 @@ pub(super) fn kick(
     let factor = (-0.5 * damping * h_s).exp();
     let (mut before_j, mut with_holders_j, mut power_w) = (0.0, 0.0, 0.0);
     if damping > 0.0 {
-        (before_j, with_holders_j) = patch.metric_mut().damped(body, &mut state.v, factor, momenta);
-        power_w = of_holders_w + state.v.iter().zip(accelerations.iter()).map(|(v, f)| v.dot(*f)).sum::<f64>();
+        // Velocities are what the kick before left, once it is known what they have.
+        (before_j, with_holders_j) = of_free_j.unwrap_or_else(|| patch.metric().of_free_j(body, &state.v, momenta));
+        let of_all_w: f64 = state.v.iter().zip(accelerations.iter()).map(|(v, f)| v.dot(*f)).sum();
+        power_w = factor * (of_all_w + of_holders_w);
     }
     *kick_sq = [patch.metric_mut().accelerate(accelerations), kick_sq[0], kick_sq[1]];
     let inertia_w = patch.metric().of_holders(&state.v, accelerations);
-    // (v + h M'⁻¹f)ᵀ M' (v + h M'⁻¹f) = vᵀM'v + 2h v·f + h² fᵀM'⁻¹f
-    let between_j = factor * factor * before_j + h_s * (2.0 * power_w + h_s * kick_sq[0]);
-    let taken_j = balance.work_j(&state.v, accelerations, h_s);
+    let taken_j = balance.work_j((&state.v, factor), accelerations, h_s);
     state.ledger.dissipated_j += taken_j;
     state.active.given_j -= taken_j;
     let mut external_w = 0.0;
-    for ((v, acceleration), external) in state.v.iter_mut().zip(accelerations.iter()).zip(&state.external_n) {
-        let change = *acceleration * h_s;
-        external_w += external.dot(*v + change * 0.5);
-        *v += change;
+    let mut push = |((v, a), external): ((&mut DVec3, &DVec3), &DVec3), factor: DVec3| {
+        let (damped, change) = (*v * factor, *a * h_s);
+        external_w += external.dot(damped + change * 0.5);
+        *v = (damped + change) * factor;
+    };
+    let mut entries = state.v.iter_mut().zip(accelerations.iter()).zip(&state.external_n);
+    for (free, entry) in body.free_parts().iter().zip(&mut entries) {
+        push(entry, DVec3::ONE - *free * (1.0 - factor));
     }
+    entries.for_each(|entry| push(entry, DVec3::splat(factor)));
     if damping > 0.0 {
-        body.damp(&mut state.v, factor);
+        // (v + h M'⁻¹f)ᵀ M' (v + h M'⁻¹f) = vᵀM'v + 2h v·f + h² fᵀM'⁻¹f
+        let between_j = factor * factor * before_j + h_s * (2.0 * power_w + h_s * kick_sq[0]);
         state.ledger.dissipated_j += 0.5 * (before_j + between_j) * -(-damping * h_s).exp_m1();
         // What free velocities have with those of holders is linear in them.
         let between_holders_j = factor * with_holders_j + h_s * inertia_w;
         state.ledger.dissipated_j += (with_holders_j + between_holders_j) * (1.0 - factor);
+        *of_free_j = Some((factor * factor * between_j, factor * between_holders_j));
     }
     state.ledger.external_work_j += h_s * external_w;
     state.ledger.dissipated_j += h_s * state.viscous.work_rate_w();

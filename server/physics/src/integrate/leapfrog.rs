@@ -24,6 +24,9 @@ use crate::world::{Model, Scratch, State};
 pub(super) fn run(tick: &Tick<'_>, state: &mut State, scratch: &mut Scratch) {
     let (substeps, dt_s) = (tick.substeps, tick.dt_s());
     tick.make_force_current(state, scratch);
+    if let Some(own) = &mut scratch.hybrid {
+        own.of_free_j = None;
+    }
     kick(tick.model, state, scratch, (0.5 * dt_s, true));
     for substep in 1..=substeps {
         note_long_step(tick, substep - 1, state, scratch);
