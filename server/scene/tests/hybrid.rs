@@ -79,7 +79,7 @@ fn regions_choose_nodes_of_the_tets_and_triangles_of_the_skin() {
     assert!((particles.lattice_through_m - DVec3::Z * 1e-3).length() < 1e-12);
     let Waking::ByTools { reach_m } = particles.waking else { panic!("tools wake them") };
     // Half a ball of this radius holds as many as may be awake.
-    let held = 2.0 / 3.0 * std::f64::consts::PI * (reach_m / 2.5e-3).powi(3);
+    let held = 2.0 / 3.0 * PI * (reach_m / 2.5e-3).powi(3);
     assert!((held - 200.0).abs() < 1e-9, "{held}");
     assert!((scene.summary.mass_kg - 0.032).abs() < 1e-12);
 }
