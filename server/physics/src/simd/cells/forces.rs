@@ -87,6 +87,25 @@ fn store<V: Vector, const N: usize>(values: &[V; 7], corners: &mut Corners<V::Sc
     }
 }
 
+/// `Σ_p a_p b_pᵀ` of some lanes. No closure: one that is not inlined has no vectors of its caller's instruction set.
+#[inline(always)]
+fn gradient<V: Vector, const N: usize>(
+    block: &CutBlock<V::Scalar, N>,
+    corners: &Corners<V::Scalar, N>,
+    first: usize,
+) -> [[V; 3]; 3] {
+    let mut h = [[V::of(0.0); 3]; 3];
+    for axis in 0..3 {
+        let a = load::<V, N>(corners, axis, first);
+        for p in 0..7 {
+            for column in 0..3 {
+                h[axis][column] = h[axis][column] + a[p] * V::load(&block.gradients[3 * p + column][first..]);
+            }
+        }
+    }
+    h
+}
+
 #[inline(always)]
 fn cut<V: Vector<Scalar = T>, T: Scalar, L: LaneLaw, const VISCOUS: bool, const N: usize>(
     split: &Split<T>,
@@ -96,21 +115,8 @@ fn cut<V: Vector<Scalar = T>, T: Scalar, L: LaneLaw, const VISCOUS: bool, const 
 ) -> f64 {
     let mut power = [T::of(0.0); N];
     for first in (0..N).step_by(V::WIDTH) {
-        let b = |p: usize, axis: usize| V::load(&block.gradients[3 * p + axis][first..]);
-        let gradient = |corners: &Corners<T, N>| {
-            let mut h = [[V::of(0.0); 3]; 3];
-            for axis in 0..3 {
-                let a = load::<V, N>(corners, axis, first);
-                for p in 0..7 {
-                    for column in 0..3 {
-                        h[axis][column] = h[axis][column] + a[p] * b(p, column);
-                    }
-                }
-            }
-            h
-        };
-        let h = gradient(edges);
-        let h_dot = if VISCOUS { gradient(rates) } else { h };
+        let h = gradient::<V, N>(block, edges, first);
+        let h_dot = if VISCOUS { gradient::<V, N>(block, rates, first) } else { h };
         let whole = V::load(&block.minus_kappa[first..]);
         let mut gone = V::of(0.0);
         let mut faded = V::of(0.0);
@@ -135,20 +141,22 @@ fn cut<V: Vector<Scalar = T>, T: Scalar, L: LaneLaw, const VISCOUS: bool, const 
             let a = load::<V, N>(edges, axis, first);
             let mut f = [V::of(0.0); 7];
             for point in 0..7 {
-                let along = p[axis][0] * b(point, 0) + p[axis][1] * b(point, 1) + p[axis][2] * b(point, 2);
+                let mut along = V::of(0.0);
+                for column in 0..3 {
+                    along = along + p[axis][column] * V::load(&block.gradients[3 * point + column][first..]);
+                }
                 f[point] = along * minus_volume;
             }
             for mode in 0..4 {
-                let gamma = |point: usize| V::load(&block.modes[7 * mode + point][first..]);
                 let mut q = V::of(0.0);
                 for point in 0..7 {
-                    q = q + a[point] * gamma(point);
+                    q = q + a[point] * V::load(&block.modes[7 * mode + point][first..]);
                 }
                 // s ∂U/∂s = V P̃ : F A − ½ κ a Σ w |q|²
                 faded = faded + q * q * half_gone * V::of(MODE_WEIGHTS[mode]);
                 let q = q * minus_kappa * V::of(MODE_WEIGHTS[mode]);
                 for point in 0..7 {
-                    f[point] = f[point] + q * gamma(point);
+                    f[point] = f[point] + q * V::load(&block.modes[7 * mode + point][first..]);
                 }
             }
             store(&f, forces, axis, first);
