@@ -73,6 +73,46 @@ fn on_the_ventricle_methods_are_stiffer_and_raw_sums_soft() {
     }
 }
 
+/// Answer and field of tets that are nodally smoothed with γ, 600 particles awake on the block or on the ventricle.
+fn smoothed(gamma: f64, nu: &str, ventricle: bool) -> (f64, f64) {
+    let method = Method::NodalSmoothing { gamma };
+    if !ventricle {
+        return errors(&format!("γ = {gamma}"), nu, 600, of(method), None);
+    }
+    let case = Case {
+        name: format!("γ = {gamma}"),
+        coarse_tets: 400,
+        skin_tets: 150_000,
+        spacing_m: 3.2e-3,
+        active: 600,
+        points: Some(of(method)),
+        places: None,
+    };
+    error(&problem(&format!("ventricle-patch-small-nu{nu}")), &case)
+}
+
+/// What γ stabilises is what smoothing leaves out: the more of it, the stiffer, on either body.
+#[test]
+fn smoothed_tets_are_the_stiffer_the_larger_gamma() {
+    for ventricle in [false, true] {
+        let answers: Vec<f64> = [0.1, 0.3, 1.0].iter().map(|&gamma| smoothed(gamma, "0.45", ventricle).0).collect();
+        assert!(answers[0] > answers[1] + 0.01 && answers[1] > answers[2] + 0.02, "{ventricle}: {answers:?}");
+    }
+}
+
+/// Not a test, but the table of `docs/adr/hybrid.md`.
+#[test]
+#[ignore = "takes a minute"]
+fn gamma_studied() {
+    for ventricle in [false, true] {
+        for nu in NU {
+            for gamma in [0.05, 0.1, 0.2, 0.3, 0.4, 0.5, 0.7, 1.0] {
+                let _ = smoothed(gamma, nu, ventricle);
+            }
+        }
+    }
+}
+
 /// Corrected sums reach over two particles, so the rim of the patch, where particles follow the coarse tets and are stiff, is wide.
 #[test]
 fn more_particles_bring_corrected_sums_nearer() {
