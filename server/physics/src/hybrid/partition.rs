@@ -278,6 +278,11 @@ impl Partition {
         })
     }
 
+    /// Whether some cells are of twice the spacing.
+    pub fn has_doubled(&self) -> bool {
+        self.has_doubled
+    }
+
     /// Most cells that a particle moves: eight where all are of one size.
     pub fn most_cells_at(&self) -> usize {
         self.most_cells_at

@@ -337,7 +337,7 @@ mod tests {
             partition.anchor(corner).nodes.iter().for_each(|&n| node[n as usize] = false);
         }
         // Along every axis a particle moves what is up to an edge away.
-        let edge = if partition.most_cells_at() > 8 { 2.0 } else { 1.0 };
+        let edge = if partition.has_doubled() { 2.0 } else { 1.0 };
         let most_m = 10e-3 - edge * 3.0_f64.sqrt() * partition.sites().spacing_m();
         let is_deep =
             |&k: &usize| partition.particle_m(patch.active()[k]).distance(DVec3::new(0.2e-3, -0.3e-3, 0.1e-3)) < most_m;

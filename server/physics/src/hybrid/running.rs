@@ -76,7 +76,7 @@ impl RunningPatch {
     pub(crate) fn new(hybrid: &Hybrid, most_active: usize, precision: Precision) -> Self {
         let partition = &hybrid.partition;
         let most_cells = room_for_cells(hybrid, most_active);
-        let around = if partition.most_cells_at() > 8 { 8 * partition.most_cells_at() } else { 27 };
+        let around = if partition.has_doubled() { 8 * partition.most_cells_at() } else { 27 };
         let most_points = (around * most_active).min(partition.particle_count());
         let kernel = RowKernel::new(partition.sites().spacing_m(), 1.0 - KEPT, &hybrid.materials, precision);
         Self {

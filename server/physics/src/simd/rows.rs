@@ -100,16 +100,11 @@ impl<T: Scalar> Arrays<T> {
 }
 
 impl RowKernel {
-    /// For cells of spacing `h` (m) that answer for the share `handed` of their volume.
-    pub fn new(spacing_m: f64, handed: f64, materials: &[Material], precision: Precision) -> Self {
-        let cell = |material: &Material| {
-            let volume_m3 = handed * spacing_m.powi(3);
-            let kappa = HOURGLASS * 4.0 / 3.0 * material.lame.mu_pa * volume_m3 / (spacing_m * spacing_m);
-            [0.25 / spacing_m, -volume_m3, -kappa]
-        };
+    /// For cells of edge `h` (m) that answer for the share `handed` of their volume, and for those of twice the edge, whose materials follow theirs.
+    pub fn new(edge_m: f64, handed: f64, materials: &[Material], precision: Precision) -> Self {
         let layout = match precision {
-            Precision::Single => Layout::Single(of_materials(materials, cell)),
-            Precision::Double => Layout::Double(of_materials(materials, cell)),
+            Precision::Single => Layout::Single(of_materials(materials, edge_m, handed)),
+            Precision::Double => Layout::Double(of_materials(materials, edge_m, handed)),
         };
         let is_viscous = materials.iter().any(|m| !m.viscosity.is_zero());
         Self { layout, is_viscous, instruction_set: Available::at_most(InstructionSet::best()) }
@@ -162,9 +157,13 @@ impl RowKernel {
     }
 }
 
-fn of_materials<T: Scalar>(materials: &[Material], cell: impl Fn(&Material) -> [f64; 3]) -> Vec<CellMaterial<T>> {
-    let of = |m: &Material| CellMaterial { split: Split::of(m), cell: cell(m) };
-    materials.iter().map(of).collect()
+fn of_materials<T: Scalar>(materials: &[Material], edge_m: f64, handed: f64) -> Vec<CellMaterial<T>> {
+    let of = |(material, edge_m): (&Material, f64)| {
+        let volume_m3 = handed * edge_m.powi(3);
+        let kappa = HOURGLASS * 4.0 / 3.0 * material.lame.mu_pa * volume_m3 / (edge_m * edge_m);
+        CellMaterial { split: Split::of(material), cell: [0.25 / edge_m, -volume_m3, -kappa] }
+    };
+    [edge_m, 2.0 * edge_m].into_iter().flat_map(|edge_m| materials.iter().map(move |m| of((m, edge_m)))).collect()
 }
 
 impl RowValues {

@@ -11,14 +11,14 @@ use crate::{
 /// Where a cell is laid out.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Slot {
-    /// A full cell: its row, and its number among the cells of all rows.
+    /// A whole cell: its row, and its number among the cells of all rows.
     Row { row: u32, cell: u32 },
-    /// A cut one: its run, and its number in it.
+    /// Another: its run, and its number in it.
     Cut { run: u32, number: u32 },
 }
 
 impl RunningPatch {
-    /// Rows of full cells and blocks of cut ones, material by material; nothing fades in them.
+    /// Rows of whole cells, of either size, and blocks of others, material by material; nothing fades in them.
     pub(super) fn lay_out(&mut self, hybrid: &Hybrid) {
         let partition = &hybrid.partition;
         for &cell in &self.fading_cells {
@@ -34,32 +34,39 @@ impl RunningPatch {
         let point_of = &self.point_of;
         let points_of = |cell: usize| partition.corners(cell).map(|particle| point_of[particle as usize]);
         let mut in_rows = 0;
-        for material in 0..hybrid.materials.len() as u16 {
-            let some = |is_cut: bool| {
+        let materials = hybrid.materials.len() as u16;
+        let sizes = if partition.has_doubled() { &[false, true][..] } else { &[false] };
+        for (material, doubled) in
+            (0..materials).flat_map(|material| sizes.iter().map(move |&doubled| (material, doubled)))
+        {
+            let some = |is_whole: bool| {
                 let cells = self.cells.iter().map(|&cell| cell as usize).enumerate();
-                cells.filter(move |&(_, cell)| {
-                    let tet = partition.cells()[cell].tet;
-                    partition.is_plain(cell) != is_cut && hybrid.of_tet[tet as usize] == material
+                cells.filter(move |&(_, number)| {
+                    let cell = partition.cells()[number];
+                    partition.is_whole(number) == is_whole
+                        && cell.doubled == doubled
+                        && hybrid.of_tet[cell.tet as usize] == material
                 })
             };
             let first_row = self.rows.len();
-            for (number, cell) in some(false) {
+            let of_size = if doubled { materials + material } else { material };
+            for (number, cell) in some(true) {
                 let points = points_of(cell);
                 let points = [points[0], points[2], points[4], points[6]];
                 match self.rows[first_row..].last_mut() {
                     Some(row) if row.points.map(|point| point + row.cells) == points => row.cells += 1,
-                    _ => self.rows.push(CellRow { points, cells: 1, material, first: in_rows, fading: false }),
+                    _ => self.rows.push(CellRow { points, cells: 1, material: of_size, first: in_rows, fading: false }),
                 }
                 self.slots[number] = Slot::Row { row: self.rows.len() as u32 - 1, cell: in_rows };
                 in_rows += 1;
             }
-            let count = some(true).count();
+            let count = some(false).count();
             if count == 0 {
                 continue;
             }
             let run = self.cut.runs() as u32;
             self.cut.start(material, count);
-            for (at, (number, cell)) in some(true).enumerate() {
+            for (at, (number, cell)) in some(false).enumerate() {
                 self.cut.put(at, points_of(cell), &hybrid.awake_cell(cell));
                 self.slots[number] = Slot::Cut { run, number: at as u32 };
             }
