@@ -16,13 +16,20 @@ pub(crate) struct ListedSkin {
     patch: u64,
 }
 
-/// A vertex with its particles' weights.
+/// A vertex with what carries it.
 #[derive(Debug, Clone, Copy)]
 struct Listed {
     vertex: u32,
     rest_m: DVec3,
-    weights: [f64; 8],
-    carriers: [Carrier; 8],
+    carriers: [(Carrier, f64); 8],
+    /// How many of them have weight, the first ones.
+    weighty: usize,
+}
+
+impl Listed {
+    fn carriers(&self) -> &[(Carrier, f64)] {
+        &self.carriers[..self.weighty]
+    }
 }
 
 /// What carries a particle.
@@ -71,12 +78,20 @@ impl ListedSkin {
             return;
         }
         let place = hybrid.places[vertex as usize];
-        let carriers = hybrid.partition.corners(place.cell as usize).map(|particle| match patch.point_of(particle) {
-            NONE => Carrier::Nodes(hybrid.partition.anchor(particle)),
-            point => Carrier::Point(point),
-        });
-        let (rest_m, weights) = (rest_positions_m[vertex as usize], place.weights(&hybrid.partition));
-        self.listed.push(Listed { vertex, rest_m, weights, carriers });
+        let rest_m = rest_positions_m[vertex as usize];
+        let mut listed = Listed { vertex, rest_m, carriers: [(Carrier::Point(NONE), 0.0); 8], weighty: 0 };
+        let particles = hybrid.partition.corners(place.cell as usize);
+        for (particle, weight) in particles.into_iter().zip(place.weights(&hybrid.partition)) {
+            if weight != 0.0 {
+                let carrier = match patch.point_of(particle) {
+                    NONE => Carrier::Nodes(hybrid.partition.anchor(particle)),
+                    point => Carrier::Point(point),
+                };
+                listed.carriers[listed.weighty] = (carrier, weight);
+                listed.weighty += 1;
+            }
+        }
+        self.listed.push(listed);
     }
 
     /// Positions and no forces at the listed vertices, where the patch was displaced to.
@@ -86,7 +101,7 @@ impl ListedSkin {
                 Carrier::Point(point) => patch.displacements_m()[*point as usize],
                 Carrier::Nodes(anchor) => anchor.of(patch.node_displacements_m()),
             };
-            let moved: DVec3 = listed.carriers.iter().zip(listed.weights).map(|(carrier, w)| of(carrier) * w).sum();
+            let moved: DVec3 = listed.carriers().iter().map(|(carrier, weight)| of(carrier) * *weight).sum();
             self.x[listed.vertex as usize] = listed.rest_m + moved;
             self.forces_n[listed.vertex as usize] = DVec3::ZERO;
         }
@@ -99,10 +114,10 @@ impl ListedSkin {
             if force_n == DVec3::ZERO {
                 continue;
             }
-            for (carrier, weight) in listed.carriers.iter().zip(listed.weights) {
+            for (carrier, weight) in listed.carriers() {
                 match carrier {
-                    Carrier::Nodes(anchor) => anchor.push(force_n * weight, forces_n),
-                    Carrier::Point(point) => patch.push(*point, force_n * weight, nodes, forces_n),
+                    Carrier::Nodes(anchor) => anchor.push(force_n * *weight, forces_n),
+                    Carrier::Point(point) => patch.push(*point, force_n * *weight, nodes, forces_n),
                 }
             }
         }
@@ -188,12 +203,13 @@ impl Hybrid {
     /// Velocity (m/s) of a vertex of the skin, from those of coarse nodes and then active particles.
     pub(crate) fn velocity_m_per_s(&self, patch: &RunningPatch, vertex: u32, v: &[DVec3]) -> DVec3 {
         let place = self.places[vertex as usize];
-        let of = |particle: u32| match patch.active().binary_search(&particle) {
-            Ok(number) => v[self.node_count() + number],
-            Err(_) => self.partition.anchor(particle).of(v),
+        let of = |particle: u32| match patch.number_of(particle) {
+            NONE => self.partition.anchor(particle).of(v),
+            number => v[self.node_count() + number as usize],
         };
         let particles = self.partition.corners(place.cell as usize);
-        particles.into_iter().zip(place.weights(&self.partition)).map(|(p, w)| of(p) * w).sum()
+        let weighty = particles.into_iter().zip(place.weights(&self.partition)).filter(|(_, weight)| *weight != 0.0);
+        weighty.map(|(particle, weight)| of(particle) * weight).sum()
     }
 
     /// Where a vertex of the skin is (m).

@@ -15,7 +15,7 @@
 //! feel of the coarse one); `docs/adr/hybrid.md` has what was measured.
 use super::{HybridScratch, balance::without_torque, body::Hybrid, fade::Progress};
 use crate::{
-    simd::Found,
+    simd::{Found, sweeps::Answer},
     world::{Model, State},
 };
 use glam::DVec3;
@@ -247,16 +247,18 @@ impl HybridScratch {
         let before = if begun > 1 { &two } else { &state.active.long_steps.before };
         // With the step before taken for none, differences are first ones.
         let before = if before.is_known_of(state) { before } else { &one };
-        let difference = |((now, one), two): ((DVec3, &DVec3), &DVec3)| (now - *one) - (*one - *two);
-        let moved = || state.x.iter().copied().zip(&one.x).zip(&before.x).map(difference);
-        let now = || state.active.long_steps.forces_n();
-        let forces = now().zip(&one.forces_n).zip(&before.forces_n).map(difference);
-        let answer: f64 = forces.zip(moved()).map(|(force, moved)| -force.dot(moved)).sum();
-        let force_sq: f64 = now().map(DVec3::length_squared).sum();
-        let moved_sq: f64 = moved().take(body.node_count()).map(DVec3::length_squared).sum();
-        let answer = answer - digits * (force_sq * moved_sq).sqrt();
-        let cause = self.twice_kinetic(body, moved()) / (long_step_s * long_step_s);
+        let LongSteps { steady_n, beyond_n, .. } = &state.active.long_steps;
+        let nodes = body.node_count();
+        let moved_of_nodes = [&state.x[..nodes], &one.x[..nodes], &before.x[..nodes]];
+        let sums = Answer { steady_n, beyond_n, forces_n: [&one.forces_n, &before.forces_n], x: moved_of_nodes }.sums();
+        let answer = sums.answer - digits * (sums.force_sq * sums.moved_sq).sqrt();
+        let mut quotient = 0.0;
+        if answer > 0.0 {
+            let difference = |((now, one), two): ((&DVec3, &DVec3), &DVec3)| (*now - *one) - (*one - *two);
+            let moved = state.x.iter().zip(&one.x).zip(&before.x).map(difference);
+            quotient = answer * (long_step_s * long_step_s) / self.twice_kinetic(body, moved);
+        }
         self.long_steps.recent = [one, two];
-        if answer > 0.0 { answer / cause } else { 0.0 }
+        quotient
     }
 }

@@ -2,6 +2,7 @@
 mod active;
 mod balance;
 pub mod body;
+mod border;
 pub mod cage;
 pub mod cell;
 pub mod clusters;

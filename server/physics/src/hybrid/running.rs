@@ -8,6 +8,7 @@ mod tests;
 use super::{
     active::room_for_cells,
     body::Hybrid,
+    border::Border,
     composite::Anchor,
     fade::Fading,
     partition::{Cell, NONE},
@@ -28,6 +29,9 @@ pub(crate) struct RunningPatch {
     /// Active particles, ascending.
     active: Vec<u32>,
     points: Vec<Point>,
+    border: Border,
+    /// Numbers of the active particles' points, ascending.
+    points_of_active: Vec<u32>,
     /// Displacements (m) of the points.
     displacements_m: Vec<DVec3>,
     /// A buffer for the kernels' values of points.
@@ -82,6 +86,8 @@ impl RunningPatch {
         Self {
             active: Vec::with_capacity(most_active),
             points: Vec::with_capacity(most_points),
+            border: Border::with_room(most_points),
+            points_of_active: Vec::with_capacity(most_active),
             displacements_m: Vec::with_capacity(most_points),
             of_points: Vec::with_capacity(most_points),
             cells: Vec::with_capacity(most_cells),
@@ -130,6 +136,11 @@ impl RunningPatch {
     /// Number of a particle among the points, [`NONE`] of one that is none.
     pub(super) fn point_of(&self, particle: u32) -> u32 {
         self.point_of[particle as usize]
+    }
+
+    /// Number of a particle among the active ones, [`NONE`] of one that is asleep.
+    pub(super) fn number_of(&self, particle: u32) -> u32 {
+        self.points.get(self.point_of(particle) as usize).map_or(NONE, |point| point.active)
     }
 
     /// Displacements (m) of the points after [`Self::displace`].
@@ -282,14 +293,17 @@ impl RunningPatch {
             }
         }
         self.points.sort_unstable_by_key(|point| point.particle);
-        let mut next = 0;
+        self.points_of_active.clear();
         for (number, point) in self.points.iter_mut().enumerate() {
             self.point_of[point.particle as usize] = number as u32;
+            let next = self.points_of_active.len();
             if self.active.get(next) == Some(&point.particle) {
                 point.active = next as u32;
-                next += 1;
+                self.points_of_active.push(number as u32);
             }
         }
+        let numbered = (0..).zip(&self.points).filter(|(_, point)| point.active == NONE);
+        self.border.take(numbered.map(|(number, point)| (number, point.anchor)));
         self.displacements_m.resize(self.points.len(), DVec3::ZERO);
     }
 
@@ -350,9 +364,9 @@ impl RunningPatch {
             self.cut.set_displacements(&self.of_points);
         }
         if self.is_viscous {
-            for (velocity, point) in self.of_points.iter_mut().zip(&self.points) {
-                let particle = v_particles.get(point.active as usize);
-                *velocity = particle.copied().unwrap_or_else(|| point.anchor.of(v_nodes));
+            self.border.follow(v_nodes, &mut self.of_points);
+            for (v, &point) in v_particles.iter().zip(&self.points_of_active) {
+                self.of_points[point as usize] = *v;
             }
             self.values.set_velocities(&self.of_points);
             self.cut.set_velocities(&self.of_points);
@@ -364,12 +378,9 @@ impl RunningPatch {
             self.cut.add_forces_n(&mut self.of_points);
         }
         let (f_nodes, f_particles) = forces_n.split_at_mut(nodes);
-        for (point, force_n) in self.points.iter().zip(&self.of_points) {
-            if point.active == NONE {
-                point.anchor.push(*force_n, f_nodes);
-            } else {
-                f_particles[point.active as usize] = *force_n;
-            }
+        self.border.push(&self.of_points, f_nodes);
+        for (force_n, &point) in f_particles.iter_mut().zip(&self.points_of_active) {
+            *force_n = self.of_points[point as usize];
         }
         found
     }
@@ -381,12 +392,9 @@ impl RunningPatch {
         for ((u, x), rest) in self.node_displacements_m.iter_mut().zip(x_nodes).zip(rest) {
             *u = *x - *rest;
         }
-        for (u, point) in self.displacements_m.iter_mut().zip(&self.points) {
-            *u = if point.active == NONE {
-                point.anchor.of(&self.node_displacements_m)
-            } else {
-                x_particles[point.active as usize] - point.rest_m
-            };
+        self.border.follow(&self.node_displacements_m, &mut self.displacements_m);
+        for (x, &point) in x_particles.iter().zip(&self.points_of_active) {
+            self.displacements_m[point as usize] = *x - self.points[point as usize].rest_m;
         }
     }
 }

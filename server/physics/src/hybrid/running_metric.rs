@@ -5,6 +5,7 @@ use super::{
     partition::NONE,
     patch::KEPT,
 };
+use crate::simd::{dense::Cholesky, sweeps};
 use glam::{BVec3, DVec3};
 
 /// `M'` and its factor.
@@ -17,8 +18,8 @@ pub(crate) struct RunningMetric {
     particle_kg: Vec<f64>,
     /// What gravity pulls coarse nodes with (kg): the row sums of `M'`.
     weight_kg: Vec<f64>,
-    /// `1/M_i` (1/kg), 0 on held axes.
-    inverse_node_per_kg: Vec<DVec3>,
+    /// `1/M_i` (1/kg) of coarse nodes, 0 on held axes and of those in the factor, and then `1/(1 − ε) m_p` of active particles.
+    inverse_per_kg: Vec<DVec3>,
     /// What active particles take from the nodes they follow.
     followed: Vec<Followed>,
     /// Nodes that active particles follow: the rows of the block. Free ones first, each ascending.
@@ -28,9 +29,7 @@ pub(crate) struct RunningMetric {
     row_of: Vec<u32>,
     /// The dense block of `M'` (kg), row by row.
     block_kg: Vec<f64>,
-    /// Its lower Cholesky factor by columns, each from the diagonal down, whose entry is inverted.
-    factor: Vec<f64>,
-    right: Vec<DVec3>,
+    factor: Cholesky,
 }
 
 /// An active particle that follows coarse nodes, with no weight where there are fewer than four.
@@ -47,24 +46,28 @@ fn weighty(anchor: &Anchor) -> impl Iterator<Item = (u32, f64)> {
     anchor.nodes.into_iter().zip(anchor.weights).filter(|(_, weight)| *weight >= NO_WEIGHT)
 }
 
+/// `1/M_i` (1/kg) of a coarse node, 0 on held axes.
+fn inverse_per_kg(hybrid: &Hybrid, node: usize) -> DVec3 {
+    let mass_kg = hybrid.masses.node_kg[node].max(f64::MIN_POSITIVE);
+    DVec3::select(hybrid.free[node], DVec3::splat(1.0 / mass_kg), DVec3::ZERO)
+}
+
 impl RunningMetric {
     pub(super) fn new(hybrid: &Hybrid, most_active: usize) -> Self {
         let nodes = hybrid.node_count();
         let most_touched = (4 * most_active).min(nodes);
-        let inverse = |(mass, free): (&f64, &BVec3)| {
-            DVec3::select(*free, DVec3::splat(1.0 / mass.max(f64::MIN_POSITIVE)), DVec3::ZERO)
-        };
+        let mut inverses_per_kg = Vec::with_capacity(nodes + most_active);
+        inverses_per_kg.extend((0..nodes).map(|node| inverse_per_kg(hybrid, node)));
         Self {
             particle_kg: Vec::with_capacity(most_active),
             weight_kg: hybrid.masses.node_kg.clone(),
-            inverse_node_per_kg: hybrid.masses.node_kg.iter().zip(&hybrid.free).map(inverse).collect(),
+            inverse_per_kg: inverses_per_kg,
             followed: Vec::with_capacity(most_active),
             touched: Vec::with_capacity(most_touched),
             free_rows: 0,
             row_of: vec![NONE; nodes],
             block_kg: Vec::with_capacity(most_touched * most_touched),
-            factor: Vec::with_capacity(most_touched * most_touched),
-            right: Vec::with_capacity(most_touched),
+            factor: Cholesky::with_room(most_touched),
         }
     }
 
@@ -73,9 +76,11 @@ impl RunningMetric {
         for &node in &self.touched {
             self.row_of[node as usize] = NONE;
             self.weight_kg[node as usize] = hybrid.masses.node_kg[node as usize];
+            self.inverse_per_kg[node as usize] = inverse_per_kg(hybrid, node as usize);
         }
         self.touched.clear();
         self.particle_kg.clear();
+        self.inverse_per_kg.truncate(hybrid.node_count());
         self.followed.clear();
         for (_, anchor) in followed.clone() {
             for (node, _) in weighty(&anchor) {
@@ -93,11 +98,13 @@ impl RunningMetric {
         self.block_kg.resize(size * size, 0.0);
         for (row, &node) in self.touched.iter().enumerate() {
             self.row_of[node as usize] = row as u32;
+            self.inverse_per_kg[node as usize] = DVec3::ZERO;
             self.block_kg[row * size + row] = hybrid.masses.node_kg[node as usize];
         }
         for (particle, anchor) in followed {
             let mass = (1.0 - KEPT) * hybrid.masses.particle_kg[particle as usize];
             self.particle_kg.push(mass);
+            self.inverse_per_kg.push(DVec3::splat(1.0 / mass));
             let weights = anchor.weights.map(|weight| if weight >= NO_WEIGHT { weight } else { 0.0 });
             self.followed.push(Followed { mass_kg: mass, nodes: anchor.nodes, weights });
             for (node, weight) in weighty(&anchor) {
@@ -109,77 +116,19 @@ impl RunningMetric {
                 }
             }
         }
-        self.cholesky();
-        self.right.resize(size, DVec3::ZERO);
-    }
-
-    /// Column after column, left-looking from what the ones before leave of it.
-    ///
-    /// Pivots are positive where no weight is negative (`metric`), which [`Hybrid::may_wake`] sees to; rounding that says otherwise is raised to a
-    /// little more than nothing.
-    fn cholesky(&mut self) {
-        let (size, stride) = (self.free_rows, self.touched.len());
-        self.factor.clear();
-        self.factor.resize(size * size, 0.0);
-        for column in 0..size {
-            let (before, now) = self.factor.split_at_mut(column * size);
-            let now = &mut now[..size];
-            now[column..].copy_from_slice(&self.block_kg[column * stride + column..column * stride + size]);
-            for earlier in before.chunks_exact(size) {
-                let scale = earlier[column];
-                if scale != 0.0 {
-                    for (entry, other) in now[column..].iter_mut().zip(&earlier[column..]) {
-                        *entry -= scale * other;
-                    }
-                }
-            }
-            let least = 1e-12 * self.block_kg[column * stride + column];
-            let inverse = now[column].max(least).sqrt().recip();
-            for entry in &mut now[column + 1..] {
-                *entry *= inverse;
-            }
-            now[column] = inverse;
-        }
+        // Pivots are positive where no weight is negative (`metric`), which [`Hybrid::may_wake`] sees to.
+        self.factor.factorise((&self.block_kg, size), self.free_rows, 1e-12);
     }
 
     /// `M'⁻¹ f` (m/s²) on free axes, zero on the others, in place of forces (N) on coarse nodes and then on active particles; returns `fᵀ M'⁻¹ f` (N²/kg).
     pub(crate) fn accelerate(&mut self, forces_n: &mut [DVec3]) -> f64 {
-        let size = self.free_rows;
-        let (nodes, particles) = forces_n.split_at_mut(self.inverse_node_per_kg.len());
-        for (right, &node) in self.right.iter_mut().zip(&self.touched[..size]) {
-            *right = std::mem::take(&mut nodes[node as usize]);
+        let free = &self.touched[..self.free_rows];
+        for (row, &node) in free.iter().enumerate() {
+            self.factor.put(row, forces_n[node as usize]);
         }
-        let mut size_sq = 0.0;
-        for (force, inverse) in nodes.iter_mut().zip(&self.inverse_node_per_kg) {
-            let acceleration = *force * *inverse;
-            size_sq += force.dot(acceleration);
-            *force = acceleration;
-        }
-        for (force, mass) in particles.iter_mut().zip(&self.particle_kg) {
-            let acceleration = *force / *mass;
-            size_sq += force.dot(acceleration);
-            *force = acceleration;
-        }
-        // L y = f
-        for column in 0..size {
-            let entries = &self.factor[column * size..(column + 1) * size];
-            let (done, rest) = self.right[..size].split_at_mut(column + 1);
-            done[column] *= entries[column];
-            let y = done[column];
-            // fᵀ (L Lᵀ)⁻¹ f = yᵀ y
-            size_sq += y.length_squared();
-            for (right, entry) in rest.iter_mut().zip(&entries[column + 1..]) {
-                *right -= y * *entry;
-            }
-        }
-        // Lᵀ a = y
-        for column in (0..size).rev() {
-            let entries = &self.factor[column * size..(column + 1) * size];
-            let (done, rest) = self.right[..size].split_at_mut(column + 1);
-            done[column] = (done[column] - weighted(rest, &entries[column + 1..])) * entries[column];
-        }
-        for (acceleration, &node) in self.right.iter().zip(&self.touched[..size]) {
-            nodes[node as usize] = *acceleration;
+        let size_sq = sweeps::divide_by_masses(forces_n, &self.inverse_per_kg) + self.factor.solve();
+        for (row, &node) in free.iter().enumerate() {
+            forces_n[node as usize] = self.factor.get(row);
         }
         size_sq
     }
@@ -266,15 +215,4 @@ impl RunningMetric {
             }
         }
     }
-}
-
-/// `Σ_i w_i a_i`, in four sums of which none waits for the others.
-fn weighted(list: &[DVec3], weights: &[f64]) -> DVec3 {
-    let mut sums = [DVec3::ZERO; 4];
-    for (list, weights) in list.chunks(4).zip(weights.chunks(4)) {
-        for ((sum, a), weight) in sums.iter_mut().zip(list).zip(weights) {
-            *sum += *a * *weight;
-        }
-    }
-    (sums[0] + sums[1]) + (sums[2] + sums[3])
 }

@@ -7,6 +7,7 @@ use crate::{
     contact::{ContactScratch, SubstepTime, SurfaceNow},
     fem::loads::add_load_n,
     hybrid::{Hybrid, HybridScratch, SkinView},
+    simd::sweeps::{self, Kick},
     world::{LoadSpec, Model, State},
 };
 use glam::DVec3;
@@ -82,9 +83,7 @@ pub(super) fn evaluate(
     if model.gravity_m_per_s2() != DVec3::ZERO {
         patch.metric().add_weight_n(model.gravity_m_per_s2(), &mut state.force_n);
     }
-    for (force, external) in state.force_n.iter_mut().zip(&state.external_n) {
-        *force += *external;
-    }
+    sweeps::add(&mut state.force_n, &state.external_n);
     own.balance.apply(body, state);
     state.force_is_current = true;
 }
@@ -119,25 +118,16 @@ pub(super) fn kick(
     if damping > 0.0 {
         // Velocities are what the kick before left, once it is known what they have.
         (before_j, with_holders_j) = of_free_j.unwrap_or_else(|| patch.metric().of_free_j(body, &state.v, momenta));
-        let of_all_w: f64 = state.v.iter().zip(accelerations.iter()).map(|(v, f)| v.dot(*f)).sum();
-        power_w = factor * (of_all_w + of_holders_w);
+        power_w = factor * (sweeps::dot(&state.v, accelerations) + of_holders_w);
     }
     *kick_sq = [patch.metric_mut().accelerate(accelerations), kick_sq[0], kick_sq[1]];
     let inertia_w = patch.metric().of_holders(&state.v, accelerations);
     let taken_j = balance.work_j((&state.v, factor), accelerations, h_s);
     state.ledger.dissipated_j += taken_j;
     state.active.given_j -= taken_j;
-    let mut external_w = 0.0;
-    let mut push = |((v, a), external): ((&mut DVec3, &DVec3), &DVec3), factor: DVec3| {
-        let (damped, change) = (*v * factor, *a * h_s);
-        external_w += external.dot(damped + change * 0.5);
-        *v = (damped + change) * factor;
-    };
-    let mut entries = state.v.iter_mut().zip(accelerations.iter()).zip(&state.external_n);
-    for (free, entry) in body.free_parts().iter().zip(&mut entries) {
-        push(entry, DVec3::ONE - *free * (1.0 - factor));
-    }
-    entries.for_each(|entry| push(entry, DVec3::splat(factor)));
+    let free_parts = if factor < 1.0 { body.free_parts() } else { &[] };
+    let (v, external_n) = (&mut state.v, &state.external_n);
+    let external_w = Kick { v, accelerations, external_n, free_parts, factor, h_s }.give();
     if damping > 0.0 {
         // (v + h M'⁻¹f)ᵀ M' (v + h M'⁻¹f) = vᵀM'v + 2h v·f + h² fᵀM'⁻¹f
         let between_j = factor * factor * before_j + h_s * (2.0 * power_w + h_s * kick_sq[0]);

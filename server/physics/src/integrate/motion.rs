@@ -1,18 +1,13 @@
 //! What integrators do to positions and velocities, and what the ledger hears of it.
-use crate::world::{Model, State};
+use crate::{
+    simd::sweeps,
+    world::{Model, State},
+};
 use glam::DVec3;
 
-/// `x ← x + dt v`; returns the largest speed (m/s) of any node.
+/// `x ← x + dt v`; returns a bound (m/s) of the largest speed of any node.
 pub(super) fn drift(state: &mut State, dt_s: f64) -> f64 {
-    // Four running maxima, so that one does not wait for the other.
-    let mut most = [0.0_f64; 4];
-    for (xs, vs) in state.x.chunks_mut(4).zip(state.v.chunks(4)) {
-        for ((x, v), most) in xs.iter_mut().zip(vs).zip(&mut most) {
-            *x += *v * dt_s;
-            *most = most.max(v.length_squared());
-        }
-    }
-    most.into_iter().fold(0.0, f64::max).sqrt()
+    sweeps::drift(&mut state.x, &state.v, dt_s)
 }
 
 /// `v ← (v e^{−c h/2} + h f/m) e^{−c h/2}`, and the ledger's share of it: what damping takes, `½ (1 − e^{−c h}) m v²` of the velocity before and

@@ -233,11 +233,12 @@ impl ForceHistory {
             let long_step = long_step_quotient(model, state, own, substeps);
             return Evidence { answer_sq, cause_sq: one_sq.max(two_sq) + held_sq, long_step };
         }
-        let [answer_sq, one_sq, two_sq] = model.kernel().step_force_sums(&StepForces {
+        let forces = StepForces {
             total_n: [&state.force_n, &one.total_n, &two.total_n],
             external_n: [&state.external_n, &one.external_n, &two.external_n],
             inverse_mass_per_kg: model.inverse_mass_per_kg(),
-        });
+        };
+        let [answer_sq, one_sq, two_sq] = forces.sums();
         Evidence { answer_sq, cause_sq: one_sq.max(two_sq) + held_sq, long_step: 0.0 }
     }
 

@@ -3,7 +3,6 @@
 use super::{
     laws::{FixedCorotated, StVenantKirchhoff, StableNeoHookean},
     real::{Scalar, Vector},
-    step_forces::StepForces,
     tangents::LaneTangent,
 };
 use crate::material::Law;
@@ -24,6 +23,11 @@ pub enum InstructionSet {
 pub(super) struct Available(InstructionSet);
 
 impl Available {
+    /// The best of this machine.
+    pub(super) fn best() -> Self {
+        Self(InstructionSet::best())
+    }
+
     /// The wanted one, or the best there is below it.
     pub(super) fn at_most(wanted: InstructionSet) -> Self {
         Self(wanted.min(InstructionSet::best()))
@@ -52,29 +56,35 @@ impl InstructionSet {
     }
 }
 
-/// [`StepForces::sums`].
-pub(super) fn step_force_sums(set: Available, forces: &StepForces<'_>) -> [f64; 3] {
+/// A pass over lists, written once for all vectors.
+pub(super) trait Sweep {
+    type Found;
+    /// Computed in vectors `V`.
+    fn run<V: Vector<Scalar = f64>>(self) -> Self::Found;
+}
+
+pub(super) fn sweep<S: Sweep>(set: Available, sweep: S) -> S::Found {
     match set.0 {
         // SAFETY: `Available` holds only what was detected.
         #[cfg(target_arch = "x86_64")]
-        InstructionSet::Avx2 => unsafe { sums_avx2(forces) },
+        InstructionSet::Avx2 => unsafe { sweep_avx2(sweep) },
         // SAFETY: `Available` holds only what was detected.
         #[cfg(target_arch = "x86_64")]
-        InstructionSet::Avx512 => unsafe { sums_avx512(forces) },
-        _ => forces.sums::<<f64 as Scalar>::Baseline>(),
+        InstructionSet::Avx512 => unsafe { sweep_avx512(sweep) },
+        _ => sweep.run::<<f64 as Scalar>::Baseline>(),
     }
 }
 
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx2")]
-fn sums_avx2(forces: &StepForces<'_>) -> [f64; 3] {
-    forces.sums::<<f64 as Scalar>::Avx2>()
+fn sweep_avx2<S: Sweep>(sweep: S) -> S::Found {
+    sweep.run::<<f64 as Scalar>::Avx2>()
 }
 
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx512f,avx512bw,avx512dq,avx512vl")]
-fn sums_avx512(forces: &StepForces<'_>) -> [f64; 3] {
-    forces.sums::<<f64 as Scalar>::Avx512>()
+fn sweep_avx512<S: Sweep>(sweep: S) -> S::Found {
+    sweep.run::<<f64 as Scalar>::Avx512>()
 }
 
 /// A pass over blocks, written once for all vectors and laws.

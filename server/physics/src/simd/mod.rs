@@ -9,6 +9,7 @@
 mod block;
 mod cell_stress;
 mod cells;
+pub(crate) mod dense;
 mod dispatch;
 mod fades;
 mod laws;
@@ -19,6 +20,7 @@ mod real;
 mod rows;
 mod shares;
 mod step_forces;
+pub(crate) mod sweeps;
 mod tangents;
 #[cfg(target_arch = "x86_64")]
 mod x86;
@@ -111,11 +113,6 @@ impl ForceKernel {
     #[must_use]
     pub fn with_instruction_set(self, instruction_set: InstructionSet) -> Self {
         Self { instruction_set: Available::at_most(instruction_set), ..self }
-    }
-
-    /// See [`StepForces::sums`].
-    pub(crate) fn step_force_sums(&self, forces: &StepForces<'_>) -> [f64; 3] {
-        dispatch::step_force_sums(self.instruction_set, forces)
     }
 
     /// Whether any material is viscous.

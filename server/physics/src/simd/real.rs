@@ -33,6 +33,8 @@ pub(super) trait Scalar: Real + Default + PartialOrd + From<f32> + Into<f64> {
 pub(super) trait Vector: Real {
     /// Its lanes' type.
     type Scalar: Scalar;
+    /// A vector for so few lanes that this one would be half empty; itself where there is none that is less work.
+    type Narrow: Vector<Scalar = Self::Scalar>;
     /// Its number of lanes.
     const WIDTH: usize;
     /// Lanes from the start of a slice that has at least [`Self::WIDTH`].
@@ -63,6 +65,7 @@ macro_rules! scalar {
 
         impl Vector for $scalar {
             type Scalar = Self;
+            type Narrow = Self;
             const WIDTH: usize = 1;
             #[inline(always)]
             fn load(source: &[Self]) -> Self {

@@ -237,12 +237,18 @@ impl<T: Scalar> Pass<T> for RowForces<'_, T> {
     fn run<V: Vector<Scalar = T>, L: LaneTangent, const VISCOUS: bool>(&mut self) -> f64 {
         let mut power_w = 0.0;
         for row in self.rows {
-            for first in (0..row.cells as usize).step_by(V::WIDTH) {
-                let [a, b, c, d] = row.points;
-                let at =
-                    [1 + a as usize + first, 1 + b as usize + first, 1 + c as usize + first, 1 + d as usize + first];
+            let mut first = 0;
+            while first < row.cells as usize {
+                let at = row.points.map(|point| 1 + point as usize + first);
                 let fades = row.fading.then_some(row.first as usize + first);
-                self.lanes::<V, L, VISCOUS>(at, row.cells as usize - first, fades, &mut power_w);
+                let left = row.cells as usize - first;
+                if left > V::Narrow::WIDTH {
+                    self.lanes::<V, L, VISCOUS>(at, left, fades, &mut power_w);
+                    first += V::WIDTH;
+                } else {
+                    self.lanes::<V::Narrow, L, VISCOUS>(at, left, fades, &mut power_w);
+                    first += V::Narrow::WIDTH;
+                }
             }
         }
         power_w

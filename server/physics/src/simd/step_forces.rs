@@ -1,9 +1,10 @@
 //! Sums over all nodes that judge a step (`integrate::stability`), in as many lanes on every instruction set: the same bits.
-use super::real::Vector;
-use bytemuck::cast_slice;
+use super::{
+    dispatch::{Available, Sweep, sweep},
+    real::Vector,
+    sweeps::{LANES, lanes, total},
+};
 use glam::DVec3;
-
-const LANES: usize = 8;
 
 /// Forces `f` (N) at three instants, the newest first, their external parts `e` (N), and `M⁻¹` (1/kg), zero on held axes.
 #[derive(Debug, Clone, Copy)]
@@ -15,11 +16,19 @@ pub(crate) struct StepForces<'a> {
 
 impl StepForces<'_> {
     /// `‖Δ²(f − e)‖²`, and `‖f‖²` at the two older instants, with `‖a‖² = aᵀ M⁻¹ a` (N²/kg).
+    pub(crate) fn sums(self) -> [f64; 3] {
+        sweep(Available::best(), self)
+    }
+}
+
+impl Sweep for StepForces<'_> {
+    type Found = [f64; 3];
+
     #[inline(always)]
-    pub(super) fn sums<V: Vector<Scalar = f64>>(&self) -> [f64; 3] {
-        let [f0, f1, f2] = self.total_n.map(|list| cast_slice::<DVec3, f64>(list).as_chunks::<LANES>());
-        let [e0, e1, e2] = self.external_n.map(|list| cast_slice::<DVec3, f64>(list).as_chunks::<LANES>());
-        let w = cast_slice::<DVec3, f64>(self.inverse_mass_per_kg).as_chunks::<LANES>();
+    fn run<V: Vector<Scalar = f64>>(self) -> [f64; 3] {
+        let [f0, f1, f2] = self.total_n.map(lanes);
+        let [e0, e1, e2] = self.external_n.map(lanes);
+        let w = lanes(self.inverse_mass_per_kg);
         let mut sums = [[V::of(0.0); LANES]; 3];
         for ((w, (f0, e0)), ((f1, e1), (f2, e2))) in
             w.0.iter().zip(f0.0.iter().zip(e0.0)).zip(f1.0.iter().zip(e1.0).zip(f2.0.iter().zip(e2.0)))
@@ -28,13 +37,7 @@ impl StepForces<'_> {
         }
         let [f, e] = [[f0.1, f1.1, f2.1], [e0.1, e1.1, e2.1]].map(|rest| rest.map(filled));
         add(&mut sums, &filled(w.1), [&f[0], &f[1], &f[2]], [&e[0], &e[1], &e[2]]);
-        sums.map(|vectors| {
-            let mut lanes = [0.0; LANES];
-            for (vector, lanes) in vectors.into_iter().zip(lanes.chunks_exact_mut(V::WIDTH)) {
-                vector.store(lanes);
-            }
-            lanes.iter().sum()
-        })
+        sums.map(total)
     }
 }
 
@@ -64,7 +67,7 @@ fn add<V: Vector<Scalar = f64>>(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::simd::{InstructionSet, dispatch};
+    use crate::simd::InstructionSet;
 
     /// Pseudo-random vectors, a number of nodes that fills no block.
     fn list(seed: u32) -> Vec<DVec3> {
@@ -91,12 +94,12 @@ mod tests {
                 *sum += (a * a).dot(*w);
             }
         }
-        let sums = forces.sums::<f64>();
+        let sums = forces.run::<f64>();
         for (sum, by_node) in sums.iter().zip(by_node) {
             assert!((sum - by_node).abs() < 1e-13 * by_node, "{sum} {by_node}");
         }
         for set in InstructionSet::available() {
-            assert_eq!(dispatch::step_force_sums(dispatch::Available::at_most(set), &forces), sums, "{set:?}");
+            assert_eq!(sweep(Available::at_most(set), forces), sums, "{set:?}");
         }
     }
 }

@@ -12,7 +12,7 @@ use std::arch::x86_64::*;
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
 macro_rules! vector {
-    ($name:ident, $register:ident, $scalar:ident, $width:expr,
+    ($name:ident, $narrow:ident, $register:ident, $scalar:ident, $width:expr,
      $add:ident, $sub:ident, $mul:ident, $div:ident, $sqrt:ident, $max:ident, $splat:ident, $load:ident, $store:ident,
      $edges:path) => {
         #[derive(Clone, Copy)]
@@ -52,6 +52,7 @@ macro_rules! vector {
 
         impl Vector for $name {
             type Scalar = $scalar;
+            type Narrow = $narrow;
             const WIDTH: usize = $width;
             #[inline(always)]
             fn load(source: &[$scalar]) -> Self {
@@ -85,6 +86,7 @@ macro_rules! vector {
 
 vector!(
     F32x4,
+    F32x4,
     __m128,
     f32,
     4,
@@ -100,6 +102,7 @@ vector!(
     edges_f32_sse
 );
 vector!(
+    F64x2,
     F64x2,
     __m128d,
     f64,
@@ -117,6 +120,7 @@ vector!(
 );
 vector!(
     F32x8,
+    F32x8,
     __m256,
     f32,
     8,
@@ -132,6 +136,7 @@ vector!(
     edges_f32_avx
 );
 vector!(
+    F64x4,
     F64x4,
     __m256d,
     f64,
@@ -149,6 +154,7 @@ vector!(
 );
 vector!(
     F32x16,
+    F32x8,
     __m512,
     f32,
     16,
@@ -165,6 +171,7 @@ vector!(
 );
 vector!(
     F64x8,
+    F64x4,
     __m512d,
     f64,
     8,
