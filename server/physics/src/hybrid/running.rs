@@ -96,7 +96,7 @@ impl RunningPatch {
             kernel,
             cut: CutCells::with_capacity(most_cells, most_points, &hybrid.materials, precision),
             share_kernel: ShareKernel::build(
-                (partition.shares(), partition.coarse().tets()),
+                partition.shares(),
                 hybrid.node_count(),
                 &hybrid.of_tet,
                 &hybrid.materials,

@@ -1,7 +1,8 @@
 //! The coarse tets of a hybrid body (`hybrid::share`, which is the oracle), in blocks of lanes: one tet a lane.
 //!
-//! A lane's nodes are its tet's ten first, then those that its cells reach into its neighbours for. The parts' moments are kept only where some lane of a block
-//! has one, part by part; a first node needs none, for they sum to zero. What wakes takes from a lane's moments and volumes, in place.
+//! A lane's nodes are its tet's ten and those that its cells reach into its neighbours for. The parts' moments are kept only where some lane of a block
+//! has one, part by part, so nodes that have moments of the same parts are given the same places ([`place_nodes`]); a first node needs none, for they sum to
+//! zero. What wakes takes from a lane's moments and volumes, in place.
 mod forces;
 
 use super::{
@@ -14,7 +15,7 @@ use super::{
 };
 use crate::{
     hybrid::{
-        composite::{NODES, PARTS},
+        composite::PARTS,
         fade::ShareFade,
         share::{self, Share},
     },
@@ -36,7 +37,7 @@ struct ShareBlock<T, const N: usize> {
     /// Entries of `places` and `moments` of every part.
     parts: [Range<usize>; PARTS],
     /// Place of each entry, from 1.
-    places: Vec<u8>,
+    places: Vec<u16>,
     /// `T_gi` (m²).
     moments: Vec<[[T; N]; 3]>,
     /// `1/V_g` (1/m³), 0 of an empty part.
@@ -68,7 +69,7 @@ struct Tables<T, const N: usize> {
     lane_of: Vec<(u32, u32)>,
     is_fading: Vec<bool>,
     /// Place, in its lane, of every node of a tet's share.
-    places_of: Vec<Vec<u8>>,
+    places_of: Vec<Vec<u16>>,
     edges: Vec<Lanes<T, N>>,
     rates: Vec<Lanes<T, N>>,
     forces: Vec<Lanes<T, N>>,
@@ -92,17 +93,11 @@ pub struct ShareKernel {
 }
 
 impl ShareKernel {
-    /// Lays out shares of tets whose own nodes are `tets`; `of_tet` indexes `materials`.
-    pub fn build(
-        (shares, tets): (&[Share], &[[u32; NODES]]),
-        nodes: usize,
-        of_tet: &[u16],
-        materials: &[Material],
-        precision: Precision,
-    ) -> Self {
+    /// Lays out shares of tets; `of_tet` indexes `materials`.
+    pub fn build(shares: &[Share], nodes: usize, of_tet: &[u16], materials: &[Material], precision: Precision) -> Self {
         let layout = match precision {
-            Precision::Single => Layout::Single(Tables::build(shares, tets, nodes, of_tet, materials)),
-            Precision::Double => Layout::Double(Tables::build(shares, tets, nodes, of_tet, materials)),
+            Precision::Single => Layout::Single(Tables::build(shares, nodes, of_tet, materials)),
+            Precision::Double => Layout::Double(Tables::build(shares, nodes, of_tet, materials)),
         };
         let is_viscous = materials.iter().any(|m| !m.viscosity.is_zero());
         // One spare node more, for the lanes of padding.
@@ -161,12 +156,11 @@ impl ShareKernel {
 }
 
 impl<T: Scalar, const N: usize> Tables<T, N> {
-    fn build(shares: &[Share], tets: &[[u32; NODES]], nodes: usize, of_tet: &[u16], materials: &[Material]) -> Self {
+    fn build(shares: &[Share], nodes: usize, of_tet: &[u16], materials: &[Material]) -> Self {
         let is_viscous = materials.iter().any(|m| !m.viscosity.is_zero());
         // Tets that reach for as many nodes share a block; one that holds nothing of the body needs no lane.
         let mut order: Vec<usize> = (0..shares.len()).filter(|&tet| !shares[tet].nodes.is_empty()).collect();
-        let extra = |tet: usize| shares[tet].nodes.iter().filter(|node| !tets[tet].contains(node)).count();
-        order.sort_by_key(|&tet| (of_tet[tet], extra(tet), tet));
+        order.sort_by_key(|&tet| (of_tet[tet], shares[tet].nodes.len(), tet));
         let mut built = Self {
             blocks: Vec::new(),
             runs: Vec::new(),
@@ -180,7 +174,7 @@ impl<T: Scalar, const N: usize> Tables<T, N> {
         for same in order.chunk_by(|&a, &b| of_tet[a] == of_tet[b]) {
             let first = built.blocks.len();
             for lanes in same.chunks(N) {
-                built.push_block(lanes, shares, tets, nodes as u32);
+                built.push_block(lanes, shares, nodes as u32);
             }
             let material = &materials[of_tet[same[0]] as usize];
             let (of_shape, of_volume) = share::split(material);
@@ -202,27 +196,16 @@ impl<T: Scalar, const N: usize> Tables<T, N> {
         built
     }
 
-    fn push_block(&mut self, tets_of_lanes: &[usize], shares: &[Share], tets: &[[u32; NODES]], spare: u32) {
+    fn push_block(&mut self, tets_of_lanes: &[usize], shares: &[Share], spare: u32) {
         let zero = T::of(0.0);
         let mut nodes: Vec<[u32; N]> = Vec::new();
-        let mut has_moment = vec![[false; PARTS]; usize::from(u8::MAX)];
+        let mut parts_of_place: Vec<u8> = Vec::new();
         for (lane, &tet) in tets_of_lanes.iter().enumerate() {
-            let share = &shares[tet];
-            let others = share.nodes.iter().copied().filter(|node| !tets[tet].contains(node));
-            let of_lane: Vec<u32> = tets[tet].iter().copied().chain(others).collect();
-            if nodes.len() < of_lane.len() {
-                nodes.resize(of_lane.len(), [spare; N]);
-            }
-            for (place, &node) in of_lane.iter().enumerate() {
-                nodes[place][lane] = node;
-            }
-            let place_of = |node: &u32| of_lane.iter().position(|n| n == node).unwrap_or(0) as u8;
-            self.places_of[tet] = share.nodes.iter().map(place_of).collect();
             self.lane_of[tet] = (self.blocks.len() as u32, lane as u32);
-            for (&place, moments) in self.places_of[tet].iter().zip(&share.moments_m2) {
-                for (part, moment) in moments.iter().enumerate() {
-                    has_moment[place as usize][part] |= *moment != DVec3::ZERO;
-                }
+            self.places_of[tet] = place_nodes(&shares[tet], &mut parts_of_place);
+            nodes.resize(parts_of_place.len(), [spare; N]);
+            for (&place, &node) in self.places_of[tet].iter().zip(&shares[tet].nodes) {
+                nodes[place as usize][lane] = node;
             }
         }
         // The first node is gathered with groups of three others.
@@ -238,7 +221,8 @@ impl<T: Scalar, const N: usize> Tables<T, N> {
         let mut places = Vec::new();
         let parts = std::array::from_fn(|part| {
             let first = places.len();
-            places.extend((1..nodes.len().min(has_moment.len())).filter(|&p| has_moment[p][part]).map(|p| p as u8));
+            let has_moment = |place: &usize| parts_of_place[*place] & (1 << part) != 0;
+            places.extend((1..parts_of_place.len()).filter(has_moment).map(|place| place as u16));
             first..places.len()
         });
         self.blocks.push(ShareBlock {
@@ -273,6 +257,8 @@ impl<T: Scalar, const N: usize> Tables<T, N> {
                     for axis in 0..3 {
                         block.moments[of_part.start + entry][axis][lane] = T::of(moment[axis]);
                     }
+                } else {
+                    debug_assert!(place == 0 || *moment == DVec3::ZERO, "a moment that the tet had not");
                 }
             }
         }
@@ -315,6 +301,33 @@ impl<T: Scalar, const N: usize> Tables<T, N> {
     }
 }
 
+/// A place for every node of a share, among those of a block whose moments are of the parts `parts_of_place`, a bit each, which grow by what the share has. The
+/// node with moments of most parts is the first. Any other goes where the fewest parts have to be added, of such places where the fewest are without use.
+fn place_nodes(share: &Share, parts_of_place: &mut Vec<u8>) -> Vec<u16> {
+    let parts_of = |moments: &[DVec3; PARTS]| {
+        moments.iter().enumerate().fold(0_u8, |parts, (part, moment)| parts | u8::from(*moment != DVec3::ZERO) << part)
+    };
+    let of_node: Vec<u8> = share.moments_m2.iter().map(parts_of).collect();
+    let mut order: Vec<usize> = (0..of_node.len()).collect();
+    order.sort_by_key(|&number| (std::cmp::Reverse(of_node[number].count_ones()), number));
+    let mut places = vec![0; of_node.len()];
+    let mut is_taken = vec![false; parts_of_place.len().max(of_node.len())];
+    parts_of_place.resize(is_taken.len(), 0);
+    for (at, &number) in order.iter().enumerate() {
+        let parts = of_node[number];
+        let cost = |&place: &usize| {
+            let there = parts_of_place[place];
+            ((parts & !there).count_ones(), (there & !parts).count_ones(), place)
+        };
+        let free = (1..is_taken.len()).filter(|&place| !is_taken[place]);
+        let place = if at == 0 { 0 } else { free.min_by_key(cost).unwrap_or(0) };
+        is_taken[place] = true;
+        parts_of_place[place] |= parts;
+        places[number] = place as u16;
+    }
+    places
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -342,8 +355,7 @@ mod tests {
                 let largest = expected.iter().map(|f| f.length()).fold(0.0, f64::max);
                 for (precision, bound) in [(Precision::Double, 1e-11), (Precision::Single, 3e-5)] {
                     let run = |set| {
-                        let of = (partition.shares(), partition.coarse().tets());
-                        let mut kernel = ShareKernel::build(of, nodes, &of_tet, &materials, precision);
+                        let mut kernel = ShareKernel::build(partition.shares(), nodes, &of_tet, &materials, precision);
                         kernel = kernel.with_instruction_set(set);
                         shares.iter().enumerate().for_each(|(tet, share)| kernel.put(tet, share));
                         let mut forces = vec![DVec3::ZERO; nodes];
