@@ -99,7 +99,7 @@ impl ForceKernel {
             nodes: mesh.positions_m().len(),
             is_viscous: materials.iter().any(|m| !m.viscosity.is_zero()),
             every_viscosity: false,
-            instruction_set: Available::at_most(InstructionSet::best()),
+            instruction_set: Available::best(),
         }
     }
 

@@ -107,7 +107,7 @@ impl RowKernel {
             Precision::Double => Layout::Double(of_materials(materials, edge_m, handed)),
         };
         let is_viscous = materials.iter().any(|m| !m.viscosity.is_zero());
-        Self { layout, is_viscous, instruction_set: Available::at_most(InstructionSet::best()) }
+        Self { layout, is_viscous, instruction_set: Available::best() }
     }
 
     /// The same kernel, held to an instruction set or the best below it that there is (for tests and benchmarks).

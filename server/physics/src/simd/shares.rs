@@ -104,7 +104,7 @@ impl ShareKernel {
         let count = nodes + 1;
         Self {
             layout,
-            instruction_set: Available::at_most(InstructionSet::best()),
+            instruction_set: Available::best(),
             displacements: vec![Node::default(); count],
             velocities: vec![Node::default(); if is_viscous { count } else { 0 }],
             sums: vec![Sum::default(); count],
