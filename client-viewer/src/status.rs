@@ -16,13 +16,14 @@ pub async fn run(server: &Server, as_json: bool) -> Result<(), ViewError> {
 
 /// The status for people.
 pub fn to_text(status: &StatusResponse) -> String {
-    let mut text = table(&facts(status));
-    text.push_str("\n\n");
-    text.push_str(&table(&timings(status)));
+    let mut text = String::new();
     if !status.quarantine.is_empty() {
         // Writing into a String cannot fail.
-        let _ = write!(text, "\n\nQUARANTINED: {}", status.quarantine);
+        let _ = write!(text, "QUARANTINED: {}\n\n", status.quarantine);
     }
+    text.push_str(&table(&facts(status)));
+    text.push_str("\n\n");
+    text.push_str(&table(&timings(status)));
     text
 }
 

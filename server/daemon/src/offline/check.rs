@@ -1,11 +1,12 @@
 //! `palpated check`: what a scene's body is like, and what a tick costs on this machine.
-use super::{load, simulate::Run, summary::TimeNumbers};
+use super::{
+    cost::{self, Cost},
+    load,
+    summary::Percentiles,
+};
 use palpate_physics::{Model, hybrid::Waking, material::Law, seed::region::Region};
 use palpate_scene::{Scene, builtin_names, wording::counted};
-use std::{
-    process::ExitCode,
-    time::{Duration, Instant},
-};
+use std::process::ExitCode;
 
 /// Flags of `palpated check`.
 #[derive(Debug, Clone, clap::Args)]
@@ -39,35 +40,14 @@ pub fn run(args: &CheckArgs) -> miette::Result<ExitCode> {
     print_particles(&model);
     print_seed(&model);
     print_contents(&scene);
-    for warning in &scene.warnings {
+    let warnings = [scene.warnings.clone(), particle_warnings(&model)].concat();
+    for warning in &warnings {
         println!("warning: {warning}");
     }
-    // What counts is a tick that is computed, not one that is slept through.
-    let cost = if scene.model.settings.sleep_tolerance_m > 0.0 {
-        let mut awake = scene.clone();
-        awake.model.settings.sleep_tolerance_m = 0.0;
-        measure(&awake, &load::build(&awake)?)?
-    } else {
-        measure(&scene, &model)?
-    };
-    print_time(&model, &cost);
+    print_time(&model, &cost::measure(&scene, &model)?);
     print_memory();
-    let failed = args.strict && !scene.warnings.is_empty();
+    let failed = args.strict && !warnings.is_empty();
     Ok(if failed { ExitCode::FAILURE } else { ExitCode::SUCCESS })
-}
-
-/// Runs the scene for up to half a second of wall time, or its own duration.
-fn measure(scene: &Scene, model: &Model) -> miette::Result<TimeNumbers> {
-    const BUDGET: Duration = Duration::from_millis(500);
-    let mut run = Run::new(scene, model)?;
-    let started = Instant::now();
-    loop {
-        run.tick();
-        run.refuse_quarantined()?;
-        if started.elapsed() > BUDGET || run.state.time_s(model) >= scene.output.duration_s {
-            return Ok(run.cost());
-        }
-    }
 }
 
 fn print_body(scene: &Scene) {
@@ -131,6 +111,43 @@ fn print_particles(model: &Model) {
         short(cage.moved_m * 1e3),
         cage.outside
     );
+    println!(
+        "           coarse level of {}; {:.0} % of the volume is in whole cells, the surface cuts the others",
+        counted(hybrid.node_count(), "node"),
+        100.0 * hybrid.partition().whole_part()
+    );
+}
+
+/// What one would want to change, of a hybrid body.
+fn particle_warnings(model: &Model) -> Vec<String> {
+    /// Of the volume in whole cells: less is a lattice that hardly sees the body.
+    const FEW_WHOLE: f64 = 0.2;
+    /// Of the particles outside the coarse tets.
+    const MANY_OUTSIDE: f64 = 0.1;
+    let (Some(hybrid), Some(spec)) = (model.hybrid(), &model.spec().particles) else { return Vec::new() };
+    let partition = hybrid.partition();
+    let mut warnings = Vec::new();
+    if partition.whole_part() < FEW_WHOLE {
+        warnings.push(format!(
+            "only {:.0} % of the volume is in whole cells: particles {} mm apart are coarse for this body; lower body.particles.spacing_mm",
+            100.0 * partition.whole_part(),
+            short(spec.spacing_m * 1e3)
+        ));
+    }
+    let outside = hybrid.cage().outside;
+    if outside as f64 > MANY_OUTSIDE * partition.particle_count() as f64 {
+        warnings.push(format!(
+            "{outside} of {} particles are outside the coarse tets and never wake: where they are, the body answers as coarsely as its tets; ask for more tets",
+            partition.particle_count()
+        ));
+    }
+    if spec.fine_depth_m.is_some() && !partition.cells().iter().any(|cell| cell.doubled) {
+        warnings.push(
+            "body.particles.fine_depth_mm: no cell is of twice the spacing, the body is too thin for any deeper down; leave the key out"
+                .to_owned(),
+        );
+    }
+    warnings
 }
 
 /// Of the papers' hybrid.
@@ -158,30 +175,49 @@ fn print_seed(model: &Model) {
     }
 }
 
-fn print_time(model: &Model, cost: &TimeNumbers) {
-    let period_us = cost.tick_period_s * 1e6;
+fn print_time(model: &Model, cost: &Cost) {
+    let period_us = cost.all.tick_period_s * 1e6;
     println!(
         "time       tick {} ms, {}; highest natural frequency {} Hz",
         short(period_us * 1e-3),
-        counted(cost.substeps_per_tick as usize, "substep"),
+        counted(cost.all.substeps_per_tick as usize, "substep"),
         short(model.max_natural_frequency_rad_per_s() / std::f64::consts::TAU)
     );
-    let us = cost.tick_wall_us;
-    let build = if cfg!(debug_assertions) { ", in an UNOPTIMISED build" } else { "" };
+    let line = |us: &Percentiles, ticks: u64, with: &str| {
+        let build = if cfg!(debug_assertions) { ", in an UNOPTIMISED build" } else { "" };
+        let ticks = counted(ticks as usize, "tick");
+        println!("           a tick{with} costs {:.1} us here (p99 {:.1} us over {ticks}{build})", us.p50, us.p99);
+    };
+    line(&cost.all.tick_wall_us, cost.all.ticks, "");
+    let deciding = cost.awake.as_ref().map_or(&cost.all.tick_wall_us, |awake| &awake.tick_wall_us);
+    if let Some(awake) = &cost.awake {
+        let how = if awake.untouched { ", nothing touching them," } else { "" };
+        line(&awake.tick_wall_us, awake.ticks, &format!(" with up to {} particles awake{how}", awake.most));
+    }
     println!(
-        "           a tick costs {:.1} us here (p99 {:.1} us over {}{build})",
-        us.p50,
-        us.p99,
-        counted(cost.ticks as usize, "tick")
+        "           {:.1} % of the tick: {}",
+        100.0 * deciding.p50 / period_us,
+        verdict(deciding, period_us, cost)
     );
-    let verdict = if us.p50 > 0.8 * period_us {
-        "does NOT fit: coarsen the mesh or lengthen tick_period_s"
+}
+
+fn verdict(us: &Percentiles, period_us: f64, cost: &Cost) -> &'static str {
+    let awake = cost.awake.is_some();
+    if us.p50 > 0.8 * period_us {
+        if awake {
+            "does NOT fit: lower most_active, or raise spacing_m or tick_period_s"
+        } else {
+            "does NOT fit: coarsen the mesh or lengthen tick_period_s"
+        }
     } else if us.p99 > period_us {
-        "fits, but other work on this machine held up more than one tick in a hundred"
+        if awake {
+            "fits, but for more than one tick in a hundred: particles switched in them, or other work held this machine up"
+        } else {
+            "fits, but other work on this machine held up more than one tick in a hundred"
+        }
     } else {
         "fits"
-    };
-    println!("           {:.1} % of the tick: {verdict}", 100.0 * us.p50 / period_us);
+    }
 }
 
 /// What this process holds of the machine's memory, the body and its buffers being most of it.

@@ -2,6 +2,7 @@
 //! physics as `serve`; nothing in them is random, so equal scenes give equal results, bit for bit.
 mod args;
 pub mod check;
+mod cost;
 pub mod equilibrium;
 mod folder;
 mod frames;

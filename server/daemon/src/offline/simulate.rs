@@ -12,7 +12,7 @@ use crate::progress::Progress;
 use glam::DVec3;
 use hdrhistogram::Histogram;
 use miette::IntoDiagnostic;
-use palpate_physics::{Model, Scratch, State, TickInput, contact::ToolTarget, step};
+use palpate_physics::{Model, Scratch, State, TickInput, contact::ToolTarget, hybrid::wake_only, step};
 use palpate_scene::Scene;
 use std::{process::ExitCode, time::Instant};
 
@@ -152,6 +152,9 @@ pub(super) struct Run<'s> {
     load_factors: Vec<f64>,
     prescribed_m: Vec<DVec3>,
     tick_wall_ns: Histogram<u64>,
+    /// The same of ticks with particles awake.
+    awake_wall_ns: Histogram<u64>,
+    most_awake: usize,
     repeated_ticks: u64,
     asleep_ticks: u64,
 }
@@ -168,6 +171,8 @@ impl<'s> Run<'s> {
             load_factors: vec![0.0; scene.model.loads.len()],
             prescribed_m: vec![DVec3::ZERO; scene.model.prescribed.len()],
             tick_wall_ns: Histogram::new_with_bounds(1, LONGEST_TICK_NS, 3).into_diagnostic()?,
+            awake_wall_ns: Histogram::new_with_bounds(1, LONGEST_TICK_NS, 3).into_diagnostic()?,
+            most_awake: 0,
             repeated_ticks: 0,
             asleep_ticks: 0,
         })
@@ -238,12 +243,22 @@ impl<'s> Run<'s> {
         let report = step(self.model, &mut self.state, &mut self.scratch, &input);
         self.repeated_ticks += u64::from(report.repeated > 0);
         self.asleep_ticks += u64::from(report.substeps == 0 && self.state.sleep.asleep);
-        self.tick_wall_ns.saturating_record(started.elapsed().as_nanos() as u64);
+        let wall_ns = started.elapsed().as_nanos() as u64;
+        self.tick_wall_ns.saturating_record(wall_ns);
+        let awake = self.state.awake_particles();
+        if awake > 0 {
+            self.awake_wall_ns.saturating_record(wall_ns);
+            self.most_awake = self.most_awake.max(awake);
+        }
+    }
+
+    /// Wakes these particles and no others.
+    pub(super) fn wake_only(&mut self, particles: impl IntoIterator<Item = u32>) {
+        wake_only(self.model, &mut self.state, &mut self.scratch, particles);
     }
 
     /// What the ticks cost.
     pub(super) fn cost(&self) -> TimeNumbers {
-        let us = |ns: u64| ns as f64 * 1e-3;
         let wall = &self.tick_wall_ns;
         let period_s = self.model.spec().settings.tick_period_s;
         TimeNumbers {
@@ -252,14 +267,24 @@ impl<'s> Run<'s> {
             substeps_per_tick: self.model.substeps(),
             repeated_ticks: self.repeated_ticks,
             asleep_ticks: self.asleep_ticks,
-            tick_wall_us: Percentiles {
-                mean: wall.mean() * 1e-3,
-                p50: us(wall.value_at_quantile(0.5)),
-                p99: us(wall.value_at_quantile(0.99)),
-                max: us(wall.max()),
-            },
+            tick_wall_us: percentiles_us(wall),
             real_time_factor: if wall.is_empty() { 0.0 } else { period_s * 1e9 / wall.mean() },
         }
+    }
+
+    /// What those with particles awake cost, how many they were, and how many particles were awake at most.
+    pub(super) fn cost_awake(&self) -> (Percentiles, u64, usize) {
+        (percentiles_us(&self.awake_wall_ns), self.awake_wall_ns.len(), self.most_awake)
+    }
+}
+
+fn percentiles_us(wall_ns: &Histogram<u64>) -> Percentiles {
+    let us = |ns: u64| ns as f64 * 1e-3;
+    Percentiles {
+        mean: wall_ns.mean() * 1e-3,
+        p50: us(wall_ns.value_at_quantile(0.5)),
+        p99: us(wall_ns.value_at_quantile(0.99)),
+        max: us(wall_ns.max()),
     }
 }
 

@@ -19,7 +19,7 @@ pub(crate) const CLUSTER: usize = 32;
 /// Triangles per group of clusters, on the skin of a hybrid body.
 pub(crate) const GROUP: usize = 32 * CLUSTER;
 /// Rounding of the travel sums is far below this (m).
-const ROUNDING_M: f64 = 1e-12;
+pub(crate) const ROUNDING_M: f64 = 1e-12;
 
 /// The boundary's triangles in the order of the broad phase.
 #[derive(Debug, Clone, Default)]
@@ -32,7 +32,7 @@ pub(super) struct Triangles {
 
 /// Box of a cluster at the time it was fitted.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct ClusterBox {
+pub(crate) struct ClusterBox {
     lo: DVec3,
     hi: DVec3,
     /// Travel `τ` when fitted; −∞: never.
@@ -43,8 +43,13 @@ impl ClusterBox {
     pub(super) const UNFITTED: Self = Self { lo: DVec3::ZERO, hi: DVec3::ZERO, fitted_at_m: f64::NEG_INFINITY };
 
     /// Lower bound of the distance (m) from `p` to the cluster's triangles when the travel is `travel_m`.
-    fn distance_bound_m(&self, p: DVec3, travel_m: f64) -> f64 {
+    pub(crate) fn distance_bound_m(&self, p: DVec3, travel_m: f64) -> f64 {
         box_distance_m(p, self.lo, self.hi) - (travel_m - self.fitted_at_m)
+    }
+
+    fn around(points: impl Iterator<Item = DVec3>, travel_m: f64) -> Self {
+        let none = Self { lo: DVec3::INFINITY, hi: DVec3::NEG_INFINITY, fitted_at_m: travel_m };
+        points.fold(none, |fitted, p| Self { lo: fitted.lo.min(p), hi: fitted.hi.max(p), ..fitted })
     }
 }
 
@@ -129,14 +134,8 @@ impl Triangles {
     }
 
     fn fit(&self, cluster: usize, x: &[DVec3], travel_m: f64) -> ClusterBox {
-        let mut fitted = ClusterBox { lo: DVec3::INFINITY, hi: DVec3::NEG_INFINITY, fitted_at_m: travel_m };
-        for nodes in &self.nodes[self.cluster_range(cluster)] {
-            for &node in nodes {
-                fitted.lo = fitted.lo.min(x[node as usize]);
-                fitted.hi = fitted.hi.max(x[node as usize]);
-            }
-        }
-        fitted
+        let nodes = self.nodes[self.cluster_range(cluster)].iter().flatten();
+        ClusterBox::around(nodes.map(|&node| x[node as usize]), travel_m)
     }
 
     /// Lists the triangles within `reach_m` of `centre`, and sets the slack: how much further away than `inner_m` all
@@ -172,10 +171,12 @@ impl Triangles {
         candidates.slack_m = others_m - inner_m - ROUNDING_M;
     }
 
-    /// [`Self::query`] on the skin of a hybrid body, whose positions are not at hand.
+    /// [`Self::query`] on the skin of a hybrid body, whose positions are not at hand: bounds that need none rule clusters out first. Of those looked at,
+    /// positions (m) are put into `x`.
     pub(super) fn query_skin(
         &self,
-        skin: &mut SkinView<'_>,
+        (skin, x): (&mut SkinView<'_>, &mut [DVec3]),
+        (boxes, travel_m): (&mut [ClusterBox], f64),
         centre: DVec3,
         (reach_m, inner_m): (f64, f64),
         candidates: &mut Candidates,
@@ -191,14 +192,23 @@ impl Triangles {
                 continue;
             }
             for cluster in (group..end).step_by(CLUSTER) {
-                let bound_m = skin.cluster_distance_m(cluster / CLUSTER, centre);
+                let cluster = cluster / CLUSTER;
+                let fitted = &mut boxes[cluster];
+                let mut bound_m = fitted.distance_bound_m(centre, travel_m);
+                if bound_m < reach_m {
+                    bound_m = bound_m.max(skin.cluster_distance_m(cluster, centre));
+                }
+                if bound_m < reach_m {
+                    skin.vertices(cluster).iter().for_each(|&vertex| x[vertex as usize] = skin.position_m(vertex));
+                    *fitted = self.fit(cluster, x, travel_m);
+                    bound_m = fitted.distance_bound_m(centre, travel_m);
+                }
                 if bound_m >= reach_m {
                     others_m = others_m.min(bound_m);
                     continue;
                 }
-                for triangle in self.cluster_range(cluster / CLUSTER) {
-                    let corners = self.nodes[triangle].map(|node| skin.position_m(node));
-                    let distance_m = centre.distance(closest_point(centre, corners));
+                for triangle in self.cluster_range(cluster) {
+                    let distance_m = centre.distance(closest_point(centre, self.corners(triangle, x)));
                     if distance_m >= reach_m {
                         others_m = others_m.min(distance_m);
                     } else {

@@ -260,22 +260,24 @@ impl ContactModel {
         }
     }
 
-    /// The second part, on the skin of a hybrid body: lists anew where a list is out of date. Whether any was.
+    /// The second part, on the skin of a hybrid body: lists anew where a list is out of date. Whether any was. `x` has room for positions (m) of all vertices.
     pub(crate) fn list_on_skin(
         &self,
-        skin: &mut SkinView<'_>,
+        (skin, x): (&mut SkinView<'_>, &mut [DVec3]),
         tools: &[ToolState],
         contact: &mut ContactState,
         scratch: &ContactScratch,
     ) -> bool {
         let mut renewed = false;
         for (index, tool) in tools.iter().enumerate() {
-            let candidates = &mut contact.split(index).0.candidates;
+            let (part, boxes, travel_m) = contact.split(index);
+            let candidates = &mut part.candidates;
             if scratch.exhaustive {
                 renewed |= candidates.triangles().len() != self.triangles.len();
                 self.triangles.list_all(candidates);
             } else if candidates.slack_m <= 0.0 {
-                self.triangles.query_skin(skin, tool.centre_m, self.reach_m(index), candidates);
+                let reach_m = self.reach_m(index);
+                self.triangles.query_skin((skin, x), (boxes, travel_m), tool.centre_m, reach_m, candidates);
                 renewed = true;
             }
         }

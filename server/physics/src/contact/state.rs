@@ -144,6 +144,11 @@ impl ContactState {
         self.tools.iter().flat_map(|tool| tool.candidates.triangles().iter().copied())
     }
 
+    /// The boxes as they were fitted, and the travel (m); of use while nothing but what is told to [`Self::travelled`] moved the surface.
+    pub(crate) fn boxes(&self) -> (&[ClusterBox], f64) {
+        (&self.boxes, self.travel_m)
+    }
+
     /// One tool's part, and the boxes with the travel.
     pub(super) fn split(&mut self, tool: usize) -> (&mut ToolContact, &mut [ClusterBox], f64) {
         (&mut self.tools[tool], &mut self.boxes, self.travel_m)

@@ -5,16 +5,19 @@
 //! ```text
 //! x = X + Σ_i w_i u_i + Σ_p w_p d_p,   Σ w_i = 1, Σ |w_i| ≤ a:   x − X ∈ ū ± (a ½(u_max − u_min) + a max |d_p|),   ū = ½(u_min + u_max)
 //! ```
+//! The last term is there where active particles carry vertices alone.
 use super::body::Hybrid;
 use crate::contact::broad::{CLUSTER, GROUP, box_distance_m};
 use glam::DVec3;
-use std::ops::Range;
+use std::{collections::BTreeSet, ops::Range};
 
 /// Boxes at rest of clusters, and of groups of them, with the coarse nodes that they follow.
 #[derive(Debug, Clone, Default)]
 pub struct SkinClusters {
     clusters: Boxes,
     groups: Boxes,
+    /// Particles with the clusters whose vertices they carry, ascending.
+    carried: Vec<[u32; 2]>,
 }
 
 #[derive(Debug, Clone, Default)]
@@ -39,7 +42,34 @@ impl SkinClusters {
             }
             boxes
         };
-        Self { clusters: boxes(CLUSTER), groups: boxes(GROUP) }
+        let (clusters, groups) = (boxes(CLUSTER), boxes(GROUP));
+        let mut carried: Vec<[u32; 2]> = Vec::new();
+        for (cluster, ends) in (0..).zip(clusters.first_vertex.windows(2)) {
+            let mut of_cluster = BTreeSet::new();
+            for &vertex in &clusters.vertices[ends[0] as usize..ends[1] as usize] {
+                let place = hybrid.place(vertex);
+                let particles = hybrid.partition().corners(place.cell as usize);
+                let weighty = particles.into_iter().zip(place.weights(hybrid.partition())).filter(|(_, w)| *w != 0.0);
+                of_cluster.extend(weighty.map(|(particle, _)| [particle, cluster]));
+            }
+            carried.extend(of_cluster);
+        }
+        carried.sort_unstable();
+        Self { clusters, groups, carried }
+    }
+
+    /// Number of clusters.
+    pub(super) fn clusters(&self) -> usize {
+        self.clusters.low_m.len()
+    }
+
+    /// The clusters some of whose vertices a particle carries.
+    pub(super) fn carried_by(&self, particle: u32) -> impl Iterator<Item = usize> + '_ {
+        let first = self.carried.partition_point(|carried| carried[0] < particle);
+        self.carried[first..]
+            .iter()
+            .take_while(move |carried| carried[0] == particle)
+            .map(|carried| carried[1] as usize)
     }
 
     /// Number of groups.
@@ -51,6 +81,11 @@ impl SkinClusters {
     pub(super) fn of_group(&self, group: usize) -> Range<usize> {
         let in_group = GROUP / CLUSTER;
         group * in_group..((group + 1) * in_group).min(self.clusters.low_m.len())
+    }
+
+    /// The group of a cluster.
+    pub(super) fn group_of(cluster: usize) -> usize {
+        cluster / (GROUP / CLUSTER)
     }
 
     /// The vertices of a cluster.
@@ -75,7 +110,7 @@ impl SkinClusters {
 pub(super) struct Displaced<'a> {
     /// Of the coarse nodes (m).
     pub(super) displacements_m: &'a [DVec3],
-    /// `max |d_p|` (m).
+    /// `max |d_p|` (m), 0 of clusters whose vertices no active particle carries.
     pub(super) deviation_m: f64,
     /// `a`.
     pub(super) amplification: f64,

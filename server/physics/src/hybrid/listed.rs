@@ -1,6 +1,9 @@
 //! The skin's vertices that something acts on, and where any other is when asked.
 use super::{body::Hybrid, clusters::Displaced, composite::Anchor, partition::NONE, running::RunningPatch};
-use crate::world::State;
+use crate::{
+    contact::broad::{ClusterBox, ROUNDING_M},
+    world::State,
+};
 use glam::DVec3;
 
 /// Vertices of the skin whose positions are kept up to date, because tools or loads are at them.
@@ -94,6 +97,11 @@ impl ListedSkin {
         self.listed.push(listed);
     }
 
+    /// Nothing more is listed. Vertices go in their order, so that sums have the same bits whenever and wherefore they were listed.
+    pub(crate) fn finish(&mut self) {
+        self.listed.sort_unstable_by_key(|listed| listed.vertex);
+    }
+
     /// Positions and no forces at the listed vertices, where the patch was displaced to.
     pub(crate) fn refresh(&mut self, patch: &RunningPatch) {
         for listed in &self.listed {
@@ -143,46 +151,71 @@ impl<'a> SkinView<'a> {
         self.deviation_m = self.patch.deviation_m();
     }
 
-    fn displaced(&self) -> Displaced<'_> {
+    fn displaced(&self, by_particles: bool) -> Displaced<'_> {
         Displaced {
             displacements_m: self.patch.node_displacements_m(),
-            deviation_m: self.deviation_m,
+            deviation_m: if by_particles { self.deviation_m } else { 0.0 },
             amplification: self.hybrid.amplification,
         }
     }
 
+    /// The vertices of a cluster of contact's broad phase.
+    pub(crate) fn vertices(&self, cluster: usize) -> &'a [u32] {
+        self.hybrid.clusters.vertices(cluster)
+    }
+
     /// Lower bound (m) of the distance from a point to the triangles of a group.
     pub(crate) fn group_distance_m(&self, group: usize, from_m: DVec3) -> f64 {
-        self.hybrid.clusters.group_distance_m(group, from_m, &self.displaced())
+        self.hybrid.clusters.group_distance_m(group, from_m, &self.displaced(self.patch.carries_of_group(group)))
     }
 
     /// The same of a cluster.
     pub(crate) fn cluster_distance_m(&self, cluster: usize, from_m: DVec3) -> f64 {
-        self.hybrid.clusters.cluster_distance_m(cluster, from_m, &self.displaced())
+        let displaced = self.displaced(self.patch.carries_of_cluster(cluster));
+        self.hybrid.clusters.cluster_distance_m(cluster, from_m, &displaced)
     }
 
-    /// The vertex nearest to a point, if one is within a distance (m): its rest position (m), and how far it is (m).
-    pub(super) fn nearest(&self, from_m: DVec3, within_m: f64) -> Option<(DVec3, f64)> {
-        let displaced = Displaced { deviation_m: self.patch.deviation_m(), ..self.displaced() };
+    /// The vertex nearest to a point, if one is within a distance (m): its rest position (m), and how far it is (m). Of several as near, the first one.
+    /// `fitted` are contact's boxes and its travel (m), where they are of use.
+    pub(super) fn nearest(
+        &mut self,
+        from_m: DVec3,
+        within_m: f64,
+        fitted: Option<(&[ClusterBox], f64)>,
+    ) -> Option<(DVec3, f64)> {
+        self.begin();
+        let bound_m = |cluster: usize| {
+            let of_fitted_m = fitted.map_or(0.0, |(boxes, travel_m)| boxes[cluster].distance_bound_m(from_m, travel_m));
+            self.cluster_distance_m(cluster, from_m).max(of_fitted_m)
+        };
+        let mut found = (within_m, NONE);
+        // What comes first should be near: it rules out most of the others.
+        let near = |group: &usize| self.group_distance_m(*group, from_m) <= within_m;
         let clusters = &self.hybrid.clusters;
-        let (mut nearest, mut nearest_m) = (None, within_m);
+        let all = (0..clusters.groups()).filter(near).flat_map(|group| clusters.of_group(group));
+        let first = all.map(|cluster| (bound_m(cluster), cluster)).min_by(|a, b| a.0.total_cmp(&b.0))?.1;
+        self.look_at(first, from_m, &mut found);
         for group in 0..clusters.groups() {
-            if clusters.group_distance_m(group, from_m, &displaced) >= nearest_m {
+            if self.group_distance_m(group, from_m) > found.0 + ROUNDING_M {
                 continue;
             }
             for cluster in clusters.of_group(group) {
-                if clusters.cluster_distance_m(cluster, from_m, &displaced) >= nearest_m {
-                    continue;
-                }
-                for &vertex in clusters.vertices(cluster) {
-                    let distance_m = self.position_m(vertex).distance(from_m);
-                    if distance_m < nearest_m {
-                        (nearest, nearest_m) = (Some(self.rest_positions_m[vertex as usize]), distance_m);
-                    }
+                if cluster != first && bound_m(cluster) <= found.0 + ROUNDING_M {
+                    self.look_at(cluster, from_m, &mut found);
                 }
             }
         }
-        nearest.map(|rest_m| (rest_m, nearest_m))
+        let (nearest_m, vertex) = found;
+        (vertex != NONE).then(|| (self.rest_positions_m[vertex as usize], nearest_m))
+    }
+
+    fn look_at(&self, cluster: usize, from_m: DVec3, (nearest_m, nearest): &mut (f64, u32)) {
+        for &vertex in self.vertices(cluster) {
+            let distance_m = self.position_m(vertex).distance(from_m);
+            if distance_m < *nearest_m || (distance_m == *nearest_m && vertex < *nearest && *nearest != NONE) {
+                (*nearest_m, *nearest) = (distance_m, vertex);
+            }
+        }
     }
 
     /// Where a vertex is (m).

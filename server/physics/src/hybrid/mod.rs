@@ -46,5 +46,5 @@ pub(crate) use active::HybridScratch;
 pub use body::Hybrid;
 pub(crate) use listed::SkinView;
 pub use skin::{Skin, SkinError};
-pub use spec::{HybridError, ParticleSpec, Waking};
+pub use spec::{HybridError, ParticleSpec, Waking, fine_layers};
 pub use switching::wake_only;

@@ -332,6 +332,15 @@ impl Partition {
     pub fn volume_m3(&self) -> f64 {
         (0..self.cells.len()).map(|cell| self.moments(cell).0).sum()
     }
+
+    /// What part of it is in cells that the surface does not cut.
+    pub fn whole_part(&self) -> f64 {
+        let spacing_m = self.sites.spacing_m();
+        let whole_m3 = |doubled: bool| if doubled { 8.0 * spacing_m.powi(3) } else { spacing_m.powi(3) };
+        let is_cut = |cell: usize| self.moments(cell).0 < (1.0 - 1e-6) * whole_m3(self.cells[cell].doubled);
+        let whole = (0..self.cells.len()).filter(|&cell| !is_cut(cell));
+        whole.map(|cell| self.moments(cell).0).sum::<f64>() / self.volume_m3()
+    }
 }
 
 #[cfg(test)]

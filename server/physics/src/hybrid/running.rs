@@ -9,6 +9,7 @@ use super::{
     active::room_for_cells,
     body::Hybrid,
     border::Border,
+    clusters::SkinClusters,
     composite::Anchor,
     fade::Fading,
     partition::{Cell, NONE},
@@ -60,6 +61,9 @@ pub(crate) struct RunningPatch {
     node_displacements_m: Vec<DVec3>,
     /// Number of every particle among the points.
     point_of: Vec<u32>,
+    /// Whether active particles carry any of a cluster's vertices, and a group's.
+    carries_of_cluster: Vec<bool>,
+    carries_of_group: Vec<bool>,
     is_awake: Vec<bool>,
     is_viscous: bool,
     /// Counts the sets of active particles.
@@ -112,6 +116,8 @@ impl RunningPatch {
             metric: RunningMetric::new(hybrid, most_active),
             node_displacements_m: vec![DVec3::ZERO; hybrid.node_count()],
             point_of: vec![NONE; partition.particle_count()],
+            carries_of_cluster: vec![false; hybrid.clusters.clusters()],
+            carries_of_group: vec![false; hybrid.clusters.groups()],
             is_awake: vec![false; partition.cells().len()],
             is_viscous: hybrid.materials.iter().any(|m| !m.viscosity.is_zero()),
             number: 0,
@@ -162,6 +168,16 @@ impl RunningPatch {
     /// The largest of [`Self::deviations_m`].
     pub(super) fn deviation_m(&self) -> f64 {
         self.deviations_m().map(|(_, deviation_m)| deviation_m).fold(0.0, f64::max)
+    }
+
+    /// Whether active particles carry any vertex of a cluster of the skin.
+    pub(super) fn carries_of_cluster(&self, cluster: usize) -> bool {
+        self.carries_of_cluster[cluster]
+    }
+
+    /// The same of a group.
+    pub(super) fn carries_of_group(&self, group: usize) -> bool {
+        self.carries_of_group[group]
     }
 
     /// Awake cells, ascending.
@@ -235,6 +251,7 @@ impl RunningPatch {
                 self.active.extend_from_slice(active);
                 self.find_cells(hybrid);
                 self.find_points(hybrid);
+                self.mark_carried(hybrid, true);
             }
             1 => self.take_from_shares(hybrid),
             _ => {
@@ -250,7 +267,17 @@ impl RunningPatch {
         self.number = other.number + 1;
     }
 
+    fn mark_carried(&mut self, hybrid: &Hybrid, carried: bool) {
+        for &particle in &self.active {
+            for cluster in hybrid.clusters.carried_by(particle) {
+                self.carries_of_cluster[cluster] = carried;
+                self.carries_of_group[SkinClusters::group_of(cluster)] = carried;
+            }
+        }
+    }
+
     fn forget(&mut self, hybrid: &Hybrid) {
+        self.mark_carried(hybrid, false);
         for point in &self.points {
             self.point_of[point.particle as usize] = NONE;
         }

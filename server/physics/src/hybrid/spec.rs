@@ -77,11 +77,16 @@ pub enum HybridError {
     },
 }
 
+/// Layers of cells that begin within a depth (m), at least one.
+pub fn fine_layers(depth_m: f64, spacing_m: f64) -> usize {
+    // A depth of whole cells, but for rounding, is that many.
+    (depth_m / spacing_m - 1e-9).ceil().max(1.0) as usize
+}
+
 impl ParticleSpec {
     /// Layers of cells of the lattice's spacing at the surface, where deeper ones are merged.
     pub(super) fn fine_layers(&self) -> Option<usize> {
-        // A depth of whole cells, but for rounding, is that many.
-        self.fine_depth_m.map(|depth_m| (depth_m / self.spacing_m - 1e-9).ceil().max(1.0) as usize)
+        self.fine_depth_m.map(|depth_m| fine_layers(depth_m, self.spacing_m))
     }
 
     pub(crate) fn check(&self) -> Result<(), HybridError> {

@@ -114,8 +114,8 @@ impl HybridScratch {
         match state.tick % LOOK_EVERY_TICKS {
             0 => {
                 self.patch.displace(body, &state.x);
-                let view = SkinView::new(body, &self.patch, model.surface_rest_positions_m());
-                place_balls(model, &view, particles.spacing_m, state);
+                let mut view = SkinView::new(body, &self.patch, model.surface_rest_positions_m());
+                place_balls(model, &mut view, particles.spacing_m, state);
                 self.looking.want(body, &state.active, reach_m, particles.most_active);
                 self.looking.keep_unsettled(&self.patch, particles);
                 state.active.want(&self.looking.wanted);
@@ -246,12 +246,14 @@ pub(crate) fn deepest_m(centre_m: DVec3, radius_m: f64, contact_force_n: DVec3) 
 }
 
 /// Where the tools' balls are now.
-fn place_balls(model: &Model, view: &SkinView<'_>, spacing_m: f64, state: &mut State) {
-    let State { tools, active, .. } = state;
+fn place_balls(model: &Model, view: &mut SkinView<'_>, spacing_m: f64, state: &mut State) {
+    let State { tools, active, contact, force_is_current, .. } = state;
+    let fitted = force_is_current.then(|| contact.boxes());
     for ((tool, spec), ball) in tools.iter().zip(&model.spec().tools).zip(&mut active.balls) {
         let near_m = (GAP * spec.radius_m).max(GAP * spacing_m) + AHEAD_S * tool.velocity_m_per_s.length();
         let deepest_m = deepest_m(tool.centre_m, spec.radius_m, tool.contact_force_n);
-        let nearest = view.nearest(deepest_m.unwrap_or(tool.centre_m), spec.radius_m + 2.0 * near_m);
+        let within_m = spec.radius_m + 2.0 * near_m;
+        let nearest = view.nearest(deepest_m.unwrap_or(tool.centre_m), within_m, fitted);
         let gap_m = nearest.map_or(f64::INFINITY, |(_, distance_m)| distance_m - spec.radius_m);
         let gap_m = if deepest_m.is_some() { 0.0 } else { gap_m };
         match (ball.as_mut(), nearest) {

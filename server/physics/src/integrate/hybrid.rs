@@ -29,7 +29,7 @@ pub(super) fn evaluate(
     let contact = model.contact();
     contact.move_tools(now.fastest_m_per_s * body.amplification(), &time, &mut state.tools, &mut state.contact);
     let mut view = SkinView::new(body, patch, rest_m);
-    let mut renewed = contact.list_on_skin(&mut view, &state.tools, &mut state.contact, contact_scratch);
+    let mut renewed = contact.list_on_skin((&mut view, &mut skin.x), &state.tools, &mut state.contact, contact_scratch);
     renewed |= skin.is_outdated(patch);
     renewed |= input.point_forces.iter().any(|point| is_usable(model, point) && !skin.is_listed(point.node));
     if renewed {
@@ -38,6 +38,7 @@ pub(super) fn evaluate(
         contact.listed_nodes(&state.contact).for_each(&mut list);
         model.spec().loads.iter().for_each(|load| vertices_of(model, load, &mut list));
         input.point_forces.iter().filter(|point| is_usable(model, point)).for_each(|point| list(point.node));
+        skin.finish();
     }
     skin.refresh(patch);
     for (index, load) in model.spec().loads.iter().enumerate() {

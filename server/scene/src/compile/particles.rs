@@ -14,7 +14,7 @@ use crate::{
 use glam::DVec3;
 use palpate_physics::{
     TetMesh,
-    hybrid::{ParticleSpec, Skin, Waking, composite::Composite, spec::MOST_ACTIVE},
+    hybrid::{ParticleSpec, Skin, Waking, composite::Composite, fine_layers, spec::MOST_ACTIVE},
     mesh::tet::EDGES,
 };
 use std::{collections::BTreeSet, f64::consts::PI};
@@ -156,7 +156,7 @@ impl ParticlesTable {
     }
 }
 
-/// The radius r (m) of the half ball, as at a flat surface, that holds `most_active` particles: one in every h³ down to the depth d of the fine ones, one in every 8 h³ below,
+/// The radius r (m) of the half ball, as at a flat surface, that holds `most_active` particles: one in every h³ in the layers of fine ones, d thick, one in every 8 h³ below,
 /// ```text
 /// n h³ = ⅛ (2π/3) r³ + ⅞ π d (r² − d²/3),  d ≤ r
 /// ```
@@ -164,6 +164,7 @@ fn half_ball_m(table: &ParticlesTable) -> f64 {
     let Some(depth_m) = table.fine_depth_m else {
         return table.spacing_m * (f64::from(table.most_active) * 6.0 / (4.0 * PI)).cbrt();
     };
+    let depth_m = fine_layers(depth_m, table.spacing_m) as f64 * table.spacing_m;
     let all_m3 = f64::from(table.most_active) * table.spacing_m.powi(3);
     let held_m3 = |r: f64| {
         let d = depth_m.min(r);
