@@ -18,6 +18,7 @@ pub mod seed;
 pub mod simd;
 pub mod snapshot;
 pub mod solve;
+pub mod spring;
 pub mod world;
 
 pub use health::{Energies, Ledger, Quarantine};

@@ -13,6 +13,7 @@ pub mod references;
 pub mod report;
 pub mod skips;
 pub mod stress;
+pub mod subdivision;
 pub mod table;
 pub mod timing;
 

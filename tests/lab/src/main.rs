@@ -1,6 +1,6 @@
 //! `palpate-lab`: run time beside error.
 use clap::{Parser, Subcommand};
-use palpate_lab::{jitter, references, report, stress};
+use palpate_lab::{jitter, references, report, stress, subdivision};
 
 #[derive(Parser)]
 #[command(
@@ -29,6 +29,10 @@ enum Command {
     Jitter(jitter::Options),
     /// Numerical stress: every row with its pass criterion
     Stress(stress::Command),
+    /// Haptic subdivision's experiment: figures 5 to 11 as plots and data
+    ///
+    /// A sheet of springs pulled at one vertex, before and after one ring or two about it are refined: which constants make it feel the same.
+    Subdivision(subdivision::Options),
 }
 
 fn main() -> miette::Result<()> {
@@ -39,5 +43,6 @@ fn main() -> miette::Result<()> {
         Command::Table => palpate_lab::table::print(),
         Command::Jitter(options) => jitter::print(&options),
         Command::Stress(command) => stress::run(&command),
+        Command::Subdivision(options) => subdivision::run(&options),
     }
 }

@@ -55,10 +55,16 @@ pub struct Options {
     peers_env: Option<PathBuf>,
 }
 
+/// Methods of a quick run: of hybrids two.
+fn is_quick_method(name: &str) -> bool {
+    !name.starts_with("hybrid") || ["hybrid 200", "hybrid 600"].contains(&name)
+}
+
 /// Problems of a quick run: most of those of rubber-like tissue, and the beam; with peers theirs too.
 fn is_quick(problem: &Problem) -> bool {
     let rubber = problem.name.contains("nu0.45");
-    let long = problem.name.contains("patch-large") || problem.name.contains("sweep");
+    let other_places = ["under-base", "flank", "shoulder", "near-tip"];
+    let long = ["patch-large", "sweep"].iter().chain(&other_places).any(|part| problem.name.contains(part));
     rubber && !long || problem.name == "cantilever"
 }
 
@@ -72,7 +78,11 @@ pub fn run(options: &Options) -> Result<()> {
     let in_extent = |p: &Problem| !options.quick || is_quick(p) || options.peers && p.name == problems::OF_PEERS;
     problems.retain(|p| chosen(&p.name, &options.problem) && in_extent(p));
     let mut methods = methods::all();
-    methods.retain(|m| options.method.is_empty() || options.method.iter().any(|filter| m.name().contains(filter)));
+    let in_extent = |name: &str| !options.quick || is_quick_method(name);
+    methods.retain(|m| match &options.method[..] {
+        [] => in_extent(m.name()),
+        filters => filters.iter().any(|filter| m.name().contains(filter)),
+    });
     if problems.is_empty() {
         let names: Vec<String> = problems::all().into_iter().map(|p| p.name).collect();
         let left_out = options.quick && names.iter().any(|name| chosen(name, &options.problem));

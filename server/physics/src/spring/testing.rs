@@ -1,0 +1,31 @@
+//! Surfaces for tests.
+#![allow(clippy::unwrap_used)]
+use super::topology::Triangulation;
+use glam::DVec3;
+
+/// A flat patch of equilateral triangles of edge `edge_m`: all within so many rings about vertex 0, in the plane z = 0.
+pub(crate) fn hexagon(rings: i32, edge_m: f64) -> Triangulation {
+    super::net::hexagonal_patch(rings, edge_m).unwrap()
+}
+
+/// An octahedron about the origin, its corners at this radius (m), each triangle split in four `levels` times and its vertices pushed out to the sphere.
+pub(crate) fn sphere(levels: u32, radius_m: f64) -> Triangulation {
+    let mut p = vec![DVec3::X, DVec3::Y, DVec3::Z, -DVec3::X, -DVec3::Y, -DVec3::Z];
+    let mut t = vec![[0, 1, 2], [1, 3, 2], [3, 4, 2], [4, 0, 2], [1, 0, 5], [3, 1, 5], [4, 3, 5], [0, 4, 5]];
+    for _ in 0..levels {
+        let mut middles = std::collections::BTreeMap::new();
+        let mut middle = |a: u32, b: u32, p: &mut Vec<DVec3>| {
+            *middles.entry([a.min(b), a.max(b)]).or_insert_with(|| {
+                p.push((p[a as usize] + p[b as usize]).normalize());
+                p.len() as u32 - 1
+            })
+        };
+        let mut finer = Vec::new();
+        for [a, b, c] in t {
+            let [ab, bc, ca] = [middle(a, b, &mut p), middle(b, c, &mut p), middle(c, a, &mut p)];
+            finer.extend([[a, ab, ca], [ab, b, bc], [ca, bc, c], [ab, bc, ca]]);
+        }
+        t = finer;
+    }
+    Triangulation::new(p.into_iter().map(|p| p * radius_m).collect(), t).unwrap()
+}

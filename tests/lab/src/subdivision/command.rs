@@ -1,0 +1,75 @@
+//! The command: figures as data and plots.
+use super::{
+    experiment::{Experiment, Figure, figures},
+    page,
+};
+use clap::Args;
+use indicatif::{ProgressBar, ProgressStyle};
+use miette::{Context, IntoDiagnostic, Result};
+use std::{fmt::Write as _, path::PathBuf};
+
+/// `K_m/K_h` before: the paper's figures, and the two it compares them with.
+const MESH_OVER_HOME: [f64; 3] = [1.0, 10.0, 0.1];
+
+/// Where to.
+#[derive(Debug, Clone, Args)]
+pub struct Options {
+    /// Directory for subdivision.csv and subdivision.html
+    #[arg(long, default_value = "lab-results")]
+    out: PathBuf,
+}
+
+/// Computes figures 5 to 11 at all three `K_m/K_h`, writes them and says what they say.
+///
+/// # Errors
+/// A file that cannot be written, or springs that come to no rest.
+pub fn run(options: &Options) -> Result<()> {
+    let out = &options.out;
+    std::fs::create_dir_all(out).into_diagnostic().wrap_err_with(|| format!("cannot make {}", out.display()))?;
+    let bar = ProgressBar::new(1000);
+    bar.set_style(ProgressStyle::with_template("{bar:20} {percent} % {elapsed} {msg}").into_diagnostic()?);
+    let mut all = Vec::new();
+    for (number, mesh_over_home) in MESH_OVER_HOME.into_iter().enumerate() {
+        bar.set_message(format!("K_m/K_h = {mesh_over_home}"));
+        let mut tell = |part: f64| bar.set_position(((number as f64 + part) / 3.0 * 1000.0) as u64);
+        all.push((mesh_over_home, figures(Experiment { mesh_over_home }, &mut tell)?));
+    }
+    bar.finish_and_clear();
+    for (name, text) in [("subdivision.csv", csv(&all)), ("subdivision.html", page::page(&all))] {
+        let path = out.join(name);
+        std::fs::write(&path, text).into_diagnostic().wrap_err_with(|| format!("cannot write {}", path.display()))?;
+    }
+    print(&all);
+    println!("\nwritten to {}: subdivision.html (plots), subdivision.csv", out.display());
+    Ok(())
+}
+
+fn csv(all: &[(f64, Vec<Figure>)]) -> String {
+    let mut text = String::from("km_over_kh,figure,quantity,curve,x_over_l,value\n");
+    for (mesh_over_home, figures) in all {
+        for figure in figures {
+            for curve in &figure.curves {
+                for (x, value) in &curve.points {
+                    let (number, quantity, name) = (figure.number, figure.quantity, &curve.name);
+                    let _ = writeln!(text, "{mesh_over_home},{number},{quantity},{name},{x},{value:.9e}");
+                }
+            }
+        }
+    }
+    text
+}
+
+/// Ends and middle of every curve.
+fn print(all: &[(f64, Vec<Figure>)]) {
+    for (mesh_over_home, figures) in all {
+        println!("\nK_m/K_h = {mesh_over_home}: at x = 0.01 L, 0.5 L, L");
+        for figure in figures {
+            println!("  figure {}: {}", figure.number, figure.title);
+            for curve in &figure.curves {
+                let at = |x: f64| curve.points.iter().find(|p| p.0 == x).map_or(f64::NAN, |p| p.1);
+                let [start, middle, end] = [0.01, 0.5, 1.0].map(at);
+                println!("    {:<9} {:<18} {start:>10.4} {middle:>10.4} {end:>10.4}", figure.quantity, curve.name);
+            }
+        }
+    }
+}

@@ -1,0 +1,158 @@
+//! The page: the figures as plots.
+use super::experiment::{EDGE_M, Figure, HOME_N_PER_M};
+use std::fmt::Write as _;
+
+const COLOURS: [&str; 3] = ["#0072b2", "#d55e00", "#009e73"];
+const STYLE: &str = "
+:root{color-scheme:light}
+body{font:16px/1.5 system-ui,sans-serif;color:#1b1f24;background:#fff;max-width:72rem;margin:0 auto;padding:1.5rem}
+p{max-width:48rem}svg text{font:12px system-ui,sans-serif;fill:#57606a}.grid{stroke:#e3e7eb}.curve{fill:none;stroke-width:2}
+.figures{display:grid;grid-template-columns:repeat(auto-fill,minmax(22rem,1fr));gap:1.2rem}figure{margin:0}svg{width:100%;height:auto}
+figcaption{font-size:14px;color:#57606a}";
+const WIDTH: f64 = 420.0;
+const HEIGHT: f64 = 280.0;
+const LEFT: f64 = 56.0;
+const RIGHT: f64 = 12.0;
+const TOP: f64 = 10.0;
+const BOTTOM: f64 = 40.0;
+/// What spans more than this is drawn in decades.
+const LOGARITHMIC: f64 = 50.0;
+
+/// The page of all figures, at each `K_m/K_h`.
+pub(super) fn page(all: &[(f64, Vec<Figure>)]) -> String {
+    let mut out = format!(
+        "<!doctype html><html lang=\"en\"><meta charset=\"utf-8\"><meta name=\"viewport\" content=\"width=device-width\">\
+         <title>Palpate: haptic subdivision</title><style>{STYLE}</style><body><h1>Haptic subdivision</h1>\
+         <p>Figures 5 to 11 of <i>Haptic Subdivision: an Approach to Defining Level-of-detail in Haptic Rendering</i> (Zhang, Payandeh, Dill). \
+         A flat sheet of equilateral triangles with edges L = {} mm, home springs K<sub>h</sub> = {} N/m; one vertex is pulled out of it by x, all others \
+         are at rest. Six or eight rings of triangles about it, their outer edge free.</p>",
+        EDGE_M * 1e3,
+        HOME_N_PER_M
+    );
+    for (mesh_over_home, figures) in all {
+        let _ = write!(out, "<h2>K<sub>m</sub>/K<sub>h</sub> = {mesh_over_home}</h2><div class=\"figures\">");
+        for figure in figures {
+            let _ = write!(
+                out,
+                "<figure>{}<figcaption>Figure {}. {}</figcaption></figure>",
+                svg(figure),
+                figure.number,
+                figure.title
+            );
+        }
+        out.push_str("</div>");
+    }
+    out.push_str("</body></html>");
+    out
+}
+
+/// The ordinate: from the least to the largest value, in round steps or in decades.
+struct Ordinate {
+    low: f64,
+    high: f64,
+    is_logarithmic: bool,
+}
+
+impl Ordinate {
+    fn over(values: &[f64]) -> Self {
+        let [low, high] = [f64::min, f64::max].map(|pick| values.iter().copied().fold(values[0], pick));
+        if high > LOGARITHMIC * low {
+            return Self { low: low.log10().floor(), high: high.log10().ceil(), is_logarithmic: true };
+        }
+        let step = round_step(high);
+        Self { low: 0.0, high: (high / step).ceil() * step, is_logarithmic: false }
+    }
+
+    fn at(&self, value: f64) -> f64 {
+        let value = if self.is_logarithmic { value.log10() } else { value };
+        HEIGHT - BOTTOM - (value - self.low) / (self.high - self.low) * (HEIGHT - BOTTOM - TOP)
+    }
+
+    fn marks(&self) -> Vec<f64> {
+        if self.is_logarithmic {
+            return (self.low as i32..=self.high as i32).map(|decade| 10_f64.powi(decade)).collect();
+        }
+        let step = round_step(self.high);
+        (0..=(self.high / step).round() as u32).map(|n| f64::from(n) * step).collect()
+    }
+}
+
+/// Some five steps of 1, 2 or 5 times a power of ten.
+fn round_step(high: f64) -> f64 {
+    let decade = 10_f64.powf((high / 5.0).log10().floor());
+    [1.0, 2.0, 5.0, 10.0].into_iter().map(|n| n * decade).find(|step| high / step <= 6.0).unwrap_or(high)
+}
+
+fn svg(figure: &Figure) -> String {
+    let values: Vec<f64> = figure.curves.iter().flat_map(|curve| &curve.points).map(|p| p.1).collect();
+    if values.is_empty() {
+        return String::new();
+    }
+    let y = Ordinate::over(&values);
+    let x = |part: f64| LEFT + part * (WIDTH - LEFT - RIGHT);
+    let mut out = format!(
+        "<svg viewBox=\"0 0 {WIDTH} {HEIGHT}\" role=\"img\" aria-label=\"figure {}\" xmlns=\"http://www.w3.org/2000/svg\">",
+        figure.number
+    );
+    for mark in y.marks() {
+        let at = y.at(mark);
+        let label = format!("{:.10}", mark).trim_end_matches('0').trim_end_matches('.').to_owned();
+        let _ = write!(
+            out,
+            "<line class=\"grid\" x1=\"{LEFT}\" x2=\"{}\" y1=\"{at:.1}\" y2=\"{at:.1}\"/>\
+             <text x=\"{}\" y=\"{:.1}\" text-anchor=\"end\">{label}</text>",
+            WIDTH - RIGHT,
+            LEFT - 6.0,
+            at + 4.0
+        );
+    }
+    for fifth in 0..=5 {
+        let part = f64::from(fifth) / 5.0;
+        let _ = write!(
+            out,
+            "<text x=\"{:.1}\" y=\"{:.1}\" text-anchor=\"middle\">{part}</text>",
+            x(part),
+            HEIGHT - BOTTOM + 16.0
+        );
+    }
+    for (number, curve) in figure.curves.iter().enumerate() {
+        let colour = COLOURS[number % COLOURS.len()];
+        let line: Vec<String> =
+            curve.points.iter().map(|(part, value)| format!("{:.1},{:.1}", x(*part), y.at(*value))).collect();
+        let _ = write!(
+            out,
+            "<polyline class=\"curve\" stroke=\"{colour}\" points=\"{}\"/>\
+             <text x=\"{:.1}\" y=\"{:.1}\" text-anchor=\"end\" style=\"fill:{colour}\">{}</text>",
+            line.join(" "),
+            WIDTH - RIGHT - 6.0,
+            TOP + 16.0 * (number as f64 + 1.0),
+            curve.name.replace('\'', "′")
+        );
+    }
+    let _ = write!(
+        out,
+        "<text x=\"{:.1}\" y=\"{:.1}\" text-anchor=\"middle\">x/L</text><text x=\"12\" y=\"{:.1}\" text-anchor=\"middle\" \
+         transform=\"rotate(-90 12 {:.1})\">{}</text></svg>",
+        x(0.5),
+        HEIGHT - 6.0,
+        0.5 * HEIGHT,
+        0.5 * HEIGHT,
+        figure.quantity.replace('\'', "′")
+    );
+    out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn steps_are_round_and_few() {
+        for (high, step) in [(1.0, 0.2), (3.68, 1.0), (0.43, 0.1), (1.22, 0.5), (2231.0, 500.0)] {
+            assert!((round_step(high) / step - 1.0).abs() < 1e-9, "{high}: {}", round_step(high));
+        }
+        let y = Ordinate::over(&[1.5, 2231.0]);
+        assert!(y.is_logarithmic && y.marks() == [1.0, 10.0, 100.0, 1000.0, 10000.0]);
+        assert!(y.at(10.0) < y.at(1.5));
+    }
+}
