@@ -96,7 +96,7 @@ fn svg(figure: &Figure) -> String {
     );
     for mark in y.marks() {
         let at = y.at(mark);
-        let label = format!("{:.10}", mark).trim_end_matches('0').trim_end_matches('.').to_owned();
+        let label = format!("{mark:.10}").trim_end_matches('0').trim_end_matches('.').to_owned();
         let _ = write!(
             out,
             "<line class=\"grid\" x1=\"{LEFT}\" x2=\"{}\" y1=\"{at:.1}\" y2=\"{at:.1}\"/>\
