@@ -19,6 +19,7 @@ mod products;
 mod real;
 mod rows;
 mod shares;
+mod springs;
 mod step_forces;
 pub(crate) mod sweeps;
 mod tangents;
@@ -41,6 +42,7 @@ pub use oracle::Oracle;
 use real::Scalar;
 pub use rows::{CellRow, RowKernel, RowValues};
 pub use shares::ShareKernel;
+pub use springs::{HalfSpring, SpringRows};
 pub(crate) use step_forces::StepForces;
 
 /// Lanes of a block: a block is one or more whole vectors on every instruction set.

@@ -8,6 +8,7 @@
 //!
 //! *Refining* splits each triangle of a region in four by Loop's scheme. A vertex of the refined surface is of *type 1* when it belongs to a vertex of the coarse one,
 //! of *type 2* when it belongs to an edge.
+pub mod blend;
 pub mod equilibrium;
 pub mod home;
 pub mod loop_scheme;
@@ -15,7 +16,7 @@ pub mod matching;
 pub mod net;
 pub mod region;
 #[cfg(test)]
-mod testing;
+pub(crate) mod testing;
 pub mod topology;
 
 pub use home::{HomeLaw, HomeLawError};

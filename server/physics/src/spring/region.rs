@@ -1,7 +1,7 @@
 //! Refining a part of a surface: rings about what is touched, in fours, without cracks.
 //!
 //! Every triangle of the region becomes four. A neighbour of it becomes two, by an edge from the middle of the one they share to its corner across; one with two such
-//! neighbours becomes three. One with three is taken into the region. A region is a set, so what several contacts have in common is refined once: to the same level.
+//! neighbours is taken into the region. A region is a set, so what several contacts have in common is refined once: to the same level.
 use super::{
     home::HomeLaw,
     net::{Net, Spring},
@@ -17,7 +17,7 @@ pub struct Region {
 }
 
 impl Region {
-    /// So many rings about vertices: the first ring's triangles have one of them as a corner, the next ring's some corner of those. Triangles all of whose neighbours are in it
+    /// So many rings about vertices: the first ring's triangles have one of them as a corner, the next ring's some corner of those. Triangles of which two neighbours are in it
     /// are, too.
     pub fn rings(surface: &Triangulation, centres: &[u32], rings: u32) -> Self {
         let mut triangles = BTreeSet::new();
@@ -37,16 +37,16 @@ impl Region {
     }
 
     fn closed(mut self, surface: &Triangulation) -> Self {
-        loop {
-            let surrounded = |t: &u32| neighbours(surface, *t).all(|n| self.triangles.contains(&n));
-            let around = self.triangles.iter().flat_map(|&t| neighbours(surface, t));
-            let outside: BTreeSet<u32> = around.filter(|t| !self.triangles.contains(t)).collect();
-            let new: Vec<u32> = outside.into_iter().filter(surrounded).collect();
-            if new.is_empty() {
-                return self;
+        let mut new: Vec<u32> = self.triangles.iter().copied().collect();
+        while let Some(triangle) = new.pop() {
+            for next in neighbours(surface, triangle) {
+                let refined = neighbours(surface, next).filter(|t| self.triangles.contains(t)).count();
+                if refined > 1 && self.triangles.insert(next) {
+                    new.push(next);
+                }
             }
-            self.triangles.extend(new);
         }
+        self
     }
 }
 
@@ -123,7 +123,6 @@ impl Refined {
     /// Splits a triangle at the middles that there are of its edges.
     fn split(&mut self, [a, b, c]: [u32; 3], middles: [Option<u32>; 3]) {
         match middles {
-            [None, None, None] => self.triangles.push([a, b, c]),
             [Some(ab), Some(bc), Some(ca)] => {
                 self.triangles.extend([[a, ab, ca], [ab, b, bc], [ca, bc, c], [ab, bc, ca]]);
                 self.springs.extend([[ab, bc], [bc, ca], [ca, ab]].map(|nodes| (nodes, Kind::Fine)));
@@ -132,20 +131,10 @@ impl Refined {
                 self.triangles.extend([[a, ab, c], [ab, b, c]]);
                 self.springs.push(([ab, c], Kind::Crack));
             }
-            [Some(ab), Some(bc), None] => {
-                let along = |p: u32, q: u32| self.rest_m[p as usize].distance(self.rest_m[q as usize]);
-                self.triangles.push([ab, b, bc]);
-                self.springs.push(([ab, bc], Kind::Crack));
-                // Of the quadrangle's diagonals the shorter one.
-                if along(a, bc) <= along(ab, c) {
-                    self.triangles.extend([[a, ab, bc], [a, bc, c]]);
-                    self.springs.push(([a, bc], Kind::Crack));
-                } else {
-                    self.triangles.extend([[a, ab, c], [ab, bc, c]]);
-                    self.springs.push(([ab, c], Kind::Crack));
-                }
-            }
-            [x, y, z] => self.split([b, c, a], [y, z, x]),
+            [None, Some(bc), None] => self.split([b, c, a], [Some(bc), None, None]),
+            [None, None, Some(ca)] => self.split([c, a, b], [Some(ca), None, None]),
+            // None, and never two: regions are closed.
+            _ => self.triangles.push([a, b, c]),
         }
     }
 
