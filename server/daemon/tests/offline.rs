@@ -288,6 +288,31 @@ fn the_schema_is_json_and_the_built_in_scenes_are_listed() {
     assert_eq!(succeeds(&["check", "--list"]).lines().next(), Some("ventricle"));
 }
 
+/// A hybrid body at rest costs little; what counts is a tick with particles awake, whether the scene's tool comes near or not. And what is wrong with its lattice is said.
+#[test]
+fn a_hybrid_body_is_checked_with_particles_awake() {
+    let folder = tempfile::tempdir().unwrap();
+    let scene = |name: &str, particles: &str, moves: &str| {
+        let text = format!(
+            "[scene]\nname = \"block\"\n[body]\n[body.box]\nsize_mm = [40, 40, 20]\ncells = [2, 2, 1]\n[body.particles]\n{particles}\n\
+             [[material]]\nlaw = \"stvk\"\nyoung_modulus_pa = 10e3\npoisson_ratio = 0.3\ndensity_kg_per_m3 = 1000\n[[fixed]]\nregion = \"z_min\"\n\
+             [[tool]]\nname = \"ball\"\nradius_mm = 8\ncoupling = \"rigid\"\n{moves}\n[output]\nduration_s = 0.4\n"
+        );
+        let path = folder.path().join(name);
+        fs::write(&path, text).unwrap();
+        path.to_str().unwrap().to_owned()
+    };
+    let far = "driver = \"script\"\nkeyframe = [{ time_s = 0, position_mm = [20, 20, 80] }, { time_s = 1, position_mm = [20, 20, 70] }]";
+    let few = "spacing_mm = 5\nmost_active = 60";
+    let text = succeeds(&["check", &scene("far.toml", few, far), "--strict"]);
+    assert!(text.contains("with up to 60 particles awake, nothing touching them, costs"), "{text}");
+    assert!(text.contains("100 % of the volume is in whole cells"), "{text}");
+    let thin = scene("thin.toml", "spacing_mm = 5\nmost_active = 60\nfine_depth_mm = 15", far);
+    let text = succeeds(&["check", &thin]);
+    assert!(text.contains("warning: fine depth in [body.particles]: no cell is of twice the spacing"), "{text}");
+    assert_eq!(palpated(&["check", &thin, "--strict"]).status.code(), Some(1));
+}
+
 #[test]
 fn every_example_passes_check_and_runs() {
     let mut count = 0;

@@ -129,7 +129,7 @@ fn particle_warnings(model: &Model) -> Vec<String> {
     let mut warnings = Vec::new();
     if partition.whole_part() < FEW_WHOLE {
         warnings.push(format!(
-            "only {:.0} % of the volume is in whole cells: particles {} mm apart are coarse for this body; lower body.particles.spacing_mm",
+            "only {:.0} % of the volume is in whole cells: particles {} mm apart are coarse for this body; lower their spacing in [body.particles]",
             100.0 * partition.whole_part(),
             short(spec.spacing_m * 1e3)
         ));
@@ -143,7 +143,7 @@ fn particle_warnings(model: &Model) -> Vec<String> {
     }
     if spec.fine_depth_m.is_some() && !partition.cells().iter().any(|cell| cell.doubled) {
         warnings.push(
-            "body.particles.fine_depth_mm: no cell is of twice the spacing, the body is too thin for any deeper down; leave the key out"
+            "fine depth in [body.particles]: no cell is of twice the spacing, the body is too thin for any deeper down; leave the key out"
                 .to_owned(),
         );
     }
