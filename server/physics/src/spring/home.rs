@@ -5,6 +5,7 @@
 //! g(u) = ∫₀ᵘ s,   G(u) = ∫₀ᵘ g,   force −K_h g(u) û,   energy K_h G(u)
 //! ```
 //! so force and stiffness are continuous. `s_0 = 1` alone is the paper's linear spring.
+use glam::DVec3;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
@@ -127,6 +128,15 @@ impl HomeLaw {
                 }
             }
             Self::Layers(layers) => layers.at(u_m),
+        }
+    }
+
+    /// `g(|u|) u/|u|` (m).
+    pub fn stretched(&self, u_m: DVec3) -> DVec3 {
+        match self {
+            Self::Linear => u_m,
+            Self::Cubic { per_m2 } => u_m * (1.0 + per_m2 * u_m.length_squared()),
+            Self::Layers(layers) => u_m.normalize_or_zero() * layers.at(u_m.length()).g_m,
         }
     }
 

@@ -9,17 +9,24 @@
 //! *Refining* splits each triangle of a region in four by Loop's scheme. A vertex of the refined surface is of *type 1* when it belongs to a vertex of the coarse one,
 //! of *type 2* when it belongs to an edge.
 pub mod blend;
+#[cfg(test)]
+mod checks;
 pub mod equilibrium;
 pub mod home;
 pub mod loop_scheme;
 pub mod matching;
+pub mod model;
+pub mod motion;
 pub mod net;
 pub mod region;
+pub mod running;
 #[cfg(test)]
 pub(crate) mod testing;
 pub mod topology;
 
 pub use home::{HomeLaw, HomeLawError};
+pub use model::{SpringError, SpringModel, SpringSpec};
+pub use motion::{SpringMotion, SpringScratch, Wanted};
 pub use net::{Net, Spring};
 pub use region::{Refined, Region};
 pub use topology::{Triangulation, TriangulationError};

@@ -8,6 +8,7 @@ use super::{
     topology::{NONE, Triangulation},
 };
 use glam::DVec3;
+use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Triangles to be refined.
@@ -166,7 +167,7 @@ impl Refined {
 }
 
 /// Spring constants.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Constants {
     /// `K_m` (N/m).
     pub mesh_n_per_m: f64,

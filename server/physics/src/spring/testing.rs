@@ -1,6 +1,6 @@
 //! Surfaces for tests.
 #![allow(clippy::unwrap_used)]
-use super::topology::Triangulation;
+use super::{home::HomeLaw, model::SpringSpec, region::Constants, topology::Triangulation};
 use glam::DVec3;
 
 /// A flat patch of equilateral triangles of edge `edge_m`: all within so many rings about vertex 0, in the plane z = 0.
@@ -28,4 +28,19 @@ pub(crate) fn sphere(levels: u32, radius_m: f64) -> Triangulation {
         t = finer;
     }
     Triangulation::new(p.into_iter().map(|p| p * radius_m).collect(), t).unwrap()
+}
+
+/// Springs on a surface, with constants that differ where it is refined.
+pub(crate) fn spring_spec(surface: Triangulation) -> SpringSpec {
+    let mass_kg: Vec<f64> = surface.vertex_areas_m2().iter().map(|area_m2| area_m2 * 2.0).collect();
+    SpringSpec {
+        coarse: Constants { mesh_n_per_m: 60.0, home_n_per_m: 40.0 },
+        fine: Constants { mesh_n_per_m: 50.0, home_n_per_m: 12.0 },
+        home_law: HomeLaw::Linear,
+        most_awake: surface.positions_m().len() + surface.edges().len(),
+        most_refined: surface.triangles().len(),
+        mass_kg,
+        held: vec![],
+        surface,
+    }
 }

@@ -1,0 +1,250 @@
+//! What of a mass-spring surface moves, and how nodes wake, fall asleep, come and go.
+//!
+//! A sleeping vertex is at home. A node of type 2 is there while the level of its edge is above 0: it comes where the displacements of its ends have it, with the momentum of what they give it of their
+//! masses, and gives each of them that part of its own back. Momentum is kept, kinetic energy falls. What levels change of the energy, and what comes and goes takes of it, is told:
+//! ```text
+//! v_e = (g_a v_a + g_b v_b)/(g_a + g_b),   ΔK = −½ g_a g_b/(g_a + g_b) |v_a − v_b|²        coming, with g_a + g_b = m_e
+//! M v ← M v + g v_e,  M ← M + g,           ΔK = −½ M g/(M + g) |v − v_e|² at either end    going
+//! ```
+use super::{
+    blend::Levels,
+    model::SpringModel,
+    region::Constants,
+    running::{RunningSprings, vertices_of},
+};
+use glam::DVec3;
+use serde::{Deserialize, Serialize};
+
+/// Which nodes are awake, and the levels.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct SpringMotion {
+    /// Awake nodes, ascending: positions and velocities are theirs.
+    pub ids: Vec<u32>,
+    /// Levels of the triangles.
+    pub levels: Levels,
+    /// `K′_m`, `K′_h` now.
+    pub fine: Constants,
+}
+
+/// What is wanted of the surface.
+#[derive(Debug, Clone, Copy)]
+pub struct Wanted<'a> {
+    /// Triangles refined, ascending.
+    pub refined: &'a [u32],
+    /// How far levels go in this tick.
+    pub step: f64,
+    /// `K′_m`, `K′_h`.
+    pub fine: Constants,
+    /// Coarse vertices awake, ascending, besides those of triangles that are not coarse.
+    pub awake: &'a [u32],
+}
+
+/// Buffers, sized once.
+#[derive(Debug, Clone)]
+pub struct SpringScratch {
+    running: RunningSprings,
+    mass_kg: Vec<f64>,
+    next_levels: Levels,
+    ids: Vec<u32>,
+    x_m: Vec<DVec3>,
+    v_m_per_s: Vec<DVec3>,
+    /// Whether the springs laid out are those of the motion last seen.
+    is_laid_out: bool,
+}
+
+impl SpringMotion {
+    /// Everything coarse; these vertices awake.
+    pub fn at_rest(model: &SpringModel, awake: impl IntoIterator<Item = u32>) -> Self {
+        let mut ids = Vec::with_capacity(model.spec().most_awake);
+        ids.extend(awake);
+        Self { ids, levels: Levels::with_room(model.spec().most_refined), fine: model.spec().fine }
+    }
+}
+
+impl SpringScratch {
+    /// Buffers of a model.
+    pub fn new(model: &SpringModel) -> Self {
+        let most = model.spec().most_awake;
+        Self {
+            running: RunningSprings::with_room(model),
+            mass_kg: Vec::with_capacity(most),
+            next_levels: Levels::with_room(model.spec().most_refined),
+            ids: Vec::with_capacity(most),
+            x_m: Vec::with_capacity(most),
+            v_m_per_s: Vec::with_capacity(most),
+            is_laid_out: false,
+        }
+    }
+
+    /// The state was replaced: lays everything out anew.
+    pub fn forget(&mut self) {
+        self.is_laid_out = false;
+    }
+
+    /// Masses (kg) of the awake nodes; infinite where they are held.
+    pub fn mass_kg(&self) -> &[f64] {
+        &self.mass_kg
+    }
+
+    /// Adds the springs' forces (N) on awake nodes at `x_m` (m).
+    pub fn add_forces_n(&mut self, model: &SpringModel, motion: &SpringMotion, x_m: &[DVec3], forces_n: &mut [DVec3]) {
+        self.running.add_forces_n(model, &motion.ids, x_m, forces_n);
+    }
+
+    /// Brings nodes and springs to what is wanted, by a tick; returns by how much (J) that changes elastic and kinetic energy. Allocates nothing.
+    pub fn go_on(
+        &mut self,
+        model: &SpringModel,
+        motion: &mut SpringMotion,
+        (x_m, v_m_per_s): (&mut Vec<DVec3>, &mut Vec<DVec3>),
+        wanted: &Wanted<'_>,
+    ) -> [f64; 2] {
+        if !self.is_laid_out {
+            self.lay_out(model, motion);
+            self.is_laid_out = true;
+        }
+        let mut elastic_j = -self.running.changing_energy_j(model, &motion.ids, x_m);
+        let changed = motion.levels.go_on(wanted.refined, wanted.step, &mut self.next_levels);
+        let same_constants = motion.fine == wanted.fine;
+        motion.fine = wanted.fine;
+        self.choose_ids(model, &motion.levels, wanted.awake);
+        let same_ids = self.ids == motion.ids;
+        if same_ids && !changed && same_constants {
+            return [0.0; 2];
+        }
+        let mut kinetic_j = 0.0;
+        if same_ids {
+            self.running.add_levels(model, &motion.ids, &motion.levels, &motion.fine);
+        } else {
+            elastic_j += self.put_home(model, motion, x_m);
+            kinetic_j -= kinetic(&self.mass_kg, v_m_per_s);
+            self.hand_back(model, motion, v_m_per_s);
+            self.come(model, motion, (x_m, v_m_per_s));
+            motion.ids.clone_from(&self.ids);
+            x_m.clone_from(&self.x_m);
+            v_m_per_s.clone_from(&self.v_m_per_s);
+            self.lay_out(model, motion);
+            kinetic_j += kinetic(&self.mass_kg, v_m_per_s);
+        }
+        elastic_j += self.running.changing_energy_j(model, &motion.ids, x_m);
+        [elastic_j, kinetic_j]
+    }
+
+    fn lay_out(&mut self, model: &SpringModel, motion: &SpringMotion) {
+        self.running.lay_out(model, &motion.ids);
+        self.running.add_levels(model, &motion.ids, &motion.levels, &motion.fine);
+        let Self { mass_kg, .. } = self;
+        mass_kg.clear();
+        mass_kg.extend(motion.ids.iter().map(|&id| own_mass_kg(model, &motion.ids, id)));
+    }
+
+    /// The awake nodes to be.
+    fn choose_ids(&mut self, model: &SpringModel, levels: &Levels, awake: &[u32]) {
+        let ids = &mut self.ids;
+        ids.clear();
+        ids.extend_from_slice(awake);
+        let before = ids.len();
+        levels.for_each_vertex(model.surface(), |vertex, _| {
+            if awake.binary_search(&vertex).is_err() {
+                ids.push(vertex);
+            }
+        });
+        if ids.len() > before {
+            ids.sort_unstable();
+        }
+        let vertices = ids.len();
+        levels.for_each_edge(model.surface(), |edge, _| ids.push(model.vertices() + edge));
+        ids[vertices..].sort_unstable();
+    }
+
+    /// Puts vertices that fall asleep home, one after the other; returns by how much (J) the springs of the coarse surface that they are on change: those of levels and homes are told elsewhere.
+    fn put_home(&mut self, model: &SpringModel, motion: &SpringMotion, x_m: &mut [DVec3]) -> f64 {
+        let surface = model.surface();
+        let vertices = vertices_of(model, &motion.ids);
+        let mut change_j = 0.0;
+        for (place, &vertex) in motion.ids[..vertices].iter().enumerate() {
+            if self.ids.binary_search(&vertex).is_ok() {
+                continue;
+            }
+            let home_m = model.rest_m()[vertex as usize];
+            for &edge in surface.edges_at(vertex) {
+                let other = surface.other_end(edge, vertex);
+                let rest_m = model.rest_m()[other as usize];
+                let other_m = motion.ids.binary_search(&other).map_or(rest_m, |place| x_m[place]);
+                let energy_j = |x: DVec3| {
+                    0.5 * model.spec().coarse.mesh_n_per_m * (x.distance(other_m) - home_m.distance(rest_m)).powi(2)
+                };
+                change_j += energy_j(home_m) - energy_j(x_m[place]);
+            }
+            x_m[place] = home_m;
+        }
+        change_j
+    }
+
+    /// Nodes of type 2 that go give their momentum to their ends, whose masses are then what they were without them.
+    fn hand_back(&mut self, model: &SpringModel, motion: &SpringMotion, v_m_per_s: &mut [DVec3]) {
+        let vertices = vertices_of(model, &motion.ids);
+        for (place, &id) in motion.ids.iter().enumerate().skip(vertices) {
+            if self.ids.binary_search(&id).is_ok() {
+                continue;
+            }
+            let edge = id - model.vertices();
+            for end in model.surface().edges()[edge as usize].nodes {
+                let Ok(at) = motion.ids.binary_search(&end) else { continue };
+                if model.is_held(end) {
+                    continue;
+                }
+                let (own_kg, back_kg) = (self.mass_kg[at], model.given_kg(end));
+                let momentum = v_m_per_s[at] * own_kg + v_m_per_s[place] * back_kg;
+                self.mass_kg[at] = own_kg + back_kg;
+                v_m_per_s[at] = momentum / self.mass_kg[at];
+            }
+        }
+    }
+
+    /// Positions and velocities of the nodes that are to be.
+    fn come(&mut self, model: &SpringModel, motion: &SpringMotion, (x_m, v_m_per_s): (&[DVec3], &[DVec3])) {
+        let of = |id: u32| motion.ids.binary_search(&id).ok().map(|place| (x_m[place], v_m_per_s[place]));
+        let at_home = |id: u32| (model.rest_m()[id as usize], DVec3::ZERO);
+        self.x_m.clear();
+        self.v_m_per_s.clear();
+        for &id in &self.ids {
+            let (x, v) = of(id).unwrap_or_else(|| match id.checked_sub(model.vertices()) {
+                None => at_home(id),
+                Some(edge) => {
+                    let [a, b] = model.surface().edges()[edge as usize].nodes.map(|end| {
+                        let (x, v) = of(end).unwrap_or_else(|| at_home(end));
+                        (x - model.rest_m()[end as usize], v)
+                    });
+                    (model.rest_m()[id as usize] + (a.0 + b.0) * 0.5, mean_velocity(model, edge, [a.1, b.1]))
+                }
+            });
+            self.x_m.push(x);
+            self.v_m_per_s.push(v);
+        }
+    }
+}
+
+/// The velocity (m/s) that a node of type 2 starts with: that of its ends, by what each gives of its mass, so that momentum is kept.
+fn mean_velocity(model: &SpringModel, edge: u32, v_m_per_s: [DVec3; 2]) -> DVec3 {
+    let [a, b] = model.surface().edges()[edge as usize].nodes.map(|end| model.given_kg(end));
+    (v_m_per_s[0] * a + v_m_per_s[1] * b) / (a + b)
+}
+
+/// Mass (kg) of an awake node: of a vertex less what its nodes of type 2 have of it; infinite where it is held.
+fn own_mass_kg(model: &SpringModel, ids: &[u32], id: u32) -> f64 {
+    if let Some(edge) = id.checked_sub(model.vertices()) {
+        return model.edge_kg(edge);
+    }
+    if model.is_held(id) {
+        return f64::INFINITY;
+    }
+    let there = |edge: &&u32| ids.binary_search(&(model.vertices() + **edge)).is_ok();
+    let given = model.surface().edges_at(id).iter().filter(there).count() as f64;
+    model.spec().mass_kg[id as usize] - given * model.given_kg(id)
+}
+
+fn kinetic(mass_kg: &[f64], v_m_per_s: &[DVec3]) -> f64 {
+    let free = mass_kg.iter().zip(v_m_per_s).filter(|(mass, _)| mass.is_finite());
+    free.map(|(mass, v)| 0.5 * mass * v.length_squared()).sum()
+}
