@@ -1,6 +1,7 @@
 //! The lab: what Palpate costs, measured beside what it gets wrong.
 pub mod bodies;
 pub mod convergence;
+pub mod fine_levels;
 pub mod jitter;
 pub mod machine;
 pub mod measure;

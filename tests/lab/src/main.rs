@@ -1,6 +1,6 @@
 //! `palpate-lab`: run time beside error.
 use clap::{Parser, Subcommand};
-use palpate_lab::{jitter, references, report, stress, subdivision};
+use palpate_lab::{fine_levels, jitter, references, report, stress, subdivision};
 
 #[derive(Parser)]
 #[command(
@@ -29,6 +29,8 @@ enum Command {
     Jitter(jitter::Options),
     /// Numerical stress: every row with its pass criterion
     Stress(stress::Command),
+    /// What a hybrid body's fine level may be made of, on every body and number of particles, at rest against the references: some minutes
+    FineLevels(fine_levels::Options),
     /// Haptic subdivision's experiment: figures 5 to 11 as plots and data
     ///
     /// A sheet of springs pulled at one vertex, before and after one ring or two about it are refined: which constants make it feel the same.
@@ -43,6 +45,7 @@ fn main() -> miette::Result<()> {
         Command::Table => palpate_lab::table::print(),
         Command::Jitter(options) => jitter::print(&options),
         Command::Stress(command) => stress::run(&command),
+        Command::FineLevels(options) => fine_levels::run(&options),
         Command::Subdivision(options) => subdivision::run(&options),
     }
 }

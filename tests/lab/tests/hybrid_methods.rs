@@ -3,7 +3,8 @@
 mod hybrid_body;
 
 use glam::{DMat3, DMat4, DVec3, DVec4};
-use hybrid_body::{Case, MakePlaces, MakePoints, error, problem};
+use hybrid_body::{Case, MakePoints, error, problem};
+use palpate_lab::fine_levels::PlacesOf;
 use palpate_physics::hybrid::{
     kernels::{Kernel, SMOOTHING},
     methods::{CONTROL, Method},
@@ -18,7 +19,7 @@ const RAW: Method = Method::RawSph(Kernel::Cone);
 const INSIDE: f64 = 0.79916;
 
 /// Relative errors of the answer and of the field, with 192 coarse tets and particles every 2.5 mm.
-fn errors(name: &str, nu: &str, active: usize, points: MakePoints, places: Option<MakePlaces>) -> (f64, f64) {
+fn errors(name: &str, nu: &str, active: usize, points: MakePoints, places: Option<PlacesOf>) -> (f64, f64) {
     let (name, points) = (name.into(), Some(points));
     let case = Case { name, coarse_tets: 4, skin_tets: 32, spacing_m: 2.5e-3, active, points, places };
     error(&problem(&format!("block-patch-small-nu{nu}")), &case)

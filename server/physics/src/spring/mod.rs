@@ -9,6 +9,7 @@
 //! *Refining* splits each triangle of a region in four by Loop's scheme. A vertex of the refined surface is of *type 1* when it belongs to a vertex of the coarse one,
 //! of *type 2* when it belongs to an edge.
 pub mod blend;
+pub mod calibration;
 #[cfg(test)]
 mod checks;
 pub mod equilibrium;

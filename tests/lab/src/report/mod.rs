@@ -4,9 +4,10 @@ mod compare;
 mod convergence;
 mod page;
 mod peers;
-mod plot;
+pub(crate) mod plot;
 mod skips;
 mod stress;
 
 pub use command::{Options, run};
 pub use compare::{Options as CompareOptions, compare, run as run_compare};
+pub(crate) use page::{COLOURS, STYLE};

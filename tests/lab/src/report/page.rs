@@ -1,7 +1,7 @@
 //! The page: one file that needs nothing else, for a reader who was not there.
 use super::{
     convergence, peers,
-    plot::{self, Point, Series},
+    plot::{self, Across, Point, Series},
     skips, stress,
 };
 use crate::{
@@ -17,12 +17,13 @@ use miette::Result;
 use std::fmt::Write as _;
 
 /// Okabe and Ito's colours, which the colour-blind can tell apart, and some more.
-const COLOURS: [&str; 16] = [
+pub(crate) const COLOURS: [&str; 16] = [
     "#0072b2", "#56b4e9", "#d55e00", "#e69f00", "#009e73", "#cc79a7", "#7a5195", "#222222", "#8c6d31", "#17becf",
     "#a1d34c", "#999999", "#8b0000", "#b39ddb", "#004d40", "#f781bf",
 ];
 
-const STYLE: &str = "
+/// The look of all pages.
+pub(crate) const STYLE: &str = "
 :root{color-scheme:light}
 body{font:16px/1.5 system-ui,sans-serif;color:#1b1f24;background:#fff;max-width:72rem;margin:0 auto;padding:1.5rem}
 h1{margin:.2em 0}h2{margin-top:2.2em;border-bottom:1px solid #d0d7de}h3{margin:2em 0 .3em}
@@ -187,7 +188,7 @@ fn section(out: &mut String, run: &Run, problem: &Problem, methods: &[Box<dyn Me
         }
     }
     let floor = reference.uncertainty / reference.value.abs();
-    let _ = write!(out, "</div>{}", plot::svg(&series, floor));
+    let _ = write!(out, "</div>{}", plot::svg(&series, floor, &Across::TIME_US));
     table(out, problem, &rows);
     Ok(())
 }
@@ -206,7 +207,7 @@ fn names<'a>(run: &'a Run, methods: &'a [Box<dyn Method>]) -> Vec<&'a str> {
 fn point(row: &Row, rows: &[&Row]) -> Option<Point> {
     let (time_us, error) = (row.median_us?, row.error()?);
     let label = format!("{} elements, {time_us:.1} µs, {}", row.elements, percent(row.answer_error));
-    Some(Point { time_us, error, on_front: row.is_on_front(rows), competes: row.is_in_competition(), label })
+    Some(Point { across: time_us, error, on_front: row.is_on_front(rows), competes: row.is_in_competition(), label })
 }
 
 fn table(out: &mut String, problem: &Problem, rows: &[&Row]) {

@@ -1,24 +1,44 @@
-//! A work-precision plot as SVG: error over time per tick, both logarithmic.
+//! Plots as SVG: error over time per tick, or over something else, both logarithmic.
 use std::fmt::Write as _;
 
 /// A method's points, by resolution.
-pub(super) struct Series<'a> {
-    pub name: &'a str,
-    pub colour: &'a str,
-    pub points: Vec<Point>,
+pub(crate) struct Series<'a> {
+    pub(crate) name: &'a str,
+    pub(crate) colour: &'a str,
+    pub(crate) points: Vec<Point>,
 }
 
 /// One resolution.
 #[derive(Debug, Clone)]
-pub(super) struct Point {
-    pub time_us: f64,
+pub(crate) struct Point {
+    /// The abscissa ([`Across`]).
+    pub(crate) across: f64,
     /// Relative error.
-    pub error: f64,
-    pub on_front: bool,
+    pub(crate) error: f64,
+    pub(crate) on_front: bool,
     /// Filled; otherwise hollow: out of competition.
-    pub competes: bool,
+    pub(crate) competes: bool,
     /// For the pointer.
-    pub label: String,
+    pub(crate) label: String,
+}
+
+/// The abscissa.
+pub(crate) struct Across {
+    /// What it is.
+    label: &'static str,
+    /// What a decade is called.
+    decade: fn(i32) -> String,
+    /// A value that all is about, with its name.
+    mark: Option<(f64, &'static str)>,
+}
+
+impl Across {
+    /// Time per tick (µs).
+    pub(crate) const TIME_US: Self =
+        Self { label: "median time per 1 ms tick", decade: time, mark: Some((TICK_US, "1 ms")) };
+    /// Particles awake.
+    pub(crate) const ACTIVE: Self =
+        Self { label: "particles awake", decade: |decade| 10_f64.powi(decade).to_string(), mark: None };
 }
 
 const WIDTH: f64 = 640.0;
@@ -58,18 +78,19 @@ impl Axis {
 }
 
 /// The plot; errors below `floor`, the reference's own uncertainty, are shaded.
-pub(super) fn svg(series: &[Series<'_>], floor: f64) -> String {
+pub(crate) fn svg(series: &[Series<'_>], floor: f64, across: &Across) -> String {
     let points = || series.iter().flat_map(|s| &s.points);
-    let x = Axis::over(points().map(|p| p.time_us).chain([TICK_US]), (LEFT, WIDTH - RIGHT));
+    let x = Axis::over(points().map(|p| p.across).chain(across.mark.map(|mark| mark.0)), (LEFT, WIDTH - RIGHT));
     let y = Axis::over(points().map(|p| p.error), (HEIGHT - BOTTOM, TOP));
     let mut out = format!(
-        "<svg viewBox=\"0 0 {WIDTH} {HEIGHT}\" role=\"img\" aria-label=\"error over time per tick\" \
-         xmlns=\"http://www.w3.org/2000/svg\">"
+        "<svg viewBox=\"0 0 {WIDTH} {HEIGHT}\" role=\"img\" aria-label=\"error over {}\" \
+         xmlns=\"http://www.w3.org/2000/svg\">",
+        across.label
     );
-    frame(&mut out, &x, &y, floor);
+    frame(&mut out, (&x, across), &y, floor);
     let mut front: Vec<&Point> = points().filter(|p| p.on_front).collect();
-    front.sort_by(|a, b| a.time_us.total_cmp(&b.time_us));
-    let place = |p: &Point| format!("{:.1},{:.1}", x.at(p.time_us), y.at(p.error));
+    front.sort_by(|a, b| a.across.total_cmp(&b.across));
+    let place = |p: &Point| format!("{:.1},{:.1}", x.at(p.across), y.at(p.error));
     let line: Vec<String> = front.iter().map(|p| place(p)).collect();
     let _ = write!(out, "<polyline class=\"front\" points=\"{}\"/>", line.join(" "));
     // The first, the default, on top.
@@ -77,7 +98,7 @@ pub(super) fn svg(series: &[Series<'_>], floor: f64) -> String {
         let line: Vec<String> = s.points.iter().map(place).collect();
         let _ = write!(out, "<polyline class=\"series\" stroke=\"{}\" points=\"{}\"/>", s.colour, line.join(" "));
         for p in &s.points {
-            let (cx, cy) = (x.at(p.time_us), y.at(p.error));
+            let (cx, cy) = (x.at(p.across), y.at(p.error));
             let ring = if p.on_front { " class=\"ring\"" } else { "" };
             let fill = if p.competes {
                 format!("fill=\"{}\"", s.colour)
@@ -97,7 +118,7 @@ pub(super) fn svg(series: &[Series<'_>], floor: f64) -> String {
     out
 }
 
-fn frame(out: &mut String, x: &Axis, y: &Axis, floor: f64) {
+fn frame(out: &mut String, (x, across): (&Axis, &Across), y: &Axis, floor: f64) {
     let (bottom, right) = (HEIGHT - BOTTOM, WIDTH - RIGHT);
     if floor > 10f64.powi(y.low) {
         let top = y.at(floor);
@@ -115,7 +136,7 @@ fn frame(out: &mut String, x: &Axis, y: &Axis, floor: f64) {
             "<line class=\"grid\" x1=\"{at:.1}\" y1=\"{TOP}\" x2=\"{at:.1}\" y2=\"{bottom}\"/><text x=\"{at:.1}\" y=\"{}\" \
              text-anchor=\"middle\">{}</text>",
             bottom + 17.0,
-            time(decade)
+            (across.decade)(decade)
         );
     }
     for decade in y.low..=y.high {
@@ -129,16 +150,23 @@ fn frame(out: &mut String, x: &Axis, y: &Axis, floor: f64) {
             percent(decade)
         );
     }
-    let tick = x.at(TICK_US);
+    if let Some((value, name)) = across.mark {
+        let at = x.at(value);
+        let _ = write!(
+            out,
+            "<line class=\"tick\" x1=\"{at:.1}\" y1=\"{TOP}\" x2=\"{at:.1}\" y2=\"{bottom}\"/><text class=\"ticktext\" x=\"{:.1}\" \
+             y=\"{:.1}\" text-anchor=\"end\">{name}</text>",
+            at - 4.0,
+            TOP + 12.0
+        );
+    }
     let _ = write!(
         out,
-        "<line class=\"tick\" x1=\"{tick:.1}\" y1=\"{TOP}\" x2=\"{tick:.1}\" y2=\"{bottom}\"/><text class=\"ticktext\" x=\"{:.1}\" \
-         y=\"{:.1}\" text-anchor=\"end\">1 ms</text><text x=\"{:.1}\" y=\"{:.1}\" text-anchor=\"middle\">median time per 1 ms \
-         tick</text><text transform=\"translate(13 {:.1}) rotate(-90)\" text-anchor=\"middle\">error of the answer</text>",
-        tick - 4.0,
-        TOP + 12.0,
+        "<text x=\"{:.1}\" y=\"{:.1}\" text-anchor=\"middle\">{}</text><text transform=\"translate(13 {:.1}) rotate(-90)\" \
+         text-anchor=\"middle\">error</text>",
         f64::midpoint(LEFT, right),
         HEIGHT - 8.0,
+        across.label,
         f64::midpoint(TOP, bottom)
     );
 }
@@ -174,6 +202,6 @@ mod tests {
 
     #[test]
     fn a_plot_without_points_is_still_a_plot() {
-        assert!(svg(&[], 0.0).ends_with("</svg>"));
+        assert!(svg(&[], 0.0, &Across::TIME_US).ends_with("</svg>"));
     }
 }
