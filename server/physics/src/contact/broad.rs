@@ -10,7 +10,7 @@
 //! long as the tool's path plus the travel stay below that slack, the list holds every triangle that can be touched: far
 //! from the body a tick costs two additions per tool and substep.
 use super::triangle::closest_point;
-use crate::{hybrid::SkinView, mesh::Surface};
+use crate::mesh::Surface;
 use glam::DVec3;
 use std::ops::Range;
 
@@ -51,6 +51,20 @@ impl ClusterBox {
         let none = Self { lo: DVec3::INFINITY, hi: DVec3::NEG_INFINITY, fitted_at_m: travel_m };
         points.fold(none, |fitted, p| Self { lo: fitted.lo.min(p), hi: fitted.hi.max(p), ..fitted })
     }
+}
+
+/// A surface whose positions are worked out when asked for: a hybrid body's skin, a refined mass-spring surface.
+pub(crate) trait Skin {
+    /// A query begins.
+    fn begin(&mut self);
+    /// Lower bound (m) of the distance from a point to the triangles of a group.
+    fn group_distance_m(&self, group: usize, from_m: DVec3) -> f64;
+    /// The same of a cluster.
+    fn cluster_distance_m(&self, cluster: usize, from_m: DVec3) -> f64;
+    /// The vertices of a cluster.
+    fn vertices(&self, cluster: usize) -> &[u32];
+    /// Where a vertex is (m).
+    fn position_m(&self, vertex: u32) -> DVec3;
 }
 
 /// Triangles a tool may touch, and how far things may move before the list is out of date.
@@ -171,11 +185,11 @@ impl Triangles {
         candidates.slack_m = others_m - inner_m - ROUNDING_M;
     }
 
-    /// [`Self::query`] on the skin of a hybrid body, whose positions are not at hand: bounds that need none rule clusters out first. Of those looked at,
+    /// [`Self::query`] on a skin, whose positions are not at hand: bounds that need none rule clusters out first. Of those looked at,
     /// positions (m) are put into `x`.
     pub(super) fn query_skin(
         &self,
-        (skin, x): (&mut SkinView<'_>, &mut [DVec3]),
+        (skin, x): (&mut impl Skin, &mut [DVec3]),
         (boxes, travel_m): (&mut [ClusterBox], f64),
         centre: DVec3,
         (reach_m, inner_m): (f64, f64),

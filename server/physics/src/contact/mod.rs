@@ -30,8 +30,8 @@ pub use triangle::closest_weights;
 /// The longest edge of a surface triangle, over the radius of a tool, that can still be sampled as finely as contact needs.
 pub const LARGEST_TRIANGLE: f64 = foundation::MAX_LEVEL as f64 * foundation::SPACING;
 
-use crate::{hybrid::SkinView, mesh::Surface};
-use broad::Triangles;
+use crate::mesh::Surface;
+use broad::{Skin, Triangles};
 use foundation::{BodyAtRest, Foundation, SampleTables};
 use glam::DVec3;
 use local_model::MeanContact;
@@ -260,10 +260,10 @@ impl ContactModel {
         }
     }
 
-    /// The second part, on the skin of a hybrid body: lists anew where a list is out of date. Whether any was. `x` has room for positions (m) of all vertices.
+    /// The second part, on a skin: lists anew where a list is out of date. Whether any was. `x` has room for positions (m) of all vertices.
     pub(crate) fn list_on_skin(
         &self,
-        (skin, x): (&mut SkinView<'_>, &mut [DVec3]),
+        (skin, x): (&mut impl Skin, &mut [DVec3]),
         tools: &[ToolState],
         contact: &mut ContactState,
         scratch: &ContactScratch,

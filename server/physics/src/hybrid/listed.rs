@@ -1,7 +1,7 @@
 //! The skin's vertices that something acts on, and where any other is when asked.
 use super::{body::Hybrid, clusters::Displaced, composite::Anchor, partition::NONE, running::RunningPatch};
 use crate::{
-    contact::broad::{ClusterBox, ROUNDING_M},
+    contact::broad::{ClusterBox, ROUNDING_M, Skin},
     world::State,
 };
 use glam::DVec3;
@@ -146,33 +146,12 @@ impl<'a> SkinView<'a> {
         Self { hybrid, patch, rest_positions_m, deviation_m: 0.0 }
     }
 
-    /// A query begins: takes how far the active particles are from where they would be asleep.
-    pub(crate) fn begin(&mut self) {
-        self.deviation_m = self.patch.deviation_m();
-    }
-
     fn displaced(&self, by_particles: bool) -> Displaced<'_> {
         Displaced {
             displacements_m: self.patch.node_displacements_m(),
             deviation_m: if by_particles { self.deviation_m } else { 0.0 },
             amplification: self.hybrid.amplification,
         }
-    }
-
-    /// The vertices of a cluster of contact's broad phase.
-    pub(crate) fn vertices(&self, cluster: usize) -> &'a [u32] {
-        self.hybrid.clusters.vertices(cluster)
-    }
-
-    /// Lower bound (m) of the distance from a point to the triangles of a group.
-    pub(crate) fn group_distance_m(&self, group: usize, from_m: DVec3) -> f64 {
-        self.hybrid.clusters.group_distance_m(group, from_m, &self.displaced(self.patch.carries_of_group(group)))
-    }
-
-    /// The same of a cluster.
-    pub(crate) fn cluster_distance_m(&self, cluster: usize, from_m: DVec3) -> f64 {
-        let displaced = self.displaced(self.patch.carries_of_cluster(cluster));
-        self.hybrid.clusters.cluster_distance_m(cluster, from_m, &displaced)
     }
 
     /// The vertex nearest to a point, if one is within a distance (m): its rest position (m), and how far it is (m). Of several as near, the first one.
@@ -217,9 +196,28 @@ impl<'a> SkinView<'a> {
             }
         }
     }
+}
 
-    /// Where a vertex is (m).
-    pub(crate) fn position_m(&self, vertex: u32) -> DVec3 {
+impl Skin for SkinView<'_> {
+    /// Takes how far the active particles are from where they would be asleep.
+    fn begin(&mut self) {
+        self.deviation_m = self.patch.deviation_m();
+    }
+
+    fn vertices(&self, cluster: usize) -> &[u32] {
+        self.hybrid.clusters.vertices(cluster)
+    }
+
+    fn group_distance_m(&self, group: usize, from_m: DVec3) -> f64 {
+        self.hybrid.clusters.group_distance_m(group, from_m, &self.displaced(self.patch.carries_of_group(group)))
+    }
+
+    fn cluster_distance_m(&self, cluster: usize, from_m: DVec3) -> f64 {
+        let displaced = self.displaced(self.patch.carries_of_cluster(cluster));
+        self.hybrid.clusters.cluster_distance_m(cluster, from_m, &displaced)
+    }
+
+    fn position_m(&self, vertex: u32) -> DVec3 {
         let place = self.hybrid.places[vertex as usize];
         let partition = &self.hybrid.partition;
         let of = |particle: u32| match self.patch.point_of(particle) {
