@@ -1,5 +1,5 @@
 //! The page: the figures as plots.
-use super::experiment::{EDGE_M, Figure, HOME_N_PER_M};
+use super::experiment::{Curve, EDGE_M, Figure, HOME_N_PER_M};
 use std::fmt::Write as _;
 
 const COLOURS: [&str; 3] = ["#0072b2", "#d55e00", "#009e73"];
@@ -15,8 +15,8 @@ const LEFT: f64 = 56.0;
 const RIGHT: f64 = 12.0;
 const TOP: f64 = 10.0;
 const BOTTOM: f64 = 40.0;
-/// What spans more than this is drawn in decades.
-const LOGARITHMIC: f64 = 50.0;
+/// What is so many times its median somewhere is drawn in decades.
+const LOGARITHMIC: f64 = 20.0;
 
 /// The page of all figures, at each `K_m/K_h`.
 pub(super) fn page(all: &[(f64, Vec<Figure>)]) -> String {
@@ -34,16 +34,24 @@ pub(super) fn page(all: &[(f64, Vec<Figure>)]) -> String {
         for figure in figures {
             let _ = write!(
                 out,
-                "<figure>{}<figcaption>Figure {}. {}</figcaption></figure>",
+                "<figure>{}<figcaption>Figure {}. {}{}</figcaption></figure>",
                 svg(figure),
                 figure.number,
-                figure.title
+                figure.title.replace('\'', "′"),
+                legend(figure)
             );
         }
         out.push_str("</div>");
     }
     out.push_str("</body></html>");
     out
+}
+
+fn legend(figure: &Figure) -> String {
+    let entry = |(curve, colour): (&Curve, &str)| {
+        format!("<br><span style=\"color:{colour}\">{}</span>", curve.name.replace('\'', "′"))
+    };
+    if figure.curves.len() < 2 { String::new() } else { figure.curves.iter().zip(COLOURS).map(entry).collect() }
 }
 
 /// The ordinate: from the least to the largest value, in round steps or in decades.
@@ -56,7 +64,9 @@ struct Ordinate {
 impl Ordinate {
     fn over(values: &[f64]) -> Self {
         let [low, high] = [f64::min, f64::max].map(|pick| values.iter().copied().fold(values[0], pick));
-        if high > LOGARITHMIC * low {
+        let mut sorted = values.to_vec();
+        sorted.sort_by(f64::total_cmp);
+        if high > LOGARITHMIC * sorted[sorted.len() / 2] {
             return Self { low: low.log10().floor(), high: high.log10().ceil(), is_logarithmic: true };
         }
         let step = round_step(high);
@@ -119,15 +129,7 @@ fn svg(figure: &Figure) -> String {
         let colour = COLOURS[number % COLOURS.len()];
         let line: Vec<String> =
             curve.points.iter().map(|(part, value)| format!("{:.1},{:.1}", x(*part), y.at(*value))).collect();
-        let _ = write!(
-            out,
-            "<polyline class=\"curve\" stroke=\"{colour}\" points=\"{}\"/>\
-             <text x=\"{:.1}\" y=\"{:.1}\" text-anchor=\"end\" style=\"fill:{colour}\">{}</text>",
-            line.join(" "),
-            WIDTH - RIGHT - 6.0,
-            TOP + 16.0 * (number as f64 + 1.0),
-            curve.name.replace('\'', "′")
-        );
+        let _ = write!(out, "<polyline class=\"curve\" stroke=\"{colour}\" points=\"{}\"/>", line.join(" "));
     }
     let _ = write!(
         out,
@@ -151,7 +153,7 @@ mod tests {
         for (high, step) in [(1.0, 0.2), (3.68, 1.0), (0.43, 0.1), (1.22, 0.5), (2231.0, 500.0)] {
             assert!((round_step(high) / step - 1.0).abs() < 1e-9, "{high}: {}", round_step(high));
         }
-        let y = Ordinate::over(&[1.5, 2231.0]);
+        let y = Ordinate::over(&[1.5, 1.6, 2231.0]);
         assert!(y.is_logarithmic && y.marks() == [1.0, 10.0, 100.0, 1000.0, 10000.0]);
         assert!(y.at(10.0) < y.at(1.5));
     }
