@@ -54,6 +54,11 @@ impl Levels {
         Self { of: region.triangles().iter().map(|&triangle| (triangle, 1.0)).collect() }
     }
 
+    /// Copies other levels. Allocates nothing where there is room.
+    pub fn copy_from(&mut self, other: &Self) {
+        self.of.clone_from(&other.of);
+    }
+
     /// Triangles that are not coarse, ascending, with their levels.
     pub fn triangles(&self) -> &[(u32, f64)] {
         &self.of

@@ -192,6 +192,26 @@ fn what_falls_asleep_leaves_its_energy() {
     assert!(told.abs() < 1e-13 * before && (moving.energy_j() - before).abs() < 1e-13 * before);
 }
 
+/// A motion put back, as from a snapshot, in buffers that know another one: the same bits.
+#[test]
+fn a_motion_put_back_goes_on_with_the_same_bits() {
+    let mut moving = Moving::new(ball(HomeLaw::Linear), (0..258).collect());
+    let refined = region(&moving.model, &[0], 2);
+    let on = |moving: &mut Moving, refined: &[u32]| {
+        moving.go_on(refined, 0.07);
+        moving.step(1e-4);
+    };
+    moving.shake(1e-3);
+    (0..9).for_each(|_| on(&mut moving, &refined));
+    let kept = (moving.motion.clone(), moving.x.clone(), moving.v.clone());
+    (0..30).for_each(|_| on(&mut moving, &[]));
+    let ends = (moving.motion.clone(), moving.x.clone(), moving.v.clone());
+    assert_ne!(ends.0, kept.0);
+    (moving.motion, moving.x, moving.v) = kept;
+    (0..30).for_each(|_| on(&mut moving, &[]));
+    assert_eq!((moving.motion, moving.x, moving.v), ends);
+}
+
 /// The bound holds at any levels and however springs are stretched, and is not idle.
 #[test]
 fn no_frequency_is_above_the_bound() {

@@ -48,7 +48,8 @@ pub struct SpringScratch {
     ids: Vec<u32>,
     x_m: Vec<DVec3>,
     v_m_per_s: Vec<DVec3>,
-    /// Whether the springs laid out are those of the motion last seen.
+    /// Whose springs are laid out, once some are.
+    laid_out: SpringMotion,
     is_laid_out: bool,
 }
 
@@ -58,6 +59,13 @@ impl SpringMotion {
         let mut ids = Vec::with_capacity(model.spec().most_awake);
         ids.extend(awake);
         Self { ids, levels: Levels::with_room(model.spec().most_refined), fine: model.spec().fine }
+    }
+
+    /// Copies another motion of the same model. Allocates nothing.
+    pub fn copy_from(&mut self, other: &Self) {
+        self.ids.clone_from(&other.ids);
+        self.levels.copy_from(&other.levels);
+        self.fine = other.fine;
     }
 }
 
@@ -72,13 +80,9 @@ impl SpringScratch {
             ids: Vec::with_capacity(most),
             x_m: Vec::with_capacity(most),
             v_m_per_s: Vec::with_capacity(most),
+            laid_out: SpringMotion::at_rest(model, []),
             is_laid_out: false,
         }
-    }
-
-    /// The state was replaced: lays everything out anew.
-    pub fn forget(&mut self) {
-        self.is_laid_out = false;
     }
 
     /// Masses (kg) of the awake nodes; infinite where they are held.
@@ -99,11 +103,10 @@ impl SpringScratch {
         (x_m, v_m_per_s): (&mut Vec<DVec3>, &mut Vec<DVec3>),
         wanted: &Wanted<'_>,
     ) -> [f64; 2] {
-        if !self.is_laid_out {
+        if !self.is_laid_out || self.laid_out != *motion {
             self.lay_out(model, motion);
             self.is_laid_out = true;
         }
-        let mut elastic_j = -self.running.changing_energy_j(model, &motion.ids, x_m);
         let changed = motion.levels.go_on(wanted.refined, wanted.step, &mut self.next_levels);
         let same_constants = motion.fine == wanted.fine;
         motion.fine = wanted.fine;
@@ -112,9 +115,12 @@ impl SpringScratch {
         if same_ids && !changed && same_constants {
             return [0.0; 2];
         }
+        // Of what was laid out, whatever is wanted now.
+        let mut elastic_j = -self.running.changing_energy_j(model, &motion.ids, x_m);
         let mut kinetic_j = 0.0;
         if same_ids {
             self.running.add_levels(model, &motion.ids, &motion.levels, &motion.fine);
+            self.laid_out.copy_from(motion);
         } else {
             elastic_j += self.put_home(model, motion, x_m);
             kinetic_j -= kinetic(&self.mass_kg, v_m_per_s);
@@ -136,6 +142,7 @@ impl SpringScratch {
         let Self { mass_kg, .. } = self;
         mass_kg.clear();
         mass_kg.extend(motion.ids.iter().map(|&id| own_mass_kg(model, &motion.ids, id)));
+        self.laid_out.copy_from(motion);
     }
 
     /// The awake nodes to be.
