@@ -73,6 +73,16 @@ impl Energies {
                 ..Self::default()
             };
         }
+        if let (Some(body), Some(springs)) = (model.springs(), &state.springs) {
+            let [kinetic_j, elastic_j] = body.energies_j(&springs.motion, &state.x, &state.v);
+            return Self {
+                kinetic_j,
+                elastic_j,
+                gravitational_j: body.gravitational_j(&springs.motion, &state.x, model.gravity_m_per_s2()),
+                external_work_j: state.ledger.external_work_j,
+                dissipated_j: state.ledger.dissipated_j,
+            };
+        }
         let kinetic_j = (0..state.x.len()).map(|i| 0.5 * model.mass_kg()[i] * state.v[i].length_squared()).sum();
         let along_gravity = |i: usize| model.gravity_m_per_s2().dot(state.x[i] - model.rest_positions_m()[i]);
         let fallen_j: f64 = (0..state.x.len()).map(|i| model.mass_kg()[i] * along_gravity(i)).sum();
@@ -101,6 +111,9 @@ pub fn elastic_energy_j(model: &Model, state: &State) -> f64 {
     if let Some(hybrid) = model.hybrid() {
         return hybrid.energies(DVec3::ZERO, state).elastic_j;
     }
+    if let (Some(body), Some(springs)) = (model.springs(), &state.springs) {
+        return body.energies_j(&springs.motion, &state.x, &state.v)[1];
+    }
     (0..model.mesh().tets().len())
         .map(|tet| {
             let corners = model.mesh().tets()[tet].map(|n| state.x[n as usize]);
@@ -109,8 +122,11 @@ pub fn elastic_energy_j(model: &Model, state: &State) -> f64 {
         .sum()
 }
 
-/// Smallest `J = det F` over all tets, and its tet; of a hybrid body, over the coarse tets' means and the awake cells. Below zero: inverted.
+/// Smallest `J = det F` over all tets, and its tet; of a hybrid body, over the coarse tets' means and the awake cells. Below zero: inverted. Springs have none: 1.
 pub fn min_volume_ratio(model: &Model, state: &State) -> (f64, usize) {
+    if model.springs().is_some() {
+        return (1.0, 0);
+    }
     if let Some(hybrid) = model.hybrid() {
         return hybrid.min_volume_ratio(state);
     }

@@ -9,6 +9,7 @@
 
 pub mod contact;
 pub mod fem;
+mod hash;
 pub mod health;
 pub mod hybrid;
 pub mod integrate;

@@ -4,7 +4,9 @@
 //! (postcard). A state goes back only into the body it came from: same mesh, materials, loads, tools and settings.
 use crate::{
     contact::ToolState,
+    hash::{Fnv, OFFSET, fnv},
     seed::SeedMotion,
+    spring::SpringBody,
     world::{Model, ModelSpec, State},
 };
 use std::fmt::Write;
@@ -13,7 +15,7 @@ use thiserror::Error;
 const MAGIC: [u8; 4] = *b"PLPS";
 const HEADER: usize = 24;
 /// Version of the layout; another one is refused.
-pub const VERSION: u32 = 9;
+pub const VERSION: u32 = 10;
 
 /// Why bytes are not a state of a body.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
@@ -90,7 +92,8 @@ pub fn restore(model: &Model, bytes: &[u8]) -> Result<State, SnapshotError> {
 }
 
 fn check(model: &Model, state: &State) -> Result<(), SnapshotError> {
-    let nodes = model.rest_positions_m().len() + state.active.len();
+    let of_springs = state.springs.as_ref().map_or(0, |springs| springs.motion.ids.len());
+    let nodes = model.always_awake_m().len() + state.active.len() + of_springs;
     let counts = state.active.fit(model)
         && [&state.x, &state.v, &state.force_n, &state.external_n].iter().all(|v| v.len() == nodes)
         && state.tools.len() == model.spec().tools.len()
@@ -100,6 +103,10 @@ fn check(model: &Model, state: &State) -> Result<(), SnapshotError> {
         && match (&state.seed, model.seed()) {
             (Some(motion), Some(seed)) => motion.fits(seed, &state.x, &state.v),
             (motion, seed) => motion.is_none() && seed.is_none(),
+        }
+        && match (&state.springs, model.springs()) {
+            (Some(own), Some(body)) => own.fits(body, model.spec().tools.len()),
+            (own, body) => own.is_none() && body.is_none(),
         };
     if !counts {
         return Err(SnapshotError::OtherBody);
@@ -136,6 +143,7 @@ fn fingerprint(model: &Model) -> u64 {
         mesh: _,
         particles,
         seed,
+        springs: _,
         regions,
         tet_region,
         prescribed,
@@ -145,26 +153,11 @@ fn fingerprint(model: &Model) -> u64 {
         settings,
     } = model.spec();
     let mut hash = Fnv(fnv(OFFSET, positions.chain(tets)));
+    let springs = model.springs().map(SpringBody::fingerprint);
     // A float prints as the shortest text that reads back to its bits. Writing to the hash cannot fail.
-    let rest = ((particles, seed), regions, tet_region, prescribed, loads, gravity_m_per_s2, tools, settings);
+    let rest = ((particles, seed, springs), regions, tet_region, prescribed, loads, gravity_m_per_s2, tools, settings);
     let _ = write!(hash, "{rest:?}");
     hash.0
-}
-
-struct Fnv(u64);
-
-impl Write for Fnv {
-    fn write_str(&mut self, text: &str) -> std::fmt::Result {
-        self.0 = fnv(self.0, text.bytes());
-        Ok(())
-    }
-}
-
-const OFFSET: u64 = 0xcbf2_9ce4_8422_2325;
-
-/// FNV-1a, 64 bits.
-fn fnv(start: u64, bytes: impl Iterator<Item = u8>) -> u64 {
-    bytes.fold(start, |hash, byte| (hash ^ u64::from(byte)).wrapping_mul(0x0000_0100_0000_01b3))
 }
 
 /// FNV-1a over the bits of tick, positions and velocities, a seed body's particles included: equal states give equal hashes on every machine.
@@ -194,6 +187,7 @@ mod tests {
             mesh: TetMesh::new(p, vec![[0, 1, 2, 3]]).unwrap(),
             particles: None,
             seed: None,
+            springs: None,
             regions: vec![Region { name: "all".into(), material, density_kg_per_m3: 1e3 }],
             tet_region: vec![0],
             prescribed: Vec::new(),

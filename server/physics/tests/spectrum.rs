@@ -154,6 +154,7 @@ fn growth(fraction: f64, ticks: u32) -> f64 {
     let spec = |tick_period_s: f64| ModelSpec {
         particles: None,
         seed: None,
+        springs: None,
         regions: vec![Region {
             name: "body".into(),
             material: material(10e3, 0.45, Law::StableNeoHookean),

@@ -33,6 +33,7 @@ pub fn model(shape: &Shape, material: Material, tool: Option<ToolSpec>) -> Resul
         mesh: shape.mesh.clone(),
         particles: None,
         seed: None,
+        springs: None,
         regions: vec![Region { name: "body".into(), material, density_kg_per_m3: 1000.0 }],
         tet_region: vec![0; shape.mesh.tets().len()],
         prescribed: base

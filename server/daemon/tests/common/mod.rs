@@ -72,6 +72,7 @@ pub fn block_scene(name: &str, cells: u32) -> Scene {
             mesh: shape.mesh,
             particles: None,
             seed: None,
+            springs: None,
             regions: vec![Region { name: "all".into(), material, density_kg_per_m3: 1e3 }],
             prescribed: vec![PrescribedSpec { name: "table".into(), nodes: bottom.clone(), axes: [true; 3] }],
             loads: Vec::new(),

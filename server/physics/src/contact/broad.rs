@@ -61,6 +61,8 @@ pub(crate) trait Skin {
     fn group_distance_m(&self, group: usize, from_m: DVec3) -> f64;
     /// The same of a cluster.
     fn cluster_distance_m(&self, cluster: usize, from_m: DVec3) -> f64;
+    /// Number of clusters.
+    fn clusters(&self) -> usize;
     /// The vertices of a cluster.
     fn vertices(&self, cluster: usize) -> &[u32];
     /// Where a vertex is (m).

@@ -8,6 +8,7 @@ mod foundation;
 mod inside;
 mod local_model;
 mod narrow;
+mod nearest;
 mod proxy;
 mod resting;
 mod spring;
@@ -19,6 +20,7 @@ mod touching;
 mod triangle;
 
 pub use inside::is_inside;
+pub(crate) use nearest::{deepest_m, nearest_vertex};
 pub use proxy::SubstepTime;
 pub(crate) use resting::{Pressing, RestingContact};
 pub(crate) use spring::SaturatingSpring;

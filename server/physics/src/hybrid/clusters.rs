@@ -9,7 +9,7 @@
 use super::body::Hybrid;
 use crate::contact::broad::{CLUSTER, GROUP, box_distance_m};
 use glam::DVec3;
-use std::{collections::BTreeSet, ops::Range};
+use std::collections::BTreeSet;
 
 /// Boxes at rest of clusters, and of groups of them, with the coarse nodes that they follow.
 #[derive(Debug, Clone, Default)]
@@ -75,12 +75,6 @@ impl SkinClusters {
     /// Number of groups.
     pub(super) fn groups(&self) -> usize {
         self.groups.low_m.len()
-    }
-
-    /// The clusters of a group.
-    pub(super) fn of_group(&self, group: usize) -> Range<usize> {
-        let in_group = GROUP / CLUSTER;
-        group * in_group..((group + 1) * in_group).min(self.clusters.low_m.len())
     }
 
     /// The group of a cluster.

@@ -1,7 +1,7 @@
 //! The skin's vertices that something acts on, and where any other is when asked.
 use super::{body::Hybrid, clusters::Displaced, composite::Anchor, partition::NONE, running::RunningPatch};
 use crate::{
-    contact::broad::{ClusterBox, ROUNDING_M, Skin},
+    contact::broad::Skin,
     world::State,
 };
 use glam::DVec3;
@@ -153,55 +153,16 @@ impl<'a> SkinView<'a> {
             amplification: self.hybrid.amplification,
         }
     }
-
-    /// The vertex nearest to a point, if one is within a distance (m): its rest position (m), and how far it is (m). Of several as near, the first one.
-    /// `fitted` are contact's boxes and its travel (m), where they are of use.
-    pub(super) fn nearest(
-        &mut self,
-        from_m: DVec3,
-        within_m: f64,
-        fitted: Option<(&[ClusterBox], f64)>,
-    ) -> Option<(DVec3, f64)> {
-        self.begin();
-        let bound_m = |cluster: usize| {
-            let of_fitted_m = fitted.map_or(0.0, |(boxes, travel_m)| boxes[cluster].distance_bound_m(from_m, travel_m));
-            self.cluster_distance_m(cluster, from_m).max(of_fitted_m)
-        };
-        let mut found = (within_m, NONE);
-        // What comes first should be near: it rules out most of the others.
-        let near = |group: &usize| self.group_distance_m(*group, from_m) <= within_m;
-        let clusters = &self.hybrid.clusters;
-        let all = (0..clusters.groups()).filter(near).flat_map(|group| clusters.of_group(group));
-        let first = all.map(|cluster| (bound_m(cluster), cluster)).min_by(|a, b| a.0.total_cmp(&b.0))?.1;
-        self.look_at(first, from_m, &mut found);
-        for group in 0..clusters.groups() {
-            if self.group_distance_m(group, from_m) > found.0 + ROUNDING_M {
-                continue;
-            }
-            for cluster in clusters.of_group(group) {
-                if cluster != first && bound_m(cluster) <= found.0 + ROUNDING_M {
-                    self.look_at(cluster, from_m, &mut found);
-                }
-            }
-        }
-        let (nearest_m, vertex) = found;
-        (vertex != NONE).then(|| (self.rest_positions_m[vertex as usize], nearest_m))
-    }
-
-    fn look_at(&self, cluster: usize, from_m: DVec3, (nearest_m, nearest): &mut (f64, u32)) {
-        for &vertex in self.vertices(cluster) {
-            let distance_m = self.position_m(vertex).distance(from_m);
-            if distance_m < *nearest_m || (distance_m == *nearest_m && vertex < *nearest && *nearest != NONE) {
-                (*nearest_m, *nearest) = (distance_m, vertex);
-            }
-        }
-    }
 }
 
 impl Skin for SkinView<'_> {
     /// Takes how far the active particles are from where they would be asleep.
     fn begin(&mut self) {
         self.deviation_m = self.patch.deviation_m();
+    }
+
+    fn clusters(&self) -> usize {
+        self.hybrid.clusters.clusters()
     }
 
     fn vertices(&self, cluster: usize) -> &[u32] {

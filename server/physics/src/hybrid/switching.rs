@@ -23,7 +23,10 @@ use super::{
     running_metric::RunningMetric,
     spec::Waking,
 };
-use crate::world::{Model, Scratch, State};
+use crate::{
+    contact::{deepest_m, nearest_vertex},
+    world::{Model, Scratch, State},
+};
 use glam::{BVec3, DVec3};
 use serde::{Deserialize, Serialize};
 
@@ -239,12 +242,6 @@ pub fn wake_only(model: &Model, state: &mut State, scratch: &mut Scratch, partic
     }
 }
 
-/// Where a tool that touches is deepest in the body, by the force on it (N): in a dent many vertices are as near to its centre, and which is nearest would
-/// change with the particles that are awake.
-pub(crate) fn deepest_m(centre_m: DVec3, radius_m: f64, contact_force_n: DVec3) -> Option<DVec3> {
-    contact_force_n.try_normalize().map(|outwards| centre_m - outwards * radius_m)
-}
-
 /// Where the tools' balls are now.
 fn place_balls(model: &Model, view: &mut SkinView<'_>, spacing_m: f64, state: &mut State) {
     let State { tools, active, contact, force_is_current, .. } = state;
@@ -253,11 +250,12 @@ fn place_balls(model: &Model, view: &mut SkinView<'_>, spacing_m: f64, state: &m
         let near_m = (GAP * spec.radius_m).max(GAP * spacing_m) + AHEAD_S * tool.velocity_m_per_s.length();
         let deepest_m = deepest_m(tool.centre_m, spec.radius_m, tool.contact_force_n);
         let within_m = spec.radius_m + 2.0 * near_m;
-        let nearest = view.nearest(deepest_m.unwrap_or(tool.centre_m), within_m, fitted);
+        let nearest = nearest_vertex(view, deepest_m.unwrap_or(tool.centre_m), within_m, fitted);
         let gap_m = nearest.map_or(f64::INFINITY, |(_, distance_m)| distance_m - spec.radius_m);
         let gap_m = if deepest_m.is_some() { 0.0 } else { gap_m };
         match (ball.as_mut(), nearest) {
-            (_, Some((rest_m, _))) if gap_m < near_m => {
+            (_, Some((vertex, _))) if gap_m < near_m => {
+                let rest_m = model.surface_rest_positions_m()[vertex as usize];
                 let moved = ball.is_none_or(|ball| ball.rest_m.distance(rest_m) > FOLLOW * spacing_m);
                 let rest_m = if moved { rest_m } else { ball.map_or(rest_m, |ball| ball.rest_m) };
                 *ball = Some(Ball { rest_m, away_ticks: 0 });

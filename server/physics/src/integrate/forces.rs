@@ -1,5 +1,5 @@
 //! The force at an instant of a tick, for every integrator.
-use super::hybrid;
+use super::{hybrid, springs};
 use crate::{
     contact::{Body, SubstepTime},
     fem::loads::add_load_n,
@@ -49,7 +49,9 @@ impl Tick<'_> {
 
     /// Forces at the start of the tick, unless the last tick left them.
     pub(super) fn make_force_current(&self, state: &mut State, scratch: &mut Scratch) {
-        let is_tracked = scratch.hybrid.as_mut().is_some_and(|own| std::mem::take(&mut own.skin_is_tracked));
+        let of_hybrid = scratch.hybrid.as_mut().map(|own| &mut own.skin_is_tracked);
+        let tracked = of_hybrid.or(scratch.springs.as_mut().map(|own| &mut own.skin_is_tracked));
+        let is_tracked = tracked.is_some_and(std::mem::take);
         if !state.force_is_current {
             if !is_tracked {
                 state.contact.forget_geometry();
@@ -81,6 +83,9 @@ impl Tick<'_> {
         let Self { model, input, loads, .. } = self;
         if let (Some(body), Some(own)) = (model.hybrid(), &mut scratch.hybrid) {
             return hybrid::evaluate(self, body, state, (own, &mut scratch.contact), now);
+        }
+        if let (Some(body), Some(own)) = (model.springs(), &mut scratch.springs) {
+            return springs::evaluate(self, body, state, (own, &mut scratch.contact), now);
         }
         let external = &mut state.external_n;
         external.fill(DVec3::ZERO);
@@ -143,7 +148,8 @@ impl LoadRamp {
 
 /// A force on a node that there is; of a seed body, on one of its surface.
 pub(super) fn is_usable(model: &Model, point: &PointForce) -> bool {
-    let nodes = if model.hybrid().is_some() { model.surface().nodes.len() } else { model.mass_kg().len() };
+    let by_vertices = model.hybrid().is_some() || model.springs().is_some();
+    let nodes = if by_vertices { model.surface().nodes.len() } else { model.mass_kg().len() };
     let of_surface = || model.surface().vertex_of_node.get(point.node as usize).is_some_and(|&v| v != u32::MAX);
     (point.node as usize) < nodes && point.force_n.is_finite() && (model.seed().is_none() || of_surface())
 }

@@ -89,7 +89,7 @@ pub(super) fn evaluate(
     state.force_is_current = true;
 }
 
-fn vertices_of(model: &Model, load: &LoadSpec, list: &mut impl FnMut(u32)) {
+pub(super) fn vertices_of(model: &Model, load: &LoadSpec, list: &mut impl FnMut(u32)) {
     match load {
         LoadSpec::NodalForces(forces) => forces.iter().for_each(|(vertex, _)| list(*vertex)),
         LoadSpec::Traction { triangles, .. } | LoadSpec::Pressure { triangles, .. } => {

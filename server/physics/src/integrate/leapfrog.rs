@@ -16,6 +16,7 @@ use super::{
     forces::Tick,
     hybrid,
     motion::{self, drift},
+    springs,
     stability::is_judged,
 };
 use crate::world::{Model, Scratch, State};
@@ -52,6 +53,9 @@ fn note_long_step(tick: &Tick<'_>, done: u32, state: &State, scratch: &mut Scrat
 fn kick(model: &Model, state: &mut State, scratch: &mut Scratch, (h_s, ends_long_step): (f64, bool)) {
     match (model.hybrid(), &mut scratch.hybrid) {
         (Some(body), Some(own)) => hybrid::kick(model, body, state, own, (h_s, ends_long_step)),
-        _ => motion::kick(model, state, h_s),
+        _ => match &scratch.springs {
+            Some(own) => springs::kick(model, state, own, h_s),
+            None => motion::kick(model, state, h_s),
+        },
     }
 }

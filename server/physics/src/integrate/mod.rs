@@ -11,6 +11,7 @@ pub mod seed_semi_implicit;
 mod seed_verlet;
 mod sleep;
 pub mod spectrum;
+mod springs;
 mod stability;
 mod tick;
 
@@ -18,6 +19,7 @@ pub(crate) use scheme::{Body, ImplicitScratch, Scheme};
 pub(crate) use seed_body::SeedBodyScratch;
 pub(crate) use sleep::RestBound;
 pub use sleep::Sleep;
+pub(crate) use springs::SpringBodyScratch;
 pub(crate) use stability::ForceHistory;
 pub use stability::{InstantForces, Pace};
 pub use tick::step;

@@ -110,7 +110,9 @@ impl Pace {
 /// Only leapfrog's ticks are judged and repeated: the seeds' schemes run as their authors describe them, backward Euler needs none.
 pub(crate) fn is_judged(model: &Model) -> bool {
     let settings = &model.spec().settings;
-    settings.subcycle_unstable && settings.integrator == Integrator::Leapfrog && model.seed().is_none()
+    // The step of springs is stable at any stretch (`spring::model`).
+    let may_be_too_long = model.seed().is_none() && model.springs().is_none();
+    settings.subcycle_unstable && settings.integrator == Integrator::Leapfrog && may_be_too_long
 }
 
 fn judges_across_ticks(model: &Model) -> bool {

@@ -34,6 +34,9 @@ pub fn step(model: &Model, state: &mut State, scratch: &mut Scratch, input: &Tic
         own.prepare(model, body, state);
         scratch.history.fit(state);
     }
+    if let (Some(body), Some(own)) = (model.springs(), &mut scratch.springs) {
+        own.prepare(model, body, state, input.point_forces);
+    }
     let was_quiet = model.rest_bound().is_some() && state.sleep.is_quiet(&state.load_factors, input);
     let judged = is_judged(model);
     scratch.last_good.keep(state);
@@ -87,6 +90,9 @@ pub fn step(model: &Model, state: &mut State, scratch: &mut Scratch, input: &Tic
 
 /// Puts back the last good tick, at rest: a velocity that led here would lead here again.
 fn quarantine(model: &Model, state: &mut State, scratch: &mut Scratch, node: u32) -> Quarantine {
+    // Positions of springs are those of awake nodes.
+    let awake = state.springs.as_ref().map(|springs| &springs.motion.ids);
+    let node = awake.map_or(node, |ids| ids.get(node as usize).copied().unwrap_or(Quarantine::NOT_A_NODE));
     let what = Quarantine { tick: state.tick, node };
     scratch.last_good.put_back(state);
     state.v.fill(DVec3::ZERO);
@@ -133,7 +139,7 @@ fn take_inputs(model: &Model, state: &mut State, scratch: &mut Scratch, input: &
         && input.prescribed_displacements_m.iter().all(|d| d.is_finite());
     rejected += u32::from(!prescribed_ok);
     scratch.history.held_jump = 0.0;
-    if model.seed().is_some() {
+    if model.seed().is_some() || model.springs().is_some() {
         // What it holds stands still.
         let moved = prescribed_ok && input.prescribed_displacements_m.iter().any(|d| *d != DVec3::ZERO);
         return rejected + u32::from(moved);
@@ -187,6 +193,10 @@ fn run(tick: &Tick<'_>, state: &mut State, scratch: &mut Scratch) {
 /// The holder supplies what the other forces lack: `r = −f` on prescribed axes.
 pub(super) fn write_reactions(model: &Model, state: &State, scratch: &mut Scratch) {
     for node in model.spec().prescribed.iter().flat_map(|set| &set.nodes).map(|&node| node as usize) {
+        if let Some(own) = &scratch.springs {
+            scratch.reaction_n[node] = own.place(node as u32).map_or(DVec3::ZERO, |place| -state.force_n[place]);
+            continue;
+        }
         let held = model.inverse_mass_per_kg()[node].cmpeq(DVec3::ZERO);
         let total_n = state.force_n[node] + state.active.long_steps.beyond_of(node);
         scratch.reaction_n[node] = DVec3::select(held, -total_n, DVec3::ZERO);

@@ -101,6 +101,11 @@ pub enum MeshError {
 const DEGENERATE_VOLUME_RATIO: f64 = 1e-12;
 
 impl TetMesh {
+    /// No tets: of a body that is a surface alone.
+    pub fn none() -> Self {
+        Self { positions_m: Vec::new(), tets: Vec::new() }
+    }
+
     /// Checks and takes a mesh: `positions_m` (m), `tets` as node indices from 0.
     ///
     /// # Errors

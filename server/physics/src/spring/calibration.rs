@@ -12,6 +12,7 @@ use super::{
     region::{Constants, Refined, Region},
     topology::{NONE, Triangulation, TriangulationError},
 };
+use crate::hash::{OFFSET, fnv};
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -173,9 +174,7 @@ impl ConstantsTable {
 pub fn fingerprint(surface: &Triangulation) -> u64 {
     let positions = surface.positions_m().iter().flat_map(DVec3::to_array).flat_map(|c| c.to_bits().to_le_bytes());
     let triangles = surface.triangles().iter().flatten().flat_map(|vertex| vertex.to_le_bytes());
-    positions
-        .chain(triangles)
-        .fold(0xcbf2_9ce4_8422_2325, |hash: u64, byte| (hash ^ u64::from(byte)).wrapping_mul(0x0000_0100_0000_01b3))
+    fnv(OFFSET, positions.chain(triangles))
 }
 
 fn check(of: &Calibration) -> Result<(), CalibrationError> {

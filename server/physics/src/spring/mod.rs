@@ -8,10 +8,13 @@
 //!
 //! *Refining* splits each triangle of a region in four by Loop's scheme. A vertex of the refined surface is of *type 1* when it belongs to a vertex of the coarse one,
 //! of *type 2* when it belongs to an edge.
+pub mod around;
 pub mod blend;
+pub mod body;
 pub mod calibration;
 #[cfg(test)]
 mod checks;
+pub mod energy;
 pub mod equilibrium;
 pub mod home;
 pub mod loop_scheme;
@@ -19,15 +22,20 @@ pub mod matching;
 pub mod model;
 pub mod motion;
 pub mod net;
+pub mod places;
 pub mod region;
 pub mod running;
 #[cfg(test)]
 pub(crate) mod testing;
+pub(crate) mod skin;
+pub(crate) mod state;
 pub mod topology;
 
+pub use body::{Refinement, Refining, SpringBody, SpringBodyError, SpringBodySpec};
 pub use home::{HomeLaw, HomeLawError};
 pub use model::{SpringError, SpringModel, SpringSpec};
-pub use motion::{SpringMotion, SpringScratch, Wanted};
+pub use motion::{Changed, SpringMotion, SpringScratch, Wanted};
 pub use net::{Net, Spring};
 pub use region::{Refined, Region};
+pub use state::{SpringState, refine_only};
 pub use topology::{Triangulation, TriangulationError};

@@ -30,7 +30,7 @@ pub struct SpringSpec {
     pub mass_kg: Vec<f64>,
     /// Vertices that do not move.
     pub held: Vec<u32>,
-    /// Most nodes awake at once.
+    /// Most coarse vertices awake at once, besides those of refined triangles.
     pub most_awake: usize,
     /// Most triangles refined at once.
     pub most_refined: usize,
@@ -102,7 +102,7 @@ impl SpringModel {
         let mut is_held = vec![false; spec.mass_kg.len()];
         spec.held.iter().for_each(|&vertex| is_held[vertex as usize] = true);
         let mut model = Self { rest_m, fine_triangles, edge_kg, is_held, frequency_rad_per_s: 0.0, spec };
-        model.frequency_rad_per_s = model.frequency_bound_rad_per_s();
+        model.frequency_rad_per_s = model.frequency_bound_sq(&[]).sqrt();
         Ok(model)
     }
 
@@ -141,33 +141,58 @@ impl SpringModel {
         0.75 * self.spec.mass_kg[vertex as usize] / self.spec.surface.edges_at(vertex).len() as f64
     }
 
+    /// Most nodes awake at once.
+    pub fn most_nodes(&self) -> usize {
+        // Of a refined triangle its corners and the middles of its edges.
+        self.rest_m.len().min(self.spec.most_awake + 6 * self.spec.most_refined)
+    }
+
     /// Whether a coarse vertex does not move.
     pub fn is_held(&self, vertex: u32) -> bool {
         self.is_held[vertex as usize]
     }
 
-    /// No natural frequency (rad/s) is larger, at whatever levels and while no home spring is beyond its steepest slope at rest or behind, and however far springs are stretched.
+    /// No natural frequency (rad/s) is larger, at whatever levels and while no home spring is pulled by more than the longest edge's length, and however far springs are stretched.
     pub fn frequency_rad_per_s(&self) -> f64 {
         self.frequency_rad_per_s
     }
 
+    /// The same, squared, with contact that is at most a spring (N/m) in all directions on each node of the surface refined everywhere.
+    pub fn touched_frequency_sq(&self, contact_n_per_m: &[f64]) -> f64 {
+        self.frequency_bound_sq(contact_n_per_m)
+    }
+
     /// `ω² ≤ max_i (K_h + 2 Σ_j k_ij)/m_i` (Gershgorin; a spring's stiffness across it is less than along it). A vertex's springs are at most those of both levels beside each other, its mass at
     /// least what it keeps when refined all around.
-    fn frequency_bound_rad_per_s(&self) -> f64 {
+    ///
+    /// `contact_n_per_m` is what contact may do, at most, on each node of the surface refined everywhere, as a spring in all directions; empty: nothing. Where an edge's middle has the level `s`, it acts
+    /// on the node by `s` and on either end by `½ (1 − s)`.
+    fn frequency_bound_sq(&self, contact_n_per_m: &[f64]) -> f64 {
+        let touch_n_per_m = |node: u32, with_edges: bool| {
+            let of = |node: u32| contact_n_per_m.get(node as usize).copied().unwrap_or(0.0);
+            let edges = if with_edges { self.surface().edges_at(node) } else { &[] };
+            of(node) + edges.iter().map(|edge| 0.5 * of(self.vertices() + edge)).sum::<f64>()
+        };
         let Constants { mesh_n_per_m, home_n_per_m } = self.spec.fine;
         let most = |coarse: f64, fine: f64| coarse.max(fine);
+        let edges = 0..self.surface().edges().len() as u32;
+        let longest_m = edges.map(|edge| self.surface().length_m(edge)).fold(0.0, f64::max);
+        let steepest = self.spec.home_law.steepest_within(longest_m);
         let of_vertex = |vertex: u32| {
             let edges = self.surface().edges_at(vertex).len() as f64;
             let triangles = self.surface().triangles_at(vertex).len() as f64;
-            // Along an edge (1 − s) K_m + s K′_m; crack springs to the middles of edges across.
+            // Along an edge (1 − s) K_m + s K′_m; crack springs to the middles of edges across. A tie's row is ¼ k twice and ½ k.
             let springs = edges * most(self.spec.coarse.mesh_n_per_m, mesh_n_per_m) + triangles * mesh_n_per_m;
-            let home = most(self.spec.coarse.home_n_per_m, home_n_per_m);
-            (home + 2.0 * springs) / (0.25 * self.spec.mass_kg[vertex as usize])
+            let home = steepest * most(self.spec.coarse.home_n_per_m, home_n_per_m);
+            let of_contact = touch_n_per_m(vertex, true);
+            (home + 2.0 * springs + edges * home_n_per_m + of_contact) / (0.25 * self.spec.mass_kg[vertex as usize])
         };
-        // Two halves, four springs inside or two to corners across.
-        let of_edge = |kg: &f64| (home_n_per_m + 2.0 * 6.0 * mesh_n_per_m) / kg;
+        // Two halves, four springs inside or two to corners across; s K′_h home and (1 − s) 2 K′_h in the tie's row.
+        let of_edge = |(edge, kg): (u32, &f64)| {
+            ((1.0 + steepest) * home_n_per_m + 12.0 * mesh_n_per_m + touch_n_per_m(self.vertices() + edge, false)) / kg
+        };
         let of_vertices = (0..self.vertices()).map(of_vertex);
-        of_vertices.chain(self.edge_kg.iter().map(of_edge)).fold(0.0, f64::max).sqrt()
+        of_vertices.chain((0..).zip(&self.edge_kg).map(of_edge)).fold(0.0, f64::max)
     }
 }
 

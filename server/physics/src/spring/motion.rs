@@ -7,7 +7,7 @@
 //! M v ← M v + g v_e,  M ← M + g,           ΔK = −½ M g/(M + g) |v − v_e|² at either end    going
 //! ```
 use super::{
-    blend::Levels,
+    blend::{self, Levels},
     model::SpringModel,
     region::Constants,
     running::{RunningSprings, vertices_of},
@@ -51,14 +51,51 @@ pub struct SpringScratch {
     /// Whose springs are laid out, once some are.
     laid_out: SpringMotion,
     is_laid_out: bool,
+    /// How often anything was laid out.
+    layout: u64,
+}
+
+/// What a tick changed of a surface.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Changed {
+    /// Elastic energy, by how much (J).
+    pub elastic_j: f64,
+    /// Kinetic energy, by how much (J).
+    pub kinetic_j: f64,
+    /// At most how far (m) any point of the surface was moved: of the coarse one, of edges' middles where they are awake or where their ends' displacements have them.
+    pub moved_m: f64,
 }
 
 impl SpringMotion {
     /// Everything coarse; these vertices awake.
     pub fn at_rest(model: &SpringModel, awake: impl IntoIterator<Item = u32>) -> Self {
-        let mut ids = Vec::with_capacity(model.spec().most_awake);
+        let mut ids = Vec::with_capacity(model.most_nodes());
         ids.extend(awake);
         Self { ids, levels: Levels::with_room(model.spec().most_refined), fine: model.spec().fine }
+    }
+
+    /// Everything coarse and asleep. Allocates nothing.
+    pub fn reset(&mut self, model: &SpringModel) {
+        self.ids.clear();
+        self.levels.clear();
+        self.fine = model.spec().fine;
+    }
+
+    /// Whether it may be a motion of a model, with these coarse vertices awake besides those of triangles that are not coarse.
+    pub fn fits(&self, model: &SpringModel, awake: &[u32]) -> bool {
+        let Constants { mesh_n_per_m, home_n_per_m } = self.fine;
+        let positive = |k: f64| k > 0.0 && k.is_finite();
+        let ascending = awake.windows(2).all(|pair| pair[0] < pair[1]);
+        let known = awake.last().is_none_or(|last| *last < model.vertices());
+        let spec = model.spec();
+        if !(ascending && known && awake.len() <= spec.most_awake && positive(mesh_n_per_m) && positive(home_n_per_m))
+            || !self.levels.fit(model.surface().triangles().len(), spec.most_refined)
+        {
+            return false;
+        }
+        let mut ids = Vec::new();
+        choose_ids(model, &self.levels, awake, &mut ids);
+        ids == self.ids
     }
 
     /// Copies another motion of the same model. Allocates nothing.
@@ -72,7 +109,7 @@ impl SpringMotion {
 impl SpringScratch {
     /// Buffers of a model.
     pub fn new(model: &SpringModel) -> Self {
-        let most = model.spec().most_awake;
+        let most = model.most_nodes();
         Self {
             running: RunningSprings::with_room(model),
             mass_kg: Vec::with_capacity(most),
@@ -82,6 +119,25 @@ impl SpringScratch {
             v_m_per_s: Vec::with_capacity(most),
             laid_out: SpringMotion::at_rest(model, []),
             is_laid_out: false,
+            layout: 0,
+        }
+    }
+
+    /// Changes whenever nodes or levels do.
+    pub fn layout(&self) -> u64 {
+        self.layout
+    }
+
+    /// The place among positions of a node that is awake.
+    pub fn place(&self, id: u32) -> Option<usize> {
+        self.running.place(id)
+    }
+
+    /// Lays out the springs of a motion, unless they are.
+    pub fn follow(&mut self, model: &SpringModel, motion: &SpringMotion) {
+        if !self.is_laid_out || self.laid_out != *motion {
+            self.lay_out(model, motion);
+            self.is_laid_out = true;
         }
     }
 
@@ -95,37 +151,43 @@ impl SpringScratch {
         self.running.add_forces_n(model, &motion.ids, x_m, forces_n);
     }
 
-    /// Brings nodes and springs to what is wanted, by a tick; returns by how much (J) that changes elastic and kinetic energy. Allocates nothing.
+    /// Energy (J) of what levels add and of all home springs.
+    pub fn changing_energy_j(&mut self, model: &SpringModel, motion: &SpringMotion, x_m: &[DVec3]) -> f64 {
+        self.running.changing_energy_j(model, &motion.ids, x_m)
+    }
+
+    /// Brings nodes and springs to what is wanted, by a tick; tells what that changed, if anything. Allocates nothing.
     pub fn go_on(
         &mut self,
         model: &SpringModel,
         motion: &mut SpringMotion,
         (x_m, v_m_per_s): (&mut Vec<DVec3>, &mut Vec<DVec3>),
         wanted: &Wanted<'_>,
-    ) -> [f64; 2] {
-        if !self.is_laid_out || self.laid_out != *motion {
-            self.lay_out(model, motion);
-            self.is_laid_out = true;
-        }
+    ) -> Option<Changed> {
+        self.follow(model, motion);
         let changed = motion.levels.go_on(wanted.refined, wanted.step, &mut self.next_levels);
         let same_constants = motion.fine == wanted.fine;
         motion.fine = wanted.fine;
-        self.choose_ids(model, &motion.levels, wanted.awake);
+        choose_ids(model, &motion.levels, wanted.awake, &mut self.ids);
         let same_ids = self.ids == motion.ids;
         if same_ids && !changed && same_constants {
-            return [0.0; 2];
+            return None;
         }
+        let mut moved_m = if changed { self.moved_by_levels_m(model, motion, x_m, wanted.step) } else { 0.0 };
         // Of what was laid out, whatever is wanted now.
         let mut elastic_j = -self.running.changing_energy_j(model, &motion.ids, x_m);
         let mut kinetic_j = 0.0;
         if same_ids {
             self.running.add_levels(model, &motion.ids, &motion.levels, &motion.fine);
             self.laid_out.copy_from(motion);
+            self.layout += 1;
         } else {
-            elastic_j += self.put_home(model, motion, x_m);
+            let (put_home_j, put_home_m) = self.put_home(model, motion, x_m);
+            elastic_j += put_home_j;
+            moved_m += put_home_m;
             kinetic_j -= kinetic(&self.mass_kg, v_m_per_s);
             self.hand_back(model, motion, v_m_per_s);
-            self.come(model, motion, (x_m, v_m_per_s));
+            self.come(model, (x_m, v_m_per_s));
             motion.ids.clone_from(&self.ids);
             x_m.clone_from(&self.x_m);
             v_m_per_s.clone_from(&self.v_m_per_s);
@@ -133,71 +195,61 @@ impl SpringScratch {
             kinetic_j += kinetic(&self.mass_kg, v_m_per_s);
         }
         elastic_j += self.running.changing_energy_j(model, &motion.ids, x_m);
-        [elastic_j, kinetic_j]
+        Some(Changed { elastic_j, kinetic_j, moved_m })
+    }
+
+    /// An edge's middle is at `s x_e + (1 − s) (X_e + ½ (u_a + u_b))`, so a change of level moves it by that of `s` times what a tie has to pull at.
+    fn moved_by_levels_m(&self, model: &SpringModel, motion: &SpringMotion, x_m: &[DVec3], step: f64) -> f64 {
+        let vertices = vertices_of(model, &motion.ids);
+        let moved = |node: u32| self.place(node).map_or(DVec3::ZERO, |at| x_m[at] - model.rest_m()[node as usize]);
+        let off_m = |&id: &u32| {
+            let [a, b] = model.surface().edges()[(id - model.vertices()) as usize].nodes.map(moved);
+            moved(id).distance((a + b) * 0.5)
+        };
+        motion.ids[vertices..].iter().map(off_m).fold(0.0, f64::max) * blend::steepest(step)
     }
 
     fn lay_out(&mut self, model: &SpringModel, motion: &SpringMotion) {
         self.running.lay_out(model, &motion.ids);
         self.running.add_levels(model, &motion.ids, &motion.levels, &motion.fine);
-        let Self { mass_kg, .. } = self;
+        let Self { mass_kg, running, .. } = self;
         mass_kg.clear();
-        mass_kg.extend(motion.ids.iter().map(|&id| own_mass_kg(model, &motion.ids, id)));
+        mass_kg.extend(motion.ids.iter().map(|&id| own_mass_kg(model, running, id)));
         self.laid_out.copy_from(motion);
+        self.layout += 1;
     }
 
-    /// The awake nodes to be.
-    fn choose_ids(&mut self, model: &SpringModel, levels: &Levels, awake: &[u32]) {
-        let ids = &mut self.ids;
-        ids.clear();
-        ids.extend_from_slice(awake);
-        let before = ids.len();
-        levels.for_each_vertex(model.surface(), |vertex, _| {
-            if awake.binary_search(&vertex).is_err() {
-                ids.push(vertex);
-            }
-        });
-        if ids.len() > before {
-            ids.sort_unstable();
-        }
-        let vertices = ids.len();
-        levels.for_each_edge(model.surface(), |edge, _| ids.push(model.vertices() + edge));
-        ids[vertices..].sort_unstable();
-    }
-
-    /// Puts vertices that fall asleep home, one after the other; returns by how much (J) the springs of the coarse surface that they are on change: those of levels and homes are told elsewhere.
-    fn put_home(&mut self, model: &SpringModel, motion: &SpringMotion, x_m: &mut [DVec3]) -> f64 {
+    /// Puts vertices that fall asleep home, one after the other; returns by how much (J) the springs of the coarse surface that they are on change (those of levels and homes are told
+    /// elsewhere), and how far (m) the farthest went.
+    fn put_home(&mut self, model: &SpringModel, motion: &SpringMotion, x_m: &mut [DVec3]) -> (f64, f64) {
         let surface = model.surface();
         let vertices = vertices_of(model, &motion.ids);
-        let mut change_j = 0.0;
-        for (place, &vertex) in motion.ids[..vertices].iter().enumerate() {
-            if self.ids.binary_search(&vertex).is_ok() {
-                continue;
-            }
+        let (mut change_j, mut farthest_m) = (0.0, 0.0_f64);
+        for (place, vertex) in gone(&motion.ids[..vertices], &self.ids) {
             let home_m = model.rest_m()[vertex as usize];
             for &edge in surface.edges_at(vertex) {
                 let other = surface.other_end(edge, vertex);
                 let rest_m = model.rest_m()[other as usize];
-                let other_m = motion.ids.binary_search(&other).map_or(rest_m, |place| x_m[place]);
+                let other_m = self.place(other).map_or(rest_m, |place| x_m[place]);
                 let energy_j = |x: DVec3| {
                     0.5 * model.spec().coarse.mesh_n_per_m * (x.distance(other_m) - home_m.distance(rest_m)).powi(2)
                 };
                 change_j += energy_j(home_m) - energy_j(x_m[place]);
             }
+            farthest_m = farthest_m.max(home_m.distance(x_m[place]));
             x_m[place] = home_m;
         }
-        change_j
+        (change_j, farthest_m)
     }
 
     /// Nodes of type 2 that go give their momentum to their ends, whose masses are then what they were without them.
     fn hand_back(&mut self, model: &SpringModel, motion: &SpringMotion, v_m_per_s: &mut [DVec3]) {
         let vertices = vertices_of(model, &motion.ids);
-        for (place, &id) in motion.ids.iter().enumerate().skip(vertices) {
-            if self.ids.binary_search(&id).is_ok() {
-                continue;
-            }
+        for (place, id) in gone(&motion.ids[vertices..], &self.ids) {
+            let place = vertices + place;
             let edge = id - model.vertices();
             for end in model.surface().edges()[edge as usize].nodes {
-                let Ok(at) = motion.ids.binary_search(&end) else { continue };
+                let Some(at) = self.running.place(end) else { continue };
                 if model.is_held(end) {
                     continue;
                 }
@@ -210,8 +262,8 @@ impl SpringScratch {
     }
 
     /// Positions and velocities of the nodes that are to be.
-    fn come(&mut self, model: &SpringModel, motion: &SpringMotion, (x_m, v_m_per_s): (&[DVec3], &[DVec3])) {
-        let of = |id: u32| motion.ids.binary_search(&id).ok().map(|place| (x_m[place], v_m_per_s[place]));
+    fn come(&mut self, model: &SpringModel, (x_m, v_m_per_s): (&[DVec3], &[DVec3])) {
+        let of = |id: u32| self.running.place(id).map(|place| (x_m[place], v_m_per_s[place]));
         let at_home = |id: u32| (model.rest_m()[id as usize], DVec3::ZERO);
         self.x_m.clear();
         self.v_m_per_s.clear();
@@ -232,6 +284,35 @@ impl SpringScratch {
     }
 }
 
+/// The awake nodes to be.
+fn choose_ids(model: &SpringModel, levels: &Levels, awake: &[u32], ids: &mut Vec<u32>) {
+    ids.clear();
+    ids.extend_from_slice(awake);
+    let before = ids.len();
+    levels.for_each_vertex(model.surface(), |vertex, _| {
+        if awake.binary_search(&vertex).is_err() {
+            ids.push(vertex);
+        }
+    });
+    if ids.len() > before {
+        ids.sort_unstable();
+    }
+    let vertices = ids.len();
+    levels.for_each_edge(model.surface(), |edge, _| ids.push(model.vertices() + edge));
+    ids[vertices..].sort_unstable();
+}
+
+/// Places and entries of one ascending list that are not in another.
+fn gone<'a>(before: &'a [u32], now: &'a [u32]) -> impl Iterator<Item = (usize, u32)> + 'a {
+    let mut next = now.partition_point(|id| before.first().is_some_and(|first| id < first));
+    before.iter().copied().enumerate().filter(move |(_, id)| {
+        while now.get(next).is_some_and(|now| now < id) {
+            next += 1;
+        }
+        now.get(next) != Some(id)
+    })
+}
+
 /// The velocity (m/s) that a node of type 2 starts with: that of its ends, by what each gives of its mass, so that momentum is kept.
 fn mean_velocity(model: &SpringModel, edge: u32, v_m_per_s: [DVec3; 2]) -> DVec3 {
     let [a, b] = model.surface().edges()[edge as usize].nodes.map(|end| model.given_kg(end));
@@ -239,14 +320,14 @@ fn mean_velocity(model: &SpringModel, edge: u32, v_m_per_s: [DVec3; 2]) -> DVec3
 }
 
 /// Mass (kg) of an awake node: of a vertex less what its nodes of type 2 have of it; infinite where it is held.
-fn own_mass_kg(model: &SpringModel, ids: &[u32], id: u32) -> f64 {
+fn own_mass_kg(model: &SpringModel, running: &RunningSprings, id: u32) -> f64 {
     if let Some(edge) = id.checked_sub(model.vertices()) {
         return model.edge_kg(edge);
     }
     if model.is_held(id) {
         return f64::INFINITY;
     }
-    let there = |edge: &&u32| ids.binary_search(&(model.vertices() + **edge)).is_ok();
+    let there = |edge: &&u32| running.place(model.vertices() + **edge).is_some();
     let given = model.surface().edges_at(id).iter().filter(there).count() as f64;
     model.spec().mass_kg[id as usize] - given * model.given_kg(id)
 }

@@ -5,6 +5,7 @@
 use super::{
     blend::{Added, Levels},
     model::SpringModel,
+    places::Places,
     region::Constants,
 };
 use crate::simd::{HalfSpring, SpringRows};
@@ -15,12 +16,16 @@ use glam::DVec3;
 pub struct RunningSprings {
     /// Of the coarse surface.
     rows: SpringRows,
-    /// Sleeping neighbours of awake vertices, ascending.
-    sleeping: Vec<u32>,
-    /// Positions (m) of awake nodes, then of sleeping neighbours.
+    /// Of awake nodes, then of the sleeping neighbours of awake vertices.
+    places: Places,
+    /// Number of awake nodes.
+    awake: usize,
+    /// Positions (m) by place.
     places_m: Vec<DVec3>,
     /// What levels add.
     added: Vec<AddedSpring>,
+    /// Ties of nodes of type 2.
+    ties: Vec<Tie>,
     /// Stiffness (N/m) of the awake nodes' home springs.
     home_n_per_m: Vec<f64>,
 }
@@ -33,24 +38,36 @@ struct AddedSpring {
     stiffness_n_per_m: f64,
 }
 
+/// A tie between places.
+#[derive(Debug, Clone, Copy)]
+struct Tie {
+    /// Of the node, and of the ends of its edge.
+    places: [u32; 3],
+    /// `X_e − ½ (X_a + X_b)` (m).
+    beside_m: DVec3,
+    stiffness_n_per_m: f64,
+}
+
 impl RunningSprings {
     /// Room for as many nodes as may be awake and as many triangles as may be refined.
     pub fn with_room(model: &SpringModel) -> Self {
-        let spec = model.spec();
+        let most_refined = model.spec().most_refined;
         let surface = model.surface();
         let at = |vertex: u32| surface.edges_at(vertex).len();
         let most_at = (0..model.vertices()).map(at).max().unwrap_or_default();
-        let awake = spec.most_awake.min(model.rest_m().len());
+        let awake = model.most_nodes();
         let vertices = awake.min(model.vertices() as usize);
         // Blocks of eight have as many slots as the vertex in them with most springs.
         let rows = SpringRows::with_room(vertices, most_at);
-        let ghosts = vertices * most_at;
+        let places = (awake + vertices * most_at).min(model.rest_m().len());
         Self {
             rows,
-            sleeping: Vec::with_capacity(ghosts),
-            places_m: Vec::with_capacity(awake + ghosts),
+            places: Places::with_room(model.rest_m().len(), places),
+            awake: 0,
+            places_m: Vec::with_capacity(places),
             // Of a triangle three inside; of each of its edges the coarse one, two halves and two cracks.
-            added: Vec::with_capacity(18 * spec.most_refined),
+            added: Vec::with_capacity(18 * most_refined),
+            ties: Vec::with_capacity(3 * most_refined),
             home_n_per_m: Vec::with_capacity(awake),
         }
     }
@@ -58,23 +75,19 @@ impl RunningSprings {
     /// Lays out the springs of the coarse surface for awake nodes (ascending). Allocates nothing.
     pub fn lay_out(&mut self, model: &SpringModel, ids: &[u32]) {
         let (surface, vertices) = (model.surface(), vertices_of(model, ids));
-        self.sleeping.clear();
+        self.places.clear();
+        ids.iter().for_each(|&id| self.places.push(id));
+        self.awake = ids.len();
         for &vertex in &ids[..vertices] {
-            for neighbour in surface.neighbours(vertex) {
-                if ids[..vertices].binary_search(&neighbour).is_err() {
-                    self.sleeping.push(neighbour);
-                }
-            }
+            surface.neighbours(vertex).for_each(|neighbour| self.places.push(neighbour));
         }
-        self.sleeping.sort_unstable();
-        self.sleeping.dedup();
         self.rows.clear();
         for &vertex in &ids[..vertices] {
             let half = |&edge: &u32| {
                 let neighbour = surface.other_end(edge, vertex);
                 let [a, b] = [vertex, neighbour].map(|node| model.rest_m()[node as usize]);
                 Some(HalfSpring {
-                    neighbour: place_of(ids, &self.sleeping, neighbour)?,
+                    neighbour: self.places.of(neighbour)?,
                     rest_length_m: a.distance(b),
                     stiffness_n_per_m: model.spec().coarse.mesh_n_per_m,
                 })
@@ -83,43 +96,65 @@ impl RunningSprings {
         }
     }
 
+    /// The place of an awake node.
+    pub fn place(&self, id: u32) -> Option<usize> {
+        self.places.of(id).map(|place| place as usize).filter(|place| *place < self.awake)
+    }
+
     /// Makes the list of what levels add, for the nodes last laid out. Allocates nothing.
     pub fn add_levels(&mut self, model: &SpringModel, ids: &[u32], levels: &Levels, fine: &Constants) {
         let vertices = vertices_of(model, ids);
-        let Self { added, home_n_per_m, sleeping, .. } = self;
+        let Self { added, ties, home_n_per_m, places, awake, .. } = self;
         added.clear();
+        ties.clear();
         home_n_per_m.clear();
         home_n_per_m.resize(ids.len(), 0.0);
         home_n_per_m[..vertices].fill(model.spec().coarse.home_n_per_m);
         levels.for_each_added(model.surface(), model.rest_m(), (&model.spec().coarse, fine), |what| match what {
             Added::Spring { nodes, rest_length_m, stiffness_n_per_m } => {
-                if let [Some(a), Some(b)] = nodes.map(|node| place_of(ids, sleeping, node)) {
+                if let [Some(a), Some(b)] = nodes.map(|node| places.of(node)) {
                     added.push(AddedSpring { places: [a, b], rest_length_m, stiffness_n_per_m });
                 }
             }
             Added::Home { node, stiffness_n_per_m } => {
-                if let Ok(place) = ids.binary_search(&node) {
-                    home_n_per_m[place] += stiffness_n_per_m;
+                if let Some(place) = places.of(node).filter(|place| (*place as usize) < *awake) {
+                    home_n_per_m[place as usize] += stiffness_n_per_m;
+                }
+            }
+            Added::Tie { nodes, stiffness_n_per_m } => {
+                if let [Some(node), Some(a), Some(b)] = nodes.map(|node| places.of(node)) {
+                    let [x, ends @ ..] = nodes.map(|node| model.rest_m()[node as usize]);
+                    let beside_m = x - (ends[0] + ends[1]) * 0.5;
+                    ties.push(Tie { places: [node, a, b], beside_m, stiffness_n_per_m });
                 }
             }
         });
     }
 
     /// Takes the awake nodes' positions (m).
-    fn place(&mut self, model: &SpringModel, x_m: &[DVec3]) {
+    fn put(&mut self, model: &SpringModel, x_m: &[DVec3]) {
         self.places_m.clear();
         self.places_m.extend_from_slice(x_m);
-        self.places_m.extend(self.sleeping.iter().map(|&node| model.rest_m()[node as usize]));
+        let sleeping = &self.places.nodes()[self.awake..];
+        self.places_m.extend(sleeping.iter().map(|&node| model.rest_m()[node as usize]));
     }
 
     /// Adds the springs' forces (N) on awake nodes at `x_m` (m).
     pub fn add_forces_n(&mut self, model: &SpringModel, ids: &[u32], x_m: &[DVec3], forces_n: &mut [DVec3]) {
-        self.place(model, x_m);
+        self.put(model, x_m);
         self.rows.add_forces_n(&self.places_m, forces_n);
         for spring in &self.added {
             let (pull_n, places) = (spring.pull_n(&self.places_m), spring.places.map(|place| place as usize));
             for (place, pull_n) in places.into_iter().zip([pull_n, -pull_n]) {
                 if let Some(force_n) = forces_n.get_mut(place) {
+                    *force_n += pull_n;
+                }
+            }
+        }
+        for tie in &self.ties {
+            let pull_n = tie.off_m(&self.places_m) * -tie.stiffness_n_per_m;
+            for (place, pull_n) in tie.places.into_iter().zip([pull_n, pull_n * -0.5, pull_n * -0.5]) {
+                if let Some(force_n) = forces_n.get_mut(place as usize) {
                     *force_n += pull_n;
                 }
             }
@@ -133,14 +168,15 @@ impl RunningSprings {
 
     /// Energy (J) of what levels add and of all home springs: what changes with levels.
     pub fn changing_energy_j(&mut self, model: &SpringModel, ids: &[u32], x_m: &[DVec3]) -> f64 {
-        self.place(model, x_m);
-        let of_added = self.added.iter().map(|spring| spring.energy_j(&self.places_m)).sum::<f64>();
+        self.put(model, x_m);
+        let of_springs = self.added.iter().map(|spring| spring.energy_j(&self.places_m)).sum::<f64>();
+        let of_ties = self.ties.iter().map(|tie| tie.energy_j(&self.places_m)).sum::<f64>();
         let homes = x_m.iter().zip(ids).zip(&self.home_n_per_m);
         let of_home = |((x_m, id), stiffness): ((&DVec3, &u32), &f64)| {
             let u_m = x_m.distance(model.rest_m()[*id as usize]);
             stiffness * model.spec().home_law.at(u_m).integral_m2
         };
-        of_added + homes.map(of_home).sum::<f64>()
+        of_springs + of_ties + homes.map(of_home).sum::<f64>()
     }
 }
 
@@ -158,13 +194,19 @@ impl AddedSpring {
     }
 }
 
+impl Tie {
+    /// `u_e − ½ (u_a + u_b)` (m).
+    fn off_m(&self, places_m: &[DVec3]) -> DVec3 {
+        let [x, a, b] = self.places.map(|place| places_m[place as usize]);
+        x - (a + b) * 0.5 - self.beside_m
+    }
+
+    fn energy_j(&self, places_m: &[DVec3]) -> f64 {
+        0.5 * self.stiffness_n_per_m * self.off_m(places_m).length_squared()
+    }
+}
+
 /// How many of the ids, ascending, are coarse vertices.
 pub(super) fn vertices_of(model: &SpringModel, ids: &[u32]) -> usize {
     ids.partition_point(|&id| id < model.vertices())
-}
-
-/// Where a node is among awake ones and their sleeping neighbours.
-fn place_of(ids: &[u32], sleeping: &[u32], node: u32) -> Option<u32> {
-    let among_sleeping = || sleeping.binary_search(&node).map(|place| ids.len() + place);
-    ids.binary_search(&node).or_else(|_| among_sleeping()).ok().map(|place| place as u32)
 }

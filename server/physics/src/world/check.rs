@@ -12,7 +12,8 @@ use glam::DVec3;
 pub(super) fn spec(spec: &ModelSpec, surface: &Surface, rest_positions_m: &[DVec3]) -> Result<(), ModelError> {
     regions(spec)?;
     let nodes = spec.mesh.positions_m().len();
-    for set in &spec.prescribed {
+    // Of springs they are checked where these are held.
+    for set in spec.prescribed.iter().filter(|_| nodes > 0) {
         indices("node", set.nodes.iter().map(|&n| n as usize), nodes)?;
     }
     spec.loads.iter().try_for_each(|load| loaded(load, rest_positions_m.len(), surface.triangles.len()))?;

@@ -1,5 +1,5 @@
 //! Why a model cannot be built.
-use crate::{hybrid::HybridError, material::ParameterError, mesh::MeshError, seed::SeedError, solve::SolveError};
+use crate::{hybrid::HybridError, material::ParameterError, mesh::MeshError, seed::SeedError, solve::SolveError, spring::SpringBodyError};
 use glam::DVec3;
 use thiserror::Error;
 
@@ -90,6 +90,9 @@ pub enum ModelError {
     /// The papers' hybrid cannot be made.
     #[error(transparent)]
     Seed(#[from] SeedError),
+    /// The mass-spring surface cannot be made.
+    #[error(transparent)]
+    Springs(#[from] SpringBodyError),
     /// A seed body cannot have it.
     #[error("a body of the papers' hybrid (seed) cannot have {what}: {instead}")]
     NotForSeeds {

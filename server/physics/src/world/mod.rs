@@ -5,6 +5,7 @@ mod error;
 mod model;
 mod seed_body;
 mod spec;
+mod springs_body;
 mod state;
 mod substeps;
 mod tick;

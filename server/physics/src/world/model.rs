@@ -1,5 +1,5 @@
 //! The model: constant after load.
-use super::{Integrator, ModelError, ModelSpec, PrescribedSpec, State, building, check, seed_body, substeps};
+use super::{Integrator, ModelError, ModelSpec, PrescribedSpec, State, building, check, seed_body, springs_body, substeps};
 use crate::{
     contact::{ContactModel, SurfaceModuli, ToolState},
     fem::{element::RestTet, mass},
@@ -12,6 +12,7 @@ use crate::{
     mesh::{Surface, TetMesh},
     seed::{SeedBodySpec, SeedModel, layer::Layer},
     simd::ForceKernel,
+    spring::{SpringBody, SpringBodySpec},
 };
 use glam::{DVec2, DVec3};
 
@@ -35,6 +36,7 @@ pub struct Model {
     seed: Option<Box<SeedModel>>,
     /// Of a seed body: rest positions (m) of core and skin.
     seed_rest_m: Vec<DVec3>,
+    springs: Option<Box<SpringBody>>,
 }
 
 impl Model {
@@ -50,7 +52,10 @@ impl Model {
     ///
     /// # Errors
     /// As [`Self::build`].
-    pub fn build_with(spec: ModelSpec, progress: &mut dyn FnMut(f64)) -> Result<Self, ModelError> {
+    pub fn build_with(mut spec: ModelSpec, progress: &mut dyn FnMut(f64)) -> Result<Self, ModelError> {
+        if let Some(springs) = spec.springs.take() {
+            return Self::of_springs(spec, springs);
+        }
         let surface = Surface::of(&spec.mesh)?;
         match (spec.particles.clone(), spec.seed.clone()) {
             (None, None) => Self::of_tets(spec, surface, progress),
@@ -124,13 +129,14 @@ impl Model {
             hybrid: None,
             seed: None,
             seed_rest_m: Vec::new(),
+            springs: None,
             spec,
         };
         model.rest_bound = RestBound::new(&model).map_err(|source| ModelError::Sleep { source: Box::new(source) })?;
         Ok(model)
     }
 
-    /// What it was built from.
+    /// What it was built from, but the springs, which [`Self::springs`] has.
     pub fn spec(&self) -> &ModelSpec {
         &self.spec
     }
@@ -144,14 +150,20 @@ impl Model {
     }
     /// Rest positions (m) of what the surface's nodes are numbered by.
     pub fn surface_rest_positions_m(&self) -> &[DVec3] {
-        match &self.spec.particles {
-            None => self.rest_positions_m(),
-            Some(particles) => particles.skin.positions_m(),
+        match (&self.spec.particles, &self.springs) {
+            (Some(particles), _) => particles.skin.positions_m(),
+            (None, Some(springs)) => springs.model().rest_m(),
+            (None, None) => self.rest_positions_m(),
         }
     }
     /// Where the surface is (m): writes one position for each of its vertices. Of a hybrid body, each is worked out from some particles.
     pub fn surface_positions_m(&self, state: &State, positions_m: &mut Vec<DVec3>) {
         positions_m.clear();
+        if let (Some(body), Some(springs)) = (&self.springs, &state.springs) {
+            let vertices = 0..self.surface.nodes.len() as u32;
+            positions_m.extend(vertices.map(|vertex| body.vertex_m(&springs.motion, vertex, &state.x)));
+            return;
+        }
         match &self.hybrid {
             None => positions_m.extend(self.surface.nodes.iter().map(|&node| state.x[node as usize])),
             Some(hybrid) => {
@@ -160,13 +172,24 @@ impl Model {
             }
         }
     }
-    /// Rest positions (m) per node; of a hybrid body, of its coarse nodes; of a seed body, of its core's and then its skin's.
+    /// Rest positions (m) per node; of a hybrid body, of its coarse nodes; of a seed body, of its core's and then its skin's; of springs, of the coarse vertices.
     pub fn rest_positions_m(&self) -> &[DVec3] {
+        if let Some(springs) = &self.springs {
+            return &springs.model().rest_m()[..springs.model().vertices() as usize];
+        }
         match &self.hybrid {
             None if self.seed.is_some() => &self.seed_rest_m,
             None => self.spec.mesh.positions_m(),
             Some(hybrid) => hybrid.partition().coarse().positions_m(),
         }
+    }
+    /// Rest positions (m) of the nodes that every state has: all of [`Self::rest_positions_m`], but of springs none, as they may sleep.
+    pub fn always_awake_m(&self) -> &[DVec3] {
+        if self.springs.is_some() { &[] } else { self.rest_positions_m() }
+    }
+    /// The mass-spring surface, where the body is one.
+    pub fn springs(&self) -> Option<&SpringBody> {
+        self.springs.as_deref()
     }
     /// The particles, where there are some.
     pub fn hybrid(&self) -> Option<&Hybrid> {
@@ -244,6 +267,42 @@ impl Model {
 }
 
 impl Model {
+    fn of_springs(spec: ModelSpec, mut wanted: SpringBodySpec) -> Result<Self, ModelError> {
+        springs_body::demand(&spec)?;
+        wanted.springs.held = springs_body::held(&spec, wanted.springs.surface.positions_m().len())?;
+        let mut body = SpringBody::build(wanted, spec.tools.len())?;
+        springs_body::demand_all_awake(&spec, &body)?;
+        let (surface, rest_m) = (body.skin(), body.model().rest_m());
+        check::spec(&spec, &surface, rest_m)?;
+        let omega = body.model().frequency_rad_per_s();
+        let contact =
+            ContactModel::build(rest_m, &surface, &body.moduli(), &body.contact_mass_kg(), omega, &spec.tools);
+        body.cluster(contact.triangles());
+        let omega_sq = body.model().touched_frequency_sq(&contact.nodal_stiffness_n_per_m) + contact.tool_frequency_sq;
+        let substeps = substeps::choose(&spec, &[], omega_sq.sqrt())?;
+        let mass_kg = body.model().spec().mass_kg.clone();
+        let inverse_mass_per_kg = free_inverse_mass(&mass_kg, &spec.prescribed)?;
+        Ok(Self {
+            kernel: ForceKernel::build(&spec.mesh, &[], &[], &[], spec.settings.precision),
+            rest_tets: Vec::new(),
+            surface,
+            materials: Vec::new(),
+            mass_kg,
+            inverse_mass_per_kg,
+            contact,
+            max_natural_frequency_rad_per_s: omega,
+            substeps,
+            substeps_per_long_step: 1,
+            scheme: Scheme::Leapfrog,
+            rest_bound: None,
+            hybrid: None,
+            seed: None,
+            seed_rest_m: Vec::new(),
+            springs: Some(Box::new(body)),
+            spec,
+        })
+    }
+
     fn of_seed(spec: ModelSpec, wanted: SeedBodySpec) -> Result<Self, ModelError> {
         let (seed, substeps) = seed_body::build(&spec, wanted)?;
         let (surface, seed_rest_m, mass_kg) = (seed.node_surface(), seed.node_rest_m(), seed.node_mass_kg());
@@ -284,6 +343,7 @@ impl Model {
             hybrid: None,
             seed: Some(Box::new(seed)),
             seed_rest_m,
+            springs: None,
             spec,
         })
     }
@@ -348,6 +408,7 @@ impl Model {
             hybrid: Some(Box::new(hybrid)),
             seed: None,
             seed_rest_m: Vec::new(),
+            springs: None,
             spec,
         })
     }

@@ -1,5 +1,5 @@
 //! What a model is built from.
-use crate::{contact::ToolSpec, hybrid::ParticleSpec, material::Material, mesh::TetMesh, seed::SeedBodySpec};
+use crate::{contact::ToolSpec, hybrid::ParticleSpec, material::Material, mesh::TetMesh, seed::SeedBodySpec, spring::SpringBodySpec};
 use glam::DVec3;
 
 /// A material and density shared by some tets.
@@ -167,6 +167,8 @@ pub struct ModelSpec {
     pub particles: Option<ParticleSpec>,
     /// Makes its tets the core of the papers' hybrid; there is one material then, and what is prescribed is held.
     pub seed: Option<SeedBodySpec>,
+    /// Makes it a mass-spring surface: its mesh is [`TetMesh::none`] then, it has no materials, and what is prescribed is held.
+    pub springs: Option<SpringBodySpec>,
     /// Materials.
     pub regions: Vec<Region>,
     /// Region of each tet.

@@ -6,6 +6,7 @@ use crate::{
     hybrid::ActiveParticles,
     integrate::{Pace, Sleep},
     seed::SeedMotion,
+    spring::SpringState,
 };
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
@@ -15,7 +16,7 @@ use serde::{Deserialize, Serialize};
 pub struct State {
     /// Ticks done since reset.
     pub tick: u64,
-    /// Positions (m), one per node, and then one per active particle.
+    /// Positions (m), one per node, and then one per active particle; of springs, one per awake node.
     pub x: Vec<DVec3>,
     /// Velocities (m/s), at the same time as `x`.
     pub v: Vec<DVec3>,
@@ -43,6 +44,8 @@ pub struct State {
     pub sleep: Sleep,
     /// Of a seed body: all that its steps change. `x` and `v` are copies of its nodes'.
     pub seed: Option<SeedMotion>,
+    /// Of springs: which nodes are awake, and what is refined.
+    pub springs: Option<SpringState>,
     /// Set when a tick's result was not finite.
     pub quarantine: Option<Quarantine>,
 }
@@ -50,11 +53,15 @@ pub struct State {
 impl State {
     /// At rest, at tick 0.
     pub fn at_rest(model: &Model) -> Self {
-        let nodes = model.rest_positions_m().len();
+        let springs = model.springs().map(|body| SpringState::at_rest(body, model.spec().tools.len()));
+        let awake: &[u32] = springs.as_ref().map_or(&[], |springs| &springs.motion.ids);
+        let nodes = model.always_awake_m().len() + awake.len();
         let zeros = || with_room(model, std::iter::repeat_n(DVec3::ZERO, nodes));
+        let mut x = with_room(model, model.always_awake_m().iter().copied());
+        x.extend(awake.iter().map(|&node| model.rest_positions_m()[node as usize]));
         Self {
             tick: 0,
-            x: with_room(model, model.rest_positions_m().iter().copied()),
+            x,
             v: zeros(),
             active: ActiveParticles::none(model),
             force_n: zeros(),
@@ -68,6 +75,7 @@ impl State {
             pace: Pace::at_start(model),
             sleep: Sleep::at_start(model),
             seed: model.seed().map(SeedMotion::at_rest),
+            springs,
             quarantine: None,
         }
     }
@@ -91,18 +99,26 @@ impl State {
         if let (Some(own), Some(other)) = (&mut self.seed, &other.seed) {
             own.copy_from(other);
         }
+        if let (Some(own), Some(other)) = (&mut self.springs, &other.springs) {
+            own.copy_from(other);
+        }
         self.quarantine = other.quarantine;
     }
 
     /// Back to rest at tick 0, as [`Self::at_rest`], in the buffers it has: allocates nothing.
     pub fn reset(&mut self, model: &Model) {
         self.tick = 0;
-        let nodes = model.rest_positions_m().len();
-        for buffer in [&mut self.x, &mut self.v, &mut self.force_n, &mut self.external_n] {
-            buffer.truncate(nodes);
-            buffer.fill(DVec3::ZERO);
+        if let (Some(own), Some(body)) = (&mut self.springs, model.springs()) {
+            own.reset(body);
         }
-        self.x.copy_from_slice(model.rest_positions_m());
+        let awake: &[u32] = self.springs.as_ref().map_or(&[], |springs| &springs.motion.ids);
+        self.x.clear();
+        self.x.extend_from_slice(model.always_awake_m());
+        self.x.extend(awake.iter().map(|&node| model.rest_positions_m()[node as usize]));
+        for buffer in [&mut self.v, &mut self.force_n, &mut self.external_n] {
+            buffer.clear();
+            buffer.resize(self.x.len(), DVec3::ZERO);
+        }
         self.active.clear();
         self.force_is_current = false;
         for (tool, spec) in self.tools.iter_mut().zip(&model.spec().tools) {
@@ -150,10 +166,11 @@ impl State {
     }
 }
 
-/// A list for nodes with room for active particles: it never grows beyond.
+/// A list for nodes with room for active particles, or for all springs' nodes that may be awake: it never grows beyond.
 pub(crate) fn with_room(model: &Model, of_nodes: impl ExactSizeIterator<Item = DVec3>) -> Vec<DVec3> {
-    let room = model.spec().particles.as_ref().map_or(0, |particles| particles.most_active);
-    let mut list = Vec::with_capacity(of_nodes.len() + room);
+    let of_particles = model.spec().particles.as_ref().map_or(0, |particles| particles.most_active);
+    let of_springs = model.springs().map_or(0, |body| body.model().most_nodes());
+    let mut list = Vec::with_capacity((of_nodes.len() + of_particles).max(of_springs));
     list.extend(of_nodes);
     list
 }

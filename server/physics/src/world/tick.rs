@@ -4,7 +4,7 @@ use crate::{
     contact::{ContactScratch, ToolTarget},
     health::{LastGood, Quarantine},
     hybrid::HybridScratch,
-    integrate::{ForceHistory, ImplicitScratch, SeedBodyScratch},
+    integrate::{ForceHistory, ImplicitScratch, SeedBodyScratch, SpringBodyScratch},
     simd::KernelScratch,
 };
 use glam::DVec3;
@@ -56,6 +56,7 @@ pub struct Scratch {
     pub(crate) implicit: ImplicitScratch,
     pub(crate) hybrid: Option<Box<HybridScratch>>,
     pub(crate) seed: Option<Box<SeedBodyScratch>>,
+    pub(crate) springs: Option<Box<SpringBodyScratch>>,
 }
 
 impl Scratch {
@@ -74,6 +75,7 @@ impl Scratch {
             implicit: ImplicitScratch::new(model),
             hybrid: HybridScratch::new(model).map(Box::new),
             seed: model.seed().map(|seed| Box::new(SeedBodyScratch::new(seed))),
+            springs: SpringBodyScratch::new(model).map(Box::new),
         }
     }
 

@@ -157,6 +157,7 @@ pub(crate) fn spec(
         mesh,
         particles: None,
         seed: None,
+        springs: None,
         regions: vec![Region { name: "body".into(), material, density_kg_per_m3: 1000.0 }],
         prescribed,
         loads,

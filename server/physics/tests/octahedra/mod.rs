@@ -59,6 +59,7 @@ pub fn body_spec(outer_m: f64, layer: Option<LayerSpec>, parameters: SeedParamet
         mesh,
         particles: None,
         seed: Some(SeedBodySpec { layer, parameters }),
+        springs: None,
         regions: vec![Region { name: "all".into(), material, density_kg_per_m3 }],
         prescribed: vec![PrescribedSpec { name: "inner".into(), nodes: vec![1, 2, 3, 5], axes: [true; 3] }],
         loads: Vec::new(),

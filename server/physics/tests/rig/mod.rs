@@ -75,6 +75,7 @@ pub fn body(mesh: TetMesh, material: Material) -> ModelSpec {
         mesh,
         particles: None,
         seed: None,
+        springs: None,
         regions: vec![Region { name: "all".into(), material, density_kg_per_m3: 1000.0 }],
         tet_region: vec![0; tets],
         prescribed: Vec::new(),

@@ -39,6 +39,7 @@ fn swung(substeps: u32) -> Result<Vec<DVec3>> {
         mesh: body.mesh,
         particles: None,
         seed: None,
+        springs: None,
         prescribed: body.prescribed,
         loads: load.into_iter().map(|load| LoadSpec::NodalForces(load.forces_n)).collect(),
         gravity_m_per_s2: DVec3::ZERO,

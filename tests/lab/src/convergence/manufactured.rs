@@ -146,6 +146,7 @@ fn loaded(mesh: TetMesh, boundary: Vec<u32>, material: Material, rule: &[([f64; 
         mesh,
         particles: None,
         seed: None,
+        springs: None,
         prescribed: vec![PrescribedSpec { name: "boundary".into(), nodes: boundary, axes: [true; 3] }],
         loads: vec![LoadSpec::NodalForces((0u32..).zip(forces).collect())],
         gravity_m_per_s2: DVec3::ZERO,

@@ -109,6 +109,7 @@ impl Method for SeedHybrid {
         };
         let mut spec = ModelSpec {
             seed: Some(SeedBodySpec { layer: Some(layer), parameters }),
+            springs: None,
             ..super::subject::spec(material, &core, Settings::default())
         };
         let first_vertex = core.mesh.positions_m().len() as u32;

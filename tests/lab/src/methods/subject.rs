@@ -67,6 +67,7 @@ pub(super) fn spec(material: Material, body: &TetBody, settings: Settings) -> Mo
         mesh: body.mesh.clone(),
         particles: None,
         seed: None,
+        springs: None,
         regions: vec![Region { name: "body".into(), material, density_kg_per_m3: 1000.0 }],
         tet_region: vec![0; body.mesh.tets().len()],
         prescribed: body.prescribed.clone(),

@@ -112,6 +112,7 @@ pub(super) fn body(options: &Options, mesh: TetMesh, material: Material) -> Mode
         mesh,
         particles: None,
         seed: None,
+        springs: None,
         regions: vec![Region { name: "body".into(), material, density_kg_per_m3: 1000.0 }],
         prescribed: Vec::new(),
         loads: Vec::new(),

@@ -7,9 +7,10 @@
 //! nothing, would make a pattern of it.
 use super::awakened::Awakened;
 use crate::{
+    contact::deepest_m,
     hybrid::{
         Hybrid, Waking,
-        switching::{FOLLOW, GAP, deepest_m},
+        switching::{FOLLOW, GAP},
     },
     solve::equilibrium::Goal,
     world::{LoadSpec, Model},

@@ -252,6 +252,7 @@ mod tests {
                 density_kg_per_m3: 1000.0,
             }],
             seed: None,
+            springs: None,
             loads: Vec::new(),
             gravity_m_per_s2: DVec3::ZERO,
             tools: Vec::new(),

@@ -1,0 +1,57 @@
+//! The vertex of a skin that is nearest to a point, without looking at those that bounds rule out.
+use super::broad::{CLUSTER, ClusterBox, GROUP, ROUNDING_M, Skin};
+use glam::DVec3;
+
+const NONE: u32 = u32::MAX;
+
+/// The vertex nearest to a point, if one is within a distance (m), and how far it is (m). Of several as near, the first one. `fitted` are contact's boxes and its travel (m), where they are of use.
+pub(crate) fn nearest_vertex(
+    skin: &mut impl Skin,
+    from_m: DVec3,
+    within_m: f64,
+    fitted: Option<(&[ClusterBox], f64)>,
+) -> Option<(u32, f64)> {
+    skin.begin();
+    let skin = &*skin;
+    let bound_m = |cluster: usize| {
+        let of_fitted_m = fitted.map_or(0.0, |(boxes, travel_m)| boxes[cluster].distance_bound_m(from_m, travel_m));
+        skin.cluster_distance_m(cluster, from_m).max(of_fitted_m)
+    };
+    let in_group = GROUP / CLUSTER;
+    let clusters = skin.clusters();
+    let groups = 0..clusters.div_ceil(in_group);
+    let of_group = |group: usize| group * in_group..((group + 1) * in_group).min(clusters);
+    let mut found = (within_m, NONE);
+    // What comes first should be near: it rules out most of the others.
+    let near = |group: &usize| skin.group_distance_m(*group, from_m) <= within_m;
+    let all = groups.clone().filter(near).flat_map(of_group);
+    let first = all.map(|cluster| (bound_m(cluster), cluster)).min_by(|a, b| a.0.total_cmp(&b.0))?.1;
+    look_at(skin, first, from_m, &mut found);
+    for group in groups {
+        if skin.group_distance_m(group, from_m) > found.0 + ROUNDING_M {
+            continue;
+        }
+        for cluster in of_group(group) {
+            if cluster != first && bound_m(cluster) <= found.0 + ROUNDING_M {
+                look_at(skin, cluster, from_m, &mut found);
+            }
+        }
+    }
+    let (nearest_m, vertex) = found;
+    (vertex != NONE).then_some((vertex, nearest_m))
+}
+
+fn look_at(skin: &impl Skin, cluster: usize, from_m: DVec3, (nearest_m, nearest): &mut (f64, u32)) {
+    for &vertex in skin.vertices(cluster) {
+        let distance_m = skin.position_m(vertex).distance(from_m);
+        if distance_m < *nearest_m || (distance_m == *nearest_m && vertex < *nearest && *nearest != NONE) {
+            (*nearest_m, *nearest) = (distance_m, vertex);
+        }
+    }
+}
+
+/// Where a tool that touches is deepest in the body, by the force on it (N): in a dent many vertices are as near to its centre, and which is nearest would
+/// change with the particles that are awake.
+pub(crate) fn deepest_m(centre_m: DVec3, radius_m: f64, contact_force_n: DVec3) -> Option<DVec3> {
+    contact_force_n.try_normalize().map(|outwards| centre_m - outwards * radius_m)
+}

@@ -1,0 +1,203 @@
+//! Forces and kicks of a mass-spring surface, for leapfrog, and what is refined and awake from one tick to the next.
+use super::{
+    forces::{Evaluation, Tick, is_usable},
+    hybrid::vertices_of,
+    motion::{Kicked, kick_nodes},
+};
+use crate::{
+    contact::{ContactScratch, SubstepTime, SurfaceNow, broad::Skin, deepest_m, nearest_vertex},
+    fem::loads::add_load_n,
+    spring::{
+        SpringBody, SpringScratch, SpringState, Wanted,
+        skin::{ListedVertices, SpringSkin},
+        state::{Looking, Near},
+    },
+    world::{Model, PointForce, State},
+};
+use glam::DVec3;
+
+/// Ticks between two looks at where the tools are.
+const LOOK_EVERY_TICKS: u32 = 8;
+/// Gap over the tool's radius from which the surface is refined.
+const GAP: f64 = 0.25;
+/// Way home, and way in a tick, over the coarse edges' length, below which a node is at rest.
+const QUIET: f64 = 1e-6;
+
+/// Buffers, sized once.
+#[derive(Debug, Clone)]
+pub(crate) struct SpringBodyScratch {
+    springs: SpringScratch,
+    skin: ListedVertices,
+    looking: Looking,
+    inverse_mass_per_kg: Vec<DVec3>,
+    /// Of which layout these are.
+    layout: u64,
+    /// Contact was told how far the last change of layout moved the surface.
+    pub(super) skin_is_tracked: bool,
+}
+
+impl SpringBodyScratch {
+    /// Of a model whose body is a mass-spring surface.
+    pub(crate) fn new(model: &Model) -> Option<Self> {
+        let body = model.springs()?;
+        Some(Self {
+            springs: SpringScratch::new(body.model()),
+            skin: ListedVertices::new(body),
+            looking: Looking::new(body, model.spec().tools.len()),
+            inverse_mass_per_kg: Vec::with_capacity(body.model().most_nodes()),
+            layout: u64::MAX,
+            skin_is_tracked: false,
+        })
+    }
+
+    /// Before a tick: looks now and then where the tools are, wakes what they and injected forces want, and brings levels on their way. Allocates nothing.
+    pub(super) fn prepare(&mut self, model: &Model, body: &SpringBody, state: &mut State, forces: &[PointForce]) {
+        self.skin_is_tracked = false;
+        let Some(springs) = &state.springs else { return };
+        self.springs.follow(body.model(), &springs.motion);
+        let is_due = state.tick.is_multiple_of(u64::from(LOOK_EVERY_TICKS));
+        let looks = is_due || state.contact.is_near_any();
+        if looks {
+            self.look(model, body, state, if is_due { LOOK_EVERY_TICKS } else { 0 });
+        }
+        let State { x, v, springs: Some(springs), .. } = state else { return };
+        if looks {
+            springs.want_refined(body, &mut self.looking);
+        }
+        if !body.is_all_awake() {
+            let mut forced = false;
+            for point in forces.iter().filter(|point| is_usable(model, point) && point.force_n != DVec3::ZERO) {
+                let vertex = body.ends(point.node)[0];
+                if self.springs.place(vertex).is_none() {
+                    springs.force(vertex);
+                    forced = true;
+                }
+            }
+            if looks || forced {
+                let is_quiet = forces.is_empty() && is_quiet(body, &springs.motion.ids, (x, v), model);
+                springs.want_awake(body, &mut self.looking, forced, is_quiet);
+            }
+        }
+        let fine = springs.motion.fine;
+        let step = body.refinement().map_or(1.0, |r| model.spec().settings.tick_period_s / r.fade_s);
+        let wanted = Wanted { refined: &springs.refined, step, fine, awake: &springs.awake };
+        if let Some(changed) = self.springs.go_on(body.model(), &mut springs.motion, (x, v), &wanted) {
+            state.ledger.dissipated_j -= changed.elastic_j + changed.kinetic_j;
+            for forces in [&mut state.force_n, &mut state.external_n] {
+                forces.clear();
+                forces.resize(state.x.len(), DVec3::ZERO);
+            }
+            state.contact.travelled(changed.moved_m);
+            self.skin_is_tracked = state.force_is_current;
+            state.force_is_current = false;
+        }
+        self.weigh();
+    }
+
+    /// The place of an awake node.
+    pub(super) fn place(&self, node: u32) -> Option<usize> {
+        self.springs.place(node)
+    }
+
+    fn weigh(&mut self) {
+        if self.layout != self.springs.layout() {
+            self.layout = self.springs.layout();
+            self.inverse_mass_per_kg.clear();
+            // Of what is held the mass is infinite.
+            self.inverse_mass_per_kg.extend(self.springs.mass_kg().iter().map(|mass| DVec3::splat(mass.recip())));
+        }
+    }
+
+    /// Notes what each tool is near to, `ticks` after the last time.
+    fn look(&mut self, model: &Model, body: &SpringBody, state: &mut State, ticks: u32) {
+        let State { x, tools, contact, force_is_current, springs: Some(springs), .. } = state else { return };
+        let fitted = force_is_current.then(|| contact.boxes());
+        for (index, (tool, spec)) in tools.iter().zip(&model.spec().tools).enumerate() {
+            if ticks == 0 && springs.touched(index).is_some() {
+                continue;
+            }
+            let near_m = GAP * spec.radius_m + 0.5 * body.edge_m();
+            let deepest_m = deepest_m(tool.centre_m, spec.radius_m, tool.contact_force_n);
+            let from_m = deepest_m.unwrap_or(tool.centre_m);
+            let mut skin = SpringSkin::new(body, (&springs.motion, &self.springs), x);
+            let nearest = nearest_vertex(&mut skin, from_m, spec.radius_m + 2.0 * near_m, fitted);
+            let near = nearest.map(|(vertex, to_skin_m)| {
+                let distance_m = |vertex: u32| skin.position_m(vertex).distance(from_m);
+                let vertex = skin.coarse_vertex(vertex, from_m);
+                Near {
+                    vertex,
+                    distance_m: distance_m(vertex),
+                    present_m: springs.touched(index).map_or(f64::INFINITY, distance_m),
+                    gap_m: if deepest_m.is_some() { 0.0 } else { to_skin_m - spec.radius_m },
+                }
+            });
+            springs.note(index, near, (near_m, spec.radius_m, ticks));
+        }
+    }
+}
+
+fn is_quiet(body: &SpringBody, ids: &[u32], (x, v): (&[DVec3], &[DVec3]), model: &Model) -> bool {
+    let (most_m, tick_s) = (QUIET * body.edge_m(), model.spec().settings.tick_period_s);
+    let moved = |(id, x): (&u32, &DVec3)| x.distance(body.model().rest_m()[*id as usize]) > most_m;
+    !ids.iter().zip(x).any(moved) && v.iter().all(|v| v.length() * tick_s <= most_m)
+}
+
+/// Total force at the present positions into `state.force_n`, its external part into `state.external_n`.
+pub(super) fn evaluate(
+    tick: &Tick<'_>,
+    body: &SpringBody,
+    state: &mut State,
+    (own, contact_scratch): (&mut SpringBodyScratch, &mut ContactScratch),
+    now: &Evaluation,
+) {
+    let Tick { model, input, loads, .. } = tick;
+    let State { x, v, springs: Some(SpringState { motion, .. }), .. } = state else { return };
+    let SpringBodyScratch { springs, skin, .. } = own;
+    let tick_period_s = model.spec().settings.tick_period_s;
+    let time = SubstepTime { fraction: now.fraction, dt_s: now.dt_s, tick_period_s };
+    let contact = model.contact();
+    contact.move_tools(now.fastest_m_per_s, &time, &mut state.tools, &mut state.contact);
+    let mut view = SpringSkin::new(body, (motion, springs), x);
+    let mut renewed = contact.list_on_skin((&mut view, &mut skin.x), &state.tools, &mut state.contact, contact_scratch);
+    renewed |= skin.is_outdated(springs);
+    renewed |= input.point_forces.iter().any(|point| is_usable(model, point) && !skin.is_listed(point.node));
+    if renewed {
+        skin.start(springs);
+        let mut list = |vertex: u32| skin.list(body, (motion, springs), vertex);
+        contact.listed_nodes(&state.contact).for_each(&mut list);
+        model.spec().loads.iter().for_each(|load| vertices_of(model, load, &mut list));
+        input.point_forces.iter().filter(|point| is_usable(model, point)).for_each(|point| list(point.node));
+        skin.finish();
+    }
+    skin.refresh(x);
+    let rest_m = model.surface_rest_positions_m();
+    for (index, load) in model.spec().loads.iter().enumerate() {
+        let factor = loads.factor(state.load_factors[index], input, index, now.load_fraction);
+        if factor != 0.0 {
+            add_load_n(load, factor, model.surface(), (rest_m, &skin.x), &mut skin.forces_n);
+        }
+    }
+    for point in input.point_forces.iter().filter(|point| is_usable(model, point)) {
+        skin.forces_n[point.node as usize] += point.force_n;
+    }
+    let velocity = |vertex: u32| body.velocity_m_per_s((motion, springs), vertex, v);
+    let surface = SurfaceNow { x: &skin.x, velocity_m_per_s: &velocity };
+    contact.press_tools(&surface, &time, &mut state.tools, &mut state.contact, &mut skin.forces_n, contact_scratch);
+    state.external_n.fill(DVec3::ZERO);
+    skin.hand_over(&mut state.external_n);
+    state.force_n.copy_from_slice(&state.external_n);
+    springs.add_forces_n(body.model(), motion, x, &mut state.force_n);
+    let gravity = model.gravity_m_per_s2();
+    if gravity != DVec3::ZERO {
+        for (force, mass) in state.force_n.iter_mut().zip(springs.mass_kg()).filter(|(_, mass)| mass.is_finite()) {
+            *force += gravity * *mass;
+        }
+    }
+    state.force_is_current = true;
+}
+
+/// A half or whole kick of the awake nodes.
+pub(super) fn kick(model: &Model, state: &mut State, own: &SpringBodyScratch, h_s: f64) {
+    let masses = Kicked { mass_kg: own.springs.mass_kg(), inverse_mass_per_kg: &own.inverse_mass_per_kg };
+    kick_nodes(model.spec().settings.mass_damping_per_s, &masses, state, h_s);
+}

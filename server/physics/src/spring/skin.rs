@@ -1,0 +1,252 @@
+//! Where the surface is that tools touch, and how forces on it go to the nodes.
+use super::{body::SpringBody, motion::{SpringMotion, SpringScratch}};
+use crate::contact::broad::{CLUSTER, GROUP, Skin, box_distance_m};
+use glam::DVec3;
+
+/// Boxes at rest of the skin's clusters, and of groups of them.
+#[derive(Debug, Clone, Default)]
+pub(super) struct SkinBoxes {
+    clusters: Vec<[DVec3; 2]>,
+    groups: Vec<[DVec3; 2]>,
+    /// First entry of each cluster in `vertices`, and the end of the last.
+    first: Vec<u32>,
+    vertices: Vec<u32>,
+}
+
+impl SkinBoxes {
+    /// Of triangles in the order of the broad phase.
+    pub(super) fn new(rest_m: &[DVec3], triangles: &[[u32; 3]]) -> Self {
+        let around = |vertices: &[u32]| {
+            let corners = vertices.iter().map(|&vertex| rest_m[vertex as usize]);
+            corners.fold([DVec3::INFINITY, DVec3::NEG_INFINITY], |[low, high], p| [low.min(p), high.max(p)])
+        };
+        let mut boxes = Self { first: vec![0], ..Self::default() };
+        for cluster in triangles.chunks(CLUSTER) {
+            let mut vertices: Vec<u32> = cluster.iter().flatten().copied().collect();
+            vertices.sort_unstable();
+            vertices.dedup();
+            boxes.clusters.push(around(&vertices));
+            boxes.vertices.extend(vertices);
+            boxes.first.push(boxes.vertices.len() as u32);
+        }
+        let join = |group: &[[DVec3; 2]]| {
+            let none = [DVec3::INFINITY, DVec3::NEG_INFINITY];
+            group.iter().fold(none, |[low, high], of| [low.min(of[0]), high.max(of[1])])
+        };
+        boxes.groups = boxes.clusters.chunks(GROUP / CLUSTER).map(join).collect();
+        boxes
+    }
+}
+
+/// The skin at an instant.
+pub(crate) struct SpringSkin<'a> {
+    body: &'a SpringBody,
+    motion: &'a SpringMotion,
+    scratch: &'a SpringScratch,
+    x_m: &'a [DVec3],
+    /// How far (m) the farthest awake node is from home.
+    farthest_m: f64,
+}
+
+/// What carries a vertex of the skin: places of nodes and weights, and where it is when these are at 0 (m).
+#[derive(Debug, Clone, Copy)]
+struct Carried {
+    offset_m: DVec3,
+    by: [(u32, f64); 3],
+    count: usize,
+}
+
+impl<'a> SpringSkin<'a> {
+    /// At positions `x_m` (m) of the awake nodes.
+    pub(crate) fn new(
+        body: &'a SpringBody,
+        (motion, scratch): (&'a SpringMotion, &'a SpringScratch),
+        x_m: &'a [DVec3],
+    ) -> Self {
+        Self { body, motion, scratch, x_m, farthest_m: 0.0 }
+    }
+
+    /// The node beneath a vertex of the skin, or the end of its edge that is nearer to a point.
+    pub(crate) fn coarse_vertex(&self, vertex: u32, from_m: DVec3) -> u32 {
+        let model = self.body.model();
+        let Some(edge) = vertex.checked_sub(model.vertices()) else { return vertex };
+        let [a, b] = model.surface().edges()[edge as usize].nodes;
+        let distance_m = |end: u32| self.position_m(end).distance(from_m);
+        if distance_m(b) < distance_m(a) { b } else { a }
+    }
+}
+
+fn carried(body: &SpringBody, motion: &SpringMotion, scratch: &SpringScratch, vertex: u32) -> Carried {
+    let model = body.model();
+    let home_m = |node: u32| model.rest_m()[node as usize];
+    let mut found = Carried { offset_m: home_m(vertex), by: [(0, 0.0); 3], count: 0 };
+    let mut add = |node: u32, weight: f64| {
+        if let Some(place) = scratch.place(node).filter(|_| weight != 0.0) {
+            found.offset_m -= home_m(node) * weight;
+            found.by[found.count] = (place as u32, weight);
+            found.count += 1;
+        }
+    };
+    match vertex.checked_sub(model.vertices()) {
+        None => add(vertex, 1.0),
+        Some(edge) => {
+            let level = if scratch.place(vertex).is_some() { motion.levels.of_edge(model.surface(), edge) } else { 0.0 };
+            add(vertex, level);
+            model.surface().edges()[edge as usize].nodes.into_iter().for_each(|end| add(end, 0.5 * (1.0 - level)));
+        }
+    }
+    found
+}
+
+impl Carried {
+    fn by(&self) -> &[(u32, f64)] {
+        &self.by[..self.count]
+    }
+
+    fn position_m(&self, x_m: &[DVec3]) -> DVec3 {
+        self.by().iter().fold(self.offset_m, |sum, (place, weight)| sum + x_m[*place as usize] * *weight)
+    }
+}
+
+impl Skin for SpringSkin<'_> {
+    fn begin(&mut self) {
+        let homes = self.motion.ids.iter().map(|&id| self.body.model().rest_m()[id as usize]);
+        let farthest_sq = self.x_m.iter().zip(homes).map(|(x, home)| x.distance_squared(home)).fold(0.0, f64::max);
+        self.farthest_m = farthest_sq.sqrt();
+    }
+
+    fn group_distance_m(&self, group: usize, from_m: DVec3) -> f64 {
+        let [low, high] = self.body.boxes.groups[group];
+        box_distance_m(from_m, low, high) - self.farthest_m
+    }
+
+    fn cluster_distance_m(&self, cluster: usize, from_m: DVec3) -> f64 {
+        let [low, high] = self.body.boxes.clusters[cluster];
+        box_distance_m(from_m, low, high) - self.farthest_m
+    }
+
+    fn clusters(&self) -> usize {
+        self.body.boxes.clusters.len()
+    }
+
+    fn vertices(&self, cluster: usize) -> &[u32] {
+        let boxes = &self.body.boxes;
+        &boxes.vertices[boxes.first[cluster] as usize..boxes.first[cluster + 1] as usize]
+    }
+
+    fn position_m(&self, vertex: u32) -> DVec3 {
+        carried(self.body, self.motion, self.scratch, vertex).position_m(self.x_m)
+    }
+}
+
+impl SpringBody {
+    /// Velocity (m/s) of a vertex of the skin.
+    pub(crate) fn velocity_m_per_s(
+        &self,
+        (motion, scratch): (&SpringMotion, &SpringScratch),
+        vertex: u32,
+        v_m_per_s: &[DVec3],
+    ) -> DVec3 {
+        let carried = carried(self, motion, scratch, vertex);
+        carried.by().iter().map(|(place, weight)| v_m_per_s[*place as usize] * *weight).sum()
+    }
+
+    /// Where a vertex of the skin is (m), at positions of the awake nodes.
+    pub fn vertex_m(&self, motion: &SpringMotion, vertex: u32, x_m: &[DVec3]) -> DVec3 {
+        let model = self.model();
+        let home_m = |node: u32| model.rest_m()[node as usize];
+        let moved = |node: u32| {
+            let place = motion.ids.binary_search(&node).ok();
+            place.map(|place| x_m[place] - home_m(node))
+        };
+        let Some(edge) = vertex.checked_sub(model.vertices()) else {
+            return home_m(vertex) + moved(vertex).unwrap_or_default();
+        };
+        let ends = model.surface().edges()[edge as usize].nodes.map(|end| moved(end).unwrap_or_default());
+        let as_ends = (ends[0] + ends[1]) * 0.5;
+        let level = motion.levels.of_edge(model.surface(), edge);
+        home_m(vertex) + moved(vertex).map_or(as_ends, |own| own * level + as_ends * (1.0 - level))
+    }
+}
+
+/// Vertices of the skin whose positions are kept up to date, because tools or loads are at them.
+#[derive(Debug, Clone)]
+pub(crate) struct ListedVertices {
+    /// Positions (m) of all vertices, of use at the listed ones.
+    pub(crate) x: Vec<DVec3>,
+    /// Forces (N) on all vertices, zero but at the listed ones.
+    pub(crate) forces_n: Vec<DVec3>,
+    listed: Vec<(u32, Carried)>,
+    is_listed: Vec<bool>,
+    /// Of which layout the carriers are.
+    layout: u64,
+}
+
+impl ListedVertices {
+    pub(crate) fn new(body: &SpringBody) -> Self {
+        let vertices = body.model().rest_m().len();
+        Self {
+            x: vec![DVec3::ZERO; vertices],
+            forces_n: vec![DVec3::ZERO; vertices],
+            listed: Vec::with_capacity(vertices),
+            is_listed: vec![false; vertices],
+            layout: u64::MAX,
+        }
+    }
+
+    /// Whether the list was made with another layout of nodes and levels.
+    pub(crate) fn is_outdated(&self, scratch: &SpringScratch) -> bool {
+        self.layout != scratch.layout()
+    }
+
+    /// Whether a vertex is listed.
+    pub(crate) fn is_listed(&self, vertex: u32) -> bool {
+        self.is_listed[vertex as usize]
+    }
+
+    /// Leaves all vertices, to be listed anew.
+    pub(crate) fn start(&mut self, scratch: &SpringScratch) {
+        for (vertex, _) in &self.listed {
+            self.is_listed[*vertex as usize] = false;
+        }
+        self.listed.clear();
+        self.layout = scratch.layout();
+    }
+
+    /// Lists a vertex. Allocates nothing.
+    pub(crate) fn list(
+        &mut self,
+        body: &SpringBody,
+        (motion, scratch): (&SpringMotion, &SpringScratch),
+        vertex: u32,
+    ) {
+        if !std::mem::replace(&mut self.is_listed[vertex as usize], true) {
+            self.listed.push((vertex, carried(body, motion, scratch, vertex)));
+        }
+    }
+
+    /// Nothing more is listed. Vertices go in their order, so that sums have the same bits whenever and wherefore they were listed.
+    pub(crate) fn finish(&mut self) {
+        self.listed.sort_unstable_by_key(|(vertex, _)| *vertex);
+    }
+
+    /// Positions and no forces at the listed vertices.
+    pub(crate) fn refresh(&mut self, x_m: &[DVec3]) {
+        for (vertex, carried) in &self.listed {
+            self.x[*vertex as usize] = carried.position_m(x_m);
+            self.forces_n[*vertex as usize] = DVec3::ZERO;
+        }
+    }
+
+    /// Hands the forces on vertices to the nodes that carry them.
+    pub(crate) fn hand_over(&self, forces_n: &mut [DVec3]) {
+        for (vertex, carried) in &self.listed {
+            let force_n = self.forces_n[*vertex as usize];
+            if force_n != DVec3::ZERO {
+                for (place, weight) in carried.by() {
+                    forces_n[*place as usize] += force_n * *weight;
+                }
+            }
+        }
+    }
+}

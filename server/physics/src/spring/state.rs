@@ -1,0 +1,232 @@
+//! What of a mass-spring surface a tick changes beside positions and velocities, and what tools and injected forces want of it.
+//!
+//! A tool that touches, or is about to, has a vertex that is refined about: the nearest to where it is deepest, or to it. It follows when another is nearer by a tenth of the tool's radius, and is let go when the tool has
+//! been away for [`AWAY_TICKS`]. Where not all of the surface fits in what may be awake at once, the vertices that are the fewest edges from such vertices are, and from those that a force was injected at;
+//! they stay awake until all is at rest.
+use super::{
+    around,
+    body::{Refining, SpringBody},
+    motion::SpringMotion,
+};
+use crate::world::{Model, State};
+use serde::{Deserialize, Serialize};
+
+/// Ticks for which a tool has to be away.
+const AWAY_TICKS: u32 = 100;
+/// Vertices kept awake for injected forces, besides those of tools.
+pub(super) const MOST_FORCED: usize = 8;
+/// Part of the reach of what is awake that a tool goes before it is awake about another vertex.
+const FOLLOW: f64 = 0.25;
+
+/// All that a tick changes of the surface beside positions and velocities.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct SpringState {
+    /// Awake nodes and levels.
+    pub motion: SpringMotion,
+    /// One for each tool.
+    about: Vec<About>,
+    /// Vertices that forces were injected at while they slept.
+    forced: Vec<u32>,
+    /// Triangles that are to be refined, ascending.
+    pub(crate) refined: Vec<u32>,
+    /// Coarse vertices that are to be awake, ascending, besides those of triangles that are not coarse.
+    pub(crate) awake: Vec<u32>,
+}
+
+/// What a tool is about.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+pub(crate) struct About {
+    /// The vertex refined about.
+    touched: Option<u32>,
+    /// The vertex awake about.
+    awake: Option<u32>,
+    /// For how many ticks the tool has been away.
+    away_ticks: u32,
+}
+
+/// What a tool is near to.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Near {
+    /// The coarse vertex nearest to it.
+    pub(crate) vertex: u32,
+    /// How far (m) that is, and how far the vertex that it is about now.
+    pub(crate) distance_m: f64,
+    pub(crate) present_m: f64,
+    /// Gap (m) between tool and surface, 0 while they touch.
+    pub(crate) gap_m: f64,
+}
+
+/// Buffers of a look.
+#[derive(Debug, Clone)]
+pub(crate) struct Looking {
+    centres: Vec<u32>,
+    triangles: Vec<u32>,
+    corners: Vec<u32>,
+    seen: Vec<bool>,
+}
+
+impl Looking {
+    pub(crate) fn new(body: &SpringBody, tools: usize) -> Self {
+        let most = body.model().spec().most_refined;
+        Self {
+            centres: Vec::with_capacity(tools),
+            triangles: Vec::with_capacity(most),
+            corners: Vec::with_capacity(3 * most + tools),
+            seen: vec![false; if body.is_all_awake() { 0 } else { body.model().vertices() as usize }],
+        }
+    }
+}
+
+/// Refines so many rings around vertices and nothing else, of a body refined by hand ([`Refining::ByHand`]): as with tools, levels go there from tick to tick. What there is no room for is left out.
+pub fn refine_only(model: &Model, state: &mut State, centres: &[u32], rings: u32) {
+    let (Some(body), Some(own)) = (model.springs(), &mut state.springs) else { return };
+    let springs = body.model();
+    let known = centres.iter().copied().filter(|&vertex| vertex < springs.vertices()).collect::<Vec<_>>();
+    let (mut triangles, mut corners) = (Vec::new(), Vec::new());
+    let levels = own.motion.levels.triangles().len();
+    let most = springs.spec().most_refined.saturating_sub(levels);
+    around::rings_into(springs.surface(), &known, (rings, most), (&mut triangles, &mut corners));
+    own.refined.clear();
+    own.refined.extend_from_slice(&triangles);
+}
+
+impl SpringState {
+    /// Everything coarse and at home.
+    pub(crate) fn at_rest(body: &SpringBody, tools: usize) -> Self {
+        let spec = body.model().spec();
+        let mut awake = Vec::with_capacity(spec.most_awake.min(body.model().vertices() as usize));
+        if body.is_all_awake() {
+            awake.extend(0..body.model().vertices());
+        }
+        Self {
+            motion: SpringMotion::at_rest(body.model(), awake.iter().copied()),
+            about: vec![About::default(); tools],
+            forced: Vec::with_capacity(MOST_FORCED),
+            refined: Vec::with_capacity(spec.most_refined),
+            awake,
+        }
+    }
+
+    /// As at rest, in the buffers it has.
+    pub(crate) fn reset(&mut self, body: &SpringBody) {
+        self.motion.reset(body.model());
+        self.about.fill(About::default());
+        self.forced.clear();
+        self.refined.clear();
+        if !body.is_all_awake() {
+            self.awake.clear();
+        }
+        self.motion.ids.extend_from_slice(&self.awake);
+    }
+
+    /// Copies another state of the same body. Allocates nothing.
+    pub(crate) fn copy_from(&mut self, other: &Self) {
+        self.motion.copy_from(&other.motion);
+        self.about.clone_from(&other.about);
+        self.forced.clone_from(&other.forced);
+        self.refined.clone_from(&other.refined);
+        self.awake.clone_from(&other.awake);
+    }
+
+    /// Whether it may be a state of a body with so many tools.
+    pub(crate) fn fits(&self, body: &SpringBody, tools: usize) -> bool {
+        let model = body.model();
+        let (vertices, triangles) = (model.vertices(), model.surface().triangles().len());
+        let ascending = |list: &[u32]| list.windows(2).all(|pair| pair[0] < pair[1]);
+        let known = |about: &About| about.touched.into_iter().chain(about.awake).all(|vertex| vertex < vertices);
+        let refined = ascending(&self.refined) && self.refined.last().is_none_or(|last| (*last as usize) < triangles);
+        let levels = self.motion.levels.triangles();
+        let coming = self.refined.iter().filter(|t| levels.binary_search_by_key(*t, |level| level.0).is_err());
+        refined
+            && levels.len() + coming.count() <= model.spec().most_refined
+            && self.about.len() == tools
+            && self.about.iter().all(known)
+            && self.forced.len() <= MOST_FORCED
+            && self.forced.iter().all(|vertex| *vertex < vertices)
+            && (!body.is_all_awake() || self.awake.iter().copied().eq(0..vertices))
+            && self.motion.fits(model, &self.awake)
+    }
+
+    /// Nodes of type 2 that are there: middles of edges refined, or on their way.
+    pub fn refined_nodes(&self, body: &SpringBody) -> usize {
+        self.motion.ids.len() - self.motion.ids.partition_point(|id| *id < body.model().vertices())
+    }
+
+    /// The vertex that a tool is refined about.
+    pub(crate) fn touched(&self, tool: usize) -> Option<u32> {
+        self.about[tool].touched
+    }
+
+    /// Takes what a tool is near to, if anything, after so many ticks; from `near_m` on it touches.
+    pub(crate) fn note(&mut self, tool: usize, near: Option<Near>, (near_m, radius_m, ticks): (f64, f64, u32)) {
+        /// Part of the tool's radius that another vertex has to be nearer.
+        const NEARER: f64 = 0.1;
+        let about = &mut self.about[tool];
+        match (about.touched, near) {
+            (touched, Some(near)) if near.gap_m < near_m => {
+                let follows = touched.is_none() || near.distance_m < near.present_m - NEARER * radius_m;
+                about.touched = if follows { Some(near.vertex) } else { touched };
+                about.away_ticks = 0;
+            }
+            (Some(_), near) if near.is_none_or(|near| near.gap_m > 2.0 * near_m) => {
+                about.away_ticks += ticks;
+                if about.away_ticks >= AWAY_TICKS {
+                    about.touched = None;
+                }
+            }
+            (Some(_), _) => about.away_ticks = 0,
+            (None, _) => {}
+        }
+    }
+
+    /// A force is injected at a vertex that sleeps.
+    pub(crate) fn force(&mut self, vertex: u32) {
+        if !self.forced.contains(&vertex) {
+            if self.forced.len() == MOST_FORCED {
+                self.forced.remove(0);
+            }
+            self.forced.push(vertex);
+        }
+    }
+
+    /// Which triangles are to be refined. While those that come and those that still go would be more than there is room for, only those that are there already. Allocates nothing.
+    pub(crate) fn want_refined(&mut self, body: &SpringBody, looking: &mut Looking) {
+        let Some(refinement) = body.refinement().filter(|refinement| refinement.by == Refining::ByTools) else { return };
+        let Looking { centres, triangles, corners, .. } = looking;
+        let most = body.model().spec().most_refined;
+        centres.clear();
+        centres.extend(self.about.iter().filter_map(|about| about.touched));
+        around::rings_into(body.model().surface(), centres, (refinement.rings, most), (triangles, corners));
+        let levels = self.motion.levels.triangles();
+        let is_there = |triangle: &u32| levels.binary_search_by_key(triangle, |level| level.0).is_ok();
+        let coming = triangles.iter().filter(|triangle| !is_there(triangle)).count();
+        let fits = levels.len() + coming <= most;
+        self.refined.clear();
+        self.refined.extend(triangles.iter().filter(|triangle| fits || is_there(triangle)));
+    }
+
+    /// Which vertices are to be awake, where not all are; `is_quiet` tells whether all that is awake is at rest. `forced` tells that a sleeping vertex was forced. Allocates nothing.
+    pub(crate) fn want_awake(&mut self, body: &SpringBody, looking: &mut Looking, forced: bool, is_quiet: bool) {
+        let rest_m = body.model().rest_m();
+        let mut changed = forced;
+        for about in &mut self.about {
+            let Some(touched) = about.touched else { continue };
+            let far_m = |awake: u32| rest_m[awake as usize].distance(rest_m[touched as usize]);
+            if about.awake.is_none_or(|awake| far_m(awake) > FOLLOW * body.awake_reach_m()) {
+                about.awake = Some(touched);
+                changed = true;
+            }
+        }
+        let is_touched = self.about.iter().any(|about| about.touched.is_some());
+        if !is_touched && !forced && is_quiet && !self.awake.is_empty() {
+            self.forced.clear();
+            self.about.iter_mut().for_each(|about| about.awake = None);
+            changed = true;
+        }
+        if changed {
+            let centres = self.about.iter().filter_map(|about| about.awake).chain(self.forced.iter().copied());
+            let most = body.model().spec().most_awake;
+            around::nearest_into(body.model().surface(), centres, most, (&mut self.awake, &mut looking.seen));
+        }
+    }
+}

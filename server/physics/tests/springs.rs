@@ -1,0 +1,327 @@
+//! Mass-spring surfaces, tick by tick.
+#![allow(clippy::unwrap_used)]
+mod rig;
+use assert_no_alloc::{AllocDisabler, assert_no_alloc};
+use glam::DVec3;
+use palpate_physics::{
+    Energies, LoadSpec, ModelSpec, PointForce, PrescribedSpec, Settings, TetMesh,
+    contact::Coupling,
+    snapshot,
+    spring::{
+        HomeLaw, Refinement, Refining, SpringBodySpec, SpringSpec, net::hexagonal_patch, refine_only,
+        region::Constants,
+    },
+};
+use rig::{Drive, Rig, at, sphere};
+
+#[global_allocator]
+static ALLOCATOR: AllocDisabler = AllocDisabler;
+
+const EDGE_M: f64 = 4e-3;
+const COARSE: Constants = Constants { mesh_n_per_m: 60.0, home_n_per_m: 12.0 };
+/// What a sphere of 3 mm feels alike where it is refined.
+const FINE: Constants = Constants { mesh_n_per_m: 36.0, home_n_per_m: 6.2 };
+
+/// A flat sheet whose border is held, and a sphere of 3 mm above its middle.
+fn sheet(rings: i32, refinement: Option<Refinement>) -> ModelSpec {
+    let surface = hexagonal_patch(rings, EDGE_M).unwrap();
+    let vertices = surface.positions_m().len();
+    let border: Vec<u32> = (0..vertices as u32).filter(|&vertex| surface.is_border(vertex)).collect();
+    ModelSpec {
+        mesh: TetMesh::none(),
+        particles: None,
+        seed: None,
+        springs: Some(SpringBodySpec {
+            springs: SpringSpec {
+                coarse: COARSE,
+                fine: FINE,
+                home_law: HomeLaw::Linear,
+                mass_kg: vec![2e-4; vertices],
+                held: Vec::new(),
+                most_awake: vertices,
+                most_refined: 300,
+                surface,
+            },
+            refinement,
+        }),
+        regions: Vec::new(),
+        tet_region: Vec::new(),
+        prescribed: vec![PrescribedSpec { name: "border".into(), nodes: border, axes: [true; 3] }],
+        loads: Vec::new(),
+        gravity_m_per_s2: DVec3::ZERO,
+        tools: vec![sphere(3e-3, DVec3::Z * 0.01, Coupling::Rigid)],
+        settings: Settings { mass_damping_per_s: 60.0, ..Settings::default() },
+    }
+}
+
+fn refined(rings: u32, by: Refining) -> Option<Refinement> {
+    Some(Refinement { rings, fade_s: 0.1, by })
+}
+
+fn refined_nodes(rig: &Rig) -> usize {
+    rig.state.springs.as_ref().unwrap().refined_nodes(rig.model.springs().unwrap())
+}
+
+fn energies(rig: &Rig) -> Energies {
+    Energies::of(&rig.model, &rig.state)
+}
+
+/// Down over so many ticks, to a centre at height `z_m`.
+fn press(rig: &mut Rig, z_m: f64, ticks: u32) {
+    let from = rig.state.tools[0].target.position_m;
+    for tick in 1..=ticks {
+        let part = f64::from(tick) / f64::from(ticks);
+        rig.tick_at(DVec3::new(from.x, from.y, from.z + (z_m - from.z) * part));
+    }
+}
+
+fn force_n(rig: &Rig) -> f64 {
+    rig.state.tools[0].device_force_n.length()
+}
+
+#[test]
+fn what_is_touched_is_refined_and_coarse_again_when_left() {
+    for (rings, nodes) in [(1, 12), (2, 42)] {
+        let mut rig = Rig::new(sheet(8, refined(rings, Refining::ByTools)));
+        press(&mut rig, 0.007, 50);
+        assert_eq!(refined_nodes(&rig), 0, "far away");
+        press(&mut rig, 1.5e-3, 200);
+        assert_eq!(refined_nodes(&rig), nodes);
+        assert!(force_n(&rig) > 1e-3);
+        press(&mut rig, 0.02, 100);
+        assert_eq!(refined_nodes(&rig), nodes, "not at once");
+        press(&mut rig, 0.02, 250);
+        assert_eq!(refined_nodes(&rig), 0);
+    }
+}
+
+/// Pressing, dragging across many regions, and leaving: all energy is accounted for.
+#[test]
+fn the_ledger_closes_while_a_tool_is_dragged_across() {
+    let mut spec = sheet(10, refined(2, Refining::ByTools));
+    spec.tools[0].friction_coefficient = 0.3;
+    let mut rig = Rig::new(spec);
+    press(&mut rig, 1.5e-3, 200);
+    let mut most = 0;
+    for tick in 0..1500 {
+        let x_m = 0.012 * (f64::from(tick) * 0.006).sin();
+        rig.tick_at(DVec3::new(x_m, 0.4 * x_m, 1.5e-3));
+        most = most.max(refined_nodes(&rig));
+    }
+    press(&mut rig, 0.02, 400);
+    let Energies { external_work_j, .. } = energies(&rig);
+    let balance_j = energies(&rig).balance_j();
+    assert!(most > 60 && external_work_j > 1e-5, "{most} {external_work_j}");
+    assert!(balance_j.abs() < 2e-3 * external_work_j, "{balance_j} of {external_work_j}");
+}
+
+/// Refined and coarse again beneath a tool that stands still: no tick changes its force by 1 %, nor does all of it by much more.
+#[test]
+fn the_force_does_not_step_when_the_surface_is_refined() {
+    for centre in [0, 1, 7] {
+        let mut rig = Rig::new(sheet(8, refined(2, Refining::ByHand)));
+        press(&mut rig, 1.5e-3, 300);
+        press(&mut rig, 1.5e-3, 300);
+        let coarse_n = force_n(&rig);
+        let (mut before_n, mut step, mut held_j) = (coarse_n, 0.0_f64, energies(&rig).held_j());
+        let mut upward_j = 0.0_f64;
+        for tick in 0..1200 {
+            let wanted: &[u32] = if tick / 300 % 2 == 0 { &[centre] } else { &[] };
+            refine_only(&rig.model, &mut rig.state, wanted, 2);
+            rig.tick_at(DVec3::Z * 1.5e-3);
+            step = step.max((force_n(&rig) - before_n).abs() / coarse_n);
+            before_n = force_n(&rig);
+            let now_j = energies(&rig).held_j();
+            upward_j = upward_j.max(now_j - held_j);
+            held_j = now_j;
+        }
+        assert!(step < 0.01 && step > 1e-5, "about {centre}: {step}");
+        assert!((force_n(&rig) / coarse_n - 1.0).abs() < 1e-3);
+        assert!(upward_j < 0.01 * held_j, "about {centre}: {upward_j} of {held_j}");
+    }
+}
+
+fn tour(tick: u32) -> DVec3 {
+    let phase = f64::from(tick) * 0.01;
+    DVec3::new(0.01 * phase.sin(), 0.008 * (0.7 * phase).cos(), 2.5e-3 + 1.5e-3 * (1.7 * phase).sin())
+}
+
+/// The broad phase and snapshots change no bit.
+#[test]
+fn looking_at_all_triangles_or_going_on_from_a_snapshot_gives_the_same_bits() {
+    for most_awake in [usize::MAX, 60] {
+        let spec = || {
+            let mut spec = sheet(10, refined(2, Refining::ByTools));
+            let springs = &mut spec.springs.as_mut().unwrap().springs;
+            springs.most_awake = springs.most_awake.min(most_awake);
+            spec.tools[0].friction_coefficient = 0.3;
+            spec
+        };
+        let mut exhaustive = spec();
+        exhaustive.settings.skips.distant_contact = false;
+        let (mut rig, mut slow) = (Rig::new(spec()), Rig::new(exhaustive));
+        let mut restored: Option<Rig> = None;
+        for tick in 0..900 {
+            if tick == 437 {
+                let bytes = snapshot::save(&rig.model, &rig.state);
+                let mut other = Rig::new(spec());
+                other.state = snapshot::restore(&other.model, &bytes).unwrap();
+                restored = Some(other);
+            }
+            for rig in [Some(&mut rig), Some(&mut slow), restored.as_mut()].into_iter().flatten() {
+                rig.tick_at(tour(tick));
+            }
+            assert_eq!(snapshot::state_hash(&rig.state), snapshot::state_hash(&slow.state), "tick {tick}");
+        }
+        assert!(rig.state.contact == slow.state.contact || rig.state.tools == slow.state.tools);
+        assert_eq!(rig.state.x, restored.unwrap().state.x);
+    }
+}
+
+#[test]
+fn damaged_and_foreign_snapshots_are_refused() {
+    let mut rig = Rig::new(sheet(6, refined(1, Refining::ByTools)));
+    press(&mut rig, 2e-3, 100);
+    let good = snapshot::save(&rig.model, &rig.state);
+    for at in (0..good.len()).step_by(997) {
+        let mut bad = good.clone();
+        bad[at] ^= 0x10;
+        assert!(snapshot::restore(&rig.model, &bad).is_err(), "byte {at}");
+    }
+    let mut softer = sheet(6, refined(1, Refining::ByTools));
+    softer.springs.as_mut().unwrap().springs.fine.home_n_per_m *= 0.5;
+    assert_eq!(snapshot::restore(&Rig::new(softer).model, &good), Err(snapshot::SnapshotError::OtherBody));
+    let mut mangled = rig.state.clone();
+    mangled.springs.as_mut().unwrap().motion.ids.swap(3, 4);
+    let bytes = snapshot::save(&rig.model, &mangled);
+    assert_eq!(snapshot::restore(&rig.model, &bytes), Err(snapshot::SnapshotError::OtherBody));
+}
+
+/// Where fewer may be awake than there are, those about the tool are, and the force is that of all of them awake; when it has left, all fall asleep at home.
+#[test]
+fn far_vertices_sleep() {
+    let run = |most_awake: usize| {
+        let mut spec = sheet(20, refined(2, Refining::ByTools));
+        spec.springs.as_mut().unwrap().springs.most_awake = most_awake;
+        let mut rig = Rig::new(spec);
+        press(&mut rig, 1.5e-3, 300);
+        let mut forces = Vec::new();
+        for tick in 0..600 {
+            let x_m = 0.03 * f64::from(tick) / 600.0;
+            rig.tick_at(DVec3::new(x_m, 0.3 * x_m, 1.5e-3));
+            forces.push(force_n(&rig));
+        }
+        let awake = rig.state.x.len();
+        press(&mut rig, 0.03, 100);
+        (0..1200).for_each(|_| press(&mut rig, 0.03, 1));
+        (forces, awake, rig)
+    };
+    let (all, all_awake, _) = run(1261);
+    let (few, few_awake, rig) = run(400);
+    assert!(all_awake > 1261 && (400..520).contains(&few_awake), "{all_awake} {few_awake}");
+    let worst = all.iter().zip(&few).map(|(all, few)| (few / all - 1.0).abs()).fold(0.0, f64::max);
+    assert!(worst < 2e-3, "{worst}");
+    assert_eq!(rig.state.x.len(), 0);
+    let e = energies(&rig);
+    assert!(e.held_j() == 0.0 && e.balance_j().abs() < 2e-3 * e.external_work_j, "{e:?}");
+}
+
+/// A force injected where all sleep wakes what is around.
+#[test]
+fn a_force_wakes_where_it_is_injected() {
+    let mut spec = sheet(20, None);
+    spec.springs.as_mut().unwrap().springs.most_awake = 200;
+    spec.tools.clear();
+    let mut rig = Rig::new(spec);
+    let mut drive = rig.still();
+    assert!(rig.state.x.is_empty());
+    drive.point_forces = vec![PointForce { node: 40, force_n: DVec3::Z * -0.02 }];
+    for _ in 0..400 {
+        rig.tick(&drive);
+    }
+    let mut surface = Vec::new();
+    rig.model.surface_positions_m(&rig.state, &mut surface);
+    let depth_m = rig.model.surface_rest_positions_m()[40].z - surface[40].z;
+    assert_eq!(rig.state.x.len(), 200);
+    assert!((depth_m - 0.02 / COARSE.home_n_per_m).abs() < 0.02 * depth_m, "{depth_m}");
+}
+
+/// Under a dead load the loop comes to rest where springs and load are in balance.
+#[test]
+fn loads_and_weight_come_to_rest_in_balance() {
+    let mut spec = sheet(6, None);
+    spec.tools.clear();
+    spec.loads = vec![LoadSpec::NodalForces(vec![(0, DVec3::new(4e-3, 0.0, -0.01))])];
+    spec.gravity_m_per_s2 = DVec3::Z * -9.81;
+    let mut rig = Rig::new(spec);
+    let drive = Drive { load_factors: vec![1.0], ..rig.still() };
+    for _ in 0..1500 {
+        rig.tick(&drive);
+    }
+    let e = energies(&rig);
+    assert!(e.kinetic_j < 1e-9 * e.elastic_j && e.balance_j().abs() < 1e-3 * e.external_work_j, "{e:?}");
+    let total: DVec3 = rig.state.force_n.iter().zip(&rig.state.v).map(|(f, _)| *f).sum();
+    let held: DVec3 = rig.scratch.reactions_n().iter().copied().sum();
+    // What is free is in balance; the holders carry the rest.
+    assert!((total + held).length() < 1e-7, "{total} {held}");
+    assert!(rig.state.x[0].z < -8e-4 && rig.state.x[0].x > 5e-5, "{}", rig.state.x[0]);
+}
+
+#[test]
+fn ticks_allocate_nothing() {
+    for most_awake in [usize::MAX, 80] {
+        let mut spec = sheet(10, refined(2, Refining::ByTools));
+        let springs = &mut spec.springs.as_mut().unwrap().springs;
+        springs.most_awake = springs.most_awake.min(most_awake);
+        springs.home_law = HomeLaw::cubic(1e4).unwrap();
+        let mut rig = Rig::new(spec);
+        let mut saved = rig.state.clone();
+        let mut drive = rig.still();
+        drive.point_forces.push(PointForce { node: 0, force_n: DVec3::ZERO });
+        let (mut layouts, mut nodes) = (0, 0);
+        assert_no_alloc(|| {
+            for tick in 0..3000 {
+                drive.tools[0] = at(tour(tick) + if tick % 1000 > 700 { DVec3::Z * 0.05 } else { DVec3::ZERO });
+                drive.point_forces[0] = PointForce { node: tick % 300, force_n: DVec3::Z * 1e-3 };
+                rig.tick(&drive);
+                layouts += u32::from(rig.state.x.len() != nodes);
+                nodes = rig.state.x.len();
+                if tick % 500 == 0 {
+                    saved.copy_from(&rig.state);
+                }
+                if tick == 1700 {
+                    rig.state.reset(&rig.model);
+                }
+            }
+        });
+        assert!(rig.state.quarantine.is_none() && layouts > 20, "{layouts}");
+    }
+}
+
+#[test]
+fn what_springs_cannot_have_is_refused_by_name() {
+    let refused = |change: &dyn Fn(&mut ModelSpec)| {
+        let mut spec = sheet(4, refined(1, Refining::ByTools));
+        change(&mut spec);
+        palpate_physics::Model::build(spec).unwrap_err().to_string()
+    };
+    let springs = |spec: &mut ModelSpec| spec.springs.take().unwrap();
+    assert!(refused(&|spec| spec.prescribed[0].axes = [true, false, true]).contains("along some axes"));
+    assert!(refused(&|spec| spec.settings.sleep_tolerance_m = 1e-6).contains("sleeps as a whole"));
+    assert!(refused(&|spec| spec.settings.integrator = palpate_physics::Integrator::BackwardEuler).contains("leapfrog"));
+    assert!(refused(&|spec| spec.prescribed[0].nodes.push(400)).contains("node 400 is out of range"));
+    assert!(refused(&|spec| {
+        let mut own = springs(spec);
+        own.refinement = Some(Refinement { rings: 0, fade_s: 0.1, by: Refining::ByTools });
+        spec.springs = Some(own);
+    })
+    .contains("rings = 0"));
+    assert!(refused(&|spec| {
+        let mut own = springs(spec);
+        own.springs.most_awake = 10;
+        spec.springs = Some(own);
+        spec.gravity_m_per_s2 = DVec3::Z;
+    })
+    .contains("gravity"));
+    assert!(refused(&|spec| spec.tools[0].radius_m = 1e-5).contains("too small for the surface"));
+}
