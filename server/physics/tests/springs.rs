@@ -4,12 +4,12 @@ mod rig;
 use assert_no_alloc::{AllocDisabler, assert_no_alloc};
 use glam::DVec3;
 use palpate_physics::{
-    Energies, LoadSpec, ModelSpec, PointForce, PrescribedSpec, Settings, TetMesh,
+    Energies, LoadSpec, ModelSpec, PointForce, PrescribedSpec, Settings, State, Substeps, TetMesh,
     contact::Coupling,
     snapshot,
     spring::{
-        HomeLaw, Refinement, Refining, SpringBodySpec, SpringSpec, net::hexagonal_patch, refine_only,
-        region::Constants,
+        HomeLaw, Net, Refinement, Refining, SpringBodySpec, SpringSpec, equilibrium::settle, net::hexagonal_patch,
+        refine_only, region::Constants,
     },
 };
 use rig::{Drive, Rig, at, sphere};
@@ -95,24 +95,32 @@ fn what_is_touched_is_refined_and_coarse_again_when_left() {
     }
 }
 
-/// Pressing, dragging across many regions, and leaving: all energy is accounted for.
+/// Pressing, dragging across many regions, and leaving: all energy is accounted for, but for what leapfrog's step leaves, which is of second order in it.
 #[test]
 fn the_ledger_closes_while_a_tool_is_dragged_across() {
-    let mut spec = sheet(10, refined(2, Refining::ByTools));
-    spec.tools[0].friction_coefficient = 0.3;
-    let mut rig = Rig::new(spec);
-    press(&mut rig, 1.5e-3, 200);
-    let mut most = 0;
-    for tick in 0..1500 {
-        let x_m = 0.012 * (f64::from(tick) * 0.006).sin();
-        rig.tick_at(DVec3::new(x_m, 0.4 * x_m, 1.5e-3));
-        most = most.max(refined_nodes(&rig));
-    }
-    press(&mut rig, 0.02, 400);
-    let Energies { external_work_j, .. } = energies(&rig);
-    let balance_j = energies(&rig).balance_j();
-    assert!(most > 60 && external_work_j > 1e-5, "{most} {external_work_j}");
-    assert!(balance_j.abs() < 2e-3 * external_work_j, "{balance_j} of {external_work_j}");
+    let off = |substeps: u32| {
+        let mut spec = sheet(10, refined(2, Refining::ByTools));
+        spec.settings.substeps = Substeps::Fixed(substeps);
+        let mut rig = Rig::new(spec);
+        press(&mut rig, 1.5e-3, 200);
+        let pressed_j = energies(&rig).held_j();
+        let mut most = 0;
+        for tick in 0..1500 {
+            let x_m = 0.012 * (f64::from(tick) * 0.006).sin();
+            rig.tick_at(DVec3::new(x_m, 0.4 * x_m, 1.5e-3));
+            most = most.max(refined_nodes(&rig));
+        }
+        press(&mut rig, 0.02, 400);
+        let e = energies(&rig);
+        let given_j = rig.state.springs.as_ref().unwrap().given_j;
+        println!("given by levels {given_j:.2e} J, held while pressed {pressed_j:.2e} J, {e:?}");
+        // Levels on their way drive no tool on.
+        assert!(most > 42 && given_j < -1e-8 && given_j > -0.05 * pressed_j, "{most} {given_j}");
+        e.balance_j().abs() / pressed_j
+    };
+    let [long, half] = [16, 32].map(off);
+    println!("{long:.2e}, {half:.2e} of what is held while pressed");
+    assert!(half < 1e-3 && half < 0.4 * long, "{long} {half}");
 }
 
 /// Refined and coarse again beneath a tool that stands still: no tick changes its force by 1 %, nor does all of it by much more.
@@ -216,14 +224,16 @@ fn far_vertices_sleep() {
         (0..1200).for_each(|_| press(&mut rig, 0.03, 1));
         (forces, awake, rig)
     };
-    let (all, all_awake, _) = run(1261);
+    let (all, all_awake, full) = run(1261);
     let (few, few_awake, rig) = run(400);
     assert!(all_awake > 1261 && (400..520).contains(&few_awake), "{all_awake} {few_awake}");
     let worst = all.iter().zip(&few).map(|(all, few)| (few / all - 1.0).abs()).fold(0.0, f64::max);
     assert!(worst < 2e-3, "{worst}");
     assert_eq!(rig.state.x.len(), 0);
     let e = energies(&rig);
-    assert!(e.held_j() == 0.0 && e.balance_j().abs() < 2e-3 * e.external_work_j, "{e:?}");
+    // What falls asleep leaves nothing that is not told: with all awake the balance is as far off, by leapfrog's step.
+    let apart_j = e.balance_j() - energies(&full).balance_j();
+    assert!(e.held_j() == 0.0 && apart_j.abs() < 1e-5 * e.external_work_j, "{e:?}");
 }
 
 /// A force injected where all sleep wakes what is around.
@@ -235,7 +245,7 @@ fn a_force_wakes_where_it_is_injected() {
     let mut rig = Rig::new(spec);
     let mut drive = rig.still();
     assert!(rig.state.x.is_empty());
-    drive.point_forces = vec![PointForce { node: 40, force_n: DVec3::Z * -0.02 }];
+    drive.point_forces = vec![PointForce { node: 40, force_n: DVec3::Z * -1e-3 }];
     for _ in 0..400 {
         rig.tick(&drive);
     }
@@ -243,7 +253,7 @@ fn a_force_wakes_where_it_is_injected() {
     rig.model.surface_positions_m(&rig.state, &mut surface);
     let depth_m = rig.model.surface_rest_positions_m()[40].z - surface[40].z;
     assert_eq!(rig.state.x.len(), 200);
-    assert!((depth_m - 0.02 / COARSE.home_n_per_m).abs() < 0.02 * depth_m, "{depth_m}");
+    assert!((depth_m - 1e-3 / COARSE.home_n_per_m).abs() < 0.02 * depth_m, "{depth_m}");
 }
 
 /// Under a dead load the loop comes to rest where springs and load are in balance.
@@ -260,11 +270,22 @@ fn loads_and_weight_come_to_rest_in_balance() {
     }
     let e = energies(&rig);
     assert!(e.kinetic_j < 1e-9 * e.elastic_j && e.balance_j().abs() < 1e-3 * e.external_work_j, "{e:?}");
-    let total: DVec3 = rig.state.force_n.iter().zip(&rig.state.v).map(|(f, _)| *f).sum();
+    let total: DVec3 = rig.state.force_n.iter().sum();
     let held: DVec3 = rig.scratch.reactions_n().iter().copied().sum();
     // What is free is in balance; the holders carry the rest.
     assert!((total + held).length() < 1e-7, "{total} {held}");
-    assert!(rig.state.x[0].z < -8e-4 && rig.state.x[0].x > 5e-5, "{}", rig.state.x[0]);
+    // The plain springs, settled by Newton's method.
+    let body = rig.model.springs().unwrap().model();
+    // At home: Loop's scheme smooths the border.
+    let homes = body.rest_m()[..body.vertices() as usize].to_vec();
+    let net = Net::uniform(&body.surface().moved(homes).unwrap(), COARSE.mesh_n_per_m, COARSE.home_n_per_m);
+    let is_held: Vec<bool> = (0..body.vertices()).map(|vertex| body.is_held(vertex)).collect();
+    let mut external_n: Vec<DVec3> = body.spec().mass_kg.iter().map(|mass| DVec3::Z * (-9.81 * mass)).collect();
+    external_n[0] += DVec3::new(4e-3, 0.0, -0.01);
+    let mut settled_m = net.rest_m.clone();
+    settle(&net, &is_held, &external_n, &mut settled_m, 1e-12).unwrap();
+    let worst_m = rig.state.x.iter().zip(&settled_m).map(|(x, settled)| x.distance(*settled)).fold(0.0, f64::max);
+    assert!(worst_m < 1e-8 && settled_m[0].z < -8e-4, "{worst_m} {}", settled_m[0]);
 }
 
 #[test]
@@ -275,7 +296,7 @@ fn ticks_allocate_nothing() {
         springs.most_awake = springs.most_awake.min(most_awake);
         springs.home_law = HomeLaw::cubic(1e4).unwrap();
         let mut rig = Rig::new(spec);
-        let mut saved = rig.state.clone();
+        let mut saved = State::at_rest(&rig.model);
         let mut drive = rig.still();
         drive.point_forces.push(PointForce { node: 0, force_n: DVec3::ZERO });
         let (mut layouts, mut nodes) = (0, 0);
@@ -308,20 +329,26 @@ fn what_springs_cannot_have_is_refused_by_name() {
     let springs = |spec: &mut ModelSpec| spec.springs.take().unwrap();
     assert!(refused(&|spec| spec.prescribed[0].axes = [true, false, true]).contains("along some axes"));
     assert!(refused(&|spec| spec.settings.sleep_tolerance_m = 1e-6).contains("sleeps as a whole"));
-    assert!(refused(&|spec| spec.settings.integrator = palpate_physics::Integrator::BackwardEuler).contains("leapfrog"));
+    assert!(
+        refused(&|spec| spec.settings.integrator = palpate_physics::Integrator::BackwardEuler).contains("leapfrog")
+    );
     assert!(refused(&|spec| spec.prescribed[0].nodes.push(400)).contains("node 400 is out of range"));
-    assert!(refused(&|spec| {
-        let mut own = springs(spec);
-        own.refinement = Some(Refinement { rings: 0, fade_s: 0.1, by: Refining::ByTools });
-        spec.springs = Some(own);
-    })
-    .contains("rings = 0"));
-    assert!(refused(&|spec| {
-        let mut own = springs(spec);
-        own.springs.most_awake = 10;
-        spec.springs = Some(own);
-        spec.gravity_m_per_s2 = DVec3::Z;
-    })
-    .contains("gravity"));
+    assert!(
+        refused(&|spec| {
+            let mut own = springs(spec);
+            own.refinement = Some(Refinement { rings: 0, fade_s: 0.1, by: Refining::ByTools });
+            spec.springs = Some(own);
+        })
+        .contains("rings = 0")
+    );
+    assert!(
+        refused(&|spec| {
+            let mut own = springs(spec);
+            own.springs.most_awake = 10;
+            spec.springs = Some(own);
+            spec.gravity_m_per_s2 = DVec3::Z;
+        })
+        .contains("gravity")
+    );
     assert!(refused(&|spec| spec.tools[0].radius_m = 1e-5).contains("too small for the surface"));
 }

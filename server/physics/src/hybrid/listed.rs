@@ -1,9 +1,6 @@
 //! The skin's vertices that something acts on, and where any other is when asked.
 use super::{body::Hybrid, clusters::Displaced, composite::Anchor, partition::NONE, running::RunningPatch};
-use crate::{
-    contact::broad::Skin,
-    world::State,
-};
+use crate::{contact::broad::Skin, world::State};
 use glam::DVec3;
 
 /// Vertices of the skin whose positions are kept up to date, because tools or loads are at them.

@@ -8,7 +8,7 @@ use crate::{
     contact::{ContactScratch, SubstepTime, SurfaceNow, broad::Skin, deepest_m, nearest_vertex},
     fem::loads::add_load_n,
     spring::{
-        SpringBody, SpringScratch, SpringState, Wanted,
+        Refinement, SpringBody, SpringScratch, SpringState, Wanted,
         skin::{ListedVertices, SpringSkin},
         state::{Looking, Near},
     },
@@ -22,6 +22,8 @@ const LOOK_EVERY_TICKS: u32 = 8;
 const GAP: f64 = 0.25;
 /// Way home, and way in a tick, over the coarse edges' length, below which a node is at rest.
 const QUIET: f64 = 1e-6;
+/// Way of a tool over the coarse edges' length in which levels go all their way, however slowly they do beneath one that stands still.
+const FADE_WAY: f64 = 1.0;
 
 /// Buffers, sized once.
 #[derive(Debug, Clone)]
@@ -79,9 +81,14 @@ impl SpringBodyScratch {
             }
         }
         let fine = springs.motion.fine;
-        let step = body.refinement().map_or(1.0, |r| model.spec().settings.tick_period_s / r.fade_s);
+        // A moving tool leaves levels no time to lag behind: what is refined too late at its front and coarse too late at its back would drive it on.
+        let speeds = state.tools.iter().map(|tool| tool.velocity_m_per_s.length());
+        let fastest_m_per_s = speeds.fold(0.0, f64::max);
+        let rate_hz = |r: Refinement| r.fade_s.recip() + fastest_m_per_s / (FADE_WAY * body.edge_m());
+        let step = body.refinement().map_or(1.0, |r| model.spec().settings.tick_period_s * rate_hz(r));
         let wanted = Wanted { refined: &springs.refined, step, fine, awake: &springs.awake };
         if let Some(changed) = self.springs.go_on(body.model(), &mut springs.motion, (x, v), &wanted) {
+            springs.given_j += changed.elastic_j + changed.kinetic_j;
             state.ledger.dissipated_j -= changed.elastic_j + changed.kinetic_j;
             for forces in [&mut state.force_n, &mut state.external_n] {
                 forces.clear();

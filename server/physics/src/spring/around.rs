@@ -79,7 +79,9 @@ pub fn nearest_into(
         surface.neighbours(vertices[next]).for_each(|vertex| take(vertex, vertices));
         next += 1;
     }
-    vertices.iter().for_each(|&vertex| seen[vertex as usize] = false);
+    for &vertex in vertices.iter() {
+        seen[vertex as usize] = false;
+    }
     vertices.sort_unstable();
 }
 

@@ -6,7 +6,11 @@
 //! ```
 //! so the surface that a tool feels and a viewer sees has the same triangles always, and moves without a step when it is refined.
 use super::{SpringError, SpringModel, SpringSpec, calibration, skin::SkinBoxes};
-use crate::{contact::SurfaceModuli, hash::{Fnv, fnv}, mesh::Surface};
+use crate::{
+    contact::SurfaceModuli,
+    hash::{Fnv, fnv},
+    mesh::Surface,
+};
 use std::fmt::Write;
 use thiserror::Error;
 
@@ -85,7 +89,8 @@ impl SpringBody {
     pub fn build(spec: SpringBodySpec, tools: usize) -> Result<Self, SpringBodyError> {
         let SpringBodySpec { mut springs, refinement } = spec;
         if let Some(Refinement { rings, fade_s, by: _ }) = refinement {
-            let setting = |name, value, ok, rule| if ok { Ok(()) } else { Err(SpringBodyError::Setting { name, value, rule }) };
+            let setting =
+                |name, value, ok, rule| if ok { Ok(()) } else { Err(SpringBodyError::Setting { name, value, rule }) };
             setting("rings", f64::from(rings), (1..=MOST_RINGS).contains(&rings), "must be 1 to 16")?;
             setting("fade_s", fade_s, fade_s > 0.0 && fade_s.is_finite(), "must be finite and larger than 0")?;
         } else {

@@ -39,9 +39,8 @@ impl SpringBody {
         let mut scratch = SpringScratch::new(model);
         scratch.follow(model, motion);
         let nodes = motion.ids.iter().zip(x_m).zip(scratch.mass_kg()).filter(|(_, mass)| mass.is_finite());
-        let fallen: f64 = nodes
-            .map(|((id, x), mass)| mass * gravity_m_per_s2.dot(*x - model.rest_m()[*id as usize]))
-            .sum();
+        let fallen: f64 =
+            nodes.map(|((id, x), mass)| mass * gravity_m_per_s2.dot(*x - model.rest_m()[*id as usize])).sum();
         0.0 - fallen
     }
 }

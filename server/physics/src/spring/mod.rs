@@ -25,10 +25,10 @@ pub mod net;
 pub mod places;
 pub mod region;
 pub mod running;
-#[cfg(test)]
-pub(crate) mod testing;
 pub(crate) mod skin;
 pub(crate) mod state;
+#[cfg(test)]
+pub(crate) mod testing;
 pub mod topology;
 
 pub use body::{Refinement, Refining, SpringBody, SpringBodyError, SpringBodySpec};

@@ -88,9 +88,9 @@ impl SpringMotion {
         let ascending = awake.windows(2).all(|pair| pair[0] < pair[1]);
         let known = awake.last().is_none_or(|last| *last < model.vertices());
         let spec = model.spec();
-        if !(ascending && known && awake.len() <= spec.most_awake && positive(mesh_n_per_m) && positive(home_n_per_m))
-            || !self.levels.fit(model.surface().triangles().len(), spec.most_refined)
-        {
+        let fits = ascending && known && awake.len() <= spec.most_awake;
+        let levels_fit = self.levels.fit(model.surface().triangles().len(), spec.most_refined);
+        if !(fits && levels_fit && positive(mesh_n_per_m) && positive(home_n_per_m)) {
             return false;
         }
         let mut ids = Vec::new();

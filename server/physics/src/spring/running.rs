@@ -76,7 +76,9 @@ impl RunningSprings {
     pub fn lay_out(&mut self, model: &SpringModel, ids: &[u32]) {
         let (surface, vertices) = (model.surface(), vertices_of(model, ids));
         self.places.clear();
-        ids.iter().for_each(|&id| self.places.push(id));
+        for &id in ids {
+            self.places.push(id);
+        }
         self.awake = ids.len();
         for &vertex in &ids[..vertices] {
             surface.neighbours(vertex).for_each(|neighbour| self.places.push(neighbour));

@@ -1,5 +1,8 @@
 //! Where the surface is that tools touch, and how forces on it go to the nodes.
-use super::{body::SpringBody, motion::{SpringMotion, SpringScratch}};
+use super::{
+    body::SpringBody,
+    motion::{SpringMotion, SpringScratch},
+};
 use crate::contact::broad::{CLUSTER, GROUP, Skin, box_distance_m};
 use glam::DVec3;
 
@@ -90,7 +93,8 @@ fn carried(body: &SpringBody, motion: &SpringMotion, scratch: &SpringScratch, ve
     match vertex.checked_sub(model.vertices()) {
         None => add(vertex, 1.0),
         Some(edge) => {
-            let level = if scratch.place(vertex).is_some() { motion.levels.of_edge(model.surface(), edge) } else { 0.0 };
+            let level =
+                if scratch.place(vertex).is_some() { motion.levels.of_edge(model.surface(), edge) } else { 0.0 };
             add(vertex, level);
             model.surface().edges()[edge as usize].nodes.into_iter().for_each(|end| add(end, 0.5 * (1.0 - level)));
         }
@@ -214,12 +218,7 @@ impl ListedVertices {
     }
 
     /// Lists a vertex. Allocates nothing.
-    pub(crate) fn list(
-        &mut self,
-        body: &SpringBody,
-        (motion, scratch): (&SpringMotion, &SpringScratch),
-        vertex: u32,
-    ) {
+    pub(crate) fn list(&mut self, body: &SpringBody, (motion, scratch): (&SpringMotion, &SpringScratch), vertex: u32) {
         if !std::mem::replace(&mut self.is_listed[vertex as usize], true) {
             self.listed.push((vertex, carried(body, motion, scratch, vertex)));
         }

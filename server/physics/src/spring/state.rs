@@ -31,6 +31,8 @@ pub struct SpringState {
     pub(crate) refined: Vec<u32>,
     /// Coarse vertices that are to be awake, ascending, besides those of triangles that are not coarse.
     pub(crate) awake: Vec<u32>,
+    /// What levels on their way and nodes that come and go gave (J) since reset; less than 0: took.
+    pub given_j: f64,
 }
 
 /// What a tool is about.
@@ -104,6 +106,7 @@ impl SpringState {
             forced: Vec::with_capacity(MOST_FORCED),
             refined: Vec::with_capacity(spec.most_refined),
             awake,
+            given_j: 0.0,
         }
     }
 
@@ -113,6 +116,7 @@ impl SpringState {
         self.about.fill(About::default());
         self.forced.clear();
         self.refined.clear();
+        self.given_j = 0.0;
         if !body.is_all_awake() {
             self.awake.clear();
         }
@@ -126,6 +130,7 @@ impl SpringState {
         self.forced.clone_from(&other.forced);
         self.refined.clone_from(&other.refined);
         self.awake.clone_from(&other.awake);
+        self.given_j = other.given_j;
     }
 
     /// Whether it may be a state of a body with so many tools.
@@ -138,6 +143,7 @@ impl SpringState {
         let levels = self.motion.levels.triangles();
         let coming = self.refined.iter().filter(|t| levels.binary_search_by_key(*t, |level| level.0).is_err());
         refined
+            && self.given_j.is_finite()
             && levels.len() + coming.count() <= model.spec().most_refined
             && self.about.len() == tools
             && self.about.iter().all(known)
@@ -191,7 +197,9 @@ impl SpringState {
 
     /// Which triangles are to be refined. While those that come and those that still go would be more than there is room for, only those that are there already. Allocates nothing.
     pub(crate) fn want_refined(&mut self, body: &SpringBody, looking: &mut Looking) {
-        let Some(refinement) = body.refinement().filter(|refinement| refinement.by == Refining::ByTools) else { return };
+        let Some(refinement) = body.refinement().filter(|refinement| refinement.by == Refining::ByTools) else {
+            return;
+        };
         let Looking { centres, triangles, corners, .. } = looking;
         let most = body.model().spec().most_refined;
         centres.clear();

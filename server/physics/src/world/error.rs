@@ -1,5 +1,8 @@
 //! Why a model cannot be built.
-use crate::{hybrid::HybridError, material::ParameterError, mesh::MeshError, seed::SeedError, solve::SolveError, spring::SpringBodyError};
+use crate::{
+    hybrid::HybridError, material::ParameterError, mesh::MeshError, seed::SeedError, solve::SolveError,
+    spring::SpringBodyError,
+};
 use glam::DVec3;
 use thiserror::Error;
 

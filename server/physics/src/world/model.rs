@@ -1,5 +1,7 @@
 //! The model: constant after load.
-use super::{Integrator, ModelError, ModelSpec, PrescribedSpec, State, building, check, seed_body, springs_body, substeps};
+use super::{
+    Integrator, ModelError, ModelSpec, PrescribedSpec, State, building, check, seed_body, springs_body, substeps,
+};
 use crate::{
     contact::{ContactModel, SurfaceModuli, ToolState},
     fem::{element::RestTet, mass},

@@ -1,5 +1,8 @@
 //! What a model is built from.
-use crate::{contact::ToolSpec, hybrid::ParticleSpec, material::Material, mesh::TetMesh, seed::SeedBodySpec, spring::SpringBodySpec};
+use crate::{
+    contact::ToolSpec, hybrid::ParticleSpec, material::Material, mesh::TetMesh, seed::SeedBodySpec,
+    spring::SpringBodySpec,
+};
 use glam::DVec3;
 
 /// A material and density shared by some tets.
