@@ -268,10 +268,12 @@ pub fn prepare(
     if period_s > LONGEST_PERIOD_S {
         return Err(PrepareError::TooSlow { period_s });
     }
-    let (tets, active, substeps) = (model.mesh().tets().len(), model.most_awake_particles(), model.substeps());
+    let (tets, substeps) = (model.mesh().tets().len(), model.substeps());
+    let active = model.springs().map_or(model.most_awake_particles(), |springs| springs.model().most_nodes());
     // A particle costs about what a tet does.
     if (tets + active) as u64 * u64::from(substeps) > MOST_TET_UPDATES {
-        let work = if active > 0 { format!("{tets} tets and {active} particles") } else { format!("{tets} tets") };
+        let work =
+            if active > 0 { format!("{tets} tets and {active} particles or vertices") } else { format!("{tets} tets") };
         return Err(PrepareError::TooHeavy { work, substeps });
     }
     let mut warnings = scene.warnings;

@@ -28,7 +28,7 @@ fn sheet(rings: i32, refinement: Option<Refinement>) -> ModelSpec {
     let vertices = surface.positions_m().len();
     let border: Vec<u32> = (0..vertices as u32).filter(|&vertex| surface.is_border(vertex)).collect();
     ModelSpec {
-        mesh: TetMesh::none(),
+        mesh: TetMesh::of_points(Vec::new()),
         particles: None,
         seed: None,
         springs: Some(SpringBodySpec {
@@ -43,6 +43,7 @@ fn sheet(rings: i32, refinement: Option<Refinement>) -> ModelSpec {
                 surface,
             },
             refinement,
+            table: None,
         }),
         regions: Vec::new(),
         tet_region: Vec::new(),

@@ -17,7 +17,8 @@ scenes!(
     "hybrid-block",
     "seed-ellipsoids",
     "seed-full-fem",
-    "seed-hybrid"
+    "seed-hybrid",
+    "springs-dome"
 );
 
 /// Text of a built-in scene.

@@ -18,6 +18,8 @@ pub enum Measure {
     Displacement(MaterialPoint),
     /// The same of a hybrid body's, by its rest position (m).
     LatticeDisplacement(DVec3),
+    /// The same of a point of a surface of springs, its nodes being vertices of the surface refined everywhere.
+    SkinDisplacement(MaterialPoint),
     /// Force (N) that holds the prescribed degrees of freedom of these nodes.
     Reaction(Vec<u32>),
     /// The energy ledger (J).
@@ -113,6 +115,7 @@ impl Probe {
         match self.measure {
             Measure::Displacement(_)
             | Measure::LatticeDisplacement(_)
+            | Measure::SkinDisplacement(_)
             | Measure::ToolPosition(_)
             | Measure::Penetration(_) => "m",
             Measure::Reaction(_) | Measure::ContactForce(_) | Measure::DeviceForce(_) => "N",
@@ -141,6 +144,7 @@ impl Probe {
         match &self.measure {
             Measure::Displacement(point) => put(out, point.of(&state.x) - point.of(model.rest_positions_m())),
             Measure::LatticeDisplacement(point_m) => put(out, lattice_displacement_m(model, state, *point_m)),
+            Measure::SkinDisplacement(point) => put(out, skin_displacement_m(model, state, point)),
             Measure::Reaction(nodes) => {
                 put(out, nodes.iter().map(|&node| reactions_n[node as usize]).sum());
             }
@@ -172,6 +176,16 @@ fn lattice_displacement_m(model: &Model, state: &State, point_m: DVec3) -> DVec3
     };
     let place = Place::new(partition, point_m);
     place.particles.into_iter().zip(place.weights).map(|(particle, weight)| moved(particle) * weight).sum()
+}
+
+/// Displacement (m) of a point of a surface of springs.
+fn skin_displacement_m(model: &Model, state: &State, point: &MaterialPoint) -> DVec3 {
+    let (Some(body), Some(springs)) = (model.springs(), &state.springs) else { return DVec3::ZERO };
+    let moved = |vertex: u32| {
+        let x = body.vertex_m(&springs.motion, vertex, &state.x);
+        x - body.model().rest_m()[vertex as usize]
+    };
+    point.nodes.iter().zip(point.weights).filter(|(_, w)| *w != 0.0).map(|(&vertex, w)| moved(vertex) * w).sum()
 }
 
 fn put(out: &mut [f64], value: DVec3) {

@@ -4,7 +4,13 @@ use super::{
     load,
     summary::Percentiles,
 };
-use palpate_physics::{Model, hybrid::Waking, material::Law, seed::region::Region};
+use palpate_physics::{
+    Model,
+    hybrid::Waking,
+    material::Law,
+    seed::region::Region,
+    spring::{Refinement, region::Constants},
+};
 use palpate_scene::{Scene, builtin_names, wording::counted};
 use std::process::ExitCode;
 
@@ -39,6 +45,7 @@ pub fn run(args: &CheckArgs) -> miette::Result<ExitCode> {
     print_body(&scene);
     print_particles(&model);
     print_seed(&model);
+    print_springs(&model);
     print_contents(&scene);
     let warnings = [scene.warnings.clone(), particle_warnings(&model)].concat();
     for warning in &warnings {
@@ -57,12 +64,16 @@ fn print_body(scene: &Scene) {
     println!("body       {}", body.origin);
     let surface = counted(body.surface_triangles, "surface triangle");
     println!("           {}, {}, {surface}", counted(body.tets, "tet"), counted(body.nodes, "node"));
-    println!("           volume {} ml, mass {} g", short(body.volume_m3 * 1e6), short(body.mass_kg * 1e3));
-    println!(
-        "quality    dihedral angles {:.1}° to {:.1}°, volume-length ratio {:.3} at worst, {:.3} in the mean",
-        quality.min_dihedral_deg, quality.max_dihedral_deg, quality.min_volume_length, quality.mean_volume_length
-    );
-    println!("           edges {:.3} to {:.3} mm", quality.edge_range_m.0 * 1e3, quality.edge_range_m.1 * 1e3);
+    if body.tets > 0 {
+        println!("           volume {} ml, mass {} g", short(body.volume_m3 * 1e6), short(body.mass_kg * 1e3));
+        println!(
+            "quality    dihedral angles {:.1}° to {:.1}°, volume-length ratio {:.3} at worst, {:.3} in the mean",
+            quality.min_dihedral_deg, quality.max_dihedral_deg, quality.min_volume_length, quality.mean_volume_length
+        );
+        println!("           edges {:.3} to {:.3} mm", quality.edge_range_m.0 * 1e3, quality.edge_range_m.1 * 1e3);
+    } else {
+        println!("           mass {} g", short(body.mass_kg * 1e3));
+    }
     for line in &body.fill_report {
         println!("           {line}");
     }
@@ -172,6 +183,30 @@ fn print_seed(model: &Model) {
             short(parameters.courant_s(spacing_m) * 1e3),
             short(parameters.courant_as_printed_s(spacing_m) * 1e3)
         );
+    }
+}
+
+/// Of a mass-spring surface.
+fn print_springs(model: &Model) {
+    let Some(body) = model.springs() else { return };
+    let spec = body.model().spec();
+    let of = |constants: &Constants| {
+        format!("K_m {} N/m, K_h {} N/m", short(constants.mesh_n_per_m), short(constants.home_n_per_m))
+    };
+    println!("springs    {}; edges {} mm long in the mean", of(&spec.coarse), short(body.edge_m() * 1e3));
+    match body.refinement() {
+        None => println!("           coarse everywhere"),
+        Some(Refinement { rings, fade_s, .. }) => println!(
+            "           {} around what is touched are refined within {} s: at most {}",
+            counted(rings as usize, "ring"),
+            short(fade_s),
+            of(&spec.fine)
+        ),
+    }
+    if body.is_all_awake() {
+        println!("           all vertices are awake always");
+    } else {
+        println!("           the {} vertices nearest to tools are awake", spec.most_awake);
     }
 }
 

@@ -56,6 +56,12 @@ struct NoEquilibrium {
 pub fn run(args: &StaticArgs) -> miette::Result<ExitCode> {
     let output = &args.output;
     let scene = load::load_with_warnings(&output.scene)?;
+    if scene.model.springs.is_some() {
+        return Err(miette::miette!(
+            help = "let `palpated simulate` come to rest",
+            "the equilibrium of a mass-spring surface is not solved for"
+        ));
+    }
     if scene.model.seed.is_some() {
         return Err(miette::miette!(
             help = "let `palpated simulate` come to rest, or put [body.particles] in place of [body.seed]: that hybrid's equilibrium is solved for",

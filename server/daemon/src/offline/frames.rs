@@ -39,7 +39,7 @@ impl Frames {
 
     /// Writes a frame and adds it to the index, so that an interrupted run can be opened.
     pub(super) fn write(&mut self, time_s: f64, model: &Model, state: &State) -> miette::Result<()> {
-        if model.particle_count() > 0 {
+        if model.particle_count() > 0 || model.springs().is_some() {
             return self.write_skin(time_s, model, state);
         }
         let rest = model.rest_positions_m();
@@ -58,7 +58,7 @@ impl Frames {
         add(&self.folder, &mut self.index, &mut self.count, &frame)
     }
 
-    /// Of a body with particles, its skin.
+    /// Of a body with particles, its skin; of springs, the surface refined everywhere.
     fn write_skin(&mut self, time_s: f64, model: &Model, state: &State) -> miette::Result<()> {
         model.surface_positions_m(state, &mut self.skin_m);
         let rest = model.surface().nodes.iter().map(|&node| model.surface_rest_positions_m()[node as usize]);

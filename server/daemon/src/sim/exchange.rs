@@ -2,7 +2,7 @@
 //! allocates on the loop's side once built.
 use super::bell::{Ear, bell};
 use glam::DVec3;
-use palpate_physics::{Model, Quarantine, contact::LocalContactModel, seed::SeedModel};
+use palpate_physics::{Model, Quarantine, contact::LocalContactModel, seed::SeedModel, spring::SpringMotion};
 use palpate_realtime::Doorbell;
 use std::{
     io,
@@ -166,7 +166,7 @@ pub struct SurfaceSnapshot {
     pub time_s: f64,
     /// Wall-clock cost of the last tick (µs).
     pub tick_cost_us: f64,
-    /// Largest displacement of a surface vertex (m); of a hybrid body, the hub works it out.
+    /// Largest displacement of a surface vertex (m); of a hybrid body and of springs, the hub works it out.
     pub max_displacement_m: f64,
     /// Why the state stands, if it is quarantined.
     pub quarantine: Option<Quarantine>,
@@ -176,6 +176,8 @@ pub struct SurfaceSnapshot {
     pub displacements_m: Vec<[f32; 3]>,
     /// Of a hybrid body, in place of displacements.
     pub lattice: LatticeSnapshot,
+    /// Of a mass-spring surface, in place of displacements.
+    pub springs: Option<SpringSnapshot>,
     /// Positions (m) of a seed body's awake particles.
     pub seed_particles_m: Vec<DVec3>,
     /// Tools.
@@ -208,6 +210,23 @@ impl LatticeSnapshot {
     }
 }
 
+/// Where a mass-spring surface is.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SpringSnapshot {
+    /// Awake nodes and levels.
+    pub motion: SpringMotion,
+    /// Positions (m) of the awake nodes.
+    pub x: Vec<DVec3>,
+}
+
+impl SpringSnapshot {
+    /// Filled to the most it will ever hold: copies of it then have that room, too.
+    fn full(model: &Model) -> Option<Self> {
+        let springs = model.springs()?.model();
+        Some(Self { motion: SpringMotion::filled(springs), x: vec![DVec3::ZERO; springs.most_nodes()] })
+    }
+}
+
 /// The loop's end of the surface.
 #[derive(Debug)]
 pub struct SurfacePort {
@@ -233,12 +252,13 @@ pub struct SurfaceEnd {
 pub fn surface(model: &Model) -> io::Result<(SurfacePort, SurfaceEnd)> {
     let (bell, ear) = bell()?;
     let (input, output) = triple_buffer(&SurfaceSnapshot {
-        displacements_m: if model.hybrid().is_some() {
+        displacements_m: if model.hybrid().is_some() || model.springs().is_some() {
             Vec::new()
         } else {
             vec![[0.0; 3]; model.surface().nodes.len()]
         },
         lattice: LatticeSnapshot::full(model),
+        springs: SpringSnapshot::full(model),
         seed_particles_m: vec![DVec3::ZERO; model.seed().map_or(0, SeedModel::most_awake)],
         tools: vec![ToolView::default(); model.spec().tools.len()],
         ..Default::default()

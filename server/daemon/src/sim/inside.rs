@@ -4,6 +4,7 @@ use palpate_physics::{
     Model, State,
     contact::is_inside,
     hybrid::{Hybrid, partition::NONE},
+    spring::topology::Edge,
 };
 
 /// A point between two tets or cells is in one of them, whatever rounding says.
@@ -12,13 +13,18 @@ const ROUNDING: f64 = 1e-9;
 /// What is looked at.
 #[derive(Debug)]
 pub struct Inside {
-    /// Nodes of the surface's triangles; of a hybrid body, none.
+    /// Nodes of the surface's triangles; of a hybrid body, none, nor of springs on a surface that is open.
     triangles: Vec<[u32; 3]>,
 }
 
 impl Inside {
     /// For a model.
     pub fn new(model: &Model) -> Self {
+        if let Some(springs) = model.springs() {
+            let surface = springs.model().surface();
+            let is_closed = !surface.edges().iter().any(Edge::is_border);
+            return Self { triangles: if is_closed { surface.triangles().to_vec() } else { Vec::new() } };
+        }
         let count = if model.hybrid().is_some() { 0 } else { model.surface().triangles.len() };
         Self { triangles: (0..count).map(|triangle| model.surface().triangle_nodes(triangle)).collect() }
     }
@@ -27,7 +33,12 @@ impl Inside {
     ///
     /// Of a hybrid body, its many-vertexed skin is not looked at: the coarse tets, linear between their corners, take the point back to
     /// rest, where it is inside when a cell of the body holds it. That is right to within about a spacing, beyond which a tool touches.
+    ///
+    /// Of springs, it is the surface at rest that is looked at, from which a tool's dent differs by little.
     pub fn holds(&self, model: &Model, state: &State, point_m: DVec3) -> bool {
+        if model.springs().is_some() {
+            return is_inside(point_m, &self.triangles, model.rest_positions_m());
+        }
         match model.hybrid() {
             None => is_inside(point_m, &self.triangles, &state.x),
             Some(hybrid) => at_rest(model, state, point_m).any(|rest_m| is_in_a_cell(hybrid, rest_m)),

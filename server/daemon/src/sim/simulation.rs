@@ -172,6 +172,13 @@ impl Simulation {
             self.surface.bell.ring();
             return;
         }
+        if let (Some(copy), Some(springs)) = (&mut snapshot.springs, &self.state.springs) {
+            copy.x.clone_from(&self.state.x);
+            copy.motion.copy_from(&springs.motion);
+            self.surface.slot.publish();
+            self.surface.bell.ring();
+            return;
+        }
         if self.model.seed().is_some() {
             snapshot.seed_particles_m.clear();
             snapshot.seed_particles_m.extend_from_slice(self.state.awake_particles_m());
@@ -191,15 +198,17 @@ impl Simulation {
     }
 }
 
-/// Copies a state of the same model without allocating; false, and nothing is copied, when the shapes differ. Active particles come and
-/// go: nodes must agree, and there must be room for particles.
+/// Copies a state of the same model without allocating; false, and nothing is copied, when the shapes differ. Active particles, and awake nodes of
+/// springs, come and go: other nodes must agree, and there must be room for those.
 pub fn copy_state(from: &State, to: &mut State) -> bool {
-    let nodes = |state: &State| state.x.len().checked_sub(state.active.len());
+    let of_springs = |state: &State| state.springs.as_ref().map_or(0, |springs| springs.motion.ids.len());
+    let nodes = |state: &State| state.x.len().checked_sub(state.active.len() + of_springs(state));
     let room = [&to.x, &to.v, &to.force_n, &to.external_n].iter().map(|list| list.capacity()).min();
     let same = nodes(from) == nodes(to)
         && room.is_some_and(|room| from.x.len() <= room)
         && from.tools.len() == to.tools.len()
-        && from.load_factors.len() == to.load_factors.len();
+        && from.load_factors.len() == to.load_factors.len()
+        && from.springs.is_some() == to.springs.is_some();
     if same {
         to.copy_from(from);
     }

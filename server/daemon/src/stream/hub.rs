@@ -3,6 +3,7 @@ use super::{
     encode::{Delta, Quantiser, Shape},
     keyframe, particles,
     skin::SkinReader,
+    springs::SpringReader,
 };
 use crate::sim::exchange::{SurfaceEnd, SurfaceSnapshot};
 use palpate_physics::Model;
@@ -227,6 +228,7 @@ impl Hub {
         let keyframe = Arc::new(keyframe::chunks(&session_id, &scene_name, &model, epoch));
         let (low, high) = keyframe::bounds_m(&model);
         let mut skin = SkinReader::new(&model, &keyframe::rest_positions_f32(&model));
+        let mut springs = SpringReader::new(&model, &keyframe::rest_positions_f32(&model));
         let mut quantiser = Quantiser::new(model.surface().nodes.len(), (high - low).length());
         let mut number = 0;
         loop {
@@ -242,7 +244,14 @@ impl Hub {
             if let Some(skin) = &mut skin {
                 snapshot.max_displacement_m = skin.read(&snapshot.lattice);
             }
-            let displacements_m = skin.as_ref().map_or(&snapshot.displacements_m[..], SkinReader::displacements_m);
+            if let (Some(reader), Some(of_loop)) = (&mut springs, &snapshot.springs) {
+                snapshot.max_displacement_m = reader.read(of_loop);
+            }
+            let displacements_m = match (&skin, &springs) {
+                (Some(skin), _) => skin.displacements_m(),
+                (None, Some(springs)) => springs.displacements_m(),
+                (None, None) => &snapshot.displacements_m[..],
+            };
             let shape = snapshot.has_vertices.then(|| quantiser.advance(number, displacements_m));
             let layers = Layers { vertices: snapshot.has_vertices, particles: self.particles.load(Ordering::Relaxed) };
             let has_particles = layers.particles && model.particle_count() > 0;

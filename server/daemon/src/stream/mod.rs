@@ -4,4 +4,5 @@ pub mod hub;
 pub mod keyframe;
 pub mod particles;
 pub mod skin;
+pub mod springs;
 pub mod viewer;

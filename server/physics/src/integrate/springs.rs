@@ -22,6 +22,8 @@ const LOOK_EVERY_TICKS: u32 = 8;
 const GAP: f64 = 0.25;
 /// Way home, and way in a tick, over the coarse edges' length, below which a node is at rest.
 const QUIET: f64 = 1e-6;
+/// How fast (s) spring constants follow what a tool displaces.
+const CONSTANTS_FOLLOW_S: f64 = 0.02;
 /// Way of a tool over the coarse edges' length in which levels go all their way, however slowly they do beneath one that stands still.
 const FADE_WAY: f64 = 1.0;
 
@@ -80,7 +82,11 @@ impl SpringBodyScratch {
                 springs.want_awake(body, &mut self.looking, forced, is_quiet);
             }
         }
-        let fine = springs.motion.fine;
+        let away_m = |vertex: u32| {
+            let place = self.springs.place(vertex);
+            place.map_or(0.0, |place| x[place].distance(body.model().rest_m()[vertex as usize]))
+        };
+        let fine = springs.next_fine(body, model.spec().settings.tick_period_s / CONSTANTS_FOLLOW_S, away_m);
         // A moving tool leaves levels no time to lag behind: what is refined too late at its front and coarse too late at its back would drive it on.
         let speeds = state.tools.iter().map(|tool| tool.velocity_m_per_s.length());
         let fastest_m_per_s = speeds.fold(0.0, f64::max);

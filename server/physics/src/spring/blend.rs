@@ -70,6 +70,11 @@ impl Levels {
         Self { of: Vec::with_capacity(triangles) }
     }
 
+    /// Of no surface: as long as levels of so many triangles.
+    pub fn filled(triangles: usize) -> Self {
+        Self { of: vec![(0, 0.0); triangles] }
+    }
+
     /// A region refined.
     pub fn full(region: &Region) -> Self {
         Self { of: region.triangles().iter().map(|&triangle| (triangle, 1.0)).collect() }

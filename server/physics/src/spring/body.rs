@@ -5,7 +5,12 @@
 //! y_e = s x_e + (1 − s) (X_e + ½ (u_a + u_b)),   force on it: s f on its node, ½ (1 − s) f on either end
 //! ```
 //! so the surface that a tool feels and a viewer sees has the same triangles always, and moves without a step when it is refined.
-use super::{SpringError, SpringModel, SpringSpec, calibration, skin::SkinBoxes};
+use super::{
+    SpringError, SpringModel, SpringSpec,
+    calibration::{self, Calibration, CalibrationError, ConstantsTable},
+    region::Constants,
+    skin::SkinBoxes,
+};
 use crate::{
     contact::SurfaceModuli,
     hash::{Fnv, fnv},
@@ -41,6 +46,8 @@ pub struct SpringBodySpec {
     pub springs: SpringSpec,
     /// `None`: coarse everywhere.
     pub refinement: Option<Refinement>,
+    /// Constants where it is refined, over how far the vertex that a tool touches is from home; `None`: those of the springs.
+    pub table: Option<ConstantsTable>,
 }
 
 /// Why no body of the loop can be made of it.
@@ -59,6 +66,9 @@ pub enum SpringBodyError {
         /// What it must satisfy.
         rule: &'static str,
     },
+    /// The table of constants.
+    #[error(transparent)]
+    Table(#[from] CalibrationError),
     /// Something it cannot have.
     #[error("a body of springs cannot have {what}: {instead}")]
     NotForSprings {
@@ -78,6 +88,7 @@ pub struct SpringBody {
     /// Mean length (m) of the coarse surface's edges, its vertices at home.
     edge_m: f64,
     awake_reach_m: f64,
+    table: Option<ConstantsTable>,
     fingerprint: u64,
 }
 
@@ -87,7 +98,7 @@ impl SpringBody {
     /// # Errors
     /// [`SpringBodyError`].
     pub fn build(spec: SpringBodySpec, tools: usize) -> Result<Self, SpringBodyError> {
-        let SpringBodySpec { mut springs, refinement } = spec;
+        let SpringBodySpec { mut springs, refinement, table } = spec;
         if let Some(Refinement { rings, fade_s, by: _ }) = refinement {
             let setting =
                 |name, value, ok, rule| if ok { Ok(()) } else { Err(SpringBodyError::Setting { name, value, rule }) };
@@ -95,6 +106,12 @@ impl SpringBody {
             setting("fade_s", fade_s, fade_s > 0.0 && fade_s.is_finite(), "must be finite and larger than 0")?;
         } else {
             springs.most_refined = 0;
+        }
+        if let Some(table) = &table {
+            let rings = refinement.map_or(0, |refinement| refinement.rings);
+            table.fits(&springs.surface, &Calibration { coarse: springs.coarse, rings, ..table.of })?;
+            // The largest: what the step has to be stable with.
+            springs.fine = table.largest();
         }
         let model = SpringModel::build(springs)?;
         let lengths = model.surface().edges().iter().map(|edge| {
@@ -105,8 +122,8 @@ impl SpringBody {
         // A disc for each tool, of vertices with √3/2 l² each.
         let each = model.spec().most_awake as f64 / tools.max(1) as f64;
         let awake_reach_m = edge_m * (each * 3.0_f64.sqrt() / (2.0 * std::f64::consts::PI)).sqrt();
-        let fingerprint = fingerprint(model.spec(), refinement);
-        Ok(Self { model, refinement, boxes: SkinBoxes::default(), edge_m, awake_reach_m, fingerprint })
+        let fingerprint = fingerprint(model.spec(), (refinement, &table));
+        Ok(Self { model, refinement, boxes: SkinBoxes::default(), edge_m, awake_reach_m, table, fingerprint })
     }
 
     /// Its springs.
@@ -122,6 +139,11 @@ impl SpringBody {
     /// How it is refined.
     pub fn refinement(&self) -> Option<Refinement> {
         self.refinement
+    }
+
+    /// Constants where it is refined, while what tools touch is so far (m) from home.
+    pub(crate) fn fine_at(&self, displacement_m: f64) -> Constants {
+        self.table.as_ref().map_or(self.model.spec().fine, |table| table.at(displacement_m / self.edge_m))
     }
 
     /// Mean length (m) of the coarse edges.
@@ -171,19 +193,19 @@ impl SpringBody {
     /// as a vertex of a regular surface has the area `(√3/2) l²`, and springs along its edges the modulus `(2/√3) K_m` (N/m).
     pub(crate) fn moduli(&self) -> Vec<SurfaceModuli> {
         let spec = self.model.spec();
-        let stiffest = |of: fn(&super::region::Constants) -> f64| of(&spec.coarse).max(of(&spec.fine));
+        let stiffest = |of: fn(&Constants) -> f64| of(&spec.coarse).max(of(&spec.fine));
         let sum_n_per_m = stiffest(|of| of.mesh_n_per_m) + stiffest(|of| of.home_n_per_m);
         let modulus_pa = 2.0 / 3.0_f64.sqrt() * sum_n_per_m / self.edge_m;
         vec![SurfaceModuli { p_wave_pa: modulus_pa, indentation_pa: modulus_pa }; self.model.fine_triangles().len()]
     }
 }
 
-fn fingerprint(spec: &SpringSpec, refinement: Option<Refinement>) -> u64 {
+fn fingerprint(spec: &SpringSpec, how: (Option<Refinement>, &Option<ConstantsTable>)) -> u64 {
     let SpringSpec { surface, coarse, fine, home_law, mass_kg, held, most_awake, most_refined } = spec;
     let masses = mass_kg.iter().flat_map(|mass| mass.to_bits().to_le_bytes());
     let mut hash = Fnv(fnv(calibration::fingerprint(surface), masses));
     // Writing to the hash cannot fail.
-    let _ = write!(hash, "{:?}", (coarse, fine, home_law, held, most_awake, most_refined, refinement));
+    let _ = write!(hash, "{:?}", (coarse, fine, home_law, held, most_awake, most_refined, how));
     hash.0
 }
 

@@ -133,6 +133,13 @@ impl ConstantsTable {
         Ok(Self { fingerprint: fingerprint(surface), of, rows: XI.iter().enumerate().map(row).collect() })
     }
 
+    /// The largest constants that it has.
+    pub fn largest(&self) -> Constants {
+        let most = self.rows.iter().map(|row| row.home_ratio).fold(0.0, f64::max);
+        let home_n_per_m = most * self.of.coarse.home_n_per_m;
+        Constants { mesh_n_per_m: self.of.ratio * home_n_per_m, home_n_per_m }
+    }
+
     /// Constants at a displacement over the mean edge's length: linear between rows, those of the last row beyond.
     pub fn at(&self, xi: f64) -> Constants {
         let after = self.rows.partition_point(|row| row.xi <= xi).clamp(1, self.rows.len().saturating_sub(1).max(1));

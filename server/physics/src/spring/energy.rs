@@ -1,46 +1,58 @@
 //! What a mass-spring surface holds.
 use super::{
+    blend::Added,
     body::SpringBody,
-    motion::{SpringMotion, SpringScratch},
+    motion::{SpringMotion, own_mass_kg},
 };
 use glam::DVec3;
 
 impl SpringBody {
-    /// Kinetic and elastic energy (J) of its springs, of all that are on awake nodes. Allocates; for who asks now and then.
+    /// Kinetic and elastic energy (J) of the awake nodes and of all springs that are on them. Allocates nothing.
     pub fn energies_j(&self, motion: &SpringMotion, x_m: &[DVec3], v_m_per_s: &[DVec3]) -> [f64; 2] {
         let model = self.model();
-        let mut scratch = SpringScratch::new(model);
-        scratch.follow(model, motion);
-        let of_levels_j = scratch.changing_energy_j(model, motion, x_m);
-        let (surface, rest_m) = (model.surface(), model.rest_m());
-        let place = |node: u32| scratch.place(node).map_or(rest_m[node as usize], |place| x_m[place]);
+        let (surface, rest_m, spec) = (model.surface(), model.rest_m(), model.spec());
+        let place = |node: u32| motion.ids.binary_search(&node).ok();
+        let at = |node: u32| place(node).map_or(rest_m[node as usize], |place| x_m[place]);
+        let longer_m = |a: u32, b: u32| at(a).distance(at(b)) - rest_m[a as usize].distance(rest_m[b as usize]);
         let vertices = motion.ids.iter().copied().take_while(|id| *id < model.vertices());
-        let mut of_edges_j = 0.0;
+        let mut elastic_j = 0.0;
         for vertex in vertices {
+            let away_m = at(vertex).distance(rest_m[vertex as usize]);
+            elastic_j += spec.coarse.home_n_per_m * spec.home_law.at(away_m).integral_m2;
             for &edge in surface.edges_at(vertex) {
                 let other = surface.other_end(edge, vertex);
                 // Of two ends that are awake the first one counts.
-                if scratch.place(other).is_some() && other < vertex {
-                    continue;
+                if vertex < other || place(other).is_none() {
+                    elastic_j += 0.5 * spec.coarse.mesh_n_per_m * longer_m(vertex, other).powi(2);
                 }
-                let rest_length_m = rest_m[vertex as usize].distance(rest_m[other as usize]);
-                let longer_m = place(vertex).distance(place(other)) - rest_length_m;
-                of_edges_j += 0.5 * model.spec().coarse.mesh_n_per_m * longer_m * longer_m;
             }
         }
-        let masses = scratch.mass_kg().iter().zip(v_m_per_s).filter(|(mass, _)| mass.is_finite());
-        let kinetic_j: f64 = masses.map(|(mass, v)| 0.5 * mass * v.length_squared()).sum();
-        [kinetic_j, of_edges_j + of_levels_j]
+        motion.levels.for_each_added(surface, rest_m, (&spec.coarse, &motion.fine), |added| {
+            elastic_j += match added {
+                Added::Spring { nodes: [a, b], stiffness_n_per_m, .. } => {
+                    0.5 * stiffness_n_per_m * longer_m(a, b).powi(2)
+                }
+                Added::Home { node, stiffness_n_per_m } => {
+                    let away_m = at(node).distance(rest_m[node as usize]);
+                    stiffness_n_per_m * spec.home_law.at(away_m).integral_m2
+                }
+                Added::Tie { nodes, stiffness_n_per_m } => {
+                    let [own, a, b] = nodes.map(|node| at(node) - rest_m[node as usize]);
+                    0.5 * stiffness_n_per_m * own.distance_squared((a + b) * 0.5)
+                }
+            };
+        });
+        let masses = motion.ids.iter().map(|&id| own_mass_kg(model, place, id)).zip(v_m_per_s);
+        let free = masses.filter(|(mass_kg, _)| mass_kg.is_finite());
+        [free.map(|(mass_kg, v)| 0.5 * mass_kg * v.length_squared()).sum(), elastic_j]
     }
 
-    /// `−Σ m g·(x − X)` (J).
+    /// `−Σ m g·(x − X)` (J). Allocates nothing.
     pub fn gravitational_j(&self, motion: &SpringMotion, x_m: &[DVec3], gravity_m_per_s2: DVec3) -> f64 {
         let model = self.model();
-        let mut scratch = SpringScratch::new(model);
-        scratch.follow(model, motion);
-        let nodes = motion.ids.iter().zip(x_m).zip(scratch.mass_kg()).filter(|(_, mass)| mass.is_finite());
-        let fallen: f64 =
-            nodes.map(|((id, x), mass)| mass * gravity_m_per_s2.dot(*x - model.rest_m()[*id as usize])).sum();
-        0.0 - fallen
+        let place = |node: u32| motion.ids.binary_search(&node).ok();
+        let masses = motion.ids.iter().zip(x_m).map(|(&id, x)| (own_mass_kg(model, place, id), id, *x));
+        let free = masses.filter(|(mass_kg, ..)| mass_kg.is_finite());
+        0.0 - free.map(|(mass, id, x)| mass * gravity_m_per_s2.dot(x - model.rest_m()[id as usize])).sum::<f64>()
     }
 }

@@ -74,6 +74,12 @@ impl SpringMotion {
         Self { ids, levels: Levels::with_room(model.spec().most_refined), fine: model.spec().fine }
     }
 
+    /// As long as it ever gets, so that copies of it have that room.
+    pub fn filled(model: &SpringModel) -> Self {
+        let levels = Levels::filled(model.spec().most_refined);
+        Self { ids: vec![0; model.most_nodes()], levels, fine: model.spec().fine }
+    }
+
     /// Everything coarse and asleep. Allocates nothing.
     pub fn reset(&mut self, model: &SpringModel) {
         self.ids.clear();
@@ -151,11 +157,6 @@ impl SpringScratch {
         self.running.add_forces_n(model, &motion.ids, x_m, forces_n);
     }
 
-    /// Energy (J) of what levels add and of all home springs.
-    pub fn changing_energy_j(&mut self, model: &SpringModel, motion: &SpringMotion, x_m: &[DVec3]) -> f64 {
-        self.running.changing_energy_j(model, &motion.ids, x_m)
-    }
-
     /// Brings nodes and springs to what is wanted, by a tick; tells what that changed, if anything. Allocates nothing.
     pub fn go_on(
         &mut self,
@@ -214,7 +215,7 @@ impl SpringScratch {
         self.running.add_levels(model, &motion.ids, &motion.levels, &motion.fine);
         let Self { mass_kg, running, .. } = self;
         mass_kg.clear();
-        mass_kg.extend(motion.ids.iter().map(|&id| own_mass_kg(model, running, id)));
+        mass_kg.extend(motion.ids.iter().map(|&id| own_mass_kg(model, |node| running.place(node), id)));
         self.laid_out.copy_from(motion);
         self.layout += 1;
     }
@@ -320,14 +321,14 @@ fn mean_velocity(model: &SpringModel, edge: u32, v_m_per_s: [DVec3; 2]) -> DVec3
 }
 
 /// Mass (kg) of an awake node: of a vertex less what its nodes of type 2 have of it; infinite where it is held.
-fn own_mass_kg(model: &SpringModel, running: &RunningSprings, id: u32) -> f64 {
+pub(super) fn own_mass_kg(model: &SpringModel, place: impl Fn(u32) -> Option<usize>, id: u32) -> f64 {
     if let Some(edge) = id.checked_sub(model.vertices()) {
         return model.edge_kg(edge);
     }
     if model.is_held(id) {
         return f64::INFINITY;
     }
-    let there = |edge: &&u32| running.place(model.vertices() + **edge).is_some();
+    let there = |edge: &&u32| place(model.vertices() + **edge).is_some();
     let given = model.surface().edges_at(id).iter().filter(there).count() as f64;
     model.spec().mass_kg[id as usize] - given * model.given_kg(id)
 }

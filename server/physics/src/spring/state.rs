@@ -7,6 +7,7 @@ use super::{
     around,
     body::{Refining, SpringBody},
     motion::SpringMotion,
+    region::Constants,
 };
 use crate::world::{Model, State};
 use serde::{Deserialize, Serialize};
@@ -100,8 +101,9 @@ impl SpringState {
         if body.is_all_awake() {
             awake.extend(0..body.model().vertices());
         }
+        let motion = SpringMotion::at_rest(body.model(), awake.iter().copied());
         Self {
-            motion: SpringMotion::at_rest(body.model(), awake.iter().copied()),
+            motion: SpringMotion { fine: body.fine_at(0.0), ..motion },
             about: vec![About::default(); tools],
             forced: Vec::with_capacity(MOST_FORCED),
             refined: Vec::with_capacity(spec.most_refined),
@@ -113,6 +115,7 @@ impl SpringState {
     /// As at rest, in the buffers it has.
     pub(crate) fn reset(&mut self, body: &SpringBody) {
         self.motion.reset(body.model());
+        self.motion.fine = body.fine_at(0.0);
         self.about.fill(About::default());
         self.forced.clear();
         self.refined.clear();
@@ -156,6 +159,18 @@ impl SpringState {
     /// Nodes of type 2 that are there: middles of edges refined, or on their way.
     pub fn refined_nodes(&self, body: &SpringBody) -> usize {
         self.motion.ids.len() - self.motion.ids.partition_point(|id| *id < body.model().vertices())
+    }
+
+    /// `K′_m`, `K′_h` a tick of `part` of the time on that they take to change: towards those at how far (m) what tools touch is from home.
+    pub(crate) fn next_fine(&self, body: &SpringBody, part: f64, away_m: impl Fn(u32) -> f64) -> Constants {
+        let touched = self.about.iter().filter_map(|about| about.touched);
+        let Some(farthest_m) = touched.map(away_m).reduce(f64::max) else { return self.motion.fine };
+        let (now, then) = (self.motion.fine, body.fine_at(farthest_m));
+        let towards = |now: f64, then: f64| now + (then - now) * part.min(1.0);
+        Constants {
+            mesh_n_per_m: towards(now.mesh_n_per_m, then.mesh_n_per_m),
+            home_n_per_m: towards(now.home_n_per_m, then.home_n_per_m),
+        }
     }
 
     /// The vertex that a tool is refined about.

@@ -170,7 +170,7 @@ pub struct ModelSpec {
     pub particles: Option<ParticleSpec>,
     /// Makes its tets the core of the papers' hybrid; there is one material then, and what is prescribed is held.
     pub seed: Option<SeedBodySpec>,
-    /// Makes it a mass-spring surface: its mesh is [`TetMesh::none`] then, it has no materials, and what is prescribed is held.
+    /// Makes it a mass-spring surface: its mesh has no tets then ([`TetMesh::of_points`]), it has no materials, and what is prescribed is held.
     pub springs: Option<SpringBodySpec>,
     /// Materials.
     pub regions: Vec<Region>,

@@ -2,7 +2,7 @@
 use super::{
     Files, exactly_one, particles,
     parts::{self, Part},
-    seed,
+    seed, springs,
 };
 use crate::{
     document::{
@@ -19,7 +19,7 @@ use crate::{
     wording::counted,
 };
 use glam::DVec3;
-use palpate_physics::{MeshError, Surface, TetMesh, contact::is_inside};
+use palpate_physics::{MeshError, Surface, TetMesh, contact::is_inside, spring::topology::Triangulation};
 
 /// A body before regions, materials and loads.
 pub(crate) struct Body {
@@ -27,6 +27,8 @@ pub(crate) struct Body {
     pub(crate) surface: Surface,
     /// The surface over particles: what loads and tools act on.
     pub(crate) skin: Option<FineSurface>,
+    /// Its surface, where it is one of springs: nodes are its vertices then, and the skin is it refined everywhere.
+    pub(crate) springs: Option<Triangulation>,
     /// Of a skin over a seed body's layer: the number of its first vertex, after the tets' nodes. Other skins have numbers of their own.
     pub(crate) first_vertex: Option<u32>,
     /// Where the shape has flat sides that a lattice should lie on: a point (m) of them.
@@ -61,6 +63,9 @@ impl Body {
         match &self.skin {
             None => MaterialPoint::locate(&self.mesh, &self.triangles().collect::<Vec<_>>(), point_m),
             Some(skin) if self.first_vertex.is_some() => self.locate_in_seed(skin, point_m),
+            Some(skin) if self.springs.is_some() => {
+                MaterialPoint::nearest(&skin.positions_m, skin.triangles.iter().copied(), point_m)
+            }
             Some(skin) if is_inside(point_m, &skin.triangles, &skin.positions_m) => {
                 MaterialPoint { nodes: [0; 4], weights: [1.0, 0.0, 0.0, 0.0], distance_m: 0.0 }
             }
@@ -108,12 +113,15 @@ pub(crate) fn make(table: &BodyTable, files: &Files<'_>, progress: &mut dyn FnMu
             ("ventricle", table.ventricle.is_some()),
             ("mesh", table.mesh.is_some()),
             ("surfaces", table.surfaces.is_some()),
+            ("surface", table.surface.is_some()),
         ],
     )?;
+    springs::demand(table)?;
     let at = at.key(kind);
     progress(0.05, "making the body");
     let mut body = match table {
         BodyTable { mesh: Some(mesh), .. } => from_file(mesh, files, &at)?,
+        BodyTable { surface: Some(surface), .. } => springs::from_file(surface, files, &at)?,
         BodyTable { surfaces: Some(surfaces), particles, .. } => {
             from_surfaces(surfaces, particles.as_ref(), files, &at, progress)?
         }
@@ -133,8 +141,15 @@ pub(crate) fn make(table: &BodyTable, files: &Files<'_>, progress: &mut dyn FnMu
         progress(0.75, "making the skin");
         seed::put_on(&mut body, layer, files.limits)?;
     }
+    if let Some(wanted) = &table.springs {
+        progress(0.75, "making the surface of springs");
+        springs::put_on(&mut body, wanted)?;
+    }
     let offset = DVec3::from(table.offset_m);
-    if offset != DVec3::ZERO {
+    if offset != DVec3::ZERO && body.springs.is_some() {
+        springs::shift(&mut body, offset)?;
+        body.skin.iter_mut().flat_map(|skin| &mut skin.positions_m).for_each(|p| *p += offset);
+    } else if offset != DVec3::ZERO {
         let moved = body.mesh.positions_m().iter().map(|p| *p + offset).collect();
         body.mesh = TetMesh::new(moved, body.mesh.tets().to_vec()).map_err(|error| mesh_fault(&at, error))?;
         body.skin.iter_mut().flat_map(|skin| &mut skin.positions_m).for_each(|p| *p += offset);
@@ -156,7 +171,9 @@ fn implausible_size(table: &BodyTable, kind: &str, body: &Body) -> Option<String
         return None;
     }
     let size = if size_m > 1.0 { format!("{size_m:.4} m") } else { format!("{:.3e} mm", size_m * 1e3) };
-    let unit = table.mesh.as_ref().map(|mesh| mesh.unit).or(table.surfaces.as_ref().map(|surfaces| surfaces.unit));
+    let of_surface = table.surface.as_ref().map(|surface| surface.unit);
+    let of_surfaces = table.surfaces.as_ref().map(|surfaces| surfaces.unit);
+    let unit = table.mesh.as_ref().map(|mesh| mesh.unit).or(of_surfaces).or(of_surface);
     let change = if let Some(unit) = unit {
         let fits = |other: &LengthUnit| PLAUSIBLE_SIZE_M.contains(&(size_m / unit.in_m() * other.in_m()));
         let other = LengthUnit::BY_USE.into_iter().find(fits);
@@ -222,6 +239,7 @@ fn of_shape(shape: Shape, kind: &str, at: &Where) -> Result<Body, Fault> {
         parts: parts::of_boundary(&shape.regions, &surface),
         surface,
         skin: None,
+        springs: None,
         first_vertex: None,
         lattice_m: None,
         origin: format!("shape {kind}"),
@@ -231,7 +249,7 @@ fn of_shape(shape: Shape, kind: &str, at: &Where) -> Result<Body, Fault> {
     })
 }
 
-fn file_fault(at: &Where, error: FileError) -> Fault {
+pub(super) fn file_fault(at: &Where, error: FileError) -> Fault {
     Fault::value(at.clone(), error.to_string()).of(Stage::Body).help(error.problem.help()).cause(error)
 }
 
@@ -262,6 +280,7 @@ fn from_surfaces(
         parts: parts::of_boundary(&filled.regions, &surface),
         surface,
         skin: None,
+        springs: None,
         first_vertex: None,
         lattice_m: None,
         origin: format!("wall between {} and {}", table.inner_file, table.outer_file),
@@ -292,6 +311,7 @@ fn from_file(table: &MeshTable, files: &Files<'_>, at: &Where) -> Result<Body, F
         parts: parts::of_groups(&grouped, &surface),
         surface,
         skin: None,
+        springs: None,
         first_vertex: None,
         lattice_m: None,
         origin: format!("file {}", table.file),

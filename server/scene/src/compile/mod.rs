@@ -9,6 +9,7 @@ mod parts;
 mod probes;
 mod regions;
 mod seed;
+mod springs;
 mod tools;
 
 use crate::{
@@ -24,7 +25,7 @@ use glam::DVec3;
 use material::Materials;
 use palpate_physics::{
     Integrator, ModelSpec, Precision, Settings, Skips, Substeps, hybrid::ParticleSpec, mesh::quality,
-    seed::SeedBodySpec, world::MAX_SUBSTEPS,
+    seed::SeedBodySpec, spring::SpringBodySpec, world::MAX_SUBSTEPS,
 };
 use regions::Regions;
 use std::path::{Path, PathBuf};
@@ -63,7 +64,7 @@ pub(crate) fn compile(
     progress: &mut dyn FnMut(f64, &str),
 ) -> Result<Scene, Fault> {
     files.limits.check_entries(document)?;
-    let settings = settings(document)?;
+    let mut settings = settings(document)?;
     let output = output(&document.output)?;
     let body = body::make(&document.body, files, progress)?;
     progress(0.8, "selecting regions");
@@ -73,6 +74,7 @@ pub(crate) fn compile(
     let loads = loads::loads(document, &regions, files)?;
     let particles = particles::spec(document, &body, &constraints, files)?;
     let seed = seed::spec(document, &body)?;
+    let springs = springs::spec(document, &body, &mut settings, files)?;
     progress(0.9, "placing tools and probes");
     let tools = tools::compile(document, &body, files)?;
     let mut warnings = body.warnings.clone();
@@ -82,7 +84,7 @@ pub(crate) fn compile(
         particles::warn_of_fine_tets(&body, &mut warnings);
     }
     let probes = probes::compile(&document.probe, &regions, &body, &tools.specs, &constraints, &mut warnings)?;
-    let summary = summary(&body, &regions, &materials, (particles.as_ref(), seed.as_ref()));
+    let summary = summary(&body, &regions, &materials, (particles.as_ref(), seed.as_ref(), springs.as_ref()));
     warn_of_shape(&summary, &mut warnings);
     warnings.extend(nothing_held(document));
     progress(1.0, "done");
@@ -93,6 +95,7 @@ pub(crate) fn compile(
             mesh: body.mesh,
             particles,
             seed,
+            springs,
             regions: materials.regions,
             tet_region: materials.tet_region,
             prescribed: constraints.specs,
@@ -239,12 +242,12 @@ fn summary(
     body: &Body,
     regions: &Regions<'_>,
     materials: &Materials,
-    (particles, seed): (Option<&ParticleSpec>, Option<&SeedBodySpec>),
+    (particles, seed, springs): (Option<&ParticleSpec>, Option<&SeedBodySpec>, Option<&SpringBodySpec>),
 ) -> BodySummary {
     let mesh = &body.mesh;
     let mass_of =
         |(tet, region): (usize, &u16)| mesh.volume_m3(tet) * materials.regions[*region as usize].density_kg_per_m3;
-    let mass_kg: f64 = materials.tet_region.iter().enumerate().map(mass_of).sum();
+    let tets_kg: f64 = materials.tet_region.iter().enumerate().map(mass_of).sum();
     // Coarse tets need not have the volume of the body that its skin encloses.
     let of_tets_m3 = seed.map_or(mesh.total_volume_m3(), |seed| seed.volume_m3(mesh, &body.surface));
     let volume_m3 = particles.map_or(of_tets_m3, |particles| particles.skin.volume_m3());
@@ -254,7 +257,10 @@ fn summary(
         tets: mesh.tets().len(),
         surface_triangles: body.triangle_count(),
         volume_m3,
-        mass_kg: mass_kg * volume_m3 / mesh.total_volume_m3(),
+        mass_kg: match springs {
+            Some(springs) => springs.springs.mass_kg.iter().sum(),
+            None => tets_kg * volume_m3 / mesh.total_volume_m3(),
+        },
         quality: quality::measure(mesh),
         fill_report: body.report.clone(),
         parts: regions

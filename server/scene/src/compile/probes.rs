@@ -36,7 +36,9 @@ pub(crate) fn compile(
                     return Err(Fault::value(at.key("region"), message));
                 }
                 Measure::Reaction(match &body.skin {
-                    Some(_) if body.first_vertex.is_none() => particles::with_middles(&body.mesh, nodes),
+                    Some(_) if body.first_vertex.is_none() && body.springs.is_none() => {
+                        particles::with_middles(&body.mesh, nodes)
+                    }
                     _ => nodes,
                 })
             }
@@ -92,6 +94,7 @@ fn displacement(name: &str, point_m: DVec3, body: &Body, warnings: &mut Vec<Stri
     match &body.skin {
         None => Measure::Displacement(point),
         Some(_) if body.first_vertex.is_some() => Measure::Displacement(point),
+        Some(_) if body.springs.is_some() => Measure::SkinDisplacement(point),
         Some(_) if point.distance_m == 0.0 => Measure::LatticeDisplacement(point_m),
         Some(skin) => Measure::LatticeDisplacement(point.of(&skin.positions_m)),
     }

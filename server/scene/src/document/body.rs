@@ -1,9 +1,9 @@
 //! `[body]`: where the tetrahedra come from.
-use super::seed::SeedTable;
+use super::{seed::SeedTable, springs::SpringsTable};
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-/// Exactly one of the sub-tables `box`, `sphere_shell`, `ellipsoid_shell`, `ventricle`, `mesh` and `surfaces`.
+/// Exactly one of the sub-tables `box`, `sphere_shell`, `ellipsoid_shell`, `ventricle`, `mesh`, `surfaces` and `surface`.
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct BodyTable {
@@ -20,6 +20,10 @@ pub(crate) struct BodyTable {
     pub(crate) mesh: Option<MeshTable>,
     /// The volume between two surface files. Parts: inner, outer, base.
     pub(crate) surfaces: Option<SurfacesTable>,
+    /// One surface file (STL, OBJ, PLY), open or closed, for `springs`. It has no parts.
+    pub(crate) surface: Option<SurfaceTable>,
+    /// Makes its surface, or a part of that, a mass-spring surface; there are no tets then.
+    pub(crate) springs: Option<SpringsTable>,
     /// Particles on a lattice within it, of which those near tools are awake: it becomes a hybrid body.
     pub(crate) particles: Option<ParticlesTable>,
     /// Makes it the papers' hybrid, whose core its tets are.
@@ -161,6 +165,16 @@ impl LengthUnit {
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct MeshTable {
+    /// Path, relative to the scene file.
+    pub(crate) file: String,
+    /// Unit of its coordinates.
+    pub(crate) unit: LengthUnit,
+}
+
+/// A surface file: STL, OBJ or PLY.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct SurfaceTable {
     /// Path, relative to the scene file.
     pub(crate) file: String,
     /// Unit of its coordinates.

@@ -6,6 +6,7 @@ pub(crate) mod region;
 pub(crate) mod schema;
 pub(crate) mod seed;
 pub(crate) mod source;
+pub(crate) mod springs;
 pub(crate) mod tool;
 pub(crate) mod words;
 
@@ -21,7 +22,8 @@ pub(crate) struct Document {
     pub(crate) scene: SceneTable,
     /// The body: exactly one of its sub-tables.
     pub(crate) body: body::BodyTable,
-    /// Materials; of two that cover a tet the later one holds.
+    /// Materials; of two that cover a tet the later one holds. Springs have none.
+    #[serde(default)]
     pub(crate) material: Vec<MaterialTable>,
     /// Named parts of the body.
     #[serde(default)]

@@ -1,0 +1,125 @@
+//! A mass-spring surface for viewers. The loop hands over awake nodes and levels; where the surface refined everywhere is, is worked out here, beside the loop. Viewers see the same triangles always.
+use crate::sim::exchange::SpringSnapshot;
+use glam::DVec3;
+use palpate_physics::Model;
+use std::sync::Arc;
+
+/// Displacements of the vertices, frame by frame.
+#[derive(Debug)]
+pub struct SpringReader {
+    model: Arc<Model>,
+    /// Rest position less the one that viewers have (m), of every vertex.
+    rounding_m: Vec<[f32; 3]>,
+    /// Displacement (m) of every node, 0 of those that sleep.
+    moved_m: Vec<DVec3>,
+    /// Nodes and vertices that were moved in the last frame.
+    moved: Vec<u32>,
+    displacements_m: Vec<[f32; 3]>,
+}
+
+impl SpringReader {
+    /// `None` of another body. `rest_f32_m` is what viewers have.
+    pub fn new(model: &Arc<Model>, rest_f32_m: &[[f32; 3]]) -> Option<Self> {
+        let rest_m = model.springs()?.model().rest_m();
+        let rounding = |(rest, rest_f32): (&DVec3, &[f32; 3])| single(*rest - DVec3::from(rest_f32.map(f64::from)));
+        let rounding_m: Vec<[f32; 3]> = rest_m.iter().zip(rest_f32_m).map(rounding).collect();
+        Some(Self {
+            model: Arc::clone(model),
+            displacements_m: rounding_m.clone(),
+            moved_m: vec![DVec3::ZERO; rounding_m.len()],
+            moved: Vec::new(),
+            rounding_m,
+        })
+    }
+
+    /// Works out a frame; returns the largest displacement (m).
+    pub fn read(&mut self, SpringSnapshot { motion, x }: &SpringSnapshot) -> f64 {
+        let Some(body) = self.model.springs() else { return 0.0 };
+        let (model, rest_m) = (body.model(), body.model().rest_m());
+        for node in self.moved.drain(..) {
+            self.moved_m[node as usize] = DVec3::ZERO;
+            self.displacements_m[node as usize] = self.rounding_m[node as usize];
+        }
+        for (&node, x) in motion.ids.iter().zip(x) {
+            self.moved_m[node as usize] = *x - rest_m[node as usize];
+        }
+        let vertices = motion.ids.iter().copied().take_while(|node| *node < model.vertices());
+        let mut largest_sq = 0.0_f64;
+        for vertex in vertices {
+            let moved_m = self.moved_m[vertex as usize];
+            largest_sq = largest_sq.max(moved_m.length_squared());
+            self.displacements_m[vertex as usize] = sum(self.rounding_m[vertex as usize], moved_m);
+            self.moved.push(vertex);
+            for &edge in model.surface().edges_at(vertex) {
+                let other = model.surface().other_end(edge, vertex);
+                let middle = (model.vertices() + edge) as usize;
+                let level = motion.levels.of_edge(model.surface(), edge);
+                let of_ends_m = (moved_m + self.moved_m[other as usize]) * 0.5;
+                let moved_m = self.moved_m[middle] * level + of_ends_m * (1.0 - level);
+                largest_sq = largest_sq.max(moved_m.length_squared());
+                self.displacements_m[middle] = sum(self.rounding_m[middle], moved_m);
+                self.moved.push(middle as u32);
+            }
+        }
+        largest_sq.sqrt()
+    }
+
+    /// Displacements (m) from the f32 rest positions, after [`Self::read`].
+    pub fn displacements_m(&self) -> &[[f32; 3]] {
+        &self.displacements_m
+    }
+}
+
+fn single(v: DVec3) -> [f32; 3] {
+    v.to_array().map(|component| component as f32)
+}
+
+fn sum(rounding_m: [f32; 3], moved_m: DVec3) -> [f32; 3] {
+    single(DVec3::from(rounding_m.map(f64::from)) + moved_m)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{sim::exchange::SpringSnapshot, stream::keyframe::rest_positions_f32};
+    use palpate_physics::{Scratch, State, TickInput, contact::ToolTarget, step};
+    use palpate_scene::{Limits, parse};
+
+    /// While a tool presses, refines, and leaves: every vertex is where the model says, in every frame.
+    #[test]
+    fn viewers_see_the_surface_of_the_model() {
+        let text = "[scene]\nname = \"t\"\n[body.sphere_shell]\ninner_radius_mm = 30\nouter_radius_mm = 40\ntarget_tets = 3000\n\
+            [body.springs]\npart = \"outer\"\nmesh_n_per_m = 60\nhome_n_per_m = 12\nvertex_mass_kg = 2e-4\ndamping_n_s_per_m = 0.02\nmost_awake = 150\n\
+            [body.springs.refine]\nrings = 2\nconstants = \"area\"\n\
+            [[tool]]\nname = \"tip\"\nradius_mm = 5\ncoupling = \"rigid\"\ndriver = \"device\"\nstart_m = [0, 0, 0.05]\n";
+        let scene = parse(text, "t", None, &Limits::local(), &mut |_, _| ()).unwrap();
+        let model = Arc::new(Model::build(scene.model).unwrap());
+        let rest_f32_m = rest_positions_f32(&model);
+        let mut reader = SpringReader::new(&model, &rest_f32_m).unwrap();
+        let (mut state, mut scratch) = (State::at_rest(&model), Scratch::new(&model));
+        let (mut expected_m, mut refined) = (Vec::new(), 0);
+        for tick in 0..900 {
+            let height_m = if tick < 500 { 0.05 - 4e-5 * f64::from(tick).min(200.0) } else { 0.08 };
+            let target = ToolTarget { position_m: DVec3::Z * height_m, velocity_m_per_s: DVec3::ZERO };
+            let input =
+                TickInput { tools: &[target], load_factors: &[], prescribed_displacements_m: &[], point_forces: &[] };
+            step(&model, &mut state, &mut scratch, &input);
+            if tick % 30 == 0 {
+                let springs = state.springs.as_ref().unwrap();
+                refined = refined.max(springs.refined_nodes(model.springs().unwrap()));
+                let snapshot = SpringSnapshot { motion: springs.motion.clone(), x: state.x.clone() };
+                let largest_m = reader.read(&snapshot);
+                model.surface_positions_m(&state, &mut expected_m);
+                let found = reader.displacements_m().iter().zip(&rest_f32_m);
+                let mut farthest_m = 0.0_f64;
+                for ((found, rest_f32), expected) in found.zip(&expected_m) {
+                    let place = DVec3::from(found.map(f64::from)) + DVec3::from(rest_f32.map(f64::from));
+                    assert!(place.distance(*expected) < 1e-9, "tick {tick}: {place} {expected}");
+                    farthest_m = farthest_m.max(DVec3::from(found.map(f64::from)).length());
+                }
+                assert!((largest_m - farthest_m).abs() < 1e-8);
+            }
+        }
+        assert!(refined > 30, "{refined}");
+    }
+}

@@ -1,0 +1,323 @@
+//! `[body.springs]`: the body's surface, or a part of it, becomes a mass-spring surface.
+use super::{Files, body::Body, check, exactly_one};
+use crate::{
+    document::{
+        Document,
+        body::{BodyTable, SurfaceTable},
+        source::{Fault, Where},
+        springs::{ConstantsName, RefineTable, SpringsTable},
+        words::did_you_mean,
+    },
+    error::Stage,
+    files,
+    skin::FineSurface,
+};
+use glam::DVec3;
+use palpate_physics::{
+    Settings, Surface, TetMesh,
+    spring::{
+        HomeLaw, Refinement, Refining, SpringBodySpec, SpringSpec,
+        calibration::ConstantsTable,
+        home::Layer,
+        loop_scheme, matching,
+        region::Constants,
+        topology::{Triangulation, TriangulationError},
+    },
+};
+use std::collections::BTreeSet;
+
+/// More vertices than this are awake only where a scene asks for it, or where something moves all of them.
+const MANY_VERTICES: usize = 20_000;
+
+fn at() -> Where {
+    Where::root("body").key("springs")
+}
+
+/// Reads a surface file as a body without an inside.
+pub(super) fn from_file(table: &SurfaceTable, files: &Files<'_>, at: &Where) -> Result<Body, Fault> {
+    let at = at.key("file");
+    let path = files.resolve(&at, &table.file)?;
+    let file = files::read_surface(&path).map_err(|error| super::body::file_fault(&at, error))?;
+    files.limits.check_tets(&at, file.triangles.len() as u64)?;
+    let scale = table.unit.in_m();
+    let positions_m: Vec<DVec3> = file.vertices.iter().map(|vertex| *vertex * scale).collect();
+    Ok(Body {
+        surface: Surface::alone(positions_m.len(), file.triangles),
+        mesh: TetMesh::of_points(positions_m),
+        skin: None,
+        springs: None,
+        first_vertex: None,
+        lattice_m: None,
+        parts: Vec::new(),
+        origin: format!("surface {}", table.file),
+        report: Vec::new(),
+        warnings: file.warnings,
+    })
+}
+
+/// Refuses what has a surface alone and no springs.
+pub(super) fn demand(table: &BodyTable) -> Result<(), Fault> {
+    if table.surface.is_some() && table.springs.is_none() {
+        let message = "a surface file has no inside to be filled with tets";
+        return Err(Fault::value(Where::root("body").key("surface"), message).help(
+            "make it a mass-spring surface with [body.springs], or give two surfaces whose volume between is filled: [body.surfaces]",
+        ));
+    }
+    if table.springs.is_some() && (table.particles.is_some() || table.seed.is_some()) {
+        let message = "a body is of springs or of particles, not both";
+        return Err(Fault::value(at(), message).help("remove one of the two tables"));
+    }
+    Ok(())
+}
+
+/// Makes the body's surface, or a part of it, the coarse surface of springs. Nodes are its vertices then, tools and loads act on the surface refined everywhere.
+pub(super) fn put_on(body: &mut Body, table: &SpringsTable) -> Result<(), Fault> {
+    let chosen: Vec<u32> = match &table.part {
+        None => (0..body.surface.triangles.len() as u32).collect(),
+        Some(name) => {
+            let names: Vec<&str> = body.parts.iter().map(|part| part.name.as_str()).collect();
+            let part = body.parts.iter().find(|part| part.name == *name).ok_or_else(|| {
+                let message = format!("the body has no part \"{name}\"");
+                let help = if names.is_empty() { "leave it out".into() } else { did_you_mean(name, &names) };
+                Fault::value(at().key("part"), message).help(help)
+            })?;
+            part.triangles.clone()
+        }
+    };
+    let corners: Vec<[u32; 3]> = chosen.iter().map(|&t| body.surface.triangle_nodes(t as usize)).collect();
+    let used: BTreeSet<u32> = corners.iter().flatten().copied().collect();
+    let used: Vec<u32> = used.into_iter().collect();
+    let number = |node: &u32| used.binary_search(node).ok().map(|number| number as u32);
+    let triangles = corners.iter().map(|t| t.map(|node| number(&node).unwrap_or_default())).collect();
+    let positions_m = used.iter().map(|&node| body.mesh.positions_m()[node as usize]).collect();
+    let surface = Triangulation::new(positions_m, triangles).map_err(refused)?;
+    let (rest_m, fine_triangles) = loop_scheme::refined(&surface);
+    // Each coarse triangle becomes four, in its place.
+    let origins = (0..fine_triangles.len() as u32).map(|fine| fine / 4).collect();
+    let skin = FineSurface { positions_m: rest_m, triangles: fine_triangles, origins };
+    for part in &mut body.parts {
+        let of_part: BTreeSet<u32> =
+            part.triangles.iter().filter_map(|t| chosen.binary_search(t).ok()).map(|t| t as u32).collect();
+        part.nodes = part.nodes.iter().filter_map(number).collect();
+        part.tets.clear();
+        part.go_over_to(&skin, |origin| of_part.contains(&origin));
+    }
+    body.parts.retain(|part| !part.nodes.is_empty());
+    let vertices = surface.positions_m().len();
+    body.mesh = TetMesh::of_points(skin.positions_m[..vertices].to_vec());
+    body.surface = Surface::alone(vertices, surface.triangles().to_vec());
+    body.report.push(format!(
+        "mass-spring surface of {vertices} vertices, {} edges and {} triangles",
+        surface.edges().len(),
+        surface.triangles().len()
+    ));
+    body.skin = Some(skin);
+    body.springs = Some(surface);
+    Ok(())
+}
+
+fn refused(error: TriangulationError) -> Fault {
+    Fault::value(at(), format!("the body's surface cannot be one of springs: {error}")).of(Stage::Body).cause(error)
+}
+
+/// Moves it (m).
+pub(super) fn shift(body: &mut Body, offset: DVec3) -> Result<(), Fault> {
+    let Some(surface) = body.springs.take() else { return Ok(()) };
+    let moved = surface.positions_m().iter().map(|p| *p + offset).collect();
+    body.springs = Some(surface.moved(moved).map_err(refused)?);
+    body.mesh = TetMesh::of_points(body.mesh.positions_m().iter().map(|p| *p + offset).collect());
+    Ok(())
+}
+
+/// What the springs are made from; `None` of another body. Their damping goes into the settings.
+pub(super) fn spec(
+    document: &Document,
+    body: &Body,
+    settings: &mut Settings,
+    files: &Files<'_>,
+) -> Result<Option<SpringBodySpec>, Fault> {
+    let (Some(table), Some(surface)) = (&document.body.springs, &body.springs) else { return Ok(None) };
+    if !document.material.is_empty() {
+        let message = "a body of springs has no material: its constants are those of its springs";
+        return Err(Fault::value(Where::root("material").index(0), message).help("remove it"));
+    }
+    if !document.prescribed.is_empty() {
+        let message = "what holds a body of springs does not move";
+        return Err(Fault::value(Where::root("prescribed").index(0), message).help("use [[fixed]]"));
+    }
+    let areas_m2 = surface.vertex_areas_m2();
+    let coarse = coarse(table, &areas_m2)?;
+    let mass_kg = masses(table, &areas_m2)?;
+    damping(table, &mass_kg, settings)?;
+    let vertices = mass_kg.len();
+    let is_moved = document.scene.gravity_m_per_s2 != [0.0; 3] || !document.load.is_empty();
+    let most_awake = match table.most_awake {
+        Some(most) => {
+            check(&at().key("most_awake"), most, most > 0, "must be 1 or larger")?;
+            (most as usize).min(vertices)
+        }
+        None if is_moved => vertices,
+        None => vertices.min(MANY_VERTICES),
+    };
+    let mut springs = SpringSpec {
+        coarse,
+        fine: coarse,
+        home_law: home_law(table)?,
+        mass_kg,
+        held: Vec::new(),
+        most_awake,
+        most_refined: 0,
+        surface: surface.clone(),
+    };
+    let Some(refine) = &table.refine else {
+        return Ok(Some(SpringBodySpec { springs, refinement: None, table: None }));
+    };
+    let (fine, constants_table) = fine(refine, &coarse, files)?;
+    springs.fine = fine;
+    let at = at().key("refine");
+    check(&at.key("rings"), refine.rings, (1..=16).contains(&refine.rings), "must be 1 to 16")?;
+    let fade_ok = refine.fade_s > 0.0 && refine.fade_s.is_finite();
+    check(&at.key("fade_s"), refine.fade_s, fade_ok, "must be finite and larger than 0")?;
+    springs.most_refined = most_refined(refine, document.tool.len())?;
+    let refinement = Refinement { rings: refine.rings, fade_s: refine.fade_s, by: Refining::ByTools };
+    Ok(Some(SpringBodySpec { springs, refinement: Some(refinement), table: constants_table }))
+}
+
+/// A regular region of so many rings has `6 n²` triangles; three times that are on their way behind a tool that moves.
+fn most_refined(refine: &RefineTable, tools: usize) -> Result<usize, Fault> {
+    const MOST: u32 = 100_000;
+    let region = 6 * (refine.rings as usize).pow(2);
+    let Some(most) = refine.most_triangles else { return Ok(6 * region * tools.max(1)) };
+    let rule = "must hold one region, 6 times the rings squared, and be 100000 or less";
+    let ok = most as usize >= region && most <= MOST;
+    check(&at().key("refine").key("most_triangles"), most, ok, rule)?;
+    Ok(most as usize)
+}
+
+fn positive(at: &Where, key: &str, value: f64) -> Result<f64, Fault> {
+    check(&at.key(key), value, value > 0.0 && value.is_finite(), "must be finite and larger than 0")?;
+    Ok(value)
+}
+
+fn coarse(table: &SpringsTable, areas_m2: &[f64]) -> Result<Constants, Fault> {
+    let at = at();
+    let constants = [("mesh_n_per_m", table.mesh_n_per_m), ("home_n_per_m", table.home_n_per_m)];
+    let skin = [
+        ("young_modulus_pa", table.young_modulus_pa),
+        ("thickness_m", table.thickness_m),
+        ("foundation_pa_per_m", table.foundation_pa_per_m),
+    ];
+    let given = |keys: &[(&str, Option<f64>)]| keys.iter().any(|(_, value)| value.is_some());
+    exactly_one(&at, &[("mesh_n_per_m", given(&constants)), ("young_modulus_pa", given(&skin))])?;
+    let value = |(key, value): (&str, Option<f64>), with: &str| {
+        let value = value
+            .ok_or_else(|| Fault::value(at.clone(), format!("[{at}] lacks the key `{key}`, which goes with {with}")))?;
+        positive(&at, key, value)
+    };
+    if given(&constants) {
+        let [mesh_n_per_m, home_n_per_m] = constants;
+        return Ok(Constants {
+            mesh_n_per_m: value(mesh_n_per_m, "`home_n_per_m`")?,
+            home_n_per_m: value(home_n_per_m, "`mesh_n_per_m`")?,
+        });
+    }
+    let with = "`young_modulus_pa`, `thickness_m` and `foundation_pa_per_m`";
+    let [young_pa, thickness_m, foundation_pa_per_m] =
+        [value(skin[0], with)?, value(skin[1], with)?, value(skin[2], with)?];
+    let mean_area_m2 = areas_m2.iter().sum::<f64>() / areas_m2.len() as f64;
+    Ok(Constants {
+        // K_m = (√3/2) E t, K_h = foundation times a vertex's area
+        mesh_n_per_m: 0.75_f64.sqrt() * young_pa * thickness_m,
+        home_n_per_m: foundation_pa_per_m * mean_area_m2,
+    })
+}
+
+fn masses(table: &SpringsTable, areas_m2: &[f64]) -> Result<Vec<f64>, Fault> {
+    let at = at();
+    let keys = [("area_density_kg_per_m2", table.area_density_kg_per_m2), ("vertex_mass_kg", table.vertex_mass_kg)];
+    let key = exactly_one(&at, &keys.map(|(key, value)| (key, value.is_some())))?;
+    let value = keys.iter().find_map(|(_, value)| *value).unwrap_or_default();
+    let value = positive(&at, key, value)?;
+    let each = |area_m2: &f64| if table.vertex_mass_kg.is_some() { value } else { value * area_m2 };
+    Ok(areas_m2.iter().map(each).collect())
+}
+
+fn damping(table: &SpringsTable, mass_kg: &[f64], settings: &mut Settings) -> Result<(), Fault> {
+    let Some(damping) = table.damping_n_s_per_m else { return Ok(()) };
+    let at = at().key("damping_n_s_per_m");
+    if settings.mass_damping_per_s != 0.0 {
+        let message = format!("{at} and numerics.mass_damping_per_s say the same in two ways");
+        return Err(Fault::value(at, message).help("remove one of the two"));
+    }
+    check(&at, damping, damping >= 0.0 && damping.is_finite(), "must be finite and not negative")?;
+    let mean_kg = mass_kg.iter().sum::<f64>() / mass_kg.len() as f64;
+    settings.mass_damping_per_s = damping / mean_kg;
+    Ok(())
+}
+
+fn home_law(table: &SpringsTable) -> Result<HomeLaw, Fault> {
+    let law = match (table.home_cubic_per_m2, &table.home_layer) {
+        (None, None) => return Ok(HomeLaw::Linear),
+        (Some(per_m2), None) => HomeLaw::cubic(per_m2),
+        (None, Some(layers)) => {
+            let layer = |layer: &super::super::document::springs::HomeLayerTable| Layer {
+                thickness_m: layer.thickness_m,
+                stiffness_ratio: layer.stiffness_ratio,
+            };
+            HomeLaw::layers(&layers.iter().map(layer).collect::<Vec<_>>())
+        }
+        (Some(_), Some(_)) => {
+            let message = "`home_cubic_per_m2` and `home_layer` are two laws of one spring";
+            return Err(Fault::value(at().key("home_layer"), message).help("remove one of the two"));
+        }
+    };
+    let key = if table.home_layer.is_some() { "home_layer" } else { "home_cubic_per_m2" };
+    law.map_err(|error| Fault::value(at().key(key), error.to_string()).cause(error))
+}
+
+/// Constants where the surface is refined, and their table.
+fn fine(
+    refine: &RefineTable,
+    coarse: &Constants,
+    files: &Files<'_>,
+) -> Result<(Constants, Option<ConstantsTable>), Fault> {
+    let at = at().key("refine");
+    let own = refine.mesh_n_per_m.is_some() || refine.home_n_per_m.is_some();
+    exactly_one(
+        &at,
+        &[
+            ("constants", refine.constants.is_some()),
+            ("table_file", refine.table_file.is_some()),
+            ("mesh_n_per_m", own),
+        ],
+    )?;
+    if let Some(file) = &refine.table_file {
+        return Ok((*coarse, Some(table(file, &at.key("table_file"), files)?)));
+    }
+    if let Some(constants) = refine.constants {
+        let fine = match constants {
+            ConstantsName::Unchanged => *coarse,
+            ConstantsName::Area => matching::area_consistent(coarse),
+        };
+        return Ok((fine, None));
+    }
+    let (Some(mesh_n_per_m), Some(home_n_per_m)) = (refine.mesh_n_per_m, refine.home_n_per_m) else {
+        let message = format!("[{at}] gives one of `mesh_n_per_m` and `home_n_per_m`, which go together");
+        return Err(Fault::value(at, message));
+    };
+    let mesh_n_per_m = positive(&at, "mesh_n_per_m", mesh_n_per_m)?;
+    Ok((Constants { mesh_n_per_m, home_n_per_m: positive(&at, "home_n_per_m", home_n_per_m)? }, None))
+}
+
+fn table(file: &str, at: &Where, files: &Files<'_>) -> Result<ConstantsTable, Fault> {
+    let path = files.resolve(at, file)?;
+    let again = "make it with `palpated calibrate`";
+    let text = files.limits.read_text(&path).map_err(|error| {
+        Fault::value(at.clone(), format!("cannot read {}: {error}", path.display())).help(again).cause(error)
+    })?;
+    serde_json::from_str(&text).map_err(|error| {
+        Fault::value(at.clone(), format!("{} is no table of spring constants: {error}", path.display()))
+            .help(again)
+            .cause(error)
+    })
+}
