@@ -37,6 +37,8 @@ enum Command {
     Static(offline::equilibrium::StaticArgs),
     /// Load a scene and say what its body is like and what a tick costs
     Check(offline::check::CheckArgs),
+    /// Find spring constants over displacement for a scene's refined mass-spring surface, and keep them beside it
+    Calibrate(offline::calibrate::CalibrateArgs),
     /// Print the JSON schema of scene files
     Schema,
 }
@@ -65,6 +67,7 @@ impl Cli {
             Some(Command::Simulate(args)) => offline::simulate::run(&args),
             Some(Command::Static(args)) => offline::equilibrium::run(&args),
             Some(Command::Check(args)) => offline::check::run(&args),
+            Some(Command::Calibrate(args)) => offline::calibrate::run(&args),
             Some(Command::Schema) => offline::schema::run(),
         }
     }

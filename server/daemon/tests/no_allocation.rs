@@ -3,11 +3,11 @@
 #![allow(clippy::unwrap_used, clippy::expect_used)]
 mod common;
 use assert_no_alloc::{AllocDisabler, assert_no_alloc};
-use common::{above, block_scene, hybrid::hybrid_scene, path, pressing};
+use common::{above, block_scene, hybrid::hybrid_scene, path, pressing, springs::springs_scene};
 use glam::DVec3;
 use palpate_physics::{Model, State, snapshot};
 use palpate_realtime::Clock;
-use palpate_scene::ScriptedHand;
+use palpate_scene::{Scene, ScriptedHand};
 use palpated::{
     serve::config::default_limits,
     sim::{
@@ -28,7 +28,17 @@ static ALLOCATOR: AllocDisabler = AllocDisabler;
 /// A hybrid body: particles wake and sleep, viewers watch, states come and go.
 #[tokio::test]
 async fn no_tick_of_a_hybrid_body_allocates() {
-    let scene = hybrid_scene();
+    watched_and_restored(hybrid_scene(), 1200, |state| !state.active.is_empty());
+}
+
+/// The same of a mass-spring surface, refined here and there, most of which sleeps.
+#[tokio::test]
+async fn no_tick_of_springs_allocates() {
+    watched_and_restored(springs_scene(), 2700, |state| !state.x.is_empty());
+}
+
+/// Runs until something is awake, and for so many ticks until nothing is.
+fn watched_and_restored(scene: Scene, ticks: u32, is_awake: impl Fn(&State) -> bool) {
     let demand = Arc::new(Demand::default());
     let model = Arc::new(Model::build(scene.model).unwrap());
     let (simulation, ends) = Simulation::build(Parts {
@@ -43,12 +53,12 @@ async fn no_tick_of_a_hybrid_body_allocates() {
     .unwrap();
     let mut bench = Bench { simulation, ends, demand, clock: Clock::Monotonic, timing: Timing::default() };
     bench.ticks(300, RUN);
-    assert!(!bench.simulation.state().active.is_empty());
+    assert!(is_awake(bench.simulation.state()));
     bench.demand.set(8, true);
     let mut copy = State::at_rest(&model);
     assert!(assert_no_alloc(|| copy_state(bench.simulation.state(), &mut copy)));
-    bench.ticks(1200, RUN);
-    assert!(bench.simulation.state().active.is_empty());
+    bench.ticks(ticks, RUN);
+    assert!(!is_awake(bench.simulation.state()));
     let saved = snapshot::restore(&model, &snapshot::save(&model, &copy)).unwrap();
     assert!(assert_no_alloc(|| bench.simulation.restore(&saved)));
     bench.ticks(300, RUN);

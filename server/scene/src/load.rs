@@ -4,7 +4,7 @@ use crate::{
     document::{schema, source::Source},
     error::{SceneError, Stage},
     limits::Limits,
-    scene::Scene,
+    scene::{Scene, ToCalibrate},
 };
 use std::path::Path;
 
@@ -14,11 +14,16 @@ use std::path::Path;
 /// # Errors
 /// [`SceneError`], pointing into the file where it can.
 pub fn load_file(path: &Path, limits: &Limits, progress: &mut dyn FnMut(f64, &str)) -> Result<Scene, SceneError> {
+    let (name, text) = read(path, limits)?;
+    parse(&text, &name, Some(path.parent().unwrap_or(Path::new("."))), limits, progress)
+}
+
+fn read(path: &Path, limits: &Limits) -> Result<(String, String), SceneError> {
     let name = path.display().to_string();
     let text = limits.read_text(path).map_err(|cause| {
         SceneError::new(Stage::Read, format!("cannot read the scene file {name}: {cause}")).with_cause(cause)
     })?;
-    parse(&text, &name, Some(path.parent().unwrap_or(Path::new("."))), limits, progress)
+    Ok((name, text))
 }
 
 /// Loads a scene from its text. `source_name` appears in messages. Relative files are looked for in `base_dir`; without
@@ -36,6 +41,17 @@ pub fn parse(
     progress(0.0, "reading the scene");
     let (source, document) = Source::read(source_name, text)?;
     compile::compile(&document, &Files { base_dir, limits }, progress).map_err(|fault| source.error(fault))
+}
+
+/// What a scene's table of spring constants is made from, without the table.
+///
+/// # Errors
+/// [`SceneError`], pointing into the file where it can: also of a scene that asks for no table.
+pub fn to_calibrate(path: &Path, limits: &Limits) -> Result<ToCalibrate, SceneError> {
+    let (name, text) = read(path, limits)?;
+    let (source, document) = Source::read(&name, &text)?;
+    let files = Files { base_dir: Some(path.parent().unwrap_or(Path::new("."))), limits };
+    compile::to_calibrate(&document, &files).map_err(|fault| source.error(fault))
 }
 
 /// JSON schema of the scene document.

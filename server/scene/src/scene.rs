@@ -4,7 +4,12 @@ use crate::{
     probes::Probe,
     timeline::Timeline,
 };
-use palpate_physics::{ModelSpec, mesh::quality::Quality};
+use palpate_physics::{
+    ModelSpec,
+    mesh::quality::Quality,
+    spring::{region::Constants, topology::Triangulation},
+};
+use std::path::PathBuf;
 
 /// A loaded scene.
 #[derive(Debug, Clone)]
@@ -89,4 +94,17 @@ pub struct PartSummary {
     pub triangles: usize,
     /// Tets in it.
     pub tets: usize,
+}
+
+/// What a table of spring constants is made from.
+#[derive(Debug, Clone)]
+pub struct ToCalibrate {
+    /// The coarse surface.
+    pub surface: Triangulation,
+    /// Its springs.
+    pub coarse: Constants,
+    /// Rings refined.
+    pub rings: u32,
+    /// Where the scene looks for the table.
+    pub table: PathBuf,
 }

@@ -204,7 +204,7 @@ fn bodies_that_are_none_or_two_or_out_of_range() {
     );
     assert_eq!(
         refused("[[material]]", "[body.ventricle]\ntarget_tets = 500\n[[material]]"),
-        "t.toml:6:7: [body] gives `box` and `ventricle`; it needs exactly one of `box`, `sphere_shell`, `ellipsoid_shell`, `ventricle`, `mesh`, `surfaces`"
+        "t.toml:6:7: [body] gives `box` and `ventricle`; it needs exactly one of `box`, `sphere_shell`, `ellipsoid_shell`, `ventricle`, `mesh`, `surfaces`, `surface`"
     );
     let bare = "[body]\n";
     assert!(

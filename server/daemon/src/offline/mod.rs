@@ -1,6 +1,7 @@
 //! Commands that run without a network: `simulate`, `static`, `check`, `schema`. They run the same scenes and the same
 //! physics as `serve`; nothing in them is random, so equal scenes give equal results, bit for bit.
 mod args;
+pub mod calibrate;
 pub mod check;
 mod cost;
 pub mod equilibrium;

@@ -2,6 +2,7 @@
 #![allow(dead_code, unreachable_pub, clippy::unwrap_used, clippy::expect_used)] // each test file uses its own part
 pub mod hybrid;
 pub mod seen;
+pub mod springs;
 
 use glam::DVec3;
 use palpate_physics::{

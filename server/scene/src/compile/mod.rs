@@ -18,7 +18,7 @@ use crate::{
         source::{Fault, Where},
     },
     limits::Limits,
-    scene::{BodySummary, OutputSettings, PartSummary, Scene},
+    scene::{BodySummary, OutputSettings, PartSummary, Scene, ToCalibrate},
 };
 use body::Body;
 use glam::DVec3;
@@ -64,6 +64,7 @@ pub(crate) fn compile(
     progress: &mut dyn FnMut(f64, &str),
 ) -> Result<Scene, Fault> {
     files.limits.check_entries(document)?;
+    springs::demand_alone(document)?;
     let mut settings = settings(document)?;
     let output = output(&document.output)?;
     let body = body::make(&document.body, files, progress)?;
@@ -112,6 +113,13 @@ pub(crate) fn compile(
         warnings,
         summary,
     })
+}
+
+/// What the table of a body of springs is made from.
+pub(crate) fn to_calibrate(document: &Document, files: &Files<'_>) -> Result<ToCalibrate, Fault> {
+    files.limits.check_entries(document)?;
+    let body = body::make(&document.body, files, &mut |_, _| ())?;
+    springs::to_calibrate(document, body, files)
 }
 
 /// A hand would feel a body that is further from rest.

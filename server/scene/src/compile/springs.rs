@@ -10,6 +10,7 @@ use crate::{
     },
     error::Stage,
     files,
+    scene::ToCalibrate,
     skin::FineSurface,
 };
 use glam::DVec3;
@@ -17,15 +18,17 @@ use palpate_physics::{
     Settings, Surface, TetMesh,
     spring::{
         HomeLaw, Refinement, Refining, SpringBodySpec, SpringSpec,
-        calibration::ConstantsTable,
+        calibration::{Calibration, ConstantsTable},
         home::Layer,
         loop_scheme, matching,
         region::Constants,
         topology::{Triangulation, TriangulationError},
     },
 };
-use std::collections::BTreeSet;
+use std::{collections::BTreeSet, path::Path};
 
+/// How a table comes to be there.
+const AGAIN: &str = "make it with `palpated calibrate`, whose argument is this scene";
 /// More vertices than this are awake only where a scene asks for it, or where something moves all of them.
 const MANY_VERTICES: usize = 20_000;
 
@@ -66,6 +69,22 @@ pub(super) fn demand(table: &BodyTable) -> Result<(), Fault> {
     if table.springs.is_some() && (table.particles.is_some() || table.seed.is_some()) {
         let message = "a body is of springs or of particles, not both";
         return Err(Fault::value(at(), message).help("remove one of the two tables"));
+    }
+    Ok(())
+}
+
+/// Refuses what springs have no use for.
+pub(super) fn demand_alone(document: &Document) -> Result<(), Fault> {
+    if document.body.springs.is_none() {
+        return Ok(());
+    }
+    if !document.material.is_empty() {
+        let message = "a body of springs has no material: its constants are those of its springs";
+        return Err(Fault::value(Where::root("material").index(0), message).help("remove it"));
+    }
+    if !document.prescribed.is_empty() {
+        let message = "what holds a body of springs does not move";
+        return Err(Fault::value(Where::root("prescribed").index(0), message).help("use [[fixed]]"));
     }
     Ok(())
 }
@@ -120,6 +139,23 @@ fn refused(error: TriangulationError) -> Fault {
     Fault::value(at(), format!("the body's surface cannot be one of springs: {error}")).of(Stage::Body).cause(error)
 }
 
+/// What the table that it asks for is made from.
+pub(super) fn to_calibrate(document: &Document, body: Body, files: &Files<'_>) -> Result<ToCalibrate, Fault> {
+    let (Some(table), Some(surface)) = (&document.body.springs, body.springs) else {
+        let message = "this body is not of springs: there is nothing to calibrate";
+        return Err(Fault::value(Where::root("body"), message).help("spring constants belong to [body.springs]"));
+    };
+    let at = at().key("refine");
+    let refine = table.refine.as_ref().and_then(|refine| Some((refine, refine.table_file.as_ref()?)));
+    let (refine, file) = refine.ok_or_else(|| {
+        Fault::value(at.clone(), format!("[{at}] names no table"))
+            .help("write table_file = \"springs-table.json\" in place of other constants there")
+    })?;
+    let coarse = coarse(table, &surface.vertex_areas_m2())?;
+    let table = files.base_dir.unwrap_or(Path::new(".")).join(file);
+    Ok(ToCalibrate { surface, coarse, rings: refine.rings, table })
+}
+
 /// Moves it (m).
 pub(super) fn shift(body: &mut Body, offset: DVec3) -> Result<(), Fault> {
     let Some(surface) = body.springs.take() else { return Ok(()) };
@@ -137,14 +173,6 @@ pub(super) fn spec(
     files: &Files<'_>,
 ) -> Result<Option<SpringBodySpec>, Fault> {
     let (Some(table), Some(surface)) = (&document.body.springs, &body.springs) else { return Ok(None) };
-    if !document.material.is_empty() {
-        let message = "a body of springs has no material: its constants are those of its springs";
-        return Err(Fault::value(Where::root("material").index(0), message).help("remove it"));
-    }
-    if !document.prescribed.is_empty() {
-        let message = "what holds a body of springs does not move";
-        return Err(Fault::value(Where::root("prescribed").index(0), message).help("use [[fixed]]"));
-    }
     let areas_m2 = surface.vertex_areas_m2();
     let coarse = coarse(table, &areas_m2)?;
     let mass_kg = masses(table, &areas_m2)?;
@@ -172,7 +200,7 @@ pub(super) fn spec(
     let Some(refine) = &table.refine else {
         return Ok(Some(SpringBodySpec { springs, refinement: None, table: None }));
     };
-    let (fine, constants_table) = fine(refine, &coarse, files)?;
+    let (fine, constants_table) = fine(refine, (&coarse, surface), files)?;
     springs.fine = fine;
     let at = at().key("refine");
     check(&at.key("rings"), refine.rings, (1..=16).contains(&refine.rings), "must be 1 to 16")?;
@@ -278,7 +306,7 @@ fn home_law(table: &SpringsTable) -> Result<HomeLaw, Fault> {
 /// Constants where the surface is refined, and their table.
 fn fine(
     refine: &RefineTable,
-    coarse: &Constants,
+    (coarse, surface): (&Constants, &Triangulation),
     files: &Files<'_>,
 ) -> Result<(Constants, Option<ConstantsTable>), Fault> {
     let at = at().key("refine");
@@ -292,7 +320,12 @@ fn fine(
         ],
     )?;
     if let Some(file) = &refine.table_file {
-        return Ok((*coarse, Some(table(file, &at.key("table_file"), files)?)));
+        let at = at.key("table_file");
+        let table = table(file, &at, files)?;
+        table
+            .fits(surface, &Calibration { coarse: *coarse, rings: refine.rings, ..table.of })
+            .map_err(|error| Fault::value(at, format!("{file}: {error}")).help(AGAIN).cause(error))?;
+        return Ok((*coarse, Some(table)));
     }
     if let Some(constants) = refine.constants {
         let fine = match constants {
@@ -311,13 +344,12 @@ fn fine(
 
 fn table(file: &str, at: &Where, files: &Files<'_>) -> Result<ConstantsTable, Fault> {
     let path = files.resolve(at, file)?;
-    let again = "make it with `palpated calibrate`";
     let text = files.limits.read_text(&path).map_err(|error| {
-        Fault::value(at.clone(), format!("cannot read {}: {error}", path.display())).help(again).cause(error)
+        Fault::value(at.clone(), format!("cannot read {}: {error}", path.display())).help(AGAIN).cause(error)
     })?;
     serde_json::from_str(&text).map_err(|error| {
         Fault::value(at.clone(), format!("{} is no table of spring constants: {error}", path.display()))
-            .help(again)
+            .help(AGAIN)
             .cause(error)
     })
 }
