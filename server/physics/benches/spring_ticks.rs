@@ -1,0 +1,103 @@
+//! Ticks of the loop on sheets of springs beneath a sphere: some 10 000 triangles all awake, and of 10 000 and a million triangles with 800 vertices awake. The sheets take turns, tick by tick. Prints
+//! load times and memory, too: `cargo bench -p palpate-physics --bench spring_ticks`.
+#![allow(missing_docs, clippy::unwrap_used)] // a program that prints
+#[path = "../tests/rig/mod.rs"]
+mod rig;
+use glam::DVec3;
+use palpate_physics::{
+    ModelSpec, Settings, TetMesh,
+    contact::Coupling,
+    spring::{HomeLaw, Refinement, Refining, SpringBodySpec, SpringSpec, net::hexagonal_patch, region::Constants},
+};
+use rig::{Rig, sphere};
+use std::time::Instant;
+
+const EDGE_M: f64 = 2e-3;
+
+fn sheet(rings: i32, most_awake: usize) -> ModelSpec {
+    let surface = hexagonal_patch(rings, EDGE_M).unwrap();
+    let vertices = surface.positions_m().len();
+    let springs = SpringSpec {
+        coarse: Constants { mesh_n_per_m: 60.0, home_n_per_m: 6.0 },
+        fine: Constants { mesh_n_per_m: 36.0, home_n_per_m: 3.1 },
+        home_law: HomeLaw::Linear,
+        mass_kg: vec![1e-3; vertices],
+        held: Vec::new(),
+        most_awake: most_awake.min(vertices),
+        most_refined: 300,
+        surface,
+    };
+    ModelSpec {
+        mesh: TetMesh::of_points(Vec::new()),
+        particles: None,
+        seed: None,
+        springs: Some(SpringBodySpec {
+            springs,
+            refinement: Some(Refinement { rings: 2, fade_s: 0.1, by: Refining::ByTools }),
+            table: None,
+        }),
+        regions: Vec::new(),
+        tet_region: Vec::new(),
+        prescribed: Vec::new(),
+        loads: Vec::new(),
+        gravity_m_per_s2: DVec3::ZERO,
+        tools: vec![sphere(3e-3, DVec3::Z * 0.01, Coupling::Rigid)],
+        settings: Settings { mass_damping_per_s: 30.0, ..Settings::default() },
+    }
+}
+
+/// Memory in use (bytes), where the system tells it.
+fn resident_bytes() -> f64 {
+    let pages = std::fs::read_to_string("/proc/self/statm").ok();
+    let pages = pages.and_then(|text| text.split_whitespace().nth(1)?.parse::<f64>().ok());
+    pages.map_or(f64::NAN, |pages| pages * 4096.0)
+}
+
+fn loaded(name: &str, rings: i32, most_awake: usize) -> (String, Rig) {
+    let (before, begun) = (resident_bytes(), Instant::now());
+    let rig = Rig::new(sheet(rings, most_awake));
+    let triangles = rig.model.springs().unwrap().model().surface().triangles().len();
+    println!(
+        "{name}: {triangles} triangles, {} substeps; loaded in {:.1} s, {:.0} bytes a triangle",
+        rig.model.substeps(),
+        begun.elapsed().as_secs_f64(),
+        (resident_bytes() - before) / triangles as f64
+    );
+    (name.to_owned(), rig)
+}
+
+/// Medians and more of ticks (µs) along a path, the bodies by turns.
+fn ticks(what: &str, rigs: &mut [(String, Rig)], path: impl Fn(u32) -> DVec3) {
+    const WARM: u32 = 500;
+    let mut costs = vec![Vec::new(); rigs.len()];
+    for tick in 0..4500 {
+        for ((_, rig), costs) in rigs.iter_mut().zip(&mut costs) {
+            let begun = Instant::now();
+            rig.tick_at(path(tick));
+            if tick >= WARM {
+                costs.push(begun.elapsed().as_secs_f64() * 1e6);
+            }
+        }
+    }
+    for ((name, rig), costs) in rigs.iter().zip(&mut costs) {
+        costs.sort_by(f64::total_cmp);
+        let at = |part: f64| costs[((costs.len() - 1) as f64 * part) as usize];
+        println!(
+            "{what}, {name}: median {:.1} us, p99 {:.1}, longest {:.0}; {} nodes awake",
+            at(0.5),
+            at(0.99),
+            at(1.0),
+            rig.state.x.len()
+        );
+    }
+}
+
+fn main() {
+    let mut all = [loaded("all awake", 41, usize::MAX)];
+    ticks("pressed", &mut all, |_| DVec3::Z * 2e-3);
+    ticks("moving", &mut all, |tick| DVec3::new(0.01 * (f64::from(tick) * 0.005).sin(), 0.0, 2e-3));
+    let mut pair = [loaded("10 k, 800 awake", 41, 800), loaded("1 M, 800 awake", 408, 800)];
+    ticks("pressed", &mut pair, |_| DVec3::Z * 2e-3);
+    ticks("moving", &mut pair, |tick| DVec3::new(0.01 * (f64::from(tick) * 0.005).sin(), 0.0, 2e-3));
+    ticks("far away", &mut pair, |_| DVec3::Z * 0.3);
+}
