@@ -225,6 +225,17 @@ fn what_is_no_surface_is_told_where() {
     assert!(load().unwrap_err().one_line().contains("no inside"));
 }
 
+#[test]
+fn a_tool_that_slips_through_is_told() {
+    let tool = |radius_mm: f64| {
+        format!(
+            "{BOX}[[tool]]\nname = \"tip\"\nradius_mm = {radius_mm}\ncoupling = \"rigid\"\ndriver = \"script\"\nkeyframe = [{{ time_s = 0, position_mm = [20, 20, 20] }}]\n"
+        )
+    };
+    assert!(scene(&tool(3.0)).unwrap().warnings.is_empty());
+    assert!(scene(&tool(1.0)).unwrap().warnings[0].contains("slips through"));
+}
+
 /// Tools and probes see the surface refined everywhere, moved with the body.
 #[test]
 fn probes_follow_the_surface() {

@@ -13,26 +13,13 @@ pub(super) fn drift(state: &mut State, dt_s: f64) -> f64 {
 /// `v ← (v e^{−c h/2} + h f/m) e^{−c h/2}`, and the ledger's share of it: what damping takes, `½ (1 − e^{−c h}) m v²` of the velocity before and
 /// of that after the force.
 pub(super) fn kick(model: &Model, state: &mut State, h_s: f64) {
-    let masses = Kicked { mass_kg: model.mass_kg(), inverse_mass_per_kg: model.inverse_mass_per_kg() };
-    kick_nodes(model.spec().settings.mass_damping_per_s, &masses, state, h_s);
-    state.ledger.external_work_j += h_s * holders_power_w(model, &state.force_n, &state.v);
-}
-
-/// What nodes resist a kick with.
-pub(super) struct Kicked<'a> {
-    pub(super) mass_kg: &'a [f64],
-    /// Zero on held axes.
-    pub(super) inverse_mass_per_kg: &'a [DVec3],
-}
-
-/// [`kick`] of nodes that are held where they stand.
-pub(super) fn kick_nodes(damping: f64, masses: &Kicked<'_>, state: &mut State, h_s: f64) {
+    let damping = model.spec().settings.mass_damping_per_s;
     let mut power_w = DVec3::ZERO;
-    let nodes = state.v.iter_mut().zip(&state.force_n).zip(masses.inverse_mass_per_kg).zip(&state.external_n);
+    let nodes = state.v.iter_mut().zip(&state.force_n).zip(model.inverse_mass_per_kg()).zip(&state.external_n);
     if damping > 0.0 {
         let factor = (-0.5 * damping * h_s).exp();
         let mut twice_kinetic_j = [DVec3::ZERO; 2];
-        for ((((v, force), inverse_mass), external), mass) in nodes.zip(masses.mass_kg) {
+        for ((((v, force), inverse_mass), external), mass) in nodes.zip(model.mass_kg()) {
             let held = inverse_mass.cmpeq(DVec3::ZERO);
             let (factor, mass) = (
                 DVec3::select(held, DVec3::ONE, DVec3::splat(factor)),
@@ -57,6 +44,7 @@ pub(super) fn kick_nodes(damping: f64, masses: &Kicked<'_>, state: &mut State, h
     }
     state.ledger.external_work_j += h_s * power_w.element_sum();
     state.ledger.dissipated_j += h_s * state.viscous.work_rate_w();
+    state.ledger.external_work_j += h_s * holders_power_w(model, &state.force_n, &state.v);
 }
 
 /// Power (W) of the holders' reactions, `−f` on prescribed axes, whose velocity a kick leaves alone.

@@ -2,11 +2,11 @@
 use super::{
     forces::{Evaluation, Tick, is_usable},
     hybrid::vertices_of,
-    motion::{Kicked, kick_nodes},
 };
 use crate::{
     contact::{ContactScratch, SubstepTime, SurfaceNow, broad::Skin, deepest_m, nearest_vertex},
     fem::loads::add_load_n,
+    simd::sweeps::LumpedKick,
     spring::{
         Refinement, SpringBody, SpringScratch, SpringState, Wanted,
         skin::{ListedVertices, SpringSkin},
@@ -33,6 +33,8 @@ pub(crate) struct SpringBodyScratch {
     springs: SpringScratch,
     skin: ListedVertices,
     looking: Looking,
+    /// Of awake nodes, on each axis; 0 where they are held, as is the inverse.
+    mass_kg: Vec<DVec3>,
     inverse_mass_per_kg: Vec<DVec3>,
     /// Of which layout these are.
     layout: u64,
@@ -48,6 +50,7 @@ impl SpringBodyScratch {
             springs: SpringScratch::new(body.model()),
             skin: ListedVertices::new(body),
             looking: Looking::new(body, model.spec().tools.len()),
+            mass_kg: Vec::with_capacity(body.model().most_nodes()),
             inverse_mass_per_kg: Vec::with_capacity(body.model().most_nodes()),
             layout: u64::MAX,
             skin_is_tracked: false,
@@ -115,9 +118,12 @@ impl SpringBodyScratch {
     fn weigh(&mut self) {
         if self.layout != self.springs.layout() {
             self.layout = self.springs.layout();
+            self.mass_kg.clear();
             self.inverse_mass_per_kg.clear();
             // Of what is held the mass is infinite.
-            self.inverse_mass_per_kg.extend(self.springs.mass_kg().iter().map(|mass| DVec3::splat(mass.recip())));
+            let masses = self.springs.mass_kg().iter();
+            self.inverse_mass_per_kg.extend(masses.clone().map(|mass| DVec3::splat(mass.recip())));
+            self.mass_kg.extend(masses.map(|mass| DVec3::splat(if mass.is_finite() { *mass } else { 0.0 })));
         }
     }
 
@@ -209,8 +215,20 @@ pub(super) fn evaluate(
     state.force_is_current = true;
 }
 
-/// A half or whole kick of the awake nodes.
+/// A half or whole kick of the awake nodes: `v ← (v e^{−c h/2} + h f/m) e^{−c h/2}`, and the ledger's share of it.
 pub(super) fn kick(model: &Model, state: &mut State, own: &SpringBodyScratch, h_s: f64) {
-    let masses = Kicked { mass_kg: own.springs.mass_kg(), inverse_mass_per_kg: &own.inverse_mass_per_kg };
-    kick_nodes(model.spec().settings.mass_damping_per_s, &masses, state, h_s);
+    let damping = model.spec().settings.mass_damping_per_s;
+    let [external_w, before_sq, between_sq] = LumpedKick {
+        v: &mut state.v,
+        forces_n: &state.force_n,
+        external_n: &state.external_n,
+        mass_kg: &own.mass_kg,
+        inverse_mass_per_kg: &own.inverse_mass_per_kg,
+        factor: (-0.5 * damping * h_s).exp(),
+        h_s,
+    }
+    .give();
+    state.ledger.external_work_j += h_s * external_w;
+    // Half of what damping takes is taken before the force, half behind it.
+    state.ledger.dissipated_j += 0.5 * (before_sq + between_sq) * -(-damping * h_s).exp_m1();
 }

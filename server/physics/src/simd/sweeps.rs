@@ -142,6 +142,62 @@ impl Sweep for Kick<'_> {
     }
 }
 
+/// `v ← (v k + h f/m) k` of nodes that move along all axes or none. Finds `Σ e·(v k + ½ h f/m)` (W), with `e` the `external_n`, and `Σ m v²` before and after the force, but for what damping takes then.
+#[derive(Debug)]
+pub(crate) struct LumpedKick<'a> {
+    pub(crate) v: &'a mut [DVec3],
+    pub(crate) forces_n: &'a [DVec3],
+    pub(crate) external_n: &'a [DVec3],
+    /// On each axis; 0 of nodes that are held, whose velocity is 0.
+    pub(crate) mass_kg: &'a [DVec3],
+    /// 0 of them, too.
+    pub(crate) inverse_mass_per_kg: &'a [DVec3],
+    pub(crate) factor: f64,
+    pub(crate) h_s: f64,
+}
+
+impl LumpedKick<'_> {
+    pub(crate) fn give(self) -> [f64; 3] {
+        sweep(Available::best(), self)
+    }
+}
+
+impl Sweep for LumpedKick<'_> {
+    type Found = [f64; 3];
+
+    #[inline(always)]
+    fn run<V: Vector<Scalar = f64>>(self) -> [f64; 3] {
+        let ((vs, v_rest), (f, f_rest)) = (lanes_mut(self.v), lanes(self.forces_n));
+        let ((e, e_rest), (m, m_rest)) = (lanes(self.external_n), lanes(self.mass_kg));
+        let (w, w_rest) = lanes(self.inverse_mass_per_kg);
+        let mut sums = [[V::of(0.0); LANES]; 3];
+        for (((v, f), e), (m, w)) in vs.iter_mut().zip(f).zip(e).zip(m.iter().zip(w)) {
+            for (part, first) in (0..LANES).step_by(V::WIDTH).enumerate() {
+                let before = V::load(&v[first..]);
+                let change = V::load(&f[first..]) * V::load(&w[first..]) * V::of(self.h_s);
+                let [after, middle] = kicked(before, change, V::of(self.factor));
+                after.store(&mut v[first..]);
+                let mass = V::load(&m[first..]);
+                let undamped = before * V::of(self.factor) + change;
+                sums[0][part] = sums[0][part] + V::load(&e[first..]) * middle;
+                sums[1][part] = sums[1][part] + mass * before * before;
+                sums[2][part] = sums[2][part] + mass * undamped * undamped;
+            }
+        }
+        let mut of_rest = [0.0; 3];
+        for (((v, f), e), (m, w)) in v_rest.iter_mut().zip(f_rest).zip(e_rest).zip(m_rest.iter().zip(w_rest)) {
+            let (before, change) = (*v, *f * *w * self.h_s);
+            let [after, middle] = kicked(before, change, self.factor);
+            *v = after;
+            let undamped = before * self.factor + change;
+            of_rest[0] += *e * middle;
+            of_rest[1] += *m * before * before;
+            of_rest[2] += *m * undamped * undamped;
+        }
+        std::array::from_fn(|sum| total(sums[sum]) + of_rest[sum])
+    }
+}
+
 /// `(v k + c) k`, and `v k + ½ c`.
 #[inline(always)]
 fn kicked<T: Real>(v: T, change: T, factor: T) -> [T; 2] {

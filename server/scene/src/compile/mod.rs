@@ -81,6 +81,7 @@ pub(crate) fn compile(
     let mut warnings = body.warnings.clone();
     warnings.extend(materials.warnings.iter().cloned());
     warnings.extend(tools.warnings);
+    springs::warn_of_small_tools(&body, &tools.specs, &mut warnings);
     if particles.is_some() {
         particles::warn_of_fine_tets(&body, &mut warnings);
     }

@@ -16,6 +16,7 @@ use crate::{
 use glam::DVec3;
 use palpate_physics::{
     Settings, Surface, TetMesh,
+    contact::ToolSpec,
     spring::{
         HomeLaw, Refinement, Refining, SpringBodySpec, SpringSpec,
         calibration::{Calibration, ConstantsTable},
@@ -137,6 +138,23 @@ pub(super) fn put_on(body: &mut Body, table: &SpringsTable) -> Result<(), Fault>
 
 fn refused(error: TriangulationError) -> Fault {
     Fault::value(at(), format!("the body's surface cannot be one of springs: {error}")).of(Stage::Body).cause(error)
+}
+
+/// Says so when a tool would pass between the vertices: contact presses it no harder than the springs behind can bear.
+pub(super) fn warn_of_small_tools(body: &Body, tools: &[ToolSpec], warnings: &mut Vec<String>) {
+    /// Of the mean edge's length.
+    const SMALL: f64 = 0.25;
+    let Some(surface) = &body.springs else { return };
+    let edges = surface.edges().len();
+    let mean_m = (0..edges as u32).map(|edge| surface.length_m(edge)).sum::<f64>() / edges as f64;
+    for tool in tools.iter().filter(|tool| tool.radius_m < SMALL * mean_m) {
+        warnings.push(format!(
+            "the tool \"{}\" (radius {:.3} mm) is small beside the surface's edges ({:.3} mm in the mean): pressed hard, it slips through; take a larger tool or a finer surface",
+            tool.name,
+            tool.radius_m * 1e3,
+            mean_m * 1e3
+        ));
+    }
 }
 
 /// What the table that it asks for is made from.
