@@ -1,14 +1,18 @@
 //! The page: the figures as plots.
-use super::experiment::{Curve, EDGE_M, Figure, HOME_N_PER_M};
+use super::{
+    contact::{Run, Touch},
+    dome::Dome,
+    experiment::{Curve, EDGE_M, Figure, HOME_N_PER_M},
+};
 use std::fmt::Write as _;
 
-const COLOURS: [&str; 3] = ["#0072b2", "#d55e00", "#009e73"];
+const COLOURS: [&str; 4] = ["#0072b2", "#d55e00", "#009e73", "#8a6fb3"];
 const STYLE: &str = "
 :root{color-scheme:light}
 body{font:16px/1.5 system-ui,sans-serif;color:#1b1f24;background:#fff;max-width:72rem;margin:0 auto;padding:1.5rem}
 p{max-width:48rem}svg text{font:12px system-ui,sans-serif;fill:#57606a}.grid{stroke:#e3e7eb}.curve{fill:none;stroke-width:2}
 .figures{display:grid;grid-template-columns:repeat(auto-fill,minmax(22rem,1fr));gap:1.2rem}figure{margin:0}svg{width:100%;height:auto}
-figcaption{font-size:14px;color:#57606a}";
+figcaption{font-size:14px;color:#57606a}table{border-collapse:collapse;font-size:14px}td,th{padding:.15rem .7rem;text-align:right}td:first-child{text-align:left}";
 const WIDTH: f64 = 420.0;
 const HEIGHT: f64 = 280.0;
 const LEFT: f64 = 56.0;
@@ -18,8 +22,8 @@ const BOTTOM: f64 = 40.0;
 /// What is so many times its median somewhere is drawn in decades.
 const LOGARITHMIC: f64 = 20.0;
 
-/// The page of all figures, at each `K_m/K_h`.
-pub(super) fn page(all: &[(f64, Vec<Figure>)]) -> String {
+/// The page of all figures, at each `K_m/K_h`, and of sheets beneath tools.
+pub(super) fn page(all: &[(f64, Vec<Figure>)], domes: &[Dome], contacts: &[(Touch, Vec<Run>)]) -> String {
     let mut out = format!(
         "<!doctype html><html lang=\"en\"><meta charset=\"utf-8\"><meta name=\"viewport\" content=\"width=device-width\">\
          <title>Palpate: haptic subdivision</title><style>{STYLE}</style><body><h1>Haptic subdivision</h1>\
@@ -35,23 +39,73 @@ pub(super) fn page(all: &[(f64, Vec<Figure>)]) -> String {
             let _ = write!(
                 out,
                 "<figure>{}<figcaption>Figure {}. {}{}</figcaption></figure>",
-                svg(figure),
+                svg(&format!("figure {}", figure.number), (figure.quantity, "x/L"), &figure.curves),
                 figure.number,
                 figure.title.replace('\'', "′"),
-                legend(figure)
+                legend(&figure.curves)
             );
         }
         out.push_str("</div>");
     }
+    out.push_str("<h2>Figure 12</h2><p>A hemisphere pressed by an edge's length at a vertex, all others at rest; refined with constants matched there, so that the force is the same.</p><div class=\"figures\">");
+    for dome in domes {
+        let _ = write!(
+            out,
+            "<figure>{}<figcaption>rings refined: {}; {:.4} N</figcaption></figure>",
+            dome.svg(),
+            dome.rings,
+            dome.force_n
+        );
+    }
+    out.push_str("</div>");
+    contact_section(&mut out, contacts);
     out.push_str("</body></html>");
     out
 }
 
-fn legend(figure: &Figure) -> String {
+/// Sheets beneath tools.
+fn contact_section(out: &mut String, contacts: &[(Touch, Vec<Run>)]) {
+    const DRAWN: [&str; 4] = ["fine everywhere", "coarse", "two rings, table", "two rings, area"];
+    out.push_str(
+        "<h2>In the loop, against a sheet that is fine everywhere</h2><p>A sphere presses, rests, is drawn along, and leaves. The fine sheet has the same foundation and mass per area. \
+         Errors are root mean squares over all ticks, over those of the fine sheet's force and displacements.</p><div class=\"figures\">",
+    );
+    for (Touch { name, radius, depth }, runs) in contacts {
+        let drawn = DRAWN.iter().filter_map(|name| runs.iter().find(|run| run.name == *name));
+        let curves: Vec<Curve> = drawn.map(curve).collect();
+        let _ = write!(
+            out,
+            "<figure>{}<figcaption>{name}: radius {radius} L, {depth} L deep{}</figcaption><table><tr><th></th><th>at rest</th><th>force off</th><th>shape off</th><th>µs a tick</th></tr>",
+            svg(name, ("force (N)", "t (s)"), &curves),
+            legend(&curves)
+        );
+        for run in runs {
+            let (force, shape) = (100.0 * run.force_error, 100.0 * run.shape_error);
+            let _ = write!(
+                out,
+                "<tr><td>{}</td><td>{:.3}</td><td>{force:.1} %</td><td>{shape:.1} %</td><td>{:.0}</td></tr>",
+                run.name, run.at_rest, run.tick_us
+            );
+        }
+        out.push_str("</table></figure>");
+    }
+    out.push_str("</div>");
+}
+
+fn curve(run: &Run) -> Curve {
+    let ticks = run.force_n.len() as f64;
+    let points = run.force_n.iter().enumerate().step_by(4);
+    Curve {
+        name: run.name.clone(),
+        points: points.map(|(tick, force)| ((tick as f64 + 1.0) / ticks, force.length())).collect(),
+    }
+}
+
+fn legend(curves: &[Curve]) -> String {
     let entry = |(curve, colour): (&Curve, &str)| {
         format!("<br><span style=\"color:{colour}\">{}</span>", curve.name.replace('\'', "′"))
     };
-    if figure.curves.len() < 2 { String::new() } else { figure.curves.iter().zip(COLOURS).map(entry).collect() }
+    if curves.len() < 2 { String::new() } else { curves.iter().zip(COLOURS).map(entry).collect() }
 }
 
 /// The ordinate: from the least to the largest value, in round steps or in decades.
@@ -93,16 +147,15 @@ fn round_step(high: f64) -> f64 {
     [1.0, 2.0, 5.0, 10.0].into_iter().map(|n| n * decade).find(|step| high / step <= 6.0).unwrap_or(high)
 }
 
-fn svg(figure: &Figure) -> String {
-    let values: Vec<f64> = figure.curves.iter().flat_map(|curve| &curve.points).map(|p| p.1).collect();
+fn svg(label: &str, (ordinate, abscissa): (&str, &str), curves: &[Curve]) -> String {
+    let values: Vec<f64> = curves.iter().flat_map(|curve| &curve.points).map(|p| p.1).collect();
     if values.is_empty() {
         return String::new();
     }
     let y = Ordinate::over(&values);
     let x = |part: f64| LEFT + part * (WIDTH - LEFT - RIGHT);
     let mut out = format!(
-        "<svg viewBox=\"0 0 {WIDTH} {HEIGHT}\" role=\"img\" aria-label=\"figure {}\" xmlns=\"http://www.w3.org/2000/svg\">",
-        figure.number
+        "<svg viewBox=\"0 0 {WIDTH} {HEIGHT}\" role=\"img\" aria-label=\"{label}\" xmlns=\"http://www.w3.org/2000/svg\">"
     );
     for mark in y.marks() {
         let at = y.at(mark);
@@ -125,7 +178,7 @@ fn svg(figure: &Figure) -> String {
             HEIGHT - BOTTOM + 16.0
         );
     }
-    for (number, curve) in figure.curves.iter().enumerate() {
+    for (number, curve) in curves.iter().enumerate() {
         let colour = COLOURS[number % COLOURS.len()];
         let line: Vec<String> =
             curve.points.iter().map(|(part, value)| format!("{:.1},{:.1}", x(*part), y.at(*value))).collect();
@@ -133,13 +186,13 @@ fn svg(figure: &Figure) -> String {
     }
     let _ = write!(
         out,
-        "<text x=\"{:.1}\" y=\"{:.1}\" text-anchor=\"middle\">x/L</text><text x=\"12\" y=\"{:.1}\" text-anchor=\"middle\" \
+        "<text x=\"{:.1}\" y=\"{:.1}\" text-anchor=\"middle\">{abscissa}</text><text x=\"12\" y=\"{:.1}\" text-anchor=\"middle\" \
          transform=\"rotate(-90 12 {:.1})\">{}</text></svg>",
         x(0.5),
         HEIGHT - 6.0,
         0.5 * HEIGHT,
         0.5 * HEIGHT,
-        figure.quantity.replace('\'', "′")
+        ordinate.replace('\'', "′")
     );
     out
 }
