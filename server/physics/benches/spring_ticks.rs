@@ -33,7 +33,7 @@ fn sheet(rings: i32, most_awake: usize) -> ModelSpec {
         seed: None,
         springs: Some(SpringBodySpec {
             springs,
-            refinement: Some(Refinement { rings: 2, fade_s: 0.1, by: Refining::ByTools }),
+            refinement: Some(Refinement { rings: 2, follows_dent: false, fade_s: 0.1, by: Refining::ByTools }),
             table: None,
         }),
         regions: Vec::new(),

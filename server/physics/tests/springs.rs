@@ -60,7 +60,7 @@ fn sheet(rings: i32, refinement: Option<Refinement>) -> ModelSpec {
 }
 
 fn refined(rings: u32, by: Refining) -> Refinement {
-    Refinement { rings, fade_s: 0.1, by }
+    Refinement { rings, follows_dent: false, fade_s: 0.1, by }
 }
 
 fn refined_nodes(rig: &Rig) -> usize {
@@ -98,6 +98,24 @@ fn what_is_touched_is_refined_and_coarse_again_when_left() {
         press(&mut rig, 0.02, 250);
         assert_eq!(refined_nodes(&rig), 0);
     }
+}
+
+/// Rings that follow the dent: few while it is shallow, more as it deepens, fewer again, and none flutters.
+#[test]
+fn deeper_dents_have_more_rings() {
+    let mut spec = sheet(10, Some(Refinement { rings: 4, follows_dent: true, fade_s: 0.1, by: Refining::ByTools }));
+    spec.tools[0].radius_m = 6e-3;
+    let mut rig = Rig::new(spec);
+    let mut counts = Vec::new();
+    for (height_m, ticks) in [(5.8e-3, 300), (4.5e-3, 300), (1e-3, 400), (5.8e-3, 600)] {
+        press(&mut rig, height_m, ticks);
+        press(&mut rig, height_m, 200);
+        let before = refined_nodes(&rig);
+        press(&mut rig, height_m, 50);
+        assert_eq!(refined_nodes(&rig), before);
+        counts.push(before);
+    }
+    assert_eq!(counts, [12, 42, 90, 12]);
 }
 
 /// Pressing, dragging across many regions, and leaving: all energy is accounted for, but for what leapfrog's step leaves, which is of second order in it.
@@ -378,7 +396,7 @@ fn what_springs_cannot_have_is_refused_by_name() {
     assert!(
         refused(&|spec| {
             let mut own = springs(spec);
-            own.refinement = Some(Refinement { rings: 0, fade_s: 0.1, by: Refining::ByTools });
+            own.refinement = Some(Refinement { rings: 0, follows_dent: false, fade_s: 0.1, by: Refining::ByTools });
             spec.springs = Some(own);
         })
         .contains("rings = 0")

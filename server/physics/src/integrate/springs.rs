@@ -9,6 +9,7 @@ use crate::{
     simd::sweeps::LumpedKick,
     spring::{
         Refinement, SpringBody, SpringScratch, SpringState, Wanted,
+        body::rings_for,
         skin::{ListedVertices, SpringSkin},
         state::{Looking, Near},
     },
@@ -63,7 +64,7 @@ impl SpringBodyScratch {
         let Some(springs) = &state.springs else { return };
         self.springs.follow(body.model(), &springs.motion);
         let is_due = state.tick.is_multiple_of(u64::from(LOOK_EVERY_TICKS));
-        let looks = is_due || state.contact.is_near_any();
+        let looks = is_due || (springs.is_any_untouched() && state.contact.is_near_any());
         if looks {
             self.look(model, body, state, if is_due { LOOK_EVERY_TICKS } else { 0 });
         }
@@ -143,7 +144,10 @@ impl SpringBodyScratch {
             let near = nearest.map(|(vertex, to_skin_m)| {
                 let distance_m = |vertex: u32| skin.position_m(vertex).distance(from_m);
                 let vertex = skin.coarse_vertex(vertex, from_m);
+                let touched = springs.touched(index).unwrap_or(vertex);
+                let depth_m = skin.position_m(touched).distance(body.model().rest_m()[touched as usize]);
                 Near {
+                    rings: rings_for(depth_m, spec.radius_m, body.edge_m()),
                     vertex,
                     distance_m: distance_m(vertex),
                     present_m: springs.touched(index).map_or(f64::INFINITY, distance_m),

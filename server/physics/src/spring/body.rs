@@ -22,8 +22,10 @@ use thiserror::Error;
 /// How the surface is refined where it is touched.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Refinement {
-    /// Rings around the vertex that is touched.
+    /// Rings around the vertex that is touched; the most, where they follow the dent.
     pub rings: u32,
+    /// As many rings as the dent needs: those of its touched part, and one for each edge's length of its depth ([`rings_for`]).
+    pub follows_dent: bool,
     /// How long (s) a triangle takes from coarse to refined, and back. Forces step the less the longer it is.
     pub fade_s: f64,
     /// Who says where.
@@ -99,13 +101,17 @@ impl SpringBody {
     /// [`SpringBodyError`].
     pub fn build(spec: SpringBodySpec, tools: usize) -> Result<Self, SpringBodyError> {
         let SpringBodySpec { mut springs, refinement, table } = spec;
-        if let Some(Refinement { rings, fade_s, by: _ }) = refinement {
+        if let Some(Refinement { rings, fade_s, .. }) = refinement {
             let setting =
                 |name, value, ok, rule| if ok { Ok(()) } else { Err(SpringBodyError::Setting { name, value, rule }) };
             setting("rings", f64::from(rings), (1..=MOST_RINGS).contains(&rings), "must be 1 to 16")?;
             setting("fade_s", fade_s, fade_s > 0.0 && fade_s.is_finite(), "must be finite and larger than 0")?;
         } else {
             springs.most_refined = 0;
+        }
+        if refinement.is_some_and(|refinement| refinement.follows_dent) && table.is_some() {
+            let what = "rings that follow the dent, with a table of constants";
+            return Err(SpringBodyError::NotForSprings { what, instead: "a table is for its number of rings" });
         }
         if let Some(table) = &table {
             let rings = refinement.map_or(0, |refinement| refinement.rings);
@@ -209,5 +215,14 @@ fn fingerprint(spec: &SpringSpec, how: (Option<Refinement>, &Option<ConstantsTab
     hash.0
 }
 
+/// How many rings of edges `l` (m) hold the dent that a sphere of radius `R` (m) makes, `d` (m) deep: the radius of the cap that touches, and as far beyond as it is deep.
+/// ```text
+/// (√(d (2 R − d)) + d)/l,   of a sphere in over its middle (R + d)/l
+/// ```
+pub fn rings_for(depth_m: f64, radius_m: f64, edge_m: f64) -> f64 {
+    let touched_m = if depth_m < radius_m { (depth_m * (2.0 * radius_m - depth_m)).sqrt() } else { radius_m };
+    (touched_m + depth_m) / edge_m
+}
+
 /// More rings would be most of any surface.
-const MOST_RINGS: u32 = 16;
+pub(super) const MOST_RINGS: u32 = 16;

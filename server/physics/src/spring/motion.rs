@@ -176,7 +176,7 @@ impl SpringScratch {
         }
         let mut moved_m = if changed { self.moved_by_levels_m(model, motion, x_m, wanted.step) } else { 0.0 };
         // Of what was laid out, whatever is wanted now.
-        let mut elastic_j = -self.running.changing_energy_j(model, &motion.ids, x_m);
+        let mut elastic_j = -self.running.energy_of_levels_j(model, x_m);
         let mut kinetic_j = 0.0;
         if same_ids {
             self.running.add_levels(model, &motion.ids, &motion.levels, &motion.fine);
@@ -195,7 +195,7 @@ impl SpringScratch {
             self.lay_out(model, motion);
             kinetic_j += kinetic(&self.mass_kg, v_m_per_s);
         }
-        elastic_j += self.running.changing_energy_j(model, &motion.ids, x_m);
+        elastic_j += self.running.energy_of_levels_j(model, x_m);
         Some(Changed { elastic_j, kinetic_j, moved_m })
     }
 
@@ -220,7 +220,7 @@ impl SpringScratch {
         self.layout += 1;
     }
 
-    /// Puts vertices that fall asleep home, one after the other; returns by how much (J) the springs of the coarse surface that they are on change (those of levels and homes are told
+    /// Puts vertices that fall asleep home, one after the other; returns by how much (J) the springs of the coarse surface that they are on change (those of levels are told
     /// elsewhere), and how far (m) the farthest went.
     fn put_home(&mut self, model: &SpringModel, motion: &SpringMotion, x_m: &mut [DVec3]) -> (f64, f64) {
         let surface = model.surface();
@@ -237,7 +237,10 @@ impl SpringScratch {
                 };
                 change_j += energy_j(home_m) - energy_j(x_m[place]);
             }
-            farthest_m = farthest_m.max(home_m.distance(x_m[place]));
+            let away_m = home_m.distance(x_m[place]);
+            farthest_m = farthest_m.max(away_m);
+            let spec = model.spec();
+            change_j -= spec.coarse.home_n_per_m * spec.home_law.at(away_m).integral_m2;
             x_m[place] = home_m;
         }
         (change_j, farthest_m)

@@ -26,6 +26,8 @@ pub struct RunningSprings {
     added: Vec<AddedSpring>,
     /// Ties of nodes of type 2.
     ties: Vec<Tie>,
+    /// What levels add to the stiffness (N/m) of home springs, by place.
+    added_homes: Vec<(u32, f64)>,
     /// Stiffness (N/m) of the awake nodes' home springs.
     home_n_per_m: Vec<f64>,
 }
@@ -68,6 +70,7 @@ impl RunningSprings {
             // Of a triangle three inside; of each of its edges the coarse one, two halves and two cracks.
             added: Vec::with_capacity(18 * most_refined),
             ties: Vec::with_capacity(3 * most_refined),
+            added_homes: Vec::with_capacity(6 * most_refined),
             home_n_per_m: Vec::with_capacity(awake),
         }
     }
@@ -106,9 +109,10 @@ impl RunningSprings {
     /// Makes the list of what levels add, for the nodes last laid out. Allocates nothing.
     pub fn add_levels(&mut self, model: &SpringModel, ids: &[u32], levels: &Levels, fine: &Constants) {
         let vertices = vertices_of(model, ids);
-        let Self { added, ties, home_n_per_m, places, awake, .. } = self;
+        let Self { added, ties, added_homes, home_n_per_m, places, awake, .. } = self;
         added.clear();
         ties.clear();
+        added_homes.clear();
         home_n_per_m.clear();
         home_n_per_m.resize(ids.len(), 0.0);
         home_n_per_m[..vertices].fill(model.spec().coarse.home_n_per_m);
@@ -121,6 +125,7 @@ impl RunningSprings {
             Added::Home { node, stiffness_n_per_m } => {
                 if let Some(place) = places.of(node).filter(|place| (*place as usize) < *awake) {
                     home_n_per_m[place as usize] += stiffness_n_per_m;
+                    added_homes.push((place, stiffness_n_per_m));
                 }
             }
             Added::Tie { nodes, stiffness_n_per_m } => {
@@ -154,7 +159,7 @@ impl RunningSprings {
             }
         }
         for tie in &self.ties {
-            let pull_n = tie.off_m(&self.places_m) * -tie.stiffness_n_per_m;
+            let pull_n = tie.off_m(tie.places.map(|place| self.places_m[place as usize])) * -tie.stiffness_n_per_m;
             for (place, pull_n) in tie.places.into_iter().zip([pull_n, pull_n * -0.5, pull_n * -0.5]) {
                 if let Some(force_n) = forces_n.get_mut(place as usize) {
                     *force_n += pull_n;
@@ -168,17 +173,16 @@ impl RunningSprings {
         }
     }
 
-    /// Energy (J) of what levels add and of all home springs: what changes with levels.
-    pub fn changing_energy_j(&mut self, model: &SpringModel, ids: &[u32], x_m: &[DVec3]) -> f64 {
-        self.put(model, x_m);
-        let of_springs = self.added.iter().map(|spring| spring.energy_j(&self.places_m)).sum::<f64>();
-        let of_ties = self.ties.iter().map(|tie| tie.energy_j(&self.places_m)).sum::<f64>();
-        let homes = x_m.iter().zip(ids).zip(&self.home_n_per_m);
-        let of_home = |((x_m, id), stiffness): ((&DVec3, &u32), &f64)| {
-            let u_m = x_m.distance(model.rest_m()[*id as usize]);
-            stiffness * model.spec().home_law.at(u_m).integral_m2
+    /// Energy (J) of what levels add: what changes with them.
+    pub fn energy_of_levels_j(&self, model: &SpringModel, x_m: &[DVec3]) -> f64 {
+        let home_m = |place: u32| model.rest_m()[self.places.nodes()[place as usize] as usize];
+        let at = |place: u32| x_m.get(place as usize).copied().unwrap_or_else(|| home_m(place));
+        let of_springs = self.added.iter().map(|spring| spring.energy_j(spring.places.map(at))).sum::<f64>();
+        let of_ties = self.ties.iter().map(|tie| tie.energy_j(tie.places.map(at))).sum::<f64>();
+        let of_home = |&(place, stiffness): &(u32, f64)| {
+            stiffness * model.spec().home_law.at(at(place).distance(home_m(place))).integral_m2
         };
-        of_springs + of_ties + homes.map(of_home).sum::<f64>()
+        of_springs + of_ties + self.added_homes.iter().map(of_home).sum::<f64>()
     }
 }
 
@@ -190,21 +194,19 @@ impl AddedSpring {
         if length_m > 0.0 { l * (self.stiffness_n_per_m * (1.0 - self.rest_length_m / length_m)) } else { DVec3::ZERO }
     }
 
-    fn energy_j(&self, places_m: &[DVec3]) -> f64 {
-        let [a, b] = self.places.map(|place| places_m[place as usize]);
+    fn energy_j(&self, [a, b]: [DVec3; 2]) -> f64 {
         0.5 * self.stiffness_n_per_m * (a.distance(b) - self.rest_length_m).powi(2)
     }
 }
 
 impl Tie {
     /// `u_e − ½ (u_a + u_b)` (m).
-    fn off_m(&self, places_m: &[DVec3]) -> DVec3 {
-        let [x, a, b] = self.places.map(|place| places_m[place as usize]);
+    fn off_m(&self, [x, a, b]: [DVec3; 3]) -> DVec3 {
         x - (a + b) * 0.5 - self.beside_m
     }
 
-    fn energy_j(&self, places_m: &[DVec3]) -> f64 {
-        0.5 * self.stiffness_n_per_m * self.off_m(places_m).length_squared()
+    fn energy_j(&self, at_m: [DVec3; 3]) -> f64 {
+        0.5 * self.stiffness_n_per_m * self.off_m(at_m).length_squared()
     }
 }
 

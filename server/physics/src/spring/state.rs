@@ -5,7 +5,7 @@
 //! they stay awake until all is at rest.
 use super::{
     around,
-    body::{Refining, SpringBody},
+    body::{MOST_RINGS, Refining, SpringBody},
     motion::SpringMotion,
     region::Constants,
 };
@@ -43,6 +43,8 @@ pub(crate) struct About {
     touched: Option<u32>,
     /// The vertex awake about.
     awake: Option<u32>,
+    /// Rings that its dent needs, at least one.
+    rings: u32,
     /// For how many ticks the tool has been away.
     away_ticks: u32,
 }
@@ -57,6 +59,8 @@ pub(crate) struct Near {
     pub(crate) present_m: f64,
     /// Gap (m) between tool and surface, 0 while they touch.
     pub(crate) gap_m: f64,
+    /// How many rings its dent needs ([`super::body::rings_for`]).
+    pub(crate) rings: f64,
 }
 
 /// Buffers of a look.
@@ -149,7 +153,7 @@ impl SpringState {
             && self.given_j.is_finite()
             && levels.len() + coming.count() <= model.spec().most_refined
             && self.about.len() == tools
-            && self.about.iter().all(known)
+            && self.about.iter().all(|about| known(about) && about.rings <= MOST_RINGS)
             && self.forced.len() <= MOST_FORCED
             && self.forced.iter().all(|vertex| *vertex < vertices)
             && (!body.is_all_awake() || self.awake.iter().copied().eq(0..vertices))
@@ -173,6 +177,11 @@ impl SpringState {
         }
     }
 
+    /// Whether some tool has no vertex yet.
+    pub(crate) fn is_any_untouched(&self) -> bool {
+        self.about.iter().any(|about| about.touched.is_none())
+    }
+
     /// The vertex that a tool is refined about.
     pub(crate) fn touched(&self, tool: usize) -> Option<u32> {
         self.about[tool].touched
@@ -182,17 +191,22 @@ impl SpringState {
     pub(crate) fn note(&mut self, tool: usize, near: Option<Near>, (near_m, radius_m, ticks): (f64, f64, u32)) {
         /// Part of the tool's radius that another vertex has to be nearer.
         const NEARER: f64 = 0.1;
+        /// Part of a ring by which a dent must have shrunk before it has one less.
+        const SHRUNK: f64 = 0.25;
         let about = &mut self.about[tool];
         match (about.touched, near) {
             (touched, Some(near)) if near.gap_m < near_m => {
                 let follows = touched.is_none() || near.distance_m < near.present_m - NEARER * radius_m;
                 about.touched = if follows { Some(near.vertex) } else { touched };
                 about.away_ticks = 0;
+                let wanted = near.rings.max(1.0).ceil().min(f64::from(MOST_RINGS)) as u32;
+                let shrunk = near.rings + SHRUNK < f64::from(about.rings) - 1.0;
+                about.rings = if wanted > about.rings || shrunk { wanted } else { about.rings };
             }
             (Some(_), near) if near.is_none_or(|near| near.gap_m > 2.0 * near_m) => {
                 about.away_ticks += ticks;
                 if about.away_ticks >= AWAY_TICKS {
-                    about.touched = None;
+                    (about.touched, about.rings) = (None, 0);
                 }
             }
             (Some(_), _) => about.away_ticks = 0,
@@ -219,7 +233,9 @@ impl SpringState {
         let most = body.model().spec().most_refined;
         centres.clear();
         centres.extend(self.about.iter().filter_map(|about| about.touched));
-        around::rings_into(body.model().surface(), centres, (refinement.rings, most), (triangles, corners));
+        let of_dents = self.about.iter().map(|about| about.rings).max().unwrap_or_default();
+        let rings = if refinement.follows_dent { of_dents.clamp(1, refinement.rings) } else { refinement.rings };
+        around::rings_into(body.model().surface(), centres, (rings, most), (triangles, corners));
         let levels = self.motion.levels.triangles();
         let is_there = |triangle: &u32| levels.binary_search_by_key(triangle, |level| level.0).is_ok();
         let coming = triangles.iter().filter(|triangle| !is_there(triangle)).count();

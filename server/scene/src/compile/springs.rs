@@ -224,8 +224,17 @@ pub(super) fn spec(
     check(&at.key("rings"), refine.rings, (1..=16).contains(&refine.rings), "must be 1 to 16")?;
     let fade_ok = refine.fade_s > 0.0 && refine.fade_s.is_finite();
     check(&at.key("fade_s"), refine.fade_s, fade_ok, "must be finite and larger than 0")?;
+    if refine.follows_dent && constants_table.is_some() {
+        let message = "a table of constants is for one number of rings";
+        return Err(Fault::value(at.key("follows_dent"), message).help("leave it out, or give other constants"));
+    }
     springs.most_refined = most_refined(refine, document.tool.len())?;
-    let refinement = Refinement { rings: refine.rings, fade_s: refine.fade_s, by: Refining::ByTools };
+    let refinement = Refinement {
+        rings: refine.rings,
+        follows_dent: refine.follows_dent,
+        fade_s: refine.fade_s,
+        by: Refining::ByTools,
+    };
     Ok(Some(SpringBodySpec { springs, refinement: Some(refinement), table: constants_table }))
 }
 

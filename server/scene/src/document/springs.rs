@@ -51,6 +51,9 @@ pub(crate) struct HomeLayerTable {
 pub(crate) struct RefineTable {
     /// Rings of triangles around the vertex that is touched, 1 to 16.
     pub(crate) rings: u32,
+    /// As many rings as the dent needs, `rings` at most: those under the touched part of the tool, and one for each edge's length of its depth. Not with `table_file`.
+    #[serde(default)]
+    pub(crate) follows_dent: bool,
     /// How long (s) a triangle takes from coarse to refined beneath a tool that stands still.
     #[serde(default = "default_fade_s")]
     pub(crate) fade_s: f64,

@@ -25,6 +25,8 @@ const COARSE: Constants = Constants { mesh_n_per_m: 60.0, home_n_per_m: 12.0 };
 const AREA_DENSITY_KG_PER_M2: f64 = 15.0;
 const DAMPING_PER_S: f64 = 60.0;
 const TICKS: u32 = 1000;
+/// Where rings follow the dent.
+const MOST_RINGS: u32 = 6;
 /// Ticks between two looks at the shape.
 const SHAPE_EVERY: u32 = 10;
 /// The last tick in which the tool rests.
@@ -112,6 +114,7 @@ pub fn compare(touch: Touch, tell: &mut dyn FnMut(f64)) -> Result<Vec<Run>, Cont
             sheets.push(sheet(&name, coarse.clone(), (COARSE, fine), (touch, rings), table)?);
         }
     }
+    sheets.push(sheet("as many as needed, area", coarse, (COARSE, area), (touch, MOST_RINGS), None)?);
     for tick in 0..TICKS {
         for sheet in &mut sheets {
             sheet.tick(tick, touch, vertices);
@@ -138,10 +141,11 @@ fn sheet(
         mass_kg: surface.vertex_areas_m2().iter().map(|area_m2| area_m2 * AREA_DENSITY_KG_PER_M2).collect(),
         held: Vec::new(),
         most_awake: vertices,
-        most_refined: 400,
+        most_refined: 1000,
         surface,
     };
-    let refinement = (rings > 0).then_some(Refinement { rings, fade_s: 0.1, by: Refining::ByTools });
+    let refinement =
+        (rings > 0).then_some(Refinement { rings, follows_dent: rings > 2, fade_s: 0.1, by: Refining::ByTools });
     let radius_m = touch.radius * EDGE_M;
     let model = Model::build(ModelSpec {
         mesh: TetMesh::of_points(Vec::new()),

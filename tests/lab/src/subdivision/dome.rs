@@ -112,7 +112,7 @@ impl Dome {
         let mut out = format!(
             "<svg viewBox=\"0 0 {SIZE} {:.0}\" role=\"img\" aria-label=\"a pressed hemisphere, rings refined: {}\" xmlns=\"http://www.w3.org/2000/svg\" \
              stroke=\"#1b1f24\" stroke-width=\"0.7\" stroke-linejoin=\"round\">",
-            0.9 * SIZE,
+            0.95 * SIZE,
             self.rings
         );
         for triangle in &order {

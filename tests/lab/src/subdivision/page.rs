@@ -11,8 +11,8 @@ const STYLE: &str = "
 :root{color-scheme:light}
 body{font:16px/1.5 system-ui,sans-serif;color:#1b1f24;background:#fff;max-width:72rem;margin:0 auto;padding:1.5rem}
 p{max-width:48rem}svg text{font:12px system-ui,sans-serif;fill:#57606a}.grid{stroke:#e3e7eb}.curve{fill:none;stroke-width:2}
-.figures{display:grid;grid-template-columns:repeat(auto-fill,minmax(22rem,1fr));gap:1.2rem}figure{margin:0}svg{width:100%;height:auto}
-figcaption{font-size:14px;color:#57606a}table{border-collapse:collapse;font-size:14px}td,th{padding:.15rem .7rem;text-align:right}td:first-child{text-align:left}";
+.figures{display:grid;grid-template-columns:repeat(auto-fill,minmax(25rem,1fr));gap:1.2rem}figure{margin:0}svg{width:100%;height:auto}
+figcaption{font-size:14px;color:#57606a}table{border-collapse:collapse;font-size:14px}td,th{padding:.15rem .5rem;text-align:right;white-space:nowrap}td:first-child{text-align:left}";
 const WIDTH: f64 = 420.0;
 const HEIGHT: f64 = 280.0;
 const LEFT: f64 = 56.0;
