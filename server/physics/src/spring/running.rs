@@ -78,11 +78,18 @@ impl RunningSprings {
     /// Lays out the springs of the coarse surface for awake nodes (ascending). Allocates nothing.
     pub fn lay_out(&mut self, model: &SpringModel, ids: &[u32]) {
         let (surface, vertices) = (model.surface(), vertices_of(model, ids));
+        // Vertices come first: while they are the same, and no sleeping neighbours come behind other nodes, so are their rows.
+        let has_rows = self.rows.nodes() == vertices
+            && self.places.nodes().len() == self.awake
+            && self.places.nodes().get(..vertices) == Some(&ids[..vertices]);
         self.places.clear();
         for &id in ids {
             self.places.push(id);
         }
         self.awake = ids.len();
+        if has_rows {
+            return;
+        }
         for &vertex in &ids[..vertices] {
             surface.neighbours(vertex).for_each(|neighbour| self.places.push(neighbour));
         }

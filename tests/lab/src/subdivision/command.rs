@@ -96,10 +96,10 @@ fn print_contacts(contacts: &[(Touch, Vec<Run>)]) {
     println!("\nsheets beneath a sphere, against one that is fine everywhere:");
     for (Touch { name, radius, depth }, runs) in contacts {
         println!("  {name}: radius {radius} L, {depth} L deep");
-        println!("    {:<22} {:>12} {:>12} {:>12} {:>10}", "", "at rest", "force off", "shape off", "us a tick");
+        println!("    {:<23} {:>12} {:>12} {:>12} {:>10}", "", "at rest", "force off", "shape off", "us a tick");
         for run in runs {
             println!(
-                "    {:<22} {:>12.3} {:>10.1} % {:>10.1} % {:>10.1}",
+                "    {:<23} {:>12.3} {:>10.1} % {:>10.1} % {:>10.1}",
                 run.name,
                 run.at_rest,
                 100.0 * run.force_error,
