@@ -33,6 +33,11 @@ fn time_step() {
 }
 
 #[test]
+fn springs() {
+    passes("springs");
+}
+
+#[test]
 fn activation() {
     passes("activation");
 }

@@ -13,8 +13,9 @@ use std::{
 #[command(after_help = "\
 The scene has [body.springs] and, in [body.springs.refine], `rings` and `table_file`: the table is written there, beside the scene.
 
-What is matched is the force of one vertex that is displaced: the table is for tools that touch few vertices. A tool that touches many
-feels it too stiff; constants = \"area\" is for those. Where the vertices tried differ much (`spread`), no table suits all of the surface.")]
+What is matched is the force of one vertex that is displaced, so that a tool which touches little else feels what it felt on the coarse \
+surface; one that touches many feels them too stiff. To come near to a surface that is fine everywhere, write constants = \"area\" instead. \
+Where the vertices tried differ much (`spread`), no table suits all of the surface.")]
 pub struct CalibrateArgs {
     /// Scene file
     pub scene: PathBuf,
@@ -34,6 +35,13 @@ pub struct CalibrateArgs {
 /// # Errors
 /// A scene that does not load or asks for no table, constants that cannot be found, or a file that cannot be written.
 pub fn run(args: &CalibrateArgs) -> miette::Result<ExitCode> {
+    if !args.scene.exists() && palpate_scene::builtin(&args.scene.display().to_string()).is_some() {
+        return Err(miette::miette!(
+            help = "copy its file from deploy/scenes, and give the copy",
+            "\"{}\" is built in: there is no folder for its table",
+            args.scene.display()
+        ));
+    }
     let ToCalibrate { surface, coarse, rings, table } =
         palpate_scene::to_calibrate(&args.scene, &Limits::local()).map_err(Report::new)?;
     if table.exists() && !args.force {

@@ -22,7 +22,7 @@ pub(super) struct Summary {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) solve: Option<SolveNumbers>,
     pub(super) energies_j: EnergyNumbers,
-    /// Smallest deformed over rest volume of a tet; below 0: inverted.
+    /// Smallest deformed over rest volume of a tet; below 0: inverted. 1 of springs.
     pub(super) min_volume_ratio: f64,
     /// Newest value of every probe: unit, and value by column.
     pub(super) probes: BTreeMap<String, ProbeNumbers>,
@@ -256,7 +256,11 @@ impl Summary {
         for (name, probe) in &self.probes {
             print_probe(name, probe);
         }
-        println!("  smallest volume ratio {:.4}, state {}", self.min_volume_ratio, self.state_hash);
+        if self.body.tets > 0 {
+            println!("  smallest volume ratio {:.4}, state {}", self.min_volume_ratio, self.state_hash);
+        } else {
+            println!("  state {}", self.state_hash);
+        }
         if let Some(balance) = self.energies_j.balance {
             println!("  energy balance {balance:.2e} J");
         }

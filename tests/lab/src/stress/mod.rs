@@ -18,6 +18,7 @@ mod recovery;
 mod rig;
 mod slivers;
 mod soak;
+mod springs;
 mod stiffness_ratio;
 mod table;
 mod time_step;
@@ -76,7 +77,7 @@ pub struct Row {
 }
 
 /// Every row, in the order of the table.
-pub const ROWS: [Row; 10] = [
+pub const ROWS: [Row; 11] = [
     Row { name: "time-step", criterion: time_step::CRITERION, run: time_step::run },
     Row { name: "stiffness-ratio", criterion: stiffness_ratio::CRITERION, run: stiffness_ratio::run },
     Row { name: "incompressible", criterion: incompressible::CRITERION, run: incompressible::run },
@@ -87,6 +88,7 @@ pub const ROWS: [Row; 10] = [
     Row { name: "slivers", criterion: slivers::CRITERION, run: slivers::run },
     Row { name: "random-scenes", criterion: random_scenes::CRITERION, run: random_scenes::run },
     Row { name: "activation", criterion: activation::CRITERION, run: activation::run },
+    Row { name: "springs", criterion: springs::CRITERION, run: springs::run },
 ];
 
 /// `palpate-lab stress`.
