@@ -23,7 +23,7 @@ static ALLOCATOR: AllocDisabler = AllocDisabler;
 
 const EDGE_M: f64 = 4e-3;
 const COARSE: Constants = Constants { mesh_n_per_m: 60.0, home_n_per_m: 12.0 };
-/// What a sphere of 3 mm feels alike where it is refined.
+/// With which a sphere of 3 mm feels much the same where it is refined: a fifth stiffer at most.
 const FINE: Constants = Constants { mesh_n_per_m: 36.0, home_n_per_m: 6.2 };
 
 /// A flat sheet whose border is held, and a sphere of 3 mm above its middle.
@@ -146,7 +146,7 @@ fn the_ledger_closes_while_a_tool_is_dragged_across() {
     assert!(half < 1e-3 && half < 0.4 * long, "{long} {half}");
 }
 
-/// Refined and coarse again beneath a tool that stands still: no tick changes its force by 1 %, nor does all of it by much more.
+/// Refined and coarse again beneath a tool that stands still: no tick changes its force by 1 %, and coarse again the force is what it was.
 #[test]
 fn the_force_does_not_step_when_the_surface_is_refined() {
     for centre in [0, 1, 7] {
@@ -214,10 +214,17 @@ fn tour(tick: u32) -> DVec3 {
     DVec3::new(0.01 * phase.sin(), 0.008 * (0.7 * phase).cos(), 2.5e-3 + 1.5e-3 * (1.7 * phase).sin())
 }
 
-/// The broad phase and snapshots change no bit.
+/// Down to the surface, along it, and away again, at other ticks each time.
+fn taps(tick: u32) -> DVec3 {
+    let (round, phase) = (tick / 331, f64::from(tick % 331) / 331.0);
+    let lift_m = 0.02 * (2.0 * (phase - 0.5)).abs().powi(2);
+    DVec3::new(0.004 * f64::from(round) - 0.004, 0.003 * phase, 2.0e-3 + lift_m)
+}
+
+/// The broad phase and snapshots change no bit, wherever a tool comes from.
 #[test]
 fn looking_at_all_triangles_or_going_on_from_a_snapshot_gives_the_same_bits() {
-    for most_awake in [usize::MAX, 60] {
+    for (most_awake, path) in [(usize::MAX, tour as fn(u32) -> DVec3), (60, tour), (usize::MAX, taps), (60, taps)] {
         let spec = || {
             let mut spec = sheet(10, Some(refined(2, Refining::ByTools)));
             let springs = &mut spec.springs.as_mut().unwrap().springs;
@@ -230,19 +237,22 @@ fn looking_at_all_triangles_or_going_on_from_a_snapshot_gives_the_same_bits() {
         let (mut rig, mut slow) = (Rig::new(spec()), Rig::new(exhaustive));
         let mut restored: Option<Rig> = None;
         for tick in 0..900 {
-            if tick == 437 {
+            if tick == 437 || tick == 683 {
                 let bytes = snapshot::save(&rig.model, &rig.state);
                 let mut other = Rig::new(spec());
                 other.state = snapshot::restore(&other.model, &bytes).unwrap();
                 restored = Some(other);
             }
             for rig in [Some(&mut rig), Some(&mut slow), restored.as_mut()].into_iter().flatten() {
-                rig.tick_at(tour(tick));
+                rig.tick_at(path(tick));
             }
             assert_eq!(snapshot::state_hash(&rig.state), snapshot::state_hash(&slow.state), "tick {tick}");
+            if let Some(restored) = &restored {
+                assert_eq!(restored.state.x, rig.state.x, "tick {tick}");
+            }
         }
         assert!(rig.state.contact == slow.state.contact || rig.state.tools == slow.state.tools);
-        assert_eq!(rig.state.x, restored.unwrap().state.x);
+        assert!(restored.is_some());
     }
 }
 

@@ -144,11 +144,6 @@ impl ContactState {
         self.tools.iter().flat_map(|tool| tool.candidates.triangles().iter().copied())
     }
 
-    /// Whether a triangle is listed for any tool.
-    pub(crate) fn is_near_any(&self) -> bool {
-        self.tools.iter().any(|tool| !tool.candidates.triangles().is_empty())
-    }
-
     /// The boxes as they were fitted, and the travel (m); of use while nothing but what is told to [`Self::travelled`] moved the surface.
     pub(crate) fn boxes(&self) -> (&[ClusterBox], f64) {
         (&self.boxes, self.travel_m)

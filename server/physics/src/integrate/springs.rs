@@ -4,7 +4,7 @@ use super::{
     hybrid::vertices_of,
 };
 use crate::{
-    contact::{ContactScratch, SubstepTime, SurfaceNow, broad::Skin, deepest_m, nearest_vertex},
+    contact::{ContactScratch, SubstepTime, SurfaceNow, ToolState, broad::Skin, deepest_m, nearest_vertex},
     fem::loads::add_load_n,
     simd::sweeps::LumpedKick,
     spring::{
@@ -19,7 +19,7 @@ use glam::DVec3;
 
 /// Ticks between two looks at where the tools are.
 const LOOK_EVERY_TICKS: u32 = 8;
-/// Gap over the tool's radius from which the surface is refined.
+/// Gap over the tool's radius from which the surface is refined, besides half an edge and what the tool goes until the next look.
 const GAP: f64 = 0.25;
 /// Way home, and way in a tick, over the coarse edges' length, below which a node is at rest.
 const QUIET: f64 = 1e-6;
@@ -64,7 +64,9 @@ impl SpringBodyScratch {
         let Some(springs) = &state.springs else { return };
         self.springs.follow(body.model(), &springs.motion);
         let is_due = state.tick.is_multiple_of(u64::from(LOOK_EVERY_TICKS));
-        let looks = is_due || (springs.is_any_untouched() && state.contact.is_near_any());
+        // Not by what contact lists, which depends on when it was listed.
+        let touches = |(index, tool): (usize, &ToolState)| tool.contacts > 0 && springs.touched(index).is_none();
+        let looks = is_due || state.tools.iter().enumerate().any(touches);
         if looks {
             self.look(model, body, state, if is_due { LOOK_EVERY_TICKS } else { 0 });
         }
@@ -132,11 +134,14 @@ impl SpringBodyScratch {
     fn look(&mut self, model: &Model, body: &SpringBody, state: &mut State, ticks: u32) {
         let State { x, tools, contact, force_is_current, springs: Some(springs), .. } = state else { return };
         let fitted = force_is_current.then(|| contact.boxes());
+        let tick_period_s = model.spec().settings.tick_period_s;
         for (index, (tool, spec)) in tools.iter().zip(&model.spec().tools).enumerate() {
             if ticks == 0 && springs.touched(index).is_some() {
                 continue;
             }
-            let near_m = GAP * spec.radius_m + 0.5 * body.edge_m();
+            // What it goes until the next look.
+            let ahead_m = f64::from(LOOK_EVERY_TICKS) * tick_period_s * tool.velocity_m_per_s.length();
+            let near_m = GAP * spec.radius_m + 0.5 * body.edge_m() + ahead_m;
             let deepest_m = deepest_m(tool.centre_m, spec.radius_m, tool.contact_force_n);
             let from_m = deepest_m.unwrap_or(tool.centre_m);
             let mut skin = SpringSkin::new(body, (&springs.motion, &self.springs), x);

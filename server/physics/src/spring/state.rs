@@ -16,6 +16,8 @@ use serde::{Deserialize, Serialize};
 const AWAY_TICKS: u32 = 100;
 /// Vertices kept awake for injected forces, besides those of tools.
 pub(super) const MOST_FORCED: usize = 8;
+/// Relative change of constants that is none.
+const NO_CHANGE: f64 = 1e-6;
 /// Part of the reach of what is awake that a tool goes before it is awake about another vertex.
 const FOLLOW: f64 = 0.25;
 
@@ -170,16 +172,15 @@ impl SpringState {
         let touched = self.about.iter().filter_map(|about| about.touched);
         let Some(farthest_m) = touched.map(away_m).reduce(f64::max) else { return self.motion.fine };
         let (now, then) = (self.motion.fine, body.fine_at(farthest_m));
+        // So near that nothing need be laid out anew.
+        if (then.home_n_per_m / now.home_n_per_m - 1.0).abs() < NO_CHANGE {
+            return now;
+        }
         let towards = |now: f64, then: f64| now + (then - now) * part.min(1.0);
         Constants {
             mesh_n_per_m: towards(now.mesh_n_per_m, then.mesh_n_per_m),
             home_n_per_m: towards(now.home_n_per_m, then.home_n_per_m),
         }
-    }
-
-    /// Whether some tool has no vertex yet.
-    pub(crate) fn is_any_untouched(&self) -> bool {
-        self.about.iter().any(|about| about.touched.is_none())
     }
 
     /// The vertex that a tool is refined about.
