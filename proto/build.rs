@@ -15,7 +15,8 @@ fn main() -> Result<(), Box<dyn Error>> {
     tonic_prost_build::configure()
         .bytes(".palpate.v1.KeyframeChunk")
         .bytes(".palpate.v1.SurfaceUpdate")
-        .bytes(".palpate.v1.ActiveParticles")
+        .bytes(".palpate.v1.Places")
+        .bytes(".palpate.v1.RefinedSurface")
         .bytes(".palpate.v1.SnapshotResponse")
         .bytes(".palpate.v1.RestoreRequest")
         .compile_fds(compiler.file_descriptor_set())?;

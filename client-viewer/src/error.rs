@@ -91,6 +91,13 @@ pub enum ViewError {
     #[error("the body of \"{0}\" has no particles")]
     #[diagnostic(help("particles are written of hybrid bodies only: those whose scene has [body.particles]"))]
     NoParticles(String),
+    /// A refined surface is wanted where the daemon has none to give.
+    #[error("the surface of \"{0}\" is not refined near tools")]
+    #[diagnostic(help(
+        "leave --refined out: a mass-spring surface ([body.springs]) is always sent refined, and a surface with an edge of more than \
+         two triangles cannot be (the daemon's log names it)"
+    ))]
+    NotRefined(String),
     /// No scene to load.
     #[error("no scene \"{scene}\": {known}")]
     NoScene {

@@ -9,6 +9,8 @@ pub mod export;
 pub mod inject;
 pub mod moment;
 pub mod picture;
+pub mod places;
+pub mod refined;
 pub mod status;
 pub mod surface;
 pub mod watch;

@@ -2,6 +2,7 @@
 use crate::{
     ViewError,
     connect::Server,
+    refined,
     surface::{Surface, Watcher, magnitude},
 };
 use clap::Args;
@@ -25,14 +26,15 @@ fn parse_positive(text: &str) -> Result<f64, String> {
 }
 
 impl Moment {
-    /// The surface at that moment, its last update with active particles if they are asked for.
+    /// The surface at that moment, with the layers asked for (rate and detail are the daemon's).
     ///
     /// # Errors
     /// An unreachable daemon, a broken stream, or [`ViewError::NotPressed`].
-    pub async fn surface(&self, server: &Server, active_particles: bool) -> Result<Surface, ViewError> {
-        let request = WatchRequest { active_particles, ..Default::default() };
+    pub async fn surface(&self, server: &Server, request: WatchRequest) -> Result<Surface, ViewError> {
+        let refined = request.refined_surface;
         let mut watcher = Watcher::ask(server.connect().await?, request).await?;
-        self.wait(&mut watcher).await
+        let surface = self.wait(&mut watcher).await?;
+        if refined { refined::merged(surface) } else { Ok(surface) }
     }
 
     async fn wait(&self, watcher: &mut Watcher) -> Result<Surface, ViewError> {

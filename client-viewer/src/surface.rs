@@ -163,7 +163,7 @@ pub fn magnitude(v: Option<&palpate_proto::v1::Vec3>) -> f64 {
     v.map_or(0.0, |v| (v.x * v.x + v.y * v.y + v.z * v.z).sqrt())
 }
 
-fn values<const N: usize, T>(bytes: &[u8], of: fn([u8; N]) -> T) -> Result<Vec<T>, ViewError> {
+pub(crate) fn values<const N: usize, T>(bytes: &[u8], of: fn([u8; N]) -> T) -> Result<Vec<T>, ViewError> {
     let (whole, rest) = bytes.as_chunks::<N>();
     if rest.is_empty() {
         Ok(whole.iter().map(|&b| of(b)).collect())
@@ -172,7 +172,7 @@ fn values<const N: usize, T>(bytes: &[u8], of: fn([u8; N]) -> T) -> Result<Vec<T
     }
 }
 
-fn broken(what: String) -> ViewError {
+pub(crate) fn broken(what: String) -> ViewError {
     ViewError::Stream(what)
 }
 

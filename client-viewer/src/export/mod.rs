@@ -7,6 +7,7 @@ mod vtu;
 use crate::{ViewError, cli, connect::Server, moment::Moment, surface::Surface};
 use clap::Args;
 use glam::DVec3;
+use palpate_proto::v1::WatchRequest;
 use std::path::{Path, PathBuf};
 
 /// Arguments of `export`.
@@ -20,6 +21,9 @@ pub struct ExportArguments {
     /// Write the active particles of a hybrid body as points, in place of the surface (.vtu, .ply)
     #[arg(long)]
     particles: bool,
+    /// Refine the surface near tools: smooth there, whatever the size of its triangles
+    #[arg(long, conflicts_with = "particles")]
+    refined: bool,
     #[command(flatten)]
     moment: Moment,
 }
@@ -33,7 +37,8 @@ pub async fn run(server: &Server, arguments: &ExportArguments) -> Result<(), Vie
         return run_particles(server, arguments).await;
     }
     let write = writer_for(&arguments.file)?;
-    let surface = arguments.moment.surface(server, false).await?;
+    let request = WatchRequest { refined_surface: arguments.refined, ..Default::default() };
+    let surface = arguments.moment.surface(server, request).await?;
     cli::write_new(&arguments.file, write(&surface).as_bytes(), arguments.force)?;
     cli::say(&format!(
         "{}: {} vertices, {} triangles at tick {}",
@@ -46,7 +51,8 @@ pub async fn run(server: &Server, arguments: &ExportArguments) -> Result<(), Vie
 
 async fn run_particles(server: &Server, arguments: &ExportArguments) -> Result<(), ViewError> {
     let write = particle_writer_for(&arguments.file)?;
-    let surface = arguments.moment.surface(server, true).await?;
+    let request = WatchRequest { active_particles: true, ..Default::default() };
+    let surface = arguments.moment.surface(server, request).await?;
     if surface.header.particle_spacing_m == 0.0 {
         return Err(ViewError::NoParticles(surface.header.scene_name));
     }
@@ -121,7 +127,7 @@ mod tests {
         let mut surface = surface();
         let positions_u16le = [0_u16, 1, 2, 4, 0, 0].iter().flat_map(|n| n.to_le_bytes()).collect::<Vec<u8>>();
         let corner_m = Some(palpate_proto::v1::Vec3 { x: -1.0, y: 0.0, z: 0.5 });
-        let particles = |bytes: &[u8]| palpate_proto::v1::ActiveParticles {
+        let particles = |bytes: &[u8]| palpate_proto::v1::Places {
             corner_m,
             quantum_m: 0.25,
             positions_u16le: bytes.to_vec().into(),

@@ -1,7 +1,6 @@
 //! Active particles as points, in the formats that can say so.
-use crate::{ViewError, surface::Surface};
+use crate::{ViewError, places, surface::Surface};
 use glam::DVec3;
-use palpate_proto::v1::ActiveParticles;
 use std::fmt::Write as _;
 
 /// VTK's number for a point.
@@ -12,16 +11,7 @@ const VTK_VERTEX: u8 = 1;
 /// # Errors
 /// An array cut short.
 pub(super) fn positions_m(surface: &Surface) -> Result<Vec<DVec3>, ViewError> {
-    let Some(ActiveParticles { corner_m, quantum_m, positions_u16le }) = &surface.last.active_particles else {
-        return Ok(Vec::new());
-    };
-    let (particles, rest) = positions_u16le.as_chunks::<6>();
-    if !rest.is_empty() {
-        return Err(ViewError::Stream("has an array of particles cut short".into()));
-    }
-    let corner = corner_m.map_or(DVec3::ZERO, |c| DVec3::new(c.x, c.y, c.z));
-    let place = |b: &[u8; 6]| DVec3::from([0, 2, 4].map(|at| f64::from(u16::from_le_bytes([b[at], b[at + 1]]))));
-    Ok(particles.iter().map(|b| corner + f64::from(*quantum_m) * place(b)).collect())
+    surface.last.active_particles.as_ref().map_or(Ok(Vec::new()), places::positions_m)
 }
 
 /// Stanford PLY (ASCII).

@@ -10,6 +10,7 @@ use camera::Camera;
 use clap::Args;
 use colour::Rgb;
 use glam::Vec3;
+use palpate_proto::v1::WatchRequest;
 use raster::{Canvas, Vertex};
 use std::path::PathBuf;
 
@@ -41,6 +42,9 @@ pub struct SnapshotArguments {
     /// Replace the file if it exists
     #[arg(long)]
     force: bool,
+    /// Draw the surface refined near tools: smooth there, whatever the size of its triangles
+    #[arg(long)]
+    refined: bool,
     #[command(flatten)]
     moment: Moment,
 }
@@ -80,7 +84,8 @@ pub async fn run(server: &Server, arguments: &SnapshotArguments) -> Result<(), V
     if !arguments.file.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("png")) {
         return Err(ViewError::Ending { path: arguments.file.clone(), known: ".png" });
     }
-    let surface = arguments.moment.surface(server, false).await?;
+    let request = WatchRequest { refined_surface: arguments.refined, ..Default::default() };
+    let surface = arguments.moment.surface(server, request).await?;
     let scale = Scale::of(&surface, arguments.full_scale_mm.map(|mm| mm * 1e-3));
     let canvas = draw(&surface, arguments.size, arguments.from, scale);
     cli::write_new(&arguments.file, &encode(&canvas)?, arguments.force)?;

@@ -4,6 +4,7 @@ import { watchForever } from "./connection";
 import { delayText } from "./delay";
 import { positionsOf } from "./particles";
 import { ForcePlot } from "./plot";
+import { patchOf } from "./refined";
 import { Stage } from "./stage";
 import { KeyframeAssembler, type Surface } from "./surface";
 import { Trace } from "./trace";
@@ -32,9 +33,10 @@ let movedAt = 0;
 const arrivals: number[] = [];
 
 const particlesBox = element<HTMLInputElement>("particles");
+const refinedBox = element<HTMLInputElement>("refined");
 
 const askAnew = watchForever({
-  request: () => ({ maxRateHz: 60, activeParticles: particlesBox.checked }),
+  request: () => ({ maxRateHz: 60, activeParticles: particlesBox.checked, refinedSurface: refinedBox.checked }),
   onEvent: (event) => {
     if (event.message.case === "keyframe") {
       const complete = assembler.push(event.message.value);
@@ -151,6 +153,15 @@ function showParticles({ activeParticles }: SurfaceUpdate): void {
   write("particle-count", `: ${positions.length / 3}`);
 }
 
+/** What the newest update refined; says when it was asked for and there is nothing to refine. */
+function showRefined({ refinedSurface }: SurfaceUpdate): void {
+  const on = refinedBox.checked;
+  const asked = on && surface !== undefined && refinedSurface !== undefined;
+  const patch = asked ? patchOf(refinedSurface, surface!.header.vertexCount, surface!.header.triangleCount) : undefined;
+  stage?.setPatch(patch);
+  write("refined-count", patch ? `: ${patch.triangles.length / 3} faces` : on ? ": –" : "");
+}
+
 let drawn: SurfaceUpdate | undefined;
 function frame(): void {
   if (newest && newest !== drawn) {
@@ -159,6 +170,7 @@ function frame(): void {
     const forces = newest.tools.map((tool) => magnitude(tool.contactForceN));
     const rescaled = arrow.update(Math.max(0, ...forces), now);
     if (legend.update(newest.maxDisplacementM, now) || rescaled) drawLegend();
+    showRefined(newest);
     stage?.refresh(legend.top);
     stage?.moveTools(newest.tools, arrow.top);
     showParticles(newest);
@@ -173,6 +185,10 @@ element<HTMLInputElement>("wireframe").addEventListener("change", (e) => stage?.
 element<HTMLInputElement>("ghost").addEventListener("change", (e) => stage?.setGhost((e.target as HTMLInputElement).checked));
 particlesBox.addEventListener("change", () => {
   layOutParticles();
+  askAnew();
+});
+refinedBox.addEventListener("change", () => {
+  if (newest) drawn = undefined;
   askAnew();
 });
 element("recentre").addEventListener("click", () => stage?.recentre());

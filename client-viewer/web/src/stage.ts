@@ -3,7 +3,8 @@ import * as THREE from "three";
 import { OrbitControls } from "three/addons/controls/OrbitControls.js";
 import { Arrow } from "./arrow";
 import { Cloud } from "./cloud";
-import { colourOf } from "./colour";
+import type { Patch } from "./refined";
+import { Skin } from "./skin";
 import type { Surface } from "./surface";
 import type { ToolState, Vec3 } from "./wire";
 
@@ -54,7 +55,7 @@ export class Stage {
   });
   private readonly edges = new THREE.MeshBasicMaterial({ color: 0x0d1013, wireframe: true, transparent: true, opacity: 0.35 });
   private readonly ghost = new THREE.MeshBasicMaterial({ color: 0x9aa4ad, wireframe: true, transparent: true, opacity: 0.3 });
-  private geometry: THREE.BufferGeometry | undefined;
+  private skin: Skin | undefined;
   private surface: Surface | undefined;
   private ghostMesh: THREE.Mesh | undefined;
   private edgeMesh: THREE.Mesh | undefined;
@@ -87,17 +88,14 @@ export class Stage {
   show(surface: Surface): void {
     const known = this.surface?.header.sessionId === surface.header.sessionId;
     this.body.clear();
-    this.geometry?.dispose();
+    this.skin?.geometry.dispose();
     this.ghostMesh?.geometry.dispose();
     this.surface = surface;
-    const geometry = new THREE.BufferGeometry();
-    geometry.setIndex(new THREE.BufferAttribute(surface.triangles, 1));
-    geometry.setAttribute("position", new THREE.BufferAttribute(surface.positions, 3));
-    geometry.setAttribute("color", new THREE.BufferAttribute(new Float32Array(surface.positions.length), 3));
+    this.skin = new Skin(surface);
+    const { geometry } = this.skin;
     const rest = new THREE.BufferGeometry();
-    rest.setIndex(geometry.index);
+    rest.setIndex(new THREE.BufferAttribute(surface.triangles, 1));
     rest.setAttribute("position", new THREE.BufferAttribute(surface.rest, 3));
-    this.geometry = geometry;
     const body = new THREE.Mesh(geometry, this.material);
     body.frustumCulled = false;
     this.edgeMesh = new THREE.Mesh(geometry, this.edges);
@@ -155,19 +153,14 @@ export class Stage {
     this.dirty = true;
   }
 
+  /** What is drawn refined from the next refresh on; nothing: the surface as it is. */
+  setPatch(patch: Patch | undefined): void {
+    if (this.skin) this.skin.patch = patch;
+  }
+
   /** Takes over changed positions and colours; `top` is the displacement (m) of the last colour. */
   refresh(top: number): void {
-    if (!this.geometry || !this.surface) return;
-    const colours = this.geometry.getAttribute("color") as THREE.BufferAttribute;
-    const colour = new THREE.Color();
-    this.surface.displacement.forEach((d, vertex) => {
-      const [r, g, b] = colourOf(d / top);
-      colour.setRGB(r, g, b, THREE.SRGBColorSpace);
-      colours.setXYZ(vertex, colour.r, colour.g, colour.b);
-    });
-    colours.needsUpdate = true;
-    (this.geometry.getAttribute("position") as THREE.BufferAttribute).needsUpdate = true;
-    this.geometry.computeVertexNormals();
+    this.skin?.refresh(top);
     this.dirty = true;
   }
 

@@ -49,17 +49,26 @@ export interface SurfaceUpdate {
   tickCostUs: number;
   maxDisplacementM: number;
   quarantine: string;
-  activeParticles?: ActiveParticles;
+  activeParticles?: Places;
+  refinedSurface?: RefinedSurface;
 }
 
-export interface ActiveParticles {
+export interface Places {
   cornerM?: Vec3;
   quantumM: number;
   positionsU16le: Uint8Array;
 }
 
+export interface RefinedSurface {
+  replacedU32le: Uint8Array;
+  trianglesU32le: Uint8Array;
+  restPositions?: Places;
+  displacementQuantumM: number;
+  displacementsI16le: Uint8Array;
+}
+
 /** What the page asks of `Watch`. */
-export interface WatchRequest { maxRateHz: number; activeParticles: boolean }
+export interface WatchRequest { maxRateHz: number; activeParticles: boolean; refinedSurface: boolean }
 
 export interface SurfaceEvent {
   message: { case: "keyframe"; value: KeyframeChunk } | { case: "update"; value: SurfaceUpdate } | { case: undefined };

@@ -37,7 +37,7 @@ async fn update_of(stream: &mut Streaming<v1::SurfaceEvent>, tick: u64) -> (v1::
     .expect("the update in time")
 }
 
-fn positions_m(particles: &v1::ActiveParticles) -> Vec<DVec3> {
+fn positions_m(particles: &v1::Places) -> Vec<DVec3> {
     let place = |b: &[u8]| DVec3::from([0, 2, 4].map(|at| f64::from(u16::from_le_bytes([b[at], b[at + 1]]))));
     let corner = dvec3(particles.corner_m.unwrap());
     particles.positions_u16le.chunks_exact(6).map(|b| corner + place(b) * f64::from(particles.quantum_m)).collect()
@@ -104,7 +104,7 @@ async fn nothing_is_made_or_sent_for_those_that_do_not_ask() {
     let hub = Arc::clone(&daemon.running.as_ref().unwrap().daemon.hub);
     let mut plain = watch(&daemon, LevelOfDetail::Full, false).await;
     assert!(update_of(&mut plain, tick).await.1.active_particles.is_none());
-    let mut seat = hub.join(60.0, Layers { vertices: true, particles: false });
+    let mut seat = hub.join(60.0, Layers { vertices: true, ..Layers::default() });
     for _ in 0..5 {
         timeout(PATIENCE, seat.frames.changed()).await.unwrap().unwrap();
         let frame = seat.frames.borrow_and_update().clone().unwrap();

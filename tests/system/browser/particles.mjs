@@ -36,8 +36,8 @@ async function counted(page) {
   return Number(/: (\d+)$/.exec((await label(page)))?.[1]);
 }
 
-let daemon = await startDaemon(palpated, port, scene);
 const browser = await launch(executablePath);
+let daemon = await startDaemon(palpated, port, scene);
 try {
   const page = await browser.newPage({ viewport: { width: 1280, height: 860 } });
   const noComplaints = complaintsOf(page);

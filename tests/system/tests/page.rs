@@ -29,6 +29,11 @@ fn page_shows_the_dent_and_comes_back_after_a_restart() {
 }
 
 #[test]
+fn page_draws_the_surface_refined_near_tools_when_asked() {
+    drive("refined.mjs", &[&root().join("deploy/scenes/hybrid-block.toml")]);
+}
+
+#[test]
 fn page_shows_active_particles_when_asked() {
     drive("particles.mjs", &[&root().join("deploy/scenes/hybrid-block.toml")]);
 }

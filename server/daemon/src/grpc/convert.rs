@@ -165,10 +165,15 @@ pub fn watch_request(request: &v1::WatchRequest, display_rate_hz: f64) -> Result
             return Err(Status::invalid_argument(format!("level_of_detail {level} is unknown; 0 to 2 are known")));
         }
     };
+    if request.refined_surface && !vertices {
+        let rule =
+            "refined_surface is of vertices, which LEVEL_OF_DETAIL_NUMBERS leaves out: ask for LEVEL_OF_DETAIL_FULL";
+        return Err(Status::invalid_argument(rule));
+    }
     // Below one update in 1000 s a rate is a mistake of units, and its interval would overflow.
     Ok((
         if rate == 0.0 { display_rate_hz } else { rate.max(1e-3) },
-        Layers { vertices, particles: request.active_particles },
+        Layers { vertices, particles: request.active_particles, refined: request.refined_surface },
     ))
 }
 
@@ -349,7 +354,13 @@ mod tests {
         let request = |level_of_detail| v1::WatchRequest { level_of_detail, ..Default::default() };
         assert_eq!(watch_request(&request(2), 60.0).unwrap(), (60.0, Layers::default()));
         let particles = v1::WatchRequest { active_particles: true, ..request(2) };
-        assert_eq!(watch_request(&particles, 60.0).unwrap().1, Layers { vertices: false, particles: true });
+        assert_eq!(watch_request(&particles, 60.0).unwrap().1, Layers { particles: true, ..Layers::default() });
+        let refined = |level| v1::WatchRequest { refined_surface: true, ..request(level) };
+        assert!(watch_request(&refined(2), 60.0).is_err());
+        assert_eq!(
+            watch_request(&refined(1), 60.0).unwrap().1,
+            Layers { vertices: true, particles: false, refined: true }
+        );
         assert!(watch_request(&request(7), 60.0).is_err());
     }
 }

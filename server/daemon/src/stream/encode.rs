@@ -75,9 +75,7 @@ impl Quantiser {
 
     /// Chooses the quantum; true when it is another one, and every vertex must be named anew.
     fn choose_exponent(&mut self, largest_m: f64) -> bool {
-        let finite = if largest_m.is_finite() { largest_m } else { f64::from(f32::MAX) };
-        let wanted = (finite / f64::from(i16::MAX)).max(f64::MIN_POSITIVE).log2().ceil() as i32;
-        let wanted = wanted.clamp(self.floor_exponent, 120);
+        let wanted = quantum_exponent(largest_m).max(self.floor_exponent);
         let shrink_by = SHRINK_RATIO.log2() as i32;
         if wanted <= self.exponent && wanted > self.exponent - shrink_by {
             return false;
@@ -117,13 +115,19 @@ impl Shape {
     }
 }
 
-fn put(into: &mut BytesMut, quanta: [i16; 3]) {
+/// `k` of the smallest quantum `2^k` m for which a component of `largest_m` fits 15 bits.
+pub(super) fn quantum_exponent(largest_m: f64) -> i32 {
+    let finite = if largest_m.is_finite() { largest_m } else { f64::from(f32::MAX) };
+    ((finite / f64::from(i16::MAX)).log2().ceil() as i32).clamp(-100, 120)
+}
+
+pub(super) fn put(into: &mut BytesMut, quanta: [i16; 3]) {
     for component in quanta {
         into.put_i16_le(component);
     }
 }
 
-fn power_of_two(exponent: i32) -> f32 {
+pub(super) fn power_of_two(exponent: i32) -> f32 {
     2.0_f32.powi(exponent)
 }
 

@@ -1,11 +1,13 @@
 //! One surface for all viewers: the loop fills a slot only while somebody watches; the hub turns it into a [`Frame`] once.
 use super::{
     encode::{Delta, Quantiser, Shape},
-    keyframe, particles,
+    keyframe, places,
+    refined::Refiner,
     skin::SkinReader,
     springs::SpringReader,
 };
 use crate::sim::exchange::{SurfaceEnd, SurfaceSnapshot};
+use glam::DVec3;
 use palpate_physics::Model;
 use palpate_proto::v1;
 use std::{
@@ -50,11 +52,17 @@ pub struct Layers {
     pub vertices: bool,
     /// Active particles.
     pub particles: bool,
+    /// The surface refined near tools.
+    pub refined: bool,
 }
 
 impl Layers {
     fn and(self, other: Self) -> Self {
-        Self { vertices: self.vertices || other.vertices, particles: self.particles || other.particles }
+        Self {
+            vertices: self.vertices || other.vertices,
+            particles: self.particles || other.particles,
+            refined: self.refined || other.refined,
+        }
     }
 
     /// Whether all that the other wants is among these.
@@ -79,7 +87,9 @@ pub struct Frame {
     /// The vertices, when somebody asked for them.
     pub shape: Option<Shape>,
     /// Active particles, when somebody asked for them and the body has particles.
-    pub particles: Option<v1::ActiveParticles>,
+    pub particles: Option<v1::Places>,
+    /// The surface refined near tools, when somebody asked for it and it can be.
+    pub refined: Option<v1::RefinedSurface>,
     /// Encoded once, for the viewers that hold the frame before (`Some`) or none (`None`).
     encoded: Mutex<Vec<(Option<u64>, Delta)>>,
 }
@@ -89,6 +99,7 @@ impl Frame {
     pub fn update(&self, since: Option<u64>, layers: Layers, skipped: u64) -> v1::SurfaceUpdate {
         let mut update = v1::SurfaceUpdate { skipped, ..self.numbers.clone() };
         update.active_particles = self.particles.clone().filter(|_| layers.particles);
+        update.refined_surface = self.refined.clone().filter(|_| layers.refined);
         if let Some(shape) = self.shape.as_ref().filter(|_| layers.vertices) {
             let delta = self.delta(shape, since);
             update.displacement_quantum_m = shape.quantum_m;
@@ -122,6 +133,8 @@ pub struct Hub {
     viewers: Mutex<Vec<Wish>>,
     /// Whether anybody wants active particles.
     particles: AtomicBool,
+    /// Whether anybody wants the surface refined near tools.
+    refined: AtomicBool,
     next_viewer: AtomicU64,
     epoch: AtomicU32,
     skipped: AtomicU64,
@@ -167,6 +180,7 @@ impl Hub {
             frames: watch::Sender::new(None),
             viewers: Mutex::new(Vec::new()),
             particles: AtomicBool::new(false),
+            refined: AtomicBool::new(false),
             next_viewer: AtomicU64::new(1),
             epoch: AtomicU32::new(0),
             skipped: AtomicU64::new(0),
@@ -210,6 +224,7 @@ impl Hub {
         let period_ticks = if rate_hz > 0.0 { (1.0 / (rate_hz * period_s)).floor().clamp(1.0, 1e6) as u32 } else { 0 };
         let wanted = wishes.iter().fold(Layers::default(), |layers, wish| layers.and(wish.layers));
         self.particles.store(wanted.particles, Ordering::Relaxed);
+        self.refined.store(wanted.refined, Ordering::Relaxed);
         self.demand.set(period_ticks, wanted.vertices);
     }
 
@@ -227,8 +242,11 @@ impl Hub {
         self.change_wishes(|_| ());
         let keyframe = Arc::new(keyframe::chunks(&session_id, &scene_name, &model, epoch));
         let (low, high) = keyframe::bounds_m(&model);
-        let mut skin = SkinReader::new(&model, &keyframe::rest_positions_f32(&model));
-        let mut springs = SpringReader::new(&model, &keyframe::rest_positions_f32(&model));
+        let rest_f32_m = keyframe::rest_positions_f32(&model);
+        let mut skin = SkinReader::new(&model, &rest_f32_m);
+        let mut springs = SpringReader::new(&model, &rest_f32_m);
+        // Made when somebody first asks: many are never asked.
+        let mut refiner: Option<Option<Refiner>> = None;
         let mut quantiser = Quantiser::new(model.surface().nodes.len(), (high - low).length());
         let mut number = 0;
         loop {
@@ -253,16 +271,39 @@ impl Hub {
                 (None, None) => &snapshot.displacements_m[..],
             };
             let shape = snapshot.has_vertices.then(|| quantiser.advance(number, displacements_m));
-            let layers = Layers { vertices: snapshot.has_vertices, particles: self.particles.load(Ordering::Relaxed) };
+            let layers = Layers {
+                vertices: snapshot.has_vertices,
+                particles: self.particles.load(Ordering::Relaxed),
+                // Of vertices that are there.
+                refined: snapshot.has_vertices && self.refined.load(Ordering::Relaxed),
+            };
+            let refiner = layers.refined.then(|| refiner.get_or_insert_with(|| Refiner::new(&model, &rest_f32_m)));
+            let refined =
+                refiner.and_then(Option::as_mut).map(|refiner| refiner.read(displacements_m, &tools(&model, snapshot)));
             let has_particles = layers.particles && model.particle_count() > 0;
-            let particles = has_particles.then(|| particles::encode(snapshot.particles_m()));
+            let particles = has_particles.then(|| places::encode(snapshot.particles_m()));
             let numbers = numbers(epoch, snapshot);
             let encoded = Mutex::new(Vec::new());
-            let frame =
-                Frame { epoch, number, keyframe: Arc::clone(&keyframe), numbers, layers, shape, particles, encoded };
+            let frame = Frame {
+                epoch,
+                number,
+                keyframe: Arc::clone(&keyframe),
+                numbers,
+                layers,
+                shape,
+                particles,
+                refined,
+                encoded,
+            };
             self.frames.send_replace(Some(Arc::new(frame)));
         }
     }
+}
+
+/// Centres (m) and radii (m).
+fn tools(model: &Model, snapshot: &SurfaceSnapshot) -> Vec<(DVec3, f64)> {
+    let shapes = &model.spec().tools;
+    snapshot.tools.iter().zip(shapes).map(|(view, shape)| (view.proxy_position_m, shape.radius_m)).collect()
 }
 
 fn numbers(epoch: u32, snapshot: &SurfaceSnapshot) -> v1::SurfaceUpdate {

@@ -2,7 +2,8 @@
 pub mod encode;
 pub mod hub;
 pub mod keyframe;
-pub mod particles;
+pub mod places;
+pub mod refined;
 pub mod skin;
 pub mod springs;
 pub mod viewer;

@@ -1,9 +1,9 @@
 //! The force at an instant of a tick, for every integrator.
 use super::{hybrid, springs};
 use crate::{
-    contact::{Body, SubstepTime},
+    contact::{Body, ContactState, SubstepTime},
     fem::loads::add_load_n,
-    world::{Model, PointForce, Scratch, State, TickInput},
+    world::{LoadSpec, Model, PointForce, Scratch, State, TickInput},
 };
 use glam::DVec3;
 
@@ -78,9 +78,50 @@ impl Tick<'_> {
         self.evaluate(state, scratch, &now);
     }
 
+    /// Adds loads and injected forces (N) on a surface whose nodes are at these places (m), at rest and now.
+    pub(super) fn add_given_n(
+        &self,
+        load_factors: &[f64],
+        now: &Evaluation,
+        (rest_m, x): (&[DVec3], &[DVec3]),
+        forces_n: &mut [DVec3],
+    ) {
+        let Self { model, input, loads, .. } = self;
+        for (index, load) in model.spec().loads.iter().enumerate() {
+            let factor = loads.factor(load_factors[index], input, index, now.load_fraction);
+            if factor != 0.0 {
+                add_load_n(load, factor, model.surface(), (rest_m, x), forces_n);
+            }
+        }
+        for point in self.usable_points() {
+            forces_n[point.node as usize] += point.force_n;
+        }
+    }
+
+    /// Injected forces on what there is.
+    pub(super) fn usable_points(&self) -> impl Iterator<Item = &PointForce> {
+        self.input.point_forces.iter().filter(|point| is_usable(self.model, point))
+    }
+
+    /// Vertices that contact lists, that loads act on, and injected forces.
+    pub(super) fn list_touched(&self, contact: &ContactState, mut list: impl FnMut(u32)) {
+        self.model.contact().listed_nodes(contact).for_each(&mut list);
+        for load in &self.model.spec().loads {
+            match load {
+                LoadSpec::NodalForces(forces) => forces.iter().for_each(|(vertex, _)| list(*vertex)),
+                LoadSpec::Traction { triangles, .. } | LoadSpec::Pressure { triangles, .. } => {
+                    let nodes =
+                        triangles.iter().flat_map(|&triangle| self.model.surface().triangle_nodes(triangle as usize));
+                    nodes.for_each(&mut list);
+                }
+            }
+        }
+        self.usable_points().for_each(|point| list(point.node));
+    }
+
     /// Total force at the present positions into `state.force_n`, its external part into `state.external_n`.
     fn evaluate(&self, state: &mut State, scratch: &mut Scratch, now: &Evaluation) {
-        let Self { model, input, loads, .. } = self;
+        let model = self.model;
         if let (Some(body), Some(own)) = (model.hybrid(), &mut scratch.hybrid) {
             return hybrid::evaluate(self, body, state, (own, &mut scratch.contact), now);
         }
@@ -89,17 +130,7 @@ impl Tick<'_> {
         }
         let external = &mut state.external_n;
         external.fill(DVec3::ZERO);
-        for (index, load) in model.spec().loads.iter().enumerate() {
-            let factor = loads.factor(state.load_factors[index], input, index, now.load_fraction);
-            if factor != 0.0 {
-                add_load_n(load, factor, model.surface(), (model.rest_positions_m(), &state.x), external);
-            }
-        }
-        for point in input.point_forces {
-            if is_usable(model, point) {
-                external[point.node as usize] += point.force_n;
-            }
-        }
+        self.add_given_n(&state.load_factors, now, (model.rest_positions_m(), &state.x), external);
         let (x, v) = (&state.x, &state.v);
         if !state.tools.is_empty() {
             let body = Body { x, v, fastest_m_per_s: now.fastest_m_per_s };

@@ -1,14 +1,13 @@
 //! Forces and kicks of a hybrid body, for leapfrog.
 use super::{
-    forces::{Evaluation, Tick, is_usable},
+    forces::{Evaluation, Tick},
     motion::holders_power_w,
 };
 use crate::{
     contact::{ContactScratch, SubstepTime, SurfaceNow},
-    fem::loads::add_load_n,
     hybrid::{Hybrid, HybridScratch, SkinView},
-    simd::sweeps::{self, Kick},
-    world::{LoadSpec, Model, State},
+    simd::{kicks::Kick, sweeps},
+    world::{Model, State},
 };
 use glam::DVec3;
 
@@ -20,7 +19,7 @@ pub(super) fn evaluate(
     (own, contact_scratch): (&mut HybridScratch, &mut ContactScratch),
     now: &Evaluation,
 ) {
-    let Tick { model, input, loads, .. } = tick;
+    let model = tick.model;
     let HybridScratch { patch, skin, .. } = own;
     patch.displace(body, &state.x);
     let tick_period_s = model.spec().settings.tick_period_s;
@@ -31,25 +30,14 @@ pub(super) fn evaluate(
     let mut view = SkinView::new(body, patch, rest_m);
     let mut renewed = contact.list_on_skin((&mut view, &mut skin.x), &state.tools, &mut state.contact, contact_scratch);
     renewed |= skin.is_outdated(patch);
-    renewed |= input.point_forces.iter().any(|point| is_usable(model, point) && !skin.is_listed(point.node));
+    renewed |= tick.usable_points().any(|point| !skin.is_listed(point.node));
     if renewed {
         skin.start(patch);
-        let mut list = |vertex: u32| skin.list(body, patch, rest_m, vertex);
-        contact.listed_nodes(&state.contact).for_each(&mut list);
-        model.spec().loads.iter().for_each(|load| vertices_of(model, load, &mut list));
-        input.point_forces.iter().filter(|point| is_usable(model, point)).for_each(|point| list(point.node));
+        tick.list_touched(&state.contact, |vertex| skin.list(body, patch, rest_m, vertex));
         skin.finish();
     }
     skin.refresh(patch);
-    for (index, load) in model.spec().loads.iter().enumerate() {
-        let factor = loads.factor(state.load_factors[index], input, index, now.load_fraction);
-        if factor != 0.0 {
-            add_load_n(load, factor, model.surface(), (rest_m, &skin.x), &mut skin.forces_n);
-        }
-    }
-    for point in input.point_forces.iter().filter(|point| is_usable(model, point)) {
-        skin.forces_n[point.node as usize] += point.force_n;
-    }
+    tick.add_given_n(&state.load_factors, now, (rest_m, &skin.x), &mut skin.forces_n);
     let v = &state.v;
     let velocity = |vertex: u32| body.velocity_m_per_s(patch, vertex, v);
     let (tools, touching) = (&mut state.tools, &mut state.contact);
@@ -87,15 +75,6 @@ pub(super) fn evaluate(
     sweeps::add(&mut state.force_n, &state.external_n);
     own.balance.apply(body, state);
     state.force_is_current = true;
-}
-
-pub(super) fn vertices_of(model: &Model, load: &LoadSpec, list: &mut impl FnMut(u32)) {
-    match load {
-        LoadSpec::NodalForces(forces) => forces.iter().for_each(|(vertex, _)| list(*vertex)),
-        LoadSpec::Traction { triangles, .. } | LoadSpec::Pressure { triangles, .. } => {
-            triangles.iter().flat_map(|&t| model.surface().triangle_nodes(t as usize)).for_each(list);
-        }
-    }
 }
 
 /// `v ← (v e^{−c h/2} + h M'⁻¹ f) e^{−c h/2}`, and the ledger's share of it, as of a body of tets.

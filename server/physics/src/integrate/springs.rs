@@ -1,12 +1,8 @@
 //! Forces and kicks of a mass-spring surface, for leapfrog, and what is refined and awake from one tick to the next.
-use super::{
-    forces::{Evaluation, Tick, is_usable},
-    hybrid::vertices_of,
-};
+use super::forces::{Evaluation, Tick, is_usable};
 use crate::{
     contact::{ContactScratch, SubstepTime, SurfaceNow, ToolState, broad::Skin, deepest_m, nearest_vertex},
-    fem::loads::add_load_n,
-    simd::sweeps::LumpedKick,
+    simd::kicks::LumpedKick,
     spring::{
         Refinement, SpringBody, SpringScratch, SpringState, Wanted,
         body::rings_for,
@@ -178,7 +174,7 @@ pub(super) fn evaluate(
     (own, contact_scratch): (&mut SpringBodyScratch, &mut ContactScratch),
     now: &Evaluation,
 ) {
-    let Tick { model, input, loads, .. } = tick;
+    let model = tick.model;
     let State { x, v, springs: Some(SpringState { motion, .. }), .. } = state else { return };
     let SpringBodyScratch { springs, skin, .. } = own;
     let tick_period_s = model.spec().settings.tick_period_s;
@@ -188,26 +184,15 @@ pub(super) fn evaluate(
     let mut view = SpringSkin::new(body, (motion, springs), x);
     let mut renewed = contact.list_on_skin((&mut view, &mut skin.x), &state.tools, &mut state.contact, contact_scratch);
     renewed |= skin.is_outdated(springs);
-    renewed |= input.point_forces.iter().any(|point| is_usable(model, point) && !skin.is_listed(point.node));
+    renewed |= tick.usable_points().any(|point| !skin.is_listed(point.node));
     if renewed {
         skin.start(springs);
-        let mut list = |vertex: u32| skin.list(body, (motion, springs), vertex);
-        contact.listed_nodes(&state.contact).for_each(&mut list);
-        model.spec().loads.iter().for_each(|load| vertices_of(model, load, &mut list));
-        input.point_forces.iter().filter(|point| is_usable(model, point)).for_each(|point| list(point.node));
+        tick.list_touched(&state.contact, |vertex| skin.list(body, (motion, springs), vertex));
         skin.finish();
     }
     skin.refresh(x);
     let rest_m = model.surface_rest_positions_m();
-    for (index, load) in model.spec().loads.iter().enumerate() {
-        let factor = loads.factor(state.load_factors[index], input, index, now.load_fraction);
-        if factor != 0.0 {
-            add_load_n(load, factor, model.surface(), (rest_m, &skin.x), &mut skin.forces_n);
-        }
-    }
-    for point in input.point_forces.iter().filter(|point| is_usable(model, point)) {
-        skin.forces_n[point.node as usize] += point.force_n;
-    }
+    tick.add_given_n(&state.load_factors, now, (rest_m, &skin.x), &mut skin.forces_n);
     let velocity = |vertex: u32| body.velocity_m_per_s((motion, springs), vertex, v);
     let surface = SurfaceNow { x: &skin.x, velocity_m_per_s: &velocity };
     contact.press_tools(&surface, &time, &mut state.tools, &mut state.contact, &mut skin.forces_n, contact_scratch);

@@ -12,6 +12,7 @@ mod cells;
 pub(crate) mod dense;
 mod dispatch;
 mod fades;
+pub(crate) mod kicks;
 mod laws;
 mod layout;
 mod oracle;

@@ -16,7 +16,7 @@ pub(super) fn lanes(list: &[DVec3]) -> (&[Lanes], &[f64]) {
 }
 
 #[inline(always)]
-fn lanes_mut(list: &mut [DVec3]) -> (&mut [Lanes], &mut [f64]) {
+pub(super) fn lanes_mut(list: &mut [DVec3]) -> (&mut [Lanes], &mut [f64]) {
     cast_slice_mut::<DVec3, f64>(list).as_chunks_mut()
 }
 
@@ -76,133 +76,6 @@ impl Sweep for Drift<'_> {
         }
         of_axis.iter().sum::<f64>().sqrt()
     }
-}
-
-/// `v ← (v k + h a) k` with `k` what damping leaves, component by component: `1 − free (1 − factor)` where `free_parts` are given, `factor` behind. Finds
-/// `Σ e·(v k + ½ h a)` (W), with `e` the `external_n`.
-#[derive(Debug)]
-pub(crate) struct Kick<'a> {
-    pub(crate) v: &'a mut [DVec3],
-    pub(crate) accelerations: &'a [DVec3],
-    pub(crate) external_n: &'a [DVec3],
-    /// 1 on free axes of the first nodes, 0 on held ones.
-    pub(crate) free_parts: &'a [DVec3],
-    pub(crate) factor: f64,
-    pub(crate) h_s: f64,
-}
-
-impl Kick<'_> {
-    pub(crate) fn give(self) -> f64 {
-        sweep(Available::best(), self)
-    }
-}
-
-impl Sweep for Kick<'_> {
-    type Found = f64;
-
-    #[inline(always)]
-    fn run<V: Vector<Scalar = f64>>(self) -> f64 {
-        let Self { v, accelerations, external_n, free_parts, factor, h_s } = self;
-        let nodes = free_parts.len();
-        let (v_nodes, v_others) = v.split_at_mut(nodes);
-        let (a_nodes, a_others) = accelerations.split_at(nodes);
-        let (e_nodes, e_others) = external_n.split_at(nodes);
-        let gone = 1.0 - factor;
-        let mut power_w = [V::of(0.0); LANES];
-        let mut of_rest_w = 0.0;
-        let ((vs, v_rest), (a, a_rest)) = (lanes_mut(v_nodes), lanes(a_nodes));
-        let ((e, e_rest), (free, free_rest)) = (lanes(e_nodes), lanes(free_parts));
-        for ((v, a), (e, free)) in vs.iter_mut().zip(a).zip(e.iter().zip(free)) {
-            for (part, first) in (0..LANES).step_by(V::WIDTH).enumerate() {
-                let factor = V::of(1.0) - V::load(&free[first..]) * V::of(gone);
-                let found = kicked(V::load(&v[first..]), V::load(&a[first..]) * V::of(h_s), factor);
-                found[0].store(&mut v[first..]);
-                power_w[part] = power_w[part] + V::load(&e[first..]) * found[1];
-            }
-        }
-        for ((v, a), (e, free)) in v_rest.iter_mut().zip(a_rest).zip(e_rest.iter().zip(free_rest)) {
-            let [after, middle] = kicked(*v, *a * h_s, 1.0 - free * gone);
-            *v = after;
-            of_rest_w += e * middle;
-        }
-        let ((vs, v_rest), (a, a_rest), (e, e_rest)) = (lanes_mut(v_others), lanes(a_others), lanes(e_others));
-        for ((v, a), e) in vs.iter_mut().zip(a).zip(e) {
-            for (part, first) in (0..LANES).step_by(V::WIDTH).enumerate() {
-                let found = kicked(V::load(&v[first..]), V::load(&a[first..]) * V::of(h_s), V::of(factor));
-                found[0].store(&mut v[first..]);
-                power_w[part] = power_w[part] + V::load(&e[first..]) * found[1];
-            }
-        }
-        for ((v, a), e) in v_rest.iter_mut().zip(a_rest).zip(e_rest) {
-            let [after, middle] = kicked(*v, *a * h_s, factor);
-            *v = after;
-            of_rest_w += e * middle;
-        }
-        total(power_w) + of_rest_w
-    }
-}
-
-/// `v ← (v k + h f/m) k` of nodes that move along all axes or none. Finds `Σ e·(v k + ½ h f/m)` (W), with `e` the `external_n`, and `Σ m v²` before and after the force, but for what damping takes then.
-#[derive(Debug)]
-pub(crate) struct LumpedKick<'a> {
-    pub(crate) v: &'a mut [DVec3],
-    pub(crate) forces_n: &'a [DVec3],
-    pub(crate) external_n: &'a [DVec3],
-    /// On each axis; 0 of nodes that are held, whose velocity is 0.
-    pub(crate) mass_kg: &'a [DVec3],
-    /// 0 of them, too.
-    pub(crate) inverse_mass_per_kg: &'a [DVec3],
-    pub(crate) factor: f64,
-    pub(crate) h_s: f64,
-}
-
-impl LumpedKick<'_> {
-    pub(crate) fn give(self) -> [f64; 3] {
-        sweep(Available::best(), self)
-    }
-}
-
-impl Sweep for LumpedKick<'_> {
-    type Found = [f64; 3];
-
-    #[inline(always)]
-    fn run<V: Vector<Scalar = f64>>(self) -> [f64; 3] {
-        let ((vs, v_rest), (f, f_rest)) = (lanes_mut(self.v), lanes(self.forces_n));
-        let ((e, e_rest), (m, m_rest)) = (lanes(self.external_n), lanes(self.mass_kg));
-        let (w, w_rest) = lanes(self.inverse_mass_per_kg);
-        let mut sums = [[V::of(0.0); LANES]; 3];
-        for (((v, f), e), (m, w)) in vs.iter_mut().zip(f).zip(e).zip(m.iter().zip(w)) {
-            for (part, first) in (0..LANES).step_by(V::WIDTH).enumerate() {
-                let before = V::load(&v[first..]);
-                let change = V::load(&f[first..]) * V::load(&w[first..]) * V::of(self.h_s);
-                let [after, middle] = kicked(before, change, V::of(self.factor));
-                after.store(&mut v[first..]);
-                let mass = V::load(&m[first..]);
-                let undamped = before * V::of(self.factor) + change;
-                sums[0][part] = sums[0][part] + V::load(&e[first..]) * middle;
-                sums[1][part] = sums[1][part] + mass * before * before;
-                sums[2][part] = sums[2][part] + mass * undamped * undamped;
-            }
-        }
-        let mut of_rest = [0.0; 3];
-        for (((v, f), e), (m, w)) in v_rest.iter_mut().zip(f_rest).zip(e_rest).zip(m_rest.iter().zip(w_rest)) {
-            let (before, change) = (*v, *f * *w * self.h_s);
-            let [after, middle] = kicked(before, change, self.factor);
-            *v = after;
-            let undamped = before * self.factor + change;
-            of_rest[0] += *e * middle;
-            of_rest[1] += *m * before * before;
-            of_rest[2] += *m * undamped * undamped;
-        }
-        std::array::from_fn(|sum| total(sums[sum]) + of_rest[sum])
-    }
-}
-
-/// `(v k + c) k`, and `v k + ½ c`.
-#[inline(always)]
-fn kicked<T: Real>(v: T, change: T, factor: T) -> [T; 2] {
-    let damped = v * factor;
-    [(damped + change) * factor, damped + change * T::of(0.5)]
 }
 
 /// `f ← M⁻¹ f`, node by node; returns `f·M⁻¹ f` (N²/kg).
@@ -361,18 +234,18 @@ fn second_difference<T: Real>(a0: T, a1: T, a2: T) -> T {
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
     use crate::{hybrid::testing::Random, simd::InstructionSet};
 
     /// Numbers of nodes that fill blocks and that do not.
-    const COUNTS: [usize; 6] = [0, 1, 7, 8, 29, 64];
+    pub(in crate::simd) const COUNTS: [usize; 6] = [0, 1, 7, 8, 29, 64];
 
-    fn vectors(random: &mut Random, count: usize) -> Vec<DVec3> {
+    pub(in crate::simd) fn vectors(random: &mut Random, count: usize) -> Vec<DVec3> {
         (0..count).map(|_| random.vector()).collect()
     }
 
-    fn is_near(found: f64, expected: f64) -> bool {
+    pub(in crate::simd) fn is_near(found: f64, expected: f64) -> bool {
         (found - expected).abs() <= 1e-13 * (1.0 + expected.abs())
     }
 
@@ -390,38 +263,6 @@ mod tests {
                 let mut found = x.clone();
                 let again = sweep(Available::at_most(set), Drift { x: &mut found, v: &v, h_s: 0.3 });
                 assert!(again.to_bits() == bound.to_bits() && found == of_best, "{count} {set:?}");
-            }
-        }
-    }
-
-    #[test]
-    fn kicks_are_those_of_plain_code() {
-        let mut random = Random(4);
-        for count in COUNTS {
-            let [v, a, e] = [0; 3].map(|_| vectors(&mut random, count));
-            for (factor, free) in [(1.0, 0), (0.9, 0), (0.9, count / 2), (0.9, count)] {
-                let free_parts: Vec<DVec3> = (0..free).map(|i| DVec3::new(1.0, f64::from(i % 2 == 0), 0.0)).collect();
-                let mut expected_w = 0.0;
-                let expected: Vec<DVec3> = (0..count)
-                    .map(|i| {
-                        let left = free_parts.get(i).map_or(DVec3::splat(factor), |free| 1.0 - *free * (1.0 - factor));
-                        expected_w += e[i].dot(v[i] * left + a[i] * 0.05);
-                        (v[i] * left + a[i] * 0.1) * left
-                    })
-                    .collect();
-                let run = |set| {
-                    let (mut v, free_parts) = (v.clone(), &free_parts[..]);
-                    let kick = Kick { v: &mut v, accelerations: &a, external_n: &e, free_parts, factor, h_s: 0.1 };
-                    (sweep(set, kick), v)
-                };
-                let (power_w, kicked) = run(Available::best());
-                assert!(is_near(power_w, expected_w), "{power_w} {expected_w}");
-                assert!(kicked.iter().zip(&expected).all(|(a, b)| a.distance(*b) < 1e-15), "{count} {factor} {free}");
-                assert!(
-                    InstructionSet::available()
-                        .into_iter()
-                        .all(|set| run(Available::at_most(set)) == (power_w, kicked.clone()))
-                );
             }
         }
     }

@@ -1,14 +1,14 @@
-//! The active particles of a hybrid or seed body as 16-bit places in the box that holds them.
+//! Points as 16-bit places in the box that holds them: the active particles of a hybrid or seed body, the vertices of a refined surface.
 //!
 //! `x = corner + q n` with `q = 2^k` m, the smallest for which the longest side of the box fits 16 bits: the error of a component is at
 //! most `q/2 ≤ side/65535`. Those near a contact move in every tick and come and go, so each update has all of them: 6 bytes a
-//! particle, where naming what changed would cost 10.
+//! point, where naming what changed would cost 10.
 use bytes::{BufMut, BytesMut};
 use glam::DVec3;
 use palpate_proto::v1;
 
-/// The particles of a frame, by their positions (m).
-pub fn encode(positions_m: &[DVec3]) -> v1::ActiveParticles {
+/// The points of a frame, by their positions (m).
+pub fn encode(positions_m: &[DVec3]) -> v1::Places {
     let start = (DVec3::INFINITY, DVec3::NEG_INFINITY);
     let (low, high) = positions_m.iter().fold(start, |(low, high), x| (low.min(*x), high.max(*x)));
     let (corner_m, side_m) =
@@ -22,7 +22,7 @@ pub fn encode(positions_m: &[DVec3]) -> v1::ActiveParticles {
             positions.put_u16_le(component.round() as u16);
         }
     }
-    v1::ActiveParticles {
+    v1::Places {
         corner_m: Some(v1::Vec3 { x: corner_m.x, y: corner_m.y, z: corner_m.z }),
         quantum_m,
         positions_u16le: positions.freeze(),
@@ -35,7 +35,7 @@ mod tests {
     use proptest::prelude::*;
 
     /// What a viewer does.
-    fn decode(message: &v1::ActiveParticles) -> Vec<DVec3> {
+    fn decode(message: &v1::Places) -> Vec<DVec3> {
         let corner = message.corner_m.unwrap();
         let place = |b: &[u8]| {
             DVec3::from([0, 2, 4].map(|at| f64::from(u16::from_le_bytes([b[at], b[at + 1]]))))
@@ -47,7 +47,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn particles_come_back_within_half_a_quantum(
+        fn points_come_back_within_half_a_quantum(
             points in prop::collection::vec(prop::array::uniform3(-0.2_f64..0.3), 0..60),
             scale in prop_oneof![Just(1.0), Just(1e-6), Just(0.0)],
         ) {
