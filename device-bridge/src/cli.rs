@@ -1,6 +1,11 @@
 //! The command line.
-use crate::{BridgeError, Config, Handle, config::DeviceConfig, run::run_with};
-use clap::{Parser, ValueEnum};
+use crate::{
+    BridgeError, Config, Handle,
+    config::{DeviceConfig, HapticMasterConfig, SimulatedConfig},
+    emulate::cli::Emulate,
+    run::run_with,
+};
+use clap::{Parser, Subcommand, ValueEnum};
 use std::{
     io::{IsTerminal, Write as _},
     path::PathBuf,
@@ -17,6 +22,8 @@ Examples:
   palpate-bridge --server https://lab:7411 --tls-ca ca.pem
   palpate-bridge --server unix:///run/palpate/palpate.sock --tool left
   palpate-bridge --print-config > bridge.toml      every key with its default
+  palpate-bridge --device hapticmaster --print-config   the same for another arm
+  palpate-bridge emulate hapticmaster              an arm that is not there, to try a configuration
 
 Signals: SIGTERM or Ctrl-C ramps the force to zero, ends the stream and exits with 0; SIGUSR1 recovers from a latched fault.
 RUST_LOG=debug says more.";
@@ -26,8 +33,10 @@ RUST_LOG=debug says more.";
 /// A servo loop beside the arm renders the newest contact model at 1 kHz, limits the force, and ramps it to zero when the
 /// daemon falls silent; the stream to the daemon reconnects by itself.
 #[derive(Debug, Parser)]
-#[command(name = "palpate-bridge", version, after_help = EXAMPLES)]
+#[command(name = "palpate-bridge", version, after_help = EXAMPLES, args_conflicts_with_subcommands = true)]
 pub struct Cli {
+    #[command(subcommand)]
+    command: Option<Command>,
     /// Configuration file (TOML); flags win over it
     #[arg(long, value_name = "FILE", env = "PALPATE_BRIDGE_CONFIG")]
     config: Option<PathBuf>,
@@ -63,11 +72,23 @@ pub struct Cli {
     print_config: bool,
 }
 
+/// What else it does.
+#[derive(Debug, Subcommand)]
+enum Command {
+    /// An arm that is not there: its bytes over a real socket, with faults on request
+    Emulate {
+        #[command(subcommand)]
+        kind: Emulate,
+    },
+}
+
 /// Kinds of arms.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum DeviceKind {
     /// No hardware: a mass held by a hand that follows a path
     Simulated,
+    /// HapticMASTER (FCS, Moog) over TCP
+    Hapticmaster,
 }
 
 impl Cli {
@@ -76,6 +97,9 @@ impl Cli {
     /// # Errors
     /// What stops it.
     pub fn run(self) -> Result<ExitCode, BridgeError> {
+        if let Some(Command::Emulate { kind }) = self.command {
+            return kind.run();
+        }
         let config = self.config()?;
         if self.print_config {
             print!("{}", printed(&config)?);
@@ -116,7 +140,14 @@ impl Cli {
         replace(&mut config.limits.max_force_n, self.max_force_n);
         config.servo.auto_recover |= self.auto_recover;
         match (self.device, &config.device) {
-            (None, _) | (Some(DeviceKind::Simulated), DeviceConfig::Simulated(_)) => {}
+            (None, _)
+            | (Some(DeviceKind::Simulated), DeviceConfig::Simulated(_))
+            | (Some(DeviceKind::Hapticmaster), DeviceConfig::Hapticmaster(_)) => {}
+            // The file is about another arm: the defaults of the one asked for.
+            (Some(DeviceKind::Simulated), _) => config.device = DeviceConfig::Simulated(SimulatedConfig::default()),
+            (Some(DeviceKind::Hapticmaster), _) => {
+                config.device = DeviceConfig::Hapticmaster(HapticMasterConfig::default());
+            }
         }
         Ok(config)
     }

@@ -201,6 +201,8 @@ impl Default for RealtimeConfig {
 pub enum DeviceConfig {
     /// No hardware: a mass held by a hand that follows a path.
     Simulated(SimulatedConfig),
+    /// HapticMASTER, over TCP.
+    Hapticmaster(HapticMasterConfig),
 }
 
 impl Default for DeviceConfig {
@@ -226,6 +228,40 @@ pub struct SimulatedConfig {
     pub period_s: Option<f64>,
     /// Where the hand goes.
     pub keyframes: Vec<KeyframeConfig>,
+}
+
+/// A HapticMASTER.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct HapticMasterConfig {
+    /// Host and port.
+    pub address: String,
+    /// Where in the world the arm's x, y and z point.
+    pub axes: [String; 3],
+    /// Where in the world the arm's origin is (m).
+    pub origin_m: [f64; 3],
+    /// Mass that the hand feels (kg).
+    pub inertia_kg: f64,
+    /// Send `set` and `get` in requests of their own, for an arm that refuses them in one: half as many poses a second.
+    pub apart: bool,
+    /// How long finding home may take (s).
+    pub homing_s: f64,
+    /// Without an answer for so long (s) the arm is lost, and its force taken away.
+    pub silence_s: f64,
+}
+
+impl Default for HapticMasterConfig {
+    fn default() -> Self {
+        Self {
+            address: "192.168.0.25:7654".into(),
+            axes: ["+x", "+y", "+z"].map(str::to_owned),
+            origin_m: [0.0; 3],
+            inertia_kg: 2.0,
+            apart: false,
+            homing_s: 60.0,
+            silence_s: 0.02,
+        }
+    }
 }
 
 /// Where the hand is at one time.
@@ -320,10 +356,12 @@ mod tests {
     }
 
     #[test]
-    fn the_example_is_valid() {
-        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../deploy/bridge.toml");
-        let config = Config::read(&path).unwrap();
-        crate::settings::Settings::new(&config).unwrap();
+    fn the_examples_are_valid() {
+        for example in ["bridge.toml", "hapticmaster.toml"] {
+            let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../deploy").join(example);
+            let config = Config::read(&path).unwrap();
+            crate::settings::Settings::new(&config).unwrap();
+        }
     }
 
     #[test]

@@ -76,6 +76,22 @@ pub enum BridgeError {
         /// Why.
         source: std::io::Error,
     },
+    /// The arm could not be started.
+    #[error("the arm cannot be started: {source}")]
+    #[diagnostic(help(
+        "check that it is switched on, that its emergency stop is released, and its address; docs/arms has a page for each arm"
+    ))]
+    Start {
+        /// What the driver says.
+        source: Box<dyn std::error::Error + Send + Sync>,
+    },
+    /// The arm failed in the loop.
+    #[error("the arm is lost: {fault}; its force was taken away")]
+    #[diagnostic(help("see to the arm, and start the bridge again: the force comes back slowly"))]
+    DeviceLost {
+        /// Why.
+        fault: crate::device::Fault,
+    },
     /// The servo thread died; its panic message is on standard error.
     #[error("the servo thread stopped unexpectedly; the arm gets no force")]
     #[diagnostic(help("this is a defect: please report it with the output above"))]

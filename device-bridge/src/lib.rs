@@ -12,6 +12,7 @@ pub mod cli;
 pub mod config;
 pub mod convert;
 pub mod device;
+pub mod emulate;
 pub mod error;
 pub mod run;
 pub mod servo;

@@ -1,7 +1,6 @@
 //! Starts servo and uplink, watches both, and ends them in order: force to zero, then the stream, then the program.
 use crate::{
-    BridgeError, Config, Stats, Summary,
-    device::Device,
+    BridgeError, Config, Stats, Summary, device,
     servo::{Servo, ServoLaw},
     settings::{ServoSettings, Settings},
     stats::reason,
@@ -84,6 +83,8 @@ pub async fn run(config: Config, shutdown: CancellationToken) -> Result<Summary,
 pub async fn run_with(config: &Config, shutdown: CancellationToken, handle: Handle) -> Result<Summary, BridgeError> {
     let settings = Settings::new(config)?;
     let shared = handle.shared;
+    let device = open(&settings, &shutdown).await?;
+    let Some(device) = device else { return Ok(shared.stats.summary()) };
     let (commands, down) = slot(&None);
     let (up, samples) = slot(&None);
     let bell = Doorbell::new().map_err(|source| BridgeError::System { what: "create an eventfd", source })?;
@@ -91,7 +92,8 @@ pub async fn run_with(config: &Config, shutdown: CancellationToken, handle: Hand
         SampleSource::new(&bell, samples).map_err(|source| BridgeError::System { what: "watch an eventfd", source })?;
     let servo = Servo {
         law: ServoLaw::new(settings.servo),
-        device: Device::open(&settings.device),
+        device,
+        last: None,
         down,
         up,
         bell,
@@ -116,7 +118,9 @@ pub async fn run_with(config: &Config, shutdown: CancellationToken, handle: Hand
     };
     // The force first; then the stream that carries it.
     let stopped = match outcome {
-        Outcome::ServoDied => Err(BridgeError::ServoDied),
+        Outcome::ServoDied => {
+            Err(shared.stats.device_fault().map_or(BridgeError::ServoDied, |fault| BridgeError::DeviceLost { fault }))
+        }
         _ => stop_servo(&shared, &settings.servo, servo_done).await,
     };
     end.cancel();
@@ -128,6 +132,19 @@ pub async fn run_with(config: &Config, shutdown: CancellationToken, handle: Hand
     match ended {
         Ok(result) => result.map(|()| shared.stats.summary()),
         Err(panic) => Err(BridgeError::System { what: "run the uplink", source: std::io::Error::other(panic) }),
+    }
+}
+
+/// The arm, opened on a thread that may wait; `None` when the bridge was told to stop meanwhile.
+async fn open(settings: &Settings, shutdown: &CancellationToken) -> Result<Option<Box<dyn device::Arm>>, BridgeError> {
+    let (settings, period_s) = (settings.device.clone(), settings.servo.period_s);
+    let opening = tokio::task::spawn_blocking(move || device::open(&settings, period_s));
+    tokio::select! {
+        () = shutdown.cancelled() => Ok(None),
+        opened = opening => match opened {
+            Ok(opened) => opened.map(Some),
+            Err(panic) => Err(BridgeError::System { what: "open the arm", source: std::io::Error::other(panic) }),
+        },
     }
 }
 

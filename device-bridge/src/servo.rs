@@ -1,7 +1,7 @@
 //! The loop beside the arm: from the newest command and the arm's motion to a safe force.
 use crate::{
     convert::{Command, Sample},
-    device::Device,
+    device::{Arm, Reading},
     run::Shared,
     settings::ServoSettings,
 };
@@ -145,7 +145,9 @@ pub struct Servo {
     /// The law.
     pub law: ServoLaw,
     /// The arm.
-    pub device: Device,
+    pub device: Box<dyn Arm>,
+    /// Where it was last.
+    pub last: Option<Reading>,
     /// Commands from the uplink.
     pub down: SlotReader<Option<Command>>,
     /// Samples for the uplink.
@@ -167,21 +169,30 @@ impl Servo {
     }
 
     fn tick(&mut self, wakeup: &Wakeup, now_ns: u64) -> ControlFlow<()> {
-        let reading = self.device.read(1 + wakeup.skipped);
+        let read = self.device.read(1 + wakeup.skipped);
+        if let Err(fault) = read {
+            self.shared.stats.set_device_fault(fault);
+            self.law.trip(now_ns, Fault::Device);
+        }
+        self.last = read.ok().or(self.last);
+        let motion = self.last.map_or(Motion::at(DVec3::ZERO), |reading| reading.motion);
         if let Some(Some(command)) = self.down.take() {
             self.law.receive(command);
         }
         self.obey_flags(now_ns);
-        let tick = self.law.tick(now_ns, &reading.motion);
+        let tick = self.law.tick(now_ns, &motion);
         self.device.apply(tick.limited.force_n);
-        if reading.motion.is_finite() && self.shared.attached.load(Ordering::Relaxed) {
+        if let Ok(reading) = read
+            && reading.motion.is_finite()
+            && self.shared.attached.load(Ordering::Relaxed)
+        {
             self.sequence += 1;
             self.up.publish(Some(Sample { sequence: self.sequence, device_time_ns: now_ns, reading }));
             self.bell.ring();
         }
-        self.count(&tick, reading.motion.is_finite());
+        self.count(&tick, motion.is_finite());
         match tick.verdict.link {
-            Link::Latched(Fault::Requested) => ControlFlow::Break(()),
+            Link::Latched(Fault::Requested | Fault::Device) => ControlFlow::Break(()),
             Link::Latched(_) if self.shared.stop.load(Ordering::Relaxed) => ControlFlow::Break(()),
             _ => ControlFlow::Continue(()),
         }
@@ -247,7 +258,8 @@ mod tests {
         }));
         let servo = Servo {
             law: ServoLaw::new(settings.servo),
-            device: Device::Witness(Arc::clone(&witness)),
+            device: Box::new(Arc::clone(&witness)),
+            last: None,
             down,
             up,
             bell: Doorbell::new().unwrap(),

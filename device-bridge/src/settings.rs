@@ -1,7 +1,8 @@
 //! What the configuration means: checked, in the types that the loop and the uplink use.
 use crate::{
     BridgeError, Config,
-    config::{DeviceConfig, SimulatedConfig},
+    config::{DeviceConfig, HapticMasterConfig, LimitsConfig, SimulatedConfig},
+    device::hapticmaster::{Dialect, frame::Frame, start::StartSettings},
 };
 use glam::DVec3;
 use palpate_control::{
@@ -12,6 +13,10 @@ use palpate_proto::connect::{self, ConnectError};
 use palpate_realtime::OsMeasures;
 use std::time::Duration;
 use tonic::transport::Endpoint;
+
+/// What a HapticMASTER can be made to feel like (kg).
+const LEAST_INERTIA_KG: f64 = 2.0;
+const MOST_INERTIA_KG: f64 = 100.0;
 
 /// The whole bridge.
 #[derive(Debug, Clone)]
@@ -73,6 +78,8 @@ pub struct ServoSettings {
 pub enum DeviceSettings {
     /// The simulated one.
     Simulated(SimulatedArm),
+    /// A HapticMASTER.
+    HapticMaster(StartSettings),
 }
 
 impl Settings {
@@ -197,6 +204,7 @@ fn unusable(error: ConnectError) -> BridgeError {
 fn device(config: &Config, period_s: f64) -> Result<DeviceSettings, BridgeError> {
     match &config.device {
         DeviceConfig::Simulated(simulated) => Ok(DeviceSettings::Simulated(simulated_arm(simulated, period_s)?)),
+        DeviceConfig::Hapticmaster(arm) => Ok(DeviceSettings::HapticMaster(hapticmaster(arm, &config.limits)?)),
     }
 }
 
@@ -215,6 +223,24 @@ fn simulated_arm(config: &SimulatedConfig, period_s: f64) -> Result<SimulatedArm
         hand_damping_n_s_per_m: config.hand_damping_n_s_per_m,
     };
     SimulatedArm::new(spec, path, period_s).map_err(|error| parameter("device", &error))
+}
+
+fn hapticmaster(config: &HapticMasterConfig, limits: &LimitsConfig) -> Result<StartSettings, BridgeError> {
+    let frame = Frame::new(&config.axes, DVec3::from_array(config.origin_m))
+        .map_err(|error| value("device.axes", error.to_string()))?;
+    if !(LEAST_INERTIA_KG..=MOST_INERTIA_KG).contains(&config.inertia_kg) {
+        let range = format!("{} is out of range: use {LEAST_INERTIA_KG} to {MOST_INERTIA_KG}", config.inertia_kg);
+        return Err(value("device.inertia_kg", range));
+    }
+    Ok(StartSettings {
+        address: config.address.clone(),
+        frame,
+        dialect: if config.apart { Dialect::Apart } else { Dialect::Mixed },
+        inertia_kg: config.inertia_kg,
+        max_force_n: limits.max_force_n,
+        homing: seconds("device.homing_s", config.homing_s)?,
+        silence: seconds("device.silence_s", config.silence_s)?,
+    })
 }
 
 fn measures(config: &Config) -> Result<OsMeasures, BridgeError> {
@@ -282,7 +308,7 @@ mod tests {
         assert!(refused(|c| c.server.device_name = "x".repeat(65)).starts_with("server.device_name"));
         assert!(refused(|c| c.server.device_name = "a\u{1b}b".into()).starts_with("server.device_name"));
         assert!(refused(|c| c.server.tool = "a\n".into()).starts_with("server.tool"));
-        let DeviceConfig::Simulated(simulated) = DeviceConfig::default();
+        let simulated = SimulatedConfig::default();
         let bad = KeyframeConfig { time_s: -1.0, position_m: [0.0; 3] };
         let device = SimulatedConfig { keyframes: vec![bad], ..simulated };
         assert!(refused(|c| c.device = DeviceConfig::Simulated(device)).starts_with("device.keyframes: keyframe 0"));

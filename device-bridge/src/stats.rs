@@ -1,4 +1,5 @@
 //! What the bridge counts. Written by the servo and the uplink, read by anybody.
+use crate::device;
 use palpate_control::{Fault, Link};
 use palpate_realtime::{Histogram, LoopMonitor, Percentiles};
 use std::{
@@ -66,6 +67,8 @@ pub struct Stats {
     recent_peak_n: AtomicU64,
     force_n: AtomicU64,
     link: AtomicU8,
+    /// 0: none; else its place among [`device::Fault::ALL`], from 1.
+    device_fault: AtomicU8,
     servo: OnceLock<Arc<LoopMonitor>>,
 }
 
@@ -101,6 +104,17 @@ impl Stats {
         f64::from_bits(self.recent_peak_n.swap(0, Ordering::Relaxed))
     }
 
+    /// Why the arm was lost, if it was.
+    pub fn device_fault(&self) -> Option<device::Fault> {
+        let place = usize::from(self.device_fault.load(Ordering::Relaxed)).checked_sub(1)?;
+        device::Fault::ALL.get(place).copied()
+    }
+
+    pub(crate) fn set_device_fault(&self, fault: device::Fault) {
+        let place = device::Fault::ALL.iter().position(|known| *known == fault).unwrap_or(0);
+        self.device_fault.store(place as u8 + 1, Ordering::Relaxed);
+    }
+
     pub(crate) fn set_link(&self, link: Link) {
         self.link.store(code_of(link), Ordering::Relaxed);
     }
@@ -134,7 +148,7 @@ impl Stats {
     }
 }
 
-const FAULTS: [Fault; 4] = [Fault::Stale, Fault::NonFinite, Fault::Peer, Fault::Requested];
+const FAULTS: [Fault; 5] = [Fault::Stale, Fault::NonFinite, Fault::Peer, Fault::Requested, Fault::Device];
 
 fn code_of(link: Link) -> u8 {
     let index = |fault| FAULTS.iter().position(|f| *f == fault).unwrap_or(0) as u8;
@@ -192,6 +206,7 @@ pub(crate) fn reason(fault: Fault) -> &'static str {
         Fault::NonFinite => "the arm's position is not finite",
         Fault::Peer => "the daemon stopped the force",
         Fault::Requested => "stopping",
+        Fault::Device => "the arm is lost",
     }
 }
 

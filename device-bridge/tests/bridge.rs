@@ -214,7 +214,7 @@ async fn the_local_model_is_rendered_beside_the_arm() {
     });
     let (address, _stop, _serving) = mock.serve("127.0.0.1:0").await;
     let mut config = config(&format!("http://{address}"));
-    let palpate_bridge::config::DeviceConfig::Simulated(arm) = &mut config.device;
+    let palpate_bridge::config::DeviceConfig::Simulated(arm) = &mut config.device else { unreachable!() };
     arm.keyframes[0].position_m = [0.0, 0.0, -0.003];
     let bridge = start(config);
     // Springs in series: 300 (−3 mm − z) = 500 z, z = −1.125 mm, 0.5625 N.

@@ -4,8 +4,10 @@ use assert_no_alloc::{AllocDisabler, assert_no_alloc};
 use glam::{DMat3, DVec3};
 use palpate_bridge::{
     Config,
+    config::{DeviceConfig, HapticMasterConfig},
     convert::Command,
-    device::Device,
+    device,
+    emulate::hapticmaster::{self as emulate, HapticMaster},
     run::Shared,
     servo::{Servo, ServoLaw},
     settings::Settings,
@@ -27,7 +29,8 @@ fn the_servo_allocates_nothing() {
     shared.attached.store(true, Ordering::Relaxed);
     let mut servo = Servo {
         law: ServoLaw::new(settings.servo),
-        device: Device::open(&settings.device),
+        device: device::open(&settings.device, 1e-3).unwrap(),
+        last: None,
         down,
         up,
         bell: Doorbell::new().unwrap(),
@@ -62,4 +65,26 @@ fn the_servo_allocates_nothing() {
     thread.join().unwrap();
     assert!(samples.take().is_some_and(|sample| sample.is_some_and(|sample| sample.sequence > 10)));
     assert!(shared.stats.summary().peak_force_n > 0.1);
+}
+
+/// A real arm's driver: its sockets, its text, its numbers.
+#[test]
+fn the_hapticmasters_driver_allocates_nothing() {
+    let emulated = HapticMaster::listen("127.0.0.1:0", emulate::Settings::default()).unwrap();
+    let mut config = Config::default();
+    let address = emulated.address().to_string();
+    config.device = DeviceConfig::Hapticmaster(HapticMasterConfig { address, ..HapticMasterConfig::default() });
+    let runtime = tokio::runtime::Builder::new_current_thread().build().unwrap();
+    let settings = runtime.block_on(async { Settings::new(&config).unwrap() });
+    let mut arm = device::open(&settings.device, 1e-3).unwrap();
+    let answered = emulated.requests();
+    for tick in 0..300 {
+        std::thread::sleep(std::time::Duration::from_millis(1));
+        // A busy machine is late: nothing is told here of how long an answer took.
+        assert_no_alloc(|| {
+            arm.read(0).unwrap();
+            arm.apply(DVec3::new(1e-7, -1.0 / 3.0, f64::from(tick)));
+        });
+    }
+    assert!(emulated.requests() > answered + 30);
 }

@@ -1,10 +1,14 @@
-//! Arms. One today; a driver for a real one adds a variant.
+//! Arms: one file or folder for each, behind one small trait.
+pub mod hapticmaster;
 pub mod simulated;
 
-use crate::settings::DeviceSettings;
+use crate::{BridgeError, settings::DeviceSettings};
 use glam::DVec3;
+use hapticmaster::{HapticMaster, start};
 use palpate_control::Motion;
 use simulated::SimulatedDevice;
+use std::fmt::Debug;
+use thiserror::Error;
 
 /// What an arm measures at one time.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -17,39 +21,55 @@ pub struct Reading {
     pub measured_force_n: Option<DVec3>,
 }
 
-/// An attached arm, used by the servo thread alone. Neither call may block, allocate or log.
-#[derive(Debug)]
-pub enum Device {
-    /// No hardware.
-    Simulated(SimulatedDevice),
-    /// No arm at all: a test looks at its force.
-    #[cfg(test)]
-    Witness(std::sync::Arc<Witness>),
+/// Why an arm is of no use any more.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Error)]
+pub enum Fault {
+    /// Nothing has come from it for too long.
+    #[error("it has stopped answering")]
+    Silent,
+    /// What comes is not its protocol.
+    #[error("what it sends is not its protocol")]
+    Garbled,
+    /// It says no.
+    #[error("it refused a command")]
+    Refused,
+    /// Somebody pressed the button.
+    #[error("its emergency stop is pressed")]
+    EmergencyStop,
+    /// The connection ended.
+    #[error("the connection to it ended")]
+    Disconnected,
 }
 
-impl Device {
-    /// Opens the arm that the configuration names.
-    pub fn open(settings: &DeviceSettings) -> Self {
-        match settings {
-            DeviceSettings::Simulated(arm) => Self::Simulated(SimulatedDevice::new(arm.clone())),
-        }
-    }
+impl Fault {
+    /// All of them.
+    pub const ALL: [Self; 5] = [Self::Silent, Self::Garbled, Self::Refused, Self::EmergencyStop, Self::Disconnected];
+}
 
+/// An arm that was opened, used by the servo thread alone. Neither call may block, allocate or log.
+pub trait Arm: Debug + Send {
     /// Reads the arm. `periods` servo periods have passed since the last reading, 1 unless ticks were skipped.
-    pub fn read(&mut self, periods: u64) -> Reading {
-        match self {
-            Self::Simulated(device) => device.read(periods),
-            #[cfg(test)]
-            Self::Witness(witness) => witness.read(),
-        }
-    }
+    ///
+    /// # Errors
+    /// A [`Fault`], from then on every time: the arm has to be opened anew.
+    fn read(&mut self, periods: u64) -> Result<Reading, Fault>;
 
     /// Puts a force (N, world) on the arm, held until the next call.
-    pub fn apply(&mut self, force_n: DVec3) {
-        match self {
-            Self::Simulated(device) => device.apply(force_n),
-            #[cfg(test)]
-            Self::Witness(witness) => witness.apply(force_n),
+    fn apply(&mut self, force_n: DVec3);
+}
+
+/// Opens the arm that the configuration names, however long that takes.
+///
+/// # Errors
+/// [`BridgeError::Start`].
+pub fn open(settings: &DeviceSettings, period_s: f64) -> Result<Box<dyn Arm>, BridgeError> {
+    match settings {
+        DeviceSettings::Simulated(arm) => Ok(Box::new(SimulatedDevice::new(arm.clone()))),
+        DeviceSettings::HapticMaster(settings) => {
+            let started = start::start(settings).map_err(|source| BridgeError::Start { source: Box::new(source) })?;
+            tracing::info!("the HapticMASTER at {} is started: {}", settings.address, started.version);
+            let arm = HapticMaster::new(started, settings, period_s);
+            Ok(Box::new(arm.map_err(|source| BridgeError::System { what: "read the arm without waiting", source })?))
         }
     }
 }
@@ -79,13 +99,24 @@ impl Witness {
         self.force_n.lock().unwrap().1
     }
 
-    fn read(&self) -> Reading {
+    fn read_now(&self) -> Reading {
         assert!(self.reads.fetch_add(1, std::sync::atomic::Ordering::Relaxed) < self.panics_at, "the driver fails");
         Reading { motion: Motion::at(DVec3::ZERO), buttons: 0, measured_force_n: None }
     }
 
-    fn apply(&self, force_n: DVec3) {
+    fn hold(&self, force_n: DVec3) {
         let mut held = self.force_n.lock().unwrap();
         *held = (force_n.length(), held.1.max(force_n.length()));
+    }
+}
+
+#[cfg(test)]
+impl Arm for std::sync::Arc<Witness> {
+    fn read(&mut self, _: u64) -> Result<Reading, Fault> {
+        Ok(self.read_now())
+    }
+
+    fn apply(&mut self, force_n: DVec3) {
+        self.hold(force_n);
     }
 }

@@ -1,5 +1,5 @@
 //! The simulated arm as a device: it lives in servo time, so it moves by as many periods as really passed.
-use super::Reading;
+use super::{Arm, Fault, Reading};
 use glam::DVec3;
 use palpate_control::SimulatedArm;
 
@@ -18,17 +18,18 @@ impl SimulatedDevice {
     pub fn new(arm: SimulatedArm) -> Self {
         Self { arm, force_n: DVec3::ZERO }
     }
+}
 
+impl Arm for SimulatedDevice {
     /// Moves on under the force held, and reads.
-    pub fn read(&mut self, periods: u64) -> Reading {
+    fn read(&mut self, periods: u64) -> Result<Reading, Fault> {
         for _ in 0..periods.min(LONGEST_GAP) {
             self.arm.step(self.force_n);
         }
-        Reading { motion: self.arm.motion(), buttons: 0, measured_force_n: Some(self.arm.hand_force_n()) }
+        Ok(Reading { motion: self.arm.motion(), buttons: 0, measured_force_n: Some(self.arm.hand_force_n()) })
     }
 
-    /// Holds a force (N).
-    pub fn apply(&mut self, force_n: DVec3) {
+    fn apply(&mut self, force_n: DVec3) {
         self.force_n = force_n;
     }
 }
@@ -45,9 +46,9 @@ mod tests {
         steady.apply(DVec3::X);
         skipping.apply(DVec3::X);
         for _ in 0..6 {
-            steady.read(1);
+            steady.read(1).unwrap();
         }
-        skipping.read(1);
+        skipping.read(1).unwrap();
         assert_eq!(skipping.read(5), steady.read(0));
     }
 }

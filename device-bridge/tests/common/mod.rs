@@ -2,7 +2,7 @@
 #![allow(dead_code, unreachable_pub, missing_docs, clippy::unwrap_used)] // helpers of tests; each file uses a part
 use palpate_bridge::{
     Config, Handle,
-    config::{DeviceConfig, KeyframeConfig, RealtimeConfig},
+    config::{DeviceConfig, KeyframeConfig, RealtimeConfig, SimulatedConfig},
 };
 use palpate_proto::v1::{
     self, DeviceDown, DeviceUp,
@@ -203,8 +203,8 @@ pub fn config(url: &str) -> Config {
     config.watchdog.stale_after_s = 0.25;
     config.watchdog.ramp_to_zero_s = 0.05;
     config.watchdog.ramp_up_s = 0.05;
-    let DeviceConfig::Simulated(arm) = &mut config.device;
-    arm.keyframes = vec![KeyframeConfig { time_s: 0.0, position_m: [0.0; 3] }];
+    let keyframes = vec![KeyframeConfig { time_s: 0.0, position_m: [0.0; 3] }];
+    config.device = DeviceConfig::Simulated(SimulatedConfig { keyframes, ..SimulatedConfig::default() });
     config.realtime = RealtimeConfig { fifo_priority: 0, lock_memory: false, processor: None, stay_awake: false };
     config
 }

@@ -56,8 +56,10 @@ pub enum Fault {
     NonFinite,
     /// The other side said so (quarantined body, shutdown, another scene).
     Peer,
-    /// Somebody asked for it (emergency stop, signal, end of the program).
+    /// Somebody asked for it (signal, end of the program).
     Requested,
+    /// The arm itself failed, or was stopped.
+    Device,
 }
 
 /// State of the link.

@@ -111,7 +111,9 @@ impl Refiner {
         let quantum_m =
             power_of_two(quantum_exponent(moved_m.iter().map(|u| u.abs().max_element()).fold(0.0, f64::max)));
         let mut moved = BytesMut::with_capacity(moved_m.len() * 6);
-        moved_m.iter().for_each(|u| put(&mut moved, (*u / f64::from(quantum_m)).to_array().map(|c| c.round() as i16)));
+        for u in &moved_m {
+            put(&mut moved, (*u / f64::from(quantum_m)).to_array().map(|c| c.round() as i16));
+        }
         v1::RefinedSurface {
             replaced_u32le: little_endian(patch.replaced.iter().copied()),
             triangles_u32le: little_endian(patch.triangles.iter().flatten().copied()),
@@ -171,7 +173,7 @@ impl Patch {
                 let [a, b, c] = surface.triangles()[triangle as usize].map(corner);
                 match surface.edges_of(triangle).each_ref().map(middle) {
                     [Some(ab), Some(bc), Some(ca)] => {
-                        triangles.extend([[a, ab, ca], [ab, b, bc], [ca, bc, c], [ab, bc, ca]])
+                        triangles.extend([[a, ab, ca], [ab, b, bc], [ca, bc, c], [ab, bc, ca]]);
                     }
                     [Some(ab), _, _] => triangles.extend([[a, ab, c], [ab, b, c]]),
                     [_, Some(bc), _] => triangles.extend([[b, bc, a], [bc, c, a]]),

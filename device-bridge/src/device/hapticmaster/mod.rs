@@ -1,0 +1,240 @@
+//! HapticMASTER (FCS, Moog): an admittance arm over TCP. It measures the hand's force and moves as a mass would; ours goes to it as a bias force.
+//!
+//! Beside the loop nothing waits: a tick reads what has come and, when the last request is answered, sends the next one, which sets the force and asks for
+//! position, velocity and force. So a pose is a tick old, and at most one request is on its way.
+//!
+//! What only hardware can tell is named here: whether `set` and `get` go in one request ([`Dialect::Mixed`]) or each in its own, whether the arm lets go when the connection
+//! ends, and the sign and zero of its axes ([`frame::Frame`]).
+pub mod frame;
+pub mod grammar;
+pub mod start;
+
+use super::{Arm, Fault, Reading};
+use frame::Frame;
+use glam::DVec3;
+use grammar::Answer;
+use palpate_control::{Motion, extrapolate};
+use std::{
+    io::{ErrorKind, Read as _, Write as _},
+    net::TcpStream,
+    time::Duration,
+};
+
+/// Name of our effect on the arm.
+pub const EFFECT: &str = "palpate";
+/// A pose is believed to go on with its velocity for so long (s).
+const LONGEST_EXTRAPOLATION_S: f64 = 5e-3;
+/// Every so many requests the emergency stop is asked for, too.
+const STOP_ASKED_EVERY: u64 = 20;
+/// How long the end of the program waits for the arm to take the force away.
+const FAREWELL: Duration = Duration::from_millis(100);
+
+/// How commands are put into requests.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Dialect {
+    /// `set` and `get` in one.
+    Mixed,
+    /// `set` and `get` take turns: half as many poses a second.
+    Apart,
+}
+
+/// What the loop's requests ask for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Asked {
+    Nothing,
+    /// The force was set, and nothing asked for.
+    Set,
+    /// Motion and force; and whether the emergency stop is pressed; behind the answer of a `set`.
+    Motion {
+        with_stop: bool,
+        behind_set: bool,
+    },
+}
+
+/// The arm, started.
+#[derive(Debug)]
+pub struct HapticMaster {
+    stream: TcpStream,
+    frame: Frame,
+    dialect: Dialect,
+    period_s: f64,
+    /// Without an answer for so many periods the arm is lost.
+    silence_periods: u64,
+    /// Largest force (N) that is ever asked of it.
+    max_force_n: f64,
+    answer: Answer,
+    asked: Asked,
+    request: Vec<u8>,
+    text: Vec<u8>,
+    /// Sent bytes of `request`.
+    sent: usize,
+    force_n: DVec3,
+    reading: Reading,
+    /// Since the pose came.
+    age_periods: u64,
+    requests: u64,
+    lost: Option<Fault>,
+}
+
+impl HapticMaster {
+    /// A started arm, whose stream does not block from now on.
+    ///
+    /// # Errors
+    /// When the operating system refuses that.
+    pub fn new(started: start::Started, settings: &start::StartSettings, period_s: f64) -> std::io::Result<Self> {
+        started.stream.set_nonblocking(true)?;
+        Ok(Self {
+            stream: started.stream,
+            frame: settings.frame,
+            dialect: settings.dialect,
+            period_s,
+            silence_periods: (settings.silence.as_secs_f64() / period_s).ceil() as u64,
+            max_force_n: settings.max_force_n,
+            answer: Answer::new(),
+            asked: Asked::Nothing,
+            request: Vec::with_capacity(grammar::HEADER_BYTES + grammar::LONGEST_TEXT),
+            text: Vec::with_capacity(grammar::LONGEST_TEXT),
+            sent: 0,
+            force_n: DVec3::ZERO,
+            reading: Reading {
+                motion: Motion::at(settings.frame.to_world_m(started.position_m)),
+                buttons: 0,
+                measured_force_n: None,
+            },
+            age_periods: 0,
+            requests: 0,
+            lost: None,
+        })
+    }
+
+    /// Takes what has come; a whole answer renews the reading.
+    fn receive(&mut self) -> Result<(), Fault> {
+        let mut bytes = [0; 1024];
+        loop {
+            match self.stream.read(&mut bytes) {
+                Ok(0) => return Err(Fault::Disconnected),
+                // Nobody asked for these.
+                Ok(_) if self.asked == Asked::Nothing => return Err(Fault::Garbled),
+                Ok(count) => self.answer.take(&bytes[..count])?,
+                Err(error) if error.kind() == ErrorKind::WouldBlock => break,
+                Err(error) if error.kind() == ErrorKind::Interrupted => {}
+                Err(_) => return Err(Fault::Disconnected),
+            }
+        }
+        let ends_with_vector = matches!(self.asked, Asked::Motion { .. });
+        let Some(text) = self.answer.whole(ends_with_vector)? else { return Ok(()) };
+        if grammar::is_refusal(text) {
+            return Err(Fault::Refused);
+        }
+        let mut parts = grammar::parts(text);
+        if let Asked::Motion { with_stop, behind_set } = self.asked {
+            if behind_set {
+                parts.next().ok_or(Fault::Garbled)?;
+            }
+            if with_stop && parts.next().and_then(grammar::truth).ok_or(Fault::Garbled)? {
+                return Err(Fault::EmergencyStop);
+            }
+            let mut vector = || parts.next().and_then(grammar::vector).ok_or(Fault::Garbled);
+            let (position_m, velocity_m_per_s, force_n) = (vector()?, vector()?, vector()?);
+            if parts.next().is_some() {
+                return Err(Fault::Garbled);
+            }
+            self.reading.motion = Motion::at(self.frame.to_world_m(position_m));
+            self.reading.motion.velocity_m_per_s = self.frame.turned(velocity_m_per_s);
+            self.reading.measured_force_n = Some(self.frame.turned(force_n));
+            self.age_periods = 0;
+        }
+        self.asked = Asked::Nothing;
+        Ok(())
+    }
+
+    /// Sends the next request, when the last one is answered.
+    fn send(&mut self) -> Result<(), Fault> {
+        if self.asked == Asked::Nothing && self.sent == self.request.len() {
+            self.compose();
+        }
+        while self.sent < self.request.len() {
+            match self.stream.write(&self.request[self.sent..]) {
+                Ok(0) => return Err(Fault::Disconnected),
+                Ok(count) => self.sent += count,
+                Err(error) if error.kind() == ErrorKind::WouldBlock => break,
+                Err(error) if error.kind() == ErrorKind::Interrupted => {}
+                Err(_) => return Err(Fault::Disconnected),
+            }
+        }
+        Ok(())
+    }
+
+    fn compose(&mut self) {
+        self.requests += 1;
+        self.text.clear();
+        let mixed = self.dialect == Dialect::Mixed;
+        let sets = mixed || self.requests.is_multiple_of(2);
+        let mut commands = 0;
+        if sets {
+            let f = self.frame.from_world(self.force_n.clamp_length_max(self.max_force_n));
+            // Writing into a Vec cannot fail.
+            let _ = write!(self.text, "set {EFFECT} force [{:.5},{:.5},{:.5}]", f.x, f.y, f.z);
+            commands += 1;
+        }
+        self.asked = Asked::Set;
+        if mixed || !sets {
+            // At the rate of requests that ask for motion, in either dialect.
+            let asks = if mixed { self.requests } else { self.requests / 2 };
+            let with_stop = asks.is_multiple_of(STOP_ASKED_EVERY);
+            for command in with_stop.then_some("get emergencybuttonpushed").into_iter().chain(start::MOTION) {
+                if commands > 0 {
+                    self.text.push(b';');
+                }
+                self.text.extend_from_slice(command.as_bytes());
+                commands += 1;
+            }
+            self.asked = Asked::Motion { with_stop, behind_set: sets };
+        }
+        grammar::frame(&self.text, &mut self.request);
+        self.sent = 0;
+        self.answer.expect(commands);
+    }
+
+    fn lose(&mut self, fault: Fault) -> Fault {
+        *self.lost.get_or_insert(fault)
+    }
+}
+
+impl Arm for HapticMaster {
+    fn read(&mut self, periods: u64) -> Result<Reading, Fault> {
+        if let Some(fault) = self.lost {
+            return Err(fault);
+        }
+        self.age_periods = self.age_periods.saturating_add(periods);
+        self.receive().map_err(|fault| self.lose(fault))?;
+        if self.age_periods > self.silence_periods {
+            return Err(self.lose(Fault::Silent));
+        }
+        let age_s = self.age_periods as f64 * self.period_s;
+        Ok(Reading { motion: extrapolate(&self.reading.motion, age_s, LONGEST_EXTRAPOLATION_S), ..self.reading })
+    }
+
+    /// A lost arm is still told to let go, should it hear: every force is zero then.
+    fn apply(&mut self, force_n: DVec3) {
+        self.force_n = if self.lost.is_some() || !force_n.is_finite() { DVec3::ZERO } else { force_n };
+        if let Err(fault) = self.send() {
+            self.lose(fault);
+        }
+    }
+}
+
+impl Drop for HapticMaster {
+    /// Takes the effect away, if the arm still listens.
+    fn drop(&mut self) {
+        let _ = self.stream.set_nonblocking(false);
+        let _ = self.stream.set_read_timeout(Some(FAREWELL));
+        let _ = self.stream.set_write_timeout(Some(FAREWELL));
+        // What is left of the last request first, or the arm would take this for its end.
+        let _ = self.stream.write_all(&self.request[self.sent..]);
+        for text in [format!("set {EFFECT} force [0,0,0]"), "remove all".to_owned()] {
+            grammar::frame(text.as_bytes(), &mut self.request);
+            let _ = self.stream.write_all(&self.request).and_then(|()| self.stream.read(&mut [0; 1024]));
+        }
+    }
+}

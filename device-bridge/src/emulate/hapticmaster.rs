@@ -1,0 +1,361 @@
+//! A HapticMASTER that is not there. `m a = F_hand + Σ F_effects − b v`, in steps of 1 ms of real time; its effects end with the connection.
+use super::Faults;
+use crate::device::hapticmaster::grammar;
+use glam::DVec3;
+use palpate_control::{ArmSpec, HandPath, ParameterError, SimulatedArm};
+use std::{
+    collections::BTreeMap,
+    io::{ErrorKind, Read as _, Write as _},
+    net::{SocketAddr, TcpListener, TcpStream},
+    sync::{
+        Arc, Mutex, MutexGuard, PoisonError,
+        atomic::{AtomicBool, Ordering},
+    },
+    thread::JoinHandle,
+    time::{Duration, Instant},
+};
+
+/// Step of its motion (s).
+const STEP_S: f64 = 1e-3;
+/// What it bears at most (N).
+const MAX_FORCE_N: f64 = 100.0;
+/// The inertia it cannot be set below (kg).
+const LEAST_INERTIA_KG: f64 = 2.0;
+/// How often it looks whether it shall stop, when nothing comes.
+const LOOK_EVERY: Duration = Duration::from_millis(1);
+
+/// How it speaks, and who holds it.
+#[derive(Debug, Clone)]
+pub struct Settings {
+    /// Answers begin with a header as requests do.
+    pub headers: bool,
+    /// Words and truth values in quotation marks, as in older versions; else with `;` behind.
+    pub quoted: bool,
+    /// Refuses `set` and `get` in one request.
+    pub apart: bool,
+    /// How long finding home takes; `None`: it knows where it is.
+    pub homing: Option<Duration>,
+    /// Friction (N s/m) and hand; the mass is set over the wire.
+    pub arm: ArmSpec,
+    /// Where the hand goes (m, the arm's axes).
+    pub path: HandPath,
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Self {
+            headers: true,
+            quoted: false,
+            apart: false,
+            homing: Some(Duration::from_millis(300)),
+            arm: ArmSpec { mass_kg: LEAST_INERTIA_KG, damping_n_s_per_m: 8.0, ..ArmSpec::default() },
+            path: HandPath::resting_at(DVec3::ZERO),
+        }
+    }
+}
+
+/// It runs until dropped.
+#[derive(Debug)]
+pub struct HapticMaster {
+    address: SocketAddr,
+    /// What it does wrong.
+    pub faults: Arc<Faults>,
+    machine: Arc<Mutex<Machine>>,
+    stop: Arc<AtomicBool>,
+    thread: Option<JoinHandle<()>>,
+}
+
+impl HapticMaster {
+    /// Listens at an address, with a thread of its own.
+    ///
+    /// # Errors
+    /// When the address is taken, or the arm's constants are out of range.
+    pub fn listen(address: &str, settings: Settings) -> std::io::Result<Self> {
+        let listener = TcpListener::bind(address)?;
+        listener.set_nonblocking(true)?;
+        let address = listener.local_addr()?;
+        let machine = Machine::new(settings).map_err(|error| std::io::Error::new(ErrorKind::InvalidInput, error))?;
+        let (machine, faults, stop) =
+            (Arc::new(Mutex::new(machine)), Arc::<Faults>::default(), Arc::<AtomicBool>::default());
+        let server = Server { machine: Arc::clone(&machine), faults: Arc::clone(&faults), stop: Arc::clone(&stop) };
+        let thread = std::thread::Builder::new().name("hapticmaster".into()).spawn(move || server.run(&listener))?;
+        Ok(Self { address, faults, machine, stop, thread: Some(thread) })
+    }
+
+    /// Where it listens.
+    pub fn address(&self) -> SocketAddr {
+        self.address
+    }
+
+    /// Force (N, the arm's axes) of all effects on it now.
+    pub fn effect_n(&self) -> DVec3 {
+        let mut machine = lock(&self.machine);
+        machine.go_on();
+        machine.effect_n()
+    }
+
+    /// Where it is (m, its own axes).
+    pub fn position_m(&self) -> DVec3 {
+        let mut machine = lock(&self.machine);
+        machine.go_on();
+        machine.arm.motion().position_m
+    }
+
+    /// Requests answered so far.
+    pub fn requests(&self) -> u64 {
+        lock(&self.machine).requests
+    }
+}
+
+impl Drop for HapticMaster {
+    fn drop(&mut self) {
+        self.stop.store(true, Ordering::Relaxed);
+        if let Some(thread) = self.thread.take() {
+            let _ = thread.join();
+        }
+    }
+}
+
+fn lock(machine: &Mutex<Machine>) -> MutexGuard<'_, Machine> {
+    machine.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+struct Server {
+    machine: Arc<Mutex<Machine>>,
+    faults: Arc<Faults>,
+    stop: Arc<AtomicBool>,
+}
+
+impl Server {
+    fn run(&self, listener: &TcpListener) {
+        while !Faults::is(&self.stop) {
+            match listener.accept() {
+                Ok((stream, _)) => {
+                    let _ = self.serve(stream);
+                    lock(&self.machine).effects.clear();
+                }
+                Err(_) => std::thread::sleep(LOOK_EVERY),
+            }
+        }
+    }
+
+    fn serve(&self, mut stream: TcpStream) -> std::io::Result<()> {
+        stream.set_nonblocking(false)?;
+        stream.set_nodelay(true)?;
+        stream.set_read_timeout(Some(LOOK_EVERY))?;
+        let mut waiting = Vec::new();
+        let mut bytes = [0; 1024];
+        while !Faults::is(&self.stop) && !Faults::is(&self.faults.cut) {
+            match stream.read(&mut bytes) {
+                Ok(0) => return Ok(()),
+                Ok(count) => waiting.extend_from_slice(&bytes[..count]),
+                Err(error) if matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut) => continue,
+                Err(error) => return Err(error),
+            }
+            while let Some(text) = next_request(&mut waiting) {
+                self.answer(&mut stream, &text)?;
+            }
+        }
+        Ok(())
+    }
+
+    fn answer(&self, stream: &mut TcpStream, text: &str) -> std::io::Result<()> {
+        let (answer, headers) = {
+            let mut machine = lock(&self.machine);
+            machine.go_on();
+            machine.stopped = Faults::is(&self.faults.emergency_stop);
+            machine.requests += 1;
+            (machine.obey(text), machine.settings.headers)
+        };
+        let slow = self.faults.slow_us.load(Ordering::Relaxed);
+        std::thread::sleep(Duration::from_micros(slow.into()));
+        if Faults::is(&self.faults.silence) {
+            return Ok(());
+        }
+        let mut bytes = Vec::new();
+        if Faults::is(&self.faults.garbage) {
+            bytes.extend((0..64_u8).map(|i| i.wrapping_mul(37).wrapping_add(129)));
+        } else if headers {
+            grammar::frame(answer.as_bytes(), &mut bytes);
+        } else {
+            bytes.extend_from_slice(answer.as_bytes());
+        }
+        if Faults::is(&self.faults.split) {
+            return bytes.iter().try_for_each(|byte| stream.write_all(&[*byte]).and_then(|()| stream.flush()));
+        }
+        stream.write_all(&bytes)
+    }
+}
+
+/// Takes a whole request out of what came.
+fn next_request(waiting: &mut Vec<u8>) -> Option<String> {
+    let length = usize::from(*waiting.get(3)?);
+    let end = grammar::HEADER_BYTES + length;
+    if waiting.len() < end {
+        return None;
+    }
+    let text = String::from_utf8_lossy(&waiting[grammar::HEADER_BYTES..end]).into_owned();
+    waiting.drain(..end);
+    Some(text)
+}
+
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum State {
+    Off,
+    Init(Instant),
+    Stop,
+    Force,
+}
+
+#[derive(Debug)]
+struct Machine {
+    settings: Settings,
+    arm: SimulatedArm,
+    state: State,
+    homed: bool,
+    stopped: bool,
+    /// Force (N) of each, and whether it is enabled.
+    effects: BTreeMap<String, (DVec3, bool)>,
+    began: Option<Instant>,
+    steps: u64,
+    requests: u64,
+}
+
+impl Machine {
+    fn new(settings: Settings) -> Result<Self, ParameterError> {
+        Ok(Self {
+            arm: SimulatedArm::new(settings.arm, settings.path.clone(), STEP_S)?,
+            state: State::Off,
+            homed: settings.homing.is_none(),
+            stopped: false,
+            effects: BTreeMap::new(),
+            began: None,
+            steps: 0,
+            requests: 0,
+            settings,
+        })
+    }
+
+    fn effect_n(&self) -> DVec3 {
+        if self.state != State::Force || self.stopped {
+            return DVec3::ZERO;
+        }
+        let sum: DVec3 = self.effects.values().filter(|(_, enabled)| *enabled).map(|(force_n, _)| *force_n).sum();
+        sum.clamp_length_max(MAX_FORCE_N)
+    }
+
+    /// Motion up to now; the hand begins on its path with the first force.
+    fn go_on(&mut self) {
+        if let State::Init(since) = self.state
+            && since.elapsed() >= self.settings.homing.unwrap_or_default()
+        {
+            (self.state, self.homed) = (State::Stop, true);
+        }
+        let Some(began) = self.began else { return };
+        let due = (began.elapsed().as_secs_f64() / STEP_S) as u64;
+        let force_n = self.effect_n();
+        while self.steps < due {
+            self.arm.step(force_n);
+            self.steps += 1;
+        }
+    }
+
+    fn obey(&mut self, text: &str) -> String {
+        let commands: Vec<&str> = text.split(';').map(str::trim).collect();
+        let is_get = |command: &&str| command.starts_with("get ");
+        if self.settings.apart && commands.iter().any(is_get) && !commands.iter().all(is_get) {
+            return "--- ERROR: set and get in one request".into();
+        }
+        let answers: Vec<String> = commands.into_iter().map(|command| self.command(command)).collect();
+        // One `;` between two answers, whatever each ends with.
+        let trimmed = |answer: &String| answer.trim_end_matches(';').to_owned();
+        match &answers[..] {
+            [one] => one.clone(),
+            _ => answers.iter().map(trimmed).collect::<Vec<_>>().join(";"),
+        }
+    }
+
+    fn command(&mut self, command: &str) -> String {
+        let words: Vec<&str> = command.split_whitespace().collect();
+        match words[..] {
+            ["get", what] => self.get(what),
+            ["remove", "all"] => {
+                self.effects.clear();
+                "Removed".into()
+            }
+            ["create", "biasforce", name] => {
+                self.effects.insert(name.to_owned(), (DVec3::ZERO, false));
+                format!("Effect biasforce with name {name} created")
+            }
+            ["set", "state", state] => self.set_state(state),
+            ["set", "inertia", kg] => self.set_inertia(kg),
+            ["set", name, ref what @ ..] => match (self.effects.get_mut(name), what) {
+                (Some(effect), ["force", vector]) => match grammar::vector(vector) {
+                    Some(force_n) => {
+                        effect.0 = force_n;
+                        "Biasforce's force set".into()
+                    }
+                    None => unknown(command),
+                },
+                (Some(effect), ["enable" | "disable"]) => {
+                    effect.1 = what[0] == "enable";
+                    format!("Effect {}d", what[0])
+                }
+                _ => unknown(command),
+            },
+            _ => unknown(command),
+        }
+    }
+
+    fn get(&self, what: &str) -> String {
+        let motion = self.arm.motion();
+        let vector = |v: DVec3| format!("[{},{},{}]", v.x, v.y, v.z);
+        let word = |text: &str| if self.settings.quoted { format!("\"{text}\"") } else { format!("{text};") };
+        match what {
+            "modelpos" | "measpos" => vector(motion.position_m),
+            "modelvel" => vector(motion.velocity_m_per_s),
+            "measforce" => vector(self.arm.hand_force_n()),
+            "os" => word("palpate emulator"),
+            "emergencybuttonpushed" => word(if self.stopped { "true" } else { "false" }),
+            "position_calibrated" => word(if self.homed { "true" } else { "false" }),
+            "state" => word(match self.state {
+                State::Off => "off",
+                State::Init(_) => "init",
+                State::Stop => "stop",
+                State::Force => "force",
+            }),
+            _ => unknown(what),
+        }
+    }
+
+    fn set_state(&mut self, state: &str) -> String {
+        self.state = match state {
+            "init" => State::Init(Instant::now()),
+            "stop" => State::Stop,
+            "off" => State::Off,
+            "force" if self.homed => State::Force,
+            "force" => return "--- ERROR: position not calibrated".into(),
+            _ => return unknown(state),
+        };
+        if self.state == State::Force {
+            self.began.get_or_insert_with(Instant::now);
+        }
+        format!("state set to '{state}'")
+    }
+
+    fn set_inertia(&mut self, kg: &str) -> String {
+        let kg: f64 = kg.parse().unwrap_or(f64::NAN);
+        let spec = ArmSpec { mass_kg: kg, ..self.settings.arm };
+        match SimulatedArm::new(spec, self.settings.path.clone(), STEP_S) {
+            Ok(arm) if kg >= LEAST_INERTIA_KG && self.began.is_none() => {
+                self.arm = arm;
+                "Inertia set".into()
+            }
+            _ => format!("--- ERROR: inertia must be at least {LEAST_INERTIA_KG}"),
+        }
+    }
+}
+
+fn unknown(command: &str) -> String {
+    format!("--- ERROR: unknown command {command}")
+}

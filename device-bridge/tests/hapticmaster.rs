@@ -1,0 +1,244 @@
+//! The HapticMASTER's driver against its emulator, over real sockets: beneath a bridge, and alone.
+#![allow(clippy::unwrap_used)]
+mod common;
+
+use common::{Mock, config, start, until};
+use glam::DVec3;
+use palpate_bridge::{
+    BridgeError, Config, Summary,
+    config::{DeviceConfig, HapticMasterConfig, KeyframeConfig, SimulatedConfig},
+    device::{Arm as _, Fault, hapticmaster as driver},
+    emulate::{
+        Faults,
+        hapticmaster::{HapticMaster, Settings},
+    },
+};
+use palpate_control::{HandPath, Keyframe};
+use palpate_proto::v1;
+use std::{
+    sync::atomic::Ordering,
+    time::{Duration, Instant},
+};
+
+fn emulator(change: impl FnOnce(&mut Settings)) -> HapticMaster {
+    let mut settings = Settings::default();
+    change(&mut settings);
+    HapticMaster::listen("127.0.0.1:0", settings).unwrap()
+}
+
+/// The arm's x, y, z point along the world's −y, +x, +z, and its origin is elsewhere.
+fn arm_config(emulator: &HapticMaster, apart: bool) -> HapticMasterConfig {
+    HapticMasterConfig {
+        address: emulator.address().to_string(),
+        axes: ["-y", "+x", "+z"].map(str::to_owned),
+        origin_m: ORIGIN_M.to_array(),
+        apart,
+        // Patient with a busy test machine.
+        silence_s: 0.5,
+        ..HapticMasterConfig::default()
+    }
+}
+
+const ORIGIN_M: DVec3 = DVec3::new(0.1, 0.0, -0.2);
+
+fn to_arm(world_m: DVec3) -> DVec3 {
+    let d = world_m - ORIGIN_M;
+    DVec3::new(-d.y, d.x, d.z)
+}
+
+fn bridged(url: &str, device: DeviceConfig) -> Config {
+    Config { device, ..config(url) }
+}
+
+/// A wall of 400 N/m whose surface is at z = 0.
+fn wall() -> v1::LocalContactModel {
+    let vec = |x, y, z| Some(v1::Vec3 { x, y, z });
+    v1::LocalContactModel {
+        point_m: vec(0.0, 0.0, 0.0),
+        normal: vec(0.0, 0.0, 1.0),
+        force_n: vec(0.0, 0.0, 0.0),
+        stiffness_n_per_m: Some(v1::Mat3 { column_major: vec![0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, -400.0] }),
+        validity_radius_m: 0.05,
+        tick: 1_000_000,
+        max_force_n: 3.0,
+    }
+}
+
+/// From above the wall into it, where it stays; the hand is the same on either arm.
+const PRESS: [(f64, f64); 3] = [(0.0, 2e-3), (0.5, 2e-3), (1.5, -5e-3)];
+
+/// Presses; returns the force (N) that the hand's end depth asks for, once nothing moves.
+async fn pressed_n(device: impl FnOnce() -> DeviceConfig) -> (f64, Summary) {
+    let mock = Mock::default();
+    mock.set(|behaviour| behaviour.local_model = Some(wall()));
+    let (address, _stop, _serving) = mock.serve("127.0.0.1:0").await;
+    let bridge = start(bridged(&format!("http://{address}"), device()));
+    let stats = bridge.handle.stats();
+    until("it presses", || stats.force_n() > 0.5).await;
+    let (mut last_n, mut still) = (0.0_f64, 0);
+    until("it has come to rest", || {
+        still = if (stats.force_n() - last_n).abs() < 2e-4 { still + 1 } else { 0 };
+        last_n = stats.force_n();
+        still > 250
+    })
+    .await;
+    (last_n, bridge.stop().await)
+}
+
+fn simulated() -> DeviceConfig {
+    let key = |(time_s, z)| KeyframeConfig { time_s, position_m: [0.0, 0.0, z] };
+    DeviceConfig::Simulated(SimulatedConfig {
+        period_s: None,
+        keyframes: PRESS.map(key).to_vec(),
+        ..SimulatedConfig::default()
+    })
+}
+
+fn held(settings: &mut Settings) {
+    let key = |(time_s, z)| Keyframe { time_s, position_m: to_arm(DVec3::new(0.0, 0.0, z)) };
+    settings.path = HandPath::new(PRESS.map(key).to_vec(), None).unwrap();
+    // The hand holds the heavier arm as firmly; it is damped like it.
+    settings.arm.hand_damping_n_s_per_m = 40.0;
+}
+
+/// An admittance arm takes the same press to the same force: within 5 %, in every dialect.
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn a_press_ends_at_the_force_of_the_simulated_arm() {
+    let (expected_n, _) = pressed_n(simulated).await;
+    // 300 (5 mm − d) = 400 d: springs in series.
+    assert!((expected_n - 400.0 * 300.0 * 5e-3 / 700.0).abs() < 0.01, "{expected_n}");
+    for (headers, quoted, apart) in [(true, false, false), (false, true, false), (true, true, true)] {
+        let arm = emulator(|settings| {
+            held(settings);
+            (settings.headers, settings.quoted, settings.apart) = (headers, quoted, apart);
+        });
+        let (found_n, summary) = pressed_n(|| DeviceConfig::Hapticmaster(arm_config(&arm, apart))).await;
+        assert!((found_n / expected_n - 1.0).abs() < 0.05, "{found_n} N, {expected_n} N: {headers} {quoted} {apart}");
+        assert!(summary.peak_force_n < 1.2 * expected_n, "{summary}");
+        assert_eq!(arm.effect_n(), DVec3::ZERO, "the bridge took its force away when it ended");
+    }
+}
+
+/// A bridge in full force; what happens then is a fault of the arm.
+async fn lost_by(fault: impl FnOnce(&Faults)) -> (Fault, f64) {
+    let mock = Mock::default();
+    let (address, _stop, _serving) = mock.serve("127.0.0.1:0").await;
+    let arm = emulator(|_| ());
+    let bridge = start(bridged(&format!("http://{address}"), DeviceConfig::Hapticmaster(arm_config(&arm, false))));
+    until("the force is up", || bridge.handle.stats().force_n() > 0.99 && arm.effect_n().length() > 0.99).await;
+    // 1 N along the world's z is along the arm's.
+    assert!((arm.effect_n() - DVec3::Z).length() < 0.02, "{}", arm.effect_n());
+    fault(&arm.faults);
+    let error = tokio::time::timeout(Duration::from_secs(20), bridge.task).await.unwrap().unwrap().unwrap_err();
+    let force_n = bridge.handle.stats().force_n();
+    until("the daemon saw the end", || mock.seen(|seen| seen.ended == 1)).await;
+    match error {
+        BridgeError::DeviceLost { fault } => (fault, force_n),
+        other => panic!("{other}"),
+    }
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn each_fault_of_the_arm_takes_the_force_away_and_is_named() {
+    assert_eq!(lost_by(|faults| Faults::set(&faults.silence, true)).await, (Fault::Silent, 0.0));
+    assert_eq!(lost_by(|faults| Faults::set(&faults.garbage, true)).await, (Fault::Garbled, 0.0));
+    assert_eq!(lost_by(|faults| Faults::set(&faults.emergency_stop, true)).await, (Fault::EmergencyStop, 0.0));
+    assert_eq!(lost_by(|faults| Faults::set(&faults.cut, true)).await, (Fault::Disconnected, 0.0));
+    assert_eq!(lost_by(|faults| faults.slow_us.store(900_000, Ordering::Relaxed)).await, (Fault::Silent, 0.0));
+}
+
+/// An arm driven without a bridge, tick by tick in real time.
+fn opened(arm: &HapticMaster, apart: bool) -> driver::HapticMaster {
+    let settings = driver::start::StartSettings {
+        address: arm.address().to_string(),
+        frame: driver::frame::Frame::new(&["+x", "+y", "+z"].map(str::to_owned), DVec3::ZERO).unwrap(),
+        dialect: if apart { driver::Dialect::Apart } else { driver::Dialect::Mixed },
+        inertia_kg: 2.0,
+        max_force_n: 3.0,
+        homing: Duration::from_secs(2),
+        silence: Duration::from_millis(500),
+    };
+    let started = driver::start::start(&settings).unwrap();
+    assert_eq!(started.version, "palpate emulator");
+    driver::HapticMaster::new(started, &settings, 1e-3).unwrap()
+}
+
+/// Answers split into bytes are put together, and poses follow the arm.
+#[test]
+fn poses_follow_the_arm_though_answers_come_in_pieces() {
+    for (split, apart) in [(false, false), (true, false), (true, true)] {
+        let emulated = emulator(|settings| {
+            let keys = [(0.0, 0.0), (0.3, 0.03)].map(|(time_s, x)| Keyframe { time_s, position_m: DVec3::X * x });
+            settings.path = HandPath::new(keys.to_vec(), None).unwrap();
+            settings.apart = apart;
+        });
+        Faults::set(&emulated.faults.split, split);
+        let mut arm = opened(&emulated, apart);
+        let began = Instant::now();
+        let (mut ticks, mut farthest_m) = (0_u64, 0.0_f64);
+        while began.elapsed() < Duration::from_millis(800) {
+            // A machine that is busy skips ticks, as the loop does.
+            let due = began.elapsed().as_millis() as u64 + 1;
+            let reading = arm.read(due - ticks).unwrap();
+            ticks = due;
+            farthest_m = farthest_m.max(reading.motion.position_m.distance(emulated.position_m()));
+            arm.apply(DVec3::ZERO);
+            std::thread::sleep(Duration::from_millis(1));
+        }
+        let end = arm.read(0).unwrap();
+        assert!(end.motion.position_m.distance(emulated.position_m()) < 1e-3, "{:?}", end.motion);
+        assert!(emulated.position_m().x > 0.02 && emulated.requests() > 100);
+        // It moves at up to 0.2 m/s: some milliseconds.
+        assert!(farthest_m < 5e-3, "{farthest_m}");
+        assert!(end.measured_force_n.is_some());
+    }
+}
+
+#[test]
+fn no_force_beyond_the_limit_reaches_the_arm_and_none_that_is_not_finite() {
+    let emulated = emulator(|_| ());
+    let mut arm = opened(&emulated, false);
+    let mut apply = |force_n: DVec3| {
+        for _ in 0..30 {
+            arm.read(1).unwrap();
+            arm.apply(force_n);
+            std::thread::sleep(Duration::from_millis(1));
+        }
+        emulated.effect_n()
+    };
+    assert!((apply(DVec3::new(0.0, -1.0, 2.0)) - DVec3::new(0.0, -1.0, 2.0)).length() < 1e-4);
+    assert!((apply(DVec3::splat(1e6)).length() - 3.0).abs() < 1e-4);
+    assert_eq!(apply(DVec3::new(f64::NAN, 0.0, 0.0)), DVec3::ZERO);
+}
+
+#[test]
+fn an_arm_that_cannot_be_started_says_why() {
+    let settings = |address: String, homing| driver::start::StartSettings {
+        address,
+        frame: driver::frame::Frame::new(&["+x", "+y", "+z"].map(str::to_owned), DVec3::ZERO).unwrap(),
+        dialect: driver::Dialect::Mixed,
+        inertia_kg: 2.0,
+        max_force_n: 3.0,
+        homing,
+        silence: Duration::from_millis(500),
+    };
+    let said = |settings| driver::start::start(&settings).unwrap_err().to_string();
+    let port = std::net::TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap();
+    assert!(said(settings(port.to_string(), Duration::ZERO)).starts_with("no HapticMASTER answers at 127.0.0.1"));
+    let emulated = emulator(|settings| settings.homing = Some(Duration::from_mins(1)));
+    let address = emulated.address().to_string();
+    let never = said(settings(address.clone(), Duration::from_millis(150)));
+    assert!(never.contains("did not find its home within 0.15 s") && never.contains("\"init\""), "{never}");
+    Faults::set(&emulated.faults.emergency_stop, true);
+    assert_eq!(said(settings(address.clone(), Duration::ZERO)), "its emergency stop is pressed");
+    Faults::set(&emulated.faults.emergency_stop, false);
+    Faults::set(&emulated.faults.garbage, true);
+    assert!(said(settings(address.clone(), Duration::ZERO)).contains("\"remove all\" is none of a HapticMASTER"));
+    Faults::set(&emulated.faults.garbage, false);
+    Faults::set(&emulated.faults.silence, true);
+    assert_eq!(said(settings(address, Duration::ZERO)), "no answer to \"remove all\" within 2 s");
+    let light = emulator(|settings| settings.homing = None);
+    let light =
+        driver::start::StartSettings { inertia_kg: 1.0, ..settings(light.address().to_string(), Duration::ZERO) };
+    assert!(said(light).contains("refused \"set inertia 1\""));
+}
