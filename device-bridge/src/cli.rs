@@ -1,15 +1,18 @@
 //! The command line.
 use crate::{
     BridgeError, Config, Handle,
-    config::{DeviceConfig, HapticMasterConfig, SimulatedConfig},
+    config::{DeviceConfig, HapticMasterConfig},
+    device::kinds,
     emulate::cli::Emulate,
+    probe::probe,
     run::run_with,
 };
 use clap::{Parser, Subcommand, ValueEnum};
 use std::{
     io::{IsTerminal, Write as _},
-    path::PathBuf,
+    path::{Path, PathBuf},
     process::ExitCode,
+    time::Duration,
 };
 use tokio::signal::unix::{SignalKind, signal};
 use tokio_util::sync::CancellationToken;
@@ -23,6 +26,8 @@ Examples:
   palpate-bridge --server unix:///run/palpate/palpate.sock --tool left
   palpate-bridge --print-config > bridge.toml      every key with its default
   palpate-bridge --device hapticmaster --print-config   the same for another arm
+  palpate-bridge devices                           the arms that there are drivers for
+  palpate-bridge probe --config bridge.toml        is the arm there, and how well does it answer?
   palpate-bridge emulate hapticmaster              an arm that is not there, to try a configuration
 
 Signals: SIGTERM or Ctrl-C ramps the force to zero, ends the stream and exits with 0; SIGUSR1 recovers from a latched fault.
@@ -80,6 +85,25 @@ enum Command {
         #[command(subcommand)]
         kind: Emulate,
     },
+    /// The kinds of arms, what they need and how to check them
+    Devices,
+    /// Read an arm for a while without any force, and say how it does
+    Probe {
+        /// Configuration file (TOML)
+        #[arg(long, value_name = "FILE", env = "PALPATE_BRIDGE_CONFIG")]
+        config: Option<PathBuf>,
+        /// The arm
+        #[arg(long, value_enum)]
+        device: Option<DeviceKind>,
+        /// How long (s)
+        #[arg(long, value_name = "S", default_value_t = 2.0, value_parser = parse_seconds)]
+        time_s: f64,
+    },
+}
+
+fn parse_seconds(text: &str) -> Result<f64, String> {
+    let seconds: f64 = text.parse().map_err(|error| format!("{error}"))?;
+    if (1e-3..=3600.0).contains(&seconds) { Ok(seconds) } else { Err("must be between 0.001 and 3600 s".into()) }
 }
 
 /// Kinds of arms.
@@ -97,26 +121,26 @@ impl Cli {
     /// # Errors
     /// What stops it.
     pub fn run(self) -> Result<ExitCode, BridgeError> {
-        if let Some(Command::Emulate { kind }) = self.command {
-            return kind.run();
+        match self.command {
+            Some(Command::Emulate { kind }) => return kind.run(),
+            Some(Command::Devices) => return Ok(say(&kinds::list())),
+            Some(Command::Probe { config, device, time_s }) => {
+                let mut config = read(config.as_deref())?;
+                choose(&mut config, device);
+                start_logs();
+                let runtime = runtime()?;
+                let _context = runtime.enter();
+                return Ok(say(&format!("{}\n", probe(&config, Duration::from_secs_f64(time_s))?)));
+            }
+            None => {}
         }
         let config = self.config()?;
         if self.print_config {
             print!("{}", printed(&config)?);
             return Ok(ExitCode::SUCCESS);
         }
-        let filter = EnvFilter::try_from_default_env().unwrap_or_else(|_| EnvFilter::new("info"));
-        tracing_subscriber::fmt()
-            .with_env_filter(filter)
-            .with_writer(std::io::stderr)
-            .with_ansi(colours_wanted())
-            .with_target(false)
-            .init();
-        // One thread: the stream's reader, writer and transport wake each other without crossing processors.
-        let runtime = tokio::runtime::Builder::new_current_thread()
-            .enable_all()
-            .build()
-            .map_err(|source| BridgeError::System { what: "start the runtime", source })?;
+        start_logs();
+        let runtime = runtime()?;
         runtime.block_on(async {
             let (shutdown, handle) = (CancellationToken::new(), Handle::new());
             obey_signals(shutdown.clone(), handle.clone())?;
@@ -129,7 +153,7 @@ impl Cli {
 
     /// The file, then the flags.
     fn config(&self) -> Result<Config, BridgeError> {
-        let mut config = self.config.as_deref().map_or_else(|| Ok(Config::default()), Config::read)?;
+        let mut config = read(self.config.as_deref())?;
         let server = &mut config.server;
         replace(&mut server.url, self.server.clone());
         replace(&mut server.tool, self.tool.clone());
@@ -139,18 +163,46 @@ impl Cli {
         replace(&mut config.servo.report_every_s, self.report_every_s);
         replace(&mut config.limits.max_force_n, self.max_force_n);
         config.servo.auto_recover |= self.auto_recover;
-        match (self.device, &config.device) {
-            (None, _)
-            | (Some(DeviceKind::Simulated), DeviceConfig::Simulated(_))
-            | (Some(DeviceKind::Hapticmaster), DeviceConfig::Hapticmaster(_)) => {}
-            // The file is about another arm: the defaults of the one asked for.
-            (Some(DeviceKind::Simulated), _) => config.device = DeviceConfig::Simulated(SimulatedConfig::default()),
-            (Some(DeviceKind::Hapticmaster), _) => {
-                config.device = DeviceConfig::Hapticmaster(HapticMasterConfig::default());
-            }
-        }
+        choose(&mut config, self.device);
         Ok(config)
     }
+}
+
+/// One thread: the stream's reader, writer and transport wake each other without crossing processors.
+fn runtime() -> Result<tokio::runtime::Runtime, BridgeError> {
+    let built = tokio::runtime::Builder::new_current_thread().enable_all().build();
+    built.map_err(|source| BridgeError::System { what: "start the runtime", source })
+}
+
+fn read(path: Option<&Path>) -> Result<Config, BridgeError> {
+    path.map_or_else(|| Ok(Config::default()), Config::read)
+}
+
+/// Another arm than the file's has its own defaults.
+fn choose(config: &mut Config, kind: Option<DeviceKind>) {
+    config.device = match (kind, &config.device) {
+        (Some(DeviceKind::Simulated), DeviceConfig::Hapticmaster(_)) => DeviceConfig::default(),
+        (Some(DeviceKind::Hapticmaster), DeviceConfig::Simulated(_)) => {
+            DeviceConfig::Hapticmaster(HapticMasterConfig::default())
+        }
+        _ => return,
+    }
+}
+
+/// A reader that has gone misses it, no more.
+fn say(text: &str) -> ExitCode {
+    let _ = write!(std::io::stdout(), "{text}");
+    ExitCode::SUCCESS
+}
+
+fn start_logs() {
+    let filter = EnvFilter::try_from_default_env().unwrap_or_else(|_| EnvFilter::new("info"));
+    tracing_subscriber::fmt()
+        .with_env_filter(filter)
+        .with_writer(std::io::stderr)
+        .with_ansi(colours_wanted())
+        .with_target(false)
+        .init();
 }
 
 /// Logs have colours on a terminal only, and not when `NO_COLOR` asks for none.
@@ -214,6 +266,21 @@ mod tests {
     fn what_is_printed_can_be_read() {
         let text = printed(&Config::default()).unwrap();
         assert_eq!(Config::parse(&text, "printed").unwrap(), Config::default());
+    }
+
+    #[test]
+    fn every_kind_of_arm_is_listed_and_chosen_by_its_name() {
+        let names: Vec<String> = DeviceKind::value_variants()
+            .iter()
+            .map(|kind| kind.to_possible_value().unwrap().get_name().into())
+            .collect();
+        assert_eq!(names, kinds::KINDS.map(|kind| kind.name));
+        for name in &names {
+            let cli = Cli::try_parse_from(["palpate-bridge", "--device", name]).unwrap();
+            let text = printed(&cli.config().unwrap()).unwrap();
+            assert!(text.contains(&format!("kind = \"{name}\"")), "{text}");
+            assert!(kinds::list().contains(&format!("probe --device {name}")));
+        }
     }
 
     #[test]

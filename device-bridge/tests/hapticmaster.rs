@@ -12,6 +12,7 @@ use palpate_bridge::{
         Faults,
         hapticmaster::{HapticMaster, Settings},
     },
+    probe::probe,
 };
 use palpate_control::{HandPath, Keyframe};
 use palpate_proto::v1;
@@ -145,6 +146,22 @@ async fn each_fault_of_the_arm_takes_the_force_away_and_is_named() {
     assert_eq!(lost_by(|faults| Faults::set(&faults.emergency_stop, true)).await, (Fault::EmergencyStop, 0.0));
     assert_eq!(lost_by(|faults| Faults::set(&faults.cut, true)).await, (Fault::Disconnected, 0.0));
     assert_eq!(lost_by(|faults| faults.slow_us.store(900_000, Ordering::Relaxed)).await, (Fault::Silent, 0.0));
+}
+
+#[test]
+fn a_probe_says_where_the_arm_is_and_how_old_its_poses_are() {
+    let arm = emulator(|settings| settings.path = HandPath::resting_at(to_arm(DVec3::new(0.01, 0.02, 0.03))));
+    let mut config = bridged("http://127.0.0.1:1", DeviceConfig::Hapticmaster(arm_config(&arm, false)));
+    config.servo.rate_hz = 500.0;
+    let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().unwrap();
+    let _context = runtime.enter();
+    let report = probe(&config, Duration::from_millis(400)).unwrap();
+    assert!(report.position_m.distance(DVec3::new(0.01, 0.02, 0.03)) < 2e-6, "{report}");
+    assert!(report.measured_force_n.is_some_and(|force_n| force_n.length() < 1e-6), "{report}");
+    assert!(report.age.count > 20 && report.age.max_ns < 500_000_000, "{report}");
+    assert!(report.to_string().contains("position  10.00, 20.00, 30.00 mm"), "{report}");
+    Faults::set(&arm.faults.emergency_stop, true);
+    assert!(probe(&config, Duration::from_millis(100)).unwrap_err().to_string().contains("emergency stop"));
 }
 
 /// An arm driven without a bridge, tick by tick in real time.

@@ -1,5 +1,6 @@
 //! Arms: one file or folder for each, behind one small trait.
 pub mod hapticmaster;
+pub mod kinds;
 pub mod simulated;
 
 use crate::{BridgeError, settings::DeviceSettings};
@@ -19,6 +20,8 @@ pub struct Reading {
     pub buttons: u32,
     /// Force of the hand on the arm (N), if it has a sensor.
     pub measured_force_n: Option<DVec3>,
+    /// How long ago (s) the pose was measured from which the motion goes on.
+    pub age_s: f64,
 }
 
 /// Why an arm is of no use any more.
@@ -101,7 +104,7 @@ impl Witness {
 
     fn read_now(&self) -> Reading {
         assert!(self.reads.fetch_add(1, std::sync::atomic::Ordering::Relaxed) < self.panics_at, "the driver fails");
-        Reading { motion: Motion::at(DVec3::ZERO), buttons: 0, measured_force_n: None }
+        Reading { motion: Motion::at(DVec3::ZERO), buttons: 0, measured_force_n: None, age_s: 0.0 }
     }
 
     fn hold(&self, force_n: DVec3) {

@@ -26,7 +26,12 @@ impl Arm for SimulatedDevice {
         for _ in 0..periods.min(LONGEST_GAP) {
             self.arm.step(self.force_n);
         }
-        Ok(Reading { motion: self.arm.motion(), buttons: 0, measured_force_n: Some(self.arm.hand_force_n()) })
+        Ok(Reading {
+            motion: self.arm.motion(),
+            buttons: 0,
+            measured_force_n: Some(self.arm.hand_force_n()),
+            age_s: 0.0,
+        })
     }
 
     fn apply(&mut self, force_n: DVec3) {

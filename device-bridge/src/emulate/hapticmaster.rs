@@ -309,7 +309,8 @@ impl Machine {
 
     fn get(&self, what: &str) -> String {
         let motion = self.arm.motion();
-        let vector = |v: DVec3| format!("[{},{},{}]", v.x, v.y, v.z);
+        // Six digits, as C's `%g` gives them.
+        let vector = |v: DVec3| format!("[{:.5e},{:.5e},{:.5e}]", v.x, v.y, v.z);
         let word = |text: &str| if self.settings.quoted { format!("\"{text}\"") } else { format!("{text};") };
         match what {
             "modelpos" | "measpos" => vector(motion.position_m),

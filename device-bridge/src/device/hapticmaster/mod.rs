@@ -100,6 +100,7 @@ impl HapticMaster {
                 motion: Motion::at(settings.frame.to_world_m(started.position_m)),
                 buttons: 0,
                 measured_force_n: None,
+                age_s: 0.0,
             },
             age_periods: 0,
             requests: 0,
@@ -212,7 +213,7 @@ impl Arm for HapticMaster {
             return Err(self.lose(Fault::Silent));
         }
         let age_s = self.age_periods as f64 * self.period_s;
-        Ok(Reading { motion: extrapolate(&self.reading.motion, age_s, LONGEST_EXTRAPOLATION_S), ..self.reading })
+        Ok(Reading { motion: extrapolate(&self.reading.motion, age_s, LONGEST_EXTRAPOLATION_S), age_s, ..self.reading })
     }
 
     /// A lost arm is still told to let go, should it hear: every force is zero then.

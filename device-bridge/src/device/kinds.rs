@@ -1,0 +1,45 @@
+//! The kinds of arms that there are drivers for, for people.
+use std::fmt::Write as _;
+
+/// What is told of a kind.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Kind {
+    /// As `--device` and `kind` of `[device]` have it.
+    pub name: &'static str,
+    /// What it is.
+    pub what: &'static str,
+    /// What it needs.
+    pub needs: &'static str,
+    /// What it was tried against.
+    pub tried: &'static str,
+}
+
+/// All of them.
+pub const KINDS: [Kind; 2] = [
+    Kind {
+        name: "simulated",
+        what: "no hardware: a mass held by a hand that follows a path",
+        needs: "nothing",
+        tried: "itself",
+    },
+    Kind {
+        name: "hapticmaster",
+        what: "HapticMASTER (FCS, Moog), an admittance arm, over TCP",
+        needs: "its address in the same network (docs/arms/hapticmaster.md)",
+        tried: "palpate-bridge emulate hapticmaster; no hardware yet",
+    },
+];
+
+/// A list of them.
+pub fn list() -> String {
+    let mut text = String::new();
+    for Kind { name, what, needs, tried } in KINDS {
+        // Writing into a String cannot fail.
+        let _ = writeln!(
+            text,
+            "{name}\n    {what}\n    needs   {needs}\n    tried   against {tried}\n    check   palpate-bridge probe --device {name}\n\
+             \x20   keys    palpate-bridge --device {name} --print-config"
+        );
+    }
+    text
+}
