@@ -3,6 +3,7 @@ use crate::{BridgeError, Config, device, settings::Settings};
 use glam::DVec3;
 use palpate_realtime::{Clock, Histogram, Percentiles, TickLoop};
 use std::{fmt, ops::ControlFlow, time::Duration};
+use tokio_util::sync::CancellationToken;
 
 /// What was found.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -30,7 +31,7 @@ pub struct Report {
 pub fn probe(config: &Config, time: Duration) -> Result<Report, BridgeError> {
     let settings = Settings::new(config)?;
     let period_s = settings.servo.period_s;
-    let mut arm = device::open(&settings.device, period_s)?;
+    let mut arm = device::open(&settings.device, period_s, &CancellationToken::new())?;
     let mut tick_loop = TickLoop::new(Clock::Monotonic, period_s)
         .map_err(|error| BridgeError::Value { key: "servo.rate_hz".to_owned(), reason: error.to_string() })?;
     let monitor = tick_loop.monitor();

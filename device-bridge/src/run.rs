@@ -138,7 +138,8 @@ pub async fn run_with(config: &Config, shutdown: CancellationToken, handle: Hand
 /// The arm, opened on a thread that may wait; `None` when the bridge was told to stop meanwhile.
 async fn open(settings: &Settings, shutdown: &CancellationToken) -> Result<Option<Box<dyn device::Arm>>, BridgeError> {
     let (settings, period_s) = (settings.device.clone(), settings.servo.period_s);
-    let opening = tokio::task::spawn_blocking(move || device::open(&settings, period_s));
+    let stop = shutdown.clone();
+    let opening = tokio::task::spawn_blocking(move || device::open(&settings, period_s, &stop));
     tokio::select! {
         () = shutdown.cancelled() => Ok(None),
         opened = opening => match opened {

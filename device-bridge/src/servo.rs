@@ -192,8 +192,9 @@ impl Servo {
         }
         self.count(&tick, motion.is_finite());
         match tick.verdict.link {
-            Link::Latched(Fault::Requested | Fault::Device) => ControlFlow::Break(()),
-            Link::Latched(_) if self.shared.stop.load(Ordering::Relaxed) => ControlFlow::Break(()),
+            Link::Latched(Fault::Requested) => ControlFlow::Break(()),
+            // Whatever took the force away: a lost arm has to be opened anew.
+            Link::Latched(_) if read.is_err() || self.shared.stop.load(Ordering::Relaxed) => ControlFlow::Break(()),
             _ => ControlFlow::Continue(()),
         }
     }
@@ -280,6 +281,32 @@ mod tests {
         let shared = Arc::clone(&servo.shared);
         drop(servo);
         assert_eq!((witness.force_n(), shared.stats.force_n()), (0.0, 0.0));
+    }
+
+    /// An arm that failed while another fault was latched left its bridge waiting for ever.
+    #[tokio::test]
+    async fn a_lost_arm_ends_the_loop_also_in_another_fault() {
+        let (mut servo, witness, _commands) = pressed(u64::MAX);
+        let wakeup = Wakeup { tick: 0, deadline_ns: 0, woke_ns: 0, skipped: 0, overrun: false };
+        let mut now_ns = Clock::Monotonic.now_ns();
+        let mut tick = |servo: &mut Servo| {
+            now_ns += 1_000_000;
+            servo.tick(&wakeup, now_ns)
+        };
+        assert!(tick(&mut servo).is_continue());
+        servo.shared.peer_fault.store(true, Ordering::Relaxed);
+        assert!((0..30).all(|_| tick(&mut servo).is_continue()));
+        assert_eq!(servo.shared.stats.link(), Link::Latched(Fault::Peer));
+        witness.fail();
+        assert!(tick(&mut servo).is_break());
+        assert_eq!(servo.shared.stats.device_fault(), Some(crate::device::Fault::Silent));
+        let (mut servo, witness, _commands) = pressed(u64::MAX);
+        assert!((0..5).all(|_| tick(&mut servo).is_continue()));
+        witness.fail();
+        // The ramp to zero comes first.
+        assert!(witness.force_n() > 0.5 && tick(&mut servo).is_continue());
+        let ticks = (0..30).take_while(|_| tick(&mut servo).is_continue()).count();
+        assert!((10..=20).contains(&ticks) && witness.force_n() == 0.0, "{ticks} ticks, {} N", witness.force_n());
     }
 
     #[tokio::test]

@@ -20,6 +20,7 @@ use std::{
     sync::atomic::Ordering,
     time::{Duration, Instant},
 };
+use tokio_util::sync::CancellationToken;
 
 fn emulator(change: impl FnOnce(&mut Settings)) -> HapticMaster {
     let mut settings = Settings::default();
@@ -175,7 +176,7 @@ fn opened(arm: &HapticMaster, apart: bool) -> driver::HapticMaster {
         homing: Duration::from_secs(2),
         silence: Duration::from_millis(500),
     };
-    let started = driver::start::start(&settings).unwrap();
+    let started = driver::start::start(&settings, &CancellationToken::new()).unwrap();
     assert_eq!(started.version, "palpate emulator");
     driver::HapticMaster::new(started, &settings, 1e-3).unwrap()
 }
@@ -239,13 +240,24 @@ fn an_arm_that_cannot_be_started_says_why() {
         homing,
         silence: Duration::from_millis(500),
     };
-    let said = |settings| driver::start::start(&settings).unwrap_err().to_string();
+    let said = |settings| driver::start::start(&settings, &CancellationToken::new()).unwrap_err().to_string();
     let port = std::net::TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap();
     assert!(said(settings(port.to_string(), Duration::ZERO)).starts_with("no HapticMASTER answers at 127.0.0.1"));
     let emulated = emulator(|settings| settings.homing = Some(Duration::from_mins(1)));
     let address = emulated.address().to_string();
     let never = said(settings(address.clone(), Duration::from_millis(150)));
     assert!(never.contains("did not find its home within 0.15 s") && never.contains("\"init\""), "{never}");
+    let stop = CancellationToken::new();
+    let stopping = std::thread::spawn({
+        let stop = stop.clone();
+        move || {
+            std::thread::sleep(Duration::from_millis(200));
+            stop.cancel();
+        }
+    });
+    let stopped = driver::start::start(&settings(address.clone(), Duration::from_mins(1)), &stop).unwrap_err();
+    assert_eq!(stopped.to_string(), "its start was stopped");
+    stopping.join().unwrap();
     Faults::set(&emulated.faults.emergency_stop, true);
     assert_eq!(said(settings(address.clone(), Duration::ZERO)), "its emergency stop is pressed");
     Faults::set(&emulated.faults.emergency_stop, false);

@@ -15,6 +15,7 @@ use palpate_bridge::{
 use palpate_control::{ForceLimits, LocalModel};
 use palpate_realtime::{Clock, Doorbell, TickLoop, slot};
 use std::sync::{Arc, atomic::Ordering};
+use tokio_util::sync::CancellationToken;
 
 #[global_allocator]
 static ALLOCATOR: AllocDisabler = AllocDisabler;
@@ -29,7 +30,7 @@ fn the_servo_allocates_nothing() {
     shared.attached.store(true, Ordering::Relaxed);
     let mut servo = Servo {
         law: ServoLaw::new(settings.servo),
-        device: device::open(&settings.device, 1e-3).unwrap(),
+        device: device::open(&settings.device, 1e-3, &CancellationToken::new()).unwrap(),
         last: None,
         down,
         up,
@@ -76,7 +77,7 @@ fn the_hapticmasters_driver_allocates_nothing() {
     config.device = DeviceConfig::Hapticmaster(HapticMasterConfig { address, ..HapticMasterConfig::default() });
     let runtime = tokio::runtime::Builder::new_current_thread().build().unwrap();
     let settings = runtime.block_on(async { Settings::new(&config).unwrap() });
-    let mut arm = device::open(&settings.device, 1e-3).unwrap();
+    let mut arm = device::open(&settings.device, 1e-3, &CancellationToken::new()).unwrap();
     let answered = emulated.requests();
     for tick in 0..300 {
         std::thread::sleep(std::time::Duration::from_millis(1));

@@ -10,6 +10,7 @@ use palpate_control::Motion;
 use simulated::SimulatedDevice;
 use std::fmt::Debug;
 use thiserror::Error;
+use tokio_util::sync::CancellationToken;
 
 /// What an arm measures at one time.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -61,15 +62,16 @@ pub trait Arm: Debug + Send {
     fn apply(&mut self, force_n: DVec3);
 }
 
-/// Opens the arm that the configuration names, however long that takes.
+/// Opens the arm that the configuration names, however long that takes, until told to stop.
 ///
 /// # Errors
 /// [`BridgeError::Start`].
-pub fn open(settings: &DeviceSettings, period_s: f64) -> Result<Box<dyn Arm>, BridgeError> {
+pub fn open(settings: &DeviceSettings, period_s: f64, stop: &CancellationToken) -> Result<Box<dyn Arm>, BridgeError> {
     match settings {
         DeviceSettings::Simulated(arm) => Ok(Box::new(SimulatedDevice::new(arm.clone()))),
         DeviceSettings::HapticMaster(settings) => {
-            let started = start::start(settings).map_err(|source| BridgeError::Start { source: Box::new(source) })?;
+            let started =
+                start::start(settings, stop).map_err(|source| BridgeError::Start { source: Box::new(source) })?;
             tracing::info!("the HapticMASTER at {} is started: {}", settings.address, started.version);
             let arm = HapticMaster::new(started, settings, period_s);
             Ok(Box::new(arm.map_err(|source| BridgeError::System { what: "read the arm without waiting", source })?))
@@ -83,6 +85,7 @@ pub fn open(settings: &DeviceSettings, period_s: f64) -> Result<Box<dyn Arm>, Br
 pub struct Witness {
     panics_at: u64,
     reads: std::sync::atomic::AtomicU64,
+    fails: std::sync::atomic::AtomicBool,
     /// Force now, and the largest so far (N).
     force_n: std::sync::Mutex<(f64, f64)>,
 }
@@ -91,11 +94,15 @@ pub struct Witness {
 #[allow(clippy::unwrap_used, clippy::panic)]
 impl Witness {
     pub(crate) fn panicking_at(reading: u64) -> Self {
-        Self { panics_at: reading, reads: 0.into(), force_n: (0.0, 0.0).into() }
+        Self { panics_at: reading, reads: 0.into(), fails: false.into(), force_n: (0.0, 0.0).into() }
     }
 
     pub(crate) fn force_n(&self) -> f64 {
         self.force_n.lock().unwrap().0
+    }
+
+    pub(crate) fn fail(&self) {
+        self.fails.store(true, std::sync::atomic::Ordering::Relaxed);
     }
 
     pub(crate) fn peak_n(&self) -> f64 {
@@ -116,7 +123,7 @@ impl Witness {
 #[cfg(test)]
 impl Arm for std::sync::Arc<Witness> {
     fn read(&mut self, _: u64) -> Result<Reading, Fault> {
-        Ok(self.read_now())
+        if self.fails.load(std::sync::atomic::Ordering::Relaxed) { Err(Fault::Silent) } else { Ok(self.read_now()) }
     }
 
     fn apply(&mut self, force_n: DVec3) {

@@ -11,6 +11,7 @@ use std::{
     time::{Duration, Instant},
 };
 use thiserror::Error;
+use tokio_util::sync::CancellationToken;
 
 /// What the loop asks for.
 pub(super) const MOTION: [&str; 3] = ["get modelpos", "get modelvel", "get measforce"];
@@ -95,6 +96,9 @@ pub enum StartError {
     /// The button is pressed.
     #[error("its emergency stop is pressed")]
     EmergencyStop,
+    /// Somebody stopped the start.
+    #[error("its start was stopped")]
+    Stopped,
     /// Finding home did not end.
     #[error("it did not find its home within {seconds} s; its state is \"{state}\"")]
     NotHome {
@@ -109,7 +113,7 @@ pub enum StartError {
 ///
 /// # Errors
 /// [`StartError`]; the arm is left without effects of ours.
-pub fn start(settings: &StartSettings) -> Result<Started, StartError> {
+pub fn start(settings: &StartSettings, stop: &CancellationToken) -> Result<Started, StartError> {
     let mut talk = Talk { stream: connect(&settings.address)?, answer: Answer::new() };
     talk.order("remove all")?;
     let version = talk.get("get os")?;
@@ -118,7 +122,7 @@ pub fn start(settings: &StartSettings) -> Result<Started, StartError> {
     }
     if !talk.truth("get position_calibrated")? {
         talk.order("set state init")?;
-        talk.await_stop(settings.homing)?;
+        talk.await_stop(settings.homing, stop)?;
     }
     talk.order(&format!("set inertia {}", settings.inertia_kg))?;
     talk.order("set state force")?;
@@ -170,14 +174,20 @@ impl Talk {
         grammar::truth(&answer).ok_or_else(|| StartError::Strange { command: command.to_owned(), answer })
     }
 
-    fn await_stop(&mut self, patience: Duration) -> Result<(), StartError> {
+    fn await_stop(&mut self, patience: Duration, stop: &CancellationToken) -> Result<(), StartError> {
         let began = Instant::now();
         loop {
             let state = self.get("get state")?;
             if state == "stop" {
                 return Ok(());
             }
+            if stop.is_cancelled() {
+                // It must not go on moving when nobody waits for it.
+                self.order("set state stop")?;
+                return Err(StartError::Stopped);
+            }
             if began.elapsed() > patience {
+                self.order("set state stop")?;
                 return Err(StartError::NotHome { seconds: patience.as_secs_f64(), state });
             }
             std::thread::sleep(LOOK_EVERY);

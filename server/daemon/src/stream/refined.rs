@@ -132,15 +132,15 @@ impl Refiner {
         let vertices = 0..self.weights.len();
         let mut near: Vec<(f64, u32)> =
             vertices.map(|v| (gap_m(v), v as u32)).filter(|(gap, _)| *gap < self.reach_m).collect();
-        let mut edge_m = self.reach_m;
+        let mut rim_m = self.reach_m;
         if near.len() > MOST_NEAR {
             let order = |a: &(f64, u32), b: &(f64, u32)| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1));
-            edge_m = near.select_nth_unstable_by(MOST_NEAR, order).1.0;
+            rim_m = near.select_nth_unstable_by(MOST_NEAR, order).1.0;
             near.truncate(MOST_NEAR);
         }
         self.weights.fill(0.0);
         for (gap_m, vertex) in &near {
-            let t = (2.0 * (edge_m - gap_m) / self.reach_m).min(1.0);
+            let t = (2.0 * (rim_m - gap_m) / self.reach_m).min(1.0);
             self.weights[*vertex as usize] = t * t * (3.0 - 2.0 * t);
         }
         let mut near: Vec<u32> = near.into_iter().map(|(_, vertex)| vertex).collect();
