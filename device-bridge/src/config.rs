@@ -161,6 +161,10 @@ pub struct PassivityConfig {
     pub max_damping_n_s_per_m: f64,
     /// Energy (J) it remembers at most.
     pub max_stored_j: f64,
+    /// Mass (kg) of the arm at the tool, or less.
+    pub arm_mass_kg: f64,
+    /// Give the hand no energy at all that it did not put in; a force on an arm at rest that was never pressed is none then.
+    pub strict: bool,
 }
 
 impl Default for PassivityConfig {
@@ -170,6 +174,8 @@ impl Default for PassivityConfig {
             enabled: true,
             max_damping_n_s_per_m: settings.max_damping_n_s_per_m,
             max_stored_j: settings.max_stored_j,
+            arm_mass_kg: settings.arm_mass_kg,
+            strict: settings.strict,
         }
     }
 }

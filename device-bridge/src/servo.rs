@@ -39,6 +39,8 @@ pub struct ServoTick {
     pub verdict: Verdict,
     /// Damping that the passivity controller added (N s/m).
     pub added_damping_n_s_per_m: f64,
+    /// It shortened the force besides.
+    pub is_capped: bool,
 }
 
 impl ServoLaw {
@@ -98,14 +100,23 @@ impl ServoLaw {
             .passivity
             .as_mut()
             .map(|passivity| passivity.step(wanted_n, motion.position_m, motion.velocity_m_per_s, dt_s));
-        let limited = self.limiter.limit(step.map_or(wanted_n, |step| step.force_n), verdict.ramp, dt_s);
+        let mut limited = self.limiter.limit(step.map_or(wanted_n, |step| step.force_n), verdict.ramp, dt_s);
+        let mut is_capped = false;
         if let Some(passivity) = &mut self.passivity {
-            passivity.held(limited.force_n);
+            // Last, and shorter only: energy that is not there must not be given for the sake of a rate.
+            let capped_n = passivity.cap(limited.force_n, motion.velocity_m_per_s, dt_s);
+            is_capped = capped_n != limited.force_n;
+            limited.force_n = capped_n;
             if verdict.ramp == 0.0 {
                 passivity.reset();
             }
         }
-        ServoTick { limited, verdict, added_damping_n_s_per_m: step.map_or(0.0, |step| step.damping_n_s_per_m) }
+        ServoTick {
+            limited,
+            verdict,
+            added_damping_n_s_per_m: step.map_or(0.0, |step| step.damping_n_s_per_m),
+            is_capped,
+        }
     }
 
     /// The local model's force, or the daemon's where there is none. On the way down damping takes its place.
@@ -219,7 +230,7 @@ impl Servo {
         count_if(&stats.saturated, tick.limited.saturated);
         count_if(&stats.rate_limited, tick.limited.rate_limited);
         count_if(&stats.non_finite, tick.limited.non_finite || !motion_finite);
-        count_if(&stats.damped, tick.added_damping_n_s_per_m > 0.0);
+        count_if(&stats.damped, tick.added_damping_n_s_per_m > 0.0 || tick.is_capped);
         stats.latched.set(self.law.latched());
         stats.dropped_up.set(self.up.overwritten());
         stats.dropped_down.set(self.down.overwritten());

@@ -115,6 +115,8 @@ fn servo(config: &Config, period_s: f64) -> Result<ServoSettings, BridgeError> {
     let passivity_settings = PassivitySettings {
         max_damping_n_s_per_m: passivity.max_damping_n_s_per_m,
         max_stored_j: passivity.max_stored_j,
+        arm_mass_kg: passivity.arm_mass_kg,
+        strict: passivity.strict,
     }
     .checked()
     .map_err(|error| parameter("passivity", &error))?;

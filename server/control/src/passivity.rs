@@ -11,11 +11,18 @@ pub struct PassivitySettings {
     /// Energy (J) the observer remembers at most. Without a bound, a long dissipative contact would excuse a later active
     /// one.
     pub max_stored_j: f64,
+    /// Mass (kg) of the arm at the tool, or less: how far a force moves it within a sample time.
+    pub arm_mass_kg: f64,
+    /// [`PassivityController::cap`] shortens forces; else it leaves them as they are.
+    pub strict: bool,
 }
+
+/// Times what the force alone moves the arm by, for the hand pulls too.
+const HAND_MARGIN: f64 = 4.0;
 
 impl Default for PassivitySettings {
     fn default() -> Self {
-        Self { max_damping_n_s_per_m: 20.0, max_stored_j: 0.05 }
+        Self { max_damping_n_s_per_m: 20.0, max_stored_j: 0.05, arm_mass_kg: 0.05, strict: false }
     }
 }
 
@@ -27,6 +34,7 @@ impl PassivitySettings {
     pub fn checked(self) -> Result<Self, ParameterError> {
         positive("max_damping_n_s_per_m", self.max_damping_n_s_per_m)?;
         not_negative("max_stored_j", self.max_stored_j)?;
+        positive("arm_mass_kg", self.arm_mass_kg)?;
         Ok(self)
     }
 }
@@ -55,6 +63,15 @@ pub struct PassivityStep {
 /// `α_k = −(E_k − T F_k·v_k) / (T v_k²)`, `F_k ← F_k − α_k v_k`, bounded by what the arm can render.
 ///
 /// With `x_{k+1} = x_k + T v_k` this is the published scheme, and E never falls below zero.
+///
+/// *No more than there is.* That damping is bounded, a limiter follows, and an arm does not keep its velocity over a sample time: on a delayed wall the published scheme lets
+/// the hand have millijoules (`device-bridge/tests/network_passivity.rs`). So [`PassivityController::cap`], which comes last, shortens what is left until it can do no more work
+/// than the energy at hand, with the way that the force itself makes of the arm:
+///
+/// `T F·v + γ ½ F² T²/m ≤ max(E, 0)`, `γ` = 4:
+///
+/// first its part along v, as far as that is positive, then all of it. It only ever shortens. A force that nobody worked for, on an arm at rest, is none then: so is the
+/// force after an arm was attached in the middle of a contact, until it is pressed. Hence [`PassivitySettings::strict`].
 #[derive(Debug, Clone)]
 pub struct PassivityController {
     settings: PassivitySettings,
@@ -118,6 +135,36 @@ impl PassivityController {
         PassivityStep { force_n: out_n, damping_n_s_per_m, energy_j: self.energy_j }
     }
 
+    /// The longest part of a force (N) that can do no more work than there is energy, for the interval that [`PassivityController::step`] opened: what is to be held over it.
+    pub fn cap(&mut self, force_n: DVec3, velocity_m_per_s: DVec3, dt_s: f64) -> DVec3 {
+        let capped_n = if self.settings.strict { self.capped_n(force_n, velocity_m_per_s, dt_s) } else { force_n };
+        self.actions += u64::from(capped_n != force_n);
+        self.held(capped_n);
+        capped_n
+    }
+
+    fn capped_n(&self, force_n: DVec3, velocity_m_per_s: DVec3, dt_s: f64) -> DVec3 {
+        if !(force_n.is_finite() && velocity_m_per_s.is_finite() && self.held.is_some()) {
+            return DVec3::ZERO;
+        }
+        let at_hand_j = self.energy_j.max(0.0);
+        // T F·v ≤ E: F ← F − β (F·v) v/v², β = 1 − E/(T F·v)
+        let given_j = dt_s * force_n.dot(velocity_m_per_s);
+        let left_n = if given_j > at_hand_j {
+            force_n - force_n.project_onto(velocity_m_per_s) * (1.0 - at_hand_j / given_j)
+        } else {
+            force_n
+        };
+        // a s² + b s ≤ E for s F
+        let a_j = HAND_MARGIN * 0.5 * left_n.length_squared() * dt_s * dt_s / self.settings.arm_mass_kg;
+        let b_j = dt_s * left_n.dot(velocity_m_per_s);
+        if a_j + b_j <= at_hand_j {
+            return left_n;
+        }
+        let s = (-b_j + (b_j * b_j + 4.0 * a_j * at_hand_j).sqrt()) / (2.0 * a_j);
+        left_n * s.clamp(0.0, 1.0)
+    }
+
     /// The force (N) really held over the interval that [`PassivityController::step`] opened.
     pub fn held(&mut self, force_n: DVec3) {
         if let Some((held_n, _)) = &mut self.held {
@@ -141,7 +188,8 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    const UNBOUNDED: PassivitySettings = PassivitySettings { max_damping_n_s_per_m: 1e12, max_stored_j: 1e9 };
+    const UNBOUNDED: PassivitySettings =
+        PassivitySettings { max_damping_n_s_per_m: 1e12, max_stored_j: 1e9, arm_mass_kg: 0.1, strict: true };
     const DT_S: f64 = 1e-3;
 
     fn vector(range: f64) -> impl Strategy<Value = DVec3> {
@@ -206,7 +254,43 @@ mod tests {
         assert!(controller.energy_j().is_finite());
     }
 
+    /// A force that pulls an arm at rest has no velocity to be damped by: it is let through as far as energy was stored before.
+    #[test]
+    fn a_cap_counts_the_way_that_the_force_makes() {
+        let mut controller = PassivityController::new(UNBOUNDED);
+        controller.step(DVec3::ZERO, DVec3::ZERO, DVec3::ZERO, DT_S);
+        assert_eq!(controller.cap(DVec3::X, DVec3::ZERO, DT_S), DVec3::ZERO, "nothing stored, nothing given");
+        controller.held(-DVec3::X);
+        // 1 N against a way of 20 um.
+        controller.step(DVec3::X, DVec3::X * 2e-5, DVec3::ZERO, DT_S);
+        assert_eq!(controller.cap(DVec3::X, DVec3::ZERO, DT_S), DVec3::X, "2e-5 J of 2e-5");
+        assert!((controller.cap(DVec3::X * 5.0, DVec3::ZERO, DT_S).x - 1.0).abs() < 1e-9);
+        // A force that brakes goes through, and one across the motion.
+        assert_eq!(controller.cap(-DVec3::X * 0.5, DVec3::X, DT_S), -DVec3::X * 0.5);
+        assert_eq!(controller.cap(DVec3::Y, DVec3::X, DT_S), DVec3::Y);
+        assert_eq!(controller.cap(DVec3::NAN, DVec3::X, DT_S), DVec3::ZERO);
+    }
+
     proptest! {
+        /// On a mass, which does not keep its velocity, that a hand pulls three times as hard as the force: not a nanojoule.
+        #[test]
+        fn a_capped_force_gives_nothing_it_does_not_have(
+            ticks in prop::collection::vec((vector(5.0), vector(3.0)), 1..300), mass_kg in 0.1_f64..1.0,
+        ) {
+            let mut controller = PassivityController::new(UNBOUNDED);
+            let (mut x, mut v, mut true_j) = (DVec3::ZERO, DVec3::ZERO, 0.0);
+            for (force_n, pull) in ticks {
+                let step = controller.step(force_n, x, v, DT_S);
+                let capped_n = controller.cap(step.force_n, v, DT_S);
+                prop_assert!(capped_n.length() <= step.force_n.length() * (1.0 + 1e-12));
+                let acceleration = (capped_n + pull.clamp_length_max(1.0) * 3.0 * capped_n.length()) / mass_kg;
+                let moved_m = v * DT_S + acceleration * (0.5 * DT_S * DT_S);
+                true_j -= capped_n.dot(moved_m);
+                (x, v) = (x + moved_m, (v + acceleration * DT_S).clamp_length_max(1.0));
+                prop_assert!(true_j >= -1e-9, "{true_j}");
+            }
+        }
+
         /// Random forces on random motion that keeps its velocity over a sample: the observed energy never falls below zero.
         #[test]
         fn energy_is_never_negative(ticks in prop::collection::vec((vector(5.0), vector(0.5)), 1..300)) {

@@ -86,7 +86,8 @@ fn the_passivity_controller_tames_a_wall_beyond_the_limit() {
     let stiffness = 3.0 * wall(0.4, 0.0, 0.0).passive_stiffness_limit_n_per_m().unwrap();
     let bounce = |controlled: bool| {
         let mut arm = SimulatedArm::new(spec, HandPath::resting_at(DVec3::X * 1e-3), T_S).unwrap();
-        let settings = PassivitySettings { max_damping_n_s_per_m: 50.0, max_stored_j: 1.0 };
+        let settings =
+            PassivitySettings { max_damping_n_s_per_m: 50.0, max_stored_j: 1.0, ..PassivitySettings::default() };
         let mut controller = PassivityController::new(settings);
         let mut fastest: f64 = 0.0;
         for tick in 0..20_000 {
