@@ -1,5 +1,9 @@
 //! `palpate-bridge probe`: opens an arm, reads it for a while without any force, and says how it does.
-use crate::{BridgeError, Config, device, settings::Settings};
+use crate::{
+    BridgeError, Config,
+    device::{self, Reading},
+    settings::Settings,
+};
 use glam::DVec3;
 use palpate_realtime::{Clock, Histogram, Percentiles, TickLoop};
 use std::{fmt, ops::ControlFlow, time::Duration};
@@ -37,12 +41,14 @@ pub fn probe(config: &Config, time: Duration) -> Result<Report, BridgeError> {
     let monitor = tick_loop.monitor();
     let ticks = (time.as_secs_f64() / period_s).ceil().max(1.0) as u64;
     let ages = Histogram::new();
-    let (mut last, mut fault, mut fresh) = (None, None, 0_u64);
+    let (mut last, mut fault, mut fresh): (Option<Reading>, _, _) = (None, None, 0_u64);
     let mut reached_m = (DVec3::INFINITY, DVec3::NEG_INFINITY);
     tick_loop.run(|wakeup| {
         match arm.read(1 + wakeup.skipped) {
             Ok(reading) => {
-                fresh += u64::from(reading.age_s < 1.5 * period_s);
+                // A pose that was there before has grown older by all the periods that passed.
+                let aged_s = (1 + wakeup.skipped) as f64 * period_s;
+                fresh += u64::from(last.is_none_or(|last| reading.age_s < last.age_s + aged_s - 0.5 * period_s));
                 ages.record((reading.age_s * 1e9) as u64);
                 let x = reading.motion.position_m;
                 reached_m = (reached_m.0.min(x), reached_m.1.max(x));

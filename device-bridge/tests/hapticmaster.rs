@@ -145,6 +145,7 @@ async fn each_fault_of_the_arm_takes_the_force_away_and_is_named() {
     assert_eq!(lost_by(|faults| Faults::set(&faults.silence, true)).await, (Fault::Silent, 0.0));
     assert_eq!(lost_by(|faults| Faults::set(&faults.garbage, true)).await, (Fault::Garbled, 0.0));
     assert_eq!(lost_by(|faults| Faults::set(&faults.emergency_stop, true)).await, (Fault::EmergencyStop, 0.0));
+    assert_eq!(lost_by(|faults| Faults::set(&faults.refusal, true)).await, (Fault::Refused, 0.0));
     assert_eq!(lost_by(|faults| Faults::set(&faults.cut, true)).await, (Fault::Disconnected, 0.0));
     assert_eq!(lost_by(|faults| faults.slow_us.store(900_000, Ordering::Relaxed)).await, (Fault::Silent, 0.0));
 }
@@ -160,6 +161,8 @@ fn a_probe_says_where_the_arm_is_and_how_old_its_poses_are() {
     assert!(report.position_m.distance(DVec3::new(0.01, 0.02, 0.03)) < 2e-6, "{report}");
     assert!(report.measured_force_n.is_some_and(|force_n| force_n.length() < 1e-6), "{report}");
     assert!(report.age.count > 20 && report.age.max_ns < 500_000_000, "{report}");
+    // A request goes out in one tick and its answer is read in the next at the soonest.
+    assert!(report.age.p50_ns > 1_900_000 && report.poses_per_s > 50.0, "{report}");
     assert!(report.to_string().contains("position  10.00, 20.00, 30.00 mm"), "{report}");
     Faults::set(&arm.faults.emergency_stop, true);
     assert!(probe(&config, Duration::from_millis(100)).unwrap_err().to_string().contains("emergency stop"));

@@ -21,7 +21,7 @@ pub struct Reading {
     pub buttons: u32,
     /// Force of the hand on the arm (N), if it has a sensor.
     pub measured_force_n: Option<DVec3>,
-    /// How long ago (s) the pose was measured from which the motion goes on.
+    /// How long ago (s), at most, the pose was measured from which the motion goes on.
     pub age_s: f64,
 }
 

@@ -30,7 +30,7 @@ pub struct HapticMasterArguments {
     apart: bool,
 }
 
-const FAULTS: &str = "silence, garbage, split, slow, stop, cut (each again: over), quit";
+const FAULTS: &str = "silence, garbage, split, slow, refuse, stop, cut (each again: over), quit";
 
 impl Emulate {
     /// Runs until its input ends or says `quit`.
@@ -65,6 +65,7 @@ impl Emulate {
                 "silence" => &faults.silence,
                 "garbage" => &faults.garbage,
                 "split" => &faults.split,
+                "refuse" => &faults.refusal,
                 "stop" => &faults.emergency_stop,
                 "cut" => &faults.cut,
                 "slow" => {

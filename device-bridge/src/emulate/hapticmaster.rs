@@ -21,6 +21,8 @@ const STEP_S: f64 = 1e-3;
 const MAX_FORCE_N: f64 = 100.0;
 /// The inertia it cannot be set below (kg).
 const LEAST_INERTIA_KG: f64 = 2.0;
+/// Its answer to everything, when it is to refuse.
+const REFUSAL: &str = "--- ERROR: not now";
 /// How often it looks whether it shall stop, when nothing comes.
 const LOOK_EVERY: Duration = Duration::from_millis(1);
 
@@ -165,7 +167,8 @@ impl Server {
             machine.go_on();
             machine.stopped = Faults::is(&self.faults.emergency_stop);
             machine.requests += 1;
-            (machine.obey(text), machine.settings.headers)
+            let answer = if Faults::is(&self.faults.refusal) { REFUSAL.to_owned() } else { machine.obey(text) };
+            (answer, machine.settings.headers)
         };
         let slow = self.faults.slow_us.load(Ordering::Relaxed);
         std::thread::sleep(Duration::from_micros(slow.into()));

@@ -15,6 +15,8 @@ pub struct Faults {
     pub split: AtomicBool,
     /// Answers after so long (us).
     pub slow_us: AtomicU32,
+    /// Refuses every command.
+    pub refusal: AtomicBool,
     /// The emergency stop is pressed.
     pub emergency_stop: AtomicBool,
     /// The cable is pulled: the connection is cut.

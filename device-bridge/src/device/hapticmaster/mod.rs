@@ -1,7 +1,7 @@
 //! HapticMASTER (FCS, Moog): an admittance arm over TCP. It measures the hand's force and moves as a mass would; ours goes to it as a bias force.
 //!
 //! Beside the loop nothing waits: a tick reads what has come and, when the last request is answered, sends the next one, which sets the force and asks for
-//! position, velocity and force. So a pose is a tick old, and at most one request is on its way.
+//! position, velocity and force. So a pose is a tick old, and at most one request is on its way. A pose's age counts from its request: the arm measured it then or later.
 //!
 //! What only hardware can tell is named here: whether `set` and `get` go in one request ([`Dialect::Mixed`]) or each in its own, whether the arm lets go when the connection
 //! ends, and the sign and zero of its axes ([`frame::Frame`]).
@@ -70,8 +70,12 @@ pub struct HapticMaster {
     sent: usize,
     force_n: DVec3,
     reading: Reading,
-    /// Since the pose came.
+    /// Since the newest pose was asked for: it is not older.
     age_periods: u64,
+    /// Since the request on its way was made.
+    asked_periods: u64,
+    /// Since a pose came.
+    quiet_periods: u64,
     requests: u64,
     lost: Option<Fault>,
 }
@@ -103,6 +107,8 @@ impl HapticMaster {
                 age_s: 0.0,
             },
             age_periods: 0,
+            asked_periods: 0,
+            quiet_periods: 0,
             requests: 0,
             lost: None,
         })
@@ -143,7 +149,8 @@ impl HapticMaster {
             self.reading.motion = Motion::at(self.frame.to_world_m(position_m));
             self.reading.motion.velocity_m_per_s = self.frame.turned(velocity_m_per_s);
             self.reading.measured_force_n = Some(self.frame.turned(force_n));
-            self.age_periods = 0;
+            self.age_periods = self.asked_periods;
+            self.quiet_periods = 0;
         }
         self.asked = Asked::Nothing;
         Ok(())
@@ -168,6 +175,7 @@ impl HapticMaster {
 
     fn compose(&mut self) {
         self.requests += 1;
+        self.asked_periods = 0;
         self.text.clear();
         let mixed = self.dialect == Dialect::Mixed;
         let sets = mixed || self.requests.is_multiple_of(2);
@@ -207,9 +215,11 @@ impl Arm for HapticMaster {
         if let Some(fault) = self.lost {
             return Err(fault);
         }
-        self.age_periods = self.age_periods.saturating_add(periods);
+        for since in [&mut self.age_periods, &mut self.asked_periods, &mut self.quiet_periods] {
+            *since = since.saturating_add(periods);
+        }
         self.receive().map_err(|fault| self.lose(fault))?;
-        if self.age_periods > self.silence_periods {
+        if self.quiet_periods > self.silence_periods {
             return Err(self.lose(Fault::Silent));
         }
         let age_s = self.age_periods as f64 * self.period_s;
