@@ -1,15 +1,18 @@
 //! The command line.
 use crate::{
     BridgeError, Config, Handle,
-    config::{DeviceConfig, HapticMasterConfig},
-    device::kinds,
+    device::kinds::{self, KINDS, Kind},
     emulate::cli::Emulate,
     probe::probe,
     run::run_with,
 };
-use clap::{Parser, Subcommand, ValueEnum};
+use clap::{
+    Parser, Subcommand,
+    builder::{PossibleValue, PossibleValuesParser, TypedValueParser},
+};
 use std::{
     io::{IsTerminal, Write as _},
+    mem::discriminant,
     path::{Path, PathBuf},
     process::ExitCode,
     time::Duration,
@@ -58,8 +61,8 @@ pub struct Cli {
     #[arg(long, value_name = "NAME")]
     name: Option<String>,
     /// The arm
-    #[arg(long, value_enum)]
-    device: Option<DeviceKind>,
+    #[arg(long, value_name = "KIND", value_parser = kind_parser())]
+    device: Option<&'static Kind>,
     /// Largest force on the arm (N)
     #[arg(long, value_name = "N")]
     max_force_n: Option<f64>,
@@ -93,8 +96,8 @@ enum Command {
         #[arg(long, value_name = "FILE", env = "PALPATE_BRIDGE_CONFIG")]
         config: Option<PathBuf>,
         /// The arm
-        #[arg(long, value_enum)]
-        device: Option<DeviceKind>,
+        #[arg(long, value_name = "KIND", value_parser = kind_parser())]
+        device: Option<&'static Kind>,
         /// How long (s)
         #[arg(long, value_name = "S", default_value_t = 2.0, value_parser = parse_seconds)]
         time_s: f64,
@@ -106,13 +109,10 @@ fn parse_seconds(text: &str) -> Result<f64, String> {
     if (1e-3..=3600.0).contains(&seconds) { Ok(seconds) } else { Err("must be between 0.001 and 3600 s".into()) }
 }
 
-/// Kinds of arms.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-enum DeviceKind {
-    /// No hardware: a mass held by a hand that follows a path
-    Simulated,
-    /// HapticMASTER (FCS, Moog) over TCP
-    Hapticmaster,
+fn kind_parser() -> impl TypedValueParser<Value = &'static Kind> {
+    let names = KINDS.iter().map(|kind| PossibleValue::new(kind.name).help(kind.what));
+    PossibleValuesParser::new(names)
+        .try_map(|name| kinds::named(&name).ok_or_else(|| format!("\"{name}\" is no kind of arm")))
 }
 
 impl Cli {
@@ -179,13 +179,11 @@ fn read(path: Option<&Path>) -> Result<Config, BridgeError> {
 }
 
 /// Another arm than the file's has its own defaults.
-fn choose(config: &mut Config, kind: Option<DeviceKind>) {
-    config.device = match (kind, &config.device) {
-        (Some(DeviceKind::Simulated), DeviceConfig::Hapticmaster(_)) => DeviceConfig::default(),
-        (Some(DeviceKind::Hapticmaster), DeviceConfig::Simulated(_)) => {
-            DeviceConfig::Hapticmaster(HapticMasterConfig::default())
-        }
-        _ => return,
+fn choose(config: &mut Config, kind: Option<&Kind>) {
+    if let Some(default) = kind.map(|kind| (kind.default)())
+        && discriminant(&default) != discriminant(&config.device)
+    {
+        config.device = default;
     }
 }
 
@@ -270,12 +268,7 @@ mod tests {
 
     #[test]
     fn every_kind_of_arm_is_listed_and_chosen_by_its_name() {
-        let names: Vec<String> = DeviceKind::value_variants()
-            .iter()
-            .map(|kind| kind.to_possible_value().unwrap().get_name().into())
-            .collect();
-        assert_eq!(names, kinds::KINDS.map(|kind| kind.name));
-        for name in &names {
+        for Kind { name, .. } in &KINDS {
             let cli = Cli::try_parse_from(["palpate-bridge", "--device", name]).unwrap();
             let text = printed(&cli.config().unwrap()).unwrap();
             assert!(text.contains(&format!("kind = \"{name}\"")), "{text}");

@@ -1,8 +1,9 @@
 //! The kinds of arms that there are drivers for, for people.
+use crate::config::{DeviceConfig, HapticMasterConfig, SimulatedConfig};
 use std::fmt::Write as _;
 
 /// What is told of a kind.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy)]
 pub struct Kind {
     /// As `--device` and `kind` of `[device]` have it.
     pub name: &'static str,
@@ -12,28 +13,37 @@ pub struct Kind {
     pub needs: &'static str,
     /// What it was tried against.
     pub tried: &'static str,
+    /// Its keys, each with its default.
+    pub default: fn() -> DeviceConfig,
 }
 
 /// All of them.
-pub const KINDS: [Kind; 2] = [
+pub static KINDS: [Kind; 2] = [
     Kind {
         name: "simulated",
         what: "no hardware: a mass held by a hand that follows a path",
         needs: "nothing",
         tried: "itself",
+        default: || DeviceConfig::Simulated(SimulatedConfig::default()),
     },
     Kind {
         name: "hapticmaster",
         what: "HapticMASTER (FCS, Moog), an admittance arm, over TCP",
         needs: "its address in the same network (docs/arms/hapticmaster.md)",
         tried: "palpate-bridge emulate hapticmaster; no hardware yet",
+        default: || DeviceConfig::Hapticmaster(HapticMasterConfig::default()),
     },
 ];
+
+/// The one with this name.
+pub fn named(name: &str) -> Option<&'static Kind> {
+    KINDS.iter().find(|kind| kind.name == name)
+}
 
 /// A list of them.
 pub fn list() -> String {
     let mut text = String::new();
-    for Kind { name, what, needs, tried } in KINDS {
+    for Kind { name, what, needs, tried, .. } in KINDS {
         // Writing into a String cannot fail.
         let _ = writeln!(
             text,
