@@ -92,11 +92,16 @@ pub struct LimitsConfig {
     pub max_force_n: f64,
     /// Largest change of force per second (N/s).
     pub max_force_rate_n_per_s: f64,
+    /// Force (N) that the arm's motors bear for ever; absent: the peak.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub continuous_force_n: Option<f64>,
+    /// Time constant (s) of the motors' warmth, with `continuous_force_n`.
+    pub thermal_time_s: f64,
 }
 
 impl Default for LimitsConfig {
     fn default() -> Self {
-        Self { max_force_n: 3.3, max_force_rate_n_per_s: 1000.0 }
+        Self { max_force_n: 3.3, max_force_rate_n_per_s: 1000.0, continuous_force_n: None, thermal_time_s: 10.0 }
     }
 }
 

@@ -7,7 +7,7 @@ use crate::{
 };
 use glam::DVec3;
 use palpate_control::{
-    Fault, ForceLimiter, ForceLimits, Limited, Link, Motion, PassivityController, Verdict, Watchdog,
+    Fault, ForceLimiter, ForceLimits, Limited, Link, Motion, PassivityController, ThermalLimiter, Verdict, Watchdog,
 };
 use palpate_realtime::{Doorbell, SlotReader, SlotWriter, TickLoop, Wakeup};
 use std::{
@@ -25,6 +25,7 @@ pub struct ServoLaw {
     watchdog: Watchdog,
     passivity: Option<PassivityController>,
     limiter: ForceLimiter,
+    thermal: Option<ThermalLimiter>,
     command: Option<Command>,
     steady_since_ns: Option<u64>,
     faults_seen: u64,
@@ -50,6 +51,7 @@ impl ServoLaw {
             watchdog: Watchdog::new(settings.watchdog),
             passivity: settings.passivity.map(PassivityController::new),
             limiter: ForceLimiter::new(settings.limits),
+            thermal: settings.thermal.map(ThermalLimiter::new),
             command: None,
             steady_since_ns: None,
             faults_seen: 0,
@@ -101,6 +103,11 @@ impl ServoLaw {
             .as_mut()
             .map(|passivity| passivity.step(wanted_n, motion.position_m, motion.velocity_m_per_s, dt_s));
         let mut limited = self.limiter.limit(step.map_or(wanted_n, |step| step.force_n), verdict.ramp, dt_s);
+        let given_n = limited.force_n;
+        if let Some(thermal) = &self.thermal {
+            limited.force_n = thermal.limit(given_n);
+            limited.saturated |= limited.force_n != given_n;
+        }
         let mut is_capped = false;
         if let Some(passivity) = &mut self.passivity {
             // Last, and shorter only: energy that is not there must not be given for the sake of a rate.
@@ -110,6 +117,12 @@ impl ServoLaw {
             if verdict.ramp == 0.0 {
                 passivity.reset();
             }
+        }
+        if limited.force_n != given_n {
+            self.limiter.was_shortened_to(limited.force_n, verdict.ramp);
+        }
+        if let Some(thermal) = &mut self.thermal {
+            thermal.held(limited.force_n, dt_s);
         }
         ServoTick {
             limited,

@@ -7,7 +7,7 @@ use crate::{
 use glam::DVec3;
 use palpate_control::{
     ArmSpec, ForceLimits, HandPath, Keyframe, ParameterError, PassivitySettings, RenderSettings, SimulatedArm,
-    WatchdogSettings, coupling::SampledWall,
+    ThermalLimits, WatchdogSettings, coupling::SampledWall,
 };
 use palpate_proto::connect::{self, ConnectError};
 use palpate_realtime::OsMeasures;
@@ -61,6 +61,8 @@ pub struct ServoSettings {
     pub period_s: f64,
     /// Peak and rate.
     pub limits: ForceLimits,
+    /// What the motors bear for ever; `None`: the peak.
+    pub thermal: Option<ThermalLimits>,
     /// Ages.
     pub watchdog: WatchdogSettings,
     /// Damping (N s/m) that replaces a fading force.
@@ -120,8 +122,13 @@ fn servo(config: &Config, period_s: f64) -> Result<ServoSettings, BridgeError> {
     }
     .checked()
     .map_err(|error| parameter("passivity", &error))?;
+    let thermal = |continuous_force_n| {
+        let (max_force_n, time_s) = (limits.max_force_n, limits.thermal_time_s);
+        ThermalLimits { continuous_force_n, max_force_n, time_s }.checked()
+    };
     Ok(ServoSettings {
         period_s,
+        thermal: limits.continuous_force_n.map(thermal).transpose().map_err(|error| parameter("limits", &error))?,
         limits: ForceLimits { max_force_n: limits.max_force_n, max_force_rate_n_per_s: limits.max_force_rate_n_per_s }
             .checked()
             .map_err(|error| parameter("limits", &error))?,
@@ -300,6 +307,7 @@ mod tests {
         assert!(refused(|c| c.servo.rate_hz = 0.0).starts_with("servo.rate_hz: 0 is out of range"));
         assert!(refused(|c| c.servo.report_every_s = f64::NAN).starts_with("servo.report_every_s"));
         assert!(refused(|c| c.limits.max_force_n = -1.0).starts_with("limits.max_force_n: -1 must be"));
+        assert!(refused(|c| c.limits.continuous_force_n = Some(4.0)).starts_with("limits.continuous_force_n: 4 must"));
         assert!(refused(|c| c.watchdog.ramp_to_zero_s = 0.0).starts_with("watchdog.ramp_to_zero_s"));
         assert!(refused(|c| c.watchdog.fading_damping_n_s_per_m = -1.0).starts_with("watchdog.fading"));
         assert!(refused(|c| c.passivity.max_stored_j = f64::INFINITY).starts_with("passivity.max_stored_j"));

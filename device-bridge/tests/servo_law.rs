@@ -243,6 +243,78 @@ fn the_local_model_is_stable_where_the_delayed_force_is_not() {
     assert!(local_m < 1e-5, "the local model must settle: {local_m} m");
 }
 
+/// Every limit at once, over 10⁵ ticks of poses, models and forces without sense, gaps, jumps and NaN: peak, rate, ramp and warmth hold at each.
+#[test]
+fn a_hundred_thousand_random_poses_keep_the_force_within_every_limit() {
+    const LIMITS: (f64, f64, f64, f64) = (3.3, 500.0, 0.88, 2.0);
+    let (peak_n, rate_n_per_s, continuous_n, thermal_s) = LIMITS;
+    for (passivity, strict) in [(false, false), (true, false), (true, true)] {
+        let mut law = law(|config| {
+            (config.limits.max_force_n, config.limits.max_force_rate_n_per_s) = (peak_n, rate_n_per_s);
+            (config.limits.continuous_force_n, config.limits.thermal_time_s) = (Some(continuous_n), thermal_s);
+            (config.servo.auto_recover, config.passivity.enabled, config.passivity.strict) = (true, passivity, strict);
+            config.watchdog.ramp_up_s = 0.05;
+        });
+        let mut random = proptest::test_runner::TestRng::deterministic_rng(proptest::test_runner::RngAlgorithm::ChaCha);
+        let mut unit = || f64::from(random.next_u32()) / f64::from(u32::MAX);
+        // Now and then beyond all bounds, or no number at all; in calm seconds neither, so that faults are left again.
+        let mut number = |scale: f64, calm: bool| {
+            let x = scale * (2.0 * unit() - 1.0);
+            match unit() {
+                kind if calm || kind > 2e-3 => x,
+                kind if kind > 1e-3 => x * 1e200,
+                kind if kind > 5e-4 => f64::NAN,
+                _ => f64::INFINITY,
+            }
+        };
+        let (mut before_n, mut before_ramp, mut warmth_n2) = (DVec3::ZERO, 0.0, 0.0_f64);
+        let (mut now_ns, mut largest_n, mut pressed, mut faults) = (MS, 0.0_f64, 0_u32, 0);
+        for tick in 0..100_000_u64 {
+            let calm = tick / 1000 % 2 == 0;
+            now_ns += MS;
+            let mut vector = |scale| DVec3::new(number(scale, calm), number(scale, calm), number(scale, calm));
+            let motion = Motion { velocity_m_per_s: vector(1.0), ..Motion::at(vector(0.05)) };
+            // Seconds of steady pressing warm the motors.
+            let leaning_n = if tick / 3000 % 2 == 0 { DVec3::Z * 20.0 } else { DVec3::ZERO };
+            let (force_n, point_m) = (vector(10.0) + leaning_n, vector(0.05));
+            // The border lets only finite commands through.
+            let is_lost = !calm && tick % 97 < 30;
+            if !is_lost && force_n.is_finite() && point_m.is_finite() {
+                let model = LocalModel {
+                    point_m,
+                    normal: DVec3::Z,
+                    force_n,
+                    stiffness_n_per_m: DMat3::from_diagonal(DVec3::splat(-2000.0)),
+                    validity_radius_m: 0.05,
+                    max_force_n: 100.0,
+                };
+                law.receive(&command(now_ns, force_n, (tick % 3 > 0).then_some(model)));
+            }
+            let tick = law.tick(now_ns, &motion);
+            let out_n = tick.limited.force_n;
+            assert!(out_n.is_finite() && out_n.length() <= tick.verdict.ramp * peak_n * (1.0 + 1e-12), "{tick:?}");
+            let ramped_n = (tick.verdict.ramp - before_ramp).abs() * peak_n;
+            // What is no number takes the force away at once, and so may strict passivity; nothing gives any at once.
+            let is_taken = tick.is_capped || tick.limited.non_finite;
+            let step_n = if is_taken { out_n.length() - before_n.length() } else { (out_n - before_n).length() };
+            // Beside the rate: the ramp, and what passes as the motors warm.
+            let cooling_n = 2.0 * (peak_n - continuous_n) * (peak_n / continuous_n).powi(2) / thermal_s * 1e-3;
+            assert!(step_n <= rate_n_per_s * 1e-3 + ramped_n + cooling_n + 1e-9, "{step_n} N: {tick:?}");
+            warmth_n2 += (out_n.length_squared() - warmth_n2) * (1.0 - (-1e-3 / thermal_s).exp());
+            assert!(warmth_n2 <= continuous_n.powi(2) * (1.0 + 1e-9), "{warmth_n2} N²");
+            (before_n, before_ramp) = (out_n, tick.verdict.ramp);
+            largest_n = largest_n.max(out_n.length());
+            pressed += u32::from(out_n.length() > 0.3);
+            faults = law.latched();
+        }
+        // It can fail: there were forces at the limits, and faults that were left again.
+        assert!(
+            largest_n > 0.9 * continuous_n && pressed > 10_000 && faults > 20,
+            "{largest_n} N, {pressed}, {faults}"
+        );
+    }
+}
+
 proptest! {
     /// Whatever the daemon sends and however the arm moves: finite, within the peak, zero once stale.
     #[test]

@@ -11,6 +11,7 @@ pub mod local_model;
 pub mod parameter;
 pub mod passivity;
 pub mod simulated_arm;
+pub mod thermal;
 pub mod watchdog;
 
 pub use coupling::VirtualCoupling;
@@ -20,4 +21,5 @@ pub use local_model::{LocalModel, RenderSettings, Rendered};
 pub use parameter::ParameterError;
 pub use passivity::{PassivityController, PassivitySettings, PassivityStep};
 pub use simulated_arm::{ArmSpec, HandPath, Keyframe, SimulatedArm};
+pub use thermal::{ThermalLimiter, ThermalLimits};
 pub use watchdog::{Fault, Link, Verdict, Watchdog, WatchdogSettings};

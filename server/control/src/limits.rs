@@ -85,6 +85,14 @@ impl ForceLimiter {
         self.unramped_n = DVec3::ZERO;
     }
 
+    /// Something after this limiter shortened the force: `force_n` (N) was put on the arm under `ramp`. The next one starts from there, or the force would jump when it is let go.
+    pub fn was_shortened_to(&mut self, force_n: DVec3, ramp: f64) {
+        let unramped_n = force_n / ramp;
+        if unramped_n.is_finite() {
+            self.unramped_n = clamp_length(unramped_n, self.limits.max_force_n).0;
+        }
+    }
+
     /// Limits `wanted_n` (N) for the next `dt_s` (s); `ramp` in 0 to 1 scales the result.
     pub fn limit(&mut self, wanted_n: DVec3, ramp: f64, dt_s: f64) -> Limited {
         if !(wanted_n.is_finite() && ramp.is_finite() && dt_s.is_finite() && dt_s >= 0.0) {
@@ -133,6 +141,22 @@ mod tests {
         let mut limiter = ForceLimiter::new(LIMITS);
         let out = limiter.limit(DVec3::new(0.1, -0.2, 0.3), 1.0, 1e-3);
         assert_eq!(out, Limited { force_n: DVec3::new(0.1, -0.2, 0.3), ..Limited::default() });
+    }
+
+    #[test]
+    fn a_force_that_was_shortened_comes_back_at_the_rate() {
+        let mut limiter = ForceLimiter::new(LIMITS);
+        for _ in 0..10 {
+            limiter.limit(DVec3::X * 3.0, 0.5, 1e-3);
+        }
+        limiter.was_shortened_to(DVec3::X * 0.2, 0.5);
+        // 0.4 N without the ramp, and a step of 0.5 N.
+        assert!((limiter.limit(DVec3::X * 3.0, 0.5, 1e-3).force_n.x - 0.45).abs() < 1e-12);
+        limiter.was_shortened_to(DVec3::ZERO, 0.0);
+        assert!(
+            (limiter.limit(DVec3::X * 3.0, 0.5, 1e-3).force_n.x - 0.70).abs() < 1e-12,
+            "nothing is known at ramp 0"
+        );
     }
 
     #[test]
