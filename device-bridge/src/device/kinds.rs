@@ -1,4 +1,4 @@
-//! The kinds of arms that there are drivers for, for people.
+//! The kinds of arms that there are drivers for: each one's name, what people are told of it, and its keys.
 use crate::config::{DeviceConfig, HapticMasterConfig, SimulatedConfig};
 use std::fmt::Write as _;
 
@@ -43,7 +43,7 @@ pub fn named(name: &str) -> Option<&'static Kind> {
 /// A list of them.
 pub fn list() -> String {
     let mut text = String::new();
-    for Kind { name, what, needs, tried, .. } in KINDS {
+    for Kind { name, what, needs, tried, .. } in &KINDS {
         // Writing into a String cannot fail.
         let _ = writeln!(
             text,

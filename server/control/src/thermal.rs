@@ -35,7 +35,8 @@ impl ThermalLimits {
 /// Windings in which a motor's current, and with it `F²`, turns to heat that flows off: `τ θ' = F² − θ`, `θ` in N².
 ///
 /// Below `θ = F_c²/2` forces up to the peak pass. From there to `F_c²` the largest falls linearly to the continuous `F_c`, so that a hand feels a body grow softer and no
-/// step, and `θ`, the mean of `F²` over the last `τ` or so, never exceeds `F_c²`: where they are equal no more than `F_c` passes.
+/// step, and `θ`, the mean of `F²` over the last `τ` or so, never exceeds `F_c²`: where they are equal no more than `F_c` passes. That holds as long as a
+/// period at the peak warms little, `F_p² dt ≪ F_c² τ`; periods are milliseconds and windings take seconds.
 #[derive(Debug, Clone)]
 pub struct ThermalLimiter {
     limits: ThermalLimits,
