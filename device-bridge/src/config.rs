@@ -1,11 +1,13 @@
 //! The configuration file, as written; [`crate::settings::Settings`] is what it means.
 mod device;
+mod workspace;
 
 use crate::{BridgeError, error::ConfigError};
 pub use device::{DeviceConfig, HapticMasterConfig, KeyframeConfig, SimulatedConfig};
 use miette::NamedSource;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
+pub use workspace::WorkspaceConfig;
 
 /// All of it. Every key has a default; unknown keys are refused.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
@@ -25,6 +27,8 @@ pub struct Config {
     pub passivity: PassivityConfig,
     /// What to ask of the operating system.
     pub realtime: RealtimeConfig,
+    /// Where in the world the arm is.
+    pub workspace: WorkspaceConfig,
     /// The arm.
     pub device: DeviceConfig,
 }

@@ -27,6 +27,7 @@ pub struct ServoLaw {
     limiter: ForceLimiter,
     thermal: Option<ThermalLimiter>,
     command: Option<Command>,
+    force_share: f64,
     steady_since_ns: Option<u64>,
     faults_seen: u64,
 }
@@ -53,6 +54,7 @@ impl ServoLaw {
             limiter: ForceLimiter::new(settings.limits),
             thermal: settings.thermal.map(ThermalLimiter::new),
             command: None,
+            force_share: 1.0,
             steady_since_ns: None,
             faults_seen: 0,
             settings,
@@ -73,6 +75,11 @@ impl ServoLaw {
     /// Ramps to zero from now on, and latches.
     pub fn trip(&mut self, now_ns: u64, fault: Fault) {
         self.watchdog.trip(now_ns, fault);
+    }
+
+    /// From now on the arm has this share of the force, 0 to 1: less than 1 while a clutch lets go or takes hold.
+    pub fn share_force(&mut self, share: f64) {
+        self.force_share = share;
     }
 
     /// Leaves a latched fault; the force comes back slowly, with the next command.
@@ -97,12 +104,13 @@ impl ServoLaw {
             self.steady_since_ns = None;
         }
         let wanted_n = self.wanted_n(motion, &verdict);
+        let ramp = verdict.ramp * self.force_share;
         let dt_s = self.settings.period_s;
         let step = self
             .passivity
             .as_mut()
             .map(|passivity| passivity.step(wanted_n, motion.position_m, motion.velocity_m_per_s, dt_s));
-        let mut limited = self.limiter.limit(step.map_or(wanted_n, |step| step.force_n), verdict.ramp, dt_s);
+        let mut limited = self.limiter.limit(step.map_or(wanted_n, |step| step.force_n), ramp, dt_s);
         let given_n = limited.force_n;
         if let Some(thermal) = &self.thermal {
             limited.force_n = thermal.limit(given_n);
@@ -114,12 +122,12 @@ impl ServoLaw {
             let capped_n = passivity.cap(limited.force_n, motion.velocity_m_per_s, dt_s);
             is_capped = capped_n != limited.force_n;
             limited.force_n = capped_n;
-            if verdict.ramp == 0.0 {
+            if ramp == 0.0 {
                 passivity.reset();
             }
         }
         if limited.force_n != given_n {
-            self.limiter.was_shortened_to(limited.force_n, verdict.ramp);
+            self.limiter.was_shortened_to(limited.force_n, ramp);
         }
         if let Some(thermal) = &mut self.thermal {
             thermal.held(limited.force_n, dt_s);
@@ -199,6 +207,7 @@ impl Servo {
             self.law.trip(now_ns, Fault::Device);
         }
         self.last = read.ok().or(self.last);
+        self.law.share_force(self.last.map_or(1.0, |reading| reading.force_share));
         let motion = self.last.map_or(Motion::at(DVec3::ZERO), |reading| reading.motion);
         if let Some(Some(command)) = self.down.take() {
             self.law.receive(command);

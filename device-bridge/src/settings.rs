@@ -2,7 +2,10 @@
 use crate::{
     BridgeError, Config,
     config::{DeviceConfig, HapticMasterConfig, LimitsConfig, SimulatedConfig},
-    device::hapticmaster::{Dialect, frame::Frame, start::StartSettings},
+    device::{
+        hapticmaster::{Dialect, start::StartSettings},
+        workspace::{ClutchSettings, Workspace},
+    },
 };
 use glam::DVec3;
 use palpate_control::{
@@ -75,9 +78,20 @@ pub struct ServoSettings {
     pub auto_recover: bool,
 }
 
+/// Which arm, and where it is.
+#[derive(Debug, Clone)]
+pub struct DeviceSettings {
+    /// The arm.
+    pub arm: ArmSettings,
+    /// Where in the world it is.
+    pub workspace: Workspace,
+    /// Its clutch.
+    pub clutch: Option<ClutchSettings>,
+}
+
 /// Which arm.
 #[derive(Debug, Clone)]
-pub enum DeviceSettings {
+pub enum ArmSettings {
     /// The simulated one.
     Simulated(SimulatedArm),
     /// A HapticMASTER.
@@ -94,12 +108,17 @@ impl Settings {
         if !(10.0..=10_000.0).contains(&rate_hz) {
             return Err(value("servo.rate_hz", format!("{rate_hz} is out of range: use 10 to 10000")));
         }
-        let servo = servo(config, 1.0 / rate_hz)?;
+        let workspace = workspace(config)?;
+        let servo = servo(config, 1.0 / rate_hz, workspace.scale())?;
         let every_s = config.servo.report_every_s;
         let report_every = seconds("servo.report_every_s", every_s)?;
         Ok(Self {
             uplink: uplink(config)?,
-            device: device(config, servo.period_s)?,
+            device: DeviceSettings {
+                arm: arm(config, servo.period_s)?,
+                workspace,
+                clutch: clutch(config, &servo.watchdog)?,
+            },
             servo,
             measures: measures(config)?,
             report_every: (!report_every.is_zero()).then_some(report_every),
@@ -107,7 +126,24 @@ impl Settings {
     }
 }
 
-fn servo(config: &Config, period_s: f64) -> Result<ServoSettings, BridgeError> {
+fn workspace(config: &Config) -> Result<Workspace, BridgeError> {
+    let workspace = &config.workspace;
+    Workspace::new(&workspace.axes, DVec3::from_array(workspace.origin_m), workspace.scale)
+        .map_err(|error| value(error.key(), error.to_string()))
+}
+
+fn clutch(config: &Config, times: &WatchdogSettings) -> Result<Option<ClutchSettings>, BridgeError> {
+    let ramps_s = (times.ramp_to_zero_s, times.ramp_up_s);
+    match config.workspace.clutch_button {
+        Some(button) if button >= u32::BITS => {
+            Err(value("workspace.clutch_button", format!("{button} is out of range: use 0 to 31")))
+        }
+        button => Ok(button.map(|button| ClutchSettings { button, ramps_s })),
+    }
+}
+
+/// What is said of the arm (its damping, its mass) counts for the world, whose movements are `scale` times the arm's: see [`Workspace`].
+fn servo(config: &Config, period_s: f64, scale: f64) -> Result<ServoSettings, BridgeError> {
     let limits = &config.limits;
     let (watchdog, passivity) = (&config.watchdog, &config.passivity);
     let fading = watchdog.fading_damping_n_s_per_m;
@@ -115,9 +151,9 @@ fn servo(config: &Config, period_s: f64) -> Result<ServoSettings, BridgeError> {
         return Err(value("watchdog.fading_damping_n_s_per_m", format!("{fading} must be finite and not negative")));
     }
     let passivity_settings = PassivitySettings {
-        max_damping_n_s_per_m: passivity.max_damping_n_s_per_m,
-        max_stored_j: passivity.max_stored_j,
-        arm_mass_kg: passivity.arm_mass_kg,
+        max_damping_n_s_per_m: passivity.max_damping_n_s_per_m / scale,
+        max_stored_j: passivity.max_stored_j * scale,
+        arm_mass_kg: passivity.arm_mass_kg / scale,
         strict: passivity.strict,
     }
     .checked()
@@ -140,19 +176,19 @@ fn servo(config: &Config, period_s: f64) -> Result<ServoSettings, BridgeError> {
         }
         .checked()
         .map_err(|error| parameter("watchdog", &error))?,
-        fading_damping_n_s_per_m: fading,
-        render: render(config, period_s)?,
+        fading_damping_n_s_per_m: fading / scale,
+        render: render(config, period_s, scale)?,
         passivity: passivity.enabled.then_some(passivity_settings),
         auto_recover: config.servo.auto_recover,
     })
 }
 
 /// The stiffest model the servo renders is what its own sampling allows on this arm.
-fn render(config: &Config, period_s: f64) -> Result<Option<RenderSettings>, BridgeError> {
+fn render(config: &Config, period_s: f64, scale: f64) -> Result<Option<RenderSettings>, BridgeError> {
     let render = &config.render;
     let wall = SampledWall {
-        arm_damping_n_s_per_m: render.arm_damping_n_s_per_m,
-        wall_damping_n_s_per_m: render.damping_n_s_per_m,
+        arm_damping_n_s_per_m: render.arm_damping_n_s_per_m / scale,
+        wall_damping_n_s_per_m: render.damping_n_s_per_m / scale,
         sample_time_s: period_s,
         delay_s: 0.0,
     };
@@ -164,7 +200,7 @@ fn render(config: &Config, period_s: f64) -> Result<Option<RenderSettings>, Brid
     let settings = RenderSettings {
         hold_s: render.hold_s,
         forget_s: render.forget_s,
-        damping_n_s_per_m: render.damping_n_s_per_m,
+        damping_n_s_per_m: render.damping_n_s_per_m / scale,
         max_stiffness_n_per_m,
     }
     .checked()
@@ -210,10 +246,10 @@ fn unusable(error: ConnectError) -> BridgeError {
     }
 }
 
-fn device(config: &Config, period_s: f64) -> Result<DeviceSettings, BridgeError> {
+fn arm(config: &Config, period_s: f64) -> Result<ArmSettings, BridgeError> {
     match &config.device {
-        DeviceConfig::Simulated(simulated) => Ok(DeviceSettings::Simulated(simulated_arm(simulated, period_s)?)),
-        DeviceConfig::Hapticmaster(arm) => Ok(DeviceSettings::HapticMaster(hapticmaster(arm, &config.limits)?)),
+        DeviceConfig::Simulated(simulated) => Ok(ArmSettings::Simulated(simulated_arm(simulated, period_s)?)),
+        DeviceConfig::Hapticmaster(arm) => Ok(ArmSettings::HapticMaster(hapticmaster(arm, &config.limits)?)),
     }
 }
 
@@ -235,15 +271,12 @@ fn simulated_arm(config: &SimulatedConfig, period_s: f64) -> Result<SimulatedArm
 }
 
 fn hapticmaster(config: &HapticMasterConfig, limits: &LimitsConfig) -> Result<StartSettings, BridgeError> {
-    let frame = Frame::new(&config.axes, DVec3::from_array(config.origin_m))
-        .map_err(|error| value("device.axes", error.to_string()))?;
     if !(LEAST_INERTIA_KG..=MOST_INERTIA_KG).contains(&config.inertia_kg) {
         let range = format!("{} is out of range: use {LEAST_INERTIA_KG} to {MOST_INERTIA_KG}", config.inertia_kg);
         return Err(value("device.inertia_kg", range));
     }
     Ok(StartSettings {
         address: config.address.clone(),
-        frame,
         dialect: if config.apart { Dialect::Apart } else { Dialect::Mixed },
         inertia_kg: config.inertia_kg,
         max_force_n: limits.max_force_n,
@@ -302,6 +335,20 @@ mod tests {
         assert!((settings.servo.render.unwrap().max_stiffness_n_per_m - 800.0).abs() < 1e-9);
     }
 
+    /// What the hand feels is s K: the same stiffness is borne at the arm in any world.
+    #[tokio::test]
+    async fn a_magnified_world_is_rendered_as_stiff_at_the_arm_as_any() {
+        let mut config = Config::default();
+        for scale in [0.25, 1.0, 4.0] {
+            config.workspace.scale = scale;
+            let servo = Settings::new(&config).unwrap().servo;
+            assert!((scale * servo.render.unwrap().max_stiffness_n_per_m - 800.0).abs() < 1e-9);
+            let passivity = servo.passivity.unwrap();
+            assert!((scale * passivity.arm_mass_kg - config.passivity.arm_mass_kg).abs() < 1e-12);
+            assert!((passivity.max_stored_j / scale - config.passivity.max_stored_j).abs() < 1e-12);
+        }
+    }
+
     #[test]
     fn every_refusal_names_the_key() {
         assert!(refused(|c| c.servo.rate_hz = 0.0).starts_with("servo.rate_hz: 0 is out of range"));
@@ -317,6 +364,9 @@ mod tests {
         assert!(refused(|c| c.server.longest_pause_s = 0.0).starts_with("server.longest_pause_s"));
         assert!(refused(|c| c.server.device_name = "x".repeat(65)).starts_with("server.device_name"));
         assert!(refused(|c| c.server.device_name = "a\u{1b}b".into()).starts_with("server.device_name"));
+        assert!(refused(|c| c.workspace.axes[0] = "up".into()).starts_with("workspace.axes: \"up\""));
+        assert!(refused(|c| c.workspace.scale = 0.0).starts_with("workspace.scale"));
+        assert!(refused(|c| c.workspace.clutch_button = Some(32)).starts_with("workspace.clutch_button: 32"));
         assert!(refused(|c| c.server.tool = "a\n".into()).starts_with("server.tool"));
         let simulated = SimulatedConfig::default();
         let bad = KeyframeConfig { time_s: -1.0, position_m: [0.0; 3] };

@@ -6,7 +6,7 @@ use common::{Mock, config, start, until};
 use glam::DVec3;
 use palpate_bridge::{
     BridgeError, Config, Summary,
-    config::{DeviceConfig, HapticMasterConfig, KeyframeConfig, SimulatedConfig},
+    config::{DeviceConfig, HapticMasterConfig, KeyframeConfig, SimulatedConfig, WorkspaceConfig},
     device::{Arm as _, Fault, hapticmaster as driver},
     emulate::{
         Faults,
@@ -28,12 +28,9 @@ fn emulator(change: impl FnOnce(&mut Settings)) -> HapticMaster {
     HapticMaster::listen("127.0.0.1:0", settings).unwrap()
 }
 
-/// The arm's x, y, z point along the world's −y, +x, +z, and its origin is elsewhere.
 fn arm_config(emulator: &HapticMaster, apart: bool) -> HapticMasterConfig {
     HapticMasterConfig {
         address: emulator.address().to_string(),
-        axes: ["-y", "+x", "+z"].map(str::to_owned),
-        origin_m: ORIGIN_M.to_array(),
         apart,
         // Patient with a busy test machine.
         silence_s: 0.5,
@@ -48,8 +45,14 @@ fn to_arm(world_m: DVec3) -> DVec3 {
     DVec3::new(-d.y, d.x, d.z)
 }
 
+/// The arm's x, y, z point along the world's −y, +x, +z, and its origin is elsewhere.
+fn elsewhere() -> WorkspaceConfig {
+    let axes = ["-y", "+x", "+z"].map(str::to_owned);
+    WorkspaceConfig { axes, origin_m: ORIGIN_M.to_array(), ..WorkspaceConfig::default() }
+}
+
 fn bridged(url: &str, device: DeviceConfig) -> Config {
-    Config { device, ..config(url) }
+    Config { device, workspace: elsewhere(), ..config(url) }
 }
 
 /// A wall of 400 N/m whose surface is at z = 0.
@@ -88,7 +91,7 @@ async fn pressed_n(device: impl FnOnce() -> DeviceConfig) -> (f64, Summary) {
 }
 
 fn simulated() -> DeviceConfig {
-    let key = |(time_s, z)| KeyframeConfig { time_s, position_m: [0.0, 0.0, z] };
+    let key = |(time_s, z)| KeyframeConfig { time_s, position_m: to_arm(DVec3::new(0.0, 0.0, z)).to_array() };
     DeviceConfig::Simulated(SimulatedConfig {
         period_s: None,
         keyframes: PRESS.map(key).to_vec(),
@@ -172,7 +175,6 @@ fn a_probe_says_where_the_arm_is_and_how_old_its_poses_are() {
 fn opened(arm: &HapticMaster, apart: bool) -> driver::HapticMaster {
     let settings = driver::start::StartSettings {
         address: arm.address().to_string(),
-        frame: driver::frame::Frame::new(&["+x", "+y", "+z"].map(str::to_owned), DVec3::ZERO).unwrap(),
         dialect: if apart { driver::Dialect::Apart } else { driver::Dialect::Mixed },
         inertia_kg: 2.0,
         max_force_n: 3.0,
@@ -236,7 +238,6 @@ fn no_force_beyond_the_limit_reaches_the_arm_and_none_that_is_not_finite() {
 fn an_arm_that_cannot_be_started_says_why() {
     let settings = |address: String, homing| driver::start::StartSettings {
         address,
-        frame: driver::frame::Frame::new(&["+x", "+y", "+z"].map(str::to_owned), DVec3::ZERO).unwrap(),
         dialect: driver::Dialect::Mixed,
         inertia_kg: 2.0,
         max_force_n: 3.0,

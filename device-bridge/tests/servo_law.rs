@@ -268,7 +268,7 @@ fn a_hundred_thousand_random_poses_keep_the_force_within_every_limit() {
             }
         };
         let (mut before_n, mut before_ramp, mut warmth_n2) = (DVec3::ZERO, 0.0, 0.0_f64);
-        let (mut now_ns, mut largest_n, mut pressed, mut faults) = (MS, 0.0_f64, 0_u32, 0);
+        let (mut now_ns, mut largest_n, mut pressed, mut faults, mut share) = (MS, 0.0_f64, 0_u32, 0, 1.0_f64);
         for tick in 0..100_000_u64 {
             let calm = tick / 1000 % 2 == 0;
             now_ns += MS;
@@ -290,10 +290,15 @@ fn a_hundred_thousand_random_poses_keep_the_force_within_every_limit() {
                 };
                 law.receive(&command(now_ns, force_n, (tick % 3 > 0).then_some(model)));
             }
+            // A clutch is pressed for 200 ms now and then, and takes 20 ms either way.
+            let clutched = tick % 2500 > 2200 && tick % 2500 < 2400;
+            share = (share + if clutched { -0.05 } else { 0.05_f64 }).clamp(0.0, 1.0);
+            law.share_force(share);
             let tick = law.tick(now_ns, &motion);
+            let ramp = tick.verdict.ramp * share;
             let out_n = tick.limited.force_n;
-            assert!(out_n.is_finite() && out_n.length() <= tick.verdict.ramp * peak_n * (1.0 + 1e-12), "{tick:?}");
-            let ramped_n = (tick.verdict.ramp - before_ramp).abs() * peak_n;
+            assert!(out_n.is_finite() && out_n.length() <= ramp * peak_n * (1.0 + 1e-12), "{tick:?}");
+            let ramped_n = (ramp - before_ramp).abs() * peak_n;
             // What is no number takes the force away at once, and so may strict passivity; nothing gives any at once.
             let is_taken = tick.is_capped || tick.limited.non_finite;
             let step_n = if is_taken { out_n.length() - before_n.length() } else { (out_n - before_n).length() };
@@ -302,7 +307,7 @@ fn a_hundred_thousand_random_poses_keep_the_force_within_every_limit() {
             assert!(step_n <= rate_n_per_s * 1e-3 + ramped_n + cooling_n + 1e-9, "{step_n} N: {tick:?}");
             warmth_n2 += (out_n.length_squared() - warmth_n2) * (1.0 - (-1e-3 / thermal_s).exp());
             assert!(warmth_n2 <= continuous_n.powi(2) * (1.0 + 1e-9), "{warmth_n2} N²");
-            (before_n, before_ramp) = (out_n, tick.verdict.ramp);
+            (before_n, before_ramp) = (out_n, ramp);
             largest_n = largest_n.max(out_n.length());
             pressed += u32::from(out_n.length() > 0.3);
             faults = law.latched();

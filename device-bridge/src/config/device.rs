@@ -42,10 +42,6 @@ pub struct SimulatedConfig {
 pub struct HapticMasterConfig {
     /// Host and port.
     pub address: String,
-    /// Where in the world the arm's x, y and z point.
-    pub axes: [String; 3],
-    /// Where in the world the arm's origin is (m).
-    pub origin_m: [f64; 3],
     /// Mass that the hand feels (kg).
     pub inertia_kg: f64,
     /// Send `set` and `get` in requests of their own, for an arm that refuses them in one: half as many poses a second.
@@ -58,15 +54,7 @@ pub struct HapticMasterConfig {
 
 impl Default for HapticMasterConfig {
     fn default() -> Self {
-        Self {
-            address: "192.168.0.25:7654".into(),
-            axes: ["+x", "+y", "+z"].map(str::to_owned),
-            origin_m: [0.0; 3],
-            inertia_kg: 2.0,
-            apart: false,
-            homing_s: 60.0,
-            silence_s: 0.02,
-        }
+        Self { address: "192.168.0.25:7654".into(), inertia_kg: 2.0, apart: false, homing_s: 60.0, silence_s: 0.02 }
     }
 }
 
@@ -76,7 +64,7 @@ impl Default for HapticMasterConfig {
 pub struct KeyframeConfig {
     /// Time since the start (s).
     pub time_s: f64,
-    /// Position (m, world).
+    /// Position (m, the arm's own axes).
     pub position_m: [f64; 3],
 }
 

@@ -2,8 +2,12 @@
 pub mod hapticmaster;
 pub mod kinds;
 pub mod simulated;
+pub mod workspace;
 
-use crate::{BridgeError, settings::DeviceSettings};
+use crate::{
+    BridgeError,
+    settings::{ArmSettings, DeviceSettings},
+};
 use glam::DVec3;
 use hapticmaster::{HapticMaster, start};
 use palpate_control::Motion;
@@ -11,11 +15,12 @@ use simulated::SimulatedDevice;
 use std::fmt::Debug;
 use thiserror::Error;
 use tokio_util::sync::CancellationToken;
+use workspace::Placed;
 
 /// What an arm measures at one time.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Reading {
-    /// Pose and twist of the tool centre (world).
+    /// Pose and twist of the tool centre: in a driver, in the arm's own axes; in the loop, in the world ([`Placed`]).
     pub motion: Motion,
     /// Bit i is button i.
     pub buttons: u32,
@@ -23,6 +28,8 @@ pub struct Reading {
     pub measured_force_n: Option<DVec3>,
     /// How long ago (s), at most, the pose was measured from which the motion goes on.
     pub age_s: f64,
+    /// Share of the force that the arm is to have: 1, but for a clutch.
+    pub force_share: f64,
 }
 
 /// Why an arm is of no use any more.
@@ -58,7 +65,7 @@ pub trait Arm: Debug + Send {
     /// A [`Fault`], from then on every time: the arm has to be opened anew.
     fn read(&mut self, periods: u64) -> Result<Reading, Fault>;
 
-    /// Puts a force (N, world) on the arm, held until the next call.
+    /// Puts a force (N, in the axes of its readings) on the arm, held until the next call.
     fn apply(&mut self, force_n: DVec3);
 }
 
@@ -67,9 +74,14 @@ pub trait Arm: Debug + Send {
 /// # Errors
 /// [`BridgeError::Start`].
 pub fn open(settings: &DeviceSettings, period_s: f64, stop: &CancellationToken) -> Result<Box<dyn Arm>, BridgeError> {
+    let arm = open_arm(&settings.arm, period_s, stop)?;
+    Ok(Box::new(Placed::new(arm, settings.workspace, settings.clutch, period_s)))
+}
+
+fn open_arm(settings: &ArmSettings, period_s: f64, stop: &CancellationToken) -> Result<Box<dyn Arm>, BridgeError> {
     match settings {
-        DeviceSettings::Simulated(arm) => Ok(Box::new(SimulatedDevice::new(arm.clone()))),
-        DeviceSettings::HapticMaster(settings) => {
+        ArmSettings::Simulated(arm) => Ok(Box::new(SimulatedDevice::new(arm.clone()))),
+        ArmSettings::HapticMaster(settings) => {
             let started =
                 start::start(settings, stop).map_err(|source| BridgeError::Start { source: Box::new(source) })?;
             tracing::info!("the HapticMASTER at {} is started: {}", settings.address, started.version);
@@ -79,13 +91,14 @@ pub fn open(settings: &DeviceSettings, period_s: f64, stop: &CancellationToken) 
     }
 }
 
-/// A driver for tests: rests at the origin, remembers its force, and panics at a given reading.
+/// A driver for tests: rests at the origin unless told where it is, remembers its force, and panics at a given reading.
 #[cfg(test)]
 #[derive(Debug)]
 pub struct Witness {
     panics_at: u64,
     reads: std::sync::atomic::AtomicU64,
     fails: std::sync::atomic::AtomicBool,
+    reading: std::sync::Mutex<Reading>,
     /// Force now, and the largest so far (N).
     force_n: std::sync::Mutex<(f64, f64)>,
 }
@@ -94,7 +107,22 @@ pub struct Witness {
 #[allow(clippy::unwrap_used, clippy::panic)]
 impl Witness {
     pub(crate) fn panicking_at(reading: u64) -> Self {
-        Self { panics_at: reading, reads: 0.into(), fails: false.into(), force_n: (0.0, 0.0).into() }
+        Self {
+            panics_at: reading,
+            reads: 0.into(),
+            fails: false.into(),
+            reading: Self::at_rest().into(),
+            force_n: (0.0, 0.0).into(),
+        }
+    }
+
+    pub(crate) fn at_rest() -> Reading {
+        let motion = Motion::at(DVec3::ZERO);
+        Reading { motion, buttons: 0, measured_force_n: None, age_s: 0.0, force_share: 1.0 }
+    }
+
+    pub(crate) fn set(&self, reading: Reading) {
+        *self.reading.lock().unwrap() = reading;
     }
 
     pub(crate) fn force_n(&self) -> f64 {
@@ -111,7 +139,7 @@ impl Witness {
 
     fn read_now(&self) -> Reading {
         assert!(self.reads.fetch_add(1, std::sync::atomic::Ordering::Relaxed) < self.panics_at, "the driver fails");
-        Reading { motion: Motion::at(DVec3::ZERO), buttons: 0, measured_force_n: None, age_s: 0.0 }
+        *self.reading.lock().unwrap()
     }
 
     fn hold(&self, force_n: DVec3) {

@@ -31,6 +31,7 @@ impl Arm for SimulatedDevice {
             buttons: 0,
             measured_force_n: Some(self.arm.hand_force_n()),
             age_s: 0.0,
+            force_share: 1.0,
         })
     }
 

@@ -4,13 +4,11 @@
 //! position, velocity and force. So a pose is a tick old, and at most one request is on its way. A pose's age counts from its request: the arm measured it then or later.
 //!
 //! What only hardware can tell is named here: whether `set` and `get` go in one request ([`Dialect::Mixed`]) or each in its own, whether the arm lets go when the connection
-//! ends, and the sign and zero of its axes ([`frame::Frame`]).
-pub mod frame;
+//! ends, and the sign and zero of its axes ([`super::workspace`]).
 pub mod grammar;
 pub mod start;
 
 use super::{Arm, Fault, Reading};
-use frame::Frame;
 use glam::DVec3;
 use grammar::Answer;
 use palpate_control::{Motion, extrapolate};
@@ -55,7 +53,6 @@ enum Asked {
 #[derive(Debug)]
 pub struct HapticMaster {
     stream: TcpStream,
-    frame: Frame,
     dialect: Dialect,
     period_s: f64,
     /// Without an answer for so many periods the arm is lost.
@@ -89,7 +86,6 @@ impl HapticMaster {
         started.stream.set_nonblocking(true)?;
         Ok(Self {
             stream: started.stream,
-            frame: settings.frame,
             dialect: settings.dialect,
             period_s,
             silence_periods: (settings.silence.as_secs_f64() / period_s).ceil() as u64,
@@ -101,10 +97,11 @@ impl HapticMaster {
             sent: 0,
             force_n: DVec3::ZERO,
             reading: Reading {
-                motion: Motion::at(settings.frame.to_world_m(started.position_m)),
+                motion: Motion::at(started.position_m),
                 buttons: 0,
                 measured_force_n: None,
                 age_s: 0.0,
+                force_share: 1.0,
             },
             age_periods: 0,
             asked_periods: 0,
@@ -146,9 +143,9 @@ impl HapticMaster {
             if parts.next().is_some() {
                 return Err(Fault::Garbled);
             }
-            self.reading.motion = Motion::at(self.frame.to_world_m(position_m));
-            self.reading.motion.velocity_m_per_s = self.frame.turned(velocity_m_per_s);
-            self.reading.measured_force_n = Some(self.frame.turned(force_n));
+            self.reading.motion = Motion::at(position_m);
+            self.reading.motion.velocity_m_per_s = velocity_m_per_s;
+            self.reading.measured_force_n = Some(force_n);
             self.age_periods = self.asked_periods;
             self.quiet_periods = 0;
         }
@@ -181,7 +178,7 @@ impl HapticMaster {
         let sets = mixed || self.requests.is_multiple_of(2);
         let mut commands = 0;
         if sets {
-            let f = self.frame.from_world(self.force_n.clamp_length_max(self.max_force_n));
+            let f = self.force_n.clamp_length_max(self.max_force_n);
             // Writing into a Vec cannot fail.
             let _ = write!(self.text, "set {EFFECT} force [{:.5},{:.5},{:.5}]", f.x, f.y, f.z);
             commands += 1;

@@ -1,7 +1,6 @@
 //! Bringing a HapticMASTER from whatever state it is in to one in which it takes forces. Waits for it, so never in the loop.
 use super::{
     Dialect, EFFECT,
-    frame::Frame,
     grammar::{self, Answer},
 };
 use glam::DVec3;
@@ -27,8 +26,6 @@ const LOOK_EVERY: Duration = Duration::from_millis(100);
 pub struct StartSettings {
     /// Host and port.
     pub address: String,
-    /// Where its axes are.
-    pub frame: Frame,
     /// How commands are put into requests.
     pub dialect: Dialect,
     /// Mass that the hand feels (kg).
