@@ -12,6 +12,7 @@ pub mod parameter;
 pub mod passivity;
 pub mod simulated_arm;
 pub mod thermal;
+pub mod velocity;
 pub mod watchdog;
 
 pub use coupling::VirtualCoupling;
@@ -22,4 +23,5 @@ pub use parameter::ParameterError;
 pub use passivity::{PassivityController, PassivitySettings, PassivityStep};
 pub use simulated_arm::{ArmSpec, HandPath, Keyframe, SimulatedArm};
 pub use thermal::{ThermalLimiter, ThermalLimits};
+pub use velocity::Velocity;
 pub use watchdog::{Fault, Link, Verdict, Watchdog, WatchdogSettings};

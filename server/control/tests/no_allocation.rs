@@ -3,7 +3,7 @@ use assert_no_alloc::{AllocDisabler, assert_no_alloc};
 use glam::{DMat3, DVec3};
 use palpate_control::{
     ArmSpec, ForceLimiter, ForceLimits, HandPath, Keyframe, LocalModel, PassivityController, PassivitySettings,
-    RenderSettings, SimulatedArm, Watchdog, WatchdogSettings, extrapolate,
+    RenderSettings, SimulatedArm, Velocity, Watchdog, WatchdogSettings, extrapolate,
 };
 
 #[global_allocator]
@@ -26,6 +26,7 @@ fn a_tick_of_everything_allocates_nothing() {
         validity_radius_m: 0.02,
         max_force_n: 100.0,
     };
+    let mut velocity = Velocity::new(1e-5);
     let mut peak_n: f64 = 0.0;
     assert_no_alloc(|| {
         for tick in 0..1000_u64 {
@@ -40,6 +41,7 @@ fn a_tick_of_everything_allocates_nothing() {
             let limited = limiter.limit(step.force_n, verdict.ramp, 1e-3);
             passivity.held(limited.force_n);
             arm.step(limited.force_n);
+            velocity.push(arm.motion().position_m.z, 1e-3);
             peak_n = peak_n.max(limited.force_n.length());
         }
     });

@@ -1,0 +1,148 @@
+//! Velocity from positions alone, for arms whose encoders count and tell nothing else.
+//!
+//! First-order adaptive windowing (Janabi-Sharifi, Hayward and Chen, Discrete-time adaptive windowing for velocity estimation, IEEE Trans. Control Systems
+//! Technology 8, 2000), with the line through the ends of the window: the longest window whose every sample is within the noise of that line. At
+//! rest it averages over all of it; in a sudden move it is a single difference.
+
+/// Samples that are remembered, the newest among them: the longest window spans one less.
+const REMEMBERED: usize = 32;
+
+/// Rate of change of one number.
+///
+/// With samples `y_k` at times `t_k`, the window's line is `y_k − b_n (t_k − t)` with `b_n = (y_k − y_{k−n})/(t_k − t_{k−n})`, and n is the
+/// largest for which `|y_{k−i} − y_k + b_n (t_k − t_{k−i})| ≤ noise` for all `0 < i < n`. A steady motion rounded to steps of `noise` keeps the whole window, and its
+/// rate is known to `noise/(t_k − t_{k−n})`; under an acceleration a the window is `√(8 noise/a)` long at most, so the rate lags by half of that.
+#[derive(Debug, Clone)]
+pub struct Velocity {
+    /// Largest distance between two measurements of one place, such as a step of an encoder.
+    noise: f64,
+    /// Newest last, in a ring: value and time (s).
+    samples: [(f64, f64); REMEMBERED],
+    count: usize,
+    rate_per_s: f64,
+}
+
+impl Velocity {
+    /// At rest, with that much noise (in the number's unit, peak to peak).
+    pub fn new(noise: f64) -> Self {
+        Self { noise, samples: [(0.0, 0.0); REMEMBERED], count: 0, rate_per_s: 0.0 }
+    }
+
+    /// A new sample, `passed_s` (s) after the one before; the rate per second now. One that is no number, or took no time, changes nothing.
+    pub fn push(&mut self, value: f64, passed_s: f64) -> f64 {
+        if !(value.is_finite() && passed_s.is_finite() && passed_s > 0.0) {
+            return self.rate_per_s;
+        }
+        // Times count back from the newest sample, so they stay small for ever.
+        for sample in &mut self.samples[..self.count] {
+            sample.1 -= passed_s;
+        }
+        if self.count == REMEMBERED {
+            self.samples.copy_within(1.., 0);
+            self.count -= 1;
+        }
+        self.samples[self.count] = (value, 0.0);
+        self.count += 1;
+        self.rate_per_s = self.slope();
+        self.rate_per_s
+    }
+
+    /// The rate per second now.
+    pub fn rate_per_s(&self) -> f64 {
+        self.rate_per_s
+    }
+
+    /// Forgets everything, as after a jump that was no motion.
+    pub fn reset(&mut self) {
+        (self.count, self.rate_per_s) = (0, 0.0);
+    }
+
+    fn slope(&self) -> f64 {
+        let Some((&(newest, _), before)) = self.samples[..self.count].split_last() else { return 0.0 };
+        // Rounding of the line itself is no noise.
+        let allowed = self.noise * (1.0 + 1e-9);
+        let mut rate = 0.0;
+        for (at, &(value, time_s)) in before.iter().enumerate().rev() {
+            let slope = (value - newest) / time_s;
+            let is_near = |&(y, t_s): &(f64, f64)| (y - newest - slope * t_s).abs() <= allowed;
+            if at + 1 < before.len() && !before[at + 1..].iter().all(is_near) {
+                break;
+            }
+            rate = slope;
+        }
+        rate
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    const T_S: f64 = 1e-3;
+    const STEP: f64 = 5e-5;
+
+    fn rounded(x: f64) -> f64 {
+        (x / STEP).floor() * STEP
+    }
+
+    /// Feeds a motion in steps of an encoder; the largest error after `settled` samples.
+    fn worst(motion: impl Fn(f64) -> (f64, f64), settled: usize, samples: usize) -> f64 {
+        let mut velocity = Velocity::new(STEP);
+        let errors = (0..samples).map(|k| {
+            let (x, v) = motion(k as f64 * T_S);
+            let error = (velocity.push(rounded(x), T_S) - v).abs();
+            if k < settled { 0.0 } else { error }
+        });
+        errors.fold(0.0, f64::max)
+    }
+
+    proptest! {
+        /// The whole window, so the bound of the whole window, at any speed; a difference of two samples errs by up to STEP/T.
+        #[test]
+        fn a_steady_motion_in_steps_is_known_to_a_step_over_the_window(v in -0.5..0.5_f64, from in -0.1..0.1_f64) {
+            let error = worst(|t_s| (from + v * t_s, v), REMEMBERED, 300);
+            prop_assert!(error <= STEP / (T_S * (REMEMBERED - 1) as f64) * 1.001, "{error}");
+        }
+    }
+
+    /// Under an acceleration a the window is √(8 noise/a) long, and the rate lags by a/2 of it.
+    #[test]
+    fn an_acceleration_shortens_the_window_to_what_the_noise_allows() {
+        let a = 6.0;
+        let mut velocity = Velocity::new(STEP);
+        for k in 0..200 {
+            let t_s = f64::from(k) * T_S;
+            let rate = velocity.push(0.5 * a * t_s * t_s, T_S);
+            let window_s = ((8.0 * STEP / a).sqrt() / T_S).floor() * T_S;
+            if k > 40 {
+                assert!((a * t_s - rate - 0.5 * a * window_s).abs() < 1e-9, "{rate} at {t_s}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_sudden_move_is_followed_in_a_few_samples_and_rest_is_rest() {
+        let jerk = |t_s: f64| if t_s < 0.1 { (0.0, 0.0) } else { (0.4 * (t_s - 0.1), 0.4) };
+        // A few samples, not the 31 of the window; and then a step over what has passed since.
+        let settled = 105;
+        assert!(worst(jerk, settled, 300) <= STEP / (4.0 * T_S), "{}", worst(jerk, settled, 300));
+        assert_eq!(worst(|_| (0.01, 0.0), 0, 100), 0.0);
+    }
+
+    #[test]
+    fn a_skipped_tick_is_time_that_passed_and_what_is_no_number_is_left_out() {
+        let mut velocity = Velocity::new(0.0);
+        let mut x = 0.0;
+        for (k, periods) in [1.0, 1.0, 5.0, 1.0, 2.0].into_iter().cycle().take(60).enumerate() {
+            x += 0.3 * periods * T_S;
+            let rate = velocity.push(x, periods * T_S);
+            assert!(k == 0 || (rate - 0.3).abs() < 1e-9, "{rate}");
+        }
+        for (value, passed_s) in [(f64::NAN, T_S), (1.0, f64::INFINITY), (1.0, 0.0), (1.0, -1.0)] {
+            assert!((velocity.push(value, passed_s) - 0.3).abs() < 1e-9);
+        }
+        velocity.reset();
+        assert_eq!((velocity.rate_per_s(), velocity.push(7.0, T_S)), (0.0, 0.0));
+    }
+}
