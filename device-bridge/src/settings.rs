@@ -1,25 +1,20 @@
 //! What the configuration means: checked, in the types that the loop and the uplink use.
+pub mod arm;
+
 use crate::{
     BridgeError, Config,
-    config::{DeviceConfig, HapticMasterConfig, LimitsConfig, SimulatedConfig},
-    device::{
-        hapticmaster::{Dialect, start::StartSettings},
-        workspace::{ClutchSettings, Workspace},
-    },
+    device::workspace::{ClutchSettings, Workspace},
 };
+pub use arm::ArmSettings;
 use glam::DVec3;
 use palpate_control::{
-    ArmSpec, ForceLimits, HandPath, Keyframe, ParameterError, PassivitySettings, RenderSettings, SimulatedArm,
-    ThermalLimits, WatchdogSettings, coupling::SampledWall,
+    ForceLimits, ParameterError, PassivitySettings, RenderSettings, ThermalLimits, WatchdogSettings,
+    coupling::SampledWall,
 };
 use palpate_proto::connect::{self, ConnectError};
 use palpate_realtime::OsMeasures;
 use std::time::Duration;
 use tonic::transport::Endpoint;
-
-/// What a HapticMASTER can be made to feel like (kg).
-const LEAST_INERTIA_KG: f64 = 2.0;
-const MOST_INERTIA_KG: f64 = 100.0;
 
 /// The whole bridge.
 #[derive(Debug, Clone)]
@@ -89,15 +84,6 @@ pub struct DeviceSettings {
     pub clutch: Option<ClutchSettings>,
 }
 
-/// Which arm.
-#[derive(Debug, Clone)]
-pub enum ArmSettings {
-    /// The simulated one.
-    Simulated(SimulatedArm),
-    /// A HapticMASTER.
-    HapticMaster(StartSettings),
-}
-
 impl Settings {
     /// Checks a configuration, and reads the certificate it names.
     ///
@@ -115,7 +101,7 @@ impl Settings {
         Ok(Self {
             uplink: uplink(config)?,
             device: DeviceSettings {
-                arm: arm(config, servo.period_s)?,
+                arm: arm::checked(config, servo.period_s)?,
                 workspace,
                 clutch: clutch(config, &servo.watchdog)?,
             },
@@ -246,45 +232,6 @@ fn unusable(error: ConnectError) -> BridgeError {
     }
 }
 
-fn arm(config: &Config, period_s: f64) -> Result<ArmSettings, BridgeError> {
-    match &config.device {
-        DeviceConfig::Simulated(simulated) => Ok(ArmSettings::Simulated(simulated_arm(simulated, period_s)?)),
-        DeviceConfig::Hapticmaster(arm) => Ok(ArmSettings::HapticMaster(hapticmaster(arm, &config.limits)?)),
-    }
-}
-
-fn simulated_arm(config: &SimulatedConfig, period_s: f64) -> Result<SimulatedArm, BridgeError> {
-    let keyframes = config
-        .keyframes
-        .iter()
-        .map(|key| Keyframe { time_s: key.time_s, position_m: DVec3::from_array(key.position_m) })
-        .collect();
-    let path =
-        HandPath::new(keyframes, config.period_s).map_err(|error| value("device.keyframes", error.to_string()))?;
-    let spec = ArmSpec {
-        mass_kg: config.mass_kg,
-        damping_n_s_per_m: config.damping_n_s_per_m,
-        hand_stiffness_n_per_m: config.hand_stiffness_n_per_m,
-        hand_damping_n_s_per_m: config.hand_damping_n_s_per_m,
-    };
-    SimulatedArm::new(spec, path, period_s).map_err(|error| parameter("device", &error))
-}
-
-fn hapticmaster(config: &HapticMasterConfig, limits: &LimitsConfig) -> Result<StartSettings, BridgeError> {
-    if !(LEAST_INERTIA_KG..=MOST_INERTIA_KG).contains(&config.inertia_kg) {
-        let range = format!("{} is out of range: use {LEAST_INERTIA_KG} to {MOST_INERTIA_KG}", config.inertia_kg);
-        return Err(value("device.inertia_kg", range));
-    }
-    Ok(StartSettings {
-        address: config.address.clone(),
-        dialect: if config.apart { Dialect::Apart } else { Dialect::Mixed },
-        inertia_kg: config.inertia_kg,
-        max_force_n: limits.max_force_n,
-        homing: seconds("device.homing_s", config.homing_s)?,
-        silence: seconds("device.silence_s", config.silence_s)?,
-    })
-}
-
 fn measures(config: &Config) -> Result<OsMeasures, BridgeError> {
     let realtime = &config.realtime;
     if realtime.fifo_priority > 99 {
@@ -319,7 +266,7 @@ fn parameter(section: &str, error: &ParameterError) -> BridgeError {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::config::KeyframeConfig;
+    use crate::config::{DeviceConfig, KeyframeConfig, SimulatedConfig, WoodenHapticsConfig};
     use proptest::prelude::*;
 
     fn refused(change: impl FnOnce(&mut Config)) -> String {
@@ -372,6 +319,14 @@ mod tests {
         let bad = KeyframeConfig { time_s: -1.0, position_m: [0.0; 3] };
         let device = SimulatedConfig { keyframes: vec![bad], ..simulated };
         assert!(refused(|c| c.device = DeviceConfig::Simulated(device)).starts_with("device.keyframes: keyframe 0"));
+        let arm = WoodenHapticsConfig { max_current_a: 40.0, ..WoodenHapticsConfig::default() };
+        assert!(
+            refused(|c| c.device = DeviceConfig::Woodenhaptics(arm)).starts_with("device.max_current_a: 40 is out")
+        );
+        let arm = WoodenHapticsConfig { body_diameters_m: [0.1, 0.0, 0.1], ..WoodenHapticsConfig::default() };
+        assert!(
+            refused(|c| c.device = DeviceConfig::Woodenhaptics(arm)).starts_with("device.body_diameters_m: 0 is out")
+        );
     }
 
     #[test]

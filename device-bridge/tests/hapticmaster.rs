@@ -2,11 +2,10 @@
 #![allow(clippy::unwrap_used)]
 mod common;
 
-use common::{Mock, config, start, until};
+use common::press::{self, PRESSED_N, bridged, pressed_n, simulated, to_arm};
 use glam::DVec3;
 use palpate_bridge::{
-    BridgeError, Config, Summary,
-    config::{DeviceConfig, HapticMasterConfig, KeyframeConfig, SimulatedConfig, WorkspaceConfig},
+    config::{DeviceConfig, HapticMasterConfig},
     device::{Arm as _, Fault, hapticmaster as driver},
     emulate::{
         Faults,
@@ -15,7 +14,6 @@ use palpate_bridge::{
     probe::probe,
 };
 use palpate_control::{HandPath, Keyframe};
-use palpate_proto::v1;
 use std::{
     sync::atomic::Ordering,
     time::{Duration, Instant},
@@ -38,109 +36,35 @@ fn arm_config(emulator: &HapticMaster, apart: bool) -> HapticMasterConfig {
     }
 }
 
-const ORIGIN_M: DVec3 = DVec3::new(0.1, 0.0, -0.2);
-
-fn to_arm(world_m: DVec3) -> DVec3 {
-    let d = world_m - ORIGIN_M;
-    DVec3::new(-d.y, d.x, d.z)
-}
-
-/// The arm's x, y, z point along the world's −y, +x, +z, and its origin is elsewhere.
-fn elsewhere() -> WorkspaceConfig {
-    let axes = ["-y", "+x", "+z"].map(str::to_owned);
-    WorkspaceConfig { axes, origin_m: ORIGIN_M.to_array(), ..WorkspaceConfig::default() }
-}
-
-fn bridged(url: &str, device: DeviceConfig) -> Config {
-    Config { device, workspace: elsewhere(), ..config(url) }
-}
-
-/// A wall of 400 N/m whose surface is at z = 0.
-fn wall() -> v1::LocalContactModel {
-    let vec = |x, y, z| Some(v1::Vec3 { x, y, z });
-    v1::LocalContactModel {
-        point_m: vec(0.0, 0.0, 0.0),
-        normal: vec(0.0, 0.0, 1.0),
-        force_n: vec(0.0, 0.0, 0.0),
-        stiffness_n_per_m: Some(v1::Mat3 { column_major: vec![0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, -400.0] }),
-        validity_radius_m: 0.05,
-        tick: 1_000_000,
-        max_force_n: 3.0,
-    }
-}
-
-/// From above the wall into it, where it stays; the hand is the same on either arm.
-const PRESS: [(f64, f64); 3] = [(0.0, 2e-3), (0.5, 2e-3), (1.5, -5e-3)];
-
-/// Presses; returns the force (N) that the hand's end depth asks for, once nothing moves.
-async fn pressed_n(device: impl FnOnce() -> DeviceConfig) -> (f64, Summary) {
-    let mock = Mock::default();
-    mock.set(|behaviour| behaviour.local_model = Some(wall()));
-    let (address, _stop, _serving) = mock.serve("127.0.0.1:0").await;
-    let bridge = start(bridged(&format!("http://{address}"), device()));
-    let stats = bridge.handle.stats();
-    until("it presses", || stats.force_n() > 0.5).await;
-    let (mut last_n, mut still) = (0.0_f64, 0);
-    until("it has come to rest", || {
-        still = if (stats.force_n() - last_n).abs() < 2e-4 { still + 1 } else { 0 };
-        last_n = stats.force_n();
-        still > 250
-    })
-    .await;
-    (last_n, bridge.stop().await)
-}
-
-fn simulated() -> DeviceConfig {
-    let key = |(time_s, z)| KeyframeConfig { time_s, position_m: to_arm(DVec3::new(0.0, 0.0, z)).to_array() };
-    DeviceConfig::Simulated(SimulatedConfig {
-        period_s: None,
-        keyframes: PRESS.map(key).to_vec(),
-        ..SimulatedConfig::default()
-    })
-}
-
 fn held(settings: &mut Settings) {
-    let key = |(time_s, z)| Keyframe { time_s, position_m: to_arm(DVec3::new(0.0, 0.0, z)) };
-    settings.path = HandPath::new(PRESS.map(key).to_vec(), None).unwrap();
+    settings.path = press::path();
     // The hand holds the heavier arm as firmly; it is damped like it.
     settings.arm.hand_damping_n_s_per_m = 40.0;
 }
 
+const FLICKER_N: f64 = 2e-4;
+
 /// An admittance arm takes the same press to the same force: within 5 %, in every dialect.
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn a_press_ends_at_the_force_of_the_simulated_arm() {
-    let (expected_n, _) = pressed_n(simulated).await;
-    // 300 (5 mm − d) = 400 d: springs in series.
-    assert!((expected_n - 400.0 * 300.0 * 5e-3 / 700.0).abs() < 0.01, "{expected_n}");
+    let (expected_n, _) = pressed_n(FLICKER_N, simulated()).await;
+    assert!((expected_n - PRESSED_N).abs() < 0.01, "{expected_n}");
     for (headers, quoted, apart) in [(true, false, false), (false, true, false), (true, true, true)] {
         let arm = emulator(|settings| {
             held(settings);
             (settings.headers, settings.quoted, settings.apart) = (headers, quoted, apart);
         });
-        let (found_n, summary) = pressed_n(|| DeviceConfig::Hapticmaster(arm_config(&arm, apart))).await;
+        let (found_n, summary) = pressed_n(FLICKER_N, DeviceConfig::Hapticmaster(arm_config(&arm, apart))).await;
         assert!((found_n / expected_n - 1.0).abs() < 0.05, "{found_n} N, {expected_n} N: {headers} {quoted} {apart}");
         assert!(summary.peak_force_n < 1.2 * expected_n, "{summary}");
         assert_eq!(arm.effect_n(), DVec3::ZERO, "the bridge took its force away when it ended");
     }
 }
 
-/// A bridge in full force; what happens then is a fault of the arm.
 async fn lost_by(fault: impl FnOnce(&Faults)) -> (Fault, f64) {
-    let mock = Mock::default();
-    let (address, _stop, _serving) = mock.serve("127.0.0.1:0").await;
     let arm = emulator(|_| ());
-    let bridge = start(bridged(&format!("http://{address}"), DeviceConfig::Hapticmaster(arm_config(&arm, false))));
-    until("the force is up", || bridge.handle.stats().force_n() > 0.99 && arm.effect_n().length() > 0.99).await;
-    // 1 N along the world's z is along the arm's.
-    assert!((arm.effect_n() - DVec3::Z).length() < 0.02, "{}", arm.effect_n());
-    fault(&arm.faults);
-    let error = tokio::time::timeout(Duration::from_secs(20), bridge.task).await.unwrap().unwrap().unwrap_err();
-    let force_n = bridge.handle.stats().force_n();
-    until("the daemon saw the end", || mock.seen(|seen| seen.ended == 1)).await;
-    match error {
-        BridgeError::DeviceLost { fault } => (fault, force_n),
-        other => panic!("{other}"),
-    }
+    let device = DeviceConfig::Hapticmaster(arm_config(&arm, false));
+    press::lost_by(device, || arm.effect_n(), || fault(&arm.faults)).await
 }
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]

@@ -1,5 +1,5 @@
 //! The kinds of arms that there are drivers for: each one's name, what people are told of it, and its keys.
-use crate::config::{DeviceConfig, HapticMasterConfig, SimulatedConfig};
+use crate::config::{DeviceConfig, HapticMasterConfig, SimulatedConfig, WoodenHapticsConfig};
 use std::fmt::Write as _;
 
 /// What is told of a kind.
@@ -18,7 +18,7 @@ pub struct Kind {
 }
 
 /// All of them.
-pub static KINDS: [Kind; 2] = [
+pub static KINDS: [Kind; 3] = [
     Kind {
         name: "simulated",
         what: "no hardware: a mass held by a hand that follows a path",
@@ -32,6 +32,13 @@ pub static KINDS: [Kind; 2] = [
         needs: "its address in the same network (docs/arms/hapticmaster.md)",
         tried: "palpate-bridge emulate hapticmaster; no hardware yet",
         default: || DeviceConfig::Hapticmaster(HapticMasterConfig::default()),
+    },
+    Kind {
+        name: "woodenhaptics",
+        what: "WoodenHaptics (open hardware), an impedance arm on a serial line",
+        needs: "its port, and the right to open it (docs/arms/woodenhaptics.md)",
+        tried: "palpate-bridge emulate woodenhaptics; no hardware yet",
+        default: || DeviceConfig::Woodenhaptics(WoodenHapticsConfig::default()),
     },
 ];
 

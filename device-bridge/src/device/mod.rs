@@ -1,7 +1,9 @@
 //! Arms: one file or folder for each, behind one small trait.
 pub mod hapticmaster;
 pub mod kinds;
+pub mod serial;
 pub mod simulated;
+pub mod woodenhaptics;
 pub mod workspace;
 
 use crate::{
@@ -15,6 +17,7 @@ use simulated::SimulatedDevice;
 use std::fmt::Debug;
 use thiserror::Error;
 use tokio_util::sync::CancellationToken;
+use woodenhaptics::WoodenHaptics;
 use workspace::Placed;
 
 /// What an arm measures at one time.
@@ -87,6 +90,10 @@ fn open_arm(settings: &ArmSettings, period_s: f64, stop: &CancellationToken) -> 
             tracing::info!("the HapticMASTER at {} is started: {}", settings.address, started.version);
             let arm = HapticMaster::new(started, settings, period_s);
             Ok(Box::new(arm.map_err(|source| BridgeError::System { what: "read the arm without waiting", source })?))
+        }
+        ArmSettings::WoodenHaptics(settings) => {
+            let started = WoodenHaptics::start(settings, period_s);
+            Ok(Box::new(started.map_err(|source| BridgeError::Start { source: Box::new(source) })?))
         }
     }
 }

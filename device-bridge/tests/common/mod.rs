@@ -1,5 +1,7 @@
 //! A daemon's Device service on a real socket, whose behaviour a test scripts.
 #![allow(dead_code, unreachable_pub, missing_docs, clippy::unwrap_used)] // helpers of tests; each file uses a part
+pub mod press;
+
 use palpate_bridge::{
     Config, Handle,
     config::{DeviceConfig, KeyframeConfig, RealtimeConfig, SimulatedConfig},

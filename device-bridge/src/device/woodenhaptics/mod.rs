@@ -1,0 +1,238 @@
+//! WoodenHaptics (open hardware): an impedance arm of three motors with encoders, on a serial line.
+//!
+//! Every tick a line with three currents goes out, and what has come is read: the newest line counts. Whether the board answers each line or sends by itself
+//! does not matter, so. Its encoders count from where the arm was when it was switched on: that has to be the pose in which all angles are 0, or
+//! [`Settings::home_counts`] says what they are there.
+//!
+//! What only hardware can tell: the order and signs of axes ([`Settings::reversed`]), what its word of information says (it is not looked at), the weight of its links
+//! (not compensated). Its firmware switches the motors off after half a second without a line.
+pub mod kinematics;
+pub mod wire;
+
+use super::{
+    Arm, Fault, Reading,
+    serial::{Line, Lines, OpenError},
+};
+use glam::DVec3;
+use kinematics::Kinematics;
+use palpate_control::{Motion, Velocity, extrapolate};
+use std::time::{Duration, Instant};
+use thiserror::Error;
+
+/// A pose is believed to go on with its velocity for so long (s).
+const LONGEST_EXTRAPOLATION_S: f64 = 5e-3;
+/// How long the first line may take.
+const PATIENCE: Duration = Duration::from_secs(2);
+/// Between two lines to a board that has not said anything yet.
+const ASK_EVERY: Duration = Duration::from_millis(5);
+/// No current: motors off.
+const NOTHING: [i16; wire::NUMBERS] = [0; wire::NUMBERS];
+
+/// The arm's constants. Of each three, the first is of body a, which turns round the upright axis.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Settings {
+    /// Path of the serial port.
+    pub port: String,
+    /// Its rate; a board with USB of its own does not care.
+    pub baud: u32,
+    /// Lengths.
+    pub kinematics: Kinematics,
+    /// Turns of each motor for a turn of its body: its diameter over the capstan's.
+    pub gear_ratios: DVec3,
+    /// Counts for a turn of a motor.
+    pub counts_per_turn: f64,
+    /// What the encoders say where all angles are 0.
+    pub home_counts: [i16; 3],
+    /// Motors and encoders that turn the other way.
+    pub reversed: [bool; 3],
+    /// Torque of a motor (N m/A).
+    pub torque_constant_nm_per_a: f64,
+    /// Largest current (A) that a motor is ever given.
+    pub max_current_a: f64,
+    /// Without a line for so long the arm is lost.
+    pub silence: Duration,
+}
+
+impl Settings {
+    /// Angles (rad) of the bodies.
+    pub fn angles_rad(&self, counts: [i16; 3]) -> DVec3 {
+        let turned = |axis: usize| f64::from(counts[axis]) - f64::from(self.home_counts[axis]);
+        DVec3::new(turned(0), turned(1), turned(2)) * self.rad_per_count()
+    }
+
+    /// What a count means (rad), with its sign.
+    pub fn rad_per_count(&self) -> DVec3 {
+        self.signs() * std::f64::consts::TAU / self.counts_per_turn / self.gear_ratios
+    }
+
+    /// Currents (mA) for torques (N m) on the bodies, all shortened alike when one is too large: then the force keeps its direction.
+    pub fn currents_ma(&self, torques_nm: DVec3) -> [i16; 3] {
+        let wanted_a = self.signs() * torques_nm / self.gear_ratios / self.torque_constant_nm_per_a;
+        let share = (self.max_current_a / wanted_a.abs().max_element()).min(1.0);
+        // A conversion saturates, and what is no number is 0.
+        (1e3 * share * wanted_a).round().to_array().map(|ma| ma as i16)
+    }
+
+    /// Torques (N m) on the bodies from currents (mA).
+    pub fn torques_nm(&self, currents_ma: [i16; 3]) -> DVec3 {
+        let amperes = DVec3::from(currents_ma.map(f64::from)) * 1e-3;
+        self.signs() * amperes * self.torque_constant_nm_per_a * self.gear_ratios
+    }
+
+    fn signs(&self) -> DVec3 {
+        DVec3::from(self.reversed.map(|reversed| if reversed { -1.0 } else { 1.0 }))
+    }
+}
+
+/// Why the arm could not be started.
+#[derive(Debug, Error)]
+pub enum StartError {
+    /// No port.
+    #[error(transparent)]
+    Open(#[from] OpenError),
+    /// Not a word.
+    #[error("no line came from {path} within {} s: is the arm's board switched on?", PATIENCE.as_secs())]
+    Silent {
+        /// The port.
+        path: String,
+    },
+    /// Something else.
+    #[error("{path}: {fault}; is it this arm's port?")]
+    Strange {
+        /// The port.
+        path: String,
+        /// What went wrong.
+        fault: Fault,
+    },
+}
+
+/// The arm.
+#[derive(Debug)]
+pub struct WoodenHaptics {
+    line: Line,
+    lines: Lines,
+    settings: Settings,
+    period_s: f64,
+    silence_periods: u64,
+    counts: [i16; 3],
+    /// Rates (counts/s): counted at the motors, where a step of the encoder is 1.
+    rates: [Velocity; 3],
+    motion: Motion,
+    force_n: DVec3,
+    /// Since the newest line came.
+    quiet_periods: u64,
+    message: Vec<u8>,
+    lost: Option<Fault>,
+}
+
+impl WoodenHaptics {
+    /// Opens the port, and waits for a first line. Blocks.
+    ///
+    /// # Errors
+    /// [`StartError`].
+    pub fn start(settings: &Settings, period_s: f64) -> Result<Self, StartError> {
+        let path = || settings.port.clone();
+        let strange = |fault| StartError::Strange { path: path(), fault };
+        let mut line = Line::open(&settings.port, settings.baud)?;
+        let (mut lines, mut message) = (Lines::default(), Vec::with_capacity(wire::LONGEST));
+        wire::write(NOTHING, &mut message);
+        let began = Instant::now();
+        let counts = loop {
+            line.send(&message).map_err(strange)?;
+            std::thread::sleep(ASK_EVERY);
+            if let Some([a, b, c, ..]) = line.newest(&mut lines, wire::parse).map_err(strange)? {
+                break [a, b, c];
+            }
+            if began.elapsed() > PATIENCE {
+                return Err(StartError::Silent { path: path() });
+            }
+        };
+        let mut arm = Self {
+            line,
+            lines,
+            period_s,
+            silence_periods: (settings.silence.as_secs_f64() / period_s).ceil() as u64,
+            counts,
+            rates: std::array::from_fn(|_| Velocity::new(1.0)),
+            motion: Motion::at(DVec3::ZERO),
+            force_n: DVec3::ZERO,
+            quiet_periods: 0,
+            message,
+            lost: None,
+            settings: settings.clone(),
+        };
+        arm.renew(counts, period_s);
+        Ok(arm)
+    }
+
+    /// A new pose, `passed_s` after the one before.
+    fn renew(&mut self, counts: [i16; 3], passed_s: f64) {
+        self.counts = counts;
+        let mut rates = DVec3::ZERO;
+        for axis in 0..3 {
+            rates[axis] = self.rates[axis].push(f64::from(counts[axis]), passed_s);
+        }
+        let angles_rad = self.settings.angles_rad(counts);
+        let kinematics = &self.settings.kinematics;
+        self.motion = Motion::at(kinematics.tool_m(angles_rad));
+        // v = J ω
+        self.motion.velocity_m_per_s =
+            kinematics.jacobian_m_per_rad(angles_rad) * (rates * self.settings.rad_per_count());
+    }
+
+    fn receive(&mut self) -> Result<(), Fault> {
+        if let Some([a, b, c, ..]) = self.line.newest(&mut self.lines, wire::parse)? {
+            let passed_s = self.quiet_periods as f64 * self.period_s;
+            self.quiet_periods = 0;
+            self.renew([a, b, c], passed_s);
+        }
+        if self.quiet_periods > self.silence_periods { Err(Fault::Silent) } else { Ok(()) }
+    }
+
+    /// τ = Jᵀ F, as currents.
+    fn send(&mut self) -> Result<(), Fault> {
+        let jacobian = self.settings.kinematics.jacobian_m_per_rad(self.settings.angles_rad(self.counts));
+        let [a, b, c] = self.settings.currents_ma(jacobian.transpose() * self.force_n);
+        wire::write([a, b, c, 0, 0, 0, 0], &mut self.message);
+        self.line.send(&self.message).map(|_| ())
+    }
+
+    fn lose(&mut self, fault: Fault) -> Fault {
+        *self.lost.get_or_insert(fault)
+    }
+}
+
+impl Arm for WoodenHaptics {
+    fn read(&mut self, periods: u64) -> Result<Reading, Fault> {
+        if let Some(fault) = self.lost {
+            return Err(fault);
+        }
+        self.quiet_periods = self.quiet_periods.saturating_add(periods);
+        self.receive().map_err(|fault| self.lose(fault))?;
+        let quiet_s = self.quiet_periods as f64 * self.period_s;
+        Ok(Reading {
+            motion: extrapolate(&self.motion, quiet_s, LONGEST_EXTRAPOLATION_S),
+            buttons: 0,
+            measured_force_n: None,
+            // It came since the last tick.
+            age_s: quiet_s + self.period_s,
+            force_share: 1.0,
+        })
+    }
+
+    /// A lost arm is still told to let go, should it hear.
+    fn apply(&mut self, force_n: DVec3) {
+        self.force_n = if self.lost.is_some() || !force_n.is_finite() { DVec3::ZERO } else { force_n };
+        if let Err(fault) = self.send() {
+            self.lose(fault);
+        }
+    }
+}
+
+impl Drop for WoodenHaptics {
+    /// Switches the motors off.
+    fn drop(&mut self) {
+        wire::write(NOTHING, &mut self.message);
+        let _ = self.line.send(&self.message);
+    }
+}

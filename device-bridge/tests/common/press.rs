@@ -1,0 +1,101 @@
+//! A press on a wall, and an arm's end, the same for every driver.
+use super::{Mock, config, start, until};
+use glam::DVec3;
+use palpate_bridge::{
+    BridgeError, Config, Summary,
+    config::{DeviceConfig, KeyframeConfig, SimulatedConfig, WorkspaceConfig},
+    device::Fault,
+};
+use palpate_control::{HandPath, Keyframe};
+use palpate_proto::v1;
+use std::time::Duration;
+
+const ORIGIN_M: DVec3 = DVec3::new(0.1, 0.0, -0.2);
+
+/// The arm's x, y, z point along the world's −y, +x, +z, and its origin is elsewhere.
+pub fn elsewhere() -> WorkspaceConfig {
+    let axes = ["-y", "+x", "+z"].map(str::to_owned);
+    WorkspaceConfig { axes, origin_m: ORIGIN_M.to_array(), ..WorkspaceConfig::default() }
+}
+
+/// A place of the world for an arm [`elsewhere`].
+pub fn to_arm(world_m: DVec3) -> DVec3 {
+    let d = world_m - ORIGIN_M;
+    DVec3::new(-d.y, d.x, d.z)
+}
+
+pub fn bridged(url: &str, device: DeviceConfig) -> Config {
+    Config { device, workspace: elsewhere(), ..config(url) }
+}
+
+/// A wall of 400 N/m whose surface is at z = 0.
+fn wall() -> v1::LocalContactModel {
+    let vec = |x, y, z| Some(v1::Vec3 { x, y, z });
+    v1::LocalContactModel {
+        point_m: vec(0.0, 0.0, 0.0),
+        normal: vec(0.0, 0.0, 1.0),
+        force_n: vec(0.0, 0.0, 0.0),
+        stiffness_n_per_m: Some(v1::Mat3 { column_major: vec![0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, -400.0] }),
+        validity_radius_m: 0.05,
+        tick: 1_000_000,
+        max_force_n: 3.0,
+    }
+}
+
+/// From above the wall into it, where it stays; the hand is the same on every arm. Time (s) and height (m).
+pub const PRESS: [(f64, f64); 3] = [(0.0, 2e-3), (0.5, 2e-3), (1.5, -5e-3)];
+/// What it ends at (N): 300 (5 mm − d) = 400 d, hand and wall as springs in series.
+pub const PRESSED_N: f64 = 400.0 * 300.0 * 5e-3 / 700.0;
+
+/// The press for a hand on an emulated arm, in the arm's axes.
+pub fn path() -> HandPath {
+    let key = |(time_s, z)| Keyframe { time_s, position_m: to_arm(DVec3::new(0.0, 0.0, z)) };
+    HandPath::new(PRESS.map(key).to_vec(), None).unwrap()
+}
+
+pub fn simulated() -> DeviceConfig {
+    let key = |(time_s, z)| KeyframeConfig { time_s, position_m: to_arm(DVec3::new(0.0, 0.0, z)).to_array() };
+    DeviceConfig::Simulated(SimulatedConfig {
+        period_s: None,
+        keyframes: PRESS.map(key).to_vec(),
+        ..SimulatedConfig::default()
+    })
+}
+
+/// Presses; the force (N) once it no longer moves by more than `flicker_n` (N) within half a second: its mean over that.
+pub async fn pressed_n(flicker_n: f64, device: DeviceConfig) -> (f64, Summary) {
+    let mock = Mock::default();
+    mock.set(|behaviour| behaviour.local_model = Some(wall()));
+    let (address, _stop, _serving) = mock.serve("127.0.0.1:0").await;
+    let bridge = start(bridged(&format!("http://{address}"), device));
+    let stats = bridge.handle.stats();
+    until("it presses", || stats.force_n() > 0.5).await;
+    let mut last = std::collections::VecDeque::new();
+    until("it has come to rest", || {
+        last.push_back(stats.force_n());
+        if last.len() > 250 {
+            last.pop_front();
+        }
+        let (least, most) = last.iter().fold((f64::MAX, 0.0_f64), |(a, b), &n| (a.min(n), b.max(n)));
+        last.len() == 250 && most - least <= flicker_n
+    })
+    .await;
+    (last.iter().sum::<f64>() / 250.0, bridge.stop().await)
+}
+
+/// A bridge in full force (1 N along the world's z, and so the arm's); `fault` happens then. The fault it ended by, and its force (N) then.
+pub async fn lost_by(device: DeviceConfig, arm_n: impl Fn() -> DVec3, fault: impl FnOnce()) -> (Fault, f64) {
+    let mock = Mock::default();
+    let (address, _stop, _serving) = mock.serve("127.0.0.1:0").await;
+    let bridge = start(bridged(&format!("http://{address}"), device));
+    let stats = bridge.handle.stats();
+    until("the force is up", || stats.force_n() > 0.99 && (arm_n() - DVec3::Z).length() < 0.02).await;
+    fault();
+    let error = tokio::time::timeout(Duration::from_secs(20), bridge.task).await.unwrap().unwrap().unwrap_err();
+    let force_n = bridge.handle.stats().force_n();
+    until("the daemon saw the end", || mock.seen(|seen| seen.ended == 1)).await;
+    match error {
+        BridgeError::DeviceLost { fault } => (fault, force_n),
+        other => panic!("{other}"),
+    }
+}
