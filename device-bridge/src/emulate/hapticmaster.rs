@@ -1,5 +1,5 @@
 //! A HapticMASTER that is not there. `m a = F_hand + Σ F_effects − b v`, in steps of 1 ms of real time; its effects end with the connection.
-use super::Faults;
+use super::{Faults, Running, Shared};
 use crate::device::hapticmaster::grammar;
 use glam::DVec3;
 use palpate_control::{ArmSpec, HandPath, ParameterError, SimulatedArm};
@@ -7,11 +7,7 @@ use std::{
     collections::BTreeMap,
     io::{ErrorKind, Read as _, Write as _},
     net::{SocketAddr, TcpListener, TcpStream},
-    sync::{
-        Arc, Mutex, MutexGuard, PoisonError,
-        atomic::{AtomicBool, Ordering},
-    },
-    thread::JoinHandle,
+    sync::{Arc, atomic::Ordering},
     time::{Duration, Instant},
 };
 
@@ -62,9 +58,8 @@ pub struct HapticMaster {
     address: SocketAddr,
     /// What it does wrong.
     pub faults: Arc<Faults>,
-    machine: Arc<Mutex<Machine>>,
-    stop: Arc<AtomicBool>,
-    thread: Option<JoinHandle<()>>,
+    shared: Shared<Machine>,
+    _running: Running,
 }
 
 impl HapticMaster {
@@ -77,11 +72,10 @@ impl HapticMaster {
         listener.set_nonblocking(true)?;
         let address = listener.local_addr()?;
         let machine = Machine::new(settings).map_err(|error| std::io::Error::new(ErrorKind::InvalidInput, error))?;
-        let (machine, faults, stop) =
-            (Arc::new(Mutex::new(machine)), Arc::<Faults>::default(), Arc::<AtomicBool>::default());
-        let server = Server { machine: Arc::clone(&machine), faults: Arc::clone(&faults), stop: Arc::clone(&stop) };
-        let thread = std::thread::Builder::new().name("hapticmaster".into()).spawn(move || server.run(&listener))?;
-        Ok(Self { address, faults, machine, stop, thread: Some(thread) })
+        let shared = Shared::new(machine);
+        let server = Server(shared.clone());
+        let running = Running::start("hapticmaster", &shared.stop, move || server.run(&listener))?;
+        Ok(Self { address, faults: Arc::clone(&shared.faults), shared, _running: running })
     }
 
     /// Where it listens.
@@ -91,50 +85,33 @@ impl HapticMaster {
 
     /// Force (N, the arm's axes) of all effects on it now.
     pub fn effect_n(&self) -> DVec3 {
-        let mut machine = lock(&self.machine);
+        let mut machine = self.shared.machine();
         machine.go_on();
         machine.effect_n()
     }
 
     /// Where it is (m, its own axes).
     pub fn position_m(&self) -> DVec3 {
-        let mut machine = lock(&self.machine);
+        let mut machine = self.shared.machine();
         machine.go_on();
         machine.arm.motion().position_m
     }
 
     /// Requests answered so far.
     pub fn requests(&self) -> u64 {
-        lock(&self.machine).requests
+        self.shared.machine().requests
     }
 }
 
-impl Drop for HapticMaster {
-    fn drop(&mut self) {
-        self.stop.store(true, Ordering::Relaxed);
-        if let Some(thread) = self.thread.take() {
-            let _ = thread.join();
-        }
-    }
-}
-
-fn lock(machine: &Mutex<Machine>) -> MutexGuard<'_, Machine> {
-    machine.lock().unwrap_or_else(PoisonError::into_inner)
-}
-
-struct Server {
-    machine: Arc<Mutex<Machine>>,
-    faults: Arc<Faults>,
-    stop: Arc<AtomicBool>,
-}
+struct Server(Shared<Machine>);
 
 impl Server {
     fn run(&self, listener: &TcpListener) {
-        while !Faults::is(&self.stop) {
+        while !Faults::is(&self.0.stop) {
             match listener.accept() {
                 Ok((stream, _)) => {
                     let _ = self.serve(stream);
-                    lock(&self.machine).effects.clear();
+                    self.0.machine().effects.clear();
                 }
                 Err(_) => std::thread::sleep(LOOK_EVERY),
             }
@@ -147,7 +124,7 @@ impl Server {
         stream.set_read_timeout(Some(LOOK_EVERY))?;
         let mut waiting = Vec::new();
         let mut bytes = [0; 1024];
-        while !Faults::is(&self.stop) && !Faults::is(&self.faults.cut) {
+        while !self.0.is_over() {
             match stream.read(&mut bytes) {
                 Ok(0) => return Ok(()),
                 Ok(count) => waiting.extend_from_slice(&bytes[..count]),
@@ -163,27 +140,27 @@ impl Server {
 
     fn answer(&self, stream: &mut TcpStream, text: &str) -> std::io::Result<()> {
         let (answer, headers) = {
-            let mut machine = lock(&self.machine);
+            let mut machine = self.0.machine();
             machine.go_on();
-            machine.stopped = Faults::is(&self.faults.emergency_stop);
+            machine.stopped = Faults::is(&self.0.faults.emergency_stop);
             machine.requests += 1;
-            let answer = if Faults::is(&self.faults.refusal) { REFUSAL.to_owned() } else { machine.obey(text) };
+            let answer = if Faults::is(&self.0.faults.refusal) { REFUSAL.to_owned() } else { machine.obey(text) };
             (answer, machine.settings.headers)
         };
-        let slow = self.faults.slow_us.load(Ordering::Relaxed);
+        let slow = self.0.faults.slow_us.load(Ordering::Relaxed);
         std::thread::sleep(Duration::from_micros(slow.into()));
-        if Faults::is(&self.faults.silence) {
+        if Faults::is(&self.0.faults.silence) {
             return Ok(());
         }
         let mut bytes = Vec::new();
-        if Faults::is(&self.faults.garbage) {
+        if Faults::is(&self.0.faults.garbage) {
             bytes.extend((0..64_u8).map(|i| i.wrapping_mul(37).wrapping_add(129)));
         } else if headers {
             grammar::frame(answer.as_bytes(), &mut bytes);
         } else {
             bytes.extend_from_slice(answer.as_bytes());
         }
-        if Faults::is(&self.faults.split) {
+        if Faults::is(&self.0.faults.split) {
             return bytes.iter().try_for_each(|byte| stream.write_all(&[*byte]).and_then(|()| stream.flush()));
         }
         stream.write_all(&bytes)

@@ -3,7 +3,13 @@ pub mod cli;
 pub mod hapticmaster;
 pub mod woodenhaptics;
 
-use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
+use std::{
+    sync::{
+        Arc, Mutex, MutexGuard, PoisonError,
+        atomic::{AtomicBool, AtomicU32, Ordering},
+    },
+    thread::JoinHandle,
+};
 
 /// What an emulator does wrong. Set while it runs.
 #[derive(Debug, Default)]
@@ -32,5 +38,58 @@ impl Faults {
 
     fn is(flag: &AtomicBool) -> bool {
         flag.load(Ordering::Relaxed)
+    }
+}
+
+/// What the thread of an emulator shares with whoever looks at it: the machine, what it does wrong, and whether it is over.
+#[derive(Debug)]
+struct Shared<M> {
+    machine: Arc<Mutex<M>>,
+    faults: Arc<Faults>,
+    stop: Arc<AtomicBool>,
+}
+
+impl<M> Shared<M> {
+    fn new(machine: M) -> Self {
+        Self { machine: Arc::new(Mutex::new(machine)), faults: Arc::default(), stop: Arc::default() }
+    }
+
+    fn machine(&self) -> MutexGuard<'_, M> {
+        self.machine.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Told to stop, or its cable is pulled.
+    fn is_over(&self) -> bool {
+        Faults::is(&self.stop) || Faults::is(&self.faults.cut)
+    }
+}
+
+impl<M> Clone for Shared<M> {
+    fn clone(&self) -> Self {
+        let Self { machine, faults, stop } = self;
+        Self { machine: Arc::clone(machine), faults: Arc::clone(faults), stop: Arc::clone(stop) }
+    }
+}
+
+/// A thread that is told to stop, and waited for, when this is dropped.
+#[derive(Debug)]
+struct Running {
+    stop: Arc<AtomicBool>,
+    thread: Option<JoinHandle<()>>,
+}
+
+impl Running {
+    fn start(name: &str, stop: &Arc<AtomicBool>, run: impl FnOnce() + Send + 'static) -> std::io::Result<Self> {
+        let thread = std::thread::Builder::new().name(name.into()).spawn(run)?;
+        Ok(Self { stop: Arc::clone(stop), thread: Some(thread) })
+    }
+}
+
+impl Drop for Running {
+    fn drop(&mut self) {
+        self.stop.store(true, Ordering::Relaxed);
+        if let Some(thread) = self.thread.take() {
+            let _ = thread.join();
+        }
     }
 }

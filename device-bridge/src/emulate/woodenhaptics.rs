@@ -1,19 +1,15 @@
 //! A WoodenHaptics that is not there, on a pseudo terminal: encoders that count in steps, currents that become torques, a hand that holds the tool.
-use super::Faults;
+use super::{Faults, Running, Shared};
 use crate::device::{
     serial::Lines,
     woodenhaptics::{Settings as Constants, wire},
 };
 use glam::DVec3;
-use palpate_control::{ArmSpec, HandPath, SimulatedArm};
+use palpate_control::{ArmSpec, HandPath, ParameterError, SimulatedArm};
 use serialport::{SerialPort as _, TTYPort};
 use std::{
     io::{ErrorKind, Read as _, Write as _},
-    sync::{
-        Arc, Mutex, MutexGuard, PoisonError,
-        atomic::{AtomicBool, Ordering},
-    },
-    thread::JoinHandle,
+    sync::{Arc, atomic::Ordering},
     time::{Duration, Instant},
 };
 
@@ -43,9 +39,8 @@ pub struct WoodenHaptics {
     port: String,
     /// What it does wrong.
     pub faults: Arc<Faults>,
-    machine: Arc<Mutex<Machine>>,
-    stop: Arc<AtomicBool>,
-    thread: Option<JoinHandle<()>>,
+    shared: Shared<Machine>,
+    _running: Running,
 }
 
 impl WoodenHaptics {
@@ -56,24 +51,12 @@ impl WoodenHaptics {
     pub fn start(settings: Settings) -> std::io::Result<Self> {
         let (ours, theirs) = TTYPort::pair()?;
         let port = theirs.name().ok_or_else(|| std::io::Error::other("the pseudo terminal has no name"))?;
-        let arm = SimulatedArm::new(settings.arm, settings.path.clone(), STEP_S);
-        let arm = arm.map_err(|error| std::io::Error::new(ErrorKind::InvalidInput, error))?;
-        let machine = Arc::new(Mutex::new(Machine {
-            arm,
-            currents_ma: [0; 3],
-            heard: None,
-            began: None,
-            steps: 0,
-            lines: 0,
-            counts: [0; 3],
-            settings,
-        }));
-        let (faults, stop) = (Arc::<Faults>::default(), Arc::<AtomicBool>::default());
-        let board = Board { machine: Arc::clone(&machine), faults: Arc::clone(&faults), stop: Arc::clone(&stop) };
-        let name = "woodenhaptics".into();
+        let machine = Machine::new(settings).map_err(|error| std::io::Error::new(ErrorKind::InvalidInput, error))?;
+        let shared = Shared::new(machine);
+        let board = Board(shared.clone());
         // Their end stays open here, or ours would end with whoever closes it.
-        let thread = std::thread::Builder::new().name(name).spawn(move || board.run(ours, theirs))?;
-        Ok(Self { port, faults, machine, stop, thread: Some(thread) })
+        let running = Running::start("woodenhaptics", &shared.stop, move || board.run(ours, theirs))?;
+        Ok(Self { port, faults: Arc::clone(&shared.faults), shared, _running: running })
     }
 
     /// Path of the port to open.
@@ -83,38 +66,21 @@ impl WoodenHaptics {
 
     /// Force (N, the arm's axes) of its motors now.
     pub fn force_n(&self) -> DVec3 {
-        lock(&self.machine).force_n()
+        self.shared.machine().force_n()
     }
 
     /// Where it is (m, its own axes).
     pub fn position_m(&self) -> DVec3 {
-        lock(&self.machine).arm.motion().position_m
+        self.shared.machine().arm.motion().position_m
     }
 
     /// Lines that it heard.
     pub fn lines(&self) -> u64 {
-        lock(&self.machine).lines
+        self.shared.machine().lines
     }
 }
 
-impl Drop for WoodenHaptics {
-    fn drop(&mut self) {
-        self.stop.store(true, Ordering::Relaxed);
-        if let Some(thread) = self.thread.take() {
-            let _ = thread.join();
-        }
-    }
-}
-
-fn lock(machine: &Mutex<Machine>) -> MutexGuard<'_, Machine> {
-    machine.lock().unwrap_or_else(PoisonError::into_inner)
-}
-
-struct Board {
-    machine: Arc<Mutex<Machine>>,
-    faults: Arc<Faults>,
-    stop: Arc<AtomicBool>,
-}
+struct Board(Shared<Machine>);
 
 impl Board {
     /// Both ends are closed when it is over, or its cable is pulled.
@@ -123,10 +89,10 @@ impl Board {
         // The first byte it hears begins a line.
         let _ = lines.take(b'\n');
         let (mut said, mut text) = (0, Vec::new());
-        while !Faults::is(&self.stop) && !Faults::is(&self.faults.cut) {
+        while !self.0.is_over() {
             let heard = hear(&mut ours);
             let line = {
-                let mut machine = lock(&self.machine);
+                let mut machine = self.0.machine();
                 let mut answers = 0;
                 for byte in heard {
                     if let Ok(Some(line)) = lines.take(byte) {
@@ -148,18 +114,18 @@ impl Board {
             }
         }
         // A pulled cable is noticed; its machine has no power.
-        lock(&self.machine).currents_ma = [0; 3];
+        self.0.machine().currents_ma = [0; 3];
     }
 
     fn say(&self, ours: &mut TTYPort, text: &[u8]) {
-        std::thread::sleep(Duration::from_micros(self.faults.slow_us.load(Ordering::Relaxed).into()));
-        if Faults::is(&self.faults.silence) {
+        std::thread::sleep(Duration::from_micros(self.0.faults.slow_us.load(Ordering::Relaxed).into()));
+        if Faults::is(&self.0.faults.silence) {
             return;
         }
-        let garbage = Faults::is(&self.faults.garbage);
+        let garbage = Faults::is(&self.0.faults.garbage);
         let noise: Vec<u8> = (0..64_u8).map(|i| i.wrapping_mul(37).wrapping_add(129)).chain([b'\n']).collect();
         let bytes = if garbage { &noise } else { text };
-        let at_once = if Faults::is(&self.faults.split) { 1 } else { bytes.len() };
+        let at_once = if Faults::is(&self.0.faults.split) { 1 } else { bytes.len() };
         // Nobody there to hear it is no matter.
         let _ = bytes.chunks(at_once).try_for_each(|part| ours.write_all(part));
     }
@@ -186,6 +152,19 @@ struct Machine {
 }
 
 impl Machine {
+    fn new(settings: Settings) -> Result<Self, ParameterError> {
+        Ok(Self {
+            arm: SimulatedArm::new(settings.arm, settings.path.clone(), STEP_S)?,
+            currents_ma: [0; 3],
+            heard: None,
+            began: None,
+            steps: 0,
+            lines: 0,
+            counts: [0; 3],
+            settings,
+        })
+    }
+
     fn obey(&mut self, line: &[u8]) -> bool {
         let Ok([a, b, c, ..]) = wire::parse(line) else { return false };
         self.go_on();
