@@ -14,10 +14,7 @@ use palpate_bridge::{
     probe::probe,
 };
 use palpate_control::{HandPath, Keyframe};
-use std::{
-    sync::atomic::Ordering,
-    time::{Duration, Instant},
-};
+use std::{sync::atomic::Ordering, time::Duration};
 use tokio_util::sync::CancellationToken;
 
 fn emulator(change: impl FnOnce(&mut Settings)) -> HapticMaster {
@@ -121,17 +118,10 @@ fn poses_follow_the_arm_though_answers_come_in_pieces() {
         });
         Faults::set(&emulated.faults.split, split);
         let mut arm = opened(&emulated, apart);
-        let began = Instant::now();
-        let (mut ticks, mut farthest_m) = (0_u64, 0.0_f64);
-        while began.elapsed() < Duration::from_millis(800) {
-            // A machine that is busy skips ticks, as the loop does.
-            let due = began.elapsed().as_millis() as u64 + 1;
-            let reading = arm.read(due - ticks).unwrap();
-            ticks = due;
+        let mut farthest_m = 0.0_f64;
+        press::follow(&mut arm, |reading| {
             farthest_m = farthest_m.max(reading.motion.position_m.distance(emulated.position_m()));
-            arm.apply(DVec3::ZERO);
-            std::thread::sleep(Duration::from_millis(1));
-        }
+        });
         let end = arm.read(0).unwrap();
         assert!(end.motion.position_m.distance(emulated.position_m()) < 1e-3, "{:?}", end.motion);
         assert!(emulated.position_m().x > 0.02 && emulated.requests() > 100);
@@ -146,11 +136,7 @@ fn no_force_beyond_the_limit_reaches_the_arm_and_none_that_is_not_finite() {
     let emulated = emulator(|_| ());
     let mut arm = opened(&emulated, false);
     let mut apply = |force_n: DVec3| {
-        for _ in 0..30 {
-            arm.read(1).unwrap();
-            arm.apply(force_n);
-            std::thread::sleep(Duration::from_millis(1));
-        }
+        press::hold(&mut arm, force_n);
         emulated.effect_n()
     };
     assert!((apply(DVec3::new(0.0, -1.0, 2.0)) - DVec3::new(0.0, -1.0, 2.0)).length() < 1e-4);

@@ -13,7 +13,7 @@ use palpate_bridge::{
     },
     run::Shared,
     servo::{Servo, ServoLaw},
-    settings::{ArmSettings, Settings, arm},
+    settings::{Settings, arm},
 };
 use palpate_control::{ArmSpec, ForceLimits, HandPath, LocalModel};
 use palpate_realtime::{Clock, Doorbell, TickLoop, slot};
@@ -98,8 +98,7 @@ fn the_hapticmasters_driver_allocates_nothing() {
 #[test]
 fn the_woodenhaptics_driver_allocates_nothing() {
     let keys = WoodenHapticsConfig::default();
-    let config = Config { device: DeviceConfig::Woodenhaptics(keys.clone()), ..Config::default() };
-    let ArmSettings::WoodenHaptics(constants) = arm::checked(&config, 1e-3).unwrap() else { panic!("another arm") };
+    let constants = arm::woodenhaptics(&keys).unwrap();
     let path = HandPath::resting_at(DVec3::ZERO);
     let settings = woodenhaptics::Settings { constants, answers: false, arm: ArmSpec::default(), path };
     let emulated = WoodenHaptics::start(settings).unwrap();

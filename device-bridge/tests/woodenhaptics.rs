@@ -2,7 +2,7 @@
 #![allow(clippy::unwrap_used)]
 mod common;
 
-use common::press::{self, PRESSED_N, bridged, lost_by, pressed_n, simulated, to_arm};
+use common::press::{self, PRESSED_N, lost_by, pressed_n, simulated, to_arm};
 use glam::DVec3;
 use palpate_bridge::{
     Config,
@@ -13,7 +13,7 @@ use palpate_bridge::{
         woodenhaptics::{Settings, WoodenHaptics},
     },
     probe::probe,
-    settings::{ArmSettings, arm},
+    settings::arm,
 };
 use palpate_control::{ArmSpec, HandPath, Keyframe};
 use std::{
@@ -34,17 +34,13 @@ fn keys(port: &str) -> WoodenHapticsConfig {
     }
 }
 
-fn constants(config: WoodenHapticsConfig) -> driver::Settings {
-    let device = DeviceConfig::Woodenhaptics(config);
-    match arm::checked(&Config { device, ..Config::default() }, 1e-3).unwrap() {
-        ArmSettings::WoodenHaptics(constants) => constants,
-        other => panic!("{other:?}"),
-    }
+fn constants(config: &WoodenHapticsConfig) -> driver::Settings {
+    arm::woodenhaptics(config).unwrap()
 }
 
 fn emulator(answers: bool, path: HandPath) -> WoodenHaptics {
     let arm = ArmSpec::default();
-    WoodenHaptics::start(Settings { constants: constants(keys("")), answers, arm, path }).unwrap()
+    WoodenHaptics::start(Settings { constants: constants(&keys("")), answers, arm, path }).unwrap()
 }
 
 fn resting() -> HandPath {
@@ -65,7 +61,7 @@ async fn a_press_ends_at_the_force_of_the_simulated_arm() {
     for answers in [false, true] {
         // The middle of the workspace is where the press is.
         let arm = WoodenHaptics::start(Settings {
-            constants: constants(shifted(keys(""))),
+            constants: constants(&shifted(keys(""))),
             answers,
             arm: ArmSpec::default(),
             path: press::path(),
@@ -105,7 +101,7 @@ async fn each_fault_of_the_arm_takes_the_force_away_and_is_named() {
 #[test]
 fn motors_are_off_half_a_second_after_the_last_line() {
     let emulated = emulator(false, resting());
-    let mut arm = driver::WoodenHaptics::start(&constants(keys(emulated.port())), 1e-3).unwrap();
+    let mut arm = driver::WoodenHaptics::start(&constants(&keys(emulated.port())), 1e-3).unwrap();
     let began = Instant::now();
     let mut pushed = began;
     while emulated.force_n().z < 0.9 {
@@ -125,10 +121,7 @@ fn motors_are_off_half_a_second_after_the_last_line() {
 #[test]
 fn a_probe_says_where_the_arm_is() {
     let arm = emulator(true, resting());
-    let config = Config {
-        workspace: palpate_bridge::config::WorkspaceConfig::default(),
-        ..bridged("http://127.0.0.1:1", device(&arm))
-    };
+    let config = Config { device: device(&arm), ..common::config("http://127.0.0.1:1") };
     let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().unwrap();
     let _context = runtime.enter();
     let report = probe(&config, Duration::from_millis(400)).unwrap();
@@ -147,19 +140,12 @@ fn poses_follow_the_arm_though_lines_come_in_pieces() {
         let keys_of = [(0.0, 0.0), (0.3, 0.03)].map(|(time_s, x)| Keyframe { time_s, position_m: DVec3::X * x });
         let emulated = emulator(answers, HandPath::new(keys_of.to_vec(), None).unwrap());
         Faults::set(&emulated.faults.split, split);
-        let mut arm = driver::WoodenHaptics::start(&constants(keys(emulated.port())), 1e-3).unwrap();
-        let began = Instant::now();
-        let (mut ticks, mut farthest_m, mut fastest_m_per_s) = (0_u64, 0.0_f64, 0.0_f64);
-        while began.elapsed() < Duration::from_millis(800) {
-            // A machine that is busy skips ticks, as the loop does.
-            let due = began.elapsed().as_millis() as u64 + 1;
-            let reading = arm.read(due - ticks).unwrap();
-            ticks = due;
+        let mut arm = driver::WoodenHaptics::start(&constants(&keys(emulated.port())), 1e-3).unwrap();
+        let (mut farthest_m, mut fastest_m_per_s) = (0.0_f64, 0.0_f64);
+        press::follow(&mut arm, |reading| {
             farthest_m = farthest_m.max(reading.motion.position_m.distance(emulated.position_m()));
             fastest_m_per_s = fastest_m_per_s.max(reading.motion.velocity_m_per_s.length());
-            arm.apply(DVec3::ZERO);
-            std::thread::sleep(Duration::from_millis(1));
-        }
+        });
         let end = arm.read(0).unwrap();
         assert!(end.motion.position_m.distance(emulated.position_m()) < 1e-4, "{:?}", end.motion);
         assert!(emulated.position_m().x > 0.02 && emulated.lines() > 100);
@@ -173,13 +159,9 @@ fn poses_follow_the_arm_though_lines_come_in_pieces() {
 #[test]
 fn no_current_beyond_the_limit_is_asked_for_and_the_force_keeps_its_direction() {
     let emulated = emulator(false, resting());
-    let mut arm = driver::WoodenHaptics::start(&constants(keys(emulated.port())), 1e-3).unwrap();
+    let mut arm = driver::WoodenHaptics::start(&constants(&keys(emulated.port())), 1e-3).unwrap();
     let mut apply = |force_n: DVec3| {
-        for _ in 0..30 {
-            arm.read(1).unwrap();
-            arm.apply(force_n);
-            std::thread::sleep(Duration::from_millis(1));
-        }
+        press::hold(&mut arm, force_n);
         emulated.force_n()
     };
     let weak = DVec3::new(0.3, -0.5, 1.0);
@@ -191,7 +173,7 @@ fn no_current_beyond_the_limit_is_asked_for_and_the_force_keeps_its_direction() 
 
 #[test]
 fn an_arm_that_cannot_be_started_says_why() {
-    let started = |port: &str| driver::WoodenHaptics::start(&constants(keys(port)), 1e-3);
+    let started = |port: &str| driver::WoodenHaptics::start(&constants(&keys(port)), 1e-3);
     let said = |port: &str| started(port).unwrap_err().to_string();
     assert!(said("/dev/nothing").starts_with("cannot open the serial port /dev/nothing"));
     let arm = emulator(false, resting());

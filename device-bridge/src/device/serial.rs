@@ -43,10 +43,7 @@ impl Line {
     }
 
     /// Reads what has come into `into`; how much that is. Does not allocate, but for the error when the cable is pulled.
-    ///
-    /// # Errors
-    /// [`Fault::Disconnected`].
-    pub fn receive(&mut self, into: &mut [u8]) -> Result<usize, Fault> {
+    fn receive(&mut self, into: &mut [u8]) -> Result<usize, Fault> {
         let there = self.port.bytes_to_read().map_err(|_| Fault::Disconnected)?;
         let most = into.len().min(there as usize);
         if most == 0 {
@@ -60,18 +57,18 @@ impl Line {
         }
     }
 
-    /// Sends a message whole, or not at all when the other end does not listen; whether it did.
+    /// Sends a message whole, or not at all when the other end does not listen: the next one says all of it anew.
     ///
     /// # Errors
     /// [`Fault::Disconnected`].
-    pub fn send(&mut self, message: &[u8]) -> Result<bool, Fault> {
+    pub fn send(&mut self, message: &[u8]) -> Result<(), Fault> {
         let unsent = self.port.bytes_to_write().map_err(|_| Fault::Disconnected)?;
         if unsent > MOST_UNSENT {
-            return Ok(false);
+            return Ok(());
         }
         match self.port.write(message) {
-            Ok(count) => Ok(count == message.len()),
-            Err(error) if matches!(error.kind(), ErrorKind::TimedOut | ErrorKind::Interrupted) => Ok(false),
+            Ok(_) => Ok(()),
+            Err(error) if matches!(error.kind(), ErrorKind::TimedOut | ErrorKind::Interrupted) => Ok(()),
             Err(_) => Err(Fault::Disconnected),
         }
     }

@@ -88,11 +88,6 @@ impl Workspace {
         }
     }
 
-    /// A place of the world (m), for the arm (m).
-    pub fn to_arm_m(&self, world_m: DVec3) -> DVec3 {
-        self.rotation.transpose() * (world_m - self.origin_m) / self.scale
-    }
-
     /// A force of the arm (N), in the world's axes.
     pub fn force_to_world_n(&self, arm_n: DVec3) -> DVec3 {
         self.rotation * arm_n
@@ -109,7 +104,7 @@ impl Workspace {
     }
 }
 
-/// A button that lets go of the tool: while it is pressed the tool stays and the arm moves freely.
+/// A button that lets go of the tool: while it is pressed the tool stays where it is, turned as the arm is, and the arm moves freely.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ClutchSettings {
     /// Its bit in [`Reading::buttons`].
@@ -129,14 +124,14 @@ pub struct Placed {
     clutch: Option<ClutchSettings>,
     period_s: f64,
     share: f64,
-    /// Where the tool stays, while it does.
-    stays: Option<Motion>,
+    /// Where the tool stays (m), while it does.
+    stays_m: Option<DVec3>,
 }
 
 impl Placed {
     /// This arm, there.
     pub fn new(arm: Box<dyn Arm>, workspace: Workspace, clutch: Option<ClutchSettings>, period_s: f64) -> Self {
-        Self { arm, workspace, clutch, period_s, share: 1.0, stays: None }
+        Self { arm, workspace, clutch, period_s, share: 1.0, stays_m: None }
     }
 
     fn obey_clutch(&mut self, reading: &mut Reading, periods: u64) {
@@ -145,13 +140,13 @@ impl Placed {
         let (down_s, up_s) = clutch.ramps_s;
         let pressed = reading.buttons >> clutch.button & 1 == 1;
         if pressed && self.share == 0.0 {
-            let at = self.stays.get_or_insert(reading.motion);
-            let still = Motion { orientation: at.orientation, ..Motion::at(at.position_m) };
-            // The arm's place is where the tool stays, whatever it does.
-            self.workspace.origin_m += still.position_m - reading.motion.position_m;
-            reading.motion = still;
+            let stays_m = *self.stays_m.get_or_insert(reading.motion.position_m);
+            // The arm's place is where the tool stays, whatever it does. It turns with the arm, or it would jump to its turn when let go.
+            self.workspace.origin_m += stays_m - reading.motion.position_m;
+            reading.motion.position_m = stays_m;
+            reading.motion.velocity_m_per_s = DVec3::ZERO;
         } else {
-            self.stays = None;
+            self.stays_m = None;
             let change = if pressed { -passed_s / down_s } else { passed_s / up_s };
             // Without a time it is there at once; 0/0 would be no number.
             self.share = if change.is_nan() { self.share } else { (self.share + change).clamp(0.0, 1.0) };
@@ -194,7 +189,9 @@ mod tests {
         assert_eq!(found.len(), 24);
         for workspace in &found {
             let p = DVec3::new(0.1, -0.2, 0.3);
-            assert!(workspace.to_arm_m(workspace.to_world(&Motion::at(p)).position_m).distance(p) < 1e-15);
+            // Forces and places turn alike.
+            let moved_m = workspace.to_world(&Motion::at(p)).position_m - DVec3::ONE;
+            assert!((workspace.force_to_world_n(p) * 2.0).distance(moved_m) < 1e-15);
             assert_eq!(workspace.force_to_arm_n(workspace.force_to_world_n(p)), p);
         }
         let refused = |names, origin_m, scale| workspace(names, origin_m, scale).unwrap_err().key();
@@ -242,7 +239,8 @@ mod tests {
         // The arm moves along its x: the world's −y, twice as far.
         let mut step = |pressed: bool| {
             x += 1e-3;
-            let motion = Motion { velocity_m_per_s: DVec3::X, ..Motion::at(DVec3::X * x) };
+            let orientation = DQuat::from_rotation_z(x);
+            let motion = Motion { velocity_m_per_s: DVec3::X, orientation, ..Motion::at(DVec3::X * x) };
             witness.set(Reading { motion, buttons: u32::from(pressed) << 3 | 1, ..Witness::at_rest() });
             placed.read(1).unwrap()
         };
@@ -259,6 +257,8 @@ mod tests {
             assert_eq!((reading.motion.velocity_m_per_s, reading.force_share), (DVec3::ZERO, 0.0));
         }
         let back: Vec<Reading> = (0..9).map(|_| step(false)).collect();
+        let turned_rad = |a: &Reading, b: &Reading| a.motion.orientation.angle_between(b.motion.orientation);
+        assert!(turned_rad(&stays[49], &back[0]) < 1.1e-3, "no jump");
         assert!((back[0].motion.position_m - stays[0].motion.position_m + DVec3::Y * 2e-3).length() < 1e-14);
         assert_eq!((back[0].force_share, back[3].force_share, back[8].force_share), (0.125, 0.5, 1.0));
     }

@@ -1,9 +1,9 @@
 //! `palpate-bridge emulate KIND`: an arm that is not there, for trying a configuration and for tests.
 use super::{Faults, hapticmaster, woodenhaptics};
 use crate::{
-    BridgeError, Config,
-    config::{DeviceConfig, KeyframeConfig, SimulatedConfig, WoodenHapticsConfig},
-    settings::{ArmSettings, arm},
+    BridgeError,
+    config::{KeyframeConfig, SimulatedConfig, WoodenHapticsConfig},
+    settings::arm,
 };
 use clap::{Args, Subcommand};
 use glam::DVec3;
@@ -87,16 +87,15 @@ impl HapticMasterArguments {
 
 impl WoodenHapticsArguments {
     fn run(self) -> Result<(), BridgeError> {
-        let device = DeviceConfig::Woodenhaptics(WoodenHapticsConfig::default());
-        let ArmSettings::WoodenHaptics(constants) = arm::checked(&Config { device, ..Config::default() }, 1e-3)? else {
-            return Ok(());
-        };
+        let constants = arm::woodenhaptics(&WoodenHapticsConfig::default())?;
         let (arm, path) = (ArmSpec::default(), presses()?);
         let settings = woodenhaptics::Settings { constants, answers: self.answers, arm, path };
         let emulated = woodenhaptics::WoodenHaptics::start(settings)
             .map_err(|source| BridgeError::System { what: "open a pseudo terminal", source })?;
-        let _link = Link::new(emulated.port(), &self.link)
-            .map_err(|source| BridgeError::System { what: "make the link to the port (--link)", source })?;
+        let _link = Link::new(emulated.port(), &self.link).map_err(|error| BridgeError::Value {
+            key: "--link".into(),
+            reason: format!("cannot make a link at {}: {error}; give another place", self.link.display()),
+        })?;
         let place = format!("a WoodenHaptics is at {} ({})", self.link.display(), emulated.port());
         obey_lines(&place, &emulated.faults, WOODENHAPTICS_FAULTS);
         Ok(())

@@ -33,10 +33,7 @@ pub enum ArmSettings {
 }
 
 /// The arm of a configuration, checked.
-///
-/// # Errors
-/// [`BridgeError`] naming the key.
-pub fn checked(config: &Config, period_s: f64) -> Result<ArmSettings, BridgeError> {
+pub(super) fn checked(config: &Config, period_s: f64) -> Result<ArmSettings, BridgeError> {
     match &config.device {
         DeviceConfig::Simulated(simulated) => Ok(ArmSettings::Simulated(simulated_arm(simulated, period_s)?)),
         DeviceConfig::Hapticmaster(arm) => Ok(ArmSettings::HapticMaster(hapticmaster(arm, &config.limits)?)),
@@ -73,7 +70,11 @@ fn hapticmaster(config: &HapticMasterConfig, limits: &LimitsConfig) -> Result<St
     })
 }
 
-fn woodenhaptics(config: &WoodenHapticsConfig) -> Result<woodenhaptics::Settings, BridgeError> {
+/// A WoodenHaptics' constants, checked.
+///
+/// # Errors
+/// [`BridgeError`] naming the key.
+pub fn woodenhaptics(config: &WoodenHapticsConfig) -> Result<woodenhaptics::Settings, BridgeError> {
     within("device.link_lengths_m", &config.link_lengths_m, LENGTHS_M)?;
     within("device.capstan_diameters_m", &config.capstan_diameters_m, LENGTHS_M)?;
     within("device.body_diameters_m", &config.body_diameters_m, LENGTHS_M)?;

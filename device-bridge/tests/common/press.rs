@@ -4,11 +4,11 @@ use glam::DVec3;
 use palpate_bridge::{
     BridgeError, Config, Summary,
     config::{DeviceConfig, KeyframeConfig, SimulatedConfig, WorkspaceConfig},
-    device::Fault,
+    device::{Arm, Fault, Reading},
 };
 use palpate_control::{HandPath, Keyframe};
 use palpate_proto::v1;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 const ORIGIN_M: DVec3 = DVec3::new(0.1, 0.0, -0.2);
 
@@ -97,5 +97,27 @@ pub async fn lost_by(device: DeviceConfig, arm_n: impl Fn() -> DVec3, fault: imp
     match error {
         BridgeError::DeviceLost { fault } => (fault, force_n),
         other => panic!("{other}"),
+    }
+}
+
+/// Drives an arm without a bridge and without force, tick by tick in real time, for 0.8 s; `look` sees every reading.
+pub fn follow(arm: &mut dyn Arm, mut look: impl FnMut(&Reading)) {
+    let (began, mut ticks) = (Instant::now(), 0);
+    while began.elapsed() < Duration::from_millis(800) {
+        // A machine that is busy skips ticks, as the loop does.
+        let due = began.elapsed().as_millis() as u64 + 1;
+        look(&arm.read(due - ticks).unwrap());
+        ticks = due;
+        arm.apply(DVec3::ZERO);
+        std::thread::sleep(Duration::from_millis(1));
+    }
+}
+
+/// Puts a force on an arm for 30 ticks.
+pub fn hold(arm: &mut dyn Arm, force_n: DVec3) {
+    for _ in 0..30 {
+        arm.read(1).unwrap();
+        arm.apply(force_n);
+        std::thread::sleep(Duration::from_millis(1));
     }
 }

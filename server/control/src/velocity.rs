@@ -47,16 +47,6 @@ impl Velocity {
         self.rate_per_s
     }
 
-    /// The rate per second now.
-    pub fn rate_per_s(&self) -> f64 {
-        self.rate_per_s
-    }
-
-    /// Forgets everything, as after a jump that was no motion.
-    pub fn reset(&mut self) {
-        (self.count, self.rate_per_s) = (0, 0.0);
-    }
-
     fn slope(&self) -> f64 {
         let Some((&(newest, _), before)) = self.samples[..self.count].split_last() else { return 0.0 };
         // Rounding of the line itself is no noise.
@@ -142,7 +132,7 @@ mod tests {
         for (value, passed_s) in [(f64::NAN, T_S), (1.0, f64::INFINITY), (1.0, 0.0), (1.0, -1.0)] {
             assert!((velocity.push(value, passed_s) - 0.3).abs() < 1e-9);
         }
-        velocity.reset();
-        assert_eq!((velocity.rate_per_s(), velocity.push(7.0, T_S)), (0.0, 0.0));
+        // One sample moves nowhere.
+        assert_eq!(Velocity::new(0.0).push(7.0, T_S), 0.0);
     }
 }

@@ -13,7 +13,7 @@ use super::{
     Arm, Fault, Reading,
     serial::{Line, Lines, OpenError},
 };
-use glam::DVec3;
+use glam::{DMat3, DVec3};
 use kinematics::Kinematics;
 use palpate_control::{Motion, Velocity, extrapolate};
 use std::time::{Duration, Instant};
@@ -114,7 +114,8 @@ pub struct WoodenHaptics {
     settings: Settings,
     period_s: f64,
     silence_periods: u64,
-    counts: [i16; 3],
+    /// At the newest pose (m/rad).
+    jacobian_m_per_rad: DMat3,
     /// Rates (counts/s): counted at the motors, where a step of the encoder is 1.
     rates: [Velocity; 3],
     motion: Motion,
@@ -152,7 +153,7 @@ impl WoodenHaptics {
             lines,
             period_s,
             silence_periods: (settings.silence.as_secs_f64() / period_s).ceil() as u64,
-            counts,
+            jacobian_m_per_rad: DMat3::ZERO,
             rates: std::array::from_fn(|_| Velocity::new(1.0)),
             motion: Motion::at(DVec3::ZERO),
             force_n: DVec3::ZERO,
@@ -167,7 +168,6 @@ impl WoodenHaptics {
 
     /// A new pose, `passed_s` after the one before.
     fn renew(&mut self, counts: [i16; 3], passed_s: f64) {
-        self.counts = counts;
         let mut rates = DVec3::ZERO;
         for axis in 0..3 {
             rates[axis] = self.rates[axis].push(f64::from(counts[axis]), passed_s);
@@ -175,9 +175,9 @@ impl WoodenHaptics {
         let angles_rad = self.settings.angles_rad(counts);
         let kinematics = &self.settings.kinematics;
         self.motion = Motion::at(kinematics.tool_m(angles_rad));
+        self.jacobian_m_per_rad = kinematics.jacobian_m_per_rad(angles_rad);
         // v = J ω
-        self.motion.velocity_m_per_s =
-            kinematics.jacobian_m_per_rad(angles_rad) * (rates * self.settings.rad_per_count());
+        self.motion.velocity_m_per_s = self.jacobian_m_per_rad * (rates * self.settings.rad_per_count());
     }
 
     fn receive(&mut self) -> Result<(), Fault> {
@@ -191,10 +191,9 @@ impl WoodenHaptics {
 
     /// τ = Jᵀ F, as currents.
     fn send(&mut self) -> Result<(), Fault> {
-        let jacobian = self.settings.kinematics.jacobian_m_per_rad(self.settings.angles_rad(self.counts));
-        let [a, b, c] = self.settings.currents_ma(jacobian.transpose() * self.force_n);
+        let [a, b, c] = self.settings.currents_ma(self.jacobian_m_per_rad.transpose() * self.force_n);
         wire::write([a, b, c, 0, 0, 0, 0], &mut self.message);
-        self.line.send(&self.message).map(|_| ())
+        self.line.send(&self.message)
     }
 
     fn lose(&mut self, fault: Fault) -> Fault {
