@@ -119,7 +119,7 @@ fn poses_follow_the_arm_though_answers_come_in_pieces() {
         Faults::set(&emulated.faults.split, split);
         let mut arm = opened(&emulated, apart);
         let mut farthest_m = 0.0_f64;
-        press::follow(&mut arm, |reading| {
+        press::follow(&mut arm, |reading, _| {
             farthest_m = farthest_m.max(reading.motion.position_m.distance(emulated.position_m()));
         });
         let end = arm.read(0).unwrap();

@@ -141,17 +141,17 @@ fn poses_follow_the_arm_though_lines_come_in_pieces() {
         let emulated = emulator(answers, HandPath::new(keys_of.to_vec(), None).unwrap());
         Faults::set(&emulated.faults.split, split);
         let mut arm = driver::WoodenHaptics::start(&constants(&keys(emulated.port())), 1e-3).unwrap();
-        let (mut farthest_m, mut fastest_m_per_s) = (0.0_f64, 0.0_f64);
-        press::follow(&mut arm, |reading| {
+        let (mut farthest_m, mut way_m) = (0.0_f64, DVec3::ZERO);
+        press::follow(&mut arm, |reading, passed_s| {
             farthest_m = farthest_m.max(reading.motion.position_m.distance(emulated.position_m()));
-            fastest_m_per_s = fastest_m_per_s.max(reading.motion.velocity_m_per_s.length());
+            way_m += passed_s * reading.motion.velocity_m_per_s;
         });
         let end = arm.read(0).unwrap();
         assert!(end.motion.position_m.distance(emulated.position_m()) < 1e-4, "{:?}", end.motion);
         assert!(emulated.position_m().x > 0.02 && emulated.lines() > 100);
         assert!(farthest_m < 5e-3, "{farthest_m}");
-        // The hand is at 30 mm · 15/8 / 0.3 s = 0.19 m/s at most, and the arm not much faster.
-        assert!((0.1..0.5).contains(&fastest_m_per_s), "{fastest_m_per_s}");
+        // All its velocities make its way; one of them says nothing where a busy machine tells lines late.
+        assert!(way_m.distance(end.motion.position_m) < 3e-3, "{way_m}, {:?}", end.motion);
         assert!(end.motion.velocity_m_per_s.length() < 5e-3, "{:?}", end.motion);
     }
 }

@@ -100,13 +100,13 @@ pub async fn lost_by(device: DeviceConfig, arm_n: impl Fn() -> DVec3, fault: imp
     }
 }
 
-/// Drives an arm without a bridge and without force, tick by tick in real time, for 0.8 s; `look` sees every reading.
-pub fn follow(arm: &mut dyn Arm, mut look: impl FnMut(&Reading)) {
+/// Drives an arm without a bridge and without force, tick by tick in real time, for 0.8 s; `look` sees every reading, and how long (s) it is since the one before.
+pub fn follow(arm: &mut dyn Arm, mut look: impl FnMut(&Reading, f64)) {
     let (began, mut ticks) = (Instant::now(), 0);
     while began.elapsed() < Duration::from_millis(800) {
         // A machine that is busy skips ticks, as the loop does.
         let due = began.elapsed().as_millis() as u64 + 1;
-        look(&arm.read(due - ticks).unwrap());
+        look(&arm.read(due - ticks).unwrap(), (due - ticks) as f64 * 1e-3);
         ticks = due;
         arm.apply(DVec3::ZERO);
         std::thread::sleep(Duration::from_millis(1));

@@ -26,7 +26,7 @@ fn a_tick_of_everything_allocates_nothing() {
         validity_radius_m: 0.02,
         max_force_n: 100.0,
     };
-    let mut velocity = Velocity::new(1e-5);
+    let mut velocity = Velocity::new(1e-5, 1e-3);
     let mut peak_n: f64 = 0.0;
     assert_no_alloc(|| {
         for tick in 0..1000_u64 {

@@ -116,7 +116,7 @@ pub struct WoodenHaptics {
     silence_periods: u64,
     /// At the newest pose (m/rad).
     jacobian_m_per_rad: DMat3,
-    /// Rates (counts/s): counted at the motors, where a step of the encoder is 1.
+    /// Rates (counts/s): counted at the motors, where a step of the encoder is 1; lines are told at ticks.
     rates: [Velocity; 3],
     motion: Motion,
     force_n: DVec3,
@@ -154,7 +154,7 @@ impl WoodenHaptics {
             period_s,
             silence_periods: (settings.silence.as_secs_f64() / period_s).ceil() as u64,
             jacobian_m_per_rad: DMat3::ZERO,
-            rates: std::array::from_fn(|_| Velocity::new(1.0)),
+            rates: std::array::from_fn(|_| Velocity::new(1.0, period_s)),
             motion: Motion::at(DVec3::ZERO),
             force_n: DVec3::ZERO,
             quiet_periods: 0,
