@@ -125,6 +125,8 @@ try {
   await page.setViewportSize({ width: 1280, height: 860 });
   // What is counted now is compared with what is there when the arm presses again.
   check("the arm presses after the reset", (await press(page)).force >= 0.02);
+  // The arrow of a force is on the graphics card from the frame after the force's number.
+  await drawn(page);
   const geometries = await page.evaluate(() => stage.geometries);
 
   const code = await stopDaemon(daemon);
@@ -139,6 +141,7 @@ try {
   await page.waitForSelector('#connection[data-state="live"]', { timeout: 20_000 });
   check("the page comes back by itself", true);
   check("the arm presses again", (await press(page)).force >= 0.02);
+  await drawn(page);
   const after = await page.evaluate(() => stage.geometries);
   check("the old surface has left the graphics card", after > 0 && after === geometries, `${geometries} before, ${after} after`);
 
