@@ -1,7 +1,7 @@
 //! `palpate-bridge probe`: opens an arm, reads it for a while without any force, and says how it does.
 use crate::{
     BridgeError, Config,
-    device::{self, Reading},
+    device::{self, Effort, Reading},
     settings::Settings,
 };
 use glam::DVec3;
@@ -56,7 +56,7 @@ pub fn probe(config: &Config, time: Duration) -> Result<Report, BridgeError> {
             }
             Err(found) => fault = Some(found),
         }
-        arm.apply(DVec3::ZERO);
+        arm.apply(&Effort::NONE);
         let over = monitor.ticks() + monitor.skipped() + 1 >= ticks || fault.is_some();
         if over { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     });

@@ -1,7 +1,7 @@
 //! The loop beside the arm: from the newest command and the arm's motion to a safe force.
 use crate::{
     convert::{Command, Sample},
-    device::{Arm, Reading},
+    device::{Arm, Effort, Reading},
     run::Shared,
     settings::ServoSettings,
 };
@@ -214,7 +214,7 @@ impl Servo {
         }
         self.obey_flags(now_ns);
         let tick = self.law.tick(now_ns, &motion);
-        self.device.apply(tick.limited.force_n);
+        self.device.apply(&Effort::force(tick.limited.force_n));
         if let Ok(reading) = read
             && reading.motion.is_finite()
             && self.shared.attached.load(Ordering::Relaxed)
@@ -263,7 +263,7 @@ impl Servo {
 
 impl Drop for Servo {
     fn drop(&mut self) {
-        self.device.apply(DVec3::ZERO);
+        self.device.apply(&Effort::NONE);
         self.shared.stats.set_force(0.0);
     }
 }

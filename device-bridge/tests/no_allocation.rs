@@ -6,7 +6,7 @@ use palpate_bridge::{
     Config,
     config::{DeviceConfig, HapticMasterConfig, WoodenHapticsConfig},
     convert::Command,
-    device,
+    device::{self, Effort},
     emulate::{
         hapticmaster::{self, HapticMaster},
         woodenhaptics::{self, WoodenHaptics},
@@ -82,7 +82,7 @@ fn drive(device: DeviceConfig) {
         // A busy machine is late: nothing is told here of how long an answer took.
         assert_no_alloc(|| {
             arm.read(0).unwrap();
-            arm.apply(DVec3::new(1e-7, -1.0 / 3.0, f64::from(tick)));
+            arm.apply(&Effort::force(DVec3::new(1e-7, -1.0 / 3.0, f64::from(tick))));
         });
     }
 }
@@ -98,7 +98,7 @@ fn the_hapticmasters_driver_allocates_nothing() {
 #[test]
 fn the_woodenhaptics_driver_allocates_nothing() {
     let keys = WoodenHapticsConfig::default();
-    let constants = arm::woodenhaptics(&keys).unwrap();
+    let constants = arm::woodenhaptics::checked(&keys).unwrap();
     let path = HandPath::resting_at(DVec3::ZERO);
     let settings = woodenhaptics::Settings { constants, answers: false, arm: ArmSpec::default(), path };
     let emulated = WoodenHaptics::start(settings).unwrap();

@@ -7,7 +7,7 @@ use glam::DVec3;
 use palpate_bridge::{
     Config,
     config::{DeviceConfig, WoodenHapticsConfig},
-    device::{Arm as _, Fault, woodenhaptics as driver},
+    device::{Arm as _, Effort, Fault, woodenhaptics as driver},
     emulate::{
         Faults,
         woodenhaptics::{Settings, WoodenHaptics},
@@ -35,7 +35,7 @@ fn keys(port: &str) -> WoodenHapticsConfig {
 }
 
 fn constants(config: &WoodenHapticsConfig) -> driver::Settings {
-    arm::woodenhaptics(config).unwrap()
+    arm::woodenhaptics::checked(config).unwrap()
 }
 
 fn emulator(answers: bool, path: HandPath) -> WoodenHaptics {
@@ -107,7 +107,7 @@ fn motors_are_off_half_a_second_after_the_last_line() {
     while emulated.force_n().z < 0.9 {
         assert!(began.elapsed() < Duration::from_secs(5), "{}", emulated.force_n());
         arm.read(1).unwrap();
-        arm.apply(DVec3::Z);
+        arm.apply(&Effort::force(DVec3::Z));
         pushed = Instant::now();
         std::thread::sleep(Duration::from_millis(1));
     }

@@ -3,6 +3,8 @@ pub mod hapticmaster;
 pub mod kinds;
 pub mod serial;
 pub mod simulated;
+#[cfg(test)]
+mod witness;
 pub mod woodenhaptics;
 pub mod workspace;
 
@@ -11,12 +13,14 @@ use crate::{
     settings::{ArmSettings, DeviceSettings},
 };
 use glam::DVec3;
-use hapticmaster::{HapticMaster, start};
+use hapticmaster::HapticMaster;
 use palpate_control::Motion;
 use simulated::SimulatedDevice;
 use std::fmt::Debug;
 use thiserror::Error;
 use tokio_util::sync::CancellationToken;
+#[cfg(test)]
+pub use witness::Witness;
 use woodenhaptics::WoodenHaptics;
 use workspace::Placed;
 
@@ -33,6 +37,31 @@ pub struct Reading {
     pub age_s: f64,
     /// Share of the force that the arm is to have: 1, but for a clutch.
     pub force_share: f64,
+}
+
+/// What an arm is to do, in the axes of its readings.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Effort {
+    /// Force (N) at the tool centre.
+    pub force_n: DVec3,
+    /// Torque (N m) about it, for an arm that has motors for it.
+    pub torque_nm: DVec3,
+}
+
+impl Effort {
+    /// Nothing.
+    pub const NONE: Self = Self::force(DVec3::ZERO);
+
+    /// A force (N) alone.
+    pub const fn force(force_n: DVec3) -> Self {
+        Self { force_n, torque_nm: DVec3::ZERO }
+    }
+
+    /// For a driver's last step: nothing when its arm is lost, and nothing that is no number.
+    pub fn unless(&self, lost: bool) -> Self {
+        let number = |v: DVec3| if lost || !v.is_finite() { DVec3::ZERO } else { v };
+        Self { force_n: number(self.force_n), torque_nm: number(self.torque_nm) }
+    }
 }
 
 /// Why an arm is of no use any more.
@@ -68,8 +97,8 @@ pub trait Arm: Debug + Send {
     /// A [`Fault`], from then on every time: the arm has to be opened anew.
     fn read(&mut self, periods: u64) -> Result<Reading, Fault>;
 
-    /// Puts a force (N, in the axes of its readings) on the arm, held until the next call.
-    fn apply(&mut self, force_n: DVec3);
+    /// Puts this on the arm, held until the next call.
+    fn apply(&mut self, effort: &Effort);
 }
 
 /// Opens the arm that the configuration names, however long that takes, until told to stop.
@@ -82,86 +111,13 @@ pub fn open(settings: &DeviceSettings, period_s: f64, stop: &CancellationToken) 
 }
 
 fn open_arm(settings: &ArmSettings, period_s: f64, stop: &CancellationToken) -> Result<Box<dyn Arm>, BridgeError> {
-    match settings {
-        ArmSettings::Simulated(arm) => Ok(Box::new(SimulatedDevice::new(arm.clone()))),
-        ArmSettings::HapticMaster(settings) => {
-            let started =
-                start::start(settings, stop).map_err(|source| BridgeError::Start { source: Box::new(source) })?;
-            tracing::info!("the HapticMASTER at {} is started: {}", settings.address, started.version);
-            let arm = HapticMaster::new(started, settings, period_s);
-            Ok(Box::new(arm.map_err(|source| BridgeError::System { what: "read the arm without waiting", source })?))
-        }
-        ArmSettings::WoodenHaptics(settings) => {
-            let started = WoodenHaptics::start(settings, period_s);
-            Ok(Box::new(started.map_err(|source| BridgeError::Start { source: Box::new(source) })?))
-        }
-    }
+    Ok(match settings {
+        ArmSettings::Simulated(arm) => Box::new(SimulatedDevice::new(arm.clone())),
+        ArmSettings::HapticMaster(settings) => Box::new(HapticMaster::open(settings, period_s, stop)?),
+        ArmSettings::WoodenHaptics(settings) => Box::new(WoodenHaptics::start(settings, period_s).map_err(unstarted)?),
+    })
 }
 
-/// A driver for tests: rests at the origin unless told where it is, remembers its force, and panics at a given reading.
-#[cfg(test)]
-#[derive(Debug)]
-pub struct Witness {
-    panics_at: u64,
-    reads: std::sync::atomic::AtomicU64,
-    fails: std::sync::atomic::AtomicBool,
-    reading: std::sync::Mutex<Reading>,
-    /// Force now, and the largest so far (N).
-    force_n: std::sync::Mutex<(f64, f64)>,
-}
-
-#[cfg(test)]
-#[allow(clippy::unwrap_used, clippy::panic)]
-impl Witness {
-    pub(crate) fn panicking_at(reading: u64) -> Self {
-        Self {
-            panics_at: reading,
-            reads: 0.into(),
-            fails: false.into(),
-            reading: Self::at_rest().into(),
-            force_n: (0.0, 0.0).into(),
-        }
-    }
-
-    pub(crate) fn at_rest() -> Reading {
-        let motion = Motion::at(DVec3::ZERO);
-        Reading { motion, buttons: 0, measured_force_n: None, age_s: 0.0, force_share: 1.0 }
-    }
-
-    pub(crate) fn set(&self, reading: Reading) {
-        *self.reading.lock().unwrap() = reading;
-    }
-
-    pub(crate) fn force_n(&self) -> f64 {
-        self.force_n.lock().unwrap().0
-    }
-
-    pub(crate) fn fail(&self) {
-        self.fails.store(true, std::sync::atomic::Ordering::Relaxed);
-    }
-
-    pub(crate) fn peak_n(&self) -> f64 {
-        self.force_n.lock().unwrap().1
-    }
-
-    fn read_now(&self) -> Reading {
-        assert!(self.reads.fetch_add(1, std::sync::atomic::Ordering::Relaxed) < self.panics_at, "the driver fails");
-        *self.reading.lock().unwrap()
-    }
-
-    fn hold(&self, force_n: DVec3) {
-        let mut held = self.force_n.lock().unwrap();
-        *held = (force_n.length(), held.1.max(force_n.length()));
-    }
-}
-
-#[cfg(test)]
-impl Arm for std::sync::Arc<Witness> {
-    fn read(&mut self, _: u64) -> Result<Reading, Fault> {
-        if self.fails.load(std::sync::atomic::Ordering::Relaxed) { Err(Fault::Silent) } else { Ok(self.read_now()) }
-    }
-
-    fn apply(&mut self, force_n: DVec3) {
-        self.hold(force_n);
-    }
+fn unstarted(error: impl std::error::Error + Send + Sync + 'static) -> BridgeError {
+    BridgeError::Start { source: Box::new(error) }
 }

@@ -1,5 +1,5 @@
 //! The simulated arm as a device: it lives in servo time, so it moves by as many periods as really passed.
-use super::{Arm, Fault, Reading};
+use super::{Arm, Effort, Fault, Reading};
 use glam::DVec3;
 use palpate_control::SimulatedArm;
 
@@ -35,8 +35,8 @@ impl Arm for SimulatedDevice {
         })
     }
 
-    fn apply(&mut self, force_n: DVec3) {
-        self.force_n = force_n;
+    fn apply(&mut self, effort: &Effort) {
+        self.force_n = effort.force_n;
     }
 }
 
@@ -49,8 +49,8 @@ mod tests {
     fn skipped_ticks_pass_in_the_arms_time_too() {
         let arm = SimulatedArm::new(ArmSpec::default(), HandPath::resting_at(DVec3::ZERO), 1e-3).unwrap();
         let (mut steady, mut skipping) = (SimulatedDevice::new(arm.clone()), SimulatedDevice::new(arm));
-        steady.apply(DVec3::X);
-        skipping.apply(DVec3::X);
+        steady.apply(&Effort::force(DVec3::X));
+        skipping.apply(&Effort::force(DVec3::X));
         for _ in 0..6 {
             steady.read(1).unwrap();
         }

@@ -1,5 +1,5 @@
 //! From an arm's own axes to the world's, and back: turned, moved, magnified, and let go of by a button.
-use super::{Arm, Fault, Reading};
+use super::{Arm, Effort, Fault, Reading};
 use glam::{DMat3, DQuat, DVec3};
 use palpate_control::Motion;
 use thiserror::Error;
@@ -93,9 +93,9 @@ impl Workspace {
         self.rotation * arm_n
     }
 
-    /// A force of the world (N), for the arm.
-    pub fn force_to_arm_n(&self, world_n: DVec3) -> DVec3 {
-        self.rotation.transpose() * world_n
+    /// A force or torque of the world, for the arm.
+    pub fn to_arm(&self, world: DVec3) -> DVec3 {
+        self.rotation.transpose() * world
     }
 
     /// World movement over the arm's.
@@ -164,8 +164,10 @@ impl Arm for Placed {
         Ok(reading)
     }
 
-    fn apply(&mut self, force_n: DVec3) {
-        self.arm.apply(self.workspace.force_to_arm_n(force_n));
+    fn apply(&mut self, effort: &Effort) {
+        let Effort { force_n, torque_nm } = *effort;
+        self.arm
+            .apply(&Effort { force_n: self.workspace.to_arm(force_n), torque_nm: self.workspace.to_arm(torque_nm) });
     }
 }
 
@@ -192,7 +194,7 @@ mod tests {
             // Forces and places turn alike.
             let moved_m = workspace.to_world(&Motion::at(p)).position_m - DVec3::ONE;
             assert!((workspace.force_to_world_n(p) * 2.0).distance(moved_m) < 1e-15);
-            assert_eq!(workspace.force_to_arm_n(workspace.force_to_world_n(p)), p);
+            assert_eq!(workspace.to_arm(workspace.force_to_world_n(p)), p);
         }
         let refused = |names, origin_m, scale| workspace(names, origin_m, scale).unwrap_err().key();
         assert_eq!(refused(["up", "y", "z"], DVec3::ZERO, 1.0), "workspace.axes");
@@ -223,7 +225,7 @@ mod tests {
         for scale in [0.1, 1.0, 8.0] {
             let workspace = workspace(["+z", "-x", "-y"], DVec3::ONE, scale).unwrap();
             let world = workspace.to_world(&Motion { velocity_m_per_s: v, ..Motion::at(DVec3::X) });
-            let arm_w = workspace.force_to_arm_n(f).dot(v);
+            let arm_w = workspace.to_arm(f).dot(v);
             assert!((f.dot(world.velocity_m_per_s) - scale * arm_w).abs() < 1e-14);
         }
     }

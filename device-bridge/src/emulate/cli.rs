@@ -1,16 +1,18 @@
 //! `palpate-bridge emulate KIND`: an arm that is not there, for trying a configuration and for tests.
-use super::{Faults, hapticmaster, woodenhaptics};
+mod hapticmaster;
+mod woodenhaptics;
+
+use super::Faults;
 use crate::{
     BridgeError,
-    config::{KeyframeConfig, SimulatedConfig, WoodenHapticsConfig},
-    settings::arm,
+    config::{KeyframeConfig, SimulatedConfig},
 };
-use clap::{Args, Subcommand};
+use clap::Subcommand;
 use glam::DVec3;
-use palpate_control::{ArmSpec, HandPath, Keyframe};
+use palpate_control::{HandPath, Keyframe};
 use std::{
     io::{BufRead as _, Write as _},
-    path::{Path, PathBuf},
+    path::Path,
     process::ExitCode,
     sync::atomic::{AtomicBool, Ordering},
 };
@@ -19,38 +21,11 @@ use std::{
 #[derive(Debug, Subcommand)]
 pub enum Emulate {
     /// A HapticMASTER over TCP; its hand presses the built-in ventricle every two seconds
-    Hapticmaster(HapticMasterArguments),
+    Hapticmaster(hapticmaster::Arguments),
     /// A WoodenHaptics on a pseudo terminal; its hand presses the built-in ventricle every two seconds
-    Woodenhaptics(WoodenHapticsArguments),
+    Woodenhaptics(woodenhaptics::Arguments),
 }
 
-/// What it is like.
-#[derive(Debug, Args)]
-pub struct HapticMasterArguments {
-    /// Where to listen; give it to the bridge as `address` of `[device]`
-    #[arg(long, default_value = "127.0.0.1:7654", value_name = "HOST:PORT")]
-    listen: String,
-    /// Answers without headers and with quotation marks, as older versions give them
-    #[arg(long)]
-    old: bool,
-    /// Refuse `set` and `get` in one request
-    #[arg(long)]
-    apart: bool,
-}
-
-/// What it is like.
-#[derive(Debug, Args)]
-pub struct WoodenHapticsArguments {
-    /// A link to make to its port; give it to the bridge as `port` of `[device]`
-    #[arg(long, default_value = "/tmp/palpate-woodenhaptics", value_name = "PATH")]
-    link: PathBuf,
-    /// Say a line for each that it hears, not one every millisecond
-    #[arg(long)]
-    answers: bool,
-}
-
-const HAPTICMASTER_FAULTS: &[&str] = &["silence", "garbage", "split", "slow", "refuse", "stop", "cut"];
-const WOODENHAPTICS_FAULTS: &[&str] = &["silence", "garbage", "split", "slow", "cut"];
 const SLOW_US: u32 = 50_000;
 
 impl Emulate {
@@ -64,41 +39,6 @@ impl Emulate {
             Self::Woodenhaptics(arguments) => arguments.run(),
         }
         .map(|()| ExitCode::SUCCESS)
-    }
-}
-
-impl HapticMasterArguments {
-    fn run(self) -> Result<(), BridgeError> {
-        let mut settings = hapticmaster::Settings {
-            apart: self.apart,
-            headers: !self.old,
-            quoted: self.old,
-            path: presses()?,
-            ..Default::default()
-        };
-        settings.arm.hand_damping_n_s_per_m = 40.0;
-        let emulated = hapticmaster::HapticMaster::listen(&self.listen, settings)
-            .map_err(|source| BridgeError::System { what: "listen there", source })?;
-        let place = format!("a HapticMASTER listens at {}", emulated.address());
-        obey_lines(&place, &emulated.faults, HAPTICMASTER_FAULTS);
-        Ok(())
-    }
-}
-
-impl WoodenHapticsArguments {
-    fn run(self) -> Result<(), BridgeError> {
-        let constants = arm::woodenhaptics(&WoodenHapticsConfig::default())?;
-        let (arm, path) = (ArmSpec::default(), presses()?);
-        let settings = woodenhaptics::Settings { constants, answers: self.answers, arm, path };
-        let emulated = woodenhaptics::WoodenHaptics::start(settings)
-            .map_err(|source| BridgeError::System { what: "open a pseudo terminal", source })?;
-        let _link = Link::new(emulated.port(), &self.link).map_err(|error| BridgeError::Value {
-            key: "--link".into(),
-            reason: format!("cannot make a link at {}: {error}; give another place", self.link.display()),
-        })?;
-        let place = format!("a WoodenHaptics is at {} ({})", self.link.display(), emulated.port());
-        obey_lines(&place, &emulated.faults, WOODENHAPTICS_FAULTS);
-        Ok(())
     }
 }
 
@@ -174,8 +114,8 @@ mod tests {
     #[test]
     fn every_fault_that_is_named_can_be_caused() {
         let faults = Faults::default();
-        for name in HAPTICMASTER_FAULTS.iter().chain(WOODENHAPTICS_FAULTS) {
-            assert!(*name == "slow" || flag(&faults, name).is_some(), "{name}");
+        for name in [hapticmaster::FAULTS, woodenhaptics::FAULTS].concat() {
+            assert!(name == "slow" || flag(&faults, name).is_some(), "{name}");
         }
     }
 

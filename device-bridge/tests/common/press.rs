@@ -4,7 +4,7 @@ use glam::DVec3;
 use palpate_bridge::{
     BridgeError, Config, Summary,
     config::{DeviceConfig, KeyframeConfig, SimulatedConfig, WorkspaceConfig},
-    device::{Arm, Fault, Reading},
+    device::{Arm, Effort, Fault, Reading},
 };
 use palpate_control::{HandPath, Keyframe};
 use palpate_proto::v1;
@@ -108,7 +108,7 @@ pub fn follow(arm: &mut dyn Arm, mut look: impl FnMut(&Reading, f64)) {
         let due = began.elapsed().as_millis() as u64 + 1;
         look(&arm.read(due - ticks).unwrap(), (due - ticks) as f64 * 1e-3);
         ticks = due;
-        arm.apply(DVec3::ZERO);
+        arm.apply(&Effort::NONE);
         std::thread::sleep(Duration::from_millis(1));
     }
 }
@@ -117,7 +117,7 @@ pub fn follow(arm: &mut dyn Arm, mut look: impl FnMut(&Reading, f64)) {
 pub fn hold(arm: &mut dyn Arm, force_n: DVec3) {
     for _ in 0..30 {
         arm.read(1).unwrap();
-        arm.apply(force_n);
+        arm.apply(&Effort::force(force_n));
         std::thread::sleep(Duration::from_millis(1));
     }
 }

@@ -8,7 +8,8 @@
 pub mod grammar;
 pub mod start;
 
-use super::{Arm, Fault, Reading};
+use super::{Arm, Effort, Fault, Reading, unstarted};
+use crate::BridgeError;
 use glam::DVec3;
 use grammar::Answer;
 use palpate_control::{Motion, extrapolate};
@@ -17,6 +18,7 @@ use std::{
     net::TcpStream,
     time::Duration,
 };
+use tokio_util::sync::CancellationToken;
 
 /// Name of our effect on the arm.
 pub const EFFECT: &str = "palpate";
@@ -78,6 +80,17 @@ pub struct HapticMaster {
 }
 
 impl HapticMaster {
+    /// Starts the arm, which may take a minute. Blocks until told to stop.
+    ///
+    /// # Errors
+    /// [`BridgeError::Start`].
+    pub fn open(settings: &start::StartSettings, period_s: f64, stop: &CancellationToken) -> Result<Self, BridgeError> {
+        let started = start::start(settings, stop).map_err(unstarted)?;
+        tracing::info!("the HapticMASTER at {} is started: {}", settings.address, started.version);
+        Self::new(started, settings, period_s)
+            .map_err(|source| BridgeError::System { what: "read the arm without waiting", source })
+    }
+
     /// A started arm, whose stream does not block from now on.
     ///
     /// # Errors
@@ -224,8 +237,8 @@ impl Arm for HapticMaster {
     }
 
     /// A lost arm is still told to let go, should it hear: every force is zero then.
-    fn apply(&mut self, force_n: DVec3) {
-        self.force_n = if self.lost.is_some() || !force_n.is_finite() { DVec3::ZERO } else { force_n };
+    fn apply(&mut self, effort: &Effort) {
+        self.force_n = effort.unless(self.lost.is_some()).force_n;
         if let Err(fault) = self.send() {
             self.lose(fault);
         }

@@ -10,7 +10,7 @@ pub mod kinematics;
 pub mod wire;
 
 use super::{
-    Arm, Fault, Reading,
+    Arm, Effort, Fault, Reading,
     serial::{Line, Lines, OpenError},
 };
 use glam::{DMat3, DVec3};
@@ -220,8 +220,8 @@ impl Arm for WoodenHaptics {
     }
 
     /// A lost arm is still told to let go, should it hear.
-    fn apply(&mut self, force_n: DVec3) {
-        self.force_n = if self.lost.is_some() || !force_n.is_finite() { DVec3::ZERO } else { force_n };
+    fn apply(&mut self, effort: &Effort) {
+        self.force_n = effort.unless(self.lost.is_some()).force_n;
         if let Err(fault) = self.send() {
             self.lose(fault);
         }

@@ -1,0 +1,24 @@
+//! The keys of a HapticMASTER.
+use serde::{Deserialize, Serialize};
+
+/// A HapticMASTER.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct HapticMasterConfig {
+    /// Host and port.
+    pub address: String,
+    /// Mass that the hand feels (kg).
+    pub inertia_kg: f64,
+    /// Send `set` and `get` in requests of their own, for an arm that refuses them in one: half as many poses a second.
+    pub apart: bool,
+    /// How long finding home may take (s).
+    pub homing_s: f64,
+    /// Without an answer for so long (s) the arm is lost, and its force taken away.
+    pub silence_s: f64,
+}
+
+impl Default for HapticMasterConfig {
+    fn default() -> Self {
+        Self { address: "192.168.0.25:7654".into(), inertia_kg: 2.0, apart: false, homing_s: 60.0, silence_s: 0.02 }
+    }
+}
