@@ -3,6 +3,7 @@ use crate::{
     BridgeError, Config, Handle,
     device::kinds::{self, KINDS, Kind},
     emulate::cli::Emulate,
+    measure::{bars, measure, svg},
     probe::probe,
     run::run_with,
 };
@@ -31,6 +32,7 @@ Examples:
   palpate-bridge --device hapticmaster --print-config   the same for another arm
   palpate-bridge devices                           the arms that there are drivers for
   palpate-bridge probe --config bridge.toml        is the arm there, and how well does it answer?
+  palpate-bridge measure --config bridge.toml      arm, loop and network together, without force: good enough for one?
   palpate-bridge emulate hapticmaster              an arm that is not there, to try a configuration
 
 Signals: SIGTERM or Ctrl-C ramps the force to zero, ends the stream and exits with 0; SIGUSR1 recovers from a latched fault.
@@ -102,7 +104,28 @@ enum Command {
         #[arg(long, value_name = "S", default_value_t = 2.0, value_parser = parse_seconds)]
         time_s: f64,
     },
+    /// Drive a tool for a while without any force, and say how well loop and network keep time; exit code 2: not well enough for a force
+    Measure {
+        /// Configuration file (TOML)
+        #[arg(long, value_name = "FILE", env = "PALPATE_BRIDGE_CONFIG")]
+        config: Option<PathBuf>,
+        /// The arm
+        #[arg(long, value_name = "KIND", value_parser = kind_parser())]
+        device: Option<&'static Kind>,
+        /// The daemon
+        #[arg(long, value_name = "ADDRESS", env = "PALPATE_SERVER")]
+        server: Option<String>,
+        /// How long (s)
+        #[arg(long, value_name = "S", default_value_t = 10.0, value_parser = parse_seconds)]
+        time_s: f64,
+        /// Write the histograms as a picture, too
+        #[arg(long, value_name = "FILE")]
+        svg: Option<PathBuf>,
+    },
 }
+
+/// Of a link that is no good for a force.
+const NOT_GOOD_ENOUGH: u8 = 2;
 
 fn parse_seconds(text: &str) -> Result<f64, String> {
     let seconds: f64 = text.parse().map_err(|error| format!("{error}"))?;
@@ -131,6 +154,12 @@ impl Cli {
                 let runtime = runtime()?;
                 let _context = runtime.enter();
                 return Ok(say(&format!("{}\n", probe(&config, Duration::from_secs_f64(time_s))?)));
+            }
+            Some(Command::Measure { config, device, server, time_s, svg }) => {
+                let mut config = read(config.as_deref())?;
+                choose(&mut config, device);
+                replace(&mut config.server.url, server);
+                return measured(&config, Duration::from_secs_f64(time_s), svg.as_deref());
             }
             None => {}
         }
@@ -166,6 +195,30 @@ impl Cli {
         choose(&mut config, self.device);
         Ok(config)
     }
+}
+
+fn measured(config: &Config, time: Duration, picture: Option<&Path>) -> Result<ExitCode, BridgeError> {
+    start_logs();
+    let handle = Handle::new();
+    let report = runtime()?.block_on(measure(config, time, handle.clone()))?;
+    let stats = handle.stats();
+    let mut charts = vec![
+        ("from a pose to the force that answers it", &stats.round_trip),
+        ("age of the arm's poses", &stats.pose_age),
+    ];
+    charts.extend(stats.servo().map(|servo| ("how late the loop's ticks began", &servo.wakeup_lateness)));
+    for (title, times) in &charts {
+        say(&bars(title, times));
+    }
+    if let Some(path) = picture {
+        std::fs::write(path, svg(&charts)).map_err(|source| BridgeError::Write {
+            what: "the picture",
+            path: path.to_owned(),
+            source,
+        })?;
+    }
+    say(&format!("{report}\n"));
+    Ok(if report.is_good_enough() { ExitCode::SUCCESS } else { ExitCode::from(NOT_GOOD_ENOUGH) })
 }
 
 /// One thread: the stream's reader, writer and transport wake each other without crossing processors.

@@ -81,13 +81,17 @@ pub struct ServoConfig {
     pub rate_hz: f64,
     /// Let the force come back by itself after a latched fault, once the daemon has answered for half a second.
     pub auto_recover: bool,
+    /// Share of ticks, over the last thousand, in which the newest answer must have been in time; with fewer the force is taken away. 0: any.
+    pub least_success_rate: f64,
+    /// A second process takes the force away when this one is killed or hangs; for arms whose connection outlives it.
+    pub guard: bool,
     /// Pause (s) between lines of counters; 0: only at exit.
     pub report_every_s: f64,
 }
 
 impl Default for ServoConfig {
     fn default() -> Self {
-        Self { rate_hz: 1000.0, auto_recover: false, report_every_s: 10.0 }
+        Self { rate_hz: 1000.0, auto_recover: false, least_success_rate: 0.9, guard: true, report_every_s: 10.0 }
     }
 }
 
@@ -153,13 +157,23 @@ pub struct RenderConfig {
     pub forget_s: f64,
     /// Damping (N s/m) along the normal.
     pub damping_n_s_per_m: f64,
-    /// Physical damping (N s/m) of the arm: with the rate it bounds the stiffness that is rendered.
+    /// Physical damping (N s/m) of the arm: with the rate, and the age of its poses, it bounds the stiffness that is rendered.
     pub arm_damping_n_s_per_m: f64,
+    /// Largest stiffness (N/m) that is rendered; absent: what the arm's damping allows.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub max_stiffness_n_per_m: Option<f64>,
 }
 
 impl Default for RenderConfig {
     fn default() -> Self {
-        Self { local_model: true, hold_s: 0.02, forget_s: 0.1, damping_n_s_per_m: 0.0, arm_damping_n_s_per_m: 0.4 }
+        Self {
+            local_model: true,
+            hold_s: 0.02,
+            forget_s: 0.1,
+            damping_n_s_per_m: 0.0,
+            arm_damping_n_s_per_m: 0.4,
+            max_stiffness_n_per_m: None,
+        }
     }
 }
 

@@ -30,6 +30,8 @@ pub struct Welcome {
     pub tick_period_s: f64,
     /// The daemon's limits.
     pub limits: ForceLimits,
+    /// Stiffness (N/m) of the coupling between arm and tool, which its force has at most; 0: it has none.
+    pub coupling_n_per_m: f64,
 }
 
 /// A checked command.
@@ -110,6 +112,7 @@ pub fn welcome(wire: &v1::DeviceWelcome) -> Result<Welcome, Rejection> {
             max_force_n: positive("welcome.limits.max_force_n", limits.max_force_n)?,
             max_force_rate_n_per_s: positive("welcome.limits.max_force_rate_n_per_s", limits.max_force_rate_n_per_s)?,
         },
+        coupling_n_per_m: not_negative("welcome.limits.coupling_stiffness_n_per_m", limits.coupling_stiffness_n_per_m)?,
     })
 }
 
@@ -169,9 +172,13 @@ fn vector(name: &'static str, wire: Option<&v1::Vec3>) -> Result<DVec3, Rejectio
 }
 
 fn positive(name: &'static str, value: f64) -> Result<f64, Rejection> {
+    if value == 0.0 { Err(Rejection::OutOfRange(name)) } else { not_negative(name, value) }
+}
+
+fn not_negative(name: &'static str, value: f64) -> Result<f64, Rejection> {
     if !value.is_finite() {
         Err(Rejection::NotFinite(name))
-    } else if value <= 0.0 {
+    } else if value < 0.0 {
         Err(Rejection::OutOfRange(name))
     } else {
         Ok(value)
@@ -192,6 +199,7 @@ mod tests {
             tool_name: "t".into(),
             tick_period_s: 1e-3,
             limits: ForceLimits { max_force_n: 3.0, max_force_rate_n_per_s: 1000.0 },
+            coupling_n_per_m: 300.0,
         }
     }
 

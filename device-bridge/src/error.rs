@@ -19,6 +19,17 @@ pub enum BridgeError {
         /// Why.
         source: std::io::Error,
     },
+    /// A file cannot be written.
+    #[error("cannot write {what} {path}", path = path.display())]
+    #[diagnostic(help("check the path and its permissions"))]
+    Write {
+        /// What the file is for.
+        what: &'static str,
+        /// Which.
+        path: PathBuf,
+        /// Why.
+        source: std::io::Error,
+    },
     /// The configuration is not TOML, or has unknown keys or wrong types.
     #[error(transparent)]
     #[diagnostic(transparent)]

@@ -6,7 +6,7 @@ use crate::{
     stats::reason,
     uplink::{SampleSource, Uplink},
 };
-use palpate_control::Link;
+use palpate_control::{EnergyMeter, Link};
 use palpate_realtime::{Clock, Doorbell, Note, OsMeasures, TickLoop, slot};
 use std::{
     sync::{
@@ -38,6 +38,10 @@ pub struct Shared {
     pub recover: AtomicBool,
     /// The daemon asks for zero force.
     pub peer_fault: AtomicBool,
+    /// The arm gets no force: it is measured.
+    pub without_force: AtomicBool,
+    /// The daemon's force crosses the network, and nobody knows yet whether that is stable.
+    pub unmeasured: AtomicBool,
 }
 
 /// A running bridge, from outside.
@@ -55,6 +59,11 @@ impl Handle {
     /// Leaves a latched fault; the force comes back slowly, with the next command.
     pub fn recover(&self) {
         self.shared.recover.store(true, Ordering::Relaxed);
+    }
+
+    /// From now on the arm gets no force: it is measured.
+    pub fn without_force(&self) {
+        self.shared.without_force.store(true, Ordering::Relaxed);
     }
 
     /// Counters, live.
@@ -99,7 +108,9 @@ pub async fn run_with(config: &Config, shutdown: CancellationToken, handle: Hand
         bell,
         shared: Arc::clone(&shared),
         sequence: 0,
+        energy: EnergyMeter::default(),
     };
+    shared.unmeasured.store(settings.uplink.across_network.is_some(), Ordering::Relaxed);
     let _no_servo_alone = StopOnDrop(Arc::clone(&shared));
     let mut servo_done = start_servo(servo, &settings).await?;
     let end = CancellationToken::new();

@@ -7,7 +7,8 @@ use crate::{
 };
 use glam::DVec3;
 use palpate_control::{
-    Fault, ForceLimiter, ForceLimits, Limited, Link, Motion, PassivityController, ThermalLimiter, Verdict, Watchdog,
+    EnergyMeter, Fault, ForceLimiter, ForceLimits, Limited, Link, Motion, PassivityController, RenderSettings,
+    StiffnessBound, SuccessRate, ThermalLimiter, Verdict, Watchdog,
 };
 use palpate_realtime::{Doorbell, SlotReader, SlotWriter, TickLoop, Wakeup};
 use std::{
@@ -26,6 +27,8 @@ pub struct ServoLaw {
     passivity: Option<PassivityController>,
     limiter: ForceLimiter,
     thermal: Option<ThermalLimiter>,
+    stiffness: StiffnessBound,
+    success: SuccessRate,
     command: Option<Command>,
     force_share: f64,
     steady_since_ns: Option<u64>,
@@ -53,6 +56,8 @@ impl ServoLaw {
             passivity: settings.passivity.map(PassivityController::new),
             limiter: ForceLimiter::new(settings.limits),
             thermal: settings.thermal.map(ThermalLimiter::new),
+            stiffness: settings.stiffness,
+            success: SuccessRate::default(),
             command: None,
             force_share: 1.0,
             steady_since_ns: None,
@@ -82,6 +87,21 @@ impl ServoLaw {
         self.force_share = share;
     }
 
+    /// The arm's newest pose is `age_s` old: the older, the softer a contact has to be rendered.
+    pub fn pose_is(&mut self, age_s: f64) {
+        self.stiffness.pose_is(age_s, self.settings.period_s);
+    }
+
+    /// How stiff (N/m) a contact is rendered at most.
+    pub fn largest_stiffness_n_per_m(&self) -> f64 {
+        self.stiffness.largest_n_per_m()
+    }
+
+    /// Share of the last thousand ticks in which the newest answer was in time.
+    pub fn success_rate(&self) -> Option<f64> {
+        self.success.rate()
+    }
+
     /// Leaves a latched fault; the force comes back slowly, with the next command.
     pub fn recover(&mut self) -> bool {
         self.watchdog.recover()
@@ -103,6 +123,7 @@ impl ServoLaw {
             self.faults_seen = self.watchdog.faults();
             self.steady_since_ns = None;
         }
+        self.judge(now_ns, &verdict);
         let wanted_n = self.wanted_n(motion, &verdict);
         let ramp = verdict.ramp * self.force_share;
         let dt_s = self.settings.period_s;
@@ -146,7 +167,8 @@ impl ServoLaw {
         let force_n = match (&command.local_model, &self.settings.render) {
             (Some(model), Some(render)) => {
                 let age_s = verdict.age_s + command.model_age_s;
-                model.render(motion.position_m, motion.velocity_m_per_s, age_s, render).force_n
+                let render = RenderSettings { max_stiffness_n_per_m: self.stiffness.largest_n_per_m(), ..*render };
+                model.render(motion.position_m, motion.velocity_m_per_s, age_s, &render).force_n
             }
             _ => command.force_n,
         };
@@ -157,6 +179,17 @@ impl ServoLaw {
                 force_n - damping * motion.velocity_m_per_s
             }
             _ => force_n,
+        }
+    }
+
+    /// A force that comes and goes with every other answer is none to feel with.
+    fn judge(&mut self, now_ns: u64, verdict: &Verdict) {
+        match verdict.link {
+            Link::Waiting | Link::Latched(_) => self.success.reset(),
+            link => self.success.push(!matches!(link, Link::Ramping(_))),
+        }
+        if self.success.rate().is_some_and(|rate| rate < self.settings.least_success_rate) {
+            self.watchdog.trip(now_ns, Fault::Unreliable);
         }
     }
 
@@ -190,6 +223,8 @@ pub struct Servo {
     pub shared: Arc<Shared>,
     /// Sequence number of the last sample.
     pub sequence: u64,
+    /// What the hand gave and got.
+    pub energy: EnergyMeter,
 }
 
 impl Servo {
@@ -207,7 +242,8 @@ impl Servo {
             self.law.trip(now_ns, Fault::Device);
         }
         self.last = read.ok().or(self.last);
-        self.law.share_force(self.last.map_or(1.0, |reading| reading.force_share));
+        self.law.share_force(self.share());
+        self.law.pose_is(self.last.map_or(0.0, |reading| reading.age_s));
         let motion = self.last.map_or(Motion::at(DVec3::ZERO), |reading| reading.motion);
         if let Some(Some(command)) = self.down.take() {
             self.law.receive(command);
@@ -215,6 +251,7 @@ impl Servo {
         self.obey_flags(now_ns);
         let tick = self.law.tick(now_ns, &motion);
         self.device.apply(&Effort::force(tick.limited.force_n));
+        self.energy.step(motion.position_m, tick.limited.force_n);
         if let Ok(reading) = read
             && reading.motion.is_finite()
             && self.shared.attached.load(Ordering::Relaxed)
@@ -230,6 +267,13 @@ impl Servo {
             Link::Latched(_) if read.is_err() || self.shared.stop.load(Ordering::Relaxed) => ControlFlow::Break(()),
             _ => ControlFlow::Continue(()),
         }
+    }
+
+    /// What the clutch leaves of the force, or nothing, when none is wanted or none may be given yet.
+    fn share(&self) -> f64 {
+        let none =
+            [&self.shared.without_force, &self.shared.unmeasured].iter().any(|flag| flag.load(Ordering::Relaxed));
+        if none { 0.0 } else { self.last.map_or(1.0, |reading| reading.force_share) }
     }
 
     fn obey_flags(&mut self, now_ns: u64) {
@@ -257,6 +301,14 @@ impl Servo {
         stats.dropped_up.set(self.up.overwritten());
         stats.dropped_down.set(self.down.overwritten());
         stats.set_force(tick.limited.force_n.length());
+        stats.set_least_energy(self.energy.least_j());
+        stats.set_gain(self.law.largest_stiffness_n_per_m());
+        stats.set_success_rate(self.law.success_rate());
+        count_if(&stats.judged, stats.received.get() > 0);
+        count_if(&stats.in_time, matches!(tick.verdict.link, Link::Fresh | Link::Extrapolating));
+        if let Some(reading) = self.last {
+            stats.pose_age.record((reading.age_s * 1e9) as u64);
+        }
         stats.set_link(tick.verdict.link);
     }
 }
@@ -278,6 +330,8 @@ mod tests {
     fn pressed(reads: u64) -> (Servo, Arc<Witness>, SlotWriter<Option<Command>>) {
         let mut config = Config::default();
         config.watchdog.ramp_up_s = 0.0;
+        // The arm is at rest: nobody worked for its force.
+        config.passivity.strict = false;
         let settings = Settings::new(&config).unwrap();
         let (mut commands, down) = slot(&None);
         let (up, _samples) = slot(&None);
@@ -299,6 +353,7 @@ mod tests {
             bell: Doorbell::new().unwrap(),
             shared: Arc::default(),
             sequence: 0,
+            energy: EnergyMeter::default(),
         };
         (servo, witness, commands)
     }

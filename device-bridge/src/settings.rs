@@ -8,7 +8,7 @@ use crate::{
 pub use arm::ArmSettings;
 use glam::DVec3;
 use palpate_control::{
-    ForceLimits, ParameterError, PassivitySettings, RenderSettings, ThermalLimits, WatchdogSettings,
+    ForceLimits, ParameterError, PassivitySettings, RenderSettings, StiffnessBound, ThermalLimits, WatchdogSettings,
     coupling::SampledWall,
 };
 use palpate_proto::connect::{self, ConnectError};
@@ -50,6 +50,8 @@ pub struct UplinkSettings {
     pub give_up_after: Option<Duration>,
     /// Told to the daemon: peak force (N) and rate (Hz).
     pub hello: (f64, f64),
+    /// What a loop across the network may be as stiff as; `None`: the stiff loop is beside the arm.
+    pub across_network: Option<StiffnessBound>,
 }
 
 /// The servo's law.
@@ -67,6 +69,10 @@ pub struct ServoSettings {
     pub fading_damping_n_s_per_m: f64,
     /// Local models; `None`: the daemon's force as it comes.
     pub render: Option<RenderSettings>,
+    /// How stiff a local model may be rendered, or, without, the daemon's coupling be.
+    pub stiffness: StiffnessBound,
+    /// Share of ticks with an answer in time; with fewer the force is taken away.
+    pub least_success_rate: f64,
     /// Energy; `None`: off.
     pub passivity: Option<PassivitySettings>,
     /// Recover from latched faults without being asked.
@@ -99,7 +105,10 @@ impl Settings {
         let every_s = config.servo.report_every_s;
         let report_every = seconds("servo.report_every_s", every_s)?;
         Ok(Self {
-            uplink: uplink(config)?,
+            uplink: UplinkSettings {
+                across_network: (!config.render.local_model).then_some(servo.stiffness),
+                ..uplink(config)?
+            },
             device: DeviceSettings {
                 arm: arm::checked(config, servo.period_s)?,
                 workspace,
@@ -148,8 +157,15 @@ fn servo(config: &Config, period_s: f64, scale: f64) -> Result<ServoSettings, Br
         let (max_force_n, time_s) = (limits.max_force_n, limits.thermal_time_s);
         ThermalLimits { continuous_force_n, max_force_n, time_s }.checked()
     };
+    let least_success_rate = config.servo.least_success_rate;
+    if !(0.0..=1.0).contains(&least_success_rate) {
+        return Err(value("servo.least_success_rate", format!("{least_success_rate} is no share: use 0 to 1")));
+    }
+    let stiffness = stiffness(config, period_s, scale)?;
     Ok(ServoSettings {
         period_s,
+        stiffness,
+        least_success_rate,
         thermal: limits.continuous_force_n.map(thermal).transpose().map_err(|error| parameter("limits", &error))?,
         limits: ForceLimits { max_force_n: limits.max_force_n, max_force_rate_n_per_s: limits.max_force_rate_n_per_s }
             .checked()
@@ -163,14 +179,14 @@ fn servo(config: &Config, period_s: f64, scale: f64) -> Result<ServoSettings, Br
         .checked()
         .map_err(|error| parameter("watchdog", &error))?,
         fading_damping_n_s_per_m: fading / scale,
-        render: render(config, period_s, scale)?,
+        render: render(config, scale, &stiffness)?,
         passivity: passivity.enabled.then_some(passivity_settings),
         auto_recover: config.servo.auto_recover,
     })
 }
 
-/// The stiffest model the servo renders is what its own sampling allows on this arm.
-fn render(config: &Config, period_s: f64, scale: f64) -> Result<Option<RenderSettings>, BridgeError> {
+/// The stiffest contact that the servo's own sampling allows on this arm, or that is asked for.
+fn stiffness(config: &Config, period_s: f64, scale: f64) -> Result<StiffnessBound, BridgeError> {
     let render = &config.render;
     let wall = SampledWall {
         arm_damping_n_s_per_m: render.arm_damping_n_s_per_m / scale,
@@ -178,16 +194,30 @@ fn render(config: &Config, period_s: f64, scale: f64) -> Result<Option<RenderSet
         sample_time_s: period_s,
         delay_s: 0.0,
     };
-    let max_stiffness_n_per_m = wall.passive_stiffness_limit_n_per_m().map_err(|error| parameter("render", &error))?;
-    if max_stiffness_n_per_m <= 0.0 {
+    let passive_n_per_m = wall.passive_stiffness_limit_n_per_m().map_err(|error| parameter("render", &error))?;
+    if passive_n_per_m <= 0.0 {
         let reason = "must be smaller than arm_damping_n_s_per_m, or no stiffness is passive".to_owned();
         return Err(value("render.damping_n_s_per_m", reason));
     }
+    let asked_n_per_m = render.max_stiffness_n_per_m.unwrap_or(passive_n_per_m);
+    if !(asked_n_per_m > 0.0 && asked_n_per_m <= passive_n_per_m) {
+        let (b, rate_hz) = (render.arm_damping_n_s_per_m, config.servo.rate_hz);
+        let reason = format!(
+            "{asked_n_per_m} N/m is not between 0 and the {passive_n_per_m:.0} N/m that are passive on an arm of {b} N s/m at {rate_hz} Hz \
+             (2 (b - B)/T): leave it out, or give the arm's damping in render.arm_damping_n_s_per_m if it has more"
+        );
+        return Err(value("render.max_stiffness_n_per_m", reason));
+    }
+    StiffnessBound::new(wall, asked_n_per_m).map_err(|error| parameter("render", &error))
+}
+
+fn render(config: &Config, scale: f64, stiffness: &StiffnessBound) -> Result<Option<RenderSettings>, BridgeError> {
+    let render = &config.render;
     let settings = RenderSettings {
         hold_s: render.hold_s,
         forget_s: render.forget_s,
         damping_n_s_per_m: render.damping_n_s_per_m / scale,
-        max_stiffness_n_per_m,
+        max_stiffness_n_per_m: stiffness.largest_n_per_m(),
     }
     .checked()
     .map_err(|error| parameter("render", &error))?;
@@ -220,6 +250,7 @@ fn uplink(config: &Config) -> Result<UplinkSettings, BridgeError> {
         seed: server.pause_seed.unwrap_or_else(seed_of_this_process),
         give_up_after,
         hello: (config.limits.max_force_n, config.servo.rate_hz),
+        across_network: None,
     })
 }
 
@@ -306,6 +337,13 @@ mod tests {
         assert!(refused(|c| c.watchdog.fading_damping_n_s_per_m = -1.0).starts_with("watchdog.fading"));
         assert!(refused(|c| c.passivity.max_stored_j = f64::INFINITY).starts_with("passivity.max_stored_j"));
         assert!(refused(|c| c.render.forget_s = 0.0).starts_with("render.forget_s"));
+        let too_stiff = refused(|c| c.render.max_stiffness_n_per_m = Some(801.0));
+        assert!(
+            too_stiff.starts_with("render.max_stiffness_n_per_m: 801 N/m") && too_stiff.contains("800 N/m"),
+            "{too_stiff}"
+        );
+        assert!(refused(|c| c.render.max_stiffness_n_per_m = Some(f64::NAN)).starts_with("render.max_stiffness"));
+        assert!(refused(|c| c.servo.least_success_rate = 1.1).starts_with("servo.least_success_rate: 1.1"));
         assert!(refused(|c| c.render.damping_n_s_per_m = 0.5).starts_with("render.damping_n_s_per_m"));
         assert!(refused(|c| c.realtime.fifo_priority = 100).starts_with("realtime.fifo_priority"));
         assert!(refused(|c| c.server.longest_pause_s = 0.0).starts_with("server.longest_pause_s"));

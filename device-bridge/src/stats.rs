@@ -62,7 +62,19 @@ pub struct Stats {
     pub damped: Counter,
     /// From reading the arm to receiving the first command that used it (ns).
     pub round_trip: Histogram,
+    /// Ticks since the first command.
+    pub judged: Counter,
+    /// Those of them in which the newest answer was in time.
+    pub in_time: Counter,
+    /// Age of the arm's newest pose at each tick (ns).
+    pub pose_age: Histogram,
     peak_force_n: AtomicU64,
+    /// Bits of the least energy (J) that the hand had put in.
+    least_energy_j: AtomicU64,
+    /// Bits of the largest stiffness (N/m) that is rendered now.
+    gain_n_per_m: AtomicU64,
+    /// Bits of the success rate; 0: not known yet.
+    success_rate: AtomicU64,
     /// Since it was last reported: the force of a moment says nothing of a press that comes and goes.
     recent_peak_n: AtomicU64,
     force_n: AtomicU64,
@@ -97,6 +109,33 @@ impl Stats {
         self.force_n.store(magnitude_n.to_bits(), Ordering::Relaxed);
         self.peak_force_n.fetch_max(magnitude_n.to_bits(), Ordering::Relaxed);
         self.recent_peak_n.fetch_max(magnitude_n.to_bits(), Ordering::Relaxed);
+    }
+
+    /// The least energy (J) that the hand had put into the virtual world at any time; below 0 it had got some.
+    pub fn least_energy_j(&self) -> f64 {
+        f64::from_bits(self.least_energy_j.load(Ordering::Relaxed))
+    }
+
+    pub(crate) fn set_least_energy(&self, least_j: f64) {
+        self.least_energy_j.store(least_j.to_bits(), Ordering::Relaxed);
+    }
+
+    /// How stiff (N/m) a contact is rendered at most now, with the delay as it is.
+    pub fn largest_stiffness_n_per_m(&self) -> f64 {
+        f64::from_bits(self.gain_n_per_m.load(Ordering::Relaxed))
+    }
+
+    pub(crate) fn set_gain(&self, n_per_m: f64) {
+        self.gain_n_per_m.store(n_per_m.to_bits(), Ordering::Relaxed);
+    }
+
+    /// Share of the last thousand ticks in which the newest answer was in time; `None` before there were so many.
+    pub fn success_rate(&self) -> Option<f64> {
+        Some(f64::from_bits(self.success_rate.load(Ordering::Relaxed))).filter(|rate| *rate > 0.0)
+    }
+
+    pub(crate) fn set_success_rate(&self, rate: Option<f64>) {
+        self.success_rate.store(rate.unwrap_or(0.0).to_bits(), Ordering::Relaxed);
     }
 
     /// Largest force (N) on the arm since this was last asked.
@@ -148,7 +187,8 @@ impl Stats {
     }
 }
 
-const FAULTS: [Fault; 5] = [Fault::Stale, Fault::NonFinite, Fault::Peer, Fault::Requested, Fault::Device];
+const FAULTS: [Fault; 6] =
+    [Fault::Stale, Fault::NonFinite, Fault::Peer, Fault::Requested, Fault::Device, Fault::Unreliable];
 
 fn code_of(link: Link) -> u8 {
     let index = |fault| FAULTS.iter().position(|f| *f == fault).unwrap_or(0) as u8;
@@ -207,6 +247,7 @@ pub(crate) fn reason(fault: Fault) -> &'static str {
         Fault::Peer => "the daemon stopped the force",
         Fault::Requested => "stopping",
         Fault::Device => "the arm is lost",
+        Fault::Unreliable => "too many answers came too late",
     }
 }
 

@@ -264,6 +264,7 @@ impl Uplink {
                     if wire.sample_sequence > told.newest_sequence {
                         told.newest_sequence = wire.sample_sequence;
                         self.shared.stats.round_trip.record(now_ns.saturating_sub(wire.echo_device_time_ns));
+                        self.judge_stiffness(welcome, told);
                     }
                     self.commands.publish(Some(command));
                 }
@@ -279,6 +280,27 @@ impl Uplink {
                 let text = "the daemon sent a message that has no place here";
                 told.once(text, text);
             }
+        }
+    }
+
+    /// Without a local model the stiff loop crosses the network: no force before it is known to be stable there.
+    fn judge_stiffness(&self, welcome: &Welcome, told: &mut Told) {
+        let Some(bound) = self.settings.across_network else { return };
+        let trips = &self.shared.stats.round_trip;
+        if !self.shared.unmeasured.load(Ordering::Relaxed) || trips.count() < TRIPS_MEASURED || told.is_judged {
+            return;
+        }
+        told.is_judged = true;
+        let trip_s = trips.value_at(0.99) as f64 * 1e-9;
+        let (is_n_per_m, may_be_n_per_m) = (welcome.coupling_n_per_m, bound.at_delay(trip_s).largest_n_per_m());
+        if is_n_per_m <= may_be_n_per_m {
+            self.shared.unmeasured.store(false, Ordering::Relaxed);
+        } else {
+            tracing::error!(
+                "no force: the tool's coupling has {is_n_per_m:.0} N/m, and across this network, {:.1} ms to and fro, {may_be_n_per_m:.0} N/m \
+                 are stable on this arm. Set render.local_model = true, or give the tool of the scene a softer coupling",
+                1e3 * trip_s
+            );
         }
     }
 
@@ -300,9 +322,14 @@ impl Uplink {
     }
 }
 
+/// Round trips that are looked at before a force crosses the network.
+const TRIPS_MEASURED: u64 = 200;
+
 /// What was said already on this connection, and the newest sample answered.
 #[derive(Debug, Default)]
 struct Told {
+    /// Whether a force may cross the network was decided.
+    is_judged: bool,
     newest_sequence: u64,
     said: Vec<String>,
 }

@@ -105,6 +105,7 @@ async fn the_delay_of_the_network_counts_as_age() {
     let (address, _stop, _serving) = mock.serve("127.0.0.1:0").await;
     let mut config = config(&format!("http://{address}"));
     (config.watchdog.stale_after_s, config.watchdog.ramp_to_zero_s) = (0.25, 0.75);
+    config.servo.least_success_rate = 0.0;
     let bridge = start(config);
     let stats = bridge.handle.stats();
     until("the force is up", || stats.force_n() > 0.99).await;

@@ -71,7 +71,7 @@ fn answers_to_old_poses_ramp_and_latch_however_steadily_they_come() {
         (8, Link::Ramping(Fault::Stale), 1.0 - 3.0 / 15.0),
         (25, Link::Latched(Fault::Stale), 0.0),
     ] {
-        let mut law = law(|_| {});
+        let mut law = law(|config| config.servo.least_success_rate = 0.0);
         let last = up(&mut law);
         let mut out = law.tick(last, &still());
         for tick in 1..=1000_u64 {
@@ -81,6 +81,33 @@ fn answers_to_old_poses_ramp_and_latch_however_steadily_they_come() {
         }
         assert_eq!(out.verdict.link, link, "{delay_ms} ms");
         assert!((out.limited.force_n.z - force_n).abs() < 1e-9, "{delay_ms} ms: {}", out.limited.force_n.z);
+    }
+}
+
+/// Of every ten answers so many come 8 ms late, in a row.
+#[test]
+fn a_force_that_comes_and_goes_with_every_other_answer_is_taken_away() {
+    for (late, link) in [(0, Link::Fresh), (2, Link::Latched(Fault::Unreliable))] {
+        let mut law = law(|_| {});
+        let last = up(&mut law);
+        let mut latched_at = None;
+        for tick in 1..=3000_u64 {
+            let now = last + tick * MS;
+            // Nothing comes for 5 ms and so many, then all of them.
+            if late == 0 || tick % 10 >= 6 + late {
+                law.receive(&command(now, DVec3::Z, None));
+            }
+            let out = law.tick(now, &still());
+            if matches!(out.verdict.link, Link::Latched(_)) {
+                latched_at.get_or_insert((tick, out.verdict.link));
+                assert_eq!(out.limited.force_n, DVec3::ZERO);
+            }
+        }
+        match link {
+            Link::Fresh => assert_eq!(latched_at, None),
+            // As soon as there are enough ticks to tell, and the ramp.
+            _ => assert!(latched_at.is_some_and(|(tick, found)| found == link && tick < 1100), "{latched_at:?}"),
+        }
     }
 }
 

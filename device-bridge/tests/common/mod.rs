@@ -205,6 +205,10 @@ pub fn config(url: &str) -> Config {
     config.watchdog.stale_after_s = 0.25;
     config.watchdog.ramp_to_zero_s = 0.05;
     config.watchdog.ramp_up_s = 0.05;
+    // The force that is asked for is on an arm at rest: nobody worked for it.
+    config.passivity.strict = false;
+    // Beside the arm the hand damps.
+    config.render.arm_damping_n_s_per_m = 4.0;
     let keyframes = vec![KeyframeConfig { time_s: 0.0, position_m: [0.0; 3] }];
     config.device = DeviceConfig::Simulated(SimulatedConfig { keyframes, ..SimulatedConfig::default() });
     config.realtime = RealtimeConfig { fifo_priority: 0, lock_memory: false, processor: None, stay_awake: false };

@@ -67,7 +67,9 @@ pub async fn pressed_n(flicker_n: f64, device: DeviceConfig) -> (f64, Summary) {
     let mock = Mock::default();
     mock.set(|behaviour| behaviour.local_model = Some(wall()));
     let (address, _stop, _serving) = mock.serve("127.0.0.1:0").await;
-    let bridge = start(bridged(&format!("http://{address}"), device));
+    let mut config = bridged(&format!("http://{address}"), device);
+    config.passivity.strict = true;
+    let bridge = start(config);
     let stats = bridge.handle.stats();
     until("it presses", || stats.force_n() > 0.5).await;
     let mut last = std::collections::VecDeque::new();

@@ -5,8 +5,11 @@
 //!
 //! Sign convention: forces act **on the arm** (N, world); the power an arm puts into the virtual world is `−F·v`.
 pub mod coupling;
+pub mod energy;
 pub mod extrapolate;
+pub mod gain;
 pub mod limits;
+pub mod link_quality;
 pub mod local_model;
 pub mod parameter;
 pub mod passivity;
@@ -16,8 +19,11 @@ pub mod velocity;
 pub mod watchdog;
 
 pub use coupling::VirtualCoupling;
+pub use energy::EnergyMeter;
 pub use extrapolate::{Motion, extrapolate};
+pub use gain::StiffnessBound;
 pub use limits::{ForceLimiter, ForceLimits, Limited};
+pub use link_quality::SuccessRate;
 pub use local_model::{LocalModel, RenderSettings, Rendered};
 pub use parameter::ParameterError;
 pub use passivity::{PassivityController, PassivitySettings, PassivityStep};

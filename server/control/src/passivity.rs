@@ -22,7 +22,7 @@ const HAND_MARGIN: f64 = 4.0;
 
 impl Default for PassivitySettings {
     fn default() -> Self {
-        Self { max_damping_n_s_per_m: 20.0, max_stored_j: 0.05, arm_mass_kg: 0.05, strict: false }
+        Self { max_damping_n_s_per_m: 20.0, max_stored_j: 0.05, arm_mass_kg: 0.05, strict: true }
     }
 }
 
@@ -123,7 +123,8 @@ impl PassivityController {
         }
         if let Some((held_n, from_m)) = self.held {
             // E_k = E_{k−1} − F_{k−1}·(x_k − x_{k−1})
-            self.energy_j = (self.energy_j - held_n.dot(position_m - from_m)).min(self.settings.max_stored_j);
+            let energy_j = (self.energy_j - held_n.dot(position_m - from_m)).min(self.settings.max_stored_j);
+            self.energy_j = if energy_j.is_finite() { energy_j } else { 0.0 };
         }
         let damping_n_s_per_m = self.damping(force_n, velocity_m_per_s, dt_s);
         let out_n = force_n - damping_n_s_per_m * velocity_m_per_s;
@@ -162,7 +163,8 @@ impl PassivityController {
             return left_n;
         }
         let s = (-b_j + (b_j * b_j + 4.0 * a_j * at_hand_j).sqrt()) / (2.0 * a_j);
-        left_n * s.clamp(0.0, 1.0)
+        // Speeds and energies beyond all sense overflow.
+        if s.is_finite() { left_n * s.clamp(0.0, 1.0) } else { DVec3::ZERO }
     }
 
     /// The force (N) really held over the interval that [`PassivityController::step`] opened.

@@ -60,6 +60,8 @@ pub enum Fault {
     Requested,
     /// The arm itself failed, or was stopped.
     Device,
+    /// Samples come, but too many of them too late.
+    Unreliable,
 }
 
 /// State of the link.

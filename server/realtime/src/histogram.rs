@@ -87,6 +87,11 @@ impl Histogram {
         self.count.load(Ordering::Relaxed)
     }
 
+    /// How many values are at most `value_ns`, to within the bucket that it is in.
+    pub fn count_up_to(&self, value_ns: u64) -> u64 {
+        self.buckets[..=bucket_of(value_ns)].iter().map(|bucket| bucket.load(Ordering::Relaxed)).sum()
+    }
+
     /// The value (ns) that a share `quantile` (0 to 1) of the values does not exceed; 0 when empty.
     pub fn value_at(&self, quantile: f64) -> u64 {
         let total: u64 = self.buckets.iter().map(|bucket| bucket.load(Ordering::Relaxed)).sum();
