@@ -3,6 +3,7 @@ use crate::{
     BridgeError, Config, Handle,
     device::kinds::{self, KINDS, Kind},
     emulate::cli::Emulate,
+    guard::stand,
     measure::{bars, measure, svg},
     probe::probe,
     run::run_with,
@@ -11,6 +12,7 @@ use clap::{
     Parser, Subcommand,
     builder::{PossibleValue, PossibleValuesParser, TypedValueParser},
 };
+use palpate_realtime::OsMeasures;
 use std::{
     io::{IsTerminal, Write as _},
     mem::discriminant,
@@ -104,6 +106,14 @@ enum Command {
         #[arg(long, value_name = "S", default_value_t = 2.0, value_parser = parse_seconds)]
         time_s: f64,
     },
+    /// Stands beside a bridge; started by it alone
+    #[command(hide = true)]
+    Guard {
+        #[arg(long)]
+        patience_us: u64,
+        #[arg(long)]
+        fifo_priority: u8,
+    },
     /// Drive a tool for a while without any force, and say how well loop and network keep time; exit code 2: not well enough for a force
     Measure {
         /// Configuration file (TOML)
@@ -146,6 +156,11 @@ impl Cli {
     pub fn run(self) -> Result<ExitCode, BridgeError> {
         match self.command {
             Some(Command::Emulate { kind }) => return kind.run(),
+            Some(Command::Guard { patience_us, fifo_priority }) => {
+                let fifo_priority = (fifo_priority > 0).then_some(fifo_priority);
+                let measures = OsMeasures { fifo_priority, lock_memory: fifo_priority.is_some(), ..OsMeasures::NONE };
+                return stand(Duration::from_micros(patience_us), &measures).map(|()| ExitCode::SUCCESS);
+            }
             Some(Command::Devices) => return Ok(say(&kinds::list())),
             Some(Command::Probe { config, device, time_s }) => {
                 let mut config = read(config.as_deref())?;
@@ -172,6 +187,10 @@ impl Cli {
         let runtime = runtime()?;
         runtime.block_on(async {
             let (shutdown, handle) = (CancellationToken::new(), Handle::new());
+            // The guard is this program; where it cannot be found there is none.
+            if let Ok(program) = std::env::current_exe() {
+                handle.guarded_by(program);
+            }
             obey_signals(shutdown.clone(), handle.clone())?;
             let summary = run_with(&config, shutdown, handle).await?;
             // A reader that has gone misses the counters, no more.

@@ -14,6 +14,7 @@ pub mod convert;
 pub mod device;
 pub mod emulate;
 pub mod error;
+pub mod guard;
 pub mod measure;
 pub mod probe;
 pub mod run;

@@ -1,6 +1,7 @@
 //! Starts servo and uplink, watches both, and ends them in order: force to zero, then the stream, then the program.
 use crate::{
     BridgeError, Config, Stats, Summary, device,
+    guard::Guard,
     servo::{Servo, ServoLaw},
     settings::{ServoSettings, Settings},
     stats::reason,
@@ -9,8 +10,9 @@ use crate::{
 use palpate_control::{EnergyMeter, Link};
 use palpate_realtime::{Clock, Doorbell, Note, OsMeasures, TickLoop, slot};
 use std::{
+    path::PathBuf,
     sync::{
-        Arc,
+        Arc, OnceLock,
         atomic::{AtomicBool, Ordering},
     },
     time::{Duration, Instant},
@@ -40,6 +42,8 @@ pub struct Shared {
     pub peer_fault: AtomicBool,
     /// The arm gets no force: it is measured.
     pub without_force: AtomicBool,
+    /// This program, to be started as a guard.
+    pub guard_program: OnceLock<PathBuf>,
     /// The daemon's force crosses the network, and nobody knows yet whether that is stable.
     pub unmeasured: AtomicBool,
 }
@@ -59,6 +63,11 @@ impl Handle {
     /// Leaves a latched fault; the force comes back slowly, with the next command.
     pub fn recover(&self) {
         self.shared.recover.store(true, Ordering::Relaxed);
+    }
+
+    /// With `servo.guard` this program (the bridge's own) stands guard beside the arm; without a program nobody does.
+    pub fn guarded_by(&self, program: PathBuf) {
+        let _ = self.shared.guard_program.set(program);
     }
 
     /// From now on the arm gets no force: it is measured.
@@ -99,6 +108,7 @@ pub async fn run_with(config: &Config, shutdown: CancellationToken, handle: Hand
     let bell = Doorbell::new().map_err(|source| BridgeError::System { what: "create an eventfd", source })?;
     let source =
         SampleSource::new(&bell, samples).map_err(|source| BridgeError::System { what: "watch an eventfd", source })?;
+    let guard = start_guard(&*device, &settings, shared.guard_program.get());
     let servo = Servo {
         law: ServoLaw::new(settings.servo),
         device,
@@ -109,6 +119,7 @@ pub async fn run_with(config: &Config, shutdown: CancellationToken, handle: Hand
         shared: Arc::clone(&shared),
         sequence: 0,
         energy: EnergyMeter::default(),
+        guard,
     };
     shared.unmeasured.store(settings.uplink.across_network.is_some(), Ordering::Relaxed);
     let _no_servo_alone = StopOnDrop(Arc::clone(&shared));
@@ -144,6 +155,17 @@ pub async fn run_with(config: &Config, shutdown: CancellationToken, handle: Hand
         Ok(result) => result.map(|()| shared.stats.summary()),
         Err(panic) => Err(BridgeError::System { what: "run the uplink", source: std::io::Error::other(panic) }),
     }
+}
+
+/// A guard, where it can help; without one the arm's own patience is all there is, which is said.
+fn start_guard(device: &dyn device::Arm, settings: &Settings, program: Option<&PathBuf>) -> Option<Guard> {
+    let program = program.filter(|_| settings.guard)?;
+    let words = device.last_words()?;
+    let watchdog = &settings.servo.watchdog;
+    let patience = Duration::from_secs_f64(watchdog.stale_after_s + watchdog.ramp_to_zero_s);
+    Guard::start(program, words, patience, &settings.measures)
+        .inspect_err(|error| tracing::warn!("no guard stands beside the arm, should this process be killed: {error}"))
+        .ok()
 }
 
 /// The arm, opened on a thread that may wait; `None` when the bridge was told to stop meanwhile.

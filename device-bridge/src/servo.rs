@@ -2,6 +2,7 @@
 use crate::{
     convert::{Command, Sample},
     device::{Arm, Effort, Reading},
+    guard::Guard,
     run::Shared,
     settings::ServoSettings,
 };
@@ -225,6 +226,8 @@ pub struct Servo {
     pub sequence: u64,
     /// What the hand gave and got.
     pub energy: EnergyMeter,
+    /// Who takes the force away should this process be killed.
+    pub guard: Option<Guard>,
 }
 
 impl Servo {
@@ -251,6 +254,9 @@ impl Servo {
         self.obey_flags(now_ns);
         let tick = self.law.tick(now_ns, &motion);
         self.device.apply(&Effort::force(tick.limited.force_n));
+        if let Some(guard) = &mut self.guard {
+            guard.beat();
+        }
         self.energy.step(motion.position_m, tick.limited.force_n);
         if let Ok(reading) = read
             && reading.motion.is_finite()
@@ -354,6 +360,7 @@ mod tests {
             shared: Arc::default(),
             sequence: 0,
             energy: EnergyMeter::default(),
+            guard: None,
         };
         (servo, witness, commands)
     }

@@ -27,6 +27,8 @@ pub struct Settings {
     pub device: DeviceSettings,
     /// What to ask of the operating system.
     pub measures: OsMeasures,
+    /// A second process takes the force away when this one is killed.
+    pub guard: bool,
     /// Pause between lines of counters.
     pub report_every: Option<Duration>,
 }
@@ -116,6 +118,7 @@ impl Settings {
             },
             servo,
             measures: measures(config)?,
+            guard: config.servo.guard,
             report_every: (!report_every.is_zero()).then_some(report_every),
         })
     }

@@ -44,6 +44,7 @@ fn the_servo_allocates_nothing() {
         shared: Arc::clone(&shared),
         sequence: 0,
         energy: palpate_control::EnergyMeter::default(),
+        guard: None,
     };
     let mut tick_loop = TickLoop::new(Clock::Monotonic, 1e-3).unwrap();
     let thread = std::thread::spawn(move || {

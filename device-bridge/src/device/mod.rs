@@ -16,7 +16,7 @@ use glam::DVec3;
 use hapticmaster::HapticMaster;
 use palpate_control::Motion;
 use simulated::SimulatedDevice;
-use std::fmt::Debug;
+use std::{fmt::Debug, os::fd::OwnedFd};
 use thiserror::Error;
 use tokio_util::sync::CancellationToken;
 #[cfg(test)]
@@ -64,6 +64,15 @@ impl Effort {
     }
 }
 
+/// Bytes that take the force away, whatever was said before, and where to write them.
+#[derive(Debug)]
+pub struct LastWords {
+    /// The connection.
+    pub to: OwnedFd,
+    /// The bytes.
+    pub bytes: Vec<u8>,
+}
+
 /// Why an arm is of no use any more.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Error)]
 pub enum Fault {
@@ -99,6 +108,11 @@ pub trait Arm: Debug + Send {
 
     /// Puts this on the arm, held until the next call.
     fn apply(&mut self, effort: &Effort);
+
+    /// What another process can say to it when this one is gone; `None` where the connection does not outlive the process.
+    fn last_words(&self) -> Option<LastWords> {
+        None
+    }
 }
 
 /// Opens the arm that the configuration names, however long that takes, until told to stop.

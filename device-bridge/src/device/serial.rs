@@ -1,8 +1,11 @@
 //! A serial line beside the loop: it never waits, and tells lines of text apart.
-use super::Fault;
+use super::{Fault, LastWords};
+use rustix::fs::OFlags;
 use serialport::{SerialPort as _, TTYPort};
 use std::{
+    fs::File,
     io::{ErrorKind, Read as _, Write as _},
+    os::unix::fs::OpenOptionsExt as _,
     time::Duration,
 };
 use thiserror::Error;
@@ -30,6 +33,8 @@ pub struct OpenError {
 #[derive(Debug)]
 pub struct Line {
     port: TTYPort,
+    /// The same port once more, for a guard.
+    spare: File,
 }
 
 impl Line {
@@ -38,8 +43,18 @@ impl Line {
     /// # Errors
     /// [`OpenError`], naming the path.
     pub fn open(path: &str, baud: u32) -> Result<Self, OpenError> {
+        let failed = |source| OpenError { path: path.to_owned(), source };
+        // Before the port itself, which is for one alone; it must not wait for a carrier, nor become our terminal.
+        let flags = (OFlags::NOCTTY | OFlags::NONBLOCK).bits().cast_signed();
+        let spare = File::options().read(true).write(true).custom_flags(flags).open(path);
+        let spare = spare.map_err(|error| failed(error.into()))?;
         let opened = serialport::new(path, baud).timeout(WAIT).open_native();
-        opened.map(|port| Self { port }).map_err(|source| OpenError { path: path.to_owned(), source })
+        opened.map(|port| Self { port, spare }).map_err(failed)
+    }
+
+    /// These bytes, for a guard to write.
+    pub fn last_words(&self, bytes: Vec<u8>) -> Option<LastWords> {
+        Some(LastWords { to: self.spare.try_clone().ok()?.into(), bytes })
     }
 
     /// Reads what has come into `into`; how much that is. Does not allocate, but for the error when the cable is pulled.

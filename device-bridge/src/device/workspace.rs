@@ -1,5 +1,5 @@
 //! From an arm's own axes to the world's, and back: turned, moved, magnified, and let go of by a button.
-use super::{Arm, Effort, Fault, Reading};
+use super::{Arm, Effort, Fault, LastWords, Reading};
 use glam::{DMat3, DQuat, DVec3};
 use palpate_control::Motion;
 use thiserror::Error;
@@ -168,6 +168,10 @@ impl Arm for Placed {
         let Effort { force_n, torque_nm } = *effort;
         self.arm
             .apply(&Effort { force_n: self.workspace.to_arm(force_n), torque_nm: self.workspace.to_arm(torque_nm) });
+    }
+
+    fn last_words(&self) -> Option<LastWords> {
+        self.arm.last_words()
     }
 }
 

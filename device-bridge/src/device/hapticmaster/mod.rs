@@ -8,7 +8,7 @@
 pub mod grammar;
 pub mod start;
 
-use super::{Arm, Effort, Fault, Reading, unstarted};
+use super::{Arm, Effort, Fault, LastWords, Reading, unstarted};
 use crate::BridgeError;
 use glam::DVec3;
 use grammar::Answer;
@@ -243,6 +243,17 @@ impl Arm for HapticMaster {
             self.lose(fault);
         }
     }
+
+    fn last_words(&self) -> Option<LastWords> {
+        let to = self.stream.try_clone().ok()?.into();
+        let mut bytes = Vec::new();
+        grammar::frame(no_force().as_bytes(), &mut bytes);
+        Some(LastWords { to, bytes })
+    }
+}
+
+fn no_force() -> String {
+    format!("set {EFFECT} force [0,0,0]")
 }
 
 impl Drop for HapticMaster {
@@ -253,7 +264,7 @@ impl Drop for HapticMaster {
         let _ = self.stream.set_write_timeout(Some(FAREWELL));
         // What is left of the last request first, or the arm would take this for its end.
         let _ = self.stream.write_all(&self.request[self.sent..]);
-        for text in [format!("set {EFFECT} force [0,0,0]"), "remove all".to_owned()] {
+        for text in [no_force(), "remove all".to_owned()] {
             grammar::frame(text.as_bytes(), &mut self.request);
             let _ = self.stream.write_all(&self.request).and_then(|()| self.stream.read(&mut [0; 1024]));
         }

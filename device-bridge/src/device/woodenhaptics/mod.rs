@@ -10,7 +10,7 @@ pub mod kinematics;
 pub mod wire;
 
 use super::{
-    Arm, Effort, Fault, Reading,
+    Arm, Effort, Fault, LastWords, Reading,
     serial::{Line, Lines, OpenError},
 };
 use glam::{DMat3, DVec3};
@@ -225,6 +225,14 @@ impl Arm for WoodenHaptics {
         if let Err(fault) = self.send() {
             self.lose(fault);
         }
+    }
+
+    /// A line of its own, whatever was begun.
+    fn last_words(&self) -> Option<LastWords> {
+        let (mut bytes, mut line) = (b"\n".to_vec(), Vec::new());
+        wire::write(NOTHING, &mut line);
+        bytes.append(&mut line);
+        self.line.last_words(bytes)
     }
 }
 
