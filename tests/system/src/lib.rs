@@ -1,4 +1,5 @@
 //! What the system tests share: the repository's root, and the real programs.
+pub mod daemon;
 pub mod programs;
 
 use std::path::{Path, PathBuf};

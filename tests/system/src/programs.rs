@@ -74,6 +74,12 @@ impl Program {
         panic!("no line with \"{text}\" within {patience:?}; printed so far:\n{}", self.output);
     }
 
+    /// Sends SIGKILL, and waits for the end.
+    pub fn kill(&mut self) {
+        self.child.kill().expect("the child runs");
+        self.child.wait().expect("the child can be waited for");
+    }
+
     /// Sends SIGTERM.
     pub fn terminate(&self) {
         let pid = rustix::process::Pid::from_child(&self.child);

@@ -1,67 +1,11 @@
 //! Daemon, bridge and viewer as real processes over real sockets.
 #![allow(clippy::unwrap_used)] // a test that cannot start its subject has failed
-use palpate_system_tests::programs::{self, Program};
-use serde_json::Value;
-use std::{
-    fs,
-    path::Path,
-    process::{Command, Output},
-    thread,
-    time::{Duration, Instant},
+use palpate_system_tests::{
+    daemon::{Daemon, PATIENCE, text, view},
+    programs::Program,
 };
-
-/// Far longer than anything needs on an idle machine.
-const PATIENCE: Duration = Duration::from_mins(1);
-
-struct Daemon {
-    program: Program,
-    url: String,
-}
-
-impl Daemon {
-    fn start(arguments: &[&str]) -> Self {
-        Self::of("palpated", &[&["serve"], arguments].concat())
-    }
-
-    fn of(program: &str, arguments: &[&str]) -> Self {
-        let mut program = Program::start(program, &[arguments, &["--listen", "127.0.0.1:0"]].concat());
-        let line = program.wait_for("http://127.0.0.1:", PATIENCE);
-        let from = line.find("http://").unwrap();
-        let url = line[from..].split_whitespace().next().unwrap().trim_end_matches(['/', ',', ')']).to_owned();
-        Self { program, url }
-    }
-
-    fn view(&self, arguments: &[&str]) -> Output {
-        view(&self.url, arguments)
-    }
-
-    fn status(&self) -> Value {
-        let output = self.view(&["status", "--json"]);
-        assert!(output.status.success(), "{}", text(&output.stderr));
-        serde_json::from_slice(&output.stdout).unwrap()
-    }
-
-    /// Asks for the status until it satisfies a condition.
-    fn wait_until(&self, what: &str, condition: impl Fn(&Value) -> bool) -> Value {
-        let end = Instant::now() + PATIENCE;
-        loop {
-            let status = self.status();
-            if condition(&status) {
-                return status;
-            }
-            assert!(Instant::now() < end, "never: {what}; last status:\n{status:#}");
-            thread::sleep(Duration::from_millis(100));
-        }
-    }
-}
-
-fn view(url: &str, arguments: &[&str]) -> Output {
-    Command::new(programs::path_of("palpate-view")).args(["--server", url]).args(arguments).output().unwrap()
-}
-
-fn text(bytes: &[u8]) -> String {
-    String::from_utf8_lossy(bytes).into_owned()
-}
+use serde_json::Value;
+use std::{fs, path::Path};
 
 #[test]
 fn the_default_scene_is_pressed_and_every_view_shows_it() {
