@@ -72,6 +72,14 @@ impl Library {
         }
     }
 
+    pub(crate) fn set_enabled(&mut self, capability: u32, enabled: bool) {
+        match &mut self.device {
+            Some(device) if enabled => drop(device.enabled.insert(capability)),
+            Some(device) => drop(device.enabled.remove(&capability)),
+            None => self.raise(hd::INVALID_OPERATION),
+        }
+    }
+
     /// None, and an error, for a parameter that there is not.
     pub(crate) fn numbers(&mut self, parameter: u32) -> Vec<f64> {
         let found = self.device.as_ref().and_then(|device| device.numbers.get(&parameter)).cloned();
@@ -82,13 +90,11 @@ impl Library {
     }
 
     pub(crate) fn text(&mut self, parameter: u32) -> *const c_char {
-        match self.device.as_ref().and_then(|device| device.texts.get(&parameter)) {
-            Some(text) => text.as_ptr(),
-            None => {
-                self.raise(hd::INVALID_ENUM);
-                std::ptr::null()
-            }
+        if let Some(text) = self.device.as_ref().and_then(|device| device.texts.get(&parameter)) {
+            return text.as_ptr();
         }
+        self.raise(hd::INVALID_ENUM);
+        std::ptr::null()
     }
 
     pub(crate) fn set(&mut self, parameter: u32, values: [f64; 3]) {
@@ -103,13 +109,11 @@ impl Library {
     }
 
     pub(crate) fn calibration(&mut self) -> u32 {
-        match &self.device {
-            Some(device) => device.calibration,
-            None => {
-                self.raise(hd::INVALID_OPERATION);
-                0
-            }
+        if let Some(device) = &self.device {
+            return device.calibration;
         }
+        self.raise(hd::INVALID_OPERATION);
+        0
     }
 }
 
@@ -139,15 +143,6 @@ impl Device {
         };
         device.hear()?;
         Ok(device)
-    }
-
-    pub(crate) fn set_enabled(&mut self, capability: u32, enabled: bool) -> std::io::Result<()> {
-        if enabled {
-            self.enabled.insert(capability);
-        } else {
-            self.enabled.remove(&capability);
-        }
-        Ok(())
     }
 
     pub(crate) fn tell(&mut self, line: &str) -> std::io::Result<()> {

@@ -55,16 +55,12 @@ pub unsafe extern "C" fn hdInitDevice(name: *const c_char) -> c_uint {
         library.raise(hd::DEVICE_ALREADY_INITIATED);
         return hd::INVALID_HANDLE;
     }
-    match Device::open(name.as_deref().unwrap_or(arm::DEFAULT)) {
-        Ok(device) => {
-            library.device = Some(device);
-            device::HANDLE
-        }
-        Err(_) => {
-            library.raise(hd::DEVICE_FAULT);
-            hd::INVALID_HANDLE
-        }
+    library.device = Device::open(name.as_deref().unwrap_or(arm::DEFAULT)).ok();
+    if library.device.is_some() {
+        return device::HANDLE;
     }
+    library.raise(hd::DEVICE_FAULT);
+    hd::INVALID_HANDLE
 }
 
 #[unsafe(no_mangle)]
@@ -107,12 +103,12 @@ pub extern "C" fn hdGetErrorString(code: c_uint) -> *const c_char {
 
 #[unsafe(no_mangle)]
 pub extern "C" fn hdEnable(capability: c_uint) {
-    library().with_device(|device| device.set_enabled(capability, true));
+    library().set_enabled(capability, true);
 }
 
 #[unsafe(no_mangle)]
 pub extern "C" fn hdDisable(capability: c_uint) {
-    library().with_device(|device| device.set_enabled(capability, false));
+    library().set_enabled(capability, false);
 }
 
 /// # Safety
