@@ -8,6 +8,7 @@
 //! its gimbal has an angular velocity, whether HD itself lets go when its program is killed.
 pub mod ffi;
 pub mod frame;
+pub mod limits;
 pub mod start;
 
 use super::{Arm, Effort, Fault, Reading, unstarted};
