@@ -102,6 +102,33 @@ async fn each_fault_of_the_arm_takes_the_force_away_and_is_named() {
     }
 }
 
+/// The frame that sees an error is the last with a force, whatever the servo still wants.
+#[test]
+fn an_error_takes_the_force_away_before_the_servo_knows() {
+    let emulated = Emulated::new(resting());
+    let mut arm = started(&emulated.keys()).unwrap();
+    let push = Effort::force(DVec3::Y * 2.0);
+    apply_until("it pushes", &mut arm, &push, || emulated.arm.force_n() == push.force_n);
+    emulated.arm.faults.error_code.store(0x0203, Ordering::Relaxed);
+    wait_until("it lets go", || {
+        arm.apply(&push);
+        emulated.arm.force_n() == DVec3::ZERO
+    });
+    emulated.arm.faults.error_code.store(0, Ordering::Relaxed);
+    press_without_effect(&mut arm, &emulated, &push);
+    assert_eq!((arm.read(1), arm.read(1)), (Err(Fault::TooFast), Err(Fault::TooFast)));
+}
+
+/// An arm that failed has to be opened anew.
+fn press_without_effect(arm: &mut Phantom, emulated: &Emulated, push: &Effort) {
+    let frames = emulated.arm.frames();
+    wait_until("frames go on", || {
+        arm.apply(push);
+        assert_eq!(emulated.arm.force_n(), DVec3::ZERO);
+        emulated.arm.frames() > frames + 100
+    });
+}
+
 /// The frames go on without the servo: they let go by themselves, and give the force back slowly.
 #[test]
 fn a_servo_that_hangs_loses_its_force_and_gets_it_back() {
@@ -129,6 +156,8 @@ fn an_arm_is_left_without_force_and_can_be_used_again() {
         drop(arm);
         // What was said last has still to be heard.
         wait_until("it lets go", || emulated.arm.force_n() == DVec3::ZERO);
+        wait_until("the library has gone", || emulated.arm.left_with_n().is_some());
+        assert_eq!(emulated.arm.left_with_n(), Some(0.0), "the last frame had no force");
     }
 }
 

@@ -141,6 +141,11 @@ impl Phantom {
         self.shared.machine().calibrated.clone()
     }
 
+    /// What force (N) the last library left on it when it went.
+    pub fn left_with_n(&self) -> Option<f64> {
+        self.shared.machine().left_with_n
+    }
+
     /// The largest force (N) since it was switched on.
     pub fn peak_n(&self) -> f64 {
         self.shared.machine().peak_n
@@ -211,6 +216,7 @@ struct Machine {
     force_n: DVec3,
     torque_nm: DVec3,
     peak_n: f64,
+    left_with_n: Option<f64>,
     heard: Option<Instant>,
     began: Option<Instant>,
     steps: u64,
@@ -226,6 +232,7 @@ impl Machine {
             force_n: DVec3::ZERO,
             torque_nm: DVec3::ZERO,
             peak_n: 0.0,
+            left_with_n: None,
             heard: None,
             began: None,
             steps: 0,
@@ -303,7 +310,7 @@ impl Machine {
     }
 
     fn let_go(&mut self) {
-        self.go_on();
+        self.left_with_n = Some(self.force_n.length());
         self.heard = None;
         self.go_on();
     }

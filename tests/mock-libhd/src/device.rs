@@ -182,11 +182,3 @@ impl Device {
         self.connection.say(&format!("force {x} {y} {z} {a} {b} {c}"))
     }
 }
-
-impl Drop for Device {
-    /// Without force.
-    fn drop(&mut self) {
-        self.effort = [0.0; 6];
-        let _ = self.send_effort();
-    }
-}

@@ -23,7 +23,7 @@ const INKWELL: u32 = 1 << 2;
 /// How long the first frame may take.
 const PATIENCE: Duration = Duration::from_secs(5);
 /// How long the last one, without force, is waited for.
-const FAREWELL: Duration = Duration::from_millis(100);
+const FAREWELL: Duration = Duration::from_millis(300);
 /// How often something is looked for while waiting.
 const LOOK_EVERY: Duration = Duration::from_millis(1);
 /// More errors than this are not left over from a start.
