@@ -3,7 +3,9 @@ mod device;
 mod workspace;
 
 use crate::{BridgeError, error::ConfigError};
-pub use device::{DeviceConfig, HapticMasterConfig, KeyframeConfig, SimulatedConfig, WoodenHapticsConfig};
+pub use device::{
+    DeviceConfig, HapticMasterConfig, KeyframeConfig, PhantomConfig, SimulatedConfig, WoodenHapticsConfig,
+};
 use miette::NamedSource;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
@@ -293,7 +295,7 @@ mod tests {
 
     #[test]
     fn the_examples_are_valid() {
-        for example in ["bridge.toml", "hapticmaster.toml", "woodenhaptics.toml"] {
+        for example in ["bridge.toml", "hapticmaster.toml", "woodenhaptics.toml", "phantom.toml"] {
             let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../deploy").join(example);
             let config = Config::read(&path).unwrap();
             crate::settings::Settings::new(&config).unwrap();

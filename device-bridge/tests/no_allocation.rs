@@ -1,14 +1,24 @@
 //! The servo thread touches no heap: device, law, slots, bell, counters.
 #![allow(clippy::unwrap_used)]
+#[path = "common/libhd.rs"]
+mod libhd;
+
 use assert_no_alloc::{AllocDisabler, assert_no_alloc};
 use glam::{DMat3, DVec3};
 use palpate_bridge::{
     Config,
     config::{DeviceConfig, HapticMasterConfig, WoodenHapticsConfig},
     convert::Command,
-    device::{self, Effort},
+    device::{
+        self, Effort,
+        phantom::{
+            ffi::Hd,
+            frame::{Frame, Guard, Next},
+        },
+    },
     emulate::{
         hapticmaster::{self, HapticMaster},
+        phantom,
         woodenhaptics::{self, WoodenHaptics},
     },
     run::Shared,
@@ -109,4 +119,30 @@ fn the_woodenhaptics_driver_allocates_nothing() {
     let emulated = WoodenHaptics::start(settings).unwrap();
     drive(DeviceConfig::Woodenhaptics(WoodenHapticsConfig { port: emulated.port().to_owned(), ..keys }));
     assert!(emulated.lines() > 100);
+}
+
+#[test]
+fn the_phantoms_driver_allocates_nothing() {
+    let emulated = libhd::Emulated::new(phantom::Settings::default());
+    drive(DeviceConfig::Phantom(emulated.keys()));
+    assert!(emulated.arm.frames() > 100);
+}
+
+/// What is done on libHD's own thread.
+#[test]
+fn a_phantoms_frame_allocates_nothing() {
+    let emulated = libhd::Emulated::new(phantom::Settings { turns: true, ..phantom::Settings::default() });
+    let hd = Hd::load(std::slice::from_ref(&emulated.library)).unwrap();
+    let name = std::ffi::CString::new(emulated.arm.socket().to_str().unwrap()).unwrap();
+    let device = hd.init_device(Some(&name)).unwrap();
+    let ((poses, mut newest), (mut efforts, efforts_out)) = (slot(&None), slot(&Effort::NONE));
+    let (guard, shared) = (Guard::new(3.0, 0.1), Arc::default());
+    let mut frame = Frame { hd, device, turns: true, guard, poses, efforts: efforts_out, shared };
+    for _ in 0..100 {
+        assert_no_alloc(|| {
+            efforts.publish(Effort::force(DVec3::splat(0.1)));
+            assert_eq!(frame.run(), Next::Again);
+        });
+    }
+    assert!(newest.take().is_some_and(Option::is_some) && frame.shared.error().is_none());
 }

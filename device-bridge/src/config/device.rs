@@ -1,9 +1,11 @@
 //! `[device]`: each kind of arm with its keys.
 mod hapticmaster;
+mod phantom;
 mod simulated;
 mod woodenhaptics;
 
 pub use hapticmaster::HapticMasterConfig;
+pub use phantom::PhantomConfig;
 use serde::{Deserialize, Serialize};
 pub use simulated::{KeyframeConfig, SimulatedConfig};
 pub use woodenhaptics::WoodenHapticsConfig;
@@ -18,6 +20,8 @@ pub enum DeviceConfig {
     Hapticmaster(HapticMasterConfig),
     /// WoodenHaptics, on a serial line.
     Woodenhaptics(WoodenHapticsConfig),
+    /// PHANToM or Touch, through OpenHaptics' libHD.
+    Phantom(PhantomConfig),
 }
 
 impl Default for DeviceConfig {

@@ -1,6 +1,7 @@
 //! Arms: one file or folder for each, behind one small trait.
 pub mod hapticmaster;
 pub mod kinds;
+pub mod phantom;
 pub mod serial;
 pub mod simulated;
 #[cfg(test)]
@@ -15,6 +16,7 @@ use crate::{
 use glam::DVec3;
 use hapticmaster::HapticMaster;
 use palpate_control::Motion;
+use phantom::Phantom;
 use simulated::SimulatedDevice;
 use std::{fmt::Debug, os::fd::OwnedFd};
 use thiserror::Error;
@@ -58,6 +60,7 @@ impl Effort {
     }
 
     /// For a driver's last step: nothing when its arm is lost, and nothing that is no number.
+    #[must_use]
     pub fn unless(&self, lost: bool) -> Self {
         let number = |v: DVec3| if lost || !v.is_finite() { DVec3::ZERO } else { v };
         Self { force_n: number(self.force_n), torque_nm: number(self.torque_nm) }
@@ -91,11 +94,37 @@ pub enum Fault {
     /// The connection ended.
     #[error("the connection to it ended")]
     Disconnected,
+    /// Its motors are warm.
+    #[error("its motors are too warm")]
+    Overheated,
+    /// The hand, or the force, moved it faster than it bears.
+    #[error("it was moved too fast")]
+    TooFast,
+    /// Beyond its peak, or too large a step.
+    #[error("more force was asked of it than it gives")]
+    TooMuchForce,
+    /// What runs its frames does not.
+    #[error("the scheduler of its library failed")]
+    Scheduler,
+    /// Its own word, without a reason.
+    #[error("it reports a fault of its own")]
+    Broken,
 }
 
 impl Fault {
     /// All of them.
-    pub const ALL: [Self; 5] = [Self::Silent, Self::Garbled, Self::Refused, Self::EmergencyStop, Self::Disconnected];
+    pub const ALL: [Self; 10] = [
+        Self::Silent,
+        Self::Garbled,
+        Self::Refused,
+        Self::EmergencyStop,
+        Self::Disconnected,
+        Self::Overheated,
+        Self::TooFast,
+        Self::TooMuchForce,
+        Self::Scheduler,
+        Self::Broken,
+    ];
 }
 
 /// An arm that was opened, used by the servo thread alone. Neither call may block, allocate or log.
@@ -129,6 +158,7 @@ fn open_arm(settings: &ArmSettings, period_s: f64, stop: &CancellationToken) -> 
         ArmSettings::Simulated(arm) => Box::new(SimulatedDevice::new(arm.clone())),
         ArmSettings::HapticMaster(settings) => Box::new(HapticMaster::open(settings, period_s, stop)?),
         ArmSettings::WoodenHaptics(settings) => Box::new(WoodenHaptics::start(settings, period_s).map_err(unstarted)?),
+        ArmSettings::Phantom(settings) => Box::new(Phantom::open(settings, period_s, stop)?),
     })
 }
 

@@ -1,5 +1,6 @@
 //! `palpate-bridge emulate KIND`: an arm that is not there, for trying a configuration and for tests.
 mod hapticmaster;
+mod phantom;
 mod woodenhaptics;
 
 use super::Faults;
@@ -24,6 +25,8 @@ pub enum Emulate {
     Hapticmaster(hapticmaster::Arguments),
     /// A WoodenHaptics on a pseudo terminal; its hand presses the built-in ventricle every two seconds
     Woodenhaptics(woodenhaptics::Arguments),
+    /// A PHANToM for the library in libHD's place (docs/arms/phantom.md); its hand presses the built-in ventricle every two seconds
+    Phantom(phantom::Arguments),
 }
 
 const SLOW_US: u32 = 50_000;
@@ -37,6 +40,7 @@ impl Emulate {
         match self {
             Self::Hapticmaster(arguments) => arguments.run(),
             Self::Woodenhaptics(arguments) => arguments.run(),
+            Self::Phantom(arguments) => arguments.run(),
         }
         .map(|()| ExitCode::SUCCESS)
     }
@@ -88,7 +92,16 @@ fn obey_lines(place: &str, faults: &Faults, known: &[&str]) {
                     let on = !flag.fetch_not(Ordering::Relaxed);
                     format!("{name}: {}", if on { "on" } else { "over" })
                 }
-                None => continue,
+                None => match error_code(name) {
+                    Some(code) => {
+                        let was = faults.error_code.swap(code, Ordering::Relaxed);
+                        if was == code {
+                            faults.error_code.store(0, Ordering::Relaxed);
+                        }
+                        format!("{name}: {}", if was == code { "over" } else { "on" })
+                    }
+                    None => continue,
+                },
             },
         };
         let _ = writeln!(out, "{said}");
@@ -107,6 +120,11 @@ fn flag<'a>(faults: &'a Faults, name: &str) -> Option<&'a AtomicBool> {
     }
 }
 
+/// Errors of libHD.
+fn error_code(name: &str) -> Option<u32> {
+    phantom::ERRORS.iter().find(|(known, _)| *known == name).map(|(_, code)| *code)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -114,8 +132,8 @@ mod tests {
     #[test]
     fn every_fault_that_is_named_can_be_caused() {
         let faults = Faults::default();
-        for name in [hapticmaster::FAULTS, woodenhaptics::FAULTS].concat() {
-            assert!(name == "slow" || flag(&faults, name).is_some(), "{name}");
+        for name in [hapticmaster::FAULTS, woodenhaptics::FAULTS, phantom::FAULTS].concat() {
+            assert!(name == "slow" || flag(&faults, name).is_some() || error_code(name).is_some(), "{name}");
         }
     }
 

@@ -1,6 +1,7 @@
 //! Devices that are not there: their bytes over real sockets, with the motion of an arm and a hand, and faults on request.
 pub mod cli;
 pub mod hapticmaster;
+pub mod phantom;
 pub mod woodenhaptics;
 
 use std::{
@@ -28,6 +29,8 @@ pub struct Faults {
     pub emergency_stop: AtomicBool,
     /// The cable is pulled: the connection is cut.
     pub cut: AtomicBool,
+    /// The code of an error that it reports; 0: none.
+    pub error_code: AtomicU32,
 }
 
 impl Faults {

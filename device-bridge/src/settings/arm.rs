@@ -1,5 +1,6 @@
 //! What the keys of each arm mean: a file for each.
 pub mod hapticmaster;
+pub mod phantom;
 pub mod simulated;
 pub mod woodenhaptics;
 
@@ -7,7 +8,9 @@ use super::value;
 use crate::{
     BridgeError, Config,
     config::DeviceConfig,
-    device::{hapticmaster::start::StartSettings, woodenhaptics::Settings as WoodenHaptics},
+    device::{
+        hapticmaster::start::StartSettings, phantom::Settings as Phantom, woodenhaptics::Settings as WoodenHaptics,
+    },
 };
 use palpate_control::SimulatedArm;
 use std::ops::RangeInclusive;
@@ -24,6 +27,8 @@ pub enum ArmSettings {
     HapticMaster(StartSettings),
     /// A WoodenHaptics.
     WoodenHaptics(WoodenHaptics),
+    /// A PHANToM or Touch.
+    Phantom(Phantom),
 }
 
 /// The arm of a configuration, checked.
@@ -32,6 +37,7 @@ pub(super) fn checked(config: &Config, period_s: f64) -> Result<ArmSettings, Bri
         DeviceConfig::Simulated(arm) => Ok(ArmSettings::Simulated(simulated::checked(arm, period_s)?)),
         DeviceConfig::Hapticmaster(arm) => Ok(ArmSettings::HapticMaster(hapticmaster::checked(arm, &config.limits)?)),
         DeviceConfig::Woodenhaptics(arm) => Ok(ArmSettings::WoodenHaptics(woodenhaptics::checked(arm)?)),
+        DeviceConfig::Phantom(arm) => Ok(ArmSettings::Phantom(phantom::checked(arm, config, period_s)?)),
     }
 }
 
