@@ -1,5 +1,5 @@
 //! What the keys of a PHANToM or Touch mean.
-use super::super::{render, seconds};
+use super::super::{seconds, stiffness};
 use crate::{BridgeError, Config, config::PhantomConfig, device::phantom::Settings};
 
 /// As OpenHaptics' installers name it.
@@ -15,7 +15,7 @@ pub fn checked(arm: &PhantomConfig, config: &Config, period_s: f64) -> Result<Se
         path => vec![path.to_owned()],
     };
     // At the arm, a wall is as stiff in a world of any scale.
-    let render = render(config, period_s, 1.0)?;
+    let stiffest_n_per_m = stiffness(config, period_s, 1.0)?.largest_n_per_m();
     Ok(Settings {
         libraries,
         name: arm.name.clone(),
@@ -26,6 +26,6 @@ pub fn checked(arm: &PhantomConfig, config: &Config, period_s: f64) -> Result<Se
         rate_hz: config.servo.rate_hz.round() as u32,
         max_force_n: config.limits.max_force_n,
         continuous_force_n: config.limits.continuous_force_n,
-        stiffest_n_per_m: render.map(|render| render.max_stiffness_n_per_m),
+        stiffest_n_per_m: config.render.local_model.then_some(stiffest_n_per_m),
     })
 }
