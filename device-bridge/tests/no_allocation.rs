@@ -4,11 +4,12 @@ use assert_no_alloc::{AllocDisabler, assert_no_alloc};
 use glam::{DMat3, DVec3};
 use palpate_bridge::{
     Config,
-    config::{DeviceConfig, HapticMasterConfig, WoodenHapticsConfig},
+    config::{DeviceConfig, HapticMasterConfig, Inverse3Config, WoodenHapticsConfig},
     convert::Command,
     device::{self, Effort},
     emulate::{
         hapticmaster::{self, HapticMaster},
+        inverse3::{self, Inverse3},
         woodenhaptics::{self, WoodenHaptics},
     },
     run::Shared,
@@ -104,4 +105,13 @@ fn the_woodenhaptics_driver_allocates_nothing() {
     let emulated = WoodenHaptics::start(settings).unwrap();
     drive(DeviceConfig::Woodenhaptics(WoodenHapticsConfig { port: emulated.port().to_owned(), ..keys }));
     assert!(emulated.lines() > 100);
+}
+
+/// Its socket's thread allocates; the loop beside it does not.
+#[test]
+fn the_inverse3s_driver_allocates_nothing() {
+    let emulated = Inverse3::listen("127.0.0.1:0", inverse3::Settings::default()).unwrap();
+    let keys = Inverse3Config { url: emulated.url(), silence_s: 5.0, ..Inverse3Config::default() };
+    drive(DeviceConfig::Inverse3(keys));
+    assert!(emulated.commands() > 100);
 }

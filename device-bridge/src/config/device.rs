@@ -1,9 +1,11 @@
 //! `[device]`: each kind of arm with its keys.
 mod hapticmaster;
+mod inverse3;
 mod simulated;
 mod woodenhaptics;
 
 pub use hapticmaster::HapticMasterConfig;
+pub use inverse3::{Inverse3Config, Inverse3Dialect};
 use serde::{Deserialize, Serialize};
 pub use simulated::{KeyframeConfig, SimulatedConfig};
 pub use woodenhaptics::WoodenHapticsConfig;
@@ -18,6 +20,8 @@ pub enum DeviceConfig {
     Hapticmaster(HapticMasterConfig),
     /// WoodenHaptics, on a serial line.
     Woodenhaptics(WoodenHapticsConfig),
+    /// Haply Inverse3, over a WebSocket.
+    Inverse3(Inverse3Config),
 }
 
 impl Default for DeviceConfig {

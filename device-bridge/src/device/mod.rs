@@ -1,5 +1,6 @@
 //! Arms: one file or folder for each, behind one small trait.
 pub mod hapticmaster;
+pub mod inverse3;
 pub mod kinds;
 pub mod serial;
 pub mod simulated;
@@ -14,6 +15,7 @@ use crate::{
 };
 use glam::DVec3;
 use hapticmaster::HapticMaster;
+use inverse3::Inverse3;
 use palpate_control::Motion;
 use simulated::SimulatedDevice;
 use std::fmt::Debug;
@@ -58,6 +60,7 @@ impl Effort {
     }
 
     /// For a driver's last step: nothing when its arm is lost, and nothing that is no number.
+    #[must_use]
     pub fn unless(&self, lost: bool) -> Self {
         let number = |v: DVec3| if lost || !v.is_finite() { DVec3::ZERO } else { v };
         Self { force_n: number(self.force_n), torque_nm: number(self.torque_nm) }
@@ -114,6 +117,7 @@ fn open_arm(settings: &ArmSettings, period_s: f64, stop: &CancellationToken) -> 
     Ok(match settings {
         ArmSettings::Simulated(arm) => Box::new(SimulatedDevice::new(arm.clone())),
         ArmSettings::HapticMaster(settings) => Box::new(HapticMaster::open(settings, period_s, stop)?),
+        ArmSettings::Inverse3(settings) => Box::new(Inverse3::start(settings).map_err(unstarted)?),
         ArmSettings::WoodenHaptics(settings) => Box::new(WoodenHaptics::start(settings, period_s).map_err(unstarted)?),
     })
 }

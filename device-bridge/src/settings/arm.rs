@@ -1,5 +1,6 @@
 //! What the keys of each arm mean: a file for each.
 pub mod hapticmaster;
+pub mod inverse3;
 pub mod simulated;
 pub mod woodenhaptics;
 
@@ -7,7 +8,9 @@ use super::value;
 use crate::{
     BridgeError, Config,
     config::DeviceConfig,
-    device::{hapticmaster::start::StartSettings, woodenhaptics::Settings as WoodenHaptics},
+    device::{
+        hapticmaster::start::StartSettings, inverse3::Settings as Inverse3, woodenhaptics::Settings as WoodenHaptics,
+    },
 };
 use palpate_control::SimulatedArm;
 use std::ops::RangeInclusive;
@@ -24,6 +27,8 @@ pub enum ArmSettings {
     HapticMaster(StartSettings),
     /// A WoodenHaptics.
     WoodenHaptics(WoodenHaptics),
+    /// An Inverse3.
+    Inverse3(Inverse3),
 }
 
 /// The arm of a configuration, checked.
@@ -32,6 +37,7 @@ pub(super) fn checked(config: &Config, period_s: f64) -> Result<ArmSettings, Bri
         DeviceConfig::Simulated(arm) => Ok(ArmSettings::Simulated(simulated::checked(arm, period_s)?)),
         DeviceConfig::Hapticmaster(arm) => Ok(ArmSettings::HapticMaster(hapticmaster::checked(arm, &config.limits)?)),
         DeviceConfig::Woodenhaptics(arm) => Ok(ArmSettings::WoodenHaptics(woodenhaptics::checked(arm)?)),
+        DeviceConfig::Inverse3(arm) => Ok(ArmSettings::Inverse3(inverse3::checked(arm, &config.realtime)?)),
     }
 }
 
