@@ -15,6 +15,7 @@ pub mod device;
 pub mod emulate;
 pub mod error;
 pub mod probe;
+pub mod recording;
 pub mod run;
 pub mod servo;
 pub mod settings;

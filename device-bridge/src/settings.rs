@@ -4,6 +4,7 @@ pub mod arm;
 use crate::{
     BridgeError, Config,
     device::workspace::{ClutchSettings, Workspace},
+    recording::recorder::RecordSettings,
 };
 pub use arm::ArmSettings;
 use glam::DVec3;
@@ -82,6 +83,8 @@ pub struct DeviceSettings {
     pub workspace: Workspace,
     /// Its clutch.
     pub clutch: Option<ClutchSettings>,
+    /// Where to write what it does.
+    pub record: Option<RecordSettings>,
 }
 
 impl Settings {
@@ -104,6 +107,7 @@ impl Settings {
                 arm: arm::checked(config, servo.period_s)?,
                 workspace,
                 clutch: clutch(config, &servo.watchdog)?,
+                record: record(config)?,
             },
             servo,
             measures: measures(config)?,
@@ -126,6 +130,11 @@ fn clutch(config: &Config, times: &WatchdogSettings) -> Result<Option<ClutchSett
         }
         button => Ok(button.map(|button| ClutchSettings { button, ramps_s })),
     }
+}
+
+fn record(config: &Config) -> Result<Option<RecordSettings>, BridgeError> {
+    let overwrite = config.record.overwrite;
+    config.record.path.clone().map(|path| RecordSettings { path, overwrite }.checked()).transpose()
 }
 
 /// What is said of the arm (its damping, its mass) counts for the world, whose movements are `scale` times the arm's: see [`Workspace`].

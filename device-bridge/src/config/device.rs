@@ -1,11 +1,13 @@
 //! `[device]`: each kind of arm with its keys.
 mod hapticmaster;
 mod inverse3;
+mod playback;
 mod simulated;
 mod woodenhaptics;
 
 pub use hapticmaster::HapticMasterConfig;
 pub use inverse3::{Inverse3Config, Inverse3Dialect};
+pub use playback::PlaybackConfig;
 use serde::{Deserialize, Serialize};
 pub use simulated::{KeyframeConfig, SimulatedConfig};
 pub use woodenhaptics::WoodenHapticsConfig;
@@ -22,6 +24,8 @@ pub enum DeviceConfig {
     Woodenhaptics(WoodenHapticsConfig),
     /// Haply Inverse3, over a WebSocket.
     Inverse3(Inverse3Config),
+    /// No hardware: a recording.
+    Playback(PlaybackConfig),
 }
 
 impl Default for DeviceConfig {

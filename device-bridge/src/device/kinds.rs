@@ -1,5 +1,7 @@
 //! The kinds of arms that there are drivers for: each one's name, what people are told of it, and its keys.
-use crate::config::{DeviceConfig, HapticMasterConfig, Inverse3Config, SimulatedConfig, WoodenHapticsConfig};
+use crate::config::{
+    DeviceConfig, HapticMasterConfig, Inverse3Config, PlaybackConfig, SimulatedConfig, WoodenHapticsConfig,
+};
 use std::fmt::Write as _;
 
 /// What is told of a kind.
@@ -18,7 +20,7 @@ pub struct Kind {
 }
 
 /// All of them.
-pub static KINDS: [Kind; 4] = [
+pub static KINDS: [Kind; 5] = [
     Kind {
         name: "simulated",
         what: "no hardware: a mass held by a hand that follows a path",
@@ -46,6 +48,13 @@ pub static KINDS: [Kind; 4] = [
         needs: "Haply's Inverse service, on this machine or another (docs/arms/inverse3.md)",
         tried: "palpate-bridge emulate inverse3; no hardware yet",
         default: || DeviceConfig::Inverse3(Inverse3Config::default()),
+    },
+    Kind {
+        name: "playback",
+        what: "no hardware: a recording of any arm (palpate-bridge --record), played back",
+        needs: "the file (docs/arms/playback.md)",
+        tried: "recordings of the simulated arm",
+        default: || DeviceConfig::Playback(PlaybackConfig::default()),
     },
 ];
 

@@ -2,6 +2,7 @@
 pub mod hapticmaster;
 pub mod inverse3;
 pub mod kinds;
+pub mod playback;
 pub mod serial;
 pub mod simulated;
 #[cfg(test)]
@@ -11,12 +12,14 @@ pub mod workspace;
 
 use crate::{
     BridgeError,
+    recording::recorder::Recorded,
     settings::{ArmSettings, DeviceSettings},
 };
 use glam::DVec3;
 use hapticmaster::HapticMaster;
 use inverse3::Inverse3;
 use palpate_control::Motion;
+use playback::Playback;
 use simulated::SimulatedDevice;
 use std::fmt::Debug;
 use thiserror::Error;
@@ -109,7 +112,10 @@ pub trait Arm: Debug + Send {
 /// # Errors
 /// [`BridgeError::Start`].
 pub fn open(settings: &DeviceSettings, period_s: f64, stop: &CancellationToken) -> Result<Box<dyn Arm>, BridgeError> {
-    let arm = open_arm(&settings.arm, period_s, stop)?;
+    let mut arm = open_arm(&settings.arm, period_s, stop)?;
+    if let Some(record) = &settings.record {
+        arm = Box::new(Recorded::start(arm, record, period_s)?);
+    }
     Ok(Box::new(Placed::new(arm, settings.workspace, settings.clutch, period_s)))
 }
 
@@ -118,6 +124,7 @@ fn open_arm(settings: &ArmSettings, period_s: f64, stop: &CancellationToken) -> 
         ArmSettings::Simulated(arm) => Box::new(SimulatedDevice::new(arm.clone())),
         ArmSettings::HapticMaster(settings) => Box::new(HapticMaster::open(settings, period_s, stop)?),
         ArmSettings::Inverse3(settings) => Box::new(Inverse3::start(settings).map_err(unstarted)?),
+        ArmSettings::Playback(settings) => Box::new(Playback::open(settings, period_s).map_err(unstarted)?),
         ArmSettings::WoodenHaptics(settings) => Box::new(WoodenHaptics::start(settings, period_s).map_err(unstarted)?),
     })
 }
