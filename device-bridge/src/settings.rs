@@ -275,7 +275,7 @@ fn parameter(section: &str, error: &ParameterError) -> BridgeError {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::config::{DeviceConfig, KeyframeConfig, SimulatedConfig, WoodenHapticsConfig};
+    use crate::config::{DeviceConfig, KeyframeConfig, PlaybackConfig, SimulatedConfig, WoodenHapticsConfig};
     use proptest::prelude::*;
 
     fn refused(change: impl FnOnce(&mut Config)) -> String {
@@ -335,6 +335,20 @@ mod tests {
         let arm = WoodenHapticsConfig { body_diameters_m: [0.1, 0.0, 0.1], ..WoodenHapticsConfig::default() };
         assert!(
             refused(|c| c.device = DeviceConfig::Woodenhaptics(arm)).starts_with("device.body_diameters_m: 0 is out")
+        );
+    }
+
+    #[test]
+    fn a_playback_and_a_recording_are_refused_by_their_keys() {
+        let played = |speed, rest_s| {
+            let arm = PlaybackConfig { speed, rest_s, ..PlaybackConfig::default() };
+            refused(|c| c.device = DeviceConfig::Playback(arm))
+        };
+        assert!(played(0.0, 1.0).starts_with("device.speed: 0 is out of range: use 0.01 to 10"));
+        assert!(played(f64::NAN, 1.0).starts_with("device.speed: NaN"));
+        assert!(played(1.0, 0.0).starts_with("device.rest_s: 0 is out of range"));
+        assert!(
+            refused(|c| c.record.path = Some("/dev/null".into())).starts_with("record.path: cannot write /dev/null")
         );
     }
 
