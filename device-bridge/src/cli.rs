@@ -32,6 +32,7 @@ Examples:
   palpate-bridge --server unix:///run/palpate/palpate.sock --tool left
   palpate-bridge --print-config > bridge.toml      every key with its default
   palpate-bridge --device hapticmaster --print-config   the same for another arm
+  palpate-bridge --record press.csv                what the arm does, to be played back (docs/arms/playback.md)
   palpate-bridge devices                           the arms that there are drivers for
   palpate-bridge probe --config bridge.toml        is the arm there, and how well does it answer?
   palpate-bridge measure --config bridge.toml      arm, loop and network together, without force: good enough for one?
@@ -70,6 +71,12 @@ pub struct Cli {
     /// Largest force on the arm (N)
     #[arg(long, value_name = "N")]
     max_force_n: Option<f64>,
+    /// Write what the arm does into this file (CSV), a row a tick; `--device playback` plays it back
+    #[arg(long, value_name = "FILE")]
+    record: Option<PathBuf>,
+    /// Record over a file that is there
+    #[arg(long)]
+    overwrite: bool,
     /// Let the force come back by itself after a latched fault
     #[arg(long)]
     auto_recover: bool,
@@ -211,6 +218,8 @@ impl Cli {
         replace(&mut config.servo.report_every_s, self.report_every_s);
         replace(&mut config.limits.max_force_n, self.max_force_n);
         config.servo.auto_recover |= self.auto_recover;
+        config.record.path = self.record.clone().or(config.record.path.take());
+        config.record.overwrite |= self.overwrite;
         choose(&mut config, self.device);
         Ok(config)
     }

@@ -1,12 +1,15 @@
 //! The configuration file, as written; [`crate::settings::Settings`] is what it means.
 mod device;
+mod record;
 mod workspace;
 
 use crate::{BridgeError, error::ConfigError};
 pub use device::{
-    DeviceConfig, HapticMasterConfig, KeyframeConfig, PhantomConfig, SimulatedConfig, WoodenHapticsConfig,
+    DeviceConfig, HapticMasterConfig, Inverse3Config, Inverse3Dialect, KeyframeConfig, PhantomConfig, PlaybackConfig,
+    SimulatedConfig, WoodenHapticsConfig,
 };
 use miette::NamedSource;
+pub use record::RecordConfig;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 pub use workspace::WorkspaceConfig;
@@ -31,6 +34,8 @@ pub struct Config {
     pub realtime: RealtimeConfig,
     /// Where in the world the arm is.
     pub workspace: WorkspaceConfig,
+    /// What the arm does, written down.
+    pub record: RecordConfig,
     /// The arm.
     pub device: DeviceConfig,
 }
@@ -295,7 +300,9 @@ mod tests {
 
     #[test]
     fn the_examples_are_valid() {
-        for example in ["bridge.toml", "hapticmaster.toml", "woodenhaptics.toml", "phantom.toml"] {
+        for example in
+            ["bridge.toml", "hapticmaster.toml", "woodenhaptics.toml", "phantom.toml", "inverse3.toml", "playback.toml"]
+        {
             let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../deploy").join(example);
             let config = Config::read(&path).unwrap();
             crate::settings::Settings::new(&config).unwrap();

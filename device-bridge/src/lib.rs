@@ -17,6 +17,7 @@ pub mod error;
 pub mod guard;
 pub mod measure;
 pub mod probe;
+pub mod recording;
 pub mod run;
 pub mod servo;
 pub mod settings;

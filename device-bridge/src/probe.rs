@@ -1,6 +1,7 @@
 //! `palpate-bridge probe`: opens an arm, reads it for a while without any force, and says how it does.
 use crate::{
     BridgeError, Config,
+    config::RecordConfig,
     device::{self, Effort, Reading},
     settings::Settings,
 };
@@ -33,7 +34,8 @@ pub struct Report {
 /// # Errors
 /// A bad configuration, an arm that cannot be started, or one that fails meanwhile.
 pub fn probe(config: &Config, time: Duration) -> Result<Report, BridgeError> {
-    let settings = Settings::new(config)?;
+    // A look at the arm is no recording.
+    let settings = Settings::new(&Config { record: RecordConfig::default(), ..config.clone() })?;
     let period_s = settings.servo.period_s;
     let mut arm = device::open(&settings.device, period_s, &CancellationToken::new())?;
     let mut tick_loop = TickLoop::new(Clock::Monotonic, period_s)

@@ -4,6 +4,7 @@ pub mod arm;
 use crate::{
     BridgeError, Config,
     device::workspace::{ClutchSettings, Workspace},
+    recording::recorder::RecordSettings,
 };
 pub use arm::ArmSettings;
 use glam::DVec3;
@@ -90,6 +91,8 @@ pub struct DeviceSettings {
     pub workspace: Workspace,
     /// Its clutch.
     pub clutch: Option<ClutchSettings>,
+    /// Where to write what it does.
+    pub record: Option<RecordSettings>,
 }
 
 impl Settings {
@@ -115,6 +118,7 @@ impl Settings {
                 arm: arm::checked(config, servo.period_s)?,
                 workspace,
                 clutch: clutch(config, &servo.watchdog)?,
+                record: record(config)?,
             },
             servo,
             measures: measures(config)?,
@@ -138,6 +142,11 @@ fn clutch(config: &Config, times: &WatchdogSettings) -> Result<Option<ClutchSett
         }
         button => Ok(button.map(|button| ClutchSettings { button, ramps_s })),
     }
+}
+
+fn record(config: &Config) -> Result<Option<RecordSettings>, BridgeError> {
+    let overwrite = config.record.overwrite;
+    config.record.path.clone().map(|path| RecordSettings { path, overwrite }.checked()).transpose()
 }
 
 /// What is said of the arm (its damping, its mass) counts for the world, whose movements are `scale` times the arm's: see [`Workspace`].
@@ -300,7 +309,7 @@ fn parameter(section: &str, error: &ParameterError) -> BridgeError {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::config::{DeviceConfig, KeyframeConfig, SimulatedConfig, WoodenHapticsConfig};
+    use crate::config::{DeviceConfig, KeyframeConfig, PlaybackConfig, SimulatedConfig, WoodenHapticsConfig};
     use proptest::prelude::*;
 
     fn refused(change: impl FnOnce(&mut Config)) -> String {
@@ -367,6 +376,20 @@ mod tests {
         let arm = WoodenHapticsConfig { body_diameters_m: [0.1, 0.0, 0.1], ..WoodenHapticsConfig::default() };
         assert!(
             refused(|c| c.device = DeviceConfig::Woodenhaptics(arm)).starts_with("device.body_diameters_m: 0 is out")
+        );
+    }
+
+    #[test]
+    fn a_playback_and_a_recording_are_refused_by_their_keys() {
+        let played = |speed, rest_s| {
+            let arm = PlaybackConfig { speed, rest_s, ..PlaybackConfig::default() };
+            refused(|c| c.device = DeviceConfig::Playback(arm))
+        };
+        assert!(played(0.0, 1.0).starts_with("device.speed: 0 is out of range: use 0.01 to 10"));
+        assert!(played(f64::NAN, 1.0).starts_with("device.speed: NaN"));
+        assert!(played(1.0, 0.0).starts_with("device.rest_s: 0 is out of range"));
+        assert!(
+            refused(|c| c.record.path = Some("/dev/null".into())).starts_with("record.path: cannot write /dev/null")
         );
     }
 

@@ -7,7 +7,7 @@ use assert_no_alloc::{AllocDisabler, assert_no_alloc};
 use glam::{DMat3, DVec3};
 use palpate_bridge::{
     Config,
-    config::{DeviceConfig, HapticMasterConfig, WoodenHapticsConfig},
+    config::{DeviceConfig, HapticMasterConfig, Inverse3Config, PlaybackConfig, RecordConfig, WoodenHapticsConfig},
     convert::Command,
     device::{
         self, Effort,
@@ -18,6 +18,7 @@ use palpate_bridge::{
     },
     emulate::{
         hapticmaster::{self, HapticMaster},
+        inverse3::{self, Inverse3},
         phantom,
         woodenhaptics::{self, WoodenHaptics},
     },
@@ -88,15 +89,18 @@ fn the_servo_allocates_nothing() {
 
 /// An arm's driver: its sockets, its text, its numbers.
 fn drive(device: DeviceConfig) {
-    let config = Config { device, ..Config::default() };
+    // A busy machine is late: nothing is told here of how long an answer took.
+    drive_by(&Config { device, ..Config::default() }, 0);
+}
+
+fn drive_by(config: &Config, periods: u64) {
     let runtime = tokio::runtime::Builder::new_current_thread().build().unwrap();
-    let settings = runtime.block_on(async { Settings::new(&config).unwrap() });
+    let settings = runtime.block_on(async { Settings::new(config).unwrap() });
     let mut arm = device::open(&settings.device, 1e-3, &CancellationToken::new()).unwrap();
     for tick in 0..300 {
         std::thread::sleep(std::time::Duration::from_millis(1));
-        // A busy machine is late: nothing is told here of how long an answer took.
         assert_no_alloc(|| {
-            arm.read(0).unwrap();
+            arm.read(periods).unwrap();
             arm.apply(&Effort::force(DVec3::new(1e-7, -1.0 / 3.0, f64::from(tick))));
         });
     }
@@ -145,4 +149,25 @@ fn a_phantoms_frame_allocates_nothing() {
         });
     }
     assert!(newest.take().is_some_and(Option::is_some) && frame.shared.error().is_none());
+}
+
+/// Its socket's thread allocates; the loop beside it does not.
+#[test]
+fn the_inverse3s_driver_allocates_nothing() {
+    let emulated = Inverse3::listen("127.0.0.1:0", inverse3::Settings::default()).unwrap();
+    let keys = Inverse3Config { url: emulated.url(), silence_s: 5.0, ..Inverse3Config::default() };
+    drive(DeviceConfig::Inverse3(keys));
+    assert!(emulated.commands() > 100);
+}
+
+/// The first is recorded, and played back while that is recorded.
+#[test]
+fn recording_and_playback_allocate_nothing() {
+    let folder = tempfile::tempdir().unwrap();
+    let [first, second] = ["first.csv", "second.csv"].map(|name| folder.path().join(name));
+    let record = |path: &std::path::Path| RecordConfig { path: Some(path.to_owned()), overwrite: false };
+    drive_by(&Config { record: record(&first), ..Config::default() }, 1);
+    let device = DeviceConfig::Playback(PlaybackConfig { file: first, ..PlaybackConfig::default() });
+    drive_by(&Config { device, record: record(&second), ..Config::default() }, 1);
+    assert_eq!(std::fs::read_to_string(second).unwrap().lines().count(), 301);
 }

@@ -1,11 +1,15 @@
 //! `[device]`: each kind of arm with its keys.
 mod hapticmaster;
+mod inverse3;
 mod phantom;
+mod playback;
 mod simulated;
 mod woodenhaptics;
 
 pub use hapticmaster::HapticMasterConfig;
+pub use inverse3::{Inverse3Config, Inverse3Dialect};
 pub use phantom::PhantomConfig;
+pub use playback::PlaybackConfig;
 use serde::{Deserialize, Serialize};
 pub use simulated::{KeyframeConfig, SimulatedConfig};
 pub use woodenhaptics::WoodenHapticsConfig;
@@ -22,6 +26,10 @@ pub enum DeviceConfig {
     Woodenhaptics(WoodenHapticsConfig),
     /// PHANToM or Touch, through OpenHaptics' libHD.
     Phantom(PhantomConfig),
+    /// Haply Inverse3, over a WebSocket.
+    Inverse3(Inverse3Config),
+    /// No hardware: a recording.
+    Playback(PlaybackConfig),
 }
 
 impl Default for DeviceConfig {

@@ -1,5 +1,8 @@
 //! The kinds of arms that there are drivers for: each one's name, what people are told of it, and its keys.
-use crate::config::{DeviceConfig, HapticMasterConfig, PhantomConfig, SimulatedConfig, WoodenHapticsConfig};
+use crate::config::{
+    DeviceConfig, HapticMasterConfig, Inverse3Config, PhantomConfig, PlaybackConfig, SimulatedConfig,
+    WoodenHapticsConfig,
+};
 use std::fmt::Write as _;
 
 /// What is told of a kind.
@@ -18,7 +21,7 @@ pub struct Kind {
 }
 
 /// All of them.
-pub static KINDS: [Kind; 4] = [
+pub static KINDS: [Kind; 6] = [
     Kind {
         name: "simulated",
         what: "no hardware: a mass held by a hand that follows a path",
@@ -46,6 +49,20 @@ pub static KINDS: [Kind; 4] = [
         needs: "OpenHaptics and the arm's driver (docs/arms/phantom.md)",
         tried: "a library in libHD's place and palpate-bridge emulate phantom; no hardware yet",
         default: || DeviceConfig::Phantom(PhantomConfig::default()),
+    },
+    Kind {
+        name: "inverse3",
+        what: "Haply Inverse3, an impedance arm behind its maker's service, over a WebSocket",
+        needs: "Haply's Inverse service, on this machine or another (docs/arms/inverse3.md)",
+        tried: "palpate-bridge emulate inverse3; no hardware yet",
+        default: || DeviceConfig::Inverse3(Inverse3Config::default()),
+    },
+    Kind {
+        name: "playback",
+        what: "no hardware: a recording of any arm (palpate-bridge --record), played back",
+        needs: "the file (docs/arms/playback.md)",
+        tried: "recordings of the simulated arm",
+        default: || DeviceConfig::Playback(PlaybackConfig::default()),
     },
 ];
 

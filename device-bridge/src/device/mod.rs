@@ -1,7 +1,9 @@
 //! Arms: one file or folder for each, behind one small trait.
 pub mod hapticmaster;
+pub mod inverse3;
 pub mod kinds;
 pub mod phantom;
+pub mod playback;
 pub mod serial;
 pub mod simulated;
 #[cfg(test)]
@@ -11,12 +13,15 @@ pub mod workspace;
 
 use crate::{
     BridgeError,
+    recording::recorder::Recorded,
     settings::{ArmSettings, DeviceSettings},
 };
 use glam::DVec3;
 use hapticmaster::HapticMaster;
+use inverse3::Inverse3;
 use palpate_control::Motion;
 use phantom::Phantom;
+use playback::Playback;
 use simulated::SimulatedDevice;
 use std::{fmt::Debug, os::fd::OwnedFd};
 use thiserror::Error;
@@ -149,7 +154,10 @@ pub trait Arm: Debug + Send {
 /// # Errors
 /// [`BridgeError::Start`].
 pub fn open(settings: &DeviceSettings, period_s: f64, stop: &CancellationToken) -> Result<Box<dyn Arm>, BridgeError> {
-    let arm = open_arm(&settings.arm, period_s, stop)?;
+    let mut arm = open_arm(&settings.arm, period_s, stop)?;
+    if let Some(record) = &settings.record {
+        arm = Box::new(Recorded::start(arm, record, period_s)?);
+    }
     Ok(Box::new(Placed::new(arm, settings.workspace, settings.clutch, period_s)))
 }
 
@@ -157,6 +165,8 @@ fn open_arm(settings: &ArmSettings, period_s: f64, stop: &CancellationToken) -> 
     Ok(match settings {
         ArmSettings::Simulated(arm) => Box::new(SimulatedDevice::new(arm.clone())),
         ArmSettings::HapticMaster(settings) => Box::new(HapticMaster::open(settings, period_s, stop)?),
+        ArmSettings::Inverse3(settings) => Box::new(Inverse3::start(settings).map_err(unstarted)?),
+        ArmSettings::Playback(settings) => Box::new(Playback::open(settings, period_s).map_err(unstarted)?),
         ArmSettings::WoodenHaptics(settings) => Box::new(WoodenHaptics::start(settings, period_s).map_err(unstarted)?),
         ArmSettings::Phantom(settings) => Box::new(Phantom::open(settings, period_s, stop)?),
     })

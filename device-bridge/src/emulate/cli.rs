@@ -1,5 +1,6 @@
 //! `palpate-bridge emulate KIND`: an arm that is not there, for trying a configuration and for tests.
 mod hapticmaster;
+mod inverse3;
 mod phantom;
 mod woodenhaptics;
 
@@ -27,6 +28,8 @@ pub enum Emulate {
     Woodenhaptics(woodenhaptics::Arguments),
     /// A PHANToM for the library in libHD's place (docs/arms/phantom.md); its hand presses the built-in ventricle every two seconds
     Phantom(phantom::Arguments),
+    /// A Haply Inverse3 and its service, over a WebSocket; its hand presses the built-in ventricle every two seconds
+    Inverse3(inverse3::Arguments),
 }
 
 const SLOW_US: u32 = 50_000;
@@ -41,6 +44,7 @@ impl Emulate {
             Self::Hapticmaster(arguments) => arguments.run(),
             Self::Woodenhaptics(arguments) => arguments.run(),
             Self::Phantom(arguments) => arguments.run(),
+            Self::Inverse3(arguments) => arguments.run(),
         }
         .map(|()| ExitCode::SUCCESS)
     }
@@ -132,7 +136,8 @@ mod tests {
     #[test]
     fn every_fault_that_is_named_can_be_caused() {
         let faults = Faults::default();
-        for name in [hapticmaster::FAULTS, woodenhaptics::FAULTS, phantom::FAULTS].concat() {
+        let of_each = [hapticmaster::FAULTS, woodenhaptics::FAULTS, phantom::FAULTS, inverse3::FAULTS];
+        for name in of_each.concat() {
             assert!(name == "slow" || flag(&faults, name).is_some() || error_code(name).is_some(), "{name}");
         }
     }

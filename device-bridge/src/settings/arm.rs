@@ -1,6 +1,8 @@
 //! What the keys of each arm mean: a file for each.
 pub mod hapticmaster;
+pub mod inverse3;
 pub mod phantom;
+pub mod playback;
 pub mod simulated;
 pub mod woodenhaptics;
 
@@ -9,7 +11,8 @@ use crate::{
     BridgeError, Config,
     config::DeviceConfig,
     device::{
-        hapticmaster::start::StartSettings, phantom::Settings as Phantom, woodenhaptics::Settings as WoodenHaptics,
+        hapticmaster::start::StartSettings, inverse3::Settings as Inverse3, phantom::Settings as Phantom,
+        playback::Settings as Playback, woodenhaptics::Settings as WoodenHaptics,
     },
 };
 use palpate_control::SimulatedArm;
@@ -29,6 +32,10 @@ pub enum ArmSettings {
     WoodenHaptics(WoodenHaptics),
     /// A PHANToM or Touch.
     Phantom(Phantom),
+    /// An Inverse3.
+    Inverse3(Inverse3),
+    /// A recording.
+    Playback(Playback),
 }
 
 /// The arm of a configuration, checked.
@@ -38,6 +45,8 @@ pub(super) fn checked(config: &Config, period_s: f64) -> Result<ArmSettings, Bri
         DeviceConfig::Hapticmaster(arm) => Ok(ArmSettings::HapticMaster(hapticmaster::checked(arm, &config.limits)?)),
         DeviceConfig::Woodenhaptics(arm) => Ok(ArmSettings::WoodenHaptics(woodenhaptics::checked(arm)?)),
         DeviceConfig::Phantom(arm) => Ok(ArmSettings::Phantom(phantom::checked(arm, config, period_s)?)),
+        DeviceConfig::Inverse3(arm) => Ok(ArmSettings::Inverse3(inverse3::checked(arm, &config.realtime)?)),
+        DeviceConfig::Playback(arm) => Ok(ArmSettings::Playback(playback::checked(arm)?)),
     }
 }
 

@@ -64,11 +64,17 @@ pub fn simulated() -> DeviceConfig {
 
 /// Presses; the force (N) once it no longer moves by more than `flicker_n` (N) within half a second: its mean over that.
 pub async fn pressed_n(flicker_n: f64, device: DeviceConfig) -> (f64, Summary) {
+    pressed_by(flicker_n, device, |_| {}).await
+}
+
+/// The same, by a bridge whose configuration is changed before.
+pub async fn pressed_by(flicker_n: f64, device: DeviceConfig, change: impl FnOnce(&mut Config)) -> (f64, Summary) {
     let mock = Mock::default();
     mock.set(|behaviour| behaviour.local_model = Some(wall()));
     let (address, _stop, _serving) = mock.serve("127.0.0.1:0").await;
     let mut config = bridged(&format!("http://{address}"), device);
     config.passivity.strict = true;
+    change(&mut config);
     let bridge = start(config);
     let stats = bridge.handle.stats();
     until("it presses", || stats.force_n() > 0.5).await;
