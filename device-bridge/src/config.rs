@@ -3,7 +3,10 @@ mod device;
 mod workspace;
 
 use crate::{BridgeError, error::ConfigError};
-pub use device::{DeviceConfig, HapticMasterConfig, KeyframeConfig, SimulatedConfig, WoodenHapticsConfig};
+pub use device::{
+    DeviceConfig, FalconConfig, Haply2diyConfig, HapticMasterConfig, KeyframeConfig, SimulatedConfig,
+    WoodenHapticsConfig,
+};
 use miette::NamedSource;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
@@ -279,7 +282,7 @@ mod tests {
 
     #[test]
     fn the_examples_are_valid() {
-        for example in ["bridge.toml", "hapticmaster.toml", "woodenhaptics.toml"] {
+        for example in ["bridge.toml", "hapticmaster.toml", "woodenhaptics.toml", "haply-2diy.toml", "falcon.toml"] {
             let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../deploy").join(example);
             let config = Config::read(&path).unwrap();
             crate::settings::Settings::new(&config).unwrap();

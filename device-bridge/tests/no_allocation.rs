@@ -4,10 +4,12 @@ use assert_no_alloc::{AllocDisabler, assert_no_alloc};
 use glam::{DMat3, DVec3};
 use palpate_bridge::{
     Config,
-    config::{DeviceConfig, HapticMasterConfig, WoodenHapticsConfig},
+    config::{DeviceConfig, FalconConfig, Haply2diyConfig, HapticMasterConfig, WoodenHapticsConfig},
     convert::Command,
     device::{self, Effort},
     emulate::{
+        falcon::{self, Falcon},
+        haply_2diy::{self, Haply2diy},
         hapticmaster::{self, HapticMaster},
         woodenhaptics::{self, WoodenHaptics},
     },
@@ -17,7 +19,10 @@ use palpate_bridge::{
 };
 use palpate_control::{ArmSpec, ForceLimits, HandPath, LocalModel};
 use palpate_realtime::{Clock, Doorbell, TickLoop, slot};
-use std::sync::{Arc, atomic::Ordering};
+use std::{
+    sync::{Arc, atomic::Ordering},
+    time::Duration,
+};
 use tokio_util::sync::CancellationToken;
 
 #[global_allocator]
@@ -55,7 +60,7 @@ fn the_servo_allocates_nothing() {
         max_force_n: 100.0,
     };
     for tick in 0..500 {
-        std::thread::sleep(std::time::Duration::from_millis(1));
+        std::thread::sleep(Duration::from_millis(1));
         commands.publish(Some(Command {
             answers_ns: Clock::Monotonic.now_ns(),
             tick,
@@ -78,7 +83,7 @@ fn drive(device: DeviceConfig) {
     let settings = runtime.block_on(async { Settings::new(&config).unwrap() });
     let mut arm = device::open(&settings.device, 1e-3, &CancellationToken::new()).unwrap();
     for tick in 0..300 {
-        std::thread::sleep(std::time::Duration::from_millis(1));
+        std::thread::sleep(Duration::from_millis(1));
         // A busy machine is late: nothing is told here of how long an answer took.
         assert_no_alloc(|| {
             arm.read(0).unwrap();
@@ -104,4 +109,31 @@ fn the_woodenhaptics_driver_allocates_nothing() {
     let emulated = WoodenHaptics::start(settings).unwrap();
     drive(DeviceConfig::Woodenhaptics(WoodenHapticsConfig { port: emulated.port().to_owned(), ..keys }));
     assert!(emulated.lines() > 100);
+}
+
+#[test]
+fn the_2diys_driver_allocates_nothing() {
+    let keys = Haply2diyConfig::default();
+    let constants = arm::haply_2diy::checked(&keys).unwrap();
+    let path = HandPath::resting_at(DVec3::ZERO);
+    let settings = haply_2diy::Settings { constants, knows_home: true, watchdog: None, arm: ArmSpec::default(), path };
+    let emulated = Haply2diy::start(settings).unwrap();
+    drive(DeviceConfig::Haply2diy(Haply2diyConfig { port: emulated.port().to_owned(), ..keys }));
+    assert!(emulated.requests() > 40);
+}
+
+#[test]
+fn the_falcons_driver_allocates_nothing() {
+    let keys = FalconConfig::default();
+    let settings = falcon::Settings {
+        constants: arm::falcon::checked(&keys).unwrap(),
+        firmware: None,
+        homing: Duration::ZERO,
+        watchdog: None,
+        arm: ArmSpec::default(),
+        path: HandPath::resting_at(DVec3::ZERO),
+    };
+    let emulated = Falcon::start(settings).unwrap();
+    drive(DeviceConfig::Falcon(FalconConfig { port: emulated.port().to_owned(), ..keys }));
+    assert!(emulated.frames() > 40);
 }

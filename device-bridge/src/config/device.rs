@@ -1,8 +1,12 @@
 //! `[device]`: each kind of arm with its keys.
+mod falcon;
+mod haply_2diy;
 mod hapticmaster;
 mod simulated;
 mod woodenhaptics;
 
+pub use falcon::FalconConfig;
+pub use haply_2diy::Haply2diyConfig;
 pub use hapticmaster::HapticMasterConfig;
 use serde::{Deserialize, Serialize};
 pub use simulated::{KeyframeConfig, SimulatedConfig};
@@ -18,6 +22,11 @@ pub enum DeviceConfig {
     Hapticmaster(HapticMasterConfig),
     /// WoodenHaptics, on a serial line.
     Woodenhaptics(WoodenHapticsConfig),
+    /// Haply 2diy, on a serial line.
+    #[serde(rename = "haply-2diy")]
+    Haply2diy(Haply2diyConfig),
+    /// Novint Falcon, on the serial port of its USB chip.
+    Falcon(FalconConfig),
 }
 
 impl Default for DeviceConfig {

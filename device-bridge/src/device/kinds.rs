@@ -1,5 +1,7 @@
 //! The kinds of arms that there are drivers for: each one's name, what people are told of it, and its keys.
-use crate::config::{DeviceConfig, HapticMasterConfig, SimulatedConfig, WoodenHapticsConfig};
+use crate::config::{
+    DeviceConfig, FalconConfig, Haply2diyConfig, HapticMasterConfig, SimulatedConfig, WoodenHapticsConfig,
+};
 use std::fmt::Write as _;
 
 /// What is told of a kind.
@@ -18,7 +20,7 @@ pub struct Kind {
 }
 
 /// All of them.
-pub static KINDS: [Kind; 3] = [
+pub static KINDS: [Kind; 5] = [
     Kind {
         name: "simulated",
         what: "no hardware: a mass held by a hand that follows a path",
@@ -39,6 +41,20 @@ pub static KINDS: [Kind; 3] = [
         needs: "its port, and the right to open it (docs/arms/woodenhaptics.md)",
         tried: "palpate-bridge emulate woodenhaptics; no hardware yet",
         default: || DeviceConfig::Woodenhaptics(WoodenHapticsConfig::default()),
+    },
+    Kind {
+        name: "haply-2diy",
+        what: "Haply 2diy (open hardware), an impedance arm in a plane, on a serial line",
+        needs: "its port, and the right to open it (docs/arms/haply-2diy.md)",
+        tried: "palpate-bridge emulate haply-2diy; no hardware yet",
+        default: || DeviceConfig::Haply2diy(Haply2diyConfig::default()),
+    },
+    Kind {
+        name: "falcon",
+        what: "Novint Falcon, an impedance arm on the serial port of its USB chip",
+        needs: "its port, the right to open it, and Novint's firmware (docs/arms/falcon.md)",
+        tried: "palpate-bridge emulate falcon; no hardware yet",
+        default: || DeviceConfig::Falcon(FalconConfig::default()),
     },
 ];
 

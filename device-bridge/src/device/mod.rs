@@ -1,6 +1,10 @@
 //! Arms: one file or folder for each, behind one small trait.
+pub mod falcon;
+pub mod haply_2diy;
 pub mod hapticmaster;
 pub mod kinds;
+#[cfg(test)]
+mod noise;
 pub mod serial;
 pub mod simulated;
 #[cfg(test)]
@@ -12,7 +16,9 @@ use crate::{
     BridgeError,
     settings::{ArmSettings, DeviceSettings},
 };
+use falcon::Falcon;
 use glam::DVec3;
+use haply_2diy::Haply2diy;
 use hapticmaster::HapticMaster;
 use palpate_control::Motion;
 use simulated::SimulatedDevice;
@@ -58,6 +64,7 @@ impl Effort {
     }
 
     /// For a driver's last step: nothing when its arm is lost, and nothing that is no number.
+    #[must_use]
     pub fn unless(&self, lost: bool) -> Self {
         let number = |v: DVec3| if lost || !v.is_finite() { DVec3::ZERO } else { v };
         Self { force_n: number(self.force_n), torque_nm: number(self.torque_nm) }
@@ -82,11 +89,15 @@ pub enum Fault {
     /// The connection ended.
     #[error("the connection to it ended")]
     Disconnected,
+    /// It does not know where it is any more: it was without power, say.
+    #[error("it lost its home")]
+    Unhomed,
 }
 
 impl Fault {
     /// All of them.
-    pub const ALL: [Self; 5] = [Self::Silent, Self::Garbled, Self::Refused, Self::EmergencyStop, Self::Disconnected];
+    pub const ALL: [Self; 6] =
+        [Self::Silent, Self::Garbled, Self::Refused, Self::EmergencyStop, Self::Disconnected, Self::Unhomed];
 }
 
 /// An arm that was opened, used by the servo thread alone. Neither call may block, allocate or log.
@@ -115,6 +126,8 @@ fn open_arm(settings: &ArmSettings, period_s: f64, stop: &CancellationToken) -> 
         ArmSettings::Simulated(arm) => Box::new(SimulatedDevice::new(arm.clone())),
         ArmSettings::HapticMaster(settings) => Box::new(HapticMaster::open(settings, period_s, stop)?),
         ArmSettings::WoodenHaptics(settings) => Box::new(WoodenHaptics::start(settings, period_s).map_err(unstarted)?),
+        ArmSettings::Haply2diy(settings) => Box::new(Haply2diy::start(settings, period_s).map_err(unstarted)?),
+        ArmSettings::Falcon(settings) => Box::new(Falcon::open(settings, period_s, stop).map_err(unstarted)?),
     })
 }
 

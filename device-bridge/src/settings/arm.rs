@@ -1,4 +1,6 @@
 //! What the keys of each arm mean: a file for each.
+pub mod falcon;
+pub mod haply_2diy;
 pub mod hapticmaster;
 pub mod simulated;
 pub mod woodenhaptics;
@@ -7,7 +9,10 @@ use super::value;
 use crate::{
     BridgeError, Config,
     config::DeviceConfig,
-    device::{hapticmaster::start::StartSettings, woodenhaptics::Settings as WoodenHaptics},
+    device::{
+        falcon::Settings as Falcon, haply_2diy::Settings as Haply2diy, hapticmaster::start::StartSettings,
+        woodenhaptics::Settings as WoodenHaptics,
+    },
 };
 use palpate_control::SimulatedArm;
 use std::ops::RangeInclusive;
@@ -24,6 +29,10 @@ pub enum ArmSettings {
     HapticMaster(StartSettings),
     /// A WoodenHaptics.
     WoodenHaptics(WoodenHaptics),
+    /// A 2diy.
+    Haply2diy(Haply2diy),
+    /// A Falcon.
+    Falcon(Falcon),
 }
 
 /// The arm of a configuration, checked.
@@ -32,6 +41,8 @@ pub(super) fn checked(config: &Config, period_s: f64) -> Result<ArmSettings, Bri
         DeviceConfig::Simulated(arm) => Ok(ArmSettings::Simulated(simulated::checked(arm, period_s)?)),
         DeviceConfig::Hapticmaster(arm) => Ok(ArmSettings::HapticMaster(hapticmaster::checked(arm, &config.limits)?)),
         DeviceConfig::Woodenhaptics(arm) => Ok(ArmSettings::WoodenHaptics(woodenhaptics::checked(arm)?)),
+        DeviceConfig::Haply2diy(arm) => Ok(ArmSettings::Haply2diy(haply_2diy::checked(arm)?)),
+        DeviceConfig::Falcon(arm) => Ok(ArmSettings::Falcon(falcon::checked(arm)?)),
     }
 }
 
