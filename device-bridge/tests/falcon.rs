@@ -197,7 +197,7 @@ fn no_torque_beyond_the_limit_is_asked_for_and_the_force_keeps_its_direction() {
 fn the_largest_force_is_that_of_a_falcon() {
     let settings = constants(&FalconConfig::default());
     let slope_rad_per_m = kinematics::legs(kinematics::MIDDLE_M).unwrap().slope_rad_per_m;
-    for (axis, expected_n) in [(DVec3::X, 0.0), (DVec3::Y, 0.0), (DVec3::Z, 0.0)] {
+    for (axis, expected_n) in [(DVec3::X, 8.24), (DVec3::Y, 8.08), (DVec3::Z, 20.11)] {
         // τ = Jᵀ F
         let torques_nm = slope_rad_per_m.inverse().transpose() * axis;
         let most_n =
@@ -287,6 +287,32 @@ fn an_arm_that_cannot_be_started_says_why() {
     // Counts from another zero.
     let far = FalconConfig { zero_deg: 170.0, ..keys(arm.port()) };
     assert!(open(&far).unwrap_err().to_string().contains("which no Falcon has"));
+}
+
+/// Near a stop the encoders may say what no Falcon has: no force, and the last pose; for long it is a fault.
+#[test]
+fn where_no_falcon_can_be_there_is_no_force_and_after_a_while_no_arm() {
+    // The hand pulls farther than the driver's constants allow.
+    let keys_of = [(0.0, 0.0), (0.3, 0.048)].map(|(time_s, z)| Keyframe { time_s, position_m: DVec3::Z * z });
+    let emulated = emulator(HandPath::new(keys_of.to_vec(), None).unwrap());
+    let mut arm = open(&FalconConfig { zero_deg: 80.0, ..keys(emulated.port()) }).unwrap();
+    let (began, mut last, mut unforced) = (Instant::now(), None, 0);
+    let fault = loop {
+        assert!(began.elapsed() < Duration::from_secs(20));
+        match arm.read(1) {
+            Ok(reading) if reading.age_s > 0.2 => {
+                assert_eq!(reading.motion.velocity_m_per_s, DVec3::ZERO);
+                assert_eq!(*last.get_or_insert(reading.motion.position_m), reading.motion.position_m);
+                unforced += u32::from(emulated.force_n() == DVec3::ZERO);
+            }
+            Ok(_) => {}
+            Err(fault) => break fault,
+        }
+        arm.apply(&Effort::force(0.2 * DVec3::Z));
+        std::thread::sleep(Duration::from_millis(1));
+    };
+    assert_eq!(fault, Fault::Garbled);
+    assert!(unforced > 10, "{unforced}");
 }
 
 #[test]

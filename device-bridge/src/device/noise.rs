@@ -35,20 +35,32 @@ impl Pair {
         })
     }
 
-    /// A million bytes, in pieces of up to 64; `look` after each.
-    pub(crate) fn feed(&mut self, mut look: impl FnMut()) {
+    /// A million random bytes, in pieces of up to 64: every other one within messages of the arm; `look` after each.
+    pub(crate) fn feed(&mut self, message: &[u8], mut look: impl FnMut()) {
         let mut left = 1_000_000_usize;
         let mut random = Random(0x9e37_79b9_7f4a_7c15);
         while left > 0 {
-            let piece: Vec<u8> = (0..=random.next() % 64).map(|_| random.next() as u8).collect();
+            let noise: Vec<u8> = (0..=random.next() % 64).map(|_| random.next() as u8).collect();
+            let piece =
+                if noise.len().is_multiple_of(2) { spliced(message, &noise, &mut random) } else { noise.clone() };
             self.ours.write_all(&piece).unwrap();
             look();
-            left = left.saturating_sub(piece.len());
+            left = left.saturating_sub(noise.len());
             // What the driver says is not heard, and must not pile up.
             let said = self.ours.bytes_to_read().unwrap() as usize;
             self.ours.read_exact(&mut vec![0; said]).unwrap();
         }
     }
+}
+
+/// Two messages, in the midst of which a part of the noise was put, or takes the place of what was there.
+fn spliced(message: &[u8], noise: &[u8], random: &mut Random) -> Vec<u8> {
+    let mut piece = [message, message].concat();
+    let at = random.next() as usize % piece.len();
+    let few = &noise[..noise.len().min(1 + random.next() as usize % 4)];
+    let replaced = if random.next().is_multiple_of(2) { few.len().min(piece.len() - at) } else { 0 };
+    piece.splice(at..at + replaced, few.iter().copied());
+    piece
 }
 
 /// Marsaglia's xorshift.

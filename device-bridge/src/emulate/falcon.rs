@@ -17,6 +17,10 @@ use std::{
     time::{Duration, Instant},
 };
 
+/// Its stops: so far from the middle (m) they begin, and are so stiff (N/m).
+const STOPS_M: f64 = 0.05;
+const STOPS_N_PER_M: f64 = 5000.0;
+
 /// What it is, and who holds it.
 #[derive(Debug, Clone)]
 pub struct Settings {
@@ -117,6 +121,12 @@ fn force_n(constants: &Constants, units: [i16; 3], grip_m: DVec3) -> DVec3 {
     legs.map_or(DVec3::ZERO, |legs| legs.slope_rad_per_m.transpose() * constants.torques_nm(units))
 }
 
+/// What its stops push with (N).
+fn stops_n(constants: &Constants, grip_m: DVec3) -> DVec3 {
+    let from_middle_m = grip_m + constants.centre_m - kinematics::MIDDLE_M;
+    STOPS_N_PER_M * (from_middle_m.clamp_length_max(STOPS_M) - from_middle_m)
+}
+
 impl Machine {
     fn new(settings: Settings) -> Result<Self, ParameterError> {
         Ok(Self {
@@ -169,8 +179,8 @@ impl Machine {
         if self.homed() == wire::HOMED {
             self.held.begin();
         }
-        let Self { settings, units, .. } = self;
-        self.held.go_on(|grip_m| force_n(&settings.constants, *units, grip_m));
+        let Self { settings: Settings { constants, .. }, units, .. } = self;
+        self.held.go_on(|grip_m| force_n(constants, *units, grip_m) + stops_n(constants, grip_m));
     }
 
     /// Out of reach they stay where they were.

@@ -29,16 +29,17 @@ const LEGS_RAD: [f64; 3] = [PI / 2.0 + PI / 12.0, -PI / 6.0 + PI / 12.0, -5.0 * 
 
 /// Middle of what the grip reaches (m): z points at the hand.
 pub const MIDDLE_M: DVec3 = DVec3::new(0.0, 0.0, 0.125);
-/// The grip is never farther from there (m).
-const REACH_M: f64 = 0.085;
+/// The grip is never farther from there (m); all legs reach any place up to 55 mm from it.
+const REACH_M: f64 = 0.1;
 /// Sine of the angle between thigh and shin below which they are as good as in line.
 const LEAST_SINE: f64 = 0.05;
-/// More steps than any pose of the workspace takes.
-const MOST_STEPS: usize = 12;
+/// More steps, and halvings of one, than any pose of the workspace takes.
+const MOST_STEPS: usize = 16;
+const MOST_HALVINGS: i32 = 6;
 /// No step of Newton's method is longer (m).
 const LONGEST_STEP_M: f64 = 0.04;
-/// As near as this (rad) two sets of angles are the same: 1/500 of a step of the encoders.
-const NEAR_RAD: f64 = 1e-6;
+/// As near as this (rad) two sets of angles are the same.
+const NEAR_RAD: f64 = 1e-9;
 
 /// Angles of the motors where the grip is somewhere.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -95,18 +96,19 @@ pub fn grip(angles_rad: DVec3, last_m: DVec3) -> Option<(DVec3, Legs)> {
 }
 
 fn newton(angles_rad: DVec3, from_m: DVec3) -> Option<(DVec3, Legs)> {
-    let mut grip_m = from_m;
+    let (mut grip_m, mut there) = (from_m, legs(from_m)?);
     for _ in 0..MOST_STEPS {
-        let there = legs(grip_m)?;
         let missing_rad = angles_rad - there.angles_rad;
         if missing_rad.abs().max_element() < NEAR_RAD {
             return Some((grip_m, there));
         }
-        let step_m = there.slope_rad_per_m.inverse() * missing_rad;
-        if !step_m.is_finite() {
-            return None;
-        }
-        grip_m += step_m.clamp_length_max(LONGEST_STEP_M);
+        let step_m = (there.slope_rad_per_m.inverse() * missing_rad).clamp_length_max(LONGEST_STEP_M);
+        // A step that leads out of reach is made shorter.
+        let shorter = |halvings: i32| {
+            let next_m = grip_m + step_m * 0.5_f64.powi(halvings);
+            legs(next_m).map(|legs| (next_m, legs))
+        };
+        (grip_m, there) = (0..MOST_HALVINGS).find_map(shorter)?;
     }
     None
 }
@@ -176,7 +178,7 @@ mod tests {
             }
             // From any other pose.
             let (found_m, _) = grip(there.angles_rad, from_m).unwrap();
-            prop_assert!(found_m.distance(grip_m) < 1e-7, "{found_m} {grip_m}");
+            prop_assert!(found_m.distance(grip_m) < 1e-9, "{found_m} {grip_m}");
             for axis in 0..3 {
                 let step = 1e-6 * DMat3::IDENTITY.col(axis);
                 let slope = (legs(grip_m + step).unwrap().angles_rad - legs(grip_m - step).unwrap().angles_rad) / 2e-6;

@@ -27,6 +27,8 @@ const LONGEST_EXTRAPOLATION_S: f64 = 5e-3;
 const MOST_UNANSWERED: u64 = 4;
 /// When nothing has come for so many periods, what is unanswered was lost, and is asked for anew.
 const LOST_AFTER_PERIODS: u64 = 10;
+/// Where no Falcon can be, as its encoders may say near its stops, it gets no force and is taken to be where it was last, for so long (s): then it is lost.
+const LONGEST_OUT_OF_REACH_S: f64 = 1.0;
 /// To the arm in the loop.
 const FLAGS: u8 = wire::HOMING | wire::GREEN;
 
@@ -99,8 +101,10 @@ pub struct Falcon {
     force_n: DVec3,
     /// Since the newest frame came.
     quiet_periods: u64,
-    /// Since it was asked for, at most.
+    /// Since the newest pose was asked for, at most.
     age_periods: u64,
+    /// Since it came.
+    out_of_reach_periods: u64,
     /// Frames sent and not answered.
     unanswered: u64,
     lost: Option<Fault>,
@@ -126,33 +130,36 @@ impl Falcon {
             force_n: DVec3::ZERO,
             quiet_periods: 0,
             age_periods: 0,
+            out_of_reach_periods: 0,
             unanswered: 0,
             lost: None,
             settings: settings.clone(),
         };
-        let impossible = |_| start::StartError::Impossible { path: settings.port.clone(), counts: frame.numbers };
-        arm.renew(frame, period_s).map_err(impossible)?;
-        Ok(arm)
+        if arm.renew(frame, period_s) {
+            Ok(arm)
+        } else {
+            Err(start::StartError::Impossible { path: settings.port.clone(), counts: frame.numbers })
+        }
     }
 
-    /// A new pose, `passed_s` after the one before.
-    fn renew(&mut self, frame: Frame, passed_s: f64) -> Result<(), Fault> {
-        if frame.flags & wire::HOMED != wire::HOMED {
-            return Err(Fault::Unhomed);
-        }
-        let angles_rad = self.settings.angles_rad(frame.numbers);
-        let (grip_m, legs) = kinematics::grip(angles_rad, self.grip_m).ok_or(Fault::Garbled)?;
+    /// A new pose, `passed_s` after the last frame; whether a Falcon can be there.
+    fn renew(&mut self, frame: Frame, passed_s: f64) -> bool {
         let mut rates = DVec3::ZERO;
         for leg in 0..3 {
             rates[leg] = self.rates[leg].push(f64::from(frame.numbers[leg]), passed_s);
         }
+        self.buttons = (frame.flags & wire::BUTTONS).into();
+        let Some((grip_m, legs)) = kinematics::grip(self.settings.angles_rad(frame.numbers), self.grip_m) else {
+            self.jacobian_m_per_rad = DMat3::ZERO;
+            self.motion.velocity_m_per_s = DVec3::ZERO;
+            return false;
+        };
         self.grip_m = grip_m;
         self.jacobian_m_per_rad = legs.slope_rad_per_m.inverse();
         self.motion = Motion::at(grip_m - self.settings.centre_m);
         // v = J ω
         self.motion.velocity_m_per_s = self.jacobian_m_per_rad * (rates * RAD_PER_COUNT);
-        self.buttons = (frame.flags & wire::BUTTONS).into();
-        Ok(())
+        true
     }
 
     fn receive(&mut self) -> Result<(), Fault> {
@@ -163,10 +170,20 @@ impl Falcon {
             Ok(frame)
         })?;
         if let Some(frame) = newest {
-            self.renew(frame, self.quiet_periods as f64 * self.period_s)?;
+            if frame.flags & wire::HOMED != wire::HOMED {
+                return Err(Fault::Unhomed);
+            }
+            if self.renew(frame, self.quiet_periods as f64 * self.period_s) {
+                self.out_of_reach_periods = 0;
+                // One was sent a tick; those after this one are not answered yet.
+                self.age_periods = 1 + self.unanswered;
+            }
             self.quiet_periods = 0;
-            // One was sent a tick; those after this one are not answered yet.
-            self.age_periods = 1 + self.unanswered;
+        }
+        if self.out_of_reach_periods as f64 * self.period_s
+            > LONGEST_OUT_OF_REACH_S.max(self.settings.silence.as_secs_f64())
+        {
+            return Err(Fault::Garbled);
         }
         if self.quiet_periods > self.silence_periods { Err(Fault::Silent) } else { Ok(()) }
     }
@@ -194,7 +211,7 @@ impl Arm for Falcon {
         if let Some(fault) = self.lost {
             return Err(fault);
         }
-        for since in [&mut self.quiet_periods, &mut self.age_periods] {
+        for since in [&mut self.quiet_periods, &mut self.age_periods, &mut self.out_of_reach_periods] {
             *since = since.saturating_add(periods);
         }
         self.receive().map_err(|fault| self.lose(fault))?;
@@ -259,15 +276,15 @@ mod tests {
         let mut arm = pair.starting(&home, || Falcon::open(&settings, 1e-3, &CancellationToken::new())).unwrap();
         let in_step = arm.frames.clone();
         let (mut readings, mut faults) = (0_u64, 0);
-        pair.feed(|| {
-            (arm.lost, arm.quiet_periods) = (None, 0);
+        pair.feed(&home, || {
+            (arm.lost, arm.quiet_periods, arm.out_of_reach_periods) = (None, 0, 0);
             match arm.read(1) {
                 Ok(reading) => {
                     assert!(reading.motion.is_finite());
                     readings += 1;
                 }
                 Err(fault) => {
-                    assert_eq!(fault, Fault::Garbled);
+                    assert!([Fault::Garbled, Fault::Unhomed].contains(&fault), "{fault}");
                     arm.line.forget().unwrap();
                     arm.frames = if readings.is_multiple_of(2) { Frames::default() } else { in_step.clone() };
                     faults += 1;

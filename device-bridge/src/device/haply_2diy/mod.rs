@@ -289,7 +289,7 @@ mod tests {
         let answer = wire::reply(settings.device_id, [12.0, 168.0]);
         let mut arm = pair.starting(&answer, || Haply2diy::start(&settings, 1e-3)).unwrap();
         let (mut readings, mut faults) = (0, 0);
-        pair.feed(|| {
+        pair.feed(&answer, || {
             (arm.is_asked, arm.lost) = (true, None);
             match arm.read(1) {
                 Ok(reading) => {

@@ -39,3 +39,23 @@ pub fn checked(config: &FalconConfig) -> Result<Settings, BridgeError> {
         silence: seconds("device.silence_s", config.silence_s)?,
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_refusal_names_the_key() {
+        let refused = |change: fn(&mut FalconConfig)| {
+            let mut config = FalconConfig::default();
+            change(&mut config);
+            checked(&config).unwrap_err().to_string()
+        };
+        assert!(refused(|c| c.zero_deg = 200.0).starts_with("device.zero_deg: 200 is out of range"));
+        assert!(refused(|c| c.torque_units_per_nm = 0.0).starts_with("device.torque_units_per_nm: 0 is out"));
+        assert!(refused(|c| c.max_torque_units = -5).starts_with("device.max_torque_units: -5 is out"));
+        assert!(refused(|c| c.centre_m = [0.0; 3]).starts_with("device.centre_m: is out of its reach"));
+        assert!(refused(|c| c.homing_s = f64::INFINITY).starts_with("device.homing_s: inf is no time"));
+        assert!(refused(|c| c.silence_s = -1.0).starts_with("device.silence_s: -1 is no time"));
+    }
+}

@@ -57,3 +57,26 @@ pub fn checked(config: &Haply2diyConfig) -> Result<Settings, BridgeError> {
         silence: seconds("device.silence_s", config.silence_s)?,
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_refusal_names_the_key() {
+        let refused = |change: fn(&mut Haply2diyConfig)| {
+            let mut config = Haply2diyConfig::default();
+            change(&mut config);
+            checked(&config).unwrap_err().to_string()
+        };
+        assert!(refused(|c| c.base_m = -0.01).starts_with("device.base_m: -0.01 is out of range"));
+        assert!(refused(|c| c.link_lengths_m[1] = 0.0).starts_with("device.link_lengths_m: 0 is out"));
+        assert!(refused(|c| c.centre_m = [0.0, 0.5]).starts_with("device.centre_m: is out of reach"));
+        assert!(refused(|c| c.ports = [1, 1]).starts_with("device.ports: two different"));
+        assert!(refused(|c| c.ports = [0, 1]).starts_with("device.ports: two different"));
+        assert!(refused(|c| c.home_deg[0] = f64::NAN).starts_with("device.home_deg: NaN is out"));
+        assert!(refused(|c| c.counts_per_turn[0] = 0.0).starts_with("device.counts_per_turn: 0 is out"));
+        assert!(refused(|c| c.max_torque_nm = 0.0).starts_with("device.max_torque_nm: 0 is out"));
+        assert!(refused(|c| c.silence_s = -1.0).starts_with("device.silence_s: -1 is no time"));
+    }
+}
