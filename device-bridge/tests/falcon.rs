@@ -157,7 +157,7 @@ fn a_probe_says_where_the_arm_is_and_what_is_pressed() {
 #[test]
 fn poses_follow_the_arm_though_frames_come_in_pieces() {
     for split in [false, true] {
-        let keys_of = [(0.0, 0.0), (0.3, 0.03)].map(|(time_s, x)| Keyframe { time_s, position_m: DVec3::X * x });
+        let keys_of = [(0.0, 0.0), (0.6, 0.03)].map(|(time_s, x)| Keyframe { time_s, position_m: DVec3::X * x });
         let emulated = emulator(HandPath::new(keys_of.to_vec(), None).unwrap());
         Faults::set(&emulated.faults.split, split);
         let mut arm = started(&emulated);
@@ -180,7 +180,8 @@ fn poses_follow_the_arm_though_frames_come_in_pieces() {
 #[test]
 fn no_torque_beyond_the_limit_is_asked_for_and_the_force_keeps_its_direction() {
     let emulated = emulator(resting());
-    let mut arm = started(&emulated);
+    // Not so much that the arm flies off while it is looked at.
+    let mut arm = open(&FalconConfig { max_torque_units: 600, ..keys(emulated.port()) }).unwrap();
     let mut apply = |force_n: DVec3| {
         press::hold(&mut arm, force_n);
         emulated.force_n()
@@ -188,7 +189,7 @@ fn no_torque_beyond_the_limit_is_asked_for_and_the_force_keeps_its_direction() {
     let weak = DVec3::new(0.3, -0.5, 1.0);
     assert!((apply(weak) - weak).length() < 0.01, "{}", apply(weak));
     let strong = apply(weak * 1e6);
-    assert!(strong.normalize().distance(weak.normalize()) < 0.02 && strong.length() < 30.0, "{strong}");
+    assert!(strong.normalize().distance(weak.normalize()) < 0.02 && strong.length() < 3.0, "{strong}");
     assert_eq!(apply(DVec3::new(f64::NAN, 0.0, 0.0)), DVec3::ZERO);
 }
 
@@ -253,7 +254,7 @@ fn the_driver_waits_until_the_arm_knows_its_home() {
 
 #[test]
 fn a_start_that_waits_can_be_stopped() {
-    let emulated = Falcon::start(Settings { homing: Duration::from_secs(60), ..settings(resting()) }).unwrap();
+    let emulated = Falcon::start(Settings { homing: Duration::from_mins(1), ..settings(resting()) }).unwrap();
     let stop = CancellationToken::new();
     let token = stop.clone();
     let settings = constants(&keys(emulated.port()));

@@ -179,7 +179,7 @@ fn a_probe_says_where_the_arm_is() {
 #[test]
 fn poses_follow_the_arm_though_answers_come_in_pieces() {
     for split in [false, true] {
-        let keys_of = [(0.0, 0.0), (0.3, 0.03)].map(|(time_s, x)| Keyframe { time_s, position_m: DVec3::X * x });
+        let keys_of = [(0.0, 0.0), (0.6, 0.03)].map(|(time_s, x)| Keyframe { time_s, position_m: DVec3::X * x });
         let emulated = emulator(HandPath::new(keys_of.to_vec(), None).unwrap());
         Faults::set(&emulated.faults.split, split);
         let mut arm = started(&emulated);

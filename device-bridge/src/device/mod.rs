@@ -5,6 +5,7 @@ pub mod hapticmaster;
 pub mod kinds;
 #[cfg(test)]
 mod noise;
+pub mod requests;
 pub mod serial;
 pub mod simulated;
 #[cfg(test)]

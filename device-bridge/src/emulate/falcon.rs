@@ -108,7 +108,8 @@ struct Machine {
     buttons: u8,
     heard: Option<Instant>,
     heard_frames: u64,
-    due: bool,
+    /// Frames to answer.
+    due: u64,
     looking_since: Option<Instant>,
     counts: [i16; 3],
     /// What a loader says.
@@ -139,7 +140,7 @@ impl Machine {
             buttons: 0,
             heard: None,
             heard_frames: 0,
-            due: false,
+            due: 0,
             looking_since: None,
             counts: [0; 3],
             said: Vec::new(),
@@ -156,7 +157,7 @@ impl Machine {
         }
         self.heard = Some(Instant::now());
         self.heard_frames += 1;
-        self.due = true;
+        self.due += 1;
     }
 
     /// Legs come home one after another.
@@ -220,7 +221,7 @@ impl Board for Machine {
 
     fn say(&mut self, bytes: &mut Vec<u8>) {
         bytes.append(&mut self.said);
-        if std::mem::take(&mut self.due) {
+        for _ in 0..std::mem::take(&mut self.due) {
             let frame = Frame { numbers: self.counts(), flags: self.homed() | self.buttons };
             bytes.extend_from_slice(&frame.bytes());
         }

@@ -10,7 +10,7 @@ pub mod kinematics;
 pub mod start;
 pub mod wire;
 
-use super::{Arm, Effort, Fault, Reading, serial::Line};
+use super::{Arm, Effort, Fault, Reading, requests::Requests, serial::Line};
 use glam::{DMat3, DVec3};
 use palpate_control::{Motion, Velocity, extrapolate};
 use std::{path::PathBuf, time::Duration};
@@ -24,7 +24,7 @@ pub const RAD_PER_COUNT: f64 = 14.25 / 110.0 * std::f64::consts::TAU / 1280.0;
 /// A pose is believed to go on with its velocity for so long (s).
 const LONGEST_EXTRAPOLATION_S: f64 = 5e-3;
 /// With so many frames unanswered no more is sent: the arm is slower than the loop, and poses would become old.
-const MOST_UNANSWERED: u64 = 4;
+const MOST_UNANSWERED: usize = 4;
 /// When nothing has come for so many periods, what is unanswered was lost, and is asked for anew.
 const LOST_AFTER_PERIODS: u64 = 10;
 /// Where no Falcon can be, as its encoders may say near its stops, it gets no force and is taken to be where it was last, for so long (s): then it is lost.
@@ -101,12 +101,12 @@ pub struct Falcon {
     force_n: DVec3,
     /// Since the newest frame came.
     quiet_periods: u64,
-    /// Since the newest pose was asked for, at most.
-    age_periods: u64,
-    /// Since it came.
-    out_of_reach_periods: u64,
-    /// Frames sent and not answered.
-    unanswered: u64,
+    /// Frames on their way.
+    requests: Requests,
+    /// When the newest frame was asked for.
+    asked_at: u64,
+    /// When the newest pose was asked for: it is not older.
+    pose_at: u64,
     lost: Option<Fault>,
 }
 
@@ -129,9 +129,9 @@ impl Falcon {
             buttons: 0,
             force_n: DVec3::ZERO,
             quiet_periods: 0,
-            age_periods: 0,
-            out_of_reach_periods: 0,
-            unanswered: 0,
+            requests: Requests::default(),
+            asked_at: 0,
+            pose_at: 0,
             lost: None,
             settings: settings.clone(),
         };
@@ -163,26 +163,24 @@ impl Falcon {
     }
 
     fn receive(&mut self) -> Result<(), Fault> {
-        let (frames, unanswered) = (&mut self.frames, &mut self.unanswered);
+        let (frames, requests) = (&mut self.frames, &mut self.requests);
         let newest = self.line.newest(|byte| {
-            let frame = frames.take(byte)?;
-            *unanswered = unanswered.saturating_sub(frame.is_some().into());
-            Ok(frame)
+            let Some(frame) = frames.take(byte)? else { return Ok(None) };
+            // One that nobody asked for any more was late: the next one says all of it anew.
+            Ok(requests.answered().map(|asked_at| (frame, asked_at)))
         })?;
-        if let Some(frame) = newest {
+        if let Some((frame, asked_at)) = newest {
             if frame.flags & wire::HOMED != wire::HOMED {
                 return Err(Fault::Unhomed);
             }
-            if self.renew(frame, self.quiet_periods as f64 * self.period_s) {
-                self.out_of_reach_periods = 0;
-                // One was sent a tick; those after this one are not answered yet.
-                self.age_periods = 1 + self.unanswered;
+            if self.renew(frame, (asked_at - self.asked_at) as f64 * self.period_s) {
+                self.pose_at = asked_at;
             }
+            self.asked_at = asked_at;
             self.quiet_periods = 0;
         }
-        if self.out_of_reach_periods as f64 * self.period_s
-            > LONGEST_OUT_OF_REACH_S.max(self.settings.silence.as_secs_f64())
-        {
+        // Frames come, and no pose.
+        if self.quiet_periods == 0 && self.age_s() > LONGEST_OUT_OF_REACH_S.max(self.settings.silence.as_secs_f64()) {
             return Err(Fault::Garbled);
         }
         if self.quiet_periods > self.silence_periods { Err(Fault::Silent) } else { Ok(()) }
@@ -191,14 +189,18 @@ impl Falcon {
     /// τ = Jᵀ F, as units.
     fn send(&mut self) -> Result<(), Fault> {
         if self.quiet_periods > LOST_AFTER_PERIODS {
-            self.unanswered = 0;
+            self.requests.forget();
         }
-        if self.unanswered >= MOST_UNANSWERED && self.lost.is_none() {
+        if self.requests.unanswered() >= MOST_UNANSWERED && self.lost.is_none() {
             return Ok(());
         }
-        self.unanswered += 1;
+        self.requests.made();
         let numbers = self.settings.units(self.jacobian_m_per_rad.transpose() * self.force_n);
         self.line.send(&Frame { numbers, flags: FLAGS }.bytes())
+    }
+
+    fn age_s(&self) -> f64 {
+        (self.requests.now() - self.pose_at) as f64 * self.period_s
     }
 
     fn lose(&mut self, fault: Fault) -> Fault {
@@ -211,11 +213,10 @@ impl Arm for Falcon {
         if let Some(fault) = self.lost {
             return Err(fault);
         }
-        for since in [&mut self.quiet_periods, &mut self.age_periods, &mut self.out_of_reach_periods] {
-            *since = since.saturating_add(periods);
-        }
+        self.requests.pass(periods);
+        self.quiet_periods = self.quiet_periods.saturating_add(periods);
         self.receive().map_err(|fault| self.lose(fault))?;
-        let age_s = self.age_periods as f64 * self.period_s;
+        let age_s = self.age_s();
         Ok(Reading {
             motion: extrapolate(&self.motion, age_s, LONGEST_EXTRAPOLATION_S),
             buttons: self.buttons,
@@ -277,7 +278,7 @@ mod tests {
         let in_step = arm.frames.clone();
         let (mut readings, mut faults) = (0_u64, 0);
         pair.feed(&home, || {
-            (arm.lost, arm.quiet_periods, arm.out_of_reach_periods) = (None, 0, 0);
+            (arm.lost, arm.quiet_periods, arm.pose_at) = (None, 0, arm.requests.now());
             match arm.read(1) {
                 Ok(reading) => {
                     assert!(reading.motion.is_finite());

@@ -12,6 +12,7 @@ pub mod wire;
 
 use super::{
     Arm, Effort, Fault, Reading,
+    requests::Requests,
     serial::{Line, OpenError},
 };
 use glam::{DMat2, DVec2, DVec3, Vec3Swizzles as _};
@@ -125,12 +126,9 @@ pub struct Haply2diy {
     rates: [Velocity; 2],
     motion: Motion,
     force_n: DVec2,
-    /// A request is on its way.
-    is_asked: bool,
-    /// Since that request.
-    asked_periods: u64,
-    /// Since the newest pose was asked for: it is not older.
-    age_periods: u64,
+    requests: Requests,
+    /// When the newest pose was asked for: it is not older.
+    asked_at: u64,
     /// Since it came.
     quiet_periods: u64,
     lost: Option<Fault>,
@@ -172,9 +170,8 @@ impl Haply2diy {
             rates: [steps_deg.x, steps_deg.y].map(|step| Velocity::new(step, period_s)),
             motion: Motion::at(DVec3::ZERO),
             force_n: DVec2::ZERO,
-            is_asked: false,
-            asked_periods: 0,
-            age_periods: 0,
+            requests: Requests::default(),
+            asked_at: 0,
             quiet_periods: 0,
             lost: None,
             settings: settings.clone(),
@@ -199,31 +196,29 @@ impl Haply2diy {
     }
 
     fn receive(&mut self) -> Result<(), Fault> {
-        let (replies, is_asked) = (&mut self.replies, &mut self.is_asked);
+        let (replies, requests) = (&mut self.replies, &mut self.requests);
         let newest = self.line.newest(|byte| {
             // Nobody asked for it.
-            if !*is_asked {
+            if requests.unanswered() == 0 {
                 return Err(Fault::Garbled);
             }
-            let reply = replies.take(byte)?;
-            *is_asked = reply.is_none();
-            Ok(reply)
+            let Some(sent_deg) = replies.take(byte)? else { return Ok(None) };
+            Ok(requests.answered().map(|asked_at| (sent_deg, asked_at)))
         })?;
-        if let Some(sent_deg) = newest {
-            self.renew(sent_deg, self.quiet_periods as f64 * self.period_s)?;
+        if let Some((sent_deg, asked_at)) = newest {
+            self.renew(sent_deg, (asked_at - self.asked_at) as f64 * self.period_s)?;
             self.quiet_periods = 0;
-            self.age_periods = self.asked_periods;
+            self.asked_at = asked_at;
         }
         if self.quiet_periods > self.silence_periods { Err(Fault::Silent) } else { Ok(()) }
     }
 
     /// τ = Jᵀ F, when the last request is answered, or the arm is lost.
     fn send(&mut self) -> Result<(), Fault> {
-        if self.is_asked && self.lost.is_none() {
+        if self.requests.unanswered() > 0 && self.lost.is_none() {
             return Ok(());
         }
-        self.is_asked = true;
-        self.asked_periods = 0;
+        self.requests.made();
         let torques_nm = self.jacobian_m_per_rad.transpose() * self.force_n;
         self.line.send(&wire::request(self.settings.device_id, self.settings.sent_nm(torques_nm)))
     }
@@ -245,11 +240,10 @@ impl Arm for Haply2diy {
         if let Some(fault) = self.lost {
             return Err(fault);
         }
-        for since in [&mut self.asked_periods, &mut self.age_periods, &mut self.quiet_periods] {
-            *since = since.saturating_add(periods);
-        }
+        self.requests.pass(periods);
+        self.quiet_periods = self.quiet_periods.saturating_add(periods);
         self.receive().map_err(|fault| self.lose(fault))?;
-        let age_s = self.age_periods as f64 * self.period_s;
+        let age_s = (self.requests.now() - self.asked_at) as f64 * self.period_s;
         Ok(Reading {
             motion: extrapolate(&self.motion, age_s, LONGEST_EXTRAPOLATION_S),
             buttons: 0,
@@ -290,7 +284,8 @@ mod tests {
         let mut arm = pair.starting(&answer, || Haply2diy::start(&settings, 1e-3)).unwrap();
         let (mut readings, mut faults) = (0, 0);
         pair.feed(&answer, || {
-            (arm.is_asked, arm.lost) = (true, None);
+            arm.requests.made();
+            arm.lost = None;
             match arm.read(1) {
                 Ok(reading) => {
                     assert!(reading.motion.is_finite());
