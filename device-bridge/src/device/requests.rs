@@ -3,6 +3,14 @@
 /// Most that can be on their way.
 const ROOM: usize = 8;
 
+/// An answer that comes so much later (periods) than the last one, though it was asked for in time, was late.
+const LATE: u64 = 2;
+
+/// Periods between two poses: between their requests, or, where the answer was late, between their answers. A pose that was measured late would be a jump otherwise.
+pub fn between(requests: u64, answers: u64) -> u64 {
+    if answers > requests.saturating_add(LATE) { answers } else { requests }
+}
+
 /// Requests on their way, and what time it is (servo periods).
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Requests {
@@ -54,6 +62,15 @@ impl Requests {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_late_answer_is_no_jump_and_jitter_is_none() {
+        for (requests, answers, expected) in
+            [(1, 1, 1), (1, 3, 1), (2, 1, 2), (1, 50, 50), (50, 1, 50), (u64::MAX, 0, u64::MAX)]
+        {
+            assert_eq!(between(requests, answers), expected);
+        }
+    }
 
     #[test]
     fn answers_are_to_the_oldest_request() {

@@ -23,9 +23,9 @@ pub const PIECE: usize = 62;
 /// A larger file is none: the arm's memory is smaller.
 const MOST_BYTES: u64 = 1 << 18;
 /// How often the loader is greeted: its first answers may be lost.
-const GREETINGS: usize = 20;
+const GREETINGS: usize = 10;
 /// How long each answer may take.
-const PATIENCE: Duration = Duration::from_millis(300);
+const PATIENCE: Duration = Duration::from_millis(500);
 const LOOK_EVERY: Duration = Duration::from_micros(500);
 
 /// Why firmware could not be loaded.

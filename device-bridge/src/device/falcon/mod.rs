@@ -10,7 +10,11 @@ pub mod kinematics;
 pub mod start;
 pub mod wire;
 
-use super::{Arm, Effort, Fault, Reading, requests::Requests, serial::Line};
+use super::{
+    Arm, Effort, Fault, Reading,
+    requests::{Requests, between},
+    serial::Line,
+};
 use glam::{DMat3, DVec3};
 use palpate_control::{Motion, Velocity, extrapolate};
 use std::{path::PathBuf, time::Duration};
@@ -173,7 +177,8 @@ impl Falcon {
             if frame.flags & wire::HOMED != wire::HOMED {
                 return Err(Fault::Unhomed);
             }
-            if self.renew(frame, (asked_at - self.asked_at) as f64 * self.period_s) {
+            let passed = between(asked_at - self.asked_at, self.quiet_periods);
+            if self.renew(frame, passed as f64 * self.period_s) {
                 self.pose_at = asked_at;
             }
             self.asked_at = asked_at;

@@ -12,7 +12,7 @@ use thiserror::Error;
 use tokio_util::sync::CancellationToken;
 
 /// How long a firmware that runs may take to answer.
-const PATIENCE: Duration = Duration::from_secs(1);
+const PATIENCE: Duration = Duration::from_secs(2);
 /// Between two frames to an arm that is not started.
 const ASK_EVERY: Duration = Duration::from_millis(5);
 

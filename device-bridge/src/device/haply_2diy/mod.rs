@@ -12,7 +12,7 @@ pub mod wire;
 
 use super::{
     Arm, Effort, Fault, Reading,
-    requests::Requests,
+    requests::{Requests, between},
     serial::{Line, OpenError},
 };
 use glam::{DMat2, DVec2, DVec3, Vec3Swizzles as _};
@@ -206,7 +206,8 @@ impl Haply2diy {
             Ok(requests.answered().map(|asked_at| (sent_deg, asked_at)))
         })?;
         if let Some((sent_deg, asked_at)) = newest {
-            self.renew(sent_deg, (asked_at - self.asked_at) as f64 * self.period_s)?;
+            let passed = between(asked_at - self.asked_at, self.quiet_periods);
+            self.renew(sent_deg, passed as f64 * self.period_s)?;
             self.quiet_periods = 0;
             self.asked_at = asked_at;
         }
