@@ -5,8 +5,8 @@ mod workspace;
 
 use crate::{BridgeError, error::ConfigError};
 pub use device::{
-    DeviceConfig, HapticMasterConfig, Inverse3Config, Inverse3Dialect, KeyframeConfig, PhantomConfig, PlaybackConfig,
-    SimulatedConfig, WoodenHapticsConfig,
+    DeviceConfig, FalconConfig, Haply2diyConfig, HapticMasterConfig, Inverse3Config, Inverse3Dialect, KeyframeConfig,
+    PhantomConfig, PlaybackConfig, SimulatedConfig, WoodenHapticsConfig,
 };
 use miette::NamedSource;
 pub use record::RecordConfig;

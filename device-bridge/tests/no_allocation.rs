@@ -7,7 +7,10 @@ use assert_no_alloc::{AllocDisabler, assert_no_alloc};
 use glam::{DMat3, DVec3};
 use palpate_bridge::{
     Config,
-    config::{DeviceConfig, HapticMasterConfig, Inverse3Config, PlaybackConfig, RecordConfig, WoodenHapticsConfig},
+    config::{
+        DeviceConfig, FalconConfig, Haply2diyConfig, HapticMasterConfig, Inverse3Config, PlaybackConfig, RecordConfig,
+        WoodenHapticsConfig,
+    },
     convert::Command,
     device::{
         self, Effort,
@@ -17,6 +20,8 @@ use palpate_bridge::{
         },
     },
     emulate::{
+        falcon::{self, Falcon},
+        haply_2diy::{self, Haply2diy},
         hapticmaster::{self, HapticMaster},
         inverse3::{self, Inverse3},
         phantom,
@@ -28,7 +33,10 @@ use palpate_bridge::{
 };
 use palpate_control::{ArmSpec, ForceLimits, HandPath, LocalModel};
 use palpate_realtime::{Clock, Doorbell, TickLoop, slot};
-use std::sync::{Arc, atomic::Ordering};
+use std::{
+    sync::{Arc, atomic::Ordering},
+    time::Duration,
+};
 use tokio_util::sync::CancellationToken;
 
 #[global_allocator]
@@ -71,7 +79,7 @@ fn the_servo_allocates_nothing() {
         max_force_n: 100.0,
     };
     for tick in 0..500 {
-        std::thread::sleep(std::time::Duration::from_millis(1));
+        std::thread::sleep(Duration::from_millis(1));
         commands.publish(Some(Command {
             answers_ns: Clock::Monotonic.now_ns(),
             tick,
@@ -99,6 +107,8 @@ fn drive_by(config: &Config, periods: u64) {
     let mut arm = device::open(&settings.device, 1e-3, &CancellationToken::new()).unwrap();
     for tick in 0..300 {
         std::thread::sleep(std::time::Duration::from_millis(1));
+        std::thread::sleep(Duration::from_millis(1));
+        // A busy machine is late: nothing is told here of how long an answer took.
         assert_no_alloc(|| {
             arm.read(periods).unwrap();
             arm.apply(&Effort::force(DVec3::new(1e-7, -1.0 / 3.0, f64::from(tick))));
@@ -170,4 +180,31 @@ fn recording_and_playback_allocate_nothing() {
     let device = DeviceConfig::Playback(PlaybackConfig { file: first, ..PlaybackConfig::default() });
     drive_by(&Config { device, record: record(&second), ..Config::default() }, 1);
     assert_eq!(std::fs::read_to_string(second).unwrap().lines().count(), 301);
+}
+
+#[test]
+fn the_2diys_driver_allocates_nothing() {
+    let keys = Haply2diyConfig::default();
+    let constants = arm::haply_2diy::checked(&keys).unwrap();
+    let path = HandPath::resting_at(DVec3::ZERO);
+    let settings = haply_2diy::Settings { constants, knows_home: true, watchdog: None, arm: ArmSpec::default(), path };
+    let emulated = Haply2diy::start(settings).unwrap();
+    drive(DeviceConfig::Haply2diy(Haply2diyConfig { port: emulated.port().to_owned(), ..keys }));
+    assert!(emulated.requests() > 40);
+}
+
+#[test]
+fn the_falcons_driver_allocates_nothing() {
+    let keys = FalconConfig::default();
+    let settings = falcon::Settings {
+        constants: arm::falcon::checked(&keys).unwrap(),
+        firmware: None,
+        homing: Duration::ZERO,
+        watchdog: None,
+        arm: ArmSpec::default(),
+        path: HandPath::resting_at(DVec3::ZERO),
+    };
+    let emulated = Falcon::start(settings).unwrap();
+    drive(DeviceConfig::Falcon(FalconConfig { port: emulated.port().to_owned(), ..keys }));
+    assert!(emulated.frames() > 40);
 }

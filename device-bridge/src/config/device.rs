@@ -1,4 +1,6 @@
 //! `[device]`: each kind of arm with its keys.
+mod falcon;
+mod haply_2diy;
 mod hapticmaster;
 mod inverse3;
 mod phantom;
@@ -6,6 +8,8 @@ mod playback;
 mod simulated;
 mod woodenhaptics;
 
+pub use falcon::FalconConfig;
+pub use haply_2diy::Haply2diyConfig;
 pub use hapticmaster::HapticMasterConfig;
 pub use inverse3::{Inverse3Config, Inverse3Dialect};
 pub use phantom::PhantomConfig;
@@ -30,6 +34,11 @@ pub enum DeviceConfig {
     Inverse3(Inverse3Config),
     /// No hardware: a recording.
     Playback(PlaybackConfig),
+    /// Haply 2diy, on a serial line.
+    #[serde(rename = "haply-2diy")]
+    Haply2diy(Haply2diyConfig),
+    /// Novint Falcon, on the serial port of its USB chip.
+    Falcon(FalconConfig),
 }
 
 impl Default for DeviceConfig {

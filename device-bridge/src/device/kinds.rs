@@ -1,7 +1,7 @@
 //! The kinds of arms that there are drivers for: each one's name, what people are told of it, and its keys.
 use crate::config::{
-    DeviceConfig, HapticMasterConfig, Inverse3Config, PhantomConfig, PlaybackConfig, SimulatedConfig,
-    WoodenHapticsConfig,
+    DeviceConfig, FalconConfig, Haply2diyConfig, HapticMasterConfig, Inverse3Config, PhantomConfig, PlaybackConfig,
+    SimulatedConfig, WoodenHapticsConfig,
 };
 use std::fmt::Write as _;
 
@@ -21,7 +21,7 @@ pub struct Kind {
 }
 
 /// All of them.
-pub static KINDS: [Kind; 6] = [
+pub static KINDS: [Kind; 8] = [
     Kind {
         name: "simulated",
         what: "no hardware: a mass held by a hand that follows a path",
@@ -63,6 +63,20 @@ pub static KINDS: [Kind; 6] = [
         needs: "the file (docs/arms/playback.md)",
         tried: "recordings of the simulated arm",
         default: || DeviceConfig::Playback(PlaybackConfig::default()),
+    },
+    Kind {
+        name: "haply-2diy",
+        what: "Haply 2diy (open hardware), an impedance arm in a plane, on a serial line",
+        needs: "its port, and the right to open it (docs/arms/haply-2diy.md)",
+        tried: "palpate-bridge emulate haply-2diy; no hardware yet",
+        default: || DeviceConfig::Haply2diy(Haply2diyConfig::default()),
+    },
+    Kind {
+        name: "falcon",
+        what: "Novint Falcon, an impedance arm on the serial port of its USB chip",
+        needs: "its port, the right to open it, and Novint's firmware (docs/arms/falcon.md)",
+        tried: "palpate-bridge emulate falcon; no hardware yet",
+        default: || DeviceConfig::Falcon(FalconConfig::default()),
     },
 ];
 

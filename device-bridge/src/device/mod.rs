@@ -1,9 +1,14 @@
 //! Arms: one file or folder for each, behind one small trait.
+pub mod falcon;
+pub mod haply_2diy;
 pub mod hapticmaster;
 pub mod inverse3;
 pub mod kinds;
+#[cfg(test)]
+mod noise;
 pub mod phantom;
 pub mod playback;
+pub mod requests;
 pub mod serial;
 pub mod simulated;
 #[cfg(test)]
@@ -16,7 +21,9 @@ use crate::{
     recording::recorder::Recorded,
     settings::{ArmSettings, DeviceSettings},
 };
+use falcon::Falcon;
 use glam::DVec3;
+use haply_2diy::Haply2diy;
 use hapticmaster::HapticMaster;
 use inverse3::Inverse3;
 use palpate_control::Motion;
@@ -114,11 +121,14 @@ pub enum Fault {
     /// Its own word, without a reason.
     #[error("it reports a fault of its own")]
     Broken,
+    /// It does not know where it is any more: it was without power, say.
+    #[error("it lost its home")]
+    Unhomed,
 }
 
 impl Fault {
     /// All of them.
-    pub const ALL: [Self; 10] = [
+    pub const ALL: [Self; 11] = [
         Self::Silent,
         Self::Garbled,
         Self::Refused,
@@ -129,6 +139,7 @@ impl Fault {
         Self::TooMuchForce,
         Self::Scheduler,
         Self::Broken,
+        Self::Unhomed,
     ];
 }
 
@@ -169,6 +180,8 @@ fn open_arm(settings: &ArmSettings, period_s: f64, stop: &CancellationToken) -> 
         ArmSettings::Playback(settings) => Box::new(Playback::open(settings, period_s).map_err(unstarted)?),
         ArmSettings::WoodenHaptics(settings) => Box::new(WoodenHaptics::start(settings, period_s).map_err(unstarted)?),
         ArmSettings::Phantom(settings) => Box::new(Phantom::open(settings, period_s, stop)?),
+        ArmSettings::Haply2diy(settings) => Box::new(Haply2diy::start(settings, period_s).map_err(unstarted)?),
+        ArmSettings::Falcon(settings) => Box::new(Falcon::open(settings, period_s, stop).map_err(unstarted)?),
     })
 }
 

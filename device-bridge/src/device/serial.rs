@@ -1,7 +1,7 @@
-//! A serial line beside the loop: it never waits, and tells lines of text apart.
+//! A serial line beside the loop: it never waits. What its bytes are, each arm says; lines of text are told apart here.
 use super::{Fault, LastWords};
 use rustix::fs::OFlags;
-use serialport::{SerialPort as _, TTYPort};
+use serialport::{ClearBuffer, SerialPort as _, TTYPort};
 use std::{
     fs::File,
     io::{ErrorKind, Read as _, Write as _},
@@ -88,28 +88,44 @@ impl Line {
         }
     }
 
-    /// What has come goes through `lines`; the newest line there is, if any.
+    /// What has come goes through `take`, byte by byte; the newest message that it puts together, if any.
     ///
     /// # Errors
-    /// [`Fault::Disconnected`], [`Fault::Garbled`], or what `parse` says.
-    pub fn newest<T>(
-        &mut self,
-        lines: &mut Lines,
-        mut parse: impl FnMut(&[u8]) -> Result<T, Fault>,
-    ) -> Result<Option<T>, Fault> {
+    /// [`Fault::Disconnected`], or what `take` says.
+    pub fn newest<T>(&mut self, mut take: impl FnMut(u8) -> Result<Option<T>, Fault>) -> Result<Option<T>, Fault> {
         let mut newest = None;
         let mut bytes = [0; CHUNK];
         loop {
             let count = self.receive(&mut bytes)?;
             for &byte in &bytes[..count] {
-                if let Some(line) = lines.take(byte)? {
-                    newest = Some(parse(line)?);
-                }
+                newest = take(byte)?.or(newest);
             }
             if count < CHUNK {
                 return Ok(newest);
             }
         }
+    }
+
+    /// Another rate (bit/s). Not for the loop.
+    ///
+    /// # Errors
+    /// [`Fault::Refused`] when the port has no such rate.
+    pub fn set_baud(&mut self, baud: u32) -> Result<(), Fault> {
+        self.port.set_baud_rate(baud).map_err(|_| Fault::Refused)
+    }
+
+    /// The lines "request to send" and "data terminal ready". A pseudo terminal has none, which is no error.
+    pub fn set_modem_lines(&mut self, request_to_send: bool, data_terminal_ready: bool) {
+        let _ = self.port.write_request_to_send(request_to_send);
+        let _ = self.port.write_data_terminal_ready(data_terminal_ready);
+    }
+
+    /// Forgets what came and was not read.
+    ///
+    /// # Errors
+    /// [`Fault::Disconnected`].
+    pub fn forget(&mut self) -> Result<(), Fault> {
+        self.port.clear(ClearBuffer::Input).map_err(|_| Fault::Disconnected)
     }
 }
 

@@ -1,4 +1,6 @@
 //! `palpate-bridge emulate KIND`: an arm that is not there, for trying a configuration and for tests.
+mod falcon;
+mod haply_2diy;
 mod hapticmaster;
 mod inverse3;
 mod phantom;
@@ -30,6 +32,11 @@ pub enum Emulate {
     Phantom(phantom::Arguments),
     /// A Haply Inverse3 and its service, over a WebSocket; its hand presses the built-in ventricle every two seconds
     Inverse3(inverse3::Arguments),
+    /// A Haply 2diy on a pseudo terminal; its hand presses the built-in ventricle every two seconds
+    #[command(name = "haply-2diy")]
+    Haply2diy(haply_2diy::Arguments),
+    /// A Novint Falcon on a pseudo terminal; its hand presses the built-in ventricle every two seconds
+    Falcon(falcon::Arguments),
 }
 
 const SLOW_US: u32 = 50_000;
@@ -45,6 +52,8 @@ impl Emulate {
             Self::Woodenhaptics(arguments) => arguments.run(),
             Self::Phantom(arguments) => arguments.run(),
             Self::Inverse3(arguments) => arguments.run(),
+            Self::Haply2diy(arguments) => arguments.run(),
+            Self::Falcon(arguments) => arguments.run(),
         }
         .map(|()| ExitCode::SUCCESS)
     }
@@ -75,6 +84,16 @@ fn presses() -> Result<HandPath, BridgeError> {
     let key = |key: &KeyframeConfig| Keyframe { time_s: key.time_s, position_m: DVec3::from_array(key.position_m) };
     HandPath::new(arm.keyframes.iter().map(key).collect(), arm.period_s)
         .map_err(|error| BridgeError::Value { key: "hand".into(), reason: error.to_string() })
+}
+
+/// An arm on a serial line, with a link to its port: faults by their names, until the input ends or says `quit`.
+fn obey_lines_at(what: &str, port: &str, link: &Path, faults: &Faults, known: &[&str]) -> Result<(), BridgeError> {
+    let _link = Link::new(port, link).map_err(|error| BridgeError::Value {
+        key: "--link".into(),
+        reason: format!("cannot make a link at {}: {error}; give another place", link.display()),
+    })?;
+    obey_lines(&format!("{what} is at {} ({port})", link.display()), faults, known);
+    Ok(())
 }
 
 /// Faults by their names, until the input ends or says `quit`.
@@ -136,7 +155,14 @@ mod tests {
     #[test]
     fn every_fault_that_is_named_can_be_caused() {
         let faults = Faults::default();
-        let of_each = [hapticmaster::FAULTS, woodenhaptics::FAULTS, phantom::FAULTS, inverse3::FAULTS];
+        let of_each = [
+            hapticmaster::FAULTS,
+            woodenhaptics::FAULTS,
+            phantom::FAULTS,
+            inverse3::FAULTS,
+            haply_2diy::FAULTS,
+            falcon::FAULTS,
+        ];
         for name in of_each.concat() {
             assert!(name == "slow" || flag(&faults, name).is_some() || error_code(name).is_some(), "{name}");
         }

@@ -1,5 +1,8 @@
 //! Devices that are not there: their bytes over real sockets, with the motion of an arm and a hand, and faults on request.
+mod board;
 pub mod cli;
+pub mod falcon;
+pub mod haply_2diy;
 pub mod hapticmaster;
 pub mod inverse3;
 pub mod phantom;

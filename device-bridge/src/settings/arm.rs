@@ -1,4 +1,6 @@
 //! What the keys of each arm mean: a file for each.
+pub mod falcon;
+pub mod haply_2diy;
 pub mod hapticmaster;
 pub mod inverse3;
 pub mod phantom;
@@ -11,8 +13,9 @@ use crate::{
     BridgeError, Config,
     config::DeviceConfig,
     device::{
-        hapticmaster::start::StartSettings, inverse3::Settings as Inverse3, phantom::Settings as Phantom,
-        playback::Settings as Playback, woodenhaptics::Settings as WoodenHaptics,
+        falcon::Settings as Falcon, haply_2diy::Settings as Haply2diy, hapticmaster::start::StartSettings,
+        inverse3::Settings as Inverse3, phantom::Settings as Phantom, playback::Settings as Playback,
+        woodenhaptics::Settings as WoodenHaptics,
     },
 };
 use palpate_control::SimulatedArm;
@@ -36,6 +39,10 @@ pub enum ArmSettings {
     Inverse3(Inverse3),
     /// A recording.
     Playback(Playback),
+    /// A 2diy.
+    Haply2diy(Haply2diy),
+    /// A Falcon.
+    Falcon(Falcon),
 }
 
 /// The arm of a configuration, checked.
@@ -47,6 +54,8 @@ pub(super) fn checked(config: &Config, period_s: f64) -> Result<ArmSettings, Bri
         DeviceConfig::Phantom(arm) => Ok(ArmSettings::Phantom(phantom::checked(arm, config, period_s)?)),
         DeviceConfig::Inverse3(arm) => Ok(ArmSettings::Inverse3(inverse3::checked(arm, &config.realtime)?)),
         DeviceConfig::Playback(arm) => Ok(ArmSettings::Playback(playback::checked(arm)?)),
+        DeviceConfig::Haply2diy(arm) => Ok(ArmSettings::Haply2diy(haply_2diy::checked(arm)?)),
+        DeviceConfig::Falcon(arm) => Ok(ArmSettings::Falcon(falcon::checked(arm)?)),
     }
 }
 

@@ -67,6 +67,11 @@ pub async fn pressed_n(flicker_n: f64, device: DeviceConfig) -> (f64, Summary) {
     pressed_by(flicker_n, device, |_| {}).await
 }
 
+/// The same for an arm that is somewhere else.
+pub async fn pressed_in_n(flicker_n: f64, workspace: WorkspaceConfig, device: DeviceConfig) -> (f64, Summary) {
+    pressed_by(flicker_n, device, |config| config.workspace = workspace).await
+}
+
 /// The same, by a bridge whose configuration is changed before.
 pub async fn pressed_by(flicker_n: f64, device: DeviceConfig, change: impl FnOnce(&mut Config)) -> (f64, Summary) {
     let mock = Mock::default();
@@ -93,9 +98,19 @@ pub async fn pressed_by(flicker_n: f64, device: DeviceConfig, change: impl FnOnc
 
 /// A bridge in full force (1 N along the world's z, and so the arm's); `fault` happens then. The fault it ended by, and its force (N) then.
 pub async fn lost_by(device: DeviceConfig, arm_n: impl Fn() -> DVec3, fault: impl FnOnce()) -> (Fault, f64) {
+    lost_in(elsewhere(), device, arm_n, fault).await
+}
+
+/// The same for an arm that is somewhere else; `arm_n` is in the world's axes then.
+pub async fn lost_in(
+    workspace: WorkspaceConfig,
+    device: DeviceConfig,
+    arm_n: impl Fn() -> DVec3,
+    fault: impl FnOnce(),
+) -> (Fault, f64) {
     let mock = Mock::default();
     let (address, _stop, _serving) = mock.serve("127.0.0.1:0").await;
-    let bridge = start(bridged(&format!("http://{address}"), device));
+    let bridge = start(Config { workspace, ..bridged(&format!("http://{address}"), device) });
     let stats = bridge.handle.stats();
     until("the force is up", || stats.force_n() > 0.99 && (arm_n() - DVec3::Z).length() < 0.02).await;
     fault();

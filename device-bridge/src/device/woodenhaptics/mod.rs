@@ -141,7 +141,7 @@ impl WoodenHaptics {
         let counts = loop {
             line.send(&message).map_err(strange)?;
             std::thread::sleep(ASK_EVERY);
-            if let Some([a, b, c, ..]) = line.newest(&mut lines, wire::parse).map_err(strange)? {
+            if let Some([a, b, c, ..]) = newest(&mut line, &mut lines).map_err(strange)? {
                 break [a, b, c];
             }
             if began.elapsed() > PATIENCE {
@@ -181,7 +181,7 @@ impl WoodenHaptics {
     }
 
     fn receive(&mut self) -> Result<(), Fault> {
-        if let Some([a, b, c, ..]) = self.line.newest(&mut self.lines, wire::parse)? {
+        if let Some([a, b, c, ..]) = newest(&mut self.line, &mut self.lines)? {
             let passed_s = self.quiet_periods as f64 * self.period_s;
             self.quiet_periods = 0;
             self.renew([a, b, c], passed_s);
@@ -199,6 +199,10 @@ impl WoodenHaptics {
     fn lose(&mut self, fault: Fault) -> Fault {
         *self.lost.get_or_insert(fault)
     }
+}
+
+fn newest(line: &mut Line, lines: &mut Lines) -> Result<Option<[i16; wire::NUMBERS]>, Fault> {
+    line.newest(|byte| lines.take(byte)?.map(wire::parse).transpose())
 }
 
 impl Arm for WoodenHaptics {

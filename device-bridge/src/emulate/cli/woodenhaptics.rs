@@ -1,5 +1,5 @@
 //! `palpate-bridge emulate woodenhaptics`.
-use super::{Link, obey_lines, presses};
+use super::{obey_lines_at, presses};
 use crate::{
     BridgeError,
     config::WoodenHapticsConfig,
@@ -31,12 +31,6 @@ impl Arguments {
         let settings = Settings { constants, answers: self.answers, arm, path };
         let emulated = WoodenHaptics::start(settings)
             .map_err(|source| BridgeError::System { what: "open a pseudo terminal", source })?;
-        let _link = Link::new(emulated.port(), &self.link).map_err(|error| BridgeError::Value {
-            key: "--link".into(),
-            reason: format!("cannot make a link at {}: {error}; give another place", self.link.display()),
-        })?;
-        let place = format!("a WoodenHaptics is at {} ({})", self.link.display(), emulated.port());
-        obey_lines(&place, &emulated.faults, FAULTS);
-        Ok(())
+        obey_lines_at("a WoodenHaptics", emulated.port(), &self.link, &emulated.faults, FAULTS)
     }
 }

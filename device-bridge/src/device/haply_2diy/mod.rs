@@ -1,0 +1,307 @@
+//! Haply 2diy (open hardware): an impedance arm of two motors with encoders, in a plane, on a serial line of USB.
+//!
+//! One request at a time is on its way: it carries two torques, and its answer two angles. So a pose is a tick old, or as long as an answer takes; its age counts from
+//! its request. The tool moves in x and y; z is 0, and a force along z is not felt.
+//!
+//! Its encoders count from where the arm is when the bridge starts: that has to be the pose of [`wire::Axis::offset_deg`]. The published firmware keeps the last torques
+//! for ever: a bridge that ends takes them away, one that is killed does not.
+//!
+//! What only hardware can tell: which way its motors push ([`Settings::reversed`]), and the weight and friction of its links (not compensated).
+pub mod kinematics;
+pub mod wire;
+
+use super::{
+    Arm, Effort, Fault, Reading,
+    requests::{Requests, between},
+    serial::{Line, OpenError},
+};
+use glam::{DMat2, DVec2, DVec3, Vec3Swizzles as _};
+use kinematics::Kinematics;
+use palpate_control::{Motion, Velocity, extrapolate};
+use std::time::{Duration, Instant};
+use thiserror::Error;
+use wire::{Axis, Replies};
+
+/// A pose is believed to go on with its velocity for so long (s).
+const LONGEST_EXTRAPOLATION_S: f64 = 5e-3;
+/// How long the first answer may take.
+const PATIENCE: Duration = Duration::from_secs(3);
+/// A board that does not answer is set up anew after so long: it may have begun anew when the port was opened.
+const SET_UP_EVERY: Duration = Duration::from_secs(1);
+/// Between two looks at whether it answered.
+const LOOK_EVERY: Duration = Duration::from_millis(1);
+
+/// The arm's constants. Of each two, the first is of motor 1, whose link is on the far side of x.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Settings {
+    /// Path of the serial port.
+    pub port: String,
+    /// Its rate; a board with USB of its own does not care.
+    pub baud: u32,
+    /// What the board calls the arm, and begins its answers with.
+    pub device_id: u8,
+    /// Lengths.
+    pub kinematics: Kinematics,
+    /// Motors and encoders.
+    pub axes: [Axis; 2],
+    /// Motors that push against the way that their encoders count.
+    pub reversed: [bool; 2],
+    /// Largest torque (N m) that a motor is ever given.
+    pub max_torque_nm: f64,
+    /// Without an answer for so long the arm is lost.
+    pub silence: Duration,
+}
+
+impl Settings {
+    /// From the order of motors to that of ports, which messages have, and back.
+    pub fn swapped<T: Copy>(&self, [first, second]: [T; 2]) -> [T; 2] {
+        if self.axes[0].port < self.axes[1].port { [first, second] } else { [second, first] }
+    }
+
+    /// Torques (N m) as they are sent, all shortened alike when one is too large: then the force keeps its direction.
+    pub fn sent_nm(&self, torques_nm: DVec2) -> [f32; 2] {
+        if !torques_nm.is_finite() {
+            return [0.0; 2];
+        }
+        let share = (self.max_torque_nm / torques_nm.abs().max_element()).min(1.0);
+        self.swapped((self.signs() * torques_nm * share).to_array()).map(|nm| nm as f32)
+    }
+
+    /// Torques (N m) of the motors from what was sent.
+    pub fn torques_nm(&self, sent_nm: [f64; 2]) -> DVec2 {
+        self.signs() * DVec2::from(self.swapped(sent_nm))
+    }
+
+    /// A step of each encoder (degrees).
+    pub fn steps_deg(&self) -> DVec2 {
+        DVec2::from(self.axes.map(|axis| 360.0 / axis.counts_per_turn))
+    }
+
+    fn signs(&self) -> DVec2 {
+        DVec2::from(self.reversed.map(|reversed| if reversed { -1.0 } else { 1.0 }))
+    }
+}
+
+/// Why the arm could not be started.
+#[derive(Debug, Error)]
+pub enum StartError {
+    /// No port.
+    #[error(transparent)]
+    Open(#[from] OpenError),
+    /// Not a word.
+    #[error("no answer came from {path} within {} s: is the arm's board switched on?", PATIENCE.as_secs())]
+    Silent {
+        /// The port.
+        path: String,
+    },
+    /// Something else.
+    #[error("{path}: {fault}; is it this arm's port?")]
+    Strange {
+        /// The port.
+        path: String,
+        /// What went wrong.
+        fault: Fault,
+    },
+    /// Angles that no such arm has.
+    #[error("{path}: its angles are {} and {} degrees, which no arm of these lengths has", angles_deg[0], angles_deg[1])]
+    Impossible {
+        /// The port.
+        path: String,
+        /// What it says.
+        angles_deg: [f64; 2],
+    },
+}
+
+/// The arm.
+#[derive(Debug)]
+pub struct Haply2diy {
+    line: Line,
+    replies: Replies,
+    settings: Settings,
+    period_s: f64,
+    silence_periods: u64,
+    /// At the newest pose (m/rad).
+    jacobian_m_per_rad: DMat2,
+    /// Rates (degrees/s): at the motors, where a step of the encoder is known; answers are told at ticks.
+    rates: [Velocity; 2],
+    motion: Motion,
+    force_n: DVec2,
+    requests: Requests,
+    /// When the newest pose was asked for: it is not older.
+    asked_at: u64,
+    /// Since it came.
+    quiet_periods: u64,
+    lost: Option<Fault>,
+}
+
+impl Haply2diy {
+    /// Opens the port, sets the board up, and waits for a first answer. Blocks. Torques that were left on are taken away.
+    ///
+    /// # Errors
+    /// [`StartError`].
+    pub fn start(settings: &Settings, period_s: f64) -> Result<Self, StartError> {
+        let path = || settings.port.clone();
+        let strange = |fault| StartError::Strange { path: path(), fault };
+        let mut line = Line::open(&settings.port, settings.baud)?;
+        let mut replies = Replies::new(settings.device_id);
+        let (began, mut set_up) = (Instant::now(), None::<Instant>);
+        let sent_deg = loop {
+            if set_up.is_none_or(|set_up| set_up.elapsed() > SET_UP_EVERY) {
+                line.forget().map_err(strange)?;
+                replies = Replies::new(settings.device_id);
+                set_up_board(&mut line, settings).map_err(strange)?;
+                set_up = Some(Instant::now());
+            }
+            std::thread::sleep(LOOK_EVERY);
+            if let Some(angles_deg) = line.newest(|byte| replies.take(byte)).map_err(strange)? {
+                break angles_deg;
+            }
+            if began.elapsed() > PATIENCE {
+                return Err(StartError::Silent { path: path() });
+            }
+        };
+        let steps_deg = settings.steps_deg();
+        let mut arm = Self {
+            line,
+            replies,
+            period_s,
+            silence_periods: (settings.silence.as_secs_f64() / period_s).ceil() as u64,
+            jacobian_m_per_rad: DMat2::ZERO,
+            rates: [steps_deg.x, steps_deg.y].map(|step| Velocity::new(step, period_s)),
+            motion: Motion::at(DVec3::ZERO),
+            force_n: DVec2::ZERO,
+            requests: Requests::default(),
+            asked_at: 0,
+            quiet_periods: 0,
+            lost: None,
+            settings: settings.clone(),
+        };
+        let impossible = |_| StartError::Impossible { path: path(), angles_deg: settings.swapped(sent_deg) };
+        arm.renew(sent_deg, period_s).map_err(impossible)?;
+        Ok(arm)
+    }
+
+    /// A new pose, `passed_s` after the one before.
+    fn renew(&mut self, sent_deg: [f64; 2], passed_s: f64) -> Result<(), Fault> {
+        let angles_deg = DVec2::from(self.settings.swapped(sent_deg));
+        let angles_rad = angles_deg.map(f64::to_radians);
+        let place = self.settings.kinematics.place(angles_rad).ok_or(Fault::Garbled)?;
+        let [a, b] = &mut self.rates;
+        let rates_deg = DVec2::new(a.push(angles_deg.x, passed_s), b.push(angles_deg.y, passed_s));
+        self.jacobian_m_per_rad = place.jacobian_m_per_rad;
+        self.motion = Motion::at(place.tool_m.extend(0.0));
+        // v = J ω
+        self.motion.velocity_m_per_s = (place.jacobian_m_per_rad * rates_deg.map(f64::to_radians)).extend(0.0);
+        Ok(())
+    }
+
+    fn receive(&mut self) -> Result<(), Fault> {
+        let (replies, requests) = (&mut self.replies, &mut self.requests);
+        let newest = self.line.newest(|byte| {
+            // Nobody asked for it.
+            if requests.unanswered() == 0 {
+                return Err(Fault::Garbled);
+            }
+            let Some(sent_deg) = replies.take(byte)? else { return Ok(None) };
+            Ok(requests.answered().map(|asked_at| (sent_deg, asked_at)))
+        })?;
+        if let Some((sent_deg, asked_at)) = newest {
+            let passed = between(asked_at - self.asked_at, self.quiet_periods);
+            self.renew(sent_deg, passed as f64 * self.period_s)?;
+            self.quiet_periods = 0;
+            self.asked_at = asked_at;
+        }
+        if self.quiet_periods > self.silence_periods { Err(Fault::Silent) } else { Ok(()) }
+    }
+
+    /// τ = Jᵀ F, when the last request is answered, or the arm is lost.
+    fn send(&mut self) -> Result<(), Fault> {
+        if self.requests.unanswered() > 0 && self.lost.is_none() {
+            return Ok(());
+        }
+        self.requests.made();
+        let torques_nm = self.jacobian_m_per_rad.transpose() * self.force_n;
+        self.line.send(&wire::request(self.settings.device_id, self.settings.sent_nm(torques_nm)))
+    }
+
+    fn lose(&mut self, fault: Fault) -> Fault {
+        *self.lost.get_or_insert(fault)
+    }
+}
+
+fn set_up_board(line: &mut Line, settings: &Settings) -> Result<(), Fault> {
+    let id = settings.device_id;
+    line.send(&[wire::RESET, id])?;
+    line.send(&wire::setup(id, settings.swapped(settings.axes)))?;
+    line.send(&wire::request(id, [0.0; 2]))
+}
+
+impl Arm for Haply2diy {
+    fn read(&mut self, periods: u64) -> Result<Reading, Fault> {
+        if let Some(fault) = self.lost {
+            return Err(fault);
+        }
+        self.requests.pass(periods);
+        self.quiet_periods = self.quiet_periods.saturating_add(periods);
+        self.receive().map_err(|fault| self.lose(fault))?;
+        let age_s = (self.requests.now() - self.asked_at) as f64 * self.period_s;
+        Ok(Reading {
+            motion: extrapolate(&self.motion, age_s, LONGEST_EXTRAPOLATION_S),
+            buttons: 0,
+            measured_force_n: None,
+            age_s,
+            force_share: 1.0,
+        })
+    }
+
+    /// A lost arm is still told to let go, should it hear.
+    fn apply(&mut self, effort: &Effort) {
+        self.force_n = effort.unless(self.lost.is_some()).force_n.xy();
+        if let Err(fault) = self.send() {
+            self.lose(fault);
+        }
+    }
+}
+
+impl Drop for Haply2diy {
+    /// Takes the torques away.
+    fn drop(&mut self) {
+        let _ = self.line.send(&wire::request(self.settings.device_id, [0.0; 2]));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{config::Haply2diyConfig, device::noise::Pair, settings::arm};
+
+    /// As if each were asked for: poses that are numbers, or a fault by its name, and nothing else.
+    #[test]
+    fn a_million_random_bytes_are_poses_or_garbled() {
+        let mut pair = Pair::new();
+        let keys = Haply2diyConfig { port: pair.path.clone(), ..Haply2diyConfig::default() };
+        let settings = arm::haply_2diy::checked(&keys).unwrap();
+        let answer = wire::reply(settings.device_id, [12.0, 168.0]);
+        let mut arm = pair.starting(&answer, || Haply2diy::start(&settings, 1e-3)).unwrap();
+        let (mut readings, mut faults) = (0, 0);
+        pair.feed(&answer, || {
+            arm.requests.made();
+            arm.lost = None;
+            match arm.read(1) {
+                Ok(reading) => {
+                    assert!(reading.motion.is_finite());
+                    readings += 1;
+                }
+                Err(fault) => {
+                    assert_eq!(fault, Fault::Garbled);
+                    arm.line.forget().unwrap();
+                    arm.replies = Replies::new(settings.device_id);
+                    faults += 1;
+                }
+            }
+            arm.quiet_periods = 0;
+            arm.apply(&Effort::force(DVec3::ONE));
+        });
+        assert!(faults > 1000 && readings > 1000, "{faults} {readings}");
+    }
+}

@@ -1,0 +1,76 @@
+//! Random bytes on a real line, for tests of what drivers make of them.
+#![allow(clippy::unwrap_used)]
+use serialport::{SerialPort as _, TTYPort};
+use std::{
+    io::{Read as _, Write as _},
+    time::Duration,
+};
+
+/// Both ends of a pseudo terminal, and the path of the driver's.
+pub(crate) struct Pair {
+    ours: TTYPort,
+    /// Open, or ours would end with whoever closes it.
+    _theirs: TTYPort,
+    pub(crate) path: String,
+}
+
+impl Pair {
+    pub(crate) fn new() -> Self {
+        let (ours, theirs) = TTYPort::pair().unwrap();
+        let path = theirs.name().unwrap();
+        Self { ours, _theirs: theirs, path }
+    }
+
+    /// A driver that starts, while every message of its is answered so.
+    pub(crate) fn starting<T: Send>(&mut self, answer: &[u8], start: impl FnOnce() -> T + Send) -> T {
+        self.ours.set_timeout(Duration::from_millis(5)).unwrap();
+        std::thread::scope(|scope| {
+            let started = scope.spawn(start);
+            while !started.is_finished() {
+                if self.ours.read(&mut [0; 64]).is_ok() {
+                    self.ours.write_all(answer).unwrap();
+                }
+            }
+            started.join().unwrap()
+        })
+    }
+
+    /// A million random bytes, in pieces of up to 64: every other one within messages of the arm; `look` after each.
+    pub(crate) fn feed(&mut self, message: &[u8], mut look: impl FnMut()) {
+        let mut left = 1_000_000_usize;
+        let mut random = Random(0x9e37_79b9_7f4a_7c15);
+        while left > 0 {
+            let noise: Vec<u8> = (0..=random.next() % 64).map(|_| random.next() as u8).collect();
+            let piece =
+                if noise.len().is_multiple_of(2) { spliced(message, &noise, &mut random) } else { noise.clone() };
+            self.ours.write_all(&piece).unwrap();
+            look();
+            left = left.saturating_sub(noise.len());
+            // What the driver says is not heard, and must not pile up.
+            let said = self.ours.bytes_to_read().unwrap() as usize;
+            self.ours.read_exact(&mut vec![0; said]).unwrap();
+        }
+    }
+}
+
+/// Two messages, in the midst of which a part of the noise was put, or takes the place of what was there.
+fn spliced(message: &[u8], noise: &[u8], random: &mut Random) -> Vec<u8> {
+    let mut piece = [message, message].concat();
+    let at = random.next() as usize % piece.len();
+    let few = &noise[..noise.len().min(1 + random.next() as usize % 4)];
+    let replaced = if random.next().is_multiple_of(2) { few.len().min(piece.len() - at) } else { 0 };
+    piece.splice(at..at + replaced, few.iter().copied());
+    piece
+}
+
+/// Marsaglia's xorshift.
+struct Random(u64);
+
+impl Random {
+    fn next(&mut self) -> u64 {
+        self.0 ^= self.0 << 13;
+        self.0 ^= self.0 >> 7;
+        self.0 ^= self.0 << 17;
+        self.0
+    }
+}
