@@ -1,12 +1,14 @@
 //! The configuration file, as written; [`crate::settings::Settings`] is what it means.
 mod device;
+mod vrpn_server;
 mod workspace;
 
 use crate::{BridgeError, error::ConfigError};
-pub use device::{DeviceConfig, HapticMasterConfig, KeyframeConfig, SimulatedConfig, WoodenHapticsConfig};
+pub use device::{DeviceConfig, HapticMasterConfig, KeyframeConfig, SimulatedConfig, VrpnConfig, WoodenHapticsConfig};
 use miette::NamedSource;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
+pub use vrpn_server::VrpnServerConfig;
 pub use workspace::WorkspaceConfig;
 
 /// All of it. Every key has a default; unknown keys are refused.
@@ -29,6 +31,8 @@ pub struct Config {
     pub realtime: RealtimeConfig,
     /// Where in the world the arm is.
     pub workspace: WorkspaceConfig,
+    /// For programs that read poses and forces by VRPN.
+    pub vrpn_server: VrpnServerConfig,
     /// The arm.
     pub device: DeviceConfig,
 }
@@ -279,7 +283,7 @@ mod tests {
 
     #[test]
     fn the_examples_are_valid() {
-        for example in ["bridge.toml", "hapticmaster.toml", "woodenhaptics.toml"] {
+        for example in ["bridge.toml", "hapticmaster.toml", "woodenhaptics.toml", "vrpn.toml"] {
             let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../deploy").join(example);
             let config = Config::read(&path).unwrap();
             crate::settings::Settings::new(&config).unwrap();

@@ -1,5 +1,6 @@
 //! What the configuration means: checked, in the types that the loop and the uplink use.
 pub mod arm;
+mod vrpn_server;
 
 use crate::{
     BridgeError, Config,
@@ -15,6 +16,7 @@ use palpate_proto::connect::{self, ConnectError};
 use palpate_realtime::OsMeasures;
 use std::time::Duration;
 use tonic::transport::Endpoint;
+pub use vrpn_server::VrpnServerSettings;
 
 /// The whole bridge.
 #[derive(Debug, Clone)]
@@ -25,6 +27,8 @@ pub struct Settings {
     pub servo: ServoSettings,
     /// The arm.
     pub device: DeviceSettings,
+    /// For programs that read by VRPN.
+    pub vrpn_server: Option<VrpnServerSettings>,
     /// What to ask of the operating system.
     pub measures: OsMeasures,
     /// Pause between lines of counters.
@@ -105,6 +109,7 @@ impl Settings {
                 workspace,
                 clutch: clutch(config, &servo.watchdog)?,
             },
+            vrpn_server: vrpn_server::checked(&config.vrpn_server, rate_hz)?,
             servo,
             measures: measures(config)?,
             report_every: (!report_every.is_zero()).then_some(report_every),

@@ -1,11 +1,13 @@
 //! `[device]`: each kind of arm with its keys.
 mod hapticmaster;
 mod simulated;
+mod vrpn;
 mod woodenhaptics;
 
 pub use hapticmaster::HapticMasterConfig;
 use serde::{Deserialize, Serialize};
 pub use simulated::{KeyframeConfig, SimulatedConfig};
+pub use vrpn::VrpnConfig;
 pub use woodenhaptics::WoodenHapticsConfig;
 
 /// The arm.
@@ -18,6 +20,8 @@ pub enum DeviceConfig {
     Hapticmaster(HapticMasterConfig),
     /// WoodenHaptics, on a serial line.
     Woodenhaptics(WoodenHapticsConfig),
+    /// Any arm behind a VRPN server.
+    Vrpn(VrpnConfig),
 }
 
 impl Default for DeviceConfig {

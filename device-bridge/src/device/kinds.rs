@@ -1,5 +1,5 @@
 //! The kinds of arms that there are drivers for: each one's name, what people are told of it, and its keys.
-use crate::config::{DeviceConfig, HapticMasterConfig, SimulatedConfig, WoodenHapticsConfig};
+use crate::config::{DeviceConfig, HapticMasterConfig, SimulatedConfig, VrpnConfig, WoodenHapticsConfig};
 use std::fmt::Write as _;
 
 /// What is told of a kind.
@@ -18,7 +18,7 @@ pub struct Kind {
 }
 
 /// All of them.
-pub static KINDS: [Kind; 3] = [
+pub static KINDS: [Kind; 4] = [
     Kind {
         name: "simulated",
         what: "no hardware: a mass held by a hand that follows a path",
@@ -39,6 +39,13 @@ pub static KINDS: [Kind; 3] = [
         needs: "its port, and the right to open it (docs/arms/woodenhaptics.md)",
         tried: "palpate-bridge emulate woodenhaptics; no hardware yet",
         default: || DeviceConfig::Woodenhaptics(WoodenHapticsConfig::default()),
+    },
+    Kind {
+        name: "vrpn",
+        what: "any arm behind a VRPN server, over TCP",
+        needs: "the server's address and the arm's names there (docs/arms/vrpn.md)",
+        tried: "palpate-bridge emulate vrpn; no hardware yet",
+        default: || DeviceConfig::Vrpn(VrpnConfig::default()),
     },
 ];
 

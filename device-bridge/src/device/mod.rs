@@ -3,6 +3,8 @@ pub mod hapticmaster;
 pub mod kinds;
 pub mod serial;
 pub mod simulated;
+pub mod tcp;
+pub mod vrpn;
 #[cfg(test)]
 mod witness;
 pub mod woodenhaptics;
@@ -19,6 +21,7 @@ use simulated::SimulatedDevice;
 use std::fmt::Debug;
 use thiserror::Error;
 use tokio_util::sync::CancellationToken;
+use vrpn::Vrpn;
 #[cfg(test)]
 pub use witness::Witness;
 use woodenhaptics::WoodenHaptics;
@@ -114,6 +117,7 @@ fn open_arm(settings: &ArmSettings, period_s: f64, stop: &CancellationToken) -> 
     Ok(match settings {
         ArmSettings::Simulated(arm) => Box::new(SimulatedDevice::new(arm.clone())),
         ArmSettings::HapticMaster(settings) => Box::new(HapticMaster::open(settings, period_s, stop)?),
+        ArmSettings::Vrpn(settings) => Box::new(Vrpn::start(settings, period_s).map_err(unstarted)?),
         ArmSettings::WoodenHaptics(settings) => Box::new(WoodenHaptics::start(settings, period_s).map_err(unstarted)?),
     })
 }

@@ -1,5 +1,6 @@
 //! `palpate-bridge emulate KIND`: an arm that is not there, for trying a configuration and for tests.
 mod hapticmaster;
+mod vrpn;
 mod woodenhaptics;
 
 use super::Faults;
@@ -24,6 +25,8 @@ pub enum Emulate {
     Hapticmaster(hapticmaster::Arguments),
     /// A WoodenHaptics on a pseudo terminal; its hand presses the built-in ventricle every two seconds
     Woodenhaptics(woodenhaptics::Arguments),
+    /// A VRPN server with an arm; its hand presses the built-in ventricle every two seconds
+    Vrpn(vrpn::Arguments),
 }
 
 const SLOW_US: u32 = 50_000;
@@ -37,6 +40,7 @@ impl Emulate {
         match self {
             Self::Hapticmaster(arguments) => arguments.run(),
             Self::Woodenhaptics(arguments) => arguments.run(),
+            Self::Vrpn(arguments) => arguments.run(),
         }
         .map(|()| ExitCode::SUCCESS)
     }
@@ -114,7 +118,7 @@ mod tests {
     #[test]
     fn every_fault_that_is_named_can_be_caused() {
         let faults = Faults::default();
-        for name in [hapticmaster::FAULTS, woodenhaptics::FAULTS].concat() {
+        for name in [hapticmaster::FAULTS, woodenhaptics::FAULTS, vrpn::FAULTS].concat() {
             assert!(name == "slow" || flag(&faults, name).is_some(), "{name}");
         }
     }

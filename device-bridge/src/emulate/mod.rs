@@ -1,6 +1,7 @@
 //! Devices that are not there: their bytes over real sockets, with the motion of an arm and a hand, and faults on request.
 pub mod cli;
 pub mod hapticmaster;
+pub mod vrpn;
 pub mod woodenhaptics;
 
 use std::{

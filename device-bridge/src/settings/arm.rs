@@ -1,13 +1,14 @@
 //! What the keys of each arm mean: a file for each.
 pub mod hapticmaster;
 pub mod simulated;
+pub mod vrpn;
 pub mod woodenhaptics;
 
 use super::value;
 use crate::{
     BridgeError, Config,
     config::DeviceConfig,
-    device::{hapticmaster::start::StartSettings, woodenhaptics::Settings as WoodenHaptics},
+    device::{hapticmaster::start::StartSettings, vrpn::Settings as Vrpn, woodenhaptics::Settings as WoodenHaptics},
 };
 use palpate_control::SimulatedArm;
 use std::ops::RangeInclusive;
@@ -24,6 +25,8 @@ pub enum ArmSettings {
     HapticMaster(StartSettings),
     /// A WoodenHaptics.
     WoodenHaptics(WoodenHaptics),
+    /// An arm behind a VRPN server.
+    Vrpn(Vrpn),
 }
 
 /// The arm of a configuration, checked.
@@ -32,6 +35,7 @@ pub(super) fn checked(config: &Config, period_s: f64) -> Result<ArmSettings, Bri
         DeviceConfig::Simulated(arm) => Ok(ArmSettings::Simulated(simulated::checked(arm, period_s)?)),
         DeviceConfig::Hapticmaster(arm) => Ok(ArmSettings::HapticMaster(hapticmaster::checked(arm, &config.limits)?)),
         DeviceConfig::Woodenhaptics(arm) => Ok(ArmSettings::WoodenHaptics(woodenhaptics::checked(arm)?)),
+        DeviceConfig::Vrpn(arm) => Ok(ArmSettings::Vrpn(vrpn::checked(arm, &config.limits)?)),
     }
 }
 
