@@ -4,10 +4,12 @@ use crate::{
     device::{Arm, Effort, Reading},
     run::Shared,
     settings::ServoSettings,
+    vrpn_server::moment::MomentWriter,
 };
 use glam::DVec3;
 use palpate_control::{
-    Fault, ForceLimiter, ForceLimits, Limited, Link, Motion, PassivityController, ThermalLimiter, Verdict, Watchdog,
+    Fault, ForceLimiter, ForceLimits, Limited, Link, LocalModel, Motion, PassivityController, ThermalLimiter, Verdict,
+    Watchdog,
 };
 use palpate_realtime::{Doorbell, SlotReader, SlotWriter, TickLoop, Wakeup};
 use std::{
@@ -85,6 +87,11 @@ impl ServoLaw {
     /// Leaves a latched fault; the force comes back slowly, with the next command.
     pub fn recover(&mut self) -> bool {
         self.watchdog.recover()
+    }
+
+    /// The contact of the newest command.
+    pub fn contact(&self) -> Option<LocalModel> {
+        self.command.and_then(|command| command.local_model)
     }
 
     /// Faults latched so far.
@@ -186,6 +193,8 @@ pub struct Servo {
     pub up: SlotWriter<Option<Sample>>,
     /// Tells the uplink of a sample.
     pub bell: Doorbell,
+    /// For programs that watch by VRPN.
+    pub told: Option<MomentWriter>,
     /// Flags and counters.
     pub shared: Arc<Shared>,
     /// Sequence number of the last sample.
@@ -217,11 +226,8 @@ impl Servo {
         self.device.apply(&Effort::force(tick.limited.force_n));
         if let Ok(reading) = read
             && reading.motion.is_finite()
-            && self.shared.attached.load(Ordering::Relaxed)
         {
-            self.sequence += 1;
-            self.up.publish(Some(Sample { sequence: self.sequence, device_time_ns: now_ns, reading }));
-            self.bell.ring();
+            self.tell(now_ns, &reading, &tick);
         }
         self.count(&tick, motion.is_finite());
         match tick.verdict.link {
@@ -229,6 +235,19 @@ impl Servo {
             // Whatever took the force away: a lost arm has to be opened anew.
             Link::Latched(_) if read.is_err() || self.shared.stop.load(Ordering::Relaxed) => ControlFlow::Break(()),
             _ => ControlFlow::Continue(()),
+        }
+    }
+
+    /// The uplink, and those that watch.
+    fn tell(&mut self, now_ns: u64, reading: &Reading, tick: &ServoTick) {
+        if self.shared.attached.load(Ordering::Relaxed) {
+            self.sequence += 1;
+            self.up.publish(Some(Sample { sequence: self.sequence, device_time_ns: now_ns, reading: *reading }));
+            self.bell.ring();
+        }
+        if let Some(told) = &mut self.told {
+            let contact = self.law.contact().filter(|_| tick.verdict.ramp > 0.0);
+            told.tell(now_ns, reading, tick.limited.force_n, contact);
         }
     }
 
@@ -297,6 +316,7 @@ mod tests {
             down,
             up,
             bell: Doorbell::new().unwrap(),
+            told: None,
             shared: Arc::default(),
             sequence: 0,
         };

@@ -4,16 +4,18 @@ use assert_no_alloc::{AllocDisabler, assert_no_alloc};
 use glam::{DMat3, DVec3};
 use palpate_bridge::{
     Config,
-    config::{DeviceConfig, HapticMasterConfig, WoodenHapticsConfig},
+    config::{DeviceConfig, HapticMasterConfig, VrpnConfig, WoodenHapticsConfig},
     convert::Command,
     device::{self, Effort},
     emulate::{
         hapticmaster::{self, HapticMaster},
+        vrpn::{self, Vrpn},
         woodenhaptics::{self, WoodenHaptics},
     },
     run::Shared,
     servo::{Servo, ServoLaw},
     settings::{Settings, arm},
+    vrpn_server::moment::moments,
 };
 use palpate_control::{ArmSpec, ForceLimits, HandPath, LocalModel};
 use palpate_realtime::{Clock, Doorbell, TickLoop, slot};
@@ -29,6 +31,7 @@ fn the_servo_allocates_nothing() {
     let settings = runtime.block_on(async { Settings::new(&Config::default()).unwrap() });
     let (mut commands, down) = slot(&None);
     let (up, mut samples) = slot(&None);
+    let (told, mut moments, _bell) = moments(3).unwrap();
     let shared = Arc::new(Shared::default());
     shared.attached.store(true, Ordering::Relaxed);
     let mut servo = Servo {
@@ -38,6 +41,7 @@ fn the_servo_allocates_nothing() {
         down,
         up,
         bell: Doorbell::new().unwrap(),
+        told: Some(told),
         shared: Arc::clone(&shared),
         sequence: 0,
     };
@@ -69,6 +73,7 @@ fn the_servo_allocates_nothing() {
     thread.join().unwrap();
     assert!(samples.take().is_some_and(|sample| sample.is_some_and(|sample| sample.sequence > 10)));
     assert!(shared.stats.summary().peak_force_n > 0.1);
+    assert!(moments.take().is_some_and(|moment| moment.is_some_and(|moment| moment.number > 10)));
 }
 
 /// An arm's driver: its sockets, its text, its numbers.
@@ -104,4 +109,12 @@ fn the_woodenhaptics_driver_allocates_nothing() {
     let emulated = WoodenHaptics::start(settings).unwrap();
     drive(DeviceConfig::Woodenhaptics(WoodenHapticsConfig { port: emulated.port().to_owned(), ..keys }));
     assert!(emulated.lines() > 100);
+}
+
+#[test]
+fn the_vrpn_driver_allocates_nothing() {
+    let emulated = Vrpn::listen("127.0.0.1:0", vrpn::Settings::default()).unwrap();
+    let address = emulated.address().to_string();
+    drive(DeviceConfig::Vrpn(VrpnConfig { address, ..VrpnConfig::default() }));
+    assert!(emulated.fields() > 100);
 }

@@ -170,7 +170,7 @@ impl Server {
             }
             {
                 let mut machine = self.0.machine();
-                while let Some(message) = peer.next().map_err(Error::other)? {
+                while let Some(message) = peer.next_told().map_err(Error::other)? {
                     machine.obey(message.sender, message.kind, peer.payload(&message));
                 }
                 machine.go_on();

@@ -188,7 +188,7 @@ mod tests {
     fn receive(peer: &mut Peer, heard: &mut Heard, bytes: &[u8]) -> Result<(), Fault> {
         peer.received.room()[..bytes.len()].copy_from_slice(bytes);
         peer.received.came(bytes.len());
-        while let Some(told) = peer.next().map_err(|_| Fault::Garbled)? {
+        while let Some(told) = peer.next_told().map_err(|_| Fault::Garbled)? {
             heard.take(told.sender, told.kind, peer.payload(&told))?;
         }
         Ok(())
@@ -245,7 +245,7 @@ mod tests {
             let (mut peer, mut heard) = (Peer::new(names()), Heard::new(SENDERS));
             let _ = traffic.chunks(parts).try_for_each(|part| receive(&mut peer, &mut heard, part));
             prop_assert!(heard.new_pose().is_none_or(|pose| pose.position_m.is_finite()));
-            prop_assert!(heard.force_n().is_none_or(|force_n| force_n.is_finite()));
+            prop_assert!(heard.force_n().is_none_or(DVec3::is_finite));
         }
     }
 }

@@ -102,7 +102,9 @@ pub fn parse_states(payload: &[u8]) -> Option<u32> {
 pub fn write_states(buttons: u32, count: u32, into: &mut Vec<u8>) {
     let count = count.min(u32::BITS);
     write_i32(count.cast_signed(), into);
-    (0..count).for_each(|button| write_i32((buttons >> button & 1).cast_signed(), into));
+    for button in 0..count {
+        write_i32((buttons >> button & 1).cast_signed(), into);
+    }
 }
 
 /// A force (N): `vrpn_ForceDevice Force`. `None` for what is none.
@@ -199,7 +201,9 @@ fn write_i32(number: i32, into: &mut Vec<u8>) {
 }
 
 fn write_f64s(numbers: &[f64], into: &mut Vec<u8>) {
-    numbers.iter().for_each(|number| into.extend_from_slice(&number.to_be_bytes()));
+    for number in numbers {
+        into.extend_from_slice(&number.to_be_bytes());
+    }
 }
 
 /// A sensor's number, filled up to where numbers of 8 bytes lie.

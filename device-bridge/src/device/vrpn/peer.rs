@@ -102,8 +102,8 @@ impl Peer {
     ///
     /// # Errors
     /// [`Malformed`].
-    pub fn next(&mut self) -> Result<Option<Told>, Malformed> {
-        while let Some((header, payload)) = self.received.next()? {
+    pub fn next_told(&mut self) -> Result<Option<Told>, Malformed> {
+        while let Some((header, payload)) = self.received.next_message()? {
             let (sender, kind) = (header.sender, header.kind);
             if matches!(kind, wire::SENDER_DESCRIPTION | wire::TYPE_DESCRIPTION) {
                 self.learn(&header, payload)?;
@@ -165,10 +165,10 @@ mod tests {
         out.message(header(17, 3), |_| ());
         out.message(header(17, 1999), |into| payload::write_change(1, true, into));
         feed(&mut peer, out.bytes());
-        let told = peer.next().unwrap().unwrap();
+        let told = peer.next_told().unwrap().unwrap();
         assert_eq!((told.sender, told.kind), (1, Kind::ButtonChange));
         assert_eq!(payload::parse_change(peer.payload(&told)), Some((1, true)));
-        assert!(peer.next().unwrap().is_none() && peer.has(1) && !peer.has(0));
+        assert!(peer.next_told().unwrap().is_none() && peer.has(1) && !peer.has(0));
     }
 
     #[test]
@@ -178,7 +178,7 @@ mod tests {
             let header = Header { time: Time::default(), sender: id, kind: wire::SENDER_DESCRIPTION };
             out.message(header, |into| payload::write_name("x", into));
             feed(&mut peer, out.bytes());
-            assert_eq!(peer.next().unwrap_err(), Malformed);
+            assert_eq!(peer.next_told().unwrap_err(), Malformed);
         }
     }
 }

@@ -100,7 +100,7 @@ impl Default for Received {
 }
 
 impl Received {
-    /// Where to put what comes next; never empty after [`Received::next`] said that nothing is whole.
+    /// Where to put what comes next; never empty after [`Received::next_message`] said that nothing is whole.
     pub fn room(&mut self) -> &mut [u8] {
         self.bytes.copy_within(self.waiting.clone(), 0);
         self.waiting = 0..self.waiting.len();
@@ -123,7 +123,7 @@ impl Received {
     ///
     /// # Errors
     /// [`Malformed`]; what comes behind it means nothing.
-    pub fn next(&mut self) -> Result<Option<(Header, Range<usize>)>, Malformed> {
+    pub fn next_message(&mut self) -> Result<Option<(Header, Range<usize>)>, Malformed> {
         let Some(header) = self.bytes[self.waiting.clone()].first_chunk::<HEADER_BYTES>() else { return Ok(None) };
         let [length, s, us, sender, kind, _] = numbers(header);
         let payload = (length as usize).checked_sub(HEADER_BYTES).ok_or(Malformed)?;
@@ -208,7 +208,7 @@ mod tests {
         for part in bytes.chunks(parts) {
             received.room()[..part.len()].copy_from_slice(part);
             received.came(part.len());
-            while let Some((header, at)) = received.next()? {
+            while let Some((header, at)) = received.next_message()? {
                 messages.push((header, received.payload(at).to_vec()));
             }
         }
