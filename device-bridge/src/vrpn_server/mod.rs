@@ -132,6 +132,12 @@ impl VrpnServer {
             }
         }
         programs.tasks.shutdown().await;
+        let stats = &programs.shared.stats.vrpn_server;
+        let [served, turned_away, told, dropped] =
+            [&stats.served, &stats.turned_away, &stats.told, &stats.dropped].map(crate::stats::Counter::get);
+        tracing::info!(
+            "VRPN: {served} programs served, {turned_away} turned away; {told} moments told, {dropped} missed by slow ones"
+        );
     }
 }
 

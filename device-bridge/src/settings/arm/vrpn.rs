@@ -43,3 +43,26 @@ pub fn checked(config: &VrpnConfig, limits: &LimitsConfig) -> Result<Settings, B
         silence: seconds("device.silence_s", config.silence_s)?,
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_refusal_names_the_key() {
+        let refused = |change: fn(&mut VrpnConfig)| {
+            let mut config = VrpnConfig::default();
+            change(&mut config);
+            checked(&config, &LimitsConfig::default()).unwrap_err().to_string()
+        };
+        assert!(refused(|c| c.tracker = String::new()).starts_with("device.tracker: \"\" is no name"));
+        assert!(refused(|c| c.button = "Phantom0@host".into()).starts_with("device.button"));
+        assert!(refused(|c| c.force_device = "a\n".into()).starts_with("device.force_device"));
+        assert!(refused(|c| c.sensor = -1).starts_with("device.sensor: -1 is out"));
+        assert!(refused(|c| c.field_radius_m = 0.0).starts_with("device.field_radius_m: 0 is out"));
+        assert!(refused(|c| c.position_step_m = f64::NAN).starts_with("device.position_step_m"));
+        assert!(refused(|c| c.silence_s = -1.0).starts_with("device.silence_s"));
+        let none = VrpnConfig { button: String::new(), force_device: String::new(), ..VrpnConfig::default() };
+        assert!(checked(&none, &LimitsConfig::default()).is_ok());
+    }
+}
