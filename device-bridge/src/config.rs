@@ -6,12 +6,15 @@ mod workspace;
 use crate::{BridgeError, error::ConfigError};
 pub use device::{
     DeviceConfig, FalconConfig, Haply2diyConfig, HapticMasterConfig, Inverse3Config, Inverse3Dialect, KeyframeConfig,
-    PhantomConfig, PlaybackConfig, SimulatedConfig, WoodenHapticsConfig,
+    PhantomConfig, PlaybackConfig, SimulatedConfig, VrpnConfig, WoodenHapticsConfig,
 };
+mod vrpn_server;
+
 use miette::NamedSource;
 pub use record::RecordConfig;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
+pub use vrpn_server::VrpnServerConfig;
 pub use workspace::WorkspaceConfig;
 
 /// All of it. Every key has a default; unknown keys are refused.
@@ -36,6 +39,8 @@ pub struct Config {
     pub workspace: WorkspaceConfig,
     /// What the arm does, written down.
     pub record: RecordConfig,
+    /// For programs that read poses and forces by VRPN.
+    pub vrpn_server: VrpnServerConfig,
     /// The arm.
     pub device: DeviceConfig,
 }

@@ -23,6 +23,7 @@ pub mod servo;
 pub mod settings;
 pub mod stats;
 pub mod uplink;
+pub mod vrpn_server;
 
 pub use config::Config;
 pub use error::BridgeError;

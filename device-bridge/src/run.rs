@@ -6,6 +6,7 @@ use crate::{
     settings::{ServoSettings, Settings},
     stats::reason,
     uplink::{SampleSource, Uplink},
+    vrpn_server,
 };
 use palpate_control::{EnergyMeter, Link};
 use palpate_realtime::{Clock, Doorbell, Note, OsMeasures, TickLoop, slot};
@@ -101,6 +102,7 @@ pub async fn run(config: Config, shutdown: CancellationToken) -> Result<Summary,
 pub async fn run_with(config: &Config, shutdown: CancellationToken, handle: Handle) -> Result<Summary, BridgeError> {
     let settings = Settings::new(config)?;
     let shared = handle.shared;
+    let (server, told) = vrpn_server::open(settings.vrpn_server.as_ref(), &shared)?.unzip();
     let device = open(&settings, &shutdown).await?;
     let Some(device) = device else { return Ok(shared.stats.summary()) };
     let (commands, down) = slot(&None);
@@ -116,6 +118,7 @@ pub async fn run_with(config: &Config, shutdown: CancellationToken, handle: Hand
         down,
         up,
         bell,
+        told,
         shared: Arc::clone(&shared),
         sequence: 0,
         energy: EnergyMeter::default(),
@@ -126,6 +129,7 @@ pub async fn run_with(config: &Config, shutdown: CancellationToken, handle: Hand
     let mut servo_done = start_servo(servo, &settings).await?;
     let end = CancellationToken::new();
     let _no_stream_alone = end.clone().drop_guard();
+    let server = server.map(|server| tokio::spawn(server.run(end.clone())));
     let uplink = Uplink::new(settings.uplink.clone(), source, commands, Arc::clone(&shared), end.clone());
     let mut uplink = tokio::spawn(uplink.run());
     let mut watcher = Watcher::new(&settings);
@@ -150,6 +154,9 @@ pub async fn run_with(config: &Config, shutdown: CancellationToken, handle: Hand
         Outcome::UplinkEnded(ended) => ended,
         _ => time::timeout(END_TIMEOUT, uplink).await.unwrap_or(Ok(Ok(()))),
     };
+    if let Some(server) = server {
+        let _ = time::timeout(END_TIMEOUT, server).await;
+    }
     stopped?;
     match ended {
         Ok(result) => result.map(|()| shared.stats.summary()),

@@ -5,11 +5,12 @@ use crate::{
     guard::Guard,
     run::Shared,
     settings::ServoSettings,
+    vrpn_server::moment::MomentWriter,
 };
 use glam::DVec3;
 use palpate_control::{
-    EnergyMeter, Fault, ForceLimiter, ForceLimits, Limited, Link, Motion, PassivityController, RenderSettings,
-    StiffnessBound, SuccessRate, ThermalLimiter, Verdict, Watchdog,
+    EnergyMeter, Fault, ForceLimiter, ForceLimits, Limited, Link, LocalModel, Motion, PassivityController,
+    RenderSettings, StiffnessBound, SuccessRate, ThermalLimiter, Verdict, Watchdog,
 };
 use palpate_realtime::{Doorbell, SlotReader, SlotWriter, TickLoop, Wakeup};
 use std::{
@@ -106,6 +107,11 @@ impl ServoLaw {
     /// Leaves a latched fault; the force comes back slowly, with the next command.
     pub fn recover(&mut self) -> bool {
         self.watchdog.recover()
+    }
+
+    /// The contact of the newest command.
+    pub fn contact(&self) -> Option<LocalModel> {
+        self.command.and_then(|command| command.local_model)
     }
 
     /// Faults latched so far.
@@ -220,6 +226,8 @@ pub struct Servo {
     pub up: SlotWriter<Option<Sample>>,
     /// Tells the uplink of a sample.
     pub bell: Doorbell,
+    /// For programs that watch by VRPN.
+    pub told: Option<MomentWriter>,
     /// Flags and counters.
     pub shared: Arc<Shared>,
     /// Sequence number of the last sample.
@@ -260,11 +268,8 @@ impl Servo {
         self.energy.step(motion.position_m, tick.limited.force_n);
         if let Ok(reading) = read
             && reading.motion.is_finite()
-            && self.shared.attached.load(Ordering::Relaxed)
         {
-            self.sequence += 1;
-            self.up.publish(Some(Sample { sequence: self.sequence, device_time_ns: now_ns, reading }));
-            self.bell.ring();
+            self.tell(now_ns, &reading, &tick);
         }
         self.count(&tick, motion.is_finite());
         match tick.verdict.link {
@@ -280,6 +285,19 @@ impl Servo {
         let none =
             [&self.shared.without_force, &self.shared.unmeasured].iter().any(|flag| flag.load(Ordering::Relaxed));
         if none { 0.0 } else { self.last.map_or(1.0, |reading| reading.force_share) }
+    }
+
+    /// The uplink, and those that watch.
+    fn tell(&mut self, now_ns: u64, reading: &Reading, tick: &ServoTick) {
+        if self.shared.attached.load(Ordering::Relaxed) {
+            self.sequence += 1;
+            self.up.publish(Some(Sample { sequence: self.sequence, device_time_ns: now_ns, reading: *reading }));
+            self.bell.ring();
+        }
+        if let Some(told) = &mut self.told {
+            let contact = self.law.contact().filter(|_| tick.verdict.ramp > 0.0);
+            told.tell(now_ns, reading, tick.limited.force_n, contact);
+        }
     }
 
     fn obey_flags(&mut self, now_ns: u64) {
@@ -357,6 +375,7 @@ mod tests {
             down,
             up,
             bell: Doorbell::new().unwrap(),
+            told: None,
             shared: Arc::default(),
             sequence: 0,
             energy: EnergyMeter::default(),

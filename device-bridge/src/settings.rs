@@ -1,5 +1,6 @@
 //! What the configuration means: checked, in the types that the loop and the uplink use.
 pub mod arm;
+mod vrpn_server;
 
 use crate::{
     BridgeError, Config,
@@ -16,6 +17,7 @@ use palpate_proto::connect::{self, ConnectError};
 use palpate_realtime::OsMeasures;
 use std::time::Duration;
 use tonic::transport::Endpoint;
+pub use vrpn_server::VrpnServerSettings;
 
 /// The whole bridge.
 #[derive(Debug, Clone)]
@@ -26,6 +28,8 @@ pub struct Settings {
     pub servo: ServoSettings,
     /// The arm.
     pub device: DeviceSettings,
+    /// For programs that read by VRPN.
+    pub vrpn_server: Option<VrpnServerSettings>,
     /// What to ask of the operating system.
     pub measures: OsMeasures,
     /// A second process takes the force away when this one is killed.
@@ -120,6 +124,7 @@ impl Settings {
                 clutch: clutch(config, &servo.watchdog)?,
                 record: record(config)?,
             },
+            vrpn_server: vrpn_server::checked(&config.vrpn_server, rate_hz)?,
             servo,
             measures: measures(config)?,
             guard: config.servo.guard,

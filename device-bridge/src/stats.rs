@@ -4,6 +4,7 @@ use palpate_control::{Fault, Link};
 use palpate_realtime::{Histogram, LoopMonitor, Percentiles};
 use std::{
     fmt,
+    net::SocketAddr,
     sync::{
         Arc, OnceLock,
         atomic::{AtomicU8, AtomicU64, Ordering},
@@ -18,6 +19,11 @@ impl Counter {
     /// One more.
     pub fn increment(&self) {
         self.0.fetch_add(1, Ordering::Relaxed);
+    }
+
+    /// So many more.
+    pub fn add(&self, count: u64) {
+        self.0.fetch_add(count, Ordering::Relaxed);
     }
 
     /// Sets it.
@@ -60,6 +66,8 @@ pub struct Stats {
     pub non_finite: Counter,
     /// Ticks in which the passivity controller damped.
     pub damped: Counter,
+    /// Of the VRPN server.
+    pub vrpn_server: VrpnStats,
     /// From reading the arm to receiving the first command that used it (ns).
     pub round_trip: Histogram,
     /// Ticks since the first command.
@@ -82,6 +90,31 @@ pub struct Stats {
     /// 0: none; else its place among [`device::Fault::ALL`], from 1.
     device_fault: AtomicU8,
     servo: OnceLock<Arc<LoopMonitor>>,
+}
+
+/// What the VRPN server counts.
+#[derive(Debug, Default)]
+pub struct VrpnStats {
+    /// Programs served.
+    pub served: Counter,
+    /// Programs turned away, being one too many.
+    pub turned_away: Counter,
+    /// Moments sent, each to one program.
+    pub told: Counter,
+    /// Moments that a program missed, since newer ones took their place before it could take them.
+    pub dropped: Counter,
+    address: OnceLock<SocketAddr>,
+}
+
+impl VrpnStats {
+    /// Where it listens, if there is one.
+    pub fn address(&self) -> Option<SocketAddr> {
+        self.address.get().copied()
+    }
+
+    pub(crate) fn set_address(&self, address: SocketAddr) {
+        let _ = self.address.set(address);
+    }
 }
 
 impl Stats {

@@ -9,7 +9,7 @@ use palpate_bridge::{
     Config,
     config::{
         DeviceConfig, FalconConfig, Haply2diyConfig, HapticMasterConfig, Inverse3Config, PlaybackConfig, RecordConfig,
-        WoodenHapticsConfig,
+        VrpnConfig, WoodenHapticsConfig,
     },
     convert::Command,
     device::{
@@ -25,11 +25,13 @@ use palpate_bridge::{
         hapticmaster::{self, HapticMaster},
         inverse3::{self, Inverse3},
         phantom,
+        vrpn::{self, Vrpn},
         woodenhaptics::{self, WoodenHaptics},
     },
     run::Shared,
     servo::{Servo, ServoLaw},
     settings::{Settings, arm},
+    vrpn_server::moment::moments,
 };
 use palpate_control::{ArmSpec, ForceLimits, HandPath, LocalModel};
 use palpate_realtime::{Clock, Doorbell, TickLoop, slot};
@@ -51,6 +53,7 @@ fn the_servo_allocates_nothing() {
     let settings = runtime.block_on(async { Settings::new(&config).unwrap() });
     let (mut commands, down) = slot(&None);
     let (up, mut samples) = slot(&None);
+    let (told, mut moments, _bell) = moments(3).unwrap();
     let shared = Arc::new(Shared::default());
     shared.attached.store(true, Ordering::Relaxed);
     let mut servo = Servo {
@@ -60,6 +63,7 @@ fn the_servo_allocates_nothing() {
         down,
         up,
         bell: Doorbell::new().unwrap(),
+        told: Some(told),
         shared: Arc::clone(&shared),
         sequence: 0,
         energy: palpate_control::EnergyMeter::default(),
@@ -93,6 +97,7 @@ fn the_servo_allocates_nothing() {
     thread.join().unwrap();
     assert!(samples.take().is_some_and(|sample| sample.is_some_and(|sample| sample.sequence > 10)));
     assert!(shared.stats.summary().peak_force_n > 0.1);
+    assert!(moments.take().is_some_and(|moment| moment.is_some_and(|moment| moment.number > 10)));
 }
 
 /// An arm's driver: its sockets, its text, its numbers.
@@ -106,7 +111,7 @@ fn drive_by(config: &Config, periods: u64) {
     let settings = runtime.block_on(async { Settings::new(config).unwrap() });
     let mut arm = device::open(&settings.device, 1e-3, &CancellationToken::new()).unwrap();
     for tick in 0..300 {
-        std::thread::sleep(std::time::Duration::from_millis(1));
+        std::thread::sleep(Duration::from_millis(1));
         std::thread::sleep(Duration::from_millis(1));
         // A busy machine is late: nothing is told here of how long an answer took.
         assert_no_alloc(|| {
@@ -207,4 +212,12 @@ fn the_falcons_driver_allocates_nothing() {
     let emulated = Falcon::start(settings).unwrap();
     drive(DeviceConfig::Falcon(FalconConfig { port: emulated.port().to_owned(), ..keys }));
     assert!(emulated.frames() > 40);
+}
+
+#[test]
+fn the_vrpn_driver_allocates_nothing() {
+    let emulated = Vrpn::listen("127.0.0.1:0", vrpn::Settings::default()).unwrap();
+    let address = emulated.address().to_string();
+    drive(DeviceConfig::Vrpn(VrpnConfig { address, ..VrpnConfig::default() }));
+    assert!(emulated.fields() > 100);
 }

@@ -6,6 +6,7 @@ mod inverse3;
 mod phantom;
 mod playback;
 mod simulated;
+mod vrpn;
 mod woodenhaptics;
 
 pub use falcon::FalconConfig;
@@ -16,6 +17,7 @@ pub use phantom::PhantomConfig;
 pub use playback::PlaybackConfig;
 use serde::{Deserialize, Serialize};
 pub use simulated::{KeyframeConfig, SimulatedConfig};
+pub use vrpn::VrpnConfig;
 pub use woodenhaptics::WoodenHapticsConfig;
 
 /// The arm.
@@ -39,6 +41,8 @@ pub enum DeviceConfig {
     Haply2diy(Haply2diyConfig),
     /// Novint Falcon, on the serial port of its USB chip.
     Falcon(FalconConfig),
+    /// Any arm behind a VRPN server.
+    Vrpn(VrpnConfig),
 }
 
 impl Default for DeviceConfig {

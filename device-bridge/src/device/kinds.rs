@@ -1,7 +1,7 @@
 //! The kinds of arms that there are drivers for: each one's name, what people are told of it, and its keys.
 use crate::config::{
     DeviceConfig, FalconConfig, Haply2diyConfig, HapticMasterConfig, Inverse3Config, PhantomConfig, PlaybackConfig,
-    SimulatedConfig, WoodenHapticsConfig,
+    SimulatedConfig, VrpnConfig, WoodenHapticsConfig,
 };
 use std::fmt::Write as _;
 
@@ -21,7 +21,7 @@ pub struct Kind {
 }
 
 /// All of them.
-pub static KINDS: [Kind; 8] = [
+pub static KINDS: [Kind; 9] = [
     Kind {
         name: "simulated",
         what: "no hardware: a mass held by a hand that follows a path",
@@ -77,6 +77,13 @@ pub static KINDS: [Kind; 8] = [
         needs: "its port, the right to open it, and Novint's firmware (docs/arms/falcon.md)",
         tried: "palpate-bridge emulate falcon; no hardware yet",
         default: || DeviceConfig::Falcon(FalconConfig::default()),
+    },
+    Kind {
+        name: "vrpn",
+        what: "any arm behind a VRPN server, over TCP",
+        needs: "the server's address and the arm's names there (docs/arms/vrpn.md)",
+        tried: "palpate-bridge emulate vrpn; no hardware yet",
+        default: || DeviceConfig::Vrpn(VrpnConfig::default()),
     },
 ];
 

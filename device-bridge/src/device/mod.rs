@@ -11,6 +11,8 @@ pub mod playback;
 pub mod requests;
 pub mod serial;
 pub mod simulated;
+pub mod tcp;
+pub mod vrpn;
 #[cfg(test)]
 mod witness;
 pub mod woodenhaptics;
@@ -33,6 +35,7 @@ use simulated::SimulatedDevice;
 use std::{fmt::Debug, os::fd::OwnedFd};
 use thiserror::Error;
 use tokio_util::sync::CancellationToken;
+use vrpn::Vrpn;
 #[cfg(test)]
 pub use witness::Witness;
 use woodenhaptics::WoodenHaptics;
@@ -178,6 +181,7 @@ fn open_arm(settings: &ArmSettings, period_s: f64, stop: &CancellationToken) -> 
         ArmSettings::HapticMaster(settings) => Box::new(HapticMaster::open(settings, period_s, stop)?),
         ArmSettings::Inverse3(settings) => Box::new(Inverse3::start(settings).map_err(unstarted)?),
         ArmSettings::Playback(settings) => Box::new(Playback::open(settings, period_s).map_err(unstarted)?),
+        ArmSettings::Vrpn(settings) => Box::new(Vrpn::start(settings, period_s).map_err(unstarted)?),
         ArmSettings::WoodenHaptics(settings) => Box::new(WoodenHaptics::start(settings, period_s).map_err(unstarted)?),
         ArmSettings::Phantom(settings) => Box::new(Phantom::open(settings, period_s, stop)?),
         ArmSettings::Haply2diy(settings) => Box::new(Haply2diy::start(settings, period_s).map_err(unstarted)?),

@@ -4,6 +4,7 @@ mod haply_2diy;
 mod hapticmaster;
 mod inverse3;
 mod phantom;
+mod vrpn;
 mod woodenhaptics;
 
 use super::Faults;
@@ -37,6 +38,8 @@ pub enum Emulate {
     Haply2diy(haply_2diy::Arguments),
     /// A Novint Falcon on a pseudo terminal; its hand presses the built-in ventricle every two seconds
     Falcon(falcon::Arguments),
+    /// A VRPN server with an arm; its hand presses the built-in ventricle every two seconds
+    Vrpn(vrpn::Arguments),
 }
 
 const SLOW_US: u32 = 50_000;
@@ -54,6 +57,7 @@ impl Emulate {
             Self::Inverse3(arguments) => arguments.run(),
             Self::Haply2diy(arguments) => arguments.run(),
             Self::Falcon(arguments) => arguments.run(),
+            Self::Vrpn(arguments) => arguments.run(),
         }
         .map(|()| ExitCode::SUCCESS)
     }
@@ -162,6 +166,7 @@ mod tests {
             inverse3::FAULTS,
             haply_2diy::FAULTS,
             falcon::FAULTS,
+            vrpn::FAULTS,
         ];
         for name in of_each.concat() {
             assert!(name == "slow" || flag(&faults, name).is_some() || error_code(name).is_some(), "{name}");

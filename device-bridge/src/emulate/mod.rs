@@ -6,6 +6,7 @@ pub mod haply_2diy;
 pub mod hapticmaster;
 pub mod inverse3;
 pub mod phantom;
+pub mod vrpn;
 pub mod woodenhaptics;
 
 use std::{

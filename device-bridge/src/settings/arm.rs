@@ -6,6 +6,7 @@ pub mod inverse3;
 pub mod phantom;
 pub mod playback;
 pub mod simulated;
+pub mod vrpn;
 pub mod woodenhaptics;
 
 use super::value;
@@ -15,7 +16,7 @@ use crate::{
     device::{
         falcon::Settings as Falcon, haply_2diy::Settings as Haply2diy, hapticmaster::start::StartSettings,
         inverse3::Settings as Inverse3, phantom::Settings as Phantom, playback::Settings as Playback,
-        woodenhaptics::Settings as WoodenHaptics,
+        vrpn::Settings as Vrpn, woodenhaptics::Settings as WoodenHaptics,
     },
 };
 use palpate_control::SimulatedArm;
@@ -43,6 +44,8 @@ pub enum ArmSettings {
     Haply2diy(Haply2diy),
     /// A Falcon.
     Falcon(Falcon),
+    /// An arm behind a VRPN server.
+    Vrpn(Vrpn),
 }
 
 /// The arm of a configuration, checked.
@@ -56,6 +59,7 @@ pub(super) fn checked(config: &Config, period_s: f64) -> Result<ArmSettings, Bri
         DeviceConfig::Playback(arm) => Ok(ArmSettings::Playback(playback::checked(arm)?)),
         DeviceConfig::Haply2diy(arm) => Ok(ArmSettings::Haply2diy(haply_2diy::checked(arm)?)),
         DeviceConfig::Falcon(arm) => Ok(ArmSettings::Falcon(falcon::checked(arm)?)),
+        DeviceConfig::Vrpn(arm) => Ok(ArmSettings::Vrpn(vrpn::checked(arm, &config.limits)?)),
     }
 }
 

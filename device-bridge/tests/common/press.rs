@@ -29,7 +29,7 @@ pub fn bridged(url: &str, device: DeviceConfig) -> Config {
 }
 
 /// A wall of 400 N/m whose surface is at z = 0.
-fn wall() -> v1::LocalContactModel {
+pub fn wall() -> v1::LocalContactModel {
     let vec = |x, y, z| Some(v1::Vec3 { x, y, z });
     v1::LocalContactModel {
         point_m: vec(0.0, 0.0, 0.0),

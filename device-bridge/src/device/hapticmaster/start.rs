@@ -3,10 +3,11 @@ use super::{
     Dialect, EFFECT,
     grammar::{self, Answer},
 };
+use crate::device::tcp;
 use glam::DVec3;
 use std::{
     io::{ErrorKind, Read as _, Write as _},
-    net::{TcpStream, ToSocketAddrs as _},
+    net::TcpStream,
     time::{Duration, Instant},
 };
 use thiserror::Error;
@@ -134,20 +135,7 @@ pub fn start(settings: &StartSettings, stop: &CancellationToken) -> Result<Start
 }
 
 fn connect(address: &str) -> Result<TcpStream, StartError> {
-    let failed = |source| StartError::Unreachable { address: address.to_owned(), source };
-    let mut last = std::io::Error::new(ErrorKind::NotFound, "the name has no address");
-    for place in address.to_socket_addrs().map_err(failed)? {
-        match TcpStream::connect_timeout(&place, PATIENCE) {
-            Ok(stream) => {
-                // A request must not wait for more to be sent with it.
-                stream.set_nodelay(true).map_err(failed)?;
-                stream.set_write_timeout(Some(PATIENCE)).map_err(failed)?;
-                return Ok(stream);
-            }
-            Err(error) => last = error,
-        }
-    }
-    Err(failed(last))
+    tcp::connect(address, PATIENCE).map_err(|source| StartError::Unreachable { address: address.to_owned(), source })
 }
 
 struct Talk {
