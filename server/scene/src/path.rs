@@ -106,7 +106,7 @@ impl MotionPath {
 
     /// Position (m) and velocity (m/s) at a time. Does not allocate.
     pub fn at(&self, time_s: f64) -> ToolTarget {
-        let rest = |position_m| ToolTarget { position_m, velocity_m_per_s: DVec3::ZERO };
+        let rest = |position_m| ToolTarget::at(position_m);
         let period_s = self.duration_s();
         let time_s = if self.repeat && period_s > 0.0 && time_s > self.first_s() {
             self.first_s() + (time_s - self.first_s()).rem_euclid(period_s)

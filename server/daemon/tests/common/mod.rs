@@ -7,7 +7,7 @@ pub mod springs;
 use glam::DVec3;
 use palpate_physics::{
     ModelSpec, PrescribedSpec, Region, Settings,
-    contact::{Coupling, ToolSpec},
+    contact::{Coupling, ToolShape, ToolSpec},
     material::{Lame, Law, Material, Viscosity},
     mesh::quality,
 };
@@ -100,6 +100,7 @@ pub fn block_scene(name: &str, cells: u32) -> Scene {
 fn tool(name: &str, start_position_m: DVec3) -> ToolSpec {
     ToolSpec {
         name: name.into(),
+        shape: ToolShape::Sphere,
         radius_m: RADIUS_M,
         coupling: Coupling::Spring { stiffness_n_per_m: 500.0, damping_n_s_per_m: 1.0, mass_kg: 0.02 },
         friction_coefficient: 0.3,

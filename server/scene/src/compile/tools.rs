@@ -12,7 +12,7 @@ use crate::{
     path::{Interpolation, MotionPath},
 };
 use glam::DVec3;
-use palpate_physics::contact::{Coupling, ToolSpec};
+use palpate_physics::contact::{Coupling, ToolShape, ToolSpec};
 
 pub(crate) struct Tools {
     pub(crate) specs: Vec<ToolSpec>,
@@ -39,6 +39,7 @@ pub(crate) fn compile(document: &Document, body: &Body, files: &Files<'_>) -> Re
         let coupling = coupling(table, &at)?;
         let spec = ToolSpec {
             name: table.name.clone(),
+            shape: ToolShape::Sphere,
             radius_m: table.radius_m,
             coupling,
             friction_coefficient,
