@@ -2,7 +2,12 @@
 #![allow(clippy::unwrap_used)]
 mod rig;
 use glam::DVec3;
-use palpate_physics::{ModelSpec, Substeps, contact::{Coupling, ToolTarget}, health, material::Law};
+use palpate_physics::{
+    ModelSpec, Substeps,
+    contact::{Coupling, ToolTarget},
+    health,
+    material::Law,
+};
 use rig::{Rig, body, bricks, even, hold, material, nodes_where, sphere};
 
 fn largest_displacement_m(rig: &Rig) -> f64 {

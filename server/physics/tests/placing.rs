@@ -2,7 +2,12 @@
 #![allow(clippy::unwrap_used)]
 mod rig;
 use glam::DVec3;
-use palpate_physics::{Model, ModelError, ModelSpec, State, contact::{Coupling, ToolTarget}, material::Law, snapshot};
+use palpate_physics::{
+    Model, ModelError, ModelSpec, State,
+    contact::{Coupling, ToolTarget},
+    material::Law,
+    snapshot,
+};
 use rig::{Rig, body, bricks, even, hold, material, nodes_where, sphere};
 
 const RADIUS_M: f64 = 0.005;

@@ -134,7 +134,9 @@ mod tests {
 
     /// Nearest of many points of the axis.
     fn by_trying(axis: Axis, corners: [DVec3; 3]) -> f64 {
-        let at = |s: f64| (axis.centre_m + axis.half_m * s).distance(closest_point(axis.centre_m + axis.half_m * s, corners));
+        let at = |s: f64| {
+            (axis.centre_m + axis.half_m * s).distance(closest_point(axis.centre_m + axis.half_m * s, corners))
+        };
         (0..=2000).map(|i| at(f64::from(i) * 1e-3 - 1.0)).fold(f64::INFINITY, f64::min)
     }
 

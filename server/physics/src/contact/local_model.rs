@@ -146,9 +146,11 @@ pub(super) fn update(
 /// Of a disc as large as the tool's outline (m).
 fn largest_radius_m(model: &ToolModel) -> f64 {
     let radius_m = model.spec.radius_m;
-    model.spec.shape.as_capsule().map_or(radius_m, |capsule| {
-        (radius_m * radius_m + 4.0 / PI * radius_m * capsule.half_length_m).sqrt()
-    })
+    model
+        .spec
+        .shape
+        .as_capsule()
+        .map_or(radius_m, |capsule| (radius_m * radius_m + 4.0 / PI * radius_m * capsule.half_length_m).sqrt())
 }
 
 /// Half the width (m) of a contact with the area of a disc: of a capsule's, which may be all along it, `π a² = 2b 2L`.

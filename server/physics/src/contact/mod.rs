@@ -175,8 +175,10 @@ impl ContactModel {
             // A body without a free node has none; its foundation is then of no consequence, but must be finite.
             frequency_sq: max_natural_frequency_rad_per_s.max(1.0).powi(2),
         };
-        let tools: Vec<ToolModel> =
-            tools.iter().map(|tool| ToolModel::new(tool, Foundation::new(&body, tool.radius_m, tool.shape.half_length_m()))).collect();
+        let tools: Vec<ToolModel> = tools
+            .iter()
+            .map(|tool| ToolModel::new(tool, Foundation::new(&body, tool.radius_m, tool.shape.half_length_m())))
+            .collect();
         let (mut nodal_stiffness_n_per_m, mut tool_frequency_sq) = (vec![0.0; mass_kg.len()], 0.0);
         for tool in &tools {
             let size = (tool.spec.radius_m, tool.spec.shape.half_length_m());

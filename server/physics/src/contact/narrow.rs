@@ -446,7 +446,9 @@ mod tests {
             let centre = above(0.2 * RADIUS_M) + DVec3::X * (1e-5 * f64::from(step));
             let ((a, _), (b, _)) = (short.press(centre), sphere.press(centre));
             assert!((a.force_n - b.force_n).length() < 1e-9 * b.pressing_n && a.contacts == b.contacts);
-            assert!((a.energy_j - b.energy_j).abs() < 1e-9 * b.energy_j && (a.heat_j - b.heat_j).abs() < 1e-9 * b.energy_j);
+            assert!(
+                (a.energy_j - b.energy_j).abs() < 1e-9 * b.energy_j && (a.heat_j - b.heat_j).abs() < 1e-9 * b.energy_j
+            );
         }
         // Turned about the vertical, it is held by the friction under it, and no force results.
         let mut bench = Bench::of_capsule(0.3 * RADIUS_M, 0.4);
@@ -464,7 +466,12 @@ mod tests {
             let (pressed, _) = bench.press(above(0.01 * RADIUS_M) + DVec3::X * shift_m);
             (pressed.force_n - pressed.normal_n).length()
         };
-        assert!(rolled(1.0) < 0.02 * rolled(0.0) && rolled(-1.0) > 1.5 * rolled(0.0), "{} {}", rolled(1.0), rolled(0.0));
+        assert!(
+            rolled(1.0) < 0.02 * rolled(0.0) && rolled(-1.0) > 1.5 * rolled(0.0),
+            "{} {}",
+            rolled(1.0),
+            rolled(0.0)
+        );
     }
 
     #[test]

@@ -170,7 +170,8 @@ impl Pull {
 
 /// Largest `β ≤ 1` with `|s + β d| ≤ limit`, for `|s| ≤ limit`. A shortened damper still only takes energy.
 fn share_within(s: DVec3, d: DVec3, limit: f64) -> f64 {
-    if (s + d).length_squared() <= limit * limit {
+    // A saturated spring may be a rounding beyond the limit by itself: without a damper there is nothing to shorten.
+    if (s + d).length_squared() <= limit * limit || d == DVec3::ZERO {
         return 1.0;
     }
     // d² β² + 2 s·d β + s² − limit² = 0
@@ -213,5 +214,7 @@ mod tests {
             assert!((s + d * share).length() <= 2.0 + 1e-12, "{s} {d} {share}");
         }
         assert_eq!(share_within(DVec3::X, DVec3::X * 0.5, 2.0), 1.0);
+        // Without damping, a spring that saturated at the limit and a rounding made the tool's velocity not a number.
+        assert_eq!(share_within(DVec3::X * (2.0 + 1e-15), DVec3::ZERO, 2.0), 1.0);
     }
 }

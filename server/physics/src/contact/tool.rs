@@ -100,9 +100,7 @@ impl ToolShape {
     pub(super) fn axis(&self, centre_m: DVec3, orientation: DQuat) -> Axis {
         match self {
             Self::Sphere => Axis::point(centre_m),
-            Self::Capsule(capsule) => {
-                Axis { centre_m, half_m: orientation * (DVec3::Z * capsule.half_length_m) }
-            }
+            Self::Capsule(capsule) => Axis { centre_m, half_m: orientation * (DVec3::Z * capsule.half_length_m) },
         }
     }
 }
@@ -211,7 +209,8 @@ pub struct LocalContactModel {
 impl ToolState {
     /// At its start, touching nothing.
     pub fn at_start(spec: &ToolSpec) -> Self {
-        let target = ToolTarget { orientation: spec.shape.start_orientation(), ..ToolTarget::at(spec.start_position_m) };
+        let target =
+            ToolTarget { orientation: spec.shape.start_orientation(), ..ToolTarget::at(spec.start_position_m) };
         Self {
             centre_m: spec.start_position_m,
             velocity_m_per_s: DVec3::ZERO,

@@ -70,7 +70,9 @@ pub enum SolveError {
         failed: u32,
     },
     /// A capsule turns until it is in equilibrium, and this solver knows no turning.
-    #[error("tool \"{tool}\" is a capsule, and static equilibrium is known of spheres only: run the scene in time until it is at rest")]
+    #[error(
+        "tool \"{tool}\" is a capsule, and static equilibrium is known of spheres only: run the scene in time until it is at rest"
+    )]
     SpheresOnly {
         /// Name of the tool.
         tool: String,

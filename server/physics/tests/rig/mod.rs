@@ -87,7 +87,14 @@ pub fn body(mesh: TetMesh, material: Material) -> ModelSpec {
 }
 
 pub fn sphere(radius_m: f64, start_position_m: DVec3, coupling: Coupling) -> ToolSpec {
-    ToolSpec { name: "sphere".into(), shape: ToolShape::Sphere, radius_m, coupling, friction_coefficient: 0.0, start_position_m }
+    ToolSpec {
+        name: "sphere".into(),
+        shape: ToolShape::Sphere,
+        radius_m,
+        coupling,
+        friction_coefficient: 0.0,
+        start_position_m,
+    }
 }
 
 /// Nodes that satisfy a condition on their rest position.
