@@ -209,8 +209,7 @@ pub struct LocalContactModel {
 impl ToolState {
     /// At its start, touching nothing.
     pub fn at_start(spec: &ToolSpec) -> Self {
-        let target =
-            ToolTarget { orientation: spec.shape.start_orientation(), ..ToolTarget::at(spec.start_position_m) };
+        let target = spec.start();
         Self {
             centre_m: spec.start_position_m,
             velocity_m_per_s: DVec3::ZERO,
@@ -273,6 +272,11 @@ impl ToolState {
 }
 
 impl ToolSpec {
+    /// Where its device starts, at rest.
+    pub fn start(&self) -> ToolTarget {
+        ToolTarget { orientation: self.shape.start_orientation(), ..ToolTarget::at(self.start_position_m) }
+    }
+
     /// What the coupling, and contact of at most this stiffness on a tool that is a mass, add (rad²/s²).
     ///
     /// A capsule's velocity and angular velocity are two: contact at a point `p` from its centre moves it by `(−I, [p]ₓ)`, and a positive block matrix
