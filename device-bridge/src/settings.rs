@@ -1,5 +1,6 @@
 //! What the configuration means: checked, in the types that the loop and the uplink use.
 pub mod arm;
+mod torque;
 
 use crate::{
     BridgeError, Config,
@@ -8,7 +9,7 @@ use crate::{
 pub use arm::ArmSettings;
 use glam::DVec3;
 use palpate_control::{
-    ForceLimits, ParameterError, PassivitySettings, RenderSettings, ThermalLimits, WatchdogSettings,
+    ForceLimits, ParameterError, PassivitySettings, RenderSettings, ThermalLimits, TorqueLimits, WatchdogSettings,
     coupling::SampledWall,
 };
 use palpate_proto::connect::{self, ConnectError};
@@ -50,6 +51,8 @@ pub struct UplinkSettings {
     pub give_up_after: Option<Duration>,
     /// Told to the daemon: peak force (N) and rate (Hz).
     pub hello: (f64, f64),
+    /// And peak torque (N m).
+    pub max_torque_nm: f64,
 }
 
 /// The servo's law.
@@ -59,6 +62,8 @@ pub struct ServoSettings {
     pub period_s: f64,
     /// Peak and rate.
     pub limits: ForceLimits,
+    /// Of torque.
+    pub torque: TorqueLimits,
     /// What the motors bear for ever; `None`: the peak.
     pub thermal: Option<ThermalLimits>,
     /// Ages.
@@ -154,6 +159,7 @@ fn servo(config: &Config, period_s: f64, scale: f64) -> Result<ServoSettings, Br
         limits: ForceLimits { max_force_n: limits.max_force_n, max_force_rate_n_per_s: limits.max_force_rate_n_per_s }
             .checked()
             .map_err(|error| parameter("limits", &error))?,
+        torque: torque::limits(config)?,
         watchdog: WatchdogSettings {
             fresh_for_s: watchdog.fresh_for_s,
             stale_after_s: watchdog.stale_after_s,
@@ -220,6 +226,7 @@ fn uplink(config: &Config) -> Result<UplinkSettings, BridgeError> {
         seed: server.pause_seed.unwrap_or_else(seed_of_this_process),
         give_up_after,
         hello: (config.limits.max_force_n, config.servo.rate_hz),
+        max_torque_nm: config.limits.max_torque_nm,
     })
 }
 

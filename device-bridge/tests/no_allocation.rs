@@ -15,7 +15,7 @@ use palpate_bridge::{
     servo::{Servo, ServoLaw},
     settings::{Settings, arm},
 };
-use palpate_control::{ArmSpec, ForceLimits, HandPath, LocalModel};
+use palpate_control::{ArmSpec, ForceLimits, HandPath, LocalModel, TorqueLimits};
 use palpate_realtime::{Clock, Doorbell, TickLoop, slot};
 use std::sync::{Arc, atomic::Ordering};
 use tokio_util::sync::CancellationToken;
@@ -26,7 +26,9 @@ static ALLOCATOR: AllocDisabler = AllocDisabler;
 #[test]
 fn the_servo_allocates_nothing() {
     let runtime = tokio::runtime::Builder::new_current_thread().build().unwrap();
-    let settings = runtime.block_on(async { Settings::new(&Config::default()).unwrap() });
+    let mut config = Config::default();
+    config.limits.max_torque_nm = 0.1;
+    let settings = runtime.block_on(async { Settings::new(&config).unwrap() });
     let (mut commands, down) = slot(&None);
     let (up, mut samples) = slot(&None);
     let shared = Arc::new(Shared::default());
@@ -63,6 +65,7 @@ fn the_servo_allocates_nothing() {
             local_model: (tick % 100 < 50).then_some(model),
             model_age_s: 0.0,
             limits: ForceLimits { max_force_n: 3.0, max_force_rate_n_per_s: 1000.0 },
+            torque: (DVec3::Y * 0.05, TorqueLimits { max_torque_nm: 0.1, max_torque_rate_nm_per_s: 20.0 }),
         }));
     }
     shared.stop.store(true, Ordering::Relaxed);

@@ -207,7 +207,13 @@ impl Daemon {
 
 /// A hello that asks for the first tool.
 pub fn hello() -> v1::DeviceHello {
-    v1::DeviceHello { device_name: "test arm".into(), tool_name: String::new(), max_force_n: 3.0, servo_rate_hz: 1e3 }
+    v1::DeviceHello {
+        device_name: "test arm".into(),
+        tool_name: String::new(),
+        max_force_n: 3.0,
+        servo_rate_hz: 1e3,
+        max_torque_nm: 0.1,
+    }
 }
 
 /// A valid sample.
