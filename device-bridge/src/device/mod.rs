@@ -58,6 +58,7 @@ impl Effort {
     }
 
     /// For a driver's last step: nothing when its arm is lost, and nothing that is no number.
+    #[must_use]
     pub fn unless(&self, lost: bool) -> Self {
         let number = |v: DVec3| if lost || !v.is_finite() { DVec3::ZERO } else { v };
         Self { force_n: number(self.force_n), torque_nm: number(self.torque_nm) }

@@ -118,7 +118,7 @@ impl Simulation {
 
     /// Whether no arm has a force.
     pub fn is_released(&self) -> bool {
-        self.tools.iter().all(|tool| tool.is_without_force())
+        self.tools.iter().all(ToolLoop::is_without_force)
     }
 
     /// Whether no device has a force.

@@ -1,7 +1,7 @@
 //! Beside a sphere that presses a hybrid body, and trembles, a strained region wakes and falls asleep a hundred times a second.
 use super::{Measured, Options, Outcome, random::Random, rig};
 use crate::{bodies, methods, problems::body::Body};
-use glam::{DQuat, DVec3};
+use glam::DQuat;
 use miette::Result;
 use palpate_physics::{
     Settings,
