@@ -99,8 +99,8 @@ fn mistakes_do_not_fit_it() {
     let good = example("ventricle.toml");
     for (from, to) in [
         ("poisson_ratio", "poison_ratio"),
-        ("outer_semi_axes_mm = [32, 64]\n", ""),
-        ("outer_semi_axes_mm = [32, 64]", "outer_semi_axes_mm = [32, 64]\nouter_semi_axes_m = [0.032, 0.064]"),
+        ("position_mm = [55, 0, 0]\n", ""),
+        ("position_mm = [55, 0, 0]", "position_mm = [55, 0, 0]\nposition_m = [0.055, 0, 0]"),
         ("stable-neo-hookean", "neo-hookean"),
         ("start_mm = [55, 0, 0]", "start_mm = [55, 0]"),
     ] {
