@@ -249,6 +249,7 @@ fn answer(up: &v1::DeviceUp) -> v1::DeviceDown {
         echo_device_time_ns: echo,
         local_model: Some(model),
         proxy_position_m: vector,
+        proxy_orientation: None,
     };
     v1::DeviceDown { message: Some(device_down::Message::Command(command)) }
 }

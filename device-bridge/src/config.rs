@@ -115,6 +115,10 @@ pub struct LimitsConfig {
     pub max_force_n: f64,
     /// Largest change of force per second (N/s).
     pub max_force_rate_n_per_s: f64,
+    /// Peak torque (N m); 0: the arm has no motors for torque.
+    pub max_torque_nm: f64,
+    /// Largest change of torque per second (N m/s).
+    pub max_torque_rate_nm_per_s: f64,
     /// Force (N) that the arm's motors bear for ever; absent: the peak.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub continuous_force_n: Option<f64>,
@@ -124,7 +128,14 @@ pub struct LimitsConfig {
 
 impl Default for LimitsConfig {
     fn default() -> Self {
-        Self { max_force_n: 3.3, max_force_rate_n_per_s: 1000.0, continuous_force_n: None, thermal_time_s: 10.0 }
+        Self {
+            max_force_n: 3.3,
+            max_force_rate_n_per_s: 1000.0,
+            max_torque_nm: 0.0,
+            max_torque_rate_nm_per_s: 20.0,
+            continuous_force_n: None,
+            thermal_time_s: 10.0,
+        }
     }
 }
 

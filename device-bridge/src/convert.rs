@@ -1,7 +1,7 @@
 //! The one border between wire types and ours. Nothing that is not finite, complete and of the right shape passes.
 use crate::{device::Reading, settings::UplinkSettings};
 use glam::{DMat3, DVec3};
-use palpate_control::{ForceLimits, LocalModel};
+use palpate_control::{ForceLimits, LocalModel, TorqueLimits};
 use palpate_proto::v1;
 use thiserror::Error;
 
@@ -32,6 +32,8 @@ pub struct Welcome {
     pub limits: ForceLimits,
     /// Stiffness (N/m) of the coupling between arm and tool, which its force has at most; 0: it has none.
     pub coupling_n_per_m: f64,
+    /// The same of torque.
+    pub torque_limits: TorqueLimits,
 }
 
 /// A checked command.
@@ -50,6 +52,8 @@ pub struct Command {
     pub model_age_s: f64,
     /// Limits that the daemon applies to this arm.
     pub limits: ForceLimits,
+    /// Torque on the arm (N m), and the daemon's limits of it.
+    pub torque: (DVec3, TorqueLimits),
 }
 
 /// A measurement on its way up.
@@ -71,6 +75,7 @@ pub fn hello(settings: &UplinkSettings) -> v1::DeviceUp {
         tool_name: settings.tool.clone(),
         max_force_n,
         servo_rate_hz,
+        max_torque_nm: settings.max_torque_nm,
     };
     v1::DeviceUp { message: Some(v1::device_up::Message::Hello(hello)) }
 }
@@ -113,6 +118,7 @@ pub fn welcome(wire: &v1::DeviceWelcome) -> Result<Welcome, Rejection> {
             max_force_rate_n_per_s: positive("welcome.limits.max_force_rate_n_per_s", limits.max_force_rate_n_per_s)?,
         },
         coupling_n_per_m: not_negative("welcome.limits.coupling_stiffness_n_per_m", limits.coupling_stiffness_n_per_m)?,
+        torque_limits: torque_limits(limits)?,
     })
 }
 
@@ -124,8 +130,7 @@ pub fn welcome(wire: &v1::DeviceWelcome) -> Result<Welcome, Rejection> {
 pub fn command(wire: &v1::DeviceCommand, welcome: &Welcome, received_ns: u64) -> Result<Option<Command>, Rejection> {
     let wrench = wire.wrench.as_ref().ok_or(Rejection::Missing("wrench"))?;
     let force_n = vector("wrench.force_n", wrench.force_n.as_ref())?;
-    // The arms of today have no motors for torque; a bad one still shows a daemon gone wrong.
-    vector("wrench.torque_nm", wrench.torque_nm.as_ref().or(Some(&v1::Vec3::default())))?;
+    let torque_nm = vector("wrench.torque_nm", wrench.torque_nm.as_ref().or(Some(&v1::Vec3::default())))?;
     let local_model = wire.local_model.as_ref().map(local_model).transpose()?;
     if wire.sample_sequence == 0 {
         return Ok(None);
@@ -141,7 +146,19 @@ pub fn command(wire: &v1::DeviceCommand, welcome: &Welcome, received_ns: u64) ->
         local_model,
         model_age_s: model_ticks as f64 * welcome.tick_period_s,
         limits: welcome.limits,
+        torque: (torque_nm, welcome.torque_limits),
     }))
+}
+
+/// A daemon that says nothing of torque sends none.
+fn torque_limits(wire: &v1::DeviceLimits) -> Result<TorqueLimits, Rejection> {
+    if wire.max_torque_nm == 0.0 {
+        return Ok(TorqueLimits::NONE);
+    }
+    Ok(TorqueLimits {
+        max_torque_nm: positive("welcome.limits.max_torque_nm", wire.max_torque_nm)?,
+        max_torque_rate_nm_per_s: positive("welcome.limits.max_torque_rate_nm_per_s", wire.max_torque_rate_nm_per_s)?,
+    })
 }
 
 fn local_model(wire: &v1::LocalContactModel) -> Result<LocalModel, Rejection> {
@@ -200,6 +217,7 @@ mod tests {
             tick_period_s: 1e-3,
             limits: ForceLimits { max_force_n: 3.0, max_force_rate_n_per_s: 1000.0 },
             coupling_n_per_m: 300.0,
+            torque_limits: TorqueLimits { max_torque_nm: 0.1, max_torque_rate_nm_per_s: 20.0 },
         }
     }
 
@@ -207,7 +225,7 @@ mod tests {
         let vec = |x, y, z| Some(v1::Vec3 { x, y, z });
         v1::DeviceCommand {
             tick: 17,
-            wrench: Some(v1::Wrench { force_n: vec(0.0, 0.0, 1.0), torque_nm: vec(0.0, 0.0, 0.0) }),
+            wrench: Some(v1::Wrench { force_n: vec(0.0, 0.0, 1.0), torque_nm: vec(0.0, 0.02, 0.0) }),
             sample_sequence: 5,
             echo_device_time_ns: 7,
             local_model: Some(v1::LocalContactModel {
@@ -222,6 +240,7 @@ mod tests {
                 max_force_n: 3.0,
             }),
             proxy_position_m: vec(0.1, 0.0, 0.0),
+            proxy_orientation: None,
         }
     }
 
@@ -229,6 +248,7 @@ mod tests {
     fn a_good_command_passes_whole() {
         let command = command(&good(), &welcomed(), 99).unwrap().unwrap();
         assert_eq!((command.answers_ns, command.tick, command.force_n), (7, 17, DVec3::Z));
+        assert_eq!(command.torque, (DVec3::Y * 0.02, welcomed().torque_limits));
         assert!((command.model_age_s - 3e-3).abs() < 1e-15);
         let model = command.local_model.unwrap();
         assert_eq!(model.stiffness_n_per_m.z_axis, DVec3::new(0.0, 0.0, -400.0));

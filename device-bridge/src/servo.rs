@@ -10,7 +10,7 @@ use crate::{
 use glam::DVec3;
 use palpate_control::{
     EnergyMeter, Fault, ForceLimiter, ForceLimits, Limited, Link, LocalModel, Motion, PassivityController,
-    RenderSettings, StiffnessBound, SuccessRate, ThermalLimiter, Verdict, Watchdog,
+    RenderSettings, StiffnessBound, SuccessRate, ThermalLimiter, TorqueLaw, Verdict, Watchdog,
 };
 use palpate_realtime::{Doorbell, SlotReader, SlotWriter, TickLoop, Wakeup};
 use std::{
@@ -31,6 +31,7 @@ pub struct ServoLaw {
     thermal: Option<ThermalLimiter>,
     stiffness: StiffnessBound,
     success: SuccessRate,
+    torque: TorqueLaw,
     command: Option<Command>,
     force_share: f64,
     steady_since_ns: Option<u64>,
@@ -42,6 +43,8 @@ pub struct ServoLaw {
 pub struct ServoTick {
     /// Force for the arm (N).
     pub limited: Limited,
+    /// Torque for the arm (N m).
+    pub torque_nm: DVec3,
     /// State of the link.
     pub verdict: Verdict,
     /// Damping that the passivity controller added (N s/m).
@@ -60,6 +63,7 @@ impl ServoLaw {
             thermal: settings.thermal.map(ThermalLimiter::new),
             stiffness: settings.stiffness,
             success: SuccessRate::default(),
+            torque: TorqueLaw::new(settings.torque, settings.passivity),
             command: None,
             force_share: 1.0,
             steady_since_ns: None,
@@ -76,6 +80,7 @@ impl ServoLaw {
             max_force_n: ours.max_force_n.min(theirs.max_force_n),
             max_force_rate_n_per_s: ours.max_force_rate_n_per_s.min(theirs.max_force_rate_n_per_s),
         });
+        self.torque.limit_to(command.torque.1);
         self.command = Some(*command);
     }
 
@@ -160,8 +165,10 @@ impl ServoLaw {
         if let Some(thermal) = &mut self.thermal {
             thermal.held(limited.force_n, dt_s);
         }
+        let wanted_nm = self.command.map_or(DVec3::ZERO, |command| command.torque.0);
         ServoTick {
             limited,
+            torque_nm: self.torque.tick(wanted_nm, motion, ramp, dt_s),
             verdict,
             added_damping_n_s_per_m: step.map_or(0.0, |step| step.damping_n_s_per_m),
             is_capped,
@@ -261,7 +268,7 @@ impl Servo {
         }
         self.obey_flags(now_ns);
         let tick = self.law.tick(now_ns, &motion);
-        self.device.apply(&Effort::force(tick.limited.force_n));
+        self.device.apply(&Effort { force_n: tick.limited.force_n, torque_nm: tick.torque_nm });
         if let Some(guard) = &mut self.guard {
             guard.beat();
         }
@@ -367,6 +374,7 @@ mod tests {
             local_model: None,
             model_age_s: 0.0,
             limits: settings.servo.limits,
+            torque: (DVec3::ZERO, settings.servo.torque),
         }));
         let servo = Servo {
             law: ServoLaw::new(settings.servo),

@@ -1,5 +1,6 @@
 //! What the configuration means: checked, in the types that the loop and the uplink use.
 pub mod arm;
+mod torque;
 mod vrpn_server;
 
 use crate::{
@@ -10,8 +11,8 @@ use crate::{
 pub use arm::ArmSettings;
 use glam::DVec3;
 use palpate_control::{
-    ForceLimits, ParameterError, PassivitySettings, RenderSettings, StiffnessBound, ThermalLimits, WatchdogSettings,
-    coupling::SampledWall,
+    ForceLimits, ParameterError, PassivitySettings, RenderSettings, StiffnessBound, ThermalLimits, TorqueLimits,
+    WatchdogSettings, coupling::SampledWall,
 };
 use palpate_proto::connect::{self, ConnectError};
 use palpate_realtime::OsMeasures;
@@ -59,6 +60,8 @@ pub struct UplinkSettings {
     pub hello: (f64, f64),
     /// What a loop across the network may be as stiff as; `None`: the stiff loop is beside the arm.
     pub across_network: Option<StiffnessBound>,
+    /// And peak torque (N m).
+    pub max_torque_nm: f64,
 }
 
 /// The servo's law.
@@ -68,6 +71,8 @@ pub struct ServoSettings {
     pub period_s: f64,
     /// Peak and rate.
     pub limits: ForceLimits,
+    /// Of torque.
+    pub torque: TorqueLimits,
     /// What the motors bear for ever; `None`: the peak.
     pub thermal: Option<ThermalLimits>,
     /// Ages.
@@ -187,6 +192,7 @@ fn servo(config: &Config, period_s: f64, scale: f64) -> Result<ServoSettings, Br
         limits: ForceLimits { max_force_n: limits.max_force_n, max_force_rate_n_per_s: limits.max_force_rate_n_per_s }
             .checked()
             .map_err(|error| parameter("limits", &error))?,
+        torque: torque::limits(config)?,
         watchdog: WatchdogSettings {
             fresh_for_s: watchdog.fresh_for_s,
             stale_after_s: watchdog.stale_after_s,
@@ -268,6 +274,7 @@ fn uplink(config: &Config) -> Result<UplinkSettings, BridgeError> {
         give_up_after,
         hello: (config.limits.max_force_n, config.servo.rate_hz),
         across_network: None,
+        max_torque_nm: config.limits.max_torque_nm,
     })
 }
 

@@ -33,7 +33,7 @@ use palpate_bridge::{
     settings::{Settings, arm},
     vrpn_server::moment::moments,
 };
-use palpate_control::{ArmSpec, ForceLimits, HandPath, LocalModel};
+use palpate_control::{ArmSpec, ForceLimits, HandPath, LocalModel, TorqueLimits};
 use palpate_realtime::{Clock, Doorbell, TickLoop, slot};
 use std::{
     sync::{Arc, atomic::Ordering},
@@ -50,6 +50,7 @@ fn the_servo_allocates_nothing() {
     let mut config = Config::default();
     // The force is on an arm that nobody pressed.
     config.passivity.strict = false;
+    config.limits.max_torque_nm = 0.1;
     let settings = runtime.block_on(async { Settings::new(&config).unwrap() });
     let (mut commands, down) = slot(&None);
     let (up, mut samples) = slot(&None);
@@ -91,6 +92,7 @@ fn the_servo_allocates_nothing() {
             local_model: (tick % 100 < 50).then_some(model),
             model_age_s: 0.0,
             limits: ForceLimits { max_force_n: 3.0, max_force_rate_n_per_s: 1000.0 },
+            torque: (DVec3::Y * 0.05, TorqueLimits { max_torque_nm: 0.1, max_torque_rate_nm_per_s: 20.0 }),
         }));
     }
     shared.stop.store(true, Ordering::Relaxed);

@@ -2,7 +2,7 @@
 #![allow(clippy::unwrap_used)] // helpers of tests
 use glam::{DMat3, DVec3};
 use palpate_bridge::{Config, convert::Command, servo::ServoLaw, settings::Settings};
-use palpate_control::{ArmSpec, Fault, ForceLimits, HandPath, Link, LocalModel, Motion, SimulatedArm};
+use palpate_control::{ArmSpec, Fault, ForceLimits, HandPath, Link, LocalModel, Motion, SimulatedArm, TorqueLimits};
 use proptest::prelude::*;
 
 const MS: u64 = 1_000_000;
@@ -24,6 +24,7 @@ fn command(answers_ns: u64, force_n: DVec3, local_model: Option<LocalModel>) -> 
         local_model,
         model_age_s: 0.0,
         limits: ForceLimits { max_force_n: 100.0, max_force_rate_n_per_s: 1e6 },
+        torque: (DVec3::ZERO, TorqueLimits::NONE),
     }
 }
 
@@ -371,4 +372,29 @@ proptest! {
             }
         }
     }
+}
+
+/// As long as the link is alive, at the stricter of both limits, and down with the force; none on an arm that has no motors for it.
+#[test]
+fn torque_is_limited_and_ramped_as_force_is() {
+    let theirs = TorqueLimits { max_torque_nm: 0.05, max_torque_rate_nm_per_s: 1e3 };
+    let fed = |own_nm: f64| {
+        let mut law = law(|config| config.limits.max_torque_nm = own_nm);
+        for tick in 1..=500 {
+            law.receive(&Command { torque: (DVec3::Y, theirs), ..command(tick * MS, DVec3::Z, None) });
+            law.tick(tick * MS, &still());
+        }
+        law
+    };
+    let mut strong = fed(0.2);
+    let mut at = |age: u64| strong.tick((500 + age) * MS, &still());
+    assert!((at(0).torque_nm - DVec3::Y * 0.05).length() < 1e-12);
+    let ramping = at(12);
+    assert!(
+        (ramping.torque_nm.y - 0.05 * ramping.verdict.ramp).abs() < 1e-12 && ramping.verdict.ramp < 1.0,
+        "{ramping:?}"
+    );
+    assert_eq!(at(40).torque_nm, DVec3::ZERO);
+    assert!((fed(0.01).tick(500 * MS, &still()).torque_nm.y - 0.01).abs() < 1e-12);
+    assert_eq!(fed(0.0).tick(500 * MS, &still()).torque_nm, DVec3::ZERO);
 }

@@ -9,7 +9,7 @@ use crate::{ViewError, cli, connect::Server, moment::Moment, surface::Surface};
 use camera::Camera;
 use clap::Args;
 use colour::Rgb;
-use glam::Vec3;
+use glam::{Quat, Vec3};
 use palpate_proto::v1::WatchRequest;
 use raster::{Canvas, Vertex};
 use std::path::PathBuf;
@@ -171,7 +171,9 @@ fn vector(v: Option<palpate_proto::v1::Vec3>) -> Option<Vec3> {
 fn draw_tools(canvas: &mut Canvas, camera: &Camera, surface: &Surface) {
     for (shape, state) in surface.header.tools.iter().zip(&surface.last.tools) {
         let Some(centre) = vector(state.proxy_position_m) else { continue };
-        for t in solids::sphere(centre, shape.radius_m as f32, TOOL) {
+        let q = state.proxy_orientation.unwrap_or(palpate_proto::v1::Quaternion { w: 1.0, x: 0.0, y: 0.0, z: 0.0 });
+        let along = Quat::from_xyzw(q.x as f32, q.y as f32, q.z as f32, q.w as f32) * Vec3::Z;
+        for t in solids::capsule(centre, along * shape.half_length_m as f32, shape.radius_m as f32, TOOL) {
             canvas.triangle(camera, t);
         }
         let force = vector(state.contact_force_n).unwrap_or(Vec3::ZERO);
@@ -262,7 +264,8 @@ mod tests {
     #[test]
     fn the_force_is_written_beside_its_arrow() {
         let mut pressed = square();
-        pressed.header.tools = vec![palpate_proto::v1::ToolShape { name: "finger".into(), radius_m: 0.01 }];
+        pressed.header.tools =
+            vec![palpate_proto::v1::ToolShape { name: "finger".into(), radius_m: 0.01, half_length_m: 0.0 }];
         let force = Some(palpate_proto::v1::Vec3 { x: 0.0, y: 0.0, z: 0.5 });
         pressed.last.tools = vec![palpate_proto::v1::ToolState { contact_force_n: force, ..Default::default() }];
         let arrow = ARROW.0.map(|c| (c * 255.0).round() as u8);

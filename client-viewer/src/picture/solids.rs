@@ -1,19 +1,25 @@
 //! Tools and arrows as triangles.
 use super::{colour::Rgb, raster::Vertex};
-use glam::Vec3;
+use glam::{Quat, Vec3};
 use std::f32::consts::{PI, TAU};
 
 const AROUND: usize = 48;
 const ALONG: usize = 24;
 
-/// A sphere (m).
-pub(super) fn sphere(centre: Vec3, radius: f32, colour: Rgb) -> Vec<[Vertex; 3]> {
+/// A capsule (m) about the segment `centre ± half`; a sphere where that is a point.
+pub(super) fn capsule(centre: Vec3, half: Vec3, radius: f32, colour: Rgb) -> Vec<[Vertex; 3]> {
+    let pole = half.try_normalize().unwrap_or(Vec3::Z);
+    // About z as it is, so that a sphere's seams are where they were.
+    let turn = Quat::from_rotation_arc(Vec3::Z, pole);
+    // The equator twice: once at either end of the cylinder.
     let at = |i: usize, j: usize| {
-        let (polar, azimuth) = (PI * i as f32 / ALONG as f32, TAU * j as f32 / AROUND as f32);
-        let normal = Vec3::new(polar.sin() * azimuth.cos(), polar.sin() * azimuth.sin(), polar.cos());
-        Vertex { position: centre + normal * radius, normal, colour }
+        let (ring, end) = if i <= ALONG / 2 { (i, half) } else { (i - 1, -half) };
+        let (polar, azimuth) = (PI * ring as f32 / ALONG as f32, TAU * j as f32 / AROUND as f32);
+        let normal = turn * Vec3::new(polar.sin() * azimuth.cos(), polar.sin() * azimuth.sin(), polar.cos());
+        Vertex { position: centre + end + normal * radius, normal, colour }
     };
-    (0..ALONG)
+    (0..=ALONG)
+        .filter(|&i| i != ALONG / 2 || half != Vec3::ZERO)
         .flat_map(|i| (0..AROUND).map(move |j| (i, j)))
         .flat_map(|(i, j)| {
             let [a, b, c, d] = [at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)];

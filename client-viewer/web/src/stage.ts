@@ -6,9 +6,10 @@ import { Cloud } from "./cloud";
 import type { Patch } from "./refined";
 import { Skin } from "./skin";
 import type { Surface } from "./surface";
-import type { ToolState, Vec3 } from "./wire";
+import type { Quaternion, ToolState, Vec3 } from "./wire";
 
 const vector = (v: Vec3 | undefined) => new THREE.Vector3(v?.x ?? 0, v?.y ?? 0, v?.z ?? 0);
+const rotation = (q: Quaternion | undefined) => new THREE.Quaternion(q?.x ?? 0, q?.y ?? 0, q?.z ?? 0, q?.w ?? 1);
 
 /** Length of the longest arrow, in sizes of the body. */
 const LONGEST_ARROW = 0.25;
@@ -16,16 +17,17 @@ const LONGEST_ARROW = 0.25;
 /** Of the surface while what is in it shall be seen. */
 const TRANSLUCENT = 0.3;
 
-/** Three circles around the origin, one in each plane. */
-function rings(radius: number): THREE.BufferGeometry {
+/** Three circles around the origin, one in each plane; of a capsule along z, its outline in two of them and a circle at either end. */
+function rings(radius: number, half: number): THREE.BufferGeometry {
   const points: number[] = [];
-  for (let axis = 0; axis < 3; axis++) {
+  for (const [axis, side] of [[0, 1], [1, 1], [2, 1], [2, -1]] as const) {
     for (let i = 0; i < 128; i++) {
       // Both ends of each of 64 segments.
       const angle = (2 * Math.PI * Math.ceil(i / 2)) / 64;
       const at = [0, 0, 0];
       at[(axis + 1) % 3] = radius * Math.cos(angle);
       at[(axis + 2) % 3] = radius * Math.sin(angle);
+      at[2] = at[2]! + half * (axis === 2 ? side : at[2]! < 0 ? -1 : 1);
       points.push(...at);
     }
   }
@@ -42,7 +44,7 @@ function corners({ min, max }: THREE.Box3): THREE.Vector3[] {
   return [min.x, max.x].flatMap((x) => [min.y, max.y].flatMap((y) => [min.z, max.z].map((z) => new THREE.Vector3(x, y, z))));
 }
 
-interface ToolView { radiusM: number; proxy: THREE.Mesh; device: THREE.LineSegments; arrow: Arrow }
+interface ToolView { radiusM: number; halfLengthM: number; proxy: THREE.Mesh; device: THREE.LineSegments; arrow: Arrow }
 
 export class Stage {
   private readonly renderer = new THREE.WebGLRenderer({ antialias: true, alpha: true });
@@ -171,6 +173,10 @@ export class Stage {
       if (!state) return;
       view.proxy.position.copy(vector(state.proxyPositionM));
       view.device.position.copy(vector(state.devicePositionM));
+      if (view.halfLengthM > 0) {
+        view.proxy.quaternion.copy(rotation(state.proxyOrientation));
+        view.device.quaternion.copy(rotation(state.deviceOrientation));
+      }
       const force = vector(state.contactForceN);
       const length = force.length();
       view.arrow.visible = length > 1e-6;
@@ -188,9 +194,11 @@ export class Stage {
     this.camera.updateMatrixWorld();
     const box = new THREE.Box3(vector(this.surface?.header.boundsMinM), vector(this.surface?.header.boundsMaxM));
     const tools = this.tools.filter((view) => view.proxy.visible).flatMap((view) => {
-      // The ends of each ball across and up the window.
-      const ends = [view.proxy, view.device].flatMap((ball) => [0, 1].flatMap((axis) => [-1, 1].map((sign) =>
-        new THREE.Vector3().setFromMatrixColumn(this.camera.matrixWorld, axis).multiplyScalar(sign * view.radiusM).add(ball.position))));
+      // The ends of each ball across and up the window: a capsule has one at either end.
+      const balls = [view.proxy, view.device].flatMap((solid) => [-1, 1].map((end) =>
+        new THREE.Vector3(0, 0, end * view.halfLengthM).applyQuaternion(solid.quaternion).add(solid.position)));
+      const ends = balls.flatMap((ball) => [0, 1].flatMap((axis) => [-1, 1].map((sign) =>
+        new THREE.Vector3().setFromMatrixColumn(this.camera.matrixWorld, axis).multiplyScalar(sign * view.radiusM).add(ball))));
       return [...ends, ...(view.arrow.visible ? [view.arrow.tip()] : [])];
     });
     return { body: this.onScreen(corners(box)), tools: this.onScreen(tools) };
@@ -229,16 +237,19 @@ export class Stage {
       view.arrow.dispose();
     }
     this.tools = surface.header.tools.map((tool) => {
-      const ball = new THREE.SphereGeometry(tool.radiusM, 48, 24);
-      const proxy = new THREE.Mesh(ball, new THREE.MeshStandardMaterial({ color: 0xe9e4da, roughness: 0.35, transparent: true, opacity: 0.85 }));
+      const solid = tool.halfLengthM > 0
+        // Along y as it is made.
+        ? new THREE.CapsuleGeometry(tool.radiusM, 2 * tool.halfLengthM, 12, 48).rotateX(Math.PI / 2)
+        : new THREE.SphereGeometry(tool.radiusM, 48, 24);
+      const proxy = new THREE.Mesh(solid, new THREE.MeshStandardMaterial({ color: 0xe9e4da, roughness: 0.35, transparent: true, opacity: 0.85 }));
       // Seen through the body: there it is while the arm presses.
-      const device = new THREE.LineSegments(rings(tool.radiusM), new THREE.LineBasicMaterial({ color: 0x6fb7e9, depthTest: false, transparent: true }));
+      const device = new THREE.LineSegments(rings(tool.radiusM, tool.halfLengthM), new THREE.LineBasicMaterial({ color: 0x6fb7e9, depthTest: false, transparent: true }));
       device.renderOrder = 1;
       const arrow = new Arrow(0.012 * this.size);
       // Nobody knows yet where they are.
       proxy.visible = device.visible = arrow.visible = false;
       this.scene.add(proxy, device, arrow);
-      return { radiusM: tool.radiusM, proxy, device, arrow };
+      return { radiusM: tool.radiusM, halfLengthM: tool.halfLengthM, proxy, device, arrow };
     });
   }
 

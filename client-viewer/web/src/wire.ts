@@ -6,6 +6,8 @@ import { Unreachable } from "./reason";
 
 export interface Vec3 { x: number; y: number; z: number }
 
+export interface Quaternion { w: number; x: number; y: number; z: number }
+
 export interface KeyframeHeader {
   sessionId: string;
   sceneName: string;
@@ -14,7 +16,8 @@ export interface KeyframeHeader {
   tickPeriodS: number;
   boundsMinM?: Vec3;
   boundsMaxM?: Vec3;
-  tools: { name: string; radiusM: number }[];
+  /** Half length 0: a sphere; else a capsule along its own z. */
+  tools: { name: string; radiusM: number; halfLengthM: number }[];
   /** 0: the body has no particles. */
   particleSpacingM: number;
 }
@@ -34,6 +37,8 @@ export interface ToolState {
   contactForceN?: Vec3;
   deviceForceN?: Vec3;
   contacts: number;
+  deviceOrientation?: Quaternion;
+  proxyOrientation?: Quaternion;
 }
 
 export interface SurfaceUpdate {

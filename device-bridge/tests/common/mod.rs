@@ -120,6 +120,7 @@ impl Mock {
             echo_device_time_ns: sample.device_time_ns,
             local_model: behaviour.local_model.clone(),
             proxy_position_m: Some(v1::Vec3::default()),
+            proxy_orientation: None,
         };
         answers.push(DeviceDown { message: Some(Message::Command(command)) });
         Some(answers)
@@ -183,6 +184,8 @@ fn welcome(max_force_n: f64) -> DeviceDown {
         coupling_damping_n_s_per_m: 1.0,
         stale_after_s: 0.05,
         ramp_to_zero_s: 0.05,
+        max_torque_nm: 0.0,
+        max_torque_rate_nm_per_s: 0.0,
     };
     let welcome = v1::DeviceWelcome {
         session_id: "mock".into(),
@@ -190,6 +193,7 @@ fn welcome(max_force_n: f64) -> DeviceDown {
         tick_period_s: 1e-3,
         limits: Some(limits),
         tool_radius_m: 5e-3,
+        tool_half_length_m: 0.0,
     };
     DeviceDown { message: Some(Message::Welcome(welcome)) }
 }

@@ -15,6 +15,7 @@ pub mod parameter;
 pub mod passivity;
 pub mod simulated_arm;
 pub mod thermal;
+pub mod torque;
 pub mod velocity;
 pub mod watchdog;
 
@@ -29,5 +30,6 @@ pub use parameter::ParameterError;
 pub use passivity::{PassivityController, PassivitySettings, PassivityStep};
 pub use simulated_arm::{ArmSpec, HandPath, Keyframe, SimulatedArm};
 pub use thermal::{ThermalLimiter, ThermalLimits};
+pub use torque::{TorqueLaw, TorqueLimiter, TorqueLimits};
 pub use velocity::Velocity;
 pub use watchdog::{Fault, Link, Verdict, Watchdog, WatchdogSettings};

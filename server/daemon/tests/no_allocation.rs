@@ -121,6 +121,8 @@ async fn no_tick_allocates() {
             arrived_ns: bench.clock.now_ns(),
             position_m: pressing() + DVec3::Z * depth,
             velocity_m_per_s: DVec3::ZERO,
+            orientation: glam::DQuat::IDENTITY,
+            angular_velocity_rad_per_s: DVec3::ZERO,
             buttons: 0,
         }));
         bench.ticks(1, RUN);

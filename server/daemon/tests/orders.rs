@@ -124,6 +124,8 @@ async fn the_loop_touches_no_heap_whatever_it_is_asked() {
             arrived_ns: Clock::Monotonic.now_ns(),
             position_m: if sequence < 50 { above() } else { pressing() },
             velocity_m_per_s: DVec3::ZERO,
+            orientation: glam::DQuat::IDENTITY,
+            angular_velocity_rad_per_s: DVec3::ZERO,
             buttons: 0,
         }));
         tokio::time::sleep(Duration::from_millis(1)).await;

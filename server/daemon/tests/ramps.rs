@@ -79,6 +79,8 @@ impl Bench {
             arrived_ns: self.clock.now_ns(),
             position_m,
             velocity_m_per_s: DVec3::ZERO,
+            orientation: glam::DQuat::IDENTITY,
+            angular_velocity_rad_per_s: DVec3::ZERO,
             buttons: 0,
         }));
         self.simulation.tick(plan, &self.clock, &self.timing);

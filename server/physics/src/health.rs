@@ -247,7 +247,11 @@ impl std::fmt::Display for Quarantine {
 pub fn first_non_finite(state: &State) -> Option<u32> {
     // One pass of additions: a sum is finite only if every term is (overflow of finite terms is caught as well).
     let sum: DVec3 = state.x.iter().zip(&state.v).map(|(x, v)| *x + *v).sum();
-    let tools: DVec3 = state.tools.iter().map(|tool| tool.centre_m + tool.velocity_m_per_s + tool.device_force_n).sum();
+    let of_tool = |tool: &ToolState| {
+        let turning = tool.orientation.xyz() + tool.angular_velocity_rad_per_s + tool.device_torque_nm;
+        tool.centre_m + tool.velocity_m_per_s + tool.device_force_n + turning
+    };
+    let tools: DVec3 = state.tools.iter().map(of_tool).sum();
     let work = state.ledger.external_work_j + state.ledger.dissipated_j;
     let particles_are_finite = state.seed.as_ref().is_none_or(SeedMotion::particles_are_finite);
     if sum.is_finite() && tools.is_finite() && work.is_finite() && particles_are_finite {

@@ -2,7 +2,12 @@
 #![allow(clippy::unwrap_used)]
 mod rig;
 use glam::DVec3;
-use palpate_physics::{ModelSpec, Substeps, contact::Coupling, health, material::Law};
+use palpate_physics::{
+    ModelSpec, Substeps,
+    contact::{Coupling, ToolTarget},
+    health,
+    material::Law,
+};
 use rig::{Rig, body, bricks, even, hold, material, nodes_where, sphere};
 
 fn largest_displacement_m(rig: &Rig) -> f64 {
@@ -133,7 +138,7 @@ fn a_body_turned_inside_out_still_meets_a_tool_in_finite_numbers() {
         }
         assert!(health::min_volume_ratio(&rig.model, &rig.state).0 <= 0.0);
         let place = DVec3::new(0.001, 0.002, -0.038);
-        rig.state.place_tool(0, place);
+        rig.state.place_tool(0, ToolTarget::at(place));
         let mut touched = 0;
         for tick in 0..400 {
             let t = f64::from(tick) * 1e-3;

@@ -5,7 +5,7 @@ use assert_no_alloc::{AllocDisabler, assert_no_alloc};
 use glam::DVec3;
 use palpate_physics::{
     Integrator, LoadSpec, PointForce, Substeps, TickInput,
-    contact::{Coupling, ToolTarget},
+    contact::{Coupling, ToolShape, ToolTarget},
     hybrid::{ParticleSpec, Skin, Waking},
     material::{Lame, Law, Viscosity},
 };
@@ -58,6 +58,15 @@ fn nor_do_ticks_of_the_other_integrators() {
     for integrator in [Integrator::SeedVerlet, Integrator::SeedSemiImplicit, Integrator::BackwardEuler] {
         ticks_allocate_nothing(integrator, 2000);
     }
+}
+
+#[test]
+fn nor_do_capsules() {
+    let mut spec = rig(Integrator::Leapfrog).model.spec().clone();
+    for tool in &mut spec.tools {
+        tool.shape = ToolShape::capsule(tool.coupling, tool.radius_m, 0.006, DVec3::new(1.0, 0.0, 1.0));
+    }
+    run_without_allocating(Rig::new(spec), 2000);
 }
 
 /// One step per tick is too long for a body of 200 kPa.

@@ -2,7 +2,12 @@
 #![allow(clippy::unwrap_used)]
 mod rig;
 use glam::DVec3;
-use palpate_physics::{Model, ModelError, ModelSpec, State, contact::Coupling, material::Law, snapshot};
+use palpate_physics::{
+    Model, ModelError, ModelSpec, State,
+    contact::{Coupling, ToolTarget},
+    material::Law,
+    snapshot,
+};
 use rig::{Rig, body, bricks, even, hold, material, nodes_where, sphere};
 
 const RADIUS_M: f64 = 0.005;
@@ -37,7 +42,7 @@ fn a_tool_put_into_shallow_contact_does_not_kick() {
     for coupling in [Coupling::Rigid, SPRING] {
         let mut rig = Rig::new(held_block(coupling));
         rig.tick_at(DVec3::Z * 0.02);
-        rig.state.place_tool(0, deep(0.001));
+        rig.state.place_tool(0, ToolTarget::at(deep(0.001)));
         // Saved before its first tick, it is still a tool that was just put there.
         let bytes = snapshot::save(&rig.model, &rig.state);
         rig.state = snapshot::restore(&rig.model, &bytes).unwrap();
@@ -66,7 +71,7 @@ fn a_tool_put_into_contact_resists_from_there_and_forgets_it_when_it_leaves() {
     let mut fresh = Rig::new(held_block(Coupling::Rigid));
     let whole = press(&mut fresh, -0.001, 0.002);
     let mut rig = Rig::new(held_block(Coupling::Rigid));
-    rig.state.place_tool(0, deep(0.001));
+    rig.state.place_tool(0, ToolTarget::at(deep(0.001)));
     let first_um = {
         rig.tick_at(deep(0.001 + 1e-6));
         rig.state.tools[0].contact_force_n.length()
@@ -95,7 +100,7 @@ fn a_tool_put_into_more_samples_than_can_be_kept_does_not_kick() {
     let mut rig = Rig::new(spec);
     for (from_m, way) in [(0.006, 1.0), (-0.006 - thickness_m, -1.0)] {
         rig.state = State::at_rest(&rig.model);
-        rig.state.place_tool(0, DVec3::Z * from_m);
+        rig.state.place_tool(0, ToolTarget::at(DVec3::Z * from_m));
         for tick in 1..=3 {
             rig.tick_at(DVec3::Z * (from_m - way * 1e-7 * f64::from(tick)));
             let tool = &rig.state.tools[0];
@@ -114,7 +119,7 @@ fn a_tool_follows_a_body_that_moves_away() {
     let velocity = DVec3::new(0.5, 0.0, -3.0);
     rig.state.v.fill(velocity);
     let start = DVec3::new(0.0, 0.0, 1.1 * RADIUS_M);
-    rig.state.place_tool(0, start);
+    rig.state.place_tool(0, ToolTarget::at(start));
     rig.state.tools[0].velocity_m_per_s = velocity;
     for tick in 1..=50 {
         rig.tick_at(start + velocity * (1e-3 * f64::from(tick)));
@@ -129,7 +134,7 @@ fn a_tool_follows_a_body_that_moves_away() {
 fn a_body_that_comes_moves_no_tool_before_it_touches() {
     let mut rig = Rig::new(block(SPRING));
     rig.state.v.fill(DVec3::Z);
-    rig.state.place_tool(0, DVec3::Z * (2.0 * RADIUS_M));
+    rig.state.place_tool(0, ToolTarget::at(DVec3::Z * (2.0 * RADIUS_M)));
     let mut near = 0;
     while rig.state.tools[0].contacts == 0 {
         rig.tick_at(DVec3::Z * (2.0 * RADIUS_M));

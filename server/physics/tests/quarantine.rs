@@ -81,7 +81,7 @@ fn inputs_that_are_not_finite_are_replaced_and_counted() {
     let mut good = pressed();
     let hold_still = good.still();
     assert_eq!(good.tick(&hold_still).inputs_rejected, 0);
-    let nan_tool = ToolTarget { position_m: DVec3::new(0.0, f64::NAN, 0.0), velocity_m_per_s: DVec3::ZERO };
+    let nan_tool = ToolTarget::at(DVec3::new(0.0, f64::NAN, 0.0));
     let drive = Drive {
         tools: vec![nan_tool],
         prescribed: vec![DVec3::splat(f64::INFINITY)],

@@ -5,7 +5,7 @@ use common::{block, held, material, spec};
 use glam::DVec3;
 use palpate_physics::{
     Energies, Model, Scratch, State, Substeps, TickInput,
-    contact::{Coupling, ToolSpec, ToolTarget},
+    contact::{Coupling, ToolShape, ToolSpec, ToolTarget},
     material::Law,
     solve::{SolveError, StaticSettings, StaticSolution, solve_static},
     step,
@@ -29,6 +29,7 @@ fn pressed_block(coupling: Coupling) -> Model {
     let mut wanted = spec(mesh, material(Law::StableNeoHookean, 10e3, 0.45), prescribed, vec![]);
     wanted.tools = vec![ToolSpec {
         name: "sphere".into(),
+        shape: ToolShape::Sphere,
         radius_m: 0.01,
         coupling,
         friction_coefficient: 0.0,
@@ -41,7 +42,7 @@ fn pressed_block(coupling: Coupling) -> Model {
 }
 
 fn at(position_m: DVec3) -> ToolTarget {
-    ToolTarget { position_m, velocity_m_per_s: DVec3::ZERO }
+    ToolTarget::at(position_m)
 }
 
 fn solved(model: &Model, device_m: DVec3) -> Result<StaticSolution, SolveError> {

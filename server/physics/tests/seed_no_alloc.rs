@@ -48,7 +48,7 @@ fn a_tick_does_not_allocate() {
         for tick in 0..400 {
             let odd = tick % 97 == 0;
             let blow = DVec3::X * if tick == 380 { 1e300 } else { 1e-6 };
-            let tools = [ToolTarget { position_m: device_m(tick), velocity_m_per_s: DVec3::ZERO }];
+            let tools = [ToolTarget::at(device_m(tick))];
             let forces = [
                 PointForce { node: first, force_n: if odd { DVec3::NAN } else { blow } },
                 // A node of the core, which nothing can push.

@@ -1,5 +1,6 @@
 //! What moves a tool.
 use crate::path::MotionPath;
+use glam::DQuat;
 use palpate_physics::contact::ToolTarget;
 
 /// What moves a tool.
@@ -14,6 +15,15 @@ pub enum Driver {
 }
 
 impl Driver {
+    /// In an orientation (tool frame to world).
+    pub(crate) fn turned(self, orientation: DQuat) -> Self {
+        match self {
+            Self::Device => Self::Device,
+            Self::Trajectory(path) => Self::Trajectory(path.turned(orientation)),
+            Self::Script(path) => Self::Script(path.turned(orientation)),
+        }
+    }
+
     /// Where the tool shall be at a time, `None` when a device decides. Does not allocate.
     pub fn target(&self, time_s: f64) -> Option<ToolTarget> {
         match self {

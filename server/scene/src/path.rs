@@ -1,5 +1,5 @@
 //! A path through space: what scripted tools, CSV trajectories and the hand on the simulated arm follow.
-use glam::DVec3;
+use glam::{DQuat, DVec3};
 use palpate_physics::contact::ToolTarget;
 
 /// How a [`MotionPath`] goes from one keyframe to the next.
@@ -12,11 +12,12 @@ pub enum Interpolation {
     Smooth,
 }
 
-/// Positions over time. Before the first keyframe it rests at the first, after the last one at the last, unless it repeats.
+/// Positions over time, in one orientation. Before the first keyframe it rests at the first, after the last one at the last, unless it repeats.
 #[derive(Debug, Clone, PartialEq)]
 pub struct MotionPath {
     times_s: Vec<f64>,
     positions_m: Vec<DVec3>,
+    orientation: DQuat,
     interpolation: Interpolation,
     repeat: bool,
 }
@@ -83,7 +84,13 @@ impl MotionPath {
             return Err(PathError::Jumps { start: first.1, end: last.1 });
         }
         let (times_s, positions_m) = keyframes.iter().copied().unzip();
-        Ok(Self { times_s, positions_m, interpolation, repeat })
+        Ok(Self { times_s, positions_m, orientation: DQuat::IDENTITY, interpolation, repeat })
+    }
+
+    /// The same path, in another orientation (tool frame to world).
+    #[must_use]
+    pub fn turned(self, orientation: DQuat) -> Self {
+        Self { orientation, ..self }
     }
 
     /// Where it starts (m).
@@ -106,7 +113,8 @@ impl MotionPath {
 
     /// Position (m) and velocity (m/s) at a time. Does not allocate.
     pub fn at(&self, time_s: f64) -> ToolTarget {
-        let rest = |position_m| ToolTarget { position_m, velocity_m_per_s: DVec3::ZERO };
+        let there = ToolTarget { orientation: self.orientation, ..ToolTarget::default() };
+        let rest = |position_m| ToolTarget { position_m, ..there };
         let period_s = self.duration_s();
         let time_s = if self.repeat && period_s > 0.0 && time_s > self.first_s() {
             self.first_s() + (time_s - self.first_s()).rem_euclid(period_s)
@@ -127,7 +135,7 @@ impl MotionPath {
             Interpolation::Linear => (s, 1.0),
             Interpolation::Smooth => (smooth_step(s), smooth_step_rate(s)),
         };
-        ToolTarget { position_m: a.lerp(b, blend), velocity_m_per_s: (b - a) * (rate / (t1 - t0)) }
+        ToolTarget { position_m: a.lerp(b, blend), velocity_m_per_s: (b - a) * (rate / (t1 - t0)), ..there }
     }
 }
 

@@ -28,6 +28,10 @@ pub enum Measure {
     ContactForce(usize),
     /// Force on a tool's device (N).
     DeviceForce(usize),
+    /// Torque of the body on a tool, about its centre (N m).
+    ContactTorque(usize),
+    /// Torque on a tool's device (N m).
+    DeviceTorque(usize),
     /// Centre of a tool (m).
     ToolPosition(usize),
     /// Deepest penetration of a tool (m).
@@ -110,7 +114,7 @@ impl Probe {
         &self.measure
     }
 
-    /// Unit of its values: `m`, `N`, `J` or `1`.
+    /// Unit of its values: `m`, `N`, `Nm`, `J` or `1`.
     pub fn unit(&self) -> &'static str {
         match self.measure {
             Measure::Displacement(_)
@@ -119,6 +123,7 @@ impl Probe {
             | Measure::ToolPosition(_)
             | Measure::Penetration(_) => "m",
             Measure::Reaction(_) | Measure::ContactForce(_) | Measure::DeviceForce(_) => "N",
+            Measure::ContactTorque(_) | Measure::DeviceTorque(_) => "Nm",
             Measure::Energy => "J",
             Measure::MinVolumeRatio => "1",
         }
@@ -155,6 +160,8 @@ impl Probe {
             }
             Measure::ContactForce(tool) => put(out, state.tools[*tool].contact_force_n),
             Measure::DeviceForce(tool) => put(out, state.tools[*tool].device_force_n),
+            Measure::ContactTorque(tool) => put(out, state.tools[*tool].contact_torque_nm),
+            Measure::DeviceTorque(tool) => put(out, state.tools[*tool].device_torque_nm),
             Measure::ToolPosition(tool) => put(out, state.tools[*tool].centre_m),
             Measure::Penetration(tool) => copy(out, &[state.tools[*tool].penetration_m]),
             Measure::MinVolumeRatio => copy(out, &[health::min_volume_ratio(model, state).0]),

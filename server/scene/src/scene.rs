@@ -41,10 +41,7 @@ impl Scene {
     /// hand, else its start. Does not allocate.
     pub fn offline_target(&self, tool: usize, time_s: f64) -> palpate_physics::contact::ToolTarget {
         let scripted = || self.arm.as_ref().filter(|arm| arm.tool == tool).map(|arm| arm.path.at(time_s));
-        let at_start = || palpate_physics::contact::ToolTarget {
-            position_m: self.model.tools[tool].start_position_m,
-            velocity_m_per_s: glam::DVec3::ZERO,
-        };
+        let at_start = || self.model.tools[tool].start();
         self.drivers[tool].target(time_s).or_else(scripted).unwrap_or_else(at_start)
     }
 }

@@ -130,7 +130,7 @@ fn unknown_keys_with_the_nearest_known_one() {
     assert_eq!(refused("[[fixed]]", "[[fix]]"), "t.toml:11:3: unknown key `fix` in the scene (did you mean `fixed`?)");
     assert_eq!(
         refused("radius_mm = 2", "diameter_mm = 2"),
-        "t.toml:20:1: unknown key `diameter_mm` in [tool[0]] (known: name, radius_m, coupling, stiffness_n_per_m, damping_n_s_per_m, mass_kg, friction_coefficient, driver, start_m, trajectory_file, keyframe, interpolation, repeat)"
+        "t.toml:20:1: unknown key `diameter_mm` in [tool[0]] (known: name, shape, radius_m, half_length_m, axis, coupling, stiffness_n_per_m, damping_n_s_per_m, mass_kg, turn_stiffness_nm_per_rad, turn_damping_nm_s_per_rad, inertia_kg_m2, friction_coefficient, driver, start_m, trajectory_file, keyframe, interpolation, repeat)"
     );
     assert_eq!(
         refused("law = \"stvk\"", "law = \"neo-hooke\""),
@@ -142,7 +142,7 @@ fn unknown_keys_with_the_nearest_known_one() {
 fn missing_keys_and_wrong_types() {
     assert_eq!(
         refused("radius_mm = 2\n", ""),
-        "t.toml:18:1: [tool[0]] lacks the key `radius_m` (or `radius_mm`) (docs/scenes.md describes every key)"
+        "t.toml:18:1: the tool \"ball\" lacks the key `radius_m` (or `radius_mm`)"
     );
     assert_eq!(
         refused("cells = [2, 2, 2]", "cells = [2, 2]"),
@@ -378,4 +378,27 @@ fn what_is_larger_than_the_limits_is_refused_before_it_is_made() {
     std::fs::write(&path, GOOD).unwrap();
     let message = load_file(&path, &limits, &mut |_, _| {}).unwrap_err().one_line();
     assert!(message.contains("cannot read the scene file") && message.contains("more than 100 bytes"), "{message}");
+}
+
+#[test]
+fn shapes_of_tools_and_what_goes_with_them() {
+    let shaped = |keys: &str| refused("radius_mm = 2\n", keys);
+    for (keys, message) in [
+        (
+            "shape = \"capsule\"\nradius_mm = 2\n",
+            "the capsule \"ball\" lacks the key `half_length_m` (or `half_length_mm`)",
+        ),
+        (
+            "shape = \"capsule\"\nradius_mm = 2\nhalf_length_mm = 0\n",
+            "tool[0].half_length_m = 0: must be larger than 0",
+        ),
+        ("shape = \"capsule\"\nradius_mm = 2\nhalf_length_mm = 4\naxis = [0, 0, 0]\n", "a direction must not be zero"),
+        ("shape = \"point\"\nradius_mm = 2\n", "a point has no radius: it is as small as the surface allows"),
+        ("radius_mm = 2\nhalf_length_mm = 4\n", "`half_length_m` goes with shape = \"capsule\""),
+        ("radius_mm = 2\ninertia_kg_m2 = 1e-6\n", "`inertia_kg_m2` goes with shape = \"capsule\""),
+        ("shape = \"cone\"\nradius_mm = 2\n", "(known: sphere, capsule, point)"),
+    ] {
+        let said = shaped(keys);
+        assert!(said.contains(message), "{said}");
+    }
 }

@@ -57,3 +57,30 @@ fn the_default_scene_is_pressed_by_the_simulated_arm_every_two_seconds() {
     let (a, b) = (scene.offline_target(0, 0.25), scene.offline_target(0, 2.25));
     assert!((a.position_m - b.position_m).length() < 1e-12 && a.velocity_m_per_s.x < 0.0);
 }
+
+/// Turned over by the press on its edge, offline.
+#[test]
+fn the_capsule_is_turned_where_it_is_pressed_beside_its_middle() {
+    use palpate_physics::{Scratch, State, TickInput, contact::ToolShape};
+    let scene = load(&folder().join("capsule-press.toml"));
+    let model = Model::build(scene.model.clone()).unwrap();
+    assert!(matches!(model.spec().tools[0].shape, ToolShape::Capsule(_)));
+    let (mut state, mut scratch) = (State::at_rest(&model), Scratch::new(&model));
+    let mut torques_nm = Vec::new();
+    for tick in 1..=2000_u32 {
+        let tools = [scene.offline_target(0, f64::from(tick) * 1e-3)];
+        let input = TickInput {
+            tools: &tools,
+            load_factors: &[],
+            prescribed_displacements_m: &[glam::DVec3::ZERO],
+            point_forces: &[],
+        };
+        palpate_physics::step(&model, &mut state, &mut scratch, &input);
+        if tick % 1500 == 500 {
+            torques_nm.push((state.tools[0].contact_force_n.z, state.tools[0].contact_torque_nm.y));
+        }
+    }
+    let [(middle_n, middle_nm), (edge_n, edge_nm)] = torques_nm[..] else { panic!("{torques_nm:?}") };
+    assert!(middle_n > 0.5 && middle_nm.abs() < 1e-3 * middle_n, "{middle_n} {middle_nm}");
+    assert!(edge_n > 0.1 && edge_nm > 5e-3 * edge_n, "{edge_n} {edge_nm}");
+}

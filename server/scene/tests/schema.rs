@@ -87,7 +87,8 @@ fn all_misfits(scene: &Value) -> Vec<String> {
 
 #[test]
 fn shipped_scenes_fit_the_schema() {
-    for name in ["ventricle", "cantilever", "lame-sphere", "block-press", "paper-2006", "two-surfaces"] {
+    for name in ["ventricle", "cantilever", "lame-sphere", "block-press", "capsule-press", "paper-2006", "two-surfaces"]
+    {
         let scene = as_json(&example(&format!("{name}.toml")));
         assert_eq!(all_misfits(&scene), Vec::<String>::new(), "{name}");
     }
@@ -98,8 +99,8 @@ fn mistakes_do_not_fit_it() {
     let good = example("ventricle.toml");
     for (from, to) in [
         ("poisson_ratio", "poison_ratio"),
-        ("radius_mm = 8\n", ""),
-        ("radius_mm = 8", "radius_mm = 8\nradius_m = 0.008"),
+        ("position_mm = [55, 0, 0]\n", ""),
+        ("position_mm = [55, 0, 0]", "position_mm = [55, 0, 0]\nposition_m = [0.055, 0, 0]"),
         ("stable-neo-hookean", "neo-hookean"),
         ("start_mm = [55, 0, 0]", "start_mm = [55, 0]"),
     ] {

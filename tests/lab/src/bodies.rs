@@ -3,7 +3,7 @@ use glam::DVec3;
 use miette::{IntoDiagnostic, Result};
 use palpate_physics::{
     Model, ModelSpec, PrescribedSpec, Region, Settings,
-    contact::{Coupling, ToolSpec},
+    contact::{Coupling, ToolShape, ToolSpec},
     material::{Convention, Lame, Law, Material, Viscosity},
 };
 use palpate_scene::shapes::{self, BoundaryRegion, Shape};
@@ -53,6 +53,7 @@ pub fn tool_beside(shape: &Shape, radius_m: f64) -> ToolSpec {
     let widest = shape.mesh.positions_m().iter().copied().max_by(|a, b| a.x.total_cmp(&b.x)).unwrap_or_default();
     ToolSpec {
         name: "tool".into(),
+        shape: ToolShape::Sphere,
         radius_m,
         coupling: Coupling::Rigid,
         friction_coefficient: 0.3,

@@ -7,7 +7,7 @@ use crate::{
     },
     stream::hub::Layers,
 };
-use glam::{DMat3, DVec3};
+use glam::{DMat3, DQuat, DVec3};
 use palpate_physics::{Quarantine, contact::LocalContactModel};
 use palpate_proto::v1::{self, DeviceFaultCode};
 use tonic::Status;
@@ -59,6 +59,11 @@ pub fn wire_vec3(v: DVec3) -> v1::Vec3 {
     v1::Vec3 { x: v.x, y: v.y, z: v.z }
 }
 
+/// A rotation on the wire.
+pub fn wire_quaternion(q: DQuat) -> v1::Quaternion {
+    v1::Quaternion { w: q.w, x: q.x, y: q.y, z: q.z }
+}
+
 /// Checks a sample against the last accepted sequence number.
 ///
 /// # Errors
@@ -92,6 +97,8 @@ pub fn device_sample(
         arrived_ns,
         position_m,
         velocity_m_per_s,
+        orientation: DQuat::from_xyzw(orientation.x, orientation.y, orientation.z, orientation.w).normalize(),
+        angular_velocity_rad_per_s: angular,
         buttons: sample.buttons,
     })
 }
@@ -143,6 +150,10 @@ pub fn device_hello(message: Option<v1::DeviceUp>) -> Result<v1::DeviceHello, St
         if !(value.is_finite() && value > 0.0) {
             return Err(Status::invalid_argument(format!("hello.{name} = {value} must be finite and larger than 0")));
         }
+    }
+    if !(hello.max_torque_nm.is_finite() && hello.max_torque_nm >= 0.0) {
+        let value = hello.max_torque_nm;
+        return Err(Status::invalid_argument(format!("hello.max_torque_nm = {value} must be finite and not negative")));
     }
     Ok(hello)
 }
@@ -232,6 +243,10 @@ pub fn tool_state(view: &ToolView) -> v1::ToolState {
         contact_force_n: Some(wire_vec3(view.contact_force_n)),
         device_force_n: Some(wire_vec3(view.device_force_n)),
         contacts: view.contacts,
+        device_orientation: Some(wire_quaternion(view.device_orientation)),
+        proxy_orientation: Some(wire_quaternion(view.proxy_orientation)),
+        contact_torque_nm: Some(wire_vec3(view.contact_torque_nm)),
+        device_torque_nm: Some(wire_vec3(view.device_torque_nm)),
     }
 }
 
@@ -246,11 +261,15 @@ pub fn quarantine(what: Option<Quarantine>) -> String {
 pub fn device_command(output: &ToolOutput) -> v1::DeviceCommand {
     v1::DeviceCommand {
         tick: output.tick,
-        wrench: Some(v1::Wrench { force_n: Some(wire_vec3(output.force_n)), torque_nm: Some(wire_vec3(DVec3::ZERO)) }),
+        wrench: Some(v1::Wrench {
+            force_n: Some(wire_vec3(output.force_n)),
+            torque_nm: Some(wire_vec3(output.torque_nm)),
+        }),
         sample_sequence: output.sample_sequence,
         echo_device_time_ns: output.echo_device_time_ns,
         local_model: output.local_model.as_ref().map(|model| local_model(model, output)),
         proxy_position_m: Some(wire_vec3(output.proxy_position_m)),
+        proxy_orientation: Some(wire_quaternion(output.proxy_orientation)),
     }
 }
 
@@ -341,6 +360,8 @@ mod tests {
             if let Ok(input) = device_sample(&sample, None, 1, 0) {
                 prop_assert!(input.position_m.abs().max_element() <= MAX_COORDINATE_M);
                 prop_assert!(input.velocity_m_per_s.abs().max_element() <= MAX_SPEED_M_PER_S);
+                prop_assert!(input.angular_velocity_rad_per_s.abs().max_element() <= MAX_TURN_RAD_PER_S);
+                prop_assert!((input.orientation.length() - 1.0).abs() < 1e-12);
             }
         }
     }

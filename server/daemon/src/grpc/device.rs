@@ -77,8 +77,10 @@ async fn begin(
     let end = seat.take(&record).ok_or_else(|| taken(seat))?;
     let attachment = daemon.numbers.next_attachment();
     let max_force_n = hello.max_force_n.min(daemon.settings.limits.force.max_force_n);
+    let max_torque_nm = hello.max_torque_nm.min(daemon.settings.limits.torque.max_torque_nm);
+    end.shared.set_max_torque_nm(max_torque_nm);
     end.shared.attach(attachment, max_force_n);
-    let welcome = welcome(&daemon, &session, tool, max_force_n);
+    let welcome = welcome(&daemon, &session, tool, (max_force_n, max_torque_nm));
     tracing::info!(device = hello.device_name, tool = seat.name, "device attached");
     let taken = Taken { session, tool, number: attachment, record, end };
     Ok((welcome, Attachment::live(daemon, taken, messages)))
@@ -107,7 +109,12 @@ fn taken(seat: &ToolSeat) -> Status {
     Status::already_exists(format!("tool \"{}\" is driven by {by} already", seat.name))
 }
 
-fn welcome(daemon: &Daemon, session: &ActiveSession, tool: usize, max_force_n: f64) -> v1::DeviceWelcome {
+fn welcome(
+    daemon: &Daemon,
+    session: &ActiveSession,
+    tool: usize,
+    (max_force_n, max_torque_nm): (f64, f64),
+) -> v1::DeviceWelcome {
     let spec = &session.model.spec().tools[tool];
     let (stiffness, damping) = match spec.coupling {
         Coupling::Rigid => (0.0, 0.0),
@@ -125,7 +132,10 @@ fn welcome(daemon: &Daemon, session: &ActiveSession, tool: usize, max_force_n: f
             coupling_damping_n_s_per_m: damping,
             stale_after_s: limits.watchdog.stale_after_s,
             ramp_to_zero_s: limits.watchdog.ramp_to_zero_s,
+            max_torque_nm,
+            max_torque_rate_nm_per_s: limits.torque.max_torque_rate_nm_per_s,
         }),
         tool_radius_m: spec.radius_m,
+        tool_half_length_m: spec.shape.half_length_m(),
     }
 }

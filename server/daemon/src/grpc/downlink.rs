@@ -77,6 +77,7 @@ enum Stage {
     Fading {
         why: &'static str,
         from_n: DVec3,
+        from_nm: DVec3,
         since: Instant,
     },
     Ended,
@@ -143,10 +144,11 @@ impl Attachment {
             if let Some(output) = self.released(until).await {
                 return Some(Ok(self.command(&output)));
             }
-            self.stage = Stage::Fading { why, from_n: self.sent.force_n, since: Instant::now() };
+            self.stage =
+                Stage::Fading { why, from_n: self.sent.force_n, from_nm: self.sent.torque_nm, since: Instant::now() };
         }
         match self.stage {
-            Stage::Fading { why, from_n, since } => Some(Ok(self.fade(why, from_n, since).await)),
+            Stage::Fading { why, from_n, from_nm, since } => Some(Ok(self.fade(why, (from_n, from_nm), since).await)),
             _ => None,
         }
     }
@@ -225,13 +227,13 @@ impl Attachment {
     /// An output that was not sent yet.
     fn unsent(&mut self) -> Option<ToolOutput> {
         let fresh = self.end.as_mut()?.outputs.update();
-        let sent_n = self.sent.force_n;
-        self.newest().filter(|output| fresh || output.force_n != sent_n)
+        let sent = (self.sent.force_n, self.sent.torque_nm);
+        self.newest().filter(|output| fresh || (output.force_n, output.torque_nm) != sent)
     }
 
     /// The last force, ramped to zero over the time the loop takes for it; then the goodbye.
-    async fn fade(&mut self, why: &str, from_n: DVec3, since: Instant) -> Message {
-        if self.sent.force_n == DVec3::ZERO {
+    async fn fade(&mut self, why: &str, (from_n, from_nm): (DVec3, DVec3), since: Instant) -> Message {
+        if (self.sent.force_n, self.sent.torque_nm) == (DVec3::ZERO, DVec3::ZERO) {
             self.stage = Stage::Ended;
             let text = format!("{why}; the force has been ramped to zero");
             return Message::Fault(fault(DeviceFaultCode::Detached, text, 1));
@@ -239,7 +241,7 @@ impl Attachment {
         sleep(FADE_STEP).await;
         let ramp_s = self.daemon.settings.limits.watchdog.ramp_to_zero_s;
         let left = (1.0 - since.elapsed().as_secs_f64() / ramp_s).max(0.0);
-        self.command(&ToolOutput { force_n: from_n * left, local_model: None, ..self.sent })
+        self.command(&ToolOutput { force_n: from_n * left, torque_nm: from_nm * left, local_model: None, ..self.sent })
     }
 
     async fn how_the_way_up_ended(&mut self) -> Option<Result<Message, Status>> {

@@ -124,8 +124,7 @@ impl Goal {
             Some(time_s) => scene.timeline.fill(time_s, &mut load_factors, &mut prescribed_m),
             None => scene.timeline.fill_final(&mut load_factors, &mut prescribed_m),
         }
-        let still = |target: ToolTarget| ToolTarget { velocity_m_per_s: DVec3::ZERO, ..target };
-        let tools = (0..scene.model.tools.len()).map(|tool| still(scene.offline_target(tool, time_s))).collect();
+        let tools = (0..scene.model.tools.len()).map(|tool| scene.offline_target(tool, time_s).at_rest()).collect();
         Self { time_s, load_factors, prescribed_m, tools }
     }
 }
@@ -161,6 +160,7 @@ fn advice(cause: &SolveError) -> &'static str {
         SolveError::Factorisation { .. } => {
             "use a coarser mesh or more memory, or let `palpated simulate` come to rest"
         }
+        SolveError::SpheresOnly { .. } => "let `palpated simulate` come to rest, or make the tool a sphere",
         SolveError::NonFinite { .. } => "look for a load or a constant in the wrong unit",
         SolveError::NoConvergence { .. } | SolveError::TooManySteps { .. } => {
             "apply less load, or let `palpated simulate` find the way with viscosity or mass_damping_per_s"

@@ -41,6 +41,12 @@ pub struct ServeArgs {
     /// Largest change of an arm's force (N/s)
     #[arg(long, value_name = "N/S", default_value_t = default_limits().force.max_force_rate_n_per_s)]
     pub max_force_rate_n_per_s: f64,
+    /// Largest torque any arm is asked for (N m); a device's own limit applies when it is smaller
+    #[arg(long, value_name = "NM", default_value_t = default_limits().torque.max_torque_nm)]
+    pub max_torque_nm: f64,
+    /// Largest change of an arm's torque (N m/s)
+    #[arg(long, value_name = "NM/S", default_value_t = default_limits().torque.max_torque_rate_nm_per_s)]
+    pub max_torque_rate_nm_per_s: f64,
     /// Updates per second for viewers that ask for no rate (Hz, 1 to 240)
     #[arg(long, value_name = "HZ", default_value_t = 60.0)]
     pub display_rate_hz: f64,
@@ -67,6 +73,8 @@ impl ServeArgs {
         let mut limits = default_limits();
         limits.force.max_force_n = self.max_force_n;
         limits.force.max_force_rate_n_per_s = self.max_force_rate_n_per_s;
+        limits.torque.max_torque_nm = self.max_torque_nm;
+        limits.torque.max_torque_rate_nm_per_s = self.max_torque_rate_nm_per_s;
         let tls = self.tls_cert.clone().zip(self.tls_key.clone());
         let measures = OsMeasures {
             fifo_priority: Some(self.priority).filter(|&priority| priority > 0),

@@ -1,7 +1,7 @@
 //! Configuration of a daemon, parsed once.
 use super::ServeError;
 use crate::{grpc::convert::MAX_WATCH_RATE_HZ, grpc::listen::TlsFiles, sim::tool::ArmLimits};
-use palpate_control::{ForceLimits, WatchdogSettings};
+use palpate_control::{ForceLimits, TorqueLimits, WatchdogSettings};
 use palpate_realtime::OsMeasures;
 use std::{
     net::{Ipv4Addr, SocketAddr},
@@ -29,10 +29,11 @@ pub struct ServeConfig {
     pub measures: OsMeasures,
 }
 
-/// Peak 8 N (a desktop arm's is 3 to 9 N), 2000 N/s, and the watchdog's own times.
+/// Peak 8 N (a desktop arm's is 3 to 9 N), 2000 N/s, 0.5 N m, 100 N m/s, and the watchdog's own times.
 pub fn default_limits() -> ArmLimits {
     ArmLimits {
         force: ForceLimits { max_force_n: 8.0, max_force_rate_n_per_s: 2000.0 },
+        torque: TorqueLimits { max_torque_nm: 0.5, max_torque_rate_nm_per_s: 100.0 },
         watchdog: WatchdogSettings::default(),
     }
 }
@@ -59,6 +60,7 @@ impl ServeConfig {
     pub fn checked(self) -> Result<Self, ServeError> {
         let setting = |error: palpate_control::ParameterError| ServeError::Setting { reason: error.to_string() };
         self.limits.force.checked().map_err(setting)?;
+        self.limits.torque.checked().map_err(setting)?;
         self.limits.watchdog.checked().map_err(setting)?;
         if !(1.0..=MAX_WATCH_RATE_HZ).contains(&self.display_rate_hz) {
             let rate = self.display_rate_hz;

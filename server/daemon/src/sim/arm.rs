@@ -29,7 +29,8 @@ impl BuiltinArm {
         // The hand as it is in the middle of the tick.
         let hand = self.path.at(time_s - 0.5 * self.period_s);
         let motion = self.arm.step_towards(hand.position_m, hand.velocity_m_per_s, force_n);
-        ToolTarget { position_m: motion.position_m, velocity_m_per_s: motion.velocity_m_per_s }
+        // The hand does not turn it.
+        ToolTarget { position_m: motion.position_m, velocity_m_per_s: motion.velocity_m_per_s, ..hand.at_rest() }
     }
 
     /// Back to the beginning of the path.

@@ -1,7 +1,7 @@
 //! What passes between the loop and the rest of the daemon: fixed slots (the newest wins) and flags. Nothing here blocks or
 //! allocates on the loop's side once built.
 use super::bell::{Ear, bell};
-use glam::DVec3;
+use glam::{DQuat, DVec3};
 use palpate_physics::{Model, Quarantine, contact::LocalContactModel, seed::SeedModel, spring::SpringMotion};
 use palpate_realtime::Doorbell;
 use std::{
@@ -28,6 +28,10 @@ pub struct DeviceInput {
     pub position_m: DVec3,
     /// Its velocity (m/s, world).
     pub velocity_m_per_s: DVec3,
+    /// Its orientation, tool frame to world.
+    pub orientation: DQuat,
+    /// Its angular velocity (rad/s, world).
+    pub angular_velocity_rad_per_s: DVec3,
     /// Bit i is button i.
     pub buttons: u32,
 }
@@ -41,6 +45,8 @@ pub struct ToolOutput {
     pub tick: u64,
     /// Limited force on the arm (N, world).
     pub force_n: DVec3,
+    /// Limited torque on the arm (N m, world).
+    pub torque_nm: DVec3,
     /// Sequence of the newest sample used.
     pub sample_sequence: u64,
     /// Its device time (ns).
@@ -52,6 +58,8 @@ pub struct ToolOutput {
     pub model_max_force_n: f64,
     /// Centre of the proxy (m, world).
     pub proxy_position_m: DVec3,
+    /// Its orientation, tool frame to world.
+    pub proxy_orientation: DQuat,
     /// No sample for too long: the force ramps to zero.
     pub stale: bool,
     /// Time stands, is stepped, or is about to jump: the force ramps to zero.
@@ -78,6 +86,7 @@ pub struct LimitedTicks {
 pub struct ToolShared {
     attachment: AtomicU64,
     max_force_n_bits: AtomicU64,
+    max_torque_nm_bits: AtomicU64,
 }
 
 impl ToolShared {
@@ -90,6 +99,16 @@ impl ToolShared {
     pub fn attach(&self, attachment: u64, max_force_n: f64) {
         self.max_force_n_bits.store(max_force_n.to_bits(), Ordering::Relaxed);
         self.attachment.store(attachment, Ordering::Release);
+    }
+
+    /// Largest torque (N m) that the device which attaches next takes.
+    pub fn set_max_torque_nm(&self, max_torque_nm: f64) {
+        self.max_torque_nm_bits.store(max_torque_nm.to_bits(), Ordering::Relaxed);
+    }
+
+    /// Largest torque the attached device takes (N m); 0: none.
+    pub fn max_torque_nm(&self) -> f64 {
+        f64::from_bits(self.max_torque_nm_bits.load(Ordering::Relaxed))
     }
 
     /// The device went.
@@ -155,6 +174,14 @@ pub struct ToolView {
     pub device_force_n: DVec3,
     /// Contact points that carry force.
     pub contacts: u32,
+    /// Of the device, tool frame to world.
+    pub device_orientation: DQuat,
+    /// Of the proxy, tool frame to world.
+    pub proxy_orientation: DQuat,
+    /// Of the body on the tool (N m, world).
+    pub contact_torque_nm: DVec3,
+    /// Sent to the arm (N m, world).
+    pub device_torque_nm: DVec3,
 }
 
 /// The surface at a tick.

@@ -118,12 +118,12 @@ impl Simulation {
 
     /// Whether no arm has a force.
     pub fn is_released(&self) -> bool {
-        self.tools.iter().all(|tool| tool.force_n() == DVec3::ZERO)
+        self.tools.iter().all(ToolLoop::is_without_force)
     }
 
     /// Whether no device has a force.
     pub fn are_devices_released(&self) -> bool {
-        self.tools.iter().all(|tool| !tool.is_attached() || tool.force_n() == DVec3::ZERO)
+        self.tools.iter().all(|tool| !tool.is_attached() || tool.is_without_force())
     }
 
     /// Back to rest at tick 0. Does not allocate.

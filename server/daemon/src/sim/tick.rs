@@ -54,8 +54,8 @@ impl Simulation {
         let period_s = self.period_s();
         let time_s = (self.state.tick + 1) as f64 * period_s;
         for (index, target) in self.targets.iter_mut().enumerate() {
-            if let Some(position_m) = self.tools[index].new_place() {
-                self.state.place_tool(index, position_m);
+            if let Some(pose) = self.tools[index].new_place() {
+                self.state.place_tool(index, pose);
             }
             *target = self.tools[index].target(&self.state.tools[index], now_ns, time_s);
         }

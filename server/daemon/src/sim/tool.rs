@@ -7,6 +7,7 @@ use glam::DVec3;
 use palpate_control::{
     extrapolate::{Motion, extrapolate},
     limits::{ForceLimiter, ForceLimits},
+    torque::{TorqueLimiter, TorqueLimits},
     watchdog::{Link, Verdict, Watchdog, WatchdogSettings},
 };
 use palpate_physics::contact::{LocalContactModel, ToolState, ToolTarget};
@@ -17,6 +18,8 @@ use palpate_scene::Driver;
 pub struct ArmLimits {
     /// Peak (N) and rate (N/s); a device's own peak applies when it is smaller.
     pub force: ForceLimits,
+    /// The same of torque.
+    pub torque: TorqueLimits,
     /// When a sample is stale, and the ramps.
     pub watchdog: WatchdogSettings,
 }
@@ -54,6 +57,7 @@ pub struct ToolLoop {
     arm: Option<BuiltinArm>,
     limits: ArmLimits,
     limiter: ForceLimiter,
+    torque_limiter: TorqueLimiter,
     watchdog: Watchdog,
     /// Factor of the force by order, 0 to 1.
     level: f64,
@@ -66,6 +70,7 @@ pub struct ToolLoop {
     newest: Option<DeviceInput>,
     limited: LimitedTicks,
     raw_n: DVec3,
+    raw_nm: DVec3,
     output: ToolOutput,
 }
 
@@ -78,6 +83,7 @@ impl ToolLoop {
             arm,
             limits,
             limiter: ForceLimiter::new(limits.force),
+            torque_limiter: TorqueLimiter::new(limits.torque),
             watchdog: Watchdog::new(limits.watchdog),
             level: 1.0,
             levelled_ns: None,
@@ -87,6 +93,7 @@ impl ToolLoop {
             newest: None,
             limited: LimitedTicks::default(),
             raw_n: DVec3::ZERO,
+            raw_nm: DVec3::ZERO,
             output: ToolOutput::default(),
         }
     }
@@ -96,9 +103,9 @@ impl ToolLoop {
         self.attachment != 0
     }
 
-    /// The force its arm has now (N).
-    pub fn force_n(&self) -> DVec3 {
-        self.output.force_n
+    /// Its arm has neither force nor torque now.
+    pub fn is_without_force(&self) -> bool {
+        (self.output.force_n, self.output.torque_nm) == (DVec3::ZERO, DVec3::ZERO)
     }
 
     /// Takes note of attaching, detaching and new samples. Once per loop, also while paused.
@@ -129,6 +136,10 @@ impl ToolLoop {
         let max_force_n =
             if attachment == 0 { own.max_force_n } else { own.max_force_n.min(self.port.shared.max_force_n()) };
         self.limiter = ForceLimiter::new(ForceLimits { max_force_n, ..own });
+        let theirs = if attachment == 0 { f64::INFINITY } else { self.port.shared.max_torque_nm() };
+        let torque = self.limits.torque;
+        let max_torque_nm = torque.max_torque_nm.min(theirs);
+        self.torque_limiter = TorqueLimiter::new(TorqueLimits { max_torque_nm, ..torque });
         self.output = ToolOutput { attachment, ..ToolOutput::default() };
         self.start_over();
     }
@@ -140,12 +151,12 @@ impl ToolLoop {
         self.place = if attached { Place::Unknown } else { Place::Clear };
     }
 
-    /// Where the tool has to be put (m, world), once, before its device moves it: it must not sweep through the body on its way
+    /// Where the tool has to be put, once, before its device moves it: it must not sweep through the body on its way
     /// from where it was.
-    pub fn new_place(&mut self) -> Option<DVec3> {
+    pub fn new_place(&mut self) -> Option<ToolTarget> {
         let sample = self.newest.filter(|_| self.place == Place::Unknown && self.is_attached())?;
         self.place = Place::Held;
-        Some(sample.position_m)
+        Some(ToolTarget { orientation: sample.orientation, ..ToolTarget::at(sample.position_m) })
     }
 
     /// Whether it waits to be clear of the body, at rest on its device.
@@ -163,7 +174,7 @@ impl ToolLoop {
         if let Some(target) = self.driver.target(time_s) {
             return target;
         }
-        let held = ToolTarget { velocity_m_per_s: DVec3::ZERO, ..tool.target };
+        let held = tool.target.at_rest();
         if !self.is_attached() {
             let force_n = self.output.force_n;
             let takes_over = std::mem::take(&mut self.arm_takes_over);
@@ -175,10 +186,20 @@ impl ToolLoop {
         }
         let Some(sample) = &self.newest else { return held };
         let verdict = self.watchdog.check(now_ns);
-        let motion = Motion { velocity_m_per_s: sample.velocity_m_per_s, ..Motion::at(sample.position_m) };
+        let motion = Motion {
+            position_m: sample.position_m,
+            orientation: sample.orientation,
+            velocity_m_per_s: sample.velocity_m_per_s,
+            angular_velocity_rad_per_s: sample.angular_velocity_rad_per_s,
+        };
         let there = extrapolate(&motion, verdict.extrapolate_s, self.limits.watchdog.stale_after_s);
-        let velocity_m_per_s = if is_stale(&verdict) { DVec3::ZERO } else { there.velocity_m_per_s };
-        ToolTarget { position_m: there.position_m, velocity_m_per_s }
+        let target = ToolTarget {
+            position_m: there.position_m,
+            velocity_m_per_s: there.velocity_m_per_s,
+            orientation: there.orientation,
+            angular_velocity_rad_per_s: there.angular_velocity_rad_per_s,
+        };
+        if is_stale(&verdict) { target.at_rest() } else { target }
     }
 
     /// Limits the force after a tick (`advanced`), or of a standing body.
@@ -195,11 +216,12 @@ impl ToolLoop {
         let release = ordered || quarantined.is_some() || self.place != Place::Clear;
         self.ramp(release, frame);
         if quarantined.is_none() {
-            self.raw_n = tool.device_force_n;
+            (self.raw_n, self.raw_nm) = (tool.device_force_n, tool.device_torque_nm);
         }
         let watched = self.is_attached().then(|| self.watchdog.check(frame.now_ns));
         let ramp = watched.map_or(1.0, |verdict| verdict.ramp) * self.level;
         let limited = self.limiter.limit(self.raw_n, ramp, frame.period_s);
+        let torque_nm = self.torque_limiter.limit(self.raw_nm, ramp, frame.period_s);
         let model_max_force_n = ramp * self.limiter.limits().max_force_n;
         if ramp > 0.0 {
             let count = &mut self.limited;
@@ -212,6 +234,7 @@ impl ToolLoop {
             attachment: self.attachment,
             tick: frame.tick,
             force_n: limited.force_n,
+            torque_nm,
             sample_sequence: self.newest.map_or(0, |s| s.sequence),
             echo_device_time_ns: self.newest.map_or(0, |s| s.device_time_ns),
             local_model: rendered.map(|model| {
@@ -221,6 +244,7 @@ impl ToolLoop {
             }),
             model_max_force_n,
             proxy_position_m: tool.centre_m,
+            proxy_orientation: tool.orientation,
             stale: self.newest.is_some() && watched.is_some_and(|verdict| is_stale(&verdict)),
             held: order == Order::Hold,
             limited: self.limited,
@@ -258,15 +282,20 @@ impl ToolLoop {
             contact_force_n: tool.contact_force_n,
             device_force_n: self.output.force_n,
             contacts: tool.contacts,
+            device_orientation: tool.target.orientation,
+            proxy_orientation: tool.orientation,
+            contact_torque_nm: tool.contact_torque_nm,
+            device_torque_nm: self.output.torque_nm,
         }
     }
 
     /// Back to the start of time.
     pub fn reset(&mut self) {
-        self.raw_n = DVec3::ZERO;
+        (self.raw_n, self.raw_nm) = (DVec3::ZERO, DVec3::ZERO);
         self.start_over();
         self.arm_takes_over = false;
         self.limiter.reset();
+        self.torque_limiter.reset();
         self.output = ToolOutput { attachment: self.attachment, ..ToolOutput::default() };
         if let Some(arm) = &mut self.arm {
             arm.reset();

@@ -6,9 +6,9 @@ use super::{
     skin::SkinReader,
     springs::SpringReader,
 };
-use crate::sim::exchange::{SurfaceEnd, SurfaceSnapshot};
+use crate::sim::exchange::{SurfaceEnd, SurfaceSnapshot, ToolView};
 use glam::DVec3;
-use palpate_physics::Model;
+use palpate_physics::{Model, contact::ToolSpec};
 use palpate_proto::v1;
 use std::{
     sync::{
@@ -300,10 +300,19 @@ impl Hub {
     }
 }
 
-/// Centres (m) and radii (m).
+/// Centres (m) and radii (m); of a capsule, those of balls along it, no further apart than their radius.
 fn tools(model: &Model, snapshot: &SurfaceSnapshot) -> Vec<(DVec3, f64)> {
     let shapes = &model.spec().tools;
-    snapshot.tools.iter().zip(shapes).map(|(view, shape)| (view.proxy_position_m, shape.radius_m)).collect()
+    let balls = |(view, spec): (&ToolView, &ToolSpec)| {
+        let (centre_m, radius_m, half_m) = (view.proxy_position_m, spec.radius_m, spec.shape.half_length_m());
+        let to_end_m = view.proxy_orientation * (DVec3::Z * half_m);
+        let each_way = (half_m / radius_m).ceil().min(100.0) as i32;
+        (-each_way..=each_way).map(move |i| {
+            let part = if each_way > 0 { f64::from(i) / f64::from(each_way) } else { 0.0 };
+            (centre_m + to_end_m * part, radius_m)
+        })
+    };
+    snapshot.tools.iter().zip(shapes).flat_map(balls).collect()
 }
 
 fn numbers(epoch: u32, snapshot: &SurfaceSnapshot) -> v1::SurfaceUpdate {

@@ -61,7 +61,11 @@ fn header(session_id: &str, scene_name: &str, model: &Model) -> v1::KeyframeHead
             .spec()
             .tools
             .iter()
-            .map(|tool| v1::ToolShape { name: tool.name.clone(), radius_m: tool.radius_m })
+            .map(|tool| v1::ToolShape {
+                name: tool.name.clone(),
+                radius_m: tool.radius_m,
+                half_length_m: tool.shape.half_length_m(),
+            })
             .collect(),
         particle_spacing_m: model.particle_spacing_m(),
     }

@@ -100,7 +100,7 @@ mod tests {
         let (mut expected_m, mut refined) = (Vec::new(), 0);
         for tick in 0..900 {
             let height_m = if tick < 500 { 0.05 - 4e-5 * f64::from(tick).min(200.0) } else { 0.08 };
-            let target = ToolTarget { position_m: DVec3::Z * height_m, velocity_m_per_s: DVec3::ZERO };
+            let target = ToolTarget::at(DVec3::Z * height_m);
             let input =
                 TickInput { tools: &[target], load_factors: &[], prescribed_displacements_m: &[], point_forces: &[] };
             step(&model, &mut state, &mut scratch, &input);

@@ -7,7 +7,7 @@ pub mod springs;
 use glam::DVec3;
 use palpate_physics::{
     ModelSpec, PrescribedSpec, Region, Settings,
-    contact::{Coupling, ToolSpec},
+    contact::{Coupling, ToolShape, ToolSpec},
     material::{Lame, Law, Material, Viscosity},
     mesh::quality,
 };
@@ -100,6 +100,7 @@ pub fn block_scene(name: &str, cells: u32) -> Scene {
 fn tool(name: &str, start_position_m: DVec3) -> ToolSpec {
     ToolSpec {
         name: name.into(),
+        shape: ToolShape::Sphere,
         radius_m: RADIUS_M,
         coupling: Coupling::Spring { stiffness_n_per_m: 500.0, damping_n_s_per_m: 1.0, mass_kg: 0.02 },
         friction_coefficient: 0.3,
@@ -206,7 +207,13 @@ impl Daemon {
 
 /// A hello that asks for the first tool.
 pub fn hello() -> v1::DeviceHello {
-    v1::DeviceHello { device_name: "test arm".into(), tool_name: String::new(), max_force_n: 3.0, servo_rate_hz: 1e3 }
+    v1::DeviceHello {
+        device_name: "test arm".into(),
+        tool_name: String::new(),
+        max_force_n: 3.0,
+        servo_rate_hz: 1e3,
+        max_torque_nm: 0.1,
+    }
 }
 
 /// A valid sample.

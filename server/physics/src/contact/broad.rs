@@ -6,10 +6,10 @@
 //! `t₀`, grown by that much, still holds its triangles. The leapfrog drift is a straight line at a known velocity, so the
 //! bound is exact, not an estimate.
 //!
-//! A query lists the triangles within `reach` of a tool's centre and returns how much further away all others are. As
-//! long as the tool's path plus the travel stay below that slack, the list holds every triangle that can be touched: far
-//! from the body a tick costs two additions per tool and substep.
-use super::triangle::closest_point;
+//! A query lists the triangles within `reach` of a tool's axis and returns how much further away all others are. As
+//! long as the path of any point of that axis plus the travel stay below that slack, the list holds every triangle that can be touched: far
+//! from the body a tick costs two additions per tool and substep. Boxes are as far from an axis as from its centre, less half its length, or further.
+use super::axis::Axis;
 use crate::mesh::Surface;
 use glam::DVec3;
 use std::ops::Range;
@@ -107,7 +107,7 @@ impl Candidates {
         self.count += 1;
     }
 
-    /// Lower bound (m) of the distance from the tool's centre to a listed triangle: what it was when looked at last, less the motion since. Not a number
+    /// Lower bound (m) of the distance from the tool's axis to a listed triangle: what it was when looked at last, less the motion since. Not a number
     /// where all are listed whatever moves.
     pub(super) fn least_distance_m(&self, number: usize) -> f64 {
         self.above_slack_m[number] + self.slack_m - ROUNDING_M
@@ -154,29 +154,30 @@ impl Triangles {
         ClusterBox::around(nodes.map(|&node| x[node as usize]), travel_m)
     }
 
-    /// Lists the triangles within `reach_m` of `centre`, and sets the slack: how much further away than `inner_m` all
+    /// Lists the triangles within `reach_m` of an axis, and sets the slack: how much further away than `inner_m` all
     /// others are.
     pub(super) fn query(
         &self,
         x: &[DVec3],
         (boxes, travel_m): (&mut [ClusterBox], f64),
-        centre: DVec3,
+        axis: &Axis,
         (reach_m, inner_m): (f64, f64),
         candidates: &mut Candidates,
     ) {
+        let (centre, half_m) = (axis.centre_m, axis.half_length_m());
         candidates.count = 0;
         let mut others_m = f64::INFINITY;
         for (cluster, fitted) in boxes.iter_mut().enumerate() {
-            if fitted.distance_bound_m(centre, travel_m) < reach_m {
+            if fitted.distance_bound_m(centre, travel_m) - half_m < reach_m {
                 *fitted = self.fit(cluster, x, travel_m);
             }
-            let bound_m = fitted.distance_bound_m(centre, travel_m);
+            let bound_m = fitted.distance_bound_m(centre, travel_m) - half_m;
             if bound_m >= reach_m {
                 others_m = others_m.min(bound_m);
                 continue;
             }
             for triangle in self.cluster_range(cluster) {
-                let distance_m = centre.distance(closest_point(centre, self.corners(triangle, x)));
+                let distance_m = axis.distance_m(self.corners(triangle, x));
                 if distance_m >= reach_m {
                     others_m = others_m.min(distance_m);
                 } else {
@@ -193,16 +194,17 @@ impl Triangles {
         &self,
         (skin, x): (&mut impl Skin, &mut [DVec3]),
         (boxes, travel_m): (&mut [ClusterBox], f64),
-        centre: DVec3,
+        axis: &Axis,
         (reach_m, inner_m): (f64, f64),
         candidates: &mut Candidates,
     ) {
+        let (centre, half_m) = (axis.centre_m, axis.half_length_m());
         candidates.count = 0;
         skin.begin();
         let mut others_m = f64::INFINITY;
         for group in (0..self.len()).step_by(GROUP) {
             let end = (group + GROUP).min(self.len());
-            let bound_m = skin.group_distance_m(group / GROUP, centre);
+            let bound_m = skin.group_distance_m(group / GROUP, centre) - half_m;
             if bound_m >= reach_m {
                 others_m = others_m.min(bound_m);
                 continue;
@@ -210,21 +212,21 @@ impl Triangles {
             for cluster in (group..end).step_by(CLUSTER) {
                 let cluster = cluster / CLUSTER;
                 let fitted = &mut boxes[cluster];
-                let mut bound_m = fitted.distance_bound_m(centre, travel_m);
+                let mut bound_m = fitted.distance_bound_m(centre, travel_m) - half_m;
                 if bound_m < reach_m {
-                    bound_m = bound_m.max(skin.cluster_distance_m(cluster, centre));
+                    bound_m = bound_m.max(skin.cluster_distance_m(cluster, centre) - half_m);
                 }
                 if bound_m < reach_m {
                     skin.vertices(cluster).iter().for_each(|&vertex| x[vertex as usize] = skin.position_m(vertex));
                     *fitted = self.fit(cluster, x, travel_m);
-                    bound_m = fitted.distance_bound_m(centre, travel_m);
+                    bound_m = fitted.distance_bound_m(centre, travel_m) - half_m;
                 }
                 if bound_m >= reach_m {
                     others_m = others_m.min(bound_m);
                     continue;
                 }
                 for triangle in self.cluster_range(cluster) {
-                    let distance_m = centre.distance(closest_point(centre, self.corners(triangle, x)));
+                    let distance_m = axis.distance_m(self.corners(triangle, x));
                     if distance_m >= reach_m {
                         others_m = others_m.min(distance_m);
                     } else {
@@ -265,7 +267,7 @@ fn morton(p: DVec3) -> u32 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::mesh::TetMesh;
+    use crate::{contact::triangle::closest_point, mesh::TetMesh};
 
     /// A strip of separate tets along x.
     fn strip(tets: usize) -> (Surface, Vec<DVec3>) {
@@ -311,7 +313,7 @@ mod tests {
             travel += fastest;
             candidates.slack_m -= motion.length() + fastest;
             if candidates.slack_m <= 0.0 {
-                triangles.query(&x, (&mut boxes, travel), centre, (reach, inner), &mut candidates);
+                triangles.query(&x, (&mut boxes, travel), &Axis::point(centre), (reach, inner), &mut candidates);
                 queries += 1;
             }
             for needed in within(&triangles, &x, centre, inner) {
@@ -334,7 +336,7 @@ mod tests {
             centre += motion;
             candidates.slack_m -= motion.length();
             if candidates.slack_m <= 0.0 {
-                triangles.query(&x, (&mut boxes, 0.0), centre, (1.5, inner), &mut candidates);
+                triangles.query(&x, (&mut boxes, 0.0), &Axis::point(centre), (1.5, inner), &mut candidates);
                 queries += 1;
             }
             let needed = within(&triangles, &x, centre, inner);

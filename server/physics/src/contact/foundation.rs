@@ -1,12 +1,13 @@
 //! The pressure foundation under the surface: area contact whose stiffness belongs to the surface, not to its mesh.
 //!
 //! Every boundary triangle carries samples, fixed in the rest surface: its `n²` congruent parts' centroids, each with
-//! weights ζ of the corners and the rest area `a = A₀/n²`. A sphere of centre `c` and radius `R` penetrates a sample
-//! `y = Σ ζ_i x_i` by `g = R − |y − c|`, and meets the pressure `p = k_f g`:
+//! weights ζ of the corners and the rest area `a = A₀/n²`. A tool of radius `R` penetrates a sample `y = Σ ζ_i x_i` by
+//! `g = R − |y − c|`, `c` the point of its axis that is nearest to `y` (of a sphere, its centre), and meets the pressure `p = k_f g`:
 //! ```text
 //! Φ = ½ Σ_s k_f a_s g_s²      f_i = −∂Φ/∂x_i = Σ_s ζ_si k_f a_s g_s (y_s − c)/|y_s − c|      f_tool = −Σ_i f_i
 //! ```
-//! so contact is conservative and balances linear momentum exactly. `k_f = α (λ + 2µ)/min(h, R)` with the size `h = √(2A₀)`
+//! (`c` may move along the axis, but that changes no `g`: `y − c` is across the axis, or `c` an end of it). So contact is conservative, and
+//! balances linear momentum exactly; angular too where the tool turns, with the torque `Σ (y − c₀) × f` about its centre `c₀`. `k_f = α (λ + 2µ)/min(h, R)` with the size `h = √(2A₀)`
 //! of the surface element: the foundation vanishes with the mesh (its compliance is first order in h), and its frequency
 //! scales like the element's own. Where a node has much surface and little mass (a sharp edge or corner), `k_f` is lowered so
 //! that the nodal part of the bound below stays under [`FREQUENCY_SHARE`] of the body's own ω²_max: contact never rules the
@@ -15,8 +16,9 @@
 //! Bound of the frequency. With `w_s = (ζ_s, −1)` on (nodes, tool), `K = Σ k a_s w_s w_sᵀ ⊗ C_s`, `C_s ≤ I`
 //! (pressure along the normal, friction springs of at most the same stiffness across it). A positive block matrix is bounded
 //! by the sum of its diagonal blocks, and the nodal block by the diagonal of its row sums (Gershgorin, `Σ_j ζ_sj = 1`):
-//! `K ≤ diag(Σ_s k a_s ζ_si) ⊕ Σ_s k a_s`. Only samples inside the sphere count: at most `2πR²` of surface on one node and
-//! `4πR²` in all. The largest frequency of body and diagonal together comes from the same Lanczos iteration as the body's own.
+//! `K ≤ diag(Σ_s k a_s ζ_si) ⊕ Σ_s k a_s`. Only samples inside the tool count: of a sphere, at most `2πR²` of surface on one node and
+//! `4πR²` in all; of a capsule of half length `L`, `R(R + L)` in place of `R²`. A tool that turns has `Σ_s k a_s (y_s − c₀)²` besides: at
+//! `s` along the cylinder `s² + R²`, on the hemispheres at most `(L + R)²`. The largest frequency of body and diagonal together comes from the same Lanczos iteration as the body's own.
 use super::{SurfaceModuli, broad::Triangles};
 use glam::DVec3;
 use std::f64::consts::PI;
@@ -75,6 +77,15 @@ pub(super) struct TriangleSamples<'a> {
     pub(super) indentation_modulus_pa: f64,
 }
 
+/// What contact can do to a tool at most.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct ContactBound {
+    /// `Σ_s k a_s` (N/m).
+    pub(super) n_per_m: f64,
+    /// `Σ_s k a_s p_s²` (N m/rad).
+    pub(super) nm_per_rad: f64,
+}
+
 /// Weights of the samples for every subdivision in use.
 #[derive(Debug, Clone, Default)]
 pub(super) struct SampleTables {
@@ -100,7 +111,7 @@ fn centroids(n: usize) -> Vec<[f64; 2]> {
 }
 
 impl Foundation {
-    pub(super) fn new(body: &BodyAtRest<'_>, radius_m: f64) -> Self {
+    pub(super) fn new(body: &BodyAtRest<'_>, radius_m: f64, half_length_m: f64) -> Self {
         let count = body.triangles.len();
         let mut built = Self {
             level: Vec::with_capacity(count),
@@ -111,7 +122,7 @@ impl Foundation {
             samples: 0,
             typical_pa_per_m: 0.0,
         };
-        let most = most_at_nodes(body, radius_m);
+        let most = most_at_nodes(body, 2.0 * quarter_m2(radius_m, half_length_m));
         let (mut softest_pa, mut ratio_area, mut total_m2) = (f64::INFINITY, 0.0, 0.0);
         for triangle in 0..count {
             let moduli = body.moduli[body.triangles.surface_triangle[triangle] as usize];
@@ -160,8 +171,13 @@ impl Foundation {
 
     /// Row sums `Σ_s k a_s ζ_si` (N/m) of what one tool can touch around each node, and of all it can touch at once; see the
     /// module's documentation.
-    pub(super) fn row_sums_n_per_m(&self, triangles: &Triangles, nodes: usize, radius_m: f64) -> (Vec<f64>, f64) {
-        let ball_m2 = PI * radius_m * radius_m;
+    pub(super) fn row_sums_n_per_m(
+        &self,
+        triangles: &Triangles,
+        nodes: usize,
+        (radius_m, half_length_m): (f64, f64),
+    ) -> (Vec<f64>, ContactBound) {
+        let quarter_m2 = quarter_m2(radius_m, half_length_m);
         let (mut nodal, mut stiffest_at) = (vec![0.0_f64; nodes], vec![0.0_f64; nodes]);
         let (mut total, mut stiffest) = (0.0, 0.0_f64);
         for (triangle, nodes) in triangles.nodes.iter().enumerate() {
@@ -176,18 +192,33 @@ impl Foundation {
             }
         }
         for (sum, k_f) in nodal.iter_mut().zip(&stiffest_at) {
-            *sum = sum.min(2.0 * ball_m2 * k_f);
+            *sum = sum.min(2.0 * quarter_m2 * k_f);
         }
-        (nodal, f64::min(total, 4.0 * ball_m2 * stiffest))
+        let square = |a: f64| a * a;
+        let reach_sq = square(half_length_m + radius_m);
+        // ∫ p² dA of cylinder and hemispheres
+        let cylinder_m4 = PI * radius_m * half_length_m * (square(half_length_m) / 3.0 + square(radius_m));
+        let moment_m4 = 4.0 * (cylinder_m4 + PI * square(radius_m) * reach_sq);
+        let bound = ContactBound {
+            n_per_m: f64::min(total, 4.0 * quarter_m2 * stiffest),
+            nm_per_rad: f64::min(total * reach_sq, moment_m4 * stiffest),
+        };
+        (nodal, bound)
     }
+}
+
+/// A quarter of the surface of a tool (m²).
+fn quarter_m2(radius_m: f64, half_length_m: f64) -> f64 {
+    PI * radius_m * (radius_m + half_length_m)
 }
 
 fn area_m2([a, b, c]: [DVec3; 3]) -> f64 {
     0.5 * (b - a).cross(c - a).length()
 }
 
-/// Largest `k_f` (Pa/m) each node can bear: `k_f min(A_i, 2πR²)/m_i ≤ share · ω²_max`, with its third `A_i` of the triangles around.
-fn most_at_nodes(body: &BodyAtRest<'_>, radius_m: f64) -> Vec<f64> {
+/// Largest `k_f` (Pa/m) each node can bear: `k_f min(A_i, 2πR²)/m_i ≤ share · ω²_max`, with its third `A_i` of the triangles around, and the
+/// `touched_m2` that a tool can touch at once in place of `2πR²`.
+fn most_at_nodes(body: &BodyAtRest<'_>, touched_m2: f64) -> Vec<f64> {
     let mut area = vec![0.0; body.mass_kg.len()];
     for (triangle, nodes) in body.triangles.nodes.iter().enumerate() {
         let third = area_m2(body.triangles.corners(triangle, body.positions_m)) / 3.0;
@@ -195,7 +226,6 @@ fn most_at_nodes(body: &BodyAtRest<'_>, radius_m: f64) -> Vec<f64> {
             area[node as usize] += third;
         }
     }
-    let touched_m2 = 2.0 * PI * radius_m * radius_m;
     let most = |(area, mass): (&f64, &f64)| FREQUENCY_SHARE * body.frequency_sq * mass / area.min(touched_m2);
     area.iter().zip(body.mass_kg).map(most).collect()
 }

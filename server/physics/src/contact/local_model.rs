@@ -14,6 +14,8 @@
 //!   [1/[`MOST_CORRECTION`], [`MOST_CORRECTION`]].
 //!
 //! Across the normal the sticking part of the contact carries `2(1 − ν)/(2 − ν) ≈ 0.75` of that (Mindlin); without friction, nothing.
+//! A capsule that is pressed at `p` from its centre gives way by turning too: the coupling is as soft there as `1/K_vc + |p × n|²/K_r` says.
+//!
 //! The stiffness is `−K_n nnᵀ − K_t (I − nnᵀ)`: symmetric, negative semi-definite, never stiffer than the coupling, and
 //! smoothed over some ten ticks.
 use super::{Coupling, LocalContactModel, ToolModel, ToolState, narrow::Pressed};
@@ -109,14 +111,19 @@ pub(super) fn update(
     let (k_f, modulus_pa) = (pressed.force_times_k_f / force_n, pressed.force_times_modulus / force_n);
     // π a² = F²/(c k_f Φ)
     let area_m2 = force_n * force_n / (PRESSURE_SHAPE * k_f * pressed.energy_j);
-    let contact_radius_m = (area_m2 / PI).sqrt().min(model.spec.radius_m);
+    let contact_radius_m = (area_m2 / PI).sqrt().min(largest_radius_m(model));
     let prior = series(2.0 * modulus_pa * contact_radius_m, k_f * area_m2);
-    estimate.learn(tool.centre_m, normal, pressed.normal_n.dot(normal), prior, model.spec.radius_m);
+    let arm_m = pressed_at_m(model, tool, pressed);
+    estimate.learn(tool.centre_m + arm_m, normal, pressed.normal_n.dot(normal), prior, model.spec.radius_m);
     let contact = prior * estimate.log_correction.exp();
     let sticking = TANGENTIAL_RATIO * contact * pressed.sticking_n / force_n;
-    let coupling = match model.spec.coupling {
-        Coupling::Rigid => f64::INFINITY,
-        Coupling::Spring { stiffness_n_per_m, .. } => stiffness_n_per_m,
+    let coupling = match (model.spec.coupling, model.spec.shape.as_capsule()) {
+        (Coupling::Rigid, _) => f64::INFINITY,
+        (Coupling::Spring { stiffness_n_per_m, .. }, None) => stiffness_n_per_m,
+        (Coupling::Spring { stiffness_n_per_m, .. }, Some(capsule)) => {
+            let lever_sq = arm_m.cross(normal).length_squared();
+            stiffness_n_per_m / (1.0 + lever_sq * stiffness_n_per_m / capsule.turning.stiffness_nm_per_rad)
+        }
     };
     estimate.smooth(series(contact, coupling), series(sticking, coupling));
     let (k_n, k_t) = (estimate.normal_n_per_m, estimate.tangential_n_per_m);
@@ -124,7 +131,8 @@ pub(super) fn update(
     let stiffness_n_per_m = across * (k_t - k_n) - DMat3::from_diagonal(DVec3::splat(k_t));
     // Hertz's force, linearised about δ = a²/R, is wrong by (3/8)(r/δ)² of itself at a distance r: 5 % at r = 0.35 δ. The device
     // moves further than the tool, by the coupling's stretch.
-    let body_radius_m = 0.35 * contact_radius_m * contact_radius_m / model.spec.radius_m;
+    let half_width_m = half_width_m(model, contact_radius_m);
+    let body_radius_m = 0.35 * half_width_m * half_width_m / model.spec.radius_m;
     let validity_radius_m = body_radius_m * (contact / series(contact, coupling));
     Some(LocalContactModel {
         point_m: tool.target.position_m,
@@ -133,6 +141,34 @@ pub(super) fn update(
         stiffness_n_per_m,
         validity_radius_m: validity_radius_m.clamp(0.02 * model.spec.radius_m, model.spec.radius_m),
     })
+}
+
+/// Of a disc as large as the tool's outline (m).
+fn largest_radius_m(model: &ToolModel) -> f64 {
+    let radius_m = model.spec.radius_m;
+    model
+        .spec
+        .shape
+        .as_capsule()
+        .map_or(radius_m, |capsule| (radius_m * radius_m + 4.0 / PI * radius_m * capsule.half_length_m).sqrt())
+}
+
+/// Half the width (m) of a contact with the area of a disc: of a capsule's, which may be all along it, `π a² = 2b 2L`.
+fn half_width_m(model: &ToolModel, radius_m: f64) -> f64 {
+    let capsule = model.spec.shape.as_capsule();
+    capsule.map_or(radius_m, |capsule| radius_m.min(PI * radius_m * radius_m / (4.0 * capsule.half_length_m)))
+}
+
+/// Where on its axis, from its centre (m), a tool is pressed: `p = s h` with `p × F = τ` as far as the axis allows; an end of it when it is pressed
+/// along the axis.
+fn pressed_at_m(model: &ToolModel, tool: &ToolState, pressed: &Pressed) -> DVec3 {
+    let half_m = model.axis(tool).half_m;
+    let across = half_m.cross(pressed.force_n);
+    let along = half_m.dot(pressed.force_n);
+    if across.length_squared() <= 1e-12 * along * along {
+        return half_m * -along.signum() * f64::from(u8::from(along != 0.0));
+    }
+    half_m * (pressed.torque_nm.dot(across) / across.length_squared()).clamp(-1.0, 1.0)
 }
 
 /// The mean force belongs to the middle of the tick; the device has moved on since.

@@ -1,8 +1,9 @@
-//! Spherical tools against the deforming surface.
+//! Spheres and capsules against the deforming surface.
 //!
 //! Once a substep, for every tool: it moves ([`proxy`]), the broad phase lists the triangles near it ([`broad`]), samples
 //! fixed in the surface press and rub ([`foundation`], [`narrow`]), and the forces go to nodes and tool by the transpose.
 //! Once a tick the contact is summed up for the servo loop ([`local_model`]).
+mod axis;
 pub(crate) mod broad;
 mod foundation;
 mod inside;
@@ -18,6 +19,7 @@ mod tool;
 mod touched;
 mod touching;
 mod triangle;
+mod turning;
 
 pub use inside::is_inside;
 pub(crate) use nearest::{deepest_m, nearest_vertex};
@@ -26,20 +28,20 @@ pub(crate) use resting::{Pressing, RestingContact};
 pub(crate) use spring::SaturatingSpring;
 pub use state::ContactState;
 pub(crate) use tangent::{ContactTangents, StepAhead};
-pub use tool::{Coupling, LocalContactModel, ToolSpec, ToolState, ToolTarget};
+pub use tool::{Capsule, Coupling, LocalContactModel, ToolShape, ToolSpec, ToolState, ToolTarget, Turning};
 pub use triangle::closest_weights;
 
 /// The longest edge of a surface triangle, over the radius of a tool, that can still be sampled as finely as contact needs.
 pub const LARGEST_TRIANGLE: f64 = foundation::MAX_LEVEL as f64 * foundation::SPACING;
 
 use crate::mesh::Surface;
+use axis::Axis;
 use broad::{Skin, Triangles};
 use foundation::{BodyAtRest, Foundation, SampleTables};
 use glam::DVec3;
 use local_model::MeanContact;
 use narrow::{Meeting, Pressed};
 use touching::Touching;
-use triangle::closest_point;
 
 /// Elastic moduli behind a boundary triangle.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -116,6 +118,7 @@ struct ToolScratch {
     next: Touching,
     sum: Pressed,
     coupling_sum_n: DVec3,
+    coupling_sum_nm: DVec3,
     /// Triangle (as the broad phase numbers them) nearest to the centre when it was last pressed.
     nearest: usize,
 }
@@ -131,6 +134,11 @@ impl ToolModel {
             impact_energy_j: foundation.flat_force_n(radius_m, depth_m) * depth_m / 3.0,
             foundation,
         }
+    }
+
+    /// The axis of the tool now (m, world).
+    fn axis(&self, tool: &ToolState) -> Axis {
+        self.spec.shape.axis(tool.centre_m, tool.orientation)
     }
 
     /// The coupling's spring; `None` of a rigid tool.
@@ -167,15 +175,18 @@ impl ContactModel {
             // A body without a free node has none; its foundation is then of no consequence, but must be finite.
             frequency_sq: max_natural_frequency_rad_per_s.max(1.0).powi(2),
         };
-        let tools: Vec<ToolModel> =
-            tools.iter().map(|tool| ToolModel::new(tool, Foundation::new(&body, tool.radius_m))).collect();
+        let tools: Vec<ToolModel> = tools
+            .iter()
+            .map(|tool| ToolModel::new(tool, Foundation::new(&body, tool.radius_m, tool.shape.half_length_m())))
+            .collect();
         let (mut nodal_stiffness_n_per_m, mut tool_frequency_sq) = (vec![0.0; mass_kg.len()], 0.0);
         for tool in &tools {
-            let (nodal, total) = tool.foundation.row_sums_n_per_m(&triangles, mass_kg.len(), tool.spec.radius_m);
+            let size = (tool.spec.radius_m, tool.spec.shape.half_length_m());
+            let (nodal, total) = tool.foundation.row_sums_n_per_m(&triangles, mass_kg.len(), size);
             for (sum, nodal) in nodal_stiffness_n_per_m.iter_mut().zip(nodal) {
                 *sum += nodal;
             }
-            tool_frequency_sq += tool.spec.coupling.frequency_bound_sq(total);
+            tool_frequency_sq += tool.spec.frequency_bound_sq(&total);
         }
         Self { nodal_stiffness_n_per_m, tool_frequency_sq, tables: SampleTables::new(), tools, triangles }
     }
@@ -216,6 +227,7 @@ impl ContactModel {
             next: Touching::with_capacity(tool.foundation.samples),
             sum: Pressed::default(),
             coupling_sum_n: DVec3::ZERO,
+            coupling_sum_nm: DVec3::ZERO,
             nearest: 0,
         };
         ContactScratch { tools: self.tools.iter().map(tool).collect(), exhaustive: !skip_distant }
@@ -227,6 +239,7 @@ impl ContactModel {
             tool.penetration_m = 0.0;
             scratch.sum = Pressed::default();
             scratch.coupling_sum_n = DVec3::ZERO;
+            scratch.coupling_sum_nm = DVec3::ZERO;
         }
     }
 
@@ -242,7 +255,7 @@ impl ContactModel {
     ) {
         self.move_tools(body.fastest_m_per_s, time, tools, contact);
         for (index, tool) in tools.iter().enumerate() {
-            self.list_candidates(index, tool.centre_m, body.x, contact, scratch.exhaustive);
+            self.list_candidates(index, &self.tools[index].axis(tool), body.x, contact, scratch.exhaustive);
         }
         let surface = SurfaceNow { x: body.x, velocity_m_per_s: &|node| body.v[node as usize] };
         self.press_tools(&surface, time, tools, contact, forces_n, scratch);
@@ -279,7 +292,8 @@ impl ContactModel {
                 self.triangles.list_all(candidates);
             } else if candidates.slack_m <= 0.0 {
                 let reach_m = self.reach_m(index);
-                self.triangles.query_skin((skin, x), (boxes, travel_m), tool.centre_m, reach_m, candidates);
+                let axis = self.tools[index].axis(tool);
+                self.triangles.query_skin((skin, x), (boxes, travel_m), &axis, reach_m, candidates);
                 renewed = true;
             }
         }
@@ -308,9 +322,9 @@ impl ContactModel {
     ) {
         for (index, (tool, scratch)) in tools.iter_mut().zip(&mut scratch.tools).enumerate() {
             let model = &self.tools[index];
-            let pressed = self.press(index, tool.centre_m, x, contact, forces_n, scratch);
+            let pressed = self.press(index, tool, x, contact, forces_n, scratch);
             let surface_m_per_s = self.surface_m_per_s(&pressed, *velocity_m_per_s);
-            let coupling_n = proxy::finish(model, tool, &pressed, surface_m_per_s, time);
+            let coupling = proxy::finish(model, tool, &pressed, surface_m_per_s, time);
             scratch.nearest = pressed.nearest.0;
             tool.friction_heat_j += pressed.heat_j;
             tool.contacts = pressed.contacts;
@@ -318,7 +332,8 @@ impl ContactModel {
             tool.penetration_m = tool.penetration_m.max(pressed.penetration_m);
             if time.dt_s > 0.0 {
                 scratch.sum.add(&pressed);
-                scratch.coupling_sum_n += coupling_n;
+                scratch.coupling_sum_n += coupling.force_n;
+                scratch.coupling_sum_nm += coupling.torque_nm;
             }
         }
     }
@@ -336,44 +351,47 @@ impl ContactModel {
         let exhaustive = scratch.exhaustive;
         for (index, (tool, scratch)) in tools.iter_mut().zip(&mut scratch.tools).enumerate() {
             self.drift(index, tool, time, contact);
-            self.list_candidates(index, tool.centre_m, x, contact, exhaustive);
-            if self.is_near(index, tool.centre_m, x, contact) {
+            let axis = self.tools[index].axis(tool);
+            self.list_candidates(index, &axis, x, contact, exhaustive);
+            if self.is_near(index, &axis, x, contact) {
                 return false;
             }
             let nothing = Pressed { to_surface_m: DVec3::INFINITY, ..Pressed::default() };
-            scratch.coupling_sum_n += proxy::finish(&self.tools[index], tool, &nothing, DVec3::ZERO, time);
+            let coupling = proxy::finish(&self.tools[index], tool, &nothing, DVec3::ZERO, time);
+            scratch.coupling_sum_n += coupling.force_n;
+            scratch.coupling_sum_nm += coupling.torque_nm;
         }
         true
     }
 
     /// Whether no tool is within a quarter of its radius of the surface. The lists must be of the present positions.
     pub fn is_apart(&self, x: &[DVec3], tools: &[ToolState], contact: &ContactState) -> bool {
-        tools.iter().enumerate().all(|(index, tool)| !self.is_near(index, tool.centre_m, x, contact))
+        tools.iter().enumerate().all(|(index, tool)| !self.is_near(index, &self.tools[index].axis(tool), x, contact))
     }
 
     /// By distances, not by what is listed: which triangles beyond the zone are on a list depends on when it was made.
-    fn is_near(&self, tool: usize, centre_m: DVec3, x: &[DVec3], contact: &ContactState) -> bool {
+    fn is_near(&self, tool: usize, axis: &Axis, x: &[DVec3], contact: &ContactState) -> bool {
         let zone_m = (1.0 + proxy::NEAR) * self.tools[tool].spec.radius_m;
-        contact.tools[tool].candidates.triangles().iter().any(|&triangle| {
-            centre_m.distance(closest_point(centre_m, self.triangles.corners(triangle as usize, x))) < zone_m
-        })
+        let listed = contact.tools[tool].candidates.triangles();
+        listed.iter().any(|&triangle| axis.distance_m(self.triangles.corners(triangle as usize, x)) < zone_m)
     }
 
     fn drift(&self, index: usize, tool: &mut ToolState, time: &SubstepTime, contact: &mut ContactState) {
-        let moved_m = proxy::drift(&self.tools[index], tool, contact.tools[index].force_n, time);
+        let part = &contact.tools[index];
+        let moved_m = proxy::drift(&self.tools[index], tool, (part.force_n, part.torque_nm), time);
         contact.tools[index].candidates.slack_m -= moved_m;
     }
 
-    fn list_candidates(&self, tool: usize, centre_m: DVec3, x: &[DVec3], contact: &mut ContactState, exhaustive: bool) {
+    fn list_candidates(&self, tool: usize, axis: &Axis, x: &[DVec3], contact: &mut ContactState, exhaustive: bool) {
         let (part, boxes, travel_m) = contact.split(tool);
         if exhaustive {
             self.triangles.list_all(&mut part.candidates);
         } else if part.candidates.slack_m <= 0.0 {
-            self.triangles.query(x, (boxes, travel_m), centre_m, self.reach_m(tool), &mut part.candidates);
+            self.triangles.query(x, (boxes, travel_m), axis, self.reach_m(tool), &mut part.candidates);
         }
     }
 
-    /// How far from a tool's centre (m) triangles are listed, and within what none may be missing.
+    /// How far from a tool's axis (m) triangles are listed, and within what none may be missing.
     fn reach_m(&self, tool: usize) -> (f64, f64) {
         let radius_m = self.tools[tool].spec.radius_m;
         ((1.0 + 2.0 * proxy::NEAR) * radius_m, (1.0 + proxy::NEAR) * radius_m)
@@ -381,26 +399,27 @@ impl ContactModel {
 
     fn press(
         &self,
-        tool: usize,
-        centre_m: DVec3,
+        index: usize,
+        tool: &ToolState,
         x: &[DVec3],
         contact: &mut ContactState,
         forces_n: &mut [DVec3],
         scratch: &mut ToolScratch,
     ) -> Pressed {
-        let (model, part) = (&self.tools[tool], &mut contact.tools[tool]);
+        let (model, part) = (&self.tools[index], &mut contact.tools[index]);
         let meeting = Meeting {
             triangles: &self.triangles,
             foundation: &model.foundation,
             tables: &self.tables,
             x,
-            centre_m,
+            axis: model.axis(tool),
+            orientation: model.spec.shape.as_capsule().map(|_| tool.orientation),
             radius_m: model.spec.radius_m,
             friction_coefficient: model.spec.friction_coefficient,
             put_into: std::mem::take(&mut part.just_put) || part.touching.tells_it_was_put(),
         };
         let pressed = narrow::press(&meeting, &mut part.candidates, &mut part.touching, &mut scratch.next, forces_n);
-        part.force_n = pressed.force_n;
+        (part.force_n, part.torque_nm) = (pressed.force_n, pressed.torque_nm);
         pressed
     }
 
@@ -426,10 +445,10 @@ impl ContactModel {
         for (index, (tool, scratch)) in tools.iter_mut().zip(&scratch.tools).enumerate() {
             let model = &self.tools[index];
             let pressed = scratch.sum.scaled(share);
-            tool.contact_force_n = pressed.force_n;
-            tool.device_force_n = match model.spec.coupling {
-                Coupling::Rigid => pressed.force_n,
-                Coupling::Spring { .. } => -scratch.coupling_sum_n * share,
+            (tool.contact_force_n, tool.contact_torque_nm) = (pressed.force_n, pressed.torque_nm);
+            (tool.device_force_n, tool.device_torque_nm) = match model.spec.coupling {
+                Coupling::Rigid => (pressed.force_n, pressed.torque_nm),
+                Coupling::Spring { .. } => (-scratch.coupling_sum_n * share, -scratch.coupling_sum_nm * share),
             };
             let mean = MeanContact { pressed, device_force_n: tool.device_force_n };
             tool.local_model = local_model::update(model, tool, &mut contact.tools[index].estimate, &mean);

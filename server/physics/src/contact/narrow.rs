@@ -1,7 +1,7 @@
 //! Narrow phase: pressure and friction of one tool on the samples inside it.
 //!
-//! A sample enters contact when the sphere's surface passes over it from the outside, `n·(c − y) > 0` with the outward
-//! normal `n`; one that the sphere reaches from behind (the far wall of a thin shell) is ignored for as long as it stays
+//! A sample enters contact when the tool's surface passes over it from the outside, `n·(c − y) > 0` with the outward
+//! normal `n` and the nearest point `c` of the tool's axis; one that the tool reaches from behind (the far wall of a thin shell) is ignored for as long as it stays
 //! inside. Once in, a sample is tracked until it leaves, so that neither the normal nor the order of events can make the
 //! energy jump. A tool that is *put* into the surface (not moved there) presses nothing at first: its samples carry
 //! `k_f a (g − g₀)` from the depth `g₀` at which it was put, or the least depth since.
@@ -9,17 +9,19 @@
 //! Coulomb friction: every sample in contact has a tangential spring `e` (m) of stiffness `k_t = τ k_f a`, stretched by the
 //! sample's motion relative to the tool and cut at the cone:
 //! ```text
-//! e ← (I − n̂n̂ᵀ)(r − q)        r = y − c, q where the spring is at rest, n̂ = r/|r|
+//! e ← (I − n̂n̂ᵀ)(p − q)        p = y − c₀ from the tool's centre, q where the spring is at rest, n̂ = r/|r|, r = y − c
 //! e ← e · min(1, µ_f f_n / (k_t |e|))      slip; its heat k_t|e|·(cut length) ≥ 0
-//! f_t = −k_t e,  q ← r − e
+//! f_t = −k_t e,  q ← p − e
 //! ```
+//! `q` is a point of the tool: where the tool turns (`R`), what is kept is `Rᵀq`, so that the spring is stretched by the motion of sample and tool
+//! relative to each other, `v + ω × p`.
 use super::{
+    axis::Axis,
     broad::{Candidates, Triangles},
     foundation::{Foundation, SampleTables, TriangleSamples},
     touching::{Touch, Touching},
-    triangle::closest_weights,
 };
-use glam::DVec3;
+use glam::{DQuat, DVec3};
 
 /// τ: tangential over normal stiffness of the foundation; Mindlin's ratio 2(1 − ν)/(2 − ν) is 0.71 at ν = 0.45 and 0.82 at 0.3.
 /// At most 1, or the bound of the frequency fails.
@@ -32,7 +34,9 @@ pub(super) struct Meeting<'a> {
     pub(super) foundation: &'a Foundation,
     pub(super) tables: &'a SampleTables,
     pub(super) x: &'a [DVec3],
-    pub(super) centre_m: DVec3,
+    pub(super) axis: Axis,
+    /// Of a tool that turns.
+    pub(super) orientation: Option<DQuat>,
     pub(super) radius_m: f64,
     pub(super) friction_coefficient: f64,
     /// The tool was put there, now or before, and has not left yet: what is not known carries nothing as deep as it is, which for
@@ -45,6 +49,8 @@ pub(super) struct Meeting<'a> {
 pub(super) struct Pressed {
     /// Force on the tool (N).
     pub(super) force_n: DVec3,
+    /// Torque on the tool about its centre (N m); none of a tool that does not turn.
+    pub(super) torque_nm: DVec3,
     /// Its part along the samples' normals (N).
     pub(super) normal_n: DVec3,
     /// `Σ |f_n|` (N).
@@ -63,8 +69,10 @@ pub(super) struct Pressed {
     pub(super) contacts: u32,
     /// Deepest sample (m).
     pub(super) penetration_m: f64,
-    /// From the tool's centre to the nearest point of the surface (m); infinite when nothing is listed.
+    /// From the nearest point of the tool's axis to the nearest point of the surface (m); infinite when nothing is listed.
     pub(super) to_surface_m: DVec3,
+    /// From the tool's centre to that point of its axis (m).
+    pub(super) arm_m: DVec3,
     /// The triangle of that point and its weights there; no weight when nothing is listed.
     pub(super) nearest: (usize, [f64; 3]),
 }
@@ -73,6 +81,7 @@ impl Pressed {
     /// Adds the forces and the energy of another instant.
     pub(super) fn add(&mut self, other: &Self) {
         self.force_n += other.force_n;
+        self.torque_nm += other.torque_nm;
         self.normal_n += other.normal_n;
         self.pressing_n += other.pressing_n;
         self.sticking_n += other.sticking_n;
@@ -85,6 +94,7 @@ impl Pressed {
     pub(super) fn scaled(&self, factor: f64) -> Self {
         Self {
             force_n: self.force_n * factor,
+            torque_nm: self.torque_nm * factor,
             normal_n: self.normal_n * factor,
             pressing_n: self.pressing_n * factor,
             sticking_n: self.sticking_n * factor,
@@ -115,7 +125,7 @@ pub(super) fn press(
         }
         let triangle = candidates.triangles()[number] as usize;
         let corners = meeting.triangles.corners(triangle, meeting.x);
-        let distance_m = nearest.look_at(meeting.centre_m, triangle, corners);
+        let distance_m = nearest.look_at(&meeting.axis, triangle, corners);
         candidates.set_distance_m(number, distance_m);
         if distance_m >= meeting.radius_m {
             continue;
@@ -135,12 +145,13 @@ pub(super) fn press(
             if candidates.least_distance_m(number) <= nearest.distance_m {
                 let triangle = candidates.triangles()[number] as usize;
                 let corners = meeting.triangles.corners(triangle, meeting.x);
-                candidates.set_distance_m(number, nearest.look_at(meeting.centre_m, triangle, corners));
+                candidates.set_distance_m(number, nearest.look_at(&meeting.axis, triangle, corners));
             }
         }
     }
     if nearest.distance_m < f64::INFINITY {
         (pressed.to_surface_m, pressed.nearest) = (nearest.to_point_m, (nearest.triangle, nearest.weights));
+        pressed.arm_m = nearest.arm_m;
     }
     pressed
 }
@@ -149,19 +160,20 @@ pub(super) fn press(
 #[derive(Debug, Clone, Copy, Default)]
 struct Nearest {
     distance_m: f64,
+    arm_m: DVec3,
     to_point_m: DVec3,
     triangle: usize,
     weights: [f64; 3],
 }
 
 impl Nearest {
-    /// Returns how far (m) the triangle is from `p`.
-    fn look_at(&mut self, p: DVec3, triangle: usize, corners: [DVec3; 3]) -> f64 {
-        let weights = closest_weights(p, corners);
-        let to_point_m = corners[0] * weights[0] + corners[1] * weights[1] + corners[2] * weights[2] - p;
-        let distance_m = to_point_m.length();
+    /// Returns how far (m) the triangle is from the axis.
+    fn look_at(&mut self, axis: &Axis, triangle: usize, corners: [DVec3; 3]) -> f64 {
+        let found = axis.approach(corners);
+        let distance_m = found.to_triangle_m.length();
         if distance_m < self.distance_m || (distance_m == self.distance_m && triangle < self.triangle) {
-            *self = Self { distance_m, to_point_m, triangle, weights };
+            let (arm_m, to_point_m, weights) = (found.arm_m, found.to_triangle_m, found.weights);
+            *self = Self { distance_m, arm_m, to_point_m, triangle, weights };
         }
         distance_m
     }
@@ -177,12 +189,13 @@ fn press_triangle(
     pressed: &mut Pressed,
 ) -> [DVec3; 3] {
     let mut nodal = [DVec3::ZERO; 3];
-    let (ab, ac, from_centre) = (b - a, c - a, a - meeting.centre_m);
+    let (ab, ac, from_centre) = (b - a, c - a, a - meeting.axis.centre_m);
     let outward = ab.cross(ac);
-    let radius_sq = meeting.radius_m * meeting.radius_m;
+    let (radius_sq, is_sphere) = (meeting.radius_m * meeting.radius_m, meeting.axis.is_point());
     for (index, &[wb, wc]) in samples.weights.iter().enumerate() {
-        // r = y − c
-        let r = from_centre + ab * wb + ac * wc;
+        // p = y − c₀, r = y − c
+        let p = from_centre + ab * wb + ac * wc;
+        let r = if is_sphere { p } else { p - meeting.axis.nearest_m(p) };
         let distance_sq = r.length_squared();
         if distance_sq >= radius_sq {
             continue;
@@ -195,32 +208,47 @@ fn press_triangle(
         let free_depth_m = if meeting.put_into { depth_m } else { 0.0 };
         if from_behind {
             // It carries nothing anyway, but tells the next tick that the tool was put there.
-            next.push(Touch { sample: number, from_behind, free_depth_m, spring_origin_m: r });
+            next.push(Touch { sample: number, from_behind, free_depth_m, spring_origin_m: meeting.in_tool(p) });
             continue;
         }
-        let mut touch = known.unwrap_or(Touch { sample: number, from_behind, free_depth_m, spring_origin_m: r });
+        let new = || Touch { sample: number, from_behind, free_depth_m, spring_origin_m: meeting.in_tool(p) };
+        let mut touch = known.unwrap_or_else(new);
         touch.free_depth_m = touch.free_depth_m.min(depth_m);
-        let force_n = press_sample(meeting, samples, r, distance_m, &mut touch, pressed);
+        // A sample exactly on the axis has no direction: it carries nothing for this instant.
+        let normal = r / distance_m.max(f64::MIN_POSITIVE);
+        let force_n = press_sample(meeting, samples, (p, normal, distance_m), &mut touch, pressed);
         next.push(touch);
         nodal[0] += force_n * (1.0 - wb - wc);
         nodal[1] += force_n * wb;
         nodal[2] += force_n * wc;
         pressed.force_n -= force_n;
+        if meeting.orientation.is_some() {
+            pressed.torque_nm -= p.cross(force_n);
+        }
     }
     nodal
 }
 
-/// Force (N) on one sample.
+impl Meeting<'_> {
+    /// From the tool's centre (m): in the world, to the tool's frame where it turns.
+    fn in_tool(&self, p: DVec3) -> DVec3 {
+        self.orientation.map_or(p, |orientation| orientation.conjugate() * p)
+    }
+
+    /// And back.
+    fn in_world(&self, p: DVec3) -> DVec3 {
+        self.orientation.map_or(p, |orientation| orientation * p)
+    }
+}
+
+/// Force (N) on one sample at `p` from the tool's centre, in the direction `normal` from the tool's axis and that far from it.
 fn press_sample(
     meeting: &Meeting<'_>,
     samples: &TriangleSamples<'_>,
-    r: DVec3,
-    distance_m: f64,
+    (p, normal, distance_m): (DVec3, DVec3, f64),
     touch: &mut Touch,
     pressed: &mut Pressed,
 ) -> DVec3 {
-    // A sample exactly at the centre has no direction: it carries nothing for this instant.
-    let normal = r / distance_m.max(f64::MIN_POSITIVE);
     let depth_m = meeting.radius_m - distance_m - touch.free_depth_m;
     // |f_n| = k_f a (g − g₀), Φ = ½ k_f a (g − g₀)²
     let f_n = samples.stiffness_n_per_m * depth_m;
@@ -233,7 +261,7 @@ fn press_sample(
     pressed.penetration_m = pressed.penetration_m.max(meeting.radius_m - distance_m);
 
     let k_t = TANGENTIAL_RATIO * samples.stiffness_n_per_m;
-    let trial = (r - touch.spring_origin_m).reject_from_normalized(normal);
+    let trial = (p - meeting.in_world(touch.spring_origin_m)).reject_from_normalized(normal);
     let (stretch_m, limit_m) = (trial.length(), meeting.friction_coefficient * f_n / k_t);
     let spring = if stretch_m > limit_m {
         pressed.heat_j += k_t * limit_m * (stretch_m - limit_m);
@@ -242,7 +270,7 @@ fn press_sample(
         pressed.sticking_n += f_n;
         trial
     };
-    touch.spring_origin_m = r - spring;
+    touch.spring_origin_m = meeting.in_tool(p - spring);
     normal * f_n - spring * k_t
 }
 
@@ -262,7 +290,7 @@ fn take(before: &mut &[Touch], sample: u32) -> Option<Touch> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::{ContactModel, SurfaceModuli, ToolSpec};
+    use super::super::{ContactModel, SurfaceModuli, ToolShape, ToolSpec};
     use super::*;
     use crate::{
         contact::Coupling,
@@ -276,18 +304,32 @@ mod tests {
         x: Vec<DVec3>,
         touching: Touching,
         next: Touching,
+        orientation: DQuat,
     }
 
     const RADIUS_M: f64 = 0.01;
 
     impl Bench {
         fn new(friction_coefficient: f64) -> Self {
+            Self::of(ToolShape::Sphere, friction_coefficient)
+        }
+
+        /// Across the face, between the first corner and the others.
+        fn of_capsule(half_length_m: f64, friction_coefficient: f64) -> Self {
+            let along = DVec3::new(1.0, 1.0, 0.1);
+            let shape = ToolShape::capsule(Coupling::Rigid, RADIUS_M, half_length_m, along);
+            Self::of(shape, friction_coefficient)
+        }
+
+        fn of(shape: ToolShape, friction_coefficient: f64) -> Self {
+            let orientation = shape.as_capsule().map_or(DQuat::IDENTITY, |capsule| capsule.start_orientation);
             let x = [(0.0, 0.0, 0.0), (0.03, 0.0, 0.0), (0.0, 0.03, 0.0), (0.0, 0.0, -0.03)];
             let x: Vec<DVec3> = x.into_iter().map(DVec3::from).collect();
             let mesh = TetMesh::new(x.clone(), vec![[0, 2, 1, 3]]).unwrap();
             let surface = Surface::of(&mesh).unwrap();
             let tool = ToolSpec {
-                name: "sphere".into(),
+                name: "tool".into(),
+                shape,
                 radius_m: RADIUS_M,
                 coupling: Coupling::Rigid,
                 friction_coefficient,
@@ -297,7 +339,7 @@ mod tests {
             let model = ContactModel::build(mesh.positions_m(), &surface, &moduli, &[1.0; 4], 1e6, &[tool]);
             let samples = model.tools[0].foundation.samples;
             let buffer = || Touching::with_capacity(samples);
-            Self { model, x, touching: buffer(), next: buffer() }
+            Self { model, x, touching: buffer(), next: buffer(), orientation }
         }
 
         fn press(&mut self, centre_m: DVec3) -> (Pressed, Vec<DVec3>) {
@@ -311,7 +353,8 @@ mod tests {
                 foundation: &tool.foundation,
                 tables: &self.model.tables,
                 x: &self.x,
-                centre_m,
+                axis: tool.spec.shape.axis(centre_m, self.orientation),
+                orientation: tool.spec.shape.as_capsule().map(|_| self.orientation),
                 radius_m: RADIUS_M,
                 friction_coefficient: tool.spec.friction_coefficient,
                 put_into: just_put || self.touching.tells_it_was_put(),
@@ -349,6 +392,34 @@ mod tests {
             prop_assert!((slope + forces[node][axis]).abs() <= 1e-5 * pressed.pressing_n, "{slope} {}", forces[node]);
         }
 
+        /// In place and in orientation, wherever the axis is; and the forces of tool and surface turn them as much.
+        #[test]
+        fn a_capsules_wrench_is_the_gradient_of_the_potential(
+            shift in prop::array::uniform3(-0.5..0.5_f64), turn in prop::array::uniform3(-1.5..1.5_f64), axis in 0..3_usize,
+        ) {
+            let centre = above(0.5 * RADIUS_M) + DVec3::from(shift) * RADIUS_M;
+            let mut bench = Bench::of_capsule(1.5 * RADIUS_M, 0.0);
+            let start = DQuat::from_scaled_axis(turn.into()) * bench.orientation;
+            bench.orientation = start;
+            let (pressed, forces) = bench.press(centre);
+            prop_assume!(pressed.contacts > 0);
+            let moments: DVec3 = bench.x.iter().zip(&forces).map(|(x, f)| (*x - centre).cross(*f)).sum();
+            prop_assert!((pressed.torque_nm + moments).length() <= 1e-12 * pressed.pressing_n * RADIUS_M);
+            let (step, unit) = (1e-7, DVec3::AXES[axis]);
+            // What comes in or goes out between is of no depth, unless it is met from behind.
+            let mut changes = |by: f64| {
+                let shifted = bench.press(centre + unit * (by * step)).0.energy_j;
+                bench.orientation = DQuat::from_scaled_axis(unit * (by * step / RADIUS_M)) * start;
+                let turned = bench.press(centre).0.energy_j;
+                bench.orientation = start;
+                DVec3::new(shifted, turned, 0.0)
+            };
+            let slopes = (changes(1.0) - changes(-1.0)) / (2.0 * step);
+            prop_assert!((slopes.x + pressed.force_n[axis]).abs() <= 1e-5 * pressed.pressing_n, "{slopes} {}", pressed.force_n);
+            let torque_n = pressed.torque_nm[axis] / RADIUS_M;
+            prop_assert!((slopes.y + torque_n).abs() <= 1e-5 * pressed.pressing_n, "{slopes} {torque_n}");
+        }
+
         #[test]
         fn no_sample_leaves_the_friction_cone(steps in prop::collection::vec(prop::array::uniform3(-1.0..1.0_f64), 1..40)) {
             let mu = 0.4;
@@ -366,6 +437,41 @@ mod tests {
                 }
             }
         }
+    }
+
+    #[test]
+    fn a_short_capsule_is_a_sphere_and_a_turned_one_rubs() {
+        let (mut short, mut sphere) = (Bench::of_capsule(1e-12, 0.4), Bench::new(0.4));
+        for step in 0..20 {
+            let centre = above(0.2 * RADIUS_M) + DVec3::X * (1e-5 * f64::from(step));
+            let ((a, _), (b, _)) = (short.press(centre), sphere.press(centre));
+            assert!((a.force_n - b.force_n).length() < 1e-9 * b.pressing_n && a.contacts == b.contacts);
+            assert!(
+                (a.energy_j - b.energy_j).abs() < 1e-9 * b.energy_j && (a.heat_j - b.heat_j).abs() < 1e-9 * b.energy_j
+            );
+        }
+        // Turned about the vertical, it is held by the friction under it, and no force results.
+        let mut bench = Bench::of_capsule(0.3 * RADIUS_M, 0.4);
+        bench.press(above(0.2 * RADIUS_M));
+        bench.orientation = DQuat::from_rotation_z(1e-4) * bench.orientation;
+        let (pressed, _) = bench.press(above(0.2 * RADIUS_M));
+        assert!(pressed.torque_nm.z < 0.0 && pressed.heat_j >= 0.0, "{}", pressed.torque_nm);
+        // A ball that rolls does not rub: v + ω × p = 0 where it touches.
+        let rolled = |spin: f64| {
+            let mut bench = Bench::of_capsule(1e-12, 0.4);
+            let (start, shift_m) = (bench.orientation, 1e-5);
+            let height_m = RADIUS_M - 0.01 * RADIUS_M;
+            bench.press(above(0.01 * RADIUS_M));
+            bench.orientation = DQuat::from_rotation_y(spin * shift_m / height_m) * start;
+            let (pressed, _) = bench.press(above(0.01 * RADIUS_M) + DVec3::X * shift_m);
+            (pressed.force_n - pressed.normal_n).length()
+        };
+        assert!(
+            rolled(1.0) < 0.02 * rolled(0.0) && rolled(-1.0) > 1.5 * rolled(0.0),
+            "{} {}",
+            rolled(1.0),
+            rolled(0.0)
+        );
     }
 
     #[test]

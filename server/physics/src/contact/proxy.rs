@@ -5,13 +5,20 @@
 //! `v ← ḋ + (v − ḋ) e^{−B h/m}`, so no damping makes it unstable.
 //!
 //! What keeps it outside, whatever the device does:
-//! - The spring saturates ([`super::spring`]) at `F_max`, the force that presses the sphere [`SATURATION_DEPTH`]·R into the flat
+//! - The spring saturates ([`super::spring`]) at `F_max`, the force that presses a sphere of its radius [`SATURATION_DEPTH`]·R into the flat
 //!   foundation. The damper is cut where the sum exceeds it.
 //! - It moves at most `R/4` in a substep; within `R/4` of the surface it approaches the nearest point, seen from there, with at
 //!   most the kinetic energy that the flat foundation stores at depth [`IMPACT_DEPTH`]·R. The rest is taken from the (virtual) tool,
 //!   never given to tool or body. In contact that point moves with the dent, which the body will stop: there a surface that gives
 //!   way allows no more speed than one at rest.
-use super::{Coupling, ToolModel, ToolState, narrow::Pressed, spring::shortened};
+//!
+//! A tool that turns is advanced in its orientation likewise ([`super::turning`]).
+use super::{
+    Coupling, ToolModel, ToolState,
+    narrow::Pressed,
+    spring::{SaturatingSpring, shortened},
+    turning,
+};
 use glam::DVec3;
 
 /// Depth over R at which the coupling's force saturates.
@@ -38,76 +45,133 @@ impl SubstepTime {
         let (from, to) = (tool.previous_target.position_m, tool.target.position_m);
         (from.lerp(to, self.fraction), (to - from) / self.tick_period_s)
     }
+
+    /// The same tick, where this substep begins.
+    fn at_start(&self) -> Self {
+        Self { fraction: self.fraction - self.dt_s / self.tick_period_s, ..*self }
+    }
 }
 
-/// First half of a substep: half kick and drift. Returns how far the tool moved (m).
-pub(super) fn drift(model: &ToolModel, tool: &mut ToolState, contact_n: DVec3, time: &SubstepTime) -> f64 {
-    let before = tool.centre_m;
-    let (device_m, device_m_per_s) = time.device(tool);
-    match model.spec.coupling {
-        Coupling::Rigid => {
-            tool.centre_m = device_m;
-            tool.velocity_m_per_s = device_m_per_s;
-        }
-        Coupling::Spring { .. } => {
-            let at_start = SubstepTime { fraction: time.fraction - time.dt_s / time.tick_period_s, ..*time };
-            half_kick(model, tool, contact_n, at_start.device(tool), 0.5 * time.dt_s);
-            limit_speed(tool, NEAR * model.spec.radius_m / time.dt_s.max(f64::MIN_POSITIVE));
-            tool.centre_m += tool.velocity_m_per_s * time.dt_s;
+impl ToolModel {
+    /// `None` of a rigid tool.
+    fn pull(&self) -> Option<Pull> {
+        match (self.spec.coupling, self.spring()) {
+            (Coupling::Spring { damping_n_s_per_m, mass_kg, .. }, Some(spring)) => {
+                Some(Pull { spring, damping_n_s_per_m, mass_kg })
+            }
+            _ => None,
         }
     }
-    before.distance(tool.centre_m)
 }
 
-/// Second half, with what the tool now meets. Returns the coupling's force on the tool (N).
+/// A coupling's spring and damper, and what they move.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Pull {
+    pub(super) spring: SaturatingSpring,
+    /// `B` (N s/m).
+    pub(super) damping_n_s_per_m: f64,
+    /// `m` (kg).
+    pub(super) mass_kg: f64,
+}
+
+/// What the coupling does to the tool.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Coupled {
+    /// Force (N).
+    pub(super) force_n: DVec3,
+    /// Torque (N m).
+    pub(super) torque_nm: DVec3,
+}
+
+/// First half of a substep: half kick and drift. Returns how far any point of the tool's axis moved (m), at most.
+pub(super) fn drift(
+    model: &ToolModel,
+    tool: &mut ToolState,
+    (contact_n, contact_nm): (DVec3, DVec3),
+    time: &SubstepTime,
+) -> f64 {
+    let before = model.axis(tool);
+    let (device_m, device_m_per_s) = time.device(tool);
+    match model.pull() {
+        None => {
+            tool.centre_m = device_m;
+            tool.velocity_m_per_s = device_m_per_s;
+            turning::follow(model, tool, time);
+        }
+        Some(pull) => {
+            let (at_start, half_s) = (time.at_start(), 0.5 * time.dt_s);
+            let (device_m, device_m_per_s) = at_start.device(tool);
+            let stretch_m = device_m - tool.centre_m;
+            pull.half_kick(&mut tool.velocity_m_per_s, contact_n, (stretch_m, device_m_per_s), half_s);
+            turning::half_kick(model, tool, contact_nm, &at_start, half_s);
+            limit_speed(model, tool, NEAR * model.spec.radius_m / time.dt_s.max(f64::MIN_POSITIVE));
+            tool.centre_m += tool.velocity_m_per_s * time.dt_s;
+            turning::drift(model, tool, time.dt_s);
+        }
+    }
+    before.centre_m.distance(tool.centre_m) + before.half_m.distance(model.axis(tool).half_m)
+}
+
+/// Second half, with what the tool now meets. Returns what the coupling does to the tool.
 pub(super) fn finish(
     model: &ToolModel,
     tool: &mut ToolState,
     pressed: &Pressed,
     surface_m_per_s: DVec3,
     time: &SubstepTime,
-) -> DVec3 {
-    let Coupling::Spring { mass_kg, .. } = model.spec.coupling else { return DVec3::ZERO };
+) -> Coupled {
+    let Some(pull) = model.pull() else { return Coupled::default() };
     let distance_m = pressed.to_surface_m.length();
     if distance_m < (1.0 + NEAR) * model.spec.radius_m {
-        let limit_m_per_s = (2.0 * model.impact_energy_j / mass_kg).sqrt();
+        let limit_m_per_s = (2.0 * model.impact_energy_j / pull.mass_kg).sqrt();
         let towards = pressed.to_surface_m / distance_m;
         let recedes_m_per_s = surface_m_per_s.dot(towards);
         let base_m_per_s = if pressed.contacts > 0 { recedes_m_per_s.min(0.0) } else { recedes_m_per_s };
-        limit_approach(tool, towards, base_m_per_s + limit_m_per_s);
+        let limit_m_per_s = base_m_per_s + limit_m_per_s;
+        match model.spec.shape.as_capsule() {
+            None => limit_approach(tool, towards, limit_m_per_s),
+            Some(capsule) => {
+                let inertia = (pull.mass_kg, capsule.turning.inertia_kg_m2);
+                turning::limit_approach(tool, (pressed.arm_m, towards), limit_m_per_s, inertia);
+            }
+        }
     }
-    half_kick(model, tool, pressed.force_n, time.device(tool), 0.5 * time.dt_s)
+    let (device_m, device_m_per_s) = time.device(tool);
+    let (stretch_m, half_s) = (device_m - tool.centre_m, 0.5 * time.dt_s);
+    let force_n = pull.half_kick(&mut tool.velocity_m_per_s, pressed.force_n, (stretch_m, device_m_per_s), half_s);
+    Coupled { force_n, torque_nm: turning::half_kick(model, tool, pressed.torque_nm, time, half_s) }
 }
 
-/// Kicks the tool over `h_s` and returns the coupling's mean force (N) over it.
-fn half_kick(
-    model: &ToolModel,
-    tool: &mut ToolState,
-    contact_n: DVec3,
-    (device_m, device_m_per_s): (DVec3, DVec3),
-    h_s: f64,
-) -> DVec3 {
-    let (Coupling::Spring { damping_n_s_per_m, mass_kg, .. }, Some(spring)) = (model.spec.coupling, model.spring())
-    else {
-        return DVec3::ZERO;
-    };
-    let (limit_n, spring_n) = (spring.limit_n, spring.force_n(device_m - tool.centre_m));
-    if h_s == 0.0 {
-        return spring_n;
+impl Pull {
+    /// Kicks the tool over `h_s`, with the contact's force (N), the stretch (m) and the device's velocity (m/s), and returns the coupling's mean force
+    /// (N) over it.
+    pub(super) fn half_kick(
+        &self,
+        velocity_m_per_s: &mut DVec3,
+        contact_n: DVec3,
+        (stretch_m, device_m_per_s): (DVec3, DVec3),
+        h_s: f64,
+    ) -> DVec3 {
+        let Self { spring, damping_n_s_per_m, mass_kg } = *self;
+        let (limit_n, spring_n) = (spring.limit_n, spring.force_n(stretch_m));
+        if h_s == 0.0 {
+            return spring_n;
+        }
+        *velocity_m_per_s += (contact_n + spring_n) * (h_s / mass_kg);
+        // Impulse of the damper over h: m (1 − e^{−B h/m}) (ḋ − ċ)
+        let share = -(-damping_n_s_per_m * h_s / mass_kg).exp_m1();
+        // |s + β d| ≤ limit and |s| ≤ limit: no more than twice the limit of it can be used.
+        let damper_n = shortened((device_m_per_s - *velocity_m_per_s) * (mass_kg * share / h_s), 2.0 * limit_n);
+        let damper_n = damper_n * share_within(spring_n, damper_n, limit_n);
+        *velocity_m_per_s += damper_n * (h_s / mass_kg);
+        spring_n + damper_n
     }
-    tool.velocity_m_per_s += (contact_n + spring_n) * (h_s / mass_kg);
-    // Impulse of the damper over h: m (1 − e^{−B h/m}) (ḋ − ċ)
-    let share = -(-damping_n_s_per_m * h_s / mass_kg).exp_m1();
-    // |s + β d| ≤ limit and |s| ≤ limit: no more than twice the limit of it can be used.
-    let damper_n = shortened((device_m_per_s - tool.velocity_m_per_s) * (mass_kg * share / h_s), 2.0 * limit_n);
-    let damper_n = damper_n * share_within(spring_n, damper_n, limit_n);
-    tool.velocity_m_per_s += damper_n * (h_s / mass_kg);
-    spring_n + damper_n
 }
 
 /// Largest `β ≤ 1` with `|s + β d| ≤ limit`, for `|s| ≤ limit`. A shortened damper still only takes energy.
 fn share_within(s: DVec3, d: DVec3, limit: f64) -> f64 {
-    if (s + d).length_squared() <= limit * limit {
+    // A saturated spring may be a rounding beyond the limit by itself: without a damper there is nothing to shorten.
+    if (s + d).length_squared() <= limit * limit || d == DVec3::ZERO {
         return 1.0;
     }
     // d² β² + 2 s·d β + s² − limit² = 0
@@ -125,8 +189,17 @@ fn limit_approach(tool: &mut ToolState, towards: DVec3, limit_m_per_s: f64) {
     }
 }
 
-fn limit_speed(tool: &mut ToolState, limit_m_per_s: f64) {
-    tool.velocity_m_per_s = tool.velocity_m_per_s.clamp_length_max(limit_m_per_s);
+fn limit_speed(model: &ToolModel, tool: &mut ToolState, limit_m_per_s: f64) {
+    let Some(capsule) = model.spec.shape.as_capsule() else {
+        tool.velocity_m_per_s = tool.velocity_m_per_s.clamp_length_max(limit_m_per_s);
+        return;
+    };
+    // |v + ω × p| ≤ |v| + L|ω| on the axis
+    let fastest = tool.velocity_m_per_s.length() + capsule.half_length_m * tool.angular_velocity_rad_per_s.length();
+    if fastest > limit_m_per_s {
+        tool.velocity_m_per_s *= limit_m_per_s / fastest;
+        tool.angular_velocity_rad_per_s *= limit_m_per_s / fastest;
+    }
 }
 
 #[cfg(test)]
@@ -141,5 +214,7 @@ mod tests {
             assert!((s + d * share).length() <= 2.0 + 1e-12, "{s} {d} {share}");
         }
         assert_eq!(share_within(DVec3::X, DVec3::X * 0.5, 2.0), 1.0);
+        // Without damping, a spring that saturated at the limit and a rounding made the tool's velocity not a number.
+        assert_eq!(share_within(DVec3::X * (2.0 + 1e-15), DVec3::ZERO, 2.0), 1.0);
     }
 }

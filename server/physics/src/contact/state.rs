@@ -30,15 +30,25 @@ pub(super) struct ToolContact {
     pub(super) just_put: bool,
     /// Force of the body on the tool now (N).
     pub(super) force_n: DVec3,
+    /// Torque of the body on the tool now (N m).
+    pub(super) torque_nm: DVec3,
     pub(super) estimate: StiffnessEstimate,
     #[serde(skip)]
     pub(super) candidates: Candidates,
 }
 
+impl ToolContact {
+    fn keep_sums_of(&mut self, other: &Self) {
+        (self.just_put, self.estimate) = (other.just_put, other.estimate);
+        (self.force_n, self.torque_nm) = (other.force_n, other.torque_nm);
+    }
+}
+
 impl PartialEq for ContactState {
     fn eq(&self, other: &Self) -> bool {
         let same = |(a, b): (&ToolContact, &ToolContact)| {
-            a.touching == b.touching && a.just_put == b.just_put && a.force_n == b.force_n && a.estimate == b.estimate
+            let forces = a.force_n == b.force_n && a.torque_nm == b.torque_nm;
+            a.touching == b.touching && a.just_put == b.just_put && forces && a.estimate == b.estimate
         };
         self.tools.len() == other.tools.len() && self.tools.iter().zip(&other.tools).all(same)
     }
@@ -55,6 +65,7 @@ impl ContactState {
             touching: Touching::with_capacity(tool.foundation.samples),
             just_put: false,
             force_n: DVec3::ZERO,
+            torque_nm: DVec3::ZERO,
             estimate: StiffnessEstimate::default(),
             candidates: Candidates::with_capacity(model.triangles.len()),
         };
@@ -75,6 +86,7 @@ impl ContactState {
             let ascending = touches.windows(2).all(|pair| pair[0].sample < pair[1].sample);
             let known = touches.last().is_none_or(|last| (last.sample as usize) < samples(index));
             let finite = saved.force_n.is_finite()
+                && saved.torque_nm.is_finite()
                 && saved.estimate.is_finite()
                 && touches.iter().all(|touch| {
                     touch.spring_origin_m.is_finite() && (0.0..f64::INFINITY).contains(&touch.free_depth_m)
@@ -82,7 +94,7 @@ impl ContactState {
             if !(ascending && known && finite && touches.iter().all(|touch| own.touching.push(*touch))) {
                 return None;
             }
-            (own.just_put, own.force_n, own.estimate) = (saved.just_put, saved.force_n, saved.estimate);
+            own.keep_sums_of(saved);
         }
         Some(self)
     }
@@ -97,7 +109,7 @@ impl ContactState {
     pub(crate) fn keep_memory_of(&mut self, other: &Self) {
         for (own, other) in self.tools.iter_mut().zip(&other.tools) {
             own.touching.copy_from(&other.touching);
-            (own.just_put, own.force_n, own.estimate) = (other.just_put, other.force_n, other.estimate);
+            own.keep_sums_of(other);
         }
     }
 
@@ -106,7 +118,7 @@ impl ContactState {
         for tool in &mut self.tools {
             tool.touching.clear();
             tool.just_put = false;
-            tool.force_n = DVec3::ZERO;
+            (tool.force_n, tool.torque_nm) = (DVec3::ZERO, DVec3::ZERO);
             tool.estimate = StiffnessEstimate::default();
         }
         self.forget_geometry();
@@ -117,7 +129,7 @@ impl ContactState {
         let part = &mut self.tools[tool];
         part.touching.clear();
         part.just_put = true;
-        part.force_n = DVec3::ZERO;
+        (part.force_n, part.torque_nm) = (DVec3::ZERO, DVec3::ZERO);
         part.estimate = StiffnessEstimate::default();
         part.candidates.slack_m = f64::NEG_INFINITY;
     }

@@ -1,11 +1,12 @@
 //! What a tool is, how it follows its device, and what is reported of it.
-use glam::{DMat3, DVec3};
+use super::{axis::Axis, foundation::ContactBound};
+use glam::{DMat3, DQuat, DVec3};
 use serde::{Deserialize, Serialize};
 
 /// How a tool follows its device.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Coupling {
-    /// The tool is where the device is: a kinematic sphere (trajectories, known-answer tests). It moves in a straight line
+    /// The tool is where the device is: kinematic (trajectories, known-answer tests). It moves in a straight line
     /// during the tick; nothing keeps it outside if it is driven further than its radius in one substep.
     Rigid,
     /// The tool is a mass on a spring and damper to the device (virtual coupling): the proxy stays outside the body
@@ -20,11 +21,97 @@ pub enum Coupling {
     },
 }
 
-/// A spherical tool.
+/// What a tool looks like: all that is nearer than its radius to a point, or to a segment.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum ToolShape {
+    /// A ball. It is the same whichever way its device is turned: it does not turn, and gives no torque.
+    Sphere,
+    /// A cylinder with a hemisphere on either end, along its own z. It turns with its device.
+    Capsule(Capsule),
+}
+
+/// The capsule but its radius.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Capsule {
+    /// From its centre to the centre of a hemisphere (m), > 0.
+    pub half_length_m: f64,
+    /// How the device is turned at the start: tool frame to world.
+    pub start_orientation: DQuat,
+    /// How it follows its device's orientation; of no use to a rigid tool.
+    pub turning: Turning,
+}
+
+/// The virtual coupling of orientation: `J ω̇ = τ_contact + K_r log(R_device Rᵀ) + B_r (ω_device − ω)`, with an inertia that is the same about
+/// every axis.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Turning {
+    /// `K_r` (N m/rad).
+    pub stiffness_nm_per_rad: f64,
+    /// `B_r` (N m s/rad).
+    pub damping_nm_s_per_rad: f64,
+    /// `J` (kg m²).
+    pub inertia_kg_m2: f64,
+}
+
+impl Turning {
+    /// What belongs to a coupling of position: `K_r = r² K`, `B_r = r² B`, `J = r² m`, with the radius of gyration of a rod with the body of a ball,
+    /// `r² = L²/3 + 2R²/5`. So a tool turns as fast, and is as well damped, as it moves. Nothing of a rigid one.
+    pub fn of(coupling: Coupling, radius_m: f64, half_length_m: f64) -> Self {
+        let square = half_length_m * half_length_m / 3.0 + 0.4 * radius_m * radius_m;
+        match coupling {
+            Coupling::Rigid => Self { stiffness_nm_per_rad: 0.0, damping_nm_s_per_rad: 0.0, inertia_kg_m2: 0.0 },
+            Coupling::Spring { stiffness_n_per_m, damping_n_s_per_m, mass_kg } => Self {
+                stiffness_nm_per_rad: square * stiffness_n_per_m,
+                damping_nm_s_per_rad: square * damping_n_s_per_m,
+                inertia_kg_m2: square * mass_kg,
+            },
+        }
+    }
+}
+
+impl ToolShape {
+    /// A capsule along a direction (world), with the [`Turning`] that belongs to its coupling.
+    pub fn capsule(coupling: Coupling, radius_m: f64, half_length_m: f64, along: DVec3) -> Self {
+        Self::Capsule(Capsule {
+            half_length_m,
+            start_orientation: DQuat::from_rotation_arc(DVec3::Z, along.normalize_or(DVec3::Z)),
+            turning: Turning::of(coupling, radius_m, half_length_m),
+        })
+    }
+
+    /// The capsule, where it is one.
+    pub fn as_capsule(&self) -> Option<&Capsule> {
+        match self {
+            Self::Sphere => None,
+            Self::Capsule(capsule) => Some(capsule),
+        }
+    }
+
+    /// From its centre to the farthest point from which its surface is one radius away (m).
+    pub fn half_length_m(&self) -> f64 {
+        self.as_capsule().map_or(0.0, |capsule| capsule.half_length_m)
+    }
+
+    fn start_orientation(&self) -> DQuat {
+        self.as_capsule().map_or(DQuat::IDENTITY, |capsule| capsule.start_orientation)
+    }
+
+    /// The axis of a tool of this shape (m, world).
+    pub(super) fn axis(&self, centre_m: DVec3, orientation: DQuat) -> Axis {
+        match self {
+            Self::Sphere => Axis::point(centre_m),
+            Self::Capsule(capsule) => Axis { centre_m, half_m: orientation * (DVec3::Z * capsule.half_length_m) },
+        }
+    }
+}
+
+/// A tool.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ToolSpec {
     /// Name, unique in a scene.
     pub name: String,
+    /// Its shape.
+    pub shape: ToolShape,
     /// Radius (m).
     pub radius_m: f64,
     /// How it follows its device.
@@ -42,6 +129,30 @@ pub struct ToolTarget {
     pub position_m: DVec3,
     /// Velocity (m/s, world).
     pub velocity_m_per_s: DVec3,
+    /// Orientation, tool frame to world. Spheres do not look at it.
+    pub orientation: DQuat,
+    /// Angular velocity (rad/s, world).
+    pub angular_velocity_rad_per_s: DVec3,
+}
+
+impl ToolTarget {
+    /// At rest, unrotated.
+    pub fn at(position_m: DVec3) -> Self {
+        Self { position_m, ..Self::default() }
+    }
+
+    /// The same, at rest.
+    #[must_use]
+    pub fn at_rest(self) -> Self {
+        Self { velocity_m_per_s: DVec3::ZERO, angular_velocity_rad_per_s: DVec3::ZERO, ..self }
+    }
+
+    pub(crate) fn is_finite(&self) -> bool {
+        // What is not a rotation would shear the tool.
+        [self.position_m, self.velocity_m_per_s, self.angular_velocity_rad_per_s].iter().all(|a| a.is_finite())
+            && self.orientation.is_finite()
+            && self.orientation.is_normalized()
+    }
 }
 
 /// A tool's changing state.
@@ -51,7 +162,11 @@ pub struct ToolState {
     pub centre_m: DVec3,
     /// Its velocity (m/s), at the same time.
     pub velocity_m_per_s: DVec3,
-    /// Device position and velocity at the end of the last tick.
+    /// Its orientation, tool frame to world; of a sphere, unrotated.
+    pub orientation: DQuat,
+    /// Its angular velocity (rad/s), at the same time; of a sphere, none.
+    pub angular_velocity_rad_per_s: DVec3,
+    /// Device pose and velocity at the end of the last tick.
     pub target: ToolTarget,
     /// The same at the end of the tick before: within a tick the device moves from there to `target`.
     pub previous_target: ToolTarget,
@@ -59,6 +174,11 @@ pub struct ToolState {
     pub contact_force_n: DVec3,
     /// Force on the device (N), mean over the tick's substeps: the coupling's, or the contact force of a rigid tool.
     pub device_force_n: DVec3,
+    /// Torque of the body on the tool (N m, about its centre), mean over the tick's substeps; of a sphere, none.
+    pub contact_torque_nm: DVec3,
+    /// Torque on the device (N m, about the tool's centre), mean over the tick's substeps: the coupling's, or the contact's of a rigid tool; of a
+    /// sphere, none.
+    pub device_torque_nm: DVec3,
     /// Contact samples that carry force, at the end of the tick.
     pub contacts: u32,
     /// Deepest penetration of the tool into the surface during the tick (m), whether it carries force or not.
@@ -89,13 +209,18 @@ pub struct LocalContactModel {
 impl ToolState {
     /// At its start, touching nothing.
     pub fn at_start(spec: &ToolSpec) -> Self {
+        let target = spec.start();
         Self {
             centre_m: spec.start_position_m,
             velocity_m_per_s: DVec3::ZERO,
-            target: ToolTarget { position_m: spec.start_position_m, velocity_m_per_s: DVec3::ZERO },
-            previous_target: ToolTarget { position_m: spec.start_position_m, velocity_m_per_s: DVec3::ZERO },
+            orientation: target.orientation,
+            angular_velocity_rad_per_s: DVec3::ZERO,
+            target,
+            previous_target: target,
             contact_force_n: DVec3::ZERO,
             device_force_n: DVec3::ZERO,
+            contact_torque_nm: DVec3::ZERO,
+            device_torque_nm: DVec3::ZERO,
             contacts: 0,
             penetration_m: 0.0,
             contact_energy_j: 0.0,
@@ -105,8 +230,15 @@ impl ToolState {
     }
 
     pub(crate) fn is_finite(&self) -> bool {
-        let targets = [&self.target, &self.previous_target];
-        let vectors = [self.centre_m, self.velocity_m_per_s, self.contact_force_n, self.device_force_n];
+        let vectors = [
+            self.centre_m,
+            self.velocity_m_per_s,
+            self.angular_velocity_rad_per_s,
+            self.contact_force_n,
+            self.device_force_n,
+            self.contact_torque_nm,
+            self.device_torque_nm,
+        ];
         let model = self.local_model.is_none_or(|m| {
             [m.point_m, m.normal, m.force_n].iter().all(|a| a.is_finite())
                 && m.stiffness_n_per_m.is_finite()
@@ -114,35 +246,52 @@ impl ToolState {
         });
         model
             && vectors.iter().all(|a| a.is_finite())
-            && targets.iter().all(|t| t.position_m.is_finite() && t.velocity_m_per_s.is_finite())
+            && self.orientation.is_finite()
+            && self.orientation.is_normalized()
+            && [&self.target, &self.previous_target].iter().all(|t| t.is_finite())
             && [self.penetration_m, self.contact_energy_j, self.friction_heat_j].iter().all(|n| n.is_finite())
     }
 
     /// Ends its contact: no force, no speed.
     pub(crate) fn let_go(&mut self) {
-        let (target, friction_heat_j) = (self.target, self.friction_heat_j);
         *self = Self {
-            centre_m: self.centre_m,
             velocity_m_per_s: DVec3::ZERO,
-            target,
-            previous_target: target,
-            friction_heat_j,
+            angular_velocity_rad_per_s: DVec3::ZERO,
+            previous_target: self.target,
             contact_force_n: DVec3::ZERO,
             device_force_n: DVec3::ZERO,
+            contact_torque_nm: DVec3::ZERO,
+            device_torque_nm: DVec3::ZERO,
             contacts: 0,
             penetration_m: 0.0,
             contact_energy_j: 0.0,
             local_model: None,
+            ..*self
         };
     }
 }
 
-impl Coupling {
-    /// What the coupling, and contact of total stiffness `contact_n_per_m` on a tool that is a mass, add (rad²/s²).
-    pub(super) fn frequency_bound_sq(self, contact_n_per_m: f64) -> f64 {
-        match self {
-            Self::Rigid => 0.0,
-            Self::Spring { stiffness_n_per_m, mass_kg, .. } => (stiffness_n_per_m + contact_n_per_m) / mass_kg,
+impl ToolSpec {
+    /// Where its device starts, at rest.
+    pub fn start(&self) -> ToolTarget {
+        ToolTarget { orientation: self.shape.start_orientation(), ..ToolTarget::at(self.start_position_m) }
+    }
+
+    /// What the coupling, and contact of at most this stiffness on a tool that is a mass, add (rad²/s²).
+    ///
+    /// A capsule's velocity and angular velocity are two: contact at a point `p` from its centre moves it by `(−I, [p]ₓ)`, and a positive block matrix
+    /// is bounded by the sum of its diagonal blocks, `Σ k a/m + Σ k a p²/J`. The couplings act on one each: the larger of them counts.
+    pub(super) fn frequency_bound_sq(&self, contact: &ContactBound) -> f64 {
+        match (self.coupling, &self.shape) {
+            (Coupling::Rigid, _) => 0.0,
+            (Coupling::Spring { stiffness_n_per_m, mass_kg, .. }, ToolShape::Sphere) => {
+                (stiffness_n_per_m + contact.n_per_m) / mass_kg
+            }
+            (Coupling::Spring { stiffness_n_per_m, mass_kg, .. }, ToolShape::Capsule(capsule)) => {
+                let Turning { stiffness_nm_per_rad, inertia_kg_m2, .. } = capsule.turning;
+                let couplings = f64::max(stiffness_n_per_m / mass_kg, stiffness_nm_per_rad / inertia_kg_m2);
+                couplings + contact.n_per_m / mass_kg + contact.nm_per_rad / inertia_kg_m2
+            }
         }
     }
 }

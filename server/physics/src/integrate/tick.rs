@@ -5,7 +5,6 @@ use super::{
     stability::{is_judged, substeps_for},
 };
 use crate::{
-    contact::ToolTarget,
     health::{Quarantine, first_non_finite},
     world::{Model, Scratch, State, StepReport, TickInput},
 };
@@ -121,10 +120,10 @@ pub(super) fn take_tools(model: &Model, state: &mut State, scratch: &mut Scratch
     rejected += u32::from(!tools_ok);
     for (index, tool) in state.tools.iter_mut().enumerate() {
         let target = if tools_ok { input.tools[index] } else { tool.target };
-        let finite = target.position_m.is_finite() && target.velocity_m_per_s.is_finite();
+        let finite = target.is_finite();
         rejected += u32::from(!finite);
         tool.previous_target = tool.target;
-        tool.target = if finite { target } else { ToolTarget { velocity_m_per_s: DVec3::ZERO, ..tool.target } };
+        tool.target = if finite { target } else { tool.target.at_rest() };
     }
     model.contact().begin_tick(&mut state.tools, &mut scratch.contact);
     rejected

@@ -69,6 +69,14 @@ pub enum SolveError {
         /// Load steps that failed.
         failed: u32,
     },
+    /// A capsule turns until it is in equilibrium, and this solver knows no turning.
+    #[error(
+        "tool \"{tool}\" is a capsule, and static equilibrium is known of spheres only: run the scene in time until it is at rest"
+    )]
+    SpheresOnly {
+        /// Name of the tool.
+        tool: String,
+    },
     /// A tool's way is longer than the allowed load steps can take it.
     #[error(
         "tool \"{tool}\" starts {distance_m} m from where it is to be, more than {:.0} of its radii ({radius_m} m)",

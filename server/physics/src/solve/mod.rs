@@ -139,6 +139,9 @@ fn check(
     };
     finite("load factor", load_factors.iter().position(|f| !f.is_finite()))?;
     finite("prescribed displacement", prescribed_displacements_m.iter().position(|d| !d.is_finite()))?;
+    if let Some(capsule) = spec.tools.iter().find(|tool| tool.shape.as_capsule().is_some()) {
+        return Err(SolveError::SpheresOnly { tool: capsule.name.clone() });
+    }
     finite("tool position", tools.iter().position(|t| !t.position_m.is_finite()))?;
     let setting = |name, value: f64, ok: bool, rule| {
         if ok { Ok(()) } else { Err(SolveError::Setting { name, value, rule }) }

@@ -109,7 +109,7 @@ impl StaticSolution {
         state.x.copy_from_slice(&self.x);
         state.load_factors.copy_from_slice(load_factors);
         for (tool, found) in state.tools.iter_mut().zip(&self.tools) {
-            tool.target = ToolTarget { position_m: found.device_m, velocity_m_per_s: DVec3::ZERO };
+            tool.target = ToolTarget::at(found.device_m);
             tool.previous_target = tool.target;
             tool.centre_m = found.centre_m;
             tool.contact_force_n = found.contact_force_n;

@@ -1,7 +1,7 @@
 //! The specification's ranges.
 use super::{Integrator, LoadSpec, MAX_SUBSTEPS, ModelError, ModelSpec, Substeps};
 use crate::{
-    contact::{Coupling, LARGEST_TRIANGLE, ToolSpec},
+    contact::{Coupling, LARGEST_TRIANGLE, ToolShape, ToolSpec, Turning},
     hybrid::HybridError,
     material::{Lame, Material, Viscosity},
     mesh::Surface,
@@ -18,6 +18,7 @@ pub(super) fn spec(spec: &ModelSpec, surface: &Surface, rest_positions_m: &[DVec
     }
     spec.loads.iter().try_for_each(|load| loaded(load, rest_positions_m.len(), surface.triangles.len()))?;
     spec.tools.iter().try_for_each(tool)?;
+    shapes(spec)?;
     spec.tools.iter().try_for_each(|tool| fine_enough(surface, rest_positions_m, tool))?;
     settings(spec)
 }
@@ -39,6 +40,22 @@ fn loaded(load: &LoadSpec, nodes: usize, triangles: usize) -> Result<(), ModelEr
             finite("pressure_pa", *pressure_pa)
         }
     }
+}
+
+/// What presses bodies that are not plain elements, or steps that need the contact's stiffness, is a sphere.
+fn shapes(spec: &ModelSpec) -> Result<(), ModelError> {
+    let Some(tool) = spec.tools.iter().find(|tool| tool.shape.as_capsule().is_some()) else { return Ok(()) };
+    let what = match () {
+        () if spec.particles.is_some() => "a hybrid body, whose particles wake about a point",
+        () if spec.seed.is_some() => "a body of the papers' hybrid, which is touched at one triangle",
+        // A spring body's mesh is empty.
+        () if spec.mesh.tets().is_empty() => "a mass-spring surface, which is refined about a point",
+        () if spec.settings.integrator == Integrator::BackwardEuler => {
+            "backward Euler, which knows no stiffness of a tool that turns"
+        }
+        () => return Ok(()),
+    };
+    Err(ModelError::SpheresOnly { tool: tool.name.clone(), what })
 }
 
 /// No triangle of the surface is too large for the tool's contact samples.
@@ -72,6 +89,18 @@ fn tool(tool: &ToolSpec) -> Result<(), ModelError> {
         positive("coupling_stiffness_n_per_m", stiffness_n_per_m)?;
         not_negative("coupling_damping_n_s_per_m", damping_n_s_per_m)?;
         positive("tool mass_kg", mass_kg)?;
+    }
+    if let ToolShape::Capsule(capsule) = &tool.shape {
+        positive("tool half_length_m", capsule.half_length_m)?;
+        let orientation = capsule.start_orientation;
+        let is_rotation = orientation.is_finite() && orientation.is_normalized();
+        setting("tool start_orientation", orientation.length(), is_rotation, "must be of length 1")?;
+        if let Coupling::Spring { .. } = tool.coupling {
+            let Turning { stiffness_nm_per_rad, damping_nm_s_per_rad, inertia_kg_m2 } = capsule.turning;
+            positive("turning stiffness_nm_per_rad", stiffness_nm_per_rad)?;
+            not_negative("turning damping_nm_s_per_rad", damping_nm_s_per_rad)?;
+            positive("turning inertia_kg_m2", inertia_kg_m2)?;
+        }
     }
     let start = tool.start_position_m.length();
     setting("tool start_position_m", start, start.is_finite(), "must be finite")

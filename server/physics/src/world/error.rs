@@ -87,6 +87,14 @@ pub enum ModelError {
         /// The longest that this tool allows (m).
         largest_m: f64,
     },
+    /// A capsule where there may only be spheres.
+    #[error("tool \"{tool}\" is a capsule, and a capsule cannot press {what}: make it a sphere")]
+    SpheresOnly {
+        /// Name of the tool.
+        tool: String,
+        /// What it cannot press.
+        what: &'static str,
+    },
     /// The particles cannot be made.
     #[error(transparent)]
     Hybrid(#[from] HybridError),

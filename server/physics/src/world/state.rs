@@ -136,15 +136,15 @@ impl State {
         self.quarantine = None;
     }
 
-    /// Puts a tool and its device at rest at `position_m` (m, world), as if it had always been there: it neither sweeps what
+    /// Puts a tool and its device at rest in a pose, as if it had always been there: it neither sweeps what
     /// lies between nor keeps its contact. Where it is put into the surface it presses nothing yet: it resists from that depth
-    /// on, and as from the outside once it has left. A position that is not finite, or a tool that is not there, changes nothing.
+    /// on, and as from the outside once it has left. A pose that is not finite, or a tool that is not there, changes nothing.
     /// Allocates nothing.
-    pub fn place_tool(&mut self, tool: usize, position_m: DVec3) {
-        let Some(state) = self.tools.get_mut(tool).filter(|_| position_m.is_finite()) else { return };
-        state.target = ToolTarget { position_m, velocity_m_per_s: DVec3::ZERO };
+    pub fn place_tool(&mut self, tool: usize, pose: ToolTarget) {
+        let Some(state) = self.tools.get_mut(tool).filter(|_| pose.is_finite()) else { return };
+        state.target = pose.at_rest();
         state.let_go();
-        state.centre_m = position_m;
+        (state.centre_m, state.orientation) = (pose.position_m, pose.orientation);
         self.contact.put_tool(tool);
         self.force_is_current = false;
     }

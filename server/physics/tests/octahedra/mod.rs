@@ -3,7 +3,7 @@
 use glam::DVec3;
 use palpate_physics::{
     ModelSpec, PrescribedSpec, Region, Settings, TetMesh,
-    contact::{Coupling, ToolSpec},
+    contact::{Coupling, ToolShape, ToolSpec},
     material::{Law, Material},
     seed::{LayerSpec, PaperModel, SeedBodySpec, SeedParameters},
 };
@@ -66,6 +66,7 @@ pub fn body_spec(outer_m: f64, layer: Option<LayerSpec>, parameters: SeedParamet
         gravity_m_per_s2: DVec3::ZERO,
         tools: vec![ToolSpec {
             name: "ball".into(),
+            shape: ToolShape::Sphere,
             radius_m: 0.01,
             coupling: Coupling::Rigid,
             friction_coefficient: 0.2,

@@ -4,7 +4,7 @@ use glam::DVec3;
 use palpate_physics::{
     Model, ModelSpec, PointForce, Precision, PrescribedSpec, Region, Scratch, Settings, State, StepReport, Surface,
     TetMesh, TickInput,
-    contact::{Coupling, ToolSpec, ToolTarget},
+    contact::{Coupling, ToolShape, ToolSpec, ToolTarget},
     hybrid::{ParticleSpec, Skin, Waking, wake_only},
     material::{Lame, Law, Material, Viscosity},
 };
@@ -60,7 +60,7 @@ impl Rig {
 }
 
 pub fn at(position_m: DVec3) -> ToolTarget {
-    ToolTarget { position_m, velocity_m_per_s: DVec3::ZERO }
+    ToolTarget::at(position_m)
 }
 
 pub fn material(law: Law, young_modulus_pa: f64, poisson_ratio: f64) -> Material {
@@ -87,7 +87,14 @@ pub fn body(mesh: TetMesh, material: Material) -> ModelSpec {
 }
 
 pub fn sphere(radius_m: f64, start_position_m: DVec3, coupling: Coupling) -> ToolSpec {
-    ToolSpec { name: "sphere".into(), radius_m, coupling, friction_coefficient: 0.0, start_position_m }
+    ToolSpec {
+        name: "sphere".into(),
+        shape: ToolShape::Sphere,
+        radius_m,
+        coupling,
+        friction_coefficient: 0.0,
+        start_position_m,
+    }
 }
 
 /// Nodes that satisfy a condition on their rest position.

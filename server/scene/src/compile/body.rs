@@ -87,6 +87,16 @@ impl Body {
         })
     }
 
+    /// The longest edge (m) of the triangles that tools touch.
+    pub(crate) fn longest_edge_m(&self) -> f64 {
+        let positions_m = self.surface_positions_m();
+        let longest_m = |corners: [u32; 3]| {
+            let [a, b, c] = corners.map(|node| positions_m[node as usize]);
+            a.distance(b).max(b.distance(c)).max(c.distance(a))
+        };
+        self.triangles().map(longest_m).fold(0.0, f64::max)
+    }
+
     /// Diagonal of the bounding box (m).
     pub(crate) fn diagonal_m(&self) -> f64 {
         let (low, high) = self.mesh.bounds_m();

@@ -9,6 +9,7 @@ mod parts;
 mod probes;
 mod regions;
 mod seed;
+mod shape;
 mod springs;
 mod tools;
 

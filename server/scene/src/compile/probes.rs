@@ -46,6 +46,8 @@ pub(crate) fn compile(
             ProbeKind::MinVolumeRatio => Measure::MinVolumeRatio,
             ProbeKind::ContactForce => Measure::ContactForce(tool(table, tools, &at)?),
             ProbeKind::DeviceForce => Measure::DeviceForce(tool(table, tools, &at)?),
+            ProbeKind::ContactTorque => Measure::ContactTorque(tool(table, tools, &at)?),
+            ProbeKind::DeviceTorque => Measure::DeviceTorque(tool(table, tools, &at)?),
             ProbeKind::ToolPosition => Measure::ToolPosition(tool(table, tools, &at)?),
             ProbeKind::Penetration => Measure::Penetration(tool(table, tools, &at)?),
         };
@@ -60,9 +62,12 @@ fn demand_own_key(table: &ProbeTable, at: &Where) -> Result<(), Fault> {
         ProbeKind::Displacement => Some("point_m"),
         ProbeKind::Reaction => Some("region"),
         ProbeKind::Energy | ProbeKind::MinVolumeRatio => None,
-        ProbeKind::ContactForce | ProbeKind::DeviceForce | ProbeKind::ToolPosition | ProbeKind::Penetration => {
-            Some("tool")
-        }
+        ProbeKind::ContactForce
+        | ProbeKind::DeviceForce
+        | ProbeKind::ContactTorque
+        | ProbeKind::DeviceTorque
+        | ProbeKind::ToolPosition
+        | ProbeKind::Penetration => Some("tool"),
     };
     let given =
         [("point_m", table.point_m.is_some()), ("region", table.region.is_some()), ("tool", table.tool.is_some())];

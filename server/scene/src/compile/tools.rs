@@ -1,5 +1,5 @@
-//! `[[tool]]` and `[arm]`: spheres and what moves them.
-use super::{Files, body::Body, check, csv, unique_names};
+//! `[[tool]]` and `[arm]`: tools and what moves them.
+use super::{Files, body::Body, check, csv, shape, unique_names};
 use crate::{
     document::{
         Document,
@@ -28,7 +28,6 @@ pub(crate) fn compile(document: &Document, body: &Body, files: &Files<'_>) -> Re
     for (index, table) in document.tool.iter().enumerate() {
         let at = Where::root("tool").index(index);
         let (driver, start_position_m) = driver(table, &at, files)?;
-        check(&at.key("radius_m"), table.radius_m, table.radius_m > 0.0, "must be larger than 0")?;
         let friction_coefficient = table.friction_coefficient;
         check(
             &at.key("friction_coefficient"),
@@ -37,19 +36,18 @@ pub(crate) fn compile(document: &Document, body: &Body, files: &Files<'_>) -> Re
             "must not be negative",
         )?;
         let coupling = coupling(table, &at)?;
-        let spec = ToolSpec {
-            name: table.name.clone(),
-            radius_m: table.radius_m,
-            coupling,
-            friction_coefficient,
-            start_position_m,
-        };
+        let (shape, radius_m) = shape::shape(table, coupling, body, &at)?;
+        let driver = driver.turned(shape.as_capsule().map(|capsule| capsule.start_orientation).unwrap_or_default());
+        let spec =
+            ToolSpec { name: table.name.clone(), shape, radius_m, coupling, friction_coefficient, start_position_m };
         tools.warn_of_start(&spec, body);
         tools.specs.push(spec);
         tools.drivers.push(driver);
     }
     if let Some(arm) = &document.arm {
-        tools.arm = Some(hand(arm, document)?);
+        let mut hand = hand(arm, document)?;
+        hand.path = hand.path.turned(tools.specs[hand.tool].start().orientation);
+        tools.arm = Some(hand);
     }
     tools.warn_of_idle(document);
     Ok(tools)
@@ -57,7 +55,10 @@ pub(crate) fn compile(document: &Document, body: &Body, files: &Files<'_>) -> Re
 
 impl Tools {
     fn warn_of_start(&mut self, tool: &ToolSpec, body: &Body) {
-        let distance_m = body.locate(tool.start_position_m).distance_m;
+        let half_m = tool.start().orientation * (DVec3::Z * tool.shape.half_length_m());
+        let along =
+            [0.0, -1.0, -0.5, 0.5, 1.0].map(|part| body.locate(tool.start_position_m + half_m * part).distance_m);
+        let distance_m = along.into_iter().fold(f64::INFINITY, f64::min);
         if distance_m < tool.radius_m {
             self.warnings.push(format!(
                 "the tool \"{}\" starts inside the body or touching it (gap {:.3} mm): the first tick pushes hard",

@@ -25,14 +25,34 @@ pub(crate) enum DriverName {
     Script,
 }
 
-/// A spherical tool.
+/// What a tool looks like.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub(crate) enum ShapeName {
+    /// A ball.
+    #[default]
+    Sphere,
+    /// A cylinder with a hemisphere on either end. It turns with its driver.
+    Capsule,
+    /// The smallest ball that cannot fall between the samples of the surface.
+    Point,
+}
+
+/// A tool.
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct ToolTable {
     /// Name, unique.
     pub(crate) name: String,
-    /// Radius (m), larger than 0.
-    pub(crate) radius_m: f64,
+    /// What it looks like; a sphere by default.
+    #[serde(default)]
+    pub(crate) shape: ShapeName,
+    /// Radius (m), larger than 0. Of a point there is none to give.
+    pub(crate) radius_m: Option<f64>,
+    /// Capsule: from its centre to the centre of a hemisphere (m), larger than 0.
+    pub(crate) half_length_m: Option<f64>,
+    /// Capsule: the direction it lies along at the start, the tool's own z (world); z by default.
+    pub(crate) axis: Option<[f64; 3]>,
     /// How it follows its driver.
     pub(crate) coupling: CouplingName,
     /// Spring coupling: stiffness (N/m), larger than 0.
@@ -41,6 +61,13 @@ pub(crate) struct ToolTable {
     pub(crate) damping_n_s_per_m: Option<f64>,
     /// Spring coupling: mass of the tool (kg), larger than 0.
     pub(crate) mass_kg: Option<f64>,
+    /// Capsule on a spring: stiffness of its orientation (N m/rad), larger than 0; by default `stiffness_n_per_m` times the square of its radius of
+    /// gyration.
+    pub(crate) turn_stiffness_nm_per_rad: Option<f64>,
+    /// Capsule on a spring: damping of its orientation (N m s/rad), not negative; by default `damping_n_s_per_m` times that.
+    pub(crate) turn_damping_nm_s_per_rad: Option<f64>,
+    /// Capsule on a spring: inertia about every axis (kg m²), larger than 0; by default `mass_kg` times that.
+    pub(crate) inertia_kg_m2: Option<f64>,
     /// Coulomb's friction coefficient; 0 by default.
     #[serde(default)]
     pub(crate) friction_coefficient: f64,
@@ -89,6 +116,10 @@ pub(crate) enum ProbeKind {
     ContactForce,
     /// Force on the device of `tool` (N).
     DeviceForce,
+    /// Torque of the body on `tool`, about its centre (N m); of a sphere, none.
+    ContactTorque,
+    /// Torque on the device of `tool` (N m); of a sphere, none.
+    DeviceTorque,
     /// Centre of `tool` (m).
     ToolPosition,
     /// Deepest penetration of `tool` into the surface (m).

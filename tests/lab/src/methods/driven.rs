@@ -16,7 +16,7 @@ pub(super) struct Driven {
 impl Driven {
     /// At rest, the tool where it first touches.
     pub(super) fn at_rest(model: &Model, tool: Option<&Tool>) -> Self {
-        let target = |tool: &Tool| ToolTarget { position_m: tool.touch_m, velocity_m_per_s: DVec3::ZERO };
+        let target = |tool: &Tool| ToolTarget::at(tool.touch_m);
         Self {
             state: State::at_rest(model),
             scratch: Scratch::new(model),

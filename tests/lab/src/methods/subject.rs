@@ -9,7 +9,7 @@ use glam::DVec3;
 use miette::{IntoDiagnostic, Result};
 use palpate_physics::{
     LoadSpec, Model, ModelSpec, Region, Settings,
-    contact::{Coupling, ToolSpec},
+    contact::{Coupling, ToolShape, ToolSpec},
     material::Material,
 };
 
@@ -100,6 +100,7 @@ impl Tool {
     pub(super) fn spec(&self) -> ToolSpec {
         ToolSpec {
             name: "tool".into(),
+            shape: ToolShape::Sphere,
             radius_m: self.radius_m,
             coupling: Coupling::Rigid,
             friction_coefficient: 0.0,

@@ -28,11 +28,7 @@ pub(super) fn settle(running: &mut dyn Running, pace: &Pace) {
 /// Positions (m) and answer of the equilibrium on the same mesh.
 pub(super) fn equilibrium(subject: &Subject) -> (Vec<DVec3>, f64) {
     let model = &subject.model;
-    let tools: Vec<ToolTarget> = subject
-        .tool
-        .iter()
-        .map(|t| ToolTarget { position_m: t.centre_m(1.0), velocity_m_per_s: DVec3::ZERO })
-        .collect();
+    let tools: Vec<ToolTarget> = subject.tool.iter().map(|t| ToolTarget::at(t.centre_m(1.0))).collect();
     let factors = vec![1.0; model.spec().loads.len()];
     let held = vec![DVec3::ZERO; model.spec().prescribed.len()];
     let settings = StaticSettings::default();

@@ -1,11 +1,11 @@
 //! Beside a sphere that presses a hybrid body, and trembles, a strained region wakes and falls asleep a hundred times a second.
 use super::{Measured, Options, Outcome, random::Random, rig};
 use crate::{bodies, methods, problems::body::Body};
-use glam::{DQuat, DVec3};
+use glam::DQuat;
 use miette::Result;
 use palpate_physics::{
     Settings,
-    contact::{Coupling, ToolSpec, ToolTarget},
+    contact::{Coupling, ToolShape, ToolSpec, ToolTarget},
     hybrid::wake_only,
     material::Law,
 };
@@ -47,6 +47,7 @@ pub(super) fn run(options: &Options) -> Result<Outcome> {
     spec.settings = Settings { mass_damping_per_s: 20.0, ..spec.settings };
     spec.tools = vec![ToolSpec {
         name: "sphere".into(),
+        shape: ToolShape::Sphere,
         radius_m: RADIUS_M,
         coupling: Coupling::Rigid,
         friction_coefficient: 0.3,
@@ -61,7 +62,7 @@ pub(super) fn run(options: &Options) -> Result<Outcome> {
     let mut drive = rig::Drive::still(&rig.model);
     let start_m = fine.first_touch_m(RADIUS_M);
     let mut press = |rig: &mut rig::Rig, depth_m: f64| {
-        drive.tools = vec![ToolTarget { position_m: start_m - fine.normal * depth_m, velocity_m_per_s: DVec3::ZERO }];
+        drive.tools = vec![ToolTarget::at(start_m - fine.normal * depth_m)];
         rig.tick(&drive).quarantined
     };
     wake_only(&rig.model, &mut rig.state, &mut rig.scratch, touched.iter().copied());

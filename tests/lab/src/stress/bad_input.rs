@@ -8,7 +8,7 @@ use glam::DVec3;
 use miette::Result;
 use palpate_physics::{
     LoadSpec, Model, ModelSpec, PointForce, TetMesh,
-    contact::{Coupling, ToolSpec, ToolTarget},
+    contact::{Coupling, ToolShape, ToolSpec, ToolTarget},
     material::{Lame, Law, Viscosity},
 };
 
@@ -64,6 +64,7 @@ fn pressed(options: &Options) -> Result<Rig> {
     ];
     let sphere = |name: &str, x: f64, coupling| ToolSpec {
         name: name.into(),
+        shape: ToolShape::Sphere,
         radius_m: 0.008,
         coupling,
         friction_coefficient: 0.3,

@@ -6,7 +6,7 @@ use glam::DVec3;
 use miette::{IntoDiagnostic, Result};
 use palpate_physics::{
     LoadSpec, ModelSpec, PointForce, TetMesh,
-    contact::{Coupling, LARGEST_TRIANGLE, ToolSpec},
+    contact::{Coupling, LARGEST_TRIANGLE, ToolShape, ToolSpec},
     material::{Law, Viscosity},
 };
 use palpate_scene::shapes;
@@ -216,6 +216,7 @@ fn tools(spec: &mut ModelSpec, random: &mut Random) -> Result<()> {
         let damping_n_s_per_m = random.within(0.2, 1.5) * (stiffness_n_per_m * mass_kg).sqrt();
         spec.tools.push(ToolSpec {
             name: format!("tool {index}"),
+            shape: ToolShape::Sphere,
             radius_m,
             coupling: if random.chance(0.5) {
                 Coupling::Rigid

@@ -30,7 +30,7 @@ impl Drive {
     /// Holds a model's tools and prescribed nodes where they start, without loads.
     pub(super) fn still(model: &Model) -> Self {
         let spec = model.spec();
-        let at = |position_m| ToolTarget { position_m, velocity_m_per_s: DVec3::ZERO };
+        let at = |position_m| ToolTarget::at(position_m);
         Self {
             tools: spec.tools.iter().map(|tool| at(tool.start_position_m)).collect(),
             load_factors: vec![0.0; spec.loads.len()],

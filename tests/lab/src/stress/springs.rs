@@ -8,7 +8,7 @@ use glam::DVec3;
 use miette::{IntoDiagnostic, Result};
 use palpate_physics::{
     ModelSpec, PointForce, Settings, TetMesh,
-    contact::{Coupling, ToolSpec, ToolTarget},
+    contact::{Coupling, ToolShape, ToolSpec, ToolTarget},
     spring::{
         HomeLaw, Refinement, Refining, SpringBodySpec, SpringSpec, home::Layer, net::hexagonal_patch, region::Constants,
     },
@@ -89,7 +89,7 @@ fn one(seed: u64) -> Result<Found> {
         for ((target, tool), [down, along]) in drive.tools.iter_mut().zip(&spec.tools).zip(&ways) {
             let pressed = if jumps { f64::from(u32::from((0.2..0.8).contains(&phase))) } else { (PI * phase).sin() };
             let way = *down * pressed.min(1.0) + *along * (3.0 * PI * phase).sin() * f64::from(u32::from(phase < 1.0));
-            *target = ToolTarget { position_m: tool.start_position_m + way, velocity_m_per_s: DVec3::ZERO };
+            *target = ToolTarget::at(tool.start_position_m + way);
         }
         drive.point_forces.clear();
         if tick <= TICKS && random.chance(0.05) {
@@ -182,6 +182,7 @@ fn tool(number: usize, edge_m: f64, random: &mut Random) -> ToolSpec {
     let beside_m = random.vector() * DVec3::new(3.0, 3.0, 0.0) * edge_m;
     ToolSpec {
         name: format!("tool {number}"),
+        shape: ToolShape::Sphere,
         radius_m,
         coupling,
         friction_coefficient: random.within(0.0, 0.6),

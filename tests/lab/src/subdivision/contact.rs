@@ -4,7 +4,7 @@
 use glam::DVec3;
 use palpate_physics::{
     Model, ModelError, ModelSpec, PrescribedSpec, Scratch, Settings, State, TetMesh, TickInput,
-    contact::{Coupling, ToolSpec, ToolTarget},
+    contact::{Coupling, ToolShape, ToolSpec, ToolTarget},
     spring::{
         HomeLaw, Refinement, Refining, SpringBodySpec, SpringSpec,
         calibration::{Calibration, CalibrationError, ConstantsTable},
@@ -159,6 +159,7 @@ fn sheet(
         gravity_m_per_s2: DVec3::ZERO,
         tools: vec![ToolSpec {
             name: "sphere".into(),
+            shape: ToolShape::Sphere,
             radius_m,
             coupling: Coupling::Rigid,
             friction_coefficient: 0.0,
@@ -186,7 +187,7 @@ fn place_m(tick: u32, touch: Touch) -> DVec3 {
 
 impl Sheet {
     fn tick(&mut self, tick: u32, touch: Touch, vertices: usize) {
-        let targets = [ToolTarget { position_m: place_m(tick + 1, touch), velocity_m_per_s: DVec3::ZERO }];
+        let targets = [ToolTarget::at(place_m(tick + 1, touch))];
         let held = [DVec3::ZERO];
         let input =
             TickInput { tools: &targets, load_factors: &[], prescribed_displacements_m: &held, point_forces: &[] };

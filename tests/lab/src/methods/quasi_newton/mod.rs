@@ -218,7 +218,7 @@ impl Running for Body {
             let position_m = tool.centre_m(fraction);
             for state in &mut self.tools {
                 state.previous_target = state.target;
-                state.target = ToolTarget { position_m, velocity_m_per_s: DVec3::ZERO };
+                state.target = ToolTarget::at(position_m);
             }
         }
         self.before.copy_from_slice(&self.x);

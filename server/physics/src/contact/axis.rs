@@ -1,0 +1,173 @@
+//! A tool's axis: the points from which its surface is one radius away. A sphere's is its centre, a capsule's a segment.
+use super::triangle::{closest_point, closest_weights};
+use glam::DVec3;
+
+/// A segment `centre ± half`; a point where `half` is zero.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Axis {
+    /// Its middle (m).
+    pub(super) centre_m: DVec3,
+    /// From there to one of its ends (m).
+    pub(super) half_m: DVec3,
+}
+
+/// Where an axis and a triangle are nearest to each other.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Approach {
+    /// From the centre to the point of the axis (m).
+    pub(super) arm_m: DVec3,
+    /// From that point to the triangle's (m).
+    pub(super) to_triangle_m: DVec3,
+    /// Weights of the triangle's corners there.
+    pub(super) weights: [f64; 3],
+}
+
+impl Axis {
+    /// A point.
+    pub(super) fn point(centre_m: DVec3) -> Self {
+        Self { centre_m, half_m: DVec3::ZERO }
+    }
+
+    pub(super) fn is_point(&self) -> bool {
+        self.half_m == DVec3::ZERO
+    }
+
+    /// Half its length (m).
+    pub(super) fn half_length_m(&self) -> f64 {
+        self.half_m.length()
+    }
+
+    /// From the centre (m) to the point of the axis that is nearest to `p`, which is given from the centre too:
+    /// `c(p) = s h`, `s = p·h/h²` kept within −1 to 1.
+    pub(super) fn nearest_m(&self, from_centre_m: DVec3) -> DVec3 {
+        self.half_m * (from_centre_m.dot(self.half_m) / self.half_m.length_squared()).clamp(-1.0, 1.0)
+    }
+
+    /// How far it is from a triangle (m).
+    pub(super) fn distance_m(&self, corners: [DVec3; 3]) -> f64 {
+        if self.is_point() {
+            return self.centre_m.distance(closest_point(self.centre_m, corners));
+        }
+        self.approach(corners).to_triangle_m.length()
+    }
+
+    /// Where a triangle is nearest to it. A segment that does not cross the triangle is nearest to it at one of its ends, or at one of the
+    /// triangle's edges.
+    pub(super) fn approach(&self, corners: [DVec3; 3]) -> Approach {
+        let from_point = |arm_m: DVec3| {
+            let p = self.centre_m + arm_m;
+            let weights = closest_weights(p, corners);
+            let to_triangle_m = corners[0] * weights[0] + corners[1] * weights[1] + corners[2] * weights[2] - p;
+            Approach { arm_m, to_triangle_m, weights }
+        };
+        if self.is_point() {
+            return from_point(DVec3::ZERO);
+        }
+        if let Some(crossing) = self.crossing(corners) {
+            return crossing;
+        }
+        let mut best = from_point(self.half_m);
+        let mut take = |other: Approach| {
+            if other.to_triangle_m.length_squared() < best.to_triangle_m.length_squared() {
+                best = other;
+            }
+        };
+        take(from_point(-self.half_m));
+        for (i, j) in [(0, 1), (1, 2), (2, 0)] {
+            let (s, t) = nearest_of_segments(
+                (self.centre_m - self.half_m, self.half_m * 2.0),
+                (corners[i], corners[j] - corners[i]),
+            );
+            let arm_m = self.half_m * (2.0 * s - 1.0);
+            let mut weights = [0.0; 3];
+            (weights[i], weights[j]) = (1.0 - t, t);
+            let to_triangle_m = corners[i] + (corners[j] - corners[i]) * t - self.centre_m - arm_m;
+            take(Approach { arm_m, to_triangle_m, weights });
+        }
+        best
+    }
+
+    /// Where the axis goes through a triangle: `c + s h = a + v (b − a) + w (c − a)`.
+    fn crossing(&self, [a, b, c]: [DVec3; 3]) -> Option<Approach> {
+        let (ab, ac) = (b - a, c - a);
+        let normal = ab.cross(ac);
+        let rate = normal.dot(self.half_m);
+        let s = normal.dot(a - self.centre_m) / rate;
+        if s.is_nan() || s.abs() > 1.0 {
+            return None;
+        }
+        let at = self.centre_m + self.half_m * s - a;
+        let area_sq = normal.length_squared();
+        let (v, w) = (at.cross(ac).dot(normal) / area_sq, ab.cross(at).dot(normal) / area_sq);
+        (v >= 0.0 && w >= 0.0 && v + w <= 1.0).then(|| Approach {
+            arm_m: self.half_m * s,
+            to_triangle_m: DVec3::ZERO,
+            weights: [1.0 - v - w, v, w],
+        })
+    }
+}
+
+/// `s` and `t` in 0..=1 at which `p + s d` and `q + t e` are nearest (Ericson, Real-time collision detection, 5.1.9); of parallel segments one of
+/// the nearest pairs. A segment without length is a point.
+fn nearest_of_segments((p, d): (DVec3, DVec3), (q, e): (DVec3, DVec3)) -> (f64, f64) {
+    let r = p - q;
+    let (dd, ee, de, dr, er) = (d.length_squared(), e.length_squared(), d.dot(e), d.dot(r), e.dot(r));
+    let over = |a: f64, b: f64| if b > 0.0 { (a / b).clamp(0.0, 1.0) } else { 0.0 };
+    // s = (de er − dr ee)/(dd ee − de²), then t = (de s + er)/ee, and where that leaves the segment s again
+    let s = over(de * er - dr * ee, dd * ee - de * de);
+    let t = if ee > 0.0 { (de * s + er) / ee } else { 0.0 };
+    if ee > 0.0 && (0.0..=1.0).contains(&t) {
+        return (s, t);
+    }
+    let t = t.clamp(0.0, 1.0);
+    (over(de * t - dr, dd), t)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn point() -> impl Strategy<Value = DVec3> {
+        prop::array::uniform3(-1.0..1.0_f64).prop_map(DVec3::from_array)
+    }
+
+    /// Nearest of many points of the axis.
+    fn by_trying(axis: Axis, corners: [DVec3; 3]) -> f64 {
+        let at = |s: f64| {
+            (axis.centre_m + axis.half_m * s).distance(closest_point(axis.centre_m + axis.half_m * s, corners))
+        };
+        (0..=2000).map(|i| at(f64::from(i) * 1e-3 - 1.0)).fold(f64::INFINITY, f64::min)
+    }
+
+    proptest! {
+        #[test]
+        fn no_point_of_the_axis_is_nearer(centre in point(), half in point(), a in point(), b in point(), c in point()) {
+            let axis = Axis { centre_m: centre, half_m: half };
+            let near = axis.approach([a, b, c]);
+            let tried = by_trying(axis, [a, b, c]);
+            let found = near.to_triangle_m.length();
+            prop_assert!(found <= tried + 1e-12 && found >= tried - 1e-3 * half.length(), "{found} {tried}");
+            prop_assert!(near.weights.iter().all(|w| *w >= -1e-12) && (near.weights.iter().sum::<f64>() - 1.0).abs() < 1e-12);
+            let at = a * near.weights[0] + b * near.weights[1] + c * near.weights[2];
+            prop_assert!((centre + near.arm_m + near.to_triangle_m - at).length() < 1e-9);
+            prop_assert!((axis.nearest_m(at - centre) - near.arm_m).length() < 1e-6 || found < 1e-9 || half.cross(b - a).length() < 1e-3);
+        }
+
+        #[test]
+        fn flat_triangles_and_short_axes_stay_finite(centre in point(), a in point(), b in point(), t in 0.0..1.0_f64, half in 0.0..1e-9_f64) {
+            let axis = Axis { centre_m: centre, half_m: DVec3::X * half };
+            for corners in [[a, b, a.lerp(b, t)], [a; 3]] {
+                let near = axis.approach(corners);
+                prop_assert!(near.to_triangle_m.is_finite());
+                prop_assert!((near.to_triangle_m.length() - by_trying(axis, corners)).abs() < 1e-6);
+            }
+        }
+    }
+
+    #[test]
+    fn a_point_is_its_own_axis() {
+        let (axis, corners) = (Axis::point(DVec3::Z), [DVec3::ZERO, DVec3::X, DVec3::Y]);
+        assert_eq!((axis.distance_m(corners), axis.approach(corners).arm_m), (1.0, DVec3::ZERO));
+    }
+}
