@@ -212,7 +212,7 @@ pub fn config(url: &str) -> Config {
     // The force that is asked for is on an arm at rest: nobody worked for it.
     config.passivity.strict = false;
     // Beside the arm the hand damps.
-    config.render.arm_damping_n_s_per_m = 4.0;
+    config.render.arm_damping_n_s_per_m = 40.0;
     let keyframes = vec![KeyframeConfig { time_s: 0.0, position_m: [0.0; 3] }];
     config.device = DeviceConfig::Simulated(SimulatedConfig { keyframes, ..SimulatedConfig::default() });
     config.realtime = RealtimeConfig { fifo_priority: 0, lock_memory: false, processor: None, stay_awake: false };
