@@ -121,7 +121,9 @@ enum Command {
         #[arg(long)]
         fifo_priority: u8,
     },
-    /// Drive a tool for a while without any force, and say how well loop and network keep time; exit code 2: not well enough for a force
+    /// Drive a tool without any force, and judge loop and network
+    ///
+    /// Says how well they keep time, and how stiff a contact may be. Ends with code 2 when they are not good enough for a force.
     Measure {
         /// Configuration file (TOML)
         #[arg(long, value_name = "FILE", env = "PALPATE_BRIDGE_CONFIG")]

@@ -187,7 +187,8 @@ fn poses_follow_the_arm_however_its_messages_come() {
         let emulated = emulator(Settings { copies, streams, path, ..Settings::default() });
         Faults::set(&emulated.faults.split, split);
         emulated.faults.slow_us.store(slow_us, Ordering::Relaxed);
-        let mut arm = started(&keys(&emulated.url())).unwrap();
+        // Patient with a busy test machine.
+        let mut arm = started(&Inverse3Config { silence_s: 5.0, ..keys(&emulated.url()) }).unwrap();
         let mut began = Instant::now();
         press::follow(&mut arm, |reading, _| {
             let apart_m = reading.motion.position_m.distance(emulated.position_m());

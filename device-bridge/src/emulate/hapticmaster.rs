@@ -330,8 +330,11 @@ impl Machine {
         match SimulatedArm::new(spec, self.settings.path.clone(), STEP_S) {
             Ok(arm) if kg >= LEAST_INERTIA_KG && self.began.is_none() => {
                 self.arm = arm;
+                self.settings.arm.mass_kg = kg;
                 "Inertia set".into()
             }
+            // The next one to start it finds it moving.
+            Ok(_) if kg == self.settings.arm.mass_kg => "Inertia set".into(),
             _ => format!("--- ERROR: inertia must be at least {LEAST_INERTIA_KG}"),
         }
     }

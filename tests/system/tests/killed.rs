@@ -15,11 +15,19 @@ use palpate_system_tests::{
 use std::{
     fs,
     path::PathBuf,
+    sync::{Mutex, MutexGuard, PoisonError},
     time::{Duration, Instant},
 };
 
 /// Felt: what it was killed with.
 const PRESSED_N: f64 = 0.1;
+
+/// One lab at a time: each has a daemon, a bridge and an arm of its own that want to keep time.
+static ALONE: Mutex<()> = Mutex::new(());
+
+fn alone() -> MutexGuard<'static, ()> {
+    ALONE.lock().unwrap_or_else(PoisonError::into_inner)
+}
 
 fn kills() -> usize {
     std::env::var("PALPATE_KILLS").ok().and_then(|text| text.parse().ok()).unwrap_or(6)
@@ -145,6 +153,7 @@ fn told(what: &str, mut times: Vec<Duration>) {
 }
 
 fn bridges_are_killed(what: &str, arm: Arm) {
+    let _alone = alone();
     let daemon = Daemon::start(&["--arm", "none"]);
     let lab = Lab::new(arm, &daemon.url);
     let session = daemon.status()["session_id"].clone();
@@ -179,6 +188,7 @@ fn a_killed_bridge_leaves_no_force_on_a_hapticmaster() {
 
 #[test]
 fn a_killed_daemon_leaves_no_force_and_the_next_one_is_found() {
+    let _alone = alone();
     let mut daemon = Daemon::start(&["--arm", "none"]);
     let address = daemon.url.trim_start_matches("http://").to_owned();
     let lab = Lab::new(Arm::woodenhaptics(), &daemon.url);

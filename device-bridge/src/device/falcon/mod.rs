@@ -11,7 +11,7 @@ pub mod start;
 pub mod wire;
 
 use super::{
-    Arm, Effort, Fault, Reading,
+    Arm, Effort, Fault, LastWords, Reading,
     requests::{Requests, between},
     serial::Line,
 };
@@ -237,6 +237,10 @@ impl Arm for Falcon {
         if let Err(fault) = self.send() {
             self.lose(fault);
         }
+    }
+
+    fn last_words(&self) -> Option<LastWords> {
+        self.line.last_words(Frame { numbers: [0; 3], flags: wire::HOMING | wire::BLUE }.bytes().to_vec())
     }
 }
 

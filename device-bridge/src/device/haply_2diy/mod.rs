@@ -11,7 +11,7 @@ pub mod kinematics;
 pub mod wire;
 
 use super::{
-    Arm, Effort, Fault, Reading,
+    Arm, Effort, Fault, LastWords, Reading,
     requests::{Requests, between},
     serial::{Line, OpenError},
 };
@@ -260,6 +260,10 @@ impl Arm for Haply2diy {
         if let Err(fault) = self.send() {
             self.lose(fault);
         }
+    }
+
+    fn last_words(&self) -> Option<LastWords> {
+        self.line.last_words(wire::request(self.settings.device_id, [0.0; 2]).to_vec())
     }
 }
 

@@ -12,7 +12,7 @@ pub mod peer;
 pub mod start;
 pub mod wire;
 
-use super::{Arm, Effort, Fault, Reading};
+use super::{Arm, Effort, Fault, LastWords, Reading};
 use glam::{DMat3, DVec3};
 use heard::Heard;
 use palpate_control::{Motion, Velocity, extrapolate};
@@ -223,6 +223,12 @@ impl Arm for Vrpn {
         if let Err(fault) = self.send() {
             self.lose(fault);
         }
+    }
+
+    fn last_words(&self) -> Option<LastWords> {
+        let mut words = Outgoing::with_capacity(OUT_BYTES);
+        words.message(Kind::ForceField.header(self.force_device?, Time::now()), |into| ForceField::NONE.write(into));
+        Some(LastWords { to: self.stream.try_clone().ok()?.into(), bytes: words.bytes().to_vec() })
     }
 }
 
