@@ -4,7 +4,7 @@
 //! its request. The tool moves in x and y; z is 0, and a force along z is not felt.
 //!
 //! Its encoders count from where the arm is when the bridge starts: that has to be the pose of [`wire::Axis::offset_deg`]. The published firmware keeps the last torques
-//! for ever: a bridge that ends takes them away, one that is killed does not.
+//! for ever: a bridge that ends takes them away, and the guard of one that is killed.
 //!
 //! What only hardware can tell: which way its motors push ([`Settings::reversed`]), and the weight and friction of its links (not compensated).
 pub mod kinematics;
