@@ -234,8 +234,10 @@ impl ContactModel {
     }
 
     /// Once a tick, before its first substep.
-    pub fn begin_tick(&self, tools: &mut [ToolState], scratch: &mut ContactScratch) {
+    pub fn begin_tick(&self, tools: &mut [ToolState], scratch: &mut ContactScratch, tick_period_s: f64) {
+        let time = SubstepTime { fraction: 1.0, dt_s: 0.0, tick_period_s };
         for (tool, scratch) in tools.iter_mut().zip(&mut scratch.tools) {
+            time.smooth(tool);
             tool.penetration_m = 0.0;
             scratch.sum = Pressed::default();
             scratch.coupling_sum_n = DVec3::ZERO;

@@ -170,6 +170,10 @@ pub struct ToolState {
     pub target: ToolTarget,
     /// The same at the end of the tick before: within a tick the device moves from there to `target`.
     pub previous_target: ToolTarget,
+    /// Velocity of the device (m/s) as the coupling's damper has it: that of its path, smoothed.
+    pub device_m_per_s: DVec3,
+    /// Its angular velocity (rad/s) likewise.
+    pub device_rad_per_s: DVec3,
     /// Force of the body on the tool (N), mean over the tick's substeps.
     pub contact_force_n: DVec3,
     /// Force on the device (N), mean over the tick's substeps: the coupling's, or the contact force of a rigid tool.
@@ -217,6 +221,8 @@ impl ToolState {
             angular_velocity_rad_per_s: DVec3::ZERO,
             target,
             previous_target: target,
+            device_m_per_s: DVec3::ZERO,
+            device_rad_per_s: DVec3::ZERO,
             contact_force_n: DVec3::ZERO,
             device_force_n: DVec3::ZERO,
             contact_torque_nm: DVec3::ZERO,
@@ -234,6 +240,8 @@ impl ToolState {
             self.centre_m,
             self.velocity_m_per_s,
             self.angular_velocity_rad_per_s,
+            self.device_m_per_s,
+            self.device_rad_per_s,
             self.contact_force_n,
             self.device_force_n,
             self.contact_torque_nm,
@@ -258,6 +266,8 @@ impl ToolState {
             velocity_m_per_s: DVec3::ZERO,
             angular_velocity_rad_per_s: DVec3::ZERO,
             previous_target: self.target,
+            device_m_per_s: DVec3::ZERO,
+            device_rad_per_s: DVec3::ZERO,
             contact_force_n: DVec3::ZERO,
             device_force_n: DVec3::ZERO,
             contact_torque_nm: DVec3::ZERO,

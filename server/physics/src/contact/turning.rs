@@ -29,7 +29,7 @@ fn rotation_vector(q: DQuat) -> DVec3 {
 
 impl SubstepTime {
     /// Orientation and angular velocity (rad/s) of the device: about one axis from target to target during a tick.
-    fn device_turn(&self, tool: &ToolState) -> (DQuat, DVec3) {
+    pub(super) fn device_turn(&self, tool: &ToolState) -> (DQuat, DVec3) {
         let (from, to) = (tool.previous_target.orientation, tool.target.orientation);
         let turn = rotation_vector(to * from.conjugate());
         (DQuat::from_scaled_axis(turn * self.fraction) * from, turn / self.tick_period_s)
@@ -66,9 +66,8 @@ pub(super) fn half_kick(
     h_s: f64,
 ) -> DVec3 {
     let Some(pull) = model.turning() else { return DVec3::ZERO };
-    let (device, device_rad_per_s) = time.device_turn(tool);
-    let apart = rotation_vector(device * tool.orientation.conjugate());
-    pull.half_kick(&mut tool.angular_velocity_rad_per_s, contact_nm, (apart, device_rad_per_s), h_s)
+    let apart = rotation_vector(time.device_turn(tool).0 * tool.orientation.conjugate());
+    pull.half_kick(&mut tool.angular_velocity_rad_per_s, contact_nm, (apart, tool.device_rad_per_s), h_s)
 }
 
 /// Turns a coupled one.

@@ -125,7 +125,8 @@ pub(super) fn take_tools(model: &Model, state: &mut State, scratch: &mut Scratch
         tool.previous_target = tool.target;
         tool.target = if finite { target } else { tool.target.at_rest() };
     }
-    model.contact().begin_tick(&mut state.tools, &mut scratch.contact);
+    let tick_period_s = model.spec().settings.tick_period_s;
+    model.contact().begin_tick(&mut state.tools, &mut scratch.contact, tick_period_s);
     rejected
 }
 

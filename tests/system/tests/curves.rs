@@ -1,0 +1,110 @@
+//! The same press on the heart by every arm: the force over time is that of the simulated arm.
+#![allow(clippy::unwrap_used)] // a test that cannot start its subject has failed
+mod lab;
+#[path = "../../../device-bridge/tests/common/libhd.rs"]
+mod libhd;
+
+use lab::{
+    Bridge,
+    arms::{self, Emulated, Hand},
+};
+use palpate_bridge::config::RecordConfig;
+use palpate_system_tests::daemon::Daemon;
+use std::{fs, path::Path, time::Duration};
+
+/// Into the ventricle's wall, a rest, and out again.
+fn hand(period_s: f64) -> Hand {
+    let keys = [(0.0, 0.045), (0.1, 0.045), (0.5, 0.026), (0.6, 0.026), (0.9, 0.045)];
+    Hand { keys: keys.map(|(share, x_m)| (share * period_s, x_m)).to_vec(), period_s }
+}
+
+/// The force (N) over a period, a value a millisecond.
+struct Curve(Vec<f64>);
+
+impl Curve {
+    /// The second whole period of a recording: in the first the force comes up.
+    fn of(recording: &Path, period_s: f64) -> Self {
+        let text = fs::read_to_string(recording).unwrap();
+        let mut lines = text.lines();
+        let names: Vec<&str> = lines.next().unwrap().split(',').collect();
+        let columns = ["time_s", "force_x_n", "force_y_n", "force_z_n"]
+            .map(|name| names.iter().position(|known| *known == name).unwrap());
+        let rows: Vec<(f64, f64)> = lines
+            .map(|line| {
+                let words: Vec<&str> = line.split(',').collect();
+                let [time_s, x, y, z] = columns.map(|column| words[column].parse::<f64>().unwrap());
+                (time_s, glam::DVec3::new(x, y, z).length())
+            })
+            .collect();
+        let end_s = rows.last().unwrap().0;
+        assert!(end_s > 2.0 * period_s, "{end_s} s recorded");
+        let at = |time_s: f64| {
+            let after = rows.partition_point(|row| row.0 <= time_s).clamp(1, rows.len() - 1);
+            let ((t0, f0), (t1, f1)) = (rows[after - 1], rows[after]);
+            f0 + (f1 - f0) * ((time_s - t0) / (t1 - t0)).clamp(0.0, 1.0)
+        };
+        Self((0..(1e3 * period_s) as u32).map(|ms| at(end_s - period_s + f64::from(ms) * 1e-3)).collect())
+    }
+
+    fn peak_n(&self) -> f64 {
+        self.0.iter().copied().fold(0.0, f64::max)
+    }
+
+    /// How far (N) this is from another: root mean square and largest, with the two periods laid over one another as well as can be.
+    fn apart_n(&self, other: &Self) -> (f64, f64) {
+        let n = self.0.len();
+        let differences = |shift: usize| self.0.iter().enumerate().map(move |(i, f)| f - other.0[(i + shift) % n]);
+        let square = |shift: usize| differences(shift).map(|d| d * d).sum::<f64>();
+        let best = (0..n).min_by(|a, b| square(*a).total_cmp(&square(*b))).unwrap();
+        ((square(best) / n as f64).sqrt(), differences(best).fold(0.0, |most, d| most.max(d.abs())))
+    }
+}
+
+/// The curve of an arm on the ventricle.
+fn pressed(daemon: &Daemon, arm: Emulated, period_s: f64, recording: &Path) -> Curve {
+    let mut config = lab::config(&daemon.url, arm.device.clone());
+    config.workspace = arms::workspace();
+    config.record = RecordConfig { path: Some(recording.to_owned()), overwrite: true };
+    let bridge = Bridge::start(config);
+    bridge.wait("it presses", |handle| handle.stats().force_n() > 0.3);
+    std::thread::sleep(Duration::from_secs_f64(2.2 * period_s));
+    let summary = bridge.stop().unwrap();
+    println!("{}: {summary}", arm.name);
+    daemon.wait_until("the tool is free", |status| status["devices"].as_array().is_some_and(Vec::is_empty));
+    Curve::of(recording, period_s)
+}
+
+#[test]
+fn every_arm_gives_the_force_curve_of_the_simulated_arm_on_the_heart() {
+    let daemon = Daemon::start(&["--arm", "none"]);
+    let folder = tempfile::tempdir().unwrap();
+    let file = |name: &str| folder.path().join(name);
+    let libhd = file("libHD.so");
+    fs::copy(libhd::built(), &libhd).unwrap();
+    let (quick_s, slow_s) = (2.5, 6.0);
+    let expected = pressed(&daemon, arms::simulated(&hand(quick_s)), quick_s, &file("simulated.csv"));
+    let quick = hand(quick_s);
+    let only = std::env::var("ONLY").unwrap_or_default();
+    let all: Vec<Box<dyn Fn() -> Emulated>> = vec![
+        Box::new(|| arms::woodenhaptics(&quick)),
+        Box::new(|| arms::haply_2diy(&quick)),
+        Box::new(|| arms::falcon(&quick)),
+        Box::new(|| arms::inverse3(&quick)),
+        Box::new(|| arms::vrpn(&quick)),
+        Box::new(|| arms::phantom(&quick, &libhd)),
+    ];
+    for arm in all {
+        let arm = arm();
+        let name = arm.name;
+        if !only.is_empty() && name != only { continue; }
+        let curve = pressed(&daemon, arm, quick_s, &file("arm.csv"));
+        let (rms_n, most_n) = curve.apart_n(&expected);
+        let _ = fs::copy(file("arm.csv"), format!("/tmp/curve-{name}.csv"));
+        println!("{name}: peak {:.4} N of {:.4}, apart rms {rms_n:.4}, most {most_n:.4} N", curve.peak_n(), expected.peak_n());
+    }
+    if !only.is_empty() { return; }
+    let expected = pressed(&daemon, arms::simulated(&hand(slow_s)), slow_s, &file("slow.csv"));
+    let curve = pressed(&daemon, arms::hapticmaster(&hand(slow_s)), slow_s, &file("arm.csv"));
+    let (rms_n, most_n) = curve.apart_n(&expected);
+    println!("hapticmaster: peak {:.4} N of {:.4}, apart rms {rms_n:.4}, most {most_n:.4} N", curve.peak_n(), expected.peak_n());
+}
