@@ -81,6 +81,8 @@ pub struct ServoSettings {
     pub fading_damping_n_s_per_m: f64,
     /// Local models; `None`: the daemon's force as it comes.
     pub render: Option<RenderSettings>,
+    /// The arm renders the contact's plane by itself.
+    pub plane: bool,
     /// How stiff a local model may be rendered, or, without, the daemon's coupling be.
     pub stiffness: StiffnessBound,
     /// Share of ticks with an answer in time; with fewer the force is taken away.
@@ -187,6 +189,7 @@ fn servo(config: &Config, period_s: f64, scale: f64) -> Result<ServoSettings, Br
     Ok(ServoSettings {
         period_s,
         stiffness,
+        plane: arm::renders_planes(&config.device),
         least_success_rate,
         thermal: limits.continuous_force_n.map(thermal).transpose().map_err(|error| parameter("limits", &error))?,
         limits: ForceLimits { max_force_n: limits.max_force_n, max_force_rate_n_per_s: limits.max_force_rate_n_per_s }

@@ -1,18 +1,20 @@
-//! A HapticMASTER that is not there. `m a = F_hand + Σ F_effects − b v`, in steps of 1 ms of real time; its effects end with the connection.
+//! A HapticMASTER that is not there. `m a = F_hand + Σ F_effects − b v`, in steps of 0.4 ms of real time; its effects end with the connection, unless it keeps them.
+mod effects;
+
 use super::{Faults, Running, Shared};
-use crate::device::hapticmaster::grammar;
+use crate::device::hapticmaster::{grammar, plane::DampFactor};
+use effects::Effects;
 use glam::DVec3;
 use palpate_control::{ArmSpec, HandPath, ParameterError, SimulatedArm};
 use std::{
-    collections::BTreeMap,
     io::{ErrorKind, Read as _, Write as _},
     net::{SocketAddr, TcpListener, TcpStream},
     sync::{Arc, atomic::Ordering},
     time::{Duration, Instant},
 };
 
-/// Step of its motion (s).
-const STEP_S: f64 = 1e-3;
+/// Step of its motion (s): its inner loop is said to run at 2.5 kHz.
+const STEP_S: f64 = 4e-4;
 /// What it bears at most (N).
 const MAX_FORCE_N: f64 = 100.0;
 /// The inertia it cannot be set below (kg).
@@ -31,6 +33,10 @@ pub struct Settings {
     pub quoted: bool,
     /// Refuses `set` and `get` in one request.
     pub apart: bool,
+    /// Effects stay when a connection ends, and act until the next one removes them.
+    pub keeps_effects: bool,
+    /// A `dampfactor` is a share of critical damping; else N s/m.
+    pub damping_is_ratio: bool,
     /// How long finding home takes; `None`: it knows where it is.
     pub homing: Option<Duration>,
     /// Friction (N s/m) and hand; the mass is set over the wire.
@@ -45,6 +51,8 @@ impl Default for Settings {
             headers: true,
             quoted: false,
             apart: false,
+            keeps_effects: false,
+            damping_is_ratio: true,
             homing: Some(Duration::from_millis(300)),
             arm: ArmSpec { mass_kg: LEAST_INERTIA_KG, damping_n_s_per_m: 8.0, ..ArmSpec::default() },
             path: HandPath::resting_at(DVec3::ZERO),
@@ -90,6 +98,32 @@ impl HapticMaster {
         machine.effect_n()
     }
 
+    /// Force (N) of one effect on it now.
+    pub fn effect_of_n(&self, name: &str) -> DVec3 {
+        let mut machine = self.shared.machine();
+        machine.go_on();
+        machine.effects.force_of_n(name, &machine.arm.motion())
+    }
+
+    /// Whether it has an effect of that name, and it is enabled.
+    pub fn is_enabled(&self, name: &str) -> bool {
+        self.shared.machine().effects.is_enabled(name)
+    }
+
+    /// The longest that all effects together pushed (N), since this was last asked.
+    pub fn peak_n(&self) -> f64 {
+        let mut machine = self.shared.machine();
+        machine.go_on();
+        std::mem::take(&mut machine.peak_n)
+    }
+
+    /// The commands of a connection that is none: for tests of what it answers.
+    pub fn obey(&self, text: &str) -> String {
+        let mut machine = self.shared.machine();
+        machine.go_on();
+        machine.obey(text)
+    }
+
     /// Where it is (m, its own axes).
     pub fn position_m(&self) -> DVec3 {
         let mut machine = self.shared.machine();
@@ -111,7 +145,11 @@ impl Server {
             match listener.accept() {
                 Ok((stream, _)) => {
                     let _ = self.serve(stream);
-                    self.0.machine().effects.clear();
+                    let mut machine = self.0.machine();
+                    machine.go_on();
+                    if !machine.settings.keeps_effects {
+                        machine.effects.clear();
+                    }
                 }
                 Err(_) => std::thread::sleep(LOOK_EVERY),
             }
@@ -194,8 +232,8 @@ struct Machine {
     state: State,
     homed: bool,
     stopped: bool,
-    /// Force (N) of each, and whether it is enabled.
-    effects: BTreeMap<String, (DVec3, bool)>,
+    effects: Effects,
+    peak_n: f64,
     began: Option<Instant>,
     steps: u64,
     requests: u64,
@@ -208,7 +246,8 @@ impl Machine {
             state: State::Off,
             homed: settings.homing.is_none(),
             stopped: false,
-            effects: BTreeMap::new(),
+            effects: Effects::new(damp_factor(&settings)),
+            peak_n: 0.0,
             began: None,
             steps: 0,
             requests: 0,
@@ -220,8 +259,7 @@ impl Machine {
         if self.state != State::Force || self.stopped {
             return DVec3::ZERO;
         }
-        let sum: DVec3 = self.effects.values().filter(|(_, enabled)| *enabled).map(|(force_n, _)| *force_n).sum();
-        sum.clamp_length_max(MAX_FORCE_N)
+        self.effects.force_n(&self.arm.motion()).clamp_length_max(MAX_FORCE_N)
     }
 
     /// Motion up to now; the hand begins on its path with the first force.
@@ -233,8 +271,9 @@ impl Machine {
         }
         let Some(began) = self.began else { return };
         let due = (began.elapsed().as_secs_f64() / STEP_S) as u64;
-        let force_n = self.effect_n();
         while self.steps < due {
+            let force_n = self.effect_n();
+            self.peak_n = self.peak_n.max(force_n.length());
             self.arm.step(force_n);
             self.steps += 1;
         }
@@ -263,26 +302,10 @@ impl Machine {
                 self.effects.clear();
                 "Removed".into()
             }
-            ["create", "biasforce", name] => {
-                self.effects.insert(name.to_owned(), (DVec3::ZERO, false));
-                format!("Effect biasforce with name {name} created")
-            }
+            ["create", kind, name] => self.effects.create(kind, name).unwrap_or_else(|| unknown(command)),
             ["set", "state", state] => self.set_state(state),
             ["set", "inertia", kg] => self.set_inertia(kg),
-            ["set", name, ref what @ ..] => match (self.effects.get_mut(name), what) {
-                (Some(effect), ["force", vector]) => match grammar::vector(vector) {
-                    Some(force_n) => {
-                        effect.0 = force_n;
-                        "Biasforce's force set".into()
-                    }
-                    None => unknown(command),
-                },
-                (Some(effect), ["enable" | "disable"]) => {
-                    effect.1 = what[0] == "enable";
-                    format!("Effect {}d", what[0])
-                }
-                _ => unknown(command),
-            },
+            ["set", name, ref what @ ..] => self.effects.set(name, what).unwrap_or_else(|| unknown(command)),
             _ => unknown(command),
         }
     }
@@ -331,6 +354,7 @@ impl Machine {
             Ok(arm) if kg >= LEAST_INERTIA_KG && self.began.is_none() => {
                 self.arm = arm;
                 self.settings.arm.mass_kg = kg;
+                self.effects.mean(damp_factor(&self.settings));
                 "Inertia set".into()
             }
             // The next one to start it finds it moving.
@@ -338,6 +362,11 @@ impl Machine {
             _ => format!("--- ERROR: inertia must be at least {LEAST_INERTIA_KG}"),
         }
     }
+}
+
+fn damp_factor(settings: &Settings) -> DampFactor {
+    let inertia_kg = settings.arm.mass_kg;
+    if settings.damping_is_ratio { DampFactor::Ratio { inertia_kg } } else { DampFactor::Coefficient }
 }
 
 fn unknown(command: &str) -> String {
