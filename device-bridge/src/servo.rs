@@ -33,6 +33,8 @@ pub struct ServoLaw {
     success: SuccessRate,
     torque: TorqueLaw,
     command: Option<Command>,
+    /// The plane that the arm was given, and where it was (m).
+    given: Option<(ContactPlane, DVec3)>,
     force_share: f64,
     steady_since_ns: Option<u64>,
     faults_seen: u64,
@@ -67,6 +69,7 @@ impl ServoLaw {
             success: SuccessRate::default(),
             torque: TorqueLaw::new(settings.torque, settings.passivity),
             command: None,
+            given: None,
             force_share: 1.0,
             steady_since_ns: None,
             faults_seen: 0,
@@ -141,6 +144,9 @@ impl ServoLaw {
         let (wanted_n, plane) = self.wanted(motion, &verdict);
         let ramp = verdict.ramp * self.force_share;
         let dt_s = self.settings.period_s;
+        if let (Some((plane, from_m)), Some(passivity)) = (self.given, &mut self.passivity) {
+            passivity.spared(plane.spared_j(from_m, motion.position_m));
+        }
         let step = self
             .passivity
             .as_mut()
@@ -171,6 +177,7 @@ impl ServoLaw {
         let plane = plane
             .filter(|_| !limited.non_finite)
             .and_then(|plane| plane.limited(limited.force_n, at, ramp, self.largest_n()));
+        self.given = plane.map(|plane| (plane, motion.position_m));
         let wanted_nm = self.command.map_or(DVec3::ZERO, |command| command.torque.0);
         ServoTick {
             limited,

@@ -157,7 +157,8 @@ async fn each_fault_takes_plane_and_bias_away_and_is_named() {
     assert_eq!(lost_by(true, |faults| Faults::set(&faults.silence, true)).await, Fault::Silent);
     assert_eq!(lost_by(true, |faults| Faults::set(&faults.garbage, true)).await, Fault::Garbled);
     assert_eq!(lost_by(true, |faults| Faults::set(&faults.emergency_stop, true)).await, Fault::EmergencyStop);
-    assert_eq!(lost_by(true, |faults| faults.slow_us.store(900_000, Ordering::Relaxed)).await, Fault::Silent);
+    // It hears nothing while it is slow, and the connection is over when it answers.
+    assert_eq!(lost_by(false, |faults| faults.slow_us.store(900_000, Ordering::Relaxed)).await, Fault::Silent);
     assert_eq!(lost_by(false, |faults| Faults::set(&faults.refusal, true)).await, Fault::Refused);
     assert_eq!(lost_by(false, |faults| Faults::set(&faults.cut, true)).await, Fault::Disconnected);
 }
@@ -290,19 +291,21 @@ fn jumps_leave_no_wrong_force_and_none_beyond_the_limit() {
         let mut plane = Plane::new(PlaneSettings { damp_factor });
         let mut numbers = Numbers(1);
         let mut enabled = 0;
-        for request in 0..2000 {
+        let mut wanted = None;
+        for request in 0..4000 {
             let limit_n = 1.6 + 1.4 * numbers.next();
-            let wanted = ContactPlane {
-                point_m: at_m + 5e-3 * numbers.vector(),
-                normal: numbers.vector().normalize(),
-                stiffness_n_per_m: 2001.0 + 2000.0 * numbers.next(),
-                damping_n_s_per_m: 1.0 + numbers.next(),
-                max_force_n: limit_n,
-            };
-            let effort = Effort {
-                plane: (request % 7 != 0).then_some(wanted),
-                ..Effort::force((10.0 * numbers.vector()).clamp_length_max(limit_n))
-            };
+            if request % 5 == 0 {
+                wanted = (request % 7 != 0).then_some(ContactPlane {
+                    point_m: at_m + 5e-3 * numbers.vector(),
+                    normal: numbers.vector().normalize(),
+                    stiffness_n_per_m: 2001.0 + 2000.0 * numbers.next(),
+                    damping_n_s_per_m: 1.0 + numbers.next(),
+                    max_force_n: limit_n,
+                });
+            }
+            let plane_wanted = wanted.map(|wanted| ContactPlane { max_force_n: limit_n, ..wanted });
+            let force_n = (10.0 * numbers.vector()).clamp_length_max(limit_n);
+            let effort = Effort { plane: plane_wanted, ..Effort::force(force_n) };
             let bias_n = tell(&arm, &mut plane, &effort, at_m, [99 + 37, 125 + 37][request % 2]);
             let total_n = arm.effect_of_n(PLANE) + arm.effect_of_n(EFFECT);
             assert!(
@@ -319,7 +322,7 @@ fn jumps_leave_no_wrong_force_and_none_beyond_the_limit() {
                     "{bias_n} N and {largest_n} N"
                 );
             }
-            assert!(request % 7 != 0 || !arm.is_enabled(PLANE));
+            assert!(wanted.is_some() || !arm.is_enabled(PLANE));
         }
         assert!(enabled > 500, "{enabled}");
     }

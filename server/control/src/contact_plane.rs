@@ -51,6 +51,19 @@ impl ContactPlane {
         if depth_m > 0.0 && force_n > 0.0 { force_n.min(self.max_force_n) } else { 0.0 }
     }
 
+    /// Energy (J) of its spring on an arm at `position_m`: `½ k d²`, and from where it gives its largest force on, that times the way.
+    pub fn stored_j(&self, position_m: DVec3) -> f64 {
+        let depth_m = (self.point_m - position_m).dot(self.normal).max(0.0);
+        let yields_at_m = depth_m.min(self.max_force_n / self.stiffness_n_per_m);
+        0.5 * self.stiffness_n_per_m * yields_at_m * yields_at_m + self.max_force_n * (depth_m - yields_at_m)
+    }
+
+    /// How much less work (J) its spring did on an arm that went from one place (m) to another than the force that it had at the first, held: `F(p)·(p' − p) − (U(p) − U(p'))`.
+    pub fn spared_j(&self, from_m: DVec3, to_m: DVec3) -> f64 {
+        let held_n = self.normal_force_n(from_m, DVec3::ZERO);
+        held_n * (to_m - from_m).dot(self.normal) - (self.stored_j(from_m) - self.stored_j(to_m))
+    }
+
     /// What a law has left of it: `ramp` of it, and at this place and velocity no more than the force (N) that the law gives along the normal there. `largest_n` (N) bounds the whole.
     ///
     /// What rate, warmth and energy take from the force they take from the plane, which so never pushes where something else would have to pull it back.
@@ -160,6 +173,26 @@ mod tests {
                 prop_assert!(left.normal_force_n(at.0 - DVec3::Z, DVec3::ZERO) <= largest_n * ramp + 1e-12);
             }
         }
+    }
+
+    /// The work that is left is the spring's own, whatever the way and however it is sampled: nothing over a closed one.
+    #[test]
+    fn what_a_held_force_does_too_much_is_spared() {
+        let plane = ContactPlane::of(&model(), model().point_m, 0.0, &SETTINGS).unwrap();
+        let plane = ContactPlane { max_force_n: 1.0, ..plane };
+        for depths_m in [vec![-3e-3, 2e-3, 5e-3, 0.0, -3e-3], vec![-1e-3, 1.9e-3, 1e-3, -1e-3]] {
+            let mut work_j = 0.0;
+            for pair in depths_m.windows(2) {
+                let [from_m, to_m] = [pair[0], pair[1]].map(|d| plane.point_m - d * DVec3::Z + pair[0] * DVec3::X);
+                let held_n = plane.normal_force_n(from_m, DVec3::ZERO) * DVec3::Z;
+                let spared_j = plane.spared_j(from_m, to_m);
+                assert!(spared_j > -1e-15, "{spared_j}");
+                work_j += held_n.dot(to_m - from_m) - spared_j;
+            }
+            assert!(work_j.abs() < 1e-15, "{work_j} J");
+        }
+        // 500 N/m yield at 2 mm: 1 mJ, and 3 mm at 1 N.
+        assert!((plane.stored_j(plane.point_m - 5e-3 * DVec3::Z) - 4e-3).abs() < 1e-15);
     }
 
     #[test]
