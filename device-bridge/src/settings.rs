@@ -324,7 +324,10 @@ fn parameter(section: &str, error: &ParameterError) -> BridgeError {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::config::{DeviceConfig, KeyframeConfig, PlaybackConfig, SimulatedConfig, WoodenHapticsConfig};
+    use crate::config::{
+        DeviceConfig, HapticMasterConfig, HapticMasterContact, KeyframeConfig, PlaybackConfig, SimulatedConfig,
+        WoodenHapticsConfig,
+    };
     use proptest::prelude::*;
 
     fn refused(change: impl FnOnce(&mut Config)) -> String {
@@ -356,6 +359,11 @@ mod tests {
 
     #[test]
     fn every_refusal_names_the_key() {
+        let by_plane = HapticMasterConfig { contact: HapticMasterContact::Plane, ..HapticMasterConfig::default() };
+        let without_model = refused(|c| {
+            (c.device, c.render.local_model) = (DeviceConfig::Hapticmaster(by_plane), false);
+        });
+        assert!(without_model.starts_with("device.contact: the plane is the local model's"), "{without_model}");
         assert!(refused(|c| c.servo.rate_hz = 0.0).starts_with("servo.rate_hz: 0 is out of range"));
         assert!(refused(|c| c.servo.report_every_s = f64::NAN).starts_with("servo.report_every_s"));
         assert!(refused(|c| c.limits.max_force_n = -1.0).starts_with("limits.max_force_n: -1 must be"));
