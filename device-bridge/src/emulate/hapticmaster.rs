@@ -21,6 +21,15 @@ const REFUSAL: &str = "--- ERROR: not now";
 /// How often it looks whether it shall stop, when nothing comes.
 const LOOK_EVERY: Duration = Duration::from_millis(1);
 
+/// What public sources do not settle of its effects.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct EffectSettings {
+    /// They stay when a connection ends, and act until the next one removes them.
+    pub kept: bool,
+    /// A `dampfactor` is a share of critical damping; else N s/m.
+    pub damping_is_ratio: bool,
+}
+
 /// How it speaks, and who holds it.
 #[derive(Debug, Clone)]
 pub struct Settings {
@@ -30,10 +39,8 @@ pub struct Settings {
     pub quoted: bool,
     /// Refuses `set` and `get` in one request.
     pub apart: bool,
-    /// Effects stay when a connection ends, and act until the next one removes them.
-    pub keeps_effects: bool,
-    /// A `dampfactor` is a share of critical damping; else N s/m.
-    pub damping_is_ratio: bool,
+    /// What it does with its effects.
+    pub effects: EffectSettings,
     /// How long finding home takes; `None`: it knows where it is.
     pub homing: Option<Duration>,
     /// Friction (N s/m) and hand; the mass is set over the wire.
@@ -48,8 +55,7 @@ impl Default for Settings {
             headers: true,
             quoted: false,
             apart: false,
-            keeps_effects: false,
-            damping_is_ratio: true,
+            effects: EffectSettings { kept: false, damping_is_ratio: true },
             homing: Some(Duration::from_millis(300)),
             arm: ArmSpec { mass_kg: LEAST_INERTIA_KG, damping_n_s_per_m: 8.0, ..ArmSpec::default() },
             path: HandPath::resting_at(DVec3::ZERO),
@@ -144,7 +150,7 @@ impl Server {
                     let _ = self.serve(stream);
                     let mut machine = self.0.machine();
                     machine.go_on();
-                    if !machine.settings.keeps_effects {
+                    if !machine.settings.effects.kept {
                         machine.effects.clear();
                     }
                 }

@@ -8,6 +8,7 @@
 //! ends, and the sign and zero of its axes ([`super::workspace`]).
 pub mod grammar;
 pub mod plane;
+mod request;
 pub mod start;
 
 use super::{Arm, Effort, Fault, LastWords, Reading, unstarted};
@@ -27,14 +28,6 @@ use tokio_util::sync::CancellationToken;
 pub const EFFECT: &str = "palpate";
 /// A pose is believed to go on with its velocity for so long (s).
 const LONGEST_EXTRAPOLATION_S: f64 = 5e-3;
-/// Bytes of `set palpate force [-100.00000,-100.00000,-100.00000]`.
-const FORCE_BYTES: usize = 47 + EFFECT.len();
-/// What writing may put behind a text before it is found to be too long.
-const MARGIN_BYTES: usize = 256;
-/// Every so many requests the emergency stop is asked for, too.
-const STOP_ASKED_EVERY: u64 = 20;
-/// How.
-const STOP: &str = "get emergencybuttonpushed";
 /// How long the end of the program waits for the arm to take the force away.
 const FAREWELL: Duration = Duration::from_millis(100);
 
@@ -116,12 +109,7 @@ impl HapticMaster {
     /// When the operating system refuses that.
     pub fn new(started: start::Started, settings: &start::StartSettings, period_s: f64) -> std::io::Result<Self> {
         started.stream.set_nonblocking(true)?;
-        let mut farewell = Vec::new();
-        for text in let_go(settings.plane.is_some()) {
-            let mut request = Vec::new();
-            grammar::frame(text.as_bytes(), &mut request);
-            farewell.extend(request);
-        }
+        let farewell = request::farewell(settings.plane.is_some());
         Ok(Self {
             stream: started.stream,
             dialect: settings.dialect,
@@ -131,7 +119,7 @@ impl HapticMaster {
             answer: Answer::new(),
             asked: Asked::Nothing,
             request: Vec::with_capacity(2 * (grammar::HEADER_BYTES + grammar::LONGEST_TEXT)),
-            text: Vec::with_capacity(grammar::LONGEST_TEXT + MARGIN_BYTES),
+            text: Vec::with_capacity(grammar::LONGEST_TEXT + request::MARGIN_BYTES),
             sent: 0,
             force_n: DVec3::ZERO,
             wanted: None,
@@ -214,66 +202,6 @@ impl HapticMaster {
         Ok(())
     }
 
-    fn compose(&mut self) {
-        self.requests += 1;
-        self.asked_periods = 0;
-        self.text.clear();
-        let mixed = self.dialect == Dialect::Mixed;
-        let with_sets = mixed || self.requests.is_multiple_of(2);
-        // At the rate of requests that ask for motion, in either dialect.
-        let asks = if mixed { self.requests } else { self.requests / 2 };
-        let with_stop = asks.is_multiple_of(STOP_ASKED_EVERY).then_some(STOP);
-        let gets = with_stop.into_iter().chain(start::MOTION);
-        let bytes_of_gets = if mixed { gets.clone().map(|get| 1 + get.len()).sum() } else { 0 };
-        let sets = if with_sets { self.compose_sets(grammar::LONGEST_TEXT - bytes_of_gets) } else { 0 };
-        let mut commands = sets;
-        self.asked = Asked::Set;
-        if mixed || !with_sets {
-            for command in gets {
-                if commands > 0 {
-                    self.text.push(b';');
-                }
-                self.text.extend_from_slice(command.as_bytes());
-                commands += 1;
-            }
-            self.asked = Asked::Motion { with_stop: with_stop.is_some(), sets };
-        }
-        grammar::frame(&self.text, &mut self.request);
-        self.sent = 0;
-        self.answer.expect(commands);
-    }
-
-    /// Plane and force, in at most so many bytes: how many commands.
-    fn compose_sets(&mut self, most: usize) -> usize {
-        let force_n = self.force_n.clamp_length_max(self.max_force_n);
-        let (count, bias_n) = match &mut self.plane {
-            Some(plane) => {
-                let wanted = self
-                    .wanted
-                    .map(|wanted| ContactPlane { max_force_n: wanted.max_force_n.min(self.max_force_n), ..wanted });
-                let at = (self.shown.position_m, self.shown.velocity_m_per_s);
-                plane.compose(wanted.as_ref(), force_n, at, &mut self.text, most - FORCE_BYTES)
-            }
-            None => (0, force_n),
-        };
-        if count > 0 {
-            self.text.push(b';');
-        }
-        // Writing into a Vec cannot fail.
-        let _ = write!(self.text, "set {EFFECT} force [{:.5},{:.5},{:.5}]", bias_n.x, bias_n.y, bias_n.z);
-        count + 1
-    }
-
-    /// Behind the rest of the request on its way, whatever is answered to it.
-    fn let_go(&mut self) {
-        if self.asked != Asked::Nobody && self.sent == self.request.len() {
-            self.asked = Asked::Nobody;
-            self.sent = 0;
-            self.request.clear();
-            self.request.extend_from_slice(&self.farewell);
-        }
-    }
-
     fn lose(&mut self, fault: Fault) -> Fault {
         *self.lost.get_or_insert(fault)
     }
@@ -311,11 +239,6 @@ impl Arm for HapticMaster {
     }
 }
 
-/// What takes every force away: a request for each, or one that is refused takes the other with it.
-fn let_go(with_plane: bool) -> impl Iterator<Item = String> {
-    [format!("set {EFFECT} force [0,0,0]")].into_iter().chain(with_plane.then(plane::disable))
-}
-
 impl Drop for HapticMaster {
     /// Takes the effect away, if the arm still listens.
     fn drop(&mut self) {
@@ -324,7 +247,7 @@ impl Drop for HapticMaster {
         let _ = self.stream.set_write_timeout(Some(FAREWELL));
         // What is left of the last request first, or the arm would take this for its end.
         let _ = self.stream.write_all(&self.request[self.sent..]);
-        for text in let_go(self.plane.is_some()).chain(["remove all".to_owned()]) {
+        for text in request::let_go(self.plane.is_some()).chain(["remove all".to_owned()]) {
             grammar::frame(text.as_bytes(), &mut self.request);
             let _ = self.stream.write_all(&self.request).and_then(|()| self.stream.read(&mut [0; 1024]));
         }

@@ -160,7 +160,7 @@ impl Machine {
 
 fn damp_factor(settings: &Settings) -> DampFactor {
     let inertia_kg = settings.arm.mass_kg;
-    if settings.damping_is_ratio { DampFactor::Ratio { inertia_kg } } else { DampFactor::Coefficient }
+    if settings.effects.damping_is_ratio { DampFactor::Ratio { inertia_kg } } else { DampFactor::Coefficient }
 }
 
 fn unknown(command: &str) -> String {
