@@ -9,10 +9,13 @@ use palpate_bridge::{
             plane::{DampFactor, PLANE, Plane, PlaneSettings},
         },
     },
-    emulate::hapticmaster::{HapticMaster, Settings},
+    emulate::{
+        Faults,
+        hapticmaster::{HapticMaster, Settings},
+    },
 };
 use palpate_control::{ContactPlane, HandPath, LocalModel, RenderSettings};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 use tokio_util::sync::CancellationToken;
 
 /// Held where it is.
@@ -145,10 +148,7 @@ fn jumps_leave_no_wrong_force_and_none_beyond_the_limit() {
     }
 }
 
-/// The driver alone, in real time, with planes that jump.
-#[test]
-fn no_force_beyond_the_limit_reaches_the_arm() {
-    let arm = emulator(DVec3::ZERO);
+fn opened(arm: &HapticMaster) -> driver::HapticMaster {
     let settings = driver::start::StartSettings {
         address: arm.address().to_string(),
         dialect: driver::Dialect::Mixed,
@@ -159,7 +159,14 @@ fn no_force_beyond_the_limit_reaches_the_arm() {
         silence: Duration::from_secs(2),
     };
     let started = driver::start::start(&settings, &CancellationToken::new()).unwrap();
-    let mut driven = driver::HapticMaster::new(started, &settings, 1e-3).unwrap();
+    driver::HapticMaster::new(started, &settings, 1e-3).unwrap()
+}
+
+/// The driver alone, in real time, with planes that jump.
+#[test]
+fn no_force_beyond_the_limit_reaches_the_arm() {
+    let arm = emulator(DVec3::ZERO);
+    let mut driven = opened(&arm);
     let mut numbers = Numbers(3);
     let mut effort = Effort::NONE;
     for tick in 0..800 {
@@ -188,4 +195,36 @@ fn no_force_beyond_the_limit_reaches_the_arm() {
     assert!(words.contains("set palpate force [0,0,0]") && words.contains("set contact disable"), "{words}");
     drop(driven);
     assert!(!arm.is_enabled(PLANE) && arm.effect_n() == DVec3::ZERO);
+}
+
+/// It hears, and answers what is none of its protocol: it is told before anybody takes its driver away.
+#[test]
+fn an_arm_that_is_lost_is_told_to_let_go_at_once() {
+    let arm = emulator(DVec3::ZERO);
+    let mut driven = opened(&arm);
+    let plane = ContactPlane {
+        point_m: DVec3::Z * 2e-3,
+        normal: DVec3::Z,
+        stiffness_n_per_m: 500.0,
+        damping_n_s_per_m: 2.0,
+        max_force_n: 3.0,
+    };
+    let effort = Effort { plane: Some(plane), ..Effort::force(DVec3::new(0.5, 0.0, 1.0)) };
+    let until = |what: &str, driven: &mut driver::HapticMaster, done: &dyn Fn(bool) -> bool| {
+        let began = Instant::now();
+        loop {
+            let lost = driven.read(1).is_err();
+            driven.apply(&effort);
+            if done(lost) {
+                return;
+            }
+            assert!(began.elapsed() < Duration::from_secs(20), "waited in vain until {what}");
+            std::thread::sleep(Duration::from_millis(1));
+        }
+    };
+    let has_force = || arm.is_enabled(PLANE) && arm.effect_of_n(EFFECT).length() > 0.4;
+    until("it has plane and bias", &mut driven, &|lost| !lost && has_force());
+    Faults::set(&arm.faults.garbage, true);
+    until("it is lost", &mut driven, &|lost| lost);
+    until("it is told", &mut driven, &|_| !arm.is_enabled(PLANE) && arm.effect_of_n(EFFECT) == DVec3::ZERO);
 }
