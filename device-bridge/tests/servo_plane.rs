@@ -174,6 +174,7 @@ fn a_plane_that_appears_around_a_resting_arm_does_not_push() {
 }
 
 proptest! {
+    #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::default() })]
     /// Whatever moves: where the arm is the plane pushes no harder than the servo, and nowhere harder than the limit.
     #[test]
     fn the_plane_is_within_the_force_and_the_limit(

@@ -262,3 +262,46 @@ fn rounded(v: DVec3, per_unit: f64) -> DVec3 {
     // Adding 0 makes −0 none, which would be told again and again.
     (v * per_unit).round() / per_unit + DVec3::ZERO
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_dampfactor_is_a_share_of_critical_damping_or_as_it_is() {
+        // 2 √(200 · 2) = 40 N s/m.
+        let ratio = DampFactor::Ratio { inertia_kg: 2.0 };
+        assert!((ratio.of(28.0, 200.0) - 0.7).abs() < 1e-12);
+        assert_eq!(DampFactor::Coefficient.of(28.0, 200.0), 28.0);
+        for factor in [ratio, DampFactor::Coefficient] {
+            assert!((factor.damping_n_s_per_m(factor.of(3.0, 500.0), 500.0) - 3.0).abs() < 1e-12);
+        }
+    }
+
+    /// An arm that moves is told of no damping twice: where it is and as it moves, plane and bias are the force.
+    #[test]
+    fn what_a_moving_arm_is_given_is_the_force() {
+        let wanted = ContactPlane {
+            point_m: DVec3::ZERO,
+            normal: DVec3::Z,
+            stiffness_n_per_m: 500.0,
+            damping_n_s_per_m: 10.0,
+            max_force_n: 5.0,
+        };
+        let at = (DVec3::Z * -2e-3, DVec3::new(0.1, 0.0, -0.1));
+        let force_n = DVec3::new(0.3, 0.0, 2.0);
+        let mut plane = Plane::new(PlaneSettings { damp_factor: DampFactor::Ratio { inertia_kg: 2.0 } });
+        let mut text = Vec::new();
+        let bias_n = (0..3).map(|_| {
+            text.clear();
+            plane.compose(Some(&wanted), force_n, at, &mut text, 200).1
+        });
+        // 500 · 2 mm + 10 · 0.1 = 2 N.
+        let bias_n = bias_n.last().unwrap();
+        assert!((bias_n - DVec3::X * 0.3).length() < 1e-3, "{bias_n}");
+        assert_eq!(plane.compose(Some(&wanted), force_n, at, &mut text, 200).0, 0, "nothing is told twice");
+        text.clear();
+        assert_eq!(plane.compose(None, force_n, at, &mut text, 200), (1, force_n));
+        assert_eq!(text, b"set contact disable");
+    }
+}
