@@ -5,8 +5,8 @@ mod workspace;
 
 use crate::{BridgeError, error::ConfigError};
 pub use device::{
-    DeviceConfig, FalconConfig, Haply2diyConfig, HapticMasterConfig, Inverse3Config, Inverse3Dialect, KeyframeConfig,
-    PhantomConfig, PlaybackConfig, SimulatedConfig, VrpnConfig, WoodenHapticsConfig,
+    DeviceConfig, FalconConfig, Haply2diyConfig, HapticMasterConfig, HapticMasterContact, Inverse3Config,
+    Inverse3Dialect, KeyframeConfig, PhantomConfig, PlaybackConfig, SimulatedConfig, VrpnConfig, WoodenHapticsConfig,
 };
 mod vrpn_server;
 

@@ -9,8 +9,8 @@ use crate::{
 };
 use glam::DVec3;
 use palpate_control::{
-    EnergyMeter, Fault, ForceLimiter, ForceLimits, Limited, Link, LocalModel, Motion, PassivityController,
-    RenderSettings, StiffnessBound, SuccessRate, ThermalLimiter, TorqueLaw, Verdict, Watchdog,
+    ContactPlane, EnergyMeter, Fault, ForceLimiter, ForceLimits, Limited, Link, LocalModel, Motion,
+    PassivityController, RenderSettings, StiffnessBound, SuccessRate, ThermalLimiter, TorqueLaw, Verdict, Watchdog,
 };
 use palpate_realtime::{Doorbell, SlotReader, SlotWriter, TickLoop, Wakeup};
 use std::{
@@ -33,6 +33,8 @@ pub struct ServoLaw {
     success: SuccessRate,
     torque: TorqueLaw,
     command: Option<Command>,
+    /// The plane that the arm was given, and where it was (m).
+    given: Option<(ContactPlane, DVec3)>,
     force_share: f64,
     steady_since_ns: Option<u64>,
     faults_seen: u64,
@@ -45,6 +47,8 @@ pub struct ServoTick {
     pub limited: Limited,
     /// Torque for the arm (N m).
     pub torque_nm: DVec3,
+    /// The part of the force that the arm renders by itself, if it does.
+    pub plane: Option<ContactPlane>,
     /// State of the link.
     pub verdict: Verdict,
     /// Damping that the passivity controller added (N s/m).
@@ -65,6 +69,7 @@ impl ServoLaw {
             success: SuccessRate::default(),
             torque: TorqueLaw::new(settings.torque, settings.passivity),
             command: None,
+            given: None,
             force_share: 1.0,
             steady_since_ns: None,
             faults_seen: 0,
@@ -136,9 +141,12 @@ impl ServoLaw {
             self.steady_since_ns = None;
         }
         self.judge(now_ns, &verdict);
-        let wanted_n = self.wanted_n(motion, &verdict);
+        let (wanted_n, plane) = self.wanted(motion, &verdict);
         let ramp = verdict.ramp * self.force_share;
         let dt_s = self.settings.period_s;
+        if let (Some((plane, from_m)), Some(passivity)) = (self.given, &mut self.passivity) {
+            passivity.spared(plane.spared_j(from_m, motion.position_m));
+        }
         let step = self
             .passivity
             .as_mut()
@@ -165,9 +173,15 @@ impl ServoLaw {
         if let Some(thermal) = &mut self.thermal {
             thermal.held(limited.force_n, dt_s);
         }
+        let at = (motion.position_m, motion.velocity_m_per_s);
+        let plane = plane
+            .filter(|_| !limited.non_finite)
+            .and_then(|plane| plane.limited(limited.force_n, at, ramp, self.largest_n()));
+        self.given = plane.map(|plane| (plane, motion.position_m));
         let wanted_nm = self.command.map_or(DVec3::ZERO, |command| command.torque.0);
         ServoTick {
             limited,
+            plane,
             torque_nm: self.torque.tick(wanted_nm, motion, ramp, dt_s),
             verdict,
             added_damping_n_s_per_m: step.map_or(0.0, |step| step.damping_n_s_per_m),
@@ -175,25 +189,48 @@ impl ServoLaw {
         }
     }
 
-    /// The local model's force, or the daemon's where there is none. On the way down damping takes its place.
-    fn wanted_n(&self, motion: &Motion, verdict: &Verdict) -> DVec3 {
-        let Some(command) = &self.command else { return DVec3::ZERO };
-        let force_n = match (&command.local_model, &self.settings.render) {
-            (Some(model), Some(render)) => {
-                let age_s = verdict.age_s + command.model_age_s;
-                let render = RenderSettings { max_stiffness_n_per_m: self.stiffness.largest_n_per_m(), ..*render };
-                model.render(motion.position_m, motion.velocity_m_per_s, age_s, &render).force_n
-            }
-            _ => command.force_n,
+    /// The local model's force, or the daemon's where there is none, and the part of it that an arm can render by itself. On the way down damping takes its place.
+    fn wanted(&self, motion: &Motion, verdict: &Verdict) -> (DVec3, Option<ContactPlane>) {
+        let Some(command) = &self.command else { return (DVec3::ZERO, None) };
+        let (force_n, plane) = match (&command.local_model, &self.settings.render) {
+            (Some(model), Some(render)) => self.rendered(model, motion, verdict.age_s + command.model_age_s, render),
+            _ => (command.force_n, None),
         };
-        match verdict.link {
+        let force_n = match verdict.link {
             // F ← F − (1 − ramp) B v
             Link::Ramping(_) => {
                 let damping = self.settings.fading_damping_n_s_per_m * (1.0 - verdict.ramp);
                 force_n - damping * motion.velocity_m_per_s
             }
             _ => force_n,
-        }
+        };
+        (force_n, plane)
+    }
+
+    /// Along the normal an arm that renders the plane is as stiff as a loop without delay may be: poses that are late are none in its own loop.
+    fn rendered(
+        &self,
+        model: &LocalModel,
+        motion: &Motion,
+        age_s: f64,
+        render: &RenderSettings,
+    ) -> (DVec3, Option<ContactPlane>) {
+        let (p, v) = (motion.position_m, motion.velocity_m_per_s);
+        let within = |max_stiffness_n_per_m| RenderSettings { max_stiffness_n_per_m, ..*render };
+        let soft = model.render(p, v, age_s, &within(self.stiffness.largest_n_per_m()));
+        let stiff = within(self.stiffness.without_delay_n_per_m());
+        let plane = self.settings.plane.then(|| ContactPlane::of(model, p, age_s, &stiff)).flatten();
+        let Some(plane) = plane else { return (soft.force_n, None) };
+        let n = plane.normal;
+        // F = F_soft − (F_soft·n) n + F_plane n
+        let force_n = soft.force_n + (plane.normal_force_n(p, v) - soft.force_n.dot(n)) * n;
+        (force_n.clamp_length_max(plane.max_force_n), Some(plane))
+    }
+
+    /// The largest force (N) on the arm now, but for a ramp.
+    fn largest_n(&self) -> f64 {
+        let peak_n = self.limiter.limits().max_force_n;
+        self.thermal.as_ref().map_or(peak_n, |thermal| thermal.largest_n().min(peak_n))
     }
 
     /// A force that comes and goes with every other answer is none to feel with.
@@ -268,7 +305,7 @@ impl Servo {
         }
         self.obey_flags(now_ns);
         let tick = self.law.tick(now_ns, &motion);
-        self.device.apply(&Effort { force_n: tick.limited.force_n, torque_nm: tick.torque_nm });
+        self.device.apply(&Effort { force_n: tick.limited.force_n, torque_nm: tick.torque_nm, plane: tick.plane });
         if let Some(guard) = &mut self.guard {
             guard.beat();
         }

@@ -81,6 +81,8 @@ pub struct ServoSettings {
     pub fading_damping_n_s_per_m: f64,
     /// Local models; `None`: the daemon's force as it comes.
     pub render: Option<RenderSettings>,
+    /// The arm renders the contact's plane by itself.
+    pub plane: bool,
     /// How stiff a local model may be rendered, or, without, the daemon's coupling be.
     pub stiffness: StiffnessBound,
     /// Share of ticks with an answer in time; with fewer the force is taken away.
@@ -187,6 +189,7 @@ fn servo(config: &Config, period_s: f64, scale: f64) -> Result<ServoSettings, Br
     Ok(ServoSettings {
         period_s,
         stiffness,
+        plane: arm::renders_planes(&config.device),
         least_success_rate,
         thermal: limits.continuous_force_n.map(thermal).transpose().map_err(|error| parameter("limits", &error))?,
         limits: ForceLimits { max_force_n: limits.max_force_n, max_force_rate_n_per_s: limits.max_force_rate_n_per_s }
@@ -321,7 +324,10 @@ fn parameter(section: &str, error: &ParameterError) -> BridgeError {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::config::{DeviceConfig, KeyframeConfig, PlaybackConfig, SimulatedConfig, WoodenHapticsConfig};
+    use crate::config::{
+        DeviceConfig, HapticMasterConfig, HapticMasterContact, KeyframeConfig, PlaybackConfig, SimulatedConfig,
+        WoodenHapticsConfig,
+    };
     use proptest::prelude::*;
 
     fn refused(change: impl FnOnce(&mut Config)) -> String {
@@ -353,6 +359,11 @@ mod tests {
 
     #[test]
     fn every_refusal_names_the_key() {
+        let by_plane = HapticMasterConfig { contact: HapticMasterContact::Plane, ..HapticMasterConfig::default() };
+        let without_model = refused(|c| {
+            (c.device, c.render.local_model) = (DeviceConfig::Hapticmaster(by_plane), false);
+        });
+        assert!(without_model.starts_with("device.contact: the plane is the local model's"), "{without_model}");
         assert!(refused(|c| c.servo.rate_hz = 0.0).starts_with("servo.rate_hz: 0 is out of range"));
         assert!(refused(|c| c.servo.report_every_s = f64::NAN).starts_with("servo.report_every_s"));
         assert!(refused(|c| c.limits.max_force_n = -1.0).starts_with("limits.max_force_n: -1 must be"));

@@ -99,6 +99,7 @@ fn opened(arm: &HapticMaster, apart: bool) -> driver::HapticMaster {
         dialect: if apart { driver::Dialect::Apart } else { driver::Dialect::Mixed },
         inertia_kg: 2.0,
         max_force_n: 3.0,
+        plane: None,
         homing: Duration::from_secs(2),
         silence: Duration::from_millis(500),
     };
@@ -151,6 +152,7 @@ fn an_arm_that_cannot_be_started_says_why() {
         dialect: driver::Dialect::Mixed,
         inertia_kg: 2.0,
         max_force_n: 3.0,
+        plane: None,
         homing,
         silence: Duration::from_millis(500),
     };

@@ -8,8 +8,8 @@ use glam::{DMat3, DVec3};
 use palpate_bridge::{
     Config,
     config::{
-        DeviceConfig, FalconConfig, Haply2diyConfig, HapticMasterConfig, Inverse3Config, PlaybackConfig, RecordConfig,
-        VrpnConfig, WoodenHapticsConfig,
+        DeviceConfig, FalconConfig, Haply2diyConfig, HapticMasterConfig, HapticMasterContact, Inverse3Config,
+        PlaybackConfig, RecordConfig, VrpnConfig, WoodenHapticsConfig,
     },
     convert::Command,
     device::{
@@ -33,7 +33,7 @@ use palpate_bridge::{
     settings::{Settings, arm},
     vrpn_server::moment::moments,
 };
-use palpate_control::{ArmSpec, ForceLimits, HandPath, LocalModel, TorqueLimits};
+use palpate_control::{ArmSpec, ContactPlane, ForceLimits, HandPath, LocalModel, TorqueLimits};
 use palpate_realtime::{Clock, Doorbell, TickLoop, slot};
 use std::{
     sync::{Arc, atomic::Ordering},
@@ -118,7 +118,16 @@ fn drive_by(config: &Config, periods: u64) {
         // A busy machine is late: nothing is told here of how long an answer took.
         assert_no_alloc(|| {
             arm.read(periods).unwrap();
-            arm.apply(&Effort::force(DVec3::new(1e-7, -1.0 / 3.0, f64::from(tick))));
+            // The plane moves, grows stiffer than any is, and goes now and then.
+            let plane = ContactPlane {
+                point_m: DVec3::new(-1.0 / 3.0, 1e-7, f64::from(tick) * 0.05),
+                normal: DVec3::new(0.6, f64::from(tick) * 1e-9, -0.8),
+                stiffness_n_per_m: 10.0_f64.powi(tick / 30),
+                damping_n_s_per_m: f64::from(tick) / 7.0,
+                max_force_n: 3.0,
+            };
+            let force_n = DVec3::new(1e-7, -1.0 / 3.0, f64::from(tick));
+            arm.apply(&Effort { plane: (tick % 10 < 8).then_some(plane), ..Effort::force(force_n) });
         });
     }
 }
@@ -126,9 +135,11 @@ fn drive_by(config: &Config, periods: u64) {
 #[test]
 fn the_hapticmasters_driver_allocates_nothing() {
     let emulated = HapticMaster::listen("127.0.0.1:0", hapticmaster::Settings::default()).unwrap();
-    let address = emulated.address().to_string();
-    drive(DeviceConfig::Hapticmaster(HapticMasterConfig { address, ..HapticMasterConfig::default() }));
-    assert!(emulated.requests() > 40);
+    for contact in [HapticMasterContact::Bias, HapticMasterContact::Plane] {
+        let (address, before) = (emulated.address().to_string(), emulated.requests());
+        drive(DeviceConfig::Hapticmaster(HapticMasterConfig { address, contact, ..HapticMasterConfig::default() }));
+        assert!(emulated.requests() > before + 40);
+    }
 }
 
 #[test]

@@ -224,7 +224,7 @@ fn no_force_beyond_the_limit_and_none_that_is_no_number_reaches_the_arm() {
 
 #[test]
 fn torque_goes_to_arms_that_have_motors_for_it() {
-    let twist = Effort { force_n: DVec3::Z, torque_nm: DVec3::new(0.0, 0.01, -0.02) };
+    let twist = Effort { torque_nm: DVec3::new(0.0, 0.01, -0.02), ..Effort::force(DVec3::Z) };
     let strong = Effort { torque_nm: DVec3::X, ..twist };
     for (turns, torque, expected_nm) in
         [(true, true, twist.torque_nm), (true, false, DVec3::ZERO), (false, true, DVec3::ZERO)]

@@ -11,7 +11,7 @@ mod woodenhaptics;
 
 pub use falcon::FalconConfig;
 pub use haply_2diy::Haply2diyConfig;
-pub use hapticmaster::HapticMasterConfig;
+pub use hapticmaster::{HapticMasterConfig, HapticMasterContact};
 pub use inverse3::{Inverse3Config, Inverse3Dialect};
 pub use phantom::PhantomConfig;
 pub use playback::PlaybackConfig;

@@ -28,7 +28,7 @@ use glam::DVec3;
 use haply_2diy::Haply2diy;
 use hapticmaster::HapticMaster;
 use inverse3::Inverse3;
-use palpate_control::Motion;
+use palpate_control::{ContactPlane, Motion};
 use phantom::Phantom;
 use playback::Playback;
 use simulated::SimulatedDevice;
@@ -63,6 +63,8 @@ pub struct Effort {
     pub force_n: DVec3,
     /// Torque (N m) about it, for an arm that has motors for it.
     pub torque_nm: DVec3,
+    /// The contact that is part of the force, for an arm that renders it by itself, with the rest of the force beside it. Others have all of it in the force.
+    pub plane: Option<ContactPlane>,
 }
 
 impl Effort {
@@ -71,14 +73,15 @@ impl Effort {
 
     /// A force (N) alone.
     pub const fn force(force_n: DVec3) -> Self {
-        Self { force_n, torque_nm: DVec3::ZERO }
+        Self { force_n, torque_nm: DVec3::ZERO, plane: None }
     }
 
     /// For a driver's last step: nothing when its arm is lost, and nothing that is no number.
     #[must_use]
     pub fn unless(&self, lost: bool) -> Self {
         let number = |v: DVec3| if lost || !v.is_finite() { DVec3::ZERO } else { v };
-        Self { force_n: number(self.force_n), torque_nm: number(self.torque_nm) }
+        let plane = self.plane.filter(|plane| !lost && self.force_n.is_finite() && plane.is_one());
+        Self { force_n: number(self.force_n), torque_nm: number(self.torque_nm), plane }
     }
 }
 

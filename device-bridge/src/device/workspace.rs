@@ -1,7 +1,7 @@
 //! From an arm's own axes to the world's, and back: turned, moved, magnified, and let go of by a button.
 use super::{Arm, Effort, Fault, LastWords, Reading};
 use glam::{DMat3, DQuat, DVec3};
-use palpate_control::Motion;
+use palpate_control::{ContactPlane, Motion};
 use thiserror::Error;
 
 /// Scales that make sense: a hand's breadth to a cell, or to a room.
@@ -98,6 +98,17 @@ impl Workspace {
         self.rotation.transpose() * world
     }
 
+    /// A plane of the world, for the arm: `K_arm = s K_world`, for the force is the same and the arm's way shorter.
+    pub fn plane_to_arm(&self, world: &ContactPlane) -> ContactPlane {
+        ContactPlane {
+            point_m: self.to_arm(world.point_m - self.origin_m) / self.scale,
+            normal: self.to_arm(world.normal),
+            stiffness_n_per_m: world.stiffness_n_per_m * self.scale,
+            damping_n_s_per_m: world.damping_n_s_per_m * self.scale,
+            max_force_n: world.max_force_n,
+        }
+    }
+
     /// World movement over the arm's.
     pub fn scale(&self) -> f64 {
         self.scale
@@ -165,9 +176,12 @@ impl Arm for Placed {
     }
 
     fn apply(&mut self, effort: &Effort) {
-        let Effort { force_n, torque_nm } = *effort;
-        self.arm
-            .apply(&Effort { force_n: self.workspace.to_arm(force_n), torque_nm: self.workspace.to_arm(torque_nm) });
+        let Effort { force_n, torque_nm, plane } = *effort;
+        self.arm.apply(&Effort {
+            force_n: self.workspace.to_arm(force_n),
+            torque_nm: self.workspace.to_arm(torque_nm),
+            plane: plane.map(|plane| self.workspace.plane_to_arm(&plane)),
+        });
     }
 
     fn last_words(&self) -> Option<LastWords> {
@@ -231,6 +245,27 @@ mod tests {
             let world = workspace.to_world(&Motion { velocity_m_per_s: v, ..Motion::at(DVec3::X) });
             let arm_w = workspace.to_arm(f).dot(v);
             assert!((f.dot(world.velocity_m_per_s) - scale * arm_w).abs() < 1e-14);
+        }
+    }
+
+    /// A plane gives an arm the force that it gives in the world.
+    #[test]
+    fn a_plane_is_where_it_is_and_as_strong() {
+        let (p, v) = (DVec3::new(0.3, -0.1, 0.2), DVec3::new(-0.01, 0.02, 0.03));
+        let plane = ContactPlane {
+            point_m: DVec3::new(4.0, 0.5, 4.0),
+            normal: DVec3::new(0.6, 0.0, 0.8),
+            stiffness_n_per_m: 400.0,
+            damping_n_s_per_m: 3.0,
+            max_force_n: 1e9,
+        };
+        for scale in [0.1, 1.0, 8.0] {
+            let workspace = workspace(["+z", "-x", "-y"], DVec3::new(1.0, 0.5, 0.0), scale).unwrap();
+            let world = workspace.to_world(&Motion { velocity_m_per_s: v, ..Motion::at(p) });
+            let expected_n = plane.normal_force_n(world.position_m, world.velocity_m_per_s);
+            let arms = workspace.plane_to_arm(&plane);
+            assert!(expected_n > 1.0 && (arms.normal_force_n(p, v) - expected_n).abs() < 1e-9, "{expected_n} N");
+            assert!((workspace.force_to_world_n(arms.normal) - plane.normal).length() < 1e-15);
         }
     }
 

@@ -1,26 +1,34 @@
-//! A HapticMASTER that is not there. `m a = F_hand + Σ F_effects − b v`, in steps of 1 ms of real time; its effects end with the connection.
+//! A HapticMASTER that is not there. `m a = F_hand + Σ F_effects − b v`, in steps of 0.4 ms of real time; its effects end with the connection, unless it keeps them.
+mod effects;
+mod machine;
+
 use super::{Faults, Running, Shared};
 use crate::device::hapticmaster::grammar;
 use glam::DVec3;
-use palpate_control::{ArmSpec, HandPath, ParameterError, SimulatedArm};
+use machine::Machine;
+use palpate_control::{ArmSpec, HandPath};
 use std::{
-    collections::BTreeMap,
     io::{ErrorKind, Read as _, Write as _},
     net::{SocketAddr, TcpListener, TcpStream},
     sync::{Arc, atomic::Ordering},
-    time::{Duration, Instant},
+    time::Duration,
 };
 
-/// Step of its motion (s).
-const STEP_S: f64 = 1e-3;
-/// What it bears at most (N).
-const MAX_FORCE_N: f64 = 100.0;
 /// The inertia it cannot be set below (kg).
 const LEAST_INERTIA_KG: f64 = 2.0;
 /// Its answer to everything, when it is to refuse.
 const REFUSAL: &str = "--- ERROR: not now";
 /// How often it looks whether it shall stop, when nothing comes.
 const LOOK_EVERY: Duration = Duration::from_millis(1);
+
+/// What public sources do not settle of its effects.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct EffectSettings {
+    /// They stay when a connection ends, and act until the next one removes them.
+    pub kept: bool,
+    /// A `dampfactor` is a share of critical damping; else N s/m.
+    pub damping_is_ratio: bool,
+}
 
 /// How it speaks, and who holds it.
 #[derive(Debug, Clone)]
@@ -31,6 +39,8 @@ pub struct Settings {
     pub quoted: bool,
     /// Refuses `set` and `get` in one request.
     pub apart: bool,
+    /// What it does with its effects.
+    pub effects: EffectSettings,
     /// How long finding home takes; `None`: it knows where it is.
     pub homing: Option<Duration>,
     /// Friction (N s/m) and hand; the mass is set over the wire.
@@ -45,6 +55,7 @@ impl Default for Settings {
             headers: true,
             quoted: false,
             apart: false,
+            effects: EffectSettings { kept: false, damping_is_ratio: true },
             homing: Some(Duration::from_millis(300)),
             arm: ArmSpec { mass_kg: LEAST_INERTIA_KG, damping_n_s_per_m: 8.0, ..ArmSpec::default() },
             path: HandPath::resting_at(DVec3::ZERO),
@@ -90,6 +101,32 @@ impl HapticMaster {
         machine.effect_n()
     }
 
+    /// Force (N) of one effect on it now.
+    pub fn effect_of_n(&self, name: &str) -> DVec3 {
+        let mut machine = self.shared.machine();
+        machine.go_on();
+        machine.effects.force_of_n(name, &machine.arm.motion())
+    }
+
+    /// Whether it has an effect of that name, and it is enabled.
+    pub fn is_enabled(&self, name: &str) -> bool {
+        self.shared.machine().effects.is_enabled(name)
+    }
+
+    /// The longest that all effects together pushed (N), since this was last asked.
+    pub fn peak_n(&self) -> f64 {
+        let mut machine = self.shared.machine();
+        machine.go_on();
+        std::mem::take(&mut machine.peak_n)
+    }
+
+    /// The commands of a connection that is none: for tests of what it answers.
+    pub fn obey(&self, text: &str) -> String {
+        let mut machine = self.shared.machine();
+        machine.go_on();
+        machine.obey(text)
+    }
+
     /// Where it is (m, its own axes).
     pub fn position_m(&self) -> DVec3 {
         let mut machine = self.shared.machine();
@@ -111,7 +148,11 @@ impl Server {
             match listener.accept() {
                 Ok((stream, _)) => {
                     let _ = self.serve(stream);
-                    self.0.machine().effects.clear();
+                    let mut machine = self.0.machine();
+                    machine.go_on();
+                    if !machine.settings.effects.kept {
+                        machine.effects.clear();
+                    }
                 }
                 Err(_) => std::thread::sleep(LOOK_EVERY),
             }
@@ -177,169 +218,4 @@ fn next_request(waiting: &mut Vec<u8>) -> Option<String> {
     let text = String::from_utf8_lossy(&waiting[grammar::HEADER_BYTES..end]).into_owned();
     waiting.drain(..end);
     Some(text)
-}
-
-#[derive(Debug, Clone, Copy, PartialEq)]
-enum State {
-    Off,
-    Init(Instant),
-    Stop,
-    Force,
-}
-
-#[derive(Debug)]
-struct Machine {
-    settings: Settings,
-    arm: SimulatedArm,
-    state: State,
-    homed: bool,
-    stopped: bool,
-    /// Force (N) of each, and whether it is enabled.
-    effects: BTreeMap<String, (DVec3, bool)>,
-    began: Option<Instant>,
-    steps: u64,
-    requests: u64,
-}
-
-impl Machine {
-    fn new(settings: Settings) -> Result<Self, ParameterError> {
-        Ok(Self {
-            arm: SimulatedArm::new(settings.arm, settings.path.clone(), STEP_S)?,
-            state: State::Off,
-            homed: settings.homing.is_none(),
-            stopped: false,
-            effects: BTreeMap::new(),
-            began: None,
-            steps: 0,
-            requests: 0,
-            settings,
-        })
-    }
-
-    fn effect_n(&self) -> DVec3 {
-        if self.state != State::Force || self.stopped {
-            return DVec3::ZERO;
-        }
-        let sum: DVec3 = self.effects.values().filter(|(_, enabled)| *enabled).map(|(force_n, _)| *force_n).sum();
-        sum.clamp_length_max(MAX_FORCE_N)
-    }
-
-    /// Motion up to now; the hand begins on its path with the first force.
-    fn go_on(&mut self) {
-        if let State::Init(since) = self.state
-            && since.elapsed() >= self.settings.homing.unwrap_or_default()
-        {
-            (self.state, self.homed) = (State::Stop, true);
-        }
-        let Some(began) = self.began else { return };
-        let due = (began.elapsed().as_secs_f64() / STEP_S) as u64;
-        let force_n = self.effect_n();
-        while self.steps < due {
-            self.arm.step(force_n);
-            self.steps += 1;
-        }
-    }
-
-    fn obey(&mut self, text: &str) -> String {
-        let commands: Vec<&str> = text.split(';').map(str::trim).collect();
-        let is_get = |command: &&str| command.starts_with("get ");
-        if self.settings.apart && commands.iter().any(is_get) && !commands.iter().all(is_get) {
-            return "--- ERROR: set and get in one request".into();
-        }
-        let answers: Vec<String> = commands.into_iter().map(|command| self.command(command)).collect();
-        // One `;` between two answers, whatever each ends with.
-        let trimmed = |answer: &String| answer.trim_end_matches(';').to_owned();
-        match &answers[..] {
-            [one] => one.clone(),
-            _ => answers.iter().map(trimmed).collect::<Vec<_>>().join(";"),
-        }
-    }
-
-    fn command(&mut self, command: &str) -> String {
-        let words: Vec<&str> = command.split_whitespace().collect();
-        match words[..] {
-            ["get", what] => self.get(what),
-            ["remove", "all"] => {
-                self.effects.clear();
-                "Removed".into()
-            }
-            ["create", "biasforce", name] => {
-                self.effects.insert(name.to_owned(), (DVec3::ZERO, false));
-                format!("Effect biasforce with name {name} created")
-            }
-            ["set", "state", state] => self.set_state(state),
-            ["set", "inertia", kg] => self.set_inertia(kg),
-            ["set", name, ref what @ ..] => match (self.effects.get_mut(name), what) {
-                (Some(effect), ["force", vector]) => match grammar::vector(vector) {
-                    Some(force_n) => {
-                        effect.0 = force_n;
-                        "Biasforce's force set".into()
-                    }
-                    None => unknown(command),
-                },
-                (Some(effect), ["enable" | "disable"]) => {
-                    effect.1 = what[0] == "enable";
-                    format!("Effect {}d", what[0])
-                }
-                _ => unknown(command),
-            },
-            _ => unknown(command),
-        }
-    }
-
-    fn get(&self, what: &str) -> String {
-        let motion = self.arm.motion();
-        // Six digits, as C's `%g` gives them.
-        let vector = |v: DVec3| format!("[{:.5e},{:.5e},{:.5e}]", v.x, v.y, v.z);
-        let word = |text: &str| if self.settings.quoted { format!("\"{text}\"") } else { format!("{text};") };
-        match what {
-            "modelpos" | "measpos" => vector(motion.position_m),
-            "modelvel" => vector(motion.velocity_m_per_s),
-            "measforce" => vector(self.arm.hand_force_n()),
-            "os" => word("palpate emulator"),
-            "emergencybuttonpushed" => word(if self.stopped { "true" } else { "false" }),
-            "position_calibrated" => word(if self.homed { "true" } else { "false" }),
-            "state" => word(match self.state {
-                State::Off => "off",
-                State::Init(_) => "init",
-                State::Stop => "stop",
-                State::Force => "force",
-            }),
-            _ => unknown(what),
-        }
-    }
-
-    fn set_state(&mut self, state: &str) -> String {
-        self.state = match state {
-            "init" => State::Init(Instant::now()),
-            "stop" => State::Stop,
-            "off" => State::Off,
-            "force" if self.homed => State::Force,
-            "force" => return "--- ERROR: position not calibrated".into(),
-            _ => return unknown(state),
-        };
-        if self.state == State::Force {
-            self.began.get_or_insert_with(Instant::now);
-        }
-        format!("state set to '{state}'")
-    }
-
-    fn set_inertia(&mut self, kg: &str) -> String {
-        let kg: f64 = kg.parse().unwrap_or(f64::NAN);
-        let spec = ArmSpec { mass_kg: kg, ..self.settings.arm };
-        match SimulatedArm::new(spec, self.settings.path.clone(), STEP_S) {
-            Ok(arm) if kg >= LEAST_INERTIA_KG && self.began.is_none() => {
-                self.arm = arm;
-                self.settings.arm.mass_kg = kg;
-                "Inertia set".into()
-            }
-            // The next one to start it finds it moving.
-            Ok(_) if kg == self.settings.arm.mass_kg => "Inertia set".into(),
-            _ => format!("--- ERROR: inertia must be at least {LEAST_INERTIA_KG}"),
-        }
-    }
-}
-
-fn unknown(command: &str) -> String {
-    format!("--- ERROR: unknown command {command}")
 }

@@ -101,7 +101,7 @@ impl Arm for Recorded {
     fn apply(&mut self, effort: &Effort) {
         self.arm.apply(effort);
         if let Some(reading) = self.read.take() {
-            self.queue.push(Row::new(self.periods as f64 * self.period_s, &reading, *effort));
+            self.queue.push(&Row::new(self.periods as f64 * self.period_s, &reading, *effort));
         }
     }
 }
@@ -125,9 +125,9 @@ impl Queue {
         (Self { rows, made: Arc::default() }, waiting)
     }
 
-    fn push(&mut self, row: Row) {
+    fn push(&mut self, row: &Row) {
         // Lost when it is full.
-        let _ = self.rows.push(row);
+        let _ = self.rows.push(*row);
         self.made.fetch_add(1, Ordering::Relaxed);
     }
 }
@@ -242,7 +242,7 @@ mod tests {
         let (mut queue, rows) = Queue::new(4);
         let reading = Witness::at_rest();
         for tick in 0..10 {
-            queue.push(Row::new(f64::from(tick), &reading, Effort::NONE));
+            queue.push(&Row::new(f64::from(tick), &reading, Effort::NONE));
         }
         // The disk wakes up when four wait, and six are gone.
         let folder = tempfile::tempdir().unwrap();
@@ -266,7 +266,7 @@ mod tests {
         let file = File::options().write(true).open("/dev/full").unwrap();
         let mut writer = Writer::start(file, &settings.path, rows, Arc::clone(&queue.made)).unwrap();
         for tick in 0..20_000 {
-            queue.push(Row::new(f64::from(tick), &Witness::at_rest(), Effort::NONE));
+            queue.push(&Row::new(f64::from(tick), &Witness::at_rest(), Effort::NONE));
         }
         drop(queue);
         let (written, lost, result) = writer.end();

@@ -12,7 +12,7 @@ pub mod woodenhaptics;
 use super::value;
 use crate::{
     BridgeError, Config,
-    config::DeviceConfig,
+    config::{DeviceConfig, HapticMasterConfig, HapticMasterContact},
     device::{
         falcon::Settings as Falcon, haply_2diy::Settings as Haply2diy, hapticmaster::start::StartSettings,
         inverse3::Settings as Inverse3, phantom::Settings as Phantom, playback::Settings as Playback,
@@ -52,7 +52,7 @@ pub enum ArmSettings {
 pub(super) fn checked(config: &Config, period_s: f64) -> Result<ArmSettings, BridgeError> {
     match &config.device {
         DeviceConfig::Simulated(arm) => Ok(ArmSettings::Simulated(simulated::checked(arm, period_s)?)),
-        DeviceConfig::Hapticmaster(arm) => Ok(ArmSettings::HapticMaster(hapticmaster::checked(arm, &config.limits)?)),
+        DeviceConfig::Hapticmaster(arm) => Ok(ArmSettings::HapticMaster(hapticmaster::checked(arm, config)?)),
         DeviceConfig::Woodenhaptics(arm) => Ok(ArmSettings::WoodenHaptics(woodenhaptics::checked(arm)?)),
         DeviceConfig::Phantom(arm) => Ok(ArmSettings::Phantom(phantom::checked(arm, config, period_s)?)),
         DeviceConfig::Inverse3(arm) => Ok(ArmSettings::Inverse3(inverse3::checked(arm, &config.realtime)?)),
@@ -61,6 +61,11 @@ pub(super) fn checked(config: &Config, period_s: f64) -> Result<ArmSettings, Bri
         DeviceConfig::Falcon(arm) => Ok(ArmSettings::Falcon(falcon::checked(arm)?)),
         DeviceConfig::Vrpn(arm) => Ok(ArmSettings::Vrpn(vrpn::checked(arm, &config.limits)?)),
     }
+}
+
+/// Whether an arm is to render the contact's plane by itself.
+pub(super) fn renders_planes(device: &DeviceConfig) -> bool {
+    matches!(device, DeviceConfig::Hapticmaster(HapticMasterConfig { contact: HapticMasterContact::Plane, .. }))
 }
 
 fn within(key: &str, values: &[f64], range: RangeInclusive<f64>) -> Result<(), BridgeError> {

@@ -43,6 +43,11 @@ impl StiffnessBound {
         self.delay_s
     }
 
+    /// The largest stiffness (N/m) where the loop that renders has no delay: what is passive at this sample time, and asked for.
+    pub fn without_delay_n_per_m(&self) -> f64 {
+        self.most_n_per_m
+    }
+
     /// The largest stiffness (N/m) at this delay.
     ///
     /// `K < (b + B)/(T/2 + t_d)` ([`SampledWall::stable_stiffness_limit_n_per_m`]), and never more than what is passive without delay.

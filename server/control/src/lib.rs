@@ -4,6 +4,7 @@
 //! received number is safe against NaN and infinity: it answers zero force, and counts.
 //!
 //! Sign convention: forces act **on the arm** (N, world); the power an arm puts into the virtual world is `−F·v`.
+pub mod contact_plane;
 pub mod coupling;
 pub mod energy;
 pub mod extrapolate;
@@ -19,6 +20,7 @@ pub mod torque;
 pub mod velocity;
 pub mod watchdog;
 
+pub use contact_plane::ContactPlane;
 pub use coupling::VirtualCoupling;
 pub use energy::EnergyMeter;
 pub use extrapolate::{Motion, extrapolate};

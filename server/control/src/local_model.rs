@@ -119,7 +119,7 @@ impl LocalModel {
     }
 
     /// K scaled so that no direction is stiffer than `max_n_per_m`: the largest column sum of |K| bounds its eigenvalues.
-    fn bounded_stiffness(&self, max_n_per_m: f64) -> DMat3 {
+    pub(crate) fn bounded_stiffness(&self, max_n_per_m: f64) -> DMat3 {
         let k = &self.stiffness_n_per_m;
         let bound = [k.x_axis, k.y_axis, k.z_axis].iter().map(|c| c.abs().element_sum()).fold(0.0, f64::max);
         if bound > max_n_per_m { *k * (max_n_per_m / bound) } else { *k }
@@ -138,7 +138,7 @@ fn distance_weight(radii: f64) -> f64 {
 }
 
 /// 1 up to `hold_s`, then linear to 0 at `forget_s`. NaN counts as old.
-fn age_weight(age_s: f64, settings: &RenderSettings) -> f64 {
+pub(crate) fn age_weight(age_s: f64, settings: &RenderSettings) -> f64 {
     if age_s <= settings.hold_s {
         1.0
     } else if age_s < settings.forget_s {

@@ -111,6 +111,13 @@ impl PassivityController {
         self.held = None;
     }
 
+    /// What was held over the interval that ends now did so much less work (J) on the arm than a constant force: a plane that the arm renders by itself ([`crate::ContactPlane::spared_j`]).
+    pub fn spared(&mut self, work_j: f64) {
+        if work_j.is_finite() {
+            self.energy_j = (self.energy_j + work_j).min(self.settings.max_stored_j);
+        }
+    }
+
     /// Damps `force_n` (N, on the arm) as far as the energy demands. `position_m` and `velocity_m_per_s` are the arm's now;
     /// the force will be held for `dt_s`. Anything not finite gives zero force and forgets the interval.
     ///

@@ -1,4 +1,5 @@
-//! HapticMASTER (FCS, Moog): an admittance arm over TCP. It measures the hand's force and moves as a mass would; ours goes to it as a bias force.
+//! HapticMASTER (FCS, Moog): an admittance arm over TCP. It measures the hand's force and moves as a mass would; ours goes to it as a bias force, or as the plane of the contact, which it
+//! renders itself, and a bias force for the rest ([`plane`]).
 //!
 //! Beside the loop nothing waits: a tick reads what has come and, when the last request is answered, sends the next one, which sets the force and asks for
 //! position, velocity and force. So a pose is a tick old, and at most one request is on its way. A pose's age counts from its request: the arm measured it then or later.
@@ -6,13 +7,16 @@
 //! What only hardware can tell is named here: whether `set` and `get` go in one request ([`Dialect::Mixed`]) or each in its own, whether the arm lets go when the connection
 //! ends, and the sign and zero of its axes ([`super::workspace`]).
 pub mod grammar;
+pub mod plane;
+mod request;
 pub mod start;
 
 use super::{Arm, Effort, Fault, LastWords, Reading, unstarted};
 use crate::BridgeError;
 use glam::DVec3;
 use grammar::Answer;
-use palpate_control::{Motion, extrapolate};
+use palpate_control::{ContactPlane, Motion, extrapolate};
+use plane::Plane;
 use std::{
     io::{ErrorKind, Read as _, Write as _},
     net::TcpStream,
@@ -24,8 +28,6 @@ use tokio_util::sync::CancellationToken;
 pub const EFFECT: &str = "palpate";
 /// A pose is believed to go on with its velocity for so long (s).
 const LONGEST_EXTRAPOLATION_S: f64 = 5e-3;
-/// Every so many requests the emergency stop is asked for, too.
-const STOP_ASKED_EVERY: u64 = 20;
 /// How long the end of the program waits for the arm to take the force away.
 const FAREWELL: Duration = Duration::from_millis(100);
 
@@ -44,10 +46,12 @@ enum Asked {
     Nothing,
     /// The force was set, and nothing asked for.
     Set,
-    /// Motion and force; and whether the emergency stop is pressed; behind the answer of a `set`.
+    /// To let go, whatever it answers.
+    Nobody,
+    /// Motion and force; and whether the emergency stop is pressed; behind the answers of so many `set`s.
     Motion {
         with_stop: bool,
-        behind_set: bool,
+        sets: usize,
     },
 }
 
@@ -68,6 +72,12 @@ pub struct HapticMaster {
     /// Sent bytes of `request`.
     sent: usize,
     force_n: DVec3,
+    /// The contact that the arm shall render.
+    wanted: Option<ContactPlane>,
+    /// The one that it renders, if it does.
+    plane: Option<Plane>,
+    /// Where the loop was told that the arm is.
+    shown: Motion,
     reading: Reading,
     /// Since the newest pose was asked for: it is not older.
     age_periods: u64,
@@ -76,6 +86,8 @@ pub struct HapticMaster {
     /// Since a pose came.
     quiet_periods: u64,
     requests: u64,
+    /// Requests that take every force away.
+    farewell: Vec<u8>,
     lost: Option<Fault>,
 }
 
@@ -97,6 +109,7 @@ impl HapticMaster {
     /// When the operating system refuses that.
     pub fn new(started: start::Started, settings: &start::StartSettings, period_s: f64) -> std::io::Result<Self> {
         started.stream.set_nonblocking(true)?;
+        let farewell = request::farewell(settings.plane.is_some());
         Ok(Self {
             stream: started.stream,
             dialect: settings.dialect,
@@ -105,10 +118,13 @@ impl HapticMaster {
             max_force_n: settings.max_force_n,
             answer: Answer::new(),
             asked: Asked::Nothing,
-            request: Vec::with_capacity(grammar::HEADER_BYTES + grammar::LONGEST_TEXT),
-            text: Vec::with_capacity(grammar::LONGEST_TEXT),
+            request: Vec::with_capacity(2 * (grammar::HEADER_BYTES + grammar::LONGEST_TEXT)),
+            text: Vec::with_capacity(grammar::LONGEST_TEXT + request::MARGIN_BYTES),
             sent: 0,
             force_n: DVec3::ZERO,
+            wanted: None,
+            plane: settings.plane.map(Plane::new),
+            shown: Motion::at(started.position_m),
             reading: Reading {
                 motion: Motion::at(started.position_m),
                 buttons: 0,
@@ -120,6 +136,7 @@ impl HapticMaster {
             asked_periods: 0,
             quiet_periods: 0,
             requests: 0,
+            farewell,
             lost: None,
         })
     }
@@ -144,8 +161,8 @@ impl HapticMaster {
             return Err(Fault::Refused);
         }
         let mut parts = grammar::parts(text);
-        if let Asked::Motion { with_stop, behind_set } = self.asked {
-            if behind_set {
+        if let Asked::Motion { with_stop, sets } = self.asked {
+            for _ in 0..sets {
                 parts.next().ok_or(Fault::Garbled)?;
             }
             if with_stop && parts.next().and_then(grammar::truth).ok_or(Fault::Garbled)? {
@@ -168,7 +185,9 @@ impl HapticMaster {
 
     /// Sends the next request, when the last one is answered.
     fn send(&mut self) -> Result<(), Fault> {
-        if self.asked == Asked::Nothing && self.sent == self.request.len() {
+        if self.lost.is_some() {
+            self.let_go();
+        } else if self.asked == Asked::Nothing && self.sent == self.request.len() {
             self.compose();
         }
         while self.sent < self.request.len() {
@@ -181,38 +200,6 @@ impl HapticMaster {
             }
         }
         Ok(())
-    }
-
-    fn compose(&mut self) {
-        self.requests += 1;
-        self.asked_periods = 0;
-        self.text.clear();
-        let mixed = self.dialect == Dialect::Mixed;
-        let sets = mixed || self.requests.is_multiple_of(2);
-        let mut commands = 0;
-        if sets {
-            let f = self.force_n.clamp_length_max(self.max_force_n);
-            // Writing into a Vec cannot fail.
-            let _ = write!(self.text, "set {EFFECT} force [{:.5},{:.5},{:.5}]", f.x, f.y, f.z);
-            commands += 1;
-        }
-        self.asked = Asked::Set;
-        if mixed || !sets {
-            // At the rate of requests that ask for motion, in either dialect.
-            let asks = if mixed { self.requests } else { self.requests / 2 };
-            let with_stop = asks.is_multiple_of(STOP_ASKED_EVERY);
-            for command in with_stop.then_some("get emergencybuttonpushed").into_iter().chain(start::MOTION) {
-                if commands > 0 {
-                    self.text.push(b';');
-                }
-                self.text.extend_from_slice(command.as_bytes());
-                commands += 1;
-            }
-            self.asked = Asked::Motion { with_stop, behind_set: sets };
-        }
-        grammar::frame(&self.text, &mut self.request);
-        self.sent = 0;
-        self.answer.expect(commands);
     }
 
     fn lose(&mut self, fault: Fault) -> Fault {
@@ -233,12 +220,14 @@ impl Arm for HapticMaster {
             return Err(self.lose(Fault::Silent));
         }
         let age_s = self.age_periods as f64 * self.period_s;
-        Ok(Reading { motion: extrapolate(&self.reading.motion, age_s, LONGEST_EXTRAPOLATION_S), age_s, ..self.reading })
+        self.shown = extrapolate(&self.reading.motion, age_s, LONGEST_EXTRAPOLATION_S);
+        Ok(Reading { motion: self.shown, age_s, ..self.reading })
     }
 
-    /// A lost arm is still told to let go, should it hear: every force is zero then.
+    /// A lost arm is still told to let go, should it hear.
     fn apply(&mut self, effort: &Effort) {
-        self.force_n = effort.unless(self.lost.is_some()).force_n;
+        let effort = effort.unless(self.lost.is_some());
+        (self.force_n, self.wanted) = (effort.force_n, effort.plane);
         if let Err(fault) = self.send() {
             self.lose(fault);
         }
@@ -246,14 +235,8 @@ impl Arm for HapticMaster {
 
     fn last_words(&self) -> Option<LastWords> {
         let to = self.stream.try_clone().ok()?.into();
-        let mut bytes = Vec::new();
-        grammar::frame(no_force().as_bytes(), &mut bytes);
-        Some(LastWords { to, bytes })
+        Some(LastWords { to, bytes: self.farewell.clone() })
     }
-}
-
-fn no_force() -> String {
-    format!("set {EFFECT} force [0,0,0]")
 }
 
 impl Drop for HapticMaster {
@@ -264,7 +247,7 @@ impl Drop for HapticMaster {
         let _ = self.stream.set_write_timeout(Some(FAREWELL));
         // What is left of the last request first, or the arm would take this for its end.
         let _ = self.stream.write_all(&self.request[self.sent..]);
-        for text in [no_force(), "remove all".to_owned()] {
+        for text in request::let_go(self.plane.is_some()).chain(["remove all".to_owned()]) {
             grammar::frame(text.as_bytes(), &mut self.request);
             let _ = self.stream.write_all(&self.request).and_then(|()| self.stream.read(&mut [0; 1024]));
         }

@@ -2,6 +2,7 @@
 use super::{
     Dialect, EFFECT,
     grammar::{self, Answer},
+    plane::{self, PlaneSettings},
 };
 use crate::device::tcp;
 use glam::DVec3;
@@ -33,6 +34,8 @@ pub struct StartSettings {
     pub inertia_kg: f64,
     /// Largest force (N) asked of it.
     pub max_force_n: f64,
+    /// The arm renders contacts by itself.
+    pub plane: Option<PlaneSettings>,
     /// How long finding home may take.
     pub homing: Duration,
     /// Without an answer for so long the arm is lost.
@@ -127,6 +130,11 @@ pub fn start(settings: &StartSettings, stop: &CancellationToken) -> Result<Start
     talk.order(&format!("create biasforce {EFFECT}"))?;
     talk.order(&format!("set {EFFECT} force [0,0,0]"))?;
     talk.order(&format!("set {EFFECT} enable"))?;
+    if settings.plane.is_some() {
+        for command in plane::commands_to_create() {
+            talk.order(&command)?;
+        }
+    }
     let command = MOTION[0];
     let answer = talk.ask(command, true)?;
     let position_m = grammar::parts(&answer).next().and_then(grammar::vector);

@@ -139,6 +139,7 @@ impl Guard {
         self.unheard = if is_new { 0 } else { self.unheard.saturating_add(1) };
         self.share = if self.unheard >= PATIENCE_FRAMES { 0.0 } else { (self.share + BACK_PER_FRAME).min(1.0) };
         Effort {
+            plane: None,
             force_n: self.share * newest.force_n.clamp_length_max(self.max_force_n),
             torque_nm: self.share * newest.torque_nm.clamp_length_max(self.max_torque_nm),
         }
@@ -262,7 +263,7 @@ mod tests {
     #[test]
     fn force_is_let_go_after_so_many_frames_without_a_servo_and_comes_back_slowly() {
         let mut guard = Guard::new(2.0, 0.1);
-        let push = Effort { force_n: DVec3::X * 5.0, torque_nm: DVec3::Y };
+        let push = Effort { torque_nm: DVec3::Y, ..Effort::force(DVec3::X * 5.0) };
         assert_eq!(guard.pass(&push, false), Effort::NONE);
         let rising: Vec<f64> = (0..60).map(|_| guard.pass(&push, true).force_n.x).collect();
         assert!(rising.windows(2).all(|pair| (0.0..0.041).contains(&(pair[1] - pair[0]))), "{rising:?}");
@@ -320,7 +321,7 @@ mod tests {
             let mut guard = Guard::new(3.0, 0.2);
             for (numbers, is_new) in frames {
                 let v = DVec3::from(numbers);
-                let effort = guard.pass(&Effort { force_n: v, torque_nm: v }, is_new);
+                let effort = guard.pass(&Effort { torque_nm: v, ..Effort::force(v) }, is_new);
                 prop_assert!(effort.force_n.length() <= 3.0 + 1e-9 && effort.torque_nm.length() <= 0.2 + 1e-9);
             }
         }
