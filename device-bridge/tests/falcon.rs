@@ -5,7 +5,6 @@ mod common;
 use common::press::{self, PRESS, elsewhere, lost_in, pressed_in_n, pressed_n, simulated};
 use glam::DVec3;
 use palpate_bridge::{
-    Config,
     config::{DeviceConfig, FalconConfig, WorkspaceConfig},
     device::{
         Arm as _, Effort, Fault,

@@ -24,9 +24,11 @@ impl Drop for Given<'_> {
     }
 }
 
+/// What is committed: what a fuzzer on this machine has added has names of 40 digits.
 fn corpus(target: &str) -> Vec<Vec<u8>> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("fuzz/corpus").join(target);
     let mut files: Vec<_> = fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()).collect();
+    files.retain(|file| file.file_name().unwrap().len() != 40);
     files.sort_unstable();
     files.iter().map(|file| fs::read(file).unwrap()).collect()
 }

@@ -215,7 +215,8 @@ async fn without_a_guard_the_force_stays_where_the_arm_itself_does_not_let_go() 
                 Holds::ForEver => true,
             };
             let force_n = (arm.force_n)();
-            assert_eq!(force_n.length() > 0.9, holds, "a {name} whose bridge was {what}: {force_n}");
+            // It moves meanwhile, and with it what its torques are worth.
+            assert_eq!(force_n.length() > 0.5, holds, "a {name} whose bridge was {what}: {force_n}");
         }
     }
 }

@@ -5,7 +5,6 @@ mod common;
 use common::press::{self, PRESS, lost_in, pressed_in_n, pressed_n, simulated};
 use glam::{DVec2, DVec3, Vec3Swizzles as _};
 use palpate_bridge::{
-    Config,
     config::{DeviceConfig, Haply2diyConfig, WorkspaceConfig},
     device::{
         Arm as _, Effort, Fault,

@@ -5,7 +5,6 @@ mod common;
 use common::press::{self, PRESSED_N, lost_by, pressed_n, simulated};
 use glam::{DQuat, DVec3};
 use palpate_bridge::{
-    Config,
     config::{DeviceConfig, Inverse3Config, Inverse3Dialect, RealtimeConfig},
     device::{
         Arm as _, Effort, Fault,

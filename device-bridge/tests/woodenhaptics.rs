@@ -5,7 +5,6 @@ mod common;
 use common::press::{self, PRESSED_N, lost_by, pressed_n, simulated, to_arm};
 use glam::DVec3;
 use palpate_bridge::{
-    Config,
     config::{DeviceConfig, WoodenHapticsConfig},
     device::{Arm as _, Effort, Fault, woodenhaptics as driver},
     emulate::{
