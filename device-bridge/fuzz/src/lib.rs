@@ -1,4 +1,4 @@
-//! What has to hold whatever bytes come: a function for each parser of the bridge, which panics where it does not.
+//! What has to hold whatever bytes come: a function for each parser of the bridge, which panics where it does not, and says whether it was understood.
 //!
 //! The fuzzer calls them with bytes of its own making, and `device-bridge/tests/fuzz_corpus.rs` with those in `corpus` and with seeded spoilt ones, so that they
 //! hold on stable Rust, too.
@@ -11,7 +11,7 @@ pub use files::{config, daemon, recording};
 pub use vrpn::{vrpn_payload, vrpn_peer, vrpn_wire};
 
 /// A body, by the name of its target and of its folder in `corpus`.
-pub type Target = (&'static str, fn(&[u8]));
+pub type Target = (&'static str, fn(&[u8]) -> bool);
 
 /// All of them.
 pub const ALL: [Target; 12] = [

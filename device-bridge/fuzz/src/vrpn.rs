@@ -20,8 +20,10 @@ fn put<'a>(bytes: &'a [u8], received: &mut Received) -> &'a [u8] {
     later
 }
 
+type Message = (Header, Vec<u8>);
+
 /// Messages that come in pieces of so many bytes, until one is malformed.
-fn messages(bytes: &[u8], piece: usize) -> (Vec<(Header, Vec<u8>)>, Result<(), Malformed>) {
+fn messages(bytes: &[u8], piece: usize) -> (Vec<Message>, Result<(), Malformed>) {
     let (mut received, mut found) = (Received::default(), Vec::new());
     for mut rest in bytes.chunks(piece) {
         while !rest.is_empty() {
@@ -39,7 +41,7 @@ fn messages(bytes: &[u8], piece: usize) -> (Vec<(Header, Vec<u8>)>, Result<(), M
 }
 
 /// Messages are the same however they are cut, and the same when they are sent again.
-pub fn vrpn_wire(bytes: &[u8]) {
+pub fn vrpn_wire(bytes: &[u8]) -> bool {
     let whole = messages(bytes, bytes.len().max(1));
     for piece in [1, 7, 1000] {
         assert_eq!(messages(bytes, piece), whole, "in pieces of {piece}");
@@ -48,6 +50,7 @@ pub fn vrpn_wire(bytes: &[u8]) {
     for (header, payload) in &whole.0 {
         out.message(*header, |into| into.extend_from_slice(payload));
     }
+    let is_some = !whole.0.is_empty();
     assert_eq!(messages(out.bytes(), 999), (whole.0, Ok(())));
     if let Some(cookie) = bytes.first_chunk::<COOKIE_BYTES>() {
         let mut received = Received::default();
@@ -55,6 +58,7 @@ pub fn vrpn_wire(bytes: &[u8]) {
         assert_eq!((received.cookie(), received.cookie()), (Some(*cookie), None));
         let _ = wire::is_cookie(cookie);
     }
+    is_some
 }
 
 fn written(write: impl FnOnce(&mut Vec<u8>)) -> Vec<u8> {
@@ -64,7 +68,7 @@ fn written(write: impl FnOnce(&mut Vec<u8>)) -> Vec<u8> {
 }
 
 /// What a payload says is finite, and the same when it is written and read again.
-pub fn vrpn_payload(bytes: &[u8]) {
+pub fn vrpn_payload(bytes: &[u8]) -> bool {
     if let Some(pose) = Pose::parse(bytes) {
         assert!(pose.position_m.is_finite() && (pose.orientation.length() - 1.0).abs() < 1e-9, "{pose:?}");
         let again = Pose::parse(&written(|into| pose.write(into)));
@@ -100,6 +104,7 @@ pub fn vrpn_payload(bytes: &[u8]) {
         assert_eq!(payload::parse_name(&again), Some(name.as_bytes()));
     }
     let _ = payload::parse_error(bytes);
+    Pose::parse(bytes).is_some()
 }
 
 /// All that a driver knows after these bytes.
@@ -151,7 +156,7 @@ fn told(
 }
 
 /// A peer is understood in the same way however its messages are cut; numbers are finite, and bytes alone lose an arm by two faults only.
-pub fn vrpn_peer(bytes: &[u8]) {
+pub fn vrpn_peer(bytes: &[u8]) -> bool {
     let whole = driver(bytes, bytes.len().max(1));
     for piece in [1, 17] {
         assert_eq!(driver(bytes, piece), whole, "in pieces of {piece}");
@@ -161,4 +166,5 @@ pub fn vrpn_peer(bytes: &[u8]) {
     assert!(whole.velocity.is_none_or(|v| v.velocity_m_per_s.is_finite() && v.angular_velocity_rad_per_s.is_finite()));
     assert!(whole.force_n.is_none_or(DVec3::is_finite), "{whole:?}");
     assert_eq!(server(bytes, 5), server(bytes, bytes.len().max(1)));
+    whole.pose.is_some() && whole.velocity.is_some() && whole.force_n.is_some()
 }
