@@ -33,18 +33,37 @@ fn corpus(target: &str) -> Vec<Vec<u8>> {
     files.iter().map(|file| fs::read(file).unwrap()).collect()
 }
 
-/// Bytes changed, put in, left out, twice, or followed by another message's.
+/// What parsers fail on more often than on others, of either byte order and both lengths: not a number, infinity, the least and the largest.
+const STRANGE: [&[u8]; 12] = [
+    b"\x7f\xf8\0\0\0\0\0\0",
+    b"\0\0\0\0\0\0\xf8\x7f",
+    b"\xff\xf0\0\0\0\0\0\0",
+    b"\0\0\0\0\0\0\xf0\xff",
+    b"\x7f\xc0\0\0",
+    b"\0\0\xc0\x7f",
+    b"\xff\xff\xff\xff\xff\xff\xff\xff",
+    b"\0\0\0\0\0\0\0\0",
+    b"\x7f\xff\xff\xff",
+    b"NaN",
+    b"-1e999",
+    b"65536",
+];
+
+/// Bytes changed, written over, put in, left out, twice, or followed by another message's.
 fn spoil(bytes: &mut Vec<u8>, other: &[u8], rng: &mut TestRng) {
     for _ in 0..rng.random_range(1..4) {
         let at = rng.random_range(0..=bytes.len());
         let end = (at + rng.random_range(0..9_usize)).min(bytes.len());
         let few: Vec<u8> = (0..rng.random_range(0..9)).map(|_| rng.random()).collect();
-        match rng.random_range(0..6) {
+        let strange = STRANGE[rng.random_range(0..STRANGE.len())];
+        match rng.random_range(0..8) {
             0 if at < bytes.len() => bytes[at] ^= 1 << rng.random_range(0..8),
             1 => drop(bytes.splice(at..end, few)),
             2 => drop(bytes.drain(at..end)),
             3 => bytes.truncate(at),
             4 => bytes.extend_from_within(at..),
+            5 => drop(bytes.splice(at..end, strange.iter().copied())),
+            6 => bytes.iter_mut().skip(at & !3).zip(strange).for_each(|(byte, strange)| *byte = *strange),
             _ => bytes.extend_from_slice(&other[at.min(other.len())..]),
         }
     }

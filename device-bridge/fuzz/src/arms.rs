@@ -121,7 +121,13 @@ pub fn falcon(bytes: &[u8]) -> bool {
     const GOOD: Frame = Frame { numbers: [1, -2, 30_000], flags: falcon_wire::HOMED };
     let (mut frames, mut count) = (Frames::default(), 0);
     for (place, &byte) in bytes.iter().enumerate() {
-        match frames.take(byte) {
+        let found = frames.take(byte);
+        if place + 1 == falcon_wire::FRAME
+            && let Some(Ok(first)) = bytes.first_chunk().map(Frame::parse)
+        {
+            assert_eq!(found, Ok(Some(first)), "the stream began with it");
+        }
+        match found {
             Ok(None) => {}
             Ok(Some(frame)) => {
                 count += 1;
