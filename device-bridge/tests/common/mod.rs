@@ -236,6 +236,17 @@ pub fn start(config: Config) -> Running {
     Running { handle, shutdown, task }
 }
 
+/// A daemon and a bridge, whose configuration is changed before, with the force up: 1 N.
+pub async fn pushing(change: impl FnOnce(&mut Config)) -> (Mock, Running) {
+    let mock = Mock::default();
+    let (address, _stop, _serving) = mock.serve("127.0.0.1:0").await;
+    let mut config = config(&format!("http://{address}"));
+    change(&mut config);
+    let bridge = start(config);
+    until("the force is up", || bridge.handle.stats().force_n() > 0.99).await;
+    (mock, bridge)
+}
+
 impl Running {
     /// Stops it and returns its counters.
     pub async fn stop(self) -> palpate_bridge::Summary {
