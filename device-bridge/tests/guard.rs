@@ -128,7 +128,9 @@ fn a_woodenhaptics() -> Arm {
     Arm { device, workspace: here(), force_n: Box::new(move || emulated.force_n()), holds: Holds::NotForLong }
 }
 
-const ARMS: [(&str, fn() -> Arm); 5] = [
+type Start = fn() -> Arm;
+
+const ARMS: [(&str, Start); 5] = [
     ("Falcon", a_falcon),
     ("2diy", a_2diy),
     ("VRPN", a_vrpn_server),
@@ -171,7 +173,7 @@ impl Drop for Bridge {
 }
 
 /// A bridge that pushes with 1 N until this happens to it.
-async fn pushed(arm: &Arm, guard: bool, happens: fn(&mut Bridge)) -> Bridge {
+async fn pushed(arm: &Arm, guard: bool, happens: Happens) -> Bridge {
     let mock = Mock::default();
     let (address, _stop, _serving) = mock.serve("127.0.0.1:0").await;
     let mut config = bridged(&format!("http://{address}"), arm.device.clone());
@@ -186,8 +188,10 @@ async fn pushed(arm: &Arm, guard: bool, happens: fn(&mut Bridge)) -> Bridge {
     bridge
 }
 
+type Happens = fn(&mut Bridge);
+
 /// A bridge that is killed, whose connection ends with it, and one that hangs, whose connection stands.
-const ENDS: [(&str, fn(&mut Bridge)); 2] = [("killed", Bridge::kill), ("stopped", Bridge::stop)];
+const ENDS: [(&str, Happens); 2] = [("killed", Bridge::kill), ("stopped", Bridge::stop)];
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn the_force_is_taken_away_when_the_bridge_is_killed_or_hangs() {
