@@ -1,7 +1,7 @@
 //! The whole bridge against a daemon's Device service on real sockets.
 mod common;
 
-use common::{Mock, config, start, until};
+use common::{Mock, config, pushing, start, until};
 use palpate_bridge::BridgeError;
 use palpate_control::{Fault, Link};
 use palpate_proto::v1;
@@ -11,10 +11,7 @@ use tonic::Status;
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn pose_goes_up_force_comes_down_and_the_arm_yields() {
-    let mock = Mock::default();
-    let (address, _stop, _serving) = mock.serve("127.0.0.1:0").await;
-    let bridge = start(config(&format!("http://{address}")));
-    until("the force is up", || bridge.handle.stats().force_n() > 0.99).await;
+    let (mock, bridge) = pushing(|_| {}).await;
     // 1 N on a hand of 300 N/m: 3.3 mm.
     until("the arm has yielded", || {
         let z = |sample: &v1::DeviceSample| sample.pose.unwrap().position_m.unwrap().z;
@@ -37,11 +34,8 @@ async fn pose_goes_up_force_comes_down_and_the_arm_yields() {
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn stopping_ramps_to_zero_and_ends_the_stream() {
-    let mock = Mock::default();
-    let (address, _stop, _serving) = mock.serve("127.0.0.1:0").await;
-    let bridge = start(config(&format!("http://{address}")));
+    let (mock, bridge) = pushing(|_| {}).await;
     let handle = bridge.handle.clone();
-    until("the force is up", || handle.stats().force_n() > 0.99).await;
     let summary = bridge.stop().await;
     assert_eq!((summary.final_force_n, handle.stats().link()), (0.0, Link::Latched(Fault::Requested)));
     assert!(!summary.to_string().contains("without force"), "a stop is no fault: {summary}");
@@ -51,11 +45,8 @@ async fn stopping_ramps_to_zero_and_ends_the_stream() {
 /// The counters at the end did not say that the arm had been without force for an hour.
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn an_end_in_a_latched_fault_says_so_and_how_to_recover() {
-    let mock = Mock::default();
-    let (address, _stop, _serving) = mock.serve("127.0.0.1:0").await;
-    let bridge = start(config(&format!("http://{address}")));
+    let (mock, bridge) = pushing(|_| {}).await;
     let stats = bridge.handle.stats();
-    until("the force is up", || stats.force_n() > 0.99).await;
     mock.set(|behaviour| behaviour.silent = true);
     until("the fault is latched", || stats.link() == Link::Latched(Fault::Stale)).await;
     let shown = bridge.stop().await.to_string();
@@ -67,11 +58,8 @@ async fn an_end_in_a_latched_fault_says_so_and_how_to_recover() {
 /// A bridge whose caller dropped it went on pressing, with nobody left to stop it.
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn a_bridge_that_is_dropped_lets_the_arm_go() {
-    let mock = Mock::default();
-    let (address, _stop, _serving) = mock.serve("127.0.0.1:0").await;
-    let bridge = start(config(&format!("http://{address}")));
+    let (mock, bridge) = pushing(|_| {}).await;
     let handle = bridge.handle.clone();
-    until("the force is up", || handle.stats().force_n() > 0.99).await;
     bridge.task.abort();
     until("the force is gone", || handle.stats().link() == Link::Latched(Fault::Requested)).await;
     assert_eq!(handle.stats().force_n(), 0.0);
@@ -80,11 +68,8 @@ async fn a_bridge_that_is_dropped_lets_the_arm_go() {
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn a_silent_daemon_means_zero_force_until_recovered() {
-    let mock = Mock::default();
-    let (address, _stop, _serving) = mock.serve("127.0.0.1:0").await;
-    let bridge = start(config(&format!("http://{address}")));
+    let (mock, bridge) = pushing(|_| {}).await;
     let stats = bridge.handle.stats();
-    until("the force is up", || stats.force_n() > 0.99).await;
     mock.set(|behaviour| behaviour.silent = true);
     until("the fault is latched", || stats.link() == Link::Latched(Fault::Stale)).await;
     assert_eq!(stats.force_n(), 0.0);
@@ -101,14 +86,12 @@ async fn a_silent_daemon_means_zero_force_until_recovered() {
 /// for busy test machines: 5 ms, 15 ms of ramp, answers 8 ms and 25 ms old.
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn the_delay_of_the_network_counts_as_age() {
-    let mock = Mock::default();
-    let (address, _stop, _serving) = mock.serve("127.0.0.1:0").await;
-    let mut config = config(&format!("http://{address}"));
-    (config.watchdog.stale_after_s, config.watchdog.ramp_to_zero_s) = (0.25, 0.75);
-    config.servo.least_success_rate = 0.0;
-    let bridge = start(config);
+    let (mock, bridge) = pushing(|config| {
+        (config.watchdog.stale_after_s, config.watchdog.ramp_to_zero_s) = (0.25, 0.75);
+        config.servo.least_success_rate = 0.0;
+    })
+    .await;
     let stats = bridge.handle.stats();
-    until("the force is up", || stats.force_n() > 0.99).await;
     mock.set(|behaviour| behaviour.delay = Duration::from_millis(400));
     until("the force ramps", || stats.link() == Link::Ramping(Fault::Stale) && stats.force_n() < 0.85).await;
     let received = stats.received.get();
@@ -125,13 +108,8 @@ async fn the_delay_of_the_network_counts_as_age() {
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn with_auto_recover_the_force_comes_back_by_itself() {
-    let mock = Mock::default();
-    let (address, _stop, _serving) = mock.serve("127.0.0.1:0").await;
-    let mut config = config(&format!("http://{address}"));
-    config.servo.auto_recover = true;
-    let bridge = start(config);
+    let (mock, bridge) = pushing(|config| config.servo.auto_recover = true).await;
     let stats = bridge.handle.stats();
-    until("the force is up", || stats.force_n() > 0.99).await;
     mock.set(|behaviour| behaviour.silent = true);
     until("the fault is latched", || stats.link() == Link::Latched(Fault::Stale)).await;
     mock.set(|behaviour| behaviour.silent = false);
@@ -165,11 +143,8 @@ async fn a_daemon_that_dies_and_returns_is_found_again() {
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn nan_from_the_daemon_never_reaches_the_arm() {
-    let mock = Mock::default();
-    let (address, _stop, _serving) = mock.serve("127.0.0.1:0").await;
-    let bridge = start(config(&format!("http://{address}")));
+    let (mock, bridge) = pushing(|_| {}).await;
     let stats = bridge.handle.stats();
-    until("the force is up", || stats.force_n() > 0.99).await;
     mock.set(|behaviour| behaviour.wrench_n.z = f64::NAN);
     until("commands are refused", || stats.rejected.get() > 20).await;
     // Refused commands are no commands: the data grow stale, and the force goes to zero.
@@ -230,11 +205,8 @@ async fn the_local_model_is_rendered_beside_the_arm() {
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn a_quarantined_body_stops_the_force() {
-    let mock = Mock::default();
-    let (address, _stop, _serving) = mock.serve("127.0.0.1:0").await;
-    let bridge = start(config(&format!("http://{address}")));
+    let (mock, bridge) = pushing(|_| {}).await;
     let stats = bridge.handle.stats();
-    until("the force is up", || stats.force_n() > 0.99).await;
     mock.set(|behaviour| behaviour.fault = Some(v1::DeviceFaultCode::Quarantined));
     until("the fault is latched", || stats.link() == Link::Latched(Fault::Peer)).await;
     assert_eq!((stats.force_n(), bridge.stop().await.peer_faults), (0.0, 1));

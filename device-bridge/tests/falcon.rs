@@ -5,7 +5,6 @@ mod common;
 use common::press::{self, PRESS, elsewhere, lost_in, pressed_in_n, pressed_n, simulated};
 use glam::DVec3;
 use palpate_bridge::{
-    Config,
     config::{DeviceConfig, FalconConfig, WorkspaceConfig},
     device::{
         Arm as _, Effort, Fault,
@@ -15,7 +14,6 @@ use palpate_bridge::{
         Faults,
         falcon::{Falcon, Settings},
     },
-    probe::probe,
     settings::arm,
 };
 use palpate_control::{ArmSpec, HandPath, Keyframe};
@@ -140,17 +138,14 @@ fn motors_are_off_after_the_last_frame_if_the_firmware_sees_to_it() {
 fn a_probe_says_where_the_arm_is_and_what_is_pressed() {
     let arm = emulator(resting());
     arm.press(0b0101);
-    let config = Config { device: device(&arm), ..common::config("http://127.0.0.1:1") };
-    let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().unwrap();
-    let _context = runtime.enter();
-    let report = probe(&config, Duration::from_millis(400)).unwrap();
+    let report = common::probed(device(&arm), Duration::from_millis(400)).unwrap();
     // Half a step of each encoder.
     assert!(report.position_m.distance(AT_M) < 5e-5, "{report}");
     assert!(report.measured_force_n.is_none() && report.poses_per_s > 50.0, "{report}");
     assert_eq!(report.buttons, 0b0101);
     Faults::set(&arm.faults.cut, true);
     std::thread::sleep(Duration::from_millis(20));
-    assert!(probe(&config, Duration::from_millis(100)).is_err());
+    assert!(common::probed(device(&arm), Duration::from_millis(100)).is_err());
 }
 
 /// Frames split into bytes are put together; place and velocity follow the arm.
@@ -162,11 +157,7 @@ fn poses_follow_the_arm_though_frames_come_in_pieces() {
         Faults::set(&emulated.faults.split, split);
         let mut arm = started(&emulated);
         let began_m = arm.read(0).unwrap().motion.position_m;
-        let (mut farthest_m, mut way_m) = (0.0_f64, DVec3::ZERO);
-        press::follow(&mut arm, |reading, passed_s| {
-            farthest_m = farthest_m.max(reading.motion.position_m.distance(emulated.position_m()));
-            way_m += passed_s * reading.motion.velocity_m_per_s;
-        });
+        let (farthest_m, way_m) = press::followed(&mut arm, || emulated.position_m());
         let end = arm.read(0).unwrap();
         assert!(end.motion.position_m.distance(emulated.position_m()) < 1e-4, "{:?}", end.motion);
         assert!(emulated.position_m().x > 0.02 && emulated.frames() > 100);
@@ -182,15 +173,8 @@ fn no_torque_beyond_the_limit_is_asked_for_and_the_force_keeps_its_direction() {
     let emulated = emulator(resting());
     // Not so much that the arm flies off while it is looked at.
     let mut arm = open(&FalconConfig { max_torque_units: 600, ..keys(emulated.port()) }).unwrap();
-    let mut apply = |force_n: DVec3| {
-        press::hold(&mut arm, force_n);
-        emulated.force_n()
-    };
     let weak = DVec3::new(0.3, -0.5, 1.0);
-    assert!((apply(weak) - weak).length() < 0.01, "{}", apply(weak));
-    let strong = apply(weak * 1e6);
-    assert!(strong.normalize().distance(weak.normalize()) < 0.02 && strong.length() < 3.0, "{strong}");
-    assert_eq!(apply(DVec3::new(f64::NAN, 0.0, 0.0)), DVec3::ZERO);
+    press::bounded(&mut arm, || emulated.force_n(), weak, 3.0);
 }
 
 /// With the usual constants and in the middle; docs/arms/falcon.md says so.
@@ -244,7 +228,7 @@ fn the_driver_waits_until_the_arm_knows_its_home() {
     let began = Instant::now();
     let error = open(&FalconConfig { homing_s: 0.1, ..keys(emulated.port()) }).unwrap_err().to_string();
     assert!(error.contains("not shown its home within 0.1 s") && error.contains("all the way out"), "{error}");
-    common_until(|| emulated.lights() == wire::RED);
+    common::wait("its light asks for its home", || emulated.lights() == wire::RED);
     let mut arm = started(&emulated);
     assert!(began.elapsed() > homing);
     assert!(arm.read(0).unwrap().motion.position_m.distance(AT_M) < 5e-5);
@@ -259,19 +243,11 @@ fn a_start_that_waits_can_be_stopped() {
     let token = stop.clone();
     let settings = constants(&keys(emulated.port()));
     let start = std::thread::spawn(move || driver::Falcon::open(&settings, 1e-3, &token).map(|_| ()));
-    common_until(|| emulated.frames() > 10);
+    common::wait("it is asked for its home", || emulated.frames() > 10);
     stop.cancel();
     let began = Instant::now();
     assert_eq!(start.join().unwrap().unwrap_err().to_string(), "its start was stopped");
     assert!(began.elapsed() < Duration::from_secs(5));
-}
-
-fn common_until(condition: impl Fn() -> bool) {
-    let began = Instant::now();
-    while !condition() {
-        assert!(began.elapsed() < Duration::from_secs(20));
-        std::thread::sleep(Duration::from_millis(1));
-    }
 }
 
 #[test]
@@ -322,7 +298,7 @@ fn a_lost_arm_stays_lost_and_is_told_to_let_go() {
     let mut arm = started(&emulated);
     press::hold(&mut arm, DVec3::Z);
     Faults::set(&emulated.faults.garbage, true);
-    common_until(|| emulated.force_n().z > 0.9);
+    common::wait("it pushes", || emulated.force_n().z > 0.9);
     let began = Instant::now();
     while arm.read(1).is_ok() {
         assert!(began.elapsed() < Duration::from_secs(5));
@@ -332,5 +308,5 @@ fn a_lost_arm_stays_lost_and_is_told_to_let_go() {
     Faults::set(&emulated.faults.garbage, false);
     arm.apply(&Effort::force(DVec3::Z));
     assert_eq!(arm.read(1), Err(Fault::Garbled));
-    common_until(|| emulated.force_n() == DVec3::ZERO);
+    common::wait("it lets go", || emulated.force_n() == DVec3::ZERO);
 }

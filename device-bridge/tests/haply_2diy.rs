@@ -5,7 +5,6 @@ mod common;
 use common::press::{self, PRESS, lost_in, pressed_in_n, pressed_n, simulated};
 use glam::{DVec2, DVec3, Vec3Swizzles as _};
 use palpate_bridge::{
-    Config,
     config::{DeviceConfig, Haply2diyConfig, WorkspaceConfig},
     device::{
         Arm as _, Effort, Fault,
@@ -15,7 +14,6 @@ use palpate_bridge::{
         Faults,
         haply_2diy::{Haply2diy, Settings},
     },
-    probe::probe,
     settings::arm,
 };
 use palpate_control::{ArmSpec, HandPath, Keyframe};
@@ -129,11 +127,7 @@ fn a_start_takes_away_what_a_killed_bridge_left() {
     let request = wire::request(constants.device_id, [0.05, -0.05]);
     killed.write_all(&[&setup[..], &request].concat()).unwrap();
     drop(killed);
-    let began = Instant::now();
-    while emulated.force_n() == DVec3::ZERO {
-        assert!(began.elapsed() < Duration::from_secs(5));
-        std::thread::sleep(Duration::from_millis(1));
-    }
+    common::wait("it pushes", || emulated.force_n() != DVec3::ZERO);
     std::thread::sleep(Duration::from_millis(600));
     assert!(emulated.force_n().length() > 0.3, "nothing takes it away by itself");
     let _arm = started(&emulated);
@@ -153,26 +147,19 @@ fn a_board_with_a_watchdog_lets_go_by_itself() {
     let emulated = Haply2diy::start(settings).unwrap();
     let mut arm = started(&emulated);
     press::hold(&mut arm, DVec3::Y);
-    let began = Instant::now();
-    while emulated.force_n() != DVec3::ZERO {
-        assert!(began.elapsed() < Duration::from_secs(5));
-        std::thread::sleep(Duration::from_millis(1));
-    }
+    common::wait("it lets go", || emulated.force_n() == DVec3::ZERO);
 }
 
 #[test]
 fn a_probe_says_where_the_arm_is() {
     let arm = emulator(resting());
-    let config = Config { device: device(&arm), ..common::config("http://127.0.0.1:1") };
-    let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().unwrap();
-    let _context = runtime.enter();
-    let report = probe(&config, Duration::from_millis(400)).unwrap();
+    let report = common::probed(device(&arm), Duration::from_millis(400)).unwrap();
     // Half a step of each encoder.
     assert!(report.position_m.distance(AT_M) < 2e-5, "{report}");
     assert!(report.measured_force_n.is_none() && report.poses_per_s > 50.0, "{report}");
     Faults::set(&arm.faults.cut, true);
     std::thread::sleep(Duration::from_millis(20));
-    assert!(probe(&config, Duration::from_millis(100)).is_err());
+    assert!(common::probed(device(&arm), Duration::from_millis(100)).is_err());
 }
 
 /// Answers split into bytes are put together; place and velocity follow the arm.
@@ -183,11 +170,7 @@ fn poses_follow_the_arm_though_answers_come_in_pieces() {
         let emulated = emulator(HandPath::new(keys_of.to_vec(), None).unwrap());
         Faults::set(&emulated.faults.split, split);
         let mut arm = started(&emulated);
-        let (mut farthest_m, mut way_m) = (0.0_f64, DVec3::ZERO);
-        press::follow(&mut arm, |reading, passed_s| {
-            farthest_m = farthest_m.max(reading.motion.position_m.distance(emulated.position_m()));
-            way_m += passed_s * reading.motion.velocity_m_per_s;
-        });
+        let (farthest_m, way_m) = press::followed(&mut arm, || emulated.position_m());
         let end = arm.read(0).unwrap();
         assert!(end.motion.position_m.distance(emulated.position_m()) < 1e-4, "{:?}", end.motion);
         assert!(emulated.position_m().x > 0.02 && emulated.requests() > 100);
@@ -218,17 +201,11 @@ fn angles_count_from_where_the_arm_is_when_the_bridge_starts() {
 fn no_torque_beyond_the_limit_is_asked_for_and_the_force_keeps_its_direction() {
     let emulated = emulator(resting());
     let mut arm = started(&emulated);
-    let mut apply = |force_n: DVec3| {
-        press::hold(&mut arm, force_n);
-        emulated.force_n()
-    };
     let weak = DVec3::new(0.3, -0.5, 0.0);
     // What is along z is not felt.
-    let felt_n = apply(weak + 2.0 * DVec3::Z);
-    assert!((felt_n - weak).length() < 0.01, "{felt_n}");
-    let strong = apply(weak * 1e6);
-    assert!(strong.normalize().distance(weak.normalize()) < 0.02 && strong.length() < 20.0, "{strong}");
-    assert_eq!(apply(DVec3::new(f64::NAN, 0.0, 0.0)), DVec3::ZERO);
+    press::hold(&mut arm, weak + 2.0 * DVec3::Z);
+    assert!((emulated.force_n() - weak).length() < 0.01, "{}", emulated.force_n());
+    press::bounded(&mut arm, || emulated.force_n(), weak, 20.0);
 }
 
 /// The published board's motors give so much; docs/arms/haply-2diy.md says so.
@@ -286,8 +263,5 @@ fn a_lost_arm_stays_lost_and_is_told_to_let_go() {
     Faults::set(&emulated.faults.garbage, false);
     arm.apply(&Effort::force(DVec3::Y));
     assert_eq!(arm.read(1), Err(Fault::Garbled));
-    while emulated.force_n() != DVec3::ZERO {
-        assert!(began.elapsed() < Duration::from_secs(5));
-        std::thread::sleep(Duration::from_millis(1));
-    }
+    common::wait("it lets go", || emulated.force_n() == DVec3::ZERO);
 }

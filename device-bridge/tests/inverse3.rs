@@ -5,7 +5,6 @@ mod common;
 use common::press::{self, PRESSED_N, lost_by, pressed_n, simulated};
 use glam::{DQuat, DVec3};
 use palpate_bridge::{
-    Config,
     config::{DeviceConfig, Inverse3Config, Inverse3Dialect, RealtimeConfig},
     device::{
         Arm as _, Effort, Fault,
@@ -15,7 +14,6 @@ use palpate_bridge::{
         Faults,
         inverse3::{DEVICE_ID, GRIP_ID, Garbage, Grip, Inverse3, Settings},
     },
-    probe::probe,
     settings::arm,
 };
 use palpate_control::{HandPath, Keyframe};
@@ -165,15 +163,12 @@ fn a_probe_says_where_the_arm_is() {
     let arm = emulator(Settings { others: 1, ..resting() });
     arm.hold_grip(DQuat::IDENTITY, 0b101);
     let keys = Inverse3Config { device_id: DEVICE_ID.into(), ..keys(&arm.url()) };
-    let config = Config { device: DeviceConfig::Inverse3(keys), ..common::config("http://127.0.0.1:1") };
-    let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().unwrap();
-    let _context = runtime.enter();
-    let report = probe(&config, Duration::from_millis(400)).unwrap();
+    let report = common::probed(DeviceConfig::Inverse3(keys.clone()), Duration::from_millis(400)).unwrap();
     assert!(report.position_m.distance(DVec3::new(0.01, 0.02, 0.03)) < 1e-6, "{report}");
     assert!(report.measured_force_n.is_none() && report.buttons == 0b101 && report.poses_per_s > 50.0, "{report}");
     Faults::set(&arm.faults.cut, true);
     std::thread::sleep(Duration::from_millis(20));
-    assert!(probe(&config, Duration::from_millis(100)).is_err());
+    assert!(common::probed(DeviceConfig::Inverse3(keys), Duration::from_millis(100)).is_err());
 }
 
 /// Frames split into bytes, messages split into frames, several at once, slow ones: place and velocity follow the arm, as far as their age allows.

@@ -18,7 +18,6 @@ use palpate_bridge::{
         Faults,
         phantom::{Calibration, Settings},
     },
-    probe::probe,
     settings::arm,
 };
 use palpate_control::{HandPath, Keyframe};
@@ -164,14 +163,11 @@ fn an_arm_is_left_without_force_and_can_be_used_again() {
 #[test]
 fn a_probe_says_where_the_arm_is() {
     let emulated = Emulated::new(Settings { buttons: 0b10, ..resting() });
-    let config = Config { device: DeviceConfig::Phantom(emulated.keys()), ..common::config("http://127.0.0.1:1") };
-    let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().unwrap();
-    let _context = runtime.enter();
-    let report = probe(&config, Duration::from_millis(400)).unwrap();
+    let report = common::probed(DeviceConfig::Phantom(emulated.keys()), Duration::from_millis(400)).unwrap();
     assert!(report.position_m.distance(PLACE_M) < 1e-12 && report.buttons == 0b10, "{report}");
     assert!(report.measured_force_n.is_none() && report.poses_per_s > 50.0, "{report}");
     Faults::set(&emulated.arm.faults.cut, true);
-    assert!(probe(&config, Duration::from_millis(100)).is_err());
+    assert!(common::probed(DeviceConfig::Phantom(emulated.keys()), Duration::from_millis(100)).is_err());
 }
 
 /// Every number that goes through C comes out as it went in.

@@ -5,14 +5,12 @@ mod common;
 use common::press::{self, PRESSED_N, lost_by, pressed_n, simulated, to_arm};
 use glam::DVec3;
 use palpate_bridge::{
-    Config,
     config::{DeviceConfig, WoodenHapticsConfig},
     device::{Arm as _, Effort, Fault, woodenhaptics as driver},
     emulate::{
         Faults,
         woodenhaptics::{Settings, WoodenHaptics},
     },
-    probe::probe,
     settings::arm,
 };
 use palpate_control::{ArmSpec, HandPath, Keyframe};
@@ -121,16 +119,13 @@ fn motors_are_off_half_a_second_after_the_last_line() {
 #[test]
 fn a_probe_says_where_the_arm_is() {
     let arm = emulator(true, resting());
-    let config = Config { device: device(&arm), ..common::config("http://127.0.0.1:1") };
-    let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().unwrap();
-    let _context = runtime.enter();
-    let report = probe(&config, Duration::from_millis(400)).unwrap();
+    let report = common::probed(device(&arm), Duration::from_millis(400)).unwrap();
     // Half a step of each encoder.
     assert!(report.position_m.distance(DVec3::new(0.01, 0.02, 0.03)) < 2e-5, "{report}");
     assert!(report.measured_force_n.is_none() && report.poses_per_s > 50.0, "{report}");
     Faults::set(&arm.faults.cut, true);
     std::thread::sleep(Duration::from_millis(20));
-    assert!(probe(&config, Duration::from_millis(100)).is_err());
+    assert!(common::probed(device(&arm), Duration::from_millis(100)).is_err());
 }
 
 /// Lines split into bytes are put together; place and velocity follow the arm.
@@ -141,16 +136,11 @@ fn poses_follow_the_arm_though_lines_come_in_pieces() {
         let emulated = emulator(answers, HandPath::new(keys_of.to_vec(), None).unwrap());
         Faults::set(&emulated.faults.split, split);
         let mut arm = driver::WoodenHaptics::start(&constants(&keys(emulated.port())), 1e-3).unwrap();
-        let (mut farthest_m, mut way_m) = (0.0_f64, DVec3::ZERO);
-        press::follow(&mut arm, |reading, passed_s| {
-            farthest_m = farthest_m.max(reading.motion.position_m.distance(emulated.position_m()));
-            way_m += passed_s * reading.motion.velocity_m_per_s;
-        });
+        let (farthest_m, way_m) = press::followed(&mut arm, || emulated.position_m());
         let end = arm.read(0).unwrap();
         assert!(end.motion.position_m.distance(emulated.position_m()) < 1e-4, "{:?}", end.motion);
         assert!(emulated.position_m().x > 0.02 && emulated.lines() > 100);
         assert!(farthest_m < 5e-3, "{farthest_m}");
-        // All its velocities make its way; one of them says nothing where a busy machine tells lines late.
         assert!(way_m.distance(end.motion.position_m) < 3e-3, "{way_m}, {:?}", end.motion);
         assert!(end.motion.velocity_m_per_s.length() < 5e-3, "{:?}", end.motion);
     }
@@ -160,15 +150,8 @@ fn poses_follow_the_arm_though_lines_come_in_pieces() {
 fn no_current_beyond_the_limit_is_asked_for_and_the_force_keeps_its_direction() {
     let emulated = emulator(false, resting());
     let mut arm = driver::WoodenHaptics::start(&constants(&keys(emulated.port())), 1e-3).unwrap();
-    let mut apply = |force_n: DVec3| {
-        press::hold(&mut arm, force_n);
-        emulated.force_n()
-    };
     let weak = DVec3::new(0.3, -0.5, 1.0);
-    assert!((apply(weak) - weak).length() < 0.01, "{}", apply(weak));
-    let strong = apply(weak * 1e6);
-    assert!(strong.normalize().distance(weak.normalize()) < 0.02 && strong.length() < 20.0, "{strong}");
-    assert_eq!(apply(DVec3::new(f64::NAN, 0.0, 0.0)), DVec3::ZERO);
+    press::bounded(&mut arm, || emulated.force_n(), weak, 20.0);
 }
 
 #[test]

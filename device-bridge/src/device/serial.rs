@@ -6,7 +6,7 @@ use std::{
     fs::File,
     io::{ErrorKind, Read as _, Write as _},
     os::unix::fs::OpenOptionsExt as _,
-    time::Duration,
+    time::{Duration, Instant},
 };
 use thiserror::Error;
 
@@ -27,6 +27,53 @@ pub struct OpenError {
     pub path: String,
     /// Why.
     pub source: serialport::Error,
+}
+
+/// An arm that could not be started.
+#[derive(Debug, Error)]
+pub enum StartError {
+    /// No port.
+    #[error(transparent)]
+    Open(#[from] OpenError),
+    /// Not a word.
+    #[error("no {what} came from {path} within {} s: is the arm's board switched on?", patience.as_secs())]
+    Silent {
+        /// The port.
+        path: String,
+        /// What was waited for.
+        what: &'static str,
+        /// How long.
+        patience: Duration,
+    },
+    /// Something else.
+    #[error("{path}: {fault}; is it this arm's port?")]
+    Strange {
+        /// The port.
+        path: String,
+        /// What went wrong.
+        fault: Fault,
+    },
+}
+
+/// Opens the line of an arm and waits for its first message, a `what`, for which `look` asks and looks. Blocks.
+///
+/// # Errors
+/// [`StartError`].
+pub fn start<T>(
+    (path, baud): (&str, u32),
+    (what, patience): (&'static str, Duration),
+    mut look: impl FnMut(&mut Line) -> Result<Option<T>, Fault>,
+) -> Result<(Line, T), StartError> {
+    let mut line = Line::open(path, baud)?;
+    let began = Instant::now();
+    loop {
+        if let Some(first) = look(&mut line).map_err(|fault| StartError::Strange { path: path.to_owned(), fault })? {
+            return Ok((line, first));
+        }
+        if began.elapsed() > patience {
+            return Err(StartError::Silent { path: path.to_owned(), what, patience });
+        }
+    }
 }
 
 /// A line of an arm, which nobody else may open meanwhile.

@@ -1,12 +1,12 @@
 //! A Haply Inverse3 that is not there, behind a service of its own: a WebSocket server, the motion of an arm in a hand, and a grip.
-use super::{Faults, Running, Shared};
+use super::{Faults, Listening, Shared};
 use crate::device::inverse3::Dialect;
 use glam::{DQuat, DVec3};
 use palpate_control::{ArmSpec, HandPath, ParameterError, SimulatedArm};
 use serde_json::{Value, json};
 use std::{
     io::{ErrorKind, Read, Write},
-    net::{SocketAddr, TcpListener, TcpStream},
+    net::TcpStream,
     sync::{Arc, atomic::Ordering},
     time::{Duration, Instant},
 };
@@ -100,11 +100,9 @@ impl Default for Settings {
 /// It runs until dropped.
 #[derive(Debug)]
 pub struct Inverse3 {
-    address: SocketAddr,
     /// What it does wrong.
     pub faults: Arc<Faults>,
-    shared: Shared<Machine>,
-    _running: Running,
+    listening: Listening<Machine>,
 }
 
 impl Inverse3 {
@@ -113,43 +111,41 @@ impl Inverse3 {
     /// # Errors
     /// When the address is taken, or the arm's constants are out of range.
     pub fn listen(address: &str, settings: Settings) -> std::io::Result<Self> {
-        let listener = TcpListener::bind(address)?;
-        listener.set_nonblocking(true)?;
-        let address = listener.local_addr()?;
-        let machine = Machine::new(settings).map_err(|error| std::io::Error::new(ErrorKind::InvalidInput, error))?;
-        let shared = Shared::new(machine);
-        let server = Server(shared.clone());
-        let running = Running::start("inverse3", &shared.stop, move || server.run(&listener))?;
-        Ok(Self { address, faults: Arc::clone(&shared.faults), shared, _running: running })
+        let listening = Listening::start("inverse3", address, Machine::new(settings), |shared, stream| {
+            // Who hangs up is served no more; the arm has no force then.
+            let _ = Server(shared).serve(stream);
+            shared.machine().force_n = DVec3::ZERO;
+        })?;
+        Ok(Self { faults: Arc::clone(&listening.shared.faults), listening })
     }
 
     /// Where it listens.
     pub fn url(&self) -> String {
-        format!("ws://{}", self.address)
+        format!("ws://{}", self.listening.address)
     }
 
     /// Force (N, the service's axes) on the arm now.
     pub fn force_n(&self) -> DVec3 {
-        let mut machine = self.shared.machine();
+        let mut machine = self.listening.machine();
         machine.go_on();
         machine.force_n
     }
 
     /// Where it is (m, the service's axes).
     pub fn position_m(&self) -> DVec3 {
-        let mut machine = self.shared.machine();
+        let mut machine = self.listening.machine();
         machine.go_on();
         machine.arm.motion().position_m
     }
 
     /// Turns the grip, and presses its buttons (a, b and c are the bits 0, 1 and 2).
     pub fn hold_grip(&self, orientation: DQuat, buttons: u32) {
-        self.shared.machine().held = (orientation, buttons);
+        self.listening.machine().held = (orientation, buttons);
     }
 
     /// Commands that it heard.
     pub fn commands(&self) -> u64 {
-        self.shared.machine().commands
+        self.listening.machine().commands
     }
 }
 
@@ -176,22 +172,9 @@ impl Write for Splitting {
     }
 }
 
-struct Server(Shared<Machine>);
+struct Server<'a>(&'a Shared<Machine>);
 
-impl Server {
-    fn run(&self, listener: &TcpListener) {
-        while !Faults::is(&self.0.stop) {
-            match listener.accept() {
-                Ok((stream, _)) => {
-                    // Who hangs up is served no more; the arm has no force then.
-                    let _ = self.serve(stream);
-                    self.0.machine().force_n = DVec3::ZERO;
-                }
-                Err(_) => std::thread::sleep(LOOK_EVERY),
-            }
-        }
-    }
-
+impl Server<'_> {
     fn serve(&self, stream: TcpStream) -> Result<(), Error> {
         stream.set_nonblocking(false)?;
         stream.set_nodelay(true)?;

@@ -9,13 +9,20 @@ pub mod phantom;
 pub mod vrpn;
 pub mod woodenhaptics;
 
+use palpate_control::ParameterError;
 use std::{
+    io::{Error, ErrorKind},
+    net::{SocketAddr, TcpListener, TcpStream},
     sync::{
         Arc, Mutex, MutexGuard, PoisonError,
         atomic::{AtomicBool, AtomicU32, Ordering},
     },
     thread::JoinHandle,
+    time::Duration,
 };
+
+/// How often a listener looks who came.
+const LOOK_EVERY: Duration = Duration::from_micros(200);
 
 /// What an emulator does wrong. Set while it runs.
 #[derive(Debug, Default)]
@@ -99,5 +106,42 @@ impl Drop for Running {
         if let Some(thread) = self.thread.take() {
             let _ = thread.join();
         }
+    }
+}
+
+/// A machine behind a TCP port, for one client after the other. It runs until dropped.
+#[derive(Debug)]
+struct Listening<M> {
+    address: SocketAddr,
+    shared: Shared<M>,
+    _running: Running,
+}
+
+impl<M: Send + 'static> Listening<M> {
+    /// Listens, with a thread of its own, on which `serve` has each client until that is over.
+    fn start(
+        name: &str,
+        address: &str,
+        machine: Result<M, ParameterError>,
+        serve: impl Fn(&Shared<M>, TcpStream) + Send + 'static,
+    ) -> std::io::Result<Self> {
+        let listener = TcpListener::bind(address)?;
+        listener.set_nonblocking(true)?;
+        let address = listener.local_addr()?;
+        let shared = Shared::new(machine.map_err(|error| Error::new(ErrorKind::InvalidInput, error))?);
+        let served = shared.clone();
+        let running = Running::start(name, &shared.stop, move || {
+            while !Faults::is(&served.stop) {
+                match listener.accept() {
+                    Ok((stream, _)) => serve(&served, stream),
+                    Err(_) => std::thread::sleep(LOOK_EVERY),
+                }
+            }
+        })?;
+        Ok(Self { address, shared, _running: running })
+    }
+
+    fn machine(&self) -> MutexGuard<'_, M> {
+        self.shared.machine()
     }
 }

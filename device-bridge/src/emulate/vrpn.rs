@@ -1,5 +1,5 @@
 //! A VRPN server that is not there, with an arm whose force device renders fields of force. One client at a time; all goes by TCP.
-use super::{Faults, Running, Shared};
+use super::{Faults, Listening, Shared};
 use crate::device::vrpn::{
     payload::{self, ForceField, Pose, Velocity},
     peer::{self, Kind, Peer},
@@ -9,7 +9,7 @@ use glam::{DQuat, DVec3};
 use palpate_control::{ArmSpec, HandPath, ParameterError, SimulatedArm};
 use std::{
     io::{Error, ErrorKind, Read as _, Result, Write as _},
-    net::{SocketAddr, TcpListener, TcpStream},
+    net::{SocketAddr, TcpStream},
     sync::{Arc, atomic::Ordering},
     time::{Duration, Instant},
 };
@@ -68,11 +68,9 @@ impl Default for Settings {
 /// It runs until dropped.
 #[derive(Debug)]
 pub struct Vrpn {
-    address: SocketAddr,
     /// What it does wrong.
     pub faults: Arc<Faults>,
-    shared: Shared<Machine>,
-    _running: Running,
+    listening: Listening<Machine>,
 }
 
 impl Vrpn {
@@ -81,70 +79,55 @@ impl Vrpn {
     /// # Errors
     /// When the address is taken, or the arm's constants are out of range.
     pub fn listen(address: &str, settings: Settings) -> Result<Self> {
-        let listener = TcpListener::bind(address)?;
-        listener.set_nonblocking(true)?;
-        let address = listener.local_addr()?;
-        let machine = Machine::new(settings).map_err(|error| Error::new(ErrorKind::InvalidInput, error))?;
-        let shared = Shared::new(machine);
-        let server = Server(shared.clone());
-        let running = Running::start("vrpn", &shared.stop, move || server.run(&listener))?;
-        Ok(Self { address, faults: Arc::clone(&shared.faults), shared, _running: running })
+        let listening = Listening::start("vrpn", address, Machine::new(settings), |shared, stream| {
+            let _ = Server(shared).serve(stream);
+            let mut machine = shared.machine();
+            if !machine.settings.keeps {
+                machine.field = ForceField::NONE;
+            }
+        })?;
+        Ok(Self { faults: Arc::clone(&listening.shared.faults), listening })
     }
 
     /// Where it listens.
     pub fn address(&self) -> SocketAddr {
-        self.address
+        self.listening.address
     }
 
     /// Force (N, the arm's axes) of its field on it now.
     pub fn force_n(&self) -> DVec3 {
-        self.shared.machine().force_n()
+        self.listening.machine().force_n()
     }
 
     /// The newest field.
     pub fn field(&self) -> ForceField {
-        self.shared.machine().field
+        self.listening.machine().field
     }
 
     /// Where it is (m, its own axes).
     pub fn position_m(&self) -> DVec3 {
-        self.shared.machine().arm.motion().position_m
+        self.listening.machine().arm.motion().position_m
     }
 
     /// Presses buttons, bit i for button i, and lets go of the others.
     pub fn press(&self, buttons: u32) {
-        self.shared.machine().buttons = buttons;
+        self.listening.machine().buttons = buttons;
     }
 
     /// Fields that came.
     pub fn fields(&self) -> u64 {
-        self.shared.machine().fields
+        self.listening.machine().fields
     }
 
     /// Answers to its pings, which it sends every 100 ms.
     pub fn pongs(&self) -> u64 {
-        self.shared.machine().pongs
+        self.listening.machine().pongs
     }
 }
 
-struct Server(Shared<Machine>);
+struct Server<'a>(&'a Shared<Machine>);
 
-impl Server {
-    fn run(&self, listener: &TcpListener) {
-        while !Faults::is(&self.0.stop) {
-            match listener.accept() {
-                Ok((stream, _)) => {
-                    let _ = self.serve(stream);
-                    let mut machine = self.0.machine();
-                    if !machine.settings.keeps {
-                        machine.field = ForceField::NONE;
-                    }
-                }
-                Err(_) => std::thread::sleep(LOOK_EVERY),
-            }
-        }
-    }
-
+impl Server<'_> {
     fn serve(&self, mut stream: TcpStream) -> Result<()> {
         stream.set_nonblocking(true)?;
         stream.set_nodelay(true)?;

@@ -3,8 +3,9 @@
 pub mod press;
 
 use palpate_bridge::{
-    Config, Handle,
+    BridgeError, Config, Handle,
     config::{DeviceConfig, KeyframeConfig, RealtimeConfig, SimulatedConfig},
+    probe::{Report, probe},
 };
 use palpate_proto::v1::{
     self, DeviceDown, DeviceUp,
@@ -223,7 +224,7 @@ pub fn config(url: &str) -> Config {
 pub struct Running {
     pub handle: Handle,
     pub shutdown: CancellationToken,
-    pub task: JoinHandle<Result<palpate_bridge::Summary, palpate_bridge::BridgeError>>,
+    pub task: JoinHandle<Result<palpate_bridge::Summary, BridgeError>>,
 }
 
 pub fn start(config: Config) -> Running {
@@ -233,6 +234,17 @@ pub fn start(config: Config) -> Running {
         async move { palpate_bridge::run_with(&config, shutdown, handle).await }
     });
     Running { handle, shutdown, task }
+}
+
+/// A daemon and a bridge, whose configuration is changed before, with the force up: 1 N.
+pub async fn pushing(change: impl FnOnce(&mut Config)) -> (Mock, Running) {
+    let mock = Mock::default();
+    let (address, _stop, _serving) = mock.serve("127.0.0.1:0").await;
+    let mut config = config(&format!("http://{address}"));
+    change(&mut config);
+    let bridge = start(config);
+    until("the force is up", || bridge.handle.stats().force_n() > 0.99).await;
+    (mock, bridge)
 }
 
 impl Running {
@@ -250,4 +262,21 @@ pub async fn until(what: &str, mut condition: impl FnMut() -> bool) {
         assert!(began.elapsed() < Duration::from_secs(20), "waited in vain until {what}");
         tokio::time::sleep(Duration::from_millis(2)).await;
     }
+}
+
+/// The same where nothing else goes on.
+pub fn wait(what: &str, mut condition: impl FnMut() -> bool) {
+    let began = Instant::now();
+    while !condition() {
+        assert!(began.elapsed() < Duration::from_secs(20), "waited in vain until {what}");
+        std::thread::sleep(Duration::from_millis(1));
+    }
+}
+
+/// Probes an arm for so long.
+pub fn probed(device: DeviceConfig, time: Duration) -> Result<Report, BridgeError> {
+    let config = Config { device, ..config("http://127.0.0.1:1") };
+    let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().unwrap();
+    let _context = runtime.enter();
+    probe(&config, time)
 }

@@ -136,6 +136,18 @@ pub fn follow(arm: &mut dyn Arm, mut look: impl FnMut(&Reading, f64)) {
     }
 }
 
+/// Follows an arm that is at `position_m`: how far (m) from there it said to be at most, and the way (m) that its velocities make.
+///
+/// One velocity says nothing where a busy machine tells lines late; all together make the way.
+pub fn followed(arm: &mut dyn Arm, position_m: impl Fn() -> DVec3) -> (f64, DVec3) {
+    let (mut farthest_m, mut way_m) = (0.0_f64, DVec3::ZERO);
+    follow(arm, |reading, passed_s| {
+        farthest_m = farthest_m.max(reading.motion.position_m.distance(position_m()));
+        way_m += passed_s * reading.motion.velocity_m_per_s;
+    });
+    (farthest_m, way_m)
+}
+
 /// Puts a force on an arm for 30 ticks.
 pub fn hold(arm: &mut dyn Arm, force_n: DVec3) {
     for _ in 0..30 {
@@ -143,4 +155,17 @@ pub fn hold(arm: &mut dyn Arm, force_n: DVec3) {
         arm.apply(&Effort::force(force_n));
         std::thread::sleep(Duration::from_millis(1));
     }
+}
+
+/// A weak force (N) is felt as it is; one that is far too strong in its direction, and as less than `most_n`; and none that is no number.
+pub fn bounded(arm: &mut dyn Arm, felt_n: impl Fn() -> DVec3, weak_n: DVec3, most_n: f64) {
+    let mut apply = |force_n: DVec3| {
+        hold(arm, force_n);
+        felt_n()
+    };
+    let weak = apply(weak_n);
+    assert!((weak - weak_n).length() < 0.01, "{weak}");
+    let strong = apply(weak_n * 1e6);
+    assert!(strong.normalize().distance(weak_n.normalize()) < 0.02 && strong.length() < most_n, "{strong}");
+    assert_eq!(apply(DVec3::new(f64::NAN, 0.0, 0.0)), DVec3::ZERO);
 }

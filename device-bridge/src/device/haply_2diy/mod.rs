@@ -13,7 +13,7 @@ pub mod wire;
 use super::{
     Arm, Effort, Fault, LastWords, Reading,
     requests::{Requests, between},
-    serial::{Line, OpenError},
+    serial::{self, Line},
 };
 use glam::{DMat2, DVec2, DVec3, Vec3Swizzles as _};
 use kinematics::Kinematics;
@@ -85,23 +85,9 @@ impl Settings {
 /// Why the arm could not be started.
 #[derive(Debug, Error)]
 pub enum StartError {
-    /// No port.
+    /// Its port, or its silence.
     #[error(transparent)]
-    Open(#[from] OpenError),
-    /// Not a word.
-    #[error("no answer came from {path} within {} s: is the arm's board switched on?", PATIENCE.as_secs())]
-    Silent {
-        /// The port.
-        path: String,
-    },
-    /// Something else.
-    #[error("{path}: {fault}; is it this arm's port?")]
-    Strange {
-        /// The port.
-        path: String,
-        /// What went wrong.
-        fault: Fault,
-    },
+    Line(#[from] serial::StartError),
     /// Angles that no such arm has.
     #[error("{path}: its angles are {} and {} degrees, which no arm of these lengths has", angles_deg[0], angles_deg[1])]
     Impossible {
@@ -140,26 +126,18 @@ impl Haply2diy {
     /// # Errors
     /// [`StartError`].
     pub fn start(settings: &Settings, period_s: f64) -> Result<Self, StartError> {
-        let path = || settings.port.clone();
-        let strange = |fault| StartError::Strange { path: path(), fault };
-        let mut line = Line::open(&settings.port, settings.baud)?;
         let mut replies = Replies::new(settings.device_id);
-        let (began, mut set_up) = (Instant::now(), None::<Instant>);
-        let sent_deg = loop {
+        let mut set_up = None::<Instant>;
+        let (line, sent_deg) = serial::start((&settings.port, settings.baud), ("answer", PATIENCE), |line| {
             if set_up.is_none_or(|set_up| set_up.elapsed() > SET_UP_EVERY) {
-                line.forget().map_err(strange)?;
+                line.forget()?;
                 replies = Replies::new(settings.device_id);
-                set_up_board(&mut line, settings).map_err(strange)?;
+                set_up_board(line, settings)?;
                 set_up = Some(Instant::now());
             }
             std::thread::sleep(LOOK_EVERY);
-            if let Some(angles_deg) = line.newest(|byte| replies.take(byte)).map_err(strange)? {
-                break angles_deg;
-            }
-            if began.elapsed() > PATIENCE {
-                return Err(StartError::Silent { path: path() });
-            }
-        };
+            line.newest(|byte| replies.take(byte))
+        })?;
         let steps_deg = settings.steps_deg();
         let mut arm = Self {
             line,
@@ -176,8 +154,8 @@ impl Haply2diy {
             lost: None,
             settings: settings.clone(),
         };
-        let impossible = |_| StartError::Impossible { path: path(), angles_deg: settings.swapped(sent_deg) };
-        arm.renew(sent_deg, period_s).map_err(impossible)?;
+        let (path, angles_deg) = (settings.port.clone(), settings.swapped(sent_deg));
+        arm.renew(sent_deg, period_s).map_err(|_| StartError::Impossible { path, angles_deg })?;
         Ok(arm)
     }
 

@@ -11,13 +11,12 @@ pub mod wire;
 
 use super::{
     Arm, Effort, Fault, LastWords, Reading,
-    serial::{Line, Lines, OpenError},
+    serial::{self, Line, Lines, StartError},
 };
 use glam::{DMat3, DVec3};
 use kinematics::Kinematics;
 use palpate_control::{Motion, Velocity, extrapolate};
-use std::time::{Duration, Instant};
-use thiserror::Error;
+use std::time::Duration;
 
 /// A pose is believed to go on with its velocity for so long (s).
 const LONGEST_EXTRAPOLATION_S: f64 = 5e-3;
@@ -84,28 +83,6 @@ impl Settings {
     }
 }
 
-/// Why the arm could not be started.
-#[derive(Debug, Error)]
-pub enum StartError {
-    /// No port.
-    #[error(transparent)]
-    Open(#[from] OpenError),
-    /// Not a word.
-    #[error("no line came from {path} within {} s: is the arm's board switched on?", PATIENCE.as_secs())]
-    Silent {
-        /// The port.
-        path: String,
-    },
-    /// Something else.
-    #[error("{path}: {fault}; is it this arm's port?")]
-    Strange {
-        /// The port.
-        path: String,
-        /// What went wrong.
-        fault: Fault,
-    },
-}
-
 /// The arm.
 #[derive(Debug)]
 pub struct WoodenHaptics {
@@ -132,22 +109,13 @@ impl WoodenHaptics {
     /// # Errors
     /// [`StartError`].
     pub fn start(settings: &Settings, period_s: f64) -> Result<Self, StartError> {
-        let path = || settings.port.clone();
-        let strange = |fault| StartError::Strange { path: path(), fault };
-        let mut line = Line::open(&settings.port, settings.baud)?;
         let (mut lines, mut message) = (Lines::default(), Vec::with_capacity(wire::LONGEST));
         wire::write(NOTHING, &mut message);
-        let began = Instant::now();
-        let counts = loop {
-            line.send(&message).map_err(strange)?;
+        let (line, [a, b, c, ..]) = serial::start((&settings.port, settings.baud), ("line", PATIENCE), |line| {
+            line.send(&message)?;
             std::thread::sleep(ASK_EVERY);
-            if let Some([a, b, c, ..]) = newest(&mut line, &mut lines).map_err(strange)? {
-                break [a, b, c];
-            }
-            if began.elapsed() > PATIENCE {
-                return Err(StartError::Silent { path: path() });
-            }
-        };
+            newest(line, &mut lines)
+        })?;
         let mut arm = Self {
             line,
             lines,
@@ -162,7 +130,7 @@ impl WoodenHaptics {
             lost: None,
             settings: settings.clone(),
         };
-        arm.renew(counts, period_s);
+        arm.renew([a, b, c], period_s);
         Ok(arm)
     }
 

@@ -2,8 +2,8 @@
 use glam::DVec3;
 use palpate_bridge::{
     config::{
-        DeviceConfig, FalconConfig, Haply2diyConfig, HapticMasterConfig, Inverse3Config, KeyframeConfig, PhantomConfig,
-        PlaybackConfig, SimulatedConfig, VrpnConfig, WoodenHapticsConfig, WorkspaceConfig,
+        DeviceConfig, FalconConfig, Haply2diyConfig, HapticMasterConfig, HapticMasterContact, Inverse3Config,
+        KeyframeConfig, PhantomConfig, PlaybackConfig, SimulatedConfig, VrpnConfig, WoodenHapticsConfig, WorkspaceConfig,
     },
     emulate::{falcon, haply_2diy, hapticmaster, inverse3, phantom, vrpn, woodenhaptics},
     settings::arm,
@@ -59,13 +59,15 @@ pub fn simulated(hand: &Hand) -> Emulated {
     Emulated::new("simulated", DeviceConfig::Simulated(device), ())
 }
 
-pub fn hapticmaster(hand: &Hand) -> Emulated {
+/// `plane`: it renders the contact itself.
+pub fn hapticmaster(hand: &Hand, plane: bool) -> Emulated {
     let mut settings = hapticmaster::Settings { path: hand.path(), homing: None, ..Default::default() };
     // A hand that holds two kilograms.
     settings.arm.hand_damping_n_s_per_m = 40.0;
     let arm = hapticmaster::HapticMaster::listen("127.0.0.1:0", settings).unwrap();
     let address = arm.address().to_string();
-    let keys = HapticMasterConfig { address, silence_s: SILENCE_S, ..HapticMasterConfig::default() };
+    let contact = if plane { HapticMasterContact::Plane } else { HapticMasterContact::Bias };
+    let keys = HapticMasterConfig { address, contact, silence_s: SILENCE_S, ..HapticMasterConfig::default() };
     Emulated::new("hapticmaster", DeviceConfig::Hapticmaster(keys), arm)
 }
 
