@@ -211,6 +211,8 @@ impl Stats {
             final_force_n: self.force_n(),
             link: self.link(),
             round_trip: self.round_trip.percentiles(),
+            judged: self.judged.get(),
+            in_time: self.in_time.get(),
             ticks: servo.map_or(0, LoopMonitor::ticks),
             overruns: servo.map_or(0, LoopMonitor::overruns),
             skipped: servo.map_or(0, LoopMonitor::skipped),
@@ -265,6 +267,8 @@ pub struct Summary {
     pub final_force_n: f64,
     pub link: Link,
     pub round_trip: Percentiles,
+    pub judged: u64,
+    pub in_time: u64,
     pub ticks: u64,
     pub overruns: u64,
     pub skipped: u64,
@@ -285,6 +289,11 @@ pub(crate) fn reason(fault: Fault) -> &'static str {
 }
 
 impl Summary {
+    /// Share of the ticks since the first answer in which the newest was in time.
+    pub fn share_in_time(&self) -> Option<f64> {
+        (self.judged > 0).then(|| self.in_time as f64 / self.judged as f64)
+    }
+
     /// The fault that keeps the arm without force; a stop that was asked for is none.
     pub fn latched_fault(&self) -> Option<Fault> {
         match self.link {
@@ -325,7 +334,9 @@ impl fmt::Display for Summary {
             writeln!(f, "trip     pose to force: none measured")?;
         } else {
             let (p50, p99, max) = (us(trip.p50_ns), us(trip.p99_ns), us(trip.max_ns));
-            writeln!(f, "trip     pose to force p50 {p50:.0} us, p99 {p99:.0} us, max {max:.0} us")?;
+            write!(f, "trip     pose to force p50 {p50:.0} us, p99 {p99:.0} us, max {max:.0} us")?;
+            let share = self.share_in_time().unwrap_or(0.0);
+            writeln!(f, "; an answer in time in {:.2} % of ticks", 1e2 * share)?;
         }
         writeln!(
             f,

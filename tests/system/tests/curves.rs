@@ -96,7 +96,7 @@ fn every_arm_gives_the_force_curve_of_the_simulated_arm_on_the_heart() {
     let libhd = file("libHD.so");
     fs::copy(libhd::built(), &libhd).unwrap();
     // An arm that is a mass of 2 kg wants a slow hand.
-    let (quick_s, slow_s) = (2.5, 6.0);
+    let (quick_s, slow_s) = (2.0, 5.0);
     let quick = hand(quick_s);
     let recorded = file("simulated.csv");
     let expected = pressed(&daemon, arms::simulated(&quick), quick_s, &recorded);

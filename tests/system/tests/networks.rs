@@ -118,15 +118,21 @@ fn the_hand_gets_no_energy_through_any_network() {
             pressed_s += summary.peak_force_n;
             runs += 1;
         }
-        let (summary, least_j) = felt(&network, Conditions { delay_ms: 20, jitter_ms: 10, loss_percent: 20 }, |config| {
-            credulous(config);
-            config.passivity.enabled = false;
-        });
+        let (summary, least_j) =
+            felt(&network, Conditions { delay_ms: 20, jitter_ms: 10, loss_percent: 20 }, |config| {
+                credulous(config);
+                config.passivity.enabled = false;
+            });
         println!("without the controller: least {least_j:.1e} J, peak {:.2} N", summary.peak_force_n);
         worst_without_j = worst_without_j.min(least_j);
         let counts = &network.counts;
         let of = |count: &std::sync::atomic::AtomicU64| count.load(Ordering::Relaxed);
-        println!("{} messages carried, {} lost, {} overtaken", of(&counts.carried), of(&counts.lost), of(&counts.overtaken));
+        println!(
+            "{} messages carried, {} lost, {} overtaken",
+            of(&counts.carried),
+            of(&counts.lost),
+            of(&counts.overtaken)
+        );
         assert!(of(&counts.lost) > 100 && of(&counts.overtaken) > 100);
     }
     println!("{runs} networks: least energy {worst_j:e} J; without the controller {worst_without_j:e} J; {pressed_s}");

@@ -3,7 +3,8 @@ use glam::DVec3;
 use palpate_bridge::{
     config::{
         DeviceConfig, FalconConfig, Haply2diyConfig, HapticMasterConfig, HapticMasterContact, Inverse3Config,
-        KeyframeConfig, PhantomConfig, PlaybackConfig, SimulatedConfig, VrpnConfig, WoodenHapticsConfig, WorkspaceConfig,
+        KeyframeConfig, PhantomConfig, PlaybackConfig, SimulatedConfig, VrpnConfig, WoodenHapticsConfig,
+        WorkspaceConfig,
     },
     emulate::{falcon, haply_2diy, hapticmaster, inverse3, phantom, vrpn, woodenhaptics},
     settings::arm,
@@ -104,8 +105,7 @@ pub fn falcon(hand: &Hand) -> Emulated {
     let keys = |port: &str| FalconConfig { port: port.to_owned(), silence_s: SILENCE_S, ..FalconConfig::default() };
     let constants = arm::falcon::checked(&keys("")).unwrap();
     let (arm, path) = (ArmSpec::default(), hand.path());
-    let settings =
-        falcon::Settings { constants, firmware: None, homing: Duration::ZERO, watchdog: None, arm, path };
+    let settings = falcon::Settings { constants, firmware: None, homing: Duration::ZERO, watchdog: None, arm, path };
     let arm = falcon::Falcon::start(settings).unwrap();
     Emulated::new("falcon", DeviceConfig::Falcon(keys(arm.port())), arm)
 }
