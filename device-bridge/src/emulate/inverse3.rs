@@ -195,7 +195,10 @@ impl Server<'_> {
             let (states, streams) = {
                 let mut machine = self.0.machine();
                 let answers = u64::from(machine.obey(&heard));
-                let passed = machine.go_on().min(1);
+                machine.go_on();
+                // Whoever looks at the arm moves it on, too.
+                let passed = u64::from(machine.steps > machine.told_steps);
+                machine.told_steps = machine.steps;
                 (if machine.settings.streams { passed } else { answers }, machine.settings.streams)
             };
             if states > 0 && !(streams && self.0.machine().is_idle()) {
@@ -273,6 +276,8 @@ struct Machine {
     heard: Option<Instant>,
     began: Option<Instant>,
     steps: u64,
+    /// Those that a stream of states has told of.
+    told_steps: u64,
     commands: u64,
 }
 
@@ -285,6 +290,7 @@ impl Machine {
             heard: None,
             began: None,
             steps: 0,
+            told_steps: 0,
             commands: 0,
             settings,
         })
@@ -312,18 +318,16 @@ impl Machine {
         true
     }
 
-    /// Motion up to now; how many steps that is.
-    fn go_on(&mut self) -> u64 {
+    /// Motion up to now.
+    fn go_on(&mut self) {
         if self.is_idle() {
             self.force_n = DVec3::ZERO;
         }
-        let before = self.steps;
         let due = self.began.map_or(0, |began| (began.elapsed().as_secs_f64() / STEP_S) as u64);
         while self.steps < due {
             self.arm.step(self.force_n);
             self.steps += 1;
         }
-        self.steps - before
     }
 
     fn state(&self, with_config: bool) -> Value {

@@ -121,6 +121,8 @@ fn a_tool_follows_a_body_that_moves_away() {
     let start = DVec3::new(0.0, 0.0, 1.1 * RADIUS_M);
     rig.state.place_tool(0, ToolTarget::at(start));
     rig.state.tools[0].velocity_m_per_s = velocity;
+    // It and its device have moved so for a while.
+    rig.state.tools[0].device_m_per_s = velocity;
     for tick in 1..=50 {
         rig.tick_at(start + velocity * (1e-3 * f64::from(tick)));
         let tool = &rig.state.tools[0];

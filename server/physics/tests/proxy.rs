@@ -89,12 +89,43 @@ fn a_hard_edge_hit_at_speed_is_not_crossed() {
     for (stiffness, mass) in [(500.0, 0.02), (2000.0, 0.01)] {
         let mut rig = Rig::new(plate(0.02, stiffness, mass));
         let mut deepest = 0.0_f64;
-        for tick in 0..400 {
+        // A spring that is saturated pulls it through its damper at 0.1 m/s.
+        for tick in 0..600 {
             rig.tick_at(sweep(tick));
             deepest = deepest.max(rig.state.tools[0].penetration_m / RADIUS_M);
         }
         println!("edge: deepest {deepest:.3} R");
         assert!(deepest < 0.6, "{deepest}");
-        assert!(rig.state.tools[0].centre_m.distance(sweep(400)) < 1e-4);
+        assert!(rig.state.tools[0].centre_m.distance(sweep(600)) < 1e-4);
     }
+}
+
+/// An arm that counts steps of an encoder moves by leaps: in the free air the coupling's damper made 0.1 N of each.
+#[test]
+fn a_device_that_moves_by_leaps_is_hardly_felt_in_the_free_air() {
+    // 30 mm/s past the plate, told in steps of 0.05 mm; its mean force (N), root mean square and largest.
+    let felt = |step_m: f64| {
+        let mut spec = plate(0.02, 400.0, 0.02);
+        let coupling = Coupling::Spring { stiffness_n_per_m: 400.0, damping_n_s_per_m: 2.0, mass_kg: 0.02 };
+        spec.tools = vec![sphere(RADIUS_M, DVec3::Z * 0.05, coupling)];
+        let mut rig = Rig::new(spec);
+        let mut forces_n = Vec::new();
+        for tick in 0..900 {
+            let x = 30e-6 * f64::from(tick);
+            let told = if step_m > 0.0 { (x / step_m).floor() * step_m } else { x };
+            rig.tick_at(DVec3::new(told, 0.0, 0.05));
+            if tick >= 300 {
+                forces_n.push(rig.state.tools[0].device_force_n.x);
+            }
+        }
+        let n = forces_n.len() as f64;
+        let mean_n = forces_n.iter().sum::<f64>() / n;
+        let rms_n = (forces_n.iter().map(|f| (f - mean_n).powi(2)).sum::<f64>() / n).sqrt();
+        (mean_n, rms_n, forces_n.iter().fold(0.0_f64, |most, f| most.max(f.abs())))
+    };
+    let (smooth, leaps) = (felt(0.0), felt(5e-5));
+    println!("smooth {smooth:?}, leaps {leaps:?}");
+    assert!(smooth.2 < 1e-6, "a tool in the free air follows without force: {smooth:?}");
+    // A step of the spring alone is 0.02 N.
+    assert!(leaps.0.abs() < 1e-3 && leaps.1 < 0.012 && leaps.2 < 0.03, "{leaps:?}");
 }

@@ -48,8 +48,17 @@ pub struct Program {
 impl Program {
     /// Starts a program of this workspace.
     pub fn start(program: &str, arguments: &[&str]) -> Self {
-        let mut child = Command::new(path_of(program))
-            .args(arguments)
+        Self::of(Command::new(path_of(program)).args(arguments))
+    }
+
+    /// Starts one in a network namespace.
+    pub fn start_in(namespace: &str, program: &str, arguments: &[&str]) -> Self {
+        // `ip` becomes the program: signals reach it.
+        Self::of(Command::new("ip").args(["netns", "exec", namespace]).arg(path_of(program)).args(arguments))
+    }
+
+    fn of(command: &mut Command) -> Self {
+        let mut child = command
             .stdin(Stdio::null())
             .stdout(Stdio::piped())
             .stderr(Stdio::piped())

@@ -10,7 +10,7 @@ use palpate_bridge::{
     settings::arm,
 };
 use palpate_control::{ArmSpec, HandPath, Keyframe};
-use std::{any::Any, path::Path, time::Duration};
+use std::{path::Path, time::Duration};
 
 /// Where in the world the middle of the arms' workspaces is (m): 5 mm outside the place where the finger touches the ventricle.
 pub const MIDDLE_M: DVec3 = DVec3::new(0.045, 0.0, 0.0);
@@ -39,12 +39,19 @@ impl Hand {
 pub struct Emulated {
     pub name: &'static str,
     pub device: DeviceConfig,
-    _there: Box<dyn Any>,
+    /// Of its motors, in its own axes (N); of one that lives in the bridge, none.
+    motors_n: Box<dyn Fn() -> DVec3>,
 }
 
 impl Emulated {
-    fn new(name: &'static str, device: DeviceConfig, there: impl Any) -> Self {
-        Self { name, device, _there: Box::new(there) }
+    /// `there` is what `force_n` looks at.
+    fn new<T: 'static>(name: &'static str, device: DeviceConfig, there: T, force_n: fn(&T) -> DVec3) -> Self {
+        Self { name, device, motors_n: Box::new(move || force_n(&there)) }
+    }
+
+    /// Its motors' force (N).
+    pub fn force_n(&self) -> f64 {
+        (self.motors_n)().length()
     }
 }
 
@@ -57,7 +64,7 @@ pub fn simulated(hand: &Hand) -> Emulated {
     let key = |key: Keyframe| KeyframeConfig { time_s: key.time_s, position_m: key.position_m.to_array() };
     let keyframes = hand.keyframes().into_iter().map(key).collect();
     let device = SimulatedConfig { period_s: Some(hand.period_s), keyframes, ..SimulatedConfig::default() };
-    Emulated::new("simulated", DeviceConfig::Simulated(device), ())
+    Emulated::new("simulated", DeviceConfig::Simulated(device), (), |()| DVec3::ZERO)
 }
 
 /// `plane`: it renders the contact itself.
@@ -69,7 +76,7 @@ pub fn hapticmaster(hand: &Hand, plane: bool) -> Emulated {
     let address = arm.address().to_string();
     let contact = if plane { HapticMasterContact::Plane } else { HapticMasterContact::Bias };
     let keys = HapticMasterConfig { address, contact, silence_s: SILENCE_S, ..HapticMasterConfig::default() };
-    Emulated::new("hapticmaster", DeviceConfig::Hapticmaster(keys), arm)
+    Emulated::new("hapticmaster", DeviceConfig::Hapticmaster(keys), arm, hapticmaster::HapticMaster::effect_n)
 }
 
 pub fn woodenhaptics(hand: &Hand) -> Emulated {
@@ -82,7 +89,8 @@ pub fn woodenhaptics(hand: &Hand) -> Emulated {
     let constants = arm::woodenhaptics::checked(&keys("")).unwrap();
     let settings = woodenhaptics::Settings { constants, answers: false, arm: ArmSpec::default(), path: hand.path() };
     let arm = woodenhaptics::WoodenHaptics::start(settings).unwrap();
-    Emulated::new("woodenhaptics", DeviceConfig::Woodenhaptics(keys(arm.port())), arm)
+    let device = DeviceConfig::Woodenhaptics(keys(arm.port()));
+    Emulated::new("woodenhaptics", device, arm, woodenhaptics::WoodenHaptics::force_n)
 }
 
 pub fn haply_2diy(hand: &Hand) -> Emulated {
@@ -98,7 +106,8 @@ pub fn haply_2diy(hand: &Hand) -> Emulated {
     let (arm, path) = (ArmSpec::default(), hand.path());
     let settings = haply_2diy::Settings { constants, knows_home: true, watchdog: None, arm, path };
     let arm = haply_2diy::Haply2diy::start(settings).unwrap();
-    Emulated::new("haply-2diy", DeviceConfig::Haply2diy(keys(arm.port())), arm)
+    let device = DeviceConfig::Haply2diy(keys(arm.port()));
+    Emulated::new("haply-2diy", device, arm, haply_2diy::Haply2diy::force_n)
 }
 
 pub fn falcon(hand: &Hand) -> Emulated {
@@ -107,14 +116,14 @@ pub fn falcon(hand: &Hand) -> Emulated {
     let (arm, path) = (ArmSpec::default(), hand.path());
     let settings = falcon::Settings { constants, firmware: None, homing: Duration::ZERO, watchdog: None, arm, path };
     let arm = falcon::Falcon::start(settings).unwrap();
-    Emulated::new("falcon", DeviceConfig::Falcon(keys(arm.port())), arm)
+    Emulated::new("falcon", DeviceConfig::Falcon(keys(arm.port())), arm, falcon::Falcon::force_n)
 }
 
 pub fn inverse3(hand: &Hand) -> Emulated {
     let settings = inverse3::Settings { path: hand.path(), ..inverse3::Settings::default() };
     let arm = inverse3::Inverse3::listen("127.0.0.1:0", settings).unwrap();
     let keys = Inverse3Config { url: arm.url(), silence_s: SILENCE_S, ..Inverse3Config::default() };
-    Emulated::new("inverse3", DeviceConfig::Inverse3(keys), arm)
+    Emulated::new("inverse3", DeviceConfig::Inverse3(keys), arm, inverse3::Inverse3::force_n)
 }
 
 pub fn vrpn(hand: &Hand) -> Emulated {
@@ -124,7 +133,7 @@ pub fn vrpn(hand: &Hand) -> Emulated {
     let [tracker, button, force_device] = names;
     let address = arm.address().to_string();
     let keys = VrpnConfig { address, tracker, button, force_device, silence_s: SILENCE_S, ..VrpnConfig::default() };
-    Emulated::new("vrpn", DeviceConfig::Vrpn(keys), arm)
+    Emulated::new("vrpn", DeviceConfig::Vrpn(keys), arm, vrpn::Vrpn::force_n)
 }
 
 /// `libhd`: what stands in libHD's place.
@@ -134,11 +143,11 @@ pub fn phantom(hand: &Hand, libhd: &Path) -> Emulated {
     let arm = phantom::Phantom::listen(&folder.path().join("arm"), settings).unwrap();
     let (library, name) = (libhd.to_str().unwrap().to_owned(), arm.socket().to_str().unwrap().to_owned());
     let keys = PhantomConfig { library, name, silence_s: SILENCE_S, ..PhantomConfig::default() };
-    Emulated::new("phantom", DeviceConfig::Phantom(keys), (arm, folder))
+    Emulated::new("phantom", DeviceConfig::Phantom(keys), (arm, folder), |(arm, _)| arm.force_n())
 }
 
 /// What another arm did, again.
 pub fn playback(recording: &Path) -> Emulated {
     let keys = PlaybackConfig { file: recording.to_owned(), ..PlaybackConfig::default() };
-    Emulated::new("playback", DeviceConfig::Playback(keys), ())
+    Emulated::new("playback", DeviceConfig::Playback(keys), (), |()| DVec3::ZERO)
 }

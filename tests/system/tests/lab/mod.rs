@@ -2,6 +2,7 @@
 #![allow(dead_code, unreachable_pub, missing_docs, clippy::unwrap_used)] // helpers of tests; each file uses a part
 pub mod arms;
 pub mod network;
+pub mod outliving;
 
 use palpate_bridge::{
     BridgeError, Config, Handle, Summary,
@@ -25,6 +26,16 @@ pub fn config(url: &str, device: DeviceConfig) -> Config {
     config.servo.least_success_rate = 0.0;
     config.realtime = RealtimeConfig { fifo_priority: 0, lock_memory: false, processor: None, stay_awake: false };
     config
+}
+
+/// A linear congruential generator (Knuth's MMIX constants); its high bits.
+pub struct Random(pub u64);
+
+impl Random {
+    pub fn below(&mut self, n: u64) -> u64 {
+        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (self.0 >> 33) % n
+    }
 }
 
 /// A bridge in this process, on a runtime of its own.

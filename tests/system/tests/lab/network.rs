@@ -1,6 +1,7 @@
 //! A network that is not good, between a bridge and a daemon: the Device service, which hands every message on, late, out of order, or not at all.
 //!
 //! Both connections are real ones. TCP delays what a network loses; what is lost here is lost, as it is where nobody sends it again.
+use super::Random;
 use palpate_proto::v1::{
     self, DeviceDown, DeviceUp,
     device_client::DeviceClient,
@@ -39,16 +40,6 @@ pub struct Counts {
     pub lost: AtomicU64,
     /// Arrived behind one that was sent later.
     pub overtaken: AtomicU64,
-}
-
-/// A linear congruential generator (Knuth's MMIX constants); its high bits.
-struct Random(u64);
-
-impl Random {
-    fn below(&mut self, n: u64) -> u64 {
-        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        (self.0 >> 33) % n
-    }
 }
 
 struct State {

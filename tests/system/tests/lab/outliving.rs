@@ -1,0 +1,52 @@
+//! An arm that outlives whoever drives it, and the configuration of a bridge for it.
+use super::{arms, config};
+use palpate_system_tests::{daemon::PATIENCE, programs::Program};
+use std::{
+    fs,
+    path::PathBuf,
+    time::{Duration, Instant},
+};
+
+/// The arm, and a file for `palpate-bridge --config`.
+pub struct Lab {
+    arm: arms::Emulated,
+    config: PathBuf,
+    _folder: tempfile::TempDir,
+}
+
+impl Lab {
+    /// For a daemon at `url`.
+    pub fn new(arm: arms::Emulated, url: &str) -> Self {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("bridge.toml");
+        let mut config = config(url, arm.device.clone());
+        config.workspace = arms::workspace();
+        fs::write(&path, toml::to_string(&config).unwrap()).unwrap();
+        Self { arm, config: path, _folder: folder }
+    }
+
+    /// What the bridge is started with.
+    pub fn arguments(&self) -> [&str; 2] {
+        ["--config", self.config.to_str().unwrap()]
+    }
+
+    /// A bridge beside the arm.
+    pub fn bridge(&self) -> Program {
+        Program::start("palpate-bridge", &self.arguments())
+    }
+
+    /// The arm's force (N), whoever drives it.
+    pub fn force_n(&self) -> f64 {
+        self.arm.force_n()
+    }
+
+    /// Waits for a force (N); how long that took.
+    pub fn wait(&self, what: &str, mut condition: impl FnMut(f64) -> bool) -> Duration {
+        let began = Instant::now();
+        while !condition(self.force_n()) {
+            assert!(began.elapsed() < PATIENCE, "never: {what}; {} N", self.force_n());
+            std::thread::sleep(Duration::from_micros(100));
+        }
+        began.elapsed()
+    }
+}
