@@ -4,10 +4,10 @@ mod rig;
 use glam::DVec3;
 use palpate_physics::{
     ModelSpec,
-    contact::{Coupling, LocalContactModel},
+    contact::{Coupling, LocalContactModel, ToolShape, ToolTarget},
     material::Law,
 };
-use rig::{Rig, body, bricks, graded, hold, material, nodes_where, sphere};
+use rig::{Drive, Rig, body, bricks, graded, hold, material, nodes_where, sphere};
 
 const RADIUS_M: f64 = 0.008;
 
@@ -30,12 +30,14 @@ fn soft_coupling() -> Coupling {
     Coupling::Spring { stiffness_n_per_m: 300.0, damping_n_s_per_m: 3.0, mass_kg: 0.01 }
 }
 
-/// Moves the device to a place in `ticks`, waits, and returns the force on the device.
+/// Moves the device to a place in `ticks`, turned as it is, waits, and returns the force on the device.
 fn settle(rig: &mut Rig, to_m: DVec3, ticks: u32) -> DVec3 {
-    let from = rig.state.tools[0].target.position_m;
+    let from = rig.state.tools[0].target;
     for tick in 1..=ticks + 80 {
         let s = (f64::from(tick) / f64::from(ticks)).min(1.0);
-        rig.tick_at(from.lerp(to_m, s));
+        let target = ToolTarget { position_m: from.position_m.lerp(to_m, s), ..from };
+        let drive = Drive { tools: vec![target], ..rig.still() };
+        rig.tick(&drive);
     }
     rig.state.tools[0].device_force_n
 }
@@ -75,6 +77,29 @@ fn normal_stiffness_is_that_of_static_presses() {
         assert!(model.normal.distance(DVec3::Z) < 1e-6);
         // Frictionless: the tool follows the device along the surface.
         assert!(model.stiffness_n_per_m.x_axis.x.abs() < 1e-6);
+    }
+}
+
+/// A capsule on its side, in the middle of the block and with one end beyond its edge, where it gives way by turning, too. Stated error: 10 %. Measured: −7 … −1 %.
+#[test]
+fn a_lying_capsule_is_as_stiff_as_static_presses_say() {
+    for (coupling, beside_m, depth_m) in
+        [(soft_coupling(), 0.0, 0.002), (Coupling::Rigid, 0.0, 0.001), (soft_coupling(), 0.035, 0.002)]
+    {
+        let mut spec = block(0.015, 0.45, coupling, 0.0);
+        spec.tools[0].shape = ToolShape::capsule(coupling, RADIUS_M, 0.012, DVec3::X);
+        spec.tools[0].start_position_m = DVec3::new(beside_m, 0.0, RADIUS_M);
+        let mut rig = Rig::new(spec);
+        settle(&mut rig, DVec3::new(beside_m, 0.0, RADIUS_M - depth_m), 200);
+        let model = rig.state.tools[0].local_model.unwrap();
+        let measured = -static_stiffness(&rig, DVec3::Z, 1e-4).z;
+        let told = -model.stiffness_n_per_m.z_axis.z;
+        let error = told / measured - 1.0;
+        println!(
+            "capsule {beside_m} m beside: model {told:.1} N/m, presses {measured:.1} N/m, {:+.1} %",
+            100.0 * error
+        );
+        assert!(error.abs() < 0.1, "{error}");
     }
 }
 
