@@ -83,6 +83,18 @@ impl Program {
         panic!("no line with \"{text}\" within {patience:?}; printed so far:\n{}", self.output);
     }
 
+    /// What it has printed so far, both streams; and how it ended, if it has.
+    pub fn said(&mut self) -> String {
+        while let Ok(line) = self.lines.try_recv() {
+            self.output.push_str(&line);
+            self.output.push('\n');
+        }
+        match self.child.try_wait() {
+            Ok(Some(status)) => format!("{}ended: {status}", self.output),
+            _ => self.output.clone(),
+        }
+    }
+
     /// Sends SIGKILL, and waits for the end.
     pub fn kill(&mut self) {
         self.child.kill().expect("the child runs");

@@ -41,12 +41,25 @@ impl Lab {
     }
 
     /// Waits for a force (N); how long that took.
-    pub fn wait(&self, what: &str, mut condition: impl FnMut(f64) -> bool) -> Duration {
+    pub fn wait(&self, what: &str, condition: impl FnMut(f64) -> bool) -> Duration {
+        let waited = self.waited(condition);
+        waited.unwrap_or_else(|| panic!("never: {what}; {} N", self.force_n()))
+    }
+
+    /// Likewise, while `bridge` runs, whose words are told when it waited in vain.
+    pub fn wait_beside(&self, bridge: &mut Program, what: &str, condition: impl FnMut(f64) -> bool) -> Duration {
+        let waited = self.waited(condition);
+        waited.unwrap_or_else(|| panic!("never: {what}; {} N; the bridge said:\n{}", self.force_n(), bridge.said()))
+    }
+
+    fn waited(&self, mut condition: impl FnMut(f64) -> bool) -> Option<Duration> {
         let began = Instant::now();
         while !condition(self.force_n()) {
-            assert!(began.elapsed() < PATIENCE, "never: {what}; {} N", self.force_n());
+            if began.elapsed() > PATIENCE {
+                return None;
+            }
             std::thread::sleep(Duration::from_micros(100));
         }
-        began.elapsed()
+        Some(began.elapsed())
     }
 }
