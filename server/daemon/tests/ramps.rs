@@ -3,10 +3,10 @@
 mod common;
 use common::{above, block_scene, pressing};
 use glam::DVec3;
-use palpate_control::{LocalModel, RenderSettings};
+use palpate_control::{HandPath, Keyframe, LocalModel, RenderSettings};
 use palpate_physics::Model;
 use palpate_realtime::{Clock, ManualClock};
-use palpate_scene::ScriptedHand;
+use palpate_scene::{Limits, Scene, ScriptedHand, builtin, parse};
 use palpated::{
     serve::config::default_limits,
     sim::{
@@ -49,12 +49,17 @@ impl Bench {
 
     /// With a simulated arm whose hand rests at a place while no device is attached.
     fn with_arm(hand_m: Option<DVec3>) -> Self {
+        let scene = block_scene("block", 3);
+        let model = Arc::new(Model::build(scene.model.clone()).unwrap());
+        Self::on(scene, model, hand_m)
+    }
+
+    fn on(scene: Scene, model: Arc<Model>, hand_m: Option<DVec3>) -> Self {
         let hand =
             |at| ScriptedHand { tool: 0, tool_name: "finger".into(), path: common::path(&[(0.0, at), (1.0, at)]) };
-        let scene = block_scene("block", 3);
         let (simulation, ends) = Simulation::build(Parts {
             session: 1,
-            model: Arc::new(Model::build(scene.model).unwrap()),
+            model,
             timeline: scene.timeline,
             drivers: scene.drivers,
             arm: hand_m.map(hand),
@@ -244,6 +249,25 @@ async fn a_device_that_attaches_in_the_body_gets_no_force_before_it_has_left_it(
         }
         let force_n = (0..300).map(|_| bench.tick(RUN, pressing(), 1).force_n.z).fold(0.0, f64::max);
         assert!(force_n > 0.1, "then it feels the body: {force_n} N");
+    }
+}
+
+/// An arm came back in the middle of a press. Its tool went through the ventricle's wall into the cavity, and there it stayed, without force, however often the arm went out and in.
+#[tokio::test]
+async fn a_device_that_attaches_in_a_wall_feels_it_once_it_has_been_outside() {
+    let scene = || parse(builtin("ventricle").unwrap(), "ventricle", None, &Limits::local(), &mut |_, _| ()).unwrap();
+    let model = Arc::new(Model::build(scene().model).unwrap());
+    let key = |(time_s, x_m)| Keyframe { time_s, position_m: DVec3::X * x_m };
+    let path = HandPath::new([(0.0, 0.045), (0.2, 0.028), (0.3, 0.028)].map(key).to_vec(), Some(0.5)).unwrap();
+    let hand = |tick: u32| path.at(1e-3 * f64::from(tick)).0;
+    for phase_ms in [110, 120, 128, 130, 132, 140, 330] {
+        let mut bench = Bench::on(scene(), Arc::clone(&model), None);
+        let felt = (phase_ms..phase_ms + 1500).map(|ms| bench.tick(RUN, hand(ms), 1).force_n.x);
+        let most_n = felt.skip(500).fold(0.0, f64::max);
+        assert!(
+            most_n > 0.5,
+            "attached {phase_ms} ms after its hand came from outside: {most_n} N within three presses"
+        );
     }
 }
 

@@ -42,10 +42,10 @@ fn slow_hand() -> Hand {
 }
 
 /// Until it is pressed, and then a moment that nobody knows.
-fn wait_pressed(lab: &Lab, bridge: &mut Program, random: &mut Random) {
-    lab.wait_beside(bridge, "it presses", |force_n| force_n > PRESSED_N);
+fn wait_pressed(lab: &Lab, (bridge, daemon): (&mut Program, &Daemon), random: &mut Random) {
+    lab.wait_beside((bridge, daemon), "it presses", |force_n| force_n > PRESSED_N);
     std::thread::sleep(Duration::from_micros(random.below(60_000)));
-    lab.wait_beside(bridge, "it presses", |force_n| force_n > PRESSED_N);
+    lab.wait_beside((bridge, daemon), "it presses", |force_n| force_n > PRESSED_N);
 }
 
 fn told(what: &str, mut times: Vec<Duration>) {
@@ -66,7 +66,7 @@ fn bridges_are_killed(what: &str, arm: arms::Emulated) {
     let (mut random, mut tick, mut times) = (Random(1), 0, Vec::new());
     for _ in 0..kills() {
         let mut bridge = lab.bridge();
-        wait_pressed(&lab, &mut bridge, &mut random);
+        wait_pressed(&lab, (&mut bridge, &daemon), &mut random);
         let killed = Instant::now();
         bridge.kill();
         lab.wait("its force ends", |force_n| force_n == 0.0);
@@ -101,7 +101,7 @@ fn a_killed_daemon_leaves_no_force_and_the_next_one_is_found() {
     let mut bridge = lab.bridge();
     let (mut random, mut times) = (Random(2), Vec::new());
     for _ in 0..kills() {
-        wait_pressed(&lab, &mut bridge, &mut random);
+        wait_pressed(&lab, (&mut bridge, &daemon), &mut random);
         let killed = Instant::now();
         daemon.program.kill();
         lab.wait("its force ends", |force_n| force_n == 0.0);
@@ -109,7 +109,7 @@ fn a_killed_daemon_leaves_no_force_and_the_next_one_is_found() {
         daemon = Daemon::at(&address, "palpated", &["serve", "--arm", "none"]);
     }
     told("daemon", times);
-    wait_pressed(&lab, &mut bridge, &mut random);
+    wait_pressed(&lab, (&mut bridge, &daemon), &mut random);
     bridge.terminate();
     assert!(bridge.wait(PATIENCE).success(), "{}", bridge.output);
     assert_eq!(lab.force_n(), 0.0);

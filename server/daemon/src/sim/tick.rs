@@ -5,7 +5,7 @@
 use super::{
     simulation::Simulation,
     timing::Timing,
-    tool::{Moment, Order},
+    tool::{Moment, Order, ToolLoop},
 };
 use palpate_physics::{StepReport, TickInput, step};
 use palpate_realtime::Clock;
@@ -77,10 +77,12 @@ impl Simulation {
         let moment = Moment { now_ns, tick: self.state.tick, period_s: self.period_s(), quarantined };
         let look = plan.advance && self.state.tick.is_multiple_of(LOOK_EVERY_TICKS);
         for (index, (tool, state)) in self.tools.iter_mut().zip(&self.state.tools).enumerate() {
-            // One that touches nothing is outside the body, or deep inside it.
-            let free = look && tool.waits_to_be_clear(state) && !self.state.contact.touches(index);
-            if free && !self.inside.holds(&self.model, &self.state, state.target.position_m) {
-                tool.found_clear();
+            let waits = look && tool.waits_to_be_clear();
+            if waits && !self.inside.holds(&self.model, &self.state, state.target.position_m) {
+                let radius_m = self.model.spec().tools[index].radius_m;
+                // One that touches nothing is outside the body, or deep inside it.
+                let is_clear = ToolLoop::follows(state, radius_m) && !self.state.contact.touches(index);
+                if is_clear { tool.found_clear() } else { tool.place_again() }
             }
             tool.couple(state, &moment, plan.order, plan.advance);
         }

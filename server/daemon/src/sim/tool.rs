@@ -35,8 +35,8 @@ pub enum Order {
     Release,
 }
 
-/// Force (N) in the coupling below which a tool that touches nothing follows its device freely.
-const FREE_N: f64 = 0.05;
+/// A tool that touches nothing and is so near to its device, in radii, follows it freely: its own mass, and the damper of its coupling, keep it a little behind.
+const FREE_RADII: f64 = 0.1;
 
 /// How far a tool has come to its device.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -151,7 +151,7 @@ impl ToolLoop {
         self.place = if attached { Place::Unknown } else { Place::Clear };
     }
 
-    /// Where the tool has to be put, once, before its device moves it: it must not sweep through the body on its way
+    /// Where the tool has to be put before its device moves it: it must not sweep through the body on its way
     /// from where it was.
     pub fn new_place(&mut self) -> Option<ToolTarget> {
         let sample = self.newest.filter(|_| self.place == Place::Unknown && self.is_attached())?;
@@ -159,9 +159,19 @@ impl ToolLoop {
         Some(ToolTarget { orientation: sample.orientation, ..ToolTarget::at(sample.position_m) })
     }
 
-    /// Whether it waits to be clear of the body, at rest on its device.
-    pub fn waits_to_be_clear(&self, tool: &ToolState) -> bool {
-        self.place == Place::Held && tool.device_force_n.length() < FREE_N
+    /// Whether it waits to be clear of the body.
+    pub fn waits_to_be_clear(&self) -> bool {
+        self.place == Place::Held
+    }
+
+    /// Whether it is at its device, as far as the tool's radius (m) says how near that is.
+    pub fn follows(tool: &ToolState, radius_m: f64) -> bool {
+        tool.centre_m.distance(tool.target.position_m) < FREE_RADII * radius_m
+    }
+
+    /// Its device is outside the body and it is not: caught in a wall that it was put into. It is put to its device once more.
+    pub fn place_again(&mut self) {
+        self.place = Place::Unknown;
     }
 
     /// It is outside the body: from now on there is force.

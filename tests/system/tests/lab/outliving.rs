@@ -1,6 +1,9 @@
 //! An arm that outlives whoever drives it, and the configuration of a bridge for it.
 use super::{arms, config};
-use palpate_system_tests::{daemon::PATIENCE, programs::Program};
+use palpate_system_tests::{
+    daemon::{Daemon, PATIENCE},
+    programs::Program,
+};
 use std::{
     fs,
     path::PathBuf,
@@ -47,9 +50,17 @@ impl Lab {
     }
 
     /// Likewise, while `bridge` runs, whose words are told when it waited in vain.
-    pub fn wait_beside(&self, bridge: &mut Program, what: &str, condition: impl FnMut(f64) -> bool) -> Duration {
+    pub fn wait_beside(
+        &self,
+        (bridge, daemon): (&mut Program, &Daemon),
+        what: &str,
+        condition: impl FnMut(f64) -> bool,
+    ) -> Duration {
         let waited = self.waited(condition);
-        waited.unwrap_or_else(|| panic!("never: {what}; {} N; the bridge said:\n{}", self.force_n(), bridge.said()))
+        waited.unwrap_or_else(|| {
+            let (said, status) = (bridge.said(), daemon.status());
+            panic!("never: {what}; {} N; the daemon:\n{status:#}\nthe bridge said:\n{said}", self.force_n())
+        })
     }
 
     fn waited(&self, mut condition: impl FnMut(f64) -> bool) -> Option<Duration> {
