@@ -56,9 +56,10 @@ impl Guard {
         Ok(Self { socket: ours, child })
     }
 
-    /// The servo lives. Neither waits nor allocates; a guard that does not listen is no matter.
-    pub fn beat(&mut self) {
-        let _ = self.socket.write(&[BEAT]);
+    /// The servo lives. Neither waits nor allocates; a guard that is slow to listen is no matter. False: there is none any more.
+    pub fn beat(&mut self) -> bool {
+        let said = self.socket.write(&[BEAT]);
+        said.err().is_none_or(|error| matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::Interrupted))
     }
 }
 

@@ -45,6 +45,8 @@ pub struct Shared {
     pub without_force: AtomicBool,
     /// This program, to be started as a guard.
     pub guard_program: OnceLock<PathBuf>,
+    /// There was a guard, and it is gone.
+    pub unguarded: AtomicBool,
     /// The daemon's force crosses the network, and nobody knows yet whether that is stable.
     pub unmeasured: AtomicBool,
 }
@@ -167,7 +169,10 @@ pub async fn run_with(config: &Config, shutdown: CancellationToken, handle: Hand
 /// A guard, where it can help; without one the arm's own patience is all there is, which is said.
 fn start_guard(device: &dyn device::Arm, settings: &Settings, program: Option<&PathBuf>) -> Option<Guard> {
     let program = program.filter(|_| settings.guard)?;
-    let words = device.last_words()?;
+    let Some(words) = device.last_words() else {
+        tracing::info!("no guard stands beside this arm: nobody else can speak to it should this process be killed");
+        return None;
+    };
     let watchdog = &settings.servo.watchdog;
     let patience = Duration::from_secs_f64(watchdog.stale_after_s + watchdog.ramp_to_zero_s);
     Guard::start(program, words, patience, &settings.measures)
@@ -256,6 +261,7 @@ const SAY_AT_MOST_EVERY: Duration = Duration::from_secs(1);
 struct Watcher {
     link: Link,
     said_at: Option<Instant>,
+    said_unguarded: bool,
     auto_recover: bool,
     report: Option<time::Interval>,
 }
@@ -263,10 +269,22 @@ struct Watcher {
 impl Watcher {
     fn new(settings: &Settings) -> Self {
         let report = settings.report_every.map(|pause| time::interval_at(time::Instant::now() + pause, pause));
-        Self { link: Link::Waiting, said_at: None, auto_recover: settings.servo.auto_recover, report }
+        Self {
+            link: Link::Waiting,
+            said_at: None,
+            said_unguarded: false,
+            auto_recover: settings.servo.auto_recover,
+            report,
+        }
     }
 
     fn look(&mut self, shared: &Shared) {
+        if !self.said_unguarded && shared.unguarded.load(Ordering::Relaxed) {
+            self.said_unguarded = true;
+            tracing::warn!(
+                "the guard beside the arm is gone: start this program again, or nobody takes the force away should it be killed"
+            );
+        }
         let link = shared.stats.link();
         if self.is_news(link, Instant::now()) {
             self.say(link);
@@ -319,7 +337,8 @@ mod tests {
 
     /// What is said of a link that is looked at every 20 ms: the number of the look, and the link.
     fn said(link_at: impl Fn(u32) -> Link, looks: u32) -> Vec<(u32, Link)> {
-        let mut watcher = Watcher { link: Link::Waiting, said_at: None, auto_recover: false, report: None };
+        let mut watcher =
+            Watcher { link: Link::Waiting, said_at: None, said_unguarded: false, auto_recover: false, report: None };
         let start = Instant::now();
         let every = (0..looks).map(|look| (look, link_at(look)));
         every.filter(|&(look, link)| watcher.is_news(link, start + WATCH_PERIOD * look)).collect()

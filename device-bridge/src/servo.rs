@@ -36,6 +36,8 @@ pub struct ServoLaw {
     /// The plane that the arm was given, and where it was (m).
     given: Option<(ContactPlane, DVec3)>,
     force_share: f64,
+    /// Since the last tick (s).
+    passed_s: f64,
     steady_since_ns: Option<u64>,
     faults_seen: u64,
 }
@@ -71,6 +73,7 @@ impl ServoLaw {
             command: None,
             given: None,
             force_share: 1.0,
+            passed_s: settings.period_s,
             steady_since_ns: None,
             faults_seen: 0,
             settings,
@@ -94,9 +97,16 @@ impl ServoLaw {
         self.watchdog.trip(now_ns, fault);
     }
 
-    /// From now on the arm has this share of the force, 0 to 1: less than 1 while a clutch lets go or takes hold.
+    /// In this tick the arm has this share of the force at most, 0 to 1: less than 1 while a clutch lets go or takes hold, or none is given yet. It rises no faster than the watchdog's ramp.
     pub fn share_force(&mut self, share: f64) {
-        self.force_share = share;
+        let ramp_up_s = self.settings.watchdog.ramp_up_s;
+        let rise = if ramp_up_s > 0.0 { self.settings.period_s / ramp_up_s } else { 1.0 };
+        self.force_share = share.min(self.force_share + rise);
+    }
+
+    /// So many periods have passed since the last tick: more than one when ticks were left out.
+    pub fn passed(&mut self, periods: u64) {
+        self.passed_s = periods as f64 * self.settings.period_s;
     }
 
     /// The arm's newest pose is `age_s` old: the older, the softer a contact has to be rendered.
@@ -107,6 +117,11 @@ impl ServoLaw {
     /// How stiff (N/m) a contact is rendered at most.
     pub fn largest_stiffness_n_per_m(&self) -> f64 {
         self.stiffness.largest_n_per_m()
+    }
+
+    /// Whether the newest answer is in time, whatever was latched before.
+    fn is_in_time(&self, verdict: &Verdict) -> bool {
+        verdict.link != Link::Waiting && verdict.age_s <= self.settings.watchdog.stale_after_s
     }
 
     /// Share of the last thousand ticks in which the newest answer was in time.
@@ -170,8 +185,13 @@ impl ServoLaw {
         if limited.force_n != given_n {
             self.limiter.was_shortened_to(limited.force_n, ramp);
         }
+        if ramp == 0.0 {
+            // What comes back begins at nothing.
+            self.limiter.reset();
+        }
         if let Some(thermal) = &mut self.thermal {
-            thermal.held(limited.force_n, dt_s);
+            // A tick that is left out holds the force longer.
+            thermal.held(limited.force_n, self.passed_s);
         }
         let at = (motion.position_m, motion.velocity_m_per_s);
         let plane = plane
@@ -297,6 +317,7 @@ impl Servo {
             self.law.trip(now_ns, Fault::Device);
         }
         self.last = read.ok().or(self.last);
+        self.law.passed(1 + wakeup.skipped);
         self.law.share_force(self.share());
         self.law.pose_is(self.last.map_or(0.0, |reading| reading.age_s));
         let motion = self.last.map_or(Motion::at(DVec3::ZERO), |reading| reading.motion);
@@ -307,7 +328,8 @@ impl Servo {
         let tick = self.law.tick(now_ns, &motion);
         self.device.apply(&Effort { force_n: tick.limited.force_n, torque_nm: tick.torque_nm, plane: tick.plane });
         if let Some(guard) = &mut self.guard {
-            guard.beat();
+            let heard = guard.beat();
+            self.shared.unguarded.store(!heard, Ordering::Relaxed);
         }
         self.energy.step(motion.position_m, tick.limited.force_n);
         if let Ok(reading) = read
@@ -373,7 +395,7 @@ impl Servo {
         stats.set_gain(self.law.largest_stiffness_n_per_m());
         stats.set_success_rate(self.law.success_rate());
         count_if(&stats.judged, stats.received.get() > 0);
-        count_if(&stats.in_time, matches!(tick.verdict.link, Link::Fresh | Link::Extrapolating));
+        count_if(&stats.in_time, self.law.is_in_time(&tick.verdict));
         if let Some(reading) = self.last {
             stats.pose_age.record((reading.age_s * 1e9) as u64);
         }

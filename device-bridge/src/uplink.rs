@@ -10,7 +10,7 @@ use palpate_proto::{
     connect::{is_transport, why_no_answer, why_unreachable, words_of},
     v1::{self, device_client::DeviceClient, device_down::Message},
 };
-use palpate_realtime::{Clock, Doorbell, SlotReader, SlotWriter};
+use palpate_realtime::{Clock, Doorbell, Histogram, SlotReader, SlotWriter};
 use std::{
     future::Future,
     pin::Pin,
@@ -227,6 +227,8 @@ impl Uplink {
         );
         self.last_said.clear();
         self.shared.stats.attached.increment();
+        // Another connection, another tool: nothing is known of them.
+        self.shared.unmeasured.store(self.settings.across_network.is_some(), Ordering::Relaxed);
         self.shared.attached.store(true, Ordering::Relaxed);
         let mut told = Told::default();
         loop {
@@ -263,7 +265,9 @@ impl Uplink {
                     self.shared.stats.received.increment();
                     if wire.sample_sequence > told.newest_sequence {
                         told.newest_sequence = wire.sample_sequence;
-                        self.shared.stats.round_trip.record(now_ns.saturating_sub(wire.echo_device_time_ns));
+                        let trip_ns = now_ns.saturating_sub(wire.echo_device_time_ns);
+                        self.shared.stats.round_trip.record(trip_ns);
+                        told.trips.record(trip_ns);
                         self.judge_stiffness(welcome, told);
                     }
                     self.commands.publish(Some(command));
@@ -286,7 +290,7 @@ impl Uplink {
     /// Without a local model the stiff loop crosses the network: no force before it is known to be stable there.
     fn judge_stiffness(&self, welcome: &Welcome, told: &mut Told) {
         let Some(bound) = self.settings.across_network else { return };
-        let trips = &self.shared.stats.round_trip;
+        let trips = &told.trips;
         if !self.shared.unmeasured.load(Ordering::Relaxed) || trips.count() < TRIPS_MEASURED || told.is_judged {
             return;
         }
@@ -328,6 +332,8 @@ const TRIPS_MEASURED: u64 = 200;
 /// What was said already on this connection, and the newest sample answered.
 #[derive(Debug, Default)]
 struct Told {
+    /// Its round trips (ns).
+    trips: Histogram,
     /// Whether a force may cross the network was decided.
     is_judged: bool,
     newest_sequence: u64,

@@ -4,15 +4,15 @@ mod common;
 
 use common::{
     Mock,
-    press::{bridged, elsewhere},
+    press::{self, bridged, elsewhere, wall},
     until,
 };
 use glam::DVec3;
 use palpate_bridge::{
     Config,
     config::{
-        DeviceConfig, FalconConfig, Haply2diyConfig, HapticMasterConfig, VrpnConfig, WoodenHapticsConfig,
-        WorkspaceConfig,
+        DeviceConfig, FalconConfig, Haply2diyConfig, HapticMasterConfig, HapticMasterContact, RecordConfig, VrpnConfig,
+        WoodenHapticsConfig, WorkspaceConfig,
     },
     emulate::{falcon, haply_2diy, hapticmaster, vrpn, woodenhaptics},
     settings::arm,
@@ -107,15 +107,31 @@ fn a_vrpn_server() -> Arm {
 }
 
 fn a_hapticmaster() -> Arm {
-    let mut settings = hapticmaster::Settings { path: resting(), ..hapticmaster::Settings::default() };
+    let settings = hapticmaster::Settings { path: resting(), ..hapticmaster::Settings::default() };
+    hapticmaster_of(settings, HapticMasterContact::Bias, (here(), Holds::WhileConnected))
+}
+
+/// It keeps its effects when a connection ends, and renders the wall by itself.
+fn a_hapticmaster_with_a_plane() -> Arm {
+    let mut settings = hapticmaster::Settings { path: press::path(), ..hapticmaster::Settings::default() };
+    settings.effects.kept = true;
+    hapticmaster_of(settings, HapticMasterContact::Plane, (elsewhere(), Holds::ForEver))
+}
+
+fn hapticmaster_of(
+    mut settings: hapticmaster::Settings,
+    contact: HapticMasterContact,
+    (workspace, holds): (WorkspaceConfig, Holds),
+) -> Arm {
     settings.arm.hand_damping_n_s_per_m = 40.0;
     let emulated = hapticmaster::HapticMaster::listen("127.0.0.1:0", settings).unwrap();
     let device = DeviceConfig::Hapticmaster(HapticMasterConfig {
         address: emulated.address().to_string(),
+        contact,
         silence_s: SILENCE_S,
         ..HapticMasterConfig::default()
     });
-    Arm { device, workspace: here(), force_n: Box::new(move || emulated.effect_n()), holds: Holds::WhileConnected }
+    Arm { device, workspace, force_n: Box::new(move || emulated.effect_n()), holds }
 }
 
 fn a_woodenhaptics() -> Arm {
@@ -130,11 +146,12 @@ fn a_woodenhaptics() -> Arm {
 
 type Start = fn() -> Arm;
 
-const ARMS: [(&str, Start); 5] = [
+const ARMS: [(&str, Start); 6] = [
     ("Falcon", a_falcon),
     ("2diy", a_2diy),
     ("VRPN", a_vrpn_server),
     ("HapticMASTER", a_hapticmaster),
+    ("HapticMASTER with a plane", a_hapticmaster_with_a_plane),
     ("WoodenHaptics", a_woodenhaptics),
 ];
 
@@ -172,16 +189,21 @@ impl Drop for Bridge {
     }
 }
 
-/// A bridge that pushes with 1 N until this happens to it.
-async fn pushed(arm: &Arm, guard: bool, happens: Happens) -> Bridge {
+/// A bridge that pushes with 1 N, or into the wall of the press where the arm renders it, until this happens to it.
+async fn pushed(arm: &Arm, happens: Happens, change: impl FnOnce(&mut Config)) -> Bridge {
     let mock = Mock::default();
+    let by_plane =
+        matches!(&arm.device, DeviceConfig::Hapticmaster(keys) if keys.contact == HapticMasterContact::Plane);
+    mock.set(|behaviour| behaviour.local_model = by_plane.then(wall));
     let (address, _stop, _serving) = mock.serve("127.0.0.1:0").await;
     let mut config = bridged(&format!("http://{address}"), arm.device.clone());
-    (config.workspace, config.servo.guard) = (arm.workspace.clone(), guard);
+    config.workspace = arm.workspace.clone();
+    change(&mut config);
     let mut bridge = Bridge::start(&config);
+    let enough_n = if by_plane { 0.8 } else { 0.9 };
     until("it pushes", || {
         assert!(bridge.child.try_wait().unwrap().is_none(), "the bridge has ended");
-        (arm.force_n)().length() > 0.9
+        (arm.force_n)().length() > enough_n
     })
     .await;
     happens(&mut bridge);
@@ -198,7 +220,7 @@ async fn the_force_is_taken_away_when_the_bridge_is_killed_or_hangs() {
     for (name, start) in ARMS {
         for (what, happens) in ENDS {
             let arm = start();
-            let _bridge = pushed(&arm, true, happens).await;
+            let _bridge = pushed(&arm, happens, |_| ()).await;
             until(&format!("a {name} whose bridge was {what} lets go"), || (arm.force_n)() == DVec3::ZERO).await;
         }
     }
@@ -210,7 +232,7 @@ async fn without_a_guard_the_force_stays_where_the_arm_itself_does_not_let_go() 
     for (name, start) in ARMS {
         for (what, happens) in ENDS {
             let arm = start();
-            let _bridge = pushed(&arm, false, happens).await;
+            let _bridge = pushed(&arm, happens, |config| config.servo.guard = false).await;
             // Longer than a guard is patient, and an arm with a watchdog of its own.
             tokio::time::sleep(Duration::from_millis(1500)).await;
             let holds = match arm.holds {
@@ -223,4 +245,14 @@ async fn without_a_guard_the_force_stays_where_the_arm_itself_does_not_let_go() 
             assert_eq!(force_n.length() > 0.5, holds, "a {name} whose bridge was {what}: {force_n}");
         }
     }
+}
+
+/// An arm that is recorded had no guard.
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn an_arm_that_is_recorded_is_guarded_too() {
+    let folder = tempfile::tempdir().unwrap();
+    let arm = a_falcon();
+    let record = RecordConfig { path: Some(folder.path().join("arm.csv")), overwrite: false };
+    let _bridge = pushed(&arm, Bridge::kill, |config| config.record = record).await;
+    until("it lets go", || (arm.force_n)() == DVec3::ZERO).await;
 }

@@ -63,6 +63,43 @@ fn silence_is_held_ramped_and_latched_within_twenty_ticks() {
     assert_eq!(law.latched(), 1);
 }
 
+/// While a link was not judged yet, or a clutch let go, the watchdog's ramp went up unseen, and the end of that was the whole force in one tick.
+#[test]
+fn a_force_that_was_withheld_comes_back_by_the_ramp_and_the_rate() {
+    let mut law = law(|_| {});
+    let mut before_n = 0.0;
+    for tick in 1..=1500_u64 {
+        law.receive(&command(tick * MS, 3.0 * DVec3::Z, None));
+        law.share_force(if tick <= 1000 { 0.0 } else { 1.0 });
+        let force_n = law.tick(tick * MS, &still()).limited.force_n.z;
+        assert!(tick > 1000 || force_n == 0.0);
+        // 3 N over 0.2 s, and the limiter's own rise in the first ticks.
+        assert!(force_n - before_n <= 0.03, "tick {tick}: {before_n} N, then {force_n} N");
+        before_n = force_n;
+    }
+    assert!(before_n > 2.99, "{before_n}");
+}
+
+/// With every second tick left out the motors were thought to be half as warm as they are.
+#[test]
+fn ticks_that_are_left_out_warm_the_motors_too() {
+    let after = |periods: u64| {
+        let mut law = law(|config| {
+            config.limits.continuous_force_n = Some(0.8);
+            config.limits.thermal_time_s = 1.0;
+        });
+        let mut force_n = 0.0;
+        for tick in (1..=4000_u64).step_by(periods as usize) {
+            law.receive(&command(tick * MS, 3.0 * DVec3::Z, None));
+            law.passed(periods);
+            force_n = law.tick(tick * MS, &still()).limited.force_n.z;
+        }
+        force_n
+    };
+    let (all_n, half_n) = (after(1), after(2));
+    assert!((half_n - all_n).abs() < 0.02 && all_n < 0.85, "{all_n} N, {half_n} N");
+}
+
 /// Commands came every millisecond, and so counted as fresh, however old the poses were that they answered.
 #[test]
 fn answers_to_old_poses_ramp_and_latch_however_steadily_they_come() {

@@ -3,7 +3,7 @@
 use super::{Row, write_header, write_row};
 use crate::{
     BridgeError,
-    device::{Arm, Effort, Fault, Reading},
+    device::{Arm, Effort, Fault, LastWords, Reading},
 };
 use glam::DVec3;
 use palpate_control::Motion;
@@ -103,6 +103,10 @@ impl Arm for Recorded {
         if let Some(reading) = self.read.take() {
             self.queue.push(&Row::new(self.periods as f64 * self.period_s, &reading, *effort));
         }
+    }
+
+    fn last_words(&self) -> Option<LastWords> {
+        self.arm.last_words()
     }
 }
 

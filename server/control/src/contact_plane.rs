@@ -82,7 +82,8 @@ impl ContactPlane {
             damping_n_s_per_m: ramped.damping_n_s_per_m * share,
             ..ramped
         };
-        (force_n.is_finite() && softened.is_one()).then_some(softened)
+        let finite = force_n.is_finite() && at.0.is_finite() && at.1.is_finite();
+        (finite && softened.is_one()).then_some(softened)
     }
 
     /// A share of its force.
@@ -113,6 +114,21 @@ mod tests {
     use super::*;
     use glam::DMat3;
     use proptest::prelude::*;
+
+    #[test]
+    fn a_place_or_a_velocity_that_is_no_number_leaves_no_plane() {
+        let plane = ContactPlane {
+            point_m: DVec3::ZERO,
+            normal: DVec3::Z,
+            stiffness_n_per_m: 400.0,
+            damping_n_s_per_m: 1.0,
+            max_force_n: 3.0,
+        };
+        let at = |position_m, velocity_m_per_s| plane.limited(DVec3::Z, (position_m, velocity_m_per_s), 1.0, 3.0);
+        assert!(at(-1e-3 * DVec3::Z, DVec3::ZERO).is_some());
+        assert_eq!(at(DVec3::NAN, DVec3::ZERO), None);
+        assert_eq!(at(-1e-3 * DVec3::Z, DVec3::NAN), None);
+    }
 
     const SETTINGS: RenderSettings =
         RenderSettings { hold_s: 5e-3, forget_s: 20e-3, damping_n_s_per_m: 2.0, max_stiffness_n_per_m: 2000.0 };

@@ -18,8 +18,12 @@ fn hand(period_s: f64) -> Hand {
     Hand { keys: keys.map(|(share, x_m)| (share * period_s, x_m)).to_vec(), period_s }
 }
 
-/// The force (N) over a period, a value a millisecond.
-struct Curve(Vec<f64>);
+/// A period of the press, a value a millisecond.
+struct Curve {
+    force_n: Vec<f64>,
+    /// Where the arm was along the press (m).
+    place_m: Vec<f64>,
+}
 
 impl Curve {
     /// The last whole period of a recording but for what the bridge's end takes away.
@@ -27,38 +31,42 @@ impl Curve {
         let text = fs::read_to_string(recording).unwrap();
         let mut lines = text.lines();
         let names: Vec<&str> = lines.next().unwrap().split(',').collect();
-        let columns = ["time_s", "force_x_n", "force_y_n", "force_z_n"]
+        let columns = ["time_s", "position_x_m", "force_x_n", "force_y_n", "force_z_n"]
             .map(|name| names.iter().position(|known| *known == name).unwrap());
-        let rows: Vec<(f64, f64)> = lines
+        // Time, place and force.
+        let rows: Vec<[f64; 3]> = lines
             .map(|line| {
                 let words: Vec<&str> = line.split(',').collect();
-                let [time_s, x, y, z] = columns.map(|column| words[column].parse::<f64>().unwrap());
-                (time_s, glam::DVec3::new(x, y, z).length())
+                let [time_s, place_m, x, y, z] = columns.map(|column| words[column].parse::<f64>().unwrap());
+                [time_s, place_m, glam::DVec3::new(x, y, z).length()]
             })
             .collect();
-        let end_s = rows.last().unwrap().0 - 0.1;
+        let end_s = rows.last().unwrap()[0] - 0.1;
         // In the first period the force comes up.
         assert!(end_s > 2.0 * period_s, "{end_s} s recorded");
-        let at = |time_s: f64| {
-            let after = rows.partition_point(|row| row.0 <= time_s).clamp(1, rows.len() - 1);
-            let ((t0, f0), (t1, f1)) = (rows[after - 1], rows[after]);
-            f0 + (f1 - f0) * ((time_s - t0) / (t1 - t0)).clamp(0.0, 1.0)
+        let at = |time_s: f64, column: usize| {
+            let after = rows.partition_point(|row| row[0] <= time_s).clamp(1, rows.len() - 1);
+            let (before, after) = (rows[after - 1], rows[after]);
+            let share = ((time_s - before[0]) / (after[0] - before[0])).clamp(0.0, 1.0);
+            before[column] + (after[column] - before[column]) * share
         };
-        Self((0..(1e3 * period_s) as u32).map(|ms| at(end_s - period_s + f64::from(ms) * 1e-3)).collect())
+        let times = || (0..(1e3 * period_s) as u32).map(|ms| end_s - period_s + f64::from(ms) * 1e-3);
+        Self { place_m: times().map(|t| at(t, 1)).collect(), force_n: times().map(|t| at(t, 2)).collect() }
     }
 
     fn peak_n(&self) -> f64 {
-        self.0.iter().copied().fold(0.0, f64::max)
+        self.force_n.iter().copied().fold(0.0, f64::max)
     }
 
-    /// How far (N) this is from another, with the two periods laid over one another as well as can be: root mean square, without the fiftieth of ticks that are farthest
-    /// apart (a machine that runs tests is late now and then, and a late tick has less force), and the least distance of those.
+    /// How far (N) this is from another, with the periods laid over one another so that the arms are at the same places: root mean square, without the fiftieth of ticks that
+    /// are farthest apart (a machine that runs tests is late now and then, and a late tick has less force), and the least distance of those.
     fn apart_n(&self, other: &Self) -> (f64, f64) {
-        let n = self.0.len();
-        let differences = |shift: usize| self.0.iter().enumerate().map(move |(i, f)| f - other.0[(i + shift) % n]);
-        let square = |shift: usize| differences(shift).map(|d| d * d).sum::<f64>();
-        let best = (0..n).min_by(|a, b| square(*a).total_cmp(&square(*b))).unwrap();
-        let mut apart: Vec<f64> = differences(best).map(f64::abs).collect();
+        let n = self.force_n.len();
+        let differences =
+            |a: &'_ [f64], b: &'_ [f64], shift: usize| (0..n).map(|i| a[i] - b[(i + shift) % n]).collect::<Vec<_>>();
+        let apart_m2 = |shift| differences(&self.place_m, &other.place_m, shift).iter().map(|d| d * d).sum::<f64>();
+        let shift = (0..n).min_by(|a, b| apart_m2(*a).total_cmp(&apart_m2(*b))).unwrap();
+        let mut apart: Vec<f64> = differences(&self.force_n, &other.force_n, shift).into_iter().map(f64::abs).collect();
         apart.sort_by(f64::total_cmp);
         let near = &apart[..n - n / 50];
         ((near.iter().map(|d| d * d).sum::<f64>() / near.len() as f64).sqrt(), near[near.len() - 1])

@@ -49,7 +49,21 @@ impl Lab {
         waited.unwrap_or_else(|| panic!("never: {what}; {} N", self.force_n()))
     }
 
-    /// Likewise, while `bridge` runs, whose words are told when it waited in vain.
+    /// Waits until the force is zero for good, as far as a tenth of a second tells (a force that a controller shortens is zero for a tick, too); when it was not zero for the last time.
+    pub fn wait_for_end(&self) -> Duration {
+        const FOR_GOOD: Duration = Duration::from_millis(100);
+        let (began, mut last) = (Instant::now(), Duration::ZERO);
+        while began.elapsed() < last + FOR_GOOD {
+            assert!(began.elapsed() < PATIENCE, "its force does not end: {} N", self.force_n());
+            if self.force_n() != 0.0 {
+                last = began.elapsed();
+            }
+            std::thread::sleep(Duration::from_micros(100));
+        }
+        last
+    }
+
+    /// Waits for a force (N), while `bridge` runs, whose words are told when it waited in vain.
     pub fn wait_beside(
         &self,
         (bridge, daemon): (&mut Program, &Daemon),
