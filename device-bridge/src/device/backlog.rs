@@ -25,7 +25,7 @@ impl Backlog {
     }
 
     /// Whether nothing may be put behind so much.
-    pub(super) fn is_too_long(&self, counted: u32) -> bool {
+    pub(super) fn is_too_long(self, counted: u32) -> bool {
         if self.buffer > 0 { counted >= MOST_BUFFERS.saturating_mul(self.buffer) } else { counted > MOST_BYTES }
     }
 }
