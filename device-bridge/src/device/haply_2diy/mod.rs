@@ -335,6 +335,8 @@ mod tests {
         let mut line = Line::open(&settings.port, settings.baud).unwrap();
         line.buffers = Some(Buffers::new(10_240, Duration::from_millis(3)));
         set_up_board(&mut line, &settings).unwrap();
+        let since = &line.buffers.as_ref().unwrap().since;
+        assert!(since.len() == 3 && since.windows(2).all(|pair| pair[1] - pair[0] >= Duration::from_millis(3)));
         let mut replies = Replies::new(settings.device_id);
         until("it answers", || line.newest(|byte| replies.take(byte)).unwrap().is_some());
         assert_eq!(emulated.requests(), 1);
