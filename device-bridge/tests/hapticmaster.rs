@@ -6,7 +6,13 @@ use common::press::{self, PRESSED_N, bridged, pressed_n, simulated, to_arm};
 use glam::DVec3;
 use palpate_bridge::{
     config::{DeviceConfig, HapticMasterConfig},
-    device::{Arm as _, Fault, hapticmaster as driver},
+    device::{
+        Arm as _, Fault,
+        hapticmaster::{
+            self as driver,
+            plane::{DampFactor, PlaneSettings},
+        },
+    },
     emulate::{
         Faults,
         hapticmaster::{HapticMaster, Settings},
@@ -46,7 +52,9 @@ const FLICKER_N: f64 = 2e-4;
 async fn a_press_ends_at_the_force_of_the_simulated_arm() {
     let (expected_n, _) = pressed_n(FLICKER_N, simulated()).await;
     assert!((expected_n - PRESSED_N).abs() < 0.01, "{expected_n}");
-    for (headers, quoted, apart) in [(true, false, false), (false, true, false), (true, true, true)] {
+    for (headers, quoted, apart) in
+        [(true, false, false), (false, true, false), (true, true, true), (false, true, true)]
+    {
         let arm = emulator(|settings| {
             held(settings);
             (settings.headers, settings.quoted, settings.apart) = (headers, quoted, apart);
@@ -186,4 +194,25 @@ fn an_arm_that_cannot_be_started_says_why() {
     let light =
         driver::start::StartSettings { inertia_kg: 1.0, ..settings(light.address().to_string(), Duration::ZERO) };
     assert!(said(light).contains("refused \"set inertia 1\""));
+}
+
+/// On an arm that keeps its effects when a connection ends.
+#[test]
+fn a_start_that_fails_leaves_no_effects() {
+    let emulated = emulator(|settings| (settings.effects.kept, settings.effects.planes) = (true, false));
+    let settings = driver::start::StartSettings {
+        address: emulated.address().to_string(),
+        dialect: driver::Dialect::Mixed,
+        inertia_kg: 2.0,
+        max_force_n: 3.0,
+        plane: Some(PlaneSettings { damp_factor: DampFactor::Coefficient }),
+        homing: Duration::from_secs(2),
+        silence: Duration::from_millis(500),
+    };
+    let error = driver::start::start(&settings, &CancellationToken::new()).unwrap_err().to_string();
+    assert!(error.contains("refused \"create flatplane contact\""), "{error}");
+    assert!(!emulated.is_enabled(driver::EFFECT));
+    let started =
+        driver::start::start(&driver::start::StartSettings { plane: None, ..settings }, &CancellationToken::new());
+    assert!(started.is_ok() && emulated.is_enabled(driver::EFFECT));
 }

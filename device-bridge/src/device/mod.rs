@@ -1,15 +1,18 @@
 //! Arms: one file or folder for each, behind one small trait.
+mod backlog;
 pub mod falcon;
 pub mod haply_2diy;
 pub mod hapticmaster;
 pub mod inverse3;
 pub mod kinds;
+mod lines;
 #[cfg(test)]
 mod noise;
 pub mod phantom;
 pub mod playback;
 pub mod requests;
 pub mod serial;
+pub mod share;
 pub mod simulated;
 pub mod tcp;
 pub mod vrpn;
@@ -40,6 +43,9 @@ use vrpn::Vrpn;
 pub use witness::Witness;
 use woodenhaptics::WoodenHaptics;
 use workspace::Placed;
+
+/// A pose is believed to go on with its velocity for so long (s).
+const LONGEST_EXTRAPOLATION_S: f64 = 5e-3;
 
 /// What an arm measures at one time.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -35,6 +35,27 @@ impl Pair {
         })
     }
 
+    /// Says something to the driver.
+    pub(crate) fn say(&mut self, bytes: &[u8]) {
+        self.ours.write_all(bytes).unwrap();
+    }
+
+    /// All that the driver has said so far.
+    pub(crate) fn heard(&mut self) -> Vec<u8> {
+        let mut heard = Vec::new();
+        loop {
+            // A pseudo terminal hands on what was written a moment later.
+            std::thread::sleep(Duration::from_millis(20));
+            let there = self.ours.bytes_to_read().unwrap() as usize;
+            if there == 0 {
+                return heard;
+            }
+            let mut bytes = vec![0; there];
+            self.ours.read_exact(&mut bytes).unwrap();
+            heard.append(&mut bytes);
+        }
+    }
+
     /// A million random bytes, in pieces of up to 64: every other one within messages of the arm; `look` after each.
     pub(crate) fn feed(&mut self, message: &[u8], mut look: impl FnMut()) {
         let mut left = 1_000_000_usize;

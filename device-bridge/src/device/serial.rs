@@ -1,5 +1,6 @@
-//! A serial line beside the loop: it never waits. What its bytes are, each arm says; lines of text are told apart here.
-use super::{Fault, LastWords};
+//! A serial line beside the loop: it never waits. What its bytes are, each arm says; lines of text are told apart in [`Lines`].
+pub use super::lines::Lines;
+use super::{Fault, LastWords, backlog::Backlog};
 use rustix::fs::OFlags;
 use serialport::{ClearBuffer, SerialPort as _, TTYPort};
 use std::{
@@ -12,12 +13,14 @@ use thiserror::Error;
 
 /// Most that is read at once.
 const CHUNK: usize = 512;
-/// The longest line that is one.
-const LONGEST_LINE: usize = 96;
-/// With so much unsent nothing more is put behind it: the other end does not listen.
-const MOST_UNSENT: u32 = 512;
+/// No message of a loop is longer.
+const LONGEST_MESSAGE: usize = 128;
 /// Never waited for: what is there is asked for first.
 const WAIT: Duration = Duration::from_millis(1);
+/// Between two looks at whether a line is empty, outside the loop.
+const LOOK_EVERY: Duration = Duration::from_millis(1);
+/// How long whoever takes the force away at the end waits for the line to be empty before.
+pub const FAREWELL: Duration = Duration::from_millis(100);
 
 /// A port that cannot be opened.
 #[derive(Debug, Error)]
@@ -80,8 +83,28 @@ pub fn start<T>(
 #[derive(Debug)]
 pub struct Line {
     port: TTYPort,
-    /// The same port once more, for a guard.
+    /// The same port once more, which does not wait for room: to write, and for a guard.
     spare: File,
+    /// The end of a message for which there was no room.
+    rest: Vec<u8>,
+    backlog: Backlog,
+    /// Messages that were not sent: all, and since the last that was.
+    refused: u64,
+    refused_in_row: u64,
+    /// Counts in the operating system's place.
+    #[cfg(test)]
+    pub(crate) buffers: Option<Buffers>,
+}
+
+/// A count of unsent bytes as that of a USB CDC line.
+#[cfg(test)]
+#[derive(Debug)]
+pub(crate) struct Buffers {
+    /// What each is counted as.
+    pub(crate) each: u32,
+    /// How long a message is on its way.
+    pub(crate) takes: Duration,
+    pub(crate) since: Vec<Instant>,
 }
 
 impl Line {
@@ -96,7 +119,16 @@ impl Line {
         let spare = File::options().read(true).write(true).custom_flags(flags).open(path);
         let spare = spare.map_err(|error| failed(error.into()))?;
         let opened = serialport::new(path, baud).timeout(WAIT).open_native();
-        opened.map(|port| Self { port, spare }).map_err(failed)
+        Ok(Self {
+            port: opened.map_err(failed)?,
+            spare,
+            rest: Vec::with_capacity(LONGEST_MESSAGE),
+            backlog: Backlog::default(),
+            refused: 0,
+            refused_in_row: 0,
+            #[cfg(test)]
+            buffers: None,
+        })
     }
 
     /// These bytes, for a guard to write.
@@ -119,27 +151,93 @@ impl Line {
         }
     }
 
-    /// Sends a message whole, or not at all when the other end does not listen: the next one says all of it anew.
+    /// Sends a message if it can go now; whether it did. One that did not is not kept: the next says all of it anew. Never waits.
     ///
     /// # Errors
     /// [`Fault::Disconnected`].
-    pub fn send(&mut self, message: &[u8]) -> Result<(), Fault> {
-        let unsent = self.port.bytes_to_write().map_err(|_| Fault::Disconnected)?;
-        if unsent > MOST_UNSENT {
-            return Ok(());
-        }
-        match self.port.write(message) {
-            Ok(_) => Ok(()),
-            Err(error) if matches!(error.kind(), ErrorKind::TimedOut | ErrorKind::Interrupted) => Ok(()),
-            Err(_) => Err(Fault::Disconnected),
+    pub fn send(&mut self, message: &[u8]) -> Result<bool, Fault> {
+        let sent = self.put(message)?;
+        self.count(sent);
+        Ok(sent)
+    }
+
+    /// The same once the line is empty, which is waited for; after so long, whatever it is. Not for the loop.
+    ///
+    /// # Errors
+    /// [`Fault::Disconnected`].
+    pub fn send_in_turn(&mut self, message: &[u8], patience: Duration) -> Result<bool, Fault> {
+        let began = Instant::now();
+        let mut sent = false;
+        loop {
+            let is_late = began.elapsed() >= patience;
+            let is_empty = self.finish()? && self.unsent()? == 0;
+            if !sent && (is_empty || is_late) {
+                sent = self.put(message)?;
+            }
+            if is_late || sent && self.rest.is_empty() {
+                self.count(sent);
+                return Ok(sent);
+            }
+            std::thread::sleep(LOOK_EVERY);
         }
     }
 
-    /// What has come goes through `take`, byte by byte; the newest message that it puts together, if any.
+    /// How many messages were not sent since the last that was: the other end does not listen.
+    pub fn refused_in_row(&self) -> u64 {
+        self.refused_in_row
+    }
+
+    fn count(&mut self, sent: bool) {
+        self.refused += u64::from(!sent);
+        self.refused_in_row = if sent { 0 } else { self.refused_in_row.saturating_add(1) };
+    }
+
+    /// Nothing of it, or all: what there was no room for is kept, and goes first from now on.
+    fn put(&mut self, message: &[u8]) -> Result<bool, Fault> {
+        if !self.finish()? {
+            return Ok(false);
+        }
+        let unsent = self.unsent()?;
+        if self.backlog.is_too_long(unsent) {
+            return Ok(false);
+        }
+        let count = write(&self.spare, message)?;
+        if count == 0 {
+            return Ok(false);
+        }
+        self.rest.extend_from_slice(&message[count..]);
+        #[cfg(test)]
+        if let Some(buffers) = &mut self.buffers {
+            buffers.since.push(Instant::now());
+        }
+        if unsent == 0 {
+            self.backlog.learn(count, self.unsent()?);
+        }
+        Ok(true)
+    }
+
+    /// The rest of a message that was begun; whether there is none any more.
+    fn finish(&mut self) -> Result<bool, Fault> {
+        if !self.rest.is_empty() {
+            let count = write(&self.spare, &self.rest)?;
+            self.rest.drain(..count);
+        }
+        Ok(self.rest.is_empty())
+    }
+
+    fn unsent(&self) -> Result<u32, Fault> {
+        let count = self.port.bytes_to_write().map_err(|_| Fault::Disconnected)?;
+        #[cfg(test)]
+        let count = self.buffers.as_ref().map_or(count, Buffers::count);
+        Ok(count)
+    }
+
+    /// What has come goes through `take`, byte by byte; the newest message that it puts together, if any. What is left of a message of ours goes on its way.
     ///
     /// # Errors
     /// [`Fault::Disconnected`], or what `take` says.
     pub fn newest<T>(&mut self, mut take: impl FnMut(u8) -> Result<Option<T>, Fault>) -> Result<Option<T>, Fault> {
+        self.finish()?;
         let mut newest = None;
         let mut bytes = [0; CHUNK];
         loop {
@@ -176,58 +274,39 @@ impl Line {
     }
 }
 
-/// Puts bytes together to lines. What comes before the first end of a line is a part of one, and left out.
-#[derive(Debug, Clone)]
-pub struct Lines {
-    bytes: [u8; LONGEST_LINE],
-    length: usize,
-    is_in_step: bool,
-    is_over: bool,
-}
-
-impl Default for Lines {
-    fn default() -> Self {
-        Self { bytes: [0; LONGEST_LINE], length: 0, is_in_step: false, is_over: false }
+impl Drop for Line {
+    fn drop(&mut self) {
+        if self.refused > 0 {
+            let path = self.port.name().unwrap_or_default();
+            tracing::warn!("{} messages to {path} were not sent: its other end did not listen", self.refused);
+        }
     }
 }
 
-impl Lines {
-    /// The next byte; a line that it ends, without its end (`\n`, `\r\n` or `\r`). An empty one is none.
-    ///
-    /// # Errors
-    /// [`Fault::Garbled`] when a line is too long to be one.
-    pub fn take(&mut self, byte: u8) -> Result<Option<&[u8]>, Fault> {
-        if std::mem::take(&mut self.is_over) {
-            self.length = 0;
-        }
-        if byte != b'\n' && byte != b'\r' {
-            *self.bytes.get_mut(self.length).ok_or(Fault::Garbled)? = byte;
-            self.length += 1;
-            return Ok(None);
-        }
-        self.is_over = true;
-        let was_in_step = std::mem::replace(&mut self.is_in_step, true);
-        Ok((was_in_step && self.length > 0).then_some(&self.bytes[..self.length]))
+/// As many bytes as there is room for, without waiting; how many.
+fn write(mut to: &File, bytes: &[u8]) -> Result<usize, Fault> {
+    match to.write(bytes) {
+        Ok(count) => Ok(count),
+        Err(error) if matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::Interrupted) => Ok(0),
+        Err(_) => Err(Fault::Disconnected),
+    }
+}
+
+#[cfg(test)]
+impl Buffers {
+    pub(crate) fn new(each: u32, takes: Duration) -> Self {
+        Self { each, takes, since: Vec::new() }
+    }
+
+    fn count(&self) -> u32 {
+        self.each * self.since.iter().filter(|since| since.elapsed() < self.takes).count() as u32
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use proptest::prelude::*;
-
-    fn lines_of(text: &[u8]) -> Vec<Vec<u8>> {
-        let mut lines = Lines::default();
-        text.iter().filter_map(|&byte| lines.take(byte).unwrap().map(<[u8]>::to_vec)).collect()
-    }
-
-    #[test]
-    fn lines_end_in_either_way_and_the_first_part_is_none() {
-        assert_eq!(lines_of(b"34 5\n1 2\r\n\n3\r4\n5"), [b"1 2".to_vec(), b"3".to_vec(), b"4".to_vec()]);
-        let mut lines = Lines::default();
-        assert!((0..LONGEST_LINE).all(|_| lines.take(b'1') == Ok(None)));
-        assert_eq!(lines.take(b'1'), Err(Fault::Garbled));
-    }
+    use crate::device::noise::Pair;
 
     #[test]
     fn a_port_that_is_not_there_is_named() {
@@ -235,15 +314,58 @@ mod tests {
         assert!(error.to_string().starts_with("cannot open the serial port /dev/nothing: "), "{error}");
     }
 
-    proptest! {
-        #[test]
-        fn any_bytes_are_lines_or_garbled(bytes in prop::collection::vec(any::<u8>(), 0..2000)) {
-            let mut lines = Lines::default();
-            for byte in bytes {
-                if let Ok(Some(line)) = lines.take(byte) {
-                    prop_assert!(!line.is_empty() && line.len() <= LONGEST_LINE);
-                }
+    fn message(number: u32) -> [u8; 28] {
+        let mut message = [b'.'; 28];
+        message[..4].copy_from_slice(&number.to_be_bytes());
+        message
+    }
+
+    /// Nobody reads: nothing waits, and what is not sent is counted. Then somebody does: every message is whole, and the newest is the last.
+    #[test]
+    fn a_line_that_is_full_refuses_messages_and_none_is_sent_in_part() {
+        let mut pair = Pair::new();
+        let mut line = Line::open(&pair.path, 115_200).unwrap();
+        let mut sent = Vec::new();
+        for number in 0..1_000_000 {
+            if line.send(&message(number)).unwrap() {
+                sent.extend_from_slice(&message(number));
+            } else if line.refused_in_row() == 3 {
+                break;
             }
         }
+        assert_eq!((line.refused_in_row(), line.refused), (3, 3));
+        let mut heard = pair.heard();
+        let nothing = |_| Ok(None::<()>);
+        // What was begun goes on by itself.
+        line.newest(nothing).unwrap();
+        heard.append(&mut pair.heard());
+        assert!(heard == sent, "{} bytes heard, {} sent", heard.len(), sent.len());
+        assert_eq!((line.send(&message(7)), line.refused_in_row(), line.refused), (Ok(true), 0, 3));
+        assert_eq!(pair.heard(), message(7));
+    }
+
+    #[test]
+    fn the_rest_of_a_message_goes_first() {
+        let mut pair = Pair::new();
+        let mut line = Line::open(&pair.path, 115_200).unwrap();
+        line.rest.extend_from_slice(b"rest,");
+        assert_eq!(line.send(b"next"), Ok(true));
+        assert_eq!(pair.heard(), b"rest,next");
+    }
+
+    /// Its count is 10240 bytes for a message: all of a loop's go out while it takes them, and few are put behind each other when it does not.
+    #[test]
+    fn a_usb_cdc_line_is_no_full_one() {
+        let mut pair = Pair::new();
+        let mut line = Line::open(&pair.path, 115_200).unwrap();
+        line.buffers = Some(Buffers::new(10_240, Duration::from_secs(1000)));
+        let sent: Vec<bool> = (0..6).map(|number| line.send(&message(number)).unwrap()).collect();
+        assert_eq!(sent, [true, true, true, true, false, false]);
+        assert_eq!(line.send_in_turn(&message(6), Duration::from_millis(5)), Ok(false));
+        line.buffers = Some(Buffers::new(10_240, Duration::from_millis(3)));
+        assert!((0..20).all(|number| line.send_in_turn(&message(number), Duration::from_secs(20)).unwrap()));
+        let since = &line.buffers.as_ref().unwrap().since;
+        assert!(since.windows(2).all(|pair| pair[1] - pair[0] >= Duration::from_millis(3)), "one after the other");
+        assert_eq!(pair.heard().len(), 24 * 28);
     }
 }

@@ -26,6 +26,8 @@ const LOOK_EVERY: Duration = Duration::from_millis(1);
 pub struct EffectSettings {
     /// They stay when a connection ends, and act until the next one removes them.
     pub kept: bool,
+    /// It has flat planes; else it refuses to create one.
+    pub planes: bool,
     /// A `dampfactor` is a share of critical damping; else N s/m.
     pub damping_is_ratio: bool,
 }
@@ -55,7 +57,7 @@ impl Default for Settings {
             headers: true,
             quoted: false,
             apart: false,
-            effects: EffectSettings { kept: false, damping_is_ratio: true },
+            effects: EffectSettings { kept: false, planes: true, damping_is_ratio: true },
             homing: Some(Duration::from_millis(300)),
             arm: ArmSpec { mass_kg: LEAST_INERTIA_KG, damping_n_s_per_m: 8.0, ..ArmSpec::default() },
             path: HandPath::resting_at(DVec3::ZERO),

@@ -149,7 +149,7 @@ impl Loader<'_> {
     }
 
     fn tell(&mut self, bytes: &[u8]) -> Result<(), LoadError> {
-        self.line.send(bytes).map_err(|fault| self.port(fault))
+        self.line.send_in_turn(bytes, PATIENCE).map(drop).map_err(|fault| self.port(fault))
     }
 
     /// What comes until that is all, or for as long as an answer may take.

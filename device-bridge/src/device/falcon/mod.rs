@@ -11,9 +11,10 @@ pub mod start;
 pub mod wire;
 
 use super::{
-    Arm, Effort, Fault, LastWords, Reading,
+    Arm, Effort, Fault, LONGEST_EXTRAPOLATION_S, LastWords, Reading,
     requests::{Requests, between},
-    serial::Line,
+    serial::{FAREWELL, Line},
+    share::Share,
 };
 use glam::{DMat3, DVec3};
 use palpate_control::{Motion, Velocity, extrapolate};
@@ -25,8 +26,6 @@ use wire::{Frame, Frames};
 pub const BAUD: u32 = 1_500_000;
 /// A step of an encoder turns a leg by so much (rad): 320 slots, each counted four times, on a shaft of 14.25 mm that turns a wheel of 110 mm.
 pub const RAD_PER_COUNT: f64 = 14.25 / 110.0 * std::f64::consts::TAU / 1280.0;
-/// A pose is believed to go on with its velocity for so long (s).
-const LONGEST_EXTRAPOLATION_S: f64 = 5e-3;
 /// With so many frames unanswered no more is sent: the arm is slower than the loop, and poses would become old.
 const MOST_UNANSWERED: usize = 4;
 /// When nothing has come for so many periods, what is unanswered was lost, and is asked for anew.
@@ -103,6 +102,8 @@ pub struct Falcon {
     motion: Motion,
     buttons: u32,
     force_n: DVec3,
+    /// Of it: none where no Falcon can be.
+    share: Share,
     /// Since the newest frame came.
     quiet_periods: u64,
     /// Frames on their way.
@@ -132,6 +133,7 @@ impl Falcon {
             motion: Motion::at(DVec3::ZERO),
             buttons: 0,
             force_n: DVec3::ZERO,
+            share: Share::ALL,
             quiet_periods: 0,
             requests: Requests::default(),
             asked_at: 0,
@@ -154,10 +156,11 @@ impl Falcon {
         }
         self.buttons = (frame.flags & wire::BUTTONS).into();
         let Some((grip_m, legs)) = kinematics::grip(self.settings.angles_rad(frame.numbers), self.grip_m) else {
-            self.jacobian_m_per_rad = DMat3::ZERO;
+            self.share.pass(false);
             self.motion.velocity_m_per_s = DVec3::ZERO;
             return false;
         };
+        self.share.pass(true);
         self.grip_m = grip_m;
         self.jacobian_m_per_rad = legs.slope_rad_per_m.inverse();
         self.motion = Motion::at(grip_m - self.settings.centre_m);
@@ -199,9 +202,15 @@ impl Falcon {
         if self.requests.unanswered() >= MOST_UNANSWERED && self.lost.is_none() {
             return Ok(());
         }
-        self.requests.made();
-        let numbers = self.settings.units(self.jacobian_m_per_rad.transpose() * self.force_n);
-        self.line.send(&Frame { numbers, flags: FLAGS }.bytes())
+        // One that was not sent is not on its way: the next tick tries again, with what is to be felt then.
+        if self.line.send(&Frame { numbers: self.units(), flags: FLAGS }.bytes())? {
+            self.requests.made();
+        }
+        Ok(())
+    }
+
+    fn units(&self) -> [i16; 3] {
+        self.settings.units(self.share.now() * (self.jacobian_m_per_rad.transpose() * self.force_n))
     }
 
     fn age_s(&self) -> f64 {
@@ -247,7 +256,7 @@ impl Arm for Falcon {
 impl Drop for Falcon {
     /// Takes the torques away; its light says that nobody uses it.
     fn drop(&mut self) {
-        let _ = self.line.send(&Frame { numbers: [0; 3], flags: wire::HOMING | wire::BLUE }.bytes());
+        let _ = self.line.send_in_turn(&Frame { numbers: [0; 3], flags: wire::HOMING | wire::BLUE }.bytes(), FAREWELL);
     }
 }
 
@@ -303,5 +312,26 @@ mod tests {
             arm.apply(&Effort::force(DVec3::ONE));
         });
         assert!(faults > 1000 && readings > 1000, "{faults} {readings}");
+    }
+
+    #[test]
+    fn out_of_reach_there_is_no_force_and_it_comes_back_slowly() {
+        let mut pair = Pair::new();
+        let settings = settings(&pair.path);
+        let home = Frame { numbers: [10, -20, 30], flags: wire::HOMED };
+        let open = || Falcon::open(&settings, 1e-3, &CancellationToken::new());
+        let mut arm = pair.starting(&home.bytes(), open).unwrap();
+        arm.force_n = DVec3::new(1.0, 1.0, 3.0);
+        let whole = arm.units();
+        assert!(whole.iter().all(|units| units.abs() > 100), "{whole:?}");
+        assert!(!arm.renew(Frame { numbers: [20_000, -20_000, 0], ..home }, 1e-3));
+        assert_eq!(arm.units(), [0; 3]);
+        for frame in 1..=50 {
+            assert!(arm.renew(home, 1e-3));
+            for (now, whole) in arm.units().iter().zip(whole) {
+                let expected = 0.02 * f64::from(frame) * f64::from(whole);
+                assert!((f64::from(*now) - expected).abs() < 1.5, "{now}, {expected}");
+            }
+        }
     }
 }

@@ -148,7 +148,7 @@ impl Talk {
         let asked = self.line.send(&Frame { numbers: [0; 3], flags }.bytes());
         std::thread::sleep(ASK_EVERY);
         let frames = &mut self.frames;
-        let answer = asked.and_then(|()| self.line.newest(|byte| frames.take(byte)));
+        let answer = asked.and_then(|_| self.line.newest(|byte| frames.take(byte)));
         answer.map_err(|fault| self.strange(fault))
     }
 

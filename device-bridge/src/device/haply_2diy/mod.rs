@@ -11,9 +11,10 @@ pub mod kinematics;
 pub mod wire;
 
 use super::{
-    Arm, Effort, Fault, LastWords, Reading,
+    Arm, Effort, Fault, LONGEST_EXTRAPOLATION_S, LastWords, Reading,
     requests::{Requests, between},
-    serial::{self, Line},
+    serial::{self, FAREWELL, Line},
+    share::Share,
 };
 use glam::{DMat2, DVec2, DVec3, Vec3Swizzles as _};
 use kinematics::Kinematics;
@@ -22,12 +23,12 @@ use std::time::{Duration, Instant};
 use thiserror::Error;
 use wire::{Axis, Replies};
 
-/// A pose is believed to go on with its velocity for so long (s).
-const LONGEST_EXTRAPOLATION_S: f64 = 5e-3;
 /// How long the first answer may take.
 const PATIENCE: Duration = Duration::from_secs(3);
 /// A board that does not answer is set up anew after so long: it may have begun anew when the port was opened.
 const SET_UP_EVERY: Duration = Duration::from_secs(1);
+/// How long a message that sets it up waits for the one before.
+const IN_TURN: Duration = Duration::from_millis(200);
 /// Between two looks at whether it answered.
 const LOOK_EVERY: Duration = Duration::from_millis(1);
 
@@ -112,6 +113,8 @@ pub struct Haply2diy {
     rates: [Velocity; 2],
     motion: Motion,
     force_n: DVec2,
+    /// Of it: none where the outer links are in line.
+    share: Share,
     requests: Requests,
     /// When the newest pose was asked for: it is not older.
     asked_at: u64,
@@ -148,6 +151,7 @@ impl Haply2diy {
             rates: [steps_deg.x, steps_deg.y].map(|step| Velocity::new(step, period_s)),
             motion: Motion::at(DVec3::ZERO),
             force_n: DVec2::ZERO,
+            share: Share::ALL,
             requests: Requests::default(),
             asked_at: 0,
             quiet_periods: 0,
@@ -167,6 +171,7 @@ impl Haply2diy {
         let [a, b] = &mut self.rates;
         let rates_deg = DVec2::new(a.push(angles_deg.x, passed_s), b.push(angles_deg.y, passed_s));
         self.jacobian_m_per_rad = place.jacobian_m_per_rad;
+        self.share.pass(place.jacobian_m_per_rad != DMat2::ZERO);
         self.motion = Motion::at(place.tool_m.extend(0.0));
         // v = J ω
         self.motion.velocity_m_per_s = (place.jacobian_m_per_rad * rates_deg.map(f64::to_radians)).extend(0.0);
@@ -197,9 +202,15 @@ impl Haply2diy {
         if self.requests.unanswered() > 0 && self.lost.is_none() {
             return Ok(());
         }
-        self.requests.made();
-        let torques_nm = self.jacobian_m_per_rad.transpose() * self.force_n;
-        self.line.send(&wire::request(self.settings.device_id, self.settings.sent_nm(torques_nm)))
+        // One that was not sent is not on its way: the next tick tries again, with what is to be felt then.
+        if self.line.send(&wire::request(self.settings.device_id, self.sent_nm()))? {
+            self.requests.made();
+        }
+        Ok(())
+    }
+
+    fn sent_nm(&self) -> [f32; 2] {
+        self.settings.sent_nm(self.share.now() * (self.jacobian_m_per_rad.transpose() * self.force_n))
     }
 
     fn lose(&mut self, fault: Fault) -> Fault {
@@ -209,9 +220,14 @@ impl Haply2diy {
 
 fn set_up_board(line: &mut Line, settings: &Settings) -> Result<(), Fault> {
     let id = settings.device_id;
-    line.send(&[wire::RESET, id])?;
-    line.send(&wire::setup(id, settings.swapped(settings.axes)))?;
-    line.send(&wire::request(id, [0.0; 2]))
+    let setup = wire::setup(id, settings.swapped(settings.axes));
+    for message in [&[wire::RESET, id][..], &setup, &wire::request(id, [0.0; 2])] {
+        // None without the one before.
+        if !line.send_in_turn(message, IN_TURN)? {
+            break;
+        }
+    }
+    Ok(())
 }
 
 impl Arm for Haply2diy {
@@ -248,14 +264,20 @@ impl Arm for Haply2diy {
 impl Drop for Haply2diy {
     /// Takes the torques away.
     fn drop(&mut self) {
-        let _ = self.line.send(&wire::request(self.settings.device_id, [0.0; 2]));
+        let _ = self.line.send_in_turn(&wire::request(self.settings.device_id, [0.0; 2]), FAREWELL);
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{config::Haply2diyConfig, device::noise::Pair, settings::arm};
+    use crate::{
+        config::Haply2diyConfig,
+        device::{noise::Pair, serial::Buffers},
+        emulate::haply_2diy as emulator,
+        settings::arm,
+    };
+    use palpate_control::{ArmSpec, HandPath};
 
     /// As if each were asked for: poses that are numbers, or a fault by its name, and nothing else.
     #[test]
@@ -285,5 +307,88 @@ mod tests {
             arm.apply(&Effort::force(DVec3::ONE));
         });
         assert!(faults > 1000 && readings > 1000, "{faults} {readings}");
+    }
+
+    fn emulated() -> (emulator::Haply2diy, Settings) {
+        let keys = Haply2diyConfig { max_torque_nm: 0.4, silence_s: 10.0, ..Haply2diyConfig::default() };
+        let constants = arm::haply_2diy::checked(&keys).unwrap();
+        let path = HandPath::resting_at(DVec3::ZERO);
+        let held = ArmSpec::default();
+        let settings = emulator::Settings { constants, knows_home: true, watchdog: None, arm: held, path };
+        let emulated = emulator::Haply2diy::start(settings).unwrap();
+        let keys = Haply2diyConfig { port: emulated.port().to_owned(), ..keys };
+        (emulated, arm::haply_2diy::checked(&keys).unwrap())
+    }
+
+    fn until(what: &str, mut done: impl FnMut() -> bool) {
+        let began = Instant::now();
+        while !done() {
+            assert!(began.elapsed() < Duration::from_secs(20), "waited in vain until {what}");
+            std::thread::sleep(Duration::from_millis(1));
+        }
+    }
+
+    /// A USB CDC line counts each message as a buffer of 10240 bytes for as long as it is on its way: the second and third were taken for too much, at every try.
+    #[test]
+    fn a_board_on_a_usb_cdc_line_is_set_up() {
+        let (emulated, settings) = emulated();
+        let mut line = Line::open(&settings.port, settings.baud).unwrap();
+        line.buffers = Some(Buffers::new(10_240, Duration::from_millis(3)));
+        set_up_board(&mut line, &settings).unwrap();
+        let since = &line.buffers.as_ref().unwrap().since;
+        assert!(since.len() == 3 && since.windows(2).all(|pair| pair[1] - pair[0] >= Duration::from_millis(3)));
+        let mut replies = Replies::new(settings.device_id);
+        until("it answers", || line.newest(|byte| replies.take(byte)).unwrap().is_some());
+        assert_eq!(emulated.requests(), 1);
+    }
+
+    #[test]
+    fn a_request_that_is_not_sent_is_not_on_its_way_and_the_next_tick_sends_the_newest_force() {
+        let (emulated, settings) = emulated();
+        let mut arm = Haply2diy::start(&settings, 1e-3).unwrap();
+        let full = || {
+            let mut buffers = Buffers::new(10_240, Duration::from_millis(30));
+            buffers.since = vec![Instant::now() + Duration::from_secs(1000); 4];
+            Some(buffers)
+        };
+        let tick = |arm: &mut Haply2diy, force_n: DVec3| {
+            arm.read(1).unwrap();
+            arm.apply(&Effort::force(force_n));
+        };
+        arm.line.buffers = full();
+        for refused in 1..4 {
+            tick(&mut arm, DVec3::Y);
+            assert_eq!((arm.requests.unanswered(), arm.line.refused_in_row()), (0, refused));
+        }
+        arm.line.buffers = None;
+        tick(&mut arm, DVec3::X);
+        assert_eq!((arm.requests.unanswered(), arm.line.refused_in_row()), (1, 0));
+        until("it has the newest force", || emulated.force_n().distance(DVec3::X) < 0.05);
+        // Not listening for a moment when it ends.
+        arm.line.buffers = full();
+        arm.line.buffers.as_mut().unwrap().since = vec![Instant::now(); 4];
+        drop(arm);
+        until("it lets go", || emulated.force_n() == DVec3::ZERO);
+    }
+
+    #[test]
+    fn where_the_outer_links_were_in_line_the_force_comes_back_slowly() {
+        let mut pair = Pair::new();
+        // Inner links on the x axis make it 180 mm from elbow to elbow: all that the outer ones reach.
+        let keys = Haply2diyConfig { port: pair.path.clone(), base_m: 0.04, ..Haply2diyConfig::default() };
+        let settings = arm::haply_2diy::checked(&keys).unwrap();
+        let answer = wire::reply(settings.device_id, [12.0, 168.0]);
+        let mut arm = pair.starting(&answer, || Haply2diy::start(&settings, 1e-3)).unwrap();
+        arm.force_n = DVec2::new(0.2, 0.5);
+        let whole_nm = arm.sent_nm();
+        assert!(whole_nm.iter().all(|nm| nm.abs() > 1e-3), "{whole_nm:?}");
+        arm.renew([0.0, 180.0], 1e-3).unwrap();
+        assert_eq!(arm.sent_nm(), [0.0; 2]);
+        for frame in 1..=50 {
+            arm.renew([12.0, 168.0], 1e-3).unwrap();
+            for (now_nm, whole_nm) in arm.sent_nm().iter().zip(whole_nm) {
+                assert!((now_nm / whole_nm - 0.02 * frame as f32).abs() < 1e-5, "{now_nm} of {whole_nm}");
+            }
+        }
     }
 }

@@ -2,8 +2,8 @@
 //!
 //! A request is 8 bytes, all zero but the fourth, the number of bytes that follow, and that many ASCII characters: commands with `;` between them. Every request has
 //! one answer. Public sources do not settle whether an answer begins with the same 8 bytes: both are taken, told apart by the first byte, which is never 0 in
-//! ASCII. One without them has no end of its own; it is whole when it has an answer for every command of the request and the last is closed, which is why every
-//! request in the loop ends with a vector that is asked for.
+//! ASCII. One without them has no end of its own; it is whole when it has an answer for every command of the request and the last is closed, by the vector that requests
+//! in the loop end with; one that ends otherwise may go on, and is over when nothing more comes ([`Answer::tells_its_end`]).
 use super::super::Fault;
 use glam::DVec3;
 
@@ -61,8 +61,13 @@ impl Answer {
     }
 
     /// Whether it began with a header, which tells its end.
-    pub fn has_header(&self) -> bool {
+    fn has_header(&self) -> bool {
         self.bytes.first() == Some(&0)
+    }
+
+    /// Whether what [`Self::whole`] gives is all of it; else it may go on for as long as bytes come.
+    pub fn tells_its_end(&self, ends_with_vector: bool) -> bool {
+        ends_with_vector || self.has_header()
     }
 
     /// The answer's text, once it is whole. `ends_with_vector`: the last command asks for one, which tells the end of an answer without a header.

@@ -11,7 +11,7 @@ pub mod plane;
 mod request;
 pub mod start;
 
-use super::{Arm, Effort, Fault, LastWords, Reading, unstarted};
+use super::{Arm, Effort, Fault, LONGEST_EXTRAPOLATION_S, LastWords, Reading, unstarted};
 use crate::BridgeError;
 use glam::DVec3;
 use grammar::Answer;
@@ -26,8 +26,6 @@ use tokio_util::sync::CancellationToken;
 
 /// Name of our effect on the arm.
 pub const EFFECT: &str = "palpate";
-/// A pose is believed to go on with its velocity for so long (s).
-const LONGEST_EXTRAPOLATION_S: f64 = 5e-3;
 /// How long the end of the program waits for the arm to take the force away.
 const FAREWELL: Duration = Duration::from_millis(100);
 
@@ -143,13 +141,16 @@ impl HapticMaster {
 
     /// Takes what has come; a whole answer renews the reading.
     fn receive(&mut self) -> Result<(), Fault> {
-        let mut bytes = [0; 1024];
+        let (mut bytes, mut came) = ([0; 1024], false);
         loop {
             match self.stream.read(&mut bytes) {
                 Ok(0) => return Err(Fault::Disconnected),
                 // Nobody asked for these.
                 Ok(_) if self.asked == Asked::Nothing => return Err(Fault::Garbled),
-                Ok(count) => self.answer.take(&bytes[..count])?,
+                Ok(count) => {
+                    came = true;
+                    self.answer.take(&bytes[..count])?;
+                }
                 Err(error) if error.kind() == ErrorKind::WouldBlock => break,
                 Err(error) if error.kind() == ErrorKind::Interrupted => {}
                 Err(_) => return Err(Fault::Disconnected),
@@ -159,6 +160,10 @@ impl HapticMaster {
         let Some(text) = self.answer.whole(ends_with_vector)? else { return Ok(()) };
         if grammar::is_refusal(text) {
             return Err(Fault::Refused);
+        }
+        // The next tick tells whether it was all.
+        if came && !self.answer.tells_its_end(ends_with_vector) {
+            return Ok(());
         }
         let mut parts = grammar::parts(text);
         if let Asked::Motion { with_stop, sets } = self.asked {
@@ -250,6 +255,61 @@ impl Drop for HapticMaster {
         for text in request::let_go(self.plane.is_some()).chain(["remove all".to_owned()]) {
             grammar::frame(text.as_bytes(), &mut self.request);
             let _ = self.stream.write_all(&self.request).and_then(|()| self.stream.read(&mut [0; 1024]));
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::net::TcpListener;
+
+    fn connected() -> (HapticMaster, TcpStream) {
+        let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+        let stream = TcpStream::connect(listener.local_addr().unwrap()).unwrap();
+        let settings = start::StartSettings {
+            address: String::new(),
+            dialect: Dialect::Apart,
+            inertia_kg: 2.0,
+            max_force_n: 3.0,
+            plane: None,
+            homing: Duration::ZERO,
+            silence: Duration::from_secs(1000),
+        };
+        let started = start::Started { stream, version: String::new(), position_m: DVec3::ZERO };
+        let arm = listener.accept().unwrap().0;
+        arm.set_read_timeout(Some(Duration::from_secs(20))).unwrap();
+        (HapticMaster::new(started, &settings, 1e-3).unwrap(), arm)
+    }
+
+    fn request(arm: &mut TcpStream) -> String {
+        let mut header = [0; grammar::HEADER_BYTES];
+        arm.read_exact(&mut header).unwrap();
+        let mut text = vec![0; header[3].into()];
+        arm.read_exact(&mut text).unwrap();
+        String::from_utf8(text).unwrap()
+    }
+
+    /// `set` and `get` apart, answers without headers, and a byte of them at a time: the first byte was taken for the whole answer to a `set`.
+    #[test]
+    fn answers_without_headers_are_put_together_from_single_bytes() {
+        let (mut driven, mut arm) = connected();
+        for round in 0..6 {
+            driven.apply(&Effort::force(DVec3::X));
+            let asked = request(&mut arm);
+            let stop = if asked.contains("emergency") { "false;" } else { "" };
+            let place = format!("{stop}[0.{round},0,0];[0,0,0];[0,0,1]");
+            assert_eq!(asked.starts_with("set"), round % 2 == 1, "{asked}");
+            let answer = if round % 2 == 1 { "Biasforce's force set" } else { &place };
+            for byte in answer.bytes() {
+                arm.write_all(&[byte]).unwrap();
+                while driven.stream.peek(&mut [0]).is_err() {
+                    std::thread::yield_now();
+                }
+                driven.read(1).unwrap();
+            }
+            let found = driven.read(1).unwrap().motion.position_m.x;
+            assert!((found - 0.1 * f64::from(round / 2 * 2)).abs() < 1e-12, "{found}");
         }
     }
 }

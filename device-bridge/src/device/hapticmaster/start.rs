@@ -113,7 +113,7 @@ pub enum StartError {
 /// Connects, and brings the arm into its state `force` with an effect of ours on it.
 ///
 /// # Errors
-/// [`StartError`]; the arm is left without effects of ours.
+/// [`StartError`]; an arm that still listens is left without effects of ours.
 pub fn start(settings: &StartSettings, stop: &CancellationToken) -> Result<Started, StartError> {
     let mut talk = Talk { stream: connect(&settings.address)?, answer: Answer::new() };
     talk.order("remove all")?;
@@ -127,19 +127,13 @@ pub fn start(settings: &StartSettings, stop: &CancellationToken) -> Result<Start
     }
     talk.order(&format!("set inertia {}", settings.inertia_kg))?;
     talk.order("set state force")?;
-    talk.order(&format!("create biasforce {EFFECT}"))?;
-    talk.order(&format!("set {EFFECT} force [0,0,0]"))?;
-    talk.order(&format!("set {EFFECT} enable"))?;
-    if settings.plane.is_some() {
-        for command in plane::commands_to_create() {
-            talk.order(&command)?;
+    match talk.create_effects(settings.plane.is_some()).and_then(|()| talk.position_m()) {
+        Ok(position_m) => Ok(Started { stream: talk.stream, version, position_m }),
+        Err(error) => {
+            let _ = talk.order("remove all");
+            Err(error)
         }
     }
-    let command = MOTION[0];
-    let answer = talk.ask(command, true)?;
-    let position_m = grammar::parts(&answer).next().and_then(grammar::vector);
-    let position_m = position_m.ok_or_else(|| StartError::Strange { command: command.into(), answer })?;
-    Ok(Started { stream: talk.stream, version, position_m })
 }
 
 fn connect(address: &str) -> Result<TcpStream, StartError> {
@@ -154,6 +148,21 @@ struct Talk {
 impl Talk {
     fn order(&mut self, command: &str) -> Result<(), StartError> {
         self.ask(command, false).map(|_| ())
+    }
+
+    fn create_effects(&mut self, with_plane: bool) -> Result<(), StartError> {
+        self.order(&format!("create biasforce {EFFECT}"))?;
+        self.order(&format!("set {EFFECT} force [0,0,0]"))?;
+        self.order(&format!("set {EFFECT} enable"))?;
+        let plane = if with_plane { plane::commands_to_create() } else { Vec::new() };
+        plane.iter().try_for_each(|command| self.order(command))
+    }
+
+    fn position_m(&mut self) -> Result<DVec3, StartError> {
+        let command = MOTION[0];
+        let answer = self.ask(command, true)?;
+        let position_m = grammar::parts(&answer).next().and_then(grammar::vector);
+        position_m.ok_or_else(|| StartError::Strange { command: command.into(), answer })
     }
 
     /// A single answer, without the ornaments of its dialect.
@@ -202,7 +211,7 @@ impl Talk {
         loop {
             let whole =
                 self.answer.whole(ends_with_vector).map_err(|_| strange(self.answer.bytes()))?.map(str::to_owned);
-            let certain = ends_with_vector || self.answer.has_header();
+            let certain = self.answer.tells_its_end(ends_with_vector);
             if let (Some(text), true) = (&whole, certain) {
                 return accepted(command, text.clone());
             }

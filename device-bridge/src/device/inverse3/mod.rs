@@ -8,7 +8,7 @@
 pub mod line;
 pub mod wire;
 
-use super::{Arm, Effort, Fault, Reading};
+use super::{Arm, Effort, Fault, LONGEST_EXTRAPOLATION_S, Reading};
 use glam::{DQuat, DVec3};
 use line::{Line, Names, Told};
 use palpate_control::{Motion, extrapolate};
@@ -25,8 +25,6 @@ use std::{
 use thiserror::Error;
 use tungstenite::{Bytes, HandshakeError, WebSocket, http::Uri, protocol::WebSocketConfig};
 
-/// A pose is believed to go on with its velocity for so long (s).
-const LONGEST_EXTRAPOLATION_S: f64 = 5e-3;
 /// How long connecting, and the first message, may take.
 const PATIENCE: Duration = Duration::from_secs(2);
 /// How often it is looked whether the first message has come.

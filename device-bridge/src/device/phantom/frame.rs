@@ -1,6 +1,6 @@
 //! What is done in each frame of HD's scheduler, on its thread: the pose out, the effort in. Nothing here waits, allocates or logs.
 use super::ffi::{self, Device, Hd};
-use crate::device::{Effort, Fault};
+use crate::device::{Effort, Fault, share::Share};
 use glam::{DMat3, DQuat, DVec3};
 use palpate_control::Motion;
 use palpate_realtime::{SlotReader, SlotWriter};
@@ -8,8 +8,6 @@ use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 
 /// Frames without a new effort after which the force is let go: the servo has died, or hangs.
 pub const PATIENCE_FRAMES: u32 = 20;
-/// When it is back, the share of its force that a frame gives back.
-const BACK_PER_FRAME: f64 = 0.02;
 /// More errors than this are not taken in one frame.
 const MOST_ERRORS: usize = 32;
 /// Beside HD's codes: poses that are none, and a panic.
@@ -125,25 +123,26 @@ pub struct Guard {
     max_force_n: f64,
     max_torque_nm: f64,
     unheard: u32,
-    share: f64,
+    share: Share,
 }
 
 impl Guard {
     /// Nothing heard yet.
     pub fn new(max_force_n: f64, max_torque_nm: f64) -> Self {
-        Self { max_force_n, max_torque_nm, unheard: PATIENCE_FRAMES, share: 0.0 }
+        Self { max_force_n, max_torque_nm, unheard: PATIENCE_FRAMES, share: Share::NONE }
     }
 
     /// What the arm is given in this frame.
     pub fn pass(&mut self, newest: &Effort, is_new: bool) -> Effort {
         self.unheard = if is_new { 0 } else { self.unheard.saturating_add(1) };
-        self.share = if self.unheard >= PATIENCE_FRAMES { 0.0 } else { (self.share + BACK_PER_FRAME).min(1.0) };
+        self.share.pass(self.unheard < PATIENCE_FRAMES);
+        let share = self.share.now();
         Effort {
             plane: None,
-            force_n: self.share * newest.force_n.clamp_length_max(self.max_force_n),
-            torque_nm: self.share * newest.torque_nm.clamp_length_max(self.max_torque_nm),
+            force_n: share * newest.force_n.clamp_length_max(self.max_force_n),
+            torque_nm: share * newest.torque_nm.clamp_length_max(self.max_torque_nm),
         }
-        .unless(self.share == 0.0)
+        .unless(share == 0.0)
     }
 }
 

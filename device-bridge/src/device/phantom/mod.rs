@@ -11,7 +11,7 @@ pub mod frame;
 pub mod limits;
 pub mod start;
 
-use super::{Arm, Effort, Fault, Reading, unstarted};
+use super::{Arm, Effort, Fault, LONGEST_EXTRAPOLATION_S, Reading, unstarted};
 use crate::BridgeError;
 use frame::Pose;
 use palpate_control::extrapolate;
@@ -19,9 +19,6 @@ use palpate_realtime::{SlotReader, SlotWriter};
 use start::{Session, StartError, Started, start};
 use std::time::Duration;
 use tokio_util::sync::CancellationToken;
-
-/// A pose is believed to go on with its velocity for so long (s).
-const LONGEST_EXTRAPOLATION_S: f64 = 5e-3;
 
 /// What to load, and what of it to use.
 #[derive(Debug, Clone, PartialEq)]

@@ -12,7 +12,7 @@ pub mod peer;
 pub mod start;
 pub mod wire;
 
-use super::{Arm, Effort, Fault, LastWords, Reading};
+use super::{Arm, Effort, Fault, LONGEST_EXTRAPOLATION_S, LastWords, Reading};
 use glam::{DMat3, DVec3};
 use heard::Heard;
 use palpate_control::{Motion, Velocity, extrapolate};
@@ -26,8 +26,6 @@ use std::{
 };
 use wire::{Outgoing, Time};
 
-/// A pose is believed to go on with its velocity for so long (s).
-const LONGEST_EXTRAPOLATION_S: f64 = 5e-3;
 /// How long the end of the program waits for the server to take the last message.
 const FAREWELL: Duration = Duration::from_millis(100);
 /// At most so many times a tick it is read what came: a server that sends without end must not hold the loop.

@@ -10,16 +10,14 @@ pub mod kinematics;
 pub mod wire;
 
 use super::{
-    Arm, Effort, Fault, LastWords, Reading,
-    serial::{self, Line, Lines, StartError},
+    Arm, Effort, Fault, LONGEST_EXTRAPOLATION_S, LastWords, Reading,
+    serial::{self, FAREWELL, Line, Lines, StartError},
 };
 use glam::{DMat3, DVec3};
 use kinematics::Kinematics;
 use palpate_control::{Motion, Velocity, extrapolate};
 use std::time::Duration;
 
-/// A pose is believed to go on with its velocity for so long (s).
-const LONGEST_EXTRAPOLATION_S: f64 = 5e-3;
 /// How long the first line may take.
 const PATIENCE: Duration = Duration::from_secs(2);
 /// Between two lines to a board that has not said anything yet.
@@ -154,14 +152,20 @@ impl WoodenHaptics {
             self.quiet_periods = 0;
             self.renew([a, b, c], passed_s);
         }
-        if self.quiet_periods > self.silence_periods { Err(Fault::Silent) } else { Ok(()) }
+        // Or it says its lines, and hears none of ours.
+        if self.quiet_periods.max(self.line.refused_in_row()) > self.silence_periods {
+            Err(Fault::Silent)
+        } else {
+            Ok(())
+        }
     }
 
     /// τ = Jᵀ F, as currents.
     fn send(&mut self) -> Result<(), Fault> {
         let [a, b, c] = self.settings.currents_ma(self.jacobian_m_per_rad.transpose() * self.force_n);
         wire::write([a, b, c, 0, 0, 0, 0], &mut self.message);
-        self.line.send(&self.message)
+        // One that was not sent is tried again in the next tick, with what is to be felt then.
+        self.line.send(&self.message).map(drop)
     }
 
     fn lose(&mut self, fault: Fault) -> Fault {
@@ -212,6 +216,53 @@ impl Drop for WoodenHaptics {
     /// Switches the motors off.
     fn drop(&mut self) {
         wire::write(NOTHING, &mut self.message);
-        let _ = self.line.send(&self.message);
+        let _ = self.line.send_in_turn(&self.message, FAREWELL);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{config::WoodenHapticsConfig, device::noise::Pair, settings::arm};
+
+    /// The currents of the last line that the driver said.
+    fn last_currents(heard: &[u8]) -> [i16; wire::NUMBERS] {
+        let mut lines = Lines::default();
+        let mut take = |&byte: &u8| lines.take(byte).unwrap().map(|line| wire::parse(line).unwrap());
+        heard.iter().filter_map(&mut take).last().unwrap()
+    }
+
+    /// A board that says its lines by itself, and does not read ours.
+    #[test]
+    fn a_board_that_does_not_listen_is_lost_and_hears_the_newest_when_it_does() {
+        let mut pair = Pair::new();
+        let keys = WoodenHapticsConfig { port: pair.path.clone(), silence_s: 0.05, ..WoodenHapticsConfig::default() };
+        let settings = arm::woodenhaptics::checked(&keys).unwrap();
+        let mut mine = Vec::new();
+        wire::write([1, 2, 3, 0, 0, 0, 0], &mut mine);
+        let mut arm = pair.starting(&mine, || WoodenHaptics::start(&settings, 1e-3)).unwrap();
+        let deaf = |arm: &mut WoodenHaptics, pair: &mut Pair, done: &dyn Fn(&WoodenHaptics) -> bool| {
+            for _ in 0..100_000 {
+                pair.say(&mine);
+                // A pseudo terminal hands on what was written a moment later.
+                arm.quiet_periods = 0;
+                let read = arm.read(1).map(drop);
+                arm.apply(&Effort::force(DVec3::X));
+                if read.is_err() || done(arm) {
+                    return read;
+                }
+            }
+            Ok(())
+        };
+        assert_eq!(deaf(&mut arm, &mut pair, &|arm| arm.line.refused_in_row() > 10), Ok(()));
+        pair.heard();
+        arm.apply(&Effort::force(DVec3::Y));
+        let expected = arm.settings.currents_ma(arm.jacobian_m_per_rad.transpose() * DVec3::Y);
+        assert_eq!(last_currents(&pair.heard())[..3], expected);
+        assert_ne!(expected, [0; 3]);
+        assert_eq!(deaf(&mut arm, &mut pair, &|_| false), Err(Fault::Silent));
+        pair.heard();
+        arm.apply(&Effort::force(DVec3::Y));
+        assert_eq!(last_currents(&pair.heard()), NOTHING);
     }
 }

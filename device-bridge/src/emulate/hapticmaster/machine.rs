@@ -96,6 +96,7 @@ impl Machine {
                 self.effects.clear();
                 "Removed".into()
             }
+            ["create", "flatplane", _] if !self.settings.effects.planes => unknown(command),
             ["create", kind, name] => self.effects.create(kind, name).unwrap_or_else(|| unknown(command)),
             ["set", "state", state] => self.set_state(state),
             ["set", "inertia", kg] => self.set_inertia(kg),
