@@ -45,6 +45,8 @@ pub struct Shared {
     pub without_force: AtomicBool,
     /// This program, to be started as a guard.
     pub guard_program: OnceLock<PathBuf>,
+    /// The connection to the daemon ended.
+    pub lost: AtomicBool,
     /// There was a guard, and it is gone.
     pub unguarded: AtomicBool,
     /// The daemon's force crosses the network, and nobody knows yet whether that is stable.

@@ -371,6 +371,8 @@ impl Servo {
             self.law.trip(now_ns, Fault::Requested);
         } else if self.shared.peer_fault.swap(false, Ordering::Relaxed) {
             self.law.trip(now_ns, Fault::Peer);
+        } else if self.shared.lost.swap(false, Ordering::Relaxed) && self.shared.stats.link() != Link::Waiting {
+            self.law.trip(now_ns, Fault::Stale);
         } else if self.shared.recover.swap(false, Ordering::Relaxed) {
             self.law.recover();
         }

@@ -127,6 +127,8 @@ impl Uplink {
             let ended = self.connection().await;
             self.shared.attached.store(false, Ordering::Relaxed);
             if self.shared.stats.attached.get() > attached_before {
+                // Nothing more will be answered: no need to wait until the last answer is old.
+                self.shared.lost.store(true, Ordering::Relaxed);
                 backoff.reset();
             }
             if self.end.is_cancelled() || matches!(ended, Ended::ByUs) {

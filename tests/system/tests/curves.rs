@@ -74,7 +74,7 @@ impl Curve {
 }
 
 /// The curve of an arm on the ventricle.
-fn pressed(daemon: &Daemon, arm: Emulated, period_s: f64, recording: &Path) -> Curve {
+fn pressed(daemon: &Daemon, arm: &Emulated, period_s: f64, recording: &Path) -> Curve {
     let mut config = lab::config(&daemon.url, arm.device.clone());
     config.workspace = arms::workspace();
     config.record = RecordConfig { path: Some(recording.to_owned()), overwrite: true };
@@ -109,7 +109,7 @@ fn every_arm_gives_the_force_curve_of_the_simulated_arm_on_the_heart() {
     let (quick_s, slow_s) = (2.5, 5.0);
     let quick = hand(quick_s);
     let recorded = file("simulated.csv");
-    let expected = pressed(&daemon, arms::simulated(&quick), quick_s, &recorded);
+    let expected = pressed(&daemon, &arms::simulated(&quick), quick_s, &recorded);
     let all: [&dyn Fn() -> Emulated; 7] = [
         &|| arms::woodenhaptics(&quick),
         &|| arms::haply_2diy(&quick),
@@ -122,12 +122,12 @@ fn every_arm_gives_the_force_curve_of_the_simulated_arm_on_the_heart() {
     for arm in all {
         let arm = arm();
         let name = arm.name;
-        judge(name, &pressed(&daemon, arm, quick_s, &file("arm.csv")), &expected, 0.02);
+        judge(name, &pressed(&daemon, &arm, quick_s, &file("arm.csv")), &expected, 0.02);
     }
-    let expected = pressed(&daemon, arms::simulated(&hand(slow_s)), slow_s, &file("slow.csv"));
+    let expected = pressed(&daemon, &arms::simulated(&hand(slow_s)), slow_s, &file("slow.csv"));
     for plane in [false, true] {
         let arm = arms::hapticmaster(&hand(slow_s), plane);
         let name = if plane { "hapticmaster, its own plane" } else { "hapticmaster" };
-        judge(name, &pressed(&daemon, arm, slow_s, &file("arm.csv")), &expected, 0.05);
+        judge(name, &pressed(&daemon, &arm, slow_s, &file("arm.csv")), &expected, 0.05);
     }
 }

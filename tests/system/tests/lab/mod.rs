@@ -16,7 +16,7 @@ use tokio_util::sync::CancellationToken;
 /// A bridge to `url`, as it is by default but for what a test machine does not grant.
 pub fn config(url: &str, device: DeviceConfig) -> Config {
     let mut config = Config { device, ..Config::default() };
-    config.server.url = url.to_owned();
+    url.clone_into(&mut config.server.url);
     config.server.first_pause_s = 0.02;
     config.server.longest_pause_s = 0.1;
     config.server.pause_seed = Some(1);
