@@ -132,7 +132,7 @@ fn every_arm_gives_the_force_curve_of_the_simulated_arm_on_the_heart() {
     let libhd = file("libHD.so");
     fs::copy(libhd::built(), &libhd).unwrap();
     // An arm that is a mass of 2 kg wants a slow hand.
-    let (quick, slow) = (hand(2.5), hand(5.0));
+    let (quick, slow) = (hand(2.5), hand(4.0));
     let recorded = file("simulated.csv");
     let of_simulated = expected(&daemon, &quick, &recorded);
     let all: [&dyn Fn() -> Emulated; 7] = [

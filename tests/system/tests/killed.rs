@@ -28,7 +28,7 @@ fn alone() -> MutexGuard<'static, ()> {
 }
 
 fn kills() -> usize {
-    std::env::var("PALPATE_KILLS").ok().and_then(|text| text.parse().ok()).unwrap_or(6)
+    std::env::var("PALPATE_KILLS").ok().and_then(|text| text.parse().ok()).unwrap_or(3)
 }
 
 /// A hand that presses the ventricle's wall for a second and goes out for a moment, so that an arm that comes back finds its tool outside. It is killed while it presses: the force
