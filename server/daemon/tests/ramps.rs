@@ -271,6 +271,24 @@ async fn a_device_that_attaches_in_a_wall_feels_it_once_it_has_been_outside() {
     }
 }
 
+/// One whose tool is in the surface, its centre outside, is put to its device again and again until it goes: that moves neither tool nor body.
+#[tokio::test]
+async fn a_device_that_attaches_in_the_surface_disturbs_nothing() {
+    let scene = parse(builtin("ventricle").unwrap(), "ventricle", None, &Limits::local(), &mut |_, _| ()).unwrap();
+    let model = Arc::new(Model::build(scene.model.clone()).unwrap());
+    let mut bench = Bench::on(scene, model, None);
+    let rest_m = bench.simulation.state().x.clone();
+    let mut most_m = 0.0_f64;
+    for tick in 0..2000 {
+        // 5 mm deep, and a tremor of half a millimetre.
+        let at = DVec3::X * (0.035 + 5e-4 * (0.05 * f64::from(tick)).sin());
+        let output = bench.tick(RUN, at, 1);
+        assert_eq!((output.force_n, output.local_model), (DVec3::ZERO, None), "tick {tick}");
+        most_m = most_m.max(deformation_m(&bench, &rest_m));
+    }
+    assert!(most_m < 1e-3, "the body was moved by {most_m} m");
+}
+
 #[tokio::test]
 async fn the_simulated_arm_takes_over_where_a_device_leaves() {
     let mut bench = Bench::with_arm(Some(above()));

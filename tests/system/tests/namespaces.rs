@@ -92,7 +92,7 @@ fn a_pulled_cable_leaves_no_force_and_the_arm_comes_back() {
     lab.wait("it presses again", |force_n| force_n > 0.1);
     let netem = format!("netns exec {} tc qdisc add dev cable root netem delay 2ms 1ms loss 5%", machines.bridge);
     match run("ip", &netem) {
-        Ok(()) => drop(lab.wait("it presses on a slow cable", |force_n| force_n > 0.01)),
+        Ok(()) => lab.wait("it presses on a slow cable", |force_n| force_n > 0.01),
         Err(why) => println!("no slow cable here: {why}"),
     }
     bridge.terminate();

@@ -169,7 +169,7 @@ impl ToolLoop {
         tool.centre_m.distance(tool.target.position_m) < FREE_RADII * radius_m
     }
 
-    /// Its device is outside the body and it is not: caught in a wall that it was put into. It is put to its device once more.
+    /// Its device is outside the body and it is not clear of it: on its way out, or caught in a wall that it was put into. It is put to its device once more, which moves the body less than pressing it would.
     pub fn place_again(&mut self) {
         self.place = Place::Unknown;
     }

@@ -37,7 +37,6 @@ impl Hand {
 
 /// It is there until dropped.
 pub struct Emulated {
-    pub name: &'static str,
     pub device: DeviceConfig,
     /// Of its motors, in its own axes (N); of one that lives in the bridge, none.
     motors_n: Box<dyn Fn() -> DVec3>,
@@ -45,8 +44,8 @@ pub struct Emulated {
 
 impl Emulated {
     /// `there` is what `force_n` looks at.
-    fn new<T: 'static>(name: &'static str, device: DeviceConfig, there: T, force_n: fn(&T) -> DVec3) -> Self {
-        Self { name, device, motors_n: Box::new(move || force_n(&there)) }
+    fn new<T: 'static>(device: DeviceConfig, there: T, force_n: fn(&T) -> DVec3) -> Self {
+        Self { device, motors_n: Box::new(move || force_n(&there)) }
     }
 
     /// Its motors' force (N).
@@ -64,7 +63,7 @@ pub fn simulated(hand: &Hand) -> Emulated {
     let key = |key: Keyframe| KeyframeConfig { time_s: key.time_s, position_m: key.position_m.to_array() };
     let keyframes = hand.keyframes().into_iter().map(key).collect();
     let device = SimulatedConfig { period_s: Some(hand.period_s), keyframes, ..SimulatedConfig::default() };
-    Emulated::new("simulated", DeviceConfig::Simulated(device), (), |()| DVec3::ZERO)
+    Emulated::new(DeviceConfig::Simulated(device), (), |()| DVec3::ZERO)
 }
 
 /// `plane`: it renders the contact itself.
@@ -76,7 +75,7 @@ pub fn hapticmaster(hand: &Hand, plane: bool) -> Emulated {
     let address = arm.address().to_string();
     let contact = if plane { HapticMasterContact::Plane } else { HapticMasterContact::Bias };
     let keys = HapticMasterConfig { address, contact, silence_s: SILENCE_S, ..HapticMasterConfig::default() };
-    Emulated::new("hapticmaster", DeviceConfig::Hapticmaster(keys), arm, hapticmaster::HapticMaster::effect_n)
+    Emulated::new(DeviceConfig::Hapticmaster(keys), arm, hapticmaster::HapticMaster::effect_n)
 }
 
 pub fn woodenhaptics(hand: &Hand) -> Emulated {
@@ -90,7 +89,7 @@ pub fn woodenhaptics(hand: &Hand) -> Emulated {
     let settings = woodenhaptics::Settings { constants, answers: false, arm: ArmSpec::default(), path: hand.path() };
     let arm = woodenhaptics::WoodenHaptics::start(settings).unwrap();
     let device = DeviceConfig::Woodenhaptics(keys(arm.port()));
-    Emulated::new("woodenhaptics", device, arm, woodenhaptics::WoodenHaptics::force_n)
+    Emulated::new(device, arm, woodenhaptics::WoodenHaptics::force_n)
 }
 
 pub fn haply_2diy(hand: &Hand) -> Emulated {
@@ -107,7 +106,7 @@ pub fn haply_2diy(hand: &Hand) -> Emulated {
     let settings = haply_2diy::Settings { constants, knows_home: true, watchdog: None, arm, path };
     let arm = haply_2diy::Haply2diy::start(settings).unwrap();
     let device = DeviceConfig::Haply2diy(keys(arm.port()));
-    Emulated::new("haply-2diy", device, arm, haply_2diy::Haply2diy::force_n)
+    Emulated::new(device, arm, haply_2diy::Haply2diy::force_n)
 }
 
 pub fn falcon(hand: &Hand) -> Emulated {
@@ -116,14 +115,14 @@ pub fn falcon(hand: &Hand) -> Emulated {
     let (arm, path) = (ArmSpec::default(), hand.path());
     let settings = falcon::Settings { constants, firmware: None, homing: Duration::ZERO, watchdog: None, arm, path };
     let arm = falcon::Falcon::start(settings).unwrap();
-    Emulated::new("falcon", DeviceConfig::Falcon(keys(arm.port())), arm, falcon::Falcon::force_n)
+    Emulated::new(DeviceConfig::Falcon(keys(arm.port())), arm, falcon::Falcon::force_n)
 }
 
 pub fn inverse3(hand: &Hand) -> Emulated {
     let settings = inverse3::Settings { path: hand.path(), ..inverse3::Settings::default() };
     let arm = inverse3::Inverse3::listen("127.0.0.1:0", settings).unwrap();
     let keys = Inverse3Config { url: arm.url(), silence_s: SILENCE_S, ..Inverse3Config::default() };
-    Emulated::new("inverse3", DeviceConfig::Inverse3(keys), arm, inverse3::Inverse3::force_n)
+    Emulated::new(DeviceConfig::Inverse3(keys), arm, inverse3::Inverse3::force_n)
 }
 
 pub fn vrpn(hand: &Hand) -> Emulated {
@@ -133,7 +132,7 @@ pub fn vrpn(hand: &Hand) -> Emulated {
     let [tracker, button, force_device] = names;
     let address = arm.address().to_string();
     let keys = VrpnConfig { address, tracker, button, force_device, silence_s: SILENCE_S, ..VrpnConfig::default() };
-    Emulated::new("vrpn", DeviceConfig::Vrpn(keys), arm, vrpn::Vrpn::force_n)
+    Emulated::new(DeviceConfig::Vrpn(keys), arm, vrpn::Vrpn::force_n)
 }
 
 /// `libhd`: what stands in libHD's place.
@@ -143,11 +142,11 @@ pub fn phantom(hand: &Hand, libhd: &Path) -> Emulated {
     let arm = phantom::Phantom::listen(&folder.path().join("arm"), settings).unwrap();
     let (library, name) = (libhd.to_str().unwrap().to_owned(), arm.socket().to_str().unwrap().to_owned());
     let keys = PhantomConfig { library, name, silence_s: SILENCE_S, ..PhantomConfig::default() };
-    Emulated::new("phantom", DeviceConfig::Phantom(keys), (arm, folder), |(arm, _)| arm.force_n())
+    Emulated::new(DeviceConfig::Phantom(keys), (arm, folder), |(arm, _)| arm.force_n())
 }
 
 /// What another arm did, again.
 pub fn playback(recording: &Path) -> Emulated {
     let keys = PlaybackConfig { file: recording.to_owned(), ..PlaybackConfig::default() };
-    Emulated::new("playback", DeviceConfig::Playback(keys), (), |()| DVec3::ZERO)
+    Emulated::new(DeviceConfig::Playback(keys), (), |()| DVec3::ZERO)
 }

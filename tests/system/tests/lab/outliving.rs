@@ -43,10 +43,22 @@ impl Lab {
         self.arm.force_n()
     }
 
-    /// Waits for a force (N); how long that took.
-    pub fn wait(&self, what: &str, condition: impl FnMut(f64) -> bool) -> Duration {
-        let waited = self.waited(condition);
-        waited.unwrap_or_else(|| panic!("never: {what}; {} N", self.force_n()))
+    /// Waits for a force (N).
+    pub fn wait(&self, what: &str, condition: impl FnMut(f64) -> bool) {
+        assert!(self.comes(condition), "never: {what}; {} N", self.force_n());
+    }
+
+    /// Likewise while `bridge` runs, whose words are told when it waited in vain.
+    pub fn wait_beside(
+        &self,
+        (bridge, daemon): (&mut Program, &Daemon),
+        what: &str,
+        condition: impl FnMut(f64) -> bool,
+    ) {
+        if !self.comes(condition) {
+            let (said, status) = (bridge.said(), daemon.status());
+            panic!("never: {what}; {} N; the daemon:\n{status:#}\nthe bridge said:\n{said}", self.force_n());
+        }
     }
 
     /// Waits until the force is zero for good, as far as a tenth of a second tells (a force that a controller shortens is zero for a tick, too); when it was not zero for the last time.
@@ -63,28 +75,15 @@ impl Lab {
         last
     }
 
-    /// Waits for a force (N), while `bridge` runs, whose words are told when it waited in vain.
-    pub fn wait_beside(
-        &self,
-        (bridge, daemon): (&mut Program, &Daemon),
-        what: &str,
-        condition: impl FnMut(f64) -> bool,
-    ) -> Duration {
-        let waited = self.waited(condition);
-        waited.unwrap_or_else(|| {
-            let (said, status) = (bridge.said(), daemon.status());
-            panic!("never: {what}; {} N; the daemon:\n{status:#}\nthe bridge said:\n{said}", self.force_n())
-        })
-    }
-
-    fn waited(&self, mut condition: impl FnMut(f64) -> bool) -> Option<Duration> {
+    /// Whether it comes to that within [`PATIENCE`].
+    fn comes(&self, mut condition: impl FnMut(f64) -> bool) -> bool {
         let began = Instant::now();
         while !condition(self.force_n()) {
             if began.elapsed() > PATIENCE {
-                return None;
+                return false;
             }
             std::thread::sleep(Duration::from_micros(100));
         }
-        Some(began.elapsed())
+        true
     }
 }
