@@ -2,13 +2,18 @@
 //!
 //! It holds the arm's connection open and a socket to the bridge, on which the servo says one byte a tick. When that ends without a farewell, or is silent for as long as
 //! the watchdog takes to zero, the guard writes the *last words*: bytes that take the force away, whatever came before them. Then an arm that holds its last force until it
-//! hears another lets go within milliseconds of a SIGKILL, and not when its own patience ends. It is no help where the connection lives in this process alone (libHD), nor when
+//! hears another lets go within milliseconds of a SIGKILL, and not when its own patience ends. To a bridge that hangs it says so, before the words: should that go on, it knows
+//! that the arm was let go. It is no help where the connection lives in this process alone (libHD), nor when
 //! the machine stops.
-use crate::{BridgeError, device::LastWords};
+use crate::{
+    BridgeError,
+    device::{LastWords, tcp},
+};
 use palpate_realtime::OsMeasures;
 use std::{
     fs::File,
     io::{ErrorKind, Read as _, Write as _},
+    net::TcpStream,
     os::{
         fd::{AsFd as _, OwnedFd},
         unix::{net::UnixStream, process::CommandExt as _},
@@ -23,6 +28,8 @@ use tokio::signal::unix::{SignalKind, signal};
 const BEAT: u8 = b'.';
 /// The servo ends, and the arm is without force.
 const FAREWELL: u8 = b'q';
+/// The guard's only word to the bridge: it speaks to the arm now.
+const SPOKEN: u8 = b'!';
 /// Last words that do not go out in so long do not go out.
 const LAST_WORDS_TAKE: Duration = Duration::from_millis(100);
 
@@ -61,6 +68,15 @@ impl Guard {
         let said = self.socket.write(&[BEAT]);
         said.err().is_none_or(|error| matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::Interrupted))
     }
+
+    /// Whether the guard has spoken since this was asked last: the bridge stood still. Neither waits nor allocates.
+    pub fn has_spoken(&mut self) -> bool {
+        let mut spoken = false;
+        while matches!(self.socket.read(&mut [0; 16]), Ok(1..)) {
+            spoken = true;
+        }
+        spoken
+    }
 }
 
 impl Drop for Guard {
@@ -98,7 +114,7 @@ fn watch(mut bridge: UnixStream, mut arm: File, patience: Duration) -> std::io::
     loop {
         match bridge.read(&mut heard) {
             // Killed.
-            Ok(0) => return say(&mut arm, &words),
+            Ok(0) => return say_the_last(arm, &words),
             Ok(count) if heard[..count].contains(&FAREWELL) => return Ok(()),
             Ok(_) if !beats => {
                 beats = true;
@@ -108,13 +124,22 @@ fn watch(mut bridge: UnixStream, mut arm: File, patience: Duration) -> std::io::
             Err(error) if error.kind() == ErrorKind::Interrupted => {}
             // It hangs; should it go on, it is watched again.
             Err(error) if matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut) => {
+                // One that is gone meanwhile needs not know.
+                let _ = bridge.write_all(&[SPOKEN]);
                 say(&mut arm, &words)?;
                 beats = false;
                 bridge.set_read_timeout(None)?;
             }
-            Err(_) => return say(&mut arm, &words),
+            Err(_) => return say_the_last(arm, &words),
         }
     }
+}
+
+/// Nobody else listens to the arm any more.
+fn say_the_last(mut arm: File, words: &[u8]) -> std::io::Result<()> {
+    say(&mut arm, words)?;
+    tcp::hear_out(&TcpStream::from(OwnedFd::from(arm)), LAST_WORDS_TAKE);
+    Ok(())
 }
 
 /// The connection may be one that does not wait.
@@ -170,6 +195,8 @@ mod tests {
             bridge.write_all(b".").unwrap();
             std::thread::sleep(Duration::from_millis(200));
         }
+        let mut told = [0; 3];
+        assert_eq!((bridge.read(&mut told).unwrap(), &told[..2]), (2, &b"!!"[..]));
         bridge.write_all(b"q").unwrap();
         guard.join().unwrap().unwrap();
         assert_eq!(heard(arm), "stopstop");

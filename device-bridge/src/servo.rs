@@ -53,6 +53,10 @@ impl Servo {
     }
 
     fn tick(&mut self, wakeup: &Wakeup, now_ns: u64) -> ControlFlow<()> {
+        if self.guard.as_mut().is_some_and(Guard::has_spoken) {
+            self.device.last_words_were_said();
+            self.law.latch(Fault::Stalled);
+        }
         let read = self.device.read(1 + wakeup.skipped);
         if let Err(fault) = read {
             self.shared.stats.set_device_fault(fault);

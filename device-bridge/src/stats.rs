@@ -222,8 +222,8 @@ impl Stats {
     }
 }
 
-const FAULTS: [Fault; 6] =
-    [Fault::Stale, Fault::NonFinite, Fault::Peer, Fault::Requested, Fault::Device, Fault::Unreliable];
+const FAULTS: [Fault; 7] =
+    [Fault::Stale, Fault::NonFinite, Fault::Peer, Fault::Requested, Fault::Device, Fault::Unreliable, Fault::Stalled];
 
 fn code_of(link: Link) -> u8 {
     let index = |fault| FAULTS.iter().position(|f| *f == fault).unwrap_or(0) as u8;
@@ -285,6 +285,7 @@ pub(crate) fn reason(fault: Fault) -> &'static str {
         Fault::Requested => "stopping",
         Fault::Device => "the arm is lost",
         Fault::Unreliable => "too many answers came too late",
+        Fault::Stalled => "this program stood still, and its guard took the force away",
     }
 }
 

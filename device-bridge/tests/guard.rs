@@ -180,6 +180,14 @@ impl Bridge {
     fn stop(&mut self) {
         kill_process(Pid::from_child(&self.child), Signal::STOP).unwrap();
     }
+
+    fn go_on(&mut self) {
+        kill_process(Pid::from_child(&self.child), Signal::CONT).unwrap();
+    }
+
+    fn assert_runs(&mut self) {
+        assert!(self.child.try_wait().unwrap().is_none(), "the bridge has ended");
+    }
 }
 
 impl Drop for Bridge {
@@ -202,7 +210,7 @@ async fn pushed(arm: &Arm, happens: Happens, change: impl FnOnce(&mut Config)) -
     let mut bridge = Bridge::start(&config);
     let enough_n = if by_plane { 0.8 } else { 0.9 };
     until("it pushes", || {
-        assert!(bridge.child.try_wait().unwrap().is_none(), "the bridge has ended");
+        bridge.assert_runs();
         (arm.force_n)().length() > enough_n
     })
     .await;
@@ -222,6 +230,26 @@ async fn the_force_is_taken_away_when_the_bridge_is_killed_or_hangs() {
             let arm = start();
             let _bridge = pushed(&arm, happens, |_| ()).await;
             until(&format!("a {name} whose bridge was {what} lets go"), || (arm.force_n)() == DVec3::ZERO).await;
+        }
+    }
+}
+
+/// The arm's answers to the guard were taken for its answers to the bridge, which ended; where there were none, the whole force came back in one tick.
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn a_bridge_that_hung_goes_on_and_its_force_comes_back() {
+    for (name, start) in ARMS {
+        let arm = start();
+        let mut bridge = pushed(&arm, Bridge::stop, |config| config.servo.auto_recover = true).await;
+        until(&format!("a {name} lets go"), || (arm.force_n)() == DVec3::ZERO).await;
+        for _ in 0..2 {
+            bridge.go_on();
+            until(&format!("a {name} is pushed again"), || {
+                bridge.assert_runs();
+                (arm.force_n)().length() > 0.8
+            })
+            .await;
+            bridge.stop();
+            until(&format!("a {name} lets go again"), || (arm.force_n)() == DVec3::ZERO).await;
         }
     }
 }

@@ -124,7 +124,7 @@ fn the_plane_ramps_down_with_a_daemon_that_is_silent() {
     for age in 1..=25_u64 {
         let tick = law.tick((1 + age) * MS, &pressed());
         // The model fades from 20 ms on; the ramp is at its end then.
-        let ramp = (1.0 - (age as f64 - 5.0).max(0.0) / 15.0).max(0.0);
+        let ramp = (1.0 - (age as f64 - 5.0).max(0.0) / 12.0).max(0.0);
         let stiffness = tick.plane.map_or(0.0, |plane| plane.stiffness_n_per_m);
         assert!((stiffness - 600.0 * ramp).abs() < 1e-6, "{age} ms: {stiffness}");
         assert_eq!(tick.plane.is_none(), ramp == 0.0);

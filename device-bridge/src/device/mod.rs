@@ -1,5 +1,6 @@
 //! Arms: one file or folder for each, behind one small trait.
 mod backlog;
+mod drain;
 pub mod falcon;
 pub mod haply_2diy;
 pub mod hapticmaster;
@@ -170,6 +171,9 @@ pub trait Arm: Debug + Send {
     fn last_words(&self) -> Option<LastWords> {
         None
     }
+
+    /// They were said while this process stood still: the arm was let go, and may answer what nobody here asked. Called before a reading.
+    fn last_words_were_said(&mut self) {}
 }
 
 /// Opens the arm that the configuration names, however long that takes, until told to stop.

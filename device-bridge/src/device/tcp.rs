@@ -1,9 +1,12 @@
 //! A TCP connection to an arm: opened with patience, small messages sent at once.
 use std::{
-    io::{Error, ErrorKind, Result},
+    io::{Error, ErrorKind, Read as _, Result},
     net::{TcpStream, ToSocketAddrs as _},
-    time::Duration,
+    time::{Duration, Instant},
 };
+
+/// Between two looks at whether more has come.
+const LOOK_EVERY: Duration = Duration::from_micros(200);
 
 /// Connects to the first of the address's places that answers; writes wait as long, at most.
 ///
@@ -23,4 +26,53 @@ pub fn connect(address: &str, patience: Duration) -> Result<TcpStream> {
         }
     }
     Err(last)
+}
+
+/// Reads and drops what comes until the other side ends the connection, for so long at most. To be done before a connection is closed behind last words: one that is closed
+/// while something is unread is reset, and a reset takes with it what the other side has not read yet. Ends at once on what is no socket.
+pub fn hear_out(mut stream: &TcpStream, patience: Duration) {
+    let began = Instant::now();
+    if stream.set_nonblocking(true).is_err() {
+        return;
+    }
+    while began.elapsed() < patience {
+        match stream.read(&mut [0; 1024]) {
+            Ok(0) => return,
+            Ok(_) => {}
+            Err(error) if error.kind() == ErrorKind::WouldBlock => std::thread::sleep(LOOK_EVERY),
+            Err(error) if error.kind() == ErrorKind::Interrupted => {}
+            Err(_) => return,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::{io::Write as _, net::TcpListener};
+
+    /// Closed at once, the connection is reset and the words are lost.
+    #[test]
+    fn last_words_arrive_whatever_was_left_unread() {
+        for _ in 0..20 {
+            let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+            let mut ours = connect(&listener.local_addr().unwrap().to_string(), Duration::from_secs(20)).unwrap();
+            let mut theirs = listener.accept().unwrap().0;
+            theirs.write_all(&[b'.'; 100]).unwrap();
+            ours.write_all(b"stop").unwrap();
+            let other = std::thread::spawn(move || {
+                // It does something else first, and answers what it reads.
+                std::thread::sleep(Duration::from_millis(5));
+                let mut heard = [0; 4];
+                theirs.read_exact(&mut heard[..2])?;
+                theirs.write_all(b"answer")?;
+                theirs.read_exact(&mut heard[2..])?;
+                theirs.write_all(b"answer")?;
+                Ok::<_, Error>(heard)
+            });
+            hear_out(&ours, Duration::from_secs(20));
+            drop(ours);
+            assert_eq!(&other.join().unwrap().unwrap(), b"stop");
+        }
+    }
 }

@@ -187,6 +187,10 @@ impl Arm for Placed {
     fn last_words(&self) -> Option<LastWords> {
         self.arm.last_words()
     }
+
+    fn last_words_were_said(&mut self) {
+        self.arm.last_words_were_said();
+    }
 }
 
 #[cfg(test)]

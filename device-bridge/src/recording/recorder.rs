@@ -108,6 +108,10 @@ impl Arm for Recorded {
     fn last_words(&self) -> Option<LastWords> {
         self.arm.last_words()
     }
+
+    fn last_words_were_said(&mut self) {
+        self.arm.last_words_were_said();
+    }
 }
 
 /// The loop's end of the queue.

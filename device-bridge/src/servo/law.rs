@@ -85,6 +85,12 @@ impl ServoLaw {
         self.watchdog.trip(now_ns, fault);
     }
 
+    /// Latches at once: the force was taken away already.
+    pub fn latch(&mut self, fault: Fault) {
+        self.watchdog.latch(fault);
+        self.steady_since_ns = None;
+    }
+
     /// In this tick the arm has this share of the force at most, 0 to 1: less than 1 while a clutch lets go or takes hold, or none is given yet. It rises no faster than the watchdog's ramp.
     pub fn share_force(&mut self, share: f64) {
         let ramp_up_s = self.settings.watchdog.ramp_up_s;

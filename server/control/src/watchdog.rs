@@ -3,6 +3,7 @@
 //! ```text
 //! Waiting ──fresh sample──▶ Fresh ◀─▶ Extrapolating ◀─▶ Ramping ──ramp at 0──▶ Latched ──recover()──▶ Waiting
 //!                             └───────────────trip()──────▶ Ramping (no way back) ──▶ Latched
+//!                  any ──latch()──▶ Latched
 //! ```
 //! A short gap is bridged by extrapolation at full force, a longer one ramps the force to zero, and once at zero the fault is
 //! latched: force comes back only after an explicit [`Watchdog::recover`], a fresh sample, and a slow ramp up. A sample that is
@@ -23,9 +24,9 @@ pub struct WatchdogSettings {
 }
 
 impl Default for WatchdogSettings {
-    /// At 1 kHz: fresh for 2 ticks, extrapolated to 5, zero by 20; back within 200 ms.
+    /// At 1 kHz: fresh for 2 ticks, extrapolated to 5, zero by 17, which leaves 3 for the way to the arm until 20 are missed; back within 200 ms.
     fn default() -> Self {
-        Self { fresh_for_s: 2e-3, stale_after_s: 5e-3, ramp_to_zero_s: 15e-3, ramp_up_s: 0.2 }
+        Self { fresh_for_s: 2e-3, stale_after_s: 5e-3, ramp_to_zero_s: 12e-3, ramp_up_s: 0.2 }
     }
 }
 
@@ -62,6 +63,8 @@ pub enum Fault {
     Device,
     /// Samples come, but too many of them too late.
     Unreliable,
+    /// The loop itself stood still, and the force was taken away meanwhile.
+    Stalled,
 }
 
 /// State of the link.
@@ -144,6 +147,15 @@ impl Watchdog {
         }
     }
 
+    /// Latches at once, for a force that is gone already. The first reason stays.
+    pub fn latch(&mut self, fault: Fault) {
+        if self.latched.is_none() {
+            let first = self.tripped.map_or(fault, |(first, _)| first);
+            self.level = 0.0;
+            self.hold_at_zero(first);
+        }
+    }
+
     /// Leaves a latched fault: the next sample ramps the force up. False when nothing is latched.
     pub fn recover(&mut self) -> bool {
         let was_latched = self.latched.take().is_some();
@@ -191,10 +203,14 @@ impl Watchdog {
         if since_start_s < self.settings.ramp_to_zero_s {
             return Link::Ramping(fault);
         }
+        self.hold_at_zero(fault);
+        Link::Latched(fault)
+    }
+
+    fn hold_at_zero(&mut self, fault: Fault) {
         self.latched = Some(fault);
         self.tripped = None;
         self.faults += u64::from(fault != Fault::Requested);
-        Link::Latched(fault)
     }
 }
 
@@ -234,14 +250,14 @@ mod tests {
     }
 
     #[test]
-    fn a_gap_is_extrapolated_then_ramped_then_latched_by_twenty_ticks() {
+    fn a_gap_is_extrapolated_then_ramped_then_latched_before_twenty_ticks() {
         let (mut watchdog, last) = running();
         for age in 1..=30_u64 {
             let verdict = watchdog.check(last + age * MS);
             let expected = match age {
                 0..=2 => (Link::Fresh, 1.0),
                 3..=5 => (Link::Extrapolating, 1.0),
-                6..=19 => (Link::Ramping(Fault::Stale), 1.0 - (age as f64 - 5.0) / 15.0),
+                6..=16 => (Link::Ramping(Fault::Stale), 1.0 - (age as f64 - 5.0) / 12.0),
                 _ => (Link::Latched(Fault::Stale), 0.0),
             };
             assert_eq!(verdict.link, expected.0, "at {age} ms");
@@ -260,7 +276,7 @@ mod tests {
         watchdog.sample_arrived(last + 13 * MS);
         let verdict = watchdog.check(last + 13 * MS);
         assert_eq!(verdict.link, Link::Fresh);
-        assert!((verdict.ramp - (1.0 - 7.0 / 15.0 + 1.0 / 200.0)).abs() < 1e-9, "{}", verdict.ramp);
+        assert!((verdict.ramp - (1.0 - 7.0 / 12.0 + 1.0 / 200.0)).abs() < 1e-9, "{}", verdict.ramp);
     }
 
     #[test]
@@ -295,12 +311,27 @@ mod tests {
         let (mut watchdog, last) = running();
         watchdog.trip(last, Fault::Requested);
         watchdog.trip(last + MS, Fault::Peer);
-        for tick in 1..=15 {
+        for tick in 1..=12 {
             watchdog.sample_arrived(last + tick * MS);
             watchdog.check(last + tick * MS);
         }
-        let verdict = watchdog.check(last + 15 * MS);
+        let verdict = watchdog.check(last + 12 * MS);
         assert_eq!((verdict.link, verdict.ramp, watchdog.faults()), (Link::Latched(Fault::Requested), 0.0, 0));
+    }
+
+    #[test]
+    fn what_is_latched_at_once_ramps_nothing_and_keeps_the_first_reason() {
+        let (mut watchdog, last) = running();
+        watchdog.latch(Fault::Stalled);
+        watchdog.latch(Fault::Peer);
+        watchdog.sample_arrived(last + MS);
+        let verdict = watchdog.check(last + MS);
+        assert_eq!((verdict.link, verdict.ramp, watchdog.faults()), (Link::Latched(Fault::Stalled), 0.0, 1));
+        assert!(watchdog.recover());
+        watchdog.trip(last + 2 * MS, Fault::Requested);
+        watchdog.latch(Fault::Stalled);
+        assert_eq!(watchdog.check(last + 2 * MS).link, Link::Latched(Fault::Requested), "a stop that was asked for");
+        assert_eq!(watchdog.faults(), 1);
     }
 
     #[test]
@@ -325,7 +356,7 @@ mod tests {
     }
 
     proptest! {
-        /// Whatever arrives whenever: the ramp never jumps up, and it is zero 20 ms after the last sample.
+        /// Whatever arrives whenever: the ramp never jumps up, and it is zero 17 ms after the last sample.
         #[test]
         fn the_ramp_never_jumps_up(steps in prop::collection::vec((0_u64..4 * MS, any::<bool>()), 1..400)) {
             let mut watchdog = Watchdog::new(WatchdogSettings::default());
@@ -339,7 +370,7 @@ mod tests {
                 let verdict = watchdog.check(now);
                 prop_assert!((0.0..=1.0).contains(&verdict.ramp));
                 prop_assert!(verdict.ramp - previous <= seconds(step) / 0.2 + 1e-12);
-                if last_sample.is_none_or(|at| now - at >= 20 * MS) {
+                if last_sample.is_none_or(|at| now - at >= 17 * MS) {
                     prop_assert_eq!(verdict.ramp, 0.0);
                 }
                 previous = verdict.ramp;

@@ -132,7 +132,7 @@ async fn after_a_pause_the_force_comes_back_as_slowly_as_after_attaching() {
 #[tokio::test]
 async fn a_slow_body_is_released_as_fast_as_a_quick_one() {
     let (mut bench, full_n) = Bench::pressed();
-    // Ticks of 5 ms of the clock: three make the 15 ms.
+    // Ticks of 5 ms of the clock: three make the 12 ms.
     let mut forces_n = Vec::new();
     for _ in 0..4 {
         forces_n.push(bench.tick(Plan { advance: true, order: Order::Release }, pressing(), 5).force_n.length());

@@ -12,6 +12,7 @@ pub mod wire;
 
 use super::{
     Arm, Effort, Fault, LONGEST_EXTRAPOLATION_S, LastWords, Reading,
+    drain::Drain,
     requests::{Requests, between},
     serial::{FAREWELL, Line},
     share::Share,
@@ -112,6 +113,8 @@ pub struct Falcon {
     asked_at: u64,
     /// When the newest pose was asked for: it is not older.
     pose_at: u64,
+    /// Of answers to a guard.
+    drain: Drain,
     lost: Option<Fault>,
 }
 
@@ -138,6 +141,7 @@ impl Falcon {
             requests: Requests::default(),
             asked_at: 0,
             pose_at: 0,
+            drain: Drain::default(),
             lost: None,
             settings: settings.clone(),
         };
@@ -169,6 +173,17 @@ impl Falcon {
         true
     }
 
+    /// Drops what has come; when that ends, nothing is on its way.
+    fn drop_frames(&mut self) -> Result<(), Fault> {
+        let came = self.line.newest(|_| Ok(Some(())))?.is_some();
+        self.quiet_periods = 0;
+        if self.drain.pass(came)? {
+            self.requests.forget();
+            self.frames = Frames::default();
+        }
+        Ok(())
+    }
+
     fn receive(&mut self) -> Result<(), Fault> {
         let (frames, requests) = (&mut self.frames, &mut self.requests);
         let newest = self.line.newest(|byte| {
@@ -196,6 +211,13 @@ impl Falcon {
 
     /// τ = Jᵀ F, as units.
     fn send(&mut self) -> Result<(), Fault> {
+        if self.drain.is_on() {
+            if self.drain.is_to_tell() {
+                let sent = self.line.send(&Frame { numbers: [0; 3], flags: FLAGS }.bytes())?;
+                self.drain.told(sent);
+            }
+            return Ok(());
+        }
         if self.quiet_periods > LOST_AFTER_PERIODS {
             self.requests.forget();
         }
@@ -229,7 +251,8 @@ impl Arm for Falcon {
         }
         self.requests.pass(periods);
         self.quiet_periods = self.quiet_periods.saturating_add(periods);
-        self.receive().map_err(|fault| self.lose(fault))?;
+        let taken = if self.drain.is_on() { self.drop_frames() } else { self.receive() };
+        taken.map_err(|fault| self.lose(fault))?;
         let age_s = self.age_s();
         Ok(Reading {
             motion: extrapolate(&self.motion, age_s, LONGEST_EXTRAPOLATION_S),
@@ -250,6 +273,10 @@ impl Arm for Falcon {
 
     fn last_words(&self) -> Option<LastWords> {
         self.line.last_words(Frame { numbers: [0; 3], flags: wire::HOMING | wire::BLUE }.bytes().to_vec())
+    }
+
+    fn last_words_were_said(&mut self) {
+        self.drain.begin(self.silence_periods);
     }
 }
 

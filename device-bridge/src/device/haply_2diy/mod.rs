@@ -12,6 +12,7 @@ pub mod wire;
 
 use super::{
     Arm, Effort, Fault, LONGEST_EXTRAPOLATION_S, LastWords, Reading,
+    drain::Drain,
     requests::{Requests, between},
     serial::{self, FAREWELL, Line},
     share::Share,
@@ -120,6 +121,8 @@ pub struct Haply2diy {
     asked_at: u64,
     /// Since it came.
     quiet_periods: u64,
+    /// Of answers to a guard.
+    drain: Drain,
     lost: Option<Fault>,
 }
 
@@ -155,6 +158,7 @@ impl Haply2diy {
             requests: Requests::default(),
             asked_at: 0,
             quiet_periods: 0,
+            drain: Drain::default(),
             lost: None,
             settings: settings.clone(),
         };
@@ -175,6 +179,17 @@ impl Haply2diy {
         self.motion = Motion::at(place.tool_m.extend(0.0));
         // v = J ω
         self.motion.velocity_m_per_s = (place.jacobian_m_per_rad * rates_deg.map(f64::to_radians)).extend(0.0);
+        Ok(())
+    }
+
+    /// Drops what has come; when that ends, nothing is on its way.
+    fn drop_answers(&mut self) -> Result<(), Fault> {
+        let came = self.line.newest(|_| Ok(Some(())))?.is_some();
+        self.quiet_periods = 0;
+        if self.drain.pass(came)? {
+            self.requests.forget();
+            self.replies = Replies::new(self.settings.device_id);
+        }
         Ok(())
     }
 
@@ -199,6 +214,13 @@ impl Haply2diy {
 
     /// τ = Jᵀ F, when the last request is answered, or the arm is lost.
     fn send(&mut self) -> Result<(), Fault> {
+        if self.drain.is_on() {
+            if self.drain.is_to_tell() {
+                let sent = self.line.send(&wire::request(self.settings.device_id, [0.0; 2]))?;
+                self.drain.told(sent);
+            }
+            return Ok(());
+        }
         if self.requests.unanswered() > 0 && self.lost.is_none() {
             return Ok(());
         }
@@ -237,7 +259,8 @@ impl Arm for Haply2diy {
         }
         self.requests.pass(periods);
         self.quiet_periods = self.quiet_periods.saturating_add(periods);
-        self.receive().map_err(|fault| self.lose(fault))?;
+        let taken = if self.drain.is_on() { self.drop_answers() } else { self.receive() };
+        taken.map_err(|fault| self.lose(fault))?;
         let age_s = (self.requests.now() - self.asked_at) as f64 * self.period_s;
         Ok(Reading {
             motion: extrapolate(&self.motion, age_s, LONGEST_EXTRAPOLATION_S),
@@ -258,6 +281,10 @@ impl Arm for Haply2diy {
 
     fn last_words(&self) -> Option<LastWords> {
         self.line.last_words(wire::request(self.settings.device_id, [0.0; 2]).to_vec())
+    }
+
+    fn last_words_were_said(&mut self) {
+        self.drain.begin(self.silence_periods);
     }
 }
 

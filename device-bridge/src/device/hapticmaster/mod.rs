@@ -11,7 +11,7 @@ pub mod plane;
 mod request;
 pub mod start;
 
-use super::{Arm, Effort, Fault, LONGEST_EXTRAPOLATION_S, LastWords, Reading, unstarted};
+use super::{Arm, Effort, Fault, LONGEST_EXTRAPOLATION_S, LastWords, Reading, drain::Drain, tcp, unstarted};
 use crate::BridgeError;
 use glam::DVec3;
 use grammar::Answer;
@@ -19,7 +19,7 @@ use palpate_control::{ContactPlane, Motion, extrapolate};
 use plane::Plane;
 use std::{
     io::{ErrorKind, Read as _, Write as _},
-    net::TcpStream,
+    net::{Shutdown, TcpStream},
     time::Duration,
 };
 use tokio_util::sync::CancellationToken;
@@ -86,6 +86,8 @@ pub struct HapticMaster {
     requests: u64,
     /// Requests that take every force away.
     farewell: Vec<u8>,
+    /// Of answers to a guard.
+    drain: Drain,
     lost: Option<Fault>,
 }
 
@@ -135,8 +137,28 @@ impl HapticMaster {
             quiet_periods: 0,
             requests: 0,
             farewell,
+            drain: Drain::default(),
             lost: None,
         })
+    }
+
+    /// Drops what has come; when that ends, nothing is on its way.
+    fn drop_answers(&mut self) -> Result<(), Fault> {
+        let mut came = false;
+        loop {
+            match self.stream.read(&mut [0; 1024]) {
+                Ok(0) => return Err(Fault::Disconnected),
+                Ok(_) => came = true,
+                Err(error) if error.kind() == ErrorKind::WouldBlock => break,
+                Err(error) if error.kind() == ErrorKind::Interrupted => {}
+                Err(_) => return Err(Fault::Disconnected),
+            }
+        }
+        self.quiet_periods = 0;
+        if self.drain.pass(came)? {
+            self.asked = Asked::Nothing;
+        }
+        Ok(())
     }
 
     /// Takes what has come; a whole answer renews the reading.
@@ -190,7 +212,7 @@ impl HapticMaster {
 
     /// Sends the next request, when the last one is answered.
     fn send(&mut self) -> Result<(), Fault> {
-        if self.lost.is_some() {
+        if self.lost.is_some() || self.drain.is_on() {
             self.let_go();
         } else if self.asked == Asked::Nothing && self.sent == self.request.len() {
             self.compose();
@@ -204,6 +226,7 @@ impl HapticMaster {
                 Err(_) => return Err(Fault::Disconnected),
             }
         }
+        self.drain.told(self.asked == Asked::Nobody);
         Ok(())
     }
 
@@ -220,7 +243,8 @@ impl Arm for HapticMaster {
         for since in [&mut self.age_periods, &mut self.asked_periods, &mut self.quiet_periods] {
             *since = since.saturating_add(periods);
         }
-        self.receive().map_err(|fault| self.lose(fault))?;
+        let taken = if self.drain.is_on() { self.drop_answers() } else { self.receive() };
+        taken.map_err(|fault| self.lose(fault))?;
         if self.quiet_periods > self.silence_periods {
             return Err(self.lose(Fault::Silent));
         }
@@ -242,6 +266,15 @@ impl Arm for HapticMaster {
         let to = self.stream.try_clone().ok()?.into();
         Some(LastWords { to, bytes: self.farewell.clone() })
     }
+
+    fn last_words_were_said(&mut self) {
+        self.drain.begin(self.silence_periods);
+        if let Some(plane) = &mut self.plane {
+            plane.was_disabled();
+        }
+        // They are said once more, behind whatever is on its way.
+        self.asked = if self.asked == Asked::Nobody { Asked::Nothing } else { self.asked };
+    }
 }
 
 impl Drop for HapticMaster {
@@ -256,6 +289,8 @@ impl Drop for HapticMaster {
             grammar::frame(text.as_bytes(), &mut self.request);
             let _ = self.stream.write_all(&self.request).and_then(|()| self.stream.read(&mut [0; 1024]));
         }
+        let _ = self.stream.shutdown(Shutdown::Write);
+        tcp::hear_out(&self.stream, FAREWELL);
     }
 }
 

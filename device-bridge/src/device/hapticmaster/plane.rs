@@ -132,6 +132,11 @@ impl Plane {
         }
     }
 
+    /// Somebody else has taken its force away.
+    pub fn was_disabled(&mut self) {
+        self.enabled = false;
+    }
+
     /// The largest force (N) that the arm may give by it now.
     pub fn largest_n(&self) -> f64 {
         self.largest_n

@@ -12,7 +12,7 @@ pub mod peer;
 pub mod start;
 pub mod wire;
 
-use super::{Arm, Effort, Fault, LONGEST_EXTRAPOLATION_S, LastWords, Reading};
+use super::{Arm, Effort, Fault, LONGEST_EXTRAPOLATION_S, LastWords, Reading, tcp};
 use glam::{DMat3, DVec3};
 use heard::Heard;
 use palpate_control::{Motion, Velocity, extrapolate};
@@ -21,7 +21,7 @@ use peer::{Kind, Peer};
 use start::StartError;
 use std::{
     io::{ErrorKind, Read as _, Write as _},
-    net::TcpStream,
+    net::{Shutdown, TcpStream},
     time::Duration,
 };
 use wire::{Outgoing, Time};
@@ -243,5 +243,7 @@ impl Drop for Vrpn {
             self.out.message(header, |into| ForceField::NONE.write(into));
             let _ = self.stream.write_all(self.out.bytes());
         }
+        let _ = self.stream.shutdown(Shutdown::Write);
+        tcp::hear_out(&self.stream, FAREWELL);
     }
 }

@@ -1,0 +1,87 @@
+//! After a guard spoke to an arm that answers: its answers come, too, and nothing tells them from ours. All are dropped until the line is quiet; then the driver asks anew.
+use super::Fault;
+
+/// A line that is not quiet after so many times what makes it quiet never will be.
+const MOST: u64 = 10;
+
+/// What is dropped. It counts readings, and not periods: an answer that comes while the loop stands still is found by the next reading.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Drain {
+    /// Readings without a byte that are still wanted; 0: nothing is dropped.
+    quiet_left: u64,
+    /// Readings until it is given up.
+    left: u64,
+    /// Readings without a byte that make a line quiet.
+    wanted: u64,
+    /// The arm was told once more to let go.
+    told: bool,
+}
+
+impl Drain {
+    /// From now on, until nothing came for as long as an arm may be silent: an answer that is later is a fault by itself.
+    pub(super) fn begin(&mut self, silence_periods: u64) {
+        let wanted = silence_periods.max(1);
+        *self = Self { quiet_left: wanted, left: wanted.saturating_mul(MOST), wanted, told: false };
+    }
+
+    /// Whether all is dropped.
+    pub(super) fn is_on(&self) -> bool {
+        self.quiet_left > 0
+    }
+
+    /// Whether the arm has still to be told to let go: a force may have gone out behind the guard's words.
+    pub(super) fn is_to_tell(&self) -> bool {
+        self.is_on() && !self.told
+    }
+
+    /// Whether it was told now.
+    pub(super) fn told(&mut self, sent: bool) {
+        self.told |= sent;
+    }
+
+    /// One reading, in which something came or not; whether the line is quiet now.
+    ///
+    /// # Errors
+    /// [`Fault::Garbled`]: it does not end.
+    pub(super) fn pass(&mut self, came: bool) -> Result<bool, Fault> {
+        self.left = self.left.checked_sub(1).ok_or(Fault::Garbled)?;
+        self.quiet_left = if came || !self.told { self.wanted } else { self.quiet_left.saturating_sub(1) };
+        Ok(!self.is_on())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn it_ends_when_nothing_came_for_so_long_since_the_arm_was_told() {
+        let mut drain = Drain::default();
+        assert!(!drain.is_on());
+        drain.begin(3);
+        // Not told, told, an answer, and then nothing.
+        for (told, came, quiet) in [
+            (false, false, false),
+            (false, false, false),
+            (true, false, false),
+            (false, true, false),
+            (false, false, false),
+            (false, false, false),
+            (false, false, true),
+        ] {
+            assert!(drain.is_on());
+            drain.told(told);
+            assert_eq!(drain.pass(came), Ok(quiet));
+        }
+        assert!(!drain.is_on() && !drain.is_to_tell());
+    }
+
+    #[test]
+    fn a_line_that_is_never_quiet_is_not_its_protocol() {
+        let mut drain = Drain::default();
+        drain.begin(20);
+        drain.told(true);
+        let readings = (0..1000).take_while(|_| drain.pass(true).is_ok()).count();
+        assert_eq!(readings, 200);
+    }
+}
