@@ -1,5 +1,6 @@
 //! What the configuration means: checked, in the types that the loop and the uplink use.
 pub mod arm;
+mod servo;
 mod torque;
 mod vrpn_server;
 
@@ -10,12 +11,10 @@ use crate::{
 };
 pub use arm::ArmSettings;
 use glam::DVec3;
-use palpate_control::{
-    ForceLimits, ParameterError, PassivitySettings, RenderSettings, StiffnessBound, ThermalLimits, TorqueLimits,
-    WatchdogSettings, coupling::SampledWall,
-};
+use palpate_control::{ParameterError, StiffnessBound, WatchdogSettings};
 use palpate_proto::connect::{self, ConnectError};
 use palpate_realtime::OsMeasures;
+pub use servo::ServoSettings;
 use std::time::Duration;
 use tonic::transport::Endpoint;
 pub use vrpn_server::VrpnServerSettings;
@@ -64,35 +63,6 @@ pub struct UplinkSettings {
     pub max_torque_nm: f64,
 }
 
-/// The servo's law.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct ServoSettings {
-    /// Period (s).
-    pub period_s: f64,
-    /// Peak and rate.
-    pub limits: ForceLimits,
-    /// Of torque.
-    pub torque: TorqueLimits,
-    /// What the motors bear for ever; `None`: the peak.
-    pub thermal: Option<ThermalLimits>,
-    /// Ages.
-    pub watchdog: WatchdogSettings,
-    /// Damping (N s/m) that replaces a fading force.
-    pub fading_damping_n_s_per_m: f64,
-    /// Local models; `None`: the daemon's force as it comes.
-    pub render: Option<RenderSettings>,
-    /// The arm renders the contact's plane by itself.
-    pub plane: bool,
-    /// How stiff a local model may be rendered, or, without, the daemon's coupling be.
-    pub stiffness: StiffnessBound,
-    /// Share of ticks with an answer in time; with fewer the force is taken away.
-    pub least_success_rate: f64,
-    /// Energy; `None`: off.
-    pub passivity: Option<PassivitySettings>,
-    /// Recover from latched faults without being asked.
-    pub auto_recover: bool,
-}
-
 /// Which arm, and where it is.
 #[derive(Debug, Clone)]
 pub struct DeviceSettings {
@@ -117,7 +87,7 @@ impl Settings {
             return Err(value("servo.rate_hz", format!("{rate_hz} is out of range: use 10 to 10000")));
         }
         let workspace = workspace(config)?;
-        let servo = servo(config, 1.0 / rate_hz, workspace.scale())?;
+        let servo = servo::checked(config, 1.0 / rate_hz, workspace.scale())?;
         let every_s = config.servo.report_every_s;
         let report_every = seconds("servo.report_every_s", every_s)?;
         Ok(Self {
@@ -159,95 +129,6 @@ fn clutch(config: &Config, times: &WatchdogSettings) -> Result<Option<ClutchSett
 fn record(config: &Config) -> Result<Option<RecordSettings>, BridgeError> {
     let overwrite = config.record.overwrite;
     config.record.path.clone().map(|path| RecordSettings { path, overwrite }.checked()).transpose()
-}
-
-/// What is said of the arm (its damping, its mass) counts for the world, whose movements are `scale` times the arm's: see [`Workspace`].
-fn servo(config: &Config, period_s: f64, scale: f64) -> Result<ServoSettings, BridgeError> {
-    let limits = &config.limits;
-    let (watchdog, passivity) = (&config.watchdog, &config.passivity);
-    let fading = watchdog.fading_damping_n_s_per_m;
-    if !(fading.is_finite() && fading >= 0.0) {
-        return Err(value("watchdog.fading_damping_n_s_per_m", format!("{fading} must be finite and not negative")));
-    }
-    let passivity_settings = PassivitySettings {
-        max_damping_n_s_per_m: passivity.max_damping_n_s_per_m / scale,
-        max_stored_j: passivity.max_stored_j * scale,
-        arm_mass_kg: passivity.arm_mass_kg / scale,
-        strict: passivity.strict,
-    }
-    .checked()
-    .map_err(|error| parameter("passivity", &error))?;
-    let thermal = |continuous_force_n| {
-        let (max_force_n, time_s) = (limits.max_force_n, limits.thermal_time_s);
-        ThermalLimits { continuous_force_n, max_force_n, time_s }.checked()
-    };
-    let least_success_rate = config.servo.least_success_rate;
-    if !(0.0..=1.0).contains(&least_success_rate) {
-        return Err(value("servo.least_success_rate", format!("{least_success_rate} is no share: use 0 to 1")));
-    }
-    let stiffness = stiffness(config, period_s, scale)?;
-    Ok(ServoSettings {
-        period_s,
-        stiffness,
-        plane: arm::renders_planes(&config.device),
-        least_success_rate,
-        thermal: limits.continuous_force_n.map(thermal).transpose().map_err(|error| parameter("limits", &error))?,
-        limits: ForceLimits { max_force_n: limits.max_force_n, max_force_rate_n_per_s: limits.max_force_rate_n_per_s }
-            .checked()
-            .map_err(|error| parameter("limits", &error))?,
-        torque: torque::limits(config)?,
-        watchdog: WatchdogSettings {
-            fresh_for_s: watchdog.fresh_for_s,
-            stale_after_s: watchdog.stale_after_s,
-            ramp_to_zero_s: watchdog.ramp_to_zero_s,
-            ramp_up_s: watchdog.ramp_up_s,
-        }
-        .checked()
-        .map_err(|error| parameter("watchdog", &error))?,
-        fading_damping_n_s_per_m: fading / scale,
-        render: render(config, scale, &stiffness)?,
-        passivity: passivity.enabled.then_some(passivity_settings),
-        auto_recover: config.servo.auto_recover,
-    })
-}
-
-/// The stiffest contact that the servo's own sampling allows on this arm, or that is asked for.
-fn stiffness(config: &Config, period_s: f64, scale: f64) -> Result<StiffnessBound, BridgeError> {
-    let render = &config.render;
-    let wall = SampledWall {
-        arm_damping_n_s_per_m: render.arm_damping_n_s_per_m / scale,
-        wall_damping_n_s_per_m: render.damping_n_s_per_m / scale,
-        sample_time_s: period_s,
-        delay_s: 0.0,
-    };
-    let passive_n_per_m = wall.passive_stiffness_limit_n_per_m().map_err(|error| parameter("render", &error))?;
-    if passive_n_per_m <= 0.0 {
-        let reason = "must be smaller than arm_damping_n_s_per_m, or no stiffness is passive".to_owned();
-        return Err(value("render.damping_n_s_per_m", reason));
-    }
-    let asked_n_per_m = render.max_stiffness_n_per_m.unwrap_or(passive_n_per_m);
-    if !(asked_n_per_m > 0.0 && asked_n_per_m <= passive_n_per_m) {
-        let (b, rate_hz) = (render.arm_damping_n_s_per_m, config.servo.rate_hz);
-        let reason = format!(
-            "{asked_n_per_m} N/m is not between 0 and the {passive_n_per_m:.0} N/m that are passive on an arm of {b} N s/m at {rate_hz} Hz \
-             (2 (b - B)/T): leave it out, or give the arm's damping in render.arm_damping_n_s_per_m if it has more"
-        );
-        return Err(value("render.max_stiffness_n_per_m", reason));
-    }
-    StiffnessBound::new(wall, asked_n_per_m).map_err(|error| parameter("render", &error))
-}
-
-fn render(config: &Config, scale: f64, stiffness: &StiffnessBound) -> Result<Option<RenderSettings>, BridgeError> {
-    let render = &config.render;
-    let settings = RenderSettings {
-        hold_s: render.hold_s,
-        forget_s: render.forget_s,
-        damping_n_s_per_m: render.damping_n_s_per_m / scale,
-        max_stiffness_n_per_m: stiffness.largest_n_per_m(),
-    }
-    .checked()
-    .map_err(|error| parameter("render", &error))?;
-    Ok(render.local_model.then_some(settings))
 }
 
 fn uplink(config: &Config) -> Result<UplinkSettings, BridgeError> {

@@ -1,5 +1,5 @@
 //! What the keys of a PHANToM or Touch mean.
-use super::super::{seconds, stiffness};
+use super::super::{seconds, servo::stiffness};
 use crate::{BridgeError, Config, config::PhantomConfig, device::phantom::Settings};
 
 /// As OpenHaptics' installers name it.
