@@ -241,6 +241,7 @@ fn answer(up: &v1::DeviceUp) -> v1::DeviceDown {
         validity_radius_m: 0.01,
         max_force_n: 3.0,
         tick: sequence,
+        torque: None,
     };
     let command = v1::DeviceCommand {
         tick: sequence,

@@ -1,7 +1,7 @@
 //! The one border between wire types and ours. Nothing that is not finite, complete and of the right shape passes.
 use crate::{device::Reading, settings::UplinkSettings};
-use glam::{DMat3, DVec3};
-use palpate_control::{ForceLimits, LocalModel, TorqueLimits};
+use glam::{DMat3, DQuat, DVec3};
+use palpate_control::{ForceLimits, LocalModel, LocalTorque, TorqueLimits};
 use palpate_proto::v1;
 use thiserror::Error;
 
@@ -48,6 +48,8 @@ pub struct Command {
     pub force_n: DVec3,
     /// Contact model, `None` out of contact.
     pub local_model: Option<LocalModel>,
+    /// Its torque.
+    pub local_torque: Option<LocalTorque>,
     /// Age of the model when the command was made (s).
     pub model_age_s: f64,
     /// Limits that the daemon applies to this arm.
@@ -132,6 +134,8 @@ pub fn command(wire: &v1::DeviceCommand, welcome: &Welcome, received_ns: u64) ->
     let force_n = vector("wrench.force_n", wrench.force_n.as_ref())?;
     let torque_nm = vector("wrench.torque_nm", wrench.torque_nm.as_ref().or(Some(&v1::Vec3::default())))?;
     let local_model = wire.local_model.as_ref().map(local_model).transpose()?;
+    let torque = wire.local_model.as_ref().and_then(|model| model.torque.as_ref());
+    let local_torque = torque.map(local_torque).transpose()?;
     if wire.sample_sequence == 0 {
         return Ok(None);
     }
@@ -144,6 +148,7 @@ pub fn command(wire: &v1::DeviceCommand, welcome: &Welcome, received_ns: u64) ->
         tick: wire.tick,
         force_n,
         local_model,
+        local_torque,
         model_age_s: model_ticks as f64 * welcome.tick_period_s,
         limits: welcome.limits,
         torque: (torque_nm, welcome.torque_limits),
@@ -162,24 +167,34 @@ fn torque_limits(wire: &v1::DeviceLimits) -> Result<TorqueLimits, Rejection> {
 }
 
 fn local_model(wire: &v1::LocalContactModel) -> Result<LocalModel, Rejection> {
-    let columns = &wire.stiffness_n_per_m.as_ref().ok_or(Rejection::Missing("local_model.stiffness_n_per_m"))?;
-    let columns: &[f64; 9] = columns
-        .column_major
-        .as_slice()
-        .try_into()
-        .map_err(|_| Rejection::OutOfRange("local_model.stiffness_n_per_m"))?;
     let model = LocalModel {
         point_m: vector("local_model.point_m", wire.point_m.as_ref())?,
         normal: vector("local_model.normal", wire.normal.as_ref())?,
         force_n: vector("local_model.force_n", wire.force_n.as_ref())?,
-        stiffness_n_per_m: DMat3::from_cols_array(columns),
+        stiffness_n_per_m: matrix("local_model.stiffness_n_per_m", wire.stiffness_n_per_m.as_ref())?,
         validity_radius_m: positive("local_model.validity_radius_m", wire.validity_radius_m)?,
         max_force_n: positive("local_model.max_force_n", wire.max_force_n)?,
     };
-    if !model.stiffness_n_per_m.is_finite() {
-        return Err(Rejection::NotFinite("local_model.stiffness_n_per_m"));
-    }
     model.accept().ok_or(Rejection::OutOfRange("local_model.normal"))
+}
+
+fn local_torque(wire: &v1::LocalTorqueModel) -> Result<LocalTorque, Rejection> {
+    let turned = wire.orientation.as_ref().ok_or(Rejection::Missing("local_model.torque.orientation"))?;
+    let model = LocalTorque {
+        orientation: DQuat::from_xyzw(turned.x, turned.y, turned.z, turned.w),
+        torque_nm: vector("local_model.torque.torque_nm", wire.torque_nm.as_ref())?,
+        stiffness_nm_per_rad: matrix("local_model.torque.stiffness_nm_per_rad", wire.stiffness_nm_per_rad.as_ref())?,
+        validity_angle_rad: positive("local_model.torque.validity_angle_rad", wire.validity_angle_rad)?,
+        max_torque_nm: positive("local_model.torque.max_torque_nm", wire.max_torque_nm)?,
+    };
+    model.accept().ok_or(Rejection::OutOfRange("local_model.torque.orientation"))
+}
+
+fn matrix(name: &'static str, wire: Option<&v1::Mat3>) -> Result<DMat3, Rejection> {
+    let columns = &wire.ok_or(Rejection::Missing(name))?.column_major;
+    let columns: &[f64; 9] = columns.as_slice().try_into().map_err(|_| Rejection::OutOfRange(name))?;
+    let matrix = DMat3::from_cols_array(columns);
+    if matrix.is_finite() { Ok(matrix) } else { Err(Rejection::NotFinite(name)) }
 }
 
 fn vector(name: &'static str, wire: Option<&v1::Vec3>) -> Result<DVec3, Rejection> {
@@ -238,6 +253,13 @@ mod tests {
                 validity_radius_m: 1e-3,
                 tick: 14,
                 max_force_n: 3.0,
+                torque: Some(v1::LocalTorqueModel {
+                    orientation: Some(v1::Quaternion { w: 1.0, x: 0.0, y: 0.0, z: 0.0 }),
+                    torque_nm: vec(0.0, 0.02, 0.0),
+                    stiffness_nm_per_rad: Some(v1::Mat3 { column_major: vec![-0.1; 9] }),
+                    validity_angle_rad: 0.1,
+                    max_torque_nm: 0.1,
+                }),
             }),
             proxy_position_m: vec(0.1, 0.0, 0.0),
             proxy_orientation: None,
@@ -252,6 +274,8 @@ mod tests {
         assert!((command.model_age_s - 3e-3).abs() < 1e-15);
         let model = command.local_model.unwrap();
         assert_eq!(model.stiffness_n_per_m.z_axis, DVec3::new(0.0, 0.0, -400.0));
+        let torque = command.local_torque.unwrap();
+        assert_eq!((torque.torque_nm, torque.orientation), (DVec3::Y * 0.02, DQuat::IDENTITY));
     }
 
     #[test]
@@ -264,7 +288,10 @@ mod tests {
     #[test]
     fn every_bad_part_refuses_the_command_and_is_named() {
         type Spoil = fn(&mut v1::DeviceCommand);
-        let cases: [(Spoil, &str); 11] = [
+        fn torque(command: &mut v1::DeviceCommand) -> &mut v1::LocalTorqueModel {
+            command.local_model.as_mut().unwrap().torque.as_mut().unwrap()
+        }
+        let cases: [(Spoil, &str); 14] = [
             (|c| c.wrench = None, "wrench is missing"),
             (|c| c.wrench.as_mut().unwrap().force_n = None, "wrench.force_n is missing"),
             (|c| c.wrench.as_mut().unwrap().force_n.as_mut().unwrap().y = f64::NAN, "wrench.force_n is not finite"),
@@ -293,6 +320,9 @@ mod tests {
                 |c| c.local_model.as_mut().unwrap().stiffness_n_per_m.as_mut().unwrap().column_major[4] = f64::NAN,
                 "local_model.stiffness_n_per_m is not finite",
             ),
+            (|c| torque(c).torque_nm = None, "local_model.torque.torque_nm is missing"),
+            (|c| torque(c).max_torque_nm = f64::NAN, "local_model.torque.max_torque_nm is not finite"),
+            (|c| torque(c).orientation.as_mut().unwrap().x = 2.0, "local_model.torque.orientation is out of range"),
         ];
         for (spoil, message) in cases {
             let mut wire = good();

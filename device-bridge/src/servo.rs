@@ -179,6 +179,7 @@ mod tests {
             tick: 1,
             force_n: DVec3::Z,
             local_model: None,
+            local_torque: None,
             model_age_s: 0.0,
             limits: settings.servo.limits,
             torque: (DVec3::ZERO, settings.servo.torque),

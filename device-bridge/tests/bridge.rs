@@ -186,6 +186,7 @@ async fn the_local_model_is_rendered_beside_the_arm() {
             validity_radius_m: 0.01,
             tick: 1_000_000,
             max_force_n: 3.0,
+            torque: None,
         });
     });
     let (address, _stop, _serving) = mock.serve("127.0.0.1:0").await;

@@ -118,6 +118,7 @@ fn answer(of_tick: u64, tick: u64, position_m: DVec3, wall_n_per_m: f64) -> Comm
         tick,
         force_n,
         local_model: (position_m.z < 0.0).then_some(model),
+        local_torque: None,
         model_age_s: 0.0,
         limits: ForceLimits { max_force_n: 8.0, max_force_rate_n_per_s: 1e5 },
         torque: (DVec3::ZERO, palpate_control::TorqueLimits::NONE),

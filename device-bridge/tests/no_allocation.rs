@@ -90,6 +90,7 @@ fn the_servo_allocates_nothing() {
             tick,
             force_n: DVec3::Z,
             local_model: (tick % 100 < 50).then_some(model),
+            local_torque: None,
             model_age_s: 0.0,
             limits: ForceLimits { max_force_n: 3.0, max_force_rate_n_per_s: 1000.0 },
             torque: (DVec3::Y * 0.05, TorqueLimits { max_torque_nm: 0.1, max_torque_rate_nm_per_s: 20.0 }),

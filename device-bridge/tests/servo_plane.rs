@@ -38,6 +38,7 @@ fn command(answers_ns: u64, local_model: Option<LocalModel>) -> Command {
         tick: 0,
         force_n: DVec3::Z,
         local_model,
+        local_torque: None,
         model_age_s: 0.0,
         limits: ForceLimits { max_force_n: 100.0, max_force_rate_n_per_s: 1e6 },
         torque: (DVec3::ZERO, TorqueLimits::NONE),

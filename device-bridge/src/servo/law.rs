@@ -192,7 +192,7 @@ impl ServoLaw {
             .filter(|_| !limited.non_finite)
             .and_then(|plane| plane.limited(limited.force_n, at, ramp, self.largest_n()));
         self.given = plane.map(|plane| (plane, motion.position_m));
-        let wanted_nm = self.command.map_or(DVec3::ZERO, |command| command.torque.0);
+        let wanted_nm = self.wanted_nm(motion, &verdict);
         ServoTick {
             limited,
             plane,
@@ -219,6 +219,19 @@ impl ServoLaw {
             _ => force_n,
         };
         (force_n, plane)
+    }
+
+    /// The same of torque.
+    fn wanted_nm(&self, motion: &Motion, verdict: &Verdict) -> DVec3 {
+        let Some(command) = &self.command else { return DVec3::ZERO };
+        match (&command.local_torque, &self.settings.render) {
+            (Some(model), Some(render)) => {
+                let max_stiffness_n_per_m = self.stiffness.largest_n_per_m();
+                let age_s = verdict.age_s + command.model_age_s;
+                model.render(motion.orientation, age_s, &RenderSettings { max_stiffness_n_per_m, ..*render })
+            }
+            _ => command.torque.0,
+        }
     }
 
     /// Along the normal an arm that renders the plane is as stiff as a loop without delay may be: poses that are late are none in its own loop.

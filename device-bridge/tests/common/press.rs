@@ -39,6 +39,7 @@ pub fn wall() -> v1::LocalContactModel {
         validity_radius_m: 0.05,
         tick: 1_000_000,
         max_force_n: 3.0,
+        torque: None,
     }
 }
 

@@ -118,12 +118,16 @@ impl LocalModel {
         clamp_length(without_pull(force_n, self.normal), self.max_force_n).0
     }
 
-    /// K scaled so that no direction is stiffer than `max_n_per_m`: the largest column sum of |K| bounds its eigenvalues.
+    /// K scaled so that no direction is stiffer than `max_n_per_m`.
     pub(crate) fn bounded_stiffness(&self, max_n_per_m: f64) -> DMat3 {
-        let k = &self.stiffness_n_per_m;
-        let bound = [k.x_axis, k.y_axis, k.z_axis].iter().map(|c| c.abs().element_sum()).fold(0.0, f64::max);
-        if bound > max_n_per_m { *k * (max_n_per_m / bound) } else { *k }
+        bounded(&self.stiffness_n_per_m, max_n_per_m)
     }
+}
+
+/// K scaled so that no direction is stiffer than `max`: the largest column sum of |K| bounds its eigenvalues.
+pub(crate) fn bounded(k: &DMat3, max: f64) -> DMat3 {
+    let bound = [k.x_axis, k.y_axis, k.z_axis].iter().map(|c| c.abs().element_sum()).fold(0.0, f64::max);
+    if bound > max { *k * (max / bound) } else { *k }
 }
 
 /// F without its part against the normal: a negative F·n is replaced by zero.
@@ -132,7 +136,7 @@ fn without_pull(force_n: DVec3, normal: DVec3) -> DVec3 {
 }
 
 /// 1 up to the radius, then the cubic 1 − 3s² + 2s³ down to 0 at [`FADE_END`] radii.
-fn distance_weight(radii: f64) -> f64 {
+pub(crate) fn distance_weight(radii: f64) -> f64 {
     let s = ((radii - 1.0) / (FADE_END - 1.0)).clamp(0.0, 1.0);
     1.0 - s * s * (3.0 - 2.0 * s)
 }

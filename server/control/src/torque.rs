@@ -62,6 +62,11 @@ impl TorqueLimiter {
         self.limiter.set_limits(limits.of_limiter());
     }
 
+    /// Largest torque (N m).
+    pub fn max_torque_nm(&self) -> f64 {
+        self.limiter.limits().max_force_n
+    }
+
     /// Zero at once.
     pub fn reset(&mut self) {
         self.limiter.reset();
@@ -73,8 +78,8 @@ impl TorqueLimiter {
     }
 }
 
-/// Lever (m) that makes the arm's inertia and damping in rotation of those at its tool.
-const LEVER_M: f64 = 0.02;
+/// Lever (m) that makes the arm's inertia and damping in rotation, and so the stiffness that it bears, of those at its tool.
+pub const LEVER_M: f64 = 0.02;
 
 /// Torque of the servo loop: limited, and passive by itself.
 ///

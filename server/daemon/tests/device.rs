@@ -81,6 +81,19 @@ async fn a_capsule_across_the_edge_is_turned_back() {
         assert!(torque_nm(&pressed).length() <= max_torque_nm + 1e-15, "{pressed:?}");
         let turned = pressed.proxy_orientation.unwrap();
         assert!((turned.w - half).abs() < 0.1 && turned.w != half, "{turned:?}");
+        // Beside the arm the same torque, and what it becomes as the arm turns on.
+        let model = pressed.local_model.as_ref().unwrap().torque.as_ref();
+        assert_eq!(model.is_some(), max_torque_nm > 0.0);
+        if let Some(model) = model {
+            let told = model.torque_nm.unwrap();
+            assert!(DVec3::new(told.x, told.y, told.z).distance(torque_nm(&pressed)) < 1e-12, "{pressed:?}");
+            assert!(
+                model.stiffness_nm_per_rad.as_ref().unwrap().column_major[4] < 0.0
+                    && model.max_torque_nm <= max_torque_nm
+            );
+            let at = model.orientation.unwrap();
+            assert!((at.w - half).abs() < 1e-6 && (at.y - half).abs() < 1e-6, "{at:?}");
+        }
         drop(arm);
         while !daemon.status().await.devices.is_empty() {
             tokio::time::sleep(std::time::Duration::from_millis(5)).await;

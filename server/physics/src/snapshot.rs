@@ -15,7 +15,7 @@ use thiserror::Error;
 const MAGIC: [u8; 4] = *b"PLPS";
 const HEADER: usize = 24;
 /// Version of the layout; another one is refused.
-pub const VERSION: u32 = 12;
+pub const VERSION: u32 = 13;
 
 /// Why bytes are not a state of a body.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]

@@ -8,7 +8,10 @@ use crate::{
     stream::hub::Layers,
 };
 use glam::{DMat3, DQuat, DVec3};
-use palpate_physics::{Quarantine, contact::LocalContactModel};
+use palpate_physics::{
+    Quarantine,
+    contact::{LocalContactModel, LocalTorqueModel},
+};
 use palpate_proto::v1::{self, DeviceFaultCode};
 use tonic::Status;
 
@@ -283,6 +286,18 @@ fn local_model(model: &LocalContactModel, output: &ToolOutput) -> v1::LocalConta
         validity_radius_m: model.validity_radius_m,
         tick: output.tick,
         max_force_n: output.model_max_force_n,
+        torque: model.torque.as_ref().map(|torque| local_torque(torque, output)),
+    }
+}
+
+fn local_torque(model: &LocalTorqueModel, output: &ToolOutput) -> v1::LocalTorqueModel {
+    let stiffness: &DMat3 = &model.stiffness_nm_per_rad;
+    v1::LocalTorqueModel {
+        orientation: Some(wire_quaternion(model.orientation)),
+        torque_nm: Some(wire_vec3(model.torque_nm)),
+        stiffness_nm_per_rad: Some(v1::Mat3 { column_major: stiffness.to_cols_array().to_vec() }),
+        validity_angle_rad: model.validity_angle_rad,
+        max_torque_nm: output.model_max_torque_nm,
     }
 }
 

@@ -56,6 +56,8 @@ pub struct ToolOutput {
     pub local_model: Option<LocalContactModel>,
     /// Largest force (N) that may be rendered from the local model: the peak times the ramp.
     pub model_max_force_n: f64,
+    /// The same of torque (N m); without one the local model has none.
+    pub model_max_torque_nm: f64,
     /// Centre of the proxy (m, world).
     pub proxy_position_m: DVec3,
     /// Its orientation, tool frame to world.

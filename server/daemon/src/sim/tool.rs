@@ -10,7 +10,7 @@ use palpate_control::{
     torque::{TorqueLimiter, TorqueLimits},
     watchdog::{Link, Verdict, Watchdog, WatchdogSettings},
 };
-use palpate_physics::contact::{LocalContactModel, ToolState, ToolTarget};
+use palpate_physics::contact::{LocalContactModel, LocalTorqueModel, ToolState, ToolTarget};
 use palpate_scene::Driver;
 
 /// Times and limits of an arm's force.
@@ -233,6 +233,7 @@ impl ToolLoop {
         let limited = self.limiter.limit(self.raw_n, ramp, frame.period_s);
         let torque_nm = self.torque_limiter.limit(self.raw_nm, ramp, frame.period_s);
         let model_max_force_n = ramp * self.limiter.limits().max_force_n;
+        let model_max_torque_nm = ramp * self.torque_limiter.max_torque_nm();
         if ramp > 0.0 {
             let count = &mut self.limited;
             count.total += u64::from(limited.saturated || limited.rate_limited || limited.non_finite);
@@ -250,9 +251,15 @@ impl ToolLoop {
             local_model: rendered.map(|model| {
                 let cut = left_of(self.raw_n.length(), limited.force_n.length() / ramp);
                 let to_peak = left_of(model.force_n.length() * cut * ramp, model_max_force_n);
-                scaled(&model, ramp * cut * to_peak)
+                let torque = model.torque.filter(|_| model_max_torque_nm > 0.0).map(|torque| {
+                    let cut = left_of(self.raw_nm.length(), torque_nm.length() / ramp);
+                    let to_peak = left_of(torque.torque_nm.length() * cut * ramp, model_max_torque_nm);
+                    scaled_torque(&torque, ramp * cut * to_peak)
+                });
+                LocalContactModel { torque, ..scaled(&model, ramp * cut * to_peak) }
             }),
             model_max_force_n,
+            model_max_torque_nm,
             proxy_position_m: tool.centre_m,
             proxy_orientation: tool.orientation,
             stale: self.newest.is_some() && watched.is_some_and(|verdict| is_stale(&verdict)),
@@ -346,4 +353,10 @@ fn left_of(wanted_n: f64, allowed_n: f64) -> f64 {
 /// Force and stiffness are scaled together: a contact that is cut to half its force is rendered half as stiff.
 fn scaled(model: &LocalContactModel, by: f64) -> LocalContactModel {
     LocalContactModel { force_n: model.force_n * by, stiffness_n_per_m: model.stiffness_n_per_m * by, ..*model }
+}
+
+/// So are torque and stiffness.
+fn scaled_torque(model: &LocalTorqueModel, by: f64) -> LocalTorqueModel {
+    let stiffness_nm_per_rad = model.stiffness_nm_per_rad * by;
+    LocalTorqueModel { torque_nm: model.torque_nm * by, stiffness_nm_per_rad, ..*model }
 }

@@ -17,8 +17,13 @@
 //! A capsule that is pressed at `p` from its centre gives way by turning too: the coupling is as soft there as `1/K_vc + |p × n|²/K_r` says.
 //!
 //! The stiffness is `−K_n nnᵀ − K_t (I − nnᵀ)`: symmetric, negative semi-definite, never stiffer than the coupling, and
-//! smoothed over some ten ticks.
-use super::{Coupling, LocalContactModel, ToolModel, ToolState, narrow::Pressed};
+//! smoothed over some ten ticks. A tool that turns has a torque, too ([`super::local_torque`]).
+use super::{
+    Coupling, LocalContactModel, LocalTorqueModel, ToolModel, ToolState,
+    local_torque::{self, Springs},
+    narrow::Pressed,
+    turning::rotation_vector,
+};
 use glam::{DMat3, DVec3};
 use serde::{Deserialize, Serialize};
 use std::f64::consts::PI;
@@ -39,13 +44,15 @@ const SECANT_TICKS: u32 = 100;
 const SMOOTHING: f64 = 0.15;
 
 /// What the local model remembers of earlier ticks.
-#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub(super) struct StiffnessEstimate {
     /// `ln s`.
     pub(super) log_correction: f64,
     /// Smoothed `K_n` and `K_t` (N/m); 0 out of contact.
     pub(super) normal_n_per_m: f64,
     pub(super) tangential_n_per_m: f64,
+    /// Smoothed `K_θ` (N m/rad).
+    pub(super) turning_nm_per_rad: DMat3,
     /// Start of the present secant, with its age in ticks; an age of 0: none.
     pub(super) start_centre_m: DVec3,
     pub(super) start_force_n: f64,
@@ -58,12 +65,29 @@ pub(super) struct MeanContact {
     pub(super) pressed: Pressed,
     /// Force on the device (N).
     pub(super) device_force_n: DVec3,
+    /// Torque on it (N m).
+    pub(super) device_torque_nm: DVec3,
+}
+
+impl Default for StiffnessEstimate {
+    /// Out of contact, with nothing learnt. (A matrix is the identity by default.)
+    fn default() -> Self {
+        Self {
+            log_correction: 0.0,
+            normal_n_per_m: 0.0,
+            tangential_n_per_m: 0.0,
+            turning_nm_per_rad: DMat3::ZERO,
+            start_centre_m: DVec3::ZERO,
+            start_force_n: 0.0,
+            age_ticks: 0,
+        }
+    }
 }
 
 impl StiffnessEstimate {
     pub(super) fn is_finite(&self) -> bool {
         let numbers = [self.log_correction, self.normal_n_per_m, self.tangential_n_per_m, self.start_force_n];
-        numbers.iter().all(|n| n.is_finite()) && self.start_centre_m.is_finite()
+        numbers.iter().all(|n| n.is_finite()) && self.start_centre_m.is_finite() && self.turning_nm_per_rad.is_finite()
     }
 
     /// Forgets the contact, keeps what was learnt of the body.
@@ -117,6 +141,10 @@ pub(super) fn update(
     estimate.learn(tool.centre_m + arm_m, normal, pressed.normal_n.dot(normal), prior, model.spec.radius_m);
     let contact = prior * estimate.log_correction.exp();
     let sticking = TANGENTIAL_RATIO * contact * pressed.sticking_n / force_n;
+    let translating = match model.spec.coupling {
+        Coupling::Rigid => f64::INFINITY,
+        Coupling::Spring { stiffness_n_per_m, .. } => stiffness_n_per_m,
+    };
     let coupling = match (model.spec.coupling, model.spec.shape.as_capsule()) {
         (Coupling::Rigid, _) => f64::INFINITY,
         (Coupling::Spring { stiffness_n_per_m, .. }, None) => stiffness_n_per_m,
@@ -134,12 +162,34 @@ pub(super) fn update(
     let half_width_m = half_width_m(model, contact_radius_m);
     let body_radius_m = 0.35 * half_width_m * half_width_m / model.spec.radius_m;
     let validity_radius_m = body_radius_m * (contact / series(contact, coupling));
+    let validity_radius_m = validity_radius_m.clamp(0.02 * model.spec.radius_m, model.spec.radius_m);
+    let springs = |turning_nm_per_rad| Springs {
+        normal_n_per_m: contact,
+        coupled_n_per_m: (series(contact, translating), series(sticking, translating)),
+        turning_nm_per_rad,
+    };
+    let torque = model.spec.shape.as_capsule().map(|capsule| {
+        let turning_nm_per_rad = match model.spec.coupling {
+            Coupling::Rigid => f64::INFINITY,
+            Coupling::Spring { .. } => capsule.turning.stiffness_nm_per_rad,
+        };
+        let k_theta = local_torque::stiffness_nm_per_rad(pressed, &springs(turning_nm_per_rad));
+        estimate.turning_nm_per_rad += (k_theta - estimate.turning_nm_per_rad) * SMOOTHING;
+        let stiffness_nm_per_rad = -estimate.turning_nm_per_rad;
+        LocalTorqueModel {
+            orientation: tool.target.orientation,
+            torque_nm: torque_at_end_of_tick(model, tool, mean, &stiffness_nm_per_rad),
+            stiffness_nm_per_rad,
+            validity_angle_rad: local_torque::validity_angle_rad(validity_radius_m, capsule.half_length_m),
+        }
+    });
     Some(LocalContactModel {
         point_m: tool.target.position_m,
         normal,
         force_n: at_end_of_tick(model, tool, mean, &stiffness_n_per_m),
         stiffness_n_per_m,
-        validity_radius_m: validity_radius_m.clamp(0.02 * model.spec.radius_m, model.spec.radius_m),
+        validity_radius_m,
+        torque,
     })
 }
 
@@ -179,6 +229,22 @@ fn at_end_of_tick(model: &ToolModel, tool: &ToolState, mean: &MeanContact, stiff
             mean.device_force_n + *stiffness_n_per_m * half_way
         }
         Coupling::Spring { .. } => mean.device_force_n,
+    }
+}
+
+/// The same of the torque.
+fn torque_at_end_of_tick(
+    model: &ToolModel,
+    tool: &ToolState,
+    mean: &MeanContact,
+    stiffness_nm_per_rad: &DMat3,
+) -> DVec3 {
+    match model.spec.coupling {
+        Coupling::Rigid => {
+            let turn = tool.target.orientation * tool.previous_target.orientation.conjugate();
+            mean.device_torque_nm + *stiffness_nm_per_rad * (rotation_vector(turn) * 0.5)
+        }
+        Coupling::Spring { .. } => mean.device_torque_nm,
     }
 }
 

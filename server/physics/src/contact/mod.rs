@@ -8,6 +8,7 @@ pub(crate) mod broad;
 mod foundation;
 mod inside;
 mod local_model;
+mod local_torque;
 mod narrow;
 mod nearest;
 mod proxy;
@@ -22,6 +23,7 @@ mod triangle;
 mod turning;
 
 pub use inside::is_inside;
+pub use local_torque::LocalTorqueModel;
 pub(crate) use nearest::{deepest_m, nearest_vertex};
 pub use proxy::SubstepTime;
 pub(crate) use resting::{Pressing, RestingContact};
@@ -452,7 +454,8 @@ impl ContactModel {
                 Coupling::Rigid => (pressed.force_n, pressed.torque_nm),
                 Coupling::Spring { .. } => (-scratch.coupling_sum_n * share, -scratch.coupling_sum_nm * share),
             };
-            let mean = MeanContact { pressed, device_force_n: tool.device_force_n };
+            let mean =
+                MeanContact { pressed, device_force_n: tool.device_force_n, device_torque_nm: tool.device_torque_nm };
             tool.local_model = local_model::update(model, tool, &mut contact.tools[index].estimate, &mean);
         }
     }

@@ -19,6 +19,7 @@ use super::{
     axis::Axis,
     broad::{Candidates, Triangles},
     foundation::{Foundation, SampleTables, TriangleSamples},
+    local_torque::Levers,
     touching::{Touch, Touching},
 };
 use glam::{DQuat, DVec3};
@@ -51,6 +52,8 @@ pub(super) struct Pressed {
     pub(super) force_n: DVec3,
     /// Torque on the tool about its centre (N m); none of a tool that does not turn.
     pub(super) torque_nm: DVec3,
+    /// Where on such a tool it is pressed.
+    pub(super) levers: Levers,
     /// Its part along the samples' normals (N).
     pub(super) normal_n: DVec3,
     /// `Σ |f_n|` (N).
@@ -82,6 +85,7 @@ impl Pressed {
     pub(super) fn add(&mut self, other: &Self) {
         self.force_n += other.force_n;
         self.torque_nm += other.torque_nm;
+        self.levers.add(&other.levers);
         self.normal_n += other.normal_n;
         self.pressing_n += other.pressing_n;
         self.sticking_n += other.sticking_n;
@@ -95,6 +99,7 @@ impl Pressed {
         Self {
             force_n: self.force_n * factor,
             torque_nm: self.torque_nm * factor,
+            levers: self.levers.scaled(factor),
             normal_n: self.normal_n * factor,
             pressing_n: self.pressing_n * factor,
             sticking_n: self.sticking_n * factor,
@@ -257,6 +262,9 @@ fn press_sample(
     pressed.force_times_k_f += f_n * samples.foundation_pa_per_m;
     pressed.force_times_modulus += f_n * samples.indentation_modulus_pa;
     pressed.normal_n -= normal * f_n;
+    if meeting.orientation.is_some() {
+        pressed.levers.push(p, normal, f_n);
+    }
     pressed.contacts += u32::from(depth_m > 0.0);
     pressed.penetration_m = pressed.penetration_m.max(meeting.radius_m - distance_m);
 

@@ -1,5 +1,5 @@
 //! What a tool is, how it follows its device, and what is reported of it.
-use super::{axis::Axis, foundation::ContactBound};
+use super::{axis::Axis, foundation::ContactBound, local_torque::LocalTorqueModel};
 use glam::{DMat3, DQuat, DVec3};
 use serde::{Deserialize, Serialize};
 
@@ -208,6 +208,8 @@ pub struct LocalContactModel {
     pub stiffness_n_per_m: DMat3,
     /// Radius inside which it may be used (m).
     pub validity_radius_m: f64,
+    /// Torque on a device whose tool turns.
+    pub torque: Option<LocalTorqueModel>,
 }
 
 impl ToolState {
@@ -251,6 +253,7 @@ impl ToolState {
             [m.point_m, m.normal, m.force_n].iter().all(|a| a.is_finite())
                 && m.stiffness_n_per_m.is_finite()
                 && m.validity_radius_m.is_finite()
+                && m.torque.is_none_or(|torque| torque.is_finite())
         });
         model
             && vectors.iter().all(|a| a.is_finite())

@@ -18,7 +18,7 @@ use super::{
 use glam::{DQuat, DVec3};
 
 /// The rotation vector (rad) of a rotation, the shorter way round: `|v| ≤ π`.
-fn rotation_vector(q: DQuat) -> DVec3 {
+pub(super) fn rotation_vector(q: DQuat) -> DVec3 {
     let q = if q.w < 0.0 { -q } else { q };
     let axis = q.xyz();
     let sine = axis.length();
