@@ -30,8 +30,10 @@ const BEAT: u8 = b'.';
 const FAREWELL: u8 = b'q';
 /// The guard's only word to the bridge: it speaks to the arm now.
 const SPOKEN: u8 = b'!';
-/// Last words that do not go out in so long do not go out.
+/// Last words to whom nobody else speaks any more, that do not go out in so long, do not go out.
 const LAST_WORDS_TAKE: Duration = Duration::from_millis(100);
+/// Between two tries to say them.
+const LOOK_EVERY: Duration = Duration::from_micros(200);
 
 /// The bridge's end. Dropped, it bids the guard farewell and waits for it.
 #[derive(Debug)]
@@ -111,50 +113,70 @@ fn watch(mut bridge: UnixStream, mut arm: File, patience: Duration) -> std::io::
     let mut words = vec![0; u32::from_be_bytes(length) as usize];
     bridge.read_exact(&mut words)?;
     let (mut heard, mut beats) = ([0; 256], false);
+    // Of the words, while it hangs: a line may be full.
+    let mut unsaid = 0;
     loop {
         match bridge.read(&mut heard) {
             // Killed.
-            Ok(0) => return say_the_last(arm, &words),
+            Ok(0) => return say_the_last(arm, &words, unsaid),
             Ok(count) if heard[..count].contains(&FAREWELL) => return Ok(()),
-            Ok(_) if !beats => {
-                beats = true;
-                bridge.set_read_timeout(Some(patience.max(Duration::from_micros(1))))?;
+            Ok(_) => {
+                if unsaid > 0 {
+                    // Half a message is worse than a late one.
+                    let _ = say(&mut arm, &words[words.len() - unsaid..], LAST_WORDS_TAKE);
+                    let _ = bridge.write_all(&[SPOKEN]);
+                    unsaid = 0;
+                }
+                if !beats {
+                    beats = true;
+                    bridge.set_read_timeout(Some(patience.max(Duration::from_micros(1))))?;
+                }
             }
-            Ok(_) => {}
             Err(error) if error.kind() == ErrorKind::Interrupted => {}
             // It hangs; should it go on, it is watched again.
             Err(error) if matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut) => {
-                // One that is gone meanwhile needs not know.
-                let _ = bridge.write_all(&[SPOKEN]);
-                say(&mut arm, &words)?;
+                // Before the words, so that no answer is earlier, and behind them, for they may take their time. One that is gone meanwhile needs not know.
+                if unsaid == 0 {
+                    let _ = bridge.write_all(&[SPOKEN]);
+                    unsaid = words.len();
+                }
+                // What an arm refuses that is gone, nobody can say to it.
+                unsaid = say(&mut arm, &words[words.len() - unsaid..], Duration::ZERO).unwrap_or(0);
+                if unsaid == 0 {
+                    let _ = bridge.write_all(&[SPOKEN]);
+                }
                 beats = false;
-                bridge.set_read_timeout(None)?;
+                bridge.set_read_timeout((unsaid > 0).then_some(LOOK_EVERY))?;
             }
-            Err(_) => return say_the_last(arm, &words),
+            Err(_) => return say_the_last(arm, &words, unsaid),
         }
     }
 }
 
-/// Nobody else listens to the arm any more.
-fn say_the_last(mut arm: File, words: &[u8]) -> std::io::Result<()> {
-    say(&mut arm, words)?;
+/// Nobody else listens to the arm any more. So many of them, which were begun, come first.
+fn say_the_last(mut arm: File, words: &[u8], unsaid: usize) -> std::io::Result<()> {
+    say(&mut arm, &words[words.len() - unsaid..], LAST_WORDS_TAKE)?;
+    say(&mut arm, words, LAST_WORDS_TAKE)?;
     tcp::hear_out(&TcpStream::from(OwnedFd::from(arm)), LAST_WORDS_TAKE);
     Ok(())
 }
 
-/// The connection may be one that does not wait.
-fn say(arm: &mut File, words: &[u8]) -> std::io::Result<()> {
+/// On a connection that may be one that does not wait, for so long at most; how many bytes are left.
+fn say(arm: &mut File, words: &[u8], patience: Duration) -> std::io::Result<usize> {
     let (began, mut said) = (Instant::now(), 0);
-    while said < words.len() && began.elapsed() < LAST_WORDS_TAKE {
+    while said < words.len() {
         match arm.write(&words[said..]) {
             Ok(count) => said += count,
             Err(error) if matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::Interrupted) => {
-                std::thread::sleep(Duration::from_micros(200));
+                if began.elapsed() >= patience {
+                    break;
+                }
+                std::thread::sleep(LOOK_EVERY);
             }
             Err(error) => return Err(error),
         }
     }
-    Ok(())
+    Ok(words.len() - said)
 }
 
 #[cfg(test)]
@@ -188,6 +210,28 @@ mod tests {
         }
     }
 
+    /// The words were given up after 0.1 s, half said perhaps, and whatever stood in the line before them was heard in their place.
+    #[test]
+    fn a_line_that_is_full_while_the_bridge_hangs_hears_the_words_when_it_listens() {
+        let (mut bridge, theirs) = UnixStream::pair().unwrap();
+        let (mut arm, mut line) = UnixStream::pair().unwrap();
+        line.set_nonblocking(true).unwrap();
+        while line.write(&[b'x'; 4096]).is_ok() {}
+        let held = File::from(OwnedFd::from(line));
+        let guard = std::thread::spawn(move || watch(theirs, held, Duration::from_millis(5)));
+        bridge.write_all(b"\0\0\0\x04stop.").unwrap();
+        std::thread::sleep(Duration::from_millis(300));
+        let mut text = String::new();
+        let mut bytes = [0; 4096];
+        while !text.ends_with("stop") {
+            let count = arm.read(&mut bytes).unwrap();
+            text.push_str(std::str::from_utf8(&bytes[..count]).unwrap());
+        }
+        bridge.write_all(b".q").unwrap();
+        guard.join().unwrap().unwrap();
+        assert_eq!(text.trim_start_matches('x'), "stop", "once, and whole");
+    }
+
     #[test]
     fn a_bridge_that_hangs_is_spoken_for_each_time() {
         let (mut bridge, arm, guard) = guarded(Duration::from_millis(20));
@@ -195,8 +239,8 @@ mod tests {
             bridge.write_all(b".").unwrap();
             std::thread::sleep(Duration::from_millis(200));
         }
-        let mut told = [0; 3];
-        assert_eq!((bridge.read(&mut told).unwrap(), &told[..2]), (2, &b"!!"[..]));
+        let mut told = [0; 8];
+        assert_eq!((bridge.read(&mut told).unwrap(), &told[..4]), (4, &b"!!!!"[..]));
         bridge.write_all(b"q").unwrap();
         guard.join().unwrap().unwrap();
         assert_eq!(heard(arm), "stopstop");

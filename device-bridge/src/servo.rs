@@ -53,11 +53,13 @@ impl Servo {
     }
 
     fn tick(&mut self, wakeup: &Wakeup, now_ns: u64) -> ControlFlow<()> {
-        if self.guard.as_mut().is_some_and(Guard::has_spoken) {
-            self.device.last_words_were_said();
-            self.law.latch(Fault::Stalled);
+        self.obey_guard();
+        let had_failed = self.shared.stats.device_fault().is_some();
+        let mut read = self.device.read(1 + wakeup.skipped);
+        if !had_failed && self.obey_guard() {
+            // What was read may be what the arm said to the guard.
+            read = self.last.map_or(read, Ok);
         }
-        let read = self.device.read(1 + wakeup.skipped);
         if let Err(fault) = read {
             self.shared.stats.set_device_fault(fault);
             self.law.trip(now_ns, Fault::Device);
@@ -71,12 +73,16 @@ impl Servo {
             self.law.receive(command);
         }
         self.obey_flags(now_ns);
-        let tick = self.law.tick(now_ns, &motion);
-        self.device.apply(&Effort { force_n: tick.limited.force_n, torque_nm: tick.torque_nm, plane: tick.plane });
+        let mut tick = self.law.tick(now_ns, &motion);
+        // Before the force, which is guarded then.
         if let Some(guard) = &mut self.guard {
             let heard = guard.beat();
             self.shared.unguarded.store(!heard, Ordering::Relaxed);
         }
+        if self.obey_guard() {
+            (tick.limited.force_n, tick.torque_nm, tick.plane) = (DVec3::ZERO, DVec3::ZERO, None);
+        }
+        self.device.apply(&Effort { force_n: tick.limited.force_n, torque_nm: tick.torque_nm, plane: tick.plane });
         self.energy.step(motion.position_m, tick.limited.force_n);
         if let Ok(reading) = read
             && reading.motion.is_finite()
@@ -90,6 +96,16 @@ impl Servo {
             Link::Latched(_) if read.is_err() || self.shared.stop.load(Ordering::Relaxed) => ControlFlow::Break(()),
             _ => ControlFlow::Continue(()),
         }
+    }
+
+    /// The guard may have spoken at any moment that this thread stood still in: the force is gone. Whether it has since this was asked last.
+    fn obey_guard(&mut self) -> bool {
+        let spoken = self.guard.as_mut().is_some_and(Guard::has_spoken);
+        if spoken {
+            self.device.last_words_were_said();
+            self.law.latch(Fault::Stalled);
+        }
+        spoken
     }
 
     /// What the clutch leaves of the force, or nothing, when none is wanted or none may be given yet.

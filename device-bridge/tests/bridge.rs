@@ -83,11 +83,11 @@ async fn a_silent_daemon_means_zero_force_until_recovered() {
 }
 
 /// The network may be as slow as it is steady: an answer to an old pose is old. The thresholds are the default ones times fifty,
-/// for busy test machines: 5 ms, 15 ms of ramp, answers 8 ms and 25 ms old.
+/// for busy test machines: 5 ms, 12 ms of ramp, answers 8 ms and 25 ms old.
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn the_delay_of_the_network_counts_as_age() {
     let (mock, bridge) = pushing(|config| {
-        (config.watchdog.stale_after_s, config.watchdog.ramp_to_zero_s) = (0.25, 0.75);
+        (config.watchdog.stale_after_s, config.watchdog.ramp_to_zero_s) = (0.25, 0.6);
         config.servo.least_success_rate = 0.0;
     })
     .await;

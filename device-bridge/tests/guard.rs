@@ -234,7 +234,7 @@ async fn the_force_is_taken_away_when_the_bridge_is_killed_or_hangs() {
     }
 }
 
-/// The arm's answers to the guard were taken for its answers to the bridge, which ended; where there were none, the whole force came back in one tick.
+/// The arm's answers to the guard were taken for its answers to the bridge, which ended.
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn a_bridge_that_hung_goes_on_and_its_force_comes_back() {
     for (name, start) in ARMS {

@@ -13,10 +13,10 @@ use palpate_bridge::{
     },
     convert::Command,
     device::{
-        self, Effort,
+        self, Effort, LastWords,
         phantom::{
             ffi::Hd,
-            frame::{Frame, Guard, Next},
+            frame::{Frame, Guard as FrameGuard, Next},
         },
     },
     emulate::{
@@ -28,13 +28,14 @@ use palpate_bridge::{
         vrpn::{self, Vrpn},
         woodenhaptics::{self, WoodenHaptics},
     },
+    guard::Guard,
     run::Shared,
     servo::{Servo, ServoLaw},
     settings::{Settings, arm},
     vrpn_server::moment::moments,
 };
 use palpate_control::{ArmSpec, ContactPlane, ForceLimits, HandPath, LocalModel, TorqueLimits};
-use palpate_realtime::{Clock, Doorbell, TickLoop, slot};
+use palpate_realtime::{Clock, Doorbell, OsMeasures, TickLoop, slot};
 use std::{
     sync::{Arc, atomic::Ordering},
     time::Duration,
@@ -57,6 +58,9 @@ fn the_servo_allocates_nothing() {
     let (told, mut moments, _bell) = moments(3).unwrap();
     let shared = Arc::new(Shared::default());
     shared.attached.store(true, Ordering::Relaxed);
+    let words = LastWords { to: std::fs::File::create("/dev/null").unwrap().into(), bytes: b"stop".to_vec() };
+    let program = std::path::Path::new(env!("CARGO_BIN_EXE_palpate-bridge"));
+    let guard = Guard::start(program, words, Duration::from_secs(60), &OsMeasures::NONE).unwrap();
     let mut servo = Servo {
         law: ServoLaw::new(settings.servo),
         device: device::open(&settings.device, 1e-3, &CancellationToken::new()).unwrap(),
@@ -68,7 +72,7 @@ fn the_servo_allocates_nothing() {
         shared: Arc::clone(&shared),
         sequence: 0,
         energy: palpate_control::EnergyMeter::default(),
-        guard: None,
+        guard: Some(guard),
     };
     let mut tick_loop = TickLoop::new(Clock::Monotonic, 1e-3).unwrap();
     let thread = std::thread::spawn(move || {
@@ -118,6 +122,9 @@ fn drive_by(config: &Config, periods: u64) {
         std::thread::sleep(Duration::from_millis(1));
         // A busy machine is late: nothing is told here of how long an answer took.
         assert_no_alloc(|| {
+            if tick == 100 {
+                arm.last_words_were_said();
+            }
             arm.read(periods).unwrap();
             // The plane moves, grows stiffer than any is, and goes now and then.
             let plane = ContactPlane {
@@ -169,7 +176,7 @@ fn a_phantoms_frame_allocates_nothing() {
     let name = std::ffi::CString::new(emulated.arm.socket().to_str().unwrap()).unwrap();
     let device = hd.init_device(Some(&name)).unwrap();
     let ((poses, mut newest), (mut efforts, efforts_out)) = (slot(&None), slot(&Effort::NONE));
-    let (guard, shared) = (Guard::new(3.0, 0.1), Arc::default());
+    let (guard, shared) = (FrameGuard::new(3.0, 0.1), Arc::default());
     let mut frame = Frame { hd, device, turns: true, guard, poses, efforts: efforts_out, shared };
     for _ in 0..100 {
         assert_no_alloc(|| {

@@ -275,7 +275,7 @@ fn automatic_recovery_counts_from_the_fault() {
     assert!((512..=515).contains(&recovered_after_ms.unwrap()), "{recovered_after_ms:?}");
 }
 
-/// Answers come all the time: a guard that spoke for a servo that stood still took the force away, and in the next tick it was whole again.
+/// Answers come all the time, and so nothing else takes this force away; a servo that stands still within a tick finds nothing late.
 #[test]
 fn a_force_that_was_taken_away_meanwhile_is_none_at_once_and_comes_back_slowly() {
     let mut law = law(|config| config.servo.auto_recover = true);

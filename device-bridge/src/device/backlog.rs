@@ -9,7 +9,7 @@ const MOST_BUFFERS: u32 = 4;
 ///
 /// Most drivers count bytes. That of USB CDC lines (`/dev/ttyACM*`) counts buffers on their way, one for each message, and each as its whole size of 20 packets
 /// (1280 bytes, or 10240 at high speed) however short the message: one is more than [`MOST_BYTES`] already. Such a line is known by what it counts
-/// when a message was put on it while it was empty: more than the message has.
+/// when a message was put on it while it was empty: more than the message has, and than a message or two of a guard.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Backlog {
     /// A buffer's size (bytes); 0 where bytes are counted, or nothing is known yet.
@@ -19,7 +19,7 @@ pub(super) struct Backlog {
 impl Backlog {
     /// An empty line was given so many bytes, and counts so many then.
     pub(super) fn learn(&mut self, given: usize, counted: u32) {
-        if counted as usize > given {
+        if counted as usize > given && counted > MOST_BYTES {
             self.buffer = counted;
         }
     }

@@ -1,4 +1,5 @@
-//! After a guard spoke to an arm that answers: its answers come, too, and nothing tells them from ours. All are dropped until the line is quiet; then the driver asks anew.
+//! After a guard spoke to an arm that answers: its answers come, too, and nothing tells them from ours. All are dropped until the line is quiet; then the driver asks anew. Meanwhile
+//! the arm has no force, which its readings tell by their share.
 use super::Fault;
 
 /// A line that is not quiet after so many times what makes it quiet never will be.
@@ -29,6 +30,11 @@ impl Drain {
         self.quiet_left > 0
     }
 
+    /// The share of the force that the arm has now.
+    pub(super) fn force_share(&self) -> f64 {
+        if self.is_on() { 0.0 } else { 1.0 }
+    }
+
     /// Whether the arm has still to be told to let go: a force may have gone out behind the guard's words.
     pub(super) fn is_to_tell(&self) -> bool {
         self.is_on() && !self.told
@@ -42,9 +48,10 @@ impl Drain {
     /// One reading, in which something came or not; whether the line is quiet now.
     ///
     /// # Errors
-    /// [`Fault::Garbled`]: it does not end.
+    /// [`Fault::Garbled`]: it does not end. [`Fault::Silent`]: it takes no word.
     pub(super) fn pass(&mut self, came: bool) -> Result<bool, Fault> {
-        self.left = self.left.checked_sub(1).ok_or(Fault::Garbled)?;
+        let endless = if self.told { Fault::Garbled } else { Fault::Silent };
+        self.left = self.left.checked_sub(1).ok_or(endless)?;
         self.quiet_left = if came || !self.told { self.wanted } else { self.quiet_left.saturating_sub(1) };
         Ok(!self.is_on())
     }
@@ -82,6 +89,9 @@ mod tests {
         drain.begin(20);
         drain.told(true);
         let readings = (0..1000).take_while(|_| drain.pass(true).is_ok()).count();
-        assert_eq!(readings, 200);
+        assert_eq!((readings, drain.pass(true)), (200, Err(Fault::Garbled)));
+        drain.begin(1);
+        let readings = (0..1000).take_while(|_| drain.pass(false).is_ok()).count();
+        assert_eq!((readings, drain.pass(false)), (10, Err(Fault::Silent)), "it was never told");
     }
 }

@@ -59,7 +59,7 @@ pub struct Reading {
     pub measured_force_n: Option<DVec3>,
     /// How long ago (s), at most, the pose was measured from which the motion goes on.
     pub age_s: f64,
-    /// Share of the force that the arm is to have: 1, but for a clutch.
+    /// Share of the force that the arm is to have: 1, but for a clutch, and where the driver asks nothing of the arm for a while.
     pub force_share: f64,
 }
 
@@ -156,6 +156,13 @@ impl Fault {
     ];
 }
 
+impl Fault {
+    /// Whether answers to somebody else may look like it.
+    fn may_be_misheard(self) -> bool {
+        matches!(self, Self::Garbled | Self::Refused)
+    }
+}
+
 /// An arm that was opened, used by the servo thread alone. Neither call may block, allocate or log.
 pub trait Arm: Debug + Send {
     /// Reads the arm. `periods` servo periods have passed since the last reading, 1 unless ticks were skipped.
@@ -172,7 +179,8 @@ pub trait Arm: Debug + Send {
         None
     }
 
-    /// They were said while this process stood still: the arm was let go, and may answer what nobody here asked. Called before a reading.
+    /// They were said while this process stood still: the arm was let go, and may answer what nobody here asked. An answer to them that the reading just before took for garbage, or for
+    /// a refusal, was none.
     fn last_words_were_said(&mut self) {}
 }
 

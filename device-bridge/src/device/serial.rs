@@ -13,6 +13,8 @@ use thiserror::Error;
 
 /// Most that is read at once.
 const CHUNK: usize = 512;
+/// More is left to the next tick: who sends so much does not hold the loop up.
+const MOST_CHUNKS: usize = 16;
 /// No message of a loop is longer.
 const LONGEST_MESSAGE: usize = 128;
 /// Never waited for: what is there is asked for first.
@@ -240,15 +242,16 @@ impl Line {
         self.finish()?;
         let mut newest = None;
         let mut bytes = [0; CHUNK];
-        loop {
+        for _ in 0..MOST_CHUNKS {
             let count = self.receive(&mut bytes)?;
             for &byte in &bytes[..count] {
                 newest = take(byte)?.or(newest);
             }
             if count < CHUNK {
-                return Ok(newest);
+                break;
             }
         }
+        Ok(newest)
     }
 
     /// Another rate (bit/s). Not for the loop.

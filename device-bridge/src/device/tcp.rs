@@ -29,7 +29,7 @@ pub fn connect(address: &str, patience: Duration) -> Result<TcpStream> {
 }
 
 /// Reads and drops what comes until the other side ends the connection, for so long at most. To be done before a connection is closed behind last words: one that is closed
-/// while something is unread is reset, and a reset takes with it what the other side has not read yet. Ends at once on what is no socket.
+/// while something is unread is reset, and who finds that when it answers the first word may hear no more. Ends at once on what is no socket.
 pub fn hear_out(mut stream: &TcpStream, patience: Duration) {
     let began = Instant::now();
     if stream.set_nonblocking(true).is_err() {
@@ -51,7 +51,7 @@ mod tests {
     use super::*;
     use std::{io::Write as _, net::TcpListener};
 
-    /// Closed at once, the connection is reset and the words are lost.
+    /// Closed at once, the connection is reset, and who answers each part of the words before it reads the next never reads that.
     #[test]
     fn last_words_arrive_whatever_was_left_unread() {
         for _ in 0..20 {

@@ -162,7 +162,7 @@ impl Placed {
             // Without a time it is there at once; 0/0 would be no number.
             self.share = if change.is_nan() { self.share } else { (self.share + change).clamp(0.0, 1.0) };
         }
-        reading.force_share = self.share;
+        reading.force_share *= self.share;
     }
 }
 

@@ -184,7 +184,7 @@ impl ServoLaw {
             self.limiter.reset();
         }
         if let Some(thermal) = &mut self.thermal {
-            // A tick that is left out holds the force longer.
+            // A force is held until the next tick, however many are left out; how long that is, is known then: the time of the last one stands for it.
             thermal.held(limited.force_n, self.passed_s);
         }
         let at = (motion.position_m, motion.velocity_m_per_s);

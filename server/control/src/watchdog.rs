@@ -23,6 +23,9 @@ pub struct WatchdogSettings {
     pub ramp_up_s: f64,
 }
 
+/// A watchdog that is more patient (s) is none.
+const LONGEST_S: f64 = 60.0;
+
 impl Default for WatchdogSettings {
     /// At 1 kHz: fresh for 2 ticks, extrapolated to 5, zero by 17, which leaves 3 for the way to the arm until 20 are missed; back within 200 ms.
     fn default() -> Self {
@@ -40,6 +43,11 @@ impl WatchdogSettings {
         positive("stale_after_s", self.stale_after_s)?;
         positive("ramp_to_zero_s", self.ramp_to_zero_s)?;
         not_negative("ramp_up_s", self.ramp_up_s)?;
+        for (name, value) in [("stale_after_s", self.stale_after_s), ("ramp_to_zero_s", self.ramp_to_zero_s)] {
+            if value > LONGEST_S {
+                return Err(ParameterError { name, value, rule: "must not be larger than 60" });
+            }
+        }
         if self.stale_after_s < self.fresh_for_s {
             let rule = "must not be smaller than fresh_for_s";
             return Err(ParameterError { name: "stale_after_s", value: self.stale_after_s, rule });
@@ -147,9 +155,10 @@ impl Watchdog {
         }
     }
 
-    /// Latches at once, for a force that is gone already. The first reason stays.
+    /// Latches at once, for a force that is gone already. The first reason stays. Where no sample was fresh enough yet for a force, none is gone, and it goes on waiting.
     pub fn latch(&mut self, fault: Fault) {
-        if self.latched.is_none() {
+        let has_force = !self.waiting || self.tripped.is_some();
+        if self.latched.is_none() && has_force {
             let first = self.tripped.map_or(fault, |(first, _)| first);
             self.level = 0.0;
             self.hold_at_zero(first);
@@ -332,6 +341,9 @@ mod tests {
         watchdog.latch(Fault::Stalled);
         assert_eq!(watchdog.check(last + 2 * MS).link, Link::Latched(Fault::Requested), "a stop that was asked for");
         assert_eq!(watchdog.faults(), 1);
+        let mut waits = Watchdog::new(WatchdogSettings::default());
+        waits.latch(Fault::Stalled);
+        assert_eq!((waits.check(MS).link, waits.faults()), (Link::Waiting, 0));
     }
 
     #[test]
@@ -351,6 +363,8 @@ mod tests {
     fn settings_out_of_order_are_refused() {
         let bad = WatchdogSettings { stale_after_s: 1e-3, ..WatchdogSettings::default() };
         assert_eq!(bad.checked().unwrap_err().name, "stale_after_s");
+        let bad = WatchdogSettings { ramp_to_zero_s: 1e20, ..WatchdogSettings::default() };
+        assert_eq!(bad.checked().unwrap_err().name, "ramp_to_zero_s");
         let bad = WatchdogSettings { ramp_to_zero_s: f64::NAN, ..WatchdogSettings::default() };
         assert_eq!(bad.checked().unwrap_err().name, "ramp_to_zero_s");
     }

@@ -87,7 +87,7 @@ fn pressed(daemon: &Daemon, arm: &Emulated, period_s: f64, recording: &Path) -> 
     Curve::of(recording, period_s)
 }
 
-/// A machine that runs tests stands still for 20 ms now and then, and then the force is gone for a quarter of a second: so often is a press tried.
+/// A machine that runs tests stands still for 17 ms now and then, and then the force is gone for 0.7 s: so often is a press tried.
 const TRIES: usize = 4;
 
 /// Presses until the force is that of `expected`, but for `most` of the peak (root mean square).

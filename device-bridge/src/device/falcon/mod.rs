@@ -259,7 +259,7 @@ impl Arm for Falcon {
             buttons: self.buttons,
             measured_force_n: None,
             age_s,
-            force_share: 1.0,
+            force_share: self.drain.force_share(),
         })
     }
 
@@ -276,6 +276,7 @@ impl Arm for Falcon {
     }
 
     fn last_words_were_said(&mut self) {
+        self.lost = self.lost.filter(|fault| !fault.may_be_misheard());
         self.drain.begin(self.silence_periods);
     }
 }

@@ -217,7 +217,7 @@ impl Arm for Haply2diy {
             buttons: 0,
             measured_force_n: None,
             age_s,
-            force_share: 1.0,
+            force_share: self.drain.force_share(),
         })
     }
 
@@ -234,6 +234,7 @@ impl Arm for Haply2diy {
     }
 
     fn last_words_were_said(&mut self) {
+        self.lost = self.lost.filter(|fault| !fault.may_be_misheard());
         self.drain.begin(self.silence_periods);
     }
 }
@@ -317,6 +318,27 @@ mod tests {
         let mut replies = Replies::new(settings.device_id);
         until("it answers", || line.newest(|byte| replies.take(byte)).unwrap().is_some());
         assert_eq!(emulated.requests(), 1);
+    }
+
+    /// The law's ramp ran on while nothing was asked of the arm, and the whole force came at once behind it.
+    #[test]
+    fn after_a_guard_spoke_there_is_no_force_until_the_line_is_quiet() {
+        let (emulated, settings) = emulated();
+        let settings = Settings { silence: Duration::from_millis(100), ..settings };
+        let mut arm = Haply2diy::start(&settings, 1e-3).unwrap();
+        // Somebody else asks, and what comes is garbage to this driver.
+        arm.line.send(&wire::request(settings.device_id, [0.0; 2])).unwrap();
+        arm.lost = Some(Fault::Garbled);
+        arm.last_words_were_said();
+        let mut shares = Vec::new();
+        for _ in 0..400 {
+            shares.push(arm.read(1).unwrap().force_share);
+            arm.apply(&Effort::force(DVec3::X * shares[shares.len() - 1]));
+            std::thread::sleep(Duration::from_millis(1));
+        }
+        let none = shares.iter().take_while(|share| **share == 0.0).count();
+        assert!((100..300).contains(&none) && shares[none..].iter().all(|share| *share == 1.0), "{none}");
+        until("it has the newest force", || emulated.force_n().distance(DVec3::X) < 0.05);
     }
 
     #[test]

@@ -26,6 +26,8 @@ use tokio_util::sync::CancellationToken;
 
 /// Name of our effect on the arm.
 pub const EFFECT: &str = "palpate";
+/// So much is dropped in a tick at most: who sends more does not hold the loop up.
+const MOST_READS: usize = 8;
 /// How long the end of the program waits for the arm to take the force away.
 const FAREWELL: Duration = Duration::from_millis(100);
 
@@ -145,7 +147,7 @@ impl HapticMaster {
     /// Drops what has come; when that ends, nothing is on its way.
     fn drop_answers(&mut self) -> Result<(), Fault> {
         let mut came = false;
-        loop {
+        for _ in 0..MOST_READS {
             match self.stream.read(&mut [0; 1024]) {
                 Ok(0) => return Err(Fault::Disconnected),
                 Ok(_) => came = true,
@@ -226,7 +228,7 @@ impl HapticMaster {
                 Err(_) => return Err(Fault::Disconnected),
             }
         }
-        self.drain.told(self.asked == Asked::Nobody);
+        self.drain.told(self.asked == Asked::Nobody && self.sent == self.request.len());
         Ok(())
     }
 
@@ -250,7 +252,7 @@ impl Arm for HapticMaster {
         }
         let age_s = self.age_periods as f64 * self.period_s;
         self.shown = extrapolate(&self.reading.motion, age_s, LONGEST_EXTRAPOLATION_S);
-        Ok(Reading { motion: self.shown, age_s, ..self.reading })
+        Ok(Reading { motion: self.shown, age_s, force_share: self.drain.force_share(), ..self.reading })
     }
 
     /// A lost arm is still told to let go, should it hear.
@@ -268,6 +270,7 @@ impl Arm for HapticMaster {
     }
 
     fn last_words_were_said(&mut self) {
+        self.lost = self.lost.filter(|fault| !fault.may_be_misheard());
         self.drain.begin(self.silence_periods);
         if let Some(plane) = &mut self.plane {
             plane.was_disabled();

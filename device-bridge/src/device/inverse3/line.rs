@@ -4,7 +4,7 @@
 //! milliseconds, or nothing would be heard of the arm. At most one command is on its way, but for the one that lets go: that waits for nothing.
 //! A state is as old as the command it answers; one that nobody asked for came since the socket was last seen empty.
 use super::{Dialect, wire};
-use crate::device::Fault;
+use crate::device::{Fault, share::Share};
 use glam::DVec3;
 use palpate_realtime::{Doorbell, SlotReader, SlotWriter};
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
@@ -60,6 +60,8 @@ pub struct Line {
     states: SlotWriter<Result<Told, Fault>>,
     bell: Doorbell,
     force_n: DVec3,
+    /// Of what the loop says: none while it is silent, and then it comes back slowly.
+    share: Share,
     sent_n: DVec3,
     /// When the commands that are not answered yet were sent.
     asked: VecDeque<Instant>,
@@ -95,6 +97,7 @@ impl Line {
             states,
             bell,
             force_n,
+            share: Share::ALL,
             sent_n: force_n,
             asked,
             empty_at,
@@ -129,8 +132,10 @@ impl Line {
     fn turn(&mut self, now: Instant) -> Result<(), Fault> {
         let new_n = self.forces.take().copied();
         if let Some(force_n) = new_n {
-            (self.force_n, self.heard_at) = (force_n, now);
+            self.share.pass(true);
+            (self.force_n, self.heard_at) = (force_n * self.share.now(), now);
         } else if now.duration_since(self.heard_at) > self.silence {
+            self.share.pass(false);
             self.force_n = DVec3::ZERO;
         }
         self.receive(now)?;
