@@ -60,7 +60,7 @@ fn the_servo_allocates_nothing() {
     shared.attached.store(true, Ordering::Relaxed);
     let words = LastWords { to: std::fs::File::create("/dev/null").unwrap().into(), bytes: b"stop".to_vec() };
     let program = std::path::Path::new(env!("CARGO_BIN_EXE_palpate-bridge"));
-    let guard = Guard::start(program, words, Duration::from_secs(60), &OsMeasures::NONE).unwrap();
+    let guard = Guard::start(program, words, Duration::from_mins(1), &OsMeasures::NONE).unwrap();
     let mut servo = Servo {
         law: ServoLaw::new(settings.servo),
         device: device::open(&settings.device, 1e-3, &CancellationToken::new()).unwrap(),
