@@ -81,6 +81,16 @@ impl Guard {
     }
 }
 
+#[cfg(test)]
+impl Guard {
+    /// One that a test speaks for.
+    pub(crate) fn spoken_for() -> (Self, UnixStream) {
+        let (socket, theirs) = UnixStream::pair().unwrap();
+        socket.set_nonblocking(true).unwrap();
+        (Self { socket, child: Command::new("true").spawn().unwrap() }, theirs)
+    }
+}
+
 impl Drop for Guard {
     fn drop(&mut self) {
         let _ = self.socket.set_nonblocking(false);

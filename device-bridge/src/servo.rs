@@ -54,9 +54,8 @@ impl Servo {
 
     fn tick(&mut self, wakeup: &Wakeup, now_ns: u64) -> ControlFlow<()> {
         self.obey_guard();
-        let had_failed = self.shared.stats.device_fault().is_some();
         let mut read = self.device.read(1 + wakeup.skipped);
-        if !had_failed && self.obey_guard() {
+        if self.obey_guard() && !self.has_failed() {
             // What was read may be what the arm said to the guard.
             read = self.last.map_or(read, Ok);
         }
@@ -102,10 +101,17 @@ impl Servo {
     fn obey_guard(&mut self) -> bool {
         let spoken = self.guard.as_mut().is_some_and(Guard::has_spoken);
         if spoken {
-            self.device.last_words_were_said();
+            // An arm that was lost before stays so.
+            if !self.has_failed() {
+                self.device.last_words_were_said();
+            }
             self.law.latch(Fault::Stalled);
         }
         spoken
+    }
+
+    fn has_failed(&self) -> bool {
+        self.shared.stats.device_fault().is_some()
     }
 
     /// What the clutch leaves of the force, or nothing, when none is wanted or none may be given yet.
@@ -179,6 +185,7 @@ mod tests {
     use super::*;
     use crate::{Config, device::Witness, settings::Settings};
     use palpate_realtime::{Clock, slot};
+    use std::io::Write as _;
 
     /// A servo in full force on an arm that a test looks at, and panics at its `reads`-th reading.
     fn pressed(reads: u64) -> (Servo, Arc<Witness>, SlotWriter<Option<Command>>) {
@@ -253,6 +260,41 @@ mod tests {
         assert!(witness.force_n() > 0.5 && tick(&mut servo).is_continue());
         let ticks = (0..30).take_while(|_| tick(&mut servo).is_continue()).count();
         assert!((10..=20).contains(&ticks) && witness.force_n() == 0.0, "{ticks} ticks, {} N", witness.force_n());
+    }
+
+    /// A force that the law still thinks of, behind the guard's words, would be a blow.
+    #[tokio::test]
+    async fn after_the_guard_spoke_there_is_no_force_at_once() {
+        let (mut servo, witness, _commands) = pressed(u64::MAX);
+        let (guard, mut theirs) = Guard::spoken_for();
+        servo.guard = Some(guard);
+        let wakeup = Wakeup { tick: 0, deadline_ns: 0, woke_ns: 0, skipped: 0, overrun: false };
+        for _ in 0..3 {
+            assert!(servo.tick(&wakeup, Clock::Monotonic.now_ns()).is_continue());
+        }
+        assert!(witness.force_n() > 0.5, "{} N", witness.force_n());
+        theirs.write_all(b"!").unwrap();
+        for _ in 0..3 {
+            assert!(servo.tick(&wakeup, Clock::Monotonic.now_ns()).is_continue());
+            assert_eq!((witness.force_n(), servo.shared.stats.link()), (0.0, Link::Latched(Fault::Stalled)));
+        }
+        assert_eq!(witness.times_let_go(), 1);
+    }
+
+    /// It would have been asked anew, and its bridge never ended.
+    #[tokio::test]
+    async fn an_arm_that_was_lost_stays_lost_when_the_guard_speaks() {
+        let (mut servo, witness, _commands) = pressed(u64::MAX);
+        let (guard, mut theirs) = Guard::spoken_for();
+        servo.guard = Some(guard);
+        let wakeup = Wakeup { tick: 0, deadline_ns: 0, woke_ns: 0, skipped: 0, overrun: false };
+        assert!(servo.tick(&wakeup, Clock::Monotonic.now_ns()).is_continue());
+        witness.fail();
+        assert!(servo.tick(&wakeup, Clock::Monotonic.now_ns()).is_continue(), "the ramp comes first");
+        theirs.write_all(b"!").unwrap();
+        assert!(servo.tick(&wakeup, Clock::Monotonic.now_ns()).is_break());
+        assert_eq!((witness.force_n(), servo.shared.stats.link()), (0.0, Link::Latched(Fault::Device)));
+        assert_eq!(witness.times_let_go(), 0);
     }
 
     #[tokio::test]

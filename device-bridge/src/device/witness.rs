@@ -14,6 +14,7 @@ pub struct Witness {
     panics_at: u64,
     reads: AtomicU64,
     fails: AtomicBool,
+    let_go: AtomicU64,
     reading: Mutex<Reading>,
     /// Force now, and the largest so far (N).
     force_n: Mutex<(f64, f64)>,
@@ -25,6 +26,7 @@ impl Witness {
             panics_at: reading,
             reads: 0.into(),
             fails: false.into(),
+            let_go: 0.into(),
             reading: Self::at_rest().into(),
             force_n: (0.0, 0.0).into(),
         }
@@ -45,6 +47,11 @@ impl Witness {
 
     pub(crate) fn fail(&self) {
         self.fails.store(true, Ordering::Relaxed);
+    }
+
+    /// How often it was told that its last words were said.
+    pub(crate) fn times_let_go(&self) -> u64 {
+        self.let_go.load(Ordering::Relaxed)
     }
 
     pub(crate) fn peak_n(&self) -> f64 {
@@ -69,5 +76,9 @@ impl Arm for Arc<Witness> {
 
     fn apply(&mut self, effort: &Effort) {
         self.hold(effort.force_n);
+    }
+
+    fn last_words_were_said(&mut self) {
+        self.let_go.fetch_add(1, Ordering::Relaxed);
     }
 }
