@@ -1,6 +1,6 @@
 //! After a guard spoke to an arm that answers: its answers come, too, and nothing tells them from ours. All are dropped until the line is quiet; then the driver asks anew. Meanwhile
 //! the arm has no force, which its readings tell by their share.
-use super::Fault;
+use super::{Fault, serial::Line};
 
 /// A line that is not quiet after so many times what makes it quiet never will be.
 const MOST: u64 = 10;
@@ -35,12 +35,7 @@ impl Drain {
         if self.is_on() { 0.0 } else { 1.0 }
     }
 
-    /// Whether the arm has still to be told to let go: a force may have gone out behind the guard's words.
-    pub(super) fn is_to_tell(&self) -> bool {
-        self.is_on() && !self.told
-    }
-
-    /// Whether it was told now.
+    /// Whether the arm was told once more to let go: a force may have gone out behind the guard's words.
     pub(super) fn told(&mut self, sent: bool) {
         self.told |= sent;
     }
@@ -54,6 +49,29 @@ impl Drain {
         self.left = self.left.checked_sub(1).ok_or(endless)?;
         self.quiet_left = if came || !self.told { self.wanted } else { self.quiet_left.saturating_sub(1) };
         Ok(!self.is_on())
+    }
+}
+
+/// The same on a serial line.
+impl Drain {
+    /// Drops what has come; whether the line is quiet now.
+    ///
+    /// # Errors
+    /// As [`Drain::pass`], and [`Fault::Disconnected`].
+    pub(super) fn hear(&mut self, line: &mut Line) -> Result<bool, Fault> {
+        let came = line.newest(|_| Ok(Some(())))?.is_some();
+        self.pass(came)
+    }
+
+    /// Tells the arm, unless it was told.
+    ///
+    /// # Errors
+    /// [`Fault::Disconnected`].
+    pub(super) fn tell(&mut self, line: &mut Line, nothing: &[u8]) -> Result<(), Fault> {
+        if !self.told {
+            self.told = line.send(nothing)?;
+        }
+        Ok(())
     }
 }
 
@@ -80,7 +98,7 @@ mod tests {
             drain.told(told);
             assert_eq!(drain.pass(came), Ok(quiet));
         }
-        assert!(!drain.is_on() && !drain.is_to_tell());
+        assert!(!drain.is_on());
     }
 
     #[test]

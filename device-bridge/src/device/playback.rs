@@ -3,8 +3,8 @@
 //! It lives in servo time. Between two rows position follows the cubic of Hermite, from their positions and velocities, orientation the shorter arc (slerp).
 use super::{Arm, Effort, Fault, Reading};
 use crate::recording::read::{self, Pose, RecordingError};
-use glam::{DQuat, DVec3};
-use palpate_control::Motion;
+use glam::DQuat;
+use palpate_control::{Motion, turn_rad};
 use std::path::PathBuf;
 
 /// After a pause longer than this (periods) the arm goes on from where it was.
@@ -120,23 +120,20 @@ fn back(from: &Motion, to: &Motion, time_s: f64, duration_s: f64) -> Motion {
     let s = time_s / duration_s;
     let blend = s * s * s * (10.0 + s * (-15.0 + 6.0 * s));
     let rate_per_s = 30.0 * s * s * (1.0 - s) * (1.0 - s) / duration_s;
-    let mut turn = to.orientation * from.orientation.inverse();
-    if turn.w < 0.0 {
-        turn = -turn;
-    }
-    let turn_rad: DVec3 = turn.to_scaled_axis();
+    let turn = turn_rad(from.orientation, to.orientation);
     let way_m = to.position_m - from.position_m;
     Motion {
         position_m: from.position_m + blend * way_m,
-        orientation: (DQuat::from_scaled_axis(blend * turn_rad) * from.orientation).normalize(),
+        orientation: (DQuat::from_scaled_axis(blend * turn) * from.orientation).normalize(),
         velocity_m_per_s: rate_per_s * way_m,
-        angular_velocity_rad_per_s: rate_per_s * turn_rad,
+        angular_velocity_rad_per_s: rate_per_s * turn,
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use glam::DVec3;
     use proptest::prelude::*;
 
     fn settings(speed: f64, repeat: bool) -> Settings {

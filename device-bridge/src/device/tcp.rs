@@ -7,6 +7,8 @@ use std::{
 
 /// Between two looks at whether more has come.
 const LOOK_EVERY: Duration = Duration::from_micros(200);
+/// So often is read at once, at most: who sends more does not hold a loop up.
+const MOST_READS: usize = 8;
 
 /// Connects to the first of the address's places that answers; writes wait as long, at most.
 ///
@@ -30,20 +32,32 @@ pub fn connect(address: &str, patience: Duration) -> Result<TcpStream> {
 
 /// Reads and drops what comes until the other side ends the connection, for so long at most. To be done before a connection is closed behind last words: one that is closed
 /// while something is unread is reset, and who finds that when it answers the first word may hear no more. Ends at once on what is no socket.
-pub fn hear_out(mut stream: &TcpStream, patience: Duration) {
+pub fn hear_out(stream: &TcpStream, patience: Duration) {
     let began = Instant::now();
     if stream.set_nonblocking(true).is_err() {
         return;
     }
-    while began.elapsed() < patience {
+    while began.elapsed() < patience && drop_what_came(stream).is_ok() {
+        std::thread::sleep(LOOK_EVERY);
+    }
+}
+
+/// Reads and drops what has come on a connection that does not wait, and not all of it where it comes without a pause; whether anything had.
+///
+/// # Errors
+/// The other side ended the connection, or it broke.
+pub fn drop_what_came(mut stream: &TcpStream) -> Result<bool> {
+    let mut came = false;
+    for _ in 0..MOST_READS {
         match stream.read(&mut [0; 1024]) {
-            Ok(0) => return,
-            Ok(_) => {}
-            Err(error) if error.kind() == ErrorKind::WouldBlock => std::thread::sleep(LOOK_EVERY),
+            Ok(0) => return Err(ErrorKind::UnexpectedEof.into()),
+            Ok(_) => came = true,
+            Err(error) if error.kind() == ErrorKind::WouldBlock => break,
             Err(error) if error.kind() == ErrorKind::Interrupted => {}
-            Err(_) => return,
+            Err(error) => return Err(error),
         }
     }
+    Ok(came)
 }
 
 #[cfg(test)]

@@ -46,6 +46,12 @@ pub fn extrapolate(motion: &Motion, after_s: f64, longest_s: f64) -> Motion {
     }
 }
 
+/// The rotation vector (rad) that turns one orientation into another, the shorter way round: `exp(θ) from = ± to`.
+pub fn turn_rad(from: DQuat, to: DQuat) -> DVec3 {
+    let by = to * from.conjugate();
+    (if by.w < 0.0 { -by } else { by }).to_scaled_axis()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

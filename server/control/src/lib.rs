@@ -24,7 +24,7 @@ pub mod watchdog;
 pub use contact_plane::ContactPlane;
 pub use coupling::VirtualCoupling;
 pub use energy::EnergyMeter;
-pub use extrapolate::{Motion, extrapolate};
+pub use extrapolate::{Motion, extrapolate, turn_rad};
 pub use gain::StiffnessBound;
 pub use limits::{ForceLimiter, ForceLimits, Limited};
 pub use link_quality::SuccessRate;

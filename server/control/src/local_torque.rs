@@ -1,5 +1,6 @@
 //! The torque of a contact on a tool that turns, rendered beside the arm between two messages of the daemon.
 use crate::{
+    extrapolate::turn_rad,
     limits::clamp_length,
     local_model::{RenderSettings, age_weight, bounded, distance_weight},
     torque::LEVER_M,
@@ -45,9 +46,7 @@ impl LocalTorque {
         if !orientation.is_finite() {
             return DVec3::ZERO;
         }
-        let by = orientation * self.orientation.conjugate();
-        // The shorter way round.
-        let turn = (if by.w < 0.0 { -by } else { by }).to_scaled_axis();
+        let turn = turn_rad(self.orientation, orientation);
         let angle_rad = turn.length();
         let share = (self.validity_angle_rad / angle_rad).min(1.0);
         let stiffness = bounded(&self.stiffness_nm_per_rad, settings.max_stiffness_n_per_m * LEVER_M * LEVER_M);

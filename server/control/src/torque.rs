@@ -1,6 +1,6 @@
 //! What an arm may be asked for in torque, and how the servo renders it.
 use crate::{
-    extrapolate::Motion,
+    extrapolate::{Motion, turn_rad},
     limits::{ForceLimiter, ForceLimits},
     parameter::{ParameterError, not_negative, positive},
     passivity::{PassivityController, PassivitySettings},
@@ -145,9 +145,7 @@ impl TorqueLaw {
             return;
         };
         if let Some(last) = self.last {
-            let by = now * last.conjugate();
-            let by = if by.w < 0.0 { -by } else { by };
-            self.turned_rad += by.to_scaled_axis();
+            self.turned_rad += turn_rad(last, now);
         }
         self.last = Some(now);
     }

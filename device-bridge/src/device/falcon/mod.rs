@@ -175,9 +175,8 @@ impl Falcon {
 
     /// Drops what has come; when that ends, nothing is on its way.
     fn drop_frames(&mut self) -> Result<(), Fault> {
-        let came = self.line.newest(|_| Ok(Some(())))?.is_some();
         self.quiet_periods = 0;
-        if self.drain.pass(came)? {
+        if self.drain.hear(&mut self.line)? {
             self.requests.forget();
             self.frames = Frames::default();
         }
@@ -212,11 +211,7 @@ impl Falcon {
     /// τ = Jᵀ F, as units.
     fn send(&mut self) -> Result<(), Fault> {
         if self.drain.is_on() {
-            if self.drain.is_to_tell() {
-                let sent = self.line.send(&Frame { numbers: [0; 3], flags: FLAGS }.bytes())?;
-                self.drain.told(sent);
-            }
-            return Ok(());
+            return self.drain.tell(&mut self.line, &Frame { numbers: [0; 3], flags: FLAGS }.bytes());
         }
         if self.quiet_periods > LOST_AFTER_PERIODS {
             self.requests.forget();

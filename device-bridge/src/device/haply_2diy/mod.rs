@@ -134,9 +134,8 @@ impl Haply2diy {
 
     /// Drops what has come; when that ends, nothing is on its way.
     fn drop_answers(&mut self) -> Result<(), Fault> {
-        let came = self.line.newest(|_| Ok(Some(())))?.is_some();
         self.quiet_periods = 0;
-        if self.drain.pass(came)? {
+        if self.drain.hear(&mut self.line)? {
             self.requests.forget();
             self.replies = Replies::new(self.settings.device_id);
         }
@@ -165,11 +164,7 @@ impl Haply2diy {
     /// τ = Jᵀ F, when the last request is answered, or the arm is lost.
     fn send(&mut self) -> Result<(), Fault> {
         if self.drain.is_on() {
-            if self.drain.is_to_tell() {
-                let sent = self.line.send(&wire::request(self.settings.device_id, [0.0; 2]))?;
-                self.drain.told(sent);
-            }
-            return Ok(());
+            return self.drain.tell(&mut self.line, &wire::request(self.settings.device_id, [0.0; 2]));
         }
         if self.requests.unanswered() > 0 && self.lost.is_none() {
             return Ok(());

@@ -26,8 +26,6 @@ use tokio_util::sync::CancellationToken;
 
 /// Name of our effect on the arm.
 pub const EFFECT: &str = "palpate";
-/// So much is dropped in a tick at most: who sends more does not hold the loop up.
-const MOST_READS: usize = 8;
 /// How long the end of the program waits for the arm to take the force away.
 const FAREWELL: Duration = Duration::from_millis(100);
 
@@ -146,16 +144,7 @@ impl HapticMaster {
 
     /// Drops what has come; when that ends, nothing is on its way.
     fn drop_answers(&mut self) -> Result<(), Fault> {
-        let mut came = false;
-        for _ in 0..MOST_READS {
-            match self.stream.read(&mut [0; 1024]) {
-                Ok(0) => return Err(Fault::Disconnected),
-                Ok(_) => came = true,
-                Err(error) if error.kind() == ErrorKind::WouldBlock => break,
-                Err(error) if error.kind() == ErrorKind::Interrupted => {}
-                Err(_) => return Err(Fault::Disconnected),
-            }
-        }
+        let came = tcp::drop_what_came(&self.stream).map_err(|_| Fault::Disconnected)?;
         self.quiet_periods = 0;
         if self.drain.pass(came)? {
             self.asked = Asked::Nothing;

@@ -19,11 +19,12 @@
 //! The stiffness is `−K_n nnᵀ − K_t (I − nnᵀ)`: symmetric, negative semi-definite, never stiffer than the coupling, and
 //! smoothed over some ten ticks. A tool that turns has a torque, too ([`super::local_torque`]).
 use super::{
-    Coupling, LocalContactModel, LocalTorqueModel, ToolModel, ToolState,
+    Capsule, Coupling, LocalContactModel, LocalTorqueModel, ToolModel, ToolState,
     local_torque::{self, Springs},
     narrow::Pressed,
     turning::rotation_vector,
 };
+use crate::fem::element::outer;
 use glam::{DMat3, DVec3};
 use serde::{Deserialize, Serialize};
 use std::f64::consts::PI;
@@ -141,39 +142,25 @@ pub(super) fn update(
     estimate.learn(tool.centre_m + arm_m, normal, pressed.normal_n.dot(normal), prior, model.spec.radius_m);
     let contact = prior * estimate.log_correction.exp();
     let sticking = TANGENTIAL_RATIO * contact * pressed.sticking_n / force_n;
-    let translating = match model.spec.coupling {
-        Coupling::Rigid => f64::INFINITY,
-        Coupling::Spring { stiffness_n_per_m, .. } => stiffness_n_per_m,
-    };
-    let coupling = match (model.spec.coupling, model.spec.shape.as_capsule()) {
-        (Coupling::Rigid, _) => f64::INFINITY,
-        (Coupling::Spring { stiffness_n_per_m, .. }, None) => stiffness_n_per_m,
-        (Coupling::Spring { stiffness_n_per_m, .. }, Some(capsule)) => {
-            let lever_sq = arm_m.cross(normal).length_squared();
-            stiffness_n_per_m / (1.0 + lever_sq * stiffness_n_per_m / capsule.turning.stiffness_nm_per_rad)
-        }
-    };
+    let (moving, turning) = coupling_stiffnesses(model);
+    // 1/K_vc + |p × n|²/K_r
+    let coupling = series(moving, turning / arm_m.cross(normal).length_squared());
     estimate.smooth(series(contact, coupling), series(sticking, coupling));
     let (k_n, k_t) = (estimate.normal_n_per_m, estimate.tangential_n_per_m);
-    let across = DMat3::from_cols(normal * normal.x, normal * normal.y, normal * normal.z);
-    let stiffness_n_per_m = across * (k_t - k_n) - DMat3::from_diagonal(DVec3::splat(k_t));
+    let stiffness_n_per_m = outer(normal, normal) * (k_t - k_n) - DMat3::from_diagonal(DVec3::splat(k_t));
     // Hertz's force, linearised about δ = a²/R, is wrong by (3/8)(r/δ)² of itself at a distance r: 5 % at r = 0.35 δ. The device
     // moves further than the tool, by the coupling's stretch.
     let half_width_m = half_width_m(model, contact_radius_m);
     let body_radius_m = 0.35 * half_width_m * half_width_m / model.spec.radius_m;
     let validity_radius_m = body_radius_m * (contact / series(contact, coupling));
     let validity_radius_m = validity_radius_m.clamp(0.02 * model.spec.radius_m, model.spec.radius_m);
-    let springs = |turning_nm_per_rad| Springs {
-        normal_n_per_m: contact,
-        coupled_n_per_m: (series(contact, translating), series(sticking, translating)),
-        turning_nm_per_rad,
-    };
     let torque = model.spec.shape.as_capsule().map(|capsule| {
-        let turning_nm_per_rad = match model.spec.coupling {
-            Coupling::Rigid => f64::INFINITY,
-            Coupling::Spring { .. } => capsule.turning.stiffness_nm_per_rad,
+        let springs = Springs {
+            normal_n_per_m: contact,
+            coupled_n_per_m: (series(contact, moving), series(sticking, moving)),
+            turning_nm_per_rad: turning,
         };
-        let k_theta = local_torque::stiffness_nm_per_rad(pressed, &springs(turning_nm_per_rad));
+        let k_theta = local_torque::stiffness_nm_per_rad(pressed, &springs);
         estimate.turning_nm_per_rad += (k_theta - estimate.turning_nm_per_rad) * SMOOTHING;
         let stiffness_nm_per_rad = -estimate.turning_nm_per_rad;
         LocalTorqueModel {
@@ -191,6 +178,17 @@ pub(super) fn update(
         validity_radius_m,
         torque,
     })
+}
+
+/// `K_vc` (N/m) and `K_r` (N m/rad): infinite where the device holds the tool itself, and a tool that does not turn.
+fn coupling_stiffnesses(model: &ToolModel) -> (f64, f64) {
+    let turning = |capsule: &Capsule| capsule.turning.stiffness_nm_per_rad;
+    match model.spec.coupling {
+        Coupling::Rigid => (f64::INFINITY, f64::INFINITY),
+        Coupling::Spring { stiffness_n_per_m, .. } => {
+            (stiffness_n_per_m, model.spec.shape.as_capsule().map_or(f64::INFINITY, turning))
+        }
+    }
 }
 
 /// Of a disc as large as the tool's outline (m).
@@ -248,10 +246,10 @@ fn torque_at_end_of_tick(
     }
 }
 
-/// Stiffness of two springs in series; either may be zero or infinite.
+/// Stiffness of two springs in series; any may be zero or infinite.
 fn series(a: f64, b: f64) -> f64 {
     let (soft, stiff) = (a.min(b), a.max(b));
-    if soft <= 0.0 { 0.0 } else { soft / (1.0 + soft / stiff) }
+    if soft <= 0.0 || soft.is_infinite() { soft.max(0.0) } else { soft / (1.0 + soft / stiff) }
 }
 
 #[cfg(test)]
@@ -264,6 +262,7 @@ mod tests {
         assert_eq!(series(2.0, f64::INFINITY), 2.0);
         assert_eq!(series(0.0, 5.0), 0.0);
         assert_eq!(series(0.0, f64::INFINITY), 0.0);
+        assert_eq!(series(f64::INFINITY, f64::INFINITY), f64::INFINITY);
     }
 
     #[test]

@@ -13,6 +13,7 @@
 //! symmetric, positive semi-definite, never stiffer than `K_r`. An elastic body resists tilting more than its pressure's spread says (a flat punch on a half space twice as much), a
 //! foundation just as much: the model is up to a third too soft (`tests/local_model.rs`), which only delays, and a softer spring is stabler. What the tool's way does to the torque, and its turn to the force, is left to the next tick.
 use super::narrow::Pressed;
+use crate::fem::element::outer;
 use glam::{DMat3, DQuat, DVec3};
 use serde::{Deserialize, Serialize};
 
@@ -64,8 +65,8 @@ impl Levers {
     pub(super) fn push(&mut self, p: DVec3, normal: DVec3, f_n: f64) {
         let lever_m = p.cross(normal);
         self.sum_nm += f_n * lever_m;
-        self.square += f_n * outer(lever_m);
-        self.reach += f_n * (DMat3::from_diagonal(DVec3::splat(p.length_squared())) - outer(p));
+        self.square += f_n * outer(lever_m, lever_m);
+        self.reach += f_n * (DMat3::from_diagonal(DVec3::splat(p.length_squared())) - outer(p, p));
     }
 
     pub(super) fn add(&mut self, other: &Self) {
@@ -95,7 +96,7 @@ pub(super) fn stiffness_nm_per_rad(pressed: &Pressed, springs: &Springs) -> DMat
     let weight = 1.0 / pressed.pressing_n;
     let (mean_m, square) = (pressed.levers.sum_nm * weight, pressed.levers.square * weight);
     let (k_n, k_t) = springs.coupled_n_per_m;
-    let at_one_place = outer(mean_m);
+    let at_one_place = outer(mean_m, mean_m);
     let along = pressed.levers.reach * weight - square;
     // C = k_n ⟨l⟩⟨l⟩ᵀ + K_n (⟨l lᵀ⟩ − ⟨l⟩⟨l⟩ᵀ) + k_t ⟨(p·p) I − p pᵀ − l lᵀ⟩
     let contact = at_one_place * k_n + (square - at_one_place) * springs.normal_n_per_m + along * k_t;
@@ -107,10 +108,6 @@ pub(super) fn stiffness_nm_per_rad(pressed: &Pressed, springs: &Springs) -> DMat
 /// Angle (rad) that moves an end of the tool as far as the force may be extrapolated.
 pub(super) fn validity_angle_rad(radius_m: f64, half_length_m: f64) -> f64 {
     (radius_m / half_length_m).min(LARGEST_ANGLE_RAD)
-}
-
-fn outer(v: DVec3) -> DMat3 {
-    DMat3::from_cols(v * v.x, v * v.y, v * v.z)
 }
 
 #[cfg(test)]
