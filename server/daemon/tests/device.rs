@@ -1,11 +1,9 @@
 //! An arm over a real socket: force when it presses, safety when it does not.
 #![allow(clippy::unwrap_used, clippy::expect_used)]
 mod common;
-use common::{Arm, Daemon, SIZE_M, above, block_scene, force_of, hello, pressing, sample};
+use common::{Arm, Daemon, above, block_scene, force_of, hello, pressing, sample};
 use glam::DVec3;
-use palpate_physics::contact::ToolShape;
 use palpate_proto::v1::{self, DeviceFaultCode, device_down::Message, device_up};
-use palpated::serve::ServeConfig;
 use tonic::Code;
 
 #[tokio::test(flavor = "multi_thread")]
@@ -41,64 +39,6 @@ async fn a_pressed_block_pushes_back_within_the_limits() {
     let status = daemon.status().await;
     assert_eq!(status.devices.len(), 1);
     assert!(status.devices[0].samples_accepted > 800 && status.devices[0].samples_rejected == 0);
-    daemon.finish().await;
-}
-
-/// A capsule that lies across the block's edge: its torque comes as far as arm and daemon allow, and an arm without motors for it gets none.
-#[tokio::test(flavor = "multi_thread")]
-async fn a_capsule_across_the_edge_is_turned_back() {
-    let mut scene = block_scene("block", 4);
-    let tool = &mut scene.model.tools[0];
-    tool.shape = ToolShape::capsule(tool.coupling, tool.radius_m, 0.02, DVec3::X);
-    let daemon = Daemon::on(scene).await;
-    for max_torque_nm in [0.1, 0.0, 1e-3] {
-        let mut arm = daemon.attach(v1::DeviceHello { max_torque_nm, ..hello() }).await;
-        let welcome = arm.welcome().await;
-        assert_eq!((welcome.tool_half_length_m, welcome.limits.unwrap().max_torque_nm), (0.02, max_torque_nm));
-        let half = std::f64::consts::FRAC_1_SQRT_2;
-        let mut hold = async |position_m: DVec3, enough: &dyn Fn(&v1::DeviceCommand) -> bool| {
-            for _ in 0..5000 {
-                arm.sequence += 1;
-                let mut lying = sample(arm.sequence, position_m);
-                lying.pose.as_mut().unwrap().orientation = Some(v1::Quaternion { w: half, x: 0.0, y: half, z: 0.0 });
-                arm.send(lying).await;
-                let command = arm.command(&mut Vec::new()).await;
-                if enough(&command) {
-                    return command;
-                }
-            }
-            panic!("never enough");
-        };
-        let beside = DVec3::X * 0.5 * SIZE_M.x;
-        hold(above() + beside, &|command| command.sample_sequence > 20).await;
-        let torque_nm = |command: &v1::DeviceCommand| {
-            let torque = command.wrench.unwrap().torque_nm.unwrap();
-            DVec3::new(torque.x, torque.y, torque.z)
-        };
-        let floor_nm = 2e-4_f64.min(0.9 * max_torque_nm);
-        let enough = |command: &v1::DeviceCommand| force_of(command).z > 0.1 && torque_nm(command).y >= floor_nm;
-        let pressed = hold(pressing() + beside, &enough).await;
-        assert!(torque_nm(&pressed).length() <= max_torque_nm + 1e-15, "{pressed:?}");
-        let turned = pressed.proxy_orientation.unwrap();
-        assert!((turned.w - half).abs() < 0.1 && turned.w != half, "{turned:?}");
-        // Beside the arm the same torque, and what it becomes as the arm turns on.
-        let model = pressed.local_model.as_ref().unwrap().torque.as_ref();
-        assert_eq!(model.is_some(), max_torque_nm > 0.0);
-        if let Some(model) = model {
-            let told = model.torque_nm.unwrap();
-            assert!(DVec3::new(told.x, told.y, told.z).distance(torque_nm(&pressed)) < 1e-12, "{pressed:?}");
-            assert!(
-                model.stiffness_nm_per_rad.as_ref().unwrap().column_major[4] < 0.0
-                    && model.max_torque_nm <= max_torque_nm
-            );
-            let at = model.orientation.unwrap();
-            assert!((at.w - half).abs() < 1e-6 && (at.y - half).abs() < 1e-6, "{at:?}");
-        }
-        drop(arm);
-        while !daemon.status().await.devices.is_empty() {
-            tokio::time::sleep(std::time::Duration::from_millis(5)).await;
-        }
-    }
     daemon.finish().await;
 }
 
@@ -279,117 +219,6 @@ async fn refused_samples_take_no_commands_place() {
     assert!(last >= first + 101, "{first} to {last}");
     assert!(!faults.is_empty());
     daemon.finish().await;
-}
-
-/// What a device hears until its stream ends: forces with their ticks, and the goodbye.
-async fn to_the_end(arm: &mut Arm) -> (Vec<(DVec3, u64)>, Option<v1::DeviceFault>) {
-    let (mut forces, mut goodbye) = (Vec::new(), None);
-    while let Some(message) = arm.next().await.expect("the stream ends without an error") {
-        match message {
-            Message::Command(command) => {
-                assert!(goodbye.is_none(), "nothing follows the goodbye");
-                forces.push((force_of(&command), command.tick));
-                arm.sequence += 1;
-                let next = device_up::Message::Sample(sample(arm.sequence, pressing()));
-                let _ = arm.up.try_send(v1::DeviceUp { message: Some(next) });
-            }
-            Message::Fault(fault) if fault.code() == DeviceFaultCode::Detached => goodbye = Some(fault),
-            Message::Fault(fault) => assert_ne!(fault.code(), DeviceFaultCode::Unspecified),
-            Message::Welcome(_) => panic!("a second welcome"),
-        }
-    }
-    (forces, goodbye)
-}
-
-#[tokio::test(flavor = "multi_thread")]
-async fn when_the_loop_fails_the_stream_ramps_to_zero_and_says_goodbye_and_the_daemon_stops_as_failed() {
-    let mut daemon = Daemon::running(block_scene("block", 3), ServeConfig::in_process(), |the_loop, tick_loop| {
-        let mut turns = 0;
-        tick_loop.run(|wakeup| {
-            turns += 1;
-            assert!(turns < 1500, "the loop fails here, as it was meant to");
-            the_loop.turn(wakeup)
-        });
-    })
-    .await;
-    let mut arm = daemon.attach(hello()).await;
-    arm.welcome().await;
-    arm.hold_until(above(), |command| command.tick > 300).await;
-    arm.hold_until(pressing(), |command| command.tick > 1300).await;
-    let (forces, goodbye) = to_the_end(&mut arm).await;
-    let goodbye = goodbye.expect("a goodbye");
-    assert!(goodbye.message.contains("loop failed"), "{}", goodbye.message);
-    assert_ramps_to_zero(forces.iter().map(|(force, _)| force));
-    // Nobody told it to stop.
-    let running = daemon.running.take().unwrap();
-    let summary = tokio::time::timeout(common::PATIENCE, running.finished()).await.unwrap().unwrap();
-    assert!(summary.failure.is_some_and(|failure| failure.contains("panic")), "{:?}", summary.failure);
-}
-
-/// From the last rise on, down to zero in steps.
-fn assert_ramps_to_zero<'a>(forces: impl Iterator<Item = &'a DVec3>) {
-    let forces: Vec<f64> = forces.map(|force| force.length()).collect();
-    assert_eq!(forces.last(), Some(&0.0), "zero is sent, not only claimed");
-    let top = forces.windows(2).rposition(|pair| pair[1] > pair[0]).map_or(0, |rise| rise + 1);
-    let ramp = &forces[top..];
-    let steps = ramp.iter().filter(|force| **force > 0.0 && **force < 0.9 * ramp[0]).count();
-    assert!(ramp[0] > 0.1 && steps >= 2, "a ramp, not a step: {forces:?}");
-}
-
-#[tokio::test(flavor = "multi_thread")]
-async fn reset_and_restore_wait_until_the_force_has_ramped_to_zero() {
-    let daemon = Daemon::on(block_scene("block", 3)).await;
-    let mut arm = daemon.attach(hello()).await;
-    arm.welcome().await;
-    let state = daemon.snapshot().await.state;
-    for restore in [false, true] {
-        let lifted_from = arm.sequence;
-        arm.hold_until(above(), |command| command.sample_sequence > lifted_from + 300).await;
-        let pressed_from = arm.sequence;
-        arm.hold_until(pressing(), |command| command.sample_sequence > pressed_from + 500).await;
-        let mut session = daemon.session();
-        let state = state.clone();
-        let order = tokio::spawn(async move {
-            if restore {
-                session.restore(v1::RestoreRequest { state, ..Default::default() }).await.unwrap();
-            } else {
-                session.reset(v1::ResetRequest::default()).await.unwrap();
-            }
-        });
-        let mut forces = Vec::new();
-        arm.hold_until(pressing(), |command| {
-            forces.push(force_of(command));
-            force_of(command) == DVec3::ZERO
-        })
-        .await;
-        assert_ramps_to_zero(forces.iter());
-        order.await.unwrap();
-    }
-    daemon.finish().await;
-}
-
-#[tokio::test(flavor = "multi_thread")]
-async fn stopping_ramps_to_zero_says_goodbye_and_ends_cleanly() {
-    let daemon = Daemon::on(block_scene("block", 3)).await;
-    let mut arm = daemon.attach(hello()).await;
-    arm.welcome().await;
-    arm.hold_until(above(), |command| command.sample_sequence > 20).await;
-    // Until the ramp up is over and the body is at rest.
-    arm.hold_until(pressing(), |command| command.sample_sequence > 500).await;
-    // Samples go on: it is the order, not silence, that ramps.
-    let reading = tokio::spawn(async move { to_the_end(&mut arm).await });
-    tokio::time::sleep(std::time::Duration::from_millis(50)).await;
-    let daemon_state = std::sync::Arc::clone(&daemon.running.as_ref().unwrap().daemon);
-    let summary = daemon.finish().await;
-    let (forces, goodbye) = reading.await.unwrap();
-    let goodbye = goodbye.unwrap();
-    assert_eq!(goodbye.code(), DeviceFaultCode::Detached);
-    assert!(goodbye.message.contains("ramped to zero"), "{}", goodbye.message);
-    assert_ramps_to_zero(forces.iter().map(|(force, _)| force));
-    let of_the_loop = |pair: &[(DVec3, u64)]| pair[0].1 < pair[1].1 || pair[0].0 == pair[1].0;
-    assert!(forces.windows(2).all(of_the_loop), "the loop ramps, not the stream in its place: {forces:?}");
-    assert!(daemon_state.sign.is_released());
-    assert!(!summary.cut, "every stream ended by itself");
 }
 
 #[tokio::test(flavor = "multi_thread")]

@@ -1,0 +1,243 @@
+use super::super::{ContactModel, SurfaceModuli, ToolShape, ToolSpec};
+use super::*;
+use crate::{
+    contact::Coupling,
+    mesh::{Surface, TetMesh},
+};
+use proptest::prelude::*;
+
+/// A tet with one face in the plane z = 0, looking up, and a sphere above its middle.
+struct Bench {
+    model: ContactModel,
+    x: Vec<DVec3>,
+    touching: Touching,
+    next: Touching,
+    orientation: DQuat,
+}
+
+const RADIUS_M: f64 = 0.01;
+
+impl Bench {
+    fn new(friction_coefficient: f64) -> Self {
+        Self::of(ToolShape::Sphere, friction_coefficient)
+    }
+
+    /// Across the face, between the first corner and the others.
+    fn of_capsule(half_length_m: f64, friction_coefficient: f64) -> Self {
+        let along = DVec3::new(1.0, 1.0, 0.1);
+        let shape = ToolShape::capsule(Coupling::Rigid, RADIUS_M, half_length_m, along);
+        Self::of(shape, friction_coefficient)
+    }
+
+    fn of(shape: ToolShape, friction_coefficient: f64) -> Self {
+        let orientation = shape.as_capsule().map_or(DQuat::IDENTITY, |capsule| capsule.start_orientation);
+        let x = [(0.0, 0.0, 0.0), (0.03, 0.0, 0.0), (0.0, 0.03, 0.0), (0.0, 0.0, -0.03)];
+        let x: Vec<DVec3> = x.into_iter().map(DVec3::from).collect();
+        let mesh = TetMesh::new(x.clone(), vec![[0, 2, 1, 3]]).unwrap();
+        let surface = Surface::of(&mesh).unwrap();
+        let tool = ToolSpec {
+            name: "tool".into(),
+            shape,
+            radius_m: RADIUS_M,
+            coupling: Coupling::Rigid,
+            friction_coefficient,
+            start_position_m: DVec3::Z,
+        };
+        let moduli = vec![SurfaceModuli { p_wave_pa: 38e3, indentation_pa: 12.5e3 }; 4];
+        let model = ContactModel::build(mesh.positions_m(), &surface, &moduli, &[1.0; 4], 1e6, &[tool]);
+        let samples = model.tools[0].foundation.samples;
+        let buffer = || Touching::with_capacity(samples);
+        Self { model, x, touching: buffer(), next: buffer(), orientation }
+    }
+
+    fn press(&mut self, centre_m: DVec3) -> (Pressed, Vec<DVec3>) {
+        self.meet(centre_m, false)
+    }
+
+    fn meet(&mut self, centre_m: DVec3, just_put: bool) -> (Pressed, Vec<DVec3>) {
+        let tool = &self.model.tools[0];
+        let meeting = Meeting {
+            triangles: &self.model.triangles,
+            foundation: &tool.foundation,
+            tables: &self.model.tables,
+            x: &self.x,
+            axis: tool.spec.shape.axis(centre_m, self.orientation),
+            orientation: tool.spec.shape.as_capsule().map(|_| self.orientation),
+            radius_m: RADIUS_M,
+            friction_coefficient: tool.spec.friction_coefficient,
+            put_into: just_put || self.touching.tells_it_was_put(),
+        };
+        let mut forces = vec![DVec3::ZERO; 4];
+        let mut all = Candidates::with_capacity(4);
+        self.model.triangles.list_all(&mut all);
+        let pressed = press(&meeting, &mut all, &mut self.touching, &mut self.next, &mut forces);
+        (pressed, forces)
+    }
+}
+
+fn above(depth_m: f64) -> DVec3 {
+    DVec3::new(0.01, 0.01, RADIUS_M - depth_m)
+}
+
+proptest! {
+    #[test]
+    fn forces_balance_and_are_the_gradient_of_the_energy(
+        shift in prop::array::uniform3(-0.3..0.3_f64), axis in 0..3_usize, node in 0..3_usize,
+    ) {
+        // Corners of the upper face, moved; the far one (3) is out of reach.
+        let centre = above(0.3 * RADIUS_M) + DVec3::from(shift) * RADIUS_M;
+        let mut bench = Bench::new(0.0);
+        let (pressed, forces) = bench.press(centre);
+        prop_assert!((pressed.force_n + forces.iter().sum::<DVec3>()).length() <= 1e-12 * pressed.pressing_n);
+        let step = 1e-7;
+        let mut energy = |sign: f64| {
+            bench.x[node][axis] += sign * step;
+            let energy = bench.press(centre).0.energy_j;
+            bench.x[node][axis] -= sign * step;
+            energy
+        };
+        let slope = (energy(1.0) - energy(-1.0)) / (2.0 * step);
+        prop_assert!((slope + forces[node][axis]).abs() <= 1e-5 * pressed.pressing_n, "{slope} {}", forces[node]);
+    }
+
+    /// In place and in orientation, wherever the axis is; and the forces of tool and surface turn them as much.
+    #[test]
+    fn a_capsules_wrench_is_the_gradient_of_the_potential(
+        shift in prop::array::uniform3(-0.5..0.5_f64), turn in prop::array::uniform3(-1.5..1.5_f64), axis in 0..3_usize,
+    ) {
+        let centre = above(0.5 * RADIUS_M) + DVec3::from(shift) * RADIUS_M;
+        let mut bench = Bench::of_capsule(1.5 * RADIUS_M, 0.0);
+        let start = DQuat::from_scaled_axis(turn.into()) * bench.orientation;
+        bench.orientation = start;
+        let (pressed, forces) = bench.press(centre);
+        prop_assume!(pressed.contacts > 0);
+        let moments: DVec3 = bench.x.iter().zip(&forces).map(|(x, f)| (*x - centre).cross(*f)).sum();
+        prop_assert!((pressed.torque_nm + moments).length() <= 1e-12 * pressed.pressing_n * RADIUS_M);
+        let (step, unit) = (1e-7, DVec3::AXES[axis]);
+        // What comes in or goes out between is of no depth, unless it is met from behind.
+        let mut changes = |by: f64| {
+            let shifted = bench.press(centre + unit * (by * step)).0.energy_j;
+            bench.orientation = DQuat::from_scaled_axis(unit * (by * step / RADIUS_M)) * start;
+            let turned = bench.press(centre).0.energy_j;
+            bench.orientation = start;
+            DVec3::new(shifted, turned, 0.0)
+        };
+        let slopes = (changes(1.0) - changes(-1.0)) / (2.0 * step);
+        prop_assert!((slopes.x + pressed.force_n[axis]).abs() <= 1e-5 * pressed.pressing_n, "{slopes} {}", pressed.force_n);
+        let torque_n = pressed.torque_nm[axis] / RADIUS_M;
+        prop_assert!((slopes.y + torque_n).abs() <= 1e-5 * pressed.pressing_n, "{slopes} {torque_n}");
+    }
+
+    #[test]
+    fn no_sample_leaves_the_friction_cone(steps in prop::collection::vec(prop::array::uniform3(-1.0..1.0_f64), 1..40)) {
+        let mu = 0.4;
+        let mut bench = Bench::new(mu);
+        let mut centre = above(0.1 * RADIUS_M);
+        for step in steps {
+            centre += DVec3::from(step) * 2e-4;
+            let (pressed, forces) = bench.press(centre);
+            let friction = pressed.force_n - pressed.normal_n;
+            prop_assert!(friction.length() <= mu * pressed.pressing_n * (1.0 + 1e-12));
+            prop_assert!(pressed.heat_j >= 0.0);
+            prop_assert!((pressed.force_n + forces.iter().sum::<DVec3>()).length() <= 1e-12 * pressed.pressing_n + 1e-18);
+            for touch in bench.touching.records() {
+                prop_assert!(touch.spring_origin_m.is_finite());
+            }
+        }
+    }
+}
+
+#[test]
+fn a_short_capsule_is_a_sphere_and_a_turned_one_rubs() {
+    let (mut short, mut sphere) = (Bench::of_capsule(1e-12, 0.4), Bench::new(0.4));
+    for step in 0..20 {
+        let centre = above(0.2 * RADIUS_M) + DVec3::X * (1e-5 * f64::from(step));
+        let ((a, _), (b, _)) = (short.press(centre), sphere.press(centre));
+        assert!((a.force_n - b.force_n).length() < 1e-9 * b.pressing_n && a.contacts == b.contacts);
+        assert!((a.energy_j - b.energy_j).abs() < 1e-9 * b.energy_j && (a.heat_j - b.heat_j).abs() < 1e-9 * b.energy_j);
+    }
+    // Turned about the vertical, it is held by the friction under it, and no force results.
+    let mut bench = Bench::of_capsule(0.3 * RADIUS_M, 0.4);
+    bench.press(above(0.2 * RADIUS_M));
+    bench.orientation = DQuat::from_rotation_z(1e-4) * bench.orientation;
+    let (pressed, _) = bench.press(above(0.2 * RADIUS_M));
+    assert!(pressed.torque_nm.z < 0.0 && pressed.heat_j >= 0.0, "{}", pressed.torque_nm);
+    // A ball that rolls does not rub: v + ω × p = 0 where it touches.
+    let rolled = |spin: f64| {
+        let mut bench = Bench::of_capsule(1e-12, 0.4);
+        let (start, shift_m) = (bench.orientation, 1e-5);
+        let height_m = RADIUS_M - 0.01 * RADIUS_M;
+        bench.press(above(0.01 * RADIUS_M));
+        bench.orientation = DQuat::from_rotation_y(spin * shift_m / height_m) * start;
+        let (pressed, _) = bench.press(above(0.01 * RADIUS_M) + DVec3::X * shift_m);
+        (pressed.force_n - pressed.normal_n).length()
+    };
+    assert!(rolled(1.0) < 0.02 * rolled(0.0) && rolled(-1.0) > 1.5 * rolled(0.0), "{} {}", rolled(1.0), rolled(0.0));
+}
+
+#[test]
+fn it_sticks_below_the_cone_and_slips_at_it() {
+    let (mu, depth) = (0.5, 0.1 * RADIUS_M);
+    let mut bench = Bench::new(mu);
+    bench.press(above(depth));
+    let mut friction_at = |shift_m: f64| {
+        let (pressed, _) = bench.press(above(depth) + DVec3::X * shift_m);
+        (pressed.force_n - pressed.normal_n, pressed)
+    };
+    // Stuck: the tool is pulled back, the force grows with the way and vanishes with it. (The samples at the very rim,
+    // where the pressure is small, slip at once.)
+    let (friction, _) = friction_at(1e-6);
+    let (twice, pressed) = friction_at(2e-6);
+    assert!(friction.x < 0.0 && (twice.x / friction.x - 2.0).abs() < 1e-2, "{friction} {twice}");
+    assert!(pressed.sticking_n > 0.99 * pressed.pressing_n);
+    assert!(friction_at(0.0).0.length() < 1e-2 * friction.length());
+    // Slipping: µ of the pressing force; the normals differ by up to a/R from the plane's.
+    let mut pressed = Pressed::default();
+    for step in 1..=50 {
+        pressed = friction_at(2e-5 * f64::from(step)).1;
+    }
+    let friction = pressed.force_n - pressed.normal_n;
+    assert!((friction.length() / (mu * pressed.pressing_n) - 1.0).abs() < 0.1, "{friction}");
+    assert!(friction.x < 0.0 && friction.y.abs() < 0.05 * friction.x.abs());
+    assert!(pressed.heat_j > 0.0);
+}
+
+#[test]
+fn samples_reached_from_behind_carry_nothing_until_they_left() {
+    let mut bench = Bench::new(0.0);
+    // A centre that starts inside the body and rises: every face is met from behind.
+    let mut ignored = 0;
+    for step in 0..=20 {
+        let centre = DVec3::new(0.004, 0.004, -1.4 * RADIUS_M + 0.06 * RADIUS_M * f64::from(step));
+        let (pressed, forces) = bench.press(centre);
+        assert_eq!(pressed.contacts, 0, "step {step}");
+        assert!(forces.iter().all(|f| *f == DVec3::ZERO));
+        ignored = ignored.max(bench.touching.records().len());
+    }
+    assert!(ignored > 100, "{ignored}");
+    bench.press(DVec3::Z);
+    assert!(bench.touching.records().is_empty());
+    assert!(bench.press(above(0.1 * RADIUS_M)).0.force_n.z > 0.0);
+}
+
+/// Where all that could be kept was met from behind, nothing told in the next tick that the tool was put there, and what could
+/// not be kept pressed with its full depth.
+#[test]
+fn a_tool_put_into_the_surface_is_known_by_the_samples_it_met_from_behind() {
+    let mut bench = Bench::new(0.0);
+    let deep = DVec3::new(0.004, 0.004, -0.6 * RADIUS_M);
+    bench.meet(deep, true);
+    assert!(bench.touching.records().len() > 3, "the ball is in the surface");
+    assert!(bench.touching.records().iter().all(|touch| touch.from_behind));
+    let kept = bench.touching.records().len() / 2;
+    (bench.touching, bench.next) = (Touching::with_capacity(kept), Touching::with_capacity(kept));
+    bench.meet(deep, true);
+    let mut met_from_the_front = false;
+    for step in 0..=20 {
+        // Up and out: the upper face is met from the front by those that were not kept.
+        let (pressed, _) = bench.meet(deep + DVec3::Z * (0.1 * RADIUS_M * f64::from(step)), false);
+        assert_eq!((pressed.contacts, pressed.force_n), (0, DVec3::ZERO), "step {step}");
+        met_from_the_front |= pressed.penetration_m > 0.0;
+    }
+    assert!(met_from_the_front, "those that were not kept are met anew");
+}

@@ -1,0 +1,237 @@
+//! The contact's part of a tick: its beginning, its substeps, its end.
+use super::{
+    Body, ContactModel, ContactScratch, ContactState, Coupling, SubstepTime, SurfaceNow, ToolScratch, ToolState,
+    axis::Axis,
+    broad::Skin,
+    local_model::{self, MeanContact},
+    narrow::{self, Meeting, Pressed},
+    proxy,
+};
+use glam::DVec3;
+
+impl ContactModel {
+    /// Once a tick, before its first substep.
+    pub fn begin_tick(&self, tools: &mut [ToolState], scratch: &mut ContactScratch, tick_period_s: f64) {
+        let time = SubstepTime { fraction: 1.0, dt_s: 0.0, tick_period_s };
+        for (tool, scratch) in tools.iter_mut().zip(&mut scratch.tools) {
+            time.smooth(tool);
+            tool.penetration_m = 0.0;
+            scratch.sum = Pressed::default();
+            scratch.coupling_sum_n = DVec3::ZERO;
+            scratch.coupling_sum_nm = DVec3::ZERO;
+        }
+    }
+
+    /// Once a substep, after the body drifted: moves the tools with it, and adds contact forces (N) on nodes to `forces_n`.
+    pub fn substep(
+        &self,
+        body: &Body<'_>,
+        time: &SubstepTime,
+        tools: &mut [ToolState],
+        contact: &mut ContactState,
+        forces_n: &mut [DVec3],
+        scratch: &mut ContactScratch,
+    ) {
+        self.move_tools(body.fastest_m_per_s, time, tools, contact);
+        for (index, tool) in tools.iter().enumerate() {
+            self.list_candidates(index, &self.tools[index].axis(tool), body.x, contact, scratch.exhaustive);
+        }
+        let surface = SurfaceNow { x: body.x, velocity_m_per_s: &|node| body.v[node as usize] };
+        self.press_tools(&surface, time, tools, contact, forces_n, scratch);
+    }
+
+    /// The first part of a substep: the body drifted with up to `fastest_m_per_s`, the tools follow.
+    pub(crate) fn move_tools(
+        &self,
+        fastest_m_per_s: f64,
+        time: &SubstepTime,
+        tools: &mut [ToolState],
+        contact: &mut ContactState,
+    ) {
+        contact.travelled(fastest_m_per_s * time.dt_s);
+        for (index, tool) in tools.iter_mut().enumerate() {
+            self.drift(index, tool, time, contact);
+        }
+    }
+
+    /// The second part, on a skin: lists anew where a list is out of date. Whether any was. `x` has room for positions (m) of all vertices.
+    pub(crate) fn list_on_skin(
+        &self,
+        (skin, x): (&mut impl Skin, &mut [DVec3]),
+        tools: &[ToolState],
+        contact: &mut ContactState,
+        scratch: &ContactScratch,
+    ) -> bool {
+        let mut renewed = false;
+        for (index, tool) in tools.iter().enumerate() {
+            let (part, boxes, travel_m) = contact.split(index);
+            let candidates = &mut part.candidates;
+            if scratch.exhaustive {
+                renewed |= candidates.triangles().len() != self.triangles.len();
+                self.triangles.list_all(candidates);
+            } else if candidates.slack_m <= 0.0 {
+                let reach_m = self.reach_m(index);
+                let axis = self.tools[index].axis(tool);
+                self.triangles.query_skin((skin, x), (boxes, travel_m), &axis, reach_m, candidates);
+                renewed = true;
+            }
+        }
+        renewed
+    }
+
+    /// Nodes of the triangles that any tool may touch, some of them several times.
+    pub(crate) fn listed_nodes<'a>(&'a self, contact: &'a ContactState) -> impl Iterator<Item = u32> + 'a {
+        contact.listed().flat_map(|triangle| self.triangles.nodes[triangle as usize])
+    }
+
+    /// Nodes of all triangles, in the order of the broad phase.
+    pub(crate) fn triangles(&self) -> &[[u32; 3]] {
+        &self.triangles.nodes
+    }
+
+    /// The last part: presses the tools on what is listed, and adds the forces (N) on nodes.
+    pub(crate) fn press_tools(
+        &self,
+        SurfaceNow { x, velocity_m_per_s }: &SurfaceNow<'_>,
+        time: &SubstepTime,
+        tools: &mut [ToolState],
+        contact: &mut ContactState,
+        forces_n: &mut [DVec3],
+        scratch: &mut ContactScratch,
+    ) {
+        for (index, (tool, scratch)) in tools.iter_mut().zip(&mut scratch.tools).enumerate() {
+            let model = &self.tools[index];
+            let pressed = self.press(index, tool, x, contact, forces_n, scratch);
+            let surface_m_per_s = self.surface_m_per_s(&pressed, *velocity_m_per_s);
+            let coupling = proxy::finish(model, tool, &pressed, surface_m_per_s, time);
+            scratch.nearest = pressed.nearest.0;
+            tool.friction_heat_j += pressed.heat_j;
+            tool.contacts = pressed.contacts;
+            tool.contact_energy_j = pressed.energy_j;
+            tool.penetration_m = tool.penetration_m.max(pressed.penetration_m);
+            if time.dt_s > 0.0 {
+                scratch.sum.add(&pressed);
+                scratch.coupling_sum_n += coupling.force_n;
+                scratch.coupling_sum_nm += coupling.torque_nm;
+            }
+        }
+    }
+
+    /// [`Self::substep`] where the body does not move and no tool is near it, of which there is nothing but the tools' motion. Stops and
+    /// returns false as soon as one is near.
+    pub fn substep_apart(
+        &self,
+        x: &[DVec3],
+        time: &SubstepTime,
+        tools: &mut [ToolState],
+        contact: &mut ContactState,
+        scratch: &mut ContactScratch,
+    ) -> bool {
+        let exhaustive = scratch.exhaustive;
+        for (index, (tool, scratch)) in tools.iter_mut().zip(&mut scratch.tools).enumerate() {
+            self.drift(index, tool, time, contact);
+            let axis = self.tools[index].axis(tool);
+            self.list_candidates(index, &axis, x, contact, exhaustive);
+            if self.is_near(index, &axis, x, contact) {
+                return false;
+            }
+            let nothing = Pressed { to_surface_m: DVec3::INFINITY, ..Pressed::default() };
+            let coupling = proxy::finish(&self.tools[index], tool, &nothing, DVec3::ZERO, time);
+            scratch.coupling_sum_n += coupling.force_n;
+            scratch.coupling_sum_nm += coupling.torque_nm;
+        }
+        true
+    }
+
+    /// Whether no tool is within a quarter of its radius of the surface. The lists must be of the present positions.
+    pub fn is_apart(&self, x: &[DVec3], tools: &[ToolState], contact: &ContactState) -> bool {
+        tools.iter().enumerate().all(|(index, tool)| !self.is_near(index, &self.tools[index].axis(tool), x, contact))
+    }
+
+    /// By distances, not by what is listed: which triangles beyond the zone are on a list depends on when it was made.
+    fn is_near(&self, tool: usize, axis: &Axis, x: &[DVec3], contact: &ContactState) -> bool {
+        let zone_m = (1.0 + proxy::NEAR) * self.tools[tool].spec.radius_m;
+        let listed = contact.tools[tool].candidates.triangles();
+        listed.iter().any(|&triangle| axis.distance_m(self.triangles.corners(triangle as usize, x)) < zone_m)
+    }
+
+    fn drift(&self, index: usize, tool: &mut ToolState, time: &SubstepTime, contact: &mut ContactState) {
+        let part = &contact.tools[index];
+        let moved_m = proxy::drift(&self.tools[index], tool, (part.force_n, part.torque_nm), time);
+        contact.tools[index].candidates.slack_m -= moved_m;
+    }
+
+    fn list_candidates(&self, tool: usize, axis: &Axis, x: &[DVec3], contact: &mut ContactState, exhaustive: bool) {
+        let (part, boxes, travel_m) = contact.split(tool);
+        if exhaustive {
+            self.triangles.list_all(&mut part.candidates);
+        } else if part.candidates.slack_m <= 0.0 {
+            self.triangles.query(x, (boxes, travel_m), axis, self.reach_m(tool), &mut part.candidates);
+        }
+    }
+
+    /// How far from a tool's axis (m) triangles are listed, and within what none may be missing.
+    fn reach_m(&self, tool: usize) -> (f64, f64) {
+        let radius_m = self.tools[tool].spec.radius_m;
+        ((1.0 + 2.0 * proxy::NEAR) * radius_m, (1.0 + proxy::NEAR) * radius_m)
+    }
+
+    fn press(
+        &self,
+        index: usize,
+        tool: &ToolState,
+        x: &[DVec3],
+        contact: &mut ContactState,
+        forces_n: &mut [DVec3],
+        scratch: &mut ToolScratch,
+    ) -> Pressed {
+        let (model, part) = (&self.tools[index], &mut contact.tools[index]);
+        let meeting = Meeting {
+            triangles: &self.triangles,
+            foundation: &model.foundation,
+            tables: &self.tables,
+            x,
+            axis: model.axis(tool),
+            orientation: model.spec.shape.as_capsule().map(|_| tool.orientation),
+            radius_m: model.spec.radius_m,
+            friction_coefficient: model.spec.friction_coefficient,
+            put_into: std::mem::take(&mut part.just_put) || part.touching.tells_it_was_put(),
+        };
+        let pressed = narrow::press(&meeting, &mut part.candidates, &mut part.touching, &mut scratch.next, forces_n);
+        (part.force_n, part.torque_nm) = (pressed.force_n, pressed.torque_nm);
+        pressed
+    }
+
+    /// Velocity (m/s) of the point of the surface nearest to a tool.
+    fn surface_m_per_s(&self, pressed: &Pressed, velocity_m_per_s: &dyn Fn(u32) -> DVec3) -> DVec3 {
+        let (triangle, weights) = pressed.nearest;
+        if weights == [0.0; 3] {
+            return DVec3::ZERO;
+        }
+        let corners = self.triangles.nodes[triangle];
+        corners.into_iter().zip(weights).map(|(node, weight)| velocity_m_per_s(node) * weight).sum()
+    }
+
+    /// Once a tick, at its end: means and local models.
+    pub fn end_tick(
+        &self,
+        tools: &mut [ToolState],
+        contact: &mut ContactState,
+        substeps: u32,
+        scratch: &mut ContactScratch,
+    ) {
+        let share = 1.0 / f64::from(substeps);
+        for (index, (tool, scratch)) in tools.iter_mut().zip(&scratch.tools).enumerate() {
+            let model = &self.tools[index];
+            let pressed = scratch.sum.scaled(share);
+            (tool.contact_force_n, tool.contact_torque_nm) = (pressed.force_n, pressed.torque_nm);
+            (tool.device_force_n, tool.device_torque_nm) = match model.spec.coupling {
+                Coupling::Rigid => (pressed.force_n, pressed.torque_nm),
+                Coupling::Spring { .. } => (-scratch.coupling_sum_n * share, -scratch.coupling_sum_nm * share),
+            };
+            let mean =
+                MeanContact { pressed, device_force_n: tool.device_force_n, device_torque_nm: tool.device_torque_nm };
+            tool.local_model = local_model::update(model, tool, &mut contact.tools[index].estimate, &mean);
+        }
+    }
+}
