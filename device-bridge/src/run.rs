@@ -109,6 +109,7 @@ pub async fn run_with(config: &Config, shutdown: CancellationToken, handle: Hand
     let (server, told) = vrpn_server::open(settings.vrpn_server.as_ref(), &shared)?.unzip();
     let device = open(&settings, &shutdown).await?;
     let Some(device) = device else { return Ok(shared.stats.summary()) };
+    let settings = settings.bearable(device.stiffest_wall_n_per_m())?;
     let (commands, down) = slot(&None);
     let (up, samples) = slot(&None);
     let bell = Doorbell::new().map_err(|source| BridgeError::System { what: "create an eventfd", source })?;
@@ -172,7 +173,11 @@ pub async fn run_with(config: &Config, shutdown: CancellationToken, handle: Hand
 fn start_guard(device: &dyn device::Arm, settings: &Settings, program: Option<&PathBuf>) -> Option<Guard> {
     let program = program.filter(|_| settings.guard)?;
     let Some(words) = device.last_words() else {
-        tracing::info!("no guard stands beside this arm: nobody else can speak to it should this process be killed");
+        if settings.device.arm.has_motors() {
+            tracing::info!(
+                "no guard stands beside this arm: nobody else can speak to it should this process be killed"
+            );
+        }
         return None;
     };
     let watchdog = &settings.servo.watchdog;

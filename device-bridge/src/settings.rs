@@ -1,6 +1,7 @@
 //! What the configuration means: checked, in the types that the loop and the uplink use.
 pub mod arm;
 mod servo;
+mod stiffness;
 mod torque;
 mod vrpn_server;
 

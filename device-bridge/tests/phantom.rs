@@ -36,7 +36,7 @@ fn resting() -> Settings {
 fn settings(keys: &PhantomConfig, max_force_n: f64) -> driver::Settings {
     let mut config = Config::default();
     config.limits.max_force_n = max_force_n;
-    arm::phantom::checked(keys, &config, 1e-3).unwrap()
+    arm::phantom::checked(keys, &config).unwrap()
 }
 
 fn started(keys: &PhantomConfig) -> Result<Phantom, StartError> {
@@ -75,6 +75,27 @@ async fn a_press_ends_at_the_force_of_the_simulated_arm() {
     assert!((found_n / expected_n - 1.0).abs() < 0.02, "{found_n} N, {expected_n} N");
     assert!(summary.peak_force_n < 1.1 * expected_n, "{summary}");
     assert_eq!(emulated.arm.force_n(), DVec3::ZERO, "the bridge took its force away when it ended");
+}
+
+/// The emulated arm is made for 500 N/m.
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn walls_are_no_stiffer_than_the_arm_is_made_for() {
+    let emulated = Emulated::new(Settings { path: press::path(), ..Settings::default() });
+    // Twice as far in the world, half as stiff there.
+    for (scale, most_n_per_m) in [(1.0, 500.0), (2.0, 250.0)] {
+        let (_mock, bridge) = common::pushing(|config| {
+            config.device = DeviceConfig::Phantom(emulated.keys());
+            config.workspace.scale = scale;
+        })
+        .await;
+        assert_eq!(bridge.handle.stats().largest_stiffness_n_per_m(), most_n_per_m);
+        bridge.stop().await;
+    }
+    let mut config = common::config("http://127.0.0.1:1");
+    config.device = DeviceConfig::Phantom(emulated.keys());
+    config.render.max_stiffness_n_per_m = Some(501.0);
+    let refused = palpate_bridge::run(config, CancellationToken::new()).await.unwrap_err().to_string();
+    assert!(refused.starts_with("render.max_stiffness_n_per_m: 501 N/m is more than the 500 N/m"), "{refused}");
 }
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]

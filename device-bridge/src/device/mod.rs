@@ -174,6 +174,11 @@ pub trait Arm: Debug + Send {
     /// Puts this on the arm, held until the next call.
     fn apply(&mut self, effort: &Effort);
 
+    /// The stiffest wall (N/m, as the force is to the readings) that it is made for, if that is known.
+    fn stiffest_wall_n_per_m(&self) -> Option<f64> {
+        None
+    }
+
     /// What another process can say to it when this one is gone; `None` where the connection does not outlive the process.
     fn last_words(&self) -> Option<LastWords> {
         None

@@ -184,6 +184,11 @@ impl Arm for Placed {
         });
     }
 
+    /// `K_world = K_arm / s`.
+    fn stiffest_wall_n_per_m(&self) -> Option<f64> {
+        self.arm.stiffest_wall_n_per_m().map(|arm_n_per_m| arm_n_per_m / self.workspace.scale)
+    }
+
     fn last_words(&self) -> Option<LastWords> {
         self.arm.last_words()
     }

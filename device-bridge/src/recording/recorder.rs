@@ -105,6 +105,10 @@ impl Arm for Recorded {
         }
     }
 
+    fn stiffest_wall_n_per_m(&self) -> Option<f64> {
+        self.arm.stiffest_wall_n_per_m()
+    }
+
     fn last_words(&self) -> Option<LastWords> {
         self.arm.last_words()
     }

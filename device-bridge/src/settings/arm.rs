@@ -48,13 +48,20 @@ pub enum ArmSettings {
     Vrpn(Vrpn),
 }
 
+impl ArmSettings {
+    /// Not one that is only computed or read.
+    pub fn has_motors(&self) -> bool {
+        !matches!(self, Self::Simulated(_) | Self::Playback(_))
+    }
+}
+
 /// The arm of a configuration, checked.
 pub(super) fn checked(config: &Config, period_s: f64) -> Result<ArmSettings, BridgeError> {
     match &config.device {
         DeviceConfig::Simulated(arm) => Ok(ArmSettings::Simulated(simulated::checked(arm, period_s)?)),
         DeviceConfig::Hapticmaster(arm) => Ok(ArmSettings::HapticMaster(hapticmaster::checked(arm, config)?)),
         DeviceConfig::Woodenhaptics(arm) => Ok(ArmSettings::WoodenHaptics(woodenhaptics::checked(arm)?)),
-        DeviceConfig::Phantom(arm) => Ok(ArmSettings::Phantom(phantom::checked(arm, config, period_s)?)),
+        DeviceConfig::Phantom(arm) => Ok(ArmSettings::Phantom(phantom::checked(arm, config)?)),
         DeviceConfig::Inverse3(arm) => Ok(ArmSettings::Inverse3(inverse3::checked(arm, &config.realtime)?)),
         DeviceConfig::Playback(arm) => Ok(ArmSettings::Playback(playback::checked(arm)?)),
         DeviceConfig::Haply2diy(arm) => Ok(ArmSettings::Haply2diy(haply_2diy::checked(arm)?)),

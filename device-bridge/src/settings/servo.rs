@@ -1,9 +1,8 @@
 //! The servo's law: its limits, times and gains.
-use super::{arm, parameter, torque, value};
+use super::{arm, parameter, stiffness::bound, torque, value};
 use crate::{BridgeError, Config};
 use palpate_control::{
     ForceLimits, PassivitySettings, RenderSettings, StiffnessBound, ThermalLimits, TorqueLimits, WatchdogSettings,
-    coupling::SampledWall,
 };
 
 /// The servo's law.
@@ -27,6 +26,8 @@ pub struct ServoSettings {
     pub plane: bool,
     /// How stiff a local model may be rendered, or, without, the daemon's coupling be.
     pub stiffness: StiffnessBound,
+    /// That was asked for (N/m).
+    pub asked_stiffness_n_per_m: Option<f64>,
     /// Share of ticks with an answer in time; with fewer the force is taken away.
     pub least_success_rate: f64,
     /// Energy; `None`: off.
@@ -59,10 +60,11 @@ pub(super) fn checked(config: &Config, period_s: f64, scale: f64) -> Result<Serv
     if !(0.0..=1.0).contains(&least_success_rate) {
         return Err(value("servo.least_success_rate", format!("{least_success_rate} is no share: use 0 to 1")));
     }
-    let stiffness = stiffness(config, period_s, scale)?;
+    let stiffness = bound(config, period_s, scale)?;
     Ok(ServoSettings {
         period_s,
         stiffness,
+        asked_stiffness_n_per_m: config.render.max_stiffness_n_per_m,
         plane: arm::renders_planes(&config.device),
         least_success_rate,
         thermal: limits.continuous_force_n.map(thermal).transpose().map_err(|error| parameter("limits", &error))?,
@@ -83,32 +85,6 @@ pub(super) fn checked(config: &Config, period_s: f64, scale: f64) -> Result<Serv
         passivity: passivity.enabled.then_some(passivity_settings),
         auto_recover: config.servo.auto_recover,
     })
-}
-
-/// The stiffest contact that the servo's own sampling allows on this arm, or that is asked for.
-pub(super) fn stiffness(config: &Config, period_s: f64, scale: f64) -> Result<StiffnessBound, BridgeError> {
-    let render = &config.render;
-    let wall = SampledWall {
-        arm_damping_n_s_per_m: render.arm_damping_n_s_per_m / scale,
-        wall_damping_n_s_per_m: render.damping_n_s_per_m / scale,
-        sample_time_s: period_s,
-        delay_s: 0.0,
-    };
-    let passive_n_per_m = wall.passive_stiffness_limit_n_per_m().map_err(|error| parameter("render", &error))?;
-    if passive_n_per_m <= 0.0 {
-        let reason = "must be smaller than arm_damping_n_s_per_m, or no stiffness is passive".to_owned();
-        return Err(value("render.damping_n_s_per_m", reason));
-    }
-    let asked_n_per_m = render.max_stiffness_n_per_m.unwrap_or(passive_n_per_m);
-    if !(asked_n_per_m > 0.0 && asked_n_per_m <= passive_n_per_m) {
-        let (b, rate_hz) = (render.arm_damping_n_s_per_m, config.servo.rate_hz);
-        let reason = format!(
-            "{asked_n_per_m} N/m is not between 0 and the {passive_n_per_m:.0} N/m that are passive on an arm of {b} N s/m at {rate_hz} Hz \
-             (2 (b - B)/T): leave it out, or give the arm's damping in render.arm_damping_n_s_per_m if it has more"
-        );
-        return Err(value("render.max_stiffness_n_per_m", reason));
-    }
-    StiffnessBound::new(wall, asked_n_per_m).map_err(|error| parameter("render", &error))
 }
 
 fn render(config: &Config, scale: f64, stiffness: &StiffnessBound) -> Result<Option<RenderSettings>, BridgeError> {

@@ -24,6 +24,12 @@ impl StiffnessBound {
         Ok(Self { wall, most_n_per_m: passive_n_per_m.min(most_n_per_m), delay_s: wall.delay_s })
     }
 
+    /// The same wall, no stiffer than this (N/m).
+    #[must_use]
+    pub fn within(self, most_n_per_m: f64) -> Self {
+        Self { most_n_per_m: self.most_n_per_m.min(most_n_per_m), ..self }
+    }
+
     /// The pose that the next force answers is `age_s` old; `dt_s` have passed since the last one.
     pub fn pose_is(&mut self, age_s: f64, dt_s: f64) {
         if age_s.is_finite() && age_s >= 0.0 && dt_s > 0.0 {
@@ -88,6 +94,7 @@ mod tests {
     #[test]
     fn what_is_asked_for_and_what_is_passive_bound_it_too() {
         assert_eq!(bound(500.0).largest_n_per_m(), 500.0);
+        assert_eq!([300.0, 700.0].map(|most| bound(500.0).within(most).largest_n_per_m()), [300.0, 500.0]);
         // 2 (b − B)/T = 400, where (b + B)/(T/2) = 1200.
         let damped = SampledWall { wall_damping_n_s_per_m: 0.2, ..bound(1.0).wall };
         assert!((StiffnessBound::new(damped, 1e9).unwrap().largest_n_per_m() - 400.0).abs() < 1e-9);

@@ -27,6 +27,8 @@ use wire::{Frame, Frames};
 pub const BAUD: u32 = 1_500_000;
 /// A step of an encoder turns a leg by so much (rad): 320 slots, each counted four times, on a shaft of 14.25 mm that turns a wheel of 110 mm.
 pub const RAD_PER_COUNT: f64 = 14.25 / 110.0 * std::f64::consts::TAU / 1280.0;
+/// Of its published limits.
+const STIFFEST_WALL_N_PER_M: f64 = 3000.0;
 /// With so many frames unanswered no more is sent: the arm is slower than the loop, and poses would become old.
 const MOST_UNANSWERED: usize = 4;
 /// When nothing has come for so many periods, what is unanswered was lost, and is asked for anew.
@@ -264,6 +266,10 @@ impl Arm for Falcon {
         if let Err(fault) = self.send() {
             self.lose(fault);
         }
+    }
+
+    fn stiffest_wall_n_per_m(&self) -> Option<f64> {
+        Some(STIFFEST_WALL_N_PER_M)
     }
 
     fn last_words(&self) -> Option<LastWords> {

@@ -80,13 +80,6 @@ impl Limits {
                 "limits.continuous_force_n should be {bears_n}, what this arm's motors bear for ever, or they get too warm in a long press"
             );
         }
-        if let (Some(stiffest), Some(rendered)) = (self.stiffness_n_per_m, settings.stiffest_n_per_m)
-            && rendered > stiffest
-        {
-            tracing::warn!(
-                "walls are rendered up to {rendered:.0} N/m, and this arm's maximum is {stiffest:.0} N/m: it may buzz. A smaller render.arm_damping_n_s_per_m renders softer ones"
-            );
-        }
         Ok(())
     }
 }

@@ -41,8 +41,6 @@ pub struct Settings {
     pub max_force_n: f64,
     /// Force (N) that the bridge keeps below for ever, if it does.
     pub continuous_force_n: Option<f64>,
-    /// Stiffest wall (N/m at the arm) that the servo renders, if it renders any.
-    pub stiffest_n_per_m: Option<f64>,
 }
 
 /// The arm.
@@ -54,6 +52,7 @@ pub struct Phantom {
     period_s: f64,
     silence_periods: u64,
     pose: Pose,
+    stiffest_wall_n_per_m: Option<f64>,
     /// Since the newest pose came.
     quiet_periods: u64,
     lost: Option<Fault>,
@@ -73,9 +72,20 @@ impl Phantom {
     /// # Errors
     /// [`StartError`].
     pub fn start(settings: &Settings, period_s: f64, stop: &CancellationToken) -> Result<Self, StartError> {
-        let Started { session, poses, efforts, pose, .. } = start(settings, stop)?;
+        let Started { session, poses, efforts, pose, limits } = start(settings, stop)?;
         let silence_periods = (settings.silence.as_secs_f64() / period_s).ceil() as u64;
-        Ok(Self { session, poses, efforts, period_s, silence_periods, pose, quiet_periods: 0, lost: None })
+        let stiffest_wall_n_per_m = limits.stiffness_n_per_m;
+        Ok(Self {
+            session,
+            poses,
+            efforts,
+            period_s,
+            silence_periods,
+            pose,
+            stiffest_wall_n_per_m,
+            quiet_periods: 0,
+            lost: None,
+        })
     }
 
     fn receive(&mut self) -> Result<(), Fault> {
@@ -112,5 +122,9 @@ impl Arm for Phantom {
     /// A lost arm's frames, should there be any, are told to let go.
     fn apply(&mut self, effort: &Effort) {
         self.efforts.publish(effort.unless(self.lost.is_some()));
+    }
+
+    fn stiffest_wall_n_per_m(&self) -> Option<f64> {
+        self.stiffest_wall_n_per_m
     }
 }

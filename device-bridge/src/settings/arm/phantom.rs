@@ -1,21 +1,19 @@
 //! What the keys of a PHANToM or Touch mean.
-use super::super::{seconds, servo::stiffness};
+use super::super::seconds;
 use crate::{BridgeError, Config, config::PhantomConfig, device::phantom::Settings};
 
 /// As OpenHaptics' installers name it.
 const LIBRARIES: [&str; 4] = ["libHD.so", "libHD.so.3", "libHD.so.3.5", "libHD.so.3.4"];
 
-/// The whole configuration counts: its rate, its limits, and how stiff it renders.
+/// The whole configuration counts: its rate and its limits.
 ///
 /// # Errors
 /// [`BridgeError`] naming the key.
-pub fn checked(arm: &PhantomConfig, config: &Config, period_s: f64) -> Result<Settings, BridgeError> {
+pub fn checked(arm: &PhantomConfig, config: &Config) -> Result<Settings, BridgeError> {
     let libraries = match arm.library.as_str() {
         "" => LIBRARIES.map(str::to_owned).to_vec(),
         path => vec![path.to_owned()],
     };
-    // At the arm, a wall is as stiff in a world of any scale.
-    let stiffest_n_per_m = stiffness(config, period_s, 1.0)?.largest_n_per_m();
     Ok(Settings {
         libraries,
         name: arm.name.clone(),
@@ -26,6 +24,5 @@ pub fn checked(arm: &PhantomConfig, config: &Config, period_s: f64) -> Result<Se
         rate_hz: config.servo.rate_hz.round() as u32,
         max_force_n: config.limits.max_force_n,
         continuous_force_n: config.limits.continuous_force_n,
-        stiffest_n_per_m: config.render.local_model.then_some(stiffest_n_per_m),
     })
 }
