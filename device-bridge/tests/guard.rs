@@ -1,7 +1,10 @@
 //! The real program is killed, or stopped, with a force on each arm whose connection outlives it: the second process, its guard, takes the force away.
 #![allow(clippy::unwrap_used)]
+#[path = "common/arms.rs"]
+mod arms;
 mod common;
 
+use arms::Emulated;
 use common::{
     Mock,
     press::{self, bridged, elsewhere, wall},
@@ -10,31 +13,31 @@ use common::{
 use glam::DVec3;
 use palpate_bridge::{
     Config,
-    config::{
-        DeviceConfig, FalconConfig, Haply2diyConfig, HapticMasterConfig, HapticMasterContact, RecordConfig, VrpnConfig,
-        WoodenHapticsConfig, WorkspaceConfig,
-    },
-    emulate::{falcon, haply_2diy, hapticmaster, vrpn, woodenhaptics},
-    settings::arm,
+    config::{DeviceConfig, HapticMasterContact, RecordConfig, WorkspaceConfig},
+    emulate::{hapticmaster, vrpn},
 };
-use palpate_control::{ArmSpec, HandPath};
+use palpate_control::HandPath;
 use rustix::process::{Pid, Signal, kill_process};
 use std::{
     process::{Child, Command, Stdio},
-    time::Duration,
+    time::{Duration, Instant},
 };
 
-/// Patient with a busy test machine.
-const SILENCE_S: f64 = 0.4;
-
-/// An arm, and what a bridge is told of it.
+/// An arm, where it is, and its force when nobody says anything any more.
 struct Arm {
-    device: DeviceConfig,
+    emulated: Emulated,
     workspace: WorkspaceConfig,
-    force_n: Box<dyn Fn() -> DVec3>,
-    /// Its force, when nobody says anything any more.
     holds: Holds,
 }
+
+impl Arm {
+    fn force_n(&self) -> DVec3 {
+        self.emulated.force_n()
+    }
+}
+
+/// A wall of the press that the hand is in to the end, were it without force (N); else 1 N is asked for.
+const FULL_N: f64 = 2.0;
 
 /// How long an emulator holds its last force.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -57,91 +60,37 @@ fn here() -> WorkspaceConfig {
 }
 
 fn a_falcon() -> Arm {
-    let keys = FalconConfig { silence_s: SILENCE_S, ..FalconConfig::default() };
-    let constants = arm::falcon::checked(&FalconConfig { port: "-".into(), ..keys.clone() }).unwrap();
-    let emulated = falcon::Falcon::start(falcon::Settings {
-        constants,
-        firmware: None,
-        homing: Duration::ZERO,
-        watchdog: None,
-        arm: ArmSpec::default(),
-        path: resting(),
-    });
-    let emulated = emulated.unwrap();
-    let device = DeviceConfig::Falcon(FalconConfig { port: emulated.port().into(), ..keys });
-    Arm { device, workspace: here(), force_n: Box::new(move || emulated.force_n()), holds: Holds::ForEver }
+    Arm { emulated: arms::falcon(resting()), workspace: here(), holds: Holds::ForEver }
 }
 
 fn a_2diy() -> Arm {
-    let keys = Haply2diyConfig { silence_s: SILENCE_S, max_torque_nm: 0.4, ..Haply2diyConfig::default() };
-    let constants = arm::haply_2diy::checked(&Haply2diyConfig { port: "-".into(), ..keys.clone() }).unwrap();
-    let emulated = haply_2diy::Haply2diy::start(haply_2diy::Settings {
-        constants,
-        knows_home: true,
-        watchdog: None,
-        arm: ArmSpec::default(),
-        path: resting(),
-    });
-    let emulated = emulated.unwrap();
-    let device = DeviceConfig::Haply2diy(Haply2diyConfig { port: emulated.port().into(), ..keys });
     // Its plane stands upright.
     let axes = ["+x", "+z", "-y"].map(str::to_owned);
     let workspace = WorkspaceConfig { axes, ..WorkspaceConfig::default() };
-    Arm { device, workspace, force_n: Box::new(move || emulated.force_n()), holds: Holds::ForEver }
+    Arm { emulated: arms::haply_2diy(resting()), workspace, holds: Holds::ForEver }
 }
 
 fn a_vrpn_server() -> Arm {
     let settings = vrpn::Settings { keeps: true, path: resting(), ..vrpn::Settings::default() };
-    let names = settings.names.clone();
-    let emulated = vrpn::Vrpn::listen("127.0.0.1:0", settings).unwrap();
-    let [tracker, button, force_device] = names;
-    let device = DeviceConfig::Vrpn(VrpnConfig {
-        address: emulated.address().to_string(),
-        tracker,
-        button,
-        force_device,
-        silence_s: SILENCE_S,
-        ..VrpnConfig::default()
-    });
-    Arm { device, workspace: here(), force_n: Box::new(move || emulated.force_n()), holds: Holds::ForEver }
+    Arm { emulated: arms::vrpn(settings), workspace: here(), holds: Holds::ForEver }
 }
 
 fn a_hapticmaster() -> Arm {
     let settings = hapticmaster::Settings { path: resting(), ..hapticmaster::Settings::default() };
-    hapticmaster_of(settings, HapticMasterContact::Bias, (here(), Holds::WhileConnected))
+    let emulated = arms::hapticmaster(settings, HapticMasterContact::Bias);
+    Arm { emulated, workspace: here(), holds: Holds::WhileConnected }
 }
 
 /// It keeps its effects when a connection ends, and renders the wall by itself.
 fn a_hapticmaster_with_a_plane() -> Arm {
     let mut settings = hapticmaster::Settings { path: press::path(), ..hapticmaster::Settings::default() };
     settings.effects.kept = true;
-    hapticmaster_of(settings, HapticMasterContact::Plane, (elsewhere(), Holds::ForEver))
-}
-
-fn hapticmaster_of(
-    mut settings: hapticmaster::Settings,
-    contact: HapticMasterContact,
-    (workspace, holds): (WorkspaceConfig, Holds),
-) -> Arm {
-    settings.arm.hand_damping_n_s_per_m = 40.0;
-    let emulated = hapticmaster::HapticMaster::listen("127.0.0.1:0", settings).unwrap();
-    let device = DeviceConfig::Hapticmaster(HapticMasterConfig {
-        address: emulated.address().to_string(),
-        contact,
-        silence_s: SILENCE_S,
-        ..HapticMasterConfig::default()
-    });
-    Arm { device, workspace, force_n: Box::new(move || emulated.effect_n()), holds }
+    let emulated = arms::hapticmaster(settings, HapticMasterContact::Plane);
+    Arm { emulated, workspace: elsewhere(), holds: Holds::ForEver }
 }
 
 fn a_woodenhaptics() -> Arm {
-    let keys = WoodenHapticsConfig { silence_s: SILENCE_S, ..WoodenHapticsConfig::default() };
-    let constants = arm::woodenhaptics::checked(&WoodenHapticsConfig { port: "-".into(), ..keys.clone() }).unwrap();
-    let (arm, path) = (ArmSpec::default(), resting());
-    let settings = woodenhaptics::Settings { constants, answers: false, arm, path };
-    let emulated = woodenhaptics::WoodenHaptics::start(settings).unwrap();
-    let device = DeviceConfig::Woodenhaptics(WoodenHapticsConfig { port: emulated.port().into(), ..keys });
-    Arm { device, workspace: here(), force_n: Box::new(move || emulated.force_n()), holds: Holds::NotForLong }
+    Arm { emulated: arms::woodenhaptics(resting()), workspace: here(), holds: Holds::NotForLong }
 }
 
 type Start = fn() -> Arm;
@@ -201,17 +150,17 @@ impl Drop for Bridge {
 async fn pushed(arm: &Arm, happens: Happens, change: impl FnOnce(&mut Config)) -> Bridge {
     let mock = Mock::default();
     let by_plane =
-        matches!(&arm.device, DeviceConfig::Hapticmaster(keys) if keys.contact == HapticMasterContact::Plane);
+        matches!(&arm.emulated.device, DeviceConfig::Hapticmaster(keys) if keys.contact == HapticMasterContact::Plane);
     mock.set(|behaviour| behaviour.local_model = by_plane.then(wall));
     let (address, _stop, _serving) = mock.serve("127.0.0.1:0").await;
-    let mut config = bridged(&format!("http://{address}"), arm.device.clone());
+    let mut config = bridged(&format!("http://{address}"), arm.emulated.device.clone());
     config.workspace = arm.workspace.clone();
     change(&mut config);
     let mut bridge = Bridge::start(&config);
     let enough_n = if by_plane { 0.8 } else { 0.9 };
     until("it pushes", || {
         bridge.assert_runs();
-        (arm.force_n)().length() > enough_n
+        arm.force_n().length() > enough_n
     })
     .await;
     happens(&mut bridge);
@@ -229,27 +178,37 @@ async fn the_force_is_taken_away_when_the_bridge_is_killed_or_hangs() {
         for (what, happens) in ENDS {
             let arm = start();
             let _bridge = pushed(&arm, happens, |_| ()).await;
-            until(&format!("a {name} whose bridge was {what} lets go"), || (arm.force_n)() == DVec3::ZERO).await;
+            until(&format!("a {name} whose bridge was {what} lets go"), || arm.force_n() == DVec3::ZERO).await;
         }
     }
 }
 
-/// The arm's answers to the guard were taken for its answers to the bridge, which ended.
+/// The arm's answers to the guard were taken for its answers to the bridge, which ended. Nor may the force be back at once, or twice over.
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn a_bridge_that_hung_goes_on_and_its_force_comes_back() {
     for (name, start) in ARMS {
         let arm = start();
-        let mut bridge = pushed(&arm, Bridge::stop, |config| config.servo.auto_recover = true).await;
-        until(&format!("a {name} lets go"), || (arm.force_n)() == DVec3::ZERO).await;
+        let ramp_up_s = 0.5;
+        let mut bridge = pushed(&arm, Bridge::stop, |config| {
+            config.servo.auto_recover = true;
+            config.watchdog.ramp_up_s = ramp_up_s;
+        })
+        .await;
+        until(&format!("a {name} lets go"), || arm.force_n() == DVec3::ZERO).await;
         for _ in 0..2 {
+            let since = Instant::now();
             bridge.go_on();
             until(&format!("a {name} is pushed again"), || {
                 bridge.assert_runs();
-                (arm.force_n)().length() > 0.8
+                let force_n = arm.force_n().length();
+                // F <= t/ramp_up F_full, with what encoders' steps and the arm's movements make of it.
+                let ramp = (since.elapsed().as_secs_f64() / ramp_up_s).min(1.0);
+                assert!(force_n <= ramp * FULL_N + 0.1, "a {name}: {force_n} N at {ramp} of the ramp");
+                force_n > 0.8
             })
             .await;
             bridge.stop();
-            until(&format!("a {name} lets go again"), || (arm.force_n)() == DVec3::ZERO).await;
+            until(&format!("a {name} lets go again"), || arm.force_n() == DVec3::ZERO).await;
         }
     }
 }
@@ -268,7 +227,7 @@ async fn without_a_guard_the_force_stays_where_the_arm_itself_does_not_let_go() 
                 Holds::WhileConnected => what == "stopped",
                 Holds::ForEver => true,
             };
-            let force_n = (arm.force_n)();
+            let force_n = arm.force_n();
             // It moves meanwhile, and with it what its torques are worth.
             assert_eq!(force_n.length() > 0.5, holds, "a {name} whose bridge was {what}: {force_n}");
         }
@@ -282,5 +241,5 @@ async fn an_arm_that_is_recorded_is_guarded_too() {
     let arm = a_falcon();
     let record = RecordConfig { path: Some(folder.path().join("arm.csv")), overwrite: false };
     let _bridge = pushed(&arm, Bridge::kill, |config| config.record = record).await;
-    until("it lets go", || (arm.force_n)() == DVec3::ZERO).await;
+    until("it lets go", || arm.force_n() == DVec3::ZERO).await;
 }

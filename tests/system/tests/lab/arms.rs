@@ -1,21 +1,22 @@
 //! One arm of each kind that is not there, held by the same hand.
+#[path = "../../../../device-bridge/tests/common/arms.rs"]
+mod emulated;
+
+pub use emulated::Emulated;
+use emulated::SILENCE_S;
 use glam::DVec3;
 use palpate_bridge::{
     config::{
-        DeviceConfig, FalconConfig, Haply2diyConfig, HapticMasterConfig, HapticMasterContact, Inverse3Config,
-        KeyframeConfig, PhantomConfig, PlaybackConfig, SimulatedConfig, VrpnConfig, WoodenHapticsConfig,
-        WorkspaceConfig,
+        DeviceConfig, HapticMasterContact, Inverse3Config, KeyframeConfig, PhantomConfig, PlaybackConfig,
+        SimulatedConfig, WorkspaceConfig,
     },
-    emulate::{falcon, haply_2diy, hapticmaster, inverse3, phantom, vrpn, woodenhaptics},
-    settings::arm,
+    emulate::{hapticmaster, inverse3, phantom, vrpn},
 };
-use palpate_control::{ArmSpec, HandPath, Keyframe};
-use std::{path::Path, time::Duration};
+use palpate_control::{HandPath, Keyframe};
+use std::path::Path;
 
 /// Where in the world the middle of the arms' workspaces is (m): 5 mm outside the place where the finger touches the ventricle.
 pub const MIDDLE_M: DVec3 = DVec3::new(0.045, 0.0, 0.0);
-/// Without an answer for so long an arm is lost: patient with a busy test machine.
-const SILENCE_S: f64 = 0.4;
 
 /// A hand that goes along the world's x: times (s) and places (m), again and again.
 #[derive(Debug, Clone)]
@@ -35,25 +36,6 @@ impl Hand {
     }
 }
 
-/// It is there until dropped.
-pub struct Emulated {
-    pub device: DeviceConfig,
-    /// Of its motors, in its own axes (N); of one that lives in the bridge, none.
-    motors_n: Box<dyn Fn() -> DVec3>,
-}
-
-impl Emulated {
-    /// `there` is what `force_n` looks at.
-    fn new<T: 'static>(device: DeviceConfig, there: T, force_n: fn(&T) -> DVec3) -> Self {
-        Self { device, motors_n: Box::new(move || force_n(&there)) }
-    }
-
-    /// Its motors' force (N).
-    pub fn force_n(&self) -> f64 {
-        (self.motors_n)().length()
-    }
-}
-
 /// In the world: as it is turned, where it has room.
 pub fn workspace() -> WorkspaceConfig {
     WorkspaceConfig { origin_m: MIDDLE_M.to_array(), ..WorkspaceConfig::default() }
@@ -68,54 +50,21 @@ pub fn simulated(hand: &Hand) -> Emulated {
 
 /// `plane`: it renders the contact itself.
 pub fn hapticmaster(hand: &Hand, plane: bool) -> Emulated {
-    let mut settings = hapticmaster::Settings { path: hand.path(), homing: None, ..Default::default() };
-    // A hand that holds two kilograms.
-    settings.arm.hand_damping_n_s_per_m = 40.0;
-    let arm = hapticmaster::HapticMaster::listen("127.0.0.1:0", settings).unwrap();
-    let address = arm.address().to_string();
-    let contact = if plane { HapticMasterContact::Plane } else { HapticMasterContact::Bias };
-    let keys = HapticMasterConfig { address, contact, silence_s: SILENCE_S, ..HapticMasterConfig::default() };
-    Emulated::new(DeviceConfig::Hapticmaster(keys), arm, hapticmaster::HapticMaster::effect_n)
+    let settings = hapticmaster::Settings { path: hand.path(), homing: None, ..Default::default() };
+    emulated::hapticmaster(settings, if plane { HapticMasterContact::Plane } else { HapticMasterContact::Bias })
 }
 
 pub fn woodenhaptics(hand: &Hand) -> Emulated {
-    let keys = |port: &str| WoodenHapticsConfig {
-        port: port.to_owned(),
-        centre_m: [0.22, 0.0, 0.08],
-        silence_s: SILENCE_S,
-        ..WoodenHapticsConfig::default()
-    };
-    let constants = arm::woodenhaptics::checked(&keys("")).unwrap();
-    let settings = woodenhaptics::Settings { constants, answers: false, arm: ArmSpec::default(), path: hand.path() };
-    let arm = woodenhaptics::WoodenHaptics::start(settings).unwrap();
-    let device = DeviceConfig::Woodenhaptics(keys(arm.port()));
-    Emulated::new(device, arm, woodenhaptics::WoodenHaptics::force_n)
+    emulated::woodenhaptics(hand.path())
 }
 
+/// The press is in its plane.
 pub fn haply_2diy(hand: &Hand) -> Emulated {
-    let keys = |port: &str| Haply2diyConfig {
-        port: port.to_owned(),
-        // The press is in its plane, and asks for more than the motors of the kit.
-        counts_per_turn: [40_000.0; 2],
-        max_torque_nm: 0.4,
-        silence_s: SILENCE_S,
-        ..Haply2diyConfig::default()
-    };
-    let constants = arm::haply_2diy::checked(&keys("")).unwrap();
-    let (arm, path) = (ArmSpec::default(), hand.path());
-    let settings = haply_2diy::Settings { constants, knows_home: true, watchdog: None, arm, path };
-    let arm = haply_2diy::Haply2diy::start(settings).unwrap();
-    let device = DeviceConfig::Haply2diy(keys(arm.port()));
-    Emulated::new(device, arm, haply_2diy::Haply2diy::force_n)
+    emulated::haply_2diy(hand.path())
 }
 
 pub fn falcon(hand: &Hand) -> Emulated {
-    let keys = |port: &str| FalconConfig { port: port.to_owned(), silence_s: SILENCE_S, ..FalconConfig::default() };
-    let constants = arm::falcon::checked(&keys("")).unwrap();
-    let (arm, path) = (ArmSpec::default(), hand.path());
-    let settings = falcon::Settings { constants, firmware: None, homing: Duration::ZERO, watchdog: None, arm, path };
-    let arm = falcon::Falcon::start(settings).unwrap();
-    Emulated::new(DeviceConfig::Falcon(keys(arm.port())), arm, falcon::Falcon::force_n)
+    emulated::falcon(hand.path())
 }
 
 pub fn inverse3(hand: &Hand) -> Emulated {
@@ -126,13 +75,7 @@ pub fn inverse3(hand: &Hand) -> Emulated {
 }
 
 pub fn vrpn(hand: &Hand) -> Emulated {
-    let settings = vrpn::Settings { path: hand.path(), ..vrpn::Settings::default() };
-    let names = settings.names.clone();
-    let arm = vrpn::Vrpn::listen("127.0.0.1:0", settings).unwrap();
-    let [tracker, button, force_device] = names;
-    let address = arm.address().to_string();
-    let keys = VrpnConfig { address, tracker, button, force_device, silence_s: SILENCE_S, ..VrpnConfig::default() };
-    Emulated::new(DeviceConfig::Vrpn(keys), arm, vrpn::Vrpn::force_n)
+    emulated::vrpn(vrpn::Settings { path: hand.path(), ..vrpn::Settings::default() })
 }
 
 /// `libhd`: what stands in libHD's place.

@@ -40,7 +40,7 @@ impl Lab {
 
     /// The arm's force (N), whoever drives it.
     pub fn force_n(&self) -> f64 {
-        self.arm.force_n()
+        self.arm.force_n().length()
     }
 
     /// Waits for a force (N).
