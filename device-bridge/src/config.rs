@@ -270,6 +270,7 @@ impl Config {
     /// [`BridgeError::Config`], with the place in the text.
     pub fn parse(text: &str, name: &str) -> Result<Self, BridgeError> {
         toml::from_str(text).map_err(|error| {
+            let error = device::wrong_key(text).unwrap_or(error);
             BridgeError::Config(Box::new(ConfigError {
                 help: nearest_key(error.message()),
                 message: error.message().to_owned(),
@@ -280,9 +281,10 @@ impl Config {
     }
 }
 
-/// From "unknown field `rate_hz2`, expected one of `rate_hz`, …": the nearest of the known ones.
+/// From "unknown field `rate_hz2`, expected one of `rate_hz`, …": the nearest of the known ones. Words that a key may have are variants.
 fn nearest_key(message: &str) -> Option<String> {
-    let (unknown, expected) = message.strip_prefix("unknown field `")?.split_once('`')?;
+    let unknown = ["unknown field `", "unknown variant `"].into_iter().find_map(|start| message.strip_prefix(start));
+    let (unknown, expected) = unknown?.split_once('`')?;
     let (nearest, distance) = expected
         .split('`')
         .skip(1)
@@ -299,6 +301,7 @@ fn nearest_key(message: &str) -> Option<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::device::kinds;
 
     fn mistake(text: &str) -> ConfigError {
         match Config::parse(text, "t") {
@@ -316,10 +319,9 @@ mod tests {
 
     #[test]
     fn the_examples_are_valid() {
-        for example in
-            ["bridge.toml", "hapticmaster.toml", "woodenhaptics.toml", "phantom.toml", "inverse3.toml", "playback.toml"]
-        {
-            let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../deploy").join(example);
+        // The simulated arm's has another name.
+        for example in kinds::KINDS.iter().map(|kind| kind.name.replace("simulated", "bridge")) {
+            let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../deploy").join(example).with_extension("toml");
             let config = Config::read(&path).unwrap();
             crate::settings::Settings::new(&config).unwrap();
         }
@@ -335,11 +337,22 @@ mod tests {
     }
 
     #[test]
-    fn an_unknown_key_of_the_device_is_refused() {
-        let text = "[device]\nkind = \"simulated\"\nmass = 0.1\n";
-        let ConfigError { message, help, .. } = mistake(text);
-        assert!(message.contains("`mass`"), "{message}");
-        assert_eq!(help.unwrap(), "did you mean `mass_kg`?");
+    fn what_is_wrong_with_the_device_is_said_with_its_place() {
+        for (text, wrong, advice) in [
+            ("[device]\nkind = \"simulated\"\nmass = 0.1\n", "mass", Some("mass_kg")),
+            ("[device]\nkind = \"hapticmaster\"\ncontact = \"plain\"\n", "\"plain\"", Some("plane")),
+            ("[device]\nsilence_s = \"long\"\nkind = \"haply-2diy\"\n", "\"long\"", None),
+            ("[device]\nkind = \"falcons\"\n", "\"falcons\"", Some("falcon")),
+            ("[device]\nport = \"x\"\n", "[device]", None),
+        ] {
+            let ConfigError { at, help, .. } = mistake(text);
+            let found = at.map(|at| &text[at.offset()..at.offset() + at.len()]);
+            assert_eq!(found, Some(wrong));
+            assert_eq!(help, advice.map(|word| format!("did you mean `{word}`?")), "{text}");
+        }
+        // Of the rest, although nothing is wrong with the device.
+        let text = "[device]\nkind = \"falcon\"\n[servo]\nrate_hz = true\n";
+        assert_eq!(mistake(text).at.unwrap().offset(), text.find("true").unwrap());
     }
 
     #[test]

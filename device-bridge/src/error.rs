@@ -88,11 +88,11 @@ pub enum BridgeError {
         source: std::io::Error,
     },
     /// The arm could not be started.
-    #[error("the arm cannot be started: {source}")]
-    #[diagnostic(help(
-        "check that it is switched on, that its emergency stop is released, and its address; docs/arms has a page for each arm"
-    ))]
+    #[error("the arm cannot be started")]
+    #[diagnostic(help("{help}"))]
     Start {
+        /// What to do.
+        help: &'static str,
         /// What the driver says.
         source: Box<dyn std::error::Error + Send + Sync>,
     },

@@ -9,6 +9,7 @@ mod simulated;
 mod vrpn;
 mod woodenhaptics;
 
+use crate::device::kinds;
 pub use falcon::FalconConfig;
 pub use haply_2diy::Haply2diyConfig;
 pub use hapticmaster::{HapticMasterConfig, HapticMasterContact};
@@ -17,6 +18,7 @@ pub use phantom::PhantomConfig;
 pub use playback::PlaybackConfig;
 use serde::{Deserialize, Serialize};
 pub use simulated::{KeyframeConfig, SimulatedConfig};
+use toml::de::{DeTable, DeValue};
 pub use vrpn::VrpnConfig;
 pub use woodenhaptics::WoodenHapticsConfig;
 
@@ -43,6 +45,15 @@ pub enum DeviceConfig {
     Falcon(FalconConfig),
     /// Any arm behind a VRPN server.
     Vrpn(VrpnConfig),
+}
+
+/// What is wrong with the keys of `[device]`, and where: serde forgets the places in a table whose type one of its own keys tells.
+pub(super) fn wrong_key(text: &str) -> Option<toml::de::Error> {
+    let mut document = DeTable::parse(text).ok()?;
+    let mut device = document.get_mut().remove("device")?;
+    let DeValue::Table(table) = device.get_mut() else { return None };
+    let kind = table.remove("kind")?;
+    (kinds::named(kind.get_ref().as_str()?)?.keys)(device.into()).err()
 }
 
 impl Default for DeviceConfig {

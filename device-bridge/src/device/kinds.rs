@@ -3,7 +3,9 @@ use crate::config::{
     DeviceConfig, FalconConfig, Haply2diyConfig, HapticMasterConfig, Inverse3Config, PhantomConfig, PlaybackConfig,
     SimulatedConfig, VrpnConfig, WoodenHapticsConfig,
 };
+use serde::de::DeserializeOwned;
 use std::fmt::Write as _;
+use toml::de::ValueDeserializer;
 
 /// What is told of a kind.
 #[derive(Debug, Clone, Copy)]
@@ -18,6 +20,8 @@ pub struct Kind {
     pub tried: &'static str,
     /// Its keys, each with its default.
     pub default: fn() -> DeviceConfig,
+    /// Reads its keys, for the place where something is wrong with them.
+    pub keys: fn(ValueDeserializer<'_>) -> Result<(), toml::de::Error>,
 }
 
 /// All of them.
@@ -28,6 +32,7 @@ pub static KINDS: [Kind; 9] = [
         needs: "nothing",
         tried: "itself",
         default: || DeviceConfig::Simulated(SimulatedConfig::default()),
+        keys: keys::<SimulatedConfig>,
     },
     Kind {
         name: "hapticmaster",
@@ -35,6 +40,7 @@ pub static KINDS: [Kind; 9] = [
         needs: "its address in the same network (docs/arms/hapticmaster.md)",
         tried: "palpate-bridge emulate hapticmaster; no hardware yet",
         default: || DeviceConfig::Hapticmaster(HapticMasterConfig::default()),
+        keys: keys::<HapticMasterConfig>,
     },
     Kind {
         name: "woodenhaptics",
@@ -42,6 +48,7 @@ pub static KINDS: [Kind; 9] = [
         needs: "its port, and the right to open it (docs/arms/woodenhaptics.md)",
         tried: "palpate-bridge emulate woodenhaptics; no hardware yet",
         default: || DeviceConfig::Woodenhaptics(WoodenHapticsConfig::default()),
+        keys: keys::<WoodenHapticsConfig>,
     },
     Kind {
         name: "phantom",
@@ -49,6 +56,7 @@ pub static KINDS: [Kind; 9] = [
         needs: "OpenHaptics and the arm's driver (docs/arms/phantom.md)",
         tried: "a library in libHD's place and palpate-bridge emulate phantom; no hardware yet",
         default: || DeviceConfig::Phantom(PhantomConfig::default()),
+        keys: keys::<PhantomConfig>,
     },
     Kind {
         name: "inverse3",
@@ -56,6 +64,7 @@ pub static KINDS: [Kind; 9] = [
         needs: "Haply's Inverse service, on this machine or another (docs/arms/inverse3.md)",
         tried: "palpate-bridge emulate inverse3; no hardware yet",
         default: || DeviceConfig::Inverse3(Inverse3Config::default()),
+        keys: keys::<Inverse3Config>,
     },
     Kind {
         name: "playback",
@@ -63,6 +72,7 @@ pub static KINDS: [Kind; 9] = [
         needs: "the file (docs/arms/playback.md)",
         tried: "recordings of the simulated arm",
         default: || DeviceConfig::Playback(PlaybackConfig::default()),
+        keys: keys::<PlaybackConfig>,
     },
     Kind {
         name: "haply-2diy",
@@ -70,6 +80,7 @@ pub static KINDS: [Kind; 9] = [
         needs: "its port, and the right to open it (docs/arms/haply-2diy.md)",
         tried: "palpate-bridge emulate haply-2diy; no hardware yet",
         default: || DeviceConfig::Haply2diy(Haply2diyConfig::default()),
+        keys: keys::<Haply2diyConfig>,
     },
     Kind {
         name: "falcon",
@@ -77,6 +88,7 @@ pub static KINDS: [Kind; 9] = [
         needs: "its port, the right to open it, and Novint's firmware (docs/arms/falcon.md)",
         tried: "palpate-bridge emulate falcon; no hardware yet",
         default: || DeviceConfig::Falcon(FalconConfig::default()),
+        keys: keys::<FalconConfig>,
     },
     Kind {
         name: "vrpn",
@@ -84,8 +96,13 @@ pub static KINDS: [Kind; 9] = [
         needs: "the server's address and the arm's names there (docs/arms/vrpn.md)",
         tried: "palpate-bridge emulate vrpn; no hardware yet",
         default: || DeviceConfig::Vrpn(VrpnConfig::default()),
+        keys: keys::<VrpnConfig>,
     },
 ];
+
+fn keys<Keys: DeserializeOwned>(table: ValueDeserializer<'_>) -> Result<(), toml::de::Error> {
+    Keys::deserialize(table).map(|_| ())
+}
 
 /// The one with this name.
 pub fn named(name: &str) -> Option<&'static Kind> {

@@ -24,7 +24,7 @@ pub mod workspace;
 
 use crate::{
     BridgeError,
-    recording::recorder::Recorded,
+    recording::{read::RecordingError, recorder::Recorded},
     settings::{ArmSettings, DeviceSettings},
 };
 use falcon::Falcon;
@@ -206,7 +206,7 @@ fn open_arm(settings: &ArmSettings, period_s: f64, stop: &CancellationToken) -> 
         ArmSettings::Simulated(arm) => Box::new(SimulatedDevice::new(arm.clone())),
         ArmSettings::HapticMaster(settings) => Box::new(HapticMaster::open(settings, period_s, stop)?),
         ArmSettings::Inverse3(settings) => Box::new(Inverse3::start(settings).map_err(unstarted)?),
-        ArmSettings::Playback(settings) => Box::new(Playback::open(settings, period_s).map_err(unstarted)?),
+        ArmSettings::Playback(settings) => Box::new(Playback::open(settings, period_s).map_err(unreadable)?),
         ArmSettings::Vrpn(settings) => Box::new(Vrpn::start(settings, period_s).map_err(unstarted)?),
         ArmSettings::WoodenHaptics(settings) => Box::new(WoodenHaptics::start(settings, period_s).map_err(unstarted)?),
         ArmSettings::Phantom(settings) => Box::new(Phantom::open(settings, period_s, stop)?),
@@ -215,6 +215,12 @@ fn open_arm(settings: &ArmSettings, period_s: f64, stop: &CancellationToken) -> 
     })
 }
 
+fn unreadable(error: RecordingError) -> BridgeError {
+    let help = "palpate-bridge --record FILE writes such files; docs/arms/playback.md tells what is in them";
+    BridgeError::Start { help, source: Box::new(error) }
+}
+
 fn unstarted(error: impl std::error::Error + Send + Sync + 'static) -> BridgeError {
-    BridgeError::Start { source: Box::new(error) }
+    let help = "check that it is switched on, that its emergency stop is released, and its address; docs/arms has a page for each arm";
+    BridgeError::Start { help, source: Box::new(error) }
 }

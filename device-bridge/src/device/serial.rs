@@ -26,12 +26,12 @@ pub const FAREWELL: Duration = Duration::from_millis(100);
 
 /// A port that cannot be opened.
 #[derive(Debug, Error)]
-#[error("cannot open the serial port {path}: {source}")]
+#[error("cannot open the serial port {path}: {reason}")]
 pub struct OpenError {
     /// Which.
     pub path: String,
     /// Why.
-    pub source: serialport::Error,
+    pub reason: serialport::Error,
 }
 
 /// An arm that could not be started.
@@ -115,7 +115,7 @@ impl Line {
     /// # Errors
     /// [`OpenError`], naming the path.
     pub fn open(path: &str, baud: u32) -> Result<Self, OpenError> {
-        let failed = |source| OpenError { path: path.to_owned(), source };
+        let failed = |reason| OpenError { path: path.to_owned(), reason };
         // Before the port itself, which is for one alone; it must not wait for a carrier, nor become our terminal.
         let flags = (OFlags::NOCTTY | OFlags::NONBLOCK).bits().cast_signed();
         let spare = File::options().read(true).write(true).custom_flags(flags).open(path);

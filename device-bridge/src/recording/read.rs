@@ -30,12 +30,12 @@ pub struct Pose {
 #[derive(Debug, Error)]
 pub enum RecordingError {
     /// Not a file, or not for us.
-    #[error("cannot read {path}: {source}", path = path.display())]
+    #[error("cannot read {path}: {reason}", path = path.display())]
     Read {
         /// Which.
         path: PathBuf,
         /// Why.
-        source: std::io::Error,
+        reason: std::io::Error,
     },
     /// Something in it is wrong.
     #[error("{name}, line {line}: {reason}")]
@@ -54,7 +54,7 @@ pub enum RecordingError {
 /// # Errors
 /// [`RecordingError`].
 pub fn file(path: &Path) -> Result<Vec<Pose>, RecordingError> {
-    let bytes = std::fs::read(path).map_err(|source| RecordingError::Read { path: path.to_owned(), source })?;
+    let bytes = std::fs::read(path).map_err(|reason| RecordingError::Read { path: path.to_owned(), reason })?;
     poses(&bytes, &path.display().to_string())
 }
 
@@ -136,7 +136,7 @@ fn row(bytes: &[u8], places: &Places) -> Result<Pose, String> {
 }
 
 fn text(bytes: &[u8]) -> Result<&str, String> {
-    std::str::from_utf8(bytes).map_err(|_| "is no text".to_owned())
+    std::str::from_utf8(bytes).map_err(|_| "is no UTF-8 text".to_owned())
 }
 
 fn finite(word: &str, most: f64) -> Result<f64, String> {
@@ -204,7 +204,7 @@ mod tests {
         let cut = &good.as_bytes()[..good.len() - 30];
         assert!(poses(cut, "a.csv").unwrap_err().to_string().starts_with("a.csv, line 3: "));
         let bytes = [good.as_bytes(), b"\xff\n"].concat();
-        assert_eq!(poses(&bytes, "a.csv").unwrap_err().to_string(), "a.csv, line 4: is no text");
+        assert_eq!(poses(&bytes, "a.csv").unwrap_err().to_string(), "a.csv, line 4: is no UTF-8 text");
         let missing = file(Path::new("/nowhere/a.csv")).unwrap_err().to_string();
         assert!(missing.starts_with("cannot read /nowhere/a.csv: "), "{missing}");
     }

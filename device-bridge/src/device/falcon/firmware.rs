@@ -32,12 +32,12 @@ const LOOK_EVERY: Duration = Duration::from_micros(500);
 #[derive(Debug, Error)]
 pub enum LoadError {
     /// No file.
-    #[error("cannot read the firmware {file}: {source}")]
+    #[error("cannot read the firmware {file}: {reason}")]
     Read {
         /// Which.
         file: String,
         /// Why.
-        source: std::io::Error,
+        reason: std::io::Error,
     },
     /// Another file.
     #[error("{file} is no firmware of a Falcon: it has {bytes} bytes")]
@@ -101,7 +101,7 @@ pub fn load(line: &mut Line, path: &str, file: &Path, stop: &CancellationToken) 
 
 fn read(file: &Path) -> Result<Vec<u8>, LoadError> {
     let name = || file.display().to_string();
-    let unread = |source| LoadError::Read { file: name(), source };
+    let unread = |reason| LoadError::Read { file: name(), reason };
     let bytes = std::fs::metadata(file).map_err(unread)?.len();
     if !(1..=MOST_BYTES).contains(&bytes) {
         return Err(LoadError::NoFirmware { file: name(), bytes });

@@ -57,20 +57,20 @@ pub struct Started {
 #[derive(Debug, Error)]
 pub enum StartError {
     /// Nobody there.
-    #[error("no HapticMASTER answers at {address}: {source}")]
+    #[error("no HapticMASTER answers at {address}: {reason}")]
     Unreachable {
         /// Host and port.
         address: String,
         /// Why.
-        source: std::io::Error,
+        reason: std::io::Error,
     },
     /// It went away.
-    #[error("the connection to the HapticMASTER broke at \"{command}\": {source}")]
+    #[error("the connection to the HapticMASTER broke at \"{command}\": {reason}")]
     Broken {
         /// What was asked.
         command: String,
         /// Why.
-        source: std::io::Error,
+        reason: std::io::Error,
     },
     /// It does not answer.
     #[error("no answer to \"{command}\" within {} s", PATIENCE.as_secs())]
@@ -137,7 +137,7 @@ pub fn start(settings: &StartSettings, stop: &CancellationToken) -> Result<Start
 }
 
 fn connect(address: &str) -> Result<TcpStream, StartError> {
-    tcp::connect(address, PATIENCE).map_err(|source| StartError::Unreachable { address: address.to_owned(), source })
+    tcp::connect(address, PATIENCE).map_err(|reason| StartError::Unreachable { address: address.to_owned(), reason })
 }
 
 struct Talk {
@@ -197,7 +197,7 @@ impl Talk {
     }
 
     fn ask(&mut self, command: &str, ends_with_vector: bool) -> Result<String, StartError> {
-        let broken = |source| StartError::Broken { command: command.to_owned(), source };
+        let broken = |reason| StartError::Broken { command: command.to_owned(), reason };
         let strange = |answer: &[u8]| StartError::Strange {
             command: command.to_owned(),
             answer: String::from_utf8_lossy(&answer[..answer.len().min(80)]).into_owned(),

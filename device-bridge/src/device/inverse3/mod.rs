@@ -72,12 +72,12 @@ pub enum StartError {
         url: String,
     },
     /// Nobody there.
-    #[error("no service answers at {url}: {source}; is Haply's Inverse service running there?")]
+    #[error("no service answers at {url}: {reason}; is Haply's Inverse service running there?")]
     Connect {
         /// Its address.
         url: String,
         /// Why.
-        source: std::io::Error,
+        reason: std::io::Error,
     },
     /// Somebody else there.
     #[error("{url} does not speak WebSocket: {reason}; is it the Inverse service's port?")]
@@ -126,12 +126,12 @@ pub enum StartError {
         device_id: String,
     },
     /// The operating system refused something.
-    #[error("cannot {what}: {source}")]
+    #[error("cannot {what}: {reason}")]
     System {
         /// What.
         what: &'static str,
         /// Why.
-        source: std::io::Error,
+        reason: std::io::Error,
     },
 }
 
@@ -155,7 +155,7 @@ impl Inverse3 {
     /// # Errors
     /// [`StartError`].
     pub fn start(settings: &Settings) -> Result<Self, StartError> {
-        let system = |what| move |source| StartError::System { what, source };
+        let system = |what| move |reason| StartError::System { what, reason };
         let mut socket = connect(&settings.url)?;
         let first = first_message(&mut socket, &settings.url)?;
         let names = Names { arm: choose(&first, settings)?, grip: settings.grip_id.clone(), dialect: settings.dialect };
@@ -250,7 +250,7 @@ fn place(url: &str) -> Option<(String, u16)> {
 /// The first of the addresses of `localhost` may be one where nobody listens: all are tried.
 fn connect(url: &str) -> Result<WebSocket<TcpStream>, StartError> {
     let host_and_port = place(url).ok_or_else(|| StartError::Address { url: url.to_owned() })?;
-    let refused = |source| StartError::Connect { url: url.to_owned(), source };
+    let refused = |reason| StartError::Connect { url: url.to_owned(), reason };
     let mut last = std::io::ErrorKind::NotFound.into();
     for address in host_and_port.to_socket_addrs().map_err(refused)? {
         match TcpStream::connect_timeout(&address, PATIENCE) {
@@ -262,7 +262,7 @@ fn connect(url: &str) -> Result<WebSocket<TcpStream>, StartError> {
 }
 
 fn shake_hands(stream: TcpStream, url: &str) -> Result<WebSocket<TcpStream>, StartError> {
-    let refused = |source| StartError::Connect { url: url.to_owned(), source };
+    let refused = |reason| StartError::Connect { url: url.to_owned(), reason };
     stream.set_nodelay(true).map_err(refused)?;
     stream.set_read_timeout(Some(PATIENCE)).map_err(refused)?;
     stream.set_write_timeout(Some(PATIENCE)).map_err(refused)?;
@@ -281,7 +281,7 @@ fn shake_hands(stream: TcpStream, url: &str) -> Result<WebSocket<TcpStream>, Sta
 }
 
 fn first_message(socket: &mut WebSocket<TcpStream>, url: &str) -> Result<Bytes, StartError> {
-    let refused = |source| StartError::Connect { url: url.to_owned(), source };
+    let refused = |reason| StartError::Connect { url: url.to_owned(), reason };
     socket.get_ref().set_read_timeout(Some(LOOK_EVERY)).map_err(refused)?;
     let began = Instant::now();
     while began.elapsed() < PATIENCE {

@@ -92,7 +92,7 @@ impl Vrpn {
     /// [`StartError`].
     pub fn start(settings: &Settings, period_s: f64) -> Result<Self, StartError> {
         let started = start::start(settings)?;
-        let broken = |source| StartError::Broken { address: settings.address.clone(), source };
+        let broken = |reason| StartError::Broken { address: settings.address.clone(), reason };
         started.stream.set_nonblocking(true).map_err(broken)?;
         let mut arm = Self {
             stream: started.stream,

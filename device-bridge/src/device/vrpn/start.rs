@@ -23,20 +23,20 @@ const LOOK_EVERY: Duration = Duration::from_millis(50);
 #[derive(Debug, Error)]
 pub enum StartError {
     /// Nobody there.
-    #[error("no VRPN server answers at {address}: {source}")]
+    #[error("no VRPN server answers at {address}: {reason}")]
     Unreachable {
         /// Host and port.
         address: String,
         /// Why.
-        source: std::io::Error,
+        reason: std::io::Error,
     },
     /// It went away.
-    #[error("the connection to {address} broke: {source}")]
+    #[error("the connection to {address} broke: {reason}")]
     Broken {
         /// Host and port.
         address: String,
         /// Why.
-        source: std::io::Error,
+        reason: std::io::Error,
     },
     /// Not a word.
     #[error("{address} does not say within {} s that it is a VRPN server", PATIENCE.as_secs())]
@@ -107,8 +107,8 @@ pub(super) fn names(settings: &Settings) -> (Vec<String>, Senders) {
 /// Connects, exchanges cookies and names, and waits until the arm has told where it is.
 pub(super) fn start(settings: &Settings) -> Result<Started, StartError> {
     let address = || settings.address.clone();
-    let unreachable = |source| StartError::Unreachable { address: address(), source };
-    let broken = |source| StartError::Broken { address: address(), source };
+    let unreachable = |reason| StartError::Unreachable { address: address(), reason };
+    let broken = |reason| StartError::Broken { address: address(), reason };
     let mut stream = tcp::connect(&settings.address, PATIENCE).map_err(unreachable)?;
     stream.set_read_timeout(Some(LOOK_EVERY)).map_err(broken)?;
     stream.write_all(&wire::cookie()).map_err(broken)?;
@@ -159,7 +159,7 @@ fn await_some<T>(
     settings: &Settings,
     mut look: impl FnMut(&mut Peer) -> Result<Option<T>, StartError>,
 ) -> Result<Option<T>, StartError> {
-    let broken = |source| StartError::Broken { address: settings.address.clone(), source };
+    let broken = |reason| StartError::Broken { address: settings.address.clone(), reason };
     let began = Instant::now();
     loop {
         if let Some(found) = look(peer)? {
