@@ -105,7 +105,7 @@ fn check(model: &Model, state: &State) -> Result<(), SnapshotError> {
             (motion, seed) => motion.is_none() && seed.is_none(),
         }
         && match (&state.springs, model.springs()) {
-            (Some(own), Some(body)) => own.fits(body, model.spec().tools.len()),
+            (Some(own), Some(body)) => own.fits(body),
             (own, body) => own.is_none() && body.is_none(),
         };
     if !counts {

@@ -83,13 +83,20 @@ fn nor_do_ticks_that_are_repeated() {
 #[test]
 fn nor_does_waking_particles() {
     for fine_depth_m in [None, Some(2e-3)] {
-        wake_and_sleep(fine_depth_m);
+        for half_length_m in [None, Some(8e-3)] {
+            wake_and_sleep(fine_depth_m, half_length_m);
+        }
     }
 }
 
-fn wake_and_sleep(fine_depth_m: Option<f64>) {
+/// Beneath spheres, or capsules of this half length.
+fn wake_and_sleep(fine_depth_m: Option<f64>, half_length_m: Option<f64>) {
     let tets = rig(Integrator::Leapfrog);
     let mut spec = tets.model.spec().clone();
+    for tool in &mut spec.tools {
+        let capsule = |half_m| ToolShape::capsule(tool.coupling, tool.radius_m, half_m, DVec3::new(1.0, 0.5, 0.0));
+        tool.shape = half_length_m.map_or(ToolShape::Sphere, capsule);
+    }
     let surface = tets.model.surface();
     let positions = surface.nodes.iter().map(|&n| tets.model.rest_positions_m()[n as usize]).collect();
     spec.particles = Some(ParticleSpec {

@@ -4,6 +4,7 @@ use super::{
     simulate::Run,
     summary::{Percentiles, TimeNumbers},
 };
+use glam::DVec3;
 use palpate_physics::{Model, hybrid::Waking};
 use palpate_scene::Scene;
 use std::time::{Duration, Instant};
@@ -100,7 +101,14 @@ fn near_first_tool(scene: &Scene, model: &Model) -> Vec<u32> {
     let from_tool_m = |particle: &u32| partition.particle_m(*particle).distance(tool.start_position_m);
     let Some(first) = all().min_by(|a, b| from_tool_m(a).total_cmp(&from_tool_m(b))) else { return Vec::new() };
     let centre_m = partition.particle_m(first);
-    let distance_m = |particle: u32| partition.particle_m(particle).distance(centre_m);
+    let capsule = tool.shape.as_capsule();
+    let half_m = capsule.map_or(DVec3::ZERO, |own| own.start_orientation * (DVec3::Z * own.half_length_m));
+    // From a point of a sphere, from a segment of a capsule.
+    let distance_m = |particle: u32| {
+        let from_centre_m = partition.particle_m(particle) - centre_m;
+        let along = (from_centre_m.dot(half_m) / half_m.length_squared().max(f64::MIN_POSITIVE)).clamp(-1.0, 1.0);
+        from_centre_m.distance(half_m * along)
+    };
     let mut near: Vec<(f64, u32)> = all().map(|p| (distance_m(p), p)).filter(|(d, _)| *d <= reach_m).collect();
     near.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
     near.truncate(spec.most_active);

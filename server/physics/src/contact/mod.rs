@@ -11,6 +11,7 @@ mod local_model;
 mod local_torque;
 mod narrow;
 mod nearest;
+mod places;
 mod proxy;
 mod resting;
 mod spring;
@@ -25,7 +26,8 @@ mod turning;
 
 pub use inside::is_inside;
 pub use local_torque::LocalTorqueModel;
-pub(crate) use nearest::{deepest_m, nearest_vertex};
+pub(crate) use nearest::deepest_m;
+pub(crate) use places::Near;
 pub use proxy::SubstepTime;
 pub(crate) use resting::{Pressing, RestingContact};
 pub(crate) use spring::SaturatingSpring;

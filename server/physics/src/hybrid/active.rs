@@ -8,6 +8,7 @@ use super::{
     listed::ListedSkin,
     long_steps::{LongStepHistory, LongSteps},
     running::RunningPatch,
+    spec::Waking,
     switching::{Ball, Looking},
 };
 use crate::world::{Model, State};
@@ -22,7 +23,7 @@ pub struct ActiveParticles {
     pub(super) next: Vec<u32>,
     /// Those to be after that: what is to sleep does so first, what is to wake follows.
     pub(super) wanted: Vec<u32>,
-    /// Of every tool.
+    /// Of every place of every tool.
     pub(super) balls: Vec<Option<Ball>>,
     pub(crate) fading: Fading,
     /// Balancing forces (N), as many as positions, or none.
@@ -40,7 +41,7 @@ impl ActiveParticles {
             ids: Vec::with_capacity(room(model)),
             next: Vec::with_capacity(room(model)),
             wanted: Vec::with_capacity(room(model)),
-            balls: vec![None; tools(model)],
+            balls: vec![None; places(model).sum()],
             fading: fading_with_room(model),
             balance_n: Vec::with_capacity(entries(model)),
             given_j: 0.0,
@@ -122,7 +123,7 @@ impl ActiveParticles {
     pub(crate) fn fit(&self, model: &Model) -> bool {
         let may_wake = |id: &u32| model.hybrid().is_some_and(|body| body.may_wake(*id));
         let finite = |ball: &Ball| ball.rest_m.is_finite();
-        self.balls.len() == tools(model)
+        self.balls.len() == places(model).sum::<usize>()
             && self.balls.iter().flatten().all(finite)
             && self.fading.is_finite()
             && [0, model.rest_positions_m().len() + self.ids.len()].contains(&self.balance_n.len())
@@ -159,9 +160,14 @@ fn fading_with_room(model: &Model) -> Fading {
     model.hybrid().map_or_else(Fading::default, of)
 }
 
-/// Tools that may keep particles awake.
-fn tools(model: &Model) -> usize {
-    if model.hybrid().is_some() { model.spec().tools.len() } else { 0 }
+/// Places of each tool that may keep particles awake: so near to one another that the balls about them overlap.
+pub(super) fn places(model: &Model) -> impl Iterator<Item = usize> + Clone {
+    let tools = if model.hybrid().is_some() { &model.spec().tools[..] } else { &[] };
+    let apart_m = match model.spec().particles.as_ref().map(|particles| particles.waking) {
+        Some(Waking::ByTools { reach_m }) => reach_m,
+        _ => f64::INFINITY,
+    };
+    tools.iter().map(move |tool| tool.place_count(apart_m))
 }
 
 /// Buffers for hybrid bodies.

@@ -1,7 +1,7 @@
 //! Which particles are awake: those near where a tool touches the skin or is about to, and those that have not come to rest yet.
 //!
 //! A tool wants the particles within a ball at rest, about the vertex of the skin nearest to it, or to where it is deepest in the body, from a gap of `g₀ + v·50 ms` on and until the gap
-//! has been twice that for 100 ms; the ball follows it in steps of a spacing. A particle that no tool wants any more sleeps once it is as
+//! has been twice that for 100 ms; the ball follows it in steps of a spacing. A capsule has several such balls, one for each place along its axis. A particle that no tool wants any more sleeps once it is as
 //! good as where it would be asleep, or when its room is needed.
 //!
 //! Momentum through a switch: what wakes moves as it was moved (`metric`). What falls asleep hands over impulses, and all of it together a couple: with
@@ -13,7 +13,7 @@
 //! with the matrix `M''` of what stays awake: linear and angular momentum are kept. Coarse nodes are moved by `Δ_i` then (`projection`), for which the couple on the right has
 //! `−Σ_i Δ_i × P_i`, of the momenta `P = M'' v + J`.
 use super::{
-    active::{ActiveParticles, HybridScratch, room},
+    active::{ActiveParticles, HybridScratch, places, room},
     balance::{Turn, turn_of},
     body::Hybrid,
     listed::SkinView,
@@ -24,7 +24,7 @@ use super::{
     spec::Waking,
 };
 use crate::{
-    contact::{deepest_m, nearest_vertex},
+    contact::Near,
     world::{Model, Scratch, State},
 };
 use glam::{BVec3, DVec3};
@@ -45,7 +45,7 @@ pub(crate) const FOLLOW: f64 = 0.9;
 /// Deviation over the spacing below which a particle may fall asleep.
 const SETTLED: f64 = 0.04;
 
-/// The ball that a tool keeps awake.
+/// The ball that a tool keeps awake, at one of its places.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Ball {
     /// Its middle at rest (m).
@@ -88,7 +88,9 @@ impl Looking {
         let most = particles.most_active;
         let tools = model.spec().tools.len().max(1);
         Self {
-            found: Vec::with_capacity(in_ball.min(body.partition.particle_count())),
+            found: Vec::with_capacity(
+                in_ball.min(body.partition.particle_count()) * places(model).max().unwrap_or_default(),
+            ),
             wanted: Vec::with_capacity(tools * most),
             unwanted: Vec::with_capacity(most),
             moved: Vec::with_capacity(most),
@@ -119,7 +121,7 @@ impl HybridScratch {
                 self.patch.displace(body, &state.x);
                 let mut view = SkinView::new(body, &self.patch, model.surface_rest_positions_m());
                 place_balls(model, &mut view, particles.spacing_m, state);
-                self.looking.want(body, &state.active, reach_m, particles.most_active);
+                self.looking.want(body, model, &state.active, (reach_m, particles.most_active));
                 self.looking.keep_unsettled(&self.patch, particles);
                 state.active.want(&self.looking.wanted);
             }
@@ -246,14 +248,12 @@ pub fn wake_only(model: &Model, state: &mut State, scratch: &mut Scratch, partic
 fn place_balls(model: &Model, view: &mut SkinView<'_>, spacing_m: f64, state: &mut State) {
     let State { tools, active, contact, force_is_current, .. } = state;
     let fitted = force_is_current.then(|| contact.boxes());
-    for ((tool, spec), ball) in tools.iter().zip(&model.spec().tools).zip(&mut active.balls) {
-        let near_m = (GAP * spec.radius_m).max(GAP * spacing_m) + AHEAD_S * tool.velocity_m_per_s.length();
-        let deepest_m = deepest_m(tool.centre_m, spec.radius_m, tool.contact_force_n);
-        let within_m = spec.radius_m + 2.0 * near_m;
-        let nearest = nearest_vertex(view, deepest_m.unwrap_or(tool.centre_m), within_m, fitted);
-        let gap_m = nearest.map_or(f64::INFINITY, |(_, distance_m)| distance_m - spec.radius_m);
-        let gap_m = if deepest_m.is_some() { 0.0 } else { gap_m };
-        match (ball.as_mut(), nearest) {
+    let places = tools.iter().zip(&model.spec().tools).zip(places(model));
+    let places = places.flat_map(|((tool, spec), count)| tool.places(spec, count).map(move |place| (place, spec)));
+    for ((place, spec), ball) in places.zip(&mut active.balls) {
+        let near_m = (GAP * spec.radius_m).max(GAP * spacing_m) + AHEAD_S * place.speed_m_per_s;
+        let Near { vertex, gap_m, .. } = place.look(view, near_m, fitted);
+        match (ball.as_mut(), vertex) {
             (_, Some((vertex, _))) if gap_m < near_m => {
                 let rest_m = model.surface_rest_positions_m()[vertex as usize];
                 let moved = ball.is_none_or(|ball| ball.rest_m.distance(rest_m) > FOLLOW * spacing_m);
@@ -316,18 +316,30 @@ impl Looking {
         }
     }
 
-    /// The particles in the tools' balls, ascending; the nearest ones where there is no room for all.
-    fn want(&mut self, body: &Hybrid, active: &ActiveParticles, reach_m: f64, most: usize) {
+    /// The particles in the tools' balls, ascending; the nearest ones where there is no room for all, as many for each tool.
+    fn want(&mut self, body: &Hybrid, model: &Model, active: &ActiveParticles, (reach_m, most): (f64, usize)) {
         self.wanted.clear();
-        let balls = active.balls.iter().flatten().count().max(1);
-        for ball in active.balls.iter().flatten() {
+        let of_tool = |first: &mut usize, count: usize| {
+            *first += count;
+            Some(active.balls[*first - count..*first].iter().flatten())
+        };
+        let tools = || places(model).scan(0, of_tool);
+        let room = most / tools().filter_map(|mut balls| balls.next()).count().max(1);
+        for balls in tools() {
             self.found.clear();
-            body.partition.particles_within(ball.rest_m, reach_m, |particle, distance_sq| {
-                if body.may_wake(particle) {
-                    self.found.push((distance_sq, particle));
-                }
-            });
-            let room = most / balls;
+            let several = balls.clone().count() > 1;
+            for ball in balls {
+                body.partition.particles_within(ball.rest_m, reach_m, |particle, distance_sq| {
+                    if body.may_wake(particle) {
+                        self.found.push((distance_sq, particle));
+                    }
+                });
+            }
+            if several {
+                // Of each the least distance.
+                self.found.sort_unstable_by(|a, b| a.1.cmp(&b.1).then(a.0.total_cmp(&b.0)));
+                self.found.dedup_by_key(|found| found.1);
+            }
             if self.found.len() > room {
                 self.found.select_nth_unstable_by(room, |a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
                 self.found.truncate(room);

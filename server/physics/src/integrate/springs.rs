@@ -1,17 +1,18 @@
 //! Forces and kicks of a mass-spring surface, for leapfrog, and what is refined and awake from one tick to the next.
 use super::forces::{Evaluation, Tick, is_usable};
 use crate::{
-    contact::{ContactScratch, SubstepTime, SurfaceNow, ToolState, broad::Skin, deepest_m, nearest_vertex},
+    contact::{ContactScratch, Near, SubstepTime, SurfaceNow, ToolState, broad::Skin},
     simd::kicks::LumpedKick,
     spring::{
         Refinement, SpringBody, SpringScratch, SpringState, Wanted,
         body::rings_for,
         skin::{ListedVertices, SpringSkin},
-        state::{Looking, Near},
+        state::{Found, Looking},
     },
     world::{Model, PointForce, State},
 };
 use glam::DVec3;
+use std::ops::Range;
 
 /// Ticks between two looks at where the tools are.
 const LOOK_EVERY_TICKS: u32 = 8;
@@ -46,7 +47,7 @@ impl SpringBodyScratch {
         Some(Self {
             springs: SpringScratch::new(body.model()),
             skin: ListedVertices::new(body),
-            looking: Looking::new(body, model.spec().tools.len()),
+            looking: Looking::new(body),
             mass_kg: Vec::with_capacity(body.model().most_nodes()),
             inverse_mass_per_kg: Vec::with_capacity(body.model().most_nodes()),
             layout: u64::MAX,
@@ -61,8 +62,8 @@ impl SpringBodyScratch {
         self.springs.follow(body.model(), &springs.motion);
         let is_due = state.tick.is_multiple_of(u64::from(LOOK_EVERY_TICKS));
         // Not by what contact lists, which depends on when it was listed.
-        let touches = |(index, tool): (usize, &ToolState)| tool.contacts > 0 && springs.touched(index).is_none();
-        let looks = is_due || state.tools.iter().enumerate().any(touches);
+        let is_new = |(tool, own): (&ToolState, Range<usize>)| tool.contacts > 0 && !springs.is_fine_at(own);
+        let looks = is_due || state.tools.iter().zip(body.places()).any(is_new);
         if looks {
             self.look(model, body, state, if is_due { LOOK_EVERY_TICKS } else { 0 });
         }
@@ -90,7 +91,9 @@ impl SpringBodyScratch {
         };
         let fine = springs.next_fine(body, model.spec().settings.tick_period_s / CONSTANTS_FOLLOW_S, away_m);
         // A moving tool leaves levels no time to lag behind: what is refined too late at its front and coarse too late at its back would drive it on.
-        let speeds = state.tools.iter().map(|tool| tool.velocity_m_per_s.length());
+        let speeds = state.tools.iter().zip(&model.spec().tools).zip(body.places());
+        let speeds =
+            speeds.flat_map(|((tool, spec), own)| tool.places(spec, own.len()).map(|place| place.speed_m_per_s));
         let fastest_m_per_s = speeds.fold(0.0, f64::max);
         let rate_hz = |r: Refinement| r.fade_s.recip() + fastest_m_per_s / (FADE_WAY * body.edge_m());
         let step = body.refinement().map_or(1.0, |r| model.spec().settings.tick_period_s * rate_hz(r));
@@ -131,31 +134,31 @@ impl SpringBodyScratch {
         let State { x, tools, contact, force_is_current, springs: Some(springs), .. } = state else { return };
         let fitted = force_is_current.then(|| contact.boxes());
         let tick_period_s = model.spec().settings.tick_period_s;
-        for (index, (tool, spec)) in tools.iter().zip(&model.spec().tools).enumerate() {
-            if ticks == 0 && springs.touched(index).is_some() {
+        for ((tool, spec), own) in tools.iter().zip(&model.spec().tools).zip(body.places()) {
+            if ticks == 0 && springs.is_fine_at(own.clone()) {
                 continue;
             }
-            // What it goes until the next look.
-            let ahead_m = f64::from(LOOK_EVERY_TICKS) * tick_period_s * tool.velocity_m_per_s.length();
-            let near_m = GAP * spec.radius_m + 0.5 * body.edge_m() + ahead_m;
-            let deepest_m = deepest_m(tool.centre_m, spec.radius_m, tool.contact_force_n);
-            let from_m = deepest_m.unwrap_or(tool.centre_m);
-            let mut skin = SpringSkin::new(body, (&springs.motion, &self.springs), x);
-            let nearest = nearest_vertex(&mut skin, from_m, spec.radius_m + 2.0 * near_m, fitted);
-            let near = nearest.map(|(vertex, to_skin_m)| {
-                let distance_m = |vertex: u32| skin.position_m(vertex).distance(from_m);
-                let vertex = skin.coarse_vertex(vertex, from_m);
-                let touched = springs.touched(index).unwrap_or(vertex);
-                let depth_m = skin.position_m(touched).distance(body.model().rest_m()[touched as usize]);
-                Near {
-                    rings: rings_for(depth_m, spec.radius_m, body.edge_m()),
-                    vertex,
-                    distance_m: distance_m(vertex),
-                    present_m: springs.touched(index).map_or(f64::INFINITY, distance_m),
-                    gap_m: if deepest_m.is_some() { 0.0 } else { to_skin_m - spec.radius_m },
-                }
-            });
-            springs.note(index, near, (near_m, spec.radius_m, ticks));
+            for (place, index) in tool.places(spec, own.len()).zip(own) {
+                // What it goes until the next look.
+                let ahead_m = f64::from(LOOK_EVERY_TICKS) * tick_period_s * place.speed_m_per_s;
+                let near_m = GAP * spec.radius_m + 0.5 * body.edge_m() + ahead_m;
+                let mut skin = SpringSkin::new(body, (&springs.motion, &self.springs), x);
+                let Near { from_m, vertex, gap_m } = place.look(&mut skin, near_m, fitted);
+                let near = vertex.map(|(vertex, _)| {
+                    let distance_m = |vertex: u32| skin.position_m(vertex).distance(from_m);
+                    let vertex = skin.coarse_vertex(vertex, from_m);
+                    let touched = springs.touched(index).unwrap_or(vertex);
+                    let depth_m = skin.position_m(touched).distance(body.model().rest_m()[touched as usize]);
+                    Found {
+                        rings: rings_for(depth_m, spec.radius_m, body.edge_m()),
+                        vertex,
+                        distance_m: distance_m(vertex),
+                        present_m: springs.touched(index).map_or(f64::INFINITY, distance_m),
+                        gap_m,
+                    }
+                });
+                springs.note(index, near, (near_m, spec.radius_m, ticks));
+            }
         }
     }
 }

@@ -12,11 +12,11 @@ use super::{
     skin::SkinBoxes,
 };
 use crate::{
-    contact::SurfaceModuli,
+    contact::{SurfaceModuli, ToolSpec},
     hash::{Fnv, fnv},
     mesh::Surface,
 };
-use std::fmt::Write;
+use std::{fmt::Write, ops::Range};
 use thiserror::Error;
 
 /// How the surface is refined where it is touched.
@@ -89,17 +89,19 @@ pub struct SpringBody {
     pub(super) boxes: SkinBoxes,
     /// Mean length (m) of the coarse surface's edges, its vertices at home.
     edge_m: f64,
+    /// How many places each tool has about which it may be refined.
+    places: Vec<usize>,
     awake_reach_m: f64,
     table: Option<ConstantsTable>,
     fingerprint: u64,
 }
 
 impl SpringBody {
-    /// Checks and builds, for so many tools.
+    /// Checks and builds, for these tools.
     ///
     /// # Errors
     /// [`SpringBodyError`].
-    pub fn build(spec: SpringBodySpec, tools: usize) -> Result<Self, SpringBodyError> {
+    pub fn build(spec: SpringBodySpec, tools: &[ToolSpec]) -> Result<Self, SpringBodyError> {
         let SpringBodySpec { mut springs, refinement, table } = spec;
         if let Some(Refinement { rings, fade_s, .. }) = refinement {
             let setting =
@@ -125,11 +127,14 @@ impl SpringBody {
             a.distance(b)
         });
         let edge_m = lengths.sum::<f64>() / model.surface().edges().len() as f64;
-        // A disc for each tool, of vertices with √3/2 l² each.
-        let each = model.spec().most_awake as f64 / tools.max(1) as f64;
+        let rings = refinement.map_or(1, |refinement| if refinement.follows_dent { 1 } else { refinement.rings });
+        // The regions about two of them touch.
+        let places: Vec<usize> = tools.iter().map(|tool| tool.place_count(f64::from(rings) * edge_m)).collect();
+        // A disc for each, of vertices with √3/2 l² each.
+        let each = model.spec().most_awake as f64 / places.iter().sum::<usize>().max(1) as f64;
         let awake_reach_m = edge_m * (each * 3.0_f64.sqrt() / (2.0 * std::f64::consts::PI)).sqrt();
         let fingerprint = fingerprint(model.spec(), (refinement, &table));
-        Ok(Self { model, refinement, boxes: SkinBoxes::default(), edge_m, awake_reach_m, table, fingerprint })
+        Ok(Self { model, refinement, boxes: SkinBoxes::default(), edge_m, places, awake_reach_m, table, fingerprint })
     }
 
     /// Its springs.
@@ -155,6 +160,19 @@ impl SpringBody {
     /// Mean length (m) of the coarse edges.
     pub fn edge_m(&self) -> f64 {
         self.edge_m
+    }
+
+    /// The places of each tool, numbered one after another.
+    pub(crate) fn places(&self) -> impl Iterator<Item = Range<usize>> {
+        self.places.iter().scan(0, |next, count| {
+            *next += count;
+            Some(*next - count..*next)
+        })
+    }
+
+    /// All of them.
+    pub(crate) fn place_count(&self) -> usize {
+        self.places.iter().sum()
     }
 
     /// About how far (m) from a tool vertices are awake, where not all are.

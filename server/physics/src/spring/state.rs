@@ -1,6 +1,6 @@
 //! What of a mass-spring surface a tick changes beside positions and velocities, and what tools and injected forces want of it.
 //!
-//! A tool that touches, or is about to, has a vertex that is refined about: the nearest to where it is deepest, or to it. It follows when another is nearer by a tenth of the tool's radius, and is let go when the tool has
+//! A tool that touches, or is about to, has a vertex that is refined about: the nearest to where it is deepest, or to it; a capsule has one for each place along its axis. It follows when another is nearer by a tenth of the tool's radius, and is let go when the tool has
 //! been away for [`AWAY_TICKS`]. Where not all of the surface fits in what may be awake at once, the vertices that are the fewest edges from such vertices are, and from those that a force was injected at;
 //! they stay awake until all is at rest.
 use super::{
@@ -11,6 +11,7 @@ use super::{
 };
 use crate::world::{Model, State};
 use serde::{Deserialize, Serialize};
+use std::ops::Range;
 
 /// Ticks for which a tool has to be away.
 const AWAY_TICKS: u32 = 100;
@@ -26,7 +27,7 @@ const FOLLOW: f64 = 0.25;
 pub struct SpringState {
     /// Awake nodes and levels.
     pub motion: SpringMotion,
-    /// One for each tool.
+    /// One for each place of each tool.
     about: Vec<About>,
     /// Vertices that forces were injected at while they slept.
     forced: Vec<u32>,
@@ -38,7 +39,7 @@ pub struct SpringState {
     pub given_j: f64,
 }
 
-/// What a tool is about.
+/// What a place of a tool is about.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub(crate) struct About {
     /// The vertex refined about.
@@ -51,9 +52,9 @@ pub(crate) struct About {
     away_ticks: u32,
 }
 
-/// What a tool is near to.
+/// What a place of a tool is near to.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Near {
+pub(crate) struct Found {
     /// The coarse vertex nearest to it.
     pub(crate) vertex: u32,
     /// How far (m) that is, and how far the vertex that it is about now.
@@ -75,12 +76,12 @@ pub(crate) struct Looking {
 }
 
 impl Looking {
-    pub(crate) fn new(body: &SpringBody, tools: usize) -> Self {
-        let most = body.model().spec().most_refined;
+    pub(crate) fn new(body: &SpringBody) -> Self {
+        let (most, places) = (body.model().spec().most_refined, body.place_count());
         Self {
-            centres: Vec::with_capacity(tools),
+            centres: Vec::with_capacity(places),
             triangles: Vec::with_capacity(most),
-            corners: Vec::with_capacity(3 * most + tools),
+            corners: Vec::with_capacity(3 * most + places),
             seen: vec![false; if body.is_all_awake() { 0 } else { body.model().vertices() as usize }],
         }
     }
@@ -101,7 +102,7 @@ pub fn refine_only(model: &Model, state: &mut State, centres: &[u32], rings: u32
 
 impl SpringState {
     /// Everything coarse and at home.
-    pub(crate) fn at_rest(body: &SpringBody, tools: usize) -> Self {
+    pub(crate) fn at_rest(body: &SpringBody) -> Self {
         let spec = body.model().spec();
         let mut awake = Vec::with_capacity(spec.most_awake.min(body.model().vertices() as usize));
         if body.is_all_awake() {
@@ -110,7 +111,7 @@ impl SpringState {
         let motion = SpringMotion::at_rest(body.model(), awake.iter().copied());
         Self {
             motion: SpringMotion { fine: body.fine_at(0.0), ..motion },
-            about: vec![About::default(); tools],
+            about: vec![About::default(); body.place_count()],
             forced: Vec::with_capacity(MOST_FORCED),
             refined: Vec::with_capacity(spec.most_refined),
             awake,
@@ -142,8 +143,8 @@ impl SpringState {
         self.given_j = other.given_j;
     }
 
-    /// Whether it may be a state of a body with so many tools.
-    pub(crate) fn fits(&self, body: &SpringBody, tools: usize) -> bool {
+    /// Whether it may be a state of a body.
+    pub(crate) fn fits(&self, body: &SpringBody) -> bool {
         let model = body.model();
         let (vertices, triangles) = (model.vertices(), model.surface().triangles().len());
         let ascending = |list: &[u32]| list.windows(2).all(|pair| pair[0] < pair[1]);
@@ -154,7 +155,7 @@ impl SpringState {
         refined
             && self.given_j.is_finite()
             && levels.len() + coming.count() <= model.spec().most_refined
-            && self.about.len() == tools
+            && self.about.len() == body.place_count()
             && self.about.iter().all(|about| known(about) && about.rings <= MOST_RINGS)
             && self.forced.len() <= MOST_FORCED
             && self.forced.iter().all(|vertex| *vertex < vertices)
@@ -183,18 +184,23 @@ impl SpringState {
         }
     }
 
-    /// The vertex that a tool is refined about.
-    pub(crate) fn touched(&self, tool: usize) -> Option<u32> {
-        self.about[tool].touched
+    /// The vertex that it is refined about for a place.
+    pub(crate) fn touched(&self, place: usize) -> Option<u32> {
+        self.about[place].touched
     }
 
-    /// Takes what a tool is near to, if anything, after so many ticks; from `near_m` on it touches.
-    pub(crate) fn note(&mut self, tool: usize, near: Option<Near>, (near_m, radius_m, ticks): (f64, f64, u32)) {
+    /// Whether it is refined about any of these places.
+    pub(crate) fn is_fine_at(&self, mut places: Range<usize>) -> bool {
+        places.any(|place| self.touched(place).is_some())
+    }
+
+    /// Takes what a place of a tool is near to, if anything, after so many ticks; from `near_m` on it touches.
+    pub(crate) fn note(&mut self, place: usize, near: Option<Found>, (near_m, radius_m, ticks): (f64, f64, u32)) {
         /// Part of the tool's radius that another vertex has to be nearer.
         const NEARER: f64 = 0.1;
         /// Part of a ring by which a dent must have shrunk before it has one less.
         const SHRUNK: f64 = 0.25;
-        let about = &mut self.about[tool];
+        let about = &mut self.about[place];
         match (about.touched, near) {
             (touched, Some(near)) if near.gap_m < near_m => {
                 let follows = touched.is_none() || near.distance_m < near.present_m - NEARER * radius_m;

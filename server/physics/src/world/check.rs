@@ -46,10 +46,7 @@ fn loaded(load: &LoadSpec, nodes: usize, triangles: usize) -> Result<(), ModelEr
 fn shapes(spec: &ModelSpec) -> Result<(), ModelError> {
     let Some(tool) = spec.tools.iter().find(|tool| tool.shape.as_capsule().is_some()) else { return Ok(()) };
     let what = match () {
-        () if spec.particles.is_some() => "a hybrid body, whose particles wake about a point",
         () if spec.seed.is_some() => "a body of the papers' hybrid, which is touched at one triangle",
-        // A spring body's mesh is empty.
-        () if spec.mesh.tets().is_empty() => "a mass-spring surface, which is refined about a point",
         () if spec.settings.integrator == Integrator::BackwardEuler => {
             "backward Euler, which knows no stiffness of a tool that turns"
         }

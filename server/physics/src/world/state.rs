@@ -53,7 +53,7 @@ pub struct State {
 impl State {
     /// At rest, at tick 0.
     pub fn at_rest(model: &Model) -> Self {
-        let springs = model.springs().map(|body| SpringState::at_rest(body, model.spec().tools.len()));
+        let springs = model.springs().map(SpringState::at_rest);
         let awake: &[u32] = springs.as_ref().map_or(&[], |springs| &springs.motion.ids);
         let nodes = model.always_awake_m().len() + awake.len();
         let zeros = || with_room(model, std::iter::repeat_n(DVec3::ZERO, nodes));

@@ -36,9 +36,8 @@ fn radius(table: &ToolTable, at: &Where) -> Result<f64, Fault> {
 }
 
 fn capsule(table: &ToolTable, coupling: Coupling, body: &Body, at: &Where) -> Result<(ToolShape, f64), Fault> {
-    if body.skin.is_some() {
-        let message =
-            "a capsule presses a body of tetrahedra only: not particles, a seed body or a mass-spring surface";
+    if body.first_vertex.is_some() {
+        let message = "a capsule does not press a seed body, which is touched at one triangle";
         return Err(Fault::value(at.key("shape"), message.to_owned()).help("make the tool a sphere"));
     }
     let radius_m = radius(table, at)?;

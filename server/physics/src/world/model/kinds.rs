@@ -95,7 +95,7 @@ impl Model {
     pub(super) fn of_springs(spec: ModelSpec, mut wanted: SpringBodySpec) -> Result<Self, ModelError> {
         springs_body::demand(&spec)?;
         wanted.springs.held = springs_body::held(&spec, wanted.springs.surface.positions_m().len())?;
-        let mut body = SpringBody::build(wanted, spec.tools.len())?;
+        let mut body = SpringBody::build(wanted, &spec.tools)?;
         springs_body::demand_all_awake(&spec, &body)?;
         let (surface, rest_m) = (body.skin(), body.model().rest_m());
         check::spec(&spec, &surface, rest_m)?;

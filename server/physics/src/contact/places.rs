@@ -1,0 +1,80 @@
+//! Places along a tool, about which bodies are fine that are coarse where no tool is: a sphere's is its centre, a capsule has several along its axis.
+use super::{
+    broad::{ClusterBox, Skin},
+    nearest::{deepest_m, nearest_vertex},
+    tool::{ToolSpec, ToolState},
+};
+use glam::DVec3;
+
+/// A place along a tool.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Place {
+    /// Where it is (m).
+    at_m: DVec3,
+    /// Its speed (m/s).
+    pub(crate) speed_m_per_s: f64,
+    /// Where the tool is deepest in the body there (m), if it touches the body there.
+    deepest_m: Option<DVec3>,
+    /// The tool may touch the body elsewhere only.
+    is_one_of_several: bool,
+    radius_m: f64,
+}
+
+/// What of a skin is near to a place.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Near {
+    /// From where it was sought (m).
+    pub(crate) from_m: DVec3,
+    /// The nearest vertex, and how far (m) it is from there.
+    pub(crate) vertex: Option<(u32, f64)>,
+    /// Gap between tool and skin (m), 0 where they touch.
+    pub(crate) gap_m: f64,
+}
+
+impl ToolSpec {
+    /// How many places it has, no farther than `apart_m` from one another.
+    pub(crate) fn place_count(&self, apart_m: f64) -> usize {
+        1 + (2.0 * self.shape.half_length_m() / apart_m).ceil() as usize
+    }
+}
+
+impl ToolState {
+    /// So many places along it.
+    pub(crate) fn places(&self, spec: &ToolSpec, count: usize) -> impl Iterator<Item = Place> + '_ {
+        let (radius_m, half_m) = (spec.radius_m, spec.shape.axis(self.centre_m, self.orientation).half_m);
+        (0..count).map(move |number| {
+            let arm_m = if count > 1 { half_m * (2.0 * number as f64 / (count - 1) as f64 - 1.0) } else { DVec3::ZERO };
+            let at_m = self.centre_m + arm_m;
+            Place {
+                at_m,
+                // v + ω × r
+                speed_m_per_s: (self.velocity_m_per_s + self.angular_velocity_rad_per_s.cross(arm_m)).length(),
+                deepest_m: deepest_m(at_m, radius_m, self.contact_force_n),
+                is_one_of_several: count > 1,
+                radius_m,
+            }
+        })
+    }
+}
+
+impl Place {
+    /// The vertex of a skin nearest to where the tool is deepest in it here, or, where it does not touch it, to this place; within a gap of `2 near_m`. `fitted` are
+    /// contact's boxes and its travel (m), where they are of use.
+    pub(crate) fn look(&self, skin: &mut impl Skin, near_m: f64, fitted: Option<(&[ClusterBox], f64)>) -> Near {
+        let within_m = self.radius_m + 2.0 * near_m;
+        let mut from = |from_m: DVec3| nearest_vertex(skin, from_m, within_m, fitted);
+        let beside = |vertex: Option<(u32, f64)>| {
+            let gap_m = vertex.map_or(f64::INFINITY, |(_, distance_m)| distance_m - self.radius_m);
+            Near { from_m: self.at_m, vertex, gap_m }
+        };
+        let touching = |from_m: DVec3, vertex: Option<(u32, f64)>| Near { from_m, vertex, gap_m: 0.0 };
+        match self.deepest_m {
+            None => beside(from(self.at_m)),
+            Some(deepest_m) if !self.is_one_of_several => touching(deepest_m, from(deepest_m)),
+            Some(deepest_m) => {
+                let near = beside(from(self.at_m));
+                if near.gap_m < near_m { touching(deepest_m, from(deepest_m)) } else { near }
+            }
+        }
+    }
+}
