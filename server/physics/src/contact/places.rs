@@ -6,6 +6,9 @@ use super::{
 };
 use glam::DVec3;
 
+/// A tool has no more: the longest capsules are fine at places only that are farther apart.
+const MOST: usize = 64;
+
 /// A place along a tool.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Place {
@@ -32,9 +35,9 @@ pub(crate) struct Near {
 }
 
 impl ToolSpec {
-    /// How many places it has, no farther than `apart_m` from one another.
+    /// How many places it has: as many as make them no farther than `apart_m` from one another, and at most 64.
     pub(crate) fn place_count(&self, apart_m: f64) -> usize {
-        1 + (2.0 * self.shape.half_length_m() / apart_m).ceil() as usize
+        ((2.0 * self.shape.half_length_m() / apart_m).ceil() as usize).saturating_add(1).min(MOST)
     }
 }
 
@@ -76,5 +79,49 @@ impl Place {
                 if near.gap_m < near_m { touching(deepest_m, from(deepest_m)) } else { near }
             }
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{
+        super::{Coupling, ToolShape},
+        *,
+    };
+
+    fn capsule(half_length_m: f64) -> ToolSpec {
+        ToolSpec {
+            name: "shaft".into(),
+            shape: ToolShape::capsule(Coupling::Rigid, 0.005, half_length_m, DVec3::X),
+            radius_m: 0.005,
+            coupling: Coupling::Rigid,
+            friction_coefficient: 0.0,
+            start_position_m: DVec3::Y,
+        }
+    }
+
+    #[test]
+    fn a_sphere_has_its_centre_and_a_capsule_places_from_end_to_end() {
+        let sphere = ToolSpec { shape: ToolShape::Sphere, ..capsule(0.0) };
+        for apart_m in [1e-9, 1.0, f64::INFINITY] {
+            assert_eq!(sphere.place_count(apart_m), 1);
+        }
+        let spec = capsule(0.01);
+        assert_eq!(
+            [0.02, 0.0199, 0.005, 1e-12, f64::INFINITY].map(|apart_m| spec.place_count(apart_m)),
+            [2, 3, 5, 64, 1]
+        );
+        assert_eq!(capsule(1e300).place_count(1e-300), 64);
+        let tool = ToolState {
+            velocity_m_per_s: DVec3::Y,
+            angular_velocity_rad_per_s: DVec3::Z * 100.0,
+            ..ToolState::at_start(&spec)
+        };
+        let places: Vec<Place> = tool.places(&spec, 3).collect();
+        for (place, x_m) in places.iter().zip([-0.01, 0.0, 0.01]) {
+            assert!(place.at_m.distance(DVec3::new(x_m, 1.0, 0.0)) < 1e-15);
+            assert!((place.speed_m_per_s - (1.0 + 100.0 * x_m).abs()).abs() < 1e-12);
+        }
+        assert_eq!(tool.places(&spec, 1).next().unwrap().at_m, DVec3::Y);
     }
 }
