@@ -97,7 +97,8 @@ fn a_probe_says_where_the_arm_is_and_how_old_its_poses_are() {
     assert!(report.age.p50_ns > 1_900_000 && report.poses_per_s > 50.0, "{report}");
     assert!(report.to_string().contains("position  10.00, 20.00, 30.00 mm"), "{report}");
     Faults::set(&arm.faults.emergency_stop, true);
-    assert!(probe(&config, Duration::from_millis(100)).unwrap_err().to_string().contains("emergency stop"));
+    let refused = common::told(&probe(&config, Duration::from_millis(100)).unwrap_err());
+    assert!(refused.starts_with("the arm cannot be started: ") && refused.contains("emergency stop"), "{refused}");
 }
 
 /// An arm driven without a bridge, tick by tick in real time.

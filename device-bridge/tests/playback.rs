@@ -92,7 +92,7 @@ async fn a_recording_that_cannot_be_used_stops_the_bridge_and_says_where() {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("bad.csv");
     std::fs::write(&file, format!("{}\n0,0,0,zero\n", COLUMNS.join(","))).unwrap();
-    let said = |error: BridgeError| error.to_string();
+    let said = |error: BridgeError| common::told(&error);
     let started = async |config| common::start(config).task.await.unwrap().unwrap_err();
     let config = Config { device: playback(&file), ..common::config("http://127.0.0.1:1") };
     let bad = said(started(config.clone()).await);

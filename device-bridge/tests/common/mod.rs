@@ -255,6 +255,12 @@ impl Running {
     }
 }
 
+/// What people are told of an error: itself and its causes.
+pub fn told(error: &dyn std::error::Error) -> String {
+    let causes = std::iter::successors(Some(error), |error| error.source());
+    causes.map(ToString::to_string).collect::<Vec<_>>().join(": ")
+}
+
 /// Waits until `condition` holds; fails the test when it does not within 20 s.
 pub async fn until(what: &str, mut condition: impl FnMut() -> bool) {
     let began = Instant::now();
