@@ -118,6 +118,29 @@ fn particles_wake_at_the_end_of_a_capsule_that_touches() {
     assert!(rig.state.tools[0].contact_torque_nm.y < -1e-5, "{}", rig.state.tools[0].contact_torque_nm);
 }
 
+/// A capsule whose ends are its places, and whose middle alone touches.
+#[test]
+fn particles_wake_beneath_the_middle_of_a_capsule_between_two_places() {
+    let mut spec = block(600, Waking::ByTools { reach_m: 2.1 * HALF_M });
+    // A corner of the block between the ends: what is at the ends is far below.
+    spec.tools[0] = ToolSpec {
+        shape: ToolShape::capsule(Coupling::Rigid, RADIUS_M, HALF_M, DVec3::new(1.0, -1.0, 0.0)),
+        start_position_m: DVec3::new(0.03, 0.03, RADIUS_M),
+        ..spec.tools[0].clone()
+    };
+    let mut rig = Rig::new(spec);
+    let at = first(&rig);
+    let mut asleep_in_contact = 0;
+    for tick in 0..900_u32 {
+        let across_m = 0.03 - 0.012 * f64::from(tick.min(600)) / 600.0;
+        run_at(&mut rig, ToolTarget { position_m: DVec3::new(across_m, across_m, 0.0), ..at });
+        let touches = rig.state.tools[0].contact_force_n.length() > 1e-4;
+        asleep_in_contact += u32::from(touches && rig.state.active.is_empty());
+    }
+    assert!(rig.state.tools[0].contact_force_n.length() > 1e-3 && !rig.state.active.is_empty());
+    assert_eq!(asleep_in_contact, 0);
+}
+
 /// What body and tool exchange, friction and all, keeps both momenta, whatever wakes and falls asleep meanwhile.
 #[test]
 fn a_free_hybrid_block_and_a_free_capsule_keep_both_momenta() {

@@ -9,7 +9,7 @@ use glam::DVec3;
 /// A tool has no more: the longest capsules are fine at places only that are farther apart.
 const MOST: usize = 64;
 
-/// A place along a tool.
+/// A place along a tool, and the piece of its axis that is nearer to it than to others.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Place {
     /// Where it is (m).
@@ -18,8 +18,8 @@ pub(crate) struct Place {
     pub(crate) speed_m_per_s: f64,
     /// Where the tool is deepest in the body there (m), if it touches the body there.
     deepest_m: Option<DVec3>,
-    /// The tool may touch the body elsewhere only.
-    is_one_of_several: bool,
+    /// How far (m) that piece reaches; nothing of the only place.
+    half_piece_m: f64,
     radius_m: f64,
 }
 
@@ -45,6 +45,7 @@ impl ToolState {
     /// So many places along it.
     pub(crate) fn places(&self, spec: &ToolSpec, count: usize) -> impl Iterator<Item = Place> + '_ {
         let (radius_m, half_m) = (spec.radius_m, spec.shape.axis(self.centre_m, self.orientation).half_m);
+        let half_piece_m = if count > 1 { half_m.length() / (count - 1) as f64 } else { 0.0 };
         (0..count).map(move |number| {
             let arm_m = if count > 1 { half_m * (2.0 * number as f64 / (count - 1) as f64 - 1.0) } else { DVec3::ZERO };
             let at_m = self.centre_m + arm_m;
@@ -53,7 +54,7 @@ impl ToolState {
                 // v + ω × r
                 speed_m_per_s: (self.velocity_m_per_s + self.angular_velocity_rad_per_s.cross(arm_m)).length(),
                 deepest_m: deepest_m(at_m, radius_m, self.contact_force_n),
-                is_one_of_several: count > 1,
+                half_piece_m,
                 radius_m,
             }
         })
@@ -63,21 +64,27 @@ impl ToolState {
 impl Place {
     /// The vertex of a skin nearest to where the tool is deepest in it here, or, where it does not touch it, to this place; within a gap of `2 near_m`. `fitted` are
     /// contact's boxes and its travel (m), where they are of use.
+    ///
+    /// Of a piece that reaches `s` to either side, a vertex that is `d` from its middle is no nearer than `√(d² − s²)`, and the nearest to the middle bounds the others:
+    /// no piece that is near goes unseen, and some are seen too soon.
     pub(crate) fn look(&self, skin: &mut impl Skin, near_m: f64, fitted: Option<(&[ClusterBox], f64)>) -> Near {
-        let within_m = self.radius_m + 2.0 * near_m;
+        let s = self.half_piece_m;
+        let within_m = (self.radius_m + 2.0 * near_m).hypot(s);
         let mut from = |from_m: DVec3| nearest_vertex(skin, from_m, within_m, fitted);
         let beside = |vertex: Option<(u32, f64)>| {
-            let gap_m = vertex.map_or(f64::INFINITY, |(_, distance_m)| distance_m - self.radius_m);
+            let nearest_m = |d: f64| if s > 0.0 { (d * d - s * s).max(0.0).sqrt() } else { d };
+            let gap_m = vertex.map_or(f64::INFINITY, |(_, distance_m)| nearest_m(distance_m) - self.radius_m);
             Near { from_m: self.at_m, vertex, gap_m }
         };
         let touching = |from_m: DVec3, vertex: Option<(u32, f64)>| Near { from_m, vertex, gap_m: 0.0 };
         match self.deepest_m {
             None => beside(from(self.at_m)),
-            Some(deepest_m) if !self.is_one_of_several => touching(deepest_m, from(deepest_m)),
-            Some(deepest_m) => {
-                let near = beside(from(self.at_m));
-                if near.gap_m < near_m { touching(deepest_m, from(deepest_m)) } else { near }
-            }
+            Some(deepest_m) if s == 0.0 => touching(deepest_m, from(deepest_m)),
+            // It may touch elsewhere only.
+            Some(deepest_m) => match beside(from(self.at_m)) {
+                near if near.gap_m < near_m => touching(deepest_m, from(deepest_m).or(near.vertex)),
+                apart => apart,
+            },
         }
     }
 }
