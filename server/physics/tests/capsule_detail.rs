@@ -7,7 +7,10 @@ use palpate_physics::{
     contact::{Coupling, ToolShape, ToolSpec, ToolTarget},
     hybrid::{Waking, wake_only},
     snapshot,
-    spring::{HomeLaw, Refinement, Refining, SpringBodySpec, SpringSpec, net::hexagonal_patch, region::Constants},
+    spring::{
+        HomeLaw, Refinement, Refining, SpringBodySpec, SpringSpec, body::triangles_about, net::hexagonal_patch,
+        region::Constants,
+    },
 };
 use rig::{Drive, Rig, held_below, hybrid_block, sphere};
 use std::f64::consts::FRAC_PI_2;
@@ -141,6 +144,54 @@ fn particles_wake_beneath_the_middle_of_a_capsule_between_two_places() {
     assert_eq!(asleep_in_contact, 0);
 }
 
+/// With room for a part of its balls a lying capsule has what is nearest to it awake, no less between two places than beneath one.
+#[test]
+fn particles_wake_as_deep_between_two_places_as_beneath_one() {
+    let mut rig = Rig::new(block(150, Waking::ByTools { reach_m: 2.0 * HALF_M }));
+    press(&mut rig, DVec3::Z * (RADIUS_M - 1.5e-3), 0.0, 1200);
+    let awake_m = |wanted: &dyn Fn(f64) -> bool| {
+        let body = rig.model.hybrid().unwrap();
+        let among = (0..body.partition().particle_count() as u32)
+            .filter(|&p| body.may_wake(p) && wanted(body.partition().particle_m(p).x.abs()));
+        let (awake, asleep): (Vec<u32>, Vec<u32>) = among.partition(|p| rig.state.active.ids().contains(p));
+        let farthest_m = awake.iter().map(|&p| beside_m(&rig, p)).fold(0.0, f64::max);
+        [asleep.iter().map(|&p| beside_m(&rig, p)).fold(f64::INFINITY, f64::min), farthest_m]
+    };
+    // Its places are its ends.
+    let [between_m, beneath_m] = [awake_m(&|x_m| x_m < 4e-3), awake_m(&|x_m| (8e-3..12e-3).contains(&x_m))];
+    println!("asleep from, awake to (m): {between_m:?} between, {beneath_m:?} beneath");
+    // Within a spacing.
+    assert!(rig.state.active.ids().len() > 120 && between_m[0] > 4e-3);
+    for (between, beneath) in between_m.into_iter().zip(beneath_m) {
+        assert!((between - beneath).abs() < 2.5e-3, "{between_m:?} {beneath_m:?}");
+    }
+}
+
+/// An upright capsule, thin beside the skin's triangles, comes down at several places of them: nothing stays asleep beneath what it presses.
+#[test]
+fn particles_wake_beneath_a_tip_that_touches_far_from_all_vertices() {
+    for at_m in [DVec3::ZERO, DVec3::X, DVec3::new(1.0, 1.0, 0.0), DVec3::new(1.2, 0.7, 0.0)] {
+        let mut spec = block(600, Waking::ByTools { reach_m: REACH_M });
+        let (radius_m, half_m) = (0.4e-3, 1e-3);
+        let height_m = radius_m + half_m;
+        spec.tools[0] = ToolSpec {
+            shape: ToolShape::capsule(Coupling::Rigid, radius_m, half_m, DVec3::Z),
+            ..sphere(radius_m, at_m * 1.25e-3 + DVec3::Z * (height_m + 3e-3), Coupling::Rigid)
+        };
+        let mut rig = Rig::new(spec);
+        let from = first(&rig);
+        let (mut pressed, mut asleep) = (0_u32, 0);
+        for tick in 0..800_u32 {
+            let down_m = 3.2e-3 * (f64::from(tick) / 500.0).min(1.0);
+            run_at(&mut rig, ToolTarget { position_m: from.position_m - DVec3::Z * down_m, ..from });
+            pressed += u32::from(rig.state.tools[0].contacts > 0);
+            // What is to wake does so some ticks after a look.
+            asleep += u32::from(pressed > 30 && rig.state.active.is_empty());
+        }
+        assert!(pressed > 200 && asleep == 0, "{at_m}: asleep in {asleep} of {pressed} ticks");
+    }
+}
+
 /// What body and tool exchange, friction and all, keeps both momenta, whatever wakes and falls asleep meanwhile.
 #[test]
 fn a_free_hybrid_block_and_a_free_capsule_keep_both_momenta() {
@@ -241,7 +292,8 @@ fn sheet(rings: i32, refinement: Option<Refinement>, along: DVec3) -> ModelSpec 
                 mass_kg: vec![2e-4; vertices],
                 held: Vec::new(),
                 most_awake: vertices,
-                most_refined: 600,
+                // What scenes have by default.
+                most_refined: 6 * triangles_about(2, 2.0 * HALF_M, EDGE_M),
                 surface,
             },
             refinement,

@@ -2,10 +2,10 @@
 #![allow(clippy::unwrap_used)]
 mod rig;
 use assert_no_alloc::{AllocDisabler, assert_no_alloc};
-use glam::DVec3;
+use glam::{DQuat, DVec3};
 use palpate_physics::{
     Energies, LoadSpec, ModelSpec, PointForce, PrescribedSpec, Settings, State, Substeps, TetMesh,
-    contact::Coupling,
+    contact::{Coupling, ToolShape, ToolTarget},
     snapshot,
     spring::{
         HomeLaw, Net, Refinement, Refining, SpringBodySpec, SpringSpec,
@@ -16,7 +16,7 @@ use palpate_physics::{
         region::Constants,
     },
 };
-use rig::{Drive, Rig, at, sphere};
+use rig::{Drive, Rig, sphere};
 
 #[global_allocator]
 static ALLOCATOR: AllocDisabler = AllocDisabler;
@@ -360,19 +360,25 @@ fn loads_and_weight_come_to_rest_in_balance() {
 
 #[test]
 fn ticks_allocate_nothing() {
-    for most_awake in [usize::MAX, 80] {
+    let lying = ToolShape::capsule(Coupling::Rigid, 3e-3, 0.012, DVec3::X);
+    for (most_awake, shape) in [usize::MAX, 80].into_iter().flat_map(|most| [(most, ToolShape::Sphere), (most, lying)])
+    {
         let mut spec = sheet(10, Some(refined(2, Refining::ByTools)));
+        spec.tools[0].shape = shape;
         let springs = &mut spec.springs.as_mut().unwrap().springs;
         springs.most_awake = springs.most_awake.min(most_awake);
         springs.home_law = HomeLaw::cubic(1e4).unwrap();
         let mut rig = Rig::new(spec);
         let mut saved = State::at_rest(&rig.model);
         let mut drive = rig.still();
+        let still = drive.tools[0];
         drive.point_forces.push(PointForce { node: 0, force_n: DVec3::ZERO });
         let (mut layouts, mut nodes) = (0, 0);
         assert_no_alloc(|| {
             for tick in 0..3000 {
-                drive.tools[0] = at(tour(tick) + if tick % 1000 > 700 { DVec3::Z * 0.05 } else { DVec3::ZERO });
+                let position_m = tour(tick) + if tick % 1000 > 700 { DVec3::Z * 0.05 } else { DVec3::ZERO };
+                let orientation = DQuat::from_rotation_z(1e-3 * f64::from(tick)) * still.orientation;
+                drive.tools[0] = ToolTarget { position_m, orientation, ..still };
                 drive.point_forces[0] = PointForce { node: tick % 300, force_n: DVec3::Z * 1e-3 };
                 rig.tick(&drive);
                 layouts += u32::from(rig.state.x.len() != nodes);

@@ -111,7 +111,11 @@ fn bad_springs_are_told_with_their_key() {
         ("part = \"z_max\"", "part = \"z_mix\"", "the body has no part \"z_mix\""),
         ("rings = 2", "rings = 0", "body.springs.refine.rings = 0: must be 1 to 16"),
         ("constants = \"area\"", "mesh_n_per_m = 3", "which go together"),
-        ("constants = \"area\"", "constants = \"area\"\nmost_triangles = 5", "must hold one region"),
+        (
+            "constants = \"area\"",
+            "constants = \"area\"\nmost_triangles = 5",
+            "must hold the region of each tool, 24 triangles",
+        ),
         ("damping_n_s_per_m = 0.01", "damping_n_s_per_m = -1", "must be finite and not negative"),
         ("constants = \"area\"", "constants = \"area\"\nfade_s = 0", "fade_s = 0"),
         ("vertex_mass_kg", "home_cubic_per_m2 = -1\nvertex_mass_kg", "per_m2 = -1"),

@@ -55,7 +55,7 @@ impl ClusterBox {
 
 /// A surface whose positions are worked out when asked for: a hybrid body's skin, a refined mass-spring surface.
 pub(crate) trait Skin {
-    /// A query begins.
+    /// Queries begin, at positions that do not change before the last of them.
     fn begin(&mut self);
     /// Lower bound (m) of the distance from a point to the triangles of a group.
     fn group_distance_m(&self, group: usize, from_m: DVec3) -> f64;

@@ -61,6 +61,8 @@ pub struct SurfaceModuli {
 pub struct ContactModel {
     /// Bound (N/m) of what contact can do at each node: a spring in all directions. Empty without tools.
     pub nodal_stiffness_n_per_m: Vec<f64>,
+    /// No point of the surface at rest is farther (m) from a vertex.
+    pub(crate) covering_radius_m: f64,
     /// Bound (rad²/s²) of what contact and coupling add through the tools' masses.
     pub tool_frequency_sq: f64,
     triangles: Triangles,
@@ -183,6 +185,9 @@ impl ContactModel {
             .iter()
             .map(|tool| ToolModel::new(tool, Foundation::new(&body, tool.radius_m, tool.shape.half_length_m())))
             .collect();
+        // Of the triangles with a longest edge l, an equilateral one has the point that is farthest from all corners: l/√3.
+        let edges_m = (0..surface.triangles.len()).map(|triangle| surface.longest_edge_m(triangle, rest_positions_m));
+        let covering_radius_m = edges_m.fold(0.0, f64::max) / 3.0_f64.sqrt();
         let (mut nodal_stiffness_n_per_m, mut tool_frequency_sq) = (vec![0.0; mass_kg.len()], 0.0);
         for tool in &tools {
             let size = (tool.spec.radius_m, tool.spec.shape.half_length_m());
@@ -192,7 +197,8 @@ impl ContactModel {
             }
             tool_frequency_sq += tool.spec.frequency_bound_sq(&total);
         }
-        Self { nodal_stiffness_n_per_m, tool_frequency_sq, tables: SampleTables::new(), tools, triangles }
+        let tables = SampleTables::new();
+        Self { nodal_stiffness_n_per_m, covering_radius_m, tool_frequency_sq, tables, tools, triangles }
     }
 
     /// Force (N) at which a tool's coupling saturates; infinite for a rigid tool.

@@ -4,15 +4,13 @@ use glam::DVec3;
 
 const NONE: u32 = u32::MAX;
 
-/// The vertex nearest to a point, if one is within a distance (m), and how far it is (m). Of several as near, the first one. `fitted` are contact's boxes and its travel (m), where they are of use.
+/// The vertex nearest to a point, if one is within a distance (m), and how far it is (m), of a skin of which a query has begun. Of several as near, the first one. `fitted` are contact's boxes and its travel (m), where they are of use.
 pub(crate) fn nearest_vertex(
-    skin: &mut impl Skin,
+    skin: &impl Skin,
     from_m: DVec3,
     within_m: f64,
     fitted: Option<(&[ClusterBox], f64)>,
 ) -> Option<(u32, f64)> {
-    skin.begin();
-    let skin = &*skin;
     let bound_m = |cluster: usize| {
         let of_fitted_m = fitted.map_or(0.0, |(boxes, travel_m)| boxes[cluster].distance_bound_m(from_m, travel_m));
         skin.cluster_distance_m(cluster, from_m).max(of_fitted_m)

@@ -62,29 +62,41 @@ impl ToolState {
 }
 
 impl Place {
-    /// The vertex of a skin nearest to where the tool is deepest in it here, or, where it does not touch it, to this place; within a gap of `2 near_m`. `fitted` are
-    /// contact's boxes and its travel (m), where they are of use.
+    /// The vertex of a skin, of which a query has begun, nearest to where the tool is deepest in it here, or, where it does not touch it, to this place; within a gap of `2 near_m`.
+    /// No point of the skin is farther than `cover_m` from a vertex. `fitted` are contact's boxes and its travel (m), where they are of use.
     ///
     /// Of a piece that reaches `s` to either side, a vertex that is `d` from its middle is no nearer than `√(d² − s²)`, and the nearest to the middle bounds the others:
     /// no piece that is near goes unseen, and some are seen too soon.
-    pub(crate) fn look(&self, skin: &mut impl Skin, near_m: f64, fitted: Option<(&[ClusterBox], f64)>) -> Near {
+    pub(crate) fn look(
+        &self,
+        skin: &impl Skin,
+        (near_m, cover_m): (f64, f64),
+        fitted: Option<(&[ClusterBox], f64)>,
+    ) -> Near {
         let s = self.half_piece_m;
-        let within_m = (self.radius_m + 2.0 * near_m).hypot(s);
-        let mut from = |from_m: DVec3| nearest_vertex(skin, from_m, within_m, fitted);
-        let beside = |vertex: Option<(u32, f64)>| {
-            let nearest_m = |d: f64| if s > 0.0 { (d * d - s * s).max(0.0).sqrt() } else { d };
-            let gap_m = vertex.map_or(f64::INFINITY, |(_, distance_m)| nearest_m(distance_m) - self.radius_m);
-            Near { from_m: self.at_m, vertex, gap_m }
+        // What touches has a vertex within `cover_m` of where it does, and of what is near by a margin for a skin that is stretched.
+        let touching_m = near_m + cover_m;
+        let within_m = (self.radius_m + touching_m.max(2.0 * near_m)).hypot(s);
+        let from = |from_m: DVec3| nearest_vertex(skin, from_m, within_m, fitted);
+        let gap_m = |d: f64| if s > 0.0 { (d * d - s * s).max(0.0).sqrt() } else { d } - self.radius_m;
+        let beside = || {
+            let vertex = from(self.at_m);
+            Near { from_m: self.at_m, vertex, gap_m: vertex.map_or(f64::INFINITY, |(_, distance_m)| gap_m(distance_m)) }
         };
-        let touching = |from_m: DVec3, vertex: Option<(u32, f64)>| Near { from_m, vertex, gap_m: 0.0 };
-        match self.deepest_m {
-            None => beside(from(self.at_m)),
-            Some(deepest_m) if s == 0.0 => touching(deepest_m, from(deepest_m)),
-            // It may touch elsewhere only.
-            Some(deepest_m) => match beside(from(self.at_m)) {
-                near if near.gap_m < near_m => touching(deepest_m, from(deepest_m).or(near.vertex)),
-                apart => apart,
-            },
+        let Some(deepest_m) = self.deepest_m else { return beside() };
+        if s == 0.0 {
+            return Near { from_m: deepest_m, vertex: from(deepest_m), gap_m: 0.0 };
+        }
+        let near = beside();
+        if near.gap_m >= touching_m {
+            // It touches elsewhere only.
+            return near;
+        }
+        // Of a tool that is levered between two walls, the force of both may point away from the one that is here.
+        let is_here = |vertex: &(u32, f64)| gap_m(skin.position_m(vertex.0).distance(self.at_m)) < touching_m;
+        match from(deepest_m).filter(is_here) {
+            Some(vertex) => Near { from_m: deepest_m, vertex: Some(vertex), gap_m: 0.0 },
+            None => Near { gap_m: 0.0, ..near },
         }
     }
 }
@@ -92,9 +104,78 @@ impl Place {
 #[cfg(test)]
 mod tests {
     use super::{
-        super::{Coupling, ToolShape},
+        super::{Coupling, ToolShape, broad::CLUSTER},
         *,
     };
+    use glam::DQuat;
+    use proptest::prelude::*;
+
+    /// Vertices, with a cluster for each.
+    struct Cloud {
+        at_m: Vec<DVec3>,
+        ids: Vec<u32>,
+    }
+
+    impl Skin for Cloud {
+        fn begin(&mut self) {}
+
+        fn group_distance_m(&self, _: usize, _: DVec3) -> f64 {
+            0.0
+        }
+
+        fn cluster_distance_m(&self, cluster: usize, from_m: DVec3) -> f64 {
+            0.9 * self.at_m[cluster].distance(from_m)
+        }
+
+        fn clusters(&self) -> usize {
+            self.at_m.len()
+        }
+
+        fn vertices(&self, cluster: usize) -> &[u32] {
+            &self.ids[cluster..=cluster]
+        }
+
+        fn position_m(&self, vertex: u32) -> DVec3 {
+            self.at_m[vertex as usize]
+        }
+    }
+
+    fn within(half_m: f64) -> impl Strategy<Value = DVec3> {
+        [-half_m..half_m, -half_m..half_m, -half_m..half_m].prop_map(DVec3::from)
+    }
+
+    proptest! {
+        /// Against the distance of every vertex from the whole axis.
+        #[test]
+        fn what_is_near_the_axis_is_near_a_place(
+            at_m in prop::collection::vec(within(0.04), 1..3 * CLUSTER),
+            axis in within(1.0),
+            half_length_m in 0.0..0.03,
+            apart_m in 1e-3..0.05,
+            near_m in 1e-3..4e-3,
+            cover_m in 0.0..3e-3,
+            force_n in prop::option::of(within(1.0)),
+        ) {
+            let spec = capsule(half_length_m);
+            let axis = axis.try_normalize().unwrap_or(DVec3::X);
+            let (orientation, contact_force_n) = (DQuat::from_rotation_arc(DVec3::Z, axis), force_n.unwrap_or_default());
+            let tool = ToolState { centre_m: DVec3::ZERO, orientation, contact_force_n, ..ToolState::at_start(&spec) };
+            let from_axis_m = |p: DVec3| p.distance(axis * p.dot(axis).clamp(-half_length_m, half_length_m));
+            let gap_m = at_m.iter().map(|p| from_axis_m(*p)).fold(f64::INFINITY, f64::min) - spec.radius_m;
+            let cloud = Cloud { ids: (0..at_m.len() as u32).collect(), at_m };
+            let count = spec.place_count(apart_m);
+            let looks: Vec<Near> = tool.places(&spec, count).map(|place| place.look(&cloud, (near_m, cover_m), None)).collect();
+            let least_m = looks.iter().map(|near| near.gap_m).fold(f64::INFINITY, f64::min);
+            let reach_m = (near_m + cover_m).max(2.0 * near_m);
+            prop_assert!(least_m <= gap_m.max(0.0) + 1e-12 || gap_m > reach_m - 1e-12, "{least_m} {gap_m}");
+            if count > 1 && contact_force_n != DVec3::ZERO && gap_m < near_m + cover_m - 1e-12 {
+                prop_assert!(looks.iter().any(|near| near.vertex.is_some() && near.gap_m == 0.0), "{looks:?}");
+            }
+            for (vertex, distance_m, from_m) in looks.iter().filter_map(|n| n.vertex.map(|(v, d)| (v, d, n.from_m))) {
+                prop_assert_eq!(cloud.at_m[vertex as usize].distance(from_m), distance_m);
+            }
+        }
+    }
 
     fn capsule(half_length_m: f64) -> ToolSpec {
         ToolSpec {

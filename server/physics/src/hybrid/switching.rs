@@ -24,7 +24,7 @@ use super::{
     spec::Waking,
 };
 use crate::{
-    contact::Near,
+    contact::{Near, broad::Skin},
     world::{Model, Scratch, State},
 };
 use glam::{BVec3, DVec3};
@@ -57,8 +57,10 @@ pub(crate) struct Ball {
 /// Buffers of a look.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Looking {
-    /// Squared distance (m²) and number of particles in a ball.
+    /// Squared distance (m²) and number of particles in a tool's balls.
     found: Vec<(f64, u32)>,
+    /// Whether a particle is among these.
+    is_found: Vec<bool>,
     /// Active particles to be.
     wanted: Vec<u32>,
     /// Active particles that nobody wants, with how far (m) they are from where they would be asleep.
@@ -89,8 +91,9 @@ impl Looking {
         let tools = model.spec().tools.len().max(1);
         Self {
             found: Vec::with_capacity(
-                in_ball.min(body.partition.particle_count()) * places(model).max().unwrap_or_default(),
+                (in_ball * places(model).max().unwrap_or_default()).min(body.partition.particle_count()),
             ),
+            is_found: vec![false; body.partition.particle_count()],
             wanted: Vec::with_capacity(tools * most),
             unwanted: Vec::with_capacity(most),
             moved: Vec::with_capacity(most),
@@ -248,11 +251,12 @@ pub fn wake_only(model: &Model, state: &mut State, scratch: &mut Scratch, partic
 fn place_balls(model: &Model, view: &mut SkinView<'_>, spacing_m: f64, state: &mut State) {
     let State { tools, active, contact, force_is_current, .. } = state;
     let fitted = force_is_current.then(|| contact.boxes());
+    view.begin();
     let places = tools.iter().zip(&model.spec().tools).zip(places(model));
     let places = places.flat_map(|((tool, spec), count)| tool.places(spec, count).map(move |place| (place, spec)));
     for ((place, spec), ball) in places.zip(&mut active.balls) {
         let near_m = (GAP * spec.radius_m).max(GAP * spacing_m) + AHEAD_S * place.speed_m_per_s;
-        let Near { vertex, gap_m, .. } = place.look(view, near_m, fitted);
+        let Near { vertex, gap_m, .. } = place.look(view, (near_m, model.contact().covering_radius_m), fitted);
         match (ball.as_mut(), vertex) {
             (_, Some((vertex, _))) if gap_m < near_m => {
                 let rest_m = model.surface_rest_positions_m()[vertex as usize];
@@ -270,6 +274,22 @@ fn place_balls(model: &Model, view: &mut SkinView<'_>, spacing_m: f64, state: &m
             (None, _) => {}
         }
     }
+}
+
+/// Squared distance (m²) of a point to the middles of balls, and to the lines between those of neighbours.
+fn distance_to_balls_sq(balls: &[Option<Ball>], at_m: DVec3) -> f64 {
+    let (mut nearest_sq, mut before_m) = (f64::INFINITY, None);
+    for ball in balls {
+        let middle_m = ball.map(|ball| ball.rest_m);
+        if let Some(to_m) = middle_m {
+            let from_m = before_m.unwrap_or(to_m);
+            let along_m = to_m - from_m;
+            let part = (at_m - from_m).dot(along_m) / along_m.length_squared().max(f64::MIN_POSITIVE);
+            nearest_sq = nearest_sq.min(at_m.distance_squared(from_m + along_m * part.clamp(0.0, 1.0)));
+        }
+        before_m = middle_m;
+    }
+    nearest_sq
 }
 
 impl Looking {
@@ -316,29 +336,32 @@ impl Looking {
         }
     }
 
-    /// The particles in the tools' balls, ascending; the nearest ones where there is no room for all, as many for each tool.
+    /// The particles in the tools' balls, ascending; where there is no room for all, as many for each tool, the nearest to their middles, and to the lines between those of neighbours.
     fn want(&mut self, body: &Hybrid, model: &Model, active: &ActiveParticles, (reach_m, most): (f64, usize)) {
         self.wanted.clear();
         let of_tool = |first: &mut usize, count: usize| {
             *first += count;
-            Some(active.balls[*first - count..*first].iter().flatten())
+            Some(&active.balls[*first - count..*first])
         };
         let tools = || places(model).scan(0, of_tool);
-        let room = most / tools().filter_map(|mut balls| balls.next()).count().max(1);
+        let room = most / tools().filter(|balls| balls.iter().any(Option::is_some)).count().max(1);
         for balls in tools() {
             self.found.clear();
-            let several = balls.clone().count() > 1;
-            for ball in balls {
+            for (number, ball) in balls.iter().enumerate().filter_map(|(number, ball)| Some((number, (*ball)?))) {
+                // As places are no farther from each other than balls reach, those after the next two hold nothing that this one does.
+                let near = &balls[number.saturating_sub(1)..(number + 4).min(balls.len())];
                 body.partition.particles_within(ball.rest_m, reach_m, |particle, distance_sq| {
-                    if body.may_wake(particle) {
-                        self.found.push((distance_sq, particle));
+                    let is_found = &mut self.is_found[particle as usize];
+                    if body.may_wake(particle) && !std::mem::replace(is_found, true) {
+                        let at_m = body.partition.particle_m(particle);
+                        let is_alone = balls.len() == 1;
+                        self.found
+                            .push((if is_alone { distance_sq } else { distance_to_balls_sq(near, at_m) }, particle));
                     }
                 });
             }
-            if several {
-                // Of each the least distance.
-                self.found.sort_unstable_by(|a, b| a.1.cmp(&b.1).then(a.0.total_cmp(&b.0)));
-                self.found.dedup_by_key(|found| found.1);
+            for (_, particle) in &self.found {
+                self.is_found[*particle as usize] = false;
             }
             if self.found.len() > room {
                 self.found.select_nth_unstable_by(room, |a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));

@@ -91,10 +91,10 @@ impl SpringBodyScratch {
         };
         let fine = springs.next_fine(body, model.spec().settings.tick_period_s / CONSTANTS_FOLLOW_S, away_m);
         // A moving tool leaves levels no time to lag behind: what is refined too late at its front and coarse too late at its back would drive it on.
-        let speeds = state.tools.iter().zip(&model.spec().tools).zip(body.places());
-        let speeds =
-            speeds.flat_map(|((tool, spec), own)| tool.places(spec, own.len()).map(|place| place.speed_m_per_s));
-        let fastest_m_per_s = speeds.fold(0.0, f64::max);
+        let places = state.tools.iter().zip(&model.spec().tools).zip(body.places());
+        let places = places.flat_map(|((tool, spec), own)| tool.places(spec, own.len()).zip(&springs.about[own]));
+        let touching = places.filter(|(_, about)| about.touched.is_some());
+        let fastest_m_per_s = touching.map(|(place, _)| place.speed_m_per_s).fold(0.0, f64::max);
         let rate_hz = |r: Refinement| r.fade_s.recip() + fastest_m_per_s / (FADE_WAY * body.edge_m());
         let step = body.refinement().map_or(1.0, |r| model.spec().settings.tick_period_s * rate_hz(r));
         let wanted = Wanted { refined: &springs.refined, step, fine, awake: &springs.awake };
@@ -134,30 +134,34 @@ impl SpringBodyScratch {
         let State { x, tools, contact, force_is_current, springs: Some(springs), .. } = state else { return };
         let fitted = force_is_current.then(|| contact.boxes());
         let tick_period_s = model.spec().settings.tick_period_s;
+        let SpringState { motion, about, .. } = springs;
+        let mut skin = SpringSkin::new(body, (motion, &self.springs), x);
+        skin.begin();
         for ((tool, spec), own) in tools.iter().zip(&model.spec().tools).zip(body.places()) {
-            if ticks == 0 && springs.is_fine_at(own.clone()) {
+            let about = &mut about[own];
+            if ticks == 0 && about.iter().any(|about| about.touched.is_some()) {
                 continue;
             }
-            for (place, index) in tool.places(spec, own.len()).zip(own) {
+            for (place, about) in tool.places(spec, about.len()).zip(about) {
                 // What it goes until the next look.
                 let ahead_m = f64::from(LOOK_EVERY_TICKS) * tick_period_s * place.speed_m_per_s;
                 let near_m = GAP * spec.radius_m + 0.5 * body.edge_m() + ahead_m;
-                let mut skin = SpringSkin::new(body, (&springs.motion, &self.springs), x);
-                let Near { from_m, vertex, gap_m } = place.look(&mut skin, near_m, fitted);
+                let cover_m = model.contact().covering_radius_m;
+                let Near { from_m, vertex, gap_m } = place.look(&skin, (near_m, cover_m), fitted);
                 let near = vertex.map(|(vertex, _)| {
                     let distance_m = |vertex: u32| skin.position_m(vertex).distance(from_m);
                     let vertex = skin.coarse_vertex(vertex, from_m);
-                    let touched = springs.touched(index).unwrap_or(vertex);
+                    let touched = about.touched.unwrap_or(vertex);
                     let depth_m = skin.position_m(touched).distance(body.model().rest_m()[touched as usize]);
                     Found {
                         rings: rings_for(depth_m, spec.radius_m, body.edge_m()),
                         vertex,
                         distance_m: distance_m(vertex),
-                        present_m: springs.touched(index).map_or(f64::INFINITY, distance_m),
+                        present_m: about.touched.map_or(f64::INFINITY, distance_m),
                         gap_m,
                     }
                 });
-                springs.note(index, near, (near_m, spec.radius_m, ticks));
+                about.note(near, (near_m, spec.radius_m, ticks));
             }
         }
     }

@@ -1,5 +1,6 @@
 //! The boundary of a tetrahedral mesh: what tools touch and viewers see.
 use super::tet::{FACES, MeshError, TetMesh};
+use glam::DVec3;
 use std::collections::BTreeMap;
 
 /// Boundary triangles over *surface vertices*, which are numbered from 0 in ascending order of their nodes.
@@ -56,6 +57,12 @@ impl Surface {
     /// Nodes of a triangle.
     pub fn triangle_nodes(&self, triangle: usize) -> [u32; 3] {
         self.triangles[triangle].map(|vertex| self.nodes[vertex as usize])
+    }
+
+    /// The longest edge (m) of a triangle, its nodes at these positions (m).
+    pub(crate) fn longest_edge_m(&self, triangle: usize, positions_m: &[DVec3]) -> f64 {
+        let [a, b, c] = self.triangle_nodes(triangle).map(|node| positions_m[node as usize]);
+        a.distance(b).max(b.distance(c)).max(c.distance(a))
     }
 }
 

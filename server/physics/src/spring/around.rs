@@ -1,7 +1,8 @@
 //! Triangles and vertices around some vertices, for the loop: in buffers that are there. Their oracle is [`super::Region`].
 use super::topology::{NONE, Triangulation};
 
-/// Triangles of so many rings about vertices, ascending, as [`super::Region::rings`] has them, but at most so many: a ring that would be more is left out, and what closes the region stops there.
+/// Triangles of so many rings about vertices, ascending, as [`super::Region::rings`] has them, but at most so many: a ring that would be more is left out, but for the first one, which has all triangles at the
+/// first vertices then; what closes the region stops there.
 /// With room for as many triangles and three times as many corners nothing is allocated.
 pub fn rings_into(
     surface: &Triangulation,
@@ -12,20 +13,30 @@ pub fn rings_into(
     triangles.clear();
     corners.clear();
     corners.extend_from_slice(centres);
-    for _ in 0..rings {
+    for ring in 0..rings {
         let before = triangles.len();
-        let fits = corners.iter().flat_map(|&vertex| surface.triangles_at(vertex)).all(|&triangle| {
-            let found = triangles[..before].binary_search(&triangle).is_ok() || triangles[before..].contains(&triangle);
-            if !found && triangles.len() < most {
-                triangles.push(triangle);
+        let mut whole = before;
+        let fits = corners.iter().all(|&vertex| {
+            let fits = surface.triangles_at(vertex).iter().all(|&triangle| {
+                let found =
+                    triangles[..before].binary_search(&triangle).is_ok() || triangles[before..].contains(&triangle);
+                if !found && triangles.len() < most {
+                    triangles.push(triangle);
+                }
+                found || triangles.last() == Some(&triangle)
+            });
+            if fits && ring == 0 {
+                whole = triangles.len();
             }
-            found || triangles.last() == Some(&triangle)
+            fits
         });
         if !fits {
-            triangles.truncate(before);
-            break;
+            triangles.truncate(whole);
         }
         triangles.sort_unstable();
+        if !fits {
+            break;
+        }
         corners.clear();
         corners.extend(triangles.iter().flat_map(|&t| surface.triangles()[t as usize]));
         corners.sort_unstable();
@@ -117,6 +128,12 @@ mod tests {
         for (most, expected) in [(5, 0), (6, 6), (23, 6), (24, 24), (53, 24), (54, 54)] {
             rings_into(&patch, &[0], (3, most), (&mut triangles, &mut corners));
             assert_eq!(triangles.len(), expected, "{most}");
+        }
+        let [middle, far] = [0, patch.positions_m().len() as u32 - 1];
+        let about = |vertex: u32| patch.triangles_at(vertex).to_vec();
+        for (most, expected) in [(5, Vec::new()), (7, about(middle)), (8, [about(middle), about(far)].concat())] {
+            rings_into(&patch, &[middle, far], (1, most), (&mut triangles, &mut corners));
+            assert_eq!(triangles, expected, "{most}");
         }
     }
 

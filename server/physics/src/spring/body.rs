@@ -128,7 +128,7 @@ impl SpringBody {
         });
         let edge_m = lengths.sum::<f64>() / model.surface().edges().len() as f64;
         let rings = refinement.map_or(1, |refinement| if refinement.follows_dent { 1 } else { refinement.rings });
-        // The regions about two of them touch.
+        // The regions about two of them overlap by half.
         let places: Vec<usize> = tools.iter().map(|tool| tool.place_count(f64::from(rings) * edge_m)).collect();
         // A disc for each, of vertices with √3/2 l² each.
         let each = model.spec().most_awake as f64 / places.iter().sum::<usize>().max(1) as f64;
@@ -240,6 +240,15 @@ fn fingerprint(spec: &SpringSpec, how: (Option<Refinement>, &Option<ConstantsTab
 pub fn rings_for(depth_m: f64, radius_m: f64, edge_m: f64) -> f64 {
     let touched_m = if depth_m < radius_m { (depth_m * (2.0 * radius_m - depth_m)).sqrt() } else { radius_m };
     (touched_m + depth_m) / edge_m
+}
+
+/// Triangles of a regular surface, with edges `l` (m), in `n` rings about a line of length `L` (m) on it.
+/// ```text
+/// 6 n² + 4 n ⌈L/l⌉
+/// ```
+pub fn triangles_about(rings: u32, length_m: f64, edge_m: f64) -> usize {
+    let rings = rings as usize;
+    (6 * rings * rings).saturating_add((4 * rings).saturating_mul((length_m / edge_m).ceil() as usize))
 }
 
 /// More rings would be most of any surface.

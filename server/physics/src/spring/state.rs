@@ -28,7 +28,7 @@ pub struct SpringState {
     /// Awake nodes and levels.
     pub motion: SpringMotion,
     /// One for each place of each tool.
-    about: Vec<About>,
+    pub(crate) about: Vec<About>,
     /// Vertices that forces were injected at while they slept.
     forced: Vec<u32>,
     /// Triangles that are to be refined, ascending.
@@ -43,7 +43,7 @@ pub struct SpringState {
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub(crate) struct About {
     /// The vertex refined about.
-    touched: Option<u32>,
+    pub(crate) touched: Option<u32>,
     /// The vertex awake about.
     awake: Option<u32>,
     /// Rings that its dent needs, at least one.
@@ -98,6 +98,34 @@ pub fn refine_only(model: &Model, state: &mut State, centres: &[u32], rings: u32
     around::rings_into(springs.surface(), &known, (rings, most), (&mut triangles, &mut corners));
     own.refined.clear();
     own.refined.extend_from_slice(&triangles);
+}
+
+impl About {
+    /// Takes what the place is near to, if anything, after so many ticks; from `near_m` on it touches.
+    pub(crate) fn note(&mut self, near: Option<Found>, (near_m, radius_m, ticks): (f64, f64, u32)) {
+        /// Part of the tool's radius that another vertex has to be nearer.
+        const NEARER: f64 = 0.1;
+        /// Part of a ring by which a dent must have shrunk before it has one less.
+        const SHRUNK: f64 = 0.25;
+        match (self.touched, near) {
+            (touched, Some(near)) if near.gap_m < near_m => {
+                let follows = touched.is_none() || near.distance_m < near.present_m - NEARER * radius_m;
+                self.touched = if follows { Some(near.vertex) } else { touched };
+                self.away_ticks = 0;
+                let wanted = near.rings.max(1.0).ceil().min(f64::from(MOST_RINGS)) as u32;
+                let shrunk = near.rings + SHRUNK < f64::from(self.rings) - 1.0;
+                self.rings = if wanted > self.rings || shrunk { wanted } else { self.rings };
+            }
+            (Some(_), near) if near.is_none_or(|near| near.gap_m > 2.0 * near_m) => {
+                self.away_ticks += ticks;
+                if self.away_ticks >= AWAY_TICKS {
+                    (self.touched, self.rings) = (None, 0);
+                }
+            }
+            (Some(_), _) => self.away_ticks = 0,
+            (None, _) => {}
+        }
+    }
 }
 
 impl SpringState {
@@ -184,41 +212,9 @@ impl SpringState {
         }
     }
 
-    /// The vertex that it is refined about for a place.
-    pub(crate) fn touched(&self, place: usize) -> Option<u32> {
-        self.about[place].touched
-    }
-
     /// Whether it is refined about any of these places.
-    pub(crate) fn is_fine_at(&self, mut places: Range<usize>) -> bool {
-        places.any(|place| self.touched(place).is_some())
-    }
-
-    /// Takes what a place of a tool is near to, if anything, after so many ticks; from `near_m` on it touches.
-    pub(crate) fn note(&mut self, place: usize, near: Option<Found>, (near_m, radius_m, ticks): (f64, f64, u32)) {
-        /// Part of the tool's radius that another vertex has to be nearer.
-        const NEARER: f64 = 0.1;
-        /// Part of a ring by which a dent must have shrunk before it has one less.
-        const SHRUNK: f64 = 0.25;
-        let about = &mut self.about[place];
-        match (about.touched, near) {
-            (touched, Some(near)) if near.gap_m < near_m => {
-                let follows = touched.is_none() || near.distance_m < near.present_m - NEARER * radius_m;
-                about.touched = if follows { Some(near.vertex) } else { touched };
-                about.away_ticks = 0;
-                let wanted = near.rings.max(1.0).ceil().min(f64::from(MOST_RINGS)) as u32;
-                let shrunk = near.rings + SHRUNK < f64::from(about.rings) - 1.0;
-                about.rings = if wanted > about.rings || shrunk { wanted } else { about.rings };
-            }
-            (Some(_), near) if near.is_none_or(|near| near.gap_m > 2.0 * near_m) => {
-                about.away_ticks += ticks;
-                if about.away_ticks >= AWAY_TICKS {
-                    (about.touched, about.rings) = (None, 0);
-                }
-            }
-            (Some(_), _) => about.away_ticks = 0,
-            (None, _) => {}
-        }
+    pub(crate) fn is_fine_at(&self, places: Range<usize>) -> bool {
+        self.about[places].iter().any(|about| about.touched.is_some())
     }
 
     /// A force is injected at a vertex that sleeps.

@@ -57,20 +57,15 @@ fn shapes(spec: &ModelSpec) -> Result<(), ModelError> {
 
 /// No triangle of the surface is too large for the tool's contact samples.
 fn fine_enough(surface: &Surface, rest_positions_m: &[DVec3], tool: &ToolSpec) -> Result<(), ModelError> {
-    let corners = |t: usize| surface.triangle_nodes(t).map(|n| rest_positions_m[n as usize]);
-    let longest_m = |t: usize| {
-        let [a, b, c] = corners(t);
-        a.distance(b).max(b.distance(c)).max(c.distance(a))
-    };
-    let all = 0..surface.triangles.len();
-    let Some((triangle, size_m)) = all.map(|t| (t, longest_m(t))).max_by(|a, b| a.1.total_cmp(&b.1)) else {
+    let sizes_m = (0..surface.triangles.len()).map(|t| (t, surface.longest_edge_m(t, rest_positions_m)));
+    let Some((triangle, size_m)) = sizes_m.max_by(|a, b| a.1.total_cmp(&b.1)) else {
         return Ok(());
     };
     let largest_m = LARGEST_TRIANGLE * tool.radius_m;
     if size_m <= largest_m * (1.0 + 1e-9) {
         return Ok(());
     }
-    let [a, b, c] = corners(triangle);
+    let [a, b, c] = surface.triangle_nodes(triangle).map(|n| rest_positions_m[n as usize]);
     let (tool, radius_m, centre_m) = (tool.name.clone(), tool.radius_m, (a + b + c) / 3.0);
     Err(ModelError::SurfaceTooCoarse { tool, radius_m, triangle, centre_m, size_m, largest_m })
 }

@@ -76,9 +76,9 @@ pub(crate) fn compile(
     let loads = loads::loads(document, &regions, files)?;
     let particles = particles::spec(document, &body, &constraints, files)?;
     let seed = seed::spec(document, &body)?;
-    let springs = springs::spec(document, &body, &mut settings, files)?;
     progress(0.9, "placing tools and probes");
     let tools = tools::compile(document, &body, files)?;
+    let springs = springs::spec(document, &body, (&mut settings, &tools.specs), files)?;
     let mut warnings = body.warnings.clone();
     warnings.extend(materials.warnings.iter().cloned());
     warnings.extend(tools.warnings);

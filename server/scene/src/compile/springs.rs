@@ -19,6 +19,7 @@ use palpate_physics::{
     contact::ToolSpec,
     spring::{
         HomeLaw, Refinement, Refining, SpringBodySpec, SpringSpec,
+        body::triangles_about,
         calibration::{Calibration, ConstantsTable},
         home::Layer,
         loop_scheme, matching,
@@ -145,8 +146,7 @@ pub(super) fn warn_of_small_tools(body: &Body, tools: &[ToolSpec], warnings: &mu
     /// Of the mean edge's length.
     const SMALL: f64 = 0.25;
     let Some(surface) = &body.springs else { return };
-    let edges = surface.edges().len();
-    let mean_m = (0..edges as u32).map(|edge| surface.length_m(edge)).sum::<f64>() / edges as f64;
+    let mean_m = mean_edge_m(surface);
     for tool in tools.iter().filter(|tool| tool.radius_m < SMALL * mean_m) {
         warnings.push(format!(
             "the tool \"{}\" (radius {:.3} mm) is small beside the surface's edges ({:.3} mm in the mean): pressed hard, it slips through; take a larger tool or a finer surface",
@@ -187,7 +187,7 @@ pub(super) fn shift(body: &mut Body, offset: DVec3) -> Result<(), Fault> {
 pub(super) fn spec(
     document: &Document,
     body: &Body,
-    settings: &mut Settings,
+    (settings, tools): (&mut Settings, &[ToolSpec]),
     files: &Files<'_>,
 ) -> Result<Option<SpringBodySpec>, Fault> {
     let (Some(table), Some(surface)) = (&document.body.springs, &body.springs) else { return Ok(None) };
@@ -228,7 +228,7 @@ pub(super) fn spec(
         let message = "a table of constants is for one number of rings";
         return Err(Fault::value(at.key("follows_dent"), message).help("leave it out, or give other constants"));
     }
-    springs.most_refined = most_refined(refine, document.tool.len())?;
+    springs.most_refined = most_refined(refine, surface, tools)?;
     let refinement = Refinement {
         rings: refine.rings,
         follows_dent: refine.follows_dent,
@@ -238,15 +238,26 @@ pub(super) fn spec(
     Ok(Some(SpringBodySpec { springs, refinement: Some(refinement), table: constants_table }))
 }
 
-/// A regular region of so many rings has `6 n²` triangles; three times that are on their way behind a tool that moves.
-fn most_refined(refine: &RefineTable, tools: usize) -> Result<usize, Fault> {
+/// Room for the region of every tool, and five times as much that is on its way behind tools that move.
+fn most_refined(refine: &RefineTable, surface: &Triangulation, tools: &[ToolSpec]) -> Result<usize, Fault> {
     const MOST: u32 = 100_000;
-    let region = 6 * (refine.rings as usize).pow(2);
-    let Some(most) = refine.most_triangles else { return Ok(6 * region * tools.max(1)) };
-    let rule = "must hold one region, 6 times the rings squared, and be 100000 or less";
-    let ok = most as usize >= region && most <= MOST;
-    check(&at().key("refine").key("most_triangles"), most, ok, rule)?;
+    let edge_m = mean_edge_m(surface);
+    let region = |tool: &ToolSpec| triangles_about(refine.rings, 2.0 * tool.shape.half_length_m(), edge_m);
+    let smallest = triangles_about(refine.rings, 0.0, edge_m);
+    let Some(most) = refine.most_triangles else {
+        let all = tools.iter().map(region).fold(0, usize::saturating_add).max(smallest);
+        return Ok(all.saturating_mul(6).min(surface.triangles().len()));
+    };
+    let largest = tools.iter().map(region).fold(smallest, usize::max);
+    let rule = format!("must hold the region of each tool, {largest} triangles, and be {MOST} or less");
+    let ok = most as usize >= largest && most <= MOST;
+    check(&at().key("refine").key("most_triangles"), most, ok, &rule)?;
     Ok(most as usize)
+}
+
+fn mean_edge_m(surface: &Triangulation) -> f64 {
+    let edges = surface.edges().len();
+    (0..edges as u32).map(|edge| surface.length_m(edge)).sum::<f64>() / edges as f64
 }
 
 fn positive(at: &Where, key: &str, value: f64) -> Result<f64, Fault> {

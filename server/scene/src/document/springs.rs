@@ -65,7 +65,8 @@ pub(crate) struct RefineTable {
     pub(crate) mesh_n_per_m: Option<f64>,
     /// Stiffness K'_h (N/m) of the refined vertices' springs home.
     pub(crate) home_n_per_m: Option<f64>,
-    /// Most triangles refined at once, or on their way; by default enough for every tool to be followed.
+    /// Most triangles refined at once, or on their way: as many as any one tool needs, at least (6 times the rings squared, and for capsules 4 times the rings for each edge's length along them); by default enough for
+    /// every tool to be followed.
     pub(crate) most_triangles: Option<u32>,
 }
 
