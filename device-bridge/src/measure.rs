@@ -4,9 +4,8 @@
 //! (`servo.least_success_rate`) no force is given: the bridge latches it while it runs, too.
 mod chart;
 
-use crate::{BridgeError, Config, Handle, Stats, run::run_with, settings::Settings};
+use crate::{BridgeError, Config, Handle, run::run_with, settings::Settings};
 pub use chart::{bars, svg};
-use palpate_control::StiffnessBound;
 use palpate_realtime::{LoopMonitor, Percentiles};
 use std::{
     fmt,
@@ -47,11 +46,12 @@ pub struct Report {
 }
 
 impl Report {
-    fn new(stats: &Stats, settings: &Settings, reached_hz: f64) -> Self {
+    fn new(handle: &Handle, settings: &Settings, reached_hz: f64) -> Self {
+        let stats = handle.stats();
         let servo = stats.servo();
         let of = |look: fn(&LoopMonitor) -> u64| servo.map_or(0, look);
         let (pose_age, round_trip) = (stats.pose_age.percentiles(), stats.round_trip.percentiles());
-        let bound: StiffnessBound = settings.servo.stiffness;
+        let bound = handle.stiffness().unwrap_or(settings.servo.stiffness);
         let at = |delay_ns: f64| bound.at_delay(1e-9 * delay_ns).largest_n_per_m();
         let judged = stats.judged.get();
         Self {
@@ -105,7 +105,7 @@ pub async fn measure(config: &Config, time: Duration, handle: Handle) -> Result<
         ended = &mut bridge => return Err(ended.err().unwrap_or(BridgeError::ServoDied)),
         reached_hz = watched => reached_hz,
     };
-    let report = Report::new(handle.stats(), &settings, reached_hz);
+    let report = Report::new(&handle, &settings, reached_hz);
     shutdown.cancel();
     bridge.await.map(|_| report)
 }

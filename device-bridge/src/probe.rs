@@ -37,7 +37,7 @@ pub fn probe(config: &Config, time: Duration) -> Result<Report, BridgeError> {
     // A look at the arm is no recording.
     let settings = Settings::new(&Config { record: RecordConfig::default(), ..config.clone() })?;
     let period_s = settings.servo.period_s;
-    let mut arm = device::open(&settings.device, period_s, &CancellationToken::new())?;
+    let mut arm = device::open(&settings.device, period_s, &CancellationToken::new(), |_| Ok(()))?;
     let mut tick_loop = TickLoop::new(Clock::Monotonic, period_s)
         .map_err(|error| BridgeError::Value { key: "servo.rate_hz".to_owned(), reason: error.to_string() })?;
     let monitor = tick_loop.monitor();

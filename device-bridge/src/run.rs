@@ -8,7 +8,7 @@ use crate::{
     uplink::{SampleSource, Uplink},
     vrpn_server,
 };
-use palpate_control::{EnergyMeter, Link};
+use palpate_control::{EnergyMeter, Link, StiffnessBound};
 use palpate_realtime::{Clock, Doorbell, Note, OsMeasures, TickLoop, slot};
 use std::{
     path::PathBuf,
@@ -45,6 +45,8 @@ pub struct Shared {
     pub without_force: AtomicBool,
     /// This program, to be started as a guard.
     pub guard_program: OnceLock<PathBuf>,
+    /// How stiff contacts may be on the arm, once it is open.
+    pub stiffness: OnceLock<StiffnessBound>,
     /// The connection to the daemon ended.
     pub lost: AtomicBool,
     /// There was a guard, and it is gone.
@@ -80,6 +82,11 @@ impl Handle {
         self.shared.without_force.store(true, Ordering::Relaxed);
     }
 
+    /// How stiff contacts may be on the arm, once it is open.
+    pub fn stiffness(&self) -> Option<StiffnessBound> {
+        self.shared.stiffness.get().copied()
+    }
+
     /// Counters, live.
     pub fn stats(&self) -> &Stats {
         &self.shared.stats
@@ -109,7 +116,8 @@ pub async fn run_with(config: &Config, shutdown: CancellationToken, handle: Hand
     let (server, told) = vrpn_server::open(settings.vrpn_server.as_ref(), &shared)?.unzip();
     let device = open(&settings, &shutdown).await?;
     let Some(device) = device else { return Ok(shared.stats.summary()) };
-    let settings = settings.bearable(device.stiffest_wall_n_per_m())?;
+    let settings = settings.bearable(device.stiffest_wall_n_per_m());
+    let _ = shared.stiffness.set(settings.servo.stiffness);
     let (commands, down) = slot(&None);
     let (up, samples) = slot(&None);
     let bell = Doorbell::new().map_err(|source| BridgeError::System { what: "create an eventfd", source })?;
@@ -189,9 +197,10 @@ fn start_guard(device: &dyn device::Arm, settings: &Settings, program: Option<&P
 
 /// The arm, opened on a thread that may wait; `None` when the bridge was told to stop meanwhile.
 async fn open(settings: &Settings, shutdown: &CancellationToken) -> Result<Option<Box<dyn device::Arm>>, BridgeError> {
-    let (settings, period_s) = (settings.device.clone(), settings.servo.period_s);
-    let stop = shutdown.clone();
-    let opening = tokio::task::spawn_blocking(move || device::open(&settings, period_s, &stop));
+    let (settings, stop) = (settings.clone(), shutdown.clone());
+    let opening = tokio::task::spawn_blocking(move || {
+        device::open(&settings.device, settings.servo.period_s, &stop, |stiffest| settings.demand_bearable(stiffest))
+    });
     tokio::select! {
         () = shutdown.cancelled() => Ok(None),
         opened = opening => match opened {

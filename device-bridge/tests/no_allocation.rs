@@ -63,7 +63,7 @@ fn the_servo_allocates_nothing() {
     let guard = Guard::start(program, words, Duration::from_mins(1), &OsMeasures::NONE).unwrap();
     let mut servo = Servo {
         law: ServoLaw::new(settings.servo),
-        device: device::open(&settings.device, 1e-3, &CancellationToken::new()).unwrap(),
+        device: device::open(&settings.device, 1e-3, &CancellationToken::new(), |_| Ok(())).unwrap(),
         last: None,
         down,
         up,
@@ -116,7 +116,7 @@ fn drive(device: DeviceConfig) {
 fn drive_by(config: &Config, periods: u64) {
     let runtime = tokio::runtime::Builder::new_current_thread().build().unwrap();
     let settings = runtime.block_on(async { Settings::new(config).unwrap() });
-    let mut arm = device::open(&settings.device, 1e-3, &CancellationToken::new()).unwrap();
+    let mut arm = device::open(&settings.device, 1e-3, &CancellationToken::new(), |_| Ok(())).unwrap();
     for tick in 0..300 {
         std::thread::sleep(Duration::from_millis(1));
         std::thread::sleep(Duration::from_millis(1));

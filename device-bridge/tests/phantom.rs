@@ -8,7 +8,7 @@ use common::press::{self, PRESSED_N, lost_by, pressed_n, simulated};
 use glam::{DQuat, DVec3};
 use libhd::Emulated;
 use palpate_bridge::{
-    Config,
+    Config, Handle,
     config::{DeviceConfig, PhantomConfig},
     device::{
         Arm as _, Effort, Fault,
@@ -18,6 +18,7 @@ use palpate_bridge::{
         Faults,
         phantom::{Calibration, Settings},
     },
+    measure::measure,
     settings::arm,
 };
 use palpate_control::{HandPath, Keyframe};
@@ -94,8 +95,24 @@ async fn walls_are_no_stiffer_than_the_arm_is_made_for() {
     let mut config = common::config("http://127.0.0.1:1");
     config.device = DeviceConfig::Phantom(emulated.keys());
     config.render.max_stiffness_n_per_m = Some(501.0);
+    let folder = tempfile::tempdir().unwrap();
+    let recording = folder.path().join("arm.csv");
+    config.record.path = Some(recording.clone());
     let refused = palpate_bridge::run(config, CancellationToken::new()).await.unwrap_err().to_string();
     assert!(refused.starts_with("render.max_stiffness_n_per_m: 501 N/m is more than the 500 N/m"), "{refused}");
+    assert!(!recording.exists(), "a run that was refused has no recording, over which the next would stumble");
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn what_is_measured_promises_no_stiffer_walls_either() {
+    let emulated = Emulated::new(Settings { path: press::path(), ..Settings::default() });
+    let (address, _stop, _serving) = common::Mock::default().serve("127.0.0.1:0").await;
+    let mut config = common::config(&format!("http://{address}"));
+    config.device = DeviceConfig::Phantom(emulated.keys());
+    config.render.arm_damping_n_s_per_m = 40.0;
+    let report = measure(&config, Duration::from_millis(300), Handle::new()).await.unwrap();
+    let (beside, across) = report.stiffness_n_per_m;
+    assert!(beside <= 500.0 && across <= beside && across > 0.0, "{beside} {across}");
 }
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]

@@ -189,12 +189,18 @@ pub trait Arm: Debug + Send {
     fn last_words_were_said(&mut self) {}
 }
 
-/// Opens the arm that the configuration names, however long that takes, until told to stop.
+/// Opens the arm that the configuration names, however long that takes, until told to stop. Before anything is recorded, `demand` is told the stiffest wall (N/m, of the world) that it is made for.
 ///
 /// # Errors
-/// [`BridgeError::Start`].
-pub fn open(settings: &DeviceSettings, period_s: f64, stop: &CancellationToken) -> Result<Box<dyn Arm>, BridgeError> {
+/// [`BridgeError::Start`], and those of `demand`.
+pub fn open(
+    settings: &DeviceSettings,
+    period_s: f64,
+    stop: &CancellationToken,
+    demand: impl FnOnce(Option<f64>) -> Result<(), BridgeError>,
+) -> Result<Box<dyn Arm>, BridgeError> {
     let mut arm = open_arm(&settings.arm, period_s, stop)?;
+    demand(arm.stiffest_wall_n_per_m().map(|of_arm| settings.workspace.stiffness_of_world(of_arm)))?;
     if let Some(record) = &settings.record {
         arm = Box::new(Recorded::start(arm, record, period_s)?);
     }

@@ -49,6 +49,11 @@ impl WorkspaceError {
 }
 
 impl Workspace {
+    /// `K_world = K_arm/s` (N/m).
+    pub(super) fn stiffness_of_world(&self, of_arm_n_per_m: f64) -> f64 {
+        of_arm_n_per_m / self.scale
+    }
+
     /// The arm's x, y and z point along these axes of the world, its origin is there (m, world), and the world moves `scale` times as far as the arm.
     ///
     /// # Errors
@@ -184,9 +189,8 @@ impl Arm for Placed {
         });
     }
 
-    /// `K_world = K_arm / s`.
     fn stiffest_wall_n_per_m(&self) -> Option<f64> {
-        self.arm.stiffest_wall_n_per_m().map(|arm_n_per_m| arm_n_per_m / self.workspace.scale)
+        self.arm.stiffest_wall_n_per_m().map(|of_arm| self.workspace.stiffness_of_world(of_arm))
     }
 
     fn last_words(&self) -> Option<LastWords> {

@@ -34,15 +34,20 @@ impl Settings {
     ///
     /// # Errors
     /// [`BridgeError::Value`] when stiffer ones are asked for.
-    pub fn bearable(mut self, stiffest_n_per_m: Option<f64>) -> Result<Self, BridgeError> {
-        let Some(stiffest_n_per_m) = stiffest_n_per_m else { return Ok(self) };
+    pub fn demand_bearable(&self, stiffest_n_per_m: Option<f64>) -> Result<(), BridgeError> {
+        let too_stiff = stiffest_n_per_m.zip(self.servo.asked_stiffness_n_per_m).filter(|(most, asked)| asked > most);
+        let Some((stiffest_n_per_m, asked_n_per_m)) = too_stiff else { return Ok(()) };
+        let reason = format!(
+            "{asked_n_per_m} N/m is more than the {stiffest_n_per_m:.0} N/m of the stiffest wall that this arm is made for: leave it out"
+        );
+        Err(value("render.max_stiffness_n_per_m", reason))
+    }
+
+    /// For the same arm, no stiffer than it is made for.
+    #[must_use]
+    pub fn bearable(mut self, stiffest_n_per_m: Option<f64>) -> Self {
+        let Some(stiffest_n_per_m) = stiffest_n_per_m else { return self };
         let servo = &mut self.servo;
-        if let Some(asked_n_per_m) = servo.asked_stiffness_n_per_m.filter(|asked| *asked > stiffest_n_per_m) {
-            let reason = format!(
-                "{asked_n_per_m} N/m is more than the {stiffest_n_per_m:.0} N/m of the stiffest wall that this arm is made for: leave it out"
-            );
-            return Err(value("render.max_stiffness_n_per_m", reason));
-        }
         let passive_n_per_m = servo.stiffness.without_delay_n_per_m();
         if passive_n_per_m > stiffest_n_per_m {
             tracing::info!(
@@ -54,7 +59,7 @@ impl Settings {
             render.max_stiffness_n_per_m = servo.stiffness.largest_n_per_m();
         }
         self.uplink.across_network = self.uplink.across_network.map(|bound| bound.within(stiffest_n_per_m));
-        Ok(self)
+        self
     }
 }
 
@@ -66,7 +71,7 @@ mod tests {
     fn an_arm_is_given_no_stiffer_walls_than_it_is_made_for() {
         let mut config = Config::default();
         let bearable = |config: &Config, stiffest| {
-            let settings = Settings::new(config).unwrap().bearable(stiffest).unwrap();
+            let settings = Settings::new(config).unwrap().bearable(stiffest);
             let across = settings.uplink.across_network.map(|bound| bound.largest_n_per_m());
             let rendered = settings.servo.render.map(|render| render.max_stiffness_n_per_m);
             assert_eq!(across.or(rendered), Some(settings.servo.stiffness.largest_n_per_m()));
@@ -80,7 +85,9 @@ mod tests {
         }
         config.render.max_stiffness_n_per_m = Some(500.0);
         assert!((bearable(&config, Some(500.0)) - 500.0).abs() < 1e-9);
-        let refused = Settings::new(&config).unwrap().bearable(Some(499.0)).unwrap_err().to_string();
+        let demand = |stiffest| Settings::new(&config).unwrap().demand_bearable(stiffest);
+        assert!([None, Some(500.0)].map(demand).iter().all(Result::is_ok));
+        let refused = demand(Some(499.0)).unwrap_err().to_string();
         assert!(refused.starts_with("render.max_stiffness_n_per_m: 500 N/m is more than the 499 N/m"), "{refused}");
     }
 }

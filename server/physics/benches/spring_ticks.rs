@@ -1,4 +1,4 @@
-//! Ticks of the loop on sheets of springs beneath a sphere: some 10 000 triangles all awake, and of 10 000 and a million triangles with 800 vertices awake. The sheets take turns, tick by tick. Prints
+//! Ticks of the loop on sheets of springs: some 10 000 triangles all awake, beneath a sphere and a lying capsule, and of 10 000 and a million triangles with 800 vertices awake, beneath a sphere. The sheets take turns, tick by tick. Prints
 //! load times and memory, too: `cargo bench -p palpate-physics --bench spring_ticks`.
 #![allow(missing_docs, clippy::unwrap_used)] // a program that prints
 #[path = "../tests/rig/mod.rs"]
@@ -6,15 +6,18 @@ mod rig;
 use glam::DVec3;
 use palpate_physics::{
     ModelSpec, Settings, TetMesh,
-    contact::Coupling,
-    spring::{HomeLaw, Refinement, Refining, SpringBodySpec, SpringSpec, net::hexagonal_patch, region::Constants},
+    contact::{Coupling, ToolShape, ToolSpec, ToolTarget},
+    spring::{
+        HomeLaw, Refinement, Refining, SpringBodySpec, SpringSpec, body::triangles_about, net::hexagonal_patch,
+        region::Constants,
+    },
 };
-use rig::{Rig, sphere};
+use rig::{Drive, Rig, sphere};
 use std::time::Instant;
 
 const EDGE_M: f64 = 2e-3;
 
-fn sheet(rings: i32, most_awake: usize) -> ModelSpec {
+fn sheet(rings: i32, most_awake: usize, shape: ToolShape) -> ModelSpec {
     let surface = hexagonal_patch(rings, EDGE_M).unwrap();
     let vertices = surface.positions_m().len();
     let springs = SpringSpec {
@@ -24,7 +27,7 @@ fn sheet(rings: i32, most_awake: usize) -> ModelSpec {
         mass_kg: vec![1e-3; vertices],
         held: Vec::new(),
         most_awake: most_awake.min(vertices),
-        most_refined: 300,
+        most_refined: 300.max(6 * triangles_about(2, 2.0 * shape.half_length_m(), EDGE_M)),
         surface,
     };
     ModelSpec {
@@ -41,7 +44,7 @@ fn sheet(rings: i32, most_awake: usize) -> ModelSpec {
         prescribed: Vec::new(),
         loads: Vec::new(),
         gravity_m_per_s2: DVec3::ZERO,
-        tools: vec![sphere(3e-3, DVec3::Z * 0.01, Coupling::Rigid)],
+        tools: vec![ToolSpec { shape, ..sphere(3e-3, DVec3::Z * 0.01, Coupling::Rigid) }],
         settings: Settings { mass_damping_per_s: 30.0, ..Settings::default() },
     }
 }
@@ -53,9 +56,9 @@ fn resident_bytes() -> f64 {
     pages.map_or(f64::NAN, |pages| pages * 4096.0)
 }
 
-fn loaded(name: &str, rings: i32, most_awake: usize) -> (String, Rig) {
+fn loaded(name: &str, rings: i32, most_awake: usize, shape: ToolShape) -> (String, Rig) {
     let (before, begun) = (resident_bytes(), Instant::now());
-    let rig = Rig::new(sheet(rings, most_awake));
+    let rig = Rig::new(sheet(rings, most_awake, shape));
     let triangles = rig.model.springs().unwrap().model().surface().triangles().len();
     println!(
         "{name}: {triangles} triangles, {} substeps; loaded in {:.1} s, {:.0} bytes a triangle",
@@ -73,7 +76,9 @@ fn ticks(what: &str, rigs: &mut [(String, Rig)], path: impl Fn(u32) -> DVec3) {
     for tick in 0..4500 {
         for ((_, rig), costs) in rigs.iter_mut().zip(&mut costs) {
             let begun = Instant::now();
-            rig.tick_at(path(tick));
+            let drive = rig.still();
+            let target = ToolTarget { position_m: path(tick), ..drive.tools[0] };
+            rig.tick(&Drive { tools: vec![target], ..drive });
             if tick >= WARM {
                 costs.push(begun.elapsed().as_secs_f64() * 1e6);
             }
@@ -93,10 +98,16 @@ fn ticks(what: &str, rigs: &mut [(String, Rig)], path: impl Fn(u32) -> DVec3) {
 }
 
 fn main() {
-    let mut all = [loaded("all awake", 41, usize::MAX)];
+    // 46 mm, 20 edges between its ends.
+    let lying = ToolShape::capsule(Coupling::Rigid, 3e-3, 0.02, DVec3::X);
+    let mut all = [ToolShape::Sphere, lying].map(|shape| {
+        let name = if shape == ToolShape::Sphere { "all awake, sphere" } else { "all awake, capsule" };
+        loaded(name, 41, usize::MAX, shape)
+    });
     ticks("pressed", &mut all, |_| DVec3::Z * 2e-3);
     ticks("moving", &mut all, |tick| DVec3::new(0.01 * (f64::from(tick) * 0.005).sin(), 0.0, 2e-3));
-    let mut pair = [loaded("10 k, 800 awake", 41, 800), loaded("1 M, 800 awake", 408, 800)];
+    let mut pair = [("10 k, 800 awake", 41), ("1 M, 800 awake", 408)]
+        .map(|(name, rings)| loaded(name, rings, 800, ToolShape::Sphere));
     ticks("pressed", &mut pair, |_| DVec3::Z * 2e-3);
     ticks("moving", &mut pair, |tick| DVec3::new(0.01 * (f64::from(tick) * 0.005).sin(), 0.0, 2e-3));
     ticks("far away", &mut pair, |_| DVec3::Z * 0.3);

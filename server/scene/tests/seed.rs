@@ -132,7 +132,7 @@ fn what_a_seed_body_cannot_have_is_told_at_its_key() {
     let material_at = lines(BODY) + lines(SEED) + 1;
     let rest_at = material_at + lines(MATERIAL);
     let at = |line: usize, column: usize, message: &str| format!("t.toml:{line}:{column}: {message}");
-    let cases: [(String, String); 12] = [
+    let cases: [(String, String); 13] = [
         (
             text(SEED, &MATERIAL.replace("stvk", "stable-neo-hookean"), ""),
             at(material_at + 1, 7, "a seed body is of St. Venant-Kirchhoff material (write law = \"stvk\")"),
@@ -160,6 +160,19 @@ fn what_a_seed_body_cannot_have_is_told_at_its_key() {
         (
             text(SEED, MATERIAL, "").replacen("tick_period_s", "gravity_m_per_s2 = [0, 0, -9.81]\ntick_period_s", 1),
             at(3, 20, "a seed body has no gravity: its particles are made without (leave it out)"),
+        ),
+        (
+            text(
+                SEED,
+                MATERIAL,
+                "[[tool]]\nname = \"shaft\"\nshape = \"capsule\"\nradius_mm = 2\nhalf_length_mm = 4\ncoupling = \"rigid\"\n\
+                 driver = \"script\"\nkeyframe = [{ time_s = 0, position_mm = [0, 0, 40] }]\n",
+            ),
+            at(
+                rest_at + 2,
+                9,
+                "a capsule does not press a seed body, which is touched at one triangle (make the tool a sphere)",
+            ),
         ),
         (
             text(SEED, MATERIAL, "[body.particles]\nspacing_mm = 4\n"),

@@ -76,6 +76,27 @@ fn a_part_of_a_shape_becomes_the_surface() {
     assert_eq!(model.surface().triangles.len(), 512);
 }
 
+/// Six times the regions of all tools, of 6 n² triangles and of 4 n for each edge's length along a capsule; no more than there are.
+#[test]
+fn there_is_room_for_what_tools_refine() {
+    let fine = BOX.replace("cells = [8, 8, 2]", "cells = [32, 32, 2]");
+    let sphere = "[[tool]]\nname = \"ball\"\nradius_mm = 3\ncoupling = \"rigid\"\ndriver = \"script\"\nkeyframe = [{ time_s = 0, position_mm = [20, 20, 30] }]\n";
+    let capsule = "[[tool]]\nname = \"shaft\"\nshape = \"capsule\"\nradius_mm = 3\nhalf_length_mm = 12\ncoupling = \"rigid\"\ndriver = \"script\"\nkeyframe = [{ time_s = 0, position_mm = [20, 20, 30] }]\n";
+    let room = |text: &str| springs(text).springs.most_refined;
+    // Edges of (2 + √2)/3 · 1.25 mm and a little less in the mean: 17 along 24 mm.
+    let (about_ball, about_shaft) = (24, 24 + 8 * 17);
+    assert_eq!(room(&fine), 6 * about_ball);
+    assert_eq!(room(&format!("{fine}{sphere}{capsule}")), 6 * (about_ball + about_shaft));
+    assert_eq!(room(&format!("{BOX}{sphere}{capsule}")), 128);
+    let asked = |most: usize| {
+        let text = fine.replace("constants = \"area\"", &format!("constants = \"area\"\nmost_triangles = {most}"));
+        scene(&format!("{text}{sphere}{capsule}")).map(|scene| scene.model.springs.unwrap().springs.most_refined)
+    };
+    assert_eq!(asked(about_shaft).unwrap(), about_shaft);
+    let message = asked(about_shaft - 1).unwrap_err().one_line();
+    assert!(message.contains("must hold the region of each tool, 160 triangles"), "{message}");
+}
+
 /// `K_m = (√3/2) E t`, `K_h` by the mean area of a vertex, masses by each one's own.
 #[test]
 fn constants_follow_from_a_skin_on_a_foundation() {
