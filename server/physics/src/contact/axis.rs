@@ -2,6 +2,9 @@
 use super::triangle::{closest_point, closest_weights};
 use glam::DVec3;
 
+/// Pieces of an axis that bounds look at one by one.
+const PIECES: usize = 8;
+
 /// A segment `centre ± half`; a point where `half` is zero.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Axis {
@@ -41,6 +44,23 @@ impl Axis {
     /// `c(p) = s h`, `s = p·h/h²` kept within −1 to 1.
     pub(super) fn nearest_m(&self, from_centre_m: DVec3) -> DVec3 {
         self.half_m * (from_centre_m.dot(self.half_m) / self.half_m.length_squared()).clamp(-1.0, 1.0)
+    }
+
+    /// A lower bound (m) of how far something is from it, of one from any point: that from its centre less half its length `L`, or, where that is below `wanted_m`, the least from the middles of
+    /// its pieces less half of one's.
+    /// ```text
+    /// max(d(c) − L, min_i d(c + ((2i + 1)/n − 1) h) − L/n)
+    /// ```
+    pub(super) fn distance_bound_m(&self, wanted_m: f64, from_point_m: impl Fn(DVec3) -> f64) -> f64 {
+        let half_length_m = self.half_length_m();
+        let of_whole_m = from_point_m(self.centre_m) - half_length_m;
+        if self.is_point() || of_whole_m >= wanted_m {
+            return of_whole_m;
+        }
+        let count = PIECES as f64;
+        let middles_m = (0..PIECES).map(|i| self.centre_m + self.half_m * ((2 * i + 1) as f64 / count - 1.0));
+        let nearest_m = middles_m.map(from_point_m).fold(f64::INFINITY, f64::min);
+        of_whole_m.max(nearest_m - half_length_m / count)
     }
 
     /// How far it is from a triangle (m).
@@ -152,6 +172,18 @@ mod tests {
             let at = a * near.weights[0] + b * near.weights[1] + c * near.weights[2];
             prop_assert!((centre + near.arm_m + near.to_triangle_m - at).length() < 1e-9);
             prop_assert!((axis.nearest_m(at - centre) - near.arm_m).length() < 1e-6 || found < 1e-9 || half.cross(b - a).length() < 1e-3);
+        }
+
+        #[test]
+        fn a_bound_is_one_and_a_useful_one(centre in point(), half in point(), a in point(), b in point(), c in point(), wanted in 0.0..3.0_f64) {
+            let (axis, corners) = (Axis { centre_m: centre, half_m: half }, [a, b, c]);
+            let from_point = |p: DVec3| p.distance(closest_point(p, corners));
+            let (distance, bound) = (axis.distance_m(corners), axis.distance_bound_m(wanted, from_point));
+            prop_assert!(bound <= distance + 1e-12, "{bound} {distance}");
+            // Within a piece, where it is of use.
+            prop_assert!(bound >= wanted || bound >= distance - 2.0 * half.length() / PIECES as f64 - 1e-12);
+            let point = Axis::point(centre);
+            prop_assert_eq!(point.distance_bound_m(wanted, from_point), point.distance_m(corners));
         }
 
         #[test]

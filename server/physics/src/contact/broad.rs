@@ -8,7 +8,7 @@
 //!
 //! A query lists the triangles within `reach` of a tool's axis and returns how much further away all others are. As
 //! long as the path of any point of that axis plus the travel stay below that slack, the list holds every triangle that can be touched: far
-//! from the body a tick costs two additions per tool and substep. Boxes are as far from an axis as from its centre, less half its length, or further.
+//! from the body a tick costs two additions per tool and substep. Boxes are as far from an axis as from its centre, less half its length, or further, and so of pieces of it ([`Axis::distance_bound_m`]).
 use super::axis::Axis;
 use crate::mesh::Surface;
 use glam::DVec3;
@@ -45,6 +45,11 @@ impl ClusterBox {
     /// Lower bound of the distance (m) from `p` to the cluster's triangles when the travel is `travel_m`.
     pub(crate) fn distance_bound_m(&self, p: DVec3, travel_m: f64) -> f64 {
         box_distance_m(p, self.lo, self.hi) - (travel_m - self.fitted_at_m)
+    }
+
+    /// The same from an axis, at its best where it is below `wanted_m`.
+    fn axis_bound_m(&self, axis: &Axis, wanted_m: f64, travel_m: f64) -> f64 {
+        axis.distance_bound_m(wanted_m, |p| self.distance_bound_m(p, travel_m))
     }
 
     fn around(points: impl Iterator<Item = DVec3>, travel_m: f64) -> Self {
@@ -164,14 +169,13 @@ impl Triangles {
         (reach_m, inner_m): (f64, f64),
         candidates: &mut Candidates,
     ) {
-        let (centre, half_m) = (axis.centre_m, axis.half_length_m());
         candidates.count = 0;
         let mut others_m = f64::INFINITY;
         for (cluster, fitted) in boxes.iter_mut().enumerate() {
-            if fitted.distance_bound_m(centre, travel_m) - half_m < reach_m {
+            if fitted.axis_bound_m(axis, reach_m, travel_m) < reach_m {
                 *fitted = self.fit(cluster, x, travel_m);
             }
-            let bound_m = fitted.distance_bound_m(centre, travel_m) - half_m;
+            let bound_m = fitted.axis_bound_m(axis, reach_m, travel_m);
             if bound_m >= reach_m {
                 others_m = others_m.min(bound_m);
                 continue;
@@ -198,13 +202,12 @@ impl Triangles {
         (reach_m, inner_m): (f64, f64),
         candidates: &mut Candidates,
     ) {
-        let (centre, half_m) = (axis.centre_m, axis.half_length_m());
         candidates.count = 0;
         skin.begin();
         let mut others_m = f64::INFINITY;
         for group in (0..self.len()).step_by(GROUP) {
             let end = (group + GROUP).min(self.len());
-            let bound_m = skin.group_distance_m(group / GROUP, centre) - half_m;
+            let bound_m = axis.distance_bound_m(reach_m, |p| skin.group_distance_m(group / GROUP, p));
             if bound_m >= reach_m {
                 others_m = others_m.min(bound_m);
                 continue;
@@ -212,14 +215,14 @@ impl Triangles {
             for cluster in (group..end).step_by(CLUSTER) {
                 let cluster = cluster / CLUSTER;
                 let fitted = &mut boxes[cluster];
-                let mut bound_m = fitted.distance_bound_m(centre, travel_m) - half_m;
+                let mut bound_m = fitted.axis_bound_m(axis, reach_m, travel_m);
                 if bound_m < reach_m {
-                    bound_m = bound_m.max(skin.cluster_distance_m(cluster, centre) - half_m);
+                    bound_m = bound_m.max(axis.distance_bound_m(reach_m, |p| skin.cluster_distance_m(cluster, p)));
                 }
                 if bound_m < reach_m {
                     skin.vertices(cluster).iter().for_each(|&vertex| x[vertex as usize] = skin.position_m(vertex));
                     *fitted = self.fit(cluster, x, travel_m);
-                    bound_m = fitted.distance_bound_m(centre, travel_m) - half_m;
+                    bound_m = fitted.axis_bound_m(axis, reach_m, travel_m);
                 }
                 if bound_m >= reach_m {
                     others_m = others_m.min(bound_m);

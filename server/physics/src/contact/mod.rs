@@ -198,7 +198,7 @@ impl ContactModel {
             tool_frequency_sq += tool.spec.frequency_bound_sq(&total);
         }
         let tables = SampleTables::new();
-        Self { nodal_stiffness_n_per_m, covering_radius_m, tool_frequency_sq, tables, tools, triangles }
+        Self { nodal_stiffness_n_per_m, covering_radius_m, tool_frequency_sq, triangles, tables, tools }
     }
 
     /// Force (N) at which a tool's coupling saturates; infinite for a rigid tool.
