@@ -140,6 +140,18 @@ mod tests {
         }
     }
 
+    /// One end of a shaft is pushed up by what is beneath it, the other one, less, down by what is above: the force of both points away from that, to a wall that is far.
+    #[test]
+    fn what_a_levered_tool_touches_is_where_it_touches() {
+        let spec = capsule(0.012);
+        let at_m = [DVec3::new(-0.012, -0.005, 0.0), DVec3::new(0.012, 0.005, 0.0), DVec3::new(0.012, -0.013, 0.0)];
+        let cloud = Cloud { at_m: at_m.to_vec(), ids: vec![0, 1, 2] };
+        let tool = ToolState { centre_m: DVec3::ZERO, contact_force_n: 0.1 * DVec3::Y, ..ToolState::at_start(&spec) };
+        let looks = tool.places(&spec, 2).map(|place| place.look(&cloud, (3e-3, 1e-3), None));
+        let found: Vec<_> = looks.map(|near| (near.vertex.map(|(vertex, _)| vertex), near.gap_m)).collect();
+        assert_eq!(found, [(Some(0), 0.0), (Some(1), 0.0)]);
+    }
+
     fn within(half_m: f64) -> impl Strategy<Value = DVec3> {
         [-half_m..half_m, -half_m..half_m, -half_m..half_m].prop_map(DVec3::from)
     }
