@@ -38,8 +38,8 @@ async function press(page) {
   return { force, displacement };
 }
 
-let daemon = await startDaemon(palpated, port);
 const browser = await launch(executablePath);
+let daemon = await startDaemon(palpated, port);
 try {
   const page = await browser.newPage({ viewport: { width: 1280, height: 860 } });
   const noComplaints = complaintsOf(page);
