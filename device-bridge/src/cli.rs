@@ -282,6 +282,8 @@ fn start_logs() {
         .with_env_filter(filter)
         .with_writer(std::io::stderr)
         .with_ansi(colours_wanted())
+        // They would be told on standard error, and one of them is that it has no reader: a panic.
+        .log_internal_errors(false)
         .with_target(false)
         .init();
 }

@@ -14,6 +14,8 @@ pub fn init() {
         .with_env_filter(filter)
         .with_writer(std::io::stderr)
         .with_ansi(colours)
+        // They would be told on standard error, and one of them is that it has no reader: a panic.
+        .log_internal_errors(false)
         .with_target(false)
         .try_init();
 }

@@ -83,6 +83,11 @@ impl Program {
         panic!("no line with \"{text}\" within {patience:?}; printed so far:\n{}", self.output);
     }
 
+    /// Nobody reads what it prints from now on: after one more line on each, its standard streams are broken pipes.
+    pub fn leave_unread(&mut self) {
+        self.lines = mpsc::channel().1;
+    }
+
     /// What it has printed so far, both streams; and how it ended, if it has.
     pub fn said(&mut self) -> String {
         while let Ok(line) = self.lines.try_recv() {

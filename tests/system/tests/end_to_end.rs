@@ -47,6 +47,24 @@ fn the_default_scene_is_pressed_and_every_view_shows_it() {
     assert!(drawn > pixels.len() / 3 / 20, "only {drawn} pixels show the body");
 }
 
+/// A daemon told of its end before it ended: where that had no reader, SIGTERM did nothing, and no later one did.
+#[test]
+fn programs_that_nobody_reads_stop_when_they_are_told() {
+    let mut daemon = Daemon::start(&[]);
+    daemon.program.leave_unread();
+    // Each logs when an arm comes and goes.
+    for _ in 0..2 {
+        let mut bridge = Program::start("palpate-bridge", &["--server", &daemon.url, "--device", "simulated"]);
+        bridge.leave_unread();
+        daemon.wait_until("the arm feels the body", |s| s["devices"][0]["force_n"].as_f64() > Some(0.05));
+        bridge.terminate();
+        assert!(bridge.wait(PATIENCE).success());
+        daemon.wait_until("the device is gone", |s| s["devices"].as_array().is_some_and(Vec::is_empty));
+    }
+    daemon.program.terminate();
+    assert!(daemon.program.wait(PATIENCE).success());
+}
+
 #[test]
 fn a_bridge_takes_the_tool_and_gives_it_back() {
     let mut daemon = Daemon::start(&[]);

@@ -4,7 +4,7 @@ use crate::{load, progress::Progress, sim::thread::Loop, telemetry};
 use miette::IntoDiagnostic;
 use palpate_scene::Scene;
 use sd_notify::NotifyState;
-use std::process::ExitCode;
+use std::{io::Write as _, process::ExitCode};
 use tokio::{
     runtime,
     signal::unix::{Signal, SignalKind, signal},
@@ -42,22 +42,23 @@ async fn serve(config: ServeConfig, scene: Scene, runner: Runner) -> Result<Exit
     let stop = CancellationToken::new();
     let signals = Signals::new().map_err(|source| ServeError::System { what: "signal handlers", source })?;
     let running = start_with(config.clone(), scene, stop.clone(), runner).await?;
-    println!("{}", report::startup(&running, &config, &description));
+    // Readers that have gone miss what is said, no more.
+    let _ = writeln!(std::io::stdout(), "{}", report::startup(&running, &config, &description));
     notify(&[NotifyState::Ready]);
     let told = stop.clone();
     tokio::spawn(async move {
         signals.first().await;
-        eprintln!("stopping: forces ramp to zero");
-        notify(&[NotifyState::Stopping]);
         told.cancel();
+        let _ = writeln!(std::io::stderr(), "stopping: forces ramp to zero");
+        notify(&[NotifyState::Stopping]);
     });
     let Some(summary) = running.finished().await else {
         tracing::error!("the daemon ended by a panic");
         return Ok(ExitCode::FAILURE);
     };
-    println!("{}", report::farewell(&summary));
+    let _ = writeln!(std::io::stdout(), "{}", report::farewell(&summary));
     if let Some(failure) = summary.failure {
-        eprintln!("stopped without being told to: {failure}");
+        let _ = writeln!(std::io::stderr(), "stopped without being told to: {failure}");
         return Ok(ExitCode::FAILURE);
     }
     Ok(ExitCode::SUCCESS)
