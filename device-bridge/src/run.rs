@@ -82,7 +82,7 @@ impl Handle {
         self.shared.without_force.store(true, Ordering::Relaxed);
     }
 
-    /// How stiff contacts may be on the arm, once it is open.
+    /// How stiff contacts may be on the arm, once it is open; of the first run with this handle.
     pub fn stiffness(&self) -> Option<StiffnessBound> {
         self.shared.stiffness.get().copied()
     }

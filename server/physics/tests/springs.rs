@@ -5,7 +5,7 @@ use assert_no_alloc::{AllocDisabler, assert_no_alloc};
 use glam::{DQuat, DVec3};
 use palpate_physics::{
     Energies, LoadSpec, ModelSpec, PointForce, PrescribedSpec, Settings, State, Substeps, TetMesh,
-    contact::{Coupling, ToolShape, ToolTarget},
+    contact::{Coupling, ToolShape, ToolSpec, ToolTarget},
     snapshot,
     spring::{
         HomeLaw, Net, Refinement, Refining, SpringBodySpec, SpringSpec,
@@ -16,7 +16,7 @@ use palpate_physics::{
         region::Constants,
     },
 };
-use rig::{Drive, Rig, sphere};
+use rig::{Drive, Rig, at, sphere};
 
 #[global_allocator]
 static ALLOCATOR: AllocDisabler = AllocDisabler;
@@ -393,6 +393,25 @@ fn ticks_allocate_nothing() {
         });
         assert!(rig.state.quarantine.is_none() && layouts > 20, "{layouts}");
     }
+}
+
+/// While levels are on their way beneath one tool, another goes about in the air at 1 m/s.
+#[test]
+fn a_tool_in_the_air_hurries_no_levels() {
+    let beneath = |swing_m: f64| {
+        let mut spec = sheet(6, Some(refined(2, Refining::ByTools)));
+        spec.tools.push(ToolSpec { name: "other".into(), ..sphere(3e-3, DVec3::Z * 0.06, Coupling::Rigid) });
+        let mut rig = Rig::new(spec);
+        let mut drive = rig.still();
+        for tick in 0..60 {
+            drive.tools[0] = at(DVec3::Z * (0.01 - 8.5e-3 * (f64::from(tick) / 20.0).min(1.0)));
+            drive.tools[1] = at(DVec3::new(swing_m * (20.0 * f64::from(tick) * 1e-3).sin(), 0.0, 0.06));
+            rig.tick(&drive);
+        }
+        assert!(refined_nodes(&rig) > 0 && rig.state.tools[0].contacts > 0);
+        rig.state.x
+    };
+    assert_eq!(beneath(0.0), beneath(0.05));
 }
 
 #[test]

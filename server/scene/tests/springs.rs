@@ -88,6 +88,9 @@ fn there_is_room_for_what_tools_refine() {
     assert_eq!(room(&fine), 6 * about_ball);
     assert_eq!(room(&format!("{fine}{sphere}{capsule}")), 6 * (about_ball + about_shaft));
     assert_eq!(room(&format!("{BOX}{sphere}{capsule}")), 128);
+    let long = capsule.replace("half_length_mm = 12", "half_length_mm = 4000");
+    let all = BOX.replace("constants = \"area\"", "constants = \"area\"\nmost_triangles = 128");
+    assert_eq!([room(&format!("{BOX}{long}")), room(&format!("{all}{long}"))], [128, 128]);
     let asked = |most: usize| {
         let text = fine.replace("constants = \"area\"", &format!("constants = \"area\"\nmost_triangles = {most}"));
         scene(&format!("{text}{sphere}{capsule}")).map(|scene| scene.model.springs.unwrap().springs.most_refined)

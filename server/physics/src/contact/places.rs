@@ -62,8 +62,8 @@ impl ToolState {
 }
 
 impl Place {
-    /// The vertex of a skin, of which a query has begun, nearest to where the tool is deepest in it here, or, where it does not touch it, to this place; within a gap of `2 near_m`.
-    /// No point of the skin is farther than `cover_m` from a vertex. `fitted` are contact's boxes and its travel (m), where they are of use.
+    /// The vertex of a skin, of which a query has begun, nearest to where the tool is deepest in it here, or, where it does not touch it, to this place; within a gap of `2 near_m`, or
+    /// `near_m + cover_m` of a tool that touches: no point of the skin is farther than `cover_m` from a vertex. `fitted` are contact's boxes and its travel (m), where they are of use.
     ///
     /// Of a piece that reaches `s` to either side, a vertex that is `d` from its middle is no nearer than `√(d² − s²)`, and the nearest to the middle bounds the others:
     /// no piece that is near goes unseen, and some are seen too soon.
@@ -76,7 +76,8 @@ impl Place {
         let s = self.half_piece_m;
         // What touches has a vertex within `cover_m` of where it does, and of what is near by a margin for a skin that is stretched.
         let touching_m = near_m + cover_m;
-        let within_m = (self.radius_m + touching_m.max(2.0 * near_m)).hypot(s);
+        let reach_m = if self.deepest_m.is_some() { touching_m.max(2.0 * near_m) } else { 2.0 * near_m };
+        let within_m = (self.radius_m + reach_m).hypot(s);
         let from = |from_m: DVec3| nearest_vertex(skin, from_m, within_m, fitted);
         let gap_m = |d: f64| if s > 0.0 { (d * d - s * s).max(0.0).sqrt() } else { d } - self.radius_m;
         let beside = || {
@@ -178,9 +179,10 @@ mod tests {
             let count = spec.place_count(apart_m);
             let looks: Vec<Near> = tool.places(&spec, count).map(|place| place.look(&cloud, (near_m, cover_m), None)).collect();
             let least_m = looks.iter().map(|near| near.gap_m).fold(f64::INFINITY, f64::min);
-            let reach_m = (near_m + cover_m).max(2.0 * near_m);
+            let touches = contact_force_n != DVec3::ZERO;
+            let reach_m = if touches { (near_m + cover_m).max(2.0 * near_m) } else { 2.0 * near_m };
             prop_assert!(least_m <= gap_m.max(0.0) + 1e-12 || gap_m > reach_m - 1e-12, "{least_m} {gap_m}");
-            if count > 1 && contact_force_n != DVec3::ZERO && gap_m < near_m + cover_m - 1e-12 {
+            if count > 1 && touches && gap_m < near_m + cover_m - 1e-12 {
                 prop_assert!(looks.iter().any(|near| near.vertex.is_some() && near.gap_m == 0.0), "{looks:?}");
             }
             for (vertex, distance_m, from_m) in looks.iter().filter_map(|n| n.vertex.map(|(v, d)| (v, d, n.from_m))) {

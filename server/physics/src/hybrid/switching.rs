@@ -91,7 +91,7 @@ impl Looking {
         let tools = model.spec().tools.len().max(1);
         Self {
             found: Vec::with_capacity(
-                (in_ball * places(model).max().unwrap_or_default()).min(body.partition.particle_count()),
+                in_ball.saturating_mul(places(model).max().unwrap_or_default()).min(body.partition.particle_count()),
             ),
             is_found: vec![false; body.partition.particle_count()],
             wanted: Vec::with_capacity(tools * most),
@@ -348,7 +348,7 @@ impl Looking {
         for balls in tools() {
             self.found.clear();
             for (number, ball) in balls.iter().enumerate().filter_map(|(number, ball)| Some((number, (*ball)?))) {
-                // As places are no farther from each other than balls reach, those after the next two hold nothing that this one does.
+                // As places are no farther from each other than balls reach, those after the next two hold next to nothing that this one does.
                 let near = &balls[number.saturating_sub(1)..(number + 4).min(balls.len())];
                 body.partition.particles_within(ball.rest_m, reach_m, |particle, distance_sq| {
                     let is_found = &mut self.is_found[particle as usize];

@@ -242,7 +242,7 @@ pub fn rings_for(depth_m: f64, radius_m: f64, edge_m: f64) -> f64 {
     (touched_m + depth_m) / edge_m
 }
 
-/// Triangles of a regular surface, with edges `l` (m), in `n` rings about a line of length `L` (m) on it.
+/// Triangles of a regular surface, with edges `l` (m), in `n` rings about a line of length `L` (m) along its edges.
 /// ```text
 /// 6 n² + 4 n ⌈L/l⌉
 /// ```

@@ -241,14 +241,15 @@ pub(super) fn spec(
 /// Room for the region of every tool, and five times as much that is on its way behind tools that move.
 fn most_refined(refine: &RefineTable, surface: &Triangulation, tools: &[ToolSpec]) -> Result<usize, Fault> {
     const MOST: u32 = 100_000;
+    let cap = surface.triangles().len().min(MOST as usize);
     let edge_m = mean_edge_m(surface);
     let region = |tool: &ToolSpec| triangles_about(refine.rings, 2.0 * tool.shape.half_length_m(), edge_m);
     let smallest = triangles_about(refine.rings, 0.0, edge_m);
     let Some(most) = refine.most_triangles else {
         let all = tools.iter().map(region).fold(0, usize::saturating_add).max(smallest);
-        return Ok(all.saturating_mul(6).min(surface.triangles().len()));
+        return Ok(all.saturating_mul(6).min(cap));
     };
-    let largest = tools.iter().map(region).fold(smallest, usize::max);
+    let largest = tools.iter().map(region).fold(smallest, usize::max).min(cap);
     let rule = format!("must hold the region of each tool, {largest} triangles, and be {MOST} or less");
     let ok = most as usize >= largest && most <= MOST;
     check(&at().key("refine").key("most_triangles"), most, ok, &rule)?;
