@@ -276,7 +276,10 @@ fn place_balls(model: &Model, view: &mut SkinView<'_>, spacing_m: f64, state: &m
     }
 }
 
-/// Squared distance (m²) of a point to the middles of balls, and to the lines between those of neighbours.
+/// Squared distance (m²) of a point `p` to the middles of balls, and to the lines between those of neighbours, `a` and `b`:
+/// ```text
+/// |p − a − s (b − a)|²,   s = (p − a)·(b − a)/|b − a|² kept within 0 to 1
+/// ```
 fn distance_to_balls_sq(balls: &[Option<Ball>], at_m: DVec3) -> f64 {
     let (mut nearest_sq, mut before_m) = (f64::INFINITY, None);
     for ball in balls {
@@ -354,6 +357,7 @@ impl Looking {
                     let is_found = &mut self.is_found[particle as usize];
                     if body.may_wake(particle) && !std::mem::replace(is_found, true) {
                         let at_m = body.partition.particle_m(particle);
+                        // The distance from its middle is at hand, and all there is.
                         let is_alone = balls.len() == 1;
                         self.found
                             .push((if is_alone { distance_sq } else { distance_to_balls_sq(near, at_m) }, particle));

@@ -7,7 +7,7 @@ use crate::{
         Refinement, SpringBody, SpringScratch, SpringState, Wanted,
         body::rings_for,
         skin::{ListedVertices, SpringSkin},
-        state::{Found, Looking},
+        state::{About, Found, Looking},
     },
     world::{Model, PointForce, State},
 };
@@ -62,7 +62,8 @@ impl SpringBodyScratch {
         self.springs.follow(body.model(), &springs.motion);
         let is_due = state.tick.is_multiple_of(u64::from(LOOK_EVERY_TICKS));
         // Not by what contact lists, which depends on when it was listed.
-        let is_new = |(tool, own): (&ToolState, Range<usize>)| tool.contacts > 0 && !springs.is_fine_at(own);
+        let is_new =
+            |(tool, own): (&ToolState, Range<usize>)| tool.contacts > 0 && !About::is_fine(&springs.about[own]);
         let looks = is_due || state.tools.iter().zip(body.places()).any(is_new);
         if looks {
             self.look(model, body, state, if is_due { LOOK_EVERY_TICKS } else { 0 });
@@ -139,7 +140,7 @@ impl SpringBodyScratch {
         skin.begin();
         for ((tool, spec), own) in tools.iter().zip(&model.spec().tools).zip(body.places()) {
             let about = &mut about[own];
-            if ticks == 0 && about.iter().any(|about| about.touched.is_some()) {
+            if ticks == 0 && About::is_fine(about) {
                 continue;
             }
             for (place, about) in tool.places(spec, about.len()).zip(about) {

@@ -17,32 +17,33 @@ pub fn rings_into(
         let before = triangles.len();
         let mut whole = before;
         let fits = corners.iter().all(|&vertex| {
-            let fits = surface.triangles_at(vertex).iter().all(|&triangle| {
-                let found =
-                    triangles[..before].binary_search(&triangle).is_ok() || triangles[before..].contains(&triangle);
-                if !found && triangles.len() < most {
-                    triangles.push(triangle);
-                }
-                found || triangles.last() == Some(&triangle)
-            });
-            if fits && ring == 0 {
-                whole = triangles.len();
-            }
+            let fits = take_at(surface, vertex, (before, most), triangles);
+            whole = if fits && ring == 0 { triangles.len() } else { whole };
             fits
         });
         if !fits {
             triangles.truncate(whole);
-        }
-        triangles.sort_unstable();
-        if !fits {
+            triangles.sort_unstable();
             break;
         }
+        triangles.sort_unstable();
         corners.clear();
         corners.extend(triangles.iter().flat_map(|&t| surface.triangles()[t as usize]));
         corners.sort_unstable();
         corners.dedup();
     }
     close(surface, most, (triangles, corners));
+}
+
+/// Takes in the triangles at a vertex, the first `before` of those that are in being ascending; whether all had room.
+fn take_at(surface: &Triangulation, vertex: u32, (before, most): (usize, usize), triangles: &mut Vec<u32>) -> bool {
+    surface.triangles_at(vertex).iter().all(|&triangle| {
+        let found = triangles[..before].binary_search(&triangle).is_ok() || triangles[before..].contains(&triangle);
+        if !found && triangles.len() < most {
+            triangles.push(triangle);
+        }
+        found || triangles.last() == Some(&triangle)
+    })
 }
 
 /// Takes in triangles with two neighbours that are in. `new` is a buffer.

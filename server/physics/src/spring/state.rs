@@ -11,7 +11,6 @@ use super::{
 };
 use crate::world::{Model, State};
 use serde::{Deserialize, Serialize};
-use std::ops::Range;
 
 /// Ticks for which a tool has to be away.
 const AWAY_TICKS: u32 = 100;
@@ -101,6 +100,11 @@ pub fn refine_only(model: &Model, state: &mut State, centres: &[u32], rings: u32
 }
 
 impl About {
+    /// Whether it is refined about any of these.
+    pub(crate) fn is_fine(places: &[Self]) -> bool {
+        places.iter().any(|about| about.touched.is_some())
+    }
+
     /// Takes what the place is near to, if anything, after so many ticks; from `near_m` on it touches.
     pub(crate) fn note(&mut self, near: Option<Found>, (near_m, radius_m, ticks): (f64, f64, u32)) {
         /// Part of the tool's radius that another vertex has to be nearer.
@@ -210,11 +214,6 @@ impl SpringState {
             mesh_n_per_m: towards(now.mesh_n_per_m, then.mesh_n_per_m),
             home_n_per_m: towards(now.home_n_per_m, then.home_n_per_m),
         }
-    }
-
-    /// Whether it is refined about any of these places.
-    pub(crate) fn is_fine_at(&self, places: Range<usize>) -> bool {
-        self.about[places].iter().any(|about| about.touched.is_some())
     }
 
     /// A force is injected at a vertex that sleeps.
