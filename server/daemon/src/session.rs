@@ -10,7 +10,7 @@ use crate::{
     },
     stream::hub::Hub,
 };
-use palpate_physics::{Model, ModelError, Scratch, State, TickInput, hybrid::wake_only, step};
+use palpate_physics::{Model, ModelError, Scratch, State, TickInput, bodies::hybrid::wake_only, step};
 use palpate_proto::v1;
 use palpate_scene::{Driver, Probe, Scene};
 use std::{

@@ -8,16 +8,17 @@ use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use glam::DVec3;
 use palpate_physics::{
     Precision, TetMesh,
-    hybrid::{
+    bodies::hybrid::{
         Skin,
         cell::RestCell,
         composite::Composite,
+        kernels::{CellRow, CutCells, RowKernel},
         moments::integrate,
         partition::Partition,
         sites::{CORNERS, Sites},
     },
+    lanes::InstructionSet,
     material::{Convention, Lame, Law, Material, Viscosity},
-    simd::{CellRow, CutCells, InstructionSet, RowKernel},
 };
 
 const SPACING_M: f64 = 2.5e-3;

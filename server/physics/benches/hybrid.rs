@@ -6,7 +6,7 @@
 mod rig;
 use criterion::{Criterion, criterion_group, criterion_main};
 use glam::DVec3;
-use palpate_physics::{Settings, contact::Coupling, hybrid::Waking};
+use palpate_physics::{Settings, bodies::hybrid::Waking, contact::Coupling};
 use rig::{Rig, held_below, hybrid_block, sphere, wake_nearest};
 
 fn pressed(active: usize) -> Rig {

@@ -6,9 +6,10 @@ use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use glam::DVec3;
 use palpate_physics::{
     Precision,
-    fem::element::RestTet,
+    elements::linear_tet::RestTet,
+    kernels::{ForceKernel, Oracle},
+    lanes::InstructionSet,
     material::{Convention, Lame, Law, Material, Viscosity},
-    simd::{ForceKernel, InstructionSet, Oracle},
 };
 
 fn kernels(criterion: &mut Criterion) {

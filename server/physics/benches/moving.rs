@@ -4,7 +4,7 @@
 #[path = "../tests/rig/mod.rs"]
 mod rig;
 use glam::DVec3;
-use palpate_physics::{Settings, contact::Coupling, hybrid::Waking};
+use palpate_physics::{Settings, bodies::hybrid::Waking, contact::Coupling};
 use rig::{Rig, held_below, hybrid_block, sphere};
 use std::time::Instant;
 

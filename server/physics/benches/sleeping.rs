@@ -8,8 +8,8 @@ use criterion::{Criterion, criterion_group, criterion_main};
 use glam::DVec3;
 use palpate_physics::{
     Settings,
+    bodies::hybrid::{ParticleSpec, Skin, Waking, wake_only},
     contact::Coupling,
-    hybrid::{ParticleSpec, Skin, Waking, wake_only},
     material::Law,
 };
 use rig::{Rig, body, bricks, even, hold, material, nodes_where, sphere};

@@ -6,11 +6,11 @@ mod rig;
 use glam::DVec3;
 use palpate_physics::{
     ModelSpec, Settings, TetMesh,
-    contact::{Coupling, ToolShape, ToolSpec, ToolTarget},
-    spring::{
+    bodies::mass_spring::{
         HomeLaw, Refinement, Refining, SpringBodySpec, SpringSpec, body::triangles_about, net::hexagonal_patch,
         region::Constants,
     },
+    contact::{Coupling, ToolShape, ToolSpec, ToolTarget},
 };
 use rig::{Drive, Rig, sphere};
 use std::time::Instant;

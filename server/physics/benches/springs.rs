@@ -4,11 +4,13 @@
 use criterion::{Criterion, criterion_group, criterion_main};
 use glam::DVec3;
 use palpate_physics::{
-    simd::{HalfSpring, InstructionSet, SpringRows},
-    spring::{
-        HomeLaw, Net, Region, SpringModel, SpringMotion, SpringScratch, SpringSpec, Wanted, net::hexagonal_patch,
+    bodies::mass_spring::{
+        HomeLaw, Net, Region, SpringModel, SpringMotion, SpringScratch, SpringSpec, Wanted,
+        kernels::{HalfSpring, SpringRows},
+        net::hexagonal_patch,
         region::Constants,
     },
+    lanes::InstructionSet,
 };
 
 fn forces(criterion: &mut Criterion) {

@@ -1,7 +1,7 @@
 //! Energy ledger, inversion, and quarantine of non-finite state.
 use crate::{
+    bodies::seed::SeedMotion,
     contact::{ContactState, ToolState},
-    seed::SeedMotion,
     world::{Model, State},
 };
 use glam::DVec3;

@@ -7,25 +7,24 @@
 //! Notation (docs/notation.md): `X` rest position, `x` position, `v` velocity (m, m/s), `F` deformation gradient,
 //! `P` first Piola-Kirchhoff stress (Pa), `b_i = ∇N_i` shape gradient (1/m), `V` rest volume (m³).
 
+pub mod bodies;
 pub mod contact;
-pub mod fem;
+pub mod elements;
 mod hash;
 pub mod health;
-pub mod hybrid;
 pub mod integrate;
+pub mod kernels;
+pub mod lanes;
+pub mod linalg;
 pub mod material;
 pub mod mesh;
-pub mod seed;
-pub mod simd;
+pub mod settings;
 pub mod snapshot;
-pub mod solve;
-pub mod spring;
+pub mod statics;
 pub mod world;
 
 pub use health::{Energies, Ledger, Quarantine};
 pub use integrate::step;
 pub use mesh::{MeshError, Surface, TetMesh};
-pub use world::{
-    Integrator, LoadSpec, Model, ModelError, ModelSpec, PointForce, Precision, PrescribedSpec, Region, Scratch,
-    Settings, Skips, State, StepReport, Substeps, TickInput,
-};
+pub use settings::{Integrator, LoadSpec, Precision, PrescribedSpec, Settings, Skips, Substeps};
+pub use world::{Model, ModelError, ModelSpec, PointForce, Region, Scratch, State, StepReport, TickInput};

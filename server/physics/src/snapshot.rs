@@ -3,10 +3,9 @@
 //! Layout (little-endian): `PLPS`, version (u32), fingerprint of the body (u64), checksum of what follows (u64), state
 //! (postcard). A state goes back only into the body it came from: same mesh, materials, loads, tools and settings.
 use crate::{
+    bodies::{mass_spring::SpringBody, seed::SeedMotion},
     contact::ToolState,
     hash::{Fnv, OFFSET, fnv},
-    seed::SeedMotion,
-    spring::SpringBody,
     world::{Model, ModelSpec, State},
 };
 use std::fmt::Write;
@@ -172,7 +171,8 @@ mod tests {
     use super::*;
     use crate::{
         mesh::TetMesh,
-        world::{ModelSpec, Region, Settings},
+        settings::Settings,
+        world::{ModelSpec, Region},
     };
     use glam::DVec3;
 

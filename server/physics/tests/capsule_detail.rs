@@ -4,13 +4,15 @@ mod rig;
 use glam::{DQuat, DVec3};
 use palpate_physics::{
     Energies, LoadSpec, ModelSpec, PrescribedSpec, Settings, Substeps, TetMesh,
-    contact::{Coupling, ToolShape, ToolSpec, ToolTarget},
-    hybrid::{Waking, wake_only},
-    snapshot,
-    spring::{
-        HomeLaw, Refinement, Refining, SpringBodySpec, SpringSpec, body::triangles_about, net::hexagonal_patch,
-        region::Constants,
+    bodies::{
+        hybrid::{Waking, wake_only},
+        mass_spring::{
+            HomeLaw, Refinement, Refining, SpringBodySpec, SpringSpec, body::triangles_about, net::hexagonal_patch,
+            region::Constants,
+        },
     },
+    contact::{Coupling, ToolShape, ToolSpec, ToolTarget},
+    snapshot,
 };
 use rig::{Drive, Rig, held_below, hybrid_block, sphere};
 use std::f64::consts::FRAC_PI_2;

@@ -3,8 +3,9 @@
 mod support;
 use glam::{DMat3, DVec3};
 use palpate_physics::{
-    fem::element::RestTet,
-    material::{Convention, Lame, Law, Material, Viscosity, stvk::contract, viscous},
+    elements::linear_tet::RestTet,
+    linalg::tensor::contract,
+    material::{Convention, Lame, Law, Material, Viscosity, viscous},
 };
 use support::Random;
 

@@ -6,7 +6,7 @@ use glam::DVec3;
 use palpate_physics::{
     LoadSpec, Model, Precision, PrescribedSpec, Scratch, State, Substeps, TetMesh, TickInput,
     material::Law,
-    solve::{RigidMotion, SolveError, StaticSettings, solve_static},
+    statics::{RigidMotion, SolveError, StaticSettings, solve_static},
     step,
 };
 use std::ops::ControlFlow;

@@ -7,7 +7,7 @@ use glam::DVec3;
 use palpate_physics::{
     Model, Scratch, State, Substeps, TickInput,
     material::Law,
-    solve::{Mode, natural_modes},
+    statics::{Mode, natural_modes},
     step,
 };
 use std::f64::consts::TAU;

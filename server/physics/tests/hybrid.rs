@@ -4,8 +4,8 @@ mod rig;
 use glam::DVec3;
 use palpate_physics::{
     Energies, ModelSpec, Precision, Settings, Substeps,
+    bodies::hybrid::{Waking, wake_only},
     contact::Coupling,
-    hybrid::{Waking, wake_only},
     snapshot,
 };
 use rig::{Rig, at, held_below, hybrid_block, near, pressed_block, sphere};

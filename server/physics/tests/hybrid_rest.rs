@@ -4,15 +4,15 @@ mod rig;
 use glam::DVec3;
 use palpate_physics::{
     Energies, LoadSpec, Model, ModelSpec, Settings,
-    contact::{Coupling, ToolTarget},
-    hybrid::{
+    bodies::hybrid::{
         Waking,
         equilibrium::equilibrium,
         patch::{Field, Patch},
         place::Place,
         wake_only,
     },
-    solve::{SolveError, StaticSettings, StaticSolution, solve_static, solve_static_with},
+    contact::{Coupling, ToolTarget},
+    statics::{SolveError, StaticSettings, StaticSolution, solve_static, solve_static_with},
 };
 use rig::{Drive, Rig, at, held_below, hold, hybrid_block, nodes_where, sphere, wake_nearest};
 use std::{collections::BTreeSet, ops::ControlFlow};

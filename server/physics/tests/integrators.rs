@@ -3,9 +3,11 @@
 mod rig;
 use glam::DVec3;
 use palpate_physics::{
-    Energies, Integrator, ModelSpec, PointForce, Substeps, contact::Coupling,
-    integrate::seed_semi_implicit::nodal_stiffness_n_per_m, integrate::spectrum::RestStiffness, material::Law,
-    snapshot, solve,
+    Energies, Integrator, ModelSpec, PointForce, Substeps,
+    contact::Coupling,
+    elements::rest_stiffness::{RestStiffness, nodal_stiffness_n_per_m},
+    material::Law,
+    snapshot, statics,
 };
 use rig::{Drive, Rig, at, body, bricks, even, hold, material, nodes_where, sphere};
 

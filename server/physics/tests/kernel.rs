@@ -4,9 +4,10 @@ mod support;
 use glam::DVec3;
 use palpate_physics::{
     Precision, TetMesh,
-    fem::element::RestTet,
+    elements::linear_tet::RestTet,
+    kernels::{ForceKernel, Oracle},
+    lanes::InstructionSet,
     material::{Convention, Lame, Law, Material, Viscosity},
-    simd::{ForceKernel, InstructionSet, Oracle},
 };
 use support::{Random, block, largest, largest_difference};
 

@@ -2,7 +2,7 @@
 #![allow(clippy::unwrap_used)]
 mod rig;
 use glam::DVec3;
-use palpate_physics::{Energies, ModelSpec, Precision, Settings, Substeps, contact::Coupling, hybrid::Waking};
+use palpate_physics::{Energies, ModelSpec, Precision, Settings, Substeps, bodies::hybrid::Waking, contact::Coupling};
 use rig::{Rig, held_below, hybrid_block, sphere, wake_nearest};
 
 /// 80 × 80 × 40 mm in 192 coarse tets, particles 2.5 mm apart, held below.

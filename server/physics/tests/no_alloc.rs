@@ -5,8 +5,8 @@ use assert_no_alloc::{AllocDisabler, assert_no_alloc};
 use glam::DVec3;
 use palpate_physics::{
     Integrator, LoadSpec, PointForce, Substeps, TickInput,
+    bodies::hybrid::{ParticleSpec, Skin, Waking},
     contact::{Coupling, ToolShape, ToolTarget},
-    hybrid::{ParticleSpec, Skin, Waking},
     material::{Lame, Law, Viscosity},
 };
 use rig::{Rig, at, body, bricks, even, hold, material, nodes_where, sphere};

@@ -7,7 +7,7 @@ use palpate_physics::{
     Energies, Model, Scratch, State, Substeps, TickInput,
     contact::{Coupling, ToolShape, ToolSpec, ToolTarget},
     material::Law,
-    solve::{SolveError, StaticSettings, StaticSolution, solve_static},
+    statics::{SolveError, StaticSettings, StaticSolution, solve_static},
     step,
 };
 use std::ops::ControlFlow;

@@ -7,8 +7,8 @@ use glam::DVec3;
 use octahedra::{FACE_M, OUTWARDS, body_spec, device_m, layer, parameters};
 use palpate_physics::{
     Integrator, LoadSpec, Model, ModelSpec, PointForce, State, Substeps,
+    bodies::seed::{AtVertex, SeedContact, SeedModel, SeedParameters, SeedScratch, SeedSpec, SeedState},
     contact::Coupling,
-    seed::{AtVertex, SeedContact, SeedModel, SeedParameters, SeedScratch, SeedSpec, SeedState},
     snapshot::{SnapshotError, restore, save, state_hash},
 };
 use rig::{Drive, Rig};

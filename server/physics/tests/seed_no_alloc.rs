@@ -7,8 +7,8 @@ use glam::DVec3;
 use octahedra::{body_spec, core, device_m, layer, parameters};
 use palpate_physics::{
     PointForce, TickInput,
+    bodies::seed::{AtVertex, SeedContact, SeedModel, SeedScratch, SeedSpec, SeedState},
     contact::ToolTarget,
-    seed::{AtVertex, SeedContact, SeedModel, SeedScratch, SeedSpec, SeedState},
 };
 use rig::Rig;
 

@@ -6,7 +6,7 @@ use glam::DVec3;
 use palpate_physics::{
     LoadSpec, Model, TetMesh,
     material::Law,
-    solve::{StaticSettings, solve_static},
+    statics::{StaticSettings, solve_static},
 };
 use std::ops::ControlFlow;
 

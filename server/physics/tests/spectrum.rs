@@ -5,8 +5,11 @@ use faer::{Mat, Side};
 use glam::DVec3;
 use palpate_physics::{
     Model, ModelSpec, Precision, PrescribedSpec, Region, Scratch, Settings, State, Substeps, TetMesh, TickInput,
-    fem::{element::RestTet, mass},
-    integrate::spectrum::{RestStiffness, element_bound_rad_per_s, max_natural_frequency_rad_per_s},
+    elements::{
+        linear_tet::RestTet,
+        mass,
+        rest_stiffness::{RestStiffness, element_bound_rad_per_s, max_natural_frequency_rad_per_s},
+    },
     material::{Convention, Lame, Law, Material, Viscosity},
     step,
 };

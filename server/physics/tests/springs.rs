@@ -5,9 +5,7 @@ use assert_no_alloc::{AllocDisabler, assert_no_alloc};
 use glam::{DQuat, DVec3};
 use palpate_physics::{
     Energies, LoadSpec, ModelSpec, PointForce, PrescribedSpec, Settings, State, Substeps, TetMesh,
-    contact::{Coupling, ToolShape, ToolSpec, ToolTarget},
-    snapshot,
-    spring::{
+    bodies::mass_spring::{
         HomeLaw, Net, Refinement, Refining, SpringBodySpec, SpringSpec,
         calibration::{Calibration, ConstantsTable},
         equilibrium::settle,
@@ -15,6 +13,8 @@ use palpate_physics::{
         refine_only,
         region::Constants,
     },
+    contact::{Coupling, ToolShape, ToolSpec, ToolTarget},
+    snapshot,
 };
 use rig::{Drive, Rig, at, sphere};
 

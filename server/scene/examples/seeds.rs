@@ -1,7 +1,9 @@
 //! The papers' table of running times (2006, table 1), on this machine: how many of their steps a second their three models make, at rest and
 //! pressed. `cargo run --release -p palpate-scene --example seeds`
 use glam::DVec3;
-use palpate_physics::seed::{AtVertex, PaperModel, SeedContact, SeedModel, SeedParameters, SeedScratch, SeedState};
+use palpate_physics::bodies::seed::{
+    AtVertex, PaperModel, SeedContact, SeedModel, SeedParameters, SeedScratch, SeedState,
+};
 use palpate_scene::shapes::seeds::paper_model;
 use std::time::Instant;
 
@@ -36,7 +38,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             "{:<11} {:>4}  {:>9}  {awake:>5}  {at_rest:>15.0}  {pressed:>7.0}  {printed}",
             format!("{model:?}"),
             built.core().mesh().tets().len(),
-            built.layer().map_or(0, palpate_physics::seed::layer::Layer::particle_count),
+            built.layer().map_or(0, palpate_physics::bodies::seed::layer::Layer::particle_count),
         );
     }
     Ok(())

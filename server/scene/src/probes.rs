@@ -1,7 +1,7 @@
 //! What a scene measures: named values with units, one row per sample.
 use glam::DVec3;
 use palpate_physics::{
-    Energies, Model, Scratch, State, contact::closest_weights, health, hybrid::place::Place, mesh::TetMesh,
+    Energies, Model, Scratch, State, bodies::hybrid::place::Place, contact::closest_weights, health, mesh::TetMesh,
 };
 
 /// A named measurement.

@@ -6,8 +6,8 @@ use crate::{
 };
 use palpate_physics::{
     ModelSpec,
+    bodies::mass_spring::{region::Constants, topology::Triangulation},
     mesh::quality::Quality,
-    spring::{region::Constants, topology::Triangulation},
 };
 use std::path::PathBuf;
 

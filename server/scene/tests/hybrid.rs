@@ -3,7 +3,7 @@
 use glam::DVec3;
 use palpate_physics::{
     LoadSpec, Model, Scratch, State, TickInput,
-    hybrid::{ParticleSpec, Waking},
+    bodies::hybrid::{ParticleSpec, Waking},
     step,
 };
 use palpate_scene::{Limits, Scene, parse};

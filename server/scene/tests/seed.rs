@@ -3,8 +3,8 @@
 use glam::DVec3;
 use palpate_physics::{
     LoadSpec, Model, Scratch, State, TickInput,
+    bodies::seed::{PaperModel, SeedBodySpec, SeedParameters, SeedSpec},
     material::{Convention, Lame, Viscosity},
-    seed::{PaperModel, SeedBodySpec, SeedParameters, SeedSpec},
     step,
 };
 use palpate_scene::{Limits, Scene, builtin, parse, probes::Measure, shapes::seeds::paper_model};

@@ -3,7 +3,7 @@
 use glam::DVec3;
 use palpate_physics::{
     Model,
-    spring::{
+    bodies::mass_spring::{
         HomeLaw, SpringBodySpec,
         calibration::{Calibration, ConstantsTable},
     },

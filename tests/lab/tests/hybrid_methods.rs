@@ -5,12 +5,12 @@ mod hybrid_body;
 use glam::{DMat3, DMat4, DVec3, DVec4};
 use hybrid_body::{Case, MakePoints, error, problem};
 use palpate_lab::fine_levels::PlacesOf;
-use palpate_physics::hybrid::{
-    kernels::{Kernel, SMOOTHING},
+use palpate_physics::bodies::hybrid::{
     methods::{CONTROL, Method},
     partition::Partition,
     place::Place,
     points::Row,
+    smoothing_kernels::{Kernel, SMOOTHING},
 };
 
 const NU: [&str; 3] = ["0.30", "0.45", "0.49"];

@@ -6,10 +6,12 @@ use super::{
 };
 use palpate_physics::{
     Model,
-    hybrid::Waking,
+    bodies::{
+        hybrid::Waking,
+        mass_spring::{Refinement, region::Constants},
+        seed::region::Region,
+    },
     material::Law,
-    seed::region::Region,
-    spring::{Refinement, region::Constants},
 };
 use palpate_scene::{Scene, builtin_names, wording::counted};
 use std::process::ExitCode;

@@ -5,7 +5,7 @@ use super::{
     summary::{Percentiles, TimeNumbers},
 };
 use glam::DVec3;
-use palpate_physics::{Model, hybrid::Waking};
+use palpate_physics::{Model, bodies::hybrid::Waking};
 use palpate_scene::Scene;
 use std::time::{Duration, Instant};
 

@@ -14,7 +14,7 @@ use miette::Diagnostic;
 use palpate_physics::{
     Model,
     contact::ToolTarget,
-    solve::{self, SolveError, StaticSettings, StaticSolution},
+    statics::{self, SolveError, StaticSettings, StaticSolution},
 };
 use palpate_scene::Scene;
 use std::{ops::ControlFlow, process::ExitCode, time::Instant};

@@ -12,7 +12,7 @@ use crate::progress::Progress;
 use glam::DVec3;
 use hdrhistogram::Histogram;
 use miette::IntoDiagnostic;
-use palpate_physics::{Model, Scratch, State, TickInput, contact::ToolTarget, hybrid::wake_only, step};
+use palpate_physics::{Model, Scratch, State, TickInput, bodies::hybrid::wake_only, contact::ToolTarget, step};
 use palpate_scene::Scene;
 use std::{process::ExitCode, time::Instant};
 

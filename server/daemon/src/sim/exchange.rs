@@ -2,7 +2,11 @@
 //! allocates on the loop's side once built.
 use super::bell::{Ear, bell};
 use glam::{DQuat, DVec3};
-use palpate_physics::{Model, Quarantine, contact::LocalContactModel, seed::SeedModel, spring::SpringMotion};
+use palpate_physics::{
+    Model, Quarantine,
+    bodies::{mass_spring::SpringMotion, seed::SeedModel},
+    contact::LocalContactModel,
+};
 use palpate_realtime::Doorbell;
 use std::{
     io,

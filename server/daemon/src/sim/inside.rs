@@ -2,9 +2,11 @@
 use glam::{DMat3, DVec3};
 use palpate_physics::{
     Model, State,
+    bodies::{
+        hybrid::{Hybrid, partition::NONE},
+        mass_spring::topology::Edge,
+    },
     contact::is_inside,
-    hybrid::{Hybrid, partition::NONE},
-    spring::topology::Edge,
 };
 
 /// A point between two tets or cells is in one of them, whatever rounding says.

@@ -25,7 +25,7 @@ use bytes::{BufMut, BytesMut};
 use glam::DVec3;
 use palpate_physics::{
     Model,
-    spring::{
+    bodies::mass_spring::{
         Triangulation,
         around::rings_into,
         loop_scheme::{Mask, apply, edge_mask, vertex_mask},
@@ -222,7 +222,7 @@ fn little_endian(numbers: impl Iterator<Item = u32>) -> bytes::Bytes {
 mod tests {
     use super::*;
     use crate::stream::keyframe::rest_positions_f32;
-    use palpate_physics::spring::loop_scheme::refined;
+    use palpate_physics::bodies::mass_spring::loop_scheme::refined;
     use palpate_scene::{Limits, parse};
 
     const BALL: &str = "[scene]\nname = \"t\"\n[body.sphere_shell]\ninner_radius_mm = 30\nouter_radius_mm = 40\n\

@@ -4,7 +4,7 @@ use crate::sim::exchange::LatticeSnapshot;
 use glam::DVec3;
 use palpate_physics::{
     Model,
-    hybrid::{composite::Anchor, place::Place},
+    bodies::hybrid::{composite::Anchor, place::Place},
 };
 use std::collections::BTreeMap;
 

@@ -24,7 +24,7 @@ use super::{
     narrow::Pressed,
     turning::rotation_vector,
 };
-use crate::fem::element::outer;
+use crate::linalg::tensor::outer;
 use glam::{DMat3, DVec3};
 use serde::{Deserialize, Serialize};
 use std::f64::consts::PI;

@@ -13,7 +13,7 @@
 //! symmetric, positive semi-definite, never stiffer than `K_r`. An elastic body resists tilting more than its pressure's spread says (a flat punch on a half space twice as much), a
 //! foundation just as much: the model is up to a third too soft (`tests/local_model.rs`), which only delays, and a softer spring is stabler. What the tool's way does to the torque, and its turn to the force, is left to the next tick.
 use super::narrow::Pressed;
-use crate::fem::element::outer;
+use crate::linalg::tensor::outer;
 use glam::{DMat3, DQuat, DVec3};
 use serde::{Deserialize, Serialize};
 

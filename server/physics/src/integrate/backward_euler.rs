@@ -19,9 +19,9 @@
 use super::{
     forces::Tick,
     motion::{damp, drift, holders_power_w},
-    pcg::{self, Stop},
     seed_semi_implicit::NodalImplicit,
 };
+use crate::linalg::pcg::{self, Stop};
 use crate::{
     contact::StepAhead,
     world::{Model, Scratch, State},

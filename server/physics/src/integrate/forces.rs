@@ -2,8 +2,9 @@
 use super::{hybrid, springs};
 use crate::{
     contact::{Body, ContactState, SubstepTime},
-    fem::loads::add_load_n,
-    world::{LoadSpec, Model, PointForce, Scratch, State, TickInput},
+    elements::loads::add_load_n,
+    settings::LoadSpec,
+    world::{Model, PointForce, Scratch, State, TickInput},
 };
 use glam::DVec3;
 

@@ -4,9 +4,9 @@ use super::{
     motion::holders_power_w,
 };
 use crate::{
+    bodies::hybrid::{Hybrid, HybridScratch, SkinView},
     contact::{ContactScratch, SubstepTime, SurfaceNow},
-    hybrid::{Hybrid, HybridScratch, SkinView},
-    simd::{kicks::Kick, sweeps},
+    lanes::{kicks::Kick, vector_operations},
     world::{Model, State},
 };
 use glam::DVec3;
@@ -72,7 +72,7 @@ pub(super) fn evaluate(
     if model.gravity_m_per_s2() != DVec3::ZERO {
         patch.metric().add_weight_n(model.gravity_m_per_s2(), &mut state.force_n);
     }
-    sweeps::add(&mut state.force_n, &state.external_n);
+    vector_operations::add(&mut state.force_n, &state.external_n);
     own.balance.apply(body, state);
     state.force_is_current = true;
 }
@@ -98,7 +98,7 @@ pub(super) fn kick(
     if damping > 0.0 {
         // Velocities are what the kick before left, once it is known what they have.
         (before_j, with_holders_j) = of_free_j.unwrap_or_else(|| patch.metric().of_free_j(body, &state.v, momenta));
-        power_w = factor * (sweeps::dot(&state.v, accelerations) + of_holders_w);
+        power_w = factor * (vector_operations::dot(&state.v, accelerations) + of_holders_w);
     }
     *kick_sq = [patch.metric_mut().accelerate(accelerations), kick_sq[0], kick_sq[1]];
     let inertia_w = patch.metric().of_holders(&state.v, accelerations);

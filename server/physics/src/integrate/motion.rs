@@ -1,13 +1,13 @@
 //! What integrators do to positions and velocities, and what the ledger hears of it.
 use crate::{
-    simd::sweeps,
+    lanes::vector_operations,
     world::{Model, State},
 };
 use glam::DVec3;
 
 /// `x ← x + dt v`; returns a bound (m/s) of the largest speed of any node.
 pub(super) fn drift(state: &mut State, dt_s: f64) -> f64 {
-    sweeps::drift(&mut state.x, &state.v, dt_s)
+    vector_operations::drift(&mut state.x, &state.v, dt_s)
 }
 
 /// `v ← (v e^{−c h/2} + h f/m) e^{−c h/2}`, and the ledger's share of it: what damping takes, `½ (1 − e^{−c h}) m v²` of the velocity before and

@@ -2,17 +2,17 @@
 use super::{
     backward_euler,
     forces::Tick,
-    leapfrog,
-    pcg::PcgScratch,
-    seed_body,
-    seed_semi_implicit::{self, NodalImplicit, nodal_stiffness_n_per_m},
+    leapfrog, seed_body,
+    seed_semi_implicit::{self, NodalImplicit},
     seed_verlet,
-    spectrum::RestStiffness,
 };
+use crate::elements::rest_stiffness::{RestStiffness, nodal_stiffness_n_per_m};
+use crate::linalg::pcg::PcgScratch;
 use crate::{
     contact::ContactTangents,
     material::{Lame, Law, Material, Viscosity},
-    world::{Integrator, Model, Scratch, State},
+    settings::Integrator,
+    world::{Model, Scratch, State},
 };
 use glam::DVec3;
 

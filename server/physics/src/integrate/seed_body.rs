@@ -11,7 +11,7 @@
 //! Ledger: forces work along what their vertices went. What the scheme, viscosity and exchange take is not known.
 use super::forces::Tick;
 use crate::{
-    seed::{AtVertex, SeedContact, SeedModel, SeedScratch},
+    bodies::seed::{AtVertex, SeedContact, SeedModel, SeedScratch},
     world::{Scratch, State},
 };
 

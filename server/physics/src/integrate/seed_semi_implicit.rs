@@ -27,8 +27,8 @@ use super::{
     forces::Tick,
     motion::{damp, drift, holders_power_w},
     scheme::Body,
-    spectrum::RestStiffness,
 };
+use crate::elements::rest_stiffness::RestStiffness;
 use crate::world::{Model, Scratch, State};
 use glam::{DMat3, DVec3};
 
@@ -67,18 +67,6 @@ impl NodalImplicit {
     pub(super) fn inverse_per_kg(&self) -> &[DMat3] {
         &self.inverse_per_kg
     }
-}
-
-/// `D_i = Σ_{t∋i} −∂f_i/∂x_i` (N/m) of every node at rest: the block diagonal of `K`, symmetric and positive definite.
-pub fn nodal_stiffness_n_per_m(body: &RestStiffness<'_>) -> Vec<DMat3> {
-    let mut nodal = vec![DMat3::ZERO; body.mesh.positions_m().len()];
-    for ((nodes, rest), &material) in body.mesh.tets().iter().zip(body.rest_tets).zip(body.tet_material) {
-        for (corner, &node) in nodes.iter().enumerate() {
-            let material = &body.materials[material as usize];
-            nodal[node as usize] -= rest.stiffness_block(material, &DMat3::IDENTITY, corner, corner);
-        }
-    }
-    nodal
 }
 
 /// All substeps of a tick.

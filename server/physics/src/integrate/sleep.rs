@@ -22,7 +22,7 @@ use super::tick::{take_tools, write_reactions};
 use crate::{
     contact::{SubstepTime, ToolState},
     health::ViscousPower,
-    solve::{SolveError, natural_modes},
+    statics::{SolveError, natural_modes},
     world::{Model, Scratch, State, StepReport, TickInput, relaxation_time_s},
 };
 use glam::DVec3;

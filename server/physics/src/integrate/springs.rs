@@ -1,14 +1,14 @@
 //! Forces and kicks of a mass-spring surface, for leapfrog, and what is refined and awake from one tick to the next.
 use super::forces::{Evaluation, Tick, is_usable};
 use crate::{
-    contact::{ContactScratch, Near, SubstepTime, SurfaceNow, ToolState, broad::Skin},
-    simd::kicks::LumpedKick,
-    spring::{
+    bodies::mass_spring::{
         Refinement, SpringBody, SpringScratch, SpringState, Wanted,
         body::rings_for,
         skin::{ListedVertices, SpringSkin},
         state::{About, Found, Looking},
     },
+    contact::{ContactScratch, Near, SubstepTime, SurfaceNow, ToolState, broad::Skin},
+    lanes::kicks::LumpedKick,
     world::{Model, PointForce, State},
 };
 use glam::DVec3;

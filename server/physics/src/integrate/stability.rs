@@ -25,10 +25,11 @@
 //! before ([`Pace::before`]). Compare Park & Underwood 1980 and Bergan & Mollestad 1985, who choose steps by the quotient
 //! `Δxᵀ Δg/Δxᵀ M Δx`, which has neither filter.
 use crate::{
+    bodies::hybrid::HybridScratch,
     health::LastGood,
-    hybrid::HybridScratch,
-    simd::StepForces,
-    world::{Integrator, MAX_SUBSTEPS, Model, Precision, State, with_room},
+    lanes::StepForces,
+    settings::{Integrator, MAX_SUBSTEPS, Precision},
+    world::{Model, State, with_room},
 };
 use glam::DVec3;
 use serde::{Deserialize, Serialize};

@@ -7,8 +7,8 @@
 use super::{
     Lame,
     neo_hookean::{cofactor, cofactor_differential},
-    stvk::{contract, trace},
 };
+use crate::linalg::tensor::{contract, trace};
 use glam::{DMat3, DQuat, DVec3, DVec4};
 
 /// `Ψ = µ|F − R|² + ½λ(J − 1)²` (J/m³).
@@ -135,7 +135,7 @@ mod tests {
     #[test]
     fn the_result_is_a_rotation_even_where_it_is_not_unique() {
         let mirror = DMat3::from_diagonal(DVec3::new(-1.0, 1.0, 1.0));
-        let line = crate::fem::element::outer(DVec3::new(1.0, 2.0, 3.0), DVec3::new(-1.0, 0.5, 2.0));
+        let line = crate::linalg::tensor::outer(DVec3::new(1.0, 2.0, 3.0), DVec3::new(-1.0, 0.5, 2.0));
         for f in [DMat3::ZERO, mirror, line, -DMat3::IDENTITY] {
             let r = nearest_rotation(&f);
             assert!((r.determinant() - 1.0).abs() < 1e-13);

@@ -2,7 +2,8 @@
 //!
 //! `Ψ = ½µ(tr FᵀF − 3) + ½λ̂(J − 1)² − µ(J − 1)` with `λ̂ = λ + µ`, `J = det F`. At `F = I` energy and stress vanish, and
 //! `δP = µ(δF + δFᵀ) + (λ̂ − µ) tr(δF) I`: small strain sees exactly λ and µ. Defined for every `F`, inverted ones included.
-use super::{Lame, stvk::contract};
+use super::Lame;
+use crate::linalg::tensor::contract;
 use glam::DMat3;
 
 /// `Ψ` (J/m³).

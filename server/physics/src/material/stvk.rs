@@ -1,5 +1,7 @@
 //! St. Venant-Kirchhoff: `Ψ = µ E:E + ½λ tr²(E)`, `E = ½(FᵀF − I)`.
 use super::Lame;
+use crate::linalg::tensor::contract;
+use crate::linalg::tensor::trace;
 use glam::DMat3;
 
 /// Green's strain `E = ½(FᵀF − I)`.
@@ -28,14 +30,4 @@ pub fn piola_differential(lame: Lame, f: &DMat3, df: &DMat3) -> DMat3 {
 /// `S = λ tr(E) I + 2µE` (Pa).
 fn second_piola(lame: Lame, e: &DMat3) -> DMat3 {
     DMat3::from_diagonal(glam::DVec3::splat(lame.lambda_pa * trace(e))) + *e * (2.0 * lame.mu_pa)
-}
-
-/// `tr(A)`.
-pub fn trace(a: &DMat3) -> f64 {
-    a.x_axis.x + a.y_axis.y + a.z_axis.z
-}
-
-/// `A:B = Σ A_ij B_ij`.
-pub fn contract(a: &DMat3, b: &DMat3) -> f64 {
-    a.x_axis.dot(b.x_axis) + a.y_axis.dot(b.y_axis) + a.z_axis.dot(b.z_axis)
 }

@@ -1,8 +1,6 @@
 //! The papers' viscous stress, for every law: `S_v = φ tr(Ė) I + 2ψĖ`, `Ė = sym(Ḟᵀ F)`; `P_v = F S_v`.
-use super::{
-    Viscosity,
-    stvk::{contract, trace},
-};
+use super::Viscosity;
+use crate::linalg::tensor::{contract, trace};
 use glam::{DMat3, DVec3};
 
 /// `Ė = sym(Ḟᵀ F)` (1/s), the rate of Green's strain.

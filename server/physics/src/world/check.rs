@@ -1,8 +1,9 @@
 //! The specification's ranges.
-use super::{Integrator, LoadSpec, MAX_SUBSTEPS, ModelError, ModelSpec, Substeps};
+use super::{ModelError, ModelSpec};
+use crate::settings::{Integrator, LoadSpec, MAX_SUBSTEPS, Substeps};
 use crate::{
+    bodies::hybrid::HybridError,
     contact::{Coupling, LARGEST_TRIANGLE, ToolShape, ToolSpec, Turning},
-    hybrid::HybridError,
     material::{Lame, Material, Viscosity},
     mesh::Surface,
 };

@@ -1,7 +1,9 @@
 //! Why a model cannot be built.
 use crate::{
-    hybrid::HybridError, material::ParameterError, mesh::MeshError, seed::SeedError, solve::SolveError,
-    spring::SpringBodyError,
+    bodies::{hybrid::HybridError, mass_spring::SpringBodyError, seed::SeedError},
+    material::ParameterError,
+    mesh::MeshError,
+    statics::SolveError,
 };
 use glam::DVec3;
 use thiserror::Error;

@@ -12,9 +12,9 @@ mod tick;
 
 pub use error::ModelError;
 pub use model::Model;
-pub use spec::{Integrator, LoadSpec, ModelSpec, Precision, PrescribedSpec, Region, Settings, Skips, Substeps};
+pub use spec::{ModelSpec, Region};
+
 pub use state::State;
 pub(crate) use state::with_room;
-pub use substeps::MAX_SUBSTEPS;
 pub(crate) use substeps::relaxation_time_s;
 pub use tick::{PointForce, Scratch, StepReport, TickInput};

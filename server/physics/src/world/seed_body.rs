@@ -1,9 +1,10 @@
 //! What a seed body needs of a specification, and what it cannot have.
-use super::{Integrator, MAX_SUBSTEPS, ModelError, ModelSpec, Substeps};
+use super::{ModelError, ModelSpec};
+use crate::settings::{Integrator, MAX_SUBSTEPS, Substeps};
 use crate::{
+    bodies::seed::{SeedBodySpec, SeedModel, SeedParameters, SeedSpec},
     contact::{ContactModel, SurfaceModuli},
     material::{Law, Material},
-    seed::{SeedBodySpec, SeedModel, SeedParameters, SeedSpec},
 };
 use glam::DVec3;
 

@@ -1,6 +1,7 @@
 //! What a mass-spring surface needs of a specification, and what it cannot have.
-use super::{Integrator, ModelError, ModelSpec};
-use crate::spring::{SpringBody, SpringBodyError};
+use super::{ModelError, ModelSpec};
+use crate::bodies::mass_spring::{SpringBody, SpringBodyError};
+use crate::settings::Integrator;
 use glam::DVec3;
 
 fn refused(what: &'static str, instead: &'static str) -> ModelError {

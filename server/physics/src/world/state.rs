@@ -1,12 +1,10 @@
 //! What a tick changes.
 use super::Model;
 use crate::{
+    bodies::{hybrid::ActiveParticles, mass_spring::SpringState, seed::SeedMotion},
     contact::{ContactState, ToolState, ToolTarget},
     health::{Ledger, Quarantine, ViscousPower},
-    hybrid::ActiveParticles,
     integrate::{Pace, Sleep},
-    seed::SeedMotion,
-    spring::SpringState,
 };
 use glam::DVec3;
 use serde::{Deserialize, Serialize};

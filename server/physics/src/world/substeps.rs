@@ -1,9 +1,8 @@
 //! How many substeps a tick needs.
-use super::{ModelError, ModelSpec, Settings, Substeps};
+use super::{ModelError, ModelSpec};
 use crate::material::Material;
-
-/// More substeps than this are refused at load.
-pub const MAX_SUBSTEPS: u32 = 100_000;
+use crate::settings::MAX_SUBSTEPS;
+use crate::settings::{Settings, Substeps};
 
 /// Part of its stable step that a hybrid body's coarse level takes: below what ticks are judged unstable by (`integrate::stability`).
 const LONG_STEP_SHARE: f64 = 0.85;

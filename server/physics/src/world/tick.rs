@@ -1,11 +1,12 @@
 //! What goes into a tick and what comes out of it, beside the state; and the buffers it works in.
-use super::{Integrator, Model};
+use super::Model;
+use crate::settings::Integrator;
 use crate::{
+    bodies::hybrid::HybridScratch,
     contact::{ContactScratch, ToolTarget},
     health::{LastGood, Quarantine},
-    hybrid::HybridScratch,
     integrate::{ForceHistory, ImplicitScratch, SeedBodyScratch, SpringBodyScratch},
-    simd::KernelScratch,
+    kernels::KernelScratch,
 };
 use glam::DVec3;
 

@@ -4,7 +4,7 @@ use glam::DVec3;
 use palpate_physics::{
     LoadSpec, Model, ModelSpec, Precision, PrescribedSpec, Region, Settings, Substeps, Surface, TetMesh,
     material::{Convention, Lame, Law, Material, Viscosity},
-    solve::{StaticSettings, StaticSolution, solve_static},
+    statics::{StaticSettings, StaticSolution, solve_static},
 };
 use std::{collections::BTreeMap, ops::ControlFlow};
 

@@ -3,9 +3,9 @@
 use glam::DVec3;
 use palpate_physics::{
     ModelSpec, PrescribedSpec, Region, Settings, TetMesh,
+    bodies::seed::{LayerSpec, PaperModel, SeedBodySpec, SeedParameters},
     contact::{Coupling, ToolShape, ToolSpec},
     material::{Law, Material},
-    seed::{LayerSpec, PaperModel, SeedBodySpec, SeedParameters},
 };
 
 /// Corners of an octahedron of radius 1, x, −x, y, −y, z, −z, and its triangles seen from outside.

@@ -4,8 +4,8 @@ use glam::DVec3;
 use palpate_physics::{
     Model, ModelSpec, PointForce, Precision, PrescribedSpec, Region, Scratch, Settings, State, StepReport, Surface,
     TetMesh, TickInput,
+    bodies::hybrid::{ParticleSpec, Skin, Waking, wake_only},
     contact::{Coupling, ToolShape, ToolSpec, ToolTarget},
-    hybrid::{ParticleSpec, Skin, Waking, wake_only},
     material::{Lame, Law, Material, Viscosity},
 };
 

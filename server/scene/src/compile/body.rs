@@ -19,7 +19,7 @@ use crate::{
     wording::counted,
 };
 use glam::DVec3;
-use palpate_physics::{MeshError, Surface, TetMesh, contact::is_inside, spring::topology::Triangulation};
+use palpate_physics::{MeshError, Surface, TetMesh, bodies::mass_spring::topology::Triangulation, contact::is_inside};
 
 /// A body before regions, materials and loads.
 pub(crate) struct Body {

@@ -25,8 +25,10 @@ use body::Body;
 use glam::DVec3;
 use material::Materials;
 use palpate_physics::{
-    Integrator, ModelSpec, Precision, Settings, Skips, Substeps, hybrid::ParticleSpec, mesh::quality,
-    seed::SeedBodySpec, spring::SpringBodySpec, world::MAX_SUBSTEPS,
+    Integrator, ModelSpec, Precision, Settings, Skips, Substeps,
+    bodies::{hybrid::ParticleSpec, mass_spring::SpringBodySpec, seed::SeedBodySpec},
+    mesh::quality,
+    settings::MAX_SUBSTEPS,
 };
 use regions::Regions;
 use std::path::{Path, PathBuf};

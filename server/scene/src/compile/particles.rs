@@ -14,7 +14,7 @@ use crate::{
 use glam::DVec3;
 use palpate_physics::{
     TetMesh,
-    hybrid::{ParticleSpec, Skin, Waking, composite::Composite, fine_layers, spec::MOST_ACTIVE},
+    bodies::hybrid::{ParticleSpec, Skin, Waking, composite::Composite, fine_layers, spec::MOST_ACTIVE},
     mesh::tet::EDGES,
 };
 use std::{collections::BTreeSet, f64::consts::PI};

@@ -11,7 +11,7 @@ use crate::{
     skin::FineSurface,
 };
 use glam::DVec3;
-use palpate_physics::seed::{LayerSpec, PaperModel, SeedBodySpec, SeedParameters};
+use palpate_physics::bodies::seed::{LayerSpec, PaperModel, SeedBodySpec, SeedParameters};
 
 const FEWEST_TRIANGLES: u32 = 20;
 

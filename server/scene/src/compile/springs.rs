@@ -16,8 +16,7 @@ use crate::{
 use glam::DVec3;
 use palpate_physics::{
     Settings, Surface, TetMesh,
-    contact::ToolSpec,
-    spring::{
+    bodies::mass_spring::{
         HomeLaw, Refinement, Refining, SpringBodySpec, SpringSpec,
         body::triangles_about,
         calibration::{Calibration, ConstantsTable},
@@ -26,6 +25,7 @@ use palpate_physics::{
         region::Constants,
         topology::{Triangulation, TriangulationError},
     },
+    contact::ToolSpec,
 };
 use std::{collections::BTreeSet, path::Path};
 

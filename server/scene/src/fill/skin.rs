@@ -59,7 +59,7 @@ fn strip(positions_m: &[DVec3], inner: &[u32], outer: &[u32], triangles: &mut Ve
 #[cfg(test)]
 mod tests {
     use super::*;
-    use palpate_physics::hybrid::Skin;
+    use palpate_physics::bodies::hybrid::Skin;
     use std::f64::consts::{PI, TAU};
 
     /// A cup: half an ellipsoid of revolution below z = 0, `around` vertices on every ring.

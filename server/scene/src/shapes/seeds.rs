@@ -12,7 +12,7 @@ use super::{ShapeError, ellipsoid_shell};
 use glam::DVec3;
 use palpate_physics::{
     TetMesh,
-    seed::{LayerSpec, PARTICLES, PaperModel, SHELL_TETS, SeedParameters, SeedSpec, VENTRICLE_TETS},
+    bodies::seed::{LayerSpec, PARTICLES, PaperModel, SHELL_TETS, SeedParameters, SeedSpec, VENTRICLE_TETS},
 };
 
 /// Semi-axes (m) of the cavity.
@@ -54,7 +54,7 @@ fn held(core: &TetMesh, outer_m: DVec3) -> Vec<u32> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use palpate_physics::seed::{AtVertex, SeedContact, SeedModel, SeedScratch, SeedState};
+    use palpate_physics::bodies::seed::{AtVertex, SeedContact, SeedModel, SeedScratch, SeedState};
 
     fn build(model: PaperModel) -> SeedModel {
         SeedModel::build(paper_model(model, SeedParameters::paper_2006(model)).unwrap()).unwrap()
@@ -75,7 +75,8 @@ mod tests {
             println!("{model:?}: {} tets, {} nodes", mesh.tets().len(), mesh.positions_m().len());
             assert!((mesh.tets().len() as f64 / f64::from(tets) - 1.0).abs() < 0.1);
             let Some(layer) = built.layer() else { continue };
-            let counts: Vec<usize> = built.regions().iter().map(palpate_physics::seed::region::Region::len).collect();
+            let counts: Vec<usize> =
+                built.regions().iter().map(palpate_physics::bodies::seed::region::Region::len).collect();
             let mean = counts.iter().sum::<usize>() as f64 / counts.len() as f64;
             println!(
                 "  {} particles {:.3} mm apart under {} triangles; awake {} to {}, {mean:.0} on average",

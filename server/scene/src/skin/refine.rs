@@ -93,7 +93,7 @@ impl Halved {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use palpate_physics::hybrid::Skin;
+    use palpate_physics::bodies::hybrid::Skin;
 
     fn longest_m(surface: &FineSurface) -> f64 {
         let edges = surface.triangles.iter().flat_map(|&[a, b, c]| [[a, b], [b, c], [c, a]]);

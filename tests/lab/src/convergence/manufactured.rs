@@ -9,10 +9,10 @@ use glam::{DMat3, DVec3};
 use miette::{IntoDiagnostic, Result};
 use palpate_physics::{
     LoadSpec, Model, ModelSpec, Precision, PrescribedSpec, Region, Settings, Surface, TetMesh,
-    fem::element::outer,
+    linalg::tensor::outer,
     material::{Law, Material},
     mesh::tet::EDGES,
-    solve::{StaticSettings, solve_static},
+    statics::{StaticSettings, solve_static},
 };
 use std::{f64::consts::PI, ops::ControlFlow};
 

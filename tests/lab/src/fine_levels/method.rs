@@ -1,7 +1,7 @@
 //! The methods by name.
-use palpate_physics::hybrid::{
-    kernels::Kernel,
+use palpate_physics::bodies::hybrid::{
     methods::{CONTROL, Method},
+    smoothing_kernels::Kernel,
 };
 
 /// What makes up the fine level.

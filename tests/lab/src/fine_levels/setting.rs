@@ -13,7 +13,7 @@ use glam::{BVec3, DVec3};
 use miette::{IntoDiagnostic, Result, miette};
 use palpate_physics::{
     Surface, TetMesh,
-    hybrid::{
+    bodies::hybrid::{
         Skin,
         cage::{self, Cage},
         composite::Composite,

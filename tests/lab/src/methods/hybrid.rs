@@ -10,7 +10,7 @@ use glam::DVec3;
 use miette::{IntoDiagnostic, Result, miette};
 use palpate_physics::{
     LoadSpec, Model, ModelSpec, Settings,
-    hybrid::{ParticleSpec, Skin, Waking, wake_only},
+    bodies::hybrid::{ParticleSpec, Skin, Waking, wake_only},
 };
 
 /// So many particles awake.

@@ -5,7 +5,7 @@ use crate::problems::{
     motion::{RATE_HZ, RINGING_DAMPING_PER_S, smooth},
 };
 use miette::{IntoDiagnostic, Result, miette};
-use palpate_physics::solve::natural_modes;
+use palpate_physics::statics::natural_modes;
 use std::f64::consts::TAU;
 
 /// Ramp, rest and damping of a problem.

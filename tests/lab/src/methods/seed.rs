@@ -13,8 +13,8 @@ use glam::DVec3;
 use miette::{IntoDiagnostic, Result, miette};
 use palpate_physics::{
     LoadSpec, Model, ModelSpec, PrescribedSpec, Settings, Surface, TetMesh,
+    bodies::seed::{LayerSpec, PaperModel, SeedBodySpec, SeedParameters},
     material::{Convention, Lame, Law, Material, Viscosity},
-    seed::{LayerSpec, PaperModel, SeedBodySpec, SeedParameters},
 };
 use palpate_scene::shapes::{self, Shape};
 

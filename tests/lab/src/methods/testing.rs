@@ -9,7 +9,7 @@ use glam::DVec3;
 use palpate_physics::{
     Model, Settings,
     contact::ToolTarget,
-    solve::{StaticSettings, solve_static},
+    statics::{StaticSettings, solve_static},
 };
 use std::ops::ControlFlow;
 

@@ -5,7 +5,7 @@ use crate::{
     problems::{Problem, load},
 };
 use miette::{Result, miette};
-use palpate_physics::fem::mass::lumped_kg;
+use palpate_physics::elements::mass::lumped_kg;
 use serde::{Deserialize, Serialize};
 
 /// Version of the format.

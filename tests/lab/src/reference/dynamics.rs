@@ -6,7 +6,7 @@
 use super::{bodies::Body, shape, solid::Solid};
 use glam::{BVec3, DMat3, DVec3};
 use miette::{Result, ensure};
-use palpate_physics::fem::element::outer;
+use palpate_physics::linalg::tensor::outer;
 
 const LOBATTO: [f64; 3] = [1.0 / 3.0, 4.0 / 3.0, 1.0 / 3.0];
 /// Of the largest stable step, for bodies that stiffen as they deform.

@@ -13,7 +13,7 @@ use super::{
 use glam::{DMat3, DVec3};
 use miette::{Result, ensure};
 use palpate_physics::{
-    fem::element::outer,
+    linalg::tensor::outer,
     material::{
         Material,
         neo_hookean::{cofactor, cofactor_differential},

@@ -8,7 +8,7 @@ use super::{
     solid::{SurfacePoint, surface_points},
 };
 use glam::{DMat3, DVec3};
-use palpate_physics::fem::element::outer;
+use palpate_physics::linalg::tensor::outer;
 
 /// Parts of a face each way on which contact is integrated: the rim of the contact runs through faces.
 const PARTS: usize = 3;

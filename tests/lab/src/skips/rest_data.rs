@@ -2,7 +2,7 @@
 use super::{Found, pair};
 use crate::{press::Press, timing::interleaved};
 use miette::Result;
-use palpate_physics::{Skips, fem::element::RestTet};
+use palpate_physics::{Skips, elements::linear_tet::RestTet};
 
 const TETS: u32 = 1_352;
 

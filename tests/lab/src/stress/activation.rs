@@ -5,8 +5,8 @@ use glam::DQuat;
 use miette::Result;
 use palpate_physics::{
     Settings,
+    bodies::hybrid::wake_only,
     contact::{Coupling, ToolShape, ToolSpec, ToolTarget},
-    hybrid::wake_only,
     material::Law,
 };
 use std::f64::consts::TAU;

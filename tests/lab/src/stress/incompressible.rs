@@ -14,7 +14,7 @@ use miette::{IntoDiagnostic, Result};
 use palpate_physics::{
     LoadSpec, Model,
     material::Law,
-    solve::{StaticSettings, solve_static},
+    statics::{StaticSettings, solve_static},
 };
 use std::{collections::BTreeSet, ops::ControlFlow};
 

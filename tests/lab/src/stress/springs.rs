@@ -8,10 +8,10 @@ use glam::DVec3;
 use miette::{IntoDiagnostic, Result};
 use palpate_physics::{
     ModelSpec, PointForce, Settings, TetMesh,
-    contact::{Coupling, ToolShape, ToolSpec, ToolTarget},
-    spring::{
+    bodies::mass_spring::{
         HomeLaw, Refinement, Refining, SpringBodySpec, SpringSpec, home::Layer, net::hexagonal_patch, region::Constants,
     },
+    contact::{Coupling, ToolShape, ToolSpec, ToolTarget},
 };
 use std::f64::consts::PI;
 

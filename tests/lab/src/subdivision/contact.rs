@@ -4,8 +4,7 @@
 use glam::DVec3;
 use palpate_physics::{
     Model, ModelError, ModelSpec, PrescribedSpec, Scratch, Settings, State, TetMesh, TickInput,
-    contact::{Coupling, ToolShape, ToolSpec, ToolTarget},
-    spring::{
+    bodies::mass_spring::{
         HomeLaw, Refinement, Refining, SpringBodySpec, SpringSpec,
         calibration::{Calibration, CalibrationError, ConstantsTable},
         loop_scheme::refined,
@@ -14,6 +13,7 @@ use palpate_physics::{
         region::Constants,
         topology::{Triangulation, TriangulationError},
     },
+    contact::{Coupling, ToolShape, ToolSpec, ToolTarget},
     step,
 };
 use std::time::Instant;

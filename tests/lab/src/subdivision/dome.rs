@@ -1,6 +1,6 @@
 //! Figure 12: a hemisphere pressed at a vertex, coarse and with one and two rings refined, drawn side by side.
 use glam::DVec3;
-use palpate_physics::spring::{
+use palpate_physics::bodies::mass_spring::{
     Refined, Region,
     loop_scheme::refined,
     matching::{Way, matched, point_force_n},
@@ -28,10 +28,10 @@ pub enum DomeError {
     Surface(#[from] TriangulationError),
     /// The springs come to no rest.
     #[error(transparent)]
-    NoRest(#[from] palpate_physics::spring::equilibrium::NoRest),
+    NoRest(#[from] palpate_physics::bodies::mass_spring::equilibrium::NoRest),
     /// No constants give the force.
     #[error(transparent)]
-    NoMatch(#[from] palpate_physics::spring::matching::NoMatch),
+    NoMatch(#[from] palpate_physics::bodies::mass_spring::matching::NoMatch),
 }
 
 /// One of the pictures.

@@ -4,9 +4,10 @@ use glam::DVec3;
 use miette::Result;
 use palpate_physics::{
     Precision,
-    fem::element::RestTet,
+    elements::linear_tet::RestTet,
+    kernels::{ForceKernel, Oracle},
+    lanes::InstructionSet,
     material::Law,
-    simd::{ForceKernel, InstructionSet, Oracle},
 };
 
 /// About what a haptic body has: the whole of it stays in the L2 cache.

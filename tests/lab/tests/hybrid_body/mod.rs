@@ -4,7 +4,7 @@ use palpate_lab::{
     fine_levels::{CoarseMesh, PlacesOf, Setting},
     problems::{self, Problem},
 };
-use palpate_physics::hybrid::{partition::Partition, points::Points};
+use palpate_physics::bodies::hybrid::{partition::Partition, points::Points};
 use std::collections::BTreeSet;
 
 /// A hybrid body whose skin is the boundary of a fine mesh.

@@ -1,5 +1,5 @@
-use super::super::{ContactModel, SurfaceModuli, ToolShape, ToolSpec};
 use super::*;
+use crate::contact::{ContactModel, SurfaceModuli, ToolShape, ToolSpec};
 use crate::{
     contact::Coupling,
     mesh::{Surface, TetMesh},

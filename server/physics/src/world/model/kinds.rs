@@ -1,21 +1,25 @@
 //! One constructor for each kind of body.
-use super::{
-    super::{Integrator, ModelError, ModelSpec, PrescribedSpec, building, check, seed_body, springs_body, substeps},
-    Model,
-};
+use super::Model;
 use crate::{
-    contact::{ContactModel, SurfaceModuli},
-    fem::{element::RestTet, mass},
-    hybrid::{Hybrid, ParticleSpec, body::Built},
-    integrate::{
-        Body, RestBound, Scheme,
-        spectrum::{RestStiffness, max_natural_frequency_rad_per_s, max_natural_frequency_with},
+    bodies::{
+        hybrid::{Hybrid, ParticleSpec, body::Built},
+        mass_spring::{SpringBody, SpringBodySpec},
+        seed::SeedBodySpec,
     },
+    contact::{ContactModel, SurfaceModuli},
+    elements::{
+        linear_tet::RestTet,
+        mass,
+        rest_stiffness::{RestStiffness, max_natural_frequency_rad_per_s, max_natural_frequency_with},
+    },
+    integrate::{Body, RestBound, Scheme},
+    kernels::ForceKernel,
     material::Material,
     mesh::Surface,
-    seed::SeedBodySpec,
-    simd::ForceKernel,
-    spring::{SpringBody, SpringBodySpec},
+};
+use crate::{
+    settings::{Integrator, PrescribedSpec},
+    world::{ModelError, ModelSpec, building, check, seed_body, springs_body, substeps},
 };
 use glam::{DVec2, DVec3};
 

@@ -83,7 +83,7 @@ impl Wall {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use palpate_physics::hybrid::Skin;
+    use palpate_physics::bodies::hybrid::Skin;
     use std::f64::consts::PI;
 
     fn check(surface: &FineSurface, longest_m: f64, volume_m3: f64) {

@@ -22,7 +22,7 @@ use miette::Result;
 use palpate_physics::{
     Precision, Settings, State, Substeps,
     contact::{Body as ContactBody, ContactScratch, ContactState, SubstepTime, ToolState, ToolTarget},
-    simd::KernelScratch,
+    kernels::KernelScratch,
 };
 use prefactor::Prefactored;
 

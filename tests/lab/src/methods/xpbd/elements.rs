@@ -16,7 +16,8 @@
 use glam::{DMat3, DVec3};
 use palpate_physics::{
     Model,
-    fem::element::{RestTet, outer},
+    elements::linear_tet::RestTet,
+    linalg::tensor::outer,
     material::{Law, Material, neo_hookean::cofactor},
 };
 

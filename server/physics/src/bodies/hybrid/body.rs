@@ -1,0 +1,333 @@
+//! A hybrid body: all that its rest state fixes.
+use super::{
+    balance::is_free,
+    cage::{self, Cage},
+    cell::RestCell,
+    clusters::SkinClusters,
+    composite::Composite,
+    metric::Masses,
+    moments::{CellMoments, full_gradients_m2, integrate},
+    partition::Partition,
+    patch::{KEPT, Materials},
+    place::{Place, SkinPlace},
+    projection::Lumping,
+    sites::Sites,
+    sizes,
+    skin::Skin,
+    spec::{HybridError, ParticleSpec},
+};
+use crate::{
+    material::Material,
+    mesh::{Surface, TetMesh, tet::EDGES},
+    settings::PrescribedSpec,
+};
+use glam::{BVec3, DVec3};
+use std::collections::BTreeSet;
+
+/// A particle follows no coarse node with less than this.
+pub(super) const NO_WEIGHT: f64 = 1e-9;
+
+/// Parts of the time to build a body: by when its cells are integrated, counted to coarse tets, and their particles known.
+const INTEGRATED: f64 = 0.15;
+const SHARED: f64 = 0.85;
+const MAY_WAKE: f64 = 0.95;
+
+/// What a hybrid body is made of. Constant after load.
+#[derive(Debug, Clone)]
+pub struct Hybrid {
+    pub(super) partition: Partition,
+    /// Rest data of a plain cell.
+    full_cell: RestCell,
+    pub(super) masses: Masses,
+    /// What lumping adds to them.
+    pub(super) lumping: Lumping,
+    pub(super) materials: Vec<Material>,
+    pub(super) of_tet: Vec<u16>,
+    /// Axes along which coarse nodes may move.
+    pub(super) free: Vec<BVec3>,
+    free_parts: Vec<DVec3>,
+    /// It is held nowhere.
+    pub(super) is_free: bool,
+    /// Which particles may wake: those that follow some node that is free, none that is held along some axes only, and lie within the coarse tets.
+    pub(super) may_wake: Vec<bool>,
+    /// Where the skin's vertices are.
+    pub(super) places: Vec<SkinPlace>,
+    /// How much faster than the fastest node or particle a vertex of the skin can be.
+    pub(super) amplification: f64,
+    /// Bounds of the skin's triangles.
+    pub(super) clusters: SkinClusters,
+    pub(super) densities_kg_per_m3: Vec<f64>,
+    cage: CageSummary,
+}
+
+/// A hybrid body and what of its model it changed.
+#[derive(Debug)]
+pub struct Built {
+    /// The body.
+    pub hybrid: Hybrid,
+    /// The coarse mesh, its boundary moved.
+    pub mesh: TetMesh,
+    /// What is prescribed, with nodes in the middle of edges.
+    pub prescribed: Vec<PrescribedSpec>,
+}
+
+/// What became of the coarse mesh's boundary.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct CageSummary {
+    /// How far it was moved at most (m), so that the coarse tets hold the particles.
+    pub moved_m: f64,
+    /// Particles that they do not hold even so, which never wake.
+    pub outside: usize,
+}
+
+impl Hybrid {
+    /// Lays the lattice over a body. `of_tet` indexes `materials` and densities; `progress` is told the part done.
+    ///
+    /// # Errors
+    /// A specification outside its range, or a lattice that does not fit the body.
+    pub fn build(
+        spec: &ParticleSpec,
+        (mesh, surface): (&TetMesh, &Surface),
+        prescribed: &[PrescribedSpec],
+        (materials, densities_kg_per_m3): (&[Material], &[f64]),
+        of_tet: &[u16],
+        progress: &mut dyn FnMut(f64),
+    ) -> Result<Built, HybridError> {
+        spec.check()?;
+        let spacing_m = spec.spacing_m;
+        let sites = Sites::covering(spec.skin.bounds_m(), spacing_m, spec.lattice_through_m);
+        let moments = integrate(&spec.skin, &sites, &mut |part| progress(INTEGRATED * part));
+        if moments.is_empty() {
+            return Err(HybridError::Nothing { spacing_m });
+        }
+        let Cage { mesh, moved_m, outside } = covering((mesh, surface), prescribed, &sites, &moments);
+        let cage = CageSummary { moved_m, outside };
+        let composite = Composite::new(&mesh);
+        let prescribed = with_edges(&mesh, surface, &composite, prescribed);
+        let moments = match spec.fine_layers() {
+            Some(layers) => merged(&sites, &composite, moments, layers, of_tet),
+            None => moments,
+        };
+        let partition = Partition::new_with(sites, composite, &moments, &mut |part| {
+            progress(INTEGRATED + (SHARED - INTEGRATED) * part);
+        });
+        progress(SHARED);
+        let masses = Masses::new(&partition, |tet| densities_kg_per_m3[of_tet[tet] as usize]);
+        let mut free: Vec<BVec3> = masses.node_kg.iter().map(|&mass| BVec3::splat(mass > 0.0)).collect();
+        for set in &prescribed {
+            for &node in &set.nodes {
+                for axis in (0..3).filter(|&axis| set.axes[axis]) {
+                    free[node as usize].set(axis, false);
+                }
+            }
+        }
+        let may_wake = (0..partition.particle_count() as u32).map(|p| may_wake(&partition, &free, p)).collect();
+        progress(MAY_WAKE);
+        let places: Vec<SkinPlace> =
+            spec.skin.positions_m().iter().map(|&point| SkinPlace::new(&partition, point)).collect();
+        let of_places = places.iter().map(SkinPlace::amplification).fold(1.0, f64::max);
+        let of_anchors = (0..partition.particle_count() as u32)
+            .map(|p| partition.anchor(p).weights.iter().map(|w| w.abs()).sum())
+            .fold(1.0, f64::max);
+        let hybrid = Self {
+            lumping: Lumping::new(&partition, &masses),
+            full_cell: RestCell::new(spacing_m, 1.0 - KEPT, &(spacing_m.powi(3), full_gradients_m2(spacing_m))),
+            materials: materials.to_vec(),
+            densities_kg_per_m3: densities_kg_per_m3.to_vec(),
+            of_tet: of_tet.to_vec(),
+            is_free: is_free(&masses.node_kg, &free),
+            free_parts: free.iter().map(|free| DVec3::select(*free, DVec3::ONE, DVec3::ZERO)).collect(),
+            free,
+            may_wake,
+            places,
+            amplification: of_places * of_anchors,
+            clusters: SkinClusters::default(),
+            cage,
+            partition,
+            masses,
+        };
+        progress(1.0);
+        Ok(Built { hybrid, mesh, prescribed })
+    }
+
+    /// The lattice on the coarse tets.
+    pub fn partition(&self) -> &Partition {
+        &self.partition
+    }
+
+    /// Masses while all sleep.
+    pub fn masses(&self) -> &Masses {
+        &self.masses
+    }
+
+    /// Materials of the coarse tets.
+    pub fn materials(&self) -> Materials<'_> {
+        Materials { materials: &self.materials, of_tet: &self.of_tet }
+    }
+
+    /// Number of coarse nodes: the first of a state's positions.
+    pub fn node_count(&self) -> usize {
+        self.free.len()
+    }
+
+    /// Axes along which coarse nodes may move.
+    pub fn free(&self) -> &[BVec3] {
+        &self.free
+    }
+
+    /// Whether a particle may wake.
+    pub fn may_wake(&self, particle: u32) -> bool {
+        self.may_wake.get(particle as usize).copied().unwrap_or(false)
+    }
+
+    /// Rest data of a cell that is awake.
+    pub(super) fn awake_cell(&self, cell: usize) -> RestCell {
+        if self.partition.is_plain(cell) { self.full_cell } else { self.partition.rest_cell(cell, 1.0 - KEPT) }
+    }
+
+    /// The same as numbers: 1 along an axis on which a coarse node may move, 0 along others.
+    pub(crate) fn free_parts(&self) -> &[DVec3] {
+        &self.free_parts
+    }
+
+    /// The material of a coarse tet.
+    pub(super) fn material_of_tet(&self, tet: u32) -> &Material {
+        &self.materials[self.of_tet[tet as usize] as usize]
+    }
+
+    /// The material of a cell.
+    pub(super) fn material_of_cell(&self, cell: usize) -> &Material {
+        self.material_of_tet(self.partition.cells()[cell].tet)
+    }
+
+    /// Where a vertex of the skin is.
+    pub fn place(&self, vertex: u32) -> SkinPlace {
+        self.places[vertex as usize]
+    }
+
+    /// How much faster than the fastest node or particle a vertex of the skin can be.
+    pub(crate) fn amplification(&self) -> f64 {
+        self.amplification
+    }
+
+    /// Takes the skin's triangles in the order of contact's broad phase.
+    pub(crate) fn cluster(&mut self, skin: &Skin, triangles: &[[u32; 3]]) {
+        self.clusters = SkinClusters::new(self, skin.positions_m(), triangles);
+    }
+
+    /// What contact may take for the mass (kg) of a vertex of the skin: with its area `A_v`, `A_v min_p m_p/A_p` over its particles, `A_p = Σ_v w_vp A_v`.
+    /// What a foundation can bear per area at the vertex, each of its particles then can.
+    pub(crate) fn vertex_masses_kg(&self, skin: &Skin) -> Vec<f64> {
+        let mut vertex_m2 = vec![0.0; self.places.len()];
+        for triangle in 0..skin.triangles().len() {
+            let [a, b, c] = skin.corners_m(triangle);
+            let third = (b - a).cross(c - a).length() / 6.0;
+            skin.triangles()[triangle].iter().for_each(|&vertex| vertex_m2[vertex as usize] += third);
+        }
+        let places = || self.places.iter().map(|place| place.place(&self.partition)).zip(&vertex_m2);
+        let mut particle_m2 = vec![0.0; self.partition.particle_count()];
+        for (place, area_m2) in places() {
+            for (particle, weight) in place.particles.into_iter().zip(place.weights) {
+                particle_m2[particle as usize] += weight.max(0.0) * area_m2;
+            }
+        }
+        let per_area = |particle: u32| self.masses.particle_kg[particle as usize] / particle_m2[particle as usize];
+        let of_vertex = |(place, area_m2): (Place, &f64)| {
+            let carriers = place.particles.into_iter().zip(place.weights).filter(|(_, weight)| *weight > 1e-6);
+            area_m2 * carriers.map(|(particle, _)| per_area(particle)).fold(f64::INFINITY, f64::min)
+        };
+        places().map(of_vertex).collect()
+    }
+
+    /// Springs (N/m) at vertices of the skin as their particles feel them: the row sums of `Σ_v k_v w_v w_vᵀ`.
+    pub(crate) fn particle_springs_n_per_m(&self, of_vertices_n_per_m: &[f64]) -> Vec<f64> {
+        let mut springs = vec![0.0; self.partition.particle_count()];
+        for (place, stiffness) in self.places.iter().zip(of_vertices_n_per_m) {
+            let amplification = place.amplification();
+            let place = place.place(&self.partition);
+            for (particle, weight) in place.particles.into_iter().zip(place.weights) {
+                springs[particle as usize] += stiffness * weight.abs() * amplification;
+            }
+        }
+        springs
+    }
+
+    /// The material of the tet that a vertex of the skin is in.
+    pub(crate) fn material_at(&self, vertex: u32) -> &Material {
+        let cell = self.partition.cells()[self.place(vertex).cell as usize];
+        &self.materials[self.of_tet[cell.tet as usize] as usize]
+    }
+
+    /// What became of the coarse mesh's boundary.
+    pub fn cage(&self) -> CageSummary {
+        self.cage
+    }
+}
+
+/// Nodes in the middle of an edge whose surface is held along an axis are held along it, too: the sets with them.
+fn with_edges(
+    mesh: &TetMesh,
+    surface: &Surface,
+    composite: &Composite,
+    prescribed: &[PrescribedSpec],
+) -> Vec<PrescribedSpec> {
+    let extended = |set: &PrescribedSpec| {
+        let held: BTreeSet<u32> = set.nodes.iter().copied().collect();
+        let mut edges = BTreeSet::new();
+        for triangle in (0..surface.triangles.len()).map(|t| surface.triangle_nodes(t)) {
+            if triangle.iter().all(|n| held.contains(n)) {
+                let [a, b, c] = triangle;
+                edges.extend([[a.min(b), a.max(b)], [b.min(c), b.max(c)], [c.min(a), c.max(a)]]);
+            }
+        }
+        let mut middles = BTreeSet::new();
+        for (corners, nodes) in mesh.tets().iter().zip(composite.tets()) {
+            for (number, [a, b]) in EDGES.into_iter().enumerate() {
+                let edge = [corners[a].min(corners[b]), corners[a].max(corners[b])];
+                if edges.contains(&edge) {
+                    middles.insert(nodes[4 + number]);
+                }
+            }
+        }
+        PrescribedSpec { nodes: set.nodes.iter().copied().chain(middles).collect(), ..set.clone() }
+    };
+    prescribed.iter().map(extended).collect()
+}
+
+/// With cells beneath so many layers merged, where they are of one material.
+fn merged(
+    sites: &Sites,
+    composite: &Composite,
+    moments: Vec<CellMoments>,
+    layers: usize,
+    of_tet: &[u16],
+) -> Vec<CellMoments> {
+    let half = DVec3::splat(0.5 * sites.spacing_m());
+    let material = |cell: usize| of_tet[composite.anchor(sites.cell_m(cell) + half).tet as usize];
+    let is_one = of_tet.iter().all(|one| *one == of_tet[0]);
+    sizes::merge(sites, moments, layers, |block| {
+        is_one || block.iter().all(|&cell| material(cell) == material(block[0]))
+    })
+}
+
+fn covering(
+    (mesh, surface): (&TetMesh, &Surface),
+    prescribed: &[PrescribedSpec],
+    sites: &Sites,
+    moments: &[CellMoments],
+) -> Cage {
+    let mut is_corner = vec![false; sites.site_count()];
+    moments.iter().flat_map(|m| sites.corners(m.cell)).for_each(|site| is_corner[site] = true);
+    let points: Vec<DVec3> =
+        (0..is_corner.len()).filter(|&site| is_corner[site]).map(|site| sites.site_m(site)).collect();
+    let held: BTreeSet<u32> = prescribed.iter().flat_map(|set| &set.nodes).copied().collect();
+    cage::cover(mesh, surface, &held, &points)
+}
+
+fn may_wake(partition: &Partition, free: &[BVec3], particle: u32) -> bool {
+    let anchor = partition.anchor(particle);
+    let mut follows = anchor.nodes.iter().zip(anchor.weights).filter(|(_, weight)| *weight >= NO_WEIGHT);
+    anchor.weights.iter().all(|&weight| weight > -NO_WEIGHT)
+        && follows.clone().all(|(&node, _)| free[node as usize].all() || !free[node as usize].any())
+        && follows.any(|(&node, _)| free[node as usize].all())
+}

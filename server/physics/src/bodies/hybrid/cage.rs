@@ -1,0 +1,202 @@
+//! Coarse tets that hold every particle: their boundary is moved outwards until they do.
+//!
+//! Coarse tets cut the corners of a curved body, and the lattice reaches past its surface by up to a cell. A particle outside all tets would have a
+//! negative weight: it would still follow affine motion, but could not be woken (`metric`). The tets carry no geometry (`partition`), so nothing is
+//! lost by making them larger. Nodes that are held stay where they are.
+use super::locate::Locator;
+use crate::{
+    contact::closest_weights,
+    mesh::{Surface, TetMesh},
+};
+use glam::DVec3;
+use std::collections::BTreeSet;
+
+/// Rounds of moving nodes.
+const ROUNDS: usize = 12;
+/// A point that lies outside by less than this part of an edge is inside.
+const ROUNDING: f64 = 1e-9;
+/// A node moves along its normal by what its faces need, over how far they face away from it, at least this.
+const LEAST_COSINE: f64 = 0.3;
+/// A face moves for a point where its free nodes carry more than this of it.
+const LEAST_SHARE: f64 = 0.3;
+/// What is moved is moved by so much too far, that rounds end.
+const SURPLUS: f64 = 1.05;
+/// No tet may lose more than this part of its volume in a round.
+const MOST_LOST: f64 = 0.5;
+
+/// A covering mesh.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Cage {
+    /// The mesh, with the same tets.
+    pub mesh: TetMesh,
+    /// How far its boundary was moved at most (m).
+    pub moved_m: f64,
+    /// Points that are still outside.
+    pub outside: usize,
+}
+
+/// Moves the boundary outwards, but for `held` nodes, until the tets hold the points or nothing moves any more.
+pub fn cover(mesh: &TetMesh, surface: &Surface, held: &BTreeSet<u32>, points_m: &[DVec3]) -> Cage {
+    let mut covering = mesh.clone();
+    let mut waiting: Vec<DVec3> = points_m.to_vec();
+    for _ in 0..ROUNDS {
+        let needs = needs(&covering, surface, held, &mut waiting);
+        if waiting.is_empty() {
+            break;
+        }
+        let moves = moves(&covering, surface, held, &needs);
+        let Some(next) = moved(&covering, &moves) else { break };
+        if next == covering {
+            break;
+        }
+        covering = next;
+    }
+    let moved_m =
+        covering.positions_m().iter().zip(mesh.positions_m()).map(|(a, b)| a.distance(*b)).fold(0.0, f64::max);
+    needs(&covering, surface, held, &mut waiting);
+    Cage { mesh: covering, moved_m, outside: waiting.len() }
+}
+
+/// How far (m) each node's faces would have to move, from the points outside; the points inside are taken off the list.
+fn needs(mesh: &TetMesh, surface: &Surface, held: &BTreeSet<u32>, waiting: &mut Vec<DVec3>) -> Vec<f64> {
+    let locator = Locator::new(mesh);
+    let mut needs = vec![0.0_f64; mesh.positions_m().len()];
+    waiting.retain(|&point| {
+        let (tet, barycentric) = locator.nearest(point);
+        if locator.inside_m(tet, &barycentric) > -ROUNDING * mesh.longest_edge_m(tet) {
+            return false;
+        }
+        let near = nearest_face(mesh, surface, point);
+        let nodes = surface.triangle_nodes(near.triangle);
+        // Beside held nodes the face hardly moves with its free ones: such a point stays outside.
+        let moves = |(node, weight): (&u32, f64)| if held.contains(node) { 0.0 } else { weight };
+        let share: f64 = nodes.iter().zip(near.weights).map(moves).sum();
+        if share > LEAST_SHARE {
+            for node in nodes {
+                needs[node as usize] = needs[node as usize].max(near.above_m / share);
+            }
+        }
+        true
+    });
+    needs
+}
+
+/// A boundary triangle near a point outside.
+struct Near {
+    triangle: usize,
+    /// Of its corners, at its point nearest to that one.
+    weights: [f64; 3],
+    /// How far (m) that one is above its plane.
+    above_m: f64,
+}
+
+/// The nearest of all; of several as near, the one with the point highest above it.
+fn nearest_face(mesh: &TetMesh, surface: &Surface, point_m: DVec3) -> Near {
+    let (mut best, mut nearest_m) = (Near { triangle: 0, weights: [0.0; 3], above_m: 0.0 }, f64::INFINITY);
+    for triangle in 0..surface.triangles.len() {
+        let corners = surface.triangle_nodes(triangle).map(|n| mesh.positions_m()[n as usize]);
+        let weights = closest_weights(point_m, corners);
+        let closest: DVec3 = corners.iter().zip(weights).map(|(c, w)| *c * w).sum();
+        let distance_m = closest.distance(point_m);
+        let normal = (corners[1] - corners[0]).cross(corners[2] - corners[0]).normalize_or_zero();
+        let above_m = (point_m - corners[0]).dot(normal);
+        let tie = (distance_m - nearest_m).abs() <= ROUNDING * nearest_m;
+        if if tie { above_m > best.above_m } else { distance_m < nearest_m } {
+            (best, nearest_m) = (Near { triangle, weights, above_m }, distance_m);
+        }
+    }
+    best
+}
+
+/// Displacements (m) that meet the needs.
+fn moves(mesh: &TetMesh, surface: &Surface, held: &BTreeSet<u32>, needs: &[f64]) -> Vec<DVec3> {
+    let normal_of = |triangle: usize| {
+        let [a, b, c] = surface.triangle_nodes(triangle).map(|n| mesh.positions_m()[n as usize]);
+        (b - a).cross(c - a)
+    };
+    let mut normals = vec![DVec3::ZERO; needs.len()];
+    for triangle in 0..surface.triangles.len() {
+        surface.triangle_nodes(triangle).iter().for_each(|&n| normals[n as usize] += normal_of(triangle));
+    }
+    let mut cosines = vec![1.0_f64; needs.len()];
+    for triangle in 0..surface.triangles.len() {
+        let normal = normal_of(triangle).normalize_or_zero();
+        for &node in &surface.triangle_nodes(triangle) {
+            let cosine = normals[node as usize].normalize_or_zero().dot(normal);
+            cosines[node as usize] = cosines[node as usize].min(cosine);
+        }
+    }
+    let displacement = |node: usize| {
+        let free = needs[node] > 0.0 && !held.contains(&(node as u32));
+        let distance_m = SURPLUS * needs[node] / cosines[node].max(LEAST_COSINE);
+        if free { normals[node].normalize_or_zero() * distance_m } else { DVec3::ZERO }
+    };
+    (0..needs.len()).map(displacement).collect()
+}
+
+/// The mesh with its nodes moved, by less where a tet would lose too much; `None` when nothing can be moved.
+fn moved(mesh: &TetMesh, moves: &[DVec3]) -> Option<TetMesh> {
+    let mut scale = 1.0;
+    for _ in 0..6 {
+        let positions: Vec<DVec3> = mesh.positions_m().iter().zip(moves).map(|(p, m)| *p + *m * scale).collect();
+        if let Ok(next) = TetMesh::new(positions, mesh.tets().to_vec()) {
+            let kept = |tet: usize| next.volume_m3(tet) > MOST_LOST * mesh.volume_m3(tet);
+            if (0..mesh.tets().len()).all(kept) {
+                return Some(next);
+            }
+        }
+        scale *= 0.5;
+    }
+    None
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::bodies::hybrid::{
+        composite::Composite,
+        metric::{Masses, Metric},
+        moments::integrate,
+        partition::Partition,
+        sites::Sites,
+        testing::{ball, tet_box},
+    };
+    use glam::BVec3;
+
+    /// Twenty tets within a ball, of which they hold three fifths.
+    #[test]
+    fn tets_inside_a_ball_are_made_to_hold_its_particles() {
+        let skin = ball(0.01, DVec3::ZERO, 3);
+        let inner = ball(0.01, DVec3::ZERO, 0);
+        let mut positions = inner.positions_m().to_vec();
+        positions.push(DVec3::ZERO);
+        let tets = inner.triangles().iter().map(|&[a, b, c]| [12, a, b, c]).collect();
+        let mesh = TetMesh::new(positions, tets).unwrap();
+        assert!(mesh.total_volume_m3() < 0.65 * skin.volume_m3());
+        let sites = Sites::covering(skin.bounds_m(), 1.1e-3, DVec3::splat(0.4e-3));
+        let moments = integrate(&skin, &sites, &mut |_| {});
+        let points: Vec<DVec3> =
+            moments.iter().flat_map(|m| sites.corners(m.cell)).map(|site| sites.site_m(site)).collect();
+        let cage = cover(&mesh, &Surface::of(&mesh).unwrap(), &BTreeSet::new(), &points);
+        assert_eq!(cage.outside, 0);
+        assert!(cage.moved_m < 8e-3, "{}", cage.moved_m);
+        let partition = Partition::new(sites, Composite::new(&cage.mesh), &moments);
+        let all: BTreeSet<u32> = (0..partition.particle_count() as u32).collect();
+        assert!(all.iter().all(|&p| partition.anchor(p).weights.iter().all(|&w| w > -1e-8)));
+        let masses = Masses::new(&partition, |_| 1000.0);
+        let free = vec![BVec3::TRUE; masses.node_kg.len()];
+        assert!(Metric::new(&partition, &masses, &all, &free).is_ok());
+    }
+
+    #[test]
+    fn held_nodes_stay() {
+        let mesh = tet_box(DVec3::ZERO, DVec3::splat(0.02), [2, 2, 2]);
+        let floor = (0..27).filter(|&n| mesh.positions_m()[n as usize].z < 1e-9).collect();
+        let points = [DVec3::new(0.01, 0.01, 0.021), DVec3::new(0.021, 0.01, 0.01), DVec3::new(0.01, 0.01, -0.001)];
+        let cage = cover(&mesh, &Surface::of(&mesh).unwrap(), &floor, &points);
+        assert_eq!(cage.outside, 1);
+        for (node, (now, before)) in cage.mesh.positions_m().iter().zip(mesh.positions_m()).enumerate() {
+            assert!(!floor.contains(&(node as u32)) || now == before);
+        }
+    }
+}

@@ -1,0 +1,96 @@
+//! What fades in cells (`hybrid::fade`), as both kernels of cells keep it.
+use super::cell_stress::faded_stress;
+use crate::{
+    bodies::hybrid::{fade::CellFade, share},
+    material::Material,
+};
+use crate::{
+    kernels::laws::{Constants, LaneLaw, M3, plus},
+    lanes::real::{Real, Scalar, Vector},
+};
+
+/// Numbers of a cell: `A` of its shape and `A` of its volume, row by row, and `a`.
+pub(crate) const ENTRIES: usize = 19;
+
+/// Of a cell; `None`: nothing fades.
+pub(crate) fn entries(fade: Option<&CellFade>) -> [f64; ENTRIES] {
+    let mut entries = [0.0; ENTRIES];
+    if let Some(fade) = fade {
+        for row in 0..3 {
+            for column in 0..3 {
+                entries[3 * row + column] = fade.shape.col(column)[row];
+                entries[9 + 3 * row + column] = fade.volume.col(column)[row];
+            }
+        }
+        entries[18] = fade.modes;
+    }
+    entries
+}
+
+/// Constants of a material: whole, of its shape and of its volume.
+#[derive(Debug, Clone)]
+pub(crate) struct Split<T> {
+    pub(crate) material: Material,
+    pub(crate) whole: Constants<T>,
+    pub(crate) shape: Constants<T>,
+    pub(crate) volume: Constants<T>,
+}
+
+impl<T: Scalar> Split<T> {
+    pub(crate) fn of(material: &Material) -> Self {
+        let (shape, volume) = share::split(material);
+        let [whole, shape, volume] = [material, &shape, &volume].map(Constants::of);
+        Self { material: *material, whole, shape, volume }
+    }
+}
+
+/// What a pass finds beside forces.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Found {
+    /// Power (W) that viscous stress takes.
+    pub viscous_w: f64,
+    /// `s ∂U/∂s` (J) of what fades (`hybrid::fade`).
+    pub fading_j: f64,
+}
+
+impl std::ops::AddAssign for Found {
+    fn add_assign(&mut self, other: Self) {
+        self.viscous_w += other.viscous_w;
+        self.fading_j += other.fading_j;
+    }
+}
+
+/// Elastic and viscous stress (Pa) where shape and volume fade by `a`, the power density (W/m³) of the latter, and `s ∂Ψ/∂s` (J/m³).
+#[inline(always)]
+pub(crate) fn fading_stress<V: Vector<Scalar = T>, T: Scalar, L: LaneLaw, const VISCOUS: bool>(
+    split: &Split<T>,
+    a: &[M3<V>; 2],
+    h: &M3<V>,
+    h_dot: &M3<V>,
+) -> (M3<V>, V, V) {
+    let (shape, density, of_shape) = faded_stress::<V, T, L, VISCOUS>((&split.shape, &a[0]), h, h_dot);
+    let (volume, _, of_volume) = faded_stress::<V, T, L, false>((&split.volume, &a[1]), h, h);
+    (plus(&shape, &volume), density, of_shape + of_volume)
+}
+
+/// `m s`.
+#[inline(always)]
+pub(crate) fn scaled<V: Vector>(m: &M3<V>, s: V) -> M3<V> {
+    let mut scaled = *m;
+    for row in &mut scaled {
+        for entry in row {
+            *entry = *entry * s;
+        }
+    }
+    scaled
+}
+
+/// The sum of lanes, one after the other, so that the width of the vectors does not show.
+#[inline(always)]
+pub(crate) fn add_lanes<V: Vector>(lanes: V, sum: &mut f64) {
+    let mut stored = [V::Scalar::of(0.0); 16];
+    lanes.store(&mut stored);
+    for &lane in &stored[..V::WIDTH] {
+        *sum += lane.into();
+    }
+}

@@ -1,0 +1,13 @@
+//! What a hybrid body's substeps compute, in blocks of lanes, beside scalar oracles.
+// A vector type is only fast where it is inlined into a function compiled for its instruction set.
+#![allow(clippy::inline_always)]
+mod cell_stress;
+mod cells;
+mod fades;
+mod rows;
+mod shares;
+
+pub use cells::CutCells;
+pub use fades::Found;
+pub use rows::{CellRow, RowKernel, RowValues};
+pub use shares::ShareKernel;

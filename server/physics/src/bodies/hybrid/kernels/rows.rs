@@ -1,0 +1,418 @@
+//! The full cells of a hybrid body's patch, row by row along x; their oracle is `hybrid::cell`.
+//!
+//! Points (the particles of awake cells) are numbered by their sites, x first, so the particles of neighbouring cells of a row are neighbours in
+//! memory: the eight of a lane are eight shifted loads, and nothing is gathered or scattered. Lanes past a row's end are given no strain and weight 0.
+//! What cells give their particles on the left and on the right is summed apart, that loads never overlap a store just made, and put
+//! together at the end: `f_i = l_i + r_{i−1}`.
+use super::{
+    cell_stress::{particles, patterns, stress},
+    fades::{ENTRIES, Found, Split, add_lanes, entries, fading_stress, scaled},
+};
+use crate::{
+    bodies::hybrid::{
+        cell::{HOURGLASS, MODE_WEIGHTS},
+        fade::CellFade,
+    },
+    material::Material,
+    settings::Precision,
+};
+use crate::{
+    kernels::{laws::M3, tangents::LaneTangent},
+    lanes::{
+        dispatch::{self, Available, InstructionSet, Pass},
+        real::{Real, Scalar, Vector},
+    },
+};
+use glam::DVec3;
+
+/// The widest vector: arrays end on so many entries of no point.
+const LANES: usize = 16;
+
+/// Full cells, one after the other along x.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct CellRow {
+    /// The first cell's points 0, 2, 4 and 6; the others follow them.
+    pub points: [u32; 4],
+    /// How many cells.
+    pub cells: u32,
+    /// Index of their material.
+    pub material: u16,
+    /// Number of the first cell among all of the rows, one after the other.
+    pub first: u32,
+    /// Whether something fades in any of them ([`RowValues::put_fade`]).
+    pub fading: bool,
+}
+
+/// Materials of full cells, which all are of one size.
+#[derive(Debug, Clone)]
+pub struct RowKernel {
+    layout: Layout,
+    instruction_set: Available,
+    is_viscous: bool,
+}
+
+#[derive(Debug, Clone)]
+enum Layout {
+    Single(Vec<CellMaterial<f32>>),
+    Double(Vec<CellMaterial<f64>>),
+}
+
+#[derive(Debug, Clone)]
+struct CellMaterial<T> {
+    split: Split<T>,
+    /// `1/(4h)` (1/m), `−V` (m³) and `−κ` (N/m).
+    cell: [f64; 3],
+}
+
+/// Displacements, velocities and forces of points.
+#[derive(Debug, Clone)]
+pub struct RowValues {
+    values: Values,
+}
+
+#[derive(Debug, Clone)]
+enum Values {
+    Single(Arrays<f32>),
+    Double(Arrays<f64>),
+}
+
+#[derive(Debug, Clone)]
+struct Arrays<T> {
+    displacements: [Vec<T>; 3],
+    /// Empty unless something is viscous.
+    velocities: [Vec<T>; 3],
+    left: [Vec<T>; 3],
+    right: [Vec<T>; 3],
+    /// Of every cell.
+    fades: [Vec<T>; ENTRIES],
+}
+
+impl<T: Scalar> Arrays<T> {
+    fn new(points: usize, cells: usize, is_viscous: bool) -> Self {
+        // One before the first point, whose left neighbour gives it nothing.
+        let zeros = |count: usize| std::array::from_fn(|_| vec![T::of(0.0); count]);
+        let entries = 1 + points + LANES;
+        Self {
+            displacements: zeros(entries),
+            velocities: zeros(if is_viscous { entries } else { 0 }),
+            left: zeros(entries),
+            right: zeros(entries),
+            fades: std::array::from_fn(|_| vec![T::of(0.0); cells + LANES]),
+        }
+    }
+}
+
+impl RowKernel {
+    /// For cells of edge `h` (m) that answer for the share `handed` of their volume, and for those of twice the edge, whose materials follow theirs.
+    pub fn new(edge_m: f64, handed: f64, materials: &[Material], precision: Precision) -> Self {
+        let layout = match precision {
+            Precision::Single => Layout::Single(of_materials(materials, edge_m, handed)),
+            Precision::Double => Layout::Double(of_materials(materials, edge_m, handed)),
+        };
+        let is_viscous = materials.iter().any(|m| !m.viscosity.is_zero());
+        Self { layout, is_viscous, instruction_set: Available::best() }
+    }
+
+    /// The same kernel, held to an instruction set or the best below it that there is (for tests and benchmarks).
+    #[must_use]
+    pub fn with_instruction_set(self, instruction_set: InstructionSet) -> Self {
+        Self { instruction_set: Available::at_most(instruction_set), ..self }
+    }
+
+    /// Buffers for up to `points` points, at rest, and `cells` cells.
+    pub fn values(&self, points: usize, cells: usize) -> RowValues {
+        let values = match &self.layout {
+            Layout::Single(_) => Values::Single(Arrays::new(points, cells, self.is_viscous)),
+            Layout::Double(_) => Values::Double(Arrays::new(points, cells, self.is_viscous)),
+        };
+        RowValues { values }
+    }
+
+    /// Sums up the forces (N) of elastic and viscous stress on the first `points` points, where `left` is left of what fades.
+    pub fn forces(&self, rows: &[CellRow], (points, left): (usize, f64), values: &mut RowValues) -> Found {
+        match (&self.layout, &mut values.values) {
+            (Layout::Single(materials), Values::Single(arrays)) => self.sum_up(materials, rows, (points, left), arrays),
+            (Layout::Double(materials), Values::Double(arrays)) => self.sum_up(materials, rows, (points, left), arrays),
+            _ => Found::default(),
+        }
+    }
+
+    fn sum_up<T: Scalar>(
+        &self,
+        materials: &[CellMaterial<T>],
+        rows: &[CellRow],
+        (points, left): (usize, f64),
+        arrays: &mut Arrays<T>,
+    ) -> Found {
+        for sums in arrays.left.iter_mut().chain(&mut arrays.right) {
+            sums[..1 + points + LANES].fill(T::of(0.0));
+        }
+        let mut found = Found::default();
+        for same in rows.chunk_by(|a, b| a.material == b.material) {
+            let material = &materials[same[0].material as usize];
+            let Material { law, viscosity, .. } = &material.split.material;
+            let law = (*law, !viscosity.is_zero());
+            let mut pass = RowForces { material, rows: same, arrays, left, fading_j: 0.0 };
+            let viscous_w = dispatch::run(self.instruction_set, law, &mut pass);
+            found += Found { viscous_w, fading_j: pass.fading_j };
+        }
+        found
+    }
+}
+
+fn of_materials<T: Scalar>(materials: &[Material], edge_m: f64, handed: f64) -> Vec<CellMaterial<T>> {
+    let of = |(material, edge_m): (&Material, f64)| {
+        let volume_m3 = handed * edge_m.powi(3);
+        let kappa = HOURGLASS * 4.0 / 3.0 * material.lame.mu_pa * volume_m3 / (edge_m * edge_m);
+        CellMaterial { split: Split::of(material), cell: [0.25 / edge_m, -volume_m3, -kappa] }
+    };
+    [edge_m, 2.0 * edge_m].into_iter().flat_map(|edge_m| materials.iter().map(move |m| of((m, edge_m)))).collect()
+}
+
+impl RowValues {
+    /// Displacements (m) of the points.
+    pub fn set_displacements(&mut self, displacements_m: &[DVec3]) {
+        match &mut self.values {
+            Values::Single(arrays) => put(&mut arrays.displacements, displacements_m),
+            Values::Double(arrays) => put(&mut arrays.displacements, displacements_m),
+        }
+    }
+
+    /// Velocities (m/s) of the points; of use only where a material is viscous.
+    pub fn set_velocities(&mut self, v: &[DVec3]) {
+        match &mut self.values {
+            Values::Single(arrays) if !arrays.velocities[0].is_empty() => put(&mut arrays.velocities, v),
+            Values::Double(arrays) if !arrays.velocities[0].is_empty() => put(&mut arrays.velocities, v),
+            _ => {}
+        }
+    }
+
+    /// What fades in a cell.
+    pub fn put_fade(&mut self, cell: u32, fade: Option<&CellFade>) {
+        match &mut self.values {
+            Values::Single(arrays) => put_fade(&mut arrays.fades, cell, fade),
+            Values::Double(arrays) => put_fade(&mut arrays.fades, cell, fade),
+        }
+    }
+
+    /// Overwrites `forces_n` (N) with those on the points.
+    pub fn forces_n(&self, forces_n: &mut [DVec3]) {
+        match &self.values {
+            Values::Single(arrays) => totals(arrays, forces_n),
+            Values::Double(arrays) => totals(arrays, forces_n),
+        }
+    }
+}
+
+fn put<T: Scalar>([x, y, z]: &mut [Vec<T>; 3], list: &[DVec3]) {
+    for (((x, y), z), a) in x[1..].iter_mut().zip(&mut y[1..]).zip(&mut z[1..]).zip(list) {
+        (*x, *y, *z) = (T::of(a.x), T::of(a.y), T::of(a.z));
+    }
+}
+
+fn put_fade<T: Scalar>(fades: &mut [Vec<T>; ENTRIES], cell: u32, fade: Option<&CellFade>) {
+    for (list, entry) in fades.iter_mut().zip(entries(fade)) {
+        list[cell as usize] = T::of(entry);
+    }
+}
+
+fn totals<T: Scalar>(arrays: &Arrays<T>, forces_n: &mut [DVec3]) {
+    for axis in 0..3 {
+        let sums = arrays.left[axis][1..].iter().zip(&arrays.right[axis]);
+        for (force, (left, right)) in forces_n.iter_mut().zip(sums) {
+            let (left, right): (f64, f64) = ((*left).into(), (*right).into());
+            force[axis] = left + right;
+        }
+    }
+}
+
+/// The pass over the rows of one material.
+struct RowForces<'a, T> {
+    material: &'a CellMaterial<T>,
+    rows: &'a [CellRow],
+    arrays: &'a mut Arrays<T>,
+    left: f64,
+    fading_j: f64,
+}
+
+impl<T: Scalar> Pass<T> for RowForces<'_, T> {
+    #[inline(always)]
+    fn run<V: Vector<Scalar = T>, L: LaneTangent, const VISCOUS: bool>(&mut self) -> f64 {
+        let mut power_w = 0.0;
+        for row in self.rows {
+            let mut first = 0;
+            while first < row.cells as usize {
+                let at = row.points.map(|point| 1 + point as usize + first);
+                let fades = row.fading.then_some(row.first as usize + first);
+                let left = row.cells as usize - first;
+                if left > V::Narrow::WIDTH {
+                    self.lanes::<V, L, VISCOUS>(at, left, fades, &mut power_w);
+                    first += V::WIDTH;
+                } else {
+                    self.lanes::<V::Narrow, L, VISCOUS>(at, left, fades, &mut power_w);
+                    first += V::Narrow::WIDTH;
+                }
+            }
+        }
+        power_w
+    }
+}
+
+impl<T: Scalar> RowForces<'_, T> {
+    /// Cells whose points 0, 2, 4, 6 are at `at` and what follows; there are `cells` of them, or more than lanes. What fades of them, if any, starts at `fades`.
+    #[inline(always)]
+    fn lanes<V: Vector<Scalar = T>, L: LaneTangent, const VISCOUS: bool>(
+        &mut self,
+        at: [usize; 4],
+        cells: usize,
+        fades: Option<usize>,
+        power_w: &mut f64,
+    ) {
+        let [quarter, minus_volume, minus_kappa] = self.material.cell;
+        let weight = first_lanes::<V>(cells);
+        let of_strain = weight * V::of(quarter);
+        let mut h = [[V::of(0.0); 3]; 3];
+        let mut modes = [[V::of(0.0); 4]; 3];
+        let mut h_dot = h;
+        for axis in 0..3 {
+            let found = patterns(&differences::<V>(&self.arrays.displacements[axis], at));
+            for column in 0..3 {
+                h[axis][column] = found[column] * of_strain;
+            }
+            modes[axis].copy_from_slice(&found[3..]);
+            if VISCOUS {
+                let found = patterns(&differences::<V>(&self.arrays.velocities[axis], at));
+                for column in 0..3 {
+                    h_dot[axis][column] = found[column] * of_strain;
+                }
+            }
+        }
+        let mut kept_modes = weight;
+        let (p, density) = if let Some(first) = fades {
+            let (left, entries) = (V::of(self.left), &self.arrays.fades);
+            let of_shape = scaled(&matrix::<V>(&entries[..9], first), left);
+            let of_volume = scaled(&matrix::<V>(&entries[9..18], first), left);
+            let gone = V::load(&entries[18][first..]) * left;
+            kept_modes = weight * (V::of(1.0) - gone);
+            let (p, density, fading) =
+                fading_stress::<V, T, L, VISCOUS>(&self.material.split, &[of_shape, of_volume], &h, &h_dot);
+            let mut squares = V::of(0.0);
+            for axis in 0..3 {
+                for mode in 0..4 {
+                    squares = squares + modes[axis][mode] * modes[axis][mode] * V::of(MODE_WEIGHTS[mode]);
+                }
+            }
+            // s ∂U/∂s = V P̃ : F A − ½ κ a Σ w |q|²
+            let of_modes = squares * gone * V::of(minus_kappa / 128.0);
+            add_lanes(weight * (fading * V::of(-minus_volume) + of_modes), &mut self.fading_j);
+            (p, density)
+        } else {
+            stress::<V, T, L, VISCOUS>(&self.material.split.whole, &h, &h_dot)
+        };
+        let of_stress = weight * V::of(minus_volume * quarter);
+        let mut of_modes = [kept_modes; 4];
+        for mode in 0..4 {
+            of_modes[mode] = kept_modes * V::of(minus_kappa * MODE_WEIGHTS[mode] / 64.0);
+        }
+        for axis in 0..3 {
+            let mut c = [V::of(0.0); 7];
+            for column in 0..3 {
+                c[column] = p[axis][column] * of_stress;
+            }
+            for mode in 0..4 {
+                c[3 + mode] = modes[axis][mode] * of_modes[mode];
+            }
+            let [f1, f2, f3, f4, f5, f6, f7] = particles(&c);
+            let f0 = V::of(0.0) - ((f1 + f2) + (f3 + f4) + ((f5 + f6) + f7));
+            let (left, right) = (&mut self.arrays.left[axis], &mut self.arrays.right[axis]);
+            let (on_left, on_right) = ([f0, f2, f4, f6], [f1, f3, f5, f7]);
+            for row in 0..4 {
+                add(&mut left[at[row]..at[row] + V::WIDTH], on_left[row]);
+                add(&mut right[at[row]..at[row] + V::WIDTH], on_right[row]);
+            }
+        }
+        if VISCOUS {
+            add_lanes(density * weight * V::of(-minus_volume), power_w);
+        }
+    }
+}
+
+#[inline(always)]
+fn matrix<V: Vector>(entries: &[Vec<V::Scalar>], first: usize) -> M3<V> {
+    let mut m = [[V::of(0.0); 3]; 3];
+    for row in 0..3 {
+        for column in 0..3 {
+            m[row][column] = V::load(&entries[3 * row + column][first..]);
+        }
+    }
+    m
+}
+
+#[inline(always)]
+fn add<V: Vector>(sums: &mut [V::Scalar], a: V) {
+    (V::load(sums) + a).store(sums);
+}
+
+/// 1 in the first lanes, 0 in the others.
+#[inline(always)]
+fn first_lanes<V: Vector>(count: usize) -> V {
+    let mut lanes = [V::Scalar::of(0.0); LANES];
+    for lane in 0..LANES {
+        if lane < count {
+            lanes[lane] = V::Scalar::of(1.0);
+        }
+    }
+    V::load(&lanes)
+}
+
+/// `a_p − a_0` of points 1 to 7.
+#[inline(always)]
+fn differences<V: Vector>(values: &[V::Scalar], at: [usize; 4]) -> [V; 7] {
+    let zero = V::load(&values[at[0]..]);
+    let mut found = [V::of(0.0); 7];
+    for row in 0..4 {
+        let values = &values[at[row]..=at[row] + V::WIDTH];
+        if row > 0 {
+            found[2 * row - 1] = V::load(values) - zero;
+        }
+        found[2 * row] = V::load(&values[1..]) - zero;
+    }
+    found
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::bodies::hybrid::kernels::cells::testing::{Answer, Question, agrees_with_oracle};
+
+    #[test]
+    fn rows_and_oracle_agree() {
+        agrees_with_oracle(true, |question: &Question<'_>| {
+            let Question { cells, u, v, material, precision, set, spacing_m, handed } = question;
+            // Points are numbered along x, as the ball's particles are.
+            let mut rows: Vec<CellRow> = Vec::new();
+            for (points, _) in *cells {
+                match rows.last_mut() {
+                    Some(row) if row.points[0] + row.cells == points[0] && row.points[3] + row.cells == points[6] => {
+                        row.cells += 1;
+                    }
+                    _ => {
+                        let points = [points[0], points[2], points[4], points[6]];
+                        let first = rows.last().map_or(0, |row| row.first + row.cells);
+                        rows.push(CellRow { points, cells: 1, material: 0, first, fading: false });
+                    }
+                }
+            }
+            assert!(rows.len() < cells.len() / 4);
+            let kernel = RowKernel::new(*spacing_m, *handed, &[*material], *precision);
+            let kernel = kernel.with_instruction_set(*set);
+            let mut values = kernel.values(u.len(), cells.len());
+            values.set_displacements(u);
+            values.set_velocities(v);
+            let power_w = kernel.forces(&rows, (u.len(), 0.0), &mut values).viscous_w;
+            let mut forces_n = vec![DVec3::NAN; u.len()];
+            values.forces_n(&mut forces_n);
+            Answer { forces_n, power_w }
+        });
+    }
+}

@@ -1,0 +1,265 @@
+//! The coarse level takes longer steps than what is awake.
+//!
+//! Its forces `f_c` are much of the work and change slowly beside those of awake cells and of contact, `f_a`. So they are evaluated every `k` substeps of
+//! length `h` only, and weigh `k` times then (Tuckerman, Berne & Martyna 1992):
+//! ```text
+//! v ← v + ½h M'⁻¹ (f_a + b + k (f_c − b))       at both ends of k substeps
+//! v ← v + h M'⁻¹ (f_a + b)                      between
+//! b ← b + (1 − e^{−T/τ}) (f_c − b)              after every tick
+//! ```
+//! While the steady part `b` does not change the step is symplectic, whatever `b` is. With `b = 0`, what balances at rest, `f_a = −f_c`, would push at one time and
+//! pull at another, and the body rest elsewhere, by some `(k h ω)²/24` of those forces (a dent by 4 % at two substeps, by 9 % at three). With `b = f_c` rest is rest, in
+//! every substep. Of a body that is held nowhere, `b` must have no torque as the body turns: it is taken from it at every evaluation (`balance`).
+//!
+//! `k h` is stable for the coarse level alone, `h` for the whole. That does not prove both together to be (modes of the fine level with `ω k h` near `nπ` resonate with what they
+//! feel of the coarse one); `docs/adr/hybrid.md` has what was measured.
+use super::kernels::Found;
+use super::{HybridScratch, balance::without_torque, body::Hybrid, fade::Progress};
+use crate::{
+    lanes::vector_operations::Answer,
+    world::{Model, State},
+};
+use glam::DVec3;
+use serde::{Deserialize, Serialize};
+
+/// How fast `b` follows (s).
+const TIME_CONSTANT_S: f64 = 0.02;
+
+/// Forces of the coarse level, one per coarse node; empty where it is evaluated in every substep.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+pub(crate) struct LongSteps {
+    /// `b` (N). Empty also until forces are evaluated next.
+    steady_n: Vec<DVec3>,
+    /// `f_c − b` (N) when it was evaluated last.
+    beyond_n: Vec<DVec3>,
+    /// One tick before the state, of a body whose tick is one long step.
+    before: Instant,
+}
+
+impl LongSteps {
+    pub(super) fn with_room(nodes: usize, entries: usize) -> Self {
+        Self {
+            steady_n: Vec::with_capacity(nodes),
+            beyond_n: Vec::with_capacity(nodes),
+            before: Instant::with_room(nodes, entries),
+        }
+    }
+
+    /// The forces will be others, as particles wake or fall asleep.
+    pub(crate) fn forget(&mut self) {
+        self.steady_n.clear();
+        self.beyond_n.clear();
+        self.before.forget();
+    }
+
+    pub(super) fn copy_from(&mut self, other: &Self) {
+        self.steady_n.clone_from(&other.steady_n);
+        self.beyond_n.clone_from(&other.beyond_n);
+        self.before.copy_from(&other.before);
+    }
+
+    /// Of so many coarse nodes, and finite.
+    pub(super) fn fit(&self, nodes: usize, entries: usize) -> bool {
+        let Self { steady_n, beyond_n, before } = self;
+        let lists = [(steady_n, nodes), (beyond_n, nodes), (&before.forces_n, nodes), (&before.x, entries)];
+        let fits = |(list, count): (&Vec<DVec3>, usize)| {
+            [0, count].contains(&list.len()) && list.iter().all(|entry| entry.is_finite())
+        };
+        lists.into_iter().all(fits)
+            && steady_n.len() == beyond_n.len()
+            && before.x.is_empty() == before.forces_n.is_empty()
+    }
+
+    /// `b` has no torque when the body, which is held nowhere, has moved to `x`, either.
+    pub(crate) fn turn_with(&mut self, body: &Hybrid, x: &[DVec3]) {
+        if body.is_free {
+            without_torque(body, x, &mut self.steady_n);
+        }
+    }
+
+    /// Takes what `add_forces_n` adds for `f_c`; returns what that returns.
+    pub(crate) fn evaluate(&mut self, nodes: usize, add_forces_n: impl FnOnce(&mut [DVec3]) -> Found) -> Found {
+        self.beyond_n.clear();
+        self.beyond_n.resize(nodes, DVec3::ZERO);
+        let found = add_forces_n(&mut self.beyond_n);
+        if self.steady_n.is_empty() {
+            std::mem::swap(&mut self.steady_n, &mut self.beyond_n);
+            self.beyond_n.resize(nodes, DVec3::ZERO);
+        } else {
+            for (beyond, steady) in self.beyond_n.iter_mut().zip(&self.steady_n) {
+                *beyond -= *steady;
+            }
+        }
+        found
+    }
+
+    /// `b`, which is nothing where there is none, and nothing on what follows, in place of the forces (N).
+    pub(crate) fn start_with_steady_n(&self, forces_n: &mut [DVec3]) {
+        let (of_nodes, others) = forces_n.split_at_mut(self.steady_n.len());
+        of_nodes.copy_from_slice(&self.steady_n);
+        others.fill(DVec3::ZERO);
+    }
+
+    /// Adds `factor (f_c − b)`.
+    pub(crate) fn add_beyond_n(&self, factor: f64, forces_n: &mut [DVec3]) {
+        for (force, beyond) in forces_n.iter_mut().zip(&self.beyond_n) {
+            *force += *beyond * factor;
+        }
+    }
+
+    /// `f_c − b` (N) of a coarse node; zero where `b` is all there is.
+    pub(crate) fn beyond_of(&self, node: usize) -> DVec3 {
+        self.beyond_n.get(node).copied().unwrap_or_default()
+    }
+
+    /// `f_c` (N).
+    fn forces_n(&self) -> impl Iterator<Item = DVec3> {
+        self.steady_n.iter().zip(&self.beyond_n).map(|(steady, beyond)| *steady + *beyond)
+    }
+}
+
+impl State {
+    /// After a tick of `period_s`: a part of `f_c − b` goes over to `b`.
+    pub(super) fn follow_coarse_forces(&mut self, period_s: f64) {
+        let part = -(-period_s / TIME_CONSTANT_S).exp_m1();
+        let LongSteps { steady_n, beyond_n, .. } = &mut self.active.long_steps;
+        for ((steady, beyond), force) in steady_n.iter_mut().zip(beyond_n).zip(&mut self.force_n) {
+            let goes_over = *beyond * part;
+            *steady += goes_over;
+            *beyond -= goes_over;
+            *force += goes_over;
+        }
+    }
+}
+
+/// Positions (m) of coarse nodes and active particles, and `f_c` (N), where a long step began; empty: not known.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+struct Instant {
+    x: Vec<DVec3>,
+    forces_n: Vec<DVec3>,
+}
+
+impl Instant {
+    fn with_room(nodes: usize, entries: usize) -> Self {
+        Self { x: Vec::with_capacity(entries), forces_n: Vec::with_capacity(nodes) }
+    }
+
+    fn forget(&mut self) {
+        self.x.clear();
+        self.forces_n.clear();
+    }
+
+    fn copy_from(&mut self, other: &Self) {
+        self.x.clone_from(&other.x);
+        self.forces_n.clone_from(&other.forces_n);
+    }
+
+    fn is_known_of(&self, state: &State) -> bool {
+        self.x.len() == state.x.len()
+    }
+}
+
+/// What long steps are judged by, and what a tick begins with.
+#[derive(Debug, Clone)]
+pub(super) struct LongStepHistory {
+    /// Where the last long step began, and the one before it in the same tick.
+    recent: [Instant; 2],
+    /// How many of a tick began so far.
+    begun: u32,
+    at_start: LongSteps,
+    fading_at_start: Progress,
+    /// [`super::ActiveParticles::given_j`].
+    given_at_start_j: f64,
+}
+
+impl LongStepHistory {
+    pub(super) fn with_room(nodes: usize, entries: usize) -> Self {
+        let instant = || Instant::with_room(nodes, entries);
+        Self {
+            recent: [instant(), instant()],
+            begun: 0,
+            at_start: LongSteps::with_room(nodes, entries),
+            fading_at_start: Progress::default(),
+            given_at_start_j: 0.0,
+        }
+    }
+}
+
+impl HybridScratch {
+    /// Before a tick that may be repeated.
+    pub(crate) fn keep_long_steps(&mut self, state: &mut State) {
+        self.long_steps.fading_at_start = state.active.fading.progress();
+        self.long_steps.given_at_start_j = state.active.given_j;
+        let LongStepHistory { begun, at_start, .. } = &mut self.long_steps;
+        *begun = 0;
+        at_start.steady_n.clone_from(&state.active.long_steps.steady_n);
+        at_start.beyond_n.clone_from(&state.active.long_steps.beyond_n);
+        if !state.force_is_current {
+            state.active.long_steps.before.forget();
+        }
+    }
+
+    /// As it was then, to be taken in more long steps.
+    pub(crate) fn put_long_steps_back(&mut self, state: &mut State) {
+        state.active.fading.go_back(self.long_steps.fading_at_start);
+        state.active.given_j = self.long_steps.given_at_start_j;
+        let LongStepHistory { begun, at_start, .. } = &mut self.long_steps;
+        *begun = 0;
+        state.active.long_steps.steady_n.clone_from(&at_start.steady_n);
+        state.active.long_steps.beyond_n.clone_from(&at_start.beyond_n);
+        state.active.long_steps.before.forget();
+    }
+
+    /// A long step begins.
+    pub(crate) fn note_long_step(&mut self, state: &State) {
+        let LongStepHistory { recent, begun, .. } = &mut self.long_steps;
+        recent.swap(0, 1);
+        recent[0].x.clone_from(&state.x);
+        recent[0].forces_n.clear();
+        recent[0].forces_n.extend(state.active.long_steps.forces_n());
+        *begun += 1;
+    }
+
+    /// After a tick that was accepted: what the next one is judged by, if it is one long step.
+    pub(crate) fn hand_on_long_step(&mut self, state: &mut State) {
+        let LongStepHistory { recent, begun, .. } = &mut self.long_steps;
+        if *begun == 1 {
+            std::mem::swap(&mut state.active.long_steps.before, &mut recent[0]);
+        } else {
+            state.active.long_steps.before.forget();
+        }
+    }
+
+    /// At the tick's end: an estimate from below of the coarse level's largest `(k h ω)²`, from the last two long steps, or the last one where no more is
+    /// known.
+    /// ```text
+    /// −Δ²f_c·Δ²x / (Δ²x·M' Δ²x/(k h)²)        since Δ²f_c = −K_c Δ²x
+    /// ```
+    /// less what rounding of `f_c`, of which so many `digits` count, may have done to it.
+    pub(crate) fn long_step_quotient(
+        &mut self,
+        model: &Model,
+        state: &State,
+        (long_step_s, digits): (f64, f64),
+    ) -> f64 {
+        let Some(body) = model.hybrid() else { return 0.0 };
+        let begun = self.long_steps.begun;
+        let [one, two] = std::mem::take(&mut self.long_steps.recent);
+        let before = if begun > 1 { &two } else { &state.active.long_steps.before };
+        // With the step before taken for none, differences are first ones.
+        let before = if before.is_known_of(state) { before } else { &one };
+        let LongSteps { steady_n, beyond_n, .. } = &state.active.long_steps;
+        let nodes = body.node_count();
+        let moved_of_nodes = [&state.x[..nodes], &one.x[..nodes], &before.x[..nodes]];
+        let sums = Answer { steady_n, beyond_n, forces_n: [&one.forces_n, &before.forces_n], x: moved_of_nodes }.sums();
+        let answer = sums.answer - digits * (sums.force_sq * sums.moved_sq).sqrt();
+        let mut quotient = 0.0;
+        if answer > 0.0 {
+            let difference = |((now, one), two): ((&DVec3, &DVec3), &DVec3)| (*now - *one) - (*one - *two);
+            let moved = state.x.iter().zip(&one.x).zip(&before.x).map(difference);
+            quotient = answer * (long_step_s * long_step_s) / self.twice_kinetic(body, moved);
+        }
+        self.long_steps.recent = [one, two];
+        quotient
+    }
+}

@@ -1,0 +1,334 @@
+//! Kinetic energy counted once, as volume is: what an active particle moves itself is taken from the coarse nodes that moved it.
+//!
+//! Asleep, particles of mass `m_p` lump on the coarse nodes, `M_i = Σ_p m_p ζ_pi`. Awake, with velocity `w_p`, beside coarse velocities `v`:
+//! ```text
+//! K = ½ Σ_i M_i |v_i|² + ½ (1 − ε) Σ_{p∈A} m_p (|w_p|² − |Σ_i ζ_pi v_i|²)
+//! ```
+//! A particle that wakes with the velocity it had, `w_p = Σ_i ζ_pi v_i`, so changes neither kinetic energy nor momentum, linear or angular; with lumped mass handed
+//! over (`M_i − Σ m_p ζ_pi`) a turning body would lose angular momentum, for lumps are farther out than what they stand for. The coarse mass matrix is
+//! ```text
+//! M' = diag(M_i) − (1 − ε) Σ_{p∈A} m_p ζ_p ζ_pᵀ      ≥ ε diag(Σ_{p∈A} m_p ζ_pi) + diag(Σ_{p∉A} m_p ζ_pi)      (ζ ≥ 0, Σ ζ = 1: Jensen)
+//! ```
+//! positive definite, and diagonal but for the nodes that active particles follow: a small dense block, factorised when the set changes.
+use super::{partition::Partition, patch::KEPT};
+use glam::{BVec3, DVec3};
+use std::collections::BTreeSet;
+
+/// Masses of a body whose particles all sleep.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Masses {
+    /// `m_p` (kg).
+    pub particle_kg: Vec<f64>,
+    /// `M_i` (kg).
+    pub node_kg: Vec<f64>,
+}
+
+impl Masses {
+    /// An eighth of each cell to its particles, and from there to the coarse nodes. `density_kg_per_m3` is that of a coarse tet.
+    pub fn new(partition: &Partition, density_kg_per_m3: impl Fn(usize) -> f64) -> Self {
+        let mut particle_kg = vec![0.0; partition.particle_count()];
+        for (number, cell) in partition.cells().iter().enumerate() {
+            let density = density_kg_per_m3(cell.tet as usize);
+            for (particle, volume_m3) in partition.corners(number).into_iter().zip(partition.particles_m3(number)) {
+                particle_kg[particle as usize] += density * volume_m3;
+            }
+        }
+        let mut node_kg = vec![0.0; partition.coarse().positions_m().len()];
+        for (particle, mass) in particle_kg.iter().enumerate() {
+            let anchor = partition.anchor(particle as u32);
+            for (&node, weight) in anchor.nodes.iter().zip(anchor.weights) {
+                node_kg[node as usize] += mass * weight;
+            }
+        }
+        Self { particle_kg, node_kg }
+    }
+}
+
+/// `M'` for a set of active particles.
+#[derive(Debug, Clone)]
+pub struct Metric {
+    /// `(1 − ε) m_p` (kg) of active particles.
+    particle_kg: Vec<f64>,
+    /// `M_i` (kg).
+    node_kg: Vec<f64>,
+    /// Nodes that active particles follow, ascending: the rows of `block`.
+    touched: Vec<u32>,
+    /// The dense block of `M'` (kg), row by row.
+    block: Vec<f64>,
+    /// Its lower Cholesky factor, axis by axis, over nodes that are free along it; the identity elsewhere.
+    factors: [Vec<f64>; 3],
+    free: Vec<BVec3>,
+}
+
+/// `M'` of a set is not positive definite.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct NotPositive {
+    /// The coarse node at which it was found.
+    pub node: u32,
+}
+
+impl Metric {
+    /// For a set of active particles; `free` tells along which axes each coarse node may move.
+    ///
+    /// # Errors
+    /// Where coarse weights are so negative (particles outside the coarse tets) that `M'` is not positive definite.
+    pub fn new(
+        partition: &Partition,
+        masses: &Masses,
+        active: &BTreeSet<u32>,
+        free: &[BVec3],
+    ) -> Result<Self, NotPositive> {
+        let anchors: Vec<_> = active.iter().map(|&particle| partition.anchor(particle)).collect();
+        let touched: BTreeSet<u32> = anchors.iter().flat_map(|anchor| anchor.nodes).collect();
+        let touched: Vec<u32> = touched.into_iter().collect();
+        let size = touched.len();
+        let row = |node: u32| touched.partition_point(|&n| n < node);
+        let mut block = vec![0.0; size * size];
+        for (at, &node) in touched.iter().enumerate() {
+            block[at * size + at] = masses.node_kg[node as usize];
+        }
+        let particle_kg: Vec<f64> =
+            active.iter().map(|&particle| (1.0 - KEPT) * masses.particle_kg[particle as usize]).collect();
+        for (anchor, mass) in anchors.iter().zip(&particle_kg) {
+            let rows = anchor.nodes.map(row);
+            for i in 0..4 {
+                for j in 0..4 {
+                    block[rows[i] * size + rows[j]] -= mass * anchor.weights[i] * anchor.weights[j];
+                }
+            }
+        }
+        let free: Vec<BVec3> = touched.iter().map(|&node| free[node as usize]).collect();
+        let mut factors = [const { Vec::new() }; 3];
+        for (axis, factor) in factors.iter_mut().enumerate() {
+            let is_free: Vec<bool> = free.iter().map(|f| f.test(axis)).collect();
+            *factor = cholesky(&block, &is_free).map_err(|at| NotPositive { node: touched[at] })?;
+        }
+        Ok(Self { particle_kg, node_kg: masses.node_kg.clone(), touched, block, factors, free })
+    }
+
+    /// Momenta `M' v` (kg m/s) of the coarse nodes.
+    pub fn momenta(&self, v: &[DVec3]) -> Vec<DVec3> {
+        let mut momenta: Vec<DVec3> = self.node_kg.iter().zip(v).map(|(m, v)| *v * *m).collect();
+        let size = self.touched.len();
+        for (at, &node) in self.touched.iter().enumerate() {
+            let row = self.block[at * size..(at + 1) * size].iter().zip(&self.touched);
+            momenta[node as usize] = row.map(|(m, &other)| v[other as usize] * *m).sum();
+        }
+        momenta
+    }
+
+    /// `M'⁻¹ f` (m/s²) on free axes, zero on the others, in place of the forces (N) on the coarse nodes. `free` is that of [`Self::new`].
+    pub fn accelerate(&self, free: &[BVec3], forces_n: &mut [DVec3]) {
+        let mut block: Vec<DVec3> = self.touched.iter().map(|&node| forces_n[node as usize]).collect();
+        for ((force, mass), free) in forces_n.iter_mut().zip(&self.node_kg).zip(free) {
+            *force = DVec3::select(*free, *force / *mass, DVec3::ZERO);
+        }
+        for axis in 0..3 {
+            solve(&self.factors[axis], &mut block, axis, &self.free);
+        }
+        for (&node, acceleration) in self.touched.iter().zip(block) {
+            forces_n[node as usize] = acceleration;
+        }
+    }
+
+    /// `(1 − ε) m_p` (kg) of the active particles.
+    pub fn particle_kg(&self) -> &[f64] {
+        &self.particle_kg
+    }
+
+    /// Kinetic energy (J) of coarse velocities and those of the active particles.
+    pub fn kinetic_j(&self, v: &[DVec3], w: &[DVec3]) -> f64 {
+        let coarse: f64 = self.momenta(v).iter().zip(v).map(|(p, v)| 0.5 * p.dot(*v)).sum();
+        coarse + self.particle_kg.iter().zip(w).map(|(m, w)| 0.5 * m * w.length_squared()).sum::<f64>()
+    }
+}
+
+/// Lower factor of the rows and columns that are free, the identity elsewhere; `Err` of the first pivot that is not positive.
+fn cholesky(a: &[f64], free: &[bool]) -> Result<Vec<f64>, usize> {
+    let size = free.len();
+    let mut l = vec![0.0; size * size];
+    for i in 0..size {
+        for j in 0..=i {
+            let taken: f64 = (0..j).map(|k| l[i * size + k] * l[j * size + k]).sum();
+            let entry = if free[i] && free[j] { a[i * size + j] } else { f64::from(u8::from(i == j)) };
+            let rest = entry - taken;
+            if i != j {
+                l[i * size + j] = rest / l[j * size + j];
+            } else if rest > 1e-12 * entry {
+                l[i * size + i] = rest.sqrt();
+            } else {
+                return Err(i);
+            }
+        }
+    }
+    Ok(l)
+}
+
+/// `L Lᵀ a = f` along one axis, in place; zero where it is not free.
+fn solve(l: &[f64], f: &mut [DVec3], axis: usize, free: &[BVec3]) {
+    let size = f.len();
+    for i in 0..size {
+        let taken: f64 = (0..i).map(|k| l[i * size + k] * f[k][axis]).sum();
+        let right = if free[i].test(axis) { f[i][axis] } else { 0.0 };
+        f[i][axis] = (right - taken) / l[i * size + i];
+    }
+    for i in (0..size).rev() {
+        let taken: f64 = (i + 1..size).map(|k| l[k * size + i] * f[k][axis]).sum();
+        f[i][axis] = (f[i][axis] - taken) / l[i * size + i];
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::bodies::hybrid::{
+        patch::{Field, Materials, Patch},
+        testing::{Random, balls_in_cage, tissue},
+    };
+    use crate::material::{Material, Viscosity};
+
+    struct Body {
+        partition: Partition,
+        masses: Masses,
+        free: Vec<BVec3>,
+        of_tet: Vec<u16>,
+    }
+
+    /// With cells of one size and of two.
+    fn bodies() -> [Body; 2] {
+        balls_in_cage().map(|partition| {
+            let masses = Masses::new(&partition, |_| 1000.0);
+            let free = masses.node_kg.iter().map(|&m| BVec3::splat(m > 0.0)).collect();
+            Body { of_tet: vec![0; partition.shares().len()], masses, free, partition }
+        })
+    }
+
+    /// A set of particles awake, in motion.
+    struct Flight {
+        patch: Patch,
+        metric: Metric,
+        x: Field,
+        v: Field,
+    }
+
+    impl Flight {
+        fn new(body: &Body, active: &BTreeSet<u32>, x: Vec<DVec3>, v: Vec<DVec3>) -> Self {
+            let patch = Patch::new(&body.partition, active);
+            let metric = Metric::new(&body.partition, &body.masses, active, &body.free).unwrap();
+            let follow = |nodes: Vec<DVec3>| Field { particles: patch.following(&body.partition, &nodes), nodes };
+            Self { x: follow(x), v: follow(v), patch, metric }
+        }
+
+        fn momentum(&self) -> (DVec3, DVec3) {
+            let mut momenta = self.metric.momenta(&self.v.nodes);
+            momenta.extend(self.metric.particle_kg().iter().zip(&self.v.particles).map(|(m, w)| *w * *m));
+            let places = self.x.nodes.iter().chain(&self.x.particles);
+            (momenta.iter().sum(), places.zip(&momenta).map(|(x, p)| x.cross(*p)).sum())
+        }
+
+        fn kinetic_j(&self) -> f64 {
+            self.metric.kinetic_j(&self.v.nodes, &self.v.particles)
+        }
+
+        /// Leapfrog; returns elastic and kinetic energy (J).
+        fn fly(&mut self, body: &Body, materials: &Materials<'_>, dt_s: f64, steps: usize) -> f64 {
+            for _ in 0..steps {
+                self.kick(body, materials, 0.5 * dt_s);
+                for (x, v) in self.x.nodes.iter_mut().zip(&self.v.nodes) {
+                    *x += *v * dt_s;
+                }
+                for (x, v) in self.x.particles.iter_mut().zip(&self.v.particles) {
+                    *x += *v * dt_s;
+                }
+                self.kick(body, materials, 0.5 * dt_s);
+            }
+            self.kinetic_j() + self.patch.energy_j(materials, &self.x)
+        }
+
+        fn kick(&mut self, body: &Body, materials: &Materials<'_>, h_s: f64) {
+            let (mut force, _) = self.patch.forces_n(materials, &self.x, &self.v);
+            self.metric.accelerate(&body.free, &mut force.nodes);
+            for (v, a) in self.v.nodes.iter_mut().zip(&force.nodes) {
+                *v += *a * h_s;
+            }
+            for ((w, f), m) in self.v.particles.iter_mut().zip(&force.particles).zip(self.metric.particle_kg()) {
+                *w += *f * (h_s / m);
+            }
+        }
+    }
+
+    fn some(body: &Body, of: impl Fn(DVec3) -> bool) -> BTreeSet<u32> {
+        (0..body.partition.particle_count() as u32).filter(|&p| of(body.partition.particle_m(p))).collect()
+    }
+
+    #[test]
+    fn masses_are_the_bodys() {
+        for body in bodies() {
+            let volume = body.partition.volume_m3();
+            for list in [&body.masses.particle_kg, &body.masses.node_kg] {
+                assert!((list.iter().sum::<f64>() / (1000.0 * volume) - 1.0).abs() < 1e-12);
+            }
+        }
+    }
+
+    #[test]
+    fn waking_changes_neither_kinetic_energy_nor_momentum() {
+        for body in bodies() {
+            let mut random = Random(11);
+            let rest = body.partition.coarse().positions_m();
+            let x: Vec<DVec3> = rest.iter().map(|p| *p + random.vector() * 1e-3).collect();
+            let v: Vec<DVec3> =
+                rest.iter().map(|p| DVec3::new(0.0, 3.0, 40.0).cross(*p) + random.vector() * 0.3).collect();
+            let asleep = Flight::new(&body, &BTreeSet::new(), x.clone(), v.clone());
+            let ((linear, angular), kinetic) = (asleep.momentum(), asleep.kinetic_j());
+            for active in [some(&body, |p| p.x > 2e-3), some(&body, |p| p.length() < 5e-3), some(&body, |_| true)] {
+                let awake = Flight::new(&body, &active, x.clone(), v.clone());
+                let (p, l) = awake.momentum();
+                assert!((p - linear).length() < 1e-13 * linear.length(), "{p} {linear}");
+                assert!((l - angular).length() < 1e-13 * angular.length(), "{l} {angular}");
+                assert!((awake.kinetic_j() / kinetic - 1.0).abs() < 1e-13);
+            }
+        }
+    }
+
+    #[test]
+    fn momenta_undo_accelerations() {
+        for body in bodies() {
+            let metric = Metric::new(&body.partition, &body.masses, &some(&body, |p| p.y > 0.0), &body.free).unwrap();
+            let mut random = Random(12);
+            let forces: Vec<DVec3> =
+                body.free.iter().map(|free| DVec3::select(*free, random.vector(), DVec3::ZERO)).collect();
+            let mut accelerations = forces.clone();
+            metric.accelerate(&body.free, &mut accelerations);
+            for (p, f) in metric.momenta(&accelerations).iter().zip(&forces) {
+                assert!((*p - *f).length() < 1e-10, "{p} {f}");
+            }
+        }
+    }
+
+    #[test]
+    fn free_flight_keeps_momentum_and_energy() {
+        for body in bodies() {
+            let material = [tissue()[1]].map(|m| Material { viscosity: Viscosity::new(0.0, 0.0).unwrap(), ..m });
+            let materials = Materials { materials: &material, of_tet: &body.of_tet };
+            let mut random = Random(13);
+            let rest = body.partition.coarse().positions_m();
+            let v: Vec<DVec3> = rest
+                .iter()
+                .map(|p| DVec3::new(0.5, 0.0, 0.0) + DVec3::Z.cross(*p) * 30.0 + random.vector() * 0.05)
+                .collect();
+            let mut flight = Flight::new(&body, &some(&body, |p| p.x > 2e-3), rest.to_vec(), v);
+            let (linear, angular) = flight.momentum();
+            let start = flight.fly(&body, &materials, 5e-5, 1);
+            let mut worst = 0.0_f64;
+            for _ in 0..10 {
+                let energy = flight.fly(&body, &materials, 5e-5, 20);
+                worst = worst.max((energy / start - 1.0).abs());
+            }
+            let (p, l) = flight.momentum();
+            assert!((p - linear).length() < 1e-12 * linear.length(), "{p} {linear}");
+            assert!((l - angular).length() < 1e-12 * angular.length(), "{l} {angular}");
+            assert!(worst < 1e-3, "{worst:e}");
+        }
+    }
+}

@@ -1,0 +1,412 @@
+//! Who owns which volume: the cells of the lattice, the coarse tets they are counted to, and the particles between them.
+//!
+//! The coarse level has no geometry of its own. Its energy is that of the lattice's cells, moved by the coarse nodes and integrated with few points:
+//! cells are counted to the part (`composite`) that holds their middle, and a part `g` has the mean gradient of its cells,
+//! ```text
+//! F_g = (1/V_g) Σ_i x_i T_giᵀ        T_gi = Σ_{c∈g} V_c Σ_p ζ_pi b_cp        V_g = Σ_{c∈g} V_c
+//! ```
+//! Affine motion is reproduced (`Σ_i T_gi = 0`, `Σ_i X_i T_giᵀ = V_g I`), whether or not the coarse tets follow the body's shape, and since cells balance at
+//! interior particles, the `T_gi` of all parts sum to zero at interior nodes.
+use super::{
+    cell::RestCell,
+    composite::{Anchor, Composite},
+    moments::{CellMoments, full_gradients_m2},
+    share::Share,
+    sites::Sites,
+    sizes::{self, Hanging, Site},
+};
+use glam::DVec3;
+
+/// Not there.
+pub const NONE: u32 = u32::MAX;
+
+/// A cell that holds some of the body.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Cell {
+    /// Its number in the lattice's box; of a doubled one that of the first of its eight.
+    pub site_cell: u32,
+    /// The coarse tet it is counted to.
+    pub tet: u32,
+    /// The part of it.
+    pub part: u8,
+    /// Of twice the spacing.
+    pub doubled: bool,
+    /// Where its moments are, [`NONE`] of a full one none of whose corners hangs.
+    cut: u32,
+}
+
+/// Progress is told whenever so many cells or sites are done.
+const TELL_EVERY: usize = 1 << 15;
+
+/// The lattice's cells and particles on the coarse tets.
+#[derive(Debug, Clone)]
+pub struct Partition {
+    sites: Sites,
+    coarse: Composite,
+    cells: Vec<Cell>,
+    /// Of cells that the surface cuts or that have corners that hang: `V_c` and `V_c b_cp`.
+    cut: Vec<(f64, [DVec3; 8])>,
+    /// Index in `cells` of every cell of the box; a doubled one is at eight of them.
+    cell_at: Vec<u32>,
+    /// Some cells are doubled.
+    has_doubled: bool,
+    /// Most cells that a particle moves.
+    most_cells_at: usize,
+    /// Site of every particle, ascending.
+    particles: Vec<u32>,
+    /// Index in `particles` of every site of the box.
+    particle_at: Vec<u32>,
+    /// The coarse tet that each particle follows.
+    tet_of_particle: Vec<u32>,
+    shares: Vec<Share>,
+}
+
+impl Partition {
+    /// Counts every cell to a coarse tet.
+    pub fn new(sites: Sites, coarse: Composite, moments: &[CellMoments]) -> Self {
+        Self::new_with(sites, coarse, moments, &mut |_| {})
+    }
+
+    /// The same; `progress` is told the part done.
+    pub(super) fn new_with(
+        sites: Sites,
+        coarse: Composite,
+        moments: &[CellMoments],
+        progress: &mut dyn FnMut(f64),
+    ) -> Self {
+        let mut tell = |third: f64, done: usize, all: usize| {
+            if done.is_multiple_of(TELL_EVERY) {
+                progress((third + done as f64 / all as f64) / 3.0);
+            }
+        };
+        let mut partition = Self {
+            sites,
+            cells: Vec::with_capacity(moments.len()),
+            cut: Vec::new(),
+            cell_at: vec![NONE; sites.cell_count()],
+            has_doubled: moments.iter().any(|moments| moments.doubled),
+            most_cells_at: 8,
+            particles: Vec::new(),
+            particle_at: vec![NONE; sites.site_count()],
+            tet_of_particle: Vec::new(),
+            shares: vec![Share::default(); coarse.tets().len()],
+            coarse,
+        };
+        let marks = sizes::mark(&sites, moments);
+        let count = moments.len();
+        for moments in moments {
+            tell(0.0, partition.cells.len(), count);
+            partition.count(moments, &marks);
+        }
+        for site in 0..partition.particle_at.len() {
+            tell(1.0, site, partition.particle_at.len());
+            if marks[site] == Site::Particle {
+                partition.particle_at[site] = partition.particles.len() as u32;
+                partition.particles.push(site as u32);
+                partition.tet_of_particle.push(partition.coarse.anchor(sites.site_m(site)).tet);
+            }
+        }
+        if partition.has_doubled {
+            let particles = 0..partition.particles.len() as u32;
+            partition.most_cells_at = particles.map(|p| partition.cells_at(p).count()).max().unwrap_or(0);
+        }
+        for cell in 0..partition.cells.len() {
+            tell(2.0, cell, count);
+            let (volume_m3, gradients_m2) = partition.moments(cell);
+            let anchors = partition.corners(cell).map(|particle| partition.anchor(particle));
+            let Cell { tet, part, .. } = partition.cells[cell];
+            partition.shares[tet as usize].add(part, 1.0, volume_m3, &gradients_m2, &anchors);
+        }
+        partition
+    }
+
+    /// Takes a cell that holds some of the body.
+    fn count(&mut self, moments: &CellMoments, marks: &[Site]) {
+        let (sites, number) = (self.sites, self.cells.len() as u32);
+        let at = sites.cell_at(moments.cell);
+        let half = DVec3::splat(if moments.doubled { 1.0 } else { 0.5 } * sites.spacing_m());
+        let Anchor { tet, part, .. } = self.coarse.anchor(sites.cell_m(moments.cell) + half);
+        self.cell_at[moments.cell] = number;
+        let mut hanging = Hanging::NONE;
+        if moments.doubled {
+            for cell in sizes::eight(&sites, at) {
+                self.cell_at[cell] = number;
+            }
+        } else if self.has_doubled {
+            let corners = sites.corners(moments.cell);
+            hanging = Hanging::new(at, |corner| marks[corners[corner]] == Site::Hangs);
+        }
+        let mut cut = NONE;
+        if hanging.any() || moments.gradients_m2.is_some() {
+            let of_corners = moments.gradients_m2.as_deref().copied();
+            let of_corners = of_corners.unwrap_or_else(|| full_gradients_m2(sites.spacing_m()));
+            self.cut.push((moments.volume_m3, hanging.to_particles(of_corners)));
+            cut = self.cut.len() as u32 - 1;
+        }
+        self.cells.push(Cell { site_cell: moments.cell as u32, tet, part, doubled: moments.doubled, cut });
+    }
+
+    /// The lattice.
+    pub fn sites(&self) -> &Sites {
+        &self.sites
+    }
+
+    /// The coarse level.
+    pub fn coarse(&self) -> &Composite {
+        &self.coarse
+    }
+
+    /// Cells that hold some of the body.
+    pub fn cells(&self) -> &[Cell] {
+        &self.cells
+    }
+
+    /// Index in [`Self::cells`] of a cell of the lattice's box, [`NONE`] where there is none of the body.
+    pub fn cell_at(&self, site_cell: usize) -> u32 {
+        self.cell_at[site_cell]
+    }
+
+    /// Number of particles.
+    pub fn particle_count(&self) -> usize {
+        self.particles.len()
+    }
+
+    /// Rest position (m) of a particle.
+    pub fn particle_m(&self, particle: u32) -> DVec3 {
+        self.sites.site_m(self.particles[particle as usize] as usize)
+    }
+
+    /// Tells the particles within a distance of a point (both m, at rest), with their squared distances.
+    pub fn particles_within(&self, point_m: DVec3, reach_m: f64, mut tell: impl FnMut(u32, f64)) {
+        let [nx, ny, nz] = self.sites.cells();
+        let from = self.sites.cell_near(point_m - reach_m);
+        let to = self.sites.cell_near(point_m + reach_m);
+        for k in from[2]..=(to[2] + 1).min(nz) {
+            for j in from[1]..=(to[1] + 1).min(ny) {
+                for i in from[0]..=(to[0] + 1).min(nx) {
+                    let site = self.sites.site([i, j, k]);
+                    let distance_sq = self.sites.site_m(site).distance_squared(point_m);
+                    if self.particle_at[site] != NONE && distance_sq <= reach_m * reach_m {
+                        tell(self.particle_at[site], distance_sq);
+                    }
+                }
+            }
+        }
+    }
+
+    /// What a particle follows while it sleeps.
+    pub fn anchor(&self, particle: u32) -> Anchor {
+        self.coarse.anchor_in(self.tet_of_particle[particle as usize], self.particle_m(particle))
+    }
+
+    /// The eight particles of a cell: those at its corners, in their order, or at those of its block where they hang (`sizes`).
+    pub fn corners(&self, cell: usize) -> [u32; 8] {
+        let Cell { site_cell, doubled, .. } = self.cells[cell];
+        let site_cell = site_cell as usize;
+        if doubled {
+            let at = self.sites.cell_at(site_cell);
+            return std::array::from_fn(|c| self.particle_at[sizes::corner_of_block(&self.sites, at, c)]);
+        }
+        let mut corners = self.sites.corners(site_cell).map(|site| self.particle_at[site]);
+        if self.has_doubled && corners.contains(&NONE) {
+            let at = self.sites.cell_at(site_cell);
+            for (number, corner) in corners.iter_mut().enumerate().filter(|(_, corner)| **corner == NONE) {
+                *corner = self.particle_at[sizes::corner_of_block(&self.sites, at, number)];
+            }
+        }
+        corners
+    }
+
+    /// Which corners of a cell hang.
+    pub fn hanging(&self, cell: usize) -> Hanging {
+        let Cell { site_cell, doubled, cut, .. } = self.cells[cell];
+        if !self.has_doubled || doubled || cut == NONE {
+            return Hanging::NONE;
+        }
+        let corners = self.sites.corners(site_cell as usize);
+        Hanging::new(self.sites.cell_at(site_cell as usize), |corner| self.particle_at[corners[corner]] == NONE)
+    }
+
+    /// Whether a cell is whole, and of the lattice's spacing.
+    pub fn is_plain(&self, cell: usize) -> bool {
+        self.is_whole(cell) && !self.cells[cell].doubled
+    }
+
+    /// Whether a cell is a whole cube, none of whose corners hangs.
+    pub fn is_whole(&self, cell: usize) -> bool {
+        self.cells[cell].cut == NONE
+    }
+
+    /// Edge (m) of a cell.
+    pub fn edge_m(&self, cell: usize) -> f64 {
+        if self.cells[cell].doubled { 2.0 * self.sites.spacing_m() } else { self.sites.spacing_m() }
+    }
+
+    /// `V_c` (m³) and `V_c b_cp` (m²) of a cell, `p` its particles.
+    pub fn moments(&self, cell: usize) -> (f64, [DVec3; 8]) {
+        match self.cells[cell].cut {
+            NONE => (self.edge_m(cell).powi(3), full_gradients_m2(self.edge_m(cell))),
+            cut => self.cut[cut as usize],
+        }
+    }
+
+    /// A cell's rest data, to answer for the share `handed` of it.
+    pub fn rest_cell(&self, cell: usize, handed: f64) -> RestCell {
+        RestCell::with_hanging(self.edge_m(cell), handed, &self.moments(cell), self.hanging(cell))
+    }
+
+    /// Cells that a particle moves.
+    pub fn cells_at(&self, particle: u32) -> impl Iterator<Item = usize> + '_ {
+        let site = self.particles[particle as usize] as usize;
+        let [nx, ny, nz] = self.sites.cells();
+        let at = [site % (nx + 1), site / (nx + 1) % (ny + 1), site / ((nx + 1) * (ny + 1))];
+        let of_blocks = self.has_doubled && at.iter().all(|n| n % 2 == 0);
+        (0..8_usize).flat_map(move |corner| {
+            let beside = |axis: usize| at[axis].checked_sub(corner >> axis & 1);
+            let around = (|| Some([beside(0)?, beside(1)?, beside(2)?]))();
+            let around = around.filter(|[i, j, k]| *i < nx && *j < ny && *k < nz);
+            let direct = around.map_or(NONE, |around| self.cell_at[self.sites.cell(around)]);
+            // Others of the same block have it in place of a corner that hangs.
+            let block = around.filter(|_| of_blocks && (direct == NONE || !self.cells[direct as usize].doubled));
+            let others = block.into_iter().flat_map(move |around| {
+                let others = self.cells_of_block(around).into_iter();
+                others.filter(move |&cell| cell != NONE && cell != direct)
+            });
+            let others = others.filter(move |&cell| self.corners(cell as usize).contains(&particle));
+            let direct = (direct != NONE).then_some(direct);
+            direct.into_iter().chain(others).map(|cell| cell as usize)
+        })
+    }
+
+    /// Whether some cells are of twice the spacing.
+    pub fn has_doubled(&self) -> bool {
+        self.has_doubled
+    }
+
+    /// Most cells that a particle moves: eight where all are of one size.
+    pub fn most_cells_at(&self) -> usize {
+        self.most_cells_at
+    }
+
+    /// Cells, or [`NONE`], of the block of eight that a cell of the box belongs to.
+    fn cells_of_block(&self, around: [usize; 3]) -> [u32; 8] {
+        let counts = self.sites.cells();
+        std::array::from_fn(|c| {
+            let at: [usize; 3] = std::array::from_fn(|axis| (around[axis] & !1) + (c >> axis & 1));
+            let inside = (0..3).all(|axis| at[axis] < counts[axis]);
+            if inside { self.cell_at[self.sites.cell(at)] } else { NONE }
+        })
+    }
+
+    /// Particles nearer than a radius to a point, ascending.
+    pub fn particles_near(&self, point_m: DVec3, radius_m: f64) -> Vec<u32> {
+        let mut near = Vec::new();
+        self.particles_within(point_m, radius_m, |particle, distance_sq| {
+            if distance_sq < radius_m * radius_m {
+                near.push(particle);
+            }
+        });
+        near
+    }
+
+    /// What of a cell's volume (m³) is its particles': an eighth for each corner.
+    pub fn particles_m3(&self, cell: usize) -> [f64; 8] {
+        self.hanging(cell).to_particles([self.moments(cell).0 / 8.0; 8])
+    }
+
+    /// Volume (m³) of a particle: what of its cells' is its.
+    pub fn particle_m3(&self, particle: u32) -> f64 {
+        let of_cell = |cell: usize| {
+            let own = self.corners(cell).into_iter().zip(self.particles_m3(cell)).find(|(p, _)| *p == particle);
+            own.map_or(0.0, |(_, volume_m3)| volume_m3)
+        };
+        self.cells_at(particle).map(of_cell).sum()
+    }
+
+    /// What of the body each coarse tet has when all particles sleep.
+    pub fn shares(&self) -> &[Share] {
+        &self.shares
+    }
+
+    /// Volume of all cells (m³).
+    pub fn volume_m3(&self) -> f64 {
+        (0..self.cells.len()).map(|cell| self.moments(cell).0).sum()
+    }
+
+    /// What part of it is in cells that the surface does not cut.
+    pub fn whole_part(&self) -> f64 {
+        let spacing_m = self.sites.spacing_m();
+        let whole_m3 = |doubled: bool| if doubled { 8.0 * spacing_m.powi(3) } else { spacing_m.powi(3) };
+        let is_cut = |cell: usize| self.moments(cell).0 < (1.0 - 1e-6) * whole_m3(self.cells[cell].doubled);
+        let whole = (0..self.cells.len()).filter(|&cell| !is_cut(cell));
+        whole.map(|cell| self.moments(cell).0).sum::<f64>() / self.volume_m3()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::bodies::hybrid::{composite::PARTS, testing::balls_in_cage};
+
+    #[test]
+    fn parts_reproduce_affine_motion_and_balance_at_interior_nodes() {
+        for partition in balls_in_cage() {
+            let coarse = partition.coarse();
+            let mut total = vec![DVec3::ZERO; coarse.positions_m().len()];
+            for share in partition.shares() {
+                for part in 0..PARTS {
+                    let sum: DVec3 = share.moments_m2.iter().map(|m| m[part]).sum();
+                    assert!(sum.length() < 1e-18);
+                    for axis in 0..3 {
+                        let column: DVec3 = share
+                            .nodes
+                            .iter()
+                            .zip(&share.moments_m2)
+                            .map(|(&n, m)| m[part] * coarse.positions_m()[n as usize][axis])
+                            .sum();
+                        let expected = DVec3::AXES[axis] * share.volume_m3[part];
+                        assert!((column - expected).length() < 1e-12 * 1e-6, "{column} {expected}");
+                    }
+                }
+                for (&node, moments) in share.nodes.iter().zip(&share.moments_m2) {
+                    total[node as usize] += moments.iter().sum::<DVec3>();
+                }
+            }
+            let volume: f64 = partition.shares().iter().flat_map(|s| s.volume_m3).sum();
+            assert!((volume / partition.volume_m3() - 1.0).abs() < 1e-12);
+            // Nodes whose whole support lies within the body: none of its cut cells' particles follows them.
+            let mut at_surface = vec![false; total.len()];
+            for (cell, _) in partition.cells().iter().enumerate().filter(|(_, c)| c.cut != NONE) {
+                for particle in partition.corners(cell) {
+                    let anchor = partition.anchor(particle);
+                    anchor.nodes.iter().for_each(|&n| at_surface[n as usize] = true);
+                }
+            }
+            let interior: Vec<usize> = (0..total.len()).filter(|&n| !at_surface[n]).collect();
+            assert!(interior.len() > 3, "{}", interior.len());
+            for node in interior {
+                assert!(total[node].length() < 1e-14 * 1e-4, "{node}: {}", total[node]);
+            }
+        }
+    }
+
+    #[test]
+    fn cells_and_particles_know_each_other() {
+        for partition in balls_in_cage() {
+            for particle in 0..partition.particle_count() as u32 {
+                let around: Vec<usize> = partition.cells_at(particle).collect();
+                assert!(!around.is_empty());
+                assert!(around.iter().all(|&cell| partition.corners(cell).contains(&particle)));
+            }
+            let all = || 0..partition.particle_count() as u32;
+            for at in [DVec3::new(0.3e-3, 2e-3, -1e-3), DVec3::new(9.5e-3, 0.0, 1e-3), DVec3::splat(-0.02)] {
+                let near: Vec<u32> = all().filter(|&p| partition.particle_m(p).distance(at) < 2.3e-3).collect();
+                assert_eq!(partition.particles_near(at, 2.3e-3), near);
+            }
+            let volume_m3: f64 = all().map(|particle| partition.particle_m3(particle)).sum();
+            assert!((volume_m3 / partition.volume_m3() - 1.0).abs() < 1e-12);
+            let pairs: usize = (0..partition.particle_count() as u32).map(|p| partition.cells_at(p).count()).sum();
+            assert_eq!(pairs, 8 * partition.cells().len());
+        }
+    }
+}

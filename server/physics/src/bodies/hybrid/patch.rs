@@ -1,0 +1,437 @@
+//! The particles that are awake, the cells between them, and what is left to the coarse tets.
+//!
+//! Every cell that touches an active particle answers for the share `1 − ε` of its volume itself, and the coarse tets lose that
+//! share of it, `V_g ← V_g − (1 − ε) V_c` and `T_gi ← T_gi − (1 − ε) V_c Σ_p ζ_pi b_cp`: volume is counted once, and uniform stress stays in
+//! balance whichever particles are awake. The `ε` that stays keeps a coarse node whose surroundings are all awake from having neither stiffness nor mass.
+//! Particles of such cells that are not active themselves (the border) follow the coarse nodes, and hand forces back to them by the same weights.
+//!
+//! In place of cells, particle methods (`methods`) may integrate the awake volume at points of theirs. Such a point answers for the same share of the parts of cells that
+//! are its own, and these go from the coarse tets by the cells' moments: what is left to them stays a mean over cells, however little it is.
+//!
+//! This is plain f64 code: the oracle of what runs in the loop.
+use super::{
+    cell::RestCell,
+    composite::Anchor,
+    fade::Fading,
+    partition::Partition,
+    points::{Handed, Operator, Points},
+    share::Share,
+};
+use crate::material::Material;
+use glam::{DMat3, DVec3};
+use std::collections::{BTreeMap, BTreeSet};
+
+/// ε.
+pub const KEPT: f64 = 0.02;
+
+/// A set of active particles.
+#[derive(Debug, Clone)]
+pub struct Patch {
+    /// Active particles, ascending.
+    active: Vec<u32>,
+    /// What the particles of the border follow; they are numbered after the active ones.
+    border: Vec<Anchor>,
+    fine: Fine,
+    /// What is left to each coarse tet.
+    shares: Vec<Share>,
+    /// What woke or fell asleep strained.
+    fading: Fading,
+}
+
+/// What integrates the awake volume.
+#[derive(Debug, Clone)]
+enum Fine {
+    Cells(Vec<PatchCell>),
+    Points(Operator),
+}
+
+#[derive(Debug, Clone)]
+struct PatchCell {
+    number: u32,
+    rest: RestCell,
+    /// Active particles, then those of the border.
+    points: [u32; 8],
+    tet: u32,
+}
+
+/// Materials of a body's coarse tets.
+#[derive(Debug, Clone, Copy)]
+pub struct Materials<'a> {
+    /// All of them.
+    pub materials: &'a [Material],
+    /// Which each coarse tet has.
+    pub of_tet: &'a [u16],
+}
+
+impl Materials<'_> {
+    pub(super) fn of(&self, tet: usize) -> &Material {
+        &self.materials[self.of_tet[tet] as usize]
+    }
+}
+
+/// Positions (m) or anything else with three components: of coarse nodes and of active particles.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Field {
+    /// One per coarse node.
+    pub nodes: Vec<DVec3>,
+    /// One per active particle.
+    pub particles: Vec<DVec3>,
+}
+
+impl Field {
+    /// `Σ a·b`.
+    pub fn dot(&self, other: &Self) -> f64 {
+        let dot = |a: &[DVec3], b: &[DVec3]| a.iter().zip(b).map(|(a, b)| a.dot(*b)).sum::<f64>();
+        dot(&self.nodes, &other.nodes) + dot(&self.particles, &other.particles)
+    }
+}
+
+impl Patch {
+    /// Wakes these particles, with cells.
+    pub fn new(partition: &Partition, active: &BTreeSet<u32>) -> Self {
+        let active: Vec<u32> = active.iter().copied().collect();
+        let awake: BTreeSet<usize> = active.iter().flat_map(|&particle| partition.cells_at(particle)).collect();
+        let mut point_of: BTreeMap<u32, u32> = active.iter().copied().zip(0..).collect();
+        let mut border = Vec::new();
+        let mut shares = partition.shares().to_vec();
+        let cells = awake
+            .into_iter()
+            .map(|number| {
+                let (cell, moments) = (&partition.cells()[number], partition.moments(number));
+                let corners = partition.corners(number);
+                let anchors = corners.map(|particle| partition.anchor(particle));
+                shares[cell.tet as usize].add(cell.part, KEPT - 1.0, moments.0, &moments.1, &anchors);
+                let points = std::array::from_fn(|p| {
+                    *point_of.entry(corners[p]).or_insert_with(|| {
+                        border.push(anchors[p]);
+                        (active.len() + border.len()) as u32 - 1
+                    })
+                });
+                PatchCell {
+                    number: number as u32,
+                    rest: partition.rest_cell(number, 1.0 - KEPT),
+                    points,
+                    tet: cell.tet,
+                }
+            })
+            .collect();
+        Self { active, border, fine: Fine::Cells(cells), shares, fading: Fading::default() }
+    }
+
+    /// Wakes these particles, with the points of a method.
+    pub fn with_points(partition: &Partition, active: &BTreeSet<u32>, points: &Points) -> Self {
+        let active: Vec<u32> = active.iter().copied().collect();
+        let mut point_of: BTreeMap<u32, u32> = active.iter().copied().zip(0..).collect();
+        let mut border = Vec::new();
+        let operator = Operator::new(&points.rows, 1.0 - KEPT, |particle| {
+            *point_of.entry(particle).or_insert_with(|| {
+                border.push(partition.anchor(particle));
+                (active.len() + border.len()) as u32 - 1
+            })
+        });
+        let mut shares = partition.shares().to_vec();
+        for &Handed { cell: number, part } in &points.handed {
+            let (cell, moments) = (&partition.cells()[number], partition.moments(number));
+            let anchors = partition.corners(number).map(|particle| partition.anchor(particle));
+            shares[cell.tet as usize].add(cell.part, part * (KEPT - 1.0), moments.0, &moments.1, &anchors);
+        }
+        Self { active, border, fine: Fine::Points(operator), shares, fading: Fading::default() }
+    }
+
+    /// The same patch with what fades in it; products leave that out.
+    #[must_use]
+    pub fn with_fading(self, fading: Fading) -> Self {
+        Self { fading, ..self }
+    }
+
+    /// Active particles, ascending.
+    pub fn active(&self) -> &[u32] {
+        &self.active
+    }
+
+    /// Cells that touch them, or points of another method.
+    pub fn cell_count(&self) -> usize {
+        match &self.fine {
+            Fine::Cells(cells) => cells.len(),
+            Fine::Points(operator) => operator.row_count(),
+        }
+    }
+
+    /// The coarse nodes at rest, and the particles where they follow them to.
+    pub fn at_rest(&self, partition: &Partition) -> Field {
+        let nodes = partition.coarse().positions_m().to_vec();
+        Field { particles: self.following(partition, &nodes), nodes }
+    }
+
+    /// Where the active particles are, or how fast, while they follow the coarse nodes.
+    pub fn following(&self, partition: &Partition, nodes: &[DVec3]) -> Vec<DVec3> {
+        self.active.iter().map(|&particle| partition.anchor(particle).of(nodes)).collect()
+    }
+
+    /// Elastic energy (J).
+    pub fn energy_j(&self, materials: &Materials<'_>, at: &Field) -> f64 {
+        let points = self.points(at);
+        let of_cell = |cell: &PatchCell| {
+            let (material, y) = (materials.of(cell.tet as usize), cell.of(&points));
+            match self.fading.of_cell(cell.number) {
+                Some(fade) => fade.energy_j(&cell.rest, material, &y),
+                None => cell.rest.energy_j(material, &y),
+            }
+        };
+        let fine: f64 = match &self.fine {
+            Fine::Cells(cells) => cells.iter().map(of_cell).sum(),
+            Fine::Points(operator) => operator.energy_j(materials, &points),
+        };
+        let of_share = |(tet, share): (usize, &Share)| match self.fading.of_tet(tet as u32) {
+            Some(fade) => fade.energy_j(share, materials.of(tet), &at.nodes),
+            None => share.energy_j(materials.of(tet), &at.nodes),
+        };
+        fine + self.shares.iter().enumerate().map(of_share).sum::<f64>()
+    }
+
+    /// Smallest `det F` of coarse tets' means and cells, and its tet.
+    pub fn min_volume_ratio(&self, at: &Field) -> (f64, usize) {
+        let points = self.points(at);
+        let of_cell = |cell: &PatchCell| (cell.rest.gradient_of(&cell.of(&points)).determinant(), cell.tet as usize);
+        let of_share = |(tet, share): (usize, &Share)| (share.volume_ratio(&at.nodes), tet);
+        let fine: Vec<(f64, usize)> = match &self.fine {
+            Fine::Cells(cells) => cells.iter().map(of_cell).collect(),
+            Fine::Points(operator) => operator.volume_ratios(&points).collect(),
+        };
+        let all = fine.into_iter().chain(self.shares.iter().enumerate().map(of_share));
+        all.fold((f64::INFINITY, 0), |least, found| if found.0 < least.0 { found } else { least })
+    }
+
+    /// How many coarse tets' means and cells have `det F ≤ 0`.
+    pub fn inverted(&self, at: &Field) -> u32 {
+        let points = self.points(at);
+        let fine = match &self.fine {
+            Fine::Cells(cells) => {
+                cells.iter().filter(|cell| cell.rest.gradient_of(&cell.of(&points)).determinant() <= 0.0).count()
+            }
+            Fine::Points(operator) => operator.volume_ratios(&points).filter(|(ratio, _)| *ratio <= 0.0).count(),
+        };
+        (fine + self.shares.iter().filter(|share| share.volume_ratio(&at.nodes) <= 0.0).count()) as u32
+    }
+
+    /// Forces (N) of elastic and viscous stress at positions `at` and velocities `rate`, and the power (W) that viscous stress takes.
+    pub fn forces_n(&self, materials: &Materials<'_>, at: &Field, rate: &Field) -> (Field, f64) {
+        let (points, rates) = (self.points(at), self.points(rate));
+        let mut nodes = vec![DVec3::ZERO; at.nodes.len()];
+        let mut of_points = vec![DVec3::ZERO; points.len()];
+        let mut power_w = 0.0;
+        match &self.fine {
+            Fine::Cells(cells) => {
+                for cell in cells {
+                    let (material, y, rate) = (materials.of(cell.tet as usize), cell.of(&points), cell.of(&rates));
+                    let (forces, power) = match self.fading.of_cell(cell.number) {
+                        Some(fade) => fade.forces_n(&cell.rest, material, &y, &rate),
+                        None => cell.rest.forces_n(material, &y, &rate),
+                    };
+                    cell.add(&forces, &mut of_points);
+                    power_w += power;
+                }
+            }
+            Fine::Points(operator) => power_w += operator.add_forces_n(materials, &points, &rates, &mut of_points),
+        }
+        for (tet, share) in self.shares.iter().enumerate() {
+            let material = materials.of(tet);
+            power_w += match self.fading.of_tet(tet as u32) {
+                Some(fade) => fade.add_forces_n(share, material, &at.nodes, &rate.nodes, &mut nodes),
+                None => share.add_forces_n(material, &at.nodes, &rate.nodes, &mut nodes),
+            };
+        }
+        (self.handed_back(nodes, of_points), power_w)
+    }
+
+    /// `−K a` (N): the change of the elastic forces along `a` at positions `at`.
+    pub fn products_n(&self, materials: &Materials<'_>, at: &Field, a: &Field) -> Field {
+        let (points, changes) = (self.points(at), self.points(a));
+        let mut nodes = vec![DVec3::ZERO; at.nodes.len()];
+        let mut of_points = vec![DVec3::ZERO; points.len()];
+        match &self.fine {
+            Fine::Cells(cells) => {
+                for cell in cells {
+                    let material = materials.of(cell.tet as usize);
+                    cell.add(&cell.rest.products_n(material, &cell.of(&points), &cell.of(&changes)), &mut of_points);
+                }
+            }
+            Fine::Points(operator) => operator.add_products_n(materials, &points, &changes, &mut of_points),
+        }
+        for (tet, share) in self.shares.iter().enumerate() {
+            share.add_products_n(materials.of(tet), &at.nodes, &a.nodes, &mut nodes);
+        }
+        self.handed_back(nodes, of_points)
+    }
+
+    /// Diagonal blocks (N/m) of the stiffness at rest, of the coarse nodes and then of the active particles; the identity where there is none.
+    pub fn diagonal_n_per_m(&self, materials: &Materials<'_>, nodes: usize) -> Vec<DMat3> {
+        let mut of_nodes = vec![DMat3::ZERO; nodes];
+        let mut of_points = vec![DMat3::ZERO; self.active.len() + self.border.len()];
+        match &self.fine {
+            Fine::Cells(cells) => {
+                for cell in cells {
+                    let blocks = cell.rest.diagonal_n_per_m(materials.of(cell.tet as usize));
+                    cell.points.iter().zip(blocks).for_each(|(&point, block)| of_points[point as usize] += block);
+                }
+            }
+            Fine::Points(operator) => operator.add_diagonal_n_per_m(materials, &mut of_points),
+        }
+        for (anchor, block) in self.border.iter().zip(of_points.split_off(self.active.len())) {
+            for (&node, weight) in anchor.nodes.iter().zip(anchor.weights) {
+                of_nodes[node as usize] += block * (weight * weight);
+            }
+        }
+        for (tet, share) in self.shares.iter().enumerate() {
+            share.add_diagonal_n_per_m(materials.of(tet), &mut of_nodes);
+        }
+        let filled = |block: DMat3| if block == DMat3::ZERO { DMat3::IDENTITY } else { block };
+        of_nodes.into_iter().chain(of_points).map(filled).collect()
+    }
+
+    /// Of active particles, then of those of the border.
+    fn points(&self, a: &Field) -> Vec<DVec3> {
+        a.particles.iter().copied().chain(self.border.iter().map(|anchor| anchor.of(&a.nodes))).collect()
+    }
+
+    /// Forces of the border go to the coarse nodes.
+    fn handed_back(&self, mut nodes: Vec<DVec3>, mut of_points: Vec<DVec3>) -> Field {
+        for (anchor, force) in self.border.iter().zip(&of_points[self.active.len()..]) {
+            for (&node, weight) in anchor.nodes.iter().zip(anchor.weights) {
+                nodes[node as usize] += *force * weight;
+            }
+        }
+        of_points.truncate(self.active.len());
+        Field { nodes, particles: of_points }
+    }
+}
+
+impl PatchCell {
+    fn of(&self, points: &[DVec3]) -> [DVec3; 8] {
+        self.points.map(|point| points[point as usize])
+    }
+
+    fn add(&self, forces_n: &[DVec3; 8], of_points: &mut [DVec3]) {
+        for (&point, force) in self.points.iter().zip(forces_n) {
+            of_points[point as usize] += *force;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::bodies::hybrid::testing::{Random, balls_in_cage, moved, plus, random_like, tissue};
+    use glam::DQuat;
+
+    fn half_awake(partition: &Partition) -> Patch {
+        let right = |&p: &u32| partition.particle_m(p).x > 0.2e-3;
+        Patch::new(partition, &(0..partition.particle_count() as u32).filter(right).collect())
+    }
+
+    /// Active particles and nodes that nothing at the surface has anything to do with.
+    fn interior(partition: &Partition, patch: &Patch) -> (Vec<usize>, Vec<usize>) {
+        let mut node = vec![true; partition.coarse().positions_m().len()];
+        let is_cut = |cell: usize| partition.moments(cell).0 < partition.edge_m(cell).powi(3) * (1.0 - 1e-12);
+        for corner in (0..partition.cells().len()).filter(|&c| is_cut(c)).flat_map(|cell| partition.corners(cell)) {
+            partition.anchor(corner).nodes.iter().for_each(|&n| node[n as usize] = false);
+        }
+        // Along every axis a particle moves what is up to an edge away.
+        let edge = if partition.has_doubled() { 2.0 } else { 1.0 };
+        let most_m = 10e-3 - edge * 3.0_f64.sqrt() * partition.sites().spacing_m();
+        let is_deep =
+            |&k: &usize| partition.particle_m(patch.active()[k]).distance(DVec3::new(0.2e-3, -0.3e-3, 0.1e-3)) < most_m;
+        ((0..node.len()).filter(|&n| node[n]).collect(), (0..patch.active().len()).filter(is_deep).collect())
+    }
+
+    #[test]
+    fn half_awake_uniform_stress_leaves_all_that_is_inside_in_balance() {
+        for partition in balls_in_cage() {
+            let patch = half_awake(&partition);
+            let rest = patch.at_rest(&partition);
+            let (nodes, particles) = interior(&partition, &patch);
+            assert!(nodes.len() > 3 && particles.len() > 50, "{} {}", nodes.len(), particles.len());
+            let of_tet = vec![0; partition.shares().len()];
+            let mut random = Random(7);
+            for material in tissue() {
+                let materials = Materials { materials: &[material], of_tet: &of_tet };
+                for _ in 0..5 {
+                    let f = DMat3::IDENTITY + DMat3::from_cols(random.vector(), random.vector(), random.vector()) * 0.2;
+                    let at = moved(&rest, |p| f * p + DVec3::new(0.01, 0.02, -0.01));
+                    let still = moved(&rest, |_| DVec3::ZERO);
+                    let (forces, _) = patch.forces_n(&materials, &at, &still);
+                    let stress = material.piola(&f);
+                    let h = partition.sites().spacing_m();
+                    // What balances at a particle is eight times P h²/4, at a node as much as its surroundings are wide.
+                    let at_particle = stress.x_axis.length().max(stress.y_axis.length()) * h * h;
+                    let worst = particles.iter().map(|&p| forces.particles[p].length()).fold(0.0, f64::max);
+                    print!("{:.1e} ", worst / at_particle);
+                    assert!(worst < 1e-12 * at_particle, "particles: {worst:e} of {at_particle:e}");
+                    let at_node = stress.x_axis.length() * 8e-3 * 8e-3;
+                    let worst = nodes.iter().map(|&n| forces.nodes[n].length()).fold(0.0, f64::max);
+                    println!("{:.1e}", worst / at_node);
+                    assert!(worst < 1e-12 * at_node, "nodes: {worst:e} of {at_node:e}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn rigid_motion_is_free_of_force_and_force_of_momentum() {
+        for partition in balls_in_cage() {
+            let patch = half_awake(&partition);
+            let rest = patch.at_rest(&partition);
+            let of_tet = vec![0; partition.shares().len()];
+            let turn = DQuat::from_axis_angle(DVec3::new(0.48, 0.6, 0.64), 2.1);
+            let mut random = Random(9);
+            for material in tissue() {
+                let materials = Materials { materials: &[material], of_tet: &of_tet };
+                let at = moved(&rest, |p| turn * p + DVec3::new(0.3, -0.2, 0.5));
+                let still = moved(&rest, |_| DVec3::ZERO);
+                let (forces, _) = patch.forces_n(&materials, &at, &still);
+                let scale = 10e3 * partition.sites().spacing_m().powi(2);
+                let largest = forces.nodes.iter().chain(&forces.particles).map(|f| f.length()).fold(0.0, f64::max);
+                print!("rigid {:.1e}", largest / scale);
+                assert!(largest < 1e-11 * scale, "{largest:e}");
+                let at = plus(&at, &random_like(&rest, 0.3e-3, &mut random), 1.0);
+                let (forces, _) = patch.forces_n(&materials, &at, &random_like(&rest, 0.1, &mut random));
+                let pairs = || at.nodes.iter().zip(&forces.nodes).chain(at.particles.iter().zip(&forces.particles));
+                let total: DVec3 = pairs().map(|(_, f)| *f).sum();
+                let torque: DVec3 = pairs().map(|(x, f)| x.cross(*f)).sum();
+                let sizes: f64 = pairs().map(|(_, f)| f.length()).sum();
+                println!(" sum {:.1e} torque {:.1e}", total.length() / sizes, torque.length() / sizes);
+                assert!(total.length() < 1e-13 * sizes && torque.length() < 1e-13 * sizes, "{total} {torque} {sizes}");
+            }
+        }
+    }
+
+    #[test]
+    fn forces_are_the_energys_gradient_and_products_theirs() {
+        for partition in balls_in_cage() {
+            let patch = half_awake(&partition);
+            let rest = patch.at_rest(&partition);
+            let of_tet = vec![0; partition.shares().len()];
+            let mut random = Random(8);
+            for material in tissue() {
+                let materials = Materials { materials: &[material], of_tet: &of_tet };
+                let at = plus(&rest, &random_like(&rest, 0.1e-3, &mut random), 1.0);
+                let a = random_like(&rest, 0.1e-3, &mut random);
+                let still = moved(&rest, |_| DVec3::ZERO);
+                let s = 1e-3;
+                let ahead = plus(&at, &a, s);
+                let behind = plus(&at, &a, -s);
+                let slope = (patch.energy_j(&materials, &ahead) - patch.energy_j(&materials, &behind)) / (2.0 * s);
+                let (forces, _) = patch.forces_n(&materials, &at, &still);
+                assert!((slope + forces.dot(&a)).abs() < 1e-6 * slope.abs(), "{slope} {}", forces.dot(&a));
+                let change = plus(
+                    &patch.forces_n(&materials, &ahead, &still).0,
+                    &patch.forces_n(&materials, &behind, &still).0,
+                    -1.0,
+                );
+                let products = patch.products_n(&materials, &at, &a);
+                let difference = plus(&products, &change, -0.5 / s);
+                assert!(difference.dot(&difference) < 1e-8 * products.dot(&products));
+            }
+        }
+    }
+}

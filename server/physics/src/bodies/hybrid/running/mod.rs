@@ -1,0 +1,425 @@
+//! The patch as the loop runs it: rebuilt without allocating when other particles wake, its cells in lanes. Its oracle is `patch`.
+//!
+//! *Points* are the particles of awake cells, ascending: those that are active, and those of the border, which follow the coarse nodes.
+mod layout;
+#[cfg(test)]
+mod tests;
+
+use super::kernels::{CellRow, CutCells, Found, RowKernel, RowValues, ShareKernel};
+use super::{
+    active::room_for_cells,
+    body::Hybrid,
+    border::Border,
+    clusters::SkinClusters,
+    composite::Anchor,
+    fade::Fading,
+    partition::{Cell, NONE},
+    patch::KEPT,
+    running_metric::RunningMetric,
+    share::Share,
+};
+use crate::settings::Precision;
+use glam::DVec3;
+use layout::Slot;
+
+/// A patch with room for the most active particles there may be.
+#[derive(Debug, Clone)]
+pub(crate) struct RunningPatch {
+    /// Active particles, ascending.
+    active: Vec<u32>,
+    points: Vec<Point>,
+    border: Border,
+    /// Numbers of the active particles' points, ascending.
+    points_of_active: Vec<u32>,
+    /// Displacements (m) of the points.
+    displacements_m: Vec<DVec3>,
+    /// A buffer for the kernels' values of points.
+    of_points: Vec<DVec3>,
+    /// Awake cells, ascending.
+    cells: Vec<u32>,
+    kernel: RowKernel,
+    rows: Vec<CellRow>,
+    values: RowValues,
+    cut: CutCells,
+    /// Where every awake cell is laid out.
+    slots: Vec<Slot>,
+    /// Numbers, among the awake cells, of those that fade.
+    fading_cells: Vec<u32>,
+    fading_tets: Vec<u32>,
+    fading_mark: u64,
+    /// What is left to each coarse tet.
+    shares: Vec<Share>,
+    share_kernel: ShareKernel,
+    /// Number of every coarse node among those of a share, while something is taken from it.
+    number_of_node: Vec<u32>,
+    /// Of which tets something was taken.
+    taken_from: Vec<u32>,
+    metric: RunningMetric,
+    /// Displacements (m) of coarse nodes.
+    node_displacements_m: Vec<DVec3>,
+    /// Number of every particle among the points.
+    point_of: Vec<u32>,
+    /// Whether active particles carry any of a cluster's vertices, and a group's.
+    carries_of_cluster: Vec<bool>,
+    carries_of_group: Vec<bool>,
+    is_awake: Vec<bool>,
+    is_viscous: bool,
+    /// Counts the sets of active particles.
+    number: u64,
+}
+
+#[derive(Debug, Clone, Copy)]
+struct Point {
+    particle: u32,
+    /// Its number among the active ones, [`NONE`] of the border's.
+    active: u32,
+    rest_m: DVec3,
+    anchor: Anchor,
+}
+
+impl RunningPatch {
+    /// Room for `most_active` particles, none awake.
+    pub(crate) fn new(hybrid: &Hybrid, most_active: usize, precision: Precision) -> Self {
+        let partition = &hybrid.partition;
+        let most_cells = room_for_cells(hybrid, most_active);
+        let around = if partition.has_doubled() { 8 * partition.most_cells_at() } else { 27 };
+        let most_points = (around * most_active).min(partition.particle_count());
+        let kernel = RowKernel::new(partition.sites().spacing_m(), 1.0 - KEPT, &hybrid.materials, precision);
+        Self {
+            active: Vec::with_capacity(most_active),
+            points: Vec::with_capacity(most_points),
+            border: Border::with_room(most_points),
+            points_of_active: Vec::with_capacity(most_active),
+            displacements_m: Vec::with_capacity(most_points),
+            of_points: Vec::with_capacity(most_points),
+            cells: Vec::with_capacity(most_cells),
+            rows: Vec::with_capacity(most_cells),
+            values: kernel.values(most_points, most_cells),
+            kernel,
+            cut: CutCells::with_capacity(most_cells, most_points, &hybrid.materials, precision),
+            share_kernel: ShareKernel::build(
+                partition.shares(),
+                hybrid.node_count(),
+                &hybrid.of_tet,
+                &hybrid.materials,
+                precision,
+            ),
+            shares: partition.shares().to_vec(),
+            slots: Vec::with_capacity(most_cells),
+            fading_cells: Vec::with_capacity(most_cells),
+            fading_tets: Vec::with_capacity(partition.shares().len()),
+            fading_mark: 0,
+            number_of_node: vec![0; hybrid.node_count()],
+            taken_from: Vec::with_capacity(partition.shares().len()),
+            metric: RunningMetric::new(hybrid, most_active),
+            node_displacements_m: vec![DVec3::ZERO; hybrid.node_count()],
+            point_of: vec![NONE; partition.particle_count()],
+            carries_of_cluster: vec![false; hybrid.clusters.clusters()],
+            carries_of_group: vec![false; hybrid.clusters.groups()],
+            is_awake: vec![false; partition.cells().len()],
+            is_viscous: hybrid.materials.iter().any(|m| !m.viscosity.is_zero()),
+            number: 0,
+        }
+    }
+
+    /// The mass matrix.
+    pub(crate) fn metric(&self) -> &RunningMetric {
+        &self.metric
+    }
+
+    /// The same, to be solved with.
+    pub(crate) fn metric_mut(&mut self) -> &mut RunningMetric {
+        &mut self.metric
+    }
+
+    /// Counts the sets of active particles there have been.
+    pub(super) fn number(&self) -> u64 {
+        self.number
+    }
+
+    /// Number of a particle among the points, [`NONE`] of one that is none.
+    pub(super) fn point_of(&self, particle: u32) -> u32 {
+        self.point_of[particle as usize]
+    }
+
+    /// Number of a particle among the active ones, [`NONE`] of one that is asleep.
+    pub(super) fn number_of(&self, particle: u32) -> u32 {
+        self.points.get(self.point_of(particle) as usize).map_or(NONE, |point| point.active)
+    }
+
+    /// Displacements (m) of the points after [`Self::displace`].
+    pub(super) fn displacements_m(&self) -> &[DVec3] {
+        &self.displacements_m
+    }
+
+    /// Displacements (m) of the coarse nodes after [`Self::displace`].
+    pub(super) fn node_displacements_m(&self) -> &[DVec3] {
+        &self.node_displacements_m
+    }
+
+    /// How far (m) each active particle is from where it would be asleep.
+    pub(super) fn deviations_m(&self) -> impl Iterator<Item = (u32, f64)> + '_ {
+        let active = self.points.iter().zip(&self.displacements_m).filter(|(point, _)| point.active != NONE);
+        active.map(|(point, u)| (point.particle, u.distance(point.anchor.of(&self.node_displacements_m))))
+    }
+
+    /// The largest of [`Self::deviations_m`].
+    pub(super) fn deviation_m(&self) -> f64 {
+        self.deviations_m().map(|(_, deviation_m)| deviation_m).fold(0.0, f64::max)
+    }
+
+    /// Whether active particles carry any vertex of a cluster of the skin.
+    pub(super) fn carries_of_cluster(&self, cluster: usize) -> bool {
+        self.carries_of_cluster[cluster]
+    }
+
+    /// The same of a group.
+    pub(super) fn carries_of_group(&self, group: usize) -> bool {
+        self.carries_of_group[group]
+    }
+
+    /// Awake cells, ascending.
+    pub(super) fn cells(&self) -> &[u32] {
+        &self.cells
+    }
+
+    /// Whether a cell is awake.
+    pub(super) fn is_awake(&self, cell: u32) -> bool {
+        self.is_awake[cell as usize]
+    }
+
+    /// Coarse tets that have lost some of their cells.
+    pub(super) fn taken_from(&self) -> &[u32] {
+        &self.taken_from
+    }
+
+    /// What is left to a coarse tet.
+    pub(super) fn share(&self, tet: u32) -> &Share {
+        &self.shares[tet as usize]
+    }
+
+    /// Positions (m) of the particles of an awake cell.
+    pub(super) fn corners_m(&self, hybrid: &Hybrid, cell: u32) -> [DVec3; 8] {
+        hybrid.partition.corners(cell as usize).map(|particle| {
+            let point = self.point_of[particle as usize] as usize;
+            self.points[point].rest_m + self.displacements_m[point]
+        })
+    }
+
+    /// Whether some particle of an awake cell follows one of these coarse nodes.
+    pub(super) fn follows(&self, hybrid: &Hybrid, cell: u32, nodes: &[bool]) -> bool {
+        hybrid.partition.corners(cell as usize).into_iter().any(|particle| {
+            let point = &self.points[self.point_of[particle as usize] as usize];
+            let anchor = &point.anchor;
+            point.active == NONE
+                && anchor.nodes.iter().zip(anchor.weights).any(|(node, weight)| weight != 0.0 && nodes[*node as usize])
+        })
+    }
+
+    /// Hands a force (N) on a point to the particle or the coarse nodes that move it.
+    pub(super) fn push(&self, point: u32, force_n: DVec3, nodes: usize, forces_n: &mut [DVec3]) {
+        let point = &self.points[point as usize];
+        if point.active == NONE {
+            point.anchor.push(force_n, forces_n);
+        } else {
+            forces_n[nodes + point.active as usize] += force_n;
+        }
+    }
+
+    /// Active particles, ascending.
+    pub(crate) fn active(&self) -> &[u32] {
+        &self.active
+    }
+
+    /// Wakes these particles (ascending, no more than there is room for) and no others, of which this fades. Allocates nothing.
+    pub(crate) fn wake(&mut self, hybrid: &Hybrid, active: &[u32], fading: &Fading) {
+        (0..Self::SLICES).for_each(|slice| self.set_slice(hybrid, active, slice));
+        self.put_fades(fading);
+    }
+
+    /// In how many slices particles wake.
+    pub(super) const SLICES: u32 = 3;
+
+    /// A slice of [`Self::wake`], one after the other, before it is told what fades.
+    pub(super) fn set_slice(&mut self, hybrid: &Hybrid, active: &[u32], slice: u32) {
+        match slice {
+            0 => {
+                self.forget(hybrid);
+                self.number += 1;
+                self.active.extend_from_slice(active);
+                self.find_cells(hybrid);
+                self.find_points(hybrid);
+                self.mark_carried(hybrid, true);
+            }
+            1 => self.take_from_shares(hybrid),
+            _ => {
+                self.lay_out(hybrid);
+                let points = self.points.iter().filter(|point| point.active != NONE);
+                self.metric.factorise(hybrid, points.map(|point| (point.particle, point.anchor)));
+            }
+        }
+    }
+
+    /// Counts this one as the one after another.
+    pub(super) fn number_after(&mut self, other: &Self) {
+        self.number = other.number + 1;
+    }
+
+    fn mark_carried(&mut self, hybrid: &Hybrid, carried: bool) {
+        for &particle in &self.active {
+            for cluster in hybrid.clusters.carried_by(particle) {
+                self.carries_of_cluster[cluster] = carried;
+                self.carries_of_group[SkinClusters::group_of(cluster)] = carried;
+            }
+        }
+    }
+
+    fn forget(&mut self, hybrid: &Hybrid) {
+        self.mark_carried(hybrid, false);
+        for point in &self.points {
+            self.point_of[point.particle as usize] = NONE;
+        }
+        for &cell in &self.cells {
+            self.is_awake[cell as usize] = false;
+        }
+        for &tet in &self.taken_from {
+            let (share, whole) = (&mut self.shares[tet as usize], &hybrid.partition.shares()[tet as usize]);
+            share.volume_m3 = whole.volume_m3;
+            share.moments_m2.copy_from_slice(&whole.moments_m2);
+            self.share_kernel.put(tet as usize, whole);
+        }
+        self.taken_from.clear();
+        self.active.clear();
+        self.points.clear();
+        self.cells.clear();
+    }
+
+    fn find_cells(&mut self, hybrid: &Hybrid) {
+        for &particle in &self.active {
+            for cell in hybrid.partition.cells_at(particle) {
+                if !self.is_awake[cell] {
+                    self.is_awake[cell] = true;
+                    self.cells.push(cell as u32);
+                }
+            }
+        }
+        self.cells.sort_unstable();
+    }
+
+    fn find_points(&mut self, hybrid: &Hybrid) {
+        for &cell in &self.cells {
+            for particle in hybrid.partition.corners(cell as usize) {
+                if self.point_of[particle as usize] == NONE {
+                    self.point_of[particle as usize] = 0;
+                    let anchor = hybrid.partition.anchor(particle);
+                    let rest_m = hybrid.partition.particle_m(particle);
+                    self.points.push(Point { particle, active: NONE, rest_m, anchor });
+                }
+            }
+        }
+        self.points.sort_unstable_by_key(|point| point.particle);
+        self.points_of_active.clear();
+        for (number, point) in self.points.iter_mut().enumerate() {
+            self.point_of[point.particle as usize] = number as u32;
+            let next = self.points_of_active.len();
+            if self.active.get(next) == Some(&point.particle) {
+                point.active = next as u32;
+                self.points_of_active.push(number as u32);
+            }
+        }
+        let numbered = (0..).zip(&self.points).filter(|(_, point)| point.active == NONE);
+        self.border.take(numbered.map(|(number, point)| (number, point.anchor)));
+        self.displacements_m.resize(self.points.len(), DVec3::ZERO);
+    }
+
+    /// `V_g ← V_g − (1 − ε) V_c` and likewise `T_gi`.
+    fn take_from_shares(&mut self, hybrid: &Hybrid) {
+        let partition = &hybrid.partition;
+        let mut last = NONE;
+        for &cell in &self.cells {
+            let Cell { tet, part, .. } = partition.cells()[cell as usize];
+            if tet != last {
+                last = tet;
+                if !self.taken_from.contains(&tet) {
+                    self.taken_from.push(tet);
+                }
+                for (number, node) in (0..).zip(&self.shares[tet as usize].nodes) {
+                    self.number_of_node[*node as usize] = number;
+                }
+            }
+            let (volume_m3, gradients_m2) = partition.moments(cell as usize);
+            let anchors = partition
+                .corners(cell as usize)
+                .map(|particle| self.points[self.point_of[particle as usize] as usize].anchor);
+            let numbers = anchors.map(|anchor| anchor.nodes.map(|node| self.number_of_node[node as usize]));
+            self.shares[tet as usize].add_numbered(part, KEPT - 1.0, (volume_m3, &gradients_m2), &anchors, &numbers);
+        }
+        for &tet in &self.taken_from {
+            self.share_kernel.put(tet as usize, &self.shares[tet as usize]);
+        }
+    }
+
+    /// Adds forces (N) on coarse nodes of elastic and viscous stress in what is left to the coarse level, where [`Self::displace`] put them, at their
+    /// velocities `v`, with `left` left of what fades.
+    pub(crate) fn add_coarse_forces_n(&mut self, v: &[DVec3], left: f64, forces_n: &mut [DVec3]) -> Found {
+        let v_nodes = &v[..self.node_displacements_m.len()];
+        self.share_kernel.add_forces_n(&self.node_displacements_m, v_nodes, left, forces_n)
+    }
+
+    /// The same of awake cells, on coarse nodes and active particles; whose forces were none.
+    pub(crate) fn add_cell_forces_n(
+        &mut self,
+        hybrid: &Hybrid,
+        v: &[DVec3],
+        left: f64,
+        forces_n: &mut [DVec3],
+    ) -> Found {
+        let nodes = hybrid.node_count();
+        let (v_nodes, v_particles) = v.split_at(nodes);
+        if self.active.is_empty() {
+            return Found::default();
+        }
+        // Less that of one of them: far from rest, their differences would be rounded too coarsely.
+        let first_m = self.displacements_m[0];
+        self.of_points.clear();
+        self.of_points.extend(self.displacements_m.iter().map(|displacement| *displacement - first_m));
+        self.values.set_displacements(&self.of_points);
+        let has_cut = !self.cut.is_empty();
+        if has_cut {
+            self.cut.set_displacements(&self.of_points);
+        }
+        if self.is_viscous {
+            self.border.follow(v_nodes, &mut self.of_points);
+            for (v, &point) in v_particles.iter().zip(&self.points_of_active) {
+                self.of_points[point as usize] = *v;
+            }
+            self.values.set_velocities(&self.of_points);
+            self.cut.set_velocities(&self.of_points);
+        }
+        let mut found = self.kernel.forces(&self.rows, (self.points.len(), left), &mut self.values);
+        self.values.forces_n(&mut self.of_points);
+        if has_cut {
+            found += self.cut.forces(self.points.len(), left);
+            self.cut.add_forces_n(&mut self.of_points);
+        }
+        let (f_nodes, f_particles) = forces_n.split_at_mut(nodes);
+        self.border.push(&self.of_points, f_nodes);
+        for (force_n, &point) in f_particles.iter_mut().zip(&self.points_of_active) {
+            *force_n = self.of_points[point as usize];
+        }
+        found
+    }
+
+    /// Takes positions (m) of coarse nodes and then active particles.
+    pub(crate) fn displace(&mut self, hybrid: &Hybrid, x: &[DVec3]) {
+        let (x_nodes, x_particles) = x.split_at(hybrid.node_count());
+        let rest = hybrid.partition.coarse().positions_m();
+        for ((u, x), rest) in self.node_displacements_m.iter_mut().zip(x_nodes).zip(rest) {
+            *u = *x - *rest;
+        }
+        self.border.follow(&self.node_displacements_m, &mut self.displacements_m);
+        for (x, &point) in x_particles.iter().zip(&self.points_of_active) {
+            self.displacements_m[point as usize] = *x - self.points[point as usize].rest_m;
+        }
+    }
+}

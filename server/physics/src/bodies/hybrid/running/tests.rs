@@ -1,0 +1,120 @@
+//! The running patch against its oracle.
+use super::*;
+use crate::{
+    bodies::hybrid::{
+        composite::PARTS,
+        fade::{CellFade, FADING_S, ShareFade},
+        metric::Metric,
+        patch::{Field, Patch},
+        testing::{Random, hybrid_ball_of, tissue},
+    },
+    material::{Material, Viscosity},
+};
+use glam::DMat3;
+use std::collections::BTreeSet;
+
+fn some(hybrid: &Hybrid, wanted: impl Fn(DVec3) -> bool) -> Vec<u32> {
+    let particles = 0..hybrid.partition.particle_count() as u32;
+    particles.filter(|&p| hybrid.may_wake(p) && wanted(hybrid.partition.particle_m(p))).collect()
+}
+
+fn largest(list: &[DVec3]) -> f64 {
+    list.iter().map(|a| a.length()).fold(0.0, f64::max)
+}
+
+/// Something in some of the cells and tets, of the size of its strains.
+fn some_fading(hybrid: &Hybrid, cells: &[u32], random: &mut Random) -> Fading {
+    let mut matrix = || DMat3::from_cols(random.vector(), random.vector(), random.vector()) * 0.1;
+    let cells = cells.iter().filter(|cell| **cell / 7 % 3 == 1);
+    let tets = (0..hybrid.partition.shares().len() as u32).filter(|tet| tet % 4 == 1);
+    let cells = cells.map(|&cell| CellFade { cell, shape: matrix(), volume: matrix(), modes: 0.3 }).collect();
+    let tets = tets.map(|tet| ShareFade { tet, parts: [(); PARTS].map(|()| matrix()), whole: matrix() }).collect();
+    let mut fading = Fading::new(cells, tets);
+    fading.go_on(0.01);
+    fading
+}
+
+/// Whichever particles were awake, and whatever faded, before: forces, power, accelerations and momenta are the oracle's.
+#[test]
+fn running_patch_and_oracle_agree() {
+    let [stvk, neo, corotated] = tissue();
+    let mut random = Random(51);
+    let still = [corotated, neo].map(|m: Material| Material { viscosity: Viscosity::default(), ..m });
+    for (materials, fine_depth_m) in [([neo, stvk], None), (still, None), ([neo, stvk], Some(1.1e-3))] {
+        let hybrid = hybrid_ball_of(&materials, 1.1e-3, fine_depth_m);
+        let doubled = hybrid.partition.cells().iter().filter(|cell| cell.doubled).count();
+        assert_eq!(doubled > 20, fine_depth_m.is_some(), "{doubled}");
+        for (precision, bound) in [(Precision::Double, 1e-11), (Precision::Single, 3e-5)] {
+            let mut running = RunningPatch::new(&hybrid, 2000, precision);
+            let near = |p: DVec3| p.distance(DVec3::new(2e-3, 1e-3, 9e-3)) < 4e-3;
+            let far = |p: DVec3| near(p) || p.distance(DVec3::new(-8e-3, 0.0, 0.0)) < 3e-3;
+            let sets = [some(&hybrid, near), some(&hybrid, far), vec![], some(&hybrid, |p| p.x > 0.2e-3)];
+            for (active, fades) in sets.iter().flat_map(|set| [(set, true), (set, false)]) {
+                running.wake(&hybrid, active, &Fading::default());
+                let fading = some_fading(&hybrid, running.cells(), &mut random);
+                let fading = if fades { fading } else { Fading::default() };
+                running.put_fades(&fading);
+                let set: BTreeSet<u32> = active.iter().copied().collect();
+                let patch = Patch::new(&hybrid.partition, &set).with_fading(fading.clone());
+                let rest = patch.at_rest(&hybrid.partition);
+                let shaken = |list: &[DVec3], size: f64, random: &mut Random| -> Vec<DVec3> {
+                    list.iter().map(|p| *p + DVec3::new(3.0, 2.0, 1.0) * size + random.vector() * size).collect()
+                };
+                let at = Field {
+                    nodes: shaken(&rest.nodes, 0.1e-3, &mut random),
+                    particles: shaken(&rest.particles, 0.1e-3, &mut random),
+                };
+                let zero = |list: &[DVec3]| vec![DVec3::ZERO; list.len()];
+                let rate = Field {
+                    nodes: shaken(&zero(&rest.nodes), 0.1, &mut random),
+                    particles: shaken(&zero(&rest.particles), 0.1, &mut random),
+                };
+                let (expected, expected_w) = patch.forces_n(&hybrid.materials(), &at, &rate);
+                let joined = |field: &Field| [&field.nodes[..], &field.particles].concat();
+                let (expected, x, v) = (joined(&expected), joined(&at), joined(&rate));
+                let mut forces = x.clone();
+                running.displace(&hybrid, &x);
+                forces.fill(DVec3::ZERO);
+                let mut found = running.add_coarse_forces_n(&v, fading.left(), &mut forces);
+                found += running.add_cell_forces_n(&hybrid, &v, fading.left(), &mut forces);
+                let worst = forces.iter().zip(&expected).map(|(a, b)| a.distance(*b)).fold(0.0, f64::max);
+                println!("{precision:?}: {:.1e}", worst / largest(&expected));
+                assert!(worst < bound * largest(&expected), "{precision:?}, {}: {worst:e}", active.len());
+                assert!((found.viscous_w - expected_w).abs() <= 10.0 * bound * expected_w, "{found:?} {expected_w}");
+                // s ∂U/∂s
+                let energy_j = |time_s: f64| {
+                    let mut fading = fading.clone();
+                    fading.go_on(time_s);
+                    patch.clone().with_fading(fading).energy_j(&hybrid.materials(), &at)
+                };
+                let step_s = 1e-6;
+                let slope_w = (energy_j(step_s) - energy_j(-step_s)) / (2.0 * step_s);
+                let difference_j = found.fading_j + FADING_S * slope_w;
+                assert!(difference_j.abs() <= 100.0 * bound.max(1e-9) * energy_j(0.0), "{found:?} {slope_w}");
+                assert_eq!(found.fading_j != 0.0, fades);
+
+                let metric = Metric::new(&hybrid.partition, &hybrid.masses, &set, &hybrid.free).unwrap();
+                let nodes = hybrid.node_count();
+                let mut accelerations = expected[..nodes].to_vec();
+                metric.accelerate(&hybrid.free, &mut accelerations);
+                let particles = expected[nodes..].iter().zip(metric.particle_kg()).map(|(f, m)| *f / *m);
+                accelerations.extend(particles);
+                let mut found = expected.clone();
+                running.metric.accelerate(&mut found);
+                let worst = found.iter().zip(&accelerations).map(|(a, b)| a.distance(*b)).fold(0.0, f64::max);
+                assert!(worst < 1e-9 * largest(&accelerations), "{worst:e} of {:e}", largest(&accelerations));
+                let mut momenta = v.clone();
+                running.metric.momenta(&hybrid, &v, &mut momenta);
+                let of_nodes = metric.momenta(&v[..nodes]);
+                let worst = momenta.iter().zip(&of_nodes).map(|(a, b)| a.distance(*b)).fold(0.0, f64::max);
+                assert!(worst < 1e-12 * largest(&of_nodes), "{worst:e}");
+                // Gravity moves everything alike.
+                let mut weight = zero(&x);
+                running.metric.add_weight_n(DVec3::X, &mut weight);
+                running.metric.momenta(&hybrid, &vec![DVec3::X; x.len()], &mut momenta);
+                let worst = weight.iter().zip(&momenta).map(|(a, b)| a.distance(*b)).fold(0.0, f64::max);
+                assert!(worst < 1e-12 * largest(&weight), "{worst:e}");
+            }
+        }
+    }
+}

@@ -1,0 +1,218 @@
+//! The coarse mass matrix `M'` as the loop runs it: factorised anew, without allocating, when other particles wake. Its oracle is `metric`.
+use super::{
+    body::{Hybrid, NO_WEIGHT},
+    composite::Anchor,
+    partition::NONE,
+    patch::KEPT,
+};
+use crate::lanes::{dense::Cholesky, vector_operations};
+use glam::{BVec3, DVec3};
+
+/// `M'` and its factor.
+///
+/// Active particles follow nodes that are free or held along all axes, so that one factor serves the three. With accelerations `a` of free nodes `f` and none of
+/// held ones `h`, `M'_ff a = f_f`; what moves the holders feels `M'_hf a`.
+#[derive(Debug, Clone)]
+pub(crate) struct RunningMetric {
+    /// `(1 − ε) m_p` (kg) of active particles.
+    particle_kg: Vec<f64>,
+    /// What gravity pulls coarse nodes with (kg): the row sums of `M'`.
+    weight_kg: Vec<f64>,
+    /// `1/M_i` (1/kg) of coarse nodes, 0 on held axes and of those in the factor, and then `1/(1 − ε) m_p` of active particles.
+    inverse_per_kg: Vec<DVec3>,
+    /// What active particles take from the nodes they follow.
+    followed: Vec<Followed>,
+    /// Nodes that active particles follow: the rows of the block. Free ones first, each ascending.
+    touched: Vec<u32>,
+    /// How many of them are free: the rows of the factor.
+    free_rows: usize,
+    row_of: Vec<u32>,
+    /// The dense block of `M'` (kg), row by row.
+    block_kg: Vec<f64>,
+    factor: Cholesky,
+}
+
+/// An active particle that follows coarse nodes, with no weight where there are fewer than four.
+#[derive(Debug, Clone, Copy)]
+struct Followed {
+    /// `(1 − ε) m_p` (kg).
+    mass_kg: f64,
+    nodes: [u32; 4],
+    weights: [f64; 4],
+}
+
+/// Nodes that a particle does follow.
+fn weighty(anchor: &Anchor) -> impl Iterator<Item = (u32, f64)> {
+    anchor.nodes.into_iter().zip(anchor.weights).filter(|(_, weight)| *weight >= NO_WEIGHT)
+}
+
+/// `1/M_i` (1/kg) of a coarse node, 0 on held axes.
+fn inverse_per_kg(hybrid: &Hybrid, node: usize) -> DVec3 {
+    let mass_kg = hybrid.masses.node_kg[node].max(f64::MIN_POSITIVE);
+    DVec3::select(hybrid.free[node], DVec3::splat(1.0 / mass_kg), DVec3::ZERO)
+}
+
+impl RunningMetric {
+    pub(super) fn new(hybrid: &Hybrid, most_active: usize) -> Self {
+        let nodes = hybrid.node_count();
+        let most_touched = (4 * most_active).min(nodes);
+        let mut inverses_per_kg = Vec::with_capacity(nodes + most_active);
+        inverses_per_kg.extend((0..nodes).map(|node| inverse_per_kg(hybrid, node)));
+        Self {
+            particle_kg: Vec::with_capacity(most_active),
+            weight_kg: hybrid.masses.node_kg.clone(),
+            inverse_per_kg: inverses_per_kg,
+            followed: Vec::with_capacity(most_active),
+            touched: Vec::with_capacity(most_touched),
+            free_rows: 0,
+            row_of: vec![NONE; nodes],
+            block_kg: Vec::with_capacity(most_touched * most_touched),
+            factor: Cholesky::with_room(most_touched),
+        }
+    }
+
+    /// Takes the active particles, in order, with what they follow. Allocates nothing.
+    pub(super) fn factorise(&mut self, hybrid: &Hybrid, followed: impl Iterator<Item = (u32, Anchor)> + Clone) {
+        for &node in &self.touched {
+            self.row_of[node as usize] = NONE;
+            self.weight_kg[node as usize] = hybrid.masses.node_kg[node as usize];
+            self.inverse_per_kg[node as usize] = inverse_per_kg(hybrid, node as usize);
+        }
+        self.touched.clear();
+        self.particle_kg.clear();
+        self.inverse_per_kg.truncate(hybrid.node_count());
+        self.followed.clear();
+        for (_, anchor) in followed.clone() {
+            for (node, _) in weighty(&anchor) {
+                if self.row_of[node as usize] == NONE {
+                    self.row_of[node as usize] = 0;
+                    self.touched.push(node);
+                }
+            }
+        }
+        let is_held = |node: u32| !hybrid.free[node as usize].any();
+        self.touched.sort_unstable_by_key(|&node| (is_held(node), node));
+        self.free_rows = self.touched.partition_point(|&node| !is_held(node));
+        let size = self.touched.len();
+        self.block_kg.clear();
+        self.block_kg.resize(size * size, 0.0);
+        for (row, &node) in self.touched.iter().enumerate() {
+            self.row_of[node as usize] = row as u32;
+            self.inverse_per_kg[node as usize] = DVec3::ZERO;
+            self.block_kg[row * size + row] = hybrid.masses.node_kg[node as usize];
+        }
+        for (particle, anchor) in followed {
+            let mass = (1.0 - KEPT) * hybrid.masses.particle_kg[particle as usize];
+            self.particle_kg.push(mass);
+            self.inverse_per_kg.push(DVec3::splat(1.0 / mass));
+            let weights = anchor.weights.map(|weight| if weight >= NO_WEIGHT { weight } else { 0.0 });
+            self.followed.push(Followed { mass_kg: mass, nodes: anchor.nodes, weights });
+            for (node, weight) in weighty(&anchor) {
+                self.weight_kg[node as usize] -= mass * weight;
+                let row = self.row_of[node as usize] as usize;
+                for (other, other_weight) in weighty(&anchor) {
+                    let column = self.row_of[other as usize] as usize;
+                    self.block_kg[row * size + column] -= mass * weight * other_weight;
+                }
+            }
+        }
+        // Pivots are positive where no weight is negative (`metric`), which [`Hybrid::may_wake`] sees to.
+        self.factor.factorise((&self.block_kg, size), self.free_rows, 1e-12);
+    }
+
+    /// `M'⁻¹ f` (m/s²) on free axes, zero on the others, in place of forces (N) on coarse nodes and then on active particles; returns `fᵀ M'⁻¹ f` (N²/kg).
+    pub(crate) fn accelerate(&mut self, forces_n: &mut [DVec3]) -> f64 {
+        let free = &self.touched[..self.free_rows];
+        for (row, &node) in free.iter().enumerate() {
+            self.factor.put(row, forces_n[node as usize]);
+        }
+        let size_sq = vector_operations::divide_by_masses(forces_n, &self.inverse_per_kg) + self.factor.solve();
+        for (row, &node) in free.iter().enumerate() {
+            forces_n[node as usize] = self.factor.get(row);
+        }
+        size_sq
+    }
+
+    /// Adds the weight `m g` (N) of coarse nodes and active particles.
+    pub(crate) fn add_weight_n(&self, gravity_m_per_s2: DVec3, forces_n: &mut [DVec3]) {
+        for (force, mass) in forces_n.iter_mut().zip(self.weight_kg.iter().chain(&self.particle_kg)) {
+            *force += gravity_m_per_s2 * *mass;
+        }
+    }
+
+    /// `(1 − ε) m_p` (kg) of the active particles.
+    pub(super) fn particle_kg(&self) -> &[f64] {
+        &self.particle_kg
+    }
+
+    /// Kinetic and gravitational energy (J) of coarse nodes and active particles. `momenta` is a buffer.
+    pub(super) fn moving_j(
+        &self,
+        hybrid: &Hybrid,
+        (x, v): (&[DVec3], &[DVec3]),
+        gravity_m_per_s2: DVec3,
+        momenta: &mut Vec<DVec3>,
+    ) -> f64 {
+        momenta.clear();
+        momenta.resize(v.len(), DVec3::ZERO);
+        self.momenta(hybrid, v, momenta);
+        let kinetic_j: f64 = momenta.iter().zip(v).map(|(p, v)| 0.5 * p.dot(*v)).sum();
+        // Rest positions are left out: what falls asleep and what wakes has the same ones.
+        let moment: DVec3 = x.iter().zip(self.weight_kg.iter().chain(&self.particle_kg)).map(|(x, m)| *x * *m).sum();
+        kinetic_j - gravity_m_per_s2.dot(moment)
+    }
+
+    /// `v_h·M'_hf a_f` of velocities, or of accelerations: with these, what the holders have to give (W) to what follows them in part.
+    pub(crate) fn of_holders(&self, v: &[DVec3], a: &[DVec3]) -> f64 {
+        let (free, held) = self.touched.split_at(self.free_rows);
+        let rows = self.block_kg.chunks_exact(self.touched.len().max(1)).skip(self.free_rows).zip(held);
+        let of_row = |(row, &node): (&[f64], &u32)| {
+            let v = v[node as usize];
+            if v == DVec3::ZERO {
+                return 0.0;
+            }
+            row.iter().zip(free).map(|(mass, &other)| v.dot(a[other as usize]) * mass).sum::<f64>()
+        };
+        rows.map(of_row).sum()
+    }
+
+    /// Kinetic energy (J) of velocities less that of lumped masses, as far as held nodes have to do with it.
+    pub(crate) fn of_held_j(&self, hybrid: &Hybrid, v: &[DVec3]) -> f64 {
+        let held = &self.touched[self.free_rows..];
+        let rows = self.block_kg.chunks_exact(self.touched.len().max(1)).skip(self.free_rows).zip(held);
+        let of_row = |(row, &node): (&[f64], &u32)| {
+            if v[node as usize] == DVec3::ZERO {
+                return 0.0;
+            }
+            let among = |(mass, &other): (&f64, &u32)| v[node as usize].dot(v[other as usize]) * mass;
+            let among_held: f64 = row.iter().zip(&self.touched).skip(self.free_rows).map(among).sum();
+            0.5 * (among_held - hybrid.masses.node_kg[node as usize] * v[node as usize].length_squared())
+        };
+        rows.map(of_row).sum::<f64>() + self.of_holders(v, v)
+    }
+
+    /// What velocities have on free axes: `v_f·M'_ff v_f` and `v_h·M'_hf v_f` (J). `momenta` is a buffer.
+    pub(crate) fn of_free_j(&self, hybrid: &Hybrid, v: &[DVec3], momenta: &mut Vec<DVec3>) -> (f64, f64) {
+        momenta.clear();
+        momenta.resize(v.len(), DVec3::ZERO);
+        self.momenta(hybrid, v, momenta);
+        let free = hybrid.free.iter().chain(std::iter::repeat(&BVec3::TRUE));
+        let of_free = free.zip(v).zip(&*momenta).map(|((free, v), p)| DVec3::select(*free, *v, DVec3::ZERO).dot(*p));
+        let of_holders_j = self.of_holders(v, v);
+        (of_free.sum::<f64>() - of_holders_j, of_holders_j)
+    }
+
+    /// Momenta `M' v` (kg m/s) of coarse nodes and then of active particles: particle by particle, which are fewer than the block's entries.
+    pub(crate) fn momenta(&self, hybrid: &Hybrid, v: &[DVec3], momenta: &mut [DVec3]) {
+        let masses = hybrid.masses.node_kg.iter().chain(&self.particle_kg);
+        for ((momentum, v), mass) in momenta.iter_mut().zip(v).zip(masses) {
+            *momentum = *v * *mass;
+        }
+        for Followed { mass_kg, nodes, weights } in &self.followed {
+            let with: DVec3 = nodes.iter().zip(weights).map(|(node, weight)| v[*node as usize] * *weight).sum();
+            for (node, weight) in nodes.iter().zip(weights) {
+                momenta[*node as usize] -= with * (mass_kg * weight);
+            }
+        }
+    }
+}

@@ -1,0 +1,352 @@
+//! Tables of spring constants for a surface of its own: haptic-subdivision's look-up table, calibrated on some of its vertices.
+//!
+//! At every sample vertex `v` and displacement `x = ξ L_v` inwards, with `L_v` the mean length of its edges, constants at a fixed ratio are matched ([`super::matching`]) on the piece of surface around it. The table has
+//! their medians over the samples, and how far the farthest is off. Beside them stands the energy that the refined piece holds over that of the coarse one, `U′(x; K′(x))/U(x)`: both meet the same force at each
+//! `x`, but constants that change on the way give or take the difference, which whoever changes them has to book.
+//!
+//! *Limits.* What is matched is the force of one vertex. A tool that touches many is met too stiffly (`N′/N` times at the worst); [`super::matching::area_consistent`] constants are for it.
+use super::{
+    loop_scheme::refined,
+    matching::{NoMatch, Way, matched, point_force_n},
+    net::Net,
+    region::{Constants, Refined, Region},
+    topology::{NONE, Triangulation, TriangulationError},
+};
+use crate::hash::{OFFSET, fnv};
+use glam::DVec3;
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+use thiserror::Error;
+
+/// Displacements over the mean edge's length.
+const XI: [f64; 9] = [0.01, 0.05, 0.1, 0.2, 0.3, 0.45, 0.6, 0.8, 1.0];
+/// Rings around a sample, beyond those refined, that its piece of surface has: what is farther hardly feels it.
+const BEYOND: u32 = 5;
+
+/// What is calibrated.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Calibration {
+    /// Of the coarse surface.
+    pub coarse: Constants,
+    /// Rings refined.
+    pub rings: u32,
+    /// `K′_m/K′_h`.
+    pub ratio: f64,
+    /// Vertices tried.
+    pub samples: usize,
+}
+
+/// Constants over displacement.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct ConstantsTable {
+    /// Of what surface: [`fingerprint`].
+    pub fingerprint: u64,
+    /// How it was made.
+    pub of: Calibration,
+    /// Rows, by displacement.
+    pub rows: Vec<TableRow>,
+}
+
+/// A displacement.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct TableRow {
+    /// `x/L`.
+    pub xi: f64,
+    /// `K′_h/K_h`, the median.
+    pub home_ratio: f64,
+    /// How far the farthest sample's is from it, relative.
+    pub spread: f64,
+    /// `U′/U`, the median.
+    pub energy_ratio: f64,
+}
+
+/// Why there is no table.
+#[derive(Debug, Clone, PartialEq, Error)]
+pub enum CalibrationError {
+    /// A number outside its range.
+    #[error("{name} = {value}: must be {rule}")]
+    Setting {
+        /// Name.
+        name: &'static str,
+        /// Value.
+        value: f64,
+        /// What it must be.
+        rule: &'static str,
+    },
+    /// Everything is too near to a border.
+    #[error("no vertex of the surface is {rings} rings from its border: refine less, or give a finer surface")]
+    NoSample {
+        /// Rings wanted.
+        rings: u32,
+    },
+    /// A piece of it, smoothed, is no surface.
+    #[error("around vertex {vertex}, smoothed by Loop's scheme, the surface is none: {source}")]
+    Piece {
+        /// The sample.
+        vertex: u32,
+        /// Why.
+        source: TriangulationError,
+    },
+    /// No constants.
+    #[error("at vertex {vertex}, displaced by {xi} of its edges' length: {source}")]
+    NoMatch {
+        /// The sample.
+        vertex: u32,
+        /// `x/L`.
+        xi: f64,
+        /// Why.
+        source: NoMatch,
+    },
+    /// The table belongs to something else.
+    #[error("the table was made for {what}: calibrate again")]
+    Stale {
+        /// What differs.
+        what: &'static str,
+    },
+}
+
+impl ConstantsTable {
+    /// Calibrates. `tell` is told the part done.
+    ///
+    /// # Errors
+    /// [`CalibrationError`].
+    pub fn calibrate(
+        surface: &Triangulation,
+        of: Calibration,
+        tell: &mut dyn FnMut(f64),
+    ) -> Result<Self, CalibrationError> {
+        check(&of)?;
+        let samples = samples(surface, &of)?;
+        let fine_rest_m = refined(surface).0;
+        let mut found: Vec<Vec<(f64, f64)>> = Vec::new();
+        for (done, &vertex) in samples.iter().enumerate() {
+            found.push(of_sample(surface, &fine_rest_m, &of, vertex)?);
+            tell((done + 1) as f64 / samples.len() as f64);
+        }
+        let row = |(number, xi): (usize, &f64)| {
+            let homes: Vec<f64> = found.iter().map(|sample| sample[number].0).collect();
+            let home_ratio = median(&homes);
+            let spread = homes.iter().map(|home| (home / home_ratio - 1.0).abs()).fold(0.0, f64::max);
+            let energies: Vec<f64> = found.iter().map(|sample| sample[number].1).collect();
+            TableRow { xi: *xi, home_ratio, spread, energy_ratio: median(&energies) }
+        };
+        Ok(Self { fingerprint: fingerprint(surface), of, rows: XI.iter().enumerate().map(row).collect() })
+    }
+
+    /// The largest constants that it has.
+    pub fn largest(&self) -> Constants {
+        let most = self.rows.iter().map(|row| row.home_ratio).fold(0.0, f64::max);
+        let home_n_per_m = most * self.of.coarse.home_n_per_m;
+        Constants { mesh_n_per_m: self.of.ratio * home_n_per_m, home_n_per_m }
+    }
+
+    /// Constants at a displacement over the mean edge's length: linear between rows, those of the last row beyond.
+    pub fn at(&self, xi: f64) -> Constants {
+        let after = self.rows.partition_point(|row| row.xi <= xi).clamp(1, self.rows.len().saturating_sub(1).max(1));
+        let home_ratio = match (self.rows.get(after - 1), self.rows.get(after)) {
+            (Some(low), Some(high)) => {
+                let part = ((xi - low.xi) / (high.xi - low.xi)).clamp(0.0, 1.0);
+                low.home_ratio + (high.home_ratio - low.home_ratio) * part
+            }
+            (Some(only), None) => only.home_ratio,
+            _ => 1.0,
+        };
+        let home_n_per_m = home_ratio * self.of.coarse.home_n_per_m;
+        Constants { mesh_n_per_m: self.of.ratio * home_n_per_m, home_n_per_m }
+    }
+
+    /// Whether it is of this surface, and made in this way.
+    ///
+    /// # Errors
+    /// [`CalibrationError::Stale`].
+    pub fn fits(&self, surface: &Triangulation, of: &Calibration) -> Result<(), CalibrationError> {
+        let stale = |what| Err(CalibrationError::Stale { what });
+        if self.fingerprint != fingerprint(surface) {
+            return stale("another surface");
+        }
+        if self.of.coarse != of.coarse || self.of.ratio.to_bits() != of.ratio.to_bits() {
+            return stale("other spring constants");
+        }
+        if self.of.rings != of.rings {
+            return stale("another number of rings");
+        }
+        if self.rows.is_empty() || self.rows.iter().any(|row| !(row.home_ratio > 0.0 && row.home_ratio.is_finite())) {
+            return stale("nothing: it has no usable rows");
+        }
+        Ok(())
+    }
+}
+
+/// A hash of vertices and triangles (FNV-1a).
+pub fn fingerprint(surface: &Triangulation) -> u64 {
+    let positions = surface.positions_m().iter().flat_map(DVec3::to_array).flat_map(|c| c.to_bits().to_le_bytes());
+    let triangles = surface.triangles().iter().flatten().flat_map(|vertex| vertex.to_le_bytes());
+    fnv(OFFSET, positions.chain(triangles))
+}
+
+fn check(of: &Calibration) -> Result<(), CalibrationError> {
+    let numbers =
+        [("mesh_n_per_m", of.coarse.mesh_n_per_m), ("home_n_per_m", of.coarse.home_n_per_m), ("ratio", of.ratio)];
+    let bad = numbers.into_iter().find(|(_, value)| !(*value > 0.0 && value.is_finite()));
+    if let Some((name, value)) = bad {
+        return Err(CalibrationError::Setting { name, value, rule: "finite and larger than 0" });
+    }
+    for (name, count) in [("rings", of.rings as usize), ("samples", of.samples)] {
+        if count == 0 {
+            return Err(CalibrationError::Setting { name, value: 0.0, rule: "1 or more" });
+        }
+    }
+    Ok(())
+}
+
+/// Vertices evenly over the numbers of those that no border is near.
+fn samples(surface: &Triangulation, of: &Calibration) -> Result<Vec<u32>, CalibrationError> {
+    let within = |vertex: &u32| {
+        let region = Region::rings(surface, &[*vertex], of.rings);
+        region.triangles().iter().flat_map(|&t| surface.triangles()[t as usize]).all(|v| !surface.is_border(v))
+    };
+    let count = surface.positions_m().len();
+    let stride = (count / of.samples).max(1);
+    // Of each stride's vertices the first that will do.
+    let first = |start: usize| (start as u32..(start + stride).min(count) as u32).find(within);
+    let found: Vec<u32> = (0..count).step_by(stride).filter_map(first).take(of.samples).collect();
+    if found.is_empty() { Err(CalibrationError::NoSample { rings: of.rings }) } else { Ok(found) }
+}
+
+/// `K′_h/K_h` and `U′/U` at every displacement of a sample.
+fn of_sample(
+    surface: &Triangulation,
+    fine_rest_m: &[DVec3],
+    of: &Calibration,
+    vertex: u32,
+) -> Result<Vec<(f64, f64)>, CalibrationError> {
+    let in_piece = |source| CalibrationError::Piece { vertex, source };
+    let (piece, piece_rest_m, own) = piece(surface, fine_rest_m, vertex, of.rings + BEYOND).map_err(in_piece)?;
+    let after = Refined::new(&piece, &Region::rings(&piece, &[own], of.rings), &piece_rest_m);
+    let before = Net::uniform(&piece, of.coarse.mesh_n_per_m, of.coarse.home_n_per_m);
+    let edges = piece.edges_at(own);
+    let length_m = edges.iter().map(|&edge| piece.length_m(edge)).sum::<f64>() / edges.len() as f64;
+    let inwards = -normal(&piece, own);
+    let mut x_m = before.rest_m.clone();
+    let at = |xi: &f64| {
+        let no_match = |source| CalibrationError::NoMatch { vertex, xi: *xi, source };
+        let push_m = inwards * (xi * length_m);
+        let force = point_force_n(&before, own, push_m, &mut x_m).map_err(|e| no_match(e.into()))?;
+        let force_n = force.dot(inwards);
+        let found = matched(&after, &of.coarse, (own, push_m), force_n, Way::Ratio(of.ratio)).map_err(no_match)?;
+        let net = after.net(&of.coarse, &found);
+        let mut x_after = net.rest_m.clone();
+        point_force_n(&net, own, push_m, &mut x_after).map_err(|e| no_match(e.into()))?;
+        Ok((found.home_n_per_m / of.coarse.home_n_per_m, net.energy_j(&x_after) / before.energy_j(&x_m)))
+    };
+    XI.iter().map(at).collect()
+}
+
+/// The surface within some rings of a vertex at its homes, homes (m) of it refined, and the vertex's number there.
+fn piece(
+    surface: &Triangulation,
+    fine_rest_m: &[DVec3],
+    vertex: u32,
+    rings: u32,
+) -> Result<(Triangulation, Vec<DVec3>, u32), TriangulationError> {
+    let region = Region::rings(surface, &[vertex], rings);
+    let corners = || region.triangles().iter().map(|&t| surface.triangles()[t as usize]);
+    let mut number: BTreeMap<u32, u32> = corners().flatten().map(|v| (v, NONE)).collect();
+    number.values_mut().zip(0..).for_each(|(own, next)| *own = next);
+    let homes: Vec<DVec3> = number.keys().map(|&v| fine_rest_m[v as usize]).collect();
+    let triangles = corners().map(|triangle| triangle.map(|v| number[&v])).collect();
+    let piece = Triangulation::new(homes.clone(), triangles)?;
+    let whole: Vec<u32> = number.keys().copied().collect();
+    let middle = |nodes: [u32; 2]| {
+        let [a, b] = nodes.map(|node| whole[node as usize]);
+        let edge = surface.edge_between(a, b);
+        edge.map_or(DVec3::ZERO, |edge| fine_rest_m[surface.positions_m().len() + edge as usize])
+    };
+    let rest_m = homes.iter().copied().chain(piece.edges().iter().map(|edge| middle(edge.nodes))).collect();
+    Ok((piece, rest_m, number[&vertex]))
+}
+
+/// Outwards, by the areas of the triangles around.
+fn normal(surface: &Triangulation, vertex: u32) -> DVec3 {
+    let of = |&triangle: &u32| {
+        let [a, b, c] = surface.triangles()[triangle as usize].map(|v| surface.positions_m()[v as usize]);
+        (b - a).cross(c - a)
+    };
+    surface.triangles_at(vertex).iter().map(of).sum::<DVec3>().normalize_or_zero()
+}
+
+fn median(values: &[f64]) -> f64 {
+    let mut sorted = values.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    let [low, high] = [(sorted.len() - 1) / 2, sorted.len() / 2].map(|at| sorted[at]);
+    f64::midpoint(low, high)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::bodies::mass_spring::testing::{hexagon, sphere};
+
+    const OF: Calibration =
+        Calibration { coarse: Constants { mesh_n_per_m: 60.0, home_n_per_m: 60.0 }, rings: 1, ratio: 1.0, samples: 1 };
+
+    /// On the paper's sheet the table is figure 8's middle curve.
+    #[test]
+    fn on_the_flat_sheet_it_is_the_papers_curve() {
+        let table = ConstantsTable::calibrate(&hexagon(8, 0.03), OF, &mut |_| {}).unwrap();
+        let of = |xi: f64| table.rows.iter().find(|row| row.xi == xi).unwrap();
+        assert!(
+            (of(0.01).home_ratio - 0.9993).abs() < 1e-3 && (of(1.0).home_ratio - 0.7041).abs() < 2e-3,
+            "{:?}",
+            table.rows
+        );
+        // With constants that fall on the way another energy is held than was put in.
+        assert!((of(0.01).energy_ratio - 1.0).abs() < 1e-3, "{:?}", of(0.01));
+        assert!(table.rows.iter().all(|row| (0.5..1.5).contains(&row.energy_ratio)), "{:?}", table.rows);
+        let between = table.at(0.7).home_n_per_m / 60.0;
+        assert!((between - f64::midpoint(of(0.6).home_ratio, of(0.8).home_ratio)).abs() < 1e-12);
+        assert_eq!(table.at(9.0).home_n_per_m, 60.0 * of(1.0).home_ratio);
+        assert_eq!(table.at(0.0).mesh_n_per_m, 60.0 * of(0.01).home_ratio);
+    }
+
+    /// With constants of the table a vertex that was no sample feels as before, within what samples differ by.
+    #[test]
+    fn on_a_ball_other_vertices_feel_as_before() {
+        let ball = sphere(3, 0.05);
+        let table = ConstantsTable::calibrate(&ball, Calibration { samples: 6, ..OF }, &mut |_| {}).unwrap();
+        let fine_rest = refined(&ball).0;
+        let homes = ball.moved(fine_rest[..ball.positions_m().len()].to_vec()).unwrap();
+        let coarse = Net::uniform(&homes, 60.0, 60.0);
+        for (vertex, row) in [(101, 4), (7, 2), (200, 6)].map(|(v, r): (u32, usize)| (v, table.rows[r])) {
+            let edges = homes.edges_at(vertex);
+            let length = edges.iter().map(|&edge| homes.length_m(edge)).sum::<f64>() / edges.len() as f64;
+            let push = -normal(&homes, vertex) * (row.xi * length);
+            let force = |net: &Net| point_force_n(net, vertex, push, &mut net.rest_m.clone()).unwrap().length();
+            let after = Refined::new(&ball, &Region::rings(&ball, &[vertex], 1), &fine_rest);
+            let ratio = force(&after.net(&OF.coarse, &table.at(row.xi))) / force(&coarse);
+            assert!((ratio - 1.0).abs() < 0.05 + row.spread, "{vertex} at {}: {ratio}, spread {}", row.xi, row.spread);
+        }
+    }
+
+    #[test]
+    fn what_does_not_fit_is_told() {
+        let patch = hexagon(4, 0.03);
+        let table = ConstantsTable::calibrate(&patch, OF, &mut |_| {}).unwrap();
+        table.fits(&patch, &OF).unwrap();
+        let other = Constants { home_n_per_m: 59.0, ..OF.coarse };
+        for (surface, of, what) in [
+            (&hexagon(4, 0.031), OF, "another surface"),
+            (&patch, Calibration { coarse: other, ..OF }, "other spring constants"),
+            (&patch, Calibration { ratio: 2.0, ..OF }, "other spring constants"),
+            (&patch, Calibration { rings: 2, ..OF }, "another number of rings"),
+        ] {
+            assert_eq!(table.fits(surface, &of), Err(CalibrationError::Stale { what }));
+        }
+        let refused = |of| ConstantsTable::calibrate(&patch, of, &mut |_| {}).unwrap_err().to_string();
+        assert_eq!(refused(Calibration { ratio: 0.0, ..OF }), "ratio = 0: must be finite and larger than 0");
+        assert_eq!(refused(Calibration { rings: 0, ..OF }), "rings = 0: must be 1 or more");
+        assert!(refused(Calibration { rings: 9, ..OF }).starts_with("no vertex of the surface is 9 rings from"));
+        let nothing = ConstantsTable { rows: vec![], ..table };
+        assert!(nothing.fits(&patch, &OF).is_err() && nothing.at(0.5).home_n_per_m == 60.0);
+    }
+}

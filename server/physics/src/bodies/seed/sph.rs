@@ -1,0 +1,131 @@
+//! The particles' internal force: raw SPH on the awake particles of a region (2006, section 3.2).
+//!
+//! Strain (eqs. 1, 5): with displacements `d = x − u`, as eq. 1 has it,
+//! ```text
+//! F_i = I + Σ_j (d_j − d_i) ⊗ b_ij        b_ij = ∇_i W(u_i − u_j) ΔV_j
+//! ```
+//! Eq. 25 differentiated is `Σ_j d_j ⊗ b_ij`. Its `d_i` is added here (`Σ_j b_ij = 0` within the layer, not at its borders), because a layer that
+//! moves as a whole would be strained. With positions, as eq. 4 reads, the body at rest would have `F = A_i = Σ_j (u_j − u_i) ⊗ b_ij`,
+//! which is not I ([`moment`]): it would burst at rest. With displacements rest is rest, but any uniform deformation G is seen as
+//! `I + (G − I) A_i`, and a rotation as strain.
+//!
+//! Stress (eqs. 9, 11): `σ = λ tr(E) I + 2µE + φ tr(ν) I + 2ψν`, `ν = 2Ė` (eq. 10). Constants: see [`super::SeedParameters::layer_factor`].
+//!
+//! Force (eq. 29), with σ as it is, without F, and added: `∇W` taken at i points from i to j, so a layer under tension pulls i to j.
+//! ```text
+//! f_i = ΔV_i Σ_j (σ_i + σ_j) b_ij        as printed: ΔV_i Σ_j σ_j b_ij
+//! ```
+//! 2005's eq. 13 is the printed one with the gradient at j, and the other sign. With `σ_j` alone ([`PairStress::Neighbour`]) forces between two
+//! particles are not opposite: momentum is lost at the border, the stiffness is not symmetric, and a layer at rest flutters: any small motion
+//! grows, at any step. `σ_i` ([`PairStress::Both`]) costs nothing within, where `Σ_j b_ij = 0`; with it the force is, at small strain,
+//! `−∂U/∂x` of `U = ΔV Σ_i ½ E_i:σ_i`, because `b_ji = −b_ij`. Neighbours are awake particles: what sleeps is not there.
+//! Rest positions never change, so neither do neighbours and weights: "whose connectivity must be determined for each time step" is
+//! what eq. 25, with rest positions in W, does not need.
+use super::{PairStress, SeedParameters, kernel::Stencil, region::Region, voxels::NONE};
+use crate::{
+    linalg::tensor::outer,
+    material::{
+        Lame, Viscosity,
+        stvk::green_strain,
+        viscous::{second_piola, strain_rate},
+    },
+};
+use glam::{DMat3, DVec3};
+
+/// Constants of the layer, the papers' factors applied.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LayerStress {
+    lame: Lame,
+    viscosity: Viscosity,
+}
+
+impl LayerStress {
+    /// With `factor` over the core's constants.
+    pub fn new(parameters: &SeedParameters) -> Self {
+        let SeedParameters { lame, viscosity, convention, .. } = *parameters;
+        let elastic = parameters.layer_factor() * convention.elastic_factor();
+        let viscous = parameters.layer_factor() * convention.viscous_factor();
+        Self {
+            lame: Lame { lambda_pa: elastic * lame.lambda_pa, mu_pa: elastic * lame.mu_pa },
+            viscosity: Viscosity { phi_pa_s: viscous * viscosity.phi_pa_s, psi_pa_s: viscous * viscosity.psi_pa_s },
+        }
+    }
+
+    /// λ and µ (Pa) as they act.
+    pub fn lame(&self) -> Lame {
+        self.lame
+    }
+
+    /// `σ = λ tr(E) I + 2µE + φ tr(Ė) I + 2ψĖ` (Pa).
+    pub fn stress_pa(&self, f: &DMat3, f_dot: &DMat3) -> DMat3 {
+        // The elastic stress has the viscous one's form, with λ, µ and E in the place of φ, ψ and Ė.
+        let as_elastic = Viscosity { phi_pa_s: self.lame.lambda_pa, psi_pa_s: self.lame.mu_pa };
+        let elastic = second_piola(as_elastic, &green_strain(f));
+        if self.viscosity.is_zero() {
+            return elastic;
+        }
+        elastic + second_piola(self.viscosity, &strain_rate(f, f_dot))
+    }
+}
+
+/// `Σ_j (a_j − a_i) ⊗ b_ij` over awake neighbours.
+pub fn gradient_of(region: &Region, stencil: &Stencil, a: &[DVec3], slot: usize) -> DMat3 {
+    let mut sum = DMat3::ZERO;
+    let here = a[slot];
+    for (neighbour, b) in neighbours(region, stencil, slot) {
+        sum += outer(a[neighbour] - here, b);
+    }
+    sum
+}
+
+/// `A_i = Σ_j (u_j − u_i) ⊗ b_ij`: what the sum sees of the identity. I would be right.
+pub fn moment(region: &Region, stencil: &Stencil, slot: usize) -> DMat3 {
+    let here = region.rest_m(slot);
+    neighbours(region, stencil, slot).map(|(j, b)| outer(region.rest_m(j) - here, b)).fold(DMat3::ZERO, |a, b| a + b)
+}
+
+/// Stress (Pa) of every slot from displacements (m) and velocities (m/s).
+pub fn stresses_pa(
+    region: &Region,
+    stencil: &Stencil,
+    law: &LayerStress,
+    (displacements_m, v): (&[DVec3], &[DVec3]),
+    stresses_pa: &mut [DMat3],
+) {
+    for (slot, stress) in stresses_pa.iter_mut().enumerate().take(region.len()) {
+        let f = DMat3::IDENTITY + gradient_of(region, stencil, displacements_m, slot);
+        let f_dot = gradient_of(region, stencil, v, slot);
+        *stress = law.stress_pa(&f, &f_dot);
+    }
+}
+
+/// Eq. 29: force (N) on every slot's particle of volume ΔV (m³).
+pub fn forces_n(
+    region: &Region,
+    stencil: &Stencil,
+    volume_m3: f64,
+    pair_stress: PairStress,
+    stresses_pa: &[DMat3],
+    forces_n: &mut [DVec3],
+) {
+    for (slot, force) in forces_n.iter_mut().enumerate().take(region.len()) {
+        let mut sum = DVec3::ZERO;
+        for (neighbour, b) in neighbours(region, stencil, slot) {
+            sum += match pair_stress {
+                PairStress::Neighbour => stresses_pa[neighbour] * b,
+                PairStress::Both => (stresses_pa[slot] + stresses_pa[neighbour]) * b,
+            };
+        }
+        *force = sum * volume_m3;
+    }
+}
+
+/// Slots of the awake neighbours and `b` (1/m) towards them.
+fn neighbours<'a>(region: &'a Region, stencil: &'a Stencil, slot: usize) -> impl Iterator<Item = (usize, DVec3)> + 'a {
+    // The box reaches as far as the stencil does: no step leaves it.
+    let voxel = region.voxel_of[slot] as i32;
+    region.steps.iter().zip(&stencil.gradients_per_m).filter_map(move |(step, b)| {
+        let neighbour = region.slot_at[(voxel + step) as usize];
+        (neighbour != NONE).then_some((neighbour as usize, *b))
+    })
+}

@@ -1,0 +1,5 @@
+//! Linear tetrahedral elements: shape gradients, lumped mass, stiffness at rest, loads on the boundary.
+pub mod linear_tet;
+pub mod loads;
+pub mod mass;
+pub mod rest_stiffness;

@@ -1,0 +1,139 @@
+//! From a mesh to blocks: tets grouped by material, ordered for locality, padded to whole blocks.
+use super::{
+    block::{Block, Blocks, Run},
+    laws::Constants,
+};
+use crate::lanes::real::Scalar;
+use crate::{elements::linear_tet::RestTet, material::Material, mesh::TetMesh};
+use glam::DVec3;
+
+/// Consecutive tets along the space-filling curve are spread over the lanes of this many blocks, so that lanes of one
+/// block rarely share a node: sums of one node would wait for each other in the scatter.
+const BLOCKS_PER_WINDOW: usize = 16;
+
+/// Blocks of all tets, and the runs of equal material among them.
+pub(crate) fn blocks<T: Scalar, const N: usize>(
+    mesh: &TetMesh,
+    rest_tets: &[RestTet],
+    tet_material: &[u16],
+    materials: &[Material],
+) -> (Blocks<T, N>, Vec<Run<T>>) {
+    let curve = morton_codes(mesh);
+    let mut order: Vec<u32> = (0..rest_tets.len() as u32).collect();
+    order.sort_by_key(|&t| (tet_material[t as usize], curve[t as usize], t));
+    let spare = mesh.positions_m().len() as u32;
+    let mut blocks = Vec::with_capacity(order.len().div_ceil(N) + materials.len());
+    let mut runs = Vec::new();
+    for group in order.chunk_by(|&a, &b| tet_material[a as usize] == tet_material[b as usize]) {
+        let start = blocks.len();
+        for window in group.chunks(N * BLOCKS_PER_WINDOW) {
+            let count = window.len().div_ceil(N);
+            for first in 0..count {
+                let lanes = window.iter().skip(first).step_by(count);
+                blocks.push(block(lanes.map(|&t| t as usize), mesh, rest_tets, spare));
+            }
+        }
+        let material = materials[tet_material[group[0] as usize] as usize];
+        runs.push(Run { material, constants: Constants::of(&material), blocks: start..blocks.len() });
+    }
+    (Blocks::new(blocks, spare as usize), runs)
+}
+
+fn block<T: Scalar, const N: usize>(
+    tets: impl Iterator<Item = usize>,
+    mesh: &TetMesh,
+    rest_tets: &[RestTet],
+    spare: u32,
+) -> Block<T, N> {
+    let zero = T::of(0.0);
+    let mut block = Block { nodes: [[spare; 4]; N], gradients: [[zero; N]; 9], minus_volume: [zero; N] };
+    for (lane, tet) in tets.enumerate() {
+        block.nodes[lane] = mesh.tets()[tet];
+        for corner in 0..3 {
+            for axis in 0..3 {
+                let gradient = rest_tets[tet].gradients_per_m[corner + 1][axis];
+                block.gradients[3 * corner + axis][lane] = T::of(gradient);
+            }
+        }
+        block.minus_volume[lane] = T::of(-rest_tets[tet].volume_m3);
+    }
+    block
+}
+
+/// Place of each tet's centroid along the Morton curve through the bounding box.
+fn morton_codes(mesh: &TetMesh) -> Vec<u64> {
+    let (low, high) = mesh.bounds_m();
+    let extent = (high - low).max_element();
+    let cells = f64::from(1_u32 << 20);
+    (0..mesh.tets().len())
+        .map(|tet| {
+            let centroid = mesh.corners_m(tet).iter().sum::<DVec3>() / 4.0;
+            let cell = (centroid - low) / extent * cells;
+            spread(cell.x as u64) | spread(cell.y as u64) << 1 | spread(cell.z as u64) << 2
+        })
+        .collect()
+}
+
+/// Two zero bits between any two of the low 21 bits.
+fn spread(mut bits: u64) -> u64 {
+    for (shift, mask) in [
+        (32, 0x001f_0000_0000_ffff),
+        (16, 0x001f_0000_ff00_00ff),
+        (8, 0x100f_00f0_0f00_f00f),
+        (4, 0x10c3_0c30_c30c_30c3),
+        (2, 0x1249_2492_4924_9249),
+    ] {
+        bits = (bits | bits << shift) & mask;
+    }
+    bits
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::material::{Convention, Lame, Law, Viscosity};
+
+    #[test]
+    fn bits_are_spread_by_three() {
+        for bit in 0..21 {
+            assert_eq!(spread(1 << bit), 1 << (3 * bit));
+        }
+        assert_eq!(spread(0x1f_ffff), 0x1249_2492_4924_9249);
+    }
+
+    /// 37 tets in two materials: every tet in one lane of its material's run, every other lane harmless.
+    #[test]
+    fn each_tet_has_one_lane_and_padding_points_to_the_spare_node() {
+        let count = 37_u32;
+        let mut points = vec![DVec3::Y, DVec3::Z];
+        points.extend((0..=count).map(|i| DVec3::X * f64::from(i)));
+        let tets = (0..count).map(|i| [i + 2, i + 3, 0, 1]).collect();
+        let mesh = TetMesh::new(points, tets).unwrap();
+        let rest: Vec<RestTet> = (0..37).map(|t| RestTet::new(&mesh.edge_matrix_m(t))).collect();
+        let of = |mu_pa| {
+            let lame = Lame::new(0.0, mu_pa).unwrap();
+            Material::new(Law::default(), lame, Viscosity::default(), Convention::Consistent)
+        };
+        let tet_material: Vec<u16> = (0..37).map(|t| u16::from(t % 3 == 0)).collect();
+        let (blocks, runs) = blocks::<f32, 16>(&mesh, &rest, &tet_material, &[of(1.0), of(2.0)]);
+        let mut seen = vec![0; 37];
+        for run in &runs {
+            for block in blocks.of(run) {
+                for lane in 0..16 {
+                    match block.nodes[lane][0] as usize {
+                        40 => {
+                            assert_eq!(block.nodes[lane], [40; 4]);
+                            assert_eq!(block.minus_volume[lane], 0.0);
+                        }
+                        node => {
+                            seen[node - 2] += 1;
+                            assert_eq!(run.material.lame.mu_pa, if (node - 2) % 3 == 0 { 2.0 } else { 1.0 });
+                        }
+                    }
+                }
+            }
+        }
+        assert_eq!(seen, vec![1; 37]);
+        assert_eq!(runs.iter().map(|run| blocks.of(run).len()).sum::<usize>(), 3);
+    }
+}

@@ -1,0 +1,138 @@
+//! What the kernel computes with: scalars, and vectors of them.
+use super::nodes::{Lanes, Node, Quad};
+use std::ops::{Add, Div, Mul, Neg, Sub};
+
+/// A number, or a vector of numbers that all do the same. Every operation is one IEEE operation per lane, never
+/// contracted, so that all instruction sets give the same bits.
+pub(crate) trait Real:
+    Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> + Div<Output = Self> + Neg<Output = Self>
+{
+    /// Steps of the iteration of `laws::FixedCorotated` that reach this precision.
+    const ROTATION_STEPS: usize;
+    /// Rounded from f64, in every lane.
+    fn of(value: f64) -> Self;
+    /// `√`, correctly rounded.
+    fn sqrt(self) -> Self;
+    /// The larger one, for numbers that are not NaN.
+    fn max(self, other: Self) -> Self;
+}
+
+/// f32 or f64: what is stored.
+pub(crate) trait Scalar: Real + Default + PartialOrd + From<f32> + Into<f64> {
+    /// Vectors of what every machine of the target has.
+    type Baseline: Vector<Scalar = Self>;
+    /// Vectors of AVX2.
+    type Avx2: Vector<Scalar = Self>;
+    /// Vectors of AVX-512.
+    type Avx512: Vector<Scalar = Self>;
+    /// Lanes `first..first + 4` back to rows: `[tet][i − 1]`.
+    fn lanes_to_rows<const N: usize>(lanes: &Lanes<Self, N>, first: usize) -> [[Quad<Self>; 3]; 4];
+}
+
+/// A vector of scalars.
+pub(crate) trait Vector: Real {
+    /// Its lanes' type.
+    type Scalar: Scalar;
+    /// A vector for so few lanes that this one would be half empty; itself where there is none that is less work.
+    type Narrow: Vector<Scalar = Self::Scalar>;
+    /// Its number of lanes.
+    const WIDTH: usize;
+    /// Lanes from the start of a slice that has at least [`Self::WIDTH`].
+    fn load(source: &[Self::Scalar]) -> Self;
+    /// Lanes to the start of a slice that has at least [`Self::WIDTH`].
+    fn store(self, target: &mut [Self::Scalar]);
+    /// Rows `a_i − a_0` of four tets, taken in f64 and then rounded, to lanes `first..first + 4`: `edges[3(i − 1) + axis][first + tet]`.
+    fn edges_to_lanes<const N: usize>(corners: &[[&Node; 4]; 4], edges: &mut Lanes<Self::Scalar, N>, first: usize);
+}
+
+macro_rules! scalar {
+    ($scalar:ident, $steps:expr) => {
+        impl Real for $scalar {
+            const ROTATION_STEPS: usize = $steps;
+            #[inline(always)]
+            fn of(value: f64) -> Self {
+                value as $scalar
+            }
+            #[inline(always)]
+            fn sqrt(self) -> Self {
+                self.sqrt()
+            }
+            #[inline(always)]
+            fn max(self, other: Self) -> Self {
+                if self > other { self } else { other }
+            }
+        }
+
+        impl Vector for $scalar {
+            type Scalar = Self;
+            type Narrow = Self;
+            const WIDTH: usize = 1;
+            #[inline(always)]
+            fn load(source: &[Self]) -> Self {
+                source[0]
+            }
+            #[inline(always)]
+            fn store(self, target: &mut [Self]) {
+                target[0] = self;
+            }
+            #[inline(always)]
+            fn edges_to_lanes<const N: usize>(corners: &[[&Node; 4]; 4], edges: &mut Lanes<Self, N>, first: usize) {
+                edges_to_lanes(corners, edges, first);
+            }
+        }
+    };
+}
+scalar!(f32, 5);
+scalar!(f64, 6);
+
+/// [`Vector::edges_to_lanes`] in plain code.
+#[inline(always)]
+pub(crate) fn edges_to_lanes<T: Scalar, const N: usize>(
+    corners: &[[&Node; 4]; 4],
+    edges: &mut Lanes<T, N>,
+    first: usize,
+) {
+    for tet in 0..4 {
+        for edge in 0..3 {
+            for axis in 0..3 {
+                edges[3 * edge + axis][first + tet] = T::of(corners[tet][edge + 1].0[axis] - corners[tet][0].0[axis]);
+            }
+        }
+    }
+}
+
+/// [`Scalar::lanes_to_rows`] in plain code.
+#[inline(always)]
+pub(crate) fn lanes_to_rows<T: Scalar, const N: usize>(lanes: &Lanes<T, N>, first: usize) -> [[Quad<T>; 3]; 4] {
+    let mut rows = [[[T::of(0.0); 4]; 3]; 4];
+    for tet in 0..4 {
+        for corner in 0..3 {
+            for axis in 0..3 {
+                rows[tet][corner][axis] = lanes[3 * corner + axis][first + tet];
+            }
+        }
+    }
+    rows
+}
+
+#[cfg(not(target_arch = "x86_64"))]
+mod elsewhere {
+    //! One lane at a time: the compiler vectorises the loop over lanes where it can.
+    use super::{Lanes, Quad, Scalar};
+
+    macro_rules! plain {
+        ($scalar:ident) => {
+            impl Scalar for $scalar {
+                type Baseline = Self;
+                type Avx2 = Self;
+                type Avx512 = Self;
+                #[inline(always)]
+                fn lanes_to_rows<const N: usize>(lanes: &Lanes<Self, N>, first: usize) -> [[Quad<Self>; 3]; 4] {
+                    crate::kernels::lanes_to_rows(lanes, first)
+                }
+            }
+        };
+    }
+    plain!(f32);
+    plain!(f64);
+}

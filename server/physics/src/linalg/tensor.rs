@@ -1,0 +1,30 @@
+//! Operations on 3×3 matrices that glam has not.
+use glam::{DMat3, DVec3};
+
+/// `tr(A)`.
+pub fn trace(a: &DMat3) -> f64 {
+    a.x_axis.x + a.y_axis.y + a.z_axis.z
+}
+
+/// `A:B = Σ A_ij B_ij`.
+pub fn contract(a: &DMat3, b: &DMat3) -> f64 {
+    a.x_axis.dot(b.x_axis) + a.y_axis.dot(b.y_axis) + a.z_axis.dot(b.z_axis)
+}
+
+/// `a bᵀ`.
+pub fn outer(a: DVec3, b: DVec3) -> DMat3 {
+    DMat3::from_cols(a * b.x, a * b.y, a * b.z)
+}
+
+/// Largest eigenvalue of a symmetric positive semi-definite 3×3 matrix, in closed form: with `q = tr A/3`,
+/// `p = √(|A − qI|²/6)`, `B = (A − qI)/p`: `λ_max = q + 2p cos(⅓ arccos(½ det B))`.
+pub fn largest_eigenvalue(a: &DMat3) -> f64 {
+    let q = trace(a) / 3.0;
+    let deviator = *a - DMat3::from_diagonal(DVec3::splat(q));
+    let p = (contract(&deviator, &deviator) / 6.0).sqrt();
+    if p == 0.0 {
+        return q;
+    }
+    let half_det = (deviator * (1.0 / p)).determinant() * 0.5;
+    q + 2.0 * p * (half_det.clamp(-1.0, 1.0).acos() / 3.0).cos()
+}

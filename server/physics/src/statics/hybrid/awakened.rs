@@ -1,0 +1,184 @@
+//! A hybrid body with some of its particles awake: what its equilibrium is sought over.
+//!
+//! A *place* lists positions (m): of the coarse nodes, of the awake particles, then of all tools. The skin follows it linearly,
+//! `y_v = Y_v + Σ_q w_vq (x_q − X_q)`, and hands forces back by the same weights; a *configuration* of contact lists the skin's vertices, then the tools.
+use crate::{
+    bodies::hybrid::{
+        Hybrid,
+        patch::{Field, KEPT, Patch},
+        place::Place,
+    },
+    world::Model,
+};
+use glam::{BVec3, DMat3, DVec3};
+use std::collections::BTreeMap;
+
+/// A hybrid body, and the particles of it that are awake.
+pub(super) struct Awakened<'a> {
+    pub(super) model: &'a Model,
+    pub(super) body: &'a Hybrid,
+    pub(super) patch: Patch,
+    /// Of every entry of a place, axes along which it may move.
+    pub(super) free: Vec<BVec3>,
+    /// Rest positions (m) of nodes and particles.
+    rest_m: Vec<DVec3>,
+    /// `m g` (N) of nodes and particles.
+    pub(super) weight_n: Vec<DVec3>,
+    /// Diagonal blocks (N/m) of the elastic stiffness at rest, of nodes and particles.
+    pub(super) diagonal_n_per_m: Vec<DMat3>,
+    /// Where the carriers of each vertex of the skin start, and one more.
+    first: Vec<u32>,
+    carriers: Vec<(u32, f64)>,
+}
+
+impl<'a> Awakened<'a> {
+    /// With these particles, ascending, awake.
+    pub(super) fn new(model: &'a Model, body: &'a Hybrid, ids: &[u32]) -> Self {
+        let partition = body.partition();
+        let patch = Patch::new(partition, &ids.iter().copied().collect());
+        let nodes = body.node_count();
+        let springs = (0..model.spec().tools.len()).map(|tool| BVec3::splat(model.contact().spring(tool).is_some()));
+        let particles = ids.iter().map(|_| BVec3::TRUE);
+        let free = body.free().iter().copied().chain(particles).chain(springs).collect();
+        let rest_m = partition.coarse().positions_m().iter().copied();
+        let rest_m = rest_m.chain(ids.iter().map(|&id| partition.particle_m(id))).collect();
+        let mut weight_n: Vec<DVec3> =
+            body.masses().node_kg.iter().map(|mass| model.gravity_m_per_s2() * *mass).collect();
+        for &id in ids {
+            let own_n = model.gravity_m_per_s2() * ((1.0 - KEPT) * body.masses().particle_kg[id as usize]);
+            partition.anchor(id).push(-own_n, &mut weight_n[..nodes]);
+            weight_n.push(own_n);
+        }
+        let diagonal_n_per_m = patch.diagonal_n_per_m(&body.materials(), nodes);
+        let mut awakened =
+            Self { model, body, patch, free, rest_m, weight_n, diagonal_n_per_m, first: vec![0], carriers: Vec::new() };
+        for vertex in 0..model.surface_rest_positions_m().len() as u32 {
+            let carriers = awakened.carriers_of(&body.place(vertex).place(partition));
+            awakened.carriers.extend(carriers);
+            awakened.first.push(awakened.carriers.len() as u32);
+        }
+        awakened
+    }
+
+    fn carriers_of(&self, place: &Place) -> BTreeMap<u32, f64> {
+        let mut carriers = BTreeMap::new();
+        let mut add = |entry: u32, weight: f64| {
+            if weight != 0.0 {
+                *carriers.entry(entry).or_default() += weight;
+            }
+        };
+        for (&particle, weight) in place.particles.iter().zip(place.weights) {
+            if let Ok(number) = self.patch.active().binary_search(&particle) {
+                add((self.nodes() + number) as u32, weight);
+                continue;
+            }
+            let anchor = self.body.partition().anchor(particle);
+            anchor.nodes.iter().zip(anchor.weights).for_each(|(&node, share)| add(node, weight * share));
+        }
+        carriers
+    }
+
+    /// Coarse nodes.
+    pub(super) fn nodes(&self) -> usize {
+        self.body.node_count()
+    }
+
+    /// Entries of a place before the tools.
+    pub(super) fn entries(&self) -> usize {
+        self.rest_m.len()
+    }
+
+    /// Vertices of the skin.
+    pub(super) fn vertices(&self) -> usize {
+        self.first.len() - 1
+    }
+
+    /// What an entry of a configuration moves with; tools with themselves.
+    pub(super) fn carriers(&self, entry: u32) -> Vec<(u32, f64)> {
+        match (entry as usize).checked_sub(self.vertices()) {
+            Some(tool) => vec![((self.entries() + tool) as u32, 1.0)],
+            None => self.of_vertex(entry as usize).to_vec(),
+        }
+    }
+
+    fn of_vertex(&self, vertex: usize) -> &[(u32, f64)] {
+        &self.carriers[self.first[vertex] as usize..self.first[vertex + 1] as usize]
+    }
+
+    /// The configuration at a place.
+    pub(super) fn configuration(&self, place: &[DVec3]) -> Vec<DVec3> {
+        let moved: Vec<DVec3> = place.iter().zip(&self.rest_m).map(|(x, rest)| *x - *rest).collect();
+        let mut configuration = self.directions(&moved);
+        for (y, rest) in configuration.iter_mut().zip(self.model.surface_rest_positions_m()) {
+            *y += *rest;
+        }
+        configuration.extend_from_slice(&place[self.entries()..]);
+        configuration
+    }
+
+    /// How the skin's vertices move when nodes and particles do.
+    pub(super) fn directions(&self, entries: &[DVec3]) -> Vec<DVec3> {
+        let of = |vertex: usize| self.of_vertex(vertex).iter().map(|&(e, w)| entries[e as usize] * w).sum();
+        (0..self.vertices()).map(of).collect()
+    }
+
+    /// Adds forces (N) of a configuration to those of a place.
+    pub(super) fn hand_back(&self, of_configuration_n: &[DVec3], forces_n: &mut [DVec3]) {
+        let (of_skin, of_tools) = of_configuration_n.split_at(self.vertices());
+        for (vertex, force_n) in of_skin.iter().enumerate().filter(|(_, force_n)| **force_n != DVec3::ZERO) {
+            for &(entry, weight) in self.of_vertex(vertex) {
+                forces_n[entry as usize] += *force_n * weight;
+            }
+        }
+        for (force_n, of_tool) in forces_n[self.entries()..].iter_mut().zip(of_tools) {
+            *force_n += *of_tool;
+        }
+    }
+
+    /// Elastic forces (N) on nodes and particles, none on tools.
+    pub(super) fn elastic_n(&self, place: &[DVec3]) -> Vec<DVec3> {
+        let at = self.field(place);
+        let still = self.field(&vec![DVec3::ZERO; place.len()]);
+        let forces = self.patch.forces_n(&self.body.materials(), &at, &still).0;
+        Self::list(forces, place.len())
+    }
+
+    /// Their change along a direction.
+    pub(super) fn elastic_change_n(&self, place: &[DVec3], direction: &[DVec3]) -> Vec<DVec3> {
+        let changes = self.patch.products_n(&self.body.materials(), &self.field(place), &self.field(direction));
+        Self::list(changes, place.len())
+    }
+
+    /// Elastic energy (J).
+    pub(super) fn elastic_j(&self, place: &[DVec3]) -> f64 {
+        self.patch.energy_j(&self.body.materials(), &self.field(place))
+    }
+
+    fn list(field: Field, length: usize) -> Vec<DVec3> {
+        let mut list = field.nodes;
+        list.extend(field.particles);
+        list.resize(length, DVec3::ZERO);
+        list
+    }
+
+    pub(super) fn field(&self, place: &[DVec3]) -> Field {
+        Field { nodes: place[..self.nodes()].to_vec(), particles: place[self.nodes()..self.entries()].to_vec() }
+    }
+
+    /// Everything at rest.
+    pub(super) fn at_rest(&self) -> Vec<DVec3> {
+        let tools = self.model.spec().tools.iter().map(|tool| tool.start_position_m);
+        self.rest_m.iter().copied().chain(tools).collect()
+    }
+
+    /// A place where other particles were awake: what wakes is where it followed to, what falls asleep follows.
+    pub(super) fn taking_over(&self, other: &Self, place: &[DVec3]) -> Vec<DVec3> {
+        let (nodes, particles) = (&place[..self.nodes()], &place[self.nodes()..other.entries()]);
+        let of = |id: &u32| match other.patch.active().binary_search(id) {
+            Ok(number) => particles[number],
+            Err(_) => self.body.partition().anchor(*id).of(nodes),
+        };
+        let awake = self.patch.active().iter().map(of);
+        nodes.iter().copied().chain(awake).chain(place[other.entries()..].iter().copied()).collect()
+    }
+}

@@ -1,0 +1,153 @@
+//! Equilibrium of a hybrid body: coarse nodes, the particles that are awake, and tools on springs.
+//!
+//! As for bodies of tets the goal is reached in stages. After each the solver looks which particles are to be awake, and where those are others, finds the
+//! stage's equilibrium again with them: what it ends with does not depend on what was awake on the way, but for where a tool's ball stays put.
+//!
+//! - `awake.rs`: which particles
+//! - `awakened.rs`: the body with them
+//! - `stage.rs`: forces, tangent and potential at a fraction of the goal
+//! - `newton.rs`: Newton's method at one stage
+mod awake;
+mod awakened;
+mod newton;
+mod stage;
+
+use super::{
+    AwakeParticles, Progress, SolveError, StaticSettings, StaticSolution,
+    equilibrium::Goal,
+    load_path,
+    newton::{Failure, Stop},
+};
+use crate::{bodies::hybrid::Hybrid, contact::RestingContact, settings::PrescribedSpec, world::Model};
+use awake::Claims;
+use awakened::Awakened;
+use glam::{BVec3, DVec3};
+use newton::Solver;
+use stage::Stage;
+use std::ops::ControlFlow;
+
+/// How often other particles may be woken at one stage.
+const MAX_LOOKS: usize = 20;
+
+/// An equilibrium on the way.
+#[derive(Clone)]
+struct Reached {
+    place: Vec<DVec3>,
+    claims: Claims,
+    ids: Vec<u32>,
+    contact: RestingContact,
+}
+
+/// From rest to the goal; the particles `given`, ascending, are awake, or those that its tools and loads keep awake.
+pub(super) fn solve(
+    model: &Model,
+    body: &Hybrid,
+    goal: &Goal<'_>,
+    given: Option<Vec<u32>>,
+    settings: &StaticSettings,
+    progress: &mut dyn FnMut(&Progress) -> ControlFlow<()>,
+) -> Result<StaticSolution, SolveError> {
+    let largest = load_path::largest_step(model, goal)?;
+    let mut solver = Solver { settings, history: Vec::new(), linear_systems: 0, progress };
+    let asleep = Awakened::new(model, body, &[]);
+    let mut claims = given.map_or_else(|| Claims::of(model, body, goal), Claims::Given);
+    let ids = claims.look(&asleep, &asleep.at_rest(), &vec![DVec3::ZERO; model.spec().tools.len()]);
+    let mut awakened = Awakened::new(model, body, &ids);
+    let place = awakened.at_rest();
+    let contact = RestingContact::appear(model.contact(), &awakened.configuration(&place));
+    let mut at = Reached { place, claims, ids, contact };
+    let (stage, load_steps) = load_path::raise(largest, settings, |fraction| {
+        let found = stage_from(&mut awakened, &mut solver, goal, fraction, &at);
+        let (next, stage) = found.map_err(|stop| (stop, solver.history.len() as u32))?;
+        at = next;
+        Ok(stage)
+    })?;
+    Ok(solution(&awakened, solver, &stage, at, load_steps))
+}
+
+/// The equilibrium at a fraction, with the particles awake that it keeps awake itself.
+fn stage_from(
+    awakened: &mut Awakened<'_>,
+    solver: &mut Solver<'_>,
+    goal: &Goal<'_>,
+    fraction: f64,
+    from: &Reached,
+) -> Result<(Reached, Stage), Stop> {
+    let mut now = from.clone();
+    if awakened.patch.active() != now.ids {
+        *awakened = Awakened::new(awakened.model, awakened.body, &now.ids);
+    }
+    // A tool may be deepest at one vertex with these awake, and at another with those: it keeps what it came to first.
+    let mut tried = vec![now.ids.clone()];
+    loop {
+        let (mut stage, begin) = Stage::enter(awakened, goal, fraction, &now.place, &now.contact);
+        now.place = settle(awakened, solver, goal, &mut stage, &begin)?;
+        now.contact = stage.contact.clone();
+        let pressing = stage.forces(awakened, &now.place).tools;
+        let contact_n: Vec<DVec3> = pressing.iter().map(|pressing| pressing.force_n).collect();
+        let wanted = now.claims.look(awakened, &now.place, &contact_n);
+        if tried.contains(&wanted) || tried.len() == MAX_LOOKS {
+            return Ok((now, stage));
+        }
+        tried.push(wanted.clone());
+        let next = Awakened::new(awakened.model, awakened.body, &wanted);
+        now.place = next.taking_over(awakened, &now.place);
+        now.ids = wanted;
+        *awakened = next;
+    }
+}
+
+/// Equilibrium of a stage: a coupled tool that moves may come upon samples that it was not in front of when it set out.
+fn settle(
+    awakened: &Awakened<'_>,
+    solver: &mut Solver<'_>,
+    goal: &Goal<'_>,
+    stage: &mut Stage,
+    begin: &[DVec3],
+) -> Result<Vec<DVec3>, Stop> {
+    let before = awakened.configuration(begin);
+    let mut found = solver.equilibrate(awakened, goal, stage, begin.to_vec())?;
+    for _ in 0..load_path::MAX_WIDENINGS {
+        let now = awakened.configuration(&found);
+        let Some(wider) = stage.contact.widened(awakened.model.contact(), &before, &now) else { return Ok(found) };
+        stage.contact = wider;
+        found = solver.equilibrate(awakened, goal, stage, found)?;
+    }
+    Err(Stop::Step(Failure::Contact))
+}
+
+fn solution(
+    awakened: &Awakened<'_>,
+    solver: Solver<'_>,
+    stage: &Stage,
+    found: Reached,
+    load_steps: u32,
+) -> StaticSolution {
+    let model = awakened.model;
+    let forces = stage.forces(awakened, &found.place);
+    let (_, residual_n, relative_residual) = forces.residual(awakened);
+    // The holder supplies what the other forces lack.
+    let hold = |(free, f): (&BVec3, &DVec3)| DVec3::select(*free, DVec3::ZERO, -*f);
+    let node_reactions_n: Vec<DVec3> = awakened.body.free().iter().zip(&forces.total_n()).map(hold).collect();
+    let of_set = |set: &PrescribedSpec| {
+        let sum: DVec3 = set.nodes.iter().map(|&n| node_reactions_n[n as usize]).sum();
+        DVec3::select(BVec3::from_array(set.axes), sum, DVec3::ZERO)
+    };
+    StaticSolution {
+        reactions_n: model.spec().prescribed.iter().map(of_set).collect(),
+        tools: stage.tools_at_rest(awakened, &forces, &found.place),
+        iterations: solver.history.len() as u32,
+        factorisations: 0,
+        load_steps,
+        residual_n,
+        relative_residual,
+        reference_n: forces.reference_n(),
+        rounding_n: newton::rounding_n(awakened, &found.place),
+        stable: Solver::is_stable(awakened, stage, &found.place),
+        inverted_tets: awakened.patch.inverted(&awakened.field(&found.place)),
+        awake: AwakeParticles { ids: found.ids, spread_loads: found.claims.spread_loads() },
+        history: solver.history,
+        x: found.place[..awakened.entries()].to_vec(),
+        node_reactions_n,
+    }
+}

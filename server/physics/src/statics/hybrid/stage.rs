@@ -1,0 +1,272 @@
+//! What an equilibrium of a hybrid body balances, at a fraction of the goal: forces, their tangent, and the change of potential along a line.
+use super::awakened::Awakened;
+use crate::{
+    contact::{Pressing, RestingContact, SaturatingSpring},
+    elements::loads,
+    settings::LoadSpec,
+    statics::{
+        ToolAtRest,
+        equilibrium::{Goal, dot},
+        follower,
+    },
+};
+use glam::{DMat3, DVec3};
+use std::collections::BTreeMap;
+
+/// The goal scaled to a fraction of the way.
+#[derive(Debug, Clone)]
+pub(super) struct Stage {
+    pub(super) fraction: f64,
+    load_factors: Vec<f64>,
+    /// Gravity and dead loads (N) on a place's entries.
+    dead_n: Vec<DVec3>,
+    /// Where the tools' devices are (m).
+    devices_m: Vec<DVec3>,
+    pub(super) contact: RestingContact,
+}
+
+/// Forces (N) on a place's entries.
+pub(super) struct Forces {
+    pub(super) elastic_n: Vec<DVec3>,
+    pub(super) external_n: Vec<DVec3>,
+    pub(super) tools: Vec<Pressing>,
+}
+
+/// The stiffness (N/m) of what acts on skin and tools.
+pub(super) struct Outer {
+    /// Entries of a configuration.
+    entries: Vec<u32>,
+    /// Each with what it moves with.
+    carriers: Vec<Vec<(u32, f64)>>,
+    /// Blocks `∂(−f_i)/∂y_j`, `i` and `j` by their numbers in `entries`; what two have is given once.
+    blocks: BTreeMap<[u32; 2], DMat3>,
+}
+
+impl Stage {
+    /// The stage entered from a place, with contact as it was there; and the place to begin with.
+    pub(super) fn enter(
+        awakened: &Awakened<'_>,
+        goal: &Goal<'_>,
+        fraction: f64,
+        before: &[DVec3],
+        contact: &RestingContact,
+    ) -> (Self, Vec<DVec3>) {
+        let model = awakened.model;
+        let load_factors: Vec<f64> = goal.load_factors.iter().map(|factor| factor * fraction).collect();
+        let skin_m = model.surface_rest_positions_m();
+        let tools = model.spec().tools.len();
+        let mut on_skin_n = vec![DVec3::ZERO; awakened.vertices() + tools];
+        for (load, &factor) in model.spec().loads.iter().zip(&load_factors) {
+            let follows = matches!(load, LoadSpec::Pressure { follower: true, .. });
+            if factor != 0.0 && !follows {
+                loads::add_load_n(load, factor, model.surface(), (skin_m, skin_m), &mut on_skin_n);
+            }
+        }
+        let mut dead_n: Vec<DVec3> = awakened.weight_n.iter().map(|weight| *weight * fraction).collect();
+        dead_n.resize(before.len(), DVec3::ZERO);
+        awakened.hand_back(&on_skin_n, &mut dead_n);
+        let start = model.spec().tools.iter().map(|tool| tool.start_position_m);
+        let devices_m: Vec<DVec3> = start.zip(goal.tools).map(|(s, tool)| s.lerp(tool.position_m, fraction)).collect();
+        let mut begin = before.to_vec();
+        for (tool, device) in devices_m.iter().enumerate() {
+            if model.contact().spring(tool).is_none() {
+                begin[awakened.entries() + tool] = *device;
+            }
+        }
+        let [was, is] = [before, &begin].map(|place| awakened.configuration(place));
+        let contact = contact.arrive(model.contact(), &was, &is);
+        (Self { fraction, load_factors, dead_n, devices_m, contact }, begin)
+    }
+
+    /// Coupled tools: entry of a place, spring and its stretch `d − c` (m).
+    fn springs<'a>(
+        &'a self,
+        awakened: &'a Awakened<'_>,
+        place: &'a [DVec3],
+    ) -> impl Iterator<Item = (usize, SaturatingSpring, DVec3)> + 'a {
+        self.devices_m.iter().enumerate().filter_map(move |(tool, device)| {
+            let (entry, spring) = (awakened.entries() + tool, awakened.model.contact().spring(tool)?);
+            Some((entry, spring, *device - place[entry]))
+        })
+    }
+
+    fn has_followers(&self, awakened: &Awakened<'_>) -> bool {
+        follower::active(awakened.model, &self.load_factors).next().is_some()
+    }
+
+    /// Adds follower pressures (N) at a configuration.
+    fn add_followers_n(&self, awakened: &Awakened<'_>, configuration: &[DVec3], forces_n: &mut [DVec3]) {
+        for (triangles, pressure_pa) in follower::active(awakened.model, &self.load_factors) {
+            loads::add_pressure_n(awakened.model.surface(), triangles, pressure_pa, configuration, forces_n);
+        }
+    }
+
+    /// All forces at a place.
+    pub(super) fn forces(&self, awakened: &Awakened<'_>, place: &[DVec3]) -> Forces {
+        let configuration = awakened.configuration(place);
+        let mut outer_n = vec![DVec3::ZERO; configuration.len()];
+        self.add_followers_n(awakened, &configuration, &mut outer_n);
+        let tools = self.contact.add_forces_n(awakened.model.contact(), &configuration, &mut outer_n);
+        let mut external_n = self.dead_n.clone();
+        awakened.hand_back(&outer_n, &mut external_n);
+        for (entry, spring, stretch_m) in self.springs(awakened, place) {
+            external_n[entry] += spring.force_n(stretch_m);
+        }
+        Forces { elastic_n: awakened.elastic_n(place), external_n, tools }
+    }
+
+    /// The stiffness of contact, couplings and follower pressures at a place; of the latter its symmetric part.
+    pub(super) fn outer(&self, awakened: &Awakened<'_>, place: &[DVec3]) -> Outer {
+        let configuration = awakened.configuration(place);
+        let mut blocks: BTreeMap<[u32; 2], DMat3> = BTreeMap::new();
+        let mut add = |i: u32, j: u32, block: &DMat3| {
+            let (pair, block) = if i <= j { ([i, j], *block) } else { ([j, i], block.transpose()) };
+            *blocks.entry(pair).or_insert(DMat3::ZERO) += block;
+        };
+        self.contact.for_each_block(awakened.model.contact(), &configuration, false, &mut add);
+        for (entry, spring, stretch_m) in self.springs(awakened, place) {
+            let own = (entry - awakened.entries() + awakened.vertices()) as u32;
+            add(own, own, &spring.hessian_n_per_m(stretch_m, false));
+        }
+        follower::for_each_block(awakened.model, &self.load_factors, &configuration, &mut add);
+        Outer::new(awakened, blocks)
+    }
+
+    /// Potential (J) of contact and couplings at a place.
+    fn tools_j(&self, awakened: &Awakened<'_>, place: &[DVec3]) -> f64 {
+        let springs: f64 = self.springs(awakened, place).map(|(_, spring, stretch)| spring.energy_j(stretch)).sum();
+        self.contact.potential_j(awakened.model.contact(), &awakened.configuration(place)) + springs
+    }
+
+    /// The tools at a place with these forces.
+    pub(super) fn tools_at_rest(&self, awakened: &Awakened<'_>, forces: &Forces, place: &[DVec3]) -> Vec<ToolAtRest> {
+        let at_rest = |(tool, pressing): (usize, &Pressing)| {
+            let (device_m, centre_m) = (self.devices_m[tool], place[awakened.entries() + tool]);
+            let spring_n = awakened.model.contact().spring(tool).map(|spring| spring.force_n(device_m - centre_m));
+            ToolAtRest::pressing(device_m, centre_m, pressing, spring_n)
+        };
+        forces.tools.iter().enumerate().map(at_rest).collect()
+    }
+}
+
+impl Forces {
+    pub(super) fn total_n(&self) -> Vec<DVec3> {
+        self.elastic_n.iter().zip(&self.external_n).map(|(a, b)| *a + *b).collect()
+    }
+
+    /// `max(‖f_elastic‖₂, ‖f_external‖₂)` (N), prescribed axes included.
+    pub(super) fn reference_n(&self) -> f64 {
+        dot(&self.elastic_n, &self.elastic_n).max(dot(&self.external_n, &self.external_n)).sqrt()
+    }
+
+    /// Total force (N) along the axes that may move, and its size; the size over [`Self::reference_n`].
+    pub(super) fn residual(&self, awakened: &Awakened<'_>) -> (Vec<DVec3>, f64, f64) {
+        let totals = self.total_n();
+        let free: Vec<DVec3> =
+            totals.iter().zip(&awakened.free).map(|(f, free)| DVec3::select(*free, *f, DVec3::ZERO)).collect();
+        let (residual_n, reference_n) = (dot(&free, &free).sqrt(), self.reference_n());
+        let relative = if residual_n == 0.0 && reference_n == 0.0 { 0.0 } else { residual_n / reference_n };
+        (free, residual_n, if reference_n.is_finite() { relative } else { f64::NAN })
+    }
+}
+
+impl Outer {
+    fn new(awakened: &Awakened<'_>, of_configuration: BTreeMap<[u32; 2], DMat3>) -> Self {
+        let mut entries: Vec<u32> = of_configuration.keys().flatten().copied().collect();
+        entries.sort_unstable();
+        entries.dedup();
+        let number = |entry: u32| entries.partition_point(|&e| e < entry) as u32;
+        let blocks = of_configuration.into_iter().map(|([i, j], block)| ([number(i), number(j)], block)).collect();
+        let carriers = entries.iter().map(|&entry| awakened.carriers(entry)).collect();
+        Self { entries, carriers, blocks }
+    }
+
+    /// `out ← out + K a`.
+    pub(super) fn add_products_n(&self, a: &[DVec3], out: &mut [DVec3]) {
+        let of = |carriers: &Vec<(u32, f64)>| carriers.iter().map(|&(e, w)| a[e as usize] * w).sum();
+        let moved: Vec<DVec3> = self.carriers.iter().map(of).collect();
+        let mut products = vec![DVec3::ZERO; self.entries.len()];
+        for ([i, j], block) in &self.blocks {
+            products[*i as usize] += *block * moved[*j as usize];
+            if i != j {
+                products[*j as usize] += block.transpose() * moved[*i as usize];
+            }
+        }
+        for (carriers, product) in self.carriers.iter().zip(products) {
+            for &(entry, weight) in carriers {
+                out[entry as usize] += product * weight;
+            }
+        }
+    }
+
+    /// Adds the diagonal blocks (N/m) of a place's entries.
+    pub(super) fn add_diagonal_n_per_m(&self, diagonal: &mut [DMat3]) {
+        for ([i, j], block) in &self.blocks {
+            let both = if i == j { *block } else { *block + block.transpose() };
+            let others = &self.carriers[*j as usize];
+            for &(entry, w) in &self.carriers[*i as usize] {
+                if let Ok(at) = others.binary_search_by_key(&entry, |(e, _)| *e) {
+                    diagonal[entry as usize] += both * (w * others[at].1);
+                }
+            }
+        }
+    }
+}
+
+/// The line `x + αd`, and the potential along it.
+pub(super) struct Line<'a> {
+    awakened: &'a Awakened<'a>,
+    stage: &'a Stage,
+    x: &'a [DVec3],
+    d: &'a [DVec3],
+    elastic_j: f64,
+    tools_j: f64,
+    /// `Σ V (λ + 2µ)` (J): the terms that cancel in `Ψ` are of this size, however small the strain.
+    cancelling_j: f64,
+    dead_slope_w: f64,
+}
+
+impl<'a> Line<'a> {
+    pub(super) fn new(awakened: &'a Awakened<'a>, stage: &'a Stage, x: &'a [DVec3], d: &'a [DVec3]) -> Self {
+        let body = awakened.body;
+        let modulus = body.materials().materials.iter().map(|m| m.lame.p_wave_modulus_pa()).fold(0.0, f64::max);
+        Self {
+            elastic_j: awakened.elastic_j(x),
+            tools_j: stage.tools_j(awakened, x),
+            cancelling_j: modulus * body.partition().volume_m3(),
+            dead_slope_w: dot(&stage.dead_n, d),
+            awakened,
+            stage,
+            x,
+            d,
+        }
+    }
+
+    pub(super) fn at(&self, alpha: f64) -> Vec<DVec3> {
+        self.x.iter().zip(self.d).map(|(x, d)| *x + *d * alpha).collect()
+    }
+
+    /// Change of potential (J) from 0 to `alpha`, and the size of the rounding in it; the work of follower pressures by Simpson's rule, which is exact.
+    pub(super) fn potential_change_j(&self, alpha: f64) -> (f64, f64) {
+        let x = self.at(alpha);
+        let elastic = self.awakened.elastic_j(&x) - self.elastic_j;
+        let tools = self.stage.tools_j(self.awakened, &x) - self.tools_j;
+        let follower_work = if self.stage.has_followers(self.awakened) {
+            alpha / 6.0
+                * (self.follower_power(0.0) + 4.0 * self.follower_power(0.5 * alpha) + self.follower_power(alpha))
+        } else {
+            0.0
+        };
+        let dead_work = alpha * self.dead_slope_w;
+        let size = 2.0 * (self.elastic_j.abs() + self.tools_j) + elastic.abs() + tools.abs();
+        let terms = self.cancelling_j + size + dead_work.abs() + follower_work.abs();
+        (elastic + tools - dead_work - follower_work, f64::EPSILON * terms)
+    }
+
+    fn follower_power(&self, t: f64) -> f64 {
+        let configuration = self.awakened.configuration(&self.at(t));
+        let mut forces_n = vec![DVec3::ZERO; configuration.len()];
+        self.stage.add_followers_n(self.awakened, &configuration, &mut forces_n);
+        dot(&forces_n, &self.awakened.directions(self.d))
+    }
+}

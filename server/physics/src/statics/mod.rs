@@ -1,0 +1,154 @@
+//! Equilibrium: the static solve that references and `palpated static` use, and natural modes about rest.
+//!
+//! Forces are those of `fem::element`, the materials and `fem::loads`, so an equilibrium found here is a resting state of
+//! [`crate::step`]. Everything is f64; linear systems go to faer's sparse Cholesky (docs/adr/static-solve.md).
+//!
+//! - `load_path.rs`: load stepping
+//! - `newton.rs`: Newton's method with a line search at one load step
+//! - `equilibrium.rs`: forces and the change of potential along a line
+//! - `stiffness.rs`, `follower.rs`: the tangent stiffness in a fixed sparsity pattern
+//! - `rigid.rs`: which rigid motions the constraints leave free
+//! - `modes.rs`: natural frequencies by subspace iteration
+//! - `eigen.rs`: small symmetric eigenproblems
+//! - `hybrid/`: the same for bodies with particles, by conjugate gradients
+//! - `solution.rs`, `error.rs`: what comes out
+mod equilibrium;
+mod error;
+mod factor;
+mod follower;
+mod hybrid;
+mod load_path;
+mod modes;
+mod newton;
+mod rigid;
+mod solution;
+mod stiffness;
+
+use crate::{contact::ToolTarget, world::Model};
+pub use error::SolveError;
+use glam::DVec3;
+pub use load_path::MAX_LOAD_STEPS;
+pub use modes::{Mode, natural_modes};
+pub use rigid::RigidMotion;
+pub use solution::{AwakeParticles, StaticSolution, ToolAtRest};
+use std::ops::ControlFlow;
+
+/// How far and how hard to solve.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct StaticSettings {
+    /// Converged when `‖f_free‖₂ ≤ relative_residual · max(‖f_internal‖₂, ‖f_external‖₂)`, the latter over all degrees of freedom.
+    pub relative_residual: f64,
+    /// Newton iterations allowed at one load step.
+    pub max_iterations: u32,
+    /// Load steps to begin with, at least; failed ones are halved, and steps grow again after success. No solve tries more than
+    /// [`MAX_LOAD_STEPS`].
+    pub load_steps: u32,
+    /// The smallest load step is the first one over `2^max_halvings`.
+    pub max_halvings: u32,
+}
+
+impl Default for StaticSettings {
+    fn default() -> Self {
+        Self { relative_residual: 1e-10, max_iterations: 100, load_steps: 1, max_halvings: 12 }
+    }
+}
+
+/// Where a solve stands, once per Newton iteration.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Progress {
+    /// Fraction of loads, displacements and tool motion at which equilibrium is sought, in (0, 1].
+    pub load_fraction: f64,
+    /// Iteration at this fraction, from 0.
+    pub iteration: u32,
+    /// `‖f_free‖₂` (N).
+    pub residual_n: f64,
+    /// The same over its reference (see [`StaticSettings::relative_residual`]).
+    pub relative_residual: f64,
+}
+
+/// Finds an equilibrium of `model` under its gravity, `load_factors` (one per load), `prescribed_displacements_m` (one per
+/// prescribed set) and devices at `tools` (one per tool), starting from rest with the tools at their start positions. A rigid tool is
+/// where its device is; a coupled one rests where its spring, saturated or not, balances its contact. A device moves at most half
+/// its tool's radius per load step, so the tool must come from outside.
+///
+/// `progress` is called once per Newton iteration and may stop the solve. Friction and viscosity do not act at rest and are
+/// left out. The pressure's load stiffness enters with its symmetric part; where a follower pressure ends at a free rim the
+/// unsymmetric rest slows Newton's method from quadratic to linear convergence, the more the further the rim turns, but does not
+/// change the equilibrium.
+///
+/// Of a hybrid body, the particles that tools would keep awake where they rest are awake, and those as near to vertices that a load acts on.
+///
+/// # Errors
+/// [`SolveError`].
+pub fn solve_static(
+    model: &Model,
+    load_factors: &[f64],
+    prescribed_displacements_m: &[DVec3],
+    tools: &[ToolTarget],
+    settings: &StaticSettings,
+    progress: &mut dyn FnMut(&Progress) -> ControlFlow<()>,
+) -> Result<StaticSolution, SolveError> {
+    check(model, load_factors, prescribed_displacements_m, tools, settings)?;
+    rigid::check_constrained(model)?;
+    let goal = equilibrium::Goal { load_factors, prescribed_displacements_m, tools };
+    match model.hybrid() {
+        Some(body) => hybrid::solve(model, body, &goal, None, settings, progress),
+        None => load_path::solve(model, &goal, settings, progress),
+    }
+}
+
+/// The same of a hybrid body with these particles awake and no others; those that may not wake are left out. `None` of any other body.
+///
+/// # Errors
+/// [`SolveError`].
+pub fn solve_static_with(
+    model: &Model,
+    particles: impl IntoIterator<Item = u32>,
+    (load_factors, prescribed_displacements_m, tools): (&[f64], &[DVec3], &[ToolTarget]),
+    settings: &StaticSettings,
+    progress: &mut dyn FnMut(&Progress) -> ControlFlow<()>,
+) -> Result<Option<StaticSolution>, SolveError> {
+    let Some(body) = model.hybrid() else { return Ok(None) };
+    check(model, load_factors, prescribed_displacements_m, tools, settings)?;
+    rigid::check_constrained(model)?;
+    let goal = equilibrium::Goal { load_factors, prescribed_displacements_m, tools };
+    let mut ids: Vec<u32> = particles.into_iter().filter(|&particle| body.may_wake(particle)).collect();
+    ids.sort_unstable();
+    ids.dedup();
+    hybrid::solve(model, body, &goal, Some(ids), settings, progress).map(Some)
+}
+
+fn check(
+    model: &Model,
+    load_factors: &[f64],
+    prescribed_displacements_m: &[DVec3],
+    tools: &[ToolTarget],
+    settings: &StaticSettings,
+) -> Result<(), SolveError> {
+    let spec = model.spec();
+    let length = |what, found, expected| {
+        if found == expected { Ok(()) } else { Err(SolveError::InputLength { what, found, expected }) }
+    };
+    length("load factors", load_factors.len(), spec.loads.len())?;
+    length("prescribed displacements", prescribed_displacements_m.len(), spec.prescribed.len())?;
+    length("tools", tools.len(), spec.tools.len())?;
+    let finite = |what, bad: Option<usize>| match bad {
+        Some(index) => Err(SolveError::InputNotFinite { what, index }),
+        None => Ok(()),
+    };
+    finite("load factor", load_factors.iter().position(|f| !f.is_finite()))?;
+    finite("prescribed displacement", prescribed_displacements_m.iter().position(|d| !d.is_finite()))?;
+    if let Some(capsule) = spec.tools.iter().find(|tool| tool.shape.as_capsule().is_some()) {
+        return Err(SolveError::SpheresOnly { tool: capsule.name.clone() });
+    }
+    finite("tool position", tools.iter().position(|t| !t.position_m.is_finite()))?;
+    let setting = |name, value: f64, ok: bool, rule| {
+        if ok { Ok(()) } else { Err(SolveError::Setting { name, value, rule }) }
+    };
+    let tolerance = settings.relative_residual;
+    setting("relative_residual", tolerance, tolerance > 0.0 && tolerance < 1.0, "must be in (0, 1)")?;
+    setting("max_iterations", f64::from(settings.max_iterations), settings.max_iterations > 0, "must be 1 or more")?;
+    let steps = settings.load_steps;
+    setting("load_steps", f64::from(steps), (1..=MAX_LOAD_STEPS).contains(&steps), "must be 1 to 10000")?;
+    setting("max_halvings", f64::from(settings.max_halvings), settings.max_halvings <= 40, "must be 40 or less")
+}
