@@ -4,6 +4,26 @@
 //! [`step`] advances a [`State`] by one tick with a [`Scratch`] that holds every buffer, so that a tick allocates
 //! nothing. The same model, state and inputs give the same bits.
 //!
+//! Its folders are a ladder: each uses only those above it in this list (`tests/ladder.rs`).
+//!
+//! | folder | what it is |
+//! |---|---|
+//! | `hash` | a hash that is the same on every machine |
+//! | [`settings`] | how a scene is computed; loads and constraints |
+//! | [`linalg`] | conjugate gradients, Lanczos' method, sparse Cholesky, small eigenproblems |
+//! | [`lanes`] | vectors of numbers, instruction sets, operations on whole lists: all the `unsafe` |
+//! | [`mesh`] | tetrahedra and surfaces |
+//! | [`material`] | constitutive laws |
+//! | [`elements`] | the linear tetrahedron: gradients, mass, stiffness at rest, loads |
+//! | [`kernels`] | internal forces of many tets at once |
+//! | [`contact`] | tools against a surface |
+//! | [`tick`] | what every kind of body shares in a tick |
+//! | [`bodies`] | the kinds of body, behind one enum |
+//! | [`integrate`] | time integrators, and the judge of the explicit one's step |
+//! | [`world`] | model, state, and the step |
+//! | [`snapshot`] | a state as bytes |
+//! | [`statics`] | equilibrium and natural modes |
+//!
 //! Notation (docs/notation.md): `X` rest position, `x` position, `v` velocity (m, m/s), `F` deformation gradient,
 //! `P` first Piola-Kirchhoff stress (Pa), `b_i = ∇N_i` shape gradient (1/m), `V` rest volume (m³).
 
@@ -11,7 +31,6 @@ pub mod bodies;
 pub mod contact;
 pub mod elements;
 mod hash;
-pub mod health;
 pub mod integrate;
 pub mod kernels;
 pub mod lanes;
@@ -21,10 +40,12 @@ pub mod mesh;
 pub mod settings;
 pub mod snapshot;
 pub mod statics;
+pub mod tick;
 pub mod world;
 
-pub use health::{Energies, Ledger, Quarantine};
-pub use integrate::step;
+pub use bodies::{Body, BodySpec, BodyState};
+pub use elements::solid::{Region, Solid};
 pub use mesh::{MeshError, Surface, TetMesh};
 pub use settings::{Integrator, LoadSpec, Precision, PrescribedSpec, Settings, Skips, Substeps};
-pub use world::{Model, ModelError, ModelSpec, PointForce, Region, Scratch, State, StepReport, TickInput};
+pub use tick::{Energies, Ledger, PointForce, TickInput};
+pub use world::{Model, ModelError, ModelSpec, Quarantine, Scratch, State, StepReport, step};

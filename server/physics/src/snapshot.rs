@@ -3,10 +3,8 @@
 //! Layout (little-endian): `PLPS`, version (u32), fingerprint of the body (u64), checksum of what follows (u64), state
 //! (postcard). A state goes back only into the body it came from: same mesh, materials, loads, tools and settings.
 use crate::{
-    bodies::{mass_spring::SpringBody, seed::SeedMotion},
-    contact::ToolState,
     hash::{Fnv, OFFSET, fnv},
-    world::{Model, ModelSpec, State},
+    world::{Model, State},
 };
 use std::fmt::Write;
 use thiserror::Error;
@@ -14,7 +12,7 @@ use thiserror::Error;
 const MAGIC: [u8; 4] = *b"PLPS";
 const HEADER: usize = 24;
 /// Version of the layout; another one is refused.
-pub const VERSION: u32 = 13;
+pub const VERSION: u32 = 14;
 
 /// Why bytes are not a state of a body.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
@@ -46,7 +44,7 @@ pub enum SnapshotError {
 
 /// The state as bytes.
 pub fn save(model: &Model, state: &State) -> Vec<u8> {
-    let mut bytes = Vec::with_capacity(HEADER + state.x.len() * 96);
+    let mut bytes = Vec::with_capacity(HEADER + state.mechanical.x.len() * 96);
     bytes.extend_from_slice(&MAGIC);
     bytes.extend_from_slice(&VERSION.to_le_bytes());
     bytes.extend_from_slice(&fingerprint(model).to_le_bytes());
@@ -85,45 +83,28 @@ pub fn restore(model: &Model, bytes: &[u8]) -> Result<State, SnapshotError> {
         return Err(SnapshotError::Damaged { what: "bytes follow its end" });
     }
     check(model, &state)?;
-    state.contact =
-        model.contact().adopt(&state.contact).ok_or(SnapshotError::Damaged { what: "its contact does not fit" })?;
+    let contact = &mut state.mechanical.contact;
+    *contact = model.contact().adopt(contact).ok_or(SnapshotError::Damaged { what: "its contact does not fit" })?;
     Ok(state)
 }
 
 fn check(model: &Model, state: &State) -> Result<(), SnapshotError> {
-    let of_springs = state.springs.as_ref().map_or(0, |springs| springs.motion.ids.len());
-    let nodes = model.always_awake_m().len() + state.active.len() + of_springs;
-    let counts = state.active.fit(model)
-        && [&state.x, &state.v, &state.force_n, &state.external_n].iter().all(|v| v.len() == nodes)
-        && state.tools.len() == model.spec().tools.len()
-        && state.load_factors.len() == model.spec().loads.len()
-        && state.pace.fits(model, nodes)
-        && state.sleep.fits(model)
-        && match (&state.seed, model.seed()) {
-            (Some(motion), Some(seed)) => motion.fits(seed, &state.x, &state.v),
-            (motion, seed) => motion.is_none() && seed.is_none(),
-        }
-        && match (&state.springs, model.springs()) {
-            (Some(own), Some(body)) => own.fits(body),
-            (own, body) => own.is_none() && body.is_none(),
-        };
-    if !counts {
+    let State { mechanical, body: own, pace, sleep, quarantine: _ } = state;
+    let (environment, body) = (model.environment(), model.body());
+    let positions = own.positions(body);
+    let fits = own.fits(body, environment, mechanical)
+        && mechanical.fits(environment, positions)
+        && pace.fits(environment, model.is_judged(), positions)
+        && sleep.fits(model);
+    if !fits {
         return Err(SnapshotError::OtherBody);
     }
-    if is_finite(state) { Ok(()) } else { Err(SnapshotError::Damaged { what: "a number in it is not finite" }) }
-}
-
-fn is_finite(state: &State) -> bool {
-    let before = &state.pace.before;
-    let held_m = &state.sleep.held_m;
-    let of_seed = || state.seed.iter().flat_map(SeedMotion::vectors);
-    let vectors = [&state.x, &state.v, &state.force_n, &state.external_n, &before.total_n, &before.external_n, held_m];
-    let (ledger, viscous) = (&state.ledger, &state.viscous);
-    let sums = [ledger.external_work_j, ledger.dissipated_j, viscous.latest_w, viscous.before_w];
-    vectors.iter().all(|list| list.iter().all(|a| a.is_finite()))
-        && state.tools.iter().all(ToolState::is_finite)
-        && of_seed().all(|a| a.is_finite())
-        && state.load_factors.iter().chain(&sums).all(|n| n.is_finite())
+    let vectors = pace.vectors().chain(&sleep.held_m).chain(own.vectors());
+    if mechanical.is_finite() && vectors.into_iter().all(|a| a.is_finite()) {
+        Ok(())
+    } else {
+        Err(SnapshotError::Damaged { what: "a number in it is not finite" })
+    }
 }
 
 fn word(header: &[u8], at: usize) -> u64 {
@@ -133,46 +114,35 @@ fn word(header: &[u8], at: usize) -> u64 {
     u64::from_le_bytes(bytes)
 }
 
-/// Hash of what makes a body: rest positions, tets, and everything else it was built from, as it prints.
+/// Hash of what makes a body and its environment: rest positions, and everything else it was built from, as it prints.
 fn fingerprint(model: &Model) -> u64 {
     let positions =
         model.rest_positions_m().iter().flat_map(glam::DVec3::to_array).flat_map(|c| c.to_bits().to_le_bytes());
-    let tets = model.mesh().tets().iter().flatten().flat_map(|n| n.to_le_bytes());
-    let ModelSpec {
-        mesh: _,
-        particles,
-        seed,
-        springs: _,
-        regions,
-        tet_region,
-        prescribed,
-        loads,
-        gravity_m_per_s2,
-        tools,
-        settings,
-    } = model.spec();
-    let mut hash = Fnv(fnv(OFFSET, positions.chain(tets)));
-    let springs = model.springs().map(SpringBody::fingerprint);
+    let mut hash = Fnv(fnv(OFFSET, positions));
+    model.body().fingerprint_into(&mut hash);
+    let around = (model.prescribed(), model.loads(), model.gravity_m_per_s2(), model.tools(), model.settings());
     // A float prints as the shortest text that reads back to its bits. Writing to the hash cannot fail.
-    let rest = ((particles, seed, springs), regions, tet_region, prescribed, loads, gravity_m_per_s2, tools, settings);
-    let _ = write!(hash, "{rest:?}");
+    let _ = write!(hash, "{around:?}");
     hash.0
 }
 
 /// FNV-1a over the bits of tick, positions and velocities, a seed body's particles included: equal states give equal hashes on every machine.
 pub fn state_hash(state: &State) -> u64 {
-    let of_seed = state.seed.iter().flat_map(SeedMotion::vectors);
-    let components = state.x.iter().chain(&state.v).chain(of_seed).flat_map(glam::DVec3::to_array);
-    fnv(OFFSET, state.tick.to_le_bytes().into_iter().chain(components.flat_map(|c| c.to_bits().to_le_bytes())))
+    let State { mechanical, body, .. } = state;
+    let components = mechanical.x.iter().chain(&mechanical.v).chain(body.vectors()).flat_map(glam::DVec3::to_array);
+    let bytes = mechanical.tick.to_le_bytes().into_iter();
+    fnv(OFFSET, bytes.chain(components.flat_map(|c| c.to_bits().to_le_bytes())))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::{
+        bodies::BodySpec,
+        elements::solid::{Region, Solid},
         mesh::TetMesh,
         settings::Settings,
-        world::{ModelSpec, Region},
+        world::ModelSpec,
     };
     use glam::DVec3;
 
@@ -184,12 +154,11 @@ mod tests {
             viscosity: crate::material::Viscosity::default(),
         };
         Model::build(ModelSpec {
-            mesh: TetMesh::new(p, vec![[0, 1, 2, 3]]).unwrap(),
-            particles: None,
-            seed: None,
-            springs: None,
-            regions: vec![Region { name: "all".into(), material, density_kg_per_m3: 1e3 }],
-            tet_region: vec![0],
+            body: BodySpec::Tet(Solid {
+                mesh: TetMesh::new(p, vec![[0, 1, 2, 3]]).unwrap(),
+                regions: vec![Region { name: "all".into(), material, density_kg_per_m3: 1e3 }],
+                tet_region: vec![0],
+            }),
             prescribed: Vec::new(),
             loads: Vec::new(),
             gravity_m_per_s2: DVec3::ZERO,
@@ -201,9 +170,9 @@ mod tests {
 
     fn moved(model: &Model) -> State {
         let mut state = State::at_rest(model);
-        state.tick = 41;
-        state.x[1] += DVec3::new(0.1, -0.2, 1.0 / 3.0);
-        state.v[2] = DVec3::new(-1e-300, 2.0, 0.0);
+        state.mechanical.tick = 41;
+        state.mechanical.x[1] += DVec3::new(0.1, -0.2, 1.0 / 3.0);
+        state.mechanical.v[2] = DVec3::new(-1e-300, 2.0, 0.0);
         state
     }
 
@@ -238,7 +207,7 @@ mod tests {
     fn a_state_that_is_not_finite_is_refused() {
         let model = model(1.0);
         let mut state = moved(&model);
-        state.x[0].x = f64::NAN;
+        state.mechanical.x[0].x = f64::NAN;
         assert!(matches!(restore(&model, &save(&model, &state)), Err(SnapshotError::Damaged { .. })));
     }
 }

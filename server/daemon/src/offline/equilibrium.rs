@@ -134,7 +134,7 @@ fn solve(scene: &Scene, model: &Model, goal: &Goal, residual: Option<f64>) -> mi
     let settings = StaticSettings { relative_residual: residual.unwrap_or(default.relative_residual), ..default };
     let interrupt = Interrupt::listen();
     let mut bar = Progress::new(&scene.name);
-    let mut show = |progress: &solve::Progress| {
+    let mut show = |progress: &statics::Progress| {
         bar.show_work(&format!(
             "{:.1} % of the load, iteration {}, residual {:.1e} of {:.0e}",
             100.0 * progress.load_fraction,
@@ -144,7 +144,7 @@ fn solve(scene: &Scene, model: &Model, goal: &Goal, residual: Option<f64>) -> mi
         ));
         if interrupt.is_set() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     };
-    let solved = solve::solve_static(model, &goal.load_factors, &goal.prescribed_m, &goal.tools, &settings, &mut show);
+    let solved = statics::solve_static(model, &goal.load_factors, &goal.prescribed_m, &goal.tools, &settings, &mut show);
     bar.finish();
     solved.map_err(|cause| NoEquilibrium { scene: scene.name.clone(), advice: advice(&cause), cause }.into())
 }

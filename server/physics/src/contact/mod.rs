@@ -9,6 +9,7 @@ mod foundation;
 mod inside;
 mod local_model;
 mod local_torque;
+pub(crate) mod moduli;
 mod narrow;
 mod nearest;
 mod places;
@@ -24,8 +25,10 @@ mod touching;
 mod triangle;
 mod turning;
 
+pub(crate) use broad::Skin;
 pub use inside::is_inside;
 pub use local_torque::LocalTorqueModel;
+pub use moduli::SurfaceModuli;
 pub(crate) use nearest::deepest_m;
 pub(crate) use places::Near;
 pub use proxy::SubstepTime;
@@ -46,15 +49,6 @@ use foundation::{BodyAtRest, Foundation, SampleTables};
 use glam::DVec3;
 use narrow::Pressed;
 use touching::Touching;
-
-/// Elastic moduli behind a boundary triangle.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct SurfaceModuli {
-    /// `λ + 2µ` (Pa).
-    pub p_wave_pa: f64,
-    /// `E/(1 − ν²)` (Pa).
-    pub indentation_pa: f64,
-}
 
 /// What contact needs that depends on the rest state alone.
 #[derive(Debug, Clone, Default)]

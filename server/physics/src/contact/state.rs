@@ -20,6 +20,9 @@ pub struct ContactState {
     boxes: Vec<ClusterBox>,
     #[serde(skip)]
     travel_m: f64,
+    /// The surface was moved, since forces were evaluated last, by nothing but what [`Self::travelled`] was told.
+    #[serde(skip)]
+    is_tracked: bool,
 }
 
 /// One tool's part.
@@ -73,6 +76,7 @@ impl ContactState {
             tools: model.tools.iter().map(tool).collect(),
             boxes: vec![ClusterBox::UNFITTED; model.triangles.clusters()],
             travel_m: 0.0,
+            is_tracked: false,
         }
     }
 
@@ -148,6 +152,21 @@ impl ContactState {
         self.travel_m += distance_m;
         for tool in &mut self.tools {
             tool.candidates.slack_m -= distance_m;
+        }
+    }
+
+    /// The surface moved by at most this much (m) as other nodes came to carry it. Where forces were current until then, its
+    /// geometry is still known at the next evaluation.
+    pub(crate) fn travelled_at_a_change(&mut self, distance_m: f64, forces_were_current: bool) {
+        self.travelled(distance_m);
+        self.is_tracked = forces_were_current;
+    }
+
+    /// Before forces are evaluated that are not current: makes the broad phase look at the positions anew, unless it knows how far the
+    /// surface moved.
+    pub(crate) fn forget_untracked_geometry(&mut self) {
+        if !std::mem::take(&mut self.is_tracked) {
+            self.forget_geometry();
         }
     }
 

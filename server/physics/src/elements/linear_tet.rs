@@ -4,6 +4,7 @@
 //! Nodal force: `f_i = −∂U/∂x_i = −V P b_i` (N).
 use crate::linalg::tensor::outer;
 use crate::material::{Material, viscous};
+use crate::mesh::TetMesh;
 use glam::{DMat3, DVec3};
 
 /// What the rest state fixes for one tet.
@@ -65,4 +66,16 @@ impl RestTet {
         };
         DMat3::from_cols(column(DVec3::X), column(DVec3::Y), column(DVec3::Z))
     }
+}
+
+/// Smallest `J = det F` of all tets at positions `x` (m), and the tet that has it. Below zero: inverted.
+pub(crate) fn min_volume_ratio(mesh: &TetMesh, rest_tets: &[RestTet], x: &[DVec3]) -> (f64, usize) {
+    let mut worst = (f64::INFINITY, 0);
+    for (tet, (nodes, rest)) in mesh.tets().iter().zip(rest_tets).enumerate() {
+        let j = rest.gradient_of(&nodes.map(|n| x[n as usize])).determinant();
+        if j < worst.0 {
+            worst = (j, tet);
+        }
+    }
+    worst
 }

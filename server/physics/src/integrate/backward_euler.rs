@@ -16,33 +16,40 @@
 //! Ledger: forces work along the path `dt v'` and are known at both of its ends, so external work is `½dt (g_n + g_{n+1})·v'`, and what the
 //! scheme takes is what is left, `½dt (f_n + f_{n+1})·v' − ΔT`, with the viscous part `−C v` of `f` put back,
 //! `dt (¼q_n + ¾q_{n+1})`. The balance is of second order; the dissipation holds viscous stress and the scheme's own damping.
-use super::{
-    forces::Tick,
-    motion::{damp, drift, holders_power_w},
-    seed_semi_implicit::NodalImplicit,
-};
-use crate::linalg::pcg::{self, Stop};
+use super::seed_semi_implicit::NodalImplicit;
 use crate::{
-    contact::StepAhead,
-    world::{Model, Scratch, State},
+    bodies::tet::{SteppedTet, TetBody, TetScratch},
+    contact::{ContactScratch, StepAhead},
+    linalg::pcg::{self, Stop},
+    tick::{
+        Environment, Evaluation, MechanicalState, Tick,
+        lumped::{LumpedMass, drift},
+    },
 };
 use glam::DVec3;
 
 /// All substeps of a tick. `nodal` is the block diagonal of `M + dt² K + dt C` at rest.
-pub(super) fn run(tick: &Tick<'_>, nodal: &NodalImplicit, state: &mut State, scratch: &mut Scratch) {
-    let (model, dt_s) = (tick.model, tick.dt_s());
-    let damping = model.spec().settings.mass_damping_per_s;
+pub(super) fn run(
+    tick: &Tick<'_>,
+    nodal: &NodalImplicit,
+    stepped: &mut SteppedTet<'_>,
+    state: &mut MechanicalState,
+    contact: &mut ContactScratch,
+) {
+    let (environment, dt_s) = (tick.environment, tick.dt_s());
+    let masses = stepped.body.lumped_mass(environment);
+    let damping = environment.settings.mass_damping_per_s;
     for substep in 1..=tick.substeps {
         if damping > 0.0 {
-            damp(model, state, (-damping * dt_s).exp());
+            masses.damp(state, (-damping * dt_s).exp());
         }
-        tick.evaluate_before(substep, state, scratch);
-        solve(model, nodal, dt_s, state, scratch);
-        let mut taken_j = -kick(model, state, &scratch.implicit.pcg.solution);
-        let (mut external_j, mut work_j) = half_work_j(model, state, dt_s);
+        evaluate_before(tick, substep, stepped, state, contact);
+        solve(environment, stepped.body, nodal, dt_s, state, stepped.scratch);
+        let mut taken_j = -kick(&masses, state, &stepped.scratch.pcg.solution);
+        let (mut external_j, mut work_j) = half_work_j(&masses, state, dt_s);
         let fastest_m_per_s = drift(state, dt_s);
-        tick.evaluate_after(substep, fastest_m_per_s, state, scratch);
-        let (external_after_j, work_after_j) = half_work_j(model, state, dt_s);
+        stepped.evaluate(tick, &tick.after_substep(substep, fastest_m_per_s), state, contact);
+        let (external_after_j, work_after_j) = half_work_j(&masses, state, dt_s);
         external_j += external_after_j;
         work_j += work_after_j;
         taken_j += work_j + dt_s * (0.25 * state.viscous.before_w + 0.75 * state.viscous.latest_w);
@@ -51,17 +58,39 @@ pub(super) fn run(tick: &Tick<'_>, nodal: &NodalImplicit, state: &mut State, scr
     }
 }
 
+/// Forces at the start of a substep, with loads and injected forces as at its end.
+fn evaluate_before(
+    tick: &Tick<'_>,
+    substep: u32,
+    stepped: &mut SteppedTet<'_>,
+    state: &mut MechanicalState,
+    contact: &mut ContactScratch,
+) {
+    if !state.force_is_current {
+        state.contact.forget_untracked_geometry();
+    }
+    let now: Evaluation = tick.before_substep(substep);
+    stepped.evaluate(tick, &now, state, contact);
+}
+
 /// `Δv` into the solver's solution.
-fn solve(model: &Model, nodal: &NodalImplicit, dt_s: f64, state: &State, scratch: &mut Scratch) {
-    let Scratch { implicit, kernel: kernel_scratch, .. } = scratch;
-    let (settings, kernel) = (&model.spec().settings, model.kernel());
-    let (tangents, inverse_mass) = (&mut implicit.tangents, model.inverse_mass_per_kg());
+fn solve(
+    environment: &Environment,
+    body: &TetBody,
+    nodal: &NodalImplicit,
+    dt_s: f64,
+    state: &MechanicalState,
+    scratch: &mut TetScratch,
+) {
+    let TetScratch { kernel: kernel_scratch, pcg: vectors, tangents, products } = scratch;
+    let (settings, kernel) = (&environment.settings, body.kernel());
+    let inverse_mass = body.inverse_mass_per_kg();
     let (x, tools, contact) = (&state.x, &state.tools, &state.contact);
     let step = StepAhead { dt_s, tick_period_s: settings.tick_period_s };
-    model.contact().take_tangents(x, tools, contact, step, tangents);
-    kernel.linearise_at(model.rest_positions_m(), x, kernel_scratch);
+    environment.contact.take_tangents(x, tools, contact, step, tangents);
+    kernel.linearise_at(body.rest_positions_m(), x, kernel_scratch);
     // r = dt f − dt² K v
-    let residual = &mut implicit.pcg.residual;
+    let residual = &mut vectors.residual;
     kernel.products_n([dt_s * dt_s, 0.0], &state.v, residual, kernel_scratch);
     tangents.add_products(-dt_s * dt_s, &state.v, residual);
     tangents.add_changes(dt_s, residual);
@@ -72,17 +101,17 @@ fn solve(model: &Model, nodal: &NodalImplicit, dt_s: f64, state: &State, scratch
     let apply = |a: &[DVec3], out: &mut [DVec3]| {
         kernel.products_n([-dt_s * dt_s, -dt_s], a, out, kernel_scratch);
         tangents.add_products(dt_s * dt_s, a, out);
-        for (((out, a), mass), inverse_mass) in out.iter_mut().zip(a).zip(model.mass_kg()).zip(inverse_mass) {
+        for (((out, a), mass), inverse_mass) in out.iter_mut().zip(a).zip(body.mass_kg()).zip(inverse_mass) {
             *out = on_free(*out + *a * *mass, *inverse_mass);
         }
     };
-    implicit.products += u64::from(pcg::solve(apply, nodal.inverse_per_kg(), stop, &mut implicit.pcg));
+    *products += u64::from(pcg::solve(apply, nodal.inverse_per_kg(), stop, vectors));
 }
 
 /// `v ← v + Δv`; returns the change of kinetic energy (J).
-fn kick(model: &Model, state: &mut State, change: &[DVec3]) -> f64 {
+fn kick(masses: &LumpedMass<'_>, state: &mut MechanicalState, change: &[DVec3]) -> f64 {
     let mut gained_j = 0.0;
-    for ((v, change), mass) in state.v.iter_mut().zip(change).zip(model.mass_kg()) {
+    for ((v, change), mass) in state.v.iter_mut().zip(change).zip(masses.mass_kg) {
         gained_j += mass * change.dot(*v + *change * 0.5);
         *v += *change;
     }
@@ -90,10 +119,10 @@ fn kick(model: &Model, state: &mut State, change: &[DVec3]) -> f64 {
 }
 
 /// Half a substep's work (J) along `dt v` of external forces, holders' included, and of all forces on free axes.
-fn half_work_j(model: &Model, state: &State, dt_s: f64) -> (f64, f64) {
-    let (mut external_w, mut total_w) = (holders_power_w(model, &state.force_n, &state.v), 0.0);
+fn half_work_j(masses: &LumpedMass<'_>, state: &MechanicalState, dt_s: f64) -> (f64, f64) {
+    let (mut external_w, mut total_w) = (masses.holders_power_w(&state.force_n, &state.v), 0.0);
     for (((v, force), external), inverse_mass) in
-        state.v.iter().zip(&state.force_n).zip(&state.external_n).zip(model.inverse_mass_per_kg())
+        state.v.iter().zip(&state.force_n).zip(&state.external_n).zip(masses.inverse_mass_per_kg)
     {
         external_w += external.dot(*v);
         total_w += on_free(*force, *inverse_mass).dot(*v);

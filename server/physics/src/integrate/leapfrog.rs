@@ -8,54 +8,40 @@
 //!           v ← v + dt f/m                 kick (the last one is a half kick)
 //! ```
 //! Second order and symplectic without damping; `x` and `v` are synchronous at the end of a tick. Viscous forces see the
-//! velocity half a step late, which the step bound of `world::substeps` accounts for.
+//! velocity half a step late, which the step bound of `tick::substeps` accounts for.
 //!
 //! Ledger: the work of a force `g` over a kick of length `h` is exactly its share of the kinetic change,
-//! `h g·(v + ½h f/m)`; what viscous stress takes is an estimate ([`crate::health::ViscousPower`]).
-use super::{
-    forces::Tick,
-    hybrid,
-    motion::{self, drift},
-    springs,
-    stability::is_judged,
+//! `h g·(v + ½h f/m)`; what viscous stress takes is an estimate ([`crate::tick::ViscousPower`]).
+use super::ForceHistory;
+use crate::{
+    bodies::SteppedBody,
+    contact::ContactScratch,
+    tick::{MechanicalState, Tick, lumped::drift},
 };
-use crate::world::{Model, Scratch, State};
 
-/// All substeps of a tick.
-pub(super) fn run(tick: &Tick<'_>, state: &mut State, scratch: &mut Scratch) {
+/// All substeps of a tick. `history` takes the forces that the step is judged by, where it is.
+pub(super) fn run(
+    tick: &Tick<'_>,
+    body: &mut SteppedBody<'_>,
+    state: &mut MechanicalState,
+    contact: &mut ContactScratch,
+    history: &mut ForceHistory,
+) {
     let (substeps, dt_s) = (tick.substeps, tick.dt_s());
-    tick.make_force_current(state, scratch);
-    if let Some(own) = &mut scratch.hybrid {
-        own.of_free_j = None;
-    }
-    kick(tick.model, state, scratch, (0.5 * dt_s, true));
+    body.make_force_current(tick, state, contact);
+    body.begin_kicks();
+    body.kick(tick.environment, state, 0.5 * dt_s, true);
     for substep in 1..=substeps {
-        note_long_step(tick, substep - 1, state, scratch);
+        if history.is_kept()
+            && tick.begins_long_step(substep)
+            && let Some(judged) = body.judged()
+        {
+            judged.note_long_step(state);
+        }
         let fastest_m_per_s = drift(state, dt_s);
-        scratch.history.set_aside(substep, substeps, state);
-        tick.evaluate_after(substep, fastest_m_per_s, state, scratch);
+        history.set_aside(substep, substeps, state);
+        body.evaluate(tick, &tick.after_substep(substep, fastest_m_per_s), state, contact);
         let h_s = if substep == substeps { 0.5 * dt_s } else { dt_s };
-        kick(tick.model, state, scratch, (h_s, tick.ends_long_step(substep)));
-    }
-}
-
-/// After `done` substeps: notes what a long step of a hybrid body's coarse level is judged by, where one begins.
-fn note_long_step(tick: &Tick<'_>, done: u32, state: &State, scratch: &mut Scratch) {
-    if tick.model.substeps_per_long_step() > 1
-        && is_judged(tick.model)
-        && tick.ends_long_step(done)
-        && let Some(own) = &mut scratch.hybrid
-    {
-        own.note_long_step(state);
-    }
-}
-
-fn kick(model: &Model, state: &mut State, scratch: &mut Scratch, (h_s, ends_long_step): (f64, bool)) {
-    match (model.hybrid(), &mut scratch.hybrid) {
-        (Some(body), Some(own)) => hybrid::kick(model, body, state, own, (h_s, ends_long_step)),
-        _ => match &scratch.springs {
-            Some(own) => springs::kick(model, state, own, h_s),
-            None => motion::kick(model, state, h_s),
-        },
+        body.kick(tick.environment, state, h_s, tick.ends_long_step(substep));
     }
 }

@@ -23,13 +23,11 @@
 //! Ledger: the change of momentum is `dt F − dt² D v'`, so beside viscous stress the fictitious damper takes
 //! `dt² v'·D ½(v + v')`, which is counted as dissipated. What elastic force does is counted along `dt ½(v + v')` but the nodes go
 //! `dt v'`: the balance is off by first order.
-use super::{
-    forces::Tick,
-    motion::{damp, drift, holders_power_w},
-    scheme::Body,
+use crate::{
+    bodies::tet::{SteppedTet, TetBody},
+    contact::ContactScratch,
+    tick::{Environment, Evaluation, MechanicalState, Tick, lumped::drift},
 };
-use crate::elements::rest_stiffness::RestStiffness;
-use crate::world::{Model, Scratch, State};
 use glam::{DMat3, DVec3};
 
 /// What the rest state fixes.
@@ -43,8 +41,8 @@ pub(crate) struct NodalImplicit {
 
 impl NodalImplicit {
     /// For steps `dt_s`, with a further matrix `dt C_i` inside the inverse where a scheme has one.
-    pub(super) fn new(nodal_n_per_m: &[DMat3], viscous_n_s_per_m: Option<&[DMat3]>, body: &Body<'_>) -> Self {
-        let Body { inverse_mass_per_kg, mass_kg, dt_s, .. } = *body;
+    pub(super) fn new(nodal_n_per_m: &[DMat3], viscous_n_s_per_m: Option<&[DMat3]>, body: &TetBody, dt_s: f64) -> Self {
+        let (inverse_mass_per_kg, mass_kg) = (body.inverse_mass_per_kg(), body.mass_kg());
         let free = |inverse_mass: DVec3| {
             DMat3::from_diagonal(DVec3::select(inverse_mass.cmpeq(DVec3::ZERO), DVec3::ZERO, DVec3::ONE))
         };
@@ -70,21 +68,30 @@ impl NodalImplicit {
 }
 
 /// All substeps of a tick.
-pub(super) fn run(tick: &Tick<'_>, nodal: &NodalImplicit, state: &mut State, scratch: &mut Scratch) {
+pub(super) fn run(
+    tick: &Tick<'_>,
+    nodal: &NodalImplicit,
+    body: &mut SteppedTet<'_>,
+    state: &mut MechanicalState,
+    contact: &mut ContactScratch,
+) {
     let dt_s = tick.dt_s();
-    tick.make_force_current(state, scratch);
+    if !state.force_is_current {
+        state.contact.forget_untracked_geometry();
+        body.evaluate(tick, &Evaluation::at_start(), state, contact);
+    }
     for substep in 1..=tick.substeps {
-        kick(tick.model, nodal, state, dt_s);
+        kick(tick.environment, body.body, nodal, state, dt_s);
         let fastest_m_per_s = drift(state, dt_s);
-        tick.evaluate_after(substep, fastest_m_per_s, state, scratch);
+        body.evaluate(tick, &tick.after_substep(substep, fastest_m_per_s), state, contact);
     }
 }
 
 /// `v ← (M + dt²D)⁻¹(M v + dt F)`, as `v + (M + dt²D)⁻¹ dt (F − dt D v)`, and the ledger's share of it.
-fn kick(model: &Model, nodal: &NodalImplicit, state: &mut State, dt_s: f64) {
-    let damping = model.spec().settings.mass_damping_per_s;
+fn kick(environment: &Environment, body: &TetBody, nodal: &NodalImplicit, state: &mut MechanicalState, dt_s: f64) {
+    let (damping, masses) = (environment.settings.mass_damping_per_s, body.lumped_mass(environment));
     if damping > 0.0 {
-        damp(model, state, (-damping * dt_s).exp());
+        masses.damp(state, (-damping * dt_s).exp());
     }
     let (mut external_w, mut drag_w) = (0.0, 0.0);
     for (node, v) in state.v.iter_mut().enumerate() {
@@ -95,6 +102,6 @@ fn kick(model: &Model, nodal: &NodalImplicit, state: &mut State, dt_s: f64) {
         external_w += state.external_n[node].dot(mean);
         drag_w += dt_s * (stiffness * *v).dot(mean);
     }
-    state.ledger.external_work_j += dt_s * (external_w + holders_power_w(model, &state.force_n, &state.v));
+    state.ledger.external_work_j += dt_s * (external_w + masses.holders_power_w(&state.force_n, &state.v));
     state.ledger.dissipated_j += dt_s * (drag_w + state.viscous.latest_w);
 }

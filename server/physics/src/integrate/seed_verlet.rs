@@ -15,22 +15,27 @@
 //!
 //! Ledger: work and kinetic energy agree exactly, but kinetic and elastic energy are half a step apart: the balance is off by
 //! `½dt` times the power between them, an error of first order that comes and goes and does not add up.
-use super::{
-    forces::Tick,
-    motion::{drift, kick},
+use crate::{
+    bodies::SteppedBody,
+    contact::ContactScratch,
+    tick::{MechanicalState, Tick, lumped::drift},
 };
-use crate::world::{Scratch, State};
 
 /// All substeps of a tick.
-pub(super) fn run(tick: &Tick<'_>, state: &mut State, scratch: &mut Scratch) {
+pub(super) fn run(
+    tick: &Tick<'_>,
+    body: &mut SteppedBody<'_>,
+    state: &mut MechanicalState,
+    contact: &mut ContactScratch,
+) {
     let dt_s = tick.dt_s();
-    tick.make_force_current(state, scratch);
+    body.make_force_current(tick, state, contact);
     if state.tick == 0 {
-        kick(tick.model, state, 0.5 * dt_s);
+        body.kick(tick.environment, state, 0.5 * dt_s, true);
     }
     for substep in 1..=tick.substeps {
         let fastest_m_per_s = drift(state, dt_s);
-        tick.evaluate_after(substep, fastest_m_per_s, state, scratch);
-        kick(tick.model, state, dt_s);
+        body.evaluate(tick, &tick.after_substep(substep, fastest_m_per_s), state, contact);
+        body.kick(tick.environment, state, dt_s, true);
     }
 }

@@ -6,7 +6,7 @@
 //! Δ²g = g₊ − 2g + g₋ = −K y − (C/dt)(y − y₋)
 //! ‖Δ²g‖ ≤ q max(‖f‖, ‖f₋‖)        ‖a‖² = Σ aᵀ M⁻¹ a over free axes,  q = dt² λ_max(M⁻¹K) + 2 dt λ_max(M⁻¹C)       (1)
 //! ```
-//! The step is stable while `k + 2d ≤ 4` in every mode, `k = dt²κ/m`, `d = dt c/m` (`world::substeps`). So
+//! The step is stable while `k + 2d ≤ 4` in every mode, `k = dt²κ/m`, `d = dt c/m` (`tick::substeps`). So
 //! `Q = ‖Δ²g‖/max(‖f‖, ‖f₋‖)` above 4 proves that it is too long, for a body that is linear between the three instants and whose
 //! stiffest mode is its most viscous one. A mode that grows as `z = −|z|` has `Q = 2 + |z| + 1/|z| > 4` exactly.
 //!
@@ -25,11 +25,8 @@
 //! before ([`Pace::before`]). Compare Park & Underwood 1980 and Bergan & Mollestad 1985, who choose steps by the quotient
 //! `Δxᵀ Δg/Δxᵀ M Δx`, which has neither filter.
 use crate::{
-    bodies::hybrid::HybridScratch,
-    health::LastGood,
-    lanes::StepForces,
-    settings::{Integrator, MAX_SUBSTEPS, Precision},
-    world::{Model, State, with_room},
+    settings::{Integrator, MAX_SUBSTEPS},
+    tick::{Environment, Judged, MechanicalState, StepEvidence, StepForcesNow},
 };
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
@@ -45,6 +42,8 @@ const SAFETY: f64 = 0.9;
 const MOST_TIMES: u32 = 64;
 /// A tick whose result is not finite is repeated with so many times its substeps.
 const TIMES_IF_NOT_FINITE: u32 = 4;
+/// Most repetitions of a tick.
+const MOST_REPETITIONS: u32 = 3;
 /// So many ticks must show that fewer substeps would do before fewer are tried.
 const CALM_TICKS: u32 = 100;
 
@@ -62,14 +61,20 @@ pub struct Pace {
 }
 
 impl Pace {
-    pub(crate) fn at_start(model: &Model) -> Self {
-        let before = if judges_across_ticks(model) { InstantForces::zero(model) } else { InstantForces::default() };
-        Self { substeps: model.substeps(), calm_ticks: 0, before, before_is_usable: false }
+    /// Before the first tick of a body with so many nodes, whose lists have room for `most_positions`.
+    pub(crate) fn at_start(environment: &Environment, is_judged: bool, nodes: usize, most_positions: usize) -> Self {
+        let substeps = environment.steps.substeps;
+        let before = if is_judged && substeps == 1 {
+            InstantForces::zero(nodes, most_positions)
+        } else {
+            InstantForces::default()
+        };
+        Self { substeps, calm_ticks: 0, before, before_is_usable: false }
     }
 
     /// As at the start, in the buffers it has.
-    pub(crate) fn reset(&mut self, model: &Model) {
-        (self.substeps, self.calm_ticks, self.before_is_usable) = (model.substeps(), 0, false);
+    pub(crate) fn reset(&mut self, environment: &Environment) {
+        (self.substeps, self.calm_ticks, self.before_is_usable) = (environment.steps.substeps, 0, false);
         self.before.total_n.fill(DVec3::ZERO);
         self.before.external_n.fill(DVec3::ZERO);
     }
@@ -82,23 +87,30 @@ impl Pace {
     }
 
     /// For so many positions, and in a range of substeps that the model may have.
-    pub(crate) fn fits(&self, model: &Model, positions: usize) -> bool {
-        let nodes = if judges_across_ticks(model) { positions } else { 0 };
-        let most = if is_judged(model) { most_substeps(model) } else { model.substeps() };
+    pub(crate) fn fits(&self, environment: &Environment, is_judged: bool, positions: usize) -> bool {
+        let steps = environment.steps;
+        let nodes = if is_judged && steps.substeps == 1 { positions } else { 0 };
+        let most = if is_judged { most_substeps(environment) } else { steps.substeps };
         [&self.before.total_n, &self.before.external_n].iter().all(|list| list.len() == nodes)
-            && (model.substeps()..=most).contains(&self.substeps)
-            && self.substeps.is_multiple_of(model.substeps_per_long_step())
+            && (steps.substeps..=most).contains(&self.substeps)
+            && self.substeps.is_multiple_of(steps.substeps_per_long_step)
+    }
+
+    /// The vectors of it, for a look whether they are finite.
+    pub(crate) fn vectors(&self) -> impl Iterator<Item = &DVec3> {
+        self.before.total_n.iter().chain(&self.before.external_n)
     }
 
     /// The tick is repeated in `substeps`.
-    pub(super) fn start_again(&mut self, substeps: u32) {
+    fn start_again(&mut self, substeps: u32) {
         (self.substeps, self.calm_ticks, self.before_is_usable) = (substeps, 0, false);
     }
 
     /// Takes note of a tick of `self.substeps` that was accepted at once.
-    pub(super) fn calm(&mut self, model: &Model, quotient: f64) {
-        let fewer = (self.substeps - (self.substeps / 8).max(1)).max(model.substeps());
-        let fewer = fewer.next_multiple_of(model.substeps_per_long_step()).min(self.substeps);
+    fn calm(&mut self, environment: &Environment, quotient: f64) {
+        let steps = environment.steps;
+        let fewer = (self.substeps - (self.substeps / 8).max(1)).max(steps.substeps);
+        let fewer = fewer.next_multiple_of(steps.substeps_per_long_step).min(self.substeps);
         // Q grows at most with dt².
         let then = quotient * (f64::from(self.substeps) / f64::from(fewer)).powi(2);
         self.calm_ticks = if then <= SAFETY * LIMIT { self.calm_ticks + 1 } else { 0 };
@@ -108,22 +120,18 @@ impl Pace {
     }
 }
 
-/// Only leapfrog's ticks are judged and repeated: the seeds' schemes run as their authors describe them, backward Euler needs none.
-pub(crate) fn is_judged(model: &Model) -> bool {
-    let settings = &model.spec().settings;
-    // The step of springs is stable at any stretch (`spring::model`).
-    let may_be_too_long = model.seed().is_none() && model.springs().is_none();
-    settings.subcycle_unstable && settings.integrator == Integrator::Leapfrog && may_be_too_long
-}
-
-fn judges_across_ticks(model: &Model) -> bool {
-    is_judged(model) && model.substeps() == 1
+/// Whether ticks of a body whose steps can be judged are: only leapfrog's. The seeds' schemes run as their authors describe them,
+/// backward Euler needs none.
+pub(crate) fn is_judged(environment: &Environment, can_be: bool) -> bool {
+    let settings = &environment.settings;
+    settings.subcycle_unstable && settings.integrator == Integrator::Leapfrog && can_be
 }
 
 /// The most substeps that are tried.
-fn most_substeps(model: &Model) -> u32 {
-    let most = model.substeps().saturating_mul(MOST_TIMES).min(MAX_SUBSTEPS.max(model.substeps()));
-    most - most % model.substeps_per_long_step()
+fn most_substeps(environment: &Environment) -> u32 {
+    let steps = environment.steps;
+    let most = steps.substeps.saturating_mul(MOST_TIMES).min(MAX_SUBSTEPS.max(steps.substeps));
+    most - most % steps.substeps_per_long_step
 }
 
 /// Forces at an instant.
@@ -136,8 +144,12 @@ pub struct InstantForces {
 }
 
 impl InstantForces {
-    fn zero(model: &Model) -> Self {
-        let zeros = || with_room(model, std::iter::repeat_n(DVec3::ZERO, model.mass_kg().len()));
+    fn zero(nodes: usize, most_positions: usize) -> Self {
+        let zeros = || {
+            let mut list = Vec::with_capacity(most_positions.max(nodes));
+            list.resize(nodes, DVec3::ZERO);
+            list
+        };
         Self { total_n: zeros(), external_n: zeros() }
     }
 
@@ -146,11 +158,11 @@ impl InstantForces {
         self.external_n.resize(positions, DVec3::ZERO);
     }
 
-    fn internal_n(&self) -> impl Iterator<Item = DVec3> {
-        self.total_n.iter().zip(&self.external_n).map(|(force, external)| *force - *external)
+    fn now(&self) -> StepForcesNow<'_> {
+        StepForcesNow { total_n: &self.total_n, external_n: &self.external_n }
     }
 
-    fn swap(&mut self, state: &mut State) {
+    fn swap(&mut self, state: &mut MechanicalState) {
         std::mem::swap(&mut self.total_n, &mut state.force_n);
         std::mem::swap(&mut self.external_n, &mut state.external_n);
     }
@@ -163,37 +175,57 @@ pub(crate) struct ForceHistory {
     two_before: InstantForces,
     one_before: InstantForces,
     /// `Σ m (Δv)²` of held axes at the tick's start (kg m²/s²).
-    pub(super) held_jump: f64,
+    pub(crate) held_jump: f64,
+}
+
+/// The state at the start of a tick.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct StartOfTick<'a> {
+    /// Positions (m).
+    pub(crate) x: &'a [DVec3],
+    /// Velocities (m/s).
+    pub(crate) v: &'a [DVec3],
+}
+
+/// What is to be done with a tick that was run.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Verdict {
+    /// It stands.
+    Accept,
+    /// It is to be taken back and repeated in [`Pace::substeps`].
+    Repeat,
 }
 
 impl ForceHistory {
-    pub(crate) fn new(model: &Model) -> Self {
-        if !is_judged(model) {
-            return Self::default();
-        }
-        let forces = || InstantForces::zero(model);
+    /// Of ticks that are judged, of a body with so many nodes, whose lists have room for `most_positions`.
+    pub(crate) fn new(nodes: usize, most_positions: usize) -> Self {
+        let forces = || InstantForces::zero(nodes, most_positions);
         Self { start: forces(), two_before: forces(), one_before: forces(), held_jump: 0.0 }
     }
 
+    /// Whether ticks are judged by it.
+    pub(crate) fn is_kept(&self) -> bool {
+        !self.start.total_n.is_empty()
+    }
+
     /// Before a tick: makes everything as long as the state's positions, of which there may be more or fewer than before. What was held is then of
-    /// no use, which [`State::force_is_current`] tells.
-    pub(super) fn fit(&mut self, state: &mut State) {
-        let positions = state.x.len();
-        if self.start.total_n.is_empty() || self.start.total_n.len() == positions {
+    /// no use, which [`MechanicalState::force_is_current`] tells.
+    pub(crate) fn fit(&mut self, positions: usize, pace: &mut Pace) {
+        if !self.is_kept() || self.start.total_n.len() == positions {
             return;
         }
         for forces in [&mut self.start, &mut self.one_before, &mut self.two_before] {
             forces.resize(positions);
         }
-        if !state.pace.before.total_n.is_empty() {
-            state.pace.before.resize(positions);
+        if !pace.before.total_n.is_empty() {
+            pace.before.resize(positions);
         }
     }
 
     /// Before forces are evaluated at the end of substep `number` of `substeps`: what the state holds is set aside if it is wanted
     /// again. The state is given a buffer to be overwritten.
-    pub(super) fn set_aside(&mut self, number: u32, substeps: u32, state: &mut State) {
-        if self.start.total_n.is_empty() {
+    pub(super) fn set_aside(&mut self, number: u32, substeps: u32, state: &mut MechanicalState) {
+        if !self.is_kept() {
             return;
         }
         if number == 1 {
@@ -206,189 +238,126 @@ impl ForceHistory {
     }
 
     /// Puts back the forces at the start of a tick that was run.
-    pub(super) fn put_back(&mut self, state: &mut State) {
+    pub(crate) fn put_back(&mut self, state: &mut MechanicalState) {
         self.start.swap(state);
     }
 
-    /// What the tick that was run in `substeps` shows. `start` is the state at its start.
-    pub(super) fn evidence(
+    /// Judges a tick that was run in [`Pace::substeps`] from `start`, after so many repetitions; `spoilt`: its result is not finite. The
+    /// pace is that of the repetition, or of the next tick, then.
+    pub(crate) fn judge(
+        &mut self,
+        environment: &Environment,
+        body: &mut dyn Judged,
+        state: &MechanicalState,
+        start: StartOfTick<'_>,
+        pace: &mut Pace,
+        spoilt: bool,
+        repeated: u32,
+    ) -> Verdict {
+        let substeps = pace.substeps;
+        let evidence = self.evidence(environment, body, state, pace, start);
+        let unstable = spoilt || self.is_unstable(&evidence, environment, body, state, pace);
+        let found = (!spoilt).then(|| quotient(&evidence));
+        let more = substeps_for(environment, body.is_viscous(), substeps, found);
+        if let Some(more) = more.filter(|_| unstable && repeated < MOST_REPETITIONS) {
+            pace.start_again(more);
+            return Verdict::Repeat;
+        }
+        if substeps > environment.steps.substeps && !unstable && repeated == 0 {
+            pace.calm(environment, quotient(&evidence));
+        }
+        self.hand_on(pace, substeps);
+        body.accept();
+        Verdict::Accept
+    }
+
+    /// What the tick shows.
+    fn evidence(
         &self,
-        model: &Model,
-        state: &State,
-        (start, own): (&LastGood, Option<&mut HybridScratch>),
-        substeps: u32,
-    ) -> Evidence {
-        let Some((one, two)) = self.before_the_end(state, substeps) else {
-            return self.evidence_of_first_step(model, state, start, own);
+        environment: &Environment,
+        body: &mut dyn Judged,
+        state: &MechanicalState,
+        pace: &Pace,
+        start: StartOfTick<'_>,
+    ) -> StepEvidence {
+        let substeps = pace.substeps;
+        let Some(older) = self.before_the_end(pace) else {
+            return body.evidence_of_first_step(environment, state, self.start.now(), start.x, start.v);
         };
-        let period_s = model.spec().settings.tick_period_s;
+        let period_s = environment.settings.tick_period_s;
         let held_sq = if substeps == 1 { self.held_jump / (period_s * period_s) } else { 0.0 };
-        if let Some(own) = own {
-            let now = state.force_n.iter().zip(&state.external_n).map(|(force, external)| *force - *external);
-            let second = now.zip(one.internal_n()).zip(two.internal_n()).map(|((g0, g1), g2)| g0 - g1 * 2.0 + g2);
-            let answer_sq = own.size_sq(second);
-            let [one_sq, two_sq] = if substeps == 1 {
-                [one, two].map(|forces| own.size_sq(forces.total_n.iter().copied()))
-            } else {
-                let [_, one_sq, two_sq] = own.kick_sq;
-                [one_sq, two_sq]
-            };
-            let long_step = long_step_quotient(model, state, own, substeps);
-            return Evidence { answer_sq, cause_sq: one_sq.max(two_sq) + held_sq, long_step };
-        }
-        let forces = StepForces {
-            total_n: [&state.force_n, &one.total_n, &two.total_n],
-            external_n: [&state.external_n, &one.external_n, &two.external_n],
-            inverse_mass_per_kg: model.inverse_mass_per_kg(),
-        };
-        let [answer_sq, one_sq, two_sq] = forces.sums();
-        Evidence { answer_sq, cause_sq: one_sq.max(two_sq) + held_sq, long_step: 0.0 }
+        let found = body.evidence(environment, state, older, held_sq, substeps);
+        // As large as to have the limit of `Q`.
+        StepEvidence { long_step: LIMIT / LONG_STEP_LIMIT * found.long_step, ..found }
     }
 
-    /// `‖g − g₋‖` of the two instants before the tick's end; 0 in a tick that has no such two.
-    fn last_change(&self, model: &Model, state: &State, own: Option<&mut HybridScratch>, substeps: u32) -> f64 {
-        let Some((one, two)) = self.before_the_end(state, substeps) else { return 0.0 };
-        if let Some(own) = own {
-            return own.size_sq(one.internal_n().zip(two.internal_n()).map(|(g, before)| g - before)).sqrt();
-        }
-        let internal = |forces: &InstantForces, node: usize| forces.total_n[node] - forces.external_n[node];
-        let change_sq = |(node, inverse_mass): (usize, &DVec3)| {
-            let change = internal(one, node) - internal(two, node);
-            (change * change).dot(*inverse_mass)
-        };
-        model.inverse_mass_per_kg().iter().enumerate().map(change_sq).sum::<f64>().sqrt()
-    }
-
-    /// Forces one and two steps before the end of a tick that was run.
-    fn before_the_end<'a>(&'a self, state: &'a State, substeps: u32) -> Option<(&'a InstantForces, &'a InstantForces)> {
-        match substeps {
-            1 => state.pace.before_is_usable.then_some((&self.start, &state.pace.before)),
-            2 => Some((&self.one_before, &self.start)),
-            _ => Some((&self.one_before, &self.two_before)),
+    /// Forces one and two steps before the end of the tick that was run.
+    fn before_the_end<'a>(&'a self, pace: &'a Pace) -> Option<[StepForcesNow<'a>; 2]> {
+        match pace.substeps {
+            1 => pace.before_is_usable.then_some([self.start.now(), pace.before.now()]),
+            2 => Some([self.one_before.now(), self.start.now()]),
+            _ => Some([self.one_before.now(), self.two_before.now()]),
         }
     }
 
     /// After a tick that was accepted: what the next one is judged by.
-    pub(super) fn hand_on(&mut self, pace: &mut Pace, substeps: u32) {
+    fn hand_on(&mut self, pace: &mut Pace, substeps: u32) {
         pace.before_is_usable = substeps == 1 && !pace.before.total_n.is_empty();
         if pace.before_is_usable {
             std::mem::swap(&mut pace.before, &mut self.start);
         }
     }
 
-    /// Without a force before: `‖Δg‖ ≤ q max(‖M Δx‖, dt ‖M v‖)/dt²`, which slow motion hides more.
-    fn evidence_of_first_step(
-        &self,
-        model: &Model,
-        state: &State,
-        start: &LastGood,
-        own: Option<&mut HybridScratch>,
-    ) -> Evidence {
-        let dt_s = model.spec().settings.tick_period_s;
-        if let (Some(own), Some(body)) = (own, model.hybrid()) {
-            let now = state.force_n.iter().zip(&state.external_n).map(|(force, external)| *force - *external);
-            let answer_sq = own.size_sq(now.zip(self.start.internal_n()).map(|(g, before)| g - before));
-            let moved_sq = own.twice_kinetic(body, state.x.iter().zip(start.x()).map(|(x, before)| *x - *before));
-            let speed_sq = own.twice_kinetic(body, start.v().iter().copied());
-            let cause_sq = (moved_sq / (dt_s * dt_s)).max(speed_sq) / (dt_s * dt_s);
-            return Evidence { answer_sq, cause_sq, long_step: 0.0 };
-        }
-        let (mut change_sq, mut moved_sq, mut speed_sq) = (0.0, 0.0, 0.0);
-        for node in 0..state.x.len() {
-            let now = state.force_n[node] - state.external_n[node];
-            let change = now - (self.start.total_n[node] - self.start.external_n[node]);
-            change_sq += (change * change * model.inverse_mass_per_kg()[node]).element_sum();
-            moved_sq += model.mass_kg()[node] * state.x[node].distance_squared(start.x()[node]);
-            speed_sq += model.mass_kg()[node] * start.v()[node].length_squared();
-        }
-        let cause_sq = (moved_sq / (dt_s * dt_s)).max(speed_sq) / (dt_s * dt_s);
-        Evidence { answer_sq: change_sq, cause_sq, long_step: 0.0 }
-    }
-}
-
-/// `(k h ω)²` of the coarse level's long steps, as far as a tick shows it, as large as to have [`LIMIT`]; 0 where there are none.
-fn long_step_quotient(model: &Model, state: &State, own: &mut HybridScratch, substeps: u32) -> f64 {
-    let every = model.substeps_per_long_step();
-    if every == 1 {
-        return 0.0;
-    }
-    let long_step_s = model.spec().settings.tick_period_s * f64::from(every) / f64::from(substeps);
-    LIMIT / LONG_STEP_LIMIT * own.long_step_quotient(model, state, (long_step_s, digits(model)))
-}
-
-/// To how many digits internal forces are known.
-fn digits(model: &Model) -> f64 {
-    match model.spec().settings.precision {
-        Precision::Single => 1e-5,
-        Precision::Double => 1e-12,
-    }
-}
-
-/// Both sides of (1), squared (N²/kg).
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Evidence {
-    answer_sq: f64,
-    cause_sq: f64,
-    /// What long steps of a coarse level have for `Q`, from another quotient (`hybrid::long_steps`).
-    long_step: f64,
-}
-
-impl Evidence {
-    /// `Q`; not finite where forces are not.
-    pub(super) fn quotient(&self) -> f64 {
-        let of_step = if self.answer_sq == 0.0 { 0.0 } else { (self.answer_sq / self.cause_sq).sqrt() };
-        if of_step.is_finite() { of_step.max(self.long_step) } else { of_step }
-    }
-
     /// `Q` is above the limit, and not by mass damping or by rounding: the answer stands above the last digits of the internal forces
     /// themselves.
-    pub(super) fn is_unstable(
+    fn is_unstable(
         &self,
-        model: &Model,
-        state: &State,
-        (history, mut own): (&ForceHistory, Option<&mut HybridScratch>),
-        substeps: u32,
+        evidence: &StepEvidence,
+        environment: &Environment,
+        body: &mut dyn Judged,
+        state: &MechanicalState,
+        pace: &Pace,
     ) -> bool {
-        if self.long_step > LIMIT {
+        if evidence.long_step > LIMIT {
             return true;
         }
-        if self.answer_sq <= LIMIT * LIMIT * self.cause_sq {
+        if evidence.answer_sq <= LIMIT * LIMIT * evidence.cause_sq {
             return false;
         }
-        let settings = &model.spec().settings;
-        let damped = -(-settings.mass_damping_per_s * settings.tick_period_s / f64::from(substeps)).exp_m1();
-        let cause = self.cause_sq.sqrt();
-        let last_change = history.last_change(model, state, own.as_deref_mut(), substeps);
+        let settings = &environment.settings;
+        let damped = -(-settings.mass_damping_per_s * settings.tick_period_s / f64::from(pace.substeps)).exp_m1();
+        let cause = evidence.cause_sq.sqrt();
+        // ‖g − g₋‖ of the two instants before the tick's end; 0 in a tick that has no such two.
+        let last_change = self.before_the_end(pace).map_or(0.0, |[one, two]| body.change(one, two));
         let beyond = (last_change - 0.5 * LIMIT * cause).max(0.0);
-        if self.answer_sq.sqrt() <= LIMIT * cause + damped * beyond {
+        if evidence.answer_sq.sqrt() <= LIMIT * cause + damped * beyond {
             return false;
         }
-        let digits = digits(model);
-        let mut internal_sq = 0.0;
-        let particle_kg = own.as_deref().map_or(&[][..], HybridScratch::particle_kg);
-        let masses = model.mass_kg().iter().chain(particle_kg);
-        let nodes = state.force_n.iter().zip(&state.external_n).zip(masses);
-        // Coarse nodes that nothing follows have no mass.
-        for ((force, external), mass) in nodes.filter(|(_, mass)| **mass > 0.0) {
-            // Reactions of held nodes included: between them a body may be stretched without a force on any other node.
-            internal_sq += (*force - *external - model.gravity_m_per_s2() * *mass).length_squared() / mass;
-        }
-        self.answer_sq > digits * digits * internal_sq
+        let digits = settings.precision.relative_rounding();
+        // Reactions of held nodes included: between them a body may be stretched without a force on any other node.
+        evidence.answer_sq > digits * digits * body.internal_sq(environment, state)
     }
+}
+
+/// `Q`; not finite where forces are not.
+fn quotient(evidence: &StepEvidence) -> f64 {
+    let StepEvidence { answer_sq, cause_sq, long_step } = *evidence;
+    let of_step = if answer_sq == 0.0 { 0.0 } else { (answer_sq / cause_sq).sqrt() };
+    if of_step.is_finite() { of_step.max(long_step) } else { of_step }
 }
 
 /// With how many substeps to repeat a tick that proved unstable in `substeps`; `None` if no more are tried.
 ///
 /// Stress's part of `Q` falls with dt², viscosity's with dt.
-pub(super) fn substeps_for(model: &Model, substeps: u32, quotient: Option<f64>) -> Option<u32> {
-    let most = most_substeps(model);
+fn substeps_for(environment: &Environment, is_viscous: bool, substeps: u32, quotient: Option<f64>) -> Option<u32> {
+    let most = most_substeps(environment);
     let wanted = match quotient.filter(|q| q.is_finite()) {
         None => substeps.saturating_mul(TIMES_IF_NOT_FINITE),
         Some(quotient) => {
-            let times = if model.kernel().is_viscous() { 0.25 * quotient } else { (0.25 * quotient).sqrt() };
+            let times = if is_viscous { 0.25 * quotient } else { (0.25 * quotient).sqrt() };
             (f64::from(substeps) * times / SAFETY).ceil().min(f64::from(most)) as u32
         }
     };
-    let every = model.substeps_per_long_step();
+    let every = environment.steps.substeps_per_long_step;
     (substeps < most).then(|| wanted.clamp(substeps + 1, most).next_multiple_of(every))
 }

@@ -1,5 +1,8 @@
 //! Linear algebra: what the model, its stepping and its equilibrium solve with.
+pub(crate) mod cholesky;
 pub(crate) mod eigen;
 pub(crate) mod lanczos;
 pub(crate) mod pcg;
 pub mod tensor;
+
+pub use cholesky::CholeskyError;

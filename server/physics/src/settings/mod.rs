@@ -16,6 +16,16 @@ pub enum Precision {
     Double,
 }
 
+impl Precision {
+    /// Part of internal forces that may be rounding.
+    pub(crate) fn relative_rounding(self) -> f64 {
+        match self {
+            Self::Single => 1e-5,
+            Self::Double => 1e-12,
+        }
+    }
+}
+
 /// How many substeps a tick takes.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub enum Substeps {

@@ -1,10 +1,9 @@
 //! What equilibrium balances: forces at a fraction of the goal, and the change of potential along a line.
-use super::{ToolAtRest, follower, stiffness::FreeAxes};
+use super::{ToolAtRest, follower, tet_model::TetModel};
 use crate::{
     contact::{Pressing, RestingContact, SaturatingSpring, ToolTarget},
-    elements::{linear_tet::RestTet, loads},
+    elements::{free_axes::FreeAxes, linear_tet::RestTet, loads},
     settings::LoadSpec,
-    world::Model,
 };
 use glam::{DMat3, DVec3};
 
@@ -34,41 +33,41 @@ pub(super) struct Stage {
 impl Stage {
     /// The stage entered from the configuration `before`, with contact as it was there; and the configuration to begin with.
     pub(super) fn enter(
-        model: &Model,
+        model: TetModel<'_>,
         goal: &Goal<'_>,
         fraction: f64,
         before: &[DVec3],
         contact: &RestingContact,
     ) -> (Self, Vec<DVec3>) {
         let load_factors: Vec<f64> = goal.load_factors.iter().map(|factor| factor * fraction).collect();
-        let gravity = model.gravity_m_per_s2() * fraction;
-        let mut dead_n: Vec<DVec3> = model.mass_kg().iter().map(|mass| gravity * *mass).collect();
+        let gravity = model.environment.gravity_m_per_s2 * fraction;
+        let mut dead_n: Vec<DVec3> = model.body.mass_kg().iter().map(|mass| gravity * *mass).collect();
         dead_n.resize(before.len(), DVec3::ZERO);
-        for (load, &factor) in model.spec().loads.iter().zip(&load_factors) {
+        for (load, &factor) in model.environment.loads.iter().zip(&load_factors) {
             let follows = matches!(load, LoadSpec::Pressure { follower: true, .. });
             if factor != 0.0 && !follows {
-                let rest = model.rest_positions_m();
-                loads::add_load_n(load, factor, model.surface(), (rest, rest), &mut dead_n);
+                let rest = model.body.rest_positions_m();
+                loads::add_load_n(load, factor, &model.environment.surface, (rest, rest), &mut dead_n);
             }
         }
-        let start = model.spec().tools.iter().map(|tool| tool.start_position_m);
+        let start = model.environment.tools.iter().map(|tool| tool.start_position_m);
         let devices_m: Vec<DVec3> = start.zip(goal.tools).map(|(s, tool)| s.lerp(tool.position_m, fraction)).collect();
         let mut begin = before.to_vec();
         for (tool, device) in devices_m.iter().enumerate() {
-            if model.contact().spring(tool).is_none() {
-                begin[model.mass_kg().len() + tool] = *device;
+            if model.environment.contact.spring(tool).is_none() {
+                begin[model.body.mass_kg().len() + tool] = *device;
             }
         }
-        let contact = contact.arrive(model.contact(), before, &begin);
+        let contact = contact.arrive(&model.environment.contact, before, &begin);
         (Self { fraction, load_factors, dead_n, devices_m, contact }, begin)
     }
 
     /// Where prescribed axes are to be, the rest as in the configuration.
-    pub(super) fn prescribed(&self, model: &Model, goal: &Goal<'_>, configuration: &[DVec3]) -> Vec<DVec3> {
+    pub(super) fn prescribed(&self, model: TetModel<'_>, goal: &Goal<'_>, configuration: &[DVec3]) -> Vec<DVec3> {
         let mut wanted = configuration.to_vec();
-        for (set, displacement) in model.spec().prescribed.iter().zip(goal.prescribed_displacements_m) {
+        for (set, displacement) in model.environment.prescribed.iter().zip(goal.prescribed_displacements_m) {
             for node in set.nodes.iter().map(|&n| n as usize) {
-                let rest = model.rest_positions_m()[node];
+                let rest = model.body.rest_positions_m()[node];
                 for axis in (0..3).filter(|&axis| set.axes[axis]) {
                     wanted[node][axis] = rest[axis] + displacement[axis] * self.fraction;
                 }
@@ -80,12 +79,12 @@ impl Stage {
     /// Coupled tools: index in the configuration, spring and its stretch `d − c` (m).
     fn springs<'a>(
         &'a self,
-        model: &'a Model,
+        model: TetModel<'a>,
         configuration: &'a [DVec3],
     ) -> impl Iterator<Item = (usize, SaturatingSpring, DVec3)> + 'a {
-        let nodes = model.mass_kg().len();
+        let nodes = model.body.mass_kg().len();
         self.devices_m.iter().enumerate().filter_map(move |(tool, device)| {
-            let spring = model.contact().spring(tool)?;
+            let spring = model.environment.contact.spring(tool)?;
             Some((nodes + tool, spring, *device - configuration[nodes + tool]))
         })
     }
@@ -93,33 +92,38 @@ impl Stage {
     /// Calls `add(i, j, block)` with the stiffness (N/m) of contact and couplings; see [`RestingContact::for_each_block`].
     pub(super) fn for_each_block(
         &self,
-        model: &Model,
+        model: TetModel<'_>,
         configuration: &[DVec3],
         definite: bool,
         mut add: impl FnMut(u32, u32, &DMat3),
     ) {
-        self.contact.for_each_block(model.contact(), configuration, definite, &mut add);
+        self.contact.for_each_block(&model.environment.contact, configuration, definite, &mut add);
         for (index, spring, stretch_m) in self.springs(model, configuration) {
             add(index as u32, index as u32, &spring.hessian_n_per_m(stretch_m, definite));
         }
     }
 
     /// The tools in a configuration with these forces.
-    pub(super) fn tools_at_rest(&self, model: &Model, forces: &Forces, configuration: &[DVec3]) -> Vec<ToolAtRest> {
-        let centres = &configuration[model.mass_kg().len()..];
+    pub(super) fn tools_at_rest(
+        &self,
+        model: TetModel<'_>,
+        forces: &Forces,
+        configuration: &[DVec3],
+    ) -> Vec<ToolAtRest> {
+        let centres = &configuration[model.body.mass_kg().len()..];
         let at_rest = |(tool, pressing): (usize, &Pressing)| {
             let (device_m, centre_m) = (self.devices_m[tool], centres[tool]);
-            let spring_n = model.contact().spring(tool).map(|spring| spring.force_n(device_m - centre_m));
+            let spring_n = model.environment.contact.spring(tool).map(|spring| spring.force_n(device_m - centre_m));
             ToolAtRest::pressing(device_m, centre_m, pressing, spring_n)
         };
         forces.tools.iter().enumerate().map(at_rest).collect()
     }
 
     /// Potential (J) of contact and couplings.
-    fn tools_j(&self, model: &Model, configuration: &[DVec3]) -> f64 {
+    fn tools_j(&self, model: TetModel<'_>, configuration: &[DVec3]) -> f64 {
         let springs: f64 =
             self.springs(model, configuration).map(|(_, spring, stretch)| spring.energy_j(stretch)).sum();
-        self.contact.potential_j(model.contact(), configuration) + springs
+        self.contact.potential_j(&model.environment.contact, configuration) + springs
     }
 }
 
@@ -135,12 +139,12 @@ pub(super) struct Forces {
 }
 
 impl Forces {
-    pub(super) fn at(model: &Model, stage: &Stage, configuration: &[DVec3]) -> Self {
+    pub(super) fn at(model: TetModel<'_>, stage: &Stage, configuration: &[DVec3]) -> Self {
         let mut external_n = stage.dead_n.clone();
-        for (triangles, pressure_pa) in follower::active(model, &stage.load_factors) {
-            loads::add_pressure_n(model.surface(), triangles, pressure_pa, configuration, &mut external_n);
+        for (triangles, pressure_pa) in follower::active(model.environment, &stage.load_factors) {
+            loads::add_pressure_n(&model.environment.surface, triangles, pressure_pa, configuration, &mut external_n);
         }
-        let tools = stage.contact.add_forces_n(model.contact(), configuration, &mut external_n);
+        let tools = stage.contact.add_forces_n(&model.environment.contact, configuration, &mut external_n);
         for (index, spring, stretch_m) in stage.springs(model, configuration) {
             external_n[index] += spring.force_n(stretch_m);
         }
@@ -179,12 +183,12 @@ fn norm(nodal: &[DVec3]) -> f64 {
 }
 
 /// Elastic nodal forces (N), element by element in f64.
-fn elastic_n(model: &Model, x: &[DVec3]) -> Vec<DVec3> {
+fn elastic_n(model: TetModel<'_>, x: &[DVec3]) -> Vec<DVec3> {
     let mut forces = vec![DVec3::ZERO; x.len()];
-    for (tet, nodes) in model.mesh().tets().iter().enumerate() {
-        let rest = &model.rest_tets()[tet];
+    for (tet, nodes) in model.body.mesh().tets().iter().enumerate() {
+        let rest = &model.body.rest_tets()[tet];
         let f = rest.gradient_of(&nodes.map(|n| x[n as usize]));
-        let corner = rest.corner_forces_n(&model.material_of(tet).piola(&f));
+        let corner = rest.corner_forces_n(&model.body.material_of(tet).piola(&f));
         for (node, force) in nodes.iter().zip(corner) {
             forces[*node as usize] += force;
         }
@@ -193,18 +197,18 @@ fn elastic_n(model: &Model, x: &[DVec3]) -> Vec<DVec3> {
 }
 
 /// Elastic energy (J) of every tet.
-fn elastic_j(model: &Model, x: &[DVec3]) -> Vec<f64> {
-    (0..model.rest_tets().len())
+fn elastic_j(model: TetModel<'_>, x: &[DVec3]) -> Vec<f64> {
+    (0..model.body.rest_tets().len())
         .map(|tet| {
-            let corners = model.mesh().tets()[tet].map(|n| x[n as usize]);
-            model.rest_tets()[tet].energy_j(model.material_of(tet), &corners)
+            let corners = model.body.mesh().tets()[tet].map(|n| x[n as usize]);
+            model.body.rest_tets()[tet].energy_j(model.body.material_of(tet), &corners)
         })
         .collect()
 }
 
 /// The line `x + αd`, and the potential along it.
 pub(super) struct Line<'a> {
-    model: &'a Model,
+    model: TetModel<'a>,
     stage: &'a Stage,
     x: &'a [DVec3],
     d: &'a [DVec3],
@@ -216,10 +220,11 @@ pub(super) struct Line<'a> {
 }
 
 impl<'a> Line<'a> {
-    pub(super) fn new(model: &'a Model, stage: &'a Stage, x: &'a [DVec3], d: &'a [DVec3]) -> Self {
+    pub(super) fn new(model: TetModel<'a>, stage: &'a Stage, x: &'a [DVec3], d: &'a [DVec3]) -> Self {
         let elastic_j = elastic_j(model, x);
-        let modulus = |(tet, rest): (usize, &RestTet)| rest.volume_m3 * model.material_of(tet).lame.p_wave_modulus_pa();
-        let cancelling_j = model.rest_tets().iter().enumerate().map(modulus).sum();
+        let modulus =
+            |(tet, rest): (usize, &RestTet)| rest.volume_m3 * model.body.material_of(tet).lame.p_wave_modulus_pa();
+        let cancelling_j = model.body.rest_tets().iter().enumerate().map(modulus).sum();
         let tools_j = stage.tools_j(model, x);
         Self { model, stage, x, d, elastic_j, tools_j, cancelling_j, dead_slope_w: dot(&stage.dead_n, d) }
     }
@@ -239,7 +244,7 @@ impl<'a> Line<'a> {
         let tools = self.stage.tools_j(self.model, &x) - self.tools_j;
         let elastic: f64 = after.iter().zip(&self.elastic_j).map(|(b, a)| b - a).sum();
         let size: f64 = after.iter().zip(&self.elastic_j).map(|(b, a)| b.abs() + a.abs()).sum();
-        let follower_work = if follower::active(self.model, &self.stage.load_factors).next().is_some() {
+        let follower_work = if follower::active(self.model.environment, &self.stage.load_factors).next().is_some() {
             let power = |t: f64| self.follower_power(t);
             alpha / 6.0 * (power(0.0) + 4.0 * power(0.5 * alpha) + power(alpha))
         } else {
@@ -253,8 +258,8 @@ impl<'a> Line<'a> {
     fn follower_power(&self, t: f64) -> f64 {
         let mut forces = vec![DVec3::ZERO; self.x.len()];
         let x = self.at(t);
-        for (triangles, pressure_pa) in follower::active(self.model, &self.stage.load_factors) {
-            loads::add_pressure_n(self.model.surface(), triangles, pressure_pa, &x, &mut forces);
+        for (triangles, pressure_pa) in follower::active(self.model.environment, &self.stage.load_factors) {
+            loads::add_pressure_n(&self.model.environment.surface, triangles, pressure_pa, &x, &mut forces);
         }
         dot(&forces, self.d)
     }

@@ -1,10 +1,23 @@
 //! Why there is no equilibrium to show.
-use super::{RigidMotion, load_path, rigid};
+use super::load_path;
+use crate::{
+    bodies::tet::ModesError,
+    elements::rigid_motion::{self, FreePart, RigidMotion},
+    linalg::CholeskyError,
+};
 use thiserror::Error;
 
 /// Why there is no equilibrium to show.
 #[derive(Debug, Clone, PartialEq, Error)]
 pub enum SolveError {
+    /// A kind of body that this solver does not know.
+    #[error("{what} is known of bodies of tetrahedra{but}: run the scene in time until it is at rest")]
+    NotForThisBody {
+        /// What is asked for.
+        what: &'static str,
+        /// What other bodies it is known of.
+        but: &'static str,
+    },
     /// Arguments of the wrong number.
     #[error("{what}: {found} given, the model has {expected}")]
     InputLength {
@@ -36,7 +49,7 @@ pub enum SolveError {
     /// Rigid motions are left free.
     #[error(
         "the body (the part with node {node}) is free to {}; prescribe displacements that hold it",
-        rigid::list(motions)
+        rigid_motion::list(motions)
     )]
     UnderConstrained {
         /// A node of the part that is free.
@@ -112,4 +125,32 @@ pub enum SolveError {
         /// Load fraction being solved.
         load_fraction: f64,
     },
+}
+
+impl From<FreePart> for SolveError {
+    fn from(FreePart { node, motions }: FreePart) -> Self {
+        Self::UnderConstrained { node, motions }
+    }
+}
+
+impl From<CholeskyError> for SolveError {
+    fn from(CholeskyError { unknowns, reason }: CholeskyError) -> Self {
+        Self::Factorisation { unknowns, reason }
+    }
+}
+
+impl From<ModesError> for SolveError {
+    fn from(error: ModesError) -> Self {
+        match error {
+            ModesError::UnderConstrained(part) => part.into(),
+            ModesError::Factorisation(error) => error.into(),
+            ModesError::NoConvergence { relative_residual, iterations } => Self::NoConvergence {
+                reached_fraction: 0.0,
+                failed_fraction: 0.0,
+                relative_residual,
+                iterations,
+                hint: "the subspace iteration did not settle; ask for one mode more or fewer, a pair may be cut in two",
+            },
+        }
+    }
 }

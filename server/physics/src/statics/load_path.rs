@@ -3,8 +3,9 @@ use super::{
     Progress, SolveError, StaticSettings, StaticSolution,
     equilibrium::{Goal, Stage},
     newton::{Failure, Solver, Stop},
+    tet_model::TetModel,
 };
-use crate::{contact::RestingContact, world::Model};
+use crate::{contact::RestingContact, tick::Environment};
 use glam::DVec3;
 use std::ops::ControlFlow;
 
@@ -15,16 +16,16 @@ pub(super) const MAX_WIDENINGS: u32 = 20;
 
 /// From rest to the goal.
 pub(super) fn solve(
-    model: &Model,
+    model: TetModel<'_>,
     goal: &Goal<'_>,
     settings: &StaticSettings,
     progress: &mut dyn FnMut(&Progress) -> ControlFlow<()>,
 ) -> Result<StaticSolution, SolveError> {
-    let largest = largest_step(model, goal)?;
+    let largest = largest_step(model.environment, goal)?;
     let mut solver = Solver::new(model, settings, goal, progress)?;
-    let start = model.spec().tools.iter().map(|tool| tool.start_position_m);
-    let mut at: Vec<DVec3> = model.rest_positions_m().iter().copied().chain(start).collect();
-    let mut contact = RestingContact::appear(model.contact(), &at);
+    let start = model.environment.tools.iter().map(|tool| tool.start_position_m);
+    let mut at: Vec<DVec3> = model.body.rest_positions_m().iter().copied().chain(start).collect();
+    let mut contact = RestingContact::appear(&model.environment.contact, &at);
     let (stage, load_steps) = raise(largest, settings, |fraction| {
         let (mut stage, begin) = Stage::enter(model, goal, fraction, &at, &contact);
         at = settle(&mut solver, goal, &mut stage, &begin).map_err(|stop| (stop, solver.history.len() as u32))?;
@@ -73,7 +74,9 @@ pub(super) fn raise<T>(
 fn settle(solver: &mut Solver<'_>, goal: &Goal<'_>, stage: &mut Stage, begin: &[DVec3]) -> Result<Vec<DVec3>, Stop> {
     let mut found = solver.equilibrate(goal, stage, begin.to_vec())?;
     for _ in 0..MAX_WIDENINGS {
-        let Some(wider) = stage.contact.widened(solver.model.contact(), begin, &found) else { return Ok(found) };
+        let Some(wider) = stage.contact.widened(&solver.model.environment.contact, begin, &found) else {
+            return Ok(found);
+        };
         stage.contact = wider;
         found = solver.equilibrate(goal, stage, found)?;
     }
@@ -97,9 +100,9 @@ fn give_up(failure: Failure, reached_fraction: f64, failed_fraction: f64, iterat
 }
 
 /// A device moves at most half its tool's radius per load step: the tool presses what it was outside of.
-pub(super) fn largest_step(model: &Model, goal: &Goal<'_>) -> Result<f64, SolveError> {
+pub(super) fn largest_step(environment: &Environment, goal: &Goal<'_>) -> Result<f64, SolveError> {
     let mut largest = 1.0_f64;
-    for (spec, target) in model.spec().tools.iter().zip(goal.tools) {
+    for (spec, target) in environment.tools.iter().zip(goal.tools) {
         let distance_m = spec.start_position_m.distance(target.position_m);
         let step = 0.5 * spec.radius_m / distance_m.max(f64::MIN_POSITIVE);
         if step < 1.0 / f64::from(MAX_LOAD_STEPS) {

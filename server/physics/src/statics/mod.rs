@@ -1,37 +1,38 @@
 //! Equilibrium: the static solve that references and `palpated static` use, and natural modes about rest.
 //!
-//! Forces are those of `fem::element`, the materials and `fem::loads`, so an equilibrium found here is a resting state of
+//! Forces are those of `elements::linear_tet`, the materials and `elements::loads`, so an equilibrium found here is a resting state of
 //! [`crate::step`]. Everything is f64; linear systems go to faer's sparse Cholesky (docs/adr/static-solve.md).
 //!
 //! - `load_path.rs`: load stepping
 //! - `newton.rs`: Newton's method with a line search at one load step
 //! - `equilibrium.rs`: forces and the change of potential along a line
-//! - `stiffness.rs`, `follower.rs`: the tangent stiffness in a fixed sparsity pattern
-//! - `rigid.rs`: which rigid motions the constraints leave free
-//! - `modes.rs`: natural frequencies by subspace iteration
-//! - `eigen.rs`: small symmetric eigenproblems
+//! - `follower.rs`: the load stiffness of follower pressure
 //! - `hybrid/`: the same for bodies with particles, by conjugate gradients
 //! - `solution.rs`, `error.rs`: what comes out
 mod equilibrium;
 mod error;
-mod factor;
 mod follower;
 mod hybrid;
 mod load_path;
-mod modes;
 mod newton;
-mod rigid;
 mod solution;
-mod stiffness;
+mod tet_model;
 
-use crate::{contact::ToolTarget, world::Model};
+use crate::{
+    bodies::{
+        Body,
+        tet::{self, Mode},
+    },
+    contact::ToolTarget,
+    elements::rigid_motion::FreePart,
+    world::Model,
+};
 pub use error::SolveError;
 use glam::DVec3;
 pub use load_path::MAX_LOAD_STEPS;
-pub use modes::{Mode, natural_modes};
-pub use rigid::RigidMotion;
 pub use solution::{AwakeParticles, StaticSolution, ToolAtRest};
 use std::ops::ControlFlow;
+use tet_model::TetModel;
 
 /// How far and how hard to solve.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -88,13 +89,37 @@ pub fn solve_static(
     settings: &StaticSettings,
     progress: &mut dyn FnMut(&Progress) -> ControlFlow<()>,
 ) -> Result<StaticSolution, SolveError> {
-    check(model, load_factors, prescribed_displacements_m, tools, settings)?;
-    rigid::check_constrained(model)?;
     let goal = equilibrium::Goal { load_factors, prescribed_displacements_m, tools };
-    match model.hybrid() {
-        Some(body) => hybrid::solve(model, body, &goal, None, settings, progress),
-        None => load_path::solve(model, &goal, settings, progress),
+    check(model, &goal, settings)?;
+    let environment = model.environment();
+    match model.body() {
+        Body::Tet(body) => {
+            held(body.first_free_part())?;
+            load_path::solve(TetModel { body, environment }, &goal, settings, progress)
+        }
+        Body::Hybrid(body) => {
+            held(body.first_free_part())?;
+            hybrid::solve(environment, body, &goal, None, settings, progress)
+        }
+        Body::MassSpring(_) | Body::Seed(_) => {
+            Err(SolveError::NotForThisBody { what: "static equilibrium", but: ", and of those with particles" })
+        }
     }
+}
+
+fn held(free: Option<FreePart>) -> Result<(), SolveError> {
+    free.map_or(Ok(()), |part| Err(part.into()))
+}
+
+/// The `count` lowest natural modes of a body of tetrahedra about rest, ascending.
+///
+/// # Errors
+/// [`SolveError`]; other bodies have none that are known.
+pub fn natural_modes(model: &Model, count: usize) -> Result<Vec<Mode>, SolveError> {
+    let Some(body) = model.body().as_tet() else {
+        return Err(SolveError::NotForThisBody { what: "natural vibration", but: "" });
+    };
+    Ok(tet::natural_modes(body, model.surface(), count)?)
 }
 
 /// The same of a hybrid body with these particles awake and no others; those that may not wake are left out. `None` of any other body.
@@ -108,24 +133,19 @@ pub fn solve_static_with(
     settings: &StaticSettings,
     progress: &mut dyn FnMut(&Progress) -> ControlFlow<()>,
 ) -> Result<Option<StaticSolution>, SolveError> {
-    let Some(body) = model.hybrid() else { return Ok(None) };
-    check(model, load_factors, prescribed_displacements_m, tools, settings)?;
-    rigid::check_constrained(model)?;
+    let Some(body) = model.body().as_hybrid() else { return Ok(None) };
     let goal = equilibrium::Goal { load_factors, prescribed_displacements_m, tools };
+    check(model, &goal, settings)?;
+    held(body.first_free_part())?;
     let mut ids: Vec<u32> = particles.into_iter().filter(|&particle| body.may_wake(particle)).collect();
     ids.sort_unstable();
     ids.dedup();
-    hybrid::solve(model, body, &goal, Some(ids), settings, progress).map(Some)
+    hybrid::solve(model.environment(), body, &goal, Some(ids), settings, progress).map(Some)
 }
 
-fn check(
-    model: &Model,
-    load_factors: &[f64],
-    prescribed_displacements_m: &[DVec3],
-    tools: &[ToolTarget],
-    settings: &StaticSettings,
-) -> Result<(), SolveError> {
-    let spec = model.spec();
+fn check(model: &Model, goal: &equilibrium::Goal<'_>, settings: &StaticSettings) -> Result<(), SolveError> {
+    let equilibrium::Goal { load_factors, prescribed_displacements_m, tools } = *goal;
+    let spec = model.environment();
     let length = |what, found, expected| {
         if found == expected { Ok(()) } else { Err(SolveError::InputLength { what, found, expected }) }
     };

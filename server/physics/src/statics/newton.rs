@@ -9,11 +9,14 @@
 use super::{
     Progress, SolveError, StaticSettings,
     equilibrium::{Forces, Goal, Line, Stage, dot},
-    factor::Factor,
     follower,
-    stiffness::{Definiteness, FreeAxes, Stiffness, force_differential_n},
+    tet_model::TetModel,
 };
-use crate::world::Model;
+use crate::{
+    bodies::tet::stiffness::{Definiteness, Stiffness, force_differential_n},
+    elements::free_axes::FreeAxes,
+    linalg::cholesky::Factor,
+};
 use glam::DVec3;
 use std::ops::ControlFlow;
 
@@ -52,7 +55,7 @@ impl From<SolveError> for Stop {
 }
 
 pub(super) struct Solver<'a> {
-    pub(super) model: &'a Model,
+    pub(super) model: TetModel<'a>,
     settings: &'a StaticSettings,
     pub(super) axes: FreeAxes,
     stiffness: Stiffness,
@@ -64,25 +67,25 @@ pub(super) struct Solver<'a> {
 }
 
 /// `ε ‖diag K‖₂ max|q|` (N): a node or tool known to `ε|q|` has a force known to `ε |q| K_ii`.
-fn rounding_n(model: &Model, stiffness: &Stiffness, goal: &Goal<'_>) -> f64 {
-    let springs = (0..goal.tools.len()).filter_map(|tool| model.contact().spring(tool));
+fn rounding_n(model: TetModel<'_>, stiffness: &Stiffness, goal: &Goal<'_>) -> f64 {
+    let springs = (0..goal.tools.len()).filter_map(|tool| model.environment.contact.spring(tool));
     let springs_sq: f64 = springs.map(|spring| 3.0 * spring.stiffness_n_per_m.powi(2)).sum();
     let diagonal = (stiffness.diagonal().map(|k| k * k).sum::<f64>() + springs_sq).sqrt();
-    let places = model.rest_positions_m().iter().copied().chain(goal.tools.iter().map(|tool| tool.position_m));
+    let places = model.body.rest_positions_m().iter().copied().chain(goal.tools.iter().map(|tool| tool.position_m));
     f64::EPSILON * diagonal * places.map(DVec3::length).fold(0.0, f64::max)
 }
 
 impl<'a> Solver<'a> {
     pub(super) fn new(
-        model: &'a Model,
+        model: TetModel<'a>,
         settings: &'a StaticSettings,
         goal: &Goal<'_>,
         progress: &'a mut dyn FnMut(&Progress) -> ControlFlow<()>,
     ) -> Result<Self, SolveError> {
-        let axes = FreeAxes::with_tools(model);
-        let mut stiffness = Stiffness::pattern(model, &axes);
-        let factor = Factor::analyse(&stiffness)?;
-        stiffness.assemble(model, model.rest_positions_m(), Definiteness::Exact);
+        let axes = model.free_axes();
+        let mut stiffness = Stiffness::pattern(model.body, &model.environment.surface, &axes);
+        let factor = Factor::analyse(&stiffness.matrix)?;
+        stiffness.assemble(model.body, model.body.rest_positions_m(), Definiteness::Exact);
         let rounding_n = rounding_n(model, &stiffness, goal);
         Ok(Self {
             model,
@@ -161,7 +164,7 @@ impl<'a> Solver<'a> {
         }
         self.refactor(stage, x)?;
         let forces = Forces::at(self.model, stage, x);
-        let carried = force_differential_n(self.model, x, &moves);
+        let carried = force_differential_n(self.model.body, x, &moves);
         let total: Vec<DVec3> = forces.total_n().iter().zip(&carried).map(|(a, b)| *a + *b).collect();
         let mut d = vec![0.0; self.axes.count];
         self.axes.gather(&total, &mut d);
@@ -176,7 +179,7 @@ impl<'a> Solver<'a> {
 
     /// Share of a motion in which no coupled tool moves further than a quarter of its radius: contact is not known further ahead.
     fn longest_step(&self, d: &[DVec3]) -> f64 {
-        let tools = self.model.spec().tools.iter().zip(&d[self.model.mass_kg().len()..]);
+        let tools = self.model.environment.tools.iter().zip(&d[self.model.body.mass_kg().len()..]);
         tools.map(|(tool, d)| 0.25 * tool.radius_m / d.length().max(f64::MIN_POSITIVE)).fold(1.0, f64::min)
     }
 
@@ -184,7 +187,7 @@ impl<'a> Solver<'a> {
     pub(super) fn is_stable(&mut self, stage: &Stage, x: &[DVec3]) -> bool {
         self.assemble(stage, x, Definiteness::Exact);
         self.factorisations += 1;
-        self.factor.factorise(&self.stiffness)
+        self.factor.factorise(&self.stiffness.matrix)
     }
 
     /// Assembles and factorises at `x`.
@@ -198,7 +201,7 @@ impl<'a> Solver<'a> {
         while shift < largest {
             self.factorisations += 1;
             self.stiffness.shift_diagonal(shift);
-            if self.factor.factorise(&self.stiffness) {
+            if self.factor.factorise(&self.stiffness.matrix) {
                 return Ok(());
             }
             shift *= 100.0;
@@ -210,10 +213,10 @@ impl<'a> Solver<'a> {
     /// Stiffness of body, follower loads, contact and couplings; without the follower loads if it is to be definite.
     fn assemble(&mut self, stage: &Stage, x: &[DVec3], definiteness: Definiteness) {
         let (axes, stiffness) = (&self.axes, &mut self.stiffness);
-        stiffness.assemble(self.model, x, definiteness);
+        stiffness.assemble(self.model.body, x, definiteness);
         let definite = definiteness == Definiteness::Projected;
         if !definite {
-            follower::add_stiffness(self.model, &stage.load_factors, x, axes, stiffness);
+            follower::add_stiffness(self.model.environment, &stage.load_factors, x, axes, stiffness);
         }
         stage.for_each_block(self.model, x, definite, |i, j, block| stiffness.add_block(axes, i, j, block));
     }
@@ -222,7 +225,7 @@ impl<'a> Solver<'a> {
     fn worst_node(&self, forces: &Forces) -> u32 {
         let total = forces.total_n();
         let by_size = |a: &usize, b: &usize| total[*a].abs().max_element().total_cmp(&total[*b].abs().max_element());
-        (0..self.model.mass_kg().len()).max_by(by_size).unwrap_or(0) as u32
+        (0..self.model.body.mass_kg().len()).max_by(by_size).unwrap_or(0) as u32
     }
 
     /// One step along Newton's direction; `None` when no length of it is acceptable.

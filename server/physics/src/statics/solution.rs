@@ -3,12 +3,13 @@ use super::{
     Progress,
     equilibrium::{Forces, Stage},
     newton::Solver,
+    tet_model::TetModel,
 };
 use crate::{
     contact::{Pressing, ToolTarget},
     elements::linear_tet::RestTet,
-    health::Energies,
     settings::PrescribedSpec,
+    tick::Energies,
     world::{Model, State},
 };
 use glam::{BVec3, DVec3};
@@ -106,10 +107,11 @@ impl StaticSolution {
     /// holds the work of a slow loading, which is what the body holds: `W = U + G`.
     pub fn state(&self, model: &Model, load_factors: &[f64]) -> State {
         let mut state = State::at_rest(model);
-        state.wake_at_rest(&self.awake.ids);
-        state.x.copy_from_slice(&self.x);
-        state.load_factors.copy_from_slice(load_factors);
-        for (tool, found) in state.tools.iter_mut().zip(&self.tools) {
+        let State { mechanical, body: own, .. } = &mut state;
+        own.wake_at_rest(&self.awake.ids, mechanical);
+        mechanical.x.copy_from_slice(&self.x);
+        mechanical.load_factors.copy_from_slice(load_factors);
+        for (tool, found) in mechanical.tools.iter_mut().zip(&self.tools) {
             tool.target = ToolTarget::at(found.device_m);
             tool.previous_target = tool.target;
             tool.centre_m = found.centre_m;
@@ -119,7 +121,7 @@ impl StaticSolution {
             tool.penetration_m = found.penetration_m;
             tool.contact_energy_j = found.contact_energy_j;
         }
-        state.ledger.external_work_j = Energies::of(model, &state).held_j();
+        state.mechanical.ledger.external_work_j = Energies::of(model, &state).held_j();
         state
     }
 
@@ -132,13 +134,14 @@ impl StaticSolution {
         let (residual_n, relative_residual) = forces.residual(&residual);
         // The holder supplies what the other forces lack.
         let hold = |(inverse_mass, f): (&DVec3, DVec3)| DVec3::select(inverse_mass.cmpeq(DVec3::ZERO), -f, DVec3::ZERO);
-        let node_reactions_n: Vec<DVec3> = model.inverse_mass_per_kg().iter().zip(forces.total_n()).map(hold).collect();
+        let node_reactions_n: Vec<DVec3> =
+            model.body.inverse_mass_per_kg().iter().zip(forces.total_n()).map(hold).collect();
         let of_set = |set: &PrescribedSpec| {
             let sum: DVec3 = set.nodes.iter().map(|&n| node_reactions_n[n as usize]).sum();
             DVec3::select(BVec3::from_array(set.axes), sum, DVec3::ZERO)
         };
         Self {
-            reactions_n: model.spec().prescribed.iter().map(of_set).collect(),
+            reactions_n: model.environment.prescribed.iter().map(of_set).collect(),
             tools: stage.tools_at_rest(model, &forces, &configuration),
             iterations: solver.history.len() as u32,
             factorisations: solver.factorisations,
@@ -152,7 +155,7 @@ impl StaticSolution {
             awake: AwakeParticles::default(),
             history: std::mem::take(&mut solver.history),
             x: {
-                configuration.truncate(model.mass_kg().len());
+                configuration.truncate(model.body.mass_kg().len());
                 configuration
             },
             node_reactions_n,
@@ -160,8 +163,8 @@ impl StaticSolution {
     }
 }
 
-fn inverted_tets(model: &Model, x: &[DVec3]) -> u32 {
+fn inverted_tets(model: TetModel<'_>, x: &[DVec3]) -> u32 {
     let volume_ratio =
         |(rest, nodes): (&RestTet, &[u32; 4])| rest.gradient_of(&nodes.map(|n| x[n as usize])).determinant();
-    model.rest_tets().iter().zip(model.mesh().tets()).map(volume_ratio).filter(|&j| j <= 0.0).count() as u32
+    model.body.rest_tets().iter().zip(model.body.mesh().tets()).map(volume_ratio).filter(|&j| j <= 0.0).count() as u32
 }

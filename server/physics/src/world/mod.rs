@@ -1,20 +1,23 @@
-//! [`Model`] (constant after load), [`State`] (what a tick changes) and [`Scratch`] (buffers, no meaning between ticks).
-mod building;
-mod check;
+//! [`Model`] (constant after load), [`State`] (what a tick changes), [`Scratch`] (buffers, no meaning between ticks), and [`step`].
+mod by_hand;
+mod energies;
 mod error;
 mod model;
-mod seed_body;
+mod quarantine;
+mod rollback;
+mod scratch;
+mod sleep;
 mod spec;
-mod springs_body;
 mod state;
-mod substeps;
-mod tick;
+mod step;
 
+pub use by_hand::{refine_only, wake_only};
+pub use energies::{elastic_energy_j, min_volume_ratio};
 pub use error::ModelError;
 pub use model::Model;
-pub use spec::{ModelSpec, Region};
-
+pub use quarantine::{Quarantine, first_non_finite};
+pub use scratch::Scratch;
+pub use sleep::Sleep;
+pub use spec::ModelSpec;
 pub use state::State;
-pub(crate) use state::with_room;
-pub(crate) use substeps::relaxation_time_s;
-pub use tick::{PointForce, Scratch, StepReport, TickInput};
+pub use step::{StepReport, step};

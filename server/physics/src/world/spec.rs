@@ -1,44 +1,19 @@
 //! What a model is built from.
-use crate::LoadSpec;
-use crate::PrescribedSpec;
-use crate::Settings;
 use crate::{
-    bodies::{hybrid::ParticleSpec, mass_spring::SpringBodySpec, seed::SeedBodySpec},
+    bodies::BodySpec,
     contact::ToolSpec,
-    material::Material,
-    mesh::TetMesh,
+    settings::{LoadSpec, PrescribedSpec, Settings},
 };
 use glam::DVec3;
 
-/// A material and density shared by some tets.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Region {
-    /// Name for messages.
-    pub name: String,
-    /// Constitutive law and constants.
-    pub material: Material,
-    /// Density (kg/m³).
-    pub density_kg_per_m3: f64,
-}
-
-/// Everything a [`Model`] is built from.
+/// Everything a [`crate::Model`] is built from.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ModelSpec {
-    /// Rest mesh; of a hybrid body, the coarse one.
-    pub mesh: TetMesh,
-    /// Particles that make it a hybrid body. Its surface is their skin: loads are at the skin's vertices and triangles.
-    pub particles: Option<ParticleSpec>,
-    /// Makes its tets the core of the papers' hybrid; there is one material then, and what is prescribed is held.
-    pub seed: Option<SeedBodySpec>,
-    /// Makes it a mass-spring surface: its mesh has no tets then ([`TetMesh::of_points`]), it has no materials, and what is prescribed is held.
-    pub springs: Option<SpringBodySpec>,
-    /// Materials.
-    pub regions: Vec<Region>,
-    /// Region of each tet.
-    pub tet_region: Vec<u16>,
-    /// Prescribed displacements; a node's axis may be prescribed once.
+    /// The body.
+    pub body: BodySpec,
+    /// Prescribed displacements; a node's axis may be prescribed once. Of springs and of the papers' hybrid what is prescribed is held.
     pub prescribed: Vec<PrescribedSpec>,
-    /// Loads.
+    /// Loads, on nodes of the surface or, of a body of tetrahedra alone, on any.
     pub loads: Vec<LoadSpec>,
     /// Gravity (m/s²).
     pub gravity_m_per_s2: DVec3,

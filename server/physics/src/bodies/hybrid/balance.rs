@@ -10,8 +10,8 @@
 //!
 //! They are dead loads: on what swings while regions are switched they may do work without end, as may strains that fade (`fade`). What both gave lately, beyond what they and
 //! switches took, is kept; where it is more than [`MOST_GIVEN`] of the elastic energy that switches lately changed, forces are balanced no more, and jump.
-use super::{active::ActiveParticles, body::Hybrid, fade, patch::KEPT, running_metric::RunningMetric};
-use crate::world::State;
+use super::{body::HybridBody, fade, patch::KEPT, running_metric::RunningMetric, state::HybridState};
+use crate::tick::MechanicalState;
 use glam::{BVec3, DMat3, DVec3};
 
 /// τ (s): less than that of strains, since forces that go on pushing what swings may feed it.
@@ -43,17 +43,17 @@ impl Balance {
     }
 
     /// Before a switch.
-    pub(super) fn take(&mut self, metric: &mut RunningMetric, state: &State) {
+    pub(super) fn take(&mut self, metric: &mut RunningMetric, own: &HybridState, state: &MechanicalState) {
         self.before.clear();
         if state.force_is_current {
             self.before.extend_from_slice(&state.force_n);
-            state.active.long_steps.add_beyond_n(1.0, &mut self.before);
+            own.long_steps.add_beyond_n(1.0, &mut self.before);
             metric.accelerate(&mut self.before);
         }
     }
 
     /// A particle, the `number`th active one before the switch, falls asleep: `impulses` takes what the coarse nodes are to be pushed with for it (N).
-    pub(super) fn hand_over(&self, body: &Hybrid, (number, particle): (usize, u32), forces_n: &mut [DVec3]) {
+    pub(super) fn hand_over(&self, body: &HybridBody, (number, particle): (usize, u32), forces_n: &mut [DVec3]) {
         if self.before.is_empty() {
             return;
         }
@@ -67,7 +67,7 @@ impl Balance {
     /// [`Self::hand_over`].
     pub(super) fn demand(
         &mut self,
-        body: &Hybrid,
+        body: &HybridBody,
         metric: &mut RunningMetric,
         before: &[u32],
         after: &[u32],
@@ -93,9 +93,9 @@ impl Balance {
     }
 
     /// At an evaluation: takes balancing forces away from the total forces, after working them out if that is due.
-    pub(crate) fn apply(&mut self, body: &Hybrid, state: &mut State) {
-        let State { x, force_n, active, .. } = state;
-        let balance_n = &mut active.balance_n;
+    pub(crate) fn apply(&mut self, body: &HybridBody, own: &mut HybridState, state: &mut MechanicalState) {
+        let MechanicalState { x, force_n, .. } = state;
+        let balance_n = &mut own.balance_n;
         if self.due_n.len() == force_n.len() {
             balance_n.clear();
             balance_n.extend(force_n.iter().zip(&self.due_n).map(|(force, due)| *force - *due));
@@ -129,7 +129,7 @@ impl Balance {
     }
 }
 
-impl ActiveParticles {
+impl HybridState {
     /// Whether fading gave little beside the elastic energy that switches changed lately.
     pub(super) fn may_balance(&self) -> bool {
         self.given_j <= MOST_GIVEN * self.switched_j
@@ -147,7 +147,7 @@ impl ActiveParticles {
 }
 
 /// Takes from forces (N) their torque at positions `x`, by forces on the coarse nodes that have no sum.
-pub(super) fn without_torque(body: &Hybrid, x: &[DVec3], forces_n: &mut [DVec3]) {
+pub(super) fn without_torque(body: &HybridBody, x: &[DVec3], forces_n: &mut [DVec3]) {
     let torque: DVec3 = x.iter().zip(&*forces_n).map(|(x, force)| x.cross(*force)).sum();
     let turn = turn_of(&body.masses.node_kg, x, torque);
     for ((force, mass), x) in forces_n.iter_mut().zip(&body.masses.node_kg).zip(x) {

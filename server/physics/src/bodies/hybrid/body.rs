@@ -13,13 +13,17 @@ use super::{
     projection::Lumping,
     sites::Sites,
     sizes,
-    skin::Skin,
     spec::{HybridError, ParticleSpec},
 };
 use crate::{
+    elements::{
+        rigid_motion::{FreePart, HeldNodes, first_free_part},
+        solid::Solid,
+    },
     material::Material,
     mesh::{Surface, TetMesh, tet::EDGES},
     settings::PrescribedSpec,
+    tick::PrescribedNodes,
 };
 use glam::{BVec3, DVec3};
 use std::collections::BTreeSet;
@@ -34,7 +38,7 @@ const MAY_WAKE: f64 = 0.95;
 
 /// What a hybrid body is made of. Constant after load.
 #[derive(Debug, Clone)]
-pub struct Hybrid {
+pub struct HybridBody {
     pub(super) partition: Partition,
     /// Rest data of a plain cell.
     full_cell: RestCell,
@@ -58,17 +62,22 @@ pub struct Hybrid {
     pub(super) clusters: SkinClusters,
     pub(super) densities_kg_per_m3: Vec<f64>,
     cage: CageSummary,
+    /// The coarse mesh, its boundary moved so that it holds the particles.
+    coarse: TetMesh,
+    /// What the particles were made from.
+    pub(super) particles: ParticleSpec,
+    /// `1/m` (1/kg) per coarse node and axis, zero where prescribed or without mass.
+    pub(super) inverse_mass_per_kg: Vec<DVec3>,
+    pub(super) max_natural_frequency_rad_per_s: f64,
 }
 
-/// A hybrid body and what of its model it changed.
+/// A hybrid body laid out.
 #[derive(Debug)]
-pub struct Built {
-    /// The body.
-    pub hybrid: Hybrid,
-    /// The coarse mesh, its boundary moved.
-    pub mesh: TetMesh,
+pub(crate) struct Built {
+    /// The body, whose frequencies are not known yet.
+    pub(crate) body: HybridBody,
     /// What is prescribed, with nodes in the middle of edges.
-    pub prescribed: Vec<PrescribedSpec>,
+    pub(crate) prescribed: Vec<PrescribedSpec>,
 }
 
 /// What became of the coarse mesh's boundary.
@@ -80,19 +89,20 @@ pub struct CageSummary {
     pub outside: usize,
 }
 
-impl Hybrid {
-    /// Lays the lattice over a body. `of_tet` indexes `materials` and densities; `progress` is told the part done.
+impl HybridBody {
+    /// Lays the lattice of particles over coarse tets, whose boundary is given; `progress` is told the part done.
     ///
     /// # Errors
     /// A specification outside its range, or a lattice that does not fit the body.
-    pub fn build(
-        spec: &ParticleSpec,
-        (mesh, surface): (&TetMesh, &Surface),
+    pub(crate) fn lay_out(
+        coarse: &Solid,
+        boundary: &Surface,
+        spec: ParticleSpec,
         prescribed: &[PrescribedSpec],
-        (materials, densities_kg_per_m3): (&[Material], &[f64]),
-        of_tet: &[u16],
         progress: &mut dyn FnMut(f64),
     ) -> Result<Built, HybridError> {
+        let (mesh, surface, of_tet) = (&coarse.mesh, boundary, &coarse.tet_region[..]);
+        let (materials, densities_kg_per_m3) = (coarse.materials(), coarse.densities_kg_per_m3());
         spec.check()?;
         let spacing_m = spec.spacing_m;
         let sites = Sites::covering(spec.skin.bounds_m(), spacing_m, spec.lattice_through_m);
@@ -132,8 +142,8 @@ impl Hybrid {
         let hybrid = Self {
             lumping: Lumping::new(&partition, &masses),
             full_cell: RestCell::new(spacing_m, 1.0 - KEPT, &(spacing_m.powi(3), full_gradients_m2(spacing_m))),
-            materials: materials.to_vec(),
-            densities_kg_per_m3: densities_kg_per_m3.to_vec(),
+            materials,
+            densities_kg_per_m3,
             of_tet: of_tet.to_vec(),
             is_free: is_free(&masses.node_kg, &free),
             free_parts: free.iter().map(|free| DVec3::select(*free, DVec3::ONE, DVec3::ZERO)).collect(),
@@ -145,9 +155,13 @@ impl Hybrid {
             cage,
             partition,
             masses,
+            coarse: mesh,
+            particles: spec,
+            inverse_mass_per_kg: Vec::new(),
+            max_natural_frequency_rad_per_s: 0.0,
         };
         progress(1.0);
-        Ok(Built { hybrid, mesh, prescribed })
+        Ok(Built { body: hybrid, prescribed })
     }
 
     /// The lattice on the coarse tets.
@@ -158,6 +172,56 @@ impl Hybrid {
     /// Masses while all sleep.
     pub fn masses(&self) -> &Masses {
         &self.masses
+    }
+
+    /// The coarse mesh, its boundary moved so that it holds the particles.
+    pub fn coarse(&self) -> &TetMesh {
+        &self.coarse
+    }
+
+    /// What the particles were made from.
+    pub fn particles(&self) -> &ParticleSpec {
+        &self.particles
+    }
+
+    /// Rest positions (m) of the skin's vertices.
+    pub fn skin_rest_m(&self) -> &[DVec3] {
+        self.particles.skin.positions_m()
+    }
+
+    /// Rest positions (m) of the coarse nodes.
+    pub fn rest_positions_m(&self) -> &[DVec3] {
+        self.partition.coarse().positions_m()
+    }
+
+    /// `1/m` (1/kg) per coarse node and axis, zero where prescribed or without mass.
+    pub fn inverse_mass_per_kg(&self) -> &[DVec3] {
+        &self.inverse_mass_per_kg
+    }
+
+    /// Largest natural frequency (rad/s) at rest.
+    pub fn max_natural_frequency_rad_per_s(&self) -> f64 {
+        self.max_natural_frequency_rad_per_s
+    }
+
+    /// Coarse nodes, and the most particles that may be active at once.
+    pub(crate) fn most_positions(&self) -> usize {
+        self.node_count() + self.particles.most_active
+    }
+
+    /// The first part of its coarse level that is not held.
+    pub(crate) fn first_free_part(&self) -> Option<FreePart> {
+        let nodes = HeldNodes {
+            rest_m: self.rest_positions_m(),
+            mass_kg: &self.masses.node_kg,
+            inverse_mass_per_kg: &self.inverse_mass_per_kg,
+        };
+        first_free_part(&nodes, self.partition.shares().iter().map(|share| &share.nodes[..]))
+    }
+
+    /// What prescribed sets need.
+    pub(crate) fn prescribed_nodes(&self) -> PrescribedNodes<'_> {
+        PrescribedNodes { rest_m: self.rest_positions_m(), mass_kg: &self.masses.node_kg }
     }
 
     /// Materials of the coarse tets.
@@ -211,13 +275,14 @@ impl Hybrid {
     }
 
     /// Takes the skin's triangles in the order of contact's broad phase.
-    pub(crate) fn cluster(&mut self, skin: &Skin, triangles: &[[u32; 3]]) {
-        self.clusters = SkinClusters::new(self, skin.positions_m(), triangles);
+    pub(crate) fn cluster(&mut self, triangles: &[[u32; 3]]) {
+        self.clusters = SkinClusters::new(self, self.skin_rest_m(), triangles);
     }
 
     /// What contact may take for the mass (kg) of a vertex of the skin: with its area `A_v`, `A_v min_p m_p/A_p` over its particles, `A_p = Σ_v w_vp A_v`.
     /// What a foundation can bear per area at the vertex, each of its particles then can.
-    pub(crate) fn vertex_masses_kg(&self, skin: &Skin) -> Vec<f64> {
+    pub(crate) fn vertex_masses_kg(&self) -> Vec<f64> {
+        let skin = &self.particles.skin;
         let mut vertex_m2 = vec![0.0; self.places.len()];
         for triangle in 0..skin.triangles().len() {
             let [a, b, c] = skin.corners_m(triangle);

@@ -6,7 +6,7 @@
 //! x = X + Σ_i w_i u_i + Σ_p w_p d_p,   Σ w_i = 1, Σ |w_i| ≤ a:   x − X ∈ ū ± (a ½(u_max − u_min) + a max |d_p|),   ū = ½(u_min + u_max)
 //! ```
 //! The last term is there where active particles carry vertices alone.
-use super::body::Hybrid;
+use super::body::HybridBody;
 use crate::contact::broad::{CLUSTER, GROUP, box_distance_m};
 use glam::DVec3;
 use std::collections::BTreeSet;
@@ -34,7 +34,7 @@ struct Boxes {
 
 impl SkinClusters {
     /// Of triangles in the order of the broad phase.
-    pub(crate) fn new(hybrid: &Hybrid, rest_positions_m: &[DVec3], triangles: &[[u32; 3]]) -> Self {
+    pub(crate) fn new(hybrid: &HybridBody, rest_positions_m: &[DVec3], triangles: &[[u32; 3]]) -> Self {
         let boxes = |size: usize| {
             let mut boxes = Boxes { first: vec![0], first_vertex: vec![0], ..Boxes::default() };
             for triangles in triangles.chunks(size) {
@@ -111,7 +111,7 @@ pub(super) struct Displaced<'a> {
 }
 
 impl Boxes {
-    fn push(&mut self, hybrid: &Hybrid, rest_positions_m: &[DVec3], triangles: &[[u32; 3]]) {
+    fn push(&mut self, hybrid: &HybridBody, rest_positions_m: &[DVec3], triangles: &[[u32; 3]]) {
         let (mut low, mut high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
         let (start, first_vertex) = (self.nodes.len(), self.vertices.len());
         for &vertex in triangles.iter().flatten() {

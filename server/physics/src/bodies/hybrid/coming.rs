@@ -1,5 +1,5 @@
 //! The patch of a switch to come, laid out in slices over the ticks before it: one tick has no time for all of it.
-use super::{body::Hybrid, running::RunningPatch};
+use super::{body::HybridBody, running::RunningPatch};
 
 /// A patch beside the one that runs.
 #[derive(Debug, Clone)]
@@ -15,7 +15,7 @@ impl Coming {
     }
 
     /// The next slice, for these particles: from the first one where the last was for others. Allocates nothing.
-    pub(super) fn go_on(&mut self, body: &Hybrid, particles: &[u32]) {
+    pub(super) fn go_on(&mut self, body: &HybridBody, particles: &[u32]) {
         if self.done > 0 && self.patch.active() != particles {
             self.done = 0;
         }
@@ -26,7 +26,7 @@ impl Coming {
     }
 
     /// All slices that are left.
-    pub(super) fn finish(&mut self, body: &Hybrid, particles: &[u32]) {
+    pub(super) fn finish(&mut self, body: &HybridBody, particles: &[u32]) {
         self.go_on(body, particles);
         while self.done < RunningPatch::SLICES {
             self.go_on(body, particles);

@@ -1,17 +1,18 @@
 //! What a hybrid body holds: by the oracle, for a look now and then.
 use super::{
-    body::Hybrid,
+    body::HybridBody,
     metric::Metric,
     patch::{Field, Patch},
+    state::HybridState,
 };
-use crate::{health::Energies, world::State};
+use crate::tick::{Energies, MechanicalState};
 use glam::DVec3;
 use std::collections::BTreeSet;
 
-impl Hybrid {
-    fn patch_of(&self, state: &State) -> (Patch, BTreeSet<u32>) {
-        let active: BTreeSet<u32> = state.active.ids().iter().copied().collect();
-        (Patch::new(&self.partition, &active).with_fading(state.active.fading().clone()), active)
+impl HybridBody {
+    fn patch_of(&self, own: &HybridState) -> (Patch, BTreeSet<u32>) {
+        let active: BTreeSet<u32> = own.ids().iter().copied().collect();
+        (Patch::new(&self.partition, &active).with_fading(own.fading().clone()), active)
     }
 
     fn field(&self, list: &[DVec3]) -> Field {
@@ -20,8 +21,8 @@ impl Hybrid {
     }
 
     /// Kinetic, elastic and gravitational energy, beside the ledger's work and dissipation.
-    pub(crate) fn energies(&self, gravity_m_per_s2: DVec3, state: &State) -> Energies {
-        let (patch, active) = self.patch_of(state);
+    pub(crate) fn energies(&self, gravity_m_per_s2: DVec3, own: &HybridState, state: &MechanicalState) -> Energies {
+        let (patch, active) = self.patch_of(own);
         let (at, rate) = (self.field(&state.x), self.field(&state.v));
         let rest = patch.at_rest(&self.partition);
         // Active particles follow free nodes within the coarse tets only: the matrix is positive.
@@ -45,13 +46,13 @@ impl Hybrid {
     }
 
     /// Smallest `det F` of coarse tets' means and awake cells, and its tet.
-    pub(crate) fn min_volume_ratio(&self, state: &State) -> (f64, usize) {
-        self.patch_of(state).0.min_volume_ratio(&self.field(&state.x))
+    pub(crate) fn min_volume_ratio(&self, own: &HybridState, x: &[DVec3]) -> (f64, usize) {
+        self.patch_of(own).0.min_volume_ratio(&self.field(x))
     }
 
     /// Momentum (kg m/s) and angular momentum about the origin (kg m²/s).
-    pub fn momentum(&self, state: &State) -> (DVec3, DVec3) {
-        let active = self.patch_of(state).1;
+    pub fn momentum(&self, own: &HybridState, state: &MechanicalState) -> (DVec3, DVec3) {
+        let active = self.patch_of(own).1;
         let (at, rate) = (self.field(&state.x), self.field(&state.v));
         let Ok(metric) = Metric::new(&self.partition, &self.masses, &active, &self.free) else {
             return (DVec3::NAN, DVec3::NAN);

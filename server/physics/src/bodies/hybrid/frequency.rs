@@ -3,7 +3,7 @@
 //! With no negative weight, a set of active particles has `U ≤ U_all` and `K ≥ (1 − ε) K_all` for the field it describes (Jensen, twice;
 //! `docs/adr/hybrid.md`).
 use super::{
-    body::Hybrid,
+    body::HybridBody,
     cell::{HOURGLASS, MODE_WEIGHTS},
     patch::KEPT,
 };
@@ -21,7 +21,7 @@ const FINE: f64 = 1e-4;
 const MANY_CELLS: usize = 200_000;
 const ROUGH: f64 = 1e-2;
 
-impl Hybrid {
+impl HybridBody {
     /// Largest natural frequency (rad/s) at rest, on springs (N/m, in all directions; one per particle, or none).
     ///
     /// Lanczos' estimate with its residual, and no more than the bound of single cells, each with its share `ρV_cp`, an eighth a corner, of its particles' masses (by Rayleigh's
@@ -165,7 +165,7 @@ mod tests {
     };
 
     /// The largest frequency (rad/s) of what is left to the coarse level, with the mass matrix of these active particles: powers of `M'⁻¹ K_c`.
-    fn left_rad_per_s(hybrid: &Hybrid, active: &[u32]) -> f64 {
+    fn left_rad_per_s(hybrid: &HybridBody, active: &[u32]) -> f64 {
         let mut running = RunningPatch::new(hybrid, active.len(), Precision::Double);
         running.wake(hybrid, active, &Fading::default());
         let (nodes, mut random) = (hybrid.node_count(), Random(7));

@@ -2,7 +2,7 @@
 //!
 //! Left alone is what cannot change: cells that stay awake and whose particles stay where they are, and coarse tets that keep what they have and whose nodes do.
 use super::{
-    body::Hybrid,
+    body::HybridBody,
     composite::PARTS,
     fade::{CellFade, Fading, ShareFade, cell_j, change, effective, modes_m2, share_j},
     partition::{Cell, Partition},
@@ -63,7 +63,7 @@ impl Before {
     /// displaced.
     pub(super) fn take(
         &mut self,
-        body: &Hybrid,
+        body: &HybridBody,
         [patch, next]: [&RunningPatch; 2],
         is_moved: &[bool],
         x: &[DVec3],
@@ -100,7 +100,7 @@ impl Before {
 
     fn take_tet(
         &mut self,
-        body: &Hybrid,
+        body: &HybridBody,
         (tet, share_changes): (u32, bool),
         share: &Share,
         x: &[DVec3],
@@ -117,7 +117,7 @@ impl Before {
     /// faded before. Returns the elastic energy (J) that those tets had, and what all that changes has now.
     pub(super) fn fade_into(
         &mut self,
-        body: &Hybrid,
+        body: &HybridBody,
         [patch, next]: [&RunningPatch; 2],
         is_moved: &[bool],
         (were_m, shifts_m, x): (&[DVec3], &[DVec3], &[DVec3]),
@@ -159,7 +159,7 @@ impl Before {
     }
 
     /// A cell that is awake now: strained as it was, or as its part was; and its energy (J). The particles around one that was awake may have fallen asleep.
-    fn of_cell(&self, body: &Hybrid, patch: &RunningPatch, cell: u32) -> (Option<CellFade>, f64) {
+    fn of_cell(&self, body: &HybridBody, patch: &RunningPatch, cell: u32) -> (Option<CellFade>, f64) {
         let (rest, y) = (body.awake_cell(cell as usize), patch.corners_m(body, cell));
         let (f, now_m2) = (rest.gradient_of(&y), modes_m2(&rest, &y));
         let own = self.cells.binary_search_by_key(&cell, |before| before.cell);
@@ -185,7 +185,7 @@ impl Before {
     /// What is left of a tet, with what fell asleep in it; and its energy (J).
     fn of_tet(
         &self,
-        body: &Hybrid,
+        body: &HybridBody,
         patch: &RunningPatch,
         (shifts_m, x): (&[DVec3], &[DVec3]),
         before: &TetBefore,
@@ -228,7 +228,7 @@ impl Before {
 }
 
 /// Whether a switch changes nothing about an awake cell: its particles stay where they are. Those that follow coarse nodes are moved with them.
-fn stays(body: &Hybrid, [before, after]: [&RunningPatch; 2], is_moved: &[bool], cell: u32) -> bool {
+fn stays(body: &HybridBody, [before, after]: [&RunningPatch; 2], is_moved: &[bool], cell: u32) -> bool {
     before.is_awake(cell) && after.is_awake(cell) && !after.follows(body, cell, is_moved)
 }
 

@@ -14,10 +14,10 @@
 //! `k h` is stable for the coarse level alone, `h` for the whole. That does not prove both together to be (modes of the fine level with `ω k h` near `nπ` resonate with what they
 //! feel of the coarse one); `docs/adr/hybrid.md` has what was measured.
 use super::kernels::Found;
-use super::{HybridScratch, balance::without_torque, body::Hybrid, fade::Progress};
+use super::{balance::without_torque, body::HybridBody, fade::Progress, scratch::HybridScratch, state::HybridState};
 use crate::{
     lanes::vector_operations::Answer,
-    world::{Model, State},
+    tick::{Environment, MechanicalState},
 };
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
@@ -71,7 +71,7 @@ impl LongSteps {
     }
 
     /// `b` has no torque when the body, which is held nowhere, has moved to `x`, either.
-    pub(crate) fn turn_with(&mut self, body: &Hybrid, x: &[DVec3]) {
+    pub(crate) fn turn_with(&mut self, body: &HybridBody, x: &[DVec3]) {
         if body.is_free {
             without_torque(body, x, &mut self.steady_n);
         }
@@ -118,12 +118,12 @@ impl LongSteps {
     }
 }
 
-impl State {
-    /// After a tick of `period_s`: a part of `f_c − b` goes over to `b`.
-    pub(super) fn follow_coarse_forces(&mut self, period_s: f64) {
+impl LongSteps {
+    /// After a tick of `period_s`: a part of `f_c − b` goes over to `b`, and so to the forces (N) of every substep.
+    pub(super) fn follow_coarse_forces(&mut self, period_s: f64, forces_n: &mut [DVec3]) {
         let part = -(-period_s / TIME_CONSTANT_S).exp_m1();
-        let LongSteps { steady_n, beyond_n, .. } = &mut self.active.long_steps;
-        for ((steady, beyond), force) in steady_n.iter_mut().zip(beyond_n).zip(&mut self.force_n) {
+        let Self { steady_n, beyond_n, .. } = self;
+        for ((steady, beyond), force) in steady_n.iter_mut().zip(beyond_n).zip(forces_n) {
             let goes_over = *beyond * part;
             *steady += goes_over;
             *beyond -= goes_over;
@@ -154,7 +154,7 @@ impl Instant {
         self.forces_n.clone_from(&other.forces_n);
     }
 
-    fn is_known_of(&self, state: &State) -> bool {
+    fn is_known_of(&self, state: &MechanicalState) -> bool {
         self.x.len() == state.x.len()
     }
 }
@@ -168,7 +168,7 @@ pub(super) struct LongStepHistory {
     begun: u32,
     at_start: LongSteps,
     fading_at_start: Progress,
-    /// [`super::ActiveParticles::given_j`].
+    /// [`HybridState::given_j`].
     given_at_start_j: f64,
 }
 
@@ -187,46 +187,46 @@ impl LongStepHistory {
 
 impl HybridScratch {
     /// Before a tick that may be repeated.
-    pub(crate) fn keep_long_steps(&mut self, state: &mut State) {
-        self.long_steps.fading_at_start = state.active.fading.progress();
-        self.long_steps.given_at_start_j = state.active.given_j;
+    pub(crate) fn keep_long_steps(&mut self, own: &mut HybridState, state: &MechanicalState) {
+        self.long_steps.fading_at_start = own.fading.progress();
+        self.long_steps.given_at_start_j = own.given_j;
         let LongStepHistory { begun, at_start, .. } = &mut self.long_steps;
         *begun = 0;
-        at_start.steady_n.clone_from(&state.active.long_steps.steady_n);
-        at_start.beyond_n.clone_from(&state.active.long_steps.beyond_n);
+        at_start.steady_n.clone_from(&own.long_steps.steady_n);
+        at_start.beyond_n.clone_from(&own.long_steps.beyond_n);
         if !state.force_is_current {
-            state.active.long_steps.before.forget();
+            own.long_steps.before.forget();
         }
     }
 
     /// As it was then, to be taken in more long steps.
-    pub(crate) fn put_long_steps_back(&mut self, state: &mut State) {
-        state.active.fading.go_back(self.long_steps.fading_at_start);
-        state.active.given_j = self.long_steps.given_at_start_j;
+    pub(crate) fn put_long_steps_back(&mut self, own: &mut HybridState) {
+        own.fading.go_back(self.long_steps.fading_at_start);
+        own.given_j = self.long_steps.given_at_start_j;
         let LongStepHistory { begun, at_start, .. } = &mut self.long_steps;
         *begun = 0;
-        state.active.long_steps.steady_n.clone_from(&at_start.steady_n);
-        state.active.long_steps.beyond_n.clone_from(&at_start.beyond_n);
-        state.active.long_steps.before.forget();
+        own.long_steps.steady_n.clone_from(&at_start.steady_n);
+        own.long_steps.beyond_n.clone_from(&at_start.beyond_n);
+        own.long_steps.before.forget();
     }
 
     /// A long step begins.
-    pub(crate) fn note_long_step(&mut self, state: &State) {
+    pub(crate) fn note_long_step(&mut self, own: &HybridState, state: &MechanicalState) {
         let LongStepHistory { recent, begun, .. } = &mut self.long_steps;
         recent.swap(0, 1);
         recent[0].x.clone_from(&state.x);
         recent[0].forces_n.clear();
-        recent[0].forces_n.extend(state.active.long_steps.forces_n());
+        recent[0].forces_n.extend(own.long_steps.forces_n());
         *begun += 1;
     }
 
     /// After a tick that was accepted: what the next one is judged by, if it is one long step.
-    pub(crate) fn hand_on_long_step(&mut self, state: &mut State) {
+    pub(crate) fn hand_on_long_step(&mut self, own: &mut HybridState) {
         let LongStepHistory { recent, begun, .. } = &mut self.long_steps;
         if *begun == 1 {
-            std::mem::swap(&mut state.active.long_steps.before, &mut recent[0]);
+            std::mem::swap(&mut own.long_steps.before, &mut recent[0]);
         } else {
-            state.active.long_steps.before.forget();
+            own.long_steps.before.forget();
         }
     }
 
@@ -235,20 +235,27 @@ impl HybridScratch {
     /// ```text
     /// −Δ²f_c·Δ²x / (Δ²x·M' Δ²x/(k h)²)        since Δ²f_c = −K_c Δ²x
     /// ```
-    /// less what rounding of `f_c`, of which so many `digits` count, may have done to it.
+    /// less what rounding of `f_c` may have done to it; 0 where the coarse level takes no longer steps.
     pub(crate) fn long_step_quotient(
         &mut self,
-        model: &Model,
-        state: &State,
-        (long_step_s, digits): (f64, f64),
+        body: &HybridBody,
+        own: &HybridState,
+        environment: &Environment,
+        state: &MechanicalState,
+        substeps: u32,
     ) -> f64 {
-        let Some(body) = model.hybrid() else { return 0.0 };
+        let every = environment.steps.substeps_per_long_step;
+        if every == 1 {
+            return 0.0;
+        }
+        let long_step_s = environment.settings.tick_period_s * f64::from(every) / f64::from(substeps);
+        let digits = environment.settings.precision.relative_rounding();
         let begun = self.long_steps.begun;
         let [one, two] = std::mem::take(&mut self.long_steps.recent);
-        let before = if begun > 1 { &two } else { &state.active.long_steps.before };
+        let before = if begun > 1 { &two } else { &own.long_steps.before };
         // With the step before taken for none, differences are first ones.
         let before = if before.is_known_of(state) { before } else { &one };
-        let LongSteps { steady_n, beyond_n, .. } = &state.active.long_steps;
+        let LongSteps { steady_n, beyond_n, .. } = &own.long_steps;
         let nodes = body.node_count();
         let moved_of_nodes = [&state.x[..nodes], &one.x[..nodes], &before.x[..nodes]];
         let sums = Answer { steady_n, beyond_n, forces_n: [&one.forces_n, &before.forces_n], x: moved_of_nodes }.sums();

@@ -1,9 +1,10 @@
 //! The hybrid body: coarse tetrahedra throughout, and particles of which only those near a contact are awake.
-mod active;
 mod balance;
 pub mod body;
 mod border;
+mod build;
 pub mod cage;
+mod carried_skin;
 pub mod cell;
 pub mod clusters;
 mod coming;
@@ -13,9 +14,9 @@ pub mod equilibrium;
 pub mod fade;
 mod frequency;
 mod handover;
+mod judged;
 pub mod kernels;
 mod least_squares;
-mod listed;
 mod locate;
 mod long_steps;
 #[cfg(test)]
@@ -30,6 +31,7 @@ pub mod points;
 mod projection;
 mod running;
 mod running_metric;
+mod scratch;
 pub mod share;
 pub mod sites;
 pub mod sizes;
@@ -38,14 +40,15 @@ mod smoothing;
 pub mod smoothing_kernels;
 pub mod spec;
 mod sph;
+mod state;
+mod stepped;
 pub(crate) mod switching;
 #[cfg(test)]
 pub(crate) mod testing;
 
-pub use active::ActiveParticles;
-pub(crate) use active::HybridScratch;
-pub use body::Hybrid;
-pub(crate) use listed::SkinView;
+pub use body::HybridBody;
+pub(crate) use scratch::HybridScratch;
 pub use skin::{Skin, SkinError};
-pub use spec::{HybridError, ParticleSpec, Waking, fine_layers};
-pub use switching::wake_only;
+pub use spec::{HybridError, HybridSpec, ParticleSpec, Waking, fine_layers};
+pub use state::HybridState;
+pub(crate) use stepped::SteppedHybrid;

@@ -10,7 +10,7 @@
 //! over the free nodes that they follow; `M''` is the mass matrix after the switch (`metric`), `L` what lumping adds to it, and a `δ` of that holds nodes that nothing else does. Solved by a
 //! few steps of conjugate gradients, preconditioned by `M''⁻¹`. Strains do not change by it (`fade`), nor do momenta (`switching`).
 use super::{
-    body::Hybrid,
+    body::HybridBody,
     composite::{Anchor, NODES},
     metric::Masses,
     partition::Partition,
@@ -85,7 +85,7 @@ pub(super) struct Projection {
 
 impl Projection {
     /// Room for the coarse nodes, and so many active particles.
-    pub(super) fn with_room(body: &Hybrid, most_active: usize) -> Self {
+    pub(super) fn with_room(body: &HybridBody, most_active: usize) -> Self {
         let nodes = body.node_count();
         let list = || Vec::with_capacity(nodes + most_active);
         Self {
@@ -108,7 +108,7 @@ impl Projection {
     }
 
     /// A particle of `(1 − ε) m_p` (kg) falls asleep away (m) from where it would be.
-    pub(super) fn hand_over(&mut self, body: &Hybrid, anchor: &Anchor, mass_kg: f64, away_m: DVec3) {
+    pub(super) fn hand_over(&mut self, body: &HybridBody, anchor: &Anchor, mass_kg: f64, away_m: DVec3) {
         anchor.push(away_m * mass_kg, &mut self.moments);
         for (node, weight) in anchor.nodes.into_iter().zip(anchor.weights) {
             self.is_moved[node as usize] |= weight > 0.0 && body.free[node as usize].all();
@@ -121,7 +121,7 @@ impl Projection {
     }
 
     /// `Δ` (m) of the coarse nodes, with the mass matrix after the switch. Allocates nothing.
-    pub(super) fn solve(&mut self, body: &Hybrid, metric: &mut RunningMetric) -> &[DVec3] {
+    pub(super) fn solve(&mut self, body: &HybridBody, metric: &mut RunningMetric) -> &[DVec3] {
         let nodes = self.moments.len();
         let all = nodes + metric.particle_kg().len();
         for list in [&mut self.shifts_m, &mut self.direction] {

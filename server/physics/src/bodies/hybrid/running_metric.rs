@@ -1,6 +1,6 @@
 //! The coarse mass matrix `M'` as the loop runs it: factorised anew, without allocating, when other particles wake. Its oracle is `metric`.
 use super::{
-    body::{Hybrid, NO_WEIGHT},
+    body::{HybridBody, NO_WEIGHT},
     composite::Anchor,
     partition::NONE,
     patch::KEPT,
@@ -47,13 +47,13 @@ fn weighty(anchor: &Anchor) -> impl Iterator<Item = (u32, f64)> {
 }
 
 /// `1/M_i` (1/kg) of a coarse node, 0 on held axes.
-fn inverse_per_kg(hybrid: &Hybrid, node: usize) -> DVec3 {
+fn inverse_per_kg(hybrid: &HybridBody, node: usize) -> DVec3 {
     let mass_kg = hybrid.masses.node_kg[node].max(f64::MIN_POSITIVE);
     DVec3::select(hybrid.free[node], DVec3::splat(1.0 / mass_kg), DVec3::ZERO)
 }
 
 impl RunningMetric {
-    pub(super) fn new(hybrid: &Hybrid, most_active: usize) -> Self {
+    pub(super) fn new(hybrid: &HybridBody, most_active: usize) -> Self {
         let nodes = hybrid.node_count();
         let most_touched = (4 * most_active).min(nodes);
         let mut inverses_per_kg = Vec::with_capacity(nodes + most_active);
@@ -72,7 +72,7 @@ impl RunningMetric {
     }
 
     /// Takes the active particles, in order, with what they follow. Allocates nothing.
-    pub(super) fn factorise(&mut self, hybrid: &Hybrid, followed: impl Iterator<Item = (u32, Anchor)> + Clone) {
+    pub(super) fn factorise(&mut self, hybrid: &HybridBody, followed: impl Iterator<Item = (u32, Anchor)> + Clone) {
         for &node in &self.touched {
             self.row_of[node as usize] = NONE;
             self.weight_kg[node as usize] = hybrid.masses.node_kg[node as usize];
@@ -116,7 +116,7 @@ impl RunningMetric {
                 }
             }
         }
-        // Pivots are positive where no weight is negative (`metric`), which [`Hybrid::may_wake`] sees to.
+        // Pivots are positive where no weight is negative (`metric`), which [`HybridBody::may_wake`] sees to.
         self.factor.factorise((&self.block_kg, size), self.free_rows, 1e-12);
     }
 
@@ -148,7 +148,7 @@ impl RunningMetric {
     /// Kinetic and gravitational energy (J) of coarse nodes and active particles. `momenta` is a buffer.
     pub(super) fn moving_j(
         &self,
-        hybrid: &Hybrid,
+        hybrid: &HybridBody,
         (x, v): (&[DVec3], &[DVec3]),
         gravity_m_per_s2: DVec3,
         momenta: &mut Vec<DVec3>,
@@ -177,7 +177,7 @@ impl RunningMetric {
     }
 
     /// Kinetic energy (J) of velocities less that of lumped masses, as far as held nodes have to do with it.
-    pub(crate) fn of_held_j(&self, hybrid: &Hybrid, v: &[DVec3]) -> f64 {
+    pub(crate) fn of_held_j(&self, hybrid: &HybridBody, v: &[DVec3]) -> f64 {
         let held = &self.touched[self.free_rows..];
         let rows = self.block_kg.chunks_exact(self.touched.len().max(1)).skip(self.free_rows).zip(held);
         let of_row = |(row, &node): (&[f64], &u32)| {
@@ -192,7 +192,7 @@ impl RunningMetric {
     }
 
     /// What velocities have on free axes: `v_f·M'_ff v_f` and `v_h·M'_hf v_f` (J). `momenta` is a buffer.
-    pub(crate) fn of_free_j(&self, hybrid: &Hybrid, v: &[DVec3], momenta: &mut Vec<DVec3>) -> (f64, f64) {
+    pub(crate) fn of_free_j(&self, hybrid: &HybridBody, v: &[DVec3], momenta: &mut Vec<DVec3>) -> (f64, f64) {
         momenta.clear();
         momenta.resize(v.len(), DVec3::ZERO);
         self.momenta(hybrid, v, momenta);
@@ -203,7 +203,7 @@ impl RunningMetric {
     }
 
     /// Momenta `M' v` (kg m/s) of coarse nodes and then of active particles: particle by particle, which are fewer than the block's entries.
-    pub(crate) fn momenta(&self, hybrid: &Hybrid, v: &[DVec3], momenta: &mut [DVec3]) {
+    pub(crate) fn momenta(&self, hybrid: &HybridBody, v: &[DVec3], momenta: &mut [DVec3]) {
         let masses = hybrid.masses.node_kg.iter().chain(&self.particle_kg);
         for ((momentum, v), mass) in momenta.iter_mut().zip(v).zip(masses) {
             *momentum = *v * *mass;

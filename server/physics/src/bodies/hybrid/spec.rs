@@ -1,5 +1,10 @@
 //! What a body's particles are made from.
 use super::skin::Skin;
+use crate::{
+    elements::solid::{Solid, SolidError},
+    mesh::MeshError,
+    tick::EnvironmentError,
+};
 use glam::DVec3;
 use thiserror::Error;
 
@@ -8,7 +13,16 @@ pub const MOST_CELLS: f64 = 5e8;
 /// More active particles than this are refused.
 pub const MOST_ACTIVE: usize = 20_000;
 
-/// The particles of a hybrid body, whose coarse level is the model's mesh.
+/// What a hybrid body is made from.
+#[derive(Debug, Clone, PartialEq)]
+pub struct HybridSpec {
+    /// The coarse level. It covers the whole body.
+    pub coarse: Solid,
+    /// The particles. Their skin is the body's surface: loads are at the skin's vertices and triangles.
+    pub particles: ParticleSpec,
+}
+
+/// The particles of a hybrid body.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ParticleSpec {
     /// The body's surface at rest: what bounds its volume, what tools touch and viewers see. As fine as the lattice, or finer.
@@ -29,7 +43,7 @@ pub struct ParticleSpec {
 /// What wakes particles.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Waking {
-    /// Nothing but [`crate::State::wake_only`].
+    /// Nothing but [`crate::world::wake_only`].
     ByHand,
     /// Tools near the skin: those within `reach_m` (m, at rest) of where it is touched or about to be.
     ByTools {
@@ -41,6 +55,12 @@ pub enum Waking {
 /// Why particles cannot be made.
 #[derive(Debug, Clone, PartialEq, Error)]
 pub enum HybridError {
+    /// The coarse level.
+    #[error(transparent)]
+    Solid(#[from] SolidError),
+    /// Settings, constraints, loads or tools.
+    #[error(transparent)]
+    Environment(#[from] EnvironmentError),
     /// A number outside its range.
     #[error("{name} = {value}: {rule}")]
     Setting {
@@ -111,5 +131,11 @@ impl ParticleSpec {
             return Err(HybridError::TooMany { spacing_m: h, cells });
         }
         Ok(())
+    }
+}
+
+impl From<MeshError> for HybridError {
+    fn from(source: MeshError) -> Self {
+        Self::Solid(source.into())
     }
 }

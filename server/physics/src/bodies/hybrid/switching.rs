@@ -13,19 +13,21 @@
 //! with the matrix `M''` of what stays awake: linear and angular momentum are kept. Coarse nodes are moved by `Δ_i` then (`projection`), for which the couple on the right has
 //! `−Σ_i Δ_i × P_i`, of the momenta `P = M'' v + J`.
 use super::{
-    active::{ActiveParticles, HybridScratch, places, room},
     balance::{Turn, turn_of},
-    body::Hybrid,
-    listed::SkinView,
+    body::HybridBody,
+    carried_skin::SkinView,
     patch::KEPT,
     projection::Projection,
     running::RunningPatch,
     running_metric::RunningMetric,
-    spec::Waking,
+    scratch::HybridScratch,
+    spec::{ParticleSpec, Waking},
+    state::{HybridState, places},
+    stepped::SteppedHybrid,
 };
 use crate::{
-    contact::{Near, broad::Skin},
-    world::{Model, Scratch, State},
+    contact::{Near, Skin, ToolSpec},
+    tick::{Environment, MechanicalState},
 };
 use glam::{BVec3, DVec3};
 use serde::{Deserialize, Serialize};
@@ -81,20 +83,22 @@ pub(super) struct Looking {
 }
 
 impl Looking {
-    pub(super) fn new(model: &Model, body: &Hybrid) -> Self {
-        let Some(particles) = &model.spec().particles else { return Self::default() };
+    pub(super) fn new(body: &HybridBody, tools: &[ToolSpec]) -> Self {
+        let particles = &body.particles;
         let in_ball = match particles.waking {
             Waking::ByHand => 0,
             Waking::ByTools { reach_m } => (2.0 * reach_m / particles.spacing_m + 2.0).powi(3) as usize,
         };
         let most = particles.most_active;
-        let tools = model.spec().tools.len().max(1);
+        let most_wanted = tools.len().max(1) * most;
         Self {
             found: Vec::with_capacity(
-                in_ball.saturating_mul(places(model).max().unwrap_or_default()).min(body.partition.particle_count()),
+                in_ball
+                    .saturating_mul(places(body, tools).max().unwrap_or_default())
+                    .min(body.partition.particle_count()),
             ),
             is_found: vec![false; body.partition.particle_count()],
-            wanted: Vec::with_capacity(tools * most),
+            wanted: Vec::with_capacity(most_wanted),
             unwanted: Vec::with_capacity(most),
             moved: Vec::with_capacity(most),
             impulses: Vec::with_capacity(body.node_count() + most),
@@ -108,66 +112,89 @@ impl Looking {
     }
 }
 
-impl HybridScratch {
+impl SteppedHybrid<'_> {
     /// Before a tick: makes the patch that of the state's active particles, and now and then looks which should be. Allocates nothing.
-    pub(crate) fn prepare(&mut self, model: &Model, body: &Hybrid, state: &mut State) {
-        self.skin_is_tracked = false;
-        self.follow(body, &state.active);
-        state.follow_coarse_forces(model.spec().settings.tick_period_s);
-        if !state.active.fading.is_empty() || !state.active.balance_n.is_empty() {
-            self.fade(model, state);
+    pub(crate) fn prepare(&mut self, environment: &Environment, state: &mut MechanicalState) {
+        let Self { body, own, scratch } = self;
+        let tick_period_s = environment.settings.tick_period_s;
+        scratch.follow(body, own);
+        own.long_steps.follow_coarse_forces(tick_period_s, &mut state.force_n);
+        if !own.fading.is_empty() || !own.balance_n.is_empty() {
+            scratch.fade(own, state, tick_period_s);
         }
-        let Some(particles) = &model.spec().particles else { return };
+        let particles = &body.particles;
         let Waking::ByTools { reach_m } = particles.waking else { return };
         match state.tick % LOOK_EVERY_TICKS {
             0 => {
-                self.patch.displace(body, &state.x);
-                let mut view = SkinView::new(body, &self.patch, model.surface_rest_positions_m());
-                place_balls(model, &mut view, particles.spacing_m, state);
-                self.looking.want(body, model, &state.active, (reach_m, particles.most_active));
-                self.looking.keep_unsettled(&self.patch, particles);
-                state.active.want(&self.looking.wanted);
+                let HybridScratch { patch, looking, .. } = &mut **scratch;
+                patch.displace(body, &state.x);
+                place_balls(environment, &mut SkinView::new(body, patch), body, own, state);
+                looking.want(body, &environment.tools, own, (reach_m, particles.most_active));
+                looking.keep_unsettled(patch, particles);
+                own.want(&looking.wanted);
             }
-            SWITCH_TICKS => state.active.next.clone_from(&state.active.wanted),
-            since_look if state.active.is_switching() => {
-                self.go_on_switching(model, body, state, since_look % SWITCH_TICKS);
+            SWITCH_TICKS => own.next.clone_from(&own.wanted),
+            since_look if own.is_switching() => {
+                self.go_on_switching(environment, state, since_look % SWITCH_TICKS);
             }
             _ => {}
         }
     }
 
     /// Lays the coming patch out, a slice a tick, then goes over to it.
-    fn go_on_switching(&mut self, model: &Model, body: &Hybrid, state: &mut State, slice: u64) {
+    fn go_on_switching(&mut self, environment: &Environment, state: &mut MechanicalState, slice: u64) {
+        let Self { body, own, scratch } = self;
         if slice <= u64::from(RunningPatch::SLICES) {
-            self.coming.go_on(body, &state.active.next);
+            scratch.coming.go_on(body, &own.next);
             return;
         }
-        let was_current = state.force_is_current;
-        let moved_m = self.switch(model, body, state);
-        state.contact.travelled(moved_m);
-        self.skin_is_tracked = was_current;
+        let were_current = state.force_is_current;
+        let moved_m = scratch.switch(body, environment.gravity_m_per_s2, own, state);
+        state.contact.travelled_at_a_change(moved_m, were_current);
     }
 
+    /// Wakes these particles and no others, as tools would: what was active goes on, what wakes moves as the coarse nodes have moved
+    /// it. Particles that may not wake ([`HybridBody::may_wake`]), and those for which there is no room, are left out.
+    pub(crate) fn wake_only(
+        &mut self,
+        environment: &Environment,
+        state: &mut MechanicalState,
+        particles: impl IntoIterator<Item = u32>,
+    ) {
+        let Self { body, own, scratch } = self;
+        scratch.follow(body, own);
+        let next = &mut own.next;
+        next.clear();
+        next.extend(particles.into_iter().filter(|&particle| body.may_wake(particle)));
+        next.sort_unstable();
+        next.dedup();
+        next.truncate(body.particles.most_active);
+        own.wanted.clone_from(&own.next);
+        if own.is_switching() {
+            scratch.switch(body, environment.gravity_m_per_s2, own, state);
+        }
+    }
+}
+
+impl HybridScratch {
     /// A tick's fading of balancing forces; strains fade with the substeps, until nothing is left to speak of.
-    fn fade(&mut self, model: &Model, state: &mut State) {
-        let State { active, ledger, .. } = state;
-        active.fade_balance(model.spec().settings.tick_period_s);
-        if active.fading.has_faded() {
-            ledger.dissipated_j += active.fading.along_j();
-            active.given_j -= active.fading.along_j();
-            active.fading.clear();
-            self.patch.put_fades(&active.fading);
+    fn fade(&mut self, own: &mut HybridState, state: &mut MechanicalState, tick_period_s: f64) {
+        own.fade_balance(tick_period_s);
+        if own.fading.has_faded() {
+            state.ledger.dissipated_j += own.fading.along_j();
+            own.given_j -= own.fading.along_j();
+            own.fading.clear();
+            self.patch.put_fades(&own.fading);
         }
     }
 
     /// Goes over to the particles that are to be active next; returns a bound of how far (m) that moves any vertex of the skin: particles that fall asleep
     /// go where they follow to, and coarse nodes, with what follows them, to what is nearest to those.
-    fn switch(&mut self, model: &Model, body: &Hybrid, state: &mut State) -> f64 {
-        self.coming.finish(body, &state.active.next);
+    fn switch(&mut self, body: &HybridBody, gravity: DVec3, own: &mut HybridState, state: &mut MechanicalState) -> f64 {
+        self.coming.finish(body, &own.next);
         let Self { patch, coming, looking, before, momenta, balance, .. } = self;
         let next = &mut coming.patch;
         let nodes = body.node_count();
-        let gravity = model.gravity_m_per_s2();
         patch.displace(body, &state.x);
         looking.impulses.clear();
         looking.impulses.resize(nodes, DVec3::ZERO);
@@ -178,10 +205,10 @@ impl HybridScratch {
         looking.projection.start(nodes);
         looking.were_m.clear();
         looking.were_m.extend_from_slice(&state.x[..nodes]);
-        balance.take(patch.metric_mut(), state);
+        balance.take(patch.metric_mut(), own, state);
         let (mut couple, mut farthest_m) = (DVec3::ZERO, 0.0_f64);
-        for (number, id) in state.active.ids().iter().enumerate() {
-            if state.active.next.binary_search(id).is_err() {
+        for (number, id) in own.ids().iter().enumerate() {
+            if own.next.binary_search(id).is_err() {
                 let (taken, away_m) =
                     looking.hand_over(body, *id, (state.x[nodes + number], state.v[nodes + number]), state);
                 couple += taken;
@@ -189,13 +216,12 @@ impl HybridScratch {
                 balance.hand_over(body, (number, *id), &mut looking.handed_n);
             }
         }
-        let mut held_j =
-            before.take(body, [patch, next], looking.projection.is_moved(), &state.x, &state.active.fading);
+        let mut held_j = before.take(body, [patch, next], looking.projection.is_moved(), &state.x, &own.fading);
         held_j += patch.metric_mut().moving_j(body, (&state.x, &state.v), gravity, momenta);
-        let some_sleep = state.active.ids().iter().any(|id| state.active.next.binary_search(id).is_err());
+        let some_sleep = own.ids().iter().any(|id| own.next.binary_search(id).is_err());
         looking.left.clear();
-        looking.left.extend_from_slice(state.active.ids());
-        state.switch(body, &mut looking.moved);
+        looking.left.extend_from_slice(own.ids());
+        own.switch(body, state, &mut looking.moved);
         if some_sleep {
             couple -= looking.shift(body, next.metric_mut(), state, momenta);
             looking.turn(couple, &state.x);
@@ -206,9 +232,8 @@ impl HybridScratch {
         next.displace(body, &state.x);
         let places = (&looking.were_m[..], &looking.shifts_m[..], &state.x[..]);
         let is_moved = looking.projection.is_moved();
-        let (first_moved_j, elastic_j) =
-            before.fade_into(body, [patch, next], is_moved, places, &mut state.active.fading);
-        next.put_fades(&state.active.fading);
+        let (first_moved_j, elastic_j) = before.fade_into(body, [patch, next], is_moved, places, &mut own.fading);
+        next.put_fades(&own.fading);
         if some_sleep {
             looking.impulses.resize(state.v.len(), DVec3::ZERO);
             next.metric_mut().accelerate(&mut looking.impulses);
@@ -219,47 +244,37 @@ impl HybridScratch {
         held_j += first_moved_j - elastic_j;
         held_j -= next.metric_mut().moving_j(body, (&state.x, &state.v), gravity, momenta);
         state.ledger.dissipated_j += held_j;
-        state.active.given_j -= held_j;
+        own.given_j -= held_j;
         state.force_is_current = false;
-        state.active.switched_j = state.active.switched_j.max(elastic_j);
-        if state.active.may_balance() {
-            balance.demand(body, next.metric_mut(), &looking.left, state.active.ids(), &looking.handed_n);
+        own.switched_j = own.switched_j.max(elastic_j);
+        if own.may_balance() {
+            balance.demand(body, next.metric_mut(), &looking.left, own.ids(), &looking.handed_n);
         }
         coming.swap(patch);
         body.amplification() * farthest_m
     }
 }
 
-/// Wakes these particles and no others, as tools would: what was active goes on, what wakes moves as the coarse nodes have moved it. Particles that may
-/// not wake ([`Hybrid::may_wake`]), and those for which there is no room, are left out.
-pub fn wake_only(model: &Model, state: &mut State, scratch: &mut Scratch, particles: impl IntoIterator<Item = u32>) {
-    let (Some(body), Some(own)) = (model.hybrid(), &mut scratch.hybrid) else { return };
-    own.follow(body, &state.active);
-    let next = &mut state.active.next;
-    next.clear();
-    next.extend(particles.into_iter().filter(|&particle| body.may_wake(particle)));
-    next.sort_unstable();
-    next.dedup();
-    next.truncate(room(model));
-    state.active.wanted.clone_from(&state.active.next);
-    if state.active.is_switching() {
-        own.switch(model, body, state);
-    }
-}
-
 /// Where the tools' balls are now.
-fn place_balls(model: &Model, view: &mut SkinView<'_>, spacing_m: f64, state: &mut State) {
-    let State { tools, active, contact, force_is_current, .. } = state;
+fn place_balls(
+    environment: &Environment,
+    view: &mut SkinView<'_>,
+    body: &HybridBody,
+    own: &mut HybridState,
+    state: &MechanicalState,
+) {
+    let MechanicalState { tools, contact, force_is_current, .. } = state;
+    let spacing_m = body.particles.spacing_m;
     let fitted = force_is_current.then(|| contact.boxes());
     view.begin();
-    let places = tools.iter().zip(&model.spec().tools).zip(places(model));
+    let places = tools.iter().zip(&environment.tools).zip(places(body, &environment.tools));
     let places = places.flat_map(|((tool, spec), count)| tool.places(spec, count).map(move |place| (place, spec)));
-    for ((place, spec), ball) in places.zip(&mut active.balls) {
+    for ((place, spec), ball) in places.zip(&mut own.balls) {
         let near_m = (GAP * spec.radius_m).max(GAP * spacing_m) + AHEAD_S * place.speed_m_per_s;
-        let Near { vertex, gap_m, .. } = place.look(view, (near_m, model.contact().covering_radius_m), fitted);
+        let Near { vertex, gap_m, .. } = place.look(view, (near_m, environment.contact.covering_radius_m), fitted);
         match (ball.as_mut(), vertex) {
             (_, Some((vertex, _))) if gap_m < near_m => {
-                let rest_m = model.surface_rest_positions_m()[vertex as usize];
+                let rest_m = body.skin_rest_m()[vertex as usize];
                 let moved = ball.is_none_or(|ball| ball.rest_m.distance(rest_m) > FOLLOW * spacing_m);
                 let rest_m = if moved { rest_m } else { ball.map_or(rest_m, |ball| ball.rest_m) };
                 *ball = Some(Ball { rest_m, away_ticks: 0 });
@@ -297,7 +312,13 @@ fn distance_to_balls_sq(balls: &[Option<Ball>], at_m: DVec3) -> f64 {
 
 impl Looking {
     /// Takes the impulse of a particle that falls asleep, and the nodes of its tet; returns its couple (kg m²/s), and how far (m) it is from where it goes.
-    fn hand_over(&mut self, body: &Hybrid, particle: u32, (y, w): (DVec3, DVec3), state: &State) -> (DVec3, f64) {
+    fn hand_over(
+        &mut self,
+        body: &HybridBody,
+        particle: u32,
+        (y, w): (DVec3, DVec3),
+        state: &MechanicalState,
+    ) -> (DVec3, f64) {
         let anchor = body.partition.anchor(particle);
         let mass_kg = (1.0 - KEPT) * body.masses.particle_kg[particle as usize];
         anchor.push((w - anchor.of(&state.v)) * mass_kg, &mut self.impulses);
@@ -314,9 +335,9 @@ impl Looking {
     /// Moves the coarse nodes to what is nearest to what has fallen asleep; returns the angular momentum (kg m²/s) that they gain by it.
     fn shift(
         &mut self,
-        body: &Hybrid,
+        body: &HybridBody,
         metric: &mut RunningMetric,
-        state: &mut State,
+        state: &mut MechanicalState,
         momenta: &mut Vec<DVec3>,
     ) -> DVec3 {
         momenta.clear();
@@ -340,13 +361,13 @@ impl Looking {
     }
 
     /// The particles in the tools' balls, ascending; where there is no room for all, as many for each tool, the nearest to their middles, and to the lines between those of neighbours.
-    fn want(&mut self, body: &Hybrid, model: &Model, active: &ActiveParticles, (reach_m, most): (f64, usize)) {
+    fn want(&mut self, body: &HybridBody, tools: &[ToolSpec], own: &HybridState, (reach_m, most): (f64, usize)) {
         self.wanted.clear();
         let of_tool = |first: &mut usize, count: usize| {
             *first += count;
-            Some(&active.balls[*first - count..*first])
+            Some(&own.balls[*first - count..*first])
         };
-        let tools = || places(model).scan(0, of_tool);
+        let tools = || places(body, tools).scan(0, of_tool);
         let room = most / tools().filter(|balls| balls.iter().any(Option::is_some)).count().max(1);
         for balls in tools() {
             self.found.clear();
@@ -378,7 +399,7 @@ impl Looking {
     }
 
     /// Keeps those awake that nobody wants but that are not settled, the farthest off first, as long as there is room.
-    fn keep_unsettled(&mut self, patch: &RunningPatch, particles: &super::spec::ParticleSpec) {
+    fn keep_unsettled(&mut self, patch: &RunningPatch, particles: &ParticleSpec) {
         self.unwanted.clear();
         for (particle, deviation_m) in patch.deviations_m() {
             if deviation_m > SETTLED * particles.spacing_m && self.wanted.binary_search(&particle).is_err() {

@@ -1,6 +1,6 @@
 //! Shapes for tests.
 use super::{
-    Hybrid, ParticleSpec, Waking,
+    HybridBody, ParticleSpec, Waking,
     cell::RestCell,
     composite::Composite,
     methods::{CONTROL, Method},
@@ -124,12 +124,12 @@ pub(crate) fn balls_in_cage() -> [Partition; 2] {
 }
 
 /// That ball as a body of two materials; the coarse nodes below −9 mm are held along two axes, those beyond 9 mm along y along all.
-pub(crate) fn hybrid_ball(materials: &[Material; 2]) -> Hybrid {
+pub(crate) fn hybrid_ball(materials: &[Material; 2]) -> HybridBody {
     hybrid_ball_of(materials, 1.1e-3, None)
 }
 
 /// The same of another spacing, or with cells that are merged deeper than that (m).
-pub(crate) fn hybrid_ball_of(materials: &[Material; 2], spacing_m: f64, fine_depth_m: Option<f64>) -> Hybrid {
+pub(crate) fn hybrid_ball_of(materials: &[Material; 2], spacing_m: f64, fine_depth_m: Option<f64>) -> HybridBody {
     let cage = tet_box(DVec3::splat(-0.0125), DVec3::splat(0.025), [3, 3, 3]);
     let spec = ParticleSpec {
         skin: ball(0.01, DVec3::new(0.2e-3, -0.3e-3, 0.1e-3), 3),
@@ -148,8 +148,8 @@ pub(crate) fn hybrid_ball_of(materials: &[Material; 2], spacing_m: f64, fine_dep
     let far = PrescribedSpec { name: "far".into(), nodes: nodes(&|p| p.y > 9e-3), axes: [true; 3] };
     let surface = Surface::of(&cage).unwrap();
     let densities = [1000.0, 1200.0];
-    let built =
-        Hybrid::build(&spec, (&cage, &surface), &[low, far], (materials, &densities), &of_tet, &mut |_| {}).unwrap();
+    let built = HybridBody::build(&spec, (&cage, &surface), &[low, far], (materials, &densities), &of_tet, &mut |_| {})
+        .unwrap();
     built.hybrid
 }
 

@@ -15,7 +15,9 @@ use crate::{
     contact::{SurfaceModuli, ToolSpec},
     hash::{Fnv, fnv},
     mesh::Surface,
+    tick::EnvironmentError,
 };
+use glam::DVec3;
 use std::{fmt::Write, ops::Range};
 use thiserror::Error;
 
@@ -43,7 +45,7 @@ pub enum Refining {
 
 /// What makes a body a mass-spring surface.
 #[derive(Debug, Clone, PartialEq)]
-pub struct SpringBodySpec {
+pub struct MassSpringSpec {
     /// The springs. What is held is what the body's specification prescribes.
     pub springs: SpringSpec,
     /// `None`: coarse everywhere.
@@ -54,10 +56,13 @@ pub struct SpringBodySpec {
 
 /// Why no body of the loop can be made of it.
 #[derive(Debug, Clone, PartialEq, Error)]
-pub enum SpringBodyError {
+pub enum MassSpringError {
     /// The springs.
     #[error(transparent)]
     Springs(#[from] SpringError),
+    /// Settings, constraints, loads or tools.
+    #[error(transparent)]
+    Environment(#[from] EnvironmentError),
     /// A number outside its range.
     #[error("{name} = {value}: {rule}")]
     Setting {
@@ -83,7 +88,7 @@ pub enum SpringBodyError {
 
 /// A mass-spring surface in the loop. Constant after load.
 #[derive(Debug, Clone)]
-pub struct SpringBody {
+pub struct MassSpringBody {
     model: SpringModel,
     refinement: Option<Refinement>,
     pub(super) boxes: SkinBoxes,
@@ -91,21 +96,22 @@ pub struct SpringBody {
     edge_m: f64,
     /// How many places each tool has about which it may be refined.
     places: Vec<usize>,
+    /// About how far (m) from a tool vertices are awake, where not all are.
     awake_reach_m: f64,
     table: Option<ConstantsTable>,
     fingerprint: u64,
 }
 
-impl SpringBody {
+impl MassSpringBody {
     /// Checks and builds, for these tools.
     ///
     /// # Errors
-    /// [`SpringBodyError`].
-    pub fn build(spec: SpringBodySpec, tools: &[ToolSpec]) -> Result<Self, SpringBodyError> {
-        let SpringBodySpec { mut springs, refinement, table } = spec;
+    /// [`MassSpringError`].
+    pub fn of(spec: MassSpringSpec, tools: &[ToolSpec]) -> Result<Self, MassSpringError> {
+        let MassSpringSpec { mut springs, refinement, table } = spec;
         if let Some(Refinement { rings, fade_s, .. }) = refinement {
             let setting =
-                |name, value, ok, rule| if ok { Ok(()) } else { Err(SpringBodyError::Setting { name, value, rule }) };
+                |name, value, ok, rule| if ok { Ok(()) } else { Err(MassSpringError::Setting { name, value, rule }) };
             setting("rings", f64::from(rings), (1..=MOST_RINGS).contains(&rings), "must be 1 to 16")?;
             setting("fade_s", fade_s, fade_s > 0.0 && fade_s.is_finite(), "must be finite and larger than 0")?;
         } else {
@@ -113,7 +119,7 @@ impl SpringBody {
         }
         if refinement.is_some_and(|refinement| refinement.follows_dent) && table.is_some() {
             let what = "rings that follow the dent, with a table of constants";
-            return Err(SpringBodyError::NotForSprings { what, instead: "a table is for its number of rings" });
+            return Err(MassSpringError::NotForSprings { what, instead: "a table is for its number of rings" });
         }
         if let Some(table) = &table {
             let rings = refinement.map_or(0, |refinement| refinement.rings);
@@ -140,6 +146,11 @@ impl SpringBody {
     /// Its springs.
     pub fn model(&self) -> &SpringModel {
         &self.model
+    }
+
+    /// Rest positions (m) of the coarse vertices.
+    pub fn rest_positions_m(&self) -> &[DVec3] {
+        &self.model.rest_m()[..self.model.vertices() as usize]
     }
 
     /// Hash of all that it was built from.

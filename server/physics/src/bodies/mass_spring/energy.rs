@@ -1,12 +1,26 @@
 //! What a mass-spring surface holds.
 use super::{
     blend::Added,
-    body::SpringBody,
+    body::MassSpringBody,
     motion::{SpringMotion, own_mass_kg},
+    state::MassSpringState,
 };
+use crate::tick::{Energies, MechanicalState};
 use glam::DVec3;
 
-impl SpringBody {
+impl MassSpringBody {
+    /// What it holds, beside the ledger's work and dissipation.
+    pub(crate) fn energies(&self, gravity_m_per_s2: DVec3, own: &MassSpringState, state: &MechanicalState) -> Energies {
+        let [kinetic_j, elastic_j] = self.energies_j(&own.motion, &state.x, &state.v);
+        Energies {
+            kinetic_j,
+            elastic_j,
+            gravitational_j: self.gravitational_j(&own.motion, &state.x, gravity_m_per_s2),
+            external_work_j: state.ledger.external_work_j,
+            dissipated_j: state.ledger.dissipated_j,
+        }
+    }
+
     /// Kinetic and elastic energy (J) of the awake nodes and of all springs that are on them. Allocates nothing.
     pub fn energies_j(&self, motion: &SpringMotion, x_m: &[DVec3], v_m_per_s: &[DVec3]) -> [f64; 2] {
         let model = self.model();

@@ -11,6 +11,7 @@
 pub mod around;
 pub mod blend;
 pub mod body;
+mod build;
 pub mod calibration;
 #[cfg(test)]
 mod checks;
@@ -24,20 +25,24 @@ pub mod model;
 pub mod motion;
 pub mod net;
 pub mod places;
+mod preparing;
 pub mod region;
 pub mod running;
 pub(crate) mod skin;
 pub(crate) mod state;
+mod stepped;
 #[cfg(test)]
 pub(crate) mod testing;
 pub mod topology;
 
-pub use body::{Refinement, Refining, SpringBody, SpringBodyError, SpringBodySpec};
+pub use body::{MassSpringBody, MassSpringError, MassSpringSpec, Refinement, Refining};
 pub use home::{HomeLaw, HomeLawError};
 pub use kernels::{HalfSpring, SpringRows};
 pub use model::{SpringError, SpringModel, SpringSpec};
 pub use motion::{Changed, SpringMotion, SpringScratch, Wanted};
 pub use net::{Net, Spring};
+pub(crate) use preparing::MassSpringScratch;
 pub use region::{Refined, Region};
-pub use state::{SpringState, refine_only};
+pub use state::MassSpringState;
+pub(crate) use stepped::SteppedMassSpring;
 pub use topology::{Triangulation, TriangulationError};

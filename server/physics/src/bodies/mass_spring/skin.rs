@@ -1,9 +1,12 @@
 //! Where the surface is that tools touch, and how forces on it go to the nodes.
 use super::{
-    body::SpringBody,
+    body::MassSpringBody,
     motion::{SpringMotion, SpringScratch},
 };
-use crate::contact::broad::{CLUSTER, GROUP, Skin, box_distance_m};
+use crate::{
+    contact::broad::{CLUSTER, GROUP, Skin, box_distance_m},
+    tick::CarriedSkin,
+};
 use glam::DVec3;
 
 /// Boxes at rest of the skin's clusters, and of groups of them.
@@ -43,17 +46,19 @@ impl SkinBoxes {
 
 /// The skin at an instant.
 pub(crate) struct SpringSkin<'a> {
-    body: &'a SpringBody,
+    body: &'a MassSpringBody,
     motion: &'a SpringMotion,
     scratch: &'a SpringScratch,
     x_m: &'a [DVec3],
+    /// Velocities (m/s) of the awake nodes; none where nobody asks for a vertex's.
+    v: &'a [DVec3],
     /// How far (m) the farthest awake node is from home.
     farthest_m: f64,
 }
 
 /// What carries a vertex of the skin: places of nodes and weights, and where it is when these are at 0 (m).
 #[derive(Debug, Clone, Copy)]
-struct Carried {
+pub(crate) struct Carried {
     offset_m: DVec3,
     by: [(u32, f64); 3],
     count: usize,
@@ -62,11 +67,16 @@ struct Carried {
 impl<'a> SpringSkin<'a> {
     /// At positions `x_m` (m) of the awake nodes.
     pub(crate) fn new(
-        body: &'a SpringBody,
+        body: &'a MassSpringBody,
         (motion, scratch): (&'a SpringMotion, &'a SpringScratch),
         x_m: &'a [DVec3],
     ) -> Self {
-        Self { body, motion, scratch, x_m, farthest_m: 0.0 }
+        Self { body, motion, scratch, x_m, v: &[], farthest_m: 0.0 }
+    }
+
+    /// The same, with velocities (m/s) of the awake nodes.
+    pub(crate) fn moving(self, v: &'a [DVec3]) -> Self {
+        Self { v, ..self }
     }
 
     /// The node beneath a vertex of the skin, or the end of its edge that is nearer to a point.
@@ -79,7 +89,7 @@ impl<'a> SpringSkin<'a> {
     }
 }
 
-fn carried(body: &SpringBody, motion: &SpringMotion, scratch: &SpringScratch, vertex: u32) -> Carried {
+fn carried(body: &MassSpringBody, motion: &SpringMotion, scratch: &SpringScratch, vertex: u32) -> Carried {
     let model = body.model();
     let home_m = |node: u32| model.rest_m()[node as usize];
     let mut found = Carried { offset_m: home_m(vertex), by: [(0, 0.0); 3], count: 0 };
@@ -143,18 +153,34 @@ impl Skin for SpringSkin<'_> {
     }
 }
 
-impl SpringBody {
-    /// Velocity (m/s) of a vertex of the skin.
-    pub(crate) fn velocity_m_per_s(
-        &self,
-        (motion, scratch): (&SpringMotion, &SpringScratch),
-        vertex: u32,
-        v_m_per_s: &[DVec3],
-    ) -> DVec3 {
-        let carried = carried(self, motion, scratch, vertex);
-        carried.by().iter().map(|(place, weight)| v_m_per_s[*place as usize] * *weight).sum()
+impl CarriedSkin for SpringSkin<'_> {
+    type Carriers = Carried;
+
+    fn layout(&self) -> u64 {
+        self.scratch.layout()
     }
 
+    fn carriers(&self, vertex: u32) -> Carried {
+        carried(self.body, self.motion, self.scratch, vertex)
+    }
+
+    fn carried_m(&self, carried: &Carried) -> DVec3 {
+        carried.position_m(self.x_m)
+    }
+
+    fn velocity_m_per_s(&self, vertex: u32) -> DVec3 {
+        let carried = self.carriers(vertex);
+        carried.by().iter().map(|(place, weight)| self.v[*place as usize] * *weight).sum()
+    }
+
+    fn push(&self, carried: &Carried, force_n: DVec3, forces_n: &mut [DVec3]) {
+        for (place, weight) in carried.by() {
+            forces_n[*place as usize] += force_n * *weight;
+        }
+    }
+}
+
+impl MassSpringBody {
     /// Where a vertex of the skin is (m), at positions of the awake nodes.
     pub fn vertex_m(&self, motion: &SpringMotion, vertex: u32, x_m: &[DVec3]) -> DVec3 {
         let model = self.model();
@@ -170,82 +196,5 @@ impl SpringBody {
         let as_ends = (ends[0] + ends[1]) * 0.5;
         let level = motion.levels.of_edge(model.surface(), edge);
         home_m(vertex) + moved(vertex).map_or(as_ends, |own| own * level + as_ends * (1.0 - level))
-    }
-}
-
-/// Vertices of the skin whose positions are kept up to date, because tools or loads are at them.
-#[derive(Debug, Clone)]
-pub(crate) struct ListedVertices {
-    /// Positions (m) of all vertices, of use at the listed ones.
-    pub(crate) x: Vec<DVec3>,
-    /// Forces (N) on all vertices, zero but at the listed ones.
-    pub(crate) forces_n: Vec<DVec3>,
-    listed: Vec<(u32, Carried)>,
-    is_listed: Vec<bool>,
-    /// Of which layout the carriers are.
-    layout: u64,
-}
-
-impl ListedVertices {
-    pub(crate) fn new(body: &SpringBody) -> Self {
-        let vertices = body.model().rest_m().len();
-        Self {
-            x: vec![DVec3::ZERO; vertices],
-            forces_n: vec![DVec3::ZERO; vertices],
-            listed: Vec::with_capacity(vertices),
-            is_listed: vec![false; vertices],
-            layout: u64::MAX,
-        }
-    }
-
-    /// Whether the list was made with another layout of nodes and levels.
-    pub(crate) fn is_outdated(&self, scratch: &SpringScratch) -> bool {
-        self.layout != scratch.layout()
-    }
-
-    /// Whether a vertex is listed.
-    pub(crate) fn is_listed(&self, vertex: u32) -> bool {
-        self.is_listed[vertex as usize]
-    }
-
-    /// Leaves all vertices, to be listed anew.
-    pub(crate) fn start(&mut self, scratch: &SpringScratch) {
-        for (vertex, _) in &self.listed {
-            self.is_listed[*vertex as usize] = false;
-        }
-        self.listed.clear();
-        self.layout = scratch.layout();
-    }
-
-    /// Lists a vertex. Allocates nothing.
-    pub(crate) fn list(&mut self, body: &SpringBody, (motion, scratch): (&SpringMotion, &SpringScratch), vertex: u32) {
-        if !std::mem::replace(&mut self.is_listed[vertex as usize], true) {
-            self.listed.push((vertex, carried(body, motion, scratch, vertex)));
-        }
-    }
-
-    /// Nothing more is listed. Vertices go in their order, so that sums have the same bits whenever and wherefore they were listed.
-    pub(crate) fn finish(&mut self) {
-        self.listed.sort_unstable_by_key(|(vertex, _)| *vertex);
-    }
-
-    /// Positions and no forces at the listed vertices.
-    pub(crate) fn refresh(&mut self, x_m: &[DVec3]) {
-        for (vertex, carried) in &self.listed {
-            self.x[*vertex as usize] = carried.position_m(x_m);
-            self.forces_n[*vertex as usize] = DVec3::ZERO;
-        }
-    }
-
-    /// Hands the forces on vertices to the nodes that carry them.
-    pub(crate) fn hand_over(&self, forces_n: &mut [DVec3]) {
-        for (vertex, carried) in &self.listed {
-            let force_n = self.forces_n[*vertex as usize];
-            if force_n != DVec3::ZERO {
-                for (place, weight) in carried.by() {
-                    forces_n[*place as usize] += force_n * *weight;
-                }
-            }
-        }
     }
 }

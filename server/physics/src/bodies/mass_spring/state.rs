@@ -5,11 +5,10 @@
 //! they stay awake until all is at rest.
 use super::{
     around,
-    body::{MOST_RINGS, Refining, SpringBody},
+    body::{MOST_RINGS, MassSpringBody, Refining},
     motion::SpringMotion,
     region::Constants,
 };
-use crate::world::{Model, State};
 use serde::{Deserialize, Serialize};
 
 /// Ticks for which a tool has to be away.
@@ -23,7 +22,7 @@ const FOLLOW: f64 = 0.25;
 
 /// All that a tick changes of the surface beside positions and velocities.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct SpringState {
+pub struct MassSpringState {
     /// Awake nodes and levels.
     pub motion: SpringMotion,
     /// One for each place of each tool.
@@ -75,7 +74,7 @@ pub(crate) struct Looking {
 }
 
 impl Looking {
-    pub(crate) fn new(body: &SpringBody) -> Self {
+    pub(crate) fn new(body: &MassSpringBody) -> Self {
         let (most, places) = (body.model().spec().most_refined, body.place_count());
         Self {
             centres: Vec::with_capacity(places),
@@ -84,19 +83,6 @@ impl Looking {
             seen: vec![false; if body.is_all_awake() { 0 } else { body.model().vertices() as usize }],
         }
     }
-}
-
-/// Refines so many rings around vertices and nothing else, of a body refined by hand ([`Refining::ByHand`]): as with tools, levels go there from tick to tick. What there is no room for is left out.
-pub fn refine_only(model: &Model, state: &mut State, centres: &[u32], rings: u32) {
-    let (Some(body), Some(own)) = (model.springs(), &mut state.springs) else { return };
-    let springs = body.model();
-    let known = centres.iter().copied().filter(|&vertex| vertex < springs.vertices()).collect::<Vec<_>>();
-    let (mut triangles, mut corners) = (Vec::new(), Vec::new());
-    let levels = own.motion.levels.triangles().len();
-    let most = springs.spec().most_refined.saturating_sub(levels);
-    around::rings_into(springs.surface(), &known, (rings, most), (&mut triangles, &mut corners));
-    own.refined.clear();
-    own.refined.extend_from_slice(&triangles);
 }
 
 impl About {
@@ -132,9 +118,9 @@ impl About {
     }
 }
 
-impl SpringState {
+impl MassSpringState {
     /// Everything coarse and at home.
-    pub(crate) fn at_rest(body: &SpringBody) -> Self {
+    pub(crate) fn at_rest(body: &MassSpringBody) -> Self {
         let spec = body.model().spec();
         let mut awake = Vec::with_capacity(spec.most_awake.min(body.model().vertices() as usize));
         if body.is_all_awake() {
@@ -152,7 +138,7 @@ impl SpringState {
     }
 
     /// As at rest, in the buffers it has.
-    pub(crate) fn reset(&mut self, body: &SpringBody) {
+    pub(crate) fn reset(&mut self, body: &MassSpringBody) {
         self.motion.reset(body.model());
         self.motion.fine = body.fine_at(0.0);
         self.about.fill(About::default());
@@ -163,6 +149,19 @@ impl SpringState {
             self.awake.clear();
         }
         self.motion.ids.extend_from_slice(&self.awake);
+    }
+
+    /// Refines so many rings around vertices and nothing else, of a body refined by hand ([`Refining::ByHand`]): as with tools, levels go
+    /// there from tick to tick. What there is no room for is left out.
+    pub(crate) fn refine_only(&mut self, body: &MassSpringBody, centres: &[u32], rings: u32) {
+        let springs = body.model();
+        let known = centres.iter().copied().filter(|&vertex| vertex < springs.vertices()).collect::<Vec<_>>();
+        let (mut triangles, mut corners) = (Vec::new(), Vec::new());
+        let levels = self.motion.levels.triangles().len();
+        let most = springs.spec().most_refined.saturating_sub(levels);
+        around::rings_into(springs.surface(), &known, (rings, most), (&mut triangles, &mut corners));
+        self.refined.clear();
+        self.refined.extend_from_slice(&triangles);
     }
 
     /// Copies another state of the same body. Allocates nothing.
@@ -176,7 +175,7 @@ impl SpringState {
     }
 
     /// Whether it may be a state of a body.
-    pub(crate) fn fits(&self, body: &SpringBody) -> bool {
+    pub(crate) fn fits(&self, body: &MassSpringBody) -> bool {
         let model = body.model();
         let (vertices, triangles) = (model.vertices(), model.surface().triangles().len());
         let ascending = |list: &[u32]| list.windows(2).all(|pair| pair[0] < pair[1]);
@@ -196,12 +195,12 @@ impl SpringState {
     }
 
     /// Nodes of type 2 that are there: middles of edges refined, or on their way.
-    pub fn refined_nodes(&self, body: &SpringBody) -> usize {
+    pub fn refined_nodes(&self, body: &MassSpringBody) -> usize {
         self.motion.ids.len() - self.motion.ids.partition_point(|id| *id < body.model().vertices())
     }
 
     /// `K′_m`, `K′_h` a tick of `part` of the time on that they take to change: towards those at how far (m) what tools touch is from home.
-    pub(crate) fn next_fine(&self, body: &SpringBody, part: f64, away_m: impl Fn(u32) -> f64) -> Constants {
+    pub(crate) fn next_fine(&self, body: &MassSpringBody, part: f64, away_m: impl Fn(u32) -> f64) -> Constants {
         let touched = self.about.iter().filter_map(|about| about.touched);
         let Some(farthest_m) = touched.map(away_m).reduce(f64::max) else { return self.motion.fine };
         let (now, then) = (self.motion.fine, body.fine_at(farthest_m));
@@ -227,7 +226,7 @@ impl SpringState {
     }
 
     /// Which triangles are to be refined. While those that come and those that still go would be more than there is room for, only those that are there already. Allocates nothing.
-    pub(crate) fn want_refined(&mut self, body: &SpringBody, looking: &mut Looking) {
+    pub(crate) fn want_refined(&mut self, body: &MassSpringBody, looking: &mut Looking) {
         let Some(refinement) = body.refinement().filter(|refinement| refinement.by == Refining::ByTools) else {
             return;
         };
@@ -247,7 +246,7 @@ impl SpringState {
     }
 
     /// Which vertices are to be awake, where not all are; `is_quiet` tells whether all that is awake is at rest. `forced` tells that a sleeping vertex was forced. Allocates nothing.
-    pub(crate) fn want_awake(&mut self, body: &SpringBody, looking: &mut Looking, forced: bool, is_quiet: bool) {
+    pub(crate) fn want_awake(&mut self, body: &MassSpringBody, looking: &mut Looking, forced: bool, is_quiet: bool) {
         let rest_m = body.model().rest_m();
         let mut changed = forced;
         for about in &mut self.about {

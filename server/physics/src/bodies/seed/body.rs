@@ -1,20 +1,28 @@
-//! A seed body as a body of the loop: how its core and its skin are numbered, weighed and touched.
-//!
-//! Nodes are the core's, and after them the skin's vertices. The skin carries the whole layer's mass, as it does while particles sleep.
-//!
-//! The papers displace what the user touches. Here tools press as on every body, with forces on vertices; they act on awake particles by
-//! eq. 25's weights (`seed::step`). Contact is explicit, so it must not be stiffer than the step can bear: [`SeedModel::contact_mass_kg`].
+//! The papers' hybrid as a body of the loop.
 use super::{
-    LayerSpec, SeedModel, SeedParameters, SeedState, core::outer_part, layer::enclosed_m3, region::Region,
-    state::Motion,
+    LayerSpec, SeedBodyState, SeedError, SeedModel, SeedParameters, SeedSpec, core::outer_part, layer::enclosed_m3,
 };
-use crate::mesh::{Surface, TetMesh};
+use crate::{
+    contact::{ContactModel, SurfaceModuli},
+    elements::{
+        rest_stiffness::{RestStiffness, max_natural_frequency_rad_per_s},
+        solid::Solid,
+    },
+    material::{Law, Material},
+    mesh::{Surface, TetMesh},
+    settings::{Integrator, MAX_SUBSTEPS, Substeps},
+    tick::{Energies, Environment, EnvironmentError, EnvironmentSpec, MechanicalState, Steps, free_inverse_mass},
+};
 use glam::DVec3;
-use serde::{Deserialize, Serialize};
 
-/// What makes the tets of a [`crate::ModelSpec`] the core of a seed body.
+/// Part of its longest step that contact and couplings may take.
+const STEP_SAFETY: f64 = 0.9;
+
+/// What a seed body is made from.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SeedBodySpec {
+    /// The core, of the one St. Venant-Kirchhoff material of its parameters. What is prescribed is held.
+    pub core: Solid,
     /// The particles around the core; without them its boundary is touched.
     pub layer: Option<LayerSpec>,
     /// Constants. `dt_s` is the longest step: a tick is taken in equal steps that are no longer.
@@ -23,7 +31,8 @@ pub struct SeedBodySpec {
 
 impl SeedBodySpec {
     /// Volume (m³) of core and layer, given the core's boundary.
-    pub fn volume_m3(&self, core: &TetMesh, boundary: &Surface) -> f64 {
+    pub fn volume_m3(&self, boundary: &Surface) -> f64 {
+        let core = &self.core.mesh;
         let core_m3 = core.total_volume_m3();
         let Some(layer) = &self.layer else { return core_m3 };
         let triangles: Vec<[u32; 3]> = (0..boundary.triangles.len()).map(|t| boundary.triangle_nodes(t)).collect();
@@ -32,153 +41,176 @@ impl SeedBodySpec {
     }
 }
 
-/// A seed body's part of [`crate::State`].
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct SeedMotion {
-    /// What the model's steps change.
-    pub now: SeedState,
-    /// Triangle of the surface that tools touch, for the next step.
-    pub touched: Option<u32>,
-    /// Particles that are awake.
-    pub awake: u32,
+/// A seed body in the loop. Constant after load.
+#[derive(Debug, Clone)]
+pub struct SeedBody {
+    model: SeedModel,
+    core: Solid,
+    layer: Option<LayerSpec>,
+    /// Rest positions (m) of core and skin.
+    rest_m: Vec<DVec3>,
+    mass_kg: Vec<f64>,
+    /// `1/m` (1/kg) per node and axis, zero where it is held.
+    inverse_mass_per_kg: Vec<DVec3>,
+    max_natural_frequency_rad_per_s: f64,
 }
 
-impl SeedMotion {
-    /// At rest.
-    pub(crate) fn at_rest(model: &SeedModel) -> Self {
-        Self { now: SeedState::at_rest(model), touched: None, awake: 0 }
-    }
-
-    /// Back to rest, in the buffers it has.
-    pub(crate) fn reset(&mut self, model: &SeedModel) {
-        self.now.core.rest(model.core().rest_m());
-        self.now.skin.rest(model.surface_rest_m());
-        self.now.particles.rest(&[]);
-        (self.now.step, self.now.touched) = (0, None);
-        (self.touched, self.awake) = (None, 0);
-    }
-
-    /// Copies another of the same model. Allocates nothing.
-    pub(crate) fn copy_from(&mut self, other: &Self) {
-        let (own, from) = (&mut self.now, &other.now);
-        own.core.copy_from(&from.core);
-        own.skin.copy_from(&from.skin);
-        own.particles.copy_from(&from.particles);
-        (own.step, own.touched) = (from.step, from.touched);
-        (self.touched, self.awake) = (other.touched, other.awake);
-    }
-
-    /// Takes all speed from it.
-    pub(crate) fn stop(&mut self) {
-        for motion in [&mut self.now.core, &mut self.now.skin, &mut self.now.particles] {
-            motion.v.fill(DVec3::ZERO);
-        }
-    }
-
-    /// Whether awake particles are finite. Nodes are looked at with everybody's.
-    pub(crate) fn particles_are_finite(&self) -> bool {
-        self.now.particles.is_finite(self.awake as usize)
-    }
-
-    /// Whether it is one of a model's, and its nodes are at `x` with velocities `v`: for states that come from elsewhere.
-    pub(crate) fn fits(&self, model: &SeedModel, x: &[DVec3], v: &[DVec3]) -> bool {
-        let Self { now, touched, awake } = self;
-        let same = |nodes: &[DVec3], of: [&[DVec3]; 2]| nodes.iter().eq(of.into_iter().flatten());
-        now.fits(model)
-            && same(x, [&now.core.x, &now.skin.x])
-            && same(v, [&now.core.v, &now.skin.v])
-            && touched.is_none_or(|triangle| (triangle as usize) < model.surface_triangles().len())
-            && *awake as usize == model.awake(now).map_or(0, Region::len)
-    }
-
-    /// Every number of it.
-    pub(crate) fn vectors(&self) -> impl Iterator<Item = &DVec3> {
-        let SeedState { core, skin, particles, .. } = &self.now;
-        [core, skin, particles].into_iter().flat_map(|motion: &Motion| motion.x.iter().chain(&motion.v))
-    }
-}
-
-impl SeedModel {
-    /// Rest positions (m) of nodes.
-    pub fn node_rest_m(&self) -> Vec<DVec3> {
-        let skin: &[DVec3] = if self.layer().is_some() { self.surface_rest_m() } else { &[] };
-        self.core().rest_m().iter().chain(skin).copied().collect()
-    }
-
-    /// Mass (kg) of nodes: that of the whole body, its layer asleep.
-    pub fn node_mass_kg(&self) -> Vec<f64> {
-        let skin = self.links().map_or(&[][..], |links| &links.mass_kg);
-        self.core().mass_kg().iter().chain(skin).copied().collect()
-    }
-
-    /// The touchable surface over nodes.
-    pub fn node_surface(&self) -> Surface {
-        if self.layer().is_none() {
-            return self.core().boundary().clone();
-        }
-        let (first, count) = (self.core().rest_m().len() as u32, self.surface_rest_m().len() as u32);
-        Surface {
-            nodes: (first..first + count).collect(),
-            triangles: self.surface_triangles().to_vec(),
-            vertex_of_node: std::iter::repeat_n(u32::MAX, first as usize).chain(0..count).collect(),
-        }
-    }
-
-    /// Mass (kg) of nodes as contact may count on it: of the skin the least that its pressure ever meets.
+impl SeedBody {
+    /// Checks and builds; a tick is taken in as few equal steps as are no longer than the parameters' `dt_s`.
     ///
-    /// A pressure `k_f g` on vertices of areas `A_v` is stiffness `k_f A_v` there, and over awake particles, with eq. 25's weights, at most
-    /// `k_f Σ_v A_v w_vs` (row sum, `Σ_s w_vs = 1`) at particle s. So a vertex counts as `m_p A_v/max_s Σ_v A_v w_vs`, or its own mass if that is less.
-    pub fn contact_mass_kg(&self) -> Vec<f64> {
-        let mut mass_kg = self.node_mass_kg();
-        let Some(layer) = self.layer() else { return mass_kg };
-        let skin = &mut mass_kg[self.core().rest_m().len()..];
-        let area_m2 = self.vertex_areas_m2();
-        for region in self.regions() {
-            let mut pressed_m2 = vec![0.0; region.len()];
-            for rider in &region.riders {
-                for &(slot, weight) in region.terms_of(rider) {
-                    pressed_m2[slot as usize] += area_m2[rider.vertex as usize] * weight;
-                }
-            }
-            for rider in &region.riders {
-                let vertex = rider.vertex as usize;
-                let most_m2 = region.terms_of(rider).iter().map(|term| pressed_m2[term.0 as usize]).fold(0.0, f64::max);
-                skin[vertex] = skin[vertex].min(layer.mass_kg * area_m2[vertex] / most_m2);
-            }
-        }
-        mass_kg
+    /// # Errors
+    /// [`SeedError`]; nothing is repaired silently.
+    pub(crate) fn build(spec: SeedBodySpec, around: EnvironmentSpec) -> Result<(Self, Environment), SeedError> {
+        Surface::of(&spec.core.mesh)?;
+        let SeedBodySpec { core, layer, parameters } = spec;
+        demand(&around, &core, &parameters)?;
+        let tick_period_s = around.settings.tick_period_s;
+        let substeps = steps_per_tick(tick_period_s, parameters.dt_s)?;
+        let model = SeedModel::build(SeedSpec {
+            core: core.mesh.clone(),
+            held_nodes: around.prescribed.iter().flat_map(|set| set.nodes.iter().copied()).collect(),
+            layer: layer.clone(),
+            parameters: SeedParameters { dt_s: tick_period_s / f64::from(substeps), ..parameters },
+        })?;
+        let (surface, rest_m, mass_kg) = (model.node_surface(), model.node_rest_m(), model.node_mass_kg());
+        core.check()?;
+        around.check(&surface, &rest_m, core.mesh.positions_m().len())?;
+        around.demand_spheres("a body of the papers' hybrid, which is touched at one triangle")?;
+        let inverse_mass_per_kg = free_inverse_mass(&mass_kg, &around.prescribed)?;
+        let materials = [*model.core().material()];
+        let of_core = RestStiffness {
+            mesh: &core.mesh,
+            rest_tets: model.core().rest_tets(),
+            tet_material: &core.tet_region,
+            materials: &materials,
+            springs_n_per_m: &[],
+        };
+        let core_nodes = core.mesh.positions_m().len();
+        let omega = max_natural_frequency_rad_per_s(&of_core, &inverse_mass_per_kg[..core_nodes]);
+        // The natural frequency that contact is made not to exceed by much: a quarter of what the explicit step bears, (ω dt)² ≤ 4.
+        let contact_rad_per_s = model.parameters().dt_s.recip();
+        let contact = ContactModel::build(
+            &rest_m,
+            &surface,
+            &moduli(&model),
+            &model.contact_mass_kg(),
+            contact_rad_per_s,
+            &around.tools,
+        );
+        demand_soft_couplings(&contact, &model)?;
+        let steps = Steps { substeps, substeps_per_long_step: 1 };
+        let body =
+            Self { model, core, layer, rest_m, mass_kg, inverse_mass_per_kg, max_natural_frequency_rad_per_s: omega };
+        Ok((body, Environment::new(around, surface, contact, steps)))
     }
 
-    /// The triangle whose touch wakes the most particles.
-    pub fn largest_region(&self) -> Option<u32> {
-        let sizes = self.regions().iter().map(Region::len).zip(0..);
-        sizes.max_by_key(|(size, _)| *size).map(|(_, triangle)| triangle)
+    /// The papers' model.
+    pub fn model(&self) -> &SeedModel {
+        &self.model
     }
 
-    /// A third (m²) of the triangles around each vertex of the surface.
-    fn vertex_areas_m2(&self) -> Vec<f64> {
-        let mut area_m2 = vec![0.0; self.surface_rest_m().len()];
-        for triangle in self.surface_triangles() {
-            let [a, b, c] = triangle.map(|vertex| self.surface_rest_m()[vertex as usize]);
-            for &vertex in triangle {
-                area_m2[vertex as usize] += (b - a).cross(c - a).length() / 6.0;
-            }
-        }
-        area_m2
+    /// The core's mesh.
+    pub fn mesh(&self) -> &TetMesh {
+        &self.core.mesh
     }
 
-    /// Kinetic energy (J) of core, awake particles, and skin but for what rides on those.
-    pub fn kinetic_energy_j(&self, state: &SeedState) -> f64 {
-        let of = |mass_kg: &f64, v: &DVec3| 0.5 * mass_kg * v.length_squared();
-        let mut energy_j: f64 = self.core().mass_kg().iter().zip(&state.core.v).map(|(m, v)| of(m, v)).sum();
-        if let (Some(links), Some(layer)) = (self.links(), self.layer()) {
-            energy_j += links.mass_kg.iter().zip(&state.skin.v).map(|(m, v)| of(m, v)).sum::<f64>();
-            if let Some(region) = self.awake(state) {
-                let riders = region.riders.iter().map(|rider| rider.vertex as usize);
-                energy_j -= riders.map(|vertex| of(&links.mass_kg[vertex], &state.skin.v[vertex])).sum::<f64>();
-                energy_j += state.particles.v[..region.len()].iter().map(|v| of(&layer.mass_kg, v)).sum::<f64>();
-            }
-        }
-        energy_j
+    /// What it was built from.
+    pub(crate) fn spec(&self) -> (&Solid, &Option<LayerSpec>, &SeedParameters) {
+        (&self.core, &self.layer, self.model.parameters())
     }
+
+    /// Rest positions (m) of the core's nodes and then the skin's vertices.
+    pub fn rest_positions_m(&self) -> &[DVec3] {
+        &self.rest_m
+    }
+
+    /// Mass (kg) of every node.
+    pub fn mass_kg(&self) -> &[f64] {
+        &self.mass_kg
+    }
+
+    /// `1/m` (1/kg) per node and axis, zero where it is held.
+    pub fn inverse_mass_per_kg(&self) -> &[DVec3] {
+        &self.inverse_mass_per_kg
+    }
+
+    /// Largest natural frequency (rad/s) of the core at rest.
+    pub fn max_natural_frequency_rad_per_s(&self) -> f64 {
+        self.max_natural_frequency_rad_per_s
+    }
+
+    /// Kinetic energy, elastic energy of the core, and external work. Particles and links have no elastic energy that is known, and so
+    /// there is no dissipation.
+    pub(crate) fn energies(&self, own: &SeedBodyState, state: &MechanicalState) -> Energies {
+        Energies {
+            kinetic_j: self.model.kinetic_energy_j(&own.now),
+            elastic_j: self.elastic_energy_j(&state.x),
+            external_work_j: state.ledger.external_work_j,
+            ..Energies::default()
+        }
+    }
+
+    /// `Σ V Ψ(F)` (J) of the core at positions `x` (m).
+    pub(crate) fn elastic_energy_j(&self, x: &[DVec3]) -> f64 {
+        let core = self.model.core();
+        let of_tet = |(nodes, rest): (&[u32; 4], &crate::elements::linear_tet::RestTet)| {
+            rest.energy_j(core.material(), &nodes.map(|n| x[n as usize]))
+        };
+        self.mesh().tets().iter().zip(core.rest_tets()).map(of_tet).sum()
+    }
+}
+
+/// As few steps as are no longer than `dt_s`.
+fn steps_per_tick(tick_period_s: f64, dt_s: f64) -> Result<u32, EnvironmentError> {
+    // A tick that is whole steps is not one more for its last digit.
+    const ROUNDING: f64 = 1e-9;
+    let steps = (tick_period_s / dt_s * (1.0 - ROUNDING)).ceil().max(1.0);
+    if steps <= f64::from(MAX_SUBSTEPS) {
+        return Ok(steps as u32);
+    }
+    Err(EnvironmentError::Setting { name: "dt_s", value: dt_s, rule: "must leave 100000 steps or fewer to a tick" })
+}
+
+/// What a seed body cannot have.
+fn demand(around: &EnvironmentSpec, core: &Solid, parameters: &SeedParameters) -> Result<(), SeedError> {
+    let SeedParameters { lame, viscosity, convention, density_kg_per_m3, .. } = *parameters;
+    let material = Material::new(Law::StVenantKirchhoff, lame, viscosity, convention);
+    let is_its = core.regions.len() == 1
+        && core.regions.iter().all(|r| r.material == material && r.density_kg_per_m3 == density_kg_per_m3);
+    let settings = &around.settings;
+    let demands = [
+        (is_its, "other materials than the one of its parameters", "give it one St. Venant-Kirchhoff material"),
+        (around.gravity_m_per_s2 == DVec3::ZERO, "gravity", "its particles have none; leave it out"),
+        (around.prescribed.iter().all(|set| set.axes == [true; 3]), "nodes held along some axes", "hold all three"),
+        (
+            settings.integrator == Integrator::Leapfrog,
+            "another integrator",
+            "it has its own two; leave this at leapfrog",
+        ),
+        (settings.substeps == Substeps::Measured, "a number of substeps", "give its step dt_s"),
+        (settings.mass_damping_per_s == 0.0, "mass damping", "its viscosities damp it; leave it at 0"),
+        (settings.sleep_tolerance_m == 0.0, "sleep of the whole body", "leave sleep_tolerance_m at 0"),
+    ];
+    match demands.into_iter().find(|(kept, ..)| !kept) {
+        Some((_, what, instead)) => Err(SeedError::NotForSeeds { what, instead }),
+        None => Ok(()),
+    }
+}
+
+/// Of every triangle of the surface: of the layer's stiffness, where there is one.
+fn moduli(seed: &SeedModel) -> Vec<SurfaceModuli> {
+    let lame = seed.core().material().lame;
+    let factor = if seed.layer().is_some() { seed.parameters().layer_factor() } else { 1.0 };
+    let moduli = SurfaceModuli {
+        p_wave_pa: factor * lame.p_wave_modulus_pa(),
+        indentation_pa: factor * lame.young_modulus_pa() / (1.0 - lame.poisson_ratio().powi(2)),
+    };
+    vec![moduli; seed.surface_triangles().len()]
+}
+
+/// Tools on couplings are stepped with the body.
+fn demand_soft_couplings(contact: &ContactModel, seed: &SeedModel) -> Result<(), SeedError> {
+    let dt_s = seed.parameters().dt_s;
+    let longest_s = STEP_SAFETY * 2.0 / contact.tool_frequency_sq.sqrt();
+    if dt_s <= longest_s { Ok(()) } else { Err(SeedError::CouplingTooStiff { dt_s, longest_s }) }
 }

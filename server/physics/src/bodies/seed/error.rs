@@ -1,10 +1,35 @@
 //! Why a seed model cannot be built.
-use crate::mesh::MeshError;
+use crate::{elements::solid::SolidError, mesh::MeshError, tick::EnvironmentError};
 use thiserror::Error;
 
 /// Why a seed model cannot be built.
 #[derive(Debug, Clone, PartialEq, Error)]
 pub enum SeedError {
+    /// The core's regions or their constants.
+    #[error(transparent)]
+    Solid(#[from] SolidError),
+    /// Settings, constraints, loads or tools.
+    #[error(transparent)]
+    Environment(#[from] EnvironmentError),
+    /// A seed body cannot have it.
+    #[error("a body of the papers' hybrid (seed) cannot have {what}: {instead}")]
+    NotForSeeds {
+        /// What.
+        what: &'static str,
+        /// What to do.
+        instead: &'static str,
+    },
+    /// A tool's coupling and contact, as a mass on springs, need a shorter step than the body's.
+    #[error(
+        "the tools' couplings need steps of {longest_s:.2e} s at most, and the seed body takes {dt_s:.2e} s: make them softer or the tools \
+         heavier, take rigid tools, or shorten its step"
+    )]
+    CouplingTooStiff {
+        /// The body's step (s).
+        dt_s: f64,
+        /// The longest that couplings bear (s).
+        longest_s: f64,
+    },
     /// The core's boundary is bad.
     #[error("the core: {0}")]
     Core(#[from] MeshError),

@@ -31,6 +31,7 @@
 //! | no mass, stiffness or damping of links | from the layer | `links.rs` |
 //! | particles woken at rest under a core that moved | start with the core | `step.rs` |
 mod body;
+mod body_state;
 pub mod core;
 mod error;
 pub mod exchange;
@@ -38,19 +39,22 @@ pub mod kernel;
 pub mod layer;
 pub mod links;
 mod model;
+mod numbering;
 pub mod radial;
 pub mod region;
 mod spec;
 pub mod sph;
 mod state;
 mod step;
+mod stepped;
 #[cfg(test)]
 pub(crate) mod testing;
 #[cfg(test)]
 mod tests;
 pub mod voxels;
 
-pub use body::{SeedBodySpec, SeedMotion};
+pub use body::{SeedBody, SeedBodySpec};
+pub use body_state::SeedBodyState;
 pub use error::SeedError;
 pub use model::SeedModel;
 pub use spec::{
@@ -58,3 +62,4 @@ pub use spec::{
     VENTRICLE_TETS,
 };
 pub use state::{AtVertex, Motion, SeedContact, SeedReport, SeedScratch, SeedState};
+pub(crate) use stepped::{SeedBodyScratch, SteppedSeed};

@@ -6,15 +6,16 @@
 //! but if there is none even for those within a spacing of a load, it is spread wide, and left to the coarse tets: some of the particles beneath it, chosen by
 //! nothing, would make a pattern of it.
 use super::awakened::Awakened;
+use crate::Surface;
 use crate::{
     bodies::hybrid::{
-        Hybrid, Waking,
+        HybridBody, Waking,
         switching::{FOLLOW, GAP},
     },
     contact::deepest_m,
     settings::LoadSpec,
     statics::equilibrium::Goal,
-    world::Model,
+    tick::Environment,
 };
 use glam::DVec3;
 use std::collections::{BTreeMap, BTreeSet};
@@ -30,31 +31,31 @@ pub(super) enum Claims {
 
 impl Claims {
     /// Of the loads and tools of a goal, before a tool came near.
-    pub(super) fn of(model: &Model, body: &Hybrid, goal: &Goal<'_>) -> Self {
-        let reach_m = match model.spec().particles.as_ref().map(|particles| particles.waking) {
-            Some(Waking::ByTools { reach_m }) => reach_m,
-            Some(Waking::ByHand) | None => return Self::Given(Vec::new()),
+    pub(super) fn of(environment: &Environment, body: &HybridBody, goal: &Goal<'_>) -> Self {
+        let reach_m = match body.particles().waking {
+            Waking::ByTools { reach_m } => reach_m,
+            Waking::ByHand => return Self::Given(Vec::new()),
         };
-        let acting = model.spec().loads.iter().zip(goal.load_factors).filter(|(_, factor)| **factor != 0.0);
-        let loads: Vec<_> = acting.map(|(load, _)| near_load(model, body, load, reach_m)).collect();
-        Self::ByRule { reach_m, balls: vec![None; model.spec().tools.len()], loads, spread: 0 }
+        let acting = environment.loads.iter().zip(goal.load_factors).filter(|(_, factor)| **factor != 0.0);
+        let loads: Vec<_> = acting.map(|(load, _)| near_load(&environment.surface, body, load, reach_m)).collect();
+        Self::ByRule { reach_m, balls: vec![None; environment.tools.len()], loads, spread: 0 }
     }
 
     /// Looks at where tools are in an equilibrium, with these forces (N) on them: the particles that are to be awake, ascending.
     pub(super) fn look(&mut self, awakened: &Awakened<'_>, place: &[DVec3], contact_n: &[DVec3]) -> Vec<u32> {
-        let (model, body) = (awakened.model, awakened.body);
-        let (most, spacing_m) = model.spec().particles.as_ref().map_or((0, 0.0), |p| (p.most_active, p.spacing_m));
+        let (environment, body) = (awakened.environment, awakened.body);
+        let (most, spacing_m) = (body.particles().most_active, body.particles().spacing_m);
         let (reach_m, balls, loads, spread) = match self {
             Self::Given(ids) => return ids.clone(),
             Self::ByRule { reach_m, balls, loads, spread } => (*reach_m, balls, loads, spread),
         };
         let configuration = awakened.configuration(place);
         let (skin_m, tools_m) = configuration.split_at(awakened.vertices());
-        let all = balls.iter_mut().zip(tools_m).zip(&model.spec().tools).zip(contact_n);
+        let all = balls.iter_mut().zip(tools_m).zip(&environment.tools).zip(contact_n);
         for (((ball, centre_m), tool), contact_n) in all {
             let near_m = (GAP * tool.radius_m).max(GAP * spacing_m);
             let touch = (*centre_m, tool.radius_m, *contact_n);
-            *ball = ball_of(*ball, model, skin_m, touch, (near_m, FOLLOW * spacing_m));
+            *ball = ball_of(*ball, body, skin_m, touch, (near_m, FOLLOW * spacing_m));
         }
         let claims = (balls.iter().flatten().count() + loads.len()).max(1);
         let room = most / claims;
@@ -96,14 +97,14 @@ fn take_nearest(found: &mut [(f64, u32)], room: usize, wanted: &mut BTreeSet<u32
 /// The ball of a tool at rest: the loop's, for a tool that stands still.
 fn ball_of(
     ball: Option<DVec3>,
-    model: &Model,
+    body: &HybridBody,
     skin_m: &[DVec3],
     (centre_m, radius_m, contact_force_n): (DVec3, f64, DVec3),
     (near_m, follow_m): (f64, f64),
 ) -> Option<DVec3> {
     let deepest_m = deepest_m(centre_m, radius_m, contact_force_n);
     let from_m = deepest_m.unwrap_or(centre_m);
-    let distances = skin_m.iter().map(|y| y.distance(from_m)).zip(model.surface_rest_positions_m());
+    let distances = skin_m.iter().map(|y| y.distance(from_m)).zip(body.skin_rest_m());
     let (distance_m, rest_m) = distances.min_by(|a, b| a.0.total_cmp(&b.0))?;
     let gap_m = if deepest_m.is_some() { 0.0 } else { distance_m - radius_m };
     match ball {
@@ -115,16 +116,16 @@ fn ball_of(
 }
 
 /// Particles that may wake within a reach of vertices that a load acts on, with the distance (m) to the nearest of them.
-fn near_load(model: &Model, body: &Hybrid, load: &LoadSpec, reach_m: f64) -> Vec<(f64, u32)> {
+fn near_load(surface: &Surface, body: &HybridBody, load: &LoadSpec, reach_m: f64) -> Vec<(f64, u32)> {
     let vertices: BTreeSet<u32> = match load {
         LoadSpec::NodalForces(forces) => forces.iter().map(|(vertex, _)| *vertex).collect(),
         LoadSpec::Traction { triangles, .. } | LoadSpec::Pressure { triangles, .. } => {
-            triangles.iter().flat_map(|&triangle| model.surface().triangle_nodes(triangle as usize)).collect()
+            triangles.iter().flat_map(|&triangle| surface.triangle_nodes(triangle as usize)).collect()
         }
     };
     let mut nearest_sq: BTreeMap<u32, f64> = BTreeMap::new();
     for vertex in vertices {
-        let rest_m = model.surface_rest_positions_m()[vertex as usize];
+        let rest_m = body.skin_rest_m()[vertex as usize];
         body.partition().particles_within(rest_m, reach_m, |particle, distance_sq| {
             if body.may_wake(particle) {
                 let nearest = nearest_sq.entry(particle).or_insert(distance_sq);

@@ -4,19 +4,19 @@
 //! `y_v = Y_v + Σ_q w_vq (x_q − X_q)`, and hands forces back by the same weights; a *configuration* of contact lists the skin's vertices, then the tools.
 use crate::{
     bodies::hybrid::{
-        Hybrid,
+        HybridBody,
         patch::{Field, KEPT, Patch},
         place::Place,
     },
-    world::Model,
+    tick::Environment,
 };
 use glam::{BVec3, DMat3, DVec3};
 use std::collections::BTreeMap;
 
 /// A hybrid body, and the particles of it that are awake.
 pub(super) struct Awakened<'a> {
-    pub(super) model: &'a Model,
-    pub(super) body: &'a Hybrid,
+    pub(super) environment: &'a Environment,
+    pub(super) body: &'a HybridBody,
     pub(super) patch: Patch,
     /// Of every entry of a place, axes along which it may move.
     pub(super) free: Vec<BVec3>,
@@ -33,26 +33,35 @@ pub(super) struct Awakened<'a> {
 
 impl<'a> Awakened<'a> {
     /// With these particles, ascending, awake.
-    pub(super) fn new(model: &'a Model, body: &'a Hybrid, ids: &[u32]) -> Self {
+    pub(super) fn new(environment: &'a Environment, body: &'a HybridBody, ids: &[u32]) -> Self {
         let partition = body.partition();
         let patch = Patch::new(partition, &ids.iter().copied().collect());
         let nodes = body.node_count();
-        let springs = (0..model.spec().tools.len()).map(|tool| BVec3::splat(model.contact().spring(tool).is_some()));
+        let springs = (0..environment.tools.len()).map(|tool| BVec3::splat(environment.contact.spring(tool).is_some()));
         let particles = ids.iter().map(|_| BVec3::TRUE);
         let free = body.free().iter().copied().chain(particles).chain(springs).collect();
         let rest_m = partition.coarse().positions_m().iter().copied();
         let rest_m = rest_m.chain(ids.iter().map(|&id| partition.particle_m(id))).collect();
         let mut weight_n: Vec<DVec3> =
-            body.masses().node_kg.iter().map(|mass| model.gravity_m_per_s2() * *mass).collect();
+            body.masses().node_kg.iter().map(|mass| environment.gravity_m_per_s2 * *mass).collect();
         for &id in ids {
-            let own_n = model.gravity_m_per_s2() * ((1.0 - KEPT) * body.masses().particle_kg[id as usize]);
+            let own_n = environment.gravity_m_per_s2 * ((1.0 - KEPT) * body.masses().particle_kg[id as usize]);
             partition.anchor(id).push(-own_n, &mut weight_n[..nodes]);
             weight_n.push(own_n);
         }
         let diagonal_n_per_m = patch.diagonal_n_per_m(&body.materials(), nodes);
-        let mut awakened =
-            Self { model, body, patch, free, rest_m, weight_n, diagonal_n_per_m, first: vec![0], carriers: Vec::new() };
-        for vertex in 0..model.surface_rest_positions_m().len() as u32 {
+        let mut awakened = Self {
+            environment,
+            body,
+            patch,
+            free,
+            rest_m,
+            weight_n,
+            diagonal_n_per_m,
+            first: vec![0],
+            carriers: Vec::new(),
+        };
+        for vertex in 0..body.skin_rest_m().len() as u32 {
             let carriers = awakened.carriers_of(&body.place(vertex).place(partition));
             awakened.carriers.extend(carriers);
             awakened.first.push(awakened.carriers.len() as u32);
@@ -109,7 +118,7 @@ impl<'a> Awakened<'a> {
     pub(super) fn configuration(&self, place: &[DVec3]) -> Vec<DVec3> {
         let moved: Vec<DVec3> = place.iter().zip(&self.rest_m).map(|(x, rest)| *x - *rest).collect();
         let mut configuration = self.directions(&moved);
-        for (y, rest) in configuration.iter_mut().zip(self.model.surface_rest_positions_m()) {
+        for (y, rest) in configuration.iter_mut().zip(self.body.skin_rest_m()) {
             *y += *rest;
         }
         configuration.extend_from_slice(&place[self.entries()..]);
@@ -167,7 +176,7 @@ impl<'a> Awakened<'a> {
 
     /// Everything at rest.
     pub(super) fn at_rest(&self) -> Vec<DVec3> {
-        let tools = self.model.spec().tools.iter().map(|tool| tool.start_position_m);
+        let tools = self.environment.tools.iter().map(|tool| tool.start_position_m);
         self.rest_m.iter().copied().chain(tools).collect()
     }
 

@@ -18,7 +18,7 @@ use super::{
     load_path,
     newton::{Failure, Stop},
 };
-use crate::{bodies::hybrid::Hybrid, contact::RestingContact, settings::PrescribedSpec, world::Model};
+use crate::{bodies::hybrid::HybridBody, contact::RestingContact, settings::PrescribedSpec, tick::Environment};
 use awake::Claims;
 use awakened::Awakened;
 use glam::{BVec3, DVec3};
@@ -40,21 +40,21 @@ struct Reached {
 
 /// From rest to the goal; the particles `given`, ascending, are awake, or those that its tools and loads keep awake.
 pub(super) fn solve(
-    model: &Model,
-    body: &Hybrid,
+    environment: &Environment,
+    body: &HybridBody,
     goal: &Goal<'_>,
     given: Option<Vec<u32>>,
     settings: &StaticSettings,
     progress: &mut dyn FnMut(&Progress) -> ControlFlow<()>,
 ) -> Result<StaticSolution, SolveError> {
-    let largest = load_path::largest_step(model, goal)?;
+    let largest = load_path::largest_step(environment, goal)?;
     let mut solver = Solver { settings, history: Vec::new(), linear_systems: 0, progress };
-    let asleep = Awakened::new(model, body, &[]);
-    let mut claims = given.map_or_else(|| Claims::of(model, body, goal), Claims::Given);
-    let ids = claims.look(&asleep, &asleep.at_rest(), &vec![DVec3::ZERO; model.spec().tools.len()]);
-    let mut awakened = Awakened::new(model, body, &ids);
+    let asleep = Awakened::new(environment, body, &[]);
+    let mut claims = given.map_or_else(|| Claims::of(environment, body, goal), Claims::Given);
+    let ids = claims.look(&asleep, &asleep.at_rest(), &vec![DVec3::ZERO; environment.tools.len()]);
+    let mut awakened = Awakened::new(environment, body, &ids);
     let place = awakened.at_rest();
-    let contact = RestingContact::appear(model.contact(), &awakened.configuration(&place));
+    let contact = RestingContact::appear(&environment.contact, &awakened.configuration(&place));
     let mut at = Reached { place, claims, ids, contact };
     let (stage, load_steps) = load_path::raise(largest, settings, |fraction| {
         let found = stage_from(&mut awakened, &mut solver, goal, fraction, &at);
@@ -75,7 +75,7 @@ fn stage_from(
 ) -> Result<(Reached, Stage), Stop> {
     let mut now = from.clone();
     if awakened.patch.active() != now.ids {
-        *awakened = Awakened::new(awakened.model, awakened.body, &now.ids);
+        *awakened = Awakened::new(awakened.environment, awakened.body, &now.ids);
     }
     // A tool may be deepest at one vertex with these awake, and at another with those: it keeps what it came to first.
     let mut tried = vec![now.ids.clone()];
@@ -90,7 +90,7 @@ fn stage_from(
             return Ok((now, stage));
         }
         tried.push(wanted.clone());
-        let next = Awakened::new(awakened.model, awakened.body, &wanted);
+        let next = Awakened::new(awakened.environment, awakened.body, &wanted);
         now.place = next.taking_over(awakened, &now.place);
         now.ids = wanted;
         *awakened = next;
@@ -109,7 +109,7 @@ fn settle(
     let mut found = solver.equilibrate(awakened, goal, stage, begin.to_vec())?;
     for _ in 0..load_path::MAX_WIDENINGS {
         let now = awakened.configuration(&found);
-        let Some(wider) = stage.contact.widened(awakened.model.contact(), &before, &now) else { return Ok(found) };
+        let Some(wider) = stage.contact.widened(&awakened.environment.contact, &before, &now) else { return Ok(found) };
         stage.contact = wider;
         found = solver.equilibrate(awakened, goal, stage, found)?;
     }
@@ -123,7 +123,7 @@ fn solution(
     found: Reached,
     load_steps: u32,
 ) -> StaticSolution {
-    let model = awakened.model;
+    let environment = awakened.environment;
     let forces = stage.forces(awakened, &found.place);
     let (_, residual_n, relative_residual) = forces.residual(awakened);
     // The holder supplies what the other forces lack.
@@ -134,7 +134,7 @@ fn solution(
         DVec3::select(BVec3::from_array(set.axes), sum, DVec3::ZERO)
     };
     StaticSolution {
-        reactions_n: model.spec().prescribed.iter().map(of_set).collect(),
+        reactions_n: environment.prescribed.iter().map(of_set).collect(),
         tools: stage.tools_at_rest(awakened, &forces, &found.place),
         iterations: solver.history.len() as u32,
         factorisations: 0,

@@ -33,8 +33,8 @@ pub(super) struct Solver<'a> {
 
 /// `ε ‖diag K‖₂ max|q|` (N): an entry known to `ε|q|` has a force known to `ε |q| K_ii`.
 pub(super) fn rounding_n(awakened: &Awakened<'_>, place: &[DVec3]) -> f64 {
-    let model = awakened.model;
-    let springs = (0..model.spec().tools.len()).filter_map(|tool| model.contact().spring(tool));
+    let environment = awakened.environment;
+    let springs = (0..environment.tools.len()).filter_map(|tool| environment.contact.spring(tool));
     let springs_sq: f64 = springs.map(|spring| 3.0 * spring.stiffness_n_per_m.powi(2)).sum();
     let along = |(block, free): (&DMat3, &BVec3)| {
         DVec3::select(*free, DVec3::new(block.x_axis.x, block.y_axis.y, block.z_axis.z), DVec3::ZERO).length_squared()
@@ -89,12 +89,12 @@ impl Solver<'_> {
 
     /// Brings prescribed axes to their place, and the free ones along by one linear system: `K d = f + (∂f/∂x) δ`.
     fn move_prescribed(&mut self, awakened: &Awakened<'_>, goal: &Goal<'_>, stage: &Stage, place: &mut [DVec3]) {
-        let model = awakened.model;
+        let environment = awakened.environment;
         let mut moves = vec![DVec3::ZERO; place.len()];
-        for (set, displacement) in model.spec().prescribed.iter().zip(goal.prescribed_displacements_m) {
+        for (set, displacement) in environment.prescribed.iter().zip(goal.prescribed_displacements_m) {
             for node in set.nodes.iter().map(|&n| n as usize) {
                 for axis in (0..3).filter(|&axis| set.axes[axis]) {
-                    let wanted_m = model.rest_positions_m()[node][axis] + displacement[axis] * stage.fraction;
+                    let wanted_m = awakened.body.rest_positions_m()[node][axis] + displacement[axis] * stage.fraction;
                     moves[node][axis] = wanted_m - place[node][axis];
                 }
             }
@@ -199,7 +199,7 @@ fn descend(
 
 /// Share of a motion in which no coupled tool moves further than a quarter of its radius: contact is not known further ahead.
 fn longest_step(awakened: &Awakened<'_>, d: &[DVec3]) -> f64 {
-    let tools = awakened.model.spec().tools.iter().zip(&d[awakened.entries()..]);
+    let tools = awakened.environment.tools.iter().zip(&d[awakened.entries()..]);
     tools.map(|(tool, d)| 0.25 * tool.radius_m / d.length().max(f64::MIN_POSITIVE)).fold(1.0, f64::min)
 }
 
@@ -238,36 +238,38 @@ mod tests {
         let lame = Lame::from_young_poisson(10e3, 0.0).unwrap();
         let mut spec = ModelSpec {
             prescribed: vec![held("below", 0.0), held("above", 0.04)],
-            particles: Some(ParticleSpec {
-                skin: Skin::new(corners, triangles).unwrap(),
-                spacing_m: 5e-3,
-                fine_depth_m: None,
-                lattice_through_m: DVec3::ZERO,
-                most_active: 300,
-                waking: Waking::ByHand,
+            body: BodySpec::Hybrid(HybridSpec {
+                coarse: Solid {
+                    tet_region: vec![0; mesh.tets().len()],
+                    regions: vec![Region {
+                        name: "all".into(),
+                        material: Material { lame, ..tissue()[0] },
+                        density_kg_per_m3: 1000.0,
+                    }],
+                    mesh: slab(),
+                },
+                particles: ParticleSpec {
+                    skin: Skin::new(corners, triangles).unwrap(),
+                    spacing_m: 5e-3,
+                    fine_depth_m: None,
+                    lattice_through_m: DVec3::ZERO,
+                    most_active: 300,
+                    waking: Waking::ByHand,
+                },
             }),
-            tet_region: vec![0; mesh.tets().len()],
-            regions: vec![Region {
-                name: "all".into(),
-                material: Material { lame, ..tissue()[0] },
-                density_kg_per_m3: 1000.0,
-            }],
-            seed: None,
-            springs: None,
             loads: Vec::new(),
             gravity_m_per_s2: DVec3::ZERO,
             tools: Vec::new(),
             settings: Settings::for_particles(),
-            mesh: slab(),
         };
         spec.settings.long_coarse_steps = false;
         let model = Model::build(spec).unwrap();
-        let body = model.hybrid().unwrap();
+        let body = model.body().as_hybrid().unwrap();
         let mut awake = Vec::new();
         body.partition().particles_within(DVec3::new(0.04, 0.04, 0.02), 0.015, |particle, _| awake.push(particle));
         awake.sort_unstable();
         for ids in [vec![], awake] {
-            let awakened = Awakened::new(&model, body, &ids);
+            let awakened = Awakened::new(model.environment(), body, &ids);
             let goal = Goal { load_factors: &[], prescribed_displacements_m: &[], tools: &[] };
             let contact = RestingContact::appear(model.contact(), &awakened.configuration(&awakened.at_rest()));
             for (stretch, stable) in [(1.0, true), (0.8, true), (0.5, false)] {

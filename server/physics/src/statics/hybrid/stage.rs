@@ -51,30 +51,30 @@ impl Stage {
         before: &[DVec3],
         contact: &RestingContact,
     ) -> (Self, Vec<DVec3>) {
-        let model = awakened.model;
+        let environment = awakened.environment;
         let load_factors: Vec<f64> = goal.load_factors.iter().map(|factor| factor * fraction).collect();
-        let skin_m = model.surface_rest_positions_m();
-        let tools = model.spec().tools.len();
+        let skin_m = awakened.body.skin_rest_m();
+        let tools = environment.tools.len();
         let mut on_skin_n = vec![DVec3::ZERO; awakened.vertices() + tools];
-        for (load, &factor) in model.spec().loads.iter().zip(&load_factors) {
+        for (load, &factor) in environment.loads.iter().zip(&load_factors) {
             let follows = matches!(load, LoadSpec::Pressure { follower: true, .. });
             if factor != 0.0 && !follows {
-                loads::add_load_n(load, factor, model.surface(), (skin_m, skin_m), &mut on_skin_n);
+                loads::add_load_n(load, factor, &environment.surface, (skin_m, skin_m), &mut on_skin_n);
             }
         }
         let mut dead_n: Vec<DVec3> = awakened.weight_n.iter().map(|weight| *weight * fraction).collect();
         dead_n.resize(before.len(), DVec3::ZERO);
         awakened.hand_back(&on_skin_n, &mut dead_n);
-        let start = model.spec().tools.iter().map(|tool| tool.start_position_m);
+        let start = environment.tools.iter().map(|tool| tool.start_position_m);
         let devices_m: Vec<DVec3> = start.zip(goal.tools).map(|(s, tool)| s.lerp(tool.position_m, fraction)).collect();
         let mut begin = before.to_vec();
         for (tool, device) in devices_m.iter().enumerate() {
-            if model.contact().spring(tool).is_none() {
+            if environment.contact.spring(tool).is_none() {
                 begin[awakened.entries() + tool] = *device;
             }
         }
         let [was, is] = [before, &begin].map(|place| awakened.configuration(place));
-        let contact = contact.arrive(model.contact(), &was, &is);
+        let contact = contact.arrive(&environment.contact, &was, &is);
         (Self { fraction, load_factors, dead_n, devices_m, contact }, begin)
     }
 
@@ -85,19 +85,19 @@ impl Stage {
         place: &'a [DVec3],
     ) -> impl Iterator<Item = (usize, SaturatingSpring, DVec3)> + 'a {
         self.devices_m.iter().enumerate().filter_map(move |(tool, device)| {
-            let (entry, spring) = (awakened.entries() + tool, awakened.model.contact().spring(tool)?);
+            let (entry, spring) = (awakened.entries() + tool, awakened.environment.contact.spring(tool)?);
             Some((entry, spring, *device - place[entry]))
         })
     }
 
     fn has_followers(&self, awakened: &Awakened<'_>) -> bool {
-        follower::active(awakened.model, &self.load_factors).next().is_some()
+        follower::active(awakened.environment, &self.load_factors).next().is_some()
     }
 
     /// Adds follower pressures (N) at a configuration.
     fn add_followers_n(&self, awakened: &Awakened<'_>, configuration: &[DVec3], forces_n: &mut [DVec3]) {
-        for (triangles, pressure_pa) in follower::active(awakened.model, &self.load_factors) {
-            loads::add_pressure_n(awakened.model.surface(), triangles, pressure_pa, configuration, forces_n);
+        for (triangles, pressure_pa) in follower::active(awakened.environment, &self.load_factors) {
+            loads::add_pressure_n(&awakened.environment.surface, triangles, pressure_pa, configuration, forces_n);
         }
     }
 
@@ -106,7 +106,7 @@ impl Stage {
         let configuration = awakened.configuration(place);
         let mut outer_n = vec![DVec3::ZERO; configuration.len()];
         self.add_followers_n(awakened, &configuration, &mut outer_n);
-        let tools = self.contact.add_forces_n(awakened.model.contact(), &configuration, &mut outer_n);
+        let tools = self.contact.add_forces_n(&awakened.environment.contact, &configuration, &mut outer_n);
         let mut external_n = self.dead_n.clone();
         awakened.hand_back(&outer_n, &mut external_n);
         for (entry, spring, stretch_m) in self.springs(awakened, place) {
@@ -123,26 +123,26 @@ impl Stage {
             let (pair, block) = if i <= j { ([i, j], *block) } else { ([j, i], block.transpose()) };
             *blocks.entry(pair).or_insert(DMat3::ZERO) += block;
         };
-        self.contact.for_each_block(awakened.model.contact(), &configuration, false, &mut add);
+        self.contact.for_each_block(&awakened.environment.contact, &configuration, false, &mut add);
         for (entry, spring, stretch_m) in self.springs(awakened, place) {
             let own = (entry - awakened.entries() + awakened.vertices()) as u32;
             add(own, own, &spring.hessian_n_per_m(stretch_m, false));
         }
-        follower::for_each_block(awakened.model, &self.load_factors, &configuration, &mut add);
+        follower::for_each_block(awakened.environment, &self.load_factors, &configuration, &mut add);
         Outer::new(awakened, blocks)
     }
 
     /// Potential (J) of contact and couplings at a place.
     fn tools_j(&self, awakened: &Awakened<'_>, place: &[DVec3]) -> f64 {
         let springs: f64 = self.springs(awakened, place).map(|(_, spring, stretch)| spring.energy_j(stretch)).sum();
-        self.contact.potential_j(awakened.model.contact(), &awakened.configuration(place)) + springs
+        self.contact.potential_j(&awakened.environment.contact, &awakened.configuration(place)) + springs
     }
 
     /// The tools at a place with these forces.
     pub(super) fn tools_at_rest(&self, awakened: &Awakened<'_>, forces: &Forces, place: &[DVec3]) -> Vec<ToolAtRest> {
         let at_rest = |(tool, pressing): (usize, &Pressing)| {
             let (device_m, centre_m) = (self.devices_m[tool], place[awakened.entries() + tool]);
-            let spring_n = awakened.model.contact().spring(tool).map(|spring| spring.force_n(device_m - centre_m));
+            let spring_n = awakened.environment.contact.spring(tool).map(|spring| spring.force_n(device_m - centre_m));
             ToolAtRest::pressing(device_m, centre_m, pressing, spring_n)
         };
         forces.tools.iter().enumerate().map(at_rest).collect()

@@ -1,7 +1,7 @@
 //! The kernels' layout of a patch's cells.
 use super::RunningPatch;
 use crate::bodies::hybrid::{
-    body::Hybrid,
+    body::HybridBody,
     fade::{CellFade, Fading},
     kernels::CellRow,
 };
@@ -17,7 +17,7 @@ pub(super) enum Slot {
 
 impl RunningPatch {
     /// Rows of whole cells, of either size, and blocks of others, material by material; nothing fades in them.
-    pub(super) fn lay_out(&mut self, hybrid: &Hybrid) {
+    pub(super) fn lay_out(&mut self, hybrid: &HybridBody) {
         let partition = &hybrid.partition;
         for &cell in &self.fading_cells {
             if let Slot::Row { cell, .. } = self.slots[cell as usize] {

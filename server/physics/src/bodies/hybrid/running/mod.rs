@@ -7,8 +7,7 @@ mod tests;
 
 use super::kernels::{CellRow, CutCells, Found, RowKernel, RowValues, ShareKernel};
 use super::{
-    active::room_for_cells,
-    body::Hybrid,
+    body::HybridBody,
     border::Border,
     clusters::SkinClusters,
     composite::Anchor,
@@ -17,6 +16,7 @@ use super::{
     patch::KEPT,
     running_metric::RunningMetric,
     share::Share,
+    state::room_for_cells,
 };
 use crate::settings::Precision;
 use glam::DVec3;
@@ -79,7 +79,7 @@ struct Point {
 
 impl RunningPatch {
     /// Room for `most_active` particles, none awake.
-    pub(crate) fn new(hybrid: &Hybrid, most_active: usize, precision: Precision) -> Self {
+    pub(crate) fn new(hybrid: &HybridBody, most_active: usize, precision: Precision) -> Self {
         let partition = &hybrid.partition;
         let most_cells = room_for_cells(hybrid, most_active);
         let around = if partition.has_doubled() { 8 * partition.most_cells_at() } else { 27 };
@@ -199,7 +199,7 @@ impl RunningPatch {
     }
 
     /// Positions (m) of the particles of an awake cell.
-    pub(super) fn corners_m(&self, hybrid: &Hybrid, cell: u32) -> [DVec3; 8] {
+    pub(super) fn corners_m(&self, hybrid: &HybridBody, cell: u32) -> [DVec3; 8] {
         hybrid.partition.corners(cell as usize).map(|particle| {
             let point = self.point_of[particle as usize] as usize;
             self.points[point].rest_m + self.displacements_m[point]
@@ -207,7 +207,7 @@ impl RunningPatch {
     }
 
     /// Whether some particle of an awake cell follows one of these coarse nodes.
-    pub(super) fn follows(&self, hybrid: &Hybrid, cell: u32, nodes: &[bool]) -> bool {
+    pub(super) fn follows(&self, hybrid: &HybridBody, cell: u32, nodes: &[bool]) -> bool {
         hybrid.partition.corners(cell as usize).into_iter().any(|particle| {
             let point = &self.points[self.point_of[particle as usize] as usize];
             let anchor = &point.anchor;
@@ -232,7 +232,7 @@ impl RunningPatch {
     }
 
     /// Wakes these particles (ascending, no more than there is room for) and no others, of which this fades. Allocates nothing.
-    pub(crate) fn wake(&mut self, hybrid: &Hybrid, active: &[u32], fading: &Fading) {
+    pub(crate) fn wake(&mut self, hybrid: &HybridBody, active: &[u32], fading: &Fading) {
         (0..Self::SLICES).for_each(|slice| self.set_slice(hybrid, active, slice));
         self.put_fades(fading);
     }
@@ -241,7 +241,7 @@ impl RunningPatch {
     pub(super) const SLICES: u32 = 3;
 
     /// A slice of [`Self::wake`], one after the other, before it is told what fades.
-    pub(super) fn set_slice(&mut self, hybrid: &Hybrid, active: &[u32], slice: u32) {
+    pub(super) fn set_slice(&mut self, hybrid: &HybridBody, active: &[u32], slice: u32) {
         match slice {
             0 => {
                 self.forget(hybrid);
@@ -265,7 +265,7 @@ impl RunningPatch {
         self.number = other.number + 1;
     }
 
-    fn mark_carried(&mut self, hybrid: &Hybrid, carried: bool) {
+    fn mark_carried(&mut self, hybrid: &HybridBody, carried: bool) {
         for &particle in &self.active {
             for cluster in hybrid.clusters.carried_by(particle) {
                 self.carries_of_cluster[cluster] = carried;
@@ -274,7 +274,7 @@ impl RunningPatch {
         }
     }
 
-    fn forget(&mut self, hybrid: &Hybrid) {
+    fn forget(&mut self, hybrid: &HybridBody) {
         self.mark_carried(hybrid, false);
         for point in &self.points {
             self.point_of[point.particle as usize] = NONE;
@@ -294,7 +294,7 @@ impl RunningPatch {
         self.cells.clear();
     }
 
-    fn find_cells(&mut self, hybrid: &Hybrid) {
+    fn find_cells(&mut self, hybrid: &HybridBody) {
         for &particle in &self.active {
             for cell in hybrid.partition.cells_at(particle) {
                 if !self.is_awake[cell] {
@@ -306,7 +306,7 @@ impl RunningPatch {
         self.cells.sort_unstable();
     }
 
-    fn find_points(&mut self, hybrid: &Hybrid) {
+    fn find_points(&mut self, hybrid: &HybridBody) {
         for &cell in &self.cells {
             for particle in hybrid.partition.corners(cell as usize) {
                 if self.point_of[particle as usize] == NONE {
@@ -333,7 +333,7 @@ impl RunningPatch {
     }
 
     /// `V_g ← V_g − (1 − ε) V_c` and likewise `T_gi`.
-    fn take_from_shares(&mut self, hybrid: &Hybrid) {
+    fn take_from_shares(&mut self, hybrid: &HybridBody) {
         let partition = &hybrid.partition;
         let mut last = NONE;
         for &cell in &self.cells {
@@ -369,7 +369,7 @@ impl RunningPatch {
     /// The same of awake cells, on coarse nodes and active particles; whose forces were none.
     pub(crate) fn add_cell_forces_n(
         &mut self,
-        hybrid: &Hybrid,
+        hybrid: &HybridBody,
         v: &[DVec3],
         left: f64,
         forces_n: &mut [DVec3],
@@ -411,7 +411,7 @@ impl RunningPatch {
     }
 
     /// Takes positions (m) of coarse nodes and then active particles.
-    pub(crate) fn displace(&mut self, hybrid: &Hybrid, x: &[DVec3]) {
+    pub(crate) fn displace(&mut self, hybrid: &HybridBody, x: &[DVec3]) {
         let (x_nodes, x_particles) = x.split_at(hybrid.node_count());
         let rest = hybrid.partition.coarse().positions_m();
         for ((u, x), rest) in self.node_displacements_m.iter_mut().zip(x_nodes).zip(rest) {

@@ -13,7 +13,7 @@ use crate::{
 use glam::DMat3;
 use std::collections::BTreeSet;
 
-fn some(hybrid: &Hybrid, wanted: impl Fn(DVec3) -> bool) -> Vec<u32> {
+fn some(hybrid: &HybridBody, wanted: impl Fn(DVec3) -> bool) -> Vec<u32> {
     let particles = 0..hybrid.partition.particle_count() as u32;
     particles.filter(|&p| hybrid.may_wake(p) && wanted(hybrid.partition.particle_m(p))).collect()
 }
@@ -23,7 +23,7 @@ fn largest(list: &[DVec3]) -> f64 {
 }
 
 /// Something in some of the cells and tets, of the size of its strains.
-fn some_fading(hybrid: &Hybrid, cells: &[u32], random: &mut Random) -> Fading {
+fn some_fading(hybrid: &HybridBody, cells: &[u32], random: &mut Random) -> Fading {
     let mut matrix = || DMat3::from_cols(random.vector(), random.vector(), random.vector()) * 0.1;
     let cells = cells.iter().filter(|cell| **cell / 7 % 3 == 1);
     let tets = (0..hybrid.partition.shares().len() as u32).filter(|tet| tet % 4 == 1);

@@ -1,0 +1,85 @@
+//! From a specification to a hybrid body in its environment.
+use super::{HybridBody, HybridError, HybridSpec, body::Built};
+use crate::{
+    contact::{ContactModel, moduli},
+    mesh::Surface,
+    settings::Integrator,
+    tick::{Environment, EnvironmentSpec, Steps, free_inverse_mass, progress as building, stiffening},
+};
+use glam::{DVec2, DVec3};
+
+impl HybridBody {
+    /// Checks, lays the lattice out, and chooses the substeps; `progress` is told the part done.
+    ///
+    /// # Errors
+    /// [`HybridError`]; nothing is repaired silently.
+    pub(crate) fn build(
+        spec: HybridSpec,
+        mut around: EnvironmentSpec,
+        progress: &mut dyn FnMut(f64),
+    ) -> Result<(Self, Environment), HybridError> {
+        let HybridSpec { coarse, particles } = spec;
+        let boundary = Surface::of(&coarse.mesh)?;
+        let skin = &particles.skin;
+        let surface = Surface::alone(skin.positions_m().len(), skin.triangles().to_vec());
+        coarse.check()?;
+        around.check(&surface, skin.positions_m(), coarse.mesh.positions_m().len())?;
+        demand(&around)?;
+        let materials = coarse.materials();
+        let Built { body: mut hybrid, prescribed } =
+            Self::lay_out(&coarse, &boundary, particles, &around.prescribed, &mut building::laying(progress))?;
+        around.prescribed = prescribed;
+        let mass_kg = &hybrid.masses().node_kg;
+        let mut inverse_mass_per_kg = free_inverse_mass(mass_kg, &around.prescribed)?;
+        for (inverse, mass) in inverse_mass_per_kg.iter_mut().zip(mass_kg) {
+            // A node that nothing follows stays where it is.
+            *inverse = if *mass > 0.0 { *inverse } else { DVec3::ZERO };
+        }
+        hybrid.inverse_mass_per_kg = inverse_mass_per_kg;
+        let omega = hybrid.frequency_rad_per_s(&[], &mut building::untouched(progress));
+        hybrid.max_natural_frequency_rad_per_s = omega;
+        let vertices = hybrid.skin_rest_m().len() as u32;
+        let moduli_pa: Vec<DVec2> = (0..vertices).map(|v| moduli::moduli_pa(hybrid.material_at(v))).collect();
+        let contact = ContactModel::build(
+            hybrid.skin_rest_m(),
+            &surface,
+            &moduli::mean_over_corners(&moduli_pa, &surface),
+            &hybrid.vertex_masses_kg(),
+            omega,
+            &around.tools,
+        );
+        hybrid.cluster(contact.triangles());
+        let stretch_sq = stiffening(&around.settings, &materials);
+        let touched = if contact.nodal_stiffness_n_per_m.is_empty() {
+            omega
+        } else {
+            let springs = hybrid.particle_springs_n_per_m(&contact.nodal_stiffness_n_per_m);
+            // λ_max(s K + C) = s λ_max(K + C/s)
+            let springs: Vec<f64> = springs.iter().map(|k| k / stretch_sq).collect();
+            hybrid.frequency_rad_per_s(&springs, &mut building::touched(progress))
+        };
+        let omega_sq = stretch_sq * touched.max(omega).powi(2) + contact.tool_frequency_sq;
+        let coarse_omega = stretch_sq.sqrt() * hybrid.coarse_frequency_rad_per_s();
+        let steps = Steps::choose(&around.settings, &materials, omega_sq.sqrt())?.with_long_steps(
+            &around.settings,
+            &materials,
+            coarse_omega,
+        );
+        Ok((hybrid, Environment::new(around, surface, contact, steps)))
+    }
+}
+
+/// What a body with particles cannot have.
+fn demand(around: &EnvironmentSpec) -> Result<(), HybridError> {
+    let refused = |what, instead| Err(HybridError::NotForParticles { what, instead });
+    if around.settings.integrator != Integrator::Leapfrog {
+        return refused("this integrator", "take leapfrog");
+    }
+    if around.settings.sleep_tolerance_m > 0.0 {
+        return refused(
+            "a body that sleeps as a whole",
+            "leave sleep_tolerance at 0: its particles sleep where nothing touches them",
+        );
+    }
+    Ok(())
+}

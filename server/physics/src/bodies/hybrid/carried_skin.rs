@@ -1,0 +1,169 @@
+//! What carries the skin's vertices, and where each is when asked.
+use super::{body::HybridBody, clusters::Displaced, composite::Anchor, partition::NONE, running::RunningPatch};
+use crate::{contact::Skin, tick::CarriedSkin};
+use glam::DVec3;
+
+/// A vertex's rest position with what carries it.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Carried {
+    rest_m: DVec3,
+    carriers: [(Carrier, f64); 8],
+    /// How many of them have weight, the first ones.
+    weighty: usize,
+}
+
+impl Carried {
+    fn carriers(&self) -> &[(Carrier, f64)] {
+        &self.carriers[..self.weighty]
+    }
+}
+
+/// What carries a particle.
+#[derive(Debug, Clone, Copy)]
+enum Carrier {
+    /// A point of the patch, by its number.
+    Point(u32),
+    /// The coarse nodes alone.
+    Nodes(Anchor),
+}
+
+/// Where the skin is, for a query of contact.
+pub(crate) struct SkinView<'a> {
+    hybrid: &'a HybridBody,
+    patch: &'a RunningPatch,
+    /// Velocities (m/s) of coarse nodes and then active particles; none where nobody asks for a vertex's.
+    v: &'a [DVec3],
+    deviation_m: f64,
+}
+
+impl<'a> SkinView<'a> {
+    /// At where the patch was displaced to.
+    pub(crate) fn new(hybrid: &'a HybridBody, patch: &'a RunningPatch) -> Self {
+        Self { hybrid, patch, v: &[], deviation_m: 0.0 }
+    }
+
+    /// The same, with velocities (m/s) of coarse nodes and then active particles.
+    pub(crate) fn moving(self, v: &'a [DVec3]) -> Self {
+        Self { v, ..self }
+    }
+
+    fn displaced(&self, by_particles: bool) -> Displaced<'_> {
+        Displaced {
+            displacements_m: self.patch.node_displacements_m(),
+            deviation_m: if by_particles { self.deviation_m } else { 0.0 },
+            amplification: self.hybrid.amplification,
+        }
+    }
+}
+
+impl Skin for SkinView<'_> {
+    /// Takes how far the active particles are from where they would be asleep.
+    fn begin(&mut self) {
+        self.deviation_m = self.patch.deviation_m();
+    }
+
+    fn clusters(&self) -> usize {
+        self.hybrid.clusters.clusters()
+    }
+
+    fn vertices(&self, cluster: usize) -> &[u32] {
+        self.hybrid.clusters.vertices(cluster)
+    }
+
+    fn group_distance_m(&self, group: usize, from_m: DVec3) -> f64 {
+        self.hybrid.clusters.group_distance_m(group, from_m, &self.displaced(self.patch.carries_of_group(group)))
+    }
+
+    fn cluster_distance_m(&self, cluster: usize, from_m: DVec3) -> f64 {
+        let displaced = self.displaced(self.patch.carries_of_cluster(cluster));
+        self.hybrid.clusters.cluster_distance_m(cluster, from_m, &displaced)
+    }
+
+    fn position_m(&self, vertex: u32) -> DVec3 {
+        let place = self.hybrid.places[vertex as usize];
+        let partition = &self.hybrid.partition;
+        let of = |particle: u32| match self.patch.point_of(particle) {
+            NONE => partition.anchor(particle).of(self.patch.node_displacements_m()),
+            point => self.patch.displacements_m()[point as usize],
+        };
+        let particles = partition.corners(place.cell as usize);
+        let moved: DVec3 = particles.into_iter().zip(place.weights(partition)).map(|(p, w)| of(p) * w).sum();
+        self.hybrid.skin_rest_m()[vertex as usize] + moved
+    }
+}
+
+impl CarriedSkin for SkinView<'_> {
+    type Carriers = Carried;
+
+    fn layout(&self) -> u64 {
+        self.patch.number()
+    }
+
+    fn carriers(&self, vertex: u32) -> Carried {
+        let hybrid = self.hybrid;
+        let place = hybrid.places[vertex as usize];
+        let rest_m = hybrid.skin_rest_m()[vertex as usize];
+        let mut carried = Carried { rest_m, carriers: [(Carrier::Point(NONE), 0.0); 8], weighty: 0 };
+        let particles = hybrid.partition.corners(place.cell as usize);
+        for (particle, weight) in particles.into_iter().zip(place.weights(&hybrid.partition)) {
+            if weight != 0.0 {
+                let carrier = match self.patch.point_of(particle) {
+                    NONE => Carrier::Nodes(hybrid.partition.anchor(particle)),
+                    point => Carrier::Point(point),
+                };
+                carried.carriers[carried.weighty] = (carrier, weight);
+                carried.weighty += 1;
+            }
+        }
+        carried
+    }
+
+    fn carried_m(&self, carried: &Carried) -> DVec3 {
+        let of = |carrier: &Carrier| match carrier {
+            Carrier::Point(point) => self.patch.displacements_m()[*point as usize],
+            Carrier::Nodes(anchor) => anchor.of(self.patch.node_displacements_m()),
+        };
+        let moved: DVec3 = carried.carriers().iter().map(|(carrier, weight)| of(carrier) * *weight).sum();
+        carried.rest_m + moved
+    }
+
+    fn velocity_m_per_s(&self, vertex: u32) -> DVec3 {
+        let hybrid = self.hybrid;
+        let place = hybrid.places[vertex as usize];
+        let of = |particle: u32| match self.patch.number_of(particle) {
+            NONE => hybrid.partition.anchor(particle).of(self.v),
+            number => self.v[hybrid.node_count() + number as usize],
+        };
+        let particles = hybrid.partition.corners(place.cell as usize);
+        let weighty = particles.into_iter().zip(place.weights(&hybrid.partition)).filter(|(_, weight)| *weight != 0.0);
+        weighty.map(|(particle, weight)| of(particle) * weight).sum()
+    }
+
+    fn push(&self, carried: &Carried, force_n: DVec3, forces_n: &mut [DVec3]) {
+        for (carrier, weight) in carried.carriers() {
+            match carrier {
+                Carrier::Nodes(anchor) => anchor.push(force_n * *weight, forces_n),
+                Carrier::Point(point) => {
+                    self.patch.push(*point, force_n * *weight, self.hybrid.node_count(), forces_n);
+                }
+            }
+        }
+    }
+}
+
+impl HybridBody {
+    /// Where a vertex of the skin is (m), at positions `x` (m) of coarse nodes and then of the active particles `active`.
+    pub fn vertex_m(&self, vertex: u32, active: &[u32], x: &[DVec3]) -> DVec3 {
+        let (of_nodes, of_particles) = x.split_at(self.node_count());
+        let moved = |particle: u32| {
+            let x = match active.binary_search(&particle) {
+                Ok(number) => of_particles[number],
+                Err(_) => self.partition.anchor(particle).of(of_nodes),
+            };
+            x - self.partition.particle_m(particle)
+        };
+        let place = self.places[vertex as usize].place(&self.partition);
+        let rest_m = self.skin_rest_m()[vertex as usize];
+        rest_m + place.particles.into_iter().zip(place.weights).map(|(p, w)| moved(p) * w).sum::<DVec3>()
+    }
+}

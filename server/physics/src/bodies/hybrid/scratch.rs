@@ -1,0 +1,91 @@
+//! What a hybrid body's ticks work in.
+use super::{
+    balance::Balance,
+    body::HybridBody,
+    carried_skin::Carried,
+    coming::Coming,
+    fade::Fading,
+    handover::Before,
+    long_steps::LongStepHistory,
+    running::RunningPatch,
+    state::{HybridState, room_for_cells},
+    switching::Looking,
+};
+use crate::tick::{Environment, ListedVertices};
+use glam::DVec3;
+
+/// Buffers for hybrid bodies.
+#[derive(Debug, Clone)]
+pub(crate) struct HybridScratch {
+    pub(crate) patch: RunningPatch,
+    pub(crate) skin: ListedVertices<Carried>,
+    pub(crate) accelerations: Vec<DVec3>,
+    pub(crate) momenta: Vec<DVec3>,
+    /// `v_f·M'_ff v_f` and `v_h·M'_hf v_f` (J) since the last kick of this tick.
+    pub(crate) of_free_j: Option<(f64, f64)>,
+    /// `fᵀ M'⁻¹ f` (N²/kg) at the last three kicks, the last one first.
+    pub(crate) kick_sq: [f64; 3],
+    pub(super) looking: Looking,
+    pub(super) coming: Coming,
+    pub(super) before: Before,
+    pub(crate) balance: Balance,
+    pub(super) long_steps: LongStepHistory,
+}
+
+impl HybridScratch {
+    /// For a body in its environment.
+    pub(crate) fn new(body: &HybridBody, environment: &Environment) -> Self {
+        let (most, positions) = (body.particles.most_active, body.most_positions());
+        let patch = || RunningPatch::new(body, most, environment.settings.precision);
+        let (mut patch, coming) = (patch(), Coming::new(patch()));
+        patch.wake(body, &[], &Fading::default());
+        Self {
+            coming,
+            patch,
+            skin: ListedVertices::new(body.places.len()),
+            accelerations: Vec::with_capacity(positions),
+            momenta: Vec::with_capacity(positions),
+            of_free_j: None,
+            kick_sq: [0.0; 3],
+            looking: Looking::new(body, &environment.tools),
+            before: Before::with_room(
+                room_for_cells(body, body.particles.most_active),
+                body.partition().shares().len(),
+            ),
+            balance: Balance::with_room(positions),
+            long_steps: LongStepHistory::with_room(body.node_count(), positions),
+        }
+    }
+
+    /// `aᵀ M'⁻¹ a` of forces (N²/kg) on free axes.
+    pub(crate) fn size_sq(&mut self, forces_n: impl Iterator<Item = DVec3>) -> f64 {
+        self.accelerations.clear();
+        self.accelerations.extend(forces_n);
+        self.patch.metric_mut().accelerate(&mut self.accelerations)
+    }
+
+    /// `vᵀ M' v` (J) of velocities, or of displacements (kg m²).
+    pub(crate) fn twice_kinetic(&mut self, body: &HybridBody, v: impl Iterator<Item = DVec3>) -> f64 {
+        let Self { patch, accelerations, momenta, .. } = self;
+        accelerations.clear();
+        accelerations.extend(v);
+        momenta.clear();
+        momenta.resize(accelerations.len(), DVec3::ZERO);
+        patch.metric_mut().momenta(body, accelerations, momenta);
+        momenta.iter().zip(accelerations.iter()).map(|(p, v)| p.dot(*v)).sum()
+    }
+
+    /// `(1 − ε) m_p` (kg) of the active particles.
+    pub(crate) fn particle_kg(&self) -> &[f64] {
+        self.patch.metric().particle_kg()
+    }
+
+    /// Makes the patch that of the state's active particles. Allocates nothing.
+    pub(super) fn follow(&mut self, body: &HybridBody, active: &HybridState) {
+        if self.patch.active() != active.ids() {
+            self.patch.wake(body, active.ids(), &active.fading);
+        } else if !self.patch.knows(&active.fading) {
+            self.patch.put_fades(&active.fading);
+        }
+    }
+}

@@ -1,0 +1,182 @@
+//! What a tick changes of a hybrid body beside positions and velocities: which particles are active, and what of them still fades.
+use super::{body::HybridBody, fade::Fading, long_steps::LongSteps, spec::Waking, switching::Ball};
+use crate::{contact::ToolSpec, tick::MechanicalState};
+use glam::DVec3;
+use serde::{Deserialize, Serialize};
+
+/// Active particles, and what of them still fades. Their positions and velocities follow those of the coarse nodes in
+/// [`MechanicalState::x`] and [`MechanicalState::v`].
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+pub struct HybridState {
+    /// Active particles, ascending.
+    ids: Vec<u32>,
+    /// Those to be: others while a switch is coming.
+    pub(super) next: Vec<u32>,
+    /// Those to be after that: what is to sleep does so first, what is to wake follows.
+    pub(super) wanted: Vec<u32>,
+    /// Of every place of every tool.
+    pub(super) balls: Vec<Option<Ball>>,
+    pub(crate) fading: Fading,
+    /// Balancing forces (N), as many as positions, or none.
+    pub(super) balance_n: Vec<DVec3>,
+    /// Energy (J) that fading strains and balancing forces gave lately, beyond what they and switches took.
+    pub(crate) given_j: f64,
+    /// Elastic energy (J) of what a switch lately changed, the most of any.
+    pub(super) switched_j: f64,
+    pub(crate) long_steps: LongSteps,
+}
+
+impl HybridState {
+    /// All particles sleep.
+    pub(crate) fn at_rest(body: &HybridBody, tools: &[ToolSpec]) -> Self {
+        let (most, positions) = (body.particles.most_active, body.most_positions());
+        Self {
+            ids: Vec::with_capacity(most),
+            next: Vec::with_capacity(most),
+            wanted: Vec::with_capacity(most),
+            balls: vec![None; places(body, tools).sum()],
+            fading: Fading::with_room(room_for_cells(body, body.particles.most_active), body.partition.shares().len()),
+            balance_n: Vec::with_capacity(positions),
+            given_j: 0.0,
+            switched_j: 0.0,
+            long_steps: LongSteps::with_room(body.node_count(), positions),
+        }
+    }
+
+    /// Their numbers.
+    pub fn ids(&self) -> &[u32] {
+        &self.ids
+    }
+
+    /// What of them and of the coarse tets woke or fell asleep strained.
+    pub fn fading(&self) -> &Fading {
+        &self.fading
+    }
+
+    /// How many.
+    pub fn len(&self) -> usize {
+        self.ids.len()
+    }
+
+    /// Takes what is wanted: at first those of it that are awake, where others are, too.
+    pub(super) fn want(&mut self, wanted: &[u32]) {
+        self.wanted.clear();
+        self.wanted.extend_from_slice(wanted);
+        let Self { ids, next, wanted, .. } = self;
+        let is_wanted = |id: &&u32| wanted.binary_search(id).is_ok();
+        next.clear();
+        if ids.iter().all(|id| is_wanted(&id)) {
+            next.extend_from_slice(wanted);
+        } else {
+            next.extend(ids.iter().filter(is_wanted));
+        }
+    }
+
+    pub(super) fn is_switching(&self) -> bool {
+        self.next != self.ids
+    }
+
+    /// Whether all sleep.
+    pub fn is_empty(&self) -> bool {
+        self.ids.is_empty()
+    }
+
+    /// Whether an active particle is at a cell.
+    fn touches(&self, body: &HybridBody, cell: u32) -> bool {
+        let is_active = |particle: &u32| self.ids.binary_search(particle).is_ok();
+        (cell as usize) < body.partition.cells().len() && body.partition.corners(cell as usize).iter().any(is_active)
+    }
+
+    /// All particles sleep, in the buffers there are.
+    pub(crate) fn clear(&mut self) {
+        self.ids.clear();
+        self.next.clear();
+        self.wanted.clear();
+        self.balls.fill(None);
+        self.fading.clear();
+        self.balance_n.clear();
+        self.given_j = 0.0;
+        self.switched_j = 0.0;
+        self.long_steps.forget();
+    }
+
+    pub(crate) fn copy_from(&mut self, other: &Self) {
+        self.ids.clone_from(&other.ids);
+        self.next.clone_from(&other.next);
+        self.wanted.clone_from(&other.wanted);
+        self.balls.clone_from(&other.balls);
+        self.fading.copy_from(&other.fading);
+        self.balance_n.clone_from(&other.balance_n);
+        self.given_j = other.given_j;
+        self.switched_j = other.switched_j;
+        self.long_steps.copy_from(&other.long_steps);
+    }
+
+    /// Whether they are ascending, may be awake, and have room.
+    pub(crate) fn fits(&self, body: &HybridBody, tools: &[ToolSpec]) -> bool {
+        let (nodes, positions) = (body.node_count(), body.node_count() + self.ids.len());
+        let may_wake = |id: &u32| body.may_wake(*id);
+        let finite = |ball: &Ball| ball.rest_m.is_finite();
+        self.balls.len() == places(body, tools).sum::<usize>()
+            && self.balls.iter().flatten().all(finite)
+            && self.fading.is_finite()
+            && [0, positions].contains(&self.balance_n.len())
+            && self.balance_n.iter().all(|force| force.is_finite())
+            && self.given_j.is_finite()
+            && self.switched_j.is_finite()
+            && self.long_steps.fit(nodes, positions)
+            && self.fading.is_sorted()
+            && self.fading.cells.iter().all(|fade| self.touches(body, fade.cell))
+            && self.fading.tets.iter().all(|fade| (fade.tet as usize) < body.coarse().tets().len())
+            && [&self.ids, &self.next, &self.wanted].into_iter().all(|list| {
+                list.len() <= body.particles.most_active && list.is_sorted_by(|a, b| a < b) && list.iter().all(may_wake)
+            })
+    }
+
+    /// Goes over to these particles, which have room and may wake, of a body at rest.
+    pub(crate) fn wake_at_rest(&mut self, ids: &[u32], state: &mut MechanicalState) {
+        self.ids.clear();
+        self.ids.extend_from_slice(ids);
+        self.next.clone_from(&self.ids);
+        self.wanted.clone_from(&self.ids);
+        for list in [&mut state.x, &mut state.v, &mut state.force_n, &mut state.external_n] {
+            list.resize(list.len() + ids.len(), DVec3::ZERO);
+        }
+    }
+
+    /// Goes over to the particles that are to be active next. `moved` is a buffer. Allocates nothing where there is room.
+    pub(super) fn switch(&mut self, body: &HybridBody, state: &mut MechanicalState, moved: &mut Vec<DVec3>) {
+        let nodes = body.node_count();
+        for list in [&mut state.x, &mut state.v] {
+            moved.clear();
+            let (of_nodes, of_particles) = list.split_at(nodes);
+            moved.extend(self.next.iter().map(|id| match self.ids.binary_search(id) {
+                Ok(number) => of_particles[number],
+                Err(_) => body.partition().anchor(*id).of(of_nodes),
+            }));
+            list.truncate(nodes);
+            list.extend_from_slice(moved);
+        }
+        for list in [&mut state.force_n, &mut state.external_n] {
+            list.resize(nodes + self.next.len(), DVec3::ZERO);
+        }
+        self.ids.clone_from(&self.next);
+        self.balance_n.clear();
+        self.long_steps.forget();
+        state.force_is_current = false;
+    }
+}
+
+/// Most awake cells of a body while no more particles are active than these.
+pub(super) fn room_for_cells(body: &HybridBody, most_active: usize) -> usize {
+    (body.partition().most_cells_at() * most_active).min(body.partition().cells().len())
+}
+
+/// Places of each tool that may keep particles awake: so near to one another that the balls about them overlap.
+pub(super) fn places(body: &HybridBody, tools: &[ToolSpec]) -> impl Iterator<Item = usize> + Clone {
+    let apart_m = match body.particles.waking {
+        Waking::ByTools { reach_m } => reach_m,
+        Waking::ByHand => f64::INFINITY,
+    };
+    tools.iter().map(move |tool| tool.place_count(apart_m))
+}

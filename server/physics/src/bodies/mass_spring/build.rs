@@ -1,0 +1,80 @@
+//! From a specification to a mass-spring surface in its environment.
+use super::{MassSpringBody, MassSpringError, MassSpringSpec};
+use crate::{
+    contact::ContactModel,
+    settings::Integrator,
+    tick::{Environment, EnvironmentError, EnvironmentSpec, Steps, free_inverse_mass},
+};
+use glam::DVec3;
+
+impl MassSpringBody {
+    /// Checks, builds, and chooses the substeps.
+    ///
+    /// # Errors
+    /// [`MassSpringError`]; nothing is repaired silently.
+    pub(crate) fn build(
+        mut spec: MassSpringSpec,
+        around: EnvironmentSpec,
+    ) -> Result<(Self, Environment), MassSpringError> {
+        demand(&around)?;
+        let vertices = spec.springs.surface.positions_m().len();
+        spec.springs.held = held(&around, vertices)?;
+        let mut body = Self::of(spec, &around.tools)?;
+        demand_all_awake(&around, &body)?;
+        let (surface, rest_m) = (body.skin(), body.model().rest_m());
+        around.check(&surface, rest_m, vertices)?;
+        let omega = body.model().frequency_rad_per_s();
+        let contact =
+            ContactModel::build(rest_m, &surface, &body.moduli(), &body.contact_mass_kg(), omega, &around.tools);
+        body.cluster(contact.triangles());
+        let omega_sq = body.model().touched_frequency_sq(&contact.nodal_stiffness_n_per_m) + contact.tool_frequency_sq;
+        let steps = Steps::choose(&around.settings, &[], omega_sq.sqrt())?;
+        free_inverse_mass(&body.model().spec().mass_kg, &around.prescribed)?;
+        Ok((body, Environment::new(around, surface, contact, steps)))
+    }
+}
+
+fn refused(what: &'static str, instead: &'static str) -> MassSpringError {
+    MassSpringError::NotForSprings { what, instead }
+}
+
+/// What a mass-spring surface cannot have.
+fn demand(around: &EnvironmentSpec) -> Result<(), MassSpringError> {
+    let settings = &around.settings;
+    let demands = [
+        (around.prescribed.iter().all(|set| set.axes == [true; 3]), "vertices held along some axes", "hold all three"),
+        (settings.integrator == Integrator::Leapfrog, "this integrator", "take leapfrog"),
+        (
+            settings.sleep_tolerance_m == 0.0,
+            "a body that sleeps as a whole",
+            "leave sleep_tolerance at 0: its vertices sleep where nothing touches them, if fewer may be awake than it has",
+        ),
+    ];
+    match demands.into_iter().find(|(kept, ..)| !kept) {
+        Some((_, what, instead)) => Err(refused(what, instead)),
+        None => Ok(()),
+    }
+}
+
+/// All that is prescribed, of so many vertices.
+fn held(around: &EnvironmentSpec, vertices: usize) -> Result<Vec<u32>, EnvironmentError> {
+    let mut held: Vec<u32> = around.prescribed.iter().flat_map(|set| set.nodes.iter().copied()).collect();
+    held.sort_unstable();
+    held.dedup();
+    match held.last().filter(|last| **last as usize >= vertices) {
+        Some(&last) => Err(EnvironmentError::OutOfRange { what: "node", index: last as usize, count: vertices }),
+        None => Ok(held),
+    }
+}
+
+/// Gravity and loads act on what would sleep.
+fn demand_all_awake(around: &EnvironmentSpec, body: &MassSpringBody) -> Result<(), MassSpringError> {
+    if body.is_all_awake() {
+        return Ok(());
+    }
+    let all = "let all of its vertices be awake, or leave it out";
+    if around.gravity_m_per_s2 != DVec3::ZERO {
+        return Err(refused("gravity, which moves vertices that sleep", all));
+    }
+    if around.loads.is_empty() { Ok(()) } else { Err(refused("loads, which move vertices that sleep", all)) }
+}

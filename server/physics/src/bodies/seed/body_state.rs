@@ -1,0 +1,70 @@
+//! What a tick changes of a seed body beside what every body has.
+use super::{SeedModel, SeedState, region::Region, state::Motion};
+use glam::DVec3;
+use serde::{Deserialize, Serialize};
+
+/// What a tick changes of a seed body beside what every body has.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct SeedBodyState {
+    /// What the model's steps change.
+    pub now: SeedState,
+    /// Triangle of the surface that tools touch, for the next step.
+    pub touched: Option<u32>,
+    /// Particles that are awake.
+    pub awake: u32,
+}
+
+impl SeedBodyState {
+    /// At rest.
+    pub(crate) fn at_rest(model: &SeedModel) -> Self {
+        Self { now: SeedState::at_rest(model), touched: None, awake: 0 }
+    }
+
+    /// Back to rest, in the buffers it has.
+    pub(crate) fn reset(&mut self, model: &SeedModel) {
+        self.now.core.rest(model.core().rest_m());
+        self.now.skin.rest(model.surface_rest_m());
+        self.now.particles.rest(&[]);
+        (self.now.step, self.now.touched) = (0, None);
+        (self.touched, self.awake) = (None, 0);
+    }
+
+    /// Copies another of the same model. Allocates nothing.
+    pub(crate) fn copy_from(&mut self, other: &Self) {
+        let (own, from) = (&mut self.now, &other.now);
+        own.core.copy_from(&from.core);
+        own.skin.copy_from(&from.skin);
+        own.particles.copy_from(&from.particles);
+        (own.step, own.touched) = (from.step, from.touched);
+        (self.touched, self.awake) = (other.touched, other.awake);
+    }
+
+    /// Takes all speed from it.
+    pub(crate) fn stop(&mut self) {
+        for motion in [&mut self.now.core, &mut self.now.skin, &mut self.now.particles] {
+            motion.v.fill(DVec3::ZERO);
+        }
+    }
+
+    /// Whether awake particles are finite. Nodes are looked at with everybody's.
+    pub(crate) fn particles_are_finite(&self) -> bool {
+        self.now.particles.is_finite(self.awake as usize)
+    }
+
+    /// Whether it is one of a model's, and its nodes are at `x` with velocities `v`: for states that come from elsewhere.
+    pub(crate) fn fits(&self, model: &SeedModel, x: &[DVec3], v: &[DVec3]) -> bool {
+        let Self { now, touched, awake } = self;
+        let same = |nodes: &[DVec3], of: [&[DVec3]; 2]| nodes.iter().eq(of.into_iter().flatten());
+        now.fits(model)
+            && same(x, [&now.core.x, &now.skin.x])
+            && same(v, [&now.core.v, &now.skin.v])
+            && touched.is_none_or(|triangle| (triangle as usize) < model.surface_triangles().len())
+            && *awake as usize == model.awake(now).map_or(0, Region::len)
+    }
+
+    /// Every number of it.
+    pub(crate) fn vectors(&self) -> impl Iterator<Item = &DVec3> {
+        let SeedState { core, skin, particles, .. } = &self.now;
+        [core, skin, particles].into_iter().flat_map(|motion: &Motion| motion.x.iter().chain(&motion.v))
+    }
+}

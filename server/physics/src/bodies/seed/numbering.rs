@@ -1,0 +1,94 @@
+//! How the core and the skin of a seed body are numbered, weighed and touched in the loop.
+//!
+//! Nodes are the core's, and after them the skin's vertices. The skin carries the whole layer's mass, as it does while particles sleep.
+//!
+//! The papers displace what the user touches. Here tools press as on every body, with forces on vertices; they act on awake particles by
+//! eq. 25's weights (`seed::step`). Contact is explicit, so it must not be stiffer than the step can bear: [`SeedModel::contact_mass_kg`].
+use super::{SeedModel, SeedState, region::Region};
+use crate::mesh::Surface;
+use glam::DVec3;
+
+impl SeedModel {
+    /// Rest positions (m) of nodes.
+    pub fn node_rest_m(&self) -> Vec<DVec3> {
+        let skin: &[DVec3] = if self.layer().is_some() { self.surface_rest_m() } else { &[] };
+        self.core().rest_m().iter().chain(skin).copied().collect()
+    }
+
+    /// Mass (kg) of nodes: that of the whole body, its layer asleep.
+    pub fn node_mass_kg(&self) -> Vec<f64> {
+        let skin = self.links().map_or(&[][..], |links| &links.mass_kg);
+        self.core().mass_kg().iter().chain(skin).copied().collect()
+    }
+
+    /// The touchable surface over nodes.
+    pub fn node_surface(&self) -> Surface {
+        if self.layer().is_none() {
+            return self.core().boundary().clone();
+        }
+        let (first, count) = (self.core().rest_m().len() as u32, self.surface_rest_m().len() as u32);
+        Surface {
+            nodes: (first..first + count).collect(),
+            triangles: self.surface_triangles().to_vec(),
+            vertex_of_node: std::iter::repeat_n(u32::MAX, first as usize).chain(0..count).collect(),
+        }
+    }
+
+    /// Mass (kg) of nodes as contact may count on it: of the skin the least that its pressure ever meets.
+    ///
+    /// A pressure `k_f g` on vertices of areas `A_v` is stiffness `k_f A_v` there, and over awake particles, with eq. 25's weights, at most
+    /// `k_f Σ_v A_v w_vs` (row sum, `Σ_s w_vs = 1`) at particle s. So a vertex counts as `m_p A_v/max_s Σ_v A_v w_vs`, or its own mass if that is less.
+    pub fn contact_mass_kg(&self) -> Vec<f64> {
+        let mut mass_kg = self.node_mass_kg();
+        let Some(layer) = self.layer() else { return mass_kg };
+        let skin = &mut mass_kg[self.core().rest_m().len()..];
+        let area_m2 = self.vertex_areas_m2();
+        for region in self.regions() {
+            let mut pressed_m2 = vec![0.0; region.len()];
+            for rider in &region.riders {
+                for &(slot, weight) in region.terms_of(rider) {
+                    pressed_m2[slot as usize] += area_m2[rider.vertex as usize] * weight;
+                }
+            }
+            for rider in &region.riders {
+                let vertex = rider.vertex as usize;
+                let most_m2 = region.terms_of(rider).iter().map(|term| pressed_m2[term.0 as usize]).fold(0.0, f64::max);
+                skin[vertex] = skin[vertex].min(layer.mass_kg * area_m2[vertex] / most_m2);
+            }
+        }
+        mass_kg
+    }
+
+    /// The triangle whose touch wakes the most particles.
+    pub fn largest_region(&self) -> Option<u32> {
+        let sizes = self.regions().iter().map(Region::len).zip(0..);
+        sizes.max_by_key(|(size, _)| *size).map(|(_, triangle)| triangle)
+    }
+
+    /// A third (m²) of the triangles around each vertex of the surface.
+    fn vertex_areas_m2(&self) -> Vec<f64> {
+        let mut area_m2 = vec![0.0; self.surface_rest_m().len()];
+        for triangle in self.surface_triangles() {
+            let [a, b, c] = triangle.map(|vertex| self.surface_rest_m()[vertex as usize]);
+            for &vertex in triangle {
+                area_m2[vertex as usize] += (b - a).cross(c - a).length() / 6.0;
+            }
+        }
+        area_m2
+    }
+
+    /// Kinetic energy (J) of core, awake particles, and skin but for what rides on those.
+    pub fn kinetic_energy_j(&self, state: &SeedState) -> f64 {
+        let of = |mass_kg: &f64, v: &DVec3| 0.5 * mass_kg * v.length_squared();
+        let mut energy_j: f64 = self.core().mass_kg().iter().zip(&state.core.v).map(|(m, v)| of(m, v)).sum();
+        if let (Some(links), Some(layer)) = (self.links(), self.layer()) {
+            energy_j += links.mass_kg.iter().zip(&state.skin.v).map(|(m, v)| of(m, v)).sum::<f64>();
+            if let Some(region) = self.awake(state) {
+                let riders = region.riders.iter().map(|rider| rider.vertex as usize);
+                energy_j -= riders.map(|vertex| of(&links.mass_kg[vertex], &state.skin.v[vertex])).sum::<f64>();
+                energy_j += state.particles.v[..region.len()].iter().map(|v| of(&layer.mass_kg, v)).sum::<f64>();
+            }
+        }
+        energy_j
+    }
+}

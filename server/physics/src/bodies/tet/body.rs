@@ -1,0 +1,227 @@
+//! What the rest state of a body of tetrahedra fixes.
+use super::TetBodyError;
+use crate::{
+    contact::{ContactModel, SurfaceModuli, moduli},
+    elements::{
+        free_axes::FreeAxes,
+        linear_tet::RestTet,
+        mass,
+        rest_stiffness::{RestStiffness, max_natural_frequency_with},
+        rigid_motion::{FreePart, HeldNodes, first_free_part},
+        solid::Solid,
+    },
+    kernels::ForceKernel,
+    material::Material,
+    mesh::{Surface, TetMesh},
+    settings::Integrator,
+    tick::{
+        Energies, Environment, EnvironmentSpec, MechanicalState, PrescribedNodes, Steps, free_inverse_mass,
+        lumped::LumpedMass, progress as building, stiffening,
+    },
+};
+use glam::{BVec3, DVec2, DVec3};
+
+/// A body of linear tetrahedra. Constant after load.
+#[derive(Debug, Clone)]
+pub struct TetBody {
+    solid: Solid,
+    materials: Vec<Material>,
+    rest_tets: Vec<RestTet>,
+    mass_kg: Vec<f64>,
+    inverse_mass_per_kg: Vec<DVec3>,
+    kernel: ForceKernel,
+    max_natural_frequency_rad_per_s: f64,
+}
+
+impl TetBody {
+    /// Checks, precomputes, and chooses the substeps; `progress` is told the part done.
+    ///
+    /// # Errors
+    /// [`TetBodyError`]; nothing is repaired silently.
+    pub(crate) fn build(
+        solid: Solid,
+        spec: EnvironmentSpec,
+        progress: &mut dyn FnMut(f64),
+    ) -> Result<(Self, Environment), TetBodyError> {
+        let surface = Surface::of(&solid.mesh)?;
+        solid.check()?;
+        let nodes = solid.mesh.positions_m().len();
+        spec.check(&surface, solid.mesh.positions_m(), nodes)?;
+        let settings = &spec.settings;
+        let (materials, rest_tets) = (solid.materials(), solid.rest_tets());
+        let mass_kg = mass::lumped_kg(&solid.mesh, |tet| solid.region_of(tet).density_kg_per_m3);
+        let inverse_mass_per_kg = free_inverse_mass(&mass_kg, &spec.prescribed)?;
+        let kernel = ForceKernel::build(&solid.mesh, &rest_tets, &solid.tet_region, &materials, settings.precision);
+        let kernel = if settings.skips.viscous_terms { kernel } else { kernel.with_every_viscosity() };
+        let mut body = Self {
+            solid,
+            materials,
+            rest_tets,
+            mass_kg,
+            inverse_mass_per_kg,
+            kernel,
+            max_natural_frequency_rad_per_s: 0.0,
+        };
+        let at_rest = body.rest_stiffness();
+        let omega = max_natural_frequency_with(&at_rest, &body.inverse_mass_per_kg, &mut building::untouched(progress));
+        let contact = ContactModel::build(
+            body.rest_positions_m(),
+            &surface,
+            &body.moduli_of_triangles(&surface),
+            &body.mass_kg,
+            omega,
+            &spec.tools,
+        );
+        let stretch_sq = stiffening(settings, &body.materials);
+        // λ_max(s K + C) = s λ_max(K + C/s)
+        let springs: Vec<f64> = contact.nodal_stiffness_n_per_m.iter().map(|k| k / stretch_sq).collect();
+        let touched = if springs.is_empty() {
+            omega
+        } else {
+            let touched = RestStiffness { springs_n_per_m: &springs, ..at_rest };
+            max_natural_frequency_with(&touched, &body.inverse_mass_per_kg, &mut building::touched(progress))
+        };
+        let explicit_sq = match settings.integrator {
+            // The body and its contact are implicit; tools on couplings are not.
+            Integrator::BackwardEuler => 0.0,
+            _ => stretch_sq * touched.max(omega).powi(2),
+        };
+        let omega_sq = explicit_sq + contact.tool_frequency_sq;
+        let steps = Steps::choose(settings, &body.materials, omega_sq.sqrt())?;
+        body.max_natural_frequency_rad_per_s = omega;
+        let environment = Environment::new(spec, surface, contact, steps).with_inner_nodes(nodes);
+        Ok((body, environment))
+    }
+
+    /// Mesh, materials and densities.
+    pub fn solid(&self) -> &Solid {
+        &self.solid
+    }
+
+    /// Mesh at rest.
+    pub fn mesh(&self) -> &TetMesh {
+        &self.solid.mesh
+    }
+
+    /// Rest positions (m) of the nodes.
+    pub fn rest_positions_m(&self) -> &[DVec3] {
+        self.solid.mesh.positions_m()
+    }
+
+    /// Rest data of every tet.
+    pub fn rest_tets(&self) -> &[RestTet] {
+        &self.rest_tets
+    }
+
+    /// Material of a tet.
+    pub fn material_of(&self, tet: usize) -> &Material {
+        &self.materials[self.solid.tet_region[tet] as usize]
+    }
+
+    /// Materials, one per region.
+    pub fn materials(&self) -> &[Material] {
+        &self.materials
+    }
+
+    /// Lumped mass (kg) per node.
+    pub fn mass_kg(&self) -> &[f64] {
+        &self.mass_kg
+    }
+
+    /// `1/m` (1/kg) per node and axis, zero where prescribed.
+    pub fn inverse_mass_per_kg(&self) -> &[DVec3] {
+        &self.inverse_mass_per_kg
+    }
+
+    /// The force kernel.
+    pub fn kernel(&self) -> &ForceKernel {
+        &self.kernel
+    }
+
+    /// Largest natural frequency (rad/s) at rest.
+    pub fn max_natural_frequency_rad_per_s(&self) -> f64 {
+        self.max_natural_frequency_rad_per_s
+    }
+
+    /// `K` at rest.
+    pub(crate) fn rest_stiffness(&self) -> RestStiffness<'_> {
+        RestStiffness {
+            mesh: &self.solid.mesh,
+            rest_tets: &self.rest_tets,
+            tet_material: &self.solid.tet_region,
+            materials: &self.materials,
+            springs_n_per_m: &[],
+        }
+    }
+
+    /// Numbers of its free axes.
+    pub(crate) fn free_axes(&self) -> FreeAxes {
+        FreeAxes::numbered(self.free())
+    }
+
+    /// Axes along which nodes may move.
+    pub(crate) fn free(&self) -> impl Iterator<Item = BVec3> + '_ {
+        self.inverse_mass_per_kg.iter().map(|inverse_mass| inverse_mass.cmpne(DVec3::ZERO))
+    }
+
+    /// The first part of it that is not held.
+    pub(crate) fn first_free_part(&self) -> Option<FreePart> {
+        let nodes = HeldNodes {
+            rest_m: self.rest_positions_m(),
+            mass_kg: &self.mass_kg,
+            inverse_mass_per_kg: &self.inverse_mass_per_kg,
+        };
+        first_free_part(&nodes, self.mesh().tets().iter().map(|tet| &tet[..]))
+    }
+
+    /// Masses for kicks.
+    pub(crate) fn lumped_mass<'a>(&'a self, environment: &'a Environment) -> LumpedMass<'a> {
+        LumpedMass {
+            mass_kg: &self.mass_kg,
+            inverse_mass_per_kg: &self.inverse_mass_per_kg,
+            prescribed: &environment.prescribed,
+        }
+    }
+
+    /// What prescribed sets need.
+    pub(crate) fn prescribed_nodes(&self) -> PrescribedNodes<'_> {
+        PrescribedNodes { rest_m: self.rest_positions_m(), mass_kg: &self.mass_kg }
+    }
+
+    /// Kinetic, elastic and gravitational energy now (O(tets)), beside the ledger's work and dissipation.
+    pub(crate) fn energies(&self, gravity_m_per_s2: DVec3, state: &MechanicalState) -> Energies {
+        let MechanicalState { x, v, ledger, .. } = state;
+        let kinetic_j = (0..x.len()).map(|i| 0.5 * self.mass_kg[i] * v[i].length_squared()).sum();
+        let along_gravity = |i: usize| gravity_m_per_s2.dot(x[i] - self.rest_positions_m()[i]);
+        let fallen_j: f64 = (0..x.len()).map(|i| self.mass_kg[i] * along_gravity(i)).sum();
+        Energies {
+            kinetic_j,
+            elastic_j: self.elastic_energy_j(x),
+            gravitational_j: 0.0 - fallen_j,
+            external_work_j: ledger.external_work_j,
+            dissipated_j: ledger.dissipated_j,
+        }
+    }
+
+    /// `Σ V Ψ(F)` (J) at positions `x` (m).
+    pub(crate) fn elastic_energy_j(&self, x: &[DVec3]) -> f64 {
+        (0..self.mesh().tets().len())
+            .map(|tet| {
+                let corners = self.mesh().tets()[tet].map(|n| x[n as usize]);
+                self.rest_tets[tet].energy_j(self.material_of(tet), &corners)
+            })
+            .sum()
+    }
+
+    /// Mean over a triangle's corners of the stiffest tet at each.
+    fn moduli_of_triangles(&self, surface: &Surface) -> Vec<SurfaceModuli> {
+        let mut of_node = vec![DVec2::ZERO; self.rest_positions_m().len()];
+        for (tet, nodes) in self.mesh().tets().iter().enumerate() {
+            let moduli = moduli::moduli_pa(self.material_of(tet));
+            for &node in nodes {
+                of_node[node as usize] = of_node[node as usize].max(moduli);
+            }
+        }
+        moduli::mean_over_corners(&of_node, surface)
+    }
+}

@@ -1,0 +1,12 @@
+//! A body of linear tetrahedra throughout.
+mod body;
+mod error;
+mod judged;
+mod modes;
+mod stepped;
+pub(crate) mod stiffness;
+
+pub use body::TetBody;
+pub use error::TetBodyError;
+pub use modes::{Mode, ModesError, natural_modes};
+pub(crate) use stepped::{SteppedTet, TetScratch};

@@ -1,0 +1,26 @@
+//! What every kind of body shares in a tick: what surrounds it, what goes in, the state that is there whatever the kind, and the
+//! operations on lumped masses.
+mod constraints;
+mod environment;
+mod error;
+mod evaluation;
+mod inputs;
+mod judged;
+mod ledger;
+pub(crate) mod lumped;
+pub(crate) mod progress;
+mod skin;
+mod state;
+mod substeps;
+
+pub(crate) use constraints::free_inverse_mass;
+pub use environment::{Environment, EnvironmentSpec};
+pub use error::EnvironmentError;
+pub(crate) use evaluation::{Evaluation, LoadRamp, Tick, touch_nodes};
+pub use inputs::{PointForce, TickInput};
+pub(crate) use inputs::{PrescribedNodes, take_prescribed, take_tools};
+pub(crate) use judged::{Judged, StepEvidence, StepForcesNow};
+pub use ledger::{Energies, Ledger, ViscousPower};
+pub(crate) use skin::{CarriedSkin, ListedVertices, Touch, touch_skin};
+pub use state::MechanicalState;
+pub(crate) use substeps::{Steps, relaxation_time_s, stiffening};

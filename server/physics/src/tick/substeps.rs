@@ -1,0 +1,83 @@
+//! How many substeps a tick needs.
+use super::EnvironmentError;
+use crate::{
+    material::Material,
+    settings::{MAX_SUBSTEPS, Settings, Substeps},
+};
+
+/// Part of its stable step that a hybrid body's coarse level takes: below what ticks are judged unstable by (`integrate::stability`).
+const LONG_STEP_SHARE: f64 = 0.85;
+
+/// How much the square of a frequency grows at the allowed stretch: the worst of the laws ([`Material::stiffening`]).
+pub(crate) fn stiffening(settings: &Settings, materials: &[Material]) -> f64 {
+    materials.iter().map(|material| material.stiffening(settings.stretch_allowance)).fold(1.0, f64::max)
+}
+
+/// Substeps per tick.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct Steps {
+    /// Substeps per tick.
+    pub(crate) substeps: u32,
+    /// How many of them make a long step of a coarse level; 1 where there is none.
+    pub(crate) substeps_per_long_step: u32,
+}
+
+impl Steps {
+    /// Substeps for a stable leapfrog: `dt = safety · (2/ω)(√(1 + ξ²) − ξ)`.
+    ///
+    /// ω is the largest frequency of the body stretched by s and touched everywhere, `ω² = λ_max(M^{-½} (χK + K_contact) M^{-½})` with
+    /// the laws' stiffening χ. ξ is the damping ratio at ω: viscous stress grows with s⁴ (`P_v = F S_v`, `Ė = sym(Ḟᵀ F)`), so
+    /// `ξ = ½ ω τ s⁴/χ`, with τ the largest ratio of viscosity to stiffness over P-waves, shear and bulk:
+    /// `(φ + 2ψ)/(λ + 2µ)`, `ψ/µ`, `(φ + ⅔ψ)/(λ + ⅔µ)`.
+    ///
+    /// # Errors
+    /// More than [`MAX_SUBSTEPS`].
+    pub(crate) fn choose(settings: &Settings, materials: &[Material], omega: f64) -> Result<Self, EnvironmentError> {
+        let all_short = |substeps| Self { substeps, substeps_per_long_step: 1 };
+        if let Substeps::Fixed(substeps) = settings.substeps {
+            return Ok(all_short(substeps));
+        }
+        let substeps = wanted(settings, materials, omega);
+        if substeps <= f64::from(MAX_SUBSTEPS) {
+            Ok(all_short(substeps as u32))
+        } else {
+            Err(EnvironmentError::TooStiff { substeps, omega_rad_per_s: omega, limit: MAX_SUBSTEPS })
+        }
+    }
+
+    /// The same for a body whose coarse level, whose largest frequency is `omega` (rad/s) when stretched, may take longer steps.
+    #[must_use]
+    pub(crate) fn with_long_steps(self, settings: &Settings, materials: &[Material], omega: f64) -> Self {
+        let least = wanted(settings, materials, omega / LONG_STEP_SHARE);
+        if !settings.long_coarse_steps || least >= f64::from(self.substeps) {
+            return self;
+        }
+        let least = least as u32;
+        match settings.substeps {
+            Substeps::Measured => {
+                let every = self.substeps.div_ceil(least);
+                Self { substeps: every * least, substeps_per_long_step: every }
+            }
+            Substeps::Fixed(substeps) => {
+                let long_steps = (least..=substeps).find(|long_steps| substeps.is_multiple_of(*long_steps));
+                Self { substeps, substeps_per_long_step: substeps / long_steps.unwrap_or(substeps) }
+            }
+        }
+    }
+}
+
+fn wanted(settings: &Settings, materials: &[Material], omega: f64) -> f64 {
+    let viscous_growth = settings.stretch_allowance.powi(4) / stiffening(settings, materials);
+    let xi = 0.5 * omega * viscous_growth * materials.iter().map(relaxation_time_s).fold(0.0, f64::max);
+    let dt_s = settings.step_safety * 2.0 / omega * ((1.0 + xi * xi).sqrt() - xi);
+    (settings.tick_period_s / dt_s).ceil().max(1.0)
+}
+
+/// Largest ratio of viscosity to stiffness (s) over P-waves, shear and bulk.
+pub(crate) fn relaxation_time_s(material: &Material) -> f64 {
+    let (lame, viscosity) = (material.lame, material.viscosity);
+    let ratio = |lambdas: f64, mus: f64| {
+        (lambdas * viscosity.phi_pa_s + mus * viscosity.psi_pa_s) / (lambdas * lame.lambda_pa + mus * lame.mu_pa)
+    };
+    ratio(1.0, 2.0).max(ratio(0.0, 1.0)).max(ratio(1.0, 2.0 / 3.0))
+}

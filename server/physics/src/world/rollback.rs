@@ -1,0 +1,73 @@
+//! What a tick that is refused or repeated goes back to.
+use super::{Model, State};
+use crate::{
+    contact::{ContactState, ToolState},
+    integrate::StartOfTick,
+    tick::{Ledger, MechanicalState, ViscousPower},
+};
+use glam::DVec3;
+
+/// The state to go back to.
+#[derive(Debug, Clone)]
+pub(super) struct LastGood {
+    x: Vec<DVec3>,
+    v: Vec<DVec3>,
+    force_is_current: bool,
+    contact: ContactState,
+    tools: Vec<ToolState>,
+    load_factors: Vec<f64>,
+    ledger: Ledger,
+    viscous: ViscousPower,
+}
+
+impl LastGood {
+    pub(super) fn new(model: &Model) -> Self {
+        let State { mechanical, .. } = State::at_rest(model);
+        let MechanicalState { x, v, force_is_current, contact, tools, load_factors, ledger, viscous, .. } = mechanical;
+        Self { x, v, force_is_current, contact, tools, load_factors, ledger, viscous }
+    }
+
+    /// Copies what quarantine goes back to. Allocates nothing.
+    pub(super) fn keep(&mut self, state: &MechanicalState) {
+        self.x.clone_from(&state.x);
+        self.tools.clone_from_slice(&state.tools);
+        self.load_factors.copy_from_slice(&state.load_factors);
+        (self.ledger, self.viscous) = (state.ledger, state.viscous);
+    }
+
+    /// Copies the rest of what a tick of leapfrog changes, but its forces, so that it can be repeated. Allocates nothing.
+    pub(super) fn keep_for_repetition(&mut self, state: &MechanicalState) {
+        self.v.clone_from(&state.v);
+        self.force_is_current = state.force_is_current;
+        self.contact.keep_memory_of(&state.contact);
+    }
+
+    /// Copies the tools only. Allocates nothing.
+    pub(super) fn keep_tools(&mut self, state: &MechanicalState) {
+        self.tools.clone_from_slice(&state.tools);
+    }
+
+    pub(super) fn put_tools_back(&self, state: &mut MechanicalState) {
+        state.tools.clone_from_slice(&self.tools);
+    }
+
+    /// Positions, and velocities where kept for repetition.
+    pub(super) fn start_of_tick(&self) -> StartOfTick<'_> {
+        StartOfTick { x: &self.x, v: &self.v }
+    }
+
+    /// Everything of [`Self::keep`] and [`Self::keep_for_repetition`].
+    pub(super) fn put_all_back(&self, state: &mut MechanicalState) {
+        self.put_back(state);
+        state.v.copy_from_slice(&self.v);
+        state.force_is_current = self.force_is_current;
+        state.contact.copy_from(&self.contact);
+    }
+
+    pub(super) fn put_back(&self, state: &mut MechanicalState) {
+        state.x.copy_from_slice(&self.x);
+        state.tools.clone_from_slice(&self.tools);
+        state.load_factors.copy_from_slice(&self.load_factors);
+        (state.ledger, state.viscous) = (self.ledger, self.viscous);
+    }
+}

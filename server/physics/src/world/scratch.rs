@@ -1,0 +1,50 @@
+//! The buffers that a tick works in.
+use super::{Model, rollback::LastGood};
+use crate::{bodies::BodyScratch, contact::ContactScratch, integrate::ForceHistory};
+use glam::DVec3;
+
+/// Buffers of [`crate::step`], sized once.
+#[derive(Debug, Clone)]
+pub struct Scratch {
+    /// Reaction forces (N) of constrained axes at the end of the tick.
+    pub(super) reaction_n: Vec<DVec3>,
+    pub(super) last_good: LastGood,
+    pub(super) history: ForceHistory,
+    pub(super) contact: ContactScratch,
+    pub(super) body: BodyScratch,
+}
+
+impl Scratch {
+    /// Buffers for a model.
+    pub fn new(model: &Model) -> Self {
+        let (environment, body) = (model.environment(), model.body());
+        let nodes = body.rest_positions_m().len();
+        Self {
+            reaction_n: vec![DVec3::ZERO; nodes],
+            last_good: LastGood::new(model),
+            history: if model.is_judged() {
+                ForceHistory::new(nodes, body.most_positions())
+            } else {
+                ForceHistory::default()
+            },
+            contact: environment.contact.scratch(environment.settings.skips.distant_contact),
+            body: BodyScratch::new(body, environment),
+        }
+    }
+
+    /// Products with the matrix of implicit schemes since this scratch was made: the solver's iterations.
+    pub fn solver_products(&self) -> u64 {
+        self.body.solver_products()
+    }
+
+    /// Force (N) that holds each prescribed degree of freedom, at the end of the last tick; zero on free ones.
+    pub fn reactions_n(&self) -> &[DVec3] {
+        &self.reaction_n
+    }
+
+    /// Takes the reactions of another scratch of the same model, without allocating: with a copy of the state, all that
+    /// probes need.
+    pub fn copy_reactions_from(&mut self, other: &Self) {
+        self.reaction_n.clone_from(&other.reaction_n);
+    }
+}
