@@ -10,7 +10,7 @@ use crate::{
     },
     stream::hub::Hub,
 };
-use palpate_physics::{Model, ModelError, Scratch, State, TickInput, bodies::hybrid::wake_only, step};
+use palpate_physics::{Model, ModelError, Scratch, State, TickInput, step, world::wake_only};
 use palpate_proto::v1;
 use palpate_scene::{Driver, Probe, Scene};
 use std::{
@@ -176,15 +176,15 @@ impl ActiveSession {
             session_id: self.id.clone(),
             scene_name: self.scene_name.clone(),
             node_count: model.rest_positions_m().len() as u32,
-            tet_count: model.mesh().tets().len() as u32,
+            tet_count: model.body().tets().unwrap().tets().len() as u32,
             surface_triangle_count: model.surface().triangles.len() as u32,
             substeps_per_tick: model.substeps(),
-            tick_period_s: model.spec().settings.tick_period_s,
-            mass_kg: model.mass_kg().iter().sum(),
-            max_natural_frequency_rad_per_s: model.max_natural_frequency_rad_per_s(),
+            tick_period_s: model.settings().tick_period_s,
+            mass_kg: model.body().mass_kg().iter().sum(),
+            max_natural_frequency_rad_per_s: model.body().max_natural_frequency_rad_per_s(),
             tool_names: self.tools.iter().map(|tool| tool.name.clone()).collect(),
-            particle_count: model.particle_count() as u32,
-            most_active_particles: model.most_awake_particles() as u32,
+            particle_count: model.body().particle_count() as u32,
+            most_active_particles: model.body().most_awake_particles() as u32,
         }
     }
 }
@@ -263,13 +263,17 @@ pub fn prepare(
     progress: &mut dyn FnMut(f64),
 ) -> Result<Prepared, PrepareError> {
     let model = Arc::new(Model::build_with(scene.model, progress)?);
-    let period_s = model.spec().settings.tick_period_s;
+    let period_s = model.settings().tick_period_s;
     palpate_realtime::Deadlines::new(palpate_realtime::Clock::Monotonic, period_s)?;
     if period_s > LONGEST_PERIOD_S {
         return Err(PrepareError::TooSlow { period_s });
     }
-    let (tets, substeps) = (model.mesh().tets().len(), model.substeps());
-    let active = model.springs().map_or(model.most_awake_particles(), |springs| springs.model().most_nodes());
+    let tets = model.body().tets().map_or(0, |mesh| mesh.tets().len());
+    let substeps = model.substeps();
+    let active = model
+        .body()
+        .as_mass_spring()
+        .map_or(model.body().most_awake_particles(), |springs| springs.model().most_nodes());
     // A particle costs about what a tet does.
     if (tets + active) as u64 * u64::from(substeps) > MOST_TET_UPDATES {
         let work =
@@ -296,7 +300,7 @@ pub fn prepare(
         end: Mutex::new(Some(end)),
         device: Mutex::new(None),
     };
-    let tools = ends.tools.into_iter().zip(&model.spec().tools).zip(for_devices).map(seat).collect();
+    let tools = ends.tools.into_iter().zip(model.tools()).zip(for_devices).map(seat).collect();
     let session = ActiveSession {
         id,
         number,
@@ -313,7 +317,7 @@ pub fn prepare(
 /// Measures some ticks of the body at rest, all particles awake that may be at once, and says so when they do not fit their period.
 fn too_heavy(model: &Model) -> Option<String> {
     let cost_s = median_tick_s(model);
-    let period_s = model.spec().settings.tick_period_s;
+    let period_s = model.settings().tick_period_s;
     (cost_s > 0.8 * period_s).then(|| {
         format!(
             "a tick costs {:.2} ms here and should last {:.2} ms ({} substeps): the body runs about {:.1} times slower than real \
@@ -328,27 +332,27 @@ fn too_heavy(model: &Model) -> Option<String> {
 
 fn median_tick_s(model: &Model) -> f64 {
     let (mut state, mut scratch) = (State::at_rest(model), Scratch::new(model));
-    let targets: Vec<_> = state.tools.iter().map(|tool| tool.target).collect();
-    let load_factors = vec![0.0; model.spec().loads.len()];
-    let prescribed = vec![glam::DVec3::ZERO; model.spec().prescribed.len()];
+    let targets: Vec<_> = state.mechanical.tools.iter().map(|tool| tool.target).collect();
+    let load_factors = vec![0.0; model.loads().len()];
+    let prescribed = vec![glam::DVec3::ZERO; model.prescribed().len()];
     let input = TickInput {
         tools: &targets,
         load_factors: &load_factors,
         prescribed_displacements_m: &prescribed,
         point_forces: &[],
     };
-    let particles = model.hybrid().map_or(0, |hybrid| hybrid.partition().particle_count() as u32);
+    let particles = model.body().as_hybrid().map_or(0, |hybrid| hybrid.partition().particle_count() as u32);
     wake_only(model, &mut state, &mut scratch, 0..particles);
     let begun = Instant::now();
     let mut costs = Vec::new();
     // A few at least, more while they are cheap.
     while costs.len() < 5 || (costs.len() < 51 && begun.elapsed() < Duration::from_millis(50)) {
-        if model.hybrid().is_some() {
+        if model.body().as_hybrid().is_some() {
             // At other ticks than every tenth nobody looks which particles are to be awake.
-            state.tick = 1;
+            state.mechanical.tick = 1;
         }
-        if let (Some(motion), Some(seed)) = (&mut state.seed, model.seed()) {
-            motion.touched = seed.largest_region();
+        if let (Some(own), Some(seed)) = (state.body.as_seed_mut(), model.body().as_seed()) {
+            own.touched = seed.model().largest_region();
         }
         let before = Instant::now();
         step(model, &mut state, &mut scratch, &input);

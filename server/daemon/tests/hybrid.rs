@@ -43,7 +43,7 @@ async fn viewers_see_the_skin_where_the_physics_has_it() {
     daemon.reset().await;
     daemon.step(300).await;
     let Seen { mirror, state, surface_m } = daemon.see_the_surface().await;
-    assert!(!state.active.is_empty());
+    assert!(!state.body.active_particles().is_empty());
     assert!(surface_m.len() > 500);
     let session = daemon.running.as_ref().unwrap().daemon.session();
     let rest = session.model.surface_rest_positions_m();

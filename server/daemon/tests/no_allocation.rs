@@ -13,7 +13,7 @@ use palpated::{
     sim::{
         exchange::DeviceInput,
         inject::Injection,
-        simulation::{Ends, Parts, Simulation, copy_state},
+        simulation::{Ends, Parts, Simulation},
         tick::Plan,
         timing::Timing,
         tool::Order,
@@ -28,13 +28,13 @@ static ALLOCATOR: AllocDisabler = AllocDisabler;
 /// A hybrid body: particles wake and sleep, viewers watch, states come and go.
 #[tokio::test]
 async fn no_tick_of_a_hybrid_body_allocates() {
-    watched_and_restored(hybrid_scene(), 1200, |state| !state.active.is_empty());
+    watched_and_restored(hybrid_scene(), 1200, |state| !state.body.active_particles().is_empty());
 }
 
 /// The same of a mass-spring surface, refined here and there, most of which sleeps.
 #[tokio::test]
 async fn no_tick_of_springs_allocates() {
-    watched_and_restored(springs_scene(), 2700, |state| !state.x.is_empty());
+    watched_and_restored(springs_scene(), 2700, |state| !state.mechanical.x.is_empty());
 }
 
 /// Runs until something is awake, and for so many ticks until nothing is.
@@ -56,7 +56,7 @@ fn watched_and_restored(scene: Scene, ticks: u32, is_awake: impl Fn(&State) -> b
     assert!(is_awake(bench.simulation.state()));
     bench.demand.set(8, true);
     let mut copy = State::at_rest(&model);
-    assert!(assert_no_alloc(|| copy_state(bench.simulation.state(), &mut copy)));
+    assert!(assert_no_alloc(|| copy.try_copy_from(bench.simulation.state())));
     bench.ticks(ticks, RUN);
     assert!(!is_awake(bench.simulation.state()));
     let saved = snapshot::restore(&model, &snapshot::save(&model, &copy)).unwrap();
@@ -133,7 +133,7 @@ async fn no_tick_allocates() {
     let forces: Vec<Injection> = (0..64)
         .map(|i| Injection { node: 60 + i % 8, force_n: DVec3::X * 1e-3, from_tick: 0, tick_count: 5 + i })
         .collect();
-    let next_tick = bench.simulation.state().tick + 1;
+    let next_tick = bench.simulation.state().mechanical.tick + 1;
     assert!(assert_no_alloc(|| bench.simulation.inject(&forces, next_tick)).is_ok());
     bench.ticks(100, RUN); // with injected forces
 
@@ -144,7 +144,7 @@ async fn no_tick_allocates() {
     bench.ticks(50, RUN);
 
     let absurd = [Injection { node: 60, force_n: DVec3::splat(1e308), from_tick: 0, tick_count: 1 }];
-    let next_tick = bench.simulation.state().tick + 1;
+    let next_tick = bench.simulation.state().mechanical.tick + 1;
     bench.simulation.inject(&absurd, next_tick).unwrap();
     bench.ticks(50, RUN); // quarantined
     assert!(bench.simulation.state().quarantine.is_some());

@@ -136,13 +136,13 @@ async fn the_loop_touches_no_heap_whatever_it_is_asked() {
     };
     running.give(1, inject()).await;
     let (Request::Copy(copy), done) = running.give(1, copy_of(&model)).await else { panic!("another order") };
-    assert_eq!(copy.state.tick, done.tick);
+    assert_eq!(copy.state.mechanical.tick, done.tick);
     running.give(1, Request::Restore(Box::new(copy.state))).await; // waits until the device is released
     running.give(1, Request::Pause(true)).await;
     running.give(1, inject()).await;
     let stepped = running.give(1, Request::Step(200)).await.1;
     let (Request::Copy(copy), done) = running.give(1, copy_of(&model)).await else { panic!("another order") };
-    assert_eq!((copy.state.tick, done.paused), (stepped.tick, true), "time stands");
+    assert_eq!((copy.state.mechanical.tick, done.paused), (stepped.tick, true), "time stands");
     running.give(1, Request::Reset).await;
     let (Request::Copy(copy), _) = running.give(1, copy_of(&model)).await else { panic!("another order") };
     assert_eq!(snapshot::state_hash(&copy.state), snapshot::state_hash(&State::at_rest(&model)));

@@ -200,13 +200,13 @@ async fn the_local_model_keeps_to_the_peak_and_the_ramp_wherever_it_is_rendered(
 
 /// Largest displacement of a node (m).
 fn deformation_m(bench: &Bench, rest_m: &[DVec3]) -> f64 {
-    bench.simulation.state().x.iter().zip(rest_m).map(|(x, rest)| x.distance(*rest)).fold(0.0, f64::max)
+    bench.simulation.state().mechanical.x.iter().zip(rest_m).map(|(x, rest)| x.distance(*rest)).fold(0.0, f64::max)
 }
 
 #[tokio::test]
 async fn a_device_that_attaches_beyond_the_body_does_not_drag_its_tool_through_it() {
     let mut bench = Bench::new();
-    let rest_m = bench.simulation.state().x.clone();
+    let rest_m = bench.simulation.state().mechanical.x.clone();
     // The tool hangs above the block; the device is beside it, low.
     let beside = DVec3::new(-0.02, 0.02, 0.01);
     let mut most_m = 0.0_f64;
@@ -277,7 +277,7 @@ async fn a_device_that_attaches_in_the_surface_disturbs_nothing() {
     let scene = parse(builtin("ventricle").unwrap(), "ventricle", None, &Limits::local(), &mut |_, _| ()).unwrap();
     let model = Arc::new(Model::build(scene.model.clone()).unwrap());
     let mut bench = Bench::on(scene, model, None);
-    let rest_m = bench.simulation.state().x.clone();
+    let rest_m = bench.simulation.state().mechanical.x.clone();
     let mut most_m = 0.0_f64;
     for tick in 0..2000 {
         // 5 mm deep, and a tremor of half a millimetre.
@@ -301,7 +301,7 @@ async fn the_simulated_arm_takes_over_where_a_device_leaves() {
     for _ in 0..200 {
         bench.time.advance(1_000_000);
         bench.simulation.tick(RUN, &bench.clock, &bench.timing);
-        let now_m = bench.simulation.state().tools[0].target.position_m;
+        let now_m = bench.simulation.state().mechanical.tools[0].target.position_m;
         assert!(now_m.distance(last_m) < 2e-3, "a hand does not go from {last_m} to {now_m} in a tick");
         last_m = now_m;
     }

@@ -53,7 +53,7 @@ async fn viewers_see_the_skin_and_forces_act_on_it() {
     daemon.pause().await;
     daemon.reset().await;
     let session = daemon.running.as_ref().unwrap().daemon.session();
-    let rest_m = session.model.seed().unwrap().surface_rest_m();
+    let rest_m = session.model.body().as_seed().unwrap().model().surface_rest_m();
     let apex = (0..rest_m.len()).min_by(|&a, &b| rest_m[a].z.total_cmp(&rest_m[b].z)).unwrap();
     let force = v1::InjectedForce {
         surface_vertex: apex as u32,

@@ -200,7 +200,7 @@ async fn status_tells_the_probes_the_stages_and_the_energies() {
 async fn status_tells_of_ticks_that_were_repeated() {
     let mut scene = block_scene("stiff", 2);
     scene.model.settings.substeps = palpate_physics::Substeps::Fixed(1);
-    for region in &mut scene.model.regions {
+    for region in &mut scene.model.body.solid_mut().unwrap().regions {
         region.material.lame.mu_pa *= 400.0;
         region.material.lame.lambda_pa *= 400.0;
     }

@@ -26,7 +26,7 @@ async fn the_live_loop_and_simulate_reach_the_same_bits() {
     daemon.pause().await;
     daemon.reset().await;
     let session = daemon.running.as_ref().unwrap().daemon.session();
-    let body = session.model.springs().unwrap();
+    let body = session.model.body().as_mass_spring().unwrap();
     for (ticks, refined, awake) in [(20, false, false), (330, true, true), (2500, false, false)] {
         let done = daemon.step(ticks).await;
         assert_eq!(daemon.status().await.quarantine, "");
@@ -34,8 +34,8 @@ async fn the_live_loop_and_simulate_reach_the_same_bits() {
         let hash = daemon.snapshot().await.state_hash;
         assert_eq!(offline["state_hash"], format!("{hash:016x}"), "at tick {done}");
         let state = state(&daemon).await;
-        assert_eq!(state.springs.as_ref().unwrap().refined_nodes(body) > 20, refined, "at tick {done}");
-        assert_eq!(!state.x.is_empty(), awake, "{} awake at tick {done}", state.x.len());
+        assert_eq!(state.body.as_mass_spring().unwrap().refined_nodes(body) > 20, refined, "at tick {done}");
+        assert_eq!(!state.mechanical.x.is_empty(), awake, "{} awake at tick {done}", state.mechanical.x.len());
     }
     daemon.finish().await;
 }

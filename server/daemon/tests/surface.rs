@@ -34,7 +34,7 @@ async fn next_update(
 fn positions_of(daemon: &Daemon, snapshot: &v1::SnapshotResponse) -> Vec<glam::DVec3> {
     let session = daemon.running.as_ref().unwrap().daemon.session();
     let state = palpate_physics::snapshot::restore(&session.model, &snapshot.state).unwrap();
-    session.model.surface().nodes.iter().map(|&node| state.x[node as usize]).collect()
+    session.model.surface().nodes.iter().map(|&node| state.mechanical.x[node as usize]).collect()
 }
 
 #[tokio::test(flavor = "multi_thread")]

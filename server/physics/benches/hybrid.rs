@@ -25,10 +25,10 @@ fn ticks(criterion: &mut Criterion) {
     let mut group = criterion.benchmark_group("hybrid tick");
     for active in [0, 50, 200, 600, 1400] {
         let mut rig = pressed(active);
-        let (substeps, awake) = (rig.model.substeps(), rig.state.active.len());
+        let (substeps, awake) = (rig.model.substeps(), rig.state.body.active_particles().len());
         println!(
             "{awake} awake, {substeps} substeps, pressed with {:.4} N, {} samples",
-            rig.state.tools[0].contact_force_n.z, rig.state.tools[0].contacts
+            rig.state.mechanical.tools[0].contact_force_n.z, rig.state.mechanical.tools[0].contacts
         );
         group.bench_function(format!("{active} active"), |b| b.iter(|| rig.tick_at(DVec3::Z * 6e-3)));
     }

@@ -46,14 +46,14 @@ fn main() {
         let mut rig = Rig::new(spec);
         let (mut quiet, mut fading, mut switching, mut awake) = (Vec::new(), Vec::new(), Vec::new(), 0);
         for tick in 0..TICKS {
-            let before = rig.state.active.ids().to_vec();
-            let was_fading = !rig.state.active.fading().is_empty();
+            let before = rig.state.body.active_particles().to_vec();
+            let was_fading = !rig.state.body.as_hybrid().unwrap().fading().is_empty();
             let start = Instant::now();
             let report = rig.tick_at(tool_m(tick));
             let took_us = start.elapsed().as_secs_f64() * 1e6;
             assert!(report.quarantined.is_none());
-            awake += rig.state.active.len();
-            if before != rig.state.active.ids() {
+            awake += rig.state.body.active_particles().len();
+            if before != rig.state.body.active_particles() {
                 switching.push(took_us);
             } else if was_fading {
                 fading.push(took_us);
@@ -65,7 +65,7 @@ fn main() {
             "{} awake on average, {} substeps, {:.4} N at last",
             awake / TICKS as usize,
             rig.model.substeps(),
-            rig.state.tools[0].contact_force_n.length()
+            rig.state.mechanical.tools[0].contact_force_n.length()
         );
         print("nothing fades", quiet);
         print("strains fade", fading);

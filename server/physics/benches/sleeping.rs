@@ -8,11 +8,12 @@ use criterion::{Criterion, criterion_group, criterion_main};
 use glam::DVec3;
 use palpate_physics::{
     Settings,
-    bodies::hybrid::{ParticleSpec, Skin, Waking, wake_only},
+    bodies::hybrid::{ParticleSpec, Skin, Waking},
     contact::Coupling,
     material::Law,
+    world::wake_only,
 };
-use rig::{Rig, body, bricks, even, hold, material, nodes_where, sphere};
+use rig::{Rig, body, bricks, even, hold, material, mesh_of, nodes_where, sphere, with_particles};
 use std::{collections::BTreeMap, time::Instant};
 
 const SPACING_M: f64 = 2.1e-3;
@@ -59,21 +60,22 @@ fn pressed(n: usize) -> Rig {
         bricks(&side, &side, &even(-side_m, 0.0, cells))
     };
     let skin = box_skin([4 * n, 4 * n, 2 * n], DVec3::new(-side_m, -side_m, -side_m));
-    let mut spec = body(axes(2), material(Law::StableNeoHookean, 10e3, 0.45));
+    let spec = body(axes(2), material(Law::StableNeoHookean, 10e3, 0.45));
     let before = (Instant::now(), resident_bytes());
-    spec.particles = Some(ParticleSpec {
+    let particles = ParticleSpec {
         skin,
         spacing_m: SPACING_M,
         fine_depth_m: None,
         lattice_through_m: DVec3::ZERO,
         most_active: ACTIVE,
         waking: Waking::ByHand,
-    });
-    spec.prescribed = vec![hold("bottom", nodes_where(&spec.mesh, |p| p.z < 1e-4 - side_m), [true; 3])];
+    };
+    let mut spec = with_particles(spec, particles);
+    spec.prescribed = vec![hold("bottom", nodes_where(mesh_of(&spec), |p| p.z < 1e-4 - side_m), [true; 3])];
     spec.settings = Settings::for_particles();
     spec.tools = vec![sphere(8e-3, DVec3::Z * 9e-3, Coupling::Rigid)];
     let mut rig = Rig::new(spec);
-    let partition = rig.model.hybrid().unwrap().partition();
+    let partition = rig.model.body().as_hybrid().unwrap().partition();
     let particles = partition.particle_count();
     println!(
         "{particles} particles, {} vertices of the skin: loaded in {:.1} s, {:.0} bytes a particle, {} substeps",
@@ -90,7 +92,11 @@ fn pressed(n: usize) -> Rig {
     for tick in 0..200 {
         rig.tick_at(DVec3::Z * (8e-3 - 2e-3 * f64::from(tick) / 200.0));
     }
-    println!("{} awake, pressed with {:.4} N", rig.state.active.len(), rig.state.tools[0].contact_force_n.z);
+    println!(
+        "{} awake, pressed with {:.4} N",
+        rig.state.body.active_particles().len(),
+        rig.state.mechanical.tools[0].contact_force_n.z
+    );
     rig
 }
 

@@ -5,9 +5,9 @@
 mod rig;
 use glam::DVec3;
 use palpate_physics::{
-    ModelSpec, Settings, TetMesh,
+    BodySpec, ModelSpec, Settings,
     bodies::mass_spring::{
-        HomeLaw, Refinement, Refining, SpringBodySpec, SpringSpec, body::triangles_about, net::hexagonal_patch,
+        HomeLaw, MassSpringSpec, Refinement, Refining, SpringSpec, body::triangles_about, net::hexagonal_patch,
         region::Constants,
     },
     contact::{Coupling, ToolShape, ToolSpec, ToolTarget},
@@ -31,16 +31,11 @@ fn sheet(rings: i32, most_awake: usize, shape: ToolShape) -> ModelSpec {
         surface,
     };
     ModelSpec {
-        mesh: TetMesh::of_points(Vec::new()),
-        particles: None,
-        seed: None,
-        springs: Some(SpringBodySpec {
+        body: BodySpec::MassSpring(MassSpringSpec {
             springs,
             refinement: Some(Refinement { rings: 2, follows_dent: false, fade_s: 0.1, by: Refining::ByTools }),
             table: None,
         }),
-        regions: Vec::new(),
-        tet_region: Vec::new(),
         prescribed: Vec::new(),
         loads: Vec::new(),
         gravity_m_per_s2: DVec3::ZERO,
@@ -59,7 +54,7 @@ fn resident_bytes() -> f64 {
 fn loaded(name: &str, rings: i32, most_awake: usize, shape: ToolShape) -> (String, Rig) {
     let (before, begun) = (resident_bytes(), Instant::now());
     let rig = Rig::new(sheet(rings, most_awake, shape));
-    let triangles = rig.model.springs().unwrap().model().surface().triangles().len();
+    let triangles = rig.model.body().as_mass_spring().unwrap().model().surface().triangles().len();
     println!(
         "{name}: {triangles} triangles, {} substeps; loaded in {:.1} s, {:.0} bytes a triangle",
         rig.model.substeps(),
@@ -92,7 +87,7 @@ fn ticks(what: &str, rigs: &mut [(String, Rig)], path: impl Fn(u32) -> DVec3) {
             at(0.5),
             at(0.99),
             at(1.0),
-            rig.state.x.len()
+            rig.state.mechanical.x.len()
         );
     }
 }

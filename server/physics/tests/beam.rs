@@ -53,8 +53,9 @@ fn deflection_m(poisson: f64, root: Root, n: usize) -> (f64, usize) {
     let law = material(Law::StVenantKirchhoff, YOUNG_PA, poisson);
     let model = Model::build(spec(mesh, law, prescribed, loads)).unwrap();
     let found = equilibrium(&model, SMALL, &[]);
-    let mean = |x: f64| mean_displacement_m(&model, &found.x, &nodes_where(model.mesh(), |p| p.x == x)).z;
-    ((mean(LENGTH_M) - mean(0.0)) / SMALL, model.rest_tets().len())
+    let mean =
+        |x: f64| mean_displacement_m(&model, &found.x, &nodes_where(model.body().tets().unwrap(), |p| p.x == x)).z;
+    ((mean(LENGTH_M) - mean(0.0)) / SMALL, model.body().as_tet().unwrap().rest_tets().len())
 }
 
 /// Prints the study; relative errors of the finer mesh and of Richardson's limit.
@@ -160,7 +161,7 @@ fn slender(n: usize) -> Vec<f64> {
     let loads = vec![LoadSpec::Traction { triangles: end, traction_pa: DVec3::Z * unit }];
     let law = material(Law::FixedCorotated, YOUNG_PA, 0.0);
     let model = Model::build(spec(mesh, law, prescribed, loads)).unwrap();
-    let end = nodes_where(model.mesh(), |p| p.x == LENGTH_M);
+    let end = nodes_where(model.body().tets().unwrap(), |p| p.x == LENGTH_M);
     let deflection = |&(alpha, _): &(f64, f64)| {
         let found = equilibrium(&model, alpha, &[]);
         println!(

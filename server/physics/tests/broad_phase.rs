@@ -43,7 +43,7 @@ fn run(exhaustive: bool, forget_at: Option<u32>) -> (State, u32) {
         }
         let drive = Drive { tools: devices(tick), ..rig.still() };
         rig.tick(&drive);
-        touched += u32::from(rig.state.tools.iter().any(|tool| tool.contacts > 0));
+        touched += u32::from(rig.state.mechanical.tools.iter().any(|tool| tool.contacts > 0));
     }
     (rig.state, touched)
 }
@@ -76,7 +76,7 @@ fn a_straight_approach_is_noticed_in_the_same_substep() {
                 ..at(place(f64::from(tick + 1) * 1e-3))
             };
             rig.tick(&Drive { tools: vec![device], ..rig.still() });
-            touched += u32::from(rig.state.tools[0].contacts > 0);
+            touched += u32::from(rig.state.mechanical.tools[0].contacts > 0);
         }
         assert!(touched > 3, "{touched}");
         rig.state

@@ -3,12 +3,13 @@
 mod rig;
 use glam::{DQuat, DVec3};
 use palpate_physics::{
-    Energies, Integrator, ModelError, ModelSpec,
+    Energies, Integrator, ModelSpec,
     contact::{Coupling, ToolShape, ToolSpec, ToolTarget, is_inside},
     material::Law,
     snapshot,
+    tick::EnvironmentError,
 };
-use rig::{Drive, Rig, body, bricks, even, hold, material, nodes_where, sphere};
+use rig::{Drive, Rig, body, bricks, even, hold, material, mesh_of, nodes_where, sphere};
 use std::f64::consts::FRAC_PI_2;
 
 const RADIUS_M: f64 = 0.004;
@@ -33,7 +34,7 @@ fn free_block() -> ModelSpec {
 
 fn block() -> ModelSpec {
     let mut spec = free_block();
-    spec.prescribed = vec![hold("bottom", nodes_where(&spec.mesh, |p| p.z < -0.0199), [true; 3])];
+    spec.prescribed = vec![hold("bottom", nodes_where(mesh_of(&spec), |p| p.z < -0.0199), [true; 3])];
     spec.settings.mass_damping_per_s = 20.0;
     spec
 }
@@ -43,7 +44,7 @@ fn lying(height_m: f64, coupling: Coupling) -> ToolSpec {
 }
 
 fn start(rig: &Rig) -> ToolTarget {
-    rig.state.tools[0].target
+    rig.state.mechanical.tools[0].target
 }
 
 fn run_at(rig: &mut Rig, target: ToolTarget, ticks: u32) {
@@ -60,9 +61,9 @@ fn a_capsule_on_its_side_presses_a_thin_layer_with_the_known_force_per_length() 
     let (young_pa, thick_m, length_m, radius_m, depth_m) = (10e3, 2e-3, 4e-3, 1.0, 4e-5);
     let mesh = bricks(&even(-0.014, 0.014, 28), &even(-0.5 * length_m, 0.5 * length_m, 4), &even(-thick_m, 0.0, 2));
     let mut spec = body(mesh, material(Law::StableNeoHookean, young_pa, 0.0));
-    let ends = nodes_where(&spec.mesh, |p| p.y.abs() > 0.499 * length_m && p.z > -0.999 * thick_m);
+    let ends = nodes_where(mesh_of(&spec), |p| p.y.abs() > 0.499 * length_m && p.z > -0.999 * thick_m);
     spec.prescribed = vec![
-        hold("bottom", nodes_where(&spec.mesh, |p| p.z < -0.999 * thick_m), [true; 3]),
+        hold("bottom", nodes_where(mesh_of(&spec), |p| p.z < -0.999 * thick_m), [true; 3]),
         hold("ends", ends, [false, true, false]),
     ];
     spec.settings.mass_damping_per_s = 300.0;
@@ -74,7 +75,7 @@ fn a_capsule_on_its_side_presses_a_thin_layer_with_the_known_force_per_length() 
         let mut rig = Rig::new(spec);
         let target = ToolTarget { position_m: DVec3::new(0.0, shift_m, radius_m - depth_m), ..start(&rig) };
         run_at(&mut rig, target, 200);
-        let tool = rig.state.tools[0].clone();
+        let tool = rig.state.mechanical.tools[0].clone();
         (rig, tool)
     };
     let (rig, tool) = press(0.0);
@@ -110,15 +111,15 @@ fn a_free_block_and_a_free_capsule_keep_both_momenta() {
     )];
     spec.tools[0].friction_coefficient = 0.5;
     let mut rig = Rig::new(spec);
-    for (x, v) in rig.state.x.iter().zip(&mut rig.state.v) {
+    for (x, v) in rig.state.mechanical.x.iter().zip(&mut rig.state.mechanical.v) {
         *v = DVec3::new(0.01, 0.02, 0.05) + DVec3::new(0.3, -0.2, 1.0).cross(*x);
     }
-    let ToolShape::Capsule(shape) = rig.model.spec().tools[0].shape else { panic!("a capsule") };
+    let ToolShape::Capsule(shape) = rig.model.tools()[0].shape else { panic!("a capsule") };
     let momenta = |rig: &Rig| {
-        let tool = &rig.state.tools[0];
+        let tool = &rig.state.mechanical.tools[0];
         let p = tool.velocity_m_per_s * 0.02;
         let l = tool.centre_m.cross(p) + tool.angular_velocity_rad_per_s * shape.turning.inertia_kg_m2;
-        let nodes = rig.state.x.iter().zip(&rig.state.v).zip(rig.model.mass_kg());
+        let nodes = rig.state.mechanical.x.iter().zip(&rig.state.mechanical.v).zip(rig.model.body().mass_kg());
         nodes.fold((p, l), |(p, l), ((x, v), m)| (p + *v * *m, l + x.cross(*v) * *m))
     };
     let (p0, l0) = momenta(&rig);
@@ -126,10 +127,10 @@ fn a_free_block_and_a_free_capsule_keep_both_momenta() {
     for _ in 0..300 {
         let still = start(&rig);
         run_at(&mut rig, still, 1);
-        touched += u32::from(rig.state.tools[0].contacts > 0);
+        touched += u32::from(rig.state.mechanical.tools[0].contacts > 0);
     }
     let (p, l) = momenta(&rig);
-    let tool = &rig.state.tools[0];
+    let tool = &rig.state.mechanical.tools[0];
     println!(
         "{touched} ticks, p off {:e}, L off {:e}",
         (p - p0).length() / p0.length(),
@@ -155,7 +156,8 @@ fn the_step_is_stable_in_contact_at_the_bound_itself() {
         for tick in 0..1500 {
             run_at(&mut rig, device, 1);
             assert!(rig.state.quarantine.is_none(), "tick {tick}");
-            most = most.max(Energies::of(&rig.model, &rig.state).held_j() + rig.state.tools[0].contact_energy_j);
+            most = most
+                .max(Energies::of(&rig.model, &rig.state).held_j() + rig.state.mechanical.tools[0].contact_energy_j);
         }
         let given = 0.5 * 500.0 * (depth_m + 0.001 * radius_m).powi(2);
         println!("R {radius_m}: {} substeps, most {most:.3e} J of {given:.3e} J", rig.model.substeps());
@@ -172,13 +174,13 @@ fn the_energy_of_body_contact_and_coupling_is_kept() {
         spec.settings.substeps = palpate_physics::Substeps::Fixed(substeps);
         spec.tools = vec![lying(RADIUS_M + 1e-5, on_spring(500.0, 0.0))];
         let mut rig = Rig::new(spec);
-        let ToolShape::Capsule(shape) = rig.model.spec().tools[0].shape else { panic!("a capsule") };
+        let ToolShape::Capsule(shape) = rig.model.tools()[0].shape else { panic!("a capsule") };
         let turned = DQuat::from_rotation_y(0.05) * start(&rig).orientation;
         let device = ToolTarget { position_m: DVec3::Z * (RADIUS_M - 2e-4), orientation: turned, ..start(&rig) };
         // The device's way is work done on the coupling; it stands from then on.
         run_at(&mut rig, device, 1);
         let energy_j = |rig: &Rig| {
-            let tool = &rig.state.tools[0];
+            let tool = &rig.state.mechanical.tools[0];
             let apart = (device.orientation * tool.orientation.conjugate()).to_scaled_axis();
             let turning = shape.turning;
             let of_tool_j = 0.5 * 0.02 * tool.velocity_m_per_s.length_squared()
@@ -192,7 +194,7 @@ fn the_energy_of_body_contact_and_coupling_is_kept() {
         for _ in 0..100 {
             run_at(&mut rig, device, 1);
             worst = worst.max((energy_j(&rig) / before_j - 1.0).abs());
-            contacts += rig.state.tools[0].contacts;
+            contacts += rig.state.mechanical.tools[0].contacts;
         }
         assert!(contacts > 100, "{contacts}");
         worst
@@ -212,8 +214,8 @@ fn at_rest_the_device_feels_the_contacts_force_and_torque() {
     let mut rig = Rig::new(spec);
     let device = ToolTarget { position_m: at_m - DVec3::Z * 5e-4, ..start(&rig) };
     run_at(&mut rig, device, 1500);
-    let tool = &rig.state.tools[0];
-    let ToolShape::Capsule(shape) = rig.model.spec().tools[0].shape else { panic!("a capsule") };
+    let tool = &rig.state.mechanical.tools[0];
+    let ToolShape::Capsule(shape) = rig.model.tools()[0].shape else { panic!("a capsule") };
     let turned = (device.orientation * tool.orientation.conjugate()).to_scaled_axis();
     let (torque_nm, force_n) = (tool.contact_torque_nm, tool.contact_force_n);
     println!("force {force_n}, torque {torque_nm}, turned {turned}");
@@ -244,16 +246,16 @@ fn a_device_in_the_block_leaves_the_capsule_outside() {
             };
             run_at(&mut rig, target, 1);
             assert!(rig.state.quarantine.is_none(), "tick {tick}");
-            deepest = deepest.max(rig.state.tools[0].penetration_m / RADIUS_M);
+            deepest = deepest.max(rig.state.mechanical.tools[0].penetration_m / RADIUS_M);
         }
         println!("along {along}, {spin} rad/s: deepest {deepest:.3} R");
         assert!(deepest < 0.6, "{deepest}");
-        let tool = &rig.state.tools[0];
+        let tool = &rig.state.mechanical.tools[0];
         let surface = rig.model.surface();
         let triangles: Vec<[u32; 3]> = (0..surface.triangles.len()).map(|t| surface.triangle_nodes(t)).collect();
         let half_m = tool.orientation * DVec3::Z * HALF_M;
         for at_m in [tool.centre_m, tool.centre_m + half_m, tool.centre_m - half_m] {
-            assert!(!is_inside(at_m, &triangles, &rig.state.x), "{at_m}");
+            assert!(!is_inside(at_m, &triangles, &rig.state.mechanical.x), "{at_m}");
         }
         // One that is turned about may roll over the edge, and then stays beside the block.
         assert!(spin > 0.0 || tool.centre_m.distance(first.position_m) < 1e-3, "{}", tool.centre_m);
@@ -291,7 +293,7 @@ fn the_broad_phase_changes_no_bit_and_a_restored_run_goes_on_as_it_was() {
             run_at(&mut slow, rubbing(tick, first), 1);
             assert_eq!(quick.state, slow.state, "tick {tick}");
             if tick == 200 {
-                assert!(quick.state.tools[0].contacts > 0, "saved in contact");
+                assert!(quick.state.mechanical.tools[0].contacts > 0, "saved in contact");
                 saved = Some(snapshot::save(&quick.model, &quick.state));
             }
         }
@@ -311,11 +313,11 @@ fn bad_orientations_are_refused_and_the_tool_stays() {
     for orientation in [DQuat::from_xyzw(0.0, 0.0, 0.0, 0.5), DQuat::from_xyzw(f64::NAN, 0.0, 0.0, 1.0)] {
         let drive = Drive { tools: vec![ToolTarget { orientation, ..first }], ..rig.still() };
         assert_eq!(rig.tick(&drive).inputs_rejected, 1);
-        assert_eq!(rig.state.tools[0].orientation, first.orientation);
+        assert_eq!(rig.state.mechanical.tools[0].orientation, first.orientation);
     }
     let pose = ToolTarget { orientation: DQuat::from_rotation_z(FRAC_PI_2) * first.orientation, ..first };
     rig.state.place_tool(0, pose);
-    assert_eq!(rig.state.tools[0].orientation, pose.orientation);
+    assert_eq!(rig.state.mechanical.tools[0].orientation, pose.orientation);
 }
 
 #[test]
@@ -325,7 +327,8 @@ fn what_only_spheres_can_press_is_refused_by_name() {
     spec.settings.integrator = Integrator::BackwardEuler;
     let error = palpate_physics::Model::build(spec).unwrap_err();
     assert!(
-        matches!(&error, ModelError::SpheresOnly { .. }) && error.to_string().contains("backward Euler"),
+        matches!(error.environment(), Some(EnvironmentError::SpheresOnly { .. }))
+            && error.to_string().contains("backward Euler"),
         "{error}"
     );
     let mut spec = block();

@@ -3,18 +3,19 @@
 mod rig;
 use glam::{DQuat, DVec3};
 use palpate_physics::{
-    Energies, LoadSpec, ModelSpec, PrescribedSpec, Settings, Substeps, TetMesh,
+    BodySpec, Energies, LoadSpec, ModelSpec, PrescribedSpec, Settings, Substeps,
     bodies::{
-        hybrid::{Waking, wake_only},
+        hybrid::Waking,
         mass_spring::{
-            HomeLaw, Refinement, Refining, SpringBodySpec, SpringSpec, body::triangles_about, net::hexagonal_patch,
+            HomeLaw, MassSpringSpec, Refinement, Refining, SpringSpec, body::triangles_about, net::hexagonal_patch,
             region::Constants,
         },
     },
     contact::{Coupling, ToolShape, ToolSpec, ToolTarget},
     snapshot,
+    world::wake_only,
 };
-use rig::{Drive, Rig, held_below, hybrid_block, sphere};
+use rig::{Drive, Rig, held_below, hybrid_block, particles_mut, sphere};
 use std::f64::consts::FRAC_PI_2;
 
 const RADIUS_M: f64 = 4e-3;
@@ -39,7 +40,7 @@ fn block(most_active: usize, waking: Waking) -> ModelSpec {
 }
 
 fn first(rig: &Rig) -> ToolTarget {
-    rig.state.tools[0].target
+    rig.state.mechanical.tools[0].target
 }
 
 fn run_at(rig: &mut Rig, target: ToolTarget) {
@@ -59,23 +60,25 @@ fn press(rig: &mut Rig, place_m: DVec3, tilt_rad: f64, ticks: u32) {
 
 /// How far (m) a particle is at rest from the line where a lying capsule touches.
 fn beside_m(rig: &Rig, particle: u32) -> f64 {
-    let at_m = rig.model.hybrid().unwrap().partition().particle_m(particle);
+    let at_m = rig.model.body().as_hybrid().unwrap().partition().particle_m(particle);
     at_m.distance(DVec3::X * at_m.x.clamp(-HALF_M, HALF_M))
 }
 
 fn are_awake(rig: &Rig, wanted: impl Fn(u32) -> bool) -> (usize, usize) {
-    let body = rig.model.hybrid().unwrap();
+    let body = rig.model.body().as_hybrid().unwrap();
     let all = (0..body.partition().particle_count() as u32).filter(|&p| body.may_wake(p) && wanted(p));
-    all.fold((0, 0), |(awake, count), p| (awake + usize::from(rig.state.active.ids().contains(&p)), count + 1))
+    all.fold((0, 0), |(awake, count), p| {
+        (awake + usize::from(rig.state.body.active_particles().contains(&p)), count + 1)
+    })
 }
 
 /// Of a block all of whose particles are awake.
 fn on_all(spec: &ModelSpec, height_m: f64) -> Rig {
     let mut spec = spec.clone();
-    let particles = spec.particles.as_mut().unwrap();
+    let particles = particles_mut(&mut spec);
     (particles.waking, particles.most_active) = (Waking::ByHand, 4000);
     let mut rig = Rig::new(spec);
-    let count = rig.model.hybrid().unwrap().partition().particle_count() as u32;
+    let count = rig.model.body().as_hybrid().unwrap().partition().particle_count() as u32;
     wake_only(&rig.model, &mut rig.state, &mut rig.scratch, 0..count);
     press(&mut rig, DVec3::Z * height_m, 0.0, 1200);
     rig
@@ -86,7 +89,7 @@ fn particles_wake_all_along_a_lying_capsule_and_it_feels_what_it_would_on_all_of
     let height_m = RADIUS_M - 1.5e-3;
     let spec = |reach_m: f64| block(1200, Waking::ByTools { reach_m });
     let all = on_all(&spec(REACH_M), height_m);
-    let expected_n = all.state.tools[0].contact_force_n.z;
+    let expected_n = all.state.mechanical.tools[0].contact_force_n.z;
     let mut off = Vec::new();
     for reach_m in [REACH_M, 9e-3, 12e-3] {
         let mut rig = Rig::new(spec(reach_m));
@@ -95,7 +98,7 @@ fn particles_wake_all_along_a_lying_capsule_and_it_feels_what_it_would_on_all_of
         let (awake, count) = are_awake(&rig, |p| beside_m(&rig, p) < 0.6 * reach_m);
         assert!(count > 40 && awake == count, "{reach_m}: {awake} of {count}");
         assert_eq!(are_awake(&rig, |p| beside_m(&rig, p) > 1.5 * reach_m).0, 0, "{reach_m}");
-        let tool = &rig.state.tools[0];
+        let tool = &rig.state.mechanical.tools[0];
         let force_n = tool.contact_force_n.z;
         assert!(
             force_n > 0.1 && tool.contact_torque_nm.length() < 0.02 * force_n * HALF_M,
@@ -114,13 +117,21 @@ fn particles_wake_at_the_end_of_a_capsule_that_touches() {
     let mut rig = Rig::new(block(600, Waking::ByTools { reach_m: REACH_M }));
     // Its end at positive x goes down; the other is 16 mm higher.
     press(&mut rig, DVec3::Z * (RADIUS_M + 7e-3), 0.72, 1200);
-    let x_m = |p| rig.model.hybrid().unwrap().partition().particle_m(p).x;
+    let x_m = |p| rig.model.body().as_hybrid().unwrap().partition().particle_m(p).x;
     let near = are_awake(&rig, |p| x_m(p) > 6e-3 && x_m(p) < 11e-3 && beside_m(&rig, p) < 0.5 * REACH_M);
     let far = are_awake(&rig, |p| x_m(p) < -3e-3);
     assert!(near.0 == near.1 && near.1 > 3 && far.0 == 0 && far.1 > 100, "{near:?} {far:?}");
-    assert!(rig.state.tools[0].contact_force_n.z > 0.01, "{}", rig.state.tools[0].contact_force_n);
+    assert!(
+        rig.state.mechanical.tools[0].contact_force_n.z > 0.01,
+        "{}",
+        rig.state.mechanical.tools[0].contact_force_n
+    );
     // A force upwards at positive x turns it back.
-    assert!(rig.state.tools[0].contact_torque_nm.y < -1e-5, "{}", rig.state.tools[0].contact_torque_nm);
+    assert!(
+        rig.state.mechanical.tools[0].contact_torque_nm.y < -1e-5,
+        "{}",
+        rig.state.mechanical.tools[0].contact_torque_nm
+    );
 }
 
 /// A capsule whose ends are its places, and whose middle alone touches.
@@ -139,10 +150,12 @@ fn particles_wake_beneath_the_middle_of_a_capsule_between_two_places() {
     for tick in 0..900_u32 {
         let across_m = 0.03 - 0.012 * f64::from(tick.min(600)) / 600.0;
         run_at(&mut rig, ToolTarget { position_m: DVec3::new(across_m, across_m, 0.0), ..at });
-        let touches = rig.state.tools[0].contact_force_n.length() > 1e-4;
-        asleep_in_contact += u32::from(touches && rig.state.active.is_empty());
+        let touches = rig.state.mechanical.tools[0].contact_force_n.length() > 1e-4;
+        asleep_in_contact += u32::from(touches && rig.state.body.active_particles().is_empty());
     }
-    assert!(rig.state.tools[0].contact_force_n.length() > 1e-3 && !rig.state.active.is_empty());
+    assert!(
+        rig.state.mechanical.tools[0].contact_force_n.length() > 1e-3 && !rig.state.body.active_particles().is_empty()
+    );
     assert_eq!(asleep_in_contact, 0);
 }
 
@@ -152,10 +165,10 @@ fn particles_wake_as_deep_between_two_places_as_beneath_one() {
     let mut rig = Rig::new(block(150, Waking::ByTools { reach_m: 2.0 * HALF_M }));
     press(&mut rig, DVec3::Z * (RADIUS_M - 1.5e-3), 0.0, 1200);
     let awake_m = |wanted: &dyn Fn(f64) -> bool| {
-        let body = rig.model.hybrid().unwrap();
+        let body = rig.model.body().as_hybrid().unwrap();
         let among = (0..body.partition().particle_count() as u32)
             .filter(|&p| body.may_wake(p) && wanted(body.partition().particle_m(p).x.abs()));
-        let (awake, asleep): (Vec<u32>, Vec<u32>) = among.partition(|p| rig.state.active.ids().contains(p));
+        let (awake, asleep): (Vec<u32>, Vec<u32>) = among.partition(|p| rig.state.body.active_particles().contains(p));
         let farthest_m = awake.iter().map(|&p| beside_m(&rig, p)).fold(0.0, f64::max);
         [asleep.iter().map(|&p| beside_m(&rig, p)).fold(f64::INFINITY, f64::min), farthest_m]
     };
@@ -163,7 +176,7 @@ fn particles_wake_as_deep_between_two_places_as_beneath_one() {
     let [between_m, beneath_m] = [awake_m(&|x_m| x_m < 4e-3), awake_m(&|x_m| (8e-3..12e-3).contains(&x_m))];
     println!("asleep from, awake to (m): {between_m:?} between, {beneath_m:?} beneath");
     // Within a spacing.
-    assert!(rig.state.active.ids().len() > 120 && between_m[0] > 4e-3);
+    assert!(rig.state.body.active_particles().len() > 120 && between_m[0] > 4e-3);
     for (between, beneath) in between_m.into_iter().zip(beneath_m) {
         assert!((between - beneath).abs() < 2.5e-3, "{between_m:?} {beneath_m:?}");
     }
@@ -186,9 +199,9 @@ fn particles_wake_beneath_a_tip_that_touches_far_from_all_vertices() {
         for tick in 0..800_u32 {
             let down_m = 3.2e-3 * (f64::from(tick) / 500.0).min(1.0);
             run_at(&mut rig, ToolTarget { position_m: from.position_m - DVec3::Z * down_m, ..from });
-            pressed += u32::from(rig.state.tools[0].contacts > 0);
+            pressed += u32::from(rig.state.mechanical.tools[0].contacts > 0);
             // What is to wake does so some ticks after a look.
-            asleep += u32::from(pressed > 30 && rig.state.active.is_empty());
+            asleep += u32::from(pressed > 30 && rig.state.body.active_particles().is_empty());
         }
         assert!(pressed > 200 && asleep == 0, "{at_m}: asleep in {asleep} of {pressed} ticks");
     }
@@ -201,15 +214,16 @@ fn a_free_hybrid_block_and_a_free_capsule_keep_both_momenta() {
     spec.tools = vec![lying(DVec3::new(0.012, 0.003, RADIUS_M + 1e-3), on_spring(1e-15, 0.0))];
     spec.tools[0].friction_coefficient = 0.5;
     let mut rig = Rig::new(spec);
-    for (x, v) in rig.state.x.iter().zip(&mut rig.state.v) {
+    for (x, v) in rig.state.mechanical.x.iter().zip(&mut rig.state.mechanical.v) {
         *v = DVec3::new(0.01, 0.02, 0.05) + DVec3::new(0.3, -0.2, 1.0).cross(*x);
     }
-    let ToolShape::Capsule(shape) = rig.model.spec().tools[0].shape else { panic!("a capsule") };
+    let ToolShape::Capsule(shape) = rig.model.tools()[0].shape else { panic!("a capsule") };
     let momenta = |rig: &Rig| {
-        let tool = &rig.state.tools[0];
+        let tool = &rig.state.mechanical.tools[0];
         let p = tool.velocity_m_per_s * 0.02;
         let l = tool.centre_m.cross(p) + tool.angular_velocity_rad_per_s * shape.turning.inertia_kg_m2;
-        let (of_body, about) = rig.model.hybrid().unwrap().momentum(&rig.state);
+        let (of_body, about) =
+            rig.model.body().as_hybrid().unwrap().momentum(rig.state.body.as_hybrid().unwrap(), &rig.state.mechanical);
         (of_body + p, about + l)
     };
     let (p0, l0) = momenta(&rig);
@@ -217,14 +231,14 @@ fn a_free_hybrid_block_and_a_free_capsule_keep_both_momenta() {
     for _ in 0..800 {
         let still = first(&rig);
         run_at(&mut rig, still);
-        touched += u32::from(rig.state.tools[0].contacts > 0);
-        sets += u32::from(rig.state.active.ids() != before);
-        before = rig.state.active.ids().to_vec();
+        touched += u32::from(rig.state.mechanical.tools[0].contacts > 0);
+        sets += u32::from(rig.state.body.active_particles() != before);
+        before = rig.state.body.active_particles().to_vec();
     }
     let (p, l) = momenta(&rig);
     let off = ((p - p0).length() / p0.length(), (l - l0).length() / l0.length());
     println!("{touched} ticks of contact, {sets} sets: p off {:.1e}, L off {:.1e}", off.0, off.1);
-    assert!(touched > 5 && sets > 2 && rig.state.tools[0].angular_velocity_rad_per_s.length() > 0.3);
+    assert!(touched > 5 && sets > 2 && rig.state.mechanical.tools[0].angular_velocity_rad_per_s.length() > 0.3);
     assert!(off.0 < 1e-11 && off.1 < 1e-11, "{off:?}");
 }
 
@@ -255,12 +269,12 @@ fn the_broad_phase_changes_no_bit_and_a_restored_run_goes_on_as_it_was() {
     for tick in 0..900 {
         run_at(&mut quick, rubbing(tick, at));
         run_at(&mut slow, rubbing(tick, at));
-        assert_eq!(quick.state.x, slow.state.x, "tick {tick}");
-        assert_eq!(quick.state.tools, slow.state.tools, "tick {tick}");
-        sets += u32::from(quick.state.active.ids() != before);
-        before = quick.state.active.ids().to_vec();
+        assert_eq!(quick.state.mechanical.x, slow.state.mechanical.x, "tick {tick}");
+        assert_eq!(quick.state.mechanical.tools, slow.state.mechanical.tools, "tick {tick}");
+        sets += u32::from(quick.state.body.active_particles() != before);
+        before = quick.state.body.active_particles().to_vec();
         if tick == 500 {
-            assert!(quick.state.tools[0].contacts > 0, "saved in contact");
+            assert!(quick.state.mechanical.tools[0].contacts > 0, "saved in contact");
             saved = Some(snapshot::save(&quick.model, &quick.state));
         }
     }
@@ -283,10 +297,7 @@ fn sheet(rings: i32, refinement: Option<Refinement>, along: DVec3) -> ModelSpec 
     let radius_m = 3e-3;
     let shape = ToolShape::capsule(Coupling::Rigid, radius_m, HALF_M, along);
     ModelSpec {
-        mesh: TetMesh::of_points(Vec::new()),
-        particles: None,
-        seed: None,
-        springs: Some(SpringBodySpec {
+        body: BodySpec::MassSpring(MassSpringSpec {
             springs: SpringSpec {
                 coarse: Constants { mesh_n_per_m: 60.0, home_n_per_m: 12.0 },
                 fine: Constants { mesh_n_per_m: 36.0, home_n_per_m: 6.2 },
@@ -301,8 +312,6 @@ fn sheet(rings: i32, refinement: Option<Refinement>, along: DVec3) -> ModelSpec 
             refinement,
             table: None,
         }),
-        regions: Vec::new(),
-        tet_region: Vec::new(),
         prescribed: vec![PrescribedSpec { name: "border".into(), nodes: border, axes: [true; 3] }],
         loads: Vec::<LoadSpec>::new(),
         gravity_m_per_s2: DVec3::ZERO,
@@ -313,9 +322,9 @@ fn sheet(rings: i32, refinement: Option<Refinement>, along: DVec3) -> ModelSpec 
 
 /// Middles (m) of the edges that are refined.
 fn refined_m(rig: &Rig) -> Vec<DVec3> {
-    let body = rig.model.springs().unwrap();
+    let body = rig.model.body().as_mass_spring().unwrap();
     let surface = body.model().surface();
-    let ids = rig.state.springs.as_ref().unwrap().motion.ids.iter();
+    let ids = rig.state.body.as_mass_spring().unwrap().motion.ids.iter();
     let middle = |id: &u32| {
         let [a, b] = surface.edges()[id.checked_sub(body.model().vertices())? as usize].nodes;
         Some((surface.positions_m()[a as usize] + surface.positions_m()[b as usize]) * 0.5)
@@ -333,7 +342,7 @@ fn a_surface_of_springs_is_refined_all_along_a_lying_capsule_and_coarse_again_wh
         let middles = refined_m(&rig);
         let apart_m = |p: DVec3| p.distance(along * p.dot(along).clamp(-HALF_M, HALF_M));
         // Every edge beneath it is refined, and none beyond its two rings.
-        let surface = rig.model.springs().unwrap().model().surface();
+        let surface = rig.model.body().as_mass_spring().unwrap().model().surface();
         let beneath = surface
             .edges()
             .iter()
@@ -341,7 +350,7 @@ fn a_surface_of_springs_is_refined_all_along_a_lying_capsule_and_coarse_again_wh
         let beneath: Vec<DVec3> = beneath.filter(|p| apart_m(*p) < EDGE_M).collect();
         assert!(beneath.len() > 20 && beneath.iter().all(|p| middles.contains(p)), "{angle_rad}");
         assert!(middles.iter().all(|p| apart_m(*p) < 3.5 * EDGE_M), "{angle_rad}");
-        assert!(rig.state.tools[0].contact_force_n.z > 0.02);
+        assert!(rig.state.mechanical.tools[0].contact_force_n.z > 0.02);
         press(&mut rig, DVec3::Z * 0.03, 0.0, 700);
         assert!(refined_m(&rig).is_empty(), "{angle_rad}");
     }
@@ -364,7 +373,7 @@ fn the_ledger_closes_while_a_capsule_is_dragged_and_turned() {
             run_at(&mut rig, ToolTarget { position_m, orientation, ..at });
         }
         press(&mut rig, DVec3::Z * 0.03, 0.0, 700);
-        let given_j = rig.state.springs.as_ref().unwrap().given_j;
+        let given_j = rig.state.body.as_mass_spring().unwrap().given_j;
         // Levels on their way drive no tool on.
         assert!(given_j < 0.0 && given_j > -0.1 * pressed_j, "{given_j} {pressed_j}");
         Energies::of(&rig.model, &rig.state).balance_j().abs() / pressed_j

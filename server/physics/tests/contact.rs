@@ -3,7 +3,7 @@
 mod rig;
 use glam::DVec3;
 use palpate_physics::{ModelSpec, Region, contact::Coupling, material::Law};
-use rig::{Rig, body, bricks, even, graded, hold, material, nodes_where, sphere};
+use rig::{Rig, body, bricks, even, graded, hold, material, nodes_where, solid_mut, sphere};
 use std::f64::consts::PI;
 
 const YOUNG_PA: f64 = 10e3;
@@ -31,10 +31,10 @@ fn quarter_block(h_m: f64, nu: f64, radius_m: f64) -> ModelSpec {
     let tet_region: Vec<u16> = (0..mesh.tets().len()).map(class).collect();
     let classes = tet_region.iter().max().unwrap() + 1;
     let mut spec = body(mesh, material(Law::StableNeoHookean, YOUNG_PA, nu));
-    let base = spec.regions[0].clone();
+    let base = solid_mut(&mut spec).regions[0].clone();
     let of_class = |class: u16| Region { density_kg_per_m3: 1000.0 * 0.5_f64.powi(i32::from(class)), ..base.clone() };
-    spec.regions = (0..classes).map(of_class).collect();
-    spec.tet_region = tet_region;
+    solid_mut(&mut spec).regions = (0..classes).map(of_class).collect();
+    solid_mut(&mut spec).tet_region = tet_region;
     spec.prescribed = prescribed;
     spec.tools = vec![sphere(radius_m, DVec3::Z * radius_m, Coupling::Rigid)];
     spec.settings.mass_damping_per_s = 60.0;
@@ -48,7 +48,7 @@ fn pressed_force_n(h_m: f64, nu: f64, radius_m: f64, depth_m: f64) -> f64 {
     for tick in 1..=140 {
         let s = (f64::from(tick) / 90.0).min(1.0);
         rig.tick_at(DVec3::Z * (radius_m - depth_m * s * s * (3.0 - 2.0 * s)));
-        forces = [forces[1], 4.0 * rig.state.tools[0].contact_force_n.z];
+        forces = [forces[1], 4.0 * rig.state.mechanical.tools[0].contact_force_n.z];
     }
     assert!((forces[1] / forces[0] - 1.0).abs() < 1e-3, "not at rest: {forces:?}");
     forces[1]
@@ -132,16 +132,17 @@ fn tool_and_body_exchange_equal_momentum() {
     spec.tools = vec![sphere(0.008, DVec3::new(0.003, 0.002, 0.0081), Coupling::Rigid)];
     spec.tools[0].friction_coefficient = 0.5;
     let mut rig = Rig::new(spec);
-    rig.state.v.fill(DVec3::new(0.1, 0.0, 0.3));
-    let momentum = |rig: &Rig| rig.state.v.iter().zip(rig.model.mass_kg()).map(|(v, m)| *v * *m).sum::<DVec3>();
+    rig.state.mechanical.v.fill(DVec3::new(0.1, 0.0, 0.3));
+    let momentum =
+        |rig: &Rig| rig.state.mechanical.v.iter().zip(rig.model.body().mass_kg()).map(|(v, m)| *v * *m).sum::<DVec3>();
     let before = momentum(&rig);
     let (mut impulse, mut last, mut touched) = (DVec3::ZERO, DVec3::ZERO, false);
-    let centre = rig.state.tools[0].centre_m;
+    let centre = rig.state.mechanical.tools[0].centre_m;
     for _ in 0..200 {
         rig.tick_at(centre);
-        last = rig.state.tools[0].contact_force_n;
+        last = rig.state.mechanical.tools[0].contact_force_n;
         impulse += last * 1e-3;
-        touched |= rig.state.tools[0].contacts > 0;
+        touched |= rig.state.mechanical.tools[0].contacts > 0;
     }
     assert!(touched && last == DVec3::ZERO, "it must touch and leave");
     let gained = momentum(&rig) - before;

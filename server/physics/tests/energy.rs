@@ -7,7 +7,7 @@ use palpate_physics::{
     contact::Coupling,
     material::{Law, Viscosity},
 };
-use rig::{Drive, Rig, at, body, bricks, even, hold, material, nodes_where, sphere};
+use rig::{Drive, Rig, at, body, bricks, even, hold, material, mesh_of, nodes_where, solid_mut, sphere};
 
 fn block() -> TetMesh {
     let side = even(-0.02, 0.02, 4);
@@ -19,19 +19,19 @@ fn soft_block() -> ModelSpec {
 }
 
 fn held_below(mut spec: ModelSpec) -> ModelSpec {
-    let bottom = nodes_where(&spec.mesh, |p| p.z < -0.0199);
+    let bottom = nodes_where(mesh_of(&spec), |p| p.z < -0.0199);
     spec.prescribed = vec![hold("bottom", bottom, [true; 3])];
     spec
 }
 
 fn momenta(model: &Model, state: &State) -> (DVec3, DVec3) {
-    let terms = || state.x.iter().zip(&state.v).zip(model.mass_kg());
+    let terms = || state.mechanical.x.iter().zip(&state.mechanical.v).zip(model.body().mass_kg());
     (terms().map(|((_, v), m)| *v * *m).sum(), terms().map(|((x, v), m)| x.cross(*v) * *m).sum())
 }
 
 /// A spin, a translation and a stretching motion.
 fn throw(state: &mut State) {
-    for (x, v) in state.x.iter().zip(&mut state.v) {
+    for (x, v) in state.mechanical.x.iter().zip(&mut state.mechanical.v) {
         *v = DVec3::new(0.3, -0.2, 0.5) + DVec3::new(4.0, -7.0, 9.0).cross(*x) + DVec3::new(12.0, -8.0, 5.0) * *x;
     }
 }
@@ -142,18 +142,18 @@ fn scenarios() -> Vec<Scenario> {
     let idle: fn(f64, &mut Drive) = |_, _| {};
     let first_load: fn(f64, &mut Drive) = |t, drive| drive.load_factors[0] = ramp(t);
     let top = |spec: &ModelSpec| {
-        let surface = palpate_physics::Surface::of(&spec.mesh).unwrap();
+        let surface = palpate_physics::Surface::of(mesh_of(&spec)).unwrap();
         let up = |t: &u32| {
-            surface.triangle_nodes(*t as usize).iter().all(|n| spec.mesh.positions_m()[*n as usize].z > -1e-9)
+            surface.triangle_nodes(*t as usize).iter().all(|n| mesh_of(&spec).positions_m()[*n as usize].z > -1e-9)
         };
         (0..surface.triangles.len() as u32).filter(up).collect::<Vec<u32>>()
     };
     let loaded = |load: LoadSpec| ModelSpec { loads: vec![load], ..held_below(soft_block()) };
     let triangles = top(&soft_block());
-    let corner = nodes_where(&soft_block().mesh, |p| p.z > -1e-9 && p.x > 0.0199);
+    let corner = nodes_where(mesh_of(&soft_block()), |p| p.z > -1e-9 && p.x > 0.0199);
     let pressure = |follower| LoadSpec::Pressure { triangles: triangles.clone(), pressure_pa: -400.0, follower };
     let mut viscous = soft_block();
-    viscous.regions[0].material.viscosity = Viscosity { phi_pa_s: 1.0, psi_pa_s: 2.0 };
+    solid_mut(&mut viscous).regions[0].material.viscosity = Viscosity { phi_pa_s: 1.0, psi_pa_s: 2.0 };
     let mut damped = soft_block();
     damped.settings.mass_damping_per_s = 30.0;
     let mut heavy = held_below(soft_block());
@@ -245,7 +245,7 @@ fn impulses_never_leave_more_energy_than_work() {
             let mut drive = rig.still();
             // Every fifth tick rests.
             if tick % 5 != 0 {
-                let node = (next() * rig.state.x.len() as f64) as u32;
+                let node = (next() * rig.state.mechanical.x.len() as f64) as u32;
                 let force_n = DVec3::new(next() - 0.5, next() - 0.5, next() - 0.5) * 0.4;
                 drive.point_forces.push(PointForce { node, force_n });
                 done += 1;
@@ -277,7 +277,7 @@ fn leapfrog_converges_with_order_two_on_large_strain() {
             let drive = rig.still();
             rig.tick(&drive);
         }
-        rig.state.x
+        rig.state.mechanical.x
     };
     let [a, b, c] = [8, 16, 32].map(at);
     let distance = |p: &[DVec3], q: &[DVec3]| p.iter().zip(q).map(|(p, q)| p.distance_squared(*q)).sum::<f64>().sqrt();
@@ -293,13 +293,13 @@ fn friction_takes_energy_and_never_gives_it() {
     spec.tools = vec![sphere(0.008, DVec3::new(0.001, 0.002, 0.0083), Coupling::Rigid)];
     spec.tools[0].friction_coefficient = 0.6;
     let mut rig = Rig::new(spec);
-    rig.state.v.fill(DVec3::new(0.3, 0.1, 0.4));
+    rig.state.mechanical.v.fill(DVec3::new(0.3, 0.1, 0.4));
     let start = Energies::of(&rig.model, &rig.state).held_j();
     let (mut heat, mut touched) = (0.0, 0);
     for _ in 0..300 {
         let drive = rig.still();
         rig.tick(&drive);
-        let tool = &rig.state.tools[0];
+        let tool = &rig.state.mechanical.tools[0];
         assert!(tool.friction_heat_j >= heat);
         heat = tool.friction_heat_j;
         touched += u32::from(tool.contacts > 0);
@@ -308,6 +308,6 @@ fn friction_takes_energy_and_never_gives_it() {
     }
     let lost = start - Energies::of(&rig.model, &rig.state).held_j();
     println!("touched {touched} ticks; lost {lost:.3e} J of {start:.3e} J, heat {heat:.3e} J");
-    assert!(touched > 5 && rig.state.tools[0].contacts == 0);
+    assert!(touched > 5 && rig.state.mechanical.tools[0].contacts == 0);
     assert!(heat > 0.01 * start && (lost / heat - 1.0).abs() < 0.05, "lost {lost:e}, heat {heat:e}");
 }

@@ -53,7 +53,7 @@ fn the_step_is_stable_in_contact_at_the_bound_itself() {
         for tick in 0..2000 {
             rig.tick_at(device);
             assert!(rig.state.quarantine.is_none(), "tick {tick}");
-            let held = Energies::of(&rig.model, &rig.state).held_j() + rig.state.tools[0].contact_energy_j;
+            let held = Energies::of(&rig.model, &rig.state).held_j() + rig.state.mechanical.tools[0].contact_energy_j;
             most = most.max(held);
         }
         // The coupling's spring is all the energy there is: it was stretched by the depth, and gives at most that.

@@ -5,10 +5,7 @@ mod common;
 use common::{block, extrapolated, held, material, mean_displacement_m, nodes_where, spec};
 use glam::DVec3;
 use palpate_physics::{
-    Model, Scratch, State, Substeps, TickInput,
-    material::Law,
-    statics::{Mode, natural_modes},
-    step,
+    Model, Scratch, State, Substeps, TickInput, bodies::tet::Mode, material::Law, statics::natural_modes, step,
 };
 use std::f64::consts::TAU;
 
@@ -122,22 +119,22 @@ fn modes_of_a_cantilever() {
 /// Frequency (Hz) of a swing started from rest in a mode's shape, tip `tip_m` out: from the times its tip's mean displacement
 /// along `axis` crosses zero, over `periods`.
 fn swing_hz(model: &Model, mode: &Mode, axis: DVec3, tip_m: f64, periods: f64) -> f64 {
-    let end = nodes_where(model.mesh(), |p| p.x == LENGTH_M);
+    let end = nodes_where(model.body().tets().unwrap(), |p| p.x == LENGTH_M);
     let tip = end.iter().map(|&n| mode.shape_per_sqrt_kg[n as usize].dot(axis)).sum::<f64>() / end.len() as f64;
     let mut state = State::at_rest(model);
-    for (x, shape) in state.x.iter_mut().zip(&mode.shape_per_sqrt_kg) {
+    for (x, shape) in state.mechanical.x.iter_mut().zip(&mode.shape_per_sqrt_kg) {
         *x += *shape * (tip_m / tip);
     }
-    state.force_is_current = false;
+    state.mechanical.force_is_current = false;
     let mut scratch = Scratch::new(model);
     let input =
         TickInput { tools: &[], load_factors: &[], prescribed_displacements_m: &[DVec3::ZERO], point_forces: &[] };
-    let period_s = model.spec().settings.tick_period_s;
+    let period_s = model.settings().tick_period_s;
     let ticks = (periods / mode.frequency_hz / period_s).ceil() as usize;
     let (mut before, mut crossings) = (tip_m, Vec::new());
     for tick in 1..=ticks {
         assert_eq!(step(model, &mut state, &mut scratch, &input).quarantined, None);
-        let now = mean_displacement_m(model, &state.x, &end).dot(axis);
+        let now = mean_displacement_m(model, &state.mechanical.x, &end).dot(axis);
         if before * now < 0.0 {
             crossings.push((tick as f64 - now / (now - before)) * period_s);
         }
@@ -153,12 +150,12 @@ fn the_beam_swings_at_the_frequency_of_its_modes() {
     let (bending_hz, axial_hz) = sorted(&modes);
     let of = |hz: f64| modes.iter().find(|m| m.frequency_hz == hz).unwrap();
     let bending = of(bending_hz[0]);
-    let tip = nodes_where(model.mesh(), |p| p.x == LENGTH_M);
+    let tip = nodes_where(model.body().tets().unwrap(), |p| p.x == LENGTH_M);
     let direction: DVec3 = tip.iter().map(|&n| bending.shape_per_sqrt_kg[n as usize]).sum::<DVec3>().normalize();
     for (name, mode, axis, periods) in [("bending", bending, direction, 3.1), ("axial", of(axial_hz), DVec3::X, 20.1)] {
         let found = swing_hz(&model, mode, axis, 1e-5, periods);
         // Leapfrog raises a frequency by (ω dt)²/24.
-        let dt = model.spec().settings.tick_period_s / f64::from(model.substeps());
+        let dt = model.settings().tick_period_s / f64::from(model.substeps());
         let raised = 1.0 + (TAU * mode.frequency_hz * dt).powi(2) / 24.0;
         let error = found / (mode.frequency_hz * raised) - 1.0;
         println!(

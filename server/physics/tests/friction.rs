@@ -3,7 +3,7 @@
 mod rig;
 use glam::DVec3;
 use palpate_physics::{ModelSpec, contact::Coupling, material::Law};
-use rig::{Rig, body, bricks, even, hold, material, nodes_where, sphere};
+use rig::{Rig, body, bricks, even, hold, material, nodes_where, solid_mut, sphere};
 
 const RADIUS_M: f64 = 0.02;
 const DEPTH_M: f64 = 0.0005;
@@ -14,7 +14,7 @@ fn slab(friction: f64, coupling: Coupling) -> ModelSpec {
     let mesh = bricks(&side, &side, &even(-0.01, 0.0, 4));
     let bottom = nodes_where(&mesh, |p| p.z < -0.0099);
     let mut spec = body(mesh, material(Law::StableNeoHookean, 1e6, 0.3));
-    spec.regions[0].density_kg_per_m3 = 1e5;
+    solid_mut(&mut spec).regions[0].density_kg_per_m3 = 1e5;
     spec.prescribed = vec![hold("bottom", bottom, [true; 3])];
     spec.settings.mass_damping_per_s = 300.0;
     spec.tools = vec![sphere(RADIUS_M, DVec3::new(-0.004, 0.0, RADIUS_M), coupling)];
@@ -36,7 +36,7 @@ fn drag_from_rest(rig: &mut Rig, distance_m: f64, ticks: u32) -> Vec<DVec3> {
     (1..=ticks)
         .map(|tick| {
             rig.tick_at(start + DVec3::new(distance_m * f64::from(tick) / f64::from(ticks), 0.0, -DEPTH_M));
-            rig.state.tools[0].contact_force_n
+            rig.state.mechanical.tools[0].contact_force_n
         })
         .collect()
 }
@@ -48,7 +48,7 @@ fn it_sticks_below_the_cone() {
     // Pressing alone leaves a little of it: neither mesh nor place is symmetric.
     let still = drag(&mut rig, 0.0, 100)[99];
     let last = drag_from_rest(&mut rig, 5e-5, 40)[39];
-    let heat = rig.state.tools[0].friction_heat_j;
+    let heat = rig.state.mechanical.tools[0].friction_heat_j;
     println!("stick: {last} from {still}, heat {heat:.1e} J");
     // Only the rim of the contact slips, where the pressure fades (Cattaneo, Mindlin).
     assert!(heat < 0.1 * 0.5 * last.x.abs() * 5e-5, "{heat}");
@@ -59,7 +59,7 @@ fn it_sticks_below_the_cone() {
         let back = 5e-5 * (1.0 - f64::from(tick.min(40)) / 40.0);
         rig.tick_at(DVec3::new(-0.004 + back, 0.0, RADIUS_M - DEPTH_M));
     }
-    let rest = rig.state.tools[0].contact_force_n;
+    let rest = rig.state.mechanical.tools[0].contact_force_n;
     println!("back: {rest}");
     assert!((rest.x - still.x).abs() < 0.1 * (last.x - still.x).abs(), "{rest} after {last}, {still} before");
 }
@@ -78,11 +78,11 @@ fn it_slides_at_the_cone() {
         assert!((ratio / mu - 1.0).abs() < 0.03, "{ratio} for {mu}");
         assert!(force.y.abs() < 0.01 * force.z);
         // The work of dragging is the heat: µ N times the way slid.
-        let heat = rig.state.tools[0].friction_heat_j;
+        let heat = rig.state.mechanical.tools[0].friction_heat_j;
         let way = mu * force.z * 0.006;
         println!("  heat {heat:.3e} J, mu N s {way:.3e} J");
         assert!(heat > 0.8 * way && heat < way * 1.05);
-        assert_eq!(smooth.state.tools[0].friction_heat_j, 0.0);
+        assert_eq!(smooth.state.mechanical.tools[0].friction_heat_j, 0.0);
     }
 }
 
@@ -96,14 +96,14 @@ fn a_coupled_tool_sticks_until_the_spring_pulls_harder_than_the_cone() {
         for _ in 0..150 {
             rig.tick_at(start - DVec3::Z * 1e-3);
         }
-        let before = rig.state.tools[0].centre_m.x;
-        let heat_of_pressing = rig.state.tools[0].friction_heat_j;
+        let before = rig.state.mechanical.tools[0].centre_m.x;
+        let heat_of_pressing = rig.state.mechanical.tools[0].friction_heat_j;
         let mut after = [0.0; 2];
         for tick in 1..=400 {
             rig.tick_at(start + DVec3::new(pull_m * (f64::from(tick) / 100.0).min(1.0), 0.0, -1e-3));
-            after[usize::from(tick > 250)] = rig.state.tools[0].centre_m.x - before;
+            after[usize::from(tick > 250)] = rig.state.mechanical.tools[0].centre_m.x - before;
         }
-        let heat = rig.state.tools[0].friction_heat_j - heat_of_pressing;
+        let heat = rig.state.mechanical.tools[0].friction_heat_j - heat_of_pressing;
         println!("pull {pull_m}: moved {after:?}, heat {heat:.1e} J");
         (after, heat)
     };

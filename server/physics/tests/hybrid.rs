@@ -3,12 +3,10 @@
 mod rig;
 use glam::DVec3;
 use palpate_physics::{
-    Energies, ModelSpec, Precision, Settings, Substeps,
-    bodies::hybrid::{Waking, wake_only},
-    contact::Coupling,
-    snapshot,
+    Energies, ModelSpec, Precision, Settings, Substeps, bodies::hybrid::Waking, contact::Coupling, snapshot,
+    world::wake_only,
 };
-use rig::{Rig, at, held_below, hybrid_block, near, pressed_block, sphere};
+use rig::{Rig, at, held_below, hybrid_block, near, particles_mut, pressed_block, sphere};
 
 /// 40 × 40 × 20 mm in 24 coarse tets, particles 2.5 mm apart, its lower face at z = −20 mm.
 fn block(poisson_ratio: f64) -> ModelSpec {
@@ -27,24 +25,24 @@ fn free_flight_keeps_momenta_and_energy() {
 
 fn fly(fine_depth_m: Option<f64>) {
     let mut spec = block(0.45);
-    spec.particles.as_mut().unwrap().fine_depth_m = fine_depth_m;
+    particles_mut(&mut spec).fine_depth_m = fine_depth_m;
     let mut rig = Rig::new(spec);
     let awake = near(&rig, DVec3::ZERO, 10e-3);
-    let nodes = rig.state.x.len();
-    for (x, v) in rig.state.x.iter().zip(&mut rig.state.v) {
+    let nodes = rig.state.mechanical.x.len();
+    for (x, v) in rig.state.mechanical.x.iter().zip(&mut rig.state.mechanical.v) {
         *v = DVec3::new(0.3, 0.0, 0.0) + DVec3::new(5.0, 0.0, 20.0).cross(*x) + DVec3::new(x.z, 0.0, x.x) * 8.0;
     }
     wake_only(&rig.model, &mut rig.state, &mut rig.scratch, awake);
-    assert!(rig.state.x.len() > nodes + 70);
-    let hybrid = rig.model.hybrid().unwrap();
-    let (linear, angular) = hybrid.momentum(&rig.state);
+    assert!(rig.state.mechanical.x.len() > nodes + 70);
+    let hybrid = rig.model.body().as_hybrid().unwrap();
+    let (linear, angular) = hybrid.momentum(rig.state.body.as_hybrid().unwrap(), &rig.state.mechanical);
     let start = Energies::of(&rig.model, &rig.state).held_j();
     let drive = rig.still();
     for _ in 0..200 {
         rig.tick(&drive);
     }
-    let hybrid = rig.model.hybrid().unwrap();
-    let (p, l) = hybrid.momentum(&rig.state);
+    let hybrid = rig.model.body().as_hybrid().unwrap();
+    let (p, l) = hybrid.momentum(rig.state.body.as_hybrid().unwrap(), &rig.state.mechanical);
     assert!((p - linear).length() < 1e-12 * linear.length(), "{p} {linear}");
     assert!((l - angular).length() < 1e-12 * angular.length(), "{l} {angular}");
     let end = Energies::of(&rig.model, &rig.state).held_j();
@@ -62,8 +60,8 @@ fn what_follows_holders_in_part_wakes_and_their_work_is_booked() {
         let mut rig = Rig::new(spec);
         let awake: Vec<u32> = near(&rig, DVec3::new(8e-3, 0.0, -20e-3), 10e-3);
         wake_only(&rig.model, &mut rig.state, &mut rig.scratch, awake.iter().copied());
-        let partition = rig.model.hybrid().unwrap().partition();
-        let ids = rig.state.active.ids();
+        let partition = rig.model.body().as_hybrid().unwrap().partition();
+        let ids = rig.state.body.active_particles();
         let floor_m = |particle: &u32| partition.particle_m(*particle).z + 20e-3;
         assert!(ids.len() > 60 && ids.iter().all(|p| floor_m(p) > 1e-3), "{} of {}", ids.len(), awake.len());
         assert!(ids.iter().any(|p| floor_m(p) < 3e-3));
@@ -95,7 +93,7 @@ fn press(mut rig: Rig) {
         let depth_m = 2e-3 * f64::from(tick.min(300)) / 300.0;
         rig.tick_at(DVec3::new(0.0, 1e-3 * f64::from(tick) / 600.0, 6e-3 - depth_m));
     }
-    let tool = &rig.state.tools[0];
+    let tool = &rig.state.mechanical.tools[0];
     assert!(tool.contact_force_n.z > 0.05 && tool.contact_force_n.y < 0.0, "{}", tool.contact_force_n);
     let energies = Energies::of(&rig.model, &rig.state);
     let error = (energies.balance_j() - balance).abs() / energies.external_work_j;
@@ -115,7 +113,7 @@ fn what_was_saved_goes_on_with_the_same_bits() {
     let bytes = snapshot::save(&rig.model, &rig.state);
     let mut other = Rig::new(pressed_block(Precision::Single, None));
     other.state = snapshot::restore(&other.model, &bytes).unwrap();
-    assert_eq!(other.state.active, rig.state.active);
+    assert_eq!(other.state.body, rig.state.body);
     for tick in 100..200 {
         rig.tick_at(way(tick));
         other.tick_at(way(tick));
@@ -141,7 +139,7 @@ fn looking_only_where_the_tool_may_be_costs_no_bit() {
                 ..rig.still()
             });
         }
-        assert!(rig.state.tools[0].contact_force_n.length() > 0.01);
+        assert!(rig.state.mechanical.tools[0].contact_force_n.length() > 0.01);
         rig.state
     };
     assert_eq!(run(true), run(false));
@@ -153,7 +151,7 @@ fn particles_wake_before_the_touch_follow_it_and_sleep_again() {
     let mut spec = pressed_block(Precision::Double, None);
     spec.gravity_m_per_s2 = DVec3::ZERO;
     spec.tools[0].start_position_m = DVec3::new(-5e-3, 0.0, 40e-3);
-    let particles = spec.particles.as_mut().unwrap();
+    let particles = particles_mut(&mut spec);
     particles.waking = Waking::ByTools { reach_m: 8e-3 };
     particles.most_active = 250;
     let mut rig = Rig::new(spec);
@@ -167,14 +165,14 @@ fn particles_wake_before_the_touch_follow_it_and_sleep_again() {
     for tick in 0..3500 {
         let report = rig.tick_at(way(tick));
         assert!(report.quarantined.is_none(), "{tick}: {:?}", report.quarantined);
-        let active = &rig.state.active;
+        let active = rig.state.body.active_particles();
         most = most.max(active.len());
         woke_at = woke_at.or((!active.is_empty()).then_some(tick));
-        touched_at = touched_at.or((rig.state.tools[0].contacts > 0).then_some(tick));
+        touched_at = touched_at.or((rig.state.mechanical.tools[0].contacts > 0).then_some(tick));
         if (500..1200).contains(&tick) {
-            force_n = rig.state.tools[0].contact_force_n.z;
-            let partition = rig.model.hybrid().unwrap().partition();
-            let sum: DVec3 = active.ids().iter().map(|&p| partition.particle_m(p)).sum();
+            force_n = rig.state.mechanical.tools[0].contact_force_n.z;
+            let partition = rig.model.body().as_hybrid().unwrap().partition();
+            let sum: DVec3 = active.iter().map(|&p| partition.particle_m(p)).sum();
             middles.push(sum.x / active.len() as f64);
         }
     }
@@ -182,7 +180,7 @@ fn particles_wake_before_the_touch_follow_it_and_sleep_again() {
     assert!(woke_at + 40 < touched_at && touched_at < 500, "{woke_at} {touched_at}");
     assert!(most > 100 && most <= 250 && force_n > 0.01, "{most} {force_n}");
     assert!(middles[0] < -3e-3 && middles[middles.len() - 1] > 1.5e-3, "{} {:?}", middles[0], middles.last());
-    assert!(rig.state.active.is_empty(), "{} still awake", rig.state.active.len());
+    assert!(rig.state.body.active_particles().is_empty(), "{} still awake", rig.state.body.active_particles().len());
 }
 
 /// One step a tick, over and under the longest that is stable with any particles awake: noticed, and left alone. With a part of them awake it is a little longer.
@@ -190,17 +188,19 @@ fn particles_wake_before_the_touch_follow_it_and_sleep_again() {
 fn a_step_that_is_too_long_is_noticed_and_taken_back() {
     for (ratio, noticed) in [(1.4, true), (0.8, false)] {
         let mut spec = block(0.45);
-        let omega = Rig::new(spec.clone()).model.max_natural_frequency_rad_per_s();
+        let omega = Rig::new(spec.clone()).model.body().max_natural_frequency_rad_per_s();
         spec.settings.substeps = Substeps::Fixed(1);
         spec.settings.tick_period_s = 2.0 * ratio / omega;
         let mut rig = Rig::new(spec);
         let some = near(&rig, DVec3::ZERO, 12e-3);
         wake_only(&rig.model, &mut rig.state, &mut rig.scratch, some);
-        for (number, v) in rig.state.v.iter_mut().enumerate() {
+        for (number, v) in rig.state.mechanical.v.iter_mut().enumerate() {
             *v = DVec3::new((number as f64 * 0.7).sin(), (number as f64 * 1.9).cos(), (number as f64 * 2.3).sin())
                 * 1e-4;
         }
-        for (v, inverse) in rig.state.v.iter_mut().zip(rig.model.inverse_mass_per_kg()) {
+        for (v, inverse) in
+            rig.state.mechanical.v.iter_mut().zip(rig.model.body().as_hybrid().unwrap().inverse_mass_per_kg())
+        {
             *v = if *inverse == DVec3::ZERO { DVec3::ZERO } else { *v };
         }
         let (start_j, mut repeated) = (Energies::of(&rig.model, &rig.state).held_j(), 0);

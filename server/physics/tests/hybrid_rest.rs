@@ -9,12 +9,15 @@ use palpate_physics::{
         equilibrium::equilibrium,
         patch::{Field, Patch},
         place::Place,
-        wake_only,
     },
     contact::{Coupling, ToolTarget},
     statics::{SolveError, StaticSettings, StaticSolution, solve_static, solve_static_with},
+    world::wake_only,
 };
-use rig::{Drive, Rig, at, held_below, hold, hybrid_block, nodes_where, sphere, wake_nearest};
+use rig::{
+    Drive, Rig, at, held_below, hold, hybrid_block, mesh_of, nodes_where, particles, particles_mut, sphere,
+    wake_nearest,
+};
 use std::{collections::BTreeSet, ops::ControlFlow};
 
 /// 40 × 40 × 20 mm in 24 coarse tets, particles 2.5 mm apart, its upper face at z = 0.
@@ -25,12 +28,12 @@ fn block(waking: Waking) -> ModelSpec {
 }
 
 fn skin_vertices(spec: &ModelSpec, wanted: impl Fn(DVec3) -> bool) -> Vec<u32> {
-    let positions = spec.particles.as_ref().unwrap().skin.positions_m();
+    let positions = particles(spec).skin.positions_m();
     (0..positions.len() as u32).filter(|&v| wanted(positions[v as usize])).collect()
 }
 
 fn skin_triangles(spec: &ModelSpec, wanted: impl Fn(DVec3) -> bool) -> Vec<u32> {
-    let skin = &spec.particles.as_ref().unwrap().skin;
+    let skin = &particles(spec).skin;
     (0..skin.triangles().len()).filter(|&t| skin.corners_m(t).into_iter().all(&wanted)).map(|t| t as u32).collect()
 }
 
@@ -41,7 +44,7 @@ fn settings() -> StaticSettings {
 /// The largest distance (m) of the skin in time and in equilibrium, and the largest displacement.
 fn apart_m(rig: &Rig, found: &StaticSolution) -> (f64, f64) {
     let (mut moving, mut still) = (Vec::new(), Vec::new());
-    let rest = found.state(&rig.model, &vec![0.0; rig.model.spec().loads.len()]);
+    let rest = found.state(&rig.model, &vec![0.0; rig.model.loads().len()]);
     rig.model.surface_positions_m(&rig.state, &mut moving);
     rig.model.surface_positions_m(&rest, &mut still);
     let skin = rig.model.surface_rest_positions_m();
@@ -63,7 +66,7 @@ fn loads_weight_and_moved_supports_come_to_the_same_rest_in_time() {
     ];
     spec.gravity_m_per_s2 = DVec3::new(0.0, -1.0, -9.81);
     let mut rig = Rig::new(spec);
-    let partition = rig.model.hybrid().unwrap().partition();
+    let partition = rig.model.body().as_hybrid().unwrap().partition();
     let particles = 0..partition.particle_count() as u32;
     let awake: Vec<u32> = particles.filter(|&p| partition.particle_m(p).length() < 10e-3).collect();
     wake_only(&rig.model, &mut rig.state, &mut rig.scratch, awake.iter().copied());
@@ -75,7 +78,7 @@ fn loads_weight_and_moved_supports_come_to_the_same_rest_in_time() {
     let goal = (&drive.load_factors[..], &drive.prescribed[..], &[] as &[ToolTarget]);
     let go_on = &mut |_: &_| ControlFlow::Continue(());
     let found = solve_static_with(&rig.model, awake, goal, &settings(), go_on).unwrap().unwrap();
-    assert_eq!(found.awake.ids, rig.state.active.ids());
+    assert_eq!(found.awake.ids, rig.state.body.active_particles());
     assert!(found.awake.ids.len() > 120 && found.stable && found.relative_residual <= 1e-12, "{found:?}");
     let (apart, moved) = apart_m(&rig, &found);
     println!("loads: {apart:.1e} m apart of {moved:.1e}, {} iterations", found.iterations);
@@ -99,8 +102,8 @@ fn damped_the_loop_comes_to_rest_where_a_patch_and_its_loads_do() {
         let report = rig.tick(&drive);
         assert!(report.quarantined.is_none());
     }
-    let hybrid = rig.model.hybrid().unwrap();
-    let active: BTreeSet<u32> = rig.state.active.ids().iter().copied().collect();
+    let hybrid = rig.model.body().as_hybrid().unwrap();
+    let active: BTreeSet<u32> = rig.state.body.active_particles().iter().copied().collect();
     let patch = Patch::new(hybrid.partition(), &active);
     let rest = patch.at_rest(hybrid.partition());
     let zero = |list: &[DVec3]| vec![DVec3::ZERO; list.len()];
@@ -126,7 +129,7 @@ fn damped_the_loop_comes_to_rest_where_a_patch_and_its_loads_do() {
 /// A sphere of 6 mm above the block, which weighs, with particles that it wakes.
 fn pressed(coupling: Coupling, fine_depth_m: Option<f64>) -> Rig {
     let mut spec = held_below(block(Waking::ByTools { reach_m: 11e-3 }));
-    spec.particles.as_mut().unwrap().fine_depth_m = fine_depth_m;
+    particles_mut(&mut spec).fine_depth_m = fine_depth_m;
     spec.settings = Settings { mass_damping_per_s: 60.0, ..spec.settings };
     spec.tools = vec![sphere(6e-3, DVec3::new(0.4e-3, 0.3e-3, 9e-3), coupling)];
     spec.gravity_m_per_s2 = DVec3::Z * -9.81;
@@ -134,7 +137,7 @@ fn pressed(coupling: Coupling, fine_depth_m: Option<f64>) -> Rig {
 }
 
 fn solved(model: &Model, device_m: DVec3) -> StaticSolution {
-    let moved = vec![DVec3::ZERO; model.spec().prescribed.len()];
+    let moved = vec![DVec3::ZERO; model.prescribed().len()];
     solve_static(model, &[], &moved, &[at(device_m)], &settings(), &mut |_| ControlFlow::Continue(())).unwrap()
 }
 
@@ -149,10 +152,16 @@ fn a_tool_rests_where_the_loop_has_it(
         rig.tick_at(start.lerp(device, (f64::from(tick) / 500.0).min(1.0)));
     }
     let found = solved(&rig.model, device);
-    assert_eq!(found.awake.ids, rig.state.active.ids(), "{} {}", found.awake.ids.len(), rig.state.active.len());
+    assert_eq!(
+        found.awake.ids,
+        rig.state.body.active_particles(),
+        "{} {}",
+        found.awake.ids.len(),
+        rig.state.body.active_particles().len()
+    );
     assert!(found.awake.ids.len() > 120 && found.stable && found.inverted_tets == 0, "{found:?}");
     let (apart, moved) = apart_m(&rig, &found);
-    let (still, moving) = (found.tools[0], &rig.state.tools[0]);
+    let (still, moving) = (found.tools[0], &rig.state.mechanical.tools[0]);
     let force = still.contact_force_n.distance(moving.contact_force_n) / still.contact_force_n.length();
     println!(
         "{coupling:?}: {:.4} N, {force:.1e} apart; skin {apart:.1e} m of {moved:.1e}, tool {:.1e} m; {} iterations, {} load steps, {} awake",
@@ -194,7 +203,7 @@ fn a_tool_on_a_spring_too() {
 
 /// Uniaxial stress of the stable neo-Hookean law: the transverse stretch that frees the sides, and `P` along (Pa).
 fn uniaxial_pa(spec: &ModelSpec, stretch: f64) -> (f64, f64) {
-    let material = &spec.regions[0].material;
+    let material = &spec.body.solid().unwrap().regions[0].material;
     let piola = |t: f64| material.piola(&glam::DMat3::from_diagonal(DVec3::new(t, t, stretch)));
     let (mut low, mut high) = (0.5_f64, 1.5_f64);
     for _ in 0..200 {
@@ -209,7 +218,7 @@ fn uniaxial_pa(spec: &ModelSpec, stretch: f64) -> (f64, f64) {
 fn a_block_under_traction_stretches_uniformly() {
     for awake in [0, 400] {
         let mut spec = block(Waking::ByHand);
-        let on = |wanted: fn(DVec3) -> bool| nodes_where(&spec.mesh, wanted);
+        let on = |wanted: fn(DVec3) -> bool| nodes_where(mesh_of(&spec), wanted);
         let [below, left, front] = [on(|p| p.z < -0.02 + 1e-6), on(|p| p.x < -0.02 + 1e-6), on(|p| p.y < -0.02 + 1e-6)];
         spec.prescribed = vec![
             hold("below", below, [false, false, true]),
@@ -219,12 +228,12 @@ fn a_block_under_traction_stretches_uniformly() {
         let (across, along_pa) = uniaxial_pa(&spec, 1.2);
         // What a uniform traction gives the corners of squares; that of triangles depends on how they are cut.
         let width_m = |x: f64| if x.abs() > 0.02 - 1e-6 { 1.25e-3 } else { 2.5e-3 };
-        let skin = spec.particles.as_ref().unwrap().skin.positions_m().to_vec();
+        let skin = particles(&spec).skin.positions_m().to_vec();
         let force = |v: u32| DVec3::Z * (along_pa * width_m(skin[v as usize].x) * width_m(skin[v as usize].y));
         let top = skin_vertices(&spec, |p| p.z > -1e-6);
         spec.loads = vec![LoadSpec::NodalForces(top.into_iter().map(|v| (v, force(v))).collect())];
         let model = Model::build(spec).unwrap();
-        let partition = model.hybrid().unwrap().partition();
+        let partition = model.body().as_hybrid().unwrap().partition();
         let inner = |&p: &u32| partition.particle_m(p).distance(DVec3::new(2e-3, 1e-3, -9e-3)) < 8e-3;
         let ids: Vec<u32> = (0..partition.particle_count() as u32).filter(inner).take(awake).collect();
         let goal = (&[1.0][..], &[DVec3::ZERO; 3][..], &[] as &[ToolTarget]);
@@ -257,7 +266,7 @@ fn a_load_on_a_spot_wakes_particles_and_one_on_all_of_a_face_does_not() {
     let spot = |p: DVec3| p.z > -1e-6 && p.length() < 5e-3;
     let (awake, model) = with(&spot, 1.0);
     assert!((100..=400).contains(&awake.ids.len()) && awake.spread_loads == 0, "{}", awake.ids.len());
-    let particle_m = |id: &u32| model.hybrid().unwrap().partition().particle_m(*id);
+    let particle_m = |id: &u32| model.body().as_hybrid().unwrap().partition().particle_m(*id);
     let farthest = awake.ids.iter().map(|id| particle_m(id).length()).fold(0.0, f64::max);
     assert!(farthest <= 5e-3 + reach_m, "{farthest}");
     assert_eq!(with(&spot, 0.0).0.ids.len(), 0);

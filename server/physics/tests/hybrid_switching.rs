@@ -3,12 +3,9 @@
 mod rig;
 use glam::DVec3;
 use palpate_physics::{
-    Energies, Precision, Scratch,
-    bodies::hybrid::{Waking, wake_only},
-    contact::Coupling,
-    snapshot,
+    Energies, Precision, Scratch, bodies::hybrid::Waking, contact::Coupling, snapshot, world::wake_only,
 };
-use rig::{Rig, held_below, hybrid_block, near, pressed_block, sphere};
+use rig::{Rig, held_below, hybrid_block, near, particles_mut, pressed_block, sphere};
 
 /// Cells of one size, and beneath the first layer of two.
 const SIZES: [Option<f64>; 2] = [None, Some(2.5e-3)];
@@ -16,7 +13,7 @@ const SIZES: [Option<f64>; 2] = [None, Some(2.5e-3)];
 /// A tool that wakes particles and is to slide.
 fn about_to_slide(distant_contact: bool, fine_depth_m: Option<f64>) -> Rig {
     let mut spec = pressed_block(Precision::Double, fine_depth_m);
-    let particles = spec.particles.as_mut().unwrap();
+    let particles = particles_mut(&mut spec);
     particles.waking = Waking::ByTools { reach_m: 8e-3 };
     particles.most_active = 250;
     spec.settings.skips.distant_contact = distant_contact;
@@ -25,9 +22,9 @@ fn about_to_slide(distant_contact: bool, fine_depth_m: Option<f64>) -> Rig {
 
 /// A tick of it; whether other particles are awake after it.
 fn slide(rig: &mut Rig) -> bool {
-    let (t, before) = (rig.state.tick as f64 * 1e-3, rig.state.active.ids().to_vec());
+    let (t, before) = (rig.state.mechanical.tick as f64 * 1e-3, rig.state.body.active_particles().to_vec());
     rig.tick_at(DVec3::new(6e-3 * (5.0 * t).sin(), 3e-3 * (7.0 * t).sin(), 6e-3 - 2e-3 * (t / 0.2).min(1.0)));
-    rig.state.active.ids() != before
+    rig.state.body.active_particles() != before
 }
 
 /// In a dent many vertices are as near to the tool's centre, and which is nearest changes with the particles that are awake: what is awake may not.
@@ -40,10 +37,10 @@ fn beneath_a_tool_that_stands_still_the_same_particles_stay_awake() {
         let mut rig = Rig::new(spec);
         let mut switches = 0;
         for tick in 0..1500_u32 {
-            let before = rig.state.active.ids().to_vec();
+            let before = rig.state.body.active_particles().to_vec();
             let depth_m = depth_m * f64::from(tick.min(300)) / 300.0;
             rig.tick_at(DVec3::new(across_m, 0.75 * across_m, 6e-3 - depth_m));
-            switches += u32::from(tick > 1000 && rig.state.active.ids() != before);
+            switches += u32::from(tick > 1000 && rig.state.body.active_particles() != before);
         }
         assert_eq!(switches, 0, "{across_m} {depth_m}");
     }
@@ -87,7 +84,7 @@ fn switches_are_followed_by_contact_as_if_it_looked_at_all_triangles() {
     let run = |distant_contact: bool, fine_depth_m: Option<f64>| {
         let mut rig = about_to_slide(distant_contact, fine_depth_m);
         let sets = (0..1500).filter(|_| slide(&mut rig)).count();
-        (sets, rig.state.x)
+        (sets, rig.state.mechanical.x)
     };
     for fine_depth_m in SIZES {
         let (sets, x) = run(true, fine_depth_m);
@@ -106,25 +103,27 @@ fn momenta_stay_while_particles_wake_and_sleep_in_free_flight() {
 
 fn pass_by(fine_depth_m: Option<f64>) {
     let mut spec = hybrid_block((0.02, 1, 8), 0.45, 400, Waking::ByTools { reach_m: 8e-3 });
-    spec.particles.as_mut().unwrap().fine_depth_m = fine_depth_m;
+    particles_mut(&mut spec).fine_depth_m = fine_depth_m;
     spec.tools = vec![sphere(6e-3, DVec3::new(-60e-3, 0.0, 7.2e-3), Coupling::Rigid)];
     let mut rig = Rig::new(spec);
-    for (x, v) in rig.state.x.iter().zip(&mut rig.state.v) {
+    for (x, v) in rig.state.mechanical.x.iter().zip(&mut rig.state.mechanical.v) {
         *v = DVec3::new(0.0, 0.02, -0.01) + DVec3::new(0.1, 0.3, 0.2).cross(*x) + DVec3::new(x.z, x.x, -x.y) * 3.0;
     }
-    let (linear, angular) = rig.model.hybrid().unwrap().momentum(&rig.state);
+    let (linear, angular) =
+        rig.model.body().as_hybrid().unwrap().momentum(rig.state.body.as_hybrid().unwrap(), &rig.state.mechanical);
     let (mut sets, mut before) = (0, vec![]);
     for tick in 0..800 {
         let x = -60e-3 + 120e-3 * f64::from(tick) / 600.0;
         rig.tick_at(DVec3::new(x.min(60e-3), 2e-5 * f64::from(tick), 14e-3));
-        assert_eq!(rig.state.tools[0].contacts, 0);
-        if rig.state.active.ids() != before {
+        assert_eq!(rig.state.mechanical.tools[0].contacts, 0);
+        if rig.state.body.active_particles() != before {
             sets += 1;
-            before = rig.state.active.ids().to_vec();
+            before = rig.state.body.active_particles().to_vec();
         }
     }
     assert!(sets > 8, "{sets} sets");
-    let (p, l) = rig.model.hybrid().unwrap().momentum(&rig.state);
+    let (p, l) =
+        rig.model.body().as_hybrid().unwrap().momentum(rig.state.body.as_hybrid().unwrap(), &rig.state.mechanical);
     let changed = |a: DVec3, b: DVec3| (a - b).length() / b.length();
     println!("{sets} sets: {:.1e} {:.1e}", changed(p, linear), changed(l, angular));
     assert!((p - linear).length() < 1e-12 * linear.length(), "{p} {linear}");
@@ -162,9 +161,9 @@ fn switch_strained((mut rig, touched): (Rig, Vec<u32>)) {
         worst_residual = worst_residual.max((after.balance_j() - before.balance_j()).abs() / before.elastic_j);
         worst_jump = worst_jump.max((after.held_j() - before.held_j()) / before.elastic_j);
         for tick in 0..5 {
-            let force_n = rig.state.tools[0].contact_force_n;
+            let force_n = rig.state.mechanical.tools[0].contact_force_n;
             rig.tick_at(DVec3::Z * (3.5e-3 + 1e-4 * (f64::from(5 * number + tick) * 0.02).sin()));
-            let now_n = rig.state.tools[0].contact_force_n;
+            let now_n = rig.state.mechanical.tools[0].contact_force_n;
             worst_step = worst_step.max(now_n.distance(force_n) / force_n.length());
         }
     }
@@ -208,16 +207,16 @@ fn waking_beneath_the_tool_is_not_felt_as_a_step() {
     for tick in 0..500 {
         rig.tick_at(DVec3::Z * (6e-3 - 1.5e-3 * f64::from(tick.min(200)) / 200.0));
     }
-    let coarse_n = rig.state.tools[0].contact_force_n.z;
+    let coarse_n = rig.state.mechanical.tools[0].contact_force_n.z;
     let touched = near(&rig, DVec3::ZERO, 10e-3);
     wake_only(&rig.model, &mut rig.state, &mut rig.scratch, touched);
     let mut worst = 0.0_f64;
     for _ in 0..300 {
-        let before_n = rig.state.tools[0].contact_force_n;
+        let before_n = rig.state.mechanical.tools[0].contact_force_n;
         rig.tick_at(DVec3::Z * 4.5e-3);
-        worst = worst.max(rig.state.tools[0].contact_force_n.distance(before_n) / before_n.length());
+        worst = worst.max(rig.state.mechanical.tools[0].contact_force_n.distance(before_n) / before_n.length());
     }
-    let fine_n = rig.state.tools[0].contact_force_n.z;
+    let fine_n = rig.state.mechanical.tools[0].contact_force_n.z;
     println!("waking beneath: {coarse_n:.3} to {fine_n:.3} N, at most {worst:.1e} in a tick");
     assert!(fine_n < 0.8 * coarse_n && worst < 0.05, "{coarse_n} {fine_n} {worst}");
 }

@@ -9,7 +9,7 @@ use palpate_physics::{
     material::Law,
     snapshot, statics,
 };
-use rig::{Drive, Rig, at, body, bricks, even, hold, material, nodes_where, sphere};
+use rig::{Drive, Rig, at, body, bricks, even, hold, material, mesh_of, nodes_where, solid_mut, sphere};
 
 const ALL: [Integrator; 4] =
     [Integrator::Leapfrog, Integrator::SeedVerlet, Integrator::SeedSemiImplicit, Integrator::BackwardEuler];
@@ -22,7 +22,7 @@ fn block(h_m: f64, poisson: f64) -> ModelSpec {
 
 fn held_block(integrator: Integrator) -> ModelSpec {
     let mut spec = block(0.01, 0.4);
-    let bottom = nodes_where(&spec.mesh, |p| p.z < -0.0199);
+    let bottom = nodes_where(mesh_of(&spec), |p| p.z < -0.0199);
     spec.prescribed = vec![hold("bottom", bottom, [true; 3])];
     spec.settings.integrator = integrator;
     spec
@@ -43,7 +43,7 @@ fn swung(integrator: Integrator, substeps: u32) -> Vec<DVec3> {
         let drive = rig.still();
         assert!(rig.tick(&drive).quarantined.is_none());
     }
-    rig.state.x
+    rig.state.mechanical.x
 }
 
 #[test]
@@ -74,8 +74,9 @@ fn momentum_left(integrator: Integrator, h_m: f64, substeps: u32) -> f64 {
     spec.settings.integrator = integrator;
     spec.settings.substeps = Substeps::Fixed(substeps);
     let mut rig = Rig::new(spec);
-    rig.state.v.fill(DVec3::X);
-    let momentum = |rig: &Rig| rig.state.v.iter().zip(rig.model.mass_kg()).map(|(v, m)| v.x * m).sum::<f64>();
+    rig.state.mechanical.v.fill(DVec3::X);
+    let momentum =
+        |rig: &Rig| rig.state.mechanical.v.iter().zip(rig.model.body().mass_kg()).map(|(v, m)| v.x * m).sum::<f64>();
     let before = momentum(&rig);
     let drive = rig.still();
     rig.tick(&drive);
@@ -96,10 +97,11 @@ fn only_the_semi_implicit_seed_drags_rigid_motion() {
 /// λ_max(D⁻¹K), by power iteration on `D⁻¹K`, which is similar to a symmetric matrix.
 fn block_jacobi_spectral_radius(spec: ModelSpec) -> f64 {
     let model = palpate_physics::Model::build(spec).unwrap();
-    let (materials, regions) = ([*model.material_of(0)], &model.spec().tet_region);
+    let tets = model.body().as_tet().unwrap();
+    let (materials, regions) = ([*tets.material_of(0)], &tets.solid().tet_region);
     let body = RestStiffness {
-        mesh: model.mesh(),
-        rest_tets: model.rest_tets(),
+        mesh: tets.mesh(),
+        rest_tets: tets.rest_tets(),
         tet_material: regions,
         materials: &materials,
         springs_n_per_m: &[],
@@ -111,8 +113,8 @@ fn block_jacobi_spectral_radius(spec: ModelSpec) -> f64 {
     let mut lambda = 0.0;
     for _ in 0..2000 {
         let mut ka = vec![DVec3::ZERO; a.len()];
-        for (tet, nodes) in model.mesh().tets().iter().enumerate() {
-            let rest = &model.rest_tets()[tet];
+        for (tet, nodes) in model.body().tets().unwrap().tets().iter().enumerate() {
+            let rest = &model.body().as_tet().unwrap().rest_tets()[tet];
             let gradient = rest.gradient_of(&nodes.map(|n| a[n as usize]));
             let dp = materials[0].piola_differential(&glam::DMat3::IDENTITY, &gradient);
             for (&node, force) in nodes.iter().zip(rest.corner_forces_n(&dp)) {
@@ -141,25 +143,25 @@ fn the_nodal_jacobian_is_less_than_stability_needs() {
 fn rest_is_rest_and_equilibrium_does_not_depend_on_the_scheme() {
     let reference = {
         let model = Rig::new(heavy(Integrator::Leapfrog)).model;
-        let settings = solve::StaticSettings { relative_residual: 1e-12, ..solve::StaticSettings::default() };
-        solve::solve_static(&model, &[], &[DVec3::ZERO], &[], &settings, &mut |_| std::ops::ControlFlow::Continue(()))
+        let settings = statics::StaticSettings { relative_residual: 1e-12, ..statics::StaticSettings::default() };
+        statics::solve_static(&model, &[], &[DVec3::ZERO], &[], &settings, &mut |_| std::ops::ControlFlow::Continue(()))
             .unwrap()
             .x
     };
     for integrator in ALL {
         let mut still = Rig::new(held_block(integrator));
-        let rest = still.state.x.clone();
+        let rest = still.state.mechanical.x.clone();
         for _ in 0..20 {
             let drive = still.still();
             still.tick(&drive);
         }
-        assert!(distance(&still.state.x, &rest) < 1e-15, "{integrator:?}");
+        assert!(distance(&still.state.mechanical.x, &rest) < 1e-15, "{integrator:?}");
         let mut rig = Rig::new(heavy(integrator));
         for _ in 0..600 {
             let drive = rig.still();
             rig.tick(&drive);
         }
-        let error = distance(&rig.state.x, &reference);
+        let error = distance(&rig.state.mechanical.x, &reference);
         println!("{integrator:?}: {error:.1e} m from the static solution");
         assert!(error < 1e-9 && distance(&reference, &rest) > 1e-3, "{integrator:?}: {error:e}");
     }
@@ -181,7 +183,7 @@ fn pressed(integrator: Integrator) -> Rig {
     for _ in 0..60 {
         rig.tick_at(DVec3::Z * 0.005);
     }
-    assert!(rig.state.tools[0].contacts > 0, "{integrator:?}");
+    assert!(rig.state.mechanical.tools[0].contacts > 0, "{integrator:?}");
     rig
 }
 
@@ -190,7 +192,7 @@ fn a_restored_run_continues_with_the_same_bits() {
     for integrator in ALL {
         let mut first = pressed(integrator);
         let bytes = snapshot::save(&first.model, &first.state);
-        let mut second = Rig::new(first.model.spec().clone());
+        let mut second = Rig::new(first.spec.clone());
         second.state = snapshot::restore(&second.model, &bytes).unwrap();
         for tick in 0..40 {
             let device = DVec3::new(1e-4 * f64::from(tick), 0.0, 0.005);
@@ -209,7 +211,7 @@ fn an_enormous_force_is_quarantined() {
         let mut drive: Drive = rig.still();
         drive.point_forces.push(PointForce { node: 60, force_n: DVec3::Z * 1e300 });
         assert!(rig.tick(&drive).quarantined.is_some(), "{integrator:?}");
-        assert_eq!(rig.state.x, good.x);
+        assert_eq!(rig.state.mechanical.x, good.mechanical.x);
         rig.state.reset(&rig.model);
         drive = Drive { tools: vec![at(DVec3::Z * 0.0085)], ..rig.still() };
         assert!(rig.tick(&drive).quarantined.is_none());
@@ -249,14 +251,16 @@ fn the_ledger_balances_to_the_scheme_s_order() {
 fn backward_euler_keeps_momentum_to_its_solver_s_tolerance() {
     for law in [Law::StVenantKirchhoff, Law::StableNeoHookean, Law::FixedCorotated] {
         let mut spec = block(0.01, 0.4);
-        spec.regions[0].material = material(law, 10e3, 0.4);
+        solid_mut(&mut spec).regions[0].material = material(law, 10e3, 0.4);
         spec.settings.integrator = Integrator::BackwardEuler;
         spec.settings.solver_tolerance = 1e-9;
         let mut rig = Rig::new(spec);
-        for (v, x) in rig.state.v.iter_mut().zip(&rig.state.x) {
+        for (v, x) in rig.state.mechanical.v.iter_mut().zip(&rig.state.mechanical.x) {
             *v = DVec3::X + DVec3::new((90.0 * x.y).sin(), (70.0 * x.z).cos(), (80.0 * x.x).sin()) * 0.2;
         }
-        let momentum = |rig: &Rig| rig.state.v.iter().zip(rig.model.mass_kg()).map(|(v, m)| *v * *m).sum::<DVec3>();
+        let momentum = |rig: &Rig| {
+            rig.state.mechanical.v.iter().zip(rig.model.body().mass_kg()).map(|(v, m)| *v * *m).sum::<DVec3>()
+        };
         let before = momentum(&rig);
         for _ in 0..50 {
             let drive = rig.still();
@@ -274,11 +278,11 @@ fn backward_euler_is_bounded_at_a_hundred_times_the_explicit_limit() {
     for law in [Law::StVenantKirchhoff, Law::StableNeoHookean, Law::FixedCorotated] {
         for times in [1.0, 10.0, 100.0] {
             let mut spec = held_block(Integrator::BackwardEuler);
-            spec.regions[0].material = material(law, 10e3, 0.4);
-            let omega = Rig::new(spec.clone()).model.max_natural_frequency_rad_per_s();
+            solid_mut(&mut spec).regions[0].material = material(law, 10e3, 0.4);
+            let omega = Rig::new(spec.clone()).model.body().max_natural_frequency_rad_per_s();
             spec.settings.tick_period_s = times * 2.0 / omega;
             let mut rig = Rig::new(spec);
-            for (v, x) in rig.state.v.iter_mut().zip(rig.model.rest_positions_m()) {
+            for (v, x) in rig.state.mechanical.v.iter_mut().zip(rig.model.rest_positions_m()) {
                 let alternating = if ((x.x + x.y) * 100.0).round() as i64 % 2 == 0 { 1.0 } else { -1.0 };
                 if x.z > -0.0199 {
                     *v = DVec3::new(alternating, -alternating, 0.5) * 0.2;
@@ -311,7 +315,7 @@ fn backward_euler_presses_as_leapfrog_does() {
             let z = 0.0085 - 0.003 * (f64::from(tick) / 100.0).min(1.0);
             assert!(rig.tick_at(DVec3::Z * z).quarantined.is_none());
         }
-        (rig.state.tools[0].device_force_n, rig.state.x)
+        (rig.state.mechanical.tools[0].device_force_n, rig.state.mechanical.x)
     };
     let (explicit, implicit) = (settle(Integrator::Leapfrog), settle(Integrator::BackwardEuler));
     println!("{} N, {} N, {:.1e} m apart", explicit.0, implicit.0, distance(&explicit.1, &implicit.1));
@@ -324,8 +328,9 @@ fn backward_euler_presses_as_leapfrog_does() {
 #[test]
 fn backward_euler_bears_stiff_viscous_contact_at_one_step_a_tick() {
     let mut spec = held_block(Integrator::BackwardEuler);
-    spec.regions[0].material = material(Law::StableNeoHookean, 1e6, 0.45);
-    spec.regions[0].material.viscosity = palpate_physics::material::Viscosity { phi_pa_s: 500.0, psi_pa_s: 500.0 };
+    solid_mut(&mut spec).regions[0].material = material(Law::StableNeoHookean, 1e6, 0.45);
+    solid_mut(&mut spec).regions[0].material.viscosity =
+        palpate_physics::material::Viscosity { phi_pa_s: 500.0, psi_pa_s: 500.0 };
     spec.tools = vec![sphere(0.008, DVec3::new(0.0, 0.0, 0.0085), Coupling::Rigid)];
     spec.tools[0].friction_coefficient = 0.5;
     let explicit = {
@@ -340,9 +345,15 @@ fn backward_euler_bears_stiff_viscous_contact_at_one_step_a_tick() {
         let t = f64::from(tick) * 1e-3;
         let device = DVec3::new(0.004 * (60.0 * t).sin(), 0.0, 0.0085 - 0.002 * (30.0 * t).sin());
         assert!(rig.tick_at(device).quarantined.is_none());
-        largest = largest.max(rig.state.tools[0].device_force_n.length());
-        let moved =
-            rig.state.x.iter().zip(rig.model.rest_positions_m()).map(|(x, r)| x.distance(*r)).fold(0.0, f64::max);
+        largest = largest.max(rig.state.mechanical.tools[0].device_force_n.length());
+        let moved = rig
+            .state
+            .mechanical
+            .x
+            .iter()
+            .zip(rig.model.rest_positions_m())
+            .map(|(x, r)| x.distance(*r))
+            .fold(0.0, f64::max);
         assert!(moved < 0.004, "tick {tick}: {moved}");
     }
     println!("leapfrog would take {explicit} substeps; largest force {largest:.2} N");

@@ -32,11 +32,11 @@ fn measured_m(law: Law, poisson: f64, cells: usize) -> ([f64; 2], usize) {
     let model = Model::build(spec(mesh, material(law, YOUNG_PA, poisson), prescribed, loads)).unwrap();
     let found = equilibrium(&model, 1.0, &[]);
     let radial = |radius: f64| {
-        let nodes = nodes_where(model.mesh(), on(radius));
+        let nodes = nodes_where(model.body().tets().unwrap(), on(radius));
         let grown = |&n: &u32| found.x[n as usize].length() - radius;
         nodes.iter().map(grown).sum::<f64>() / nodes.len() as f64
     };
-    ([radial(INNER_M), radial(OUTER_M)], model.rest_tets().len())
+    ([radial(INNER_M), radial(OUTER_M)], model.body().as_tet().unwrap().rest_tets().len())
 }
 
 /// What a study of three meshes, each twice as fine, found for u(a).

@@ -32,21 +32,21 @@ fn soft_coupling() -> Coupling {
 
 /// Moves the device to a place in `ticks`, turned as it is, waits, and returns the force on the device.
 fn settle(rig: &mut Rig, to_m: DVec3, ticks: u32) -> DVec3 {
-    let from = rig.state.tools[0].target;
+    let from = rig.state.mechanical.tools[0].target;
     for tick in 1..=ticks + 80 {
         let s = (f64::from(tick) / f64::from(ticks)).min(1.0);
         let target = ToolTarget { position_m: from.position_m.lerp(to_m, s), ..from };
         let drive = Drive { tools: vec![target], ..rig.still() };
         rig.tick(&drive);
     }
-    rig.state.tools[0].device_force_n
+    rig.state.mechanical.tools[0].device_force_n
 }
 
 /// `∂F/∂p` by central differences of static presses about where the device is.
 fn static_stiffness(rig: &Rig, axis: DVec3, step_m: f64) -> DVec3 {
     let at = |sign: f64| {
-        let mut copy = Rig { model: rig.model.clone(), state: rig.state.clone(), scratch: rig.scratch.clone() };
-        let here = rig.state.tools[0].target.position_m;
+        let mut copy = rig.clone();
+        let here = rig.state.mechanical.tools[0].target.position_m;
         settle(&mut copy, here + axis * (sign * step_m), 40)
     };
     (at(1.0) - at(-1.0)) / (2.0 * step_m)
@@ -55,7 +55,7 @@ fn static_stiffness(rig: &Rig, axis: DVec3, step_m: f64) -> DVec3 {
 fn pressed(spec: ModelSpec, depth_m: f64) -> (Rig, LocalContactModel) {
     let mut rig = Rig::new(spec);
     settle(&mut rig, DVec3::Z * (RADIUS_M - depth_m), 200);
-    let model = rig.state.tools[0].local_model.unwrap();
+    let model = rig.state.mechanical.tools[0].local_model.unwrap();
     (rig, model)
 }
 
@@ -91,7 +91,7 @@ fn a_lying_capsule_is_as_stiff_as_static_presses_say() {
         spec.tools[0].start_position_m = DVec3::new(beside_m, 0.0, RADIUS_M);
         let mut rig = Rig::new(spec);
         settle(&mut rig, DVec3::new(beside_m, 0.0, RADIUS_M - depth_m), 200);
-        let model = rig.state.tools[0].local_model.unwrap();
+        let model = rig.state.mechanical.tools[0].local_model.unwrap();
         let measured = -static_stiffness(&rig, DVec3::Z, 1e-4).z;
         let told = -model.stiffness_n_per_m.z_axis.z;
         let error = told / measured - 1.0;
@@ -106,15 +106,15 @@ fn a_lying_capsule_is_as_stiff_as_static_presses_say() {
 /// `∂τ/∂θ` about an axis by central differences of static turns of the device where it is.
 fn static_turning(rig: &Rig, axis: DVec3, step_rad: f64) -> DVec3 {
     let at = |sign: f64| {
-        let mut copy = Rig { model: rig.model.clone(), state: rig.state.clone(), scratch: rig.scratch.clone() };
-        let here = rig.state.tools[0].target;
+        let mut copy = rig.clone();
+        let here = rig.state.mechanical.tools[0].target;
         for tick in 1..=120 {
             let turn = DQuat::from_scaled_axis(axis * (sign * step_rad * (f64::from(tick) / 40.0).min(1.0)));
             let target = ToolTarget { orientation: turn * here.orientation, ..here };
             let drive = Drive { tools: vec![target], ..copy.still() };
             copy.tick(&drive);
         }
-        copy.state.tools[0].device_torque_nm
+        copy.state.mechanical.tools[0].device_torque_nm
     };
     (at(1.0) - at(-1.0)) / (2.0 * step_rad)
 }
@@ -139,7 +139,7 @@ fn a_lying_capsule_is_as_hard_to_turn_as_static_turns_say() {
         spec.tools[0].start_position_m = DVec3::new(beside_m, 0.0, RADIUS_M);
         let mut rig = Rig::new(spec);
         settle(&mut rig, DVec3::new(beside_m, 0.0, RADIUS_M - depth_m), 200);
-        let model = rig.state.tools[0].local_model.unwrap().torque.unwrap();
+        let model = rig.state.mechanical.tools[0].local_model.unwrap().torque.unwrap();
         let about = |axis: DVec3| {
             let measured = -static_turning(&rig, axis, 0.01).dot(axis);
             let told = -(model.stiffness_nm_per_rad * axis).dot(axis);
@@ -184,7 +184,7 @@ fn the_force_it_predicts_is_the_force_that_comes() {
         for sign in [-1.0, 1.0] {
             let to = model.point_m + DVec3::Z * (sign * model.validity_radius_m);
             let predicted = model.force_n + model.stiffness_n_per_m * (to - model.point_m);
-            let mut copy = Rig { model: rig.model.clone(), state: rig.state.clone(), scratch: rig.scratch.clone() };
+            let mut copy = rig.clone();
             let came = settle(&mut copy, to, 60);
             let error = (predicted - came).length() / model.force_n.length();
             println!("radius {:.2e} m: predicted {:.4} N, came {:.4} N", model.validity_radius_m, predicted.z, came.z);
@@ -205,7 +205,7 @@ fn it_keeps_its_promises_in_motion() {
         let t = f64::from(tick) * 1e-3;
         let place = DVec3::new(0.008 * (9.0 * t).sin(), 0.003 * (23.0 * t).sin(), -0.003 * (30.0 * t).sin());
         rig.tick_at(DVec3::Z * RADIUS_M + place);
-        let Some(model) = rig.state.tools[0].local_model else {
+        let Some(model) = rig.state.mechanical.tools[0].local_model else {
             before = 0.0;
             continue;
         };
@@ -218,7 +218,7 @@ fn it_keeps_its_promises_in_motion() {
             assert!((-1e-9..=coupling_n_per_m * (1.0 + 1e-9)).contains(&along), "tick {tick}: {along}");
         }
         assert!(model.validity_radius_m > 0.0 && model.validity_radius_m <= RADIUS_M);
-        assert_eq!(model.point_m, rig.state.tools[0].target.position_m);
+        assert_eq!(model.point_m, rig.state.mechanical.tools[0].target.position_m);
         let now = -model.normal.dot(k * model.normal);
         steepest = steepest.max((now - before).abs());
         before = now;

@@ -32,7 +32,7 @@ fn pressed_n(substeps: u32, long_coarse_steps: bool, ramp: u32) -> Vec<f64> {
     let force_n = |tick: u32| {
         let report = rig.tick_at(DVec3::Z * (8e-3 - 2e-3 * f64::from(tick.min(ramp)) / f64::from(ramp)));
         assert_eq!(report.repeated, 0);
-        rig.state.tools[0].contact_force_n.z
+        rig.state.mechanical.tools[0].contact_force_n.z
     };
     (0..400).map(force_n).collect()
 }
@@ -60,10 +60,11 @@ fn one_long_step_a_tick_presses_as_short_ones_do() {
 fn a_trembling_body_hardly_gains_energy() {
     let mut rig = with_awake(block(4, true), 300);
     assert_eq!(rig.model.substeps_per_long_step(), 4);
-    let nodes = rig.model.mass_kg().len();
-    for (number, v) in rig.state.v.iter_mut().enumerate() {
+    let nodes = rig.model.body().mass_kg().len();
+    for (number, v) in rig.state.mechanical.v.iter_mut().enumerate() {
         let s = number as f64;
-        let free = number >= nodes || rig.model.inverse_mass_per_kg()[number] != DVec3::ZERO;
+        let free =
+            number >= nodes || rig.model.body().as_hybrid().unwrap().inverse_mass_per_kg()[number] != DVec3::ZERO;
         *v = if free { DVec3::new((s * 0.7).sin(), (s * 1.9).cos(), (s * 2.3).sin()) * 1e-4 } else { DVec3::ZERO };
     }
     let drive = rig.still();
@@ -90,12 +91,14 @@ fn a_long_step_that_is_too_long_is_noticed() {
         spec.settings.subcycle_unstable = subcycle_unstable;
         let mut rig = with_awake(spec, 0);
         assert_eq!(rig.model.substeps_per_long_step(), 4);
-        for (x, inverse) in rig.state.x.iter_mut().zip(rig.model.inverse_mass_per_kg()) {
+        for (x, inverse) in
+            rig.state.mechanical.x.iter_mut().zip(rig.model.body().as_hybrid().unwrap().inverse_mass_per_kg())
+        {
             if *inverse != DVec3::ZERO {
                 *x = *x * 1.5 + DVec3::Z * 0.02;
             }
         }
-        rig.state.force_is_current = false;
+        rig.state.mechanical.force_is_current = false;
         let drive = rig.still();
         let (start_j, mut most_j, mut repeated) = (Energies::of(&rig.model, &rig.state).held_j(), 0.0_f64, 0);
         for _ in 0..60 {

@@ -9,7 +9,7 @@ use palpate_physics::{
     contact::{Coupling, ToolShape, ToolTarget},
     material::{Lame, Law, Viscosity},
 };
-use rig::{Rig, at, body, bricks, even, hold, material, nodes_where, sphere};
+use rig::{Rig, at, body, bricks, even, hold, material, mesh_of, nodes_where, solid_mut, sphere, with_particles};
 
 #[global_allocator]
 static ALLOCATOR: AllocDisabler = AllocDisabler;
@@ -20,7 +20,7 @@ fn rig(integrator: Integrator) -> Rig {
     let mesh = bricks(&side, &side, &even(-0.02, 0.0, 2));
     let bottom = nodes_where(&mesh, |p| p.z < -0.0199);
     let mut spec = body(mesh, material(Law::StableNeoHookean, 10e3, 0.45));
-    spec.regions[0].material.viscosity = Viscosity { phi_pa_s: 0.2, psi_pa_s: 0.2 };
+    solid_mut(&mut spec).regions[0].material.viscosity = Viscosity { phi_pa_s: 0.2, psi_pa_s: 0.2 };
     spec.settings.mass_damping_per_s = 2.0;
     spec.settings.integrator = integrator;
     spec.gravity_m_per_s2 = DVec3::new(0.0, 0.0, -9.81);
@@ -62,7 +62,7 @@ fn nor_do_ticks_of_the_other_integrators() {
 
 #[test]
 fn nor_do_capsules() {
-    let mut spec = rig(Integrator::Leapfrog).model.spec().clone();
+    let mut spec = rig(Integrator::Leapfrog).spec;
     for tool in &mut spec.tools {
         tool.shape = ToolShape::capsule(tool.coupling, tool.radius_m, 0.006, DVec3::new(1.0, 0.0, 1.0));
     }
@@ -72,9 +72,9 @@ fn nor_do_capsules() {
 /// One step per tick is too long for a body of 200 kPa.
 #[test]
 fn nor_do_ticks_that_are_repeated() {
-    let mut spec = rig(Integrator::Leapfrog).model.spec().clone();
+    let mut spec = rig(Integrator::Leapfrog).spec;
     spec.settings.substeps = Substeps::Fixed(1);
-    spec.regions[0].material.lame = Lame::from_young_poisson(200e3, 0.45).unwrap();
+    solid_mut(&mut spec).regions[0].material.lame = Lame::from_young_poisson(200e3, 0.45).unwrap();
     let rig = Rig::new(spec);
     assert!(run_without_allocating(rig, 2000) > 0);
 }
@@ -92,24 +92,26 @@ fn nor_does_waking_particles() {
 /// Beneath spheres, or capsules of this half length.
 fn wake_and_sleep(fine_depth_m: Option<f64>, half_length_m: Option<f64>) {
     let tets = rig(Integrator::Leapfrog);
-    let mut spec = tets.model.spec().clone();
+    let mut spec = tets.spec.clone();
     for tool in &mut spec.tools {
         let capsule = |half_m| ToolShape::capsule(tool.coupling, tool.radius_m, half_m, DVec3::new(1.0, 0.5, 0.0));
         tool.shape = half_length_m.map_or(ToolShape::Sphere, capsule);
     }
     let surface = tets.model.surface();
     let positions = surface.nodes.iter().map(|&n| tets.model.rest_positions_m()[n as usize]).collect();
-    spec.particles = Some(ParticleSpec {
+    let solid = solid_mut(&mut spec);
+    solid.mesh = bricks(&even(-0.02, 0.02, 2), &even(-0.02, 0.02, 2), &even(-0.02, 0.0, 1));
+    solid.tet_region = vec![0; solid.mesh.tets().len()];
+    let particles = ParticleSpec {
         skin: Skin::new(positions, surface.triangles.clone()).unwrap(),
         spacing_m: 2e-3,
         fine_depth_m,
         lattice_through_m: DVec3::ZERO,
         most_active: 300,
         waking: Waking::ByTools { reach_m: 7e-3 },
-    });
-    spec.mesh = bricks(&even(-0.02, 0.02, 2), &even(-0.02, 0.02, 2), &even(-0.02, 0.0, 1));
-    spec.tet_region = vec![0; spec.mesh.tets().len()];
-    spec.prescribed[0].nodes = nodes_where(&spec.mesh, |p| p.z < -0.0199);
+    };
+    let mut spec = with_particles(spec, particles);
+    spec.prescribed[0].nodes = nodes_where(mesh_of(&spec), |p| p.z < -0.0199);
     spec.loads[0] = LoadSpec::NodalForces(vec![(7, DVec3::X * 0.01)]);
     let mut rig = Rig::new(spec);
     let mut saved = rig.state.clone();
@@ -125,9 +127,9 @@ fn wake_and_sleep(fine_depth_m: Option<f64>, half_length_m: Option<f64>) {
                 point_forces: &[PointForce { node: tick % 50, force_n: DVec3::Z * 1e-3 }],
             };
             palpate_physics::step(&rig.model, &mut rig.state, &mut rig.scratch, &input);
-            sets += u32::from(rig.state.active.len() != count);
-            count = rig.state.active.len();
-            faded += u32::from(!rig.state.active.fading().is_empty());
+            sets += u32::from(rig.state.body.active_particles().len() != count);
+            count = rig.state.body.active_particles().len();
+            faded += u32::from(!rig.state.body.as_hybrid().unwrap().fading().is_empty());
             if tick == 1500 {
                 rig.state.reset(&rig.model);
             }
@@ -139,7 +141,7 @@ fn wake_and_sleep(fine_depth_m: Option<f64>, half_length_m: Option<f64>) {
 /// Falls asleep, sleeps, and wakes for a load.
 #[test]
 fn nor_does_sleep() {
-    let mut spec = rig(Integrator::Leapfrog).model.spec().clone();
+    let mut spec = rig(Integrator::Leapfrog).spec;
     spec.settings.mass_damping_per_s = 60.0;
     spec.settings.sleep_tolerance_m = 1e-6;
     let mut rig = Rig::new(spec);
@@ -190,8 +192,8 @@ fn run_without_allocating(mut rig: Rig, ticks: u32) -> u32 {
             assert!(report.quarantined.is_none());
             poison += report.inputs_rejected;
             repeated += report.repeated;
-            touched += u32::from(rig.state.tools.iter().any(|t| t.contacts > 0));
-            far += u32::from(rig.state.tools.iter().all(|t| t.contacts == 0));
+            touched += u32::from(rig.state.mechanical.tools.iter().any(|t| t.contacts > 0));
+            far += u32::from(rig.state.mechanical.tools.iter().all(|t| t.contacts == 0));
             if tick == 1500 {
                 saved.copy_from(&rig.state);
             }

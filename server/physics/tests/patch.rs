@@ -33,7 +33,8 @@ fn random_gradient(random: &mut Random) -> DMat3 {
 fn kernel_forces(model: &Model, x: &[DVec3]) -> Vec<DVec3> {
     let mut forces = vec![DVec3::ZERO; x.len()];
     let v = vec![DVec3::ZERO; x.len()];
-    model.kernel().forces_n(model.rest_positions_m(), x, &v, &mut forces, &mut model.kernel().scratch());
+    let kernel = model.body().as_tet().unwrap().kernel();
+    kernel.forces_n(model.rest_positions_m(), x, &v, &mut forces, &mut kernel.scratch());
     forces
 }
 
@@ -43,8 +44,9 @@ fn interior_residual(model: &Model, f: DMat3) -> [f64; 2] {
     let forces = kernel_forces(model, &x);
     let mut balanced = vec![0.0; x.len()];
     let mut largest = 0.0_f64;
-    for (tet, nodes) in model.mesh().tets().iter().enumerate() {
-        let corners = model.rest_tets()[tet].corner_forces_n(&model.material_of(tet).piola(&f));
+    let tets = model.body().as_tet().unwrap();
+    for (tet, nodes) in tets.mesh().tets().iter().enumerate() {
+        let corners = tets.rest_tets()[tet].corner_forces_n(&tets.material_of(tet).piola(&f));
         for (node, corner) in nodes.iter().zip(corners) {
             balanced[*node as usize] += corner.length();
             largest = largest.max(corner.length());
@@ -80,13 +82,14 @@ fn a_boundary_moved_uniformly_solves_to_a_uniform_interior() {
     for (name, law) in LAWS {
         let mut body = body(law, Precision::Double);
         let f = random_gradient(&mut Random(5));
-        let held: Vec<u32> = palpate_physics::Surface::of(&body.mesh).unwrap().nodes;
+        let mesh = body.body.solid().unwrap().mesh.clone();
+        let held: Vec<u32> = palpate_physics::Surface::of(&mesh).unwrap().nodes;
         body.prescribed =
             held.iter().map(|&n| PrescribedSpec { name: format!("{n}"), nodes: vec![n], axes: [true; 3] }).collect();
         let moved: Vec<DVec3> = held
             .iter()
             .map(|&n| {
-                let rest = body.mesh.positions_m()[n as usize];
+                let rest = mesh.positions_m()[n as usize];
                 f * rest - rest
             })
             .collect();

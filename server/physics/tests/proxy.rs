@@ -2,7 +2,7 @@
 #![allow(clippy::unwrap_used)]
 mod rig;
 use glam::DVec3;
-use palpate_physics::{ModelSpec, contact::Coupling, health, material::Law};
+use palpate_physics::{ModelSpec, contact::Coupling, material::Law, world};
 use rig::{Rig, body, bricks, even, hold, material, nodes_where, sphere};
 
 const RADIUS_M: f64 = 0.005;
@@ -28,16 +28,16 @@ fn plate(thick_m: f64, stiffness_n_per_m: f64, mass_kg: f64) -> ModelSpec {
 /// largest device force (N). The proxy must then be back at the device, out of contact: it never changed sides.
 fn drive(spec: ModelSpec, ticks: u32, path: impl Fn(u32) -> DVec3) -> (f64, f64) {
     let mut rig = Rig::new(spec);
-    let start = rig.state.tools[0].centre_m;
+    let start = rig.state.mechanical.tools[0].centre_m;
     let (mut deepest, mut strongest) = (0.0_f64, 0.0_f64);
     for tick in 0..ticks + 300 {
         rig.tick_at(if tick < ticks { path(tick) } else { start });
         assert!(rig.state.quarantine.is_none(), "tick {tick}");
-        deepest = deepest.max(rig.state.tools[0].penetration_m / RADIUS_M);
-        strongest = strongest.max(rig.state.tools[0].device_force_n.length());
+        deepest = deepest.max(rig.state.mechanical.tools[0].penetration_m / RADIUS_M);
+        strongest = strongest.max(rig.state.mechanical.tools[0].device_force_n.length());
     }
-    let tool = &rig.state.tools[0];
-    let (min_j, _) = health::min_volume_ratio(&rig.model, &rig.state);
+    let tool = &rig.state.mechanical.tools[0];
+    let min_j = world::min_volume_ratio(&rig.model, &rig.state).unwrap().ratio;
     println!(
         "deepest {deepest:.3} R, strongest {strongest:.3} N, limit {:.3} N, min J at end {min_j:.3}, off by {:.2e} m, contacts {}",
         rig.model.contact().force_limit_n(0),
@@ -92,11 +92,11 @@ fn a_hard_edge_hit_at_speed_is_not_crossed() {
         // A spring that is saturated pulls it through its damper at 0.1 m/s.
         for tick in 0..600 {
             rig.tick_at(sweep(tick));
-            deepest = deepest.max(rig.state.tools[0].penetration_m / RADIUS_M);
+            deepest = deepest.max(rig.state.mechanical.tools[0].penetration_m / RADIUS_M);
         }
         println!("edge: deepest {deepest:.3} R");
         assert!(deepest < 0.6, "{deepest}");
-        assert!(rig.state.tools[0].centre_m.distance(sweep(600)) < 1e-4);
+        assert!(rig.state.mechanical.tools[0].centre_m.distance(sweep(600)) < 1e-4);
     }
 }
 
@@ -115,7 +115,7 @@ fn a_device_that_moves_by_leaps_is_hardly_felt_in_the_free_air() {
             let told = if step_m > 0.0 { (x / step_m).floor() * step_m } else { x };
             rig.tick_at(DVec3::new(told, 0.0, 0.05));
             if tick >= 300 {
-                forces_n.push(rig.state.tools[0].device_force_n.x);
+                forces_n.push(rig.state.mechanical.tools[0].device_force_n.x);
             }
         }
         let n = forces_n.len() as f64;

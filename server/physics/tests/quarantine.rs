@@ -8,7 +8,7 @@ use palpate_physics::{
     material::Law,
     snapshot,
 };
-use rig::{Drive, Rig, at, body, bricks, even, hold, material, nodes_where, sphere};
+use rig::{Drive, Rig, at, body, bricks, even, hold, material, nodes_where, solid_mut, sphere};
 
 fn pressed_block() -> ModelSpec {
     let side = even(-0.02, 0.02, 4);
@@ -26,7 +26,7 @@ fn pressed() -> Rig {
     for _ in 0..50 {
         rig.tick_at(DVec3::Z * 0.005);
     }
-    assert!(rig.state.tools[0].contacts > 0);
+    assert!(rig.state.mechanical.tools[0].contacts > 0);
     rig
 }
 
@@ -40,13 +40,13 @@ fn an_enormous_force_leaves_the_last_good_state() {
         let report = rig.tick(&drive);
         assert!(report.quarantined.is_some(), "{force_n}");
         assert_eq!(report.quarantined, rig.state.quarantine);
-        assert_eq!(rig.state.x, good.x);
-        assert!(rig.state.v.iter().all(|v| *v == DVec3::ZERO));
-        assert_eq!(rig.state.ledger, good.ledger);
+        assert_eq!(rig.state.mechanical.x, good.mechanical.x);
+        assert!(rig.state.mechanical.v.iter().all(|v| *v == DVec3::ZERO));
+        assert_eq!(rig.state.mechanical.ledger, good.mechanical.ledger);
         assert!(rig.scratch.reactions_n().iter().all(|r| r.is_finite()));
-        let tool = &rig.state.tools[0];
+        let tool = &rig.state.mechanical.tools[0];
         assert_eq!((tool.device_force_n, tool.local_model, tool.contacts), (DVec3::ZERO, None, 0));
-        assert_eq!(tool.centre_m, good.tools[0].centre_m);
+        assert_eq!(tool.centre_m, good.mechanical.tools[0].centre_m);
         // Whatever comes, nothing happens any more.
         let held = rig.state.clone();
         for _ in 0..20 {
@@ -70,8 +70,11 @@ fn a_device_at_an_absurd_place_cannot_harm_the_body() {
             rig.tick_at(DVec3::new(far_m, 0.0, -far_m));
         }
         assert_eq!(rig.state.quarantine, None, "{far_m}");
-        assert!(rig.state.x.iter().all(|x| x.is_finite()));
-        assert!(rig.state.tools[0].device_force_n.length() <= rig.model.contact().force_limit_n(0) * (1.0 + 1e-9));
+        assert!(rig.state.mechanical.x.iter().all(|x| x.is_finite()));
+        assert!(
+            rig.state.mechanical.tools[0].device_force_n.length()
+                <= rig.model.contact().force_limit_n(0) * (1.0 + 1e-9)
+        );
     }
 }
 
@@ -119,8 +122,12 @@ fn a_model_of_what_is_not_finite_is_refused_by_name() {
     };
     let load = |load: LoadSpec| spoilt(&|spec: &mut ModelSpec| spec.loads = vec![load.clone()]);
     for bad in [f64::NAN, f64::INFINITY] {
-        assert!(spoilt(&|spec| spec.regions[0].material.lame.mu_pa = bad).contains("region \"all\": lambda_pa"));
-        assert!(spoilt(&|spec| spec.regions[0].material.viscosity.psi_pa_s = bad).contains("viscosity_psi_pa_s"));
+        assert!(
+            spoilt(&|spec| solid_mut(spec).regions[0].material.lame.mu_pa = bad).contains("region \"all\": lambda_pa")
+        );
+        assert!(
+            spoilt(&|spec| solid_mut(spec).regions[0].material.viscosity.psi_pa_s = bad).contains("viscosity_psi_pa_s")
+        );
         assert!(load(LoadSpec::NodalForces(vec![(0, DVec3::X * bad)])).contains("nodal force"));
         assert!(load(LoadSpec::Traction { triangles: vec![0], traction_pa: DVec3::X * bad }).contains("traction_pa"));
         assert!(

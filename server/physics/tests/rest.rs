@@ -53,7 +53,7 @@ fn solved(model: &Model, device_m: DVec3) -> Result<StaticSolution, SolveError> 
 /// Ticks with the device going from its start to its place in `way_ticks`, then resting.
 fn stepped(model: &Model, mut state: State, device_m: DVec3, way_ticks: u32, ticks: u32) -> State {
     let mut scratch = Scratch::new(model);
-    let start = state.tools[0].target.position_m;
+    let start = state.mechanical.tools[0].target.position_m;
     for tick in 1..=ticks {
         let way = (f64::from(tick) / f64::from(way_ticks)).min(1.0);
         let input = TickInput {
@@ -76,8 +76,8 @@ fn agree(coupling: Coupling, device_m: DVec3) -> (Model, StaticSolution) {
     let model = pressed_block(coupling);
     let found = solved(&model, device_m).unwrap();
     let state = stepped(&model, State::at_rest(&model), device_m, 100, 1500);
-    let (still, moving) = (found.tools[0], &state.tools[0]);
-    let nodes_m = largest_distance_m(&state.x, &found.x);
+    let (still, moving) = (found.tools[0], &state.mechanical.tools[0]);
+    let nodes_m = largest_distance_m(&state.mechanical.x, &found.x);
     let tool_m = still.centre_m.distance(moving.centre_m);
     let force = still.contact_force_n.distance(moving.contact_force_n) / still.contact_force_n.length();
     let device = still.device_force_n.distance(moving.device_force_n) / still.contact_force_n.length();
@@ -99,7 +99,7 @@ fn agree(coupling: Coupling, device_m: DVec3) -> (Model, StaticSolution) {
     assert!((still.contact_energy_j / moving.contact_energy_j - 1.0).abs() < 1e-8);
     // The tool rests, and the floor carries the weight and what the device gives.
     assert!((still.contact_force_n - still.device_force_n).length() < 1e-9 * still.contact_force_n.length());
-    let weight = model.mass_kg().iter().sum::<f64>() * 9.81;
+    let weight = model.body().mass_kg().iter().sum::<f64>() * 9.81;
     let sum = found.reactions_n[0] - still.device_force_n - DVec3::Z * weight;
     assert!(sum.length() < 1e-9 * still.contact_force_n.length(), "{sum}");
     (model, found)
@@ -152,8 +152,8 @@ fn time_goes_on_from_a_static_solution_without_moving() {
         let energies = Energies::of(&model, &start);
         assert!(energies.elastic_j > 0.0 && energies.balance_j().abs() < 1e-15, "{energies:?}");
         let state = stepped(&model, start, device, 1, 200);
-        let moved =
-            largest_distance_m(&state.x, &found.x).max(state.tools[0].centre_m.distance(found.tools[0].centre_m));
+        let moved = largest_distance_m(&state.mechanical.x, &found.x)
+            .max(state.mechanical.tools[0].centre_m.distance(found.tools[0].centre_m));
         println!("{coupling:?}: moved {moved:.1e} m in 200 ticks");
         assert!(moved < 1e-10 * SIZE_M, "{moved:e}");
     }

@@ -6,12 +6,12 @@ mod rig;
 use glam::DVec3;
 use octahedra::{FACE_M, OUTWARDS, body_spec, device_m, layer, parameters};
 use palpate_physics::{
-    Integrator, LoadSpec, Model, ModelSpec, PointForce, State, Substeps,
+    BodySpec, Integrator, LoadSpec, Model, ModelSpec, PointForce, State, Substeps,
     bodies::seed::{AtVertex, SeedContact, SeedModel, SeedParameters, SeedScratch, SeedSpec, SeedState},
     contact::Coupling,
     snapshot::{SnapshotError, restore, save, state_hash},
 };
-use rig::{Drive, Rig};
+use rig::{Drive, Rig, solid_mut};
 
 fn layered() -> ModelSpec {
     body_spec(0.02, Some(layer()), parameters())
@@ -25,9 +25,9 @@ fn run(rig: &mut Rig, ticks: std::ops::Range<u32>) {
 
 /// The model as the papers' library builds it, from what the body was built from.
 fn oracle(spec: &ModelSpec, dt_s: f64) -> SeedModel {
-    let seed = spec.seed.clone().unwrap();
+    let BodySpec::Seed(seed) = spec.body.clone() else { panic!("no seed body") };
     SeedModel::build(SeedSpec {
-        core: spec.mesh.clone(),
+        core: seed.core.mesh,
         held_nodes: spec.prescribed[0].nodes.clone(),
         layer: seed.layer,
         parameters: SeedParameters { dt_s, ..seed.parameters },
@@ -49,21 +49,21 @@ fn a_tick_is_the_papers_step_with_what_tools_do_as_external_forces() {
         for tick in 0..400 {
             let nodes = rig.model.surface().nodes.iter().zip(0..);
             let forces_n: Vec<AtVertex> = nodes
-                .map(|(&node, vertex)| AtVertex { vertex, value: rig.state.external_n[node as usize] })
+                .map(|(&node, vertex)| AtVertex { vertex, value: rig.state.mechanical.external_n[node as usize] })
                 .filter(|force| force.value != DVec3::ZERO)
                 .collect();
-            let triangle = rig.state.seed.as_ref().unwrap().touched;
+            let triangle = rig.state.body.as_seed().unwrap().touched;
             touched += u32::from(!forces_n.is_empty());
             sides.extend(triangle);
             assert!(tick >= 150 || triangle.is_none_or(|triangle| triangle == 0 || !is_layered), "{triangle:?}");
             model.step(&mut state, &mut scratch, &SeedContact { triangle, forces_n: &forces_n, displaced_m: &[] });
             rig.tick_at(device_m(tick));
-            assert_eq!(rig.state.seed.as_ref().unwrap().now, state, "tick {tick}");
-            assert!(rig.state.x.iter().eq(state.core.x.iter().chain(&state.skin.x)));
-            assert!(rig.state.v.iter().eq(state.core.v.iter().chain(&state.skin.v)));
+            assert_eq!(rig.state.body.as_seed().unwrap().now, state, "tick {tick}");
+            assert!(rig.state.mechanical.x.iter().eq(state.core.x.iter().chain(&state.skin.x)));
+            assert!(rig.state.mechanical.v.iter().eq(state.core.v.iter().chain(&state.skin.v)));
         }
         assert!(touched > 100 && sides.len() > 1, "{touched} {sides:?}");
-        assert!(!rig.state.contact.touches(0) && rig.state.awake_particles() == 0);
+        assert!(!rig.state.mechanical.contact.touches(0) && rig.state.awake_particles() == 0);
     }
 }
 
@@ -84,12 +84,12 @@ fn a_tick_is_taken_in_equal_steps_that_are_no_longer_than_wanted() {
             let drive = Drive { point_forces: push(rig), ..rig.still() };
             (0..ticks).for_each(|_| assert_eq!(rig.tick(&drive).inputs_rejected, 0));
         }
-        assert_eq!(one.state.seed, two.state.seed);
+        assert_eq!(one.state.body, two.state.body);
     }
-    assert!(one.state.x[one.model.surface().nodes[2] as usize].distance(DVec3::Y * 0.03) > 1e-4);
+    assert!(one.state.mechanical.x[one.model.surface().nodes[2] as usize].distance(DVec3::Y * 0.03) > 1e-4);
     let longer = steps(14.1e-3);
     assert_eq!(longer.model.substeps(), 3);
-    assert!((longer.model.seed().unwrap().parameters().dt_s - 4.7e-3).abs() < 1e-15);
+    assert!((longer.model.body().as_seed().unwrap().model().parameters().dt_s - 4.7e-3).abs() < 1e-15);
 }
 
 /// The ball pressed in by `depth_m` over 100 ticks and held there.
@@ -108,8 +108,8 @@ fn a_pressed_body_pushes_back_as_hard_as_its_holder_holds() {
     let mut rig = Rig::new(body_spec(0.03, None, parameters()));
     let (mut on_tool, mut by_holder, mut ticks) = (DVec3::ZERO, DVec3::ZERO, 0);
     press_and_hold(&mut rig, 2e-3, 8000, |rig| {
-        let on_body: DVec3 = rig.state.external_n.iter().sum();
-        let contact_n = rig.state.tools[0].contact_force_n;
+        let on_body: DVec3 = rig.state.mechanical.external_n.iter().sum();
+        let contact_n = rig.state.mechanical.tools[0].contact_force_n;
         assert!((on_body + contact_n).length() <= 1e-12 * contact_n.length());
         ticks += 1;
         if ticks > 2000 {
@@ -121,7 +121,7 @@ fn a_pressed_body_pushes_back_as_hard_as_its_holder_holds() {
     let left = (on_tool - by_holder).length() / on_tool.length();
     println!("{left} of the force is left between tool and holder");
     assert!(left < 1e-2, "{on_tool} on the tool, {by_holder} by the holder");
-    assert!(rig.state.ledger.external_work_j > 0.0);
+    assert!(rig.state.mechanical.ledger.external_work_j > 0.0);
 }
 
 /// Particles are awake while their triangle is touched, and resist more the deeper they are pressed.
@@ -132,9 +132,9 @@ fn particles_wake_under_the_tool_and_resist() {
         let (mut sum_n, mut touched) = (0.0, false);
         press_and_hold(&mut rig, depth_m, 400, |rig| {
             assert_eq!(rig.state.awake_particles() > 0, touched);
-            assert!(rig.state.awake_particles() <= rig.model.most_awake_particles());
-            touched = rig.state.contact.touches(0);
-            sum_n += rig.state.tools[0].contact_force_n.dot(OUTWARDS);
+            assert!(rig.state.awake_particles() <= rig.model.body().most_awake_particles());
+            touched = rig.state.mechanical.contact.touches(0);
+            sum_n += rig.state.mechanical.tools[0].contact_force_n.dot(OUTWARDS);
         });
         sum_n / 400.0
     };
@@ -157,8 +157,8 @@ fn loads_and_prescribed_nodes_act_as_far_as_it_has_them() {
         rig.tick(&drive(DVec3::ZERO));
     }
     let corner = rig.model.surface().triangle_nodes(0)[0] as usize;
-    assert!((rig.state.x[corner] - rig.model.rest_positions_m()[corner]).dot(OUTWARDS) < -1e-5);
-    assert_eq!(rig.state.x[1], rig.model.rest_positions_m()[1]);
+    assert!((rig.state.mechanical.x[corner] - rig.model.rest_positions_m()[corner]).dot(OUTWARDS) < -1e-5);
+    assert_eq!(rig.state.mechanical.x[1], rig.model.rest_positions_m()[1]);
 }
 
 #[test]
@@ -178,10 +178,10 @@ fn a_restored_run_continues_with_the_same_bits() {
     assert_eq!(restore(&other.model, &bytes), Err(SnapshotError::OtherBody));
     // Particles are part of the hash, and nodes that are not where the model has them are refused.
     let mut moved = first.state.clone();
-    moved.seed.as_mut().unwrap().now.particles.x[0].x += 1e-9;
+    moved.body.as_seed_mut().unwrap().now.particles.x[0].x += 1e-9;
     assert_ne!(state_hash(&moved), state_hash(&first.state));
     let mut torn = first.state.clone();
-    torn.x[0].x += 1e-9;
+    torn.mechanical.x[0].x += 1e-9;
     assert_eq!(restore(&first.model, &save(&first.model, &torn)), Err(SnapshotError::OtherBody));
 }
 
@@ -196,13 +196,16 @@ fn what_bursts_is_contained() {
         let in_m = 6e-3 * f64::from(tick.min(100)) / 100.0;
         quarantined = rig.tick_at(OUTWARDS * (FACE_M + 0.01 - in_m)).quarantined;
         if quarantined.is_some() {
-            assert_eq!((&rig.state.x, rig.state.tick), (&before.x, before.tick + 1));
+            assert_eq!(
+                (&rig.state.mechanical.x, rig.state.mechanical.tick),
+                (&before.mechanical.x, before.mechanical.tick + 1)
+            );
             break;
         }
     }
     assert!(awake > 100);
     assert!(quarantined.is_some() && quarantined == rig.state.quarantine);
-    let seed = &rig.state.seed.as_ref().unwrap().now;
+    let seed = &rig.state.body.as_seed().unwrap().now;
     assert!([&seed.core, &seed.skin, &seed.particles].iter().all(|part| part.v.iter().all(|v| *v == DVec3::ZERO)));
     assert_eq!(restore(&rig.model, &save(&rig.model, &rig.state)).unwrap(), rig.state);
     let held = rig.state.clone();
@@ -222,11 +225,12 @@ fn what_it_cannot_have_is_refused_by_name() {
         Model::build(spec).unwrap_err().to_string()
     };
     let parameters_of = |spec: &mut ModelSpec, change: &dyn Fn(&mut SeedParameters)| {
-        change(&mut spec.seed.as_mut().unwrap().parameters);
+        let BodySpec::Seed(seed) = &mut spec.body else { panic!("no seed body") };
+        change(&mut seed.parameters);
     };
     let refused: [(Change<'_>, &str); 11] = [
         (&|spec| spec.gravity_m_per_s2 = DVec3::NEG_Z, "cannot have gravity"),
-        (&|spec| spec.regions[0].density_kg_per_m3 = 900.0, "one St. Venant-Kirchhoff material"),
+        (&|spec| solid_mut(spec).regions[0].density_kg_per_m3 = 900.0, "one St. Venant-Kirchhoff material"),
         (&|spec| spec.prescribed[0].axes[1] = false, "hold all three"),
         (&|spec| spec.prescribed[0].nodes[0] = 99, "99"),
         (&|spec| spec.settings.integrator = Integrator::SeedVerlet, "it has its own two"),

@@ -8,7 +8,7 @@ use palpate_physics::{
     material::{Law, Viscosity},
     snapshot,
 };
-use rig::{Drive, Rig, at, body, bricks, even, hold, material, nodes_where, sphere};
+use rig::{Drive, Rig, at, body, bricks, even, hold, material, nodes_where, solid_mut, sphere};
 
 /// A block of two materials on its floor that rings and is pressed; only the upper half is viscous, or neither is.
 fn pressed_block(law: Law, upper: Viscosity) -> ModelSpec {
@@ -21,8 +21,8 @@ fn pressed_block(law: Law, upper: Viscosity) -> ModelSpec {
     let mut spec = body(mesh, lower);
     spec.prescribed = vec![hold("floor", floor, [true; 3])];
     let viscous = palpate_physics::material::Material { viscosity: upper, ..lower };
-    spec.regions.push(Region { name: "upper".into(), material: viscous, density_kg_per_m3: 1000.0 });
-    spec.tet_region = tet_region;
+    solid_mut(&mut spec).regions.push(Region { name: "upper".into(), material: viscous, density_kg_per_m3: 1000.0 });
+    solid_mut(&mut spec).tet_region = tet_region;
     spec.tools = vec![sphere(0.006, DVec3::new(0.002, 0.001, 0.0065), Coupling::Rigid)];
     spec
 }
@@ -30,7 +30,7 @@ fn pressed_block(law: Law, upper: Viscosity) -> ModelSpec {
 fn run(mut spec: ModelSpec, skip: bool) -> State {
     spec.settings.skips.viscous_terms = skip;
     let mut rig = Rig::new(spec);
-    for (v, x) in rig.state.v.iter_mut().zip(rig.model.rest_positions_m()) {
+    for (v, x) in rig.state.mechanical.v.iter_mut().zip(rig.model.rest_positions_m()) {
         *v = DVec3::new(x.y, -x.z, x.x) * 5.0;
     }
     for tick in 0..200 {
@@ -38,7 +38,7 @@ fn run(mut spec: ModelSpec, skip: bool) -> State {
         let drive = Drive { tools: vec![at(DVec3::new(0.002, 0.001, 0.0065 - depth_m))], ..rig.still() };
         rig.tick(&drive);
     }
-    assert!(rig.state.quarantine.is_none() && rig.state.tools[0].contacts > 0);
+    assert!(rig.state.quarantine.is_none() && rig.state.mechanical.tools[0].contacts > 0);
     rig.state
 }
 

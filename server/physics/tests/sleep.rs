@@ -4,9 +4,9 @@ mod rig;
 use glam::DVec3;
 use palpate_physics::{
     Energies, Integrator, LoadSpec, Model, ModelError, ModelSpec, PointForce, PrescribedSpec, contact::Coupling,
-    material::Law, snapshot,
+    material::Law, snapshot, tick::EnvironmentError,
 };
-use rig::{Drive, Rig, at, body, bricks, even, hold, material, nodes_where, sphere};
+use rig::{Drive, Rig, at, body, bricks, even, hold, material, nodes_where, solid_mut, sphere};
 
 const TOLERANCE_M: f64 = 1e-7;
 const RADIUS_M: f64 = 0.006;
@@ -36,7 +36,7 @@ fn drive(rig: &Rig, (tool, load, force): (DVec3, f64, Option<PointForce>)) -> Dr
 }
 
 fn farthest_m(a: &Rig, b: &Rig) -> f64 {
-    a.state.x.iter().zip(&b.state.x).map(|(a, b)| a.distance(*b)).fold(0.0, f64::max)
+    a.state.mechanical.x.iter().zip(&b.state.mechanical.x).map(|(a, b)| a.distance(*b)).fold(0.0, f64::max)
 }
 
 /// Runs the script with and without sleep; returns the ticks slept and the largest distance between the two bodies.
@@ -44,19 +44,19 @@ fn compare(spec: impl Fn(f64) -> ModelSpec, ticks: u32, script: Script) -> (Vec<
     let (mut sleepy, mut awake) = (Rig::new(spec(TOLERANCE_M)), Rig::new(spec(0.0)));
     let (mut slept, mut worst_m) = (Vec::new(), 0.0_f64);
     for tick in 0..ticks {
-        let before = sleepy.state.x.clone();
+        let before = sleepy.state.mechanical.x.clone();
         let was_asleep = sleepy.state.sleep.asleep;
         for rig in [&mut sleepy, &mut awake] {
             let input = drive(rig, script(tick));
             rig.tick(&input);
         }
         if was_asleep && sleepy.state.sleep.asleep {
-            assert_eq!(sleepy.state.x, before);
+            assert_eq!(sleepy.state.mechanical.x, before);
             slept.push(tick);
         }
         worst_m = worst_m.max(farthest_m(&sleepy, &awake));
     }
-    assert!(!awake.state.sleep.asleep && awake.state.tick == sleepy.state.tick);
+    assert!(!awake.state.sleep.asleep && awake.state.mechanical.tick == sleepy.state.mechanical.tick);
     (slept, worst_m)
 }
 
@@ -94,18 +94,18 @@ fn an_injected_force_and_a_prescribed_motion_wake_it_in_their_tick() {
         while !rig.state.sleep.asleep {
             let input = drive(&rig, (AWAY, 0.0, None));
             rig.tick(&input);
-            assert!(rig.state.tick < 3000);
+            assert!(rig.state.mechanical.tick < 3000);
         }
         let kinetic_j = Energies::of(&rig.model, &rig.state).kinetic_j;
         assert_eq!(kinetic_j, 0.0);
-        let force = PointForce { node: rig.state.x.len() as u32 - 1, force_n: DVec3::X * 0.01 };
+        let force = PointForce { node: rig.state.mechanical.x.len() as u32 - 1, force_n: DVec3::X * 0.01 };
         let mut input = drive(&rig, (AWAY, 0.0, (!moved).then_some(force)));
         if moved {
             input.prescribed[0] = DVec3::X * 1e-4;
         }
-        let before = rig.state.x.clone();
+        let before = rig.state.mechanical.x.clone();
         rig.tick(&input);
-        assert!(!rig.state.sleep.asleep && rig.state.x != before, "moved {moved}");
+        assert!(!rig.state.sleep.asleep && rig.state.mechanical.x != before, "moved {moved}");
     }
 }
 
@@ -134,7 +134,7 @@ fn what_creeps_does_not_sleep_far_from_rest() {
         let spec = |tolerance_m| {
             let mut spec = block(tolerance_m);
             spec.gravity_m_per_s2 = DVec3::ZERO;
-            spec.regions[0].material.viscosity.psi_pa_s = psi_pa_s;
+            solid_mut(&mut spec).regions[0].material.viscosity.psi_pa_s = psi_pa_s;
             spec.settings.mass_damping_per_s = damping_per_s;
             if psi_pa_s > 0.0 {
                 // Leapfrog's step would be short.
@@ -203,7 +203,7 @@ fn the_ledger_balances_over_sleep() {
             balance.push(Energies::of(&rig.model, &rig.state).balance_j());
         }
     }
-    let moved_j = rig.state.ledger.dissipated_j;
+    let moved_j = rig.state.mechanical.ledger.dissipated_j;
     assert!(balance.iter().all(|b| b.abs() < 1e-3 * moved_j), "{balance:?} of {moved_j}");
 }
 
@@ -218,7 +218,10 @@ fn what_cannot_sleep_is_told() {
     for integrator in [Integrator::SeedVerlet, Integrator::SeedSemiImplicit] {
         let mut spec = block(TOLERANCE_M);
         spec.settings.integrator = integrator;
-        assert!(matches!(Model::build(spec), Err(ModelError::Setting { name: "sleep_tolerance_m", .. })));
+        assert!(matches!(
+            Model::build(spec).unwrap_err().environment(),
+            Some(EnvironmentError::Setting { name: "sleep_tolerance_m", .. })
+        ));
     }
     let mut spec = block(TOLERANCE_M);
     spec.settings.sleep_tolerance_m = -1.0;

@@ -9,14 +9,14 @@ use palpate_physics::{
     snapshot::{SnapshotError, restore, save, state_hash},
 };
 use proptest::prelude::*;
-use rig::{Rig, body, bricks, even, hold, material, nodes_where, sphere};
+use rig::{Rig, body, bricks, even, hold, material, nodes_where, solid_mut, sphere};
 
 fn spec() -> ModelSpec {
     let side = even(-0.02, 0.02, 4);
     let mesh = bricks(&side, &side, &even(-0.02, 0.0, 2));
     let bottom = nodes_where(&mesh, |p| p.z < -0.0199);
     let mut spec = body(mesh, material(Law::StableNeoHookean, 10e3, 0.4));
-    spec.regions[0].material.viscosity = Viscosity { phi_pa_s: 0.1, psi_pa_s: 0.1 };
+    solid_mut(&mut spec).regions[0].material.viscosity = Viscosity { phi_pa_s: 0.1, psi_pa_s: 0.1 };
     spec.prescribed = vec![hold("bottom", bottom, [true; 3])];
     let coupling = Coupling::Spring { stiffness_n_per_m: 200.0, damping_n_s_per_m: 1.0, mass_kg: 0.02 };
     spec.tools = vec![sphere(0.008, DVec3::new(0.0, 0.0, 0.0085), coupling)];
@@ -34,7 +34,7 @@ fn run(rig: &mut Rig, ticks: std::ops::Range<u32>) {
 fn rubbing() -> Rig {
     let mut rig = Rig::new(spec());
     run(&mut rig, 0..70);
-    assert!(rig.state.tools[0].contacts > 0 && rig.state.tools[0].friction_heat_j > 0.0);
+    assert!(rig.state.mechanical.tools[0].contacts > 0 && rig.state.mechanical.tools[0].friction_heat_j > 0.0);
     rig
 }
 
@@ -61,9 +61,9 @@ fn friction_and_stiffness_memory_are_part_of_it() {
     let rig = rubbing();
     let mut plain = rig.state.clone();
     let back = restore(&rig.model, &save(&rig.model, &rig.state)).unwrap();
-    assert_eq!(back.contact, rig.state.contact);
-    plain.contact = rig.model.contact().state();
-    assert_ne!(plain.contact, rig.state.contact);
+    assert_eq!(back.mechanical.contact, rig.state.mechanical.contact);
+    plain.mechanical.contact = rig.model.contact().state();
+    assert_ne!(plain.mechanical.contact, rig.state.mechanical.contact);
     let mut with = Rig { state: back, ..Rig::new(spec()) };
     let mut without = Rig { state: plain, ..Rig::new(spec()) };
     run(&mut with, 70..100);
@@ -76,8 +76,8 @@ fn another_model_is_refused_whatever_differs() {
     let rig = rubbing();
     let bytes = save(&rig.model, &rig.state);
     let changes: [fn(&mut ModelSpec); 7] = [
-        |s| s.regions[0].density_kg_per_m3 = 1001.0,
-        |s| s.regions[0].material.lame.mu_pa *= 1.0 + 1e-15,
+        |s| solid_mut(s).regions[0].density_kg_per_m3 = 1001.0,
+        |s| solid_mut(s).regions[0].material.lame.mu_pa *= 1.0 + 1e-15,
         |s| s.tools[0].friction_coefficient = 0.41,
         |s| s.tools[0].radius_m = 0.009,
         |s| s.settings.step_safety = 0.8,
@@ -115,12 +115,12 @@ fn each_defect_has_its_own_error() {
 fn a_number_that_is_not_finite_is_refused_wherever_it_is() {
     let rig = rubbing();
     let changes: [fn(&mut palpate_physics::State); 6] = [
-        |s| s.x[3].y = f64::NAN,
-        |s| s.force_n[0].x = f64::INFINITY,
-        |s| s.ledger.external_work_j = f64::NAN,
-        |s| s.tools[0].target.position_m.z = f64::NAN,
-        |s| s.tools[0].friction_heat_j = f64::NEG_INFINITY,
-        |s| s.viscous.before_w = f64::NAN,
+        |s| s.mechanical.x[3].y = f64::NAN,
+        |s| s.mechanical.force_n[0].x = f64::INFINITY,
+        |s| s.mechanical.ledger.external_work_j = f64::NAN,
+        |s| s.mechanical.tools[0].target.position_m.z = f64::NAN,
+        |s| s.mechanical.tools[0].friction_heat_j = f64::NEG_INFINITY,
+        |s| s.mechanical.viscous.before_w = f64::NAN,
     ];
     for (index, change) in changes.into_iter().enumerate() {
         let mut state = rig.state.clone();

@@ -4,7 +4,8 @@ mod support;
 use faer::{Mat, Side};
 use glam::DVec3;
 use palpate_physics::{
-    Model, ModelSpec, Precision, PrescribedSpec, Region, Scratch, Settings, State, Substeps, TetMesh, TickInput,
+    BodySpec, Model, ModelSpec, Precision, PrescribedSpec, Region, Scratch, Settings, Solid, State, Substeps, TetMesh,
+    TickInput,
     elements::{
         linear_tet::RestTet,
         mass,
@@ -155,15 +156,15 @@ fn growth(fraction: f64, ticks: u32) -> f64 {
     let mut random = Random(11);
     let mesh = block([4, 3, 3], 5e-3, 0.15, &mut random);
     let spec = |tick_period_s: f64| ModelSpec {
-        particles: None,
-        seed: None,
-        springs: None,
-        regions: vec![Region {
-            name: "body".into(),
-            material: material(10e3, 0.45, Law::StableNeoHookean),
-            density_kg_per_m3: 1000.0,
-        }],
-        tet_region: vec![0; mesh.tets().len()],
+        body: BodySpec::Tet(Solid {
+            mesh: mesh.clone(),
+            regions: vec![Region {
+                name: "body".into(),
+                material: material(10e3, 0.45, Law::StableNeoHookean),
+                density_kg_per_m3: 1000.0,
+            }],
+            tet_region: vec![0; mesh.tets().len()],
+        }),
         prescribed: vec![PrescribedSpec { name: "base".into(), nodes: (0..20).collect(), axes: [true; 3] }],
         loads: vec![],
         gravity_m_per_s2: DVec3::ZERO,
@@ -175,12 +176,11 @@ fn growth(fraction: f64, ticks: u32) -> f64 {
             subcycle_unstable: false,
             ..Settings::default()
         },
-        mesh: mesh.clone(),
     };
-    let omega = Model::build(spec(1e-3)).unwrap().max_natural_frequency_rad_per_s();
+    let omega = Model::build(spec(1e-3)).unwrap().body().max_natural_frequency_rad_per_s();
     let model = Model::build(spec(fraction * 2.0 / omega)).unwrap();
     let mut state = State::at_rest(&model);
-    for (x, inverse_mass) in state.x.iter_mut().zip(model.inverse_mass_per_kg()) {
+    for (x, inverse_mass) in state.mechanical.x.iter_mut().zip(model.body().as_tet().unwrap().inverse_mass_per_kg()) {
         if inverse_mass.x > 0.0 {
             *x += random.vector() * 1e-9;
         }
@@ -194,8 +194,8 @@ fn growth(fraction: f64, ticks: u32) -> f64 {
             return f64::INFINITY;
         }
     }
-    let u: f64 = state.x.iter().zip(model.rest_positions_m()).map(|(x, r)| (*x - *r).length_squared()).sum();
-    (u / (state.x.len() as f64 * 1e-18)).sqrt()
+    let u: f64 = state.mechanical.x.iter().zip(model.rest_positions_m()).map(|(x, r)| (*x - *r).length_squared()).sum();
+    (u / (state.mechanical.x.len() as f64 * 1e-18)).sqrt()
 }
 
 #[test]

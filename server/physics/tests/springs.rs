@@ -4,19 +4,19 @@ mod rig;
 use assert_no_alloc::{AllocDisabler, assert_no_alloc};
 use glam::{DQuat, DVec3};
 use palpate_physics::{
-    Energies, LoadSpec, ModelSpec, PointForce, PrescribedSpec, Settings, State, Substeps, TetMesh,
+    BodySpec, BodyState, Energies, LoadSpec, ModelSpec, PointForce, PrescribedSpec, Settings, State, Substeps,
     bodies::mass_spring::{
-        HomeLaw, Net, Refinement, Refining, SpringBodySpec, SpringSpec,
+        HomeLaw, MassSpringSpec, Net, Refinement, Refining, SpringSpec,
         calibration::{Calibration, ConstantsTable},
         equilibrium::settle,
         net::hexagonal_patch,
-        refine_only,
         region::Constants,
     },
     contact::{Coupling, ToolShape, ToolSpec, ToolTarget},
     snapshot,
+    world::refine_only,
 };
-use rig::{Drive, Rig, at, sphere};
+use rig::{Drive, Rig, at, sphere, springs_mut};
 
 #[global_allocator]
 static ALLOCATOR: AllocDisabler = AllocDisabler;
@@ -32,10 +32,7 @@ fn sheet(rings: i32, refinement: Option<Refinement>) -> ModelSpec {
     let vertices = surface.positions_m().len();
     let border: Vec<u32> = (0..vertices as u32).filter(|&vertex| surface.is_border(vertex)).collect();
     ModelSpec {
-        mesh: TetMesh::of_points(Vec::new()),
-        particles: None,
-        seed: None,
-        springs: Some(SpringBodySpec {
+        body: BodySpec::MassSpring(MassSpringSpec {
             springs: SpringSpec {
                 coarse: COARSE,
                 fine: FINE,
@@ -49,8 +46,6 @@ fn sheet(rings: i32, refinement: Option<Refinement>) -> ModelSpec {
             refinement,
             table: None,
         }),
-        regions: Vec::new(),
-        tet_region: Vec::new(),
         prescribed: vec![PrescribedSpec { name: "border".into(), nodes: border, axes: [true; 3] }],
         loads: Vec::new(),
         gravity_m_per_s2: DVec3::ZERO,
@@ -64,7 +59,7 @@ fn refined(rings: u32, by: Refining) -> Refinement {
 }
 
 fn refined_nodes(rig: &Rig) -> usize {
-    rig.state.springs.as_ref().unwrap().refined_nodes(rig.model.springs().unwrap())
+    rig.state.body.as_mass_spring().unwrap().refined_nodes(rig.model.body().as_mass_spring().unwrap())
 }
 
 fn energies(rig: &Rig) -> Energies {
@@ -73,7 +68,7 @@ fn energies(rig: &Rig) -> Energies {
 
 /// Down over so many ticks, to a centre at height `z_m`.
 fn press(rig: &mut Rig, z_m: f64, ticks: u32) {
-    let from = rig.state.tools[0].target.position_m;
+    let from = rig.state.mechanical.tools[0].target.position_m;
     for tick in 1..=ticks {
         let part = f64::from(tick) / f64::from(ticks);
         rig.tick_at(DVec3::new(from.x, from.y, from.z + (z_m - from.z) * part));
@@ -81,7 +76,7 @@ fn press(rig: &mut Rig, z_m: f64, ticks: u32) {
 }
 
 fn force_n(rig: &Rig) -> f64 {
-    rig.state.tools[0].device_force_n.length()
+    rig.state.mechanical.tools[0].device_force_n.length()
 }
 
 #[test]
@@ -135,7 +130,7 @@ fn the_ledger_closes_while_a_tool_is_dragged_across() {
         }
         press(&mut rig, 0.02, 400);
         let e = energies(&rig);
-        let given_j = rig.state.springs.as_ref().unwrap().given_j;
+        let given_j = rig.state.body.as_mass_spring().unwrap().given_j;
         println!("given by levels {given_j:.2e} J, held while pressed {pressed_j:.2e} J, {e:?}");
         // Levels on their way drive no tool on.
         assert!(most > 42 && given_j < -1e-8 && given_j > -0.05 * pressed_j, "{most} {given_j}");
@@ -177,7 +172,7 @@ fn the_force_does_not_step_when_the_surface_is_refined() {
 fn with_a_calibrated_table_a_point_feels_alike_on_both() {
     for depth_m in [0.4e-3, 0.8e-3, 1.2e-3] {
         let mut spec = sheet(8, Some(refined(2, Refining::ByHand)));
-        let own = spec.springs.as_mut().unwrap();
+        let own = springs_mut(&mut spec);
         let of = Calibration { coarse: COARSE, rings: 2, ratio: 5.0, samples: 3 };
         own.table = Some(ConstantsTable::calibrate(&own.springs.surface, of, &mut |_| ()).unwrap());
         spec.tools[0].radius_m = 0.5e-3;
@@ -227,7 +222,7 @@ fn looking_at_all_triangles_or_going_on_from_a_snapshot_gives_the_same_bits() {
     for (most_awake, path) in [(usize::MAX, tour as fn(u32) -> DVec3), (60, tour), (usize::MAX, taps), (60, taps)] {
         let spec = || {
             let mut spec = sheet(10, Some(refined(2, Refining::ByTools)));
-            let springs = &mut spec.springs.as_mut().unwrap().springs;
+            let springs = &mut springs_mut(&mut spec).springs;
             springs.most_awake = springs.most_awake.min(most_awake);
             spec.tools[0].friction_coefficient = 0.3;
             spec
@@ -248,10 +243,13 @@ fn looking_at_all_triangles_or_going_on_from_a_snapshot_gives_the_same_bits() {
             }
             assert_eq!(snapshot::state_hash(&rig.state), snapshot::state_hash(&slow.state), "tick {tick}");
             if let Some(restored) = &restored {
-                assert_eq!(restored.state.x, rig.state.x, "tick {tick}");
+                assert_eq!(restored.state.mechanical.x, rig.state.mechanical.x, "tick {tick}");
             }
         }
-        assert!(rig.state.contact == slow.state.contact || rig.state.tools == slow.state.tools);
+        assert!(
+            rig.state.mechanical.contact == slow.state.mechanical.contact
+                || rig.state.mechanical.tools == slow.state.mechanical.tools
+        );
         assert!(restored.is_some());
     }
 }
@@ -267,10 +265,11 @@ fn damaged_and_foreign_snapshots_are_refused() {
         assert!(snapshot::restore(&rig.model, &bad).is_err(), "byte {at}");
     }
     let mut softer = sheet(6, Some(refined(1, Refining::ByTools)));
-    softer.springs.as_mut().unwrap().springs.fine.home_n_per_m *= 0.5;
+    springs_mut(&mut softer).springs.fine.home_n_per_m *= 0.5;
     assert_eq!(snapshot::restore(&Rig::new(softer).model, &good), Err(snapshot::SnapshotError::OtherBody));
     let mut mangled = rig.state.clone();
-    mangled.springs.as_mut().unwrap().motion.ids.swap(3, 4);
+    let BodyState::MassSpring(own) = &mut mangled.body else { panic!("no springs") };
+    own.motion.ids.swap(3, 4);
     let bytes = snapshot::save(&rig.model, &mangled);
     assert_eq!(snapshot::restore(&rig.model, &bytes), Err(snapshot::SnapshotError::OtherBody));
 }
@@ -280,7 +279,7 @@ fn damaged_and_foreign_snapshots_are_refused() {
 fn far_vertices_sleep() {
     let run = |most_awake: usize| {
         let mut spec = sheet(20, Some(refined(2, Refining::ByTools)));
-        spec.springs.as_mut().unwrap().springs.most_awake = most_awake;
+        springs_mut(&mut spec).springs.most_awake = most_awake;
         let mut rig = Rig::new(spec);
         press(&mut rig, 1.5e-3, 300);
         let mut forces = Vec::new();
@@ -289,7 +288,7 @@ fn far_vertices_sleep() {
             rig.tick_at(DVec3::new(x_m, 0.3 * x_m, 1.5e-3));
             forces.push(force_n(&rig));
         }
-        let awake = rig.state.x.len();
+        let awake = rig.state.mechanical.x.len();
         press(&mut rig, 0.03, 100);
         (0..1200).for_each(|_| press(&mut rig, 0.03, 1));
         (forces, awake, rig)
@@ -299,7 +298,7 @@ fn far_vertices_sleep() {
     assert!(all_awake > 1261 && (400..520).contains(&few_awake), "{all_awake} {few_awake}");
     let worst = all.iter().zip(&few).map(|(all, few)| (few / all - 1.0).abs()).fold(0.0, f64::max);
     assert!(worst < 2e-3, "{worst}");
-    assert_eq!(rig.state.x.len(), 0);
+    assert_eq!(rig.state.mechanical.x.len(), 0);
     let e = energies(&rig);
     // What falls asleep leaves nothing that is not told: with all awake the balance is as far off, by leapfrog's step.
     let apart_j = e.balance_j() - energies(&full).balance_j();
@@ -310,11 +309,11 @@ fn far_vertices_sleep() {
 #[test]
 fn a_force_wakes_where_it_is_injected() {
     let mut spec = sheet(20, None);
-    spec.springs.as_mut().unwrap().springs.most_awake = 200;
+    springs_mut(&mut spec).springs.most_awake = 200;
     spec.tools.clear();
     let mut rig = Rig::new(spec);
     let mut drive = rig.still();
-    assert!(rig.state.x.is_empty());
+    assert!(rig.state.mechanical.x.is_empty());
     drive.point_forces = vec![PointForce { node: 40, force_n: DVec3::Z * -1e-3 }];
     for _ in 0..400 {
         rig.tick(&drive);
@@ -322,7 +321,7 @@ fn a_force_wakes_where_it_is_injected() {
     let mut surface = Vec::new();
     rig.model.surface_positions_m(&rig.state, &mut surface);
     let depth_m = rig.model.surface_rest_positions_m()[40].z - surface[40].z;
-    assert_eq!(rig.state.x.len(), 200);
+    assert_eq!(rig.state.mechanical.x.len(), 200);
     assert!((depth_m - 1e-3 / COARSE.home_n_per_m).abs() < 0.02 * depth_m, "{depth_m}");
 }
 
@@ -340,12 +339,12 @@ fn loads_and_weight_come_to_rest_in_balance() {
     }
     let e = energies(&rig);
     assert!(e.kinetic_j < 1e-9 * e.elastic_j && e.balance_j().abs() < 1e-3 * e.external_work_j, "{e:?}");
-    let total: DVec3 = rig.state.force_n.iter().sum();
+    let total: DVec3 = rig.state.mechanical.force_n.iter().sum();
     let held: DVec3 = rig.scratch.reactions_n().iter().copied().sum();
     // What is free is in balance; the holders carry the rest.
     assert!((total + held).length() < 1e-7, "{total} {held}");
     // The plain springs, settled by Newton's method.
-    let body = rig.model.springs().unwrap().model();
+    let body = rig.model.body().as_mass_spring().unwrap().model();
     // At home: Loop's scheme smooths the border.
     let homes = body.rest_m()[..body.vertices() as usize].to_vec();
     let net = Net::uniform(&body.surface().moved(homes).unwrap(), COARSE.mesh_n_per_m, COARSE.home_n_per_m);
@@ -354,7 +353,8 @@ fn loads_and_weight_come_to_rest_in_balance() {
     external_n[0] += DVec3::new(4e-3, 0.0, -0.01);
     let mut settled_m = net.rest_m.clone();
     settle(&net, &is_held, &external_n, &mut settled_m, 1e-12).unwrap();
-    let worst_m = rig.state.x.iter().zip(&settled_m).map(|(x, settled)| x.distance(*settled)).fold(0.0, f64::max);
+    let worst_m =
+        rig.state.mechanical.x.iter().zip(&settled_m).map(|(x, settled)| x.distance(*settled)).fold(0.0, f64::max);
     assert!(worst_m < 1e-8 && settled_m[0].z < -8e-4, "{worst_m} {}", settled_m[0]);
 }
 
@@ -365,7 +365,7 @@ fn ticks_allocate_nothing() {
     {
         let mut spec = sheet(10, Some(refined(2, Refining::ByTools)));
         spec.tools[0].shape = shape;
-        let springs = &mut spec.springs.as_mut().unwrap().springs;
+        let springs = &mut springs_mut(&mut spec).springs;
         springs.most_awake = springs.most_awake.min(most_awake);
         springs.home_law = HomeLaw::cubic(1e4).unwrap();
         let mut rig = Rig::new(spec);
@@ -381,8 +381,8 @@ fn ticks_allocate_nothing() {
                 drive.tools[0] = ToolTarget { position_m, orientation, ..still };
                 drive.point_forces[0] = PointForce { node: tick % 300, force_n: DVec3::Z * 1e-3 };
                 rig.tick(&drive);
-                layouts += u32::from(rig.state.x.len() != nodes);
-                nodes = rig.state.x.len();
+                layouts += u32::from(rig.state.mechanical.x.len() != nodes);
+                nodes = rig.state.mechanical.x.len();
                 if tick % 500 == 0 {
                     saved.copy_from(&rig.state);
                 }
@@ -410,8 +410,8 @@ fn a_tool_in_the_air_hurries_no_levels() {
             drive.tools[1] = at(DVec3::new(swing_m * (20.0 * f64::from(tick) * 1e-3).sin(), 0.0, 0.06));
             rig.tick(&drive);
         }
-        assert!(refined_nodes(&rig) > 0 && rig.state.tools[0].contacts > 0);
-        rig.state.x
+        assert!(refined_nodes(&rig) > 0 && rig.state.mechanical.tools[0].contacts > 0);
+        rig.state.mechanical.x
     };
     assert!(beneath(0.0) == beneath(0.05), "its speed is seen in the positions");
 }
@@ -423,7 +423,6 @@ fn what_springs_cannot_have_is_refused_by_name() {
         change(&mut spec);
         palpate_physics::Model::build(spec).unwrap_err().to_string()
     };
-    let springs = |spec: &mut ModelSpec| spec.springs.take().unwrap();
     assert!(refused(&|spec| spec.prescribed[0].axes = [true, false, true]).contains("along some axes"));
     assert!(refused(&|spec| spec.settings.sleep_tolerance_m = 1e-6).contains("sleeps as a whole"));
     assert!(
@@ -432,17 +431,14 @@ fn what_springs_cannot_have_is_refused_by_name() {
     assert!(refused(&|spec| spec.prescribed[0].nodes.push(400)).contains("node 400 is out of range"));
     assert!(
         refused(&|spec| {
-            let mut own = springs(spec);
-            own.refinement = Some(Refinement { rings: 0, follows_dent: false, fade_s: 0.1, by: Refining::ByTools });
-            spec.springs = Some(own);
+            let none = Refinement { rings: 0, follows_dent: false, fade_s: 0.1, by: Refining::ByTools };
+            springs_mut(spec).refinement = Some(none);
         })
         .contains("rings = 0")
     );
     assert!(
         refused(&|spec| {
-            let mut own = springs(spec);
-            own.springs.most_awake = 10;
-            spec.springs = Some(own);
+            springs_mut(spec).springs.most_awake = 10;
             spec.gravity_m_per_s2 = DVec3::Z;
         })
         .contains("gravity")

@@ -9,7 +9,7 @@ use palpate_physics::{
     material::{Law, Viscosity},
     snapshot,
 };
-use rig::{Drive, Rig, body, bricks, even, hold, material, nodes_where, sphere};
+use rig::{Drive, Rig, body, bricks, even, hold, material, mesh_of, nodes_where, solid_mut, sphere};
 use support::Random;
 
 fn block() -> ModelSpec {
@@ -20,7 +20,7 @@ fn block() -> ModelSpec {
 /// Ticks of one step at `ratio` times the longest stable one of the body without viscosity.
 fn one_step(mut spec: ModelSpec, ratio: f64) -> Rig {
     spec.settings.substeps = Substeps::Fixed(1);
-    let omega = Rig::new(spec.clone()).model.max_natural_frequency_rad_per_s();
+    let omega = Rig::new(spec.clone()).model.body().max_natural_frequency_rad_per_s();
     spec.settings.tick_period_s = 2.0 * ratio / omega;
     Rig::new(spec)
 }
@@ -28,7 +28,9 @@ fn one_step(mut spec: ModelSpec, ratio: f64) -> Rig {
 /// Random speeds in all modes: small enough for a linear body, or not.
 fn strike(rig: &mut Rig, speed_m_per_s: f64, seed: u64) {
     let mut random = Random(seed);
-    for (v, inverse_mass) in rig.state.v.iter_mut().zip(rig.model.inverse_mass_per_kg()) {
+    for (v, inverse_mass) in
+        rig.state.mechanical.v.iter_mut().zip(rig.model.body().as_tet().unwrap().inverse_mass_per_kg())
+    {
         if inverse_mass.x > 0.0 {
             *v = random.vector() * speed_m_per_s;
         }
@@ -99,7 +101,7 @@ fn mass_damping_neither_alarms_nor_hides() {
                 assert_eq!(ring(struck(ratio), 500).0, None, "{damping_per_s} /s, r = {ratio}, seed {seed}");
             }
             // |z| = 1 at k = 4 cosh ½c dt: what is damped is stable a little further.
-            let omega = struck(1.0).model.max_natural_frequency_rad_per_s();
+            let omega = struck(1.0).model.body().max_natural_frequency_rad_per_s();
             let ratio =
                 (100..200).map(|r| 0.01 * f64::from(r)).find(|r| r * r > 1.2 * (damping_per_s * r / omega).cosh());
             let (first, _, growth) = ring(struck(ratio.unwrap()), 500);
@@ -112,11 +114,11 @@ fn mass_damping_neither_alarms_nor_hides() {
 #[test]
 fn viscosity_shortens_the_step_that_is_noticed() {
     let ratio = 0.7;
-    let omega = one_step(block(), ratio).model.max_natural_frequency_rad_per_s();
+    let omega = one_step(block(), ratio).model.body().max_natural_frequency_rad_per_s();
     let edge_s = 0.5 * (2.0 * ratio / omega) * (1.0 / (ratio * ratio) - 1.0);
     for (times, noticed) in [(0.8, false), (1.1, true), (2.0, true)] {
         let mut spec = block();
-        let material = &mut spec.regions[0].material;
+        let material = &mut solid_mut(&mut spec).regions[0].material;
         let tau_s = times * edge_s;
         material.viscosity =
             Viscosity { phi_pa_s: tau_s * material.lame.lambda_pa, psi_pa_s: tau_s * material.lame.mu_pa };
@@ -131,15 +133,17 @@ fn viscosity_shortens_the_step_that_is_noticed() {
 
 /// ω_max (rad/s) of the body as it is now, by power iteration on `M⁻¹K(x)`.
 fn frequency_now(rig: &Rig, direction: &mut [DVec3]) -> f64 {
-    let (model, kernel) = (&rig.model, rig.model.kernel());
+    let (model, kernel) = (&rig.model, rig.model.body().as_tet().unwrap().kernel());
     let (mut scratch, mut product) = (kernel.scratch_for_products(), vec![DVec3::ZERO; direction.len()]);
-    kernel.linearise_at(model.rest_positions_m(), &rig.state.x, &mut scratch);
+    kernel.linearise_at(model.rest_positions_m(), &rig.state.mechanical.x, &mut scratch);
     let mut largest = 0.0;
     for _ in 0..100 {
         kernel.products_n([-1.0, 0.0], direction, &mut product, &mut scratch);
-        let weighted: f64 = direction.iter().zip(model.mass_kg()).map(|(a, m)| a.length_squared() * m).sum();
+        let weighted: f64 = direction.iter().zip(model.body().mass_kg()).map(|(a, m)| a.length_squared() * m).sum();
         largest = direction.iter().zip(&product).map(|(a, p)| a.dot(*p)).sum::<f64>() / weighted;
-        for ((a, p), inverse_mass) in direction.iter_mut().zip(&product).zip(model.inverse_mass_per_kg()) {
+        for ((a, p), inverse_mass) in
+            direction.iter_mut().zip(&product).zip(model.body().as_tet().unwrap().inverse_mass_per_kg())
+        {
             *a = *p * *inverse_mass / largest;
         }
     }
@@ -153,17 +157,17 @@ fn a_body_that_stiffens_past_the_limit_while_it_is_stretched() {
     let mesh = bricks(&even(-0.04, 0.04, 8), &side, &side);
     let mut spec = body(mesh, material(Law::StVenantKirchhoff, 10e3, 0.3));
     let ends = [("left", -1.0), ("right", 1.0)]
-        .map(|(name, sign)| hold(name, nodes_where(&spec.mesh, |p| sign * p.x > 0.0399), [true; 3]));
+        .map(|(name, sign)| hold(name, nodes_where(mesh_of(&spec), |p| sign * p.x > 0.0399), [true; 3]));
     spec.prescribed = ends.to_vec();
     let run = |subcycle_unstable: bool| {
         let mut spec = spec.clone();
         spec.settings.subcycle_unstable = subcycle_unstable;
         let mut rig = one_step(spec, 0.9);
         strike(&mut rig, 1e-4, 3);
-        let period_s = rig.model.spec().settings.tick_period_s;
+        let period_s = rig.model.settings().tick_period_s;
         let mut direction: Vec<DVec3> = {
             let mut random = Random(7);
-            rig.state.x.iter().map(|_| random.vector()).collect()
+            rig.state.mechanical.x.iter().map(|_| random.vector()).collect()
         };
         let (mut crossed, mut noticed, mut moved_j, mut gained_j) = (None, None, 0.0_f64, 0.0_f64);
         for tick in 1..=3000_u32 {
@@ -206,8 +210,8 @@ fn pressed(precision: Precision, ratio: Option<f64>) -> Rig {
     let mut spec = block();
     spec.settings.precision = precision;
     spec.gravity_m_per_s2 = DVec3::new(0.0, 0.0, -9.81);
-    spec.prescribed = vec![hold("floor", nodes_where(&spec.mesh, |p| p.z < -0.0199), [true; 3])];
-    spec.regions[0].material.viscosity = Viscosity { phi_pa_s: 0.02, psi_pa_s: 0.02 };
+    spec.prescribed = vec![hold("floor", nodes_where(mesh_of(&spec), |p| p.z < -0.0199), [true; 3])];
+    solid_mut(&mut spec).regions[0].material.viscosity = Viscosity { phi_pa_s: 0.02, psi_pa_s: 0.02 };
     spec.tools = vec![sphere(0.008, DVec3::new(0.0, 0.0, 0.0085), Coupling::Rigid)];
     spec.tools[0].friction_coefficient = 0.4;
     match ratio {
@@ -227,17 +231,17 @@ fn switched_off_and_on_agree_bit_for_bit_where_steps_are_stable() {
     for precision in [Precision::Single, Precision::Double] {
         for ratio in [None, Some(0.5)] {
             let mut on = pressed(precision, ratio);
-            let mut spec = on.model.spec().clone();
+            let mut spec = on.spec.clone();
             spec.settings.subcycle_unstable = false;
             let mut off = Rig::new(spec);
             for tick in 0..3000 {
                 assert_eq!(press(&mut on, tick).repeated, 0, "{precision:?}, {ratio:?}, tick {tick}");
                 press(&mut off, tick);
             }
-            assert!(on.state.tools[0].contacts > 0);
-            assert_eq!(on.state.x, off.state.x);
-            assert_eq!(on.state.v, off.state.v);
-            assert_eq!(on.state.ledger, off.state.ledger);
+            assert!(on.state.mechanical.tools[0].contacts > 0);
+            assert_eq!(on.state.mechanical.x, off.state.mechanical.x);
+            assert_eq!(on.state.mechanical.v, off.state.mechanical.v);
+            assert_eq!(on.state.mechanical.ledger, off.state.mechanical.ledger);
         }
     }
 }
@@ -252,7 +256,7 @@ fn a_repeated_tick_is_the_tick_in_more_substeps() {
         let report = press(&mut rig, tick);
         assert_eq!(report.quarantined, None);
         if report.repeated > 0 {
-            let mut at_once = Rig { state: before, ..Rig::new(rig.model.spec().clone()) };
+            let mut at_once = Rig { state: before, ..Rig::new(rig.spec.clone()) };
             at_once.state.pace.substeps = report.substeps;
             let direct = press(&mut at_once, tick);
             assert_eq!((direct.substeps, direct.repeated), (report.substeps, 0));
@@ -261,7 +265,7 @@ fn a_repeated_tick_is_the_tick_in_more_substeps() {
             checked += 1;
         }
     }
-    assert!(checked > 0 && rig.state.tools[0].friction_heat_j > 0.0, "{checked}");
+    assert!(checked > 0 && rig.state.mechanical.tools[0].friction_heat_j > 0.0, "{checked}");
 }
 
 /// What a tick is judged by is part of the state: alarm and repetition come in the same ticks after a restore.
@@ -272,7 +276,7 @@ fn a_restored_run_is_judged_as_the_one_that_went_on() {
     for tick in 0..300 {
         let bytes = snapshot::save(&first.model, &first.state);
         let mut second =
-            Rig { state: snapshot::restore(&first.model, &bytes).unwrap(), ..Rig::new(first.model.spec().clone()) };
+            Rig { state: snapshot::restore(&first.model, &bytes).unwrap(), ..Rig::new(first.spec.clone()) };
         let report = press(&mut first, tick);
         assert_eq!(press(&mut second, tick), report);
         assert_eq!(first.state, second.state);

@@ -33,9 +33,9 @@ fn every_example_loads_without_warnings_and_builds() {
         assert_eq!(scene.name, path.file_stem().unwrap().to_str().unwrap());
         let model = Model::build(scene.model.clone()).unwrap_or_else(|error| panic!("{}: {error}", path.display()));
         assert!(model.substeps() <= 100, "{}: {} substeps", path.display(), model.substeps());
-        assert_eq!(scene.timeline.loads.len(), model.spec().loads.len());
-        assert_eq!(scene.timeline.prescribed.len(), model.spec().prescribed.len());
-        assert_eq!(scene.drivers.len(), model.spec().tools.len());
+        assert_eq!(scene.timeline.loads.len(), model.loads().len());
+        assert_eq!(scene.timeline.prescribed.len(), model.prescribed().len());
+        assert_eq!(scene.drivers.len(), model.tools().len());
     }
 }
 
@@ -69,7 +69,7 @@ fn the_capsule_is_turned_where_it_is_pressed_beside_its_middle() {
     use palpate_physics::{Scratch, State, TickInput, contact::ToolShape};
     let scene = load(&folder().join("capsule-press.toml"));
     let model = Model::build(scene.model.clone()).unwrap();
-    assert!(matches!(model.spec().tools[0].shape, ToolShape::Capsule(_)));
+    assert!(matches!(model.tools()[0].shape, ToolShape::Capsule(_)));
     let (mut state, mut scratch) = (State::at_rest(&model), Scratch::new(&model));
     let mut torques_nm = Vec::new();
     for tick in 1..=2000_u32 {
@@ -82,7 +82,8 @@ fn the_capsule_is_turned_where_it_is_pressed_beside_its_middle() {
         };
         palpate_physics::step(&model, &mut state, &mut scratch, &input);
         if tick % 1500 == 500 {
-            torques_nm.push((state.tools[0].contact_force_n.z, state.tools[0].contact_torque_nm.y));
+            torques_nm
+                .push((state.mechanical.tools[0].contact_force_n.z, state.mechanical.tools[0].contact_torque_nm.y));
         }
     }
     let [(middle_n, middle_nm), (edge_n, edge_nm)] = torques_nm[..] else { panic!("{torques_nm:?}") };

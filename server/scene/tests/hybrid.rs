@@ -60,10 +60,10 @@ region = "z_min"
 #[test]
 fn regions_choose_nodes_of_the_tets_and_triangles_of_the_skin() {
     let scene = scene(BLOCK);
-    let particles = scene.model.particles.as_ref().unwrap();
+    let particles = &scene.model.body.as_hybrid().unwrap().particles;
     let held = &scene.model.prescribed[0].nodes;
     assert_eq!(held.len(), 9);
-    assert!(held.iter().all(|&node| scene.model.mesh.positions_m()[node as usize].z == 1e-3));
+    assert!(held.iter().all(|&node| scene.model.body.solid().unwrap().mesh.positions_m()[node as usize].z == 1e-3));
     let LoadSpec::Traction { triangles, .. } = &scene.model.loads[0] else { panic!("a traction") };
     let area = |&triangle: &u32| {
         let [a, b, c] = particles.skin.corners_m(triangle as usize);
@@ -114,8 +114,8 @@ fn the_table_bears_what_the_skin_is_loaded_with() {
     assert!(moved.z < -1e-5 && (value("top") - moved).length() < 0.1 * moved.length(), "{moved} {}", value("top"));
     let reaction = value("table");
     assert!(reaction.z > 0.01 && reaction.truncate().length() < 1e-2 * reaction.z, "{reaction}");
-    let LoadSpec::Traction { triangles, .. } = &model.spec().loads[0] else { panic!("a traction") };
-    let skin = &model.spec().particles.as_ref().unwrap().skin;
+    let LoadSpec::Traction { triangles, .. } = &model.loads()[0] else { panic!("a traction") };
+    let skin = &model.body().as_hybrid().unwrap().particles().skin;
     let area: f64 = triangles
         .iter()
         .map(|&t| {
@@ -134,7 +134,7 @@ fn the_ventricles_lattice_lies_in_its_cut() {
          [body.particles]\nspacing_mm = 5\n[[fixed]]\nregion = \"base\"\n[[load]]\nregion = \"inner\"\npressure_pa = 10\n\
          follower = true\namplitude.constant = 1\n",
     );
-    let particles = scene.model.particles.as_ref().unwrap();
+    let particles = &scene.model.body.as_hybrid().unwrap().particles;
     assert!((particles.lattice_through_m - DVec3::new(0.0, 0.0, 0.0225)).length() < 1e-9);
     let LoadSpec::Pressure { triangles, .. } = &scene.model.loads[0] else { panic!("a pressure") };
     let axes = DVec3::new(0.0315, 0.0315, 0.0765);
@@ -155,8 +155,8 @@ fn two_surfaces_become_a_skin_and_coarse_tets() {
     );
     let scene = parse(&text, "t.toml", Some(&data), &Limits::local(), &mut |_, _| {})
         .unwrap_or_else(|error| panic!("{}", error.one_line()));
-    let skin = &scene.model.particles.as_ref().unwrap().skin;
-    let volume = scene.model.mesh.total_volume_m3();
+    let skin = &scene.model.body.as_hybrid().unwrap().particles.skin;
+    let volume = scene.model.body.solid().unwrap().mesh.total_volume_m3();
     assert!((skin.volume_m3() / volume - 1.0).abs() < 0.02, "{} {volume}", skin.volume_m3());
     for triangle in 0..skin.triangles().len() {
         let [a, b, c] = skin.corners_m(triangle);
@@ -182,7 +182,7 @@ fn loaded(text: &str) -> Result<Scene, String> {
 #[test]
 fn particles_that_cannot_be_are_told_at_their_key() {
     let good = loaded(&small("spacing_mm = 1.25", "")).unwrap();
-    let particles = good.model.particles.unwrap();
+    let particles = good.model.body.as_hybrid().unwrap().particles.clone();
     assert_eq!(particles.most_active, 600);
     assert_eq!(good.summary.surface_triangles, particles.skin.triangles().len());
     assert!((particles.skin.volume_m3() - 1e-6).abs() < 1e-15);
@@ -245,7 +245,9 @@ fn particles_that_cannot_be_are_told_at_their_key() {
 
 #[test]
 fn a_finer_skin_and_larger_cells_deep_down_are_what_was_asked_for() {
-    let of = |more: &str| loaded(&small("spacing_mm = 1.25", more)).unwrap().model.particles.unwrap();
+    let of = |more: &str| {
+        loaded(&small("spacing_mm = 1.25", more)).unwrap().model.body.as_hybrid().unwrap().particles.clone()
+    };
     let (same, two_sizes, finer) = (of(""), of("fine_depth_mm = 1.25"), of("skin_edge_mm = 0.6"));
     assert_eq!((same.fine_depth_m, two_sizes.fine_depth_m), (None, Some(1.25e-3)));
     let longest_m = |particles: &ParticleSpec| {
@@ -279,7 +281,7 @@ fn a_mesh_files_boundary_becomes_a_fine_skin() {
     let text = "[scene]\nname = \"t\"\n[body.mesh]\nfile = \"heart.node\"\nunit = \"mm\"\n[body.particles]\nspacing_mm = 8\n\
                 [[material]]\nlaw = \"stvk\"\nyoung_modulus_pa = 1e4\npoisson_ratio = 0.3\ndensity_kg_per_m3 = 1000\n";
     let scene = parse(text, "t.toml", Some(folder.path()), &Limits::local(), &mut |_, _| {}).unwrap();
-    let skin = scene.model.particles.unwrap().skin;
+    let skin = scene.model.body.as_hybrid().unwrap().particles.skin.clone();
     assert!((skin.volume_m3() / (0.08_f64.powi(3) / 6.0) - 1.0).abs() < 1e-12);
     for triangle in 0..skin.triangles().len() {
         let [a, b, c] = skin.corners_m(triangle);

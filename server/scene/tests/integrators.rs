@@ -44,13 +44,16 @@ fn every_name_is_read_and_runs() {
         let input = TickInput {
             tools: &[],
             load_factors: &[],
-            prescribed_displacements_m: &vec![glam::DVec3::ZERO; model.spec().prescribed.len()],
+            prescribed_displacements_m: &vec![glam::DVec3::ZERO; model.prescribed().len()],
             point_forces: &[],
         };
         for _ in 0..10 {
             assert!(step(&model, &mut state, &mut scratch, &input).quarantined.is_none());
         }
-        assert!(state.x.iter().zip(model.rest_positions_m()).any(|(x, rest)| x.z < rest.z), "{name} stands still");
+        assert!(
+            state.mechanical.x.iter().zip(model.rest_positions_m()).any(|(x, rest)| x.z < rest.z),
+            "{name} stands still"
+        );
     }
 }
 

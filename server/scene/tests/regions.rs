@@ -61,7 +61,7 @@ fn volume_1_and_surface_1_are_two_regions() {
         let rest = "[[fixed]]\nregion = \"surface 1\"\n[[region]]\nname = \"left\"\nselect.physical_group = \"volume 1\"\n\
                     [[region]]\nname = \"tip\"\nselect.physical_group = \"3\"\n";
         let scene = bar(file, rest).unwrap();
-        let (mesh, held) = (&scene.model.mesh, &scene.model.prescribed[0].nodes);
+        let (mesh, held) = (&scene.model.body.solid().unwrap().mesh, &scene.model.prescribed[0].nodes);
         assert!(!held.is_empty() && held.iter().all(|&node| mesh.positions_m()[node as usize].x == 0.0), "{file}");
         let (volume, surface) = (part(&scene, "volume 1"), part(&scene, "surface 1"));
         assert!(volume.tets > 0 && volume.nodes > surface.nodes, "{file}");
@@ -93,10 +93,10 @@ fn groups_of_tets_share_out_the_surface() {
     let scene = bar(UNNAMED[0], &pressed(&["{ region = \"volume 1\" }", "{ region = \"right\" }"])).unwrap();
     partition(&scene);
     for (side, triangles) in [(0.0..2.0 + 1e-9, &triangles(&scene)[0]), (2.0 - 1e-9..4.0, &triangles(&scene)[1])] {
-        let surface = palpate_physics::Surface::of(&scene.model.mesh).unwrap();
+        let surface = palpate_physics::Surface::of(&scene.model.body.solid().unwrap().mesh).unwrap();
         for &triangle in triangles {
             let corners = surface.triangle_nodes(triangle as usize);
-            let x_mm = corners.map(|node| scene.model.mesh.positions_m()[node as usize].x * 1e3);
+            let x_mm = corners.map(|node| scene.model.body.solid().unwrap().mesh.positions_m()[node as usize].x * 1e3);
             assert!(x_mm.iter().all(|x| (side.start - 1e-9..side.end + 1e-9).contains(x)), "{x_mm:?}");
         }
     }

@@ -3,7 +3,7 @@
 use glam::DVec3;
 use palpate_physics::{
     LoadSpec, Model, Scratch, State, TickInput,
-    bodies::seed::{PaperModel, SeedBodySpec, SeedParameters, SeedSpec},
+    bodies::seed::{PaperModel, SeedParameters, SeedSpec},
     material::{Convention, Lame, Viscosity},
     step,
 };
@@ -32,15 +32,16 @@ fn the_shipped_scenes_are_the_papers_models() {
             let changed = text.replace("convention = \"paper-2006\"", &format!("convention = \"{convention}\""));
             let spec = loaded(&changed).unwrap().model;
             let wanted = paper_model(paper, parameters).unwrap();
-            assert_eq!(spec.mesh, wanted.core, "{name}");
+            let seed = spec.body.as_seed().unwrap();
+            assert_eq!(seed.core.mesh, wanted.core, "{name}");
             assert_eq!(spec.prescribed[0].nodes, wanted.held_nodes, "{name}");
             let SeedSpec { layer, parameters, .. } = wanted;
-            assert_eq!(spec.seed, Some(SeedBodySpec { layer, parameters }), "{name} {convention}");
+            assert_eq!((&seed.layer, seed.parameters), (&layer, parameters), "{name} {convention}");
             assert_eq!(spec.settings.tick_period_s, parameters.dt_s);
         }
         let model = Model::build(loaded(text).unwrap().model).unwrap();
         assert_eq!(model.substeps(), 1);
-        let mass_kg: f64 = model.mass_kg().iter().sum();
+        let mass_kg: f64 = model.body().mass_kg().iter().sum();
         let told_kg = loaded(text).unwrap().summary.mass_kg;
         assert!((mass_kg / told_kg - 1.0).abs() < 1e-2, "{name}: {mass_kg} of {told_kg} kg");
     }
@@ -55,7 +56,7 @@ fn the_shipped_scenes_run_and_push_back() {
         let (mut state, mut scratch) = (State::at_rest(&model), Scratch::new(&model));
         let (mut row, mut most_n, mut most_m) = ([0.0; 3], 0.0_f64, 0.0_f64);
         while state.time_s(&model) < 0.6 * scene.output.duration_s {
-            let time_s = (state.tick + 1) as f64 * model.spec().settings.tick_period_s;
+            let time_s = (state.mechanical.tick + 1) as f64 * model.settings().tick_period_s;
             let input = TickInput {
                 tools: &[scene.offline_target(0, time_s)],
                 load_factors: &[],
@@ -96,7 +97,7 @@ fn a_scene_of_ones_own_gives_its_parameters() {
                 [[probe]]\nname = \"holder\"\nmeasure = \"reaction\"\nregion = \"inner\"\n";
     let scene = loaded(&text(SEED, MATERIAL, rest)).unwrap();
     assert_eq!(scene.warnings, Vec::<String>::new());
-    let seed = scene.model.seed.clone().unwrap();
+    let seed = scene.model.body.as_seed().unwrap().clone();
     let SeedParameters { convention, lame, viscosity, dt_s, density_kg_per_m3, .. } = seed.parameters;
     assert_eq!((convention, lame), (Convention::Consistent, Lame { lambda_pa: 6.0, mu_pa: 3.0 }));
     assert_eq!(viscosity, Viscosity { phi_pa_s: 1e-3, psi_pa_s: 0.0 });

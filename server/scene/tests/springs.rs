@@ -4,7 +4,7 @@ use glam::DVec3;
 use palpate_physics::{
     Model,
     bodies::mass_spring::{
-        HomeLaw, SpringBodySpec,
+        HomeLaw, MassSpringSpec,
         calibration::{Calibration, ConstantsTable},
     },
 };
@@ -44,9 +44,9 @@ fn scene(text: &str) -> Result<Scene, SceneError> {
     parse(text, "t.toml", None, &Limits::local(), &mut |_, _| {})
 }
 
-fn springs(text: &str) -> SpringBodySpec {
+fn springs(text: &str) -> MassSpringSpec {
     let scene = scene(text).unwrap_or_else(|error| panic!("{}", error.one_line()));
-    scene.model.springs.unwrap()
+    scene.model.body.as_mass_spring().unwrap().clone()
 }
 
 /// The message for the good scene with one thing replaced.
@@ -59,7 +59,7 @@ fn refused(from: &str, to: &str) -> String {
 fn a_part_of_a_shape_becomes_the_surface() {
     let scene = scene(BOX).unwrap();
     assert_eq!(scene.warnings, Vec::<String>::new());
-    let springs = scene.model.springs.as_ref().unwrap();
+    let springs = scene.model.body.as_mass_spring().unwrap();
     let surface = &springs.springs.surface;
     assert_eq!((surface.positions_m().len(), surface.triangles().len()), (81, 128));
     assert!(surface.positions_m().iter().all(|p| (p.z - 0.01).abs() < 1e-12));
@@ -72,7 +72,7 @@ fn a_part_of_a_shape_becomes_the_surface() {
     let held: usize = scene.model.prescribed.iter().map(|set| set.nodes.len()).sum();
     assert_eq!(held, 32);
     let model = Model::build(scene.model).unwrap();
-    assert!(model.springs().unwrap().is_all_awake());
+    assert!(model.body().as_mass_spring().unwrap().is_all_awake());
     assert_eq!(model.surface().triangles.len(), 512);
 }
 
@@ -93,7 +93,8 @@ fn there_is_room_for_what_tools_refine() {
     assert_eq!([room(&format!("{BOX}{long}")), room(&format!("{all}{long}"))], [128, 128]);
     let asked = |most: usize| {
         let text = fine.replace("constants = \"area\"", &format!("constants = \"area\"\nmost_triangles = {most}"));
-        scene(&format!("{text}{sphere}{capsule}")).map(|scene| scene.model.springs.unwrap().springs.most_refined)
+        scene(&format!("{text}{sphere}{capsule}"))
+            .map(|scene| scene.model.body.as_mass_spring().unwrap().springs.most_refined)
     };
     assert_eq!(asked(about_shaft).unwrap(), about_shaft);
     let message = asked(about_shaft - 1).unwrap_err().one_line();
@@ -220,7 +221,7 @@ fn a_file_and_its_table() {
     let of = Calibration { coarse: wanted.coarse, rings: 1, ratio: 5.0, samples: 2 };
     let table = ConstantsTable::calibrate(&wanted.surface, of, &mut |_| ()).unwrap();
     std::fs::write(&wanted.table, serde_json::to_string(&table).unwrap()).unwrap();
-    let springs = load().unwrap().model.springs.unwrap();
+    let springs = load().unwrap().model.body.as_mass_spring().unwrap().clone();
     assert_eq!(springs.table.as_ref(), Some(&table));
     assert_eq!(springs.springs.surface.positions_m().len(), 49);
 
@@ -275,7 +276,7 @@ fn probes_follow_the_surface() {
     let model = Model::build(scene.model).unwrap();
     let mut state = palpate_physics::State::at_rest(&model);
     let middle = (0..81).find(|&v| model.rest_positions_m()[v].distance(DVec3::new(0.02, 0.02, 0.0)) < 1e-9).unwrap();
-    state.x[middle].z -= 1e-3;
+    state.mechanical.x[middle].z -= 1e-3;
     let mut row = [0.0; 3];
     probe.evaluate_with(&model, &state, &[], &mut row);
     assert!((row[2] + 1e-3).abs() < 1e-12, "{row:?}");

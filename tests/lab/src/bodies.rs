@@ -2,7 +2,7 @@
 use glam::DVec3;
 use miette::{IntoDiagnostic, Result};
 use palpate_physics::{
-    Model, ModelSpec, PrescribedSpec, Region, Settings,
+    BodySpec, Model, ModelSpec, PrescribedSpec, Region, Settings, Solid,
     contact::{Coupling, ToolShape, ToolSpec},
     material::{Convention, Lame, Law, Material, Viscosity},
 };
@@ -28,14 +28,18 @@ pub fn ellipsoid(tets: u32) -> Result<Shape> {
 
 /// A model of a shape held at its base, if it has one, with a rigid spherical tool beside it if `tool_radius_m` is given.
 pub fn model(shape: &Shape, material: Material, tool: Option<ToolSpec>) -> Result<Model> {
+    Model::build(spec(shape, material, tool)).into_diagnostic()
+}
+
+/// What [`model`] is built from.
+pub fn spec(shape: &Shape, material: Material, tool: Option<ToolSpec>) -> ModelSpec {
     let base = shape.region("base").map(BoundaryRegion::nodes);
-    Model::build(ModelSpec {
-        mesh: shape.mesh.clone(),
-        particles: None,
-        seed: None,
-        springs: None,
-        regions: vec![Region { name: "body".into(), material, density_kg_per_m3: 1000.0 }],
-        tet_region: vec![0; shape.mesh.tets().len()],
+    ModelSpec {
+        body: BodySpec::Tet(Solid {
+            mesh: shape.mesh.clone(),
+            regions: vec![Region { name: "body".into(), material, density_kg_per_m3: 1000.0 }],
+            tet_region: vec![0; shape.mesh.tets().len()],
+        }),
         prescribed: base
             .map(|nodes| PrescribedSpec { name: "base".into(), nodes, axes: [true; 3] })
             .into_iter()
@@ -44,8 +48,7 @@ pub fn model(shape: &Shape, material: Material, tool: Option<ToolSpec>) -> Resul
         gravity_m_per_s2: DVec3::ZERO,
         tools: tool.into_iter().collect(),
         settings: Settings::default(),
-    })
-    .into_diagnostic()
+    }
 }
 
 /// A rigid sphere of `radius_m`, touching the shape's widest side from +x.

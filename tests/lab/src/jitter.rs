@@ -1,5 +1,6 @@
 //! Wake-up lateness and cost of a 1 kHz loop with a body in it, and wake-up lateness of `cyclictest` beside it if it is
 //! installed (Debian package rt-tests).
+use crate::methods::tet_body;
 use crate::{bodies, press::Press};
 use clap::Args;
 use miette::{IntoDiagnostic, Result, miette};
@@ -38,7 +39,7 @@ pub fn print(options: &Options) -> Result<()> {
         "{} s at {RATE_HZ} Hz each, in turns of 1 s, SCHED_FIFO {}; body: ventricle, 90 mm, {} tets, {} substeps, pressed 1 mm",
         options.seconds,
         options.priority,
-        model.mesh().tets().len(),
+        tet_body(&model).mesh().tets().len(),
         model.substeps()
     );
     let ours = Arc::new(LoopMonitor::default());

@@ -19,14 +19,14 @@ impl<'m> Press<'m> {
     /// Tools go along −x from where they start, `depth_m` deep within `approach_ticks`.
     pub fn new(model: &'m Model, depth_m: f64, approach_ticks: usize) -> Self {
         let mut state = State::at_rest(model);
-        for (v, x) in state.v.iter_mut().zip(model.rest_positions_m()) {
+        for (v, x) in state.mechanical.v.iter_mut().zip(model.rest_positions_m()) {
             *v = DVec3::new(x.y, x.x, 0.0);
         }
         Self {
             state,
             scratch: Scratch::new(model),
-            prescribed_m: vec![DVec3::ZERO; model.spec().prescribed.len()],
-            targets: vec![ToolTarget::default(); model.spec().tools.len()],
+            prescribed_m: vec![DVec3::ZERO; model.prescribed().len()],
+            targets: vec![ToolTarget::default(); model.tools().len()],
             model,
             depth_m,
             approach_ticks,
@@ -37,7 +37,7 @@ impl<'m> Press<'m> {
     /// One tick.
     pub fn tick(&mut self) -> StepReport {
         let depth_m = self.depth_m * (self.tick as f64 / self.approach_ticks as f64).min(1.0);
-        for (target, tool) in self.targets.iter_mut().zip(&self.model.spec().tools) {
+        for (target, tool) in self.targets.iter_mut().zip(self.model.tools()) {
             target.position_m = tool.start_position_m - DVec3::X * depth_m;
         }
         self.tick += 1;
@@ -57,6 +57,6 @@ impl<'m> Press<'m> {
 
     /// Contact samples of the first tool that carry force.
     pub fn contacts(&self) -> u32 {
-        self.state.tools.first().map_or(0, |tool| tool.contacts)
+        self.state.mechanical.tools.first().map_or(0, |tool| tool.contacts)
     }
 }

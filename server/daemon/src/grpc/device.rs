@@ -115,7 +115,7 @@ fn welcome(
     tool: usize,
     (max_force_n, max_torque_nm): (f64, f64),
 ) -> v1::DeviceWelcome {
-    let spec = &session.model.spec().tools[tool];
+    let spec = &session.model.tools()[tool];
     let (stiffness, damping) = match spec.coupling {
         Coupling::Rigid => (0.0, 0.0),
         Coupling::Spring { stiffness_n_per_m, damping_n_s_per_m, .. } => (stiffness_n_per_m, damping_n_s_per_m),
@@ -124,7 +124,7 @@ fn welcome(
     v1::DeviceWelcome {
         session_id: session.id.clone(),
         tool_name: spec.name.clone(),
-        tick_period_s: session.model.spec().settings.tick_period_s,
+        tick_period_s: session.model.settings().tick_period_s,
         limits: Some(v1::DeviceLimits {
             max_force_n,
             max_force_rate_n_per_s: limits.force.max_force_rate_n_per_s,

@@ -174,7 +174,7 @@ impl Session for SessionService {
     async fn snapshot(&self, request: Request<v1::SnapshotRequest>) -> Result<Response<v1::SnapshotResponse>, Status> {
         let session = current_session(&self.daemon, &small(request)?.session_id)?;
         let (copy, _, room) = self.copy(&session).await?;
-        let (tick, model) = (copy.state.tick, Arc::clone(&session.model));
+        let (tick, model) = (copy.state.mechanical.tick, Arc::clone(&session.model));
         let save = move || {
             let saved = (snapshot::save(&model, &copy.state), snapshot::state_hash(&copy.state));
             drop((copy, room));
@@ -200,7 +200,7 @@ impl Session for SessionService {
         };
         let (state_hash, state, _room) =
             blocking(read).await?.map_err(|error| Status::invalid_argument(error.to_string()))?;
-        let response = v1::RestoreResponse { tick: state.tick, state_hash };
+        let response = v1::RestoreResponse { tick: state.mechanical.tick, state_hash };
         self.order(&session, Order::Restore(Box::new(state))).await?;
         Ok(Response::new(response))
     }

@@ -83,7 +83,7 @@ fn print_body(scene: &Scene) {
         let sets = [(part.nodes, "node"), (part.triangles, "triangle"), (part.tets, "tet")];
         println!("region     {:<16} {}", part.name, sets.map(|(count, what)| counted(count, what)).join(", "));
     }
-    for region in &scene.model.regions {
+    for region in scene.model.body.solid().map_or(&[][..], |solid| &solid.regions) {
         let lame = region.material.lame;
         println!(
             "material   {:<16} {}, E {} Pa, nu {}, {} kg/m3",
@@ -97,7 +97,8 @@ fn print_body(scene: &Scene) {
 }
 
 fn print_particles(model: &Model) {
-    let (Some(hybrid), Some(spec)) = (model.hybrid(), &model.spec().particles) else { return };
+    let Some(hybrid) = model.body().as_hybrid() else { return };
+    let spec = hybrid.particles();
     let cage = hybrid.cage();
     println!(
         "particles  {}, {} mm apart, at most {} awake; skin of {}",
@@ -137,7 +138,8 @@ fn particle_warnings(model: &Model) -> Vec<String> {
     const FEW_WHOLE: f64 = 0.2;
     /// Of the particles outside the coarse tets.
     const MANY_OUTSIDE: f64 = 0.1;
-    let (Some(hybrid), Some(spec)) = (model.hybrid(), &model.spec().particles) else { return Vec::new() };
+    let Some(hybrid) = model.body().as_hybrid() else { return Vec::new() };
+    let spec = hybrid.particles();
     let partition = hybrid.partition();
     let mut warnings = Vec::new();
     if partition.whole_part() < FEW_WHOLE {
@@ -165,7 +167,7 @@ fn particle_warnings(model: &Model) -> Vec<String> {
 
 /// Of the papers' hybrid.
 fn print_seed(model: &Model) {
-    let Some(seed) = model.seed() else { return };
+    let Some(seed) = model.body().as_seed().map(palpate_physics::bodies::seed::SeedBody::model) else { return };
     let parameters = seed.parameters();
     println!("seed       the papers' own hybrid; steps of {} ms", short(parameters.dt_s * 1e3));
     if let Some(layer) = seed.layer() {
@@ -190,7 +192,7 @@ fn print_seed(model: &Model) {
 
 /// Of a mass-spring surface.
 fn print_springs(model: &Model) {
-    let Some(body) = model.springs() else { return };
+    let Some(body) = model.body().as_mass_spring() else { return };
     let spec = body.model().spec();
     let of = |constants: &Constants| {
         format!("K_m {} N/m, K_h {} N/m", short(constants.mesh_n_per_m), short(constants.home_n_per_m))
@@ -218,7 +220,7 @@ fn print_time(model: &Model, cost: &Cost) {
         "time       tick {} ms, {}; highest natural frequency {} Hz",
         short(period_us * 1e-3),
         counted(cost.all.substeps_per_tick as usize, "substep"),
-        short(model.max_natural_frequency_rad_per_s() / std::f64::consts::TAU)
+        short(model.body().max_natural_frequency_rad_per_s() / std::f64::consts::TAU)
     );
     let line = |us: &Percentiles, ticks: u64, with: &str| {
         let build = if cfg!(debug_assertions) { ", in an UNOPTIMISED build" } else { "" };

@@ -5,7 +5,7 @@ use super::{
     summary::{Percentiles, TimeNumbers},
 };
 use glam::DVec3;
-use palpate_physics::{Model, bodies::hybrid::Waking};
+use palpate_physics::{BodySpec, Model, bodies::hybrid::Waking};
 use palpate_scene::Scene;
 use std::time::{Duration, Instant};
 
@@ -48,7 +48,7 @@ pub(super) fn measure(scene: &Scene, model: &Model) -> miette::Result<Cost> {
     let mut run = Run::new(scene, model)?;
     let all = run_for(&mut run, scene, model)?;
     let (tick_wall_us, ticks, most) = run.cost_awake();
-    let awake = if ticks >= ENOUGH_TICKS && model.hybrid().is_some() {
+    let awake = if ticks >= ENOUGH_TICKS && model.body().as_hybrid().is_some() {
         Some(AwakeCost { tick_wall_us, ticks, most, untouched: false })
     } else {
         woken(scene, model)?
@@ -74,8 +74,8 @@ fn woken(scene: &Scene, model: &Model) -> miette::Result<Option<AwakeCost>> {
         return Ok(None);
     }
     let mut by_hand = scene.clone();
-    if let Some(spec) = &mut by_hand.model.particles {
-        spec.waking = Waking::ByHand;
+    if let BodySpec::Hybrid(spec) = &mut by_hand.model.body {
+        spec.particles.waking = Waking::ByHand;
     }
     let model = load::build(&by_hand)?;
     let mut run = Run::new(&by_hand, &model)?;
@@ -91,10 +91,8 @@ fn woken(scene: &Scene, model: &Model) -> miette::Result<Option<AwakeCost>> {
 
 /// The particles that the first tool would wake where it is nearest to the body, the nearest first.
 fn near_first_tool(scene: &Scene, model: &Model) -> Vec<u32> {
-    let (Some(hybrid), Some(spec), Some(tool)) = (model.hybrid(), &scene.model.particles, scene.model.tools.first())
-    else {
-        return Vec::new();
-    };
+    let (Some(hybrid), Some(tool)) = (model.body().as_hybrid(), scene.model.tools.first()) else { return Vec::new() };
+    let spec = hybrid.particles();
     let Waking::ByTools { reach_m } = spec.waking else { return Vec::new() };
     let partition = hybrid.partition();
     let all = || (0..partition.particle_count() as u32).filter(|&particle| hybrid.may_wake(particle));

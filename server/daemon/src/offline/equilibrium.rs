@@ -12,7 +12,7 @@ use crate::progress::Progress;
 use glam::DVec3;
 use miette::Diagnostic;
 use palpate_physics::{
-    Model,
+    BodySpec, Model,
     contact::ToolTarget,
     statics::{self, SolveError, StaticSettings, StaticSolution},
 };
@@ -56,13 +56,13 @@ struct NoEquilibrium {
 pub fn run(args: &StaticArgs) -> miette::Result<ExitCode> {
     let output = &args.output;
     let scene = load::load_with_warnings(&output.scene)?;
-    if scene.model.springs.is_some() {
+    if let BodySpec::MassSpring(_) = scene.model.body {
         return Err(miette::miette!(
             help = "let `palpated simulate` come to rest",
             "the equilibrium of a mass-spring surface is not solved for"
         ));
     }
-    if scene.model.seed.is_some() {
+    if let BodySpec::Seed(_) = scene.model.body {
         return Err(miette::miette!(
             help = "let `palpated simulate` come to rest, or put [body.particles] in place of [body.seed]: that hybrid's equilibrium is solved for",
             "\"{}\" is the papers' hybrid, whose forces have no equilibrium that is solved for",
@@ -98,7 +98,7 @@ pub fn run(args: &StaticArgs) -> miette::Result<ExitCode> {
         rounding_n: solution.rounding_n,
         stable: solution.stable,
         inverted_tets: solution.inverted_tets,
-        spread_loads: scene.model.particles.is_some().then_some(solution.awake.spread_loads),
+        spread_loads: (model.body().particle_count() > 0).then_some(solution.awake.spread_loads),
     });
     if let Some(out) = &out {
         summary.write(out)?;
@@ -144,7 +144,8 @@ fn solve(scene: &Scene, model: &Model, goal: &Goal, residual: Option<f64>) -> mi
         ));
         if interrupt.is_set() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     };
-    let solved = statics::solve_static(model, &goal.load_factors, &goal.prescribed_m, &goal.tools, &settings, &mut show);
+    let solved =
+        statics::solve_static(model, &goal.load_factors, &goal.prescribed_m, &goal.tools, &settings, &mut show);
     bar.finish();
     solved.map_err(|cause| NoEquilibrium { scene: scene.name.clone(), advice: advice(&cause), cause }.into())
 }
@@ -152,6 +153,7 @@ fn solve(scene: &Scene, model: &Model, goal: &Goal, residual: Option<f64>) -> mi
 /// What to do about it.
 fn advice(cause: &SolveError) -> &'static str {
     match cause {
+        SolveError::NotForThisBody { .. } => "let `palpated simulate` come to rest",
         SolveError::UnderConstrained { .. } => "add a [[fixed]] region to the scene",
         SolveError::Cancelled { .. } => "it was interrupted; nothing was written",
         SolveError::ToolTooFar { .. } => {

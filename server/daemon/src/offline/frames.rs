@@ -32,25 +32,24 @@ impl Frames {
         std::fs::create_dir_all(&folder)
             .into_diagnostic()
             .wrap_err_with(|| format!("cannot create {}", folder.display()))?;
-        let region = model.spec().tet_region.iter().map(|&region| u32::from(region)).collect();
+        let regions = model.body().filling_tets().map_or(&[][..], |solid| &solid.tet_region);
+        let region = regions.iter().map(|&region| u32::from(region)).collect();
         let index = PvdIndex::create(&out.join(folder::INDEX))?;
         Ok(Self { folder: out.to_path_buf(), index, count: 0, region, displacement_m: Vec::new(), skin_m: Vec::new() })
     }
 
     /// Writes a frame and adds it to the index, so that an interrupted run can be opened.
     pub(super) fn write(&mut self, time_s: f64, model: &Model, state: &State) -> miette::Result<()> {
-        if model.particle_count() > 0 || model.springs().is_some() {
-            return self.write_skin(time_s, model, state);
-        }
+        let Some(solid) = model.body().filling_tets() else { return self.write_skin(time_s, model, state) };
         let rest = model.rest_positions_m();
         self.displacement_m.clear();
-        self.displacement_m.extend(state.x.iter().zip(rest).map(|(x, rest)| *x - *rest));
+        self.displacement_m.extend(state.mechanical.x.iter().zip(rest).map(|(x, rest)| *x - *rest));
         let frame = VtuFrame {
-            points: &state.x,
-            cells: Cells::Tets(model.mesh().tets()),
+            points: &state.mechanical.x,
+            cells: Cells::Tets(solid.mesh.tets()),
             point_data: &[
                 Field { name: "displacement_m", values: Values::Vectors(&self.displacement_m) },
-                Field { name: "velocity_m_per_s", values: Values::Vectors(&state.v) },
+                Field { name: "velocity_m_per_s", values: Values::Vectors(&state.mechanical.v) },
             ],
             cell_data: &[Field { name: "material", values: Values::Integers(&self.region) }],
             time_s: Some(time_s),

@@ -12,7 +12,7 @@ use crate::progress::Progress;
 use glam::DVec3;
 use hdrhistogram::Histogram;
 use miette::IntoDiagnostic;
-use palpate_physics::{Model, Scratch, State, TickInput, bodies::hybrid::wake_only, contact::ToolTarget, step};
+use palpate_physics::{Model, Scratch, State, TickInput, contact::ToolTarget, step, world::wake_only};
 use palpate_scene::Scene;
 use std::{process::ExitCode, time::Instant};
 
@@ -116,7 +116,7 @@ enum FrameRule {
 
 /// Ticks in a time, at least one.
 fn in_ticks(time_s: f64, model: &Model) -> u64 {
-    ((time_s / model.spec().settings.tick_period_s).round() as u64).max(1)
+    ((time_s / model.settings().tick_period_s).round() as u64).max(1)
 }
 
 impl Plan {
@@ -228,7 +228,7 @@ impl<'s> Run<'s> {
 
     /// One tick: the inputs at its end, then the step, whose wall time is recorded.
     pub(super) fn tick(&mut self) {
-        let time_s = (self.state.tick + 1) as f64 * self.model.spec().settings.tick_period_s;
+        let time_s = (self.state.mechanical.tick + 1) as f64 * self.model.settings().tick_period_s;
         for (tool, target) in self.targets.iter_mut().enumerate() {
             *target = self.scene.offline_target(tool, time_s);
         }
@@ -260,10 +260,10 @@ impl<'s> Run<'s> {
     /// What the ticks cost.
     pub(super) fn cost(&self) -> TimeNumbers {
         let wall = &self.tick_wall_ns;
-        let period_s = self.model.spec().settings.tick_period_s;
+        let period_s = self.model.settings().tick_period_s;
         TimeNumbers {
             tick_period_s: period_s,
-            ticks: self.state.tick,
+            ticks: self.state.mechanical.tick,
             substeps_per_tick: self.model.substeps(),
             repeated_ticks: self.repeated_ticks,
             asleep_ticks: self.asleep_ticks,

@@ -1,7 +1,7 @@
 //! What a run did, as JSON for programs and as lines for people.
 use super::{folder, probes::ProbeRows};
 use miette::{IntoDiagnostic, WrapErr};
-use palpate_physics::{Energies, Model, State, health, snapshot};
+use palpate_physics::{Energies, Model, State, snapshot, world};
 use palpate_scene::{Scene, wording::counted};
 use serde::Serialize;
 use std::{collections::BTreeMap, path::Path};
@@ -61,12 +61,12 @@ pub(super) struct ParticleNumbers {
 
 impl ParticleNumbers {
     pub(super) fn of(model: &Model, state: &State) -> Option<Self> {
-        (model.particle_count() > 0).then(|| Self {
-            count: model.particle_count(),
-            spacing_m: model.particle_spacing_m(),
-            most_active: model.most_awake_particles(),
+        (model.body().particle_count() > 0).then(|| Self {
+            count: model.body().particle_count(),
+            spacing_m: model.body().particle_spacing_m(),
+            most_active: model.body().most_awake_particles(),
             active: state.awake_particles(),
-            outside: model.hybrid().map_or(0, |hybrid| hybrid.cage().outside),
+            outside: model.body().as_hybrid().map_or(0, |hybrid| hybrid.cage().outside),
             skin_triangles: model.surface().triangles.len(),
         })
     }
@@ -185,9 +185,10 @@ impl Summary {
                 gravitational: energies.gravitational_j,
                 external_work: energies.external_work_j,
                 dissipated: energies.dissipated_j,
-                balance: (ending.command == "simulate" && model.seed().is_none()).then(|| energies.balance_j()),
+                balance: (ending.command == "simulate" && model.body().as_seed().is_none())
+                    .then(|| energies.balance_j()),
             },
-            min_volume_ratio: health::min_volume_ratio(model, state).0,
+            min_volume_ratio: world::min_volume_ratio(model, state).map_or(1.0, |smallest| smallest.ratio),
             probes,
             samples: rows.count(),
             frames: ending.frames,

@@ -26,7 +26,7 @@ pub fn startup(running: &Running, config: &ServeConfig, description: &str) -> St
             text,
             "particles  {}, {:.2} mm apart, at most {} awake",
             info.particle_count,
-            session.model.particle_spacing_m() * 1e3,
+            session.model.body().particle_spacing_m() * 1e3,
             info.most_active_particles,
         );
     }

@@ -2,11 +2,7 @@
 //! allocates on the loop's side once built.
 use super::bell::{Ear, bell};
 use glam::{DQuat, DVec3};
-use palpate_physics::{
-    Model, Quarantine,
-    bodies::{mass_spring::SpringMotion, seed::SeedModel},
-    contact::LocalContactModel,
-};
+use palpate_physics::{Model, Quarantine, bodies::mass_spring::SpringMotion, contact::LocalContactModel};
 use palpate_realtime::Doorbell;
 use std::{
     io,
@@ -237,8 +233,8 @@ pub struct LatticeSnapshot {
 impl LatticeSnapshot {
     /// Filled to the most it will ever hold: copies of it then have that room, too.
     fn full(model: &Model) -> Self {
-        let (Some(hybrid), Some(particles)) = (model.hybrid(), &model.spec().particles) else { return Self::default() };
-        let most = particles.most_active;
+        let Some(hybrid) = model.body().as_hybrid() else { return Self::default() };
+        let most = hybrid.particles().most_active;
         Self { x: vec![DVec3::ZERO; hybrid.node_count() + most], active: vec![0; most] }
     }
 }
@@ -255,7 +251,7 @@ pub struct SpringSnapshot {
 impl SpringSnapshot {
     /// Filled to the most it will ever hold: copies of it then have that room, too.
     fn full(model: &Model) -> Option<Self> {
-        let springs = model.springs()?.model();
+        let springs = model.body().as_mass_spring()?.model();
         Some(Self { motion: SpringMotion::filled(springs), x: vec![DVec3::ZERO; springs.most_nodes()] })
     }
 }
@@ -285,15 +281,15 @@ pub struct SurfaceEnd {
 pub fn surface(model: &Model) -> io::Result<(SurfacePort, SurfaceEnd)> {
     let (bell, ear) = bell()?;
     let (input, output) = triple_buffer(&SurfaceSnapshot {
-        displacements_m: if model.hybrid().is_some() || model.springs().is_some() {
+        displacements_m: if model.body().as_hybrid().is_some() || model.body().as_mass_spring().is_some() {
             Vec::new()
         } else {
             vec![[0.0; 3]; model.surface().nodes.len()]
         },
         lattice: LatticeSnapshot::full(model),
         springs: SpringSnapshot::full(model),
-        seed_particles_m: vec![DVec3::ZERO; model.seed().map_or(0, SeedModel::most_awake)],
-        tools: vec![ToolView::default(); model.spec().tools.len()],
+        seed_particles_m: vec![DVec3::ZERO; model.body().as_seed().map_or(0, |seed| seed.model().most_awake())],
+        tools: vec![ToolView::default(); model.tools().len()],
         ..Default::default()
     });
     Ok((SurfacePort { slot: input, bell }, SurfaceEnd { slot: output, ear }))

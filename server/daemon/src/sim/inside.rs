@@ -1,9 +1,9 @@
 //! Whether a point is inside the deformed body: asked now and then for a tool that waits to be clear of it.
 use glam::{DMat3, DVec3};
 use palpate_physics::{
-    Model, State,
+    Model, State, TetMesh,
     bodies::{
-        hybrid::{Hybrid, partition::NONE},
+        hybrid::{HybridBody, partition::NONE},
         mass_spring::topology::Edge,
     },
     contact::is_inside,
@@ -22,12 +22,12 @@ pub struct Inside {
 impl Inside {
     /// For a model.
     pub fn new(model: &Model) -> Self {
-        if let Some(springs) = model.springs() {
+        if let Some(springs) = model.body().as_mass_spring() {
             let surface = springs.model().surface();
             let is_closed = !surface.edges().iter().any(Edge::is_border);
             return Self { triangles: if is_closed { surface.triangles().to_vec() } else { Vec::new() } };
         }
-        let count = if model.hybrid().is_some() { 0 } else { model.surface().triangles.len() };
+        let count = if model.body().as_hybrid().is_some() { 0 } else { model.surface().triangles.len() };
         Self { triangles: (0..count).map(|triangle| model.surface().triangle_nodes(triangle)).collect() }
     }
 
@@ -38,21 +38,23 @@ impl Inside {
     ///
     /// Of springs, it is the surface at rest that is looked at, from which a tool's dent differs by little.
     pub fn holds(&self, model: &Model, state: &State, point_m: DVec3) -> bool {
-        if model.springs().is_some() {
+        if model.body().as_mass_spring().is_some() {
             return is_inside(point_m, &self.triangles, model.rest_positions_m());
         }
-        match model.hybrid() {
-            None => is_inside(point_m, &self.triangles, &state.x),
-            Some(hybrid) => at_rest(model, state, point_m).any(|rest_m| is_in_a_cell(hybrid, rest_m)),
+        match model.body().as_hybrid() {
+            None => is_inside(point_m, &self.triangles, &state.mechanical.x),
+            Some(hybrid) => {
+                at_rest(hybrid.coarse(), &state.mechanical.x, point_m).any(|rest_m| is_in_a_cell(hybrid, rest_m))
+            }
         }
     }
 }
 
 /// Where a point may be at rest (m): once for every coarse tet that holds it.
-fn at_rest<'a>(model: &'a Model, state: &'a State, point_m: DVec3) -> impl Iterator<Item = DVec3> + 'a {
-    let rest = model.mesh().positions_m();
-    model.mesh().tets().iter().filter_map(move |tet| {
-        let [a, b, c, d] = tet.map(|node| state.x[node as usize]);
+fn at_rest<'a>(coarse: &'a TetMesh, x: &'a [DVec3], point_m: DVec3) -> impl Iterator<Item = DVec3> + 'a {
+    let rest = coarse.positions_m();
+    coarse.tets().iter().filter_map(move |tet| {
+        let [a, b, c, d] = tet.map(|node| x[node as usize]);
         let local = DMat3::from_cols(b - a, c - a, d - a).inverse() * (point_m - a);
         let weights = [1.0 - local.element_sum(), local.x, local.y, local.z];
         let held = weights.iter().all(|&weight| weight >= -ROUNDING);
@@ -60,7 +62,7 @@ fn at_rest<'a>(model: &'a Model, state: &'a State, point_m: DVec3) -> impl Itera
     })
 }
 
-fn is_in_a_cell(hybrid: &Hybrid, rest_m: DVec3) -> bool {
+fn is_in_a_cell(hybrid: &HybridBody, rest_m: DVec3) -> bool {
     let sites = hybrid.partition().sites();
     let cell = sites.cell(sites.cell_near(rest_m));
     let local = (rest_m - sites.cell_m(cell)) / sites.spacing_m();
@@ -92,7 +94,7 @@ mod tests {
             let inside = Inside::new(&model);
             let mut state = State::at_rest(&model);
             let turn = glam::DQuat::from_rotation_y(1.0);
-            state.x.iter_mut().for_each(|x| *x = turn * *x + DVec3::X);
+            state.mechanical.x.iter_mut().for_each(|x| *x = turn * *x + DVec3::X);
             let holds = |x: f64, y: f64, z: f64| inside.holds(&model, &state, turn * DVec3::new(x, y, z) + DVec3::X);
             for [x, y, z] in [[0.038, 0.0, 0.0], [0.0, -0.038, 0.01], [0.0, 0.0, -0.083]] {
                 assert!(holds(x, y, z), "the wall at {x} {y} {z}, {particles}");

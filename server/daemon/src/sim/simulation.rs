@@ -69,7 +69,7 @@ impl Simulation {
     pub fn build(parts: Parts) -> io::Result<(Box<Self>, Ends)> {
         let Parts { session, model, timeline, drivers, arm, limits, demand } = parts;
         let (surface, surface_end) = exchange::surface(&model)?;
-        let period_s = model.spec().settings.tick_period_s;
+        let period_s = model.settings().tick_period_s;
         let mut tools = Vec::new();
         let mut tool_ends = Vec::new();
         for (index, driver) in drivers.into_iter().enumerate() {
@@ -85,10 +85,10 @@ impl Simulation {
             session,
             scratch: Scratch::new(&model),
             timeline,
-            targets: state.tools.iter().map(|tool| tool.target).collect(),
+            targets: state.mechanical.tools.iter().map(|tool| tool.target).collect(),
             tools,
-            load_factors: vec![0.0; model.spec().loads.len()],
-            prescribed_m: vec![DVec3::ZERO; model.spec().prescribed.len()],
+            load_factors: vec![0.0; model.loads().len()],
+            prescribed_m: vec![DVec3::ZERO; model.prescribed().len()],
             injections: Injections::default(),
             surface,
             rest_f32_m: keyframe::rest_positions_f32(&model),
@@ -113,7 +113,7 @@ impl Simulation {
 
     /// Period of the tick (s).
     pub fn period_s(&self) -> f64 {
-        self.model.spec().settings.tick_period_s
+        self.model.settings().tick_period_s
     }
 
     /// Whether no arm has a force.
@@ -143,11 +143,11 @@ impl Simulation {
 
     /// Takes another state of the same model. Does not allocate. False when it is not one of this model's.
     pub fn restore(&mut self, state: &State) -> bool {
-        if !copy_state(state, &mut self.state) {
+        if !self.state.try_copy_from(state) {
             return false;
         }
         self.injections.clear();
-        for (tool, state) in self.tools.iter_mut().zip(&self.state.tools) {
+        for (tool, state) in self.tools.iter_mut().zip(&self.state.mechanical.tools) {
             tool.restored(state);
         }
         true
@@ -156,37 +156,38 @@ impl Simulation {
     /// Fills the surface's slot and rings.
     pub(super) fn publish_surface(&mut self, tick_cost_us: f64) {
         let snapshot: &mut SurfaceSnapshot = self.surface.slot.input_buffer_mut();
-        snapshot.tick = self.state.tick;
+        snapshot.tick = self.state.mechanical.tick;
         snapshot.time_s = self.state.time_s(&self.model);
         snapshot.tick_cost_us = tick_cost_us;
         snapshot.quarantine = self.state.quarantine;
         snapshot.has_vertices = self.demand.wants_vertices();
-        for (view, (tool, state)) in snapshot.tools.iter_mut().zip(self.tools.iter().zip(&self.state.tools)) {
+        for (view, (tool, state)) in snapshot.tools.iter_mut().zip(self.tools.iter().zip(&self.state.mechanical.tools))
+        {
             *view = tool.view(state);
         }
-        if self.model.hybrid().is_some() {
-            snapshot.lattice.x.clone_from(&self.state.x);
+        if self.model.body().as_hybrid().is_some() {
+            snapshot.lattice.x.clone_from(&self.state.mechanical.x);
             snapshot.lattice.active.clear();
-            snapshot.lattice.active.extend_from_slice(self.state.active.ids());
+            snapshot.lattice.active.extend_from_slice(self.state.body.active_particles());
             self.surface.slot.publish();
             self.surface.bell.ring();
             return;
         }
-        if let (Some(copy), Some(springs)) = (&mut snapshot.springs, &self.state.springs) {
-            copy.x.clone_from(&self.state.x);
+        if let (Some(copy), Some(springs)) = (&mut snapshot.springs, self.state.body.as_mass_spring()) {
+            copy.x.clone_from(&self.state.mechanical.x);
             copy.motion.copy_from(&springs.motion);
             self.surface.slot.publish();
             self.surface.bell.ring();
             return;
         }
-        if self.model.seed().is_some() {
+        if self.model.body().as_seed().is_some() {
             snapshot.seed_particles_m.clear();
             snapshot.seed_particles_m.extend_from_slice(self.state.awake_particles_m());
         }
         let nodes = &self.model.surface().nodes;
         let mut largest_sq = 0.0_f64;
         for ((displacement, node), rest) in snapshot.displacements_m.iter_mut().zip(nodes).zip(&self.rest_f32_m) {
-            let moved = self.state.x[*node as usize] - DVec3::from(rest.map(f64::from));
+            let moved = self.state.mechanical.x[*node as usize] - DVec3::from(rest.map(f64::from));
             largest_sq = largest_sq.max(moved.length_squared());
             if snapshot.has_vertices {
                 *displacement = moved.to_array().map(|component| component as f32);
@@ -196,21 +197,4 @@ impl Simulation {
         self.surface.slot.publish();
         self.surface.bell.ring();
     }
-}
-
-/// Copies a state of the same model without allocating; false, and nothing is copied, when the shapes differ. Active particles, and awake nodes of
-/// springs, come and go: other nodes must agree, and there must be room for those.
-pub fn copy_state(from: &State, to: &mut State) -> bool {
-    let of_springs = |state: &State| state.springs.as_ref().map_or(0, |springs| springs.motion.ids.len());
-    let nodes = |state: &State| state.x.len().checked_sub(state.active.len() + of_springs(state));
-    let room = [&to.x, &to.v, &to.force_n, &to.external_n].iter().map(|list| list.capacity()).min();
-    let same = nodes(from) == nodes(to)
-        && room.is_some_and(|room| from.x.len() <= room)
-        && from.tools.len() == to.tools.len()
-        && from.load_factors.len() == to.load_factors.len()
-        && from.springs.is_some() == to.springs.is_some();
-    if same {
-        to.copy_from(from);
-    }
-    same
 }

@@ -1,7 +1,7 @@
 //! The loop: a thread of its own that wakes at absolute deadlines, takes orders, and ticks.
 use super::{
     command::{Command, Copy, Desk, Done, Refusal, Request},
-    simulation::{Simulation, copy_state},
+    simulation::Simulation,
     tick::Plan,
     timing::Timing,
     tool::Order,
@@ -233,7 +233,7 @@ impl Loop {
                 self.interrupt_steps();
             }
             Request::Inject(forces) => {
-                let next_tick = self.simulation.state.tick + 1;
+                let next_tick = self.simulation.state.mechanical.tick + 1;
                 first_tick = self.simulation.inject(forces, next_tick).map_err(Refusal::Inject)?;
             }
         }
@@ -247,7 +247,7 @@ impl Loop {
     }
 
     fn copy_to(&self, copy: &mut Copy) -> Result<(), Refusal> {
-        if !copy_state(&self.simulation.state, &mut copy.state) {
+        if !copy.state.try_copy_from(&self.simulation.state) {
             return Err(Refusal::OtherBody);
         }
         for (copied, reaction_n) in copy.reactions_n.iter_mut().zip(self.simulation.scratch.reactions_n()) {
@@ -259,7 +259,7 @@ impl Loop {
     fn done(&self) -> Done {
         let state = &self.simulation.state;
         Done {
-            tick: state.tick,
+            tick: state.mechanical.tick,
             time_s: state.time_s(&self.simulation.model),
             paused: self.paused,
             first_tick: 0,

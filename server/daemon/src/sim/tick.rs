@@ -52,12 +52,12 @@ impl Simulation {
 
     fn read_inputs(&mut self, now_ns: u64) {
         let period_s = self.period_s();
-        let time_s = (self.state.tick + 1) as f64 * period_s;
+        let time_s = (self.state.mechanical.tick + 1) as f64 * period_s;
         for (index, target) in self.targets.iter_mut().enumerate() {
             if let Some(pose) = self.tools[index].new_place() {
                 self.state.place_tool(index, pose);
             }
-            *target = self.tools[index].target(&self.state.tools[index], now_ns, time_s);
+            *target = self.tools[index].target(&self.state.mechanical.tools[index], now_ns, time_s);
         }
         self.timeline.fill(time_s, &mut self.load_factors, &mut self.prescribed_m);
     }
@@ -67,21 +67,21 @@ impl Simulation {
             tools: &self.targets,
             load_factors: &self.load_factors,
             prescribed_displacements_m: &self.prescribed_m,
-            point_forces: self.injections.acting_in(self.state.tick + 1),
+            point_forces: self.injections.acting_in(self.state.mechanical.tick + 1),
         };
         step(&self.model, &mut self.state, &mut self.scratch, &input)
     }
 
     fn couple(&mut self, plan: Plan, now_ns: u64) {
         let quarantined = self.state.quarantine.map(|q| q.tick);
-        let moment = Moment { now_ns, tick: self.state.tick, period_s: self.period_s(), quarantined };
-        let look = plan.advance && self.state.tick.is_multiple_of(LOOK_EVERY_TICKS);
-        for (index, (tool, state)) in self.tools.iter_mut().zip(&self.state.tools).enumerate() {
+        let moment = Moment { now_ns, tick: self.state.mechanical.tick, period_s: self.period_s(), quarantined };
+        let look = plan.advance && self.state.mechanical.tick.is_multiple_of(LOOK_EVERY_TICKS);
+        for (index, (tool, state)) in self.tools.iter_mut().zip(&self.state.mechanical.tools).enumerate() {
             let waits = look && tool.waits_to_be_clear();
             if waits && !self.inside.holds(&self.model, &self.state, state.target.position_m) {
-                let radius_m = self.model.spec().tools[index].radius_m;
+                let radius_m = self.model.tools()[index].radius_m;
                 // One that touches nothing is outside the body, or deep inside it.
-                let is_clear = ToolLoop::follows(state, radius_m) && !self.state.contact.touches(index);
+                let is_clear = ToolLoop::follows(state, radius_m) && !self.state.mechanical.contact.touches(index);
                 if is_clear { tool.found_clear() } else { tool.place_again() }
             }
             tool.couple(state, &moment, plan.order, plan.advance);

@@ -238,7 +238,7 @@ impl Hub {
         ended: CancellationToken,
     ) {
         let epoch = self.epoch.fetch_add(1, Ordering::Relaxed) + 1;
-        *self.tick_period_s.lock().unwrap_or_else(PoisonError::into_inner) = model.spec().settings.tick_period_s;
+        *self.tick_period_s.lock().unwrap_or_else(PoisonError::into_inner) = model.settings().tick_period_s;
         self.change_wishes(|_| ());
         let keyframe = Arc::new(keyframe::chunks(&session_id, &scene_name, &model, epoch));
         let (low, high) = keyframe::bounds_m(&model);
@@ -280,7 +280,7 @@ impl Hub {
             let refiner = layers.refined.then(|| refiner.get_or_insert_with(|| Refiner::new(&model, &rest_f32_m)));
             let refined =
                 refiner.and_then(Option::as_mut).map(|refiner| refiner.read(displacements_m, &tools(&model, snapshot)));
-            let has_particles = layers.particles && model.particle_count() > 0;
+            let has_particles = layers.particles && model.body().particle_count() > 0;
             let particles = has_particles.then(|| places::encode(snapshot.particles_m()));
             let numbers = numbers(epoch, snapshot);
             let encoded = Mutex::new(Vec::new());
@@ -302,7 +302,7 @@ impl Hub {
 
 /// Centres (m) and radii (m); of a capsule, those of balls along it, no further apart than their radius.
 fn tools(model: &Model, snapshot: &SurfaceSnapshot) -> Vec<(DVec3, f64)> {
-    let shapes = &model.spec().tools;
+    let shapes = model.tools();
     let balls = |(view, spec): (&ToolView, &ToolSpec)| {
         let (centre_m, radius_m, half_m) = (view.proxy_position_m, spec.radius_m, spec.shape.half_length_m());
         let to_end_m = view.proxy_orientation * (DVec3::Z * half_m);

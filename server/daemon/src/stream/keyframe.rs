@@ -54,12 +54,11 @@ fn header(session_id: &str, scene_name: &str, model: &Model) -> v1::KeyframeHead
         scene_name: scene_name.to_owned(),
         vertex_count: model.surface().nodes.len() as u32,
         triangle_count: model.surface().triangles.len() as u32,
-        tick_period_s: model.spec().settings.tick_period_s,
+        tick_period_s: model.settings().tick_period_s,
         bounds_min_m: vec3(low),
         bounds_max_m: vec3(high),
         tools: model
-            .spec()
-            .tools
+            .tools()
             .iter()
             .map(|tool| v1::ToolShape {
                 name: tool.name.clone(),
@@ -67,7 +66,7 @@ fn header(session_id: &str, scene_name: &str, model: &Model) -> v1::KeyframeHead
                 half_length_m: tool.shape.half_length_m(),
             })
             .collect(),
-        particle_spacing_m: model.particle_spacing_m(),
+        particle_spacing_m: model.body().particle_spacing_m(),
     }
 }
 

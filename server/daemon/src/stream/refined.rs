@@ -77,7 +77,7 @@ struct Vertex {
 impl Refiner {
     /// `None` of a mass-spring surface, which viewers see refined already, and of a surface that cannot be. `rest_f32_m` is what viewers have.
     pub fn new(model: &Model, rest_f32_m: &[[f32; 3]]) -> Option<Self> {
-        if model.springs().is_some() {
+        if model.body().as_mass_spring().is_some() {
             return None;
         }
         let rest_m = rest_f32_m.iter().map(|x| DVec3::from(x.map(f64::from))).collect();

@@ -39,7 +39,7 @@ struct Vertex {
 impl SkinReader {
     /// `None` of a body of tets. `rest_f32_m` is what viewers have.
     pub fn new(model: &Model, rest_f32_m: &[[f32; 3]]) -> Option<Self> {
-        let hybrid = model.hybrid()?;
+        let hybrid = model.body().as_hybrid()?;
         let partition = hybrid.partition();
         let rest = model.surface_rest_positions_m();
         let places: Vec<Place> = (0..rest.len() as u32).map(|vertex| hybrid.place(vertex).place(partition)).collect();

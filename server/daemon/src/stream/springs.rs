@@ -20,7 +20,7 @@ pub struct SpringReader {
 impl SpringReader {
     /// `None` of another body. `rest_f32_m` is what viewers have.
     pub fn new(model: &Arc<Model>, rest_f32_m: &[[f32; 3]]) -> Option<Self> {
-        let rest_m = model.springs()?.model().rest_m();
+        let rest_m = model.body().as_mass_spring()?.model().rest_m();
         let rounding = |(rest, rest_f32): (&DVec3, &[f32; 3])| single(*rest - DVec3::from(rest_f32.map(f64::from)));
         let rounding_m: Vec<[f32; 3]> = rest_m.iter().zip(rest_f32_m).map(rounding).collect();
         Some(Self {
@@ -34,7 +34,7 @@ impl SpringReader {
 
     /// Works out a frame; returns the largest displacement (m).
     pub fn read(&mut self, SpringSnapshot { motion, x }: &SpringSnapshot) -> f64 {
-        let Some(body) = self.model.springs() else { return 0.0 };
+        let Some(body) = self.model.body().as_mass_spring() else { return 0.0 };
         let (model, rest_m) = (body.model(), body.model().rest_m());
         for node in self.moved.drain(..) {
             self.moved_m[node as usize] = DVec3::ZERO;
@@ -105,9 +105,9 @@ mod tests {
                 TickInput { tools: &[target], load_factors: &[], prescribed_displacements_m: &[], point_forces: &[] };
             step(&model, &mut state, &mut scratch, &input);
             if tick % 30 == 0 {
-                let springs = state.springs.as_ref().unwrap();
-                refined = refined.max(springs.refined_nodes(model.springs().unwrap()));
-                let snapshot = SpringSnapshot { motion: springs.motion.clone(), x: state.x.clone() };
+                let springs = state.body.as_mass_spring().unwrap();
+                refined = refined.max(springs.refined_nodes(model.body().as_mass_spring().unwrap()));
+                let snapshot = SpringSnapshot { motion: springs.motion.clone(), x: state.mechanical.x.clone() };
                 let largest_m = reader.read(&snapshot);
                 model.surface_positions_m(&state, &mut expected_m);
                 let found = reader.displacements_m().iter().zip(&rest_f32_m);

@@ -6,7 +6,7 @@ pub mod springs;
 
 use glam::DVec3;
 use palpate_physics::{
-    ModelSpec, PrescribedSpec, Region, Settings,
+    BodySpec, ModelSpec, PrescribedSpec, Region, Settings, Solid,
     contact::{Coupling, ToolShape, ToolSpec},
     material::{Lame, Law, Material, Viscosity},
     mesh::quality,
@@ -69,12 +69,11 @@ pub fn block_scene(name: &str, cells: u32) -> Scene {
         name: name.into(),
         description: "a soft block".into(),
         model: ModelSpec {
-            tet_region: vec![0; tets],
-            mesh: shape.mesh,
-            particles: None,
-            seed: None,
-            springs: None,
-            regions: vec![Region { name: "all".into(), material, density_kg_per_m3: 1e3 }],
+            body: BodySpec::Tet(Solid {
+                tet_region: vec![0; tets],
+                mesh: shape.mesh,
+                regions: vec![Region { name: "all".into(), material, density_kg_per_m3: 1e3 }],
+            }),
             prescribed: vec![PrescribedSpec { name: "table".into(), nodes: bottom.clone(), axes: [true; 3] }],
             loads: Vec::new(),
             gravity_m_per_s2: DVec3::ZERO,

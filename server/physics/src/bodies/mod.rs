@@ -4,19 +4,21 @@
 //! [`crate::tick::MechanicalState`], its buffers, and how it is stepped. No kind knows another, nor this file.
 pub mod hybrid;
 pub mod mass_spring;
+mod material_point;
 pub mod seed;
 mod spec;
 mod state;
 mod stepped;
 pub mod tet;
 
+pub use material_point::MaterialPoint;
 pub use spec::{BodyError, BodySpec};
 pub(crate) use state::BodyScratch;
 pub use state::BodyState;
 pub(crate) use stepped::SteppedBody;
 
 use crate::{
-    elements::linear_tet::min_volume_ratio,
+    elements::{linear_tet::min_volume_ratio, solid::Solid},
     hash::Fnv,
     mesh::TetMesh,
     tick::{Energies, Environment, EnvironmentSpec, MechanicalState},
@@ -107,6 +109,15 @@ impl Body {
             Self::Hybrid(body) => Some(body.coarse()),
             Self::MassSpring(_) => None,
             Self::Seed(body) => Some(body.mesh()),
+        }
+    }
+
+    /// The tets that fill it by themselves; none of a body with particles, or of springs.
+    pub fn filling_tets(&self) -> Option<&Solid> {
+        match self {
+            Self::Tet(body) => Some(body.solid()),
+            Self::Seed(body) if body.model().layer().is_none() => Some(body.core()),
+            Self::Hybrid(_) | Self::MassSpring(_) | Self::Seed(_) => None,
         }
     }
 

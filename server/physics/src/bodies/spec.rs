@@ -22,6 +22,21 @@ pub enum BodySpec {
 }
 
 impl BodySpec {
+    /// A hybrid body, if it is one.
+    pub fn as_hybrid(&self) -> Option<&HybridSpec> {
+        if let Self::Hybrid(spec) = self { Some(spec) } else { None }
+    }
+
+    /// A mass-spring surface, if it is one.
+    pub fn as_mass_spring(&self) -> Option<&MassSpringSpec> {
+        if let Self::MassSpring(spec) = self { Some(spec) } else { None }
+    }
+
+    /// The papers' hybrid, if it is one.
+    pub fn as_seed(&self) -> Option<&SeedBodySpec> {
+        if let Self::Seed(spec) = self { Some(spec) } else { None }
+    }
+
     /// The tets, of whatever level, with their materials; none of a surface of springs.
     pub fn solid(&self) -> Option<&Solid> {
         match self {
@@ -29,6 +44,16 @@ impl BodySpec {
             Self::Hybrid(spec) => Some(&spec.coarse),
             Self::MassSpring(_) => None,
             Self::Seed(spec) => Some(&spec.core),
+        }
+    }
+
+    /// The same, to be changed.
+    pub fn solid_mut(&mut self) -> Option<&mut Solid> {
+        match self {
+            Self::Tet(solid) => Some(solid),
+            Self::Hybrid(spec) => Some(&mut spec.coarse),
+            Self::MassSpring(_) => None,
+            Self::Seed(spec) => Some(&mut spec.core),
         }
     }
 }

@@ -109,6 +109,11 @@ impl Solid {
         &self.regions[self.tet_region[tet] as usize]
     }
 
+    /// Mass (kg) of all tets.
+    pub fn mass_kg(&self) -> f64 {
+        (0..self.tet_region.len()).map(|tet| self.mesh.volume_m3(tet) * self.region_of(tet).density_kg_per_m3).sum()
+    }
+
     /// Rest data of every tet.
     pub(crate) fn rest_tets(&self) -> Vec<RestTet> {
         (0..self.mesh.tets().len()).map(|tet| RestTet::new(&self.mesh.edge_matrix_m(tet))).collect()

@@ -1,7 +1,7 @@
 //! The model: constant after load.
 use super::{ModelError, ModelSpec, State, sleep::RestBound};
 use crate::{
-    bodies::Body,
+    bodies::{Body, MaterialPoint},
     contact::{ContactModel, ToolSpec},
     integrate::{Scheme, is_judged},
     mesh::Surface,
@@ -111,6 +111,11 @@ impl Model {
     /// Where the surface is (m): writes one position for each of its vertices.
     pub fn surface_positions_m(&self, state: &State, positions_m: &mut Vec<DVec3>) {
         self.body.surface_positions_m(&self.environment, &state.body, &state.mechanical, positions_m);
+    }
+
+    /// How far (m) a point of the material has gone from rest.
+    pub fn displacement_m(&self, state: &State, point: &MaterialPoint) -> DVec3 {
+        self.body.displacement_m(&state.body, &state.mechanical, point)
     }
 
     pub(super) fn scheme(&self) -> &Scheme {

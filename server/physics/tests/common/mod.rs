@@ -2,7 +2,8 @@
 #![allow(dead_code, clippy::unwrap_used)] // every test file uses its own part
 use glam::DVec3;
 use palpate_physics::{
-    LoadSpec, Model, ModelSpec, Precision, PrescribedSpec, Region, Settings, Substeps, Surface, TetMesh,
+    BodySpec, LoadSpec, Model, ModelSpec, Precision, PrescribedSpec, Region, Settings, Solid, Substeps, Surface,
+    TetMesh,
     material::{Convention, Lame, Law, Material, Viscosity},
     statics::{StaticSettings, StaticSolution, solve_static},
 };
@@ -153,12 +154,11 @@ pub(crate) fn spec(
     loads: Vec<LoadSpec>,
 ) -> ModelSpec {
     ModelSpec {
-        tet_region: vec![0; mesh.tets().len()],
-        mesh,
-        particles: None,
-        seed: None,
-        springs: None,
-        regions: vec![Region { name: "body".into(), material, density_kg_per_m3: 1000.0 }],
+        body: BodySpec::Tet(Solid {
+            tet_region: vec![0; mesh.tets().len()],
+            mesh,
+            regions: vec![Region { name: "body".into(), material, density_kg_per_m3: 1000.0 }],
+        }),
         prescribed,
         loads,
         gravity_m_per_s2: DVec3::ZERO,
@@ -170,8 +170,8 @@ pub(crate) fn spec(
 /// Equilibrium with all loads at `factor` and prescribed displacements `moved` (missing ones are zero).
 pub(crate) fn equilibrium(model: &Model, factor: f64, moved: &[DVec3]) -> StaticSolution {
     let mut displacements = moved.to_vec();
-    displacements.resize(model.spec().prescribed.len(), DVec3::ZERO);
-    let factors = vec![factor; model.spec().loads.len()];
+    displacements.resize(model.prescribed().len(), DVec3::ZERO);
+    let factors = vec![factor; model.loads().len()];
     let settings = StaticSettings { relative_residual: 1e-12, ..StaticSettings::default() };
     solve_static(model, &factors, &displacements, &[], &settings, &mut |_| ControlFlow::Continue(())).unwrap()
 }

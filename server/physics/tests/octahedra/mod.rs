@@ -2,7 +2,7 @@
 #![allow(dead_code, missing_docs, unreachable_pub, clippy::unwrap_used)]
 use glam::DVec3;
 use palpate_physics::{
-    ModelSpec, PrescribedSpec, Region, Settings, TetMesh,
+    BodySpec, ModelSpec, PrescribedSpec, Region, Settings, Solid, TetMesh,
     bodies::seed::{LayerSpec, PaperModel, SeedBodySpec, SeedParameters},
     contact::{Coupling, ToolShape, ToolSpec},
     material::{Law, Material},
@@ -55,12 +55,15 @@ pub fn body_spec(outer_m: f64, layer: Option<LayerSpec>, parameters: SeedParamet
     let SeedParameters { lame, viscosity, convention, density_kg_per_m3, dt_s, .. } = parameters;
     let material = Material::new(Law::StVenantKirchhoff, lame, viscosity, convention);
     ModelSpec {
-        tet_region: vec![0; mesh.tets().len()],
-        mesh,
-        particles: None,
-        seed: Some(SeedBodySpec { layer, parameters }),
-        springs: None,
-        regions: vec![Region { name: "all".into(), material, density_kg_per_m3 }],
+        body: BodySpec::Seed(SeedBodySpec {
+            core: Solid {
+                tet_region: vec![0; mesh.tets().len()],
+                mesh,
+                regions: vec![Region { name: "all".into(), material, density_kg_per_m3 }],
+            },
+            layer,
+            parameters,
+        }),
         prescribed: vec![PrescribedSpec { name: "inner".into(), nodes: vec![1, 2, 3, 5], axes: [true; 3] }],
         loads: Vec::new(),
         gravity_m_per_s2: DVec3::ZERO,

@@ -2,14 +2,20 @@
 #![allow(dead_code, missing_docs, unreachable_pub, clippy::expect_used, clippy::unwrap_used)]
 use glam::DVec3;
 use palpate_physics::{
-    Model, ModelSpec, PointForce, Precision, PrescribedSpec, Region, Scratch, Settings, State, StepReport, Surface,
-    TetMesh, TickInput,
-    bodies::hybrid::{ParticleSpec, Skin, Waking, wake_only},
+    BodySpec, Model, ModelSpec, PointForce, Precision, PrescribedSpec, Region, Scratch, Settings, Solid, State,
+    StepReport, Surface, TetMesh, TickInput,
+    bodies::{
+        hybrid::{HybridSpec, ParticleSpec, Skin, Waking},
+        mass_spring::MassSpringSpec,
+    },
     contact::{Coupling, ToolShape, ToolSpec, ToolTarget},
     material::{Lame, Law, Material, Viscosity},
+    world::wake_only,
 };
 
+#[derive(Clone)]
 pub struct Rig {
+    pub spec: ModelSpec,
     pub model: Model,
     pub state: State,
     pub scratch: Scratch,
@@ -26,18 +32,17 @@ pub struct Drive {
 
 impl Rig {
     pub fn new(spec: ModelSpec) -> Self {
-        let model = Model::build(spec).unwrap();
+        let model = Model::build(spec.clone()).unwrap();
         let (state, scratch) = (State::at_rest(&model), Scratch::new(&model));
-        Self { model, state, scratch }
+        Self { spec, model, state, scratch }
     }
 
     /// Inputs that hold everything where it is.
     pub fn still(&self) -> Drive {
-        let spec = self.model.spec();
         Drive {
-            tools: self.state.tools.iter().map(|t| at(t.target.position_m)).collect(),
-            load_factors: vec![0.0; spec.loads.len()],
-            prescribed: vec![DVec3::ZERO; spec.prescribed.len()],
+            tools: self.state.mechanical.tools.iter().map(|t| at(t.target.position_m)).collect(),
+            load_factors: vec![0.0; self.model.loads().len()],
+            prescribed: vec![DVec3::ZERO; self.model.prescribed().len()],
             point_forces: Vec::new(),
         }
     }
@@ -72,12 +77,11 @@ pub fn material(law: Law, young_modulus_pa: f64, poisson_ratio: f64) -> Material
 pub fn body(mesh: TetMesh, material: Material) -> ModelSpec {
     let tets = mesh.tets().len();
     ModelSpec {
-        mesh,
-        particles: None,
-        seed: None,
-        springs: None,
-        regions: vec![Region { name: "all".into(), material, density_kg_per_m3: 1000.0 }],
-        tet_region: vec![0; tets],
+        body: BodySpec::Tet(Solid {
+            mesh,
+            regions: vec![Region { name: "all".into(), material, density_kg_per_m3: 1000.0 }],
+            tet_region: vec![0; tets],
+        }),
         prescribed: Vec::new(),
         loads: Vec::new(),
         gravity_m_per_s2: DVec3::ZERO,
@@ -121,29 +125,65 @@ pub fn hybrid_block(
     let fine = block(cells);
     let surface = Surface::of(&fine).unwrap();
     let positions = surface.nodes.iter().map(|&n| fine.positions_m()[n as usize]).collect();
-    let mut spec = body(block(n), material(Law::StableNeoHookean, 10e3, poisson_ratio));
-    spec.particles = Some(ParticleSpec {
-        skin: Skin::new(positions, surface.triangles).unwrap(),
-        spacing_m: a_m / cells as f64,
-        fine_depth_m: None,
-        lattice_through_m: DVec3::ZERO,
-        most_active,
-        waking,
-    });
-    spec
+    let spec = body(block(n), material(Law::StableNeoHookean, 10e3, poisson_ratio));
+    with_particles(
+        spec,
+        ParticleSpec {
+            skin: Skin::new(positions, surface.triangles).unwrap(),
+            spacing_m: a_m / cells as f64,
+            fine_depth_m: None,
+            lattice_through_m: DVec3::ZERO,
+            most_active,
+            waking,
+        },
+    )
+}
+
+/// The tets of a body, of whatever level.
+pub fn solid_mut(spec: &mut ModelSpec) -> &mut Solid {
+    spec.body.solid_mut().unwrap()
+}
+
+/// The mesh of a body's tets.
+pub fn mesh_of(spec: &ModelSpec) -> &TetMesh {
+    &spec.body.solid().unwrap().mesh
+}
+
+/// Makes tets the coarse level of a hybrid body.
+pub fn with_particles(spec: ModelSpec, particles: ParticleSpec) -> ModelSpec {
+    let coarse = spec.body.solid().unwrap().clone();
+    ModelSpec { body: BodySpec::Hybrid(HybridSpec { coarse, particles }), ..spec }
+}
+
+/// The particles of a hybrid body.
+pub fn particles(spec: &ModelSpec) -> &ParticleSpec {
+    let BodySpec::Hybrid(hybrid) = &spec.body else { panic!("no hybrid body") };
+    &hybrid.particles
+}
+
+/// The particles of a hybrid body.
+pub fn particles_mut(spec: &mut ModelSpec) -> &mut ParticleSpec {
+    let BodySpec::Hybrid(hybrid) = &mut spec.body else { panic!("no hybrid body") };
+    &mut hybrid.particles
+}
+
+/// What a mass-spring surface is made from.
+pub fn springs_mut(spec: &mut ModelSpec) -> &mut MassSpringSpec {
+    let BodySpec::MassSpring(springs) = &mut spec.body else { panic!("no springs") };
+    springs
 }
 
 /// Holds the lowest nodes of a body.
 pub fn held_below(mut spec: ModelSpec) -> ModelSpec {
-    let low_m = spec.mesh.positions_m().iter().map(|p| p.z).fold(f64::INFINITY, f64::min);
-    spec.prescribed = vec![hold("bottom", nodes_where(&spec.mesh, |p| p.z < low_m + 1e-4), [true; 3])];
+    let low_m = mesh_of(&spec).positions_m().iter().map(|p| p.z).fold(f64::INFINITY, f64::min);
+    spec.prescribed = vec![hold("bottom", nodes_where(mesh_of(&spec), |p| p.z < low_m + 1e-4), [true; 3])];
     spec
 }
 
 /// A sphere above a weighing block of 40 × 40 × 20 mm in 24 coarse tets, particles 2.5 mm apart, its lower face held.
 pub fn pressed_block(precision: Precision, fine_depth_m: Option<f64>) -> ModelSpec {
     let mut spec = held_below(hybrid_block((0.02, 1, 8), 0.45, 400, Waking::ByHand));
-    spec.particles.as_mut().unwrap().fine_depth_m = fine_depth_m;
+    particles_mut(&mut spec).fine_depth_m = fine_depth_m;
     spec.settings = Settings { precision, mass_damping_per_s: 20.0, ..spec.settings };
     spec.tools = vec![sphere(6e-3, DVec3::Z * 7e-3, Coupling::Rigid)];
     spec.tools[0].friction_coefficient = 0.3;
@@ -153,13 +193,13 @@ pub fn pressed_block(precision: Precision, fine_depth_m: Option<f64>) -> ModelSp
 
 /// Particles within a distance of a point, at rest.
 pub fn near(rig: &Rig, point: DVec3, distance_m: f64) -> Vec<u32> {
-    let partition = rig.model.hybrid().unwrap().partition();
+    let partition = rig.model.body().as_hybrid().unwrap().partition();
     (0..partition.particle_count() as u32).filter(|&p| partition.particle_m(p).distance(point) < distance_m).collect()
 }
 
 /// Wakes the particles nearest to the origin.
 pub fn wake_nearest(rig: &mut Rig, count: usize) {
-    let partition = rig.model.hybrid().unwrap().partition();
+    let partition = rig.model.body().as_hybrid().unwrap().partition();
     let mut near: Vec<u32> = (0..partition.particle_count() as u32).collect();
     let distance_sq = |particle: u32| partition.particle_m(particle).length_squared();
     near.sort_by(|&a, &b| distance_sq(a).total_cmp(&distance_sq(b)));

@@ -1,6 +1,8 @@
 //! `[body]`: shapes, mesh files and surface pairs become one kind of body with named parts.
 use super::{
-    Files, exactly_one, particles,
+    Files, exactly_one,
+    located::Located,
+    particles,
     parts::{self, Part},
     seed, springs,
 };
@@ -13,7 +15,6 @@ use crate::{
     files::{self, FileError, SurfaceFile, UnusedNodes},
     fill::{self, FillError, FillOptions, SurfaceInput},
     limits::Limits,
-    probes::MaterialPoint,
     shapes::{self, Shape, ShapeError},
     skin::FineSurface,
     wording::counted,
@@ -59,27 +60,27 @@ impl Body {
     }
 
     /// The point of the body nearest to a position (m). With a skin, only its distance means something for a point inside.
-    pub(crate) fn locate(&self, point_m: DVec3) -> MaterialPoint {
+    pub(crate) fn locate(&self, point_m: DVec3) -> Located {
         match &self.skin {
-            None => MaterialPoint::locate(&self.mesh, &self.triangles().collect::<Vec<_>>(), point_m),
+            None => Located::locate(&self.mesh, &self.triangles().collect::<Vec<_>>(), point_m),
             Some(skin) if self.first_vertex.is_some() => self.locate_in_seed(skin, point_m),
             Some(skin) if self.springs.is_some() => {
-                MaterialPoint::nearest(&skin.positions_m, skin.triangles.iter().copied(), point_m)
+                Located::nearest(&skin.positions_m, skin.triangles.iter().copied(), point_m)
             }
             Some(skin) if is_inside(point_m, &skin.triangles, &skin.positions_m) => {
-                MaterialPoint { nodes: [0; 4], weights: [1.0, 0.0, 0.0, 0.0], distance_m: 0.0 }
+                Located { nodes: [0; 4], weights: [1.0, 0.0, 0.0, 0.0], distance_m: 0.0 }
             }
-            Some(skin) => MaterialPoint::nearest(&skin.positions_m, skin.triangles.iter().copied(), point_m),
+            Some(skin) => Located::nearest(&skin.positions_m, skin.triangles.iter().copied(), point_m),
         }
     }
 
     /// In the core, or the nearest of the skin: nothing is known between them.
-    fn locate_in_seed(&self, skin: &FineSurface, point_m: DVec3) -> MaterialPoint {
-        let in_core = |tet| MaterialPoint::inside(&self.mesh, tet, point_m);
+    fn locate_in_seed(&self, skin: &FineSurface, point_m: DVec3) -> Located {
+        let in_core = |tet| Located::inside(&self.mesh, tet, point_m);
         (0..self.mesh.tets().len()).find_map(in_core).unwrap_or_else(|| {
-            let nearest = MaterialPoint::nearest(&skin.positions_m, skin.triangles.iter().copied(), point_m);
+            let nearest = Located::nearest(&skin.positions_m, skin.triangles.iter().copied(), point_m);
             let is_inside = is_inside(point_m, &skin.triangles, &skin.positions_m);
-            MaterialPoint {
+            Located {
                 nodes: nearest.nodes.map(|vertex| vertex + self.first_vertex.unwrap_or_default()),
                 distance_m: if is_inside { 0.0 } else { nearest.distance_m },
                 ..nearest

@@ -2,7 +2,9 @@
 mod amplitude;
 mod body;
 mod csv;
+mod kind;
 mod loads;
+mod located;
 mod material;
 mod particles;
 mod parts;
@@ -23,12 +25,9 @@ use crate::{
 };
 use body::Body;
 use glam::DVec3;
-use material::Materials;
+use kind::Kind;
 use palpate_physics::{
-    Integrator, ModelSpec, Precision, Settings, Skips, Substeps,
-    bodies::{hybrid::ParticleSpec, mass_spring::SpringBodySpec, seed::SeedBodySpec},
-    mesh::quality,
-    settings::MAX_SUBSTEPS,
+    BodySpec, Integrator, ModelSpec, Precision, Settings, Skips, Solid, Substeps, mesh::quality, settings::MAX_SUBSTEPS,
 };
 use regions::Regions;
 use std::path::{Path, PathBuf};
@@ -76,20 +75,22 @@ pub(crate) fn compile(
     let materials = material::compile(&document.material, &regions, &body)?;
     let constraints = loads::constraints(document, &regions, files)?;
     let loads = loads::loads(document, &regions, files)?;
-    let particles = particles::spec(document, &body, &constraints, files)?;
-    let seed = seed::spec(document, &body)?;
     progress(0.9, "placing tools and probes");
     let tools = tools::compile(document, &body, files)?;
-    let springs = springs::spec(document, &body, (&mut settings, &tools.specs), files)?;
+    let made_of = Solid { mesh: body.mesh.clone(), regions: materials.regions, tet_region: materials.tet_region };
+    let model_body = match Kind::of(&document.body) {
+        Kind::Tet => BodySpec::Tet(made_of),
+        Kind::Hybrid => BodySpec::Hybrid(particles::spec(document, &body, made_of, &constraints, files)?),
+        Kind::Seed => BodySpec::Seed(seed::spec(document, &body, made_of)?),
+        Kind::MassSpring => BodySpec::MassSpring(springs::spec(document, &body, (&mut settings, &tools.specs), files)?),
+    };
     let mut warnings = body.warnings.clone();
-    warnings.extend(materials.warnings.iter().cloned());
+    warnings.extend(materials.warnings);
     warnings.extend(tools.warnings);
     springs::warn_of_small_tools(&body, &tools.specs, &mut warnings);
-    if particles.is_some() {
-        particles::warn_of_fine_tets(&body, &mut warnings);
-    }
+    particles::warn_of_fine_tets(document, &body, &mut warnings);
     let probes = probes::compile(&document.probe, &regions, &body, &tools.specs, &constraints, &mut warnings)?;
-    let summary = summary(&body, &regions, &materials, (particles.as_ref(), seed.as_ref(), springs.as_ref()));
+    let summary = summary(&body, &regions, &model_body);
     warn_of_shape(&summary, &mut warnings);
     warnings.extend(nothing_held(document));
     progress(1.0, "done");
@@ -97,12 +98,7 @@ pub(crate) fn compile(
         name: document.scene.name.clone(),
         description: document.scene.description.trim().to_owned(),
         model: ModelSpec {
-            mesh: body.mesh,
-            particles,
-            seed,
-            springs,
-            regions: materials.regions,
-            tet_region: materials.tet_region,
+            body: model_body,
             prescribed: constraints.specs,
             loads: loads.specs,
             gravity_m_per_s2: DVec3::from(document.scene.gravity_m_per_s2),
@@ -146,7 +142,7 @@ fn settings(document: &Document) -> Result<Settings, Fault> {
         solver_tolerance,
         sleep_tolerance_um,
     } = document.numerics;
-    let defaults = if document.body.particles.is_some() { Settings::for_particles() } else { Settings::default() };
+    let defaults = Kind::of(&document.body).default_settings();
     let stretch_allowance = stretch_allowance.unwrap_or(defaults.stretch_allowance);
     let period = document.scene.tick_period_s;
     check(
@@ -250,28 +246,24 @@ fn unique_names<'n>(table: &str, names: impl Iterator<Item = &'n str>) -> Result
     Ok(())
 }
 
-fn summary(
-    body: &Body,
-    regions: &Regions<'_>,
-    materials: &Materials,
-    (particles, seed, springs): (Option<&ParticleSpec>, Option<&SeedBodySpec>, Option<&SpringBodySpec>),
-) -> BodySummary {
+fn summary(body: &Body, regions: &Regions<'_>, made: &BodySpec) -> BodySummary {
     let mesh = &body.mesh;
-    let mass_of =
-        |(tet, region): (usize, &u16)| mesh.volume_m3(tet) * materials.regions[*region as usize].density_kg_per_m3;
-    let tets_kg: f64 = materials.tet_region.iter().enumerate().map(mass_of).sum();
-    // Coarse tets need not have the volume of the body that its skin encloses.
-    let of_tets_m3 = seed.map_or(mesh.total_volume_m3(), |seed| seed.volume_m3(mesh, &body.surface));
-    let volume_m3 = particles.map_or(of_tets_m3, |particles| particles.skin.volume_m3());
+    let tets_kg = made.solid().map_or(0.0, Solid::mass_kg);
+    // Coarse tets need not have the volume of the body that its surface encloses.
+    let volume_m3 = match made {
+        BodySpec::Tet(_) | BodySpec::MassSpring(_) => mesh.total_volume_m3(),
+        BodySpec::Hybrid(spec) => spec.particles.skin.volume_m3(),
+        BodySpec::Seed(spec) => spec.volume_m3(&body.surface),
+    };
     BodySummary {
         origin: body.origin.clone(),
         nodes: mesh.positions_m().len(),
         tets: mesh.tets().len(),
         surface_triangles: body.triangle_count(),
         volume_m3,
-        mass_kg: match springs {
-            Some(springs) => springs.springs.mass_kg.iter().sum(),
-            None => tets_kg * volume_m3 / mesh.total_volume_m3(),
+        mass_kg: match made {
+            BodySpec::MassSpring(spec) => spec.springs.mass_kg.iter().sum(),
+            BodySpec::Tet(_) | BodySpec::Hybrid(_) | BodySpec::Seed(_) => tets_kg * volume_m3 / mesh.total_volume_m3(),
         },
         quality: quality::measure(mesh),
         fill_report: body.report.clone(),

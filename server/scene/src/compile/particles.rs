@@ -13,8 +13,8 @@ use crate::{
 };
 use glam::DVec3;
 use palpate_physics::{
-    TetMesh,
-    bodies::hybrid::{ParticleSpec, Skin, Waking, composite::Composite, fine_layers, spec::MOST_ACTIVE},
+    Solid, TetMesh,
+    bodies::hybrid::{HybridSpec, ParticleSpec, Skin, Waking, composite::Composite, fine_layers, spec::MOST_ACTIVE},
     mesh::tet::EDGES,
 };
 use std::{collections::BTreeSet, f64::consts::PI};
@@ -123,14 +123,17 @@ pub(super) fn put_on(body: &mut Body, table: &BodyTable, skin: FineSurface) {
     body.skin = Some(skin);
 }
 
-/// What particles are made from; `None` of a body of tets.
+/// What a hybrid body is made from, on its coarse level.
 pub(super) fn spec(
     document: &Document,
     body: &Body,
+    coarse: Solid,
     constraints: &Constraints,
     files: &Files<'_>,
-) -> Result<Option<ParticleSpec>, Fault> {
-    let (Some(table), Some(fine)) = (&document.body.particles, &body.skin) else { return Ok(None) };
+) -> Result<HybridSpec, Fault> {
+    let (Some(table), Some(fine)) = (&document.body.particles, &body.skin) else {
+        return Err(Fault::value(at(), "particles need a surface that encloses the body".to_owned()));
+    };
     demand_numerics(document)?;
     files.limits.check_tets(&at().key("spacing_m"), fine.triangles.len() as u64)?;
     let skin = Skin::new(fine.positions_m.clone(), fine.triangles.clone()).map_err(|error| {
@@ -139,14 +142,15 @@ pub(super) fn spec(
             .help("repair the file so that every edge of its surface has one triangle on either side")
             .cause(error)
     })?;
-    Ok(Some(ParticleSpec {
+    let particles = ParticleSpec {
         lattice_through_m: lattice_through_m(body, &skin, constraints),
         skin,
         spacing_m: table.spacing_m,
         fine_depth_m: table.fine_depth_m,
         most_active: table.most_active as usize,
         waking: Waking::ByTools { reach_m: table.reach_m.unwrap_or_else(|| half_ball_m(table)) },
-    }))
+    };
+    Ok(HybridSpec { coarse, particles })
 }
 
 impl ParticlesTable {
@@ -180,10 +184,10 @@ fn half_ball_m(table: &ParticlesTable) -> f64 {
 }
 
 /// Says so when the coarse level is none.
-pub(super) fn warn_of_fine_tets(body: &Body, warnings: &mut Vec<String>) {
+pub(super) fn warn_of_fine_tets(document: &Document, body: &Body, warnings: &mut Vec<String>) {
     const MANY_TETS: usize = 5000;
     let tets = body.mesh.tets().len();
-    if tets > MANY_TETS {
+    if document.body.particles.is_some() && tets > MANY_TETS {
         warnings.push(format!(
             "{tets} tets are many for the coarse level of a body with particles, and all of them are computed all the time: a few hundred do"
         ));

@@ -9,7 +9,7 @@ use crate::{
     probes::{Measure, Probe},
 };
 use glam::DVec3;
-use palpate_physics::contact::ToolSpec;
+use palpate_physics::{bodies::MaterialPoint, contact::ToolSpec};
 
 /// All probes.
 pub(crate) fn compile(
@@ -96,13 +96,9 @@ fn displacement(name: &str, point_m: DVec3, body: &Body, warnings: &mut Vec<Stri
             point.distance_m * 1e3
         ));
     }
-    match &body.skin {
-        None => Measure::Displacement(point),
-        Some(_) if body.first_vertex.is_some() => Measure::Displacement(point),
-        Some(_) if body.springs.is_some() => Measure::SkinDisplacement(point),
-        Some(_) if point.distance_m == 0.0 => Measure::LatticeDisplacement(point_m),
-        Some(skin) => Measure::LatticeDisplacement(point.of(&skin.positions_m)),
-    }
+    let is_inside = point.distance_m == 0.0;
+    let rest_m = if is_inside { point_m } else { point.of(body.surface_positions_m()) };
+    Measure::Displacement(MaterialPoint { rest_m, nodes: point.nodes, weights: point.weights })
 }
 
 fn tool(table: &ProbeTable, tools: &[ToolSpec], at: &Where) -> Result<usize, Fault> {

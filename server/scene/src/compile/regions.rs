@@ -1,16 +1,14 @@
 //! Regions: which nodes, surface triangles and tets a selector chooses.
 use super::{
     body::Body,
+    located::Located,
     parts::{Part, SURFACE, WHOLE},
     unique_names,
 };
-use crate::{
-    document::{
-        region::{NearestSelector, PlaneTable, RegionTable, Selector},
-        source::{Fault, Where},
-        words::did_you_mean,
-    },
-    probes::MaterialPoint,
+use crate::document::{
+    region::{NearestSelector, PlaneTable, RegionTable, Selector},
+    source::{Fault, Where},
+    words::did_you_mean,
 };
 use glam::DVec3;
 
@@ -316,7 +314,7 @@ impl<'b> Regions<'b> {
         let faces: Vec<[u32; 3]> = self.body.triangles().collect();
         let triangles: Vec<u32> = (0..faces.len() as u32).collect();
         mark(&mut selection.triangles, &triangles, nearest.count, |&triangle| {
-            MaterialPoint::on_triangle(self.body.surface_positions_m(), faces[triangle as usize], point).distance_m
+            Located::on_triangle(self.body.surface_positions_m(), faces[triangle as usize], point).distance_m
         });
         let tets: Vec<u32> = (0..mesh.tets().len() as u32).collect();
         mark(&mut selection.tets, &tets, nearest.count, |&tet| {

@@ -11,6 +11,7 @@ use crate::{
     skin::FineSurface,
 };
 use glam::DVec3;
+use palpate_physics::Solid;
 use palpate_physics::bodies::seed::{LayerSpec, PaperModel, SeedBodySpec, SeedParameters};
 
 const FEWEST_TRIANGLES: u32 = 20;
@@ -40,9 +41,11 @@ pub(super) fn put_on(body: &mut Body, layer: &SeedLayerTable, limits: &Limits) -
     Ok(())
 }
 
-/// What the seed body is made from; `None` of another.
-pub(super) fn spec(document: &Document, body: &Body) -> Result<Option<SeedBodySpec>, Fault> {
-    let Some(table) = &document.body.seed else { return Ok(None) };
+/// What the seed body is made from, around its core.
+pub(super) fn spec(document: &Document, body: &Body, core: Solid) -> Result<SeedBodySpec, Fault> {
+    let Some(table) = &document.body.seed else {
+        return Err(Fault::value(at(), "there is no [body.seed]".to_owned()));
+    };
     demand(document)?;
     let parameters = parameters(document, table)?;
     let layer = table.layer.as_ref().zip(body.skin.as_ref()).map(|(layer, skin)| LayerSpec {
@@ -50,7 +53,7 @@ pub(super) fn spec(document: &Document, body: &Body) -> Result<Option<SeedBodySp
         skin_triangles: skin.triangles.clone(),
         particles: layer.particles,
     });
-    Ok(Some(SeedBodySpec { layer, parameters }))
+    Ok(SeedBodySpec { core, layer, parameters })
 }
 
 fn parameters(document: &Document, table: &SeedTable) -> Result<SeedParameters, Fault> {

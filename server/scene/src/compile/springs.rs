@@ -17,7 +17,7 @@ use glam::DVec3;
 use palpate_physics::{
     Settings, Surface, TetMesh,
     bodies::mass_spring::{
-        HomeLaw, Refinement, Refining, SpringBodySpec, SpringSpec,
+        HomeLaw, MassSpringSpec, Refinement, Refining, SpringSpec,
         body::triangles_about,
         calibration::{Calibration, ConstantsTable},
         home::Layer,
@@ -183,14 +183,16 @@ pub(super) fn shift(body: &mut Body, offset: DVec3) -> Result<(), Fault> {
     Ok(())
 }
 
-/// What the springs are made from; `None` of another body. Their damping goes into the settings.
+/// What the springs are made from. Their damping goes into the settings.
 pub(super) fn spec(
     document: &Document,
     body: &Body,
     (settings, tools): (&mut Settings, &[ToolSpec]),
     files: &Files<'_>,
-) -> Result<Option<SpringBodySpec>, Fault> {
-    let (Some(table), Some(surface)) = (&document.body.springs, &body.springs) else { return Ok(None) };
+) -> Result<MassSpringSpec, Fault> {
+    let (Some(table), Some(surface)) = (&document.body.springs, &body.springs) else {
+        return Err(Fault::value(at(), "springs need a surface".to_owned()));
+    };
     let areas_m2 = surface.vertex_areas_m2();
     let coarse = coarse(table, &areas_m2)?;
     let mass_kg = masses(table, &areas_m2)?;
@@ -216,7 +218,7 @@ pub(super) fn spec(
         surface: surface.clone(),
     };
     let Some(refine) = &table.refine else {
-        return Ok(Some(SpringBodySpec { springs, refinement: None, table: None }));
+        return Ok(MassSpringSpec { springs, refinement: None, table: None });
     };
     let (fine, constants_table) = fine(refine, (&coarse, surface), files)?;
     springs.fine = fine;
@@ -235,7 +237,7 @@ pub(super) fn spec(
         fade_s: refine.fade_s,
         by: Refining::ByTools,
     };
-    Ok(Some(SpringBodySpec { springs, refinement: Some(refinement), table: constants_table }))
+    Ok(MassSpringSpec { springs, refinement: Some(refinement), table: constants_table })
 }
 
 /// Room for the region of every tool, and five times as much that is on its way behind tools that move.

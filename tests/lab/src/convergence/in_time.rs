@@ -7,7 +7,8 @@ use crate::{
 use glam::DVec3;
 use miette::{IntoDiagnostic, Result, ensure};
 use palpate_physics::{
-    LoadSpec, Model, ModelSpec, Precision, Region, Scratch, Settings, State, Substeps, TickInput, material::Law, step,
+    BodySpec, LoadSpec, Model, ModelSpec, Precision, Region, Scratch, Settings, Solid, State, Substeps, TickInput,
+    material::Law, step,
 };
 
 const SUBSTEPS: [u32; 4] = [8, 16, 32, 64];
@@ -30,16 +31,15 @@ fn swung(substeps: u32) -> Result<Vec<DVec3>> {
     let body = Body::Block.tets(8)?;
     let load = load::on_tets(Action::Patch { radius_m: 20e-3, force_n: 1.0 }, &body);
     let model = Model::build(ModelSpec {
-        regions: vec![Region {
-            name: "body".into(),
-            material: bodies::material(Law::StableNeoHookean, 10e3, 0.4)?,
-            density_kg_per_m3: 1000.0,
-        }],
-        tet_region: vec![0; body.mesh.tets().len()],
-        mesh: body.mesh,
-        particles: None,
-        seed: None,
-        springs: None,
+        body: BodySpec::Tet(Solid {
+            regions: vec![Region {
+                name: "body".into(),
+                material: bodies::material(Law::StableNeoHookean, 10e3, 0.4)?,
+                density_kg_per_m3: 1000.0,
+            }],
+            tet_region: vec![0; body.mesh.tets().len()],
+            mesh: body.mesh,
+        }),
         prescribed: body.prescribed,
         loads: load.into_iter().map(|load| LoadSpec::NodalForces(load.forces_n)).collect(),
         gravity_m_per_s2: DVec3::ZERO,
@@ -48,11 +48,11 @@ fn swung(substeps: u32) -> Result<Vec<DVec3>> {
     })
     .into_diagnostic()?;
     let (mut state, mut scratch) = (State::at_rest(&model), Scratch::new(&model));
-    let held = vec![DVec3::ZERO; model.spec().prescribed.len()];
+    let held = vec![DVec3::ZERO; model.prescribed().len()];
     let input = TickInput { tools: &[], load_factors: &[1.0], prescribed_displacements_m: &held, point_forces: &[] };
     for _ in 0..TICKS {
         let report = step(&model, &mut state, &mut scratch, &input);
         ensure!(report.quarantined.is_none(), "the swinging block is quarantined at {substeps} substeps");
     }
-    Ok(state.x)
+    Ok(state.mechanical.x)
 }

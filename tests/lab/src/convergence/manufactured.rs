@@ -1,6 +1,7 @@
 //! A manufactured solution on the unit block: `u = A sin πX sin πY sin πZ · (1, −½, ¾)`, zero on the boundary, at finite strain. The body force
 //! that makes it an equilibrium is `−Div P`, `(Div P)_i = Σ_k [δP(F; ∂F/∂X_k) e_k]_i`, integrated against the shape functions.
 use super::Convergence;
+use crate::methods::tet_body;
 use crate::{
     bodies,
     stress::{meshes, random::Random},
@@ -8,7 +9,7 @@ use crate::{
 use glam::{DMat3, DVec3};
 use miette::{IntoDiagnostic, Result};
 use palpate_physics::{
-    LoadSpec, Model, ModelSpec, Precision, PrescribedSpec, Region, Settings, Surface, TetMesh,
+    BodySpec, LoadSpec, Model, ModelSpec, Precision, PrescribedSpec, Region, Settings, Solid, Surface, TetMesh,
     linalg::tensor::outer,
     material::{Law, Material},
     mesh::tet::EDGES,
@@ -111,8 +112,8 @@ fn errors(material: Material, cells: u32) -> Result<[f64; 2]> {
     let found = solve_static(&model, &[1.0], &[DVec3::ZERO], &[], &settings, &mut |_| ControlFlow::Continue(()))
         .into_diagnostic()?;
     let mut sums = [0.0; 4];
-    for (tet, nodes) in model.mesh().tets().iter().enumerate() {
-        let (corners, rest) = (model.mesh().corners_m(tet), &model.rest_tets()[tet]);
+    for (tet, nodes) in tet_body(&model).mesh().tets().iter().enumerate() {
+        let (corners, rest) = (tet_body(&model).mesh().corners_m(tet), &tet_body(&model).rest_tets()[tet]);
         let x = nodes.map(|n| found.x[n as usize]);
         let f = rest.gradient_of(&x);
         for (weights, share) in &rule {
@@ -141,12 +142,11 @@ fn loaded(mesh: TetMesh, boundary: Vec<u32>, material: Material, rule: &[([f64; 
         }
     }
     Model::build(ModelSpec {
-        regions: vec![Region { name: "body".into(), material, density_kg_per_m3: 1000.0 }],
-        tet_region: vec![0; mesh.tets().len()],
-        mesh,
-        particles: None,
-        seed: None,
-        springs: None,
+        body: BodySpec::Tet(Solid {
+            regions: vec![Region { name: "body".into(), material, density_kg_per_m3: 1000.0 }],
+            tet_region: vec![0; mesh.tets().len()],
+            mesh,
+        }),
         prescribed: vec![PrescribedSpec { name: "boundary".into(), nodes: boundary, axes: [true; 3] }],
         loads: vec![LoadSpec::NodalForces((0u32..).zip(forces).collect())],
         gravity_m_per_s2: DVec3::ZERO,

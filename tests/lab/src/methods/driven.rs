@@ -21,8 +21,8 @@ impl Driven {
             state: State::at_rest(model),
             scratch: Scratch::new(model),
             targets: tool.into_iter().map(target).collect(),
-            factors: vec![0.0; model.spec().loads.len()],
-            prescribed_m: vec![DVec3::ZERO; model.spec().prescribed.len()],
+            factors: vec![0.0; model.loads().len()],
+            prescribed_m: vec![DVec3::ZERO; model.prescribed().len()],
             failure: None,
         }
     }
@@ -30,7 +30,7 @@ impl Driven {
     /// One tick, at whose end the tool is, and loads are, so far.
     pub(super) fn tick(&mut self, model: &Model, tool: Option<&Tool>, fraction: f64) {
         if let Some(tool) = tool {
-            let period_s = model.spec().settings.tick_period_s;
+            let period_s = model.settings().tick_period_s;
             for target in &mut self.targets {
                 let position_m = tool.centre_m(fraction);
                 target.velocity_m_per_s = (position_m - target.position_m) / period_s;
@@ -52,7 +52,7 @@ impl Driven {
 
     /// Force (N) of the tools on the body.
     pub(super) fn tool_force_n(&self) -> DVec3 {
-        self.state.tools.iter().map(|tool| tool.contact_force_n).sum()
+        self.state.mechanical.tools.iter().map(|tool| tool.contact_force_n).sum()
     }
 
     /// The ledger's error, over the work of loads and tools.

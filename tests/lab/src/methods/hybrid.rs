@@ -1,5 +1,6 @@
 //! Hybrid bodies as the server runs them: coarse tets, and the particles nearest to the touch awake.
 use super::{Method, Pace, Running, driven::Driven, subject::Tool};
+use crate::methods::tet_body;
 use crate::problems::{
     Action, Problem,
     body::{Body, TetBody},
@@ -9,8 +10,9 @@ use crate::problems::{
 use glam::DVec3;
 use miette::{IntoDiagnostic, Result, miette};
 use palpate_physics::{
-    LoadSpec, Model, ModelSpec, Settings,
-    bodies::hybrid::{ParticleSpec, Skin, Waking, wake_only},
+    BodySpec, LoadSpec, Model, ModelSpec, Settings,
+    bodies::hybrid::{HybridSpec, ParticleSpec, Skin, Waking},
+    world::wake_only,
 };
 
 /// So many particles awake.
@@ -108,8 +110,10 @@ impl Method for Hybrid {
             self.fineness(problem).ok_or_else(|| miette!("the {} has no particles", problem.body.name()))?;
         let (coarse, fine) = (problem.body.tets(resolution)?, problem.body.tets(skin)?);
         let settings = Settings { mass_damping_per_s: pace.damping_per_s, ..Settings::for_particles() };
+        let particles = ParticleSpec { fine_depth_m, ..particles(problem.body, &fine, spacing_m, self.active)? };
+        let hybrid = HybridSpec { coarse: super::subject::solid(problem.material()?, &coarse), particles };
         let mut spec = ModelSpec {
-            particles: Some(ParticleSpec { fine_depth_m, ..particles(problem.body, &fine, spacing_m, self.active)? }),
+            body: BodySpec::Hybrid(hybrid),
             ..super::subject::spec(problem.material()?, &coarse, settings)
         };
         let load = load::on_tets(problem.action, &fine);
@@ -148,7 +152,7 @@ pub(crate) fn particles(body: Body, fine: &TetBody, spacing_m: f64, most_active:
 
 /// The particles nearest to a point that may wake.
 pub(crate) fn nearest(model: &Model, point_m: DVec3, count: usize) -> Vec<u32> {
-    let Some(body) = model.hybrid() else { return vec![] };
+    let Some(body) = model.body().as_hybrid() else { return vec![] };
     let partition = body.partition();
     let mut near: Vec<u32> = (0..partition.particle_count() as u32).filter(|&p| body.may_wake(p)).collect();
     let distance = |p: &u32| partition.particle_m(*p).distance_squared(point_m);
@@ -180,7 +184,7 @@ impl Pressed {
 
     /// Of a seed body that no tool touches, but a load: its particles under this triangle are awake.
     pub(super) fn touch(&mut self, triangle: Option<u32>) {
-        if let (Some(seed), true) = (&mut self.driven.state.seed, self.load.is_some()) {
+        if let (Some(seed), true) = (self.driven.state.body.as_seed_mut(), self.load.is_some()) {
             seed.touched = triangle;
         }
     }
@@ -214,15 +218,19 @@ impl Running for Pressed {
     }
 
     fn energy_error(&self) -> Option<f64> {
-        if self.model.seed().is_some() {
+        if self.model.body().as_seed().is_some() {
             return None;
         }
         self.driven.energy_error(&self.model)
     }
 
     fn size(&self) -> [usize; 3] {
-        let awake = self.driven.state.seed.as_ref().map_or(0, |_| self.model.most_awake_particles());
-        [self.model.mesh().tets().len(), self.driven.state.x.len() + awake, self.model.substeps() as usize]
+        let awake = self.driven.state.body.as_seed().map_or(0, |_| self.model.body().most_awake_particles());
+        [
+            tet_body(&self.model).mesh().tets().len(),
+            self.driven.state.mechanical.x.len() + awake,
+            self.model.substeps() as usize,
+        ]
     }
 
     fn failure(&self) -> Option<String> {

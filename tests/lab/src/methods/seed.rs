@@ -12,7 +12,7 @@ use crate::problems::{
 use glam::DVec3;
 use miette::{IntoDiagnostic, Result, miette};
 use palpate_physics::{
-    LoadSpec, Model, ModelSpec, PrescribedSpec, Settings, Surface, TetMesh,
+    BodySpec, LoadSpec, Model, ModelSpec, PrescribedSpec, Settings, Surface, TetMesh,
     bodies::seed::{LayerSpec, PaperModel, SeedBodySpec, SeedParameters},
     material::{Convention, Lame, Law, Material, Viscosity},
 };
@@ -108,8 +108,11 @@ impl Method for SeedHybrid {
             particles: (layer_m3 / SPACING_M.powi(3)).round() as u32,
         };
         let mut spec = ModelSpec {
-            seed: Some(SeedBodySpec { layer: Some(layer), parameters }),
-            springs: None,
+            body: BodySpec::Seed(SeedBodySpec {
+                core: super::subject::solid(material, &core),
+                layer: Some(layer),
+                parameters,
+            }),
             ..super::subject::spec(material, &core, Settings::default())
         };
         let first_vertex = core.mesh.positions_m().len() as u32;

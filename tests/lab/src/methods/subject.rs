@@ -8,7 +8,7 @@ use crate::problems::{
 use glam::DVec3;
 use miette::{IntoDiagnostic, Result};
 use palpate_physics::{
-    LoadSpec, Model, ModelSpec, Region, Settings,
+    Body, BodySpec, LoadSpec, Model, ModelSpec, Region, Settings, Solid,
     contact::{Coupling, ToolShape, ToolSpec},
     material::Material,
 };
@@ -57,24 +57,36 @@ impl Subject {
 
     /// Elements, nodes and the given substeps.
     pub(super) fn size(&self, substeps: usize) -> [usize; 3] {
-        let mesh = self.model.mesh();
+        let mesh = tet_body(&self.model).mesh();
         [mesh.tets().len(), mesh.positions_m().len(), substeps]
+    }
+}
+
+/// A problem's body of one material.
+pub(super) fn solid(material: Material, body: &TetBody) -> Solid {
+    Solid {
+        mesh: body.mesh.clone(),
+        regions: vec![Region { name: "body".into(), material, density_kg_per_m3: 1000.0 }],
+        tet_region: vec![0; body.mesh.tets().len()],
     }
 }
 
 pub(super) fn spec(material: Material, body: &TetBody, settings: Settings) -> ModelSpec {
     ModelSpec {
-        mesh: body.mesh.clone(),
-        particles: None,
-        seed: None,
-        springs: None,
-        regions: vec![Region { name: "body".into(), material, density_kg_per_m3: 1000.0 }],
-        tet_region: vec![0; body.mesh.tets().len()],
+        body: BodySpec::Tet(solid(material, body)),
         prescribed: body.prescribed.clone(),
         loads: vec![],
         gravity_m_per_s2: DVec3::ZERO,
         tools: vec![],
         settings,
+    }
+}
+
+/// The tets of a model of tets alone, which all of [`Subject`] are.
+pub(crate) fn tet_body(model: &Model) -> &palpate_physics::bodies::tet::TetBody {
+    match model.body() {
+        Body::Tet(body) => body,
+        _ => unreachable!("methods on tetrahedra are given bodies of tetrahedra"),
     }
 }
 

@@ -29,8 +29,8 @@ pub(super) fn settle(running: &mut dyn Running, pace: &Pace) {
 pub(super) fn equilibrium(subject: &Subject) -> (Vec<DVec3>, f64) {
     let model = &subject.model;
     let tools: Vec<ToolTarget> = subject.tool.iter().map(|t| ToolTarget::at(t.centre_m(1.0))).collect();
-    let factors = vec![1.0; model.spec().loads.len()];
-    let held = vec![DVec3::ZERO; model.spec().prescribed.len()];
+    let factors = vec![1.0; model.loads().len()];
+    let held = vec![DVec3::ZERO; model.prescribed().len()];
     let settings = StaticSettings::default();
     let found = solve_static(model, &factors, &held, &tools, &settings, &mut |_| ControlFlow::Continue(())).unwrap();
     let answer = subject.answer(&found.x, found.tools.iter().map(|tool| tool.contact_force_n).sum());
@@ -52,7 +52,7 @@ pub(super) fn tumbling(x: &[DVec3]) -> Vec<DVec3> {
 
 /// `Σ m v` and `Σ m x × v`.
 pub(super) fn momenta(model: &Model, x: &[DVec3], v: &[DVec3]) -> [DVec3; 2] {
-    let each = || model.mass_kg().iter().zip(x).zip(v);
+    let each = || model.body().mass_kg().iter().zip(x).zip(v);
     [each().map(|((m, _), v)| *v * *m).sum(), each().map(|((m, x), v)| x.cross(*v) * *m).sum()]
 }
 

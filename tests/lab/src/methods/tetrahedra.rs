@@ -122,11 +122,11 @@ impl Running for Body {
     }
 
     fn answer(&self) -> f64 {
-        self.subject.answer(&self.driven.state.x, self.driven.tool_force_n())
+        self.subject.answer(&self.driven.state.mechanical.x, self.driven.tool_force_n())
     }
 
     fn displacements_m(&self) -> Vec<DVec3> {
-        self.subject.displacements_m(&self.driven.state.x)
+        self.subject.displacements_m(&self.driven.state.mechanical.x)
     }
 
     fn energy_error(&self) -> Option<f64> {

@@ -3,7 +3,7 @@ use super::Found;
 use crate::{bodies, press::Press, timing::interleaved};
 use glam::DVec3;
 use miette::{IntoDiagnostic, Result};
-use palpate_physics::{Model, Skips, State, material::Law};
+use palpate_physics::{Model, ModelSpec, Skips, State, material::Law};
 
 const TOOL_RADIUS_M: f64 = 10e-3;
 const DEPTH_M: f64 = 2e-3;
@@ -25,23 +25,23 @@ pub(super) fn distant_contact_pressed(rounds: usize) -> Result<Found> {
 }
 
 /// A ventricle of so many tets that rings, with a tool so far away (m) or, at 0, pressed in.
-pub(super) fn scene(tets: u32, away_m: f64, skips: Skips) -> Result<Model> {
+pub(super) fn scene(tets: u32, away_m: f64, skips: Skips) -> Result<ModelSpec> {
     let shape = bodies::ventricle(SCALE, tets)?;
     let mut tool = bodies::tool_beside(&shape, TOOL_RADIUS_M);
     tool.start_position_m += DVec3::X * away_m;
-    let mut spec =
-        bodies::model(&shape, bodies::material(Law::StableNeoHookean, 10e3, 0.45)?, Some(tool))?.spec().clone();
+    let mut spec = bodies::spec(&shape, bodies::material(Law::StableNeoHookean, 10e3, 0.45)?, Some(tool));
     spec.settings.skips = skips;
-    Model::build(spec).into_diagnostic()
+    Ok(spec)
 }
 
 /// The largest distance (m) between the places of a node in two states.
 pub(super) fn farthest_m(a: &State, b: &State) -> f64 {
-    a.x.iter().zip(&b.x).map(|(a, b)| a.distance(*b)).fold(0.0, f64::max)
+    a.mechanical.x.iter().zip(&b.mechanical.x).map(|(a, b)| a.distance(*b)).fold(0.0, f64::max)
 }
 
 fn compare(tets: u32, away_m: f64, off: Skips, rounds: usize) -> Result<Found> {
-    let models = [scene(tets, away_m, Skips::default())?, scene(tets, away_m, off)?];
+    let model = |skips| Model::build(scene(tets, away_m, skips)?).into_diagnostic();
+    let models = [model(Skips::default())?, model(off)?];
     let depth_m = if away_m > 0.0 { 0.0 } else { DEPTH_M };
     let mut presses = models.each_ref().map(|model| Press::new(model, depth_m, APPROACH_TICKS));
     for press in &mut presses {

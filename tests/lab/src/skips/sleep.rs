@@ -13,7 +13,7 @@ const MOST_TICKS: usize = 20_000;
 
 pub(super) fn run(rounds: usize) -> Result<Found> {
     let model = |sleep_tolerance_m: f64| -> Result<Model> {
-        let mut spec = pair::scene(TETS, AWAY_M, Skips::default())?.spec().clone();
+        let mut spec = pair::scene(TETS, AWAY_M, Skips::default())?;
         spec.settings.mass_damping_per_s = DAMPING_PER_S;
         spec.settings.sleep_tolerance_m = sleep_tolerance_m;
         Model::build(spec).into_diagnostic()

@@ -4,10 +4,11 @@ use crate::{bodies, methods, problems::body::Body};
 use glam::DQuat;
 use miette::Result;
 use palpate_physics::{
-    Settings,
-    bodies::hybrid::wake_only,
+    BodySpec, Settings,
+    bodies::hybrid::HybridSpec,
     contact::{Coupling, ToolShape, ToolSpec, ToolTarget},
     material::Law,
+    world::wake_only,
 };
 use std::f64::consts::TAU;
 
@@ -43,7 +44,8 @@ pub(super) fn run(options: &Options) -> Result<Outcome> {
     let (coarse, fine) = (Body::Block.tets(4)?, Body::Block.tets(32)?);
     let mut spec = rig::body(options, coarse.mesh, bodies::material(Law::StableNeoHookean, 10e3, poisson_ratio)?);
     spec.prescribed = coarse.prescribed;
-    spec.particles = Some(methods::particles(Body::Block, &fine, SPACING_M, 600)?);
+    let particles = methods::particles(Body::Block, &fine, SPACING_M, 600)?;
+    spec.body = BodySpec::Hybrid(HybridSpec { coarse: rig::solid(&spec).clone(), particles });
     spec.settings = Settings { mass_damping_per_s: 20.0, ..spec.settings };
     spec.tools = vec![ToolSpec {
         name: "sphere".into(),
@@ -79,17 +81,17 @@ pub(super) fn run(options: &Options) -> Result<Outcome> {
         residual = residual.max((after.balance_j() - before.balance_j()).abs() / before.elastic_j);
         jump = jump.max((after.held_j() - before.held_j()) / before.elastic_j);
         for tick in 0..every_ms {
-            let force_n = rig.state.tools[0].contact_force_n;
+            let force_n = rig.state.mechanical.tools[0].contact_force_n;
             let phase = TAU * f64::from(every_ms * number + tick) / TREMOR_TICKS;
             if let Some(quarantine) = press(&mut rig, DEPTH_M - TREMOR_M * phase.sin()) {
                 outcome.broken.push(quarantine.to_string());
                 return Ok(outcome);
             }
-            let now_n = rig.state.tools[0].contact_force_n;
+            let now_n = rig.state.mechanical.tools[0].contact_force_n;
             force_step = force_step.max(now_n.distance(force_n) / force_n.length());
         }
     }
-    outcome.push(Measured::value("force at the end", rig.state.tools[0].contact_force_n.length(), "N"));
+    outcome.push(Measured::value("force at the end", rig.state.mechanical.tools[0].contact_force_n.length(), "N"));
     outcome.push(Measured::bounded("ledger over a switch, of the elastic energy", residual, "1", 1e-9));
     outcome.push(Measured::bounded("energy up at a switch, of the elastic energy", jump, "1", 1e-9));
     outcome.push(Measured::bounded("force from tick to tick", 100.0 * force_step, "%", 1.0));

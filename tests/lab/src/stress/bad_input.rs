@@ -4,10 +4,11 @@
 //! takes the force of a refused tick away at once.
 use super::{Measured, Options, Outcome, meshes, random::Random, rig, rig::Drive, rig::Rig};
 use crate::bodies::material;
+use crate::methods::tet_body;
 use glam::DVec3;
 use miette::Result;
 use palpate_physics::{
-    LoadSpec, Model, ModelSpec, PointForce, TetMesh,
+    BodySpec, LoadSpec, Model, ModelSpec, PointForce, TetMesh,
     contact::{Coupling, ToolShape, ToolSpec, ToolTarget},
     material::{Lame, Law, Viscosity},
 };
@@ -30,7 +31,7 @@ pub(super) fn run(options: &Options) -> Result<Outcome> {
         for field in 0..FIELDS.len() {
             tried += 1;
             let bad = BAD[random.below(BAD.len())];
-            let built = spoilt(&good.model, field, bad, &mut random);
+            let built = spoilt(&good.spec, field, bad, &mut random);
             taken += u32::from(built.is_ok());
             match built {
                 Ok(()) => outcome.demand(false, || format!("{} = {bad} was accepted", FIELDS[field])),
@@ -54,7 +55,7 @@ fn pressed(options: &Options) -> Result<Rig> {
     let top = meshes::triangles_where(&mesh, |p| p.z > -1e-9)?;
     let corner = meshes::nodes_where(&mesh, |p| p.z > -1e-9 && p.x > 0.0199);
     let mut spec = rig::body(options, mesh, material(Law::StableNeoHookean, 10e3, 0.4)?);
-    spec.regions[0].material.viscosity = Viscosity { phi_pa_s: 0.2, psi_pa_s: 0.2 };
+    rig::solid_mut(&mut spec).regions[0].material.viscosity = Viscosity { phi_pa_s: 0.2, psi_pa_s: 0.2 };
     spec.prescribed = vec![rig::hold("floor", floor)];
     spec.gravity_m_per_s2 = DVec3::NEG_Z * 9.81;
     spec.loads = vec![
@@ -94,7 +95,7 @@ fn ticks(good: &Rig, rounds: u32, random: &mut Random, outcome: &mut Outcome) ->
     let mut refused = 0;
     for round in 0..rounds {
         let mut drive = pressing(&good.model);
-        let node = random.below(good.state.x.len()) as u32;
+        let node = random.below(good.state.mechanical.x.len()) as u32;
         drive.point_forces.push(PointForce { node, force_n: DVec3::ZERO });
         let what = spoil(&mut drive, random);
         let mut rig = good.clone();
@@ -145,13 +146,19 @@ fn blows(good: &Rig, outcome: &mut Outcome) {
         let mut rig = good.clone();
         let mut drive = pressing(&good.model);
         drive.point_forces.push(PointForce { node: rig.model.surface().triangle_nodes(0)[0], force_n });
-        let free = rig.model.inverse_mass_per_kg().iter().position(|inverse| inverse.x > 0.0).unwrap_or(0);
+        let free = tet_body(&rig.model).inverse_mass_per_kg().iter().position(|inverse| inverse.x > 0.0).unwrap_or(0);
         drive.point_forces[0].node = free as u32;
         let report = rig.tick(&drive);
         outcome.demand(report.quarantined.is_some(), || format!("{force_n} N was not refused"));
-        outcome.demand(rig.state.x == good.state.x, || format!("{force_n} N moved the last good state"));
-        let silent =
-            rig.state.tools.iter().all(|tool| tool.device_force_n == DVec3::ZERO && tool.local_model.is_none());
+        outcome.demand(rig.state.mechanical.x == good.state.mechanical.x, || {
+            format!("{force_n} N moved the last good state")
+        });
+        let silent = rig
+            .state
+            .mechanical
+            .tools
+            .iter()
+            .all(|tool| tool.device_force_n == DVec3::ZERO && tool.local_model.is_none());
         outcome.demand(silent, || format!("a tool still feels {force_n} N"));
     }
 }
@@ -183,16 +190,16 @@ const FIELDS: [&str; 23] = [
 ];
 
 /// Builds the model with one bad number in one of [`FIELDS`]; the error's text if it was refused.
-fn spoilt(model: &Model, field: usize, bad: f64, random: &mut Random) -> Result<(), String> {
-    let mut spec = model.spec().clone();
+fn spoilt(spec: &ModelSpec, field: usize, bad: f64, random: &mut Random) -> Result<(), String> {
+    let mut spec = spec.clone();
     let axis = random.below(3);
     let text = |error: &dyn std::fmt::Display| error.to_string();
     match field {
         0 => {
-            let mut positions = spec.mesh.positions_m().to_vec();
+            let mut positions = rig::solid(&spec).mesh.positions_m().to_vec();
             let node = random.below(positions.len());
             positions[node][axis] = bad;
-            return TetMesh::new(positions, spec.mesh.tets().to_vec()).map(|_| ()).map_err(|e| text(&e));
+            return TetMesh::new(positions, rig::solid(&spec).mesh.tets().to_vec()).map(|_| ()).map_err(|e| text(&e));
         }
         1 => return Lame::from_young_poisson(bad, 0.3).map(|_| ()).map_err(|e| text(&e)),
         2 => return Lame::from_young_poisson(1e3, bad).map(|_| ()).map_err(|e| text(&e)),
@@ -202,10 +209,11 @@ fn spoilt(model: &Model, field: usize, bad: f64, random: &mut Random) -> Result<
 }
 
 fn spoil_field(spec: &mut ModelSpec, field: usize, bad: f64, axis: usize, random: &mut Random) {
-    let region = &mut spec.regions[0];
     let tool = random.below(spec.tools.len());
     let coupling = &mut spec.tools[1].coupling;
     let Coupling::Spring { stiffness_n_per_m, damping_n_s_per_m, mass_kg } = coupling else { return };
+    let BodySpec::Tet(solid) = &mut spec.body else { return };
+    let region = &mut solid.regions[0];
     match field {
         3 => region.material.lame.lambda_pa = bad,
         4 => region.material.lame.mu_pa = bad,

@@ -52,7 +52,7 @@ fn excess(options: &Options, substeps: u32, force_n: f64, count: u32, outcome: &
         drive.point_forces.clear();
         // Every fifth tick rests.
         if tick % 5 != 0 {
-            let node = random.below(rig.state.x.len()) as u32;
+            let node = random.below(rig.state.mechanical.x.len()) as u32;
             drive.point_forces.push(PointForce { node, force_n: random.vector() * force_n });
             done += 1;
         }

@@ -1,6 +1,7 @@
 //! Lamé's thick sphere under internal pressure as ν → ½, on one octant; the linear answer of the mesh itself, no Richardson.
 //! The pressure is so small that every law is linear.
 use super::{Measured, Options, Outcome, rig};
+use crate::methods::tet_body;
 use crate::{
     bodies,
     problems::{
@@ -69,5 +70,5 @@ fn inner_displacement_m(options: &Options, poisson: f64, cells: usize) -> Result
     let go_on = &mut |_: &_| ControlFlow::Continue(());
     let found = solve_static(&model, &[1.0], &[DVec3::ZERO; 3], &[], &settings, go_on).into_diagnostic()?;
     let grown = cavity.iter().map(|&n| found.x[n as usize].length() - OCTANT_M[0]);
-    Ok((grown.sum::<f64>() / cavity.len() as f64, model.mesh().tets().len()))
+    Ok((grown.sum::<f64>() / cavity.len() as f64, tet_body(&model).mesh().tets().len()))
 }

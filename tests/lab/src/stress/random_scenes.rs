@@ -2,6 +2,7 @@
 //! `palpate-lab stress random-scenes --seed N` begins with the scene that failed as N.
 use super::{Measured, Options, Outcome, meshes, random::Random, rig, rig::Drive, rig::Rig};
 use crate::bodies::material;
+use crate::methods::tet_body;
 use glam::DVec3;
 use miette::{IntoDiagnostic, Result};
 use palpate_physics::{
@@ -80,16 +81,17 @@ const TICKS: u32 = 150;
 fn one(options: &Options, seed: u64) -> Result<Found> {
     let mut random = Random::new(seed);
     let spec = scene(options, &mut random)?;
-    let (young_pa, size_m) = (spec.regions[0].material.lame.young_modulus_pa(), size_m(&spec.mesh));
+    let (young_pa, size_m) =
+        (rig::solid(&spec).regions[0].material.lame.young_modulus_pa(), size_m(&rig::solid(&spec).mesh));
     let mut rig = Rig::new(spec)?;
     let mut drive = Drive::still(&rig.model);
-    let ways: Vec<DVec3> = rig.model.spec().tools.iter().map(|tool| way(tool, size_m, &mut random)).collect();
+    let ways: Vec<DVec3> = rig.model.tools().iter().map(|tool| way(tool, size_m, &mut random)).collect();
     let mut found = Found { finite: true, substeps: rig.model.substeps(), what: what(&rig), ..Found::default() };
     let mut moved_j = f64::MIN_POSITIVE;
     let (mut gain_j, mut loss_j) = (0.0_f64, 0.0_f64);
     for tick in 1..=TICKS {
         let phase = f64::from(tick) / f64::from(TICKS);
-        for ((target, tool), way) in drive.tools.iter_mut().zip(&rig.model.spec().tools).zip(&ways) {
+        for ((target, tool), way) in drive.tools.iter_mut().zip(rig.model.tools()).zip(&ways) {
             let before = target.position_m;
             target.position_m = tool.start_position_m + *way * (std::f64::consts::PI * phase).sin();
             target.velocity_m_per_s = (target.position_m - before) / 1e-3;
@@ -97,7 +99,7 @@ fn one(options: &Options, seed: u64) -> Result<Found> {
         drive.load_factors.fill((3.0 * phase).min(1.0));
         drive.point_forces.clear();
         if random.chance(0.2) {
-            let node = random.below(rig.state.x.len()) as u32;
+            let node = random.below(rig.state.mechanical.x.len()) as u32;
             let force_n = random.vector() * 1e-4 * young_pa * size_m * size_m;
             drive.point_forces.push(PointForce { node, force_n });
         }
@@ -115,7 +117,7 @@ fn one(options: &Options, seed: u64) -> Result<Found> {
         // What leapfrog holds in the moment beyond the work is no gain.
         let own_j = rig.leapfrog_excess_j().max(0.0);
         (gain_j, loss_j) = (gain_j.max(energies.balance_j() - own_j), loss_j.max(-energies.balance_j()));
-        found.touched |= rig.state.tools.iter().any(|tool| tool.contacts > 0);
+        found.touched |= rig.state.mechanical.tools.iter().any(|tool| tool.contacts > 0);
     }
     (found.gain, found.loss) = (gain_j / moved_j, loss_j / moved_j);
     found.min_j = rig.min_volume_ratio();
@@ -123,10 +125,11 @@ fn one(options: &Options, seed: u64) -> Result<Found> {
 }
 
 fn what(rig: &Rig) -> String {
-    let (spec, substeps) = (rig.model.spec(), rig.model.substeps());
-    let material = &spec.regions[0].material;
+    let (model, substeps) = (&rig.model, rig.model.substeps());
+    let body = tet_body(model);
+    let material = body.material_of(0);
     let (law, poisson, psi) = (material.law, material.lame.poisson_ratio(), material.viscosity.psi_pa_s);
-    let (loads, tools, tets) = (spec.loads.len(), spec.tools.len(), spec.mesh.tets().len());
+    let (loads, tools, tets) = (model.loads().len(), model.tools().len(), body.mesh().tets().len());
     format!(
         "{law:?}, nu {poisson:.2}, psi {psi:.2} Pa s, {loads} loads, {tools} tools, {tets} tets, {substeps} substeps"
     )
@@ -172,17 +175,17 @@ fn scene(options: &Options, random: &mut Random) -> Result<ModelSpec> {
         // Relaxation times of up to a millisecond.
         let most = 1e-3 * young_pa;
         let viscosity = Viscosity { phi_pa_s: most * random.unit(), psi_pa_s: most * random.unit() };
-        spec.regions[0].material.viscosity = viscosity;
+        rig::solid_mut(&mut spec).regions[0].material.viscosity = viscosity;
     }
-    spec.regions[0].density_kg_per_m3 = random.within(500.0, 2000.0);
-    let held = meshes::nodes_where(&spec.mesh, |p| p.z < low.z + 0.15 * (high.z - low.z));
+    rig::solid_mut(&mut spec).regions[0].density_kg_per_m3 = random.within(500.0, 2000.0);
+    let held = meshes::nodes_where(&rig::solid(&spec).mesh, |p| p.z < low.z + 0.15 * (high.z - low.z));
     spec.prescribed = vec![rig::hold("below", held)];
     if random.chance(0.5) {
         spec.gravity_m_per_s2 = random.vector() * 9.81;
     }
     if random.chance(0.7) {
         let above = low.z + random.within(0.5, 0.8) * (high.z - low.z);
-        let triangles = meshes::triangles_where(&spec.mesh, |p| p.z > above)?;
+        let triangles = meshes::triangles_where(&rig::solid(&spec).mesh, |p| p.z > above)?;
         let most_pa = 0.05 * young_pa;
         spec.loads.push(if random.chance(0.5) {
             LoadSpec::Traction { triangles, traction_pa: random.vector() * most_pa }
@@ -200,16 +203,18 @@ fn scene(options: &Options, random: &mut Random) -> Result<ModelSpec> {
 
 /// Up to two spheres beside the body, as small as its surface allows or larger.
 fn tools(spec: &mut ModelSpec, random: &mut Random) -> Result<()> {
-    let surface = palpate_physics::Surface::of(&spec.mesh).into_diagnostic()?;
-    let longest_m = (0..spec.mesh.tets().len()).map(|tet| spec.mesh.longest_edge_m(tet)).fold(0.0, f64::max);
+    let surface = palpate_physics::Surface::of(&rig::solid(&spec).mesh).into_diagnostic()?;
+    let longest_m = (0..rig::solid(&spec).mesh.tets().len())
+        .map(|tet| rig::solid(&spec).mesh.longest_edge_m(tet))
+        .fold(0.0, f64::max);
     let least_m = longest_m / LARGEST_TRIANGLE;
-    let (low, high) = spec.mesh.bounds_m();
+    let (low, high) = rig::solid(&spec).mesh.bounds_m();
     for index in 0..random.below(3) {
-        let radius_m = (least_m * 1.01).max(0.2 * size_m(&spec.mesh)) * random.within(1.0, 2.0);
+        let radius_m = (least_m * 1.01).max(0.2 * size_m(&rig::solid(&spec).mesh)) * random.within(1.0, 2.0);
         let side = DVec3::new(random.within(-1.0, 1.0), random.within(-1.0, 1.0), random.within(0.3, 1.0)).normalize();
         // Away from the middle until it is clear of every vertex.
         let middle = 0.5 * (low + high);
-        let vertices = surface.nodes.iter().map(|&n| spec.mesh.positions_m()[n as usize]);
+        let vertices = surface.nodes.iter().map(|&n| rig::solid(&spec).mesh.positions_m()[n as usize]);
         let far_m = vertices.map(|p| (p - middle).dot(side)).fold(0.0, f64::max) + 1.05 * radius_m;
         let mass_kg = random.log_within(0.01, 0.1);
         let stiffness_n_per_m = random.log_within(50.0, 1000.0);

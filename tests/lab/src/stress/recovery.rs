@@ -4,6 +4,7 @@
 //! repeated in more substeps. Its free nodes are put wrong at rest and let go for five seconds.
 use super::{Measured, Options, Outcome, meshes, random::Random, rig, rig::Drive, rig::Rig};
 use crate::bodies::material;
+use crate::methods::tet_body;
 use glam::DVec3;
 use miette::Result;
 use palpate_physics::material::Law;
@@ -58,8 +59,8 @@ fn held(options: &Options, law: Law) -> Result<Rig> {
 
 fn put(rig: &mut Rig, start: Start, seed: u64) {
     let mut random = Random::new(seed);
-    let free = rig.model.inverse_mass_per_kg().to_vec();
-    for (x, _) in rig.state.x.iter_mut().zip(&free).filter(|(_, inverse)| inverse.x > 0.0) {
+    let free = tet_body(&rig.model).inverse_mass_per_kg().to_vec();
+    for (x, _) in rig.state.mechanical.x.iter_mut().zip(&free).filter(|(_, inverse)| inverse.x > 0.0) {
         let anywhere = DVec3::new(0.02, 0.02, 0.01) * random.vector() - DVec3::Z * 0.01;
         *x = match start {
             Start::Flattened => DVec3::new(x.x, x.y, -0.02),
@@ -68,7 +69,7 @@ fn put(rig: &mut Rig, start: Start, seed: u64) {
             Start::Mirrored => DVec3::new(x.x, x.y, -0.04 - x.z),
         };
     }
-    rig.state.force_is_current = false;
+    rig.state.mechanical.force_is_current = false;
 }
 
 /// How a body came back.

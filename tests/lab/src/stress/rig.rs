@@ -1,15 +1,17 @@
 //! A body under way: model, state, buffers, and what drives a tick. The one place of the suite that steps time.
 use super::Options;
+use crate::methods::tet_body;
 use glam::DVec3;
 use miette::{IntoDiagnostic, Result};
 use palpate_physics::{
-    Energies, Model, ModelSpec, PointForce, Precision, PrescribedSpec, Region, Scratch, Settings, State, StepReport,
-    TetMesh, TickInput, contact::ToolTarget, health, material::Material, step,
+    BodySpec, Energies, Model, ModelSpec, PointForce, Precision, PrescribedSpec, Region, Scratch, Settings, Solid,
+    State, StepReport, TetMesh, TickInput, contact::ToolTarget, material::Material, step, world,
 };
 
 /// A body and its state.
 #[derive(Debug, Clone)]
 pub(super) struct Rig {
+    pub(super) spec: ModelSpec,
     pub(super) model: Model,
     pub(super) state: State,
     pub(super) scratch: Scratch,
@@ -29,12 +31,11 @@ pub(super) struct Drive {
 impl Drive {
     /// Holds a model's tools and prescribed nodes where they start, without loads.
     pub(super) fn still(model: &Model) -> Self {
-        let spec = model.spec();
         let at = |position_m| ToolTarget::at(position_m);
         Self {
-            tools: spec.tools.iter().map(|tool| at(tool.start_position_m)).collect(),
-            load_factors: vec![0.0; spec.loads.len()],
-            prescribed_m: vec![DVec3::ZERO; spec.prescribed.len()],
+            tools: model.tools().iter().map(|tool| at(tool.start_position_m)).collect(),
+            load_factors: vec![0.0; model.loads().len()],
+            prescribed_m: vec![DVec3::ZERO; model.prescribed().len()],
             point_forces: Vec::new(),
         }
     }
@@ -42,8 +43,14 @@ impl Drive {
 
 impl Rig {
     pub(super) fn new(spec: ModelSpec) -> Result<Self> {
-        let model = Model::build(spec).into_diagnostic()?;
-        Ok(Self { state: State::at_rest(&model), scratch: Scratch::new(&model), substeps: model.substeps(), model })
+        let model = Model::build(spec.clone()).into_diagnostic()?;
+        Ok(Self {
+            spec,
+            state: State::at_rest(&model),
+            scratch: Scratch::new(&model),
+            substeps: model.substeps(),
+            model,
+        })
     }
 
     /// One tick. Allocates nothing.
@@ -64,17 +71,17 @@ impl Rig {
     }
 
     pub(super) fn min_volume_ratio(&self) -> f64 {
-        health::min_volume_ratio(&self.model, &self.state).0
+        world::min_volume_ratio(&self.model, &self.state).map_or(1.0, |smallest| smallest.ratio)
     }
 
     pub(super) fn is_finite(&self) -> bool {
-        health::first_non_finite(&self.state).is_none()
+        world::first_non_finite(&self.state).is_none()
     }
 
     /// Largest distance (m) of any node from its rest position.
     pub(super) fn largest_displacement_m(&self) -> f64 {
         let rest = self.model.rest_positions_m();
-        self.state.x.iter().zip(rest).map(|(x, rest)| x.distance(*rest)).fold(0.0, f64::max)
+        self.state.mechanical.x.iter().zip(rest).map(|(x, rest)| x.distance(*rest)).fold(0.0, f64::max)
     }
 
     /// `⅛ dt² Σ f_i·f/m` (J) with the internal force `f_i` and the total one `f`, over the free degrees of freedom.
@@ -88,10 +95,10 @@ impl Rig {
     /// (the last term in W's own share is `+⅛ dt² g·f/m`, since the ledger stands half a kick before the end of a step). So this
     /// is by how much the energy held may exceed the work done although nothing is wrong: second order in dt.
     pub(super) fn leapfrog_excess_j(&self) -> f64 {
-        let dt_s = self.model.spec().settings.tick_period_s / f64::from(self.substeps);
+        let dt_s = self.model.settings().tick_period_s / f64::from(self.substeps);
         let weight = self.model.gravity_m_per_s2();
-        let nodes = self.state.force_n.iter().zip(&self.state.external_n);
-        let masses = self.model.mass_kg().iter().zip(self.model.inverse_mass_per_kg());
+        let nodes = self.state.mechanical.force_n.iter().zip(&self.state.mechanical.external_n);
+        let masses = self.model.body().mass_kg().iter().zip(tet_body(&self.model).inverse_mass_per_kg());
         let terms = nodes.zip(masses).map(|((force, external), (mass, inverse_mass))| {
             let internal = *force - *external - weight * *mass;
             (internal * *force * *inverse_mass).element_sum()
@@ -108,17 +115,32 @@ pub(super) fn settings(_options: &Options) -> Settings {
 /// A body of one material without viscosity, 1000 kg/m³, nothing held or loaded.
 pub(super) fn body(options: &Options, mesh: TetMesh, material: Material) -> ModelSpec {
     ModelSpec {
-        tet_region: vec![0; mesh.tets().len()],
-        mesh,
-        particles: None,
-        seed: None,
-        springs: None,
-        regions: vec![Region { name: "body".into(), material, density_kg_per_m3: 1000.0 }],
+        body: BodySpec::Tet(Solid {
+            tet_region: vec![0; mesh.tets().len()],
+            mesh,
+            regions: vec![Region { name: "body".into(), material, density_kg_per_m3: 1000.0 }],
+        }),
         prescribed: Vec::new(),
         loads: Vec::new(),
         gravity_m_per_s2: DVec3::ZERO,
         tools: Vec::new(),
         settings: settings(options),
+    }
+}
+
+/// The tets of a body that was made by [`body`].
+pub(super) fn solid_mut(spec: &mut ModelSpec) -> &mut Solid {
+    match &mut spec.body {
+        BodySpec::Tet(solid) => solid,
+        _ => unreachable!("stressed bodies are of tetrahedra until they are given particles"),
+    }
+}
+
+/// The same, to be read.
+pub(super) fn solid(spec: &ModelSpec) -> &Solid {
+    match &spec.body {
+        BodySpec::Tet(solid) => solid,
+        _ => unreachable!("stressed bodies are of tetrahedra until they are given particles"),
     }
 }
 

@@ -22,7 +22,7 @@ fn ring(options: &Options, name: &str, mesh: TetMesh, outcome: &mut Outcome) -> 
     let shape = quality::measure(&mesh);
     let mut rig = Rig::new(rig::body(options, mesh, material(Law::StableNeoHookean, 10e3, 0.4)?))?;
     let mut random = Random::new(options.seed);
-    for (v, x) in rig.state.v.iter_mut().zip(&rig.state.x) {
+    for (v, x) in rig.state.mechanical.v.iter_mut().zip(&rig.state.mechanical.x) {
         *v = *x * 1.0 + random.vector() * 1e-3;
     }
     let start_j = rig.energies().held_j();
@@ -34,9 +34,9 @@ fn ring(options: &Options, name: &str, mesh: TetMesh, outcome: &mut Outcome) -> 
         most = most.max(rig.energies().held_j() / start_j);
     }
     outcome.demand(rig.is_finite(), || format!("{name}: not finite"));
-    let settings = rig.model.spec().settings;
+    let settings = rig.model.settings();
     let dt_s = settings.tick_period_s / f64::from(rig.model.substeps());
-    let limit_s = 2.0 / rig.model.max_natural_frequency_rad_per_s();
+    let limit_s = 2.0 / rig.model.body().max_natural_frequency_rad_per_s();
     outcome.push(Measured::value(format!("smallest dihedral angle, {name}"), shape.min_dihedral_deg, "deg"));
     outcome.push(Measured::value(
         format!("longest edge over shortest, {name}"),

@@ -73,7 +73,7 @@ fn ringing(options: &Options, finer: u32) -> Result<Rig> {
     spec.settings.substeps = Substeps::Fixed(finer * measured);
     let mut rig = Rig::new(spec)?;
     let mut random = Random::new(options.seed);
-    for (v, x) in rig.state.v.iter_mut().zip(&rig.state.x) {
+    for (v, x) in rig.state.mechanical.v.iter_mut().zip(&rig.state.mechanical.x) {
         let rates = DVec3::new(0.3, -0.2, 0.5).cross(*x) + DVec3::new(x.y, -x.z, x.x) + random.vector() * 1e-3;
         *v = rates * RATE_PER_S;
     }

@@ -5,11 +5,11 @@ use super::{
     rig::{Drive, Rig, hold},
 };
 use glam::DVec3;
-use miette::{IntoDiagnostic, Result};
+use miette::{IntoDiagnostic, Result, bail};
 use palpate_physics::{
-    ModelSpec, PointForce, Settings, TetMesh,
+    BodySpec, ModelSpec, PointForce, Settings,
     bodies::mass_spring::{
-        HomeLaw, Refinement, Refining, SpringBodySpec, SpringSpec, home::Layer, net::hexagonal_patch, region::Constants,
+        HomeLaw, MassSpringSpec, Refinement, Refining, SpringSpec, home::Layer, net::hexagonal_patch, region::Constants,
     },
     contact::{Coupling, ToolShape, ToolSpec, ToolTarget},
 };
@@ -67,10 +67,10 @@ fn one(seed: u64) -> Result<Found> {
     let mut random = Random::new(seed);
     let edge_m = random.log_within(1e-3, 1e-2);
     let spec = body(edge_m, &mut random)?;
-    let home_n_per_m = spec.springs.as_ref().map_or(1.0, |springs| springs.springs.coarse.home_n_per_m);
-    let mut rig = Rig::new(spec)?;
+    let BodySpec::MassSpring(springs) = &spec.body else { bail!("the body is not one of springs") };
+    let home_n_per_m = springs.springs.coarse.home_n_per_m;
+    let mut rig = Rig::new(spec.clone())?;
     let mut drive = Drive::still(&rig.model);
-    let spec = rig.model.spec().clone();
     let jumps = random.chance(0.3);
     let ways: Vec<[DVec3; 2]> = spec
         .tools
@@ -105,7 +105,7 @@ fn one(seed: u64) -> Result<Found> {
             moved_j = moved_j.max(energy_j.abs());
         }
         (gain_j, loss_j) = (gain_j.max(energies.balance_j()), loss_j.max(-energies.balance_j()));
-        found.touched |= rig.state.tools.iter().any(|tool| tool.contacts > 0);
+        found.touched |= rig.state.mechanical.tools.iter().any(|tool| tool.contacts > 0);
         found.refined = found.refined.max(refined_nodes(&rig));
     }
     found.refined_at_last = refined_nodes(&rig);
@@ -115,7 +115,7 @@ fn one(seed: u64) -> Result<Found> {
 }
 
 fn refined_nodes(rig: &Rig) -> usize {
-    let both = rig.state.springs.as_ref().zip(rig.model.springs());
+    let both = rig.state.body.as_mass_spring().zip(rig.model.body().as_mass_spring());
     both.map_or(0, |(springs, body)| springs.refined_nodes(body))
 }
 
@@ -158,12 +158,7 @@ fn body(edge_m: f64, random: &mut Random) -> Result<ModelSpec> {
     });
     let tools = 1 + random.below(2);
     Ok(ModelSpec {
-        mesh: TetMesh::of_points(Vec::new()),
-        particles: None,
-        seed: None,
-        springs: Some(SpringBodySpec { springs, refinement, table: None }),
-        regions: Vec::new(),
-        tet_region: Vec::new(),
+        body: BodySpec::MassSpring(MassSpringSpec { springs, refinement, table: None }),
         prescribed: vec![hold("border", border)],
         loads: Vec::new(),
         gravity_m_per_s2: DVec3::ZERO,

@@ -49,8 +49,9 @@ fn layered(options: &Options, ratio: f64) -> Result<Rig> {
     let floor = meshes::nodes_where(&mesh, |p| p.z < -0.0199);
     let triangles = meshes::triangles_where(&mesh, |p| p.z > -1e-9)?;
     let mut spec = rig::body(options, mesh, soft);
-    spec.regions.push(Region { name: "stiff".into(), material: stiff, density_kg_per_m3: 1000.0 });
-    spec.tet_region = tet_region;
+    let solid = rig::solid_mut(&mut spec);
+    solid.regions.push(Region { name: "stiff".into(), material: stiff, density_kg_per_m3: 1000.0 });
+    solid.tet_region = tet_region;
     spec.prescribed = vec![rig::hold("floor", floor)];
     // About 1 % of shear in the soft half: small enough that the trapezoid of the internal forces is their work to 1e-6.
     spec.loads = vec![LoadSpec::Traction { triangles, traction_pa: DVec3::X * 1e-3 * SOFT_PA }];

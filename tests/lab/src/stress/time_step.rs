@@ -62,11 +62,11 @@ pub(super) fn run(options: &Options) -> Result<Outcome> {
 fn sweep(options: &Options, ratio: f64, steps: u32) -> Result<Sweep> {
     let mut spec = rig::body(options, meshes::block(4)?, material(Law::StableNeoHookean, 10e3, 0.4)?);
     spec.settings.substeps = Substeps::Fixed(1);
-    let omega = Rig::new(spec.clone())?.model.max_natural_frequency_rad_per_s();
+    let omega = Rig::new(spec.clone())?.model.body().max_natural_frequency_rad_per_s();
     spec.settings.tick_period_s = 2.0 * ratio / omega;
     let mut rig = Rig::new(spec)?;
     let mut random = Random::new(options.seed);
-    for v in &mut rig.state.v {
+    for v in &mut rig.state.mechanical.v {
         *v = random.vector() * 1e-6 * 0.02 * omega;
     }
     let drive = Drive::still(&rig.model);

@@ -3,9 +3,9 @@
 //! The fine sheet is the coarse one refined everywhere, on the same foundation per area ([`matching::area_consistent`]), with the same mass per area. A sphere presses, rests, is drawn along, and leaves.
 use glam::DVec3;
 use palpate_physics::{
-    Model, ModelError, ModelSpec, PrescribedSpec, Scratch, Settings, State, TetMesh, TickInput,
+    BodySpec, Model, ModelError, ModelSpec, PrescribedSpec, Scratch, Settings, State, TickInput,
     bodies::mass_spring::{
-        HomeLaw, Refinement, Refining, SpringBodySpec, SpringSpec,
+        HomeLaw, MassSpringSpec, Refinement, Refining, SpringSpec,
         calibration::{Calibration, CalibrationError, ConstantsTable},
         loop_scheme::refined,
         matching,
@@ -148,12 +148,7 @@ fn sheet(
         (rings > 0).then_some(Refinement { rings, follows_dent: rings > 2, fade_s: 0.1, by: Refining::ByTools });
     let radius_m = touch.radius * EDGE_M;
     let model = Model::build(ModelSpec {
-        mesh: TetMesh::of_points(Vec::new()),
-        particles: None,
-        seed: None,
-        springs: Some(SpringBodySpec { springs, refinement, table }),
-        regions: Vec::new(),
-        tet_region: Vec::new(),
+        body: BodySpec::MassSpring(MassSpringSpec { springs, refinement, table }),
         prescribed: vec![PrescribedSpec { name: "border".into(), nodes: border, axes: [true; 3] }],
         loads: Vec::new(),
         gravity_m_per_s2: DVec3::ZERO,
@@ -194,7 +189,7 @@ impl Sheet {
         let begun = Instant::now();
         step(&self.model, &mut self.state, &mut self.scratch, &input);
         let cost_us = begun.elapsed().as_secs_f64() * 1e6;
-        let tool = &self.state.tools[0];
+        let tool = &self.state.mechanical.tools[0];
         if tool.contacts > 0 {
             self.costs_us.push(cost_us);
         }

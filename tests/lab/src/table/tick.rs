@@ -1,4 +1,5 @@
 //! µs per 1 ms tick of whole bodies, with their substeps, and the two aims.
+use crate::methods::tet_body;
 use crate::{bodies, press::Press, timing::Summary};
 use miette::Result;
 use palpate_physics::{Model, material::Law};
@@ -44,7 +45,7 @@ fn row(name: &str, shape: &Shape, (young, nu): (f64, f64), tool_radius_m: Option
 /// Times of ticks, and how many contact samples carried force at the end. A tool goes in by a tenth of its radius
 /// during the ticks that are not counted, and stays; without one the body rings.
 fn run(model: &Model, radius_m: f64) -> (Summary, u32) {
-    let ticks = (20_000_000 / (model.substeps() as usize * model.mesh().tets().len())).clamp(100, 2_000);
+    let ticks = (20_000_000 / (model.substeps() as usize * tet_body(model).mesh().tets().len())).clamp(100, 2_000);
     let approach = ticks / 2;
     let mut press = Press::new(model, 0.1 * radius_m, approach);
     let mut times = Vec::with_capacity(ticks);

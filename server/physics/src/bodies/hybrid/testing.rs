@@ -12,6 +12,8 @@ use super::{
     skin::Skin,
     smoothing_kernels::Kernel,
 };
+use crate::Region;
+use crate::Solid;
 use crate::{
     material::{Convention, Lame, Law, Material, Viscosity},
     mesh::{Surface, TetMesh},
@@ -147,10 +149,10 @@ pub(crate) fn hybrid_ball_of(materials: &[Material; 2], spacing_m: f64, fine_dep
     let low = PrescribedSpec { name: "low".into(), nodes: nodes(&|p| p.z < -9e-3), axes: [true, false, true] };
     let far = PrescribedSpec { name: "far".into(), nodes: nodes(&|p| p.y > 9e-3), axes: [true; 3] };
     let surface = Surface::of(&cage).unwrap();
-    let densities = [1000.0, 1200.0];
-    let built = HybridBody::build(&spec, (&cage, &surface), &[low, far], (materials, &densities), &of_tet, &mut |_| {})
-        .unwrap();
-    built.hybrid
+    let region = |(material, density_kg_per_m3)| Region { name: "half".into(), material, density_kg_per_m3 };
+    let regions = materials.iter().copied().zip([1000.0, 1200.0]).map(region).collect();
+    let coarse = Solid { mesh: cage, regions, tet_region: of_tet };
+    HybridBody::lay_out(&coarse, &surface, spec, &[low, far], &mut |_| {}).unwrap().body
 }
 
 /// A block of full cells of spacing 1 mm, in a box of coarse tets.

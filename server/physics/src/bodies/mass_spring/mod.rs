@@ -18,7 +18,7 @@ mod checks;
 pub mod energy;
 pub mod equilibrium;
 pub mod home;
-pub(crate) mod kernels;
+pub mod kernels;
 pub mod loop_scheme;
 pub mod matching;
 pub mod model;

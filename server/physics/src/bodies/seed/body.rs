@@ -114,6 +114,11 @@ impl SeedBody {
         &self.core.mesh
     }
 
+    /// The core, with its material.
+    pub fn core(&self) -> &Solid {
+        &self.core
+    }
+
     /// What it was built from.
     pub(crate) fn spec(&self) -> (&Solid, &Option<LayerSpec>, &SeedParameters) {
         (&self.core, &self.layer, self.model.parameters())

@@ -6,7 +6,7 @@
 //! but if there is none even for those within a spacing of a load, it is spread wide, and left to the coarse tets: some of the particles beneath it, chosen by
 //! nothing, would make a pattern of it.
 use super::awakened::Awakened;
-use crate::Surface;
+use crate::mesh::Surface;
 use crate::{
     bodies::hybrid::{
         HybridBody, Waking,

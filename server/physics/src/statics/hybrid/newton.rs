@@ -213,15 +213,17 @@ fn worst_entry(forces: &Forces) -> u32 {
 mod tests {
     use super::*;
     use crate::{
+        bodies::BodySpec,
         bodies::hybrid::{
-            ParticleSpec, Skin, Waking,
+            HybridSpec, ParticleSpec, Skin, Waking,
             sites::CORNERS,
             testing::{slab, tissue},
         },
         contact::RestingContact,
+        elements::solid::{Region, Solid},
         material::{Lame, Material},
         settings::{PrescribedSpec, Settings},
-        world::{Model, ModelSpec, Region},
+        world::{Model, ModelSpec},
     };
 
     /// StVK pressed evenly to a stretch s bears `½ E (s³ − s)`, less the more it is pressed beyond s = 1/√3: one half of a block then gives way to the other.

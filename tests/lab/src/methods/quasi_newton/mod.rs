@@ -15,6 +15,7 @@ mod history;
 mod prefactor;
 
 use super::{Method, Pace, Running, subject::Subject};
+use crate::methods::tet_body;
 use crate::problems::Problem;
 use glam::DVec3;
 use history::{History, dot};
@@ -114,20 +115,20 @@ impl Body {
     fn new(subject: Subject, iterations: usize) -> Result<Self> {
         let model = &subject.model;
         let state = State::at_rest(model);
-        let nodes = state.x.len();
+        let nodes = state.mechanical.x.len();
         let zeros = || vec![DVec3::ZERO; nodes];
         Ok(Self {
-            system: Prefactored::new(model, model.spec().settings.tick_period_s)?,
+            system: Prefactored::new(model, model.settings().tick_period_s)?,
             history: History::new(nodes),
             iterations,
             contact: model.contact().state(),
             contact_scratch: model.contact().scratch(true),
-            kernel_scratch: model.kernel().scratch(),
-            tools: state.tools,
-            before: state.x.clone(),
-            inertial: state.x.clone(),
-            next: Point { x: state.x.clone(), gradient: zeros(), contact_n: zeros() },
-            x: state.x,
+            kernel_scratch: tet_body(model).kernel().scratch(),
+            tools: state.mechanical.tools,
+            before: state.mechanical.x.clone(),
+            inertial: state.mechanical.x.clone(),
+            next: Point { x: state.mechanical.x.clone(), gradient: zeros(), contact_n: zeros() },
+            x: state.mechanical.x,
             v: zeros(),
             gradient: zeros(),
             direction: zeros(),
@@ -143,7 +144,7 @@ impl Body {
     /// Gradient at `next.x`, to which nodes came from `x`.
     fn evaluate(&mut self) {
         let (model, next) = (&self.subject.model, &mut self.next);
-        let dt_s = model.spec().settings.tick_period_s;
+        let dt_s = model.settings().tick_period_s;
         next.contact_n.fill(DVec3::ZERO);
         if !self.tools.is_empty() {
             // The broad phase must hear of every motion; a halved step comes back by as much as is left.
@@ -161,12 +162,12 @@ impl Body {
         }
         // ∇g = M (x − y)/dt² − f_elastic − f_contact − f
         let rest = model.rest_positions_m();
-        model.kernel().forces_n(rest, &next.x, &self.v, &mut next.gradient, &mut self.kernel_scratch);
-        let inertia = model.mass_kg().iter().map(|mass| mass / (dt_s * dt_s));
+        tet_body(model).kernel().forces_n(rest, &next.x, &self.v, &mut next.gradient, &mut self.kernel_scratch);
+        let inertia = model.body().mass_kg().iter().map(|mass| mass / (dt_s * dt_s));
         for (node, inertia) in inertia.enumerate() {
             let force_n = next.gradient[node] + next.contact_n[node] + self.load_n[node] * self.factor;
             let gradient = (next.x[node] - self.inertial[node]) * inertia - force_n;
-            let held = model.inverse_mass_per_kg()[node].cmpeq(DVec3::ZERO);
+            let held = tet_body(model).inverse_mass_per_kg()[node].cmpeq(DVec3::ZERO);
             next.gradient[node] = DVec3::select(held, DVec3::ZERO, gradient);
         }
     }
@@ -210,7 +211,7 @@ impl Body {
 
 impl Running for Body {
     fn tick(&mut self, fraction: f64) {
-        let settings = &self.subject.model.spec().settings;
+        let settings = &self.subject.model.settings();
         let dt_s = settings.tick_period_s;
         let damping = (-settings.mass_damping_per_s * dt_s).exp();
         self.factor = fraction;

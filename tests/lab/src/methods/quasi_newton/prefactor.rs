@@ -3,6 +3,7 @@
 //! `K₀` is the tangent of the elastic force at rest. It is positive semidefinite for every law here, whose small strain is Hooke's, so `A`
 //! is positive definite. Liu et al. take the Laplacian `Σ_t k_t V_t b_i·b_j I` in its place, which is one scalar matrix for all three axes
 //! and so cheaper to solve; `docs/adr/integrators.md` has what both were measured to do.
+use crate::methods::tet_body;
 use faer::{
     Conj, MatMut, Par, Side, Spec,
     dyn_stack::{MemBuffer, MemStack},
@@ -85,7 +86,7 @@ fn numbers(model: &Model) -> (Vec<[usize; 3]>, usize) {
         unknowns += 1;
         unknowns - 1
     };
-    let number = model.inverse_mass_per_kg().iter().map(|w| w.to_array().map(&mut next)).collect();
+    let number = tet_body(model).inverse_mass_per_kg().iter().map(|w| w.to_array().map(&mut next)).collect();
     (number, unknowns)
 }
 
@@ -100,11 +101,11 @@ fn lower_triangle(model: &Model, number: &[[usize; 3]], dt_s: f64) -> Vec<Triple
             }
         }
     };
-    for (node, mass) in model.mass_kg().iter().enumerate() {
+    for (node, mass) in model.body().mass_kg().iter().enumerate() {
         add(node, node, &DMat3::from_diagonal(DVec3::splat(mass / (dt_s * dt_s))));
     }
-    for (tet, nodes) in model.mesh().tets().iter().enumerate() {
-        let (rest, material) = (&model.rest_tets()[tet], model.material_of(tet));
+    for (tet, nodes) in tet_body(model).mesh().tets().iter().enumerate() {
+        let (rest, material) = (&tet_body(model).rest_tets()[tet], tet_body(model).material_of(tet));
         for (i, &p) in nodes.iter().enumerate() {
             for (j, &q) in nodes.iter().enumerate() {
                 let block = rest.stiffness_block(material, &DMat3::IDENTITY, i, j);

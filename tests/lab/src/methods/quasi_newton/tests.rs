@@ -1,6 +1,7 @@
 #![allow(clippy::unwrap_used)] // a test that cannot build its subject has failed
 use super::*;
 use crate::methods::testing::{equilibrium, farthest_m, free, momenta, problem, settle, tumbling};
+use crate::methods::tet_body;
 
 fn settings(pace: Option<&Pace>) -> Settings {
     Settings {
@@ -20,13 +21,13 @@ fn body(name: &str, resolution: u32, pace: Option<&Pace>, iterations: usize) -> 
 /// `|x − y|²_M/(2dt²) + Σ V Ψ + Φ − f·x` (J) at the point last evaluated.
 fn objective_j(body: &Body) -> f64 {
     let (model, x) = (&body.subject.model, &body.next.x);
-    let dt_s = model.spec().settings.tick_period_s;
+    let dt_s = model.settings().tick_period_s;
     let inertia: f64 =
-        model.mass_kg().iter().zip(x).zip(&body.inertial).map(|((m, x), y)| m * x.distance_squared(*y)).sum();
+        model.body().mass_kg().iter().zip(x).zip(&body.inertial).map(|((m, x), y)| m * x.distance_squared(*y)).sum();
     let element = |(tet, nodes): (usize, &[u32; 4])| {
-        model.rest_tets()[tet].energy_j(model.material_of(tet), &nodes.map(|n| x[n as usize]))
+        tet_body(model).rest_tets()[tet].energy_j(tet_body(model).material_of(tet), &nodes.map(|n| x[n as usize]))
     };
-    let elastic: f64 = model.mesh().tets().iter().enumerate().map(element).sum();
+    let elastic: f64 = tet_body(model).mesh().tets().iter().enumerate().map(element).sum();
     let contact: f64 = body.tools.iter().map(|tool| tool.contact_energy_j).sum();
     let load: f64 = body.load_n.iter().zip(x).map(|(f, x)| f.dot(*x) * body.factor).sum();
     inertia / (2.0 * dt_s * dt_s) + elastic + contact - load
@@ -51,7 +52,7 @@ fn the_gradient_is_the_slope_of_the_objective() {
                     (objective_j(&body), body.next.gradient[node][axis])
                 };
                 let ((up, g_up), (down, g_down)) = (at(1.0), at(-1.0));
-                let held = body.subject.model.inverse_mass_per_kg()[node][axis] == 0.0;
+                let held = tet_body(&body.subject.model).inverse_mass_per_kg()[node][axis] == 0.0;
                 let slope = if held { 0.0 } else { (up - down) / (2.0 * step) };
                 let gradient = 0.5 * (g_up + g_down);
                 assert!((slope - gradient).abs() < 1e-5 * scale, "{name} {node} {axis}: {slope} {gradient}");
@@ -68,7 +69,8 @@ fn the_factorised_matrix_is_the_tangent_at_rest() {
         let rest = body.x.clone();
         let free = |w: &DVec3| DVec3::select(w.cmpeq(DVec3::ZERO), DVec3::ZERO, DVec3::ONE);
         let wave = rest.iter().map(|x| DVec3::new((90.0 * x.y).sin(), (50.0 * x.z).cos(), (70.0 * x.x).sin()));
-        let p: Vec<DVec3> = wave.zip(body.subject.model.inverse_mass_per_kg()).map(|(p, w)| p * free(w)).collect();
+        let p: Vec<DVec3> =
+            wave.zip(tet_body(&body.subject.model).inverse_mass_per_kg()).map(|(p, w)| p * free(w)).collect();
         let step = 1e-8;
         let mut gradient = |sign: f64| {
             for ((next, x), p) in body.next.x.iter_mut().zip(&rest).zip(&p) {

@@ -13,6 +13,7 @@
 //! ```
 //! Any other law: one constraint, `C = √(2VΨ)` with `α = 1`, so `C²/(2α) = VΨ`, and `∂C/∂x_i = −f_i/C`:
 //! `Δx_i = w_i f_i/(Σ w f·f/(2VΨ) + 1/h²)`.
+use crate::methods::tet_body;
 use glam::{DMat3, DVec3};
 use palpate_physics::{
     Model,
@@ -57,17 +58,19 @@ pub(super) struct AnyLaw {
 impl Elements {
     /// For substeps `h_s` (s).
     pub(super) fn of(model: &Model, h_s: f64) -> Self {
-        let tets = model.mesh().tets().iter().enumerate();
-        if (0..model.mesh().tets().len()).all(|tet| model.material_of(tet).law == Law::StableNeoHookean) {
+        let tets = tet_body(model).mesh().tets().iter().enumerate();
+        if (0..tet_body(model).mesh().tets().len())
+            .all(|tet| tet_body(model).material_of(tet).law == Law::StableNeoHookean)
+        {
             let element = |(tet, nodes): (usize, &[u32; 4])| {
-                NeoHookean::new(*nodes, &model.rest_tets()[tet], model.material_of(tet), h_s)
+                NeoHookean::new(*nodes, &tet_body(model).rest_tets()[tet], tet_body(model).material_of(tet), h_s)
             };
             return Self::StableNeoHookean(tets.map(element).collect());
         }
         let element = |(tet, nodes): (usize, &[u32; 4])| AnyLaw {
             nodes: *nodes,
-            rest: model.rest_tets()[tet],
-            material: *model.material_of(tet),
+            rest: tet_body(model).rest_tets()[tet],
+            material: *tet_body(model).material_of(tet),
             compliance: 1.0 / (h_s * h_s),
         };
         Self::AnyLaw(tets.map(element).collect())

@@ -12,6 +12,7 @@ mod contact;
 mod elements;
 
 use super::{Method, Pace, Running, subject::Subject};
+use crate::methods::tet_body;
 use crate::problems::Problem;
 use contact::Contact;
 use elements::{Elements, Node};
@@ -85,7 +86,7 @@ struct Body {
 impl Body {
     fn new(subject: Subject) -> Self {
         let model = &subject.model;
-        let h_s = model.spec().settings.tick_period_s / f64::from(model.substeps());
+        let h_s = model.settings().tick_period_s / f64::from(model.substeps());
         let x = model.rest_positions_m().to_vec();
         let zeros = vec![DVec3::ZERO; x.len()];
         let node = |(x, w): (&DVec3, &DVec3)| Node { x: *x, w: *w };
@@ -93,7 +94,7 @@ impl Body {
             h_s,
             elements: Elements::of(model, h_s),
             contact: subject.tool.as_ref().map(|tool| Contact::of(model, tool.radius_m, h_s)),
-            nodes: x.iter().zip(model.inverse_mass_per_kg()).map(node).collect(),
+            nodes: x.iter().zip(tet_body(model).inverse_mass_per_kg()).map(node).collect(),
             before: x.clone(),
             v: zeros.clone(),
             load_n: subject.load.as_ref().map_or(zeros, |load| load.dense(x.len())),
@@ -107,7 +108,7 @@ impl Body {
     /// To a part of the action; returns the force (N) of the body on the tool.
     fn substep(&mut self, fraction: f64) -> DVec3 {
         let h = self.h_s;
-        let damping = (-self.subject.model.spec().settings.mass_damping_per_s * h).exp();
+        let damping = (-self.subject.model.settings().mass_damping_per_s * h).exp();
         let push = h * h * fraction;
         for (i, node) in self.nodes.iter_mut().enumerate() {
             self.before[i] = node.x;

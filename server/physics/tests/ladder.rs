@@ -1,0 +1,172 @@
+//! The house is a ladder: each folder of the crate uses only those below it, and no kind of body knows another.
+#![allow(clippy::unwrap_used)]
+use std::{
+    collections::{BTreeMap, BTreeSet},
+    fs,
+    path::{Path, PathBuf},
+};
+
+/// The rungs, the lowest first.
+const LADDER: [&str; 20] = [
+    "hash",
+    "settings",
+    "linalg",
+    "lanes",
+    "mesh",
+    "material",
+    "elements",
+    "kernels",
+    "contact",
+    "tick",
+    "bodies/tet",
+    "bodies/hybrid",
+    "bodies/mass_spring",
+    "bodies/seed",
+    "bodies",
+    "integrate",
+    "world",
+    "snapshot",
+    "statics",
+    "lib",
+];
+/// Rungs beside one another: none uses another.
+const BESIDE: [&str; 4] = ["bodies/tet", "bodies/hybrid", "bodies/mass_spring", "bodies/seed"];
+
+/// The rung that a path in the source folder, or a module path joined by `/`, belongs to.
+fn rung_of(path: &str) -> Option<usize> {
+    let fits = |rung: &str| path == rung || path.strip_prefix(rung).is_some_and(|rest| rest.starts_with('/'));
+    let fitting = LADDER.iter().enumerate().filter(|(_, rung)| fits(rung));
+    fitting.max_by_key(|(_, rung)| rung.len()).map(|(number, _)| number)
+}
+
+fn sources(folder: &Path, found: &mut Vec<PathBuf>) {
+    for entry in fs::read_dir(folder).unwrap() {
+        let path = entry.unwrap().path();
+        if path.is_dir() {
+            sources(&path, found);
+        } else if path.extension().is_some_and(|ending| ending == "rs") {
+            found.push(path);
+        }
+    }
+}
+
+/// The text without comments, and without what only tests see: they may use what they like.
+fn product_part(text: &str) -> String {
+    let before_tests = text.split("#[cfg(test)]\nmod ").next().unwrap_or_default();
+    before_tests.lines().map(|line| line.split("//").next().unwrap_or_default()).collect::<Vec<_>>().join("\n")
+}
+
+/// Every `crate::…` path that a text names, in `use` trees and in code, its parts joined by `/`.
+fn crate_paths(text: &str) -> BTreeSet<String> {
+    let mut paths = BTreeSet::new();
+    for (at, _) in text.match_indices("crate::") {
+        let is_word = text[..at].chars().next_back().is_some_and(|c| c.is_alphanumeric() || c == '_' || c == '$');
+        if !is_word {
+            expand(&mut text[at + "crate::".len()..].chars().peekable(), "", &mut paths);
+        }
+    }
+    paths
+}
+
+/// Walks a use tree behind a prefix; each leaf is a path.
+fn expand(rest: &mut std::iter::Peekable<std::str::Chars<'_>>, prefix: &str, paths: &mut BTreeSet<String>) {
+    let mut path = prefix.to_owned();
+    loop {
+        let mut word = String::new();
+        while let Some(c) = rest.next_if(|c| c.is_alphanumeric() || *c == '_') {
+            word.push(c);
+        }
+        if !word.is_empty() {
+            path = if path.is_empty() { word } else { format!("{path}/{word}") };
+        }
+        match rest.peek() {
+            Some(':') => {
+                rest.next();
+            }
+            Some('{') => {
+                rest.next();
+                loop {
+                    while rest.next_if(|c| c.is_whitespace() || *c == ',').is_some() {}
+                    if rest.next_if_eq(&'}').is_some() || rest.peek().is_none() {
+                        return;
+                    }
+                    expand(rest, &path, paths);
+                    // What is left of a leaf, as an alias.
+                    while rest.next_if(|c| !matches!(c, ',' | '}')).is_some() {}
+                }
+            }
+            _ => {
+                paths.insert(path);
+                return;
+            }
+        }
+    }
+}
+
+/// What is wrong with the paths that a file of a rung names.
+fn faults(file: &str, text: &str) -> Vec<String> {
+    let module = file.trim_end_matches(".rs").trim_end_matches("/mod");
+    let Some(own) = rung_of(module) else { return vec![format!("{file} is on no rung of the ladder")] };
+    let mut faults = Vec::new();
+    for path in crate_paths(&product_part(text)) {
+        // Names that the crate's root shows again are asked for where they are.
+        let Some(other) = rung_of(&path) else {
+            faults.push(format!("{file} uses crate::{}, which is no folder", path.replace('/', "::")));
+            continue;
+        };
+        let beside = own != other && [own, other].iter().all(|rung| BESIDE.contains(&LADDER[*rung]));
+        if other > own || beside {
+            faults.push(format!(
+                "{file} ({}) uses crate::{} ({})",
+                LADDER[own],
+                path.replace('/', "::"),
+                LADDER[other]
+            ));
+        }
+    }
+    faults
+}
+
+#[test]
+fn every_folder_uses_only_those_below_it() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
+    let mut files = Vec::new();
+    sources(&root, &mut files);
+    assert!(files.len() > 150, "{} files", files.len());
+    let mut wrong = BTreeMap::new();
+    for path in files {
+        let file = path.strip_prefix(&root).unwrap().to_string_lossy().replace('\\', "/");
+        // Helpers of tests, like tests, may use what they like.
+        if file == "lib.rs" || file.contains("/testing") || file.contains("/tests") {
+            continue;
+        }
+        let found = faults(&file, &fs::read_to_string(&path).unwrap());
+        if !found.is_empty() {
+            wrong.insert(file, found);
+        }
+    }
+    let all: Vec<String> = wrong.into_values().flatten().collect();
+    assert!(all.is_empty(), "{} arrows run up the ladder:\n{}", all.len(), all.join("\n"));
+}
+
+#[test]
+fn an_arrow_up_is_seen_however_it_is_written() {
+    for text in [
+        "use crate::world::Model;",
+        "use crate::{\n    mesh::Surface,\n    bodies::{Body, tet::TetBody},\n};",
+        "fn f() { crate::statics::solve() }",
+        "use crate::{mesh::{self, tet::EDGES as E}, integrate::Pace};",
+    ] {
+        assert_eq!(faults("contact/mod.rs", text).len(), if text.contains("Body, tet") { 2 } else { 1 }, "{text}");
+    }
+    assert_eq!(faults("bodies/tet/body.rs", "use crate::bodies::seed::SeedModel;").len(), 1);
+    assert_eq!(faults("bodies/tet/body.rs", "use crate::bodies::Body;").len(), 1);
+    assert!(faults("bodies/tet/body.rs", "use crate::{bodies::tet::modes, tick::Tick};").is_empty());
+    assert!(faults("bodies/stepped.rs", "use crate::bodies::seed::SteppedSeed;").is_empty());
+    assert!(faults("contact/mod.rs", "// use crate::world::Model;\nuse crate::mesh::Surface;").is_empty());
+    assert!(
+        faults("contact/mod.rs", "use crate::mesh::Surface;\n#[cfg(test)]\nmod tests { use crate::world::Model; }")
+            .is_empty()
+    );
+    assert_eq!(faults("attic/mod.rs", "").len(), 1);
+}
