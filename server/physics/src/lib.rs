@@ -8,7 +8,7 @@
 //!
 //! | folder | what it is |
 //! |---|---|
-//! | `hash` | a hash that is the same on every machine |
+//! | `hash` | hashes that are the same on every machine: of what prints, and of every bit of every tick |
 //! | [`settings`] | how a scene is computed; loads and constraints |
 //! | [`linalg`] | conjugate gradients, Lanczos' method, sparse Cholesky, small eigenproblems |
 //! | [`lanes`] | vectors of numbers, instruction sets, operations on whole lists: all the `unsafe` |
@@ -45,6 +45,7 @@ pub mod world;
 
 pub use bodies::{Body, BodySpec, BodyState};
 pub use elements::solid::{Region, Solid};
+pub use hash::Chain;
 pub use mesh::{MeshError, Surface, TetMesh};
 pub use settings::{Integrator, LoadSpec, Precision, PrescribedSpec, Settings, Skips, Substeps};
 pub use tick::{Energies, Ledger, PointForce, TickInput};

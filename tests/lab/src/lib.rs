@@ -2,6 +2,7 @@
 pub mod bodies;
 pub mod convergence;
 pub mod fine_levels;
+pub mod hashes;
 pub mod jitter;
 pub mod machine;
 pub mod measure;

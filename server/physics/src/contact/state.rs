@@ -5,6 +5,7 @@ use super::{
     local_model::StiffnessEstimate,
     touching::Touching,
 };
+use crate::hash::Chain;
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
@@ -101,6 +102,29 @@ impl ContactState {
             own.keep_sums_of(saved);
         }
         Some(self)
+    }
+
+    /// Adds all that is remembered.
+    pub(crate) fn chain(&self, chain: &mut Chain) {
+        chain.list(&self.tools, |chain, tool| {
+            chain.list(tool.touching.records(), |chain, touch| {
+                chain.whole(u64::from(touch.sample));
+                chain.flag(touch.from_behind);
+                chain.real(touch.free_depth_m);
+                chain.vector(touch.spring_origin_m);
+            });
+            chain.flag(tool.just_put);
+            chain.vector(tool.force_n);
+            chain.vector(tool.torque_nm);
+            let estimate = &tool.estimate;
+            chain.real(estimate.log_correction);
+            chain.real(estimate.normal_n_per_m);
+            chain.real(estimate.tangential_n_per_m);
+            chain.matrix(&estimate.turning_nm_per_rad);
+            chain.vector(estimate.start_centre_m);
+            chain.real(estimate.start_force_n);
+            chain.whole(u64::from(estimate.age_ticks));
+        });
     }
 
     /// Copies another state of the same model. Allocates nothing.

@@ -9,6 +9,7 @@
 //! - `follower.rs`: the load stiffness of follower pressure
 //! - `hybrid/`: the same for bodies with particles, by conjugate gradients
 //! - `solution.rs`, `error.rs`: what comes out
+mod chained;
 mod equilibrium;
 mod error;
 mod follower;

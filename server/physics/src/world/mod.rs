@@ -1,5 +1,6 @@
 //! [`Model`] (constant after load), [`State`] (what a tick changes), [`Scratch`] (buffers, no meaning between ticks), and [`step`].
 mod by_hand;
+mod chained;
 mod energies;
 mod error;
 mod model;

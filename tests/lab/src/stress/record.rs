@@ -92,6 +92,7 @@ fn folder() -> PathBuf {
 pub fn records() -> Result<Vec<Record>> {
     let Ok(entries) = fs::read_dir(folder()) else { return Ok(vec![]) };
     let mut paths: Vec<PathBuf> = entries.filter_map(|entry| Some(entry.ok()?.path())).collect();
+    paths.retain(|path| path.extension().is_some_and(|extension| extension == "toml"));
     paths.sort();
     let read = |path: &PathBuf| {
         let text = fs::read_to_string(path).into_diagnostic()?;

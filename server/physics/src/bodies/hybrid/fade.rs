@@ -15,6 +15,7 @@ use super::{
     composite::PARTS,
     share::{Share, split},
 };
+use crate::hash::Chain;
 use crate::material::{Material, viscous};
 use glam::{DMat3, DVec3};
 use serde::{Deserialize, Serialize};
@@ -126,6 +127,23 @@ impl Fading {
         let mut fading = Self { cells, tets, ..Self::default() };
         fading.start();
         fading
+    }
+
+    /// Adds all that fades, and how far it has.
+    pub(super) fn chain(&self, chain: &mut Chain) {
+        chain.list(&self.cells, |chain, fade| {
+            chain.whole(u64::from(fade.cell));
+            chain.matrix(&fade.shape);
+            chain.matrix(&fade.volume);
+            chain.real(fade.modes);
+        });
+        chain.list(&self.tets, |chain, fade| {
+            chain.whole(u64::from(fade.tet));
+            fade.parts.iter().for_each(|part| chain.matrix(part));
+            chain.matrix(&fade.whole);
+        });
+        chain.real(self.progress.left);
+        self.progress.along_j.into_iter().for_each(|along_j| chain.real(along_j));
     }
 
     /// `s`.

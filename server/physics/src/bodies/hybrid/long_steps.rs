@@ -15,6 +15,7 @@
 //! feel of the coarse one); `docs/adr/hybrid.md` has what was measured.
 use super::kernels::Found;
 use super::{balance::without_torque, body::HybridBody, fade::Progress, scratch::HybridScratch, state::HybridState};
+use crate::hash::Chain;
 use crate::{
     lanes::vector_operations::Answer,
     tick::{Environment, MechanicalState},
@@ -42,6 +43,14 @@ impl LongSteps {
             steady_n: Vec::with_capacity(nodes),
             beyond_n: Vec::with_capacity(nodes),
             before: Instant::with_room(nodes, entries),
+        }
+    }
+
+    /// Adds the forces of the last evaluation, and the instant before.
+    pub(super) fn chain(&self, chain: &mut Chain) {
+        let Self { steady_n, beyond_n, before } = self;
+        for list in [steady_n, beyond_n, &before.forces_n, &before.x] {
+            chain.vectors(list);
         }
     }
 

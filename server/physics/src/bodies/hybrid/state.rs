@@ -1,5 +1,6 @@
 //! What a tick changes of a hybrid body beside positions and velocities: which particles are active, and what of them still fades.
 use super::{body::HybridBody, fade::Fading, long_steps::LongSteps, spec::Waking, switching::Ball};
+use crate::hash::Chain;
 use crate::{contact::ToolSpec, tick::MechanicalState};
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
@@ -98,6 +99,24 @@ impl HybridState {
         self.given_j = 0.0;
         self.switched_j = 0.0;
         self.long_steps.forget();
+    }
+
+    /// Adds all of it.
+    pub(crate) fn chain(&self, chain: &mut Chain) {
+        for list in [&self.ids, &self.next, &self.wanted] {
+            chain.wholes(list);
+        }
+        chain.list(&self.balls, |chain, ball| {
+            chain.maybe(ball.as_ref(), |chain, ball| {
+                chain.vector(ball.rest_m);
+                chain.whole(u64::from(ball.away_ticks));
+            });
+        });
+        self.fading.chain(chain);
+        chain.vectors(&self.balance_n);
+        chain.real(self.given_j);
+        chain.real(self.switched_j);
+        self.long_steps.chain(chain);
     }
 
     pub(crate) fn copy_from(&mut self, other: &Self) {

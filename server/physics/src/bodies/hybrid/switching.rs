@@ -53,7 +53,7 @@ pub(crate) struct Ball {
     /// Its middle at rest (m).
     pub(super) rest_m: DVec3,
     /// For how many ticks the tool has been away.
-    away_ticks: u32,
+    pub(super) away_ticks: u32,
 }
 
 /// Buffers of a look.

@@ -9,6 +9,7 @@ use super::{
     motion::SpringMotion,
     region::Constants,
 };
+use crate::hash::Chain;
 use serde::{Deserialize, Serialize};
 
 /// Ticks for which a tool has to be away.
@@ -162,6 +163,28 @@ impl MassSpringState {
         around::rings_into(springs.surface(), &known, (rings, most), (&mut triangles, &mut corners));
         self.refined.clear();
         self.refined.extend_from_slice(&triangles);
+    }
+
+    /// Adds all of it but positions and velocities.
+    pub(crate) fn chain(&self, chain: &mut Chain) {
+        chain.wholes(&self.motion.ids);
+        chain.list(self.motion.levels.triangles(), |chain, (triangle, way)| {
+            chain.whole(u64::from(*triangle));
+            chain.real(*way);
+        });
+        chain.real(self.motion.fine.mesh_n_per_m);
+        chain.real(self.motion.fine.home_n_per_m);
+        let vertex = |chain: &mut Chain, vertex: u32| chain.whole(u64::from(vertex));
+        chain.list(&self.about, |chain, about| {
+            chain.maybe(about.touched, vertex);
+            chain.maybe(about.awake, vertex);
+            chain.whole(u64::from(about.rings));
+            chain.whole(u64::from(about.away_ticks));
+        });
+        for list in [&self.forced, &self.refined, &self.awake] {
+            chain.wholes(list);
+        }
+        chain.real(self.given_j);
     }
 
     /// Copies another state of the same body. Allocates nothing.

@@ -1,5 +1,6 @@
 //! What a tick changes of a seed body beside what every body has.
 use super::{SeedModel, SeedState, region::Region, state::Motion};
+use crate::hash::Chain;
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
@@ -27,6 +28,23 @@ impl SeedBodyState {
         self.now.particles.rest(&[]);
         (self.now.step, self.now.touched) = (0, None);
         (self.touched, self.awake) = (None, 0);
+    }
+
+    /// Adds all of it.
+    pub(crate) fn chain(&self, chain: &mut Chain) {
+        let triangle = |chain: &mut Chain, triangle: u32| chain.whole(u64::from(triangle));
+        chain.whole(self.now.step);
+        chain.maybe(self.now.touched, triangle);
+        chain.maybe(self.touched, triangle);
+        chain.whole(u64::from(self.awake));
+        // What lies beyond the awake particles is in no use.
+        let Motion { x, v } = &self.now.particles;
+        let awake = self.awake as usize;
+        for list in [&self.now.core.x, &self.now.core.v, &self.now.skin.x, &self.now.skin.v] {
+            chain.vectors(list);
+        }
+        chain.vectors(&x[..awake]);
+        chain.vectors(&v[..awake]);
     }
 
     /// Copies another of the same model. Allocates nothing.

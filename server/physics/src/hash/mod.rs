@@ -1,4 +1,8 @@
 //! FNV-1a, 64 bits: the same on every machine.
+mod chain;
+
+pub use chain::Chain;
+
 use std::fmt::Write;
 
 /// What the hash of nothing is.
