@@ -141,8 +141,8 @@ fn the_nodal_jacobian_is_less_than_stability_needs() {
 fn rest_is_rest_and_equilibrium_does_not_depend_on_the_scheme() {
     let reference = {
         let model = Rig::new(heavy(Integrator::Leapfrog)).model;
-        let settings = solve::StaticSettings { relative_residual: 1e-12, ..solve::StaticSettings::default() };
-        solve::solve_static(&model, &[], &[DVec3::ZERO], &[], &settings, &mut |_| std::ops::ControlFlow::Continue(()))
+        let settings = statics::StaticSettings { relative_residual: 1e-12, ..statics::StaticSettings::default() };
+        statics::solve_static(&model, &[], &[DVec3::ZERO], &[], &settings, &mut |_| std::ops::ControlFlow::Continue(()))
             .unwrap()
             .x
     };

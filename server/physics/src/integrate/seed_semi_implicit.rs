@@ -28,7 +28,6 @@ use super::{
     motion::{damp, drift, holders_power_w},
     scheme::Body,
 };
-use crate::elements::rest_stiffness::RestStiffness;
 use crate::world::{Model, Scratch, State};
 use glam::{DMat3, DVec3};
 

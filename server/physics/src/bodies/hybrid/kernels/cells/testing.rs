@@ -11,27 +11,30 @@ use crate::{
 use glam::DVec3;
 
 /// Cells, and how their points moved.
-pub(in crate::kernels) struct Question<'a> {
-    pub(in crate::kernels) cells: &'a [([u32; 8], RestCell)],
-    pub(in crate::kernels) spacing_m: f64,
-    pub(in crate::kernels) handed: f64,
-    pub(in crate::kernels) u: &'a [DVec3],
-    pub(in crate::kernels) v: &'a [DVec3],
-    pub(in crate::kernels) material: Material,
-    pub(in crate::kernels) precision: Precision,
-    pub(in crate::kernels) set: InstructionSet,
+pub(in crate::bodies::hybrid::kernels) struct Question<'a> {
+    pub(in crate::bodies::hybrid::kernels) cells: &'a [([u32; 8], RestCell)],
+    pub(in crate::bodies::hybrid::kernels) spacing_m: f64,
+    pub(in crate::bodies::hybrid::kernels) handed: f64,
+    pub(in crate::bodies::hybrid::kernels) u: &'a [DVec3],
+    pub(in crate::bodies::hybrid::kernels) v: &'a [DVec3],
+    pub(in crate::bodies::hybrid::kernels) material: Material,
+    pub(in crate::bodies::hybrid::kernels) precision: Precision,
+    pub(in crate::bodies::hybrid::kernels) set: InstructionSet,
 }
 
 /// Forces of all points.
 #[derive(Debug, PartialEq)]
-pub(in crate::kernels) struct Answer {
-    pub(in crate::kernels) forces_n: Vec<DVec3>,
-    pub(in crate::kernels) power_w: f64,
+pub(in crate::bodies::hybrid::kernels) struct Answer {
+    pub(in crate::bodies::hybrid::kernels) forces_n: Vec<DVec3>,
+    pub(in crate::bodies::hybrid::kernels) power_w: f64,
 }
 
 /// Whatever the law, the precision and the instruction set: the forces of the plain code, and the same bits. Of the cells of a ball, all or
 /// the full ones; the largest displacements turn some inside out.
-pub(in crate::kernels) fn agrees_with_oracle(only_full: bool, kernel: impl Fn(&Question<'_>) -> Answer) {
+pub(in crate::bodies::hybrid::kernels) fn agrees_with_oracle(
+    only_full: bool,
+    kernel: impl Fn(&Question<'_>) -> Answer,
+) {
     let (mut cells, rest) = ball_cells();
     let whole = cells.iter().map(|(_, c)| c.volume_m3).fold(0.0, f64::max) * (1.0 - 1e-12);
     cells.retain(|(_, cell)| !only_full || cell.volume_m3 > whole);
