@@ -1,5 +1,5 @@
 //! Linear algebra: what the model, its stepping and its equilibrium solve with.
 pub(crate) mod eigen;
 pub(crate) mod lanczos;
-pub(crate) mod pcg;
+pub mod pcg;
 pub mod tensor;

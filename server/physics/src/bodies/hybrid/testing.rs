@@ -1,24 +1,15 @@
 //! Shapes for tests.
 use super::{
-    Hybrid, ParticleSpec, Waking,
-    cell::RestCell,
-    composite::Composite,
-    methods::{CONTROL, Method},
-    moments::integrate,
-    partition::Partition,
-    patch::{Field, Patch},
-    sites::{CORNERS, Sites},
-    sizes,
-    skin::Skin,
-    smoothing_kernels::Kernel,
+    Hybrid, ParticleSpec, Waking, cell::RestCell, composite::Composite, moments::integrate, partition::Partition,
+    patch::Field, sites::Sites, sizes, skin::Skin,
 };
 use crate::{
     material::{Convention, Lame, Law, Material, Viscosity},
     mesh::{Surface, TetMesh},
     settings::PrescribedSpec,
 };
-use glam::{DMat3, DVec3};
-use std::collections::{BTreeMap, BTreeSet};
+use glam::DVec3;
+use std::collections::BTreeMap;
 
 /// A sphere: an icosahedron whose triangles are split in four `rounds` times.
 pub(crate) fn ball(radius_m: f64, centre_m: DVec3, rounds: u32) -> Skin {
@@ -153,18 +144,6 @@ pub(crate) fn hybrid_ball_of(materials: &[Material; 2], spacing_m: f64, fine_dep
     built.hybrid
 }
 
-/// A block of full cells of spacing 1 mm, in a box of coarse tets.
-pub(crate) fn block_in_cage(cells: [usize; 3]) -> Partition {
-    let size = DVec3::from(cells.map(|n| n as f64)) * 1e-3;
-    let corners = CORNERS.map(|corner| corner * size).to_vec();
-    let faces = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
-    let triangles = faces.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]).collect();
-    let skin = Skin::new(corners, triangles).unwrap();
-    let sites = Sites::covering(skin.bounds_m(), 1e-3, DVec3::ZERO);
-    let moments = integrate(&skin, &sites, &mut |_| {});
-    Partition::new(sites, Composite::new(&tet_box(DVec3::ZERO, size, [1, 1, 1])), &moments)
-}
-
 /// One material of each law, nearly incompressible and viscous.
 pub(crate) fn tissue() -> [Material; 3] {
     let lame = Lame::from_young_poisson(10e3, 0.45).unwrap();
@@ -191,33 +170,6 @@ pub(crate) fn random_like(field: &Field, size: f64, random: &mut Random) -> Fiel
 pub(crate) fn plus(a: &Field, b: &Field, s: f64) -> Field {
     let sum = |a: &[DVec3], b: &[DVec3]| a.iter().zip(b).map(|(a, b)| *a + *b * s).collect();
     Field { nodes: sum(&a.nodes, &b.nodes), particles: sum(&a.particles, &b.particles) }
-}
-
-/// Those that do not.
-pub(crate) const RAW: [Method; 2] = [Method::RawSph(Kernel::Cone), Method::RawSph(Kernel::WendlandC2)];
-/// Methods that reproduce affine motion.
-pub(crate) const CORRECTED: [Method; 5] = [
-    Method::CorrectedSph { kernel: Kernel::Cone, control: CONTROL },
-    Method::CorrectedSph { kernel: Kernel::WendlandC2, control: CONTROL },
-    Method::MovingLeastSquares { control: CONTROL },
-    Method::ElementFreeGalerkin,
-    Method::NodalSmoothing { gamma: 0.5 },
-];
-
-/// Half of a ball.
-pub(crate) fn half(partition: &Partition) -> BTreeSet<u32> {
-    (0..partition.particle_count() as u32).filter(|&p| partition.particle_m(p).x > 0.2e-3).collect()
-}
-
-/// And that half awake.
-pub(crate) fn half_awake(partition: &Partition, method: Method) -> Patch {
-    let active = half(partition);
-    Patch::with_points(partition, &active, &method.points(partition, &active))
-}
-
-/// A matrix not far from the identity.
-pub(crate) fn stretch(random: &mut Random) -> DMat3 {
-    DMat3::IDENTITY + DMat3::from_cols(random.vector(), random.vector(), random.vector()) * 0.1
 }
 
 /// The cells of that ball, all awake, and their particles at rest (m).
