@@ -21,6 +21,8 @@ pub mod mesh;
 pub mod settings;
 pub mod snapshot;
 pub mod statics;
+#[cfg(test)]
+mod testing;
 pub mod world;
 
 pub use health::{Energies, Ledger, Quarantine};

@@ -3,99 +3,19 @@ use super::{
     Hybrid, ParticleSpec, Waking, cell::RestCell, composite::Composite, moments::integrate, partition::Partition,
     patch::Field, sites::Sites, sizes, skin::Skin,
 };
+pub(crate) use crate::testing::{Random, slab, tet_box};
 use crate::{
     material::{Convention, Lame, Law, Material, Viscosity},
-    mesh::{Surface, TetMesh},
+    mesh::Surface,
     settings::PrescribedSpec,
+    testing::sphere,
 };
 use glam::DVec3;
-use std::collections::BTreeMap;
 
-/// A sphere: an icosahedron whose triangles are split in four `rounds` times.
+/// A ball's skin: an icosahedron whose triangles are split in four `rounds` times.
 pub(crate) fn ball(radius_m: f64, centre_m: DVec3, rounds: u32) -> Skin {
-    let golden = f64::midpoint(1.0, 5.0_f64.sqrt());
-    let mut points: Vec<DVec3> = Vec::new();
-    for (a, b) in [(1.0, golden), (1.0, -golden), (-1.0, golden), (-1.0, -golden)] {
-        points.extend([DVec3::new(0.0, a, b), DVec3::new(a, b, 0.0), DVec3::new(b, 0.0, a)]);
-    }
-    let mut triangles = Vec::new();
-    for (i, j) in (0..12).flat_map(|i| (i + 1..12).map(move |j| (i, j))) {
-        for k in j + 1..12 {
-            let near = |a: usize, b: usize| (points[a].distance(points[b]) - 2.0).abs() < 1e-9;
-            if near(i, j) && near(j, k) && near(k, i) {
-                let [a, b, c] = [i, j, k].map(|n| points[n]);
-                let outward = (b - a).cross(c - a).dot(a) > 0.0;
-                triangles.push(if outward { [i, j, k] } else { [i, k, j] }.map(|n| n as u32));
-            }
-        }
-    }
-    for _ in 0..rounds {
-        let mut middle: BTreeMap<[u32; 2], u32> = BTreeMap::new();
-        let mut split = Vec::new();
-        for [a, b, c] in triangles {
-            let [ab, bc, ca] = [[a, b], [b, c], [c, a]].map(|[u, v]| {
-                *middle.entry([u.min(v), u.max(v)]).or_insert_with(|| {
-                    points.push((points[u as usize] + points[v as usize]) * 0.5);
-                    points.len() as u32 - 1
-                })
-            });
-            split.extend([[a, ab, ca], [b, bc, ab], [c, ca, bc], [ab, bc, ca]]);
-        }
-        triangles = split;
-    }
-    let on_sphere = points.iter().map(|p| centre_m + p.normalize() * radius_m).collect();
-    Skin::new(on_sphere, triangles).unwrap()
-}
-
-/// Numbers without a pattern (xorshift64).
-pub(crate) struct Random(pub(crate) u64);
-
-impl Random {
-    /// In [0, 1).
-    pub(crate) fn unit(&mut self) -> f64 {
-        for shift in [13_i32, -7, 17] {
-            self.0 ^= if shift > 0 { self.0 << shift } else { self.0 >> -shift };
-        }
-        (self.0 >> 11) as f64 / (1_u64 << 53) as f64
-    }
-
-    /// Components in (−1, 1).
-    pub(crate) fn vector(&mut self) -> DVec3 {
-        DVec3::new(self.unit(), self.unit(), self.unit()) * 2.0 - DVec3::ONE
-    }
-}
-
-/// A box of `cells` of six tets each.
-pub(crate) fn tet_box(low: DVec3, size: DVec3, cells: [usize; 3]) -> TetMesh {
-    let count = cells.map(|n| n + 1);
-    let number = |[i, j, k]: [usize; 3]| ((k * count[1] + j) * count[0] + i) as u32;
-    let places =
-        |n: [usize; 3]| (0..n[2]).flat_map(move |k| (0..n[1]).flat_map(move |j| (0..n[0]).map(move |i| [i, j, k])));
-    let positions: Vec<DVec3> = places(count)
-        .map(|at| low + size * DVec3::from(std::array::from_fn(|axis| at[axis] as f64 / cells[axis] as f64)))
-        .collect();
-    let mut tets = Vec::new();
-    for place in places(cells) {
-        for order in [[0, 1, 2], [0, 2, 1], [1, 0, 2], [1, 2, 0], [2, 0, 1], [2, 1, 0]] {
-            let mut at = place;
-            let mut tet = [number(at); 4];
-            for (step, axis) in order.into_iter().enumerate() {
-                at[axis] += 1;
-                tet[step + 1] = number(at);
-            }
-            let [a, b, c, d] = tet.map(|n| positions[n as usize]);
-            if (b - a).cross(c - a).dot(d - a) < 0.0 {
-                tet.swap(2, 3);
-            }
-            tets.push(tet);
-        }
-    }
-    TetMesh::new(positions, tets).unwrap()
-}
-
-/// 80 × 80 × 40 mm in 2 × 2 × 1 cells.
-pub(crate) fn slab() -> TetMesh {
-    tet_box(DVec3::ZERO, DVec3::new(0.08, 0.08, 0.04), [2, 2, 1])
+    let (directions, triangles) = sphere(rounds);
+    Skin::new(directions.iter().map(|&direction| centre_m + direction * radius_m).collect(), triangles).unwrap()
 }
 
 /// A ball of 10 mm radius off the lattice, in a box of coarse tets that reaches past it.
