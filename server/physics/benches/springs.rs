@@ -5,10 +5,8 @@ use criterion::{Criterion, criterion_group, criterion_main};
 use glam::DVec3;
 use palpate_physics::{
     bodies::mass_spring::{
-        HomeLaw, Net, Region, SpringModel, SpringMotion, SpringScratch, SpringSpec, Wanted,
-        kernels::{HalfSpring, SpringRows},
-        net::hexagonal_patch,
-        region::Constants,
+        HalfSpring, HomeLaw, Net, Region, SpringModel, SpringMotion, SpringRows, SpringScratch, SpringSpec, Wanted,
+        net::hexagonal_patch, region::Constants,
     },
     lanes::InstructionSet,
 };

@@ -40,6 +40,8 @@ pub mod mesh;
 pub mod settings;
 pub mod snapshot;
 pub mod statics;
+#[cfg(test)]
+mod testing;
 pub mod tick;
 pub mod world;
 

@@ -4,12 +4,7 @@ mod rig;
 use glam::DVec3;
 use palpate_physics::{
     Energies, LoadSpec, Model, ModelSpec, Settings,
-    bodies::hybrid::{
-        Waking,
-        equilibrium::equilibrium,
-        patch::{Field, Patch},
-        place::Place,
-    },
+    bodies::hybrid::Waking,
     contact::{Coupling, ToolTarget},
     statics::{SolveError, StaticSettings, StaticSolution, solve_static, solve_static_with},
     world::wake_only,
@@ -18,7 +13,7 @@ use rig::{
     Drive, Rig, at, held_below, hold, hybrid_block, mesh_of, nodes_where, particles, particles_mut, sphere,
     wake_nearest,
 };
-use std::{collections::BTreeSet, ops::ControlFlow};
+use std::ops::ControlFlow;
 
 /// 40 × 40 × 20 mm in 24 coarse tets, particles 2.5 mm apart, its upper face at z = 0.
 fn block(waking: Waking) -> ModelSpec {
@@ -85,45 +80,6 @@ fn loads_weight_and_moved_supports_come_to_the_same_rest_in_time() {
     assert!(moved > 1e-3 && apart < 1e-9 * moved, "{apart:e} of {moved:e}");
     let held = rig.scratch.reactions_n().iter().sum::<DVec3>();
     assert!((held - found.reactions_n[0]).length() < 1e-8 * held.length(), "{held} {}", found.reactions_n[0]);
-}
-
-/// The lab's solver, of a patch and loads by themselves.
-#[test]
-fn damped_the_loop_comes_to_rest_where_a_patch_and_its_loads_do() {
-    let mut spec = held_below(block(Waking::ByHand));
-    let pressed = skin_vertices(&spec, |p| p.length() < 5e-3);
-    let force_n = DVec3::new(2e-3, 0.0, -2e-2) / pressed.len() as f64;
-    spec.loads = vec![LoadSpec::NodalForces(pressed.iter().map(|&v| (v, force_n)).collect())];
-    let mut rig = Rig::new(spec);
-    wake_nearest(&mut rig, 140);
-    let mut drive = rig.still();
-    drive.load_factors = vec![1.0];
-    for _ in 0..1500 {
-        let report = rig.tick(&drive);
-        assert!(report.quarantined.is_none());
-    }
-    let hybrid = rig.model.body().as_hybrid().unwrap();
-    let active: BTreeSet<u32> = rig.state.body.active_particles().iter().copied().collect();
-    let patch = Patch::new(hybrid.partition(), &active);
-    let rest = patch.at_rest(hybrid.partition());
-    let zero = |list: &[DVec3]| vec![DVec3::ZERO; list.len()];
-    let mut loads_n = Field { nodes: zero(&rest.nodes), particles: zero(&rest.particles) };
-    let skin = rig.model.surface_rest_positions_m();
-    let place = |v: u32| Place::new(hybrid.partition(), skin[v as usize]);
-    for &v in &pressed {
-        place(v).push(hybrid.partition(), &patch, force_n, &mut loads_n);
-    }
-    let found = equilibrium(hybrid.partition(), &patch, &hybrid.materials(), hybrid.free(), &loads_n, 1e-10).unwrap();
-    let mut positions = Vec::new();
-    rig.model.surface_positions_m(&rig.state, &mut positions);
-    let (mut worst, mut largest) = (0.0_f64, 0.0_f64);
-    for (v, x) in positions.iter().enumerate() {
-        let expected = place(v as u32).of(hybrid.partition(), &patch, &found);
-        worst = worst.max(x.distance(expected));
-        largest = largest.max(expected.distance(skin[v]));
-    }
-    println!("at rest: {worst:.1e} m of {largest:.1e}");
-    assert!(largest > 2e-4 && worst < 1e-9 * largest, "{worst:e} of {largest:e}");
 }
 
 /// A sphere of 6 mm above the block, which weighs, with particles that it wakes.

@@ -4,14 +4,11 @@ mod hybrid_body;
 
 use glam::{DMat3, DMat4, DVec3, DVec4};
 use hybrid_body::{Case, MakePoints, error, problem};
-use palpate_lab::fine_levels::PlacesOf;
-use palpate_physics::bodies::hybrid::{
-    methods::{CONTROL, Method},
-    partition::Partition,
-    place::Place,
-    points::Row,
-    smoothing_kernels::{Kernel, SMOOTHING},
+use palpate_lab::fine_levels::{
+    PlacesOf,
+    methods::{CONTROL, Kernel, Method, Row, SMOOTHING, particle_m3, particles_near},
 };
+use palpate_physics::bodies::hybrid::{partition::Partition, place::Place};
 
 const NU: [&str; 3] = ["0.30", "0.45", "0.49"];
 const RAW: Method = Method::RawSph(Kernel::Cone);
@@ -171,7 +168,7 @@ fn sums_weighted_as_on_a_uniform_grid_are_nearer_than_with_the_particles_own_vol
         let answer = |name: &str, own: bool| {
             changed(nu, name, Kernel::WendlandC2, move |partition, row| {
                 for term in row.terms.iter_mut().filter(|_| own) {
-                    term.gradient_per_m *= partition.particle_m3(term.particle);
+                    term.gradient_per_m *= particle_m3(partition, term.particle);
                 }
                 multiply(row, row.of_identity().transpose().inverse());
             }) - 1.0
@@ -198,7 +195,7 @@ fn parameters_of_moving_least_squares_are_softer_than_their_field() {
 /// Values of the shape functions of moving least squares, as places of up to eight particles.
 fn by_least_squares(partition: &Partition, point_m: DVec3) -> Vec<Place> {
     let smoothing_m = SMOOTHING * partition.sites().spacing_m();
-    let near = partition.particles_near(point_m, Kernel::support_m(smoothing_m));
+    let near = particles_near(partition, point_m, Kernel::support_m(smoothing_m));
     let row = |&particle: &u32| {
         let span = (partition.particle_m(particle) - point_m) / smoothing_m;
         let weight = Kernel::WendlandC2.value_per_m3(span.length() * smoothing_m, smoothing_m) * smoothing_m.powi(3);

@@ -2,7 +2,7 @@
 pub(crate) mod cholesky;
 pub(crate) mod eigen;
 pub(crate) mod lanczos;
-pub(crate) mod pcg;
+pub mod pcg;
 pub mod tensor;
 
 pub use cholesky::CholeskyError;

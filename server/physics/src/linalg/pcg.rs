@@ -1,27 +1,30 @@
-//! Preconditioned conjugate gradients in buffers that are there already, for `A = M + dt² K + dt C`.
+//! Preconditioned conjugate gradients in buffers that are there already, for a stiffness `K` or a step's `M + dt² K + dt C`.
 use glam::{DMat3, DVec3};
 
 /// When to stop.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Stop {
+pub struct Stop {
     /// Most products with `A`.
-    pub(crate) iterations: u32,
+    pub iterations: u32,
     /// `√(rᵀP⁻¹r)` over its value at the start.
-    pub(crate) tolerance: f64,
+    pub tolerance: f64,
 }
 
-/// The vectors of the iteration; the right side goes into `residual`.
+/// The vectors of the iteration.
 #[derive(Debug, Clone, Default)]
-pub(crate) struct PcgScratch {
-    pub(crate) residual: Vec<DVec3>,
-    pub(crate) solution: Vec<DVec3>,
+pub struct PcgScratch {
+    /// `r`: the right side goes in here, what is left of it comes out.
+    pub residual: Vec<DVec3>,
+    /// `s`, as it comes out.
+    pub solution: Vec<DVec3>,
     preconditioned: Vec<DVec3>,
     direction: Vec<DVec3>,
     product: Vec<DVec3>,
 }
 
 impl PcgScratch {
-    pub(crate) fn new(nodes: usize) -> Self {
+    /// For a system of so many nodes, of three unknowns each.
+    pub fn new(nodes: usize) -> Self {
         let zero = vec![DVec3::ZERO; nodes];
         Self {
             residual: zero.clone(),
@@ -37,7 +40,7 @@ impl PcgScratch {
 ///
 /// Where `A` turns out to be indefinite along a direction (`pᵀAp ≤ 0`: the tangent of a law under compression), it stops at what it
 /// has (Steihaug 1983), or at `P⁻¹r` if it has nothing: still a descent of the energy that the positive directions make.
-pub(crate) fn solve(
+pub fn solve(
     mut apply: impl FnMut(&[DVec3], &mut [DVec3]),
     inverse_blocks: &[DMat3],
     stop: Stop,

@@ -1,6 +1,6 @@
 //! The command.
 use super::{
-    method::FineMethod,
+    names::FineMethod,
     page,
     study::{ACTIVE, Case, Row, Summary, summaries},
 };

@@ -1,4 +1,10 @@
 //! A hybrid body at rest under a load, built once for many methods and numbers of particles.
+use super::{
+    equilibrium::equilibrium,
+    level::{FineLevel, still},
+    methods::{PointPatch, Points},
+    places,
+};
 use crate::{
     problems::{
         Problem,
@@ -17,12 +23,10 @@ use palpate_physics::{
         Skin,
         cage::{self, Cage},
         composite::Composite,
-        equilibrium::equilibrium,
         moments::integrate,
         partition::Partition,
-        patch::{Field, Materials, Patch},
+        patch::{Materials, Patch},
         place::Place,
-        points::Points,
         sites::Sites,
     },
     mesh::tet::EDGES,
@@ -135,32 +139,33 @@ impl Setting {
     pub fn errors(&self, active: usize, points: Option<PointsOf<'_>>, places: Option<PlacesOf>) -> Result<Errors> {
         let partition = &self.partition;
         let active: BTreeSet<u32> = self.near.iter().copied().take(active).collect();
-        let patch = match points {
-            None => Patch::new(partition, &active),
-            Some(points) => Patch::with_points(partition, &active, &points(partition, &active)),
+        let level: Box<dyn FineLevel> = match points {
+            None => Box::new(Patch::new(partition, &active)),
+            Some(points) => Box::new(PointPatch::new(partition, &active, &points(partition, &active))),
         };
-        let places = |at: DVec3| places.map_or_else(|| vec![Place::new(partition, at)], |places| places(partition, at));
-        let at_rest = patch.at_rest(partition);
-        let zero = |list: &[DVec3]| vec![DVec3::ZERO; list.len()];
-        let mut loads_n = Field { nodes: zero(&at_rest.nodes), particles: zero(&at_rest.particles) };
+        let level = level.as_ref();
+        let places_of =
+            |at: DVec3| places.map_or_else(|| vec![Place::new(partition, at)], |places| places(partition, at));
+        let mut loads_n = still(&level.at_rest(partition));
         let rest = self.fine.mesh.positions_m();
         for &(node, force_n) in &self.load.forces_n {
-            for place in places(rest[node as usize]) {
-                place.push(partition, &patch, force_n, &mut loads_n);
+            for place in places_of(rest[node as usize]) {
+                places::push(&place, partition, level.active(), force_n, &mut loads_n);
             }
         }
         let of_tet = vec![0; partition.shares().len()];
         let materials = Materials { materials: &[self.problem.material()?], of_tet: &of_tet };
-        let found = equilibrium(partition, &patch, &materials, &self.free, &loads_n, 1e-6).into_diagnostic()?;
+        let found = equilibrium(partition, level, &materials, &self.free, &loads_n, 1e-6).into_diagnostic()?;
         let mut x = rest.to_vec();
         for &node in &self.fine.surface.nodes {
-            x[node as usize] = places(rest[node as usize]).iter().map(|p| p.of(partition, &patch, &found)).sum();
+            let value = |place: &Place| places::value(place, partition, level.active(), &found);
+            x[node as usize] = places_of(rest[node as usize]).iter().map(value).sum();
         }
         let displacements = Probe::new(&self.fine, &self.samples).displacements_m(rest, &x);
         let field = FieldError::of(&self.samples, &displacements, &self.reference.displacements_m())
             .ok_or_else(|| miette!("the reference of {} has no field", self.problem.name))?;
         let answer = self.load.displacement_m(rest, &x) / self.reference.value - 1.0;
-        Ok(Errors { answer, field, points: patch.cell_count() })
+        Ok(Errors { answer, field, points: level.point_count(partition) })
     }
 }
 

@@ -1,6 +1,6 @@
 //! All cases, and what they come to.
 use super::{
-    method::FineMethod,
+    names::FineMethod,
     setting::{CoarseMesh, Setting},
 };
 use crate::problems::{self, Problem, place::Place};

@@ -8,7 +8,7 @@ use miette::{IntoDiagnostic, Result};
 use palpate_physics::bodies::mass_spring::{
     Net, Refined, Region, Triangulation,
     loop_scheme::refined,
-    matching::{Way, matched, point_force_n, spread_over},
+    matching::{Way, matched, point_force_n},
     net::hexagonal_patch,
     region::Constants,
 };
@@ -122,7 +122,8 @@ pub fn figures(experiment: Experiment, tell: &mut dyn FnMut(f64)) -> Result<Vec<
     }];
     for (rings, sheet) in ["one ring", "two rings"].into_iter().zip(&sheets) {
         let number = if rings == "one ring" { 6 } else { 7 };
-        let spread = spread_over(constants.home_n_per_m, &sheet.refined);
+        // K′_h = K_h N/N′: home springs add up to the same.
+        let spread = constants.home_n_per_m * sheet.refined.node_ratio();
         let mut curves = Vec::new();
         for (name, home_n_per_m) in [("K'_h by eq. 5", spread), ("K'_h = K_h", constants.home_n_per_m)] {
             curves.push(sheet.curve(name.into(), &sheet.matched(Way::Home(home_n_per_m))?, mesh));

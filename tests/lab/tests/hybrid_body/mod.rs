@@ -1,10 +1,10 @@
 //! A hybrid body at rest under a load, against the lab's references.
 #![allow(clippy::unwrap_used)] // helpers of tests
 use palpate_lab::{
-    fine_levels::{CoarseMesh, PlacesOf, Setting},
+    fine_levels::{CoarseMesh, PlacesOf, Setting, methods::Points},
     problems::{self, Problem},
 };
-use palpate_physics::bodies::hybrid::{partition::Partition, points::Points};
+use palpate_physics::bodies::hybrid::partition::Partition;
 use std::collections::BTreeSet;
 
 /// A hybrid body whose skin is the boundary of a fine mesh.

@@ -176,7 +176,7 @@ impl Partition {
         self.sites.site_m(self.particles[particle as usize] as usize)
     }
 
-    /// Tells the particles within a distance of a point (both m, at rest), with their squared distances.
+    /// Tells the particles within a distance of a point (both m, at rest), ascending, with their squared distances (m²).
     pub fn particles_within(&self, point_m: DVec3, reach_m: f64, mut tell: impl FnMut(u32, f64)) {
         let [nx, ny, nz] = self.sites.cells();
         let from = self.sites.cell_near(point_m - reach_m);
@@ -298,29 +298,9 @@ impl Partition {
         })
     }
 
-    /// Particles nearer than a radius to a point, ascending.
-    pub fn particles_near(&self, point_m: DVec3, radius_m: f64) -> Vec<u32> {
-        let mut near = Vec::new();
-        self.particles_within(point_m, radius_m, |particle, distance_sq| {
-            if distance_sq < radius_m * radius_m {
-                near.push(particle);
-            }
-        });
-        near
-    }
-
     /// What of a cell's volume (m³) is its particles': an eighth for each corner.
     pub fn particles_m3(&self, cell: usize) -> [f64; 8] {
         self.hanging(cell).to_particles([self.moments(cell).0 / 8.0; 8])
-    }
-
-    /// Volume (m³) of a particle: what of its cells' is its.
-    pub fn particle_m3(&self, particle: u32) -> f64 {
-        let of_cell = |cell: usize| {
-            let own = self.corners(cell).into_iter().zip(self.particles_m3(cell)).find(|(p, _)| *p == particle);
-            own.map_or(0.0, |(_, volume_m3)| volume_m3)
-        };
-        self.cells_at(particle).map(of_cell).sum()
     }
 
     /// What of the body each coarse tet has when all particles sleep.
@@ -400,10 +380,12 @@ mod tests {
             }
             let all = || 0..partition.particle_count() as u32;
             for at in [DVec3::new(0.3e-3, 2e-3, -1e-3), DVec3::new(9.5e-3, 0.0, 1e-3), DVec3::splat(-0.02)] {
-                let near: Vec<u32> = all().filter(|&p| partition.particle_m(p).distance(at) < 2.3e-3).collect();
-                assert_eq!(partition.particles_near(at, 2.3e-3), near);
+                let near: Vec<u32> = all().filter(|&p| partition.particle_m(p).distance(at) <= 2.3e-3).collect();
+                let mut told = Vec::new();
+                partition.particles_within(at, 2.3e-3, |particle, _| told.push(particle));
+                assert_eq!(told, near);
             }
-            let volume_m3: f64 = all().map(|particle| partition.particle_m3(particle)).sum();
+            let volume_m3: f64 = (0..partition.cells().len()).flat_map(|cell| partition.particles_m3(cell)).sum();
             assert!((volume_m3 / partition.volume_m3() - 1.0).abs() < 1e-12);
             let pairs: usize = (0..partition.particle_count() as u32).map(|p| partition.cells_at(p).count()).sum();
             assert_eq!(pairs, 8 * partition.cells().len());

@@ -5,18 +5,8 @@
 //! balance whichever particles are awake. The `ε` that stays keeps a coarse node whose surroundings are all awake from having neither stiffness nor mass.
 //! Particles of such cells that are not active themselves (the border) follow the coarse nodes, and hand forces back to them by the same weights.
 //!
-//! In place of cells, particle methods (`methods`) may integrate the awake volume at points of theirs. Such a point answers for the same share of the parts of cells that
-//! are its own, and these go from the coarse tets by the cells' moments: what is left to them stays a mean over cells, however little it is.
-//!
 //! This is plain f64 code: the oracle of what runs in the loop.
-use super::{
-    cell::RestCell,
-    composite::Anchor,
-    fade::Fading,
-    partition::Partition,
-    points::{Handed, Operator, Points},
-    share::Share,
-};
+use super::{cell::RestCell, composite::Anchor, fade::Fading, partition::Partition, share::Share};
 use crate::material::Material;
 use glam::{DMat3, DVec3};
 use std::collections::{BTreeMap, BTreeSet};
@@ -31,18 +21,11 @@ pub struct Patch {
     active: Vec<u32>,
     /// What the particles of the border follow; they are numbered after the active ones.
     border: Vec<Anchor>,
-    fine: Fine,
+    cells: Vec<PatchCell>,
     /// What is left to each coarse tet.
     shares: Vec<Share>,
     /// What woke or fell asleep strained.
     fading: Fading,
-}
-
-/// What integrates the awake volume.
-#[derive(Debug, Clone)]
-enum Fine {
-    Cells(Vec<PatchCell>),
-    Points(Operator),
 }
 
 #[derive(Debug, Clone)]
@@ -64,7 +47,8 @@ pub struct Materials<'a> {
 }
 
 impl Materials<'_> {
-    pub(super) fn of(&self, tet: usize) -> &Material {
+    /// That of a coarse tet, and of all that is counted to it.
+    pub fn of(&self, tet: usize) -> &Material {
         &self.materials[self.of_tet[tet] as usize]
     }
 }
@@ -87,7 +71,7 @@ impl Field {
 }
 
 impl Patch {
-    /// Wakes these particles, with cells.
+    /// Wakes these particles.
     pub fn new(partition: &Partition, active: &BTreeSet<u32>) -> Self {
         let active: Vec<u32> = active.iter().copied().collect();
         let awake: BTreeSet<usize> = active.iter().flat_map(|&particle| partition.cells_at(particle)).collect();
@@ -115,27 +99,7 @@ impl Patch {
                 }
             })
             .collect();
-        Self { active, border, fine: Fine::Cells(cells), shares, fading: Fading::default() }
-    }
-
-    /// Wakes these particles, with the points of a method.
-    pub fn with_points(partition: &Partition, active: &BTreeSet<u32>, points: &Points) -> Self {
-        let active: Vec<u32> = active.iter().copied().collect();
-        let mut point_of: BTreeMap<u32, u32> = active.iter().copied().zip(0..).collect();
-        let mut border = Vec::new();
-        let operator = Operator::new(&points.rows, 1.0 - KEPT, |particle| {
-            *point_of.entry(particle).or_insert_with(|| {
-                border.push(partition.anchor(particle));
-                (active.len() + border.len()) as u32 - 1
-            })
-        });
-        let mut shares = partition.shares().to_vec();
-        for &Handed { cell: number, part } in &points.handed {
-            let (cell, moments) = (&partition.cells()[number], partition.moments(number));
-            let anchors = partition.corners(number).map(|particle| partition.anchor(particle));
-            shares[cell.tet as usize].add(cell.part, part * (KEPT - 1.0), moments.0, &moments.1, &anchors);
-        }
-        Self { active, border, fine: Fine::Points(operator), shares, fading: Fading::default() }
+        Self { active, border, cells, shares, fading: Fading::default() }
     }
 
     /// The same patch with what fades in it; products leave that out.
@@ -147,14 +111,6 @@ impl Patch {
     /// Active particles, ascending.
     pub fn active(&self) -> &[u32] {
         &self.active
-    }
-
-    /// Cells that touch them, or points of another method.
-    pub fn cell_count(&self) -> usize {
-        match &self.fine {
-            Fine::Cells(cells) => cells.len(),
-            Fine::Points(operator) => operator.row_count(),
-        }
     }
 
     /// The coarse nodes at rest, and the particles where they follow them to.
@@ -178,10 +134,7 @@ impl Patch {
                 None => cell.rest.energy_j(material, &y),
             }
         };
-        let fine: f64 = match &self.fine {
-            Fine::Cells(cells) => cells.iter().map(of_cell).sum(),
-            Fine::Points(operator) => operator.energy_j(materials, &points),
-        };
+        let fine: f64 = self.cells.iter().map(of_cell).sum();
         let of_share = |(tet, share): (usize, &Share)| match self.fading.of_tet(tet as u32) {
             Some(fade) => fade.energy_j(share, materials.of(tet), &at.nodes),
             None => share.energy_j(materials.of(tet), &at.nodes),
@@ -194,24 +147,16 @@ impl Patch {
         let points = self.points(at);
         let of_cell = |cell: &PatchCell| (cell.rest.gradient_of(&cell.of(&points)).determinant(), cell.tet as usize);
         let of_share = |(tet, share): (usize, &Share)| (share.volume_ratio(&at.nodes), tet);
-        let fine: Vec<(f64, usize)> = match &self.fine {
-            Fine::Cells(cells) => cells.iter().map(of_cell).collect(),
-            Fine::Points(operator) => operator.volume_ratios(&points).collect(),
-        };
-        let all = fine.into_iter().chain(self.shares.iter().enumerate().map(of_share));
+        let all = self.cells.iter().map(of_cell).chain(self.shares.iter().enumerate().map(of_share));
         all.fold((f64::INFINITY, 0), |least, found| if found.0 < least.0 { found } else { least })
     }
 
     /// How many coarse tets' means and cells have `det F ≤ 0`.
     pub fn inverted(&self, at: &Field) -> u32 {
         let points = self.points(at);
-        let fine = match &self.fine {
-            Fine::Cells(cells) => {
-                cells.iter().filter(|cell| cell.rest.gradient_of(&cell.of(&points)).determinant() <= 0.0).count()
-            }
-            Fine::Points(operator) => operator.volume_ratios(&points).filter(|(ratio, _)| *ratio <= 0.0).count(),
-        };
-        (fine + self.shares.iter().filter(|share| share.volume_ratio(&at.nodes) <= 0.0).count()) as u32
+        let is_inverted = |cell: &&PatchCell| cell.rest.gradient_of(&cell.of(&points)).determinant() <= 0.0;
+        let cells = self.cells.iter().filter(is_inverted).count();
+        (cells + self.shares.iter().filter(|share| share.volume_ratio(&at.nodes) <= 0.0).count()) as u32
     }
 
     /// Forces (N) of elastic and viscous stress at positions `at` and velocities `rate`, and the power (W) that viscous stress takes.
@@ -220,19 +165,14 @@ impl Patch {
         let mut nodes = vec![DVec3::ZERO; at.nodes.len()];
         let mut of_points = vec![DVec3::ZERO; points.len()];
         let mut power_w = 0.0;
-        match &self.fine {
-            Fine::Cells(cells) => {
-                for cell in cells {
-                    let (material, y, rate) = (materials.of(cell.tet as usize), cell.of(&points), cell.of(&rates));
-                    let (forces, power) = match self.fading.of_cell(cell.number) {
-                        Some(fade) => fade.forces_n(&cell.rest, material, &y, &rate),
-                        None => cell.rest.forces_n(material, &y, &rate),
-                    };
-                    cell.add(&forces, &mut of_points);
-                    power_w += power;
-                }
-            }
-            Fine::Points(operator) => power_w += operator.add_forces_n(materials, &points, &rates, &mut of_points),
+        for cell in &self.cells {
+            let (material, y, rate) = (materials.of(cell.tet as usize), cell.of(&points), cell.of(&rates));
+            let (forces, power) = match self.fading.of_cell(cell.number) {
+                Some(fade) => fade.forces_n(&cell.rest, material, &y, &rate),
+                None => cell.rest.forces_n(material, &y, &rate),
+            };
+            cell.add(&forces, &mut of_points);
+            power_w += power;
         }
         for (tet, share) in self.shares.iter().enumerate() {
             let material = materials.of(tet);
@@ -249,14 +189,9 @@ impl Patch {
         let (points, changes) = (self.points(at), self.points(a));
         let mut nodes = vec![DVec3::ZERO; at.nodes.len()];
         let mut of_points = vec![DVec3::ZERO; points.len()];
-        match &self.fine {
-            Fine::Cells(cells) => {
-                for cell in cells {
-                    let material = materials.of(cell.tet as usize);
-                    cell.add(&cell.rest.products_n(material, &cell.of(&points), &cell.of(&changes)), &mut of_points);
-                }
-            }
-            Fine::Points(operator) => operator.add_products_n(materials, &points, &changes, &mut of_points),
+        for cell in &self.cells {
+            let material = materials.of(cell.tet as usize);
+            cell.add(&cell.rest.products_n(material, &cell.of(&points), &cell.of(&changes)), &mut of_points);
         }
         for (tet, share) in self.shares.iter().enumerate() {
             share.add_products_n(materials.of(tet), &at.nodes, &a.nodes, &mut nodes);
@@ -268,14 +203,9 @@ impl Patch {
     pub fn diagonal_n_per_m(&self, materials: &Materials<'_>, nodes: usize) -> Vec<DMat3> {
         let mut of_nodes = vec![DMat3::ZERO; nodes];
         let mut of_points = vec![DMat3::ZERO; self.active.len() + self.border.len()];
-        match &self.fine {
-            Fine::Cells(cells) => {
-                for cell in cells {
-                    let blocks = cell.rest.diagonal_n_per_m(materials.of(cell.tet as usize));
-                    cell.points.iter().zip(blocks).for_each(|(&point, block)| of_points[point as usize] += block);
-                }
-            }
-            Fine::Points(operator) => operator.add_diagonal_n_per_m(materials, &mut of_points),
+        for cell in &self.cells {
+            let blocks = cell.rest.diagonal_n_per_m(materials.of(cell.tet as usize));
+            cell.points.iter().zip(blocks).for_each(|(&point, block)| of_points[point as usize] += block);
         }
         for (anchor, block) in self.border.iter().zip(of_points.split_off(self.active.len())) {
             for (&node, weight) in anchor.nodes.iter().zip(anchor.weights) {

@@ -1,7 +1,6 @@
 //! Points of a body at rest, such as those of its skin, between the particles that carry them.
 use super::{
     partition::{NONE, Partition},
-    patch::{Field, Patch},
     sites::trilinear,
 };
 use glam::DVec3;
@@ -76,58 +75,25 @@ impl Place {
     pub fn new(partition: &Partition, point_m: DVec3) -> Self {
         SkinPlace::new(partition, point_m).place(partition)
     }
-
-    /// Of anything with three components.
-    pub fn of(&self, partition: &Partition, patch: &Patch, a: &Field) -> DVec3 {
-        let value = |particle: u32| match patch.active().binary_search(&particle) {
-            Ok(index) => a.particles[index],
-            Err(_) => partition.anchor(particle).of(&a.nodes),
-        };
-        self.particles.iter().zip(self.weights).map(|(&p, w)| value(p) * w).sum()
-    }
-
-    /// Adds a force (N) at the point to what it moves with.
-    pub fn push(&self, partition: &Partition, patch: &Patch, force_n: DVec3, forces_n: &mut Field) {
-        for (&particle, weight) in self.particles.iter().zip(self.weights) {
-            if let Ok(index) = patch.active().binary_search(&particle) {
-                forces_n.particles[index] += force_n * weight;
-                continue;
-            }
-            let anchor = partition.anchor(particle);
-            for (&node, share) in anchor.nodes.iter().zip(anchor.weights) {
-                forces_n.nodes[node as usize] += force_n * (weight * share);
-            }
-        }
-    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::bodies::hybrid::testing::{Random, ball, balls_in_cage};
+    use crate::bodies::hybrid::testing::{ball, balls_in_cage};
 
     #[test]
-    fn points_of_the_skin_move_affinely_and_hand_over_all_of_a_force() {
+    fn points_of_the_skin_move_affinely() {
         for partition in balls_in_cage() {
             let skin = ball(0.01, DVec3::new(0.2e-3, -0.3e-3, 0.1e-3), 3);
-            let active = (0..partition.particle_count() as u32).filter(|&p| partition.particle_m(p).z > 3e-3).collect();
-            let patch = Patch::new(&partition, &active);
-            let rest = patch.at_rest(&partition);
-            let mut random = Random(31);
             // Some lie deep in the body.
             for (number, &point) in skin.positions_m().iter().enumerate() {
                 let point = point * if number % 3 == 0 { 0.1 * (number % 10) as f64 } else { 1.0 };
-                let place = Place::new(&partition, point);
-                assert!(place.weights.iter().all(|&w| w > -0.5));
-                assert!((place.of(&partition, &patch, &rest) - point).length() < 1e-15);
-                let force = random.vector();
-                let zero = |list: &[DVec3]| vec![DVec3::ZERO; list.len()];
-                let mut forces = Field { nodes: zero(&rest.nodes), particles: zero(&rest.particles) };
-                place.push(&partition, &patch, force, &mut forces);
-                let all = || forces.nodes.iter().zip(&rest.nodes).chain(forces.particles.iter().zip(&rest.particles));
-                let total: DVec3 = all().map(|(f, _)| *f).sum();
-                let torque: DVec3 = all().map(|(f, x)| x.cross(*f)).sum();
-                assert!((total - force).length() < 1e-14 && (torque - point.cross(force)).length() < 1e-16);
+                let Place { particles, weights } = Place::new(&partition, point);
+                assert!(weights.iter().all(|&w| w > -0.5));
+                assert!((weights.iter().sum::<f64>() - 1.0).abs() < 1e-14, "{weights:?}");
+                let moved: DVec3 = particles.iter().zip(weights).map(|(&p, w)| partition.particle_m(p) * w).sum();
+                assert!((moved - point).length() < 1e-15, "{moved} {point}");
             }
         }
     }

@@ -3,6 +3,8 @@
 //! ```text
 //! f_i = Σ_j k_ij (1 − r_ij/|l_ij|) l_ij,   l_ij = x_j − x_i
 //! ```
+// A vector type is only fast where it is inlined into a function compiled for its instruction set.
+#![allow(clippy::inline_always)]
 use crate::lanes::{
     dispatch::{Available, InstructionSet, Sweep, sweep},
     real::Vector,

@@ -40,11 +40,6 @@ pub enum NoMatch {
     },
 }
 
-/// Eq. 5: `K′_h = K_h N/N′`, so that home springs add up to the same.
-pub fn spread_over(home_n_per_m: f64, refined: &Refined) -> f64 {
-    home_n_per_m * refined.node_ratio()
-}
-
 /// Constants that any number of refinements leaves the same sheet on the same foundation, per area: in the plane springs of a triangle of any size make the same stiffness, and a
 /// refined vertex has a quarter of the foundation's area: `K′_m = K_m`, `K′_h = K_h/4`.
 pub fn area_consistent(coarse: &Constants) -> Constants {
@@ -142,7 +137,7 @@ mod tests {
         for part in [0.1, 1.0] {
             let push = DVec3::Z * (part * edge);
             let force_n = point_force_n(&coarse, 0, push, &mut coarse.rest_m.clone()).unwrap().z;
-            for way in [Way::Home(60.0), Way::Home(spread_over(60.0, &refined)), Way::Ratio(1.0), Way::Ratio(4.0)] {
+            for way in [Way::Home(60.0), Way::Home(60.0 * refined.node_ratio()), Way::Ratio(1.0), Way::Ratio(4.0)] {
                 let found = matched(&refined, &k, (0, push), force_n, way).unwrap();
                 let net = refined.net(&k, &found);
                 let force = point_force_n(&net, 0, push, &mut net.rest_m.clone()).unwrap().z;

@@ -170,11 +170,9 @@ pub(super) fn outer_part(positions_m: &[DVec3], boundary: &[[u32; 3]]) -> Vec<[u
 mod tests {
     use super::*;
     use crate::{
-        bodies::{
-            hybrid::testing::Random,
-            seed::{PaperModel, testing::shell},
-        },
+        bodies::seed::{PaperModel, testing::shell},
         material::{Convention, Viscosity},
+        testing::Random,
     };
 
     fn core(convention: Convention, viscous: bool) -> Core {

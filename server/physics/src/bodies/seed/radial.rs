@@ -79,7 +79,7 @@ pub fn at(weights: [f64; 3], corners: [DVec3; 3]) -> DVec3 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::bodies::{hybrid::testing::Random, seed::testing::sphere};
+    use crate::{bodies::seed::testing::sphere, testing::Random};
 
     #[test]
     fn a_foot_lies_on_the_ray() {

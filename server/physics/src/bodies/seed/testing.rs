@@ -1,12 +1,12 @@
 //! Shapes for tests.
 use super::{LayerSpec, PaperModel, SeedParameters, SeedSpec};
-use crate::{bodies::hybrid::testing::ball, mesh::TetMesh};
+use crate::{mesh::TetMesh, testing};
 use glam::DVec3;
 
 /// An ellipsoid: an icosahedron whose triangles are split in four `rounds` times. Vertices (m) and triangles.
 pub(crate) fn sphere(axes_m: DVec3, rounds: u32) -> (Vec<DVec3>, Vec<[u32; 3]>) {
-    let skin = ball(1.0, DVec3::ZERO, rounds);
-    (skin.positions_m().iter().map(|&p| p * axes_m).collect(), skin.triangles().to_vec())
+    let (directions, triangles) = testing::sphere(rounds);
+    (directions.iter().map(|&direction| direction * axes_m).collect(), triangles)
 }
 
 /// One layer of prisms between two ellipsoids, each in three tets.

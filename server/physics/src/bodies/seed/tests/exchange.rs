@@ -1,8 +1,8 @@
 //! What passes between particles, core and skin.
 use super::{ball, ball_with, press, touched};
-use crate::bodies::{
-    hybrid::testing::Random,
-    seed::{Exchange, SeedContact, SeedModel, SeedScratch, SeedState, exchange},
+use crate::{
+    bodies::seed::{Exchange, SeedContact, SeedModel, SeedScratch, SeedState, exchange},
+    testing::Random,
 };
 use glam::{DQuat, DVec3};
 

@@ -1,14 +1,12 @@
 //! What raw SPH does, as printed and repaired.
 use super::{TOUCHED, ball, ball_with, touched, triangle_towards};
 use crate::{
-    bodies::{
-        hybrid::testing::Random,
-        seed::{
-            AtVertex, PairStress, PaperModel, SeedContact, SeedModel, SeedParameters, SeedScratch, SeedState,
-            region::Place, sph, voxels::NONE,
-        },
+    bodies::seed::{
+        AtVertex, PairStress, PaperModel, SeedContact, SeedModel, SeedParameters, SeedScratch, SeedState,
+        region::Place, sph, voxels::NONE,
     },
     material::{Convention, Viscosity, stvk::green_strain},
+    testing::Random,
 };
 use glam::{DMat3, DQuat, DVec3};
 

@@ -1,18 +1,18 @@
-//! Sums over neighbours as smoothed particle hydrodynamics makes them, raw and corrected; see `methods`.
+//! Sums over neighbours as smoothed particle hydrodynamics makes them, raw and corrected; see `mod.rs`.
 use super::{
-    partition::Partition,
+    neighbours::particles_near,
     points::{Row, Term},
     smoothing_kernels::{Kernel, SMOOTHING},
 };
-use crate::linalg::tensor::outer;
 use glam::DMat3;
+use palpate_physics::{bodies::hybrid::partition::Partition, linalg::tensor::outer};
 
 /// `b_qp = −V_p W' ΔX/|ΔX|`.
 pub(super) fn raw(partition: &Partition, kernel: Kernel, particle: u32) -> Vec<Term> {
     let spacing_m = partition.sites().spacing_m();
     let (smoothing_m, volume_m3) = (SMOOTHING * spacing_m, spacing_m.powi(3));
     let at = partition.particle_m(particle);
-    let near = partition.particles_near(at, Kernel::support_m(smoothing_m));
+    let near = particles_near(partition, at, Kernel::support_m(smoothing_m));
     let term = |neighbour: u32| {
         let span_m = partition.particle_m(neighbour) - at;
         let distance_m = span_m.length();
@@ -47,14 +47,14 @@ pub(super) fn controlled(partition: &Partition, kernel: Kernel, control: f64, mu
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::bodies::hybrid::testing::block_in_cage;
+    use crate::fine_levels::testing::block_in_cage;
     use glam::DVec3;
 
     /// In a layer four particles thick.
     #[test]
     fn raw_sums_give_the_identity_map_another_gradient() {
         let of_identity = |partition: &Partition, kernel: Kernel, at: DVec3| {
-            let particle = partition.particles_near(at, 1e-6)[0];
+            let particle = particles_near(partition, at, 1e-6)[0];
             let terms = raw(partition, kernel, particle);
             terms.iter().fold(DMat3::ZERO, |sum, term| sum + outer(term.span_m, term.gradient_per_m))
         };

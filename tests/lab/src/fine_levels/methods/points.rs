@@ -5,18 +5,18 @@
 //! U = Σ_q V_q Ψ_q(F_q) + ½ µ Σ_qp k_qp |e_qp|²          e_qp = (y_p − y_o) − F_q (X_p − X_o)
 //! f_p = −Σ_q (V_q P_q − µ H_q) b_qp − µ Σ_q k_qp e_qp          H_q = Σ_p k_qp e_qp ⊗ (X_p − X_o),  origins the opposite
 //! ```
-//! What fills `b_qp`, `V_q` and `k_qp` is the method (`methods`). Where a method reproduces affine motion, `O_q = 0`; where it does not (raw SPH), `O_q` makes
+//! What fills `b_qp`, `V_q` and `k_qp` is the method (`mod.rs`). Where a method reproduces affine motion, `O_q = 0`; where it does not (raw SPH), `O_q` makes
 //! it measure strain from gradients of displacement, `F_q = I + Σ_p (u_p − u_o) ⊗ b_qp`: free of stress at rest, but not when turned.
 //! The second term of U is the control of zero-energy modes (Ganzenmüller 2015, CMAME 286, 87-106): it costs what neighbours move beside the motion that
 //! `F_q` tells. There it is an explicit force along `y_p − y_o`; here it is an energy, quadratic in y, so its force is its transpose like the rest.
 //!
 //! Every force is a sum over differences, so forces sum to zero. Where `O_q = 0`, U does not change as all turns, so neither is there a torque.
-use super::patch::Materials;
-use crate::{
+use glam::{DMat3, DVec3};
+use palpate_physics::{
+    bodies::hybrid::patch::Materials,
     linalg::tensor::outer,
     material::{Lame, Material, Viscosity, viscous},
 };
-use glam::{DMat3, DVec3};
 use std::ops::Range;
 
 /// What of a material a point has.
@@ -168,14 +168,6 @@ impl Operator {
     /// Number of rows.
     pub fn row_count(&self) -> usize {
         self.rows.len()
-    }
-
-    /// `det F` of every row, and its tet.
-    pub fn volume_ratios(&self, y: &[DVec3]) -> impl Iterator<Item = (f64, usize)> {
-        let of_row = move |(row, head): (usize, &Head)| {
-            ((head.offset + self.gradient_of(row, y)).determinant(), head.tet as usize)
-        };
-        self.rows.iter().enumerate().map(of_row)
     }
 
     /// Elastic energy (J) at positions of the points.

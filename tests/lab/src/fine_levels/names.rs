@@ -1,8 +1,5 @@
 //! The methods by name.
-use palpate_physics::bodies::hybrid::{
-    methods::{CONTROL, Method},
-    smoothing_kernels::Kernel,
-};
+use super::methods::{CONTROL, Kernel, Method};
 
 /// What makes up the fine level.
 #[derive(Debug, Clone, Copy, PartialEq)]

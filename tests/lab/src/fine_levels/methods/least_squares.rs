@@ -9,16 +9,17 @@
 //! particle and zero at the others: a particle's degree of freedom is not quite where it is, once motion is not affine. The skin and the particles that
 //! follow the coarse level take it for that.
 use super::{
-    partition::Partition,
+    neighbours::particles_near,
     points::Term,
     smoothing_kernels::{Kernel, SMOOTHING},
 };
 use glam::{DMat4, DVec3, DVec4};
+use palpate_physics::bodies::hybrid::partition::Partition;
 
 /// `∇N_p` (1/m) of the particles around a point (m), except that of `origin`, which is the others' opposite.
 pub(super) fn terms(partition: &Partition, point_m: DVec3, origin: u32) -> Vec<Term> {
     let smoothing_m = SMOOTHING * partition.sites().spacing_m();
-    let near = partition.particles_near(point_m, Kernel::support_m(smoothing_m));
+    let near = particles_near(partition, point_m, Kernel::support_m(smoothing_m));
     let places: Vec<DVec3> = near.iter().map(|&p| partition.particle_m(p)).collect();
     let gradients = gradients_per_m(&places, point_m, smoothing_m);
     let origin_m = partition.particle_m(origin);
@@ -66,7 +67,7 @@ fn gradients_per_m(places_m: &[DVec3], point_m: DVec3, smoothing_m: f64) -> Vec<
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::bodies::hybrid::testing::Random;
+    use crate::stress::random::Random;
 
     /// Shape functions themselves, to be differentiated.
     fn values(places_m: &[DVec3], point_m: DVec3, smoothing_m: f64) -> Vec<f64> {
@@ -88,7 +89,7 @@ mod tests {
 
     #[test]
     fn gradients_are_those_of_the_shape_functions() {
-        let mut random = Random(17);
+        let mut random = Random::new(17);
         let places: Vec<DVec3> = (0..30).map(|_| random.vector() * 2e-3).collect();
         for _ in 0..10 {
             let (at, smoothing_m, step) = (random.vector() * 0.5e-3, 1.3e-3, 1e-8);

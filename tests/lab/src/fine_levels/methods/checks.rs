@@ -1,29 +1,41 @@
 //! What the methods satisfy, and what not: balance of uniform stress, plane waves, frequencies.
 use super::{
-    methods::Method,
-    partition::Partition,
-    patch::{Field, KEPT, Materials, Patch},
+    Method,
+    neighbours::{particle_m3, particles_near},
+    patch::PointPatch,
     points::Operator,
     smoothing_kernels::Kernel,
-    testing::{CORRECTED, RAW, Random, ball_in_cage, block_in_cage, half, half_awake, moved, stretch, tissue},
 };
-use crate::material::{Lame, Material};
+use crate::{
+    fine_levels::{
+        level::FineLevel,
+        testing::{CORRECTED, RAW, ball_in_cage, block_in_cage, half, half_awake, moved, stretch, tissue},
+    },
+    stress::random::Random,
+};
 use glam::DVec3;
+use palpate_physics::{
+    bodies::hybrid::{
+        partition::Partition,
+        patch::{Field, KEPT, Materials, Patch},
+    },
+    material::{Lame, Material},
+};
 use std::{collections::BTreeSet, f64::consts::PI};
 
 /// Forces of uniform stress over `P h²`: the largest in the middle of a block, and the largest on a particle beneath a face but not in it. Both ought to be zero.
 fn out_of_balance(partition: &Partition, method: Method, material: &Material) -> (f64, f64) {
     let active: BTreeSet<u32> = (0..partition.particle_count() as u32).collect();
-    let patch = Patch::with_points(partition, &active, &method.points(partition, &active));
+    let patch = PointPatch::new(partition, &active, &method.points(partition, &active));
     let of_tet = vec![0; partition.shares().len()];
     let materials = Materials { materials: &[*material], of_tet: &of_tet };
-    let f = stretch(&mut Random(59));
+    let f = stretch(&mut Random::new(59));
     let at = moved(&patch.at_rest(partition), |p| f * p);
-    let (forces, _) = patch.forces_n(&materials, &at, &moved(&at, |_| DVec3::ZERO));
+    let forces = patch.elastic_forces_n(&materials, &at);
     let stress = material.piola(&f);
     let unit = 1e-6 * stress.x_axis.length().max(stress.y_axis.length()).max(stress.z_axis.length());
     let force = |z_mm: f64| {
-        let particle = partition.particles_near(DVec3::new(7.0, 7.0, z_mm) * 1e-3, 1e-6)[0];
+        let particle = particles_near(partition, DVec3::new(7.0, 7.0, z_mm) * 1e-3, 1e-6)[0];
         forces.particles[particle as usize].length() / unit
     };
     (force(6.0).max(force(7.0)), [1.0, 2.0, 3.0, 4.0].map(force).into_iter().fold(0.0, f64::max))
@@ -32,20 +44,20 @@ fn out_of_balance(partition: &Partition, method: Method, material: &Material) ->
 /// On half of a ball, what uniform stress puts on a particle beside the traction that the cells give it, at most, over `P h²`; and on the middle node of a block that is half awake,
 /// over `P` times the area of its section.
 fn beside_traction(ball: &Partition, block: &Partition, method: Method, material: &Material) -> (f64, f64) {
-    let f = stretch(&mut Random(61));
+    let f = stretch(&mut Random::new(61));
     let stress = material.piola(&f);
     let unit_pa = stress.x_axis.length().max(stress.y_axis.length()).max(stress.z_axis.length());
-    let forces = |partition: &Partition, patch: &Patch| {
+    let forces = |partition: &Partition, patch: &dyn FineLevel| {
         let of_tet = vec![0; partition.shares().len()];
         let materials = Materials { materials: &[*material], of_tet: &of_tet };
         let at = moved(&patch.at_rest(partition), |p| f * p);
-        patch.forces_n(&materials, &at, &moved(&at, |_| DVec3::ZERO)).0
+        patch.elastic_forces_n(&materials, &at)
     };
     let (cells, points) =
         (forces(ball, &Patch::new(ball, &half(ball))).particles, forces(ball, &half_awake(ball, method)).particles);
     let worst = cells.iter().zip(points).map(|(a, b)| a.distance(b)).fold(0.0, f64::max);
     let active = (0..block.particle_count() as u32).filter(|&p| block.particle_m(p).x > 7.5e-3).collect();
-    let nodes = forces(block, &Patch::with_points(block, &active, &method.points(block, &active))).nodes;
+    let nodes = forces(block, &PointPatch::new(block, &active, &method.points(block, &active))).nodes;
     let middle = DVec3::new(7.0, 7.0, 6.5) * 1e-3;
     let at_middle = block.coarse().positions_m().iter().position(|x| x.distance(middle) < 1e-9).unwrap();
     let area_m2 = 14e-3 * 13e-3;
@@ -133,13 +145,13 @@ fn control_leaves_no_mode_without_energy() {
 }
 
 /// Square of the largest natural frequency (rad²/s²) of all particles awake, by power iteration.
-fn largest_square(partition: &Partition, patch: &Patch, material: &Material) -> f64 {
+fn largest_square(partition: &Partition, patch: &dyn FineLevel, material: &Material) -> f64 {
     let of_tet = vec![0; partition.shares().len()];
     let materials = Materials { materials: &[*material], of_tet: &of_tet };
     let rest = patch.at_rest(partition);
     let still = vec![DVec3::ZERO; rest.nodes.len()];
-    let masses: Vec<f64> = patch.active().iter().map(|&p| 1000.0 * (1.0 - KEPT) * partition.particle_m3(p)).collect();
-    let mut random = Random(67);
+    let masses: Vec<f64> = patch.active().iter().map(|&p| 1000.0 * (1.0 - KEPT) * particle_m3(partition, p)).collect();
+    let mut random = Random::new(67);
     let mut a = Field { particles: masses.iter().map(|_| random.vector()).collect(), nodes: still.clone() };
     let mut square = 0.0;
     for _ in 0..300 {
@@ -162,7 +174,7 @@ fn the_largest_frequency_is_about_that_of_cells_or_less() {
     let of_cells = largest_square(&partition, &Patch::new(&partition, &all), &material).sqrt();
     let ratios = [0.36, 0.58, 0.72, 0.91, 1.03, 0.91, 0.96];
     for (method, expected) in RAW.into_iter().chain(CORRECTED).zip(ratios) {
-        let patch = Patch::with_points(&partition, &all, &method.points(&partition, &all));
+        let patch = PointPatch::new(&partition, &all, &method.points(&partition, &all));
         let ratio = largest_square(&partition, &patch, &material).sqrt() / of_cells;
         assert!((ratio - expected).abs() < 0.01, "{method:?}: {ratio}");
     }

@@ -8,11 +8,9 @@
 //! ```
 //! The sums run over the particles n that are awake, so that volume is counted once in either law: a tet has a quarter for each of its corners that is. With γ = 0
 //! fields that alternate from particle to particle cost nothing.
-use super::{
-    partition::Partition,
-    points::{Handed, Points, Role, Row, Term},
-};
+use super::points::{Handed, Points, Role, Row, Term};
 use glam::DVec3;
+use palpate_physics::bodies::hybrid::partition::Partition;
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Corners of a cell's tets: ways along its edges from its first corner to its last.

@@ -1,0 +1,20 @@
+//! Numbers for tests, the same in every run.
+use glam::DVec3;
+
+/// Numbers without a pattern (xorshift64).
+pub(crate) struct Random(pub(crate) u64);
+
+impl Random {
+    /// In [0, 1).
+    pub(crate) fn unit(&mut self) -> f64 {
+        for shift in [13_i32, -7, 17] {
+            self.0 ^= if shift > 0 { self.0 << shift } else { self.0 >> -shift };
+        }
+        (self.0 >> 11) as f64 / (1_u64 << 53) as f64
+    }
+
+    /// Components in (−1, 1).
+    pub(crate) fn vector(&mut self) -> DVec3 {
+        DVec3::new(self.unit(), self.unit(), self.unit()) * 2.0 - DVec3::ONE
+    }
+}
