@@ -9,10 +9,7 @@ use palpate_physics::{
     statics::{SolveError, StaticSettings, StaticSolution, solve_static, solve_static_with},
     world::wake_only,
 };
-use rig::{
-    Drive, Rig, at, held_below, hold, hybrid_block, mesh_of, nodes_where, particles, particles_mut, sphere,
-    wake_nearest,
-};
+use rig::{Drive, Rig, at, held_below, hold, hybrid_block, mesh_of, nodes_where, particles, particles_mut, sphere};
 use std::ops::ControlFlow;
 
 /// 40 × 40 × 20 mm in 24 coarse tets, particles 2.5 mm apart, its upper face at z = 0.
