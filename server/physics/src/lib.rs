@@ -18,6 +18,8 @@ pub mod lanes;
 pub mod linalg;
 pub mod material;
 pub mod mesh;
+#[cfg(test)]
+mod random;
 pub mod settings;
 pub mod snapshot;
 pub mod statics;

@@ -2,7 +2,7 @@
 use super::{hybrid, springs};
 use crate::{
     contact::{Body, ContactState, SubstepTime},
-    elements::loads::add_load_n,
+    elements::loads::{LoadPositions, add_load_n},
     settings::LoadSpec,
     world::{Model, PointForce, Scratch, State, TickInput},
 };
@@ -91,7 +91,7 @@ impl Tick<'_> {
         for (index, load) in model.spec().loads.iter().enumerate() {
             let factor = loads.factor(load_factors[index], input, index, now.load_fraction);
             if factor != 0.0 {
-                add_load_n(load, factor, model.surface(), (rest_m, x), forces_n);
+                add_load_n(load, factor, model.surface(), LoadPositions { rest_m, deformed_m: x }, forces_n);
             }
         }
         for point in self.usable_points() {

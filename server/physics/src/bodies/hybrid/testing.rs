@@ -12,6 +12,7 @@ use super::{
     skin::Skin,
     smoothing_kernels::Kernel,
 };
+pub(crate) use crate::random::Random;
 use crate::{
     material::{Convention, Lame, Law, Material, Viscosity},
     mesh::{Surface, TetMesh},
@@ -54,24 +55,6 @@ pub(crate) fn ball(radius_m: f64, centre_m: DVec3, rounds: u32) -> Skin {
     }
     let on_sphere = points.iter().map(|p| centre_m + p.normalize() * radius_m).collect();
     Skin::new(on_sphere, triangles).unwrap()
-}
-
-/// Numbers without a pattern (xorshift64).
-pub(crate) struct Random(pub(crate) u64);
-
-impl Random {
-    /// In [0, 1).
-    pub(crate) fn unit(&mut self) -> f64 {
-        for shift in [13_i32, -7, 17] {
-            self.0 ^= if shift > 0 { self.0 << shift } else { self.0 >> -shift };
-        }
-        (self.0 >> 11) as f64 / (1_u64 << 53) as f64
-    }
-
-    /// Components in (−1, 1).
-    pub(crate) fn vector(&mut self) -> DVec3 {
-        DVec3::new(self.unit(), self.unit(), self.unit()) * 2.0 - DVec3::ONE
-    }
 }
 
 /// A box of `cells` of six tets each.

@@ -4,7 +4,7 @@
 //! f_i = Σ_j k_ij (1 − r_ij/|l_ij|) l_ij,   l_ij = x_j − x_i
 //! ```
 use crate::lanes::{
-    dispatch::{Available, InstructionSet, Sweep, sweep},
+    dispatch::{Available, InstructionSet, Pass, run},
     real::Vector,
 };
 use glam::DVec3;
@@ -106,7 +106,7 @@ impl SpringRows {
     /// Adds the springs' forces (N) on the nodes, at positions `x_m` (m) of these and then of what else springs go to. The last block's lanes without a node must be in `x_m`, or
     /// there are none: positions are taken of the last entry then.
     pub fn add_forces_n(&self, x_m: &[DVec3], forces_n: &mut [DVec3]) {
-        sweep(self.instruction_set, Pull { rows: self, x_m, forces_n });
+        run(self.instruction_set, Pull { rows: self, x_m, forces_n });
     }
 }
 
@@ -116,7 +116,8 @@ struct Pull<'a> {
     forces_n: &'a mut [DVec3],
 }
 
-impl Sweep for Pull<'_> {
+impl Pass for Pull<'_> {
+    type Scalar = f64;
     type Found = ();
 
     #[inline(always)]
