@@ -52,7 +52,7 @@ fn kernels(criterion: &mut Criterion) {
         let (cells, rest) = cells(offset);
         let u: Vec<DVec3> = rest.iter().map(|_| random.vector() * 2e-4).collect();
         let mut forces = vec![DVec3::ZERO; rest.len()];
-        for law in [Law::StVenantKirchhoff, Law::StableNeoHookean, Law::FixedCorotated] {
+        for law in Law::ALL {
             let lame = Lame { lambda_pa: 30e3, mu_pa: 3e3 };
             let material = Material::new(law, lame, Viscosity::default(), Convention::Consistent);
             let mut group = criterion.benchmark_group(format!("cells, {name}, {law:?}"));

@@ -19,7 +19,7 @@ fn kernels(criterion: &mut Criterion) {
     let x: Vec<DVec3> = mesh.positions_m().iter().map(|p| *p + random.vector() * 5e-4).collect();
     let v: Vec<DVec3> = x.iter().map(|_| random.vector()).collect();
     let (tet_material, mut forces) = (vec![0; rest.len()], vec![DVec3::ZERO; x.len()]);
-    for law in [Law::StVenantKirchhoff, Law::StableNeoHookean, Law::FixedCorotated] {
+    for law in Law::ALL {
         for viscosity in [Viscosity::default(), Viscosity { phi_pa_s: 1.0, psi_pa_s: 1.0 }] {
             let lame = Lame { lambda_pa: 30e3, mu_pa: 3e3 };
             let materials = [Material::new(law, lame, viscosity, Convention::Consistent)];

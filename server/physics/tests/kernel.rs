@@ -11,8 +11,6 @@ use palpate_physics::{
 };
 use support::{Random, block, largest, largest_difference};
 
-const LAWS: [Law; 3] = [Law::StVenantKirchhoff, Law::StableNeoHookean, Law::FixedCorotated];
-
 fn material(law: Law, nu: f64, viscous: bool) -> Material {
     let viscosity = if viscous { Viscosity::new(3.0, 5.0).unwrap() } else { Viscosity::default() };
     Material::new(law, Lame::from_young_poisson(10e3, nu).unwrap(), viscosity, Convention::Consistent)
@@ -105,8 +103,8 @@ fn cases() -> Vec<(String, Case)> {
     let mut cases = Vec::new();
     for viscous in [false, true] {
         for nu in [0.0, 0.45, 0.49] {
-            let mut sets: Vec<Vec<Material>> = LAWS.map(|law| vec![material(law, nu, viscous)]).to_vec();
-            sets.push(LAWS.map(|law| material(law, nu, viscous)).to_vec());
+            let mut sets: Vec<Vec<Material>> = Law::ALL.map(|law| vec![material(law, nu, viscous)]).to_vec();
+            sets.push(Law::ALL.map(|law| material(law, nu, viscous)).to_vec());
             for set in sets {
                 for (strain, noise) in [(1e-6, 0.0), (0.02, 0.01), (0.2, 0.1), (0.3, 0.6)] {
                     let name = format!("{set:?} strain {strain} noise {noise}");
@@ -176,7 +174,7 @@ fn forces_of_a_body_sum_to_nothing() {
 #[test]
 fn at_rest_the_force_is_exactly_zero() {
     let mut random = Random(5);
-    for law in LAWS {
+    for law in Law::ALL {
         let mut case = Case::random(vec![material(law, 0.45, true)], 0.0, 0.0, &mut random);
         case.x = case.mesh.positions_m().to_vec();
         case.v.fill(DVec3::ZERO);
@@ -192,7 +190,7 @@ fn at_rest_the_force_is_exactly_zero() {
 #[test]
 fn a_bad_node_does_not_leak() {
     let mut random = Random(9);
-    for law in LAWS {
+    for law in Law::ALL {
         let mut case = Case::random(vec![material(law, 0.3, false)], 0.1, 0.05, &mut random);
         let bad = case.x.len() - 1;
         let (good, _) = case.run(&case.kernel(Precision::Single));
@@ -221,7 +219,7 @@ fn a_bad_node_does_not_leak() {
 #[test]
 fn products_agree_with_the_oracle() {
     let mut random = Random(31);
-    for law in LAWS {
+    for law in Law::ALL {
         for (strain, noise) in [(0.0, 1e-3), (0.2, 0.1), (0.3, 0.6)] {
             let materials = vec![material(law, 0.3, true), material(law, 0.45, false)];
             let case = Case::random(materials, strain, noise, &mut random);

@@ -1,7 +1,7 @@
 //! The patch test, in both precisions, and rigid motion.
 #![allow(clippy::unwrap_used)] // helpers outside #[test] functions
 mod common;
-use common::{LAWS, Random, block, equilibrium, jittered, material, spec};
+use common::{Random, block, equilibrium, jittered, material, spec};
 use glam::{DMat3, DQuat, DVec3};
 use palpate_physics::{Model, ModelSpec, Precision, PrescribedSpec, TetMesh, material::Law};
 
@@ -61,7 +61,8 @@ fn interior_residual(model: &Model, f: DMat3) -> [f64; 2] {
 
 #[test]
 fn uniform_deformation_leaves_interior_nodes_in_balance() {
-    for (name, law) in LAWS {
+    for law in Law::ALL {
+        let name = law.name();
         for (precision, bound) in [(Precision::Double, 1e-12), (Precision::Single, 1e-5)] {
             let model = Model::build(body(law, precision)).unwrap();
             let mut random = Random(1);
@@ -79,7 +80,8 @@ fn uniform_deformation_leaves_interior_nodes_in_balance() {
 
 #[test]
 fn a_boundary_moved_uniformly_solves_to_a_uniform_interior() {
-    for (name, law) in LAWS {
+    for law in Law::ALL {
+        let name = law.name();
         let mut body = body(law, Precision::Double);
         let f = random_gradient(&mut Random(5));
         let mesh = body.body.solid().unwrap().mesh.clone();
@@ -105,7 +107,8 @@ fn a_boundary_moved_uniformly_solves_to_a_uniform_interior() {
 #[test]
 fn rigid_motion_makes_no_force() {
     let mut random = Random(3);
-    for (name, law) in LAWS {
+    for law in Law::ALL {
+        let name = law.name();
         let model = Model::build(body(law, Precision::Double)).unwrap();
         let mut worst = 0.0_f64;
         for _ in 0..20 {

@@ -11,7 +11,6 @@ use palpate_physics::{
         mass_spring::{Refinement, region::Constants},
         seed::region::Region,
     },
-    material::Law,
 };
 use palpate_scene::{Scene, builtin_names, wording::counted};
 use std::process::ExitCode;
@@ -88,7 +87,7 @@ fn print_body(scene: &Scene) {
         println!(
             "material   {:<16} {}, E {} Pa, nu {}, {} kg/m3",
             region.name,
-            law(region.material.law),
+            region.material.law.name(),
             short(lame.young_modulus_pa()),
             short(lame.poisson_ratio()),
             region.density_kg_per_m3
@@ -286,15 +285,6 @@ fn print_contents(scene: &Scene) {
     }
     let probes: Vec<&str> = scene.probes.iter().map(palpate_scene::Probe::name).collect();
     println!("probes     {}", if probes.is_empty() { "none".to_owned() } else { probes.join(", ") });
-}
-
-/// A law as scenes name it.
-fn law(law: Law) -> &'static str {
-    match law {
-        Law::StVenantKirchhoff => "stvk",
-        Law::StableNeoHookean => "stable-neo-hookean",
-        Law::FixedCorotated => "fixed-corotated",
-    }
 }
 
 /// Four significant digits, without the zeros behind them.

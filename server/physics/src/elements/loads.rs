@@ -2,12 +2,21 @@
 use crate::{mesh::Surface, settings::LoadSpec};
 use glam::DVec3;
 
-/// Adds the nodal forces (N) of a load scaled by `factor`, with the body at rest and deformed at the given positions (m).
+/// Positions (m) of all nodes that loads act at.
+#[derive(Debug, Clone, Copy)]
+pub struct LoadPositions<'a> {
+    /// At rest: dead loads act here.
+    pub rest_m: &'a [DVec3],
+    /// Of the deformed body: follower loads act here.
+    pub deformed_m: &'a [DVec3],
+}
+
+/// Adds the nodal forces (N) of a load scaled by `factor`.
 pub fn add_load_n(
     load: &LoadSpec,
     factor: f64,
     surface: &Surface,
-    (rest_m, deformed_m): (&[DVec3], &[DVec3]),
+    LoadPositions { rest_m, deformed_m }: LoadPositions<'_>,
     forces_n: &mut [DVec3],
 ) {
     match load {

@@ -1,10 +1,14 @@
 //! From a mesh to blocks: tets grouped by material, ordered for locality, padded to whole blocks.
-use super::{
-    block::{Block, Blocks, Run},
-    laws::Constants,
+use super::tets::{RestLanes, Run, TetBlocks};
+use crate::{
+    elements::linear_tet::RestTet,
+    lanes::{
+        blocks::{Block, Blocks},
+        real::Scalar,
+    },
+    material::{Material, constants::Constants},
+    mesh::TetMesh,
 };
-use crate::lanes::real::Scalar;
-use crate::{elements::linear_tet::RestTet, material::Material, mesh::TetMesh};
 use glam::DVec3;
 
 /// Consecutive tets along the space-filling curve are spread over the lanes of this many blocks, so that lanes of one
@@ -12,12 +16,12 @@ use glam::DVec3;
 const BLOCKS_PER_WINDOW: usize = 16;
 
 /// Blocks of all tets, and the runs of equal material among them.
-pub(crate) fn blocks<T: Scalar, const N: usize>(
+pub(super) fn blocks<T: Scalar, const N: usize>(
     mesh: &TetMesh,
     rest_tets: &[RestTet],
     tet_material: &[u16],
     materials: &[Material],
-) -> (Blocks<T, N>, Vec<Run<T>>) {
+) -> (TetBlocks<T, N>, Vec<Run<T>>) {
     let curve = morton_codes(mesh);
     let mut order: Vec<u32> = (0..rest_tets.len() as u32).collect();
     order.sort_by_key(|&t| (tet_material[t as usize], curve[t as usize], t));
@@ -36,7 +40,7 @@ pub(crate) fn blocks<T: Scalar, const N: usize>(
         let material = materials[tet_material[group[0] as usize] as usize];
         runs.push(Run { material, constants: Constants::of(&material), blocks: start..blocks.len() });
     }
-    (Blocks::new(blocks, spare as usize), runs)
+    (Blocks::new(blocks, spare as usize + 1), runs)
 }
 
 fn block<T: Scalar, const N: usize>(
@@ -44,18 +48,19 @@ fn block<T: Scalar, const N: usize>(
     mesh: &TetMesh,
     rest_tets: &[RestTet],
     spare: u32,
-) -> Block<T, N> {
+) -> Block<RestLanes<T, N>, N> {
     let zero = T::of(0.0);
-    let mut block = Block { nodes: [[spare; 4]; N], gradients: [[zero; N]; 9], minus_volume: [zero; N] };
+    let rest = RestLanes { gradients: [[zero; N]; 9], minus_volume: [zero; N] };
+    let mut block = Block { nodes: [[spare; 4]; N], rest };
     for (lane, tet) in tets.enumerate() {
         block.nodes[lane] = mesh.tets()[tet];
         for corner in 0..3 {
             for axis in 0..3 {
                 let gradient = rest_tets[tet].gradients_per_m[corner + 1][axis];
-                block.gradients[3 * corner + axis][lane] = T::of(gradient);
+                block.rest.gradients[3 * corner + axis][lane] = T::of(gradient);
             }
         }
-        block.minus_volume[lane] = T::of(-rest_tets[tet].volume_m3);
+        block.rest.minus_volume[lane] = T::of(-rest_tets[tet].volume_m3);
     }
     block
 }
@@ -118,12 +123,12 @@ mod tests {
         let (blocks, runs) = blocks::<f32, 16>(&mesh, &rest, &tet_material, &[of(1.0), of(2.0)]);
         let mut seen = vec![0; 37];
         for run in &runs {
-            for block in blocks.of(run) {
+            for block in blocks.batches(run.blocks.clone()).flat_map(|batch| batch.blocks()) {
                 for lane in 0..16 {
                     match block.nodes[lane][0] as usize {
                         40 => {
                             assert_eq!(block.nodes[lane], [40; 4]);
-                            assert_eq!(block.minus_volume[lane], 0.0);
+                            assert_eq!(block.rest.minus_volume[lane], 0.0);
                         }
                         node => {
                             seen[node - 2] += 1;
@@ -134,6 +139,6 @@ mod tests {
             }
         }
         assert_eq!(seen, vec![1; 37]);
-        assert_eq!(runs.iter().map(|run| blocks.of(run).len()).sum::<usize>(), 3);
+        assert_eq!(runs.iter().map(|run| run.blocks.len()).sum::<usize>(), 3);
     }
 }

@@ -6,25 +6,26 @@
 //! on every instruction set.
 // A vector type is only fast where it is inlined into a function compiled for its instruction set.
 #![allow(clippy::inline_always)]
-pub(crate) mod block;
-pub(crate) mod laws;
+mod forces;
 mod layout;
 mod oracle;
-pub(crate) mod products;
-pub(crate) mod tangents;
+mod products;
+mod tets;
 
-use crate::lanes::nodes::node;
-use crate::lanes::nodes::{Node, Sum};
 use crate::{
     elements::linear_tet::RestTet,
-    lanes::{Available, InstructionSet, LANES_F32, LANES_F64, dispatch, real::Scalar},
-    material::{Law, Material},
+    lanes::{
+        Available, InstructionSet, LANES_F32, LANES_F64,
+        nodes::{Node, Sum, node},
+        real::Scalar,
+    },
+    material::Material,
     mesh::TetMesh,
     settings::Precision,
 };
-use block::{Blocks, Forces, Job, Products, Run};
 use glam::DVec3;
 pub use oracle::Oracle;
+use tets::{Forces, Products, Run, TetBlocks};
 
 /// Internal forces of a body: rest data laid out for the kernel of the chosen precision.
 #[derive(Debug, Clone)]
@@ -40,8 +41,8 @@ pub struct ForceKernel {
 
 #[derive(Debug, Clone)]
 enum Layout {
-    Single(Blocks<f32, LANES_F32>, Vec<Run<f32>>),
-    Double(Blocks<f64, LANES_F64>, Vec<Run<f64>>),
+    Single(TetBlocks<f32, LANES_F32>, Vec<Run<f32>>),
+    Double(TetBlocks<f64, LANES_F64>, Vec<Run<f64>>),
 }
 
 /// Buffers of the kernel.
@@ -169,34 +170,29 @@ impl ForceKernel {
     fn add_products<T: Scalar, const N: usize>(
         &self,
         factors: [f64; 2],
-        blocks: &Blocks<T, N>,
+        blocks: &TetBlocks<T, N>,
         runs: &[Run<T>],
         scratch: &mut KernelScratch,
     ) {
         let KernelScratch { displacements, directions, sums, .. } = scratch;
         for run in runs {
-            let mut job = Job::for_products(blocks, run, displacements, directions, sums, factors);
-            dispatch::run(self.instruction_set, self.pass_of(&run.material), &mut Products(&mut job));
+            let mut pass = Products { blocks, run, displacements, directions, factors, sums };
+            run.material.run(self.instruction_set, self.every_viscosity, &mut pass);
         }
     }
 
     fn add_forces<T: Scalar, const N: usize>(
         &self,
-        blocks: &Blocks<T, N>,
+        blocks: &TetBlocks<T, N>,
         runs: &[Run<T>],
         scratch: &mut KernelScratch,
     ) -> f64 {
         let KernelScratch { displacements, velocities, sums, .. } = scratch;
         let mut power_w = 0.0;
         for run in runs {
-            let mut job = Job::new(blocks, run, displacements, velocities, sums);
-            power_w += dispatch::run(self.instruction_set, self.pass_of(&run.material), &mut Forces(&mut job));
+            let mut pass = Forces { blocks, run, displacements, velocities, sums };
+            power_w += run.material.run(self.instruction_set, self.every_viscosity, &mut pass);
         }
         power_w
-    }
-
-    /// The law, and whether viscous terms are computed.
-    fn pass_of(&self, material: &Material) -> (Law, bool) {
-        (material.law, self.every_viscosity || !material.viscosity.is_zero())
     }
 }

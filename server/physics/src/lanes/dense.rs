@@ -1,6 +1,6 @@
 //! A small dense matrix's Cholesky factor in lanes, and solving with it for three right-hand sides.
 use super::{
-    dispatch::{Available, Sweep, sweep},
+    dispatch::{Available, Pass, run},
     real::Vector,
     vector_operations::{LANES, total},
 };
@@ -45,7 +45,7 @@ impl Cholesky {
             }
         }
         let Self { columns, inverse_pivots, .. } = self;
-        sweep(Available::best(), Factorise { columns, inverse_pivots, blocks, least });
+        run(Available::best(), Factorise { columns, inverse_pivots, blocks, least });
     }
 
     /// Row `row` of the right-hand sides.
@@ -63,7 +63,7 @@ impl Cholesky {
     /// Solves in place of the right-hand sides `b`; returns `Σ bᵀ A⁻¹ b`.
     pub(crate) fn solve(&mut self) -> f64 {
         let Self { columns, inverse_pivots, right, .. } = self;
-        sweep(Available::best(), Solve { columns, inverse_pivots, right: right.each_mut().map(Vec::as_mut_slice) })
+        run(Available::best(), Solve { columns, inverse_pivots, right: right.each_mut().map(Vec::as_mut_slice) })
     }
 }
 
@@ -75,7 +75,8 @@ struct Factorise<'a> {
     least: f64,
 }
 
-impl Sweep for Factorise<'_> {
+impl Pass for Factorise<'_> {
+    type Scalar = f64;
     type Found = ();
 
     #[inline(always)]
@@ -113,7 +114,8 @@ struct Solve<'a> {
     right: [&'a mut [Lanes]; 3],
 }
 
-impl Sweep for Solve<'_> {
+impl Pass for Solve<'_> {
+    type Scalar = f64;
     type Found = f64;
 
     #[inline(always)]
@@ -170,7 +172,7 @@ fn take<V: Vector<Scalar = f64>>(a: &mut Lanes, scale: V, b: &Lanes) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{bodies::hybrid::testing::Random, lanes::InstructionSet};
+    use crate::{lanes::InstructionSet, testing::Random};
 
     /// A symmetric matrix of so many rows, larger on its diagonal than all else of a row, with some zeros; its rows have three entries more.
     fn matrix(size: usize, random: &mut Random) -> (Vec<f64>, usize) {
@@ -215,7 +217,7 @@ mod tests {
                     entries[number..size].copy_from_slice(&matrix[number * stride + number..number * stride + size]);
                 }
                 let Cholesky { columns, inverse_pivots, right: lists, .. } = &mut other;
-                sweep(set, Factorise { columns, inverse_pivots, blocks: size.div_ceil(LANES), least: 1e-12 });
+                run(set, Factorise { columns, inverse_pivots, blocks: size.div_ceil(LANES), least: 1e-12 });
                 for list in &mut *lists {
                     list.fill([0.0; LANES]);
                 }
@@ -225,11 +227,7 @@ mod tests {
                     }
                 }
                 let right = lists.each_mut().map(Vec::as_mut_slice);
-                assert_eq!(
-                    sweep(set, Solve { columns, inverse_pivots, right }).to_bits(),
-                    size_sq.to_bits(),
-                    "{set:?}"
-                );
+                assert_eq!(run(set, Solve { columns, inverse_pivots, right }).to_bits(), size_sq.to_bits(), "{set:?}");
                 assert!((0..size).all(|row| other.get(row) == solved[row]), "{set:?}");
             }
         }

@@ -1,11 +1,6 @@
 //! One body of code, compiled for several instruction sets, chosen at run time.
 #![allow(unsafe_code)] // calls into functions compiled for an instruction set that was detected
 use super::real::{Scalar, Vector};
-use crate::kernels::{
-    laws::{FixedCorotated, StVenantKirchhoff, StableNeoHookean},
-    tangents::LaneTangent,
-};
-use crate::material::Law;
 
 /// Instruction sets a kernel is compiled for. All of them give the same bits.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -56,79 +51,38 @@ impl InstructionSet {
     }
 }
 
-/// A pass over lists, written once for all vectors.
-pub(crate) trait Sweep {
+/// A computation that is written once for all vectors.
+pub(crate) trait Pass {
+    /// The precision it computes in.
+    type Scalar: Scalar;
+    /// What it finds.
     type Found;
-    /// Computed in vectors `V`.
-    fn run<V: Vector<Scalar = f64>>(self) -> Self::Found;
+    /// Computes in vectors `V`. Implementations are `#[inline(always)]`: a vector type is only fast where it is inlined into
+    /// a function compiled for its instruction set.
+    fn run<V: Vector<Scalar = Self::Scalar>>(self) -> Self::Found;
 }
 
-pub(crate) fn sweep<S: Sweep>(set: Available, sweep: S) -> S::Found {
+/// Runs a pass that was compiled for an instruction set.
+pub(crate) fn run<P: Pass>(set: Available, pass: P) -> P::Found {
     match set.0 {
         // SAFETY: `Available` holds only what was detected.
         #[cfg(target_arch = "x86_64")]
-        InstructionSet::Avx2 => unsafe { sweep_avx2(sweep) },
+        InstructionSet::Avx2 => unsafe { run_avx2(pass) },
         // SAFETY: `Available` holds only what was detected.
         #[cfg(target_arch = "x86_64")]
-        InstructionSet::Avx512 => unsafe { sweep_avx512(sweep) },
-        _ => sweep.run::<<f64 as Scalar>::Baseline>(),
+        InstructionSet::Avx512 => unsafe { run_avx512(pass) },
+        _ => pass.run::<<P::Scalar as Scalar>::Baseline>(),
     }
 }
 
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx2")]
-fn sweep_avx2<S: Sweep>(sweep: S) -> S::Found {
-    sweep.run::<<f64 as Scalar>::Avx2>()
+fn run_avx2<P: Pass>(pass: P) -> P::Found {
+    pass.run::<<P::Scalar as Scalar>::Avx2>()
 }
 
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx512f,avx512bw,avx512dq,avx512vl")]
-fn sweep_avx512<S: Sweep>(sweep: S) -> S::Found {
-    sweep.run::<<f64 as Scalar>::Avx512>()
-}
-
-/// A pass over blocks, written once for all vectors and laws.
-pub(crate) trait Pass<T: Scalar> {
-    /// Adds what the blocks give, computed in vectors `V`; returns the viscous power (W) if forces are what it adds.
-    fn run<V: Vector<Scalar = T>, L: LaneTangent, const VISCOUS: bool>(&mut self) -> f64;
-}
-
-/// Runs a pass with a law, with or without viscous terms.
-pub(crate) fn run<P: Pass<T>, T: Scalar>(set: Available, (law, with_viscosity): (Law, bool), pass: &mut P) -> f64 {
-    match (law, with_viscosity) {
-        (Law::StVenantKirchhoff, false) => pick::<P, T, StVenantKirchhoff, false>(set, pass),
-        (Law::StVenantKirchhoff, true) => pick::<P, T, StVenantKirchhoff, true>(set, pass),
-        (Law::StableNeoHookean, false) => pick::<P, T, StableNeoHookean, false>(set, pass),
-        (Law::StableNeoHookean, true) => pick::<P, T, StableNeoHookean, true>(set, pass),
-        (Law::FixedCorotated, false) => pick::<P, T, FixedCorotated, false>(set, pass),
-        (Law::FixedCorotated, true) => pick::<P, T, FixedCorotated, true>(set, pass),
-    }
-}
-
-#[cfg(target_arch = "x86_64")]
-fn pick<P: Pass<T>, T: Scalar, L: LaneTangent, const VISCOUS: bool>(set: Available, pass: &mut P) -> f64 {
-    match set.0 {
-        InstructionSet::Baseline => pass.run::<T::Baseline, L, VISCOUS>(),
-        // SAFETY: `Available` holds only what was detected.
-        InstructionSet::Avx2 => unsafe { avx2::<P, T, L, VISCOUS>(pass) },
-        // SAFETY: `Available` holds only what was detected.
-        InstructionSet::Avx512 => unsafe { avx512::<P, T, L, VISCOUS>(pass) },
-    }
-}
-
-#[cfg(not(target_arch = "x86_64"))]
-fn pick<P: Pass<T>, T: Scalar, L: LaneTangent, const VISCOUS: bool>(_: Available, pass: &mut P) -> f64 {
-    pass.run::<T::Baseline, L, VISCOUS>()
-}
-
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx2")]
-fn avx2<P: Pass<T>, T: Scalar, L: LaneTangent, const VISCOUS: bool>(pass: &mut P) -> f64 {
-    pass.run::<T::Avx2, L, VISCOUS>()
-}
-
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx512f,avx512bw,avx512dq,avx512vl")]
-fn avx512<P: Pass<T>, T: Scalar, L: LaneTangent, const VISCOUS: bool>(pass: &mut P) -> f64 {
-    pass.run::<T::Avx512, L, VISCOUS>()
+fn run_avx512<P: Pass>(pass: P) -> P::Found {
+    pass.run::<<P::Scalar as Scalar>::Avx512>()
 }

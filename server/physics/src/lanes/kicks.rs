@@ -1,6 +1,6 @@
 //! Kicks of all nodes: what forces and damping do to velocities, and the power of it.
 use super::{
-    dispatch::{Available, Sweep, sweep},
+    dispatch::{Available, Pass, run},
     real::{Real, Vector},
     vector_operations::{LANES, lanes, lanes_mut, total},
 };
@@ -21,11 +21,12 @@ pub(crate) struct Kick<'a> {
 
 impl Kick<'_> {
     pub(crate) fn give(self) -> f64 {
-        sweep(Available::best(), self)
+        run(Available::best(), self)
     }
 }
 
-impl Sweep for Kick<'_> {
+impl Pass for Kick<'_> {
+    type Scalar = f64;
     type Found = f64;
 
     #[inline(always)]
@@ -86,11 +87,12 @@ pub(crate) struct LumpedKick<'a> {
 
 impl LumpedKick<'_> {
     pub(crate) fn give(self) -> [f64; 3] {
-        sweep(Available::best(), self)
+        run(Available::best(), self)
     }
 }
 
-impl Sweep for LumpedKick<'_> {
+impl Pass for LumpedKick<'_> {
+    type Scalar = f64;
     type Found = [f64; 3];
 
     #[inline(always)]
@@ -137,7 +139,7 @@ fn kicked<T: Real>(v: T, change: T, factor: T) -> [T; 2] {
 mod tests {
     use super::*;
     use crate::lanes::vector_operations::tests::{COUNTS, is_near, vectors};
-    use crate::{bodies::hybrid::testing::Random, lanes::InstructionSet};
+    use crate::{lanes::InstructionSet, testing::Random};
 
     #[test]
     fn kicks_are_those_of_plain_code() {
@@ -157,7 +159,7 @@ mod tests {
                 let run = |set| {
                     let (mut v, free_parts) = (v.clone(), &free_parts[..]);
                     let kick = Kick { v: &mut v, accelerations: &a, external_n: &e, free_parts, factor, h_s: 0.1 };
-                    (sweep(set, kick), v)
+                    (run(set, kick), v)
                 };
                 let (power_w, kicked) = run(Available::best());
                 assert!(is_near(power_w, expected_w), "{power_w} {expected_w}");
@@ -198,7 +200,7 @@ mod tests {
                 let (forces_n, external_n, mass_kg) = (&forces_n[..], &external_n[..], &mass_kg[..]);
                 let inverse_mass_per_kg = &inverse[..];
                 let kick = LumpedKick { v: &mut v, forces_n, external_n, mass_kg, inverse_mass_per_kg, factor, h_s };
-                (sweep(set, kick), v)
+                (run(set, kick), v)
             };
             let (found, kicked) = run(Available::best());
             assert!(found.iter().zip(&sums).all(|(a, b)| is_near(*a, *b)), "{count}: {found:?} {sums:?}");

@@ -1,8 +1,10 @@
-//! Vectors of numbers, the instruction sets that work on them, and operations on whole lists: one of the three places with `unsafe`.
+//! Vectors of numbers, the instruction sets that work on them, and operations on whole lists: one of the three places of
+//! Palpate with `unsafe`.
 //!
 //! All of it gives the same bits on every instruction set.
 // A vector type is only fast where it is inlined into a function compiled for its instruction set.
 #![allow(clippy::inline_always)]
+pub(crate) mod blocks;
 pub(crate) mod dense;
 pub(crate) mod dispatch;
 pub(crate) mod kicks;

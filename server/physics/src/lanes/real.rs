@@ -1,4 +1,4 @@
-//! What the kernel computes with: scalars, and vectors of them.
+//! What passes compute with: scalars, and vectors of them.
 use super::nodes::{Lanes, Node, Quad};
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
@@ -7,8 +7,8 @@ use std::ops::{Add, Div, Mul, Neg, Sub};
 pub(crate) trait Real:
     Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> + Div<Output = Self> + Neg<Output = Self>
 {
-    /// Steps of the iteration of `laws::FixedCorotated` that reach this precision.
-    const ROTATION_STEPS: usize;
+    /// Binary digits of a number: 24 of f32, 53 of f64.
+    const MANTISSA_DIGITS: u32;
     /// Rounded from f64, in every lane.
     fn of(value: f64) -> Self;
     /// `√`, correctly rounded.
@@ -46,9 +46,9 @@ pub(crate) trait Vector: Real {
 }
 
 macro_rules! scalar {
-    ($scalar:ident, $steps:expr) => {
+    ($scalar:ident) => {
         impl Real for $scalar {
-            const ROTATION_STEPS: usize = $steps;
+            const MANTISSA_DIGITS: u32 = $scalar::MANTISSA_DIGITS;
             #[inline(always)]
             fn of(value: f64) -> Self {
                 value as $scalar
@@ -82,8 +82,8 @@ macro_rules! scalar {
         }
     };
 }
-scalar!(f32, 5);
-scalar!(f64, 6);
+scalar!(f32);
+scalar!(f64);
 
 /// [`Vector::edges_to_lanes`] in plain code.
 #[inline(always)]
@@ -128,7 +128,7 @@ mod elsewhere {
                 type Avx512 = Self;
                 #[inline(always)]
                 fn lanes_to_rows<const N: usize>(lanes: &Lanes<Self, N>, first: usize) -> [[Quad<Self>; 3]; 4] {
-                    crate::kernels::lanes_to_rows(lanes, first)
+                    super::lanes_to_rows(lanes, first)
                 }
             }
         };

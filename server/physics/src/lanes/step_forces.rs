@@ -1,6 +1,6 @@
 //! Sums over all nodes that judge a step (`integrate::stability`), in as many lanes on every instruction set: the same bits.
 use super::{
-    dispatch::{Available, Sweep, sweep},
+    dispatch::{Available, Pass, run},
     real::Vector,
     vector_operations::{LANES, lanes, total},
 };
@@ -17,11 +17,12 @@ pub(crate) struct StepForces<'a> {
 impl StepForces<'_> {
     /// `‖Δ²(f − e)‖²`, and `‖f‖²` at the two older instants, with `‖a‖² = aᵀ M⁻¹ a` (N²/kg).
     pub(crate) fn sums(self) -> [f64; 3] {
-        sweep(Available::best(), self)
+        run(Available::best(), self)
     }
 }
 
-impl Sweep for StepForces<'_> {
+impl Pass for StepForces<'_> {
+    type Scalar = f64;
     type Found = [f64; 3];
 
     #[inline(always)]
@@ -99,7 +100,7 @@ mod tests {
             assert!((sum - by_node).abs() < 1e-13 * by_node, "{sum} {by_node}");
         }
         for set in InstructionSet::available() {
-            assert_eq!(sweep(Available::at_most(set), forces), sums, "{set:?}");
+            assert_eq!(run(Available::at_most(set), forces), sums, "{set:?}");
         }
     }
 }

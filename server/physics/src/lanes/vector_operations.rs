@@ -1,6 +1,6 @@
 //! Passes over all nodes: what a substep does to every position, velocity and force. Sums are taken in as many lanes on every instruction set: the same bits.
 use super::{
-    dispatch::{Available, Sweep, sweep},
+    dispatch::{Available, Pass, run},
     real::{Real, Vector},
 };
 use bytemuck::{cast_slice, cast_slice_mut};
@@ -38,7 +38,7 @@ fn stored<V: Vector<Scalar = f64>>(vectors: [V; LANES]) -> Lanes {
 
 /// `x ← x + h v`; returns a bound (m/s) of the largest speed: the length of `(max |v_x|, max |v_y|, max |v_z|)`.
 pub(crate) fn drift(x: &mut [DVec3], v: &[DVec3], h_s: f64) -> f64 {
-    sweep(Available::best(), Drift { x, v, h_s })
+    run(Available::best(), Drift { x, v, h_s })
 }
 
 struct Drift<'a> {
@@ -47,7 +47,8 @@ struct Drift<'a> {
     h_s: f64,
 }
 
-impl Sweep for Drift<'_> {
+impl Pass for Drift<'_> {
+    type Scalar = f64;
     type Found = f64;
 
     #[inline(always)]
@@ -80,7 +81,7 @@ impl Sweep for Drift<'_> {
 
 /// `f ← M⁻¹ f`, node by node; returns `f·M⁻¹ f` (N²/kg).
 pub(crate) fn divide_by_masses(forces_n: &mut [DVec3], inverse_mass_per_kg: &[DVec3]) -> f64 {
-    sweep(Available::best(), Divide { forces_n, inverse_mass_per_kg })
+    run(Available::best(), Divide { forces_n, inverse_mass_per_kg })
 }
 
 struct Divide<'a> {
@@ -88,7 +89,8 @@ struct Divide<'a> {
     inverse_mass_per_kg: &'a [DVec3],
 }
 
-impl Sweep for Divide<'_> {
+impl Pass for Divide<'_> {
+    type Scalar = f64;
     type Found = f64;
 
     #[inline(always)]
@@ -115,7 +117,7 @@ impl Sweep for Divide<'_> {
 
 /// `a += b`.
 pub(crate) fn add(a: &mut [DVec3], b: &[DVec3]) {
-    sweep(Available::best(), Add { a, b });
+    run(Available::best(), Add { a, b });
 }
 
 struct Add<'a> {
@@ -123,7 +125,8 @@ struct Add<'a> {
     b: &'a [DVec3],
 }
 
-impl Sweep for Add<'_> {
+impl Pass for Add<'_> {
+    type Scalar = f64;
     type Found = ();
 
     #[inline(always)]
@@ -142,7 +145,7 @@ impl Sweep for Add<'_> {
 
 /// `Σ a·b`.
 pub(crate) fn dot(a: &[DVec3], b: &[DVec3]) -> f64 {
-    sweep(Available::best(), Dot { a, b })
+    run(Available::best(), Dot { a, b })
 }
 
 struct Dot<'a> {
@@ -150,7 +153,8 @@ struct Dot<'a> {
     b: &'a [DVec3],
 }
 
-impl Sweep for Dot<'_> {
+impl Pass for Dot<'_> {
+    type Scalar = f64;
     type Found = f64;
 
     #[inline(always)]
@@ -189,11 +193,12 @@ pub(crate) struct AnswerSums {
 
 impl Answer<'_> {
     pub(crate) fn sums(self) -> AnswerSums {
-        sweep(Available::best(), self)
+        run(Available::best(), self)
     }
 }
 
-impl Sweep for Answer<'_> {
+impl Pass for Answer<'_> {
+    type Scalar = f64;
     type Found = AnswerSums;
 
     #[inline(always)]
@@ -236,7 +241,7 @@ fn second_difference<T: Real>(a0: T, a1: T, a2: T) -> T {
 #[cfg(test)]
 pub(crate) mod tests {
     use super::*;
-    use crate::{bodies::hybrid::testing::Random, lanes::InstructionSet};
+    use crate::{lanes::InstructionSet, testing::Random};
 
     /// Numbers of nodes that fill blocks and that do not.
     pub(crate) const COUNTS: [usize; 6] = [0, 1, 7, 8, 29, 64];
@@ -261,7 +266,7 @@ pub(crate) mod tests {
             assert!(is_near(bound, largest.length()) && v.iter().all(|v| v.length() <= bound), "{count}: {bound}");
             for set in InstructionSet::available() {
                 let mut found = x.clone();
-                let again = sweep(Available::at_most(set), Drift { x: &mut found, v: &v, h_s: 0.3 });
+                let again = run(Available::at_most(set), Drift { x: &mut found, v: &v, h_s: 0.3 });
                 assert!(again.to_bits() == bound.to_bits() && found == of_best, "{count} {set:?}");
             }
         }
@@ -291,13 +296,13 @@ pub(crate) mod tests {
             assert!(is_near(sums.force_sq, dots(&added, &added)) && is_near(sums.moved_sq, dots(&moved, &moved)));
             for set in InstructionSet::available() {
                 let set = Available::at_most(set);
-                assert_eq!(sweep(set, answer()), sums);
-                assert_eq!(sweep(set, Dot { a: &a, b: &b }), dot(&a, &b));
+                assert_eq!(run(set, answer()), sums);
+                assert_eq!(run(set, Dot { a: &a, b: &b }), dot(&a, &b));
                 let mut in_place = a.clone();
-                let found = sweep(set, Divide { forces_n: &mut in_place, inverse_mass_per_kg: &b });
+                let found = run(set, Divide { forces_n: &mut in_place, inverse_mass_per_kg: &b });
                 assert!(found == divide_by_masses(&mut a.clone(), &b) && in_place == divided);
                 let mut in_place = a.clone();
-                sweep(set, Add { a: &mut in_place, b: &b });
+                run(set, Add { a: &mut in_place, b: &b });
                 assert!(in_place == added);
             }
         }

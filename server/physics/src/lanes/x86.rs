@@ -30,7 +30,7 @@ macro_rules! vector {
         }
 
         impl Real for $name {
-            const ROTATION_STEPS: usize = $scalar::ROTATION_STEPS;
+            const MANTISSA_DIGITS: u32 = $scalar::MANTISSA_DIGITS;
             #[inline(always)]
             fn of(value: f64) -> Self {
                 // SAFETY: see the module: the machine has the instruction.

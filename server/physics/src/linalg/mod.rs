@@ -2,6 +2,7 @@
 pub(crate) mod cholesky;
 pub(crate) mod eigen;
 pub(crate) mod lanczos;
+pub(crate) mod nearest_rotation;
 pub mod pcg;
 pub mod tensor;
 

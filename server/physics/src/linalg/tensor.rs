@@ -28,3 +28,17 @@ pub fn largest_eigenvalue(a: &DMat3) -> f64 {
     let half_det = (deviator * (1.0 / p)).determinant() * 0.5;
     q + 2.0 * p * (half_det.clamp(-1.0, 1.0).acos() / 3.0).cos()
 }
+
+/// `cof F = ∂J/∂F = [f₁×f₂, f₂×f₀, f₀×f₁]`, with the columns `f_i` of `F`; it is defined for singular `F` too.
+pub fn cofactor(f: &DMat3) -> DMat3 {
+    DMat3::from_cols(f.y_axis.cross(f.z_axis), f.z_axis.cross(f.x_axis), f.x_axis.cross(f.y_axis))
+}
+
+/// `δ(cof F)` for a change `δF`.
+pub fn cofactor_differential(f: &DMat3, df: &DMat3) -> DMat3 {
+    DMat3::from_cols(
+        df.y_axis.cross(f.z_axis) + f.y_axis.cross(df.z_axis),
+        df.z_axis.cross(f.x_axis) + f.z_axis.cross(df.x_axis),
+        df.x_axis.cross(f.y_axis) + f.x_axis.cross(df.y_axis),
+    )
+}

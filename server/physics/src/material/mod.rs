@@ -1,24 +1,45 @@
 //! Constitutive laws: energy density `Ψ(F)` (Pa), first Piola-Kirchhoff stress `P = ∂Ψ/∂F` (Pa), and its differential
-//! `δP = ∂P/∂F : δF`. One file per law; one harness (`tests/derivatives.rs`) checks energy → stress → stiffness of them all.
+//! `δP = ∂P/∂F : δF`.
+//!
+//! A law is one file and one line of the registry below (docs/how-to/add-a-law.md). One harness (`tests/derivatives.rs`)
+//! checks energy → stress → stiffness of all of them, another (`tests/kernel.rs`) their lanes against f64.
+// A vector type is only fast where it is inlined into a function compiled for its instruction set.
+#![allow(clippy::inline_always)]
+pub(crate) mod constants;
 pub mod fixed_corotated;
-pub mod neo_hookean;
+pub(crate) mod lane_matrix;
+pub(crate) mod lane_strain;
+pub(crate) mod law;
 pub mod parameters;
+pub(crate) mod passes;
+mod registry;
+pub mod stable_neo_hookean;
 pub mod stvk;
 pub mod viscous;
 
+use crate::lanes::Available;
 use glam::DMat3;
+pub(crate) use law::ConstitutiveLaw;
 pub use parameters::{Lame, ParameterError, Viscosity};
+pub(crate) use passes::LawPass;
 
-/// Which law a material obeys.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum Law {
-    /// St. Venant-Kirchhoff: the papers' law; softens in compression and does not resist inversion.
-    StVenantKirchhoff,
-    /// Stable neo-Hookean (Smith, de Goes & Kim 2018): resists and recovers from inversion. The default.
+registry::laws! {
+    stvk::StVenantKirchhoff,
     #[default]
-    StableNeoHookean,
-    /// Fixed corotated (Stomakhin et al. 2012): linear about the rotated rest state.
-    FixedCorotated,
+    stable_neo_hookean::StableNeoHookean,
+    fixed_corotated::FixedCorotated,
+}
+
+impl Law {
+    /// The name that a scene file gives the law.
+    pub fn name(self) -> &'static str {
+        Self::NAMES[self as usize]
+    }
+
+    /// The law of a name.
+    pub fn by_name(name: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|law| law.name() == name)
+    }
 }
 
 /// The papers' factors on elastic and viscous stress (MODEL §1.1): a seed convention halves or keeps what the formulas print.
@@ -72,46 +93,30 @@ impl Material {
 
     /// Energy density `Ψ(F)` (J/m³), zero at `F = I`.
     pub fn energy_density(&self, f: &DMat3) -> f64 {
-        match self.law {
-            Law::StVenantKirchhoff => stvk::energy_density(self.lame, f),
-            Law::StableNeoHookean => neo_hookean::energy_density(self.lame, f),
-            Law::FixedCorotated => fixed_corotated::energy_density(self.lame, f),
-        }
+        self.law.energy_density(self.lame, f)
     }
 
     /// First Piola-Kirchhoff stress `P = ∂Ψ/∂F` (Pa).
     pub fn piola(&self, f: &DMat3) -> DMat3 {
-        match self.law {
-            Law::StVenantKirchhoff => stvk::piola(self.lame, f),
-            Law::StableNeoHookean => neo_hookean::piola(self.lame, f),
-            Law::FixedCorotated => fixed_corotated::piola(self.lame, f),
-        }
-    }
-
-    /// How much the P-wave modulus grows when no principal stretch exceeds `s ≥ 1`: the largest `n·(δP N)` for
-    /// `δF = n Nᵀ`, unit `n` and `N`, over its rest value `λ + 2µ`.
-    /// ```text
-    /// St. Venant-Kirchhoff:  N·S N + (λ + 2µ) s²,  N·S N ≤ (3λ + 2µ)(s² − 1)/2     (equal stretch)
-    /// stable neo-Hookean:    µ + (λ + µ)|cof F N|²,  |cof F N| ≤ s²                (J is linear along n Nᵀ)
-    /// fixed corotated:       2µ + λ |cof F N|² at most
-    /// ```
-    /// The square of the largest natural frequency grows by about as much.
-    pub fn stiffening(&self, stretch: f64) -> f64 {
-        let (lambda, mu, s2) = (self.lame.lambda_pa.max(0.0), self.lame.mu_pa, stretch * stretch);
-        let modulus = match self.law {
-            Law::StVenantKirchhoff => (1.5 * lambda + mu) * (s2 - 1.0) + (lambda + 2.0 * mu) * s2,
-            Law::StableNeoHookean => mu + (lambda + mu) * s2 * s2,
-            Law::FixedCorotated => 2.0 * mu + lambda * s2 * s2,
-        };
-        modulus / (lambda + 2.0 * mu)
+        self.law.piola(self.lame, f)
     }
 
     /// Differential `δP = ∂P/∂F : δF` (Pa).
     pub fn piola_differential(&self, f: &DMat3, df: &DMat3) -> DMat3 {
-        match self.law {
-            Law::StVenantKirchhoff => stvk::piola_differential(self.lame, f, df),
-            Law::StableNeoHookean => neo_hookean::piola_differential(self.lame, f, df),
-            Law::FixedCorotated => fixed_corotated::piola_differential(self.lame, f, df),
-        }
+        self.law.piola_differential(self.lame, f, df)
+    }
+
+    /// How much the P-wave modulus grows when no principal stretch exceeds `s ≥ 1`: the largest `n·(δP N)` for
+    /// `δF = n Nᵀ`, unit `n` and `N`, over its rest value `λ + 2µ`. The square of the largest natural frequency grows by
+    /// about as much.
+    pub fn stiffening(&self, stretch: f64) -> f64 {
+        let lame = Lame { lambda_pa: self.lame.lambda_pa.max(0.0), ..self.lame };
+        self.law.stretched_modulus_pa(lame, stretch * stretch) / lame.p_wave_modulus_pa()
+    }
+
+    /// Runs a pass that was compiled for this material's law and the instruction set; viscous terms are computed if the
+    /// material has any, or if `every_viscosity` asks for them.
+    pub(crate) fn run<P: LawPass>(&self, set: Available, every_viscosity: bool, pass: &mut P) -> f64 {
+        self.law.run(set, every_viscosity || !self.viscosity.is_zero(), pass)
     }
 }

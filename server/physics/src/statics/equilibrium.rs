@@ -47,7 +47,8 @@ impl Stage {
             let follows = matches!(load, LoadSpec::Pressure { follower: true, .. });
             if factor != 0.0 && !follows {
                 let rest = model.body.rest_positions_m();
-                loads::add_load_n(load, factor, &model.environment.surface, (rest, rest), &mut dead_n);
+                let at = loads::LoadPositions { rest_m: rest, deformed_m: rest };
+                loads::add_load_n(load, factor, &model.environment.surface, at, &mut dead_n);
             }
         }
         let start = model.environment.tools.iter().map(|tool| tool.start_position_m);

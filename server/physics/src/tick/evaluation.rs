@@ -2,7 +2,7 @@
 use super::{Environment, MechanicalState, PointForce, TickInput};
 use crate::{
     contact::{Body, ContactScratch, ContactState, SubstepTime},
-    elements::loads::add_load_n,
+    elements::loads::{LoadPositions, add_load_n},
     settings::LoadSpec,
 };
 use glam::DVec3;
@@ -89,7 +89,7 @@ impl Tick<'_> {
         for (index, load) in self.environment.loads.iter().enumerate() {
             let factor = self.loads.factor(load_factors[index], self.input, index, now.load_fraction);
             if factor != 0.0 {
-                add_load_n(load, factor, &self.environment.surface, (rest_m, x), forces_n);
+                add_load_n(load, factor, &self.environment.surface, LoadPositions { rest_m, deformed_m: x }, forces_n);
             }
         }
         for point in self.usable_points() {

@@ -9,13 +9,6 @@ use palpate_physics::{
 };
 use std::{collections::BTreeMap, ops::ControlFlow};
 
-/// Every law, by name.
-pub(crate) const LAWS: [(&str, Law); 3] = [
-    ("StVK", Law::StVenantKirchhoff),
-    ("stable neo-Hookean", Law::StableNeoHookean),
-    ("fixed corotated", Law::FixedCorotated),
-];
-
 /// A pseudo-random sequence in (−1, 1), the same every time (splitmix64).
 pub(crate) struct Random(pub(crate) u64);
 

@@ -1,12 +1,12 @@
 //! `[[material]]`: laws and constants, and which tets have them.
 use super::{body::Body, regions::Regions};
 use crate::document::{
-    ConventionName, LawName, MaterialTable,
+    ConventionName, MaterialTable,
     source::{Fault, Where},
 };
 use palpate_physics::{
     Region,
-    material::{Convention, Lame, Law, Material, ParameterError, Viscosity, parameters},
+    material::{Convention, Lame, Material, ParameterError, Viscosity, parameters},
 };
 
 pub(crate) struct Materials {
@@ -70,12 +70,7 @@ pub(super) fn constants(table: &MaterialTable, at: &Where) -> Result<Constants, 
 
 fn material(table: &MaterialTable, region: &str, at: &Where) -> Result<Region, Fault> {
     let Constants { lame, viscosity, convention, density_kg_per_m3 } = constants(table, at)?;
-    let law = match table.law {
-        LawName::Stvk => Law::StVenantKirchhoff,
-        LawName::StableNeoHookean => Law::StableNeoHookean,
-        LawName::FixedCorotated => Law::FixedCorotated,
-    };
-    let material = Material::new(law, lame, viscosity, convention);
+    let material = Material::new(table.law.0, lame, viscosity, convention);
     Ok(Region { name: table.name.clone().unwrap_or_else(|| region.to_owned()), material, density_kg_per_m3 })
 }
 

@@ -2,7 +2,7 @@
 use super::{body::Body, check, material};
 use crate::{
     document::{
-        Document, LawName, NumericsTable,
+        Document, NumericsTable,
         seed::{SeedLayerTable, SeedTable},
         source::{Fault, Where},
     },
@@ -11,8 +11,11 @@ use crate::{
     skin::FineSurface,
 };
 use glam::DVec3;
-use palpate_physics::Solid;
-use palpate_physics::bodies::seed::{LayerSpec, PaperModel, SeedBodySpec, SeedParameters};
+use palpate_physics::{
+    Solid,
+    bodies::seed::{LayerSpec, PaperModel, SeedBodySpec, SeedParameters},
+    material::Law,
+};
 
 const FEWEST_TRIANGLES: u32 = 20;
 
@@ -80,7 +83,7 @@ fn demand(document: &Document) -> Result<(), Fault> {
     }
     let materials = Where::root("material");
     match document.material.as_slice() {
-        [one] if one.law != LawName::Stvk => {
+        [one] if one.law.0 != Law::StVenantKirchhoff => {
             return refuse(
                 materials.index(0).key("law"),
                 "a seed body is of St. Venant-Kirchhoff material",

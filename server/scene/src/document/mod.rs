@@ -1,6 +1,7 @@
 //! The scene document as it is written: one struct per table, every key with its unit. What the keys may hold together
 //! is checked when they are compiled (`crate::compile`).
 pub(crate) mod body;
+pub(crate) mod law;
 pub(crate) mod motion;
 pub(crate) mod region;
 pub(crate) mod schema;
@@ -74,18 +75,6 @@ fn default_tick_period_s() -> f64 {
     1e-3
 }
 
-/// A constitutive law.
-#[derive(Debug, Clone, Copy, PartialEq, Deserialize, JsonSchema)]
-#[serde(rename_all = "kebab-case")]
-pub(crate) enum LawName {
-    /// St. Venant-Kirchhoff, the papers' law: softens in compression and does not resist inversion.
-    Stvk,
-    /// Stable neo-Hookean: resists and recovers from inversion.
-    StableNeoHookean,
-    /// Fixed corotated: linear about the rotated rest state.
-    FixedCorotated,
-}
-
 /// The papers' factors on elastic stress.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Deserialize, JsonSchema)]
 pub(crate) enum ConventionName {
@@ -110,7 +99,7 @@ pub(crate) struct MaterialTable {
     /// Region whose tets have it (centroid inside); the whole body by default.
     pub(crate) region: Option<String>,
     /// Constitutive law.
-    pub(crate) law: LawName,
+    pub(crate) law: law::LawName,
     /// Young's modulus E (Pa), larger than 0.
     pub(crate) young_modulus_pa: Option<f64>,
     /// Poisson's ratio ν, in (-1, 0.5).

@@ -298,7 +298,7 @@ fn in_words(message: &str) -> String {
         other => other,
     };
     // An enumeration's word was wanted, and what is there is none.
-    if found == "invalid type: unit variant" {
+    if found == "invalid type: unit variant" || wanted == "a word" {
         return "must be a text in quotes".to_owned();
     }
     format!("{found}, expected {wanted}").replace("invalid type: map", "invalid type: table")

@@ -123,11 +123,12 @@ fn in_time(name: &str, motion: Motion) -> Problem {
     }
 }
 
-fn suffix(law: Law) -> &'static str {
+/// What names the law of a problem.
+fn suffix(law: Law) -> String {
     match law {
-        Law::StableNeoHookean => "",
-        Law::StVenantKirchhoff => "-stvk",
-        Law::FixedCorotated => "-corotated",
+        Law::StableNeoHookean => String::new(),
+        Law::FixedCorotated => "-corotated".to_owned(),
+        other => format!("-{}", other.name()),
     }
 }
 

@@ -13,11 +13,8 @@ use super::{
 use glam::{DMat3, DVec3};
 use miette::{Result, ensure};
 use palpate_physics::{
-    linalg::tensor::outer,
-    material::{
-        Material,
-        neo_hookean::{cofactor, cofactor_differential},
-    },
+    linalg::tensor::{cofactor, cofactor_differential, outer},
+    material::Material,
 };
 
 /// What the rest state fixes at one quadrature point.

@@ -18,7 +18,7 @@ pub(super) const MODES: usize = 4;
 pub(super) fn modulus_pa(material: &Material) -> f64 {
     match material.law {
         Law::StVenantKirchhoff => 0.0,
-        Law::StableNeoHookean | Law::FixedCorotated => material.lame.lambda_pa,
+        _ => material.lame.lambda_pa,
     }
 }
 

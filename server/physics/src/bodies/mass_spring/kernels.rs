@@ -6,7 +6,7 @@
 // A vector type is only fast where it is inlined into a function compiled for its instruction set.
 #![allow(clippy::inline_always)]
 use crate::lanes::{
-    dispatch::{Available, InstructionSet, Sweep, sweep},
+    dispatch::{Available, InstructionSet, Pass, run},
     real::Vector,
 };
 use glam::DVec3;
@@ -108,7 +108,7 @@ impl SpringRows {
     /// Adds the springs' forces (N) on the nodes, at positions `x_m` (m) of these and then of what else springs go to. The last block's lanes without a node must be in `x_m`, or
     /// there are none: positions are taken of the last entry then.
     pub fn add_forces_n(&self, x_m: &[DVec3], forces_n: &mut [DVec3]) {
-        sweep(self.instruction_set, Pull { rows: self, x_m, forces_n });
+        run(self.instruction_set, Pull { rows: self, x_m, forces_n });
     }
 }
 
@@ -118,7 +118,8 @@ struct Pull<'a> {
     forces_n: &'a mut [DVec3],
 }
 
-impl Sweep for Pull<'_> {
+impl Pass for Pull<'_> {
+    type Scalar = f64;
     type Found = ();
 
     #[inline(always)]

@@ -59,7 +59,8 @@ impl Stage {
         for (load, &factor) in environment.loads.iter().zip(&load_factors) {
             let follows = matches!(load, LoadSpec::Pressure { follower: true, .. });
             if factor != 0.0 && !follows {
-                loads::add_load_n(load, factor, &environment.surface, (skin_m, skin_m), &mut on_skin_n);
+                let at = loads::LoadPositions { rest_m: skin_m, deformed_m: skin_m };
+                loads::add_load_n(load, factor, &environment.surface, at, &mut on_skin_n);
             }
         }
         let mut dead_n: Vec<DVec3> = awakened.weight_n.iter().map(|weight| *weight * fraction).collect();

@@ -18,8 +18,9 @@ use glam::{DMat3, DVec3};
 use palpate_physics::{
     Model,
     elements::linear_tet::RestTet,
+    linalg::tensor::cofactor,
     linalg::tensor::outer,
-    material::{Law, Material, neo_hookean::cofactor},
+    material::{Law, Material},
 };
 
 /// A node: position (m) and inverse mass (1/kg), zero on held axes.

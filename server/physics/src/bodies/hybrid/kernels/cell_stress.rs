@@ -1,10 +1,13 @@
 //! What full and cut cells of a hybrid body's patch share: sums and differences of eight, and the stress of a vector of cells.
 use crate::{
-    kernels::{
-        block::any_outside,
-        laws::{Constants, LaneLaw, M3, columns, plus, rows, viscous},
-    },
     lanes::real::{Real, Scalar, Vector},
+    material::{
+        ConstitutiveLaw,
+        constants::Constants,
+        lane_matrix::{M3, columns, plus, rows},
+        law::{LaneStress, any_outside},
+        viscous::{LaneViscous, lane_viscous},
+    },
 };
 use glam::DMat3;
 
@@ -46,25 +49,25 @@ pub(crate) fn particles<V: Vector>(c: &[V; 7]) -> [V; 7] {
 
 /// Elastic and viscous stress (Pa), and the power density (W/m³) of the latter.
 #[inline(always)]
-pub(crate) fn stress<V: Vector<Scalar = T>, T: Scalar, L: LaneLaw, const VISCOUS: bool>(
+pub(crate) fn stress<V: Vector<Scalar = T>, T: Scalar, L: ConstitutiveLaw, const VISCOUS: bool>(
     constants: &Constants<T>,
     h: &M3<V>,
     h_dot: &M3<V>,
 ) -> (M3<V>, V) {
     let c: Constants<V> = constants.converted();
-    let (mut p, domain) = L::piola(&c, h);
+    let LaneStress { mut p, domain } = L::lane_piola(&c, h);
     if let Some(limit) = L::DOMAIN {
         let mut inside = [T::of(limit); LANES];
         domain.store(&mut inside);
-        if any_outside(&inside, L::DOMAIN) {
+        if any_outside::<L, T, LANES>(&inside) {
             let (strains, mut stresses) = (stored(h), stored(&p));
             redo_outside::<T, L>(constants, &strains, &inside, &mut stresses);
             p = stresses.map(|row| row.map(|entry| V::load(&entry)));
         }
     }
     if VISCOUS {
-        let (viscous_p, density) = viscous(&c, h, h_dot);
-        return (plus(&p, &viscous_p), density);
+        let LaneViscous { p: viscous_p, power_density } = lane_viscous(&c, h, h_dot);
+        return (plus(&p, &viscous_p), power_density);
     }
     (p, V::of(0.0))
 }
@@ -72,8 +75,9 @@ pub(crate) fn stress<V: Vector<Scalar = T>, T: Scalar, L: LaneLaw, const VISCOUS
 /// The same of a rest state changed by `A` (`hybrid::fade`): `P̃(F (I + A)) (I + A)ᵀ`, with `F (I + A) − I = H + A + H A`; viscous stress is that of `F`. And
 /// `P̃ : F A` (J/m³).
 #[inline(always)]
-pub(crate) fn faded_stress<V: Vector<Scalar = T>, T: Scalar, L: LaneLaw, const VISCOUS: bool>(
-    (constants, a): (&Constants<T>, &M3<V>),
+pub(crate) fn faded_stress<V: Vector<Scalar = T>, T: Scalar, L: ConstitutiveLaw, const VISCOUS: bool>(
+    constants: &Constants<T>,
+    a: &M3<V>,
     h: &M3<V>,
     h_dot: &M3<V>,
 ) -> (M3<V>, V, V) {
@@ -95,8 +99,8 @@ pub(crate) fn faded_stress<V: Vector<Scalar = T>, T: Scalar, L: LaneLaw, const V
         }
     }
     if VISCOUS {
-        let (viscous_p, density) = viscous(&constants.converted(), h, h_dot);
-        return (plus(&back, &viscous_p), density, along);
+        let LaneViscous { p: viscous_p, power_density } = lane_viscous(&constants.converted(), h, h_dot);
+        return (plus(&back, &viscous_p), power_density, along);
     }
     (back, V::of(0.0), along)
 }
@@ -130,7 +134,7 @@ fn stored<V: Vector>(m: &M3<V>) -> Stored<V::Scalar> {
 /// Lanes outside the law's domain, once more, in f64. On stored lanes: a function that is not inlined has no vectors of its caller's set.
 #[cold]
 #[inline(never)]
-fn redo_outside<T: Scalar, L: LaneLaw>(
+fn redo_outside<T: Scalar, L: ConstitutiveLaw>(
     constants: &Constants<T>,
     h: &Stored<T>,
     inside: &[T; LANES],
@@ -143,7 +147,7 @@ fn redo_outside<T: Scalar, L: LaneLaw>(
         }
         let of_lane: M3<f64> = h.map(|row| row.map(|entry| entry[lane].into()));
         let f = columns(&of_lane) + DMat3::IDENTITY;
-        let redone = rows(&L::piola_outside(&constants.converted(), &f));
+        let redone = rows(&L::piola(constants.lame(), &f));
         for row in 0..3 {
             for column in 0..3 {
                 p[row][column][lane] = T::of(redone[row][column]);

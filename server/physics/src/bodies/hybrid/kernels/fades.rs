@@ -2,11 +2,12 @@
 use super::cell_stress::faded_stress;
 use crate::{
     bodies::hybrid::{fade::CellFade, share},
-    material::Material,
-};
-use crate::{
-    kernels::laws::{Constants, LaneLaw, M3, plus},
     lanes::real::{Real, Scalar, Vector},
+    material::{
+        ConstitutiveLaw, Material,
+        constants::Constants,
+        lane_matrix::{M3, plus},
+    },
 };
 
 /// Numbers of a cell: `A` of its shape and `A` of its volume, row by row, and `a`.
@@ -62,14 +63,14 @@ impl std::ops::AddAssign for Found {
 
 /// Elastic and viscous stress (Pa) where shape and volume fade by `a`, the power density (W/m³) of the latter, and `s ∂Ψ/∂s` (J/m³).
 #[inline(always)]
-pub(crate) fn fading_stress<V: Vector<Scalar = T>, T: Scalar, L: LaneLaw, const VISCOUS: bool>(
+pub(crate) fn fading_stress<V: Vector<Scalar = T>, T: Scalar, L: ConstitutiveLaw, const VISCOUS: bool>(
     split: &Split<T>,
     a: &[M3<V>; 2],
     h: &M3<V>,
     h_dot: &M3<V>,
 ) -> (M3<V>, V, V) {
-    let (shape, density, of_shape) = faded_stress::<V, T, L, VISCOUS>((&split.shape, &a[0]), h, h_dot);
-    let (volume, _, of_volume) = faded_stress::<V, T, L, false>((&split.volume, &a[1]), h, h);
+    let (shape, density, of_shape) = faded_stress::<V, T, L, VISCOUS>(&split.shape, &a[0], h, h_dot);
+    let (volume, _, of_volume) = faded_stress::<V, T, L, false>(&split.volume, &a[1], h, h);
     (plus(&shape, &volume), density, of_shape + of_volume)
 }
 

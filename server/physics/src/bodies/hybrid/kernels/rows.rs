@@ -13,15 +13,12 @@ use crate::{
         cell::{HOURGLASS, MODE_WEIGHTS},
         fade::CellFade,
     },
-    material::Material,
-    settings::Precision,
-};
-use crate::{
-    kernels::{laws::M3, tangents::LaneTangent},
     lanes::{
-        dispatch::{self, Available, InstructionSet, Pass},
+        Available, InstructionSet,
         real::{Real, Scalar, Vector},
     },
+    material::{ConstitutiveLaw, LawPass, Material, lane_matrix::M3},
+    settings::Precision,
 };
 use glam::DVec3;
 
@@ -150,10 +147,8 @@ impl RowKernel {
         let mut found = Found::default();
         for same in rows.chunk_by(|a, b| a.material == b.material) {
             let material = &materials[same[0].material as usize];
-            let Material { law, viscosity, .. } = &material.split.material;
-            let law = (*law, !viscosity.is_zero());
             let mut pass = RowForces { material, rows: same, arrays, left, fading_j: 0.0 };
-            let viscous_w = dispatch::run(self.instruction_set, law, &mut pass);
+            let viscous_w = material.split.material.run(self.instruction_set, false, &mut pass);
             found += Found { viscous_w, fading_j: pass.fading_j };
         }
         found
@@ -235,9 +230,11 @@ struct RowForces<'a, T> {
     fading_j: f64,
 }
 
-impl<T: Scalar> Pass<T> for RowForces<'_, T> {
+impl<T: Scalar> LawPass for RowForces<'_, T> {
+    type Scalar = T;
+
     #[inline(always)]
-    fn run<V: Vector<Scalar = T>, L: LaneTangent, const VISCOUS: bool>(&mut self) -> f64 {
+    fn run<V: Vector<Scalar = T>, L: ConstitutiveLaw, const VISCOUS: bool>(&mut self) -> f64 {
         let mut power_w = 0.0;
         for row in self.rows {
             let mut first = 0;
@@ -261,7 +258,7 @@ impl<T: Scalar> Pass<T> for RowForces<'_, T> {
 impl<T: Scalar> RowForces<'_, T> {
     /// Cells whose points 0, 2, 4, 6 are at `at` and what follows; there are `cells` of them, or more than lanes. What fades of them, if any, starts at `fades`.
     #[inline(always)]
-    fn lanes<V: Vector<Scalar = T>, L: LaneTangent, const VISCOUS: bool>(
+    fn lanes<V: Vector<Scalar = T>, L: ConstitutiveLaw, const VISCOUS: bool>(
         &mut self,
         at: [usize; 4],
         cells: usize,

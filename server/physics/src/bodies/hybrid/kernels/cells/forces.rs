@@ -8,12 +8,11 @@ use crate::{
             fades::{Split, add_lanes, fading_stress, scaled},
         },
     },
-    kernels::{laws::LaneLaw, tangents::LaneTangent},
     lanes::{
-        dispatch::Pass,
         nodes::{Lanes, Node, Sum},
         real::{Scalar, Vector},
     },
+    material::{ConstitutiveLaw, LawPass},
 };
 
 /// Blocks that are gathered, computed and scattered together: a wide load waits for the narrow stores it overlaps.
@@ -45,9 +44,11 @@ pub(super) struct CutForces<'a, T, const N: usize> {
     pub(super) fading_j: f64,
 }
 
-impl<T: Scalar, const N: usize> Pass<T> for CutForces<'_, T, N> {
+impl<T: Scalar, const N: usize> LawPass for CutForces<'_, T, N> {
+    type Scalar = T;
+
     #[inline(always)]
-    fn run<V: Vector<Scalar = T>, L: LaneTangent, const VISCOUS: bool>(&mut self) -> f64 {
+    fn run<V: Vector<Scalar = T>, L: ConstitutiveLaw, const VISCOUS: bool>(&mut self) -> f64 {
         let mut edges: [Corners<T, N>; BATCH] = [[[[T::of(0.0); N]; 9]; 3]; BATCH];
         let mut rates = edges;
         let mut forces = edges;
@@ -110,7 +111,7 @@ fn gradient<V: Vector, const N: usize>(
 }
 
 #[inline(always)]
-fn cut<V: Vector<Scalar = T>, T: Scalar, L: LaneLaw, const VISCOUS: bool, const N: usize>(
+fn cut<V: Vector<Scalar = T>, T: Scalar, L: ConstitutiveLaw, const VISCOUS: bool, const N: usize>(
     split: &Split<T>,
     (block, mut fading): (&CutBlock<T, N>, Option<FadingBlock<'_, T, N>>),
     [edges, rates]: [&Corners<T, N>; 2],

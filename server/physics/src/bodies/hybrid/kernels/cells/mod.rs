@@ -7,22 +7,19 @@ mod forces;
 pub(crate) mod testing;
 
 use super::fades::{ENTRIES, Found, Split, entries};
-use crate::lanes::{
-    dispatch::{self, Available, InstructionSet},
-    nodes::{Node, Sum, node},
-    real::Scalar,
-};
 use crate::{
     bodies::hybrid::{cell::RestCell, fade::CellFade},
+    lanes::{
+        Available, InstructionSet, LANES_F32, LANES_F64,
+        nodes::{Node, Sum, node},
+        real::Scalar,
+    },
     material::Material,
     settings::Precision,
 };
 use forces::CutForces;
 use glam::DVec3;
 use std::ops::Range;
-
-const LANES_F32: usize = 16;
-const LANES_F64: usize = 8;
 
 /// Consecutive cells are spread over the lanes of this many blocks: sums of one point would wait for each other in the scatter.
 const BLOCKS_PER_WINDOW: usize = 16;
@@ -261,7 +258,7 @@ impl<T: Scalar, const N: usize> Tables<T, N> {
             let blocks = &self.blocks[run.blocks.clone()];
             let fades = &self.fades[run.blocks.clone()];
             let mut pass = CutForces { split, blocks, fades, left, displacements, velocities, sums, fading_j: 0.0 };
-            let viscous_w = dispatch::run(set, (split.material.law, !split.material.viscosity.is_zero()), &mut pass);
+            let viscous_w = split.material.run(set, false, &mut pass);
             found += Found { viscous_w, fading_j: pass.fading_j };
         }
         found

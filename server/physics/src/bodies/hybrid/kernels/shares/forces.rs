@@ -8,14 +8,13 @@ use crate::{
             fades::{add_lanes, scaled},
         },
     },
-    kernels::{
-        laws::{LaneLaw, M3, plus},
-        tangents::LaneTangent,
-    },
     lanes::{
-        dispatch::Pass,
         nodes::{Lanes, Node, Sum},
         real::{Scalar, Vector},
+    },
+    material::{
+        ConstitutiveLaw, LawPass,
+        lane_matrix::{M3, plus},
     },
 };
 
@@ -35,9 +34,11 @@ pub(super) struct ShareForces<'a, T, const N: usize> {
     pub(super) fading_j: f64,
 }
 
-impl<T: Scalar, const N: usize> Pass<T> for ShareForces<'_, T, N> {
+impl<T: Scalar, const N: usize> LawPass for ShareForces<'_, T, N> {
+    type Scalar = T;
+
     #[inline(always)]
-    fn run<V: Vector<Scalar = T>, L: LaneTangent, const VISCOUS: bool>(&mut self) -> f64 {
+    fn run<V: Vector<Scalar = T>, L: ConstitutiveLaw, const VISCOUS: bool>(&mut self) -> f64 {
         let mut power_w = 0.0;
         for block in self.blocks {
             gather::<V, N>(&block.nodes, self.displacements, self.edges);
@@ -60,7 +61,7 @@ impl<T: Scalar, const N: usize> Pass<T> for ShareForces<'_, T, N> {
 
 impl<T: Scalar, const N: usize> ShareForces<'_, T, N> {
     #[inline(always)]
-    fn lanes<V: Vector<Scalar = T>, L: LaneLaw, const VISCOUS: bool>(
+    fn lanes<V: Vector<Scalar = T>, L: ConstitutiveLaw, const VISCOUS: bool>(
         &mut self,
         block: &ShareBlock<T, N>,
         first: usize,
@@ -83,7 +84,7 @@ impl<T: Scalar, const N: usize> ShareForces<'_, T, N> {
         let left = V::of(self.left);
         let pressure = if fading {
             let a = scaled(&load_matrix::<V, N>(&block.fades[PARTS], first), left);
-            let (p, _, along) = faded_stress::<V, T, L, false>((of_volume, &a), &mean, &mean);
+            let (p, _, along) = faded_stress::<V, T, L, false>(of_volume, &a, &mean, &mean);
             let mut volume = V::of(0.0);
             for part in 0..PARTS {
                 volume = volume + V::load(&block.volume[part][first..]);
@@ -97,7 +98,7 @@ impl<T: Scalar, const N: usize> ShareForces<'_, T, N> {
             let h_dot = if VISCOUS { gradient::<V, N>(block, part, self.rates, first) } else { zero };
             let (p, density) = if fading {
                 let a = scaled(&load_matrix::<V, N>(&block.fades[part], first), left);
-                let (p, density, along) = faded_stress::<V, T, L, VISCOUS>((of_shape, &a), &strains[part], &h_dot);
+                let (p, density, along) = faded_stress::<V, T, L, VISCOUS>(of_shape, &a, &strains[part], &h_dot);
                 faded = faded + along * V::load(&block.volume[part][first..]);
                 (p, density)
             } else {

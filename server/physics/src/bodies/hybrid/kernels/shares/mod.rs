@@ -12,23 +12,17 @@ use crate::{
         fade::ShareFade,
         share::{self, Share},
     },
-    material::{Law, Material},
-    settings::Precision,
-};
-use crate::{
-    kernels::laws::Constants,
     lanes::{
-        dispatch::{self, Available, InstructionSet},
+        Available, InstructionSet, LANES_F32, LANES_F64,
         nodes::{Lanes, Node, Sum, node},
         real::Scalar,
     },
+    material::{Material, constants::Constants},
+    settings::Precision,
 };
 use forces::ShareForces;
 use glam::{DMat3, DVec3};
 use std::ops::Range;
-
-const LANES_F32: usize = 16;
-const LANES_F64: usize = 8;
 
 /// Tets in lanes. Lanes of padding have the spare node throughout, and zeros.
 #[derive(Debug, Clone)]
@@ -56,7 +50,7 @@ struct ShareBlock<T, const N: usize> {
 /// Blocks of one material.
 #[derive(Debug, Clone)]
 struct Run<T> {
-    law: (Law, bool),
+    material: Material,
     of_shape: Constants<T>,
     of_volume: Constants<T>,
     blocks: Range<usize>,
@@ -180,7 +174,7 @@ impl<T: Scalar, const N: usize> Tables<T, N> {
             let material = &materials[of_tet[same[0]] as usize];
             let (of_shape, of_volume) = share::split(material);
             built.runs.push(Run {
-                law: (material.law, !material.viscosity.is_zero()),
+                material: *material,
                 of_shape: Constants::of(&of_shape),
                 of_volume: Constants::of(&of_volume),
                 blocks: first..built.blocks.len(),
@@ -295,7 +289,7 @@ impl<T: Scalar, const N: usize> Tables<T, N> {
             let blocks = &blocks[run.blocks.clone()];
             let mut pass =
                 ShareForces { run, blocks, edges, rates, forces, displacements, velocities, sums, left, fading_j: 0.0 };
-            let viscous_w = dispatch::run(set, run.law, &mut pass);
+            let viscous_w = run.material.run(set, false, &mut pass);
             found += Found { viscous_w, fading_j: pass.fading_j };
         }
         found
