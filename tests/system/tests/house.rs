@@ -114,7 +114,7 @@ fn every_module_is_on_the_map() {
 fn unsafe_stays_in_its_named_places() {
     let allowed = [
         "server/realtime/src/os.rs",
-        "server/physics/src/simd/",
+        "server/physics/src/lanes/",
         "device-bridge/src/device/phantom/ffi.rs",
         "tests/mock-libhd/src/",
     ];
