@@ -85,13 +85,13 @@ fn kernels(criterion: &mut Criterion) {
                         let mut values = kernel.values(rest.len(), cells.len());
                         values.set_displacements(&u);
                         group.bench_function(format!("{precision:?} {set:?}, rows of 10"), |b| {
-                            b.iter(|| kernel.forces(&rows, (rest.len(), 0.5), &mut values));
+                            b.iter(|| kernel.forces(&rows, rest.len(), 0.5, &mut values));
                         });
                         for row in &mut rows {
                             row.fading = true;
                         }
                         group.bench_function(format!("{precision:?} {set:?}, rows of 10 that fade"), |b| {
-                            b.iter(|| kernel.forces(&rows, (rest.len(), 0.5), &mut values));
+                            b.iter(|| kernel.forces(&rows, rest.len(), 0.5, &mut values));
                         });
                     }
                     let mut kernel = CutCells::with_capacity(cells.len(), rest.len(), &[material], precision);

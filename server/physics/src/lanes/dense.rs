@@ -8,7 +8,16 @@ use glam::DVec3;
 
 type Lanes = [f64; LANES];
 
-/// `A = L Lᵀ`, L by columns. Every column starts with the block of eight rows that its pivot is in, with zeros up to the pivot, which is kept apart.
+/// A symmetric matrix by its rows.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Symmetric<'a> {
+    pub(crate) entries: &'a [f64],
+    /// Entries from the start of a row to that of the next.
+    pub(crate) stride: usize,
+}
+
+/// `A = L Lᵀ`, with L by columns. Every column starts with the block of eight rows that its pivot is in, with zeros up to the
+/// pivot, which is kept apart.
 #[derive(Debug, Clone)]
 pub(crate) struct Cholesky {
     columns: Vec<Lanes>,
@@ -28,9 +37,9 @@ impl Cholesky {
         }
     }
 
-    /// Factorises the first `size` rows and columns of a symmetric matrix whose rows are `stride` long. Pivots that are less than `least` of the diagonal, which of a
-    /// positive definite matrix rounding alone can make them, are raised to that. Allocates nothing.
-    pub(crate) fn factorise(&mut self, (matrix, stride): (&[f64], usize), size: usize, least: f64) {
+    /// Factorises the first `size` rows and columns of a matrix. Pivots that are less than `least` of the diagonal, which of
+    /// a positive definite matrix rounding alone can make them, are raised to that. Allocates nothing.
+    pub(crate) fn factorise(&mut self, matrix: Symmetric<'_>, size: usize, least: f64) {
         let blocks = size.div_ceil(LANES);
         self.columns.clear();
         self.columns.resize(size * blocks, [0.0; LANES]);
@@ -41,7 +50,7 @@ impl Cholesky {
         }
         for (number, column) in self.columns.chunks_exact_mut(blocks.max(1)).enumerate() {
             for (row, entry) in column.as_flattened_mut().iter_mut().enumerate().take(size).skip(number) {
-                *entry = matrix[number * stride + row];
+                *entry = matrix.entries[number * matrix.stride + row];
             }
         }
         let Self { columns, inverse_pivots, .. } = self;
@@ -196,7 +205,7 @@ mod tests {
         for size in [0, 1, 7, 8, 9, 16, 23, 41] {
             let (matrix, stride) = matrix(size, &mut random);
             let right: Vec<DVec3> = (0..size).map(|_| random.vector()).collect();
-            factor.factorise((&matrix, stride), size, 1e-12);
+            factor.factorise(Symmetric { entries: &matrix, stride }, size, 1e-12);
             right.iter().enumerate().for_each(|(row, b)| factor.put(row, *b));
             let size_sq = factor.solve();
             let solved: Vec<DVec3> = (0..size).map(|row| factor.get(row)).collect();

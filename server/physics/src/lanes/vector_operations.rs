@@ -1,4 +1,5 @@
-//! Passes over all nodes: what a substep does to every position, velocity and force. Sums are taken in as many lanes on every instruction set: the same bits.
+//! Vector operations on all nodes: what a substep does to every position, velocity and force. A sum is taken in as many lanes on
+//! every instruction set, which gives the same bits.
 use super::{
     dispatch::{Available, Pass, run},
     real::{Real, Vector},

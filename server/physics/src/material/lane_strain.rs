@@ -19,6 +19,18 @@ pub(crate) fn twice_green_strain<T: Real>(h: &M3<T>) -> M3<T> {
     e
 }
 
+/// `2δE = δF + δFᵀ + δFᵀH + HᵀδF`.
+#[inline(always)]
+pub(crate) fn twice_green_strain_differential<T: Real>(h: &M3<T>, df: &M3<T>) -> M3<T> {
+    let mut rate = *df;
+    for i in 0..3 {
+        for j in 0..3 {
+            rate[i][j] = df[i][j] + df[j][i] + (column_dot(df, i, h, j) + column_dot(h, i, df, j));
+        }
+    }
+    rate
+}
+
 /// `J − 1 = tr H + tr cof H + det H`.
 #[inline(always)]
 pub(crate) fn volume_change<T: Real>(h: &M3<T>, cof_h: &M3<T>) -> T {

@@ -2,8 +2,8 @@
 use super::{
     ConstitutiveLaw, Lame,
     constants::Constants,
-    lane_matrix::{M3, column_dot, plus, product, scaled, trace as lane_trace},
-    lane_strain::twice_green_strain,
+    lane_matrix::{M3, plus, product, scaled, trace as lane_trace},
+    lane_strain::{twice_green_strain, twice_green_strain_differential},
     law::LaneStress,
 };
 use crate::{
@@ -52,17 +52,11 @@ impl ConstitutiveLaw for StVenantKirchhoff {
         LaneStress::everywhere(plus(&s, &product(h, &s)))
     }
 
-    /// `δP = δF S + δS + H δS`, `2δE = δF + δFᵀ + δFᵀH + HᵀδF`.
+    /// `δP = δF S + δS + H δS`.
     #[inline(always)]
     fn lane_piola_differential<T: Real>(c: &Constants<T>, h: &M3<T>, df: &M3<T>) -> LaneStress<T> {
         let s = lane_second_piola(c, &twice_green_strain(h));
-        let mut rate = *df;
-        for i in 0..3 {
-            for j in 0..3 {
-                rate[i][j] = df[i][j] + df[j][i] + (column_dot(df, i, h, j) + column_dot(h, i, df, j));
-            }
-        }
-        let ds = lane_second_piola(c, &rate);
+        let ds = lane_second_piola(c, &twice_green_strain_differential(h, df));
         LaneStress::everywhere(plus(&product(df, &s), &plus(&ds, &product(h, &ds))))
     }
 }

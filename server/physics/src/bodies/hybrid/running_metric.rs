@@ -5,7 +5,10 @@ use super::{
     partition::NONE,
     patch::KEPT,
 };
-use crate::lanes::{dense::Cholesky, vector_operations};
+use crate::lanes::{
+    dense::{Cholesky, Symmetric},
+    vector_operations,
+};
 use glam::{BVec3, DVec3};
 
 /// `M'` and its factor.
@@ -117,7 +120,8 @@ impl RunningMetric {
             }
         }
         // Pivots are positive where no weight is negative (`metric`), which [`HybridBody::may_wake`] sees to.
-        self.factor.factorise((&self.block_kg, size), self.free_rows, 1e-12);
+        let block_kg = Symmetric { entries: &self.block_kg, stride: size };
+        self.factor.factorise(block_kg, self.free_rows, 1e-12);
     }
 
     /// `M'⁻¹ f` (m/s²) on free axes, zero on the others, in place of forces (N) on coarse nodes and then on active particles; returns `fᵀ M'⁻¹ f` (N²/kg).

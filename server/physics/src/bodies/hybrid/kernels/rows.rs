@@ -126,10 +126,10 @@ impl RowKernel {
     }
 
     /// Sums up the forces (N) of elastic and viscous stress on the first `points` points, where `left` is left of what fades.
-    pub fn forces(&self, rows: &[CellRow], (points, left): (usize, f64), values: &mut RowValues) -> Found {
+    pub fn forces(&self, rows: &[CellRow], points: usize, left: f64, values: &mut RowValues) -> Found {
         match (&self.layout, &mut values.values) {
-            (Layout::Single(materials), Values::Single(arrays)) => self.sum_up(materials, rows, (points, left), arrays),
-            (Layout::Double(materials), Values::Double(arrays)) => self.sum_up(materials, rows, (points, left), arrays),
+            (Layout::Single(materials), Values::Single(arrays)) => self.sum_up(materials, rows, points, left, arrays),
+            (Layout::Double(materials), Values::Double(arrays)) => self.sum_up(materials, rows, points, left, arrays),
             _ => Found::default(),
         }
     }
@@ -138,7 +138,8 @@ impl RowKernel {
         &self,
         materials: &[CellMaterial<T>],
         rows: &[CellRow],
-        (points, left): (usize, f64),
+        points: usize,
+        left: f64,
         arrays: &mut Arrays<T>,
     ) -> Found {
         for sums in arrays.left.iter_mut().chain(&mut arrays.right) {
@@ -406,7 +407,7 @@ mod tests {
             let mut values = kernel.values(u.len(), cells.len());
             values.set_displacements(u);
             values.set_velocities(v);
-            let power_w = kernel.forces(&rows, (u.len(), 0.0), &mut values).viscous_w;
+            let power_w = kernel.forces(&rows, u.len(), 0.0, &mut values).viscous_w;
             let mut forces_n = vec![DVec3::NAN; u.len()];
             values.forces_n(&mut forces_n);
             Answer { forces_n, power_w }

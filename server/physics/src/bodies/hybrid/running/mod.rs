@@ -396,7 +396,7 @@ impl RunningPatch {
             self.values.set_velocities(&self.of_points);
             self.cut.set_velocities(&self.of_points);
         }
-        let mut found = self.kernel.forces(&self.rows, (self.points.len(), left), &mut self.values);
+        let mut found = self.kernel.forces(&self.rows, self.points.len(), left, &mut self.values);
         self.values.forces_n(&mut self.of_points);
         if has_cut {
             found += self.cut.forces(self.points.len(), left);
