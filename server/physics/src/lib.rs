@@ -45,10 +45,10 @@ mod testing;
 pub mod tick;
 pub mod world;
 
-pub use bodies::{Body, BodySpec, BodyState};
-pub use elements::solid::{Region, Solid};
-pub use hash::Chain;
-pub use mesh::{MeshError, Surface, TetMesh};
-pub use settings::{Integrator, LoadSpec, Precision, PrescribedSpec, Settings, Skips, Substeps};
-pub use tick::{Energies, Ledger, PointForce, TickInput};
-pub use world::{Model, ModelError, ModelSpec, Quarantine, Scratch, State, StepReport, step};
+pub use crate::bodies::{Body, BodySpec, BodyState};
+pub use crate::elements::solid::{Region, Solid};
+pub use crate::hash::Chain;
+pub use crate::mesh::{MeshError, Surface, TetMesh};
+pub use crate::settings::{Integrator, LoadSpec, Precision, PrescribedSpec, Settings, Skips, Substeps};
+pub use crate::tick::{Energies, Ledger, PointForce, TickInput};
+pub use crate::world::{Model, ModelError, ModelSpec, Quarantine, Scratch, State, StepReport, step};

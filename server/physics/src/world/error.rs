@@ -1,8 +1,11 @@
 //! Why a model cannot be built.
 use crate::{
     bodies::{
-        BodyError, hybrid::HybridError, mass_spring::MassSpringError, seed::SeedError, tet::ModesError,
-        tet::TetBodyError,
+        BodyError,
+        hybrid::HybridError,
+        mass_spring::MassSpringError,
+        seed::SeedError,
+        tet::{ModesError, TetBodyError},
     },
     tick::EnvironmentError,
 };

@@ -1,10 +1,9 @@
 //! A hybrid body: all that its rest state fixes.
 use super::{
-    balance::is_free,
-    cage::{self, Cage},
     cell::RestCell,
     clusters::SkinClusters,
     composite::Composite,
+    embedding_mesh::{self, EmbeddingMesh},
     metric::Masses,
     moments::{CellMoments, full_gradients_m2, integrate},
     partition::Partition,
@@ -14,6 +13,7 @@ use super::{
     sites::Sites,
     sizes,
     spec::{HybridError, ParticleSpec},
+    transition_force::is_free,
 };
 use crate::{
     elements::{
@@ -110,7 +110,7 @@ impl HybridBody {
         if moments.is_empty() {
             return Err(HybridError::Nothing { spacing_m });
         }
-        let Cage { mesh, moved_m, outside } = covering((mesh, surface), prescribed, &sites, &moments);
+        let EmbeddingMesh { mesh, moved_m, outside } = covering((mesh, surface), prescribed, &sites, &moments);
         let cage = CageSummary { moved_m, outside };
         let composite = Composite::new(&mesh);
         let prescribed = with_edges(&mesh, surface, &composite, prescribed);
@@ -380,13 +380,13 @@ fn covering(
     prescribed: &[PrescribedSpec],
     sites: &Sites,
     moments: &[CellMoments],
-) -> Cage {
+) -> EmbeddingMesh {
     let mut is_corner = vec![false; sites.site_count()];
     moments.iter().flat_map(|m| sites.corners(m.cell)).for_each(|site| is_corner[site] = true);
     let points: Vec<DVec3> =
         (0..is_corner.len()).filter(|&site| is_corner[site]).map(|site| sites.site_m(site)).collect();
     let held: BTreeSet<u32> = prescribed.iter().flat_map(|set| &set.nodes).copied().collect();
-    cage::cover(mesh, surface, &held, &points)
+    embedding_mesh::cover(mesh, surface, &held, &points)
 }
 
 fn may_wake(partition: &Partition, free: &[BVec3], particle: u32) -> bool {

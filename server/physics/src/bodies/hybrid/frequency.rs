@@ -156,8 +156,8 @@ mod tests {
     use crate::{
         bodies::hybrid::{
             cell::RestCell,
-            fade::Fading,
             moments::full_gradients_m2,
+            prestrain::PrestrainDecay,
             running::RunningPatch,
             testing::{Random, hybrid_ball, hybrid_ball_of, tissue},
         },
@@ -167,7 +167,7 @@ mod tests {
     /// The largest frequency (rad/s) of what is left to the coarse level, with the mass matrix of these active particles: powers of `M'⁻¹ K_c`.
     fn left_rad_per_s(hybrid: &HybridBody, active: &[u32]) -> f64 {
         let mut running = RunningPatch::new(hybrid, active.len(), Precision::Double);
-        running.wake(hybrid, active, &Fading::default());
+        running.wake(hybrid, active, &PrestrainDecay::default());
         let (nodes, mut random) = (hybrid.node_count(), Random(7));
         let mut a: Vec<DVec3> = (0..nodes + active.len()).map(|_| random.vector()).collect();
         let mut found = 0.0;

@@ -9,12 +9,14 @@
 //! ```
 //! While the steady part `b` does not change the step is symplectic, whatever `b` is. With `b = 0`, what balances at rest, `f_a = −f_c`, would push at one time and
 //! pull at another, and the body rest elsewhere, by some `(k h ω)²/24` of those forces (a dent by 4 % at two substeps, by 9 % at three). With `b = f_c` rest is rest, in
-//! every substep. Of a body that is held nowhere, `b` must have no torque as the body turns: it is taken from it at every evaluation (`balance`).
+//! every substep. Of a body that is held nowhere, `b` must have no torque as the body turns: it is taken from it at every evaluation (`transition_force`).
 //!
 //! `k h` is stable for the coarse level alone, `h` for the whole. That does not prove both together to be (modes of the fine level with `ω k h` near `nπ` resonate with what they
 //! feel of the coarse one); `docs/adr/hybrid.md` has what was measured.
 use super::kernels::Found;
-use super::{balance::without_torque, body::HybridBody, fade::Progress, scratch::HybridScratch, state::HybridState};
+use super::{
+    body::HybridBody, prestrain::Progress, scratch::HybridScratch, state::HybridState, transition_force::without_torque,
+};
 use crate::hash::Chain;
 use crate::{
     lanes::vector_operations::Answer,

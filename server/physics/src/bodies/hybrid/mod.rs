@@ -1,18 +1,14 @@
 //! The hybrid body: coarse tetrahedra throughout, and particles of which only those near a contact are awake.
-mod balance;
 pub mod body;
-mod border;
 mod build;
-pub mod cage;
 mod carried_skin;
 pub mod cell;
 pub mod clusters;
-mod coming;
 pub mod composite;
+mod constrained_points;
+pub mod embedding_mesh;
 mod energy;
-pub mod fade;
 mod frequency;
-mod handover;
 mod judged;
 pub mod kernels;
 mod locate;
@@ -22,20 +18,24 @@ pub mod moments;
 pub mod partition;
 pub mod patch;
 pub mod place;
+pub mod prestrain;
 mod projection;
+pub mod residual_element;
 mod running;
 mod running_metric;
 mod scratch;
-pub mod share;
 pub mod sites;
 pub mod sizes;
 pub mod skin;
 pub mod spec;
+mod staged_patch;
 mod state;
+mod state_transfer;
 mod stepped;
 pub(crate) mod switching;
 #[cfg(test)]
 pub(crate) mod testing;
+mod transition_force;
 
 pub use body::HybridBody;
 pub(crate) use scratch::HybridScratch;

@@ -11,7 +11,7 @@ use super::{
     cell::RestCell,
     composite::{Anchor, Composite},
     moments::{CellMoments, full_gradients_m2},
-    share::Share,
+    residual_element::ResidualElement,
     sites::Sites,
     sizes::{self, Hanging, Site},
 };
@@ -58,7 +58,7 @@ pub struct Partition {
     particle_at: Vec<u32>,
     /// The coarse tet that each particle follows.
     tet_of_particle: Vec<u32>,
-    shares: Vec<Share>,
+    shares: Vec<ResidualElement>,
 }
 
 impl Partition {
@@ -89,7 +89,7 @@ impl Partition {
             particles: Vec::new(),
             particle_at: vec![NONE; sites.site_count()],
             tet_of_particle: Vec::new(),
-            shares: vec![Share::default(); coarse.tets().len()],
+            shares: vec![ResidualElement::default(); coarse.tets().len()],
             coarse,
         };
         let marks = sizes::mark(&sites, moments);
@@ -304,7 +304,7 @@ impl Partition {
     }
 
     /// What of the body each coarse tet has when all particles sleep.
-    pub fn shares(&self) -> &[Share] {
+    pub fn shares(&self) -> &[ResidualElement] {
         &self.shares
     }
 

@@ -6,7 +6,10 @@
 //! Particles of such cells that are not active themselves (the border) follow the coarse nodes, and hand forces back to them by the same weights.
 //!
 //! This is plain f64 code: the oracle of what runs in the loop.
-use super::{cell::RestCell, composite::Anchor, fade::Fading, partition::Partition, share::Share};
+use super::{
+    cell::RestCell, composite::Anchor, partition::Partition, prestrain::PrestrainDecay,
+    residual_element::ResidualElement,
+};
 use crate::material::Material;
 use glam::{DMat3, DVec3};
 use std::collections::{BTreeMap, BTreeSet};
@@ -23,9 +26,9 @@ pub struct Patch {
     border: Vec<Anchor>,
     cells: Vec<PatchCell>,
     /// What is left to each coarse tet.
-    shares: Vec<Share>,
+    shares: Vec<ResidualElement>,
     /// What woke or fell asleep strained.
-    fading: Fading,
+    fading: PrestrainDecay,
 }
 
 #[derive(Debug, Clone)]
@@ -99,12 +102,12 @@ impl Patch {
                 }
             })
             .collect();
-        Self { active, border, cells, shares, fading: Fading::default() }
+        Self { active, border, cells, shares, fading: PrestrainDecay::default() }
     }
 
     /// The same patch with what fades in it; products leave that out.
     #[must_use]
-    pub fn with_fading(self, fading: Fading) -> Self {
+    pub fn with_fading(self, fading: PrestrainDecay) -> Self {
         Self { fading, ..self }
     }
 
@@ -135,7 +138,7 @@ impl Patch {
             }
         };
         let fine: f64 = self.cells.iter().map(of_cell).sum();
-        let of_share = |(tet, share): (usize, &Share)| match self.fading.of_tet(tet as u32) {
+        let of_share = |(tet, share): (usize, &ResidualElement)| match self.fading.of_tet(tet as u32) {
             Some(fade) => fade.energy_j(share, materials.of(tet), &at.nodes),
             None => share.energy_j(materials.of(tet), &at.nodes),
         };
@@ -146,7 +149,7 @@ impl Patch {
     pub fn min_volume_ratio(&self, at: &Field) -> (f64, usize) {
         let points = self.points(at);
         let of_cell = |cell: &PatchCell| (cell.rest.gradient_of(&cell.of(&points)).determinant(), cell.tet as usize);
-        let of_share = |(tet, share): (usize, &Share)| (share.volume_ratio(&at.nodes), tet);
+        let of_share = |(tet, share): (usize, &ResidualElement)| (share.volume_ratio(&at.nodes), tet);
         let all = self.cells.iter().map(of_cell).chain(self.shares.iter().enumerate().map(of_share));
         all.fold((f64::INFINITY, 0), |least, found| if found.0 < least.0 { found } else { least })
     }

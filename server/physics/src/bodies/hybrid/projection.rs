@@ -8,7 +8,7 @@
 //! C'' = M'' − (1 − δ) L        L = Σ_{all p} m_p (diag ζ_p − ζ_p ζ_pᵀ)
 //! ```
 //! over the free nodes that they follow; `M''` is the mass matrix after the switch (`metric`), `L` what lumping adds to it, and a `δ` of that holds nodes that nothing else does. Solved by a
-//! few steps of conjugate gradients, preconditioned by `M''⁻¹`. Strains do not change by it (`fade`), nor do momenta (`switching`).
+//! few steps of conjugate gradients, preconditioned by `M''⁻¹`. Strains do not change by it (`prestrain`), nor do momenta (`switching`).
 use super::{
     body::HybridBody,
     composite::{Anchor, NODES},
@@ -182,7 +182,7 @@ mod tests {
     use crate::bodies::hybrid::patch::KEPT;
     use crate::{
         bodies::hybrid::{
-            fade::Fading,
+            prestrain::PrestrainDecay,
             running::RunningPatch,
             testing::{Random, hybrid_ball, tissue},
         },
@@ -197,7 +197,7 @@ mod tests {
         let waking: Vec<u32> = (0..partition.particle_count() as u32).filter(|&p| body.may_wake(p)).collect();
         let (fell, stay): (Vec<u32>, Vec<u32>) = waking.iter().partition(|&&p| partition.particle_m(p).x > -1e-3);
         let mut patch = RunningPatch::new(&body, waking.len(), Precision::Double);
-        patch.wake(&body, &stay, &Fading::default());
+        patch.wake(&body, &stay, &PrestrainDecay::default());
         let kg = |p: u32| (1.0 - KEPT) * body.masses.particle_kg[p as usize];
         let mut random = Random(21);
         let away: Vec<DVec3> = fell.iter().map(|&p| away(partition.particle_m(p), &mut random)).collect();

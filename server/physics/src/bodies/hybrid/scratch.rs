@@ -1,15 +1,15 @@
 //! What a hybrid body's ticks work in.
 use super::{
-    balance::Balance,
     body::HybridBody,
     carried_skin::Carried,
-    coming::Coming,
-    fade::Fading,
-    handover::Before,
     long_steps::LongStepHistory,
+    prestrain::PrestrainDecay,
     running::RunningPatch,
+    staged_patch::StagedPatch,
     state::{HybridState, room_for_cells},
-    switching::Looking,
+    state_transfer::Before,
+    switching::ActivationQuery,
+    transition_force::TransitionForce,
 };
 use crate::tick::{Environment, ListedVertices};
 use glam::DVec3;
@@ -25,10 +25,10 @@ pub(crate) struct HybridScratch {
     pub(crate) of_free_j: Option<(f64, f64)>,
     /// `fᵀ M'⁻¹ f` (N²/kg) at the last three kicks, the last one first.
     pub(crate) kick_sq: [f64; 3],
-    pub(super) looking: Looking,
-    pub(super) coming: Coming,
+    pub(super) looking: ActivationQuery,
+    pub(super) coming: StagedPatch,
     pub(super) before: Before,
-    pub(crate) balance: Balance,
+    pub(crate) balance: TransitionForce,
     pub(super) long_steps: LongStepHistory,
 }
 
@@ -37,8 +37,8 @@ impl HybridScratch {
     pub(crate) fn new(body: &HybridBody, environment: &Environment) -> Self {
         let (most, positions) = (body.particles.most_active, body.most_positions());
         let patch = || RunningPatch::new(body, most, environment.settings.precision);
-        let (mut patch, coming) = (patch(), Coming::new(patch()));
-        patch.wake(body, &[], &Fading::default());
+        let (mut patch, coming) = (patch(), StagedPatch::new(patch()));
+        patch.wake(body, &[], &PrestrainDecay::default());
         Self {
             coming,
             patch,
@@ -47,12 +47,12 @@ impl HybridScratch {
             momenta: Vec::with_capacity(positions),
             of_free_j: None,
             kick_sq: [0.0; 3],
-            looking: Looking::new(body, &environment.tools),
+            looking: ActivationQuery::new(body, &environment.tools),
             before: Before::with_room(
                 room_for_cells(body, body.particles.most_active),
                 body.partition().shares().len(),
             ),
-            balance: Balance::with_room(positions),
+            balance: TransitionForce::with_room(positions),
             long_steps: LongStepHistory::with_room(body.node_count(), positions),
         }
     }

@@ -1,5 +1,5 @@
 //! What a tick changes of a hybrid body beside positions and velocities: which particles are active, and what of them still fades.
-use super::{body::HybridBody, fade::Fading, long_steps::LongSteps, spec::Waking, switching::Ball};
+use super::{body::HybridBody, long_steps::LongSteps, prestrain::PrestrainDecay, spec::Waking, switching::Ball};
 use crate::hash::Chain;
 use crate::{contact::ToolSpec, tick::MechanicalState};
 use glam::DVec3;
@@ -17,7 +17,7 @@ pub struct HybridState {
     pub(super) wanted: Vec<u32>,
     /// Of every place of every tool.
     pub(super) balls: Vec<Option<Ball>>,
-    pub(crate) fading: Fading,
+    pub(crate) fading: PrestrainDecay,
     /// Balancing forces (N), as many as positions, or none.
     pub(super) balance_n: Vec<DVec3>,
     /// Energy (J) that fading strains and balancing forces gave lately, beyond what they and switches took.
@@ -36,7 +36,10 @@ impl HybridState {
             next: Vec::with_capacity(most),
             wanted: Vec::with_capacity(most),
             balls: vec![None; places(body, tools).sum()],
-            fading: Fading::with_room(room_for_cells(body, body.particles.most_active), body.partition.shares().len()),
+            fading: PrestrainDecay::with_room(
+                room_for_cells(body, body.particles.most_active),
+                body.partition.shares().len(),
+            ),
             balance_n: Vec::with_capacity(positions),
             given_j: 0.0,
             switched_j: 0.0,
@@ -50,7 +53,7 @@ impl HybridState {
     }
 
     /// What of them and of the coarse tets woke or fell asleep strained.
-    pub fn fading(&self) -> &Fading {
+    pub fn fading(&self) -> &PrestrainDecay {
         &self.fading
     }
 

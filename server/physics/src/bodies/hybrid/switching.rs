@@ -13,7 +13,6 @@
 //! with the matrix `M''` of what stays awake: linear and angular momentum are kept. Coarse nodes are moved by `Δ_i` then (`projection`), for which the couple on the right has
 //! `−Σ_i Δ_i × P_i`, of the momenta `P = M'' v + J`.
 use super::{
-    balance::{Turn, turn_of},
     body::HybridBody,
     carried_skin::SkinView,
     patch::KEPT,
@@ -24,6 +23,7 @@ use super::{
     spec::{ParticleSpec, Waking},
     state::{HybridState, places},
     stepped::SteppedHybrid,
+    transition_force::{Turn, turn_of},
 };
 use crate::{
     contact::{Near, Skin, ToolSpec},
@@ -58,7 +58,7 @@ pub(crate) struct Ball {
 
 /// Buffers of a look.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Looking {
+pub(super) struct ActivationQuery {
     /// Squared distance (m²) and number of particles in a tool's balls.
     found: Vec<(f64, u32)>,
     /// Whether a particle is among these.
@@ -82,7 +82,7 @@ pub(super) struct Looking {
     weights_kg: Vec<f64>,
 }
 
-impl Looking {
+impl ActivationQuery {
     pub(super) fn new(body: &HybridBody, tools: &[ToolSpec]) -> Self {
         let particles = &body.particles;
         let in_ball = match particles.waking {
@@ -310,7 +310,7 @@ fn distance_to_balls_sq(balls: &[Option<Ball>], at_m: DVec3) -> f64 {
     nearest_sq
 }
 
-impl Looking {
+impl ActivationQuery {
     /// Takes the impulse of a particle that falls asleep, and the nodes of its tet; returns its couple (kg m²/s), and how far (m) it is from where it goes.
     fn hand_over(
         &mut self,

@@ -3,7 +3,7 @@ use super::{
     MassSpringBody, MassSpringState, Refinement, SpringScratch, SteppedMassSpring, Wanted,
     body::rings_for,
     skin::{Carried, SpringSkin},
-    state::{About, Found, Looking},
+    state::{About, ActivationQuery, Found},
 };
 use crate::{
     contact::{Near, Skin, ToolState},
@@ -28,7 +28,7 @@ const FADE_WAY: f64 = 1.0;
 pub(crate) struct MassSpringScratch {
     pub(super) springs: SpringScratch,
     pub(super) skin: ListedVertices<Carried>,
-    looking: Looking,
+    looking: ActivationQuery,
     /// Of awake nodes, on each axis; 0 where they are held, as is the inverse.
     pub(super) mass_kg: Vec<DVec3>,
     pub(super) inverse_mass_per_kg: Vec<DVec3>,
@@ -101,7 +101,7 @@ impl MassSpringScratch {
         Self {
             springs: SpringScratch::new(body.model()),
             skin: ListedVertices::new(body.model().rest_m().len()),
-            looking: Looking::new(body),
+            looking: ActivationQuery::new(body),
             mass_kg: Vec::with_capacity(body.model().most_nodes()),
             inverse_mass_per_kg: Vec::with_capacity(body.model().most_nodes()),
             layout: u64::MAX,

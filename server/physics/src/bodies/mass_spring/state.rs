@@ -67,14 +67,14 @@ pub(crate) struct Found {
 
 /// Buffers of a look.
 #[derive(Debug, Clone)]
-pub(crate) struct Looking {
+pub(crate) struct ActivationQuery {
     centres: Vec<u32>,
     triangles: Vec<u32>,
     corners: Vec<u32>,
     seen: Vec<bool>,
 }
 
-impl Looking {
+impl ActivationQuery {
     pub(crate) fn new(body: &MassSpringBody) -> Self {
         let (most, places) = (body.model().spec().most_refined, body.place_count());
         Self {
@@ -249,11 +249,11 @@ impl MassSpringState {
     }
 
     /// Which triangles are to be refined. While those that come and those that still go would be more than there is room for, only those that are there already. Allocates nothing.
-    pub(crate) fn want_refined(&mut self, body: &MassSpringBody, looking: &mut Looking) {
+    pub(crate) fn want_refined(&mut self, body: &MassSpringBody, looking: &mut ActivationQuery) {
         let Some(refinement) = body.refinement().filter(|refinement| refinement.by == Refining::ByTools) else {
             return;
         };
-        let Looking { centres, triangles, corners, .. } = looking;
+        let ActivationQuery { centres, triangles, corners, .. } = looking;
         let most = body.model().spec().most_refined;
         centres.clear();
         centres.extend(self.about.iter().filter_map(|about| about.touched));
@@ -269,7 +269,13 @@ impl MassSpringState {
     }
 
     /// Which vertices are to be awake, where not all are; `is_quiet` tells whether all that is awake is at rest. `forced` tells that a sleeping vertex was forced. Allocates nothing.
-    pub(crate) fn want_awake(&mut self, body: &MassSpringBody, looking: &mut Looking, forced: bool, is_quiet: bool) {
+    pub(crate) fn want_awake(
+        &mut self,
+        body: &MassSpringBody,
+        looking: &mut ActivationQuery,
+        forced: bool,
+        is_quiet: bool,
+    ) {
         let rest_m = body.model().rest_m();
         let mut changed = forced;
         for about in &mut self.about {

@@ -28,7 +28,7 @@ pub enum Place {
     /// Of the region, within.
     Inside,
     /// Of the region, at its border.
-    Border,
+    ConstrainedPoints,
     /// Of the body, outside the region.
     Beyond,
     /// Outside the body.
@@ -157,7 +157,7 @@ impl Region {
 
     /// Force (N) of the border on a slot's particle at `x` (m).
     pub fn border_force_n(&self, law: BorderForce, stiffness_n_per_m: f64, slot: usize, x_m: DVec3) -> DVec3 {
-        let started_there = self.places[self.voxel_of[slot] as usize] == Place::Border;
+        let started_there = self.places[self.voxel_of[slot] as usize] == Place::ConstrainedPoints;
         let away_m = match law {
             BorderForce::OwnVoxel if started_there => {
                 let (centre, half) = (self.rest_m(slot), DVec3::splat(0.5 * self.voxels.spacing_m));
@@ -206,7 +206,7 @@ fn places(voxels: &Voxels, slot_at: &[u32], holds: impl Fn(usize) -> Holds) -> V
     let place = |voxel: usize| match slot_at[voxel] {
         NONE if is_beyond(voxel) => Place::Beyond,
         NONE => Place::Free,
-        _ if voxels.beside(voxel).any(is_beyond) => Place::Border,
+        _ if voxels.beside(voxel).any(is_beyond) => Place::ConstrainedPoints,
         _ => Place::Inside,
     };
     (0..voxels.count()).map(place).collect()
@@ -215,7 +215,7 @@ fn places(voxels: &Voxels, slot_at: &[u32], holds: impl Fn(usize) -> Holds) -> V
 /// Nearest by distance between centres; of two as near the one with the lower number.
 fn nearest_border(voxels: &Voxels, places: &[Place]) -> Vec<u32> {
     let border: Vec<(u32, [i32; 3])> = (0..places.len())
-        .filter(|&voxel| places[voxel] == Place::Border)
+        .filter(|&voxel| places[voxel] == Place::ConstrainedPoints)
         .map(|voxel| (voxel as u32, voxels.place(voxel).map(|n| n as i32)))
         .collect();
     let nearest = |voxel: usize| {

@@ -213,11 +213,13 @@ fn worst_entry(forces: &Forces) -> u32 {
 mod tests {
     use super::*;
     use crate::{
-        bodies::BodySpec,
-        bodies::hybrid::{
-            HybridSpec, ParticleSpec, Skin, Waking,
-            sites::CORNERS,
-            testing::{slab, tissue},
+        bodies::{
+            BodySpec,
+            hybrid::{
+                HybridSpec, ParticleSpec, Skin, Waking,
+                sites::CORNERS,
+                testing::{slab, tissue},
+            },
         },
         contact::RestingContact,
         elements::solid::{Region, Solid},

@@ -11,7 +11,7 @@ use palpate_physics::bodies::hybrid::{
     composite::Anchor,
     partition::Partition,
     patch::{Field, KEPT, Materials},
-    share::Share,
+    residual_element::ResidualElement,
 };
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -24,7 +24,7 @@ pub struct PointPatch {
     border: Vec<Anchor>,
     operator: Operator,
     /// What is left to each coarse tet.
-    shares: Vec<Share>,
+    shares: Vec<ResidualElement>,
 }
 
 impl PointPatch {
@@ -50,7 +50,7 @@ impl PointPatch {
 
     /// Elastic energy (J).
     pub fn energy_j(&self, materials: &Materials<'_>, at: &Field) -> f64 {
-        let of_share = |(tet, share): (usize, &Share)| share.energy_j(materials.of(tet), &at.nodes);
+        let of_share = |(tet, share): (usize, &ResidualElement)| share.energy_j(materials.of(tet), &at.nodes);
         let fine = self.operator.energy_j(materials, &self.points(at));
         fine + self.shares.iter().enumerate().map(of_share).sum::<f64>()
     }

@@ -18,8 +18,7 @@ use glam::{DMat3, DVec3};
 use palpate_physics::{
     Model,
     elements::linear_tet::RestTet,
-    linalg::tensor::cofactor,
-    linalg::tensor::outer,
+    linalg::tensor::{cofactor, outer},
     material::{Law, Material},
 };
 

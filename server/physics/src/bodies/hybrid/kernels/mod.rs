@@ -3,11 +3,11 @@
 #![allow(clippy::inline_always)]
 mod cell_stress;
 mod cells;
-mod fades;
+mod prestrains;
+mod residual_elements;
 mod rows;
-mod shares;
 
 pub use cells::CutCells;
-pub use fades::Found;
+pub use prestrains::Found;
+pub use residual_elements::ShareKernel;
 pub use rows::{CellRow, RowKernel, RowValues};
-pub use shares::ShareKernel;

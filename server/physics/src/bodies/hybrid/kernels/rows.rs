@@ -6,12 +6,12 @@
 //! together at the end: `f_i = l_i + r_{i−1}`.
 use super::{
     cell_stress::{particles, patterns, stress},
-    fades::{ENTRIES, Found, Split, add_lanes, entries, fading_stress, scaled},
+    prestrains::{ENTRIES, Found, Split, add_lanes, entries, fading_stress, scaled},
 };
 use crate::{
     bodies::hybrid::{
         cell::{HOURGLASS, MODE_WEIGHTS},
-        fade::CellFade,
+        prestrain::CellPrestrain,
     },
     lanes::{
         Available, InstructionSet,
@@ -184,7 +184,7 @@ impl RowValues {
     }
 
     /// What fades in a cell.
-    pub fn put_fade(&mut self, cell: u32, fade: Option<&CellFade>) {
+    pub fn put_fade(&mut self, cell: u32, fade: Option<&CellPrestrain>) {
         match &mut self.values {
             Values::Single(arrays) => put_fade(&mut arrays.fades, cell, fade),
             Values::Double(arrays) => put_fade(&mut arrays.fades, cell, fade),
@@ -206,7 +206,7 @@ fn put<T: Scalar>([x, y, z]: &mut [Vec<T>; 3], list: &[DVec3]) {
     }
 }
 
-fn put_fade<T: Scalar>(fades: &mut [Vec<T>; ENTRIES], cell: u32, fade: Option<&CellFade>) {
+fn put_fade<T: Scalar>(fades: &mut [Vec<T>; ENTRIES], cell: u32, fade: Option<&CellPrestrain>) {
     for (list, entry) in fades.iter_mut().zip(entries(fade)) {
         list[cell as usize] = T::of(entry);
     }

@@ -2,8 +2,8 @@
 use super::RunningPatch;
 use crate::bodies::hybrid::{
     body::HybridBody,
-    fade::{CellFade, Fading},
     kernels::CellRow,
+    prestrain::{CellPrestrain, PrestrainDecay},
 };
 
 /// Where a cell is laid out.
@@ -72,18 +72,18 @@ impl RunningPatch {
     }
 
     /// Whether this is what the kernels were told of last.
-    pub(in crate::bodies::hybrid) fn knows(&self, fading: &Fading) -> bool {
+    pub(in crate::bodies::hybrid) fn knows(&self, fading: &PrestrainDecay) -> bool {
         self.fading_mark == fading.mark()
     }
 
     /// Tells the kernels what fades.
-    pub(in crate::bodies::hybrid) fn put_fades(&mut self, fading: &Fading) {
+    pub(in crate::bodies::hybrid) fn put_fades(&mut self, fading: &PrestrainDecay) {
         self.fading_mark = fading.mark();
         let Self { rows, slots, values, cut, fading_cells, cells, .. } = self;
         for row in rows.iter_mut() {
             row.fading = false;
         }
-        let mut put = |number: u32, fade: Option<&CellFade>| match slots[number as usize] {
+        let mut put = |number: u32, fade: Option<&CellPrestrain>| match slots[number as usize] {
             Slot::Row { row, cell } => {
                 rows[row as usize].fading |= fade.is_some();
                 values.put_fade(cell, fade);

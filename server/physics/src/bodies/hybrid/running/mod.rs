@@ -8,14 +8,14 @@ mod tests;
 use super::kernels::{CellRow, CutCells, Found, RowKernel, RowValues, ShareKernel};
 use super::{
     body::HybridBody,
-    border::Border,
     clusters::SkinClusters,
     composite::Anchor,
-    fade::Fading,
+    constrained_points::ConstrainedPoints,
     partition::{Cell, NONE},
     patch::KEPT,
+    prestrain::PrestrainDecay,
+    residual_element::ResidualElement,
     running_metric::RunningMetric,
-    share::Share,
     state::room_for_cells,
 };
 use crate::settings::Precision;
@@ -28,7 +28,7 @@ pub(crate) struct RunningPatch {
     /// Active particles, ascending.
     active: Vec<u32>,
     points: Vec<Point>,
-    border: Border,
+    border: ConstrainedPoints,
     /// Numbers of the active particles' points, ascending.
     points_of_active: Vec<u32>,
     /// Displacements (m) of the points.
@@ -48,7 +48,7 @@ pub(crate) struct RunningPatch {
     fading_tets: Vec<u32>,
     fading_mark: u64,
     /// What is left to each coarse tet.
-    shares: Vec<Share>,
+    shares: Vec<ResidualElement>,
     share_kernel: ShareKernel,
     /// Number of every coarse node among those of a share, while something is taken from it.
     number_of_node: Vec<u32>,
@@ -88,7 +88,7 @@ impl RunningPatch {
         Self {
             active: Vec::with_capacity(most_active),
             points: Vec::with_capacity(most_points),
-            border: Border::with_room(most_points),
+            border: ConstrainedPoints::with_room(most_points),
             points_of_active: Vec::with_capacity(most_active),
             displacements_m: Vec::with_capacity(most_points),
             of_points: Vec::with_capacity(most_points),
@@ -194,7 +194,7 @@ impl RunningPatch {
     }
 
     /// What is left to a coarse tet.
-    pub(super) fn share(&self, tet: u32) -> &Share {
+    pub(super) fn share(&self, tet: u32) -> &ResidualElement {
         &self.shares[tet as usize]
     }
 
@@ -232,7 +232,7 @@ impl RunningPatch {
     }
 
     /// Wakes these particles (ascending, no more than there is room for) and no others, of which this fades. Allocates nothing.
-    pub(crate) fn wake(&mut self, hybrid: &HybridBody, active: &[u32], fading: &Fading) {
+    pub(crate) fn wake(&mut self, hybrid: &HybridBody, active: &[u32], fading: &PrestrainDecay) {
         (0..Self::SLICES).for_each(|slice| self.set_slice(hybrid, active, slice));
         self.put_fades(fading);
     }

@@ -3,9 +3,9 @@ use super::*;
 use crate::{
     bodies::hybrid::{
         composite::PARTS,
-        fade::{CellFade, FADING_S, ShareFade},
         metric::Metric,
         patch::{Field, Patch},
+        prestrain::{CellPrestrain, FADING_S, ResidualPrestrain},
         testing::{Random, hybrid_ball_of, tissue},
     },
     material::{Material, Viscosity},
@@ -23,13 +23,14 @@ fn largest(list: &[DVec3]) -> f64 {
 }
 
 /// Something in some of the cells and tets, of the size of its strains.
-fn some_fading(hybrid: &HybridBody, cells: &[u32], random: &mut Random) -> Fading {
+fn some_fading(hybrid: &HybridBody, cells: &[u32], random: &mut Random) -> PrestrainDecay {
     let mut matrix = || DMat3::from_cols(random.vector(), random.vector(), random.vector()) * 0.1;
     let cells = cells.iter().filter(|cell| **cell / 7 % 3 == 1);
     let tets = (0..hybrid.partition.shares().len() as u32).filter(|tet| tet % 4 == 1);
-    let cells = cells.map(|&cell| CellFade { cell, shape: matrix(), volume: matrix(), modes: 0.3 }).collect();
-    let tets = tets.map(|tet| ShareFade { tet, parts: [(); PARTS].map(|()| matrix()), whole: matrix() }).collect();
-    let mut fading = Fading::new(cells, tets);
+    let cells = cells.map(|&cell| CellPrestrain { cell, shape: matrix(), volume: matrix(), modes: 0.3 }).collect();
+    let tets =
+        tets.map(|tet| ResidualPrestrain { tet, parts: [(); PARTS].map(|()| matrix()), whole: matrix() }).collect();
+    let mut fading = PrestrainDecay::new(cells, tets);
     fading.go_on(0.01);
     fading
 }
@@ -50,9 +51,9 @@ fn running_patch_and_oracle_agree() {
             let far = |p: DVec3| near(p) || p.distance(DVec3::new(-8e-3, 0.0, 0.0)) < 3e-3;
             let sets = [some(&hybrid, near), some(&hybrid, far), vec![], some(&hybrid, |p| p.x > 0.2e-3)];
             for (active, fades) in sets.iter().flat_map(|set| [(set, true), (set, false)]) {
-                running.wake(&hybrid, active, &Fading::default());
+                running.wake(&hybrid, active, &PrestrainDecay::default());
                 let fading = some_fading(&hybrid, running.cells(), &mut random);
-                let fading = if fades { fading } else { Fading::default() };
+                let fading = if fades { fading } else { PrestrainDecay::default() };
                 running.put_fades(&fading);
                 let set: BTreeSet<u32> = active.iter().copied().collect();
                 let patch = Patch::new(&hybrid.partition, &set).with_fading(fading.clone());

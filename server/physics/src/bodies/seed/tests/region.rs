@@ -52,7 +52,7 @@ fn the_border_is_where_the_region_meets_the_rest_of_the_body() {
     for slot in 0..region.len() {
         let voxel = region.voxel_of[slot] as usize;
         let beside: Vec<Place> = region.voxels.beside(voxel).map(|v| region.places[v]).collect();
-        let is_border = region.places[voxel] == Place::Border;
+        let is_border = region.places[voxel] == Place::ConstrainedPoints;
         assert_eq!(is_border, beside.contains(&Place::Beyond));
         assert!(region.rest_m(slot).distance(layer.rest_m(region.particles[slot])) < 1e-15);
         border += usize::from(is_border);
@@ -63,9 +63,9 @@ fn the_border_is_where_the_region_meets_the_rest_of_the_body() {
     for voxel in 0..region.voxels.count() {
         let gradient = region.gradient_m(voxel);
         let end = region.voxels.holding(region.voxels.centre_m(voxel) + gradient).unwrap();
-        assert_eq!(region.places[end], Place::Border);
-        assert_eq!(gradient == DVec3::ZERO, region.places[voxel] == Place::Border);
-        for &slot_voxel in region.voxel_of.iter().filter(|&&v| region.places[v as usize] == Place::Border) {
+        assert_eq!(region.places[end], Place::ConstrainedPoints);
+        assert_eq!(gradient == DVec3::ZERO, region.places[voxel] == Place::ConstrainedPoints);
+        for &slot_voxel in region.voxel_of.iter().filter(|&&v| region.places[v as usize] == Place::ConstrainedPoints) {
             let distance = region.voxels.centre_m(slot_voxel as usize).distance(region.voxels.centre_m(voxel));
             assert!(distance > gradient.length() - 1e-12);
         }
@@ -79,7 +79,7 @@ fn the_border_draws_back_what_leaves_it() {
     let spacing = region.voxels.spacing_m;
     for slot in 0..region.len() {
         let here = region.rest_m(slot);
-        let is_border = region.places[region.voxel_of[slot] as usize] == Place::Border;
+        let is_border = region.places[region.voxel_of[slot] as usize] == Place::ConstrainedPoints;
         for direction in [DVec3::X, DVec3::Y, DVec3::Z, DVec3::NEG_ONE] {
             let force = |x| region.border_force_n(BorderForce::OwnVoxel, 2.0, slot, x);
             assert_eq!(force(here + direction * 0.49 * spacing), DVec3::ZERO);

@@ -5,7 +5,7 @@ use crate::{
         cell::MODE_WEIGHTS,
         kernels::{
             cell_stress::{load_matrix, stress},
-            fades::{Split, add_lanes, fading_stress, scaled},
+            prestrains::{Split, add_lanes, fading_stress, scaled},
         },
     },
     lanes::{

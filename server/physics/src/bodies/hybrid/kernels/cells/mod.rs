@@ -6,9 +6,9 @@ mod forces;
 #[cfg(test)]
 pub(crate) mod testing;
 
-use super::fades::{ENTRIES, Found, Split, entries};
+use super::prestrains::{ENTRIES, Found, Split, entries};
 use crate::{
-    bodies::hybrid::{cell::RestCell, fade::CellFade},
+    bodies::hybrid::{cell::RestCell, prestrain::CellPrestrain},
     lanes::{
         Available, InstructionSet, LANES_F32, LANES_F64,
         nodes::{Node, Sum, node},
@@ -133,7 +133,7 @@ impl CutCells {
     }
 
     /// What fades in a cell of a run (from 0).
-    pub fn put_fade(&mut self, run: usize, number: usize, fade: Option<&CellFade>) {
+    pub fn put_fade(&mut self, run: usize, number: usize, fade: Option<&CellPrestrain>) {
         match &mut self.layout {
             Layout::Single(blocks) => blocks.put_fade(run, number, fade),
             Layout::Double(blocks) => blocks.put_fade(run, number, fade),
@@ -223,7 +223,7 @@ impl<T: Scalar, const N: usize> Tables<T, N> {
         self.runs.push(Run { material, blocks: first..self.blocks.len(), cells });
     }
 
-    fn put_fade(&mut self, run: usize, number: usize, fade: Option<&CellFade>) {
+    fn put_fade(&mut self, run: usize, number: usize, fade: Option<&CellPrestrain>) {
         let run = &self.runs[run];
         let (block, lane) = run.lane::<N>(number);
         let block = &mut self.fades[run.blocks.start + block];
@@ -291,7 +291,7 @@ mod tests {
             // Others before: nothing of them may stay.
             kernel.start(0, 3);
             (0..3).for_each(|number| kernel.put(number, cells[number].0, &cells[number].1));
-            (0..3).for_each(|number| kernel.put_fade(0, number, Some(&CellFade::none(0))));
+            (0..3).for_each(|number| kernel.put_fade(0, number, Some(&CellPrestrain::none(0))));
             kernel.clear();
             kernel.start(0, cells.len());
             for (number, (points, rest)) in cells.iter().enumerate() {

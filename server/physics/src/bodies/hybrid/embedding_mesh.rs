@@ -26,7 +26,7 @@ const MOST_LOST: f64 = 0.5;
 
 /// A covering mesh.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Cage {
+pub struct EmbeddingMesh {
     /// The mesh, with the same tets.
     pub mesh: TetMesh,
     /// How far its boundary was moved at most (m).
@@ -36,7 +36,7 @@ pub struct Cage {
 }
 
 /// Moves the boundary outwards, but for `held` nodes, until the tets hold the points or nothing moves any more.
-pub fn cover(mesh: &TetMesh, surface: &Surface, held: &BTreeSet<u32>, points_m: &[DVec3]) -> Cage {
+pub fn cover(mesh: &TetMesh, surface: &Surface, held: &BTreeSet<u32>, points_m: &[DVec3]) -> EmbeddingMesh {
     let mut covering = mesh.clone();
     let mut waiting: Vec<DVec3> = points_m.to_vec();
     for _ in 0..ROUNDS {
@@ -54,7 +54,7 @@ pub fn cover(mesh: &TetMesh, surface: &Surface, held: &BTreeSet<u32>, points_m: 
     let moved_m =
         covering.positions_m().iter().zip(mesh.positions_m()).map(|(a, b)| a.distance(*b)).fold(0.0, f64::max);
     needs(&covering, surface, held, &mut waiting);
-    Cage { mesh: covering, moved_m, outside: waiting.len() }
+    EmbeddingMesh { mesh: covering, moved_m, outside: waiting.len() }
 }
 
 /// How far (m) each node's faces would have to move, from the points outside; the points inside are taken off the list.

@@ -4,7 +4,7 @@ use glam::DVec3;
 
 /// Points of the border, sorted by the nodes that they follow, so that those are read and written once for a group.
 #[derive(Debug, Clone)]
-pub(super) struct Border {
+pub(super) struct ConstrainedPoints {
     followers: Vec<Follower>,
 }
 
@@ -15,7 +15,7 @@ struct Follower {
     weights: [f64; 4],
 }
 
-impl Border {
+impl ConstrainedPoints {
     pub(super) fn with_room(points: usize) -> Self {
         Self { followers: Vec::with_capacity(points) }
     }

@@ -5,12 +5,12 @@
 //! zero. What wakes takes from a lane's moments and volumes, in place.
 mod forces;
 
-use super::fades::Found;
+use super::prestrains::Found;
 use crate::{
     bodies::hybrid::{
         composite::PARTS,
-        fade::ShareFade,
-        share::{self, Share},
+        prestrain::ResidualPrestrain,
+        residual_element::{self, ResidualElement},
     },
     lanes::{
         Available, InstructionSet, LANES_F32, LANES_F64,
@@ -89,7 +89,13 @@ pub struct ShareKernel {
 
 impl ShareKernel {
     /// Lays out shares of tets; `of_tet` indexes `materials`.
-    pub fn build(shares: &[Share], nodes: usize, of_tet: &[u16], materials: &[Material], precision: Precision) -> Self {
+    pub fn build(
+        shares: &[ResidualElement],
+        nodes: usize,
+        of_tet: &[u16],
+        materials: &[Material],
+        precision: Precision,
+    ) -> Self {
         let layout = match precision {
             Precision::Single => Layout::Single(Tables::build(shares, nodes, of_tet, materials)),
             Precision::Double => Layout::Double(Tables::build(shares, nodes, of_tet, materials)),
@@ -113,7 +119,7 @@ impl ShareKernel {
     }
 
     /// What is left to a tet; its nodes are those it had. Allocates nothing.
-    pub fn put(&mut self, tet: usize, share: &Share) {
+    pub fn put(&mut self, tet: usize, share: &ResidualElement) {
         match &mut self.layout {
             Layout::Single(blocks) => blocks.put(tet, share),
             Layout::Double(blocks) => blocks.put(tet, share),
@@ -121,7 +127,7 @@ impl ShareKernel {
     }
 
     /// What fades in a tet; `None`: nothing any more. Allocates nothing.
-    pub fn put_fade(&mut self, tet: usize, fade: Option<&ShareFade>) {
+    pub fn put_fade(&mut self, tet: usize, fade: Option<&ResidualPrestrain>) {
         match &mut self.layout {
             Layout::Single(blocks) => blocks.put_fade(tet, fade),
             Layout::Double(blocks) => blocks.put_fade(tet, fade),
@@ -151,7 +157,7 @@ impl ShareKernel {
 }
 
 impl<T: Scalar, const N: usize> Tables<T, N> {
-    fn build(shares: &[Share], nodes: usize, of_tet: &[u16], materials: &[Material]) -> Self {
+    fn build(shares: &[ResidualElement], nodes: usize, of_tet: &[u16], materials: &[Material]) -> Self {
         let is_viscous = materials.iter().any(|m| !m.viscosity.is_zero());
         // Tets that reach for as many nodes share a block; one that holds nothing of the body needs no lane.
         let mut order: Vec<usize> = (0..shares.len()).filter(|&tet| !shares[tet].nodes.is_empty()).collect();
@@ -172,7 +178,7 @@ impl<T: Scalar, const N: usize> Tables<T, N> {
                 built.push_block(lanes, shares, nodes as u32);
             }
             let material = &materials[of_tet[same[0]] as usize];
-            let (of_shape, of_volume) = share::split(material);
+            let (of_shape, of_volume) = residual_element::split(material);
             built.runs.push(Run {
                 material: *material,
                 of_shape: Constants::of(&of_shape),
@@ -191,7 +197,7 @@ impl<T: Scalar, const N: usize> Tables<T, N> {
         built
     }
 
-    fn push_block(&mut self, tets_of_lanes: &[usize], shares: &[Share], spare: u32) {
+    fn push_block(&mut self, tets_of_lanes: &[usize], shares: &[ResidualElement], spare: u32) {
         let zero = T::of(0.0);
         let mut nodes: Vec<[u32; N]> = Vec::new();
         let mut parts_of_place: Vec<u8> = Vec::new();
@@ -233,7 +239,7 @@ impl<T: Scalar, const N: usize> Tables<T, N> {
         });
     }
 
-    fn put(&mut self, tet: usize, share: &Share) {
+    fn put(&mut self, tet: usize, share: &ResidualElement) {
         let (block, lane) = self.lane_of[tet];
         let Some(block) = self.blocks.get_mut(block as usize) else { return };
         let lane = lane as usize;
@@ -259,7 +265,7 @@ impl<T: Scalar, const N: usize> Tables<T, N> {
         }
     }
 
-    fn put_fade(&mut self, tet: usize, fade: Option<&ShareFade>) {
+    fn put_fade(&mut self, tet: usize, fade: Option<&ResidualPrestrain>) {
         let (block, lane) = self.lane_of[tet];
         let Some(block) = self.blocks.get_mut(block as usize) else { return };
         let lane = lane as usize;
@@ -298,7 +304,7 @@ impl<T: Scalar, const N: usize> Tables<T, N> {
 
 /// A place for every node of a share, among those of a block whose moments are of the parts `parts_of_place`, a bit each, which grow by what the share has. The
 /// node with moments of most parts is the first. Any other goes where the fewest parts have to be added, of such places where the fewest are without use.
-fn place_nodes(share: &Share, parts_of_place: &mut Vec<u8>) -> Vec<u16> {
+fn place_nodes(share: &ResidualElement, parts_of_place: &mut Vec<u8>) -> Vec<u16> {
     let parts_of = |moments: &[DVec3; PARTS]| {
         moments.iter().enumerate().fold(0_u8, |parts, (part, moment)| parts | u8::from(*moment != DVec3::ZERO) << part)
     };
@@ -344,8 +350,9 @@ mod tests {
                 let x: Vec<DVec3> =
                     u.iter().zip(partition.coarse().positions_m()).map(|(u, rest)| *u + *rest).collect();
                 let mut expected = vec![DVec3::ZERO; nodes];
-                let power =
-                    |(share, &m): (&Share, &u16)| share.add_forces_n(&materials[m as usize], &x, &v, &mut expected);
+                let power = |(share, &m): (&ResidualElement, &u16)| {
+                    share.add_forces_n(&materials[m as usize], &x, &v, &mut expected)
+                };
                 let expected_w: f64 = shares.iter().zip(&of_tet).map(power).sum();
                 let largest = expected.iter().map(|f| f.length()).fold(0.0, f64::max);
                 for (precision, bound) in [(Precision::Double, 1e-11), (Precision::Single, 3e-5)] {

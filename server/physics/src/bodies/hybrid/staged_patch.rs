@@ -3,13 +3,13 @@ use super::{body::HybridBody, running::RunningPatch};
 
 /// A patch beside the one that runs.
 #[derive(Debug, Clone)]
-pub(super) struct Coming {
+pub(super) struct StagedPatch {
     pub(super) patch: RunningPatch,
     /// Slices that are done, for the particles that the patch has.
     done: u32,
 }
 
-impl Coming {
+impl StagedPatch {
     pub(super) fn new(patch: RunningPatch) -> Self {
         Self { patch, done: 0 }
     }

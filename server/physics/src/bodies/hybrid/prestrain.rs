@@ -5,15 +5,15 @@
 //! ```text
 //! F̃ = F (I + A)       P = P̃(F̃) (I + A)ᵀ       A = s A_0,  s = e^{−t/τ}
 //! ```
-//! one `A` for its shape and one for its volume, which is the tet's (`share`), and hourglass stiffness `κ (1 − a)`, `a` from 1 to 0. What is left of a part,
+//! one `A` for its shape and one for its volume, which is the tet's (`residual_element`), and hourglass stiffness `κ (1 − a)`, `a` from 1 to 0. What is left of a part,
 //! or what it gets back, has an `A` of its own: its effective gradient is at first the mean of what it is made of, by volume, and by Jensen its energy no more than
 //! theirs. Changes of the rest state are objective: momentum does not hear of them. What fading takes, `−ds/dt ∂U/∂s`, is booked in the ledger.
 //!
-//! Nor do accelerations jump (`balance`).
+//! Nor do accelerations jump (`transition_force`).
 use super::{
     cell::{MODE_WEIGHTS, RestCell},
     composite::PARTS,
-    share::{Share, split},
+    residual_element::{ResidualElement, split},
 };
 use crate::hash::Chain;
 use crate::material::{Material, viscous};
@@ -29,7 +29,7 @@ const TRACE: f64 = 1e-13;
 
 /// A cell that woke strained; `A` and `a` when it did.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct CellFade {
+pub struct CellPrestrain {
     /// Index of the cell.
     pub cell: u32,
     /// `A` of its shape.
@@ -42,7 +42,7 @@ pub struct CellFade {
 
 /// A coarse tet of which some woke or fell asleep strained.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct ShareFade {
+pub struct ResidualPrestrain {
     /// The tet.
     pub tet: u32,
     /// `A` of its parts' shape.
@@ -53,10 +53,10 @@ pub struct ShareFade {
 
 /// All that fades.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
-pub struct Fading {
+pub struct PrestrainDecay {
     /// Ascending, as are the tets; after changing either, [`Self::start`].
-    pub(super) cells: Vec<CellFade>,
-    pub(super) tets: Vec<ShareFade>,
+    pub(super) cells: Vec<CellPrestrain>,
+    pub(super) tets: Vec<ResidualPrestrain>,
     progress: Progress,
     /// The largest entry of all.
     most: f64,
@@ -102,7 +102,7 @@ pub(super) fn cell_j(rest: &RestCell, material: &Material, [shape, volume]: [&DM
 }
 
 /// `U_e` (J) of effective gradients.
-pub(super) fn share_j(share: &Share, material: &Material, shapes: &[DMat3; PARTS], whole: &DMat3) -> f64 {
+pub(super) fn share_j(share: &ResidualElement, material: &Material, shapes: &[DMat3; PARTS], whole: &DMat3) -> f64 {
     let (of_shape, of_volume) = split(material);
     let shape: f64 = shapes.iter().zip(share.volume_m3).map(|(f, v)| v * of_shape.energy_density(f)).sum();
     shape + share.total_m3() * of_volume.energy_density(whole)
@@ -117,13 +117,13 @@ fn largest(a: &DMat3) -> f64 {
     a.to_cols_array().iter().fold(0.0, |most, entry| most.max(entry.abs()))
 }
 
-impl Fading {
+impl PrestrainDecay {
     pub(super) fn with_room(cells: usize, tets: usize) -> Self {
         Self { cells: Vec::with_capacity(cells), tets: Vec::with_capacity(tets), ..Self::default() }
     }
 
     /// Of these cells and tets, ascending.
-    pub fn new(cells: Vec<CellFade>, tets: Vec<ShareFade>) -> Self {
+    pub fn new(cells: Vec<CellPrestrain>, tets: Vec<ResidualPrestrain>) -> Self {
         let mut fading = Self { cells, tets, ..Self::default() };
         fading.start();
         fading
@@ -179,17 +179,17 @@ impl Fading {
     pub(super) fn start(&mut self) {
         self.tets.sort_unstable_by_key(|fade| fade.tet);
         self.progress = Progress { left: 1.0, along_j: [0.0; 2] };
-        let of_cells = self.cells.iter().map(CellFade::largest);
-        self.most = of_cells.chain(self.tets.iter().map(ShareFade::largest)).fold(0.0, f64::max);
+        let of_cells = self.cells.iter().map(CellPrestrain::largest);
+        self.most = of_cells.chain(self.tets.iter().map(ResidualPrestrain::largest)).fold(0.0, f64::max);
         // FNV-1a, word by word.
         let mix = |mark: u64, word: u64| (mark ^ word).wrapping_mul(0x0100_0000_01b3);
         let of_matrix =
             |mark: u64, a: &DMat3| a.to_cols_array().iter().fold(mark, |mark, entry| mix(mark, entry.to_bits()));
-        let of_cell = |mark: u64, fade: &CellFade| {
+        let of_cell = |mark: u64, fade: &CellPrestrain| {
             let mark = mix(mix(mark, u64::from(fade.cell)), fade.modes.to_bits());
             of_matrix(of_matrix(mark, &fade.shape), &fade.volume)
         };
-        let of_tet = |mark: u64, fade: &ShareFade| {
+        let of_tet = |mark: u64, fade: &ResidualPrestrain| {
             fade.parts.iter().chain([&fade.whole]).fold(mix(mark, u64::from(fade.tet)), of_matrix)
         };
         let mark = self.cells.iter().fold(0xcbf2_9ce4_8422_2325, of_cell);
@@ -231,22 +231,22 @@ impl Fading {
     }
 
     /// What is left of a cell's, if it fades.
-    pub(super) fn of_cell(&self, cell: u32) -> Option<CellFade> {
+    pub(super) fn of_cell(&self, cell: u32) -> Option<CellPrestrain> {
         let at = self.cells.binary_search_by_key(&cell, |fade| fade.cell).ok()?;
-        let CellFade { shape, volume, modes, .. } = self.cells[at];
+        let CellPrestrain { shape, volume, modes, .. } = self.cells[at];
         let left = self.left();
-        Some(CellFade { cell, shape: shape * left, volume: volume * left, modes: modes * left })
+        Some(CellPrestrain { cell, shape: shape * left, volume: volume * left, modes: modes * left })
     }
 
     /// What is left of a tet's, if it fades.
-    pub(super) fn of_tet(&self, tet: u32) -> Option<ShareFade> {
+    pub(super) fn of_tet(&self, tet: u32) -> Option<ResidualPrestrain> {
         let at = self.tets.binary_search_by_key(&tet, |fade| fade.tet).ok()?;
-        let ShareFade { parts, whole, .. } = self.tets[at];
-        Some(ShareFade { tet, parts: parts.map(|part| part * self.left()), whole: whole * self.left() })
+        let ResidualPrestrain { parts, whole, .. } = self.tets[at];
+        Some(ResidualPrestrain { tet, parts: parts.map(|part| part * self.left()), whole: whole * self.left() })
     }
 
     /// All that is left of tets', ascending.
-    pub(super) fn left_of_tets(&self) -> impl Iterator<Item = ShareFade> + '_ {
+    pub(super) fn left_of_tets(&self) -> impl Iterator<Item = ResidualPrestrain> + '_ {
         self.tets.iter().filter_map(|fade| self.of_tet(fade.tet))
     }
 
@@ -256,7 +256,7 @@ impl Fading {
     }
 }
 
-impl CellFade {
+impl CellPrestrain {
     fn largest(&self) -> f64 {
         // Stiffness of modes that is too small by so little shows less than a strain would.
         largest(&self.shape).max(largest(&self.volume)).max(self.modes * NOTHING.sqrt())
@@ -310,7 +310,7 @@ impl CellFade {
     }
 }
 
-impl ShareFade {
+impl ResidualPrestrain {
     fn largest(&self) -> f64 {
         self.parts.iter().chain([&self.whole]).map(largest).fold(0.0, f64::max)
     }
@@ -330,13 +330,13 @@ impl ShareFade {
     }
 
     /// Effective gradients of the parts' shape, and of the tet's volume.
-    pub(super) fn effective(&self, share: &Share, gradients: &[DMat3; PARTS]) -> ([DMat3; PARTS], DMat3) {
+    pub(super) fn effective(&self, share: &ResidualElement, gradients: &[DMat3; PARTS]) -> ([DMat3; PARTS], DMat3) {
         let mean = share.mean(gradients);
         (std::array::from_fn(|part| effective(&gradients[part], &self.parts[part])), effective(&mean, &self.whole))
     }
 
     /// `U_e` (J).
-    pub(super) fn energy_j(&self, share: &Share, material: &Material, x: &[DVec3]) -> f64 {
+    pub(super) fn energy_j(&self, share: &ResidualElement, material: &Material, x: &[DVec3]) -> f64 {
         if share.nodes.is_empty() {
             return 0.0;
         }
@@ -347,7 +347,7 @@ impl ShareFade {
     /// Adds forces (N) to `forces_n`; returns the power (W) that viscous stress takes.
     pub(super) fn add_forces_n(
         &self,
-        share: &Share,
+        share: &ResidualElement,
         material: &Material,
         x: &[DVec3],
         v: &[DVec3],

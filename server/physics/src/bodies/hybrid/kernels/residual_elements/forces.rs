@@ -5,7 +5,7 @@ use crate::{
         composite::PARTS,
         kernels::{
             cell_stress::{faded_stress, load_matrix, stress},
-            fades::{add_lanes, scaled},
+            prestrains::{add_lanes, scaled},
         },
     },
     lanes::{

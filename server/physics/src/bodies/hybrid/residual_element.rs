@@ -16,7 +16,7 @@ use glam::{DMat3, DVec3};
 
 /// A coarse tet's share of the body.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub struct Share {
+pub struct ResidualElement {
     /// Coarse nodes that move it.
     pub nodes: Vec<u32>,
     /// `V_g` (m³) of every part.
@@ -25,7 +25,7 @@ pub struct Share {
     pub moments_m2: Vec<[DVec3; PARTS]>,
 }
 
-impl Share {
+impl ResidualElement {
     /// Adds a cell's `factor V_c` to a part; `corners` are its particles' anchors.
     pub fn add(&mut self, part: u8, factor: f64, volume_m3: f64, gradients_m2: &[DVec3; 8], corners: &[Anchor; 8]) {
         let numbers = corners.map(|anchor| anchor.nodes.map(|node| self.number_of(node)));

@@ -1,14 +1,14 @@
-//! From one set of active particles to another: who answers for which volume changes, energy and force do not (`fade`).
+//! From one set of active particles to another: who answers for which volume changes, energy and force do not (`prestrain`).
 //!
 //! Left alone is what cannot change: cells that stay awake and whose particles stay where they are, and coarse tets that keep what they have and whose nodes do.
 use super::{
     body::HybridBody,
     composite::PARTS,
-    fade::{CellFade, Fading, ShareFade, cell_j, change, effective, modes_m2, share_j},
     partition::{Cell, Partition},
     patch::KEPT,
+    prestrain::{CellPrestrain, PrestrainDecay, ResidualPrestrain, cell_j, change, effective, modes_m2, share_j},
+    residual_element::ResidualElement,
     running::RunningPatch,
-    share::Share,
 };
 use glam::{DMat3, DVec3};
 
@@ -24,7 +24,7 @@ pub(super) struct Before {
     asleep: Vec<(u32, u32)>,
     tets: Vec<TetBefore>,
     /// What fades after it, and before.
-    next: Fading,
+    next: PrestrainDecay,
 }
 
 #[derive(Debug, Clone, Copy)]
@@ -55,7 +55,7 @@ impl Before {
             cells: Vec::with_capacity(cells),
             asleep: Vec::with_capacity(cells),
             tets: Vec::with_capacity(tets),
-            next: Fading::with_room(cells, tets),
+            next: PrestrainDecay::with_room(cells, tets),
         }
     }
 
@@ -67,7 +67,7 @@ impl Before {
         [patch, next]: [&RunningPatch; 2],
         is_moved: &[bool],
         x: &[DVec3],
-        fading: &Fading,
+        fading: &PrestrainDecay,
     ) -> f64 {
         let mut held_j = 0.0;
         self.cells.clear();
@@ -76,7 +76,7 @@ impl Before {
             if stays(body, [patch, next], is_moved, cell) {
                 continue;
             }
-            let fade = fading.of_cell(cell).unwrap_or(CellFade::none(cell));
+            let fade = fading.of_cell(cell).unwrap_or(CellPrestrain::none(cell));
             let (rest, y) = (body.awake_cell(cell as usize), patch.corners_m(body, cell));
             let [shape, volume] = fade.effective(&rest, &y);
             let modes_m2 = (1.0 - fade.modes) * modes_m2(&rest, &y);
@@ -102,11 +102,11 @@ impl Before {
         &mut self,
         body: &HybridBody,
         (tet, share_changes): (u32, bool),
-        share: &Share,
+        share: &ResidualElement,
         x: &[DVec3],
-        fading: &Fading,
+        fading: &PrestrainDecay,
     ) -> f64 {
-        let fade = fading.of_tet(tet).unwrap_or(ShareFade::none(tet));
+        let fade = fading.of_tet(tet).unwrap_or(ResidualPrestrain::none(tet));
         let gradients = share.gradients(x, DMat3::IDENTITY);
         let (parts, whole) = fade.effective(share, &gradients);
         self.tets.push(TetBefore { tet, gradients, share_changes, parts, whole });
@@ -121,7 +121,7 @@ impl Before {
         [patch, next]: [&RunningPatch; 2],
         is_moved: &[bool],
         (were_m, shifts_m, x): (&[DVec3], &[DVec3], &[DVec3]),
-        fading: &mut Fading,
+        fading: &mut PrestrainDecay,
     ) -> (f64, f64) {
         let (known, mut moved_j, mut now_j) = (self.tets.len(), 0.0, 0.0);
         let has_moved = |node: &u32| shifts_m[*node as usize] != DVec3::ZERO;
@@ -135,7 +135,7 @@ impl Before {
         self.next.clear();
         for &cell in next.cells() {
             if stays(body, [patch, next], is_moved, cell) {
-                self.next.cells.extend(fading.of_cell(cell).filter(CellFade::exceeds_a_trace));
+                self.next.cells.extend(fading.of_cell(cell).filter(CellPrestrain::exceeds_a_trace));
                 continue;
             }
             let (fade, energy_j) = self.of_cell(body, next, cell);
@@ -148,7 +148,7 @@ impl Before {
             self.next.tets.extend(fade);
         }
         // Tets that this leaves alone go on.
-        for fade in fading.left_of_tets().filter(ShareFade::exceeds_a_trace) {
+        for fade in fading.left_of_tets().filter(ResidualPrestrain::exceeds_a_trace) {
             if self.tets.binary_search_by_key(&fade.tet, |before| before.tet).is_err() {
                 self.next.tets.push(fade);
             }
@@ -159,7 +159,7 @@ impl Before {
     }
 
     /// A cell that is awake now: strained as it was, or as its part was; and its energy (J). The particles around one that was awake may have fallen asleep.
-    fn of_cell(&self, body: &HybridBody, patch: &RunningPatch, cell: u32) -> (Option<CellFade>, f64) {
+    fn of_cell(&self, body: &HybridBody, patch: &RunningPatch, cell: u32) -> (Option<CellPrestrain>, f64) {
         let (rest, y) = (body.awake_cell(cell as usize), patch.corners_m(body, cell));
         let (f, now_m2) = (rest.gradient_of(&y), modes_m2(&rest, &y));
         let own = self.cells.binary_search_by_key(&cell, |before| before.cell);
@@ -173,10 +173,10 @@ impl Before {
         let fade = before.map(|(shape, volume, before_m2)| {
             let least_m2 = (NO_MODES * body.partition.sites().spacing_m()).powi(2);
             let modes = if now_m2 > least_m2 { (1.0 - before_m2 / now_m2).max(0.0) } else { 0.0 };
-            CellFade { cell, shape: change(&f, &shape), volume: change(&f, &volume), modes }
+            CellPrestrain { cell, shape: change(&f, &shape), volume: change(&f, &volume), modes }
         });
-        let fade = fade.filter(CellFade::is_something);
-        let now = fade.unwrap_or(CellFade::none(cell));
+        let fade = fade.filter(CellPrestrain::is_something);
+        let now = fade.unwrap_or(CellPrestrain::none(cell));
         let gradients = [&effective(&f, &now.shape), &effective(&f, &now.volume)];
         let energy_j = cell_j(&rest, body.material_of_cell(cell as usize), gradients, (1.0 - now.modes) * now_m2);
         (fade, energy_j)
@@ -189,7 +189,7 @@ impl Before {
         patch: &RunningPatch,
         (shifts_m, x): (&[DVec3], &[DVec3]),
         before: &TetBefore,
-    ) -> (Option<ShareFade>, f64) {
+    ) -> (Option<ResidualPrestrain>, f64) {
         let share = patch.share(before.tet);
         let mut kept_m3 = share.volume_m3;
         let (mut parts, mut whole) = ([DMat3::ZERO; PARTS], DMat3::ZERO);
@@ -212,7 +212,7 @@ impl Before {
             share.gradients_after(&before.gradients, shifts_m)
         };
         let mean = share.mean(&gradients);
-        let mut fade = ShareFade::none(before.tet);
+        let mut fade = ResidualPrestrain::none(before.tet);
         for part in 0..PARTS {
             let volume_m3 = share.volume_m3[part];
             if volume_m3 > 0.0 {
@@ -220,8 +220,8 @@ impl Before {
             }
         }
         fade.whole = change(&mean, &(whole * (1.0 / share.total_m3())));
-        let fade = Some(fade).filter(ShareFade::is_something);
-        let now = fade.unwrap_or(ShareFade::none(before.tet));
+        let fade = Some(fade).filter(ResidualPrestrain::is_something);
+        let now = fade.unwrap_or(ResidualPrestrain::none(before.tet));
         let shapes = std::array::from_fn(|part| effective(&gradients[part], &now.parts[part]));
         (fade, share_j(share, body.material_of_tet(before.tet), &shapes, &effective(&mean, &now.whole)))
     }

@@ -8,9 +8,9 @@
 //! `Σ c = 0`, since neither momentum nor external force changed. Their torque is zero at first; as the body moves on it is taken from them again by forces
 //! `M_i α × (x_i − x̄)` on the coarse nodes of a body that is held nowhere. The work of these forces is booked in the ledger.
 //!
-//! They are dead loads: on what swings while regions are switched they may do work without end, as may strains that fade (`fade`). What both gave lately, beyond what they and
+//! They are dead loads: on what swings while regions are switched they may do work without end, as may strains that fade (`prestrain`). What both gave lately, beyond what they and
 //! switches took, is kept; where it is more than [`MOST_GIVEN`] of the elastic energy that switches lately changed, forces are balanced no more, and jump.
-use super::{body::HybridBody, fade, patch::KEPT, running_metric::RunningMetric, state::HybridState};
+use super::{body::HybridBody, patch::KEPT, prestrain, running_metric::RunningMetric, state::HybridState};
 use crate::tick::MechanicalState;
 use glam::{BVec3, DMat3, DVec3};
 
@@ -27,7 +27,7 @@ const NOTHING: f64 = 1e-9;
 
 /// Buffers for them.
 #[derive(Debug, Clone, Default)]
-pub(crate) struct Balance {
+pub(crate) struct TransitionForce {
     /// Accelerations (m/s²) before a switch.
     before: Vec<DVec3>,
     /// Forces (N) with which they go on after it; empty unless they are to be balanced by the next evaluation.
@@ -36,7 +36,7 @@ pub(crate) struct Balance {
     taken_n: Vec<DVec3>,
 }
 
-impl Balance {
+impl TransitionForce {
     pub(super) fn with_room(entries: usize) -> Self {
         let list = || Vec::with_capacity(entries);
         Self { before: list(), due_n: list(), taken_n: list() }
@@ -137,11 +137,11 @@ impl HybridState {
 
     /// A tick's fading of balancing forces.
     pub(super) fn fade_balance(&mut self, period_s: f64) {
-        let forgotten = fade::factor(period_s, FORGETTING_S);
+        let forgotten = prestrain::factor(period_s, FORGETTING_S);
         self.given_j *= forgotten;
         self.switched_j *= forgotten;
         let time_constant_s = if self.may_balance() { FADING_S } else { HURRIED_S };
-        let factor = fade::factor(period_s, time_constant_s);
+        let factor = prestrain::factor(period_s, time_constant_s);
         self.balance_n.iter_mut().for_each(|balance| *balance *= factor);
     }
 }

@@ -1,7 +1,7 @@
 //! What fades in cells (`hybrid::fade`), as both kernels of cells keep it.
 use super::cell_stress::faded_stress;
 use crate::{
-    bodies::hybrid::{fade::CellFade, share},
+    bodies::hybrid::{prestrain::CellPrestrain, residual_element},
     lanes::real::{Real, Scalar, Vector},
     material::{
         ConstitutiveLaw, Material,
@@ -14,7 +14,7 @@ use crate::{
 pub(crate) const ENTRIES: usize = 19;
 
 /// Of a cell; `None`: nothing fades.
-pub(crate) fn entries(fade: Option<&CellFade>) -> [f64; ENTRIES] {
+pub(crate) fn entries(fade: Option<&CellPrestrain>) -> [f64; ENTRIES] {
     let mut entries = [0.0; ENTRIES];
     if let Some(fade) = fade {
         for row in 0..3 {
@@ -39,7 +39,7 @@ pub(crate) struct Split<T> {
 
 impl<T: Scalar> Split<T> {
     pub(crate) fn of(material: &Material) -> Self {
-        let (shape, volume) = share::split(material);
+        let (shape, volume) = residual_element::split(material);
         let [whole, shape, volume] = [material, &shape, &volume].map(Constants::of);
         Self { material: *material, whole, shape, volume }
     }
