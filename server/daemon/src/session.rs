@@ -176,7 +176,7 @@ impl ActiveSession {
             session_id: self.id.clone(),
             scene_name: self.scene_name.clone(),
             node_count: model.rest_positions_m().len() as u32,
-            tet_count: model.body().tets().unwrap().tets().len() as u32,
+            tet_count: model.body().tets().map_or(0, |mesh| mesh.tets().len()) as u32,
             surface_triangle_count: model.surface().triangles.len() as u32,
             substeps_per_tick: model.substeps(),
             tick_period_s: model.settings().tick_period_s,

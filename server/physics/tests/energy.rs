@@ -142,9 +142,9 @@ fn scenarios() -> Vec<Scenario> {
     let idle: fn(f64, &mut Drive) = |_, _| {};
     let first_load: fn(f64, &mut Drive) = |t, drive| drive.load_factors[0] = ramp(t);
     let top = |spec: &ModelSpec| {
-        let surface = palpate_physics::Surface::of(mesh_of(&spec)).unwrap();
+        let surface = palpate_physics::Surface::of(mesh_of(spec)).unwrap();
         let up = |t: &u32| {
-            surface.triangle_nodes(*t as usize).iter().all(|n| mesh_of(&spec).positions_m()[*n as usize].z > -1e-9)
+            surface.triangle_nodes(*t as usize).iter().all(|n| mesh_of(spec).positions_m()[*n as usize].z > -1e-9)
         };
         (0..surface.triangles.len() as u32).filter(up).collect::<Vec<u32>>()
     };

@@ -7,5 +7,5 @@ mod seed_verlet;
 mod stability;
 
 pub(crate) use scheme::Scheme;
-pub(crate) use stability::{ForceHistory, StartOfTick, Verdict, is_judged};
+pub(crate) use stability::{Attempt, ForceHistory, StartOfTick, Verdict, is_judged};
 pub use stability::{InstantForces, Pace};

@@ -187,6 +187,15 @@ pub(crate) struct StartOfTick<'a> {
     pub(crate) v: &'a [DVec3],
 }
 
+/// How a tick went that was run.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Attempt {
+    /// Its result is not finite.
+    pub(crate) is_spoilt: bool,
+    /// How often it had been repeated before.
+    pub(crate) repeated: u32,
+}
+
 /// What is to be done with a tick that was run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Verdict {
@@ -242,8 +251,7 @@ impl ForceHistory {
         self.start.swap(state);
     }
 
-    /// Judges a tick that was run in [`Pace::substeps`] from `start`, after so many repetitions; `spoilt`: its result is not finite. The
-    /// pace is that of the repetition, or of the next tick, then.
+    /// Judges a tick that was run in [`Pace::substeps`] from `start`. The pace is that of the repetition, or of the next tick, then.
     pub(crate) fn judge(
         &mut self,
         environment: &Environment,
@@ -251,13 +259,13 @@ impl ForceHistory {
         state: &MechanicalState,
         start: StartOfTick<'_>,
         pace: &mut Pace,
-        spoilt: bool,
-        repeated: u32,
+        attempt: Attempt,
     ) -> Verdict {
+        let Attempt { is_spoilt, repeated } = attempt;
         let substeps = pace.substeps;
         let evidence = self.evidence(environment, body, state, pace, start);
-        let unstable = spoilt || self.is_unstable(&evidence, environment, body, state, pace);
-        let found = (!spoilt).then(|| quotient(&evidence));
+        let unstable = is_spoilt || self.is_unstable(&evidence, environment, body, state, pace);
+        let found = (!is_spoilt).then(|| quotient(&evidence));
         let more = substeps_for(environment, body.is_viscous(), substeps, found);
         if let Some(more) = more.filter(|_| unstable && repeated < MOST_REPETITIONS) {
             pace.start_again(more);

@@ -128,7 +128,7 @@ fn suffix(law: Law) -> String {
     match law {
         Law::StableNeoHookean => String::new(),
         Law::FixedCorotated => "-corotated".to_owned(),
-        other => format!("-{}", other.name()),
+        Law::StVenantKirchhoff => format!("-{}", law.name()),
     }
 }
 

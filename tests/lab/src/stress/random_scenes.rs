@@ -203,18 +203,18 @@ fn scene(options: &Options, random: &mut Random) -> Result<ModelSpec> {
 
 /// Up to two spheres beside the body, as small as its surface allows or larger.
 fn tools(spec: &mut ModelSpec, random: &mut Random) -> Result<()> {
-    let surface = palpate_physics::Surface::of(&rig::solid(&spec).mesh).into_diagnostic()?;
-    let longest_m = (0..rig::solid(&spec).mesh.tets().len())
-        .map(|tet| rig::solid(&spec).mesh.longest_edge_m(tet))
+    let surface = palpate_physics::Surface::of(&rig::solid(spec).mesh).into_diagnostic()?;
+    let longest_m = (0..rig::solid(spec).mesh.tets().len())
+        .map(|tet| rig::solid(spec).mesh.longest_edge_m(tet))
         .fold(0.0, f64::max);
     let least_m = longest_m / LARGEST_TRIANGLE;
-    let (low, high) = rig::solid(&spec).mesh.bounds_m();
+    let (low, high) = rig::solid(spec).mesh.bounds_m();
     for index in 0..random.below(3) {
-        let radius_m = (least_m * 1.01).max(0.2 * size_m(&rig::solid(&spec).mesh)) * random.within(1.0, 2.0);
+        let radius_m = (least_m * 1.01).max(0.2 * size_m(&rig::solid(spec).mesh)) * random.within(1.0, 2.0);
         let side = DVec3::new(random.within(-1.0, 1.0), random.within(-1.0, 1.0), random.within(0.3, 1.0)).normalize();
         // Away from the middle until it is clear of every vertex.
         let middle = 0.5 * (low + high);
-        let vertices = surface.nodes.iter().map(|&n| rig::solid(&spec).mesh.positions_m()[n as usize]);
+        let vertices = surface.nodes.iter().map(|&n| rig::solid(spec).mesh.positions_m()[n as usize]);
         let far_m = vertices.map(|p| (p - middle).dot(side)).fold(0.0, f64::max) + 1.05 * radius_m;
         let mass_kg = random.log_within(0.01, 0.1);
         let stiffness_n_per_m = random.log_within(50.0, 1000.0);
