@@ -12,7 +12,7 @@ use palpate_physics::{
         Skin,
         cell::RestCell,
         composite::Composite,
-        kernels::{CellRow, CutCells, RowKernel},
+        kernels::{CellRow, CutCells, Room, RowKernel},
         moments::integrate,
         partition::Partition,
         sites::{CORNERS, Sites},
@@ -81,17 +81,18 @@ fn kernels(criterion: &mut Criterion) {
                             }
                         };
                         let mut rows: Vec<CellRow> = (0..100).map(row).collect();
-                        let kernel = RowKernel::new(SPACING_M, 1.0, &[material], precision).with_instruction_set(set);
-                        let mut values = kernel.values(rest.len(), cells.len());
-                        values.set_displacements(&u);
+                        let room = Room { points: rest.len(), cells: cells.len() };
+                        let kernel = RowKernel::new(SPACING_M, 1.0, &[material], precision, room);
+                        let mut kernel = kernel.with_instruction_set(set);
+                        kernel.set_displacements(&u);
                         group.bench_function(format!("{precision:?} {set:?}, rows of 10"), |b| {
-                            b.iter(|| kernel.forces(&rows, rest.len(), 0.5, &mut values));
+                            b.iter(|| kernel.forces(&rows, rest.len(), 0.5));
                         });
                         for row in &mut rows {
                             row.fading = true;
                         }
                         group.bench_function(format!("{precision:?} {set:?}, rows of 10 that fade"), |b| {
-                            b.iter(|| kernel.forces(&rows, rest.len(), 0.5, &mut values));
+                            b.iter(|| kernel.forces(&rows, rest.len(), 0.5));
                         });
                     }
                     let mut kernel = CutCells::with_capacity(cells.len(), rest.len(), &[material], precision);

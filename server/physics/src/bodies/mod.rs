@@ -2,6 +2,7 @@
 //!
 //! A kind has its own folder: what it is made from, what its rest state fixes, what a tick changes of it beside
 //! [`crate::tick::MechanicalState`], its buffers, and how it is stepped. No kind knows another, nor this file.
+mod chained;
 pub mod hybrid;
 pub mod mass_spring;
 mod material_point;

@@ -59,6 +59,13 @@ impl BodyState {
         }
     }
 
+    /// Refines so many rings around vertices and nothing else, of a body that is refined by hand; others are not refined.
+    pub(crate) fn refine_only(&mut self, body: &Body, centres: &[u32], rings: u32) {
+        if let (Self::MassSpring(own), Body::MassSpring(body)) = (self, body) {
+            own.refine_only(body, centres, rings);
+        }
+    }
+
     /// Copies another state of the same body. Allocates nothing.
     pub(crate) fn copy_from(&mut self, other: &Self) {
         match (self, other) {

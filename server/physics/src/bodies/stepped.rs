@@ -45,6 +45,18 @@ impl<'a> SteppedBody<'a> {
         }
     }
 
+    /// Wakes these particles and no others, if there are particles.
+    pub(crate) fn wake_only(
+        &mut self,
+        environment: &Environment,
+        state: &mut MechanicalState,
+        particles: impl IntoIterator<Item = u32>,
+    ) {
+        if let Self::Hybrid(body) = self {
+            body.wake_only(environment, state, particles);
+        }
+    }
+
     /// Total force (N) at the present positions, and its external part.
     pub(crate) fn evaluate(
         &mut self,

@@ -74,7 +74,14 @@ pub fn step(model: &Model, state: &mut State, scratch: &mut Scratch, input: &Tic
         let Some(judged) = body.judged().filter(|_| history.is_kept()) else { break spoilt };
         let start = last_good.start_of_tick();
         let is_spoilt = spoilt.is_some();
-        match history.judge(environment, judged, mechanical, start, pace, Attempt { is_spoilt, repeated: report.repeated }) {
+        match history.judge(
+            environment,
+            judged,
+            mechanical,
+            start,
+            pace,
+            Attempt { is_spoilt, repeated: report.repeated },
+        ) {
             Verdict::Accept => break spoilt,
             Verdict::Repeat => {
                 last_good.put_all_back(mechanical);

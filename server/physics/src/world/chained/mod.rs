@@ -1,10 +1,9 @@
 //! Which bits of models, states and ticks a hash is of, and in which order ([`Chain`]).
 use super::{Model, Quarantine, Scratch, State, StepReport};
 use crate::{
-    bodies::{Body, BodyState, mass_spring::SpringModel},
     contact::{LocalContactModel, ToolState, ToolTarget},
     hash::Chain,
-    tick::{Energies, MechanicalState, free_inverse_mass},
+    tick::{Energies, MechanicalState},
 };
 
 impl Chain {
@@ -30,12 +29,7 @@ impl Chain {
         self.whole(u64::from(state.sleep.calm_checks));
         self.vectors(&state.sleep.held_m);
         self.maybe(state.quarantine, Self::quarantine);
-        match &state.body {
-            BodyState::Tet => {}
-            BodyState::Hybrid(own) => own.chain(self),
-            BodyState::MassSpring(own) => own.chain(self),
-            BodyState::Seed(own) => own.chain(self),
-        }
+        state.body.chain(self);
     }
 
     fn mechanical(&mut self, state: &MechanicalState) {
@@ -121,15 +115,7 @@ impl Chain {
         let body = model.body();
         self.real(body.max_natural_frequency_rad_per_s());
         self.reals(body.mass_kg());
-        match body {
-            Body::Tet(body) => self.vectors(body.inverse_mass_per_kg()),
-            Body::Hybrid(body) => self.vectors(body.inverse_mass_per_kg()),
-            // A node that is prescribed twice is refused when the model is built.
-            Body::MassSpring(_) => {
-                self.vectors(&free_inverse_mass(body.mass_kg(), model.prescribed()).unwrap_or_default());
-            }
-            Body::Seed(body) => self.vectors(body.inverse_mass_per_kg()),
-        }
+        body.chain_inverse_mass(model.prescribed(), self);
         self.vectors(body.rest_positions_m());
         self.vectors(body.surface_rest_positions_m());
         self.wholes(&model.surface().nodes);
@@ -141,18 +127,7 @@ impl Chain {
         self.whole(body.particle_count() as u64);
         self.whole(body.most_awake_particles() as u64);
         self.real(body.particle_spacing_m());
-        if let Body::MassSpring(body) = body {
-            self.springs(body.model());
-        }
-    }
-
-    fn springs(&mut self, model: &SpringModel) {
-        self.reals(&model.spec().mass_kg);
-        for constants in [model.spec().coarse, model.spec().fine] {
-            self.real(constants.mesh_n_per_m);
-            self.real(constants.home_n_per_m);
-        }
-        self.wholes(&model.spec().held);
+        body.chain(self);
     }
 }
 

@@ -10,4 +10,4 @@ mod rows;
 pub use cells::CutCells;
 pub use prestrains::Found;
 pub use residual_elements::ShareKernel;
-pub use rows::{CellRow, RowKernel, RowValues};
+pub use rows::{CellRow, Room, RowKernel};

@@ -36,22 +36,36 @@ pub struct CellRow {
     pub material: u16,
     /// Number of the first cell among all of the rows, one after the other.
     pub first: u32,
-    /// Whether something fades in any of them ([`RowValues::put_fade`]).
+    /// Whether something fades in any of them ([`RowKernel::put_fade`]).
     pub fading: bool,
 }
 
-/// Materials of full cells, which all are of one size.
+/// Full cells, which all are of one size: their materials, and displacements, velocities and forces of their points.
 #[derive(Debug, Clone)]
 pub struct RowKernel {
     layout: Layout,
     instruction_set: Available,
-    is_viscous: bool,
+}
+
+/// For how many it has buffers.
+#[derive(Debug, Clone, Copy)]
+pub struct Room {
+    /// Points.
+    pub points: usize,
+    /// Cells.
+    pub cells: usize,
 }
 
 #[derive(Debug, Clone)]
 enum Layout {
-    Single(Vec<CellMaterial<f32>>),
-    Double(Vec<CellMaterial<f64>>),
+    Single(Rows<f32>),
+    Double(Rows<f64>),
+}
+
+#[derive(Debug, Clone)]
+struct Rows<T> {
+    materials: Vec<CellMaterial<T>>,
+    arrays: Arrays<T>,
 }
 
 #[derive(Debug, Clone)]
@@ -59,18 +73,6 @@ struct CellMaterial<T> {
     split: Split<T>,
     /// `1/(4h)` (1/m), `−V` (m³) and `−κ` (N/m).
     cell: [f64; 3],
-}
-
-/// Displacements, velocities and forces of points.
-#[derive(Debug, Clone)]
-pub struct RowValues {
-    values: Values,
-}
-
-#[derive(Debug, Clone)]
-enum Values {
-    Single(Arrays<f32>),
-    Double(Arrays<f64>),
 }
 
 #[derive(Debug, Clone)]
@@ -99,15 +101,40 @@ impl<T: Scalar> Arrays<T> {
     }
 }
 
-impl RowKernel {
-    /// For cells of edge `h` (m) that answer for the share `handed` of their volume, and for those of twice the edge, whose materials follow theirs.
-    pub fn new(edge_m: f64, handed: f64, materials: &[Material], precision: Precision) -> Self {
-        let layout = match precision {
-            Precision::Single => Layout::Single(of_materials(materials, edge_m, handed)),
-            Precision::Double => Layout::Double(of_materials(materials, edge_m, handed)),
-        };
+impl<T: Scalar> Rows<T> {
+    fn new(materials: &[Material], edge_m: f64, handed: f64, room: Room) -> Self {
         let is_viscous = materials.iter().any(|m| !m.viscosity.is_zero());
-        Self { layout, is_viscous, instruction_set: Available::best() }
+        Self {
+            materials: of_materials(materials, edge_m, handed),
+            arrays: Arrays::new(room.points, room.cells, is_viscous),
+        }
+    }
+
+    fn sum_up(&mut self, set: Available, rows: &[CellRow], points: usize, left: f64) -> Found {
+        let Self { materials, arrays } = self;
+        for sums in arrays.left.iter_mut().chain(&mut arrays.right) {
+            sums[..1 + points + LANES].fill(T::of(0.0));
+        }
+        let mut found = Found::default();
+        for same in rows.chunk_by(|a, b| a.material == b.material) {
+            let material = &materials[same[0].material as usize];
+            let mut pass = RowForces { material, rows: same, arrays, left, fading_j: 0.0 };
+            let viscous_w = material.split.material.run(set, false, &mut pass);
+            found += Found { viscous_w, fading_j: pass.fading_j };
+        }
+        found
+    }
+}
+
+impl RowKernel {
+    /// For cells of edge `h` (m) that answer for the share `handed` of their volume, and for those of twice the edge, whose materials follow theirs;
+    /// its points are at rest.
+    pub fn new(edge_m: f64, handed: f64, materials: &[Material], precision: Precision, room: Room) -> Self {
+        let layout = match precision {
+            Precision::Single => Layout::Single(Rows::new(materials, edge_m, handed, room)),
+            Precision::Double => Layout::Double(Rows::new(materials, edge_m, handed, room)),
+        };
+        Self { layout, instruction_set: Available::best() }
     }
 
     /// The same kernel, held to an instruction set or the best below it that there is (for tests and benchmarks).
@@ -116,43 +143,45 @@ impl RowKernel {
         Self { instruction_set: Available::at_most(instruction_set), ..self }
     }
 
-    /// Buffers for up to `points` points, at rest, and `cells` cells.
-    pub fn values(&self, points: usize, cells: usize) -> RowValues {
-        let values = match &self.layout {
-            Layout::Single(_) => Values::Single(Arrays::new(points, cells, self.is_viscous)),
-            Layout::Double(_) => Values::Double(Arrays::new(points, cells, self.is_viscous)),
-        };
-        RowValues { values }
-    }
-
     /// Sums up the forces (N) of elastic and viscous stress on the first `points` points, where `left` is left of what fades.
-    pub fn forces(&self, rows: &[CellRow], points: usize, left: f64, values: &mut RowValues) -> Found {
-        match (&self.layout, &mut values.values) {
-            (Layout::Single(materials), Values::Single(arrays)) => self.sum_up(materials, rows, points, left, arrays),
-            (Layout::Double(materials), Values::Double(arrays)) => self.sum_up(materials, rows, points, left, arrays),
-            _ => Found::default(),
+    pub fn forces(&mut self, rows: &[CellRow], points: usize, left: f64) -> Found {
+        match &mut self.layout {
+            Layout::Single(of) => of.sum_up(self.instruction_set, rows, points, left),
+            Layout::Double(of) => of.sum_up(self.instruction_set, rows, points, left),
         }
     }
 
-    fn sum_up<T: Scalar>(
-        &self,
-        materials: &[CellMaterial<T>],
-        rows: &[CellRow],
-        points: usize,
-        left: f64,
-        arrays: &mut Arrays<T>,
-    ) -> Found {
-        for sums in arrays.left.iter_mut().chain(&mut arrays.right) {
-            sums[..1 + points + LANES].fill(T::of(0.0));
+    /// Displacements (m) of the points.
+    pub fn set_displacements(&mut self, displacements_m: &[DVec3]) {
+        match &mut self.layout {
+            Layout::Single(Rows { arrays, .. }) => put(&mut arrays.displacements, displacements_m),
+            Layout::Double(Rows { arrays, .. }) => put(&mut arrays.displacements, displacements_m),
         }
-        let mut found = Found::default();
-        for same in rows.chunk_by(|a, b| a.material == b.material) {
-            let material = &materials[same[0].material as usize];
-            let mut pass = RowForces { material, rows: same, arrays, left, fading_j: 0.0 };
-            let viscous_w = material.split.material.run(self.instruction_set, false, &mut pass);
-            found += Found { viscous_w, fading_j: pass.fading_j };
+    }
+
+    /// Velocities (m/s) of the points; of use only where a material is viscous.
+    pub fn set_velocities(&mut self, v: &[DVec3]) {
+        match &mut self.layout {
+            Layout::Single(Rows { arrays, .. }) if !arrays.velocities[0].is_empty() => put(&mut arrays.velocities, v),
+            Layout::Double(Rows { arrays, .. }) if !arrays.velocities[0].is_empty() => put(&mut arrays.velocities, v),
+            Layout::Single(_) | Layout::Double(_) => {}
         }
-        found
+    }
+
+    /// What fades in a cell.
+    pub fn put_fade(&mut self, cell: u32, fade: Option<&CellPrestrain>) {
+        match &mut self.layout {
+            Layout::Single(Rows { arrays, .. }) => put_fade(&mut arrays.fades, cell, fade),
+            Layout::Double(Rows { arrays, .. }) => put_fade(&mut arrays.fades, cell, fade),
+        }
+    }
+
+    /// Overwrites `forces_n` (N) with those on the points.
+    pub fn forces_n(&self, forces_n: &mut [DVec3]) {
+        match &self.layout {
+            Layout::Single(Rows { arrays, .. }) => totals(arrays, forces_n),
+            Layout::Double(Rows { arrays, .. }) => totals(arrays, forces_n),
+        }
     }
 }
 
@@ -163,41 +192,6 @@ fn of_materials<T: Scalar>(materials: &[Material], edge_m: f64, handed: f64) -> 
         CellMaterial { split: Split::of(material), cell: [0.25 / edge_m, -volume_m3, -kappa] }
     };
     [edge_m, 2.0 * edge_m].into_iter().flat_map(|edge_m| materials.iter().map(move |m| of((m, edge_m)))).collect()
-}
-
-impl RowValues {
-    /// Displacements (m) of the points.
-    pub fn set_displacements(&mut self, displacements_m: &[DVec3]) {
-        match &mut self.values {
-            Values::Single(arrays) => put(&mut arrays.displacements, displacements_m),
-            Values::Double(arrays) => put(&mut arrays.displacements, displacements_m),
-        }
-    }
-
-    /// Velocities (m/s) of the points; of use only where a material is viscous.
-    pub fn set_velocities(&mut self, v: &[DVec3]) {
-        match &mut self.values {
-            Values::Single(arrays) if !arrays.velocities[0].is_empty() => put(&mut arrays.velocities, v),
-            Values::Double(arrays) if !arrays.velocities[0].is_empty() => put(&mut arrays.velocities, v),
-            _ => {}
-        }
-    }
-
-    /// What fades in a cell.
-    pub fn put_fade(&mut self, cell: u32, fade: Option<&CellPrestrain>) {
-        match &mut self.values {
-            Values::Single(arrays) => put_fade(&mut arrays.fades, cell, fade),
-            Values::Double(arrays) => put_fade(&mut arrays.fades, cell, fade),
-        }
-    }
-
-    /// Overwrites `forces_n` (N) with those on the points.
-    pub fn forces_n(&self, forces_n: &mut [DVec3]) {
-        match &self.values {
-            Values::Single(arrays) => totals(arrays, forces_n),
-            Values::Double(arrays) => totals(arrays, forces_n),
-        }
-    }
 }
 
 fn put<T: Scalar>([x, y, z]: &mut [Vec<T>; 3], list: &[DVec3]) {
@@ -402,14 +396,14 @@ mod tests {
                 }
             }
             assert!(rows.len() < cells.len() / 4);
-            let kernel = RowKernel::new(*spacing_m, *handed, &[*material], *precision);
-            let kernel = kernel.with_instruction_set(*set);
-            let mut values = kernel.values(u.len(), cells.len());
-            values.set_displacements(u);
-            values.set_velocities(v);
-            let power_w = kernel.forces(&rows, u.len(), 0.0, &mut values).viscous_w;
+            let room = Room { points: u.len(), cells: cells.len() };
+            let kernel = RowKernel::new(*spacing_m, *handed, &[*material], *precision, room);
+            let mut kernel = kernel.with_instruction_set(*set);
+            kernel.set_displacements(u);
+            kernel.set_velocities(v);
+            let power_w = kernel.forces(&rows, u.len(), 0.0).viscous_w;
             let mut forces_n = vec![DVec3::NAN; u.len()];
-            values.forces_n(&mut forces_n);
+            kernel.forces_n(&mut forces_n);
             Answer { forces_n, power_w }
         });
     }

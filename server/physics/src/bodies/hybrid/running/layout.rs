@@ -21,7 +21,7 @@ impl RunningPatch {
         let partition = &hybrid.partition;
         for &cell in &self.fading_cells {
             if let Slot::Row { cell, .. } = self.slots[cell as usize] {
-                self.values.put_fade(cell, None);
+                self.full.put_fade(cell, None);
             }
         }
         self.fading_cells.clear();
@@ -79,14 +79,14 @@ impl RunningPatch {
     /// Tells the kernels what fades.
     pub(in crate::bodies::hybrid) fn put_fades(&mut self, fading: &PrestrainDecay) {
         self.fading_mark = fading.mark();
-        let Self { rows, slots, values, cut, fading_cells, cells, .. } = self;
+        let Self { rows, slots, full, cut, fading_cells, cells, .. } = self;
         for row in rows.iter_mut() {
             row.fading = false;
         }
         let mut put = |number: u32, fade: Option<&CellPrestrain>| match slots[number as usize] {
             Slot::Row { row, cell } => {
                 rows[row as usize].fading |= fade.is_some();
-                values.put_fade(cell, fade);
+                full.put_fade(cell, fade);
             }
             Slot::Cut { run, number } => cut.put_fade(run as usize, number as usize, fade),
         };

@@ -5,7 +5,7 @@ mod layout;
 #[cfg(test)]
 mod tests;
 
-use super::kernels::{CellRow, CutCells, Found, RowKernel, RowValues, ShareKernel};
+use super::kernels::{CellRow, CutCells, Found, Room, RowKernel, ShareKernel};
 use super::{
     body::HybridBody,
     clusters::SkinClusters,
@@ -37,9 +37,8 @@ pub(crate) struct RunningPatch {
     of_points: Vec<DVec3>,
     /// Awake cells, ascending.
     cells: Vec<u32>,
-    kernel: RowKernel,
+    full: RowKernel,
     rows: Vec<CellRow>,
-    values: RowValues,
     cut: CutCells,
     /// Where every awake cell is laid out.
     slots: Vec<Slot>,
@@ -84,7 +83,7 @@ impl RunningPatch {
         let most_cells = room_for_cells(hybrid, most_active);
         let around = if partition.has_doubled() { 8 * partition.most_cells_at() } else { 27 };
         let most_points = (around * most_active).min(partition.particle_count());
-        let kernel = RowKernel::new(partition.sites().spacing_m(), 1.0 - KEPT, &hybrid.materials, precision);
+        let (edge_m, room) = (partition.sites().spacing_m(), Room { points: most_points, cells: most_cells });
         Self {
             active: Vec::with_capacity(most_active),
             points: Vec::with_capacity(most_points),
@@ -94,8 +93,7 @@ impl RunningPatch {
             of_points: Vec::with_capacity(most_points),
             cells: Vec::with_capacity(most_cells),
             rows: Vec::with_capacity(most_cells),
-            values: kernel.values(most_points, most_cells),
-            kernel,
+            full: RowKernel::new(edge_m, 1.0 - KEPT, &hybrid.materials, precision, room),
             cut: CutCells::with_capacity(most_cells, most_points, &hybrid.materials, precision),
             share_kernel: ShareKernel::build(
                 partition.shares(),
@@ -383,7 +381,7 @@ impl RunningPatch {
         let first_m = self.displacements_m[0];
         self.of_points.clear();
         self.of_points.extend(self.displacements_m.iter().map(|displacement| *displacement - first_m));
-        self.values.set_displacements(&self.of_points);
+        self.full.set_displacements(&self.of_points);
         let has_cut = !self.cut.is_empty();
         if has_cut {
             self.cut.set_displacements(&self.of_points);
@@ -393,11 +391,11 @@ impl RunningPatch {
             for (v, &point) in v_particles.iter().zip(&self.points_of_active) {
                 self.of_points[point as usize] = *v;
             }
-            self.values.set_velocities(&self.of_points);
+            self.full.set_velocities(&self.of_points);
             self.cut.set_velocities(&self.of_points);
         }
-        let mut found = self.kernel.forces(&self.rows, self.points.len(), left, &mut self.values);
-        self.values.forces_n(&mut self.of_points);
+        let mut found = self.full.forces(&self.rows, self.points.len(), left);
+        self.full.forces_n(&mut self.of_points);
         if has_cut {
             found += self.cut.forces(self.points.len(), left);
             self.cut.add_forces_n(&mut self.of_points);
