@@ -28,12 +28,9 @@ pub(super) fn push(place: &Place, partition: &Partition, active: &[u32], force_n
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{
-        fine_levels::{
-            level::{FineLevel, still},
-            testing::{ball, ball_in_cage},
-        },
-        stress::random::Random,
+    use crate::fine_levels::{
+        level::{FineLevel, still},
+        testing::{Random, ball, ball_in_cage},
     };
     use palpate_physics::bodies::hybrid::patch::Patch;
 
@@ -43,7 +40,7 @@ mod tests {
         let active = (0..partition.particle_count() as u32).filter(|&p| partition.particle_m(p).z > 3e-3).collect();
         let patch = Patch::new(&partition, &active);
         let rest = FineLevel::at_rest(&patch, &partition);
-        let mut random = Random::new(31);
+        let mut random = Random(31);
         // Some lie deep in the body.
         for (number, &point) in ball().positions_m().iter().enumerate() {
             let point = point * if number % 3 == 0 { 0.1 * (number % 10) as f64 } else { 1.0 };

@@ -1,6 +1,5 @@
-//! Bodies and fields for tests.
+//! Bodies, fields and numbers for tests: those that the figures of `docs/adr/hybrid.md` are from, which depend on the strain and on how the ball lies.
 use super::methods::{CONTROL, Kernel, Method, PointPatch};
-use crate::stress::random::Random;
 use glam::{DMat3, DVec3};
 use palpate_physics::{
     Surface, TetMesh,
@@ -9,8 +8,8 @@ use palpate_physics::{
     },
     material::{Convention, Lame, Law, Material, Viscosity},
 };
-use palpate_scene::shapes::{box_mesh, sphere_shell};
-use std::collections::BTreeSet;
+use palpate_scene::shapes::box_mesh;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// Methods that reproduce no affine motion.
 pub(super) const RAW: [Method; 2] = [Method::RawSph(Kernel::Cone), Method::RawSph(Kernel::WendlandC2)];
@@ -23,21 +22,64 @@ pub(super) const CORRECTED: [Method; 5] = [
     Method::NodalSmoothing { gamma: 0.5 },
 ];
 
+/// Numbers without a pattern (xorshift64).
+pub(super) struct Random(pub(super) u64);
+
+impl Random {
+    /// In [0, 1).
+    pub(super) fn unit(&mut self) -> f64 {
+        for shift in [13_i32, -7, 17] {
+            self.0 ^= if shift > 0 { self.0 << shift } else { self.0 >> -shift };
+        }
+        (self.0 >> 11) as f64 / (1_u64 << 53) as f64
+    }
+
+    /// Components in (−1, 1).
+    pub(super) fn vector(&mut self) -> DVec3 {
+        DVec3::new(self.unit(), self.unit(), self.unit()) * 2.0 - DVec3::ONE
+    }
+}
+
 /// A box of `cells` of six tets each, its lowest corner at `low_m`.
 fn tet_box(low_m: DVec3, size_m: DVec3, cells: [u32; 3]) -> TetMesh {
     let mesh = box_mesh(size_m, cells).unwrap().mesh;
     TetMesh::new(mesh.positions_m().iter().map(|p| low_m + *p).collect(), mesh.tets().to_vec()).unwrap()
 }
 
-/// The skin of a ball of 10 mm radius, off the lattice of [`ball_in_cage`].
+/// The skin of a ball of 10 mm radius, off the lattice of [`ball_in_cage`]: an icosahedron whose triangles are split in four three times.
 pub(super) fn ball() -> Skin {
-    let shell = sphere_shell(0.005, 0.01, 4000).unwrap();
-    let outer = shell.region("outer").unwrap();
-    let nodes = outer.nodes();
-    let vertex = |node: u32| nodes.binary_search(&node).unwrap() as u32;
-    let off_m = DVec3::new(0.2e-3, -0.3e-3, 0.1e-3);
-    let positions_m = nodes.iter().map(|&node| shell.mesh.positions_m()[node as usize] + off_m).collect();
-    Skin::new(positions_m, outer.triangles.iter().map(|triangle| triangle.map(vertex)).collect()).unwrap()
+    let golden = f64::midpoint(1.0, 5.0_f64.sqrt());
+    let mut points: Vec<DVec3> = Vec::new();
+    for (a, b) in [(1.0, golden), (1.0, -golden), (-1.0, golden), (-1.0, -golden)] {
+        points.extend([DVec3::new(0.0, a, b), DVec3::new(a, b, 0.0), DVec3::new(b, 0.0, a)]);
+    }
+    let mut triangles = Vec::new();
+    for (i, j) in (0..12).flat_map(|i| (i + 1..12).map(move |j| (i, j))) {
+        for k in j + 1..12 {
+            let near = |a: usize, b: usize| (points[a].distance(points[b]) - 2.0).abs() < 1e-9;
+            if near(i, j) && near(j, k) && near(k, i) {
+                let [a, b, c] = [i, j, k].map(|n| points[n]);
+                let outward = (b - a).cross(c - a).dot(a) > 0.0;
+                triangles.push(if outward { [i, j, k] } else { [i, k, j] }.map(|n| n as u32));
+            }
+        }
+    }
+    for _ in 0..3 {
+        let mut middle: BTreeMap<[u32; 2], u32> = BTreeMap::new();
+        let mut split = Vec::new();
+        for [a, b, c] in triangles {
+            let [ab, bc, ca] = [[a, b], [b, c], [c, a]].map(|[u, v]| {
+                *middle.entry([u.min(v), u.max(v)]).or_insert_with(|| {
+                    points.push((points[u as usize] + points[v as usize]) * 0.5);
+                    points.len() as u32 - 1
+                })
+            });
+            split.extend([[a, ab, ca], [b, bc, ab], [c, ca, bc], [ab, bc, ca]]);
+        }
+        triangles = split;
+    }
+    let centre_m = DVec3::new(0.2e-3, -0.3e-3, 0.1e-3);
+    Skin::new(points.iter().map(|p| centre_m + p.normalize() * 0.01).collect(), triangles).unwrap()
 }
 
 /// That ball in a box of coarse tets that reaches past it.

@@ -6,12 +6,9 @@ use super::{
     points::Operator,
     smoothing_kernels::Kernel,
 };
-use crate::{
-    fine_levels::{
-        level::FineLevel,
-        testing::{CORRECTED, RAW, ball_in_cage, block_in_cage, half, half_awake, moved, stretch, tissue},
-    },
-    stress::random::Random,
+use crate::fine_levels::{
+    level::FineLevel,
+    testing::{CORRECTED, RAW, Random, ball_in_cage, block_in_cage, half, half_awake, moved, stretch, tissue},
 };
 use glam::DVec3;
 use palpate_physics::{
@@ -29,7 +26,7 @@ fn out_of_balance(partition: &Partition, method: Method, material: &Material) ->
     let patch = PointPatch::new(partition, &active, &method.points(partition, &active));
     let of_tet = vec![0; partition.shares().len()];
     let materials = Materials { materials: &[*material], of_tet: &of_tet };
-    let f = stretch(&mut Random::new(59));
+    let f = stretch(&mut Random(59));
     let at = moved(&patch.at_rest(partition), |p| f * p);
     let forces = patch.elastic_forces_n(&materials, &at);
     let stress = material.piola(&f);
@@ -44,7 +41,7 @@ fn out_of_balance(partition: &Partition, method: Method, material: &Material) ->
 /// On half of a ball, what uniform stress puts on a particle beside the traction that the cells give it, at most, over `P h²`; and on the middle node of a block that is half awake,
 /// over `P` times the area of its section.
 fn beside_traction(ball: &Partition, block: &Partition, method: Method, material: &Material) -> (f64, f64) {
-    let f = stretch(&mut Random::new(61));
+    let f = stretch(&mut Random(61));
     let stress = material.piola(&f);
     let unit_pa = stress.x_axis.length().max(stress.y_axis.length()).max(stress.z_axis.length());
     let forces = |partition: &Partition, patch: &dyn FineLevel| {
@@ -151,7 +148,7 @@ fn largest_square(partition: &Partition, patch: &dyn FineLevel, material: &Mater
     let rest = patch.at_rest(partition);
     let still = vec![DVec3::ZERO; rest.nodes.len()];
     let masses: Vec<f64> = patch.active().iter().map(|&p| 1000.0 * (1.0 - KEPT) * particle_m3(partition, p)).collect();
-    let mut random = Random::new(67);
+    let mut random = Random(67);
     let mut a = Field { particles: masses.iter().map(|_| random.vector()).collect(), nodes: still.clone() };
     let mut square = 0.0;
     for _ in 0..300 {

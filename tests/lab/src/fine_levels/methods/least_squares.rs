@@ -67,7 +67,7 @@ fn gradients_per_m(places_m: &[DVec3], point_m: DVec3, smoothing_m: f64) -> Vec<
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::stress::random::Random;
+    use crate::fine_levels::testing::Random;
 
     /// Shape functions themselves, to be differentiated.
     fn values(places_m: &[DVec3], point_m: DVec3, smoothing_m: f64) -> Vec<f64> {
@@ -89,7 +89,7 @@ mod tests {
 
     #[test]
     fn gradients_are_those_of_the_shape_functions() {
-        let mut random = Random::new(17);
+        let mut random = Random(17);
         let places: Vec<DVec3> = (0..30).map(|_| random.vector() * 2e-3).collect();
         for _ in 0..10 {
             let (at, smoothing_m, step) = (random.vector() * 0.5e-3, 1.3e-3, 1e-8);

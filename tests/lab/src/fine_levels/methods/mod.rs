@@ -20,8 +20,8 @@
 //! control, `k_qp = α V_q V_p w_p/|ΔX|²`. Gauss points see those fields.
 //!
 //! Points answer for volume `V_q = Σ_c V_c/8` over the cells around them, an octant's point for one of the eight. None but nodal smoothing is *integration-consistent* at the
-//! surface: inside `Σ_q V_q b_qp = 0` by symmetry, but uniform stress P puts up to `0.12 P h²` on particles beneath a flat face (raw), `0.08 P h²` (corrected, cone), less than `0.0005 P h²` (the others),
-//! and on some at a surface that cuts cells half of `P h²` beside the traction that is theirs.
+//! surface: inside `Σ_q V_q b_qp = 0` by symmetry, but the uniform stress P of one strain (`checks.rs`) puts up to `0.12 P h²` on particles beneath a flat face (raw; of another strain it was 0.19),
+//! `0.08 P h²` (corrected, cone), less than `0.0005 P h²` (the others), and on some at a surface that cuts cells half of `P h²` beside the traction that is theirs.
 #[cfg(test)]
 mod checks;
 mod least_squares;

@@ -1,11 +1,8 @@
 //! What every method keeps: energy, momentum, affine motion, volume.
 use super::*;
-use crate::{
-    fine_levels::{
-        level::FineLevel,
-        testing::{CORRECTED, RAW, ball_in_cage, half, half_awake, moved, plus, random_like, stretch, tissue},
-    },
-    stress::random::Random,
+use crate::fine_levels::{
+    level::FineLevel,
+    testing::{CORRECTED, RAW, Random, ball_in_cage, half, half_awake, moved, plus, random_like, stretch, tissue},
 };
 use glam::{DMat3, DQuat};
 use palpate_physics::{
@@ -23,7 +20,7 @@ fn force_sums(at: &Field, forces: &Field) -> (DVec3, DVec3, f64) {
 fn forces_are_the_energys_gradient_and_products_theirs() {
     let partition = ball_in_cage();
     let of_tet = vec![0; partition.shares().len()];
-    let mut random = Random::new(41);
+    let mut random = Random(41);
     for method in RAW.into_iter().chain(CORRECTED) {
         let patch = half_awake(&partition, method);
         let rest = patch.at_rest(&partition);
@@ -79,7 +76,7 @@ fn forces_sum_to_zero_and_objective_methods_know_no_torque_nor_rotation() {
     let of_tet = vec![0; partition.shares().len()];
     let turn = DQuat::from_axis_angle(DVec3::new(0.48, 0.6, 0.64), 2.1);
     let scale = 10e3 * partition.sites().spacing_m().powi(2);
-    let mut random = Random::new(43);
+    let mut random = Random(43);
     for method in RAW.into_iter().chain(CORRECTED) {
         let patch = half_awake(&partition, method);
         let rest = patch.at_rest(&partition);
@@ -111,7 +108,7 @@ fn forces_sum_to_zero_and_objective_methods_know_no_torque_nor_rotation() {
 #[test]
 fn corrected_methods_reproduce_affine_motion_at_every_point() {
     let partition = ball_in_cage();
-    let f = stretch(&mut Random::new(47));
+    let f = stretch(&mut Random(47));
     for method in CORRECTED {
         let points = method.points(&partition, &half(&partition));
         for row in &points.rows {
@@ -142,7 +139,7 @@ fn all_points_that_see_an_active_particle_are_awake() {
 fn volume_is_counted_once() {
     let partition = ball_in_cage();
     let of_tet = vec![0; partition.shares().len()];
-    let f = stretch(&mut Random::new(53));
+    let f = stretch(&mut Random(53));
     for method in CORRECTED {
         let patch = half_awake(&partition, method);
         let at = moved(&patch.at_rest(&partition), |p| f * p);
