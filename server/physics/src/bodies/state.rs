@@ -184,9 +184,4 @@ impl BodyScratch {
             Body::Seed(body) => Self::Seed(Box::new(SeedBodyScratch::new(body.model()))),
         }
     }
-
-    /// Products with the matrix of implicit schemes since this scratch was made.
-    pub(crate) fn solver_products(&self) -> u64 {
-        if let Self::Tet(scratch) = self { scratch.products } else { 0 }
-    }
 }

@@ -82,7 +82,7 @@ fn solve(
     state: &MechanicalState,
     scratch: &mut TetScratch,
 ) {
-    let TetScratch { kernel: kernel_scratch, pcg: vectors, tangents, products } = scratch;
+    let TetScratch { kernel: kernel_scratch, pcg: vectors, tangents } = scratch;
     let (settings, kernel) = (&environment.settings, body.kernel());
     let inverse_mass = body.inverse_mass_per_kg();
     let (x, tools, contact) = (&state.x, &state.tools, &state.contact);
@@ -105,7 +105,7 @@ fn solve(
             *out = on_free(*out + *a * *mass, *inverse_mass);
         }
     };
-    *products += u64::from(pcg::solve(apply, nodal.inverse_per_kg(), stop, vectors));
+    pcg::solve(apply, nodal.inverse_per_kg(), stop, vectors);
 }
 
 /// `v ← v + Δv`; returns the change of kinetic energy (J).

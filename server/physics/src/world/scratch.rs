@@ -32,19 +32,8 @@ impl Scratch {
         }
     }
 
-    /// Products with the matrix of implicit schemes since this scratch was made: the solver's iterations.
-    pub fn solver_products(&self) -> u64 {
-        self.body.solver_products()
-    }
-
     /// Force (N) that holds each prescribed degree of freedom, at the end of the last tick; zero on free ones.
     pub fn reactions_n(&self) -> &[DVec3] {
         &self.reaction_n
-    }
-
-    /// Takes the reactions of another scratch of the same model, without allocating: with a copy of the state, all that
-    /// probes need.
-    pub fn copy_reactions_from(&mut self, other: &Self) {
-        self.reaction_n.clone_from(&other.reaction_n);
     }
 }

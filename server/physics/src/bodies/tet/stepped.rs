@@ -24,8 +24,6 @@ pub(crate) struct TetScratch {
     pub(crate) pcg: PcgScratch,
     /// Empty unless the scheme is implicit.
     pub(crate) tangents: ContactTangents,
-    /// Products with the matrix of implicit schemes since this scratch was made.
-    pub(crate) products: u64,
 }
 
 impl TetScratch {
@@ -37,13 +35,11 @@ impl TetScratch {
                 kernel: kernel.scratch_for_products(),
                 pcg: PcgScratch::new(body.mass_kg().len()),
                 tangents: ContactTangents::new(&environment.contact),
-                products: 0,
             },
             _ => Self {
                 kernel: kernel.scratch(),
                 pcg: PcgScratch::default(),
                 tangents: ContactTangents::new(&ContactModel::default()),
-                products: 0,
             },
         }
     }
