@@ -74,6 +74,16 @@ impl Body {
         }
     }
 
+    /// Where a point that was located is at rest (m). A seed body's vertices are numbered after the nodes of its core.
+    pub(crate) fn rest_position_m(&self, point: &Located) -> DVec3 {
+        let Some(first) = self.first_vertex else { return point.of(self.surface_positions_m()) };
+        let at = |node: u32| match node.checked_sub(first) {
+            Some(vertex) => self.surface_positions_m()[vertex as usize],
+            None => self.mesh.positions_m()[node as usize],
+        };
+        point.nodes.iter().zip(point.weights).map(|(&node, weight)| at(node) * weight).sum()
+    }
+
     /// In the core, or the nearest of the skin: nothing is known between them.
     fn locate_in_seed(&self, skin: &FineSurface, point_m: DVec3) -> Located {
         let in_core = |tet| Located::inside(&self.mesh, tet, point_m);

@@ -97,7 +97,7 @@ fn displacement(name: &str, point_m: DVec3, body: &Body, warnings: &mut Vec<Stri
         ));
     }
     let is_inside = point.distance_m == 0.0;
-    let rest_m = if is_inside { point_m } else { point.of(body.surface_positions_m()) };
+    let rest_m = if is_inside { point_m } else { body.rest_position_m(&point) };
     Measure::Displacement(MaterialPoint { rest_m, nodes: point.nodes, weights: point.weights })
 }
 
