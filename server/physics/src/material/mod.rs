@@ -55,17 +55,12 @@ pub enum Convention {
 }
 
 impl Convention {
-    /// Factor on λ and µ.
+    /// Factor on λ and µ; that on φ and ψ is 1 in all of them.
     pub fn elastic_factor(self) -> f64 {
         match self {
             Self::Consistent | Self::Paper2005 => 1.0,
             Self::Paper2006 => 0.5,
         }
-    }
-
-    /// Factor on φ and ψ.
-    pub fn viscous_factor(self) -> f64 {
-        1.0
     }
 }
 
@@ -83,12 +78,8 @@ pub struct Material {
 impl Material {
     /// A material with a convention's factors applied to its constants.
     pub fn new(law: Law, lame: Lame, viscosity: Viscosity, convention: Convention) -> Self {
-        let (e, v) = (convention.elastic_factor(), convention.viscous_factor());
-        Self {
-            law,
-            lame: Lame { lambda_pa: e * lame.lambda_pa, mu_pa: e * lame.mu_pa },
-            viscosity: Viscosity { phi_pa_s: v * viscosity.phi_pa_s, psi_pa_s: v * viscosity.psi_pa_s },
-        }
+        let factor = convention.elastic_factor();
+        Self { law, lame: Lame { lambda_pa: factor * lame.lambda_pa, mu_pa: factor * lame.mu_pa }, viscosity }
     }
 
     /// Energy density `Ψ(F)` (J/m³), zero at `F = I`.

@@ -44,7 +44,7 @@ impl LayerStress {
     pub fn new(parameters: &SeedParameters) -> Self {
         let SeedParameters { lame, viscosity, convention, .. } = *parameters;
         let elastic = parameters.layer_factor() * convention.elastic_factor();
-        let viscous = parameters.layer_factor() * convention.viscous_factor();
+        let viscous = parameters.layer_factor();
         Self {
             lame: Lame { lambda_pa: elastic * lame.lambda_pa, mu_pa: elastic * lame.mu_pa },
             viscosity: Viscosity { phi_pa_s: viscous * viscosity.phi_pa_s, psi_pa_s: viscous * viscosity.psi_pa_s },
