@@ -58,14 +58,20 @@ fn product_part(text: &str) -> String {
     text[..end].lines().map(|line| line.split("//").next().unwrap_or_default()).collect::<Vec<_>>().join("\n")
 }
 
-/// Every `crate::…` path that a text names, in `use` trees and in code, its parts joined by `/`.
-fn crate_paths(text: &str) -> BTreeSet<String> {
+/// Every `crate::…` and `super::…` path that the text of a module names, in `use` trees and in code, from the crate's root, its parts joined by `/`.
+fn named_paths(module: &str, text: &str) -> BTreeSet<String> {
     let mut paths = BTreeSet::new();
-    for (at, _) in text.match_indices("crate::") {
-        let is_word = text[..at].chars().next_back().is_some_and(|c| c.is_alphanumeric() || c == '_' || c == '$');
-        if !is_word {
-            expand(&mut text[at + "crate::".len()..].chars().peekable(), "", &mut paths);
+    let is_word = |at: usize| text[..at].ends_with(|c: char| c.is_alphanumeric() || "_$:".contains(c));
+    for (at, mark) in text.match_indices("crate::").filter(|(at, _)| !is_word(*at)) {
+        expand(&mut text[at + mark.len()..].chars().peekable(), "", &mut paths);
+    }
+    for (at, _) in text.match_indices("super::").filter(|(at, _)| !is_word(*at)) {
+        let (mut rest, mut base) = (&text[at..], module);
+        while let Some(behind) = rest.strip_prefix("super::") {
+            rest = behind;
+            base = base.rsplit_once('/').map_or("", |(above, _)| above);
         }
+        expand(&mut rest.chars().peekable(), base, &mut paths);
     }
     paths
 }
@@ -110,7 +116,7 @@ fn faults(file: &str, text: &str) -> Vec<String> {
     let module = file.trim_end_matches(".rs").trim_end_matches("/mod");
     let Some(own) = rung_of(module) else { return vec![format!("{file} is on no rung of the ladder")] };
     let mut faults = Vec::new();
-    for path in crate_paths(&product_part(text)) {
+    for path in named_paths(module, &product_part(text)) {
         // Names that the crate's root shows again are asked for where they are.
         let Some(other) = rung_of(&path) else {
             faults.push(format!("{file} uses crate::{}, which is no folder", path.replace('/', "::")));
@@ -170,6 +176,11 @@ fn an_arrow_up_is_seen_however_it_is_written() {
         faults("contact/mod.rs", "use crate::mesh::Surface;\n#[cfg(test)]\nmod tests { use crate::world::Model; }")
             .is_empty()
     );
+    // So are relative paths: `super` of a folder's own file is the crate's root.
+    assert_eq!(faults("contact/mod.rs", "use super::world::Model;").len(), 1);
+    assert_eq!(faults("contact/narrow/mod.rs", "use super::super::{mesh::Surface, statics::solve};").len(), 1);
+    assert_eq!(faults("bodies/tet/body.rs", "use super::super::seed::SeedModel;").len(), 1);
+    assert!(faults("bodies/tet/body.rs", "use super::modes::Mode;").is_empty());
     // What follows the declaration of a file of helpers is product code again.
     let after = "#[cfg(test)]\npub(crate) mod testing;\npub use crate::world::Model;";
     assert_eq!(faults("contact/mod.rs", after).len(), 1);
