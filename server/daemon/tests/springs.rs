@@ -27,6 +27,7 @@ async fn the_live_loop_and_simulate_reach_the_same_bits() {
     daemon.reset().await;
     let session = daemon.running.as_ref().unwrap().daemon.session();
     let body = session.model.body().as_mass_spring().unwrap();
+    assert_eq!(session.info().tet_count, 0);
     for (ticks, refined, awake) in [(20, false, false), (330, true, true), (2500, false, false)] {
         let done = daemon.step(ticks).await;
         assert_eq!(daemon.status().await.quarantine, "");
