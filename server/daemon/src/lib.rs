@@ -1,4 +1,5 @@
 //! `palpated`: the daemon that simulates a body at the haptic rate, and the offline commands on the same scenes.
+pub mod bodies;
 pub mod cli;
 pub mod grpc;
 pub mod load;

@@ -1,5 +1,6 @@
 //! The session outside the loop: its body, its tools and who drives them, and how one session replaces another.
 use crate::{
+    bodies::served,
     sim::{
         command::{Orders, Refusal, Request},
         exchange::{SurfaceEnd, ToolEnd},
@@ -10,7 +11,7 @@ use crate::{
     },
     stream::hub::Hub,
 };
-use palpate_physics::{Model, ModelError, Scratch, State, TickInput, step, world::wake_only};
+use palpate_physics::{Model, ModelError, Scratch, State, TickInput, step};
 use palpate_proto::v1;
 use palpate_scene::{Driver, Probe, Scene};
 use std::{
@@ -270,10 +271,7 @@ pub fn prepare(
     }
     let tets = model.body().tets().map_or(0, |mesh| mesh.tets().len());
     let substeps = model.substeps();
-    let active = model
-        .body()
-        .as_mass_spring()
-        .map_or(model.body().most_awake_particles(), |springs| springs.model().most_nodes());
+    let active = model.body().most_awake_points();
     // A particle costs about what a tet does.
     if (tets + active) as u64 * u64::from(substeps) > MOST_TET_UPDATES {
         let work =
@@ -341,19 +339,11 @@ fn median_tick_s(model: &Model) -> f64 {
         prescribed_displacements_m: &prescribed,
         point_forces: &[],
     };
-    let particles = model.body().as_hybrid().map_or(0, |hybrid| hybrid.partition().particle_count() as u32);
-    wake_only(model, &mut state, &mut scratch, 0..particles);
     let begun = Instant::now();
     let mut costs = Vec::new();
     // A few at least, more while they are cheap.
     while costs.len() < 5 || (costs.len() < 51 && begun.elapsed() < Duration::from_millis(50)) {
-        if model.body().as_hybrid().is_some() {
-            // At other ticks than every tenth nobody looks which particles are to be awake.
-            state.mechanical.tick = 1;
-        }
-        if let (Some(own), Some(seed)) = (state.body.as_seed_mut(), model.body().as_seed()) {
-            own.touched = seed.model().largest_region();
-        }
+        served(model).make_next_tick_the_heaviest(model, &mut state, &mut scratch);
         let before = Instant::now();
         step(model, &mut state, &mut scratch, &input);
         costs.push(before.elapsed().as_secs_f64());

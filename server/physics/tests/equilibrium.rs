@@ -7,7 +7,7 @@ use palpate_physics::{
     LoadSpec, Model, Precision, PrescribedSpec, Scratch, State, Substeps, TetMesh, TickInput,
     elements::rigid_motion::RigidMotion,
     material::Law,
-    statics::{SolveError, StaticSettings, solve_static},
+    statics::{Goal, SolveError, StaticSettings, solve_static},
     step,
 };
 use std::ops::ControlFlow;
@@ -123,7 +123,10 @@ fn what_is_free_to_move_is_named() {
         let moved = vec![DVec3::ZERO; prescribed.len()];
         let model = Model::build(spec(mesh, material(Law::default(), YOUNG_PA, 0.3), prescribed, vec![])).unwrap();
         let settings = StaticSettings::default();
-        solve_static(&model, &[], &moved, &[], &settings, &mut |_| ControlFlow::Continue(())).unwrap_err()
+        solve_static(&model, &Goal { prescribed_displacements_m: &moved, ..Goal::default() }, &settings, &mut |_| {
+            ControlFlow::Continue(())
+        })
+        .unwrap_err()
     };
     let SolveError::UnderConstrained { motions, .. } = free(|_| vec![]) else { panic!() };
     assert_eq!(motions.len(), 6);
@@ -153,8 +156,13 @@ fn a_loose_part_is_found() {
     let prescribed = vec![held(&mesh, "clamp", [true; 3], |p| p.x == 0.0)];
     let model = Model::build(spec(mesh, material(Law::default(), YOUNG_PA, 0.3), prescribed, vec![])).unwrap();
     let settings = StaticSettings::default();
-    let error =
-        solve_static(&model, &[], &[DVec3::ZERO], &[], &settings, &mut |_| ControlFlow::Continue(())).unwrap_err();
+    let error = solve_static(
+        &model,
+        &Goal { prescribed_displacements_m: &[DVec3::ZERO], ..Goal::default() },
+        &settings,
+        &mut |_| ControlFlow::Continue(()),
+    )
+    .unwrap_err();
     let SolveError::UnderConstrained { node, motions } = error else { panic!("{error}") };
     assert_eq!((node, motions.len()), (8, 6));
 }
@@ -167,20 +175,48 @@ fn bad_arguments_and_a_stop_are_errors() {
     let model = Model::build(spec(mesh, material(Law::default(), YOUNG_PA, 0.3), prescribed, loads)).unwrap();
     let settings = StaticSettings::default();
     let mut go = |_: &_| ControlFlow::Continue(());
-    let error = solve_static(&model, &[], &[DVec3::ZERO], &[], &settings, &mut go).unwrap_err();
+    let error = solve_static(
+        &model,
+        &Goal { prescribed_displacements_m: &[DVec3::ZERO], ..Goal::default() },
+        &settings,
+        &mut go,
+    )
+    .unwrap_err();
     assert_eq!(error, SolveError::InputLength { what: "load factors", found: 0, expected: 1 });
-    let error = solve_static(&model, &[1.0], &[DVec3::NAN], &[], &settings, &mut go).unwrap_err();
+    let error = solve_static(
+        &model,
+        &Goal { load_factors: &[1.0], prescribed_displacements_m: &[DVec3::NAN], ..Goal::default() },
+        &settings,
+        &mut go,
+    )
+    .unwrap_err();
     assert_eq!(error, SolveError::InputNotFinite { what: "prescribed displacement", index: 0 });
     let loose = StaticSettings { relative_residual: 0.0, ..settings };
     assert!(matches!(
-        solve_static(&model, &[1.0], &[DVec3::ZERO], &[], &loose, &mut go),
+        solve_static(
+            &model,
+            &Goal { load_factors: &[1.0], prescribed_displacements_m: &[DVec3::ZERO], ..Goal::default() },
+            &loose,
+            &mut go
+        ),
         Err(SolveError::Setting { .. })
     ));
-    let error =
-        solve_static(&model, &[1.0], &[DVec3::ZERO], &[], &settings, &mut |_| ControlFlow::Break(())).unwrap_err();
+    let error = solve_static(
+        &model,
+        &Goal { load_factors: &[1.0], prescribed_displacements_m: &[DVec3::ZERO], ..Goal::default() },
+        &settings,
+        &mut |_| ControlFlow::Break(()),
+    )
+    .unwrap_err();
     assert_eq!(error, SolveError::Cancelled { load_fraction: 1.0 });
     // A load that no body can carry in f64.
-    let error = solve_static(&model, &[f64::MAX], &[DVec3::ZERO], &[], &settings, &mut go).unwrap_err();
+    let error = solve_static(
+        &model,
+        &Goal { load_factors: &[f64::MAX], prescribed_displacements_m: &[DVec3::ZERO], ..Goal::default() },
+        &settings,
+        &mut go,
+    )
+    .unwrap_err();
     println!("{error}");
     assert!(matches!(error, SolveError::NoConvergence { .. } | SolveError::NonFinite { .. }));
 }
@@ -206,7 +242,13 @@ fn a_stvk_column_past_its_limit_point_is_reported_inverted() {
     let model = Model::build(spec(mesh, material(Law::StVenantKirchhoff, YOUNG_PA, 0.0), prescribed, loads)).unwrap();
     let settings = StaticSettings { load_steps: 10, ..StaticSettings::default() };
     let moved = [DVec3::ZERO; 3];
-    let found = solve_static(&model, &[1.0], &moved, &[], &settings, &mut |_| ControlFlow::Continue(())).unwrap();
+    let found = solve_static(
+        &model,
+        &Goal { load_factors: &[1.0], prescribed_displacements_m: &moved, ..Goal::default() },
+        &settings,
+        &mut |_| ControlFlow::Continue(()),
+    )
+    .unwrap();
     // The only equilibrium left is turned inside out, ½s(s² − 1) = −0.25: found, and reported as inverted.
     let end = nodes_where(model.body().tets().unwrap(), |p| p.x == 0.1);
     let s = 1.0 + mean_displacement_m(&model, &found.x, &end).x / 0.1;
@@ -244,10 +286,15 @@ fn a_load_is_raised_in_a_bounded_number_of_steps() {
     let stopped = |max_iterations, max_halvings| {
         let settings = StaticSettings { relative_residual: 1e-10, max_iterations, load_steps: 1, max_halvings };
         let mut calls = 0;
-        let error = solve_static(&model, &[1.0], &[DVec3::ZERO], &[], &settings, &mut |_| {
-            calls += 1;
-            ControlFlow::Continue(())
-        })
+        let error = solve_static(
+            &model,
+            &Goal { load_factors: &[1.0], prescribed_displacements_m: &[DVec3::ZERO], ..Goal::default() },
+            &settings,
+            &mut |_| {
+                calls += 1;
+                ControlFlow::Continue(())
+            },
+        )
         .unwrap_err();
         println!("{calls} iterations: {error}");
         (error, calls)

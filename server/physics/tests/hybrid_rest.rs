@@ -5,8 +5,8 @@ use glam::DVec3;
 use palpate_physics::{
     Energies, LoadSpec, Model, ModelSpec, Settings,
     bodies::hybrid::Waking,
-    contact::{Coupling, ToolTarget},
-    statics::{SolveError, StaticSettings, StaticSolution, solve_static, solve_static_with},
+    contact::Coupling,
+    statics::{Goal, SolveError, StaticSettings, StaticSolution, solve_static},
     world::wake_only,
 };
 use rig::{Drive, Rig, at, held_below, hold, hybrid_block, mesh_of, nodes_where, particles, particles_mut, sphere};
@@ -67,9 +67,13 @@ fn loads_weight_and_moved_supports_come_to_the_same_rest_in_time() {
     for _ in 0..2000 {
         assert!(rig.tick(&drive).quarantined.is_none());
     }
-    let goal = (&drive.load_factors[..], &drive.prescribed[..], &[] as &[ToolTarget]);
-    let go_on = &mut |_: &_| ControlFlow::Continue(());
-    let found = solve_static_with(&rig.model, awake, goal, &settings(), go_on).unwrap().unwrap();
+    let goal = Goal {
+        load_factors: &drive.load_factors,
+        prescribed_displacements_m: &drive.prescribed,
+        awake: Some(&awake),
+        ..Goal::default()
+    };
+    let found = solve_static(&rig.model, &goal, &settings(), &mut |_| ControlFlow::Continue(())).unwrap();
     assert_eq!(found.awake.ids, rig.state.body.active_particles());
     assert!(found.awake.ids.len() > 120 && found.stable && found.relative_residual <= 1e-12, "{found:?}");
     let (apart, moved) = apart_m(&rig, &found);
@@ -91,7 +95,13 @@ fn pressed(coupling: Coupling, fine_depth_m: Option<f64>) -> Rig {
 
 fn solved(model: &Model, device_m: DVec3) -> StaticSolution {
     let moved = vec![DVec3::ZERO; model.prescribed().len()];
-    solve_static(model, &[], &moved, &[at(device_m)], &settings(), &mut |_| ControlFlow::Continue(())).unwrap()
+    solve_static(
+        model,
+        &Goal { prescribed_displacements_m: &moved, tools: &[at(device_m)], ..Goal::default() },
+        &settings(),
+        &mut |_| ControlFlow::Continue(()),
+    )
+    .unwrap()
 }
 
 fn a_tool_rests_where_the_loop_has_it(
@@ -189,9 +199,13 @@ fn a_block_under_traction_stretches_uniformly() {
         let partition = model.body().as_hybrid().unwrap().partition();
         let inner = |&p: &u32| partition.particle_m(p).distance(DVec3::new(2e-3, 1e-3, -9e-3)) < 8e-3;
         let ids: Vec<u32> = (0..partition.particle_count() as u32).filter(inner).take(awake).collect();
-        let goal = (&[1.0][..], &[DVec3::ZERO; 3][..], &[] as &[ToolTarget]);
-        let found =
-            solve_static_with(&model, ids, goal, &settings(), &mut |_| ControlFlow::Continue(())).unwrap().unwrap();
+        let goal = Goal {
+            load_factors: &[1.0],
+            prescribed_displacements_m: &[DVec3::ZERO; 3],
+            awake: Some(&ids),
+            ..Goal::default()
+        };
+        let found = solve_static(&model, &goal, &settings(), &mut |_| ControlFlow::Continue(())).unwrap();
         assert_eq!(found.awake.ids.is_empty(), awake == 0);
         let corner = DVec3::new(-0.02, -0.02, -0.02);
         let expected = |rest: DVec3| corner + (rest - corner) * DVec3::new(across, across, 1.2);
@@ -212,8 +226,12 @@ fn a_load_on_a_spot_wakes_particles_and_one_on_all_of_a_face_does_not() {
         let triangles = skin_triangles(&spec, loaded);
         spec.loads = vec![LoadSpec::Traction { triangles, traction_pa: DVec3::Z * -100.0 }];
         let model = Model::build(spec).unwrap();
-        let found =
-            solve_static(&model, &[factor], &[DVec3::ZERO], &[], &settings(), &mut |_| ControlFlow::Continue(()));
+        let found = solve_static(
+            &model,
+            &Goal { load_factors: &[factor], prescribed_displacements_m: &[DVec3::ZERO], ..Goal::default() },
+            &settings(),
+            &mut |_| ControlFlow::Continue(()),
+        );
         (found.unwrap().awake, model)
     };
     let spot = |p: DVec3| p.z > -1e-6 && p.length() < 5e-3;
@@ -231,12 +249,20 @@ fn a_load_on_a_spot_wakes_particles_and_one_on_all_of_a_face_does_not() {
 fn what_is_not_held_or_not_to_be_reached_is_refused() {
     let go_on = &mut |_: &_| ControlFlow::Continue(());
     let free = Model::build(block(Waking::ByHand)).unwrap();
-    let error = solve_static(&free, &[], &[], &[], &settings(), go_on).unwrap_err();
+    let error = solve_static(&free, &Goal::default(), &settings(), go_on).unwrap_err();
     assert!(matches!(error, SolveError::UnderConstrained { ref motions, .. } if motions.len() == 6), "{error}");
     let past = Model::build(held_below(block(Waking::ByHand))).unwrap();
-    let error = solve_static(&past, &[], &[DVec3::NAN], &[], &settings(), go_on).unwrap_err();
+    let error =
+        solve_static(&past, &Goal { prescribed_displacements_m: &[DVec3::NAN], ..Goal::default() }, &settings(), go_on)
+            .unwrap_err();
     assert!(matches!(error, SolveError::InputNotFinite { .. }), "{error}");
     let stop = &mut |_: &_| ControlFlow::Break(());
-    let error = solve_static(&past, &[], &[DVec3::X * 1e-3], &[], &settings(), stop).unwrap_err();
+    let error = solve_static(
+        &past,
+        &Goal { prescribed_displacements_m: &[DVec3::X * 1e-3], ..Goal::default() },
+        &settings(),
+        stop,
+    )
+    .unwrap_err();
     assert!(matches!(error, SolveError::Cancelled { .. }), "{error}");
 }

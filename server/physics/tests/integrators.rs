@@ -144,9 +144,14 @@ fn rest_is_rest_and_equilibrium_does_not_depend_on_the_scheme() {
     let reference = {
         let model = Rig::new(heavy(Integrator::Leapfrog)).model;
         let settings = statics::StaticSettings { relative_residual: 1e-12, ..statics::StaticSettings::default() };
-        statics::solve_static(&model, &[], &[DVec3::ZERO], &[], &settings, &mut |_| std::ops::ControlFlow::Continue(()))
-            .unwrap()
-            .x
+        statics::solve_static(
+            &model,
+            &statics::Goal { prescribed_displacements_m: &[DVec3::ZERO], ..statics::Goal::default() },
+            &settings,
+            &mut |_| std::ops::ControlFlow::Continue(()),
+        )
+        .unwrap()
+        .x
     };
     for integrator in ALL {
         let mut still = Rig::new(held_block(integrator));

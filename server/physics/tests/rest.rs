@@ -7,7 +7,7 @@ use palpate_physics::{
     Energies, Model, Scratch, State, Substeps, TickInput,
     contact::{Coupling, ToolShape, ToolSpec, ToolTarget},
     material::Law,
-    statics::{SolveError, StaticSettings, StaticSolution, solve_static},
+    statics::{Goal, SolveError, StaticSettings, StaticSolution, solve_static},
     step,
 };
 use std::ops::ControlFlow;
@@ -47,7 +47,12 @@ fn at(position_m: DVec3) -> ToolTarget {
 
 fn solved(model: &Model, device_m: DVec3) -> Result<StaticSolution, SolveError> {
     let settings = StaticSettings { relative_residual: 1e-12, ..StaticSettings::default() };
-    solve_static(model, &[], &[DVec3::ZERO], &[at(device_m)], &settings, &mut |_| ControlFlow::Continue(()))
+    solve_static(
+        model,
+        &Goal { prescribed_displacements_m: &[DVec3::ZERO], tools: &[at(device_m)], ..Goal::default() },
+        &settings,
+        &mut |_| ControlFlow::Continue(()),
+    )
 }
 
 /// Ticks with the device going from its start to its place in `way_ticks`, then resting.

@@ -6,7 +6,7 @@ use glam::DVec3;
 use palpate_physics::{
     LoadSpec, Model, TetMesh,
     material::Law,
-    statics::{StaticSettings, solve_static},
+    statics::{Goal, StaticSettings, solve_static},
 };
 use std::ops::ControlFlow;
 
@@ -25,8 +25,13 @@ fn cost(name: &str, mesh: TetMesh, pressure_pa: f64) {
     let model = Model::build(spec(mesh, law, prescribed, loads)).unwrap();
     let start = cpu_s();
     let settings = StaticSettings::default();
-    let found =
-        solve_static(&model, &[1.0], &[DVec3::ZERO], &[], &settings, &mut |_| ControlFlow::Continue(())).unwrap();
+    let found = solve_static(
+        &model,
+        &Goal { load_factors: &[1.0], prescribed_displacements_m: &[DVec3::ZERO], ..Goal::default() },
+        &settings,
+        &mut |_| ControlFlow::Continue(()),
+    )
+    .unwrap();
     println!(
         "| {name} | {tets} | {} | {} | {} | {:.2} |",
         3 * nodes,

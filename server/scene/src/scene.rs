@@ -72,8 +72,8 @@ pub struct BodySummary {
     pub volume_m3: f64,
     /// Mass (kg).
     pub mass_kg: f64,
-    /// Shape of the tets.
-    pub quality: Quality,
+    /// Shape of the tets, where there are any.
+    pub quality: Option<Quality>,
     /// What the filler did, one remark a line: repairs, layers, quality.
     pub fill_report: Vec<String>,
     /// Named parts that regions can refer to: nodes, surface triangles and tets of each.

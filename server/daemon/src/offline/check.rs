@@ -4,15 +4,12 @@ use super::{
     load,
     summary::Percentiles,
 };
-use palpate_physics::{
-    Model,
-    bodies::{
-        hybrid::Waking,
-        mass_spring::{Refinement, region::Constants},
-        seed::region::Region,
-    },
+use crate::bodies::served;
+use palpate_physics::Model;
+use palpate_scene::{
+    Scene, builtin_names,
+    wording::{counted, short},
 };
-use palpate_scene::{Scene, builtin_names, wording::counted};
 use std::process::ExitCode;
 
 /// Flags of `palpated check`.
@@ -44,11 +41,10 @@ pub fn run(args: &CheckArgs) -> miette::Result<ExitCode> {
     let scene = load::load_scene(name)?;
     let model = load::build(&scene)?;
     print_body(&scene);
-    print_particles(&model);
-    print_seed(&model);
-    print_springs(&model);
+    let body = served(&model);
+    body.description().iter().for_each(|line| println!("{line}"));
     print_contents(&scene);
-    let warnings = [scene.warnings.clone(), particle_warnings(&model)].concat();
+    let warnings = [scene.warnings.clone(), body.warnings()].concat();
     for warning in &warnings {
         println!("warning: {warning}");
     }
@@ -60,12 +56,11 @@ pub fn run(args: &CheckArgs) -> miette::Result<ExitCode> {
 
 fn print_body(scene: &Scene) {
     let body = &scene.summary;
-    let quality = &body.quality;
     println!("{}", [scene.name.as_str(), &scene.description].map(str::trim).join(": ").trim_end_matches([':', ' ']));
     println!("body       {}", body.origin);
     let surface = counted(body.surface_triangles, "surface triangle");
     println!("           {}, {}, {surface}", counted(body.tets, "tet"), counted(body.nodes, "node"));
-    if body.tets > 0 {
+    if let Some(quality) = &body.quality {
         println!("           volume {} ml, mass {} g", short(body.volume_m3 * 1e6), short(body.mass_kg * 1e3));
         println!(
             "quality    dihedral angles {:.1}° to {:.1}°, volume-length ratio {:.3} at worst, {:.3} in the mean",
@@ -92,124 +87,6 @@ fn print_body(scene: &Scene) {
             short(lame.poisson_ratio()),
             region.density_kg_per_m3
         );
-    }
-}
-
-fn print_particles(model: &Model) {
-    let Some(hybrid) = model.body().as_hybrid() else { return };
-    let spec = hybrid.particles();
-    let cage = hybrid.cage();
-    println!(
-        "particles  {}, {} mm apart, at most {} awake; skin of {}",
-        hybrid.partition().particle_count(),
-        short(spec.spacing_m * 1e3),
-        spec.most_active,
-        counted(spec.skin.triangles().len(), "triangle")
-    );
-    if let Some(depth_m) = spec.fine_depth_m {
-        let doubled = hybrid.partition().cells().iter().filter(|cell| cell.doubled).count();
-        println!(
-            "           {} mm apart deeper than {} mm ({} of {})",
-            short(spec.spacing_m * 2e3),
-            short(depth_m * 1e3),
-            doubled,
-            counted(hybrid.partition().cells().len(), "cell")
-        );
-    }
-    if let Waking::ByTools { reach_m } = spec.waking {
-        println!("           those within {} mm of a tool's contact wake", short(reach_m * 1e3));
-    }
-    println!(
-        "           the coarse tets' surface was moved by up to {} mm to hold them; {} outside never wake",
-        short(cage.moved_m * 1e3),
-        cage.outside
-    );
-    println!(
-        "           coarse level of {}; {:.0} % of the volume is in whole cells, the surface cuts the others",
-        counted(hybrid.node_count(), "node"),
-        100.0 * hybrid.partition().whole_part()
-    );
-}
-
-/// What one would want to change, of a hybrid body.
-fn particle_warnings(model: &Model) -> Vec<String> {
-    /// Of the volume in whole cells: less is a lattice that hardly sees the body.
-    const FEW_WHOLE: f64 = 0.2;
-    /// Of the particles outside the coarse tets.
-    const MANY_OUTSIDE: f64 = 0.1;
-    let Some(hybrid) = model.body().as_hybrid() else { return Vec::new() };
-    let spec = hybrid.particles();
-    let partition = hybrid.partition();
-    let mut warnings = Vec::new();
-    if partition.whole_part() < FEW_WHOLE {
-        warnings.push(format!(
-            "only {:.0} % of the volume is in whole cells: particles {} mm apart are coarse for this body; lower their spacing in [body.particles]",
-            100.0 * partition.whole_part(),
-            short(spec.spacing_m * 1e3)
-        ));
-    }
-    let outside = hybrid.cage().outside;
-    if outside as f64 > MANY_OUTSIDE * partition.particle_count() as f64 {
-        warnings.push(format!(
-            "{outside} of {} particles are outside the coarse tets and never wake: where they are, the body answers as coarsely as its tets; ask for more tets",
-            partition.particle_count()
-        ));
-    }
-    if spec.fine_depth_m.is_some() && !partition.cells().iter().any(|cell| cell.doubled) {
-        warnings.push(
-            "fine depth in [body.particles]: no cell is of twice the spacing, the body is too thin for any deeper down; leave the key out"
-                .to_owned(),
-        );
-    }
-    warnings
-}
-
-/// Of the papers' hybrid.
-fn print_seed(model: &Model) {
-    let Some(seed) = model.body().as_seed().map(palpate_physics::bodies::seed::SeedBody::model) else { return };
-    let parameters = seed.parameters();
-    println!("seed       the papers' own hybrid; steps of {} ms", short(parameters.dt_s * 1e3));
-    if let Some(layer) = seed.layer() {
-        let spacing_m = layer.voxels.spacing_m;
-        let sizes = seed.regions().iter().map(Region::len);
-        println!(
-            "particles  {}, {} mm apart; {} to {} awake, {:.0} on average over {}",
-            layer.particle_count(),
-            short(spacing_m * 1e3),
-            sizes.clone().min().unwrap_or_default(),
-            seed.most_awake(),
-            sizes.sum::<usize>() as f64 / seed.regions().len() as f64,
-            counted(seed.regions().len(), "triangle")
-        );
-        println!(
-            "           waves cross a spacing in {} ms, by the papers' formula in {} ms",
-            short(parameters.courant_s(spacing_m) * 1e3),
-            short(parameters.courant_as_printed_s(spacing_m) * 1e3)
-        );
-    }
-}
-
-/// Of a mass-spring surface.
-fn print_springs(model: &Model) {
-    let Some(body) = model.body().as_mass_spring() else { return };
-    let spec = body.model().spec();
-    let of = |constants: &Constants| {
-        format!("K_m {} N/m, K_h {} N/m", short(constants.mesh_n_per_m), short(constants.home_n_per_m))
-    };
-    println!("springs    {}; edges {} mm long in the mean", of(&spec.coarse), short(body.edge_m() * 1e3));
-    match body.refinement() {
-        None => println!("           coarse everywhere"),
-        Some(Refinement { rings, fade_s, .. }) => println!(
-            "           {} around what is touched are refined within {} s: at most {}",
-            counted(rings as usize, "ring"),
-            short(fade_s),
-            of(&spec.fine)
-        ),
-    }
-    if body.is_all_awake() {
-        println!("           all vertices are awake always");
-    } else {
-        println!("           the {} vertices nearest to tools are awake", spec.most_awake);
     }
 }
 
@@ -285,31 +162,4 @@ fn print_contents(scene: &Scene) {
     }
     let probes: Vec<&str> = scene.probes.iter().map(palpate_scene::Probe::name).collect();
     println!("probes     {}", if probes.is_empty() { "none".to_owned() } else { probes.join(", ") });
-}
-
-/// Four significant digits, without the zeros behind them.
-fn short(value: f64) -> String {
-    let rounded: f64 = format!("{value:.3e}").parse().unwrap_or(value);
-    if rounded == 0.0 || (1e-4..1e7).contains(&rounded.abs()) { rounded.to_string() } else { format!("{rounded:e}") }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn numbers_have_the_digits_they_need() {
-        let cases = [
-            (256.0, "256"),
-            (3614.465, "3614"),
-            (0.45, "0.45"),
-            (4999.6, "5000"),
-            (1e4, "10000"),
-            (1.5e9, "1.5e9"),
-            (0.0, "0"),
-        ];
-        for (value, text) in cases {
-            assert_eq!(short(value), text);
-        }
-    }
 }

@@ -8,13 +8,13 @@ use super::{
     probes::ProbeRows,
     summary::{Ending, SolveNumbers, Summary},
 };
-use crate::progress::Progress;
+use crate::{bodies::served, progress::Progress};
 use glam::DVec3;
 use miette::Diagnostic;
 use palpate_physics::{
-    BodySpec, Model,
+    Model,
     contact::ToolTarget,
-    statics::{self, SolveError, StaticSettings, StaticSolution},
+    statics::{self, Goal, SolveError, StaticSettings, StaticSolution},
 };
 use palpate_scene::Scene;
 use std::{ops::ControlFlow, process::ExitCode, time::Instant};
@@ -56,37 +56,27 @@ struct NoEquilibrium {
 pub fn run(args: &StaticArgs) -> miette::Result<ExitCode> {
     let output = &args.output;
     let scene = load::load_with_warnings(&output.scene)?;
-    if let BodySpec::MassSpring(_) = scene.model.body {
-        return Err(miette::miette!(
-            help = "let `palpated simulate` come to rest",
-            "the equilibrium of a mass-spring surface is not solved for"
-        ));
-    }
-    if let BodySpec::Seed(_) = scene.model.body {
-        return Err(miette::miette!(
-            help = "let `palpated simulate` come to rest, or put [body.particles] in place of [body.seed]: that hybrid's equilibrium is solved for",
-            "\"{}\" is the papers' hybrid, whose forces have no equilibrium that is solved for",
-            scene.name
-        ));
-    }
     let model = load::build(&scene)?;
+    if let Some(refusal) = served(&model).no_equilibrium(&scene.name) {
+        return Err(refusal);
+    }
     if let Some(out) = &output.out {
         folder::check(out, output.force)?;
     }
     let started = Instant::now();
-    let goal = Goal::of(&scene, args.at_s);
-    let solution = solve(&scene, &model, &goal, args.residual)?;
+    let sought = Sought::of(&scene, args.at_s);
+    let solution = solve(&scene, &model, &sought, args.residual)?;
     // Only now that there is something to replace them with do earlier results go.
     let out = output.out.as_deref().map(|out| folder::prepare(out, output.force)).transpose()?;
-    let state = solution.state(&model, &goal.load_factors);
+    let state = solution.state(&model, &sought.load_factors);
     let mut rows = ProbeRows::new(&scene.probes, out.as_ref().map(|out| out.join(folder::PROBES)).as_deref())?;
-    rows.sample(goal.time_s, &model, &state, &solution.node_reactions_n)?;
+    rows.sample(sought.time_s, &model, &state, &solution.node_reactions_n)?;
     rows.flush()?;
     let wall_s = started.elapsed().as_secs_f64();
-    let mut ending = Ending { command: "static", by: "equilibrium", simulated_s: goal.time_s, wall_s, frames: 0 };
+    let mut ending = Ending { command: "static", by: "equilibrium", simulated_s: sought.time_s, wall_s, frames: 0 };
     if let Some(out) = &out {
         let mut frames = Frames::new(out, &model)?;
-        frames.write(goal.time_s, &model, &state)?;
+        frames.write(sought.time_s, &model, &state)?;
         ending.frames = frames.count();
     }
     let mut summary = Summary::new(&scene, &model, &state, &rows, &ending);
@@ -108,14 +98,14 @@ pub fn run(args: &StaticArgs) -> miette::Result<ExitCode> {
 }
 
 /// Under what the equilibrium is sought.
-struct Goal {
+struct Sought {
     time_s: f64,
     load_factors: Vec<f64>,
     prescribed_m: Vec<DVec3>,
     tools: Vec<ToolTarget>,
 }
 
-impl Goal {
+impl Sought {
     fn of(scene: &Scene, at_s: Option<f64>) -> Self {
         let mut load_factors = vec![0.0; scene.model.loads.len()];
         let mut prescribed_m = vec![DVec3::ZERO; scene.model.prescribed.len()];
@@ -127,9 +117,18 @@ impl Goal {
         let tools = (0..scene.model.tools.len()).map(|tool| scene.offline_target(tool, time_s).at_rest()).collect();
         Self { time_s, load_factors, prescribed_m, tools }
     }
+
+    fn goal(&self) -> Goal<'_> {
+        Goal {
+            load_factors: &self.load_factors,
+            prescribed_displacements_m: &self.prescribed_m,
+            tools: &self.tools,
+            awake: None,
+        }
+    }
 }
 
-fn solve(scene: &Scene, model: &Model, goal: &Goal, residual: Option<f64>) -> miette::Result<StaticSolution> {
+fn solve(scene: &Scene, model: &Model, sought: &Sought, residual: Option<f64>) -> miette::Result<StaticSolution> {
     let default = StaticSettings::default();
     let settings = StaticSettings { relative_residual: residual.unwrap_or(default.relative_residual), ..default };
     let interrupt = Interrupt::listen();
@@ -144,8 +143,7 @@ fn solve(scene: &Scene, model: &Model, goal: &Goal, residual: Option<f64>) -> mi
         ));
         if interrupt.is_set() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     };
-    let solved =
-        statics::solve_static(model, &goal.load_factors, &goal.prescribed_m, &goal.tools, &settings, &mut show);
+    let solved = statics::solve_static(model, &sought.goal(), &settings, &mut show);
     bar.finish();
     solved.map_err(|cause| NoEquilibrium { scene: scene.name.clone(), advice: advice(&cause), cause }.into())
 }

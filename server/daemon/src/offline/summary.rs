@@ -66,7 +66,7 @@ impl ParticleNumbers {
             spacing_m: model.body().particle_spacing_m(),
             most_active: model.body().most_awake_particles(),
             active: state.awake_particles(),
-            outside: model.body().as_hybrid().map_or(0, |hybrid| hybrid.cage().outside),
+            outside: model.body().particles_that_never_wake(),
             skin_triangles: model.surface().triangles.len(),
         })
     }
@@ -185,8 +185,7 @@ impl Summary {
                 gravitational: energies.gravitational_j,
                 external_work: energies.external_work_j,
                 dissipated: energies.dissipated_j,
-                balance: (ending.command == "simulate" && model.body().as_seed().is_none())
-                    .then(|| energies.balance_j()),
+                balance: (ending.command == "simulate" && model.body().books_energy()).then(|| energies.balance_j()),
             },
             min_volume_ratio: world::min_volume_ratio(model, state).map_or(1.0, |smallest| smallest.ratio),
             probes,

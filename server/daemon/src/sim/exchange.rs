@@ -1,8 +1,9 @@
 //! What passes between the loop and the rest of the daemon: fixed slots (the newest wins) and flags. Nothing here blocks or
 //! allocates on the loop's side once built.
 use super::bell::{Ear, bell};
+use crate::bodies::{Shape, served};
 use glam::{DQuat, DVec3};
-use palpate_physics::{Model, Quarantine, bodies::mass_spring::SpringMotion, contact::LocalContactModel};
+use palpate_physics::{Model, Quarantine, contact::LocalContactModel};
 use palpate_realtime::Doorbell;
 use std::{
     io,
@@ -187,7 +188,7 @@ pub struct ToolView {
 }
 
 /// The surface at a tick.
-#[derive(Debug, Clone, PartialEq, Default)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct SurfaceSnapshot {
     /// Tick.
     pub tick: u64,
@@ -195,65 +196,14 @@ pub struct SurfaceSnapshot {
     pub time_s: f64,
     /// Wall-clock cost of the last tick (µs).
     pub tick_cost_us: f64,
-    /// Largest displacement of a surface vertex (m); of a hybrid body and of springs, the hub works it out.
-    pub max_displacement_m: f64,
     /// Why the state stands, if it is quarantined.
     pub quarantine: Option<Quarantine>,
-    /// Whether [`SurfaceSnapshot::displacements_m`] was filled.
-    pub has_vertices: bool,
-    /// Displacement of each surface vertex (m) from its f32 rest position.
-    pub displacements_m: Vec<[f32; 3]>,
-    /// Of a hybrid body, in place of displacements.
-    pub lattice: LatticeSnapshot,
-    /// Of a mass-spring surface, in place of displacements.
-    pub springs: Option<SpringSnapshot>,
-    /// Positions (m) of a seed body's awake particles.
-    pub seed_particles_m: Vec<DVec3>,
+    /// Whether anybody wants vertices.
+    pub wants_vertices: bool,
+    /// Where the body is.
+    pub shape: Shape,
     /// Tools.
     pub tools: Vec<ToolView>,
-}
-
-impl SurfaceSnapshot {
-    /// Positions (m) of the awake particles.
-    pub fn particles_m(&self) -> &[DVec3] {
-        let LatticeSnapshot { x, active } = &self.lattice;
-        if active.is_empty() { &self.seed_particles_m } else { &x[x.len() - active.len()..] }
-    }
-}
-
-/// What the skin of a hybrid body follows.
-#[derive(Debug, Clone, PartialEq, Default)]
-pub struct LatticeSnapshot {
-    /// Positions (m) of coarse nodes and then of active particles.
-    pub x: Vec<DVec3>,
-    /// Active particles, ascending.
-    pub active: Vec<u32>,
-}
-
-impl LatticeSnapshot {
-    /// Filled to the most it will ever hold: copies of it then have that room, too.
-    fn full(model: &Model) -> Self {
-        let Some(hybrid) = model.body().as_hybrid() else { return Self::default() };
-        let most = hybrid.particles().most_active;
-        Self { x: vec![DVec3::ZERO; hybrid.node_count() + most], active: vec![0; most] }
-    }
-}
-
-/// Where a mass-spring surface is.
-#[derive(Debug, Clone, PartialEq)]
-pub struct SpringSnapshot {
-    /// Awake nodes and levels.
-    pub motion: SpringMotion,
-    /// Positions (m) of the awake nodes.
-    pub x: Vec<DVec3>,
-}
-
-impl SpringSnapshot {
-    /// Filled to the most it will ever hold: copies of it then have that room, too.
-    fn full(model: &Model) -> Option<Self> {
-        let springs = model.body().as_mass_spring()?.model();
-        Some(Self { motion: SpringMotion::filled(springs), x: vec![DVec3::ZERO; springs.most_nodes()] })
-    }
 }
 
 /// The loop's end of the surface.
@@ -281,16 +231,13 @@ pub struct SurfaceEnd {
 pub fn surface(model: &Model) -> io::Result<(SurfacePort, SurfaceEnd)> {
     let (bell, ear) = bell()?;
     let (input, output) = triple_buffer(&SurfaceSnapshot {
-        displacements_m: if model.body().as_hybrid().is_some() || model.body().as_mass_spring().is_some() {
-            Vec::new()
-        } else {
-            vec![[0.0; 3]; model.surface().nodes.len()]
-        },
-        lattice: LatticeSnapshot::full(model),
-        springs: SpringSnapshot::full(model),
-        seed_particles_m: vec![DVec3::ZERO; model.body().as_seed().map_or(0, |seed| seed.model().most_awake())],
+        tick: 0,
+        time_s: 0.0,
+        tick_cost_us: 0.0,
+        quarantine: None,
+        wants_vertices: false,
+        shape: served(model).largest_shape(model),
         tools: vec![ToolView::default(); model.tools().len()],
-        ..Default::default()
     });
     Ok((SurfacePort { slot: input, bell }, SurfaceEnd { slot: output, ear }))
 }

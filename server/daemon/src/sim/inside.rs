@@ -1,74 +1,24 @@
 //! Whether a point is inside the deformed body: asked now and then for a tool that waits to be clear of it.
-use glam::{DMat3, DVec3};
-use palpate_physics::{
-    Model, State, TetMesh,
-    bodies::{
-        hybrid::{HybridBody, partition::NONE},
-        mass_spring::topology::Edge,
-    },
-    contact::is_inside,
-};
-
-/// A point between two tets or cells is in one of them, whatever rounding says.
-const ROUNDING: f64 = 1e-9;
+use crate::bodies::served;
+use glam::DVec3;
+use palpate_physics::{Model, State};
 
 /// What is looked at.
 #[derive(Debug)]
 pub struct Inside {
-    /// Nodes of the surface's triangles; of a hybrid body, none, nor of springs on a surface that is open.
-    triangles: Vec<[u32; 3]>,
+    enclosing_triangles: Vec<[u32; 3]>,
 }
 
 impl Inside {
     /// For a model.
     pub fn new(model: &Model) -> Self {
-        if let Some(springs) = model.body().as_mass_spring() {
-            let surface = springs.model().surface();
-            let is_closed = !surface.edges().iter().any(Edge::is_border);
-            return Self { triangles: if is_closed { surface.triangles().to_vec() } else { Vec::new() } };
-        }
-        let count = if model.body().as_hybrid().is_some() { 0 } else { model.surface().triangles.len() };
-        Self { triangles: (0..count).map(|triangle| model.surface().triangle_nodes(triangle)).collect() }
+        Self { enclosing_triangles: served(model).enclosing_triangles(model) }
     }
 
-    /// Whether a point (m) is inside. Does not allocate.
-    ///
-    /// Of a hybrid body, its many-vertexed skin is not looked at: the coarse tets, linear between their corners, take the point back to
-    /// rest, where it is inside when a cell of the body holds it. That is right to within about a spacing, beyond which a tool touches.
-    ///
-    /// Of springs, it is the surface at rest that is looked at, from which a tool's dent differs by little.
+    /// Whether a point (m) is inside the body. Does not allocate.
     pub fn holds(&self, model: &Model, state: &State, point_m: DVec3) -> bool {
-        if model.body().as_mass_spring().is_some() {
-            return is_inside(point_m, &self.triangles, model.rest_positions_m());
-        }
-        match model.body().as_hybrid() {
-            None => is_inside(point_m, &self.triangles, &state.mechanical.x),
-            Some(hybrid) => {
-                at_rest(hybrid.coarse(), &state.mechanical.x, point_m).any(|rest_m| is_in_a_cell(hybrid, rest_m))
-            }
-        }
+        served(model).holds(&self.enclosing_triangles, state, point_m)
     }
-}
-
-/// Where a point may be at rest (m): once for every coarse tet that holds it.
-fn at_rest<'a>(coarse: &'a TetMesh, x: &'a [DVec3], point_m: DVec3) -> impl Iterator<Item = DVec3> + 'a {
-    let rest = coarse.positions_m();
-    coarse.tets().iter().filter_map(move |tet| {
-        let [a, b, c, d] = tet.map(|node| x[node as usize]);
-        let local = DMat3::from_cols(b - a, c - a, d - a).inverse() * (point_m - a);
-        let weights = [1.0 - local.element_sum(), local.x, local.y, local.z];
-        let held = weights.iter().all(|&weight| weight >= -ROUNDING);
-        held.then(|| tet.iter().zip(weights).map(|(&node, weight)| rest[node as usize] * weight).sum())
-    })
-}
-
-fn is_in_a_cell(hybrid: &HybridBody, rest_m: DVec3) -> bool {
-    let sites = hybrid.partition().sites();
-    let cell = sites.cell(sites.cell_near(rest_m));
-    let local = (rest_m - sites.cell_m(cell)) / sites.spacing_m();
-    // The nearest cell of a point outside the lattice's box does not hold it.
-    let in_box = (local - 0.5).abs().max_element() <= 0.5 + ROUNDING;
-    in_box && hybrid.partition().cell_at(cell) != NONE
 }
 
 #[cfg(test)]

@@ -6,7 +6,7 @@ use super::{
     inside::Inside,
     tool::{ArmLimits, ToolLoop},
 };
-use crate::stream::{hub::Demand, keyframe};
+use crate::stream::hub::Demand;
 use glam::DVec3;
 use palpate_physics::{Model, Scratch, State, contact::ToolTarget};
 use palpate_scene::{Driver, ScriptedHand, Timeline};
@@ -27,7 +27,6 @@ pub struct Simulation {
     pub(super) prescribed_m: Vec<DVec3>,
     pub(super) injections: Injections,
     pub(super) surface: SurfacePort,
-    pub(super) rest_f32_m: Vec<[f32; 3]>,
     pub(super) inside: Inside,
     pub(super) demand: Arc<Demand>,
     pub(super) ticks_to_frame: u32,
@@ -91,7 +90,6 @@ impl Simulation {
             prescribed_m: vec![DVec3::ZERO; model.prescribed().len()],
             injections: Injections::default(),
             surface,
-            rest_f32_m: keyframe::rest_positions_f32(&model),
             inside: Inside::new(&model),
             demand,
             ticks_to_frame: 0,
@@ -160,40 +158,12 @@ impl Simulation {
         snapshot.time_s = self.state.time_s(&self.model);
         snapshot.tick_cost_us = tick_cost_us;
         snapshot.quarantine = self.state.quarantine;
-        snapshot.has_vertices = self.demand.wants_vertices();
+        snapshot.wants_vertices = self.demand.wants_vertices();
+        snapshot.shape.fill(&self.model, &self.state);
         for (view, (tool, state)) in snapshot.tools.iter_mut().zip(self.tools.iter().zip(&self.state.mechanical.tools))
         {
             *view = tool.view(state);
         }
-        if self.model.body().as_hybrid().is_some() {
-            snapshot.lattice.x.clone_from(&self.state.mechanical.x);
-            snapshot.lattice.active.clear();
-            snapshot.lattice.active.extend_from_slice(self.state.body.active_particles());
-            self.surface.slot.publish();
-            self.surface.bell.ring();
-            return;
-        }
-        if let (Some(copy), Some(springs)) = (&mut snapshot.springs, self.state.body.as_mass_spring()) {
-            copy.x.clone_from(&self.state.mechanical.x);
-            copy.motion.copy_from(&springs.motion);
-            self.surface.slot.publish();
-            self.surface.bell.ring();
-            return;
-        }
-        if self.model.body().as_seed().is_some() {
-            snapshot.seed_particles_m.clear();
-            snapshot.seed_particles_m.extend_from_slice(self.state.awake_particles_m());
-        }
-        let nodes = &self.model.surface().nodes;
-        let mut largest_sq = 0.0_f64;
-        for ((displacement, node), rest) in snapshot.displacements_m.iter_mut().zip(nodes).zip(&self.rest_f32_m) {
-            let moved = self.state.mechanical.x[*node as usize] - DVec3::from(rest.map(f64::from));
-            largest_sq = largest_sq.max(moved.length_squared());
-            if snapshot.has_vertices {
-                *displacement = moved.to_array().map(|component| component as f32);
-            }
-        }
-        snapshot.max_displacement_m = largest_sq.sqrt();
         self.surface.slot.publish();
         self.surface.bell.ring();
     }

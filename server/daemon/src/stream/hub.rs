@@ -3,9 +3,8 @@ use super::{
     encode::{Delta, Quantiser, Shape},
     keyframe, places,
     refined::Refiner,
-    skin::SkinReader,
-    springs::SpringReader,
 };
+use crate::bodies::served;
 use crate::sim::exchange::{SurfaceEnd, SurfaceSnapshot, ToolView};
 use glam::DVec3;
 use palpate_physics::{Model, contact::ToolSpec};
@@ -243,8 +242,7 @@ impl Hub {
         let keyframe = Arc::new(keyframe::chunks(&session_id, &scene_name, &model, epoch));
         let (low, high) = keyframe::bounds_m(&model);
         let rest_f32_m = keyframe::rest_positions_f32(&model);
-        let mut skin = SkinReader::new(&model, &rest_f32_m);
-        let mut springs = SpringReader::new(&model, &rest_f32_m);
+        let mut reader = served(&model).shape_reader(&model, &rest_f32_m);
         // Made when somebody first asks: many are never asked.
         let mut refiner: Option<Option<Refiner>> = None;
         let mut quantiser = Quantiser::new(model.surface().nodes.len(), (high - low).length());
@@ -258,31 +256,22 @@ impl Hub {
                 continue;
             }
             number += 1;
-            let snapshot = surface.slot.output_buffer_mut();
-            if let Some(skin) = &mut skin {
-                snapshot.max_displacement_m = skin.read(&snapshot.lattice);
-            }
-            if let (Some(reader), Some(of_loop)) = (&mut springs, &snapshot.springs) {
-                snapshot.max_displacement_m = reader.read(of_loop);
-            }
-            let displacements_m = match (&skin, &springs) {
-                (Some(skin), _) => skin.displacements_m(),
-                (None, Some(springs)) => springs.displacements_m(),
-                (None, None) => &snapshot.displacements_m[..],
-            };
-            let shape = snapshot.has_vertices.then(|| quantiser.advance(number, displacements_m));
+            let snapshot = surface.slot.output_buffer();
+            let max_displacement_m = reader.read(&snapshot.shape);
+            let displacements_m = reader.displacements_m();
+            let shape = snapshot.wants_vertices.then(|| quantiser.advance(number, displacements_m));
             let layers = Layers {
-                vertices: snapshot.has_vertices,
+                vertices: snapshot.wants_vertices,
                 particles: self.particles.load(Ordering::Relaxed),
                 // Of vertices that are there.
-                refined: snapshot.has_vertices && self.refined.load(Ordering::Relaxed),
+                refined: snapshot.wants_vertices && self.refined.load(Ordering::Relaxed),
             };
             let refiner = layers.refined.then(|| refiner.get_or_insert_with(|| Refiner::new(&model, &rest_f32_m)));
             let refined =
                 refiner.and_then(Option::as_mut).map(|refiner| refiner.read(displacements_m, &tools(&model, snapshot)));
             let has_particles = layers.particles && model.body().particle_count() > 0;
-            let particles = has_particles.then(|| places::encode(snapshot.particles_m()));
-            let numbers = numbers(epoch, snapshot);
+            let particles = has_particles.then(|| places::encode(snapshot.shape.particles_m()));
+            let numbers = v1::SurfaceUpdate { max_displacement_m, ..numbers(epoch, snapshot) };
             let encoded = Mutex::new(Vec::new());
             let frame = Frame {
                 epoch,
@@ -323,7 +312,6 @@ fn numbers(epoch: u32, snapshot: &SurfaceSnapshot) -> v1::SurfaceUpdate {
         sent_unix_ns: SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |d| d.as_nanos() as u64),
         tools: snapshot.tools.iter().map(crate::grpc::convert::tool_state).collect(),
         tick_cost_us: snapshot.tick_cost_us,
-        max_displacement_m: snapshot.max_displacement_m,
         quarantine: crate::grpc::convert::quarantine(snapshot.quarantine),
         ..Default::default()
     }

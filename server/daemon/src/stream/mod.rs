@@ -4,6 +4,4 @@ pub mod hub;
 pub mod keyframe;
 pub mod places;
 pub mod refined;
-pub mod skin;
-pub mod springs;
 pub mod viewer;

@@ -21,6 +21,7 @@ use super::{
     encode::{power_of_two, put, quantum_exponent},
     places,
 };
+use crate::bodies::served;
 use bytes::{BufMut, BytesMut};
 use glam::DVec3;
 use palpate_physics::{
@@ -75,9 +76,9 @@ struct Vertex {
 }
 
 impl Refiner {
-    /// `None` of a mass-spring surface, which viewers see refined already, and of a surface that cannot be. `rest_f32_m` is what viewers have.
+    /// `None` of a body that viewers see refined already, and of a surface that cannot be refined. `rest_f32_m` is what viewers have.
     pub fn new(model: &Model, rest_f32_m: &[[f32; 3]]) -> Option<Self> {
-        if model.body().as_mass_spring().is_some() {
+        if !served(model).may_be_refined_for_viewers() {
             return None;
         }
         let rest_m = rest_f32_m.iter().map(|x| DVec3::from(x.map(f64::from))).collect();

@@ -61,7 +61,7 @@ pub fn block_scene(name: &str, cells: u32) -> Scene {
         surface_triangles: 0,
         volume_m3: shape.mesh.total_volume_m3(),
         mass_kg: shape.mesh.total_volume_m3() * 1e3,
-        quality: quality::measure(&shape.mesh),
+        quality: Some(quality::measure(&shape.mesh)),
         fill_report: Vec::new(),
         parts: Vec::new(),
     };

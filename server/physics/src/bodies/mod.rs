@@ -29,7 +29,7 @@ use hybrid::HybridBody;
 use mass_spring::MassSpringBody;
 use seed::SeedBody;
 use std::fmt::Write;
-use tet::TetBody;
+use tet::{ModesError, RestBound, TetBody};
 
 /// A body: all that its rest state fixes. Constant after load.
 #[derive(Debug, Clone)]
@@ -181,6 +181,21 @@ impl Body {
         }
     }
 
+    /// Particles that never wake because no tetrahedron of the coarse level holds them.
+    pub fn particles_that_never_wake(&self) -> usize {
+        if let Self::Hybrid(body) = self { body.cage().outside } else { 0 }
+    }
+
+    /// Most points awake at once: particles, or the nodes of springs.
+    pub fn most_awake_points(&self) -> usize {
+        if let Self::MassSpring(body) = self { body.model().most_nodes() } else { self.most_awake_particles() }
+    }
+
+    /// Whether its steps book work and dissipation, so that the ledger can be balanced.
+    pub fn books_energy(&self) -> bool {
+        !matches!(self, Self::Seed(_))
+    }
+
     /// How far particles are apart (m); 0 where there are none.
     pub fn particle_spacing_m(&self) -> f64 {
         match self {
@@ -198,6 +213,25 @@ impl Body {
             Self::MassSpring(body) => body.model().most_nodes(),
             Self::Seed(body) => body.rest_positions_m().len(),
         }
+    }
+
+    /// Whether it has a scheme of time integration of its own, whatever the settings ask for.
+    pub(crate) fn has_own_scheme(&self) -> bool {
+        matches!(self, Self::Seed(_))
+    }
+
+    /// The constants of the bound on how far it is from rest; `None` of bodies that have none.
+    ///
+    /// # Errors
+    /// A body that is not held, or whose modes are not found.
+    pub(crate) fn rest_bound(&self, environment: &Environment) -> Result<Option<RestBound>, ModesError> {
+        let Self::Tet(body) = self else { return Ok(None) };
+        RestBound::new(body, &environment.surface).map(Some)
+    }
+
+    /// A bound (m) on how far any node is from rest, now and later, while nothing that acts on the body changes.
+    pub(crate) fn distance_from_rest_m(&self, bound: &RestBound, state: &MechanicalState) -> f64 {
+        if let Self::Tet(body) = self { bound.distance_m(body, state) } else { f64::INFINITY }
     }
 
     /// Whether leapfrog's step of it can be judged ([`SteppedBody::judged`]).

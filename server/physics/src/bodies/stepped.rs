@@ -110,6 +110,18 @@ impl<'a> SteppedBody<'a> {
         }
     }
 
+    /// All substeps of a tick, of a body with a scheme of its own ([`Body::has_own_scheme`]).
+    pub(crate) fn run_own_scheme(
+        &mut self,
+        tick: &Tick<'_>,
+        state: &mut MechanicalState,
+        contact: &mut ContactScratch,
+    ) {
+        if let Self::Seed(body) = self {
+            body.run(tick, state, contact);
+        }
+    }
+
     /// What leapfrog's step is judged by; `None` of bodies whose step is never too long.
     ///
     /// A mass-spring surface's step is stable at any stretch, and the seeds' schemes run as their authors describe them.

@@ -22,6 +22,8 @@ pub(crate) enum Scheme {
     SeedSemiImplicit(NodalImplicit),
     /// Of a body of tetrahedra alone.
     BackwardEuler(NodalImplicit),
+    /// The body's own steps.
+    OfBody,
 }
 
 impl Scheme {
@@ -29,6 +31,9 @@ impl Scheme {
     pub(crate) fn build(environment: &Environment, body: &Body) -> Self {
         let settings = &environment.settings;
         let dt_s = settings.tick_period_s / f64::from(environment.steps.substeps);
+        if body.has_own_scheme() {
+            return Self::OfBody;
+        }
         match (settings.integrator, body.as_tet()) {
             (Integrator::SeedVerlet, _) => Self::SeedVerlet,
             (Integrator::SeedSemiImplicit, Some(body)) => Self::SeedSemiImplicit(nodal_implicit(body, dt_s)),
@@ -54,7 +59,7 @@ impl Scheme {
         history: &mut ForceHistory,
     ) {
         match (self, body) {
-            (_, SteppedBody::Seed(body)) => body.run(tick, state, contact),
+            (Self::OfBody, body) => body.run_own_scheme(tick, state, contact),
             (Self::SeedSemiImplicit(nodal), SteppedBody::Tet(body)) => {
                 seed_semi_implicit::run(tick, nodal, body, state, contact);
             }

@@ -101,11 +101,6 @@ pub enum MeshError {
 const DEGENERATE_VOLUME_RATIO: f64 = 1e-12;
 
 impl TetMesh {
-    /// Points (m) without tets: of a body that is a surface alone, or of nothing.
-    pub fn of_points(positions_m: Vec<DVec3>) -> Self {
-        Self { positions_m, tets: Vec::new() }
-    }
-
     /// Checks and takes a mesh: `positions_m` (m), `tets` as node indices from 0.
     ///
     /// # Errors

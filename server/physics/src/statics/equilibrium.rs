@@ -8,11 +8,17 @@ use crate::{
 use glam::{DMat3, DVec3};
 
 /// Loads, displacements and tools to be reached.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Goal<'a> {
-    pub(super) load_factors: &'a [f64],
-    pub(super) prescribed_displacements_m: &'a [DVec3],
-    pub(super) tools: &'a [ToolTarget],
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Goal<'a> {
+    /// One factor per load of the model.
+    pub load_factors: &'a [f64],
+    /// One displacement (m) per prescribed set of the model.
+    pub prescribed_displacements_m: &'a [DVec3],
+    /// Where the devices are, one per tool of the model.
+    pub tools: &'a [ToolTarget],
+    /// Of a hybrid body: these particles are awake and no others, those left out that may not wake. `None`: those are awake that tools
+    /// would keep awake where they rest, and those as near to vertices that a load acts on. Other bodies do not look at it.
+    pub awake: Option<&'a [u32]>,
 }
 
 /// The goal scaled to a fraction of the way.

@@ -24,12 +24,11 @@ use crate::{
         Body,
         tet::{self, Mode},
     },
-    contact::ToolTarget,
     elements::rigid_motion::FreePart,
     world::Model,
 };
+pub use equilibrium::Goal;
 pub use error::SolveError;
-use glam::DVec3;
 pub use load_path::MAX_LOAD_STEPS;
 pub use solution::{AwakeParticles, StaticSolution, ToolAtRest};
 use std::ops::ControlFlow;
@@ -68,39 +67,33 @@ pub struct Progress {
     pub relative_residual: f64,
 }
 
-/// Finds an equilibrium of `model` under its gravity, `load_factors` (one per load), `prescribed_displacements_m` (one per
-/// prescribed set) and devices at `tools` (one per tool), starting from rest with the tools at their start positions. A rigid tool is
-/// where its device is; a coupled one rests where its spring, saturated or not, balances its contact. A device moves at most half
-/// its tool's radius per load step, so the tool must come from outside.
+/// Finds an equilibrium of `model` under its gravity and the loads, displacements and devices of `goal`, starting from rest with the tools
+/// at their start positions. A rigid tool is where its device is; a coupled one rests where its spring, saturated or not, balances its
+/// contact. A device moves at most half its tool's radius per load step, so the tool must come from outside.
 ///
 /// `progress` is called once per Newton iteration and may stop the solve. Friction and viscosity do not act at rest and are
 /// left out. The pressure's load stiffness enters with its symmetric part; where a follower pressure ends at a free rim the
 /// unsymmetric rest slows Newton's method from quadratic to linear convergence, the more the further the rim turns, but does not
 /// change the equilibrium.
 ///
-/// Of a hybrid body, the particles that tools would keep awake where they rest are awake, and those as near to vertices that a load acts on.
-///
 /// # Errors
 /// [`SolveError`].
 pub fn solve_static(
     model: &Model,
-    load_factors: &[f64],
-    prescribed_displacements_m: &[DVec3],
-    tools: &[ToolTarget],
+    goal: &Goal<'_>,
     settings: &StaticSettings,
     progress: &mut dyn FnMut(&Progress) -> ControlFlow<()>,
 ) -> Result<StaticSolution, SolveError> {
-    let goal = equilibrium::Goal { load_factors, prescribed_displacements_m, tools };
-    check(model, &goal, settings)?;
+    check(model, goal, settings)?;
     let environment = model.environment();
     match model.body() {
         Body::Tet(body) => {
             held(body.first_free_part())?;
-            load_path::solve(TetModel { body, environment }, &goal, settings, progress)
+            load_path::solve(TetModel { body, environment }, goal, settings, progress)
         }
         Body::Hybrid(body) => {
             held(body.first_free_part())?;
-            hybrid::solve(environment, body, &goal, None, settings, progress)
+            hybrid::solve(environment, body, goal, settings, progress)
         }
         Body::MassSpring(_) | Body::Seed(_) => {
             Err(SolveError::NotForThisBody { what: "static equilibrium", but: ", and of those with particles" })
@@ -123,29 +116,8 @@ pub fn natural_modes(model: &Model, count: usize) -> Result<Vec<Mode>, SolveErro
     Ok(tet::natural_modes(body, model.surface(), count)?)
 }
 
-/// The same of a hybrid body with these particles awake and no others; those that may not wake are left out. `None` of any other body.
-///
-/// # Errors
-/// [`SolveError`].
-pub fn solve_static_with(
-    model: &Model,
-    particles: impl IntoIterator<Item = u32>,
-    (load_factors, prescribed_displacements_m, tools): (&[f64], &[DVec3], &[ToolTarget]),
-    settings: &StaticSettings,
-    progress: &mut dyn FnMut(&Progress) -> ControlFlow<()>,
-) -> Result<Option<StaticSolution>, SolveError> {
-    let Some(body) = model.body().as_hybrid() else { return Ok(None) };
-    let goal = equilibrium::Goal { load_factors, prescribed_displacements_m, tools };
-    check(model, &goal, settings)?;
-    held(body.first_free_part())?;
-    let mut ids: Vec<u32> = particles.into_iter().filter(|&particle| body.may_wake(particle)).collect();
-    ids.sort_unstable();
-    ids.dedup();
-    hybrid::solve(model.environment(), body, &goal, Some(ids), settings, progress).map(Some)
-}
-
-fn check(model: &Model, goal: &equilibrium::Goal<'_>, settings: &StaticSettings) -> Result<(), SolveError> {
-    let equilibrium::Goal { load_factors, prescribed_displacements_m, tools } = *goal;
+fn check(model: &Model, goal: &Goal<'_>, settings: &StaticSettings) -> Result<(), SolveError> {
+    let Goal { load_factors, prescribed_displacements_m, tools, .. } = *goal;
     let spec = model.environment();
     let length = |what, found, expected| {
         if found == expected { Ok(()) } else { Err(SolveError::InputLength { what, found, expected }) }

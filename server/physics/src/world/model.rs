@@ -1,5 +1,5 @@
 //! The model: constant after load.
-use super::{ModelError, ModelSpec, State, sleep::RestBound};
+use super::{ModelError, ModelSpec, State, sleep::SleepBound};
 use crate::{
     bodies::{Body, MaterialPoint},
     contact::{ContactModel, ToolSpec},
@@ -16,7 +16,7 @@ pub struct Model {
     body: Body,
     environment: Environment,
     scheme: Scheme,
-    rest_bound: Option<RestBound>,
+    sleep_bound: Option<SleepBound>,
 }
 
 impl Model {
@@ -37,9 +37,9 @@ impl Model {
         let around = EnvironmentSpec { settings, prescribed, loads, gravity_m_per_s2, tools };
         let (body, environment) = Body::build(body, around, progress)?;
         let scheme = Scheme::build(&environment, &body);
-        let rest_bound =
-            RestBound::new(&environment, &body).map_err(|source| ModelError::Sleep { source: Box::new(source) })?;
-        Ok(Self { body, environment, scheme, rest_bound })
+        let sleep_bound =
+            SleepBound::new(&environment, &body).map_err(|source| ModelError::Sleep { source: Box::new(source) })?;
+        Ok(Self { body, environment, scheme, sleep_bound })
     }
 
     /// The body.
@@ -123,8 +123,8 @@ impl Model {
     }
 
     /// How near to rest the body is left alone; `None`: never.
-    pub(super) fn rest_bound(&self) -> Option<&RestBound> {
-        self.rest_bound.as_ref()
+    pub(super) fn sleep_bound(&self) -> Option<&SleepBound> {
+        self.sleep_bound.as_ref()
     }
 
     /// Whether ticks whose step proves too long are taken back and repeated.

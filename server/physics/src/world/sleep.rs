@@ -1,17 +1,7 @@
 //! A body at rest sleeps: nothing of it is computed until something changes.
 //!
-//! Near an equilibrium `x*` the body obeys `M δẍ + C δẋ + K δx = 0`, `δx = x − x*`, with `C` of viscous stress and mass damping. The energy
-//! `½ v·M v + ½ δx·K δx` does not grow, and `K ≥ ω₁² M` with the lowest natural frequency `ω₁`. So with the residual `r = −K δx` on free axes:
-//! ```text
-//! ω₁² ‖M^½ δx(t)‖² ≤ δx(t)·K δx(t) ≤ ‖M^½ v‖² + r·K⁻¹ r ≤ ‖M^½ v‖² + ‖M^-½ r‖²/ω₁²
-//! |δx_i(t)| ≤ (‖M^-½ r‖/ω₁² + ‖M^½ v‖/ω₁)/√m_min         of every node, now and later                           (1)
-//! ```
-//! The force that is at hand is `f = r − C_v v`, with the viscous stress' part. `C_v ≤ τ K` with the largest ratio `τ` of viscosity to stiffness, so
-//! `‖M^-½ r‖ ≤ ‖M^-½ f‖ + τ ω_max² ‖M^½ v‖`: a viscous body that creeps is not taken for one at rest.
-//!
-//! Where (1) stays below the tolerance over [`CALM_CHECKS`] looks in a row, with no tool near and no input that changes, no node will
-//! ever be further from where it is than twice the tolerance, so it is left there. `ω₁` is that of the body at rest; a load that
-//! softens it (towards buckling) makes (1) too small by the square of the ratio of frequencies.
+//! [`RestBound`] bounds how far any node is from rest, now and later. Where the bound stays below the tolerance over [`CALM_CHECKS`] looks in a row,
+//! with no tool near and no input that changes, no node will ever be further from where it is than twice the tolerance, so it is left there.
 //!
 //! A sleeping body wakes before a tick in which a load, a prescribed displacement or an injected force differs from the tick before, and
 //! before one in which a tool comes within a quarter of its radius of the surface: that tick then runs from its start as if it had not slept.
@@ -25,14 +15,13 @@ use super::{
 use crate::{
     bodies::{
         Body, SteppedBody,
-        tet::{ModesError, TetBody, natural_modes},
+        tet::{ModesError, RestBound},
     },
     contact::{ContactScratch, SubstepTime, ToolState},
-    tick::{Environment, MechanicalState, TickInput, ViscousPower, relaxation_time_s, take_tools},
+    tick::{Environment, MechanicalState, TickInput, ViscousPower, take_tools},
 };
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
-use std::f64::consts::TAU;
 
 /// Ticks between two looks at the bound.
 const LOOK_EVERY_TICKS: u64 = 10;
@@ -68,7 +57,7 @@ impl Sleep {
 
     /// Of the model's size, and asleep only in a model that ever is.
     pub(crate) fn fits(&self, model: &Model) -> bool {
-        self.held_m.len() == model.prescribed().len() && (!self.asleep || model.rest_bound().is_some())
+        self.held_m.len() == model.prescribed().len() && (!self.asleep || model.sleep_bound().is_some())
     }
 
     pub(super) fn wake(&mut self) {
@@ -83,57 +72,31 @@ impl Sleep {
     }
 }
 
-/// The constants of (1).
+/// The bound of a body, and what it is to stay below.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct RestBound {
+pub(crate) struct SleepBound {
     tolerance_m: f64,
-    lowest_rad_per_s: f64,
-    /// `τ ω_max²` (1/s).
-    viscous_per_s: f64,
-    root_of_smallest_mass: f64,
+    bound: RestBound,
 }
 
-impl RestBound {
+impl SleepBound {
     /// `None` where the settings let nothing sleep.
     ///
     /// # Errors
     /// A body that is not held, or whose modes are not found.
     pub(super) fn new(environment: &Environment, body: &Body) -> Result<Option<Self>, ModesError> {
         let tolerance_m = environment.settings.sleep_tolerance_m;
-        // Other bodies refuse to sleep as a whole as they are built.
-        let Some(body) = body.as_tet().filter(|_| tolerance_m > 0.0) else { return Ok(None) };
-        let free = |inverse_mass: &&DVec3| **inverse_mass != DVec3::ZERO;
-        let largest = body.inverse_mass_per_kg().iter().filter(free).map(|m| m.max_element()).fold(0.0, f64::max);
-        // Without a free node there is no mode, and nothing that could move.
-        let lowest =
-            natural_modes(body, &environment.surface, 1)?.first().map_or(f64::INFINITY, |mode| TAU * mode.frequency_hz);
-        let relaxation_s = body.materials().iter().map(relaxation_time_s).fold(0.0, f64::max);
-        Ok(Some(Self {
-            tolerance_m,
-            lowest_rad_per_s: lowest,
-            viscous_per_s: relaxation_s * body.max_natural_frequency_rad_per_s().powi(2),
-            root_of_smallest_mass: largest.sqrt().recip(),
-        }))
-    }
-
-    /// The right side of (1) (m).
-    fn distance_m(&self, body: &TetBody, state: &MechanicalState) -> f64 {
-        let (mut residual_sq, mut speed_sq) = (0.0, 0.0);
-        for (((force, v), mass), inverse_mass) in
-            state.force_n.iter().zip(&state.v).zip(body.mass_kg()).zip(body.inverse_mass_per_kg())
-        {
-            residual_sq += (*force * *force).dot(*inverse_mass);
-            speed_sq += mass * v.length_squared();
+        if tolerance_m <= 0.0 {
+            return Ok(None);
         }
-        let (omega, speed) = (self.lowest_rad_per_s, speed_sq.sqrt());
-        let residual = residual_sq.sqrt() + self.viscous_per_s * speed;
-        (residual / (omega * omega) + speed / omega) / self.root_of_smallest_mass
+        // Bodies without a bound refuse to sleep as they are built.
+        Ok(body.rest_bound(environment)?.map(|bound| Self { tolerance_m, bound }))
     }
 }
 
 /// After a tick that was computed: looks whether the body may sleep. `was_quiet` is [`Sleep::is_quiet`] before it.
 pub(super) fn consider(model: &Model, state: &mut State, input: &TickInput<'_>, was_quiet: bool) {
-    let (Some(bound), Some(body)) = (model.rest_bound(), model.body().as_tet()) else { return };
+    let Some(SleepBound { tolerance_m, bound }) = model.sleep_bound() else { return };
     let State { mechanical, sleep, pace, .. } = state;
     if !was_quiet {
         sleep.calm_checks = 0;
@@ -147,10 +110,11 @@ pub(super) fn consider(model: &Model, state: &mut State, input: &TickInput<'_>, 
         return;
     }
     let calm = model.contact().is_apart(&mechanical.x, &mechanical.tools, &mechanical.contact)
-        && bound.distance_m(body, mechanical) <= bound.tolerance_m;
+        && model.body().distance_from_rest_m(bound, mechanical) <= *tolerance_m;
     sleep.calm_checks = if calm { sleep.calm_checks + 1 } else { 0 };
     if sleep.calm_checks >= CALM_CHECKS {
-        let kinetic_j: f64 = mechanical.v.iter().zip(body.mass_kg()).map(|(v, m)| 0.5 * m * v.length_squared()).sum();
+        let kinetic_j: f64 =
+            mechanical.v.iter().zip(model.body().mass_kg()).map(|(v, m)| 0.5 * m * v.length_squared()).sum();
         mechanical.ledger.dissipated_j += kinetic_j;
         mechanical.v.fill(DVec3::ZERO);
         mechanical.viscous = ViscousPower::default();

@@ -55,7 +55,7 @@ pub fn step(model: &Model, state: &mut State, scratch: &mut Scratch, input: &Tic
 
     body.prepare(environment, mechanical, input.point_forces);
     history.fit(mechanical.x.len(), pace);
-    let was_quiet = model.rest_bound().is_some() && state.sleep.is_quiet(&mechanical.load_factors, input);
+    let was_quiet = model.sleep_bound().is_some() && state.sleep.is_quiet(&mechanical.load_factors, input);
     last_good.keep(mechanical);
     body.keep_last_good();
     if let Some(judged) = body.judged().filter(|_| history.is_kept()) {

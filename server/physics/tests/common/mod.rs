@@ -5,7 +5,7 @@ use palpate_physics::{
     BodySpec, LoadSpec, Model, ModelSpec, Precision, PrescribedSpec, Region, Settings, Solid, Substeps, Surface,
     TetMesh,
     material::{Convention, Lame, Law, Material, Viscosity},
-    statics::{StaticSettings, StaticSolution, solve_static},
+    statics::{Goal, StaticSettings, StaticSolution, solve_static},
 };
 use std::{collections::BTreeMap, ops::ControlFlow};
 
@@ -166,7 +166,13 @@ pub(crate) fn equilibrium(model: &Model, factor: f64, moved: &[DVec3]) -> Static
     displacements.resize(model.prescribed().len(), DVec3::ZERO);
     let factors = vec![factor; model.loads().len()];
     let settings = StaticSettings { relative_residual: 1e-12, ..StaticSettings::default() };
-    solve_static(model, &factors, &displacements, &[], &settings, &mut |_| ControlFlow::Continue(())).unwrap()
+    solve_static(
+        model,
+        &Goal { load_factors: &factors, prescribed_displacements_m: &displacements, ..Goal::default() },
+        &settings,
+        &mut |_| ControlFlow::Continue(()),
+    )
+    .unwrap()
 }
 
 /// Mean displacement (m) of nodes.

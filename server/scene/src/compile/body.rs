@@ -1,14 +1,13 @@
 //! `[body]`: shapes, mesh files and surface pairs become one kind of body with named parts.
 use super::{
     Files, exactly_one,
+    kinds::{self, BodyKind, mass_spring},
     located::Located,
-    particles,
     parts::{self, Part},
-    seed, springs,
 };
 use crate::{
     document::{
-        body::{BodyTable, LengthUnit, MeshTable, ParticlesTable, SurfacesTable},
+        body::{BodyTable, LengthUnit, MeshTable, SurfacesTable},
         source::{Fault, Where},
     },
     error::Stage,
@@ -20,17 +19,20 @@ use crate::{
     wording::counted,
 };
 use glam::DVec3;
-use palpate_physics::{MeshError, Surface, TetMesh, bodies::mass_spring::topology::Triangulation, contact::is_inside};
+use palpate_physics::{
+    MeshError, Surface, TetMesh,
+    bodies::mass_spring::topology::{Triangulation, TriangulationError},
+};
 
 /// A body before regions, materials and loads.
 pub(crate) struct Body {
-    pub(crate) mesh: TetMesh,
+    pub(crate) kind: &'static dyn BodyKind,
+    pub(crate) mesh: BodyMesh,
+    /// The surface of the mesh.
     pub(crate) surface: Surface,
-    /// The surface over particles: what loads and tools act on.
+    /// The surface that loads and tools act on, where that is another.
     pub(crate) skin: Option<FineSurface>,
-    /// Its surface, where it is one of springs: nodes are its vertices then, and the skin is it refined everywhere.
-    pub(crate) springs: Option<Triangulation>,
-    /// Of a skin over a seed body's layer: the number of its first vertex, after the tets' nodes. Other skins have numbers of their own.
+    /// The number of the skin's first vertex, where they are numbered after the mesh's nodes. Other skins have numbers of their own.
     pub(crate) first_vertex: Option<u32>,
     /// Where the shape has flat sides that a lattice should lie on: a point (m) of them.
     pub(crate) lattice_m: Option<DVec3>,
@@ -41,6 +43,30 @@ pub(crate) struct Body {
 }
 
 impl Body {
+    /// A body with nothing but a mesh, its surface and its origin.
+    pub(super) fn new(kind: &'static dyn BodyKind, mesh: BodyMesh, surface: Surface, origin: String) -> Self {
+        Self {
+            kind,
+            mesh,
+            surface,
+            skin: None,
+            first_vertex: None,
+            lattice_m: None,
+            parts: Vec::new(),
+            origin,
+            report: Vec::new(),
+            warnings: Vec::new(),
+        }
+    }
+
+    /// Its tetrahedra.
+    ///
+    /// # Errors
+    /// It has none.
+    pub(crate) fn tets(&self) -> Result<&TetMesh, Fault> {
+        self.mesh.tets().ok_or_else(kinds::nothing_inside)
+    }
+
     /// Triangles of the surface: of the skin, where there is one.
     pub(crate) fn triangle_count(&self) -> usize {
         self.skin.as_ref().map_or(self.surface.triangles.len(), |skin| skin.triangles.len())
@@ -59,19 +85,9 @@ impl Body {
         self.skin.as_ref().map_or(self.mesh.positions_m(), |skin| &skin.positions_m)
     }
 
-    /// The point of the body nearest to a position (m). With a skin, only its distance means something for a point inside.
+    /// The point of the body nearest to a position (m). Where there are no nodes around it, only its distance means something.
     pub(crate) fn locate(&self, point_m: DVec3) -> Located {
-        match &self.skin {
-            None => Located::locate(&self.mesh, &self.triangles().collect::<Vec<_>>(), point_m),
-            Some(skin) if self.first_vertex.is_some() => self.locate_in_seed(skin, point_m),
-            Some(skin) if self.springs.is_some() => {
-                Located::nearest(&skin.positions_m, skin.triangles.iter().copied(), point_m)
-            }
-            Some(skin) if is_inside(point_m, &skin.triangles, &skin.positions_m) => {
-                Located { nodes: [0; 4], weights: [1.0, 0.0, 0.0, 0.0], distance_m: 0.0 }
-            }
-            Some(skin) => Located::nearest(&skin.positions_m, skin.triangles.iter().copied(), point_m),
-        }
+        self.kind.locate(self, point_m)
     }
 
     /// Where a point that was located is at rest (m). A seed body's vertices are numbered after the nodes of its core.
@@ -82,20 +98,6 @@ impl Body {
             None => self.mesh.positions_m()[node as usize],
         };
         point.nodes.iter().zip(point.weights).map(|(&node, weight)| at(node) * weight).sum()
-    }
-
-    /// In the core, or the nearest of the skin: nothing is known between them.
-    fn locate_in_seed(&self, skin: &FineSurface, point_m: DVec3) -> Located {
-        let in_core = |tet| Located::inside(&self.mesh, tet, point_m);
-        (0..self.mesh.tets().len()).find_map(in_core).unwrap_or_else(|| {
-            let nearest = Located::nearest(&skin.positions_m, skin.triangles.iter().copied(), point_m);
-            let is_inside = is_inside(point_m, &skin.triangles, &skin.positions_m);
-            Located {
-                nodes: nearest.nodes.map(|vertex| vertex + self.first_vertex.unwrap_or_default()),
-                distance_m: if is_inside { 0.0 } else { nearest.distance_m },
-                ..nearest
-            }
-        })
     }
 
     /// The longest edge (m) of the triangles that tools touch.
@@ -122,10 +124,80 @@ impl Body {
     }
 }
 
+/// The nodes of a body, and what is between them.
+#[derive(Debug)]
+pub(crate) enum BodyMesh {
+    /// Corners of tetrahedra.
+    Tets(TetMesh),
+    /// Vertices (m) of a surface with nothing inside, and the surface of which they are the refined vertices, once it is known.
+    Surface { positions_m: Vec<DVec3>, control: Option<Triangulation> },
+}
+
+impl BodyMesh {
+    /// Positions (m) of the nodes.
+    pub(crate) fn positions_m(&self) -> &[DVec3] {
+        match self {
+            Self::Tets(mesh) => mesh.positions_m(),
+            Self::Surface { positions_m, .. } => positions_m,
+        }
+    }
+
+    /// The tetrahedra, where there are any.
+    pub(crate) fn tets(&self) -> Option<&TetMesh> {
+        if let Self::Tets(mesh) = self { Some(mesh) } else { None }
+    }
+
+    /// How many tetrahedra there are.
+    pub(crate) fn tet_count(&self) -> usize {
+        self.tets().map_or(0, |mesh| mesh.tets().len())
+    }
+
+    /// The middle (m) of every tetrahedron.
+    pub(crate) fn tet_middles_m(&self) -> impl Iterator<Item = DVec3> + '_ {
+        let middles = |mesh: &'_ TetMesh, tet| mesh.corners_m(tet).iter().sum::<DVec3>() / 4.0;
+        self.tets().into_iter().flat_map(move |mesh| (0..mesh.tets().len()).map(move |tet| middles(mesh, tet)))
+    }
+
+    /// Corners of the bounding box (m).
+    pub(crate) fn bounds_m(&self) -> (DVec3, DVec3) {
+        let start = (DVec3::INFINITY, DVec3::NEG_INFINITY);
+        self.positions_m().iter().fold(start, |(low, high), &p| (low.min(p), high.max(p)))
+    }
+
+    /// The point of the first tetrahedron that holds a position (m).
+    pub(crate) fn inside(&self, point_m: DVec3) -> Option<Located> {
+        let mesh = self.tets()?;
+        (0..mesh.tets().len()).find_map(|tet| Located::inside(mesh, tet, point_m))
+    }
+
+    /// The point of the first tetrahedron that holds a position (m), else the nearest of the boundary's triangles.
+    pub(crate) fn locate(&self, boundary: impl Iterator<Item = [u32; 3]>, point_m: DVec3) -> Located {
+        self.inside(point_m).unwrap_or_else(|| Located::nearest(self.positions_m(), boundary, point_m))
+    }
+
+    /// The same elsewhere by `offset_m`.
+    fn moved(self, offset_m: DVec3, at: &Where) -> Result<Self, Fault> {
+        let moved = |positions_m: &[DVec3]| positions_m.iter().map(|p| *p + offset_m).collect();
+        Ok(match &self {
+            Self::Tets(mesh) => {
+                let tets = mesh.tets().to_vec();
+                Self::Tets(TetMesh::new(moved(mesh.positions_m()), tets).map_err(|error| mesh_fault(at, error))?)
+            }
+            Self::Surface { positions_m, control } => {
+                let control = control.as_ref().map(|surface| surface.moved(moved(surface.positions_m())));
+                let refused = |error: TriangulationError| {
+                    Fault::value(at.clone(), error.to_string()).of(Stage::Body).cause(error)
+                };
+                Self::Surface { positions_m: moved(positions_m), control: control.transpose().map_err(refused)? }
+            }
+        })
+    }
+}
+
 /// Makes the body.
 pub(crate) fn make(table: &BodyTable, files: &Files<'_>, progress: &mut dyn FnMut(f64, &str)) -> Result<Body, Fault> {
     let at = Where::root("body");
-    let kind = exactly_one(
+    let key = exactly_one(
         &at,
         &[
             ("box", table.block.is_some()),
@@ -137,46 +209,23 @@ pub(crate) fn make(table: &BodyTable, files: &Files<'_>, progress: &mut dyn FnMu
             ("surface", table.surface.is_some()),
         ],
     )?;
-    springs::demand(table)?;
-    let at = at.key(kind);
+    let at = at.key(key);
     progress(0.05, "making the body");
+    let kind = kinds::of(table);
     let mut body = match table {
-        BodyTable { mesh: Some(mesh), .. } => from_file(mesh, files, &at)?,
-        BodyTable { surface: Some(surface), .. } => springs::from_file(surface, files, &at)?,
-        BodyTable { surfaces: Some(surfaces), particles, .. } => {
-            from_surfaces(surfaces, particles.as_ref(), files, &at, progress)?
-        }
-        _ => from_shape(table, kind, files.limits, &at)?,
+        BodyTable { mesh: Some(mesh), .. } => from_file(kind, mesh, files, &at)?,
+        BodyTable { surface: Some(surface), .. } => mass_spring::from_file(kind, surface, files, &at)?,
+        BodyTable { surfaces: Some(surfaces), .. } => from_surfaces(kind, table, surfaces, files, &at, progress)?,
+        _ => from_shape(kind, table, key, files.limits, &at)?,
     };
-    if let Some(wanted) = &table.particles {
-        progress(0.75, "making the skin");
-        let skin = if let Some(skin) = body.skin.take() {
-            skin
-        } else {
-            particles::demand(wanted, &body, files.limits)?;
-            particles::skin_of(table, &body, wanted.longest_edge_m()).map_err(|error| shape_fault(&at, error))?
-        };
-        particles::put_on(&mut body, table, skin);
-    }
-    if let Some(layer) = table.seed.as_ref().and_then(|seed| seed.layer.as_ref()) {
-        progress(0.75, "making the skin");
-        seed::put_on(&mut body, layer, files.limits)?;
-    }
-    if let Some(wanted) = &table.springs {
-        progress(0.75, "making the surface of springs");
-        springs::put_on(&mut body, wanted)?;
-    }
+    kind.put_surface_on(&mut body, table, &at, files, progress)?;
     let offset = DVec3::from(table.offset_m);
-    if offset != DVec3::ZERO && body.springs.is_some() {
-        springs::shift(&mut body, offset)?;
-        body.skin.iter_mut().flat_map(|skin| &mut skin.positions_m).for_each(|p| *p += offset);
-    } else if offset != DVec3::ZERO {
-        let moved = body.mesh.positions_m().iter().map(|p| *p + offset).collect();
-        body.mesh = TetMesh::new(moved, body.mesh.tets().to_vec()).map_err(|error| mesh_fault(&at, error))?;
+    if offset != DVec3::ZERO {
+        body.mesh = body.mesh.moved(offset, &at)?;
         body.skin.iter_mut().flat_map(|skin| &mut skin.positions_m).for_each(|p| *p += offset);
         body.lattice_m.iter_mut().for_each(|p| *p += offset);
     }
-    let warning = implausible_size(table, kind, &body);
+    let warning = implausible_size(table, key, &body);
     body.warnings.extend(warning);
     Ok(body)
 }
@@ -216,7 +265,13 @@ fn mesh_fault(at: &Where, error: MeshError) -> Fault {
     Fault::value(at.clone(), error.to_string()).of(Stage::Body).cause(error)
 }
 
-fn from_shape(table: &BodyTable, kind: &str, limits: &Limits, at: &Where) -> Result<Body, Fault> {
+fn from_shape(
+    kind: &'static dyn BodyKind,
+    table: &BodyTable,
+    key: &str,
+    limits: &Limits,
+    at: &Where,
+) -> Result<Body, Fault> {
     let demand = |target_tets: u32| limits.check_tets(&at.key("target_tets"), target_tets.into());
     let shape = if let Some(block) = &table.block {
         let tets = block.cells.iter().fold(6u64, |product, &cells| product.saturating_mul(cells.into()));
@@ -242,32 +297,23 @@ fn from_shape(table: &BodyTable, kind: &str, limits: &Limits, at: &Where) -> Res
         BodyTable { ventricle: Some(ventricle), .. } => Some(DVec3::Z * ventricle.cut_z_m),
         _ => None,
     };
-    Ok(Body { lattice_m: flat_m, ..of_shape(shape, kind, at)? })
+    Ok(Body { lattice_m: flat_m, ..of_shape(kind, shape, key, at)? })
 }
 
-fn shape_fault(at: &Where, error: ShapeError) -> Fault {
+pub(super) fn shape_fault(at: &Where, error: ShapeError) -> Fault {
     Fault::value(at.clone(), format!("[{at}]: {error}")).of(Stage::Body).cause(error)
 }
 
-fn of_shape(shape: Shape, kind: &str, at: &Where) -> Result<Body, Fault> {
+fn of_shape(kind: &'static dyn BodyKind, shape: Shape, key: &str, at: &Where) -> Result<Body, Fault> {
     let surface = Surface::of(&shape.mesh).map_err(|error| mesh_fault(at, error))?;
     let report = if shape.layers > 0 {
         vec![format!("{} through the wall", counted(shape.layers as usize, "layer"))]
     } else {
         Vec::new()
     };
-    Ok(Body {
-        parts: parts::of_boundary(&shape.regions, &surface),
-        surface,
-        skin: None,
-        springs: None,
-        first_vertex: None,
-        lattice_m: None,
-        origin: format!("shape {kind}"),
-        report,
-        warnings: Vec::new(),
-        mesh: shape.mesh,
-    })
+    let parts = parts::of_boundary(&shape.regions, &surface);
+    let body = Body::new(kind, BodyMesh::Tets(shape.mesh), surface, format!("shape {key}"));
+    Ok(Body { parts, report, ..body })
 }
 
 pub(super) fn file_fault(at: &Where, error: FileError) -> Fault {
@@ -276,8 +322,9 @@ pub(super) fn file_fault(at: &Where, error: FileError) -> Fault {
 
 /// Reads both surfaces and fills the wall between them.
 fn from_surfaces(
+    kind: &'static dyn BodyKind,
+    of_body: &BodyTable,
     table: &SurfacesTable,
-    wanted: Option<&ParticlesTable>,
     files: &Files<'_>,
     at: &Where,
     progress: &mut dyn FnMut(f64, &str),
@@ -297,22 +344,12 @@ fn from_surfaces(
     let filled = fill::fill(inner_input, outer_input, options, &mut part_of_load).map_err(refused)?;
     let surface = Surface::of(&filled.mesh).map_err(|error| mesh_fault(at, error))?;
     let warnings = inner.warnings.iter().chain(&outer.warnings).cloned().collect();
-    let mut body = Body {
-        parts: parts::of_boundary(&filled.regions, &surface),
-        surface,
-        skin: None,
-        springs: None,
-        first_vertex: None,
-        lattice_m: None,
-        origin: format!("wall between {} and {}", table.inner_file, table.outer_file),
-        report: filled.report.to_string().lines().map(str::to_owned).collect(),
-        warnings,
-        mesh: filled.mesh,
-    };
-    if let Some(wanted) = wanted {
-        particles::demand(wanted, &body, files.limits)?;
-        body.skin = Some(fill::around(inner_input, outer_input, wanted.spacing_m).map_err(refused)?);
-    }
+    let parts = parts::of_boundary(&filled.regions, &surface);
+    let origin = format!("wall between {} and {}", table.inner_file, table.outer_file);
+    let report = filled.report.to_string().lines().map(str::to_owned).collect();
+    let mut body = Body { parts, report, warnings, ..Body::new(kind, BodyMesh::Tets(filled.mesh), surface, origin) };
+    let around = |spacing_m| fill::around(inner_input, outer_input, spacing_m).map_err(refused);
+    body.skin = kinds::skin_around(&body, of_body, files, around)?;
     Ok(body)
 }
 
@@ -320,7 +357,7 @@ fn input(file: &SurfaceFile, metres_per_unit: f64) -> SurfaceInput<'_> {
     SurfaceInput { vertices: &file.vertices, triangles: &file.triangles, metres_per_unit }
 }
 
-fn from_file(table: &MeshTable, files: &Files<'_>, at: &Where) -> Result<Body, Fault> {
+fn from_file(kind: &'static dyn BodyKind, table: &MeshTable, files: &Files<'_>, at: &Where) -> Result<Body, Fault> {
     let at = at.key("file");
     let path = files.resolve(&at, &table.file)?;
     let refused = |error| file_fault(&at, error);
@@ -328,16 +365,7 @@ fn from_file(table: &MeshTable, files: &Files<'_>, at: &Where) -> Result<Body, F
     files.limits.check_tets(&at, volume.tets.len() as u64)?;
     let grouped = volume.into_tet_mesh(table.unit.in_m(), UnusedNodes::Drop).map_err(refused)?;
     let surface = Surface::of(&grouped.mesh).map_err(|error| mesh_fault(&at, error))?;
-    Ok(Body {
-        parts: parts::of_groups(&grouped, &surface),
-        surface,
-        skin: None,
-        springs: None,
-        first_vertex: None,
-        lattice_m: None,
-        origin: format!("file {}", table.file),
-        report: Vec::new(),
-        warnings: grouped.warnings.clone(),
-        mesh: grouped.mesh,
-    })
+    let (parts, warnings) = (parts::of_groups(&grouped, &surface), grouped.warnings.clone());
+    let body = Body::new(kind, BodyMesh::Tets(grouped.mesh), surface, format!("file {}", table.file));
+    Ok(Body { parts, warnings, ..body })
 }

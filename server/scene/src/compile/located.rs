@@ -19,14 +19,6 @@ impl Located {
         self.nodes.iter().zip(self.weights).map(|(&node, weight)| field[node as usize] * weight).sum()
     }
 
-    /// The material point at a rest position (m): barycentric in the first tet that contains it, else the nearest
-    /// point of the boundary triangles (node triples).
-    pub(crate) fn locate(mesh: &TetMesh, boundary: &[[u32; 3]], point_m: DVec3) -> Self {
-        (0..mesh.tets().len())
-            .find_map(|tet| Self::inside(mesh, tet, point_m))
-            .unwrap_or_else(|| Self::nearest(mesh.positions_m(), boundary.iter().copied(), point_m))
-    }
-
     /// The nearest point of triangles.
     pub(crate) fn nearest(positions_m: &[DVec3], triangles: impl Iterator<Item = [u32; 3]>, point_m: DVec3) -> Self {
         let candidates = triangles.map(|triangle| Self::on_triangle(positions_m, triangle, point_m));
@@ -56,9 +48,11 @@ impl Located {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::compile::body::BodyMesh;
 
-    fn unit() -> TetMesh {
-        TetMesh::new(vec![DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::Z], vec![[0, 1, 2, 3]]).unwrap()
+    fn unit() -> BodyMesh {
+        let corners = vec![DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::Z];
+        BodyMesh::Tets(TetMesh::new(corners, vec![[0, 1, 2, 3]]).unwrap())
     }
 
     const BOUNDARY: [[u32; 3]; 4] = [[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]];
@@ -67,7 +61,7 @@ mod tests {
     fn a_point_inside_is_reproduced_exactly() {
         let mesh = unit();
         let p = DVec3::new(0.2, 0.3, 0.1);
-        let point = Located::locate(&mesh, &BOUNDARY, p);
+        let point = mesh.locate(BOUNDARY.into_iter(), p);
         assert_eq!(point.distance_m, 0.0);
         assert!((point.of(mesh.positions_m()) - p).length() < 1e-15);
     }
@@ -80,7 +74,7 @@ mod tests {
             (DVec3::new(0.5, -1.0, -1.0), DVec3::new(0.5, 0.0, 0.0)),
             (DVec3::new(3.0, 0.0, 0.0), DVec3::X),
         ] {
-            let point = Located::locate(&mesh, &BOUNDARY, p);
+            let point = mesh.locate(BOUNDARY.into_iter(), p);
             assert!((point.of(mesh.positions_m()) - nearest).length() < 1e-15, "{p}");
             assert!((point.distance_m - p.distance(nearest)).abs() < 1e-15);
             assert!((point.weights.iter().sum::<f64>() - 1.0).abs() < 1e-15);

@@ -18,7 +18,7 @@ pub(crate) struct Materials {
 /// Materials, the later ones over the earlier; a tet without one is an error.
 pub(crate) fn compile(tables: &[MaterialTable], regions: &Regions<'_>, body: &Body) -> Result<Materials, Fault> {
     let mut found = Vec::new();
-    let mut owner: Vec<Option<u16>> = vec![None; body.mesh.tets().len()];
+    let mut owner: Vec<Option<u16>> = vec![None; body.mesh.tet_count()];
     let mut warnings = Vec::new();
     for (index, table) in tables.iter().enumerate() {
         let at = Where::root("material").index(index);

@@ -2,17 +2,14 @@
 mod amplitude;
 mod body;
 mod csv;
-mod kind;
+mod kinds;
 mod loads;
 mod located;
 mod material;
-mod particles;
 mod parts;
 mod probes;
 mod regions;
-mod seed;
 mod shape;
-mod springs;
 mod tools;
 
 use crate::{
@@ -25,9 +22,9 @@ use crate::{
 };
 use body::Body;
 use glam::DVec3;
-use kind::Kind;
+use kinds::{Compiled, Ingredients};
 use palpate_physics::{
-    BodySpec, Integrator, ModelSpec, Precision, Settings, Skips, Solid, Substeps, mesh::quality, settings::MAX_SUBSTEPS,
+    Integrator, ModelSpec, Precision, Settings, Skips, Substeps, mesh::quality, settings::MAX_SUBSTEPS,
 };
 use regions::Regions;
 use std::path::{Path, PathBuf};
@@ -66,7 +63,7 @@ pub(crate) fn compile(
     progress: &mut dyn FnMut(f64, &str),
 ) -> Result<Scene, Fault> {
     files.limits.check_entries(document)?;
-    springs::demand_alone(document)?;
+    kinds::of(&document.body).refuse(document)?;
     let mut settings = settings(document)?;
     let output = output(&document.output)?;
     let body = body::make(&document.body, files, progress)?;
@@ -77,20 +74,15 @@ pub(crate) fn compile(
     let loads = loads::loads(document, &regions, files)?;
     progress(0.9, "placing tools and probes");
     let tools = tools::compile(document, &body, files)?;
-    let made_of = Solid { mesh: body.mesh.clone(), regions: materials.regions, tet_region: materials.tet_region };
-    let model_body = match Kind::of(&document.body) {
-        Kind::Tet => BodySpec::Tet(made_of),
-        Kind::Hybrid => BodySpec::Hybrid(particles::spec(document, &body, made_of, &constraints, files)?),
-        Kind::Seed => BodySpec::Seed(seed::spec(document, &body, made_of)?),
-        Kind::MassSpring => BodySpec::MassSpring(springs::spec(document, &body, (&mut settings, &tools.specs), files)?),
-    };
     let mut warnings = body.warnings.clone();
-    warnings.extend(materials.warnings);
+    warnings.extend_from_slice(&materials.warnings);
+    let ingredients =
+        Ingredients { document, body: &body, materials, constraints: &constraints, tools: &tools.specs, files };
+    let compiled = body.kind.compile(ingredients, &mut settings)?;
     warnings.extend(tools.warnings);
-    springs::warn_of_small_tools(&body, &tools.specs, &mut warnings);
-    particles::warn_of_fine_tets(document, &body, &mut warnings);
+    warnings.extend(body.kind.warnings(&body, &tools.specs));
     let probes = probes::compile(&document.probe, &regions, &body, &tools.specs, &constraints, &mut warnings)?;
-    let summary = summary(&body, &regions, &model_body);
+    let summary = summary(&body, &regions, &compiled);
     warn_of_shape(&summary, &mut warnings);
     warnings.extend(nothing_held(document));
     progress(1.0, "done");
@@ -98,7 +90,7 @@ pub(crate) fn compile(
         name: document.scene.name.clone(),
         description: document.scene.description.trim().to_owned(),
         model: ModelSpec {
-            body: model_body,
+            body: compiled.spec,
             prescribed: constraints.specs,
             loads: loads.specs,
             gravity_m_per_s2: DVec3::from(document.scene.gravity_m_per_s2),
@@ -118,8 +110,11 @@ pub(crate) fn compile(
 /// What the table of a body of springs is made from.
 pub(crate) fn to_calibrate(document: &Document, files: &Files<'_>) -> Result<ToCalibrate, Fault> {
     files.limits.check_entries(document)?;
+    if document.body.springs.is_some() {
+        kinds::of(&document.body).refuse(document)?;
+    }
     let body = body::make(&document.body, files, &mut |_, _| ())?;
-    springs::to_calibrate(document, body, files)
+    kinds::mass_spring::to_calibrate(document, &body, files)
 }
 
 /// A hand would feel a body that is further from rest.
@@ -142,7 +137,7 @@ fn settings(document: &Document) -> Result<Settings, Fault> {
         solver_tolerance,
         sleep_tolerance_um,
     } = document.numerics;
-    let defaults = Kind::of(&document.body).default_settings();
+    let defaults = kinds::of(&document.body).default_settings();
     let stretch_allowance = stretch_allowance.unwrap_or(defaults.stretch_allowance);
     let period = document.scene.tick_period_s;
     check(
@@ -246,26 +241,15 @@ fn unique_names<'n>(table: &str, names: impl Iterator<Item = &'n str>) -> Result
     Ok(())
 }
 
-fn summary(body: &Body, regions: &Regions<'_>, made: &BodySpec) -> BodySummary {
-    let mesh = &body.mesh;
-    let tets_kg = made.solid().map_or(0.0, Solid::mass_kg);
-    // Coarse tets need not have the volume of the body that its surface encloses.
-    let volume_m3 = match made {
-        BodySpec::Tet(_) | BodySpec::MassSpring(_) => mesh.total_volume_m3(),
-        BodySpec::Hybrid(spec) => spec.particles.skin.volume_m3(),
-        BodySpec::Seed(spec) => spec.volume_m3(&body.surface),
-    };
+fn summary(body: &Body, regions: &Regions<'_>, compiled: &Compiled) -> BodySummary {
     BodySummary {
         origin: body.origin.clone(),
-        nodes: mesh.positions_m().len(),
-        tets: mesh.tets().len(),
+        nodes: body.mesh.positions_m().len(),
+        tets: body.mesh.tet_count(),
         surface_triangles: body.triangle_count(),
-        volume_m3,
-        mass_kg: match made {
-            BodySpec::MassSpring(spec) => spec.springs.mass_kg.iter().sum(),
-            BodySpec::Tet(_) | BodySpec::Hybrid(_) | BodySpec::Seed(_) => tets_kg * volume_m3 / mesh.total_volume_m3(),
-        },
-        quality: quality::measure(mesh),
+        volume_m3: compiled.volume_m3,
+        mass_kg: compiled.mass_kg,
+        quality: body.mesh.tets().map(quality::measure),
         fill_report: body.report.clone(),
         parts: regions
             .summaries()
@@ -291,7 +275,7 @@ fn nothing_held(document: &Document) -> Option<String> {
 
 fn warn_of_shape(summary: &BodySummary, warnings: &mut Vec<String>) {
     const THIN_DIHEDRAL_DEG: f64 = 5.0;
-    let worst = summary.quality.min_dihedral_deg;
+    let worst = summary.quality.as_ref().map_or(f64::INFINITY, |quality| quality.min_dihedral_deg);
     if worst < THIN_DIHEDRAL_DEG {
         warnings.push(format!(
             "the smallest dihedral angle is {worst:.1}°: such slivers cost substeps and accuracy; improve the mesh"

@@ -1,5 +1,5 @@
 //! `[[probe]]`: measurements with their points, regions and tools found.
-use super::{body::Body, loads::Constraints, particles, regions::Regions, unique_names};
+use super::{body::Body, loads::Constraints, regions::Regions, unique_names};
 use crate::{
     document::{
         source::{Fault, Where},
@@ -35,12 +35,7 @@ pub(crate) fn compile(
                     let message = "no node of this region is fixed or prescribed: it has no reaction";
                     return Err(Fault::value(at.key("region"), message));
                 }
-                Measure::Reaction(match &body.skin {
-                    Some(_) if body.first_vertex.is_none() && body.springs.is_none() => {
-                        particles::with_middles(&body.mesh, nodes)
-                    }
-                    _ => nodes,
-                })
+                Measure::Reaction(body.kind.reaction_nodes(body, nodes))
             }
             ProbeKind::Energy => Measure::Energy,
             ProbeKind::MinVolumeRatio => Measure::MinVolumeRatio,

@@ -28,7 +28,7 @@ impl Selection {
             nodes: vec![value; body.mesh.positions_m().len()],
             vertices: vec![value; body.skin.as_ref().map_or(0, |skin| skin.positions_m.len())],
             triangles: vec![value; body.triangle_count()],
-            tets: vec![value; body.mesh.tets().len()],
+            tets: vec![value; body.mesh.tet_count()],
         }
     }
 
@@ -269,8 +269,7 @@ impl<'b> Regions<'b> {
         let corners_m = self.body.surface_positions_m();
         let middle = |corners: [u32; 3]| corners.iter().map(|&corner| corners_m[corner as usize]).sum::<DVec3>() / 3.0;
         let triangles = self.body.triangles().map(|corners| inside(middle(corners))).collect();
-        let centroid = |tet| self.body.mesh.corners_m(tet).iter().sum::<DVec3>() / 4.0;
-        let tets = (0..self.body.mesh.tets().len()).map(|tet| inside(centroid(tet))).collect();
+        let tets = self.body.mesh.tet_middles_m().map(inside).collect();
         Selection { nodes, vertices, triangles, tets }
     }
 
@@ -316,10 +315,9 @@ impl<'b> Regions<'b> {
         mark(&mut selection.triangles, &triangles, nearest.count, |&triangle| {
             Located::on_triangle(self.body.surface_positions_m(), faces[triangle as usize], point).distance_m
         });
-        let tets: Vec<u32> = (0..mesh.tets().len() as u32).collect();
-        mark(&mut selection.tets, &tets, nearest.count, |&tet| {
-            (mesh.corners_m(tet as usize).iter().sum::<DVec3>() / 4.0).distance(point)
-        });
+        let middles_m: Vec<DVec3> = mesh.tet_middles_m().collect();
+        let tets: Vec<u32> = (0..middles_m.len() as u32).collect();
+        mark(&mut selection.tets, &tets, nearest.count, |&tet| middles_m[tet as usize].distance(point));
         selection
     }
 }

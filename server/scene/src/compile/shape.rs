@@ -36,8 +36,7 @@ fn radius(table: &ToolTable, at: &Where) -> Result<f64, Fault> {
 }
 
 fn capsule(table: &ToolTable, coupling: Coupling, body: &Body, at: &Where) -> Result<(ToolShape, f64), Fault> {
-    if body.first_vertex.is_some() {
-        let message = "a capsule does not press a seed body, which is touched at one triangle";
+    if let Some(message) = body.kind.no_capsules() {
         return Err(Fault::value(at.key("shape"), message.to_owned()).help("make the tool a sphere"));
     }
     let radius_m = radius(table, at)?;

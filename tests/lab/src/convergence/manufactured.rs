@@ -13,7 +13,7 @@ use palpate_physics::{
     linalg::tensor::outer,
     material::{Law, Material},
     mesh::tet::EDGES,
-    statics::{StaticSettings, solve_static},
+    statics::{Goal, StaticSettings, solve_static},
 };
 use std::{f64::consts::PI, ops::ControlFlow};
 
@@ -109,8 +109,13 @@ fn errors(material: Material, cells: u32) -> Result<[f64; 2]> {
     let rule = quadrature();
     let model = loaded(mesh, boundary, material, &rule)?;
     let settings = StaticSettings { relative_residual: 1e-10, ..StaticSettings::default() };
-    let found = solve_static(&model, &[1.0], &[DVec3::ZERO], &[], &settings, &mut |_| ControlFlow::Continue(()))
-        .into_diagnostic()?;
+    let found = solve_static(
+        &model,
+        &Goal { load_factors: &[1.0], prescribed_displacements_m: &[DVec3::ZERO], ..Goal::default() },
+        &settings,
+        &mut |_| ControlFlow::Continue(()),
+    )
+    .into_diagnostic()?;
     let mut sums = [0.0; 4];
     for (tet, nodes) in tet_body(&model).mesh().tets().iter().enumerate() {
         let (corners, rest) = (tet_body(&model).mesh().corners_m(tet), &tet_body(&model).rest_tets()[tet]);

@@ -111,7 +111,7 @@ mod tests {
     use palpate_physics::{
         BodySpec, LoadSpec, Model, ModelSpec, Region, Settings, Solid,
         bodies::hybrid::{HybridSpec, patch::Patch, place::Place},
-        statics::{StaticSettings, solve_static_with},
+        statics::{Goal, StaticSettings, solve_static},
     };
     use std::{collections::BTreeSet, ops::ControlFlow};
 
@@ -146,9 +146,9 @@ mod tests {
         let awake = nearest(&model, fine.touch_m, 140);
         let settings = StaticSettings { relative_residual: 1e-12, ..StaticSettings::default() };
         let held = vec![DVec3::ZERO; model.prescribed().len()];
-        let goal = (&[1.0][..], &held[..], &[][..]);
-        let go_on = &mut |_: &_| ControlFlow::Continue(());
-        let of_server = solve_static_with(&model, awake.iter().copied(), goal, &settings, go_on).unwrap().unwrap();
+        let goal =
+            Goal { load_factors: &[1.0], prescribed_displacements_m: &held, awake: Some(&awake), ..Goal::default() };
+        let of_server = solve_static(&model, &goal, &settings, &mut |_| ControlFlow::Continue(())).unwrap();
         let mut expected = Vec::new();
         model.surface_positions_m(&of_server.state(&model, &[1.0]), &mut expected);
 

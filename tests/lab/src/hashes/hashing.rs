@@ -9,7 +9,7 @@ use palpate_physics::{
     Chain, Energies, Model, Scratch, State, StepReport, TickInput,
     contact::ToolTarget,
     snapshot,
-    statics::{StaticSettings, natural_modes, solve_static},
+    statics::{Goal, StaticSettings, natural_modes, solve_static},
     step,
 };
 use palpate_scene::Scene;
@@ -205,7 +205,18 @@ fn at_rest(scene: &Scene, model: &Model, time_s: f64) -> Result<Chain> {
         (0..scene.model.tools.len()).map(|tool| scene.offline_target(tool, tools_at_s).at_rest()).collect();
     let go_on = &mut |_: &_| ControlFlow::Continue(());
     let settings = StaticSettings::default();
-    let solution = solve_static(model, &load_factors, &prescribed_m, &tools, &settings, go_on).into_diagnostic()?;
+    let solution = solve_static(
+        model,
+        &Goal {
+            load_factors: &load_factors,
+            prescribed_displacements_m: &prescribed_m,
+            tools: &tools,
+            ..Goal::default()
+        },
+        &settings,
+        go_on,
+    )
+    .into_diagnostic()?;
     let mut chain = Chain::default();
     chain.solution(&solution);
     let state = solution.state(model, &load_factors);

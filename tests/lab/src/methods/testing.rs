@@ -9,7 +9,7 @@ use glam::DVec3;
 use palpate_physics::{
     Model, Settings,
     contact::ToolTarget,
-    statics::{StaticSettings, solve_static},
+    statics::{Goal, StaticSettings, solve_static},
 };
 use std::ops::ControlFlow;
 
@@ -32,7 +32,13 @@ pub(super) fn equilibrium(subject: &Subject) -> (Vec<DVec3>, f64) {
     let factors = vec![1.0; model.loads().len()];
     let held = vec![DVec3::ZERO; model.prescribed().len()];
     let settings = StaticSettings::default();
-    let found = solve_static(model, &factors, &held, &tools, &settings, &mut |_| ControlFlow::Continue(())).unwrap();
+    let found = solve_static(
+        model,
+        &Goal { load_factors: &factors, prescribed_displacements_m: &held, tools: &tools, ..Goal::default() },
+        &settings,
+        &mut |_| ControlFlow::Continue(()),
+    )
+    .unwrap();
     let answer = subject.answer(&found.x, found.tools.iter().map(|tool| tool.contact_force_n).sum());
     (found.x, answer)
 }

@@ -15,7 +15,7 @@ use miette::{IntoDiagnostic, Result};
 use palpate_physics::{
     LoadSpec, Model,
     material::Law,
-    statics::{StaticSettings, solve_static},
+    statics::{Goal, StaticSettings, solve_static},
 };
 use std::{collections::BTreeSet, ops::ControlFlow};
 
@@ -68,7 +68,13 @@ fn inner_displacement_m(options: &Options, poisson: f64, cells: usize) -> Result
     let model = Model::build(spec).into_diagnostic()?;
     let settings = StaticSettings { relative_residual: 1e-9, ..StaticSettings::default() };
     let go_on = &mut |_: &_| ControlFlow::Continue(());
-    let found = solve_static(&model, &[1.0], &[DVec3::ZERO; 3], &[], &settings, go_on).into_diagnostic()?;
+    let found = solve_static(
+        &model,
+        &Goal { load_factors: &[1.0], prescribed_displacements_m: &[DVec3::ZERO; 3], ..Goal::default() },
+        &settings,
+        go_on,
+    )
+    .into_diagnostic()?;
     let grown = cavity.iter().map(|&n| found.x[n as usize].length() - OCTANT_M[0]);
     Ok((grown.sum::<f64>() / cavity.len() as f64, tet_body(&model).mesh().tets().len()))
 }

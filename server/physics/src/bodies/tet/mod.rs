@@ -3,10 +3,12 @@ mod body;
 mod error;
 mod judged;
 mod modes;
+mod rest_bound;
 mod stepped;
 pub(crate) mod stiffness;
 
 pub use body::TetBody;
 pub use error::TetBodyError;
 pub use modes::{Mode, ModesError, natural_modes};
+pub(crate) use rest_bound::RestBound;
 pub(crate) use stepped::{SteppedTet, TetScratch};

@@ -32,6 +32,12 @@ pub(super) enum Claims {
 impl Claims {
     /// Of the loads and tools of a goal, before a tool came near.
     pub(super) fn of(environment: &Environment, body: &HybridBody, goal: &Goal<'_>) -> Self {
+        if let Some(given) = goal.awake {
+            let mut ids: Vec<u32> = given.iter().copied().filter(|&particle| body.may_wake(particle)).collect();
+            ids.sort_unstable();
+            ids.dedup();
+            return Self::Given(ids);
+        }
         let reach_m = match body.particles().waking {
             Waking::ByTools { reach_m } => reach_m,
             Waking::ByHand => return Self::Given(Vec::new()),

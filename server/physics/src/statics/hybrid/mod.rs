@@ -38,19 +38,18 @@ struct Reached {
     contact: RestingContact,
 }
 
-/// From rest to the goal; the particles `given`, ascending, are awake, or those that its tools and loads keep awake.
+/// From rest to the goal.
 pub(super) fn solve(
     environment: &Environment,
     body: &HybridBody,
     goal: &Goal<'_>,
-    given: Option<Vec<u32>>,
     settings: &StaticSettings,
     progress: &mut dyn FnMut(&Progress) -> ControlFlow<()>,
 ) -> Result<StaticSolution, SolveError> {
     let largest = load_path::largest_step(environment, goal)?;
     let mut solver = Solver { settings, history: Vec::new(), linear_systems: 0, progress };
     let asleep = Awakened::new(environment, body, &[]);
-    let mut claims = given.map_or_else(|| Claims::of(environment, body, goal), Claims::Given);
+    let mut claims = Claims::of(environment, body, goal);
     let ids = claims.look(&asleep, &asleep.at_rest(), &vec![DVec3::ZERO; environment.tools.len()]);
     let mut awakened = Awakened::new(environment, body, &ids);
     let place = awakened.at_rest();

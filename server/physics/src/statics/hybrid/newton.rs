@@ -274,7 +274,7 @@ mod tests {
         awake.sort_unstable();
         for ids in [vec![], awake] {
             let awakened = Awakened::new(model.environment(), body, &ids);
-            let goal = Goal { load_factors: &[], prescribed_displacements_m: &[], tools: &[] };
+            let goal = Goal::default();
             let contact = RestingContact::appear(model.contact(), &awakened.configuration(&awakened.at_rest()));
             for (stretch, stable) in [(1.0, true), (0.8, true), (0.5, false)] {
                 let place: Vec<DVec3> = awakened.at_rest().iter().map(|x| *x * DVec3::new(1.0, 1.0, stretch)).collect();

@@ -1,8 +1,10 @@
 //! `[body.seed]`: the papers' hybrid around a body's tets.
-use super::{body::Body, check, material};
+use super::{BodyKind, Compiled, Ingredients, mass_kg};
 use crate::{
+    compile::{Files, body::Body, check, located::Located, material},
     document::{
         Document, NumericsTable,
+        body::BodyTable,
         seed::{SeedLayerTable, SeedTable},
         source::{Fault, Where},
     },
@@ -12,8 +14,9 @@ use crate::{
 };
 use glam::DVec3;
 use palpate_physics::{
-    Solid,
+    BodySpec, Settings,
     bodies::seed::{LayerSpec, PaperModel, SeedBodySpec, SeedParameters},
+    contact::is_inside,
     material::Law,
 };
 
@@ -23,8 +26,72 @@ fn at() -> Where {
     Where::root("body").key("seed")
 }
 
-/// Puts the layer's surface on the body: parts go over to it, and what acts on its surface acts there.
-pub(super) fn put_on(body: &mut Body, layer: &SeedLayerTable, limits: &Limits) -> Result<(), Fault> {
+/// The papers' own hybrid.
+#[derive(Debug)]
+pub(super) struct Seed;
+
+impl BodyKind for Seed {
+    /// Puts the layer's surface on the body: parts go over to it, and what acts on its surface acts there.
+    fn put_surface_on(
+        &self,
+        body: &mut Body,
+        table: &BodyTable,
+        _: &Where,
+        files: &Files<'_>,
+        progress: &mut dyn FnMut(f64, &str),
+    ) -> Result<(), Fault> {
+        let Some(layer) = table.seed.as_ref().and_then(|seed| seed.layer.as_ref()) else { return Ok(()) };
+        progress(0.75, "making the skin");
+        demand_layer(layer, files.limits)?;
+        let (positions_m, triangles) = ellipsoid_surface(layer.outer_semi_axes_m.into(), layer.triangles);
+        let outer = body.parts.iter().position(|part| part.name == "outer").map_or(u32::MAX, |number| number as u32);
+        let skin = FineSurface { origins: vec![outer; triangles.len()], positions_m, triangles };
+        for (number, part) in (0..).zip(&mut body.parts) {
+            part.go_over_to(&skin, |origin| origin == number);
+        }
+        body.first_vertex = Some(body.mesh.positions_m().len() as u32);
+        body.skin = Some(skin);
+        Ok(())
+    }
+
+    fn compile(&self, ingredients: Ingredients<'_>, _: &mut Settings) -> Result<Compiled, Fault> {
+        let core = ingredients.solid()?;
+        let Ingredients { document, body, .. } = ingredients;
+        let Some(table) = &document.body.seed else {
+            return Err(Fault::value(at(), "there is no [body.seed]".to_owned()));
+        };
+        demand(document)?;
+        let parameters = parameters(document, table)?;
+        let layer = table.layer.as_ref().zip(body.skin.as_ref()).map(|(layer, skin)| LayerSpec {
+            skin_m: skin.positions_m.clone(),
+            skin_triangles: skin.triangles.clone(),
+            particles: layer.particles,
+        });
+        let spec = SeedBodySpec { core, layer, parameters };
+        let volume_m3 = spec.volume_m3(&body.surface);
+        Ok(Compiled { mass_kg: mass_kg(&spec.core, volume_m3), volume_m3, spec: BodySpec::Seed(spec) })
+    }
+
+    /// In the core, or the nearest of the skin: nothing is known between them.
+    fn locate(&self, body: &Body, point_m: DVec3) -> Located {
+        let Some(skin) = &body.skin else { return body.mesh.locate(body.triangles(), point_m) };
+        body.mesh.inside(point_m).unwrap_or_else(|| {
+            let nearest = Located::nearest(&skin.positions_m, skin.triangles.iter().copied(), point_m);
+            let is_inside = is_inside(point_m, &skin.triangles, &skin.positions_m);
+            Located {
+                nodes: nearest.nodes.map(|vertex| vertex + body.first_vertex.unwrap_or_default()),
+                distance_m: if is_inside { 0.0 } else { nearest.distance_m },
+                ..nearest
+            }
+        })
+    }
+
+    fn no_capsules(&self) -> Option<&'static str> {
+        Some("a capsule does not press a seed body, which is touched at one triangle")
+    }
+}
+
+fn demand_layer(layer: &SeedLayerTable, limits: &Limits) -> Result<(), Fault> {
     let at = at().key("layer");
     let axes_ok = layer.outer_semi_axes_m.iter().all(|axis| *axis > 0.0);
     check(&at.key("outer_semi_axes_m"), DVec3::from(layer.outer_semi_axes_m), axes_ok, "all must be larger than 0")?;
@@ -32,31 +99,7 @@ pub(super) fn put_on(body: &mut Body, layer: &SeedLayerTable, limits: &Limits) -
     let triangles_ok = (FEWEST_TRIANGLES..=most).contains(&layer.triangles);
     check(&at.key("triangles"), layer.triangles, triangles_ok, &format!("must be {FEWEST_TRIANGLES} to {most} here"))?;
     let particles_ok = (1..=most).contains(&layer.particles);
-    check(&at.key("particles"), layer.particles, particles_ok, &format!("must be 1 to {most} here"))?;
-    let (positions_m, triangles) = ellipsoid_surface(layer.outer_semi_axes_m.into(), layer.triangles);
-    let outer = body.parts.iter().position(|part| part.name == "outer").map_or(u32::MAX, |number| number as u32);
-    let skin = FineSurface { origins: vec![outer; triangles.len()], positions_m, triangles };
-    for (number, part) in (0..).zip(&mut body.parts) {
-        part.go_over_to(&skin, |origin| origin == number);
-    }
-    body.first_vertex = Some(body.mesh.positions_m().len() as u32);
-    body.skin = Some(skin);
-    Ok(())
-}
-
-/// What the seed body is made from, around its core.
-pub(super) fn spec(document: &Document, body: &Body, core: Solid) -> Result<SeedBodySpec, Fault> {
-    let Some(table) = &document.body.seed else {
-        return Err(Fault::value(at(), "there is no [body.seed]".to_owned()));
-    };
-    demand(document)?;
-    let parameters = parameters(document, table)?;
-    let layer = table.layer.as_ref().zip(body.skin.as_ref()).map(|(layer, skin)| LayerSpec {
-        skin_m: skin.positions_m.clone(),
-        skin_triangles: skin.triangles.clone(),
-        particles: layer.particles,
-    });
-    Ok(SeedBodySpec { core, layer, parameters })
+    check(&at.key("particles"), layer.particles, particles_ok, &format!("must be 1 to {most} here"))
 }
 
 fn parameters(document: &Document, table: &SeedTable) -> Result<SeedParameters, Fault> {

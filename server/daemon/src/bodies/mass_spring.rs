@@ -1,12 +1,102 @@
-//! A mass-spring surface for viewers. The loop hands over awake nodes and levels; where the surface refined everywhere is, is worked out here, beside the loop. Viewers see the same triangles always.
-use crate::sim::exchange::SpringSnapshot;
+//! Mass-spring surfaces. The loop hands over awake nodes and levels; where the surface refined everywhere is, is worked out beside the loop.
+//! Viewers always see the same triangles.
+use super::{
+    ServedBody, Shape, ShapeReader,
+    shape::{double, single},
+};
 use glam::DVec3;
-use palpate_physics::Model;
+use palpate_physics::{
+    Model, State,
+    bodies::mass_spring::{MassSpringBody, Refinement, SpringMotion, region::Constants, topology::Edge},
+    contact::is_inside,
+};
+use palpate_scene::wording::{counted, short};
 use std::sync::Arc;
 
-/// Displacements of the vertices, frame by frame.
+impl ServedBody for MassSpringBody {
+    fn largest_shape(&self, _model: &Model) -> Shape {
+        let springs = self.model();
+        let x = vec![DVec3::ZERO; springs.most_nodes()];
+        Shape::Springs(SpringShape { motion: SpringMotion::filled(springs), x })
+    }
+
+    fn shape_reader(&self, model: &Arc<Model>, rest_f32_m: &[[f32; 3]]) -> Box<dyn ShapeReader> {
+        Box::new(SpringReader::new(model, self, rest_f32_m))
+    }
+
+    /// They see it refined already.
+    fn may_be_refined_for_viewers(&self) -> bool {
+        false
+    }
+
+    /// None of a surface that is open.
+    fn enclosing_triangles(&self, _model: &Model) -> Vec<[u32; 3]> {
+        let surface = self.model().surface();
+        let is_closed = !surface.edges().iter().any(Edge::is_border);
+        if is_closed { surface.triangles().to_vec() } else { Vec::new() }
+    }
+
+    /// Looks at the surface at rest, from which a tool's dent differs by little.
+    fn holds(&self, enclosing_triangles: &[[u32; 3]], _state: &State, point_m: DVec3) -> bool {
+        is_inside(point_m, enclosing_triangles, self.rest_positions_m())
+    }
+
+    fn description(&self) -> Vec<String> {
+        let spec = self.model().spec();
+        let of = |constants: &Constants| {
+            format!("K_m {} N/m, K_h {} N/m", short(constants.mesh_n_per_m), short(constants.home_n_per_m))
+        };
+        let coarse = of(&spec.coarse);
+        let refined = match self.refinement() {
+            None => "coarse everywhere".to_owned(),
+            Some(Refinement { rings, fade_s, .. }) => format!(
+                "{} around what is touched are refined within {} s: at most {}",
+                counted(rings as usize, "ring"),
+                short(fade_s),
+                of(&spec.fine)
+            ),
+        };
+        let awake = if self.is_all_awake() {
+            "all vertices are awake always".to_owned()
+        } else {
+            format!("the {} vertices nearest to tools are awake", spec.most_awake)
+        };
+        vec![
+            format!("springs    {coarse}; edges {} mm long in the mean", short(self.edge_m() * 1e3)),
+            format!("           {refined}"),
+            format!("           {awake}"),
+        ]
+    }
+
+    fn no_equilibrium(&self, _scene: &str) -> Option<miette::Report> {
+        Some(miette::miette!(
+            help = "let `palpated simulate` come to rest",
+            "the equilibrium of a mass-spring surface is not solved for"
+        ))
+    }
+}
+
+/// Where a mass-spring surface is.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SpringShape {
+    /// Awake nodes and levels.
+    pub motion: SpringMotion,
+    /// Positions (m) of the awake nodes.
+    pub x: Vec<DVec3>,
+}
+
+impl SpringShape {
+    pub(super) fn fill(&mut self, state: &State) {
+        if let Some(springs) = state.body.as_mass_spring() {
+            self.x.clone_from(&state.mechanical.x);
+            self.motion.copy_from(&springs.motion);
+        }
+    }
+}
+
+/// Displacements of the vertices of the surface refined everywhere.
 #[derive(Debug)]
-pub struct SpringReader {
+struct SpringReader {
     model: Arc<Model>,
     /// Rest position less the one that viewers have (m), of every vertex.
     rounding_m: Vec<[f32; 3]>,
@@ -18,23 +108,25 @@ pub struct SpringReader {
 }
 
 impl SpringReader {
-    /// `None` of another body. `rest_f32_m` is what viewers have.
-    pub fn new(model: &Arc<Model>, rest_f32_m: &[[f32; 3]]) -> Option<Self> {
-        let rest_m = model.body().as_mass_spring()?.model().rest_m();
-        let rounding = |(rest, rest_f32): (&DVec3, &[f32; 3])| single(*rest - DVec3::from(rest_f32.map(f64::from)));
-        let rounding_m: Vec<[f32; 3]> = rest_m.iter().zip(rest_f32_m).map(rounding).collect();
-        Some(Self {
+    fn new(model: &Arc<Model>, body: &MassSpringBody, rest_f32_m: &[[f32; 3]]) -> Self {
+        let rounding = |(rest, rest_f32): (&DVec3, &[f32; 3])| single(*rest - double(*rest_f32));
+        let rounding_m: Vec<[f32; 3]> = body.model().rest_m().iter().zip(rest_f32_m).map(rounding).collect();
+        Self {
             model: Arc::clone(model),
             displacements_m: rounding_m.clone(),
             moved_m: vec![DVec3::ZERO; rounding_m.len()],
             moved: Vec::new(),
             rounding_m,
-        })
+        }
     }
+}
 
-    /// Works out a frame; returns the largest displacement (m).
-    pub fn read(&mut self, SpringSnapshot { motion, x }: &SpringSnapshot) -> f64 {
-        let Some(body) = self.model.body().as_mass_spring() else { return 0.0 };
+impl ShapeReader for SpringReader {
+    fn read(&mut self, shape: &Shape) -> f64 {
+        let (Shape::Springs(SpringShape { motion, x }), Some(body)) = (shape, self.model.body().as_mass_spring())
+        else {
+            return 0.0;
+        };
         let (model, rest_m) = (body.model(), body.model().rest_m());
         for node in self.moved.drain(..) {
             self.moved_m[node as usize] = DVec3::ZERO;
@@ -64,24 +156,19 @@ impl SpringReader {
         largest_sq.sqrt()
     }
 
-    /// Displacements (m) from the f32 rest positions, after [`Self::read`].
-    pub fn displacements_m(&self) -> &[[f32; 3]] {
+    fn displacements_m(&self) -> &[[f32; 3]] {
         &self.displacements_m
     }
 }
 
-fn single(v: DVec3) -> [f32; 3] {
-    v.to_array().map(|component| component as f32)
-}
-
 fn sum(rounding_m: [f32; 3], moved_m: DVec3) -> [f32; 3] {
-    single(DVec3::from(rounding_m.map(f64::from)) + moved_m)
+    single(double(rounding_m) + moved_m)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{sim::exchange::SpringSnapshot, stream::keyframe::rest_positions_f32};
+    use crate::{bodies::served, stream::keyframe::rest_positions_f32};
     use palpate_physics::{Scratch, State, TickInput, contact::ToolTarget, step};
     use palpate_scene::{Limits, parse};
 
@@ -95,7 +182,8 @@ mod tests {
         let scene = parse(text, "t", None, &Limits::local(), &mut |_, _| ()).unwrap();
         let model = Arc::new(Model::build(scene.model).unwrap());
         let rest_f32_m = rest_positions_f32(&model);
-        let mut reader = SpringReader::new(&model, &rest_f32_m).unwrap();
+        let mut reader = served(&model).shape_reader(&model, &rest_f32_m);
+        let mut shape = served(&model).largest_shape(&model);
         let (mut state, mut scratch) = (State::at_rest(&model), Scratch::new(&model));
         let (mut expected_m, mut refined) = (Vec::new(), 0);
         for tick in 0..900 {
@@ -107,8 +195,8 @@ mod tests {
             if tick % 30 == 0 {
                 let springs = state.body.as_mass_spring().unwrap();
                 refined = refined.max(springs.refined_nodes(model.body().as_mass_spring().unwrap()));
-                let snapshot = SpringSnapshot { motion: springs.motion.clone(), x: state.mechanical.x.clone() };
-                let largest_m = reader.read(&snapshot);
+                shape.fill(&model, &state);
+                let largest_m = reader.read(&shape);
                 model.surface_positions_m(&state, &mut expected_m);
                 let found = reader.displacements_m().iter().zip(&rest_f32_m);
                 let mut farthest_m = 0.0_f64;

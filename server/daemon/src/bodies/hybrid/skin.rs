@@ -1,16 +1,19 @@
 //! The skin of a hybrid body for viewers. The loop hands over coarse nodes and active particles only; where each of the skin's many vertices
 //! is, is worked out here, beside the loop.
-use crate::sim::exchange::LatticeSnapshot;
+use crate::bodies::{
+    Shape, ShapeReader,
+    shape::{double, single},
+};
 use glam::DVec3;
 use palpate_physics::{
     Model,
-    bodies::hybrid::{composite::Anchor, place::Place},
+    bodies::hybrid::{HybridBody, composite::Anchor, place::Place},
 };
 use std::collections::BTreeMap;
 
 /// Displacements of the skin's vertices, frame by frame.
 #[derive(Debug)]
-pub struct SkinReader {
+pub(super) struct SkinReader {
     /// Particles that carry vertices, ascending.
     particles: Vec<Carrier>,
     vertices: Vec<Vertex>,
@@ -37,9 +40,7 @@ struct Vertex {
 }
 
 impl SkinReader {
-    /// `None` of a body of tets. `rest_f32_m` is what viewers have.
-    pub fn new(model: &Model, rest_f32_m: &[[f32; 3]]) -> Option<Self> {
-        let hybrid = model.body().as_hybrid()?;
+    pub(super) fn new(model: &Model, hybrid: &HybridBody, rest_f32_m: &[[f32; 3]]) -> Self {
         let partition = hybrid.partition();
         let rest = model.surface_rest_positions_m();
         let places: Vec<Place> = (0..rest.len() as u32).map(|vertex| hybrid.place(vertex).place(partition)).collect();
@@ -54,18 +55,20 @@ impl SkinReader {
         let vertex = |((place, rest), rest_f32): ((&Place, &DVec3), &[f32; 3])| Vertex {
             carriers: place.particles.map(|particle| number[&particle]),
             weights: place.weights,
-            rounding_m: *rest - DVec3::from(rest_f32.map(f64::from)),
+            rounding_m: *rest - double(*rest_f32),
         };
-        Some(Self {
+        Self {
             vertices: places.iter().zip(rest).zip(rest_f32_m).map(vertex).collect(),
             carried_m: vec![DVec3::ZERO; number.len()],
             displacements_m: vec![[0.0; 3]; places.len()],
             particles: number.keys().map(carrier).collect(),
-        })
+        }
     }
+}
 
-    /// Works out a frame; returns the largest displacement (m).
-    pub fn read(&mut self, lattice: &LatticeSnapshot) -> f64 {
+impl ShapeReader for SkinReader {
+    fn read(&mut self, shape: &Shape) -> f64 {
+        let Shape::Lattice(lattice) = shape else { return 0.0 };
         // Active particles follow the coarse nodes.
         let (nodes, active) = lattice.x.split_at(lattice.x.len() - lattice.active.len());
         for (carried_m, Carrier { particle, rest_m, anchor }) in self.carried_m.iter_mut().zip(&self.particles) {
@@ -80,13 +83,12 @@ impl SkinReader {
             let carried = vertex.carriers.iter().map(|&carrier| self.carried_m[carrier as usize]);
             let moved = carried.zip(vertex.weights).map(|(u, weight)| u * weight).sum::<DVec3>() + vertex.rounding_m;
             largest_sq = largest_sq.max(moved.length_squared());
-            *displacement_m = moved.to_array().map(|component| component as f32);
+            *displacement_m = single(moved);
         }
         largest_sq.sqrt()
     }
 
-    /// Displacements (m) from the f32 rest positions, after [`Self::read`].
-    pub fn displacements_m(&self) -> &[[f32; 3]] {
+    fn displacements_m(&self) -> &[[f32; 3]] {
         &self.displacements_m
     }
 }

@@ -1,11 +1,17 @@
 //! `[body.springs]`: the body's surface, or a part of it, becomes a mass-spring surface.
-use super::{Files, body::Body, check, exactly_one};
+use super::{BodyKind, Compiled, Ingredients};
 use crate::{
+    compile::{
+        Files,
+        body::{Body, BodyMesh, file_fault},
+        check, exactly_one,
+        located::Located,
+    },
     document::{
         Document,
         body::{BodyTable, SurfaceTable},
         source::{Fault, Where},
-        springs::{ConstantsName, RefineTable, SpringsTable},
+        springs::{ConstantsName, HomeLayerTable, RefineTable, SpringsTable},
         words::did_you_mean,
     },
     error::Stage,
@@ -15,7 +21,7 @@ use crate::{
 };
 use glam::DVec3;
 use palpate_physics::{
-    Settings, Surface, TetMesh,
+    BodySpec, Settings, Surface,
     bodies::mass_spring::{
         HomeLaw, MassSpringSpec, Refinement, Refining, SpringSpec,
         body::triangles_about,
@@ -38,61 +44,91 @@ fn at() -> Where {
     Where::root("body").key("springs")
 }
 
+/// A surface of masses on springs.
+#[derive(Debug)]
+pub(super) struct MassSpring;
+
+impl BodyKind for MassSpring {
+    fn refuse(&self, document: &Document) -> Result<(), Fault> {
+        let refuse = |at: Where, message: &str, help: &str| Err(Fault::value(at, message).help(help));
+        if document.body.particles.is_some() || document.body.seed.is_some() {
+            return refuse(at(), "a body is of springs or of particles, not both", "remove one of the two tables");
+        }
+        if !document.material.is_empty() {
+            let message = "a body of springs has no material: its constants are those of its springs";
+            return refuse(Where::root("material").index(0), message, "remove it");
+        }
+        if !document.prescribed.is_empty() {
+            let message = "what holds a body of springs does not move";
+            return refuse(Where::root("prescribed").index(0), message, "use [[fixed]]");
+        }
+        Ok(())
+    }
+
+    fn put_surface_on(
+        &self,
+        body: &mut Body,
+        table: &BodyTable,
+        _: &Where,
+        _: &Files<'_>,
+        progress: &mut dyn FnMut(f64, &str),
+    ) -> Result<(), Fault> {
+        let Some(wanted) = &table.springs else { return Ok(()) };
+        progress(0.75, "making the surface of springs");
+        put_on(body, wanted)
+    }
+
+    fn compile(&self, ingredients: Ingredients<'_>, settings: &mut Settings) -> Result<Compiled, Fault> {
+        let Ingredients { document, body, tools, files, .. } = ingredients;
+        let spec = spec(document, body, tools, files, settings)?;
+        Ok(Compiled { mass_kg: spec.springs.mass_kg.iter().sum(), volume_m3: 0.0, spec: BodySpec::MassSpring(spec) })
+    }
+
+    /// On the surface refined everywhere: there is nothing inside.
+    fn locate(&self, body: &Body, point_m: DVec3) -> Located {
+        Located::nearest(body.surface_positions_m(), body.triangles(), point_m)
+    }
+
+    /// Says so when a tool would pass between the vertices: contact presses it no harder than the springs behind can bear.
+    fn warnings(&self, body: &Body, tools: &[ToolSpec]) -> Vec<String> {
+        /// Of the mean edge's length.
+        const SMALL: f64 = 0.25;
+        let Ok(surface) = control(body) else { return Vec::new() };
+        let mean_m = mean_edge_m(surface);
+        let small = tools.iter().filter(|tool| tool.radius_m < SMALL * mean_m);
+        let warning = |tool: &ToolSpec| {
+            format!(
+                "the tool \"{}\" (radius {:.3} mm) is small beside the surface's edges ({:.3} mm in the mean): pressed hard, it slips through; take a larger tool or a finer surface",
+                tool.name,
+                tool.radius_m * 1e3,
+                mean_m * 1e3
+            )
+        };
+        small.map(warning).collect()
+    }
+}
+
 /// Reads a surface file as a body without an inside.
-pub(super) fn from_file(table: &SurfaceTable, files: &Files<'_>, at: &Where) -> Result<Body, Fault> {
+pub(in crate::compile) fn from_file(
+    kind: &'static dyn BodyKind,
+    table: &SurfaceTable,
+    files: &Files<'_>,
+    at: &Where,
+) -> Result<Body, Fault> {
     let at = at.key("file");
     let path = files.resolve(&at, &table.file)?;
-    let file = files::read_surface(&path).map_err(|error| super::body::file_fault(&at, error))?;
+    let file = files::read_surface(&path).map_err(|error| file_fault(&at, error))?;
     files.limits.check_tets(&at, file.triangles.len() as u64)?;
     let scale = table.unit.in_m();
     let positions_m: Vec<DVec3> = file.vertices.iter().map(|vertex| *vertex * scale).collect();
-    Ok(Body {
-        surface: Surface::alone(positions_m.len(), file.triangles),
-        mesh: TetMesh::of_points(positions_m),
-        skin: None,
-        springs: None,
-        first_vertex: None,
-        lattice_m: None,
-        parts: Vec::new(),
-        origin: format!("surface {}", table.file),
-        report: Vec::new(),
-        warnings: file.warnings,
-    })
-}
-
-/// Refuses what has a surface alone and no springs.
-pub(super) fn demand(table: &BodyTable) -> Result<(), Fault> {
-    if table.surface.is_some() && table.springs.is_none() {
-        let message = "a surface file has no inside to be filled with tets";
-        return Err(Fault::value(Where::root("body").key("surface"), message).help(
-            "make it a mass-spring surface with [body.springs], or give two surfaces whose volume between is filled: [body.surfaces]",
-        ));
-    }
-    if table.springs.is_some() && (table.particles.is_some() || table.seed.is_some()) {
-        let message = "a body is of springs or of particles, not both";
-        return Err(Fault::value(at(), message).help("remove one of the two tables"));
-    }
-    Ok(())
-}
-
-/// Refuses what springs have no use for.
-pub(super) fn demand_alone(document: &Document) -> Result<(), Fault> {
-    if document.body.springs.is_none() {
-        return Ok(());
-    }
-    if !document.material.is_empty() {
-        let message = "a body of springs has no material: its constants are those of its springs";
-        return Err(Fault::value(Where::root("material").index(0), message).help("remove it"));
-    }
-    if !document.prescribed.is_empty() {
-        let message = "what holds a body of springs does not move";
-        return Err(Fault::value(Where::root("prescribed").index(0), message).help("use [[fixed]]"));
-    }
-    Ok(())
+    let surface = Surface::alone(positions_m.len(), file.triangles);
+    let origin = format!("surface {}", table.file);
+    let mesh = BodyMesh::Surface { positions_m, control: None };
+    Ok(Body { warnings: file.warnings, ..Body::new(kind, mesh, surface, origin) })
 }
 
 /// Makes the body's surface, or a part of it, the coarse surface of springs. Nodes are its vertices then, tools and loads act on the surface refined everywhere.
-pub(super) fn put_on(body: &mut Body, table: &SpringsTable) -> Result<(), Fault> {
+fn put_on(body: &mut Body, table: &SpringsTable) -> Result<(), Fault> {
     let chosen: Vec<u32> = match &table.part {
         None => (0..body.surface.triangles.len() as u32).collect(),
         Some(name) => {
@@ -125,15 +161,14 @@ pub(super) fn put_on(body: &mut Body, table: &SpringsTable) -> Result<(), Fault>
     }
     body.parts.retain(|part| !part.nodes.is_empty());
     let vertices = surface.positions_m().len();
-    body.mesh = TetMesh::of_points(skin.positions_m[..vertices].to_vec());
     body.surface = Surface::alone(vertices, surface.triangles().to_vec());
     body.report.push(format!(
         "mass-spring surface of {vertices} vertices, {} edges and {} triangles",
         surface.edges().len(),
         surface.triangles().len()
     ));
+    body.mesh = BodyMesh::Surface { positions_m: skin.positions_m[..vertices].to_vec(), control: Some(surface) };
     body.skin = Some(skin);
-    body.springs = Some(surface);
     Ok(())
 }
 
@@ -141,28 +176,17 @@ fn refused(error: TriangulationError) -> Fault {
     Fault::value(at(), format!("the body's surface cannot be one of springs: {error}")).of(Stage::Body).cause(error)
 }
 
-/// Says so when a tool would pass between the vertices: contact presses it no harder than the springs behind can bear.
-pub(super) fn warn_of_small_tools(body: &Body, tools: &[ToolSpec], warnings: &mut Vec<String>) {
-    /// Of the mean edge's length.
-    const SMALL: f64 = 0.25;
-    let Some(surface) = &body.springs else { return };
-    let mean_m = mean_edge_m(surface);
-    for tool in tools.iter().filter(|tool| tool.radius_m < SMALL * mean_m) {
-        warnings.push(format!(
-            "the tool \"{}\" (radius {:.3} mm) is small beside the surface's edges ({:.3} mm in the mean): pressed hard, it slips through; take a larger tool or a finer surface",
-            tool.name,
-            tool.radius_m * 1e3,
-            mean_m * 1e3
-        ));
-    }
-}
-
 /// What the table that it asks for is made from.
-pub(super) fn to_calibrate(document: &Document, body: Body, files: &Files<'_>) -> Result<ToCalibrate, Fault> {
-    let (Some(table), Some(surface)) = (&document.body.springs, body.springs) else {
+pub(in crate::compile) fn to_calibrate(
+    document: &Document,
+    body: &Body,
+    files: &Files<'_>,
+) -> Result<ToCalibrate, Fault> {
+    let Some(table) = &document.body.springs else {
         let message = "this body is not of springs: there is nothing to calibrate";
         return Err(Fault::value(Where::root("body"), message).help("spring constants belong to [body.springs]"));
     };
+    let surface = control(body)?.clone();
     let at = at().key("refine");
     let refine = table.refine.as_ref().and_then(|refine| Some((refine, refine.table_file.as_ref()?)));
     let (refine, file) = refine.ok_or_else(|| {
@@ -174,25 +198,26 @@ pub(super) fn to_calibrate(document: &Document, body: Body, files: &Files<'_>) -
     Ok(ToCalibrate { surface, coarse, rings: refine.rings, table })
 }
 
-/// Moves it (m).
-pub(super) fn shift(body: &mut Body, offset: DVec3) -> Result<(), Fault> {
-    let Some(surface) = body.springs.take() else { return Ok(()) };
-    let moved = surface.positions_m().iter().map(|p| *p + offset).collect();
-    body.springs = Some(surface.moved(moved).map_err(refused)?);
-    body.mesh = TetMesh::of_points(body.mesh.positions_m().iter().map(|p| *p + offset).collect());
-    Ok(())
+/// The surface whose vertices the springs are between.
+fn control(body: &Body) -> Result<&Triangulation, Fault> {
+    match &body.mesh {
+        BodyMesh::Surface { control: Some(surface), .. } => Ok(surface),
+        _ => Err(Fault::value(at(), "springs need a surface".to_owned())),
+    }
 }
 
 /// What the springs are made from. Their damping goes into the settings.
-pub(super) fn spec(
+fn spec(
     document: &Document,
     body: &Body,
-    (settings, tools): (&mut Settings, &[ToolSpec]),
+    tools: &[ToolSpec],
     files: &Files<'_>,
+    settings: &mut Settings,
 ) -> Result<MassSpringSpec, Fault> {
-    let (Some(table), Some(surface)) = (&document.body.springs, &body.springs) else {
-        return Err(Fault::value(at(), "springs need a surface".to_owned()));
+    let Some(table) = &document.body.springs else {
+        return Err(Fault::value(at(), "there is no [body.springs]".to_owned()));
     };
+    let surface = control(body)?;
     let areas_m2 = surface.vertex_areas_m2();
     let coarse = coarse(table, &areas_m2)?;
     let mass_kg = masses(table, &areas_m2)?;
@@ -329,7 +354,7 @@ fn home_law(table: &SpringsTable) -> Result<HomeLaw, Fault> {
         (None, None) => return Ok(HomeLaw::Linear),
         (Some(per_m2), None) => HomeLaw::cubic(per_m2),
         (None, Some(layers)) => {
-            let layer = |layer: &super::super::document::springs::HomeLayerTable| Layer {
+            let layer = |layer: &HomeLayerTable| Layer {
                 thickness_m: layer.thickness_m,
                 stiffness_ratio: layer.stiffness_ratio,
             };

@@ -1,6 +1,13 @@
 //! `[body.particles]`: the skin and the lattice of a hybrid body.
-use super::{Files, body::Body, check, loads::Constraints};
+use super::{BodyKind, Compiled, Ingredients, mass_kg};
 use crate::{
+    compile::{
+        Files,
+        body::{Body, shape_fault},
+        check,
+        loads::Constraints,
+        located::Located,
+    },
     document::{
         Document, IntegratorName,
         body::{BodyTable, ParticlesTable},
@@ -13,8 +20,9 @@ use crate::{
 };
 use glam::DVec3;
 use palpate_physics::{
-    Solid, TetMesh,
+    BodySpec, Settings, TetMesh,
     bodies::hybrid::{HybridSpec, ParticleSpec, Skin, Waking, composite::Composite, fine_layers, spec::MOST_ACTIVE},
+    contact::{ToolSpec, is_inside},
     mesh::tet::EDGES,
 };
 use std::{collections::BTreeSet, f64::consts::PI};
@@ -28,8 +36,107 @@ fn at() -> Where {
     Where::root("body").key("particles")
 }
 
+/// Coarse tetrahedra, and particles of which those near a contact are awake.
+#[derive(Debug)]
+pub(super) struct Hybrid;
+
+impl BodyKind for Hybrid {
+    fn default_settings(&self) -> Settings {
+        Settings::for_particles()
+    }
+
+    fn put_surface_on(
+        &self,
+        body: &mut Body,
+        table: &BodyTable,
+        at: &Where,
+        files: &Files<'_>,
+        progress: &mut dyn FnMut(f64, &str),
+    ) -> Result<(), Fault> {
+        let Some(wanted) = &table.particles else { return Ok(()) };
+        progress(0.75, "making the skin");
+        let skin = if let Some(skin) = body.skin.take() {
+            skin
+        } else {
+            demand(wanted, body, files.limits)?;
+            skin_of(table, body, wanted.longest_edge_m()).map_err(|error| shape_fault(at, error))?
+        };
+        put_on(body, table, skin);
+        Ok(())
+    }
+
+    fn compile(&self, ingredients: Ingredients<'_>, _: &mut Settings) -> Result<Compiled, Fault> {
+        let coarse = ingredients.solid()?;
+        let Ingredients { document, body, constraints, files, .. } = ingredients;
+        let (Some(table), Some(fine)) = (&document.body.particles, &body.skin) else {
+            return Err(Fault::value(at(), "particles need a surface that encloses the body".to_owned()));
+        };
+        demand_numerics(document)?;
+        files.limits.check_tets(&at().key("spacing_m"), fine.triangles.len() as u64)?;
+        let skin = Skin::new(fine.positions_m.clone(), fine.triangles.clone()).map_err(|error| {
+            Fault::value(at(), format!("particles need a surface that encloses the body: {error}"))
+                .of(Stage::Body)
+                .help("repair the file so that every edge of its surface has one triangle on either side")
+                .cause(error)
+        })?;
+        let particles = ParticleSpec {
+            lattice_through_m: lattice_through_m(body, &skin, constraints),
+            skin,
+            spacing_m: table.spacing_m,
+            fine_depth_m: table.fine_depth_m,
+            most_active: table.most_active as usize,
+            waking: Waking::ByTools { reach_m: table.reach_m.unwrap_or_else(|| half_ball_m(table)) },
+        };
+        let volume_m3 = particles.skin.volume_m3();
+        let mass_kg = mass_kg(&coarse, volume_m3);
+        Ok(Compiled { spec: BodySpec::Hybrid(HybridSpec { coarse, particles }), volume_m3, mass_kg })
+    }
+
+    fn locate(&self, body: &Body, point_m: DVec3) -> Located {
+        match &body.skin {
+            None => body.mesh.locate(body.triangles(), point_m),
+            Some(skin) if is_inside(point_m, &skin.triangles, &skin.positions_m) => {
+                Located { nodes: [0; 4], weights: [1.0, 0.0, 0.0, 0.0], distance_m: 0.0 }
+            }
+            Some(skin) => Located::nearest(&skin.positions_m, skin.triangles.iter().copied(), point_m),
+        }
+    }
+
+    /// With those in the middle of edges between two of them, which composite tets have.
+    fn reaction_nodes(&self, body: &Body, nodes: Vec<u32>) -> Vec<u32> {
+        match body.tets() {
+            Ok(mesh) => with_middles(mesh, nodes),
+            Err(_) => nodes,
+        }
+    }
+
+    /// Says so when the coarse level is none.
+    fn warnings(&self, body: &Body, _: &[ToolSpec]) -> Vec<String> {
+        const MANY_TETS: usize = 5000;
+        let tets = body.mesh.tet_count();
+        if tets <= MANY_TETS {
+            return Vec::new();
+        }
+        vec![format!(
+            "{tets} tets are many for the coarse level of a body with particles, and all of them are computed all the time: a few hundred do"
+        )]
+    }
+}
+
+/// The skin of the wall between two surfaces, in the place of the tets' own, where there are to be particles.
+pub(in crate::compile) fn skin_around(
+    body: &Body,
+    table: &BodyTable,
+    files: &Files<'_>,
+    make: impl FnOnce(f64) -> Result<FineSurface, Fault>,
+) -> Result<Option<FineSurface>, Fault> {
+    let Some(wanted) = &table.particles else { return Ok(None) };
+    demand(wanted, body, files.limits)?;
+    make(wanted.spacing_m).map(Some)
+}
+
 /// Refuses numbers out of range, and a lattice too fine or too coarse for the body, before it is laid.
-pub(super) fn demand(table: &ParticlesTable, body: &Body, limits: &Limits) -> Result<(), Fault> {
+fn demand(table: &ParticlesTable, body: &Body, limits: &Limits) -> Result<(), Fault> {
     let (key, spacing_m) = (at().key("spacing_m"), table.spacing_m);
     check(&key, spacing_m, spacing_m > 0.0, "must be larger than 0")?;
     let most_ok = (1..=MOST_ACTIVE).contains(&(table.most_active as usize));
@@ -52,12 +159,13 @@ pub(super) fn demand(table: &ParticlesTable, body: &Body, limits: &Limits) -> Re
         );
         return Err(Fault::value(key, message).help("take a spacing with several particles through the thinnest part"));
     }
+    let mesh = body.tets()?;
     let boundary_m2: f64 = body.triangles().map(|corners| area_m2(corners, body.mesh.positions_m())).sum();
     let most = f64::from(limits.tets);
     let edge_m = table.longest_edge_m();
     let in_box = ((high - low) / spacing_m).ceil().element_product();
     let counts = [
-        (body.mesh.total_volume_m3() / spacing_m.powi(3), "particles", most, spacing_m),
+        (mesh.total_volume_m3() / spacing_m.powi(3), "particles", most, spacing_m),
         (in_box, "cells in the box around the body", CELLS_PER_TET * most, spacing_m),
         (boundary_m2 / (0.25 * edge_m * edge_m), "triangles of the skin", most, edge_m),
     ];
@@ -80,7 +188,7 @@ fn area_m2(corners: [u32; 3], positions_m: &[DVec3]) -> f64 {
 
 /// The skin of a shape or a mesh file. Shells are triangulated anew on their true surface; flat sides and the triangles of a file are
 /// what they are, and only refined.
-pub(super) fn skin_of(table: &BodyTable, body: &Body, edge_m: f64) -> Result<FineSurface, ShapeError> {
+fn skin_of(table: &BodyTable, body: &Body, edge_m: f64) -> Result<FineSurface, ShapeError> {
     if let Some(shell) = &table.sphere_shell {
         shapes::sphere_shell_skin(shell.inner_radius_m, shell.outer_radius_m, edge_m)
     } else if let Some(shell) = &table.ellipsoid_shell {
@@ -105,7 +213,7 @@ fn boundary(body: &Body, spacing_m: f64) -> FineSurface {
 }
 
 /// Gives the body its skin: parts go over to it, and what acts on its surface acts there.
-pub(super) fn put_on(body: &mut Body, table: &BodyTable, skin: FineSurface) {
+fn put_on(body: &mut Body, table: &BodyTable, skin: FineSurface) {
     let of_regions = table.block.is_none() && table.mesh.is_none();
     for (number, part) in (0..).zip(&mut body.parts) {
         if of_regions {
@@ -123,39 +231,9 @@ pub(super) fn put_on(body: &mut Body, table: &BodyTable, skin: FineSurface) {
     body.skin = Some(skin);
 }
 
-/// What a hybrid body is made from, on its coarse level.
-pub(super) fn spec(
-    document: &Document,
-    body: &Body,
-    coarse: Solid,
-    constraints: &Constraints,
-    files: &Files<'_>,
-) -> Result<HybridSpec, Fault> {
-    let (Some(table), Some(fine)) = (&document.body.particles, &body.skin) else {
-        return Err(Fault::value(at(), "particles need a surface that encloses the body".to_owned()));
-    };
-    demand_numerics(document)?;
-    files.limits.check_tets(&at().key("spacing_m"), fine.triangles.len() as u64)?;
-    let skin = Skin::new(fine.positions_m.clone(), fine.triangles.clone()).map_err(|error| {
-        Fault::value(at(), format!("particles need a surface that encloses the body: {error}"))
-            .of(Stage::Body)
-            .help("repair the file so that every edge of its surface has one triangle on either side")
-            .cause(error)
-    })?;
-    let particles = ParticleSpec {
-        lattice_through_m: lattice_through_m(body, &skin, constraints),
-        skin,
-        spacing_m: table.spacing_m,
-        fine_depth_m: table.fine_depth_m,
-        most_active: table.most_active as usize,
-        waking: Waking::ByTools { reach_m: table.reach_m.unwrap_or_else(|| half_ball_m(table)) },
-    };
-    Ok(HybridSpec { coarse, particles })
-}
-
 impl ParticlesTable {
     /// Of the skin's triangles (m).
-    pub(super) fn longest_edge_m(&self) -> f64 {
+    fn longest_edge_m(&self) -> f64 {
         self.skin_edge_m.unwrap_or(self.spacing_m)
     }
 }
@@ -181,17 +259,6 @@ fn half_ball_m(table: &ParticlesTable) -> f64 {
         *(if held_m3(middle) < all_m3 { &mut low } else { &mut high }) = middle;
     }
     f64::midpoint(low, high)
-}
-
-/// Says so when the coarse level is none.
-pub(super) fn warn_of_fine_tets(document: &Document, body: &Body, warnings: &mut Vec<String>) {
-    const MANY_TETS: usize = 5000;
-    let tets = body.mesh.tets().len();
-    if document.body.particles.is_some() && tets > MANY_TETS {
-        warnings.push(format!(
-            "{tets} tets are many for the coarse level of a body with particles, and all of them are computed all the time: a few hundred do"
-        ));
-    }
 }
 
 /// What bodies with particles cannot have, at its key.
@@ -223,7 +290,7 @@ fn lattice_through_m(body: &Body, skin: &Skin, constraints: &Constraints) -> DVe
 }
 
 /// Nodes with those in the middle of edges between two of them, which composite tets have.
-pub(super) fn with_middles(mesh: &TetMesh, mut nodes: Vec<u32>) -> Vec<u32> {
+fn with_middles(mesh: &TetMesh, mut nodes: Vec<u32>) -> Vec<u32> {
     let chosen: BTreeSet<u32> = nodes.iter().copied().collect();
     let mut middles = BTreeSet::new();
     for (corners, numbers) in mesh.tets().iter().zip(Composite::new(mesh).tets()) {

@@ -1,0 +1,169 @@
+//! Hybrid bodies: coarse tetrahedra, and particles of which those near a contact are awake.
+mod inside;
+mod skin;
+
+use super::{ServedBody, Shape, ShapeReader};
+use glam::DVec3;
+use palpate_physics::{
+    BodySpec, Model, Scratch, State,
+    bodies::hybrid::{HybridBody, Waking},
+    world::wake_only,
+};
+use palpate_scene::{
+    Scene,
+    wording::{counted, short},
+};
+use skin::SkinReader;
+use std::sync::Arc;
+
+impl ServedBody for HybridBody {
+    fn largest_shape(&self, _model: &Model) -> Shape {
+        let most = self.particles().most_active;
+        Shape::Lattice(LatticeShape { x: vec![DVec3::ZERO; self.node_count() + most], active: vec![0; most] })
+    }
+
+    fn shape_reader(&self, model: &Arc<Model>, rest_f32_m: &[[f32; 3]]) -> Box<dyn ShapeReader> {
+        Box::new(SkinReader::new(model, self, rest_f32_m))
+    }
+
+    fn enclosing_triangles(&self, _model: &Model) -> Vec<[u32; 3]> {
+        Vec::new()
+    }
+
+    fn holds(&self, _enclosing_triangles: &[[u32; 3]], state: &State, point_m: DVec3) -> bool {
+        inside::holds(self, &state.mechanical.x, point_m)
+    }
+
+    fn make_next_tick_the_heaviest(&self, model: &Model, state: &mut State, scratch: &mut Scratch) {
+        if state.mechanical.tick == 0 {
+            wake_only(model, state, scratch, 0..self.partition().particle_count() as u32);
+        }
+        // Only at every tenth tick it is asked which particles are to be awake.
+        state.mechanical.tick = 1;
+    }
+
+    fn wakes_particles_for_tools(&self) -> bool {
+        matches!(self.particles().waking, Waking::ByTools { .. })
+    }
+
+    fn woken_by_first_tool(&self, scene: &Scene) -> Option<(Scene, Vec<u32>)> {
+        let particles = near_first_tool(self, scene);
+        if particles.is_empty() {
+            return None;
+        }
+        let mut by_hand = scene.clone();
+        if let BodySpec::Hybrid(spec) = &mut by_hand.model.body {
+            spec.particles.waking = Waking::ByHand;
+        }
+        Some((by_hand, particles))
+    }
+
+    fn description(&self) -> Vec<String> {
+        let (spec, partition, embedding) = (self.particles(), self.partition(), self.cage());
+        let mut lines = vec![format!(
+            "particles  {}, {} mm apart, at most {} awake; skin of {}",
+            partition.particle_count(),
+            short(spec.spacing_m * 1e3),
+            spec.most_active,
+            counted(spec.skin.triangles().len(), "triangle")
+        )];
+        if let Some(depth_m) = spec.fine_depth_m {
+            let doubled = partition.cells().iter().filter(|cell| cell.doubled).count();
+            lines.push(format!(
+                "           {} mm apart deeper than {} mm ({doubled} of {})",
+                short(spec.spacing_m * 2e3),
+                short(depth_m * 1e3),
+                counted(partition.cells().len(), "cell")
+            ));
+        }
+        if let Waking::ByTools { reach_m } = spec.waking {
+            lines.push(format!("           those within {} mm of a tool's contact wake", short(reach_m * 1e3)));
+        }
+        lines.push(format!(
+            "           the coarse tets' surface was moved by up to {} mm to hold them; {} outside never wake",
+            short(embedding.moved_m * 1e3),
+            embedding.outside
+        ));
+        lines.push(format!(
+            "           coarse level of {}; {:.0} % of the volume is in whole cells, the surface cuts the others",
+            counted(self.node_count(), "node"),
+            100.0 * partition.whole_part()
+        ));
+        lines
+    }
+
+    fn warnings(&self) -> Vec<String> {
+        /// Of the volume in whole cells: less is a lattice that hardly sees the body.
+        const FEW_WHOLE: f64 = 0.2;
+        /// Of the particles outside the coarse tets.
+        const MANY_OUTSIDE: f64 = 0.1;
+        let (spec, partition) = (self.particles(), self.partition());
+        let mut warnings = Vec::new();
+        if partition.whole_part() < FEW_WHOLE {
+            warnings.push(format!(
+                "only {:.0} % of the volume is in whole cells: particles {} mm apart are coarse for this body; lower their spacing in [body.particles]",
+                100.0 * partition.whole_part(),
+                short(spec.spacing_m * 1e3)
+            ));
+        }
+        let outside = self.cage().outside;
+        if outside as f64 > MANY_OUTSIDE * partition.particle_count() as f64 {
+            warnings.push(format!(
+                "{outside} of {} particles are outside the coarse tets and never wake: where they are, the body answers as coarsely as its tets; ask for more tets",
+                partition.particle_count()
+            ));
+        }
+        if spec.fine_depth_m.is_some() && !partition.cells().iter().any(|cell| cell.doubled) {
+            warnings.push(
+                "fine depth in [body.particles]: no cell is of twice the spacing, the body is too thin for any deeper down; leave the key out"
+                    .to_owned(),
+            );
+        }
+        warnings
+    }
+}
+
+/// What the skin of a hybrid body follows.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LatticeShape {
+    /// Positions (m) of coarse nodes and then of active particles.
+    pub x: Vec<DVec3>,
+    /// Active particles, ascending.
+    pub active: Vec<u32>,
+}
+
+impl LatticeShape {
+    pub(super) fn fill(&mut self, state: &State) {
+        self.x.clone_from(&state.mechanical.x);
+        self.active.clear();
+        self.active.extend_from_slice(state.body.active_particles());
+    }
+
+    pub(super) fn particles_m(&self) -> &[DVec3] {
+        &self.x[self.x.len() - self.active.len()..]
+    }
+}
+
+/// The particles that the first tool would wake where it is nearest to the body, the nearest first.
+fn near_first_tool(hybrid: &HybridBody, scene: &Scene) -> Vec<u32> {
+    let Some(tool) = scene.model.tools.first() else { return Vec::new() };
+    let spec = hybrid.particles();
+    let Waking::ByTools { reach_m } = spec.waking else { return Vec::new() };
+    let partition = hybrid.partition();
+    let all = || (0..partition.particle_count() as u32).filter(|&particle| hybrid.may_wake(particle));
+    let from_tool_m = |particle: &u32| partition.particle_m(*particle).distance(tool.start_position_m);
+    let Some(first) = all().min_by(|a, b| from_tool_m(a).total_cmp(&from_tool_m(b))) else { return Vec::new() };
+    let centre_m = partition.particle_m(first);
+    let capsule = tool.shape.as_capsule();
+    let half_m = capsule.map_or(DVec3::ZERO, |own| own.start_orientation * (DVec3::Z * own.half_length_m));
+    // From a point of a sphere, from a segment of a capsule.
+    let distance_m = |particle: u32| {
+        let from_centre_m = partition.particle_m(particle) - centre_m;
+        let along = (from_centre_m.dot(half_m) / half_m.length_squared().max(f64::MIN_POSITIVE)).clamp(-1.0, 1.0);
+        from_centre_m.distance(half_m * along)
+    };
+    let mut near: Vec<(f64, u32)> = all().map(|p| (distance_m(p), p)).filter(|(d, _)| *d <= reach_m).collect();
+    near.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+    near.truncate(spec.most_active);
+    near.into_iter().map(|(_, particle)| particle).collect()
+}

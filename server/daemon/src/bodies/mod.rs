@@ -1,0 +1,80 @@
+//! The kinds of body as the daemon serves them: what the loop hands over of each, how the hub makes vertices of it, what `palpated check`
+//! says about it.
+//!
+//! What physics answers for all kinds ([`palpate_physics::bodies::Body`]) is not asked again here. A kind is one file with one
+//! `impl ServedBody`, and one line of [`served`]; nowhere else does the daemon ask which kind a body is.
+mod hybrid;
+mod mass_spring;
+mod seed;
+mod shape;
+mod tet;
+
+pub use shape::{Shape, ShapeReader};
+
+use glam::DVec3;
+use palpate_physics::{Body, Model, Scratch, State, contact::is_inside};
+use palpate_scene::Scene;
+use std::sync::Arc;
+
+/// What the daemon asks of a kind of body.
+pub trait ServedBody {
+    /// A shape filled to the most that it will ever hold: copies of it then have that room, too.
+    fn largest_shape(&self, model: &Model) -> Shape;
+
+    /// What makes vertices of such shapes, for viewers that know each vertex's rest position as `rest_f32_m` (m).
+    fn shape_reader(&self, model: &Arc<Model>, rest_f32_m: &[[f32; 3]]) -> Box<dyn ShapeReader>;
+
+    /// Whether viewers may be shown the surface refined by Loop's scheme near tools.
+    fn may_be_refined_for_viewers(&self) -> bool {
+        true
+    }
+
+    /// Triangles of nodes that enclose the body, for [`Self::holds`]; none where it looks at something else, or where nothing is enclosed.
+    fn enclosing_triangles(&self, model: &Model) -> Vec<[u32; 3]> {
+        (0..model.surface().triangles.len()).map(|triangle| model.surface().triangle_nodes(triangle)).collect()
+    }
+
+    /// Whether a point (m) is inside the deformed body. Does not allocate.
+    fn holds(&self, enclosing_triangles: &[[u32; 3]], state: &State, point_m: DVec3) -> bool {
+        is_inside(point_m, enclosing_triangles, &state.mechanical.x)
+    }
+
+    /// Brings a state to where its next tick costs the most: with as much awake as may be at once.
+    fn make_next_tick_the_heaviest(&self, _model: &Model, _state: &mut State, _scratch: &mut Scratch) {}
+
+    /// Whether particles wake around the contacts of tools, by the model's own choice.
+    fn wakes_particles_for_tools(&self) -> bool {
+        false
+    }
+
+    /// The scene with particles that wake by hand only, and those that its first tool would wake where it is nearest to the body, the
+    /// nearest first; `None` where a tool wakes none.
+    fn woken_by_first_tool(&self, _scene: &Scene) -> Option<(Scene, Vec<u32>)> {
+        None
+    }
+
+    /// Lines that `palpated check` prints of what is particular to the kind.
+    fn description(&self) -> Vec<String> {
+        Vec::new()
+    }
+
+    /// What one would want to change about the body.
+    fn warnings(&self) -> Vec<String> {
+        Vec::new()
+    }
+
+    /// Why `palpated static` refuses the body; `None` where its equilibrium is solved for.
+    fn no_equilibrium(&self, _scene: &str) -> Option<miette::Report> {
+        None
+    }
+}
+
+/// A model's body as the daemon serves it.
+pub fn served(model: &Model) -> &dyn ServedBody {
+    match model.body() {
+        Body::Tet(body) => &**body,
+        Body::Hybrid(body) => &**body,
+        Body::MassSpring(body) => &**body,
+        Body::Seed(body) => &**body,
+    }
+}
