@@ -128,6 +128,21 @@ fn unsafe_stays_in_its_named_places() {
     }
 }
 
+/// A folder of modules has its module's file inside, `mod.rs`: one style, and a folder is moved with all that it has.
+#[test]
+fn the_file_of_a_module_with_a_folder_is_in_the_folder() {
+    let paths = tracked();
+    let folders: BTreeSet<&str> = paths
+        .iter()
+        .filter(|path| path.ends_with(".rs"))
+        .filter_map(|path| path.rsplit_once('/'))
+        .map(|(f, _)| f)
+        .collect();
+    let beside = |path: &&String| path.strip_suffix(".rs").is_some_and(|module| folders.contains(module));
+    let strangers: Vec<_> = paths.iter().filter(beside).collect();
+    assert!(strangers.is_empty(), "these belong into their folders as mod.rs: {strangers:?}");
+}
+
 /// The top level is given: nothing else is committed there.
 #[test]
 fn the_top_level_holds_only_what_belongs_there() {
