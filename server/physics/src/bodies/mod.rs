@@ -1,35 +1,62 @@
-//! The kinds of body, behind one enum: what each of them answers.
+//! The registry of the kinds of body.
 //!
 //! A kind has its own folder: what it is made from, what its rest state fixes, what a tick changes of it beside
-//! [`crate::tick::MechanicalState`], its buffers, and how it is stepped. No kind knows another, nor this file.
-mod chained;
+//! [`crate::tick::MechanicalState`], its buffers, and how it is stepped. It implements [`crate::tick::BodyKind`], [`crate::tick::KindState`] and
+//! [`crate::tick::Stepped`]; no kind knows another, nor this file. Here each has its lines: a variant of every enumeration, how its parts are made,
+//! and an arm of the macros by which the enumerations answer.
+mod body;
 pub mod hybrid;
 pub mod mass_spring;
-mod material_point;
 pub mod seed;
 mod spec;
 mod state;
 mod stepped;
 pub mod tet;
 
-pub use material_point::MaterialPoint;
-pub use spec::{BodyError, BodySpec};
-pub(crate) use state::BodyScratch;
-pub use state::BodyState;
-pub(crate) use stepped::SteppedBody;
+pub use crate::{elements::linear_tet::VolumeRatio, tick::MaterialPoint};
 
 use crate::{
-    elements::{linear_tet::min_volume_ratio, solid::Solid},
-    hash::Fnv,
-    mesh::TetMesh,
-    tick::{Energies, Environment, EnvironmentSpec, MechanicalState},
+    elements::solid::Solid,
+    tick::{Environment, EnvironmentSpec, KindState},
 };
-use glam::DVec3;
-use hybrid::HybridBody;
-use mass_spring::MassSpringBody;
-use seed::SeedBody;
-use std::fmt::Write;
-use tet::{ModesError, RestBound, TetBody};
+use hybrid::{HybridBody, HybridError, HybridScratch, HybridSpec, HybridState, SteppedHybrid};
+use mass_spring::{
+    MassSpringBody, MassSpringError, MassSpringScratch, MassSpringSpec, MassSpringState, SteppedMassSpring,
+};
+use seed::{SeedBody, SeedBodyScratch, SeedBodySpec, SeedBodyState, SeedError, SteppedSeed};
+use serde::{Deserialize, Serialize};
+use tet::{SteppedTet, TetBody, TetBodyError, TetScratch, TetState};
+use thiserror::Error;
+
+/// What a body is built from.
+#[derive(Debug, Clone, PartialEq)]
+pub enum BodySpec {
+    /// Linear tetrahedra throughout.
+    Tet(Solid),
+    /// Coarse tetrahedra, and particles.
+    Hybrid(HybridSpec),
+    /// A surface of masses on springs.
+    MassSpring(MassSpringSpec),
+    /// The papers' own hybrid.
+    Seed(SeedBodySpec),
+}
+
+/// Why a body cannot be built.
+#[derive(Debug, Clone, PartialEq, Error)]
+pub enum BodyError {
+    /// Of tetrahedra.
+    #[error(transparent)]
+    Tet(#[from] TetBodyError),
+    /// With particles.
+    #[error(transparent)]
+    Hybrid(#[from] HybridError),
+    /// A mass-spring surface.
+    #[error(transparent)]
+    MassSpring(#[from] MassSpringError),
+    /// The papers' hybrid.
+    #[error(transparent)]
+    Seed(#[from] SeedError),
+}
 
 /// A body: all that its rest state fixes. Constant after load.
 #[derive(Debug, Clone)]
@@ -44,13 +71,35 @@ pub enum Body {
     Seed(Box<SeedBody>),
 }
 
-/// The smallest `J = det F` of a body.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct VolumeRatio {
-    /// `J`; below zero: inverted.
-    pub ratio: f64,
-    /// Where it is: a tet's number, of a hybrid body a coarse tet's.
-    pub tet: usize,
+/// What a tick changes of a body beside [`crate::tick::MechanicalState`], by its kind.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub enum BodyState {
+    /// Of tetrahedra there is nothing more.
+    Tet(Box<TetState>),
+    /// Which particles are active, and what of them still changes after a switch.
+    Hybrid(Box<HybridState>),
+    /// Which nodes are awake, and what is refined.
+    MassSpring(Box<MassSpringState>),
+    /// All that the papers' steps change; positions and velocities are copies of its nodes'.
+    Seed(Box<SeedBodyState>),
+}
+
+/// Buffers of a body's steps, sized once.
+#[derive(Debug, Clone)]
+pub(crate) enum BodyScratch {
+    Tet(Box<TetScratch>),
+    Hybrid(Box<HybridScratch>),
+    MassSpring(Box<MassSpringScratch>),
+    Seed(Box<SeedBodyScratch>),
+}
+
+/// A body with its own state and buffers, while it is stepped: the one place where a tick asks which kind it is.
+#[derive(Debug)]
+pub(crate) enum SteppedBody<'a> {
+    Tet(SteppedTet<'a>),
+    Hybrid(SteppedHybrid<'a>),
+    MassSpring(SteppedMassSpring<'a>),
+    Seed(SteppedSeed<'a>),
 }
 
 impl Body {
@@ -64,233 +113,83 @@ impl Body {
         progress: &mut dyn FnMut(f64),
     ) -> Result<(Self, Environment), BodyError> {
         Ok(match spec {
-            BodySpec::Tet(solid) => {
-                let (body, environment) = TetBody::build(solid, around, progress)?;
-                (Self::Tet(Box::new(body)), environment)
-            }
-            BodySpec::Hybrid(spec) => {
-                let (body, environment) = HybridBody::build(spec, around, progress)?;
-                (Self::Hybrid(Box::new(body)), environment)
-            }
-            BodySpec::MassSpring(spec) => {
-                let (body, environment) = MassSpringBody::build(spec, around)?;
-                (Self::MassSpring(Box::new(body)), environment)
-            }
-            BodySpec::Seed(spec) => {
-                let (body, environment) = SeedBody::build(spec, around)?;
-                (Self::Seed(Box::new(body)), environment)
-            }
+            BodySpec::Tet(spec) => built(Self::Tet, TetBody::build(spec, around, progress)?),
+            BodySpec::Hybrid(spec) => built(Self::Hybrid, HybridBody::build(spec, around, progress)?),
+            BodySpec::MassSpring(spec) => built(Self::MassSpring, MassSpringBody::build(spec, around)?),
+            BodySpec::Seed(spec) => built(Self::Seed, SeedBody::build(spec, around)?),
         })
     }
+}
 
-    /// The body of tetrahedra, if it is one.
-    pub fn as_tet(&self) -> Option<&TetBody> {
-        if let Self::Tet(body) = self { Some(body) } else { None }
-    }
+fn built<K>(kind: fn(Box<K>) -> Body, (body, environment): (K, Environment)) -> (Body, Environment) {
+    (kind(Box::new(body)), environment)
+}
 
-    /// The hybrid body, if it is one.
-    pub fn as_hybrid(&self) -> Option<&HybridBody> {
-        if let Self::Hybrid(body) = self { Some(body) } else { None }
-    }
-
-    /// The mass-spring surface, if it is one.
-    pub fn as_mass_spring(&self) -> Option<&MassSpringBody> {
-        if let Self::MassSpring(body) = self { Some(body) } else { None }
-    }
-
-    /// The papers' hybrid, if it is one.
-    pub fn as_seed(&self) -> Option<&SeedBody> {
-        if let Self::Seed(body) = self { Some(body) } else { None }
-    }
-
-    /// Its tetrahedra at rest: all there are, the coarse level's, or the core's; none of a surface of springs.
-    pub fn tets(&self) -> Option<&TetMesh> {
-        match self {
-            Self::Tet(body) => Some(body.mesh()),
-            Self::Hybrid(body) => Some(body.coarse()),
-            Self::MassSpring(_) => None,
-            Self::Seed(body) => Some(body.mesh()),
+impl BodyState {
+    /// The state of a body at rest.
+    pub(crate) fn at_rest(body: &Body, environment: &Environment) -> Self {
+        match body {
+            Body::Tet(body) => Self::Tet(Box::new(KindState::at_rest(&**body, environment))),
+            Body::Hybrid(body) => Self::Hybrid(Box::new(KindState::at_rest(&**body, environment))),
+            Body::MassSpring(body) => Self::MassSpring(Box::new(KindState::at_rest(&**body, environment))),
+            Body::Seed(body) => Self::Seed(Box::new(KindState::at_rest(&**body, environment))),
         }
-    }
-
-    /// The tets that fill it by themselves; none of a body with particles, or of springs.
-    pub fn filling_tets(&self) -> Option<&Solid> {
-        match self {
-            Self::Tet(body) => Some(body.solid()),
-            Self::Seed(body) if body.model().layer().is_none() => Some(body.core()),
-            Self::Hybrid(_) | Self::MassSpring(_) | Self::Seed(_) => None,
-        }
-    }
-
-    /// Rest positions (m) of the nodes that masses and constraints are of: of tets, of a coarse level with its edges' middles, of coarse
-    /// vertices, of a core and then its skin.
-    pub fn rest_positions_m(&self) -> &[DVec3] {
-        match self {
-            Self::Tet(body) => body.rest_positions_m(),
-            Self::Hybrid(body) => body.rest_positions_m(),
-            Self::MassSpring(body) => body.rest_positions_m(),
-            Self::Seed(body) => body.rest_positions_m(),
-        }
-    }
-
-    /// Rest positions (m) of what the surface's nodes are numbered by.
-    pub fn surface_rest_positions_m(&self) -> &[DVec3] {
-        match self {
-            Self::Tet(body) => body.rest_positions_m(),
-            Self::Hybrid(body) => body.skin_rest_m(),
-            Self::MassSpring(body) => body.model().rest_m(),
-            Self::Seed(body) => body.rest_positions_m(),
-        }
-    }
-
-    /// Lumped mass (kg) of every node of [`Self::rest_positions_m`].
-    pub fn mass_kg(&self) -> &[f64] {
-        match self {
-            Self::Tet(body) => body.mass_kg(),
-            Self::Hybrid(body) => &body.masses().node_kg,
-            Self::MassSpring(body) => &body.model().spec().mass_kg,
-            Self::Seed(body) => body.mass_kg(),
-        }
-    }
-
-    /// Largest natural frequency (rad/s) at rest.
-    pub fn max_natural_frequency_rad_per_s(&self) -> f64 {
-        match self {
-            Self::Tet(body) => body.max_natural_frequency_rad_per_s(),
-            Self::Hybrid(body) => body.max_natural_frequency_rad_per_s(),
-            Self::MassSpring(body) => body.model().frequency_rad_per_s(),
-            Self::Seed(body) => body.max_natural_frequency_rad_per_s(),
-        }
-    }
-
-    /// Particles, awake or not.
-    pub fn particle_count(&self) -> usize {
-        match self {
-            Self::Hybrid(body) => body.partition().particle_count(),
-            Self::Seed(body) => body.model().layer().map_or(0, seed::layer::Layer::particle_count),
-            Self::Tet(_) | Self::MassSpring(_) => 0,
-        }
-    }
-
-    /// Most particles awake at once.
-    pub fn most_awake_particles(&self) -> usize {
-        match self {
-            Self::Hybrid(body) => body.particles().most_active,
-            Self::Seed(body) => body.model().most_awake(),
-            Self::Tet(_) | Self::MassSpring(_) => 0,
-        }
-    }
-
-    /// Particles that never wake because no tetrahedron of the coarse level holds them.
-    pub fn particles_that_never_wake(&self) -> usize {
-        if let Self::Hybrid(body) = self { body.cage().outside } else { 0 }
-    }
-
-    /// Most points awake at once: particles, or the nodes of springs.
-    pub fn most_awake_points(&self) -> usize {
-        if let Self::MassSpring(body) = self { body.model().most_nodes() } else { self.most_awake_particles() }
-    }
-
-    /// Whether its steps book work and dissipation, so that the ledger can be balanced.
-    pub fn books_energy(&self) -> bool {
-        !matches!(self, Self::Seed(_))
-    }
-
-    /// How far particles are apart (m); 0 where there are none.
-    pub fn particle_spacing_m(&self) -> f64 {
-        match self {
-            Self::Hybrid(body) => body.particles().spacing_m,
-            Self::Seed(body) => body.model().layer().map_or(0.0, |layer| layer.voxels.spacing_m),
-            Self::Tet(_) | Self::MassSpring(_) => 0.0,
-        }
-    }
-
-    /// The most positions that a state of it ever has.
-    pub(crate) fn most_positions(&self) -> usize {
-        match self {
-            Self::Tet(body) => body.rest_positions_m().len(),
-            Self::Hybrid(body) => body.most_positions(),
-            Self::MassSpring(body) => body.model().most_nodes(),
-            Self::Seed(body) => body.rest_positions_m().len(),
-        }
-    }
-
-    /// Whether it has a scheme of time integration of its own, whatever the settings ask for.
-    pub(crate) fn has_own_scheme(&self) -> bool {
-        matches!(self, Self::Seed(_))
-    }
-
-    /// The constants of the bound on how far it is from rest; `None` of bodies that have none.
-    ///
-    /// # Errors
-    /// A body that is not held, or whose modes are not found.
-    pub(crate) fn rest_bound(&self, environment: &Environment) -> Result<Option<RestBound>, ModesError> {
-        let Self::Tet(body) = self else { return Ok(None) };
-        RestBound::new(body, &environment.surface).map(Some)
-    }
-
-    /// A bound (m) on how far any node is from rest, now and later, while nothing that acts on the body changes.
-    pub(crate) fn distance_from_rest_m(&self, bound: &RestBound, state: &MechanicalState) -> f64 {
-        if let Self::Tet(body) = self { bound.distance_m(body, state) } else { f64::INFINITY }
-    }
-
-    /// Whether leapfrog's step of it can be judged ([`SteppedBody::judged`]).
-    pub(crate) fn can_be_judged(&self) -> bool {
-        matches!(self, Self::Tet(_) | Self::Hybrid(_))
-    }
-
-    /// Writes where each vertex of the surface is (m). Of a hybrid body, each is worked out from some particles.
-    pub(crate) fn surface_positions_m(
-        &self,
-        environment: &Environment,
-        own: &BodyState,
-        state: &MechanicalState,
-        positions_m: &mut Vec<DVec3>,
-    ) {
-        positions_m.clear();
-        let vertices = 0..environment.surface.nodes.len() as u32;
-        match (self, own) {
-            (Self::Hybrid(body), BodyState::Hybrid(own)) => {
-                positions_m.extend(vertices.map(|vertex| body.vertex_m(vertex, own.ids(), &state.x)));
-            }
-            (Self::MassSpring(body), BodyState::MassSpring(own)) => {
-                positions_m.extend(vertices.map(|vertex| body.vertex_m(&own.motion, vertex, &state.x)));
-            }
-            _ => positions_m.extend(environment.surface.nodes.iter().map(|&node| state.x[node as usize])),
-        }
-    }
-
-    /// What the body holds now, beside the ledger's work and dissipation.
-    pub(crate) fn energies(&self, gravity_m_per_s2: DVec3, own: &BodyState, state: &MechanicalState) -> Energies {
-        match (self, own) {
-            (Self::Tet(body), _) => body.energies(gravity_m_per_s2, state),
-            (Self::Hybrid(body), BodyState::Hybrid(own)) => body.energies(gravity_m_per_s2, own, state),
-            (Self::MassSpring(body), BodyState::MassSpring(own)) => body.energies(gravity_m_per_s2, own, state),
-            (Self::Seed(body), BodyState::Seed(own)) => body.energies(own, state),
-            _ => Energies::NAN,
-        }
-    }
-
-    /// The smallest `J = det F` over all tets; of a hybrid body, over the coarse tets' means and the awake cells. A surface of springs has
-    /// none.
-    pub(crate) fn min_volume_ratio(&self, own: &BodyState, x: &[DVec3]) -> Option<VolumeRatio> {
-        let (ratio, tet) = match (self, own) {
-            (Self::Tet(body), _) => min_volume_ratio(body.mesh(), body.rest_tets(), x),
-            (Self::Hybrid(body), BodyState::Hybrid(own)) => body.min_volume_ratio(own, x),
-            (Self::Seed(body), _) => min_volume_ratio(body.mesh(), body.model().core().rest_tets(), x),
-            _ => return None,
-        };
-        Some(VolumeRatio { ratio, tet })
-    }
-
-    /// Writes what it was built from into a hash, so that a state goes back only into the body it came from.
-    pub(crate) fn fingerprint_into(&self, hash: &mut Fnv) {
-        // A float prints as the shortest text that reads back to its bits. Writing to the hash cannot fail.
-        let _ = match self {
-            Self::Tet(body) => write!(hash, "tet {:?}", body.solid()),
-            Self::Hybrid(body) => write!(hash, "hybrid {:?}", (body.coarse(), body.materials(), body.particles())),
-            Self::MassSpring(body) => write!(hash, "mass-spring {}", body.fingerprint()),
-            Self::Seed(body) => write!(hash, "seed {:?}", body.spec()),
-        };
     }
 }
+
+impl BodyScratch {
+    /// Buffers for a body in its environment.
+    pub(crate) fn new(body: &Body, environment: &Environment) -> Self {
+        match body {
+            Body::Tet(body) => Self::Tet(Box::new(TetScratch::new(body, environment))),
+            Body::Hybrid(body) => Self::Hybrid(Box::new(HybridScratch::new(body, environment))),
+            Body::MassSpring(body) => Self::MassSpring(Box::new(MassSpringScratch::new(body))),
+            Body::Seed(body) => Self::Seed(Box::new(SeedBodyScratch::new(body.model()))),
+        }
+    }
+}
+
+impl<'a> SteppedBody<'a> {
+    /// `None`: state or buffers are of another kind of body.
+    pub(crate) fn of(body: &'a Body, own: &'a mut BodyState, scratch: &'a mut BodyScratch) -> Option<Self> {
+        Some(match (body, own, scratch) {
+            (Body::Tet(body), BodyState::Tet(_), BodyScratch::Tet(scratch)) => Self::Tet(SteppedTet { body, scratch }),
+            (Body::Hybrid(body), BodyState::Hybrid(own), BodyScratch::Hybrid(scratch)) => {
+                Self::Hybrid(SteppedHybrid { body, own, scratch })
+            }
+            (Body::MassSpring(body), BodyState::MassSpring(own), BodyScratch::MassSpring(scratch)) => {
+                Self::MassSpring(SteppedMassSpring { body, own, scratch })
+            }
+            (Body::Seed(body), BodyState::Seed(own), BodyScratch::Seed(scratch)) => {
+                Self::Seed(SteppedSeed { body, own, scratch })
+            }
+            _ => return None,
+        })
+    }
+}
+
+/// What the kind says that one of the enumerations holds: `of_kind!(Body, self, body => body.mass_kg())`.
+macro_rules! of_kind {
+    ($enumeration:ident, $value:expr, $kind:ident => $answer:expr) => {
+        match $value {
+            $enumeration::Tet($kind) => $answer,
+            $enumeration::Hybrid($kind) => $answer,
+            $enumeration::MassSpring($kind) => $answer,
+            $enumeration::Seed($kind) => $answer,
+        }
+    };
+}
+
+/// The same of two enumerations that hold the same kind, else another value.
+macro_rules! of_both {
+    ($one:ident, $a:expr, $other:ident, $b:expr, ($kind:ident, $own:ident) => $answer:expr, else $otherwise:expr) => {
+        match ($a, $b) {
+            ($one::Tet($kind), $other::Tet($own)) => $answer,
+            ($one::Hybrid($kind), $other::Hybrid($own)) => $answer,
+            ($one::MassSpring($kind), $other::MassSpring($own)) => $answer,
+            ($one::Seed($kind), $other::Seed($own)) => $answer,
+            _ => $otherwise,
+        }
+    };
+}
+use {of_both, of_kind};

@@ -1,25 +1,6 @@
-//! What a body is built from, and why it cannot be.
-use super::{
-    hybrid::{HybridError, HybridSpec},
-    mass_spring::{MassSpringError, MassSpringSpec},
-    seed::{SeedBodySpec, SeedError},
-    tet::TetBodyError,
-};
+//! What a body is built from, whichever kind it is.
+use super::{BodySpec, hybrid::HybridSpec, mass_spring::MassSpringSpec, seed::SeedBodySpec};
 use crate::elements::solid::Solid;
-use thiserror::Error;
-
-/// What a body is built from.
-#[derive(Debug, Clone, PartialEq)]
-pub enum BodySpec {
-    /// Linear tetrahedra throughout.
-    Tet(Solid),
-    /// Coarse tetrahedra, and particles.
-    Hybrid(HybridSpec),
-    /// A surface of masses on springs.
-    MassSpring(MassSpringSpec),
-    /// The papers' own hybrid.
-    Seed(SeedBodySpec),
-}
 
 impl BodySpec {
     /// A hybrid body, if it is one.
@@ -37,13 +18,13 @@ impl BodySpec {
         if let Self::Seed(spec) = self { Some(spec) } else { None }
     }
 
-    /// The tets, of whatever level, with their materials; none of a surface of springs.
+    /// The tets, of whatever level, with their materials, of kinds that have any.
     pub fn solid(&self) -> Option<&Solid> {
         match self {
             Self::Tet(solid) => Some(solid),
             Self::Hybrid(spec) => Some(&spec.coarse),
-            Self::MassSpring(_) => None,
             Self::Seed(spec) => Some(&spec.core),
+            _ => None,
         }
     }
 
@@ -52,25 +33,8 @@ impl BodySpec {
         match self {
             Self::Tet(solid) => Some(solid),
             Self::Hybrid(spec) => Some(&mut spec.coarse),
-            Self::MassSpring(_) => None,
             Self::Seed(spec) => Some(&mut spec.core),
+            _ => None,
         }
     }
-}
-
-/// Why a body cannot be built.
-#[derive(Debug, Clone, PartialEq, Error)]
-pub enum BodyError {
-    /// Of tetrahedra.
-    #[error(transparent)]
-    Tet(#[from] TetBodyError),
-    /// With particles.
-    #[error(transparent)]
-    Hybrid(#[from] HybridError),
-    /// A mass-spring surface.
-    #[error(transparent)]
-    MassSpring(#[from] MassSpringError),
-    /// The papers' hybrid.
-    #[error(transparent)]
-    Seed(#[from] SeedError),
 }

@@ -1,99 +1,59 @@
-//! What a tick changes of a body beside what every body has, and the buffers that it works in.
+//! What a tick changes of a body beside what every body has, whichever kind it is.
 use super::{
-    Body,
-    hybrid::{HybridScratch, HybridState},
-    mass_spring::{MassSpringScratch, MassSpringState},
-    seed::{SeedBodyScratch, SeedBodyState},
-    tet::TetScratch,
+    Body, BodyState, hybrid::HybridState, mass_spring::MassSpringState, of_both, of_kind, seed::SeedBodyState,
 };
-use crate::tick::{Environment, MechanicalState};
+use crate::{
+    hash::Chain,
+    tick::{Environment, KindState, MechanicalState},
+};
 use glam::DVec3;
-use serde::{Deserialize, Serialize};
-
-/// What a tick changes of a body beside [`MechanicalState`], by its kind.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub enum BodyState {
-    /// Of tetrahedra there is nothing more.
-    Tet,
-    /// Which particles are active, and what of them fades.
-    Hybrid(Box<HybridState>),
-    /// Which nodes are awake, and what is refined.
-    MassSpring(Box<MassSpringState>),
-    /// All that the papers' steps change; positions and velocities are copies of its nodes'.
-    Seed(Box<SeedBodyState>),
-}
 
 impl BodyState {
-    /// At rest.
-    pub(crate) fn at_rest(body: &Body, environment: &Environment) -> Self {
-        match body {
-            Body::Tet(_) => Self::Tet,
-            Body::Hybrid(body) => Self::Hybrid(Box::new(HybridState::at_rest(body, &environment.tools))),
-            Body::MassSpring(body) => Self::MassSpring(Box::new(MassSpringState::at_rest(body))),
-            Body::Seed(body) => Self::Seed(Box::new(SeedBodyState::at_rest(body.model()))),
-        }
-    }
-
     /// Positions (m) at rest, of what is awake then.
     pub(crate) fn rest_m<'a>(&'a self, body: &'a Body) -> impl ExactSizeIterator<Item = DVec3> + 'a {
         let rest_m = body.rest_positions_m();
-        let awake = if let Self::MassSpring(own) = self { Some(&own.motion.ids[..]) } else { None };
+        let awake = self.awake_nodes();
         let count = awake.map_or(rest_m.len(), <[u32]>::len);
         (0..count).map(move |place| rest_m[awake.map_or(place, |ids| ids[place] as usize)])
     }
 
-    /// Back to rest, in the buffers it has.
+    /// Goes back to rest, in the buffers it has.
     pub(crate) fn reset(&mut self, body: &Body) {
-        match (self, body) {
-            (Self::Hybrid(own), _) => own.clear(),
-            (Self::MassSpring(own), Body::MassSpring(body)) => own.reset(body),
-            (Self::Seed(own), Body::Seed(body)) => own.reset(body.model()),
-            _ => {}
-        }
+        of_both!(BodyState, self, Body, body, (own, body) => KindState::reset(&mut **own, body), else ());
     }
 
-    /// Goes over to these particles, which have room and may wake, of a body at rest; other bodies have none.
+    /// Wakes these particles in a body at rest. There must be room for them, and they must be such as may wake; other bodies have none.
     pub(crate) fn wake_at_rest(&mut self, ids: &[u32], state: &mut MechanicalState) {
-        if let Self::Hybrid(own) = self {
-            own.wake_at_rest(ids, state);
-        }
+        of_kind!(BodyState, self, own => KindState::wake_at_rest(&mut **own, ids, state));
     }
 
     /// Refines so many rings around vertices and nothing else, of a body that is refined by hand; others are not refined.
     pub(crate) fn refine_only(&mut self, body: &Body, centres: &[u32], rings: u32) {
-        if let (Self::MassSpring(own), Body::MassSpring(body)) = (self, body) {
-            own.refine_only(body, centres, rings);
-        }
+        of_both!(BodyState, self, Body, body, (own, body) => {
+            KindState::refine_only(&mut **own, body, centres, rings);
+        }, else ());
     }
 
     /// Copies another state of the same body. Allocates nothing.
     pub(crate) fn copy_from(&mut self, other: &Self) {
-        match (self, other) {
-            (Self::Hybrid(own), Self::Hybrid(other)) => own.copy_from(other),
-            (Self::MassSpring(own), Self::MassSpring(other)) => own.copy_from(other),
-            (Self::Seed(own), Self::Seed(other)) => own.copy_from(other),
-            _ => {}
-        }
+        of_both!(BodyState, self, BodyState, other, (own, other) => KindState::copy_from(&mut **own, other), else ());
     }
 
     /// Whether it may be a state of a body, beside one of what every body has: for states that come from elsewhere.
     pub(crate) fn fits(&self, body: &Body, environment: &Environment, state: &MechanicalState) -> bool {
-        match (self, body) {
-            (Self::Tet, Body::Tet(_)) => true,
-            (Self::Hybrid(own), Body::Hybrid(body)) => own.fits(body, &environment.tools),
-            (Self::MassSpring(own), Body::MassSpring(body)) => own.fits(body),
-            (Self::Seed(own), Body::Seed(body)) => own.fits(body.model(), &state.x, &state.v),
-            _ => false,
-        }
+        of_both!(BodyState, self, Body, body, (own, body) => {
+            KindState::fits(&**own, body, environment, state)
+        }, else false)
+    }
+
+    /// Adds all of it.
+    pub(crate) fn chain(&self, chain: &mut Chain) {
+        of_kind!(BodyState, self, own => KindState::chain(&**own, chain));
     }
 
     /// How many positions a state of the body has.
     pub(crate) fn positions(&self, body: &Body) -> usize {
-        match self {
-            Self::Tet | Self::Seed(_) => body.rest_positions_m().len(),
-            Self::Hybrid(own) => body.rest_positions_m().len() + own.len(),
-            Self::MassSpring(own) => own.motion.ids.len(),
-        }
+        self.awake_nodes().map_or_else(|| body.rest_positions_m().len() + self.active_particles().len(), <[u32]>::len)
     }
 
     /// Whether another is of the same kind of body.
@@ -103,45 +63,37 @@ impl BodyState {
 
     /// How many of a state's positions are of nodes that are always there.
     pub(crate) fn always_there(&self, positions: usize) -> Option<usize> {
-        match self {
-            Self::Tet | Self::Seed(_) => Some(positions),
-            Self::Hybrid(own) => positions.checked_sub(own.len()),
-            Self::MassSpring(own) => positions.checked_sub(own.motion.ids.len()),
-        }
+        positions.checked_sub(self.awake_nodes().unwrap_or(self.active_particles()).len())
     }
 
     /// Whether numbers that are looked at with nobody else's are finite.
     pub(crate) fn is_finite(&self) -> bool {
-        if let Self::Seed(own) = self { own.particles_are_finite() } else { true }
+        of_kind!(BodyState, self, own => own.is_finite())
     }
 
     /// Vectors that a hash of positions and velocities is of, beside those of [`MechanicalState`].
-    pub(crate) fn vectors(&self) -> impl Iterator<Item = &DVec3> {
-        let seed = if let Self::Seed(own) = self { Some(own) } else { None };
-        seed.into_iter().flat_map(|own| own.vectors())
+    pub(crate) fn vectors(&self) -> Box<dyn Iterator<Item = &DVec3> + '_> {
+        of_kind!(BodyState, self, own => KindState::vectors(&**own))
+    }
+
+    /// The nodes, ascending, whose positions a state has, where it does not have all nodes'.
+    fn awake_nodes(&self) -> Option<&[u32]> {
+        of_kind!(BodyState, self, own => own.awake_nodes())
     }
 
     /// Particles of the lattice that are active, ascending; none of other bodies.
     pub fn active_particles(&self) -> &[u32] {
-        if let Self::Hybrid(own) = self { own.ids() } else { &[] }
+        of_kind!(BodyState, self, own => own.active_particles())
     }
 
-    /// Particles that are awake.
+    /// How many particles are awake.
     pub fn awake_particles(&self) -> usize {
-        match self {
-            Self::Hybrid(own) => own.len(),
-            Self::Seed(own) => own.awake as usize,
-            Self::Tet | Self::MassSpring(_) => 0,
-        }
+        of_kind!(BodyState, self, own => own.awake_particles())
     }
 
     /// Positions (m) of the awake particles.
     pub(crate) fn awake_particles_m<'a>(&'a self, state: &'a MechanicalState) -> &'a [DVec3] {
-        match self {
-            Self::Hybrid(own) => &state.x[state.x.len() - own.len()..],
-            Self::Seed(own) => &own.now.particles.x[..own.awake as usize],
-            Self::Tet | Self::MassSpring(_) => &[],
-        }
+        of_kind!(BodyState, self, own => own.awake_particles_m(state))
     }
 
     /// A hybrid body's part.
@@ -162,26 +114,5 @@ impl BodyState {
     /// A seed body's part, to be changed by hand.
     pub fn as_seed_mut(&mut self) -> Option<&mut SeedBodyState> {
         if let Self::Seed(own) = self { Some(own) } else { None }
-    }
-}
-
-/// Buffers of a body's steps, sized once.
-#[derive(Debug, Clone)]
-pub(crate) enum BodyScratch {
-    Tet(Box<TetScratch>),
-    Hybrid(Box<HybridScratch>),
-    MassSpring(Box<MassSpringScratch>),
-    Seed(Box<SeedBodyScratch>),
-}
-
-impl BodyScratch {
-    /// For a body in its environment.
-    pub(crate) fn new(body: &Body, environment: &Environment) -> Self {
-        match body {
-            Body::Tet(body) => Self::Tet(Box::new(TetScratch::new(body, environment))),
-            Body::Hybrid(body) => Self::Hybrid(Box::new(HybridScratch::new(body, environment))),
-            Body::MassSpring(body) => Self::MassSpring(Box::new(MassSpringScratch::new(body))),
-            Body::Seed(body) => Self::Seed(Box::new(SeedBodyScratch::new(body.model()))),
-        }
     }
 }

@@ -68,13 +68,22 @@ impl RestTet {
     }
 }
 
-/// Smallest `J = det F` of all tets at positions `x` (m), and the tet that has it. Below zero: inverted.
-pub(crate) fn min_volume_ratio(mesh: &TetMesh, rest_tets: &[RestTet], x: &[DVec3]) -> (f64, usize) {
-    let mut worst = (f64::INFINITY, 0);
+/// The smallest `J = det F` of a body.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct VolumeRatio {
+    /// `J`; below zero: inverted.
+    pub ratio: f64,
+    /// Where it is: a tet's number, of a hybrid body a coarse tet's.
+    pub tet: usize,
+}
+
+/// Smallest `J = det F` of all tets at positions `x` (m).
+pub(crate) fn min_volume_ratio(mesh: &TetMesh, rest_tets: &[RestTet], x: &[DVec3]) -> VolumeRatio {
+    let mut worst = VolumeRatio { ratio: f64::INFINITY, tet: 0 };
     for (tet, (nodes, rest)) in mesh.tets().iter().zip(rest_tets).enumerate() {
-        let j = rest.gradient_of(&nodes.map(|n| x[n as usize])).determinant();
-        if j < worst.0 {
-            worst = (j, tet);
+        let ratio = rest.gradient_of(&nodes.map(|n| x[n as usize])).determinant();
+        if ratio < worst.ratio {
+            worst = VolumeRatio { ratio, tet };
         }
     }
     worst

@@ -22,7 +22,7 @@ use crate::{
     contact::{ContactScratch, StepAhead},
     linalg::pcg::{self, Stop},
     tick::{
-        Environment, Evaluation, MechanicalState, Tick,
+        Environment, Evaluation, MechanicalState, Stepped, Tick,
         lumped::{LumpedMass, drift},
     },
 };

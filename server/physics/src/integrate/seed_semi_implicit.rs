@@ -26,7 +26,7 @@
 use crate::{
     bodies::tet::{SteppedTet, TetBody},
     contact::ContactScratch,
-    tick::{Environment, Evaluation, MechanicalState, Tick, lumped::drift},
+    tick::{Environment, Evaluation, MechanicalState, Stepped, Tick, lumped::drift},
 };
 use glam::{DMat3, DVec3};
 

@@ -95,9 +95,7 @@ pub fn solve_static(
             held(body.first_free_part())?;
             hybrid::solve(environment, body, goal, settings, progress)
         }
-        Body::MassSpring(_) | Body::Seed(_) => {
-            Err(SolveError::NotForThisBody { what: "static equilibrium", but: ", and of those with particles" })
-        }
+        _ => Err(SolveError::NotForThisBody { what: "static equilibrium", but: ", and of those with particles" }),
     }
 }
 

@@ -7,7 +7,7 @@ use crate::bodies::SteppedBody;
 pub fn wake_only(model: &Model, state: &mut State, scratch: &mut Scratch, particles: impl IntoIterator<Item = u32>) {
     let State { mechanical, body: own, .. } = state;
     if let Some(mut body) = SteppedBody::of(model.body(), own, &mut scratch.body) {
-        body.wake_only(model.environment(), mechanical, particles);
+        body.wake_only(model.environment(), mechanical, &mut particles.into_iter());
     }
 }
 

@@ -11,6 +11,7 @@ mod energy;
 mod frequency;
 mod judged;
 pub mod kernels;
+mod kind;
 mod locate;
 mod long_steps;
 pub mod metric;

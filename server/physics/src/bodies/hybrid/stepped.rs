@@ -3,7 +3,10 @@ use super::{HybridBody, HybridScratch, HybridState, carried_skin::SkinView};
 use crate::{
     contact::ContactScratch,
     lanes::{kicks::Kick, vector_operations},
-    tick::{Environment, Evaluation, MechanicalState, Tick, Touch, lumped::holders_power_w, touch_skin},
+    tick::{
+        Environment, Evaluation, Judged, MechanicalState, PointForce, PrescribedNodes, Stepped, Tick, Touch,
+        lumped::holders_power_w, touch_skin,
+    },
 };
 use glam::DVec3;
 
@@ -15,9 +18,8 @@ pub(crate) struct SteppedHybrid<'a> {
     pub(crate) scratch: &'a mut HybridScratch,
 }
 
-impl SteppedHybrid<'_> {
-    /// Total force (N) at the present positions, and its external part.
-    pub(crate) fn evaluate(
+impl<'a> Stepped<'a> for SteppedHybrid<'a> {
+    fn evaluate(
         &mut self,
         tick: &Tick<'_>,
         now: &Evaluation,
@@ -70,19 +72,13 @@ impl SteppedHybrid<'_> {
         state.force_is_current = true;
     }
 
-    /// Before the first kick of a tick: velocities are not those that the last one left.
-    pub(crate) fn begin_kicks(&mut self) {
+    /// Velocities are not those that the last kick left.
+    fn begin_kicks(&mut self) {
         self.scratch.of_free_j = None;
     }
 
     /// `v ← (v e^{−c h/2} + h M'⁻¹ f) e^{−c h/2}`, and the ledger's share of it, as of a body of tets.
-    pub(crate) fn kick(
-        &mut self,
-        environment: &Environment,
-        state: &mut MechanicalState,
-        h_s: f64,
-        ends_long_step: bool,
-    ) {
+    fn kick(&mut self, environment: &Environment, state: &mut MechanicalState, h_s: f64, ends_long_step: bool) {
         let Self { body, own, scratch } = self;
         let HybridScratch { patch, accelerations, momenta, of_free_j, kick_sq, balance, .. } = &mut **scratch;
         accelerations.clear();
@@ -123,14 +119,38 @@ impl SteppedHybrid<'_> {
     }
 
     /// Kinetic energy (J) that velocities of held axes have by themselves and with free ones.
-    pub(crate) fn held_kinetic_j(&self, state: &MechanicalState) -> f64 {
+    fn held_kinetic_j(&self, state: &MechanicalState) -> f64 {
         self.scratch.patch.metric().of_held_j(self.body, &state.v)
     }
 
-    /// The force (N) that holds a node on its prescribed axes: what the other forces lack.
-    pub(crate) fn reaction_n(&self, node: usize, state: &MechanicalState) -> DVec3 {
+    fn reaction_n(&self, node: usize, state: &MechanicalState) -> DVec3 {
         let held = self.body.inverse_mass_per_kg()[node].cmpeq(DVec3::ZERO);
         let total_n = state.force_n[node] + self.own.long_steps.beyond_of(node);
         DVec3::select(held, -total_n, DVec3::ZERO)
+    }
+
+    fn prepare(&mut self, environment: &Environment, state: &mut MechanicalState, _: &[PointForce]) {
+        self.switch_if_due(environment, state);
+    }
+
+    fn wake_only(
+        &mut self,
+        environment: &Environment,
+        state: &mut MechanicalState,
+        particles: &mut dyn Iterator<Item = u32>,
+    ) {
+        self.wake_only(environment, state, particles);
+    }
+
+    fn judged(&mut self) -> Option<&mut dyn Judged> {
+        Some(self)
+    }
+
+    fn prescribed_nodes(&self) -> Option<PrescribedNodes<'a>> {
+        Some(self.body.prescribed_nodes())
+    }
+
+    fn stop_at_last_good(&mut self) {
+        self.own.long_steps.forget();
     }
 }

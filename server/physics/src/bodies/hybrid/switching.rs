@@ -114,7 +114,7 @@ impl ActivationQuery {
 
 impl SteppedHybrid<'_> {
     /// Before a tick: makes the patch that of the state's active particles, and now and then looks which should be. Allocates nothing.
-    pub(crate) fn prepare(&mut self, environment: &Environment, state: &mut MechanicalState) {
+    pub(super) fn switch_if_due(&mut self, environment: &Environment, state: &mut MechanicalState) {
         let Self { body, own, scratch } = self;
         let tick_period_s = environment.settings.tick_period_s;
         scratch.follow(body, own);

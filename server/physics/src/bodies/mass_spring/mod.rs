@@ -19,6 +19,7 @@ pub mod energy;
 pub mod equilibrium;
 pub mod home;
 pub mod kernels;
+mod kind;
 pub mod loop_scheme;
 pub mod matching;
 pub mod model;

@@ -38,7 +38,12 @@ pub(crate) struct MassSpringScratch {
 
 impl SteppedMassSpring<'_> {
     /// Before a tick: looks now and then where the tools are, wakes what they and injected forces want, and brings levels on their way. Allocates nothing.
-    pub(crate) fn prepare(&mut self, environment: &Environment, state: &mut MechanicalState, forces: &[PointForce]) {
+    pub(super) fn wake_and_refine(
+        &mut self,
+        environment: &Environment,
+        state: &mut MechanicalState,
+        forces: &[PointForce],
+    ) {
         let Self { body, own, scratch } = self;
         let tick_period_s = environment.settings.tick_period_s;
         scratch.springs.follow(body.model(), &own.motion);

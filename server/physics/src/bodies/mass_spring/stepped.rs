@@ -3,7 +3,7 @@ use super::{MassSpringBody, MassSpringScratch, MassSpringState, skin::SpringSkin
 use crate::{
     contact::ContactScratch,
     lanes::kicks::LumpedKick,
-    tick::{Environment, Evaluation, MechanicalState, Tick, Touch, touch_skin},
+    tick::{Environment, Evaluation, MechanicalState, PointForce, Stepped, Tick, Touch, touch_skin},
 };
 use glam::DVec3;
 
@@ -15,9 +15,8 @@ pub(crate) struct SteppedMassSpring<'a> {
     pub(crate) scratch: &'a mut MassSpringScratch,
 }
 
-impl SteppedMassSpring<'_> {
-    /// Total force (N) at the present positions, and its external part.
-    pub(crate) fn evaluate(
+impl<'a> Stepped<'a> for SteppedMassSpring<'a> {
+    fn evaluate(
         &mut self,
         tick: &Tick<'_>,
         now: &Evaluation,
@@ -49,7 +48,7 @@ impl SteppedMassSpring<'_> {
     }
 
     /// A half or whole kick of the awake nodes: `v ← (v e^{−c h/2} + h f/m) e^{−c h/2}`, and the ledger's share of it.
-    pub(crate) fn kick(&self, environment: &Environment, state: &mut MechanicalState, h_s: f64) {
+    fn kick(&mut self, environment: &Environment, state: &mut MechanicalState, h_s: f64, _ends_long_step: bool) {
         let damping = environment.settings.mass_damping_per_s;
         let [external_w, before_sq, between_sq] = LumpedKick {
             v: &mut state.v,
@@ -66,13 +65,17 @@ impl SteppedMassSpring<'_> {
         state.ledger.dissipated_j += 0.5 * (before_sq + between_sq) * -(-damping * h_s).exp_m1();
     }
 
-    /// The force (N) that holds a node; nothing while it sleeps.
-    pub(crate) fn reaction_n(&self, node: usize, state: &MechanicalState) -> DVec3 {
+    /// It is nothing while the node sleeps.
+    fn reaction_n(&self, node: usize, state: &MechanicalState) -> DVec3 {
         self.scratch.place(node as u32).map_or(DVec3::ZERO, |place| -state.force_n[place])
     }
 
-    /// The node at a place among those that are awake.
-    pub(crate) fn node_at(&self, place: u32) -> Option<u32> {
+    /// The places are those of awake nodes.
+    fn node_at(&self, place: u32) -> Option<u32> {
         self.own.motion.ids.get(place as usize).copied()
+    }
+
+    fn prepare(&mut self, environment: &Environment, state: &mut MechanicalState, forces: &[PointForce]) {
+        self.wake_and_refine(environment, state, forces);
     }
 }

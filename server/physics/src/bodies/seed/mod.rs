@@ -36,6 +36,7 @@ pub mod core;
 mod error;
 pub mod exchange;
 pub mod kernel;
+mod kind;
 pub mod layer;
 pub mod links;
 mod model;

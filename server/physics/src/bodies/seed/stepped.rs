@@ -12,7 +12,7 @@
 use super::{AtVertex, SeedBody, SeedBodyState, SeedContact, SeedModel, SeedScratch};
 use crate::{
     contact::ContactScratch,
-    tick::{Evaluation, MechanicalState, Tick, touch_nodes},
+    tick::{Environment, Evaluation, MechanicalState, Stepped, Tick, touch_nodes},
 };
 use glam::DVec3;
 
@@ -45,9 +45,27 @@ impl SeedBodyScratch {
     }
 }
 
-impl SteppedSeed<'_> {
-    /// All steps of a tick.
-    pub(crate) fn run(&mut self, tick: &Tick<'_>, state: &mut MechanicalState, contact: &mut ContactScratch) {
+impl<'a> Stepped<'a> for SteppedSeed<'a> {
+    /// Works out what tools, loads and injections do to nodes; its steps make the other forces.
+    fn evaluate(
+        &mut self,
+        tick: &Tick<'_>,
+        now: &Evaluation,
+        state: &mut MechanicalState,
+        contact: &mut ContactScratch,
+    ) {
+        touch_nodes(tick, now, self.body.rest_positions_m(), state, contact);
+    }
+
+    /// Does nothing: its own steps move it.
+    fn kick(&mut self, _: &Environment, _: &mut MechanicalState, _: f64, _: bool) {}
+
+    fn reaction_n(&self, node: usize, state: &MechanicalState) -> DVec3 {
+        let held = self.body.inverse_mass_per_kg()[node].cmpeq(DVec3::ZERO);
+        DVec3::select(held, -state.force_n[node], DVec3::ZERO)
+    }
+
+    fn run_own_scheme(&mut self, tick: &Tick<'_>, state: &mut MechanicalState, contact: &mut ContactScratch) {
         if !state.force_is_current {
             state.contact.forget_untracked_geometry();
             self.evaluate(tick, &Evaluation::at_start(), state, contact);
@@ -60,17 +78,21 @@ impl SteppedSeed<'_> {
         }
     }
 
-    /// What tools, loads and injections do to nodes; its steps make the other forces.
-    pub(crate) fn evaluate(
-        &mut self,
-        tick: &Tick<'_>,
-        now: &Evaluation,
-        state: &mut MechanicalState,
-        contact: &mut ContactScratch,
-    ) {
-        touch_nodes(tick, now, self.body.rest_positions_m(), state, contact);
+    fn keep_last_good(&mut self) {
+        self.scratch.last_good.copy_from(self.own);
     }
 
+    fn stop_at_last_good(&mut self) {
+        self.own.copy_from(&self.scratch.last_good);
+        self.own.stop();
+    }
+
+    fn is_finite(&self) -> bool {
+        self.own.particles_are_finite()
+    }
+}
+
+impl SteppedSeed<'_> {
     fn note_touch(&mut self, tick: &Tick<'_>, state: &MechanicalState, contact: &ContactScratch) {
         if !state.tools.is_empty() {
             self.own.touched = tick.environment.contact.touched_triangle(&state.contact, contact);
@@ -105,22 +127,5 @@ impl SteppedSeed<'_> {
         }
         v.iter_mut().zip(now.core.v.iter().chain(&now.skin.v)).for_each(|(v, of)| *v = *of);
         farthest_sq.sqrt() / tick.dt_s()
-    }
-
-    /// The force (N) that holds a node: what the other forces lack.
-    pub(crate) fn reaction_n(&self, node: usize, state: &MechanicalState) -> DVec3 {
-        let held = self.body.inverse_mass_per_kg()[node].cmpeq(DVec3::ZERO);
-        DVec3::select(held, -state.force_n[node], DVec3::ZERO)
-    }
-
-    /// Keeps the state before a tick, for a quarantine to go back to.
-    pub(crate) fn keep_last_good(&mut self) {
-        self.scratch.last_good.copy_from(self.own);
-    }
-
-    /// Goes back to it, at rest.
-    pub(crate) fn stop_at_last_good(&mut self) {
-        self.own.copy_from(&self.scratch.last_good);
-        self.own.stop();
     }
 }

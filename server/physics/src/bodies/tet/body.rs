@@ -15,8 +15,8 @@ use crate::{
     mesh::{Surface, TetMesh},
     settings::Integrator,
     tick::{
-        Energies, Environment, EnvironmentSpec, MechanicalState, PrescribedNodes, Steps, free_inverse_mass,
-        lumped::LumpedMass, progress as building, stiffening,
+        Environment, EnvironmentSpec, PrescribedNodes, Steps, free_inverse_mass, lumped::LumpedMass,
+        progress as building, stiffening,
     },
 };
 use glam::{BVec3, DVec2, DVec3};
@@ -186,21 +186,6 @@ impl TetBody {
     /// What prescribed sets need.
     pub(crate) fn prescribed_nodes(&self) -> PrescribedNodes<'_> {
         PrescribedNodes { rest_m: self.rest_positions_m(), mass_kg: &self.mass_kg }
-    }
-
-    /// Kinetic, elastic and gravitational energy now (O(tets)), beside the ledger's work and dissipation.
-    pub(crate) fn energies(&self, gravity_m_per_s2: DVec3, state: &MechanicalState) -> Energies {
-        let MechanicalState { x, v, ledger, .. } = state;
-        let kinetic_j = (0..x.len()).map(|i| 0.5 * self.mass_kg[i] * v[i].length_squared()).sum();
-        let along_gravity = |i: usize| gravity_m_per_s2.dot(x[i] - self.rest_positions_m()[i]);
-        let fallen_j: f64 = (0..x.len()).map(|i| self.mass_kg[i] * along_gravity(i)).sum();
-        Energies {
-            kinetic_j,
-            elastic_j: self.elastic_energy_j(x),
-            gravitational_j: 0.0 - fallen_j,
-            external_work_j: ledger.external_work_j,
-            dissipated_j: ledger.dissipated_j,
-        }
     }
 
     /// `Σ V Ψ(F)` (J) at positions `x` (m).

@@ -2,6 +2,7 @@
 mod body;
 mod error;
 mod judged;
+mod kind;
 mod modes;
 mod rest_bound;
 mod stepped;
@@ -9,6 +10,7 @@ pub(crate) mod stiffness;
 
 pub use body::TetBody;
 pub use error::TetBodyError;
+pub use kind::TetState;
 pub use modes::{Mode, ModesError, natural_modes};
 pub(crate) use rest_bound::RestBound;
 pub(crate) use stepped::{SteppedTet, TetScratch};

@@ -5,7 +5,7 @@ use crate::{
     kernels::KernelScratch,
     linalg::pcg::PcgScratch,
     settings::Integrator,
-    tick::{Environment, Evaluation, MechanicalState, Tick, touch_nodes},
+    tick::{Environment, Evaluation, Judged, MechanicalState, PrescribedNodes, Stepped, Tick, touch_nodes},
 };
 use glam::DVec3;
 
@@ -45,9 +45,8 @@ impl TetScratch {
     }
 }
 
-impl SteppedTet<'_> {
-    /// Total force (N) at the present positions, and its external part.
-    pub(crate) fn evaluate(
+impl<'a> Stepped<'a> for SteppedTet<'a> {
+    fn evaluate(
         &mut self,
         tick: &Tick<'_>,
         now: &Evaluation,
@@ -65,14 +64,20 @@ impl SteppedTet<'_> {
         }
     }
 
-    /// A half or whole kick.
-    pub(crate) fn kick(&self, environment: &Environment, state: &mut MechanicalState, h_s: f64) {
+    fn kick(&mut self, environment: &Environment, state: &mut MechanicalState, h_s: f64, _ends_long_step: bool) {
         self.body.lumped_mass(environment).kick(environment.settings.mass_damping_per_s, state, h_s);
     }
 
-    /// The force (N) that holds a node on its prescribed axes: what the other forces lack.
-    pub(crate) fn reaction_n(&self, node: usize, state: &MechanicalState) -> DVec3 {
+    fn reaction_n(&self, node: usize, state: &MechanicalState) -> DVec3 {
         let held = self.body.inverse_mass_per_kg()[node].cmpeq(DVec3::ZERO);
         DVec3::select(held, -state.force_n[node], DVec3::ZERO)
+    }
+
+    fn judged(&mut self) -> Option<&mut dyn Judged> {
+        Some(self)
+    }
+
+    fn prescribed_nodes(&self) -> Option<PrescribedNodes<'a>> {
+        Some(self.body.prescribed_nodes())
     }
 }

@@ -1,0 +1,132 @@
+//! What a hybrid body is as a kind of body.
+use super::{HybridBody, HybridState, place::Place};
+use crate::{
+    elements::linear_tet::VolumeRatio,
+    hash::{Chain, Fnv},
+    mesh::{Surface, TetMesh},
+    settings::PrescribedSpec,
+    tick::{BodyKind, Energies, Environment, KindState, MaterialPoint, MechanicalState},
+};
+use glam::DVec3;
+use std::fmt::Write;
+
+impl BodyKind for HybridBody {
+    type State = HybridState;
+
+    /// Of the coarse level's nodes, with those in the middle of its edges.
+    fn rest_positions_m(&self) -> &[DVec3] {
+        self.rest_positions_m()
+    }
+
+    fn mass_kg(&self) -> &[f64] {
+        &self.masses().node_kg
+    }
+
+    fn max_natural_frequency_rad_per_s(&self) -> f64 {
+        self.max_natural_frequency_rad_per_s()
+    }
+
+    fn energies(&self, gravity_m_per_s2: DVec3, own: &HybridState, state: &MechanicalState) -> Energies {
+        self.energies(gravity_m_per_s2, own, state)
+    }
+
+    fn fingerprint_into(&self, hash: &mut Fnv) {
+        // A float prints as the shortest text that reads back to its bits. Writing to the hash cannot fail.
+        let _ = write!(hash, "hybrid {:?}", (self.coarse(), self.materials(), self.particles()));
+    }
+
+    /// The coarse level's.
+    fn tets(&self) -> Option<&TetMesh> {
+        Some(self.coarse())
+    }
+
+    fn surface_rest_positions_m(&self) -> &[DVec3] {
+        self.skin_rest_m()
+    }
+
+    fn particle_count(&self) -> usize {
+        self.partition().particle_count()
+    }
+
+    fn most_awake_particles(&self) -> usize {
+        self.particles().most_active
+    }
+
+    fn particle_spacing_m(&self) -> f64 {
+        self.particles().spacing_m
+    }
+
+    fn particles_that_never_wake(&self) -> usize {
+        self.cage().outside
+    }
+
+    fn most_positions(&self) -> usize {
+        self.most_positions()
+    }
+
+    fn can_be_judged(&self) -> bool {
+        true
+    }
+
+    /// Each vertex is worked out from some particles.
+    fn surface_into_m(&self, surface: &Surface, own: &HybridState, state: &MechanicalState, into_m: &mut Vec<DVec3>) {
+        into_m.extend((0..surface.nodes.len() as u32).map(|vertex| self.vertex_m(vertex, own.ids(), &state.x)));
+    }
+
+    /// As the particles around the point have gone.
+    fn displacement_m(&self, own: &HybridState, state: &MechanicalState, point: &MaterialPoint) -> DVec3 {
+        let partition = self.partition();
+        let (of_nodes, of_particles) = state.x.split_at(self.node_count());
+        let moved = |particle: u32| {
+            let x = match own.ids().binary_search(&particle) {
+                Ok(number) => of_particles[number],
+                Err(_) => partition.anchor(particle).of(of_nodes),
+            };
+            x - partition.particle_m(particle)
+        };
+        let place = Place::new(partition, point.rest_m);
+        place.particles.into_iter().zip(place.weights).map(|(particle, w)| moved(particle) * w).sum()
+    }
+
+    /// Over the coarse tets' means and the awake cells.
+    fn min_volume_ratio(&self, own: &HybridState, x: &[DVec3]) -> Option<VolumeRatio> {
+        let (ratio, tet) = self.min_volume_ratio(own, x);
+        Some(VolumeRatio { ratio, tet })
+    }
+
+    fn chain_inverse_mass(&self, _: &[PrescribedSpec], chain: &mut Chain) {
+        chain.vectors(self.inverse_mass_per_kg());
+    }
+}
+
+impl KindState for HybridState {
+    type Body = HybridBody;
+
+    fn at_rest(body: &HybridBody, environment: &Environment) -> Self {
+        Self::at_rest(body, &environment.tools)
+    }
+
+    fn reset(&mut self, _: &HybridBody) {
+        self.clear();
+    }
+
+    fn copy_from(&mut self, other: &Self) {
+        self.copy_from(other);
+    }
+
+    fn fits(&self, body: &HybridBody, environment: &Environment, _: &MechanicalState) -> bool {
+        self.fits(body, &environment.tools)
+    }
+
+    fn chain(&self, chain: &mut Chain) {
+        self.chain(chain);
+    }
+
+    fn active_particles(&self) -> &[u32] {
+        self.ids()
+    }
+
+    fn wake_at_rest(&mut self, ids: &[u32], state: &mut MechanicalState) {
+        self.wake_at_rest(ids, state);
+    }
+}

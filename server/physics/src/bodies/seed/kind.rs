@@ -1,0 +1,117 @@
+//! What the papers' hybrid is as a kind of body.
+use super::{SeedBody, SeedBodyState, layer::Layer};
+use crate::{
+    elements::{
+        linear_tet::{VolumeRatio, min_volume_ratio},
+        solid::Solid,
+    },
+    hash::{Chain, Fnv},
+    mesh::TetMesh,
+    settings::PrescribedSpec,
+    tick::{BodyKind, Energies, Environment, KindState, MechanicalState},
+};
+use glam::DVec3;
+use std::fmt::Write;
+
+impl BodyKind for SeedBody {
+    type State = SeedBodyState;
+
+    /// Of the core and then its skin.
+    fn rest_positions_m(&self) -> &[DVec3] {
+        self.rest_positions_m()
+    }
+
+    fn mass_kg(&self) -> &[f64] {
+        self.mass_kg()
+    }
+
+    fn max_natural_frequency_rad_per_s(&self) -> f64 {
+        self.max_natural_frequency_rad_per_s()
+    }
+
+    fn energies(&self, _: DVec3, own: &SeedBodyState, state: &MechanicalState) -> Energies {
+        self.energies(own, state)
+    }
+
+    fn fingerprint_into(&self, hash: &mut Fnv) {
+        // A float prints as the shortest text that reads back to its bits. Writing to the hash cannot fail.
+        let _ = write!(hash, "seed {:?}", self.spec());
+    }
+
+    /// The core's.
+    fn tets(&self) -> Option<&TetMesh> {
+        Some(self.mesh())
+    }
+
+    fn filling_tets(&self) -> Option<&Solid> {
+        self.model().layer().is_none().then(|| self.core())
+    }
+
+    fn particle_count(&self) -> usize {
+        self.model().layer().map_or(0, Layer::particle_count)
+    }
+
+    fn most_awake_particles(&self) -> usize {
+        self.model().most_awake()
+    }
+
+    fn particle_spacing_m(&self) -> f64 {
+        self.model().layer().map_or(0.0, |layer| layer.voxels.spacing_m)
+    }
+
+    fn books_energy(&self) -> bool {
+        false
+    }
+
+    fn has_own_scheme(&self) -> bool {
+        true
+    }
+
+    fn min_volume_ratio(&self, _: &SeedBodyState, x: &[DVec3]) -> Option<VolumeRatio> {
+        Some(min_volume_ratio(self.mesh(), self.model().core().rest_tets(), x))
+    }
+
+    fn chain_inverse_mass(&self, _: &[PrescribedSpec], chain: &mut Chain) {
+        chain.vectors(self.inverse_mass_per_kg());
+    }
+}
+
+impl KindState for SeedBodyState {
+    type Body = SeedBody;
+
+    fn at_rest(body: &SeedBody, _: &Environment) -> Self {
+        Self::at_rest(body.model())
+    }
+
+    fn reset(&mut self, body: &SeedBody) {
+        self.reset(body.model());
+    }
+
+    fn copy_from(&mut self, other: &Self) {
+        self.copy_from(other);
+    }
+
+    fn fits(&self, body: &SeedBody, _: &Environment, state: &MechanicalState) -> bool {
+        self.fits(body.model(), &state.x, &state.v)
+    }
+
+    fn chain(&self, chain: &mut Chain) {
+        self.chain(chain);
+    }
+
+    fn awake_particles(&self) -> usize {
+        self.awake as usize
+    }
+
+    fn awake_particles_m<'a>(&'a self, _: &'a MechanicalState) -> &'a [DVec3] {
+        &self.now.particles.x[..self.awake as usize]
+    }
+
+    fn is_finite(&self) -> bool {
+        self.particles_are_finite()
+    }
+
+    fn vectors(&self) -> Box<dyn Iterator<Item = &DVec3> + '_> {
+        Box::new(self.vectors())
+    }
+}

@@ -1,0 +1,239 @@
+//! What a kind of body is: what its rest state fixes, what a tick changes of it, and how it is stepped.
+//!
+//! A kind implements these three traits in its folder (`bodies/<kind>/kind.rs`); `bodies/mod.rs` registers it. What only some kinds have is answered
+//! by a default here, which says what it means to have none.
+use super::{
+    Energies, Environment, Evaluation, Judged, MaterialPoint, MechanicalState, PointForce, PrescribedNodes, Tick,
+    free_inverse_mass,
+};
+use crate::{
+    contact::ContactScratch,
+    elements::{linear_tet::VolumeRatio, solid::Solid},
+    hash::{Chain, Fnv},
+    mesh::{Surface, TetMesh},
+    settings::PrescribedSpec,
+};
+use glam::DVec3;
+
+/// What the rest state of a kind of body fixes, and what that tells about a state. Constant after load.
+pub(crate) trait BodyKind {
+    /// What a tick changes of it beside [`MechanicalState`].
+    type State;
+
+    /// Rest positions (m) of the nodes that masses and constraints are of.
+    fn rest_positions_m(&self) -> &[DVec3];
+
+    /// Lumped mass (kg) of every node.
+    fn mass_kg(&self) -> &[f64];
+
+    /// Largest natural frequency (rad/s) at rest.
+    fn max_natural_frequency_rad_per_s(&self) -> f64;
+
+    /// What the body holds now, beside the ledger's work and dissipation.
+    fn energies(&self, gravity_m_per_s2: DVec3, own: &Self::State, state: &MechanicalState) -> Energies;
+
+    /// Writes what it was built from into a hash, so that a state goes back only into the body it came from.
+    fn fingerprint_into(&self, hash: &mut Fnv);
+
+    /// Its tetrahedra at rest, of whatever level.
+    fn tets(&self) -> Option<&TetMesh> {
+        None
+    }
+
+    /// The tets that fill it by themselves.
+    fn filling_tets(&self) -> Option<&Solid> {
+        None
+    }
+
+    /// Rest positions (m) of what the surface's nodes are numbered by.
+    fn surface_rest_positions_m(&self) -> &[DVec3] {
+        self.rest_positions_m()
+    }
+
+    /// Particles, awake or not.
+    fn particle_count(&self) -> usize {
+        0
+    }
+
+    /// Most particles awake at once.
+    fn most_awake_particles(&self) -> usize {
+        0
+    }
+
+    /// How far particles are apart (m); 0 where there are none.
+    fn particle_spacing_m(&self) -> f64 {
+        0.0
+    }
+
+    /// Particles that never wake because no tetrahedron of the coarse level holds them.
+    fn particles_that_never_wake(&self) -> usize {
+        0
+    }
+
+    /// Most points awake at once: particles, or the nodes of springs.
+    fn most_awake_points(&self) -> usize {
+        self.most_awake_particles()
+    }
+
+    /// The most positions that a state of it ever has.
+    fn most_positions(&self) -> usize {
+        self.rest_positions_m().len()
+    }
+
+    /// Whether its steps book work and dissipation, so that the ledger can be balanced.
+    fn books_energy(&self) -> bool {
+        true
+    }
+
+    /// Whether it has a scheme of time integration of its own, whatever the settings ask for ([`Stepped::run_own_scheme`]).
+    fn has_own_scheme(&self) -> bool {
+        false
+    }
+
+    /// Whether leapfrog's step of it can be judged ([`Stepped::judged`]).
+    fn can_be_judged(&self) -> bool {
+        false
+    }
+
+    /// Writes where each vertex of the surface is (m).
+    fn surface_into_m(&self, surface: &Surface, _: &Self::State, state: &MechanicalState, into_m: &mut Vec<DVec3>) {
+        into_m.extend(surface.nodes.iter().map(|&node| state.x[node as usize]));
+    }
+
+    /// How far (m) a point of the material has gone from rest.
+    fn displacement_m(&self, _: &Self::State, state: &MechanicalState, point: &MaterialPoint) -> DVec3 {
+        point.of(&state.x) - point.of(self.rest_positions_m())
+    }
+
+    /// The smallest `J = det F`; `None` where there is no volume.
+    fn min_volume_ratio(&self, _: &Self::State, _: &[DVec3]) -> Option<VolumeRatio> {
+        None
+    }
+
+    /// Adds `1/m` (1/kg) of every node and axis, zero where it is prescribed.
+    fn chain_inverse_mass(&self, prescribed: &[PrescribedSpec], chain: &mut Chain) {
+        // A node that is prescribed twice is refused when the model is built.
+        chain.vectors(&free_inverse_mass(self.mass_kg(), prescribed).unwrap_or_default());
+    }
+
+    /// Adds what of its rest state no function that every body has tells.
+    fn chain(&self, _: &mut Chain) {}
+}
+
+/// What a tick changes of a kind of body beside [`MechanicalState`].
+pub(crate) trait KindState {
+    /// The body it is of.
+    type Body;
+
+    /// At rest.
+    fn at_rest(body: &Self::Body, environment: &Environment) -> Self;
+
+    /// Goes back to rest, in the buffers it has.
+    fn reset(&mut self, body: &Self::Body);
+
+    /// Copies another state of the same body. Allocates nothing.
+    fn copy_from(&mut self, other: &Self);
+
+    /// Whether it may be a state of a body, beside one of what every body has: for states that come from elsewhere.
+    fn fits(&self, body: &Self::Body, environment: &Environment, state: &MechanicalState) -> bool;
+
+    /// Adds all of it.
+    fn chain(&self, chain: &mut Chain);
+
+    /// The nodes, ascending, whose positions a state has, where it does not have all nodes'.
+    fn awake_nodes(&self) -> Option<&[u32]> {
+        None
+    }
+
+    /// The particles, ascending, whose positions follow the nodes' in a state.
+    fn active_particles(&self) -> &[u32] {
+        &[]
+    }
+
+    /// Wakes these particles in a body at rest. There must be room for them, and they must be such as may wake.
+    fn wake_at_rest(&mut self, _ids: &[u32], _state: &mut MechanicalState) {}
+
+    /// Refines so many rings around vertices and nothing else, where that is done by hand.
+    fn refine_only(&mut self, _body: &Self::Body, _centres: &[u32], _rings: u32) {}
+
+    /// How many particles are awake.
+    fn awake_particles(&self) -> usize {
+        self.active_particles().len()
+    }
+
+    /// Positions (m) of the awake particles.
+    fn awake_particles_m<'a>(&'a self, state: &'a MechanicalState) -> &'a [DVec3] {
+        &state.x[state.x.len() - self.active_particles().len()..]
+    }
+
+    /// Whether its own numbers are finite; those of [`MechanicalState`] are looked at with everybody's.
+    fn is_finite(&self) -> bool {
+        true
+    }
+
+    /// Vectors that a hash of positions and velocities is of, beside those of [`MechanicalState`].
+    fn vectors(&self) -> Box<dyn Iterator<Item = &DVec3> + '_> {
+        Box::new(std::iter::empty())
+    }
+}
+
+/// A body with its own state and buffers, while it is stepped.
+pub(crate) trait Stepped<'a> {
+    /// Works out the total force (N) at the present positions, and its external part.
+    fn evaluate(
+        &mut self,
+        tick: &Tick<'_>,
+        now: &Evaluation,
+        state: &mut MechanicalState,
+        contact: &mut ContactScratch,
+    );
+
+    /// Gives a half or whole kick of length `h_s` (s): `v ← (v e^{−c h/2} + h f/m) e^{−c h/2}` with the mass damping `c` (1/s), and books it.
+    fn kick(&mut self, environment: &Environment, state: &mut MechanicalState, h_s: f64, ends_long_step: bool);
+
+    /// The force (N) that holds a node on its prescribed axes: what the other forces lack.
+    fn reaction_n(&self, node: usize, state: &MechanicalState) -> DVec3;
+
+    /// Comes before a tick: what is to wake or to fall asleep, to be refined or coarse, goes on its way. Allocates nothing.
+    fn prepare(&mut self, _environment: &Environment, _state: &mut MechanicalState, _forces: &[PointForce]) {}
+
+    /// Wakes these particles and no others, if there are particles.
+    fn wake_only(&mut self, _: &Environment, _: &mut MechanicalState, _particles: &mut dyn Iterator<Item = u32>) {}
+
+    /// Comes before the first kick of a tick.
+    fn begin_kicks(&mut self) {}
+
+    /// What leapfrog's step is judged by; `None` of bodies whose step is never too long, or that step themselves.
+    fn judged(&mut self) -> Option<&mut dyn Judged> {
+        None
+    }
+
+    /// The nodes that prescribed sets move; `None` where what they hold stands still.
+    fn prescribed_nodes(&self) -> Option<PrescribedNodes<'a>> {
+        None
+    }
+
+    /// Kinetic energy (J) that velocities of held axes have beside what lumped masses give them.
+    fn held_kinetic_j(&self, _: &MechanicalState) -> f64 {
+        0.0
+    }
+
+    /// Runs all substeps of a tick, of a body with a scheme of its own ([`BodyKind::has_own_scheme`]).
+    fn run_own_scheme(&mut self, _: &Tick<'_>, _: &mut MechanicalState, _: &mut ContactScratch) {}
+
+    /// Keeps what quarantine goes back to, beside [`MechanicalState`].
+    fn keep_last_good(&mut self) {}
+
+    /// Goes back, in quarantine, to what was kept, at rest.
+    fn stop_at_last_good(&mut self) {}
+
+    /// Whether its own numbers are finite.
+    fn is_finite(&self) -> bool {
+        true
+    }
+
+    /// The number by which users know the node at a place of [`MechanicalState::x`].
+    fn node_at(&self, place: u32) -> Option<u32> {
+        Some(place)
+    }
+}
