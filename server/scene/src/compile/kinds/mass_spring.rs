@@ -3,19 +3,18 @@ use super::{BodyKind, Compiled, Ingredients};
 use crate::{
     compile::{
         Files,
-        body::{Body, BodyMesh, file_fault},
+        body::{Body, BodyMesh},
         check, exactly_one,
         located::Located,
     },
     document::{
         Document,
-        body::{BodyTable, SurfaceTable},
+        body::BodyTable,
         source::{Fault, Where},
         springs::{ConstantsName, HomeLayerTable, RefineTable, SpringsTable},
         words::did_you_mean,
     },
     error::Stage,
-    files,
     scene::ToCalibrate,
     skin::FineSurface,
 };
@@ -106,25 +105,6 @@ impl BodyKind for MassSpring {
         };
         small.map(warning).collect()
     }
-}
-
-/// Reads a surface file as a body without an inside.
-pub(in crate::compile) fn from_file(
-    kind: &'static dyn BodyKind,
-    table: &SurfaceTable,
-    files: &Files<'_>,
-    at: &Where,
-) -> Result<Body, Fault> {
-    let at = at.key("file");
-    let path = files.resolve(&at, &table.file)?;
-    let file = files::read_surface(&path).map_err(|error| file_fault(&at, error))?;
-    files.limits.check_tets(&at, file.triangles.len() as u64)?;
-    let scale = table.unit.in_m();
-    let positions_m: Vec<DVec3> = file.vertices.iter().map(|vertex| *vertex * scale).collect();
-    let surface = Surface::alone(positions_m.len(), file.triangles);
-    let origin = format!("surface {}", table.file);
-    let mesh = BodyMesh::Surface { positions_m, control: None };
-    Ok(Body { warnings: file.warnings, ..Body::new(kind, mesh, surface, origin) })
 }
 
 /// Makes the body's surface, or a part of it, the coarse surface of springs. Nodes are its vertices then, tools and loads act on the surface refined everywhere.
