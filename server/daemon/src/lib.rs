@@ -12,3 +12,4 @@ pub mod sim;
 pub mod status;
 pub mod stream;
 pub mod telemetry;
+pub mod tick_budget;

@@ -1,6 +1,5 @@
 //! The session outside the loop: its body, its tools and who drives them, and how one session replaces another.
 use crate::{
-    bodies::served,
     sim::{
         command::{Orders, Refusal, Request},
         exchange::{SurfaceEnd, ToolEnd},
@@ -10,8 +9,9 @@ use crate::{
         tool::ArmLimits,
     },
     stream::hub::Hub,
+    tick_budget::{self, BudgetError},
 };
-use palpate_physics::{Model, ModelError, Scratch, State, TickInput, step};
+use palpate_physics::{Model, ModelError};
 use palpate_proto::v1;
 use palpate_scene::{Driver, Probe, Scene};
 use std::{
@@ -21,7 +21,6 @@ use std::{
         Arc, Mutex, MutexGuard, PoisonError, RwLock,
         atomic::{AtomicU64, Ordering},
     },
-    time::{Duration, Instant},
 };
 use thiserror::Error;
 use tokio_util::sync::CancellationToken;
@@ -46,34 +45,13 @@ pub enum PrepareError {
     /// The loop cannot keep its tick.
     #[error(transparent)]
     Period(#[from] palpate_realtime::PeriodError),
-    /// Nobody could stop or ask a loop that is in one tick for so long.
-    #[error(
-        "a tick of {work} in {substeps} substeps takes too long for a session (at most {MOST_TET_UPDATES} tets times substeps): coarsen the \
-         mesh, soften the material or shorten the tick; palpated simulate takes it as it is"
-    )]
-    TooHeavy {
-        /// Tets of the body, and particles that may be awake.
-        work: String,
-        /// Substeps of a tick.
-        substeps: u32,
-    },
-    /// Orders and viewers wait for the tick's end.
-    #[error(
-        "scene.tick_period_s = {period_s}: a session needs ticks of {LONGEST_PERIOD_S} s at most; palpated simulate takes it as it is"
-    )]
-    TooSlow {
-        /// The period (s).
-        period_s: f64,
-    },
+    /// Its ticks take too long.
+    #[error(transparent)]
+    Budget(#[from] BudgetError),
     /// The operating system.
     #[error("no descriptors for the session's slots: {0}")]
     Slots(io::Error),
 }
-
-/// Longest tick of a session (s).
-const LONGEST_PERIOD_S: f64 = 0.5;
-/// Most tets times substeps in a tick of a session: some quarter of a second of work.
-const MOST_TET_UPDATES: u64 = 50_000_000;
 
 /// A running session.
 #[derive(Debug)]
@@ -266,20 +244,9 @@ pub fn prepare(
     let model = Arc::new(Model::build_with(scene.model, progress)?);
     let period_s = model.settings().tick_period_s;
     palpate_realtime::Deadlines::new(palpate_realtime::Clock::Monotonic, period_s)?;
-    if period_s > LONGEST_PERIOD_S {
-        return Err(PrepareError::TooSlow { period_s });
-    }
-    let tets = model.body().tets().map_or(0, |mesh| mesh.tets().len());
-    let substeps = model.substeps();
-    let active = model.body().most_awake_points();
-    // A particle costs about what a tet does.
-    if (tets + active) as u64 * u64::from(substeps) > MOST_TET_UPDATES {
-        let work =
-            if active > 0 { format!("{tets} tets and {active} particles or vertices") } else { format!("{tets} tets") };
-        return Err(PrepareError::TooHeavy { work, substeps });
-    }
+    tick_budget::check(&model)?;
     let mut warnings = scene.warnings;
-    warnings.extend(too_heavy(&model));
+    warnings.extend(tick_budget::warning(&model));
     let (number, id) = numbers.next_session();
     let for_devices: Vec<bool> = scene.drivers.iter().map(|driver| matches!(driver, Driver::Device)).collect();
     let (simulation, ends) = Simulation::build(Parts {
@@ -310,46 +277,6 @@ pub fn prepare(
         ended: CancellationToken::new(),
     };
     Ok(Prepared { simulation, session: Arc::new(session), surface: ends.surface })
-}
-
-/// Measures some ticks of the body at rest, all particles awake that may be at once, and says so when they do not fit their period.
-fn too_heavy(model: &Model) -> Option<String> {
-    let cost_s = median_tick_s(model);
-    let period_s = model.settings().tick_period_s;
-    (cost_s > 0.8 * period_s).then(|| {
-        format!(
-            "a tick costs {:.2} ms here and should last {:.2} ms ({} substeps): the body runs about {:.1} times slower than real \
-             time; coarsen the mesh, soften the material or lengthen the tick",
-            cost_s * 1e3,
-            period_s * 1e3,
-            model.substeps(),
-            cost_s / period_s,
-        )
-    })
-}
-
-fn median_tick_s(model: &Model) -> f64 {
-    let (mut state, mut scratch) = (State::at_rest(model), Scratch::new(model));
-    let targets: Vec<_> = state.mechanical.tools.iter().map(|tool| tool.target).collect();
-    let load_factors = vec![0.0; model.loads().len()];
-    let prescribed = vec![glam::DVec3::ZERO; model.prescribed().len()];
-    let input = TickInput {
-        tools: &targets,
-        load_factors: &load_factors,
-        prescribed_displacements_m: &prescribed,
-        point_forces: &[],
-    };
-    let begun = Instant::now();
-    let mut costs = Vec::new();
-    // A few at least, more while they are cheap.
-    while costs.len() < 5 || (costs.len() < 51 && begun.elapsed() < Duration::from_millis(50)) {
-        served(model).make_next_tick_the_heaviest(model, &mut state, &mut scratch);
-        let before = Instant::now();
-        step(model, &mut state, &mut scratch, &input);
-        costs.push(before.elapsed().as_secs_f64());
-    }
-    costs.sort_by(f64::total_cmp);
-    costs[costs.len() / 2]
 }
 
 impl Daemon {

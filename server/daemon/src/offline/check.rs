@@ -4,7 +4,7 @@ use super::{
     load,
     summary::Percentiles,
 };
-use crate::bodies::served;
+use crate::{bodies::served, tick_budget::USABLE};
 use palpate_physics::Model;
 use palpate_scene::{
     Scene, builtin_names,
@@ -118,7 +118,7 @@ fn print_time(model: &Model, cost: &Cost) {
 
 fn verdict(us: &Percentiles, period_us: f64, cost: &Cost) -> &'static str {
     let awake = cost.awake.is_some();
-    if us.p50 > 0.8 * period_us {
+    if us.p50 > USABLE * period_us {
         if awake {
             "does NOT fit: lower most_active, or raise spacing_m or tick_period_s"
         } else {
