@@ -194,15 +194,15 @@ fn print_springs(model: &Model) {
     let Some(body) = model.body().as_mass_spring() else { return };
     let spec = body.model().spec();
     let of = |constants: &Constants| {
-        format!("K_m {} N/m, K_h {} N/m", short(constants.mesh_n_per_m), short(constants.home_n_per_m))
+        format!("K_m {} N/m, K_h {} N/m", short(constants.mesh_n_per_m), short(constants.anchor_n_per_m))
     };
     println!("springs    {}; edges {} mm long in the mean", of(&spec.coarse), short(body.edge_m() * 1e3));
     match body.refinement() {
         None => println!("           coarse everywhere"),
-        Some(Refinement { rings, fade_s, .. }) => println!(
+        Some(Refinement { rings, blend_s, .. }) => println!(
             "           {} around what is touched are refined within {} s: at most {}",
             counted(rings as usize, "ring"),
-            short(fade_s),
+            short(blend_s),
             of(&spec.fine)
         ),
     }

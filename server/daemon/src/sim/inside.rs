@@ -24,7 +24,7 @@ impl Inside {
     pub fn new(model: &Model) -> Self {
         if let Some(springs) = model.body().as_mass_spring() {
             let surface = springs.model().surface();
-            let is_closed = !surface.edges().iter().any(Edge::is_border);
+            let is_closed = !surface.edges().iter().any(Edge::is_boundary);
             return Self { triangles: if is_closed { surface.triangles().to_vec() } else { Vec::new() } };
         }
         let count = if model.body().as_hybrid().is_some() { 0 } else { model.surface().triangles.len() };

@@ -40,7 +40,7 @@ fn springs(model: &SpringModel, chain: &mut Chain) {
     chain.reals(&model.spec().mass_kg);
     for constants in [model.spec().coarse, model.spec().fine] {
         chain.real(constants.mesh_n_per_m);
-        chain.real(constants.home_n_per_m);
+        chain.real(constants.anchor_n_per_m);
     }
     chain.wholes(&model.spec().held);
 }

@@ -20,7 +20,7 @@ pub(crate) use stepped::SteppedBody;
 
 use crate::{
     elements::{linear_tet::min_volume_ratio, solid::Solid},
-    hash::Fnv,
+    hash::{FirstNames, Fnv},
     mesh::TetMesh,
     tick::{Energies, Environment, EnvironmentSpec, MechanicalState},
 };
@@ -256,7 +256,7 @@ impl Body {
             Self::Tet(body) => write!(hash, "tet {:?}", body.solid()),
             Self::Hybrid(body) => write!(hash, "hybrid {:?}", (body.coarse(), body.materials(), body.particles())),
             Self::MassSpring(body) => write!(hash, "mass-spring {}", body.fingerprint()),
-            Self::Seed(body) => write!(hash, "seed {:?}", body.spec()),
+            Self::Seed(body) => write!(FirstNames(hash), "seed {:?}", body.spec()),
         };
     }
 }

@@ -5,7 +5,7 @@ use glam::DVec3;
 use palpate_physics::{
     BodySpec, Model, ModelError, ModelSpec, PrescribedSpec, Scratch, Settings, State, TickInput,
     bodies::mass_spring::{
-        HomeLaw, MassSpringSpec, Refinement, Refining, SpringSpec,
+        AnchorLaw, MassSpringSpec, Refinement, Refining, SpringSpec,
         calibration::{Calibration, CalibrationError, ConstantsTable},
         loop_scheme::refined,
         matching,
@@ -21,7 +21,7 @@ use thiserror::Error;
 
 const EDGE_M: f64 = 4e-3;
 const RINGS: i32 = 12;
-const COARSE: Constants = Constants { mesh_n_per_m: 60.0, home_n_per_m: 12.0 };
+const COARSE: Constants = Constants { mesh_n_per_m: 60.0, anchor_n_per_m: 12.0 };
 const AREA_DENSITY_KG_PER_M2: f64 = 15.0;
 const DAMPING_PER_S: f64 = 60.0;
 const TICKS: u32 = 1000;
@@ -107,7 +107,7 @@ pub fn compare(touch: Touch, tell: &mut dyn FnMut(f64)) -> Result<Vec<Run>, Cont
     ];
     for rings in [1, 2] {
         let count = if rings == 1 { "one ring" } else { "two rings" };
-        let of = Calibration { coarse: COARSE, rings, ratio: COARSE.mesh_n_per_m / COARSE.home_n_per_m, samples: 3 };
+        let of = Calibration { coarse: COARSE, rings, ratio: COARSE.mesh_n_per_m / COARSE.anchor_n_per_m, samples: 3 };
         let table = ConstantsTable::calibrate(&coarse, of, &mut |_| ())?;
         for (how, fine, table) in [("unchanged", COARSE, None), ("table", COARSE, Some(table)), ("area", area, None)] {
             let name = format!("{count}, {how}");
@@ -133,11 +133,11 @@ fn sheet(
     table: Option<ConstantsTable>,
 ) -> Result<Sheet, ContactError> {
     let vertices = surface.positions_m().len();
-    let border: Vec<u32> = (0..vertices as u32).filter(|&vertex| surface.is_border(vertex)).collect();
+    let boundary: Vec<u32> = (0..vertices as u32).filter(|&vertex| surface.is_boundary(vertex)).collect();
     let springs = SpringSpec {
         coarse,
         fine,
-        home_law: HomeLaw::Linear,
+        anchor_law: AnchorLaw::Linear,
         mass_kg: surface.vertex_areas_m2().iter().map(|area_m2| area_m2 * AREA_DENSITY_KG_PER_M2).collect(),
         held: Vec::new(),
         most_awake: vertices,
@@ -145,11 +145,11 @@ fn sheet(
         surface,
     };
     let refinement =
-        (rings > 0).then_some(Refinement { rings, follows_dent: rings > 2, fade_s: 0.1, by: Refining::ByTools });
+        (rings > 0).then_some(Refinement { rings, follows_dent: rings > 2, blend_s: 0.1, by: Refining::ByTools });
     let radius_m = touch.radius * EDGE_M;
     let model = Model::build(ModelSpec {
         body: BodySpec::MassSpring(MassSpringSpec { springs, refinement, table }),
-        prescribed: vec![PrescribedSpec { name: "border".into(), nodes: border, axes: [true; 3] }],
+        prescribed: vec![PrescribedSpec { name: "boundary".into(), nodes: boundary, axes: [true; 3] }],
         loads: Vec::new(),
         gravity_m_per_s2: DVec3::ZERO,
         tools: vec![ToolSpec {

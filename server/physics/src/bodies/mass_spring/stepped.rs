@@ -1,4 +1,4 @@
-//! Forces and kicks of a mass-spring surface.
+//! Forces on a mass-spring surface, and its kicks.
 use super::{MassSpringBody, MassSpringScratch, MassSpringState, skin::SpringSkin};
 use crate::{
     contact::ContactScratch,
@@ -16,7 +16,7 @@ pub(crate) struct SteppedMassSpring<'a> {
 }
 
 impl SteppedMassSpring<'_> {
-    /// Total force (N) at the present positions, and its external part.
+    /// Computes the total force (N) at the present positions, and its external part.
     pub(crate) fn evaluate(
         &mut self,
         tick: &Tick<'_>,
@@ -35,7 +35,7 @@ impl SteppedMassSpring<'_> {
             scratch: contact,
             fastest_m_per_s: now.fastest_m_per_s,
         };
-        let mut view = SpringSkin::new(body, (&own.motion, springs), x).moving(v);
+        let mut view = SpringSkin::new(body, &own.motion, springs, x).moving(v);
         touch_skin(tick, now, body.model().rest_m(), &mut view, skin, touch);
         state.force_n.copy_from_slice(&state.external_n);
         springs.add_forces_n(body.model(), &own.motion, &state.x, &mut state.force_n);
@@ -48,7 +48,8 @@ impl SteppedMassSpring<'_> {
         state.force_is_current = true;
     }
 
-    /// A half or whole kick of the awake nodes: `v ← (v e^{−c h/2} + h f/m) e^{−c h/2}`, and the ledger's share of it.
+    /// Gives the awake nodes a kick of length `h`, `v ← (v e^{−c h/2} + h f/m) e^{−c h/2}`, and adds its work and
+    /// dissipation to the ledger.
     pub(crate) fn kick(&self, environment: &Environment, state: &mut MechanicalState, h_s: f64) {
         let damping = environment.settings.mass_damping_per_s;
         let [external_w, before_sq, between_sq] = LumpedKick {
@@ -62,16 +63,16 @@ impl SteppedMassSpring<'_> {
         }
         .give();
         state.ledger.external_work_j += h_s * external_w;
-        // Half of what damping takes is taken before the force, half behind it.
+        // Half of the damping acts before the force, and half of it after.
         state.ledger.dissipated_j += 0.5 * (before_sq + between_sq) * -(-damping * h_s).exp_m1();
     }
 
-    /// The force (N) that holds a node; nothing while it sleeps.
+    /// Returns the force (N) that holds a node, which is zero while the node sleeps.
     pub(crate) fn reaction_n(&self, node: usize, state: &MechanicalState) -> DVec3 {
         self.scratch.place(node as u32).map_or(DVec3::ZERO, |place| -state.force_n[place])
     }
 
-    /// The node at a place among those that are awake.
+    /// Returns the node at a place among the awake nodes.
     pub(crate) fn node_at(&self, place: u32) -> Option<u32> {
         self.own.motion.ids.get(place as usize).copied()
     }

@@ -6,7 +6,7 @@
 use super::{
     LayerSpec, SeedError, SeedParameters,
     kernel::{Cone, Stencil},
-    radial::{Foot, Radial},
+    radial::{Attachment, Radial},
     voxels::{NONE, Voxels},
 };
 use glam::DVec3;
@@ -49,7 +49,7 @@ pub struct Layer {
     /// Triangle of the skin over each particle.
     pub triangle_over: Vec<u32>,
     /// Where each particle's ray to the mass centre meets the core.
-    pub core_foot: Vec<Foot>,
+    pub core_attachment: Vec<Attachment>,
 }
 
 /// The two surfaces around a layer.
@@ -99,17 +99,17 @@ impl Layer {
             particle_at[voxel as usize] = particle as u32;
         }
         let cone = Cone::of_smoothing_length(parameters.smoothing_ratio * voxels.spacing_m);
-        let share_m3 = volume_m3 / count as f64;
+        let particle_m3 = volume_m3 / count as f64;
         let rest_m = |&voxel: &u32| voxels.centre_m(voxel as usize);
         Ok(Self {
             holds,
             particle_at,
-            volume_m3: share_m3,
-            mass_kg: parameters.density_kg_per_m3 * share_m3,
-            stencil: Stencil::new(&cone, voxels.spacing_m, share_m3),
+            volume_m3: particle_m3,
+            mass_kg: parameters.density_kg_per_m3 * particle_m3,
+            stencil: Stencil::new(&cone, voxels.spacing_m, particle_m3),
             cone,
-            triangle_over: voxel_of.iter().map(|voxel| walls.skin.foot(rest_m(voxel)).triangle).collect(),
-            core_foot: voxel_of.iter().map(|voxel| walls.core.foot(rest_m(voxel))).collect(),
+            triangle_over: voxel_of.iter().map(|voxel| walls.skin.attachment(rest_m(voxel)).triangle).collect(),
+            core_attachment: voxel_of.iter().map(|voxel| walls.core.attachment(rest_m(voxel))).collect(),
             voxel_of,
             voxels,
         })

@@ -10,7 +10,7 @@
 //!
 //! Not printed, and chosen: the mass of a vertex (its share by area of the layer's, which has nobody else while its particles sleep), k
 //! (that of the column of layer below it, `(λ + 2µ) A/|o|`) and c (`2ξ√(km)`).
-use super::radial::{Foot, at};
+use super::radial::{Attachment, at};
 use glam::DVec3;
 
 /// Links of all vertices.
@@ -43,7 +43,7 @@ pub(super) struct LinkMaterial {
 impl Links {
     pub(super) fn new(
         (skin_m, triangles): (&[DVec3], &[[u32; 3]]),
-        feet: &[Foot],
+        attachments: &[Attachment],
         (core_m, core_triangles): (&[DVec3], &[[u32; 3]]),
         material: &LinkMaterial,
     ) -> Self {
@@ -63,13 +63,13 @@ impl Links {
             damping_n_s_per_m: Vec::new(),
             mass_kg: Vec::new(),
         };
-        for ((foot, &position), area) in feet.iter().zip(skin_m).zip(area_m2) {
-            let nodes = core_triangles[foot.triangle as usize];
-            let offset = position - at(foot.weights, nodes.map(|n| core_m[n as usize]));
+        for ((attachment, &position), area) in attachments.iter().zip(skin_m).zip(area_m2) {
+            let nodes = core_triangles[attachment.triangle as usize];
+            let offset = position - at(attachment.weights, nodes.map(|n| core_m[n as usize]));
             let (mass, stiffness) =
                 (material.layer_mass_kg * area / total_m2, material.modulus_pa * area / offset.length());
             links.nodes.push(nodes);
-            links.weights.push(foot.weights);
+            links.weights.push(attachment.weights);
             links.offset_m.push(offset);
             links.mass_kg.push(mass);
             links.stiffness_n_per_m.push(stiffness);
@@ -79,14 +79,14 @@ impl Links {
     }
 
     /// `Σ_i ζ_i a_i` over the corners of a vertex's face.
-    pub fn at_foot(&self, vertex: usize, of_nodes: &[DVec3]) -> DVec3 {
+    pub fn attachment_m(&self, vertex: usize, of_nodes: &[DVec3]) -> DVec3 {
         at(self.weights[vertex], self.nodes[vertex].map(|n| of_nodes[n as usize]))
     }
 
     /// Force (N) on a vertex; its face's nodes get `−ζ_i` of it.
     pub fn force_n(&self, vertex: usize, (x, v): (DVec3, DVec3), (core_x, core_v): (&[DVec3], &[DVec3])) -> DVec3 {
-        let stretch = x - self.at_foot(vertex, core_x) - self.offset_m[vertex];
-        let rate = v - self.at_foot(vertex, core_v);
+        let stretch = x - self.attachment_m(vertex, core_x) - self.offset_m[vertex];
+        let rate = v - self.attachment_m(vertex, core_v);
         stretch * -self.stiffness_n_per_m[vertex] - rate * self.damping_n_s_per_m[vertex]
     }
 }

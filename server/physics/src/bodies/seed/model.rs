@@ -33,7 +33,7 @@ pub(super) struct Hull {
     pub(super) regions: Vec<Region>,
     pub(super) stress: LayerStress,
     pub(super) most_awake: usize,
-    pub(super) border_stiffness_n_per_m: f64,
+    pub(super) interface_stiffness_n_per_m: f64,
 }
 
 impl SeedModel {
@@ -131,10 +131,10 @@ impl Hull {
         let regions = regions(spec, &layer, parameters.first_neighbours)?;
         let stress = LayerStress::new(parameters);
         let modulus_pa = stress.lame().p_wave_modulus_pa();
-        let feet: Vec<_> = spec.skin_m.iter().map(|&vertex| core_fan.foot(vertex)).collect();
+        let attachments: Vec<_> = spec.skin_m.iter().map(|&vertex| core_fan.attachment(vertex)).collect();
         let links = Links::new(
             (&spec.skin_m, &spec.skin_triangles),
-            &feet,
+            &attachments,
             (core_m, core_triangles),
             &LinkMaterial {
                 modulus_pa: modulus_pa * parameters.link_stiffness_ratio,
@@ -144,7 +144,7 @@ impl Hull {
         );
         Ok(Self {
             most_awake: regions.iter().map(Region::len).max().unwrap_or(0),
-            border_stiffness_n_per_m: parameters.border_stiffness_ratio * modulus_pa * layer.voxels.spacing_m,
+            interface_stiffness_n_per_m: parameters.interface_stiffness_ratio * modulus_pa * layer.voxels.spacing_m,
             layer,
             links,
             regions,
@@ -215,8 +215,8 @@ fn regions(spec: &LayerSpec, layer: &Layer, first_neighbours: bool) -> Result<Ve
         let mut vertices: Vec<u32> = patch.iter().flat_map(|&t| spec.skin_triangles[t as usize]).collect();
         vertices.sort_unstable();
         vertices.dedup();
-        let riders: Vec<(u32, DVec3)> = vertices.iter().map(|&v| (v, spec.skin_m[v as usize])).collect();
-        Ok(Region::new(layer, particles, &riders))
+        let carried: Vec<(u32, DVec3)> = vertices.iter().map(|&v| (v, spec.skin_m[v as usize])).collect();
+        Ok(Region::new(layer, particles, &carried))
     };
     spec.skin_triangles.iter().enumerate().map(region).collect()
 }

@@ -45,14 +45,15 @@ impl SeedModel {
         let area_m2 = self.vertex_areas_m2();
         for region in self.regions() {
             let mut pressed_m2 = vec![0.0; region.len()];
-            for rider in &region.riders {
-                for &(slot, weight) in region.terms_of(rider) {
-                    pressed_m2[slot as usize] += area_m2[rider.vertex as usize] * weight;
+            for carried in &region.carried {
+                for &(slot, weight) in region.terms_of(carried) {
+                    pressed_m2[slot as usize] += area_m2[carried.vertex as usize] * weight;
                 }
             }
-            for rider in &region.riders {
-                let vertex = rider.vertex as usize;
-                let most_m2 = region.terms_of(rider).iter().map(|term| pressed_m2[term.0 as usize]).fold(0.0, f64::max);
+            for carried in &region.carried {
+                let vertex = carried.vertex as usize;
+                let most_m2 =
+                    region.terms_of(carried).iter().map(|term| pressed_m2[term.0 as usize]).fold(0.0, f64::max);
                 skin[vertex] = skin[vertex].min(layer.mass_kg * area_m2[vertex] / most_m2);
             }
         }
@@ -84,8 +85,8 @@ impl SeedModel {
         if let (Some(links), Some(layer)) = (self.links(), self.layer()) {
             energy_j += links.mass_kg.iter().zip(&state.skin.v).map(|(m, v)| of(m, v)).sum::<f64>();
             if let Some(region) = self.awake(state) {
-                let riders = region.riders.iter().map(|rider| rider.vertex as usize);
-                energy_j -= riders.map(|vertex| of(&links.mass_kg[vertex], &state.skin.v[vertex])).sum::<f64>();
+                let carried = region.carried.iter().map(|carried| carried.vertex as usize);
+                energy_j -= carried.map(|vertex| of(&links.mass_kg[vertex], &state.skin.v[vertex])).sum::<f64>();
                 energy_j += state.particles.v[..region.len()].iter().map(|v| of(&layer.mass_kg, v)).sum::<f64>();
             }
         }

@@ -4,7 +4,7 @@ use glam::{DMat3, DVec3};
 
 /// Where the ray from the mass centre through a point meets a surface.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Foot {
+pub struct Attachment {
     /// The triangle.
     pub triangle: u32,
     /// Barycentric weights of its corners; they sum to one and are not negative.
@@ -44,12 +44,12 @@ impl Radial {
         Ok(Self { centre_m, inverse_per_m })
     }
 
-    /// The foot of a point: of `p − c = α a + β b + γ c` the triangle with α, β, γ ≥ 0 is met, at `(α, β, γ)/(α + β + γ)`.
+    /// The attachment of a point: of `p − c = α a + β b + γ c` the triangle with α, β, γ ≥ 0 is met, at `(α, β, γ)/(α + β + γ)`.
     ///
     /// Rounding may leave a point on an edge outside both its triangles: the triangle that is least outside is taken.
-    pub fn foot(&self, point_m: DVec3) -> Foot {
+    pub fn attachment(&self, point_m: DVec3) -> Attachment {
         let from = point_m - self.centre_m;
-        let mut best = (f64::NEG_INFINITY, Foot { triangle: 0, weights: [1.0, 0.0, 0.0] });
+        let mut best = (f64::NEG_INFINITY, Attachment { triangle: 0, weights: [1.0, 0.0, 0.0] });
         for (triangle, inverse) in self.inverse_per_m.iter().enumerate() {
             let along = *inverse * from;
             let sum = along.element_sum();
@@ -60,7 +60,7 @@ impl Radial {
                 if least > best.0 {
                     let kept = weights.max(DVec3::ZERO);
                     let weights = (kept / kept.element_sum()).to_array();
-                    best = (least, Foot { triangle: triangle as u32, weights });
+                    best = (least, Attachment { triangle: triangle as u32, weights });
                     if least >= 0.0 {
                         break;
                     }
@@ -89,16 +89,16 @@ mod tests {
         let mut random = Random(5);
         for _ in 0..500 {
             let point = centre + random.vector() * 0.7;
-            let foot = radial.foot(point);
-            let met = at(foot.weights, triangles[foot.triangle as usize].map(|n| positions[n as usize]));
+            let attachment = radial.attachment(point);
+            let met = at(attachment.weights, triangles[attachment.triangle as usize].map(|n| positions[n as usize]));
             let (ray, along) = ((met - centre).normalize(), (point - centre).normalize());
-            assert!(ray.distance(along) < 1e-12 && foot.weights.iter().all(|&w| w >= 0.0));
+            assert!(ray.distance(along) < 1e-12 && attachment.weights.iter().all(|&w| w >= 0.0));
         }
-        // A corner's own foot is the corner.
+        // A corner's own attachment is the corner.
         for (vertex, &position) in positions.iter().enumerate() {
-            let foot = radial.foot(position);
-            let corner = triangles[foot.triangle as usize].iter().position(|&n| n as usize == vertex).unwrap();
-            assert!((foot.weights[corner] - 1.0).abs() < 1e-12);
+            let attachment = radial.attachment(position);
+            let corner = triangles[attachment.triangle as usize].iter().position(|&n| n as usize == vertex).unwrap();
+            assert!((attachment.weights[corner] - 1.0).abs() < 1e-12);
         }
     }
 

@@ -27,7 +27,7 @@ pub const PARTICLES: u32 = 27_988;
 /// What passes between particles and core (2006, section 6.1).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Exchange {
-    /// Repaired: particles of the core's border are tied to their faces along the normal by impulses, so that the linear momentum
+    /// Repaired: particles of the core's interface are tied to their faces along the normal by impulses, so that the linear momentum
     /// that the paper appeals to is conserved.
     #[default]
     Impulses,
@@ -47,11 +47,11 @@ pub enum PairStress {
 
 /// What keeps particles within their region (`seed::region`).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum BorderForce {
-    /// Repaired: particles of the border are drawn back to their own voxels.
+pub enum InterfaceForce {
+    /// Repaired: particles of the interface are drawn back to their own voxels.
     #[default]
     OwnVoxel,
-    /// As printed: those, and particles beyond the border, are drawn by the gradient field to the nearest border voxel. Pumps energy.
+    /// As printed: those, and particles beyond the interface, are drawn by the gradient field to the nearest interface voxel. Pumps energy.
     NearestVoxel,
 }
 
@@ -73,7 +73,7 @@ pub struct SeedParameters {
     /// Whether nv(ps) reaches to the first-connected vertices ("eventually, … depending on the mesh size").
     pub first_neighbours: bool,
     /// Border force per distance, over `(λ + 2µ) · spacing`. Not printed.
-    pub border_stiffness_ratio: f64,
+    pub interface_stiffness_ratio: f64,
     /// Stiffness of the surface's links, over that of the column of layer between their ends. Not printed.
     pub link_stiffness_ratio: f64,
     /// Damping ratio of the links. Not printed.
@@ -83,7 +83,7 @@ pub struct SeedParameters {
     /// Which stress makes the force between two particles.
     pub pair_stress: PairStress,
     /// What keeps particles within their region.
-    pub border_force: BorderForce,
+    pub interface_force: InterfaceForce,
 }
 
 /// The layer of particles and the surface outside it.
@@ -135,12 +135,12 @@ impl SeedParameters {
             density_kg_per_m3: 1000.0,
             smoothing_ratio: 1.2,
             first_neighbours: true,
-            border_stiffness_ratio: 1.0,
+            interface_stiffness_ratio: 1.0,
             link_stiffness_ratio: 1.0,
             link_damping_ratio: 1.0,
             exchange: Exchange::default(),
             pair_stress: PairStress::default(),
-            border_force: BorderForce::default(),
+            interface_force: InterfaceForce::default(),
         }
     }
 
@@ -150,7 +150,7 @@ impl SeedParameters {
         Self {
             exchange: Exchange::Displacements,
             pair_stress: PairStress::Neighbour,
-            border_force: BorderForce::NearestVoxel,
+            interface_force: InterfaceForce::NearestVoxel,
             ..self
         }
     }
@@ -199,8 +199,10 @@ impl SeedParameters {
                 return refuse(name, value, "must be finite and larger than 0");
             }
         }
-        let not_negative =
-            [("border_stiffness_ratio", self.border_stiffness_ratio), ("link_damping_ratio", self.link_damping_ratio)];
+        let not_negative = [
+            ("interface_stiffness_ratio", self.interface_stiffness_ratio),
+            ("link_damping_ratio", self.link_damping_ratio),
+        ];
         for (name, value) in not_negative {
             if !(value >= 0.0 && value.is_finite()) {
                 return refuse(name, value, "must be finite and not negative");
@@ -216,6 +218,8 @@ impl SeedParameters {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::hash::{FirstNames, Fnv, OFFSET, fnv};
+    use std::fmt::Write;
 
     #[test]
     fn the_courant_step_as_printed_is_shorter_where_lambda_is_larger_than_mu() {
@@ -232,8 +236,19 @@ mod tests {
         let message = |parameters: SeedParameters| parameters.check().unwrap_err().to_string();
         assert!(message(SeedParameters { dt_s: f64::NAN, ..good }).contains("dt_s = NaN"));
         assert!(message(SeedParameters { smoothing_ratio: 9.0, ..good }).contains("smoothing_ratio = 9"));
-        assert!(message(SeedParameters { border_stiffness_ratio: -1.0, ..good }).contains("not negative"));
+        assert!(message(SeedParameters { interface_stiffness_ratio: -1.0, ..good }).contains("not negative"));
         let lame = Lame { lambda_pa: 5.0, mu_pa: 0.0 };
         assert!(message(SeedParameters { lame, ..good }).contains("mu_pa > 0"));
+    }
+
+    /// Snapshots hold this hash.
+    #[test]
+    fn renamed_parameters_are_hashed_by_their_first_names() {
+        let parameters = SeedParameters::paper_2006(PaperModel::Hybrid);
+        let mut hash = Fnv(OFFSET);
+        write!(FirstNames(&mut hash), "{parameters:?}").unwrap();
+        let first = format!("{parameters:?}").replace("interface_", "border_");
+        assert!(first.contains("border_stiffness_ratio: 1.0") && first.contains("border_force: OwnVoxel"), "{first}");
+        assert_eq!(hash.0, fnv(OFFSET, first.bytes()));
     }
 }

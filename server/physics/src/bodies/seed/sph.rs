@@ -4,7 +4,7 @@
 //! ```text
 //! F_i = I + Σ_j (d_j − d_i) ⊗ b_ij        b_ij = ∇_i W(u_i − u_j) ΔV_j
 //! ```
-//! Eq. 25 differentiated is `Σ_j d_j ⊗ b_ij`. Its `d_i` is added here (`Σ_j b_ij = 0` within the layer, not at its borders), because a layer that
+//! Eq. 25 differentiated is `Σ_j d_j ⊗ b_ij`. Its `d_i` is added here (`Σ_j b_ij = 0` within the layer, not at its boundaries), because a layer that
 //! moves as a whole would be strained. With positions, as eq. 4 reads, the body at rest would have `F = A_i = Σ_j (u_j − u_i) ⊗ b_ij`,
 //! which is not I ([`moment`]): it would burst at rest. With displacements rest is rest, but any uniform deformation G is seen as
 //! `I + (G − I) A_i`, and a rotation as strain.
@@ -16,7 +16,7 @@
 //! f_i = ΔV_i Σ_j (σ_i + σ_j) b_ij        as printed: ΔV_i Σ_j σ_j b_ij
 //! ```
 //! 2005's eq. 13 is the printed one with the gradient at j, and the other sign. With `σ_j` alone ([`PairStress::Neighbour`]) forces between two
-//! particles are not opposite: momentum is lost at the border, the stiffness is not symmetric, and a layer at rest flutters: any small motion
+//! particles are not opposite: momentum is lost at the interface, the stiffness is not symmetric, and a layer at rest flutters: any small motion
 //! grows, at any step. `σ_i` ([`PairStress::Both`]) costs nothing within, where `Σ_j b_ij = 0`; with it the force is, at small strain,
 //! `−∂U/∂x` of `U = ΔV Σ_i ½ E_i:σ_i`, because `b_ji = −b_ij`. Neighbours are awake particles: what sleeps is not there.
 //! Rest positions never change, so neither do neighbours and weights: "whose connectivity must be determined for each time step" is

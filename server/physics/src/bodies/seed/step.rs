@@ -1,7 +1,7 @@
 //! One of the papers' steps Δt. The papers do not print its order; it is
 //!
 //! 1. the touched point: its region wakes, another falls asleep (section 6);
-//! 2. forces at time t: core (22), links of the surface, particles (29) and border, external ones (28);
+//! 2. forces at time t: core (22), links of the surface, particles (29) and interface, external ones (28);
 //! 3. motion: particles and surface by Verlet (33), core by the semi-implicit scheme (34);
 //! 4. vertices that the user displaces are brought to where they are held;
 //! 5. exchange between particles and core;
@@ -13,7 +13,7 @@ use super::{
     Exchange, SeedContact, SeedModel, SeedReport, SeedScratch, SeedState, exchange,
     layer::Holds,
     model::Hull,
-    region::{Region, Rider},
+    region::{CarriedVertex, Region},
     sph,
     state::AtVertex,
 };
@@ -59,9 +59,9 @@ impl SeedModel {
 
         if let (Some(hull), Some(region)) = (self.hull(), awake) {
             self.exchange(hull, region, state, scratch);
-            for rider in &region.riders {
-                let (by, speed) = region.carried(rider, &state.particles.x, &state.particles.v);
-                let vertex = rider.vertex as usize;
+            for carried in &region.carried {
+                let (by, speed) = region.carried_motion(carried, &state.particles.x, &state.particles.v);
+                let vertex = carried.vertex as usize;
                 state.skin.x[vertex] = self.surface_rest_m()[vertex] + by;
                 state.skin.v[vertex] = speed;
             }
@@ -90,8 +90,8 @@ impl SeedModel {
         if let Some(hull) = self.hull() {
             total += sum(&hull.links.mass_kg, &state.skin.v);
             if let Some(region) = self.awake(state) {
-                for rider in &region.riders {
-                    let vertex = rider.vertex as usize;
+                for carried in &region.carried {
+                    let vertex = carried.vertex as usize;
                     total -= state.skin.v[vertex] * hull.links.mass_kg[vertex];
                 }
                 total += state.particles.v[..region.len()].iter().sum::<DVec3>() * hull.layer.mass_kg;
@@ -140,8 +140,8 @@ impl SeedModel {
         let forces = &mut scratch.force_n;
         sph::forces_n(region, stencil, hull.layer.volume_m3, pair_stress, &scratch.stress_pa, forces);
         for (slot, force) in forces.iter_mut().enumerate().take(region.len()) {
-            let (law, stiffness) = (self.parameters().border_force, hull.border_stiffness_n_per_m);
-            *force += region.border_force_n(law, stiffness, slot, state.particles.x[slot]);
+            let (law, stiffness) = (self.parameters().interface_force, hull.interface_stiffness_n_per_m);
+            *force += region.interface_force_n(law, stiffness, slot, state.particles.x[slot]);
         }
     }
 
@@ -152,9 +152,9 @@ impl SeedModel {
         }
         if self.hull().is_none() {
             scratch.core_force_n[self.node_of(push.vertex)] += push.value;
-        } else if let Some((region, rider)) = riding(awake, push.vertex) {
+        } else if let Some((region, carried)) = carried_by(awake, push.vertex) {
             // The transpose of eq. 25's interpolation: the same weights.
-            for &(slot, weight) in region.terms_of(rider) {
+            for &(slot, weight) in region.terms_of(carried) {
                 scratch.force_n[slot as usize] += push.value * weight;
             }
         } else {
@@ -184,8 +184,8 @@ impl SeedModel {
                 rejected += 1;
                 continue;
             };
-            if let Some((region, rider)) = riding(awake, goal.vertex) {
-                for &(slot, weight) in region.terms_of(rider) {
+            if let Some((region, carried)) = carried_by(awake, goal.vertex) {
+                for &(slot, weight) in region.terms_of(carried) {
                     let (sum, weights) = &mut scratch.goal_sums[slot as usize];
                     *sum += (goal.value - *rest) * weight;
                     *weights += weight;
@@ -235,9 +235,9 @@ impl SeedModel {
     }
 }
 
-/// The rider that a vertex is, and its region.
-fn riding(awake: Option<&Region>, vertex: u32) -> Option<(&Region, &Rider)> {
-    awake.and_then(|region| Some((region, region.rider(vertex)?)))
+/// The carried vertex with this number, and its region.
+fn carried_by(awake: Option<&Region>, vertex: u32) -> Option<(&Region, &CarriedVertex)> {
+    awake.and_then(|region| Some((region, region.carried_vertex(vertex)?)))
 }
 
 impl Hull {
@@ -247,8 +247,8 @@ impl Hull {
         for (vertex, force) in scratch.skin_force_n.iter_mut().enumerate() {
             *force = self.links.force_n(vertex, (state.skin.x[vertex], state.skin.v[vertex]), core);
         }
-        for rider in awake.map_or(&[][..], |region| &region.riders) {
-            scratch.skin_force_n[rider.vertex as usize] = DVec3::ZERO;
+        for carried in awake.map_or(&[][..], |region| &region.carried) {
+            scratch.skin_force_n[carried.vertex as usize] = DVec3::ZERO;
         }
         for (vertex, force) in scratch.skin_force_n.iter().enumerate() {
             for (&node, weight) in self.links.nodes[vertex].iter().zip(self.links.weights[vertex]) {
@@ -257,12 +257,12 @@ impl Hull {
         }
     }
 
-    /// Where a sleeping particle is (m) and how fast (m/s): it moves with its foot on the core.
+    /// Where a sleeping particle is (m) and how fast (m/s): it moves with its attachment on the core.
     fn asleep(&self, model: &SeedModel, particle: u32, state: &SeedState) -> (DVec3, DVec3) {
-        let foot = self.layer.core_foot[particle as usize];
-        let nodes = model.core().outer_triangles()[foot.triangle as usize].map(|n| n as usize);
+        let attachment = self.layer.core_attachment[particle as usize];
+        let nodes = model.core().outer_triangles()[attachment.triangle as usize].map(|n| n as usize);
         let (mut x, mut v) = (self.layer.rest_m(particle), DVec3::ZERO);
-        for (node, weight) in nodes.into_iter().zip(foot.weights) {
+        for (node, weight) in nodes.into_iter().zip(attachment.weights) {
             x += (state.core.x[node] - model.core().rest_m()[node]) * weight;
             v += state.core.v[node] * weight;
         }
@@ -271,10 +271,10 @@ impl Hull {
 }
 
 impl Region {
-    /// Displacement (m) and velocity (m/s) of a rider: `Σ w_j (x_j − u_j)`, `Σ w_j v_j`.
-    fn carried(&self, rider: &Rider, x: &[DVec3], v: &[DVec3]) -> (DVec3, DVec3) {
+    /// Displacement (m) and velocity (m/s) of a carried vertex: `Σ w_j (x_j − u_j)`, `Σ w_j v_j`.
+    fn carried_motion(&self, carried: &CarriedVertex, x: &[DVec3], v: &[DVec3]) -> (DVec3, DVec3) {
         let (mut by, mut speed) = (DVec3::ZERO, DVec3::ZERO);
-        for &(slot, weight) in self.terms_of(rider) {
+        for &(slot, weight) in self.terms_of(carried) {
             by += (x[slot as usize] - self.rest_m(slot as usize)) * weight;
             speed += v[slot as usize] * weight;
         }

@@ -1,4 +1,4 @@
-//! Mass-spring surfaces: every law of home springs, every way to refine, awake in part, calibrated.
+//! Mass-spring surfaces: every law of anchor springs, every way to refine, awake in part, calibrated.
 use super::farthest_node;
 use crate::hashes::{
     case::{Case, Moment, Source},
@@ -13,7 +13,7 @@ use palpate_physics::{
 
 const TICKS: u64 = 500;
 const LAYERS: &str =
-    "home_layer = [{ thickness_m = 1e-3, stiffness_ratio = 1 }, { thickness_m = 1, stiffness_ratio = 4 }]\n";
+    "anchor_layer = [{ thickness_m = 1e-3, stiffness_ratio = 1 }, { thickness_m = 1, stiffness_ratio = 4 }]\n";
 const AREA: &str = "[body.springs.refine]\nrings = 2\nconstants = \"area\"\n";
 
 /// A ball of some 300 triangles whose lower half is held, under a sphere that a case moves.
@@ -49,7 +49,7 @@ pub(super) fn cases() -> Vec<Case> {
                 &spring.replace("[numerics]\nmass_damping_per_s = 20\n", ""),
             ),
         ),
-        case("springs/cubic", ball(&format!("{DAMPED}home_cubic_per_m2 = 1e5\n"), AREA, RIGID)),
+        case("springs/cubic", ball(&format!("{DAMPED}anchor_cubic_per_m2 = 1e5\n"), AREA, RIGID)),
         case("springs/layers", ball(&format!("{DAMPED}{LAYERS}"), AREA, RIGID)),
         case("springs/mass-damping", ball("", AREA, &spring)),
         case("springs/capsule", ball(DAMPED, &format!("{AREA}most_triangles = 120\n"), &capsule)),

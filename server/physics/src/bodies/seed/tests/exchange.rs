@@ -68,7 +68,7 @@ fn printed_exchange_makes_momentum_from_displacements() {
     println!("the nodes take on {ratio:.0} times the momentum that the particle brings");
     assert!(ratio > 50.0);
     // Every corner of the face moves by all of the step, whatever its weight.
-    let face = model.core().outer_triangles()[region.on_core[0].foot.triangle as usize];
+    let face = model.core().outer_triangles()[region.on_core[0].attachment.triangle as usize];
     for node in face {
         assert!((x[node as usize] - model.core().rest_m()[node as usize] - step).length() < 1e-15);
     }
@@ -97,7 +97,7 @@ fn links_are_free_at_rest_and_in_translation_and_resist_rotation() {
         let offset = links.offset_m[vertex];
         let away = DQuat::from_rotation_z(angle) * offset - offset;
         assert!((*force + away * links.stiffness_n_per_m[vertex]).length() < 1e-12);
-        // About the foot, which the reaction passes through.
+        // About the attachment, which the reaction passes through.
         let turned_offset = DQuat::from_rotation_z(angle) * offset;
         torque += turned_offset.cross(*force);
         expected -= links.stiffness_n_per_m[vertex] * offset.truncate().length_squared() * angle.sin();
