@@ -42,7 +42,7 @@ pub struct Refinement {
 pub enum Refining {
     /// The surface is refined where tools touch it or are about to.
     ByTools,
-    /// The surface is refined where [`crate::refine_only`] says, for experiments.
+    /// The surface is refined where `world::refine_only` says, for experiments.
     ByHand,
 }
 

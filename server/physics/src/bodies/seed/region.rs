@@ -1,18 +1,22 @@
-//! The region RV(ps) of a touched point (2006, sections 6 and 6.1): which particles are awake, and where its interface is.
+//! The region RV(ps) of a touched point (2006, sections 6 and 6.1): which particles are awake, and where their
+//! interface is.
 //!
-//! The papers project the boundary of nv(ps) — the touched triangle's corners and their first neighbours — towards the mass centre onto
-//! the core and take the particles between. A particle lies there exactly when its own ray from the mass centre leaves through a
-//! triangle of nv(ps): so a region is the union of the particles under some triangles, and needs no polygon C(ps).
+//! The papers project the boundary of nv(ps) — the touched triangle's corners and their first neighbours — towards the
+//! mass centre onto the core and take the particles between. A particle lies there exactly when its own ray from the
+//! mass centre leaves through a triangle of nv(ps). So a region is the union of the particles under some triangles, and
+//! the polygon C(ps) is not needed.
 //!
-//! RV is embedded in a box of voxels B(ps). Its *interface* are the voxels of RV beside a voxel of the body outside RV: at the sides other
-//! particles, below the core. Towards the skin it has none ("inner boundaries"). Every voxel of B knows the nearest interface voxel; the
-//! vector there is the gradient field.
+//! RV is embedded in a box of voxels B(ps). Its *interface* (the papers' border) consists of the voxels of RV beside a
+//! voxel of the body outside RV: at the sides these hold other particles, below they hold the core. Towards the skin
+//! there is no interface ("inner boundaries"). Every voxel of B knows the nearest interface voxel; the vector to it is
+//! the gradient field.
 //!
-//! *Border force, as printed* ([`InterfaceForce::NearestVoxel`]): k times the gradient at the particle's voxel, on particles that started at
-//! the interface and on those beyond it. It is constant within a voxel, jumps between voxels and changes its aim where another interface
-//! voxel becomes the nearest: it has no potential and pumps energy, at any step. *Repaired* ([`InterfaceForce::OwnVoxel`]): a particle of the
-//! interface is drawn to its own voxel, `k (c − x)` with c the voxel's point nearest to x: zero within, continuous, of potential
-//! `½k|x − c|²`. Nothing draws the others, which no interface voxel is proper to.
+//! The *interface force as printed* ([`InterfaceForce::NearestVoxel`]) is k times the gradient at the particle's voxel;
+//! it acts on particles that started at the interface and on those beyond it. It is constant within a voxel, jumps
+//! between voxels, and changes its direction where another interface voxel becomes the nearest: it has no potential and
+//! pumps energy, at any step. The *repaired* force ([`InterfaceForce::OwnVoxel`]) draws a particle of the interface to
+//! its own voxel by `k (c − x)`, where c is the voxel's point nearest to x: it is zero within the voxel, continuous,
+//! and has the potential `½k|x − c|²`. It does not act on other particles, which have no voxel at the interface.
 use super::{
     InterfaceForce,
     kernel::Stencil,
@@ -25,13 +29,13 @@ use glam::DVec3;
 /// What a voxel of B(ps) is to the region.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Place {
-    /// Of the region, within.
+    /// The voxel is in the region, and not at its interface.
     Inside,
-    /// Of the region, at its interface.
+    /// The voxel is in the region, at its interface.
     Interface,
-    /// Of the body, outside the region.
+    /// The voxel is in the body, outside the region.
     Beyond,
-    /// Outside the body.
+    /// The voxel is outside the body.
     Free,
 }
 
@@ -40,46 +44,48 @@ pub enum Place {
 pub struct OnCore {
     /// Its slot in the region.
     pub slot: u32,
-    /// The face below it.
+    /// Its attachment point on the face below it.
     pub attachment: Attachment,
 }
 
-/// A vertex of the skin that follows awake particles.
+/// A vertex of the skin that awake particles carry.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct CarriedVertex {
     /// The vertex.
     pub vertex: u32,
-    /// Where its terms begin and end.
+    /// First entry of its terms in [`Region::terms`], and their end.
     pub terms: [u32; 2],
 }
 
-/// What is awake while one triangle of the skin is touched. A *slot* is a place in its list of particles.
+/// The particles that are awake while one triangle of the skin is touched. A *slot* is an index in the list of
+/// particles.
 #[derive(Debug, Clone)]
 pub struct Region {
-    /// Its particles, ascending.
+    /// The particles, ascending.
     pub particles: Vec<u32>,
-    /// B(ps).
+    /// The box B(ps).
     pub voxels: Voxels,
-    /// Slot of each of B's voxels, or [`NONE`].
+    /// Slot of each voxel of B, or [`NONE`].
     pub slot_at: Vec<u32>,
     /// Voxel of B of each slot.
     pub voxel_of: Vec<u32>,
-    /// What each voxel of B is.
+    /// What each voxel of B is to the region.
     pub places: Vec<Place>,
-    /// Interface voxel of B nearest to each voxel, or [`NONE`] when there is no interface.
+    /// Interface voxel of B nearest to each voxel, or [`NONE`] where there is no interface.
     pub nearest_interface: Vec<u32>,
     /// Particles of the interface beside the core.
     pub on_core: Vec<OnCore>,
-    /// Vertices of nv(ps).
+    /// Carried vertices: those of nv(ps).
     pub carried: Vec<CarriedVertex>,
-    /// Slots and weights of the carried.
+    /// Slots with weights, of all carried vertices.
     pub terms: Vec<(u32, f64)>,
-    /// Steps of the stencil as differences of B's voxel numbers.
+    /// Steps of the stencil as differences of the numbers of B's voxels.
     pub steps: Vec<i32>,
 }
 
 impl Region {
-    /// Of particles, ascending and at least one, under vertices at `carried` (numbers and rest positions in metres).
+    /// Returns the region of `particles`, which are ascending and at least one, that carries the vertices `carried`,
+    /// given by their numbers and rest positions (m).
     pub(super) fn new(layer: &Layer, particles: Vec<u32>, carried: &[(u32, DVec3)]) -> Self {
         let place = |particle: &u32| layer.voxels.place(layer.voxel_of[*particle as usize] as usize);
         let (mut low, mut high) = ([usize::MAX; 3], [0; 3]);
@@ -88,7 +94,7 @@ impl Region {
                 (low[axis], high[axis]) = (low[axis].min(at[axis]), high[axis].max(at[axis]));
             }
         }
-        // The layer's box has the same margin, so this stays within.
+        // The layer's box has the same margin, so this box stays within it.
         let reach = layer.stencil.reach;
         let (low, high) = (low.map(|n| n - reach), high.map(|n| n + reach));
         let voxels = layer.voxels.part(low, high);
@@ -130,32 +136,32 @@ impl Region {
         region
     }
 
-    /// How many particles are awake.
+    /// Returns the number of particles.
     pub fn len(&self) -> usize {
         self.particles.len()
     }
 
-    /// Never: a region has particles.
+    /// Returns whether there are no particles, which is never so.
     pub fn is_empty(&self) -> bool {
         self.particles.is_empty()
     }
 
-    /// Rest position (m) of a slot's particle.
+    /// Returns the rest position (m) of a slot's particle.
     pub fn rest_m(&self, slot: usize) -> DVec3 {
         self.voxels.centre_m(self.voxel_of[slot] as usize)
     }
 
-    /// Slots and weights of a carried vertex.
+    /// Returns the slots and weights of a carried vertex.
     pub fn terms_of(&self, carried: &CarriedVertex) -> &[(u32, f64)] {
         &self.terms[carried.terms[0] as usize..carried.terms[1] as usize]
     }
 
-    /// The carried vertex with this number, if it is one.
+    /// Returns the carried vertex with this number, if the region carries it.
     pub fn carried_vertex(&self, vertex: u32) -> Option<&CarriedVertex> {
         self.carried.iter().find(|carried| carried.vertex == vertex)
     }
 
-    /// Force (N) of the interface on a slot's particle at `x` (m).
+    /// Returns the force (N) of the interface on a slot's particle at `x_m` (m).
     pub fn interface_force_n(&self, law: InterfaceForce, stiffness_n_per_m: f64, slot: usize, x_m: DVec3) -> DVec3 {
         let started_there = self.places[self.voxel_of[slot] as usize] == Place::Interface;
         let away_m = match law {
@@ -173,7 +179,7 @@ impl Region {
         away_m * stiffness_n_per_m
     }
 
-    /// The gradient field: from a voxel to the nearest of the interface (m).
+    /// Returns the gradient field at a voxel: the vector (m) to the nearest voxel of the interface.
     pub fn gradient_m(&self, voxel: usize) -> DVec3 {
         match self.nearest_interface[voxel] {
             NONE => DVec3::ZERO,
@@ -181,8 +187,9 @@ impl Region {
         }
     }
 
-    /// Eq. 25 at a vertex, over awake particles only and with weights that sum to one: `W_j ΔV_j / Σ W ΔV` (as printed, they sum to about
-    /// ½ on the surface). Where the support holds no awake particle, the nearest one alone.
+    /// Adds a carried vertex, by eq. 25 over awake particles only and with weights that sum to one: `W_j ΔV_j / Σ W ΔV`
+    /// (as printed, they sum to about ½ on the surface). Where the support holds no awake particle, the nearest one
+    /// alone carries the vertex.
     fn add_carried(&mut self, layer: &Layer, vertex: u32, position_m: DVec3) {
         let first = self.terms.len();
         let distance = |slot: usize| self.rest_m(slot).distance(position_m);
@@ -212,7 +219,8 @@ fn places(voxels: &Voxels, slot_at: &[u32], holds: impl Fn(usize) -> Holds) -> V
     (0..voxels.count()).map(place).collect()
 }
 
-/// Nearest by distance between centres; of two as near the one with the lower number.
+/// Returns the interface voxel nearest to each voxel, by the distance between centres; of two as near it is the one
+/// with the lower number.
 fn nearest_interface(voxels: &Voxels, places: &[Place]) -> Vec<u32> {
     let interface: Vec<(u32, [i32; 3])> = (0..places.len())
         .filter(|&voxel| places[voxel] == Place::Interface)

@@ -3,12 +3,13 @@
 //! ```text
 //! f at t        from the last step: what tools, loads and injections do to the surface's vertices, and the triangle that tools touch
 //! step          region of that triangle, forces, motion, exchange, surface (`seed::step`)
-//! f at t + dt   tools follow, contact is looked at anew
+//! f at t + dt   tools follow, contact is evaluated anew
 //! ```
-//! Which triangle is touched: the one nearest to the centre of the tool that is pressed hardest, as long as samples of the surface are
-//! inside it. Without tools it stays what it is set to.
+//! The touched triangle is the one nearest to the centre of the tool that is pressed hardest, while samples of the
+//! surface are inside that tool. Without tools it stays what it is set to.
 //!
-//! Ledger: forces work along what their vertices went. What the scheme, viscosity and exchange take is not known.
+//! Ledger: forces work along the displacement of their vertices. What the scheme, viscosity and exchange dissipate is
+//! not known.
 use super::{AtVertex, SeedBody, SeedBodyState, SeedContact, SeedModel, SeedScratch};
 use crate::{
     contact::ContactScratch,
@@ -24,7 +25,7 @@ pub(crate) struct SteppedSeed<'a> {
     pub(crate) scratch: &'a mut SeedBodyScratch,
 }
 
-/// Buffers, sized once.
+/// Buffers, which are allocated once.
 #[derive(Debug, Clone)]
 pub(crate) struct SeedBodyScratch {
     step: SeedScratch,
@@ -35,7 +36,7 @@ pub(crate) struct SeedBodyScratch {
 }
 
 impl SeedBodyScratch {
-    /// For a model.
+    /// Returns buffers for a model.
     pub(crate) fn new(seed: &SeedModel) -> Self {
         Self {
             step: SeedScratch::new(seed),
@@ -46,7 +47,7 @@ impl SeedBodyScratch {
 }
 
 impl SteppedSeed<'_> {
-    /// All steps of a tick.
+    /// Takes all steps of a tick.
     pub(crate) fn run(&mut self, tick: &Tick<'_>, state: &mut MechanicalState, contact: &mut ContactScratch) {
         if !state.force_is_current {
             state.contact.forget_untracked_geometry();
@@ -60,7 +61,7 @@ impl SteppedSeed<'_> {
         }
     }
 
-    /// What tools, loads and injections do to nodes; its steps make the other forces.
+    /// Computes the forces of tools, loads and injections on nodes. The other forces are computed in the steps.
     pub(crate) fn evaluate(
         &mut self,
         tick: &Tick<'_>,
@@ -77,7 +78,8 @@ impl SteppedSeed<'_> {
         }
     }
 
-    /// One step. Returns a bound (m/s) of how fast any node came to where it is: of what is put there, too.
+    /// Takes one step. Returns an upper bound (m/s) of the speed with which any node came to where it is, including
+    /// nodes that are put there.
     fn advance(&mut self, tick: &Tick<'_>, state: &mut MechanicalState) -> f64 {
         let Self { body, own, scratch } = self;
         let MechanicalState { x, v, force_n, external_n, ledger, .. } = state;
@@ -107,18 +109,18 @@ impl SteppedSeed<'_> {
         farthest_sq.sqrt() / tick.dt_s()
     }
 
-    /// The force (N) that holds a node: what the other forces lack.
+    /// Returns the force (N) that holds a node, which balances the other forces.
     pub(crate) fn reaction_n(&self, node: usize, state: &MechanicalState) -> DVec3 {
         let held = self.body.inverse_mass_per_kg()[node].cmpeq(DVec3::ZERO);
         DVec3::select(held, -state.force_n[node], DVec3::ZERO)
     }
 
-    /// Keeps the state before a tick, for a quarantine to go back to.
+    /// Keeps the state before a tick, to which a quarantine goes back.
     pub(crate) fn keep_last_good(&mut self) {
         self.scratch.last_good.copy_from(self.own);
     }
 
-    /// Goes back to it, at rest.
+    /// Goes back to the state that was kept, without velocities.
     pub(crate) fn stop_at_last_good(&mut self) {
         self.own.copy_from(&self.scratch.last_good);
         self.own.stop();

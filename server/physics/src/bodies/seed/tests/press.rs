@@ -8,7 +8,7 @@ use crate::{
 };
 use glam::DVec3;
 
-/// Table 1 of 2006, a corner of the layer pressed to 3 of its 10 mm in 500 steps.
+/// With table 1 of 2006 a triangle of the skin is pressed to 3 of the layer's 10 mm in 500 steps.
 #[test]
 fn a_press_stays_finite_and_pushes_back_the_more_the_deeper() {
     let model = ball();
@@ -48,7 +48,8 @@ fn twice_the_constants_push_twice_as_hard() {
     }
 }
 
-/// The printed interface force does nothing while nobody leaves a voxel, and then drives them out, however short the step.
+/// The printed interface force does nothing while nobody leaves a voxel, and then drives them out, however short the
+/// step.
 #[test]
 fn the_printed_interface_force_pumps_energy() {
     for (dt_s, steps) in [(7e-3, 500), (1e-3, 3500)] {
@@ -114,7 +115,8 @@ fn as_printed_all_three_repairs_are_out() {
     assert!(burst.is_err());
 }
 
-/// "To obtain a more global motion of the object surface when no particles are activated": the links bring the skin home.
+/// "To obtain a more global motion of the object surface when no particles are activated": the links bring the skin
+/// back to rest.
 #[test]
 fn a_surface_that_is_let_go_comes_back() {
     let model = ball();
@@ -127,7 +129,7 @@ fn a_surface_that_is_let_go_comes_back() {
     let stretched = |state: &SeedState| {
         let links = model.links().unwrap();
         let stretch = |(vertex, x): (usize, &DVec3)| {
-            x.distance(links.attachment_m(vertex, &state.core.x) + links.offset_m[vertex])
+            x.distance(links.at_attachment(vertex, &state.core.x) + links.offset_m[vertex])
         };
         state.skin.x.iter().enumerate().map(stretch).fold(0.0, f64::max)
     };
@@ -147,7 +149,7 @@ fn a_surface_that_is_let_go_comes_back() {
     assert!(start > 0.5e-3 && stretched(&state) < 0.03 * start);
 }
 
-/// From triangle to neighbouring triangle, each pressed by a millimetre and let go: 200 touches in 70 s.
+/// One triangle after its neighbour is pressed by a millimetre and let go: 200 touches in 70 s.
 #[test]
 fn a_touch_that_walks_over_the_surface_stays_finite() {
     let model = ball();

@@ -1,9 +1,9 @@
-//! Which particles are awake, and their interface.
+//! Tests of which particles are awake, and of the interface of their region.
 use super::{TOUCHED, ball, ball_with, press, touched};
 use crate::bodies::seed::{InterfaceForce, SeedContact, SeedScratch, SeedState, region::Place};
 use glam::DVec3;
 
-/// Whether the ray from `from` through `point` meets a triangle (Möller & Trumbore).
+/// Returns whether the ray from `from` through `point` meets a triangle (Möller & Trumbore).
 fn ray_meets(from: DVec3, point: DVec3, [a, b, c]: [DVec3; 3]) -> bool {
     let (along, ab, ac) = (point - from, b - a, c - a);
     let p = along.cross(ac);
