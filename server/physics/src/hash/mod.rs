@@ -5,10 +5,10 @@ pub use chain::Chain;
 
 use std::fmt::Write;
 
-/// What the hash of nothing is.
+/// The hash of no bytes.
 pub(crate) const OFFSET: u64 = 0xcbf2_9ce4_8422_2325;
 
-/// Goes on with a hash.
+/// Returns the hash `start` continued by more bytes.
 pub(crate) fn fnv(start: u64, bytes: impl Iterator<Item = u8>) -> u64 {
     bytes.fold(start, |hash, byte| (hash ^ u64::from(byte)).wrapping_mul(0x0000_0100_0000_01b3))
 }
@@ -23,8 +23,8 @@ impl Write for Fnv {
     }
 }
 
-/// Writes what `Debug` prints into a hash, each renamed field under its first name, so that snapshots taken before stay good.
-/// A field's name is a piece of text by itself.
+/// Writes what `Debug` prints into a hash, each renamed field under its first name, so that snapshots taken before stay
+/// good. A field's name is a piece of text by itself.
 pub(crate) struct FirstNames<'a>(pub(crate) &'a mut Fnv);
 
 /// A field's name and the one that it had at first.
