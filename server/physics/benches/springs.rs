@@ -1,4 +1,5 @@
-//! A flat sheet of some 10 000 triangles on springs, all awake: forces of the coarse springs, and steps with two rings refined: `cargo bench -p palpate-physics --bench springs`.
+//! A flat sheet of some 10 000 triangles on springs, all awake: forces of the coarse springs, and steps with two rings
+//! refined: `cargo bench -p palpate-physics --bench springs`.
 #![allow(missing_docs)] // criterion's macros
 #![allow(clippy::unwrap_used)] // helpers of a benchmark
 use criterion::{Criterion, criterion_group, criterion_main};

@@ -1,4 +1,5 @@
-//! Capsules on bodies that are fine near tools only: hybrid bodies, whose particles wake there, and surfaces of springs, which are refined there.
+//! Capsules on bodies that are fine near tools only: hybrid bodies, whose particles wake there, and surfaces of
+//! springs, which are refined there.
 #![allow(clippy::unwrap_used)]
 mod rig;
 use glam::{DQuat, DVec3};
@@ -159,7 +160,8 @@ fn particles_wake_beneath_the_middle_of_a_capsule_between_two_places() {
     assert_eq!(asleep_in_contact, 0);
 }
 
-/// With room for a part of its balls a lying capsule has what is nearest to it awake, no less between two places than beneath one.
+/// With room for a part of its balls a lying capsule has what is nearest to it awake, no less between two places than
+/// beneath one.
 #[test]
 fn particles_wake_as_deep_between_two_places_as_beneath_one() {
     let mut rig = Rig::new(block(150, Waking::ByTools { reach_m: 2.0 * HALF_M }));
@@ -182,7 +184,8 @@ fn particles_wake_as_deep_between_two_places_as_beneath_one() {
     }
 }
 
-/// An upright capsule, thin beside the skin's triangles, comes down at several places of them: nothing stays asleep beneath what it presses.
+/// An upright capsule, thin beside the skin's triangles, comes down at several places of them: nothing stays asleep
+/// beneath what it presses.
 #[test]
 fn particles_wake_beneath_a_tip_that_touches_far_from_all_vertices() {
     for at_m in [DVec3::ZERO, DVec3::X, DVec3::new(1.0, 1.0, 0.0), DVec3::new(1.2, 0.7, 0.0)] {
@@ -253,7 +256,8 @@ fn rubbing(tick: u32, first: ToolTarget) -> ToolTarget {
     }
 }
 
-/// Contact goes on with what it knew of the skin where particles wake beneath a capsule that rubs and turns; a restored run goes on as it was.
+/// Contact goes on with what it knew of the skin where particles wake beneath a capsule that rubs and turns; a restored
+/// run goes on as it was.
 #[test]
 fn the_broad_phase_changes_no_bit_and_a_restored_run_goes_on_as_it_was() {
     let start = |distant_contact: bool| {
@@ -356,7 +360,8 @@ fn a_surface_of_springs_is_refined_all_along_a_lying_capsule_and_coarse_again_wh
     }
 }
 
-/// Pressing, dragging and turning across many regions, and leaving: the error of the books is leapfrog's, of second order in the step.
+/// Pressing, dragging and turning across many regions, and leaving: the error of the books is leapfrog's, of second
+/// order in the step.
 #[test]
 fn the_ledger_closes_while_a_capsule_is_dragged_and_turned() {
     let by_tools = Refinement { rings: 2, follows_dent: false, blend_s: 0.1, by: Refining::ByTools };

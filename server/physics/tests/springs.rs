@@ -113,7 +113,8 @@ fn deeper_dents_have_more_rings() {
     assert_eq!(counts, [12, 42, 90, 12]);
 }
 
-/// Pressing, dragging across many regions, and leaving: all energy is accounted for, but for what leapfrog's step leaves, which is of second order in it.
+/// Pressing, dragging across many regions, and leaving: all energy is accounted for, but for what leapfrog's step
+/// leaves, which is of second order in it.
 #[test]
 fn the_ledger_closes_while_a_tool_is_dragged_across() {
     let off = |substeps: u32| {
@@ -141,7 +142,8 @@ fn the_ledger_closes_while_a_tool_is_dragged_across() {
     assert!(half < 1e-3 && half < 0.4 * long, "{long} {half}");
 }
 
-/// Refined and coarse again beneath a tool that stands still: no tick changes its force by 1 %, and coarse again the force is what it was.
+/// Refined and coarse again beneath a tool that stands still: no tick changes its force by 1 %, and coarse again the
+/// force is what it was.
 #[test]
 fn the_force_does_not_step_when_the_surface_is_refined() {
     for centre in [0, 1, 7] {
@@ -167,7 +169,8 @@ fn the_force_does_not_step_when_the_surface_is_refined() {
     }
 }
 
-/// Constants from a table calibrated for this sheet, and a sphere that touches little but one vertex: refined and coarse again, at several depths, the force does not step, and is nearly the same.
+/// Constants from a table calibrated for this sheet, and a sphere that touches little but one vertex: refined and
+/// coarse again, at several depths, the force does not step, and is nearly the same.
 #[test]
 fn with_a_calibrated_table_a_point_feels_alike_on_both() {
     for depth_m in [0.4e-3, 0.8e-3, 1.2e-3] {
@@ -274,7 +277,8 @@ fn damaged_and_foreign_snapshots_are_refused() {
     assert_eq!(snapshot::restore(&rig.model, &bytes), Err(snapshot::SnapshotError::OtherBody));
 }
 
-/// Where fewer may be awake than there are, those about the tool are, and the force is that of all of them awake; when it has left, all fall asleep at home.
+/// Where fewer may be awake than there are, those about the tool are, and the force is that of all of them awake; when
+/// it has left, all fall asleep at their rest positions.
 #[test]
 fn far_vertices_sleep() {
     let run = |most_awake: usize| {
@@ -345,9 +349,9 @@ fn loads_and_weight_come_to_rest_in_balance() {
     assert!((total + held).length() < 1e-7, "{total} {held}");
     // The plain springs, settled by Newton's method.
     let body = rig.model.body().as_mass_spring().unwrap().model();
-    // At home: Loop's scheme smooths the boundary.
-    let homes = body.rest_m()[..body.vertices() as usize].to_vec();
-    let net = Net::uniform(&body.surface().moved(homes).unwrap(), COARSE.mesh_n_per_m, COARSE.anchor_n_per_m);
+    // At the rest positions: Loop's scheme smooths the boundary.
+    let rest_m = body.rest_m()[..body.vertices() as usize].to_vec();
+    let net = Net::uniform(&body.surface().moved(rest_m).unwrap(), COARSE.mesh_n_per_m, COARSE.anchor_n_per_m);
     let is_held: Vec<bool> = (0..body.vertices()).map(|vertex| body.is_held(vertex)).collect();
     let mut external_n: Vec<DVec3> = body.spec().mass_kg.iter().map(|mass| DVec3::Z * (-9.81 * mass)).collect();
     external_n[0] += DVec3::new(4e-3, 0.0, -0.01);

@@ -106,7 +106,7 @@ fn there_is_room_for_what_tools_refine() {
 fn constants_follow_from_a_skin_on_a_foundation() {
     let skin = "young_modulus_pa = 50e3\nthickness_mm = 1.5\nfoundation_pa_per_m = 2e6";
     let text = BOX
-        .replace("mesh_n_per_m = 60\nhome_n_per_m = 12", skin)
+        .replace("mesh_n_per_m = 60\nanchor_n_per_m = 12", skin)
         .replace("vertex_mass_kg = 2e-4", "area_density_kg_per_m2 = 3");
     let springs = springs(&text).springs;
     assert!((springs.coarse.mesh_n_per_m - 0.75_f64.sqrt() * 75.0).abs() < 1e-9);
@@ -137,12 +137,13 @@ fn first_names_of_keys_give_the_same_model() {
         assert_eq!(springs(&first), springs(&text));
     }
     let both = [
-        ("anchor_n_per_m = 12", "anchor_n_per_m = 12\nhome_n_per_m = 12", "body.springs", "anchor_n_per_m"),
-        ("rings = 2", "rings = 2\nblend_s = 0.1\nfade_s = 0.1", "body.springs.refine", "blend_s"),
+        ("anchor_n_per_m = 12", "anchor_n_per_m = 12\nhome_n_per_m = 12", "anchor_n_per_m"),
+        ("rings = 2", "rings = 2\nblend_s = 0.1\nfade_s = 0.1", "blend_s"),
     ];
-    for (from, to, table, key) in both {
+    for (from, to, key) in both {
         let message = refused(from, to);
-        assert!(message.contains(table) && message.contains(&format!("duplicate field `{key}`")), "{message}");
+        assert!(message.contains(&format!("`{key}` is given twice, once by an earlier name of the key")), "{message}");
+        println!("{message}");
     }
 }
 
@@ -168,7 +169,7 @@ fn bad_springs_are_told_with_their_key() {
             "must hold the region of each tool, 24 triangles",
         ),
         ("damping_n_s_per_m = 0.01", "damping_n_s_per_m = -1", "must be finite and not negative"),
-        ("constants = \"area\"", "constants = \"area\"\nfade_s = 0", "blend_s = 0"),
+        ("constants = \"area\"", "constants = \"area\"\nblend_s = 0", "blend_s = 0"),
         ("vertex_mass_kg", "anchor_cubic_per_m2 = -1\nvertex_mass_kg", "per_m2 = -1"),
         (
             "[[probe]]\nname = \"middle\"",

@@ -89,7 +89,7 @@ mod tests {
     #[test]
     fn viewers_see_the_surface_of_the_model() {
         let text = "[scene]\nname = \"t\"\n[body.sphere_shell]\ninner_radius_mm = 30\nouter_radius_mm = 40\ntarget_tets = 3000\n\
-            [body.springs]\npart = \"outer\"\nmesh_n_per_m = 60\nhome_n_per_m = 12\nvertex_mass_kg = 2e-4\ndamping_n_s_per_m = 0.02\nmost_awake = 150\n\
+            [body.springs]\npart = \"outer\"\nmesh_n_per_m = 60\nanchor_n_per_m = 12\nvertex_mass_kg = 2e-4\ndamping_n_s_per_m = 0.02\nmost_awake = 150\n\
             [body.springs.refine]\nrings = 2\nconstants = \"area\"\n\
             [[tool]]\nname = \"tip\"\nradius_mm = 5\ncoupling = \"rigid\"\ndriver = \"device\"\nstart_m = [0, 0, 0.05]\n";
         let scene = parse(text, "t", None, &Limits::local(), &mut |_, _| ()).unwrap();

@@ -91,7 +91,8 @@ pub(super) fn demand_alone(document: &Document) -> Result<(), Fault> {
     Ok(())
 }
 
-/// Makes the body's surface, or a part of it, the coarse surface of springs. Nodes are its vertices then, tools and loads act on the surface refined everywhere.
+/// Makes the body's surface, or a part of it, the coarse surface of springs. Nodes are its vertices then, tools and
+/// loads act on the surface refined everywhere.
 pub(super) fn put_on(body: &mut Body, table: &SpringsTable) -> Result<(), Fault> {
     let chosen: Vec<u32> = match &table.part {
         None => (0..body.surface.triangles.len() as u32).collect(),

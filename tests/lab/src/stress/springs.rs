@@ -1,4 +1,5 @@
-//! Random mass-spring surfaces beneath tools that press, drag, jump and leave: stiff and soft, of uneven masses, refined in any way, most of them asleep or none.
+//! Random mass-spring surfaces beneath tools that press, drag, jump and leave: stiff and soft, of uneven masses,
+//! refined in any way, most of them asleep or none.
 use super::{
     Measured, Options, Outcome,
     random::Random,

@@ -21,7 +21,8 @@ pub struct Options {
     out: PathBuf,
 }
 
-/// Computes figures 5 to 11 at all three `K_m/K_h`, figure 12, and sheets beneath tools; writes them and says what they say.
+/// Computes figures 5 to 11 at all three `K_m/K_h`, figure 12, and sheets beneath tools; writes them and says what they
+/// say.
 ///
 /// # Errors
 /// A file that cannot be written, or springs that come to no rest.

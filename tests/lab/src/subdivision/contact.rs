@@ -1,6 +1,8 @@
-//! Coarse sheets and sheets refined where they are touched, in the loop, against one that is fine everywhere: force and shape over time, and what a tick costs.
+//! Coarse sheets and sheets refined where they are touched, in the loop, against one that is fine everywhere: force and
+//! shape over time, and what a tick costs.
 //!
-//! The fine sheet is the coarse one refined everywhere, on the same foundation per area ([`matching::area_consistent`]), with the same mass per area. A sphere presses, rests, is drawn along, and leaves.
+//! The fine sheet is the coarse one refined everywhere, on the same foundation per area
+//! ([`matching::area_consistent`]), with the same mass per area. A sphere presses, rests, is drawn along, and leaves.
 use glam::DVec3;
 use palpate_physics::{
     BodySpec, Model, ModelError, ModelSpec, PrescribedSpec, Scratch, Settings, State, TickInput,
@@ -228,7 +230,8 @@ impl Sheet {
 mod tests {
     use super::*;
 
-    /// Beneath a tool that touches many vertices, refined on the same foundation per area, force and shape are nearer to the fine sheet's than coarse; beneath any tool constants unchanged are too stiff.
+    /// Beneath a tool that touches many vertices, refined on the same foundation per area, force and shape are nearer
+    /// to the fine sheet's than coarse; beneath any tool constants unchanged are too stiff.
     #[test]
     fn refined_on_the_same_foundation_is_nearer_to_the_fine_sheet() {
         let area = TOUCHES[2];

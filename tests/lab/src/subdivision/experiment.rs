@@ -1,8 +1,10 @@
-//! A flat sheet of equilateral triangles, one vertex pulled out of it: the force before, and the constants with which it is the same once one ring or two about the vertex are refined.
+//! A flat sheet of equilateral triangles, one vertex pulled out of it: the force before, and the constants with which
+//! it is the same once one ring or two about the vertex are refined.
 //!
-//! The paper leaves open how large the sheet is, how its edge is held, whether the others move in the plane, and whose constants rim and cracks have. Here: eight rings for
-//! one refined ring and six for two; a free edge; every vertex but the pulled one at rest in three dimensions; all nodes of the refined area, and all springs that touch its
-//! inside, its rim or close its cracks, have the new constants; rest lengths are those of the flat sheet.
+//! The paper leaves open how large the sheet is, how its edge is held, whether the others move in the plane, and whose
+//! constants rim and cracks have. Here: eight rings for one refined ring and six for two; a free edge; every vertex but
+//! the pulled one at rest in three dimensions; all nodes of the refined area, and all springs that touch its inside,
+//! its rim or close its cracks, have the new constants; rest lengths are those of the flat sheet.
 use glam::DVec3;
 use miette::{IntoDiagnostic, Result};
 use palpate_physics::bodies::mass_spring::{
@@ -189,7 +191,8 @@ mod tests {
             let (anchors, meshes) = (curves(&figures, anchors), curves(&figures, meshes));
             // "All the plots start from a ratio of K'_h/K_h close to 1."
             assert!(anchors.iter().all(|curve| (curve[0] - 1.0).abs() < 0.03), "{anchors:?}");
-            // "When K'_h has a ratio of 4 over K'_m, the plot shows the least variation"; "the K'_h = 0.25 K'_m plot shows the largest".
+            // "When K'_h has a ratio of 4 over K'_m, the plot shows the least variation"; "the K'_h = 0.25 K'_m plot
+            // shows the largest".
             let ranges: Vec<f64> = anchors.iter().map(|curve| range(curve)).collect();
             assert!(ranges[0] > ranges[1] && ranges[0] > ranges[2], "{ranges:?}");
             // "Actually they are the same plot drawn in different ordinates."

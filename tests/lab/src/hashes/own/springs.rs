@@ -20,7 +20,7 @@ const AREA: &str = "[body.springs.refine]\nrings = 2\nconstants = \"area\"\n";
 fn ball(springs: &str, refine: &str, more: &str) -> String {
     format!(
         "[scene]\nname = \"own\"\n[body.sphere_shell]\ninner_radius_mm = 16\nouter_radius_mm = 20\ntarget_tets = 600\n\
-        [body.springs]\npart = \"outer\"\nmesh_n_per_m = 60\nhome_n_per_m = 12\narea_density_kg_per_m2 = 15\n{springs}{refine}\
+        [body.springs]\npart = \"outer\"\nmesh_n_per_m = 60\nanchor_n_per_m = 12\narea_density_kg_per_m2 = 15\n{springs}{refine}\
         [[region]]\nname = \"lower\"\nselect = {{ half_space = {{ point_mm = [0, 0, -5], normal = [0, 0, -1] }} }}\n\
         [[fixed]]\nregion = \"lower\"\n\
         [[tool]]\nname = \"sphere\"\nradius_mm = 5\nfriction_coefficient = 0.3\ndriver = \"device\"\nstart_mm = [0, 0, 32]\n{more}"
@@ -55,7 +55,7 @@ pub(super) fn cases() -> Vec<Case> {
         case("springs/capsule", ball(DAMPED, &format!("{AREA}most_triangles = 120\n"), &capsule)),
         case(
             "springs/follows-dent",
-            ball(DAMPED, &AREA.replace("rings = 2", "rings = 4\nfollows_dent = true\nfade_s = 0.05"), RIGID),
+            ball(DAMPED, &AREA.replace("rings = 2", "rings = 4\nfollows_dent = true\nblend_s = 0.05"), RIGID),
         ),
         case(
             "springs/loaded",
