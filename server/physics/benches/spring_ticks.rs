@@ -7,7 +7,7 @@ use glam::DVec3;
 use palpate_physics::{
     BodySpec, ModelSpec, Settings,
     bodies::mass_spring::{
-        HomeLaw, MassSpringSpec, Refinement, Refining, SpringSpec, body::triangles_about, net::hexagonal_patch,
+        AnchorLaw, MassSpringSpec, Refinement, Refining, SpringSpec, body::triangles_about, net::hexagonal_patch,
         region::Constants,
     },
     contact::{Coupling, ToolShape, ToolSpec, ToolTarget},
@@ -21,9 +21,9 @@ fn sheet(rings: i32, most_awake: usize, shape: ToolShape) -> ModelSpec {
     let surface = hexagonal_patch(rings, EDGE_M).unwrap();
     let vertices = surface.positions_m().len();
     let springs = SpringSpec {
-        coarse: Constants { mesh_n_per_m: 60.0, home_n_per_m: 6.0 },
-        fine: Constants { mesh_n_per_m: 36.0, home_n_per_m: 3.1 },
-        home_law: HomeLaw::Linear,
+        coarse: Constants { mesh_n_per_m: 60.0, anchor_n_per_m: 6.0 },
+        fine: Constants { mesh_n_per_m: 36.0, anchor_n_per_m: 3.1 },
+        anchor_law: AnchorLaw::Linear,
         mass_kg: vec![1e-3; vertices],
         held: Vec::new(),
         most_awake: most_awake.min(vertices),
@@ -33,7 +33,7 @@ fn sheet(rings: i32, most_awake: usize, shape: ToolShape) -> ModelSpec {
     ModelSpec {
         body: BodySpec::MassSpring(MassSpringSpec {
             springs,
-            refinement: Some(Refinement { rings: 2, follows_dent: false, fade_s: 0.1, by: Refining::ByTools }),
+            refinement: Some(Refinement { rings: 2, follows_dent: false, blend_s: 0.1, by: Refining::ByTools }),
             table: None,
         }),
         prescribed: Vec::new(),

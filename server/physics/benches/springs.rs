@@ -1,12 +1,13 @@
-//! A flat sheet of some 10 000 triangles on springs, all awake: forces of the coarse springs, and steps with two rings refined: `cargo bench -p palpate-physics --bench springs`.
+//! A flat sheet of some 10 000 triangles on springs, all awake: forces of the coarse springs, and steps with two rings
+//! refined: `cargo bench -p palpate-physics --bench springs`.
 #![allow(missing_docs)] // criterion's macros
 #![allow(clippy::unwrap_used)] // helpers of a benchmark
 use criterion::{Criterion, criterion_group, criterion_main};
 use glam::DVec3;
 use palpate_physics::{
     bodies::mass_spring::{
-        HalfSpring, HomeLaw, Net, Region, SpringModel, SpringMotion, SpringRows, SpringScratch, SpringSpec, Wanted,
-        net::hexagonal_patch, region::Constants,
+        AnchorLaw, AwakeNodes, HalfSpring, Net, Region, SpringModel, SpringMotion, SpringRows, SpringScratch,
+        SpringSpec, Wanted, net::hexagonal_patch, region::Constants,
     },
     lanes::InstructionSet,
 };
@@ -38,11 +39,11 @@ fn forces(criterion: &mut Criterion) {
 /// A step: levels and nodes as wanted, forces, kick and drift.
 fn steps(criterion: &mut Criterion) {
     let surface = hexagonal_patch(41, 0.002).unwrap();
-    let coarse = Constants { mesh_n_per_m: 60.0, home_n_per_m: 6.0 };
+    let coarse = Constants { mesh_n_per_m: 60.0, anchor_n_per_m: 6.0 };
     let spec = SpringSpec {
         coarse,
-        fine: Constants { mesh_n_per_m: 42.0, home_n_per_m: 4.2 },
-        home_law: HomeLaw::Linear,
+        fine: Constants { mesh_n_per_m: 42.0, anchor_n_per_m: 4.2 },
+        anchor_law: AnchorLaw::Linear,
         mass_kg: vec![1e-3; surface.positions_m().len()],
         held: vec![],
         most_awake: surface.positions_m().len() + 500,
@@ -61,7 +62,7 @@ fn steps(criterion: &mut Criterion) {
     println!("largest frequency at most {:.0} rad/s", model.frequency_rad_per_s());
     let mut step = |wanted: &[u32], level_step: f64| {
         let wanted = Wanted { refined: wanted, step: level_step, fine: model.spec().fine, awake: &awake };
-        scratch.go_on(&model, &mut motion, (&mut x, &mut v), &wanted);
+        scratch.advance(&model, &mut motion, AwakeNodes { x_m: &mut x, v_m_per_s: &mut v }, &wanted);
         forces.clear();
         forces.resize(x.len(), DVec3::ZERO);
         scratch.add_forces_n(&model, &motion, &x, &mut forces);

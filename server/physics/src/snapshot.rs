@@ -1,4 +1,4 @@
-//! Save, restore, hash: the whole dynamic state as bytes.
+//! Snapshots, which are the whole dynamic state as bytes, and a hash of the state.
 //!
 //! Layout (little-endian): `PLPS`, version (u32), fingerprint of the body (u64), checksum of what follows (u64), state
 //! (postcard). A state goes back only into the body it came from: same mesh, materials, loads, tools and settings.
@@ -11,30 +11,30 @@ use thiserror::Error;
 
 const MAGIC: [u8; 4] = *b"PLPS";
 const HEADER: usize = 24;
-/// Version of the layout; another one is refused.
+/// Version of the layout; snapshots of other versions are refused.
 pub const VERSION: u32 = 14;
 
 /// Why bytes are not a state of a body.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
 pub enum SnapshotError {
-    /// Not a snapshot at all.
+    /// The bytes are no snapshot.
     #[error("these {bytes} bytes are no snapshot: they do not begin as one")]
     NoSnapshot {
         /// Their number.
         bytes: usize,
     },
-    /// Another version.
+    /// The snapshot has another version.
     #[error("the snapshot has version {found}, this program reads version {VERSION}")]
     Version {
-        /// Version found.
+        /// Version that was found.
         found: u32,
     },
-    /// Of another body.
+    /// The snapshot belongs to another body.
     #[error(
         "the snapshot belongs to another body: mesh, materials, loads, tools or settings differ from the loaded scene's"
     )]
     OtherBody,
-    /// Damaged.
+    /// The snapshot is damaged.
     #[error("the snapshot is damaged: {what}")]
     Damaged {
         /// What is wrong.
@@ -42,7 +42,7 @@ pub enum SnapshotError {
     },
 }
 
-/// The state as bytes.
+/// Returns a state as bytes.
 pub fn save(model: &Model, state: &State) -> Vec<u8> {
     let mut bytes = Vec::with_capacity(HEADER + state.mechanical.x.len() * 96);
     bytes.extend_from_slice(&MAGIC);
@@ -58,10 +58,10 @@ pub fn save(model: &Model, state: &State) -> Vec<u8> {
     bytes
 }
 
-/// The state that [`save`] wrote.
+/// Returns the state that [`save`] wrote.
 ///
 /// # Errors
-/// [`SnapshotError`]; whatever the bytes, nothing else happens.
+/// [`SnapshotError`]. Nothing else happens, whatever the bytes are.
 pub fn restore(model: &Model, bytes: &[u8]) -> Result<State, SnapshotError> {
     let (header, body) = bytes.split_at_checked(HEADER).ok_or(SnapshotError::NoSnapshot { bytes: bytes.len() })?;
     if header[..4] != MAGIC {
@@ -114,7 +114,8 @@ fn word(header: &[u8], at: usize) -> u64 {
     u64::from_le_bytes(bytes)
 }
 
-/// Hash of what makes a body and its environment: rest positions, and everything else it was built from, as it prints.
+/// Returns a hash of what makes a body and its environment: the rest positions, and everything else that it was built
+/// from, as it prints.
 fn fingerprint(model: &Model) -> u64 {
     let positions =
         model.rest_positions_m().iter().flat_map(glam::DVec3::to_array).flat_map(|c| c.to_bits().to_le_bytes());
@@ -126,7 +127,8 @@ fn fingerprint(model: &Model) -> u64 {
     hash.0
 }
 
-/// FNV-1a over the bits of tick, positions and velocities, a seed body's particles included: equal states give equal hashes on every machine.
+/// Returns the FNV-1a hash of the bits of tick, positions and velocities, including a seed body's particles. Equal
+/// states give equal hashes on every machine.
 pub fn state_hash(state: &State) -> u64 {
     let State { mechanical, body, .. } = state;
     let components = mechanical.x.iter().chain(&mechanical.v).chain(body.vectors()).flat_map(glam::DVec3::to_array);

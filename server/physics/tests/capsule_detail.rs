@@ -1,4 +1,5 @@
-//! Capsules on bodies that are fine near tools only: hybrid bodies, whose particles wake there, and surfaces of springs, which are refined there.
+//! Capsules on bodies that are fine near tools only: hybrid bodies, whose particles wake there, and surfaces of
+//! springs, which are refined there.
 #![allow(clippy::unwrap_used)]
 mod rig;
 use glam::{DQuat, DVec3};
@@ -7,7 +8,7 @@ use palpate_physics::{
     bodies::{
         hybrid::Waking,
         mass_spring::{
-            HomeLaw, MassSpringSpec, Refinement, Refining, SpringSpec, body::triangles_about, net::hexagonal_patch,
+            AnchorLaw, MassSpringSpec, Refinement, Refining, SpringSpec, body::triangles_about, net::hexagonal_patch,
             region::Constants,
         },
     },
@@ -159,7 +160,8 @@ fn particles_wake_beneath_the_middle_of_a_capsule_between_two_places() {
     assert_eq!(asleep_in_contact, 0);
 }
 
-/// With room for a part of its balls a lying capsule has what is nearest to it awake, no less between two places than beneath one.
+/// With room for a part of its balls a lying capsule has what is nearest to it awake, no less between two places than
+/// beneath one.
 #[test]
 fn particles_wake_as_deep_between_two_places_as_beneath_one() {
     let mut rig = Rig::new(block(150, Waking::ByTools { reach_m: 2.0 * HALF_M }));
@@ -182,7 +184,8 @@ fn particles_wake_as_deep_between_two_places_as_beneath_one() {
     }
 }
 
-/// An upright capsule, thin beside the skin's triangles, comes down at several places of them: nothing stays asleep beneath what it presses.
+/// An upright capsule, thin beside the skin's triangles, comes down at several places of them: nothing stays asleep
+/// beneath what it presses.
 #[test]
 fn particles_wake_beneath_a_tip_that_touches_far_from_all_vertices() {
     for at_m in [DVec3::ZERO, DVec3::X, DVec3::new(1.0, 1.0, 0.0), DVec3::new(1.2, 0.7, 0.0)] {
@@ -253,7 +256,8 @@ fn rubbing(tick: u32, first: ToolTarget) -> ToolTarget {
     }
 }
 
-/// Contact goes on with what it knew of the skin where particles wake beneath a capsule that rubs and turns; a restored run goes on as it was.
+/// Contact goes on with what it knew of the skin where particles wake beneath a capsule that rubs and turns; a restored
+/// run goes on as it was.
 #[test]
 fn the_broad_phase_changes_no_bit_and_a_restored_run_goes_on_as_it_was() {
     let start = |distant_contact: bool| {
@@ -289,19 +293,19 @@ fn the_broad_phase_changes_no_bit_and_a_restored_run_goes_on_as_it_was() {
 
 const EDGE_M: f64 = 4e-3;
 
-/// A flat sheet of springs whose border is held, and a capsule of 3 mm that lies above its middle.
+/// A flat sheet of springs whose boundary is held, and a capsule of 3 mm that lies above its middle.
 fn sheet(rings: i32, refinement: Option<Refinement>, along: DVec3) -> ModelSpec {
     let surface = hexagonal_patch(rings, EDGE_M).unwrap();
     let vertices = surface.positions_m().len();
-    let border: Vec<u32> = (0..vertices as u32).filter(|&vertex| surface.is_border(vertex)).collect();
+    let boundary: Vec<u32> = (0..vertices as u32).filter(|&vertex| surface.is_boundary(vertex)).collect();
     let radius_m = 3e-3;
     let shape = ToolShape::capsule(Coupling::Rigid, radius_m, HALF_M, along);
     ModelSpec {
         body: BodySpec::MassSpring(MassSpringSpec {
             springs: SpringSpec {
-                coarse: Constants { mesh_n_per_m: 60.0, home_n_per_m: 12.0 },
-                fine: Constants { mesh_n_per_m: 36.0, home_n_per_m: 6.2 },
-                home_law: HomeLaw::Linear,
+                coarse: Constants { mesh_n_per_m: 60.0, anchor_n_per_m: 12.0 },
+                fine: Constants { mesh_n_per_m: 36.0, anchor_n_per_m: 6.2 },
+                anchor_law: AnchorLaw::Linear,
                 mass_kg: vec![2e-4; vertices],
                 held: Vec::new(),
                 most_awake: vertices,
@@ -312,7 +316,7 @@ fn sheet(rings: i32, refinement: Option<Refinement>, along: DVec3) -> ModelSpec 
             refinement,
             table: None,
         }),
-        prescribed: vec![PrescribedSpec { name: "border".into(), nodes: border, axes: [true; 3] }],
+        prescribed: vec![PrescribedSpec { name: "boundary".into(), nodes: boundary, axes: [true; 3] }],
         loads: Vec::<LoadSpec>::new(),
         gravity_m_per_s2: DVec3::ZERO,
         tools: vec![ToolSpec { shape, ..sphere(radius_m, DVec3::Z * 0.01, Coupling::Rigid) }],
@@ -334,7 +338,7 @@ fn refined_m(rig: &Rig) -> Vec<DVec3> {
 
 #[test]
 fn a_surface_of_springs_is_refined_all_along_a_lying_capsule_and_coarse_again_when_it_has_left() {
-    let by_tools = Refinement { rings: 2, follows_dent: false, fade_s: 0.1, by: Refining::ByTools };
+    let by_tools = Refinement { rings: 2, follows_dent: false, blend_s: 0.1, by: Refining::ByTools };
     for angle_rad in [0.0, 0.4, FRAC_PI_2] {
         let along = DQuat::from_rotation_z(angle_rad) * DVec3::X;
         let mut rig = Rig::new(sheet(10, Some(by_tools), along));
@@ -356,10 +360,11 @@ fn a_surface_of_springs_is_refined_all_along_a_lying_capsule_and_coarse_again_wh
     }
 }
 
-/// Pressing, dragging and turning across many regions, and leaving: the error of the books is leapfrog's, of second order in the step.
+/// Pressing, dragging and turning across many regions, and leaving: the error of the books is leapfrog's, of second
+/// order in the step.
 #[test]
 fn the_ledger_closes_while_a_capsule_is_dragged_and_turned() {
-    let by_tools = Refinement { rings: 2, follows_dent: false, fade_s: 0.1, by: Refining::ByTools };
+    let by_tools = Refinement { rings: 2, follows_dent: false, blend_s: 0.1, by: Refining::ByTools };
     let off = |substeps: u32| {
         let mut spec = sheet(10, Some(by_tools), DVec3::X);
         spec.settings.substeps = Substeps::Fixed(substeps);

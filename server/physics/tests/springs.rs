@@ -6,7 +6,7 @@ use glam::{DQuat, DVec3};
 use palpate_physics::{
     BodySpec, BodyState, Energies, LoadSpec, ModelSpec, PointForce, PrescribedSpec, Settings, State, Substeps,
     bodies::mass_spring::{
-        HomeLaw, MassSpringSpec, Net, Refinement, Refining, SpringSpec,
+        AnchorLaw, MassSpringSpec, Net, Refinement, Refining, SpringSpec,
         calibration::{Calibration, ConstantsTable},
         equilibrium::settle,
         net::hexagonal_patch,
@@ -22,21 +22,21 @@ use rig::{Drive, Rig, at, sphere, springs_mut};
 static ALLOCATOR: AllocDisabler = AllocDisabler;
 
 const EDGE_M: f64 = 4e-3;
-const COARSE: Constants = Constants { mesh_n_per_m: 60.0, home_n_per_m: 12.0 };
+const COARSE: Constants = Constants { mesh_n_per_m: 60.0, anchor_n_per_m: 12.0 };
 /// With which a sphere of 3 mm feels much the same where it is refined: a fifth stiffer at most.
-const FINE: Constants = Constants { mesh_n_per_m: 36.0, home_n_per_m: 6.2 };
+const FINE: Constants = Constants { mesh_n_per_m: 36.0, anchor_n_per_m: 6.2 };
 
-/// A flat sheet whose border is held, and a sphere of 3 mm above its middle.
+/// A flat sheet whose boundary is held, and a sphere of 3 mm above its middle.
 fn sheet(rings: i32, refinement: Option<Refinement>) -> ModelSpec {
     let surface = hexagonal_patch(rings, EDGE_M).unwrap();
     let vertices = surface.positions_m().len();
-    let border: Vec<u32> = (0..vertices as u32).filter(|&vertex| surface.is_border(vertex)).collect();
+    let boundary: Vec<u32> = (0..vertices as u32).filter(|&vertex| surface.is_boundary(vertex)).collect();
     ModelSpec {
         body: BodySpec::MassSpring(MassSpringSpec {
             springs: SpringSpec {
                 coarse: COARSE,
                 fine: FINE,
-                home_law: HomeLaw::Linear,
+                anchor_law: AnchorLaw::Linear,
                 mass_kg: vec![2e-4; vertices],
                 held: Vec::new(),
                 most_awake: vertices,
@@ -46,7 +46,7 @@ fn sheet(rings: i32, refinement: Option<Refinement>) -> ModelSpec {
             refinement,
             table: None,
         }),
-        prescribed: vec![PrescribedSpec { name: "border".into(), nodes: border, axes: [true; 3] }],
+        prescribed: vec![PrescribedSpec { name: "boundary".into(), nodes: boundary, axes: [true; 3] }],
         loads: Vec::new(),
         gravity_m_per_s2: DVec3::ZERO,
         tools: vec![sphere(3e-3, DVec3::Z * 0.01, Coupling::Rigid)],
@@ -55,7 +55,7 @@ fn sheet(rings: i32, refinement: Option<Refinement>) -> ModelSpec {
 }
 
 fn refined(rings: u32, by: Refining) -> Refinement {
-    Refinement { rings, follows_dent: false, fade_s: 0.1, by }
+    Refinement { rings, follows_dent: false, blend_s: 0.1, by }
 }
 
 fn refined_nodes(rig: &Rig) -> usize {
@@ -98,7 +98,7 @@ fn what_is_touched_is_refined_and_coarse_again_when_left() {
 /// Rings that follow the dent: few while it is shallow, more as it deepens, fewer again, and none flutters.
 #[test]
 fn deeper_dents_have_more_rings() {
-    let mut spec = sheet(10, Some(Refinement { rings: 4, follows_dent: true, fade_s: 0.1, by: Refining::ByTools }));
+    let mut spec = sheet(10, Some(Refinement { rings: 4, follows_dent: true, blend_s: 0.1, by: Refining::ByTools }));
     spec.tools[0].radius_m = 6e-3;
     let mut rig = Rig::new(spec);
     let mut counts = Vec::new();
@@ -113,7 +113,8 @@ fn deeper_dents_have_more_rings() {
     assert_eq!(counts, [12, 42, 90, 12]);
 }
 
-/// Pressing, dragging across many regions, and leaving: all energy is accounted for, but for what leapfrog's step leaves, which is of second order in it.
+/// Pressing, dragging across many regions, and leaving: all energy is accounted for, but for what leapfrog's step
+/// leaves, which is of second order in it.
 #[test]
 fn the_ledger_closes_while_a_tool_is_dragged_across() {
     let off = |substeps: u32| {
@@ -141,7 +142,8 @@ fn the_ledger_closes_while_a_tool_is_dragged_across() {
     assert!(half < 1e-3 && half < 0.4 * long, "{long} {half}");
 }
 
-/// Refined and coarse again beneath a tool that stands still: no tick changes its force by 1 %, and coarse again the force is what it was.
+/// Refined and coarse again beneath a tool that stands still: no tick changes its force by 1 %, and coarse again the
+/// force is what it was.
 #[test]
 fn the_force_does_not_step_when_the_surface_is_refined() {
     for centre in [0, 1, 7] {
@@ -167,7 +169,8 @@ fn the_force_does_not_step_when_the_surface_is_refined() {
     }
 }
 
-/// Constants from a table calibrated for this sheet, and a sphere that touches little but one vertex: refined and coarse again, at several depths, the force does not step, and is nearly the same.
+/// Constants from a table calibrated for this sheet, and a sphere that touches little but one vertex: refined and
+/// coarse again, at several depths, the force does not step, and is nearly the same.
 #[test]
 fn with_a_calibrated_table_a_point_feels_alike_on_both() {
     for depth_m in [0.4e-3, 0.8e-3, 1.2e-3] {
@@ -265,7 +268,7 @@ fn damaged_and_foreign_snapshots_are_refused() {
         assert!(snapshot::restore(&rig.model, &bad).is_err(), "byte {at}");
     }
     let mut softer = sheet(6, Some(refined(1, Refining::ByTools)));
-    springs_mut(&mut softer).springs.fine.home_n_per_m *= 0.5;
+    springs_mut(&mut softer).springs.fine.anchor_n_per_m *= 0.5;
     assert_eq!(snapshot::restore(&Rig::new(softer).model, &good), Err(snapshot::SnapshotError::OtherBody));
     let mut mangled = rig.state.clone();
     let BodyState::MassSpring(own) = &mut mangled.body else { panic!("no springs") };
@@ -274,7 +277,8 @@ fn damaged_and_foreign_snapshots_are_refused() {
     assert_eq!(snapshot::restore(&rig.model, &bytes), Err(snapshot::SnapshotError::OtherBody));
 }
 
-/// Where fewer may be awake than there are, those about the tool are, and the force is that of all of them awake; when it has left, all fall asleep at home.
+/// Where fewer may be awake than there are, those about the tool are, and the force is that of all of them awake; when
+/// it has left, all fall asleep at their rest positions.
 #[test]
 fn far_vertices_sleep() {
     let run = |most_awake: usize| {
@@ -322,7 +326,7 @@ fn a_force_wakes_where_it_is_injected() {
     rig.model.surface_positions_m(&rig.state, &mut surface);
     let depth_m = rig.model.surface_rest_positions_m()[40].z - surface[40].z;
     assert_eq!(rig.state.mechanical.x.len(), 200);
-    assert!((depth_m - 1e-3 / COARSE.home_n_per_m).abs() < 0.02 * depth_m, "{depth_m}");
+    assert!((depth_m - 1e-3 / COARSE.anchor_n_per_m).abs() < 0.02 * depth_m, "{depth_m}");
 }
 
 /// Under a dead load the loop comes to rest where springs and load are in balance.
@@ -345,9 +349,9 @@ fn loads_and_weight_come_to_rest_in_balance() {
     assert!((total + held).length() < 1e-7, "{total} {held}");
     // The plain springs, settled by Newton's method.
     let body = rig.model.body().as_mass_spring().unwrap().model();
-    // At home: Loop's scheme smooths the border.
-    let homes = body.rest_m()[..body.vertices() as usize].to_vec();
-    let net = Net::uniform(&body.surface().moved(homes).unwrap(), COARSE.mesh_n_per_m, COARSE.home_n_per_m);
+    // At the rest positions: Loop's scheme smooths the boundary.
+    let rest_m = body.rest_m()[..body.vertices() as usize].to_vec();
+    let net = Net::uniform(&body.surface().moved(rest_m).unwrap(), COARSE.mesh_n_per_m, COARSE.anchor_n_per_m);
     let is_held: Vec<bool> = (0..body.vertices()).map(|vertex| body.is_held(vertex)).collect();
     let mut external_n: Vec<DVec3> = body.spec().mass_kg.iter().map(|mass| DVec3::Z * (-9.81 * mass)).collect();
     external_n[0] += DVec3::new(4e-3, 0.0, -0.01);
@@ -367,7 +371,7 @@ fn ticks_allocate_nothing() {
         spec.tools[0].shape = shape;
         let springs = &mut springs_mut(&mut spec).springs;
         springs.most_awake = springs.most_awake.min(most_awake);
-        springs.home_law = HomeLaw::cubic(1e4).unwrap();
+        springs.anchor_law = AnchorLaw::cubic(1e4).unwrap();
         let mut rig = Rig::new(spec);
         let mut saved = State::at_rest(&rig.model);
         let mut drive = rig.still();
@@ -431,7 +435,7 @@ fn what_springs_cannot_have_is_refused_by_name() {
     assert!(refused(&|spec| spec.prescribed[0].nodes.push(400)).contains("node 400 is out of range"));
     assert!(
         refused(&|spec| {
-            let none = Refinement { rings: 0, follows_dent: false, fade_s: 0.1, by: Refining::ByTools };
+            let none = Refinement { rings: 0, follows_dent: false, blend_s: 0.1, by: Refining::ByTools };
             springs_mut(spec).refinement = Some(none);
         })
         .contains("rings = 0")

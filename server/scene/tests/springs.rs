@@ -4,7 +4,7 @@ use glam::DVec3;
 use palpate_physics::{
     Model,
     bodies::mass_spring::{
-        HomeLaw, MassSpringSpec,
+        AnchorLaw, MassSpringSpec,
         calibration::{Calibration, ConstantsTable},
     },
 };
@@ -19,7 +19,7 @@ cells = [8, 8, 2]
 [body.springs]
 part = "z_max"
 mesh_n_per_m = 60
-home_n_per_m = 12
+anchor_n_per_m = 12
 vertex_mass_kg = 2e-4
 damping_n_s_per_m = 0.01
 [body.springs.refine]
@@ -68,7 +68,7 @@ fn a_part_of_a_shape_becomes_the_surface() {
     // K_d of a vertex is its mass times the damping.
     assert!((scene.model.settings.mass_damping_per_s - 50.0).abs() < 1e-9);
     let fine = springs.springs.fine;
-    assert_eq!((fine.mesh_n_per_m, fine.home_n_per_m), (60.0, 3.0));
+    assert_eq!((fine.mesh_n_per_m, fine.anchor_n_per_m), (60.0, 3.0));
     let held: usize = scene.model.prescribed.iter().map(|set| set.nodes.len()).sum();
     assert_eq!(held, 32);
     let model = Model::build(scene.model).unwrap();
@@ -106,30 +106,57 @@ fn there_is_room_for_what_tools_refine() {
 fn constants_follow_from_a_skin_on_a_foundation() {
     let skin = "young_modulus_pa = 50e3\nthickness_mm = 1.5\nfoundation_pa_per_m = 2e6";
     let text = BOX
-        .replace("mesh_n_per_m = 60\nhome_n_per_m = 12", skin)
+        .replace("mesh_n_per_m = 60\nanchor_n_per_m = 12", skin)
         .replace("vertex_mass_kg = 2e-4", "area_density_kg_per_m2 = 3");
     let springs = springs(&text).springs;
     assert!((springs.coarse.mesh_n_per_m - 0.75_f64.sqrt() * 75.0).abs() < 1e-9);
-    assert!((springs.coarse.home_n_per_m - 2e6 * 1.6e-3 / 81.0).abs() < 1e-9);
+    assert!((springs.coarse.anchor_n_per_m - 2e6 * 1.6e-3 / 81.0).abs() < 1e-9);
     assert!((springs.mass_kg.iter().sum::<f64>() - 3.0 * 1.6e-3).abs() < 1e-12);
-    assert!(springs.mass_kg.iter().any(|m| (m / springs.mass_kg[0] - 1.0).abs() > 0.5), "borders have less");
+    assert!(springs.mass_kg.iter().any(|m| (m / springs.mass_kg[0] - 1.0).abs() > 0.5), "boundaries have less");
 }
 
 #[test]
-fn home_springs_may_stiffen() {
-    let cubic = springs(&BOX.replace("vertex_mass", "home_cubic_per_m2 = 1e5\nvertex_mass")).springs.home_law;
-    assert_eq!(cubic, HomeLaw::cubic(1e5).unwrap());
-    let layers = "home_layer = [{ thickness_mm = 1, stiffness_ratio = 1 }, { thickness_mm = 5, stiffness_ratio = 4 }]\nvertex_mass";
-    let layered = springs(&BOX.replace("vertex_mass", layers)).springs.home_law;
+fn anchor_springs_may_stiffen() {
+    let cubic = springs(&BOX.replace("vertex_mass", "anchor_cubic_per_m2 = 1e5\nvertex_mass")).springs.anchor_law;
+    assert_eq!(cubic, AnchorLaw::cubic(1e5).unwrap());
+    let layers = "anchor_layer = [{ thickness_mm = 1, stiffness_ratio = 1 }, { thickness_mm = 5, stiffness_ratio = 4 }]\nvertex_mass";
+    let layered = springs(&BOX.replace("vertex_mass", layers)).springs.anchor_law;
     assert!((layered.at(3e-3).slope - 4.0).abs() < 1e-12);
+}
+
+/// Keys that were renamed are still read by their first names, and refused where both are given.
+#[test]
+fn first_names_of_keys_give_the_same_model() {
+    let own = BOX.replace("constants = \"area\"", "mesh_n_per_m = 40\nanchor_n_per_m = 4\nblend_s = 0.05");
+    let layer = "anchor_layer = [{ thickness_mm = 1, stiffness_ratio = 2 }]\nvertex_mass";
+    for text in
+        [own.replace("vertex_mass", "anchor_cubic_per_m2 = 1e5\nvertex_mass"), own.replace("vertex_mass", layer)]
+    {
+        let first = text.replace("anchor_", "home_").replace("blend_s", "fade_s");
+        assert!(!first.contains("anchor") && first.contains("home_n_per_m = 4\nfade_s"), "{first}");
+        assert_eq!(springs(&first), springs(&text));
+    }
+    let both = [
+        ("anchor_n_per_m = 12", "anchor_n_per_m = 12\nhome_n_per_m = 12", "anchor_n_per_m"),
+        ("rings = 2", "rings = 2\nblend_s = 0.1\nfade_s = 0.1", "blend_s"),
+    ];
+    for (from, to, key) in both {
+        let message = refused(from, to);
+        assert!(message.contains(&format!("`{key}` is given twice, once by an earlier name of the key")), "{message}");
+        println!("{message}");
+    }
 }
 
 #[test]
 fn bad_springs_are_told_with_their_key() {
     let cases = [
-        ("home_n_per_m = 12", "home_n_per_m = 0", "body.springs.home_n_per_m = 0: must be finite and larger than 0"),
+        (
+            "anchor_n_per_m = 12",
+            "anchor_n_per_m = 0",
+            "body.springs.anchor_n_per_m = 0: must be finite and larger than 0",
+        ),
         ("mesh_n_per_m = 60", "mesh_n_per_m = -1", "body.springs.mesh_n_per_m = -1"),
-        ("mesh_n_per_m = 60\n", "", "lacks the key `mesh_n_per_m`, which goes with `home_n_per_m`"),
+        ("mesh_n_per_m = 60\n", "", "lacks the key `mesh_n_per_m`, which goes with `anchor_n_per_m`"),
         ("mesh_n_per_m = 60", "mesh_n_per_m = 60\nyoung_modulus_pa = 1e4", "exactly one of"),
         ("vertex_mass_kg = 2e-4", "vertex_mass_kg = 0", "body.springs.vertex_mass_kg = 0"),
         ("vertex_mass_kg = 2e-4\n", "", "exactly one of `area_density_kg_per_m2`, `vertex_mass_kg`"),
@@ -142,8 +169,8 @@ fn bad_springs_are_told_with_their_key() {
             "must hold the region of each tool, 24 triangles",
         ),
         ("damping_n_s_per_m = 0.01", "damping_n_s_per_m = -1", "must be finite and not negative"),
-        ("constants = \"area\"", "constants = \"area\"\nfade_s = 0", "fade_s = 0"),
-        ("vertex_mass_kg", "home_cubic_per_m2 = -1\nvertex_mass_kg", "per_m2 = -1"),
+        ("constants = \"area\"", "constants = \"area\"\nblend_s = 0", "blend_s = 0"),
+        ("vertex_mass_kg", "anchor_cubic_per_m2 = -1\nvertex_mass_kg", "per_m2 = -1"),
         (
             "[[probe]]\nname = \"middle\"",
             "[numerics]\nmass_damping_per_s = 5\n[[probe]]\nname = \"middle\"",
@@ -198,7 +225,7 @@ file = "dome.stl"
 unit = "mm"
 [body.springs]
 mesh_n_per_m = 60
-home_n_per_m = 12
+anchor_n_per_m = 12
 vertex_mass_kg = 2e-4
 [body.springs.refine]
 rings = 1
@@ -224,8 +251,15 @@ fn a_file_and_its_table() {
     let springs = load().unwrap().model.body.as_mass_spring().unwrap().clone();
     assert_eq!(springs.table.as_ref(), Some(&table));
     assert_eq!(springs.springs.surface.positions_m().len(), 49);
+    // A table that was written when its fields had their first names.
+    let text = serde_json::to_string(&table).unwrap();
+    let first = text.replace("anchor_n_per_m", "home_n_per_m").replace("anchor_ratio", "home_ratio");
+    assert!(first.contains("home_n_per_m") && first.contains("home_ratio"), "{first}");
+    std::fs::write(&wanted.table, first).unwrap();
+    assert_eq!(load().unwrap().model.body.as_mass_spring().unwrap().table.as_ref(), Some(&table));
+    std::fs::write(&wanted.table, text).unwrap();
 
-    std::fs::write(&path, FILE.replace("home_n_per_m = 12", "home_n_per_m = 13")).unwrap();
+    std::fs::write(&path, FILE.replace("anchor_n_per_m = 12", "anchor_n_per_m = 13")).unwrap();
     assert!(load().unwrap_err().one_line().contains("the table was made for other spring constants"));
     std::fs::write(&path, FILE.replace("rings = 1", "rings = 2")).unwrap();
     assert!(load().unwrap_err().one_line().contains("another number of rings"));

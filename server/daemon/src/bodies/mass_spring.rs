@@ -32,7 +32,7 @@ impl ServedBody for MassSpringBody {
     /// None of a surface that is open.
     fn enclosing_triangles(&self, _model: &Model) -> Vec<[u32; 3]> {
         let surface = self.model().surface();
-        let is_closed = !surface.edges().iter().any(Edge::is_border);
+        let is_closed = !surface.edges().iter().any(Edge::is_boundary);
         if is_closed { surface.triangles().to_vec() } else { Vec::new() }
     }
 
@@ -44,15 +44,15 @@ impl ServedBody for MassSpringBody {
     fn description(&self) -> Vec<String> {
         let spec = self.model().spec();
         let of = |constants: &Constants| {
-            format!("K_m {} N/m, K_h {} N/m", short(constants.mesh_n_per_m), short(constants.home_n_per_m))
+            format!("K_m {} N/m, K_h {} N/m", short(constants.mesh_n_per_m), short(constants.anchor_n_per_m))
         };
         let coarse = of(&spec.coarse);
         let refined = match self.refinement() {
             None => "coarse everywhere".to_owned(),
-            Some(Refinement { rings, fade_s, .. }) => format!(
+            Some(Refinement { rings, blend_s, .. }) => format!(
                 "{} around what is touched are refined within {} s: at most {}",
                 counted(rings as usize, "ring"),
-                short(fade_s),
+                short(blend_s),
                 of(&spec.fine)
             ),
         };
@@ -176,7 +176,7 @@ mod tests {
     #[test]
     fn viewers_see_the_surface_of_the_model() {
         let text = "[scene]\nname = \"t\"\n[body.sphere_shell]\ninner_radius_mm = 30\nouter_radius_mm = 40\ntarget_tets = 3000\n\
-            [body.springs]\npart = \"outer\"\nmesh_n_per_m = 60\nhome_n_per_m = 12\nvertex_mass_kg = 2e-4\ndamping_n_s_per_m = 0.02\nmost_awake = 150\n\
+            [body.springs]\npart = \"outer\"\nmesh_n_per_m = 60\nanchor_n_per_m = 12\nvertex_mass_kg = 2e-4\ndamping_n_s_per_m = 0.02\nmost_awake = 150\n\
             [body.springs.refine]\nrings = 2\nconstants = \"area\"\n\
             [[tool]]\nname = \"tip\"\nradius_mm = 5\ncoupling = \"rigid\"\ndriver = \"device\"\nstart_m = [0, 0, 0.05]\n";
         let scene = parse(text, "t", None, &Limits::local(), &mut |_, _| ()).unwrap();

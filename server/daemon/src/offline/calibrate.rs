@@ -47,7 +47,7 @@ pub fn run(args: &CalibrateArgs) -> miette::Result<ExitCode> {
     if table.exists() && !args.force {
         return Err(miette::miette!(help = "add --force to overwrite it", "{} is there already", table.display()));
     }
-    let ratio = args.ratio.unwrap_or(coarse.mesh_n_per_m / coarse.home_n_per_m);
+    let ratio = args.ratio.unwrap_or(coarse.mesh_n_per_m / coarse.anchor_n_per_m);
     let of = Calibration { coarse, rings, ratio, samples: args.samples };
     let mut bar = Progress::new(&args.scene.display().to_string());
     let found = ConstantsTable::calibrate(&surface, of, &mut |part| bar.show(part, "calibrating"));
@@ -62,8 +62,8 @@ pub fn run(args: &CalibrateArgs) -> miette::Result<ExitCode> {
         println!(
             "  {:6.2} {:10.4} {:14.4} {:7.1} % {:8.3}",
             row.xi,
-            row.home_ratio,
-            row.home_ratio * coarse.home_n_per_m,
+            row.anchor_ratio,
+            row.anchor_ratio * coarse.anchor_n_per_m,
             100.0 * row.spread,
             row.energy_ratio
         );

@@ -11,7 +11,7 @@
 //! surface goes over into the other one without a gap or a crease, and nothing jumps as a tool comes, moves or leaves.
 //!
 //! *Creases*: an edge at which the body turns by more than [`SHARP_DEG`] at rest is sharp, and a line of such edges stays one (Hoppe and others 1994): it is refined
-//! like a border, by its own vertices alone; where three or more meet the vertex stays:
+//! like a boundary, by its own vertices alone; where three or more meet the vertex stays:
 //! ```text
 //! sharp edge  ½ (a + b)        vertex of 2 sharp edges  ¾ p + ⅛ (b_1 + b_2)        of 3 or more  p        of 1 or none  Loop's
 //! ```
@@ -155,7 +155,7 @@ impl Refiner {
 impl Patch {
     fn new(surface: &Triangulation, sharp: &[bool], near: Vec<u32>) -> Self {
         let mut split = Vec::new();
-        rings_into(surface, &near, (1, usize::MAX), (&mut split, &mut Vec::new()));
+        rings_into(surface, &near, 1, usize::MAX, &mut split, &mut Vec::new());
         let is_split = |triangle: &u32| split.binary_search(triangle).is_ok();
         let corners: BTreeSet<u32> = split.iter().flat_map(|&t| surface.triangles()[t as usize]).collect();
         // Those with a triangle that is not split stay: w = 0.
@@ -168,7 +168,7 @@ impl Patch {
         let mut triangles = Vec::new();
         let mut replaced = BTreeSet::new();
         let across = edges.iter().flat_map(|&edge| surface.edges()[edge as usize].triangles);
-        // Of an edge on the border the other side is no triangle.
+        // Of an edge on the boundary the other side is no triangle.
         for triangle in split.iter().copied().chain(across.filter(|&t| (t as usize) < surface.triangles().len())) {
             if replaced.insert(triangle) {
                 let [a, b, c] = surface.triangles()[triangle as usize].map(corner);
@@ -201,7 +201,7 @@ fn is_sharp(surface: &Triangulation, edge: &Edge) -> bool {
         let [a, b, c] = surface.triangles()[triangle as usize].map(|v| surface.positions_m()[v as usize]);
         (b - a).cross(c - a)
     };
-    !edge.is_border() && normal(edge.triangles[0]).angle_between(normal(edge.triangles[1])).to_degrees() > SHARP_DEG
+    !edge.is_boundary() && normal(edge.triangles[0]).angle_between(normal(edge.triangles[1])).to_degrees() > SHARP_DEG
 }
 
 fn mask_of_vertex(surface: &Triangulation, sharp: &[bool], vertex: u32) -> Mask {
@@ -297,7 +297,7 @@ mod tests {
         let (rest_m, u_m, triangles) = drawn(&refiner, &u, &message);
         // No edge with one triangle or three, no vertex of two fans, none without area.
         let whole = without_unused(&rest_m, &triangles);
-        assert!(whole.edges().iter().all(|edge| !edge.is_border()));
+        assert!(whole.edges().iter().all(|edge| !edge.is_boundary()));
         assert!(whole.triangles().len() > refiner.surface.triangles().len() + 100);
         let x_m: Vec<DVec3> = rest_m.iter().zip(&u_m).map(|(rest, u)| *rest + *u).collect();
         let of_m = &x_m[..refiner.surface.positions_m().len()];
@@ -384,6 +384,6 @@ mod tests {
         let over = refiner.read(&u, &[(DVec3::new(0.0, 0.0, 0.01), 0.1)]);
         let (rest_m, _, triangles) = drawn(&refiner, &u, &over);
         assert_eq!(refiner.patch.near.len(), MOST_NEAR);
-        assert!(without_unused(&rest_m, &triangles).edges().iter().all(|edge| !edge.is_border()));
+        assert!(without_unused(&rest_m, &triangles).edges().iter().all(|edge| !edge.is_boundary()));
     }
 }

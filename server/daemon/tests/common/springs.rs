@@ -11,7 +11,7 @@ target_tets = 4000
 [body.springs]
 part = "outer"
 mesh_n_per_m = 60
-home_n_per_m = 12
+anchor_n_per_m = 12
 area_density_kg_per_m2 = 12
 damping_n_s_per_m = 0.02
 most_awake = 120

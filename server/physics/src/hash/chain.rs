@@ -1,9 +1,10 @@
-//! A hash of every bit that ticks change, chained from tick to tick: two runs that differ in one bit of one tick have different hashes
-//! from there on.
+//! A hash of every bit that ticks change, which is chained from tick to tick: two runs that differ in one bit of one
+//! tick have different hashes from there on.
 //!
-//! FNV-1a over numbers that are taken one by one: whichever structs hold them, the same run has the same hash. A list comes after its
-//! length, what may be missing after 0 or 1. What a state keeps for speed alone (boxes, layouts, buffers) is left out; it shows in the
-//! ticks after, if it is wrong. What of a whole state is added, and in which order, is where the state is ([`crate::world`]).
+//! It is FNV-1a over numbers that are taken one by one, so that the same run has the same hash whichever structs hold
+//! the numbers. The length of a list comes before it, and 0 or 1 before what may be missing. What a state keeps only
+//! for speed (boxes, layouts, buffers) is left out; if it is wrong, this shows in the next ticks. The parts of a whole
+//! state and their order are given where the state is ([`crate::world`]).
 use super::{OFFSET, fnv};
 use glam::{DMat3, DQuat, DVec3};
 
@@ -18,12 +19,12 @@ impl Default for Chain {
 }
 
 impl Chain {
-    /// Goes on after a hash.
+    /// Returns a hash that continues another one.
     pub fn after(hash: u64) -> Self {
         Self(hash)
     }
 
-    /// The hash of all that was added.
+    /// Returns the hash of everything that was added.
     pub fn value(self) -> u64 {
         self.0
     }
@@ -38,7 +39,7 @@ impl Chain {
         self.whole(number.to_bits());
     }
 
-    /// Adds whether something is so.
+    /// Adds a flag as 0 or 1.
     pub fn flag(&mut self, flag: bool) {
         self.whole(u64::from(flag));
     }
@@ -73,7 +74,7 @@ impl Chain {
         self.list(list, |chain, number| chain.whole(u64::from(*number)));
     }
 
-    /// Adds a list of anything.
+    /// Adds the length of a list, then its entries with `add`.
     pub fn list<T>(&mut self, list: &[T], mut add: impl FnMut(&mut Self, &T)) {
         self.whole(list.len() as u64);
         for entry in list {
@@ -81,7 +82,7 @@ impl Chain {
         }
     }
 
-    /// Adds what may be missing.
+    /// Adds whether something is there, then the thing itself with `add`.
     pub fn maybe<T>(&mut self, what: Option<T>, add: impl FnOnce(&mut Self, T)) {
         self.flag(what.is_some());
         if let Some(what) = what {
@@ -94,7 +95,7 @@ impl Chain {
 mod tests {
     use super::*;
 
-    /// A list that begins earlier is not one that ends later.
+    /// An entry has another hash in the first of two lists than in the second.
     #[test]
     fn lists_do_not_run_into_one_another() {
         let of = |one: &[f64], other: &[f64]| {

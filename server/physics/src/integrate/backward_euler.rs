@@ -4,18 +4,20 @@
 //! ```text
 //! (M + dt² K + dt C) Δv = dt (f(x, v) − dt K v)          v ← v + Δv          x ← x + dt v          f ← f(x, v)
 //! ```
-//! (Baraff & Witkin 1998). `K` is the tangent of elastic stress and, in positive part, of contact (`contact::tangent`), whose force takes
-//! part as the tool's motion will change it. `C` is the matrix of viscous stress. Products are matrix-free
-//! through the force kernel. The iteration starts at the velocity there is (`Δv = 0`), so a body at rest or in steady motion
-//! costs nothing, and nothing but the state decides where it ends. Loads are those at the end of the substep, forces are evaluated at both
-//! of its ends.
+//! (Baraff & Witkin 1998). `K` is the tangent of elastic stress and the positive part of that of contact
+//! (`contact::tangent`), whose force includes its change by the tool's motion. `C` is the matrix of viscous stress.
+//! Products are matrix-free through the force kernel. The iteration starts at the present velocity (`Δv = 0`), so that
+//! a body at rest or in steady motion costs nothing, and only the state decides where it ends. Loads are those at the
+//! end of the substep; forces are evaluated at both of its ends.
 //!
-//! First order; stable for any step where `K ≥ 0`, by damping what the step cannot resolve. Follower loads and the tools' own
-//! motion on their couplings stay explicit: measured substeps are those that the couplings need.
+//! The scheme is of first order, and stable for any step where `K ≥ 0`, as it damps what the step cannot resolve.
+//! Follower loads and the tools' own motion on their couplings stay explicit: measured substeps are those that the
+//! couplings need.
 //!
-//! Ledger: forces work along the path `dt v'` and are known at both of its ends, so external work is `½dt (g_n + g_{n+1})·v'`, and what the
-//! scheme takes is what is left, `½dt (f_n + f_{n+1})·v' − ΔT`, with the viscous part `−C v` of `f` put back,
-//! `dt (¼q_n + ¾q_{n+1})`. The balance is of second order; the dissipation holds viscous stress and the scheme's own damping.
+//! Ledger: forces work along the path `dt v'` and are known at both of its ends, so external work is
+//! `½dt (g_n + g_{n+1})·v'`. The scheme takes the remaining part, `½dt (f_n + f_{n+1})·v' − ΔT`, where the viscous part
+//! `−C v` of `f` is put back, `dt (¼q_n + ¾q_{n+1})`. The balance is of second order; the dissipation includes viscous
+//! stress and the scheme's own damping.
 use super::seed_semi_implicit::NodalImplicit;
 use crate::{
     bodies::tet::{SteppedTet, TetBody, TetScratch},
@@ -28,7 +30,7 @@ use crate::{
 };
 use glam::DVec3;
 
-/// All substeps of a tick. `nodal` is the block diagonal of `M + dt² K + dt C` at rest.
+/// Takes all substeps of a tick. `nodal` is the block diagonal of `M + dt² K + dt C` at rest.
 pub(super) fn run(
     tick: &Tick<'_>,
     nodal: &NodalImplicit,
@@ -58,7 +60,7 @@ pub(super) fn run(
     }
 }
 
-/// Forces at the start of a substep, with loads and injected forces as at its end.
+/// Evaluates forces at the start of a substep, with loads as at its end.
 fn evaluate_before(
     tick: &Tick<'_>,
     substep: u32,
@@ -73,7 +75,7 @@ fn evaluate_before(
     stepped.evaluate(tick, &now, state, contact);
 }
 
-/// `Δv` into the solver's solution.
+/// Solves for `Δv`, which is then the solver's solution.
 fn solve(
     environment: &Environment,
     body: &TetBody,
@@ -108,7 +110,7 @@ fn solve(
     pcg::solve(apply, nodal.inverse_per_kg(), stop, vectors);
 }
 
-/// `v ← v + Δv`; returns the change of kinetic energy (J).
+/// Gives the kick `v ← v + Δv`. Returns the change of the kinetic energy (J).
 fn kick(masses: &LumpedMass<'_>, state: &mut MechanicalState, change: &[DVec3]) -> f64 {
     let mut gained_j = 0.0;
     for ((v, change), mass) in state.v.iter_mut().zip(change).zip(masses.mass_kg) {
@@ -118,7 +120,8 @@ fn kick(masses: &LumpedMass<'_>, state: &mut MechanicalState, change: &[DVec3]) 
     gained_j
 }
 
-/// Half a substep's work (J) along `dt v` of external forces, holders' included, and of all forces on free axes.
+/// Returns the work (J) of half a substep along `dt v`: of external forces including those of holders, and of all
+/// forces on free axes.
 fn half_work_j(masses: &LumpedMass<'_>, state: &MechanicalState, dt_s: f64) -> (f64, f64) {
     let (mut external_w, mut total_w) = (masses.holders_power_w(&state.force_n, &state.v), 0.0);
     for (((v, force), external), inverse_mass) in
@@ -130,7 +133,7 @@ fn half_work_j(masses: &LumpedMass<'_>, state: &MechanicalState, dt_s: f64) -> (
     (0.5 * dt_s * external_w, 0.5 * dt_s * total_w)
 }
 
-/// Without the components on held axes.
+/// Returns a vector without its components on held axes.
 fn on_free(a: DVec3, inverse_mass_per_kg: DVec3) -> DVec3 {
     DVec3::select(inverse_mass_per_kg.cmpeq(DVec3::ZERO), DVec3::ZERO, a)
 }

@@ -7,11 +7,11 @@
 //!           f ← f(x, v)                    internal, gravity, loads, contact
 //!           v ← v + dt f/m                 kick (the last one is a half kick)
 //! ```
-//! Second order and symplectic without damping; `x` and `v` are synchronous at the end of a tick. Viscous forces see the
-//! velocity half a step late, which the step bound of `tick::substeps` accounts for.
+//! The scheme is of second order, and symplectic without damping; `x` and `v` belong to the same time at the end of a
+//! tick. Viscous forces see the velocity half a step late, which the step bound of `tick::substeps` takes into account.
 //!
-//! Ledger: the work of a force `g` over a kick of length `h` is exactly its share of the kinetic change,
-//! `h g·(v + ½h f/m)`; what viscous stress takes is an estimate ([`crate::tick::ViscousPower`]).
+//! Ledger: the work of a force `g` over a kick of length `h` is exactly its part of the change of kinetic energy,
+//! `h g·(v + ½h f/m)`; what viscous stress takes is estimated ([`crate::tick::ViscousPower`]).
 use super::ForceHistory;
 use crate::{
     bodies::SteppedBody,
@@ -19,7 +19,7 @@ use crate::{
     tick::{MechanicalState, Tick, lumped::drift},
 };
 
-/// All substeps of a tick. `history` takes the forces that the step is judged by, where it is.
+/// Takes all substeps of a tick. `history` keeps the forces by which the step is judged, where it is judged.
 pub(super) fn run(
     tick: &Tick<'_>,
     body: &mut SteppedBody<'_>,

@@ -1,4 +1,4 @@
-//! Time integrators, one file each, and what judges the explicit one's step.
+//! Time integrators, one file each, and the test of whether the explicit one's step is stable.
 mod backward_euler;
 mod leapfrog;
 mod scheme;

@@ -5,24 +5,24 @@
 //! v ← (I − (dt²/m) J_F)⁻¹ ṽ                                                                              (34)
 //! x ← x + dt v
 //! ```
-//! `J_F = −D_i = ∂F_i/∂x_i` of each node at rest, its neighbours held: 3×3, constant, inverted at load. So with the block
-//! diagonal `D` of the stiffness `K`: `v' = (M + dt² D)⁻¹ (M v + dt F)`.
+//! Here `J_F = −D_i = ∂F_i/∂x_i` of each node at rest with its neighbours held: a constant 3×3 matrix that is inverted
+//! at load. So with the block diagonal `D` of the stiffness `K` the step is `v' = (M + dt² D)⁻¹ (M v + dt F)`.
 //!
-//! Its defects. `D` is not `K`, whose rows sum to zero:
-//! - A body that moves as a whole is dragged as if every node hung on the resting frame by a damper `dt D`: at E = 10 kPa,
-//!   ν = 0.45 and h = 5 mm one step of 1 ms takes about three quarters of its momentum.
-//! - It is not unconditionally stable. For a mode with `k = dt²κ/m`, `d = dt²δ/m`: `(1 + d)z² − (2 + d − k)z + 1 = 0`, so
-//!   `|z| ≤ 1` needs `k ≤ 4 + 2d`: any step only where λ_max(D⁻¹K) ≤ 2, and a block of tets has 2.02, 2.08 and 2.80 at
-//!   ν = 0, 0.3 and 0.45. Leapfrog's condition `k ≤ 4` always suffices, and is what measured substeps keep;
-//!   `Substeps::Fixed(1)` is what the paper runs.
-//! - It is of first order in time, and what pushes during a step acts in the next one.
+//! The scheme has defects, as `D` is not `K`, whose rows sum to zero:
+//! - A body that moves as a whole is dragged as if every node hung on the resting frame by a damper `dt D`. At E = 10
+//!   kPa, ν = 0.45 and h = 5 mm one step of 1 ms takes about three quarters of its momentum.
+//! - It is not unconditionally stable. For a mode with `k = dt²κ/m`, `d = dt²δ/m`: `(1 + d)z² − (2 + d − k)z + 1 = 0`,
+//!   so `|z| ≤ 1` needs `k ≤ 4 + 2d`: any step only where λ_max(D⁻¹K) ≤ 2, and a block of tets has 2.02, 2.08 and 2.80
+//!   at ν = 0, 0.3 and 0.45. Leapfrog's condition `k ≤ 4` always suffices, and measured substeps keep it; the paper
+//!   runs `Substeps::Fixed(1)`.
+//! - It is of first order in time, and a force that pushes during a step acts in the next one.
 //!
-//! On a held axis the velocity is given and its coupling to the node's other axes left out. Forces other than the body's
-//! own (contact, viscous stress) are explicit.
+//! On a held axis the velocity is given, and its coupling to the node's other axes is left out. Forces other than the
+//! body's own (contact, viscous stress) are explicit.
 //!
 //! Ledger: the change of momentum is `dt F − dt² D v'`, so beside viscous stress the fictitious damper takes
-//! `dt² v'·D ½(v + v')`, which is counted as dissipated. What elastic force does is counted along `dt ½(v + v')` but the nodes go
-//! `dt v'`: the balance is off by first order.
+//! `dt² v'·D ½(v + v')`, which is counted as dissipated. The work of elastic forces is counted along `dt ½(v + v')`,
+//! but the nodes move by `dt v'`: the balance has an error of first order.
 use crate::{
     bodies::tet::{SteppedTet, TetBody},
     contact::ContactScratch,
@@ -30,17 +30,18 @@ use crate::{
 };
 use glam::{DMat3, DVec3};
 
-/// What the rest state fixes.
+/// The matrices of the scheme, which the rest state fixes.
 #[derive(Debug, Clone)]
 pub(crate) struct NodalImplicit {
-    /// `D_i` (N/m), rows and columns of held axes zero.
+    /// Stiffness `D_i` (N/m) with zero rows and columns for held axes.
     stiffness_n_per_m: Vec<DMat3>,
-    /// `(m_i I + dt² D_i)⁻¹` (1/kg), rows and columns of held axes zero.
+    /// Matrices `(m_i I + dt² D_i)⁻¹` (1/kg) with zero rows and columns for held axes.
     inverse_per_kg: Vec<DMat3>,
 }
 
 impl NodalImplicit {
-    /// For steps `dt_s`, with a further matrix `dt C_i` inside the inverse where a scheme has one.
+    /// Returns the matrices for steps of `dt_s` (s), with a further matrix `dt C_i` inside the inverse where a scheme
+    /// has one.
     pub(super) fn new(nodal_n_per_m: &[DMat3], viscous_n_s_per_m: Option<&[DMat3]>, body: &TetBody, dt_s: f64) -> Self {
         let (inverse_mass_per_kg, mass_kg) = (body.inverse_mass_per_kg(), body.mass_kg());
         let free = |inverse_mass: DVec3| {
@@ -61,13 +62,13 @@ impl NodalImplicit {
         Self { stiffness_n_per_m, inverse_per_kg }
     }
 
-    /// `(M + dt² D + dt C)⁻¹` (1/kg) per node.
+    /// Returns `(M + dt² D + dt C)⁻¹` (1/kg) of every node.
     pub(super) fn inverse_per_kg(&self) -> &[DMat3] {
         &self.inverse_per_kg
     }
 }
 
-/// All substeps of a tick.
+/// Takes all substeps of a tick.
 pub(super) fn run(
     tick: &Tick<'_>,
     nodal: &NodalImplicit,
@@ -87,7 +88,8 @@ pub(super) fn run(
     }
 }
 
-/// `v ← (M + dt²D)⁻¹(M v + dt F)`, as `v + (M + dt²D)⁻¹ dt (F − dt D v)`, and the ledger's share of it.
+/// Gives the kick `v ← (M + dt²D)⁻¹(M v + dt F)`, computed as `v + (M + dt²D)⁻¹ dt (F − dt D v)`, and adds its work and
+/// dissipation to the ledger.
 fn kick(environment: &Environment, body: &TetBody, nodal: &NodalImplicit, state: &mut MechanicalState, dt_s: f64) {
     let (damping, masses) = (environment.settings.mass_damping_per_s, body.lumped_mass(environment));
     if damping > 0.0 {

@@ -1,29 +1,34 @@
-//! Whether leapfrog's step was too long, read from the forces that the tick evaluates anyway.
+//! The test of whether leapfrog's step was too long, from the forces that the tick evaluates anyway.
 //!
-//! With lumped mass `M`, internal force `g` (elastic and viscous), the force `f` of everything, and positions at three instants
-//! one step `dt` apart, leapfrog gives `y = x₊ − 2x + x₋ = dt² M⁻¹ f`, whatever the loads. Stress answers `y` alone,
+//! With lumped mass `M`, internal force `g` (elastic and viscous), the force `f` of everything, and positions at three
+//! instants one step `dt` apart, leapfrog gives `y = x₊ − 2x + x₋ = dt² M⁻¹ f`, whatever the loads. Only stress answers
+//! to `y`:
 //! ```text
 //! Δ²g = g₊ − 2g + g₋ = −K y − (C/dt)(y − y₋)
 //! ‖Δ²g‖ ≤ q max(‖f‖, ‖f₋‖)        ‖a‖² = Σ aᵀ M⁻¹ a over free axes,  q = dt² λ_max(M⁻¹K) + 2 dt λ_max(M⁻¹C)       (1)
 //! ```
 //! The step is stable while `k + 2d ≤ 4` in every mode, `k = dt²κ/m`, `d = dt c/m` (`tick::substeps`). So
-//! `Q = ‖Δ²g‖/max(‖f‖, ‖f₋‖)` above 4 proves that it is too long, for a body that is linear between the three instants and whose
-//! stiffest mode is its most viscous one. A mode that grows as `z = −|z|` has `Q = 2 + |z| + 1/|z| > 4` exactly.
+//! `Q = ‖Δ²g‖/max(‖f‖, ‖f₋‖)` above 4 proves that it is too long, for a body that is linear between the three instants
+//! and whose stiffest mode is its most viscous one. A mode that grows as `z = −|z|` has `Q = 2 + |z| + 1/|z| > 4`
+//! exactly.
 //!
-//! With mass damping `c`, `e = e^{−c dt}`, leapfrog gives `y = √e dt² M⁻¹ f − (1 − e)(x − x₋)` and is stable while `k ≤ 2 (1 + e)/√e`. Then
+//! With mass damping `c`, `e = e^{−c dt}`, leapfrog gives `y = √e dt² M⁻¹ f − (1 − e)(x − x₋)` and is stable while
+//! `k ≤ 2 (1 + e)/√e`. Then
 //! ```text
 //! ‖Δ²g‖ ≤ 2 (1 + e) max(‖f‖, ‖f₋‖) + (1 − e) ‖g − g₋‖                                                            (2)
 //! ```
-//! which is (1)'s 4 again where `‖g − g₋‖ ≤ 2 max(‖f‖, ‖f₋‖)`. Loads may make it larger: what it is above that raises the limit.
+//! which is the 4 of (1) again where `‖g − g₋‖ ≤ 2 max(‖f‖, ‖f₋‖)`. Loads may make `‖g − g₋‖` larger, and the excess
+//! raises the limit.
 //!
-//! Rigid and slow motion is filtered out twice: a mode counts with `ω⁸` above and `ω⁴` below the line, so that a small
-//! tremble at the limit is seen beside a large motion. What contact, loads and tools do is in `f`, not in `g`: it cannot alarm, and a
-//! step that is too long for contact alone is not seen. On held axes that change their speed between ticks `y` is not zero;
-//! `m Δv/dt` stands for the force there, and `λ_max` in (1) is then that of the body not held.
+//! Rigid and slow motion is filtered out twice: a mode counts with `ω⁸` in the numerator and `ω⁴` in the denominator,
+//! so that a small oscillation at the limit is seen beside a large motion. The effect of contact, loads and tools is in
+//! `f`, not in `g`: it cannot cause an alarm, and a step that is too long for contact alone is not detected. On held
+//! axes that change their speed between ticks `y` is not zero; `m Δv/dt` stands for the force there, and `λ_max` in (1)
+//! is then that of the body without holders.
 //!
 //! A tick of two or more substeps is judged by its last three instants; one of a single step by its own two and the one
-//! before ([`Pace::before`]). Compare Park & Underwood 1980 and Bergan & Mollestad 1985, who choose steps by the quotient
-//! `Δxᵀ Δg/Δxᵀ M Δx`, which has neither filter.
+//! before ([`Pace::before`]). Compare Park & Underwood 1980 and Bergan & Mollestad 1985, who choose steps by the
+//! quotient `Δxᵀ Δg/Δxᵀ M Δx`, which has neither filter.
 use crate::{
     settings::{Integrator, MAX_SUBSTEPS},
     tick::{Environment, Judged, MechanicalState, StepEvidence, StepForcesNow},
@@ -31,37 +36,37 @@ use crate::{
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
-/// `Q` above this is unstable: the limit 4 at a step of 0.975 of the longest.
+/// `Q` above this counts as unstable. The limit 4 at a step of 0.975 of the longest one gives this value.
 const LIMIT: f64 = 3.8;
-/// `(k h ω)²` of long steps above this is taken for unstable, half of what would be for linear bodies: they are few, and what a body does that is strained by
-/// half in one of them is far from linear.
+/// `(k h ω)²` of long steps above this counts as unstable. It is half of the limit of linear bodies, as long steps are
+/// few, and a body that is strained by half in one of them is far from linear.
 const LONG_STEP_LIMIT: f64 = 2.0;
-/// Part of the stable step that a repetition aims at.
+/// Fraction of the stable step at which a repetition aims.
 const SAFETY: f64 = 0.9;
-/// More substeps than this many times the model's are not tried.
+/// Largest number of substeps that is tried, over the model's.
 const MOST_TIMES: u32 = 64;
-/// A tick whose result is not finite is repeated with so many times its substeps.
+/// Factor on the substeps of a tick that is repeated because its result was not finite.
 const TIMES_IF_NOT_FINITE: u32 = 4;
-/// Most repetitions of a tick.
+/// Largest number of repetitions of a tick.
 const MOST_REPETITIONS: u32 = 3;
-/// So many ticks must show that fewer substeps would do before fewer are tried.
-const CALM_TICKS: u32 = 100;
+/// Number of ticks in a row that must show that fewer substeps suffice before fewer are tried.
+const SETTLED_TICKS: u32 = 100;
 
-/// In how many substeps ticks are taken, and what a tick of one step is judged by.
+/// The number of substeps in which ticks are taken, and the forces by which a tick of one step is judged.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Pace {
-    /// Substeps of the next tick; the model's unless a tick proved unstable.
+    /// Number of substeps of the next tick, which is the model's unless a tick proved unstable.
     pub substeps: u32,
-    /// Ticks in a row in which fewer would have done.
-    pub calm_ticks: u32,
+    /// Number of ticks in a row in which fewer substeps would have sufficed.
+    pub settled_ticks: u32,
     /// Forces one step before those of the state; empty unless the model takes one step per tick.
     pub before: InstantForces,
-    /// `before` is that, with nothing put elsewhere in between.
+    /// Whether `before` has those forces, and nothing was put elsewhere in between.
     pub before_is_usable: bool,
 }
 
 impl Pace {
-    /// Before the first tick of a body with so many nodes, whose lists have room for `most_positions`.
+    /// Returns the pace before the first tick of a body with so many nodes, whose lists have room for `most_positions`.
     pub(crate) fn at_start(environment: &Environment, is_judged: bool, nodes: usize, most_positions: usize) -> Self {
         let substeps = environment.steps.substeps;
         let before = if is_judged && substeps == 1 {
@@ -69,12 +74,12 @@ impl Pace {
         } else {
             InstantForces::default()
         };
-        Self { substeps, calm_ticks: 0, before, before_is_usable: false }
+        Self { substeps, settled_ticks: 0, before, before_is_usable: false }
     }
 
-    /// As at the start, in the buffers it has.
+    /// Makes the pace as at the start, in the buffers it has.
     pub(crate) fn reset(&mut self, environment: &Environment) {
-        (self.substeps, self.calm_ticks, self.before_is_usable) = (environment.steps.substeps, 0, false);
+        (self.substeps, self.settled_ticks, self.before_is_usable) = (environment.steps.substeps, 0, false);
         self.before.total_n.fill(DVec3::ZERO);
         self.before.external_n.fill(DVec3::ZERO);
     }
@@ -82,11 +87,11 @@ impl Pace {
     pub(crate) fn copy_from(&mut self, other: &Self) {
         self.before.total_n.clone_from(&other.before.total_n);
         self.before.external_n.clone_from(&other.before.external_n);
-        (self.substeps, self.calm_ticks) = (other.substeps, other.calm_ticks);
+        (self.substeps, self.settled_ticks) = (other.substeps, other.settled_ticks);
         self.before_is_usable = other.before_is_usable;
     }
 
-    /// For so many positions, and in a range of substeps that the model may have.
+    /// Returns whether the pace has lists of so many positions, and a number of substeps that the model may have.
     pub(crate) fn fits(&self, environment: &Environment, is_judged: bool, positions: usize) -> bool {
         let steps = environment.steps;
         let nodes = if is_judged && steps.substeps == 1 { positions } else { 0 };
@@ -96,38 +101,39 @@ impl Pace {
             && self.substeps.is_multiple_of(steps.substeps_per_long_step)
     }
 
-    /// The vectors of it, for a look whether they are finite.
+    /// Returns all vectors, for a check that they are finite.
     pub(crate) fn vectors(&self) -> impl Iterator<Item = &DVec3> {
         self.before.total_n.iter().chain(&self.before.external_n)
     }
 
-    /// The tick is repeated in `substeps`.
+    /// Notes that the tick is repeated in `substeps` substeps.
     fn start_again(&mut self, substeps: u32) {
-        (self.substeps, self.calm_ticks, self.before_is_usable) = (substeps, 0, false);
+        (self.substeps, self.settled_ticks, self.before_is_usable) = (substeps, 0, false);
     }
 
-    /// Takes note of a tick of `self.substeps` that was accepted at once.
-    fn calm(&mut self, environment: &Environment, quotient: f64) {
+    /// Notes a tick in `self.substeps` substeps that was accepted at once, and takes fewer substeps once enough ticks
+    /// have shown that they suffice.
+    fn settle(&mut self, environment: &Environment, quotient: f64) {
         let steps = environment.steps;
         let fewer = (self.substeps - (self.substeps / 8).max(1)).max(steps.substeps);
         let fewer = fewer.next_multiple_of(steps.substeps_per_long_step).min(self.substeps);
         // Q grows at most with dt².
         let then = quotient * (f64::from(self.substeps) / f64::from(fewer)).powi(2);
-        self.calm_ticks = if then <= SAFETY * LIMIT { self.calm_ticks + 1 } else { 0 };
-        if self.calm_ticks >= CALM_TICKS {
-            (self.substeps, self.calm_ticks) = (fewer, 0);
+        self.settled_ticks = if then <= SAFETY * LIMIT { self.settled_ticks + 1 } else { 0 };
+        if self.settled_ticks >= SETTLED_TICKS {
+            (self.substeps, self.settled_ticks) = (fewer, 0);
         }
     }
 }
 
-/// Whether ticks of a body whose steps can be judged are: only leapfrog's. The seeds' schemes run as their authors describe them,
-/// backward Euler needs none.
+/// Returns whether the ticks of a body are judged, given whether its steps can be. Only those of leapfrog are: the
+/// seeds' schemes run as their authors describe them, and backward Euler needs no judgement.
 pub(crate) fn is_judged(environment: &Environment, can_be: bool) -> bool {
     let settings = &environment.settings;
     settings.subcycle_unstable && settings.integrator == Integrator::Leapfrog && can_be
 }
 
-/// The most substeps that are tried.
+/// Returns the largest number of substeps that is tried.
 fn most_substeps(environment: &Environment) -> u32 {
     let steps = environment.steps;
     let most = steps.substeps.saturating_mul(MOST_TIMES).min(MAX_SUBSTEPS.max(steps.substeps));
@@ -137,9 +143,9 @@ fn most_substeps(environment: &Environment) -> u32 {
 /// Forces at an instant.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct InstantForces {
-    /// All of it (N), one per node.
+    /// Total force (N) on each node.
     pub total_n: Vec<DVec3>,
-    /// The part of loads, tools and injected forces (N).
+    /// The part of it that loads, tools and injected forces make (N).
     pub external_n: Vec<DVec3>,
 }
 
@@ -168,13 +174,13 @@ impl InstantForces {
     }
 }
 
-/// Forces at the instants of a tick that are wanted again; empty unless ticks are judged.
+/// Forces at those instants of a tick at which they are needed again; empty unless ticks are judged.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct ForceHistory {
     start: InstantForces,
     two_before: InstantForces,
     one_before: InstantForces,
-    /// `Σ m (Δv)²` of held axes at the tick's start (kg m²/s²).
+    /// Sum `Σ m (Δv)²` (kg m²/s²) of held axes at the tick's start.
     pub(crate) held_jump: f64,
 }
 
@@ -187,38 +193,39 @@ pub(crate) struct StartOfTick<'a> {
     pub(crate) v: &'a [DVec3],
 }
 
-/// How a tick went that was run.
+/// The outcome of a tick that was run.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Attempt {
-    /// Its result is not finite.
+    /// Whether its result is not finite.
     pub(crate) is_spoilt: bool,
-    /// How often it had been repeated before.
+    /// Number of times that it had been repeated before.
     pub(crate) repeated: u32,
 }
 
-/// What is to be done with a tick that was run.
+/// The verdict on a tick that was run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Verdict {
-    /// It stands.
+    /// The tick is accepted.
     Accept,
-    /// It is to be taken back and repeated in [`Pace::substeps`].
+    /// The tick is to be taken back and repeated in [`Pace::substeps`].
     Repeat,
 }
 
 impl ForceHistory {
-    /// Of ticks that are judged, of a body with so many nodes, whose lists have room for `most_positions`.
+    /// Returns a history for ticks that are judged, of a body with so many nodes, whose lists have room for
+    /// `most_positions`.
     pub(crate) fn new(nodes: usize, most_positions: usize) -> Self {
         let forces = || InstantForces::zero(nodes, most_positions);
         Self { start: forces(), two_before: forces(), one_before: forces(), held_jump: 0.0 }
     }
 
-    /// Whether ticks are judged by it.
+    /// Returns whether ticks are judged by this history.
     pub(crate) fn is_kept(&self) -> bool {
         !self.start.total_n.is_empty()
     }
 
-    /// Before a tick: makes everything as long as the state's positions, of which there may be more or fewer than before. What was held is then of
-    /// no use, which [`MechanicalState::force_is_current`] tells.
+    /// Makes all lists as long as the state's positions before a tick, as there may be more or fewer of these than
+    /// before. What the lists held is then of no use, which [`MechanicalState::force_is_current`] tells.
     pub(crate) fn fit(&mut self, positions: usize, pace: &mut Pace) {
         if !self.is_kept() || self.start.total_n.len() == positions {
             return;
@@ -231,8 +238,8 @@ impl ForceHistory {
         }
     }
 
-    /// Before forces are evaluated at the end of substep `number` of `substeps`: what the state holds is set aside if it is wanted
-    /// again. The state is given a buffer to be overwritten.
+    /// Sets the state's forces aside if they are needed again, before forces are evaluated at the end of substep
+    /// `number` of `substeps`. The state gets a buffer that is then overwritten.
     pub(super) fn set_aside(&mut self, number: u32, substeps: u32, state: &mut MechanicalState) {
         if !self.is_kept() {
             return;
@@ -246,12 +253,13 @@ impl ForceHistory {
         }
     }
 
-    /// Puts back the forces at the start of a tick that was run.
+    /// Puts the forces at the start of a tick that was run back into the state.
     pub(crate) fn put_back(&mut self, state: &mut MechanicalState) {
         self.start.swap(state);
     }
 
-    /// Judges a tick that was run in [`Pace::substeps`] from `start`. The pace is that of the repetition, or of the next tick, then.
+    /// Judges a tick that was run in [`Pace::substeps`] from `start`. Afterwards the pace is that of the repetition, or
+    /// of the next tick.
     pub(crate) fn judge(
         &mut self,
         environment: &Environment,
@@ -272,14 +280,14 @@ impl ForceHistory {
             return Verdict::Repeat;
         }
         if substeps > environment.steps.substeps && !unstable && repeated == 0 {
-            pace.calm(environment, quotient(&evidence));
+            pace.settle(environment, quotient(&evidence));
         }
         self.hand_on(pace, substeps);
         body.accept();
         Verdict::Accept
     }
 
-    /// What the tick shows.
+    /// Returns the evidence of the tick that was run.
     fn evidence(
         &self,
         environment: &Environment,
@@ -295,11 +303,11 @@ impl ForceHistory {
         let period_s = environment.settings.tick_period_s;
         let held_sq = if substeps == 1 { self.held_jump / (period_s * period_s) } else { 0.0 };
         let found = body.evidence(environment, state, older, held_sq, substeps);
-        // As large as to have the limit of `Q`.
+        // Scaled so that it has the limit of `Q`.
         StepEvidence { long_step: LIMIT / LONG_STEP_LIMIT * found.long_step, ..found }
     }
 
-    /// Forces one and two steps before the end of the tick that was run.
+    /// Returns the forces one and two steps before the end of the tick that was run, if they are known.
     fn before_the_end<'a>(&'a self, pace: &'a Pace) -> Option<[StepForcesNow<'a>; 2]> {
         match pace.substeps {
             1 => pace.before_is_usable.then_some([self.start.now(), pace.before.now()]),
@@ -308,7 +316,7 @@ impl ForceHistory {
         }
     }
 
-    /// After a tick that was accepted: what the next one is judged by.
+    /// Keeps the forces of a tick that was accepted by which the next one is judged.
     fn hand_on(&mut self, pace: &mut Pace, substeps: u32) {
         pace.before_is_usable = substeps == 1 && !pace.before.total_n.is_empty();
         if pace.before_is_usable {
@@ -316,8 +324,8 @@ impl ForceHistory {
         }
     }
 
-    /// `Q` is above the limit, and not by mass damping or by rounding: the answer stands above the last digits of the internal forces
-    /// themselves.
+    /// Returns whether `Q` is above the limit, and not because of mass damping or rounding: the second difference must
+    /// exceed the last digits of the internal forces themselves.
     fn is_unstable(
         &self,
         evidence: &StepEvidence,
@@ -335,28 +343,29 @@ impl ForceHistory {
         let settings = &environment.settings;
         let damped = -(-settings.mass_damping_per_s * settings.tick_period_s / f64::from(pace.substeps)).exp_m1();
         let cause = evidence.cause_sq.sqrt();
-        // ‖g − g₋‖ of the two instants before the tick's end; 0 in a tick that has no such two.
+        // ‖g − g₋‖ of the two instants before the tick's end, or 0 in a tick without two such instants.
         let last_change = self.before_the_end(pace).map_or(0.0, |[one, two]| body.change(one, two));
         let beyond = (last_change - 0.5 * LIMIT * cause).max(0.0);
         if evidence.answer_sq.sqrt() <= LIMIT * cause + damped * beyond {
             return false;
         }
         let digits = settings.precision.relative_rounding();
-        // Reactions of held nodes included: between them a body may be stretched without a force on any other node.
+        // Reactions of held nodes are included: between them a body may be stretched without a force on any other node.
         evidence.answer_sq > digits * digits * body.internal_sq(environment, state)
     }
 }
 
-/// `Q`; not finite where forces are not.
+/// Returns `Q`, which is not finite where forces are not.
 fn quotient(evidence: &StepEvidence) -> f64 {
     let StepEvidence { answer_sq, cause_sq, long_step } = *evidence;
     let of_step = if answer_sq == 0.0 { 0.0 } else { (answer_sq / cause_sq).sqrt() };
     if of_step.is_finite() { of_step.max(long_step) } else { of_step }
 }
 
-/// With how many substeps to repeat a tick that proved unstable in `substeps`; `None` if no more are tried.
+/// Returns the number of substeps in which to repeat a tick that proved unstable in `substeps`, or `None` if no larger
+/// number is tried.
 ///
-/// Stress's part of `Q` falls with dt², viscosity's with dt.
+/// The part of `Q` by elastic stress falls with dt², that by viscous stress with dt.
 fn substeps_for(environment: &Environment, is_viscous: bool, substeps: u32, quotient: Option<f64>) -> Option<u32> {
     let most = most_substeps(environment);
     let wanted = match quotient.filter(|q| q.is_finite()) {

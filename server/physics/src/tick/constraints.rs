@@ -3,10 +3,10 @@ use super::EnvironmentError;
 use crate::settings::PrescribedSpec;
 use glam::DVec3;
 
-/// `1/m` (1/kg) of every node and axis, zero where it is prescribed.
+/// Returns the inverse mass `1/m` (1/kg) of every node and axis, which is zero where the displacement is prescribed.
 ///
 /// # Errors
-/// Two sets that prescribe one node along one axis.
+/// Two sets prescribe one node along one axis.
 pub(crate) fn free_inverse_mass(
     mass_kg: &[f64],
     prescribed: &[PrescribedSpec],

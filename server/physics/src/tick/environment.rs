@@ -1,4 +1,4 @@
-//! What surrounds a body, of whatever kind it is.
+//! The surroundings of a body of any kind.
 use super::{EnvironmentError, PointForce, Steps};
 use crate::{
     contact::{ContactModel, Coupling, LARGEST_TRIANGLE, SubstepTime, ToolShape, ToolSpec, ToolState, Turning},
@@ -7,12 +7,12 @@ use crate::{
 };
 use glam::DVec3;
 
-/// What is asked of a body's surroundings.
+/// The specification of a body's surroundings.
 #[derive(Debug, Clone, PartialEq)]
 pub struct EnvironmentSpec {
     /// Numerical settings.
     pub settings: Settings,
-    /// Prescribed displacements; a node's axis may be prescribed once.
+    /// Prescribed displacements; each axis of a node may be prescribed once.
     pub prescribed: Vec<PrescribedSpec>,
     /// Loads.
     pub loads: Vec<LoadSpec>,
@@ -22,7 +22,8 @@ pub struct EnvironmentSpec {
     pub tools: Vec<ToolSpec>,
 }
 
-/// Settings, constraints, loads, gravity, tools, and the surface that these act on. Constant after load.
+/// Settings, constraints, loads, gravity, tools, and the surface on which these act. It does not change after it is
+/// loaded.
 #[derive(Debug, Clone)]
 pub struct Environment {
     /// Numerical settings.
@@ -35,52 +36,53 @@ pub struct Environment {
     pub gravity_m_per_s2: DVec3,
     /// Tools.
     pub tools: Vec<ToolSpec>,
-    /// What tools touch, loads act on and viewers see.
+    /// Surface that tools touch, loads act on and viewers see.
     pub surface: Surface,
     /// Contact with that surface.
     pub contact: ContactModel,
-    /// Substeps per tick, and how many of them make a long step of a coarse level.
+    /// Number of substeps per tick, and of those in a long step of a coarse level.
     pub(crate) steps: Steps,
-    /// Forces may be injected at the first so many nodes, inside ones included, besides those of the surface.
+    /// Number of first nodes at which forces may be injected although they need not be on the surface.
     pub(crate) inner_nodes: usize,
 }
 
 impl Environment {
-    /// Around a body with this surface, contact and number of substeps.
+    /// Returns the surroundings of a body with this surface, contact and number of substeps.
     pub(crate) fn new(spec: EnvironmentSpec, surface: Surface, contact: ContactModel, steps: Steps) -> Self {
         let EnvironmentSpec { settings, prescribed, loads, gravity_m_per_s2, tools } = spec;
         Self { settings, prescribed, loads, gravity_m_per_s2, tools, surface, contact, steps, inner_nodes: 0 }
     }
 
-    /// The same; forces may also be injected at nodes inside the body, of which there are so many.
+    /// Returns the same surroundings, where forces may also be injected at the first `inner_nodes` nodes, inside the
+    /// body or not.
     pub(crate) fn with_inner_nodes(self, inner_nodes: usize) -> Self {
         Self { inner_nodes, ..self }
     }
 
-    /// Whether a force is injected on a node that there is, and finite.
+    /// Returns whether an injected force is finite and on a node that may have one.
     pub(crate) fn accepts(&self, point: &PointForce) -> bool {
         let node = point.node as usize;
         let on_surface = || self.surface.vertex_of_node.get(node).is_some_and(|&vertex| vertex != u32::MAX);
         (node < self.inner_nodes || on_surface()) && point.force_n.is_finite()
     }
 
-    /// When forces are evaluated, for contact.
+    /// Returns the time of an evaluation of forces in the form that contact takes.
     pub(crate) fn substep_time(&self, fraction: f64, dt_s: f64) -> SubstepTime {
         SubstepTime { fraction, dt_s, tick_period_s: self.settings.tick_period_s }
     }
 
-    /// The tools before the first tick.
+    /// Returns the tools' states before the first tick.
     pub(crate) fn tools_at_start(&self) -> Vec<ToolState> {
         self.tools.iter().map(ToolState::at_start).collect()
     }
 }
 
 impl EnvironmentSpec {
-    /// Checks all ranges. `surface` is what tools and loads are at, its nodes at `rest_positions_m` (m); so many nodes may be
-    /// prescribed.
+    /// Checks all ranges. `surface` is the one that tools and loads act on, with its nodes at `rest_positions_m` (m);
+    /// the first `prescribed_nodes` nodes may be prescribed.
     ///
     /// # Errors
-    /// The first value that is outside its range.
+    /// Names the first value that is outside its range.
     pub(crate) fn check(
         &self,
         surface: &Surface,
@@ -99,7 +101,7 @@ impl EnvironmentSpec {
         self.check_settings()
     }
 
-    /// Refuses capsules, which cannot press `what`.
+    /// Refuses capsules, because they cannot press `what`.
     pub(crate) fn demand_spheres(&self, what: &'static str) -> Result<(), EnvironmentError> {
         match self.tools.iter().find(|tool| tool.shape.as_capsule().is_some()) {
             Some(tool) => Err(EnvironmentError::SpheresOnly { tool: tool.name.clone(), what }),
@@ -156,7 +158,7 @@ fn loaded(load: &LoadSpec, nodes: usize, triangles: usize) -> Result<(), Environ
     }
 }
 
-/// No triangle of the surface is too large for the tool's contact samples.
+/// Checks that no triangle of the surface is too large for the tool's contact samples.
 fn fine_enough(surface: &Surface, rest_positions_m: &[DVec3], tool: &ToolSpec) -> Result<(), EnvironmentError> {
     let sizes_m = (0..surface.triangles.len()).map(|t| (t, surface.longest_edge_m(t, rest_positions_m)));
     let Some((triangle, size_m)) = sizes_m.max_by(|a, b| a.1.total_cmp(&b.1)) else {
@@ -199,12 +201,12 @@ fn tool(tool: &ToolSpec) -> Result<(), EnvironmentError> {
     setting("tool start_position_m", start, start.is_finite(), "must be finite")
 }
 
-/// Refuses a value that is not `ok`, with the rule that it breaks.
+/// Refuses a value that is not `ok`, with the rule that it violates.
 pub(crate) fn setting(name: &'static str, value: f64, ok: bool, rule: &'static str) -> Result<(), EnvironmentError> {
     if ok { Ok(()) } else { Err(EnvironmentError::Setting { name, value, rule }) }
 }
 
-/// Refuses an index that points beyond `count`.
+/// Refuses an index that is not below `count`.
 pub(crate) fn indices(
     what: &'static str,
     mut indices: impl Iterator<Item = usize>,

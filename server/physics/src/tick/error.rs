@@ -5,36 +5,36 @@ use thiserror::Error;
 /// Why a body cannot have the surroundings that are asked for.
 #[derive(Debug, Clone, PartialEq, Error)]
 pub enum EnvironmentError {
-    /// An index points nowhere.
+    /// An index is out of range.
     #[error("{what} {index} is out of range: there are {count}")]
     OutOfRange {
         /// What is indexed.
         what: &'static str,
         /// The index.
         index: usize,
-        /// How many there are.
+        /// Number of what may be indexed.
         count: usize,
     },
-    /// A setting outside its range.
+    /// A setting is outside its range.
     #[error("{name} = {value}: {rule}")]
     Setting {
-        /// Name.
+        /// Name of the setting.
         name: &'static str,
-        /// Value.
+        /// Its value.
         value: f64,
         /// What it must satisfy.
         rule: &'static str,
     },
-    /// Two prescriptions for one degree of freedom.
+    /// Two sets prescribe one degree of freedom.
     #[error("node {node} is prescribed along axis {axis} by both \"{first}\" and \"{second}\"")]
     PrescribedTwice {
-        /// Node.
+        /// The node.
         node: u32,
-        /// `x`, `y` or `z`.
+        /// Axis `x`, `y` or `z`.
         axis: char,
-        /// First set.
+        /// Name of the first set.
         first: String,
-        /// Second set.
+        /// Name of the second set.
         second: String,
     },
     /// A triangle of the surface is too large for a tool to be felt between its contact samples.
@@ -53,10 +53,10 @@ pub enum EnvironmentError {
         centre_m: DVec3,
         /// Its longest edge (m).
         size_m: f64,
-        /// The longest that this tool allows (m).
+        /// The longest edge that this tool allows (m).
         largest_m: f64,
     },
-    /// A capsule where there may only be spheres.
+    /// A tool is a capsule where only spheres are possible.
     #[error("tool \"{tool}\" is a capsule, and a capsule cannot press {what}: make it a sphere")]
     SpheresOnly {
         /// Name of the tool.
@@ -64,17 +64,17 @@ pub enum EnvironmentError {
         /// What it cannot press.
         what: &'static str,
     },
-    /// More substeps than any tick can bear.
+    /// The body needs more substeps than a tick may have.
     #[error(
         "the body needs {substeps:.3e} substeps per tick (largest natural frequency {omega_rad_per_s:.3e} rad/s); \
          coarsen or improve the mesh, soften the material, or lengthen the tick (limit {limit})"
     )]
     TooStiff {
-        /// Substeps needed.
+        /// Number of substeps needed.
         substeps: f64,
-        /// ω_max (rad/s).
+        /// Largest natural frequency ω_max (rad/s).
         omega_rad_per_s: f64,
-        /// Largest number allowed.
+        /// Largest number of substeps allowed.
         limit: u32,
     },
 }

@@ -1,4 +1,4 @@
-//! The force at an instant of a tick: when it is evaluated, and what loads and injected forces give.
+//! The evaluation of forces at an instant of a tick: its time, and the forces of loads and injections.
 use super::{Environment, MechanicalState, PointForce, TickInput};
 use crate::{
     contact::{Body, ContactScratch, ContactState, SubstepTime},
@@ -7,77 +7,78 @@ use crate::{
 };
 use glam::DVec3;
 
-/// What is the same during all of a tick.
+/// What stays the same during a tick.
 pub(crate) struct Tick<'a> {
     pub(crate) environment: &'a Environment,
     pub(crate) input: &'a TickInput<'a>,
     pub(crate) loads: LoadRamp,
-    /// Substeps it is taken in.
+    /// Number of substeps in which the tick is taken.
     pub(crate) substeps: u32,
 }
 
-/// When forces are evaluated, and how the body came there.
+/// The instant of an evaluation of forces, and the step that led to it.
 pub(crate) struct Evaluation {
-    /// Part of the tick that is over.
+    /// Fraction of the tick that is over.
     pub(crate) fraction: f64,
-    /// The same for loads.
+    /// Fraction of the tick that is over for loads.
     pub(crate) load_fraction: f64,
-    /// Step that led here (s); 0 at the start.
+    /// Step (s) that led here; 0 at the start.
     pub(crate) dt_s: f64,
-    /// Bound of the speed (m/s) with which any node came here.
+    /// Upper bound (m/s) of the speed with which any node came here.
     pub(crate) fastest_m_per_s: f64,
     /// Whether a long step of a coarse level ends here.
     pub(crate) ends_long_step: bool,
 }
 
 impl Evaluation {
-    /// At the start of a tick.
+    /// Returns the evaluation at the start of a tick.
     pub(crate) fn at_start() -> Self {
         Self::before_a_step(0.0, 0.0)
     }
 
-    /// At a part of the tick, before the step from there.
+    /// Returns the evaluation at a fraction of the tick, before the step from there.
     pub(crate) fn before_a_step(fraction: f64, load_fraction: f64) -> Self {
         Self { fraction, load_fraction, dt_s: 0.0, fastest_m_per_s: 0.0, ends_long_step: true }
     }
 }
 
 impl Tick<'_> {
-    /// Whether a long step of a coarse level ends with substep `number` (from 1).
+    /// Returns whether a long step of a coarse level ends with substep `number` (from 1).
     pub(crate) fn ends_long_step(&self, number: u32) -> bool {
         number.is_multiple_of(self.environment.steps.substeps_per_long_step)
     }
 
-    /// Whether a step of a coarse level that is longer than substeps begins with substep `number` (from 1).
+    /// Returns whether a long step of a coarse level, of more than one substep, begins with substep `number` (from 1).
     pub(crate) fn begins_long_step(&self, number: u32) -> bool {
         self.environment.steps.substeps_per_long_step > 1 && self.ends_long_step(number - 1)
     }
 
-    /// Substep `dt` (s).
+    /// Returns the substep `dt` (s).
     pub(crate) fn dt_s(&self) -> f64 {
         self.environment.settings.tick_period_s / f64::from(self.substeps)
     }
 
-    /// When contact takes part in an evaluation.
+    /// Returns the time of an evaluation in the form that contact takes.
     pub(crate) fn substep_time(&self, now: &Evaluation) -> SubstepTime {
         self.environment.substep_time(now.fraction, now.dt_s)
     }
 
-    /// At the start of substep `number` (from 1), with loads and injected forces as at its end.
+    /// Returns the evaluation at the start of substep `number` (from 1), with loads as at its end.
     pub(crate) fn before_substep(&self, number: u32) -> Evaluation {
         let part = |substeps_done: u32| f64::from(substeps_done) / f64::from(self.substeps);
         Evaluation::before_a_step(part(number - 1), part(number))
     }
 
-    /// At the end of substep `number` (from 1), to which the nodes came with at most `fastest_m_per_s`.
+    /// Returns the evaluation at the end of substep `number` (from 1), to which the nodes came with speeds of at most
+    /// `fastest_m_per_s` (m/s).
     pub(crate) fn after_substep(&self, number: u32, fastest_m_per_s: f64) -> Evaluation {
         let fraction = f64::from(number) / f64::from(self.substeps);
         let ends_long_step = self.ends_long_step(number);
         Evaluation { fraction, load_fraction: fraction, dt_s: self.dt_s(), fastest_m_per_s, ends_long_step }
     }
 
-    /// Adds loads and injected forces (N) on a surface whose nodes are at `rest_m` (m) at rest and at `x` (m) now; `load_factors`
-    /// are those at the end of the last tick.
+    /// Adds the forces (N) of loads and injections on a surface whose nodes are at `rest_m` (m) at rest and at `x` (m)
+    /// now. `load_factors` are the factors at the end of the last tick.
     pub(crate) fn add_given_n(
         &self,
         load_factors: &[f64],
@@ -97,13 +98,13 @@ impl Tick<'_> {
         }
     }
 
-    /// Injected forces on nodes that there are.
+    /// Returns the injected forces that are finite and on nodes that may have one.
     pub(crate) fn usable_points(&self) -> impl Iterator<Item = &PointForce> {
         self.input.point_forces.iter().filter(|point| self.environment.accepts(point))
     }
 
-    /// Calls `list` with every vertex that contact lists, that a load acts on or that a force is injected at, some of them several
-    /// times.
+    /// Calls `list` with every vertex that contact lists, that a load acts on or at which a force is injected, with
+    /// some of them several times.
     pub(crate) fn list_touched(&self, contact: &ContactState, mut list: impl FnMut(u32)) {
         let environment = self.environment;
         environment.contact.listed_nodes(contact).for_each(&mut list);
@@ -121,14 +122,14 @@ impl Tick<'_> {
     }
 }
 
-/// Load factors between the last tick's and this one's.
+/// Load factors that change linearly from the last tick's to this one's.
 pub(crate) struct LoadRamp {
-    /// The input has one finite factor per load. Otherwise the last tick's are kept.
+    /// Whether the input has one finite factor per load; otherwise the last tick's factors are kept.
     pub(crate) usable: bool,
 }
 
 impl LoadRamp {
-    /// From those of a state to those of the input.
+    /// Returns the ramp from the factors of a state to those of the input.
     pub(crate) fn new(state: &MechanicalState, input: &TickInput<'_>) -> Self {
         let usable =
             input.load_factors.len() == state.load_factors.len() && input.load_factors.iter().all(|f| f.is_finite());
@@ -139,7 +140,7 @@ impl LoadRamp {
         if self.usable { from + (input.load_factors[load] - from) * fraction } else { from }
     }
 
-    /// After a tick: its factors are the last ones now.
+    /// Keeps the factors of a tick that is over as the last ones.
     pub(crate) fn finish(&self, state: &mut MechanicalState, input: &TickInput<'_>) {
         if self.usable {
             state.load_factors.copy_from_slice(input.load_factors);
@@ -147,8 +148,8 @@ impl LoadRamp {
     }
 }
 
-/// Moves the tools and evaluates contact, loads and injected forces where the surface's vertices are nodes of the body: overwrites
-/// `state.external_n`. The nodes are at `rest_m` (m) at rest.
+/// Moves the tools and evaluates contact, loads and injected forces of a body whose surface's vertices are its nodes,
+/// which are at `rest_m` (m) at rest. Overwrites `state.external_n`.
 pub(crate) fn touch_nodes(
     tick: &Tick<'_>,
     now: &Evaluation,

@@ -1,4 +1,4 @@
-//! What goes into a tick, and how the state takes it.
+//! The inputs of a tick, and how they are applied to the state.
 use super::{Environment, MechanicalState};
 use crate::contact::{ContactScratch, ToolTarget};
 use glam::DVec3;
@@ -6,39 +6,41 @@ use glam::DVec3;
 /// A force injected on a node for one tick.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PointForce {
-    /// Node of the surface ([`Environment::surface`]) or, of a body of tets alone, any.
+    /// Node of the surface ([`Environment::surface`]), or any node of a body of tets alone.
     pub node: u32,
     /// Force (N, world).
     pub force_n: DVec3,
 }
 
-/// What acts during a tick; values are those at its end, and are reached linearly from the previous tick's.
+/// What acts during a tick. Values are those at its end; they are reached linearly from the previous tick's.
 #[derive(Debug, Clone, Copy)]
 pub struct TickInput<'a> {
-    /// One per tool.
+    /// Target of each tool.
     pub tools: &'a [ToolTarget],
-    /// One per load.
+    /// Factor of each load.
     pub load_factors: &'a [f64],
-    /// One per prescribed set: displacement from rest (m).
+    /// Displacement (m) from rest of each prescribed set.
     pub prescribed_displacements_m: &'a [DVec3],
-    /// Forces held constant during the tick.
+    /// Injected forces, which are constant during the tick.
     pub point_forces: &'a [PointForce],
 }
 
 impl TickInput<'_> {
-    /// Injected forces that are left out, as they are not finite or on no node.
+    /// Returns the number of injected forces that are left out, because they are not finite or on no node that may have
+    /// one.
     pub(crate) fn rejected_points(&self, environment: &Environment) -> u32 {
         self.point_forces.iter().filter(|point| !environment.accepts(point)).count() as u32
     }
 
-    /// The displacement (m) of every prescribed set; `None` where one is missing or not finite: then all hold still.
+    /// Returns the displacement (m) of every prescribed set, or `None` where one is missing or not finite; then all
+    /// sets hold still.
     pub(crate) fn usable_displacements_m(&self, environment: &Environment) -> Option<&[DVec3]> {
         let given = self.prescribed_displacements_m;
         (given.len() == environment.prescribed.len() && given.iter().all(|d| d.is_finite())).then_some(given)
     }
 }
 
-/// Gives the tools their targets, and starts their tick. Returns how many were refused.
+/// Gives the tools their targets, and starts their tick. Returns how many targets were refused.
 pub(crate) fn take_tools(
     environment: &Environment,
     state: &mut MechanicalState,
@@ -59,7 +61,7 @@ pub(crate) fn take_tools(
     rejected
 }
 
-/// The nodes that prescribed sets are of.
+/// The nodes to which prescribed sets belong.
 pub(crate) struct PrescribedNodes<'a> {
     /// Rest positions (m).
     pub(crate) rest_m: &'a [DVec3],
@@ -67,8 +69,9 @@ pub(crate) struct PrescribedNodes<'a> {
     pub(crate) mass_kg: &'a [f64],
 }
 
-/// Gives prescribed nodes the constant velocity that takes them to `X + displacement` at the tick's end (`None`: they hold still).
-/// The kinetic energy this gives is work done from outside. Returns `Σ m (Δv)²` (kg m²/s²).
+/// Gives prescribed nodes the constant velocity that takes them to `X + displacement` at the tick's end; without
+/// displacements they hold still. The kinetic energy that they get is work done from outside. Returns `Σ m (Δv)²` (kg
+/// m²/s²).
 pub(crate) fn take_prescribed(
     environment: &Environment,
     nodes: &PrescribedNodes<'_>,

@@ -1,4 +1,4 @@
-//! Drift, kick and damping of nodes with lumped masses, and what the ledger hears of them.
+//! Drift, kick and damping of nodes with lumped masses, and their entries in the ledger.
 use super::MechanicalState;
 use crate::{lanes::vector_operations, settings::PrescribedSpec};
 use glam::DVec3;
@@ -8,18 +8,19 @@ use glam::DVec3;
 pub(crate) struct LumpedMass<'a> {
     /// Mass (kg) per node.
     pub(crate) mass_kg: &'a [f64],
-    /// `1/m` (1/kg) per node and axis, zero where prescribed.
+    /// Inverse mass `1/m` (1/kg) per node and axis, zero where the displacement is prescribed.
     pub(crate) inverse_mass_per_kg: &'a [DVec3],
-    /// What is prescribed.
+    /// Prescribed displacements.
     pub(crate) prescribed: &'a [PrescribedSpec],
 }
 
-/// `x ← x + dt v`; returns a bound (m/s) of the largest speed of any node.
+/// Moves the nodes by `x ← x + dt v`. Returns an upper bound (m/s) of their speeds.
 pub(crate) fn drift(state: &mut MechanicalState, dt_s: f64) -> f64 {
     vector_operations::drift(&mut state.x, &state.v, dt_s)
 }
 
-/// Power (W) of the holders' reactions, `−f` on prescribed axes, whose velocity a kick leaves alone.
+/// Returns the power (W) of the holders' reactions, which are `−f` on prescribed axes; a kick does not change the
+/// velocity there.
 pub(crate) fn holders_power_w(prescribed: &[PrescribedSpec], forces_n: &[DVec3], v: &[DVec3]) -> f64 {
     let mut power_w = 0.0;
     for set in prescribed {
@@ -32,8 +33,9 @@ pub(crate) fn holders_power_w(prescribed: &[PrescribedSpec], forces_n: &[DVec3],
 }
 
 impl LumpedMass<'_> {
-    /// `v ← (v e^{−c h/2} + h f/m) e^{−c h/2}` with the mass damping `c` (1/s), and the ledger's share of it: what damping takes,
-    /// `½ (1 − e^{−c h}) m v²` of the velocity before and of that after the force.
+    /// Gives the nodes a kick of length `h`, `v ← (v e^{−c h/2} + h f/m) e^{−c h/2}` with the mass damping `c` (1/s),
+    /// and adds its work and dissipation to the ledger. Damping takes `½ (1 − e^{−c h}) m v²` of the velocity before
+    /// the force and as much of that after it.
     pub(crate) fn kick(&self, damping_per_s: f64, state: &mut MechanicalState, h_s: f64) {
         let mut power_w = DVec3::ZERO;
         let nodes = state.v.iter_mut().zip(&state.force_n).zip(self.inverse_mass_per_kg).zip(&state.external_n);
@@ -68,12 +70,12 @@ impl LumpedMass<'_> {
         state.ledger.external_work_j += h_s * self.holders_power_w(&state.force_n, &state.v);
     }
 
-    /// Power (W) of the holders' reactions.
+    /// Returns the power (W) of the holders' reactions.
     pub(crate) fn holders_power_w(&self, forces_n: &[DVec3], v: &[DVec3]) -> f64 {
         holders_power_w(self.prescribed, forces_n, v)
     }
 
-    /// Multiplies velocities on free axes by a factor; the ledger counts what that takes as dissipated.
+    /// Multiplies the velocities on free axes by a factor; the ledger counts the energy that this takes as dissipated.
     pub(crate) fn damp(&self, state: &mut MechanicalState, factor: f64) {
         let mut taken_j = 0.0;
         for ((v, inverse_mass), mass) in state.v.iter_mut().zip(self.inverse_mass_per_kg).zip(self.mass_kg) {

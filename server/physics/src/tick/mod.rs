@@ -1,4 +1,4 @@
-//! What every kind of body shares in a tick: what surrounds it, what goes in, the state that is there whatever the kind, and the
+//! What all kinds of body share in a tick: the surroundings, the inputs, the state that every kind has, and the
 //! operations on lumped masses.
 mod constraints;
 mod environment;

@@ -1,20 +1,22 @@
-//! How the time to build a body is parted, for who waits for it.
+//! The fractions of the time to build a body that its parts take, for a display of progress.
 
-/// To lay it out; then come its largest frequencies, untouched and touched.
+/// Fraction of the time that laying the body out takes.
 const LAID: f64 = 0.4;
+/// Fraction of the time that each of the two largest frequencies takes, first untouched, then touched.
 const FREQUENCY: f64 = 0.3;
 
-/// Tells `progress` of the body being laid out.
+/// Returns a function that tells `progress` of the body being laid out, given the fraction of it that is done.
 pub(crate) fn laying(progress: &mut dyn FnMut(f64)) -> impl FnMut(f64) {
     |part| progress(LAID * part)
 }
 
-/// Of its largest frequency while nothing touches it.
+/// Returns a function that tells `progress` of the search for the body's largest frequency while nothing touches it.
 pub(crate) fn untouched(progress: &mut dyn FnMut(f64)) -> impl FnMut(f64) {
     |part| progress(LAID + FREQUENCY * part)
 }
 
-/// Of that while it is touched everywhere.
+/// Returns a function that tells `progress` of the search for the body's largest frequency while it is touched
+/// everywhere.
 pub(crate) fn touched(progress: &mut dyn FnMut(f64)) -> impl FnMut(f64) {
     |part| progress(LAID + FREQUENCY * (1.0 + part))
 }

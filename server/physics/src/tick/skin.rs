@@ -1,35 +1,35 @@
-//! Contact, loads and injected forces on a surface whose vertices are carried by nodes: a hybrid body's skin, a refined surface of
-//! springs.
+//! Contact, loads and injected forces on a surface whose vertices are carried by nodes: the skin of a hybrid body, or a
+//! refined surface of springs.
 use super::{Evaluation, Tick};
 use crate::contact::{ContactScratch, ContactState, Skin, SurfaceNow, ToolState};
 use glam::DVec3;
 
 /// A surface whose vertices are carried by nodes, at one instant.
 pub(crate) trait CarriedSkin: Skin {
-    /// What carries a vertex: it does not change before [`Self::layout`] does.
+    /// The nodes that carry a vertex; they do not change before [`Self::layout`] does.
     type Carriers: Clone;
-    /// A number that changes where what carries vertices does.
+    /// Returns a number that changes whenever the carriers of vertices do.
     fn layout(&self) -> u64;
-    /// What carries a vertex.
+    /// Returns the carriers of a vertex.
     fn carriers(&self, vertex: u32) -> Self::Carriers;
-    /// Where a vertex is (m).
+    /// Returns the position (m) of a vertex from its carriers.
     fn carried_m(&self, carriers: &Self::Carriers) -> DVec3;
-    /// Velocity (m/s) of a vertex.
+    /// Returns the velocity (m/s) of a vertex.
     fn velocity_m_per_s(&self, vertex: u32) -> DVec3;
-    /// Gives a force (N) on a vertex to the nodes that carry it.
+    /// Adds a force (N) on a vertex to the forces on its carriers.
     fn push(&self, carriers: &Self::Carriers, force_n: DVec3, forces_n: &mut [DVec3]);
 }
 
-/// Vertices of a skin whose positions are kept up to date, because tools, loads or injected forces are at them.
+/// The vertices of a skin whose positions are kept up to date, because tools, loads or injected forces are at them.
 #[derive(Debug, Clone)]
 pub(crate) struct ListedVertices<C> {
-    /// Positions (m) of all vertices, of use at the listed ones.
+    /// Positions (m) of all vertices, which are up to date only at listed ones.
     x: Vec<DVec3>,
-    /// Forces (N) on all vertices, zero but at the listed ones.
+    /// Forces (N) on all vertices, which are zero except at listed ones.
     forces_n: Vec<DVec3>,
     listed: Vec<ListedVertex<C>>,
     is_listed: Vec<bool>,
-    /// The layout that the carriers are of.
+    /// Layout to which the carriers belong.
     layout: u64,
 }
 
@@ -40,7 +40,7 @@ struct ListedVertex<C> {
 }
 
 impl<C> ListedVertices<C> {
-    /// For a skin of so many vertices.
+    /// Returns an empty list for a skin with so many vertices.
     pub(crate) fn new(vertices: usize) -> Self {
         Self {
             x: vec![DVec3::ZERO; vertices],
@@ -55,7 +55,7 @@ impl<C> ListedVertices<C> {
         self.is_listed[vertex as usize]
     }
 
-    /// Leaves all vertices, to be listed anew.
+    /// Empties the list, so that vertices can be listed anew.
     fn start(&mut self, layout: u64) {
         for listed in &self.listed {
             self.is_listed[listed.vertex as usize] = false;
@@ -64,19 +64,20 @@ impl<C> ListedVertices<C> {
         self.layout = layout;
     }
 
-    /// Lists a vertex. Allocates nothing.
+    /// Lists a vertex. Nothing is allocated.
     fn list<S: CarriedSkin<Carriers = C>>(&mut self, skin: &S, vertex: u32) {
         if !std::mem::replace(&mut self.is_listed[vertex as usize], true) {
             self.listed.push(ListedVertex { vertex, carriers: skin.carriers(vertex) });
         }
     }
 
-    /// Nothing more is listed. Vertices go in their order, so that sums have the same bits whenever and wherefore they were listed.
+    /// Ends the listing. Vertices are sorted, so that sums have the same bits whenever and for whatever reason the
+    /// vertices were listed.
     fn finish(&mut self) {
         self.listed.sort_unstable_by_key(|listed| listed.vertex);
     }
 
-    /// Positions and no forces at the listed vertices.
+    /// Computes the positions of the listed vertices, and sets the forces on them to zero.
     fn refresh<S: CarriedSkin<Carriers = C>>(&mut self, skin: &S) {
         for ListedVertex { vertex, carriers } in &self.listed {
             self.x[*vertex as usize] = skin.carried_m(carriers);
@@ -84,7 +85,7 @@ impl<C> ListedVertices<C> {
         }
     }
 
-    /// Hands the forces on vertices to the nodes that carry them.
+    /// Adds the forces on the listed vertices to the forces on their carriers.
     fn push<S: CarriedSkin<Carriers = C>>(&self, skin: &S, forces_n: &mut [DVec3]) {
         for ListedVertex { vertex, carriers } in &self.listed {
             let force_n = self.forces_n[*vertex as usize];
@@ -95,20 +96,20 @@ impl<C> ListedVertices<C> {
     }
 }
 
-/// What a skin is touched with, of a [`super::MechanicalState`]: all but what the skin itself reads.
+/// What touches a skin: the parts of a [`super::MechanicalState`] that the skin itself does not read.
 pub(crate) struct Touch<'a> {
     pub(crate) tools: &'a mut [ToolState],
     pub(crate) contact: &'a mut ContactState,
     pub(crate) load_factors: &'a [f64],
-    /// Overwritten with what tools, loads and injected forces give the nodes (N).
+    /// Forces (N) of tools, loads and injections on the nodes, which are overwritten.
     pub(crate) external_n: &'a mut [DVec3],
     pub(crate) scratch: &'a mut ContactScratch,
-    /// Bound of the speed (m/s) with which any vertex came here.
+    /// Upper bound (m/s) of the speed with which any vertex came here.
     pub(crate) fastest_m_per_s: f64,
 }
 
-/// Moves the tools, lists what they may touch, and evaluates contact, loads and injected forces on a skin that is at `rest_m` (m) at
-/// rest.
+/// Moves the tools, lists the vertices that they may touch, and evaluates contact, loads and injected forces on a skin
+/// whose vertices are at `rest_m` (m) at rest.
 pub(crate) fn touch_skin<S: CarriedSkin>(
     tick: &Tick<'_>,
     now: &Evaluation,

@@ -7,21 +7,21 @@ use serde::{Deserialize, Serialize};
 /// What a tick changes of a body of any kind, and of its tools.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct MechanicalState {
-    /// Ticks done since reset.
+    /// Number of ticks since reset.
     pub tick: u64,
-    /// Positions (m): of the nodes that are always there, then of what is awake besides (particles, nodes of springs).
+    /// Positions (m) of the nodes that always exist, then of awake particles or nodes of springs.
     pub x: Vec<DVec3>,
     /// Velocities (m/s), at the same time as `x`.
     pub v: Vec<DVec3>,
-    /// Total force (N) at `x`: what the next half kick uses.
+    /// Total force (N) at `x`, which the next half kick uses.
     pub force_n: Vec<DVec3>,
     /// The part of it that loads, tools and injected forces make (N).
     pub external_n: Vec<DVec3>,
-    /// False: `force_n` must be computed anew before it is used.
+    /// Whether `force_n` is up to date; otherwise it must be computed before it is used.
     pub force_is_current: bool,
-    /// Tools, one per [`Environment::tools`].
+    /// State of each tool of [`Environment::tools`].
     pub tools: Vec<ToolState>,
-    /// What contact remembers: samples touched, friction springs, and geometry that follows from `x`.
+    /// State of contact: touched samples, friction springs, and geometry that follows from `x`.
     pub contact: ContactState,
     /// Factor of every load at the end of the last tick.
     pub load_factors: Vec<f64>,
@@ -32,7 +32,8 @@ pub struct MechanicalState {
 }
 
 impl MechanicalState {
-    /// At rest, at tick 0, with nodes at `x` (m), whose capacity is the most positions that there will ever be.
+    /// Returns the state at rest at tick 0, with nodes at `x` (m). The capacity of `x` is the largest number of
+    /// positions that there will ever be.
     pub(crate) fn at_rest(environment: &Environment, x: Vec<DVec3>) -> Self {
         let zeros = || {
             let mut list = Vec::with_capacity(x.capacity());
@@ -54,7 +55,7 @@ impl MechanicalState {
         }
     }
 
-    /// Copies another state of the same model into the buffers it has: allocates nothing.
+    /// Copies another state of the same model into the buffers it has. Nothing is allocated.
     pub(crate) fn copy_from(&mut self, other: &Self) {
         self.tick = other.tick;
         self.x.clone_from(&other.x);
@@ -69,7 +70,7 @@ impl MechanicalState {
         self.viscous = other.viscous;
     }
 
-    /// Back to rest at tick 0, with nodes at `x` (m), in the buffers it has: allocates nothing.
+    /// Brings the state back to rest at tick 0, with nodes at `x` (m), in the buffers it has. Nothing is allocated.
     pub(crate) fn reset(&mut self, environment: &Environment, x: impl Iterator<Item = DVec3>) {
         self.tick = 0;
         self.x.clear();
@@ -88,19 +89,19 @@ impl MechanicalState {
         self.viscous = ViscousPower::default();
     }
 
-    /// Room for positions, velocities and forces alike.
+    /// Returns the number of positions for which all lists have room.
     pub(crate) fn room(&self) -> usize {
         [&self.x, &self.v, &self.force_n, &self.external_n].iter().map(|list| list.capacity()).min().unwrap_or_default()
     }
 
-    /// Whether it is of an environment's size, with so many positions.
+    /// Returns whether the state has the sizes of an environment, and so many positions.
     pub(crate) fn fits(&self, environment: &Environment, positions: usize) -> bool {
         [&self.x, &self.v, &self.force_n, &self.external_n].iter().all(|list| list.len() == positions)
             && self.tools.len() == environment.tools.len()
             && self.load_factors.len() == environment.loads.len()
     }
 
-    /// Whether every number that is remembered is finite.
+    /// Returns whether every number of the state is finite.
     pub(crate) fn is_finite(&self) -> bool {
         let sums =
             [self.ledger.external_work_j, self.ledger.dissipated_j, self.viscous.latest_w, self.viscous.before_w];
@@ -109,10 +110,10 @@ impl MechanicalState {
             && self.load_factors.iter().chain(&sums).all(|n| n.is_finite())
     }
 
-    /// Puts a tool and its device at rest in a pose, as if it had always been there: it neither sweeps what
-    /// lies between nor keeps its contact. Where it is put into the surface it presses nothing yet: it resists from that depth
-    /// on, and as from the outside once it has left. A pose that is not finite, or a tool that is not there, changes nothing.
-    /// Allocates nothing.
+    /// Puts a tool and its device at rest in a pose, as if they had always been there: the tool neither sweeps what
+    /// lies between nor keeps its contact. Where it is put into the surface it presses nothing yet; it resists from
+    /// that depth on, and as from the outside once it has left. A pose that is not finite, or a tool that does not
+    /// exist, changes nothing. Nothing is allocated.
     pub(crate) fn place_tool(&mut self, tool: usize, pose: ToolTarget) {
         let Some(state) = self.tools.get_mut(tool).filter(|_| pose.is_finite()) else { return };
         state.target = pose.at_rest();

@@ -1,37 +1,39 @@
-//! How many substeps a tick needs.
+//! The number of substeps that a tick needs.
 use super::EnvironmentError;
 use crate::{
     material::Material,
     settings::{MAX_SUBSTEPS, Settings, Substeps},
 };
 
-/// Part of its stable step that a hybrid body's coarse level takes: below what ticks are judged unstable by (`integrate::stability`).
-const LONG_STEP_SHARE: f64 = 0.85;
+/// Fraction of its stable step that a hybrid body's coarse level takes, which is less than that at which ticks are
+/// judged unstable (`integrate::stability`).
+const LONG_STEP_FRACTION: f64 = 0.85;
 
-/// How much the square of a frequency grows at the allowed stretch: the worst of the laws ([`Material::stiffening`]).
+/// Returns the factor by which the square of a frequency grows at the allowed stretch, the largest one of the laws
+/// ([`Material::stiffening`]).
 pub(crate) fn stiffening(settings: &Settings, materials: &[Material]) -> f64 {
     materials.iter().map(|material| material.stiffening(settings.stretch_allowance)).fold(1.0, f64::max)
 }
 
-/// Substeps per tick.
+/// The substeps of a tick.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Steps {
-    /// Substeps per tick.
+    /// Number of substeps per tick.
     pub(crate) substeps: u32,
-    /// How many of them make a long step of a coarse level; 1 where there is none.
+    /// Number of substeps in a long step of a coarse level; 1 where there is none.
     pub(crate) substeps_per_long_step: u32,
 }
 
 impl Steps {
-    /// Substeps for a stable leapfrog: `dt = safety · (2/ω)(√(1 + ξ²) − ξ)`.
+    /// Returns the substeps with which leapfrog is stable: `dt = safety · (2/ω)(√(1 + ξ²) − ξ)`.
     ///
-    /// ω is the largest frequency of the body stretched by s and touched everywhere, `ω² = λ_max(M^{-½} (χK + K_contact) M^{-½})` with
-    /// the laws' stiffening χ. ξ is the damping ratio at ω: viscous stress grows with s⁴ (`P_v = F S_v`, `Ė = sym(Ḟᵀ F)`), so
-    /// `ξ = ½ ω τ s⁴/χ`, with τ the largest ratio of viscosity to stiffness over P-waves, shear and bulk:
-    /// `(φ + 2ψ)/(λ + 2µ)`, `ψ/µ`, `(φ + ⅔ψ)/(λ + ⅔µ)`.
+    /// Here ω is the largest frequency of the body stretched by s and touched everywhere,
+    /// `ω² = λ_max(M^{-½} (χK + K_contact) M^{-½})` with the laws' stiffening χ, and ξ is the damping ratio at ω.
+    /// Viscous stress grows with s⁴ (`P_v = F S_v`, `Ė = sym(Ḟᵀ F)`), so that `ξ = ½ ω τ s⁴/χ`, where τ is the largest
+    /// ratio of viscosity to stiffness over P-waves, shear and bulk: `(φ + 2ψ)/(λ + 2µ)`, `ψ/µ`, `(φ + ⅔ψ)/(λ + ⅔µ)`.
     ///
     /// # Errors
-    /// More than [`MAX_SUBSTEPS`].
+    /// The body needs more than [`MAX_SUBSTEPS`].
     pub(crate) fn choose(settings: &Settings, materials: &[Material], omega: f64) -> Result<Self, EnvironmentError> {
         let all_short = |substeps| Self { substeps, substeps_per_long_step: 1 };
         if let Substeps::Fixed(substeps) = settings.substeps {
@@ -45,10 +47,11 @@ impl Steps {
         }
     }
 
-    /// The same for a body whose coarse level, whose largest frequency is `omega` (rad/s) when stretched, may take longer steps.
+    /// Returns the same substeps for a body whose coarse level may take longer steps; `omega` (rad/s) is the largest
+    /// frequency of that level when it is stretched.
     #[must_use]
     pub(crate) fn with_long_steps(self, settings: &Settings, materials: &[Material], omega: f64) -> Self {
-        let least = wanted(settings, materials, omega / LONG_STEP_SHARE);
+        let least = wanted(settings, materials, omega / LONG_STEP_FRACTION);
         if !settings.long_coarse_steps || least >= f64::from(self.substeps) {
             return self;
         }
@@ -73,7 +76,7 @@ fn wanted(settings: &Settings, materials: &[Material], omega: f64) -> f64 {
     (settings.tick_period_s / dt_s).ceil().max(1.0)
 }
 
-/// Largest ratio of viscosity to stiffness (s) over P-waves, shear and bulk.
+/// Returns the largest ratio of viscosity to stiffness (s) over P-waves, shear and bulk.
 pub(crate) fn relaxation_time_s(material: &Material) -> f64 {
     let (lame, viscosity) = (material.lame, material.viscosity);
     let ratio = |lambdas: f64, mus: f64| {

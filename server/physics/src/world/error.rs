@@ -14,21 +14,21 @@ use thiserror::Error;
 /// Why a model cannot be built.
 #[derive(Debug, Clone, PartialEq, Error)]
 pub enum ModelError {
-    /// The body.
+    /// The body or its surroundings are wrong.
     #[error(transparent)]
     Body(#[from] BodyError),
-    /// A body that cannot tell how near to rest it is.
+    /// The body is to sleep, but has no lowest natural frequency from which its distance to rest follows.
     #[error(
         "whether a body may sleep follows from its lowest natural frequency, which it has where it is held (or let it never sleep)"
     )]
     Sleep {
-        /// Why there is none.
+        /// Why there is no such frequency.
         source: Box<ModesError>,
     },
 }
 
 impl ModelError {
-    /// What is wrong with settings, constraints, loads or tools, whatever the kind of body.
+    /// Returns what is wrong with settings, constraints, loads or tools, for any kind of body.
     pub fn environment(&self) -> Option<&EnvironmentError> {
         match self {
             Self::Body(

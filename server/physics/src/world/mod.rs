@@ -1,4 +1,5 @@
-//! [`Model`] (constant after load), [`State`] (what a tick changes), [`Scratch`] (buffers, no meaning between ticks), and [`step`].
+//! [`Model`] (which does not change after it is loaded), [`State`] (what a tick changes), [`Scratch`] (buffers without
+//! a meaning between ticks), and [`step`].
 mod by_hand;
 mod chained;
 mod energies;

@@ -1,4 +1,4 @@
-//! The model: constant after load.
+//! The model, which does not change after it is loaded.
 use super::{ModelError, ModelSpec, State, sleep::SleepBound};
 use crate::{
     bodies::{Body, MaterialPoint},
@@ -10,7 +10,7 @@ use crate::{
 };
 use glam::DVec3;
 
-/// A body in its environment: loads, constraints and tools. Constant after [`Model::build`].
+/// A body in its environment of loads, constraints and tools. It does not change after [`Model::build`].
 #[derive(Debug, Clone)]
 pub struct Model {
     body: Body,
@@ -20,7 +20,7 @@ pub struct Model {
 }
 
 impl Model {
-    /// Checks the specification, precomputes all that the rest state fixes, and chooses the substeps.
+    /// Checks the specification, computes everything that the rest state fixes, and chooses the substeps.
     ///
     /// # Errors
     /// [`ModelError`], naming what is wrong; nothing is repaired silently.
@@ -28,10 +28,10 @@ impl Model {
         Self::build_with(spec, &mut |_| {})
     }
 
-    /// The same; `progress` is told the part done of what takes long.
+    /// Does the same as [`Self::build`], and calls `progress` with the fraction that is done of what takes long.
     ///
     /// # Errors
-    /// As [`Self::build`].
+    /// The same as of [`Self::build`].
     pub fn build_with(spec: ModelSpec, progress: &mut dyn FnMut(f64)) -> Result<Self, ModelError> {
         let ModelSpec { body, prescribed, loads, gravity_m_per_s2, tools, settings } = spec;
         let around = EnvironmentSpec { settings, prescribed, loads, gravity_m_per_s2, tools };
@@ -42,78 +42,78 @@ impl Model {
         Ok(Self { body, environment, scheme, sleep_bound })
     }
 
-    /// The body.
+    /// Returns the body.
     pub fn body(&self) -> &Body {
         &self.body
     }
 
-    /// What surrounds it.
+    /// Returns the body's surroundings.
     pub fn environment(&self) -> &Environment {
         &self.environment
     }
 
-    /// Numerical settings.
+    /// Returns the numerical settings.
     pub fn settings(&self) -> &Settings {
         &self.environment.settings
     }
 
-    /// Tools.
+    /// Returns the tools.
     pub fn tools(&self) -> &[ToolSpec] {
         &self.environment.tools
     }
 
-    /// Loads.
+    /// Returns the loads.
     pub fn loads(&self) -> &[LoadSpec] {
         &self.environment.loads
     }
 
-    /// Prescribed displacements; of a hybrid body, with nodes in the middle of its coarse edges.
+    /// Returns the prescribed displacements; those of a hybrid body include nodes in the middle of its coarse edges.
     pub fn prescribed(&self) -> &[PrescribedSpec] {
         &self.environment.prescribed
     }
 
-    /// Gravity (m/s²).
+    /// Returns gravity (m/s²).
     pub fn gravity_m_per_s2(&self) -> DVec3 {
         self.environment.gravity_m_per_s2
     }
 
-    /// What tools touch and viewers see: the tets' boundary; of a hybrid body and of springs, their skin, whose vertices are their own
-    /// nodes.
+    /// Returns the surface that tools touch and viewers see: the tets' boundary, or the skin of a hybrid body or of
+    /// springs, whose vertices are numbered by themselves.
     pub fn surface(&self) -> &Surface {
         &self.environment.surface
     }
 
-    /// Contact.
+    /// Returns the contact model.
     pub fn contact(&self) -> &ContactModel {
         &self.environment.contact
     }
 
-    /// Substeps per tick.
+    /// Returns the number of substeps per tick.
     pub fn substeps(&self) -> u32 {
         self.environment.steps.substeps
     }
 
-    /// Substeps in a step of a hybrid body's coarse level.
+    /// Returns the number of substeps in a step of a hybrid body's coarse level.
     pub fn substeps_per_long_step(&self) -> u32 {
         self.environment.steps.substeps_per_long_step
     }
 
-    /// Rest positions (m) of the nodes that masses and constraints are of.
+    /// Returns the rest positions (m) of the nodes that have masses and constraints.
     pub fn rest_positions_m(&self) -> &[DVec3] {
         self.body.rest_positions_m()
     }
 
-    /// Rest positions (m) of what the surface's nodes are numbered by.
+    /// Returns the rest positions (m) of the nodes that the surface refers to.
     pub fn surface_rest_positions_m(&self) -> &[DVec3] {
         self.body.surface_rest_positions_m()
     }
 
-    /// Where the surface is (m): writes one position for each of its vertices.
+    /// Writes the position (m) of each of the surface's vertices into `positions_m`.
     pub fn surface_positions_m(&self, state: &State, positions_m: &mut Vec<DVec3>) {
         self.body.surface_positions_m(&self.environment, &state.body, &state.mechanical, positions_m);
     }
 
-    /// How far (m) a point of the material has gone from rest.
+    /// Returns the displacement (m) of a point of the material from rest.
     pub fn displacement_m(&self, state: &State, point: &MaterialPoint) -> DVec3 {
         self.body.displacement_m(&state.body, &state.mechanical, point)
     }
@@ -122,12 +122,12 @@ impl Model {
         &self.scheme
     }
 
-    /// How near to rest the body is left alone; `None`: never.
+    /// Returns the bound of the distance to rest below which the body sleeps, or `None` where it never sleeps.
     pub(super) fn sleep_bound(&self) -> Option<&SleepBound> {
         self.sleep_bound.as_ref()
     }
 
-    /// Whether ticks whose step proves too long are taken back and repeated.
+    /// Returns whether ticks whose step proves too long are taken back and repeated.
     pub(crate) fn is_judged(&self) -> bool {
         is_judged(&self.environment, self.body.can_be_judged())
     }

@@ -15,12 +15,12 @@ use std::fmt;
 pub struct Quarantine {
     /// Tick whose result was refused.
     pub tick: u64,
-    /// First node that was not finite, or [`Quarantine::NOT_A_NODE`].
+    /// The first node that was not finite, or [`Quarantine::NOT_A_NODE`].
     pub node: u32,
 }
 
 impl Quarantine {
-    /// In place of a node: a tool, a load's work, a sum or a seed body's particle was not finite.
+    /// Stands in the place of a node where a tool, a load's work, a sum or a seed body's particle was not finite.
     pub const NOT_A_NODE: u32 = u32::MAX;
 }
 
@@ -35,8 +35,8 @@ impl fmt::Display for Quarantine {
     }
 }
 
-/// After the last good tick was put back: brings it to rest, for a velocity that led here would lead here again. `place` is where the
-/// state was not finite.
+/// Brings the last good state, which was put back, to rest, because a velocity that led to the quarantine would lead to
+/// it again. `place` is where the state was not finite.
 pub(super) fn enter_quarantine(
     environment: &Environment,
     place: u32,
@@ -59,12 +59,14 @@ pub(super) fn enter_quarantine(
     Quarantine { tick, node }
 }
 
-/// What in a state is not finite: a node whose position or velocity is not, or [`Quarantine::NOT_A_NODE`].
+/// Returns what in a state is not finite, if anything: the first node whose position or velocity is not, or
+/// [`Quarantine::NOT_A_NODE`].
 pub fn first_non_finite(state: &State) -> Option<u32> {
     first_non_finite_of(&state.mechanical, state.body.is_finite())
 }
 
-/// The same of what every kind of body has; `own_is_finite` tells of what this kind has besides.
+/// Returns the same for the state that every kind of body has; `own_is_finite` tells whether the state of this kind is
+/// finite.
 pub(super) fn first_non_finite_of(state: &MechanicalState, own_is_finite: bool) -> Option<u32> {
     // One pass of additions: a sum is finite only if every term is (overflow of finite terms is caught as well).
     let sum: DVec3 = state.x.iter().zip(&state.v).map(|(x, v)| *x + *v).sum();

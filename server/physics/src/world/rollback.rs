@@ -1,4 +1,4 @@
-//! What a tick that is refused or repeated goes back to.
+//! The state to which a tick that is refused or repeated goes back.
 use super::{Model, State};
 use crate::{
     contact::{ContactState, ToolState},
@@ -7,7 +7,7 @@ use crate::{
 };
 use glam::DVec3;
 
-/// The state to go back to.
+/// The state at the start of a tick, to which the tick may go back.
 #[derive(Debug, Clone)]
 pub(super) struct LastGood {
     x: Vec<DVec3>,
@@ -27,7 +27,7 @@ impl LastGood {
         Self { x, v, force_is_current, contact, tools, load_factors, ledger, viscous }
     }
 
-    /// Copies what quarantine goes back to. Allocates nothing.
+    /// Copies the state to which a quarantine goes back. Nothing is allocated.
     pub(super) fn keep(&mut self, state: &MechanicalState) {
         self.x.clone_from(&state.x);
         self.tools.clone_from_slice(&state.tools);
@@ -35,14 +35,15 @@ impl LastGood {
         (self.ledger, self.viscous) = (state.ledger, state.viscous);
     }
 
-    /// Copies the rest of what a tick of leapfrog changes, but its forces, so that it can be repeated. Allocates nothing.
+    /// Copies what a tick of leapfrog changes besides, except its forces, so that the tick can be repeated. Nothing is
+    /// allocated.
     pub(super) fn keep_for_repetition(&mut self, state: &MechanicalState) {
         self.v.clone_from(&state.v);
         self.force_is_current = state.force_is_current;
         self.contact.keep_memory_of(&state.contact);
     }
 
-    /// Copies the tools only. Allocates nothing.
+    /// Copies only the tools. Nothing is allocated.
     pub(super) fn keep_tools(&mut self, state: &MechanicalState) {
         self.tools.clone_from_slice(&state.tools);
     }
@@ -51,12 +52,12 @@ impl LastGood {
         state.tools.clone_from_slice(&self.tools);
     }
 
-    /// Positions, and velocities where kept for repetition.
+    /// Returns the positions, and the velocities where they were kept for a repetition.
     pub(super) fn start_of_tick(&self) -> StartOfTick<'_> {
         StartOfTick { x: &self.x, v: &self.v }
     }
 
-    /// Everything of [`Self::keep`] and [`Self::keep_for_repetition`].
+    /// Puts everything back that [`Self::keep`] and [`Self::keep_for_repetition`] have copied.
     pub(super) fn put_all_back(&self, state: &mut MechanicalState) {
         self.put_back(state);
         state.v.copy_from_slice(&self.v);

@@ -3,7 +3,7 @@ use super::{Model, rollback::LastGood};
 use crate::{bodies::BodyScratch, contact::ContactScratch, integrate::ForceHistory};
 use glam::DVec3;
 
-/// Buffers of [`crate::step`], sized once.
+/// Buffers of [`crate::step`], which are allocated once.
 #[derive(Debug, Clone)]
 pub struct Scratch {
     /// Reaction forces (N) of constrained axes at the end of the tick.
@@ -15,7 +15,7 @@ pub struct Scratch {
 }
 
 impl Scratch {
-    /// Buffers for a model.
+    /// Returns buffers for a model.
     pub fn new(model: &Model) -> Self {
         let (environment, body) = (model.environment(), model.body());
         let nodes = body.rest_positions_m().len();
@@ -32,7 +32,8 @@ impl Scratch {
         }
     }
 
-    /// Force (N) that holds each prescribed degree of freedom, at the end of the last tick; zero on free ones.
+    /// Returns the force (N) that holds each prescribed degree of freedom at the end of the last tick, which is zero on
+    /// free ones.
     pub fn reactions_n(&self) -> &[DVec3] {
         &self.reaction_n
     }

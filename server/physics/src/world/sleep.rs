@@ -1,11 +1,12 @@
-//! A body at rest sleeps: nothing of it is computed until something changes.
+//! Sleep of a body at rest: nothing of it is computed until something changes.
 //!
-//! [`RestBound`] bounds how far any node is from rest, now and later. Where the bound stays below the tolerance over [`CALM_CHECKS`] looks in a row,
-//! with no tool near and no input that changes, no node will ever be further from where it is than twice the tolerance, so it is left there.
+//! [`RestBound`] bounds how far any node is from rest, now and later. Where the bound stays below the tolerance over
+//! [`STILL_CHECKS`] checks in a row, with no tool near and no input that changes, no node will ever be further from its
+//! present position than twice the tolerance, so the body is left as it is.
 //!
-//! A sleeping body wakes before a tick in which a load, a prescribed displacement or an injected force differs from the tick before, and
-//! before one in which a tool comes within a quarter of its radius of the surface: that tick then runs from its start as if it had not slept.
-//! Tools go on moving on their couplings all the while.
+//! A sleeping body wakes before a tick in which a load, a prescribed displacement or an injected force differs from the
+//! tick before, and before one in which a tool comes within a quarter of its radius of the surface: that tick then runs
+//! from its start as if it had not slept. Tools go on moving on their couplings all the while.
 //!
 //! Ledger: the kinetic energy that is dropped counts as dissipated.
 use super::{
@@ -23,48 +24,48 @@ use crate::{
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
-/// Ticks between two looks at the bound.
-const LOOK_EVERY_TICKS: u64 = 10;
-/// Looks in a row that must find it kept.
-const CALM_CHECKS: u32 = 10;
+/// Number of ticks between two checks of the bound.
+const CHECK_EVERY_TICKS: u64 = 10;
+/// Number of checks in a row that must find the bound kept.
+const STILL_CHECKS: u32 = 10;
 
-/// Whether the body sleeps, and what it is woken by.
+/// Whether the body sleeps, and the inputs whose change wakes it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Sleep {
-    /// Nothing of the body is computed.
+    /// Whether the body sleeps, so that nothing of it is computed.
     pub asleep: bool,
-    /// Looks in a row that found it calm.
-    pub calm_checks: u32,
+    /// Number of checks in a row that found the body still.
+    pub still_checks: u32,
     /// Prescribed displacements (m) of the last tick, one per set.
     pub held_m: Vec<DVec3>,
 }
 
 impl Sleep {
     pub(super) fn at_start(environment: &Environment) -> Self {
-        Self { asleep: false, calm_checks: 0, held_m: vec![DVec3::ZERO; environment.prescribed.len()] }
+        Self { asleep: false, still_checks: 0, held_m: vec![DVec3::ZERO; environment.prescribed.len()] }
     }
 
-    /// As at the start, in the buffer it has.
+    /// Wakes the body as at the start, in the buffer it has.
     pub(crate) fn reset(&mut self) {
         self.wake();
         self.held_m.fill(DVec3::ZERO);
     }
 
     pub(crate) fn copy_from(&mut self, other: &Self) {
-        (self.asleep, self.calm_checks) = (other.asleep, other.calm_checks);
+        (self.asleep, self.still_checks) = (other.asleep, other.still_checks);
         self.held_m.copy_from_slice(&other.held_m);
     }
 
-    /// Of the model's size, and asleep only in a model that ever is.
+    /// Returns whether this has the model's size, and is asleep only where the model's body may sleep.
     pub(crate) fn fits(&self, model: &Model) -> bool {
         self.held_m.len() == model.prescribed().len() && (!self.asleep || model.sleep_bound().is_some())
     }
 
     pub(super) fn wake(&mut self) {
-        (self.asleep, self.calm_checks) = (false, 0);
+        (self.asleep, self.still_checks) = (false, 0);
     }
 
-    /// Whether nothing acts in this tick that did not act, in the same measure, at the end of the last one.
+    /// Returns whether the inputs of this tick are the same as those at the end of the last one.
     pub(super) fn is_quiet(&self, load_factors: &[f64], input: &TickInput<'_>) -> bool {
         input.point_forces.is_empty()
             && input.load_factors == load_factors
@@ -80,10 +81,10 @@ pub(crate) struct SleepBound {
 }
 
 impl SleepBound {
-    /// `None` where the settings let nothing sleep.
+    /// Returns the bound, or `None` where the settings let nothing sleep.
     ///
     /// # Errors
-    /// A body that is not held, or whose modes are not found.
+    /// The body is not held, or its modes are not found.
     pub(super) fn new(environment: &Environment, body: &Body) -> Result<Option<Self>, ModesError> {
         let tolerance_m = environment.settings.sleep_tolerance_m;
         if tolerance_m <= 0.0 {
@@ -94,25 +95,26 @@ impl SleepBound {
     }
 }
 
-/// After a tick that was computed: looks whether the body may sleep. `was_quiet` is [`Sleep::is_quiet`] before it.
+/// Checks after a tick that was computed whether the body may sleep. `was_quiet` is [`Sleep::is_quiet`] before the
+/// tick.
 pub(super) fn consider(model: &Model, state: &mut State, input: &TickInput<'_>, was_quiet: bool) {
     let Some(SleepBound { tolerance_m, bound }) = model.sleep_bound() else { return };
     let State { mechanical, sleep, pace, .. } = state;
     if !was_quiet {
-        sleep.calm_checks = 0;
+        sleep.still_checks = 0;
         let given = input.prescribed_displacements_m;
         if given.len() == sleep.held_m.len() && given.iter().all(|d| d.is_finite()) {
             sleep.held_m.copy_from_slice(given);
         }
         return;
     }
-    if !mechanical.tick.is_multiple_of(LOOK_EVERY_TICKS) {
+    if !mechanical.tick.is_multiple_of(CHECK_EVERY_TICKS) {
         return;
     }
-    let calm = model.contact().is_apart(&mechanical.x, &mechanical.tools, &mechanical.contact)
+    let is_still = model.contact().is_apart(&mechanical.x, &mechanical.tools, &mechanical.contact)
         && model.body().distance_from_rest_m(bound, mechanical) <= *tolerance_m;
-    sleep.calm_checks = if calm { sleep.calm_checks + 1 } else { 0 };
-    if sleep.calm_checks >= CALM_CHECKS {
+    sleep.still_checks = if is_still { sleep.still_checks + 1 } else { 0 };
+    if sleep.still_checks >= STILL_CHECKS {
         let kinetic_j: f64 =
             mechanical.v.iter().zip(model.body().mass_kg()).map(|(v, m)| 0.5 * m * v.length_squared()).sum();
         mechanical.ledger.dissipated_j += kinetic_j;
@@ -123,7 +125,8 @@ pub(super) fn consider(model: &Model, state: &mut State, input: &TickInput<'_>, 
     }
 }
 
-/// A tick of a body that sleeps: its tools move, and nothing else. `None`: it is awake now, and the tick is still to be run.
+/// Takes a tick of a sleeping body, in which only its tools move. Returns `None` where the body woke, and the tick is
+/// still to be run.
 pub(super) fn doze(
     model: &Model,
     state: &mut State,
@@ -141,7 +144,7 @@ pub(super) fn doze(
     let inputs_rejected = take_tools(environment, mechanical, contact, input);
     if !stays_apart(environment, mechanical, contact, pace.substeps) {
         last_good.put_tools_back(mechanical);
-        // What the broad phase knows is of tools that are elsewhere.
+        // The broad phase's lists belong to tools at other positions.
         mechanical.force_is_current = false;
         sleep.wake();
         return None;
@@ -154,7 +157,7 @@ pub(super) fn doze(
     Some(StepReport { substeps: 0, repeated: 0, inputs_rejected, quarantined: None })
 }
 
-/// Moves the tools through a tick; whether none of them came near the surface.
+/// Moves the tools through a tick. Returns whether none of them came near the surface.
 fn stays_apart(
     environment: &Environment,
     state: &mut MechanicalState,

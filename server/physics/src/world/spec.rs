@@ -1,4 +1,4 @@
-//! What a model is built from.
+//! The specification from which a model is built.
 use crate::{
     bodies::BodySpec,
     contact::ToolSpec,
@@ -11,9 +11,10 @@ use glam::DVec3;
 pub struct ModelSpec {
     /// The body.
     pub body: BodySpec,
-    /// Prescribed displacements; a node's axis may be prescribed once. Of springs and of the papers' hybrid what is prescribed is held.
+    /// Prescribed displacements; each axis of a node may be prescribed once. Prescribed nodes of springs and of the
+    /// papers' hybrid are held.
     pub prescribed: Vec<PrescribedSpec>,
-    /// Loads, on nodes of the surface or, of a body of tetrahedra alone, on any.
+    /// Loads on nodes of the surface, or on any nodes of a body of tetrahedra alone.
     pub loads: Vec<LoadSpec>,
     /// Gravity (m/s²).
     pub gravity_m_per_s2: DVec3,

@@ -1,26 +1,26 @@
-//! What a tick changes.
+//! The state: everything that a tick changes.
 use super::{Model, Quarantine, Sleep};
 use crate::{bodies::BodyState, contact::ToolTarget, integrate::Pace, tick::MechanicalState};
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
-/// What a tick changes.
+/// Everything that a tick changes.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct State {
-    /// Positions, velocities, forces, tools, and the energy book: what every kind of body has.
+    /// Positions, velocities, forces, tools, and the ledger, which every kind of body has.
     pub mechanical: MechanicalState,
-    /// What this kind of body has besides.
+    /// State that only this kind of body has.
     pub body: BodyState,
-    /// In how many substeps ticks are taken.
+    /// Number of substeps in which ticks are taken.
     pub pace: Pace,
     /// Whether the body sleeps.
     pub sleep: Sleep,
-    /// Set when a tick's result was not finite.
+    /// The quarantine, where a tick's result was not finite.
     pub quarantine: Option<Quarantine>,
 }
 
 impl State {
-    /// At rest, at tick 0.
+    /// Returns the state at rest, at tick 0.
     pub fn at_rest(model: &Model) -> Self {
         let (environment, body) = (model.environment(), model.body());
         let own = BodyState::at_rest(body, environment);
@@ -36,7 +36,7 @@ impl State {
         }
     }
 
-    /// Copies another state of the same model into the buffers it has: allocates nothing.
+    /// Copies another state of the same model into the buffers it has. Nothing is allocated.
     pub fn copy_from(&mut self, other: &Self) {
         self.mechanical.copy_from(&other.mechanical);
         self.body.copy_from(&other.body);
@@ -45,8 +45,8 @@ impl State {
         self.quarantine = other.quarantine;
     }
 
-    /// The same; false, and nothing is copied, where the other state is not one of the same model by its shapes, or has more awake than
-    /// there is room for.
+    /// Does the same as [`Self::copy_from`], and returns true. Returns false and copies nothing where the other state
+    /// cannot be one of the same model by its lengths, or has more awake nodes than there is room for.
     pub fn try_copy_from(&mut self, other: &Self) -> bool {
         let (own, from) = (&self.mechanical, &other.mechanical);
         let fits = self.body.is_alike(&other.body)
@@ -60,7 +60,7 @@ impl State {
         fits
     }
 
-    /// Back to rest at tick 0, as [`Self::at_rest`], in the buffers it has: allocates nothing.
+    /// Brings the state back to rest at tick 0, as [`Self::at_rest`], in the buffers it has. Nothing is allocated.
     pub fn reset(&mut self, model: &Model) {
         let (environment, body) = (model.environment(), model.body());
         self.body.reset(body);
@@ -70,25 +70,25 @@ impl State {
         self.quarantine = None;
     }
 
-    /// Puts a tool and its device at rest in a pose, as if it had always been there: it neither sweeps what
-    /// lies between nor keeps its contact. Where it is put into the surface it presses nothing yet: it resists from that depth
-    /// on, and as from the outside once it has left. A pose that is not finite, or a tool that is not there, changes nothing.
-    /// Allocates nothing.
+    /// Puts a tool and its device at rest in a pose, as if they had always been there: the tool neither sweeps what
+    /// lies between nor keeps its contact. Where it is put into the surface it presses nothing yet; it resists from
+    /// that depth on, and as from the outside once it has left. A pose that is not finite, or a tool that does not
+    /// exist, changes nothing. Nothing is allocated.
     pub fn place_tool(&mut self, tool: usize, pose: ToolTarget) {
         self.mechanical.place_tool(tool, pose);
     }
 
-    /// Particles that are awake.
+    /// Returns the number of awake particles.
     pub fn awake_particles(&self) -> usize {
         self.body.awake_particles()
     }
 
-    /// Positions (m) of the awake particles.
+    /// Returns the positions (m) of the awake particles.
     pub fn awake_particles_m(&self) -> &[DVec3] {
         self.body.awake_particles_m(&self.mechanical)
     }
 
-    /// Simulated time (s) since reset.
+    /// Returns the simulated time (s) since reset.
     pub fn time_s(&self, model: &Model) -> f64 {
         self.mechanical.tick as f64 * model.settings().tick_period_s
     }

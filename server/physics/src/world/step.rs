@@ -1,4 +1,4 @@
-//! One tick.
+//! The step of a model by one tick.
 use super::{
     Model, Quarantine, Scratch, State,
     quarantine::{enter_quarantine, first_non_finite_of},
@@ -12,31 +12,33 @@ use crate::{
 };
 use glam::DVec3;
 
-/// What a tick did.
+/// The report of a tick.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct StepReport {
-    /// Substeps that the tick was taken in; 0 while quarantined or asleep.
+    /// Number of substeps in which the tick was taken; 0 while the state is quarantined or the body asleep.
     pub substeps: u32,
-    /// How often it was taken back and repeated in more substeps, because it proved unstable.
+    /// Number of times that the tick was taken back and repeated in more substeps, because it proved unstable.
     pub repeated: u32,
-    /// Inputs that were not finite or of the wrong length, and so were replaced by the previous tick's.
+    /// Number of inputs that were not finite or of the wrong length, and so were replaced by the previous tick's.
     pub inputs_rejected: u32,
-    /// Set when this tick's result was refused.
+    /// The quarantine, where this tick's result was refused.
     pub quarantined: Option<Quarantine>,
 }
 
 impl StepReport {
-    /// Of a tick in which nothing was done.
+    /// Report of a tick in which nothing was done.
     const NOTHING: Self = Self { substeps: 0, repeated: 0, inputs_rejected: 0, quarantined: None };
 }
 
-/// Advances `state` by one tick. Allocates nothing; same arguments, same bits.
+/// Advances `state` by one tick. Nothing is allocated, and the same arguments give the same bits.
 ///
-/// A tick of leapfrog whose step proves too long (`integrate::stability`), or whose result is not finite, is taken back and repeated from
-/// its start in more substeps, at most three times; the ticks after it keep to them until fewer would do.
+/// A tick of leapfrog whose step proves too long (`integrate::stability`), or whose result is not finite, is taken back
+/// and repeated from its start in more substeps, at most three times. The ticks after it are taken in as many until
+/// fewer suffice.
 ///
-/// A result that is not finite even so is refused: the last good state is kept, at rest, and marked as quarantined until it is
-/// reset or restored. Inputs that are not finite, or of the wrong length, are replaced by the previous tick's and counted.
+/// A result that is still not finite is refused: the last good state is kept, at rest, and marked as quarantined until
+/// it is reset or restored. Inputs that are not finite, or of the wrong length, are replaced by the previous tick's and
+/// counted.
 ///
 /// A state or scratch of another kind of body is left as it is.
 pub fn step(model: &Model, state: &mut State, scratch: &mut Scratch, input: &TickInput<'_>) -> StepReport {
@@ -107,8 +109,8 @@ pub fn step(model: &Model, state: &mut State, scratch: &mut Scratch, input: &Tic
     report
 }
 
-/// Checks the inputs, starts the tools' tick, and gives prescribed nodes the velocity that reaches their target at its end. Returns how
-/// many were refused.
+/// Checks the inputs, starts the tools' tick, and gives prescribed nodes the velocity that reaches their target at the
+/// tick's end. Returns how many inputs were refused.
 fn take_inputs(
     tick: &Tick<'_>,
     body: &SteppedBody<'_>,
@@ -128,12 +130,12 @@ fn take_inputs(
             state.ledger.external_work_j += body.held_kinetic_j(state) - before_j;
             rejected
         }
-        // What it holds stands still.
+        // Nodes that such a body holds stand still.
         None => rejected + u32::from(displacements_m.is_some_and(|given| given.iter().any(|d| *d != DVec3::ZERO))),
     }
 }
 
-/// All substeps, then what is summed up once a tick.
+/// Takes all substeps, then ends the tick of loads and contact.
 fn run(
     scheme: &Scheme,
     tick: &Tick<'_>,
@@ -147,7 +149,7 @@ fn run(
     tick.environment.contact.end_tick(&mut state.tools, &mut state.contact, tick.substeps, contact);
 }
 
-/// The holder supplies what the other forces lack: `r = −f` on prescribed axes.
+/// Writes the holders' reactions `r = −f` on prescribed axes, which balance the other forces.
 pub(super) fn write_reactions(
     environment: &Environment,
     body: &SteppedBody<'_>,

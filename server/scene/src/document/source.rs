@@ -275,6 +275,9 @@ fn document_fault(at: Where, message: &str) -> Fault {
         Some((word, known)) if message.starts_with("unknown variant") => {
             fault(at.clone(), format!("{at} = \"{word}\" is not known")).help(did_you_mean(word, known))
         }
+        Some((key, _)) if message.starts_with("duplicate field") => {
+            fault(at, format!("`{key}` is given twice, once by an earlier name of the key")).help("keep one of them")
+        }
         Some((key, _)) if message.starts_with("missing field") => {
             let length = if key.ends_with("_m") { format!(" (or `{key}m`)") } else { String::new() };
             fault(at, format!("{table} lacks the key `{key}`{length}")).help("docs/scenes.md describes every key")

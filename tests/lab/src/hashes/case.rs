@@ -112,7 +112,7 @@ fn calibrated(text: &str, limits: &Limits) -> Result<Scene> {
     let path = folder.path().join("scene.toml");
     write(&path, text)?;
     let ToCalibrate { surface, coarse, rings, table } = palpate_scene::to_calibrate(&path, limits)?;
-    let ratio = coarse.mesh_n_per_m / coarse.home_n_per_m;
+    let ratio = coarse.mesh_n_per_m / coarse.anchor_n_per_m;
     let of = calibration::Calibration { coarse, rings, ratio, samples: 2 };
     let found = calibration::ConstantsTable::calibrate(&surface, of, &mut |_| {}).into_diagnostic()?;
     write(&table, &serde_json::to_string(&found).into_diagnostic()?)?;

@@ -1,4 +1,5 @@
-//! Random mass-spring surfaces beneath tools that press, drag, jump and leave: stiff and soft, of uneven masses, refined in any way, most of them asleep or none.
+//! Random mass-spring surfaces beneath tools that press, drag, jump and leave: stiff and soft, of uneven masses,
+//! refined in any way, most of them asleep or none.
 use super::{
     Measured, Options, Outcome,
     random::Random,
@@ -9,7 +10,8 @@ use miette::{IntoDiagnostic, Result, bail};
 use palpate_physics::{
     BodySpec, ModelSpec, PointForce, Settings,
     bodies::mass_spring::{
-        HomeLaw, MassSpringSpec, Refinement, Refining, SpringSpec, home::Layer, net::hexagonal_patch, region::Constants,
+        AnchorLaw, MassSpringSpec, Refinement, Refining, SpringSpec, anchor::Layer, net::hexagonal_patch,
+        region::Constants,
     },
     contact::{Coupling, ToolShape, ToolSpec, ToolTarget},
 };
@@ -68,7 +70,7 @@ fn one(seed: u64) -> Result<Found> {
     let edge_m = random.log_within(1e-3, 1e-2);
     let spec = body(edge_m, &mut random)?;
     let BodySpec::MassSpring(springs) = &spec.body else { bail!("the body is not one of springs") };
-    let home_n_per_m = springs.springs.coarse.home_n_per_m;
+    let anchor_n_per_m = springs.springs.coarse.anchor_n_per_m;
     let mut rig = Rig::new(spec.clone())?;
     let mut drive = Drive::still(&rig.model);
     let jumps = random.chance(0.3);
@@ -94,7 +96,7 @@ fn one(seed: u64) -> Result<Found> {
         drive.point_forces.clear();
         if tick <= TICKS && random.chance(0.05) {
             let node = random.below(rig.model.surface().nodes.len()) as u32;
-            drive.point_forces.push(PointForce { node, force_n: random.vector() * (0.1 * home_n_per_m * edge_m) });
+            drive.point_forces.push(PointForce { node, force_n: random.vector() * (0.1 * anchor_n_per_m * edge_m) });
         }
         if let Some(quarantine) = rig.tick(&drive).quarantined {
             found.refused = Some(quarantine.tick as u32);
@@ -126,24 +128,24 @@ fn body(edge_m: f64, random: &mut Random) -> Result<ModelSpec> {
     let bent = surface.positions_m().iter().map(|p| *p + DVec3::Z * (lift_m * (p.x / (5.0 * edge_m)).sin()));
     let bent = bent.map(|p| p + random.vector() * (0.15 * edge_m)).collect();
     let surface = surface.moved(bent).into_diagnostic()?;
-    let border = (0..vertices as u32).filter(|&vertex| surface.is_border(vertex)).collect();
-    let home_n_per_m = random.log_within(1.0, 100.0);
-    let coarse = Constants { mesh_n_per_m: home_n_per_m * random.log_within(1e-2, 1e2), home_n_per_m };
-    let [mesh, home] = [random.within(0.3, 1.5), random.within(0.1, 1.0)];
-    let fine = Constants { mesh_n_per_m: coarse.mesh_n_per_m * mesh, home_n_per_m: home_n_per_m * home };
+    let boundary = (0..vertices as u32).filter(|&vertex| surface.is_boundary(vertex)).collect();
+    let anchor_n_per_m = random.log_within(1.0, 100.0);
+    let coarse = Constants { mesh_n_per_m: anchor_n_per_m * random.log_within(1e-2, 1e2), anchor_n_per_m };
+    let [mesh, anchor] = [random.within(0.3, 1.5), random.within(0.1, 1.0)];
+    let fine = Constants { mesh_n_per_m: coarse.mesh_n_per_m * mesh, anchor_n_per_m: anchor_n_per_m * anchor };
     let mass_kg = random.log_within(1e-5, 1e-3);
     let uneven = random.within(1.0, 10.0);
     let layers =
         [(0.3, 1.0), (1.0, 5.0)].map(|(part, stiffness_ratio)| Layer { thickness_m: part * edge_m, stiffness_ratio });
-    let home_law = match random.below(3) {
-        0 => HomeLaw::Linear,
-        1 => HomeLaw::cubic(random.log_within(0.1, 10.0) / (edge_m * edge_m)).into_diagnostic()?,
-        _ => HomeLaw::layers(&layers).into_diagnostic()?,
+    let anchor_law = match random.below(3) {
+        0 => AnchorLaw::Linear,
+        1 => AnchorLaw::cubic(random.log_within(0.1, 10.0) / (edge_m * edge_m)).into_diagnostic()?,
+        _ => AnchorLaw::layers(&layers).into_diagnostic()?,
     };
     let springs = SpringSpec {
         coarse,
         fine,
-        home_law,
+        anchor_law,
         mass_kg: (0..vertices).map(|_| mass_kg * random.log_within(1.0, uneven + 1e-9)).collect(),
         held: Vec::new(),
         most_awake: if random.chance(0.5) { vertices } else { 100 + random.below(100) },
@@ -153,13 +155,13 @@ fn body(edge_m: f64, random: &mut Random) -> Result<ModelSpec> {
     let refinement = random.chance(0.8).then(|| Refinement {
         rings: 1 + random.below(4) as u32,
         follows_dent: random.chance(0.3),
-        fade_s: random.log_within(5e-3, 0.2),
+        blend_s: random.log_within(5e-3, 0.2),
         by: Refining::ByTools,
     });
     let tools = 1 + random.below(2);
     Ok(ModelSpec {
         body: BodySpec::MassSpring(MassSpringSpec { springs, refinement, table: None }),
-        prescribed: vec![hold("border", border)],
+        prescribed: vec![hold("boundary", boundary)],
         loads: Vec::new(),
         gravity_m_per_s2: DVec3::ZERO,
         tools: (0..tools).map(|number| tool(number, edge_m, random)).collect(),

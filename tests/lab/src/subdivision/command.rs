@@ -11,7 +11,7 @@ use miette::{Context, IntoDiagnostic, Result};
 use std::{fmt::Write as _, path::PathBuf};
 
 /// `K_m/K_h` before: the paper's figures, and the two it compares them with.
-const MESH_OVER_HOME: [f64; 3] = [1.0, 10.0, 0.1];
+const MESH_OVER_ANCHOR: [f64; 3] = [1.0, 10.0, 0.1];
 
 /// Where to.
 #[derive(Debug, Clone, Args)]
@@ -21,7 +21,8 @@ pub struct Options {
     out: PathBuf,
 }
 
-/// Computes figures 5 to 11 at all three `K_m/K_h`, figure 12, and sheets beneath tools; writes them and says what they say.
+/// Computes figures 5 to 11 at all three `K_m/K_h`, figure 12, and sheets beneath tools; writes them and says what they
+/// say.
 ///
 /// # Errors
 /// A file that cannot be written, or springs that come to no rest.
@@ -31,10 +32,10 @@ pub fn run(options: &Options) -> Result<()> {
     let bar = ProgressBar::new(1000);
     bar.set_style(ProgressStyle::with_template("{bar:20} {percent} % {elapsed} {msg}").into_diagnostic()?);
     let mut all = Vec::new();
-    for (number, mesh_over_home) in MESH_OVER_HOME.into_iter().enumerate() {
-        bar.set_message(format!("K_m/K_h = {mesh_over_home}"));
+    for (number, mesh_over_anchor) in MESH_OVER_ANCHOR.into_iter().enumerate() {
+        bar.set_message(format!("K_m/K_h = {mesh_over_anchor}"));
         let mut tell = |part: f64| bar.set_position(((number as f64 + part) / 6.0 * 1000.0) as u64);
-        all.push((mesh_over_home, figures(Experiment { mesh_over_home }, &mut tell)?));
+        all.push((mesh_over_anchor, figures(Experiment { mesh_over_anchor }, &mut tell)?));
     }
     let mut contacts = Vec::new();
     for (number, touch) in TOUCHES.into_iter().enumerate() {
@@ -57,12 +58,12 @@ pub fn run(options: &Options) -> Result<()> {
 
 fn csv(all: &[(f64, Vec<Figure>)]) -> String {
     let mut text = String::from("km_over_kh,figure,quantity,curve,x_over_l,value\n");
-    for (mesh_over_home, figures) in all {
+    for (mesh_over_anchor, figures) in all {
         for figure in figures {
             for curve in &figure.curves {
                 for (x, value) in &curve.points {
                     let (number, quantity, name) = (figure.number, figure.quantity, &curve.name);
-                    let _ = writeln!(text, "{mesh_over_home},{number},{quantity},{name},{x},{value:.9e}");
+                    let _ = writeln!(text, "{mesh_over_anchor},{number},{quantity},{name},{x},{value:.9e}");
                 }
             }
         }
@@ -112,8 +113,8 @@ fn print_contacts(contacts: &[(Touch, Vec<Run>)]) {
 
 /// Ends and middle of every curve.
 fn print(all: &[(f64, Vec<Figure>)]) {
-    for (mesh_over_home, figures) in all {
-        println!("\nK_m/K_h = {mesh_over_home}: at x = 0.01 L, 0.5 L, L");
+    for (mesh_over_anchor, figures) in all {
+        println!("\nK_m/K_h = {mesh_over_anchor}: at x = 0.01 L, 0.5 L, L");
         for figure in figures {
             println!("  figure {}: {}", figure.number, figure.title);
             for curve in &figure.curves {

@@ -1,11 +1,13 @@
-//! Coarse sheets and sheets refined where they are touched, in the loop, against one that is fine everywhere: force and shape over time, and what a tick costs.
+//! Coarse sheets and sheets refined where they are touched, in the loop, against one that is fine everywhere: force and
+//! shape over time, and what a tick costs.
 //!
-//! The fine sheet is the coarse one refined everywhere, on the same foundation per area ([`matching::area_consistent`]), with the same mass per area. A sphere presses, rests, is drawn along, and leaves.
+//! The fine sheet is the coarse one refined everywhere, on the same foundation per area
+//! ([`matching::area_consistent`]), with the same mass per area. A sphere presses, rests, is drawn along, and leaves.
 use glam::DVec3;
 use palpate_physics::{
     BodySpec, Model, ModelError, ModelSpec, PrescribedSpec, Scratch, Settings, State, TickInput,
     bodies::mass_spring::{
-        HomeLaw, MassSpringSpec, Refinement, Refining, SpringSpec,
+        AnchorLaw, MassSpringSpec, Refinement, Refining, SpringSpec,
         calibration::{Calibration, CalibrationError, ConstantsTable},
         loop_scheme::refined,
         matching,
@@ -21,7 +23,7 @@ use thiserror::Error;
 
 const EDGE_M: f64 = 4e-3;
 const RINGS: i32 = 12;
-const COARSE: Constants = Constants { mesh_n_per_m: 60.0, home_n_per_m: 12.0 };
+const COARSE: Constants = Constants { mesh_n_per_m: 60.0, anchor_n_per_m: 12.0 };
 const AREA_DENSITY_KG_PER_M2: f64 = 15.0;
 const DAMPING_PER_S: f64 = 60.0;
 const TICKS: u32 = 1000;
@@ -107,7 +109,7 @@ pub fn compare(touch: Touch, tell: &mut dyn FnMut(f64)) -> Result<Vec<Run>, Cont
     ];
     for rings in [1, 2] {
         let count = if rings == 1 { "one ring" } else { "two rings" };
-        let of = Calibration { coarse: COARSE, rings, ratio: COARSE.mesh_n_per_m / COARSE.home_n_per_m, samples: 3 };
+        let of = Calibration { coarse: COARSE, rings, ratio: COARSE.mesh_n_per_m / COARSE.anchor_n_per_m, samples: 3 };
         let table = ConstantsTable::calibrate(&coarse, of, &mut |_| ())?;
         for (how, fine, table) in [("unchanged", COARSE, None), ("table", COARSE, Some(table)), ("area", area, None)] {
             let name = format!("{count}, {how}");
@@ -133,11 +135,11 @@ fn sheet(
     table: Option<ConstantsTable>,
 ) -> Result<Sheet, ContactError> {
     let vertices = surface.positions_m().len();
-    let border: Vec<u32> = (0..vertices as u32).filter(|&vertex| surface.is_border(vertex)).collect();
+    let boundary: Vec<u32> = (0..vertices as u32).filter(|&vertex| surface.is_boundary(vertex)).collect();
     let springs = SpringSpec {
         coarse,
         fine,
-        home_law: HomeLaw::Linear,
+        anchor_law: AnchorLaw::Linear,
         mass_kg: surface.vertex_areas_m2().iter().map(|area_m2| area_m2 * AREA_DENSITY_KG_PER_M2).collect(),
         held: Vec::new(),
         most_awake: vertices,
@@ -145,11 +147,11 @@ fn sheet(
         surface,
     };
     let refinement =
-        (rings > 0).then_some(Refinement { rings, follows_dent: rings > 2, fade_s: 0.1, by: Refining::ByTools });
+        (rings > 0).then_some(Refinement { rings, follows_dent: rings > 2, blend_s: 0.1, by: Refining::ByTools });
     let radius_m = touch.radius * EDGE_M;
     let model = Model::build(ModelSpec {
         body: BodySpec::MassSpring(MassSpringSpec { springs, refinement, table }),
-        prescribed: vec![PrescribedSpec { name: "border".into(), nodes: border, axes: [true; 3] }],
+        prescribed: vec![PrescribedSpec { name: "boundary".into(), nodes: boundary, axes: [true; 3] }],
         loads: Vec::new(),
         gravity_m_per_s2: DVec3::ZERO,
         tools: vec![ToolSpec {
@@ -228,7 +230,8 @@ impl Sheet {
 mod tests {
     use super::*;
 
-    /// Beneath a tool that touches many vertices, refined on the same foundation per area, force and shape are nearer to the fine sheet's than coarse; beneath any tool constants unchanged are too stiff.
+    /// Beneath a tool that touches many vertices, refined on the same foundation per area, force and shape are nearer
+    /// to the fine sheet's than coarse; beneath any tool constants unchanged are too stiff.
     #[test]
     fn refined_on_the_same_foundation_is_nearer_to_the_fine_sheet() {
         let area = TOUCHES[2];

@@ -13,7 +13,7 @@ use thiserror::Error;
 const RADIUS_M: f64 = 0.04;
 /// How often each triangle of an octahedron is split in four.
 const SPLITS: u32 = 3;
-const COARSE: Constants = Constants { mesh_n_per_m: 60.0, home_n_per_m: 60.0 };
+const COARSE: Constants = Constants { mesh_n_per_m: 60.0, anchor_n_per_m: 60.0 };
 /// Where it is pressed, and how deep over the mean edge's length.
 const TOWARDS: DVec3 = DVec3::new(0.35, -0.35, 0.87);
 const DEPTH: f64 = 1.0;
@@ -64,7 +64,7 @@ pub fn domes() -> Result<Vec<Dome>, DomeError> {
         let refined = Refined::new(&surface, &Region::rings(&surface, &[centre], rings), &rest_m);
         let inside = match domes.first() {
             None => COARSE,
-            Some(coarse) => matched(&refined, &COARSE, (centre, inwards), coarse.force_n, Way::Ratio(1.0))?,
+            Some(coarse) => matched(&refined, &COARSE, centre, inwards, coarse.force_n, Way::Ratio(1.0))?,
         };
         let net = refined.net(&COARSE, &inside);
         let mut x_m = net.rest_m.clone();

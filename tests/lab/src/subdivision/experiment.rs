@@ -1,8 +1,10 @@
-//! A flat sheet of equilateral triangles, one vertex pulled out of it: the force before, and the constants with which it is the same once one ring or two about the vertex are refined.
+//! A flat sheet of equilateral triangles, one vertex pulled out of it: the force before, and the constants with which
+//! it is the same once one ring or two about the vertex are refined.
 //!
-//! The paper leaves open how large the sheet is, how its edge is held, whether the others move in the plane, and whose constants rim and cracks have. Here: eight rings for
-//! one refined ring and six for two; a free edge; every vertex but the pulled one at rest in three dimensions; all nodes of the refined area, and all springs that touch its
-//! inside, its rim or close its cracks, have the new constants; rest lengths are those of the flat sheet.
+//! The paper leaves open how large the sheet is, how its edge is held, whether the others move in the plane, and whose
+//! constants rim and cracks have. Here: eight rings for one refined ring and six for two; a free edge; every vertex but
+//! the pulled one at rest in three dimensions; all nodes of the refined area, and all springs that touch its inside,
+//! its rim or close its cracks, have the new constants; rest lengths are those of the flat sheet.
 use glam::DVec3;
 use miette::{IntoDiagnostic, Result};
 use palpate_physics::bodies::mass_spring::{
@@ -16,7 +18,7 @@ use palpate_physics::bodies::mass_spring::{
 /// `L` (m).
 pub(super) const EDGE_M: f64 = 0.03;
 /// `K_h` (N/m).
-pub(super) const HOME_N_PER_M: f64 = 60.0;
+pub(super) const ANCHOR_N_PER_M: f64 = 60.0;
 /// Displacements over `L`: the paper's plots reach from 0 to 1.
 const STEPS: [f64; 24] = [
     0.01, 0.02, 0.03, 0.05, 0.075, 0.1, 0.15, 0.2, 0.25, 0.3, 0.35, 0.4, 0.45, 0.5, 0.55, 0.6, 0.65, 0.7, 0.75, 0.8,
@@ -51,7 +53,7 @@ pub struct Curve {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Experiment {
     /// `K_m/K_h` before.
-    pub mesh_over_home: f64,
+    pub mesh_over_anchor: f64,
 }
 
 /// A sheet before and after.
@@ -69,7 +71,7 @@ impl Sheet {
         let coarse = hexagonal_patch(size, EDGE_M).into_diagnostic()?;
         let region = Region::rings(&coarse, &[0], rings);
         let after = Refined::new(&coarse, &region, &refined(&coarse).0);
-        let net = Net::uniform(&coarse, constants.mesh_n_per_m, constants.home_n_per_m);
+        let net = Net::uniform(&coarse, constants.mesh_n_per_m, constants.anchor_n_per_m);
         let mut x_m = net.rest_m.clone();
         let mut force_n = |part: &f64| point_force_n(&net, 0, DVec3::Z * (part * EDGE_M), &mut x_m).map(|f| f.z);
         let forces_n = STEPS.iter().map(&mut force_n).collect::<Result<_, _>>().into_diagnostic()?;
@@ -79,7 +81,7 @@ impl Sheet {
     /// Constants with which each force is the same after.
     fn matched(&self, way: Way) -> Result<Vec<Constants>> {
         let of = |(part, force_n): (&f64, &f64)| {
-            matched(&self.refined, &self.constants, (0, DVec3::Z * (part * EDGE_M)), *force_n, way).into_diagnostic()
+            matched(&self.refined, &self.constants, 0, DVec3::Z * (part * EDGE_M), *force_n, way).into_diagnostic()
         };
         STEPS.iter().zip(&self.forces_n).map(of).collect()
     }
@@ -94,8 +96,8 @@ fn mesh(found: &Constants, before: &Constants) -> f64 {
     found.mesh_n_per_m / before.mesh_n_per_m
 }
 
-fn home(found: &Constants, before: &Constants) -> f64 {
-    found.home_n_per_m / before.home_n_per_m
+fn anchor(found: &Constants, before: &Constants) -> f64 {
+    found.anchor_n_per_m / before.anchor_n_per_m
 }
 
 /// Figures 5 to 11. `tell` is told the part done.
@@ -103,7 +105,8 @@ fn home(found: &Constants, before: &Constants) -> f64 {
 /// # Errors
 /// Springs that come to no rest, or a force that no constant gives.
 pub fn figures(experiment: Experiment, tell: &mut dyn FnMut(f64)) -> Result<Vec<Figure>> {
-    let constants = Constants { mesh_n_per_m: experiment.mesh_over_home * HOME_N_PER_M, home_n_per_m: HOME_N_PER_M };
+    let constants =
+        Constants { mesh_n_per_m: experiment.mesh_over_anchor * ANCHOR_N_PER_M, anchor_n_per_m: ANCHOR_N_PER_M };
     let sheets = [Sheet::new(1, constants)?, Sheet::new(2, constants)?];
     let total = 2.0 * (2 + RATIOS.len()) as f64;
     let mut done = 0.0;
@@ -122,27 +125,27 @@ pub fn figures(experiment: Experiment, tell: &mut dyn FnMut(f64)) -> Result<Vec<
     }];
     for (rings, sheet) in ["one ring", "two rings"].into_iter().zip(&sheets) {
         let number = if rings == "one ring" { 6 } else { 7 };
-        // K′_h = K_h N/N′: home springs add up to the same.
-        let spread = constants.home_n_per_m * sheet.refined.node_ratio();
+        // K′_h = K_h N/N′: anchor springs add up to the same.
+        let spread = constants.anchor_n_per_m * sheet.refined.node_ratio();
         let mut curves = Vec::new();
-        for (name, home_n_per_m) in [("K'_h by eq. 5", spread), ("K'_h = K_h", constants.home_n_per_m)] {
-            curves.push(sheet.curve(name.into(), &sheet.matched(Way::Home(home_n_per_m))?, mesh));
+        for (name, anchor_n_per_m) in [("K'_h by eq. 5", spread), ("K'_h = K_h", constants.anchor_n_per_m)] {
+            curves.push(sheet.curve(name.into(), &sheet.matched(Way::Anchor(anchor_n_per_m))?, mesh));
             tell();
         }
         let title = format!("K'_m that gives the same force, {rings} refined");
         figures.push(Figure { number, title, quantity: "K'_m/K_m", curves });
     }
     for (rings, sheet, number) in [("one ring", &sheets[0], 8), ("two rings", &sheets[1], 10)] {
-        let (mut homes, mut meshes) = (Vec::new(), Vec::new());
+        let (mut anchors, mut meshes) = (Vec::new(), Vec::new());
         for ratio in RATIOS {
-            let found = sheet.matched(Way::Ratio(ratio * experiment.mesh_over_home))?;
-            let name = format!("K'_m/K'_h = {}", ratio * experiment.mesh_over_home);
-            homes.push(sheet.curve(name.clone(), &found, home));
+            let found = sheet.matched(Way::Ratio(ratio * experiment.mesh_over_anchor))?;
+            let name = format!("K'_m/K'_h = {}", ratio * experiment.mesh_over_anchor);
+            anchors.push(sheet.curve(name.clone(), &found, anchor));
             meshes.push(sheet.curve(name, &found, mesh));
             tell();
         }
         let title = |of: &str| format!("{of} at a fixed ratio, {rings} refined");
-        figures.push(Figure { number, title: title("K'_h"), quantity: "K'_h/K_h", curves: homes });
+        figures.push(Figure { number, title: title("K'_h"), quantity: "K'_h/K_h", curves: anchors });
         figures.push(Figure { number: number + 1, title: title("K'_m"), quantity: "K'_m/K_m", curves: meshes });
     }
     Ok(figures)
@@ -168,8 +171,8 @@ mod tests {
     }
 
     /// What the paper says of its figures, one by one.
-    fn statements(mesh_over_home: f64) {
-        let figures = figures(Experiment { mesh_over_home }, &mut |_| {}).unwrap();
+    fn statements(mesh_over_anchor: f64) {
+        let figures = figures(Experiment { mesh_over_anchor }, &mut |_| {}).unwrap();
         assert_eq!(figures.iter().map(|figure| figure.number).collect::<Vec<_>>(), [5, 6, 7, 8, 9, 10, 11]);
         let force = &curves(&figures, 5)[0];
         assert!(force.windows(2).all(|pair| pair[1] > pair[0]));
@@ -178,22 +181,23 @@ mod tests {
             // "As displacement approaches zero, the upper plot asymptotically approaches infinity": as 1/x² at least.
             assert!(
                 falls(&spread[..8]) && spread[0] > 3.5 * spread[1] && spread[0] > 30.0,
-                "{mesh_over_home}: {spread:?}"
+                "{mesh_over_anchor}: {spread:?}"
             );
             assert!(spread.iter().zip(kept).all(|(upper, lower)| upper > lower));
             // "It also shows that K'_m is smaller than K_m."
             assert!(kept.iter().all(|k| *k < 1.0), "{kept:?}");
         }
-        for (homes, meshes) in [(8, 9), (10, 11)] {
-            let (homes, meshes) = (curves(&figures, homes), curves(&figures, meshes));
+        for (anchors, meshes) in [(8, 9), (10, 11)] {
+            let (anchors, meshes) = (curves(&figures, anchors), curves(&figures, meshes));
             // "All the plots start from a ratio of K'_h/K_h close to 1."
-            assert!(homes.iter().all(|curve| (curve[0] - 1.0).abs() < 0.03), "{homes:?}");
-            // "When K'_h has a ratio of 4 over K'_m, the plot shows the least variation"; "the K'_h = 0.25 K'_m plot shows the largest".
-            let ranges: Vec<f64> = homes.iter().map(|curve| range(curve)).collect();
+            assert!(anchors.iter().all(|curve| (curve[0] - 1.0).abs() < 0.03), "{anchors:?}");
+            // "When K'_h has a ratio of 4 over K'_m, the plot shows the least variation"; "the K'_h = 0.25 K'_m plot
+            // shows the largest".
+            let ranges: Vec<f64> = anchors.iter().map(|curve| range(curve)).collect();
             assert!(ranges[0] > ranges[1] && ranges[0] > ranges[2], "{ranges:?}");
             // "Actually they are the same plot drawn in different ordinates."
-            for ((home, mesh), ratio) in homes.iter().zip(&meshes).zip(RATIOS) {
-                assert!(home.iter().zip(mesh).all(|(h, m)| (m / h / ratio - 1.0).abs() < 1e-9));
+            for ((anchor, mesh), ratio) in anchors.iter().zip(&meshes).zip(RATIOS) {
+                assert!(anchor.iter().zip(mesh).all(|(h, m)| (m / h / ratio - 1.0).abs() < 1e-9));
             }
         }
         // "The number of rings does not change the nature of the shape of the plots."
@@ -208,12 +212,12 @@ mod tests {
     #[test]
     fn the_papers_statements_hold() {
         statements(1.0);
-        let figures = figures(Experiment { mesh_over_home: 1.0 }, &mut |_| {}).unwrap();
+        let figures = figures(Experiment { mesh_over_anchor: 1.0 }, &mut |_| {}).unwrap();
         // "An approximately linear relationship": within a few per cent of the straight line nearest to it.
         let kept = &curves(&figures, 6)[1];
         assert!(deviation_from_line(kept) < 0.1, "{}", deviation_from_line(kept));
-        let homes = curves(&figures, 8);
-        assert!(range(&homes[2]) < range(&homes[1]), "ratio 0.25 varies least");
+        let anchors = curves(&figures, 8);
+        assert!(range(&anchors[2]) < range(&anchors[1]), "ratio 0.25 varies least");
     }
 
     /// "The initial ratio of K_m/K_h does not affect the basic relationship."

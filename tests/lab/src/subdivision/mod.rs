@@ -1,4 +1,5 @@
-//! `palpate-lab subdivision`: the experiment of haptic-subdivision, figures 5 to 12, and sheets in the loop against one that is fine everywhere.
+//! `palpate-lab subdivision`: the experiment of haptic-subdivision, figures 5 to 12, and sheets in the loop against one
+//! that is fine everywhere.
 //!
 //! - `experiment.rs`: figures 5 to 11
 //! - `dome.rs`: figure 12

@@ -2,7 +2,7 @@
 use super::{
     contact::{Run, Touch},
     dome::Dome,
-    experiment::{Curve, EDGE_M, Figure, HOME_N_PER_M},
+    experiment::{ANCHOR_N_PER_M, Curve, EDGE_M, Figure},
 };
 use std::fmt::Write as _;
 
@@ -28,13 +28,13 @@ pub(super) fn page(all: &[(f64, Vec<Figure>)], domes: &[Dome], contacts: &[(Touc
         "<!doctype html><html lang=\"en\"><meta charset=\"utf-8\"><meta name=\"viewport\" content=\"width=device-width\">\
          <title>Palpate: haptic subdivision</title><style>{STYLE}</style><body><h1>Haptic subdivision</h1>\
          <p>Figures 5 to 11 of <i>Haptic Subdivision: an Approach to Defining Level-of-detail in Haptic Rendering</i> (Zhang, Payandeh, Dill). \
-         A flat sheet of equilateral triangles with edges L = {} mm, home springs K<sub>h</sub> = {} N/m; one vertex is pulled out of it by x, all others \
+         A flat sheet of equilateral triangles with edges L = {} mm, anchor springs K<sub>h</sub> = {} N/m; one vertex is pulled out of it by x, all others \
          are at rest. Six or eight rings of triangles about it, their outer edge free.</p>",
         EDGE_M * 1e3,
-        HOME_N_PER_M
+        ANCHOR_N_PER_M
     );
-    for (mesh_over_home, figures) in all {
-        let _ = write!(out, "<h2>K<sub>m</sub>/K<sub>h</sub> = {mesh_over_home}</h2><div class=\"figures\">");
+    for (mesh_over_anchor, figures) in all {
+        let _ = write!(out, "<h2>K<sub>m</sub>/K<sub>h</sub> = {mesh_over_anchor}</h2><div class=\"figures\">");
         for figure in figures {
             let _ = write!(
                 out,

@@ -1,14 +1,19 @@
-//! Triangles and vertices around some vertices, for the loop: in buffers that are there. Their oracle is [`super::Region`].
+//! Triangles and vertices around given vertices, written into buffers of the loop. The oracle is [`super::Region`].
 use super::topology::{NONE, Triangulation};
 
-/// Triangles of so many rings about vertices, ascending, as [`super::Region::rings`] has them, but at most so many: a ring that would be more is left out, but for the first one, which has all triangles at the
-/// first vertices then; what closes the region stops there.
-/// With room for as many triangles and three times as many corners nothing is allocated.
+/// Writes the triangles of `rings` rings about the vertices `centres` into `triangles`, ascending, as
+/// [`super::Region::rings`] has them, but at most `most` of them. A ring for which there is no room is left out; of the
+/// first ring the triangles at as many centres as there is room for are taken. Triangles that would close the region
+/// are left out where there is no room. `corners` is a buffer.
+///
+/// Nothing is allocated where `triangles` has room for `most` triangles and `corners` for three times as many.
 pub fn rings_into(
     surface: &Triangulation,
     centres: &[u32],
-    (rings, most): (u32, usize),
-    (triangles, corners): (&mut Vec<u32>, &mut Vec<u32>),
+    rings: u32,
+    most: usize,
+    triangles: &mut Vec<u32>,
+    corners: &mut Vec<u32>,
 ) {
     triangles.clear();
     corners.clear();
@@ -17,7 +22,7 @@ pub fn rings_into(
         let before = triangles.len();
         let mut whole = before;
         let fits = corners.iter().all(|&vertex| {
-            let fits = take_at(surface, vertex, (before, most), triangles);
+            let fits = take_at(surface, vertex, before, most, triangles);
             whole = if fits && ring == 0 { triangles.len() } else { whole };
             fits
         });
@@ -32,11 +37,12 @@ pub fn rings_into(
         corners.sort_unstable();
         corners.dedup();
     }
-    close(surface, most, (triangles, corners));
+    close(surface, most, triangles, corners);
 }
 
-/// Takes in the triangles at a vertex, the first `before` of those that are in being ascending; whether all had room.
-fn take_at(surface: &Triangulation, vertex: u32, (before, most): (usize, usize), triangles: &mut Vec<u32>) -> bool {
+/// Adds the triangles at a vertex to `triangles`, of which the first `before` are ascending, while there are fewer than
+/// `most`. Returns whether all of them had room.
+fn take_at(surface: &Triangulation, vertex: u32, before: usize, most: usize, triangles: &mut Vec<u32>) -> bool {
     surface.triangles_at(vertex).iter().all(|&triangle| {
         let found = triangles[..before].binary_search(&triangle).is_ok() || triangles[before..].contains(&triangle);
         if !found && triangles.len() < most {
@@ -46,8 +52,8 @@ fn take_at(surface: &Triangulation, vertex: u32, (before, most): (usize, usize),
     })
 }
 
-/// Takes in triangles with two neighbours that are in. `new` is a buffer.
-fn close(surface: &Triangulation, most: usize, (triangles, new): (&mut Vec<u32>, &mut Vec<u32>)) {
+/// Adds every triangle that has two neighbours in `triangles`, while there are fewer than `most`. `new` is a buffer.
+fn close(surface: &Triangulation, most: usize, triangles: &mut Vec<u32>, new: &mut Vec<u32>) {
     new.clear();
     new.extend_from_slice(triangles);
     while let Some(triangle) = new.pop() {
@@ -72,12 +78,14 @@ fn close(surface: &Triangulation, most: usize, (triangles, new): (&mut Vec<u32>,
     }
 }
 
-/// The `most` vertices that are the fewest edges away from some, ascending. `seen` has a 0 for every vertex, and has again when it returns. With room in `vertices` nothing is allocated.
+/// Writes the `most` vertices that are the fewest edges away from `centres` into `vertices`, ascending. `seen` is false
+/// for every vertex, before and after. Nothing is allocated where `vertices` has room.
 pub fn nearest_into(
     surface: &Triangulation,
     centres: impl Iterator<Item = u32>,
     most: usize,
-    (vertices, seen): (&mut Vec<u32>, &mut [bool]),
+    vertices: &mut Vec<u32>,
+    seen: &mut [bool],
 ) {
     vertices.clear();
     let mut take = |vertex: u32, vertices: &mut Vec<u32>| {
@@ -113,7 +121,7 @@ mod tests {
             for other in 0..surface.positions_m().len() as u32 {
                 for (centres, rings) in [(vec![other], 3), (vec![0, other], 1), (vec![5, other], 2)] {
                     let region = Region::rings(surface, &centres, rings);
-                    rings_into(surface, &centres, (rings, 1000), (&mut triangles, &mut corners));
+                    rings_into(surface, &centres, rings, 1000, &mut triangles, &mut corners);
                     assert!(triangles.iter().eq(region.triangles()), "{centres:?} {rings}");
                 }
             }
@@ -125,13 +133,13 @@ mod tests {
         let patch = hexagon(6, 0.03);
         let (mut triangles, mut corners) = (Vec::new(), Vec::new());
         for (most, expected) in [(5, 0), (6, 6), (23, 6), (24, 24), (53, 24), (54, 54)] {
-            rings_into(&patch, &[0], (3, most), (&mut triangles, &mut corners));
+            rings_into(&patch, &[0], 3, most, &mut triangles, &mut corners);
             assert_eq!(triangles.len(), expected, "{most}");
         }
         let [middle, far] = [0, patch.positions_m().len() as u32 - 1];
         let about = |vertex: u32| patch.triangles_at(vertex).to_vec();
         for (most, expected) in [(5, Vec::new()), (7, about(middle)), (8, [about(middle), about(far)].concat())] {
-            rings_into(&patch, &[middle, far], (1, most), (&mut triangles, &mut corners));
+            rings_into(&patch, &[middle, far], 1, most, &mut triangles, &mut corners);
             assert_eq!(triangles, expected, "{most}");
         }
     }
@@ -141,7 +149,7 @@ mod tests {
         let patch = hexagon(6, 0.03);
         let (mut vertices, mut seen) = (Vec::new(), vec![false; patch.positions_m().len()]);
         for (most, expected) in [(1, 1), (7, 7), (19, 19), (37, 37), (1000, patch.positions_m().len())] {
-            nearest_into(&patch, [0].into_iter(), most, (&mut vertices, &mut seen));
+            nearest_into(&patch, [0].into_iter(), most, &mut vertices, &mut seen);
             let rings = Region::rings(&patch, &[0], [1, 7, 19, 37].iter().filter(|n| **n < most).count() as u32);
             let corners = rings.triangles().iter().flat_map(|&t| patch.triangles()[t as usize]);
             let mut within: Vec<u32> = corners.chain([0]).collect();
@@ -151,9 +159,9 @@ mod tests {
             assert!(most > 1 && most < 1000 && within == vertices || vertices.len() == expected);
             assert!(vertices.is_sorted() && seen.iter().all(|seen| !seen));
         }
-        nearest_into(&patch, [0, 60, 0].into_iter(), 9, (&mut vertices, &mut seen));
+        nearest_into(&patch, [0, 60, 0].into_iter(), 9, &mut vertices, &mut seen);
         assert!(vertices.len() == 9 && vertices.contains(&60) && seen.iter().all(|seen| !seen));
-        nearest_into(&patch, std::iter::empty(), 9, (&mut vertices, &mut seen));
+        nearest_into(&patch, std::iter::empty(), 9, &mut vertices, &mut seen);
         assert!(vertices.is_empty());
     }
 }

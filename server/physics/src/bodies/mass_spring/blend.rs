@@ -1,17 +1,22 @@
-//! A surface on its way between coarse and refined: every triangle has a *level* `s`, 0 coarse, 1 refined.
+//! Blending between the coarse and the refined surface: every triangle has a *level* `s`, 0 where it is coarse and 1
+//! where it is refined.
 //!
-//! Springs of both are there by weight, so that energy and force go over without a step. With the level `s_e` of an edge, the larger of its two triangles', and `s_v` of a vertex, the largest of
-//! those around it,
+//! The springs of both surfaces act by weight, so that energy and force change without a step. The level `s_e` of an
+//! edge is the larger one of its two triangles, the level `s_v` of a vertex the largest one of the triangles around it.
+//! The stiffnesses are
 //! ```text
-//! coarse edge           (1 − s_e) K_m          home of a coarse vertex   (1 − s_v) K_h + s_v K′_h
-//! its two halves        s_e K′_m               home of type 2            s_e K′_h
-//! inside a triangle     s_t K′_m               crack of a triangle       (s_e − s_t)⁺ K′_m
+//! coarse edge           (1 − s_e) K_m          anchor of a coarse vertex   (1 − s_v) K_h + s_v K′_h
+//! its two halves        s_e K′_m               anchor of type 2            s_e K′_h
+//! inside a triangle     s_t K′_m               crack of a triangle         (s_e − s_t)⁺ K′_m
 //! tie of type 2         (1 − s_e) K′_h: ½ k |u_e − ½ (u_a + u_b)|², a and b its ends
 //! ```
-//! The *tie* keeps a node that is hardly there near the surface that does not know it: with the home spring it makes the same stiffness at every level, where springs that fade alone would leave a mass to
-//! swing, ever slower, until it is taken away. A level goes along `s = 3 w² − 2 w³` while its way `w` goes linearly, so that force has no kink where fading begins and ends.
+//! The *tie* keeps a node of low level near the coarse surface: together with its anchor spring it has the same
+//! stiffness at every level. Without it, blended springs alone would leave a mass that swings ever slower until it is
+//! removed. A level follows `s = 3 w² − 2 w³` while its progress `w` is linear in time, so that the force has no kink
+//! where blending begins and ends.
 //!
-//! At levels 0 and 1 of a [`super::Region`] that is [`super::Refined::net`]; between, each level moves alone, so regions may grow, shrink and overlap in mid-way.
+//! At levels 0 and 1 of a [`super::Region`] the springs are those of [`super::Refined::net`]. Each level moves by
+//! itself, so that regions may grow, shrink and overlap while they are blended.
 use super::{
     region::{Constants, Region},
     topology::{NONE, Triangulation},
@@ -22,107 +27,111 @@ use serde::{Deserialize, Serialize};
 /// Levels of the triangles that are not coarse.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct Levels {
-    /// Triangle, ascending, and how far on its way it is, larger than 0.
+    /// Triangles, ascending, each with its progress `w`, which is larger than 0.
     of: Vec<(u32, f64)>,
 }
 
-/// `s` of a way `w` in 0..=1.
-fn smooth(way: f64) -> f64 {
-    way * way * (3.0 - 2.0 * way)
+/// Returns the level `s` at a progress `w` in 0..=1.
+fn smooth(progress: f64) -> f64 {
+    progress * progress * (3.0 - 2.0 * progress)
 }
 
-/// The most that a level changes while its way does by `step`.
+/// Returns the largest change of a level while its progress changes by `step`.
 pub fn steepest(step: f64) -> f64 {
     (1.5 * step).min(1.0)
 }
 
-/// A spring, or a home spring, that blending adds to those of the coarse surface; less where its stiffness is negative.
+/// A spring that blending adds to those of the coarse surface; one of negative stiffness takes from them.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Added {
-    /// Between two nodes.
+    /// A spring between two nodes.
     Spring {
         /// Its ends.
         nodes: [u32; 2],
-        /// `r` (m).
+        /// Rest length `r` (m).
         rest_length_m: f64,
-        /// `k` (N/m).
+        /// Stiffness `k` (N/m).
         stiffness_n_per_m: f64,
     },
-    /// To a node's home.
-    Home {
+    /// An anchor spring from a node to its rest position.
+    Anchor {
         /// The node.
         node: u32,
-        /// `K_h` (N/m).
+        /// Stiffness `K_h` (N/m).
         stiffness_n_per_m: f64,
     },
-    /// To where the displacements of an edge's ends would have the node on it.
+    /// A tie from an edge's node to where the displacements of the edge's ends would have it.
     Tie {
-        /// The node, and the ends.
+        /// The node, then the two ends.
         nodes: [u32; 3],
-        /// `k` (N/m).
+        /// Stiffness `k` (N/m).
         stiffness_n_per_m: f64,
     },
 }
 
 impl Levels {
-    /// Room for so many triangles, all coarse.
+    /// Returns levels of a surface that is coarse everywhere, with room for so many triangles.
     pub fn with_room(triangles: usize) -> Self {
         Self { of: Vec::with_capacity(triangles) }
     }
 
-    /// Of no surface: as long as levels of so many triangles.
+    /// Returns levels of no surface that have the length of levels of so many triangles.
     pub fn filled(triangles: usize) -> Self {
         Self { of: vec![(0, 0.0); triangles] }
     }
 
-    /// A region refined.
+    /// Returns the levels of a region that is completely refined.
     pub fn full(region: &Region) -> Self {
         Self { of: region.triangles().iter().map(|&triangle| (triangle, 1.0)).collect() }
     }
 
-    /// Copies other levels. Allocates nothing where there is room.
+    /// Copies other levels. Nothing is allocated where there is room.
     pub fn copy_from(&mut self, other: &Self) {
         self.of.clone_from(&other.of);
     }
 
-    /// Everything coarse. Allocates nothing.
+    /// Makes every triangle coarse. Nothing is allocated.
     pub fn clear(&mut self) {
         self.of.clear();
     }
 
-    /// Triangles that are not coarse, ascending, with how far on their way they are.
+    /// Returns the triangles that are not coarse, ascending, each with its progress.
     pub fn triangles(&self) -> &[(u32, f64)] {
         &self.of
     }
 
-    /// Whether they are levels of a surface of so many triangles, of which at most so many may not be coarse.
+    /// Returns whether these may be levels of a surface of `triangles` triangles, at most `most` of which are not
+    /// coarse.
     pub fn fit(&self, triangles: usize, most: usize) -> bool {
-        let known = |&(triangle, way): &(u32, f64)| (triangle as usize) < triangles && way > 0.0 && way <= 1.0;
+        let known =
+            |&(triangle, progress): &(u32, f64)| (triangle as usize) < triangles && progress > 0.0 && progress <= 1.0;
         self.of.len() <= most && self.of.iter().all(known) && self.of.windows(2).all(|pair| pair[0].0 < pair[1].0)
     }
 
-    fn way(&self, triangle: u32) -> f64 {
+    fn progress(&self, triangle: u32) -> f64 {
         self.of.binary_search_by_key(&triangle, |of| of.0).map_or(0.0, |found| self.of[found].1)
     }
 
-    /// Level of a triangle, 0 of [`NONE`].
+    /// Returns the level `s_t` of a triangle, which is 0 of [`NONE`].
     pub fn of_triangle(&self, triangle: u32) -> f64 {
-        smooth(self.way(triangle))
+        smooth(self.progress(triangle))
     }
 
-    /// `s_e`.
+    /// Returns the level `s_e` of an edge.
     pub fn of_edge(&self, surface: &Triangulation, edge: u32) -> f64 {
         let [one, other] = surface.edges()[edge as usize].triangles;
         self.of_triangle(one).max(self.of_triangle(other))
     }
 
-    /// `s_v`.
+    /// Returns the level `s_v` of a vertex.
     pub fn of_vertex(&self, surface: &Triangulation, vertex: u32) -> f64 {
         surface.triangles_at(vertex).iter().map(|&triangle| self.of_triangle(triangle)).fold(0.0, f64::max)
     }
 
-    /// Ways go by up to `step` towards 1 in the triangles of a list, ascending, and towards 0 in others. `next` is a buffer; with room in both nothing is allocated. Whether any changed.
-    pub fn go_on(&mut self, refined: &[u32], step: f64, next: &mut Self) -> bool {
+    /// Moves every triangle's progress by up to `step`: towards 1 in the triangles of `refined`, which is ascending,
+    /// and towards 0 in the others. Returns whether any progress changed. `next` is a buffer; nothing is allocated
+    /// where both have room.
+    pub fn advance(&mut self, refined: &[u32], step: f64, next: &mut Self) -> bool {
         next.of.clear();
         let mut changed = false;
         let (mut own, mut wanted) = (self.of.iter().peekable(), refined.iter().peekable());
@@ -145,26 +154,26 @@ impl Levels {
         changed
     }
 
-    /// Edges that have a node of type 2 now, each once: tells each with `s_e`.
+    /// Calls `tell` once with every edge that has a node of type 2 now, and with its level `s_e`.
     pub fn for_each_edge(&self, surface: &Triangulation, mut tell: impl FnMut(u32, f64)) {
-        for &(triangle, way) in &self.of {
+        for &(triangle, progress) in &self.of {
             for edge in surface.edges_of(triangle) {
                 let [one, other] = surface.edges()[edge as usize].triangles;
                 let across = if one == triangle { other } else { one };
-                let beyond = self.way(across);
-                // Of two triangles that are not coarse the first one speaks for both.
+                let beyond = self.progress(across);
+                // The edge of two triangles that are not coarse is told for the first one.
                 if beyond == 0.0 || triangle < across {
-                    tell(edge, smooth(way.max(beyond)));
+                    tell(edge, smooth(progress.max(beyond)));
                 }
             }
         }
     }
 
-    /// Vertices of triangles that are not coarse, each once: tells each with `s_v`.
+    /// Calls `tell` once with every vertex of triangles that are not coarse, and with its level `s_v`.
     pub fn for_each_vertex(&self, surface: &Triangulation, mut tell: impl FnMut(u32, f64)) {
         for &(triangle, _) in &self.of {
             for vertex in surface.triangles()[triangle as usize] {
-                let around = || surface.triangles_at(vertex).iter().filter(|&&t| self.way(t) > 0.0);
+                let around = || surface.triangles_at(vertex).iter().filter(|&&t| self.progress(t) > 0.0);
                 if around().next() == Some(&triangle) {
                     tell(vertex, self.of_vertex(surface, vertex));
                 }
@@ -172,13 +181,15 @@ impl Levels {
         }
     }
 
-    /// What the levels add to a surface of the constants `outside`: tells springs with nodes of type 1 by their vertices, and those of type 2 as the number of vertices plus that of their
-    /// edge. `fine_rest_m` are homes (m) of all of them.
+    /// Calls `tell` with every spring that the levels add to a surface with the constants `coarse`, where the refined
+    /// surface has the constants `fine`. A node of type 1 has the number of its vertex, a node of type 2 the number of
+    /// vertices plus that of its edge. `fine_rest_m` are the rest positions (m) of all of them.
     pub fn for_each_added(
         &self,
         surface: &Triangulation,
         fine_rest_m: &[DVec3],
-        (outside, inside): (&Constants, &Constants),
+        coarse: &Constants,
+        fine: &Constants,
         mut tell: impl FnMut(Added),
     ) {
         let vertices = surface.positions_m().len() as u32;
@@ -191,31 +202,31 @@ impl Levels {
         self.for_each_edge(surface, |number, level| {
             let edge = &surface.edges()[number as usize];
             let ([a, b], middle) = (edge.nodes, vertices + number);
-            spring(a, b, -level * outside.mesh_n_per_m);
-            spring(a, middle, level * inside.mesh_n_per_m);
-            spring(middle, b, level * inside.mesh_n_per_m);
+            spring(a, b, -level * coarse.mesh_n_per_m);
+            spring(a, middle, level * fine.mesh_n_per_m);
+            spring(middle, b, level * fine.mesh_n_per_m);
             for (triangle, opposite) in edge.triangles.into_iter().zip(edge.opposite).filter(|(t, _)| *t != NONE) {
                 let beyond = (level - self.of_triangle(triangle)).max(0.0);
-                spring(middle, opposite, beyond * inside.mesh_n_per_m);
+                spring(middle, opposite, beyond * fine.mesh_n_per_m);
             }
         });
-        for &(triangle, way) in &self.of {
+        for &(triangle, progress) in &self.of {
             let [ab, bc, ca] = surface.edges_of(triangle).map(|edge| vertices + edge);
             for [one, other] in [[ab, bc], [bc, ca], [ca, ab]] {
-                spring(one, other, smooth(way) * inside.mesh_n_per_m);
+                spring(one, other, smooth(progress) * fine.mesh_n_per_m);
             }
         }
         self.for_each_edge(surface, |number, level| {
             let node = vertices + number;
-            tell(Added::Home { node, stiffness_n_per_m: level * inside.home_n_per_m });
+            tell(Added::Anchor { node, stiffness_n_per_m: level * fine.anchor_n_per_m });
             if level < 1.0 {
                 let [a, b] = surface.edges()[number as usize].nodes;
-                tell(Added::Tie { nodes: [node, a, b], stiffness_n_per_m: (1.0 - level) * inside.home_n_per_m });
+                tell(Added::Tie { nodes: [node, a, b], stiffness_n_per_m: (1.0 - level) * fine.anchor_n_per_m });
             }
         });
         self.for_each_vertex(surface, |node, level| {
-            let stiffness_n_per_m = level * (inside.home_n_per_m - outside.home_n_per_m);
-            tell(Added::Home { node, stiffness_n_per_m });
+            let stiffness_n_per_m = level * (fine.anchor_n_per_m - coarse.anchor_n_per_m);
+            tell(Added::Anchor { node, stiffness_n_per_m });
         });
     }
 }
@@ -224,13 +235,13 @@ impl Levels {
 mod tests {
     use super::*;
     use crate::bodies::mass_spring::{
-        HomeLaw, Net, Refined, Spring,
+        AnchorLaw, Net, Refined, Spring,
         loop_scheme::refined,
         testing::{hexagon, sphere},
     };
 
-    const OUTSIDE: Constants = Constants { mesh_n_per_m: 60.0, home_n_per_m: 40.0 };
-    const INSIDE: Constants = Constants { mesh_n_per_m: 45.0, home_n_per_m: 22.0 };
+    const OUTSIDE: Constants = Constants { mesh_n_per_m: 60.0, anchor_n_per_m: 40.0 };
+    const INSIDE: Constants = Constants { mesh_n_per_m: 45.0, anchor_n_per_m: 22.0 };
 
     /// The coarse surface's springs with what levels add, on all nodes that the surface refined has.
     fn blended(surface: &Triangulation, levels: &Levels) -> Net {
@@ -240,17 +251,17 @@ mod tests {
             Spring { nodes: edge.nodes, rest_length_m: a.distance(b), stiffness_n_per_m: OUTSIDE.mesh_n_per_m }
         });
         let mut springs: Vec<Spring> = coarse.collect();
-        let mut home_n_per_m = vec![0.0; rest_m.len()];
-        home_n_per_m[..surface.positions_m().len()].fill(OUTSIDE.home_n_per_m);
-        levels.for_each_added(surface, &rest_m, (&OUTSIDE, &INSIDE), |added| match added {
+        let mut anchor_n_per_m = vec![0.0; rest_m.len()];
+        anchor_n_per_m[..surface.positions_m().len()].fill(OUTSIDE.anchor_n_per_m);
+        levels.for_each_added(surface, &rest_m, &OUTSIDE, &INSIDE, |added| match added {
             Added::Spring { nodes, rest_length_m, stiffness_n_per_m } => {
                 springs.push(Spring { nodes, rest_length_m, stiffness_n_per_m });
             }
-            Added::Home { node, stiffness_n_per_m } => home_n_per_m[node as usize] += stiffness_n_per_m,
+            Added::Anchor { node, stiffness_n_per_m } => anchor_n_per_m[node as usize] += stiffness_n_per_m,
             // Whoever is told has them apart from the springs.
             Added::Tie { .. } => {}
         });
-        Net { rest_m, springs, home_n_per_m, home_law: HomeLaw::Linear }
+        Net { rest_m, springs, anchor_n_per_m, anchor_law: AnchorLaw::Linear }
     }
 
     fn shaken(rest_m: &[DVec3]) -> Vec<DVec3> {
@@ -296,7 +307,7 @@ mod tests {
         let energy = |levels: &Levels| blended(&patch, levels).energy_j(&x);
         let [start, end] = [&one, &other].map(|region| energy(&Levels::full(region)));
         let (mut before, mut steps) = (start, 0);
-        while levels.go_on(&wanted, 0.02, &mut next) {
+        while levels.advance(&wanted, 0.02, &mut next) {
             let now = energy(&levels);
             assert!((now - before).abs() < 0.075 * (start - end).abs().max(0.1 * start), "{before} {now}");
             assert!(levels.triangles().windows(2).all(|pair| pair[0].0 < pair[1].0));

@@ -1,10 +1,12 @@
-//! A mass-spring surface as a body of the loop: what tools touch, and what they may do to it.
+//! A mass-spring surface as a body of the loop: what tools touch, and how it is refined.
 //!
-//! Tools touch the surface refined everywhere, coarse or not. Where an edge's middle has the level `s`, with its own node at `x_e` and its ends displaced by `u_a` and `u_b`, it is at
+//! Tools touch the surface refined everywhere, whatever its levels. Where an edge's middle has the level `s`, its own
+//! node is at `x_e` and its ends are displaced by `u_a` and `u_b`, the middle is at
 //! ```text
 //! y_e = s x_e + (1 − s) (X_e + ½ (u_a + u_b)),   force on it: s f on its node, ½ (1 − s) f on either end
 //! ```
-//! so the surface that a tool feels and a viewer sees has the same triangles always, and moves without a step when it is refined.
+//! so that the surface that a tool feels and a viewer sees always has the same triangles, and moves without a step when
+//! it is refined.
 use super::{
     SpringError, SpringModel, SpringSpec,
     calibration::{self, Calibration, CalibrationError, ConstantsTable},
@@ -24,96 +26,97 @@ use thiserror::Error;
 /// How the surface is refined where it is touched.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Refinement {
-    /// Rings around the vertex that is touched; the most, where they follow the dent.
+    /// Number of rings around the touched vertex; the largest number, where rings follow the dent.
     pub rings: u32,
-    /// As many rings as the dent needs: those of its touched part, and one for each edge's length of its depth ([`rings_for`]).
+    /// Whether there are only as many rings as the dent needs: those under its touched part, and one for each edge's
+    /// length of its depth ([`rings_for`]).
     pub follows_dent: bool,
-    /// How long (s) a triangle takes from coarse to refined, and back. Forces step the less the longer it is.
-    pub fade_s: f64,
-    /// Who says where.
+    /// Time (s) that a triangle takes from coarse to refined, and back. The longer it is, the less forces step.
+    pub blend_s: f64,
+    /// What determines where the surface is refined.
     pub by: Refining,
 }
 
-/// Who says where a surface is refined.
+/// What determines where a surface is refined.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Refining {
-    /// Tools that touch it, or are about to.
+    /// The surface is refined where tools touch it or are about to.
     ByTools,
-    /// [`super::refine_only`] alone: for experiments.
+    /// The surface is refined where `world::refine_only` says, for experiments.
     ByHand,
 }
 
 /// What makes a body a mass-spring surface.
 #[derive(Debug, Clone, PartialEq)]
 pub struct MassSpringSpec {
-    /// The springs. What is held is what the body's specification prescribes.
+    /// The springs. Vertices are held where the body's specification prescribes their displacement.
     pub springs: SpringSpec,
-    /// `None`: coarse everywhere.
+    /// How the surface is refined; `None` where it stays coarse.
     pub refinement: Option<Refinement>,
-    /// Constants where it is refined, over how far the vertex that a tool touches is from home; `None`: those of the springs.
+    /// Constants of the refined surface over the displacement of the touched vertex; `None` where they are constant.
     pub table: Option<ConstantsTable>,
 }
 
-/// Why no body of the loop can be made of it.
+/// Why no body of the loop can be made from a specification.
 #[derive(Debug, Clone, PartialEq, Error)]
 pub enum MassSpringError {
-    /// The springs.
+    /// The springs are wrong.
     #[error(transparent)]
     Springs(#[from] SpringError),
-    /// Settings, constraints, loads or tools.
+    /// Settings, constraints, loads or tools are wrong.
     #[error(transparent)]
     Environment(#[from] EnvironmentError),
-    /// A number outside its range.
+    /// A number is outside its range.
     #[error("{name} = {value}: {rule}")]
     Setting {
-        /// Name.
+        /// Name of the number.
         name: &'static str,
-        /// Value.
+        /// Its value.
         value: f64,
         /// What it must satisfy.
         rule: &'static str,
     },
-    /// The table of constants.
+    /// The table of constants is wrong.
     #[error(transparent)]
     Table(#[from] CalibrationError),
-    /// Something it cannot have.
+    /// A body of springs cannot have something.
     #[error("a body of springs cannot have {what}: {instead}")]
     NotForSprings {
-        /// What.
+        /// What it cannot have.
         what: &'static str,
-        /// What to do.
+        /// What to do instead.
         instead: &'static str,
     },
 }
 
-/// A mass-spring surface in the loop. Constant after load.
+/// A mass-spring surface in the loop. It does not change after it is loaded.
 #[derive(Debug, Clone)]
 pub struct MassSpringBody {
     model: SpringModel,
     refinement: Option<Refinement>,
     pub(super) boxes: SkinBoxes,
-    /// Mean length (m) of the coarse surface's edges, its vertices at home.
+    /// Mean length (m) of the coarse surface's edges at rest.
     edge_m: f64,
-    /// How many places each tool has about which it may be refined.
-    places: Vec<usize>,
-    /// About how far (m) from a tool vertices are awake, where not all are.
+    /// Number of samples along each tool's axis; the surface may be refined about each.
+    axis_samples: Vec<usize>,
+    /// Approximate distance (m) from a tool up to which vertices are awake, where not all are.
     awake_reach_m: f64,
     table: Option<ConstantsTable>,
     fingerprint: u64,
 }
 
 impl MassSpringBody {
-    /// Checks and builds, for these tools.
+    /// Checks a specification and builds a surface for the given tools.
     ///
     /// # Errors
     /// [`MassSpringError`].
     pub fn of(spec: MassSpringSpec, tools: &[ToolSpec]) -> Result<Self, MassSpringError> {
         let MassSpringSpec { mut springs, refinement, table } = spec;
-        if let Some(Refinement { rings, fade_s, .. }) = refinement {
+        if let Some(Refinement { rings, blend_s, .. }) = refinement {
             let setting =
                 |name, value, ok, rule| if ok { Ok(()) } else { Err(MassSpringError::Setting { name, value, rule }) };
             setting("rings", f64::from(rings), (1..=MOST_RINGS).contains(&rings), "must be 1 to 16")?;
-            setting("fade_s", fade_s, fade_s > 0.0 && fade_s.is_finite(), "must be finite and larger than 0")?;
+            setting("blend_s", blend_s, blend_s > 0.0 && blend_s.is_finite(), "must be finite and larger than 0")?;
         } else {
             springs.most_refined = 0;
         }
@@ -124,7 +127,7 @@ impl MassSpringBody {
         if let Some(table) = &table {
             let rings = refinement.map_or(0, |refinement| refinement.rings);
             table.fits(&springs.surface, &Calibration { coarse: springs.coarse, rings, ..table.of })?;
-            // The largest: what the step has to be stable with.
+            // The step must be stable with the largest constants.
             springs.fine = table.largest();
         }
         let model = SpringModel::build(springs)?;
@@ -134,64 +137,65 @@ impl MassSpringBody {
         });
         let edge_m = lengths.sum::<f64>() / model.surface().edges().len() as f64;
         let rings = refinement.map_or(1, |refinement| if refinement.follows_dent { 1 } else { refinement.rings });
-        // The regions about two of them overlap by half.
-        let places: Vec<usize> = tools.iter().map(|tool| tool.place_count(f64::from(rings) * edge_m)).collect();
-        // A disc for each, of vertices with √3/2 l² each.
-        let each = model.spec().most_awake as f64 / places.iter().sum::<usize>().max(1) as f64;
+        // The regions about two neighbouring samples overlap by half.
+        let axis_samples: Vec<usize> = tools.iter().map(|tool| tool.place_count(f64::from(rings) * edge_m)).collect();
+        // Vertices in a disc about each sample are awake; each vertex has the area √3/2 l².
+        let each = model.spec().most_awake as f64 / axis_samples.iter().sum::<usize>().max(1) as f64;
         let awake_reach_m = edge_m * (each * 3.0_f64.sqrt() / (2.0 * std::f64::consts::PI)).sqrt();
-        let fingerprint = fingerprint(model.spec(), (refinement, &table));
-        Ok(Self { model, refinement, boxes: SkinBoxes::default(), edge_m, places, awake_reach_m, table, fingerprint })
+        let fingerprint = fingerprint(model.spec(), refinement, &table);
+        let boxes = SkinBoxes::default();
+        Ok(Self { model, refinement, boxes, edge_m, axis_samples, awake_reach_m, table, fingerprint })
     }
 
-    /// Its springs.
+    /// Returns the springs.
     pub fn model(&self) -> &SpringModel {
         &self.model
     }
 
-    /// Rest positions (m) of the coarse vertices.
+    /// Returns the rest positions (m) of the coarse vertices.
     pub fn rest_positions_m(&self) -> &[DVec3] {
         &self.model.rest_m()[..self.model.vertices() as usize]
     }
 
-    /// Hash of all that it was built from.
+    /// Returns a hash of everything that the body was built from.
     pub(crate) fn fingerprint(&self) -> u64 {
         self.fingerprint
     }
 
-    /// How it is refined.
+    /// Returns how the surface is refined, if it is.
     pub fn refinement(&self) -> Option<Refinement> {
         self.refinement
     }
 
-    /// Constants where it is refined, while what tools touch is so far (m) from home.
+    /// Returns the constants of the refined surface while the touched vertices are displaced by `displacement_m` (m).
     pub(crate) fn fine_at(&self, displacement_m: f64) -> Constants {
         self.table.as_ref().map_or(self.model.spec().fine, |table| table.at(displacement_m / self.edge_m))
     }
 
-    /// Mean length (m) of the coarse edges.
+    /// Returns the mean length (m) of the coarse edges at rest.
     pub fn edge_m(&self) -> f64 {
         self.edge_m
     }
 
-    /// The places of each tool, numbered one after another.
-    pub(crate) fn places(&self) -> impl Iterator<Item = Range<usize>> {
-        self.places.iter().scan(0, |next, count| {
+    /// Returns the range of every tool's axis samples, where the samples of all tools are numbered one after another.
+    pub(crate) fn axis_samples(&self) -> impl Iterator<Item = Range<usize>> {
+        self.axis_samples.iter().scan(0, |next, count| {
             *next += count;
             Some(*next - count..*next)
         })
     }
 
-    /// All of them.
-    pub(crate) fn place_count(&self) -> usize {
-        self.places.iter().sum()
+    /// Returns the number of axis samples of all tools.
+    pub(crate) fn axis_sample_count(&self) -> usize {
+        self.axis_samples.iter().sum()
     }
 
-    /// About how far (m) from a tool vertices are awake, where not all are.
+    /// Returns the approximate distance (m) from a tool up to which vertices are awake, where not all are.
     pub(crate) fn awake_reach_m(&self) -> f64 {
         self.awake_reach_m
     }
 
-    /// The coarse vertices that carry a vertex of the skin where it is coarse.
+    /// Returns the coarse vertices that carry a vertex of the skin where the surface is coarse.
     pub(crate) fn ends(&self, vertex: u32) -> [u32; 2] {
         match vertex.checked_sub(self.model.vertices()) {
             None => [vertex; 2],
@@ -199,61 +203,67 @@ impl MassSpringBody {
         }
     }
 
-    /// Whether all coarse vertices are awake always.
+    /// Returns whether all coarse vertices are always awake.
     pub fn is_all_awake(&self) -> bool {
         self.model.spec().most_awake >= self.model.vertices() as usize
     }
 
-    /// What tools touch: the surface refined everywhere, its vertices numbered as its nodes.
+    /// Returns the surface that tools touch: the one refined everywhere, with vertices numbered as nodes.
     pub fn skin(&self) -> Surface {
         Surface::alone(self.model.rest_m().len(), self.model.fine_triangles().to_vec())
     }
 
-    /// Takes the skin's triangles in the order of contact's broad phase.
+    /// Makes boxes of the skin's triangles, which are given in the order of contact's broad phase.
     pub(crate) fn cluster(&mut self, triangles: &[[u32; 3]]) {
         self.boxes = SkinBoxes::new(self.model.rest_m(), triangles);
     }
 
-    /// What (kg) answers contact at each vertex of the skin, of the mass refined all around; nothing where it is held.
+    /// Returns the mass (kg) that answers contact at each vertex of the skin: the one that the vertex has where the
+    /// surface is refined all around it.
     pub(crate) fn contact_mass_kg(&self) -> Vec<f64> {
         let model = &self.model;
         let of_vertices = (0..model.vertices()).map(|v| 0.25 * model.spec().mass_kg[v as usize]);
         of_vertices.chain((0..model.surface().edges().len() as u32).map(|edge| model.edge_kg(edge))).collect()
     }
 
-    /// Moduli of what lies behind each triangle of the skin, for contact's foundation: those of a solid one coarse edge `l` thick with the springs' stiffness across and along,
+    /// Returns the moduli behind each triangle of the skin, for contact's foundation: those of a solid that is one
+    /// coarse edge `l` thick and as stiff as the springs, across and along,
     /// ```text
     /// (2/√3) (K_m + K_h)/l
     /// ```
-    /// as a vertex of a regular surface has the area `(√3/2) l²`, and springs along its edges the modulus `(2/√3) K_m` (N/m).
+    /// because a vertex of a regular surface has the area `(√3/2) l²`, and mesh springs have the modulus `(2/√3) K_m`
+    /// (N/m).
     pub(crate) fn moduli(&self) -> Vec<SurfaceModuli> {
         let spec = self.model.spec();
         let stiffest = |of: fn(&Constants) -> f64| of(&spec.coarse).max(of(&spec.fine));
-        let sum_n_per_m = stiffest(|of| of.mesh_n_per_m) + stiffest(|of| of.home_n_per_m);
+        let sum_n_per_m = stiffest(|of| of.mesh_n_per_m) + stiffest(|of| of.anchor_n_per_m);
         let modulus_pa = 2.0 / 3.0_f64.sqrt() * sum_n_per_m / self.edge_m;
         vec![SurfaceModuli { p_wave_pa: modulus_pa, indentation_pa: modulus_pa }; self.model.fine_triangles().len()]
     }
 }
 
-fn fingerprint(spec: &SpringSpec, how: (Option<Refinement>, &Option<ConstantsTable>)) -> u64 {
-    let SpringSpec { surface, coarse, fine, home_law, mass_kg, held, most_awake, most_refined } = spec;
+fn fingerprint(spec: &SpringSpec, refinement: Option<Refinement>, table: &Option<ConstantsTable>) -> u64 {
+    let SpringSpec { surface, coarse, fine, anchor_law, mass_kg, held, most_awake, most_refined } = spec;
     let masses = mass_kg.iter().flat_map(|mass| mass.to_bits().to_le_bytes());
     let mut hash = Fnv(fnv(calibration::fingerprint(surface), masses));
+    let how = (refinement, table);
     // Writing to the hash cannot fail.
-    let _ = write!(hash, "{:?}", (coarse, fine, home_law, held, most_awake, most_refined, how));
+    let _ = write!(hash, "{:?}", (coarse, fine, anchor_law, held, most_awake, most_refined, how));
     hash.0
 }
 
-/// How many rings of edges `l` (m) hold the dent that a sphere of radius `R` (m) makes, `d` (m) deep: the radius of the cap that touches, and as far beyond as it is deep.
+/// Returns how many rings of edges `l` (m) hold the dent that a sphere of radius `R` (m) makes at the depth `d` (m):
+/// the radius of the cap that touches, and the depth once more beyond it.
 /// ```text
-/// (√(d (2 R − d)) + d)/l,   of a sphere in over its middle (R + d)/l
+/// (√(d (2 R − d)) + d)/l,   where the sphere is deeper than its radius (R + d)/l
 /// ```
 pub fn rings_for(depth_m: f64, radius_m: f64, edge_m: f64) -> f64 {
     let touched_m = if depth_m < radius_m { (depth_m * (2.0 * radius_m - depth_m)).sqrt() } else { radius_m };
     (touched_m + depth_m) / edge_m
 }
 
-/// Triangles of a regular surface, with edges `l` (m), in `n` rings about a line of length `L` (m) along its edges.
+/// Returns the number of triangles of a regular surface with edges `l` (m) in `n` rings about a line of length `L` (m)
+/// along its edges.
 /// ```text
 /// 6 n² + 4 n ⌈L/l⌉
 /// ```
@@ -262,5 +272,5 @@ pub fn triangles_about(rings: u32, length_m: f64, edge_m: f64) -> usize {
     (6 * rings * rings).saturating_add((4 * rings).saturating_mul((length_m / edge_m).ceil() as usize))
 }
 
-/// More rings would be most of any surface.
+/// Largest number of rings, which is most of any surface.
 pub(super) const MOST_RINGS: u32 = 16;

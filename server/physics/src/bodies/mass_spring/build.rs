@@ -1,4 +1,4 @@
-//! From a specification to a mass-spring surface in its environment.
+//! Builds a mass-spring surface and its environment from specifications.
 use super::{MassSpringBody, MassSpringError, MassSpringSpec};
 use crate::{
     contact::ContactModel,
@@ -8,7 +8,7 @@ use crate::{
 use glam::DVec3;
 
 impl MassSpringBody {
-    /// Checks, builds, and chooses the substeps.
+    /// Checks the specification, builds the surface in its environment, and chooses the substeps.
     ///
     /// # Errors
     /// [`MassSpringError`]; nothing is repaired silently.
@@ -38,7 +38,7 @@ fn refused(what: &'static str, instead: &'static str) -> MassSpringError {
     MassSpringError::NotForSprings { what, instead }
 }
 
-/// What a mass-spring surface cannot have.
+/// Refuses settings and constraints that a mass-spring surface cannot have.
 fn demand(around: &EnvironmentSpec) -> Result<(), MassSpringError> {
     let settings = &around.settings;
     let demands = [
@@ -56,7 +56,7 @@ fn demand(around: &EnvironmentSpec) -> Result<(), MassSpringError> {
     }
 }
 
-/// All that is prescribed, of so many vertices.
+/// Returns all prescribed vertices, ascending, of a surface with so many vertices.
 fn held(around: &EnvironmentSpec, vertices: usize) -> Result<Vec<u32>, EnvironmentError> {
     let mut held: Vec<u32> = around.prescribed.iter().flat_map(|set| set.nodes.iter().copied()).collect();
     held.sort_unstable();
@@ -67,7 +67,7 @@ fn held(around: &EnvironmentSpec, vertices: usize) -> Result<Vec<u32>, Environme
     }
 }
 
-/// Gravity and loads act on what would sleep.
+/// Refuses gravity and loads where not all vertices are awake, as they would move sleeping ones.
 fn demand_all_awake(around: &EnvironmentSpec, body: &MassSpringBody) -> Result<(), MassSpringError> {
     if body.is_all_awake() {
         return Ok(());

@@ -1,10 +1,15 @@
-//! Tables of spring constants for a surface of its own: haptic-subdivision's look-up table, calibrated on some of its vertices.
+//! Tables of spring constants for a given surface: haptic-subdivision's look-up table, calibrated on some vertices of
+//! the surface.
 //!
-//! At every sample vertex `v` and displacement `x = ξ L_v` inwards, with `L_v` the mean length of its edges, constants at a fixed ratio are matched ([`super::matching`]) on the piece of surface around it. The table has
-//! their medians over the samples, and how far the farthest is off. Beside them stands the energy that the refined piece holds over that of the coarse one, `U′(x; K′(x))/U(x)`: both meet the same force at each
-//! `x`, but constants that change on the way give or take the difference, which whoever changes them has to book.
+//! At every sample vertex `v` and displacement `x = ξ L_v` inwards, where `L_v` is the mean length of its edges,
+//! constants of a fixed ratio are matched ([`super::matching`]) on the piece of surface around it. The table has their
+//! medians over the samples, and the largest relative difference of a sample from the median. It also has the energy of
+//! the refined piece over that of the coarse one, `U′(x; K′(x))/U(x)`: both answer with the same force at each `x`, but
+//! constants that change during the displacement add or remove the difference, which must be booked where they are
+//! changed.
 //!
-//! *Limits.* What is matched is the force of one vertex. A tool that touches many is met too stiffly (`N′/N` times at the worst); [`super::matching::area_consistent`] constants are for it.
+//! *Limits.* The force of one vertex is matched. A tool that touches many vertices is met too stiffly (by `N′/N` at
+//! worst); the [`super::matching::area_consistent`] constants are for such tools.
 use super::{
     loop_scheme::refined,
     matching::{NoMatch, Way, matched, point_force_n},
@@ -18,86 +23,88 @@ use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use thiserror::Error;
 
-/// Displacements over the mean edge's length.
+/// Displacements over the mean length of the edges.
 const XI: [f64; 9] = [0.01, 0.05, 0.1, 0.2, 0.3, 0.45, 0.6, 0.8, 1.0];
-/// Rings around a sample, beyond those refined, that its piece of surface has: what is farther hardly feels it.
+/// Number of rings that a sample's piece of surface has beyond the refined ones; the surface farther away hardly
+/// matters.
 const BEYOND: u32 = 5;
 
 /// What is calibrated.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Calibration {
-    /// Of the coarse surface.
+    /// Constants of the coarse surface.
     pub coarse: Constants,
-    /// Rings refined.
+    /// Number of refined rings.
     pub rings: u32,
-    /// `K′_m/K′_h`.
+    /// Ratio `K′_m/K′_h`.
     pub ratio: f64,
-    /// Vertices tried.
+    /// Number of sample vertices.
     pub samples: usize,
 }
 
-/// Constants over displacement.
+/// Spring constants over displacement.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ConstantsTable {
-    /// Of what surface: [`fingerprint`].
+    /// The surface that it was made for, by its [`fingerprint`].
     pub fingerprint: u64,
     /// How it was made.
     pub of: Calibration,
-    /// Rows, by displacement.
+    /// Rows by ascending displacement.
     pub rows: Vec<TableRow>,
 }
 
-/// A displacement.
+/// The constants at one displacement.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct TableRow {
-    /// `x/L`.
+    /// Displacement `x/L`.
     pub xi: f64,
-    /// `K′_h/K_h`, the median.
-    pub home_ratio: f64,
-    /// How far the farthest sample's is from it, relative.
+    /// Median of `K′_h/K_h`.
+    #[serde(alias = "home_ratio")]
+    pub anchor_ratio: f64,
+    /// Largest relative difference of a sample's `K′_h/K_h` from the median.
     pub spread: f64,
-    /// `U′/U`, the median.
+    /// Median of `U′/U`.
     pub energy_ratio: f64,
 }
 
 /// Why there is no table.
 #[derive(Debug, Clone, PartialEq, Error)]
 pub enum CalibrationError {
-    /// A number outside its range.
+    /// A number is outside its range.
     #[error("{name} = {value}: must be {rule}")]
     Setting {
-        /// Name.
+        /// Name of the number.
         name: &'static str,
-        /// Value.
+        /// Its value.
         value: f64,
         /// What it must be.
         rule: &'static str,
     },
-    /// Everything is too near to a border.
-    #[error("no vertex of the surface is {rings} rings from its border: refine less, or give a finer surface")]
+    /// Every vertex is too near to a boundary.
+    #[error("no vertex of the surface is {rings} rings from its boundary: refine less, or give a finer surface")]
     NoSample {
-        /// Rings wanted.
+        /// Number of rings that are wanted.
         rings: u32,
     },
-    /// A piece of it, smoothed, is no surface.
+    /// A piece of the surface is no valid surface once it is smoothed.
     #[error("around vertex {vertex}, smoothed by Loop's scheme, the surface is none: {source}")]
     Piece {
-        /// The sample.
+        /// The sample vertex.
         vertex: u32,
-        /// Why.
+        /// What is wrong.
         source: TriangulationError,
     },
-    /// No constants.
+    /// No constants match at a sample.
     #[error("at vertex {vertex}, displaced by {xi} of its edges' length: {source}")]
     NoMatch {
-        /// The sample.
+        /// The sample vertex.
         vertex: u32,
-        /// `x/L`.
+        /// Displacement `x/L`.
         xi: f64,
-        /// Why.
+        /// What is wrong.
         source: NoMatch,
     },
-    /// The table belongs to something else.
+    /// The table was made for something else.
     #[error("the table was made for {what}: calibrate again")]
     Stale {
         /// What differs.
@@ -106,7 +113,7 @@ pub enum CalibrationError {
 }
 
 impl ConstantsTable {
-    /// Calibrates. `tell` is told the part done.
+    /// Calibrates a surface. `tell` is called with the fraction that is done.
     ///
     /// # Errors
     /// [`CalibrationError`].
@@ -124,38 +131,39 @@ impl ConstantsTable {
             tell((done + 1) as f64 / samples.len() as f64);
         }
         let row = |(number, xi): (usize, &f64)| {
-            let homes: Vec<f64> = found.iter().map(|sample| sample[number].0).collect();
-            let home_ratio = median(&homes);
-            let spread = homes.iter().map(|home| (home / home_ratio - 1.0).abs()).fold(0.0, f64::max);
+            let ratios: Vec<f64> = found.iter().map(|sample| sample[number].0).collect();
+            let anchor_ratio = median(&ratios);
+            let spread = ratios.iter().map(|ratio| (ratio / anchor_ratio - 1.0).abs()).fold(0.0, f64::max);
             let energies: Vec<f64> = found.iter().map(|sample| sample[number].1).collect();
-            TableRow { xi: *xi, home_ratio, spread, energy_ratio: median(&energies) }
+            TableRow { xi: *xi, anchor_ratio, spread, energy_ratio: median(&energies) }
         };
         Ok(Self { fingerprint: fingerprint(surface), of, rows: XI.iter().enumerate().map(row).collect() })
     }
 
-    /// The largest constants that it has.
+    /// Returns the largest constants of the table.
     pub fn largest(&self) -> Constants {
-        let most = self.rows.iter().map(|row| row.home_ratio).fold(0.0, f64::max);
-        let home_n_per_m = most * self.of.coarse.home_n_per_m;
-        Constants { mesh_n_per_m: self.of.ratio * home_n_per_m, home_n_per_m }
+        let most = self.rows.iter().map(|row| row.anchor_ratio).fold(0.0, f64::max);
+        let anchor_n_per_m = most * self.of.coarse.anchor_n_per_m;
+        Constants { mesh_n_per_m: self.of.ratio * anchor_n_per_m, anchor_n_per_m }
     }
 
-    /// Constants at a displacement over the mean edge's length: linear between rows, those of the last row beyond.
+    /// Returns the constants at a displacement over the mean length of the edges: linear between rows, and those of the
+    /// last row beyond it.
     pub fn at(&self, xi: f64) -> Constants {
         let after = self.rows.partition_point(|row| row.xi <= xi).clamp(1, self.rows.len().saturating_sub(1).max(1));
-        let home_ratio = match (self.rows.get(after - 1), self.rows.get(after)) {
+        let anchor_ratio = match (self.rows.get(after - 1), self.rows.get(after)) {
             (Some(low), Some(high)) => {
                 let part = ((xi - low.xi) / (high.xi - low.xi)).clamp(0.0, 1.0);
-                low.home_ratio + (high.home_ratio - low.home_ratio) * part
+                low.anchor_ratio + (high.anchor_ratio - low.anchor_ratio) * part
             }
-            (Some(only), None) => only.home_ratio,
+            (Some(only), None) => only.anchor_ratio,
             _ => 1.0,
         };
-        let home_n_per_m = home_ratio * self.of.coarse.home_n_per_m;
-        Constants { mesh_n_per_m: self.of.ratio * home_n_per_m, home_n_per_m }
+        let anchor_n_per_m = anchor_ratio * self.of.coarse.anchor_n_per_m;
+        Constants { mesh_n_per_m: self.of.ratio * anchor_n_per_m, anchor_n_per_m }
     }
 
-    /// Whether it is of this surface, and made in this way.
+    /// Checks that the table was made for this surface, and in this way.
     ///
     /// # Errors
     /// [`CalibrationError::Stale`].
@@ -170,14 +178,15 @@ impl ConstantsTable {
         if self.of.rings != of.rings {
             return stale("another number of rings");
         }
-        if self.rows.is_empty() || self.rows.iter().any(|row| !(row.home_ratio > 0.0 && row.home_ratio.is_finite())) {
+        if self.rows.is_empty() || self.rows.iter().any(|row| !(row.anchor_ratio > 0.0 && row.anchor_ratio.is_finite()))
+        {
             return stale("nothing: it has no usable rows");
         }
         Ok(())
     }
 }
 
-/// A hash of vertices and triangles (FNV-1a).
+/// Returns a hash of a surface's vertices and triangles (FNV-1a).
 pub fn fingerprint(surface: &Triangulation) -> u64 {
     let positions = surface.positions_m().iter().flat_map(DVec3::to_array).flat_map(|c| c.to_bits().to_le_bytes());
     let triangles = surface.triangles().iter().flatten().flat_map(|vertex| vertex.to_le_bytes());
@@ -186,7 +195,7 @@ pub fn fingerprint(surface: &Triangulation) -> u64 {
 
 fn check(of: &Calibration) -> Result<(), CalibrationError> {
     let numbers =
-        [("mesh_n_per_m", of.coarse.mesh_n_per_m), ("home_n_per_m", of.coarse.home_n_per_m), ("ratio", of.ratio)];
+        [("mesh_n_per_m", of.coarse.mesh_n_per_m), ("anchor_n_per_m", of.coarse.anchor_n_per_m), ("ratio", of.ratio)];
     let bad = numbers.into_iter().find(|(_, value)| !(*value > 0.0 && value.is_finite()));
     if let Some((name, value)) = bad {
         return Err(CalibrationError::Setting { name, value, rule: "finite and larger than 0" });
@@ -199,21 +208,21 @@ fn check(of: &Calibration) -> Result<(), CalibrationError> {
     Ok(())
 }
 
-/// Vertices evenly over the numbers of those that no border is near.
+/// Returns sample vertices, evenly spaced by number, whose refined rings do not reach the boundary.
 fn samples(surface: &Triangulation, of: &Calibration) -> Result<Vec<u32>, CalibrationError> {
     let within = |vertex: &u32| {
         let region = Region::rings(surface, &[*vertex], of.rings);
-        region.triangles().iter().flat_map(|&t| surface.triangles()[t as usize]).all(|v| !surface.is_border(v))
+        region.triangles().iter().flat_map(|&t| surface.triangles()[t as usize]).all(|v| !surface.is_boundary(v))
     };
     let count = surface.positions_m().len();
     let stride = (count / of.samples).max(1);
-    // Of each stride's vertices the first that will do.
+    // Each stride gives its first vertex that is far enough from the boundary.
     let first = |start: usize| (start as u32..(start + stride).min(count) as u32).find(within);
     let found: Vec<u32> = (0..count).step_by(stride).filter_map(first).take(of.samples).collect();
     if found.is_empty() { Err(CalibrationError::NoSample { rings: of.rings }) } else { Ok(found) }
 }
 
-/// `K′_h/K_h` and `U′/U` at every displacement of a sample.
+/// Returns `K′_h/K_h` and `U′/U` at every displacement of a sample vertex.
 fn of_sample(
     surface: &Triangulation,
     fine_rest_m: &[DVec3],
@@ -223,7 +232,7 @@ fn of_sample(
     let in_piece = |source| CalibrationError::Piece { vertex, source };
     let (piece, piece_rest_m, own) = piece(surface, fine_rest_m, vertex, of.rings + BEYOND).map_err(in_piece)?;
     let after = Refined::new(&piece, &Region::rings(&piece, &[own], of.rings), &piece_rest_m);
-    let before = Net::uniform(&piece, of.coarse.mesh_n_per_m, of.coarse.home_n_per_m);
+    let before = Net::uniform(&piece, of.coarse.mesh_n_per_m, of.coarse.anchor_n_per_m);
     let edges = piece.edges_at(own);
     let length_m = edges.iter().map(|&edge| piece.length_m(edge)).sum::<f64>() / edges.len() as f64;
     let inwards = -normal(&piece, own);
@@ -233,16 +242,17 @@ fn of_sample(
         let push_m = inwards * (xi * length_m);
         let force = point_force_n(&before, own, push_m, &mut x_m).map_err(|e| no_match(e.into()))?;
         let force_n = force.dot(inwards);
-        let found = matched(&after, &of.coarse, (own, push_m), force_n, Way::Ratio(of.ratio)).map_err(no_match)?;
+        let found = matched(&after, &of.coarse, own, push_m, force_n, Way::Ratio(of.ratio)).map_err(no_match)?;
         let net = after.net(&of.coarse, &found);
         let mut x_after = net.rest_m.clone();
         point_force_n(&net, own, push_m, &mut x_after).map_err(|e| no_match(e.into()))?;
-        Ok((found.home_n_per_m / of.coarse.home_n_per_m, net.energy_j(&x_after) / before.energy_j(&x_m)))
+        Ok((found.anchor_n_per_m / of.coarse.anchor_n_per_m, net.energy_j(&x_after) / before.energy_j(&x_m)))
     };
     XI.iter().map(at).collect()
 }
 
-/// The surface within some rings of a vertex at its homes, homes (m) of it refined, and the vertex's number there.
+/// Returns the surface within some rings of a vertex, at its rest positions, with the rest positions (m) of it refined,
+/// and the number that the vertex has there.
 fn piece(
     surface: &Triangulation,
     fine_rest_m: &[DVec3],
@@ -253,20 +263,20 @@ fn piece(
     let corners = || region.triangles().iter().map(|&t| surface.triangles()[t as usize]);
     let mut number: BTreeMap<u32, u32> = corners().flatten().map(|v| (v, NONE)).collect();
     number.values_mut().zip(0..).for_each(|(own, next)| *own = next);
-    let homes: Vec<DVec3> = number.keys().map(|&v| fine_rest_m[v as usize]).collect();
+    let coarse_rest_m: Vec<DVec3> = number.keys().map(|&v| fine_rest_m[v as usize]).collect();
     let triangles = corners().map(|triangle| triangle.map(|v| number[&v])).collect();
-    let piece = Triangulation::new(homes.clone(), triangles)?;
+    let piece = Triangulation::new(coarse_rest_m.clone(), triangles)?;
     let whole: Vec<u32> = number.keys().copied().collect();
     let middle = |nodes: [u32; 2]| {
         let [a, b] = nodes.map(|node| whole[node as usize]);
         let edge = surface.edge_between(a, b);
         edge.map_or(DVec3::ZERO, |edge| fine_rest_m[surface.positions_m().len() + edge as usize])
     };
-    let rest_m = homes.iter().copied().chain(piece.edges().iter().map(|edge| middle(edge.nodes))).collect();
+    let rest_m = coarse_rest_m.iter().copied().chain(piece.edges().iter().map(|edge| middle(edge.nodes))).collect();
     Ok((piece, rest_m, number[&vertex]))
 }
 
-/// Outwards, by the areas of the triangles around.
+/// Returns the outward normal at a vertex: the mean of its triangles' normals, weighted by area.
 fn normal(surface: &Triangulation, vertex: u32) -> DVec3 {
     let of = |&triangle: &u32| {
         let [a, b, c] = surface.triangles()[triangle as usize].map(|v| surface.positions_m()[v as usize]);
@@ -287,40 +297,44 @@ mod tests {
     use super::*;
     use crate::bodies::mass_spring::testing::{hexagon, sphere};
 
-    const OF: Calibration =
-        Calibration { coarse: Constants { mesh_n_per_m: 60.0, home_n_per_m: 60.0 }, rings: 1, ratio: 1.0, samples: 1 };
+    const OF: Calibration = Calibration {
+        coarse: Constants { mesh_n_per_m: 60.0, anchor_n_per_m: 60.0 },
+        rings: 1,
+        ratio: 1.0,
+        samples: 1,
+    };
 
-    /// On the paper's sheet the table is figure 8's middle curve.
+    /// On the paper's sheet the table is the middle curve of figure 8.
     #[test]
     fn on_the_flat_sheet_it_is_the_papers_curve() {
         let table = ConstantsTable::calibrate(&hexagon(8, 0.03), OF, &mut |_| {}).unwrap();
         let of = |xi: f64| table.rows.iter().find(|row| row.xi == xi).unwrap();
         assert!(
-            (of(0.01).home_ratio - 0.9993).abs() < 1e-3 && (of(1.0).home_ratio - 0.7041).abs() < 2e-3,
+            (of(0.01).anchor_ratio - 0.9993).abs() < 1e-3 && (of(1.0).anchor_ratio - 0.7041).abs() < 2e-3,
             "{:?}",
             table.rows
         );
-        // With constants that fall on the way another energy is held than was put in.
+        // With constants that fall during the displacement the energy is not the work that was done.
         assert!((of(0.01).energy_ratio - 1.0).abs() < 1e-3, "{:?}", of(0.01));
         assert!(table.rows.iter().all(|row| (0.5..1.5).contains(&row.energy_ratio)), "{:?}", table.rows);
-        let between = table.at(0.7).home_n_per_m / 60.0;
-        assert!((between - f64::midpoint(of(0.6).home_ratio, of(0.8).home_ratio)).abs() < 1e-12);
-        assert_eq!(table.at(9.0).home_n_per_m, 60.0 * of(1.0).home_ratio);
-        assert_eq!(table.at(0.0).mesh_n_per_m, 60.0 * of(0.01).home_ratio);
+        let between = table.at(0.7).anchor_n_per_m / 60.0;
+        assert!((between - f64::midpoint(of(0.6).anchor_ratio, of(0.8).anchor_ratio)).abs() < 1e-12);
+        assert_eq!(table.at(9.0).anchor_n_per_m, 60.0 * of(1.0).anchor_ratio);
+        assert_eq!(table.at(0.0).mesh_n_per_m, 60.0 * of(0.01).anchor_ratio);
     }
 
-    /// With constants of the table a vertex that was no sample feels as before, within what samples differ by.
+    /// With the table's constants a vertex that was no sample feels as before, within the spread of the samples.
     #[test]
     fn on_a_ball_other_vertices_feel_as_before() {
         let ball = sphere(3, 0.05);
         let table = ConstantsTable::calibrate(&ball, Calibration { samples: 6, ..OF }, &mut |_| {}).unwrap();
         let fine_rest = refined(&ball).0;
-        let homes = ball.moved(fine_rest[..ball.positions_m().len()].to_vec()).unwrap();
-        let coarse = Net::uniform(&homes, 60.0, 60.0);
+        let at_rest = ball.moved(fine_rest[..ball.positions_m().len()].to_vec()).unwrap();
+        let coarse = Net::uniform(&at_rest, 60.0, 60.0);
         for (vertex, row) in [(101, 4), (7, 2), (200, 6)].map(|(v, r): (u32, usize)| (v, table.rows[r])) {
-            let edges = homes.edges_at(vertex);
-            let length = edges.iter().map(|&edge| homes.length_m(edge)).sum::<f64>() / edges.len() as f64;
-            let push = -normal(&homes, vertex) * (row.xi * length);
+            let edges = at_rest.edges_at(vertex);
+            let length = edges.iter().map(|&edge| at_rest.length_m(edge)).sum::<f64>() / edges.len() as f64;
+            let push = -normal(&at_rest, vertex) * (row.xi * length);
             let force = |net: &Net| point_force_n(net, vertex, push, &mut net.rest_m.clone()).unwrap().length();
             let after = Refined::new(&ball, &Region::rings(&ball, &[vertex], 1), &fine_rest);
             let ratio = force(&after.net(&OF.coarse, &table.at(row.xi))) / force(&coarse);
@@ -333,7 +347,7 @@ mod tests {
         let patch = hexagon(4, 0.03);
         let table = ConstantsTable::calibrate(&patch, OF, &mut |_| {}).unwrap();
         table.fits(&patch, &OF).unwrap();
-        let other = Constants { home_n_per_m: 59.0, ..OF.coarse };
+        let other = Constants { anchor_n_per_m: 59.0, ..OF.coarse };
         for (surface, of, what) in [
             (&hexagon(4, 0.031), OF, "another surface"),
             (&patch, Calibration { coarse: other, ..OF }, "other spring constants"),
@@ -347,6 +361,6 @@ mod tests {
         assert_eq!(refused(Calibration { rings: 0, ..OF }), "rings = 0: must be 1 or more");
         assert!(refused(Calibration { rings: 9, ..OF }).starts_with("no vertex of the surface is 9 rings from"));
         let nothing = ConstantsTable { rows: vec![], ..table };
-        assert!(nothing.fits(&patch, &OF).is_err() && nothing.at(0.5).home_n_per_m == 60.0);
+        assert!(nothing.fits(&patch, &OF).is_err() && nothing.at(0.5).anchor_n_per_m == 60.0);
     }
 }

@@ -1,19 +1,19 @@
-//! What moves, against the plain springs.
-use super::HomeLaw;
+//! The running springs and the motion of a surface, compared with the plain springs.
+use super::AnchorLaw;
 use super::{
     blend::{Added, Levels},
     model::SpringModel,
-    motion::{SpringMotion, SpringScratch, Wanted},
+    motion::{AwakeNodes, SpringMotion, SpringScratch, Wanted},
     net::{Net, Spring},
     region::{Constants, Region},
     testing::{hexagon, sphere, spring_spec},
 };
 use glam::DVec3;
 
-/// A tie: its node and the ends, and its stiffness (N/m).
+/// A tie: its node, the ends of the node's edge, and its stiffness (N/m).
 type Tie = ([u32; 3], f64);
 
-/// All springs on all nodes that the surface refined has, and the ties.
+/// Returns all springs and all ties on the nodes of the surface refined everywhere.
 fn oracle(model: &SpringModel, levels: &Levels, fine: &Constants) -> (Net, Vec<Tie>) {
     let rest_m = model.rest_m().to_vec();
     let coarse = &model.spec().coarse;
@@ -22,32 +22,32 @@ fn oracle(model: &SpringModel, levels: &Levels, fine: &Constants) -> (Net, Vec<T
         Spring { nodes, rest_length_m: a.distance(b), stiffness_n_per_m: coarse.mesh_n_per_m }
     };
     let mut springs: Vec<Spring> = model.surface().edges().iter().map(|edge| spring(edge.nodes)).collect();
-    let mut home_n_per_m = vec![0.0; rest_m.len()];
-    home_n_per_m[..model.vertices() as usize].fill(coarse.home_n_per_m);
+    let mut anchor_n_per_m = vec![0.0; rest_m.len()];
+    anchor_n_per_m[..model.vertices() as usize].fill(coarse.anchor_n_per_m);
     let mut ties = Vec::new();
-    levels.for_each_added(model.surface(), model.rest_m(), (coarse, fine), |added| match added {
+    levels.for_each_added(model.surface(), model.rest_m(), coarse, fine, |added| match added {
         Added::Spring { nodes, rest_length_m, stiffness_n_per_m } => {
             springs.push(Spring { nodes, rest_length_m, stiffness_n_per_m });
         }
-        Added::Home { node, stiffness_n_per_m } => home_n_per_m[node as usize] += stiffness_n_per_m,
+        Added::Anchor { node, stiffness_n_per_m } => anchor_n_per_m[node as usize] += stiffness_n_per_m,
         Added::Tie { nodes, stiffness_n_per_m } => ties.push((nodes, stiffness_n_per_m)),
     });
-    (Net { rest_m, springs, home_n_per_m, home_law: model.spec().home_law.clone() }, ties)
+    (Net { rest_m, springs, anchor_n_per_m, anchor_law: model.spec().anchor_law.clone() }, ties)
 }
 
-/// `u_e − ½ (u_a + u_b)` (m).
+/// Returns `u_e − ½ (u_a + u_b)` (m).
 fn off_m(net: &Net, nodes: [u32; 3], x_m: &[DVec3]) -> DVec3 {
     let [own, a, b] = nodes.map(|node| x_m[node as usize] - net.rest_m[node as usize]);
     own - (a + b) * 0.5
 }
 
-/// Energy (J) of springs and ties.
+/// Returns the energy (J) of springs and ties.
 fn energy_j((net, ties): &(Net, Vec<Tie>), x_m: &[DVec3]) -> f64 {
     let of_ties = ties.iter().map(|(nodes, stiffness)| 0.5 * stiffness * off_m(net, *nodes, x_m).length_squared());
     net.energy_j(x_m) + of_ties.sum::<f64>()
 }
 
-/// Forces (N) of springs and ties.
+/// Returns the forces (N) of springs and ties.
 fn forces_n((net, ties): &(Net, Vec<Tie>), x_m: &[DVec3]) -> Vec<DVec3> {
     let mut forces = net.forces_n(x_m);
     for (nodes, stiffness) in ties {
@@ -76,17 +76,18 @@ impl Moving {
         let v = vec![DVec3::ZERO; awake.len()];
         let scratch = SpringScratch::new(&model);
         let mut own = Self { model, motion, scratch, x, v, awake };
-        own.go_on(&[], 0.0);
+        own.advance(&[], 0.0);
         own
     }
 
-    fn go_on(&mut self, refined: &[u32], step: f64) -> [f64; 2] {
+    fn advance(&mut self, refined: &[u32], step: f64) -> [f64; 2] {
         let wanted = Wanted { refined, step, fine: self.model.spec().fine, awake: &self.awake };
-        let changed = self.scratch.go_on(&self.model, &mut self.motion, (&mut self.x, &mut self.v), &wanted);
+        let nodes = AwakeNodes { x_m: &mut self.x, v_m_per_s: &mut self.v };
+        let changed = self.scratch.advance(&self.model, &mut self.motion, nodes, &wanted);
         changed.map_or([0.0; 2], |changed| [changed.elastic_j, changed.kinetic_j])
     }
 
-    /// Positions of all nodes: sleeping vertices at home, others of type 2 wherever.
+    /// Returns the positions of all nodes, at rest where they are not awake.
     fn all_m(&self) -> Vec<DVec3> {
         let mut all = self.model.rest_m().to_vec();
         for (id, x) in self.motion.ids.iter().zip(&self.x) {
@@ -115,7 +116,7 @@ impl Moving {
         forces
     }
 
-    /// Leapfrog, kick by half first.
+    /// Takes a step of leapfrog, half a kick first.
     fn step(&mut self, h_s: f64) {
         for part in 0..2 {
             let forces = self.forces_n();
@@ -142,21 +143,21 @@ fn region(model: &SpringModel, centres: &[u32], rings: u32) -> Vec<u32> {
     Region::rings(model.surface(), centres, rings).triangles().iter().copied().collect()
 }
 
-fn ball(law: HomeLaw) -> SpringModel {
-    SpringModel::build(crate::bodies::mass_spring::SpringSpec { home_law: law, ..spring_spec(sphere(3, 0.05)) })
+fn ball(law: AnchorLaw) -> SpringModel {
+    SpringModel::build(crate::bodies::mass_spring::SpringSpec { anchor_law: law, ..spring_spec(sphere(3, 0.05)) })
         .unwrap()
 }
 
-/// Everything awake or a part of it, at any levels.
+/// The whole surface is awake or a part of it, at any levels.
 #[test]
 fn forces_are_those_of_the_plain_springs() {
-    for (law, awake) in [(HomeLaw::Linear, 258), (HomeLaw::cubic(1e5).unwrap(), 258), (HomeLaw::Linear, 90)] {
+    for (law, awake) in [(AnchorLaw::Linear, 258), (AnchorLaw::cubic(1e5).unwrap(), 258), (AnchorLaw::Linear, 90)] {
         let model = ball(law);
         let (one, other) = (region(&model, &[0], 2), region(&model, &[40], 1));
         let mut moving = Moving::new(model, (0..awake).collect());
         for (refined, ticks) in [(&one, 7), (&one, 20), (&other, 5)] {
             for _ in 0..ticks {
-                moving.go_on(refined, 0.07);
+                moving.advance(refined, 0.07);
             }
             moving.shake(1e-3);
             let expected = forces_n(&moving.oracle(), &moving.all_m());
@@ -174,10 +175,11 @@ fn forces_are_those_of_the_plain_springs() {
     }
 }
 
-/// What comes and goes, and levels on their way, change the energy by what is told; nodes that come and go keep momentum and take kinetic energy; it is never given.
+/// Nodes that enter and leave, and levels that change, change the energy by what is returned; nodes that enter and
+/// leave conserve momentum and take kinetic energy, and never give any.
 #[test]
 fn energy_is_told_and_momentum_kept_while_a_shaken_ball_is_refined_here_and_there() {
-    let model = ball(HomeLaw::cubic(1e5).unwrap());
+    let model = ball(AnchorLaw::cubic(1e5).unwrap());
     let regions: Vec<Vec<u32>> =
         [0, 3, 40, 41].iter().map(|&centre| region(&model, &[centre], 1 + centre % 2)).collect();
     let mut moving = Moving::new(model, (0..258).collect());
@@ -186,7 +188,7 @@ fn energy_is_told_and_momentum_kept_while_a_shaken_ball_is_refined_here_and_ther
     let h_s = 0.2 / moving.model.frequency_rad_per_s();
     for tick in 0..2000 {
         let (energy, momentum) = (moving.energy_j(), moving.momentum());
-        let [elastic, kinetic] = moving.go_on(&regions[tick / 37 % 4], 0.05);
+        let [elastic, kinetic] = moving.advance(&regions[tick / 37 % 4], 0.05);
         assert!(kinetic <= 1e-15 * start, "tick {tick}: {kinetic}");
         let change = moving.energy_j() - energy;
         assert!((change - elastic - kinetic).abs() < 1e-12 * start, "tick {tick}: {change} {elastic} {kinetic}");
@@ -202,34 +204,36 @@ fn energy_is_told_and_momentum_kept_while_a_shaken_ball_is_refined_here_and_ther
     assert!(largest > 24.0 && balance.abs() < 1e-3 * start, "{balance} of {start}, {largest} triangles");
 }
 
-/// Vertices fall asleep and wake at home: the energy they had is told, and springs to them are those of the oracle.
+/// Vertices fall asleep and wake at their rest positions: the energy they had is returned, and springs to them are
+/// those of the oracle.
 #[test]
 fn what_falls_asleep_leaves_its_energy() {
-    let mut moving = Moving::new(ball(HomeLaw::Linear), (0..258).collect());
+    let mut moving = Moving::new(ball(AnchorLaw::Linear), (0..258).collect());
     let refined = region(&moving.model, &[0], 1);
     for _ in 0..25 {
-        moving.go_on(&refined, 0.07);
+        moving.advance(&refined, 0.07);
     }
     moving.shake(1e-3);
     moving.awake = (0..258).filter(|id| id % 3 != 1).collect();
     let before = moving.energy_j();
-    let told: f64 = moving.go_on(&refined, 0.07).iter().sum();
+    let told: f64 = moving.advance(&refined, 0.07).iter().sum();
     let change = moving.energy_j() - before;
     assert!(moving.motion.ids.len() < 258 && change < -0.1 * before, "{before} {change}");
     assert!((change - told).abs() < 1e-13 * before, "{change} {told}");
     moving.awake = (0..258).collect();
     let before = moving.energy_j();
-    let told: f64 = moving.go_on(&refined, 0.07).iter().sum();
+    let told: f64 = moving.advance(&refined, 0.07).iter().sum();
     assert!(told.abs() < 1e-13 * before && (moving.energy_j() - before).abs() < 1e-13 * before);
 }
 
-/// A motion put back, as from a snapshot, in buffers that know another one: the same bits.
+/// A motion that is put back, as from a snapshot, goes on with the same bits in buffers that were laid out for another
+/// one.
 #[test]
 fn a_motion_put_back_goes_on_with_the_same_bits() {
-    let mut moving = Moving::new(ball(HomeLaw::Linear), (0..258).collect());
+    let mut moving = Moving::new(ball(AnchorLaw::Linear), (0..258).collect());
     let refined = region(&moving.model, &[0], 2);
     let on = |moving: &mut Moving, refined: &[u32]| {
-        moving.go_on(refined, 0.07);
+        moving.advance(refined, 0.07);
         moving.step(1e-4);
     };
     moving.shake(1e-3);
@@ -243,7 +247,7 @@ fn a_motion_put_back_goes_on_with_the_same_bits() {
     assert_eq!((moving.motion, moving.x, moving.v), ends);
 }
 
-/// The bound holds at any levels and however springs are stretched, and is not idle.
+/// The bound holds at any levels and however far springs are stretched, and it is not much too large.
 #[test]
 fn no_frequency_is_above_the_bound() {
     for surface in [hexagon(4, 0.03), sphere(2, 0.05)] {
@@ -272,7 +276,7 @@ fn no_frequency_is_above_the_bound() {
                 }
             }
             highest = highest.max(omega_sq.sqrt());
-            moving.go_on(&refined, 0.1);
+            moving.advance(&refined, 0.1);
         }
         let bound = moving.model.frequency_rad_per_s();
         assert!(highest < bound && highest > 0.5 * bound, "{highest} {bound}");

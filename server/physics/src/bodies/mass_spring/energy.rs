@@ -1,4 +1,4 @@
-//! What a mass-spring surface holds.
+//! The energies of a mass-spring surface.
 use super::{
     blend::Added,
     body::MassSpringBody,
@@ -9,7 +9,7 @@ use crate::tick::{Energies, MechanicalState};
 use glam::DVec3;
 
 impl MassSpringBody {
-    /// What it holds, beside the ledger's work and dissipation.
+    /// Returns the energies of a state, with the ledger's work and dissipation.
     pub(crate) fn energies(&self, gravity_m_per_s2: DVec3, own: &MassSpringState, state: &MechanicalState) -> Energies {
         let [kinetic_j, elastic_j] = self.energies_j(&own.motion, &state.x, &state.v);
         Energies {
@@ -21,7 +21,8 @@ impl MassSpringBody {
         }
     }
 
-    /// Kinetic and elastic energy (J) of the awake nodes and of all springs that are on them. Allocates nothing.
+    /// Returns the kinetic energy (J) of the awake nodes, and the elastic energy (J) of all springs at them. Nothing is
+    /// allocated.
     pub fn energies_j(&self, motion: &SpringMotion, x_m: &[DVec3], v_m_per_s: &[DVec3]) -> [f64; 2] {
         let model = self.model();
         let (surface, rest_m, spec) = (model.surface(), model.rest_m(), model.spec());
@@ -32,23 +33,23 @@ impl MassSpringBody {
         let mut elastic_j = 0.0;
         for vertex in vertices {
             let away_m = at(vertex).distance(rest_m[vertex as usize]);
-            elastic_j += spec.coarse.home_n_per_m * spec.home_law.at(away_m).integral_m2;
+            elastic_j += spec.coarse.anchor_n_per_m * spec.anchor_law.at(away_m).integral_m2;
             for &edge in surface.edges_at(vertex) {
                 let other = surface.other_end(edge, vertex);
-                // Of two ends that are awake the first one counts.
+                // A spring between two awake vertices counts at the first one.
                 if vertex < other || place(other).is_none() {
                     elastic_j += 0.5 * spec.coarse.mesh_n_per_m * longer_m(vertex, other).powi(2);
                 }
             }
         }
-        motion.levels.for_each_added(surface, rest_m, (&spec.coarse, &motion.fine), |added| {
+        motion.levels.for_each_added(surface, rest_m, &spec.coarse, &motion.fine, |added| {
             elastic_j += match added {
                 Added::Spring { nodes: [a, b], stiffness_n_per_m, .. } => {
                     0.5 * stiffness_n_per_m * longer_m(a, b).powi(2)
                 }
-                Added::Home { node, stiffness_n_per_m } => {
+                Added::Anchor { node, stiffness_n_per_m } => {
                     let away_m = at(node).distance(rest_m[node as usize]);
-                    stiffness_n_per_m * spec.home_law.at(away_m).integral_m2
+                    stiffness_n_per_m * spec.anchor_law.at(away_m).integral_m2
                 }
                 Added::Tie { nodes, stiffness_n_per_m } => {
                     let [own, a, b] = nodes.map(|node| at(node) - rest_m[node as usize]);
@@ -61,7 +62,7 @@ impl MassSpringBody {
         [free.map(|(mass_kg, v)| 0.5 * mass_kg * v.length_squared()).sum(), elastic_j]
     }
 
-    /// `−Σ m g·(x − X)` (J). Allocates nothing.
+    /// Returns the gravitational energy `−Σ m g·(x − X)` (J). Nothing is allocated.
     pub fn gravitational_j(&self, motion: &SpringMotion, x_m: &[DVec3], gravity_m_per_s2: DVec3) -> f64 {
         let model = self.model();
         let place = |node: u32| motion.ids.binary_search(&node).ok();

@@ -1,13 +1,13 @@
-//! Where a net of springs comes to rest when some of its nodes are held.
+//! Static equilibrium of a net of springs some of whose nodes are held.
 use super::net::Net;
 use glam::DVec3;
 use thiserror::Error;
 
-/// A net does not come to rest.
+/// A net of springs did not come to rest.
 #[derive(Debug, Clone, Copy, PartialEq, Error)]
 #[error("the springs found no rest in {iterations} steps: a node is still pulled by {residual_n:e} N")]
 pub struct NoRest {
-    /// Newton steps taken.
+    /// Number of Newton steps that were taken.
     pub iterations: usize,
     /// Largest force (N) left on a free node.
     pub residual_n: f64,
@@ -15,12 +15,14 @@ pub struct NoRest {
 
 const MOST_STEPS: usize = 200;
 
-/// Moves the free nodes of `x_m` (m) to rest, where no force on any of them is more than `tolerance_n` (N). `external_n` (N) acts on all nodes; it may be empty.
+/// Moves the free nodes of `x_m` (m) to rest, where the force on each is `tolerance_n` (N) or less. `external_n` (N)
+/// acts on all nodes; it may be empty.
 ///
-/// Newton's method; its steps by conjugate gradients, ended where the stiffness proves not positive, and shortened until the energy `U − Σ f·x` or the largest force gets less.
+/// Newton's method is used. Its steps are found by conjugate gradients, which end where the stiffness proves not
+/// positive, and a step is halved until the energy `U − Σ f·x` or the largest force decreases.
 ///
 /// # Errors
-/// [`NoRest`].
+/// [`NoRest`], where 200 steps or a very short one lead to no rest.
 pub fn settle(
     net: &Net,
     is_held: &[bool],
@@ -65,7 +67,7 @@ pub fn settle(
     Ok(())
 }
 
-/// A Newton step: `K p = f` by conjugate gradients with the diagonal, to a residual that falls with the force's.
+/// Returns a Newton step, the solution of `K p = f` by conjugate gradients that are preconditioned with the diagonal.
 fn direction(net: &Net, is_held: &[bool], x_m: &[DVec3], forces: &[DVec3], diagonal: &[f64]) -> Vec<DVec3> {
     let dot = |a: &[DVec3], b: &[DVec3]| -> f64 { a.iter().zip(b).map(|(a, b)| a.dot(*b)).sum() };
     let scaled = |r: &[DVec3]| -> Vec<DVec3> {

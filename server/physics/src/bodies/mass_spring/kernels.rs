@@ -1,4 +1,5 @@
-//! Mesh springs, node by node: each stands at both of its ends, so forces are gathered and never scattered. Their oracle is `spring::net`.
+//! Forces of mesh springs, node by node: each spring is stored at both of its ends, so that forces are gathered and
+//! never scattered. The oracle is [`super::Net`].
 //!
 //! ```text
 //! f_i = Σ_j k_ij (1 − r_ij/|l_ij|) l_ij,   l_ij = x_j − x_i
@@ -11,22 +12,23 @@ use crate::lanes::{
 };
 use glam::DVec3;
 
-/// Nodes of a block: one or more whole vectors on every instruction set.
+/// Number of nodes in a block, which makes one or more whole vectors on every instruction set.
 const LANES: usize = 8;
 /// Springs shorter than this (m) have no direction and no force.
 const NO_LENGTH_M: f64 = 1e-12;
 
-/// Springs of nodes that move, in blocks of eight nodes; a block has as many slots as the node in it with most springs.
+/// The springs of nodes that move, in blocks of eight nodes. A block has as many slots as its node with the most
+/// springs.
 #[derive(Debug, Clone)]
 pub struct SpringRows {
-    /// Where each block's slots begin, and the end of the last.
+    /// First slot of each block, then the end of the last block's slots.
     first_slot: Vec<u32>,
     slots: Vec<Slot>,
     nodes: usize,
     instruction_set: Available,
 }
 
-/// One spring of each of eight nodes.
+/// One spring of each of the eight nodes of a block.
 #[derive(Debug, Clone, Copy)]
 struct Slot {
     neighbours: [u32; LANES],
@@ -39,14 +41,14 @@ struct Slot {
 pub struct HalfSpring {
     /// The other end.
     pub neighbour: u32,
-    /// `r` (m).
+    /// Rest length `r` (m).
     pub rest_length_m: f64,
-    /// `k` (N/m).
+    /// Stiffness `k` (N/m).
     pub stiffness_n_per_m: f64,
 }
 
 impl SpringRows {
-    /// Room for so many nodes, in no springs, with so many springs a node.
+    /// Returns rows without nodes that have room for so many nodes with so many springs each.
     pub fn with_room(nodes: usize, springs_a_node: usize) -> Self {
         let blocks = nodes.div_ceil(LANES);
         let mut first_slot = Vec::with_capacity(blocks + 1);
@@ -59,20 +61,22 @@ impl SpringRows {
         }
     }
 
-    /// The same, held to an instruction set or the best below it that there is (for tests and benchmarks).
+    /// Returns the same rows limited to an instruction set, or to the best available one below it (for tests and
+    /// benchmarks).
     #[must_use]
     pub fn with_instruction_set(self, instruction_set: InstructionSet) -> Self {
         Self { instruction_set: Available::at_most(instruction_set), ..self }
     }
 
-    /// Forgets all nodes. Allocates nothing.
+    /// Removes all nodes. Nothing is allocated.
     pub fn clear(&mut self) {
         self.nodes = 0;
         self.slots.clear();
         self.first_slot.truncate(1);
     }
 
-    /// The next node, with its springs, of which neighbours are numbered as the positions of [`Self::add_forces_n`]. Allocates nothing while there is room.
+    /// Appends the next node with its springs, whose neighbours are numbered as the positions of
+    /// [`Self::add_forces_n`]. Nothing is allocated while there is room.
     pub fn push(&mut self, springs: impl Iterator<Item = HalfSpring>) {
         let (lane, own) = (self.nodes % LANES, self.nodes as u32);
         let first = if lane == 0 {
@@ -83,7 +87,7 @@ impl SpringRows {
         };
         for (number, spring) in springs.enumerate() {
             if first + number == self.slots.len() {
-                // Nodes without so many springs have one to themselves, without length or force.
+                // A node with fewer springs gets one from itself to itself, without length and force.
                 let block = own - lane as u32;
                 self.slots.push(Slot {
                     neighbours: std::array::from_fn(|lane| block + lane as u32),
@@ -100,13 +104,14 @@ impl SpringRows {
         self.nodes += 1;
     }
 
-    /// Number of nodes.
+    /// Returns the number of nodes.
     pub fn nodes(&self) -> usize {
         self.nodes
     }
 
-    /// Adds the springs' forces (N) on the nodes, at positions `x_m` (m) of these and then of what else springs go to. The last block's lanes without a node must be in `x_m`, or
-    /// there are none: positions are taken of the last entry then.
+    /// Adds the springs' forces (N) on the nodes. `x_m` (m) has the positions of the nodes, then of the other
+    /// neighbours. A lane of the last block without a node, which has no force, reads the last entry where `x_m` ends
+    /// before it.
     pub fn add_forces_n(&self, x_m: &[DVec3], forces_n: &mut [DVec3]) {
         run(self.instruction_set, Pull { rows: self, x_m, forces_n });
     }

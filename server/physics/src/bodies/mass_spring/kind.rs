@@ -69,7 +69,7 @@ impl BodyKind for MassSpringBody {
         chain.reals(&spec.mass_kg);
         for constants in [spec.coarse, spec.fine] {
             chain.real(constants.mesh_n_per_m);
-            chain.real(constants.home_n_per_m);
+            chain.real(constants.anchor_n_per_m);
         }
         chain.wholes(&spec.held);
     }

@@ -1,30 +1,32 @@
-//! Loop's scheme: where vertices of the refined surface go.
+//! Loop's scheme: the positions of the refined surface's vertices.
 //!
-//! A vertex of type 1, with `k` neighbours `p_j` inside, or its two on the border `b_1, b_2`; a vertex of type 2 on the edge `a b` with corners `c, d` across:
+//! A vertex of type 1 has `k` neighbours `p_j`, or on the boundary its two neighbours `b_1, b_2` there; a vertex of
+//! type 2 lies on the edge `a b` with the corners `c, d` across:
 //! ```text
-//! p′ = (1 − k β) p + β Σ_j p_j,   β = (5/8 − (3/8 + ¼ cos 2π/k)²)/k        on a border p′ = ¾ p + ⅛ (b_1 + b_2)
-//! e  = ⅜ (a + b) + ⅛ (c + d)                                               on a border e  = ½ (a + b)
+//! p′ = (1 − k β) p + β Σ_j p_j,   β = (5/8 − (3/8 + ¼ cos 2π/k)²)/k        on a boundary p′ = ¾ p + ⅛ (b_1 + b_2)
+//! e  = ⅜ (a + b) + ⅛ (c + d)                                               on a boundary e  = ½ (a + b)
 //! ```
-//! The limit surface has continuous curvature but at *extraordinary* vertices, of `k ≠ 6` inside, where its tangent plane is continuous.
+//! The curvature of the limit surface is continuous, except at *extraordinary* vertices inside, whose `k` is not 6;
+//! there its tangent plane is continuous.
 use super::topology::{Edge, NONE, Triangulation};
 use glam::DVec3;
 use std::f64::consts::TAU;
 
-/// Weights of coarse vertices in a vertex of the refined surface; they sum to 1.
+/// Coarse vertices with their weights in a vertex of the refined surface; the weights sum to 1.
 pub type Mask = Vec<(u32, f64)>;
 
-/// `β` of a vertex with `k` neighbours.
+/// Returns `β` of a vertex with `k` neighbours.
 pub fn beta(k: usize) -> f64 {
     let k = k as f64;
     (0.625 - (0.375 + 0.25 * (TAU / k).cos()).powi(2)) / k
 }
 
-/// Of the vertex of type 1 of a coarse vertex.
+/// Returns the mask of the vertex of type 1 that belongs to a coarse vertex.
 pub fn vertex_mask(surface: &Triangulation, vertex: u32) -> Mask {
-    let on_border = |edge: &&u32| surface.edges()[**edge as usize].is_border();
-    let borders: Vec<u32> = surface.edges_at(vertex).iter().filter(on_border).copied().collect();
-    if !borders.is_empty() {
-        let ends = borders.into_iter().map(|edge| (surface.other_end(edge, vertex), 0.125));
+    let on_boundary = |edge: &&u32| surface.edges()[**edge as usize].is_boundary();
+    let boundary_edges: Vec<u32> = surface.edges_at(vertex).iter().filter(on_boundary).copied().collect();
+    if !boundary_edges.is_empty() {
+        let ends = boundary_edges.into_iter().map(|edge| (surface.other_end(edge, vertex), 0.125));
         return std::iter::once((vertex, 0.75)).chain(ends).collect();
     }
     let k = surface.edges_at(vertex).len();
@@ -32,7 +34,7 @@ pub fn vertex_mask(surface: &Triangulation, vertex: u32) -> Mask {
     std::iter::once((vertex, 1.0 - k as f64 * beta)).chain(surface.neighbours(vertex).map(|n| (n, beta))).collect()
 }
 
-/// Of the vertex of type 2 of a coarse edge.
+/// Returns the mask of the vertex of type 2 that belongs to a coarse edge.
 pub fn edge_mask(edge: &Edge) -> Mask {
     let [a, b] = edge.nodes;
     match edge.opposite {
@@ -41,12 +43,13 @@ pub fn edge_mask(edge: &Edge) -> Mask {
     }
 }
 
-/// A mask's point.
+/// Returns the weighted sum of a mask's points.
 pub fn apply(mask: &[(u32, f64)], of: &[DVec3]) -> DVec3 {
     mask.iter().map(|&(vertex, weight)| of[vertex as usize] * weight).sum()
 }
 
-/// The whole surface refined once: vertices of type 1 in their order, then those of type 2 in that of edges; of each triangle its three corners, then the middle one.
+/// Returns positions and triangles of the whole surface refined once. Vertices of type 1 come in their order, then
+/// those of type 2 in that of edges; each triangle gives those at its three corners, then the middle one.
 pub fn refined(surface: &Triangulation) -> (Vec<DVec3>, Vec<[u32; 3]>) {
     let (vertices, p) = (surface.positions_m().len() as u32, surface.positions_m());
     let of_vertices = (0..vertices).map(|vertex| apply(&vertex_mask(surface, vertex), p));
@@ -79,7 +82,7 @@ mod tests {
         // Four neighbours at the ball's first vertices, six at the others.
         assert_eq!(vertex_mask(&ball, 0).len(), 5);
         assert_eq!(vertex_mask(&ball, 6).len(), 7);
-        // The patch's corner is on a border.
+        // The patch's corner is on a boundary.
         assert_eq!(vertex_mask(&patch, 36).len(), 3);
     }
 
@@ -88,7 +91,7 @@ mod tests {
         let patch = hexagon(4, 0.03);
         let (fine, triangles) = refined(&patch);
         assert_eq!(triangles.len(), 4 * patch.triangles().len());
-        for vertex in (0..patch.positions_m().len() as u32).filter(|&v| !patch.is_border(v)) {
+        for vertex in (0..patch.positions_m().len() as u32).filter(|&v| !patch.is_boundary(v)) {
             assert!(fine[vertex as usize].distance(patch.positions_m()[vertex as usize]) < 1e-15);
         }
         for (edge, at) in patch.edges().iter().zip(&fine[patch.positions_m().len()..]) {
@@ -99,7 +102,8 @@ mod tests {
         assert_eq!(again.edges().len(), 2 * patch.edges().len() + 3 * patch.triangles().len());
     }
 
-    /// The limit of an octahedron is a smooth ball: refined again and again, angles between neighbours go to nothing, at extraordinary vertices too.
+    /// The limit of an octahedron is a smooth ball: when it is refined again and again, angles between neighbours tend
+    /// to zero, at extraordinary vertices too.
     #[test]
     fn refining_again_and_again_leads_to_a_smooth_surface() {
         let mut surface = sphere(0, 1.0);
@@ -114,7 +118,7 @@ mod tests {
             let bend = |edge: &Edge| normal(edge.triangles[0]).angle_between(normal(edge.triangles[1]));
             sharpest.push(surface.edges().iter().map(bend).fold(0.0, f64::max));
         }
-        // Half as sharp each time, once the first corners are gone.
+        // Angles are halved each time, once the first corners are gone.
         assert!(
             sharpest.windows(2).all(|pair| pair[1] < 0.7 * pair[0]) && sharpest[3] < 0.52 * sharpest[2],
             "{sharpest:?}"

@@ -1,10 +1,11 @@
-//! Spring constants for a refined region such that it feels as before: haptic-subdivision, eq. 4.
+//! Spring constants with which a refined region feels as the coarse one did: haptic-subdivision, eq. 4.
 //! ```text
 //! F′(K′_h, K′_m, x) = F(K_h, K_m, x)
 //! ```
-//! of the force that displaces one vertex by `x`, all others at rest. That is one equation for two constants; a [`Way`] is the other.
-//! They are right for what they are matched for, *point contact*: pressed uniformly, a region of `N′` home springs in place of `N` with much the same constant is
-//! `N′/N` times as stiff. [`area_consistent`] are right for that, and wrong for a point.
+//! Here `F` is the force that displaces one vertex by `x` while all others come to rest. This is one equation for two
+//! constants; a [`Way`] is the second one. Matched constants are right for *point contact*. Under uniform pressure a
+//! region of `N′` anchor springs in place of `N`, with about the same constant, is `N′/N` times as stiff. The
+//! [`area_consistent`] constants are right for that, and wrong for a point.
 use super::{
     equilibrium::{NoRest, settle},
     net::Net,
@@ -13,12 +14,12 @@ use super::{
 use glam::DVec3;
 use thiserror::Error;
 
-/// What is asked besides eq. 4.
+/// The condition besides eq. 4.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Way {
-    /// `K′_h` is this (N/m); `K′_m` is found.
-    Home(f64),
-    /// `K′_m/K′_h` is this; both are found.
+    /// `K′_h` is given (N/m), and `K′_m` is found.
+    Anchor(f64),
+    /// `K′_m/K′_h` is given, and both are found.
     Ratio(f64),
 }
 
@@ -28,28 +29,30 @@ pub enum NoMatch {
     /// One of the nets does not come to rest.
     #[error(transparent)]
     NoRest(#[from] NoRest),
-    /// The force is not reached by any constant.
+    /// No constant gives the force.
     #[error("no constant between {low_n_per_m:e} and {high_n_per_m:e} N/m gives the force {force_n:e} N")]
     OutOfReach {
-        /// The force wanted (N).
+        /// The force that is wanted (N).
         force_n: f64,
-        /// Smallest tried (N/m).
+        /// Smallest constant that was tried (N/m).
         low_n_per_m: f64,
-        /// Largest tried (N/m).
+        /// Largest constant that was tried (N/m).
         high_n_per_m: f64,
     },
 }
 
-/// Constants that any number of refinements leaves the same sheet on the same foundation, per area: in the plane springs of a triangle of any size make the same stiffness, and a
-/// refined vertex has a quarter of the foundation's area: `K′_m = K_m`, `K′_h = K_h/4`.
+/// Returns the constants with which a refined surface is the same sheet on the same foundation, per area: `K′_m = K_m`,
+/// `K′_h = K_h/4`. In the plane the springs of triangles of any size make the same stiffness, and a refined vertex has
+/// a quarter of the foundation's area.
 pub fn area_consistent(coarse: &Constants) -> Constants {
-    Constants { mesh_n_per_m: coarse.mesh_n_per_m, home_n_per_m: 0.25 * coarse.home_n_per_m }
+    Constants { mesh_n_per_m: coarse.mesh_n_per_m, anchor_n_per_m: 0.25 * coarse.anchor_n_per_m }
 }
 
-/// Forces below this part of the stiffest spring times the displacement are none.
+/// Forces below this part of the stiffest spring times the displacement count as zero.
 const TOLERANCE: f64 = 1e-12;
 
-/// The force (N) that displaces a node (m) from home, all others at rest. `x_m` is where to start from, and where they are at last.
+/// Returns the force (N) that displaces a node by `displacement_m` (m) from its rest position while all others come to
+/// rest. `x_m` has the positions from which to start, and at the end those at rest.
 ///
 /// # Errors
 /// [`NoRest`].
@@ -62,22 +65,25 @@ pub fn point_force_n(net: &Net, node: u32, displacement_m: DVec3, x_m: &mut Vec<
     Ok(-net.forces_n(x_m)[node as usize])
 }
 
-/// Constants inside a region with which displacing its node `node` (m) takes the force `force_n` (N, along the displacement).
+/// Returns the constants inside a region with which a displacement of its node `node` by `displacement_m` (m) takes the
+/// force `force_n` (N, along the displacement).
 ///
-/// The root of `ln F′ − ln F` over the constant's logarithm, by the Illinois method, to 1e-10 of the force.
+/// They are the root of `ln F′ − ln F` over the constant's logarithm, which the Illinois method finds to 1e-10 of the
+/// force.
 ///
 /// # Errors
 /// [`NoMatch`].
 pub fn matched(
     refined: &Refined,
     outside: &Constants,
-    (node, displacement_m): (u32, DVec3),
+    node: u32,
+    displacement_m: DVec3,
     force_n: f64,
     way: Way,
 ) -> Result<Constants, NoMatch> {
     let constants = |ln: f64| match way {
-        Way::Home(home_n_per_m) => Constants { mesh_n_per_m: ln.exp(), home_n_per_m },
-        Way::Ratio(ratio) => Constants { mesh_n_per_m: ratio * ln.exp(), home_n_per_m: ln.exp() },
+        Way::Anchor(anchor_n_per_m) => Constants { mesh_n_per_m: ln.exp(), anchor_n_per_m },
+        Way::Ratio(ratio) => Constants { mesh_n_per_m: ratio * ln.exp(), anchor_n_per_m: ln.exp() },
     };
     let mut x_m = refined.rest_m.clone();
     let mut misfit = |ln: f64| -> Result<f64, NoRest> {
@@ -86,11 +92,11 @@ pub fn matched(
         Ok((force / force_n).ln())
     };
     let start = match way {
-        Way::Home(_) => outside.mesh_n_per_m.ln(),
-        Way::Ratio(_) => outside.home_n_per_m.ln(),
+        Way::Anchor(_) => outside.mesh_n_per_m.ln(),
+        Way::Ratio(_) => outside.anchor_n_per_m.ln(),
     };
     let first = misfit(start)?;
-    // The force grows with the constant: away from the start until it is on the other side.
+    // The force grows with the constant: go away from the start until the force is on the other side.
     let (mut one, mut step) = ((start, first), -first.signum() * 0.25);
     let mut other = one;
     while other.1 * one.1 > 0.0 || other.0.to_bits() == one.0.to_bits() {
@@ -130,42 +136,44 @@ mod tests {
 
     #[test]
     fn matched_constants_give_the_force_of_the_coarse_sheet() {
-        let (edge, k) = (0.03, Constants { mesh_n_per_m: 60.0, home_n_per_m: 60.0 });
+        let (edge, k) = (0.03, Constants { mesh_n_per_m: 60.0, anchor_n_per_m: 60.0 });
         let patch = hexagon(5, edge);
-        let coarse = Net::uniform(&patch, k.mesh_n_per_m, k.home_n_per_m);
+        let coarse = Net::uniform(&patch, k.mesh_n_per_m, k.anchor_n_per_m);
         let refined = Refined::new(&patch, &Region::rings(&patch, &[0], 1), &loop_scheme::refined(&patch).0);
         for part in [0.1, 1.0] {
             let push = DVec3::Z * (part * edge);
             let force_n = point_force_n(&coarse, 0, push, &mut coarse.rest_m.clone()).unwrap().z;
-            for way in [Way::Home(60.0), Way::Home(60.0 * refined.node_ratio()), Way::Ratio(1.0), Way::Ratio(4.0)] {
-                let found = matched(&refined, &k, (0, push), force_n, way).unwrap();
+            for way in [Way::Anchor(60.0), Way::Anchor(60.0 * refined.node_ratio()), Way::Ratio(1.0), Way::Ratio(4.0)] {
+                let found = matched(&refined, &k, 0, push, force_n, way).unwrap();
                 let net = refined.net(&k, &found);
                 let force = point_force_n(&net, 0, push, &mut net.rest_m.clone()).unwrap().z;
                 assert!((force / force_n - 1.0).abs() < 1e-9, "{way:?} at {part}: {force} {force_n}");
                 match way {
-                    Way::Home(home) => assert_eq!(found.home_n_per_m, home),
-                    Way::Ratio(ratio) => assert!((found.mesh_n_per_m / found.home_n_per_m / ratio - 1.0).abs() < 1e-12),
+                    Way::Anchor(anchor) => assert_eq!(found.anchor_n_per_m, anchor),
+                    Way::Ratio(ratio) => {
+                        assert!((found.mesh_n_per_m / found.anchor_n_per_m / ratio - 1.0).abs() < 1e-12)
+                    }
                 }
             }
         }
     }
 
-    /// A uniform press is felt by home springs alone. Matched for a point they are too many; area-consistent ones are not, but for the rim, whose vertices have more area than a fine
-    /// one's and less than a coarse one's.
+    /// Only anchor springs answer a uniform press. Those matched for a point are too stiff together; area-consistent
+    /// ones are not, except along the rim, whose vertices have more area than a fine one and less than a coarse one.
     #[test]
     fn pressed_uniformly_matched_constants_are_too_stiff_and_area_consistent_ones_not() {
-        let (edge, k) = (0.03, Constants { mesh_n_per_m: 60.0, home_n_per_m: 60.0 });
+        let (edge, k) = (0.03, Constants { mesh_n_per_m: 60.0, anchor_n_per_m: 60.0 });
         let patch = hexagon(5, edge);
         let fine_rest = loop_scheme::refined(&patch).0;
-        let coarse = Net::uniform(&patch, k.mesh_n_per_m, k.home_n_per_m);
+        let coarse = Net::uniform(&patch, k.mesh_n_per_m, k.anchor_n_per_m);
         for (rings, too_stiff) in [(1, 2.5..2.8), (2, 3.0..3.3)] {
             let refined = Refined::new(&patch, &Region::rings(&patch, &[0], rings), &fine_rest);
             let push = DVec3::Z * (0.1 * edge);
             let force_n = point_force_n(&coarse, 0, push, &mut coarse.rest_m.clone()).unwrap().z;
-            let of_point = matched(&refined, &k, (0, push), force_n, Way::Ratio(1.0)).unwrap();
+            let of_point = matched(&refined, &k, 0, push, force_n, Way::Ratio(1.0)).unwrap();
             let of_sum = |constants: &Constants| {
                 let inside = refined.is_inside.iter().filter(|inside| **inside).count() as f64;
-                constants.home_n_per_m * inside / (k.home_n_per_m * refined.coarse_inside as f64)
+                constants.anchor_n_per_m * inside / (k.anchor_n_per_m * refined.coarse_inside as f64)
             };
             assert!(too_stiff.contains(&of_sum(&of_point)), "{rings}: {}", of_sum(&of_point));
             let of_area = of_sum(&area_consistent(&k));
@@ -175,11 +183,11 @@ mod tests {
 
     #[test]
     fn a_force_out_of_reach_is_told() {
-        let k = Constants { mesh_n_per_m: 60.0, home_n_per_m: 60.0 };
+        let k = Constants { mesh_n_per_m: 60.0, anchor_n_per_m: 60.0 };
         let patch = hexagon(3, 0.03);
         let refined = Refined::new(&patch, &Region::rings(&patch, &[0], 1), &loop_scheme::refined(&patch).0);
-        // Home springs alone push back more than this.
-        let error = matched(&refined, &k, (0, DVec3::Z * 1e-3), 1e-3, Way::Home(60.0)).unwrap_err();
+        // Anchor springs alone push back more than this.
+        let error = matched(&refined, &k, 0, DVec3::Z * 1e-3, 1e-3, Way::Anchor(60.0)).unwrap_err();
         assert!(matches!(error, NoMatch::OutOfReach { .. }), "{error}");
     }
 }

@@ -1,10 +1,12 @@
-//! What of a mass-spring surface moves, and how nodes wake, fall asleep, come and go.
+//! Which nodes of a mass-spring surface move, and how nodes wake, fall asleep, enter and leave.
 //!
-//! A sleeping vertex is at home. A node of type 2 is there while the level of its edge is above 0: it comes where the displacements of its ends have it, with the momentum of what they give it of their
-//! masses, and gives each of them that part of its own back. Momentum is kept, kinetic energy falls. What levels change of the energy, and what comes and goes takes of it, is told:
+//! A sleeping vertex is at its rest position. A node of type 2 exists while the level of its edge is above 0. It enters
+//! at the mean displacement of its edge's ends, with the momentum of the mass that the ends give it; when it leaves,
+//! each end gets its part of the mass back with the node's velocity. Momentum is conserved, and kinetic energy falls.
+//! The changes of energy by levels and by nodes that enter and leave are returned ([`Changed`]):
 //! ```text
-//! v_e = (g_a v_a + g_b v_b)/(g_a + g_b),   ΔK = −½ g_a g_b/(g_a + g_b) |v_a − v_b|²        coming, with g_a + g_b = m_e
-//! M v ← M v + g v_e,  M ← M + g,           ΔK = −½ M g/(M + g) |v − v_e|² at either end    going
+//! v_e = (g_a v_a + g_b v_b)/(g_a + g_b),   ΔK = −½ g_a g_b/(g_a + g_b) |v_a − v_b|²        entering, with g_a + g_b = m_e
+//! M v ← M v + g v_e,  M ← M + g,           ΔK = −½ M g/(M + g) |v − v_e|² at either end    leaving
 //! ```
 use super::{
     blend::{self, Levels},
@@ -18,28 +20,37 @@ use serde::{Deserialize, Serialize};
 /// Which nodes are awake, and the levels.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct SpringMotion {
-    /// Awake nodes, ascending: positions and velocities are theirs.
+    /// Awake nodes, ascending; lists of positions and velocities have an entry for each.
     pub ids: Vec<u32>,
     /// Levels of the triangles.
     pub levels: Levels,
-    /// `K′_m`, `K′_h` now.
+    /// Present constants `K′_m`, `K′_h` of the refined surface.
     pub fine: Constants,
 }
 
-/// What is wanted of the surface.
+/// What the surface is to become.
 #[derive(Debug, Clone, Copy)]
 pub struct Wanted<'a> {
-    /// Triangles refined, ascending.
+    /// Triangles that are to be refined, ascending.
     pub refined: &'a [u32],
-    /// How far levels go in this tick.
+    /// Change of every triangle's progress in this tick, at most.
     pub step: f64,
-    /// `K′_m`, `K′_h`.
+    /// Constants `K′_m`, `K′_h` of the refined surface.
     pub fine: Constants,
-    /// Coarse vertices awake, ascending, besides those of triangles that are not coarse.
+    /// Coarse vertices that are to be awake, ascending, besides those of triangles that are not coarse.
     pub awake: &'a [u32],
 }
 
-/// Buffers, sized once.
+/// Positions and velocities of the awake nodes.
+#[derive(Debug)]
+pub struct AwakeNodes<'a> {
+    /// Positions (m).
+    pub x_m: &'a mut Vec<DVec3>,
+    /// Velocities (m/s).
+    pub v_m_per_s: &'a mut Vec<DVec3>,
+}
+
+/// Buffers, which are allocated once.
 #[derive(Debug, Clone)]
 pub struct SpringScratch {
     running: RunningSprings,
@@ -48,55 +59,57 @@ pub struct SpringScratch {
     ids: Vec<u32>,
     x_m: Vec<DVec3>,
     v_m_per_s: Vec<DVec3>,
-    /// Whose springs are laid out, once some are.
+    /// The motion whose springs are laid out, once some are.
     laid_out: SpringMotion,
     is_laid_out: bool,
-    /// How often anything was laid out.
+    /// Number of times that anything was laid out.
     layout: u64,
 }
 
 /// What a tick changed of a surface.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Changed {
-    /// Elastic energy, by how much (J).
+    /// Change of the elastic energy (J).
     pub elastic_j: f64,
-    /// Kinetic energy, by how much (J).
+    /// Change of the kinetic energy (J).
     pub kinetic_j: f64,
-    /// At most how far (m) any point of the surface was moved: of the coarse one, of edges' middles where they are awake or where their ends' displacements have them.
+    /// Upper bound of the distance (m) by which any point of the surface was moved: coarse vertices, and the middles of
+    /// edges.
     pub moved_m: f64,
 }
 
 impl SpringMotion {
-    /// Everything coarse; these vertices awake.
+    /// Returns a motion in which every triangle is coarse and the vertices `awake` are awake.
     pub fn at_rest(model: &SpringModel, awake: impl IntoIterator<Item = u32>) -> Self {
         let mut ids = Vec::with_capacity(model.most_nodes());
         ids.extend(awake);
         Self { ids, levels: Levels::with_room(model.spec().most_refined), fine: model.spec().fine }
     }
 
-    /// As long as it ever gets, so that copies of it have that room.
+    /// Returns a motion of the largest size that a motion of the model has, so that copies of it have that room.
     pub fn filled(model: &SpringModel) -> Self {
         let levels = Levels::filled(model.spec().most_refined);
         Self { ids: vec![0; model.most_nodes()], levels, fine: model.spec().fine }
     }
 
-    /// Everything coarse and asleep. Allocates nothing.
+    /// Makes every triangle coarse and puts every node to sleep. Nothing is allocated.
     pub fn reset(&mut self, model: &SpringModel) {
         self.ids.clear();
         self.levels.clear();
         self.fine = model.spec().fine;
     }
 
-    /// Whether it may be a motion of a model, with these coarse vertices awake besides those of triangles that are not coarse.
+    /// Returns whether this may be a motion of a model with the coarse vertices `awake` awake, besides those of
+    /// triangles that are not coarse.
     pub fn fits(&self, model: &SpringModel, awake: &[u32]) -> bool {
-        let Constants { mesh_n_per_m, home_n_per_m } = self.fine;
+        let Constants { mesh_n_per_m, anchor_n_per_m } = self.fine;
         let positive = |k: f64| k > 0.0 && k.is_finite();
         let ascending = awake.windows(2).all(|pair| pair[0] < pair[1]);
         let known = awake.last().is_none_or(|last| *last < model.vertices());
         let spec = model.spec();
         let fits = ascending && known && awake.len() <= spec.most_awake;
         let levels_fit = self.levels.fit(model.surface().triangles().len(), spec.most_refined);
-        if !(fits && levels_fit && positive(mesh_n_per_m) && positive(home_n_per_m)) {
+        if !(fits && levels_fit && positive(mesh_n_per_m) && positive(anchor_n_per_m)) {
             return false;
         }
         let mut ids = Vec::new();
@@ -104,7 +117,7 @@ impl SpringMotion {
         ids == self.ids
     }
 
-    /// Copies another motion of the same model. Allocates nothing.
+    /// Copies another motion of the same model. Nothing is allocated.
     pub fn copy_from(&mut self, other: &Self) {
         self.ids.clone_from(&other.ids);
         self.levels.copy_from(&other.levels);
@@ -113,7 +126,7 @@ impl SpringMotion {
 }
 
 impl SpringScratch {
-    /// Buffers of a model.
+    /// Returns buffers for a model.
     pub fn new(model: &SpringModel) -> Self {
         let most = model.most_nodes();
         Self {
@@ -129,17 +142,17 @@ impl SpringScratch {
         }
     }
 
-    /// Changes whenever nodes or levels do.
+    /// Returns a number that changes whenever awake nodes or levels do.
     pub fn layout(&self) -> u64 {
         self.layout
     }
 
-    /// The place among positions of a node that is awake.
+    /// Returns the place of a node in the lists of positions and velocities, where it is awake.
     pub fn place(&self, id: u32) -> Option<usize> {
         self.running.place(id)
     }
 
-    /// Lays out the springs of a motion, unless they are.
+    /// Lays out the springs of a motion, unless they are laid out already.
     pub fn follow(&mut self, model: &SpringModel, motion: &SpringMotion) {
         if !self.is_laid_out || self.laid_out != *motion {
             self.lay_out(model, motion);
@@ -147,26 +160,28 @@ impl SpringScratch {
         }
     }
 
-    /// Masses (kg) of the awake nodes; infinite where they are held.
+    /// Returns the masses (kg) of the awake nodes; those of held nodes are infinite.
     pub fn mass_kg(&self) -> &[f64] {
         &self.mass_kg
     }
 
-    /// Adds the springs' forces (N) on awake nodes at `x_m` (m).
+    /// Adds the springs' forces (N) on the awake nodes, which are at `x_m` (m).
     pub fn add_forces_n(&mut self, model: &SpringModel, motion: &SpringMotion, x_m: &[DVec3], forces_n: &mut [DVec3]) {
         self.running.add_forces_n(model, &motion.ids, x_m, forces_n);
     }
 
-    /// Brings nodes and springs to what is wanted, by a tick; tells what that changed, if anything. Allocates nothing.
-    pub fn go_on(
+    /// Moves nodes and levels by one tick towards what is wanted. Returns what that changed, if anything. Nothing is
+    /// allocated.
+    pub fn advance(
         &mut self,
         model: &SpringModel,
         motion: &mut SpringMotion,
-        (x_m, v_m_per_s): (&mut Vec<DVec3>, &mut Vec<DVec3>),
+        nodes: AwakeNodes<'_>,
         wanted: &Wanted<'_>,
     ) -> Option<Changed> {
+        let AwakeNodes { x_m, v_m_per_s } = nodes;
         self.follow(model, motion);
-        let changed = motion.levels.go_on(wanted.refined, wanted.step, &mut self.next_levels);
+        let changed = motion.levels.advance(wanted.refined, wanted.step, &mut self.next_levels);
         let same_constants = motion.fine == wanted.fine;
         motion.fine = wanted.fine;
         choose_ids(model, &motion.levels, wanted.awake, &mut self.ids);
@@ -175,7 +190,7 @@ impl SpringScratch {
             return None;
         }
         let mut moved_m = if changed { self.moved_by_levels_m(model, motion, x_m, wanted.step) } else { 0.0 };
-        // Of what was laid out, whatever is wanted now.
+        // The energy before is that of the springs that were laid out, whatever is wanted now.
         let mut elastic_j = -self.running.energy_of_levels_j(model, x_m);
         let mut kinetic_j = 0.0;
         if same_ids {
@@ -183,12 +198,12 @@ impl SpringScratch {
             self.laid_out.copy_from(motion);
             self.layout += 1;
         } else {
-            let (put_home_j, put_home_m) = self.put_home(model, motion, x_m);
-            elastic_j += put_home_j;
-            moved_m += put_home_m;
+            let (put_at_rest_j, put_at_rest_m) = self.put_at_rest(model, motion, x_m);
+            elastic_j += put_at_rest_j;
+            moved_m += put_at_rest_m;
             kinetic_j -= kinetic(&self.mass_kg, v_m_per_s);
-            self.hand_back(model, motion, v_m_per_s);
-            self.come(model, (x_m, v_m_per_s));
+            self.return_momentum(model, motion, v_m_per_s);
+            self.enter(model, x_m, v_m_per_s);
             motion.ids.clone_from(&self.ids);
             x_m.clone_from(&self.x_m);
             v_m_per_s.clone_from(&self.v_m_per_s);
@@ -199,7 +214,9 @@ impl SpringScratch {
         Some(Changed { elastic_j, kinetic_j, moved_m })
     }
 
-    /// An edge's middle is at `s x_e + (1 − s) (X_e + ½ (u_a + u_b))`, so a change of level moves it by that of `s` times what a tie has to pull at.
+    /// Returns an upper bound of the distance (m) by which a change of levels by `step` moves the surface. An edge's
+    /// middle is at `s x_e + (1 − s) (X_e + ½ (u_a + u_b))`, so it moves by the change of `s` times the length of its
+    /// tie.
     fn moved_by_levels_m(&self, model: &SpringModel, motion: &SpringMotion, x_m: &[DVec3], step: f64) -> f64 {
         let vertices = vertices_of(model, &motion.ids);
         let moved = |node: u32| self.place(node).map_or(DVec3::ZERO, |at| x_m[at] - model.rest_m()[node as usize]);
@@ -220,34 +237,35 @@ impl SpringScratch {
         self.layout += 1;
     }
 
-    /// Puts vertices that fall asleep home, one after the other; returns by how much (J) the springs of the coarse surface that they are on change (those of levels are told
-    /// elsewhere), and how far (m) the farthest went.
-    fn put_home(&mut self, model: &SpringModel, motion: &SpringMotion, x_m: &mut [DVec3]) -> (f64, f64) {
+    /// Puts vertices that fall asleep to their rest positions, one after the other. Returns the change of energy (J) of
+    /// their springs of the coarse surface (that of the springs that levels add is taken by the caller), and the
+    /// largest distance (m) by which a vertex moved.
+    fn put_at_rest(&mut self, model: &SpringModel, motion: &SpringMotion, x_m: &mut [DVec3]) -> (f64, f64) {
         let surface = model.surface();
         let vertices = vertices_of(model, &motion.ids);
         let (mut change_j, mut farthest_m) = (0.0, 0.0_f64);
         for (place, vertex) in gone(&motion.ids[..vertices], &self.ids) {
-            let home_m = model.rest_m()[vertex as usize];
+            let own_rest_m = model.rest_m()[vertex as usize];
             for &edge in surface.edges_at(vertex) {
                 let other = surface.other_end(edge, vertex);
                 let rest_m = model.rest_m()[other as usize];
                 let other_m = self.place(other).map_or(rest_m, |place| x_m[place]);
                 let energy_j = |x: DVec3| {
-                    0.5 * model.spec().coarse.mesh_n_per_m * (x.distance(other_m) - home_m.distance(rest_m)).powi(2)
+                    0.5 * model.spec().coarse.mesh_n_per_m * (x.distance(other_m) - own_rest_m.distance(rest_m)).powi(2)
                 };
-                change_j += energy_j(home_m) - energy_j(x_m[place]);
+                change_j += energy_j(own_rest_m) - energy_j(x_m[place]);
             }
-            let away_m = home_m.distance(x_m[place]);
+            let away_m = own_rest_m.distance(x_m[place]);
             farthest_m = farthest_m.max(away_m);
             let spec = model.spec();
-            change_j -= spec.coarse.home_n_per_m * spec.home_law.at(away_m).integral_m2;
-            x_m[place] = home_m;
+            change_j -= spec.coarse.anchor_n_per_m * spec.anchor_law.at(away_m).integral_m2;
+            x_m[place] = own_rest_m;
         }
         (change_j, farthest_m)
     }
 
-    /// Nodes of type 2 that go give their momentum to their ends, whose masses are then what they were without them.
-    fn hand_back(&mut self, model: &SpringModel, motion: &SpringMotion, v_m_per_s: &mut [DVec3]) {
+    /// Gives the momentum and mass of the nodes of type 2 that leave back to the ends of their edges.
+    fn return_momentum(&mut self, model: &SpringModel, motion: &SpringMotion, v_m_per_s: &mut [DVec3]) {
         let vertices = vertices_of(model, &motion.ids);
         for (place, id) in gone(&motion.ids[vertices..], &self.ids) {
             let place = vertices + place;
@@ -257,26 +275,26 @@ impl SpringScratch {
                 if model.is_held(end) {
                     continue;
                 }
-                let (own_kg, back_kg) = (self.mass_kg[at], model.given_kg(end));
-                let momentum = v_m_per_s[at] * own_kg + v_m_per_s[place] * back_kg;
-                self.mass_kg[at] = own_kg + back_kg;
+                let (own_kg, returned_kg) = (self.mass_kg[at], model.given_kg(end));
+                let momentum = v_m_per_s[at] * own_kg + v_m_per_s[place] * returned_kg;
+                self.mass_kg[at] = own_kg + returned_kg;
                 v_m_per_s[at] = momentum / self.mass_kg[at];
             }
         }
     }
 
-    /// Positions and velocities of the nodes that are to be.
-    fn come(&mut self, model: &SpringModel, (x_m, v_m_per_s): (&[DVec3], &[DVec3])) {
+    /// Computes positions and velocities of the nodes that are awake next, from those of the nodes that are awake now.
+    fn enter(&mut self, model: &SpringModel, x_m: &[DVec3], v_m_per_s: &[DVec3]) {
         let of = |id: u32| self.running.place(id).map(|place| (x_m[place], v_m_per_s[place]));
-        let at_home = |id: u32| (model.rest_m()[id as usize], DVec3::ZERO);
+        let at_rest = |id: u32| (model.rest_m()[id as usize], DVec3::ZERO);
         self.x_m.clear();
         self.v_m_per_s.clear();
         for &id in &self.ids {
             let (x, v) = of(id).unwrap_or_else(|| match id.checked_sub(model.vertices()) {
-                None => at_home(id),
+                None => at_rest(id),
                 Some(edge) => {
                     let [a, b] = model.surface().edges()[edge as usize].nodes.map(|end| {
-                        let (x, v) = of(end).unwrap_or_else(|| at_home(end));
+                        let (x, v) = of(end).unwrap_or_else(|| at_rest(end));
                         (x - model.rest_m()[end as usize], v)
                     });
                     (model.rest_m()[id as usize] + (a.0 + b.0) * 0.5, mean_velocity(model, edge, [a.1, b.1]))
@@ -288,7 +306,7 @@ impl SpringScratch {
     }
 }
 
-/// The awake nodes to be.
+/// Writes the nodes that are awake at these levels into `ids`, ascending, with the coarse vertices `awake` among them.
 fn choose_ids(model: &SpringModel, levels: &Levels, awake: &[u32], ids: &mut Vec<u32>) {
     ids.clear();
     ids.extend_from_slice(awake);
@@ -306,7 +324,8 @@ fn choose_ids(model: &SpringModel, levels: &Levels, awake: &[u32], ids: &mut Vec
     ids[vertices..].sort_unstable();
 }
 
-/// Places and entries of one ascending list that are not in another.
+/// Returns the entries of the ascending list `before` that are not in the ascending list `now`, each with its place in
+/// the former.
 fn gone<'a>(before: &'a [u32], now: &'a [u32]) -> impl Iterator<Item = (usize, u32)> + 'a {
     let mut next = now.partition_point(|id| before.first().is_some_and(|first| id < first));
     before.iter().copied().enumerate().filter(move |(_, id)| {
@@ -317,13 +336,15 @@ fn gone<'a>(before: &'a [u32], now: &'a [u32]) -> impl Iterator<Item = (usize, u
     })
 }
 
-/// The velocity (m/s) that a node of type 2 starts with: that of its ends, by what each gives of its mass, so that momentum is kept.
+/// Returns the velocity (m/s) with which a node of type 2 enters: the mean of its ends' velocities, weighted by the
+/// mass that each gives, so that momentum is conserved.
 fn mean_velocity(model: &SpringModel, edge: u32, v_m_per_s: [DVec3; 2]) -> DVec3 {
     let [a, b] = model.surface().edges()[edge as usize].nodes.map(|end| model.given_kg(end));
     (v_m_per_s[0] * a + v_m_per_s[1] * b) / (a + b)
 }
 
-/// Mass (kg) of an awake node: of a vertex less what its nodes of type 2 have of it; infinite where it is held.
+/// Returns the mass (kg) of an awake node. That of a vertex is less by what its nodes of type 2 have of it; that of a
+/// held vertex is infinite. `place` tells where awake nodes are.
 pub(super) fn own_mass_kg(model: &SpringModel, place: impl Fn(u32) -> Option<usize>, id: u32) -> f64 {
     if let Some(edge) = id.checked_sub(model.vertices()) {
         return model.edge_kg(edge);

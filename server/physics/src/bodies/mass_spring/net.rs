@@ -1,6 +1,6 @@
-//! Springs between vertices and to their homes: energy, forces and stiffness, plainly. The oracle of what runs.
+//! Energy, forces and stiffness of mesh and anchor springs, written plainly. This is the oracle of the running springs.
 use super::{
-    home::HomeLaw,
+    anchor::AnchorLaw,
     topology::{Triangulation, TriangulationError},
 };
 use glam::DVec3;
@@ -10,28 +10,29 @@ use glam::DVec3;
 pub struct Spring {
     /// Its ends.
     pub nodes: [u32; 2],
-    /// `r` (m).
+    /// Rest length `r` (m).
     pub rest_length_m: f64,
-    /// `K_m` (N/m).
+    /// Stiffness `K_m` (N/m).
     pub stiffness_n_per_m: f64,
 }
 
-/// Nodes on springs.
+/// Nodes that are connected by springs.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Net {
-    /// `X` (m), homes of the nodes.
+    /// Rest positions `X` (m) of the nodes.
     pub rest_m: Vec<DVec3>,
-    /// Along edges.
+    /// Mesh springs, along edges.
     pub springs: Vec<Spring>,
-    /// `K_h` (N/m) of every node.
-    pub home_n_per_m: Vec<f64>,
-    /// `g`.
-    pub home_law: HomeLaw,
+    /// Stiffness `K_h` (N/m) of every node's anchor spring.
+    pub anchor_n_per_m: Vec<f64>,
+    /// Law `g` of the anchor springs.
+    pub anchor_law: AnchorLaw,
 }
 
 impl Net {
-    /// Springs along all edges of a surface, with the same constants (N/m) everywhere.
-    pub fn uniform(surface: &Triangulation, mesh_n_per_m: f64, home_n_per_m: f64) -> Self {
+    /// Returns springs along all edges of a surface and anchor springs at all of its vertices, with the same constants
+    /// (N/m) everywhere.
+    pub fn uniform(surface: &Triangulation, mesh_n_per_m: f64, anchor_n_per_m: f64) -> Self {
         let spring = |nodes: [u32; 2]| {
             let [a, b] = nodes.map(|node| surface.positions_m()[node as usize]);
             Spring { nodes, rest_length_m: a.distance(b), stiffness_n_per_m: mesh_n_per_m }
@@ -39,27 +40,27 @@ impl Net {
         Self {
             rest_m: surface.positions_m().to_vec(),
             springs: surface.edges().iter().map(|edge| spring(edge.nodes)).collect(),
-            home_n_per_m: vec![home_n_per_m; surface.positions_m().len()],
-            home_law: HomeLaw::Linear,
+            anchor_n_per_m: vec![anchor_n_per_m; surface.positions_m().len()],
+            anchor_law: AnchorLaw::Linear,
         }
     }
 
-    /// `U = Σ ½ K_m (|l| − r)² + Σ K_h G(|u|)` (J) at positions `x_m`.
+    /// Returns the energy `U = Σ ½ K_m (|l| − r)² + Σ K_h G(|u|)` (J) at the positions `x_m` (m).
     pub fn energy_j(&self, x_m: &[DVec3]) -> f64 {
         let of_spring = |spring: &Spring| {
             let longer_m = spring.along(x_m).0 - spring.rest_length_m;
             0.5 * spring.stiffness_n_per_m * longer_m * longer_m
         };
-        let of_home = |(node, stiffness): (usize, &f64)| {
-            stiffness * self.home_law.at((x_m[node] - self.rest_m[node]).length()).integral_m2
+        let of_anchor = |(node, stiffness): (usize, &f64)| {
+            stiffness * self.anchor_law.at((x_m[node] - self.rest_m[node]).length()).integral_m2
         };
         let springs: f64 = self.springs.iter().map(of_spring).sum();
-        springs + self.home_n_per_m.iter().enumerate().map(of_home).sum::<f64>()
+        springs + self.anchor_n_per_m.iter().enumerate().map(of_anchor).sum::<f64>()
     }
 
-    /// `f = −∂U/∂x` (N).
+    /// Returns the forces `f = −∂U/∂x` (N) at the positions `x_m` (m).
     pub fn forces_n(&self, x_m: &[DVec3]) -> Vec<DVec3> {
-        let mut forces: Vec<DVec3> = (0..x_m.len()).map(|node| self.home_force_n(node, x_m[node])).collect();
+        let mut forces: Vec<DVec3> = (0..x_m.len()).map(|node| self.anchor_force_n(node, x_m[node])).collect();
         for spring in &self.springs {
             let (length_m, direction) = spring.along(x_m);
             let pull = direction * (spring.stiffness_n_per_m * (length_m - spring.rest_length_m));
@@ -70,24 +71,25 @@ impl Net {
         forces
     }
 
-    fn home_force_n(&self, node: usize, x_m: DVec3) -> DVec3 {
+    fn anchor_force_n(&self, node: usize, x_m: DVec3) -> DVec3 {
         let u = x_m - self.rest_m[node];
         let (direction, distance_m) = unit(u);
-        direction * (-self.home_n_per_m[node] * self.home_law.at(distance_m).g_m)
+        direction * (-self.anchor_n_per_m[node] * self.anchor_law.at(distance_m).g_m)
     }
 
-    /// `Σ ∂²U/∂x∂x p` (N) of a displacement `p` (m): of a spring with `n` along it
+    /// Writes `Σ ∂²U/∂x∂x p` (N) of a displacement `p` (m) into `out_n`. The stiffness of a mesh spring along `n` and
+    /// of an anchor spring along `û` is
     /// ```text
-    /// k (n nᵀ + (1 − r/|l|) (I − n nᵀ)),   and of a home K_h (g′ û ûᵀ + (g/u) (I − û ûᵀ))
+    /// k (n nᵀ + (1 − r/|l|) (I − n nᵀ)),   K_h (g′ û ûᵀ + (g/u) (I − û ûᵀ))
     /// ```
     pub fn stiffness_times_n(&self, x_m: &[DVec3], p_m: &[DVec3], out_n: &mut Vec<DVec3>) {
         out_n.clear();
         out_n.extend((0..x_m.len()).map(|node| {
             let (direction, distance_m) = unit(x_m[node] - self.rest_m[node]);
-            let law = self.home_law.at(distance_m);
+            let law = self.anchor_law.at(distance_m);
             let across = if distance_m > 0.0 { law.g_m / distance_m } else { law.slope };
             let along = direction * direction.dot(p_m[node]);
-            (along * law.slope + (p_m[node] - along) * across) * self.home_n_per_m[node]
+            (along * law.slope + (p_m[node] - along) * across) * self.anchor_n_per_m[node]
         }));
         for spring in &self.springs {
             let [a, b] = spring.nodes.map(|node| node as usize);
@@ -101,9 +103,9 @@ impl Net {
         }
     }
 
-    /// Upper bound (N/m) of the diagonal of the stiffness at any positions: `K_h + Σ K_m` of a node's springs.
+    /// Returns an upper bound (N/m) of the stiffness' diagonal at any positions: `K_h + Σ K_m` over a node's springs.
     pub fn diagonal_n_per_m(&self) -> Vec<f64> {
-        let mut diagonal = self.home_n_per_m.clone();
+        let mut diagonal = self.anchor_n_per_m.clone();
         for spring in &self.springs {
             spring.nodes.iter().for_each(|&node| diagonal[node as usize] += spring.stiffness_n_per_m);
         }
@@ -112,7 +114,8 @@ impl Net {
 }
 
 impl Spring {
-    /// Length (m) and direction from the first end to the second; no direction where they coincide.
+    /// Returns the length (m) and the direction from the first end to the second, which is zero where the ends
+    /// coincide.
     pub fn along(&self, x_m: &[DVec3]) -> (f64, DVec3) {
         let [a, b] = self.nodes.map(|node| x_m[node as usize]);
         let (direction, length_m) = unit(b - a);
@@ -125,10 +128,11 @@ fn unit(v: DVec3) -> (DVec3, f64) {
     if length > 0.0 { (v / length, length) } else { (DVec3::ZERO, 0.0) }
 }
 
-/// A flat patch of equilateral triangles of edge `edge_m`: all vertices within so many rings about vertex 0, in the plane z = 0.
+/// Returns a flat patch of equilateral triangles of edge `edge_m` (m) in the plane z = 0: all vertices within `rings`
+/// rings about vertex 0.
 ///
 /// # Errors
-/// No ring, or an edge that is not finite and positive: a surface without triangles or area.
+/// There is no ring, or the edge is not finite and positive: the surface would have no triangles or no area.
 pub fn hexagonal_patch(rings: i32, edge_m: f64) -> Result<Triangulation, TriangulationError> {
     let within = |q: i32, r: i32| q.abs().max(r.abs()).max((q + r).abs()) <= rings;
     let all = (-rings..=rings).flat_map(|q| (-rings..=rings).map(move |r| (q, r))).filter(|&(q, r)| within(q, r));
@@ -153,7 +157,7 @@ pub fn hexagonal_patch(rings: i32, edge_m: f64) -> Result<Triangulation, Triangu
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::bodies::mass_spring::home::Layer;
+    use crate::bodies::mass_spring::anchor::Layer;
     use crate::bodies::mass_spring::testing::hexagon;
     use glam::Vec3Swizzles;
 
@@ -167,8 +171,8 @@ mod tests {
     fn forces_and_stiffness_are_derivatives_of_the_energy() {
         let layers =
             [Layer { thickness_m: 3e-3, stiffness_ratio: 1.0 }, Layer { thickness_m: 1.0, stiffness_ratio: 5.0 }];
-        for law in [HomeLaw::Linear, HomeLaw::cubic(1e4).unwrap(), HomeLaw::layers(&layers).unwrap()] {
-            let net = Net { home_law: law, ..Net::uniform(&hexagon(2, 0.03), 60.0, 40.0) };
+        for law in [AnchorLaw::Linear, AnchorLaw::cubic(1e4).unwrap(), AnchorLaw::layers(&layers).unwrap()] {
+            let net = Net { anchor_law: law, ..Net::uniform(&hexagon(2, 0.03), 60.0, 40.0) };
             let x = shaken(&net);
             let p: Vec<DVec3> = shaken(&net).iter().zip(&net.rest_m).map(|(x, rest)| (*x - *rest).yzx()).collect();
             let moved = |t: f64| -> Vec<DVec3> { x.iter().zip(&p).map(|(x, p)| *x + *p * t).collect() };
@@ -191,7 +195,7 @@ mod tests {
     fn at_rest_there_is_no_force_and_springs_alone_keep_momentum() {
         let mut net = Net::uniform(&hexagon(3, 0.03), 60.0, 60.0);
         assert!(net.forces_n(&net.rest_m).iter().all(|f| f.length() < 1e-13));
-        net.home_n_per_m.fill(0.0);
+        net.anchor_n_per_m.fill(0.0);
         let x = shaken(&net);
         let forces = net.forces_n(&x);
         let largest = forces.iter().map(|f| f.length()).fold(0.0, f64::max);
@@ -200,7 +204,8 @@ mod tests {
         assert!(couple.length() < 1e-13 * largest);
     }
 
-    /// The force on a node pulled out of the sheet while all others stay: `K_h x + 6 K_m (√(L² + x²) − L) x/√(L² + x²)`.
+    /// A node that is pulled out of the sheet while all others stay is met by the force
+    /// `K_h x + 6 K_m (√(L² + x²) − L) x/√(L² + x²)`.
     #[test]
     fn neighbours_held_fixed_answer_by_the_formula() {
         let (edge, k) = (0.03, 60.0);

@@ -1,28 +1,29 @@
-//! Where each node of a surface is among those that are awake, at hand.
+//! The place of each node of a surface in the lists of awake nodes, found without a search.
 use super::topology::NONE;
 
-/// The place of every node, [`NONE`] of most.
+/// A numbering of some nodes of a surface by places, in both directions.
 #[derive(Debug, Clone)]
 pub struct Places {
+    /// Place of every node; [`NONE`] of a node that has no place.
     of: Vec<u32>,
-    /// The nodes that have one, in their order.
+    /// Nodes by place.
     nodes: Vec<u32>,
 }
 
 impl Places {
-    /// Of so many nodes, of which so many may have a place at once.
+    /// Returns a numbering of a surface with `nodes` nodes, at most `most` of which have a place at once.
     pub fn with_room(nodes: usize, most: usize) -> Self {
         Self { of: vec![NONE; nodes], nodes: Vec::with_capacity(most) }
     }
 
-    /// No node has a place.
+    /// Takes the places of all nodes.
     pub fn clear(&mut self) {
         for node in self.nodes.drain(..) {
             self.of[node as usize] = NONE;
         }
     }
 
-    /// Gives a node the next place, unless it has one.
+    /// Gives a node the next place, unless it has a place already.
     pub fn push(&mut self, node: u32) {
         let place = &mut self.of[node as usize];
         if *place == NONE {
@@ -31,13 +32,13 @@ impl Places {
         }
     }
 
-    /// The place of a node.
+    /// Returns the place of a node, if it has one.
     pub fn of(&self, node: u32) -> Option<u32> {
         let place = self.of[node as usize];
         (place != NONE).then_some(place)
     }
 
-    /// Nodes by their places.
+    /// Returns the nodes by place.
     pub fn nodes(&self) -> &[u32] {
         &self.nodes
     }

@@ -1,9 +1,10 @@
-//! Refining a part of a surface: rings about what is touched, in fours, without cracks.
+//! Refinement of a part of a surface: rings about touched vertices are split in four, without cracks.
 //!
-//! Every triangle of the region becomes four. A neighbour of it becomes two, by an edge from the middle of the one they share to its corner across; one with two such
-//! neighbours is taken into the region. A region is a set, so what several contacts have in common is refined once: to the same level.
+//! Every triangle of the region becomes four. A triangle beside the region becomes two, by an edge from the middle of
+//! the edge that they share to the corner across; a triangle with two neighbours in the region is added to it. A region
+//! is a set, so that triangles which belong to several contacts are refined once.
 use super::{
-    home::HomeLaw,
+    anchor::AnchorLaw,
     net::{Net, Spring},
     topology::{NONE, Triangulation},
 };
@@ -11,15 +12,16 @@ use glam::DVec3;
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, BTreeSet};
 
-/// Triangles to be refined.
+/// A set of triangles that are to be refined.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Region {
     triangles: BTreeSet<u32>,
 }
 
 impl Region {
-    /// So many rings about vertices: the first ring's triangles have one of them as a corner, the next ring's some corner of those. Triangles of which two neighbours are in it
-    /// are, too.
+    /// Returns the region of `rings` rings about the vertices `centres`: triangles of the first ring have one of these
+    /// as a corner, those of the next ring a corner of the ring before. Triangles with two neighbours in the region
+    /// belong to it, too.
     pub fn rings(surface: &Triangulation, centres: &[u32], rings: u32) -> Self {
         let mut triangles = BTreeSet::new();
         let mut corners: BTreeSet<u32> = centres.iter().copied().collect();
@@ -32,7 +34,7 @@ impl Region {
         Self { triangles }.closed(surface)
     }
 
-    /// Its triangles, ascending.
+    /// Returns the triangles of the region, ascending.
     pub fn triangles(&self) -> &BTreeSet<u32> {
         &self.triangles
     }
@@ -51,7 +53,7 @@ impl Region {
     }
 }
 
-/// Triangles across the edges of one.
+/// Returns the triangles across the edges of a triangle.
 fn neighbours(surface: &Triangulation, triangle: u32) -> impl Iterator<Item = u32> + '_ {
     let edges = surface.edges_of(triangle).into_iter().flat_map(|edge| surface.edges()[edge as usize].triangles);
     edges.filter(move |&t| t != NONE && t != triangle)
@@ -60,18 +62,19 @@ fn neighbours(surface: &Triangulation, triangle: u32) -> impl Iterator<Item = u3
 /// Where a spring of a partly refined surface lies.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Kind {
-    /// Along an edge of the coarse surface.
+    /// The spring lies along an edge of the coarse surface.
     Coarse,
-    /// In the region or along its rim.
+    /// The spring lies in the region or along its rim.
     Fine,
-    /// From the rim into a coarse triangle beside it.
+    /// The spring goes from the rim across the coarse triangle beside it, and closes the crack there.
     Crack,
 }
 
-/// A surface whose region is refined. Nodes are the coarse vertices in their order (those of the region of type 1), then vertices of type 2.
+/// A surface with a refined region. Nodes are the coarse vertices in their order (those of the region are of type 1),
+/// then the vertices of type 2.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Refined {
-    /// Homes (m).
+    /// Rest positions (m) of the nodes.
     pub rest_m: Vec<DVec3>,
     /// The coarse edge of every node of type 2, ascending.
     pub edges: Vec<u32>,
@@ -81,12 +84,13 @@ pub struct Refined {
     pub triangles: Vec<[u32; 3]>,
     /// Whether each node belongs to the region.
     pub is_inside: Vec<bool>,
-    /// Coarse vertices of the region: `N`. With those of type 2 they are `N′`.
+    /// Number `N` of the region's coarse vertices; together with those of type 2 there are `N′`.
     pub coarse_inside: usize,
 }
 
 impl Refined {
-    /// Refines a region. `fine_rest_m` are homes (m) of the whole surface refined ([`super::loop_scheme::refined`]).
+    /// Refines a region. `fine_rest_m` has the rest positions (m) of the whole surface refined
+    /// ([`super::loop_scheme::refined`]).
     pub fn new(surface: &Triangulation, region: &Region, fine_rest_m: &[DVec3]) -> Self {
         let vertices = surface.positions_m().len();
         let edges: BTreeSet<u32> = region.triangles.iter().flat_map(|&t| surface.edges_of(t)).collect();
@@ -121,7 +125,7 @@ impl Refined {
         own
     }
 
-    /// Splits a triangle at the middles that there are of its edges.
+    /// Splits a triangle at those of its edges that have a middle.
     fn split(&mut self, [a, b, c]: [u32; 3], middles: [Option<u32>; 3]) {
         match middles {
             [Some(ab), Some(bc), Some(ca)] => {
@@ -134,45 +138,47 @@ impl Refined {
             }
             [None, Some(bc), None] => self.split([b, c, a], [Some(bc), None, None]),
             [None, None, Some(ca)] => self.split([c, a, b], [Some(ca), None, None]),
-            // None, and never two: regions are closed.
+            // No edge has a middle; there are never two, as regions are closed.
             _ => self.triangles.push([a, b, c]),
         }
     }
 
-    /// `N/N′`.
+    /// Returns `N/N′`.
     pub fn node_ratio(&self) -> f64 {
         self.coarse_inside as f64 / (self.coarse_inside + self.edges.len()) as f64
     }
 
-    /// Springs of one kind.
+    /// Returns the number of springs of one kind.
     pub fn count(&self, kind: Kind) -> usize {
         self.springs.iter().filter(|(_, of)| *of == kind).count()
     }
 
-    /// Springs on it: constants (N/m) outside, and those inside, of the rim and of cracks.
+    /// Returns the springs of the surface, with the constants `outside` where it is coarse, and `inside` in the region,
+    /// along its rim and for crack springs.
     pub fn net(&self, outside: &Constants, inside: &Constants) -> Net {
         let spring = |&(nodes, kind): &([u32; 2], Kind)| {
             let [a, b] = nodes.map(|node| self.rest_m[node as usize]);
             let of = if kind == Kind::Coarse { outside } else { inside };
             Spring { nodes, rest_length_m: a.distance(b), stiffness_n_per_m: of.mesh_n_per_m }
         };
-        let home = |inside_region: &bool| if *inside_region { inside.home_n_per_m } else { outside.home_n_per_m };
+        let anchor = |inside_region: &bool| if *inside_region { inside.anchor_n_per_m } else { outside.anchor_n_per_m };
         Net {
             rest_m: self.rest_m.clone(),
             springs: self.springs.iter().map(spring).collect(),
-            home_n_per_m: self.is_inside.iter().map(home).collect(),
-            home_law: HomeLaw::Linear,
+            anchor_n_per_m: self.is_inside.iter().map(anchor).collect(),
+            anchor_law: AnchorLaw::Linear,
         }
     }
 }
 
-/// Spring constants.
+/// The constants of mesh and anchor springs.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Constants {
-    /// `K_m` (N/m).
+    /// Stiffness `K_m` (N/m) of the mesh springs.
     pub mesh_n_per_m: f64,
-    /// `K_h` (N/m).
-    pub home_n_per_m: f64,
+    /// Stiffness `K_h` (N/m) of the anchor springs.
+    #[serde(alias = "home_n_per_m")]
+    pub anchor_n_per_m: f64,
 }
 
 #[cfg(test)]
@@ -187,7 +193,7 @@ mod tests {
         Refined::new(surface, &Region::rings(surface, centres, rings), &refined(surface).0)
     }
 
-    /// The counts of MODEL.md: 7 → 19 nodes with 42 + 6 springs, 19 → 61 with 156 + 12.
+    /// The paper's counts: 7 → 19 nodes with 42 + 6 springs, 19 → 61 with 156 + 12.
     #[test]
     fn rings_have_the_papers_nodes_and_springs() {
         let patch = hexagon(6, 0.03);
@@ -201,23 +207,23 @@ mod tests {
     }
 
     fn is_whole(of: &Triangulation, refined: &Refined) {
-        let is_border = |edge: &u32| of.edges()[*edge as usize].is_border();
-        let borders = (0..of.edges().len() as u32).filter(is_border).count()
-            + refined.edges.iter().filter(|e| is_border(e)).count();
+        let is_boundary = |edge: &u32| of.edges()[*edge as usize].is_boundary();
+        let boundary_edges = (0..of.edges().len() as u32).filter(is_boundary).count()
+            + refined.edges.iter().filter(|e| is_boundary(e)).count();
         let surface = Triangulation::new(refined.rest_m.clone(), refined.triangles.clone()).unwrap();
         let mut springs: Vec<[u32; 2]> =
             refined.springs.iter().map(|(n, _)| [n[0].min(n[1]), n[0].max(n[1])]).collect();
         springs.sort_unstable();
         let edges: Vec<[u32; 2]> = surface.edges().iter().map(|edge| edge.nodes).collect();
         assert_eq!(springs, edges, "every edge has one spring");
-        assert_eq!(surface.edges().iter().filter(|edge| edge.is_border()).count(), borders);
+        assert_eq!(surface.edges().iter().filter(|edge| edge.is_boundary()).count(), boundary_edges);
     }
 
     #[test]
     fn a_partly_refined_surface_has_no_cracks() {
         let (patch, ball) = (hexagon(4, 0.03), sphere(3, 0.05));
         is_whole(&patch, &about(&patch, &[0], 2));
-        // On the border, and about two vertices whose regions touch, overlap, or leave single triangles between them.
+        // On the boundary, and about two vertices whose regions touch, overlap, or leave single triangles between them.
         is_whole(&patch, &about(&patch, &[60], 1));
         for other in 0..ball.positions_m().len() as u32 {
             is_whole(&ball, &about(&ball, &[0, other], 1));

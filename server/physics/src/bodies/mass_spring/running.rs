@@ -1,7 +1,9 @@
-//! The springs of the nodes that are awake, as the loop computes them; their oracle is [`super::Net`].
+//! The springs of the awake nodes as the loop computes them. The oracle is [`super::Net`].
 //!
-//! Awake nodes are numbered by their place among the ids, ascending, coarse vertices first. Springs go over them and over the sleeping neighbours behind them, which are at home. Those of the coarse
-//! surface are laid out when other vertices wake; what levels add to them ([`super::blend`]) is a list of its own, made anew while levels change.
+//! An awake node has the place of its id in the ascending list of ids, so coarse vertices come first. After the awake
+//! nodes come their sleeping neighbours, which are at their rest positions. The springs of the coarse surface are laid
+//! out whenever other vertices wake. The springs that levels add ([`super::blend`]) are a list of their own, which is
+//! made anew while levels change.
 use super::kernels::{HalfSpring, SpringRows};
 use super::{
     blend::{Added, Levels},
@@ -11,28 +13,28 @@ use super::{
 };
 use glam::DVec3;
 
-/// Springs of a number of awake nodes.
+/// The springs of the awake nodes.
 #[derive(Debug, Clone)]
 pub struct RunningSprings {
-    /// Of the coarse surface.
+    /// Mesh springs of the coarse surface.
     rows: SpringRows,
-    /// Of awake nodes, then of the sleeping neighbours of awake vertices.
+    /// Places of the awake nodes, then of the sleeping neighbours of awake vertices.
     places: Places,
     /// Number of awake nodes.
     awake: usize,
     /// Positions (m) by place.
     places_m: Vec<DVec3>,
-    /// What levels add.
+    /// Mesh springs that levels add.
     added: Vec<AddedSpring>,
-    /// Ties of nodes of type 2.
+    /// Ties of the nodes of type 2.
     ties: Vec<Tie>,
-    /// What levels add to the stiffness (N/m) of home springs, by place.
-    added_homes: Vec<(u32, f64)>,
-    /// Stiffness (N/m) of the awake nodes' home springs.
-    home_n_per_m: Vec<f64>,
+    /// Places of anchor springs, each with the stiffness (N/m) that levels add to it.
+    added_anchors: Vec<(u32, f64)>,
+    /// Stiffness (N/m) of the awake nodes' anchor springs.
+    anchor_n_per_m: Vec<f64>,
 }
 
-/// An added spring between places.
+/// A mesh spring that levels add, between two places.
 #[derive(Debug, Clone, Copy)]
 struct AddedSpring {
     places: [u32; 2],
@@ -40,18 +42,18 @@ struct AddedSpring {
     stiffness_n_per_m: f64,
 }
 
-/// A tie between places.
+/// A tie between three places.
 #[derive(Debug, Clone, Copy)]
 struct Tie {
-    /// Of the node, and of the ends of its edge.
+    /// Place of the node, then of the ends of its edge.
     places: [u32; 3],
-    /// `X_e − ½ (X_a + X_b)` (m).
+    /// Offset `X_e − ½ (X_a + X_b)` (m) at rest.
     beside_m: DVec3,
     stiffness_n_per_m: f64,
 }
 
 impl RunningSprings {
-    /// Room for as many nodes as may be awake and as many triangles as may be refined.
+    /// Returns buffers with room for as many nodes as may be awake and as many triangles as may be refined.
     pub fn with_room(model: &SpringModel) -> Self {
         let most_refined = model.spec().most_refined;
         let surface = model.surface();
@@ -59,7 +61,7 @@ impl RunningSprings {
         let most_at = (0..model.vertices()).map(at).max().unwrap_or_default();
         let awake = model.most_nodes();
         let vertices = awake.min(model.vertices() as usize);
-        // Blocks of eight have as many slots as the vertex in them with most springs.
+        // A block of eight vertices has as many slots as its vertex with the most springs.
         let rows = SpringRows::with_room(vertices, most_at);
         let places = (awake + vertices * most_at).min(model.rest_m().len());
         Self {
@@ -67,18 +69,20 @@ impl RunningSprings {
             places: Places::with_room(model.rest_m().len(), places),
             awake: 0,
             places_m: Vec::with_capacity(places),
-            // Of a triangle three inside; of each of its edges the coarse one, two halves and two cracks.
+            // A triangle has three springs inside; each of its edges has the coarse one, two halves and two crack
+            // springs.
             added: Vec::with_capacity(18 * most_refined),
             ties: Vec::with_capacity(3 * most_refined),
-            added_homes: Vec::with_capacity(6 * most_refined),
-            home_n_per_m: Vec::with_capacity(awake),
+            added_anchors: Vec::with_capacity(6 * most_refined),
+            anchor_n_per_m: Vec::with_capacity(awake),
         }
     }
 
-    /// Lays out the springs of the coarse surface for awake nodes (ascending). Allocates nothing.
+    /// Lays out the springs of the coarse surface for the awake nodes `ids`, which are ascending. Nothing is allocated.
     pub fn lay_out(&mut self, model: &SpringModel, ids: &[u32]) {
         let (surface, vertices) = (model.surface(), vertices_of(model, ids));
-        // Vertices come first: while they are the same, and no sleeping neighbours come behind other nodes, so are their rows.
+        // Vertices come first: rows stay valid while the vertices are the same and no sleeping neighbours come after
+        // other nodes.
         let has_rows = self.rows.nodes() == vertices
             && self.places.nodes().len() == self.awake
             && self.places.nodes().get(..vertices) == Some(&ids[..vertices]);
@@ -108,31 +112,31 @@ impl RunningSprings {
         }
     }
 
-    /// The place of an awake node.
+    /// Returns the place of a node, where it is awake.
     pub fn place(&self, id: u32) -> Option<usize> {
         self.places.of(id).map(|place| place as usize).filter(|place| *place < self.awake)
     }
 
-    /// Makes the list of what levels add, for the nodes last laid out. Allocates nothing.
+    /// Makes the lists of what levels add, for the nodes that were laid out last. Nothing is allocated.
     pub fn add_levels(&mut self, model: &SpringModel, ids: &[u32], levels: &Levels, fine: &Constants) {
         let vertices = vertices_of(model, ids);
-        let Self { added, ties, added_homes, home_n_per_m, places, awake, .. } = self;
+        let Self { added, ties, added_anchors, anchor_n_per_m, places, awake, .. } = self;
         added.clear();
         ties.clear();
-        added_homes.clear();
-        home_n_per_m.clear();
-        home_n_per_m.resize(ids.len(), 0.0);
-        home_n_per_m[..vertices].fill(model.spec().coarse.home_n_per_m);
-        levels.for_each_added(model.surface(), model.rest_m(), (&model.spec().coarse, fine), |what| match what {
+        added_anchors.clear();
+        anchor_n_per_m.clear();
+        anchor_n_per_m.resize(ids.len(), 0.0);
+        anchor_n_per_m[..vertices].fill(model.spec().coarse.anchor_n_per_m);
+        levels.for_each_added(model.surface(), model.rest_m(), &model.spec().coarse, fine, |what| match what {
             Added::Spring { nodes, rest_length_m, stiffness_n_per_m } => {
                 if let [Some(a), Some(b)] = nodes.map(|node| places.of(node)) {
                     added.push(AddedSpring { places: [a, b], rest_length_m, stiffness_n_per_m });
                 }
             }
-            Added::Home { node, stiffness_n_per_m } => {
+            Added::Anchor { node, stiffness_n_per_m } => {
                 if let Some(place) = places.of(node).filter(|place| (*place as usize) < *awake) {
-                    home_n_per_m[place as usize] += stiffness_n_per_m;
-                    added_homes.push((place, stiffness_n_per_m));
+                    anchor_n_per_m[place as usize] += stiffness_n_per_m;
+                    added_anchors.push((place, stiffness_n_per_m));
                 }
             }
             Added::Tie { nodes, stiffness_n_per_m } => {
@@ -145,7 +149,8 @@ impl RunningSprings {
         });
     }
 
-    /// Takes the awake nodes' positions (m).
+    /// Sets the positions by place: of the awake nodes to `x_m` (m), and of sleeping neighbours to their rest
+    /// positions.
     fn put(&mut self, model: &SpringModel, x_m: &[DVec3]) {
         self.places_m.clear();
         self.places_m.extend_from_slice(x_m);
@@ -153,7 +158,7 @@ impl RunningSprings {
         self.places_m.extend(sleeping.iter().map(|&node| model.rest_m()[node as usize]));
     }
 
-    /// Adds the springs' forces (N) on awake nodes at `x_m` (m).
+    /// Adds the springs' forces (N) on the awake nodes, which are at `x_m` (m).
     pub fn add_forces_n(&mut self, model: &SpringModel, ids: &[u32], x_m: &[DVec3], forces_n: &mut [DVec3]) {
         self.put(model, x_m);
         self.rows.add_forces_n(&self.places_m, forces_n);
@@ -173,23 +178,24 @@ impl RunningSprings {
                 }
             }
         }
-        let law = &model.spec().home_law;
-        for ((force_n, x_m), (id, stiffness)) in forces_n.iter_mut().zip(x_m).zip(ids.iter().zip(&self.home_n_per_m)) {
+        let law = &model.spec().anchor_law;
+        for ((force_n, x_m), (id, stiffness)) in forces_n.iter_mut().zip(x_m).zip(ids.iter().zip(&self.anchor_n_per_m))
+        {
             let u = *x_m - model.rest_m()[*id as usize];
             *force_n -= law.stretched(u) * *stiffness;
         }
     }
 
-    /// Energy (J) of what levels add: what changes with them.
+    /// Returns the energy (J) of the springs and ties that levels add, which is the part that changes with levels.
     pub fn energy_of_levels_j(&self, model: &SpringModel, x_m: &[DVec3]) -> f64 {
-        let home_m = |place: u32| model.rest_m()[self.places.nodes()[place as usize] as usize];
-        let at = |place: u32| x_m.get(place as usize).copied().unwrap_or_else(|| home_m(place));
+        let rest_of_m = |place: u32| model.rest_m()[self.places.nodes()[place as usize] as usize];
+        let at = |place: u32| x_m.get(place as usize).copied().unwrap_or_else(|| rest_of_m(place));
         let of_springs = self.added.iter().map(|spring| spring.energy_j(spring.places.map(at))).sum::<f64>();
         let of_ties = self.ties.iter().map(|tie| tie.energy_j(tie.places.map(at))).sum::<f64>();
-        let of_home = |&(place, stiffness): &(u32, f64)| {
-            stiffness * model.spec().home_law.at(at(place).distance(home_m(place))).integral_m2
+        let of_anchor = |&(place, stiffness): &(u32, f64)| {
+            stiffness * model.spec().anchor_law.at(at(place).distance(rest_of_m(place))).integral_m2
         };
-        of_springs + of_ties + self.added_homes.iter().map(of_home).sum::<f64>()
+        of_springs + of_ties + self.added_anchors.iter().map(of_anchor).sum::<f64>()
     }
 }
 
@@ -207,7 +213,7 @@ impl AddedSpring {
 }
 
 impl Tie {
-    /// `u_e − ½ (u_a + u_b)` (m).
+    /// Returns the length `u_e − ½ (u_a + u_b)` (m) of the tie.
     fn off_m(&self, [x, a, b]: [DVec3; 3]) -> DVec3 {
         x - (a + b) * 0.5 - self.beside_m
     }
@@ -217,7 +223,7 @@ impl Tie {
     }
 }
 
-/// How many of the ids, ascending, are coarse vertices.
+/// Returns how many of the ascending `ids` are coarse vertices.
 pub(super) fn vertices_of(model: &SpringModel, ids: &[u32]) -> usize {
     ids.partition_point(|&id| id < model.vertices())
 }

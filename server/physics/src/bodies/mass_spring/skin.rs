@@ -1,4 +1,4 @@
-//! Where the surface is that tools touch, and how forces on it go to the nodes.
+//! The positions of the surface that tools touch, and the transfer of forces from it to the nodes.
 use super::{
     body::MassSpringBody,
     motion::{SpringMotion, SpringScratch},
@@ -9,18 +9,18 @@ use crate::{
 };
 use glam::DVec3;
 
-/// Boxes at rest of the skin's clusters, and of groups of them.
+/// Bounding boxes, at rest, of the skin's clusters and of groups of clusters.
 #[derive(Debug, Clone, Default)]
 pub(super) struct SkinBoxes {
     clusters: Vec<[DVec3; 2]>,
     groups: Vec<[DVec3; 2]>,
-    /// First entry of each cluster in `vertices`, and the end of the last.
+    /// First entry of each cluster in `vertices`, then the end of the last one's.
     first: Vec<u32>,
     vertices: Vec<u32>,
 }
 
 impl SkinBoxes {
-    /// Of triangles in the order of the broad phase.
+    /// Returns the boxes of triangles, which are given in the order of the broad phase.
     pub(super) fn new(rest_m: &[DVec3], triangles: &[[u32; 3]]) -> Self {
         let around = |vertices: &[u32]| {
             let corners = vertices.iter().map(|&vertex| rest_m[vertex as usize]);
@@ -50,13 +50,14 @@ pub(crate) struct SpringSkin<'a> {
     motion: &'a SpringMotion,
     scratch: &'a SpringScratch,
     x_m: &'a [DVec3],
-    /// Velocities (m/s) of the awake nodes; none where nobody asks for a vertex's.
+    /// Velocities (m/s) of the awake nodes; empty where no vertex' velocity is asked for.
     v: &'a [DVec3],
-    /// How far (m) the farthest awake node is from home.
+    /// Largest distance (m) of an awake node from its rest position.
     farthest_m: f64,
 }
 
-/// What carries a vertex of the skin: places of nodes and weights, and where it is when these are at 0 (m).
+/// What carries a vertex of the skin: places of nodes with weights, and the position (m) of the vertex if these were at
+/// 0.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Carried {
     offset_m: DVec3,
@@ -65,21 +66,23 @@ pub(crate) struct Carried {
 }
 
 impl<'a> SpringSkin<'a> {
-    /// At positions `x_m` (m) of the awake nodes.
+    /// Returns the skin at the positions `x_m` (m) of the awake nodes.
     pub(crate) fn new(
         body: &'a MassSpringBody,
-        (motion, scratch): (&'a SpringMotion, &'a SpringScratch),
+        motion: &'a SpringMotion,
+        scratch: &'a SpringScratch,
         x_m: &'a [DVec3],
     ) -> Self {
         Self { body, motion, scratch, x_m, v: &[], farthest_m: 0.0 }
     }
 
-    /// The same, with velocities (m/s) of the awake nodes.
+    /// Returns the same skin with the velocities (m/s) of the awake nodes.
     pub(crate) fn moving(self, v: &'a [DVec3]) -> Self {
         Self { v, ..self }
     }
 
-    /// The node beneath a vertex of the skin, or the end of its edge that is nearer to a point.
+    /// Returns the coarse vertex of a vertex of the skin, or of a vertex on an edge the end that is nearer to the point
+    /// `from_m` (m).
     pub(crate) fn coarse_vertex(&self, vertex: u32, from_m: DVec3) -> u32 {
         let model = self.body.model();
         let Some(edge) = vertex.checked_sub(model.vertices()) else { return vertex };
@@ -91,11 +94,11 @@ impl<'a> SpringSkin<'a> {
 
 fn carried(body: &MassSpringBody, motion: &SpringMotion, scratch: &SpringScratch, vertex: u32) -> Carried {
     let model = body.model();
-    let home_m = |node: u32| model.rest_m()[node as usize];
-    let mut found = Carried { offset_m: home_m(vertex), by: [(0, 0.0); 3], count: 0 };
+    let rest_of_m = |node: u32| model.rest_m()[node as usize];
+    let mut found = Carried { offset_m: rest_of_m(vertex), by: [(0, 0.0); 3], count: 0 };
     let mut add = |node: u32, weight: f64| {
         if let Some(place) = scratch.place(node).filter(|_| weight != 0.0) {
-            found.offset_m -= home_m(node) * weight;
+            found.offset_m -= rest_of_m(node) * weight;
             found.by[found.count] = (place as u32, weight);
             found.count += 1;
         }
@@ -124,8 +127,8 @@ impl Carried {
 
 impl Skin for SpringSkin<'_> {
     fn begin(&mut self) {
-        let homes = self.motion.ids.iter().map(|&id| self.body.model().rest_m()[id as usize]);
-        let farthest_sq = self.x_m.iter().zip(homes).map(|(x, home)| x.distance_squared(home)).fold(0.0, f64::max);
+        let rest_m = self.motion.ids.iter().map(|&id| self.body.model().rest_m()[id as usize]);
+        let farthest_sq = self.x_m.iter().zip(rest_m).map(|(x, rest_m)| x.distance_squared(rest_m)).fold(0.0, f64::max);
         self.farthest_m = farthest_sq.sqrt();
     }
 
@@ -181,20 +184,20 @@ impl CarriedSkin for SpringSkin<'_> {
 }
 
 impl MassSpringBody {
-    /// Where a vertex of the skin is (m), at positions of the awake nodes.
+    /// Returns the position (m) of a vertex of the skin, where the awake nodes are at `x_m` (m).
     pub fn vertex_m(&self, motion: &SpringMotion, vertex: u32, x_m: &[DVec3]) -> DVec3 {
         let model = self.model();
-        let home_m = |node: u32| model.rest_m()[node as usize];
+        let rest_of_m = |node: u32| model.rest_m()[node as usize];
         let moved = |node: u32| {
             let place = motion.ids.binary_search(&node).ok();
-            place.map(|place| x_m[place] - home_m(node))
+            place.map(|place| x_m[place] - rest_of_m(node))
         };
         let Some(edge) = vertex.checked_sub(model.vertices()) else {
-            return home_m(vertex) + moved(vertex).unwrap_or_default();
+            return rest_of_m(vertex) + moved(vertex).unwrap_or_default();
         };
         let ends = model.surface().edges()[edge as usize].nodes.map(|end| moved(end).unwrap_or_default());
         let as_ends = (ends[0] + ends[1]) * 0.5;
         let level = motion.levels.of_edge(model.surface(), edge);
-        home_m(vertex) + moved(vertex).map_or(as_ends, |own| own * level + as_ends * (1.0 - level))
+        rest_of_m(vertex) + moved(vertex).map_or(as_ends, |own| own * level + as_ends * (1.0 - level))
     }
 }

@@ -1,8 +1,11 @@
-//! What of a mass-spring surface a tick changes beside positions and velocities, and what tools and injected forces want of it.
+//! What a tick changes of a mass-spring surface beside positions and velocities, and where tools and injected forces
+//! make it refined and awake.
 //!
-//! A tool that touches, or is about to, has a vertex that is refined about: the nearest to where it is deepest, or to it; a capsule has one for each place along its axis. It follows when another is nearer by a tenth of the tool's radius, and is let go when the tool has
-//! been away for [`AWAY_TICKS`]. Where not all of the surface fits in what may be awake at once, the vertices that are the fewest edges from such vertices are, and from those that a force was injected at;
-//! they stay awake until all is at rest.
+//! A tool that touches the surface, or is about to, has a vertex about which the surface is refined: the one nearest to
+//! where it is deepest, or to the tool. A capsule has such a vertex for each sample along its axis. Another vertex
+//! takes its place when it is nearer by a tenth of the tool's radius, and there is none once the tool has been away for
+//! [`AWAY_TICKS`]. Where not all vertices may be awake at once, those that are the fewest edges from such vertices, and
+//! from those at which a force was injected, are awake; they stay awake until all of them are at rest.
 use super::{
     around,
     body::{MOST_RINGS, MassSpringBody, Refining},
@@ -12,60 +15,62 @@ use super::{
 use crate::hash::Chain;
 use serde::{Deserialize, Serialize};
 
-/// Ticks for which a tool has to be away.
+/// Number of ticks that a tool has to be away before the surface is no longer refined about it.
 const AWAY_TICKS: u32 = 100;
-/// Vertices kept awake for injected forces, besides those of tools.
+/// Largest number of vertices about which the surface is kept awake for injected forces, besides those of tools.
 pub(super) const MOST_FORCED: usize = 8;
-/// Relative change of constants that is none.
+/// Relative change of constants below which they are left as they are.
 const NO_CHANGE: f64 = 1e-6;
-/// Part of the reach of what is awake that a tool goes before it is awake about another vertex.
+/// Part of the awake region's reach that a tool moves before the surface is awake about another vertex.
 const FOLLOW: f64 = 0.25;
 
-/// All that a tick changes of the surface beside positions and velocities.
+/// Everything that a tick changes of the surface beside positions and velocities.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct MassSpringState {
     /// Awake nodes and levels.
     pub motion: SpringMotion,
-    /// One for each place of each tool.
+    /// Vertices about which the surface is refined and awake, for each axis sample of each tool.
     pub(crate) about: Vec<About>,
-    /// Vertices that forces were injected at while they slept.
+    /// Vertices at which forces were injected while they slept.
     forced: Vec<u32>,
     /// Triangles that are to be refined, ascending.
     pub(crate) refined: Vec<u32>,
     /// Coarse vertices that are to be awake, ascending, besides those of triangles that are not coarse.
     pub(crate) awake: Vec<u32>,
-    /// What levels on their way and nodes that come and go gave (J) since reset; less than 0: took.
+    /// Energy (J) that changes of levels and nodes that enter and leave have added since reset; negative where they
+    /// have taken it.
     pub given_j: f64,
 }
 
-/// What a place of a tool is about.
+/// The vertices about which the surface is refined and awake for one axis sample of a tool.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub(crate) struct About {
-    /// The vertex refined about.
+    /// Vertex about which the surface is refined.
     pub(crate) touched: Option<u32>,
-    /// The vertex awake about.
+    /// Vertex about which the surface is awake.
     awake: Option<u32>,
-    /// Rings that its dent needs, at least one.
+    /// Number of rings that its dent needs, at least one where it touches.
     rings: u32,
-    /// For how many ticks the tool has been away.
+    /// Number of ticks that the tool has been away.
     away_ticks: u32,
 }
 
-/// What a place of a tool is near to.
+/// What an axis sample of a tool is near to.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Found {
-    /// The coarse vertex nearest to it.
+    /// The nearest coarse vertex.
     pub(crate) vertex: u32,
-    /// How far (m) that is, and how far the vertex that it is about now.
+    /// Distance (m) of that vertex.
     pub(crate) distance_m: f64,
+    /// Distance (m) of the vertex about which the surface is refined now.
     pub(crate) present_m: f64,
     /// Gap (m) between tool and surface, 0 while they touch.
     pub(crate) gap_m: f64,
-    /// How many rings its dent needs ([`super::body::rings_for`]).
+    /// Number of rings that the dent needs ([`super::body::rings_for`]).
     pub(crate) rings: f64,
 }
 
-/// Buffers of a look.
+/// Buffers of a query of what is to be refined and awake.
 #[derive(Debug, Clone)]
 pub(crate) struct ActivationQuery {
     centres: Vec<u32>,
@@ -76,27 +81,28 @@ pub(crate) struct ActivationQuery {
 
 impl ActivationQuery {
     pub(crate) fn new(body: &MassSpringBody) -> Self {
-        let (most, places) = (body.model().spec().most_refined, body.place_count());
+        let (most, samples) = (body.model().spec().most_refined, body.axis_sample_count());
         Self {
-            centres: Vec::with_capacity(places),
+            centres: Vec::with_capacity(samples),
             triangles: Vec::with_capacity(most),
-            corners: Vec::with_capacity(3 * most + places),
+            corners: Vec::with_capacity(3 * most + samples),
             seen: vec![false; if body.is_all_awake() { 0 } else { body.model().vertices() as usize }],
         }
     }
 }
 
 impl About {
-    /// Whether it is refined about any of these.
-    pub(crate) fn is_fine(places: &[Self]) -> bool {
-        places.iter().any(|about| about.touched.is_some())
+    /// Returns whether the surface is refined about any of the samples.
+    pub(crate) fn is_fine(samples: &[Self]) -> bool {
+        samples.iter().any(|about| about.touched.is_some())
     }
 
-    /// Takes what the place is near to, if anything, after so many ticks; from `near_m` on it touches.
-    pub(crate) fn note(&mut self, near: Option<Found>, (near_m, radius_m, ticks): (f64, f64, u32)) {
-        /// Part of the tool's radius that another vertex has to be nearer.
+    /// Notes what the sample is near to, if anything, `ticks` ticks after the last query. A tool of the radius
+    /// `radius_m` (m) counts as touching where its gap is less than `near_m` (m).
+    pub(crate) fn note(&mut self, near: Option<Found>, near_m: f64, radius_m: f64, ticks: u32) {
+        /// Part of the tool's radius by which another vertex has to be nearer.
         const NEARER: f64 = 0.1;
-        /// Part of a ring by which a dent must have shrunk before it has one less.
+        /// Part of a ring by which a dent must have shrunk before it has one ring less.
         const SHRUNK: f64 = 0.25;
         match (self.touched, near) {
             (touched, Some(near)) if near.gap_m < near_m => {
@@ -120,7 +126,7 @@ impl About {
 }
 
 impl MassSpringState {
-    /// Everything coarse and at home.
+    /// Returns the state in which every triangle is coarse and every node at rest.
     pub(crate) fn at_rest(body: &MassSpringBody) -> Self {
         let spec = body.model().spec();
         let mut awake = Vec::with_capacity(spec.most_awake.min(body.model().vertices() as usize));
@@ -130,7 +136,7 @@ impl MassSpringState {
         let motion = SpringMotion::at_rest(body.model(), awake.iter().copied());
         Self {
             motion: SpringMotion { fine: body.fine_at(0.0), ..motion },
-            about: vec![About::default(); body.place_count()],
+            about: vec![About::default(); body.axis_sample_count()],
             forced: Vec::with_capacity(MOST_FORCED),
             refined: Vec::with_capacity(spec.most_refined),
             awake,
@@ -138,7 +144,7 @@ impl MassSpringState {
         }
     }
 
-    /// As at rest, in the buffers it has.
+    /// Makes the state as [`Self::at_rest`] in the buffers it has.
     pub(crate) fn reset(&mut self, body: &MassSpringBody) {
         self.motion.reset(body.model());
         self.motion.fine = body.fine_at(0.0);
@@ -152,28 +158,29 @@ impl MassSpringState {
         self.motion.ids.extend_from_slice(&self.awake);
     }
 
-    /// Refines so many rings around vertices and nothing else, of a body refined by hand ([`Refining::ByHand`]): as with tools, levels go
-    /// there from tick to tick. What there is no room for is left out.
+    /// Refines `rings` rings around the vertices `centres` and nothing else, of a body that is refined by hand
+    /// ([`Refining::ByHand`]). As with tools, levels change from tick to tick. Triangles for which there is no room are
+    /// left out.
     pub(crate) fn refine_only(&mut self, body: &MassSpringBody, centres: &[u32], rings: u32) {
         let springs = body.model();
         let known = centres.iter().copied().filter(|&vertex| vertex < springs.vertices()).collect::<Vec<_>>();
         let (mut triangles, mut corners) = (Vec::new(), Vec::new());
         let levels = self.motion.levels.triangles().len();
         let most = springs.spec().most_refined.saturating_sub(levels);
-        around::rings_into(springs.surface(), &known, (rings, most), (&mut triangles, &mut corners));
+        around::rings_into(springs.surface(), &known, rings, most, &mut triangles, &mut corners);
         self.refined.clear();
         self.refined.extend_from_slice(&triangles);
     }
 
-    /// Adds all of it but positions and velocities.
+    /// Adds all of the state to a hash.
     pub(crate) fn chain(&self, chain: &mut Chain) {
         chain.wholes(&self.motion.ids);
-        chain.list(self.motion.levels.triangles(), |chain, (triangle, way)| {
+        chain.list(self.motion.levels.triangles(), |chain, (triangle, progress)| {
             chain.whole(u64::from(*triangle));
-            chain.real(*way);
+            chain.real(*progress);
         });
         chain.real(self.motion.fine.mesh_n_per_m);
-        chain.real(self.motion.fine.home_n_per_m);
+        chain.real(self.motion.fine.anchor_n_per_m);
         let vertex = |chain: &mut Chain, vertex: u32| chain.whole(u64::from(vertex));
         chain.list(&self.about, |chain, about| {
             chain.maybe(about.touched, vertex);
@@ -187,7 +194,7 @@ impl MassSpringState {
         chain.real(self.given_j);
     }
 
-    /// Copies another state of the same body. Allocates nothing.
+    /// Copies another state of the same body. Nothing is allocated.
     pub(crate) fn copy_from(&mut self, other: &Self) {
         self.motion.copy_from(&other.motion);
         self.about.clone_from(&other.about);
@@ -197,7 +204,7 @@ impl MassSpringState {
         self.given_j = other.given_j;
     }
 
-    /// Whether it may be a state of a body.
+    /// Returns whether this may be a state of a body.
     pub(crate) fn fits(&self, body: &MassSpringBody) -> bool {
         let model = body.model();
         let (vertices, triangles) = (model.vertices(), model.surface().triangles().len());
@@ -205,11 +212,11 @@ impl MassSpringState {
         let known = |about: &About| about.touched.into_iter().chain(about.awake).all(|vertex| vertex < vertices);
         let refined = ascending(&self.refined) && self.refined.last().is_none_or(|last| (*last as usize) < triangles);
         let levels = self.motion.levels.triangles();
-        let coming = self.refined.iter().filter(|t| levels.binary_search_by_key(*t, |level| level.0).is_err());
+        let entering = self.refined.iter().filter(|t| levels.binary_search_by_key(*t, |level| level.0).is_err());
         refined
             && self.given_j.is_finite()
-            && levels.len() + coming.count() <= model.spec().most_refined
-            && self.about.len() == body.place_count()
+            && levels.len() + entering.count() <= model.spec().most_refined
+            && self.about.len() == body.axis_sample_count()
             && self.about.iter().all(|about| known(about) && about.rings <= MOST_RINGS)
             && self.forced.len() <= MOST_FORCED
             && self.forced.iter().all(|vertex| *vertex < vertices)
@@ -217,28 +224,29 @@ impl MassSpringState {
             && self.motion.fits(model, &self.awake)
     }
 
-    /// Nodes of type 2 that are there: middles of edges refined, or on their way.
+    /// Returns the number of nodes of type 2: the middles of edges that are not coarse.
     pub fn refined_nodes(&self, body: &MassSpringBody) -> usize {
         self.motion.ids.len() - self.motion.ids.partition_point(|id| *id < body.model().vertices())
     }
 
-    /// `K′_m`, `K′_h` a tick of `part` of the time on that they take to change: towards those at how far (m) what tools touch is from home.
-    pub(crate) fn next_fine(&self, body: &MassSpringBody, part: f64, away_m: impl Fn(u32) -> f64) -> Constants {
+    /// Returns the constants `K′_m`, `K′_h` of the next tick. They move by `fraction` of the difference towards those
+    /// at the displacement of the touched vertices; `away_m` tells how far (m) a vertex is from its rest position.
+    pub(crate) fn next_fine(&self, body: &MassSpringBody, fraction: f64, away_m: impl Fn(u32) -> f64) -> Constants {
         let touched = self.about.iter().filter_map(|about| about.touched);
         let Some(farthest_m) = touched.map(away_m).reduce(f64::max) else { return self.motion.fine };
         let (now, then) = (self.motion.fine, body.fine_at(farthest_m));
-        // So near that nothing need be laid out anew.
-        if (then.home_n_per_m / now.home_n_per_m - 1.0).abs() < NO_CHANGE {
+        // While constants hardly change nothing is laid out anew.
+        if (then.anchor_n_per_m / now.anchor_n_per_m - 1.0).abs() < NO_CHANGE {
             return now;
         }
-        let towards = |now: f64, then: f64| now + (then - now) * part.min(1.0);
+        let towards = |now: f64, then: f64| now + (then - now) * fraction.min(1.0);
         Constants {
             mesh_n_per_m: towards(now.mesh_n_per_m, then.mesh_n_per_m),
-            home_n_per_m: towards(now.home_n_per_m, then.home_n_per_m),
+            anchor_n_per_m: towards(now.anchor_n_per_m, then.anchor_n_per_m),
         }
     }
 
-    /// A force is injected at a vertex that sleeps.
+    /// Notes that a force is injected at a sleeping vertex.
     pub(crate) fn force(&mut self, vertex: u32) {
         if !self.forced.contains(&vertex) {
             if self.forced.len() == MOST_FORCED {
@@ -248,33 +256,35 @@ impl MassSpringState {
         }
     }
 
-    /// Which triangles are to be refined. While those that come and those that still go would be more than there is room for, only those that are there already. Allocates nothing.
-    pub(crate) fn want_refined(&mut self, body: &MassSpringBody, looking: &mut ActivationQuery) {
+    /// Decides which triangles are to be refined. While entering triangles and those that still leave together have no
+    /// room, only triangles that are not coarse already are kept. Nothing is allocated.
+    pub(crate) fn want_refined(&mut self, body: &MassSpringBody, query: &mut ActivationQuery) {
         let Some(refinement) = body.refinement().filter(|refinement| refinement.by == Refining::ByTools) else {
             return;
         };
-        let ActivationQuery { centres, triangles, corners, .. } = looking;
+        let ActivationQuery { centres, triangles, corners, .. } = query;
         let most = body.model().spec().most_refined;
         centres.clear();
         centres.extend(self.about.iter().filter_map(|about| about.touched));
         let of_dents = self.about.iter().map(|about| about.rings).max().unwrap_or_default();
         let rings = if refinement.follows_dent { of_dents.clamp(1, refinement.rings) } else { refinement.rings };
-        around::rings_into(body.model().surface(), centres, (rings, most), (triangles, corners));
+        around::rings_into(body.model().surface(), centres, rings, most, triangles, corners);
         let levels = self.motion.levels.triangles();
         let is_there = |triangle: &u32| levels.binary_search_by_key(triangle, |level| level.0).is_ok();
-        let coming = triangles.iter().filter(|triangle| !is_there(triangle)).count();
-        let fits = levels.len() + coming <= most;
+        let entering = triangles.iter().filter(|triangle| !is_there(triangle)).count();
+        let fits = levels.len() + entering <= most;
         self.refined.clear();
         self.refined.extend(triangles.iter().filter(|triangle| fits || is_there(triangle)));
     }
 
-    /// Which vertices are to be awake, where not all are; `is_quiet` tells whether all that is awake is at rest. `forced` tells that a sleeping vertex was forced. Allocates nothing.
+    /// Decides which vertices are to be awake, where not all are. `forced` tells that a force was injected at a
+    /// sleeping vertex, `is_still` that all awake nodes are at rest. Nothing is allocated.
     pub(crate) fn want_awake(
         &mut self,
         body: &MassSpringBody,
-        looking: &mut ActivationQuery,
+        query: &mut ActivationQuery,
         forced: bool,
-        is_quiet: bool,
+        is_still: bool,
     ) {
         let rest_m = body.model().rest_m();
         let mut changed = forced;
@@ -287,7 +297,7 @@ impl MassSpringState {
             }
         }
         let is_touched = self.about.iter().any(|about| about.touched.is_some());
-        if !is_touched && !forced && is_quiet && !self.awake.is_empty() {
+        if !is_touched && !forced && is_still && !self.awake.is_empty() {
             self.forced.clear();
             self.about.iter_mut().for_each(|about| about.awake = None);
             changed = true;
@@ -295,7 +305,7 @@ impl MassSpringState {
         if changed {
             let centres = self.about.iter().filter_map(|about| about.awake).chain(self.forced.iter().copied());
             let most = body.model().spec().most_awake;
-            around::nearest_into(body.model().surface(), centres, most, (&mut self.awake, &mut looking.seen));
+            around::nearest_into(body.model().surface(), centres, most, &mut self.awake, &mut query.seen);
         }
     }
 }

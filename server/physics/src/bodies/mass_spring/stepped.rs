@@ -1,4 +1,4 @@
-//! Forces and kicks of a mass-spring surface.
+//! Forces on a mass-spring surface, and its kicks.
 use super::{MassSpringBody, MassSpringScratch, MassSpringState, skin::SpringSkin};
 use crate::{
     contact::ContactScratch,
@@ -34,7 +34,7 @@ impl<'a> Stepped<'a> for SteppedMassSpring<'a> {
             scratch: contact,
             fastest_m_per_s: now.fastest_m_per_s,
         };
-        let mut view = SpringSkin::new(body, (&own.motion, springs), x).moving(v);
+        let mut view = SpringSkin::new(body, &own.motion, springs, x).moving(v);
         touch_skin(tick, now, body.model().rest_m(), &mut view, skin, touch);
         state.force_n.copy_from_slice(&state.external_n);
         springs.add_forces_n(body.model(), &own.motion, &state.x, &mut state.force_n);
@@ -47,7 +47,8 @@ impl<'a> Stepped<'a> for SteppedMassSpring<'a> {
         state.force_is_current = true;
     }
 
-    /// A half or whole kick of the awake nodes: `v ← (v e^{−c h/2} + h f/m) e^{−c h/2}`, and the ledger's share of it.
+    /// Gives the awake nodes a kick of length `h`, `v ← (v e^{−c h/2} + h f/m) e^{−c h/2}`, and adds its work and
+    /// dissipation to the ledger.
     fn kick(&mut self, environment: &Environment, state: &mut MechanicalState, h_s: f64, _ends_long_step: bool) {
         let damping = environment.settings.mass_damping_per_s;
         let [external_w, before_sq, between_sq] = LumpedKick {
@@ -61,16 +62,16 @@ impl<'a> Stepped<'a> for SteppedMassSpring<'a> {
         }
         .give();
         state.ledger.external_work_j += h_s * external_w;
-        // Half of what damping takes is taken before the force, half behind it.
+        // Half of the damping acts before the force, and half of it after.
         state.ledger.dissipated_j += 0.5 * (before_sq + between_sq) * -(-damping * h_s).exp_m1();
     }
 
-    /// It is nothing while the node sleeps.
+    /// Returns the force (N) that holds a node, which is zero while the node sleeps.
+    /// Returns the node at a place among the awake nodes.
     fn reaction_n(&self, node: usize, state: &MechanicalState) -> DVec3 {
         self.scratch.place(node as u32).map_or(DVec3::ZERO, |place| -state.force_n[place])
     }
 
-    /// The places are those of awake nodes.
     fn node_at(&self, place: u32) -> Option<u32> {
         self.own.motion.ids.get(place as usize).copied()
     }

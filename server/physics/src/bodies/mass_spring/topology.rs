@@ -1,129 +1,50 @@
-//! A triangle surface that springs can be put on: edges, neighbours, borders.
+//! The topology of a triangle surface that springs are put on: edges, neighbours and boundaries.
+pub use super::topology_error::TriangulationError;
 use glam::DVec3;
 use std::collections::BTreeMap;
-use thiserror::Error;
 
-/// No triangle, or no vertex.
+/// Stands for no triangle, or no vertex.
 pub const NONE: u32 = u32::MAX;
 
-/// A triangle surface, open or closed, on which every edge has one or two triangles and those around a vertex are one fan.
+/// A triangle surface, open or closed, on which every edge has one or two triangles, and the triangles around a vertex
+/// are one fan.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Triangulation {
     positions_m: Vec<DVec3>,
     triangles: Vec<[u32; 3]>,
     edges: Vec<Edge>,
-    /// Edges of each triangle: from its first to its second corner, and so on.
+    /// Edges of each triangle, the first from its first to its second corner, and so on.
     triangle_edges: Vec<[u32; 3]>,
-    /// Edges at each vertex, ascending; where those of a vertex begin, and the end of the last.
+    /// Edges at each vertex, ascending.
     edges_at: Vec<u32>,
+    /// First entry of each vertex in `edges_at`, then the end of the last one's.
     first_edge_at: Vec<u32>,
     triangles_at: Vec<u32>,
     first_triangle_at: Vec<u32>,
 }
 
-/// An edge with what is on either side.
+/// An edge with the triangles on its sides.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Edge {
     /// Ends, ascending.
     pub nodes: [u32; 2],
-    /// Triangles on either side, [`NONE`] where there is none: on a border.
+    /// Triangles on either side; on a boundary the second one is [`NONE`].
     pub triangles: [u32; 2],
-    /// Their corners across, [`NONE`] likewise.
+    /// The corner of each of these triangles that is not on the edge; on a boundary the second one is [`NONE`].
     pub opposite: [u32; 2],
 }
 
 impl Edge {
-    /// Whether it has a triangle on one side only.
-    pub fn is_border(&self) -> bool {
+    /// Returns whether the edge lies on a boundary: it has a triangle on one side only.
+    pub fn is_boundary(&self) -> bool {
         self.triangles[1] == NONE
     }
 }
 
-/// Why no springs can be put on a surface.
-#[derive(Debug, Clone, PartialEq, Error)]
-pub enum TriangulationError {
-    /// No triangles.
-    #[error("the surface has no triangles")]
-    Empty,
-    /// More vertices or triangles than can be numbered.
-    #[error("the surface has {count} {what}, more than {most} can be refined")]
-    TooMany {
-        /// Triangles or vertices.
-        what: &'static str,
-        /// How many.
-        count: usize,
-        /// How many there may be.
-        most: usize,
-    },
-    /// A coordinate is NaN or infinite.
-    #[error("vertex {vertex} of the surface has a coordinate that is not finite: {position}")]
-    NonFinite {
-        /// Index, from 0.
-        vertex: usize,
-        /// Its position.
-        position: DVec3,
-    },
-    /// A triangle names a vertex that does not exist.
-    #[error("triangle {triangle} refers to vertex {vertex}, but there are only {vertices}")]
-    OutOfRange {
-        /// Index, from 0.
-        triangle: usize,
-        /// The vertex it names.
-        vertex: u32,
-        /// Number of vertices.
-        vertices: usize,
-    },
-    /// A triangle with one vertex twice, or with corners on a line.
-    #[error(
-        "triangle {triangle} (vertices {}, {}, {}) has no area: remove it, or merge the vertices that coincide",
-        corners[0], corners[1], corners[2]
-    )]
-    NoArea {
-        /// Index, from 0.
-        triangle: usize,
-        /// Its corners.
-        corners: [u32; 3],
-    },
-    /// An edge of more than two triangles.
-    #[error("the edge from vertex {} to vertex {} has {count} triangles: a surface has one or two at every edge", edge[0], edge[1])]
-    CrowdedEdge {
-        /// Its ends.
-        edge: [u32; 2],
-        /// How many triangles it has.
-        count: usize,
-    },
-    /// Two neighbours that are seen from opposite sides.
-    #[error(
-        "triangles {} and {} go the same way along the edge from vertex {} to vertex {}: turn one of them round",
-        triangles[0], triangles[1], edge[0], edge[1]
-    )]
-    Turned {
-        /// The two.
-        triangles: [u32; 2],
-        /// The edge that they share.
-        edge: [u32; 2],
-    },
-    /// A vertex without triangles.
-    #[error("vertex {vertex} belongs to no triangle: no spring would hold it but its own; remove it")]
-    Isolated {
-        /// Index, from 0.
-        vertex: usize,
-    },
-    /// Surfaces that hang together at a vertex only.
-    #[error(
-        "the triangles around vertex {vertex} are {fans} fans that touch in it only: give each a vertex of its own"
-    )]
-    SeveralFans {
-        /// Index, from 0.
-        vertex: usize,
-        /// How many.
-        fans: usize,
-    },
-}
-
-/// A triangle with less than this of its longest edge's square has no area.
+/// A triangle whose doubled area is less than this times the square of its longest edge counts as having no area.
 const NO_AREA: f64 = 1e-12;
-/// Refining makes up to four times as many triangles, whose corners are numbered in 32 bits.
+/// Largest number of triangles or vertices: refinement makes up to four times as many triangles, whose corners are
+/// numbered in 32 bits.
 const MOST: usize = (u32::MAX / 8) as usize;
 
 impl Triangulation {
@@ -170,72 +91,72 @@ impl Triangulation {
         Ok(own)
     }
 
-    /// Positions (m).
+    /// Returns the positions (m) of the vertices.
     pub fn positions_m(&self) -> &[DVec3] {
         &self.positions_m
     }
 
-    /// Corners of the triangles, counter-clockwise from outside.
+    /// Returns the corners of the triangles, counter-clockwise seen from outside.
     pub fn triangles(&self) -> &[[u32; 3]] {
         &self.triangles
     }
 
-    /// Edges, ascending by their ends.
+    /// Returns the edges, ascending by their ends.
     pub fn edges(&self) -> &[Edge] {
         &self.edges
     }
 
-    /// Edges of a triangle: from its first to its second corner, and so on.
+    /// Returns the edges of a triangle, the first from its first to its second corner, and so on.
     pub fn edges_of(&self, triangle: u32) -> [u32; 3] {
         self.triangle_edges[triangle as usize]
     }
 
-    /// Edges at a vertex, ascending.
+    /// Returns the edges at a vertex, ascending.
     pub fn edges_at(&self, vertex: u32) -> &[u32] {
         let first = &self.first_edge_at;
         &self.edges_at[first[vertex as usize] as usize..first[vertex as usize + 1] as usize]
     }
 
-    /// Triangles at a vertex, ascending.
+    /// Returns the triangles at a vertex, ascending.
     pub fn triangles_at(&self, vertex: u32) -> &[u32] {
         let first = &self.first_triangle_at;
         &self.triangles_at[first[vertex as usize] as usize..first[vertex as usize + 1] as usize]
     }
 
-    /// The other ends of the edges at a vertex.
+    /// Returns the other ends of the edges at a vertex.
     pub fn neighbours(&self, vertex: u32) -> impl Iterator<Item = u32> + '_ {
         self.edges_at(vertex).iter().map(move |&edge| self.other_end(edge, vertex))
     }
 
-    /// The other end of an edge.
+    /// Returns the other end of an edge.
     pub fn other_end(&self, edge: u32, vertex: u32) -> u32 {
         let [a, b] = self.edges[edge as usize].nodes;
         if a == vertex { b } else { a }
     }
 
-    /// The edge between two vertices, if there is one.
+    /// Returns the edge between two vertices, if there is one.
     pub fn edge_between(&self, a: u32, b: u32) -> Option<u32> {
         self.edges_at(a).iter().copied().find(|&edge| self.other_end(edge, a) == b)
     }
 
-    /// Whether a vertex lies on a border.
-    pub fn is_border(&self, vertex: u32) -> bool {
-        self.edges_at(vertex).iter().any(|&edge| self.edges[edge as usize].is_border())
+    /// Returns whether a vertex lies on a boundary.
+    pub fn is_boundary(&self, vertex: u32) -> bool {
+        self.edges_at(vertex).iter().any(|&edge| self.edges[edge as usize].is_boundary())
     }
 
-    /// Length (m) of an edge.
+    /// Returns the length (m) of an edge.
     pub fn length_m(&self, edge: u32) -> f64 {
         let [a, b] = self.edges[edge as usize].nodes;
         self.positions_m[a as usize].distance(self.positions_m[b as usize])
     }
 
-    /// Area (m²) of a triangle.
+    /// Returns the area (m²) of a triangle.
     pub fn area_m2(&self, triangle: u32) -> f64 {
         let [a, b, c] = self.triangles[triangle as usize].map(|v| self.positions_m[v as usize]);
         0.5 * (b - a).cross(c - a).length()
     }
 
-    /// Area (m²) of each vertex: a third of its triangles'.
+    /// Returns the tributary area (m²) of each vertex, a third of that of its triangles.
     pub fn vertex_areas_m2(&self) -> Vec<f64> {
         let mut areas = vec![0.0; self.positions_m.len()];
         for triangle in 0..self.triangles.len() as u32 {
@@ -245,10 +166,10 @@ impl Triangulation {
         areas
     }
 
-    /// The same surface with vertices elsewhere.
+    /// Returns the same surface with its vertices at other positions (m).
     ///
     /// # Errors
-    /// A position that is not finite, or a triangle that has no area there.
+    /// A position is not finite, or a triangle has no area there.
     pub fn moved(&self, positions_m: Vec<DVec3>) -> Result<Self, TriangulationError> {
         Self::new(positions_m, self.triangles.clone())
     }
@@ -272,7 +193,7 @@ impl Triangulation {
         Ok(())
     }
 
-    /// Triangles at a vertex that hang together with one of them by edges.
+    /// Returns the triangles at a vertex that are connected with one of them through edges at the vertex.
     fn fan(&self, vertex: u32, first: u32) -> Vec<u32> {
         let (mut fan, mut next) = (vec![first], 0);
         while next < fan.len() {
@@ -328,7 +249,8 @@ fn find_edges(triangles: &[[u32; 3]]) -> Result<Found, TriangulationError> {
     Ok((edges, triangle_edges))
 }
 
-/// For every vertex the numbers of what has it among its corners, ascending.
+/// Returns the elements that have each vertex among their corners, ascending: the first entry of each vertex, then all
+/// entries.
 fn at_vertices<const N: usize>(vertices: usize, of: impl Iterator<Item = [u32; N]> + Clone) -> (Vec<u32>, Vec<u32>) {
     let mut first = vec![0_u32; vertices + 1];
     for corners in of.clone() {
@@ -376,7 +298,7 @@ mod tests {
             }
         }
         for vertex in 0..37 {
-            let inside = !patch.is_border(vertex);
+            let inside = !patch.is_boundary(vertex);
             assert_eq!(patch.neighbours(vertex).count() == 6, inside);
             assert!(patch.neighbours(vertex).all(|other| patch.edge_between(vertex, other).is_some()));
         }

@@ -15,22 +15,22 @@ use crate::{
 };
 use glam::DVec3;
 
-/// Part of its longest step that contact and couplings may take.
+/// Part of the longest stable step of contact and couplings that the body's step may be.
 const STEP_SAFETY: f64 = 0.9;
 
 /// What a seed body is made from.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SeedBodySpec {
-    /// The core, of the one St. Venant-Kirchhoff material of its parameters. What is prescribed is held.
+    /// The core, whose one St. Venant-Kirchhoff material is that of the parameters. Prescribed nodes are held.
     pub core: Solid,
-    /// The particles around the core; without them its boundary is touched.
+    /// The particles around the core; without them the core's boundary is touched.
     pub layer: Option<LayerSpec>,
-    /// Constants. `dt_s` is the longest step: a tick is taken in equal steps that are no longer.
+    /// Constants. `dt_s` is the longest step: a tick is taken in equal steps that are no longer than this.
     pub parameters: SeedParameters,
 }
 
 impl SeedBodySpec {
-    /// Volume (m³) of core and layer, given the core's boundary.
+    /// Returns the volume (m³) of core and layer, given the core's boundary.
     pub fn volume_m3(&self, boundary: &Surface) -> f64 {
         let core = &self.core.mesh;
         let core_m3 = core.total_volume_m3();
@@ -41,7 +41,7 @@ impl SeedBodySpec {
     }
 }
 
-/// A seed body in the loop. Constant after load.
+/// A seed body in the loop. It does not change after it is loaded.
 #[derive(Debug, Clone)]
 pub struct SeedBody {
     model: SeedModel,
@@ -50,13 +50,14 @@ pub struct SeedBody {
     /// Rest positions (m) of core and skin.
     rest_m: Vec<DVec3>,
     mass_kg: Vec<f64>,
-    /// `1/m` (1/kg) per node and axis, zero where it is held.
+    /// Inverse mass `1/m` (1/kg) per node and axis, zero where the node is held.
     inverse_mass_per_kg: Vec<DVec3>,
     max_natural_frequency_rad_per_s: f64,
 }
 
 impl SeedBody {
-    /// Checks and builds; a tick is taken in as few equal steps as are no longer than the parameters' `dt_s`.
+    /// Checks the specification and builds the body in its environment. A tick is taken in the smallest number of equal
+    /// steps that are no longer than the parameters' `dt_s`.
     ///
     /// # Errors
     /// [`SeedError`]; nothing is repaired silently.
@@ -87,7 +88,8 @@ impl SeedBody {
         };
         let core_nodes = core.mesh.positions_m().len();
         let omega = max_natural_frequency_rad_per_s(&of_core, &inverse_mass_per_kg[..core_nodes]);
-        // The natural frequency that contact is made not to exceed by much: a quarter of what the explicit step bears, (ω dt)² ≤ 4.
+        // Contact is made so that its natural frequency hardly exceeds this: the explicit step bears (ω dt)² ≤ 4, and
+        // this is a quarter of it.
         let contact_rad_per_s = model.parameters().dt_s.recip();
         let contact = ContactModel::build(
             &rest_m,
@@ -104,48 +106,48 @@ impl SeedBody {
         Ok((body, Environment::new(around, surface, contact, steps)))
     }
 
-    /// The papers' model.
+    /// Returns the papers' model.
     pub fn model(&self) -> &SeedModel {
         &self.model
     }
 
-    /// The core's mesh.
+    /// Returns the core's mesh.
     pub fn mesh(&self) -> &TetMesh {
         &self.core.mesh
     }
 
-    /// The core, with its material.
+    /// Returns the core with its material.
     pub fn core(&self) -> &Solid {
         &self.core
     }
 
-    /// What it was built from.
+    /// Returns what the body was built from.
     pub(crate) fn spec(&self) -> (&Solid, &Option<LayerSpec>, &SeedParameters) {
         (&self.core, &self.layer, self.model.parameters())
     }
 
-    /// Rest positions (m) of the core's nodes and then the skin's vertices.
+    /// Returns the rest positions (m) of the core's nodes, then of the skin's vertices.
     pub fn rest_positions_m(&self) -> &[DVec3] {
         &self.rest_m
     }
 
-    /// Mass (kg) of every node.
+    /// Returns the mass (kg) of every node.
     pub fn mass_kg(&self) -> &[f64] {
         &self.mass_kg
     }
 
-    /// `1/m` (1/kg) per node and axis, zero where it is held.
+    /// Returns the inverse mass `1/m` (1/kg) per node and axis, which is zero where the node is held.
     pub fn inverse_mass_per_kg(&self) -> &[DVec3] {
         &self.inverse_mass_per_kg
     }
 
-    /// Largest natural frequency (rad/s) of the core at rest.
+    /// Returns the largest natural frequency (rad/s) of the core at rest.
     pub fn max_natural_frequency_rad_per_s(&self) -> f64 {
         self.max_natural_frequency_rad_per_s
     }
 
-    /// Kinetic energy, elastic energy of the core, and external work. Particles and links have no elastic energy that is known, and so
-    /// there is no dissipation.
+    /// Returns the kinetic energy, the core's elastic energy, and the external work. The elastic energy of particles
+    /// and links is not known, and so neither is the dissipation, which is left at zero.
     pub(crate) fn energies(&self, own: &SeedBodyState, state: &MechanicalState) -> Energies {
         Energies {
             kinetic_j: self.model.kinetic_energy_j(&own.now),
@@ -155,7 +157,7 @@ impl SeedBody {
         }
     }
 
-    /// `Σ V Ψ(F)` (J) of the core at positions `x` (m).
+    /// Returns the elastic energy `Σ V Ψ(F)` (J) of the core at the positions `x` (m).
     pub(crate) fn elastic_energy_j(&self, x: &[DVec3]) -> f64 {
         let core = self.model.core();
         let of_tet = |(nodes, rest): (&[u32; 4], &crate::elements::linear_tet::RestTet)| {
@@ -165,9 +167,9 @@ impl SeedBody {
     }
 }
 
-/// As few steps as are no longer than `dt_s`.
+/// Returns the smallest number of equal steps per tick that are no longer than `dt_s`.
 fn steps_per_tick(tick_period_s: f64, dt_s: f64) -> Result<u32, EnvironmentError> {
-    // A tick that is whole steps is not one more for its last digit.
+    // A tick of a whole number of steps must not get one more because of its last digit.
     const ROUNDING: f64 = 1e-9;
     let steps = (tick_period_s / dt_s * (1.0 - ROUNDING)).ceil().max(1.0);
     if steps <= f64::from(MAX_SUBSTEPS) {
@@ -176,7 +178,7 @@ fn steps_per_tick(tick_period_s: f64, dt_s: f64) -> Result<u32, EnvironmentError
     Err(EnvironmentError::Setting { name: "dt_s", value: dt_s, rule: "must leave 100000 steps or fewer to a tick" })
 }
 
-/// What a seed body cannot have.
+/// Refuses settings and constraints that a seed body cannot have.
 fn demand(around: &EnvironmentSpec, core: &Solid, parameters: &SeedParameters) -> Result<(), SeedError> {
     let SeedParameters { lame, viscosity, convention, density_kg_per_m3, .. } = *parameters;
     let material = Material::new(Law::StVenantKirchhoff, lame, viscosity, convention);
@@ -202,7 +204,8 @@ fn demand(around: &EnvironmentSpec, core: &Solid, parameters: &SeedParameters) -
     }
 }
 
-/// Of every triangle of the surface: of the layer's stiffness, where there is one.
+/// Returns the moduli behind every triangle of the surface: those of the layer, where there is one, and else those of
+/// the core.
 fn moduli(seed: &SeedModel) -> Vec<SurfaceModuli> {
     let lame = seed.core().material().lame;
     let factor = if seed.layer().is_some() { seed.parameters().layer_factor() } else { 1.0 };
@@ -213,7 +216,7 @@ fn moduli(seed: &SeedModel) -> Vec<SurfaceModuli> {
     vec![moduli; seed.surface_triangles().len()]
 }
 
-/// Tools on couplings are stepped with the body.
+/// Refuses couplings that are too stiff for the body's step, in which the tools on them are stepped, too.
 fn demand_soft_couplings(contact: &ContactModel, seed: &SeedModel) -> Result<(), SeedError> {
     let dt_s = seed.parameters().dt_s;
     let longest_s = STEP_SAFETY * 2.0 / contact.tool_frequency_sq.sqrt();

@@ -7,21 +7,21 @@ use serde::{Deserialize, Serialize};
 /// What a tick changes of a seed body beside what every body has.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct SeedBodyState {
-    /// What the model's steps change.
+    /// The state that the model's steps change.
     pub now: SeedState,
     /// Triangle of the surface that tools touch, for the next step.
     pub touched: Option<u32>,
-    /// Particles that are awake.
+    /// Number of awake particles.
     pub awake: u32,
 }
 
 impl SeedBodyState {
-    /// At rest.
+    /// Returns the state at rest.
     pub(crate) fn at_rest(model: &SeedModel) -> Self {
         Self { now: SeedState::at_rest(model), touched: None, awake: 0 }
     }
 
-    /// Back to rest, in the buffers it has.
+    /// Brings the state back to rest in the buffers it has.
     pub(crate) fn reset(&mut self, model: &SeedModel) {
         self.now.core.rest(model.core().rest_m());
         self.now.skin.rest(model.surface_rest_m());
@@ -30,14 +30,14 @@ impl SeedBodyState {
         (self.touched, self.awake) = (None, 0);
     }
 
-    /// Adds all of it.
+    /// Adds all of the state to a hash.
     pub(crate) fn chain(&self, chain: &mut Chain) {
         let triangle = |chain: &mut Chain, triangle: u32| chain.whole(u64::from(triangle));
         chain.whole(self.now.step);
         chain.maybe(self.now.touched, triangle);
         chain.maybe(self.touched, triangle);
         chain.whole(u64::from(self.awake));
-        // What lies beyond the awake particles is in no use.
+        // Entries beyond the awake particles are not used.
         let Motion { x, v } = &self.now.particles;
         let awake = self.awake as usize;
         for list in [&self.now.core.x, &self.now.core.v, &self.now.skin.x, &self.now.skin.v] {
@@ -47,7 +47,7 @@ impl SeedBodyState {
         chain.vectors(&v[..awake]);
     }
 
-    /// Copies another of the same model. Allocates nothing.
+    /// Copies another state of the same model. Nothing is allocated.
     pub(crate) fn copy_from(&mut self, other: &Self) {
         let (own, from) = (&mut self.now, &other.now);
         own.core.copy_from(&from.core);
@@ -57,19 +57,20 @@ impl SeedBodyState {
         (self.touched, self.awake) = (other.touched, other.awake);
     }
 
-    /// Takes all speed from it.
+    /// Sets all velocities to zero.
     pub(crate) fn stop(&mut self) {
         for motion in [&mut self.now.core, &mut self.now.skin, &mut self.now.particles] {
             motion.v.fill(DVec3::ZERO);
         }
     }
 
-    /// Whether awake particles are finite. Nodes are looked at with everybody's.
+    /// Returns whether the awake particles are finite. Nodes are checked where those of every kind of body are.
     pub(crate) fn particles_are_finite(&self) -> bool {
         self.now.particles.is_finite(self.awake as usize)
     }
 
-    /// Whether it is one of a model's, and its nodes are at `x` with velocities `v`: for states that come from elsewhere.
+    /// Returns whether this may be a state of a model whose nodes are at `x` (m) with the velocities `v` (m/s); it may
+    /// come from a snapshot.
     pub(crate) fn fits(&self, model: &SeedModel, x: &[DVec3], v: &[DVec3]) -> bool {
         let Self { now, touched, awake } = self;
         let same = |nodes: &[DVec3], of: [&[DVec3]; 2]| nodes.iter().eq(of.into_iter().flatten());
@@ -80,7 +81,7 @@ impl SeedBodyState {
             && *awake as usize == model.awake(now).map_or(0, Region::len)
     }
 
-    /// Every number of it.
+    /// Returns all positions and velocities, for a check that they are finite.
     pub(crate) fn vectors(&self) -> impl Iterator<Item = &DVec3> {
         let SeedState { core, skin, particles, .. } = &self.now;
         [core, skin, particles].into_iter().flat_map(|motion: &Motion| motion.x.iter().chain(&motion.v))

@@ -1,8 +1,8 @@
 //! The FEM core Ω_e: linear tets of St. Venant-Kirchhoff material with viscous stress, in the semi-implicit scheme.
 //!
-//! Eq. 22 (2005: 6) prints `F_i = (V/2) Σ_j x_j Σ_k Σ_l Γ_jl Γ_ik σ_kl = +(V/2) F σ b_i`. Its sign is that of ∂U/∂x; eq. 32 needs the
-//! force −∂U/∂x. With the ½ and either paper's strain it is `−V F S b_i` with the [`Convention`](crate::material::Convention)'s
-//! factors, which is what [`RestTet::forces_n`] computes.
+//! Eq. 22 (2005: 6) prints `F_i = (V/2) Σ_j x_j Σ_k Σ_l Γ_jl Γ_ik σ_kl = +(V/2) F σ b_i`. Its sign is that of ∂U/∂x,
+//! while eq. 32 needs the force −∂U/∂x. With the ½ and either paper's strain the force is `−V F S b_i` with the factors
+//! of the [`Convention`](crate::material::Convention), which is what [`RestTet::forces_n`] computes.
 use super::{SeedError, SeedParameters};
 use crate::{
     elements::{
@@ -15,18 +15,18 @@ use crate::{
 };
 use glam::{DMat3, DVec3};
 
-/// The core with all that its rest state fixes.
+/// The core, with everything that its rest state fixes.
 #[derive(Debug, Clone)]
 pub struct Core {
     mesh: TetMesh,
     rest_tets: Vec<RestTet>,
     material: Material,
     mass_kg: Vec<f64>,
-    /// 1/m (1/kg); 0 of held nodes.
+    /// Inverse masses `1/m` (1/kg), zero for held nodes.
     inverse_mass_per_kg: Vec<f64>,
-    /// `D_i = −∂F_i/∂x_i` (N/m) at rest.
+    /// Stiffness `D_i = −∂F_i/∂x_i` (N/m) of each node at rest.
     stiffness_n_per_m: Vec<DMat3>,
-    /// `(m_i I + dt² D_i)⁻¹` (1/kg); 0 of held nodes.
+    /// Matrices `(m_i I + dt² D_i)⁻¹` (1/kg), zero for held nodes.
     implicit_per_kg: Vec<DMat3>,
     boundary: Surface,
     outer_triangles: Vec<[u32; 3]>,
@@ -115,7 +115,7 @@ impl Core {
         &self.outer_triangles
     }
 
-    /// Internal forces (N), eq. 22 with the sign of eq. 32.
+    /// Computes the internal forces (N) by eq. 22, with the sign of eq. 32.
     pub fn forces_n(&self, x: &[DVec3], v: &[DVec3], forces_n: &mut [DVec3]) {
         forces_n.fill(DVec3::ZERO);
         for (nodes, rest) in self.mesh.tets().iter().zip(&self.rest_tets) {
@@ -126,7 +126,8 @@ impl Core {
         }
     }
 
-    /// One step of eq. 34, `v ← (M + dt²D)⁻¹(M v + dt F)`, `x ← x + dt v`; its defects: `integrate::seed_semi_implicit`.
+    /// Takes one step of eq. 34, `v ← (M + dt²D)⁻¹(M v + dt F)`, `x ← x + dt v`. `integrate::seed_semi_implicit` tells
+    /// its defects.
     pub fn advance(&self, dt_s: f64, forces_n: &[DVec3], x: &mut [DVec3], v: &mut [DVec3]) {
         for (node, force) in forces_n.iter().enumerate() {
             let drag = self.stiffness_n_per_m[node] * v[node] * dt_s;
@@ -135,13 +136,15 @@ impl Core {
         }
     }
 
-    /// The force (N) which, acting during a step of eq. 34, moves a node by `by_m` more: `(M + dt²D) by/dt²`.
+    /// Returns the force (N) which, acting during a step of eq. 34, moves a node by `by_m` (m) more:
+    /// `(M + dt²D) by/dt²`.
     pub fn force_for_n(&self, node: usize, by_m: DVec3, dt_s: f64) -> DVec3 {
         by_m * (self.mass_kg[node] / (dt_s * dt_s)) + self.stiffness_n_per_m[node] * by_m
     }
 }
 
-/// Of the closed surfaces that make a boundary the one that encloses most: not the wall of a cavity.
+/// Returns the triangles of that closed surface of a boundary which encloses the largest volume; the others are walls
+/// of cavities.
 pub(super) fn outer_part(positions_m: &[DVec3], boundary: &[[u32; 3]]) -> Vec<[u32; 3]> {
     let mut part: Vec<u32> = (0..positions_m.len() as u32).collect();
     loop {

@@ -1,8 +1,9 @@
-//! The particles' weight: a line through the Lennard-Jones potential.
+//! The particles' weight: a linear approximation of the Lennard-Jones potential.
 //!
-//! Eq. 24 (2006; eq. 8 of 2005), `W(r) = κ(r⁻³ − r⁻¹)`, is no weight: it is singular at 0, negative beyond `r = 1` and has no finite
-//! integral. The 2006 paper uses "a linear approximation of the Lennard-Jones potential which fulfils kernel requirements" and does
-//! not print it. Read here as the tangent at the zero crossing, cut there and normalised over the ball:
+//! Eq. 24 (2006; eq. 8 of 2005), `W(r) = κ(r⁻³ − r⁻¹)`, is no weight: it is singular at 0, negative beyond `r = 1` and
+//! has no finite integral. The 2006 paper uses "a linear approximation of the Lennard-Jones potential which fulfils
+//! kernel requirements" and does not print it. It is read here as the tangent at the zero crossing, cut off there and
+//! normalised over the ball:
 //! ```text
 //! W(r) = 3/(πR³) (1 − r/R)₊        ∫ W dV = 4π · 3/(πR³) ∫₀ᴿ (1 − r/R) r² dr = 1        |∇W| = 3/(πR⁴)
 //! ```
@@ -10,7 +11,7 @@
 use glam::DVec3;
 use std::f64::consts::PI;
 
-/// A cone of radius R.
+/// A weight that falls linearly to zero at the radius R: a cone.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Cone {
     /// Radius R = 2h (m) of the support.
@@ -18,36 +19,39 @@ pub struct Cone {
 }
 
 impl Cone {
-    /// Of the smoothing length h (m).
+    /// Returns the cone of the smoothing length h (m).
     pub fn of_smoothing_length(h_m: f64) -> Self {
         Self { radius_m: 2.0 * h_m }
     }
 
-    /// `W = 3/(πR³)(1 − r/R)₊` (1/m³).
+    /// Returns `W = 3/(πR³)(1 − r/R)₊` (1/m³) at the distance `r_m` (m).
     pub fn weight_per_m3(&self, r_m: f64) -> f64 {
         3.0 / (PI * self.radius_m.powi(3)) * (1.0 - r_m / self.radius_m).max(0.0)
     }
 
-    /// `∇_i W(u_i − u_j) = 3/(πR⁴) (u_j − u_i)/r` (1/m⁴) for `to_m = u_j − u_i`; zero at the tip and outside the support.
+    /// Returns `∇_i W(u_i − u_j) = 3/(πR⁴) (u_j − u_i)/r` (1/m⁴) for `to_m = u_j − u_i`, which is zero at the tip and
+    /// outside the support.
     pub fn gradient_per_m4(&self, to_m: DVec3) -> DVec3 {
         let r = to_m.length();
         if r > 0.0 && r < self.radius_m { to_m * (3.0 / (PI * self.radius_m.powi(4) * r)) } else { DVec3::ZERO }
     }
 }
 
-/// The same for all particles of a lattice: where neighbours are, and `b = ∇_i W ΔV` (1/m) towards them.
+/// The neighbours of a particle and the gradients `b = ∇_i W ΔV` (1/m) towards them, which are the same for all
+/// particles of a lattice.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Stencil {
-    /// Steps to neighbours, in voxels, z slowest: the order in which sums run.
+    /// Steps to the neighbours, in voxels, with z slowest; sums run in this order.
     pub steps: Vec<[i32; 3]>,
-    /// `b` (1/m) of each.
+    /// Gradient `b` (1/m) towards each neighbour.
     pub gradients_per_m: Vec<DVec3>,
-    /// Voxels from a particle to its farthest neighbour along an axis.
+    /// Number of voxels from a particle to its farthest neighbour along an axis.
     pub reach: usize,
 }
 
 impl Stencil {
-    /// Of a weight on a lattice of `spacing_m` whose particles have `volume_m3` each.
+    /// Returns the stencil of a weight on a lattice of `spacing_m` (m) whose particles have the volume `volume_m3` (m³)
+    /// each.
     pub fn new(cone: &Cone, spacing_m: f64, volume_m3: f64) -> Self {
         let reach = (cone.radius_m / spacing_m).ceil() as i32;
         let (mut steps, mut gradients_per_m) = (Vec::new(), Vec::new());

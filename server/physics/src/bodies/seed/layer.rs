@@ -1,40 +1,41 @@
 //! The layer Ω_p: particles on the voxels between the core and the outer surface (2006, section 6).
 //!
-//! "For a uniform initial grid, the mass associated with a node can be computed from the total number of particles within a known mass
-//! volume": with N voxel centres in a layer of volume V every particle has `ΔV = V/N` and `m = ρ V/N`. The papers do not say how the
-//! layer is filled; voxels are what they embed its regions in.
+//! "For a uniform initial grid, the mass associated with a node can be computed from the total number of particles
+//! within a known mass volume": with N voxel centres in a layer of volume V every particle has `ΔV = V/N` and
+//! `m = ρ V/N`. The papers do not say how the layer is filled. Here it is filled with the voxels in which they embed
+//! its regions.
 use super::{
     LayerSpec, SeedError, SeedParameters,
     kernel::{Cone, Stencil},
-    radial::{Foot, Radial},
+    radial::{Attachment, Radial},
     voxels::{NONE, Voxels},
 };
 use glam::DVec3;
 
-/// Rounds of looking for the spacing that gives the wanted count.
+/// Largest number of rounds in which the spacing that gives the wanted number of particles is sought.
 const ROUNDS: usize = 40;
-/// Most particles of a layer.
+/// Largest number of particles of a layer.
 const MOST: u32 = 4_000_000;
 
 /// What a voxel holds at rest.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Holds {
-    /// Nothing of the body: beyond its outer surface.
+    /// The voxel lies outside the body.
     Nothing,
-    /// A particle.
+    /// The voxel holds a particle.
     Particle,
-    /// The core, or its cavity.
+    /// The voxel lies in the core, or in its cavity.
     Core,
 }
 
-/// All particles, asleep. Nothing of this changes in time.
+/// All particles of the layer at rest. Nothing of it changes in time.
 #[derive(Debug, Clone)]
 pub struct Layer {
     /// Voxels around the body.
     pub voxels: Voxels,
-    /// What each holds.
+    /// What each voxel holds.
     pub holds: Vec<Holds>,
-    /// Voxel of each particle; particles are numbered as their voxels are.
+    /// Voxel of each particle; particles are in the order of their voxels.
     pub voxel_of: Vec<u32>,
     /// Particle of each voxel, or [`NONE`].
     pub particle_at: Vec<u32>,
@@ -48,11 +49,11 @@ pub struct Layer {
     pub stencil: Stencil,
     /// Triangle of the skin over each particle.
     pub triangle_over: Vec<u32>,
-    /// Where each particle's ray to the mass centre meets the core.
-    pub core_foot: Vec<Foot>,
+    /// Attachment point of each particle on the core, where its ray to the mass centre meets it.
+    pub core_attachment: Vec<Attachment>,
 }
 
-/// The two surfaces around a layer.
+/// The two surfaces that enclose a layer.
 pub(super) struct Walls<'a> {
     pub(super) core_m: &'a [DVec3],
     pub(super) core_triangles: &'a [[u32; 3]],
@@ -69,13 +70,14 @@ impl Layer {
         if !(volume_m3 > 0.0 && (1..=MOST).contains(&wanted)) {
             return Err(none(0));
         }
-        let bounds = spec.skin_m.iter().fold((spec.skin_m[0], spec.skin_m[0]), |(a, b), &p| (a.min(p), b.max(p)));
-        // Regions are looked at in boxes that reach as far beyond their particles as a neighbour may be.
+        let first_m = spec.skin_m[0];
+        let (low_m, high_m) = spec.skin_m.iter().fold((first_m, first_m), |(a, b), &p| (a.min(p), b.max(p)));
+        // Boxes of regions reach as far beyond their particles as a neighbour may be.
         let margin = (2.0 * parameters.smoothing_ratio).ceil() as usize;
         let mut spacing_m = (volume_m3 / f64::from(wanted)).cbrt();
         let mut best: Option<(usize, Voxels, Vec<Holds>)> = None;
         for _ in 0..ROUNDS {
-            let voxels = Voxels::covering(bounds, spacing_m, margin);
+            let voxels = Voxels::covering(low_m, high_m, spacing_m, margin);
             let holds = held_by(&voxels, spec, walls);
             let found = holds.iter().filter(|&&h| h == Holds::Particle).count();
             let miss = found.abs_diff(wanted as usize);
@@ -99,28 +101,28 @@ impl Layer {
             particle_at[voxel as usize] = particle as u32;
         }
         let cone = Cone::of_smoothing_length(parameters.smoothing_ratio * voxels.spacing_m);
-        let share_m3 = volume_m3 / count as f64;
+        let particle_m3 = volume_m3 / count as f64;
         let rest_m = |&voxel: &u32| voxels.centre_m(voxel as usize);
         Ok(Self {
             holds,
             particle_at,
-            volume_m3: share_m3,
-            mass_kg: parameters.density_kg_per_m3 * share_m3,
-            stencil: Stencil::new(&cone, voxels.spacing_m, share_m3),
+            volume_m3: particle_m3,
+            mass_kg: parameters.density_kg_per_m3 * particle_m3,
+            stencil: Stencil::new(&cone, voxels.spacing_m, particle_m3),
             cone,
-            triangle_over: voxel_of.iter().map(|voxel| walls.skin.foot(rest_m(voxel)).triangle).collect(),
-            core_foot: voxel_of.iter().map(|voxel| walls.core.foot(rest_m(voxel))).collect(),
+            triangle_over: voxel_of.iter().map(|voxel| walls.skin.attachment(rest_m(voxel)).triangle).collect(),
+            core_attachment: voxel_of.iter().map(|voxel| walls.core.attachment(rest_m(voxel))).collect(),
             voxel_of,
             voxels,
         })
     }
 
-    /// Particles, asleep or awake.
+    /// Returns the number of particles, asleep or awake.
     pub fn particle_count(&self) -> usize {
         self.voxel_of.len()
     }
 
-    /// Where a particle is at rest (m).
+    /// Returns the rest position (m) of a particle.
     pub fn rest_m(&self, particle: u32) -> DVec3 {
         self.voxels.centre_m(self.voxel_of[particle as usize] as usize)
     }
@@ -137,12 +139,13 @@ fn held_by(voxels: &Voxels, spec: &LayerSpec, walls: &Walls<'_>) -> Vec<Holds> {
     skin.into_iter().zip(core).map(holds).collect()
 }
 
-/// Volume (m³) that a closed surface encloses: `∮ x·n dA/3`.
+/// Returns the volume `∮ x·n dA/3` (m³) that a closed surface encloses.
 pub(super) fn enclosed_m3(positions_m: &[DVec3], triangles: &[[u32; 3]]) -> f64 {
     triangles.iter().map(|t| signed_m3(positions_m, *t)).sum()
 }
 
-/// `∫ x dV` (m⁴) of what a closed surface encloses: every triangle's tet from the origin has its centre at a quarter of its corners.
+/// Returns `∫ x dV` (m⁴) over the volume that a closed surface encloses. The tet from the origin to a triangle has its
+/// centre at a quarter of the sum of the triangle's corners.
 pub(super) fn enclosed_moment_m4(positions_m: &[DVec3], triangles: &[[u32; 3]]) -> DVec3 {
     let moment = |t: &[u32; 3]| {
         let [a, b, c] = t.map(|n| positions_m[n as usize]);

@@ -1,52 +1,69 @@
 //! The damped spring links of the outer surface (2006, section 6.1).
 //!
-//! "Each external vertex is linked to an internal tetrahedron face using its projection in the mass center direction. This defines a
-//! dumped spring-like connection which is used to move the external surface far from the activated zone."
+//! "Each external vertex is linked to an internal tetrahedron face using its projection in the mass center direction.
+//! This defines a dumped spring-like connection which is used to move the external surface far from the activated
+//! zone."
 //! ```text
 //! f = −k (x − a) − c (ẋ − ȧ)        a = Σ_i ζ_i x_i + o        o = X − Σ_i ζ_i X_i
 //! ```
-//! The vertex gets f, the face's nodes −ζ_i f. The offset o is fixed in the world, which is how the text reads and what is wrong with it:
-//! translations are free of force, but a body that is turned by R pulls its surface back by `k (R − I) o`, a torque. Kept as it is.
+//! Here a is the vertex' attachment point on the face. The vertex gets the force f, and the face's nodes get −ζ_i f.
+//! The offset o is fixed in the world, as the text says, and this is what is wrong with it: translations are free of
+//! force, but a body that is turned by R pulls its surface back by `k (R − I) o`, a torque. It is kept as printed.
 //!
-//! Not printed, and chosen: the mass of a vertex (its share by area of the layer's, which has nobody else while its particles sleep), k
-//! (that of the column of layer below it, `(λ + 2µ) A/|o|`) and c (`2ξ√(km)`).
-use super::radial::{Foot, at};
+//! Three things are not printed and are chosen here: the mass of a vertex (its tributary mass of the layer, which
+//! nothing else carries while particles sleep), the stiffness k (that of the column of layer below the vertex,
+//! `(λ + 2µ) A/|o|`) and the damping c (`2ξ√(km)`).
+use super::{
+    radial::{Attachment, at},
+    state::Motion,
+};
 use glam::DVec3;
 
-/// Links of all vertices.
+/// The links of all vertices.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Links {
     /// Nodes of each vertex's face.
     pub nodes: Vec<[u32; 3]>,
-    /// Their weights.
+    /// Weights ζ of these nodes.
     pub weights: Vec<[f64; 3]>,
-    /// Offset o (m).
+    /// Offsets o (m).
     pub offset_m: Vec<DVec3>,
-    /// k (N/m).
+    /// Stiffness k (N/m) of each link.
     pub stiffness_n_per_m: Vec<f64>,
-    /// c (N s/m).
+    /// Damping c (N s/m) of each link.
     pub damping_n_s_per_m: Vec<f64>,
-    /// Mass of each vertex (kg).
+    /// Mass (kg) of each vertex.
     pub mass_kg: Vec<f64>,
 }
 
 /// What links are made of.
 pub(super) struct LinkMaterial {
-    /// `λ + 2µ` (Pa) of the column, times the chosen ratio.
+    /// Modulus `λ + 2µ` (Pa) of the column, times the chosen ratio.
     pub(super) modulus_pa: f64,
-    /// ξ.
+    /// Damping ratio ξ.
     pub(super) damping_ratio: f64,
     /// Mass (kg) of the layer.
     pub(super) layer_mass_kg: f64,
 }
 
+/// A triangle surface at rest.
+#[derive(Clone, Copy)]
+pub(super) struct TriangleMesh<'a> {
+    /// Positions (m) of the vertices.
+    pub(super) positions_m: &'a [DVec3],
+    /// Corners of the triangles.
+    pub(super) triangles: &'a [[u32; 3]],
+}
+
 impl Links {
     pub(super) fn new(
-        (skin_m, triangles): (&[DVec3], &[[u32; 3]]),
-        feet: &[Foot],
-        (core_m, core_triangles): (&[DVec3], &[[u32; 3]]),
+        skin: TriangleMesh<'_>,
+        attachments: &[Attachment],
+        core: TriangleMesh<'_>,
         material: &LinkMaterial,
     ) -> Self {
+        let TriangleMesh { positions_m: skin_m, triangles } = skin;
+        let TriangleMesh { positions_m: core_m, triangles: core_triangles } = core;
         let mut area_m2 = vec![0.0; skin_m.len()];
         for triangle in triangles {
             let [a, b, c] = triangle.map(|n| skin_m[n as usize]);
@@ -63,13 +80,13 @@ impl Links {
             damping_n_s_per_m: Vec::new(),
             mass_kg: Vec::new(),
         };
-        for ((foot, &position), area) in feet.iter().zip(skin_m).zip(area_m2) {
-            let nodes = core_triangles[foot.triangle as usize];
-            let offset = position - at(foot.weights, nodes.map(|n| core_m[n as usize]));
+        for ((attachment, &position), area) in attachments.iter().zip(skin_m).zip(area_m2) {
+            let nodes = core_triangles[attachment.triangle as usize];
+            let offset = position - at(attachment.weights, nodes.map(|n| core_m[n as usize]));
             let (mass, stiffness) =
                 (material.layer_mass_kg * area / total_m2, material.modulus_pa * area / offset.length());
             links.nodes.push(nodes);
-            links.weights.push(foot.weights);
+            links.weights.push(attachment.weights);
             links.offset_m.push(offset);
             links.mass_kg.push(mass);
             links.stiffness_n_per_m.push(stiffness);
@@ -78,15 +95,17 @@ impl Links {
         links
     }
 
-    /// `Σ_i ζ_i a_i` over the corners of a vertex's face.
-    pub fn at_foot(&self, vertex: usize, of_nodes: &[DVec3]) -> DVec3 {
+    /// Returns `Σ_i ζ_i a_i` over the corners of a vertex' face: the attachment point (m) of the nodes' positions, or
+    /// its velocity (m/s) of the nodes' velocities.
+    pub fn at_attachment(&self, vertex: usize, of_nodes: &[DVec3]) -> DVec3 {
         at(self.weights[vertex], self.nodes[vertex].map(|n| of_nodes[n as usize]))
     }
 
-    /// Force (N) on a vertex; its face's nodes get `−ζ_i` of it.
-    pub fn force_n(&self, vertex: usize, (x, v): (DVec3, DVec3), (core_x, core_v): (&[DVec3], &[DVec3])) -> DVec3 {
-        let stretch = x - self.at_foot(vertex, core_x) - self.offset_m[vertex];
-        let rate = v - self.at_foot(vertex, core_v);
+    /// Returns the force (N) on a vertex at `x` (m) with the velocity `v` (m/s); each node of its face gets `−ζ_i`
+    /// times this force.
+    pub fn force_n(&self, vertex: usize, x: DVec3, v: DVec3, core: &Motion) -> DVec3 {
+        let stretch = x - self.at_attachment(vertex, &core.x) - self.offset_m[vertex];
+        let rate = v - self.at_attachment(vertex, &core.v);
         stretch * -self.stiffness_n_per_m[vertex] - rate * self.damping_n_s_per_m[vertex]
     }
 }

@@ -1,6 +1,7 @@
-//! The seeds' hybrid body, as its authors describe it (Mero & Susín 2005, 2006): a coarse FEM core, a layer of particles around it of
-//! which those under the touched point are awake, and a surface on spring links. A benchmark row and a piece of history, not the
-//! hybrid that ships (`crate::bodies::hybrid`). What the papers leave open or get wrong: `docs/theory/seed-hybrid.md`.
+//! The seeds' hybrid body, as its authors describe it (Mero & Susín 2005, 2006): a coarse FEM core, a layer of
+//! particles around it of which those under the touched point are awake, and a surface on spring links. It is kept as a
+//! benchmark and for its history; the hybrid body of Palpate is another one (`crate::bodies::hybrid`).
+//! `docs/theory/seed-hybrid.md` tells what the papers leave open or get wrong.
 //!
 //! | step of the papers | equations, section | file |
 //! |---|---|---|
@@ -10,7 +11,7 @@
 //! | layer: filling, volumes, masses | 25; 6 | `layer.rs`, `voxels.rs` |
 //! | the particles' weight | 24, 25 | `kernel.rs` |
 //! | strain, stress and force of particles | 25, 29; 2005: 13 | `sph.rs` |
-//! | region RV(ps), its voxels, gradient field, border force | 6, 6.1 | `region.rs` |
+//! | region RV(ps), its voxels, gradient field, interface force (the papers' border) | 6, 6.1 | `region.rs` |
 //! | exchange between particles and core | 6.1 | `exchange.rs` |
 //! | links of the outer surface | 6.1 | `links.rs` |
 //! | the step Δt, Verlet | 33 | `step.rs`, `state.rs` |
@@ -24,7 +25,7 @@
 //! | eq. 4 on positions strains what rests | displacements, as eqs. 1 and 5 have them | `sph.rs` |
 //! | eq. 13 of 2005: sign | gradient at i | `sph.rs` |
 //! | eq. 29: the neighbour's stress alone; flutters | both particles' stress | `sph.rs` |
-//! | border force towards the nearest border voxel; pumps energy | towards the particle's own | `region.rs` |
+//! | interface force towards the nearest interface voxel; pumps energy | towards the particle's own | `region.rs` |
 //! | eq. 27's mass matrix has no place in eq. 33 | m = ρV/N | `layer.rs` |
 //! | exchange "from conservation of linear momentum" moves without masses | impulses | `exchange.rs` |
 //! | eq. 25 on the surface: weights sum to ½ | divided by their sum | `region.rs` |
@@ -59,7 +60,7 @@ pub use body_state::SeedBodyState;
 pub use error::SeedError;
 pub use model::SeedModel;
 pub use spec::{
-    BorderForce, Exchange, LayerSpec, PARTICLES, PairStress, PaperModel, SHELL_TETS, SeedParameters, SeedSpec,
+    Exchange, InterfaceForce, LayerSpec, PARTICLES, PairStress, PaperModel, SHELL_TETS, SeedParameters, SeedSpec,
     VENTRICLE_TETS,
 };
 pub use state::{AtVertex, Motion, SeedContact, SeedReport, SeedScratch, SeedState};

@@ -1,9 +1,9 @@
-//! The model: constant after load.
+//! The model of a seed body, which does not change after it is loaded.
 use super::{
     LayerSpec, SeedError, SeedParameters, SeedSpec,
     core::Core,
     layer::{Layer, Walls, enclosed_m3, enclosed_moment_m4},
-    links::{LinkMaterial, Links},
+    links::{LinkMaterial, Links, TriangleMesh},
     radial::Radial,
     region::Region,
     sph::LayerStress,
@@ -12,7 +12,7 @@ use crate::mesh::Surface;
 use glam::DVec3;
 use std::collections::BTreeMap;
 
-/// A seed body: a core, and around it, unless it is a core alone, particles and a skin.
+/// A seed body: a core, and, unless there is the core alone, particles and a skin around it.
 #[derive(Debug, Clone)]
 pub struct SeedModel {
     parameters: SeedParameters,
@@ -20,24 +20,24 @@ pub struct SeedModel {
     hull: Option<Hull>,
     surface_rest_m: Vec<DVec3>,
     surface_triangles: Vec<[u32; 3]>,
-    /// Without a layer: the core's node of each vertex of the surface.
+    /// The core's node of each vertex of the surface; empty where there is a layer.
     vertex_nodes: Vec<u32>,
 }
 
-/// What lies around the core.
+/// The layer and the skin around the core.
 #[derive(Debug, Clone)]
 pub(super) struct Hull {
     pub(super) layer: Layer,
     pub(super) links: Links,
-    /// One per triangle of the skin.
+    /// The region of each triangle of the skin.
     pub(super) regions: Vec<Region>,
     pub(super) stress: LayerStress,
     pub(super) most_awake: usize,
-    pub(super) border_stiffness_n_per_m: f64,
+    pub(super) interface_stiffness_n_per_m: f64,
 }
 
 impl SeedModel {
-    /// Checks the specification and precomputes all that the rest state fixes, every triangle's region included.
+    /// Checks the specification and computes everything that the rest state fixes, including every triangle's region.
     ///
     /// # Errors
     /// [`SeedError`], naming what is wrong.
@@ -69,42 +69,43 @@ impl SeedModel {
         Self { parameters, core, hull: None, surface_rest_m, surface_triangles: triangles, vertex_nodes: nodes }
     }
 
-    /// Constants.
+    /// Returns the constants.
     pub fn parameters(&self) -> &SeedParameters {
         &self.parameters
     }
 
-    /// The core.
+    /// Returns the core.
     pub fn core(&self) -> &Core {
         &self.core
     }
 
-    /// The particles, if there are any.
+    /// Returns the layer of particles, if there is one.
     pub fn layer(&self) -> Option<&Layer> {
         self.hull.as_ref().map(|hull| &hull.layer)
     }
 
-    /// The surface's links; none without a layer.
+    /// Returns the surface's links; there are none without a layer.
     pub fn links(&self) -> Option<&Links> {
         self.hull.as_ref().map(|hull| &hull.links)
     }
 
-    /// Regions, one per triangle of the surface; none without a layer.
+    /// Returns the region of each triangle of the surface; there are none without a layer.
     pub fn regions(&self) -> &[Region] {
         self.hull.as_ref().map_or(&[], |hull| &hull.regions)
     }
 
-    /// Most particles of a region.
+    /// Returns the number of particles in the largest region.
     pub fn most_awake(&self) -> usize {
         self.hull.as_ref().map_or(0, |hull| hull.most_awake)
     }
 
-    /// Rest positions (m) of the touchable surface's vertices: the skin's, or without a layer those of the core's boundary.
+    /// Returns the rest positions (m) of the touchable surface's vertices: those of the skin, or without a layer those
+    /// of the core's boundary.
     pub fn surface_rest_m(&self) -> &[DVec3] {
         &self.surface_rest_m
     }
 
-    /// Triangles of the touchable surface, counter-clockwise seen from outside.
+    /// Returns the triangles of the touchable surface, counter-clockwise seen from outside.
     pub fn surface_triangles(&self) -> &[[u32; 3]] {
         &self.surface_triangles
     }
@@ -113,7 +114,7 @@ impl SeedModel {
         self.hull.as_ref()
     }
 
-    /// Without a layer: the core's node of a vertex.
+    /// Returns the core's node of a vertex, where there is no layer.
     pub(super) fn node_of(&self, vertex: u32) -> usize {
         self.vertex_nodes[vertex as usize] as usize
     }
@@ -131,11 +132,11 @@ impl Hull {
         let regions = regions(spec, &layer, parameters.first_neighbours)?;
         let stress = LayerStress::new(parameters);
         let modulus_pa = stress.lame().p_wave_modulus_pa();
-        let feet: Vec<_> = spec.skin_m.iter().map(|&vertex| core_fan.foot(vertex)).collect();
+        let attachments: Vec<_> = spec.skin_m.iter().map(|&vertex| core_fan.attachment(vertex)).collect();
         let links = Links::new(
-            (&spec.skin_m, &spec.skin_triangles),
-            &feet,
-            (core_m, core_triangles),
+            TriangleMesh { positions_m: &spec.skin_m, triangles: &spec.skin_triangles },
+            &attachments,
+            TriangleMesh { positions_m: core_m, triangles: core_triangles },
             &LinkMaterial {
                 modulus_pa: modulus_pa * parameters.link_stiffness_ratio,
                 damping_ratio: parameters.link_damping_ratio,
@@ -144,7 +145,7 @@ impl Hull {
         );
         Ok(Self {
             most_awake: regions.iter().map(Region::len).max().unwrap_or(0),
-            border_stiffness_n_per_m: parameters.border_stiffness_ratio * modulus_pa * layer.voxels.spacing_m,
+            interface_stiffness_n_per_m: parameters.interface_stiffness_ratio * modulus_pa * layer.voxels.spacing_m,
             layer,
             links,
             regions,
@@ -176,7 +177,7 @@ fn check_closed(spec: &LayerSpec) -> Result<(), SeedError> {
     }
 }
 
-/// Of core and layer, which have the same density.
+/// Returns the mass centre (m) of core and layer, which have the same density.
 fn mass_centre_m(core: &Core, spec: &LayerSpec) -> DVec3 {
     let (core_m, faces) = (core.rest_m(), core.outer_triangles());
     let of_core: f64 = core.mass_kg().iter().sum();
@@ -187,7 +188,8 @@ fn mass_centre_m(core: &Core, spec: &LayerSpec) -> DVec3 {
     (core_centre * core_m3 + layer_m4) / (core_m3 + layer_m3)
 }
 
-/// The region of every triangle: the particles under it and, with `first_neighbours`, under all triangles that share a corner with it.
+/// Returns the region of every triangle: the particles under it and, with `first_neighbours`, under all triangles that
+/// share a corner with it.
 fn regions(spec: &LayerSpec, layer: &Layer, first_neighbours: bool) -> Result<Vec<Region>, SeedError> {
     let mut around: Vec<Vec<u32>> = vec![Vec::new(); spec.skin_m.len()];
     for (triangle, corners) in spec.skin_triangles.iter().enumerate() {
@@ -215,8 +217,8 @@ fn regions(spec: &LayerSpec, layer: &Layer, first_neighbours: bool) -> Result<Ve
         let mut vertices: Vec<u32> = patch.iter().flat_map(|&t| spec.skin_triangles[t as usize]).collect();
         vertices.sort_unstable();
         vertices.dedup();
-        let riders: Vec<(u32, DVec3)> = vertices.iter().map(|&v| (v, spec.skin_m[v as usize])).collect();
-        Ok(Region::new(layer, particles, &riders))
+        let carried: Vec<(u32, DVec3)> = vertices.iter().map(|&v| (v, spec.skin_m[v as usize])).collect();
+        Ok(Region::new(layer, particles, &carried))
     };
     spec.skin_triangles.iter().enumerate().map(region).collect()
 }

@@ -1,27 +1,30 @@
-//! How the core and the skin of a seed body are numbered, weighed and touched in the loop.
+//! The numbers and masses of nodes that the core and the skin of a seed body have in the loop, and the masses that
+//! contact counts on.
 //!
-//! Nodes are the core's, and after them the skin's vertices. The skin carries the whole layer's mass, as it does while particles sleep.
+//! Nodes are those of the core, then the vertices of the skin. The skin carries the mass of the whole layer, as it does
+//! while particles sleep.
 //!
-//! The papers displace what the user touches. Here tools press as on every body, with forces on vertices; they act on awake particles by
-//! eq. 25's weights (`seed::step`). Contact is explicit, so it must not be stiffer than the step can bear: [`SeedModel::contact_mass_kg`].
+//! The papers displace what the user touches. Here tools press as on every body, with forces on vertices, which act on
+//! awake particles by the weights of eq. 25 (`seed::step`). Contact is explicit, so it must not be stiffer than the
+//! step can bear ([`SeedModel::contact_mass_kg`]).
 use super::{SeedModel, SeedState, region::Region};
 use crate::mesh::Surface;
 use glam::DVec3;
 
 impl SeedModel {
-    /// Rest positions (m) of nodes.
+    /// Returns the rest positions (m) of the nodes.
     pub fn node_rest_m(&self) -> Vec<DVec3> {
         let skin: &[DVec3] = if self.layer().is_some() { self.surface_rest_m() } else { &[] };
         self.core().rest_m().iter().chain(skin).copied().collect()
     }
 
-    /// Mass (kg) of nodes: that of the whole body, its layer asleep.
+    /// Returns the masses (kg) of the nodes, which are those of the whole body while its layer sleeps.
     pub fn node_mass_kg(&self) -> Vec<f64> {
         let skin = self.links().map_or(&[][..], |links| &links.mass_kg);
         self.core().mass_kg().iter().chain(skin).copied().collect()
     }
 
-    /// The touchable surface over nodes.
+    /// Returns the touchable surface with its vertices numbered as nodes.
     pub fn node_surface(&self) -> Surface {
         if self.layer().is_none() {
             return self.core().boundary().clone();
@@ -34,10 +37,12 @@ impl SeedModel {
         }
     }
 
-    /// Mass (kg) of nodes as contact may count on it: of the skin the least that its pressure ever meets.
+    /// Returns the masses (kg) of the nodes that contact may count on; for the skin these are the smallest that a
+    /// pressure on it ever meets.
     ///
-    /// A pressure `k_f g` on vertices of areas `A_v` is stiffness `k_f A_v` there, and over awake particles, with eq. 25's weights, at most
-    /// `k_f Σ_v A_v w_vs` (row sum, `Σ_s w_vs = 1`) at particle s. So a vertex counts as `m_p A_v/max_s Σ_v A_v w_vs`, or its own mass if that is less.
+    /// A pressure `k_f g` on vertices of areas `A_v` is the stiffness `k_f A_v` there, and over awake particles, with
+    /// the weights of eq. 25, at most `k_f Σ_v A_v w_vs` (row sum, `Σ_s w_vs = 1`) at particle s. So a vertex counts as
+    /// `m_p A_v/max_s Σ_v A_v w_vs`, or as its own mass where that is smaller.
     pub fn contact_mass_kg(&self) -> Vec<f64> {
         let mut mass_kg = self.node_mass_kg();
         let Some(layer) = self.layer() else { return mass_kg };
@@ -45,27 +50,28 @@ impl SeedModel {
         let area_m2 = self.vertex_areas_m2();
         for region in self.regions() {
             let mut pressed_m2 = vec![0.0; region.len()];
-            for rider in &region.riders {
-                for &(slot, weight) in region.terms_of(rider) {
-                    pressed_m2[slot as usize] += area_m2[rider.vertex as usize] * weight;
+            for carried in &region.carried {
+                for &(slot, weight) in region.terms_of(carried) {
+                    pressed_m2[slot as usize] += area_m2[carried.vertex as usize] * weight;
                 }
             }
-            for rider in &region.riders {
-                let vertex = rider.vertex as usize;
-                let most_m2 = region.terms_of(rider).iter().map(|term| pressed_m2[term.0 as usize]).fold(0.0, f64::max);
+            for carried in &region.carried {
+                let vertex = carried.vertex as usize;
+                let most_m2 =
+                    region.terms_of(carried).iter().map(|term| pressed_m2[term.0 as usize]).fold(0.0, f64::max);
                 skin[vertex] = skin[vertex].min(layer.mass_kg * area_m2[vertex] / most_m2);
             }
         }
         mass_kg
     }
 
-    /// The triangle whose touch wakes the most particles.
+    /// Returns the triangle whose touch wakes the most particles.
     pub fn largest_region(&self) -> Option<u32> {
         let sizes = self.regions().iter().map(Region::len).zip(0..);
         sizes.max_by_key(|(size, _)| *size).map(|(_, triangle)| triangle)
     }
 
-    /// A third (m²) of the triangles around each vertex of the surface.
+    /// Returns the tributary area (m²) of each vertex of the surface, a third of that of its triangles.
     fn vertex_areas_m2(&self) -> Vec<f64> {
         let mut area_m2 = vec![0.0; self.surface_rest_m().len()];
         for triangle in self.surface_triangles() {
@@ -77,15 +83,15 @@ impl SeedModel {
         area_m2
     }
 
-    /// Kinetic energy (J) of core, awake particles, and skin but for what rides on those.
+    /// Returns the kinetic energy (J) of the core, the awake particles, and the skin without its carried vertices.
     pub fn kinetic_energy_j(&self, state: &SeedState) -> f64 {
         let of = |mass_kg: &f64, v: &DVec3| 0.5 * mass_kg * v.length_squared();
         let mut energy_j: f64 = self.core().mass_kg().iter().zip(&state.core.v).map(|(m, v)| of(m, v)).sum();
         if let (Some(links), Some(layer)) = (self.links(), self.layer()) {
             energy_j += links.mass_kg.iter().zip(&state.skin.v).map(|(m, v)| of(m, v)).sum::<f64>();
             if let Some(region) = self.awake(state) {
-                let riders = region.riders.iter().map(|rider| rider.vertex as usize);
-                energy_j -= riders.map(|vertex| of(&links.mass_kg[vertex], &state.skin.v[vertex])).sum::<f64>();
+                let carried = region.carried.iter().map(|carried| carried.vertex as usize);
+                energy_j -= carried.map(|vertex| of(&links.mass_kg[vertex], &state.skin.v[vertex])).sum::<f64>();
                 energy_j += state.particles.v[..region.len()].iter().map(|v| of(&layer.mass_kg, v)).sum::<f64>();
             }
         }

@@ -1,23 +1,27 @@
-//! The region RV(ps) of a touched point (2006, sections 6 and 6.1): which particles are awake, and where its border is.
+//! The region RV(ps) of a touched point (2006, sections 6 and 6.1): which particles are awake, and where their
+//! interface is.
 //!
-//! The papers project the boundary of nv(ps) — the touched triangle's corners and their first neighbours — towards the mass centre onto
-//! the core and take the particles between. A particle lies there exactly when its own ray from the mass centre leaves through a
-//! triangle of nv(ps): so a region is the union of the particles under some triangles, and needs no polygon C(ps).
+//! The papers project the boundary of nv(ps) — the touched triangle's corners and their first neighbours — towards the
+//! mass centre onto the core and take the particles between. A particle lies there exactly when its own ray from the
+//! mass centre leaves through a triangle of nv(ps). So a region is the union of the particles under some triangles, and
+//! the polygon C(ps) is not needed.
 //!
-//! RV is embedded in a box of voxels B(ps). Its *border* are the voxels of RV beside a voxel of the body outside RV: at the sides other
-//! particles, below the core. Towards the skin it has none ("inner boundaries"). Every voxel of B knows the nearest border voxel; the
-//! vector there is the gradient field.
+//! RV is embedded in a box of voxels B(ps). Its *interface* (the papers' border) consists of the voxels of RV beside a
+//! voxel of the body outside RV: at the sides these hold other particles, below they hold the core. Towards the skin
+//! there is no interface ("inner boundaries"). Every voxel of B knows the nearest interface voxel; the vector to it is
+//! the gradient field.
 //!
-//! *Border force, as printed* ([`BorderForce::NearestVoxel`]): k times the gradient at the particle's voxel, on particles that started at
-//! the border and on those beyond it. It is constant within a voxel, jumps between voxels and changes its aim where another border
-//! voxel becomes the nearest: it has no potential and pumps energy, at any step. *Repaired* ([`BorderForce::OwnVoxel`]): a particle of the
-//! border is drawn to its own voxel, `k (c − x)` with c the voxel's point nearest to x: zero within, continuous, of potential
-//! `½k|x − c|²`. Nothing draws the others, which no border voxel is proper to.
+//! The *interface force as printed* ([`InterfaceForce::NearestVoxel`]) is k times the gradient at the particle's voxel;
+//! it acts on particles that started at the interface and on those beyond it. It is constant within a voxel, jumps
+//! between voxels, and changes its direction where another interface voxel becomes the nearest: it has no potential and
+//! pumps energy, at any step. The *repaired* force ([`InterfaceForce::OwnVoxel`]) draws a particle of the interface to
+//! its own voxel by `k (c − x)`, where c is the voxel's point nearest to x: it is zero within the voxel, continuous,
+//! and has the potential `½k|x − c|²`. It does not act on other particles, which have no voxel at the interface.
 use super::{
-    BorderForce,
+    InterfaceForce,
     kernel::Stencil,
     layer::{Holds, Layer},
-    radial::Foot,
+    radial::Attachment,
     voxels::{NONE, Voxels},
 };
 use glam::DVec3;
@@ -25,62 +29,64 @@ use glam::DVec3;
 /// What a voxel of B(ps) is to the region.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Place {
-    /// Of the region, within.
+    /// The voxel is in the region, and not at its interface.
     Inside,
-    /// Of the region, at its border.
-    ConstrainedPoints,
-    /// Of the body, outside the region.
+    /// The voxel is in the region, at its interface.
+    Interface,
+    /// The voxel is in the body, outside the region.
     Beyond,
-    /// Outside the body.
+    /// The voxel is outside the body.
     Free,
 }
 
-/// A particle of the border beside the core.
+/// A particle of the interface beside the core.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct OnCore {
     /// Its slot in the region.
     pub slot: u32,
-    /// The face below it.
-    pub foot: Foot,
+    /// Its attachment point on the face below it.
+    pub attachment: Attachment,
 }
 
-/// A vertex of the skin that follows awake particles.
+/// A vertex of the skin that awake particles carry.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Rider {
+pub struct CarriedVertex {
     /// The vertex.
     pub vertex: u32,
-    /// Where its terms begin and end.
+    /// First entry of its terms in [`Region::terms`], and their end.
     pub terms: [u32; 2],
 }
 
-/// What is awake while one triangle of the skin is touched. A *slot* is a place in its list of particles.
+/// The particles that are awake while one triangle of the skin is touched. A *slot* is an index in the list of
+/// particles.
 #[derive(Debug, Clone)]
 pub struct Region {
-    /// Its particles, ascending.
+    /// The particles, ascending.
     pub particles: Vec<u32>,
-    /// B(ps).
+    /// The box B(ps).
     pub voxels: Voxels,
-    /// Slot of each of B's voxels, or [`NONE`].
+    /// Slot of each voxel of B, or [`NONE`].
     pub slot_at: Vec<u32>,
     /// Voxel of B of each slot.
     pub voxel_of: Vec<u32>,
-    /// What each voxel of B is.
+    /// What each voxel of B is to the region.
     pub places: Vec<Place>,
-    /// Border voxel of B nearest to each voxel, or [`NONE`] when there is no border.
-    pub nearest_border: Vec<u32>,
-    /// Particles of the border beside the core.
+    /// Interface voxel of B nearest to each voxel, or [`NONE`] where there is no interface.
+    pub nearest_interface: Vec<u32>,
+    /// Particles of the interface beside the core.
     pub on_core: Vec<OnCore>,
-    /// Vertices of nv(ps).
-    pub riders: Vec<Rider>,
-    /// Slots and weights of the riders.
+    /// Carried vertices: those of nv(ps).
+    pub carried: Vec<CarriedVertex>,
+    /// Slots with weights, of all carried vertices.
     pub terms: Vec<(u32, f64)>,
-    /// Steps of the stencil as differences of B's voxel numbers.
+    /// Steps of the stencil as differences of the numbers of B's voxels.
     pub steps: Vec<i32>,
 }
 
 impl Region {
-    /// Of particles, ascending and at least one, under vertices at `riders` (numbers and rest positions in metres).
-    pub(super) fn new(layer: &Layer, particles: Vec<u32>, riders: &[(u32, DVec3)]) -> Self {
+    /// Returns the region of `particles`, which are ascending and at least one, that carries the vertices `carried`,
+    /// given by their numbers and rest positions (m).
+    pub(super) fn new(layer: &Layer, particles: Vec<u32>, carried: &[(u32, DVec3)]) -> Self {
         let place = |particle: &u32| layer.voxels.place(layer.voxel_of[*particle as usize] as usize);
         let (mut low, mut high) = ([usize::MAX; 3], [0; 3]);
         for at in particles.iter().map(place) {
@@ -88,7 +94,7 @@ impl Region {
                 (low[axis], high[axis]) = (low[axis].min(at[axis]), high[axis].max(at[axis]));
             }
         }
-        // The layer's box has the same margin, so this stays within.
+        // The layer's box has the same margin, so this box stays within it.
         let reach = layer.stencil.reach;
         let (low, high) = (low.map(|n| n - reach), high.map(|n| n + reach));
         let voxels = layer.voxels.part(low, high);
@@ -110,10 +116,10 @@ impl Region {
             |slot: usize| voxels.beside(voxel_of[slot] as usize).any(|v| layer.holds[in_layer(v)] == Holds::Core);
         let on_core = (0..particles.len())
             .filter(|&slot| is_on_core(slot))
-            .map(|slot| OnCore { slot: slot as u32, foot: layer.core_foot[particles[slot] as usize] })
+            .map(|slot| OnCore { slot: slot as u32, attachment: layer.core_attachment[particles[slot] as usize] })
             .collect();
         let mut region = Self {
-            nearest_border: nearest_border(&voxels, &places),
+            nearest_interface: nearest_interface(&voxels, &places),
             steps: box_steps(&layer.stencil, &voxels),
             particles,
             voxels,
@@ -121,50 +127,50 @@ impl Region {
             voxel_of,
             places,
             on_core,
-            riders: Vec::with_capacity(riders.len()),
+            carried: Vec::with_capacity(carried.len()),
             terms: Vec::new(),
         };
-        for &(vertex, position_m) in riders {
-            region.add_rider(layer, vertex, position_m);
+        for &(vertex, position_m) in carried {
+            region.add_carried(layer, vertex, position_m);
         }
         region
     }
 
-    /// How many particles are awake.
+    /// Returns the number of particles.
     pub fn len(&self) -> usize {
         self.particles.len()
     }
 
-    /// Never: a region has particles.
+    /// Returns whether there are no particles, which is never so.
     pub fn is_empty(&self) -> bool {
         self.particles.is_empty()
     }
 
-    /// Rest position (m) of a slot's particle.
+    /// Returns the rest position (m) of a slot's particle.
     pub fn rest_m(&self, slot: usize) -> DVec3 {
         self.voxels.centre_m(self.voxel_of[slot] as usize)
     }
 
-    /// Slots and weights of a rider.
-    pub fn terms_of(&self, rider: &Rider) -> &[(u32, f64)] {
-        &self.terms[rider.terms[0] as usize..rider.terms[1] as usize]
+    /// Returns the slots and weights of a carried vertex.
+    pub fn terms_of(&self, carried: &CarriedVertex) -> &[(u32, f64)] {
+        &self.terms[carried.terms[0] as usize..carried.terms[1] as usize]
     }
 
-    /// The rider that a vertex is, if it is one.
-    pub fn rider(&self, vertex: u32) -> Option<&Rider> {
-        self.riders.iter().find(|rider| rider.vertex == vertex)
+    /// Returns the carried vertex with this number, if the region carries it.
+    pub fn carried_vertex(&self, vertex: u32) -> Option<&CarriedVertex> {
+        self.carried.iter().find(|carried| carried.vertex == vertex)
     }
 
-    /// Force (N) of the border on a slot's particle at `x` (m).
-    pub fn border_force_n(&self, law: BorderForce, stiffness_n_per_m: f64, slot: usize, x_m: DVec3) -> DVec3 {
-        let started_there = self.places[self.voxel_of[slot] as usize] == Place::ConstrainedPoints;
+    /// Returns the force (N) of the interface on a slot's particle at `x_m` (m).
+    pub fn interface_force_n(&self, law: InterfaceForce, stiffness_n_per_m: f64, slot: usize, x_m: DVec3) -> DVec3 {
+        let started_there = self.places[self.voxel_of[slot] as usize] == Place::Interface;
         let away_m = match law {
-            BorderForce::OwnVoxel if started_there => {
+            InterfaceForce::OwnVoxel if started_there => {
                 let (centre, half) = (self.rest_m(slot), DVec3::splat(0.5 * self.voxels.spacing_m));
                 x_m.clamp(centre - half, centre + half) - x_m
             }
-            BorderForce::OwnVoxel => DVec3::ZERO,
-            BorderForce::NearestVoxel => {
+            InterfaceForce::OwnVoxel => DVec3::ZERO,
+            InterfaceForce::NearestVoxel => {
                 let voxel = self.voxels.nearest(x_m);
                 let crossed = self.places[voxel] == Place::Beyond;
                 if started_there || crossed { self.gradient_m(voxel) } else { DVec3::ZERO }
@@ -173,17 +179,18 @@ impl Region {
         away_m * stiffness_n_per_m
     }
 
-    /// The gradient field: from a voxel to the nearest of the border (m).
+    /// Returns the gradient field at a voxel: the vector (m) to the nearest voxel of the interface.
     pub fn gradient_m(&self, voxel: usize) -> DVec3 {
-        match self.nearest_border[voxel] {
+        match self.nearest_interface[voxel] {
             NONE => DVec3::ZERO,
             nearest => self.voxels.centre_m(nearest as usize) - self.voxels.centre_m(voxel),
         }
     }
 
-    /// Eq. 25 at a vertex, over awake particles only and with weights that sum to one: `W_j ΔV_j / Σ W ΔV` (as printed, they sum to about
-    /// ½ on the surface). Where the support holds no awake particle, the nearest one alone.
-    fn add_rider(&mut self, layer: &Layer, vertex: u32, position_m: DVec3) {
+    /// Adds a carried vertex, by eq. 25 over awake particles only and with weights that sum to one: `W_j ΔV_j / Σ W ΔV`
+    /// (as printed, they sum to about ½ on the surface). Where the support holds no awake particle, the nearest one
+    /// alone carries the vertex.
+    fn add_carried(&mut self, layer: &Layer, vertex: u32, position_m: DVec3) {
         let first = self.terms.len();
         let distance = |slot: usize| self.rest_m(slot).distance(position_m);
         let weights: Vec<(u32, f64)> = (0..self.len())
@@ -197,7 +204,7 @@ impl Region {
             let nearest = (0..self.len()).min_by(|&a, &b| distance(a).total_cmp(&distance(b))).unwrap_or(0);
             self.terms.push((nearest as u32, 1.0));
         }
-        self.riders.push(Rider { vertex, terms: [first as u32, self.terms.len() as u32] });
+        self.carried.push(CarriedVertex { vertex, terms: [first as u32, self.terms.len() as u32] });
     }
 }
 
@@ -206,22 +213,23 @@ fn places(voxels: &Voxels, slot_at: &[u32], holds: impl Fn(usize) -> Holds) -> V
     let place = |voxel: usize| match slot_at[voxel] {
         NONE if is_beyond(voxel) => Place::Beyond,
         NONE => Place::Free,
-        _ if voxels.beside(voxel).any(is_beyond) => Place::ConstrainedPoints,
+        _ if voxels.beside(voxel).any(is_beyond) => Place::Interface,
         _ => Place::Inside,
     };
     (0..voxels.count()).map(place).collect()
 }
 
-/// Nearest by distance between centres; of two as near the one with the lower number.
-fn nearest_border(voxels: &Voxels, places: &[Place]) -> Vec<u32> {
-    let border: Vec<(u32, [i32; 3])> = (0..places.len())
-        .filter(|&voxel| places[voxel] == Place::ConstrainedPoints)
+/// Returns the interface voxel nearest to each voxel, by the distance between centres; of two as near it is the one
+/// with the lower number.
+fn nearest_interface(voxels: &Voxels, places: &[Place]) -> Vec<u32> {
+    let interface: Vec<(u32, [i32; 3])> = (0..places.len())
+        .filter(|&voxel| places[voxel] == Place::Interface)
         .map(|voxel| (voxel as u32, voxels.place(voxel).map(|n| n as i32)))
         .collect();
     let nearest = |voxel: usize| {
         let at = voxels.place(voxel).map(|n| n as i32);
         let squared = |there: &[i32; 3]| (0..3).map(|axis| (there[axis] - at[axis]).pow(2)).sum::<i32>();
-        border.iter().min_by_key(|(_, there)| squared(there)).map_or(NONE, |(number, _)| *number)
+        interface.iter().min_by_key(|(_, there)| squared(there)).map_or(NONE, |(number, _)| *number)
     };
     (0..places.len()).map(nearest).collect()
 }

@@ -1,4 +1,4 @@
-//! What a seed model is built from, and what the papers print.
+//! What a seed model is built from, and the constants that the papers print.
 use super::SeedError;
 use crate::{
     material::{Convention, Lame, Viscosity},
@@ -6,7 +6,7 @@ use crate::{
 };
 use glam::DVec3;
 
-/// Which of the papers' models. 2005 calls them ED0, HM2 and HM1.
+/// One of the papers' models, which the paper of 2005 calls ED0, HM2 and HM1.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum PaperModel {
     /// "Ellipsoids Model": a shell of 188 tets, no particles.
@@ -17,73 +17,75 @@ pub enum PaperModel {
     Hybrid,
 }
 
-/// Tets the papers print of the shell inside (table 1 of 2006).
+/// Number of tets of the shell inside (table 1 of 2006).
 pub const SHELL_TETS: u32 = 188;
-/// Tets of the full FEM ventricle.
+/// Number of tets of the full FEM ventricle.
 pub const VENTRICLE_TETS: u32 = 1352;
-/// Particles in all of the hybrid's layer (section 7 of 2006).
+/// Number of particles in all of the hybrid's layer (section 7 of 2006).
 pub const PARTICLES: u32 = 27_988;
 
-/// What passes between particles and core (2006, section 6.1).
+/// The exchange between particles and core (2006, section 6.1).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Exchange {
-    /// Repaired: particles of the core's border are tied to their faces along the normal by impulses, so that the linear momentum
-    /// that the paper appeals to is conserved.
+    /// Repaired: particles of the interface beside the core are tied to their faces along the normal by impulses, which
+    /// conserves linear momentum, to which the paper appeals.
     #[default]
     Impulses,
-    /// As printed: averaged displacements of particles that cross go to the nodes, the faces' normal displacement to particles.
+    /// As printed: the mean displacement of particles that cross a face goes to its nodes, and the normal displacement
+    /// of a face to its particles.
     Displacements,
 }
 
 /// Which stress makes the force between two particles (`seed::sph`).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum PairStress {
-    /// Repaired: `σ_i + σ_j`. Conserves linear momentum and, at small strain, energy.
+    /// Repaired: the stress is `σ_i + σ_j`, which conserves linear momentum and, at small strain, energy.
     #[default]
     Both,
-    /// As printed (eq. 29): the neighbour's, `σ_j`. The layer flutters until it bursts.
+    /// As printed (eq. 29): the stress is the neighbour's, `σ_j`. The layer flutters until it bursts.
     Neighbour,
 }
 
-/// What keeps particles within their region (`seed::region`).
+/// The force that keeps particles within their region (`seed::region`).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum BorderForce {
-    /// Repaired: particles of the border are drawn back to their own voxels.
+pub enum InterfaceForce {
+    /// Repaired: particles of the interface are drawn back to their own voxels.
     #[default]
     OwnVoxel,
-    /// As printed: those, and particles beyond the border, are drawn by the gradient field to the nearest border voxel. Pumps energy.
+    /// As printed: these particles, and particles beyond the interface, are drawn by the gradient field to the nearest
+    /// interface voxel. This pumps energy.
     NearestVoxel,
 }
 
-/// Constants. All of one papers' model: [`SeedParameters::paper_2005`], [`SeedParameters::paper_2006`].
+/// Constants. [`SeedParameters::paper_2005`] and [`SeedParameters::paper_2006`] return those of the papers' models.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SeedParameters {
-    /// Which paper's factors.
+    /// The paper whose factors apply.
     pub convention: Convention,
-    /// λ, µ (Pa). Printed without unit.
+    /// Lamé's constants λ, µ (Pa), which are printed without unit.
     pub lame: Lame,
-    /// φ, ψ (Pa s). Printed without unit.
+    /// Viscosities φ, ψ (Pa s), which are printed without unit.
     pub viscosity: Viscosity,
-    /// Step Δt (s). Printed without unit, and in 2005 only.
+    /// Step Δt (s), which is printed without unit, and in 2005 only.
     pub dt_s: f64,
-    /// Density ρ (kg/m³). Not printed.
+    /// Density ρ (kg/m³), which is not printed.
     pub density_kg_per_m3: f64,
-    /// Smoothing length h over the particles' spacing. Not printed.
+    /// Smoothing length h over the particles' spacing, which is not printed.
     pub smoothing_ratio: f64,
     /// Whether nv(ps) reaches to the first-connected vertices ("eventually, … depending on the mesh size").
     pub first_neighbours: bool,
-    /// Border force per distance, over `(λ + 2µ) · spacing`. Not printed.
-    pub border_stiffness_ratio: f64,
-    /// Stiffness of the surface's links, over that of the column of layer between their ends. Not printed.
+    /// Interface force per distance, over `(λ + 2µ) · spacing`, which is not printed.
+    pub interface_stiffness_ratio: f64,
+    /// Stiffness of the surface's links, over that of the column of layer between their ends, which is not printed.
     pub link_stiffness_ratio: f64,
-    /// Damping ratio of the links. Not printed.
+    /// Damping ratio of the links, which is not printed.
     pub link_damping_ratio: f64,
-    /// What passes between particles and core.
+    /// Exchange between particles and core.
     pub exchange: Exchange,
     /// Which stress makes the force between two particles.
     pub pair_stress: PairStress,
-    /// What keeps particles within their region.
-    pub border_force: BorderForce,
+    /// Force that keeps particles within their region.
+    pub interface_force: InterfaceForce,
 }
 
 /// The layer of particles and the surface outside it.
@@ -91,9 +93,9 @@ pub struct SeedParameters {
 pub struct LayerSpec {
     /// Vertices (m) of the outer surface.
     pub skin_m: Vec<DVec3>,
-    /// Its triangles, counter-clockwise seen from outside.
+    /// Triangles of the outer surface, counter-clockwise seen from outside.
     pub skin_triangles: Vec<[u32; 3]>,
-    /// About how many particles fill the layer.
+    /// Approximate number of particles that fill the layer.
     pub particles: u32,
 }
 
@@ -111,12 +113,12 @@ pub struct SeedSpec {
 }
 
 impl SeedParameters {
-    /// Table 1 of 2005 with that paper's factors.
+    /// Returns table 1 of 2005, with that paper's factors.
     pub fn paper_2005(model: PaperModel) -> Self {
         Self::printed(model, Convention::Paper2005)
     }
 
-    /// Table 1 of 2006 with that paper's factors, and the Δt of 2005, which 2006 does not print.
+    /// Returns table 1 of 2006, with that paper's factors, and the Δt of 2005, which the paper of 2006 does not print.
     pub fn paper_2006(model: PaperModel) -> Self {
         Self::printed(model, Convention::Paper2006)
     }
@@ -135,30 +137,30 @@ impl SeedParameters {
             density_kg_per_m3: 1000.0,
             smoothing_ratio: 1.2,
             first_neighbours: true,
-            border_stiffness_ratio: 1.0,
+            interface_stiffness_ratio: 1.0,
             link_stiffness_ratio: 1.0,
             link_damping_ratio: 1.0,
             exchange: Exchange::default(),
             pair_stress: PairStress::default(),
-            border_force: BorderForce::default(),
+            interface_force: InterfaceForce::default(),
         }
     }
 
-    /// The same without the repairs that can be left out. It bursts within seconds.
+    /// Returns the same parameters without the repairs that can be left out. A body with them bursts within seconds.
     #[must_use]
     pub fn as_printed(self) -> Self {
         Self {
             exchange: Exchange::Displacements,
             pair_stress: PairStress::Neighbour,
-            border_force: BorderForce::NearestVoxel,
+            interface_force: InterfaceForce::NearestVoxel,
             ..self
         }
     }
 
-    /// Factor on elastic and viscous stress in the layer, over the core's.
+    /// Returns the factor on elastic and viscous stress in the layer, over the core's.
     ///
-    /// Eq. 22 (2005: 6) halves the core's force; eq. 29 (13) halves nothing. So in either paper the same λ and µ make the layer twice as
-    /// stiff, and φ and ψ twice as viscous, as the core.
+    /// Eq. 22 (2005: 6) halves the core's force, while eq. 29 (13) halves nothing. So in either paper the same λ and µ
+    /// make the layer twice as stiff as the core, and φ and ψ make it twice as viscous.
     pub fn layer_factor(&self) -> f64 {
         match self.convention {
             Convention::Consistent => 1.0,
@@ -166,12 +168,13 @@ impl SeedParameters {
         }
     }
 
-    /// The longest step (s) that eq. 14 of 2005 allows for neighbours `h_m` apart, as printed: `h √(ρ/(2λ + µ))`.
+    /// Returns the longest step (s) that eq. 14 of 2005 allows for neighbours `h_m` (m) apart, as printed:
+    /// `h √(ρ/(2λ + µ))`.
     pub fn courant_as_printed_s(&self, h_m: f64) -> f64 {
         h_m * (self.density_kg_per_m3 / (2.0 * self.lame.lambda_pa + self.lame.mu_pa)).sqrt()
     }
 
-    /// The same with the speed of pressure waves, `h √(ρ/(λ + 2µ))`: eq. 14 swaps λ and µ.
+    /// Returns the same step with the speed of pressure waves, `h √(ρ/(λ + 2µ))`: eq. 14 swaps λ and µ.
     pub fn courant_s(&self, h_m: f64) -> f64 {
         h_m * (self.density_kg_per_m3 / self.lame.p_wave_modulus_pa()).sqrt()
     }
@@ -199,8 +202,10 @@ impl SeedParameters {
                 return refuse(name, value, "must be finite and larger than 0");
             }
         }
-        let not_negative =
-            [("border_stiffness_ratio", self.border_stiffness_ratio), ("link_damping_ratio", self.link_damping_ratio)];
+        let not_negative = [
+            ("interface_stiffness_ratio", self.interface_stiffness_ratio),
+            ("link_damping_ratio", self.link_damping_ratio),
+        ];
         for (name, value) in not_negative {
             if !(value >= 0.0 && value.is_finite()) {
                 return refuse(name, value, "must be finite and not negative");
@@ -232,7 +237,7 @@ mod tests {
         let message = |parameters: SeedParameters| parameters.check().unwrap_err().to_string();
         assert!(message(SeedParameters { dt_s: f64::NAN, ..good }).contains("dt_s = NaN"));
         assert!(message(SeedParameters { smoothing_ratio: 9.0, ..good }).contains("smoothing_ratio = 9"));
-        assert!(message(SeedParameters { border_stiffness_ratio: -1.0, ..good }).contains("not negative"));
+        assert!(message(SeedParameters { interface_stiffness_ratio: -1.0, ..good }).contains("not negative"));
         let lame = Lame { lambda_pa: 5.0, mu_pa: 0.0 };
         assert!(message(SeedParameters { lame, ..good }).contains("mu_pa > 0"));
     }

@@ -1,26 +1,30 @@
 //! The particles' internal force: raw SPH on the awake particles of a region (2006, section 3.2).
 //!
-//! Strain (eqs. 1, 5): with displacements `d = x − u`, as eq. 1 has it,
+//! The strain (eqs. 1, 5) follows from displacements `d = x − u`, as eq. 1 has it:
 //! ```text
 //! F_i = I + Σ_j (d_j − d_i) ⊗ b_ij        b_ij = ∇_i W(u_i − u_j) ΔV_j
 //! ```
-//! Eq. 25 differentiated is `Σ_j d_j ⊗ b_ij`. Its `d_i` is added here (`Σ_j b_ij = 0` within the layer, not at its borders), because a layer that
-//! moves as a whole would be strained. With positions, as eq. 4 reads, the body at rest would have `F = A_i = Σ_j (u_j − u_i) ⊗ b_ij`,
-//! which is not I ([`moment`]): it would burst at rest. With displacements rest is rest, but any uniform deformation G is seen as
-//! `I + (G − I) A_i`, and a rotation as strain.
+//! Eq. 25 differentiated is `Σ_j d_j ⊗ b_ij`. The term `d_i` is added here (`Σ_j b_ij = 0` within the layer, but not at
+//! its boundaries), because otherwise a layer that moves as a whole would be strained. With positions, as eq. 4 reads,
+//! the body at rest would have `F = A_i = Σ_j (u_j − u_i) ⊗ b_ij`, which is not I ([`moment`]): it would burst at rest.
+//! With displacements the rest state has no strain, but any uniform deformation G is seen as `I + (G − I) A_i`, and a
+//! rotation as strain.
 //!
-//! Stress (eqs. 9, 11): `σ = λ tr(E) I + 2µE + φ tr(ν) I + 2ψν`, `ν = 2Ė` (eq. 10). Constants: see [`super::SeedParameters::layer_factor`].
+//! The stress (eqs. 9, 11) is `σ = λ tr(E) I + 2µE + φ tr(ν) I + 2ψν`, with `ν = 2Ė` (eq. 10) and the constants of
+//! [`super::SeedParameters::layer_factor`].
 //!
-//! Force (eq. 29), with σ as it is, without F, and added: `∇W` taken at i points from i to j, so a layer under tension pulls i to j.
+//! The force (eq. 29) has σ without F, and is added: `∇W` at i points from i to j, so that a layer under tension pulls
+//! i towards j.
 //! ```text
 //! f_i = ΔV_i Σ_j (σ_i + σ_j) b_ij        as printed: ΔV_i Σ_j σ_j b_ij
 //! ```
-//! 2005's eq. 13 is the printed one with the gradient at j, and the other sign. With `σ_j` alone ([`PairStress::Neighbour`]) forces between two
-//! particles are not opposite: momentum is lost at the border, the stiffness is not symmetric, and a layer at rest flutters: any small motion
-//! grows, at any step. `σ_i` ([`PairStress::Both`]) costs nothing within, where `Σ_j b_ij = 0`; with it the force is, at small strain,
-//! `−∂U/∂x` of `U = ΔV Σ_i ½ E_i:σ_i`, because `b_ji = −b_ij`. Neighbours are awake particles: what sleeps is not there.
-//! Rest positions never change, so neither do neighbours and weights: "whose connectivity must be determined for each time step" is
-//! what eq. 25, with rest positions in W, does not need.
+//! Eq. 13 of 2005 is the printed force with the gradient at j, and with the other sign. With `σ_j` alone
+//! ([`PairStress::Neighbour`]) the forces between two particles are not opposite: momentum is lost at the interface,
+//! the stiffness is not symmetric, and a layer at rest flutters: any small motion grows, at any step. The term `σ_i`
+//! ([`PairStress::Both`]) changes nothing within, where `Σ_j b_ij = 0`; with it the force is, at small strain, `−∂U/∂x`
+//! of `U = ΔV Σ_i ½ E_i:σ_i`, because `b_ji = −b_ij`. Neighbours are awake particles; sleeping ones do not count. Rest
+//! positions never change, so neither do neighbours and weights. The papers' "connectivity must be determined for each
+//! time step" does not apply to eq. 25, which has rest positions in W.
 use super::{PairStress, SeedParameters, kernel::Stencil, region::Region, voxels::NONE};
 use crate::{
     linalg::tensor::outer,
@@ -32,7 +36,7 @@ use crate::{
 };
 use glam::{DMat3, DVec3};
 
-/// Constants of the layer, the papers' factors applied.
+/// Constants of the layer, with the papers' factors.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LayerStress {
     lame: Lame,
@@ -40,7 +44,7 @@ pub struct LayerStress {
 }
 
 impl LayerStress {
-    /// With `factor` over the core's constants.
+    /// Returns the layer's constants of given parameters.
     pub fn new(parameters: &SeedParameters) -> Self {
         let SeedParameters { lame, viscosity, convention, .. } = *parameters;
         let elastic = parameters.layer_factor() * convention.elastic_factor();
@@ -51,12 +55,12 @@ impl LayerStress {
         }
     }
 
-    /// λ and µ (Pa) as they act.
+    /// Returns λ and µ (Pa) with the factors.
     pub fn lame(&self) -> Lame {
         self.lame
     }
 
-    /// `σ = λ tr(E) I + 2µE + φ tr(Ė) I + 2ψĖ` (Pa).
+    /// Returns `σ = λ tr(E) I + 2µE + φ tr(Ė) I + 2ψĖ` (Pa).
     pub fn stress_pa(&self, f: &DMat3, f_dot: &DMat3) -> DMat3 {
         // The elastic stress has the viscous one's form, with λ, µ and E in the place of φ, ψ and Ė.
         let as_elastic = Viscosity { phi_pa_s: self.lame.lambda_pa, psi_pa_s: self.lame.mu_pa };
@@ -68,7 +72,7 @@ impl LayerStress {
     }
 }
 
-/// `Σ_j (a_j − a_i) ⊗ b_ij` over awake neighbours.
+/// Returns `Σ_j (a_j − a_i) ⊗ b_ij` over the awake neighbours of a slot's particle.
 pub fn gradient_of(region: &Region, stencil: &Stencil, a: &[DVec3], slot: usize) -> DMat3 {
     let mut sum = DMat3::ZERO;
     let here = a[slot];
@@ -78,18 +82,19 @@ pub fn gradient_of(region: &Region, stencil: &Stencil, a: &[DVec3], slot: usize)
     sum
 }
 
-/// `A_i = Σ_j (u_j − u_i) ⊗ b_ij`: what the sum sees of the identity. I would be right.
+/// Returns `A_i = Σ_j (u_j − u_i) ⊗ b_ij`, which is what the sum makes of the identity; it should be I.
 pub fn moment(region: &Region, stencil: &Stencil, slot: usize) -> DMat3 {
     let here = region.rest_m(slot);
     neighbours(region, stencil, slot).map(|(j, b)| outer(region.rest_m(j) - here, b)).fold(DMat3::ZERO, |a, b| a + b)
 }
 
-/// Stress (Pa) of every slot from displacements (m) and velocities (m/s).
+/// Computes the stress (Pa) of every slot's particle from displacements (m) and velocities `v` (m/s).
 pub fn stresses_pa(
     region: &Region,
     stencil: &Stencil,
     law: &LayerStress,
-    (displacements_m, v): (&[DVec3], &[DVec3]),
+    displacements_m: &[DVec3],
+    v: &[DVec3],
     stresses_pa: &mut [DMat3],
 ) {
     for (slot, stress) in stresses_pa.iter_mut().enumerate().take(region.len()) {
@@ -99,7 +104,7 @@ pub fn stresses_pa(
     }
 }
 
-/// Eq. 29: force (N) on every slot's particle of volume ΔV (m³).
+/// Computes the force (N) on every slot's particle, of the volume ΔV (m³), by eq. 29.
 pub fn forces_n(
     region: &Region,
     stencil: &Stencil,
@@ -120,7 +125,7 @@ pub fn forces_n(
     }
 }
 
-/// Slots of the awake neighbours and `b` (1/m) towards them.
+/// Returns the slots of the awake neighbours and the gradients `b` (1/m) towards them.
 fn neighbours<'a>(region: &'a Region, stencil: &'a Stencil, slot: usize) -> impl Iterator<Item = (usize, DVec3)> + 'a {
     // The box reaches as far as the stencil does: no step leaves it.
     let voxel = region.voxel_of[slot] as i32;

@@ -1,19 +1,20 @@
-//! One of the papers' steps Δt. The papers do not print its order; it is
+//! One of the papers' steps Δt. The papers do not print the order of its parts; here it is:
 //!
-//! 1. the touched point: its region wakes, another falls asleep (section 6);
-//! 2. forces at time t: core (22), links of the surface, particles (29) and border, external ones (28);
-//! 3. motion: particles and surface by Verlet (33), core by the semi-implicit scheme (34);
-//! 4. vertices that the user displaces are brought to where they are held;
-//! 5. exchange between particles and core;
-//! 6. the surface over awake particles follows them (25).
+//! 1. The touched point: its region wakes, and another one falls asleep (section 6).
+//! 2. Forces at time t: of the core (22), the surface's links, particles (29) and their interface, and external ones
+//!    (28).
+//! 3. Motion: of particles and surface by Verlet (33), of the core by the semi-implicit scheme (34).
+//! 4. Vertices that the user displaces are brought to where they are held.
+//! 5. Exchange between particles and core.
+//! 6. The surface over awake particles follows them (25).
 //!
-//! Everything runs in the order of its numbers: the same inputs give the same bits. Steps allocate nothing, and their cost is that of the
-//! core, the surface and the awake particles.
+//! Everything runs in the order of its numbers, so that the same inputs give the same bits. Steps allocate nothing, and
+//! their cost is that of the core, the surface and the awake particles.
 use super::{
     Exchange, SeedContact, SeedModel, SeedReport, SeedScratch, SeedState, exchange,
     layer::Holds,
     model::Hull,
-    region::{Region, Rider},
+    region::{CarriedVertex, Region},
     sph,
     state::AtVertex,
 };
@@ -59,9 +60,9 @@ impl SeedModel {
 
         if let (Some(hull), Some(region)) = (self.hull(), awake) {
             self.exchange(hull, region, state, scratch);
-            for rider in &region.riders {
-                let (by, speed) = region.carried(rider, &state.particles.x, &state.particles.v);
-                let vertex = rider.vertex as usize;
+            for carried in &region.carried {
+                let (by, speed) = region.carried_motion(carried, &state.particles.x, &state.particles.v);
+                let vertex = carried.vertex as usize;
                 state.skin.x[vertex] = self.surface_rest_m()[vertex] + by;
                 state.skin.v[vertex] = speed;
             }
@@ -73,25 +74,26 @@ impl SeedModel {
         report
     }
 
-    /// The region that is awake.
+    /// Returns the region that is awake, if one is.
     pub fn awake(&self, state: &SeedState) -> Option<&Region> {
         self.regions().get(state.touched? as usize)
     }
 
-    /// Where a vertex of the touchable surface is (m).
+    /// Returns the position (m) of a vertex of the touchable surface.
     pub fn surface_m(&self, state: &SeedState, vertex: u32) -> DVec3 {
         if self.hull().is_some() { state.skin.x[vertex as usize] } else { state.core.x[self.node_of(vertex)] }
     }
 
-    /// Linear momentum (kg m/s) of core, surface and awake particles. Vertices over awake particles carry none of their own.
+    /// Returns the linear momentum (kg m/s) of core, surface and awake particles. Vertices over awake particles have
+    /// none of their own.
     pub fn momentum_kg_m_per_s(&self, state: &SeedState) -> DVec3 {
         let sum = |masses: &[f64], v: &[DVec3]| masses.iter().zip(v).map(|(m, v)| *v * *m).sum::<DVec3>();
         let mut total = sum(self.core().mass_kg(), &state.core.v);
         if let Some(hull) = self.hull() {
             total += sum(&hull.links.mass_kg, &state.skin.v);
             if let Some(region) = self.awake(state) {
-                for rider in &region.riders {
-                    let vertex = rider.vertex as usize;
+                for carried in &region.carried {
+                    let vertex = carried.vertex as usize;
                     total -= state.skin.v[vertex] * hull.links.mass_kg[vertex];
                 }
                 total += state.particles.v[..region.len()].iter().sum::<DVec3>() * hull.layer.mass_kg;
@@ -100,8 +102,9 @@ impl SeedModel {
         total
     }
 
-    /// Wakes the region of a triangle. Particles that were awake go on as they are. Others start where the core has taken them: at rest the
-    /// papers' "active particles start in these voxels", and no jump where the core has moved.
+    /// Wakes the region of a triangle. Particles that were awake keep their positions and velocities. The others start
+    /// where the core has moved them, so that there is no jump; at rest this is the papers' "active particles start in
+    /// these voxels".
     fn wake(&self, touched: Option<u32>, state: &mut SeedState, scratch: &mut SeedScratch) {
         let Some(hull) = self.hull() else { return };
         if touched == state.touched {
@@ -134,27 +137,28 @@ impl SeedModel {
         for slot in 0..region.len() {
             scratch.displacement_m[slot] = state.particles.x[slot] - region.rest_m(slot);
         }
-        let motion = (&scratch.displacement_m[..], &state.particles.v[..]);
-        sph::stresses_pa(region, stencil, &hull.stress, motion, &mut scratch.stress_pa);
+        let (displacements_m, v) = (&scratch.displacement_m, &state.particles.v);
+        sph::stresses_pa(region, stencil, &hull.stress, displacements_m, v, &mut scratch.stress_pa);
         let pair_stress = self.parameters().pair_stress;
         let forces = &mut scratch.force_n;
         sph::forces_n(region, stencil, hull.layer.volume_m3, pair_stress, &scratch.stress_pa, forces);
         for (slot, force) in forces.iter_mut().enumerate().take(region.len()) {
-            let (law, stiffness) = (self.parameters().border_force, hull.border_stiffness_n_per_m);
-            *force += region.border_force_n(law, stiffness, slot, state.particles.x[slot]);
+            let (law, stiffness) = (self.parameters().interface_force, hull.interface_stiffness_n_per_m);
+            *force += region.interface_force_n(law, stiffness, slot, state.particles.x[slot]);
         }
     }
 
-    /// Adds an external force to what its vertex moves with; false if it cannot.
+    /// Adds an external force on a vertex to the node, the particles or the vertex itself that carries it. Returns
+    /// whether there is such a vertex and the force is finite.
     fn push(&self, awake: Option<&Region>, push: &AtVertex, scratch: &mut SeedScratch) -> bool {
         if push.vertex as usize >= self.surface_rest_m().len() || !push.value.is_finite() {
             return false;
         }
         if self.hull().is_none() {
             scratch.core_force_n[self.node_of(push.vertex)] += push.value;
-        } else if let Some((region, rider)) = riding(awake, push.vertex) {
+        } else if let Some((region, carried)) = carried_by(awake, push.vertex) {
             // The transpose of eq. 25's interpolation: the same weights.
-            for &(slot, weight) in region.terms_of(rider) {
+            for &(slot, weight) in region.terms_of(carried) {
                 scratch.force_n[slot as usize] += push.value * weight;
             }
         } else {
@@ -163,12 +167,12 @@ impl SeedModel {
         true
     }
 
-    /// Brings displaced vertices to where they are held. Returns the holder's force (N), `m Δ/dt²` of all that it moves by Δ beyond what it
-    /// would do by itself, and how many vertices it cannot displace.
+    /// Brings displaced vertices to where they are held. Returns the holder's force (N), `m Δ/dt²` over all points that
+    /// it moves by Δ beyond their own motion, and how many vertices cannot be displaced.
     ///
-    /// Particles in the support of displaced vertices move with them, each by the mean of their displacements, weighted as eq. 25
-    /// does. To move them only as far as the vertices need, `Σ_j w_j d_j`, would leave patterns open that raw SPH does not resist:
-    /// a particle then goes four times as far as its vertex.
+    /// Particles in the support of displaced vertices move with them, each by the mean of their displacements with the
+    /// weights of eq. 25. If they moved only as far as the vertices need, `Σ_j w_j d_j`, patterns would remain that raw
+    /// SPH does not resist: a particle would then go four times as far as its vertex.
     fn displace(
         &self,
         awake: Option<&Region>,
@@ -184,8 +188,8 @@ impl SeedModel {
                 rejected += 1;
                 continue;
             };
-            if let Some((region, rider)) = riding(awake, goal.vertex) {
-                for &(slot, weight) in region.terms_of(rider) {
+            if let Some((region, carried)) = carried_by(awake, goal.vertex) {
+                for &(slot, weight) in region.terms_of(carried) {
                     let (sum, weights) = &mut scratch.goal_sums[slot as usize];
                     *sum += (goal.value - *rest) * weight;
                     *weights += weight;
@@ -235,20 +239,20 @@ impl SeedModel {
     }
 }
 
-/// The rider that a vertex is, and its region.
-fn riding(awake: Option<&Region>, vertex: u32) -> Option<(&Region, &Rider)> {
-    awake.and_then(|region| Some((region, region.rider(vertex)?)))
+/// Returns the carried vertex with this number in the awake region, and the region.
+fn carried_by(awake: Option<&Region>, vertex: u32) -> Option<(&Region, &CarriedVertex)> {
+    awake.and_then(|region| Some((region, region.carried_vertex(vertex)?)))
 }
 
 impl Hull {
-    /// Forces of links on vertices (N), none on those over awake particles, and their reactions on the core.
+    /// Computes the forces (N) of links on vertices, which are zero over awake particles, and adds their reactions to
+    /// the core's forces.
     fn link_forces(&self, awake: Option<&Region>, state: &SeedState, scratch: &mut SeedScratch) {
-        let core = (&state.core.x[..], &state.core.v[..]);
         for (vertex, force) in scratch.skin_force_n.iter_mut().enumerate() {
-            *force = self.links.force_n(vertex, (state.skin.x[vertex], state.skin.v[vertex]), core);
+            *force = self.links.force_n(vertex, state.skin.x[vertex], state.skin.v[vertex], &state.core);
         }
-        for rider in awake.map_or(&[][..], |region| &region.riders) {
-            scratch.skin_force_n[rider.vertex as usize] = DVec3::ZERO;
+        for carried in awake.map_or(&[][..], |region| &region.carried) {
+            scratch.skin_force_n[carried.vertex as usize] = DVec3::ZERO;
         }
         for (vertex, force) in scratch.skin_force_n.iter().enumerate() {
             for (&node, weight) in self.links.nodes[vertex].iter().zip(self.links.weights[vertex]) {
@@ -257,12 +261,13 @@ impl Hull {
         }
     }
 
-    /// Where a sleeping particle is (m) and how fast (m/s): it moves with its foot on the core.
+    /// Returns the position (m) and velocity (m/s) of a sleeping particle, which moves with its attachment point on the
+    /// core.
     fn asleep(&self, model: &SeedModel, particle: u32, state: &SeedState) -> (DVec3, DVec3) {
-        let foot = self.layer.core_foot[particle as usize];
-        let nodes = model.core().outer_triangles()[foot.triangle as usize].map(|n| n as usize);
+        let attachment = self.layer.core_attachment[particle as usize];
+        let nodes = model.core().outer_triangles()[attachment.triangle as usize].map(|n| n as usize);
         let (mut x, mut v) = (self.layer.rest_m(particle), DVec3::ZERO);
-        for (node, weight) in nodes.into_iter().zip(foot.weights) {
+        for (node, weight) in nodes.into_iter().zip(attachment.weights) {
             x += (state.core.x[node] - model.core().rest_m()[node]) * weight;
             v += state.core.v[node] * weight;
         }
@@ -271,10 +276,10 @@ impl Hull {
 }
 
 impl Region {
-    /// Displacement (m) and velocity (m/s) of a rider: `Σ w_j (x_j − u_j)`, `Σ w_j v_j`.
-    fn carried(&self, rider: &Rider, x: &[DVec3], v: &[DVec3]) -> (DVec3, DVec3) {
+    /// Returns the displacement `Σ w_j (x_j − u_j)` (m) and the velocity `Σ w_j v_j` (m/s) of a carried vertex.
+    fn carried_motion(&self, carried: &CarriedVertex, x: &[DVec3], v: &[DVec3]) -> (DVec3, DVec3) {
         let (mut by, mut speed) = (DVec3::ZERO, DVec3::ZERO);
-        for &(slot, weight) in self.terms_of(rider) {
+        for &(slot, weight) in self.terms_of(carried) {
             by += (x[slot as usize] - self.rest_m(slot as usize)) * weight;
             speed += v[slot as usize] * weight;
         }

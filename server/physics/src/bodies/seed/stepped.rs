@@ -3,12 +3,13 @@
 //! ```text
 //! f at t        from the last step: what tools, loads and injections do to the surface's vertices, and the triangle that tools touch
 //! step          region of that triangle, forces, motion, exchange, surface (`seed::step`)
-//! f at t + dt   tools follow, contact is looked at anew
+//! f at t + dt   tools follow, contact is evaluated anew
 //! ```
-//! Which triangle is touched: the one nearest to the centre of the tool that is pressed hardest, as long as samples of the surface are
-//! inside it. Without tools it stays what it is set to.
+//! The touched triangle is the one nearest to the centre of the tool that is pressed hardest, while samples of the
+//! surface are inside that tool. Without tools it stays what it is set to.
 //!
-//! Ledger: forces work along what their vertices went. What the scheme, viscosity and exchange take is not known.
+//! Ledger: forces work along the displacement of their vertices. What the scheme, viscosity and exchange dissipate is
+//! not known.
 use super::{AtVertex, SeedBody, SeedBodyState, SeedContact, SeedModel, SeedScratch};
 use crate::{
     contact::ContactScratch,
@@ -24,7 +25,7 @@ pub(crate) struct SteppedSeed<'a> {
     pub(crate) scratch: &'a mut SeedBodyScratch,
 }
 
-/// Buffers, sized once.
+/// Buffers, which are allocated once.
 #[derive(Debug, Clone)]
 pub(crate) struct SeedBodyScratch {
     step: SeedScratch,
@@ -35,7 +36,7 @@ pub(crate) struct SeedBodyScratch {
 }
 
 impl SeedBodyScratch {
-    /// For a model.
+    /// Returns buffers for a model.
     pub(crate) fn new(seed: &SeedModel) -> Self {
         Self {
             step: SeedScratch::new(seed),
@@ -99,7 +100,8 @@ impl SteppedSeed<'_> {
         }
     }
 
-    /// One step. Returns a bound (m/s) of how fast any node came to where it is: of what is put there, too.
+    /// Takes one step. Returns an upper bound (m/s) of the speed with which any node came to where it is, including
+    /// nodes that are put there.
     fn advance(&mut self, tick: &Tick<'_>, state: &mut MechanicalState) -> f64 {
         let Self { body, own, scratch } = self;
         let MechanicalState { x, v, force_n, external_n, ledger, .. } = state;

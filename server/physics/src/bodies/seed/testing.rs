@@ -3,20 +3,20 @@ use super::{LayerSpec, PaperModel, SeedParameters, SeedSpec};
 use crate::{mesh::TetMesh, testing};
 use glam::DVec3;
 
-/// An ellipsoid: an icosahedron whose triangles are split in four `rounds` times. Vertices (m) and triangles.
+/// Returns vertices (m) and triangles of an ellipsoid: an icosahedron whose triangles are split in four `rounds` times.
 pub(crate) fn sphere(axes_m: DVec3, rounds: u32) -> (Vec<DVec3>, Vec<[u32; 3]>) {
     let (directions, triangles) = testing::sphere(rounds);
     (directions.iter().map(|&direction| direction * axes_m).collect(), triangles)
 }
 
-/// One layer of prisms between two ellipsoids, each in three tets.
+/// Returns one layer of prisms between two ellipsoids, each split in three tets.
 pub(crate) fn shell(inner_m: DVec3, outer_m: DVec3, rounds: u32) -> TetMesh {
     let (directions, triangles) = sphere(DVec3::ONE, rounds);
     let count = directions.len() as u32;
     let positions = directions.iter().map(|&d| d * inner_m).chain(directions.iter().map(|&d| d * outer_m)).collect();
     let mut tets = Vec::new();
     for triangle in triangles {
-        // Diagonals of the quads from the lower number inside to the higher outside.
+        // Diagonals of the quads go from the lower number inside to the higher one outside.
         let mut low = triangle;
         low.sort_unstable();
         let [a, b, c] = low;
@@ -35,7 +35,8 @@ pub(crate) fn shell(inner_m: DVec3, outer_m: DVec3, rounds: u32) -> TetMesh {
     TetMesh::new(positions, tets).unwrap()
 }
 
-/// A ball of 30 mm radius: a core of 240 tets from 12 to 20 mm, held at its upper end, and 8000 particles around it under 320 triangles.
+/// Returns a ball of 30 mm radius: a core of 240 tets from 12 to 20 mm, held at its upper end, and 8000 particles
+/// around it under 320 triangles.
 pub(crate) fn ball_spec() -> SeedSpec {
     let (skin_m, skin_triangles) = sphere(DVec3::splat(0.03), 2);
     let core = shell(DVec3::splat(0.012), DVec3::splat(0.02), 1);

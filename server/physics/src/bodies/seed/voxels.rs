@@ -1,23 +1,23 @@
-//! A box of cubic voxels, and which of them a closed surface encloses.
+//! A box of cubic voxels, and the voxels that a closed surface encloses.
 use glam::DVec3;
 
-/// No such voxel, particle or slot.
+/// Stands for no voxel, particle or slot.
 pub const NONE: u32 = u32::MAX;
 
-/// A box of voxels. `centre = origin + (i + ½, j + ½, k + ½) spacing`; x runs fastest.
+/// A box of voxels with centres at `origin + (i + ½, j + ½, k + ½) spacing`, numbered with x fastest.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Voxels {
     /// Lowest corner (m).
     pub origin_m: DVec3,
     /// Edge of a voxel (m).
     pub spacing_m: f64,
-    /// Voxels along each axis.
+    /// Number of voxels along each axis.
     pub size: [usize; 3],
 }
 
 impl Voxels {
-    /// Voxels that cover a box (m) and `margin` more on every side.
-    pub fn covering((low_m, high_m): (DVec3, DVec3), spacing_m: f64, margin: usize) -> Self {
+    /// Returns voxels that cover the box from `low_m` to `high_m` (m), and `margin` more on every side.
+    pub fn covering(low_m: DVec3, high_m: DVec3, spacing_m: f64, margin: usize) -> Self {
         let across = ((high_m - low_m) / spacing_m).ceil().max(DVec3::ONE).to_array();
         Self {
             origin_m: low_m - DVec3::splat(margin as f64 * spacing_m),
@@ -26,29 +26,29 @@ impl Voxels {
         }
     }
 
-    /// How many there are.
+    /// Returns the number of voxels.
     pub fn count(&self) -> usize {
         self.size.iter().product()
     }
 
-    /// Number of a voxel.
+    /// Returns the number of the voxel at a place.
     pub fn number(&self, [i, j, k]: [usize; 3]) -> usize {
         (k * self.size[1] + j) * self.size[0] + i
     }
 
-    /// Where a voxel is, in voxels from the lowest.
+    /// Returns the place of a voxel, in voxels from the lowest one along each axis.
     pub fn place(&self, number: usize) -> [usize; 3] {
         let [nx, ny, _] = self.size;
         [number % nx, number / nx % ny, number / (nx * ny)]
     }
 
-    /// Centre (m) of a voxel.
+    /// Returns the centre (m) of a voxel.
     pub fn centre_m(&self, number: usize) -> DVec3 {
         let place = self.place(number).map(|n| n as f64 + 0.5);
         self.origin_m + DVec3::from(place) * self.spacing_m
     }
 
-    /// The voxel that holds a point (m); `None` outside the box.
+    /// Returns the voxel that holds a point (m), or `None` outside the box.
     pub fn holding(&self, point_m: DVec3) -> Option<usize> {
         let at = (point_m - self.origin_m) / self.spacing_m;
         let size = DVec3::from(self.size.map(|n| n as f64));
@@ -56,14 +56,14 @@ impl Voxels {
         inside.then(|| self.number(at.to_array().map(|a| a as usize)))
     }
 
-    /// The voxel that holds a point (m) or is nearest to it.
+    /// Returns the voxel that holds a point (m) or is nearest to it.
     pub fn nearest(&self, point_m: DVec3) -> usize {
         let at = ((point_m - self.origin_m) / self.spacing_m).to_array();
         // NaN becomes 0.
         self.number(std::array::from_fn(|axis| (at[axis] as usize).min(self.size[axis] - 1)))
     }
 
-    /// The box of voxels from `low` to `high`, both included.
+    /// Returns the box of voxels from `low` to `high`, both included.
     #[must_use]
     pub fn part(&self, low: [usize; 3], high: [usize; 3]) -> Self {
         Self {
@@ -73,7 +73,7 @@ impl Voxels {
         }
     }
 
-    /// Numbers of the up to six voxels that share a face with one.
+    /// Returns the numbers of the up to six voxels that share a face with a voxel.
     pub fn beside(&self, number: usize) -> impl Iterator<Item = usize> {
         let (place, me) = (self.place(number), *self);
         (0..6).filter_map(move |side| {
@@ -84,13 +84,14 @@ impl Voxels {
         })
     }
 
-    /// Which voxels' centres a closed surface encloses.
+    /// Returns for every voxel whether a closed surface encloses its centre.
     ///
-    /// Along every column of voxels, `n(z) = Σ sign(t)` over the triangles t that the column meets above z is the winding number.
-    /// Where a column meets an edge or a corner, ties are broken by the edge's direction, so that it meets one of the triangles there.
+    /// Along every column of voxels, the winding number is `n(z) = Σ sign(t)` over the triangles t that the column
+    /// meets above z. Where a column meets an edge or a corner, ties are broken by the edge's direction, so that it
+    /// meets exactly one of the triangles there.
     pub fn enclosed(&self, positions_m: &[DVec3], triangles: &[[u32; 3]]) -> Vec<bool> {
         let [nx, ny, nz] = self.size;
-        // turns[column][k]: by how much the winding number grows from voxel k − 1 to k.
+        // turns[column][k] is the change of the winding number from voxel k − 1 to k.
         let mut turns = vec![0_i32; nx * ny * (nz + 1)];
         for &triangle in triangles {
             let corners = triangle.map(|n| positions_m[n as usize]);
@@ -119,9 +120,10 @@ impl Voxels {
     }
 }
 
-/// Where the vertical line through (x, y) meets a triangle, and by how much the winding number grows there on the way up.
+/// Returns the change of the winding number on the way up where the vertical line through (x, y) meets a triangle, and
+/// the height z there.
 fn crossing(nodes: [u32; 3], p: [DVec3; 3], x: f64, y: f64) -> Option<(i32, f64)> {
-    // Twice the area of (p_a, p_b, (x, y)): from both sides of an edge the same number but for its sign.
+    // Twice the area of (p_a, p_b, (x, y)), which is the same number from both sides of an edge, except for its sign.
     let area = |a: usize, b: usize| {
         let (from, to, sign) = if nodes[a] < nodes[b] { (p[a], p[b], 1.0) } else { (p[b], p[a], -1.0) };
         sign * ((to.x - from.x) * (y - from.y) - (to.y - from.y) * (x - from.x))
@@ -129,7 +131,7 @@ fn crossing(nodes: [u32; 3], p: [DVec3; 3], x: f64, y: f64) -> Option<(i32, f64)
     let areas = [area(1, 2), area(2, 0), area(0, 1)];
     let total: f64 = areas.iter().sum();
     let turn = if total > 0.0 { 1.0 } else { -1.0 };
-    // On an edge: to the triangle that has it on its left or bottom.
+    // A point on an edge belongs to the triangle that has the edge on its left or bottom.
     let owns = |a: usize, b: usize| {
         let along = (p[b] - p[a]) * turn;
         along.y < 0.0 || (along.y == 0.0 && along.x > 0.0)
@@ -151,8 +153,7 @@ mod tests {
     #[test]
     fn columns_enclose_what_the_winding_number_says() {
         let (positions, triangles) = sphere(DVec3::new(0.9, 0.7, 1.1), 2);
-        let bounds = (DVec3::splat(-1.2), DVec3::splat(1.2));
-        let voxels = Voxels::covering(bounds, 0.13, 1);
+        let voxels = Voxels::covering(DVec3::splat(-1.2), DVec3::splat(1.2), 0.13, 1);
         let inside = voxels.enclosed(&positions, &triangles);
         let said: Vec<bool> =
             (0..voxels.count()).map(|n| is_inside(voxels.centre_m(n), &triangles, &positions)).collect();
@@ -165,7 +166,7 @@ mod tests {
         // An octahedron with corners on the columns, and edges in their planes.
         let p = [DVec3::X, DVec3::NEG_X, DVec3::Y, DVec3::NEG_Y, DVec3::Z, DVec3::NEG_Z].map(|p| p * 2.0);
         let faces = [[0, 2, 4], [2, 1, 4], [1, 3, 4], [3, 0, 4], [2, 0, 5], [1, 2, 5], [3, 1, 5], [0, 3, 5]];
-        let voxels = Voxels::covering((DVec3::splat(-2.5), DVec3::splat(2.5)), 0.5, 0);
+        let voxels = Voxels::covering(DVec3::splat(-2.5), DVec3::splat(2.5), 0.5, 0);
         for (number, inside) in voxels.enclosed(&p, &faces).into_iter().enumerate() {
             let reach = voxels.centre_m(number).abs().element_sum();
             assert!(inside == (reach < 2.0) || reach == 2.0, "{}", voxels.centre_m(number));
@@ -174,7 +175,7 @@ mod tests {
 
     #[test]
     fn numbers_places_and_parts_agree() {
-        let voxels = Voxels::covering((DVec3::ZERO, DVec3::new(0.3, 0.2, 0.4)), 0.1, 2);
+        let voxels = Voxels::covering(DVec3::ZERO, DVec3::new(0.3, 0.2, 0.4), 0.1, 2);
         for number in 0..voxels.count() {
             assert_eq!(voxels.number(voxels.place(number)), number);
             assert_eq!(voxels.holding(voxels.centre_m(number)), Some(number));

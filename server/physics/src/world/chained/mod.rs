@@ -1,4 +1,4 @@
-//! Which bits of models, states and ticks a hash is of, and in which order ([`Chain`]).
+//! The bits of models, states and ticks that a hash covers, and their order ([`Chain`]).
 use super::{Model, Quarantine, Scratch, State, StepReport};
 use crate::{
     contact::{LocalContactModel, ToolState, ToolTarget},
@@ -21,12 +21,12 @@ impl Chain {
     pub fn state(&mut self, state: &State) {
         self.mechanical(&state.mechanical);
         self.whole(u64::from(state.pace.substeps));
-        self.whole(u64::from(state.pace.calm_ticks));
+        self.whole(u64::from(state.pace.settled_ticks));
         self.flag(state.pace.before_is_usable);
         self.vectors(&state.pace.before.total_n);
         self.vectors(&state.pace.before.external_n);
         self.flag(state.sleep.asleep);
-        self.whole(u64::from(state.sleep.calm_checks));
+        self.whole(u64::from(state.sleep.still_checks));
         self.vectors(&state.sleep.held_m);
         self.maybe(state.quarantine, Self::quarantine);
         state.body.chain(self);
@@ -100,7 +100,7 @@ impl Chain {
         });
     }
 
-    /// Adds what a body holds. Visits every tet.
+    /// Adds the energies of a state.
     pub fn energies(&mut self, energies: &Energies) {
         let Energies { kinetic_j, elastic_j, gravitational_j, external_work_j, dissipated_j } = *energies;
         for energy_j in [kinetic_j, elastic_j, gravitational_j, external_work_j, dissipated_j] {
@@ -108,7 +108,7 @@ impl Chain {
         }
     }
 
-    /// Adds what of a model the rest state fixes: steps, masses, places, and what contact may do to nodes.
+    /// Adds what the rest state fixes of a model: steps, masses, rest positions, and the stiffness of contact at nodes.
     pub fn model(&mut self, model: &Model) {
         self.whole(u64::from(model.substeps()));
         self.whole(u64::from(model.substeps_per_long_step()));

@@ -11,7 +11,7 @@ use crate::{
         Document,
         body::BodyTable,
         source::{Fault, Where},
-        springs::{ConstantsName, HomeLayerTable, RefineTable, SpringsTable},
+        springs::{AnchorLayerTable, ConstantsName, RefineTable, SpringsTable},
         words::did_you_mean,
     },
     error::Stage,
@@ -22,10 +22,10 @@ use glam::DVec3;
 use palpate_physics::{
     BodySpec, Settings, Surface,
     bodies::mass_spring::{
-        HomeLaw, MassSpringSpec, Refinement, Refining, SpringSpec,
+        AnchorLaw, MassSpringSpec, Refinement, Refining, SpringSpec,
+        anchor::Layer,
         body::triangles_about,
         calibration::{Calibration, ConstantsTable},
-        home::Layer,
         loop_scheme, matching,
         region::Constants,
         topology::{Triangulation, TriangulationError},
@@ -107,7 +107,8 @@ impl BodyKind for MassSpring {
     }
 }
 
-/// Makes the body's surface, or a part of it, the coarse surface of springs. Nodes are its vertices then, tools and loads act on the surface refined everywhere.
+/// Makes the body's surface, or a part of it, the coarse surface of springs. Nodes are its vertices then, tools and
+/// loads act on the surface refined everywhere.
 fn put_on(body: &mut Body, table: &SpringsTable) -> Result<(), Fault> {
     let chosen: Vec<u32> = match &table.part {
         None => (0..body.surface.triangles.len() as u32).collect(),
@@ -215,7 +216,7 @@ fn spec(
     let mut springs = SpringSpec {
         coarse,
         fine: coarse,
-        home_law: home_law(table)?,
+        anchor_law: anchor_law(table)?,
         mass_kg,
         held: Vec::new(),
         most_awake,
@@ -229,8 +230,8 @@ fn spec(
     springs.fine = fine;
     let at = at().key("refine");
     check(&at.key("rings"), refine.rings, (1..=16).contains(&refine.rings), "must be 1 to 16")?;
-    let fade_ok = refine.fade_s > 0.0 && refine.fade_s.is_finite();
-    check(&at.key("fade_s"), refine.fade_s, fade_ok, "must be finite and larger than 0")?;
+    let blend_ok = refine.blend_s > 0.0 && refine.blend_s.is_finite();
+    check(&at.key("blend_s"), refine.blend_s, blend_ok, "must be finite and larger than 0")?;
     if refine.follows_dent && constants_table.is_some() {
         let message = "a table of constants is for one number of rings";
         return Err(Fault::value(at.key("follows_dent"), message).help("leave it out, or give other constants"));
@@ -239,7 +240,7 @@ fn spec(
     let refinement = Refinement {
         rings: refine.rings,
         follows_dent: refine.follows_dent,
-        fade_s: refine.fade_s,
+        blend_s: refine.blend_s,
         by: Refining::ByTools,
     };
     Ok(MassSpringSpec { springs, refinement: Some(refinement), table: constants_table })
@@ -275,7 +276,7 @@ fn positive(at: &Where, key: &str, value: f64) -> Result<f64, Fault> {
 
 fn coarse(table: &SpringsTable, areas_m2: &[f64]) -> Result<Constants, Fault> {
     let at = at();
-    let constants = [("mesh_n_per_m", table.mesh_n_per_m), ("home_n_per_m", table.home_n_per_m)];
+    let constants = [("mesh_n_per_m", table.mesh_n_per_m), ("anchor_n_per_m", table.anchor_n_per_m)];
     let skin = [
         ("young_modulus_pa", table.young_modulus_pa),
         ("thickness_m", table.thickness_m),
@@ -289,10 +290,10 @@ fn coarse(table: &SpringsTable, areas_m2: &[f64]) -> Result<Constants, Fault> {
         positive(&at, key, value)
     };
     if given(&constants) {
-        let [mesh_n_per_m, home_n_per_m] = constants;
+        let [mesh_n_per_m, anchor_n_per_m] = constants;
         return Ok(Constants {
-            mesh_n_per_m: value(mesh_n_per_m, "`home_n_per_m`")?,
-            home_n_per_m: value(home_n_per_m, "`mesh_n_per_m`")?,
+            mesh_n_per_m: value(mesh_n_per_m, "`anchor_n_per_m`")?,
+            anchor_n_per_m: value(anchor_n_per_m, "`mesh_n_per_m`")?,
         });
     }
     let with = "`young_modulus_pa`, `thickness_m` and `foundation_pa_per_m`";
@@ -302,7 +303,7 @@ fn coarse(table: &SpringsTable, areas_m2: &[f64]) -> Result<Constants, Fault> {
     Ok(Constants {
         // K_m = (√3/2) E t, K_h = foundation times a vertex's area
         mesh_n_per_m: 0.75_f64.sqrt() * young_pa * thickness_m,
-        home_n_per_m: foundation_pa_per_m * mean_area_m2,
+        anchor_n_per_m: foundation_pa_per_m * mean_area_m2,
     })
 }
 
@@ -329,23 +330,23 @@ fn damping(table: &SpringsTable, mass_kg: &[f64], settings: &mut Settings) -> Re
     Ok(())
 }
 
-fn home_law(table: &SpringsTable) -> Result<HomeLaw, Fault> {
-    let law = match (table.home_cubic_per_m2, &table.home_layer) {
-        (None, None) => return Ok(HomeLaw::Linear),
-        (Some(per_m2), None) => HomeLaw::cubic(per_m2),
+fn anchor_law(table: &SpringsTable) -> Result<AnchorLaw, Fault> {
+    let law = match (table.anchor_cubic_per_m2, &table.anchor_layer) {
+        (None, None) => return Ok(AnchorLaw::Linear),
+        (Some(per_m2), None) => AnchorLaw::cubic(per_m2),
         (None, Some(layers)) => {
-            let layer = |layer: &HomeLayerTable| Layer {
+            let layer = |layer: &AnchorLayerTable| Layer {
                 thickness_m: layer.thickness_m,
                 stiffness_ratio: layer.stiffness_ratio,
             };
-            HomeLaw::layers(&layers.iter().map(layer).collect::<Vec<_>>())
+            AnchorLaw::layers(&layers.iter().map(layer).collect::<Vec<_>>())
         }
         (Some(_), Some(_)) => {
-            let message = "`home_cubic_per_m2` and `home_layer` are two laws of one spring";
-            return Err(Fault::value(at().key("home_layer"), message).help("remove one of the two"));
+            let message = "`anchor_cubic_per_m2` and `anchor_layer` are two laws of one spring";
+            return Err(Fault::value(at().key("anchor_layer"), message).help("remove one of the two"));
         }
     };
-    let key = if table.home_layer.is_some() { "home_layer" } else { "home_cubic_per_m2" };
+    let key = if table.anchor_layer.is_some() { "anchor_layer" } else { "anchor_cubic_per_m2" };
     law.map_err(|error| Fault::value(at().key(key), error.to_string()).cause(error))
 }
 
@@ -356,7 +357,7 @@ fn fine(
     files: &Files<'_>,
 ) -> Result<(Constants, Option<ConstantsTable>), Fault> {
     let at = at().key("refine");
-    let own = refine.mesh_n_per_m.is_some() || refine.home_n_per_m.is_some();
+    let own = refine.mesh_n_per_m.is_some() || refine.anchor_n_per_m.is_some();
     exactly_one(
         &at,
         &[
@@ -380,12 +381,12 @@ fn fine(
         };
         return Ok((fine, None));
     }
-    let (Some(mesh_n_per_m), Some(home_n_per_m)) = (refine.mesh_n_per_m, refine.home_n_per_m) else {
-        let message = format!("[{at}] gives one of `mesh_n_per_m` and `home_n_per_m`, which go together");
+    let (Some(mesh_n_per_m), Some(anchor_n_per_m)) = (refine.mesh_n_per_m, refine.anchor_n_per_m) else {
+        let message = format!("[{at}] gives one of `mesh_n_per_m` and `anchor_n_per_m`, which go together");
         return Err(Fault::value(at, message));
     };
     let mesh_n_per_m = positive(&at, "mesh_n_per_m", mesh_n_per_m)?;
-    Ok((Constants { mesh_n_per_m, home_n_per_m: positive(&at, "home_n_per_m", home_n_per_m)? }, None))
+    Ok((Constants { mesh_n_per_m, anchor_n_per_m: positive(&at, "anchor_n_per_m", anchor_n_per_m)? }, None))
 }
 
 fn table(file: &str, at: &Where, files: &Files<'_>) -> Result<ConstantsTable, Fault> {

@@ -4,7 +4,7 @@ use crate::hashes::case::{Case, Moment};
 use glam::DVec3;
 use palpate_physics::{
     BodySpec, PointForce,
-    bodies::seed::{BorderForce, Exchange, PairStress},
+    bodies::seed::{Exchange, InterfaceForce, PairStress},
 };
 use palpate_scene::Scene;
 
@@ -59,7 +59,7 @@ pub(super) fn cases() -> Vec<Case> {
     }));
     cases.push(without("seed/nearest-voxels", |scene| {
         if let BodySpec::Seed(seed) = &mut scene.model.body {
-            seed.parameters.border_force = BorderForce::NearestVoxel;
+            seed.parameters.interface_force = InterfaceForce::NearestVoxel;
         }
     }));
     cases

@@ -1,4 +1,4 @@
-//! Mass-spring surfaces: every law of home springs, every way to refine, awake in part, calibrated.
+//! Mass-spring surfaces: every law of anchor springs, every way to refine, awake in part, calibrated.
 use super::farthest_node;
 use crate::hashes::{
     case::{Case, Moment, Source},
@@ -13,14 +13,14 @@ use palpate_physics::{
 
 const TICKS: u64 = 500;
 const LAYERS: &str =
-    "home_layer = [{ thickness_m = 1e-3, stiffness_ratio = 1 }, { thickness_m = 1, stiffness_ratio = 4 }]\n";
+    "anchor_layer = [{ thickness_m = 1e-3, stiffness_ratio = 1 }, { thickness_m = 1, stiffness_ratio = 4 }]\n";
 const AREA: &str = "[body.springs.refine]\nrings = 2\nconstants = \"area\"\n";
 
 /// A ball of some 300 triangles whose lower half is held, under a sphere that a case moves.
 fn ball(springs: &str, refine: &str, more: &str) -> String {
     format!(
         "[scene]\nname = \"own\"\n[body.sphere_shell]\ninner_radius_mm = 16\nouter_radius_mm = 20\ntarget_tets = 600\n\
-        [body.springs]\npart = \"outer\"\nmesh_n_per_m = 60\nhome_n_per_m = 12\narea_density_kg_per_m2 = 15\n{springs}{refine}\
+        [body.springs]\npart = \"outer\"\nmesh_n_per_m = 60\nanchor_n_per_m = 12\narea_density_kg_per_m2 = 15\n{springs}{refine}\
         [[region]]\nname = \"lower\"\nselect = {{ half_space = {{ point_mm = [0, 0, -5], normal = [0, 0, -1] }} }}\n\
         [[fixed]]\nregion = \"lower\"\n\
         [[tool]]\nname = \"sphere\"\nradius_mm = 5\nfriction_coefficient = 0.3\ndriver = \"device\"\nstart_mm = [0, 0, 32]\n{more}"
@@ -49,13 +49,13 @@ pub(super) fn cases() -> Vec<Case> {
                 &spring.replace("[numerics]\nmass_damping_per_s = 20\n", ""),
             ),
         ),
-        case("springs/cubic", ball(&format!("{DAMPED}home_cubic_per_m2 = 1e5\n"), AREA, RIGID)),
+        case("springs/cubic", ball(&format!("{DAMPED}anchor_cubic_per_m2 = 1e5\n"), AREA, RIGID)),
         case("springs/layers", ball(&format!("{DAMPED}{LAYERS}"), AREA, RIGID)),
         case("springs/mass-damping", ball("", AREA, &spring)),
         case("springs/capsule", ball(DAMPED, &format!("{AREA}most_triangles = 120\n"), &capsule)),
         case(
             "springs/follows-dent",
-            ball(DAMPED, &AREA.replace("rings = 2", "rings = 4\nfollows_dent = true\nfade_s = 0.05"), RIGID),
+            ball(DAMPED, &AREA.replace("rings = 2", "rings = 4\nfollows_dent = true\nblend_s = 0.05"), RIGID),
         ),
         case(
             "springs/loaded",

@@ -1,12 +1,12 @@
-//! What passes between particles, core and skin.
+//! Tests of the exchange between particles, core and skin.
 use super::{ball, ball_with, press, touched};
 use crate::{
-    bodies::seed::{Exchange, SeedContact, SeedModel, SeedScratch, SeedState, exchange},
+    bodies::seed::{Exchange, Motion, SeedContact, SeedModel, SeedScratch, SeedState, exchange},
     testing::Random,
 };
 use glam::{DQuat, DVec3};
 
-/// A state in which everything moves.
+/// Returns a state in which everything moves.
 fn stirred(model: &SeedModel) -> SeedState {
     let (mut state, mut scratch) = (SeedState::at_rest(model), SeedScratch::new(model));
     let contact = SeedContact { triangle: Some(touched(model).0), ..SeedContact::default() };
@@ -68,7 +68,7 @@ fn printed_exchange_makes_momentum_from_displacements() {
     println!("the nodes take on {ratio:.0} times the momentum that the particle brings");
     assert!(ratio > 50.0);
     // Every corner of the face moves by all of the step, whatever its weight.
-    let face = model.core().outer_triangles()[region.on_core[0].foot.triangle as usize];
+    let face = model.core().outer_triangles()[region.on_core[0].attachment.triangle as usize];
     for node in face {
         assert!((x[node as usize] - model.core().rest_m()[node as usize] - step).length() < 1e-15);
     }
@@ -83,7 +83,8 @@ fn links_are_free_at_rest_and_in_translation_and_resist_rotation() {
     let forces = |moved: &dyn Fn(DVec3) -> DVec3, speed: DVec3| -> Vec<DVec3> {
         let nodes: Vec<DVec3> = core.iter().map(|&x| moved(x)).collect();
         let speeds: Vec<DVec3> = still.iter().map(|_| speed).collect();
-        (0..skin.len()).map(|vertex| links.force_n(vertex, (moved(skin[vertex]), speed), (&nodes, &speeds))).collect()
+        let core = Motion { x: nodes, v: speeds };
+        (0..skin.len()).map(|vertex| links.force_n(vertex, moved(skin[vertex]), speed, &core)).collect()
     };
     let largest = |forces: &[DVec3]| forces.iter().map(|f| f.length()).fold(0.0, f64::max);
     assert!(largest(&forces(&|x| x, DVec3::ZERO)) < 1e-15);
@@ -97,7 +98,7 @@ fn links_are_free_at_rest_and_in_translation_and_resist_rotation() {
         let offset = links.offset_m[vertex];
         let away = DQuat::from_rotation_z(angle) * offset - offset;
         assert!((*force + away * links.stiffness_n_per_m[vertex]).length() < 1e-12);
-        // About the foot, which the reaction passes through.
+        // The torque is about the attachment point, which the reaction passes through.
         let turned_offset = DQuat::from_rotation_z(angle) * offset;
         torque += turned_offset.cross(*force);
         expected -= links.stiffness_n_per_m[vertex] * offset.truncate().length_squared() * angle.sin();
@@ -106,8 +107,8 @@ fn links_are_free_at_rest_and_in_translation_and_resist_rotation() {
     assert!((torque.z / expected - 1.0).abs() < 1e-9 && torque.z < -1e-7);
 }
 
-/// Half a voxel is free: until particles cross, the printed exchange leaves an awake region unsupported. A press of 1 mm, less than that, only
-/// pushes it before it.
+/// Particles are free within half a voxel: until they cross, the printed exchange leaves an awake region without
+/// support. A press of 1 mm, which is less, only pushes the region before it.
 #[test]
 fn only_the_repaired_exchange_supports_the_layer_from_below() {
     let late = |exchange| {

@@ -1,4 +1,4 @@
-//! What raw SPH does, as printed and repaired.
+//! Tests of raw SPH, as printed and repaired.
 use super::{TOUCHED, ball, ball_with, touched, triangle_towards};
 use crate::{
     bodies::seed::{
@@ -10,8 +10,9 @@ use crate::{
 };
 use glam::{DMat3, DQuat, DVec3};
 
-/// `Σ_j r_j` over the stencil gives `A = ΔV/(πR⁴) Σ r I` within a lattice: `1/(π 2.4⁴) (6 + 12√2 + 8√3 + 6·2 + 24√5) = 0.984` at R = 2.4
-/// spacings; with one side missing the tangential and normal parts follow the same way.
+/// `Σ_j r_j` over the stencil gives `A = ΔV/(πR⁴) Σ r I` within a lattice:
+/// `1/(π 2.4⁴) (6 + 12√2 + 8√3 + 6·2 + 24√5) = 0.984` at R = 2.4 spacings; with one side missing the tangential and
+/// normal parts follow the same way.
 #[test]
 fn raw_sph_sees_the_identity_short_within_and_shorter_at_the_surface() {
     let model = ball();
@@ -41,7 +42,8 @@ fn raw_sph_sees_the_identity_short_within_and_shorter_at_the_surface() {
     assert!(least < 0.45 && least_at > 0.027);
 }
 
-/// Eq. 5 with displacements leaves the body alone at rest and where it moves as a whole; it takes a rotation for strain.
+/// Eq. 5 with displacements leaves the body alone at rest and where it moves as a whole; it takes a rotation for
+/// strain.
 #[test]
 fn the_layers_strain_is_free_of_translation_and_not_of_rotation() {
     let model = ball();
@@ -78,7 +80,7 @@ fn a_pair_of_stresses_conserves_momentum_and_energy_and_one_alone_neither() {
     let still = vec![DVec3::ZERO; count];
     let force = |pair, d: &[DVec3]| {
         let (mut stress, mut force) = (vec![DMat3::ZERO; count], still.clone());
-        sph::stresses_pa(region, &layer.stencil, &law, (d, &still), &mut stress);
+        sph::stresses_pa(region, &layer.stencil, &law, d, &still, &mut stress);
         sph::forces_n(region, &layer.stencil, layer.volume_m3, pair, &stress, &mut force);
         force
     };
@@ -103,7 +105,8 @@ fn a_pair_of_stresses_conserves_momentum_and_energy_and_one_alone_neither() {
     assert!(work(&both, &d) < 0.0, "it resists");
 }
 
-/// Root mean square speed (m/s) of awake particles after `steps` from random speeds of up to `speed`.
+/// Returns the root mean square speed (m/s) of awake particles at the start, from random speeds of up to `speed` (m/s),
+/// and after `steps` steps.
 fn speed_after(model: &SeedModel, speed: f64, steps: u32) -> [f64; 2] {
     let triangle = touched(model).0;
     let contact = SeedContact { triangle: Some(triangle), ..SeedContact::default() };
@@ -140,7 +143,7 @@ fn the_neighbours_stress_alone_flutters_at_any_step_and_both_do_not() {
     }
 }
 
-/// One step of a force on a vertex over awake particles: all of its momentum arrives.
+/// In one step of a force on a vertex over awake particles all of its momentum arrives.
 #[test]
 fn a_force_on_the_surface_gives_its_impulse() {
     for layer in [true, false] {

@@ -1,4 +1,4 @@
-//! The whole model on a ball of two layers.
+//! Tests of the whole model on a ball of two layers.
 mod exchange;
 mod forces;
 mod press;
@@ -17,14 +17,14 @@ fn ball_with(change: impl Fn(&mut SeedSpec)) -> SeedModel {
     SeedModel::build(spec).unwrap()
 }
 
-/// The triangle of the surface whose middle lies farthest along a direction.
+/// Returns the triangle of the surface whose middle lies farthest along a direction.
 fn triangle_towards(model: &SeedModel, direction: DVec3) -> u32 {
     let along = |t: &[u32; 3]| t.iter().map(|&v| model.surface_rest_m()[v as usize]).sum::<DVec3>().dot(direction);
     let triangles = model.surface_triangles();
     (0..triangles.len()).max_by(|&a, &b| along(&triangles[a]).total_cmp(&along(&triangles[b]))).unwrap() as u32
 }
 
-/// Where the tests touch, off all axes.
+/// Direction from the centre in which the tests touch the ball, off all axes.
 const TOUCHED: DVec3 = DVec3::new(0.3, 0.2, -1.0);
 
 fn touched(model: &SeedModel) -> (u32, &Region) {
@@ -32,13 +32,13 @@ fn touched(model: &SeedModel) -> (u32, &Region) {
     (triangle, &model.regions()[triangle as usize])
 }
 
-/// A triangle pressed inwards evenly to `depth_m` in `steps`. Means of the reaction (N), outwards, over tenths of the time, and the
-/// last state.
+/// Presses a triangle inwards evenly to `depth_m` (m) in `steps` steps. Returns the means of the outward reaction (N)
+/// over tenths of the time, and the last state.
 fn press(model: &SeedModel, depth_m: f64, steps: u32) -> (Vec<f64>, SeedState) {
     try_press(model, depth_m, steps).unwrap()
 }
 
-/// [`press`], or after how many steps the state was no longer finite.
+/// Does the same as [`press`], or returns after how many steps the state was no longer finite.
 fn try_press(model: &SeedModel, depth_m: f64, steps: u32) -> Result<(Vec<f64>, SeedState), u32> {
     let triangle = triangle_towards(model, TOUCHED);
     let corners = model.surface_triangles()[triangle as usize];

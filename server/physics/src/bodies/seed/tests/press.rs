@@ -2,13 +2,13 @@
 use super::{ball, ball_with, press, touched, triangle_towards, try_press};
 use crate::{
     bodies::seed::{
-        AtVertex, BorderForce, Exchange, PairStress, PaperModel, SeedContact, SeedParameters, SeedScratch, SeedState,
+        AtVertex, Exchange, InterfaceForce, PairStress, PaperModel, SeedContact, SeedParameters, SeedScratch, SeedState,
     },
     material::Viscosity,
 };
 use glam::DVec3;
 
-/// Table 1 of 2006, a corner of the layer pressed to 3 of its 10 mm in 500 steps.
+/// With table 1 of 2006 a triangle of the skin is pressed to 3 of the layer's 10 mm in 500 steps.
 #[test]
 fn a_press_stays_finite_and_pushes_back_the_more_the_deeper() {
     let model = ball();
@@ -48,13 +48,14 @@ fn twice_the_constants_push_twice_as_hard() {
     }
 }
 
-/// The printed border force does nothing while nobody leaves a voxel, and then drives them out, however short the step.
+/// The printed interface force does nothing while nobody leaves a voxel, and then drives them out, however short the
+/// step.
 #[test]
-fn the_printed_border_force_pumps_energy() {
+fn the_printed_interface_force_pumps_energy() {
     for (dt_s, steps) in [(7e-3, 500), (1e-3, 3500)] {
-        let result = |border_force| {
+        let result = |interface_force| {
             let model = ball_with(|spec| {
-                spec.parameters.border_force = border_force;
+                spec.parameters.interface_force = interface_force;
                 spec.parameters.dt_s = dt_s;
             });
             try_press(&model, 3e-3, steps).map(|(_, state)| {
@@ -62,7 +63,7 @@ fn the_printed_border_force_pumps_energy() {
                 (0..region.len()).map(|slot| state.particles.x[slot].distance(region.rest_m(slot))).fold(0.0, f64::max)
             })
         };
-        let (own, nearest) = (result(BorderForce::OwnVoxel), result(BorderForce::NearestVoxel));
+        let (own, nearest) = (result(InterfaceForce::OwnVoxel), result(InterfaceForce::NearestVoxel));
         println!("{dt_s} s: farthest particle (m) or last step: own {own:?}, nearest {nearest:?}");
         assert!(own.unwrap() < 8e-3 && nearest.is_err());
     }
@@ -101,7 +102,10 @@ fn a_core_alone_pushes_back_too() {
 fn as_printed_all_three_repairs_are_out() {
     let parameters = SeedParameters::paper_2006(PaperModel::Hybrid).as_printed();
     assert_eq!(parameters.pair_stress, PairStress::Neighbour);
-    assert_eq!((parameters.exchange, parameters.border_force), (Exchange::Displacements, BorderForce::NearestVoxel));
+    assert_eq!(
+        (parameters.exchange, parameters.interface_force),
+        (Exchange::Displacements, InterfaceForce::NearestVoxel)
+    );
     let model = ball_with(|spec| spec.parameters = parameters);
     // A short press is survived, a longer one not.
     let (_, state) = press(&model, 0.5e-3, 50);
@@ -111,7 +115,8 @@ fn as_printed_all_three_repairs_are_out() {
     assert!(burst.is_err());
 }
 
-/// "To obtain a more global motion of the object surface when no particles are activated": the links bring the skin home.
+/// "To obtain a more global motion of the object surface when no particles are activated": the links bring the skin
+/// back to rest.
 #[test]
 fn a_surface_that_is_let_go_comes_back() {
     let model = ball();
@@ -123,8 +128,9 @@ fn a_surface_that_is_let_go_comes_back() {
     };
     let stretched = |state: &SeedState| {
         let links = model.links().unwrap();
-        let stretch =
-            |(vertex, x): (usize, &DVec3)| x.distance(links.at_foot(vertex, &state.core.x) + links.offset_m[vertex]);
+        let stretch = |(vertex, x): (usize, &DVec3)| {
+            x.distance(links.at_attachment(vertex, &state.core.x) + links.offset_m[vertex])
+        };
         state.skin.x.iter().enumerate().map(stretch).fold(0.0, f64::max)
     };
     let (pressed, start) = (away(&state), stretched(&state));
@@ -143,7 +149,7 @@ fn a_surface_that_is_let_go_comes_back() {
     assert!(start > 0.5e-3 && stretched(&state) < 0.03 * start);
 }
 
-/// From triangle to neighbouring triangle, each pressed by a millimetre and let go: 200 touches in 70 s.
+/// One triangle after its neighbour is pressed by a millimetre and let go: 200 touches in 70 s.
 #[test]
 fn a_touch_that_walks_over_the_surface_stays_finite() {
     let model = ball();

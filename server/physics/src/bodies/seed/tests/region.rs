@@ -1,9 +1,9 @@
-//! Which particles are awake, and their border.
+//! Tests of which particles are awake, and of the interface of their region.
 use super::{TOUCHED, ball, ball_with, press, touched};
-use crate::bodies::seed::{BorderForce, SeedContact, SeedScratch, SeedState, region::Place};
+use crate::bodies::seed::{InterfaceForce, SeedContact, SeedScratch, SeedState, region::Place};
 use glam::DVec3;
 
-/// Whether the ray from `from` through `point` meets a triangle (Möller & Trumbore).
+/// Returns whether the ray from `from` through `point` meets a triangle (Möller & Trumbore).
 fn ray_meets(from: DVec3, point: DVec3, [a, b, c]: [DVec3; 3]) -> bool {
     let (along, ab, ac) = (point - from, b - a, c - a);
     let p = along.cross(ac);
@@ -44,28 +44,28 @@ fn a_region_holds_the_particles_in_the_cone_of_its_triangles_and_no_others() {
 }
 
 #[test]
-fn the_border_is_where_the_region_meets_the_rest_of_the_body() {
+fn the_interface_is_where_the_region_meets_the_rest_of_the_body() {
     let model = ball();
     let layer = model.layer().unwrap();
     let (_, region) = touched(&model);
-    let (mut border, mut free_side) = (0, 0);
+    let (mut interface, mut free_side) = (0, 0);
     for slot in 0..region.len() {
         let voxel = region.voxel_of[slot] as usize;
         let beside: Vec<Place> = region.voxels.beside(voxel).map(|v| region.places[v]).collect();
-        let is_border = region.places[voxel] == Place::ConstrainedPoints;
-        assert_eq!(is_border, beside.contains(&Place::Beyond));
+        let is_interface = region.places[voxel] == Place::Interface;
+        assert_eq!(is_interface, beside.contains(&Place::Beyond));
         assert!(region.rest_m(slot).distance(layer.rest_m(region.particles[slot])) < 1e-15);
-        border += usize::from(is_border);
-        free_side += usize::from(!is_border && beside.contains(&Place::Free));
+        interface += usize::from(is_interface);
+        free_side += usize::from(!is_interface && beside.contains(&Place::Free));
     }
-    assert!(border > 50 && free_side > 20, "{border} at the border, {free_side} at the free surface");
+    assert!(interface > 50 && free_side > 20, "{interface} at the interface, {free_side} at the free surface");
     assert!(region.on_core.len() > 20);
     for voxel in 0..region.voxels.count() {
         let gradient = region.gradient_m(voxel);
         let end = region.voxels.holding(region.voxels.centre_m(voxel) + gradient).unwrap();
-        assert_eq!(region.places[end], Place::ConstrainedPoints);
-        assert_eq!(gradient == DVec3::ZERO, region.places[voxel] == Place::ConstrainedPoints);
-        for &slot_voxel in region.voxel_of.iter().filter(|&&v| region.places[v as usize] == Place::ConstrainedPoints) {
+        assert_eq!(region.places[end], Place::Interface);
+        assert_eq!(gradient == DVec3::ZERO, region.places[voxel] == Place::Interface);
+        for &slot_voxel in region.voxel_of.iter().filter(|&&v| region.places[v as usize] == Place::Interface) {
             let distance = region.voxels.centre_m(slot_voxel as usize).distance(region.voxels.centre_m(voxel));
             assert!(distance > gradient.length() - 1e-12);
         }
@@ -73,24 +73,24 @@ fn the_border_is_where_the_region_meets_the_rest_of_the_body() {
 }
 
 #[test]
-fn the_border_draws_back_what_leaves_it() {
+fn the_interface_draws_back_what_leaves_it() {
     let model = ball();
     let (_, region) = touched(&model);
     let spacing = region.voxels.spacing_m;
     for slot in 0..region.len() {
         let here = region.rest_m(slot);
-        let is_border = region.places[region.voxel_of[slot] as usize] == Place::ConstrainedPoints;
+        let is_interface = region.places[region.voxel_of[slot] as usize] == Place::Interface;
         for direction in [DVec3::X, DVec3::Y, DVec3::Z, DVec3::NEG_ONE] {
-            let force = |x| region.border_force_n(BorderForce::OwnVoxel, 2.0, slot, x);
+            let force = |x| region.interface_force_n(InterfaceForce::OwnVoxel, 2.0, slot, x);
             assert_eq!(force(here + direction * 0.49 * spacing), DVec3::ZERO);
             let out = force(here + direction * 1.5 * spacing);
-            let expected = if is_border { direction * (-2.0 * spacing) } else { DVec3::ZERO };
+            let expected = if is_interface { direction * (-2.0 * spacing) } else { DVec3::ZERO };
             assert!((out - expected).length() < 1e-12);
-            // As printed: towards the nearest border voxel, in steps of a voxel.
+            // As printed: towards the nearest interface voxel, in steps of a voxel.
             let there = here + direction * 1.2 * spacing;
-            let printed = region.border_force_n(BorderForce::NearestVoxel, 2.0, slot, there);
+            let printed = region.interface_force_n(InterfaceForce::NearestVoxel, 2.0, slot, there);
             let voxel = region.voxels.holding(there).unwrap();
-            let acts = is_border || region.places[voxel] == Place::Beyond;
+            let acts = is_interface || region.places[voxel] == Place::Beyond;
             assert_eq!(printed, if acts { region.gradient_m(voxel) * 2.0 } else { DVec3::ZERO });
         }
     }

@@ -1,32 +1,34 @@
-//! How a home spring pulls: the law `g(u)` of its force `K_h g(u)` over the distance `u` from its rest position.
+//! The laws of anchor springs: `g(u)` of the force `K_h g(u)` that pulls a vertex back over the distance `u` from its
+//! rest position.
 //!
-//! All have slope 1 at rest, so that `K_h` is the stiffness there. With slopes `s_k` at distances `u_k`, linear between and constant beyond,
+//! Every law has slope 1 at rest, so that `K_h` is the stiffness there. With slopes `s_k` at distances `u_k`, linear
+//! between and constant beyond,
 //! ```text
 //! g(u) = ∫₀ᵘ s,   G(u) = ∫₀ᵘ g,   force −K_h g(u) û,   energy K_h G(u)
 //! ```
-//! so force and stiffness are continuous. `s_0 = 1` alone is the paper's linear spring.
+//! so that force and stiffness are continuous. The single slope `s_0 = 1` is the paper's linear spring.
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
-/// A home spring's law.
+/// The law of an anchor spring.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub enum HomeLaw {
-    /// `g = u`: the paper's.
+pub enum AnchorLaw {
+    /// The paper's law `g = u`.
     Linear,
-    /// `g = u + c u³`.
+    /// The law `g = u + c u³`.
     Cubic {
         /// `c` (1/m²).
         per_m2: f64,
     },
-    /// Several layers, one behind the other ([`Layers`]).
+    /// Several layers that lie one behind the other ([`Layers`]).
     Layers(Layers),
 }
 
-/// A slope that goes linearly from one distance to the next.
+/// A slope that is linear in the distance between given knots.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Layers {
-    /// Distance (m), ascending from 0, and slope there.
+    /// Knots by ascending distance, the first at 0.
     knots: Vec<Knot>,
 }
 
@@ -35,65 +37,66 @@ struct Knot {
     u_m: f64,
     slope: f64,
     g_m: f64,
-    /// `G` (m²).
+    /// Integral `G` (m²) of the law.
     integral_m2: f64,
 }
 
-/// One layer, of those in series.
+/// One of several layers in series.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Layer {
-    /// How far (m) it can be compressed; the last one without end.
+    /// Distance (m) by which it can be compressed; of the last layer it means nothing.
     pub thickness_m: f64,
-    /// Its stiffness over the first one's.
+    /// Its stiffness over that of the first layer.
     pub stiffness_ratio: f64,
 }
 
-/// Why a law is none.
+/// Why numbers make no law.
 #[derive(Debug, Clone, Copy, PartialEq, Error)]
-pub enum HomeLawError {
-    /// A number outside its range.
+pub enum AnchorLawError {
+    /// A number is outside its range.
     #[error("{name} = {value}: must be {rule}")]
     Setting {
-        /// Name.
+        /// Name of the number.
         name: &'static str,
-        /// Value.
+        /// Its value.
         value: f64,
         /// What it must be.
         rule: &'static str,
     },
-    /// No layers.
-    #[error("a home spring of layers needs at least one layer")]
+    /// There are no layers.
+    #[error("an anchor spring of layers needs at least one layer")]
     NoLayers,
 }
 
-/// A law at a distance.
+/// The values of a law at a distance.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct AtDistance {
-    /// `g` (m).
+    /// Law `g` (m).
     pub g_m: f64,
-    /// `g′`.
+    /// Slope `g′`.
     pub slope: f64,
-    /// `G` (m²).
+    /// Integral `G` (m²).
     pub integral_m2: f64,
 }
 
-impl HomeLaw {
-    /// A cubic spring.
+impl AnchorLaw {
+    /// Returns the law of a cubic spring.
     ///
     /// # Errors
-    /// A constant that is negative or not finite: the spring would push away from home.
-    pub fn cubic(per_m2: f64) -> Result<Self, HomeLawError> {
+    /// The constant is negative or not finite: the spring would push away from its rest position.
+    pub fn cubic(per_m2: f64) -> Result<Self, AnchorLawError> {
         check("per_m2", per_m2, (0.0..f64::INFINITY).contains(&per_m2), "finite and not negative")?;
         Ok(Self::Cubic { per_m2 })
     }
 
-    /// Layers in series that come to bear one after the other: while `u` is within the first `n` thicknesses the stiffness is the nth layer's. Over the
-    /// [`BLEND`] of a thickness before its end a layer's stiffness goes over to that of the next.
+    /// Returns the law of layers in series that are compressed one after the other: the stiffness is the nth layer's
+    /// while `u` lies in the nth thickness. Over the last [`BLEND`] of its thickness a layer's stiffness changes
+    /// linearly to that of the next.
     ///
     /// # Errors
-    /// No layers, or a thickness or stiffness that is not positive.
-    pub fn layers(layers: &[Layer]) -> Result<Self, HomeLawError> {
-        let first = layers.first().ok_or(HomeLawError::NoLayers)?;
+    /// There are no layers, or a thickness or stiffness is not positive.
+    pub fn layers(layers: &[Layer]) -> Result<Self, AnchorLawError> {
+        let first = layers.first().ok_or(AnchorLawError::NoLayers)?;
         let mut slopes = vec![(0.0, 1.0)];
         let mut depth_m = 0.0;
         for pair in layers.windows(2) {
@@ -115,7 +118,7 @@ impl HomeLaw {
         Ok(Self::Layers(Layers::new(&slopes)))
     }
 
-    /// At a distance (m) from home.
+    /// Returns the law's values at a distance (m) from the rest position.
     pub fn at(&self, u_m: f64) -> AtDistance {
         match self {
             Self::Linear => AtDistance { g_m: u_m, slope: 1.0, integral_m2: 0.5 * u_m * u_m },
@@ -131,7 +134,7 @@ impl HomeLaw {
         }
     }
 
-    /// `g(|u|) u/|u|` (m).
+    /// Returns `g(|u|) u/|u|` (m).
     pub fn stretched(&self, u_m: DVec3) -> DVec3 {
         match self {
             Self::Linear => u_m,
@@ -140,7 +143,7 @@ impl HomeLaw {
         }
     }
 
-    /// The steepest it gets within a distance (m): what bounds the stable step.
+    /// Returns the largest slope within a distance (m), which bounds the stable step.
     pub fn steepest_within(&self, u_m: f64) -> f64 {
         match self {
             Self::Linear => 1.0,
@@ -153,7 +156,7 @@ impl HomeLaw {
     }
 }
 
-/// Part of a layer's thickness over which its stiffness goes over to the next one's.
+/// Part of a layer's thickness over which its stiffness changes to that of the next layer.
 pub const BLEND: f64 = 0.2;
 
 impl Layers {
@@ -179,7 +182,8 @@ impl Layers {
 }
 
 impl Knot {
-    /// A way of `t` from here, over a piece of this length at whose end the slope is another.
+    /// Returns the values at the distance `t` (m) behind the knot, on a piece of this length (m) at whose end the slope
+    /// is `slope`.
     fn towards(&self, slope: f64, length_m: f64, t: f64) -> AtDistance {
         let change = if length_m > 0.0 { (slope - self.slope) / length_m } else { 0.0 };
         AtDistance {
@@ -190,18 +194,18 @@ impl Knot {
     }
 }
 
-fn check(name: &'static str, value: f64, ok: bool, rule: &'static str) -> Result<(), HomeLawError> {
-    if ok { Ok(()) } else { Err(HomeLawError::Setting { name, value, rule }) }
+fn check(name: &'static str, value: f64, ok: bool, rule: &'static str) -> Result<(), AnchorLawError> {
+    if ok { Ok(()) } else { Err(AnchorLawError::Setting { name, value, rule }) }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    fn laws() -> [HomeLaw; 3] {
+    fn laws() -> [AnchorLaw; 3] {
         let layers = [(1e-3, 1.0), (2e-3, 4.0), (1e-3, 30.0)];
         let layers = layers.map(|(thickness_m, stiffness_ratio)| Layer { thickness_m, stiffness_ratio });
-        [HomeLaw::Linear, HomeLaw::cubic(2e5).unwrap(), HomeLaw::layers(&layers).unwrap()]
+        [AnchorLaw::Linear, AnchorLaw::cubic(2e5).unwrap(), AnchorLaw::layers(&layers).unwrap()]
     }
 
     #[test]
@@ -232,10 +236,10 @@ mod tests {
 
     #[test]
     fn bad_numbers_are_named() {
-        assert!(matches!(HomeLaw::cubic(-1.0), Err(HomeLawError::Setting { name: "per_m2", .. })));
-        assert_eq!(HomeLaw::layers(&[]), Err(HomeLawError::NoLayers));
+        assert!(matches!(AnchorLaw::cubic(-1.0), Err(AnchorLawError::Setting { name: "per_m2", .. })));
+        assert_eq!(AnchorLaw::layers(&[]), Err(AnchorLawError::NoLayers));
         let layer = |thickness_m, stiffness_ratio| Layer { thickness_m, stiffness_ratio };
-        let refused = |layers: &[Layer]| HomeLaw::layers(layers).unwrap_err().to_string();
+        let refused = |layers: &[Layer]| AnchorLaw::layers(layers).unwrap_err().to_string();
         assert!(refused(&[layer(0.0, 1.0), layer(1.0, 1.0)]).contains("thickness_m = 0"));
         assert!(refused(&[layer(1.0, 1.0), layer(1.0, -2.0)]).contains("stiffness_ratio = -2"));
     }
