@@ -47,7 +47,7 @@ fn main() {
         let (mut quiet, mut fading, mut switching, mut awake) = (Vec::new(), Vec::new(), Vec::new(), 0);
         for tick in 0..TICKS {
             let before = rig.state.body.active_particles().to_vec();
-            let was_fading = !rig.state.body.as_hybrid().unwrap().fading().is_empty();
+            let was_prestrained = !rig.state.body.as_hybrid().unwrap().prestrain().is_empty();
             let start = Instant::now();
             let report = rig.tick_at(tool_m(tick));
             let took_us = start.elapsed().as_secs_f64() * 1e6;
@@ -55,7 +55,7 @@ fn main() {
             awake += rig.state.body.active_particles().len();
             if before != rig.state.body.active_particles() {
                 switching.push(took_us);
-            } else if was_fading {
+            } else if was_prestrained {
                 fading.push(took_us);
             } else {
                 quiet.push(took_us);

@@ -98,7 +98,7 @@ fn print_body(scene: &Scene) {
 fn print_particles(model: &Model) {
     let Some(hybrid) = model.body().as_hybrid() else { return };
     let spec = hybrid.particles();
-    let cage = hybrid.cage();
+    let embedding = hybrid.embedding();
     println!(
         "particles  {}, {} mm apart, at most {} awake; skin of {}",
         hybrid.partition().particle_count(),
@@ -121,8 +121,8 @@ fn print_particles(model: &Model) {
     }
     println!(
         "           the coarse tets' surface was moved by up to {} mm to hold them; {} outside never wake",
-        short(cage.moved_m * 1e3),
-        cage.outside
+        short(embedding.moved_m * 1e3),
+        embedding.outside
     );
     println!(
         "           coarse level of {}; {:.0} % of the volume is in whole cells, the surface cuts the others",
@@ -148,7 +148,7 @@ fn particle_warnings(model: &Model) -> Vec<String> {
             short(spec.spacing_m * 1e3)
         ));
     }
-    let outside = hybrid.cage().outside;
+    let outside = hybrid.embedding().outside;
     if outside as f64 > MANY_OUTSIDE * partition.particle_count() as f64 {
         warnings.push(format!(
             "{outside} of {} particles are outside the coarse tets and never wake: where they are, the body answers as coarsely as its tets; ask for more tets",

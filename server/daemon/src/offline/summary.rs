@@ -66,7 +66,7 @@ impl ParticleNumbers {
             spacing_m: model.body().particle_spacing_m(),
             most_active: model.body().most_awake_particles(),
             active: state.awake_particles(),
-            outside: model.body().as_hybrid().map_or(0, |hybrid| hybrid.cage().outside),
+            outside: model.body().as_hybrid().map_or(0, |hybrid| hybrid.embedding().outside),
             skin_triangles: model.surface().triangles.len(),
         })
     }

@@ -4,7 +4,7 @@ use crate::sim::exchange::LatticeSnapshot;
 use glam::DVec3;
 use palpate_physics::{
     Model,
-    bodies::hybrid::{composite::Anchor, place::Place},
+    bodies::hybrid::{composite::Anchor, trilinear_point::TrilinearPoint},
 };
 use std::collections::BTreeMap;
 
@@ -42,7 +42,8 @@ impl SkinReader {
         let hybrid = model.body().as_hybrid()?;
         let partition = hybrid.partition();
         let rest = model.surface_rest_positions_m();
-        let places: Vec<Place> = (0..rest.len() as u32).map(|vertex| hybrid.place(vertex).place(partition)).collect();
+        let places: Vec<TrilinearPoint> =
+            (0..rest.len() as u32).map(|vertex| hybrid.vertex_point(vertex).trilinear(partition)).collect();
         let mut number: BTreeMap<u32, u32> =
             places.iter().flat_map(|place| place.particles).map(|particle| (particle, 0)).collect();
         number.values_mut().zip(0..).for_each(|(slot, index)| *slot = index);
@@ -51,7 +52,7 @@ impl SkinReader {
             rest_m: partition.particle_m(particle),
             anchor: partition.anchor(particle),
         };
-        let vertex = |((place, rest), rest_f32): ((&Place, &DVec3), &[f32; 3])| Vertex {
+        let vertex = |((place, rest), rest_f32): ((&TrilinearPoint, &DVec3), &[f32; 3])| Vertex {
             carriers: place.particles.map(|particle| number[&particle]),
             weights: place.weights,
             rounding_m: *rest - DVec3::from(rest_f32.map(f64::from)),

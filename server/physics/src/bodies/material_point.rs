@@ -1,5 +1,5 @@
 //! A point of a body's material, and where it goes.
-use super::{Body, BodyState, hybrid::place::Place};
+use super::{Body, BodyState, hybrid::trilinear_point::TrilinearPoint};
 use crate::tick::MechanicalState;
 use glam::DVec3;
 
@@ -36,7 +36,7 @@ impl Body {
                     };
                     x - partition.particle_m(particle)
                 };
-                let place = Place::new(partition, point.rest_m);
+                let place = TrilinearPoint::new(partition, point.rest_m);
                 place.particles.into_iter().zip(place.weights).map(|(particle, w)| moved(particle) * w).sum()
             }
             (Self::MassSpring(body), BodyState::MassSpring(own)) => {

@@ -10,7 +10,7 @@
 //! balances linear momentum exactly; angular too where the tool turns, with the torque `Σ (y − c₀) × f` about its centre `c₀`. `k_f = α (λ + 2µ)/min(h, R)` with the size `h = √(2A₀)`
 //! of the surface element: the foundation vanishes with the mesh (its compliance is first order in h), and its frequency
 //! scales like the element's own. Where a node has much surface and little mass (a sharp edge or corner), `k_f` is lowered so
-//! that the nodal part of the bound below stays under [`FREQUENCY_SHARE`] of the body's own ω²_max: contact never rules the
+//! that the nodal part of the bound below stays under [`FREQUENCY_FRACTION`] of the body's own ω²_max: contact never rules the
 //! time step.
 //!
 //! Bound of the frequency. With `w_s = (ζ_s, −1)` on (nodes, tool), `K = Σ k a_s w_s w_sᵀ ⊗ C_s`, `C_s ≤ I`
@@ -26,7 +26,7 @@ use std::f64::consts::PI;
 /// α: foundation stiffness over that of one element layer, `(λ + 2µ)/h`. See `docs/adr` on contact.
 const STIFFNESS_RATIO: f64 = 8.0;
 /// Largest share of the body's ω²_max that contact may add at a node.
-const FREQUENCY_SHARE: f64 = 1.5;
+const FREQUENCY_FRACTION: f64 = 1.5;
 /// Sample spacing wanted, as a fraction of the tool's radius.
 pub(super) const SPACING: f64 = 1.0 / 3.0;
 /// Most subdivisions of a triangle's edge; larger triangles are refused.
@@ -226,7 +226,7 @@ fn most_at_nodes(body: &BodyAtRest<'_>, touched_m2: f64) -> Vec<f64> {
             area[node as usize] += third;
         }
     }
-    let most = |(area, mass): (&f64, &f64)| FREQUENCY_SHARE * body.frequency_sq * mass / area.min(touched_m2);
+    let most = |(area, mass): (&f64, &f64)| FREQUENCY_FRACTION * body.frequency_sq * mass / area.min(touched_m2);
     area.iter().zip(body.mass_kg).map(most).collect()
 }
 

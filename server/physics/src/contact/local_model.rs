@@ -36,7 +36,7 @@ const TANGENTIAL_RATIO: f64 = 0.75;
 /// Bound of the correction `s` and of its inverse.
 pub(super) const MOST_CORRECTION: f64 = 8.0;
 /// Share of a new secant in `ln s`.
-const SECANT_SHARE: f64 = 0.3;
+const SECANT_FRACTION: f64 = 0.3;
 /// Motion (over R) that makes a secant.
 const SECANT_MOTION: f64 = 0.01;
 /// Ticks after which a secant's start is too old.
@@ -103,7 +103,7 @@ impl StiffnessEstimate {
             let ratio = (force_n - self.start_force_n) / deeper_m / prior_n_per_m;
             if ratio > 0.0 {
                 let measured = ratio.ln().clamp(-MOST_CORRECTION.ln(), MOST_CORRECTION.ln());
-                self.log_correction += SECANT_SHARE * (measured - self.log_correction);
+                self.log_correction += SECANT_FRACTION * (measured - self.log_correction);
             }
             self.age_ticks = 0;
         }

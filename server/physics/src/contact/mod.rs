@@ -4,6 +4,7 @@
 //! fixed in the surface press and rub ([`foundation`], [`narrow`]), and the forces go to nodes and tool by the transpose.
 //! Once a tick the contact is summed up for the servo loop ([`local_model`]).
 mod axis;
+mod axis_samples;
 pub(crate) mod broad;
 mod foundation;
 mod inside;
@@ -12,7 +13,6 @@ mod local_torque;
 pub(crate) mod moduli;
 mod narrow;
 mod nearest;
-mod places;
 mod proxy;
 mod resting;
 mod spring;
@@ -25,12 +25,12 @@ mod touching;
 mod triangle;
 mod turning;
 
+pub(crate) use axis_samples::Near;
 pub(crate) use broad::Skin;
 pub use inside::is_inside;
 pub use local_torque::LocalTorqueModel;
 pub use moduli::SurfaceModuli;
 pub(crate) use nearest::deepest_m;
-pub(crate) use places::Near;
 pub use proxy::SubstepTime;
 pub(crate) use resting::{Pressing, RestingContact};
 pub(crate) use spring::SaturatingSpring;
@@ -88,7 +88,7 @@ pub struct TriangleFoundation<'a> {
 
 /// The body at one instant.
 #[derive(Debug, Clone, Copy)]
-pub struct Body<'a> {
+pub struct BodyMotion<'a> {
     /// Positions (m) of its nodes.
     pub x: &'a [DVec3],
     /// Velocities (m/s) of its nodes.

@@ -56,9 +56,9 @@ impl SubstepTime {
 
     /// At a tick's beginning: takes its path into the velocities that dampers have: `v ← v + (1 − e^{−T/τ}) (Δ/T − v)`.
     pub(super) fn smooth(&self, tool: &mut ToolState) {
-        let share = -(-self.tick_period_s / SMOOTHED_S).exp_m1();
+        let part = -(-self.tick_period_s / SMOOTHED_S).exp_m1();
         let smoothed = |old: DVec3, path: DVec3| {
-            let new = old + (path - old) * share;
+            let new = old + (path - old) * part;
             if path == DVec3::ZERO && new.length() < AT_REST { DVec3::ZERO } else { new }
         };
         tool.device_m_per_s = smoothed(tool.device_m_per_s, self.device(tool).1);
@@ -176,17 +176,17 @@ impl Pull {
         }
         *velocity_m_per_s += (contact_n + spring_n) * (h_s / mass_kg);
         // Impulse of the damper over h: m (1 − e^{−B h/m}) (ḋ − ċ)
-        let share = -(-damping_n_s_per_m * h_s / mass_kg).exp_m1();
+        let part = -(-damping_n_s_per_m * h_s / mass_kg).exp_m1();
         // |s + β d| ≤ limit and |s| ≤ limit: no more than twice the limit of it can be used.
-        let damper_n = shortened((device_m_per_s - *velocity_m_per_s) * (mass_kg * share / h_s), 2.0 * limit_n);
-        let damper_n = damper_n * share_within(spring_n, damper_n, limit_n);
+        let damper_n = shortened((device_m_per_s - *velocity_m_per_s) * (mass_kg * part / h_s), 2.0 * limit_n);
+        let damper_n = damper_n * fraction_within(spring_n, damper_n, limit_n);
         *velocity_m_per_s += damper_n * (h_s / mass_kg);
         spring_n + damper_n
     }
 }
 
 /// Largest `β ≤ 1` with `|s + β d| ≤ limit`, for `|s| ≤ limit`. A shortened damper still only takes energy.
-fn share_within(s: DVec3, d: DVec3, limit: f64) -> f64 {
+fn fraction_within(s: DVec3, d: DVec3, limit: f64) -> f64 {
     // A saturated spring may be a rounding beyond the limit by itself: without a damper there is nothing to shorten.
     if (s + d).length_squared() <= limit * limit || d == DVec3::ZERO {
         return 1.0;
@@ -226,12 +226,12 @@ mod tests {
     #[test]
     fn the_damper_is_cut_at_the_limit_and_never_reversed() {
         for (s, d) in [(DVec3::X, DVec3::X * 5.0), (DVec3::X * 2.0, DVec3::Y), (DVec3::X * 2.0, DVec3::NEG_X * 9.0)] {
-            let share = share_within(s, d, 2.0);
-            assert!((0.0..=1.0).contains(&share));
-            assert!((s + d * share).length() <= 2.0 + 1e-12, "{s} {d} {share}");
+            let part = fraction_within(s, d, 2.0);
+            assert!((0.0..=1.0).contains(&part));
+            assert!((s + d * part).length() <= 2.0 + 1e-12, "{s} {d} {part}");
         }
-        assert_eq!(share_within(DVec3::X, DVec3::X * 0.5, 2.0), 1.0);
+        assert_eq!(fraction_within(DVec3::X, DVec3::X * 0.5, 2.0), 1.0);
         // Without damping, a spring that saturated at the limit and a rounding made the tool's velocity not a number.
-        assert_eq!(share_within(DVec3::X * (2.0 + 1e-15), DVec3::ZERO, 2.0), 1.0);
+        assert_eq!(fraction_within(DVec3::X * (2.0 + 1e-15), DVec3::ZERO, 2.0), 1.0);
     }
 }

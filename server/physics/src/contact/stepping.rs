@@ -1,6 +1,6 @@
 //! The contact's part of a tick: its beginning, its substeps, its end.
 use super::{
-    Body, ContactModel, ContactScratch, ContactState, Coupling, SubstepTime, SurfaceNow, ToolScratch, ToolState,
+    BodyMotion, ContactModel, ContactScratch, ContactState, Coupling, SubstepTime, SurfaceNow, ToolScratch, ToolState,
     axis::Axis,
     broad::Skin,
     local_model::{self, MeanContact},
@@ -25,7 +25,7 @@ impl ContactModel {
     /// Once a substep, after the body drifted: moves the tools with it, and adds contact forces (N) on nodes to `forces_n`.
     pub fn substep(
         &self,
-        body: &Body<'_>,
+        body: &BodyMotion<'_>,
         time: &SubstepTime,
         tools: &mut [ToolState],
         contact: &mut ContactState,
@@ -220,14 +220,14 @@ impl ContactModel {
         substeps: u32,
         scratch: &mut ContactScratch,
     ) {
-        let share = 1.0 / f64::from(substeps);
+        let fraction = 1.0 / f64::from(substeps);
         for (index, (tool, scratch)) in tools.iter_mut().zip(&scratch.tools).enumerate() {
             let model = &self.tools[index];
-            let pressed = scratch.sum.scaled(share);
+            let pressed = scratch.sum.scaled(fraction);
             (tool.contact_force_n, tool.contact_torque_nm) = (pressed.force_n, pressed.torque_nm);
             (tool.device_force_n, tool.device_torque_nm) = match model.spec.coupling {
                 Coupling::Rigid => (pressed.force_n, pressed.torque_nm),
-                Coupling::Spring { .. } => (-scratch.coupling_sum_n * share, -scratch.coupling_sum_nm * share),
+                Coupling::Spring { .. } => (-scratch.coupling_sum_n * fraction, -scratch.coupling_sum_nm * fraction),
             };
             let mean =
                 MeanContact { pressed, device_force_n: tool.device_force_n, device_torque_nm: tool.device_torque_nm };

@@ -78,8 +78,8 @@ pub fn element_bound_rad_per_s(stiffness: &RestStiffness<'_>, inverse_mass_per_k
     for ((nodes, rest), &material) in mesh.tets().iter().zip(rest_tets).zip(tet_material) {
         let Lame { lambda_pa, mu_pa } = materials[material as usize].lame;
         let gram = nodes.iter().zip(rest.gradients_per_m).fold(DMat3::ZERO, |sum, (&node, b)| {
-            let share = rest.volume_m3 / volume_of_node[node as usize];
-            sum + outer(b, b) * (inverse_mass_per_kg[node as usize].max_element() / share)
+            let part = rest.volume_m3 / volume_of_node[node as usize];
+            sum + outer(b, b) * (inverse_mass_per_kg[node as usize].max_element() / part)
         });
         let modulus = 3.0 * lambda_pa.max(0.0) + 2.0 * mu_pa;
         largest_sq = largest_sq.max(rest.volume_m3 * modulus * largest_eigenvalue(&gram));

@@ -8,12 +8,12 @@ use super::{
     moments::{CellMoments, full_gradients_m2, integrate},
     partition::Partition,
     patch::{KEPT, Materials},
-    place::{Place, SkinPlace},
     projection::Lumping,
     sites::Sites,
     sizes,
     spec::{HybridError, ParticleSpec},
     transition_force::is_free,
+    trilinear_point::{CellPoint, TrilinearPoint},
 };
 use crate::{
     elements::{
@@ -33,7 +33,7 @@ pub(super) const NO_WEIGHT: f64 = 1e-9;
 
 /// Parts of the time to build a body: by when its cells are integrated, counted to coarse tets, and their particles known.
 const INTEGRATED: f64 = 0.15;
-const SHARED: f64 = 0.85;
+const COUNTED: f64 = 0.85;
 const MAY_WAKE: f64 = 0.95;
 
 /// What a hybrid body is made of. Constant after load.
@@ -55,13 +55,13 @@ pub struct HybridBody {
     /// Which particles may wake: those that follow some node that is free, none that is held along some axes only, and lie within the coarse tets.
     pub(super) may_wake: Vec<bool>,
     /// Where the skin's vertices are.
-    pub(super) places: Vec<SkinPlace>,
+    pub(super) vertex_points: Vec<CellPoint>,
     /// How much faster than the fastest node or particle a vertex of the skin can be.
     pub(super) amplification: f64,
     /// Bounds of the skin's triangles.
     pub(super) clusters: SkinClusters,
     pub(super) densities_kg_per_m3: Vec<f64>,
-    cage: CageSummary,
+    embedding: EmbeddingSummary,
     /// The coarse mesh, its boundary moved so that it holds the particles.
     coarse: TetMesh,
     /// What the particles were made from.
@@ -82,7 +82,7 @@ pub(crate) struct Built {
 
 /// What became of the coarse mesh's boundary.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct CageSummary {
+pub struct EmbeddingSummary {
     /// How far it was moved at most (m), so that the coarse tets hold the particles.
     pub moved_m: f64,
     /// Particles that they do not hold even so, which never wake.
@@ -111,7 +111,7 @@ impl HybridBody {
             return Err(HybridError::Nothing { spacing_m });
         }
         let EmbeddingMesh { mesh, moved_m, outside } = covering((mesh, surface), prescribed, &sites, &moments);
-        let cage = CageSummary { moved_m, outside };
+        let embedding = EmbeddingSummary { moved_m, outside };
         let composite = Composite::new(&mesh);
         let prescribed = with_edges(&mesh, surface, &composite, prescribed);
         let moments = match spec.fine_layers() {
@@ -119,9 +119,9 @@ impl HybridBody {
             None => moments,
         };
         let partition = Partition::new_with(sites, composite, &moments, &mut |part| {
-            progress(INTEGRATED + (SHARED - INTEGRATED) * part);
+            progress(INTEGRATED + (COUNTED - INTEGRATED) * part);
         });
-        progress(SHARED);
+        progress(COUNTED);
         let masses = Masses::new(&partition, |tet| densities_kg_per_m3[of_tet[tet] as usize]);
         let mut free: Vec<BVec3> = masses.node_kg.iter().map(|&mass| BVec3::splat(mass > 0.0)).collect();
         for set in &prescribed {
@@ -133,9 +133,9 @@ impl HybridBody {
         }
         let may_wake = (0..partition.particle_count() as u32).map(|p| may_wake(&partition, &free, p)).collect();
         progress(MAY_WAKE);
-        let places: Vec<SkinPlace> =
-            spec.skin.positions_m().iter().map(|&point| SkinPlace::new(&partition, point)).collect();
-        let of_places = places.iter().map(SkinPlace::amplification).fold(1.0, f64::max);
+        let vertex_points: Vec<CellPoint> =
+            spec.skin.positions_m().iter().map(|&point| CellPoint::new(&partition, point)).collect();
+        let of_vertices = vertex_points.iter().map(CellPoint::amplification).fold(1.0, f64::max);
         let of_anchors = (0..partition.particle_count() as u32)
             .map(|p| partition.anchor(p).weights.iter().map(|w| w.abs()).sum())
             .fold(1.0, f64::max);
@@ -149,10 +149,10 @@ impl HybridBody {
             free_parts: free.iter().map(|free| DVec3::select(*free, DVec3::ONE, DVec3::ZERO)).collect(),
             free,
             may_wake,
-            places,
-            amplification: of_places * of_anchors,
+            vertex_points,
+            amplification: of_vertices * of_anchors,
             clusters: SkinClusters::default(),
-            cage,
+            embedding,
             partition,
             masses,
             coarse: mesh,
@@ -216,7 +216,7 @@ impl HybridBody {
             mass_kg: &self.masses.node_kg,
             inverse_mass_per_kg: &self.inverse_mass_per_kg,
         };
-        first_free_part(&nodes, self.partition.shares().iter().map(|share| &share.nodes[..]))
+        first_free_part(&nodes, self.partition.residual_elements().iter().map(|residual| &residual.nodes[..]))
     }
 
     /// What prescribed sets need.
@@ -265,8 +265,8 @@ impl HybridBody {
     }
 
     /// Where a vertex of the skin is.
-    pub fn place(&self, vertex: u32) -> SkinPlace {
-        self.places[vertex as usize]
+    pub fn vertex_point(&self, vertex: u32) -> CellPoint {
+        self.vertex_points[vertex as usize]
     }
 
     /// How much faster than the fastest node or particle a vertex of the skin can be.
@@ -283,34 +283,34 @@ impl HybridBody {
     /// What a foundation can bear per area at the vertex, each of its particles then can.
     pub(crate) fn vertex_masses_kg(&self) -> Vec<f64> {
         let skin = &self.particles.skin;
-        let mut vertex_m2 = vec![0.0; self.places.len()];
+        let mut vertex_m2 = vec![0.0; self.vertex_points.len()];
         for triangle in 0..skin.triangles().len() {
             let [a, b, c] = skin.corners_m(triangle);
             let third = (b - a).cross(c - a).length() / 6.0;
             skin.triangles()[triangle].iter().for_each(|&vertex| vertex_m2[vertex as usize] += third);
         }
-        let places = || self.places.iter().map(|place| place.place(&self.partition)).zip(&vertex_m2);
+        let points = || self.vertex_points.iter().map(|point| point.trilinear(&self.partition)).zip(&vertex_m2);
         let mut particle_m2 = vec![0.0; self.partition.particle_count()];
-        for (place, area_m2) in places() {
-            for (particle, weight) in place.particles.into_iter().zip(place.weights) {
+        for (point, area_m2) in points() {
+            for (particle, weight) in point.particles.into_iter().zip(point.weights) {
                 particle_m2[particle as usize] += weight.max(0.0) * area_m2;
             }
         }
         let per_area = |particle: u32| self.masses.particle_kg[particle as usize] / particle_m2[particle as usize];
-        let of_vertex = |(place, area_m2): (Place, &f64)| {
-            let carriers = place.particles.into_iter().zip(place.weights).filter(|(_, weight)| *weight > 1e-6);
+        let of_vertex = |(point, area_m2): (TrilinearPoint, &f64)| {
+            let carriers = point.particles.into_iter().zip(point.weights).filter(|(_, weight)| *weight > 1e-6);
             area_m2 * carriers.map(|(particle, _)| per_area(particle)).fold(f64::INFINITY, f64::min)
         };
-        places().map(of_vertex).collect()
+        points().map(of_vertex).collect()
     }
 
     /// Springs (N/m) at vertices of the skin as their particles feel them: the row sums of `Σ_v k_v w_v w_vᵀ`.
     pub(crate) fn particle_springs_n_per_m(&self, of_vertices_n_per_m: &[f64]) -> Vec<f64> {
         let mut springs = vec![0.0; self.partition.particle_count()];
-        for (place, stiffness) in self.places.iter().zip(of_vertices_n_per_m) {
-            let amplification = place.amplification();
-            let place = place.place(&self.partition);
-            for (particle, weight) in place.particles.into_iter().zip(place.weights) {
+        for (point, stiffness) in self.vertex_points.iter().zip(of_vertices_n_per_m) {
+            let amplification = point.amplification();
+            let point = point.trilinear(&self.partition);
+            for (particle, weight) in point.particles.into_iter().zip(point.weights) {
                 springs[particle as usize] += stiffness * weight.abs() * amplification;
             }
         }
@@ -319,13 +319,13 @@ impl HybridBody {
 
     /// The material of the tet that a vertex of the skin is in.
     pub(crate) fn material_at(&self, vertex: u32) -> &Material {
-        let cell = self.partition.cells()[self.place(vertex).cell as usize];
+        let cell = self.partition.cells()[self.vertex_point(vertex).cell as usize];
         &self.materials[self.of_tet[cell.tet as usize] as usize]
     }
 
     /// What became of the coarse mesh's boundary.
-    pub fn cage(&self) -> CageSummary {
-        self.cage
+    pub fn embedding(&self) -> EmbeddingSummary {
+        self.embedding
     }
 }
 

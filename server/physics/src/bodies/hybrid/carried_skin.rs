@@ -80,14 +80,14 @@ impl Skin for SkinView<'_> {
     }
 
     fn position_m(&self, vertex: u32) -> DVec3 {
-        let place = self.hybrid.places[vertex as usize];
+        let cell_point = self.hybrid.vertex_points[vertex as usize];
         let partition = &self.hybrid.partition;
         let of = |particle: u32| match self.patch.point_of(particle) {
             NONE => partition.anchor(particle).of(self.patch.node_displacements_m()),
             point => self.patch.displacements_m()[point as usize],
         };
-        let particles = partition.corners(place.cell as usize);
-        let moved: DVec3 = particles.into_iter().zip(place.weights(partition)).map(|(p, w)| of(p) * w).sum();
+        let particles = partition.corners(cell_point.cell as usize);
+        let moved: DVec3 = particles.into_iter().zip(cell_point.weights(partition)).map(|(p, w)| of(p) * w).sum();
         self.hybrid.skin_rest_m()[vertex as usize] + moved
     }
 }
@@ -101,11 +101,11 @@ impl CarriedSkin for SkinView<'_> {
 
     fn carriers(&self, vertex: u32) -> Carried {
         let hybrid = self.hybrid;
-        let place = hybrid.places[vertex as usize];
+        let cell_point = hybrid.vertex_points[vertex as usize];
         let rest_m = hybrid.skin_rest_m()[vertex as usize];
         let mut carried = Carried { rest_m, carriers: [(Carrier::Point(NONE), 0.0); 8], weighty: 0 };
-        let particles = hybrid.partition.corners(place.cell as usize);
-        for (particle, weight) in particles.into_iter().zip(place.weights(&hybrid.partition)) {
+        let particles = hybrid.partition.corners(cell_point.cell as usize);
+        for (particle, weight) in particles.into_iter().zip(cell_point.weights(&hybrid.partition)) {
             if weight != 0.0 {
                 let carrier = match self.patch.point_of(particle) {
                     NONE => Carrier::Nodes(hybrid.partition.anchor(particle)),
@@ -129,13 +129,14 @@ impl CarriedSkin for SkinView<'_> {
 
     fn velocity_m_per_s(&self, vertex: u32) -> DVec3 {
         let hybrid = self.hybrid;
-        let place = hybrid.places[vertex as usize];
+        let cell_point = hybrid.vertex_points[vertex as usize];
         let of = |particle: u32| match self.patch.number_of(particle) {
             NONE => hybrid.partition.anchor(particle).of(self.v),
             number => self.v[hybrid.node_count() + number as usize],
         };
-        let particles = hybrid.partition.corners(place.cell as usize);
-        let weighty = particles.into_iter().zip(place.weights(&hybrid.partition)).filter(|(_, weight)| *weight != 0.0);
+        let particles = hybrid.partition.corners(cell_point.cell as usize);
+        let weighty =
+            particles.into_iter().zip(cell_point.weights(&hybrid.partition)).filter(|(_, weight)| *weight != 0.0);
         weighty.map(|(particle, weight)| of(particle) * weight).sum()
     }
 
@@ -162,8 +163,8 @@ impl HybridBody {
             };
             x - self.partition.particle_m(particle)
         };
-        let place = self.places[vertex as usize].place(&self.partition);
+        let cell_point = self.vertex_points[vertex as usize].trilinear(&self.partition);
         let rest_m = self.skin_rest_m()[vertex as usize];
-        rest_m + place.particles.into_iter().zip(place.weights).map(|(p, w)| moved(p) * w).sum::<DVec3>()
+        rest_m + cell_point.particles.into_iter().zip(cell_point.weights).map(|(p, w)| moved(p) * w).sum::<DVec3>()
     }
 }

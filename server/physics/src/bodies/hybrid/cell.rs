@@ -34,14 +34,14 @@ pub struct RestCell {
 
 impl RestCell {
     /// From `V_c` (m³) and `V_c b_cp` (m²) of the part of it that is body, of which it shall answer for the share `handed`.
-    pub fn new(edge_m: f64, handed: f64, moments: &(f64, [DVec3; 8])) -> Self {
-        Self::with_hanging(edge_m, handed, moments, Hanging::NONE)
+    pub fn new(edge_m: f64, fraction: f64, moments: &(f64, [DVec3; 8])) -> Self {
+        Self::with_hanging(edge_m, fraction, moments, Hanging::NONE)
     }
 
     /// The same of a cell with corners that hang, in terms of its particles, as the moments are.
     pub fn with_hanging(
         edge_m: f64,
-        handed: f64,
+        fraction: f64,
         (volume_m3, gradients_m2): &(f64, [DVec3; 8]),
         hanging: Hanging,
     ) -> Self {
@@ -53,7 +53,7 @@ impl RestCell {
             let raw = hanging.to_particles(raw);
             std::array::from_fn(|p| raw[p] - linear.dot(gradients_per_m[p]))
         });
-        let volume_m3 = handed * volume_m3;
+        let volume_m3 = fraction * volume_m3;
         let hourglass_m = HOURGLASS * 4.0 / 3.0 * volume_m3 / (edge_m * edge_m);
         Self { volume_m3, gradients_per_m, modes, hourglass_m }
     }

@@ -18,7 +18,7 @@ const ROUNDING: f64 = 1e-9;
 /// A node moves along its normal by what its faces need, over how far they face away from it, at least this.
 const LEAST_COSINE: f64 = 0.3;
 /// A face moves for a point where its free nodes carry more than this of it.
-const LEAST_SHARE: f64 = 0.3;
+const LEAST_FREE_PART: f64 = 0.3;
 /// What is moved is moved by so much too far, that rounds end.
 const SURPLUS: f64 = 1.05;
 /// No tet may lose more than this part of its volume in a round.
@@ -70,10 +70,10 @@ fn needs(mesh: &TetMesh, surface: &Surface, held: &BTreeSet<u32>, waiting: &mut 
         let nodes = surface.triangle_nodes(near.triangle);
         // Beside held nodes the face hardly moves with its free ones: such a point stays outside.
         let moves = |(node, weight): (&u32, f64)| if held.contains(node) { 0.0 } else { weight };
-        let share: f64 = nodes.iter().zip(near.weights).map(moves).sum();
-        if share > LEAST_SHARE {
+        let free_part: f64 = nodes.iter().zip(near.weights).map(moves).sum();
+        if free_part > LEAST_FREE_PART {
             for node in nodes {
-                needs[node as usize] = needs[node as usize].max(near.above_m / share);
+                needs[node as usize] = needs[node as usize].max(near.above_m / free_part);
             }
         }
         true
@@ -177,10 +177,10 @@ mod tests {
         let moments = integrate(&skin, &sites, &mut |_| {});
         let points: Vec<DVec3> =
             moments.iter().flat_map(|m| sites.corners(m.cell)).map(|site| sites.site_m(site)).collect();
-        let cage = cover(&mesh, &Surface::of(&mesh).unwrap(), &BTreeSet::new(), &points);
-        assert_eq!(cage.outside, 0);
-        assert!(cage.moved_m < 8e-3, "{}", cage.moved_m);
-        let partition = Partition::new(sites, Composite::new(&cage.mesh), &moments);
+        let embedding = cover(&mesh, &Surface::of(&mesh).unwrap(), &BTreeSet::new(), &points);
+        assert_eq!(embedding.outside, 0);
+        assert!(embedding.moved_m < 8e-3, "{}", embedding.moved_m);
+        let partition = Partition::new(sites, Composite::new(&embedding.mesh), &moments);
         let all: BTreeSet<u32> = (0..partition.particle_count() as u32).collect();
         assert!(all.iter().all(|&p| partition.anchor(p).weights.iter().all(|&w| w > -1e-8)));
         let masses = Masses::new(&partition, |_| 1000.0);
@@ -193,9 +193,9 @@ mod tests {
         let mesh = tet_box(DVec3::ZERO, DVec3::splat(0.02), [2, 2, 2]);
         let floor = (0..27).filter(|&n| mesh.positions_m()[n as usize].z < 1e-9).collect();
         let points = [DVec3::new(0.01, 0.01, 0.021), DVec3::new(0.021, 0.01, 0.01), DVec3::new(0.01, 0.01, -0.001)];
-        let cage = cover(&mesh, &Surface::of(&mesh).unwrap(), &floor, &points);
-        assert_eq!(cage.outside, 1);
-        for (node, (now, before)) in cage.mesh.positions_m().iter().zip(mesh.positions_m()).enumerate() {
+        let embedding = cover(&mesh, &Surface::of(&mesh).unwrap(), &floor, &points);
+        assert_eq!(embedding.outside, 1);
+        for (node, (now, before)) in embedding.mesh.positions_m().iter().zip(mesh.positions_m()).enumerate() {
             assert!(!floor.contains(&(node as u32)) || now == before);
         }
     }

@@ -12,7 +12,7 @@ use std::collections::BTreeSet;
 impl HybridBody {
     fn patch_of(&self, own: &HybridState) -> (Patch, BTreeSet<u32>) {
         let active: BTreeSet<u32> = own.ids().iter().copied().collect();
-        (Patch::new(&self.partition, &active).with_fading(own.fading().clone()), active)
+        (Patch::new(&self.partition, &active).with_prestrain(own.prestrain().clone()), active)
     }
 
     fn field(&self, list: &[DVec3]) -> Field {

@@ -54,8 +54,8 @@ impl HybridBody {
         let at_rest_m = self.partition.coarse().positions_m();
         let mut apply = |a: &[DVec3], out: &mut [DVec3]| {
             out.fill(DVec3::ZERO);
-            for (tet, share) in self.partition.shares().iter().enumerate() {
-                share.add_products_n(self.material_of_tet(tet as u32), at_rest_m, a, out);
+            for (tet, residual) in self.partition.residual_elements().iter().enumerate() {
+                residual.add_products_n(self.material_of_tet(tet as u32), at_rest_m, a, out);
             }
             for product in out {
                 *product = -*product;
@@ -173,9 +173,9 @@ mod tests {
         let mut found = 0.0;
         for _ in 0..600 {
             let mut products = vec![DVec3::ZERO; a.len()];
-            for tet in 0..hybrid.partition.shares().len() as u32 {
-                let (share, material) = (running.share(tet), hybrid.material_of_tet(tet));
-                share.add_products_n(material, hybrid.partition.coarse().positions_m(), &a, &mut products);
+            for tet in 0..hybrid.partition.residual_elements().len() as u32 {
+                let (residual, material) = (running.residual_element(tet), hybrid.material_of_tet(tet));
+                residual.add_products_n(material, hybrid.partition.coarse().positions_m(), &a, &mut products);
             }
             let before: f64 = a.iter().map(|a| a.length_squared()).sum();
             running.metric_mut().accelerate(&mut products);

@@ -75,6 +75,6 @@ impl Judged for SteppedHybrid<'_> {
     }
 
     fn accept(&mut self) {
-        self.scratch.hand_on_long_step(self.own);
+        self.scratch.pass_on_long_step(self.own);
     }
 }

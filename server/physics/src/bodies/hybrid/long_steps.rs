@@ -178,7 +178,7 @@ pub(super) struct LongStepHistory {
     /// How many of a tick began so far.
     begun: u32,
     at_start: LongSteps,
-    fading_at_start: Progress,
+    prestrain_at_start: Progress,
     /// [`HybridState::given_j`].
     given_at_start_j: f64,
 }
@@ -190,7 +190,7 @@ impl LongStepHistory {
             recent: [instant(), instant()],
             begun: 0,
             at_start: LongSteps::with_room(nodes, entries),
-            fading_at_start: Progress::default(),
+            prestrain_at_start: Progress::default(),
             given_at_start_j: 0.0,
         }
     }
@@ -199,7 +199,7 @@ impl LongStepHistory {
 impl HybridScratch {
     /// Before a tick that may be repeated.
     pub(crate) fn keep_long_steps(&mut self, own: &mut HybridState, state: &MechanicalState) {
-        self.long_steps.fading_at_start = own.fading.progress();
+        self.long_steps.prestrain_at_start = own.prestrain.progress();
         self.long_steps.given_at_start_j = own.given_j;
         let LongStepHistory { begun, at_start, .. } = &mut self.long_steps;
         *begun = 0;
@@ -212,7 +212,7 @@ impl HybridScratch {
 
     /// As it was then, to be taken in more long steps.
     pub(crate) fn put_long_steps_back(&mut self, own: &mut HybridState) {
-        own.fading.go_back(self.long_steps.fading_at_start);
+        own.prestrain.go_back(self.long_steps.prestrain_at_start);
         own.given_j = self.long_steps.given_at_start_j;
         let LongStepHistory { begun, at_start, .. } = &mut self.long_steps;
         *begun = 0;
@@ -232,7 +232,7 @@ impl HybridScratch {
     }
 
     /// After a tick that was accepted: what the next one is judged by, if it is one long step.
-    pub(crate) fn hand_on_long_step(&mut self, own: &mut HybridState) {
+    pub(crate) fn pass_on_long_step(&mut self, own: &mut HybridState) {
         let LongStepHistory { recent, begun, .. } = &mut self.long_steps;
         if *begun == 1 {
             std::mem::swap(&mut own.long_steps.before, &mut recent[0]);

@@ -183,11 +183,11 @@ mod tests {
     use super::*;
     use crate::bodies::hybrid::{
         patch::{Field, Materials, Patch},
-        testing::{Random, balls_in_cage, tissue},
+        testing::{Random, embedded_balls, tissue},
     };
     use crate::material::{Material, Viscosity};
 
-    struct Body {
+    struct TestBody {
         partition: Partition,
         masses: Masses,
         free: Vec<BVec3>,
@@ -195,11 +195,11 @@ mod tests {
     }
 
     /// With cells of one size and of two.
-    fn bodies() -> [Body; 2] {
-        balls_in_cage().map(|partition| {
+    fn bodies() -> [TestBody; 2] {
+        embedded_balls().map(|partition| {
             let masses = Masses::new(&partition, |_| 1000.0);
             let free = masses.node_kg.iter().map(|&m| BVec3::splat(m > 0.0)).collect();
-            Body { of_tet: vec![0; partition.shares().len()], masses, free, partition }
+            TestBody { of_tet: vec![0; partition.residual_elements().len()], masses, free, partition }
         })
     }
 
@@ -212,7 +212,7 @@ mod tests {
     }
 
     impl Flight {
-        fn new(body: &Body, active: &BTreeSet<u32>, x: Vec<DVec3>, v: Vec<DVec3>) -> Self {
+        fn new(body: &TestBody, active: &BTreeSet<u32>, x: Vec<DVec3>, v: Vec<DVec3>) -> Self {
             let patch = Patch::new(&body.partition, active);
             let metric = Metric::new(&body.partition, &body.masses, active, &body.free).unwrap();
             let follow = |nodes: Vec<DVec3>| Field { particles: patch.following(&body.partition, &nodes), nodes };
@@ -222,8 +222,8 @@ mod tests {
         fn momentum(&self) -> (DVec3, DVec3) {
             let mut momenta = self.metric.momenta(&self.v.nodes);
             momenta.extend(self.metric.particle_kg().iter().zip(&self.v.particles).map(|(m, w)| *w * *m));
-            let places = self.x.nodes.iter().chain(&self.x.particles);
-            (momenta.iter().sum(), places.zip(&momenta).map(|(x, p)| x.cross(*p)).sum())
+            let positions = self.x.nodes.iter().chain(&self.x.particles);
+            (momenta.iter().sum(), positions.zip(&momenta).map(|(x, p)| x.cross(*p)).sum())
         }
 
         fn kinetic_j(&self) -> f64 {
@@ -231,7 +231,7 @@ mod tests {
         }
 
         /// Leapfrog; returns elastic and kinetic energy (J).
-        fn fly(&mut self, body: &Body, materials: &Materials<'_>, dt_s: f64, steps: usize) -> f64 {
+        fn fly(&mut self, body: &TestBody, materials: &Materials<'_>, dt_s: f64, steps: usize) -> f64 {
             for _ in 0..steps {
                 self.kick(body, materials, 0.5 * dt_s);
                 for (x, v) in self.x.nodes.iter_mut().zip(&self.v.nodes) {
@@ -245,7 +245,7 @@ mod tests {
             self.kinetic_j() + self.patch.energy_j(materials, &self.x)
         }
 
-        fn kick(&mut self, body: &Body, materials: &Materials<'_>, h_s: f64) {
+        fn kick(&mut self, body: &TestBody, materials: &Materials<'_>, h_s: f64) {
             let (mut force, _) = self.patch.forces_n(materials, &self.x, &self.v);
             self.metric.accelerate(&body.free, &mut force.nodes);
             for (v, a) in self.v.nodes.iter_mut().zip(&force.nodes) {
@@ -257,7 +257,7 @@ mod tests {
         }
     }
 
-    fn some(body: &Body, of: impl Fn(DVec3) -> bool) -> BTreeSet<u32> {
+    fn some(body: &TestBody, of: impl Fn(DVec3) -> bool) -> BTreeSet<u32> {
         (0..body.partition.particle_count() as u32).filter(|&p| of(body.partition.particle_m(p))).collect()
     }
 

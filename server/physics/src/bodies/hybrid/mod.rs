@@ -17,7 +17,6 @@ pub mod metric;
 pub mod moments;
 pub mod partition;
 pub mod patch;
-pub mod place;
 pub mod prestrain;
 mod projection;
 pub mod residual_element;
@@ -36,6 +35,7 @@ pub(crate) mod switching;
 #[cfg(test)]
 pub(crate) mod testing;
 mod transition_force;
+pub mod trilinear_point;
 
 pub use body::HybridBody;
 pub(crate) use scratch::HybridScratch;

@@ -47,7 +47,7 @@ pub fn integrate(skin: &Skin, sites: &Sites, progress: &mut dyn FnMut(f64)) -> V
     let mut row = Row::new(sites);
     for (j, triangles) in in_row.iter().enumerate() {
         row.integrate(skin, triangles, j);
-        row.hand_over(j, &mut found);
+        row.move_into(j, &mut found);
         progress((j + 1) as f64 / rows as f64);
     }
     found.sort_by_key(|moments| moments.cell);
@@ -128,7 +128,7 @@ impl<'a> Row<'a> {
         let (along_x, along_y) = (ray % (nx * RAYS), ray / (nx * RAYS));
         let at = |n: usize| ((n % RAYS) as f64 + 0.5) / RAYS as f64;
         let (x, y) = (at(along_x), at(along_y));
-        let share = 1.0 / (RAYS * RAYS) as f64;
+        let fraction = 1.0 / (RAYS * RAYS) as f64;
         let (from, to) = (from.max(0.0), to.min(nz as f64));
         for k in from as usize..(to.ceil().max(0.0) as usize).min(nz) {
             let (a, b) = ((from - k as f64).max(0.0), (to - k as f64).min(1.0));
@@ -136,7 +136,7 @@ impl<'a> Row<'a> {
                 continue;
             }
             let sums = &mut self.sums[k * nx + along_x / RAYS];
-            sums.volume += (b - a) * share;
+            sums.volume += (b - a) * fraction;
             // ∫ z dz over the stretch
             let first = 0.5 * (b * b - a * a);
             for (gradient, corner) in sums.gradients.iter_mut().zip(super::sites::CORNERS) {
@@ -144,13 +144,13 @@ impl<'a> Row<'a> {
                 let wx = if corner.x == 0.0 { 1.0 - x } else { x };
                 let wy = if corner.y == 0.0 { 1.0 - y } else { y };
                 let wz = if corner.z == 0.0 { b - a - first } else { first };
-                *gradient += DVec3::new(sx * wy * wz, sy * wx * wz, sz * wx * wy * (b - a)) * share;
+                *gradient += DVec3::new(sx * wy * wz, sy * wx * wz, sz * wx * wy * (b - a)) * fraction;
             }
         }
     }
 
     /// Gives away what was found and clears it.
-    fn hand_over(&mut self, j: usize, found: &mut Vec<CellMoments>) {
+    fn move_into(&mut self, j: usize, found: &mut Vec<CellMoments>) {
         let [nx, ..] = self.sites.cells();
         let h = self.sites.spacing_m();
         for (at, sums) in self.sums.iter_mut().enumerate() {

@@ -58,7 +58,7 @@ pub struct Partition {
     particle_at: Vec<u32>,
     /// The coarse tet that each particle follows.
     tet_of_particle: Vec<u32>,
-    shares: Vec<ResidualElement>,
+    residual_elements: Vec<ResidualElement>,
 }
 
 impl Partition {
@@ -89,7 +89,7 @@ impl Partition {
             particles: Vec::new(),
             particle_at: vec![NONE; sites.site_count()],
             tet_of_particle: Vec::new(),
-            shares: vec![ResidualElement::default(); coarse.tets().len()],
+            residual_elements: vec![ResidualElement::default(); coarse.tets().len()],
             coarse,
         };
         let marks = sizes::mark(&sites, moments);
@@ -115,7 +115,7 @@ impl Partition {
             let (volume_m3, gradients_m2) = partition.moments(cell);
             let anchors = partition.corners(cell).map(|particle| partition.anchor(particle));
             let Cell { tet, part, .. } = partition.cells[cell];
-            partition.shares[tet as usize].add(part, 1.0, volume_m3, &gradients_m2, &anchors);
+            partition.residual_elements[tet as usize].add(part, 1.0, volume_m3, &gradients_m2, &anchors);
         }
         partition
     }
@@ -251,8 +251,8 @@ impl Partition {
     }
 
     /// A cell's rest data, to answer for the share `handed` of it.
-    pub fn rest_cell(&self, cell: usize, handed: f64) -> RestCell {
-        RestCell::with_hanging(self.edge_m(cell), handed, &self.moments(cell), self.hanging(cell))
+    pub fn rest_cell(&self, cell: usize, fraction: f64) -> RestCell {
+        RestCell::with_hanging(self.edge_m(cell), fraction, &self.moments(cell), self.hanging(cell))
     }
 
     /// Cells that a particle moves.
@@ -304,8 +304,8 @@ impl Partition {
     }
 
     /// What of the body each coarse tet has when all particles sleep.
-    pub fn shares(&self) -> &[ResidualElement] {
-        &self.shares
+    pub fn residual_elements(&self) -> &[ResidualElement] {
+        &self.residual_elements
     }
 
     /// Volume of all cells (m³).
@@ -326,33 +326,33 @@ impl Partition {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::bodies::hybrid::{composite::PARTS, testing::balls_in_cage};
+    use crate::bodies::hybrid::{composite::PARTS, testing::embedded_balls};
 
     #[test]
     fn parts_reproduce_affine_motion_and_balance_at_interior_nodes() {
-        for partition in balls_in_cage() {
+        for partition in embedded_balls() {
             let coarse = partition.coarse();
             let mut total = vec![DVec3::ZERO; coarse.positions_m().len()];
-            for share in partition.shares() {
+            for residual in partition.residual_elements() {
                 for part in 0..PARTS {
-                    let sum: DVec3 = share.moments_m2.iter().map(|m| m[part]).sum();
+                    let sum: DVec3 = residual.moments_m2.iter().map(|m| m[part]).sum();
                     assert!(sum.length() < 1e-18);
                     for axis in 0..3 {
-                        let column: DVec3 = share
+                        let column: DVec3 = residual
                             .nodes
                             .iter()
-                            .zip(&share.moments_m2)
+                            .zip(&residual.moments_m2)
                             .map(|(&n, m)| m[part] * coarse.positions_m()[n as usize][axis])
                             .sum();
-                        let expected = DVec3::AXES[axis] * share.volume_m3[part];
+                        let expected = DVec3::AXES[axis] * residual.volume_m3[part];
                         assert!((column - expected).length() < 1e-12 * 1e-6, "{column} {expected}");
                     }
                 }
-                for (&node, moments) in share.nodes.iter().zip(&share.moments_m2) {
+                for (&node, moments) in residual.nodes.iter().zip(&residual.moments_m2) {
                     total[node as usize] += moments.iter().sum::<DVec3>();
                 }
             }
-            let volume: f64 = partition.shares().iter().flat_map(|s| s.volume_m3).sum();
+            let volume: f64 = partition.residual_elements().iter().flat_map(|s| s.volume_m3).sum();
             assert!((volume / partition.volume_m3() - 1.0).abs() < 1e-12);
             // Nodes whose whole support lies within the body: none of its cut cells' particles follows them.
             let mut at_surface = vec![false; total.len()];
@@ -372,7 +372,7 @@ mod tests {
 
     #[test]
     fn cells_and_particles_know_each_other() {
-        for partition in balls_in_cage() {
+        for partition in embedded_balls() {
             for particle in 0..partition.particle_count() as u32 {
                 let around: Vec<usize> = partition.cells_at(particle).collect();
                 assert!(!around.is_empty());

@@ -23,12 +23,12 @@ pub struct Patch {
     /// Active particles, ascending.
     active: Vec<u32>,
     /// What the particles of the border follow; they are numbered after the active ones.
-    border: Vec<Anchor>,
+    constrained: Vec<Anchor>,
     cells: Vec<PatchCell>,
     /// What is left to each coarse tet.
-    shares: Vec<ResidualElement>,
+    residual_elements: Vec<ResidualElement>,
     /// What woke or fell asleep strained.
-    fading: PrestrainDecay,
+    prestrain: PrestrainDecay,
 }
 
 #[derive(Debug, Clone)]
@@ -79,19 +79,19 @@ impl Patch {
         let active: Vec<u32> = active.iter().copied().collect();
         let awake: BTreeSet<usize> = active.iter().flat_map(|&particle| partition.cells_at(particle)).collect();
         let mut point_of: BTreeMap<u32, u32> = active.iter().copied().zip(0..).collect();
-        let mut border = Vec::new();
-        let mut shares = partition.shares().to_vec();
+        let mut constrained = Vec::new();
+        let mut residual_elements = partition.residual_elements().to_vec();
         let cells = awake
             .into_iter()
             .map(|number| {
                 let (cell, moments) = (&partition.cells()[number], partition.moments(number));
                 let corners = partition.corners(number);
                 let anchors = corners.map(|particle| partition.anchor(particle));
-                shares[cell.tet as usize].add(cell.part, KEPT - 1.0, moments.0, &moments.1, &anchors);
+                residual_elements[cell.tet as usize].add(cell.part, KEPT - 1.0, moments.0, &moments.1, &anchors);
                 let points = std::array::from_fn(|p| {
                     *point_of.entry(corners[p]).or_insert_with(|| {
-                        border.push(anchors[p]);
-                        (active.len() + border.len()) as u32 - 1
+                        constrained.push(anchors[p]);
+                        (active.len() + constrained.len()) as u32 - 1
                     })
                 });
                 PatchCell {
@@ -102,13 +102,13 @@ impl Patch {
                 }
             })
             .collect();
-        Self { active, border, cells, shares, fading: PrestrainDecay::default() }
+        Self { active, constrained, cells, residual_elements, prestrain: PrestrainDecay::default() }
     }
 
     /// The same patch with what fades in it; products leave that out.
     #[must_use]
-    pub fn with_fading(self, fading: PrestrainDecay) -> Self {
-        Self { fading, ..self }
+    pub fn with_prestrain(self, prestrain: PrestrainDecay) -> Self {
+        Self { prestrain, ..self }
     }
 
     /// Active particles, ascending.
@@ -132,25 +132,25 @@ impl Patch {
         let points = self.points(at);
         let of_cell = |cell: &PatchCell| {
             let (material, y) = (materials.of(cell.tet as usize), cell.of(&points));
-            match self.fading.of_cell(cell.number) {
-                Some(fade) => fade.energy_j(&cell.rest, material, &y),
+            match self.prestrain.of_cell(cell.number) {
+                Some(prestrain) => prestrain.energy_j(&cell.rest, material, &y),
                 None => cell.rest.energy_j(material, &y),
             }
         };
         let fine: f64 = self.cells.iter().map(of_cell).sum();
-        let of_share = |(tet, share): (usize, &ResidualElement)| match self.fading.of_tet(tet as u32) {
-            Some(fade) => fade.energy_j(share, materials.of(tet), &at.nodes),
-            None => share.energy_j(materials.of(tet), &at.nodes),
+        let of_residual = |(tet, residual): (usize, &ResidualElement)| match self.prestrain.of_tet(tet as u32) {
+            Some(prestrain) => prestrain.energy_j(residual, materials.of(tet), &at.nodes),
+            None => residual.energy_j(materials.of(tet), &at.nodes),
         };
-        fine + self.shares.iter().enumerate().map(of_share).sum::<f64>()
+        fine + self.residual_elements.iter().enumerate().map(of_residual).sum::<f64>()
     }
 
     /// Smallest `det F` of coarse tets' means and cells, and its tet.
     pub fn min_volume_ratio(&self, at: &Field) -> (f64, usize) {
         let points = self.points(at);
         let of_cell = |cell: &PatchCell| (cell.rest.gradient_of(&cell.of(&points)).determinant(), cell.tet as usize);
-        let of_share = |(tet, share): (usize, &ResidualElement)| (share.volume_ratio(&at.nodes), tet);
-        let all = self.cells.iter().map(of_cell).chain(self.shares.iter().enumerate().map(of_share));
+        let of_residual = |(tet, residual): (usize, &ResidualElement)| (residual.volume_ratio(&at.nodes), tet);
+        let all = self.cells.iter().map(of_cell).chain(self.residual_elements.iter().enumerate().map(of_residual));
         all.fold((f64::INFINITY, 0), |least, found| if found.0 < least.0 { found } else { least })
     }
 
@@ -159,7 +159,8 @@ impl Patch {
         let points = self.points(at);
         let is_inverted = |cell: &&PatchCell| cell.rest.gradient_of(&cell.of(&points)).determinant() <= 0.0;
         let cells = self.cells.iter().filter(is_inverted).count();
-        (cells + self.shares.iter().filter(|share| share.volume_ratio(&at.nodes) <= 0.0).count()) as u32
+        (cells + self.residual_elements.iter().filter(|residual| residual.volume_ratio(&at.nodes) <= 0.0).count())
+            as u32
     }
 
     /// Forces (N) of elastic and viscous stress at positions `at` and velocities `rate`, and the power (W) that viscous stress takes.
@@ -170,21 +171,21 @@ impl Patch {
         let mut power_w = 0.0;
         for cell in &self.cells {
             let (material, y, rate) = (materials.of(cell.tet as usize), cell.of(&points), cell.of(&rates));
-            let (forces, power) = match self.fading.of_cell(cell.number) {
-                Some(fade) => fade.forces_n(&cell.rest, material, &y, &rate),
+            let (forces, power) = match self.prestrain.of_cell(cell.number) {
+                Some(prestrain) => prestrain.forces_n(&cell.rest, material, &y, &rate),
                 None => cell.rest.forces_n(material, &y, &rate),
             };
             cell.add(&forces, &mut of_points);
             power_w += power;
         }
-        for (tet, share) in self.shares.iter().enumerate() {
+        for (tet, residual) in self.residual_elements.iter().enumerate() {
             let material = materials.of(tet);
-            power_w += match self.fading.of_tet(tet as u32) {
-                Some(fade) => fade.add_forces_n(share, material, &at.nodes, &rate.nodes, &mut nodes),
-                None => share.add_forces_n(material, &at.nodes, &rate.nodes, &mut nodes),
+            power_w += match self.prestrain.of_tet(tet as u32) {
+                Some(prestrain) => prestrain.add_forces_n(residual, material, &at.nodes, &rate.nodes, &mut nodes),
+                None => residual.add_forces_n(material, &at.nodes, &rate.nodes, &mut nodes),
             };
         }
-        (self.handed_back(nodes, of_points), power_w)
+        (self.push_constrained(nodes, of_points), power_w)
     }
 
     /// `−K a` (N): the change of the elastic forces along `a` at positions `at`.
@@ -196,27 +197,27 @@ impl Patch {
             let material = materials.of(cell.tet as usize);
             cell.add(&cell.rest.products_n(material, &cell.of(&points), &cell.of(&changes)), &mut of_points);
         }
-        for (tet, share) in self.shares.iter().enumerate() {
-            share.add_products_n(materials.of(tet), &at.nodes, &a.nodes, &mut nodes);
+        for (tet, residual) in self.residual_elements.iter().enumerate() {
+            residual.add_products_n(materials.of(tet), &at.nodes, &a.nodes, &mut nodes);
         }
-        self.handed_back(nodes, of_points)
+        self.push_constrained(nodes, of_points)
     }
 
     /// Diagonal blocks (N/m) of the stiffness at rest, of the coarse nodes and then of the active particles; the identity where there is none.
     pub fn diagonal_n_per_m(&self, materials: &Materials<'_>, nodes: usize) -> Vec<DMat3> {
         let mut of_nodes = vec![DMat3::ZERO; nodes];
-        let mut of_points = vec![DMat3::ZERO; self.active.len() + self.border.len()];
+        let mut of_points = vec![DMat3::ZERO; self.active.len() + self.constrained.len()];
         for cell in &self.cells {
             let blocks = cell.rest.diagonal_n_per_m(materials.of(cell.tet as usize));
             cell.points.iter().zip(blocks).for_each(|(&point, block)| of_points[point as usize] += block);
         }
-        for (anchor, block) in self.border.iter().zip(of_points.split_off(self.active.len())) {
+        for (anchor, block) in self.constrained.iter().zip(of_points.split_off(self.active.len())) {
             for (&node, weight) in anchor.nodes.iter().zip(anchor.weights) {
                 of_nodes[node as usize] += block * (weight * weight);
             }
         }
-        for (tet, share) in self.shares.iter().enumerate() {
-            share.add_diagonal_n_per_m(materials.of(tet), &mut of_nodes);
+        for (tet, residual) in self.residual_elements.iter().enumerate() {
+            residual.add_diagonal_n_per_m(materials.of(tet), &mut of_nodes);
         }
         let filled = |block: DMat3| if block == DMat3::ZERO { DMat3::IDENTITY } else { block };
         of_nodes.into_iter().chain(of_points).map(filled).collect()
@@ -224,12 +225,12 @@ impl Patch {
 
     /// Of active particles, then of those of the border.
     fn points(&self, a: &Field) -> Vec<DVec3> {
-        a.particles.iter().copied().chain(self.border.iter().map(|anchor| anchor.of(&a.nodes))).collect()
+        a.particles.iter().copied().chain(self.constrained.iter().map(|anchor| anchor.of(&a.nodes))).collect()
     }
 
     /// Forces of the border go to the coarse nodes.
-    fn handed_back(&self, mut nodes: Vec<DVec3>, mut of_points: Vec<DVec3>) -> Field {
-        for (anchor, force) in self.border.iter().zip(&of_points[self.active.len()..]) {
+    fn push_constrained(&self, mut nodes: Vec<DVec3>, mut of_points: Vec<DVec3>) -> Field {
+        for (anchor, force) in self.constrained.iter().zip(&of_points[self.active.len()..]) {
             for (&node, weight) in anchor.nodes.iter().zip(anchor.weights) {
                 nodes[node as usize] += *force * weight;
             }
@@ -254,7 +255,7 @@ impl PatchCell {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::bodies::hybrid::testing::{Random, balls_in_cage, moved, plus, random_like, tissue};
+    use crate::bodies::hybrid::testing::{Random, embedded_balls, moved, plus, random_like, tissue};
     use glam::DQuat;
 
     fn half_awake(partition: &Partition) -> Patch {
@@ -279,12 +280,12 @@ mod tests {
 
     #[test]
     fn half_awake_uniform_stress_leaves_all_that_is_inside_in_balance() {
-        for partition in balls_in_cage() {
+        for partition in embedded_balls() {
             let patch = half_awake(&partition);
             let rest = patch.at_rest(&partition);
             let (nodes, particles) = interior(&partition, &patch);
             assert!(nodes.len() > 3 && particles.len() > 50, "{} {}", nodes.len(), particles.len());
-            let of_tet = vec![0; partition.shares().len()];
+            let of_tet = vec![0; partition.residual_elements().len()];
             let mut random = Random(7);
             for material in tissue() {
                 let materials = Materials { materials: &[material], of_tet: &of_tet };
@@ -311,10 +312,10 @@ mod tests {
 
     #[test]
     fn rigid_motion_is_free_of_force_and_force_of_momentum() {
-        for partition in balls_in_cage() {
+        for partition in embedded_balls() {
             let patch = half_awake(&partition);
             let rest = patch.at_rest(&partition);
-            let of_tet = vec![0; partition.shares().len()];
+            let of_tet = vec![0; partition.residual_elements().len()];
             let turn = DQuat::from_axis_angle(DVec3::new(0.48, 0.6, 0.64), 2.1);
             let mut random = Random(9);
             for material in tissue() {
@@ -340,10 +341,10 @@ mod tests {
 
     #[test]
     fn forces_are_the_energys_gradient_and_products_theirs() {
-        for partition in balls_in_cage() {
+        for partition in embedded_balls() {
             let patch = half_awake(&partition);
             let rest = patch.at_rest(&partition);
-            let of_tet = vec![0; partition.shares().len()];
+            let of_tet = vec![0; partition.residual_elements().len()];
             let mut random = Random(8);
             for material in tissue() {
                 let materials = Materials { materials: &[material], of_tet: &of_tet };

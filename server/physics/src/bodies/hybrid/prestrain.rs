@@ -21,7 +21,7 @@ use glam::{DMat3, DVec3};
 use serde::{Deserialize, Serialize};
 
 /// τ (s).
-pub(super) const FADING_S: f64 = 0.04;
+pub(super) const DECAY_S: f64 = 0.04;
 /// A change of rest state smaller than this is none.
 const NOTHING: f64 = 1e-6;
 /// One smaller than this has no energy to speak of.
@@ -95,17 +95,22 @@ fn piola(material: &Material, f: &DMat3, a: &DMat3) -> DMat3 {
 }
 
 /// `U_c` (J) of effective gradients, and of modes' `(1 − a) Σ_k w_k |q_k|²` (m²).
-pub(super) fn cell_j(rest: &RestCell, material: &Material, [shape, volume]: [&DMat3; 2], modes_m2: f64) -> f64 {
+pub(super) fn cell_energy_j(rest: &RestCell, material: &Material, [shape, volume]: [&DMat3; 2], modes_m2: f64) -> f64 {
     let (of_shape, of_volume) = split(material);
     let density = of_shape.energy_density(shape) + of_volume.energy_density(volume);
     rest.volume_m3 * density + 0.5 * rest.hourglass_m * material.lame.mu_pa * modes_m2
 }
 
 /// `U_e` (J) of effective gradients.
-pub(super) fn share_j(share: &ResidualElement, material: &Material, shapes: &[DMat3; PARTS], whole: &DMat3) -> f64 {
+pub(super) fn residual_energy_j(
+    residual: &ResidualElement,
+    material: &Material,
+    shapes: &[DMat3; PARTS],
+    whole: &DMat3,
+) -> f64 {
     let (of_shape, of_volume) = split(material);
-    let shape: f64 = shapes.iter().zip(share.volume_m3).map(|(f, v)| v * of_shape.energy_density(f)).sum();
-    shape + share.total_m3() * of_volume.energy_density(whole)
+    let shape: f64 = shapes.iter().zip(residual.volume_m3).map(|(f, v)| v * of_shape.energy_density(f)).sum();
+    shape + residual.total_m3() * of_volume.energy_density(whole)
 }
 
 /// `Σ_k w_k |q_k|²` (m²).
@@ -124,23 +129,23 @@ impl PrestrainDecay {
 
     /// Of these cells and tets, ascending.
     pub fn new(cells: Vec<CellPrestrain>, tets: Vec<ResidualPrestrain>) -> Self {
-        let mut fading = Self { cells, tets, ..Self::default() };
-        fading.start();
-        fading
+        let mut decay = Self { cells, tets, ..Self::default() };
+        decay.start();
+        decay
     }
 
     /// Adds all that fades, and how far it has.
     pub(super) fn chain(&self, chain: &mut Chain) {
-        chain.list(&self.cells, |chain, fade| {
-            chain.whole(u64::from(fade.cell));
-            chain.matrix(&fade.shape);
-            chain.matrix(&fade.volume);
-            chain.real(fade.modes);
+        chain.list(&self.cells, |chain, prestrain| {
+            chain.whole(u64::from(prestrain.cell));
+            chain.matrix(&prestrain.shape);
+            chain.matrix(&prestrain.volume);
+            chain.real(prestrain.modes);
         });
-        chain.list(&self.tets, |chain, fade| {
-            chain.whole(u64::from(fade.tet));
-            fade.parts.iter().for_each(|part| chain.matrix(part));
-            chain.matrix(&fade.whole);
+        chain.list(&self.tets, |chain, prestrain| {
+            chain.whole(u64::from(prestrain.tet));
+            prestrain.parts.iter().for_each(|part| chain.matrix(part));
+            chain.matrix(&prestrain.whole);
         });
         chain.real(self.progress.left);
         self.progress.along_j.into_iter().for_each(|along_j| chain.real(along_j));
@@ -177,7 +182,7 @@ impl PrestrainDecay {
 
     /// From now on it fades: all has been taken, but for the order of tets.
     pub(super) fn start(&mut self) {
-        self.tets.sort_unstable_by_key(|fade| fade.tet);
+        self.tets.sort_unstable_by_key(|prestrain| prestrain.tet);
         self.progress = Progress { left: 1.0, along_j: [0.0; 2] };
         let of_cells = self.cells.iter().map(CellPrestrain::largest);
         self.most = of_cells.chain(self.tets.iter().map(ResidualPrestrain::largest)).fold(0.0, f64::max);
@@ -185,24 +190,24 @@ impl PrestrainDecay {
         let mix = |mark: u64, word: u64| (mark ^ word).wrapping_mul(0x0100_0000_01b3);
         let of_matrix =
             |mark: u64, a: &DMat3| a.to_cols_array().iter().fold(mark, |mark, entry| mix(mark, entry.to_bits()));
-        let of_cell = |mark: u64, fade: &CellPrestrain| {
-            let mark = mix(mix(mark, u64::from(fade.cell)), fade.modes.to_bits());
-            of_matrix(of_matrix(mark, &fade.shape), &fade.volume)
+        let of_cell = |mark: u64, prestrain: &CellPrestrain| {
+            let mark = mix(mix(mark, u64::from(prestrain.cell)), prestrain.modes.to_bits());
+            of_matrix(of_matrix(mark, &prestrain.shape), &prestrain.volume)
         };
-        let of_tet = |mark: u64, fade: &ResidualPrestrain| {
-            fade.parts.iter().chain([&fade.whole]).fold(mix(mark, u64::from(fade.tet)), of_matrix)
+        let of_tet = |mark: u64, prestrain: &ResidualPrestrain| {
+            prestrain.parts.iter().chain([&prestrain.whole]).fold(mix(mark, u64::from(prestrain.tet)), of_matrix)
         };
         let mark = self.cells.iter().fold(0xcbf2_9ce4_8422_2325, of_cell);
         self.mark = self.tets.iter().fold(mix(mark, self.cells.len() as u64), of_tet);
     }
 
     /// Time (s) goes on.
-    pub(crate) fn go_on(&mut self, time_s: f64) {
-        self.progress.left *= factor(time_s, FADING_S);
+    pub(crate) fn advance(&mut self, time_s: f64) {
+        self.progress.left *= factor(time_s, DECAY_S);
     }
 
     /// Whether so little is left that it is nothing.
-    pub(super) fn has_faded(&self) -> bool {
+    pub(super) fn has_decayed(&self) -> bool {
         !self.is_empty() && self.most * self.left() < NOTHING
     }
 
@@ -214,7 +219,7 @@ impl PrestrainDecay {
     /// Takes `s ∂U/∂s` (J) of coarse tets (0) or of cells (1); returns the energy (J) that fading took within the time (s) since the last one.
     pub(crate) fn take_along(&mut self, level: usize, along_j: f64, time_s: f64) -> f64 {
         let before_j = std::mem::replace(&mut self.progress.along_j[level], along_j);
-        0.5 * (before_j + along_j) * time_s / FADING_S
+        0.5 * (before_j + along_j) * time_s / DECAY_S
     }
 
     pub(super) fn copy_from(&mut self, other: &Self) {
@@ -232,7 +237,7 @@ impl PrestrainDecay {
 
     /// What is left of a cell's, if it fades.
     pub(super) fn of_cell(&self, cell: u32) -> Option<CellPrestrain> {
-        let at = self.cells.binary_search_by_key(&cell, |fade| fade.cell).ok()?;
+        let at = self.cells.binary_search_by_key(&cell, |prestrain| prestrain.cell).ok()?;
         let CellPrestrain { shape, volume, modes, .. } = self.cells[at];
         let left = self.left();
         Some(CellPrestrain { cell, shape: shape * left, volume: volume * left, modes: modes * left })
@@ -240,14 +245,14 @@ impl PrestrainDecay {
 
     /// What is left of a tet's, if it fades.
     pub(super) fn of_tet(&self, tet: u32) -> Option<ResidualPrestrain> {
-        let at = self.tets.binary_search_by_key(&tet, |fade| fade.tet).ok()?;
+        let at = self.tets.binary_search_by_key(&tet, |prestrain| prestrain.tet).ok()?;
         let ResidualPrestrain { parts, whole, .. } = self.tets[at];
         Some(ResidualPrestrain { tet, parts: parts.map(|part| part * self.left()), whole: whole * self.left() })
     }
 
     /// All that is left of tets', ascending.
     pub(super) fn left_of_tets(&self) -> impl Iterator<Item = ResidualPrestrain> + '_ {
-        self.tets.iter().filter_map(|fade| self.of_tet(fade.tet))
+        self.tets.iter().filter_map(|prestrain| self.of_tet(prestrain.tet))
     }
 
     /// Whether cells and tets ascend.
@@ -285,7 +290,7 @@ impl CellPrestrain {
     /// `U_c` (J).
     pub(super) fn energy_j(&self, rest: &RestCell, material: &Material, y: &[DVec3; 8]) -> f64 {
         let [shape, volume] = self.effective(rest, y);
-        cell_j(rest, material, [&shape, &volume], (1.0 - self.modes) * modes_m2(rest, y))
+        cell_energy_j(rest, material, [&shape, &volume], (1.0 - self.modes) * modes_m2(rest, y))
     }
 
     /// `f_p` (N), and the power (W) that viscous stress takes.
@@ -330,44 +335,44 @@ impl ResidualPrestrain {
     }
 
     /// Effective gradients of the parts' shape, and of the tet's volume.
-    pub(super) fn effective(&self, share: &ResidualElement, gradients: &[DMat3; PARTS]) -> ([DMat3; PARTS], DMat3) {
-        let mean = share.mean(gradients);
+    pub(super) fn effective(&self, residual: &ResidualElement, gradients: &[DMat3; PARTS]) -> ([DMat3; PARTS], DMat3) {
+        let mean = residual.mean(gradients);
         (std::array::from_fn(|part| effective(&gradients[part], &self.parts[part])), effective(&mean, &self.whole))
     }
 
     /// `U_e` (J).
-    pub(super) fn energy_j(&self, share: &ResidualElement, material: &Material, x: &[DVec3]) -> f64 {
-        if share.nodes.is_empty() {
+    pub(super) fn energy_j(&self, residual: &ResidualElement, material: &Material, x: &[DVec3]) -> f64 {
+        if residual.nodes.is_empty() {
             return 0.0;
         }
-        let (shapes, whole) = self.effective(share, &share.gradients(x, DMat3::IDENTITY));
-        share_j(share, material, &shapes, &whole)
+        let (shapes, whole) = self.effective(residual, &residual.gradients(x, DMat3::IDENTITY));
+        residual_energy_j(residual, material, &shapes, &whole)
     }
 
     /// Adds forces (N) to `forces_n`; returns the power (W) that viscous stress takes.
     pub(super) fn add_forces_n(
         &self,
-        share: &ResidualElement,
+        residual: &ResidualElement,
         material: &Material,
         x: &[DVec3],
         v: &[DVec3],
         forces_n: &mut [DVec3],
     ) -> f64 {
-        if share.nodes.is_empty() {
+        if residual.nodes.is_empty() {
             return 0.0;
         }
         let (of_shape, of_volume) = split(material);
-        let gradients = share.gradients(x, DMat3::IDENTITY);
-        let pressure = piola(&of_volume, &share.mean(&gradients), &self.whole);
+        let gradients = residual.gradients(x, DMat3::IDENTITY);
+        let pressure = piola(&of_volume, &residual.mean(&gradients), &self.whole);
         let mut power_w = 0.0;
         let mut stresses = [pressure; PARTS];
         for part in 0..PARTS {
             stresses[part] += piola(&of_shape, &gradients[part], &self.parts[part]);
         }
         if !material.viscosity.is_zero() {
-            power_w = share.add_viscous_pa(material, &gradients, v, &mut stresses);
+            power_w = residual.add_viscous_pa(material, &gradients, v, &mut stresses);
         }
-        share.scatter(&stresses, forces_n);
+        residual.scatter(&stresses, forces_n);
         power_w
     }
 }

@@ -108,7 +108,7 @@ impl Projection {
     }
 
     /// A particle of `(1 − ε) m_p` (kg) falls asleep away (m) from where it would be.
-    pub(super) fn hand_over(&mut self, body: &HybridBody, anchor: &Anchor, mass_kg: f64, away_m: DVec3) {
+    pub(super) fn transfer(&mut self, body: &HybridBody, anchor: &Anchor, mass_kg: f64, away_m: DVec3) {
         anchor.push(away_m * mass_kg, &mut self.moments);
         for (node, weight) in anchor.nodes.into_iter().zip(anchor.weights) {
             self.is_moved[node as usize] |= weight > 0.0 && body.free[node as usize].all();
@@ -204,7 +204,7 @@ mod tests {
         let mut projection = Projection::with_room(&body, waking.len());
         projection.start(body.node_count());
         for (&p, away) in fell.iter().zip(&away) {
-            projection.hand_over(&body, &partition.anchor(p), kg(p), *away);
+            projection.transfer(&body, &partition.anchor(p), kg(p), *away);
         }
         let (start, moved) = (projection.moments.clone(), projection.is_moved.clone());
         let shifts = projection.solve(&body, patch.metric_mut()).to_vec();

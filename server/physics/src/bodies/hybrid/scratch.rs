@@ -25,10 +25,10 @@ pub(crate) struct HybridScratch {
     pub(crate) of_free_j: Option<(f64, f64)>,
     /// `fᵀ M'⁻¹ f` (N²/kg) at the last three kicks, the last one first.
     pub(crate) kick_sq: [f64; 3],
-    pub(super) looking: ActivationQuery,
-    pub(super) coming: StagedPatch,
+    pub(super) query: ActivationQuery,
+    pub(super) staged: StagedPatch,
     pub(super) before: Before,
-    pub(crate) balance: TransitionForce,
+    pub(crate) transition: TransitionForce,
     pub(super) long_steps: LongStepHistory,
 }
 
@@ -37,22 +37,22 @@ impl HybridScratch {
     pub(crate) fn new(body: &HybridBody, environment: &Environment) -> Self {
         let (most, positions) = (body.particles.most_active, body.most_positions());
         let patch = || RunningPatch::new(body, most, environment.settings.precision);
-        let (mut patch, coming) = (patch(), StagedPatch::new(patch()));
+        let (mut patch, staged) = (patch(), StagedPatch::new(patch()));
         patch.wake(body, &[], &PrestrainDecay::default());
         Self {
-            coming,
+            staged,
             patch,
-            skin: ListedVertices::new(body.places.len()),
+            skin: ListedVertices::new(body.vertex_points.len()),
             accelerations: Vec::with_capacity(positions),
             momenta: Vec::with_capacity(positions),
             of_free_j: None,
             kick_sq: [0.0; 3],
-            looking: ActivationQuery::new(body, &environment.tools),
+            query: ActivationQuery::new(body, &environment.tools),
             before: Before::with_room(
                 room_for_cells(body, body.particles.most_active),
-                body.partition().shares().len(),
+                body.partition().residual_elements().len(),
             ),
-            balance: TransitionForce::with_room(positions),
+            transition: TransitionForce::with_room(positions),
             long_steps: LongStepHistory::with_room(body.node_count(), positions),
         }
     }
@@ -83,9 +83,9 @@ impl HybridScratch {
     /// Makes the patch that of the state's active particles. Allocates nothing.
     pub(super) fn follow(&mut self, body: &HybridBody, active: &HybridState) {
         if self.patch.active() != active.ids() {
-            self.patch.wake(body, active.ids(), &active.fading);
-        } else if !self.patch.knows(&active.fading) {
-            self.patch.put_fades(&active.fading);
+            self.patch.wake(body, active.ids(), &active.prestrain);
+        } else if !self.patch.knows(&active.prestrain) {
+            self.patch.put_prestrains(&active.prestrain);
         }
     }
 }

@@ -118,7 +118,7 @@ mod tests {
     }
 
     #[test]
-    fn numbers_and_places_agree() {
+    fn numbers_and_positions_agree() {
         let sites = Sites::covering((DVec3::ZERO, DVec3::new(0.3, 0.2, 0.4)), 0.1, DVec3::ZERO);
         for cell in 0..sites.cell_count() {
             assert_eq!(sites.cell(sites.cell_at(cell)), cell);

@@ -175,7 +175,7 @@ mod tests {
     use crate::bodies::hybrid::{
         partition::{NONE, Partition},
         sites::{CORNERS, trilinear},
-        testing::balls_in_cage,
+        testing::embedded_balls,
     };
     use std::collections::BTreeMap;
 
@@ -192,7 +192,7 @@ mod tests {
 
     #[test]
     fn displacements_are_continuous_between_cells_of_two_sizes() {
-        let [one_size, partition] = balls_in_cage();
+        let [one_size, partition] = embedded_balls();
         let sites = *partition.sites();
         let doubled = partition.cells().iter().filter(|cell| cell.doubled).count();
         assert_eq!(one_size.cells().len(), partition.cells().len() + 7 * doubled);
@@ -229,12 +229,12 @@ mod tests {
 
     /// As a cell at rest is eight of half its edge.
     #[test]
-    fn particles_reproduce_places_and_volume() {
-        let [_, partition] = balls_in_cage();
+    fn particles_reproduce_positions_and_volume() {
+        let [_, partition] = embedded_balls();
         for number in 0..partition.cells().len() {
             let cell = partition.cells()[number];
             let first_m = partition.sites().cell_m(cell.site_cell as usize);
-            let places_m = partition.corners(number).map(|p| partition.particle_m(p));
+            let positions_m = partition.corners(number).map(|p| partition.particle_m(p));
             for corner in 0..8 {
                 let at_m: glam::DVec3 = at_corner(&partition, number, corner)
                     .into_iter()
@@ -245,17 +245,17 @@ mod tests {
             let (volume_m3, gradients_m2) = partition.moments(number);
             let rest = partition.rest_cell(number, 1.0);
             for axis in 0..3 {
-                let column: glam::DVec3 = gradients_m2.iter().zip(places_m).map(|(g, x)| *g * x[axis]).sum();
+                let column: glam::DVec3 = gradients_m2.iter().zip(positions_m).map(|(g, x)| *g * x[axis]).sum();
                 assert!((column - glam::DVec3::AXES[axis] * volume_m3).length() < 1e-12 * 1e-9);
             }
-            assert!(rest.amplitudes(&places_m).iter().all(|q| q.length() < 1e-16));
+            assert!(rest.amplitudes(&positions_m).iter().all(|q| q.length() < 1e-16));
             assert!((partition.particles_m3(number).iter().sum::<f64>() / volume_m3 - 1.0).abs() < 1e-14);
         }
     }
 
     #[test]
     fn only_what_is_whole_and_deep_enough_is_merged() {
-        let [one_size, _] = balls_in_cage();
+        let [one_size, _] = embedded_balls();
         let sites = *one_size.sites();
         let is_whole = |at: [usize; 3]| {
             let cell = one_size.cell_at(sites.cell(at));

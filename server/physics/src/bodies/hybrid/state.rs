@@ -17,9 +17,9 @@ pub struct HybridState {
     pub(super) wanted: Vec<u32>,
     /// Of every place of every tool.
     pub(super) balls: Vec<Option<Ball>>,
-    pub(crate) fading: PrestrainDecay,
+    pub(crate) prestrain: PrestrainDecay,
     /// Balancing forces (N), as many as positions, or none.
-    pub(super) balance_n: Vec<DVec3>,
+    pub(super) transition_force_n: Vec<DVec3>,
     /// Energy (J) that fading strains and balancing forces gave lately, beyond what they and switches took.
     pub(crate) given_j: f64,
     /// Elastic energy (J) of what a switch lately changed, the most of any.
@@ -35,12 +35,12 @@ impl HybridState {
             ids: Vec::with_capacity(most),
             next: Vec::with_capacity(most),
             wanted: Vec::with_capacity(most),
-            balls: vec![None; places(body, tools).sum()],
-            fading: PrestrainDecay::with_room(
+            balls: vec![None; axis_sample_counts(body, tools).sum()],
+            prestrain: PrestrainDecay::with_room(
                 room_for_cells(body, body.particles.most_active),
-                body.partition.shares().len(),
+                body.partition.residual_elements().len(),
             ),
-            balance_n: Vec::with_capacity(positions),
+            transition_force_n: Vec::with_capacity(positions),
             given_j: 0.0,
             switched_j: 0.0,
             long_steps: LongSteps::with_room(body.node_count(), positions),
@@ -53,8 +53,8 @@ impl HybridState {
     }
 
     /// What of them and of the coarse tets woke or fell asleep strained.
-    pub fn fading(&self) -> &PrestrainDecay {
-        &self.fading
+    pub fn prestrain(&self) -> &PrestrainDecay {
+        &self.prestrain
     }
 
     /// How many.
@@ -97,8 +97,8 @@ impl HybridState {
         self.next.clear();
         self.wanted.clear();
         self.balls.fill(None);
-        self.fading.clear();
-        self.balance_n.clear();
+        self.prestrain.clear();
+        self.transition_force_n.clear();
         self.given_j = 0.0;
         self.switched_j = 0.0;
         self.long_steps.forget();
@@ -115,8 +115,8 @@ impl HybridState {
                 chain.whole(u64::from(ball.away_ticks));
             });
         });
-        self.fading.chain(chain);
-        chain.vectors(&self.balance_n);
+        self.prestrain.chain(chain);
+        chain.vectors(&self.transition_force_n);
         chain.real(self.given_j);
         chain.real(self.switched_j);
         self.long_steps.chain(chain);
@@ -127,8 +127,8 @@ impl HybridState {
         self.next.clone_from(&other.next);
         self.wanted.clone_from(&other.wanted);
         self.balls.clone_from(&other.balls);
-        self.fading.copy_from(&other.fading);
-        self.balance_n.clone_from(&other.balance_n);
+        self.prestrain.copy_from(&other.prestrain);
+        self.transition_force_n.clone_from(&other.transition_force_n);
         self.given_j = other.given_j;
         self.switched_j = other.switched_j;
         self.long_steps.copy_from(&other.long_steps);
@@ -139,17 +139,17 @@ impl HybridState {
         let (nodes, positions) = (body.node_count(), body.node_count() + self.ids.len());
         let may_wake = |id: &u32| body.may_wake(*id);
         let finite = |ball: &Ball| ball.rest_m.is_finite();
-        self.balls.len() == places(body, tools).sum::<usize>()
+        self.balls.len() == axis_sample_counts(body, tools).sum::<usize>()
             && self.balls.iter().flatten().all(finite)
-            && self.fading.is_finite()
-            && [0, positions].contains(&self.balance_n.len())
-            && self.balance_n.iter().all(|force| force.is_finite())
+            && self.prestrain.is_finite()
+            && [0, positions].contains(&self.transition_force_n.len())
+            && self.transition_force_n.iter().all(|force| force.is_finite())
             && self.given_j.is_finite()
             && self.switched_j.is_finite()
             && self.long_steps.fit(nodes, positions)
-            && self.fading.is_sorted()
-            && self.fading.cells.iter().all(|fade| self.touches(body, fade.cell))
-            && self.fading.tets.iter().all(|fade| (fade.tet as usize) < body.coarse().tets().len())
+            && self.prestrain.is_sorted()
+            && self.prestrain.cells.iter().all(|prestrain| self.touches(body, prestrain.cell))
+            && self.prestrain.tets.iter().all(|prestrain| (prestrain.tet as usize) < body.coarse().tets().len())
             && [&self.ids, &self.next, &self.wanted].into_iter().all(|list| {
                 list.len() <= body.particles.most_active && list.is_sorted_by(|a, b| a < b) && list.iter().all(may_wake)
             })
@@ -183,7 +183,7 @@ impl HybridState {
             list.resize(nodes + self.next.len(), DVec3::ZERO);
         }
         self.ids.clone_from(&self.next);
-        self.balance_n.clear();
+        self.transition_force_n.clear();
         self.long_steps.forget();
         state.force_is_current = false;
     }
@@ -195,10 +195,10 @@ pub(super) fn room_for_cells(body: &HybridBody, most_active: usize) -> usize {
 }
 
 /// Places of each tool that may keep particles awake: so near to one another that the balls about them overlap.
-pub(super) fn places(body: &HybridBody, tools: &[ToolSpec]) -> impl Iterator<Item = usize> + Clone {
+pub(super) fn axis_sample_counts(body: &HybridBody, tools: &[ToolSpec]) -> impl Iterator<Item = usize> + Clone {
     let apart_m = match body.particles.waking {
         Waking::ByTools { reach_m } => reach_m,
         Waking::ByHand => f64::INFINITY,
     };
-    tools.iter().map(move |tool| tool.place_count(apart_m))
+    tools.iter().map(move |tool| tool.axis_sample_count(apart_m))
 }

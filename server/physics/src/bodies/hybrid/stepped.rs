@@ -40,24 +40,24 @@ impl SteppedHybrid<'_> {
         let MechanicalState { x, v, force_n, viscous, ledger, .. } = &mut *state;
         let every = tick.environment.steps.substeps_per_long_step;
         let (mut viscous_w, mut taken_j) = (0.0, 0.0);
-        own.fading.go_on(now.dt_s);
-        let left = own.fading.left();
+        own.prestrain.advance(now.dt_s);
+        let left = own.prestrain.left();
         own.long_steps.turn_with(body, x);
         if every > 1 && now.ends_long_step {
             let of_coarse = |forces_n: &mut [DVec3]| patch.add_coarse_forces_n(v, left, forces_n);
             let found = own.long_steps.evaluate(body.node_count(), of_coarse);
             viscous_w += f64::from(every) * found.viscous_w;
-            taken_j += own.fading.take_along(0, found.fading_j, f64::from(every) * now.dt_s);
+            taken_j += own.prestrain.take_along(0, found.prestrain_j, f64::from(every) * now.dt_s);
         }
         own.long_steps.start_with_steady_n(force_n);
         if every == 1 {
             let found = patch.add_coarse_forces_n(v, left, force_n);
             viscous_w += found.viscous_w;
-            taken_j += own.fading.take_along(0, found.fading_j, now.dt_s);
+            taken_j += own.prestrain.take_along(0, found.prestrain_j, now.dt_s);
         }
         let found = patch.add_cell_forces_n(body, v, left, force_n);
         viscous_w += found.viscous_w;
-        taken_j += own.fading.take_along(1, found.fading_j, now.dt_s);
+        taken_j += own.prestrain.take_along(1, found.prestrain_j, now.dt_s);
         viscous.record(viscous_w, now.dt_s > 0.0);
         ledger.dissipated_j += taken_j;
         own.given_j -= taken_j;
@@ -66,7 +66,7 @@ impl SteppedHybrid<'_> {
             patch.metric().add_weight_n(gravity, &mut state.force_n);
         }
         vector_operations::add(&mut state.force_n, &state.external_n);
-        scratch.balance.apply(body, own, state);
+        scratch.transition.apply(body, own, state);
         state.force_is_current = true;
     }
 
@@ -84,7 +84,7 @@ impl SteppedHybrid<'_> {
         ends_long_step: bool,
     ) {
         let Self { body, own, scratch } = self;
-        let HybridScratch { patch, accelerations, momenta, of_free_j, kick_sq, balance, .. } = &mut **scratch;
+        let HybridScratch { patch, accelerations, momenta, of_free_j, kick_sq, transition, .. } = &mut **scratch;
         accelerations.clear();
         accelerations.extend_from_slice(&state.force_n);
         if ends_long_step {
@@ -102,7 +102,7 @@ impl SteppedHybrid<'_> {
         }
         *kick_sq = [patch.metric_mut().accelerate(accelerations), kick_sq[0], kick_sq[1]];
         let inertia_w = patch.metric().of_holders(&state.v, accelerations);
-        let taken_j = balance.work_j((&state.v, factor), accelerations, h_s);
+        let taken_j = transition.work_j((&state.v, factor), accelerations, h_s);
         state.ledger.dissipated_j += taken_j;
         own.given_j -= taken_j;
         let free_parts = if factor < 1.0 { body.free_parts() } else { &[] };

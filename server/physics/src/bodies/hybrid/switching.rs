@@ -21,7 +21,7 @@ use super::{
     running_metric::RunningMetric,
     scratch::HybridScratch,
     spec::{ParticleSpec, Waking},
-    state::{HybridState, places},
+    state::{HybridState, axis_sample_counts},
     stepped::SteppedHybrid,
     transition_force::{Turn, turn_of},
 };
@@ -71,7 +71,7 @@ pub(super) struct ActivationQuery {
     /// Momenta (kg m/s) handed to coarse nodes.
     impulses: Vec<DVec3>,
     /// Forces (N) handed to them.
-    handed_n: Vec<DVec3>,
+    transferred_n: Vec<DVec3>,
     projection: Projection,
     /// Positions (m) of the coarse nodes before, and how far they are moved (m).
     were_m: Vec<DVec3>,
@@ -94,7 +94,7 @@ impl ActivationQuery {
         Self {
             found: Vec::with_capacity(
                 in_ball
-                    .saturating_mul(places(body, tools).max().unwrap_or_default())
+                    .saturating_mul(axis_sample_counts(body, tools).max().unwrap_or_default())
                     .min(body.partition.particle_count()),
             ),
             is_found: vec![false; body.partition.particle_count()],
@@ -102,7 +102,7 @@ impl ActivationQuery {
             unwanted: Vec::with_capacity(most),
             moved: Vec::with_capacity(most),
             impulses: Vec::with_capacity(body.node_count() + most),
-            handed_n: Vec::with_capacity(body.node_count()),
+            transferred_n: Vec::with_capacity(body.node_count()),
             projection: Projection::with_room(body, most),
             were_m: Vec::with_capacity(body.node_count()),
             shifts_m: Vec::with_capacity(body.node_count()),
@@ -119,19 +119,19 @@ impl SteppedHybrid<'_> {
         let tick_period_s = environment.settings.tick_period_s;
         scratch.follow(body, own);
         own.long_steps.follow_coarse_forces(tick_period_s, &mut state.force_n);
-        if !own.fading.is_empty() || !own.balance_n.is_empty() {
-            scratch.fade(own, state, tick_period_s);
+        if !own.prestrain.is_empty() || !own.transition_force_n.is_empty() {
+            scratch.decay(own, state, tick_period_s);
         }
         let particles = &body.particles;
         let Waking::ByTools { reach_m } = particles.waking else { return };
         match state.tick % LOOK_EVERY_TICKS {
             0 => {
-                let HybridScratch { patch, looking, .. } = &mut **scratch;
+                let HybridScratch { patch, query, .. } = &mut **scratch;
                 patch.displace(body, &state.x);
-                place_balls(environment, &mut SkinView::new(body, patch), body, own, state);
-                looking.want(body, &environment.tools, own, (reach_m, particles.most_active));
-                looking.keep_unsettled(patch, particles);
-                own.want(&looking.wanted);
+                update_balls(environment, &mut SkinView::new(body, patch), body, own, state);
+                query.want(body, &environment.tools, own, (reach_m, particles.most_active));
+                query.keep_unsettled(patch, particles);
+                own.want(&query.wanted);
             }
             SWITCH_TICKS => own.next.clone_from(&own.wanted),
             since_look if own.is_switching() => {
@@ -145,7 +145,7 @@ impl SteppedHybrid<'_> {
     fn go_on_switching(&mut self, environment: &Environment, state: &mut MechanicalState, slice: u64) {
         let Self { body, own, scratch } = self;
         if slice <= u64::from(RunningPatch::SLICES) {
-            scratch.coming.go_on(body, &own.next);
+            scratch.staged.go_on(body, &own.next);
             return;
         }
         let were_current = state.force_is_current;
@@ -178,66 +178,67 @@ impl SteppedHybrid<'_> {
 
 impl HybridScratch {
     /// A tick's fading of balancing forces; strains fade with the substeps, until nothing is left to speak of.
-    fn fade(&mut self, own: &mut HybridState, state: &mut MechanicalState, tick_period_s: f64) {
-        own.fade_balance(tick_period_s);
-        if own.fading.has_faded() {
-            state.ledger.dissipated_j += own.fading.along_j();
-            own.given_j -= own.fading.along_j();
-            own.fading.clear();
-            self.patch.put_fades(&own.fading);
+    fn decay(&mut self, own: &mut HybridState, state: &mut MechanicalState, tick_period_s: f64) {
+        own.decay_transition_force(tick_period_s);
+        if own.prestrain.has_decayed() {
+            state.ledger.dissipated_j += own.prestrain.along_j();
+            own.given_j -= own.prestrain.along_j();
+            own.prestrain.clear();
+            self.patch.put_prestrains(&own.prestrain);
         }
     }
 
     /// Goes over to the particles that are to be active next; returns a bound of how far (m) that moves any vertex of the skin: particles that fall asleep
     /// go where they follow to, and coarse nodes, with what follows them, to what is nearest to those.
     fn switch(&mut self, body: &HybridBody, gravity: DVec3, own: &mut HybridState, state: &mut MechanicalState) -> f64 {
-        self.coming.finish(body, &own.next);
-        let Self { patch, coming, looking, before, momenta, balance, .. } = self;
-        let next = &mut coming.patch;
+        self.staged.finish(body, &own.next);
+        let Self { patch, staged, query, before, momenta, transition, .. } = self;
+        let next = &mut staged.patch;
         let nodes = body.node_count();
         patch.displace(body, &state.x);
-        looking.impulses.clear();
-        looking.impulses.resize(nodes, DVec3::ZERO);
-        looking.weights_kg.clear();
-        looking.weights_kg.resize(nodes, 0.0);
-        looking.handed_n.clear();
-        looking.handed_n.resize(nodes, DVec3::ZERO);
-        looking.projection.start(nodes);
-        looking.were_m.clear();
-        looking.were_m.extend_from_slice(&state.x[..nodes]);
-        balance.take(patch.metric_mut(), own, state);
+        query.impulses.clear();
+        query.impulses.resize(nodes, DVec3::ZERO);
+        query.weights_kg.clear();
+        query.weights_kg.resize(nodes, 0.0);
+        query.transferred_n.clear();
+        query.transferred_n.resize(nodes, DVec3::ZERO);
+        query.projection.start(nodes);
+        query.were_m.clear();
+        query.were_m.extend_from_slice(&state.x[..nodes]);
+        transition.take(patch.metric_mut(), own, state);
         let (mut couple, mut farthest_m) = (DVec3::ZERO, 0.0_f64);
         for (number, id) in own.ids().iter().enumerate() {
             if own.next.binary_search(id).is_err() {
                 let (taken, away_m) =
-                    looking.hand_over(body, *id, (state.x[nodes + number], state.v[nodes + number]), state);
+                    query.transfer(body, *id, (state.x[nodes + number], state.v[nodes + number]), state);
                 couple += taken;
                 farthest_m = farthest_m.max(away_m);
-                balance.hand_over(body, (number, *id), &mut looking.handed_n);
+                transition.transfer(body, (number, *id), &mut query.transferred_n);
             }
         }
-        let mut held_j = before.take(body, [patch, next], looking.projection.is_moved(), &state.x, &own.fading);
+        let mut held_j = before.take(body, [patch, next], query.projection.is_moved(), &state.x, &own.prestrain);
         held_j += patch.metric_mut().moving_j(body, (&state.x, &state.v), gravity, momenta);
         let some_sleep = own.ids().iter().any(|id| own.next.binary_search(id).is_err());
-        looking.left.clear();
-        looking.left.extend_from_slice(own.ids());
-        own.switch(body, state, &mut looking.moved);
+        query.left.clear();
+        query.left.extend_from_slice(own.ids());
+        own.switch(body, state, &mut query.moved);
         if some_sleep {
-            couple -= looking.shift(body, next.metric_mut(), state, momenta);
-            looking.turn(couple, &state.x);
+            couple -= query.shift(body, next.metric_mut(), state, momenta);
+            query.turn(couple, &state.x);
         }
-        looking.shifts_m.clear();
-        looking.shifts_m.extend(looking.were_m.iter().zip(&state.x).map(|(were_m, x)| *x - *were_m));
-        farthest_m += looking.shifts_m.iter().map(|shift| shift.length()).fold(0.0, f64::max);
+        query.shifts_m.clear();
+        query.shifts_m.extend(query.were_m.iter().zip(&state.x).map(|(were_m, x)| *x - *were_m));
+        farthest_m += query.shifts_m.iter().map(|shift| shift.length()).fold(0.0, f64::max);
         next.displace(body, &state.x);
-        let places = (&looking.were_m[..], &looking.shifts_m[..], &state.x[..]);
-        let is_moved = looking.projection.is_moved();
-        let (first_moved_j, elastic_j) = before.fade_into(body, [patch, next], is_moved, places, &mut own.fading);
-        next.put_fades(&own.fading);
+        let samples = (&query.were_m[..], &query.shifts_m[..], &state.x[..]);
+        let is_moved = query.projection.is_moved();
+        let (first_moved_j, elastic_j) =
+            before.prestrain_after(body, [patch, next], is_moved, samples, &mut own.prestrain);
+        next.put_prestrains(&own.prestrain);
         if some_sleep {
-            looking.impulses.resize(state.v.len(), DVec3::ZERO);
-            next.metric_mut().accelerate(&mut looking.impulses);
-            for (v, change) in state.v.iter_mut().zip(&looking.impulses[..nodes]) {
+            query.impulses.resize(state.v.len(), DVec3::ZERO);
+            next.metric_mut().accelerate(&mut query.impulses);
+            for (v, change) in state.v.iter_mut().zip(&query.impulses[..nodes]) {
                 *v += *change;
             }
         }
@@ -247,16 +248,16 @@ impl HybridScratch {
         own.given_j -= held_j;
         state.force_is_current = false;
         own.switched_j = own.switched_j.max(elastic_j);
-        if own.may_balance() {
-            balance.demand(body, next.metric_mut(), &looking.left, own.ids(), &looking.handed_n);
+        if own.may_use_transition_force() {
+            transition.demand(body, next.metric_mut(), &query.left, own.ids(), &query.transferred_n);
         }
-        coming.swap(patch);
+        staged.swap(patch);
         body.amplification() * farthest_m
     }
 }
 
 /// Where the tools' balls are now.
-fn place_balls(
+fn update_balls(
     environment: &Environment,
     view: &mut SkinView<'_>,
     body: &HybridBody,
@@ -267,11 +268,12 @@ fn place_balls(
     let spacing_m = body.particles.spacing_m;
     let fitted = force_is_current.then(|| contact.boxes());
     view.begin();
-    let places = tools.iter().zip(&environment.tools).zip(places(body, &environment.tools));
-    let places = places.flat_map(|((tool, spec), count)| tool.places(spec, count).map(move |place| (place, spec)));
-    for ((place, spec), ball) in places.zip(&mut own.balls) {
-        let near_m = (GAP * spec.radius_m).max(GAP * spacing_m) + AHEAD_S * place.speed_m_per_s;
-        let Near { vertex, gap_m, .. } = place.look(view, (near_m, environment.contact.covering_radius_m), fitted);
+    let samples = tools.iter().zip(&environment.tools).zip(axis_sample_counts(body, &environment.tools));
+    let samples =
+        samples.flat_map(|((tool, spec), count)| tool.axis_samples(spec, count).map(move |sample| (sample, spec)));
+    for ((sample, spec), ball) in samples.zip(&mut own.balls) {
+        let near_m = (GAP * spec.radius_m).max(GAP * spacing_m) + AHEAD_S * sample.speed_m_per_s;
+        let Near { vertex, gap_m, .. } = sample.look(view, (near_m, environment.contact.covering_radius_m), fitted);
         match (ball.as_mut(), vertex) {
             (_, Some((vertex, _))) if gap_m < near_m => {
                 let rest_m = body.skin_rest_m()[vertex as usize];
@@ -312,7 +314,7 @@ fn distance_to_balls_sq(balls: &[Option<Ball>], at_m: DVec3) -> f64 {
 
 impl ActivationQuery {
     /// Takes the impulse of a particle that falls asleep, and the nodes of its tet; returns its couple (kg m²/s), and how far (m) it is from where it goes.
-    fn hand_over(
+    fn transfer(
         &mut self,
         body: &HybridBody,
         particle: u32,
@@ -323,7 +325,7 @@ impl ActivationQuery {
         let mass_kg = (1.0 - KEPT) * body.masses.particle_kg[particle as usize];
         anchor.push((w - anchor.of(&state.v)) * mass_kg, &mut self.impulses);
         let away_m = y - anchor.of(&state.x);
-        self.projection.hand_over(body, &anchor, mass_kg, away_m);
+        self.projection.transfer(body, &anchor, mass_kg, away_m);
         for node in body.partition.coarse().tets()[anchor.tet as usize].map(|node| node as usize) {
             if body.free[node] == BVec3::TRUE {
                 self.weights_kg[node] = body.masses.node_kg[node];
@@ -367,7 +369,7 @@ impl ActivationQuery {
             *first += count;
             Some(&own.balls[*first - count..*first])
         };
-        let tools = || places(body, tools).scan(0, of_tool);
+        let tools = || axis_sample_counts(body, tools).scan(0, of_tool);
         let room = most / tools().filter(|balls| balls.iter().any(Option::is_some)).count().max(1);
         for balls in tools() {
             self.found.clear();

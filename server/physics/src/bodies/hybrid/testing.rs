@@ -20,17 +20,17 @@ pub(crate) fn ball(radius_m: f64, centre_m: DVec3, rounds: u32) -> Skin {
 }
 
 /// A ball of 10 mm radius off the lattice, in a box of coarse tets that reaches past it.
-pub(crate) fn ball_in_cage() -> Partition {
-    balls_in_cage()[0].clone()
+pub(crate) fn embedded_ball() -> Partition {
+    embedded_balls()[0].clone()
 }
 
 /// The same, and with cells merged that its surface does not cut.
-pub(crate) fn balls_in_cage() -> [Partition; 2] {
+pub(crate) fn embedded_balls() -> [Partition; 2] {
     let skin = ball(0.01, DVec3::new(0.2e-3, -0.3e-3, 0.1e-3), 3);
     let sites = Sites::covering(skin.bounds_m(), 1.1e-3, DVec3::splat(0.4e-3));
-    let cage = tet_box(DVec3::splat(-0.0125), DVec3::splat(0.025), [3, 3, 3]);
+    let coarse = tet_box(DVec3::splat(-0.0125), DVec3::splat(0.025), [3, 3, 3]);
     let moments = integrate(&skin, &sites, &mut |_| {});
-    let composite = Composite::new(&cage);
+    let composite = Composite::new(&coarse);
     let two_sizes = sizes::merge(&sites, moments.clone(), 1, |_| true);
     [moments, two_sizes].map(|moments| Partition::new(sites, composite.clone(), &moments))
 }
@@ -42,7 +42,7 @@ pub(crate) fn hybrid_ball(materials: &[Material; 2]) -> HybridBody {
 
 /// The same of another spacing, or with cells that are merged deeper than that (m).
 pub(crate) fn hybrid_ball_of(materials: &[Material; 2], spacing_m: f64, fine_depth_m: Option<f64>) -> HybridBody {
-    let cage = tet_box(DVec3::splat(-0.0125), DVec3::splat(0.025), [3, 3, 3]);
+    let coarse = tet_box(DVec3::splat(-0.0125), DVec3::splat(0.025), [3, 3, 3]);
     let spec = ParticleSpec {
         skin: ball(0.01, DVec3::new(0.2e-3, -0.3e-3, 0.1e-3), 3),
         spacing_m,
@@ -51,17 +51,17 @@ pub(crate) fn hybrid_ball_of(materials: &[Material; 2], spacing_m: f64, fine_dep
         most_active: 2000,
         waking: Waking::ByHand,
     };
-    let middle = |tet: usize| cage.corners_m(tet).iter().sum::<DVec3>() / 4.0;
-    let of_tet: Vec<u16> = (0..cage.tets().len()).map(|tet| u16::from(middle(tet).y > 0.0)).collect();
+    let middle = |tet: usize| coarse.corners_m(tet).iter().sum::<DVec3>() / 4.0;
+    let of_tet: Vec<u16> = (0..coarse.tets().len()).map(|tet| u16::from(middle(tet).y > 0.0)).collect();
     let nodes = |of: &dyn Fn(DVec3) -> bool| -> Vec<u32> {
-        (0..cage.positions_m().len() as u32).filter(|&n| of(cage.positions_m()[n as usize])).collect()
+        (0..coarse.positions_m().len() as u32).filter(|&n| of(coarse.positions_m()[n as usize])).collect()
     };
     let low = PrescribedSpec { name: "low".into(), nodes: nodes(&|p| p.z < -9e-3), axes: [true, false, true] };
     let far = PrescribedSpec { name: "far".into(), nodes: nodes(&|p| p.y > 9e-3), axes: [true; 3] };
-    let surface = Surface::of(&cage).unwrap();
+    let surface = Surface::of(&coarse).unwrap();
     let region = |(material, density_kg_per_m3)| Region { name: "half".into(), material, density_kg_per_m3 };
     let regions = materials.iter().copied().zip([1000.0, 1200.0]).map(region).collect();
-    let coarse = Solid { mesh: cage, regions, tet_region: of_tet };
+    let coarse = Solid { mesh: coarse, regions, tet_region: of_tet };
     HybridBody::lay_out(&coarse, &surface, spec, &[low, far], &mut |_| {}).unwrap().body
 }
 
@@ -95,7 +95,7 @@ pub(crate) fn plus(a: &Field, b: &Field, s: f64) -> Field {
 
 /// The cells of that ball, all awake, and their particles at rest (m).
 pub(crate) fn ball_cells() -> (Vec<([u32; 8], RestCell)>, Vec<DVec3>) {
-    let partition = ball_in_cage();
+    let partition = embedded_ball();
     let rest = (0..partition.particle_count() as u32).map(|p| partition.particle_m(p)).collect();
     let cell = |c: usize| (partition.corners(c), partition.rest_cell(c, 0.98));
     ((0..partition.cells().len()).map(cell).collect(), rest)

@@ -15,9 +15,9 @@ use crate::tick::MechanicalState;
 use glam::{BVec3, DMat3, DVec3};
 
 /// τ (s): less than that of strains, since forces that go on pushing what swings may feed it.
-const FADING_S: f64 = 0.02;
+const DECAY_S: f64 = 0.02;
 /// The same where it did (s).
-const HURRIED_S: f64 = 0.003;
+const FAST_DECAY_S: f64 = 0.003;
 /// How fast what fading gave is forgotten (s).
 const FORGETTING_S: f64 = 1.0;
 /// Fading that gave more than this, over the elastic energy that a switch lately changed, is not helped on by balancing forces.
@@ -53,7 +53,7 @@ impl TransitionForce {
     }
 
     /// A particle, the `number`th active one before the switch, falls asleep: `impulses` takes what the coarse nodes are to be pushed with for it (N).
-    pub(super) fn hand_over(&self, body: &HybridBody, (number, particle): (usize, u32), forces_n: &mut [DVec3]) {
+    pub(super) fn transfer(&self, body: &HybridBody, (number, particle): (usize, u32), forces_n: &mut [DVec3]) {
         if self.before.is_empty() {
             return;
         }
@@ -71,7 +71,7 @@ impl TransitionForce {
         metric: &mut RunningMetric,
         before: &[u32],
         after: &[u32],
-        handed_n: &[DVec3],
+        transferred_n: &[DVec3],
     ) {
         self.due_n.clear();
         if self.before.is_empty() {
@@ -87,33 +87,33 @@ impl TransitionForce {
         self.taken_n.extend(after.iter().map(of));
         self.due_n.resize(self.taken_n.len(), DVec3::ZERO);
         metric.momenta(body, &self.taken_n, &mut self.due_n);
-        for (due, handed) in self.due_n.iter_mut().zip(handed_n) {
-            *due += *handed;
+        for (due, transferred) in self.due_n.iter_mut().zip(transferred_n) {
+            *due += *transferred;
         }
     }
 
     /// At an evaluation: takes balancing forces away from the total forces, after working them out if that is due.
     pub(crate) fn apply(&mut self, body: &HybridBody, own: &mut HybridState, state: &mut MechanicalState) {
         let MechanicalState { x, force_n, .. } = state;
-        let balance_n = &mut own.balance_n;
+        let transition_force_n = &mut own.transition_force_n;
         if self.due_n.len() == force_n.len() {
-            balance_n.clear();
-            balance_n.extend(force_n.iter().zip(&self.due_n).map(|(force, due)| *force - *due));
-            for (balance, free) in balance_n.iter_mut().zip(&body.free) {
-                *balance = DVec3::select(*free, *balance, DVec3::ZERO);
+            transition_force_n.clear();
+            transition_force_n.extend(force_n.iter().zip(&self.due_n).map(|(force, due)| *force - *due));
+            for (force, free) in transition_force_n.iter_mut().zip(&body.free) {
+                *force = DVec3::select(*free, *force, DVec3::ZERO);
             }
         }
         self.due_n.clear();
         self.taken_n.clear();
-        if balance_n.len() != force_n.len() {
-            balance_n.clear();
+        if transition_force_n.len() != force_n.len() {
+            transition_force_n.clear();
             return;
         }
-        if largest(balance_n) <= NOTHING * largest(force_n) {
-            balance_n.clear();
+        if largest(transition_force_n) <= NOTHING * largest(force_n) {
+            transition_force_n.clear();
             return;
         }
-        self.taken_n.extend_from_slice(balance_n);
+        self.taken_n.extend_from_slice(transition_force_n);
         if body.is_free {
             without_torque(body, x, &mut self.taken_n);
         }
@@ -131,18 +131,18 @@ impl TransitionForce {
 
 impl HybridState {
     /// Whether fading gave little beside the elastic energy that switches changed lately.
-    pub(super) fn may_balance(&self) -> bool {
+    pub(super) fn may_use_transition_force(&self) -> bool {
         self.given_j <= MOST_GIVEN * self.switched_j
     }
 
     /// A tick's fading of balancing forces.
-    pub(super) fn fade_balance(&mut self, period_s: f64) {
+    pub(super) fn decay_transition_force(&mut self, period_s: f64) {
         let forgotten = prestrain::factor(period_s, FORGETTING_S);
         self.given_j *= forgotten;
         self.switched_j *= forgotten;
-        let time_constant_s = if self.may_balance() { FADING_S } else { HURRIED_S };
+        let time_constant_s = if self.may_use_transition_force() { DECAY_S } else { FAST_DECAY_S };
         let factor = prestrain::factor(period_s, time_constant_s);
-        self.balance_n.iter_mut().for_each(|balance| *balance *= factor);
+        self.transition_force_n.iter_mut().for_each(|force| *force *= factor);
     }
 }
 

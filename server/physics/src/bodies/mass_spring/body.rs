@@ -135,7 +135,7 @@ impl MassSpringBody {
         let edge_m = lengths.sum::<f64>() / model.surface().edges().len() as f64;
         let rings = refinement.map_or(1, |refinement| if refinement.follows_dent { 1 } else { refinement.rings });
         // The regions about two of them overlap by half.
-        let places: Vec<usize> = tools.iter().map(|tool| tool.place_count(f64::from(rings) * edge_m)).collect();
+        let places: Vec<usize> = tools.iter().map(|tool| tool.axis_sample_count(f64::from(rings) * edge_m)).collect();
         // A disc for each, of vertices with √3/2 l² each.
         let each = model.spec().most_awake as f64 / places.iter().sum::<usize>().max(1) as f64;
         let awake_reach_m = edge_m * (each * 3.0_f64.sqrt() / (2.0 * std::f64::consts::PI)).sqrt();

@@ -75,7 +75,8 @@ impl SteppedMassSpring<'_> {
         let fine = own.next_fine(body, tick_period_s / CONSTANTS_FOLLOW_S, away_m);
         // A moving tool leaves levels no time to lag behind: what is refined too late at its front and coarse too late at its back would drive it on.
         let places = state.tools.iter().zip(&environment.tools).zip(body.places());
-        let places = places.flat_map(|((tool, spec), places)| tool.places(spec, places.len()).zip(&own.about[places]));
+        let places =
+            places.flat_map(|((tool, spec), places)| tool.axis_samples(spec, places.len()).zip(&own.about[places]));
         let touching = places.filter(|(_, about)| about.touched.is_some());
         let fastest_m_per_s = touching.map(|(place, _)| place.speed_m_per_s).fold(0.0, f64::max);
         let rate_hz = |r: Refinement| r.fade_s.recip() + fastest_m_per_s / (FADE_WAY * body.edge_m());
@@ -145,7 +146,7 @@ impl MassSpringScratch {
             if ticks == 0 && About::is_fine(about) {
                 continue;
             }
-            for (place, about) in tool.places(spec, about.len()).zip(about) {
+            for (place, about) in tool.axis_samples(spec, about.len()).zip(about) {
                 // What it goes until the next look.
                 let ahead_m = f64::from(LOOK_EVERY_TICKS) * tick_period_s * place.speed_m_per_s;
                 let near_m = GAP * spec.radius_m + 0.5 * body.edge_m() + ahead_m;

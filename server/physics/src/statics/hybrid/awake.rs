@@ -42,14 +42,14 @@ impl Claims {
     }
 
     /// Looks at where tools are in an equilibrium, with these forces (N) on them: the particles that are to be awake, ascending.
-    pub(super) fn look(&mut self, awakened: &Awakened<'_>, place: &[DVec3], contact_n: &[DVec3]) -> Vec<u32> {
+    pub(super) fn look(&mut self, awakened: &Awakened<'_>, unknowns: &[DVec3], contact_n: &[DVec3]) -> Vec<u32> {
         let (environment, body) = (awakened.environment, awakened.body);
         let (most, spacing_m) = (body.particles().most_active, body.particles().spacing_m);
         let (reach_m, balls, loads, spread) = match self {
             Self::Given(ids) => return ids.clone(),
             Self::ByRule { reach_m, balls, loads, spread } => (*reach_m, balls, loads, spread),
         };
-        let configuration = awakened.configuration(place);
+        let configuration = awakened.configuration(unknowns);
         let (skin_m, tools_m) = configuration.split_at(awakened.vertices());
         let all = balls.iter_mut().zip(tools_m).zip(&environment.tools).zip(contact_n);
         for (((ball, centre_m), tool), contact_n) in all {

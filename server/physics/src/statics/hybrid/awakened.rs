@@ -6,7 +6,7 @@ use crate::{
     bodies::hybrid::{
         HybridBody,
         patch::{Field, KEPT, Patch},
-        place::Place,
+        trilinear_point::TrilinearPoint,
     },
     tick::Environment,
 };
@@ -62,27 +62,27 @@ impl<'a> Awakened<'a> {
             carriers: Vec::new(),
         };
         for vertex in 0..body.skin_rest_m().len() as u32 {
-            let carriers = awakened.carriers_of(&body.place(vertex).place(partition));
+            let carriers = awakened.carriers_of(&body.vertex_point(vertex).trilinear(partition));
             awakened.carriers.extend(carriers);
             awakened.first.push(awakened.carriers.len() as u32);
         }
         awakened
     }
 
-    fn carriers_of(&self, place: &Place) -> BTreeMap<u32, f64> {
+    fn carriers_of(&self, point: &TrilinearPoint) -> BTreeMap<u32, f64> {
         let mut carriers = BTreeMap::new();
         let mut add = |entry: u32, weight: f64| {
             if weight != 0.0 {
                 *carriers.entry(entry).or_default() += weight;
             }
         };
-        for (&particle, weight) in place.particles.iter().zip(place.weights) {
+        for (&particle, weight) in point.particles.iter().zip(point.weights) {
             if let Ok(number) = self.patch.active().binary_search(&particle) {
                 add((self.nodes() + number) as u32, weight);
                 continue;
             }
             let anchor = self.body.partition().anchor(particle);
-            anchor.nodes.iter().zip(anchor.weights).for_each(|(&node, share)| add(node, weight * share));
+            anchor.nodes.iter().zip(anchor.weights).for_each(|(&node, part)| add(node, weight * part));
         }
         carriers
     }
@@ -115,13 +115,13 @@ impl<'a> Awakened<'a> {
     }
 
     /// The configuration at a place.
-    pub(super) fn configuration(&self, place: &[DVec3]) -> Vec<DVec3> {
-        let moved: Vec<DVec3> = place.iter().zip(&self.rest_m).map(|(x, rest)| *x - *rest).collect();
+    pub(super) fn configuration(&self, unknowns: &[DVec3]) -> Vec<DVec3> {
+        let moved: Vec<DVec3> = unknowns.iter().zip(&self.rest_m).map(|(x, rest)| *x - *rest).collect();
         let mut configuration = self.directions(&moved);
         for (y, rest) in configuration.iter_mut().zip(self.body.skin_rest_m()) {
             *y += *rest;
         }
-        configuration.extend_from_slice(&place[self.entries()..]);
+        configuration.extend_from_slice(&unknowns[self.entries()..]);
         configuration
     }
 
@@ -132,7 +132,7 @@ impl<'a> Awakened<'a> {
     }
 
     /// Adds forces (N) of a configuration to those of a place.
-    pub(super) fn hand_back(&self, of_configuration_n: &[DVec3], forces_n: &mut [DVec3]) {
+    pub(super) fn push(&self, of_configuration_n: &[DVec3], forces_n: &mut [DVec3]) {
         let (of_skin, of_tools) = of_configuration_n.split_at(self.vertices());
         for (vertex, force_n) in of_skin.iter().enumerate().filter(|(_, force_n)| **force_n != DVec3::ZERO) {
             for &(entry, weight) in self.of_vertex(vertex) {
@@ -145,22 +145,22 @@ impl<'a> Awakened<'a> {
     }
 
     /// Elastic forces (N) on nodes and particles, none on tools.
-    pub(super) fn elastic_n(&self, place: &[DVec3]) -> Vec<DVec3> {
-        let at = self.field(place);
-        let still = self.field(&vec![DVec3::ZERO; place.len()]);
+    pub(super) fn elastic_n(&self, unknowns: &[DVec3]) -> Vec<DVec3> {
+        let at = self.field(unknowns);
+        let still = self.field(&vec![DVec3::ZERO; unknowns.len()]);
         let forces = self.patch.forces_n(&self.body.materials(), &at, &still).0;
-        Self::list(forces, place.len())
+        Self::list(forces, unknowns.len())
     }
 
     /// Their change along a direction.
-    pub(super) fn elastic_change_n(&self, place: &[DVec3], direction: &[DVec3]) -> Vec<DVec3> {
-        let changes = self.patch.products_n(&self.body.materials(), &self.field(place), &self.field(direction));
-        Self::list(changes, place.len())
+    pub(super) fn elastic_change_n(&self, unknowns: &[DVec3], direction: &[DVec3]) -> Vec<DVec3> {
+        let changes = self.patch.products_n(&self.body.materials(), &self.field(unknowns), &self.field(direction));
+        Self::list(changes, unknowns.len())
     }
 
     /// Elastic energy (J).
-    pub(super) fn elastic_j(&self, place: &[DVec3]) -> f64 {
-        self.patch.energy_j(&self.body.materials(), &self.field(place))
+    pub(super) fn elastic_j(&self, unknowns: &[DVec3]) -> f64 {
+        self.patch.energy_j(&self.body.materials(), &self.field(unknowns))
     }
 
     fn list(field: Field, length: usize) -> Vec<DVec3> {
@@ -170,8 +170,8 @@ impl<'a> Awakened<'a> {
         list
     }
 
-    pub(super) fn field(&self, place: &[DVec3]) -> Field {
-        Field { nodes: place[..self.nodes()].to_vec(), particles: place[self.nodes()..self.entries()].to_vec() }
+    pub(super) fn field(&self, unknowns: &[DVec3]) -> Field {
+        Field { nodes: unknowns[..self.nodes()].to_vec(), particles: unknowns[self.nodes()..self.entries()].to_vec() }
     }
 
     /// Everything at rest.
@@ -181,13 +181,13 @@ impl<'a> Awakened<'a> {
     }
 
     /// A place where other particles were awake: what wakes is where it followed to, what falls asleep follows.
-    pub(super) fn taking_over(&self, other: &Self, place: &[DVec3]) -> Vec<DVec3> {
-        let (nodes, particles) = (&place[..self.nodes()], &place[self.nodes()..other.entries()]);
+    pub(super) fn taking_over(&self, other: &Self, unknowns: &[DVec3]) -> Vec<DVec3> {
+        let (nodes, particles) = (&unknowns[..self.nodes()], &unknowns[self.nodes()..other.entries()]);
         let of = |id: &u32| match other.patch.active().binary_search(id) {
             Ok(number) => particles[number],
             Err(_) => self.body.partition().anchor(*id).of(nodes),
         };
         let awake = self.patch.active().iter().map(of);
-        nodes.iter().copied().chain(awake).chain(place[other.entries()..].iter().copied()).collect()
+        nodes.iter().copied().chain(awake).chain(unknowns[other.entries()..].iter().copied()).collect()
     }
 }

@@ -32,7 +32,7 @@ const MAX_LOOKS: usize = 20;
 /// An equilibrium on the way.
 #[derive(Clone)]
 struct Reached {
-    place: Vec<DVec3>,
+    unknowns: Vec<DVec3>,
     claims: Claims,
     ids: Vec<u32>,
     contact: RestingContact,
@@ -53,9 +53,9 @@ pub(super) fn solve(
     let mut claims = given.map_or_else(|| Claims::of(environment, body, goal), Claims::Given);
     let ids = claims.look(&asleep, &asleep.at_rest(), &vec![DVec3::ZERO; environment.tools.len()]);
     let mut awakened = Awakened::new(environment, body, &ids);
-    let place = awakened.at_rest();
-    let contact = RestingContact::appear(&environment.contact, &awakened.configuration(&place));
-    let mut at = Reached { place, claims, ids, contact };
+    let unknowns = awakened.at_rest();
+    let contact = RestingContact::appear(&environment.contact, &awakened.configuration(&unknowns));
+    let mut at = Reached { unknowns, claims, ids, contact };
     let (stage, load_steps) = load_path::raise(largest, settings, |fraction| {
         let found = stage_from(&mut awakened, &mut solver, goal, fraction, &at);
         let (next, stage) = found.map_err(|stop| (stop, solver.history.len() as u32))?;
@@ -80,18 +80,18 @@ fn stage_from(
     // A tool may be deepest at one vertex with these awake, and at another with those: it keeps what it came to first.
     let mut tried = vec![now.ids.clone()];
     loop {
-        let (mut stage, begin) = Stage::enter(awakened, goal, fraction, &now.place, &now.contact);
-        now.place = settle(awakened, solver, goal, &mut stage, &begin)?;
+        let (mut stage, begin) = Stage::enter(awakened, goal, fraction, &now.unknowns, &now.contact);
+        now.unknowns = settle(awakened, solver, goal, &mut stage, &begin)?;
         now.contact = stage.contact.clone();
-        let pressing = stage.forces(awakened, &now.place).tools;
+        let pressing = stage.forces(awakened, &now.unknowns).tools;
         let contact_n: Vec<DVec3> = pressing.iter().map(|pressing| pressing.force_n).collect();
-        let wanted = now.claims.look(awakened, &now.place, &contact_n);
+        let wanted = now.claims.look(awakened, &now.unknowns, &contact_n);
         if tried.contains(&wanted) || tried.len() == MAX_LOOKS {
             return Ok((now, stage));
         }
         tried.push(wanted.clone());
         let next = Awakened::new(awakened.environment, awakened.body, &wanted);
-        now.place = next.taking_over(awakened, &now.place);
+        now.unknowns = next.taking_over(awakened, &now.unknowns);
         now.ids = wanted;
         *awakened = next;
     }
@@ -124,7 +124,7 @@ fn solution(
     load_steps: u32,
 ) -> StaticSolution {
     let environment = awakened.environment;
-    let forces = stage.forces(awakened, &found.place);
+    let forces = stage.forces(awakened, &found.unknowns);
     let (_, residual_n, relative_residual) = forces.residual(awakened);
     // The holder supplies what the other forces lack.
     let hold = |(free, f): (&BVec3, &DVec3)| DVec3::select(*free, DVec3::ZERO, -*f);
@@ -135,19 +135,19 @@ fn solution(
     };
     StaticSolution {
         reactions_n: environment.prescribed.iter().map(of_set).collect(),
-        tools: stage.tools_at_rest(awakened, &forces, &found.place),
+        tools: stage.tools_at_rest(awakened, &forces, &found.unknowns),
         iterations: solver.history.len() as u32,
         factorisations: 0,
         load_steps,
         residual_n,
         relative_residual,
         reference_n: forces.reference_n(),
-        rounding_n: newton::rounding_n(awakened, &found.place),
-        stable: Solver::is_stable(awakened, stage, &found.place),
-        inverted_tets: awakened.patch.inverted(&awakened.field(&found.place)),
+        rounding_n: newton::rounding_n(awakened, &found.unknowns),
+        stable: Solver::is_stable(awakened, stage, &found.unknowns),
+        inverted_tets: awakened.patch.inverted(&awakened.field(&found.unknowns)),
         awake: AwakeParticles { ids: found.ids, spread_loads: found.claims.spread_loads() },
         history: solver.history,
-        x: found.place[..awakened.entries()].to_vec(),
+        x: found.unknowns[..awakened.entries()].to_vec(),
         node_reactions_n,
     }
 }

@@ -65,7 +65,7 @@ impl Stage {
         }
         let mut dead_n: Vec<DVec3> = awakened.weight_n.iter().map(|weight| *weight * fraction).collect();
         dead_n.resize(before.len(), DVec3::ZERO);
-        awakened.hand_back(&on_skin_n, &mut dead_n);
+        awakened.push(&on_skin_n, &mut dead_n);
         let start = environment.tools.iter().map(|tool| tool.start_position_m);
         let devices_m: Vec<DVec3> = start.zip(goal.tools).map(|(s, tool)| s.lerp(tool.position_m, fraction)).collect();
         let mut begin = before.to_vec();
@@ -74,7 +74,7 @@ impl Stage {
                 begin[awakened.entries() + tool] = *device;
             }
         }
-        let [was, is] = [before, &begin].map(|place| awakened.configuration(place));
+        let [was, is] = [before, &begin].map(|unknowns| awakened.configuration(unknowns));
         let contact = contact.arrive(&environment.contact, &was, &is);
         (Self { fraction, load_factors, dead_n, devices_m, contact }, begin)
     }
@@ -83,11 +83,11 @@ impl Stage {
     fn springs<'a>(
         &'a self,
         awakened: &'a Awakened<'_>,
-        place: &'a [DVec3],
+        unknowns: &'a [DVec3],
     ) -> impl Iterator<Item = (usize, SaturatingSpring, DVec3)> + 'a {
         self.devices_m.iter().enumerate().filter_map(move |(tool, device)| {
             let (entry, spring) = (awakened.entries() + tool, awakened.environment.contact.spring(tool)?);
-            Some((entry, spring, *device - place[entry]))
+            Some((entry, spring, *device - unknowns[entry]))
         })
     }
 
@@ -103,29 +103,29 @@ impl Stage {
     }
 
     /// All forces at a place.
-    pub(super) fn forces(&self, awakened: &Awakened<'_>, place: &[DVec3]) -> Forces {
-        let configuration = awakened.configuration(place);
+    pub(super) fn forces(&self, awakened: &Awakened<'_>, unknowns: &[DVec3]) -> Forces {
+        let configuration = awakened.configuration(unknowns);
         let mut outer_n = vec![DVec3::ZERO; configuration.len()];
         self.add_followers_n(awakened, &configuration, &mut outer_n);
         let tools = self.contact.add_forces_n(&awakened.environment.contact, &configuration, &mut outer_n);
         let mut external_n = self.dead_n.clone();
-        awakened.hand_back(&outer_n, &mut external_n);
-        for (entry, spring, stretch_m) in self.springs(awakened, place) {
+        awakened.push(&outer_n, &mut external_n);
+        for (entry, spring, stretch_m) in self.springs(awakened, unknowns) {
             external_n[entry] += spring.force_n(stretch_m);
         }
-        Forces { elastic_n: awakened.elastic_n(place), external_n, tools }
+        Forces { elastic_n: awakened.elastic_n(unknowns), external_n, tools }
     }
 
     /// The stiffness of contact, couplings and follower pressures at a place; of the latter its symmetric part.
-    pub(super) fn outer(&self, awakened: &Awakened<'_>, place: &[DVec3]) -> Outer {
-        let configuration = awakened.configuration(place);
+    pub(super) fn outer(&self, awakened: &Awakened<'_>, unknowns: &[DVec3]) -> Outer {
+        let configuration = awakened.configuration(unknowns);
         let mut blocks: BTreeMap<[u32; 2], DMat3> = BTreeMap::new();
         let mut add = |i: u32, j: u32, block: &DMat3| {
             let (pair, block) = if i <= j { ([i, j], *block) } else { ([j, i], block.transpose()) };
             *blocks.entry(pair).or_insert(DMat3::ZERO) += block;
         };
         self.contact.for_each_block(&awakened.environment.contact, &configuration, false, &mut add);
-        for (entry, spring, stretch_m) in self.springs(awakened, place) {
+        for (entry, spring, stretch_m) in self.springs(awakened, unknowns) {
             let own = (entry - awakened.entries() + awakened.vertices()) as u32;
             add(own, own, &spring.hessian_n_per_m(stretch_m, false));
         }
@@ -134,15 +134,20 @@ impl Stage {
     }
 
     /// Potential (J) of contact and couplings at a place.
-    fn tools_j(&self, awakened: &Awakened<'_>, place: &[DVec3]) -> f64 {
-        let springs: f64 = self.springs(awakened, place).map(|(_, spring, stretch)| spring.energy_j(stretch)).sum();
-        self.contact.potential_j(&awakened.environment.contact, &awakened.configuration(place)) + springs
+    fn tools_j(&self, awakened: &Awakened<'_>, unknowns: &[DVec3]) -> f64 {
+        let springs: f64 = self.springs(awakened, unknowns).map(|(_, spring, stretch)| spring.energy_j(stretch)).sum();
+        self.contact.potential_j(&awakened.environment.contact, &awakened.configuration(unknowns)) + springs
     }
 
     /// The tools at a place with these forces.
-    pub(super) fn tools_at_rest(&self, awakened: &Awakened<'_>, forces: &Forces, place: &[DVec3]) -> Vec<ToolAtRest> {
+    pub(super) fn tools_at_rest(
+        &self,
+        awakened: &Awakened<'_>,
+        forces: &Forces,
+        unknowns: &[DVec3],
+    ) -> Vec<ToolAtRest> {
         let at_rest = |(tool, pressing): (usize, &Pressing)| {
-            let (device_m, centre_m) = (self.devices_m[tool], place[awakened.entries() + tool]);
+            let (device_m, centre_m) = (self.devices_m[tool], unknowns[awakened.entries() + tool]);
             let spring_n = awakened.environment.contact.spring(tool).map(|spring| spring.force_n(device_m - centre_m));
             ToolAtRest::pressing(device_m, centre_m, pressing, spring_n)
         };

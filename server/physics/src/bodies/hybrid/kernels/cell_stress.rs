@@ -75,7 +75,7 @@ pub(crate) fn stress<V: Vector<Scalar = T>, T: Scalar, L: ConstitutiveLaw, const
 /// The same of a rest state changed by `A` (`hybrid::fade`): `P̃(F (I + A)) (I + A)ᵀ`, with `F (I + A) − I = H + A + H A`; viscous stress is that of `F`. And
 /// `P̃ : F A` (J/m³).
 #[inline(always)]
-pub(crate) fn faded_stress<V: Vector<Scalar = T>, T: Scalar, L: ConstitutiveLaw, const VISCOUS: bool>(
+pub(crate) fn prestrained_stress<V: Vector<Scalar = T>, T: Scalar, L: ConstitutiveLaw, const VISCOUS: bool>(
     constants: &Constants<T>,
     a: &M3<V>,
     h: &M3<V>,

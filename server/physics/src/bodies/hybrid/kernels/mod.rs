@@ -9,5 +9,5 @@ mod rows;
 
 pub use cells::CutCells;
 pub use prestrains::Found;
-pub use residual_elements::ShareKernel;
+pub use residual_elements::ResidualKernel;
 pub use rows::{CellRow, Room, RowKernel};

@@ -1,5 +1,5 @@
 //! What fades in cells (`hybrid::fade`), as both kernels of cells keep it.
-use super::cell_stress::faded_stress;
+use super::cell_stress::prestrained_stress;
 use crate::{
     bodies::hybrid::{prestrain::CellPrestrain, residual_element},
     lanes::real::{Real, Scalar, Vector},
@@ -14,16 +14,16 @@ use crate::{
 pub(crate) const ENTRIES: usize = 19;
 
 /// Of a cell; `None`: nothing fades.
-pub(crate) fn entries(fade: Option<&CellPrestrain>) -> [f64; ENTRIES] {
+pub(crate) fn entries(prestrain: Option<&CellPrestrain>) -> [f64; ENTRIES] {
     let mut entries = [0.0; ENTRIES];
-    if let Some(fade) = fade {
+    if let Some(prestrain) = prestrain {
         for row in 0..3 {
             for column in 0..3 {
-                entries[3 * row + column] = fade.shape.col(column)[row];
-                entries[9 + 3 * row + column] = fade.volume.col(column)[row];
+                entries[3 * row + column] = prestrain.shape.col(column)[row];
+                entries[9 + 3 * row + column] = prestrain.volume.col(column)[row];
             }
         }
-        entries[18] = fade.modes;
+        entries[18] = prestrain.modes;
     }
     entries
 }
@@ -51,26 +51,26 @@ pub struct Found {
     /// Power (W) that viscous stress takes.
     pub viscous_w: f64,
     /// `s ∂U/∂s` (J) of what fades (`hybrid::fade`).
-    pub fading_j: f64,
+    pub prestrain_j: f64,
 }
 
 impl std::ops::AddAssign for Found {
     fn add_assign(&mut self, other: Self) {
         self.viscous_w += other.viscous_w;
-        self.fading_j += other.fading_j;
+        self.prestrain_j += other.prestrain_j;
     }
 }
 
 /// Elastic and viscous stress (Pa) where shape and volume fade by `a`, the power density (W/m³) of the latter, and `s ∂Ψ/∂s` (J/m³).
 #[inline(always)]
-pub(crate) fn fading_stress<V: Vector<Scalar = T>, T: Scalar, L: ConstitutiveLaw, const VISCOUS: bool>(
+pub(crate) fn prestrained_cell_stress<V: Vector<Scalar = T>, T: Scalar, L: ConstitutiveLaw, const VISCOUS: bool>(
     split: &Split<T>,
     a: &[M3<V>; 2],
     h: &M3<V>,
     h_dot: &M3<V>,
 ) -> (M3<V>, V, V) {
-    let (shape, density, of_shape) = faded_stress::<V, T, L, VISCOUS>(&split.shape, &a[0], h, h_dot);
-    let (volume, _, of_volume) = faded_stress::<V, T, L, false>(&split.volume, &a[1], h, h);
+    let (shape, density, of_shape) = prestrained_stress::<V, T, L, VISCOUS>(&split.shape, &a[0], h, h_dot);
+    let (volume, _, of_volume) = prestrained_stress::<V, T, L, false>(&split.volume, &a[1], h, h);
     (plus(&shape, &volume), density, of_shape + of_volume)
 }
 

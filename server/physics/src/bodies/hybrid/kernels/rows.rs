@@ -6,7 +6,7 @@
 //! together at the end: `f_i = l_i + r_{i−1}`.
 use super::{
     cell_stress::{particles, patterns, stress},
-    prestrains::{ENTRIES, Found, Split, add_lanes, entries, fading_stress, scaled},
+    prestrains::{ENTRIES, Found, Split, add_lanes, entries, prestrained_cell_stress, scaled},
 };
 use crate::{
     bodies::hybrid::{
@@ -37,7 +37,7 @@ pub struct CellRow {
     /// Number of the first cell among all of the rows, one after the other.
     pub first: u32,
     /// Whether something fades in any of them ([`RowKernel::put_fade`]).
-    pub fading: bool,
+    pub prestrained: bool,
 }
 
 /// Full cells, which all are of one size: their materials, and displacements, velocities and forces of their points.
@@ -83,7 +83,7 @@ struct Arrays<T> {
     left: [Vec<T>; 3],
     right: [Vec<T>; 3],
     /// Of every cell.
-    fades: [Vec<T>; ENTRIES],
+    prestrains: [Vec<T>; ENTRIES],
 }
 
 impl<T: Scalar> Arrays<T> {
@@ -96,16 +96,16 @@ impl<T: Scalar> Arrays<T> {
             velocities: zeros(if is_viscous { entries } else { 0 }),
             left: zeros(entries),
             right: zeros(entries),
-            fades: std::array::from_fn(|_| vec![T::of(0.0); cells + LANES]),
+            prestrains: std::array::from_fn(|_| vec![T::of(0.0); cells + LANES]),
         }
     }
 }
 
 impl<T: Scalar> Rows<T> {
-    fn new(materials: &[Material], edge_m: f64, handed: f64, room: Room) -> Self {
+    fn new(materials: &[Material], edge_m: f64, fraction: f64, room: Room) -> Self {
         let is_viscous = materials.iter().any(|m| !m.viscosity.is_zero());
         Self {
-            materials: of_materials(materials, edge_m, handed),
+            materials: of_materials(materials, edge_m, fraction),
             arrays: Arrays::new(room.points, room.cells, is_viscous),
         }
     }
@@ -118,9 +118,9 @@ impl<T: Scalar> Rows<T> {
         let mut found = Found::default();
         for same in rows.chunk_by(|a, b| a.material == b.material) {
             let material = &materials[same[0].material as usize];
-            let mut pass = RowForces { material, rows: same, arrays, left, fading_j: 0.0 };
+            let mut pass = RowForces { material, rows: same, arrays, left, prestrain_j: 0.0 };
             let viscous_w = material.split.material.run(set, false, &mut pass);
-            found += Found { viscous_w, fading_j: pass.fading_j };
+            found += Found { viscous_w, prestrain_j: pass.prestrain_j };
         }
         found
     }
@@ -129,10 +129,10 @@ impl<T: Scalar> Rows<T> {
 impl RowKernel {
     /// For cells of edge `h` (m) that answer for the share `handed` of their volume, and for those of twice the edge, whose materials follow theirs;
     /// its points are at rest.
-    pub fn new(edge_m: f64, handed: f64, materials: &[Material], precision: Precision, room: Room) -> Self {
+    pub fn new(edge_m: f64, fraction: f64, materials: &[Material], precision: Precision, room: Room) -> Self {
         let layout = match precision {
-            Precision::Single => Layout::Single(Rows::new(materials, edge_m, handed, room)),
-            Precision::Double => Layout::Double(Rows::new(materials, edge_m, handed, room)),
+            Precision::Single => Layout::Single(Rows::new(materials, edge_m, fraction, room)),
+            Precision::Double => Layout::Double(Rows::new(materials, edge_m, fraction, room)),
         };
         Self { layout, instruction_set: Available::best() }
     }
@@ -169,10 +169,10 @@ impl RowKernel {
     }
 
     /// What fades in a cell.
-    pub fn put_fade(&mut self, cell: u32, fade: Option<&CellPrestrain>) {
+    pub fn put_prestrain(&mut self, cell: u32, prestrain: Option<&CellPrestrain>) {
         match &mut self.layout {
-            Layout::Single(Rows { arrays, .. }) => put_fade(&mut arrays.fades, cell, fade),
-            Layout::Double(Rows { arrays, .. }) => put_fade(&mut arrays.fades, cell, fade),
+            Layout::Single(Rows { arrays, .. }) => put_prestrain(&mut arrays.prestrains, cell, prestrain),
+            Layout::Double(Rows { arrays, .. }) => put_prestrain(&mut arrays.prestrains, cell, prestrain),
         }
     }
 
@@ -185,9 +185,9 @@ impl RowKernel {
     }
 }
 
-fn of_materials<T: Scalar>(materials: &[Material], edge_m: f64, handed: f64) -> Vec<CellMaterial<T>> {
+fn of_materials<T: Scalar>(materials: &[Material], edge_m: f64, fraction: f64) -> Vec<CellMaterial<T>> {
     let of = |(material, edge_m): (&Material, f64)| {
-        let volume_m3 = handed * edge_m.powi(3);
+        let volume_m3 = fraction * edge_m.powi(3);
         let kappa = HOURGLASS * 4.0 / 3.0 * material.lame.mu_pa * volume_m3 / (edge_m * edge_m);
         CellMaterial { split: Split::of(material), cell: [0.25 / edge_m, -volume_m3, -kappa] }
     };
@@ -200,8 +200,8 @@ fn put<T: Scalar>([x, y, z]: &mut [Vec<T>; 3], list: &[DVec3]) {
     }
 }
 
-fn put_fade<T: Scalar>(fades: &mut [Vec<T>; ENTRIES], cell: u32, fade: Option<&CellPrestrain>) {
-    for (list, entry) in fades.iter_mut().zip(entries(fade)) {
+fn put_prestrain<T: Scalar>(prestrains: &mut [Vec<T>; ENTRIES], cell: u32, prestrain: Option<&CellPrestrain>) {
+    for (list, entry) in prestrains.iter_mut().zip(entries(prestrain)) {
         list[cell as usize] = T::of(entry);
     }
 }
@@ -222,7 +222,7 @@ struct RowForces<'a, T> {
     rows: &'a [CellRow],
     arrays: &'a mut Arrays<T>,
     left: f64,
-    fading_j: f64,
+    prestrain_j: f64,
 }
 
 impl<T: Scalar> LawPass for RowForces<'_, T> {
@@ -235,13 +235,13 @@ impl<T: Scalar> LawPass for RowForces<'_, T> {
             let mut first = 0;
             while first < row.cells as usize {
                 let at = row.points.map(|point| 1 + point as usize + first);
-                let fades = row.fading.then_some(row.first as usize + first);
+                let first_prestrain = row.prestrained.then_some(row.first as usize + first);
                 let left = row.cells as usize - first;
                 if left > V::Narrow::WIDTH {
-                    self.lanes::<V, L, VISCOUS>(at, left, fades, &mut power_w);
+                    self.lanes::<V, L, VISCOUS>(at, left, first_prestrain, &mut power_w);
                     first += V::WIDTH;
                 } else {
-                    self.lanes::<V::Narrow, L, VISCOUS>(at, left, fades, &mut power_w);
+                    self.lanes::<V::Narrow, L, VISCOUS>(at, left, first_prestrain, &mut power_w);
                     first += V::Narrow::WIDTH;
                 }
             }
@@ -257,7 +257,7 @@ impl<T: Scalar> RowForces<'_, T> {
         &mut self,
         at: [usize; 4],
         cells: usize,
-        fades: Option<usize>,
+        first_prestrain: Option<usize>,
         power_w: &mut f64,
     ) {
         let [quarter, minus_volume, minus_kappa] = self.material.cell;
@@ -280,14 +280,14 @@ impl<T: Scalar> RowForces<'_, T> {
             }
         }
         let mut kept_modes = weight;
-        let (p, density) = if let Some(first) = fades {
-            let (left, entries) = (V::of(self.left), &self.arrays.fades);
+        let (p, density) = if let Some(first) = first_prestrain {
+            let (left, entries) = (V::of(self.left), &self.arrays.prestrains);
             let of_shape = scaled(&matrix::<V>(&entries[..9], first), left);
             let of_volume = scaled(&matrix::<V>(&entries[9..18], first), left);
             let gone = V::load(&entries[18][first..]) * left;
             kept_modes = weight * (V::of(1.0) - gone);
-            let (p, density, fading) =
-                fading_stress::<V, T, L, VISCOUS>(&self.material.split, &[of_shape, of_volume], &h, &h_dot);
+            let (p, density, along) =
+                prestrained_cell_stress::<V, T, L, VISCOUS>(&self.material.split, &[of_shape, of_volume], &h, &h_dot);
             let mut squares = V::of(0.0);
             for axis in 0..3 {
                 for mode in 0..4 {
@@ -296,7 +296,7 @@ impl<T: Scalar> RowForces<'_, T> {
             }
             // s ∂U/∂s = V P̃ : F A − ½ κ a Σ w |q|²
             let of_modes = squares * gone * V::of(minus_kappa / 128.0);
-            add_lanes(weight * (fading * V::of(-minus_volume) + of_modes), &mut self.fading_j);
+            add_lanes(weight * (along * V::of(-minus_volume) + of_modes), &mut self.prestrain_j);
             (p, density)
         } else {
             stress::<V, T, L, VISCOUS>(&self.material.split.whole, &h, &h_dot)
@@ -380,7 +380,7 @@ mod tests {
     #[test]
     fn rows_and_oracle_agree() {
         agrees_with_oracle(true, |question: &Question<'_>| {
-            let Question { cells, u, v, material, precision, set, spacing_m, handed } = question;
+            let Question { cells, u, v, material, precision, set, spacing_m, fraction } = question;
             // Points are numbered along x, as the ball's particles are.
             let mut rows: Vec<CellRow> = Vec::new();
             for (points, _) in *cells {
@@ -391,13 +391,13 @@ mod tests {
                     _ => {
                         let points = [points[0], points[2], points[4], points[6]];
                         let first = rows.last().map_or(0, |row| row.first + row.cells);
-                        rows.push(CellRow { points, cells: 1, material: 0, first, fading: false });
+                        rows.push(CellRow { points, cells: 1, material: 0, first, prestrained: false });
                     }
                 }
             }
             assert!(rows.len() < cells.len() / 4);
             let room = Room { points: u.len(), cells: cells.len() };
-            let kernel = RowKernel::new(*spacing_m, *handed, &[*material], *precision, room);
+            let kernel = RowKernel::new(*spacing_m, *fraction, &[*material], *precision, room);
             let mut kernel = kernel.with_instruction_set(*set);
             kernel.set_displacements(u);
             kernel.set_velocities(v);

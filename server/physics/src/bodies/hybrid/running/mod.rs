@@ -5,7 +5,7 @@ mod layout;
 #[cfg(test)]
 mod tests;
 
-use super::kernels::{CellRow, CutCells, Found, Room, RowKernel, ShareKernel};
+use super::kernels::{CellRow, CutCells, Found, ResidualKernel, Room, RowKernel};
 use super::{
     body::HybridBody,
     clusters::SkinClusters,
@@ -28,7 +28,7 @@ pub(crate) struct RunningPatch {
     /// Active particles, ascending.
     active: Vec<u32>,
     points: Vec<Point>,
-    border: ConstrainedPoints,
+    constrained: ConstrainedPoints,
     /// Numbers of the active particles' points, ascending.
     points_of_active: Vec<u32>,
     /// Displacements (m) of the points.
@@ -43,12 +43,12 @@ pub(crate) struct RunningPatch {
     /// Where every awake cell is laid out.
     slots: Vec<Slot>,
     /// Numbers, among the awake cells, of those that fade.
-    fading_cells: Vec<u32>,
-    fading_tets: Vec<u32>,
-    fading_mark: u64,
+    prestrained_cells: Vec<u32>,
+    prestrained_tets: Vec<u32>,
+    prestrain_mark: u64,
     /// What is left to each coarse tet.
-    shares: Vec<ResidualElement>,
-    share_kernel: ShareKernel,
+    residual_elements: Vec<ResidualElement>,
+    residual_kernel: ResidualKernel,
     /// Number of every coarse node among those of a share, while something is taken from it.
     number_of_node: Vec<u32>,
     /// Of which tets something was taken.
@@ -87,7 +87,7 @@ impl RunningPatch {
         Self {
             active: Vec::with_capacity(most_active),
             points: Vec::with_capacity(most_points),
-            border: ConstrainedPoints::with_room(most_points),
+            constrained: ConstrainedPoints::with_room(most_points),
             points_of_active: Vec::with_capacity(most_active),
             displacements_m: Vec::with_capacity(most_points),
             of_points: Vec::with_capacity(most_points),
@@ -95,20 +95,20 @@ impl RunningPatch {
             rows: Vec::with_capacity(most_cells),
             full: RowKernel::new(edge_m, 1.0 - KEPT, &hybrid.materials, precision, room),
             cut: CutCells::with_capacity(most_cells, most_points, &hybrid.materials, precision),
-            share_kernel: ShareKernel::build(
-                partition.shares(),
+            residual_kernel: ResidualKernel::build(
+                partition.residual_elements(),
                 hybrid.node_count(),
                 &hybrid.of_tet,
                 &hybrid.materials,
                 precision,
             ),
-            shares: partition.shares().to_vec(),
+            residual_elements: partition.residual_elements().to_vec(),
             slots: Vec::with_capacity(most_cells),
-            fading_cells: Vec::with_capacity(most_cells),
-            fading_tets: Vec::with_capacity(partition.shares().len()),
-            fading_mark: 0,
+            prestrained_cells: Vec::with_capacity(most_cells),
+            prestrained_tets: Vec::with_capacity(partition.residual_elements().len()),
+            prestrain_mark: 0,
             number_of_node: vec![0; hybrid.node_count()],
-            taken_from: Vec::with_capacity(partition.shares().len()),
+            taken_from: Vec::with_capacity(partition.residual_elements().len()),
             metric: RunningMetric::new(hybrid, most_active),
             node_displacements_m: vec![DVec3::ZERO; hybrid.node_count()],
             point_of: vec![NONE; partition.particle_count()],
@@ -192,8 +192,8 @@ impl RunningPatch {
     }
 
     /// What is left to a coarse tet.
-    pub(super) fn share(&self, tet: u32) -> &ResidualElement {
-        &self.shares[tet as usize]
+    pub(super) fn residual_element(&self, tet: u32) -> &ResidualElement {
+        &self.residual_elements[tet as usize]
     }
 
     /// Positions (m) of the particles of an awake cell.
@@ -230,9 +230,9 @@ impl RunningPatch {
     }
 
     /// Wakes these particles (ascending, no more than there is room for) and no others, of which this fades. Allocates nothing.
-    pub(crate) fn wake(&mut self, hybrid: &HybridBody, active: &[u32], fading: &PrestrainDecay) {
+    pub(crate) fn wake(&mut self, hybrid: &HybridBody, active: &[u32], decay: &PrestrainDecay) {
         (0..Self::SLICES).for_each(|slice| self.set_slice(hybrid, active, slice));
-        self.put_fades(fading);
+        self.put_prestrains(decay);
     }
 
     /// In how many slices particles wake.
@@ -249,7 +249,7 @@ impl RunningPatch {
                 self.find_points(hybrid);
                 self.mark_carried(hybrid, true);
             }
-            1 => self.take_from_shares(hybrid),
+            1 => self.take_from_residual_elements(hybrid),
             _ => {
                 self.lay_out(hybrid);
                 let points = self.points.iter().filter(|point| point.active != NONE);
@@ -281,10 +281,11 @@ impl RunningPatch {
             self.is_awake[cell as usize] = false;
         }
         for &tet in &self.taken_from {
-            let (share, whole) = (&mut self.shares[tet as usize], &hybrid.partition.shares()[tet as usize]);
-            share.volume_m3 = whole.volume_m3;
-            share.moments_m2.copy_from_slice(&whole.moments_m2);
-            self.share_kernel.put(tet as usize, whole);
+            let (residual, whole) =
+                (&mut self.residual_elements[tet as usize], &hybrid.partition.residual_elements()[tet as usize]);
+            residual.volume_m3 = whole.volume_m3;
+            residual.moments_m2.copy_from_slice(&whole.moments_m2);
+            self.residual_kernel.put(tet as usize, whole);
         }
         self.taken_from.clear();
         self.active.clear();
@@ -326,12 +327,12 @@ impl RunningPatch {
             }
         }
         let numbered = (0..).zip(&self.points).filter(|(_, point)| point.active == NONE);
-        self.border.take(numbered.map(|(number, point)| (number, point.anchor)));
+        self.constrained.take(numbered.map(|(number, point)| (number, point.anchor)));
         self.displacements_m.resize(self.points.len(), DVec3::ZERO);
     }
 
     /// `V_g ← V_g − (1 − ε) V_c` and likewise `T_gi`.
-    fn take_from_shares(&mut self, hybrid: &HybridBody) {
+    fn take_from_residual_elements(&mut self, hybrid: &HybridBody) {
         let partition = &hybrid.partition;
         let mut last = NONE;
         for &cell in &self.cells {
@@ -341,7 +342,7 @@ impl RunningPatch {
                 if !self.taken_from.contains(&tet) {
                     self.taken_from.push(tet);
                 }
-                for (number, node) in (0..).zip(&self.shares[tet as usize].nodes) {
+                for (number, node) in (0..).zip(&self.residual_elements[tet as usize].nodes) {
                     self.number_of_node[*node as usize] = number;
                 }
             }
@@ -350,10 +351,16 @@ impl RunningPatch {
                 .corners(cell as usize)
                 .map(|particle| self.points[self.point_of[particle as usize] as usize].anchor);
             let numbers = anchors.map(|anchor| anchor.nodes.map(|node| self.number_of_node[node as usize]));
-            self.shares[tet as usize].add_numbered(part, KEPT - 1.0, (volume_m3, &gradients_m2), &anchors, &numbers);
+            self.residual_elements[tet as usize].add_numbered(
+                part,
+                KEPT - 1.0,
+                (volume_m3, &gradients_m2),
+                &anchors,
+                &numbers,
+            );
         }
         for &tet in &self.taken_from {
-            self.share_kernel.put(tet as usize, &self.shares[tet as usize]);
+            self.residual_kernel.put(tet as usize, &self.residual_elements[tet as usize]);
         }
     }
 
@@ -361,7 +368,7 @@ impl RunningPatch {
     /// velocities `v`, with `left` left of what fades.
     pub(crate) fn add_coarse_forces_n(&mut self, v: &[DVec3], left: f64, forces_n: &mut [DVec3]) -> Found {
         let v_nodes = &v[..self.node_displacements_m.len()];
-        self.share_kernel.add_forces_n(&self.node_displacements_m, v_nodes, left, forces_n)
+        self.residual_kernel.add_forces_n(&self.node_displacements_m, v_nodes, left, forces_n)
     }
 
     /// The same of awake cells, on coarse nodes and active particles; whose forces were none.
@@ -387,7 +394,7 @@ impl RunningPatch {
             self.cut.set_displacements(&self.of_points);
         }
         if self.is_viscous {
-            self.border.follow(v_nodes, &mut self.of_points);
+            self.constrained.follow(v_nodes, &mut self.of_points);
             for (v, &point) in v_particles.iter().zip(&self.points_of_active) {
                 self.of_points[point as usize] = *v;
             }
@@ -401,7 +408,7 @@ impl RunningPatch {
             self.cut.add_forces_n(&mut self.of_points);
         }
         let (f_nodes, f_particles) = forces_n.split_at_mut(nodes);
-        self.border.push(&self.of_points, f_nodes);
+        self.constrained.push(&self.of_points, f_nodes);
         for (force_n, &point) in f_particles.iter_mut().zip(&self.points_of_active) {
             *force_n = self.of_points[point as usize];
         }
@@ -415,7 +422,7 @@ impl RunningPatch {
         for ((u, x), rest) in self.node_displacements_m.iter_mut().zip(x_nodes).zip(rest) {
             *u = *x - *rest;
         }
-        self.border.follow(&self.node_displacements_m, &mut self.displacements_m);
+        self.constrained.follow(&self.node_displacements_m, &mut self.displacements_m);
         for (x, &point) in x_particles.iter().zip(&self.points_of_active) {
             self.displacements_m[point as usize] = *x - self.points[point as usize].rest_m;
         }

@@ -41,7 +41,7 @@ struct CutBlock<T, const N: usize> {
 /// What fades in the cells of a block.
 #[derive(Debug, Clone)]
 #[repr(C, align(64))]
-struct FadeBlock<T, const N: usize> {
+struct PrestrainBlock<T, const N: usize> {
     entries: [[T; N]; ENTRIES],
     /// Bits of the lanes in which something does.
     lanes: u32,
@@ -61,7 +61,7 @@ struct Tables<T, const N: usize> {
     materials: Vec<Split<T>>,
     blocks: Vec<CutBlock<T, N>>,
     /// As many.
-    fades: Vec<FadeBlock<T, N>>,
+    prestrains: Vec<PrestrainBlock<T, N>>,
     runs: Vec<Run>,
     spare: u32,
 }
@@ -133,10 +133,10 @@ impl CutCells {
     }
 
     /// What fades in a cell of a run (from 0).
-    pub fn put_fade(&mut self, run: usize, number: usize, fade: Option<&CellPrestrain>) {
+    pub fn put_prestrain(&mut self, run: usize, number: usize, prestrain: Option<&CellPrestrain>) {
         match &mut self.layout {
-            Layout::Single(blocks) => blocks.put_fade(run, number, fade),
-            Layout::Double(blocks) => blocks.put_fade(run, number, fade),
+            Layout::Single(blocks) => blocks.put_prestrain(run, number, prestrain),
+            Layout::Double(blocks) => blocks.put_prestrain(run, number, prestrain),
         }
     }
 
@@ -194,7 +194,7 @@ impl<T: Scalar, const N: usize> Tables<T, N> {
             materials: materials.iter().map(Split::of).collect(),
             // Every run may leave one block in part empty.
             blocks: Vec::with_capacity(cells.div_ceil(N) + materials.len()),
-            fades: Vec::with_capacity(cells.div_ceil(N) + materials.len()),
+            prestrains: Vec::with_capacity(cells.div_ceil(N) + materials.len()),
             runs: Vec::with_capacity(materials.len()),
             spare: points as u32,
         }
@@ -202,7 +202,7 @@ impl<T: Scalar, const N: usize> Tables<T, N> {
 
     fn clear(&mut self) {
         self.blocks.clear();
-        self.fades.clear();
+        self.prestrains.clear();
         self.runs.clear();
     }
 
@@ -218,19 +218,19 @@ impl<T: Scalar, const N: usize> Tables<T, N> {
                 minus_kappa: [zero; N],
             });
         }
-        let nothing = FadeBlock { entries: [[zero; N]; ENTRIES], lanes: 0 };
-        self.fades.resize(self.blocks.len(), nothing);
+        let nothing = PrestrainBlock { entries: [[zero; N]; ENTRIES], lanes: 0 };
+        self.prestrains.resize(self.blocks.len(), nothing);
         self.runs.push(Run { material, blocks: first..self.blocks.len(), cells });
     }
 
-    fn put_fade(&mut self, run: usize, number: usize, fade: Option<&CellPrestrain>) {
+    fn put_prestrain(&mut self, run: usize, number: usize, prestrain: Option<&CellPrestrain>) {
         let run = &self.runs[run];
         let (block, lane) = run.lane::<N>(number);
-        let block = &mut self.fades[run.blocks.start + block];
-        for (lanes, entry) in block.entries.iter_mut().zip(entries(fade)) {
+        let block = &mut self.prestrains[run.blocks.start + block];
+        for (lanes, entry) in block.entries.iter_mut().zip(entries(prestrain)) {
             lanes[lane] = T::of(entry);
         }
-        block.lanes = block.lanes & !(1 << lane) | u32::from(fade.is_some()) << lane;
+        block.lanes = block.lanes & !(1 << lane) | u32::from(prestrain.is_some()) << lane;
     }
 
     fn put(&mut self, number: usize, points: [u32; 8], rest: &RestCell) {
@@ -256,10 +256,11 @@ impl<T: Scalar, const N: usize> Tables<T, N> {
         for run in &self.runs {
             let split = &self.materials[run.material as usize];
             let blocks = &self.blocks[run.blocks.clone()];
-            let fades = &self.fades[run.blocks.clone()];
-            let mut pass = CutForces { split, blocks, fades, left, displacements, velocities, sums, fading_j: 0.0 };
+            let prestrains = &self.prestrains[run.blocks.clone()];
+            let mut pass =
+                CutForces { split, blocks, prestrains, left, displacements, velocities, sums, prestrain_j: 0.0 };
             let viscous_w = split.material.run(set, false, &mut pass);
-            found += Found { viscous_w, fading_j: pass.fading_j };
+            found += Found { viscous_w, prestrain_j: pass.prestrain_j };
         }
         found
     }
@@ -291,7 +292,7 @@ mod tests {
             // Others before: nothing of them may stay.
             kernel.start(0, 3);
             (0..3).for_each(|number| kernel.put(number, cells[number].0, &cells[number].1));
-            (0..3).for_each(|number| kernel.put_fade(0, number, Some(&CellPrestrain::none(0))));
+            (0..3).for_each(|number| kernel.put_prestrain(0, number, Some(&CellPrestrain::none(0))));
             kernel.clear();
             kernel.start(0, cells.len());
             for (number, (points, rest)) in cells.iter().enumerate() {

@@ -14,7 +14,7 @@ use glam::DVec3;
 pub(crate) struct Question<'a> {
     pub(crate) cells: &'a [([u32; 8], RestCell)],
     pub(crate) spacing_m: f64,
-    pub(crate) handed: f64,
+    pub(crate) fraction: f64,
     pub(crate) u: &'a [DVec3],
     pub(crate) v: &'a [DVec3],
     pub(crate) material: Material,
@@ -50,9 +50,9 @@ pub(crate) fn agrees_with_oracle(only_full: bool, kernel: impl Fn(&Question<'_>)
             }
             let largest = expected.iter().map(|f| f.length()).fold(0.0, f64::max);
             for (precision, bound) in [(Precision::Double, 1e-11), (Precision::Single, 2e-5)] {
-                let (spacing_m, handed) = (1.1e-3, 0.98);
+                let (spacing_m, fraction) = (1.1e-3, 0.98);
                 let (cells, u, v) = (&cells[..], &u[..], &v[..]);
-                let run = |set| kernel(&Question { cells, spacing_m, handed, u, v, material, precision, set });
+                let run = |set| kernel(&Question { cells, spacing_m, fraction, u, v, material, precision, set });
                 let baseline = run(InstructionSet::Baseline);
                 let pairs = baseline.forces_n.iter().zip(&expected);
                 let worst = pairs.map(|(a, b)| a.distance(*b)).fold(0.0, f64::max);

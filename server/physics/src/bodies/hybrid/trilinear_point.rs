@@ -7,7 +7,7 @@ use glam::DVec3;
 
 /// The cell that a point of the skin belongs to, and where in it.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct SkinPlace {
+pub struct CellPoint {
     /// Index of the cell.
     pub cell: u32,
     /// In units of the cell's edge from its first corner.
@@ -16,14 +16,14 @@ pub struct SkinPlace {
 
 /// A point in a cell: it moves with the cell's particles by their trilinear weights, and hands forces to them by the same.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Place {
+pub struct TrilinearPoint {
     /// Particles.
     pub particles: [u32; 8],
     /// Their weights; they sum to one, and are negative only where the point lies in no cell of the body.
     pub weights: [f64; 8],
 }
 
-impl SkinPlace {
+impl CellPoint {
     /// Of a point (m); one that lies in no cell of the body belongs to the nearest.
     pub fn new(partition: &Partition, point_m: DVec3) -> Self {
         let sites = partition.sites();
@@ -65,31 +65,31 @@ impl SkinPlace {
     }
 
     /// With its particles and weights.
-    pub fn place(&self, partition: &Partition) -> Place {
-        Place { particles: partition.corners(self.cell as usize), weights: self.weights(partition) }
+    pub fn trilinear(&self, partition: &Partition) -> TrilinearPoint {
+        TrilinearPoint { particles: partition.corners(self.cell as usize), weights: self.weights(partition) }
     }
 }
 
-impl Place {
+impl TrilinearPoint {
     /// Of a point (m); one that lies in no cell of the body belongs to the nearest.
     pub fn new(partition: &Partition, point_m: DVec3) -> Self {
-        SkinPlace::new(partition, point_m).place(partition)
+        CellPoint::new(partition, point_m).trilinear(partition)
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::bodies::hybrid::testing::{ball, balls_in_cage};
+    use crate::bodies::hybrid::testing::{ball, embedded_balls};
 
     #[test]
     fn points_of_the_skin_move_affinely() {
-        for partition in balls_in_cage() {
+        for partition in embedded_balls() {
             let skin = ball(0.01, DVec3::new(0.2e-3, -0.3e-3, 0.1e-3), 3);
             // Some lie deep in the body.
             for (number, &point) in skin.positions_m().iter().enumerate() {
                 let point = point * if number % 3 == 0 { 0.1 * (number % 10) as f64 } else { 1.0 };
-                let Place { particles, weights } = Place::new(&partition, point);
+                let TrilinearPoint { particles, weights } = TrilinearPoint::new(&partition, point);
                 assert!(weights.iter().all(|&w| w > -0.5));
                 assert!((weights.iter().sum::<f64>() - 1.0).abs() < 1e-14, "{weights:?}");
                 let moved: DVec3 = particles.iter().zip(weights).map(|(&p, w)| partition.particle_m(p) * w).sum();

@@ -7,11 +7,11 @@ use super::{
 use glam::DVec3;
 
 /// A tool has no more: the longest capsules are fine at places only that are farther apart.
-const MOST: usize = 64;
+const MOST_SAMPLES: usize = 64;
 
 /// A place along a tool, and the piece of its axis that is nearer to it than to others.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Place {
+pub(crate) struct AxisSample {
     /// Where it is (m).
     at_m: DVec3,
     /// Its speed (m/s).
@@ -36,20 +36,20 @@ pub(crate) struct Near {
 
 impl ToolSpec {
     /// How many places it has: as many as make them no farther than `apart_m` from one another, and at most 64.
-    pub(crate) fn place_count(&self, apart_m: f64) -> usize {
-        ((2.0 * self.shape.half_length_m() / apart_m).ceil() as usize).saturating_add(1).min(MOST)
+    pub(crate) fn axis_sample_count(&self, apart_m: f64) -> usize {
+        ((2.0 * self.shape.half_length_m() / apart_m).ceil() as usize).saturating_add(1).min(MOST_SAMPLES)
     }
 }
 
 impl ToolState {
     /// So many places along it.
-    pub(crate) fn places(&self, spec: &ToolSpec, count: usize) -> impl Iterator<Item = Place> + '_ {
+    pub(crate) fn axis_samples(&self, spec: &ToolSpec, count: usize) -> impl Iterator<Item = AxisSample> + '_ {
         let (radius_m, half_m) = (spec.radius_m, spec.shape.axis(self.centre_m, self.orientation).half_m);
         let half_piece_m = if count > 1 { half_m.length() / (count - 1) as f64 } else { 0.0 };
         (0..count).map(move |number| {
             let arm_m = if count > 1 { half_m * (2.0 * number as f64 / (count - 1) as f64 - 1.0) } else { DVec3::ZERO };
             let at_m = self.centre_m + arm_m;
-            Place {
+            AxisSample {
                 at_m,
                 // v + ω × r
                 speed_m_per_s: (self.velocity_m_per_s + self.angular_velocity_rad_per_s.cross(arm_m)).length(),
@@ -61,7 +61,7 @@ impl ToolState {
     }
 }
 
-impl Place {
+impl AxisSample {
     /// The vertex of a skin, of which a query has begun, nearest to where the tool is deepest in it here, or, where it does not touch it, to this place; within a gap of `2 near_m`, or
     /// `near_m + cover_m` of a tool that touches: no point of the skin is farther than `cover_m` from a vertex. `fitted` are contact's boxes and its travel (m), where they are of use.
     ///
@@ -148,7 +148,8 @@ mod tests {
         let at_m = [DVec3::new(-0.012, -0.005, 0.0), DVec3::new(0.012, 0.005, 0.0), DVec3::new(0.012, -0.013, 0.0)];
         let cloud = Cloud { at_m: at_m.to_vec(), ids: vec![0, 1, 2] };
         let tool = ToolState { centre_m: DVec3::ZERO, contact_force_n: 0.1 * DVec3::Y, ..ToolState::at_start(&spec) };
-        let looks: Vec<Near> = tool.places(&spec, 5).map(|place| place.look(&cloud, (3e-3, 1e-3), None)).collect();
+        let looks: Vec<Near> =
+            tool.axis_samples(&spec, 5).map(|sample| sample.look(&cloud, (3e-3, 1e-3), None)).collect();
         let found = [looks[0], looks[4]].map(|near| (near.vertex.map(|(vertex, _)| vertex), near.gap_m));
         assert_eq!(found, [(Some(0), 0.0), (Some(1), 0.0)]);
     }
@@ -160,7 +161,7 @@ mod tests {
     proptest! {
         /// Against the distance of every vertex from the whole axis.
         #[test]
-        fn what_is_near_the_axis_is_near_a_place(
+        fn what_is_near_the_axis_is_near_a_sample(
             at_m in prop::collection::vec(within(0.04), 1..3 * CLUSTER),
             axis in within(1.0),
             half_length_m in 0.0..0.03,
@@ -176,8 +177,8 @@ mod tests {
             let from_axis_m = |p: DVec3| p.distance(axis * p.dot(axis).clamp(-half_length_m, half_length_m));
             let gap_m = at_m.iter().map(|p| from_axis_m(*p)).fold(f64::INFINITY, f64::min) - spec.radius_m;
             let cloud = Cloud { ids: (0..at_m.len() as u32).collect(), at_m };
-            let count = spec.place_count(apart_m);
-            let looks: Vec<Near> = tool.places(&spec, count).map(|place| place.look(&cloud, (near_m, cover_m), None)).collect();
+            let count = spec.axis_sample_count(apart_m);
+            let looks: Vec<Near> = tool.axis_samples(&spec, count).map(|sample| sample.look(&cloud, (near_m, cover_m), None)).collect();
             let least_m = looks.iter().map(|near| near.gap_m).fold(f64::INFINITY, f64::min);
             let touches = contact_force_n != DVec3::ZERO;
             let reach_m = if touches { (near_m + cover_m).max(2.0 * near_m) } else { 2.0 * near_m };
@@ -203,27 +204,27 @@ mod tests {
     }
 
     #[test]
-    fn a_sphere_has_its_centre_and_a_capsule_places_from_end_to_end() {
+    fn a_sphere_has_its_centre_and_a_capsule_samples_from_end_to_end() {
         let sphere = ToolSpec { shape: ToolShape::Sphere, ..capsule(0.0) };
         for apart_m in [1e-9, 1.0, f64::INFINITY] {
-            assert_eq!(sphere.place_count(apart_m), 1);
+            assert_eq!(sphere.axis_sample_count(apart_m), 1);
         }
         let spec = capsule(0.01);
         assert_eq!(
-            [0.02, 0.0199, 0.005, 1e-12, f64::INFINITY].map(|apart_m| spec.place_count(apart_m)),
+            [0.02, 0.0199, 0.005, 1e-12, f64::INFINITY].map(|apart_m| spec.axis_sample_count(apart_m)),
             [2, 3, 5, 64, 1]
         );
-        assert_eq!(capsule(1e300).place_count(1e-300), 64);
+        assert_eq!(capsule(1e300).axis_sample_count(1e-300), 64);
         let tool = ToolState {
             velocity_m_per_s: DVec3::Y,
             angular_velocity_rad_per_s: DVec3::Z * 100.0,
             ..ToolState::at_start(&spec)
         };
-        let places: Vec<Place> = tool.places(&spec, 3).collect();
-        for (place, x_m) in places.iter().zip([-0.01, 0.0, 0.01]) {
-            assert!(place.at_m.distance(DVec3::new(x_m, 1.0, 0.0)) < 1e-15);
-            assert!((place.speed_m_per_s - (1.0 + 100.0 * x_m).abs()).abs() < 1e-12);
+        let axis_samples: Vec<AxisSample> = tool.axis_samples(&spec, 3).collect();
+        for (sample, x_m) in axis_samples.iter().zip([-0.01, 0.0, 0.01]) {
+            assert!(sample.at_m.distance(DVec3::new(x_m, 1.0, 0.0)) < 1e-15);
+            assert!((sample.speed_m_per_s - (1.0 + 100.0 * x_m).abs()).abs() < 1e-12);
         }
-        assert_eq!(tool.places(&spec, 1).next().unwrap().at_m, DVec3::Y);
+        assert_eq!(tool.axis_samples(&spec, 1).next().unwrap().at_m, DVec3::Y);
     }
 }
