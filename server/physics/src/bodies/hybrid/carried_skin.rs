@@ -1,14 +1,14 @@
-//! What carries the skin's vertices, and where each is when asked.
+//! What carries the skin's vertices; their positions are computed when they are asked for.
 use super::{body::HybridBody, clusters::Displaced, composite::Anchor, partition::NONE, running::RunningPatch};
 use crate::{contact::Skin, tick::CarriedSkin};
 use glam::DVec3;
 
-/// A vertex's rest position with what carries it.
+/// A vertex of the skin: its rest position, and the particles that carry it.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Carried {
     rest_m: DVec3,
     carriers: [(Carrier, f64); 8],
-    /// How many of them have weight, the first ones.
+    /// How many of the carriers have a weight other than zero; they are the first ones.
     weighty: usize,
 }
 
@@ -18,31 +18,31 @@ impl Carried {
     }
 }
 
-/// What carries a particle.
+/// What moves a particle that carries a vertex.
 #[derive(Debug, Clone, Copy)]
 enum Carrier {
-    /// A point of the patch, by its number.
+    /// A point of the patch, given by its number.
     Point(u32),
     /// The coarse nodes alone.
     Nodes(Anchor),
 }
 
-/// Where the skin is, for a query of contact.
+/// The skin at one instant, as contact queries it.
 pub(crate) struct SkinView<'a> {
     hybrid: &'a HybridBody,
     patch: &'a RunningPatch,
-    /// Velocities (m/s) of coarse nodes and then active particles; none where nobody asks for a vertex's.
+    /// Velocities (m/s) of coarse nodes and then active particles; empty where no vertex's velocity is asked for.
     v: &'a [DVec3],
     deviation_m: f64,
 }
 
 impl<'a> SkinView<'a> {
-    /// At where the patch was displaced to.
+    /// Views the skin where the patch was displaced to.
     pub(crate) fn new(hybrid: &'a HybridBody, patch: &'a RunningPatch) -> Self {
         Self { hybrid, patch, v: &[], deviation_m: 0.0 }
     }
 
-    /// The same, with velocities (m/s) of coarse nodes and then active particles.
+    /// Returns the same view with velocities (m/s) of coarse nodes and then active particles.
     pub(crate) fn moving(self, v: &'a [DVec3]) -> Self {
         Self { v, ..self }
     }
@@ -57,7 +57,7 @@ impl<'a> SkinView<'a> {
 }
 
 impl Skin for SkinView<'_> {
-    /// Takes how far the active particles are from where they would be asleep.
+    /// Measures how far the active particles are from where they would be asleep.
     fn begin(&mut self) {
         self.deviation_m = self.patch.deviation_m();
     }
@@ -153,7 +153,8 @@ impl CarriedSkin for SkinView<'_> {
 }
 
 impl HybridBody {
-    /// Where a vertex of the skin is (m), at positions `x` (m) of coarse nodes and then of the active particles `active`.
+    /// Returns the position (m) of a vertex of the skin, at positions `x` (m) of coarse nodes and then of the active
+    /// particles `active`.
     pub fn vertex_m(&self, vertex: u32, active: &[u32], x: &[DVec3]) -> DVec3 {
         let (of_nodes, of_particles) = x.split_at(self.node_count());
         let moved = |particle: u32| {

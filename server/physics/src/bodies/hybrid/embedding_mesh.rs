@@ -11,31 +11,32 @@ use crate::{
 use glam::DVec3;
 use std::collections::BTreeSet;
 
-/// Rounds of moving nodes.
+/// Most rounds of moving nodes.
 const ROUNDS: usize = 12;
-/// A point that lies outside by less than this part of an edge is inside.
+/// A point that lies outside by less than this fraction of an edge counts as inside.
 const ROUNDING: f64 = 1e-9;
-/// A node moves along its normal by what its faces need, over how far they face away from it, at least this.
+/// A node moves along its normal by what its faces need, divided by the cosine between their normals and its own, which
+/// counts as this at least.
 const LEAST_COSINE: f64 = 0.3;
-/// A face moves for a point where its free nodes carry more than this of it.
+/// A face is moved for a point only where the weights of its free nodes sum to more than this at the point.
 const LEAST_FREE_PART: f64 = 0.3;
-/// What is moved is moved by so much too far, that rounds end.
+/// Nodes are moved by this times what is needed, so that the rounds end.
 const SURPLUS: f64 = 1.05;
-/// No tet may lose more than this part of its volume in a round.
+/// No tet may lose more than this fraction of its volume in a round.
 const MOST_LOST: f64 = 0.5;
 
-/// A covering mesh.
+/// A mesh that holds the particles.
 #[derive(Debug, Clone, PartialEq)]
 pub struct EmbeddingMesh {
     /// The mesh, with the same tets.
     pub mesh: TetMesh,
-    /// How far its boundary was moved at most (m).
+    /// Largest displacement (m) of a node of its boundary.
     pub moved_m: f64,
-    /// Points that are still outside.
+    /// Number of points that are still outside.
     pub outside: usize,
 }
 
-/// Moves the boundary outwards, but for `held` nodes, until the tets hold the points or nothing moves any more.
+/// Moves the boundary outwards, but for `held` nodes, until the tets hold the points or no node can be moved further.
 pub fn cover(mesh: &TetMesh, surface: &Surface, held: &BTreeSet<u32>, points_m: &[DVec3]) -> EmbeddingMesh {
     let mut covering = mesh.clone();
     let mut waiting: Vec<DVec3> = points_m.to_vec();
@@ -57,7 +58,8 @@ pub fn cover(mesh: &TetMesh, surface: &Surface, held: &BTreeSet<u32>, points_m: 
     EmbeddingMesh { mesh: covering, moved_m, outside: waiting.len() }
 }
 
-/// How far (m) each node's faces would have to move, from the points outside; the points inside are taken off the list.
+/// Returns how far (m) each node's faces would have to move to hold the points outside, and takes the points inside off
+/// the list.
 fn needs(mesh: &TetMesh, surface: &Surface, held: &BTreeSet<u32>, waiting: &mut Vec<DVec3>) -> Vec<f64> {
     let locator = Locator::new(mesh);
     let mut needs = vec![0.0_f64; mesh.positions_m().len()];
@@ -84,13 +86,13 @@ fn needs(mesh: &TetMesh, surface: &Surface, held: &BTreeSet<u32>, waiting: &mut 
 /// A boundary triangle near a point outside.
 struct Near {
     triangle: usize,
-    /// Of its corners, at its point nearest to that one.
+    /// Weights of its corners at its point that is nearest to the point outside.
     weights: [f64; 3],
-    /// How far (m) that one is above its plane.
+    /// Height (m) of the point outside above the triangle's plane.
     above_m: f64,
 }
 
-/// The nearest of all; of several as near, the one with the point highest above it.
+/// Returns the boundary triangle nearest to a point; of several that are as near, the one that the point is highest above.
 fn nearest_face(mesh: &TetMesh, surface: &Surface, point_m: DVec3) -> Near {
     let (mut best, mut nearest_m) = (Near { triangle: 0, weights: [0.0; 3], above_m: 0.0 }, f64::INFINITY);
     for triangle in 0..surface.triangles.len() {
@@ -108,7 +110,7 @@ fn nearest_face(mesh: &TetMesh, surface: &Surface, point_m: DVec3) -> Near {
     best
 }
 
-/// Displacements (m) that meet the needs.
+/// Returns displacements (m) of the nodes that meet the needs.
 fn moves(mesh: &TetMesh, surface: &Surface, held: &BTreeSet<u32>, needs: &[f64]) -> Vec<DVec3> {
     let normal_of = |triangle: usize| {
         let [a, b, c] = surface.triangle_nodes(triangle).map(|n| mesh.positions_m()[n as usize]);
@@ -134,7 +136,7 @@ fn moves(mesh: &TetMesh, surface: &Surface, held: &BTreeSet<u32>, needs: &[f64])
     (0..needs.len()).map(displacement).collect()
 }
 
-/// The mesh with its nodes moved, by less where a tet would lose too much; `None` when nothing can be moved.
+/// Returns the mesh with its nodes moved, all by less where a tet would lose too much volume; `None` when they cannot be moved.
 fn moved(mesh: &TetMesh, moves: &[DVec3]) -> Option<TetMesh> {
     let mut scale = 1.0;
     for _ in 0..6 {
@@ -163,7 +165,7 @@ mod tests {
     };
     use glam::BVec3;
 
-    /// Twenty tets within a ball, of which they hold three fifths.
+    /// Twenty tets inside a ball hold three fifths of it at first.
     #[test]
     fn tets_inside_a_ball_are_made_to_hold_its_particles() {
         let skin = ball(0.01, DVec3::ZERO, 3);

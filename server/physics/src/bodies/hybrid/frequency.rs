@@ -16,19 +16,21 @@ use crate::{
 };
 use glam::{BVec3, DMat3, DVec3};
 
-/// Lanczos' residual over the eigenvalue, of bodies of up to so many cells and of larger ones.
+/// Bound of Lanczos' residual over the eigenvalue: `FINE` for bodies of up to `MANY_CELLS` cells, `ROUGH` for larger ones.
 const FINE: f64 = 1e-4;
 const MANY_CELLS: usize = 200_000;
 const ROUGH: f64 = 1e-2;
 
 impl HybridBody {
-    /// Largest natural frequency (rad/s) at rest, on springs (N/m, in all directions; one per particle, or none).
+    /// Returns the largest natural frequency (rad/s) at rest, on springs (N/m, in all directions; one per particle, or none).
     ///
-    /// Lanczos' estimate with its residual, and no more than the bound of single cells, each with its share `ρV_cp`, an eighth a corner, of its particles' masses (by Rayleigh's
-    /// quotient no assembly is faster than the fastest cell): `ω_c² ≤ V_c/ρ ((3λ⁺ + 2µ) λ_max(Σ_p b_p b_pᵀ/V_cp) + κ/V_c Σ_p w_k γ_kp²/V_cp)`. Of full cells
-    /// that is `4 (3λ + 2µ)/(ρh²)`: all swell at once. Neighbours hinder each other, so that a lattice has some two thirds of it.
+    /// It is Lanczos' estimate plus its residual, and no more than the bound of single cells, each with its part `ρV_cp`
+    /// (an eighth per corner) of its particles' masses. By Rayleigh's quotient no assembly is faster than the fastest cell: `ω_c² ≤ V_c/ρ ((3λ⁺ + 2µ) λ_max(Σ_p b_p b_pᵀ/V_cp) + κ/V_c Σ_p w_k γ_kp²/V_cp)`.
+    /// For full cells that is `4 (3λ + 2µ)/(ρh²)`, of cells that swell. Neighbours hinder each other, so that a lattice
+    /// has some two thirds of it.
     ///
-    /// Of very many cells the estimate is rougher, and as safe: its residual, which is added, may be a hundredth. `progress` is told the part done.
+    /// For very many cells the estimate is rougher, and as safe: its residual, which is added, may be a hundredth of it.
+    /// `progress` is told the fraction done.
     pub fn frequency_rad_per_s(&self, springs_n_per_m: &[f64], progress: &mut dyn FnMut(f64)) -> f64 {
         let tolerance = if self.partition.cells().len() > MANY_CELLS { ROUGH } else { FINE };
         self.frequency_to(tolerance, springs_n_per_m, progress)
@@ -45,7 +47,7 @@ impl HybridBody {
         ((theta + residual).min(bound_sq) / (1.0 - KEPT)).sqrt()
     }
 
-    /// The same of the coarse level alone, while all particles sleep.
+    /// Returns the largest natural frequency (rad/s) of the coarse level alone, while all particles sleep.
     pub fn coarse_frequency_rad_per_s(&self) -> f64 {
         let root = |(mass, free): (&f64, &BVec3)| {
             DVec3::select(*free, DVec3::splat(mass.max(f64::MIN_POSITIVE).sqrt().recip()), DVec3::ZERO)
@@ -65,7 +67,7 @@ impl HybridBody {
         (theta + residual).sqrt()
     }
 
-    /// `out ← K a` with all particles awake.
+    /// Writes `out ← K a` with all particles awake.
     fn apply(&self, springs_n_per_m: &[f64], a: &[DVec3], out: &mut [DVec3]) {
         out.fill(DVec3::ZERO);
         for number in 0..self.partition.cells().len() {
@@ -108,13 +110,13 @@ impl HybridBody {
     }
 }
 
-/// `σ` (Pa) of the gradient of a small displacement.
+/// Returns the stress `σ` (Pa) of the gradient of a small displacement.
 fn stress_pa(material: &Material, g: &DMat3) -> DMat3 {
     let Lame { lambda_pa, mu_pa } = material.lame;
     (*g + g.transpose()) * mu_pa + DMat3::from_diagonal(DVec3::splat(lambda_pa * trace(g)))
 }
 
-/// `out ← out + K_c a` of a cell that the surface does not cut, as of `cell`'s but with an eighth of its multiplications.
+/// Adds `K_c a` of a cell that the surface does not cut to `out`: the same as `cell`'s, with an eighth of its multiplications.
 ///
 /// Its gradient's rows and its hourglass amplitudes are sums of the corners' values with the signs of `ξ, η, ζ, ηζ, ζξ, ξη, ξηζ`: all come from three rounds of sums and differences
 /// of pairs, `t`, and go back the same way.
@@ -164,7 +166,8 @@ mod tests {
         settings::Precision,
     };
 
-    /// The largest frequency (rad/s) of what is left to the coarse level, with the mass matrix of these active particles: powers of `M'⁻¹ K_c`.
+    /// Returns the largest frequency (rad/s) of what is left to the coarse level, with the mass matrix of these active
+    /// particles, by powers of `M'⁻¹ K_c`.
     fn left_rad_per_s(hybrid: &HybridBody, active: &[u32]) -> f64 {
         let mut running = RunningPatch::new(hybrid, active.len(), Precision::Double);
         running.wake(hybrid, active, &PrestrainDecay::default());
@@ -205,7 +208,7 @@ mod tests {
         }
     }
 
-    /// Rough: never less, and at most half of its residual more.
+    /// A rough estimate is never below the fine one, and above it by half of its residual at most.
     #[test]
     fn a_rough_estimate_is_as_safe_and_little_more() {
         for spacing_m in [1.1e-3, 0.5e-3] {

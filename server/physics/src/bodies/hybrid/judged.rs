@@ -1,4 +1,4 @@
-//! What the step of a hybrid body is judged by: norms in the metric of what is awake, and its long steps.
+//! How the length of a hybrid body's step is judged: by norms in the mass matrix of what is awake, and by its long steps.
 use super::{HybridScratch, SteppedHybrid};
 use crate::tick::{Environment, Judged, MechanicalState, StepEvidence, StepForcesNow};
 use glam::DVec3;
