@@ -1,4 +1,4 @@
-//! Who owns which volume: the cells of the lattice, the coarse tets they are counted to, and the particles between them.
+//! The partition of the body's volume into the cells of the lattice, the coarse tets that these are counted to, and the particles between them.
 //!
 //! The coarse level has no geometry of its own. Its energy is that of the lattice's cells, moved by the coarse nodes and integrated with few points:
 //! cells are counted to the part (`composite`) that holds their middle, and a part `g` has the mean gradient of its cells,
@@ -17,25 +17,25 @@ use super::{
 };
 use glam::DVec3;
 
-/// Not there.
+/// The number that stands for an entry that does not exist.
 pub const NONE: u32 = u32::MAX;
 
 /// A cell that holds some of the body.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Cell {
-    /// Its number in the lattice's box; of a doubled one that of the first of its eight.
+    /// Its number in the lattice's box; that of the first of its eight cells for a doubled one.
     pub site_cell: u32,
-    /// The coarse tet it is counted to.
+    /// The coarse tet that it is counted to.
     pub tet: u32,
-    /// The part of it.
+    /// The part of the tet.
     pub part: u8,
-    /// Of twice the spacing.
+    /// Whether its edge is twice the spacing.
     pub doubled: bool,
-    /// Where its moments are, [`NONE`] of a full one none of whose corners hangs.
+    /// Index of its moments among those of cut cells, [`NONE`] for a full one none of whose corners hangs.
     cut: u32,
 }
 
-/// Progress is told whenever so many cells or sites are done.
+/// Progress is reported whenever this many cells or sites are done.
 const TELL_EVERY: usize = 1 << 15;
 
 /// The lattice's cells and particles on the coarse tets.
@@ -44,13 +44,13 @@ pub struct Partition {
     sites: Sites,
     coarse: Composite,
     cells: Vec<Cell>,
-    /// Of cells that the surface cuts or that have corners that hang: `V_c` and `V_c b_cp`.
+    /// `V_c` and `V_c b_cp` of cells that the surface cuts or that have hanging corners.
     cut: Vec<(f64, [DVec3; 8])>,
     /// Index in `cells` of every cell of the box; a doubled one is at eight of them.
     cell_at: Vec<u32>,
-    /// Some cells are doubled.
+    /// Whether some cells are doubled.
     has_doubled: bool,
-    /// Most cells that a particle moves.
+    /// Largest number of cells that a particle moves.
     most_cells_at: usize,
     /// Site of every particle, ascending.
     particles: Vec<u32>,
@@ -67,7 +67,7 @@ impl Partition {
         Self::new_with(sites, coarse, moments, &mut |_| {})
     }
 
-    /// The same; `progress` is told the part done.
+    /// Does the same; `progress` is told the fraction done.
     pub(super) fn new_with(
         sites: Sites,
         coarse: Composite,
@@ -120,7 +120,7 @@ impl Partition {
         partition
     }
 
-    /// Takes a cell that holds some of the body.
+    /// Adds a cell that holds some of the body.
     fn count(&mut self, moments: &CellMoments, marks: &[Site]) {
         let (sites, number) = (self.sites, self.cells.len() as u32);
         let at = sites.cell_at(moments.cell);
@@ -146,32 +146,32 @@ impl Partition {
         self.cells.push(Cell { site_cell: moments.cell as u32, tet, part, doubled: moments.doubled, cut });
     }
 
-    /// The lattice.
+    /// Returns the lattice.
     pub fn sites(&self) -> &Sites {
         &self.sites
     }
 
-    /// The coarse level.
+    /// Returns the coarse level's shape functions.
     pub fn coarse(&self) -> &Composite {
         &self.coarse
     }
 
-    /// Cells that hold some of the body.
+    /// Returns the cells that hold some of the body.
     pub fn cells(&self) -> &[Cell] {
         &self.cells
     }
 
-    /// Index in [`Self::cells`] of a cell of the lattice's box, [`NONE`] where there is none of the body.
+    /// Returns the index in [`Self::cells`] of a cell of the lattice's box, [`NONE`] where it holds nothing of the body.
     pub fn cell_at(&self, site_cell: usize) -> u32 {
         self.cell_at[site_cell]
     }
 
-    /// Number of particles.
+    /// Returns the number of particles.
     pub fn particle_count(&self) -> usize {
         self.particles.len()
     }
 
-    /// Rest position (m) of a particle.
+    /// Returns the rest position (m) of a particle.
     pub fn particle_m(&self, particle: u32) -> DVec3 {
         self.sites.site_m(self.particles[particle as usize] as usize)
     }
@@ -194,12 +194,12 @@ impl Partition {
         }
     }
 
-    /// What a particle follows while it sleeps.
+    /// Returns the coarse nodes that a particle follows while it sleeps.
     pub fn anchor(&self, particle: u32) -> Anchor {
         self.coarse.anchor_in(self.tet_of_particle[particle as usize], self.particle_m(particle))
     }
 
-    /// The eight particles of a cell: those at its corners, in their order, or at those of its block where they hang (`sizes`).
+    /// Returns the eight particles of a cell: those at its corners, in their order; in place of a hanging corner, the one at the corner of its block (`sizes`).
     pub fn corners(&self, cell: usize) -> [u32; 8] {
         let Cell { site_cell, doubled, .. } = self.cells[cell];
         let site_cell = site_cell as usize;
@@ -217,7 +217,7 @@ impl Partition {
         corners
     }
 
-    /// Which corners of a cell hang.
+    /// Returns which corners of a cell hang.
     pub fn hanging(&self, cell: usize) -> Hanging {
         let Cell { site_cell, doubled, cut, .. } = self.cells[cell];
         if !self.has_doubled || doubled || cut == NONE {
@@ -227,22 +227,22 @@ impl Partition {
         Hanging::new(self.sites.cell_at(site_cell as usize), |corner| self.particle_at[corners[corner]] == NONE)
     }
 
-    /// Whether a cell is whole, and of the lattice's spacing.
+    /// Returns whether a cell is whole, and its edge is the lattice's spacing.
     pub fn is_plain(&self, cell: usize) -> bool {
         self.is_whole(cell) && !self.cells[cell].doubled
     }
 
-    /// Whether a cell is a whole cube, none of whose corners hangs.
+    /// Returns whether a cell is a whole cube, none of whose corners hangs.
     pub fn is_whole(&self, cell: usize) -> bool {
         self.cells[cell].cut == NONE
     }
 
-    /// Edge (m) of a cell.
+    /// Returns the edge (m) of a cell.
     pub fn edge_m(&self, cell: usize) -> f64 {
         if self.cells[cell].doubled { 2.0 * self.sites.spacing_m() } else { self.sites.spacing_m() }
     }
 
-    /// `V_c` (m³) and `V_c b_cp` (m²) of a cell, `p` its particles.
+    /// Returns `V_c` (m³) and `V_c b_cp` (m²) of a cell, `p` its particles.
     pub fn moments(&self, cell: usize) -> (f64, [DVec3; 8]) {
         match self.cells[cell].cut {
             NONE => (self.edge_m(cell).powi(3), full_gradients_m2(self.edge_m(cell))),
@@ -250,12 +250,12 @@ impl Partition {
         }
     }
 
-    /// A cell's rest data, to answer for the share `handed` of it.
+    /// Returns a cell's rest data; it answers for `fraction` of the cell's volume.
     pub fn rest_cell(&self, cell: usize, fraction: f64) -> RestCell {
         RestCell::with_hanging(self.edge_m(cell), fraction, &self.moments(cell), self.hanging(cell))
     }
 
-    /// Cells that a particle moves.
+    /// Returns the cells that a particle moves.
     pub fn cells_at(&self, particle: u32) -> impl Iterator<Item = usize> + '_ {
         let site = self.particles[particle as usize] as usize;
         let [nx, ny, nz] = self.sites.cells();
@@ -266,7 +266,7 @@ impl Partition {
             let around = (|| Some([beside(0)?, beside(1)?, beside(2)?]))();
             let around = around.filter(|[i, j, k]| *i < nx && *j < ny && *k < nz);
             let direct = around.map_or(NONE, |around| self.cell_at[self.sites.cell(around)]);
-            // Others of the same block have it in place of a corner that hangs.
+            // Other cells of the same block have this particle in place of a hanging corner.
             let block = around.filter(|_| of_blocks && (direct == NONE || !self.cells[direct as usize].doubled));
             let others = block.into_iter().flat_map(move |around| {
                 let others = self.cells_of_block(around).into_iter();
@@ -278,17 +278,17 @@ impl Partition {
         })
     }
 
-    /// Whether some cells are of twice the spacing.
+    /// Returns whether some cells are doubled.
     pub fn has_doubled(&self) -> bool {
         self.has_doubled
     }
 
-    /// Most cells that a particle moves: eight where all are of one size.
+    /// Returns the largest number of cells that a particle moves: eight where all are of one size.
     pub fn most_cells_at(&self) -> usize {
         self.most_cells_at
     }
 
-    /// Cells, or [`NONE`], of the block of eight that a cell of the box belongs to.
+    /// Returns the cells, or [`NONE`], of the block of eight that a cell of the box belongs to.
     fn cells_of_block(&self, around: [usize; 3]) -> [u32; 8] {
         let counts = self.sites.cells();
         std::array::from_fn(|c| {
@@ -298,22 +298,22 @@ impl Partition {
         })
     }
 
-    /// What of a cell's volume (m³) is its particles': an eighth for each corner.
+    /// Returns the parts of a cell's volume (m³) that its particles have: an eighth for each corner.
     pub fn particles_m3(&self, cell: usize) -> [f64; 8] {
         self.hanging(cell).to_particles([self.moments(cell).0 / 8.0; 8])
     }
 
-    /// What of the body each coarse tet has when all particles sleep.
+    /// Returns the residual elements of the coarse tets while all particles sleep: they have all of the body.
     pub fn residual_elements(&self) -> &[ResidualElement] {
         &self.residual_elements
     }
 
-    /// Volume of all cells (m³).
+    /// Returns the volume of all cells (m³).
     pub fn volume_m3(&self) -> f64 {
         (0..self.cells.len()).map(|cell| self.moments(cell).0).sum()
     }
 
-    /// What part of it is in cells that the surface does not cut.
+    /// Returns the fraction of the volume that is in cells that the surface does not cut.
     pub fn whole_part(&self) -> f64 {
         let spacing_m = self.sites.spacing_m();
         let whole_m3 = |doubled: bool| if doubled { 8.0 * spacing_m.powi(3) } else { spacing_m.powi(3) };

@@ -1,9 +1,9 @@
-//! The particles that are awake, the cells between them, and what is left to the coarse tets.
+//! A patch: the active particles, the cells between them, and the residual elements of the coarse tets.
 //!
-//! Every cell that touches an active particle answers for the share `1 − ε` of its volume itself, and the coarse tets lose that
-//! share of it, `V_g ← V_g − (1 − ε) V_c` and `T_gi ← T_gi − (1 − ε) V_c Σ_p ζ_pi b_cp`: volume is counted once, and uniform stress stays in
-//! balance whichever particles are awake. The `ε` that stays keeps a coarse node whose surroundings are all awake from having neither stiffness nor mass.
-//! Particles of such cells that are not active themselves (the border) follow the coarse nodes, and hand forces back to them by the same weights.
+//! Every cell that has an active particle answers for the fraction `1 − ε` of its volume itself, and the coarse tets lose that
+//! fraction of it, `V_g ← V_g − (1 − ε) V_c` and `T_gi ← T_gi − (1 − ε) V_c Σ_p ζ_pi b_cp`: volume is counted once, and uniform stress stays
+//! in balance whichever particles are awake. The `ε` that stays keeps a coarse node whose surroundings are all awake from having neither stiffness nor mass.
+//! Particles of such cells that are not active themselves (the constrained points) follow the coarse nodes, and their forces are added to those of the nodes by the same weights.
 //!
 //! This is plain f64 code: the oracle of what runs in the loop.
 use super::{
@@ -14,20 +14,20 @@ use crate::material::Material;
 use glam::{DMat3, DVec3};
 use std::collections::{BTreeMap, BTreeSet};
 
-/// ε.
+/// `ε`, the fraction of an awake cell that stays with the coarse tets.
 pub const KEPT: f64 = 0.02;
 
-/// A set of active particles.
+/// A set of active particles, with its cells and residual elements.
 #[derive(Debug, Clone)]
 pub struct Patch {
     /// Active particles, ascending.
     active: Vec<u32>,
-    /// What the particles of the border follow; they are numbered after the active ones.
+    /// What the constrained points follow; they are numbered after the active particles.
     constrained: Vec<Anchor>,
     cells: Vec<PatchCell>,
-    /// What is left to each coarse tet.
+    /// Residual elements of the coarse tets.
     residual_elements: Vec<ResidualElement>,
-    /// What woke or fell asleep strained.
+    /// Prestrain of what woke or fell asleep while it was strained.
     prestrain: PrestrainDecay,
 }
 
@@ -35,7 +35,7 @@ pub struct Patch {
 struct PatchCell {
     number: u32,
     rest: RestCell,
-    /// Active particles, then those of the border.
+    /// Numbers of its points: active particles first, then constrained points.
     points: [u32; 8],
     tet: u32,
 }
@@ -43,20 +43,20 @@ struct PatchCell {
 /// Materials of a body's coarse tets.
 #[derive(Debug, Clone, Copy)]
 pub struct Materials<'a> {
-    /// All of them.
+    /// All materials.
     pub materials: &'a [Material],
-    /// Which each coarse tet has.
+    /// Index of the material of each coarse tet.
     pub of_tet: &'a [u16],
 }
 
 impl Materials<'_> {
-    /// That of a coarse tet, and of all that is counted to it.
+    /// Returns the material of a coarse tet, and of all cells that are counted to it.
     pub fn of(&self, tet: usize) -> &Material {
         &self.materials[self.of_tet[tet] as usize]
     }
 }
 
-/// Positions (m) or anything else with three components: of coarse nodes and of active particles.
+/// Positions (m), or anything else with three components, of coarse nodes and of active particles.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Field {
     /// One per coarse node.
@@ -66,7 +66,7 @@ pub struct Field {
 }
 
 impl Field {
-    /// `Σ a·b`.
+    /// Returns `Σ a·b`.
     pub fn dot(&self, other: &Self) -> f64 {
         let dot = |a: &[DVec3], b: &[DVec3]| a.iter().zip(b).map(|(a, b)| a.dot(*b)).sum::<f64>();
         dot(&self.nodes, &other.nodes) + dot(&self.particles, &other.particles)
@@ -74,7 +74,7 @@ impl Field {
 }
 
 impl Patch {
-    /// Wakes these particles.
+    /// Makes the patch of these active particles.
     pub fn new(partition: &Partition, active: &BTreeSet<u32>) -> Self {
         let active: Vec<u32> = active.iter().copied().collect();
         let awake: BTreeSet<usize> = active.iter().flat_map(|&particle| partition.cells_at(particle)).collect();
@@ -105,29 +105,30 @@ impl Patch {
         Self { active, constrained, cells, residual_elements, prestrain: PrestrainDecay::default() }
     }
 
-    /// The same patch with what fades in it; products leave that out.
+    /// Returns the same patch with prestrain; [`Self::products_n`] leaves it out.
     #[must_use]
     pub fn with_prestrain(self, prestrain: PrestrainDecay) -> Self {
         Self { prestrain, ..self }
     }
 
-    /// Active particles, ascending.
+    /// Returns the active particles, ascending.
     pub fn active(&self) -> &[u32] {
         &self.active
     }
 
-    /// The coarse nodes at rest, and the particles where they follow them to.
+    /// Returns the rest positions (m) of the coarse nodes, and of the particles, which follow them.
     pub fn at_rest(&self, partition: &Partition) -> Field {
         let nodes = partition.coarse().positions_m().to_vec();
         Field { particles: self.following(partition, &nodes), nodes }
     }
 
-    /// Where the active particles are, or how fast, while they follow the coarse nodes.
+    /// Returns the values that the active particles have while they follow the coarse nodes: positions of positions,
+    /// velocities of velocities.
     pub fn following(&self, partition: &Partition, nodes: &[DVec3]) -> Vec<DVec3> {
         self.active.iter().map(|&particle| partition.anchor(particle).of(nodes)).collect()
     }
 
-    /// Elastic energy (J).
+    /// Returns the elastic energy (J).
     pub fn energy_j(&self, materials: &Materials<'_>, at: &Field) -> f64 {
         let points = self.points(at);
         let of_cell = |cell: &PatchCell| {
@@ -145,7 +146,7 @@ impl Patch {
         fine + self.residual_elements.iter().enumerate().map(of_residual).sum::<f64>()
     }
 
-    /// Smallest `det F` of coarse tets' means and cells, and its tet.
+    /// Returns the smallest `det F` of coarse tets' means and cells, and the tet where it is.
     pub fn min_volume_ratio(&self, at: &Field) -> (f64, usize) {
         let points = self.points(at);
         let of_cell = |cell: &PatchCell| (cell.rest.gradient_of(&cell.of(&points)).determinant(), cell.tet as usize);
@@ -154,7 +155,7 @@ impl Patch {
         all.fold((f64::INFINITY, 0), |least, found| if found.0 < least.0 { found } else { least })
     }
 
-    /// How many coarse tets' means and cells have `det F ≤ 0`.
+    /// Returns the number of coarse tets' means and cells that have `det F ≤ 0`.
     pub fn inverted(&self, at: &Field) -> u32 {
         let points = self.points(at);
         let is_inverted = |cell: &&PatchCell| cell.rest.gradient_of(&cell.of(&points)).determinant() <= 0.0;
@@ -163,7 +164,8 @@ impl Patch {
             as u32
     }
 
-    /// Forces (N) of elastic and viscous stress at positions `at` and velocities `rate`, and the power (W) that viscous stress takes.
+    /// Returns the forces (N) of elastic and viscous stress at positions `at` and velocities `rate`, and the power (W) that viscous
+    /// stress takes.
     pub fn forces_n(&self, materials: &Materials<'_>, at: &Field, rate: &Field) -> (Field, f64) {
         let (points, rates) = (self.points(at), self.points(rate));
         let mut nodes = vec![DVec3::ZERO; at.nodes.len()];
@@ -188,7 +190,7 @@ impl Patch {
         (self.push_constrained(nodes, of_points), power_w)
     }
 
-    /// `−K a` (N): the change of the elastic forces along `a` at positions `at`.
+    /// Returns `−K a` (N), the change of the elastic forces along `a` at positions `at`.
     pub fn products_n(&self, materials: &Materials<'_>, at: &Field, a: &Field) -> Field {
         let (points, changes) = (self.points(at), self.points(a));
         let mut nodes = vec![DVec3::ZERO; at.nodes.len()];
@@ -203,7 +205,8 @@ impl Patch {
         self.push_constrained(nodes, of_points)
     }
 
-    /// Diagonal blocks (N/m) of the stiffness at rest, of the coarse nodes and then of the active particles; the identity where there is none.
+    /// Returns the diagonal blocks (N/m) of the stiffness at rest, of the coarse nodes and then of the active particles; the identity
+    /// where there is no stiffness.
     pub fn diagonal_n_per_m(&self, materials: &Materials<'_>, nodes: usize) -> Vec<DMat3> {
         let mut of_nodes = vec![DMat3::ZERO; nodes];
         let mut of_points = vec![DMat3::ZERO; self.active.len() + self.constrained.len()];
@@ -223,12 +226,12 @@ impl Patch {
         of_nodes.into_iter().chain(of_points).map(filled).collect()
     }
 
-    /// Of active particles, then of those of the border.
+    /// Returns the values of all points: of the active particles, then of the constrained points, which follow.
     fn points(&self, a: &Field) -> Vec<DVec3> {
         a.particles.iter().copied().chain(self.constrained.iter().map(|anchor| anchor.of(&a.nodes))).collect()
     }
 
-    /// Forces of the border go to the coarse nodes.
+    /// Adds the forces (N) on constrained points to those of the coarse nodes that they follow.
     fn push_constrained(&self, mut nodes: Vec<DVec3>, mut of_points: Vec<DVec3>) -> Field {
         for (anchor, force) in self.constrained.iter().zip(&of_points[self.active.len()..]) {
             for (&node, weight) in anchor.nodes.iter().zip(anchor.weights) {
@@ -263,7 +266,7 @@ mod tests {
         Patch::new(partition, &(0..partition.particle_count() as u32).filter(right).collect())
     }
 
-    /// Active particles and nodes that nothing at the surface has anything to do with.
+    /// Returns the nodes, and the active particles, whose whole support lies within the body.
     fn interior(partition: &Partition, patch: &Patch) -> (Vec<usize>, Vec<usize>) {
         let mut node = vec![true; partition.coarse().positions_m().len()];
         let is_cut = |cell: usize| partition.moments(cell).0 < partition.edge_m(cell).powi(3) * (1.0 - 1e-12);

@@ -1,30 +1,31 @@
-//! Points of a body at rest, such as those of its skin, between the particles that carry them.
+//! Points of a body at rest, such as the vertices of its skin, between the eight particles that carry them.
 use super::{
     partition::{NONE, Partition},
     sites::trilinear,
 };
 use glam::DVec3;
 
-/// The cell that a point of the skin belongs to, and where in it.
+/// A point given by the cell that it belongs to and its coordinates there.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CellPoint {
     /// Index of the cell.
     pub cell: u32,
-    /// In units of the cell's edge from its first corner.
+    /// Coordinates in units of the cell's edge, from its first corner.
     pub local: DVec3,
 }
 
-/// A point in a cell: it moves with the cell's particles by their trilinear weights, and hands forces to them by the same.
+/// A point given by the eight particles of its cell and their trilinear weights: it moves by the mean of their
+/// motions with these weights, and a force on it acts on them by the same weights.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TrilinearPoint {
-    /// Particles.
+    /// The particles.
     pub particles: [u32; 8],
     /// Their weights; they sum to one, and are negative only where the point lies in no cell of the body.
     pub weights: [f64; 8],
 }
 
 impl CellPoint {
-    /// Of a point (m); one that lies in no cell of the body belongs to the nearest.
+    /// Finds the cell of a point (m); a point that lies in no cell of the body belongs to the nearest one.
     pub fn new(partition: &Partition, point_m: DVec3) -> Self {
         let sites = partition.sites();
         let at = sites.cell_near(point_m);
@@ -54,24 +55,24 @@ impl CellPoint {
         Self { cell, local: (point_m - first_m) / partition.edge_m(cell as usize) }
     }
 
-    /// Weights of its cell's particles.
+    /// Returns the weights of its cell's particles.
     pub fn weights(&self, partition: &Partition) -> [f64; 8] {
         partition.hanging(self.cell as usize).to_particles(trilinear(self.local))
     }
 
-    /// How much faster than the fastest of its particles the point can be: `Σ |w_p|`, 1 inside a cell.
+    /// Returns a bound of the point's speed over that of the fastest of its particles: `Σ |w_p|`, 1 inside a cell.
     pub fn amplification(&self) -> f64 {
         trilinear(self.local).iter().map(|w| w.abs()).sum()
     }
 
-    /// With its particles and weights.
+    /// Returns its particles and their weights.
     pub fn trilinear(&self, partition: &Partition) -> TrilinearPoint {
         TrilinearPoint { particles: partition.corners(self.cell as usize), weights: self.weights(partition) }
     }
 }
 
 impl TrilinearPoint {
-    /// Of a point (m); one that lies in no cell of the body belongs to the nearest.
+    /// Finds the particles and weights of a point (m); one that lies in no cell of the body belongs to the nearest.
     pub fn new(partition: &Partition, point_m: DVec3) -> Self {
         CellPoint::new(partition, point_m).trilinear(partition)
     }
