@@ -1,4 +1,4 @@
-//! What a hybrid body's ticks work in.
+//! The buffers that a hybrid body's ticks work in.
 use super::{
     body::HybridBody,
     carried_skin::Carried,
@@ -14,7 +14,7 @@ use super::{
 use crate::tick::{Environment, ListedVertices};
 use glam::DVec3;
 
-/// Buffers for hybrid bodies.
+/// Buffers of a hybrid body.
 #[derive(Debug, Clone)]
 pub(crate) struct HybridScratch {
     pub(crate) patch: RunningPatch,
@@ -33,7 +33,7 @@ pub(crate) struct HybridScratch {
 }
 
 impl HybridScratch {
-    /// For a body in its environment.
+    /// Makes the buffers of a body in its environment.
     pub(crate) fn new(body: &HybridBody, environment: &Environment) -> Self {
         let (most, positions) = (body.particles.most_active, body.most_positions());
         let patch = || RunningPatch::new(body, most, environment.settings.precision);
@@ -57,14 +57,14 @@ impl HybridScratch {
         }
     }
 
-    /// `aᵀ M'⁻¹ a` of forces (N²/kg) on free axes.
+    /// Returns `fᵀ M'⁻¹ f` (N²/kg) of forces on free axes.
     pub(crate) fn size_sq(&mut self, forces_n: impl Iterator<Item = DVec3>) -> f64 {
         self.accelerations.clear();
         self.accelerations.extend(forces_n);
         self.patch.metric_mut().accelerate(&mut self.accelerations)
     }
 
-    /// `vᵀ M' v` (J) of velocities, or of displacements (kg m²).
+    /// Returns `vᵀ M' v` (J) of velocities; of displacements it is in kg m².
     pub(crate) fn twice_kinetic(&mut self, body: &HybridBody, v: impl Iterator<Item = DVec3>) -> f64 {
         let Self { patch, accelerations, momenta, .. } = self;
         accelerations.clear();
@@ -75,12 +75,12 @@ impl HybridScratch {
         momenta.iter().zip(accelerations.iter()).map(|(p, v)| p.dot(*v)).sum()
     }
 
-    /// `(1 − ε) m_p` (kg) of the active particles.
+    /// Returns `(1 − ε) m_p` (kg) of the active particles.
     pub(crate) fn particle_kg(&self) -> &[f64] {
         self.patch.metric().particle_kg()
     }
 
-    /// Makes the patch that of the state's active particles. Allocates nothing.
+    /// Makes the patch that of the state's active particles and prestrains, where it is not. Allocates nothing.
     pub(super) fn follow(&mut self, body: &HybridBody, active: &HybridState) {
         if self.patch.active() != active.ids() {
             self.patch.wake(body, active.ids(), &active.prestrain);
