@@ -1,34 +1,35 @@
-//! What a tick changes of a hybrid body beside positions and velocities: which particles are active, and what of them still fades.
+//! The state of a hybrid body beside positions and velocities: which particles are active, their prestrain, and the transition force.
 use super::{body::HybridBody, long_steps::LongSteps, prestrain::PrestrainDecay, spec::Waking, switching::Ball};
 use crate::hash::Chain;
 use crate::{contact::ToolSpec, tick::MechanicalState};
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
-/// Active particles, and what of them still fades. Their positions and velocities follow those of the coarse nodes in
-/// [`MechanicalState::x`] and [`MechanicalState::v`].
+/// What a tick changes of a hybrid body beside its [`MechanicalState`], whose lists `x` and `v` have the values of the coarse
+/// nodes first, then those of the active particles.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct HybridState {
     /// Active particles, ascending.
     ids: Vec<u32>,
-    /// Those to be: others while a switch is coming.
+    /// Particles that are to be active next; others than `ids` while a switch is being prepared.
     pub(super) next: Vec<u32>,
-    /// Those to be after that: what is to sleep does so first, what is to wake follows.
+    /// Particles that are wanted awake. Where some have to fall asleep and others to wake, `next` first has those that stay
+    /// awake, and then all of these.
     pub(super) wanted: Vec<u32>,
-    /// Of every place of every tool.
+    /// The ball of every axis sample of every tool.
     pub(super) balls: Vec<Option<Ball>>,
     pub(crate) prestrain: PrestrainDecay,
-    /// Balancing forces (N), as many as positions, or none.
+    /// The transition force (N), of as many entries as there are positions, or none.
     pub(super) transition_force_n: Vec<DVec3>,
-    /// Energy (J) that fading strains and balancing forces gave lately, beyond what they and switches took.
+    /// Energy (J) that decaying prestrain and the transition force gave lately, beyond what they and switches took.
     pub(crate) given_j: f64,
-    /// Elastic energy (J) of what a switch lately changed, the most of any.
+    /// Largest elastic energy (J) of what any recent switch changed.
     pub(super) switched_j: f64,
     pub(crate) long_steps: LongSteps,
 }
 
 impl HybridState {
-    /// All particles sleep.
+    /// Makes the state of a body whose particles all sleep.
     pub(crate) fn at_rest(body: &HybridBody, tools: &[ToolSpec]) -> Self {
         let (most, positions) = (body.particles.most_active, body.most_positions());
         Self {
@@ -47,22 +48,22 @@ impl HybridState {
         }
     }
 
-    /// Their numbers.
+    /// Returns the active particles, ascending.
     pub fn ids(&self) -> &[u32] {
         &self.ids
     }
 
-    /// What of them and of the coarse tets woke or fell asleep strained.
+    /// Returns the prestrain of cells that woke, and of coarse tets, while they were strained.
     pub fn prestrain(&self) -> &PrestrainDecay {
         &self.prestrain
     }
 
-    /// How many.
+    /// Returns the number of active particles.
     pub fn len(&self) -> usize {
         self.ids.len()
     }
 
-    /// Takes what is wanted: at first those of it that are awake, where others are, too.
+    /// Sets the wanted particles. Where particles are active that are not wanted, those that are both come next.
     pub(super) fn want(&mut self, wanted: &[u32]) {
         self.wanted.clear();
         self.wanted.extend_from_slice(wanted);
@@ -80,18 +81,18 @@ impl HybridState {
         self.next != self.ids
     }
 
-    /// Whether all sleep.
+    /// Returns whether all particles sleep.
     pub fn is_empty(&self) -> bool {
         self.ids.is_empty()
     }
 
-    /// Whether an active particle is at a cell.
+    /// Returns whether a cell has an active particle.
     fn touches(&self, body: &HybridBody, cell: u32) -> bool {
         let is_active = |particle: &u32| self.ids.binary_search(particle).is_ok();
         (cell as usize) < body.partition.cells().len() && body.partition.corners(cell as usize).iter().any(is_active)
     }
 
-    /// All particles sleep, in the buffers there are.
+    /// Lets all particles sleep, without allocating.
     pub(crate) fn clear(&mut self) {
         self.ids.clear();
         self.next.clear();
@@ -104,7 +105,7 @@ impl HybridState {
         self.long_steps.forget();
     }
 
-    /// Adds all of it.
+    /// Adds all of the state to a hash.
     pub(crate) fn chain(&self, chain: &mut Chain) {
         for list in [&self.ids, &self.next, &self.wanted] {
             chain.wholes(list);
@@ -134,7 +135,8 @@ impl HybridState {
         self.long_steps.copy_from(&other.long_steps);
     }
 
-    /// Whether they are ascending, may be awake, and have room.
+    /// Returns whether a state read from a snapshot fits the body: particles are ascending, may wake and have room, and all
+    /// numbers are finite.
     pub(crate) fn fits(&self, body: &HybridBody, tools: &[ToolSpec]) -> bool {
         let (nodes, positions) = (body.node_count(), body.node_count() + self.ids.len());
         let may_wake = |id: &u32| body.may_wake(*id);
@@ -155,7 +157,8 @@ impl HybridState {
             })
     }
 
-    /// Goes over to these particles, which have room and may wake, of a body at rest.
+    /// Switches a body at rest to the given active particles; they must be no more than there is room for, and each must be
+    /// allowed to wake.
     pub(crate) fn wake_at_rest(&mut self, ids: &[u32], state: &mut MechanicalState) {
         self.ids.clear();
         self.ids.extend_from_slice(ids);
@@ -166,7 +169,8 @@ impl HybridState {
         }
     }
 
-    /// Goes over to the particles that are to be active next. `moved` is a buffer. Allocates nothing where there is room.
+    /// Switches to the particles that are to be active next: what wakes starts where, and as fast as, it followed. `moved` is
+    /// a buffer. Allocates nothing where there is room.
     pub(super) fn switch(&mut self, body: &HybridBody, state: &mut MechanicalState, moved: &mut Vec<DVec3>) {
         let nodes = body.node_count();
         for list in [&mut state.x, &mut state.v] {
@@ -189,12 +193,13 @@ impl HybridState {
     }
 }
 
-/// Most awake cells of a body while no more particles are active than these.
+/// Returns the largest number of cells that are awake while no more than `most_active` particles are active.
 pub(super) fn room_for_cells(body: &HybridBody, most_active: usize) -> usize {
     (body.partition().most_cells_at() * most_active).min(body.partition().cells().len())
 }
 
-/// Places of each tool that may keep particles awake: so near to one another that the balls about them overlap.
+/// Returns the number of axis samples of each tool that may keep particles awake: they are so near to one another that the
+/// balls about them overlap.
 pub(super) fn axis_sample_counts(body: &HybridBody, tools: &[ToolSpec]) -> impl Iterator<Item = usize> + Clone {
     let apart_m = match body.particles.waking {
         Waking::ByTools { reach_m } => reach_m,

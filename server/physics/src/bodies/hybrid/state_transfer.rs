@@ -1,6 +1,7 @@
-//! From one set of active particles to another: who answers for which volume changes, energy and force do not (`prestrain`).
+//! State transfer from one set of active particles to another: which cell or coarse tet answers for which volume changes, energy and force do not (`prestrain`).
 //!
-//! Left alone is what cannot change: cells that stay awake and whose particles stay where they are, and coarse tets that keep what they have and whose nodes do.
+//! It leaves alone what a switch does not change: cells that stay awake and whose particles stay where they are, and coarse tets that keep their volume and whose
+//! nodes stay where they are.
 use super::{
     body::HybridBody,
     composite::PARTS,
@@ -14,25 +15,25 @@ use super::{
 };
 use glam::{DMat3, DVec3};
 
-/// Hourglasses smaller than this, over the spacing, are none.
+/// Hourglass amplitudes smaller than this, over the spacing, count as zero.
 const NO_MODES: f64 = 1e-9;
 
-/// What a switch changes, strained as it was.
+/// The cells and coarse tets that a switch changes, with their strain before it.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Before {
     /// Awake cells, ascending.
     cells: Vec<CellBefore>,
-    /// Those of them that fall asleep: tet, and number among the cells.
+    /// Those of the cells that fall asleep: their tet, and their number in `cells`.
     asleep: Vec<(u32, u32)>,
     tets: Vec<TetBefore>,
-    /// What fades after it, and before.
+    /// The prestrain after the switch; a buffer between switches.
     next: PrestrainDecay,
 }
 
 #[derive(Debug, Clone, Copy)]
 struct CellBefore {
     cell: u32,
-    /// Effective gradients.
+    /// Effective gradients of shape and volume.
     shape: DMat3,
     volume: DMat3,
     /// `(1 − a) Σ_k w_k |q_k|²` (m²).
@@ -44,9 +45,9 @@ struct TetBefore {
     tet: u32,
     /// `F_g`.
     gradients: [DMat3; PARTS],
-    /// Not only where its nodes are.
+    /// Whether the switch changes its residual element, and not only the positions of its nodes.
     residual_changes: bool,
-    /// Effective ones.
+    /// Effective gradients of the parts' shape and of the tet's volume.
     parts: [DMat3; PARTS],
     whole: DMat3,
 }
@@ -61,8 +62,8 @@ impl Before {
         }
     }
 
-    /// Takes how all is strained that changes between two patches, or because coarse nodes are moved; returns its elastic energy (J). The patch before is
-    /// displaced.
+    /// Records the strain of all that a switch changes; returns its elastic energy (J). The patch before the switch is displaced to
+    /// positions `x` (m).
     pub(super) fn take(
         &mut self,
         body: &HybridBody,
@@ -115,8 +116,9 @@ impl Before {
         residual_energy_j(residual, body.material_of_tet(tet), &parts, &whole)
     }
 
-    /// Takes the tets, too, whose nodes have moved from where they were by `shifts_m`, and works out what fades: the next patch is displaced, `fading` is what
-    /// faded before. Returns the elastic energy (J) that those tets had, and what all that changes has now.
+    /// Records the tets, too, of which only nodes have moved, and replaces the prestrain `decay` by that after the switch. The
+    /// patch after the switch is displaced. Returns the elastic energy (J) that those tets had, and the one that all that changes
+    /// has now.
     pub(super) fn prestrain_after(
         &mut self,
         body: &HybridBody,
@@ -149,7 +151,7 @@ impl Before {
             now_j += energy_j;
             self.next.tets.extend(prestrain);
         }
-        // Tets that this leaves alone go on.
+        // Tets that the switch leaves alone keep their prestrain.
         for prestrain in decay.left_of_tets().filter(ResidualPrestrain::exceeds_a_trace) {
             if self.tets.binary_search_by_key(&prestrain.tet, |before| before.tet).is_err() {
                 self.next.tets.push(prestrain);
@@ -160,7 +162,8 @@ impl Before {
         (moved_j, now_j)
     }
 
-    /// A cell that is awake now: strained as it was, or as its part was; and its energy (J). The particles around one that was awake may have fallen asleep.
+    /// Returns the prestrain of a cell that is awake now, with which it is strained as it was, or as its part was, and its
+    /// energy (J). A cell that was awake may have particles that have fallen asleep.
     fn of_cell(&self, body: &HybridBody, patch: &RunningPatch, cell: u32) -> (Option<CellPrestrain>, f64) {
         let (rest, y) = (body.awake_cell(cell as usize), patch.corners_m(body, cell));
         let (f, now_m2) = (rest.gradient_of(&y), modes_m2(&rest, &y));
@@ -185,7 +188,7 @@ impl Before {
         (prestrain, energy_j)
     }
 
-    /// What is left of a tet, with what fell asleep in it; and its energy (J).
+    /// Returns the prestrain of a tet's residual element, which includes what fell asleep in it, and its energy (J).
     fn of_tet(
         &self,
         body: &HybridBody,
@@ -233,12 +236,13 @@ impl Before {
     }
 }
 
-/// Whether a switch changes nothing about an awake cell: its particles stay where they are. Those that follow coarse nodes are moved with them.
+/// Returns whether a switch changes nothing about an awake cell: it stays awake, and its particles stay where they are, none
+/// of them following a coarse node that is moved.
 fn stays(body: &HybridBody, [before, after]: [&RunningPatch; 2], is_moved: &[bool], cell: u32) -> bool {
     before.is_awake(cell) && after.is_awake(cell) && !after.follows(body, cell, is_moved)
 }
 
-/// `(1 − ε) V_c` (m³).
+/// Returns `(1 − ε) V_c` (m³), the volume that is transferred between a cell and its tet.
 fn transferred_m3(partition: &Partition, cell: u32) -> f64 {
     (1.0 - KEPT) * partition.moments(cell as usize).0
 }

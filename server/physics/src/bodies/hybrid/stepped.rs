@@ -16,7 +16,7 @@ pub(crate) struct SteppedHybrid<'a> {
 }
 
 impl SteppedHybrid<'_> {
-    /// Total force (N) at the present positions, and its external part.
+    /// Computes the total force (N) at the present positions, and its external part.
     pub(crate) fn evaluate(
         &mut self,
         tick: &Tick<'_>,
@@ -70,12 +70,12 @@ impl SteppedHybrid<'_> {
         state.force_is_current = true;
     }
 
-    /// Before the first kick of a tick: velocities are not those that the last one left.
+    /// Forgets, before the first kick of a tick, the energy that the last kick left: velocities have changed since.
     pub(crate) fn begin_kicks(&mut self) {
         self.scratch.of_free_j = None;
     }
 
-    /// `v ← (v e^{−c h/2} + h M'⁻¹ f) e^{−c h/2}`, and the ledger's share of it, as of a body of tets.
+    /// Kicks, `v ← (v e^{−c h/2} + h M'⁻¹ f) e^{−c h/2}`, and books the work in the ledger, as for a body of tets.
     pub(crate) fn kick(
         &mut self,
         environment: &Environment,
@@ -96,7 +96,7 @@ impl SteppedHybrid<'_> {
         let factor = (-0.5 * damping * h_s).exp();
         let (mut before_j, mut with_holders_j, mut power_w) = (0.0, 0.0, 0.0);
         if damping > 0.0 {
-            // Velocities are what the kick before left, once it is known what they have.
+            // Velocities are those that the kick before left, of which the energy is known from there.
             (before_j, with_holders_j) = of_free_j.unwrap_or_else(|| patch.metric().of_free_j(body, &state.v, momenta));
             power_w = factor * (vector_operations::dot(&state.v, accelerations) + of_holders_w);
         }
@@ -112,7 +112,7 @@ impl SteppedHybrid<'_> {
             // (v + h M'⁻¹f)ᵀ M' (v + h M'⁻¹f) = vᵀM'v + 2h v·f + h² fᵀM'⁻¹f
             let between_j = factor * factor * before_j + h_s * (2.0 * power_w + h_s * kick_sq[0]);
             state.ledger.dissipated_j += 0.5 * (before_j + between_j) * -(-damping * h_s).exp_m1();
-            // What free velocities have with those of holders is linear in them.
+            // The energy that free velocities have with those of held nodes is linear in the former.
             let between_holders_j = factor * with_holders_j + h_s * inertia_w;
             state.ledger.dissipated_j += (with_holders_j + between_holders_j) * (1.0 - factor);
             *of_free_j = Some((factor * factor * between_j, factor * between_holders_j));
@@ -122,12 +122,12 @@ impl SteppedHybrid<'_> {
         state.ledger.external_work_j += h_s * (of_holders_w + inertia_w);
     }
 
-    /// Kinetic energy (J) that velocities of held axes have by themselves and with free ones.
+    /// Returns the kinetic energy (J) that velocities of held axes have by themselves and with free ones.
     pub(crate) fn held_kinetic_j(&self, state: &MechanicalState) -> f64 {
         self.scratch.patch.metric().of_held_j(self.body, &state.v)
     }
 
-    /// The force (N) that holds a node on its prescribed axes: what the other forces lack.
+    /// Returns the force (N) that holds a node on its prescribed axes: minus the sum of the other forces.
     pub(crate) fn reaction_n(&self, node: usize, state: &MechanicalState) -> DVec3 {
         let held = self.body.inverse_mass_per_kg()[node].cmpeq(DVec3::ZERO);
         let total_n = state.force_n[node] + self.own.long_steps.beyond_of(node);

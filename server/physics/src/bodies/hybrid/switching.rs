@@ -1,17 +1,17 @@
-//! Which particles are awake: those near where a tool touches the skin or is about to, and those that have not come to rest yet.
+//! Switching wakes particles near where a tool touches the skin or is about to, and lets others fall asleep once they have come to rest.
 //!
-//! A tool wants the particles within a ball at rest, about the vertex of the skin nearest to it, or to where it is deepest in the body, from a gap of `g₀ + v·50 ms` on and until the gap
-//! has been twice that for 100 ms; the ball follows it in steps of a spacing. A capsule has several such balls, one for each place along its axis. A particle that no tool wants any more sleeps once it is as
-//! good as where it would be asleep, or when its room is needed.
+//! A tool wants the particles within a ball at rest, about the vertex of the skin nearest to it, or nearest to where it is deepest in the body. The ball exists from when the gap is less than
+//! `g₀ + v·50 ms` until the gap has been twice that for 100 ms, and follows the tool in steps of a spacing. A capsule has several such balls, one for each sample of its axis. A particle that no
+//! tool wants any more falls asleep once it is nearly where it would be asleep, or when its room is needed.
 //!
-//! Momentum through a switch: what wakes moves as it was moved (`metric`). What falls asleep hands over impulses, and all of it together a couple: with
-//! `m = (1 − ε) m_p`, the place `x_p = Σ_i ζ_pi x_i` where a particle is then, and the free nodes of its tets, of masses `M_i` about their middle `x̄`,
+//! A switch keeps momentum. What wakes moves as it was moved (`metric`). What falls asleep transfers impulses to the coarse nodes, and all of it together a couple: with
+//! `m = (1 − ε) m_p`, the position `x_p = Σ_i ζ_pi x_i` that a particle has then, and the free nodes of its tets, of masses `M_i` about their middle `x̄`,
 //! ```text
 //! J_i = Σ_p m ζ_pi (w_p − Σ_j ζ_pj v_j) + M_i α × (x_i − x̄)       Σ_i M_i (x_i − x̄) × (α × (x_i − x̄)) = Σ_p m (y_p − x_p) × w_p
 //! v ← v + M''⁻¹ J
 //! ```
-//! with the matrix `M''` of what stays awake: linear and angular momentum are kept. Coarse nodes are moved by `Δ_i` then (`projection`), for which the couple on the right has
-//! `−Σ_i Δ_i × P_i`, of the momenta `P = M'' v + J`.
+//! with the matrix `M''` of what stays awake. So linear and angular momentum are kept. Coarse nodes are moved by `Δ_i` then (`projection`), for which `−Σ_i Δ_i × P_i`, with the momenta
+//! `P = M'' v + J`, is added to the couple on the right.
 use super::{
     body::HybridBody,
     carried_skin::SkinView,
@@ -32,51 +32,52 @@ use crate::{
 use glam::{BVec3, DVec3};
 use serde::{Deserialize, Serialize};
 
-/// Ticks in which a switch is prepared and done.
+/// Number of ticks in which a switch is prepared and done.
 const SWITCH_TICKS: u64 = 2 + RunningPatch::SLICES as u64;
-/// Ticks between two looks: after each, what is to sleep falls asleep, and then what is to wake wakes. Both in one tick would take it as long as both.
+/// Number of ticks between two activation queries. After each, what is to sleep falls asleep, and then what is to wake wakes:
+/// both in one tick would take too long.
 const LOOK_EVERY_TICKS: u64 = 2 * SWITCH_TICKS;
-/// Time (s) ahead of which an approaching tool is seen.
+/// Time (s) before its contact at which an approaching tool wakes particles.
 const AHEAD_S: f64 = 0.05;
-/// Ticks for which a tool has to be away.
+/// Number of ticks for which a tool has to be away until its ball is given up.
 const AWAY_TICKS: u32 = 100;
-/// Gap over the tool's radius, and over the spacing, from which its particles are awake.
+/// Gap, over the tool's radius and over the spacing, below which a tool's particles are awake.
 pub(crate) const GAP: f64 = 0.25;
-/// Way over the spacing that the skin's nearest point goes before a ball follows.
+/// Distance, over the spacing, that the skin's nearest vertex moves at rest before a ball follows.
 pub(crate) const FOLLOW: f64 = 0.9;
 /// Deviation over the spacing below which a particle may fall asleep.
 const SETTLED: f64 = 0.04;
 
-/// The ball that a tool keeps awake, at one of its places.
+/// The ball whose particles a tool keeps awake, about one of the samples of its axis.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Ball {
     /// Its middle at rest (m).
     pub(super) rest_m: DVec3,
-    /// For how many ticks the tool has been away.
+    /// Number of ticks for which the tool has been away.
     pub(super) away_ticks: u32,
 }
 
-/// Buffers of a look.
+/// An activation query, which finds the particles that are to be awake, and buffers of switches.
 #[derive(Debug, Clone, Default)]
 pub(super) struct ActivationQuery {
-    /// Squared distance (m²) and number of particles in a tool's balls.
+    /// Particles in a tool's balls, each with its squared distance (m²).
     found: Vec<(f64, u32)>,
-    /// Whether a particle is among these.
+    /// Whether each particle is among these.
     is_found: Vec<bool>,
-    /// Active particles to be.
+    /// Particles that are to be awake.
     wanted: Vec<u32>,
-    /// Active particles that nobody wants, with how far (m) they are from where they would be asleep.
+    /// Active particles that no tool wants, each with its distance (m) from where it would be asleep.
     unwanted: Vec<(f64, u32)>,
     moved: Vec<DVec3>,
-    /// Momenta (kg m/s) handed to coarse nodes.
+    /// Impulses (kg m/s) transferred to coarse nodes.
     impulses: Vec<DVec3>,
-    /// Forces (N) handed to them.
+    /// Forces (N) transferred to coarse nodes.
     transferred_n: Vec<DVec3>,
     projection: Projection,
-    /// Positions (m) of the coarse nodes before, and how far they are moved (m).
+    /// Positions (m) of the coarse nodes before a switch, and their displacements (m) by it.
     were_m: Vec<DVec3>,
     shifts_m: Vec<DVec3>,
-    /// Active particles that were.
+    /// Particles that were active before a switch.
     left: Vec<u32>,
     /// Masses (kg) of the free nodes of tets in which particles fall asleep, 0 of others.
     weights_kg: Vec<f64>,
@@ -113,7 +114,8 @@ impl ActivationQuery {
 }
 
 impl SteppedHybrid<'_> {
-    /// Before a tick: makes the patch that of the state's active particles, and now and then looks which should be. Allocates nothing.
+    /// Prepares a tick: makes the patch that of the state's active particles, and every few ticks queries which should be
+    /// active, and switches to them. Allocates nothing.
     pub(crate) fn prepare(&mut self, environment: &Environment, state: &mut MechanicalState) {
         let Self { body, own, scratch } = self;
         let tick_period_s = environment.settings.tick_period_s;
@@ -141,7 +143,7 @@ impl SteppedHybrid<'_> {
         }
     }
 
-    /// Lays the coming patch out, a slice a tick, then goes over to it.
+    /// Lays the staged patch out, a slice per tick, then switches to it.
     fn go_on_switching(&mut self, environment: &Environment, state: &mut MechanicalState, slice: u64) {
         let Self { body, own, scratch } = self;
         if slice <= u64::from(RunningPatch::SLICES) {
@@ -153,8 +155,9 @@ impl SteppedHybrid<'_> {
         state.contact.travelled_at_a_change(moved_m, were_current);
     }
 
-    /// Wakes these particles and no others, as tools would: what was active goes on, what wakes moves as the coarse nodes have moved
-    /// it. Particles that may not wake ([`HybridBody::may_wake`]), and those for which there is no room, are left out.
+    /// Wakes these particles and no others, as tools would: what was active stays as it is, what wakes moves as the coarse
+    /// nodes have moved it. Particles that may not wake ([`HybridBody::may_wake`]), and those for which there is no room, are
+    /// left out.
     pub(crate) fn wake_only(
         &mut self,
         environment: &Environment,
@@ -177,7 +180,8 @@ impl SteppedHybrid<'_> {
 }
 
 impl HybridScratch {
-    /// A tick's fading of balancing forces; strains fade with the substeps, until nothing is left to speak of.
+    /// Lets the transition force decay over a tick, and leaves the prestrain out, which decays with the substeps, once nearly
+    /// nothing is left of it.
     fn decay(&mut self, own: &mut HybridState, state: &mut MechanicalState, tick_period_s: f64) {
         own.decay_transition_force(tick_period_s);
         if own.prestrain.has_decayed() {
@@ -188,8 +192,8 @@ impl HybridScratch {
         }
     }
 
-    /// Goes over to the particles that are to be active next; returns a bound of how far (m) that moves any vertex of the skin: particles that fall asleep
-    /// go where they follow to, and coarse nodes, with what follows them, to what is nearest to those.
+    /// Switches to the particles that are to be active next. Returns a bound of how far (m) that moves any vertex of the skin:
+    /// particles that fall asleep move to where they follow, and coarse nodes, with what follows them, to the projection of those.
     fn switch(&mut self, body: &HybridBody, gravity: DVec3, own: &mut HybridState, state: &mut MechanicalState) -> f64 {
         self.staged.finish(body, &own.next);
         let Self { patch, staged, query, before, momenta, transition, .. } = self;
@@ -256,7 +260,7 @@ impl HybridScratch {
     }
 }
 
-/// Where the tools' balls are now.
+/// Updates the tools' balls.
 fn update_balls(
     environment: &Environment,
     view: &mut SkinView<'_>,
@@ -293,9 +297,9 @@ fn update_balls(
     }
 }
 
-/// Squared distance (m²) of a point `p` to the middles of balls, and to the lines between those of neighbours, `a` and `b`:
+/// Returns the squared distance (m²) of a point `p` to the middles of balls, and to the lines between those of neighbours, `a` and `b`:
 /// ```text
-/// |p − a − s (b − a)|²,   s = (p − a)·(b − a)/|b − a|² kept within 0 to 1
+/// |p − a − s (b − a)|²,   s = (p − a)·(b − a)/|b − a|², limited to 0 to 1
 /// ```
 fn distance_to_balls_sq(balls: &[Option<Ball>], at_m: DVec3) -> f64 {
     let (mut nearest_sq, mut before_m) = (f64::INFINITY, None);
@@ -313,7 +317,8 @@ fn distance_to_balls_sq(balls: &[Option<Ball>], at_m: DVec3) -> f64 {
 }
 
 impl ActivationQuery {
-    /// Takes the impulse of a particle that falls asleep, and the nodes of its tet; returns its couple (kg m²/s), and how far (m) it is from where it goes.
+    /// Transfers the impulse of a particle at `y` (m) with velocity `w` (m/s), which falls asleep, to the coarse nodes. Returns its
+    /// couple (kg m²/s), and its distance (m) from where it will be asleep.
     fn transfer(
         &mut self,
         body: &HybridBody,
@@ -334,7 +339,7 @@ impl ActivationQuery {
         (away_m.cross(w) * mass_kg, away_m.length())
     }
 
-    /// Moves the coarse nodes to what is nearest to what has fallen asleep; returns the angular momentum (kg m²/s) that they gain by it.
+    /// Moves the coarse nodes to the projection of what has fallen asleep; returns the angular momentum (kg m²/s) that they gain.
     fn shift(
         &mut self,
         body: &HybridBody,
@@ -354,7 +359,7 @@ impl ActivationQuery {
         gained
     }
 
-    /// Takes the couple of all of them; none where too few of those nodes are free.
+    /// Adds the couple (kg m²/s) of all particles that fell asleep to the impulses; adds nothing where too few nodes are free.
     fn turn(&mut self, couple: DVec3, x: &[DVec3]) {
         let Turn { turn, middle } = turn_of(&self.weights_kg, x, couple);
         for ((impulse, weight), x) in self.impulses.iter_mut().zip(&self.weights_kg).zip(x) {
@@ -362,7 +367,8 @@ impl ActivationQuery {
         }
     }
 
-    /// The particles in the tools' balls, ascending; where there is no room for all, as many for each tool, the nearest to their middles, and to the lines between those of neighbours.
+    /// Finds the particles in the tools' balls, ascending. Where there is no room for all, each tool gets as many: those nearest to
+    /// the middles of its balls, and to the lines between those of neighbours.
     fn want(&mut self, body: &HybridBody, tools: &[ToolSpec], own: &HybridState, (reach_m, most): (f64, usize)) {
         self.wanted.clear();
         let of_tool = |first: &mut usize, count: usize| {
@@ -374,13 +380,13 @@ impl ActivationQuery {
         for balls in tools() {
             self.found.clear();
             for (number, ball) in balls.iter().enumerate().filter_map(|(number, ball)| Some((number, (*ball)?))) {
-                // As places are no farther from each other than balls reach, those after the next two hold next to nothing that this one does.
+                // As samples are no farther from each other than balls reach, balls after the next two have hardly a particle of this one.
                 let near = &balls[number.saturating_sub(1)..(number + 4).min(balls.len())];
                 body.partition.particles_within(ball.rest_m, reach_m, |particle, distance_sq| {
                     let is_found = &mut self.is_found[particle as usize];
                     if body.may_wake(particle) && !std::mem::replace(is_found, true) {
                         let at_m = body.partition.particle_m(particle);
-                        // The distance from its middle is at hand, and all there is.
+                        // Of a single ball the distance from its middle is known already.
                         let is_alone = balls.len() == 1;
                         self.found
                             .push((if is_alone { distance_sq } else { distance_to_balls_sq(near, at_m) }, particle));
@@ -400,7 +406,8 @@ impl ActivationQuery {
         self.wanted.dedup();
     }
 
-    /// Keeps those awake that nobody wants but that are not settled, the farthest off first, as long as there is room.
+    /// Keeps active particles awake that no tool wants but that are not settled, as long as there is room; those that are
+    /// farthest from where they would be asleep come first.
     fn keep_unsettled(&mut self, patch: &RunningPatch, particles: &ParticleSpec) {
         self.unwanted.clear();
         for (particle, deviation_m) in patch.deviations_m() {

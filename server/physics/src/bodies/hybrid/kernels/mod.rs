@@ -1,4 +1,4 @@
-//! What a hybrid body's substeps compute, in blocks of lanes, beside scalar oracles.
+//! Kernels of a hybrid body's substeps, in blocks of lanes, beside scalar oracles.
 // A vector type is only fast where it is inlined into a function compiled for its instruction set.
 #![allow(clippy::inline_always)]
 mod cell_stress;

@@ -2,8 +2,8 @@
 //!
 //! Points (the particles of awake cells) are numbered by their sites, x first, so the particles of neighbouring cells of a row are neighbours in
 //! memory: the eight of a lane are eight shifted loads, and nothing is gathered or scattered. Lanes past a row's end are given no strain and weight 0.
-//! What cells give their particles on the left and on the right is summed apart, that loads never overlap a store just made, and put
-//! together at the end: `f_i = l_i + r_{i−1}`.
+//! Forces on the particles on the left and on the right of cells are summed apart, so that loads never overlap a
+//! store just made, and added at the end: `f_i = l_i + r_{i−1}`.
 use super::{
     cell_stress::{particles, patterns, stress},
     prestrains::{ENTRIES, Found, Split, add_lanes, entries, prestrained_cell_stress, scaled},
@@ -22,7 +22,7 @@ use crate::{
 };
 use glam::DVec3;
 
-/// The widest vector: arrays end on so many entries of no point.
+/// Number of lanes of the widest vector; arrays end on so many entries that belong to no point.
 const LANES: usize = 16;
 
 /// Full cells, one after the other along x.
@@ -30,29 +30,29 @@ const LANES: usize = 16;
 pub struct CellRow {
     /// The first cell's points 0, 2, 4 and 6; the others follow them.
     pub points: [u32; 4],
-    /// How many cells.
+    /// Number of cells.
     pub cells: u32,
     /// Index of their material.
     pub material: u16,
-    /// Number of the first cell among all of the rows, one after the other.
+    /// Number of the first cell when the cells of all rows are counted one after the other.
     pub first: u32,
-    /// Whether something fades in any of them ([`RowKernel::put_fade`]).
+    /// Whether any of the cells has prestrain ([`RowKernel::put_prestrain`]).
     pub prestrained: bool,
 }
 
-/// Full cells, which all are of one size: their materials, and displacements, velocities and forces of their points.
+/// Full cells, of the lattice's spacing or twice that: their materials, and displacements, velocities and forces of their points.
 #[derive(Debug, Clone)]
 pub struct RowKernel {
     layout: Layout,
     instruction_set: Available,
 }
 
-/// For how many it has buffers.
+/// How many points and cells a kernel has buffers for.
 #[derive(Debug, Clone, Copy)]
 pub struct Room {
-    /// Points.
+    /// Number of points.
     pub points: usize,
-    /// Cells.
+    /// Number of cells.
     pub cells: usize,
 }
 
@@ -78,17 +78,17 @@ struct CellMaterial<T> {
 #[derive(Debug, Clone)]
 struct Arrays<T> {
     displacements: [Vec<T>; 3],
-    /// Empty unless something is viscous.
+    /// Empty unless some material is viscous.
     velocities: [Vec<T>; 3],
     left: [Vec<T>; 3],
     right: [Vec<T>; 3],
-    /// Of every cell.
+    /// Prestrain of every cell, entry by entry.
     prestrains: [Vec<T>; ENTRIES],
 }
 
 impl<T: Scalar> Arrays<T> {
     fn new(points: usize, cells: usize, is_viscous: bool) -> Self {
-        // One before the first point, whose left neighbour gives it nothing.
+        // There is one entry before the first point, as its left neighbour, which adds nothing to it.
         let zeros = |count: usize| std::array::from_fn(|_| vec![T::of(0.0); count]);
         let entries = 1 + points + LANES;
         Self {
@@ -127,8 +127,8 @@ impl<T: Scalar> Rows<T> {
 }
 
 impl RowKernel {
-    /// For cells of edge `h` (m) that answer for the share `handed` of their volume, and for those of twice the edge, whose materials follow theirs;
-    /// its points are at rest.
+    /// Makes the kernel for cells of edge `h` (m) that answer for `fraction` of their volume, and for those of twice the edge,
+    /// whose materials are numbered after theirs. Its points are at rest.
     pub fn new(edge_m: f64, fraction: f64, materials: &[Material], precision: Precision, room: Room) -> Self {
         let layout = match precision {
             Precision::Single => Layout::Single(Rows::new(materials, edge_m, fraction, room)),
@@ -137,13 +137,14 @@ impl RowKernel {
         Self { layout, instruction_set: Available::best() }
     }
 
-    /// The same kernel, held to an instruction set or the best below it that there is (for tests and benchmarks).
+    /// Returns the same kernel, held to an instruction set or to the best available below it (for tests and benchmarks).
     #[must_use]
     pub fn with_instruction_set(self, instruction_set: InstructionSet) -> Self {
         Self { instruction_set: Available::at_most(instruction_set), ..self }
     }
 
-    /// Sums up the forces (N) of elastic and viscous stress on the first `points` points, where `left` is left of what fades.
+    /// Sums up the forces (N) of elastic and viscous stress on the first `points` points, with the fraction `left` of the
+    /// prestrain.
     pub fn forces(&mut self, rows: &[CellRow], points: usize, left: f64) -> Found {
         match &mut self.layout {
             Layout::Single(of) => of.sum_up(self.instruction_set, rows, points, left),
@@ -151,7 +152,7 @@ impl RowKernel {
         }
     }
 
-    /// Displacements (m) of the points.
+    /// Sets the displacements (m) of the points.
     pub fn set_displacements(&mut self, displacements_m: &[DVec3]) {
         match &mut self.layout {
             Layout::Single(Rows { arrays, .. }) => put(&mut arrays.displacements, displacements_m),
@@ -159,7 +160,7 @@ impl RowKernel {
         }
     }
 
-    /// Velocities (m/s) of the points; of use only where a material is viscous.
+    /// Sets the velocities (m/s) of the points; they are used only where a material is viscous.
     pub fn set_velocities(&mut self, v: &[DVec3]) {
         match &mut self.layout {
             Layout::Single(Rows { arrays, .. }) if !arrays.velocities[0].is_empty() => put(&mut arrays.velocities, v),
@@ -168,7 +169,7 @@ impl RowKernel {
         }
     }
 
-    /// What fades in a cell.
+    /// Sets the prestrain of a cell, `None` for one without.
     pub fn put_prestrain(&mut self, cell: u32, prestrain: Option<&CellPrestrain>) {
         match &mut self.layout {
             Layout::Single(Rows { arrays, .. }) => put_prestrain(&mut arrays.prestrains, cell, prestrain),
@@ -251,7 +252,8 @@ impl<T: Scalar> LawPass for RowForces<'_, T> {
 }
 
 impl<T: Scalar> RowForces<'_, T> {
-    /// Cells whose points 0, 2, 4, 6 are at `at` and what follows; there are `cells` of them, or more than lanes. What fades of them, if any, starts at `fades`.
+    /// Computes a vector of cells, the first of which has its points 0, 2, 4, 6 at the entries `at`; there are `cells` of them,
+    /// or more than lanes. Their prestrains, if any, start at `first_prestrain`.
     #[inline(always)]
     fn lanes<V: Vector<Scalar = T>, L: ConstitutiveLaw, const VISCOUS: bool>(
         &mut self,
@@ -345,7 +347,7 @@ fn add<V: Vector>(sums: &mut [V::Scalar], a: V) {
     (V::load(sums) + a).store(sums);
 }
 
-/// 1 in the first lanes, 0 in the others.
+/// Returns 1 in the first lanes, 0 in the others.
 #[inline(always)]
 fn first_lanes<V: Vector>(count: usize) -> V {
     let mut lanes = [V::Scalar::of(0.0); LANES];
@@ -357,7 +359,7 @@ fn first_lanes<V: Vector>(count: usize) -> V {
     V::load(&lanes)
 }
 
-/// `a_p − a_0` of points 1 to 7.
+/// Returns `a_p − a_0` of points 1 to 7.
 #[inline(always)]
 fn differences<V: Vector>(values: &[V::Scalar], at: [usize; 4]) -> [V; 7] {
     let zero = V::load(&values[at[0]..]);

@@ -6,17 +6,17 @@ use crate::bodies::hybrid::{
     prestrain::{CellPrestrain, PrestrainDecay},
 };
 
-/// Where a cell is laid out.
+/// Where the kernels have a cell.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Slot {
     /// A whole cell: its row, and its number among the cells of all rows.
     Row { row: u32, cell: u32 },
-    /// Another: its run, and its number in it.
+    /// Another cell: its run, and its number in the run.
     Cut { run: u32, number: u32 },
 }
 
 impl RunningPatch {
-    /// Rows of whole cells, of either size, and blocks of others, material by material; nothing fades in them.
+    /// Lays out rows of whole cells, of either size, and blocks of other cells, material by material, without prestrain.
     pub(super) fn lay_out(&mut self, hybrid: &HybridBody) {
         let partition = &hybrid.partition;
         for &cell in &self.prestrained_cells {
@@ -77,12 +77,12 @@ impl RunningPatch {
         }
     }
 
-    /// Whether this is what the kernels were told of last.
+    /// Returns whether these are the prestrains that the kernels were given last.
     pub(in crate::bodies::hybrid) fn knows(&self, decay: &PrestrainDecay) -> bool {
         self.prestrain_mark == decay.mark()
     }
 
-    /// Tells the kernels what fades.
+    /// Gives the kernels the prestrains.
     pub(in crate::bodies::hybrid) fn put_prestrains(&mut self, decay: &PrestrainDecay) {
         self.prestrain_mark = decay.mark();
         let Self { rows, slots, full, cut, prestrained_cells, cells, .. } = self;

@@ -1,6 +1,6 @@
-//! The patch as the loop runs it: rebuilt without allocating when other particles wake, its cells in lanes. Its oracle is `patch`.
+//! The patch as the loop runs it: it is rebuilt without allocating when other particles wake, and has its cells in lanes. Its oracle is `patch`.
 //!
-//! *Points* are the particles of awake cells, ascending: those that are active, and those of the border, which follow the coarse nodes.
+//! *Points* are the particles of awake cells, ascending: those that are active, and the constrained points, which follow the coarse nodes.
 mod layout;
 #[cfg(test)]
 mod tests;
@@ -40,44 +40,44 @@ pub(crate) struct RunningPatch {
     full: RowKernel,
     rows: Vec<CellRow>,
     cut: CutCells,
-    /// Where every awake cell is laid out.
+    /// Where the kernels have every awake cell.
     slots: Vec<Slot>,
-    /// Numbers, among the awake cells, of those that fade.
+    /// Numbers, among the awake cells, of those with prestrain.
     prestrained_cells: Vec<u32>,
     prestrained_tets: Vec<u32>,
     prestrain_mark: u64,
-    /// What is left to each coarse tet.
+    /// Residual elements of the coarse tets.
     residual_elements: Vec<ResidualElement>,
     residual_kernel: ResidualKernel,
-    /// Number of every coarse node among those of a share, while something is taken from it.
+    /// Number of every coarse node among those of a residual element, while cells are taken from it.
     number_of_node: Vec<u32>,
-    /// Of which tets something was taken.
+    /// Coarse tets of which cells were taken.
     taken_from: Vec<u32>,
     metric: RunningMetric,
     /// Displacements (m) of coarse nodes.
     node_displacements_m: Vec<DVec3>,
-    /// Number of every particle among the points.
+    /// Number of every particle among the points, [`NONE`] for one that is no point.
     point_of: Vec<u32>,
-    /// Whether active particles carry any of a cluster's vertices, and a group's.
+    /// Whether active particles carry any vertex of each cluster, and of each group.
     carries_of_cluster: Vec<bool>,
     carries_of_group: Vec<bool>,
     is_awake: Vec<bool>,
     is_viscous: bool,
-    /// Counts the sets of active particles.
+    /// Number of sets of active particles that there have been.
     number: u64,
 }
 
 #[derive(Debug, Clone, Copy)]
 struct Point {
     particle: u32,
-    /// Its number among the active ones, [`NONE`] of the border's.
+    /// Its number among the active particles, [`NONE`] for a constrained point.
     active: u32,
     rest_m: DVec3,
     anchor: Anchor,
 }
 
 impl RunningPatch {
-    /// Room for `most_active` particles, none awake.
+    /// Makes room for `most_active` active particles; none is awake.
     pub(crate) fn new(hybrid: &HybridBody, most_active: usize, precision: Precision) -> Self {
         let partition = &hybrid.partition;
         let most_cells = room_for_cells(hybrid, most_active);
@@ -120,83 +120,83 @@ impl RunningPatch {
         }
     }
 
-    /// The mass matrix.
+    /// Returns the mass matrix.
     pub(crate) fn metric(&self) -> &RunningMetric {
         &self.metric
     }
 
-    /// The same, to be solved with.
+    /// Returns the mass matrix, to be solved with.
     pub(crate) fn metric_mut(&mut self) -> &mut RunningMetric {
         &mut self.metric
     }
 
-    /// Counts the sets of active particles there have been.
+    /// Returns the number of sets of active particles that there have been.
     pub(super) fn number(&self) -> u64 {
         self.number
     }
 
-    /// Number of a particle among the points, [`NONE`] of one that is none.
+    /// Returns the number of a particle among the points, [`NONE`] for one that is no point.
     pub(super) fn point_of(&self, particle: u32) -> u32 {
         self.point_of[particle as usize]
     }
 
-    /// Number of a particle among the active ones, [`NONE`] of one that is asleep.
+    /// Returns the number of a particle among the active ones, [`NONE`] for one that is asleep.
     pub(super) fn number_of(&self, particle: u32) -> u32 {
         self.points.get(self.point_of(particle) as usize).map_or(NONE, |point| point.active)
     }
 
-    /// Displacements (m) of the points after [`Self::displace`].
+    /// Returns the displacements (m) of the points after [`Self::displace`].
     pub(super) fn displacements_m(&self) -> &[DVec3] {
         &self.displacements_m
     }
 
-    /// Displacements (m) of the coarse nodes after [`Self::displace`].
+    /// Returns the displacements (m) of the coarse nodes after [`Self::displace`].
     pub(super) fn node_displacements_m(&self) -> &[DVec3] {
         &self.node_displacements_m
     }
 
-    /// How far (m) each active particle is from where it would be asleep.
+    /// Returns the active particles, each with its distance (m) from where it would be asleep.
     pub(super) fn deviations_m(&self) -> impl Iterator<Item = (u32, f64)> + '_ {
         let active = self.points.iter().zip(&self.displacements_m).filter(|(point, _)| point.active != NONE);
         active.map(|(point, u)| (point.particle, u.distance(point.anchor.of(&self.node_displacements_m))))
     }
 
-    /// The largest of [`Self::deviations_m`].
+    /// Returns the largest distance (m) of [`Self::deviations_m`].
     pub(super) fn deviation_m(&self) -> f64 {
         self.deviations_m().map(|(_, deviation_m)| deviation_m).fold(0.0, f64::max)
     }
 
-    /// Whether active particles carry any vertex of a cluster of the skin.
+    /// Returns whether active particles carry any vertex of a cluster of the skin.
     pub(super) fn carries_of_cluster(&self, cluster: usize) -> bool {
         self.carries_of_cluster[cluster]
     }
 
-    /// The same of a group.
+    /// Returns the same for a group.
     pub(super) fn carries_of_group(&self, group: usize) -> bool {
         self.carries_of_group[group]
     }
 
-    /// Awake cells, ascending.
+    /// Returns the awake cells, ascending.
     pub(super) fn cells(&self) -> &[u32] {
         &self.cells
     }
 
-    /// Whether a cell is awake.
+    /// Returns whether a cell is awake.
     pub(super) fn is_awake(&self, cell: u32) -> bool {
         self.is_awake[cell as usize]
     }
 
-    /// Coarse tets that have lost some of their cells.
+    /// Returns the coarse tets that have lost some of their cells.
     pub(super) fn taken_from(&self) -> &[u32] {
         &self.taken_from
     }
 
-    /// What is left to a coarse tet.
+    /// Returns the residual element of a coarse tet.
     pub(super) fn residual_element(&self, tet: u32) -> &ResidualElement {
         &self.residual_elements[tet as usize]
     }
 
-    /// Positions (m) of the particles of an awake cell.
+    /// Returns the positions (m) of the particles of an awake cell.
     pub(super) fn corners_m(&self, hybrid: &HybridBody, cell: u32) -> [DVec3; 8] {
         hybrid.partition.corners(cell as usize).map(|particle| {
             let point = self.point_of[particle as usize] as usize;
@@ -204,7 +204,7 @@ impl RunningPatch {
         })
     }
 
-    /// Whether some particle of an awake cell follows one of these coarse nodes.
+    /// Returns whether some particle of an awake cell follows one of these coarse nodes.
     pub(super) fn follows(&self, hybrid: &HybridBody, cell: u32, nodes: &[bool]) -> bool {
         hybrid.partition.corners(cell as usize).into_iter().any(|particle| {
             let point = &self.points[self.point_of[particle as usize] as usize];
@@ -214,7 +214,7 @@ impl RunningPatch {
         })
     }
 
-    /// Hands a force (N) on a point to the particle or the coarse nodes that move it.
+    /// Adds a force (N) on a point to that of the particle, or to those of the coarse nodes, that move it.
     pub(super) fn push(&self, point: u32, force_n: DVec3, nodes: usize, forces_n: &mut [DVec3]) {
         let point = &self.points[point as usize];
         if point.active == NONE {
@@ -224,21 +224,21 @@ impl RunningPatch {
         }
     }
 
-    /// Active particles, ascending.
+    /// Returns the active particles, ascending.
     pub(crate) fn active(&self) -> &[u32] {
         &self.active
     }
 
-    /// Wakes these particles (ascending, no more than there is room for) and no others, of which this fades. Allocates nothing.
+    /// Wakes these particles (ascending, no more than there is room for) and no others, with these prestrains. Allocates nothing.
     pub(crate) fn wake(&mut self, hybrid: &HybridBody, active: &[u32], decay: &PrestrainDecay) {
         (0..Self::SLICES).for_each(|slice| self.set_slice(hybrid, active, slice));
         self.put_prestrains(decay);
     }
 
-    /// In how many slices particles wake.
+    /// Number of slices in which a patch is laid out.
     pub(super) const SLICES: u32 = 3;
 
-    /// A slice of [`Self::wake`], one after the other, before it is told what fades.
+    /// Does a slice of [`Self::wake`]. They have to be done one after the other, before the prestrains are given.
     pub(super) fn set_slice(&mut self, hybrid: &HybridBody, active: &[u32], slice: u32) {
         match slice {
             0 => {
@@ -258,7 +258,7 @@ impl RunningPatch {
         }
     }
 
-    /// Counts this one as the one after another.
+    /// Numbers this patch as the one after another.
     pub(super) fn number_after(&mut self, other: &Self) {
         self.number = other.number + 1;
     }
@@ -331,7 +331,7 @@ impl RunningPatch {
         self.displacements_m.resize(self.points.len(), DVec3::ZERO);
     }
 
-    /// `V_g ← V_g − (1 − ε) V_c` and likewise `T_gi`.
+    /// Takes the awake cells from the residual elements: `V_g ← V_g − (1 − ε) V_c`, and likewise `T_gi`.
     fn take_from_residual_elements(&mut self, hybrid: &HybridBody) {
         let partition = &hybrid.partition;
         let mut last = NONE;
@@ -364,14 +364,14 @@ impl RunningPatch {
         }
     }
 
-    /// Adds forces (N) on coarse nodes of elastic and viscous stress in what is left to the coarse level, where [`Self::displace`] put them, at their
-    /// velocities `v`, with `left` left of what fades.
+    /// Adds the forces (N) of elastic and viscous stress in the residual elements to those on coarse nodes, where
+    /// [`Self::displace`] put the nodes, at velocities `v`, with the fraction `left` of the prestrain.
     pub(crate) fn add_coarse_forces_n(&mut self, v: &[DVec3], left: f64, forces_n: &mut [DVec3]) -> Found {
         let v_nodes = &v[..self.node_displacements_m.len()];
         self.residual_kernel.add_forces_n(&self.node_displacements_m, v_nodes, left, forces_n)
     }
 
-    /// The same of awake cells, on coarse nodes and active particles; whose forces were none.
+    /// Adds the forces (N) of awake cells to those on coarse nodes, and overwrites those on active particles.
     pub(crate) fn add_cell_forces_n(
         &mut self,
         hybrid: &HybridBody,
@@ -384,7 +384,7 @@ impl RunningPatch {
         if self.active.is_empty() {
             return Found::default();
         }
-        // Less that of one of them: far from rest, their differences would be rounded too coarsely.
+        // The displacement of one point is taken from all: far from rest, differences would be rounded too coarsely.
         let first_m = self.displacements_m[0];
         self.of_points.clear();
         self.of_points.extend(self.displacements_m.iter().map(|displacement| *displacement - first_m));
@@ -415,7 +415,7 @@ impl RunningPatch {
         found
     }
 
-    /// Takes positions (m) of coarse nodes and then active particles.
+    /// Moves the patch to positions (m) of coarse nodes and then active particles.
     pub(crate) fn displace(&mut self, hybrid: &HybridBody, x: &[DVec3]) {
         let (x_nodes, x_particles) = x.split_at(hybrid.node_count());
         let rest = hybrid.partition.coarse().positions_m();

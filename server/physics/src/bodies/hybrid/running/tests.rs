@@ -22,7 +22,7 @@ fn largest(list: &[DVec3]) -> f64 {
     list.iter().map(|a| a.length()).fold(0.0, f64::max)
 }
 
-/// Something in some of the cells and tets, of the size of its strains.
+/// Returns prestrain in some of the cells and tets, of the size of the strains of this test.
 fn some_prestrain(hybrid: &HybridBody, cells: &[u32], random: &mut Random) -> PrestrainDecay {
     let mut matrix = || DMat3::from_cols(random.vector(), random.vector(), random.vector()) * 0.1;
     let cells = cells.iter().filter(|cell| **cell / 7 % 3 == 1);
@@ -35,7 +35,8 @@ fn some_prestrain(hybrid: &HybridBody, cells: &[u32], random: &mut Random) -> Pr
     decay
 }
 
-/// Whichever particles were awake, and whatever faded, before: forces, power, accelerations and momenta are the oracle's.
+/// Forces, power, accelerations and momenta are those of the oracle, whichever particles were awake before, with whichever
+/// prestrain.
 #[test]
 fn running_patch_and_oracle_agree() {
     let [stvk, neo, corotated] = tissue();

@@ -15,13 +15,13 @@ use crate::{
     material::{ConstitutiveLaw, LawPass},
 };
 
-/// Blocks that are gathered, computed and scattered together: a wide load waits for the narrow stores it overlaps.
+/// Number of blocks that are gathered, computed and scattered together: a wide load waits for the narrow stores it overlaps.
 const BATCH: usize = 4;
 
-/// Points 1 to 3, 4 to 6, and 7 of a block's cells, three components each; what is over stays zero.
+/// Points 1 to 3, 4 to 6, and 7 of a block's cells, three components each; entries beyond them stay zero.
 type Corners<T, const N: usize> = [Lanes<T, N>; 3];
 
-/// A block of which something fades.
+/// The prestrains of a block, while its forces are computed.
 struct PrestrainedBlock<'a, T, const N: usize> {
     block: &'a PrestrainBlock<T, N>,
     left: f64,
@@ -33,12 +33,12 @@ struct PrestrainedBlock<'a, T, const N: usize> {
 pub(super) struct CutForces<'a, T, const N: usize> {
     pub(super) split: &'a Split<T>,
     pub(super) blocks: &'a [CutBlock<T, N>],
-    /// As many.
+    /// Prestrains of the blocks, one for each.
     pub(super) prestrains: &'a [PrestrainBlock<T, N>],
     pub(super) displacements: &'a [Node],
     pub(super) velocities: &'a [Node],
     pub(super) sums: &'a mut [Sum],
-    /// What is left of what fades.
+    /// The fraction of the prestrain that is left.
     pub(super) left: f64,
     /// `s ∂U/∂s` (J), added to.
     pub(super) prestrain_j: f64,
@@ -75,7 +75,7 @@ impl<T: Scalar, const N: usize> LawPass for CutForces<'_, T, N> {
     }
 }
 
-/// One axis of points 1 to 7.
+/// Loads one axis of points 1 to 7.
 #[inline(always)]
 fn load<V: Vector, const N: usize>(corners: &Corners<V::Scalar, N>, axis: usize, first: usize) -> [V; 7] {
     let mut loaded = [V::of(0.0); 7];
@@ -92,7 +92,8 @@ fn store<V: Vector, const N: usize>(values: &[V; 7], corners: &mut Corners<V::Sc
     }
 }
 
-/// `Σ_p a_p b_pᵀ` of some lanes. No closure: one that is not inlined has no vectors of its caller's instruction set.
+/// Returns `Σ_p a_p b_pᵀ` of some lanes. It is not a closure, since one that is not inlined has no vectors of its caller's
+/// instruction set.
 #[inline(always)]
 fn gradient<V: Vector, const N: usize>(
     block: &CutBlock<V::Scalar, N>,
@@ -174,7 +175,7 @@ fn cut<V: Vector<Scalar = T>, T: Scalar, L: ConstitutiveLaw, const VISCOUS: bool
     power.iter().fold(0.0, |sum, &p| sum + p.into())
 }
 
-/// `a_p − a_0` of all lanes.
+/// Writes `a_p − a_0` of all lanes.
 #[inline(always)]
 fn gather<V: Vector, const N: usize>(points: &[[u32; 8]; N], values: &[Node], edges: &mut Corners<V::Scalar, N>) {
     for first in (0..N).step_by(4) {
@@ -193,7 +194,7 @@ fn gather<V: Vector, const N: usize>(points: &[[u32; 8]; N], values: &[Node], ed
     }
 }
 
-/// Adds the points' forces, lane after lane: the same order, hence the same bits, always.
+/// Adds the points' forces, lane after lane, so that the order, and hence the bits, are always the same.
 #[inline(always)]
 fn scatter<T: Scalar, const N: usize>(points: &[[u32; 8]; N], forces: &Corners<T, N>, sums: &mut [Sum]) {
     for first in (0..N).step_by(4) {

@@ -28,7 +28,7 @@ pub(super) struct ResidualForces<'a, T, const N: usize> {
     pub(super) displacements: &'a [Node],
     pub(super) velocities: &'a [Node],
     pub(super) sums: &'a mut [Sum],
-    /// What is left of what fades.
+    /// The fraction of the prestrain that is left.
     pub(super) left: f64,
     /// `s ∂U/∂s` (J), added to.
     pub(super) prestrain_j: f64,
@@ -126,7 +126,7 @@ impl<T: Scalar, const N: usize> ResidualForces<'_, T, N> {
     }
 }
 
-/// `1/V_g Σ_i (a_i − a_0) T_giᵀ`.
+/// Returns `1/V_g Σ_i (a_i − a_0) T_giᵀ`.
 #[inline(always)]
 fn gradient<V: Vector, const N: usize>(
     block: &ResidualBlock<V::Scalar, N>,
@@ -154,13 +154,14 @@ fn gradient<V: Vector, const N: usize>(
     sum
 }
 
-/// Written out: a closure would not be inlined into a function compiled for its vectors' instruction set.
+/// Loads a moment. It is written out, since a closure would not be inlined into a function compiled for its vectors'
+/// instruction set.
 #[inline(always)]
 fn moment<V: Vector, const N: usize>(moment: &[[V::Scalar; N]; 3], first: usize) -> [V; 3] {
     [V::load(&moment[0][first..]), V::load(&moment[1][first..]), V::load(&moment[2][first..])]
 }
 
-/// `a_i − a_0` of all lanes.
+/// Writes `a_i − a_0` of all lanes.
 #[inline(always)]
 fn gather<V: Vector, const N: usize>(nodes: &[[u32; N]], values: &[Node], edges: &mut [Lanes<V::Scalar, N>]) {
     for (group, edges) in edges.iter_mut().enumerate().take(nodes.len() / 3) {
@@ -177,7 +178,8 @@ fn gather<V: Vector, const N: usize>(nodes: &[[u32; N]], values: &[Node], edges:
     }
 }
 
-/// Adds the nodes' forces, lane after lane: the same order, hence the same bits, always. `f_0 = −Σ f_i` in f64.
+/// Adds the nodes' forces, lane after lane, so that the order, and hence the bits, are always the same. `f_0 = −Σ f_i` is summed
+/// in f64.
 #[inline(always)]
 fn scatter<T: Scalar, const N: usize>(nodes: &[[u32; N]], forces: &[Lanes<T, N>], sums: &mut [Sum]) {
     for first in (0..N).step_by(4) {

@@ -1,8 +1,8 @@
-//! The coarse tets of a hybrid body (`hybrid::share`, which is the oracle), in blocks of lanes: one tet a lane.
+//! The residual elements of a hybrid body's coarse tets (`hybrid::residual_element` is the oracle), in blocks of lanes: one tet per lane.
 //!
-//! A lane's nodes are its tet's ten and those that its cells reach into its neighbours for. The parts' moments are kept only where some lane of a block
-//! has one, part by part, so nodes that have moments of the same parts are given the same places ([`place_nodes`]); a first node needs none, for they sum to
-//! zero. What wakes takes from a lane's moments and volumes, in place.
+//! A lane's nodes are its tet's ten and those of neighbouring tets that its cells' particles follow. The parts' moments are kept only where some lane of a block
+//! has one, part by part; so nodes that have moments of the same parts get the same local numbers in their lanes ([`assign_local_nodes`]). The first node needs no
+//! moments, for they sum to zero. Cells that wake are taken from a lane's moments and volumes in place.
 mod forces;
 
 use super::prestrains::Found;
@@ -27,11 +27,11 @@ use std::ops::Range;
 /// Tets in lanes. Lanes of padding have the spare node throughout, and zeros.
 #[derive(Debug, Clone)]
 struct ResidualBlock<T, const N: usize> {
-    /// Of every place among a lane's nodes; as many as fill groups of three behind the first.
+    /// Node of every local number and lane; the first is followed by full groups of three.
     nodes: Vec<[u32; N]>,
-    /// Entries of `places` and `moments` of every part.
+    /// Range of entries in `local_nodes` and `moments` of every part.
     parts: [Range<usize>; PARTS],
-    /// Place of each entry, from 1.
+    /// Local number of each entry's node, from 1.
     local_nodes: Vec<u16>,
     /// `T_gi` (m²).
     moments: Vec<[[T; N]; 3]>,
@@ -41,9 +41,9 @@ struct ResidualBlock<T, const N: usize> {
     weight: [[T; N]; PARTS],
     /// `V_g` (m³).
     volume: [[T; N]; PARTS],
-    /// What fades of the parts' shape and of the tet's volume (`hybrid::fade`), entries row by row.
+    /// Prestrain of the parts' shape and of the tet's volume (`hybrid::prestrain`), entries row by row.
     prestrains: [[[T; N]; 9]; PARTS + 1],
-    /// How many lanes have something that fades.
+    /// Number of lanes with prestrain.
     prestrained: u32,
 }
 
@@ -63,7 +63,7 @@ struct Tables<T, const N: usize> {
     /// Block and lane of every tet.
     lane_of: Vec<(u32, u32)>,
     is_prestrained: Vec<bool>,
-    /// Place, in its lane, of every node of a tet's share.
+    /// Local number, in its lane, of every node of each tet's residual element.
     local_nodes_of: Vec<Vec<u16>>,
     edges: Vec<Lanes<T, N>>,
     rates: Vec<Lanes<T, N>>,
@@ -76,19 +76,19 @@ enum Layout {
     Double(Tables<f64, LANES_F64>),
 }
 
-/// Forces of what is left to the coarse tets.
+/// Forces of the residual elements of coarse tets.
 #[derive(Debug, Clone)]
 pub struct ResidualKernel {
     layout: Layout,
     instruction_set: Available,
     displacements: Vec<Node>,
-    /// Empty unless something is viscous.
+    /// Empty unless some material is viscous.
     velocities: Vec<Node>,
     sums: Vec<Sum>,
 }
 
 impl ResidualKernel {
-    /// Lays out shares of tets; `of_tet` indexes `materials`.
+    /// Lays out the residual elements of tets; `of_tet` indexes `materials`.
     pub fn build(
         residual_elements: &[ResidualElement],
         nodes: usize,
@@ -101,7 +101,7 @@ impl ResidualKernel {
             Precision::Double => Layout::Double(Tables::build(residual_elements, nodes, of_tet, materials)),
         };
         let is_viscous = materials.iter().any(|m| !m.viscosity.is_zero());
-        // One spare node more, for the lanes of padding.
+        // There is one spare node more, for the lanes of padding.
         let count = nodes + 1;
         Self {
             layout,
@@ -112,13 +112,13 @@ impl ResidualKernel {
         }
     }
 
-    /// The same, held to an instruction set or the best below it that there is (for tests and benchmarks).
+    /// Returns the same kernel, held to an instruction set or to the best available below it (for tests and benchmarks).
     #[must_use]
     pub fn with_instruction_set(self, instruction_set: InstructionSet) -> Self {
         Self { instruction_set: Available::at_most(instruction_set), ..self }
     }
 
-    /// What is left to a tet; its nodes are those it had. Allocates nothing.
+    /// Sets the residual element of a tet; its nodes are those that it had. Allocates nothing.
     pub fn put(&mut self, tet: usize, residual: &ResidualElement) {
         match &mut self.layout {
             Layout::Single(blocks) => blocks.put(tet, residual),
@@ -126,7 +126,7 @@ impl ResidualKernel {
         }
     }
 
-    /// What fades in a tet; `None`: nothing any more. Allocates nothing.
+    /// Sets the prestrain of a tet, `None` for one without. Allocates nothing.
     pub fn put_prestrain(&mut self, tet: usize, prestrain: Option<&ResidualPrestrain>) {
         match &mut self.layout {
             Layout::Single(blocks) => blocks.put_prestrain(tet, prestrain),
@@ -134,8 +134,8 @@ impl ResidualKernel {
         }
     }
 
-    /// Adds forces (N) of elastic and viscous stress to `forces_n` at `displacements_m` and velocities `v` of the coarse nodes, where `left` is left of
-    /// what fades.
+    /// Adds forces (N) of elastic and viscous stress to `forces_n` at `displacements_m` and velocities `v` of the coarse nodes,
+    /// with the fraction `left` of the prestrain.
     pub fn add_forces_n(&mut self, displacements_m: &[DVec3], v: &[DVec3], left: f64, forces_n: &mut [DVec3]) -> Found {
         let Self { layout, instruction_set, displacements, velocities, sums } = self;
         for (to, from) in displacements.iter_mut().zip(displacements_m) {
@@ -159,7 +159,7 @@ impl ResidualKernel {
 impl<T: Scalar, const N: usize> Tables<T, N> {
     fn build(residual_elements: &[ResidualElement], nodes: usize, of_tet: &[u16], materials: &[Material]) -> Self {
         let is_viscous = materials.iter().any(|m| !m.viscosity.is_zero());
-        // Tets that reach for as many nodes share a block; one that holds nothing of the body needs no lane.
+        // Tets with as many nodes share a block; one that holds nothing of the body needs no lane.
         let mut order: Vec<usize> =
             (0..residual_elements.len()).filter(|&tet| !residual_elements[tet].nodes.is_empty()).collect();
         order.sort_by_key(|&tet| (of_tet[tet], residual_elements[tet].nodes.len(), tet));
@@ -214,7 +214,7 @@ impl<T: Scalar, const N: usize> Tables<T, N> {
         nodes.resize(1 + (nodes.len() - 1).next_multiple_of(3), [spare; N]);
         for local_nodes in 1..nodes.len() {
             for lane in 0..tets_of_lanes.len() {
-                // A place that a lane has no use for is its first node: no difference, no force.
+                // A local number that a lane does not use gets its first node: it has no difference and no force.
                 if nodes[local_nodes][lane] == spare {
                     nodes[local_nodes][lane] = nodes[0][lane];
                 }
@@ -315,8 +315,10 @@ impl<T: Scalar, const N: usize> Tables<T, N> {
     }
 }
 
-/// A place for every node of a share, among those of a block whose moments are of the parts `parts_of_place`, a bit each, which grow by what the share has. The
-/// node with moments of most parts is the first. Any other goes where the fewest parts have to be added, of such places where the fewest are without use.
+/// Returns a local number for every node of a residual element, among those of a block that have moments of the parts
+/// `parts_of_local_node`, a bit each; these grow by the parts of the element's nodes. The node with moments of most parts is the
+/// first. Any other gets the number to which the fewest parts have to be added, and of such numbers the one of whose parts it
+/// leaves the fewest unused.
 fn assign_local_nodes(residual: &ResidualElement, parts_of_local_node: &mut Vec<u8>) -> Vec<u16> {
     let parts_of = |moments: &[DVec3; PARTS]| {
         moments.iter().enumerate().fold(0_u8, |parts, (part, moment)| parts | u8::from(*moment != DVec3::ZERO) << part)
@@ -347,7 +349,8 @@ mod tests {
     use super::*;
     use crate::bodies::hybrid::testing::{Random, embedded_ball, tissue};
 
-    /// Whatever the law, the precision and the instruction set, also after a part of some shares was taken: the forces of the plain code, and the same bits.
+    /// The kernel finds the forces of the plain code, whatever the law and the precision, and the same bits with every
+    /// instruction set, also after parts of some residual elements were taken.
     #[test]
     fn residual_elements_and_oracle_agree() {
         let partition = embedded_ball();
@@ -386,7 +389,7 @@ mod tests {
                         assert!(run(set) == baseline, "{set:?}");
                     }
                 }
-                // What is left where most was taken from some parts, and as good as all of others.
+                // Most of the volume is taken from some parts, and nearly all from others.
                 for (number, residual) in residual_elements.iter_mut().enumerate().filter(|(number, _)| number % 3 > 0)
                 {
                     let left = if number % 3 == 1 { 0.3 } else { 0.02 };
