@@ -2,31 +2,31 @@
 use super::triangle::{closest_point, closest_weights};
 use glam::DVec3;
 
-/// Pieces of an axis that bounds look at one by one.
+/// Number of pieces of an axis that bounds look at one by one.
 const PIECES: usize = 8;
 
-/// A segment `centre ± half`; a point where `half` is zero.
+/// A segment `centre ± half`, or a point where `half` is zero.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Axis {
     /// Its middle (m).
     pub(super) centre_m: DVec3,
-    /// From there to one of its ends (m).
+    /// Vector (m) from the middle to one of its ends.
     pub(super) half_m: DVec3,
 }
 
-/// Where an axis and a triangle are nearest to each other.
+/// The points of an axis and of a triangle that are nearest to each other.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Approach {
-    /// From the centre to the point of the axis (m).
+    /// Vector (m) from the centre to the point of the axis.
     pub(super) arm_m: DVec3,
-    /// From that point to the triangle's (m).
+    /// Vector (m) from that point to the triangle's.
     pub(super) to_triangle_m: DVec3,
-    /// Weights of the triangle's corners there.
+    /// Weights of the triangle's corners at its point.
     pub(super) weights: [f64; 3],
 }
 
 impl Axis {
-    /// A point.
+    /// Makes an axis that is a point.
     pub(super) fn point(centre_m: DVec3) -> Self {
         Self { centre_m, half_m: DVec3::ZERO }
     }
@@ -35,19 +35,20 @@ impl Axis {
         self.half_m == DVec3::ZERO
     }
 
-    /// Half its length (m).
+    /// Returns half its length (m).
     pub(super) fn half_length_m(&self) -> f64 {
         self.half_m.length()
     }
 
-    /// From the centre (m) to the point of the axis that is nearest to `p`, which is given from the centre too:
-    /// `c(p) = s h`, `s = p·h/h²` kept within −1 to 1.
+    /// Returns the vector (m) from the centre to the point of the axis that is nearest to `p`, which is given from the centre,
+    /// too: `c(p) = s h`, `s = p·h/h²` limited to −1 to 1.
     pub(super) fn nearest_m(&self, from_centre_m: DVec3) -> DVec3 {
         self.half_m * (from_centre_m.dot(self.half_m) / self.half_m.length_squared()).clamp(-1.0, 1.0)
     }
 
-    /// A lower bound (m) of how far something is from it, of one from any point: that from its centre less half its length `L`, or, where that is below `wanted_m`, the least from the middles of
-    /// its pieces less half of one's.
+    /// Returns a lower bound (m) of the distance of something from the axis, made of such a bound from any point: that from its
+    /// centre less half its length `L`, or, where that is below `wanted_m`, the least from the middles of its pieces less half the
+    /// length of a piece.
     /// ```text
     /// max(d(c) − L, min_i d(c + ((2i + 1)/n − 1) h) − L/n)
     /// ```
@@ -63,7 +64,7 @@ impl Axis {
         of_whole_m.max(nearest_m - half_length_m / count)
     }
 
-    /// How far it is from a triangle (m).
+    /// Returns its distance (m) from a triangle.
     pub(super) fn distance_m(&self, corners: [DVec3; 3]) -> f64 {
         if self.is_point() {
             return self.centre_m.distance(closest_point(self.centre_m, corners));
@@ -71,8 +72,8 @@ impl Axis {
         self.approach(corners).to_triangle_m.length()
     }
 
-    /// Where a triangle is nearest to it. A segment that does not cross the triangle is nearest to it at one of its ends, or at one of the
-    /// triangle's edges.
+    /// Finds where a triangle is nearest to it. A segment that does not cross the triangle is nearest to it at one of its ends, or
+    /// at one of the triangle's edges.
     pub(super) fn approach(&self, corners: [DVec3; 3]) -> Approach {
         let from_point = |arm_m: DVec3| {
             let p = self.centre_m + arm_m;
@@ -107,7 +108,7 @@ impl Axis {
         best
     }
 
-    /// Where the axis goes through a triangle: `c + s h = a + v (b − a) + w (c − a)`.
+    /// Finds where the axis crosses a triangle: `c + s h = a + v (b − a) + w (c − a)`.
     fn crossing(&self, [a, b, c]: [DVec3; 3]) -> Option<Approach> {
         let (ab, ac) = (b - a, c - a);
         let normal = ab.cross(ac);
@@ -127,8 +128,8 @@ impl Axis {
     }
 }
 
-/// `s` and `t` in 0..=1 at which `p + s d` and `q + t e` are nearest (Ericson, Real-time collision detection, 5.1.9); of parallel segments one of
-/// the nearest pairs. A segment without length is a point.
+/// Returns `s` and `t` in 0..=1 at which `p + s d` and `q + t e` are nearest (Ericson, Real-time collision detection, 5.1.9);
+/// for parallel segments it is one of the nearest pairs. A segment without length is a point.
 fn nearest_of_segments((p, d): (DVec3, DVec3), (q, e): (DVec3, DVec3)) -> (f64, f64) {
     let r = p - q;
     let (dd, ee, de, dr, er) = (d.length_squared(), e.length_squared(), d.dot(e), d.dot(r), e.dot(r));
@@ -152,7 +153,7 @@ mod tests {
         prop::array::uniform3(-1.0..1.0_f64).prop_map(DVec3::from_array)
     }
 
-    /// Nearest of many points of the axis.
+    /// Returns the distance of the nearest of many points of the axis.
     fn by_trying(axis: Axis, corners: [DVec3; 3]) -> f64 {
         let at = |s: f64| {
             (axis.centre_m + axis.half_m * s).distance(closest_point(axis.centre_m + axis.half_m * s, corners))
@@ -180,7 +181,7 @@ mod tests {
             let from_point = |p: DVec3| p.distance(closest_point(p, corners));
             let (distance, bound) = (axis.distance_m(corners), axis.distance_bound_m(wanted, from_point));
             prop_assert!(bound <= distance + 1e-12, "{bound} {distance}");
-            // Within a piece, where it is of use.
+            // Where the bound is used it is good to within a piece.
             prop_assert!(bound >= wanted || bound >= distance - 2.0 * half.length() / PIECES as f64 - 1e-12);
             let point = Axis::point(centre);
             prop_assert_eq!(point.distance_bound_m(wanted, from_point), point.distance_m(corners));

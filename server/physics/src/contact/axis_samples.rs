@@ -1,4 +1,4 @@
-//! Places along a tool, about which bodies are fine that are coarse where no tool is: a sphere's is its centre, a capsule has several along its axis.
+//! Samples of a tool's axis, about which bodies are fine that are coarse elsewhere: a sphere's centre, several points along a capsule.
 use super::{
     broad::{ClusterBox, Skin},
     nearest::{deepest_m, nearest_vertex},
@@ -6,43 +6,44 @@ use super::{
 };
 use glam::DVec3;
 
-/// A tool has no more: the longest capsules are fine at places only that are farther apart.
+/// Largest number of samples of a tool's axis; on the longest capsules samples are farther apart than wanted.
 const MOST_SAMPLES: usize = 64;
 
-/// A place along a tool, and the piece of its axis that is nearer to it than to others.
+/// A sample of a tool's axis, and the piece of the axis that is nearer to it than to other samples.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct AxisSample {
-    /// Where it is (m).
+    /// Position (m) of the sample.
     at_m: DVec3,
-    /// Its speed (m/s).
+    /// Speed (m/s) of the sample.
     pub(crate) speed_m_per_s: f64,
-    /// Where the tool is deepest in the body there (m), if it touches the body there.
+    /// Where (m) the tool is deepest in the body about the sample, if it touches the body.
     deepest_m: Option<DVec3>,
-    /// How far (m) that piece reaches; nothing of the only place.
+    /// How far (m) that piece reaches to either side; 0 for a single sample.
     half_piece_m: f64,
     radius_m: f64,
 }
 
-/// What of a skin is near to a place.
+/// What of a skin is near to an axis sample.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Near {
-    /// From where it was sought (m).
+    /// The point (m) from which it was sought.
     pub(crate) from_m: DVec3,
-    /// The nearest vertex, and how far (m) it is from there.
+    /// The vertex nearest to that point, and its distance (m).
     pub(crate) vertex: Option<(u32, f64)>,
-    /// Gap between tool and skin (m), 0 where they touch.
+    /// Gap (m) between tool and skin, 0 where they touch.
     pub(crate) gap_m: f64,
 }
 
 impl ToolSpec {
-    /// How many places it has: as many as make them no farther than `apart_m` from one another, and at most 64.
+    /// Returns the number of samples of its axis: as many as make them no farther than `apart_m` from one another, and at most
+    /// [`MOST_SAMPLES`].
     pub(crate) fn axis_sample_count(&self, apart_m: f64) -> usize {
         ((2.0 * self.shape.half_length_m() / apart_m).ceil() as usize).saturating_add(1).min(MOST_SAMPLES)
     }
 }
 
 impl ToolState {
-    /// So many places along it.
+    /// Returns this number of samples of its axis.
     pub(crate) fn axis_samples(&self, spec: &ToolSpec, count: usize) -> impl Iterator<Item = AxisSample> + '_ {
         let (radius_m, half_m) = (spec.radius_m, spec.shape.axis(self.centre_m, self.orientation).half_m);
         let half_piece_m = if count > 1 { half_m.length() / (count - 1) as f64 } else { 0.0 };
@@ -62,11 +63,14 @@ impl ToolState {
 }
 
 impl AxisSample {
-    /// The vertex of a skin, of which a query has begun, nearest to where the tool is deepest in it here, or, where it does not touch it, to this place; within a gap of `2 near_m`, or
-    /// `near_m + cover_m` of a tool that touches: no point of the skin is farther than `cover_m` from a vertex. `fitted` are contact's boxes and its travel (m), where they are of use.
+    /// Finds the vertex of a skin, of which a query has begun, that is nearest to where the tool is deepest in it here, or, where
+    /// the tool does not touch it, to this sample. Vertices are sought within a gap of `2 near_m`, or `near_m + cover_m` of a tool
+    /// that touches: no point of the skin is farther than `cover_m` from a vertex. `fitted` are contact's boxes, where they may be
+    /// used.
     ///
-    /// Of a piece that reaches `s` to either side, a vertex that is `d` from its middle is no nearer than `√(d² − s²)`, and the nearest to the middle bounds the others:
-    /// no piece that is near goes unseen, and some are seen too soon.
+    /// A vertex at distance `d` from the middle of a piece that reaches `s` to either side is no nearer to the piece than
+    /// `√(d² − s²)`, and the vertex nearest to the middle bounds the others: no piece that is near is missed, and some are found
+    /// too early.
     pub(crate) fn look(
         &self,
         skin: &impl Skin,
@@ -74,7 +78,7 @@ impl AxisSample {
         fitted: Option<(&[ClusterBox], f64)>,
     ) -> Near {
         let s = self.half_piece_m;
-        // What touches has a vertex within `cover_m` of where it does, and of what is near by a margin for a skin that is stretched.
+        // A tool that touches has a vertex within `cover_m` of where it does; the rest is a margin for a stretched skin.
         let touching_m = near_m + cover_m;
         let reach_m = if self.deepest_m.is_some() { touching_m.max(2.0 * near_m) } else { 2.0 * near_m };
         let within_m = (self.radius_m + reach_m).hypot(s);
@@ -90,10 +94,10 @@ impl AxisSample {
         }
         let near = beside();
         if near.gap_m >= touching_m {
-            // It touches elsewhere only.
+            // The tool touches elsewhere only.
             return near;
         }
-        // Of a tool that is levered between two walls, the force of both may point away from the one that is here.
+        // If a tool is levered between two walls, the force of both may point away from the one that is here.
         let is_here = |vertex: &(u32, f64)| gap_m(skin.position_m(vertex.0).distance(self.at_m)) < touching_m;
         match from(deepest_m).filter(is_here) {
             Some(vertex) => Near { from_m: deepest_m, vertex: Some(vertex), gap_m: 0.0 },
@@ -111,7 +115,7 @@ mod tests {
     use glam::DQuat;
     use proptest::prelude::*;
 
-    /// Vertices, with a cluster for each.
+    /// A skin of vertices, with a cluster for each.
     struct Cloud {
         at_m: Vec<DVec3>,
         ids: Vec<u32>,
@@ -141,7 +145,8 @@ mod tests {
         }
     }
 
-    /// One end of a shaft is pushed up by what is beneath it, the other one, less, down by what is above: the force of both points away from that, to a wall that is far.
+    /// One end of a shaft is pushed up by what is beneath it, the other one, less, down by what is above: the sum of the forces
+    /// points away from the latter, to a wall that is far.
     #[test]
     fn what_a_levered_tool_touches_is_where_it_touches() {
         let spec = capsule(0.012);
@@ -159,7 +164,7 @@ mod tests {
     }
 
     proptest! {
-        /// Against the distance of every vertex from the whole axis.
+        /// The samples' gaps are compared with the distance of every vertex from the whole axis.
         #[test]
         fn what_is_near_the_axis_is_near_a_sample(
             at_m in prop::collection::vec(within(0.04), 1..3 * CLUSTER),

@@ -1,4 +1,4 @@
-//! Broad phase: which triangles a tool can touch, without looking at the others.
+//! The broad phase finds the triangles that a tool can touch, without looking at the others.
 //!
 //! The boundary's triangles are sorted along a Morton curve of their rest centroids and cut into clusters of
 //! [`CLUSTER`] neighbours. A cluster's box is refitted only when a tool might be near it. What makes a stale box safe is
@@ -8,17 +8,17 @@
 //!
 //! A query lists the triangles within `reach` of a tool's axis and returns how much further away all others are. As
 //! long as the path of any point of that axis plus the travel stay below that slack, the list holds every triangle that can be touched: far
-//! from the body a tick costs two additions per tool and substep. Boxes are as far from an axis as from its centre, less half its length, or further, and so of pieces of it ([`Axis::distance_bound_m`]).
+//! from the body a tick costs two additions per tool and substep. A box is at least as far from an axis as from the axis's centre, less half its length; the same holds for pieces of the axis ([`Axis::distance_bound_m`]).
 use super::axis::Axis;
 use crate::mesh::Surface;
 use glam::DVec3;
 use std::ops::Range;
 
-/// Triangles per cluster.
+/// Number of triangles per cluster.
 pub(crate) const CLUSTER: usize = 32;
-/// Triangles per group of clusters, on the skin of a hybrid body.
+/// Number of triangles per group of clusters, on the skin of a hybrid body.
 pub(crate) const GROUP: usize = 32 * CLUSTER;
-/// Rounding of the travel sums is far below this (m).
+/// A length (m) far above the rounding of the travel's sums.
 pub(crate) const ROUNDING_M: f64 = 1e-12;
 
 /// The boundary's triangles in the order of the broad phase.
@@ -26,28 +26,28 @@ pub(crate) const ROUNDING_M: f64 = 1e-12;
 pub(super) struct Triangles {
     /// Nodes of each triangle, in Morton order.
     pub(super) nodes: Vec<[u32; 3]>,
-    /// Index in [`Surface::triangles`] of each.
+    /// Index of each in [`Surface::triangles`].
     pub(super) surface_triangle: Vec<u32>,
 }
 
-/// Box of a cluster at the time it was fitted.
+/// Box of a cluster at the time when it was fitted.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct ClusterBox {
     lo: DVec3,
     hi: DVec3,
-    /// Travel `τ` when fitted; −∞: never.
+    /// Travel `τ` (m) when the box was fitted; −∞ if it never was.
     fitted_at_m: f64,
 }
 
 impl ClusterBox {
     pub(super) const UNFITTED: Self = Self { lo: DVec3::ZERO, hi: DVec3::ZERO, fitted_at_m: f64::NEG_INFINITY };
 
-    /// Lower bound of the distance (m) from `p` to the cluster's triangles when the travel is `travel_m`.
+    /// Returns a lower bound of the distance (m) from `p` to the cluster's triangles when the travel is `travel_m`.
     pub(crate) fn distance_bound_m(&self, p: DVec3, travel_m: f64) -> f64 {
         box_distance_m(p, self.lo, self.hi) - (travel_m - self.fitted_at_m)
     }
 
-    /// The same from an axis, at its best where it is below `wanted_m`.
+    /// Returns the same from an axis; the bound is refined where it is below `wanted_m`.
     fn axis_bound_m(&self, axis: &Axis, wanted_m: f64, travel_m: f64) -> f64 {
         axis.distance_bound_m(wanted_m, |p| self.distance_bound_m(p, travel_m))
     }
@@ -58,30 +58,30 @@ impl ClusterBox {
     }
 }
 
-/// A surface whose positions are worked out when asked for: a hybrid body's skin, a refined mass-spring surface.
+/// A surface whose positions are computed when they are asked for: a hybrid body's skin, or a refined mass-spring surface.
 pub(crate) trait Skin {
-    /// Queries begin, at positions that do not change before the last of them.
+    /// Begins queries, at positions that do not change before the last of them.
     fn begin(&mut self);
-    /// Lower bound (m) of the distance from a point to the triangles of a group.
+    /// Returns a lower bound (m) of the distance from a point to the triangles of a group.
     fn group_distance_m(&self, group: usize, from_m: DVec3) -> f64;
-    /// The same of a cluster.
+    /// Returns the same for a cluster.
     fn cluster_distance_m(&self, cluster: usize, from_m: DVec3) -> f64;
-    /// Number of clusters.
+    /// Returns the number of clusters.
     fn clusters(&self) -> usize;
-    /// The vertices of a cluster.
+    /// Returns the vertices of a cluster.
     fn vertices(&self, cluster: usize) -> &[u32];
-    /// Where a vertex is (m).
+    /// Returns the position (m) of a vertex.
     fn position_m(&self, vertex: u32) -> DVec3;
 }
 
-/// Triangles a tool may touch, and how far things may move before the list is out of date.
+/// Triangles that a tool may touch, and how far things may move before the list is out of date.
 #[derive(Debug, Clone)]
 pub(super) struct Candidates {
     list: Box<[u32]>,
-    /// What each triangle's distance (m) was above the slack when it was looked at last; −∞: never.
+    /// Each triangle's distance (m) less the slack when it was looked at last; −∞ if it never was.
     above_slack_m: Box<[f64]>,
     count: usize,
-    /// What relative motion (m) is left until the list must be renewed.
+    /// Relative motion (m) that is left until the list must be renewed.
     pub(super) slack_m: f64,
 }
 
@@ -101,7 +101,7 @@ impl Candidates {
         }
     }
 
-    /// Triangles, ascending.
+    /// Returns the listed triangles, ascending.
     pub(super) fn triangles(&self) -> &[u32] {
         &self.list[..self.count]
     }
@@ -112,13 +112,13 @@ impl Candidates {
         self.count += 1;
     }
 
-    /// Lower bound (m) of the distance from the tool's axis to a listed triangle: what it was when looked at last, less the motion since. Not a number
-    /// where all are listed whatever moves.
+    /// Returns a lower bound (m) of the distance from the tool's axis to a listed triangle: its distance when it was looked at
+    /// last, less the motion since. It is not a number where all triangles are listed ([`Triangles::list_all`]).
     pub(super) fn least_distance_m(&self, number: usize) -> f64 {
         self.above_slack_m[number] + self.slack_m - ROUNDING_M
     }
 
-    /// How far (m) a listed triangle is now.
+    /// Records how far (m) a listed triangle is from the tool's axis now.
     pub(super) fn set_distance_m(&mut self, number: usize, distance_m: f64) {
         self.above_slack_m[number] = distance_m - self.slack_m;
     }
@@ -192,8 +192,8 @@ impl Triangles {
         candidates.slack_m = others_m - inner_m - ROUNDING_M;
     }
 
-    /// [`Self::query`] on a skin, whose positions are not at hand: bounds that need none rule clusters out first. Of those looked at,
-    /// positions (m) are put into `x`.
+    /// Does the same as [`Self::query`] on a skin, whose positions are computed only where they are needed: bounds that need none
+    /// rule clusters out first. Positions (m) of the others' vertices are written into `x`.
     pub(super) fn query_skin(
         &self,
         (skin, x): (&mut impl Skin, &mut [DVec3]),
@@ -241,7 +241,7 @@ impl Triangles {
         candidates.slack_m = others_m - inner_m - ROUNDING_M;
     }
 
-    /// The oracle of [`Self::query`]: every triangle.
+    /// Lists every triangle: the oracle of [`Self::query`].
     pub(super) fn list_all(&self, candidates: &mut Candidates) {
         candidates.count = 0;
         for triangle in 0..self.len() {
@@ -272,7 +272,7 @@ mod tests {
     use super::*;
     use crate::{contact::triangle::closest_point, mesh::TetMesh};
 
-    /// A strip of separate tets along x.
+    /// Returns a strip of separate tets along x.
     fn strip(tets: usize) -> (Surface, Vec<DVec3>) {
         let corner = [DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::Z];
         let positions: Vec<DVec3> = (0..tets).flat_map(|t| corner.map(|c| c * 0.5 + DVec3::X * t as f64)).collect();
@@ -325,7 +325,7 @@ mod tests {
         }
         assert!(queries < 600, "{queries} queries in 2000 steps");
     }
-    /// A tool flying straight at what stands still: what was listed is renewed in the very step in which it runs out.
+    /// A tool flies straight at a surface that stands still: its list is renewed in the very step in which the slack runs out.
     #[test]
     fn a_straight_approach_uses_all_of_the_slack_and_no_more() {
         let (surface, x) = strip(50);

@@ -23,13 +23,13 @@ use super::{SurfaceModuli, broad::Triangles};
 use glam::DVec3;
 use std::f64::consts::PI;
 
-/// α: foundation stiffness over that of one element layer, `(λ + 2µ)/h`. See `docs/adr` on contact.
+/// `α`, the foundation's stiffness over that of one layer of elements, `(λ + 2µ)/h` (`docs/adr/contact-foundation.md`).
 const STIFFNESS_RATIO: f64 = 8.0;
-/// Largest share of the body's ω²_max that contact may add at a node.
+/// Largest addition of contact to the squared frequency at a node, over the body's ω²_max.
 const FREQUENCY_FRACTION: f64 = 1.5;
-/// Sample spacing wanted, as a fraction of the tool's radius.
+/// Largest spacing of samples, over the tool's radius.
 pub(super) const SPACING: f64 = 1.0 / 3.0;
-/// Most subdivisions of a triangle's edge; larger triangles are refused.
+/// Largest number of subdivisions of a triangle's edge; triangles that need more are refused.
 pub(super) const MAX_LEVEL: usize = 48;
 
 /// Samples and stiffness of the surface as one tool meets it; indices are those of [`Triangles`].
@@ -45,13 +45,13 @@ pub(super) struct Foundation {
     stiffness_pa_per_m: Vec<f64>,
     /// Indentation modulus `E/(1 − ν²)` (Pa) of every triangle.
     indentation_modulus_pa: Vec<f64>,
-    /// All samples.
+    /// Number of all samples.
     pub(super) samples: usize,
-    /// `k_f` (Pa/m) of a typical triangle of the softest material; what the coupling's limits are made of.
+    /// `k_f` (Pa/m) of a typical triangle of the softest material; the coupling's limits are derived from it.
     pub(super) typical_pa_per_m: f64,
 }
 
-/// What the foundation is made for.
+/// The body at rest, for which the foundation is made.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct BodyAtRest<'a> {
     pub(super) triangles: &'a Triangles,
@@ -62,14 +62,14 @@ pub(super) struct BodyAtRest<'a> {
     pub(super) frequency_sq: f64,
 }
 
-/// A triangle as the foundation sees it.
+/// The samples of one triangle and its stiffness.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct TriangleSamples<'a> {
     /// Weights of the second and third corner.
     pub(super) weights: &'a [[f64; 2]],
     /// Number of the first sample.
     pub(super) first: u32,
-    /// `k_f a` (N/m) of each.
+    /// `k_f a` (N/m) of each sample.
     pub(super) stiffness_n_per_m: f64,
     /// `k_f` (Pa/m).
     pub(super) foundation_pa_per_m: f64,
@@ -77,7 +77,7 @@ pub(super) struct TriangleSamples<'a> {
     pub(super) indentation_modulus_pa: f64,
 }
 
-/// What contact can do to a tool at most.
+/// Bounds of contact's stiffness for a tool.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct ContactBound {
     /// `Σ_s k a_s` (N/m).
@@ -86,7 +86,7 @@ pub(super) struct ContactBound {
     pub(super) nm_per_rad: f64,
 }
 
-/// Weights of the samples for every subdivision in use.
+/// Weights of the samples for every number of subdivisions.
 #[derive(Debug, Clone, Default)]
 pub(super) struct SampleTables {
     tables: Vec<Vec<[f64; 2]>>,
@@ -98,7 +98,7 @@ impl SampleTables {
     }
 }
 
-/// Centroids of the `n²` congruent parts of a triangle, as weights of its second and third corner.
+/// Returns the centroids of the `n²` congruent parts of a triangle, as weights of its second and third corner.
 fn centroids(n: usize) -> Vec<[f64; 2]> {
     let at = |i: usize, j: usize, third: f64| [(i as f64 + third) / n as f64, (j as f64 + third) / n as f64];
     let row = |i: usize| {
@@ -158,19 +158,19 @@ impl Foundation {
         }
     }
 
-    /// The triangle of a sample, and the number after its last one.
+    /// Returns the triangle of a sample, and the number after the triangle's last sample.
     pub(super) fn triangle_of(&self, sample: u32) -> (usize, u32) {
         let next = self.first_sample.partition_point(|&first| first <= sample);
         (next - 1, self.first_sample.get(next).copied().unwrap_or(self.samples as u32))
     }
 
-    /// Force (N) that presses a sphere to depth `d` into a flat foundation: `∫ k_f (d − r²/2R) dA = π k_f R d²`.
+    /// Returns the force (N) that presses a sphere to depth `d` into a flat foundation: `∫ k_f (d − r²/2R) dA = π k_f R d²`.
     pub(super) fn flat_force_n(&self, radius_m: f64, depth_m: f64) -> f64 {
         PI * self.typical_pa_per_m * radius_m * depth_m * depth_m
     }
 
-    /// Row sums `Σ_s k a_s ζ_si` (N/m) of what one tool can touch around each node, and of all it can touch at once; see the
-    /// module's documentation.
+    /// Returns the row sums `Σ_s k a_s ζ_si` (N/m) over the samples that one tool can touch around each node, and the bounds of
+    /// all that it can touch at once; see the module's documentation.
     pub(super) fn row_sums_n_per_m(
         &self,
         triangles: &Triangles,
@@ -196,7 +196,7 @@ impl Foundation {
         }
         let square = |a: f64| a * a;
         let reach_sq = square(half_length_m + radius_m);
-        // ∫ p² dA of cylinder and hemispheres
+        // ∫ p² dA over cylinder and hemispheres
         let cylinder_m4 = PI * radius_m * half_length_m * (square(half_length_m) / 3.0 + square(radius_m));
         let moment_m4 = 4.0 * (cylinder_m4 + PI * square(radius_m) * reach_sq);
         let bound = ContactBound {
@@ -207,7 +207,7 @@ impl Foundation {
     }
 }
 
-/// A quarter of the surface of a tool (m²).
+/// Returns a quarter of the surface of a tool (m²).
 fn quarter_m2(radius_m: f64, half_length_m: f64) -> f64 {
     PI * radius_m * (radius_m + half_length_m)
 }
@@ -216,8 +216,8 @@ fn area_m2([a, b, c]: [DVec3; 3]) -> f64 {
     0.5 * (b - a).cross(c - a).length()
 }
 
-/// Largest `k_f` (Pa/m) each node can bear: `k_f min(A_i, 2πR²)/m_i ≤ share · ω²_max`, with its third `A_i` of the triangles around, and the
-/// `touched_m2` that a tool can touch at once in place of `2πR²`.
+/// Returns the largest `k_f` (Pa/m) that each node can bear: `k_f min(A_i, 2πR²)/m_i ≤ FREQUENCY_FRACTION · ω²_max`, with its third
+/// `A_i` of the triangles around it, and the area `touched_m2` (m²) that a tool can touch at once in place of `2πR²`.
 fn most_at_nodes(body: &BodyAtRest<'_>, touched_m2: f64) -> Vec<f64> {
     let mut area = vec![0.0; body.mass_kg.len()];
     for (triangle, nodes) in body.triangles.nodes.iter().enumerate() {

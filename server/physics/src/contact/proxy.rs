@@ -1,11 +1,11 @@
-//! How a tool moves: along its device's path, or as a mass on the virtual coupling.
+//! The motion of a tool: along its device's path, or as a mass on the virtual coupling.
 //!
 //! A coupled tool (the *proxy*) obeys `m c̈ = f_contact + K(d − c) + B(ḋ − ċ)` and is advanced with the body's own leapfrog:
 //! half kick, drift, new force, half kick. The damper is integrated exactly over each half kick,
 //! `v ← ḋ + (v − ḋ) e^{−B h/m}`, so no damping makes it unstable.
 //!
-//! The damper's `ḋ` is the velocity of the device's path, smoothed over [`SMOOTHED_S`]: an arm that counts steps of an encoder, or whose poses come beside the ticks,
-//! moves by leaps, and a damper makes of a leap of 0.05 mm in a tick of 1 ms 50 mm/s, and of 2 N s/m a buzz of 0.1 N.
+//! The damper's `ḋ` is the velocity of the device's path, smoothed over [`SMOOTHED_S`]: an arm that counts steps of an encoder, or whose poses are not in time
+//! with the ticks, moves by leaps. A leap of 0.05 mm in a tick of 1 ms is 50 mm/s, of which a damper of 2 N s/m makes a buzz of 0.1 N.
 //!
 //! What keeps it outside, whatever the device does:
 //! - The spring saturates ([`super::spring`]) at `F_max`, the force that presses a sphere of its radius [`SATURATION_DEPTH`]·R into the flat
@@ -24,11 +24,11 @@ use super::{
 };
 use glam::DVec3;
 
-/// Depth over R at which the coupling's force saturates.
+/// Depth, over R, at which the coupling's force saturates.
 pub(super) const SATURATION_DEPTH: f64 = 0.3;
-/// Depth over R whose foundation energy bounds the proxy's kinetic energy near the surface.
+/// Depth, over R, whose foundation energy bounds the proxy's kinetic energy near the surface.
 pub(super) const IMPACT_DEPTH: f64 = 0.4;
-/// Largest motion in a substep, and the width of the zone near the surface, over R.
+/// Largest motion in a substep, and width of the zone near the surface, both over R.
 pub(super) const NEAR: f64 = 0.25;
 
 /// Time constant (s) of the device's velocity for the coupling's damper.
@@ -36,25 +36,25 @@ pub(super) const SMOOTHED_S: f64 = 5e-3;
 /// A device that stands still is at rest below this speed (m/s, rad/s): what is left of a smoothed velocity has no end.
 const AT_REST: f64 = 1e-7;
 
-/// Where a substep stands in its tick.
+/// The position of a substep within its tick.
 #[derive(Debug, Clone, Copy)]
 pub struct SubstepTime {
-    /// Part of the tick done at its end, 0..=1.
+    /// Fraction of the tick that is done at the substep's end, 0..=1.
     pub fraction: f64,
-    /// Its length (s); 0 evaluates forces where things are.
+    /// The substep's length (s); with 0 forces are evaluated where things are.
     pub dt_s: f64,
     /// The tick's length (s).
     pub tick_period_s: f64,
 }
 
 impl SubstepTime {
-    /// Position (m) and velocity (m/s) of the device: straight from target to target during a tick.
+    /// Returns position (m) and velocity (m/s) of the device, which moves straight from target to target during a tick.
     fn device(&self, tool: &ToolState) -> (DVec3, DVec3) {
         let (from, to) = (tool.previous_target.position_m, tool.target.position_m);
         (from.lerp(to, self.fraction), (to - from) / self.tick_period_s)
     }
 
-    /// At a tick's beginning: takes its path into the velocities that dampers have: `v ← v + (1 − e^{−T/τ}) (Δ/T − v)`.
+    /// Smooths, at a tick's beginning, its path into the velocities that dampers use: `v ← v + (1 − e^{−T/τ}) (Δ/T − v)`.
     pub(super) fn smooth(&self, tool: &mut ToolState) {
         let part = -(-self.tick_period_s / SMOOTHED_S).exp_m1();
         let smoothed = |old: DVec3, path: DVec3| {
@@ -65,14 +65,14 @@ impl SubstepTime {
         tool.device_rad_per_s = smoothed(tool.device_rad_per_s, self.device_turn(tool).1);
     }
 
-    /// The same tick, where this substep begins.
+    /// Returns the time at which this substep begins.
     fn at_start(&self) -> Self {
         Self { fraction: self.fraction - self.dt_s / self.tick_period_s, ..*self }
     }
 }
 
 impl ToolModel {
-    /// `None` of a rigid tool.
+    /// Returns the coupling of position, `None` for a rigid tool.
     fn pull(&self) -> Option<Pull> {
         match (self.spec.coupling, self.spring()) {
             (Coupling::Spring { damping_n_s_per_m, mass_kg, .. }, Some(spring)) => {
@@ -83,7 +83,7 @@ impl ToolModel {
     }
 }
 
-/// A coupling's spring and damper, and what they move.
+/// A coupling's spring and damper, and the mass that they move.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Pull {
     pub(super) spring: SaturatingSpring,
@@ -93,7 +93,7 @@ pub(super) struct Pull {
     pub(super) mass_kg: f64,
 }
 
-/// What the coupling does to the tool.
+/// Force and torque of the coupling on the tool.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Coupled {
     /// Force (N).
@@ -102,7 +102,7 @@ pub(super) struct Coupled {
     pub(super) torque_nm: DVec3,
 }
 
-/// First half of a substep: half kick and drift. Returns how far any point of the tool's axis moved (m), at most.
+/// Does the first half of a substep, half kick and drift. Returns a bound (m) of how far any point of the tool's axis moved.
 pub(super) fn drift(
     model: &ToolModel,
     tool: &mut ToolState,
@@ -130,7 +130,7 @@ pub(super) fn drift(
     before.centre_m.distance(tool.centre_m) + before.half_m.distance(model.axis(tool).half_m)
 }
 
-/// Second half, with what the tool now meets. Returns what the coupling does to the tool.
+/// Does the second half of a substep, with the contact that the tool has now. Returns the coupling's force and torque on the tool.
 pub(super) fn finish(
     model: &ToolModel,
     tool: &mut ToolState,
@@ -177,7 +177,7 @@ impl Pull {
         *velocity_m_per_s += (contact_n + spring_n) * (h_s / mass_kg);
         // Impulse of the damper over h: m (1 − e^{−B h/m}) (ḋ − ċ)
         let part = -(-damping_n_s_per_m * h_s / mass_kg).exp_m1();
-        // |s + β d| ≤ limit and |s| ≤ limit: no more than twice the limit of it can be used.
+        // |s + β d| ≤ limit and |s| ≤ limit: no more than twice the limit of the damper's force can be used.
         let damper_n = shortened((device_m_per_s - *velocity_m_per_s) * (mass_kg * part / h_s), 2.0 * limit_n);
         let damper_n = damper_n * fraction_within(spring_n, damper_n, limit_n);
         *velocity_m_per_s += damper_n * (h_s / mass_kg);
@@ -185,7 +185,7 @@ impl Pull {
     }
 }
 
-/// Largest `β ≤ 1` with `|s + β d| ≤ limit`, for `|s| ≤ limit`. A shortened damper still only takes energy.
+/// Returns the largest `β ≤ 1` with `|s + β d| ≤ limit`, for `|s| ≤ limit`. A damper shortened by it still only takes energy.
 fn fraction_within(s: DVec3, d: DVec3, limit: f64) -> f64 {
     // A saturated spring may be a rounding beyond the limit by itself: without a damper there is nothing to shorten.
     if (s + d).length_squared() <= limit * limit || d == DVec3::ZERO {

@@ -1,4 +1,4 @@
-//! How a tool that turns follows its device's orientation: rigidly, or on the virtual coupling's other half.
+//! The rotation of a tool that turns: it follows its device's orientation rigidly, or on the virtual coupling of orientation.
 //!
 //! A coupled capsule obeys `J ω̇ = τ_contact + K_r log(R_d Rᵀ) + B_r (ω_d − ω)` beside `m c̈ = …` of [`super::proxy`], with the same half kicks,
 //! the damper integrated exactly, and `R ← exp(ω h) R` for a drift. `log` is the rotation vector of the shorter way round: it is the gradient of
@@ -17,7 +17,7 @@ use super::{
 };
 use glam::{DQuat, DVec3};
 
-/// The rotation vector (rad) of a rotation, the shorter way round: `|v| ≤ π`.
+/// Returns the rotation vector (rad) of a rotation, the shorter way round: `|v| ≤ π`.
 pub(super) fn rotation_vector(q: DQuat) -> DVec3 {
     let q = if q.w < 0.0 { -q } else { q };
     let axis = q.xyz();
@@ -28,7 +28,8 @@ pub(super) fn rotation_vector(q: DQuat) -> DVec3 {
 }
 
 impl SubstepTime {
-    /// Orientation and angular velocity (rad/s) of the device: about one axis from target to target during a tick.
+    /// Returns orientation and angular velocity (rad/s) of the device, which turns about one axis from target to target during a
+    /// tick.
     pub(super) fn device_turn(&self, tool: &ToolState) -> (DQuat, DVec3) {
         let (from, to) = (tool.previous_target.orientation, tool.target.orientation);
         let turn = rotation_vector(to * from.conjugate());
@@ -37,7 +38,7 @@ impl SubstepTime {
 }
 
 impl ToolModel {
-    /// Spring, damper and inertia of a coupled tool that turns.
+    /// Returns spring, damper and inertia of a coupled tool that turns, `None` for others.
     fn turning(&self) -> Option<Pull> {
         let (capsule, spring) = (self.spec.shape.as_capsule()?, self.spring()?);
         let turning = capsule.turning;
@@ -50,14 +51,14 @@ impl ToolModel {
     }
 }
 
-/// A rigid tool is turned as its device is.
+/// Turns a rigid tool as its device is turned.
 pub(super) fn follow(model: &ToolModel, tool: &mut ToolState, time: &SubstepTime) {
     if model.spec.shape.as_capsule().is_some() {
         (tool.orientation, tool.angular_velocity_rad_per_s) = time.device_turn(tool);
     }
 }
 
-/// Half a kick of a coupled one. Returns the coupling's mean torque (N m) over it.
+/// Does half a kick of a coupled tool's rotation. Returns the coupling's mean torque (N m) over it.
 pub(super) fn half_kick(
     model: &ToolModel,
     tool: &mut ToolState,
@@ -70,7 +71,7 @@ pub(super) fn half_kick(
     pull.half_kick(&mut tool.angular_velocity_rad_per_s, contact_nm, (apart, tool.device_rad_per_s), h_s)
 }
 
-/// Turns a coupled one.
+/// Does the drift of a coupled tool's rotation.
 pub(super) fn drift(model: &ToolModel, tool: &mut ToolState, dt_s: f64) {
     if model.spec.shape.as_capsule().is_some() {
         let turn = DQuat::from_scaled_axis(tool.angular_velocity_rad_per_s * dt_s);
@@ -78,7 +79,7 @@ pub(super) fn drift(model: &ToolModel, tool: &mut ToolState, dt_s: f64) {
     }
 }
 
-/// Cuts the speed with which a point of the axis, `arm_m` from the centre, goes towards the surface, but no more than to a stop.
+/// Cuts the speed with which a point of the axis, `arm_m` from the centre, goes towards the surface, but to no less than zero.
 pub(super) fn limit_approach(
     tool: &mut ToolState,
     (arm_m, towards): (DVec3, DVec3),
