@@ -96,8 +96,10 @@ impl Axis {
         take(from_point(-self.half_m));
         for (i, j) in [(0, 1), (1, 2), (2, 0)] {
             let (s, t) = nearest_of_segments(
-                (self.centre_m - self.half_m, self.half_m * 2.0),
-                (corners[i], corners[j] - corners[i]),
+                self.centre_m - self.half_m,
+                self.half_m * 2.0,
+                corners[i],
+                corners[j] - corners[i],
             );
             let arm_m = self.half_m * (2.0 * s - 1.0);
             let mut weights = [0.0; 3];
@@ -130,7 +132,7 @@ impl Axis {
 
 /// Returns `s` and `t` in 0..=1 at which `p + s d` and `q + t e` are nearest (Ericson, Real-time collision detection, 5.1.9);
 /// for parallel segments it is one of the nearest pairs. A segment without length is a point.
-fn nearest_of_segments((p, d): (DVec3, DVec3), (q, e): (DVec3, DVec3)) -> (f64, f64) {
+fn nearest_of_segments(p: DVec3, d: DVec3, q: DVec3, e: DVec3) -> (f64, f64) {
     let r = p - q;
     let (dd, ee, de, dr, er) = (d.length_squared(), e.length_squared(), d.dot(e), d.dot(r), e.dot(r));
     let over = |a: f64, b: f64| if b > 0.0 { (a / b).clamp(0.0, 1.0) } else { 0.0 };

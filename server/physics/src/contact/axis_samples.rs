@@ -1,6 +1,6 @@
 //! Samples of a tool's axis, about which bodies are fine that are coarse elsewhere: a sphere's centre, several points along a capsule.
 use super::{
-    broad::{ClusterBox, Skin},
+    broad::{FittedBoxes, Skin},
     nearest::{deepest_m, nearest_vertex},
     tool::{ToolSpec, ToolState},
 };
@@ -75,7 +75,7 @@ impl AxisSample {
         &self,
         skin: &impl Skin,
         (near_m, cover_m): (f64, f64),
-        fitted: Option<(&[ClusterBox], f64)>,
+        fitted: Option<FittedBoxes<'_>>,
     ) -> Near {
         let s = self.half_piece_m;
         // A tool that touches has a vertex within `cover_m` of where it does; the rest is a margin for a stretched skin.

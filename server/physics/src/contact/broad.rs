@@ -58,6 +58,33 @@ impl ClusterBox {
     }
 }
 
+/// The clusters' boxes and the travel by which they are out of date.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct FittedBoxes<'a> {
+    /// Box of every cluster.
+    pub(crate) boxes: &'a [ClusterBox],
+    /// Travel `τ` (m) now.
+    pub(crate) travel_m: f64,
+}
+
+/// The same boxes, to be refitted.
+#[derive(Debug)]
+pub(super) struct FittedBoxesMut<'a> {
+    /// Box of every cluster.
+    pub(super) boxes: &'a mut [ClusterBox],
+    /// Travel `τ` (m) now.
+    pub(super) travel_m: f64,
+}
+
+/// How far from a tool's axis triangles are listed.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct ListReach {
+    /// Triangles within this distance (m) are listed.
+    pub(super) listed_m: f64,
+    /// No triangle within this distance (m) may be missing from the list while it is used.
+    pub(super) complete_m: f64,
+}
+
 /// A surface whose positions are computed when they are asked for: a hybrid body's skin, or a refined mass-spring surface.
 pub(crate) trait Skin {
     /// Begins queries, at positions that do not change before the last of them.
@@ -159,14 +186,14 @@ impl Triangles {
         ClusterBox::around(nodes.map(|&node| x[node as usize]), travel_m)
     }
 
-    /// Lists the triangles within `reach_m` of an axis, and sets the slack: how much further away than `inner_m` all
-    /// others are.
+    /// Lists the triangles within `reach.listed_m` of an axis, and sets the slack: how much further away than
+    /// `reach.complete_m` all others are.
     pub(super) fn query(
         &self,
         x: &[DVec3],
-        (boxes, travel_m): (&mut [ClusterBox], f64),
+        FittedBoxesMut { boxes, travel_m }: FittedBoxesMut<'_>,
         axis: &Axis,
-        (reach_m, inner_m): (f64, f64),
+        ListReach { listed_m: reach_m, complete_m }: ListReach,
         candidates: &mut Candidates,
     ) {
         candidates.count = 0;
@@ -189,17 +216,18 @@ impl Triangles {
                 }
             }
         }
-        candidates.slack_m = others_m - inner_m - ROUNDING_M;
+        candidates.slack_m = others_m - complete_m - ROUNDING_M;
     }
 
     /// Does the same as [`Self::query`] on a skin, whose positions are computed only where they are needed: bounds that need none
     /// rule clusters out first. Positions (m) of the others' vertices are written into `x`.
     pub(super) fn query_skin(
         &self,
-        (skin, x): (&mut impl Skin, &mut [DVec3]),
-        (boxes, travel_m): (&mut [ClusterBox], f64),
+        skin: &mut impl Skin,
+        x: &mut [DVec3],
+        FittedBoxesMut { boxes, travel_m }: FittedBoxesMut<'_>,
         axis: &Axis,
-        (reach_m, inner_m): (f64, f64),
+        ListReach { listed_m: reach_m, complete_m }: ListReach,
         candidates: &mut Candidates,
     ) {
         candidates.count = 0;
@@ -238,7 +266,7 @@ impl Triangles {
                 }
             }
         }
-        candidates.slack_m = others_m - inner_m - ROUNDING_M;
+        candidates.slack_m = others_m - complete_m - ROUNDING_M;
     }
 
     /// Lists every triangle: the oracle of [`Self::query`].
@@ -302,7 +330,8 @@ mod tests {
         let mut boxes = vec![ClusterBox::UNFITTED; triangles.clusters()];
         let mut candidates = Candidates::with_capacity(triangles.len());
         let (mut travel, mut queries) = (0.0, 0);
-        let (reach, inner) = (1.5, 1.2);
+        let inner = 1.2;
+        let reach = ListReach { listed_m: 1.5, complete_m: inner };
         let mut centre = DVec3::new(-5.0, 0.3, 0.0);
         for step in 0..2000 {
             let motion = DVec3::new(0.03, 0.01 * (f64::from(step) * 0.1).sin(), 0.0);
@@ -316,7 +345,8 @@ mod tests {
             travel += fastest;
             candidates.slack_m -= motion.length() + fastest;
             if candidates.slack_m <= 0.0 {
-                triangles.query(&x, (&mut boxes, travel), &Axis::point(centre), (reach, inner), &mut candidates);
+                let fitted = FittedBoxesMut { boxes: &mut boxes, travel_m: travel };
+                triangles.query(&x, fitted, &Axis::point(centre), reach, &mut candidates);
                 queries += 1;
             }
             for needed in within(&triangles, &x, centre, inner) {
@@ -339,7 +369,9 @@ mod tests {
             centre += motion;
             candidates.slack_m -= motion.length();
             if candidates.slack_m <= 0.0 {
-                triangles.query(&x, (&mut boxes, 0.0), &Axis::point(centre), (1.5, inner), &mut candidates);
+                let fitted = FittedBoxesMut { boxes: &mut boxes, travel_m: 0.0 };
+                let reach = ListReach { listed_m: 1.5, complete_m: inner };
+                triangles.query(&x, fitted, &Axis::point(centre), reach, &mut candidates);
                 queries += 1;
             }
             let needed = within(&triangles, &x, centre, inner);

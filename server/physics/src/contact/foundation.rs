@@ -175,7 +175,8 @@ impl Foundation {
         &self,
         triangles: &Triangles,
         nodes: usize,
-        (radius_m, half_length_m): (f64, f64),
+        radius_m: f64,
+        half_length_m: f64,
     ) -> (Vec<f64>, ContactBound) {
         let quarter_m2 = quarter_m2(radius_m, half_length_m);
         let (mut nodal, mut stiffest_at) = (vec![0.0_f64; nodes], vec![0.0_f64; nodes]);

@@ -184,8 +184,8 @@ impl ContactModel {
         let covering_radius_m = edges_m.fold(0.0, f64::max) / 3.0_f64.sqrt();
         let (mut nodal_stiffness_n_per_m, mut tool_frequency_sq) = (vec![0.0; mass_kg.len()], 0.0);
         for tool in &tools {
-            let size = (tool.spec.radius_m, tool.spec.shape.half_length_m());
-            let (nodal, total) = tool.foundation.row_sums_n_per_m(&triangles, mass_kg.len(), size);
+            let (radius_m, half_length_m) = (tool.spec.radius_m, tool.spec.shape.half_length_m());
+            let (nodal, total) = tool.foundation.row_sums_n_per_m(&triangles, mass_kg.len(), radius_m, half_length_m);
             for (sum, nodal) in nodal_stiffness_n_per_m.iter_mut().zip(nodal) {
                 *sum += nodal;
             }

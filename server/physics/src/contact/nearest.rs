@@ -1,5 +1,5 @@
 //! Finds the vertex of a skin that is nearest to a point, without looking at those that bounds rule out.
-use super::broad::{CLUSTER, ClusterBox, GROUP, ROUNDING_M, Skin};
+use super::broad::{CLUSTER, FittedBoxes, GROUP, ROUNDING_M, Skin};
 use glam::DVec3;
 
 const NONE: u32 = u32::MAX;
@@ -10,10 +10,10 @@ pub(crate) fn nearest_vertex(
     skin: &impl Skin,
     from_m: DVec3,
     within_m: f64,
-    fitted: Option<(&[ClusterBox], f64)>,
+    fitted: Option<FittedBoxes<'_>>,
 ) -> Option<(u32, f64)> {
     let bound_m = |cluster: usize| {
-        let of_fitted_m = fitted.map_or(0.0, |(boxes, travel_m)| boxes[cluster].distance_bound_m(from_m, travel_m));
+        let of_fitted_m = fitted.map_or(0.0, |fitted| fitted.boxes[cluster].distance_bound_m(from_m, fitted.travel_m));
         skin.cluster_distance_m(cluster, from_m).max(of_fitted_m)
     };
     let in_group = GROUP / CLUSTER;

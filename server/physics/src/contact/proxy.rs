@@ -106,7 +106,8 @@ pub(super) struct Coupled {
 pub(super) fn drift(
     model: &ToolModel,
     tool: &mut ToolState,
-    (contact_n, contact_nm): (DVec3, DVec3),
+    contact_n: DVec3,
+    contact_nm: DVec3,
     time: &SubstepTime,
 ) -> f64 {
     let before = model.axis(tool);
@@ -120,7 +121,7 @@ pub(super) fn drift(
         Some(pull) => {
             let (at_start, half_s) = (time.at_start(), 0.5 * time.dt_s);
             let stretch_m = at_start.device(tool).0 - tool.centre_m;
-            pull.half_kick(&mut tool.velocity_m_per_s, contact_n, (stretch_m, tool.device_m_per_s), half_s);
+            pull.half_kick(&mut tool.velocity_m_per_s, contact_n, stretch_m, tool.device_m_per_s, half_s);
             turning::half_kick(model, tool, contact_nm, &at_start, half_s);
             limit_speed(model, tool, NEAR * model.spec.radius_m / time.dt_s.max(f64::MIN_POSITIVE));
             tool.centre_m += tool.velocity_m_per_s * time.dt_s;
@@ -149,13 +150,13 @@ pub(super) fn finish(
         match model.spec.shape.as_capsule() {
             None => limit_approach(tool, towards, limit_m_per_s),
             Some(capsule) => {
-                let inertia = (pull.mass_kg, capsule.turning.inertia_kg_m2);
-                turning::limit_approach(tool, (pressed.arm_m, towards), limit_m_per_s, inertia);
+                let inertia_kg_m2 = capsule.turning.inertia_kg_m2;
+                turning::limit_approach(tool, pressed.arm_m, towards, limit_m_per_s, pull.mass_kg, inertia_kg_m2);
             }
         }
     }
     let (stretch_m, half_s) = (time.device(tool).0 - tool.centre_m, 0.5 * time.dt_s);
-    let force_n = pull.half_kick(&mut tool.velocity_m_per_s, pressed.force_n, (stretch_m, tool.device_m_per_s), half_s);
+    let force_n = pull.half_kick(&mut tool.velocity_m_per_s, pressed.force_n, stretch_m, tool.device_m_per_s, half_s);
     Coupled { force_n, torque_nm: turning::half_kick(model, tool, pressed.torque_nm, time, half_s) }
 }
 
@@ -166,7 +167,8 @@ impl Pull {
         &self,
         velocity_m_per_s: &mut DVec3,
         contact_n: DVec3,
-        (stretch_m, device_m_per_s): (DVec3, DVec3),
+        stretch_m: DVec3,
+        device_m_per_s: DVec3,
         h_s: f64,
     ) -> DVec3 {
         let Self { spring, damping_n_s_per_m, mass_kg } = *self;

@@ -1,7 +1,7 @@
 //! The state of contact, which is carried from one tick to the next.
 use super::{
     ContactModel,
-    broad::{Candidates, ClusterBox},
+    broad::{Candidates, ClusterBox, FittedBoxes, FittedBoxesMut},
     local_model::StiffnessEstimate,
     touching::Touching,
 };
@@ -201,12 +201,13 @@ impl ContactState {
 
     /// Returns the boxes as they were fitted, and the travel; they may be used while all motion of the surface was told to
     /// [`Self::travelled`].
-    pub(crate) fn boxes(&self) -> (&[ClusterBox], f64) {
-        (&self.boxes, self.travel_m)
+    pub(crate) fn boxes(&self) -> FittedBoxes<'_> {
+        FittedBoxes { boxes: &self.boxes, travel_m: self.travel_m }
     }
 
     /// Returns the contact of one tool, and the boxes with the travel.
-    pub(super) fn split(&mut self, tool: usize) -> (&mut ToolContact, &mut [ClusterBox], f64) {
-        (&mut self.tools[tool], &mut self.boxes, self.travel_m)
+    pub(super) fn split(&mut self, tool: usize) -> (&mut ToolContact, FittedBoxesMut<'_>) {
+        let fitted = FittedBoxesMut { boxes: &mut self.boxes, travel_m: self.travel_m };
+        (&mut self.tools[tool], fitted)
     }
 }

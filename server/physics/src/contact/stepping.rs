@@ -2,7 +2,7 @@
 use super::{
     BodyMotion, ContactModel, ContactScratch, ContactState, Coupling, SubstepTime, SurfaceNow, ToolScratch, ToolState,
     axis::Axis,
-    broad::Skin,
+    broad::{ListReach, Skin},
     local_model::{self, MeanContact},
     narrow::{self, Meeting, Pressed},
     proxy,
@@ -54,25 +54,27 @@ impl ContactModel {
         }
     }
 
-    /// Does the second part, on a skin: renews the lists that are out of date. Returns whether any was.
+    /// Does the second part, on a skin: renews the lists that are out of date. Returns whether any was. `x` has room for the
+    /// positions (m) of all vertices.
     pub(crate) fn list_on_skin(
         &self,
-        (skin, x): (&mut impl Skin, &mut [DVec3]),
+        skin: &mut impl Skin,
+        x: &mut [DVec3],
         tools: &[ToolState],
         contact: &mut ContactState,
         scratch: &ContactScratch,
     ) -> bool {
         let mut renewed = false;
         for (index, tool) in tools.iter().enumerate() {
-            let (part, boxes, travel_m) = contact.split(index);
+            let (part, fitted) = contact.split(index);
             let candidates = &mut part.candidates;
             if scratch.exhaustive {
                 renewed |= candidates.triangles().len() != self.triangles.len();
                 self.triangles.list_all(candidates);
             } else if candidates.slack_m <= 0.0 {
-                let reach_m = self.reach_m(index);
+                let reach = self.reach(index);
                 let axis = self.tools[index].axis(tool);
-                self.triangles.query_skin((skin, x), (boxes, travel_m), &axis, reach_m, candidates);
+                self.triangles.query_skin(skin, x, fitted, &axis, reach, candidates);
                 renewed = true;
             }
         }
@@ -158,23 +160,23 @@ impl ContactModel {
 
     fn drift(&self, index: usize, tool: &mut ToolState, time: &SubstepTime, contact: &mut ContactState) {
         let part = &contact.tools[index];
-        let moved_m = proxy::drift(&self.tools[index], tool, (part.force_n, part.torque_nm), time);
+        let moved_m = proxy::drift(&self.tools[index], tool, part.force_n, part.torque_nm, time);
         contact.tools[index].candidates.slack_m -= moved_m;
     }
 
     fn list_candidates(&self, tool: usize, axis: &Axis, x: &[DVec3], contact: &mut ContactState, exhaustive: bool) {
-        let (part, boxes, travel_m) = contact.split(tool);
+        let (part, fitted) = contact.split(tool);
         if exhaustive {
             self.triangles.list_all(&mut part.candidates);
         } else if part.candidates.slack_m <= 0.0 {
-            self.triangles.query(x, (boxes, travel_m), axis, self.reach_m(tool), &mut part.candidates);
+            self.triangles.query(x, fitted, axis, self.reach(tool), &mut part.candidates);
         }
     }
 
     /// Returns how far from a tool's axis triangles are listed.
-    fn reach_m(&self, tool: usize) -> (f64, f64) {
+    fn reach(&self, tool: usize) -> ListReach {
         let radius_m = self.tools[tool].spec.radius_m;
-        ((1.0 + 2.0 * proxy::NEAR) * radius_m, (1.0 + proxy::NEAR) * radius_m)
+        ListReach { listed_m: (1.0 + 2.0 * proxy::NEAR) * radius_m, complete_m: (1.0 + proxy::NEAR) * radius_m }
     }
 
     fn press(

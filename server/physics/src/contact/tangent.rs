@@ -95,13 +95,13 @@ impl ContactModel {
                 Coupling::Rigid => (tool.target.position_m - tool.previous_target.position_m) / step.tick_period_s,
                 Coupling::Spring { .. } => tool.velocity_m_per_s,
             };
-            let centres = (tool.centre_m, tool.centre_m + tool_m_per_s * step.dt_s);
+            let next_centre_m = tool.centre_m + tool_m_per_s * step.dt_s;
             let mut records = contact.tools[index].touching.records();
             while let Some(first) = records.first() {
                 let (triangle, end) = self.tools[index].foundation.triangle_of(first.sample);
                 let (here, rest) = records.split_at(records.partition_point(|touch| touch.sample < end));
                 records = rest;
-                tangents.push(&self.triangle_tangent(index, triangle, centres, x, here));
+                tangents.push(&self.triangle_tangent(index, triangle, tool.centre_m, next_centre_m, x, here));
             }
         }
     }
@@ -110,7 +110,8 @@ impl ContactModel {
         &self,
         tool: usize,
         triangle: usize,
-        (centre_m, next_centre_m): (DVec3, DVec3),
+        centre_m: DVec3,
+        next_centre_m: DVec3,
         x: &[DVec3],
         touches: &[Touch],
     ) -> TriangleTangent {

@@ -68,7 +68,7 @@ pub(super) fn half_kick(
 ) -> DVec3 {
     let Some(pull) = model.turning() else { return DVec3::ZERO };
     let apart = rotation_vector(time.device_turn(tool).0 * tool.orientation.conjugate());
-    pull.half_kick(&mut tool.angular_velocity_rad_per_s, contact_nm, (apart, tool.device_rad_per_s), h_s)
+    pull.half_kick(&mut tool.angular_velocity_rad_per_s, contact_nm, apart, tool.device_rad_per_s, h_s)
 }
 
 /// Does the drift of a coupled tool's rotation.
@@ -82,9 +82,11 @@ pub(super) fn drift(model: &ToolModel, tool: &mut ToolState, dt_s: f64) {
 /// Cuts the speed with which a point of the axis, `arm_m` from the centre, goes towards the surface, but to no less than zero.
 pub(super) fn limit_approach(
     tool: &mut ToolState,
-    (arm_m, towards): (DVec3, DVec3),
+    arm_m: DVec3,
+    towards: DVec3,
     limit_m_per_s: f64,
-    (mass_kg, inertia_kg_m2): (f64, f64),
+    mass_kg: f64,
+    inertia_kg_m2: f64,
 ) {
     let own = (tool.velocity_m_per_s + tool.angular_velocity_rad_per_s.cross(arm_m)).dot(towards);
     let excess = (own - limit_m_per_s).min(own);

@@ -5,7 +5,7 @@ use super::{
     composite::Composite,
     embedding_mesh::{self, EmbeddingMesh},
     metric::Masses,
-    moments::{CellMoments, full_gradients_m2, integrate},
+    moments::{CellMoments, Moments, integrate},
     partition::Partition,
     patch::{KEPT, Materials},
     projection::Lumping,
@@ -112,7 +112,7 @@ impl HybridBody {
         if moments.is_empty() {
             return Err(HybridError::Nothing { spacing_m });
         }
-        let EmbeddingMesh { mesh, moved_m, outside } = covering((mesh, surface), prescribed, &sites, &moments);
+        let EmbeddingMesh { mesh, moved_m, outside } = covering(mesh, surface, prescribed, &sites, &moments);
         let embedding = EmbeddingSummary { moved_m, outside };
         let composite = Composite::new(&mesh);
         let prescribed = with_edges(&mesh, surface, &composite, prescribed);
@@ -143,7 +143,7 @@ impl HybridBody {
             .fold(1.0, f64::max);
         let hybrid = Self {
             lumping: Lumping::new(&partition, &masses),
-            full_cell: RestCell::new(spacing_m, 1.0 - KEPT, &(spacing_m.powi(3), full_gradients_m2(spacing_m))),
+            full_cell: RestCell::new(spacing_m, 1.0 - KEPT, &Moments::full(spacing_m)),
             materials,
             densities_kg_per_m3,
             of_tet: of_tet.to_vec(),
@@ -380,7 +380,8 @@ fn merged(
 }
 
 fn covering(
-    (mesh, surface): (&TetMesh, &Surface),
+    mesh: &TetMesh,
+    surface: &Surface,
     prescribed: &[PrescribedSpec],
     sites: &Sites,
     moments: &[CellMoments],

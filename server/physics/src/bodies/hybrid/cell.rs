@@ -7,7 +7,7 @@
 //! f_p = −V P b_p − κ Σ_k w_k γ_kp q_k
 //! ```
 //! `χ = 2` is what the first three cost in shear when they bend a cell out of its plane. A cell then is too stiff in bending; [`HOURGLASS`] is a quarter of it.
-use super::{sites::CORNERS, sizes::Hanging};
+use super::{moments::Moments, sites::CORNERS, sizes::Hanging};
 use crate::{
     linalg::tensor::outer,
     material::{Lame, Material, viscous},
@@ -34,7 +34,7 @@ pub struct RestCell {
 
 impl RestCell {
     /// Makes the rest data of a cell from the moments of the part of it that is body; it answers for `fraction` of that.
-    pub fn new(edge_m: f64, fraction: f64, moments: &(f64, [DVec3; 8])) -> Self {
+    pub fn new(edge_m: f64, fraction: f64, moments: &Moments) -> Self {
         Self::with_hanging(edge_m, fraction, moments, Hanging::NONE)
     }
 
@@ -42,7 +42,7 @@ impl RestCell {
     pub fn with_hanging(
         edge_m: f64,
         fraction: f64,
-        (volume_m3, gradients_m2): &(f64, [DVec3; 8]),
+        Moments { volume_m3, gradients_m2 }: &Moments,
         hanging: Hanging,
     ) -> Self {
         let gradients_per_m = gradients_m2.map(|g| g * (1.0 / volume_m3));
@@ -118,14 +118,11 @@ impl RestCell {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::bodies::hybrid::{
-        moments::full_gradients_m2,
-        testing::{Random, tissue},
-    };
+    use crate::bodies::hybrid::testing::{Random, tissue};
 
     fn cell() -> RestCell {
         let h = 2.5e-3_f64;
-        RestCell::new(h, 1.0, &(h.powi(3), full_gradients_m2(h)))
+        RestCell::new(h, 1.0, &Moments::full(h))
     }
 
     #[test]

@@ -158,7 +158,7 @@ mod tests {
     use crate::{
         bodies::hybrid::{
             cell::RestCell,
-            moments::full_gradients_m2,
+            moments::Moments,
             prestrain::PrestrainDecay,
             running::RunningPatch,
             testing::{Random, hybrid_ball, hybrid_ball_of, tissue},
@@ -228,7 +228,7 @@ mod tests {
     #[test]
     fn products_of_full_cells_are_those_of_any_cell() {
         let (spacing_m, mut random) = (1.1e-3, Random(9));
-        let rest = RestCell::new(spacing_m, 1.0, &(spacing_m.powi(3), full_gradients_m2(spacing_m)));
+        let rest = RestCell::new(spacing_m, 1.0, &Moments::full(spacing_m));
         for material in tissue() {
             let a: [DVec3; 8] = std::array::from_fn(|_| random.vector());
             let sigma = stress_pa(&material, &rest.gradient_of(&a));

@@ -19,7 +19,23 @@ const LEAST_FILLED: f64 = 0.01;
 /// A cell counts as full if the body fills this fraction of it, or more.
 const FULL: f64 = 1.0 - 1e-9;
 
-/// The moments of the part of one cell that is body.
+/// Volume and shape gradients of the part of a cell that is body, integrated over it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Moments {
+    /// `V_c` (m³).
+    pub volume_m3: f64,
+    /// `V_c b_cp` (m²), `p` the cell's particles.
+    pub gradients_m2: [DVec3; 8],
+}
+
+impl Moments {
+    /// Returns the moments of a full cell.
+    pub fn full(edge_m: f64) -> Self {
+        Self { volume_m3: edge_m.powi(3), gradients_m2: full_gradients_m2(edge_m) }
+    }
+}
+
+/// The moments of the part of one cell that is body, with its number.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CellMoments {
     /// Number of the cell.

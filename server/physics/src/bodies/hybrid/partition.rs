@@ -10,7 +10,7 @@
 use super::{
     cell::RestCell,
     composite::{Anchor, Composite},
-    moments::{CellMoments, full_gradients_m2},
+    moments::{CellMoments, Moments, full_gradients_m2},
     residual_element::ResidualElement,
     sites::Sites,
     sizes::{self, Hanging, Site},
@@ -45,7 +45,7 @@ pub struct Partition {
     coarse: Composite,
     cells: Vec<Cell>,
     /// `V_c` and `V_c b_cp` of cells that the surface cuts or that have hanging corners.
-    cut: Vec<(f64, [DVec3; 8])>,
+    cut: Vec<Moments>,
     /// Index in `cells` of every cell of the box; a doubled one is at eight of them.
     cell_at: Vec<u32>,
     /// Whether some cells are doubled.
@@ -112,10 +112,10 @@ impl Partition {
         }
         for cell in 0..partition.cells.len() {
             tell(2.0, cell, count);
-            let (volume_m3, gradients_m2) = partition.moments(cell);
+            let moments = partition.moments(cell);
             let anchors = partition.corners(cell).map(|particle| partition.anchor(particle));
             let Cell { tet, part, .. } = partition.cells[cell];
-            partition.residual_elements[tet as usize].add(part, 1.0, volume_m3, &gradients_m2, &anchors);
+            partition.residual_elements[tet as usize].add(part, 1.0, &moments, &anchors);
         }
         partition
     }
@@ -140,7 +140,8 @@ impl Partition {
         if hanging.any() || moments.gradients_m2.is_some() {
             let of_corners = moments.gradients_m2.as_deref().copied();
             let of_corners = of_corners.unwrap_or_else(|| full_gradients_m2(sites.spacing_m()));
-            self.cut.push((moments.volume_m3, hanging.to_particles(of_corners)));
+            let gradients_m2 = hanging.to_particles(of_corners);
+            self.cut.push(Moments { volume_m3: moments.volume_m3, gradients_m2 });
             cut = self.cut.len() as u32 - 1;
         }
         self.cells.push(Cell { site_cell: moments.cell as u32, tet, part, doubled: moments.doubled, cut });
@@ -243,9 +244,9 @@ impl Partition {
     }
 
     /// Returns `V_c` (m³) and `V_c b_cp` (m²) of a cell, `p` its particles.
-    pub fn moments(&self, cell: usize) -> (f64, [DVec3; 8]) {
+    pub fn moments(&self, cell: usize) -> Moments {
         match self.cells[cell].cut {
-            NONE => (self.edge_m(cell).powi(3), full_gradients_m2(self.edge_m(cell))),
+            NONE => Moments::full(self.edge_m(cell)),
             cut => self.cut[cut as usize],
         }
     }
@@ -300,7 +301,7 @@ impl Partition {
 
     /// Returns the parts of a cell's volume (m³) that its particles have: an eighth for each corner.
     pub fn particles_m3(&self, cell: usize) -> [f64; 8] {
-        self.hanging(cell).to_particles([self.moments(cell).0 / 8.0; 8])
+        self.hanging(cell).to_particles([self.moments(cell).volume_m3 / 8.0; 8])
     }
 
     /// Returns the residual elements of the coarse tets while all particles sleep: they have all of the body.
@@ -310,16 +311,16 @@ impl Partition {
 
     /// Returns the volume of all cells (m³).
     pub fn volume_m3(&self) -> f64 {
-        (0..self.cells.len()).map(|cell| self.moments(cell).0).sum()
+        (0..self.cells.len()).map(|cell| self.moments(cell).volume_m3).sum()
     }
 
     /// Returns the fraction of the volume that is in cells that the surface does not cut.
     pub fn whole_part(&self) -> f64 {
         let spacing_m = self.sites.spacing_m();
         let whole_m3 = |doubled: bool| if doubled { 8.0 * spacing_m.powi(3) } else { spacing_m.powi(3) };
-        let is_cut = |cell: usize| self.moments(cell).0 < (1.0 - 1e-6) * whole_m3(self.cells[cell].doubled);
+        let is_cut = |cell: usize| self.moments(cell).volume_m3 < (1.0 - 1e-6) * whole_m3(self.cells[cell].doubled);
         let whole = (0..self.cells.len()).filter(|&cell| !is_cut(cell));
-        whole.map(|cell| self.moments(cell).0).sum::<f64>() / self.volume_m3()
+        whole.map(|cell| self.moments(cell).volume_m3).sum::<f64>() / self.volume_m3()
     }
 }
 

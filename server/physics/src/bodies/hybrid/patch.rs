@@ -87,7 +87,7 @@ impl Patch {
                 let (cell, moments) = (&partition.cells()[number], partition.moments(number));
                 let corners = partition.corners(number);
                 let anchors = corners.map(|particle| partition.anchor(particle));
-                residual_elements[cell.tet as usize].add(cell.part, KEPT - 1.0, moments.0, &moments.1, &anchors);
+                residual_elements[cell.tet as usize].add(cell.part, KEPT - 1.0, &moments, &anchors);
                 let points = std::array::from_fn(|p| {
                     *point_of.entry(corners[p]).or_insert_with(|| {
                         constrained.push(anchors[p]);
@@ -269,7 +269,7 @@ mod tests {
     /// Returns the nodes, and the active particles, whose whole support lies within the body.
     fn interior(partition: &Partition, patch: &Patch) -> (Vec<usize>, Vec<usize>) {
         let mut node = vec![true; partition.coarse().positions_m().len()];
-        let is_cut = |cell: usize| partition.moments(cell).0 < partition.edge_m(cell).powi(3) * (1.0 - 1e-12);
+        let is_cut = |cell: usize| partition.moments(cell).volume_m3 < partition.edge_m(cell).powi(3) * (1.0 - 1e-12);
         for corner in (0..partition.cells().len()).filter(|&c| is_cut(c)).flat_map(|cell| partition.corners(cell)) {
             partition.anchor(corner).nodes.iter().for_each(|&n| node[n as usize] = false);
         }

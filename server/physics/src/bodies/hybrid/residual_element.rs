@@ -7,7 +7,10 @@
 //! f_i = −Σ_g (P(F_g; λ⁻, µ) + P(F̄; λ − λ⁻, 0)) T_gi
 //! ```
 //! (every law's Ψ is linear in λ and µ). Viscous stress acts on the parts.
-use super::composite::{Anchor, PARTS};
+use super::{
+    composite::{Anchor, PARTS},
+    moments::Moments,
+};
 use crate::{
     linalg::tensor::outer,
     material::{Lame, Material, viscous},
@@ -27,9 +30,9 @@ pub struct ResidualElement {
 
 impl ResidualElement {
     /// Adds `factor` times a cell's moments to a part; `corners` tell what the cell's particles follow.
-    pub fn add(&mut self, part: u8, factor: f64, volume_m3: f64, gradients_m2: &[DVec3; 8], corners: &[Anchor; 8]) {
+    pub fn add(&mut self, part: u8, factor: f64, moments: &Moments, corners: &[Anchor; 8]) {
         let numbers = corners.map(|anchor| anchor.nodes.map(|node| self.number_of(node)));
-        self.add_numbered(part, factor, (volume_m3, gradients_m2), corners, &numbers);
+        self.add_numbered(part, factor, moments, corners, &numbers);
     }
 
     /// Returns the number of a node among its own; adds the node if it is not among them.
@@ -47,7 +50,7 @@ impl ResidualElement {
         &mut self,
         part: u8,
         factor: f64,
-        (volume_m3, gradients_m2): (f64, &[DVec3; 8]),
+        Moments { volume_m3, gradients_m2 }: &Moments,
         corners: &[Anchor; 8],
         numbers: &[[u32; 4]; 8],
     ) {

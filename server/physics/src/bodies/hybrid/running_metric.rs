@@ -152,11 +152,13 @@ impl RunningMetric {
         &self.particle_kg
     }
 
-    /// Returns the kinetic and gravitational energy (J) of coarse nodes and active particles. `momenta` is a buffer.
+    /// Returns the kinetic and gravitational energy (J) of coarse nodes and active particles, at positions
+    /// `x` (m) and velocities `v` (m/s). `momenta` is a buffer.
     pub(super) fn moving_j(
         &self,
         hybrid: &HybridBody,
-        (x, v): (&[DVec3], &[DVec3]),
+        x: &[DVec3],
+        v: &[DVec3],
         gravity_m_per_s2: DVec3,
         momenta: &mut Vec<DVec3>,
     ) -> f64 {

@@ -175,6 +175,7 @@ pub enum Site {
 mod tests {
     use super::*;
     use crate::bodies::hybrid::{
+        moments::Moments,
         partition::{NONE, Partition},
         sites::{CORNERS, trilinear},
         testing::embedded_balls,
@@ -244,7 +245,7 @@ mod tests {
                     .sum();
                 assert!((at_m - first_m - CORNERS[corner] * partition.edge_m(number)).length() < 1e-16);
             }
-            let (volume_m3, gradients_m2) = partition.moments(number);
+            let Moments { volume_m3, gradients_m2 } = partition.moments(number);
             let rest = partition.rest_cell(number, 1.0);
             for axis in 0..3 {
                 let column: glam::DVec3 = gradients_m2.iter().zip(positions_m).map(|(g, x)| *g * x[axis]).sum();
@@ -267,8 +268,8 @@ mod tests {
             .map(|number| CellMoments {
                 cell: one_size.cells()[number].site_cell as usize,
                 doubled: false,
-                volume_m3: one_size.moments(number).0,
-                gradients_m2: (!one_size.is_whole(number)).then(|| Box::new(one_size.moments(number).1)),
+                volume_m3: one_size.moments(number).volume_m3,
+                gradients_m2: (!one_size.is_whole(number)).then(|| Box::new(one_size.moments(number).gradients_m2)),
             })
             .collect();
         for layers in 1..4 {

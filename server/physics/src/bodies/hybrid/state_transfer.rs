@@ -18,6 +18,26 @@ use glam::{DMat3, DVec3};
 /// Hourglass amplitudes smaller than this, over the spacing, count as zero.
 const NO_MODES: f64 = 1e-9;
 
+/// A switch from one patch to another.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct PatchSwitch<'a> {
+    pub(super) before: &'a RunningPatch,
+    pub(super) after: &'a RunningPatch,
+    /// Whether each coarse node is moved by the switch.
+    pub(super) is_moved: &'a [bool],
+}
+
+/// How a switch moves the coarse nodes.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct NodeShifts<'a> {
+    /// Positions (m) before the switch.
+    pub(super) before_m: &'a [DVec3],
+    /// Displacements (m) by it.
+    pub(super) shifts_m: &'a [DVec3],
+    /// Positions (m) after it.
+    pub(super) after_m: &'a [DVec3],
+}
+
 /// The cells and coarse tets that a switch changes, with their strain before it.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Before {
@@ -67,16 +87,16 @@ impl Before {
     pub(super) fn take(
         &mut self,
         body: &HybridBody,
-        [patch, next]: [&RunningPatch; 2],
-        is_moved: &[bool],
+        switch: &PatchSwitch<'_>,
         x: &[DVec3],
         decay: &PrestrainDecay,
     ) -> f64 {
+        let PatchSwitch { before: patch, after: next, .. } = *switch;
         let mut held_j = 0.0;
         self.cells.clear();
         self.asleep.clear();
         for &cell in patch.cells() {
-            if stays(body, [patch, next], is_moved, cell) {
+            if switch.leaves_alone(body, cell) {
                 continue;
             }
             let prestrain = decay.of_cell(cell).unwrap_or(CellPrestrain::none(cell));
@@ -94,7 +114,7 @@ impl Before {
         let first = next.taken_from().iter().filter(|&tet| !patch.taken_from().contains(tet));
         for &tet in patch.taken_from().iter().chain(first) {
             if patch.residual_element(tet) != next.residual_element(tet) {
-                held_j += self.take_tet(body, (tet, true), patch.residual_element(tet), x, decay);
+                held_j += self.take_tet(body, tet, true, patch.residual_element(tet), x, decay);
             }
         }
         self.tets.sort_unstable_by_key(|before| before.tet);
@@ -104,7 +124,8 @@ impl Before {
     fn take_tet(
         &mut self,
         body: &HybridBody,
-        (tet, residual_changes): (u32, bool),
+        tet: u32,
+        residual_changes: bool,
         residual: &ResidualElement,
         x: &[DVec3],
         decay: &PrestrainDecay,
@@ -122,23 +143,23 @@ impl Before {
     pub(super) fn prestrain_after(
         &mut self,
         body: &HybridBody,
-        [patch, next]: [&RunningPatch; 2],
-        is_moved: &[bool],
-        (were_m, shifts_m, x): (&[DVec3], &[DVec3], &[DVec3]),
+        switch: &PatchSwitch<'_>,
+        nodes: &NodeShifts<'_>,
         decay: &mut PrestrainDecay,
     ) -> (f64, f64) {
+        let next = switch.after;
         let (known, mut moved_j, mut now_j) = (self.tets.len(), 0.0, 0.0);
-        let has_moved = |node: &u32| shifts_m[*node as usize] != DVec3::ZERO;
+        let has_moved = |node: &u32| nodes.shifts_m[*node as usize] != DVec3::ZERO;
         for tet in 0..body.partition.residual_elements().len() as u32 {
             let is_known = self.tets[..known].binary_search_by_key(&tet, |before| before.tet).is_ok();
             if !is_known && next.residual_element(tet).nodes.iter().any(has_moved) {
-                moved_j += self.take_tet(body, (tet, false), next.residual_element(tet), were_m, decay);
+                moved_j += self.take_tet(body, tet, false, next.residual_element(tet), nodes.before_m, decay);
             }
         }
         self.tets.sort_unstable_by_key(|before| before.tet);
         self.next.clear();
         for &cell in next.cells() {
-            if stays(body, [patch, next], is_moved, cell) {
+            if switch.leaves_alone(body, cell) {
                 self.next.cells.extend(decay.of_cell(cell).filter(CellPrestrain::exceeds_a_trace));
                 continue;
             }
@@ -147,7 +168,7 @@ impl Before {
             self.next.cells.extend(prestrain);
         }
         for number in 0..self.tets.len() {
-            let (prestrain, energy_j) = self.of_tet(body, next, (shifts_m, x), &self.tets[number]);
+            let (prestrain, energy_j) = self.of_tet(body, next, nodes, &self.tets[number]);
             now_j += energy_j;
             self.next.tets.extend(prestrain);
         }
@@ -193,7 +214,7 @@ impl Before {
         &self,
         body: &HybridBody,
         patch: &RunningPatch,
-        (shifts_m, x): (&[DVec3], &[DVec3]),
+        nodes: &NodeShifts<'_>,
         before: &TetBefore,
     ) -> (Option<ResidualPrestrain>, f64) {
         let residual = patch.residual_element(before.tet);
@@ -213,9 +234,9 @@ impl Before {
             whole += before.whole * kept_m3[part];
         }
         let gradients = if before.residual_changes {
-            residual.gradients(x, DMat3::IDENTITY)
+            residual.gradients(nodes.after_m, DMat3::IDENTITY)
         } else {
-            residual.gradients_after(&before.gradients, shifts_m)
+            residual.gradients_after(&before.gradients, nodes.shifts_m)
         };
         let mean = residual.mean(&gradients);
         let mut prestrain = ResidualPrestrain::none(before.tet);
@@ -236,13 +257,15 @@ impl Before {
     }
 }
 
-/// Returns whether a switch changes nothing about an awake cell: it stays awake, and its particles stay where they are, none
-/// of them following a coarse node that is moved.
-fn stays(body: &HybridBody, [before, after]: [&RunningPatch; 2], is_moved: &[bool], cell: u32) -> bool {
-    before.is_awake(cell) && after.is_awake(cell) && !after.follows(body, cell, is_moved)
+impl PatchSwitch<'_> {
+    /// Returns whether the switch changes nothing about an awake cell: it stays awake, and its particles stay where they are,
+    /// none of them following a coarse node that is moved.
+    fn leaves_alone(&self, body: &HybridBody, cell: u32) -> bool {
+        self.before.is_awake(cell) && self.after.is_awake(cell) && !self.after.follows(body, cell, self.is_moved)
+    }
 }
 
 /// Returns `(1 − ε) V_c` (m³), the volume that is transferred between a cell and its tet.
 fn transferred_m3(partition: &Partition, cell: u32) -> f64 {
-    (1.0 - KEPT) * partition.moments(cell as usize).0
+    (1.0 - KEPT) * partition.moments(cell as usize).volume_m3
 }

@@ -102,7 +102,7 @@ impl SteppedHybrid<'_> {
         }
         *kick_sq = [patch.metric_mut().accelerate(accelerations), kick_sq[0], kick_sq[1]];
         let inertia_w = patch.metric().of_holders(&state.v, accelerations);
-        let taken_j = transition.work_j((&state.v, factor), accelerations, h_s);
+        let taken_j = transition.work_j(&state.v, factor, accelerations, h_s);
         state.ledger.dissipated_j += taken_j;
         own.given_j -= taken_j;
         let free_parts = if factor < 1.0 { body.free_parts() } else { &[] };

@@ -22,6 +22,7 @@ use super::{
     scratch::HybridScratch,
     spec::{ParticleSpec, Waking},
     state::{HybridState, axis_sample_counts},
+    state_transfer::{NodeShifts, PatchSwitch},
     stepped::SteppedHybrid,
     transition_force::{Turn, turn_of},
 };
@@ -131,7 +132,7 @@ impl SteppedHybrid<'_> {
                 let HybridScratch { patch, query, .. } = &mut **scratch;
                 patch.displace(body, &state.x);
                 update_balls(environment, &mut SkinView::new(body, patch), body, own, state);
-                query.want(body, &environment.tools, own, (reach_m, particles.most_active));
+                query.want(body, &environment.tools, own, reach_m, particles.most_active);
                 query.keep_unsettled(patch, particles);
                 own.want(&query.wanted);
             }
@@ -214,14 +215,15 @@ impl HybridScratch {
         for (number, id) in own.ids().iter().enumerate() {
             if own.next.binary_search(id).is_err() {
                 let (taken, away_m) =
-                    query.transfer(body, *id, (state.x[nodes + number], state.v[nodes + number]), state);
+                    query.transfer(body, *id, state.x[nodes + number], state.v[nodes + number], state);
                 couple += taken;
                 farthest_m = farthest_m.max(away_m);
-                transition.transfer(body, (number, *id), &mut query.transferred_n);
+                transition.transfer(body, number, *id, &mut query.transferred_n);
             }
         }
-        let mut held_j = before.take(body, [patch, next], query.projection.is_moved(), &state.x, &own.prestrain);
-        held_j += patch.metric_mut().moving_j(body, (&state.x, &state.v), gravity, momenta);
+        let switch = PatchSwitch { before: patch, after: next, is_moved: query.projection.is_moved() };
+        let mut held_j = before.take(body, &switch, &state.x, &own.prestrain);
+        held_j += patch.metric_mut().moving_j(body, &state.x, &state.v, gravity, momenta);
         let some_sleep = own.ids().iter().any(|id| own.next.binary_search(id).is_err());
         query.left.clear();
         query.left.extend_from_slice(own.ids());
@@ -234,10 +236,9 @@ impl HybridScratch {
         query.shifts_m.extend(query.were_m.iter().zip(&state.x).map(|(were_m, x)| *x - *were_m));
         farthest_m += query.shifts_m.iter().map(|shift| shift.length()).fold(0.0, f64::max);
         next.displace(body, &state.x);
-        let samples = (&query.were_m[..], &query.shifts_m[..], &state.x[..]);
-        let is_moved = query.projection.is_moved();
-        let (first_moved_j, elastic_j) =
-            before.prestrain_after(body, [patch, next], is_moved, samples, &mut own.prestrain);
+        let moved = NodeShifts { before_m: &query.were_m, shifts_m: &query.shifts_m, after_m: &state.x };
+        let switch = PatchSwitch { before: patch, after: next, is_moved: query.projection.is_moved() };
+        let (first_moved_j, elastic_j) = before.prestrain_after(body, &switch, &moved, &mut own.prestrain);
         next.put_prestrains(&own.prestrain);
         if some_sleep {
             query.impulses.resize(state.v.len(), DVec3::ZERO);
@@ -247,7 +248,7 @@ impl HybridScratch {
             }
         }
         held_j += first_moved_j - elastic_j;
-        held_j -= next.metric_mut().moving_j(body, (&state.x, &state.v), gravity, momenta);
+        held_j -= next.metric_mut().moving_j(body, &state.x, &state.v, gravity, momenta);
         state.ledger.dissipated_j += held_j;
         own.given_j -= held_j;
         state.force_is_current = false;
@@ -323,7 +324,8 @@ impl ActivationQuery {
         &mut self,
         body: &HybridBody,
         particle: u32,
-        (y, w): (DVec3, DVec3),
+        y: DVec3,
+        w: DVec3,
         state: &MechanicalState,
     ) -> (DVec3, f64) {
         let anchor = body.partition.anchor(particle);
@@ -369,7 +371,7 @@ impl ActivationQuery {
 
     /// Finds the particles in the tools' balls, ascending. Where there is no room for all, each tool gets as many: those nearest to
     /// the middles of its balls, and to the lines between those of neighbours.
-    fn want(&mut self, body: &HybridBody, tools: &[ToolSpec], own: &HybridState, (reach_m, most): (f64, usize)) {
+    fn want(&mut self, body: &HybridBody, tools: &[ToolSpec], own: &HybridState, reach_m: f64, most: usize) {
         self.wanted.clear();
         let of_tool = |first: &mut usize, count: usize| {
             *first += count;

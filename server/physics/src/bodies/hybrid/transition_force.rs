@@ -56,7 +56,7 @@ impl TransitionForce {
 
     /// Adds to `forces_n` the forces (N) on coarse nodes that stand for a particle which falls asleep, the `number`th active one
     /// before the switch.
-    pub(super) fn transfer(&self, body: &HybridBody, (number, particle): (usize, u32), forces_n: &mut [DVec3]) {
+    pub(super) fn transfer(&self, body: &HybridBody, number: usize, particle: u32, forces_n: &mut [DVec3]) {
         if self.before.is_empty() {
             return;
         }
@@ -127,7 +127,7 @@ impl TransitionForce {
 
     /// Returns the work (J) that the body does against the transition force over a kick of length `h_s`, with velocities `v` times
     /// a factor on free axes, and accelerations (m/s²).
-    pub(crate) fn work_j(&self, (v, factor): (&[DVec3], f64), accelerations: &[DVec3], h_s: f64) -> f64 {
+    pub(crate) fn work_j(&self, v: &[DVec3], factor: f64, accelerations: &[DVec3], h_s: f64) -> f64 {
         let power = |((taken, v), a): ((&DVec3, &DVec3), &DVec3)| taken.dot(*v * factor + *a * (0.5 * h_s));
         h_s * self.taken_n.iter().zip(v).zip(accelerations).map(power).sum::<f64>()
     }

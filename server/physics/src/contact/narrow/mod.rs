@@ -222,7 +222,7 @@ fn press_triangle(
         touch.free_depth_m = touch.free_depth_m.min(depth_m);
         // A sample exactly on the axis has no direction: it carries nothing for this instant.
         let normal = r / distance_m.max(f64::MIN_POSITIVE);
-        let force_n = press_sample(meeting, samples, (p, normal, distance_m), &mut touch, pressed);
+        let force_n = press_sample(meeting, samples, p, normal, distance_m, &mut touch, pressed);
         next.push(touch);
         nodal[0] += force_n * (1.0 - wb - wc);
         nodal[1] += force_n * wb;
@@ -247,11 +247,14 @@ impl Meeting<'_> {
     }
 }
 
-/// Presses one sample; returns the force (N) on it.
+/// Presses one sample at `p` from the tool's centre, which is `distance_m` from the tool's axis in the direction `normal`; returns
+/// the force (N) on it.
 fn press_sample(
     meeting: &Meeting<'_>,
     samples: &TriangleSamples<'_>,
-    (p, normal, distance_m): (DVec3, DVec3, f64),
+    p: DVec3,
+    normal: DVec3,
+    distance_m: f64,
     touch: &mut Touch,
     pressed: &mut Pressed,
 ) -> DVec3 {

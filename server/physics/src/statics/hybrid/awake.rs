@@ -54,8 +54,8 @@ impl Claims {
         let all = balls.iter_mut().zip(tools_m).zip(&environment.tools).zip(contact_n);
         for (((ball, centre_m), tool), contact_n) in all {
             let near_m = (GAP * tool.radius_m).max(GAP * spacing_m);
-            let touch = (*centre_m, tool.radius_m, *contact_n);
-            *ball = ball_of(*ball, body, skin_m, touch, (near_m, FOLLOW * spacing_m));
+            let touch = TouchingTool { centre_m: *centre_m, radius_m: tool.radius_m, contact_force_n: *contact_n };
+            *ball = ball_of(*ball, body, skin_m, touch, near_m, FOLLOW * spacing_m);
         }
         let claims = (balls.iter().flatten().count() + loads.len()).max(1);
         let room = most / claims;
@@ -94,13 +94,22 @@ fn take_nearest(found: &mut [(f64, u32)], room: usize, wanted: &mut BTreeSet<u32
     wanted.extend(found.iter().take(room).map(|(_, particle)| *particle));
 }
 
-/// The ball of a tool at rest: the loop's, for a tool that stands still.
+/// A tool at rest, and the force of the body on it.
+#[derive(Debug, Clone, Copy)]
+struct TouchingTool {
+    centre_m: DVec3,
+    radius_m: f64,
+    contact_force_n: DVec3,
+}
+
+/// Returns the middle (m) of the ball of a tool at rest: the loop's ball, for a tool that stands still.
 fn ball_of(
     ball: Option<DVec3>,
     body: &HybridBody,
     skin_m: &[DVec3],
-    (centre_m, radius_m, contact_force_n): (DVec3, f64, DVec3),
-    (near_m, follow_m): (f64, f64),
+    TouchingTool { centre_m, radius_m, contact_force_n }: TouchingTool,
+    near_m: f64,
+    follow_m: f64,
 ) -> Option<DVec3> {
     let deepest_m = deepest_m(centre_m, radius_m, contact_force_n);
     let from_m = deepest_m.unwrap_or(centre_m);

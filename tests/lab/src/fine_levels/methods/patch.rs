@@ -43,7 +43,7 @@ impl PointPatch {
         for &Handed { cell: number, part } in &points.handed {
             let (cell, moments) = (&partition.cells()[number], partition.moments(number));
             let anchors = partition.corners(number).map(|particle| partition.anchor(particle));
-            residual_elements[cell.tet as usize].add(cell.part, part * (KEPT - 1.0), moments.0, &moments.1, &anchors);
+            residual_elements[cell.tet as usize].add(cell.part, part * (KEPT - 1.0), &moments, &anchors);
         }
         Self { active, border, operator, residual_elements }
     }

@@ -346,18 +346,12 @@ impl RunningPatch {
                     self.number_of_node[*node as usize] = number;
                 }
             }
-            let (volume_m3, gradients_m2) = partition.moments(cell as usize);
+            let moments = partition.moments(cell as usize);
             let anchors = partition
                 .corners(cell as usize)
                 .map(|particle| self.points[self.point_of[particle as usize] as usize].anchor);
             let numbers = anchors.map(|anchor| anchor.nodes.map(|node| self.number_of_node[node as usize]));
-            self.residual_elements[tet as usize].add_numbered(
-                part,
-                KEPT - 1.0,
-                (volume_m3, &gradients_m2),
-                &anchors,
-                &numbers,
-            );
+            self.residual_elements[tet as usize].add_numbered(part, KEPT - 1.0, &moments, &anchors, &numbers);
         }
         for &tet in &self.taken_from {
             self.residual_kernel.put(tet as usize, &self.residual_elements[tet as usize]);

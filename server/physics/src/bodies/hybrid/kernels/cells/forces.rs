@@ -61,11 +61,11 @@ impl<T: Scalar, const N: usize> LawPass for CutForces<'_, T, N> {
                 }
             }
             for (index, block) in batch.iter().enumerate() {
-                let (of, forces) = ([&edges[index], &rates[index]], &mut forces[index]);
+                let (edges, rates, forces) = (&edges[index], &rates[index], &mut forces[index]);
                 let prestrain = Some(&self.prestrains[number * BATCH + index]).filter(|prestrain| prestrain.lanes != 0);
                 let prestrain =
                     prestrain.map(|block| PrestrainedBlock { block, left: self.left, along_j: &mut self.prestrain_j });
-                power_w += cut::<V, T, L, VISCOUS, N>(self.split, (block, prestrain), of, forces);
+                power_w += cut::<V, T, L, VISCOUS, N>(self.split, block, prestrain, edges, rates, forces);
             }
             for (block, forces) in batch.iter().zip(&forces) {
                 scatter(&block.points, forces, self.sums);
@@ -115,8 +115,10 @@ fn gradient<V: Vector, const N: usize>(
 #[inline(always)]
 fn cut<V: Vector<Scalar = T>, T: Scalar, L: ConstitutiveLaw, const VISCOUS: bool, const N: usize>(
     split: &Split<T>,
-    (block, mut prestrain): (&CutBlock<T, N>, Option<PrestrainedBlock<'_, T, N>>),
-    [edges, rates]: [&Corners<T, N>; 2],
+    block: &CutBlock<T, N>,
+    mut prestrain: Option<PrestrainedBlock<'_, T, N>>,
+    edges: &Corners<T, N>,
+    rates: &Corners<T, N>,
     forces: &mut Corners<T, N>,
 ) -> f64 {
     let mut power = [T::of(0.0); N];

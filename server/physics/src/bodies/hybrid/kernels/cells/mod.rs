@@ -177,8 +177,8 @@ impl CutCells {
         let Self { layout, instruction_set, displacements, velocities, sums } = self;
         sums[..points].fill(Sum::default());
         match layout {
-            Layout::Single(blocks) => blocks.sum_up(*instruction_set, left, [displacements, velocities], sums),
-            Layout::Double(blocks) => blocks.sum_up(*instruction_set, left, [displacements, velocities], sums),
+            Layout::Single(blocks) => blocks.sum_up(*instruction_set, left, displacements, velocities, sums),
+            Layout::Double(blocks) => blocks.sum_up(*instruction_set, left, displacements, velocities, sums),
         }
     }
 
@@ -253,7 +253,14 @@ impl<T: Scalar, const N: usize> Tables<T, N> {
         block.minus_kappa[lane] = T::of(-rest.hourglass_m * mu_pa);
     }
 
-    fn sum_up(&self, set: Available, left: f64, [displacements, velocities]: [&[Node]; 2], sums: &mut [Sum]) -> Found {
+    fn sum_up(
+        &self,
+        set: Available,
+        left: f64,
+        displacements: &[Node],
+        velocities: &[Node],
+        sums: &mut [Sum],
+    ) -> Found {
         let mut found = Found::default();
         for run in &self.runs {
             let split = &self.materials[run.material as usize];

@@ -146,8 +146,8 @@ impl ResidualKernel {
         }
         sums.fill(Sum::default());
         let found = match layout {
-            Layout::Single(blocks) => blocks.sum_up(*instruction_set, left, [displacements, velocities], sums),
-            Layout::Double(blocks) => blocks.sum_up(*instruction_set, left, [displacements, velocities], sums),
+            Layout::Single(blocks) => blocks.sum_up(*instruction_set, left, displacements, velocities, sums),
+            Layout::Double(blocks) => blocks.sum_up(*instruction_set, left, displacements, velocities, sums),
         };
         for (force, Sum([x, y, z, _])) in forces_n.iter_mut().zip(&sums[..displacements_m.len()]) {
             *force += DVec3::new(*x, *y, *z);
@@ -289,7 +289,8 @@ impl<T: Scalar, const N: usize> Tables<T, N> {
         &mut self,
         set: Available,
         left: f64,
-        [displacements, velocities]: [&[Node]; 2],
+        displacements: &[Node],
+        velocities: &[Node],
         sums: &mut [Sum],
     ) -> Found {
         let Self { blocks, runs, edges, rates, forces, .. } = self;
