@@ -1,4 +1,5 @@
-//! A tool's axis: the points from which its surface is one radius away. A sphere's is its centre, a capsule's a segment.
+//! A tool's axis: the points from which its surface is one radius away. A sphere's is its centre, a capsule's a
+//! segment.
 use super::triangle::{closest_point, closest_weights};
 use glam::DVec3;
 
@@ -40,15 +41,15 @@ impl Axis {
         self.half_m.length()
     }
 
-    /// Returns the vector (m) from the centre to the point of the axis that is nearest to `p`, which is given from the centre,
-    /// too: `c(p) = s h`, `s = p·h/h²` limited to −1 to 1.
+    /// Returns the vector (m) from the centre to the point of the axis that is nearest to `p`, which is given from the
+    /// centre, too: `c(p) = s h`, `s = p·h/h²` limited to −1 to 1.
     pub(super) fn nearest_m(&self, from_centre_m: DVec3) -> DVec3 {
         self.half_m * (from_centre_m.dot(self.half_m) / self.half_m.length_squared()).clamp(-1.0, 1.0)
     }
 
-    /// Returns a lower bound (m) of the distance of something from the axis, made of such a bound from any point: that from its
-    /// centre less half its length `L`, or, where that is below `wanted_m`, the least from the middles of its pieces less half the
-    /// length of a piece.
+    /// Returns a lower bound (m) of the distance of something from the axis, made of such a bound from any point: that
+    /// from its centre less half its length `L`, or, where that is below `wanted_m`, the least from the middles of its
+    /// pieces less half the length of a piece.
     /// ```text
     /// max(d(c) − L, min_i d(c + ((2i + 1)/n − 1) h) − L/n)
     /// ```
@@ -72,8 +73,8 @@ impl Axis {
         self.approach(corners).to_triangle_m.length()
     }
 
-    /// Finds where a triangle is nearest to it. A segment that does not cross the triangle is nearest to it at one of its ends, or
-    /// at one of the triangle's edges.
+    /// Finds where a triangle is nearest to it. A segment that does not cross the triangle is nearest to it at one of
+    /// its ends, or at one of the triangle's edges.
     pub(super) fn approach(&self, corners: [DVec3; 3]) -> Approach {
         let from_point = |arm_m: DVec3| {
             let p = self.centre_m + arm_m;
@@ -130,8 +131,8 @@ impl Axis {
     }
 }
 
-/// Returns `s` and `t` in 0..=1 at which `p + s d` and `q + t e` are nearest (Ericson, Real-time collision detection, 5.1.9);
-/// for parallel segments it is one of the nearest pairs. A segment without length is a point.
+/// Returns `s` and `t` in 0..=1 at which `p + s d` and `q + t e` are nearest (Ericson, Real-time collision detection,
+/// 5.1.9); for parallel segments it is one of the nearest pairs. A segment without length is a point.
 fn nearest_of_segments(p: DVec3, d: DVec3, q: DVec3, e: DVec3) -> (f64, f64) {
     let r = p - q;
     let (dd, ee, de, dr, er) = (d.length_squared(), e.length_squared(), d.dot(e), d.dot(r), e.dot(r));

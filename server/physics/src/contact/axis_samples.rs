@@ -1,4 +1,5 @@
-//! Samples of a tool's axis, about which bodies are fine that are coarse elsewhere: a sphere's centre, several points along a capsule.
+//! Samples of a tool's axis, about which bodies are fine that are coarse elsewhere: a sphere's centre, several points
+//! along a capsule.
 use super::{
     broad::{FittedBoxes, Skin},
     nearest::{deepest_m, nearest_vertex},
@@ -35,8 +36,8 @@ pub(crate) struct Near {
 }
 
 impl ToolSpec {
-    /// Returns the number of samples of its axis: as many as make them no farther than `apart_m` from one another, and at most
-    /// [`MOST_SAMPLES`].
+    /// Returns the number of samples of its axis: as many as make them no farther than `apart_m` from one another, and
+    /// at most [`MOST_SAMPLES`].
     pub(crate) fn axis_sample_count(&self, apart_m: f64) -> usize {
         ((2.0 * self.shape.half_length_m() / apart_m).ceil() as usize).saturating_add(1).min(MOST_SAMPLES)
     }
@@ -63,14 +64,14 @@ impl ToolState {
 }
 
 impl AxisSample {
-    /// Finds the vertex of a skin, of which a query has begun, that is nearest to where the tool is deepest in it here, or, where
-    /// the tool does not touch it, to this sample. Vertices are sought within a gap of `2 near_m`, or `near_m + cover_m` of a tool
-    /// that touches: no point of the skin is farther than `cover_m` from a vertex. `fitted` are contact's boxes, where they may be
-    /// used.
+    /// Finds the vertex of a skin, of which a query has begun, that is nearest to where the tool is deepest in it here,
+    /// or, where the tool does not touch it, to this sample. Vertices are sought within a gap of `2 near_m`, or
+    /// `near_m + cover_m` of a tool that touches: no point of the skin is farther than `cover_m` from a vertex.
+    /// `fitted` are contact's boxes, where they may be used.
     ///
-    /// A vertex at distance `d` from the middle of a piece that reaches `s` to either side is no nearer to the piece than
-    /// `√(d² − s²)`, and the vertex nearest to the middle bounds the others: no piece that is near is missed, and some are found
-    /// too early.
+    /// A vertex at distance `d` from the middle of a piece that reaches `s` to either side is no nearer to the piece
+    /// than `√(d² − s²)`, and the vertex nearest to the middle bounds the others: no piece that is near is missed, and
+    /// some are found too early.
     pub(crate) fn look(
         &self,
         skin: &impl Skin,
@@ -78,7 +79,8 @@ impl AxisSample {
         fitted: Option<FittedBoxes<'_>>,
     ) -> Near {
         let s = self.half_piece_m;
-        // A tool that touches has a vertex within `cover_m` of where it does; the rest is a margin for a stretched skin.
+        // A tool that touches has a vertex within `cover_m` of where it does; the rest is a margin for a stretched
+        // skin.
         let touching_m = near_m + cover_m;
         let reach_m = if self.deepest_m.is_some() { touching_m.max(2.0 * near_m) } else { 2.0 * near_m };
         let within_m = (self.radius_m + reach_m).hypot(s);
@@ -145,8 +147,8 @@ mod tests {
         }
     }
 
-    /// One end of a shaft is pushed up by what is beneath it, the other one, less, down by what is above: the sum of the forces
-    /// points away from the latter, to a wall that is far.
+    /// One end of a shaft is pushed up by what is beneath it, the other one, less, down by what is above: the sum of
+    /// the forces points away from the latter, to a wall that is far.
     #[test]
     fn what_a_levered_tool_touches_is_where_it_touches() {
         let spec = capsule(0.012);

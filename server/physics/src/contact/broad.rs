@@ -1,14 +1,16 @@
 //! The broad phase finds the triangles that a tool can touch, without looking at the others.
 //!
 //! The boundary's triangles are sorted along a Morton curve of their rest centroids and cut into clusters of
-//! [`CLUSTER`] neighbours. A cluster's box is refitted only when a tool might be near it. What makes a stale box safe is
-//! the *travel* `τ(t) = ∫ max_i |v_i| dt`: no surface point moves further than `τ(t) − τ(t₀)` after `t₀`, so the box of
-//! `t₀`, grown by that much, still holds its triangles. The leapfrog drift is a straight line at a known velocity, so the
-//! bound is exact, not an estimate.
+//! [`CLUSTER`] neighbours. A cluster's box is refitted only when a tool might be near it. What makes a stale box safe
+//! is the *travel* `τ(t) = ∫ max_i |v_i| dt`: no surface point moves further than `τ(t) − τ(t₀)` after `t₀`, so the box
+//! of `t₀`, grown by that much, still holds its triangles. The leapfrog drift is a straight line at a known velocity,
+//! so the bound is exact, not an estimate.
 //!
 //! A query lists the triangles within `reach` of a tool's axis and returns how much further away all others are. As
-//! long as the path of any point of that axis plus the travel stay below that slack, the list holds every triangle that can be touched: far
-//! from the body a tick costs two additions per tool and substep. A box is at least as far from an axis as from the axis's centre, less half its length; the same holds for pieces of the axis ([`Axis::distance_bound_m`]).
+//! long as the path of any point of that axis plus the travel stay below that slack, the list holds every triangle that
+//! can be touched: far from the body a tick costs two additions per tool and substep. A box is at least as far from an
+//! axis as from the axis's centre, less half its length; the same holds for pieces of the axis
+//! ([`Axis::distance_bound_m`]).
 use super::axis::Axis;
 use crate::mesh::Surface;
 use glam::DVec3;
@@ -85,7 +87,8 @@ pub(super) struct ListReach {
     pub(super) complete_m: f64,
 }
 
-/// A surface whose positions are computed when they are asked for: a hybrid body's skin, or a refined mass-spring surface.
+/// A surface whose positions are computed when they are asked for: a hybrid body's skin, or a refined mass-spring
+/// surface.
 pub(crate) trait Skin {
     /// Begins queries, at positions that do not change before the last of them.
     fn begin(&mut self);
@@ -139,8 +142,9 @@ impl Candidates {
         self.count += 1;
     }
 
-    /// Returns a lower bound (m) of the distance from the tool's axis to a listed triangle: its distance when it was looked at
-    /// last, less the motion since. It is not a number where all triangles are listed ([`Triangles::list_all`]).
+    /// Returns a lower bound (m) of the distance from the tool's axis to a listed triangle: its distance when it was
+    /// looked at last, less the motion since. It is not a number where all triangles are listed
+    /// ([`Triangles::list_all`]).
     pub(super) fn least_distance_m(&self, number: usize) -> f64 {
         self.above_slack_m[number] + self.slack_m - ROUNDING_M
     }
@@ -219,8 +223,8 @@ impl Triangles {
         candidates.slack_m = others_m - complete_m - ROUNDING_M;
     }
 
-    /// Does the same as [`Self::query`] on a skin, whose positions are computed only where they are needed: bounds that need none
-    /// rule clusters out first. Positions (m) of the others' vertices are written into `x`.
+    /// Does the same as [`Self::query`] on a skin, whose positions are computed only where they are needed: bounds that
+    /// need none rule clusters out first. Positions (m) of the others' vertices are written into `x`.
     pub(super) fn query_skin(
         &self,
         skin: &mut impl Skin,
@@ -355,7 +359,8 @@ mod tests {
         }
         assert!(queries < 600, "{queries} queries in 2000 steps");
     }
-    /// A tool flies straight at a surface that stands still: its list is renewed in the very step in which the slack runs out.
+    /// A tool flies straight at a surface that stands still: its list is renewed in the very step in which the slack
+    /// runs out.
     #[test]
     fn a_straight_approach_uses_all_of_the_slack_and_no_more() {
         let (surface, x) = strip(50);

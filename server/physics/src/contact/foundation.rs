@@ -2,23 +2,26 @@
 //!
 //! Every boundary triangle carries samples, fixed in the rest surface: its `n²` congruent parts' centroids, each with
 //! weights ζ of the corners and the rest area `a = A₀/n²`. A tool of radius `R` penetrates a sample `y = Σ ζ_i x_i` by
-//! `g = R − |y − c|`, `c` the point of its axis that is nearest to `y` (of a sphere, its centre), and meets the pressure `p = k_f g`:
+//! `g = R − |y − c|`, `c` the point of its axis that is nearest to `y` (of a sphere, its centre), and meets the
+//! pressure `p = k_f g`:
 //! ```text
 //! Φ = ½ Σ_s k_f a_s g_s²      f_i = −∂Φ/∂x_i = Σ_s ζ_si k_f a_s g_s (y_s − c)/|y_s − c|      f_tool = −Σ_i f_i
 //! ```
-//! (`c` may move along the axis, but that changes no `g`: `y − c` is across the axis, or `c` an end of it). So contact is conservative, and
-//! balances linear momentum exactly; angular too where the tool turns, with the torque `Σ (y − c₀) × f` about its centre `c₀`. `k_f = α (λ + 2µ)/min(h, R)` with the size `h = √(2A₀)`
-//! of the surface element: the foundation vanishes with the mesh (its compliance is first order in h), and its frequency
-//! scales like the element's own. Where a node has much surface and little mass (a sharp edge or corner), `k_f` is lowered so
-//! that the nodal part of the bound below stays under [`FREQUENCY_FRACTION`] of the body's own ω²_max: contact never rules the
-//! time step.
+//! (`c` may move along the axis, but that changes no `g`: `y − c` is across the axis, or `c` an end of it). So contact
+//! is conservative, and balances linear momentum exactly; angular too where the tool turns, with the torque
+//! `Σ (y − c₀) × f` about its centre `c₀`. `k_f = α (λ + 2µ)/min(h, R)` with the size `h = √(2A₀)` of the surface
+//! element: the foundation vanishes with the mesh (its compliance is first order in h), and its frequency scales like
+//! the element's own. Where a node has much surface and little mass (a sharp edge or corner), `k_f` is lowered so that
+//! the nodal part of the bound below stays under [`FREQUENCY_FRACTION`] of the body's own ω²_max: contact never rules
+//! the time step.
 //!
-//! Bound of the frequency. With `w_s = (ζ_s, −1)` on (nodes, tool), `K = Σ k a_s w_s w_sᵀ ⊗ C_s`, `C_s ≤ I`
-//! (pressure along the normal, friction springs of at most the same stiffness across it). A positive block matrix is bounded
-//! by the sum of its diagonal blocks, and the nodal block by the diagonal of its row sums (Gershgorin, `Σ_j ζ_sj = 1`):
-//! `K ≤ diag(Σ_s k a_s ζ_si) ⊕ Σ_s k a_s`. Only samples inside the tool count: of a sphere, at most `2πR²` of surface on one node and
-//! `4πR²` in all; of a capsule of half length `L`, `R(R + L)` in place of `R²`. A tool that turns has `Σ_s k a_s (y_s − c₀)²` besides: at
-//! `s` along the cylinder `s² + R²`, on the hemispheres at most `(L + R)²`. The largest frequency of body and diagonal together comes from the same Lanczos iteration as the body's own.
+//! Bound of the frequency. With `w_s = (ζ_s, −1)` on (nodes, tool), `K = Σ k a_s w_s w_sᵀ ⊗ C_s`, `C_s ≤ I` (pressure
+//! along the normal, friction springs of at most the same stiffness across it). A positive block matrix is bounded by
+//! the sum of its diagonal blocks, and the nodal block by the diagonal of its row sums (Gershgorin, `Σ_j ζ_sj = 1`):
+//! `K ≤ diag(Σ_s k a_s ζ_si) ⊕ Σ_s k a_s`. Only samples inside the tool count: of a sphere, at most `2πR²` of surface
+//! on one node and `4πR²` in all; of a capsule of half length `L`, `R(R + L)` in place of `R²`. A tool that turns has
+//! `Σ_s k a_s (y_s − c₀)²` besides: at `s` along the cylinder `s² + R²`, on the hemispheres at most `(L + R)²`. The
+//! largest frequency of body and diagonal together comes from the same Lanczos iteration as the body's own.
 use super::{SurfaceModuli, broad::Triangles};
 use glam::DVec3;
 use std::f64::consts::PI;
@@ -164,13 +167,14 @@ impl Foundation {
         (next - 1, self.first_sample.get(next).copied().unwrap_or(self.samples as u32))
     }
 
-    /// Returns the force (N) that presses a sphere to depth `d` into a flat foundation: `∫ k_f (d − r²/2R) dA = π k_f R d²`.
+    /// Returns the force (N) that presses a sphere to depth `d` into a flat foundation:
+    /// `∫ k_f (d − r²/2R) dA = π k_f R d²`.
     pub(super) fn flat_force_n(&self, radius_m: f64, depth_m: f64) -> f64 {
         PI * self.typical_pa_per_m * radius_m * depth_m * depth_m
     }
 
-    /// Returns the row sums `Σ_s k a_s ζ_si` (N/m) over the samples that one tool can touch around each node, and the bounds of
-    /// all that it can touch at once; see the module's documentation.
+    /// Returns the row sums `Σ_s k a_s ζ_si` (N/m) over the samples that one tool can touch around each node, and the
+    /// bounds of all that it can touch at once; see the module's documentation.
     pub(super) fn row_sums_n_per_m(
         &self,
         triangles: &Triangles,
@@ -217,8 +221,9 @@ fn area_m2([a, b, c]: [DVec3; 3]) -> f64 {
     0.5 * (b - a).cross(c - a).length()
 }
 
-/// Returns the largest `k_f` (Pa/m) that each node can bear: `k_f min(A_i, 2πR²)/m_i ≤ FREQUENCY_FRACTION · ω²_max`, with its third
-/// `A_i` of the triangles around it, and the area `touched_m2` (m²) that a tool can touch at once in place of `2πR²`.
+/// Returns the largest `k_f` (Pa/m) that each node can bear: `k_f min(A_i, 2πR²)/m_i ≤ FREQUENCY_FRACTION · ω²_max`,
+/// with its third `A_i` of the triangles around it, and the area `touched_m2` (m²) that a tool can touch at once in
+/// place of `2πR²`.
 fn most_at_nodes(body: &BodyAtRest<'_>, touched_m2: f64) -> Vec<f64> {
     let mut area = vec![0.0; body.mass_kg.len()];
     for (triangle, nodes) in body.triangles.nodes.iter().enumerate() {

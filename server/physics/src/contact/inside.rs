@@ -2,8 +2,8 @@
 use glam::DVec3;
 use std::f64::consts::TAU;
 
-/// Returns whether `point_m` (m) is enclosed by the closed surface `triangles` with corners `x` (m), by its winding number
-/// `Σ Ω_t / 4π`: an integer away from the surface, and insensitive to the rounding of a single triangle.
+/// Returns whether `point_m` (m) is enclosed by the closed surface `triangles` with corners `x` (m), by its winding
+/// number `Σ Ω_t / 4π`: an integer away from the surface, and insensitive to the rounding of a single triangle.
 ///
 /// It looks at every triangle, so it is not for every substep. Allocates nothing.
 pub fn is_inside(point_m: DVec3, triangles: &[[u32; 3]], x: &[DVec3]) -> bool {

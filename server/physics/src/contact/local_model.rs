@@ -13,9 +13,9 @@
 //!   measured secants `ΔF/Δδ` of recent ticks to `K₀`, averaged in its logarithm and limited to
 //!   [1/[`MOST_CORRECTION`], [`MOST_CORRECTION`]].
 //!
-//! Across the normal the stiffness of the sticking part of the contact is `2(1 − ν)/(2 − ν) ≈ 0.75` of that (Mindlin); without friction
-//! it is zero. A capsule that is pressed at `p` from its centre gives way by turning, too: the coupling's compliance there is
-//! `1/K_vc + |p × n|²/K_r`.
+//! Across the normal the stiffness of the sticking part of the contact is `2(1 − ν)/(2 − ν) ≈ 0.75` of that (Mindlin);
+//! without friction it is zero. A capsule that is pressed at `p` from its centre gives way by turning, too: the
+//! coupling's compliance there is `1/K_vc + |p × n|²/K_r`.
 //!
 //! The stiffness is `−K_n nnᵀ − K_t (I − nnᵀ)`: symmetric, negative semi-definite, never stiffer than the coupling, and
 //! smoothed over some ten ticks. A tool that turns has a torque, too ([`super::local_torque`]).
@@ -55,7 +55,8 @@ pub(super) struct StiffnessEstimate {
     pub(super) tangential_n_per_m: f64,
     /// Smoothed `K_θ` (N m/rad).
     pub(super) turning_nm_per_rad: DMat3,
-    /// Where the present secant starts (m), its force there (N), and its age in ticks; there is none where the age is 0.
+    /// Where the present secant starts (m), its force there (N), and its age in ticks; there is none where the age is
+    /// 0.
     pub(super) start_centre_m: DVec3,
     pub(super) start_force_n: f64,
     pub(super) age_ticks: u32,
@@ -72,7 +73,8 @@ pub(super) struct MeanContact {
 }
 
 impl Default for StiffnessEstimate {
-    /// Returns the estimate out of contact, with nothing learnt. It is written out since a matrix is the identity by default.
+    /// Returns the estimate out of contact, with nothing learnt. It is written out since a matrix is the identity by
+    /// default.
     fn default() -> Self {
         Self {
             log_correction: 0.0,
@@ -149,8 +151,8 @@ pub(super) fn update(
     estimate.smooth(series(contact, coupling), series(sticking, coupling));
     let (k_n, k_t) = (estimate.normal_n_per_m, estimate.tangential_n_per_m);
     let stiffness_n_per_m = outer(normal, normal) * (k_t - k_n) - DMat3::from_diagonal(DVec3::splat(k_t));
-    // Hertz's force, linearised about δ = a²/R, is wrong by (3/8)(r/δ)² of itself at a distance r: 5 % at r = 0.35 δ. The device
-    // moves further than the tool, by the coupling's stretch.
+    // Hertz's force, linearised about δ = a²/R, is wrong by (3/8)(r/δ)² of itself at a distance r: 5 % at r = 0.35 δ.
+    // The device moves further than the tool, by the coupling's stretch.
     let half_width_m = half_width_m(model, contact_radius_m);
     let body_radius_m = 0.35 * half_width_m * half_width_m / model.spec.radius_m;
     let validity_radius_m = body_radius_m * (contact / series(contact, coupling));
@@ -181,7 +183,8 @@ pub(super) fn update(
     })
 }
 
-/// Returns `K_vc` (N/m) and `K_r` (N m/rad). Both are infinite for a rigid tool, the latter for one that does not turn, too.
+/// Returns `K_vc` (N/m) and `K_r` (N m/rad). Both are infinite for a rigid tool, the latter for one that does not turn,
+/// too.
 fn coupling_stiffnesses(model: &ToolModel) -> (f64, f64) {
     let turning = |capsule: &Capsule| capsule.turning.stiffness_nm_per_rad;
     match model.spec.coupling {
@@ -202,15 +205,15 @@ fn largest_radius_m(model: &ToolModel) -> f64 {
         .map_or(radius_m, |capsule| (radius_m * radius_m + 4.0 / PI * radius_m * capsule.half_length_m).sqrt())
 }
 
-/// Returns half the width (m) of a contact that has the area of a disc; with a capsule the contact may reach all along it,
-/// `π a² = 2b 2L`.
+/// Returns half the width (m) of a contact that has the area of a disc; with a capsule the contact may reach all along
+/// it, `π a² = 2b 2L`.
 fn half_width_m(model: &ToolModel, radius_m: f64) -> f64 {
     let capsule = model.spec.shape.as_capsule();
     capsule.map_or(radius_m, |capsule| radius_m.min(PI * radius_m * radius_m / (4.0 * capsule.half_length_m)))
 }
 
-/// Returns where on its axis, from its centre (m), a tool is pressed: `p = s h` with `p × F = τ` as far as the axis allows, or an
-/// end of the axis when it is pressed along it.
+/// Returns where on its axis, from its centre (m), a tool is pressed: `p = s h` with `p × F = τ` as far as the axis
+/// allows, or an end of the axis when it is pressed along it.
 fn pressed_at_m(model: &ToolModel, tool: &ToolState, pressed: &Pressed) -> DVec3 {
     let half_m = model.axis(tool).half_m;
     let across = half_m.cross(pressed.force_n);
@@ -221,8 +224,8 @@ fn pressed_at_m(model: &ToolModel, tool: &ToolState, pressed: &Pressed) -> DVec3
     half_m * (pressed.torque_nm.dot(across) / across.length_squared()).clamp(-1.0, 1.0)
 }
 
-/// Returns the force (N) at the end of the tick: the mean force is that of the middle of the tick, and the device has moved
-/// on since.
+/// Returns the force (N) at the end of the tick: the mean force is that of the middle of the tick, and the device has
+/// moved on since.
 fn at_end_of_tick(model: &ToolModel, tool: &ToolState, mean: &MeanContact, stiffness_n_per_m: &DMat3) -> DVec3 {
     match model.spec.coupling {
         Coupling::Rigid => {

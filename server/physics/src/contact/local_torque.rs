@@ -1,17 +1,21 @@
 //! The local torque model: the torque of the contact of a tool that turns.
 //!
-//! A rotation `θ` of the tool about its centre moves a sample at `p` by `θ × p`: along the sample's normal by `l·θ` with its lever `l = p × n`. So samples that share the
-//! contact's stiffnesses `K_n`, `K_t` (of [`super::local_model`], before the coupling) by the forces they carry, `w = |f_n|/Σ|f_n|`, resist it with the torque `−C θ`:
+//! A rotation `θ` of the tool about its centre moves a sample at `p` by `θ × p`: along the sample's normal by `l·θ`
+//! with its lever `l = p × n`. So samples that share the contact's stiffnesses `K_n`, `K_t` (of [`super::local_model`],
+//! before the coupling) by the forces they carry, `w = |f_n|/Σ|f_n|`, resist it with the torque `−C θ`:
 //! ```text
 //! C = k_n ⟨l⟩⟨l⟩ᵀ + K_n (⟨l lᵀ⟩ − ⟨l⟩⟨l⟩ᵀ) + k_t ⟨(p·p) I − p pᵀ − l lᵀ⟩,    1/k = 1/K + 1/K_vc
 //! ```
-//! (`θ·⟨…⟩θ` of the last term is the mean square of a sample's motion along the surface). A tool that is pressed at one point moves against the coupling of its centre, too;
-//! one that is pressed on both sides of its centre does not. The device turns it by the coupling's other half, in series for every direction:
+//! (`θ·⟨…⟩θ` of the last term is the mean square of a sample's motion along the surface). A tool that is pressed at one
+//! point moves against the coupling of its centre, too; one that is pressed on both sides of its centre does not. The
+//! device turns it by the coupling's other half, in series for every direction:
 //! ```text
 //! K_θ = (C⁻¹ + I/K_r)⁻¹ = C (I + C/K_r)⁻¹
 //! ```
-//! It is symmetric, positive semi-definite, and never stiffer than `K_r`. An elastic body resists tilting more than its pressure's spread says (a flat punch on a half space twice as much), a
-//! foundation just as much: the model is up to a third too soft (`tests/local_model.rs`), which only delays, and a softer spring is stabler. The change of the torque by the tool's translation, and that of the force by its rotation, are left to the next tick.
+//! It is symmetric, positive semi-definite, and never stiffer than `K_r`. An elastic body resists tilting more than its
+//! pressure's spread says (a flat punch on a half space twice as much), a foundation just as much: the model is up to a
+//! third too soft (`tests/local_model.rs`), which only delays, and a softer spring is stabler. The change of the torque
+//! by the tool's translation, and that of the force by its rotation, are left to the next tick.
 use super::narrow::Pressed;
 use crate::linalg::tensor::outer;
 use glam::{DMat3, DQuat, DVec3};
@@ -20,7 +24,8 @@ use serde::{Deserialize, Serialize};
 /// A torque model holds within this angle (rad) at most: a rotation vector is no sum of smaller ones.
 const LARGEST_ANGLE_RAD: f64 = 0.2;
 
-/// Torque on the device near `orientation`: `τ(R) = torque_nm + stiffness θ`, with the rotation vector `θ` (rad, world) of `R orientation⁻¹`.
+/// Torque on the device near `orientation`: `τ(R) = torque_nm + stiffness θ`, with the rotation vector `θ` (rad, world)
+/// of `R orientation⁻¹`.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct LocalTorqueModel {
     /// The device's orientation about which it is expanded.

@@ -1,8 +1,8 @@
 //! Spheres and capsules against the deforming surface.
 //!
-//! Once a substep every tool moves ([`proxy`]), the broad phase lists the triangles near it ([`broad`]), samples fixed in the
-//! surface press and rub ([`foundation`], [`narrow`]), and the forces are added to those of nodes and tool by the transpose.
-//! Once a tick the contact is summed up for the servo loop ([`local_model`]).
+//! Once a substep every tool moves ([`proxy`]), the broad phase lists the triangles near it ([`broad`]), samples fixed
+//! in the surface press and rub ([`foundation`], [`narrow`]), and the forces are added to those of nodes and tool by
+//! the transpose. Once a tick the contact is summed up for the servo loop ([`local_model`]).
 mod axis;
 mod axis_samples;
 pub(crate) mod broad;
@@ -39,7 +39,8 @@ pub(crate) use tangent::{ContactTangents, StepAhead};
 pub use tool::{Capsule, Coupling, LocalContactModel, ToolShape, ToolSpec, ToolState, ToolTarget, Turning};
 pub use triangle::closest_weights;
 
-/// The longest edge of a surface triangle, over the radius of a tool, that can still be sampled as finely as contact needs.
+/// The longest edge of a surface triangle, over the radius of a tool, that can still be sampled as finely as contact
+/// needs.
 pub const LARGEST_TRIANGLE: f64 = foundation::MAX_LEVEL as f64 * foundation::SPACING;
 
 use crate::mesh::Surface;
@@ -153,8 +154,8 @@ impl ToolModel {
 }
 
 impl ContactModel {
-    /// Precomputes contact samples and the foundation stiffness of a body at rest, whose largest natural frequency without
-    /// contact is given. `moduli[triangle]` are those of the tets behind a triangle.
+    /// Precomputes contact samples and the foundation stiffness of a body at rest, whose largest natural frequency
+    /// without contact is given. `moduli[triangle]` are those of the tets behind a triangle.
     pub fn build(
         rest_positions_m: &[DVec3],
         surface: &Surface,

@@ -4,8 +4,8 @@ use glam::DVec3;
 
 const NONE: u32 = u32::MAX;
 
-/// Returns the vertex nearest to a point, if one is within a distance (m), and its distance (m), on a skin of which a query has
-/// begun; of several that are as near, the first one. `fitted` are contact's boxes, where they may be used.
+/// Returns the vertex nearest to a point, if one is within a distance (m), and its distance (m), on a skin of which a
+/// query has begun; of several that are as near, the first one. `fitted` are contact's boxes, where they may be used.
 pub(crate) fn nearest_vertex(
     skin: &impl Skin,
     from_m: DVec3,
@@ -49,8 +49,8 @@ fn look_at(skin: &impl Skin, cluster: usize, from_m: DVec3, (nearest_m, nearest)
     }
 }
 
-/// Returns where (m) a tool that touches is deepest in the body, by the force on it (N): in a dent many vertices are nearly as near
-/// to its centre, and the nearest one would change with the particles that are awake.
+/// Returns where (m) a tool that touches is deepest in the body, by the force on it (N): in a dent many vertices are
+/// nearly as near to its centre, and the nearest one would change with the particles that are awake.
 pub(crate) fn deepest_m(centre_m: DVec3, radius_m: f64, contact_force_n: DVec3) -> Option<DVec3> {
     contact_force_n.try_normalize().map(|outwards| centre_m - outwards * radius_m)
 }

@@ -1,11 +1,12 @@
 //! The motion of a tool: along its device's path, or as a mass on the virtual coupling.
 //!
-//! A coupled tool (the *proxy*) obeys `m c̈ = f_contact + K(d − c) + B(ḋ − ċ)` and is advanced with the body's own leapfrog:
-//! half kick, drift, new force, half kick. The damper is integrated exactly over each half kick,
+//! A coupled tool (the *proxy*) obeys `m c̈ = f_contact + K(d − c) + B(ḋ − ċ)` and is advanced with the body's own
+//! leapfrog: half kick, drift, new force, half kick. The damper is integrated exactly over each half kick,
 //! `v ← ḋ + (v − ḋ) e^{−B h/m}`, so no damping makes it unstable.
 //!
-//! The damper's `ḋ` is the velocity of the device's path, smoothed over [`SMOOTHED_S`]: an arm that counts steps of an encoder, or whose poses are not in time
-//! with the ticks, moves by leaps. A leap of 0.05 mm in a tick of 1 ms is 50 mm/s, of which a damper of 2 N s/m makes a buzz of 0.1 N.
+//! The damper's `ḋ` is the velocity of the device's path, smoothed over [`SMOOTHED_S`]: an arm that counts steps of an
+//! encoder, or whose poses are not in time with the ticks, moves by leaps. A leap of 0.05 mm in a tick of 1 ms is 50
+//! mm/s, of which a damper of 2 N s/m makes a buzz of 0.1 N.
 //!
 //! What keeps it outside, whatever the device does:
 //! - The spring saturates ([`super::spring`]) at `F_max`, the force that presses a sphere of its radius [`SATURATION_DEPTH`]·R into the flat
@@ -54,7 +55,8 @@ impl SubstepTime {
         (from.lerp(to, self.fraction), (to - from) / self.tick_period_s)
     }
 
-    /// Smooths, at a tick's beginning, its path into the velocities that dampers use: `v ← v + (1 − e^{−T/τ}) (Δ/T − v)`.
+    /// Smooths, at a tick's beginning, its path into the velocities that dampers use:
+    /// `v ← v + (1 − e^{−T/τ}) (Δ/T − v)`.
     pub(super) fn smooth(&self, tool: &mut ToolState) {
         let part = -(-self.tick_period_s / SMOOTHED_S).exp_m1();
         let smoothed = |old: DVec3, path: DVec3| {
@@ -102,7 +104,8 @@ pub(super) struct Coupled {
     pub(super) torque_nm: DVec3,
 }
 
-/// Does the first half of a substep, half kick and drift. Returns a bound (m) of how far any point of the tool's axis moved.
+/// Does the first half of a substep, half kick and drift. Returns a bound (m) of how far any point of the tool's axis
+/// moved.
 pub(super) fn drift(
     model: &ToolModel,
     tool: &mut ToolState,
@@ -131,7 +134,8 @@ pub(super) fn drift(
     before.centre_m.distance(tool.centre_m) + before.half_m.distance(model.axis(tool).half_m)
 }
 
-/// Does the second half of a substep, with the contact that the tool has now. Returns the coupling's force and torque on the tool.
+/// Does the second half of a substep, with the contact that the tool has now. Returns the coupling's force and torque
+/// on the tool.
 pub(super) fn finish(
     model: &ToolModel,
     tool: &mut ToolState,
@@ -161,8 +165,8 @@ pub(super) fn finish(
 }
 
 impl Pull {
-    /// Kicks the tool over `h_s`, with the contact's force (N), the stretch (m) and the device's velocity (m/s), and returns the coupling's mean force
-    /// (N) over it.
+    /// Kicks the tool over `h_s`, with the contact's force (N), the stretch (m) and the device's velocity (m/s), and
+    /// returns the coupling's mean force (N) over it.
     pub(super) fn half_kick(
         &self,
         velocity_m_per_s: &mut DVec3,
@@ -187,7 +191,8 @@ impl Pull {
     }
 }
 
-/// Returns the largest `β ≤ 1` with `|s + β d| ≤ limit`, for `|s| ≤ limit`. A damper shortened by it still only takes energy.
+/// Returns the largest `β ≤ 1` with `|s + β d| ≤ limit`, for `|s| ≤ limit`. A damper shortened by it still only takes
+/// energy.
 fn fraction_within(s: DVec3, d: DVec3, limit: f64) -> f64 {
     // A saturated spring may be a rounding beyond the limit by itself: without a damper there is nothing to shorten.
     if (s + d).length_squared() <= limit * limit || d == DVec3::ZERO {
@@ -198,8 +203,8 @@ fn fraction_within(s: DVec3, d: DVec3, limit: f64) -> f64 {
     (((half * half + square * rest).sqrt() - half) / square).clamp(0.0, 1.0)
 }
 
-/// Cuts the velocity towards the surface, but no more than to a stop; `towards` is not a direction when the centre lies on the
-/// surface.
+/// Cuts the velocity towards the surface, but no more than to a stop; `towards` is not a direction when the centre lies
+/// on the surface.
 fn limit_approach(tool: &mut ToolState, towards: DVec3, limit_m_per_s: f64) {
     let own = tool.velocity_m_per_s.dot(towards);
     let excess = (own - limit_m_per_s).min(own);

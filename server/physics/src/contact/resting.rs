@@ -1,13 +1,13 @@
 //! Contact at rest: the foundation's potential, force and stiffness, without friction or history.
 //!
 //! `Φ = ½ Σ_s k_f a_s g_s²`, `g = R − |r|`, `r = y − c` (see [`super::foundation`]). With `n̂ = r/|r|`:
-//! `−∂Φ/∂y = k g n̂ = ∂Φ/∂c`, `∂²Φ/∂r² = H = k n̂n̂ᵀ − k (g/|r|)(I − n̂n̂ᵀ)`; nodes get both through the weights ζ, so that with
-//! `w = (ζ, −1)` on (nodes, tool) the force is `−w ⊗ ∂Φ/∂r` and the stiffness `w wᵀ ⊗ H`.
+//! `−∂Φ/∂y = k g n̂ = ∂Φ/∂c`, `∂²Φ/∂r² = H = k n̂n̂ᵀ − k (g/|r|)(I − n̂n̂ᵀ)`; nodes get both through the weights ζ, so
+//! that with `w = (ζ, −1)` on (nodes, tool) the force is `−w ⊗ ∂Φ/∂r` and the stiffness `w wᵀ ⊗ H`.
 //!
 //! A *configuration* holds the positions of all nodes, then the centres of all tools.
 //!
-//! Which samples a tool may press is settled where it arrives: those whose outward side it is on, and of those inside it
-//! before, the ones it pressed then. So the potential is one smooth function while equilibrium is sought.
+//! Which samples a tool may press is settled where it arrives: those whose outward side it is on, and of those inside
+//! it before, the ones it pressed then. So the potential is one smooth function while equilibrium is sought.
 use super::ContactModel;
 use glam::{DMat3, DVec3};
 
@@ -60,7 +60,8 @@ impl RestingContact {
         nothing.settled(model, configuration, |_, sample| sample.outward.dot(sample.from_centre_m) < 0.0)
     }
 
-    /// Returns the contact of tools that moved from the configuration `before`, where they had this contact, to another.
+    /// Returns the contact of tools that moved from the configuration `before`, where they had this contact, to
+    /// another.
     pub(crate) fn arrive(&self, model: &ContactModel, before: &[DVec3], now: &[DVec3]) -> Self {
         let was_inside = inside(model, before);
         self.settled(model, now, |tool, sample| {
@@ -72,8 +73,8 @@ impl RestingContact {
         })
     }
 
-    /// Returns the contact with those samples added that tools met from the outside between two configurations and could not
-    /// press; `None` if there are none.
+    /// Returns the contact with those samples added that tools met from the outside between two configurations and
+    /// could not press; `None` if there are none.
     pub(crate) fn widened(&self, model: &ContactModel, before: &[DVec3], now: &[DVec3]) -> Option<Self> {
         let (was_inside, is_inside) = (inside(model, before), inside(model, now));
         let mut widened = false;
@@ -132,8 +133,9 @@ impl RestingContact {
         tools
     }
 
-    /// Calls `add(i, j, block)` with `∂²Φ/∂q_i∂q_j` (N/m), once per pair `i ≤ j` of a triangle's corners and the tool (numbered as in
-    /// the configuration). `definite` leaves out the part that pressing makes across the normal, which is negative.
+    /// Calls `add(i, j, block)` with `∂²Φ/∂q_i∂q_j` (N/m), once per pair `i ≤ j` of a triangle's corners and the tool
+    /// (numbered as in the configuration). `definite` leaves out the part that pressing makes across the normal, which
+    /// is negative.
     pub(crate) fn for_each_block(
         &self,
         model: &ContactModel,

@@ -32,8 +32,8 @@ impl SaturatingSpring {
         }
     }
 
-    /// Returns `∂²Ψ/∂c²` (N/m): `K I`, or `F_max/|e| (I − êêᵀ)`. `definite` gives the secant `F_max/|e| I` instead of the latter, which
-    /// is no less and leads straight to the device.
+    /// Returns `∂²Ψ/∂c²` (N/m): `K I`, or `F_max/|e| (I − êêᵀ)`. `definite` gives the secant `F_max/|e| I` instead of
+    /// the latter, which is no less and leads straight to the device.
     pub(crate) fn hessian_n_per_m(self, stretch_m: DVec3, definite: bool) -> DMat3 {
         let length_m = stretch_m.length();
         if self.stiffness_n_per_m * length_m <= self.limit_n {

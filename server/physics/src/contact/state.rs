@@ -11,9 +11,9 @@ use serde::{Deserialize, Serialize};
 
 /// Contact's part of [`crate::State`].
 ///
-/// Samples in contact, friction springs, the force at the end of the tick and the estimate of stiffness are state in the full
-/// sense: saved, restored, compared. The broad phase's boxes and lists follow from the positions; they are neither saved
-/// nor compared, and are rebuilt whenever `force_is_current` is false.
+/// Samples in contact, friction springs, the force at the end of the tick and the estimate of stiffness are state in
+/// the full sense: saved, restored, compared. The broad phase's boxes and lists follow from the positions; they are
+/// neither saved nor compared, and are rebuilt whenever `force_is_current` is false.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct ContactState {
     pub(super) tools: Vec<ToolContact>,
@@ -81,7 +81,8 @@ impl ContactState {
         }
     }
 
-    /// Copies what was read from a snapshot into buffers of the model's size; returns `None` when it does not fit the model.
+    /// Copies what was read from a snapshot into buffers of the model's size; returns `None` when it does not fit the
+    /// model.
     pub(super) fn adopt(mut self, saved: &Self, samples: impl Fn(usize) -> usize) -> Option<Self> {
         if saved.tools.len() != self.tools.len() {
             return None;
@@ -179,15 +180,15 @@ impl ContactState {
         }
     }
 
-    /// Records that the surface moved by at most this distance (m) as other nodes came to carry it. Where forces were current
-    /// until then, its geometry is still known at the next evaluation.
+    /// Records that the surface moved by at most this distance (m) as other nodes came to carry it. Where forces were
+    /// current until then, its geometry is still known at the next evaluation.
     pub(crate) fn travelled_at_a_change(&mut self, distance_m: f64, forces_were_current: bool) {
         self.travelled(distance_m);
         self.is_tracked = forces_were_current;
     }
 
-    /// Makes the broad phase look at the positions anew, before forces are evaluated that are not current, unless it knows how far
-    /// the surface moved.
+    /// Makes the broad phase look at the positions anew, before forces are evaluated that are not current, unless it
+    /// knows how far the surface moved.
     pub(crate) fn forget_untracked_geometry(&mut self) {
         if !std::mem::take(&mut self.is_tracked) {
             self.forget_geometry();
@@ -199,8 +200,8 @@ impl ContactState {
         self.tools.iter().flat_map(|tool| tool.candidates.triangles().iter().copied())
     }
 
-    /// Returns the boxes as they were fitted, and the travel; they may be used while all motion of the surface was told to
-    /// [`Self::travelled`].
+    /// Returns the boxes as they were fitted, and the travel; they may be used while all motion of the surface was told
+    /// to [`Self::travelled`].
     pub(crate) fn boxes(&self) -> FittedBoxes<'_> {
         FittedBoxes { boxes: &self.boxes, travel_m: self.travel_m }
     }

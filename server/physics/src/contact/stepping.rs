@@ -54,8 +54,8 @@ impl ContactModel {
         }
     }
 
-    /// Does the second part, on a skin: renews the lists that are out of date. Returns whether any was. `x` has room for the
-    /// positions (m) of all vertices.
+    /// Does the second part, on a skin: renews the lists that are out of date. Returns whether any was. `x` has room
+    /// for the positions (m) of all vertices.
     pub(crate) fn list_on_skin(
         &self,
         skin: &mut impl Skin,
@@ -119,8 +119,8 @@ impl ContactModel {
         }
     }
 
-    /// Does a [`Self::substep`] in which the body does not move and no tool is near it, so that only the tools move. Stops and
-    /// returns false as soon as a tool is near.
+    /// Does a [`Self::substep`] in which the body does not move and no tool is near it, so that only the tools move.
+    /// Stops and returns false as soon as a tool is near.
     pub fn substep_apart(
         &self,
         x: &[DVec3],
@@ -145,13 +145,14 @@ impl ContactModel {
         true
     }
 
-    /// Returns whether no tool is within a quarter of its radius of the surface. The lists must be of the present positions.
+    /// Returns whether no tool is within a quarter of its radius of the surface. The lists must be of the present
+    /// positions.
     pub fn is_apart(&self, x: &[DVec3], tools: &[ToolState], contact: &ContactState) -> bool {
         tools.iter().enumerate().all(|(index, tool)| !self.is_near(index, &self.tools[index].axis(tool), x, contact))
     }
 
-    /// Returns whether a tool is near the surface. It measures distances, since which triangles beyond the zone are listed depends
-    /// on when the list was made.
+    /// Returns whether a tool is near the surface. It measures distances, since which triangles beyond the zone are
+    /// listed depends on when the list was made.
     fn is_near(&self, tool: usize, axis: &Axis, x: &[DVec3], contact: &ContactState) -> bool {
         let zone_m = (1.0 + proxy::NEAR) * self.tools[tool].spec.radius_m;
         let listed = contact.tools[tool].candidates.triangles();

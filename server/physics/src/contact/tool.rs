@@ -41,8 +41,8 @@ pub struct Capsule {
     pub turning: Turning,
 }
 
-/// The virtual coupling of orientation: `J ω̇ = τ_contact + K_r log(R_device Rᵀ) + B_r (ω_device − ω)`, with an inertia that is the same about
-/// every axis.
+/// The virtual coupling of orientation: `J ω̇ = τ_contact + K_r log(R_device Rᵀ) + B_r (ω_device − ω)`, with an inertia
+/// that is the same about every axis.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Turning {
     /// `K_r` (N m/rad).
@@ -54,8 +54,9 @@ pub struct Turning {
 }
 
 impl Turning {
-    /// Returns the coupling of orientation that belongs to one of position: `K_r = r² K`, `B_r = r² B`, `J = r² m`, with the radius of gyration of a rod with the body of a ball,
-    /// `r² = L²/3 + 2R²/5`. So a tool turns as fast as it moves, and with the same damping. For a rigid coupling all are zero.
+    /// Returns the coupling of orientation that belongs to one of position: `K_r = r² K`, `B_r = r² B`, `J = r² m`,
+    /// with the radius of gyration of a rod with the body of a ball, `r² = L²/3 + 2R²/5`. So a tool turns as fast as it
+    /// moves, and with the same damping. For a rigid coupling all are zero.
     pub fn of(coupling: Coupling, radius_m: f64, half_length_m: f64) -> Self {
         let square = half_length_m * half_length_m / 3.0 + 0.4 * radius_m * radius_m;
         match coupling {
@@ -180,8 +181,8 @@ pub struct ToolState {
     pub device_force_n: DVec3,
     /// Torque of the body on the tool (N m, about its centre), mean over the tick's substeps; zero for a sphere.
     pub contact_torque_nm: DVec3,
-    /// Torque on the device (N m, about the tool's centre), mean over the tick's substeps: the coupling's, or the contact's of a rigid tool;
-    /// zero for a sphere.
+    /// Torque on the device (N m, about the tool's centre), mean over the tick's substeps: the coupling's, or the
+    /// contact's of a rigid tool; zero for a sphere.
     pub device_torque_nm: DVec3,
     /// Number of contact samples that carry force, at the end of the tick.
     pub contacts: u32,
@@ -290,11 +291,12 @@ impl ToolSpec {
         ToolTarget { orientation: self.shape.start_orientation(), ..ToolTarget::at(self.start_position_m) }
     }
 
-    /// Returns a bound (rad²/s²) of what the coupling, and contact of at most this stiffness on a tool that is a mass, add to the
-    /// squared frequency.
+    /// Returns a bound (rad²/s²) of what the coupling, and contact of at most this stiffness on a tool that is a mass,
+    /// add to the squared frequency.
     ///
-    /// A capsule has a velocity and an angular velocity: contact at a point `p` from its centre moves it by `(−I, [p]ₓ)`, and a positive block matrix
-    /// is bounded by the sum of its diagonal blocks, `Σ k a/m + Σ k a p²/J`. Each of the two couplings acts on one of them, so the larger one counts.
+    /// A capsule has a velocity and an angular velocity: contact at a point `p` from its centre moves it by
+    /// `(−I, [p]ₓ)`, and a positive block matrix is bounded by the sum of its diagonal blocks, `Σ k a/m + Σ k a p²/J`.
+    /// Each of the two couplings acts on one of them, so the larger one counts.
     pub(super) fn frequency_bound_sq(&self, contact: &ContactBound) -> f64 {
         match (self.coupling, &self.shape) {
             (Coupling::Rigid, _) => 0.0,

@@ -2,8 +2,8 @@
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
-/// More samples than this inside one tool are pressed without friction and without memory, or not at all where the tool was put
-/// into the surface.
+/// More samples than this inside one tool are pressed without friction and without memory, or not at all where the tool
+/// was put into the surface.
 const MOST: usize = 16_384;
 
 /// A sample inside the tool.
@@ -13,9 +13,9 @@ pub(super) struct Touch {
     pub(super) sample: u32,
     /// Whether the tool reached it from behind the surface: then it carries nothing until it leaves.
     pub(super) from_behind: bool,
-    /// Depth (m) up to which it carries nothing: that at which the tool was put there, or the least since. For a sample that was met
-    /// before a tool that was put there had left the surface, it is the depth at which it was met. It is recorded for samples met
-    /// from behind, too, since it tells that the tool was put there.
+    /// Depth (m) up to which it carries nothing: that at which the tool was put there, or the least since. For a sample
+    /// that was met before a tool that was put there had left the surface, it is the depth at which it was met. It is
+    /// recorded for samples met from behind, too, since it tells that the tool was put there.
     pub(super) free_depth_m: f64,
     /// Position relative to the tool's centre (m) where its friction spring is at rest.
     pub(super) spring_origin_m: DVec3,

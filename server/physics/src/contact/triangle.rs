@@ -1,7 +1,8 @@
 //! The point of a triangle closest to a given point.
 use glam::DVec3;
 
-/// Returns the weights of the corners at the point of triangle `[a, b, c]` that is closest to `p`; they are ≥ 0 and sum to 1.
+/// Returns the weights of the corners at the point of triangle `[a, b, c]` that is closest to `p`; they are ≥ 0 and sum
+/// to 1.
 ///
 /// The plane of the triangle falls into seven regions: three where a corner is closest, three an edge, and the inside.
 /// With `ab·ap` and the like, the region follows from the signs of the projections on the edges and of the signed areas

@@ -1,15 +1,16 @@
-//! The rotation of a tool that turns: it follows its device's orientation rigidly, or on the virtual coupling of orientation.
+//! The rotation of a tool that turns: it follows its device's orientation rigidly, or on the virtual coupling of
+//! orientation.
 //!
-//! A coupled capsule obeys `J ω̇ = τ_contact + K_r log(R_d Rᵀ) + B_r (ω_d − ω)` beside `m c̈ = …` of [`super::proxy`], with the same half kicks,
-//! the damper integrated exactly, and `R ← exp(ω h) R` for a drift. `log` is the rotation vector of the shorter way round: it is the gradient of
-//! `½ |log|²`, so the spring `½ K_r |log(R_d Rᵀ)|²` is conservative. With one inertia `J` for every axis the angular momentum is `J ω`, whichever way
-//! the tool is turned.
+//! A coupled capsule obeys `J ω̇ = τ_contact + K_r log(R_d Rᵀ) + B_r (ω_d − ω)` beside `m c̈ = …` of [`super::proxy`],
+//! with the same half kicks, the damper integrated exactly, and `R ← exp(ω h) R` for a drift. `log` is the rotation
+//! vector of the shorter way round: it is the gradient of `½ |log|²`, so the spring `½ K_r |log(R_d Rᵀ)|²` is
+//! conservative. With one inertia `J` for every axis the angular momentum is `J ω`, whichever way the tool is turned.
 //!
-//! The spring saturates at `τ_max = F_max L`. Held by both couplings, a tool that is wedged between two walls carries `f₁ − f₂ ≤ F_max` and
-//! `(f₁ + f₂) L ≤ τ_max` at its ends: neither is more than `F_max`, which its hemisphere bears.
+//! The spring saturates at `τ_max = F_max L`. Held by both couplings, a tool that is wedged between two walls carries
+//! `f₁ − f₂ ≤ F_max` and `(f₁ + f₂) L ≤ τ_max` at its ends: neither is more than `F_max`, which its hemisphere bears.
 //!
-//! The limit of the approach is that of a sphere, at the point of the axis that is nearest to the surface: an impulse `λ` there takes
-//! `λ (1/m + |p × n|²/J)` of its speed, and energy only.
+//! The limit of the approach is that of a sphere, at the point of the axis that is nearest to the surface: an impulse
+//! `λ` there takes `λ (1/m + |p × n|²/J)` of its speed, and energy only.
 use super::{
     ToolModel, ToolState,
     proxy::{Pull, SubstepTime},
@@ -28,8 +29,8 @@ pub(super) fn rotation_vector(q: DQuat) -> DVec3 {
 }
 
 impl SubstepTime {
-    /// Returns orientation and angular velocity (rad/s) of the device, which turns about one axis from target to target during a
-    /// tick.
+    /// Returns orientation and angular velocity (rad/s) of the device, which turns about one axis from target to target
+    /// during a tick.
     pub(super) fn device_turn(&self, tool: &ToolState) -> (DQuat, DVec3) {
         let (from, to) = (tool.previous_target.orientation, tool.target.orientation);
         let turn = rotation_vector(to * from.conjugate());
@@ -79,7 +80,8 @@ pub(super) fn drift(model: &ToolModel, tool: &mut ToolState, dt_s: f64) {
     }
 }
 
-/// Cuts the speed with which a point of the axis, `arm_m` from the centre, goes towards the surface, but to no less than zero.
+/// Cuts the speed with which a point of the axis, `arm_m` from the centre, goes towards the surface, but to no less
+/// than zero.
 pub(super) fn limit_approach(
     tool: &mut ToolState,
     arm_m: DVec3,

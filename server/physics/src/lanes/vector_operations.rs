@@ -1,5 +1,5 @@
-//! Vector operations on all nodes: what a substep does to every position, velocity and force. A sum is taken in as many lanes on
-//! every instruction set, which gives the same bits.
+//! Vector operations on all nodes: what a substep does to every position, velocity and force. A sum is taken in as many
+//! lanes on every instruction set, which gives the same bits.
 use super::{
     dispatch::{Available, Pass, run},
     real::{Real, Vector},

@@ -307,7 +307,8 @@ impl HybridBody {
         points().map(of_vertex).collect()
     }
 
-    /// Returns the springs (N/m) at vertices of the skin as their particles feel them: the row sums of `Σ_v k_v w_v w_vᵀ`.
+    /// Returns the springs (N/m) at vertices of the skin as their particles feel them: the row sums of
+    /// `Σ_v k_v w_v w_vᵀ`.
     pub(crate) fn particle_springs_n_per_m(&self, of_vertices_n_per_m: &[f64]) -> Vec<f64> {
         let mut springs = vec![0.0; self.partition.particle_count()];
         for (point, stiffness) in self.vertex_points.iter().zip(of_vertices_n_per_m) {

@@ -1,12 +1,14 @@
 //! The cell between eight particles, with one point of integration.
 //!
-//! `F = Σ_p y_p b_pᵀ` is blind to four patterns of motion per component (hourglasses): `ηζ`, `ζξ`, `ξη`, `ξηζ` in the cell's coordinates. With `γ_k` those patterns
-//! over eight, less their linear part (Flanagan & Belytschko 1981), `q_k = Σ_p γ_kp y_p` is their amplitude (m), zero for affine motion, and turns with the body:
+//! `F = Σ_p y_p b_pᵀ` is blind to four patterns of motion per component (hourglasses): `ηζ`, `ζξ`, `ξη`, `ξηζ` in the
+//! cell's coordinates. With `γ_k` those patterns over eight, less their linear part (Flanagan & Belytschko 1981),
+//! `q_k = Σ_p γ_kp y_p` is their amplitude (m), zero for affine motion, and turns with the body:
 //! ```text
 //! U_c = V Ψ(F) + ½ κ Σ_k w_k |q_k|²        κ = χ (4/3) µ V/h²,  w = (1, 1, 1, ½)
 //! f_p = −V P b_p − κ Σ_k w_k γ_kp q_k
 //! ```
-//! `χ = 2` is what the first three cost in shear when they bend a cell out of its plane. A cell then is too stiff in bending; [`HOURGLASS`] is a quarter of it.
+//! `χ = 2` is what the first three cost in shear when they bend a cell out of its plane. A cell then is too stiff in
+//! bending; [`HOURGLASS`] is a quarter of it.
 use super::{moments::Moments, sites::CORNERS, sizes::Hanging};
 use crate::{
     linalg::tensor::outer,
@@ -33,7 +35,8 @@ pub struct RestCell {
 }
 
 impl RestCell {
-    /// Makes the rest data of a cell from the moments of the part of it that is body; it answers for `fraction` of that.
+    /// Makes the rest data of a cell from the moments of the part of it that is body; it answers for `fraction` of
+    /// that.
     pub fn new(edge_m: f64, fraction: f64, moments: &Moments) -> Self {
         Self::with_hanging(edge_m, fraction, moments, Hanging::NONE)
     }
@@ -95,7 +98,8 @@ impl RestCell {
         self.corner_forces_n(material, &change, &self.amplitudes(a))
     }
 
-    /// Returns the diagonal blocks (N/m) of the stiffness at rest, `V ((λ + µ) b_p b_pᵀ + µ |b_p|² I) + κ Σ_k w_k γ_kp² I`.
+    /// Returns the diagonal blocks (N/m) of the stiffness at rest,
+    /// `V ((λ + µ) b_p b_pᵀ + µ |b_p|² I) + κ Σ_k w_k γ_kp² I`.
     pub fn diagonal_n_per_m(&self, material: &Material) -> [DMat3; 8] {
         let Lame { lambda_pa, mu_pa } = material.lame;
         std::array::from_fn(|p| {

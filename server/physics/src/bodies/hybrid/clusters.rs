@@ -1,7 +1,8 @@
 //! Bounding boxes of the skin's triangles that are found without the positions of their vertices.
 //!
-//! A vertex of the skin moves by a mean of the displacements of what it follows, so a cluster's box is its box at rest, shifted and widened by the
-//! least and largest displacement of the coarse nodes it follows, and by how far any active particle is from where it would be asleep:
+//! A vertex of the skin moves by a mean of the displacements of what it follows, so a cluster's box is its box at rest,
+//! shifted and widened by the least and largest displacement of the coarse nodes it follows, and by how far any active
+//! particle is from where it would be asleep:
 //! ```text
 //! x = X + Σ_i w_i u_i + Σ_p w_p d_p,   Σ w_i = 1, Σ |w_i| ≤ a:   x − X ∈ ū ± (a ½(u_max − u_min) + a max |d_p|),   ū = ½(u_min + u_max)
 //! ```

@@ -1,9 +1,11 @@
-//! The shape functions of the coarse level. Every tetrahedron has ten nodes, four at its corners and six at the middles of its
-//! edges; the functions are linear on each of its eight parts (the four corner tets, and the octahedron between them cut in four along its shortest diagonal).
+//! The shape functions of the coarse level. Every tetrahedron has ten nodes, four at its corners and six at the middles
+//! of its edges; the functions are linear on each of its eight parts (the four corner tets, and the octahedron between
+//! them cut in four along its shortest diagonal).
 //!
-//! They are never negative and reproduce affine functions, so a particle that follows the coarse nodes by them, `y_p = Σ_i ζ_pi x_i`, moves rigidly where they do,
-//! and its mass, spread by the same weights, is positive. A particle has at most four weights. (Composite tetrahedra: Thoutireddy et
-//! al. 2002. Quadratic functions on the same nodes are negative in places: mass spread by them would be, too.)
+//! They are never negative and reproduce affine functions, so a particle that follows the coarse nodes by them,
+//! `y_p = Σ_i ζ_pi x_i`, moves rigidly where they do, and its mass, spread by the same weights, is positive. A particle
+//! has at most four weights. (Composite tetrahedra: Thoutireddy et al. 2002. Quadratic functions on the same nodes are
+//! negative in places: mass spread by them would be, too.)
 use super::locate::Locator;
 use crate::mesh::{TetMesh, tet::EDGES};
 use glam::DVec3;
@@ -24,7 +26,8 @@ const NODE_OF_EDGE: [[usize; 4]; 4] = [[0, 4, 5, 6], [4, 1, 7, 8], [5, 7, 2, 9],
 pub struct Composite {
     positions_m: Vec<DVec3>,
     tets: Vec<[u32; NODES]>,
-    /// Of each tet, the corner that, with corner 0, has the edge from whose middle the octahedron's shortest diagonal starts.
+    /// Of each tet, the corner that, with corner 0, has the edge from whose middle the octahedron's shortest diagonal
+    /// starts.
     diagonal: Vec<u8>,
     locator: Locator,
 }
@@ -121,12 +124,12 @@ fn others(mate: usize) -> [usize; 2] {
     }
 }
 
-/// Returns nodes (numbered within the tet), weights and part for barycentric coordinates. The octahedron's diagonal joins the
-/// middle of edge `(0, mate)` with that of the edge opposite.
+/// Returns nodes (numbered within the tet), weights and part for barycentric coordinates. The octahedron's diagonal
+/// joins the middle of edge `(0, mate)` with that of the edge opposite.
 ///
-/// Corner tet `a` where `L_a ≥ ½`: `2L_a − 1` at the corner, `2L_b` at the middle of `(a, b)`. In the octahedron let `(s, t)` be the
-/// diagonal's edge with the larger `|L_s − L_t|`, `L_s ≥ L_t`, and `(u, v)` the other: `2L_t` at `(s, t)`, `1 − 2L_s` at `(u, v)`,
-/// `2L_u + 2L_s − 1` at `(s, u)`, `2L_v + 2L_s − 1` at `(s, v)`.
+/// Corner tet `a` where `L_a ≥ ½`: `2L_a − 1` at the corner, `2L_b` at the middle of `(a, b)`. In the octahedron let
+/// `(s, t)` be the diagonal's edge with the larger `|L_s − L_t|`, `L_s ≥ L_t`, and `(u, v)` the other: `2L_t` at
+/// `(s, t)`, `1 − 2L_s` at `(u, v)`, `2L_u + 2L_s − 1` at `(s, u)`, `2L_v + 2L_s − 1` at `(s, v)`.
 fn weights(l: [f64; 4], mate: usize) -> ([usize; 4], [f64; 4], u8) {
     if let Some(a) = (0..4).find(|&a| l[a] >= 0.5) {
         let mut nodes = [0, 1, 2, 3].map(|b| NODE_OF_EDGE[a][b]);

@@ -1,8 +1,9 @@
 //! Coarse tets that hold every particle: their boundary is moved outwards until they do.
 //!
-//! Coarse tets cut the corners of a curved body, and the lattice reaches past its surface by up to a cell. A particle outside all tets would have a
-//! negative weight: it would still follow affine motion, but could not be woken (`metric`). The tets carry no geometry (`partition`), so nothing is
-//! lost by making them larger. Nodes that are held stay where they are.
+//! Coarse tets cut the corners of a curved body, and the lattice reaches past its surface by up to a cell. A particle
+//! outside all tets would have a negative weight: it would still follow affine motion, but could not be woken
+//! (`metric`). The tets carry no geometry (`partition`), so nothing is lost by making them larger. Nodes that are held
+//! stay where they are.
 use super::locate::Locator;
 use crate::{
     contact::closest_weights,
@@ -92,7 +93,8 @@ struct Near {
     above_m: f64,
 }
 
-/// Returns the boundary triangle nearest to a point; of several that are as near, the one that the point is highest above.
+/// Returns the boundary triangle nearest to a point; of several that are as near, the one that the point is highest
+/// above.
 fn nearest_face(mesh: &TetMesh, surface: &Surface, point_m: DVec3) -> Near {
     let (mut best, mut nearest_m) = (Near { triangle: 0, weights: [0.0; 3], above_m: 0.0 }, f64::INFINITY);
     for triangle in 0..surface.triangles.len() {
@@ -136,7 +138,8 @@ fn moves(mesh: &TetMesh, surface: &Surface, held: &BTreeSet<u32>, needs: &[f64])
     (0..needs.len()).map(displacement).collect()
 }
 
-/// Returns the mesh with its nodes moved, all by less where a tet would lose too much volume; `None` when they cannot be moved.
+/// Returns the mesh with its nodes moved, all by less where a tet would lose too much volume; `None` when they cannot
+/// be moved.
 fn moved(mesh: &TetMesh, moves: &[DVec3]) -> Option<TetMesh> {
     let mut scale = 1.0;
     for _ in 0..6 {

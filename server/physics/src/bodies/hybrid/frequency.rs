@@ -1,7 +1,8 @@
-//! The largest natural frequency that a hybrid body can have, whichever particles are awake: that of all of them, over √(1 − ε).
+//! The largest natural frequency that a hybrid body can have, whichever particles are awake: that of all of them, over
+//! √(1 − ε).
 //!
-//! With no negative weight, a set of active particles has `U ≤ U_all` and `K ≥ (1 − ε) K_all` for the field it describes (Jensen, twice;
-//! `docs/adr/hybrid.md`).
+//! With no negative weight, a set of active particles has `U ≤ U_all` and `K ≥ (1 − ε) K_all` for the field it
+//! describes (Jensen, twice; `docs/adr/hybrid.md`).
 use super::{
     body::HybridBody,
     cell::{HOURGLASS, MODE_WEIGHTS},
@@ -16,21 +17,24 @@ use crate::{
 };
 use glam::{BVec3, DMat3, DVec3};
 
-/// Bound of Lanczos' residual over the eigenvalue: `FINE` for bodies of up to `MANY_CELLS` cells, `ROUGH` for larger ones.
+/// Bound of Lanczos' residual over the eigenvalue: `FINE` for bodies of up to `MANY_CELLS` cells, `ROUGH` for larger
+/// ones.
 const FINE: f64 = 1e-4;
 const MANY_CELLS: usize = 200_000;
 const ROUGH: f64 = 1e-2;
 
 impl HybridBody {
-    /// Returns the largest natural frequency (rad/s) at rest, on springs (N/m, in all directions; one per particle, or none).
+    /// Returns the largest natural frequency (rad/s) at rest, on springs (N/m, in all directions; one per particle, or
+    /// none).
     ///
-    /// It is Lanczos' estimate plus its residual, and no more than the bound of single cells, each with its part `ρV_cp`
-    /// (an eighth per corner) of its particles' masses. By Rayleigh's quotient no assembly is faster than the fastest cell: `ω_c² ≤ V_c/ρ ((3λ⁺ + 2µ) λ_max(Σ_p b_p b_pᵀ/V_cp) + κ/V_c Σ_p w_k γ_kp²/V_cp)`.
-    /// For full cells that is `4 (3λ + 2µ)/(ρh²)`, of cells that swell. Neighbours hinder each other, so that a lattice
-    /// has some two thirds of it.
+    /// It is Lanczos' estimate plus its residual, and no more than the bound of single cells, each with its part
+    /// `ρV_cp` (an eighth per corner) of its particles' masses. By Rayleigh's quotient no assembly is faster than the
+    /// fastest cell: `ω_c² ≤ V_c/ρ ((3λ⁺ + 2µ) λ_max(Σ_p b_p b_pᵀ/V_cp) + κ/V_c Σ_p w_k γ_kp²/V_cp)`. For full cells
+    /// that is `4 (3λ + 2µ)/(ρh²)`, of cells that swell. Neighbours hinder each other, so that a lattice has some two
+    /// thirds of it.
     ///
-    /// For very many cells the estimate is rougher, and as safe: its residual, which is added, may be a hundredth of it.
-    /// `progress` is told the fraction done.
+    /// For very many cells the estimate is rougher, and as safe: its residual, which is added, may be a hundredth of
+    /// it. `progress` is told the fraction done.
     pub fn frequency_rad_per_s(&self, springs_n_per_m: &[f64], progress: &mut dyn FnMut(f64)) -> f64 {
         let tolerance = if self.partition.cells().len() > MANY_CELLS { ROUGH } else { FINE };
         self.frequency_to(tolerance, springs_n_per_m, progress)
@@ -116,10 +120,12 @@ fn stress_pa(material: &Material, g: &DMat3) -> DMat3 {
     (*g + g.transpose()) * mu_pa + DMat3::from_diagonal(DVec3::splat(lambda_pa * trace(g)))
 }
 
-/// Adds `K_c a` of a cell that the surface does not cut to `out`: the same as `cell`'s, with an eighth of its multiplications.
+/// Adds `K_c a` of a cell that the surface does not cut to `out`: the same as `cell`'s, with an eighth of its
+/// multiplications.
 ///
-/// Its gradient's rows and its hourglass amplitudes are sums of the corners' values with the signs of `ξ, η, ζ, ηζ, ζξ, ξη, ξηζ`: all come from three rounds of sums and differences
-/// of pairs, `t`, and go back the same way.
+/// Its gradient's rows and its hourglass amplitudes are sums of the corners' values with the signs of
+/// `ξ, η, ζ, ηζ, ζξ, ξη, ξηζ`: all come from three rounds of sums and differences of pairs, `t`, and go back the same
+/// way.
 /// ```text
 /// G e_j = t_j/4h,   q_k = t_k/8,   K a = Hᵀ (V/4h σ e_j, κ/8 w_k q_k)
 /// ```

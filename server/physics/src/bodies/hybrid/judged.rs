@@ -1,4 +1,5 @@
-//! How the length of a hybrid body's step is judged: by norms in the mass matrix of what is awake, and by its long steps.
+//! How the length of a hybrid body's step is judged: by norms in the mass matrix of what is awake, and by its long
+//! steps.
 use super::{HybridScratch, SteppedHybrid};
 use crate::tick::{Environment, Judged, MechanicalState, StepEvidence, StepForcesNow};
 use glam::DVec3;

@@ -88,13 +88,14 @@ impl Locator {
         self.tets[tet].barycentric(point_m)
     }
 
-    /// Returns the least distance (m) of a point, given by its barycentric coordinates, from the tet's faces, negative outside.
+    /// Returns the least distance (m) of a point, given by its barycentric coordinates, from the tet's faces, negative
+    /// outside.
     pub(super) fn inside_m(&self, tet: usize, barycentric: &[f64; 4]) -> f64 {
         self.tets[tet].inside_m(barycentric)
     }
 
-    /// Returns the tet that holds a point, or the one that the point is least far outside of, and the point's barycentric
-    /// coordinates in it.
+    /// Returns the tet that holds a point, or the one that the point is least far outside of, and the point's
+    /// barycentric coordinates in it.
     pub(super) fn nearest(&self, point_m: DVec3) -> (usize, [f64; 4]) {
         let [x, y, z] = self.box_of(point_m);
         let at = (z * self.boxes[1] + y) * self.boxes[0] + x;

@@ -1,19 +1,21 @@
 //! Long steps: the coarse level takes longer steps than the awake cells do.
 //!
-//! Its forces `f_c` are much of the work and change slowly beside those of awake cells and of contact, `f_a`. So they are evaluated only every `k`
-//! substeps of length `h`, and weigh `k` times then (Tuckerman, Berne & Martyna 1992):
+//! Its forces `f_c` are much of the work and change slowly beside those of awake cells and of contact, `f_a`. So they
+//! are evaluated only every `k` substeps of length `h`, and weigh `k` times then (Tuckerman, Berne & Martyna 1992):
 //! ```text
 //! v ← v + ½h M'⁻¹ (f_a + b + k (f_c − b))       at both ends of k substeps
 //! v ← v + h M'⁻¹ (f_a + b)                      between
 //! b ← b + (1 − e^{−T/τ}) (f_c − b)              after every tick
 //! ```
-//! While the steady part `b` does not change, the step is symplectic, whatever `b` is. With `b = 0`, forces that balance at rest, `f_a = −f_c`, would push at one
-//! time and pull at another, and the body would come to rest elsewhere, by some `(k h ω)²/24` of those forces (a dent by 4 % at two substeps, by 9 % at three). With
-//! `b = f_c` a body at rest stays at rest in every substep. Where a body is held nowhere, `b` must have no torque as the body turns: the torque is taken from it at
-//! every evaluation (`transition_force`).
+//! While the steady part `b` does not change, the step is symplectic, whatever `b` is. With `b = 0`, forces that
+//! balance at rest, `f_a = −f_c`, would push at one time and pull at another, and the body would come to rest
+//! elsewhere, by some `(k h ω)²/24` of those forces (a dent by 4 % at two substeps, by 9 % at three). With `b = f_c` a
+//! body at rest stays at rest in every substep. Where a body is held nowhere, `b` must have no torque as the body
+//! turns: the torque is taken from it at every evaluation (`transition_force`).
 //!
-//! `k h` is stable for the coarse level alone, `h` for the whole. That does not prove that both are stable together: modes of the fine level with `ω k h` near `nπ`
-//! resonate with what they feel of the coarse one. `docs/adr/hybrid.md` has what was measured.
+//! `k h` is stable for the coarse level alone, `h` for the whole. That does not prove that both are stable together:
+//! modes of the fine level with `ω k h` near `nπ` resonate with what they feel of the coarse one. `docs/adr/hybrid.md`
+//! has what was measured.
 use super::kernels::Found;
 use super::{
     body::HybridBody, prestrain::Progress, scratch::HybridScratch, state::HybridState, transition_force::without_torque,
@@ -105,7 +107,8 @@ impl LongSteps {
         found
     }
 
-    /// Overwrites the forces (N) with `b` on the coarse nodes and zero on the particles; with zero on all where there is no `b`.
+    /// Overwrites the forces (N) with `b` on the coarse nodes and zero on the particles; with zero on all where there
+    /// is no `b`.
     pub(crate) fn start_with_steady_n(&self, forces_n: &mut [DVec3]) {
         let (of_nodes, others) = forces_n.split_at_mut(self.steady_n.len());
         of_nodes.copy_from_slice(&self.steady_n);
@@ -232,8 +235,8 @@ impl HybridScratch {
         *begun += 1;
     }
 
-    /// Passes on, after a tick that was accepted, where its long step began: the next tick is judged by it, if it is one long
-    /// step again.
+    /// Passes on, after a tick that was accepted, where its long step began: the next tick is judged by it, if it is
+    /// one long step again.
     pub(crate) fn pass_on_long_step(&mut self, own: &mut HybridState) {
         let LongStepHistory { recent, begun, .. } = &mut self.long_steps;
         if *begun == 1 {
@@ -243,8 +246,8 @@ impl HybridScratch {
         }
     }
 
-    /// Returns, at the tick's end, an estimate from below of the coarse level's largest `(k h ω)²`, from the last two long steps, or from the last one where no
-    /// more is known,
+    /// Returns, at the tick's end, an estimate from below of the coarse level's largest `(k h ω)²`, from the last two
+    /// long steps, or from the last one where no more is known,
     /// ```text
     /// −Δ²f_c·Δ²x / (Δ²x·M' Δ²x/(k h)²)        since Δ²f_c = −K_c Δ²x
     /// ```

@@ -1,16 +1,19 @@
-//! Kinetic energy is counted once, as volume is: the mass that an active particle moves itself is taken from the coarse nodes that moved it.
+//! Kinetic energy is counted once, as volume is: the mass that an active particle moves itself is taken from the coarse
+//! nodes that moved it.
 //!
-//! The masses `m_p` of sleeping particles are lumped on the coarse nodes, `M_i = Σ_p m_p ζ_pi`. With active ones of velocity `w_p`, beside coarse velocities `v`,
+//! The masses `m_p` of sleeping particles are lumped on the coarse nodes, `M_i = Σ_p m_p ζ_pi`. With active ones of
+//! velocity `w_p`, beside coarse velocities `v`,
 //! ```text
 //! K = ½ Σ_i M_i |v_i|² + ½ (1 − ε) Σ_{p∈A} m_p (|w_p|² − |Σ_i ζ_pi v_i|²)
 //! ```
-//! A particle that wakes with the velocity it had, `w_p = Σ_i ζ_pi v_i`, therefore changes neither kinetic energy nor momentum, linear
-//! or angular. If lumped mass were transferred (`M_i − Σ m_p ζ_pi`), a turning body would lose angular momentum, for lumps are farther out than what they stand for. The
-//! coarse mass matrix is
+//! A particle that wakes with the velocity it had, `w_p = Σ_i ζ_pi v_i`, therefore changes neither kinetic energy nor
+//! momentum, linear or angular. If lumped mass were transferred (`M_i − Σ m_p ζ_pi`), a turning body would lose angular
+//! momentum, for lumps are farther out than what they stand for. The coarse mass matrix is
 //! ```text
 //! M' = diag(M_i) − (1 − ε) Σ_{p∈A} m_p ζ_p ζ_pᵀ      ≥ ε diag(Σ_{p∈A} m_p ζ_pi) + diag(Σ_{p∉A} m_p ζ_pi)      (ζ ≥ 0, Σ ζ = 1: Jensen)
 //! ```
-//! It is positive definite, and diagonal but for a small dense block of the nodes that active particles follow, which is factorised when the set changes.
+//! It is positive definite, and diagonal but for a small dense block of the nodes that active particles follow, which
+//! is factorised when the set changes.
 use super::{partition::Partition, patch::KEPT};
 use glam::{BVec3, DVec3};
 use std::collections::BTreeSet;
@@ -73,7 +76,8 @@ impl Metric {
     /// Factorises `M'` for a set of active particles; `free` tells along which axes each coarse node may move.
     ///
     /// # Errors
-    /// Fails where coarse weights are so negative (of particles outside the coarse tets) that `M'` is not positive definite.
+    /// Fails where coarse weights are so negative (of particles outside the coarse tets) that `M'` is not positive
+    /// definite.
     pub fn new(
         partition: &Partition,
         masses: &Masses,
@@ -119,8 +123,8 @@ impl Metric {
         momenta
     }
 
-    /// Overwrites the forces (N) on the coarse nodes with `M'⁻¹ f` (m/s²) on free axes, zero on the others. `free` is that
-    /// of [`Self::new`].
+    /// Overwrites the forces (N) on the coarse nodes with `M'⁻¹ f` (m/s²) on free axes, zero on the others. `free` is
+    /// that of [`Self::new`].
     pub fn accelerate(&self, free: &[BVec3], forces_n: &mut [DVec3]) {
         let mut block: Vec<DVec3> = self.touched.iter().map(|&node| forces_n[node as usize]).collect();
         for ((force, mass), free) in forces_n.iter_mut().zip(&self.node_kg).zip(free) {

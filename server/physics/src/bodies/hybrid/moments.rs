@@ -1,14 +1,17 @@
 //! Moments of the part of each lattice cell that is body: its volume, and the integrals of its shape gradients.
 //!
-//! A cell `c` is integrated with one point (`F_c = Σ_p y_p b_cpᵀ`), so all that it needs to know of the shape of the body within it is
+//! A cell `c` is integrated with one point (`F_c = Σ_p y_p b_cpᵀ`), so all that it needs to know of the shape of the
+//! body within it is
 //! ```text
 //! V_c = ∫_{c∩Ω} dV        V_c b_cp = ∫_{c∩Ω} ∇N_p dV        N_p trilinear
 //! ```
-//! `Σ_p b_cp = 0` and `Σ_p X_p b_cpᵀ = I` hold whatever the shape, because they hold at every point: affine motion is reproduced. The
-//! integrals of all cells at an interior particle add up to that of `∇N_p` over its whole support, which is zero: uniform stress leaves the particle in balance.
+//! `Σ_p b_cp = 0` and `Σ_p X_p b_cpᵀ = I` hold whatever the shape, because they hold at every point: affine motion is
+//! reproduced. The integrals of all cells at an interior particle add up to that of `∇N_p` over its whole support,
+//! which is zero: uniform stress leaves the particle in balance.
 //!
-//! The integrals are taken along rays in z, [`RAYS`] by [`RAYS`] to a cell, exactly between the points where a ray crosses the surface. Which side of an
-//! edge a ray passes is decided by the same arithmetic for both triangles of the edge, so no ray slips through.
+//! The integrals are taken along rays in z, [`RAYS`] by [`RAYS`] to a cell, exactly between the points where a ray
+//! crosses the surface. Which side of an edge a ray passes is decided by the same arithmetic for both triangles of the
+//! edge, so no ray slips through.
 use super::{sites::Sites, skin::Skin};
 use glam::DVec3;
 
@@ -196,7 +199,8 @@ fn cross(ids: [u32; 3], corners: [DVec3; 3], nx: usize, j: usize, crossings: &mu
     for along_y in rays(low.y, high.y, j * RAYS, RAYS) {
         for along_x in rays(low.x, high.x, 0, nx * RAYS) {
             let (x, y) = ((along_x as f64 + 0.5) / RAYS as f64, (along_y as f64 + 0.5) / RAYS as f64);
-            // Twice the areas that the point makes with the edges; the sign is that of the edge from its lower to its higher vertex.
+            // Twice the areas that the point makes with the edges; the sign is that of the edge from its lower to its
+            // higher vertex.
             let mut areas = [0.0; 3];
             let mut left = [false; 3];
             for edge in 0..3 {

@@ -1,12 +1,14 @@
-//! The partition of the body's volume into the cells of the lattice, the coarse tets that these are counted to, and the particles between them.
+//! The partition of the body's volume into the cells of the lattice, the coarse tets that these are counted to, and the
+//! particles between them.
 //!
-//! The coarse level has no geometry of its own. Its energy is that of the lattice's cells, moved by the coarse nodes and integrated with few points:
-//! cells are counted to the part (`composite`) that holds their middle, and a part `g` has the mean gradient of its cells,
+//! The coarse level has no geometry of its own. Its energy is that of the lattice's cells, moved by the coarse nodes
+//! and integrated with few points: cells are counted to the part (`composite`) that holds their middle, and a part `g`
+//! has the mean gradient of its cells,
 //! ```text
 //! F_g = (1/V_g) Σ_i x_i T_giᵀ        T_gi = Σ_{c∈g} V_c Σ_p ζ_pi b_cp        V_g = Σ_{c∈g} V_c
 //! ```
-//! Affine motion is reproduced (`Σ_i T_gi = 0`, `Σ_i X_i T_giᵀ = V_g I`), whether or not the coarse tets follow the body's shape, and since cells balance at
-//! interior particles, the `T_gi` of all parts sum to zero at interior nodes.
+//! Affine motion is reproduced (`Σ_i T_gi = 0`, `Σ_i X_i T_giᵀ = V_g I`), whether or not the coarse tets follow the
+//! body's shape, and since cells balance at interior particles, the `T_gi` of all parts sum to zero at interior nodes.
 use super::{
     cell::RestCell,
     composite::{Anchor, Composite},
@@ -162,7 +164,8 @@ impl Partition {
         &self.cells
     }
 
-    /// Returns the index in [`Self::cells`] of a cell of the lattice's box, [`NONE`] where it holds nothing of the body.
+    /// Returns the index in [`Self::cells`] of a cell of the lattice's box, [`NONE`] where it holds nothing of the
+    /// body.
     pub fn cell_at(&self, site_cell: usize) -> u32 {
         self.cell_at[site_cell]
     }
@@ -177,7 +180,8 @@ impl Partition {
         self.sites.site_m(self.particles[particle as usize] as usize)
     }
 
-    /// Tells the particles within a distance of a point (both m, at rest), ascending, with their squared distances (m²).
+    /// Tells the particles within a distance of a point (both m, at rest), ascending, with their squared distances
+    /// (m²).
     pub fn particles_within(&self, point_m: DVec3, reach_m: f64, mut tell: impl FnMut(u32, f64)) {
         let [nx, ny, nz] = self.sites.cells();
         let from = self.sites.cell_near(point_m - reach_m);
@@ -200,7 +204,8 @@ impl Partition {
         self.coarse.anchor_in(self.tet_of_particle[particle as usize], self.particle_m(particle))
     }
 
-    /// Returns the eight particles of a cell: those at its corners, in their order; in place of a hanging corner, the one at the corner of its block (`sizes`).
+    /// Returns the eight particles of a cell: those at its corners, in their order; in place of a hanging corner, the
+    /// one at the corner of its block (`sizes`).
     pub fn corners(&self, cell: usize) -> [u32; 8] {
         let Cell { site_cell, doubled, .. } = self.cells[cell];
         let site_cell = site_cell as usize;

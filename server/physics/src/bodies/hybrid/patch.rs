@@ -1,9 +1,11 @@
 //! A patch: the active particles, the cells between them, and the residual elements of the coarse tets.
 //!
-//! Every cell that has an active particle answers for the fraction `1 − ε` of its volume itself, and the coarse tets lose that
-//! fraction of it, `V_g ← V_g − (1 − ε) V_c` and `T_gi ← T_gi − (1 − ε) V_c Σ_p ζ_pi b_cp`: volume is counted once, and uniform stress stays
-//! in balance whichever particles are awake. The `ε` that stays keeps a coarse node whose surroundings are all awake from having neither stiffness nor mass.
-//! Particles of such cells that are not active themselves (the constrained points) follow the coarse nodes, and their forces are added to those of the nodes by the same weights.
+//! Every cell that has an active particle answers for the fraction `1 − ε` of its volume itself, and the coarse tets
+//! lose that fraction of it, `V_g ← V_g − (1 − ε) V_c` and `T_gi ← T_gi − (1 − ε) V_c Σ_p ζ_pi b_cp`: volume is counted
+//! once, and uniform stress stays in balance whichever particles are awake. The `ε` that stays keeps a coarse node
+//! whose surroundings are all awake from having neither stiffness nor mass. Particles of such cells that are not active
+//! themselves (the constrained points) follow the coarse nodes, and their forces are added to those of the nodes by the
+//! same weights.
 //!
 //! This is plain f64 code: the oracle of what runs in the loop.
 use super::{
@@ -164,8 +166,8 @@ impl Patch {
             as u32
     }
 
-    /// Returns the forces (N) of elastic and viscous stress at positions `at` and velocities `rate`, and the power (W) that viscous
-    /// stress takes.
+    /// Returns the forces (N) of elastic and viscous stress at positions `at` and velocities `rate`, and the power (W)
+    /// that viscous stress takes.
     pub fn forces_n(&self, materials: &Materials<'_>, at: &Field, rate: &Field) -> (Field, f64) {
         let (points, rates) = (self.points(at), self.points(rate));
         let mut nodes = vec![DVec3::ZERO; at.nodes.len()];
@@ -205,8 +207,8 @@ impl Patch {
         self.push_constrained(nodes, of_points)
     }
 
-    /// Returns the diagonal blocks (N/m) of the stiffness at rest, of the coarse nodes and then of the active particles; the identity
-    /// where there is no stiffness.
+    /// Returns the diagonal blocks (N/m) of the stiffness at rest, of the coarse nodes and then of the active
+    /// particles; the identity where there is no stiffness.
     pub fn diagonal_n_per_m(&self, materials: &Materials<'_>, nodes: usize) -> Vec<DMat3> {
         let mut of_nodes = vec![DMat3::ZERO; nodes];
         let mut of_points = vec![DMat3::ZERO; self.active.len() + self.constrained.len()];
@@ -299,7 +301,8 @@ mod tests {
                     let (forces, _) = patch.forces_n(&materials, &at, &still);
                     let stress = material.piola(&f);
                     let h = partition.sites().spacing_m();
-                    // What balances at a particle is eight times P h²/4, at a node as much as its surroundings are wide.
+                    // What balances at a particle is eight times P h²/4, at a node as much as its surroundings are
+                    // wide.
                     let at_particle = stress.x_axis.length().max(stress.y_axis.length()) * h * h;
                     let worst = particles.iter().map(|&p| forces.particles[p].length()).fold(0.0, f64::max);
                     print!("{:.1e} ", worst / at_particle);

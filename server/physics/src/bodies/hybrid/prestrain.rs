@@ -1,14 +1,17 @@
-//! Prestrain, with which cells wake and volume falls asleep in a body that is strained without a step in energy or force.
+//! Prestrain, with which cells wake and volume falls asleep in a body that is strained without a step in energy or
+//! force.
 //!
-//! A coarse part strains less than the cells in it do, so a cell that woke as it is would raise the energy. It is given the strain that its part had
-//! by a change of its rest state, the prestrain, which then decays: with `A = F⁻¹ F_before − I` at first, the effective gradient is
+//! A coarse part strains less than the cells in it do, so a cell that woke as it is would raise the energy. It is given
+//! the strain that its part had by a change of its rest state, the prestrain, which then decays: with
+//! `A = F⁻¹ F_before − I` at first, the effective gradient is
 //! ```text
 //! F̃ = F (I + A)       P = P̃(F̃) (I + A)ᵀ       A = s A_0,  s = e^{−t/τ}
 //! ```
-//! There is one `A` for its shape and one for its volume, whose strain is the tet's (`residual_element`), and the hourglass stiffness is `κ (1 − a)`, with `a` from 1 to
-//! 0. A part that loses volume, or gets some back, has an `A` of its own: its effective gradient is at first the mean, by volume, of those of what it is made of, and by
-//! Jensen's inequality its energy is no more than theirs. Changes of the rest state are objective: they do not change momentum. The energy that the decay takes,
-//! `−ds/dt ∂U/∂s`, is booked in the ledger.
+//! There is one `A` for its shape and one for its volume, whose strain is the tet's (`residual_element`), and the
+//! hourglass stiffness is `κ (1 − a)`, with `a` from 1 to 0. A part that loses volume, or gets some back, has an `A` of
+//! its own: its effective gradient is at first the mean, by volume, of those of what it is made of, and by Jensen's
+//! inequality its energy is no more than theirs. Changes of the rest state are objective: they do not change momentum.
+//! The energy that the decay takes, `−ds/dt ∂U/∂s`, is booked in the ledger.
 //!
 //! Accelerations do not jump, either (`transition_force`).
 use super::{
@@ -55,7 +58,8 @@ pub struct ResidualPrestrain {
 /// All prestrains of a body, and how far they have decayed.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct PrestrainDecay {
-    /// Prestrains of cells, ascending, as are those of tets. [`Self::start`] has to be called after either list was changed.
+    /// Prestrains of cells, ascending, as are those of tets. [`Self::start`] has to be called after either list was
+    /// changed.
     pub(super) cells: Vec<CellPrestrain>,
     pub(super) tets: Vec<ResidualPrestrain>,
     progress: Progress,
@@ -95,7 +99,8 @@ fn piola(material: &Material, f: &DMat3, a: &DMat3) -> DMat3 {
     p + p * a.transpose()
 }
 
-/// Returns `U_c` (J) of a cell's effective gradients, of shape and of volume, and of its hourglasses' `(1 − a) Σ_k w_k |q_k|²` (m²).
+/// Returns `U_c` (J) of a cell's effective gradients, of shape and of volume, and of its hourglasses'
+/// `(1 − a) Σ_k w_k |q_k|²` (m²).
 pub(super) fn cell_energy_j(rest: &RestCell, material: &Material, [shape, volume]: [&DMat3; 2], modes_m2: f64) -> f64 {
     let (of_shape, of_volume) = split(material);
     let density = of_shape.energy_density(shape) + of_volume.energy_density(volume);
@@ -181,7 +186,8 @@ impl PrestrainDecay {
         (self.progress, self.most, self.mark) = (Progress::default(), 0.0, 0);
     }
 
-    /// Starts the decay, once all prestrains are in the lists: sorts the tets, and computes the largest entry and the checksum.
+    /// Starts the decay, once all prestrains are in the lists: sorts the tets, and computes the largest entry and the
+    /// checksum.
     pub(super) fn start(&mut self) {
         self.tets.sort_unstable_by_key(|prestrain| prestrain.tet);
         self.progress = Progress { left: 1.0, along_j: [0.0; 2] };
@@ -217,8 +223,8 @@ impl PrestrainDecay {
         self.progress.along_j.iter().sum()
     }
 
-    /// Records `s ∂U/∂s` (J) of coarse tets (level 0) or of cells (level 1); returns the energy (J) that the decay took in the
-    /// time (s) since the last record.
+    /// Records `s ∂U/∂s` (J) of coarse tets (level 0) or of cells (level 1); returns the energy (J) that the decay took
+    /// in the time (s) since the last record.
     pub(crate) fn take_along(&mut self, level: usize, along_j: f64, time_s: f64) -> f64 {
         let before_j = std::mem::replace(&mut self.progress.along_j[level], along_j);
         0.5 * (before_j + along_j) * time_s / DECAY_S

@@ -1,14 +1,18 @@
-//! Projects the motion of particles that fall asleep on the coarse nodes: these are moved to the field that is nearest to it in the mass norm.
+//! Projects the motion of particles that fall asleep on the coarse nodes: these are moved to the field that is nearest
+//! to it in the mass norm.
 //!
-//! A node around which all is awake is held by little: by the `ε` that the coarse level keeps of its surroundings, which may have it far from the particles. If these
-//! followed it there when they fall asleep, the dent that they have would be lost, and a region that is switched again and again would build up stress. So coarse nodes
-//! are moved by `Δ`, which, with particles `p` falling asleep at `y_p`, of mass `m = (1 − ε) m_p`, and the consistent mass matrix `C'` of what slept before, is the solution of
+//! A node around which all is awake is held by little: by the `ε` that the coarse level keeps of its surroundings,
+//! which may have it far from the particles. If these followed it there when they fall asleep, the dent that they have
+//! would be lost, and a region that is switched again and again would build up stress. So coarse nodes are moved by
+//! `Δ`, which, with particles `p` falling asleep at `y_p`, of mass `m = (1 − ε) m_p`, and the consistent mass matrix
+//! `C'` of what slept before, is the solution of
 //! ```text
 //! min ½ Σ_p m |y_p − ζ_pᵀ(x + Δ)|² + ½ Δᵀ C' Δ        C'' Δ = Σ_p m ζ_p (y_p − ζ_pᵀ x)
 //! C'' = M'' − (1 − δ) L        L = Σ_{all p} m_p (diag ζ_p − ζ_p ζ_pᵀ)
 //! ```
-//! over the free nodes that they follow. `M''` is the mass matrix after the switch (`metric`), `L` the part of it that lumping adds; `δ` of that holds nodes that nothing
-//! else does. The system is solved by a few steps of conjugate gradients, preconditioned by `M''⁻¹`. It changes neither strains (`prestrain`) nor momenta (`switching`).
+//! over the free nodes that they follow. `M''` is the mass matrix after the switch (`metric`), `L` the part of it that
+//! lumping adds; `δ` of that holds nodes that nothing else does. The system is solved by a few steps of conjugate
+//! gradients, preconditioned by `M''⁻¹`. It changes neither strains (`prestrain`) nor momenta (`switching`).
 use super::{
     body::HybridBody,
     composite::{Anchor, NODES},
@@ -107,7 +111,8 @@ impl Projection {
         self.is_moved.resize(nodes, false);
     }
 
-    /// Adds a particle of mass `(1 − ε) m_p` (kg) that falls asleep at a distance `away_m` (m) from where it would be asleep.
+    /// Adds a particle of mass `(1 − ε) m_p` (kg) that falls asleep at a distance `away_m` (m) from where it would be
+    /// asleep.
     pub(super) fn transfer(&mut self, body: &HybridBody, anchor: &Anchor, mass_kg: f64, away_m: DVec3) {
         anchor.push(away_m * mass_kg, &mut self.moments);
         for (node, weight) in anchor.nodes.into_iter().zip(anchor.weights) {
@@ -115,7 +120,8 @@ impl Projection {
         }
     }
 
-    /// Returns whether each coarse node will be moved: those are the free ones that a particle follows which falls asleep.
+    /// Returns whether each coarse node will be moved: those are the free ones that a particle follows which falls
+    /// asleep.
     pub(super) fn is_moved(&self) -> &[bool] {
         &self.is_moved
     }
@@ -189,8 +195,8 @@ mod tests {
         settings::Precision,
     };
 
-    /// Lets half of the awake particles fall asleep where displacements put them. Returns the residual with the exact `C''` of
-    /// all particles over the right side, and the misfit of the particles after and before.
+    /// Lets half of the awake particles fall asleep where displacements put them. Returns the residual with the exact
+    /// `C''` of all particles over the right side, and the misfit of the particles after and before.
     fn fall_asleep(away: impl Fn(DVec3, &mut Random) -> DVec3) -> (f64, f64, f64) {
         let [material, other, _] = tissue();
         let body = hybrid_ball(&[material, other]);

@@ -1,7 +1,7 @@
 //! The residual element of a coarse tet: what it still answers for of the body beside awake cells, and its energy.
 //!
-//! The shape of a tet is strained by the mean gradient `F_g` of each of its five parts, its volume by the mean `F̄` of the whole: the tets would lock if
-//! every part had to keep its own volume.
+//! The shape of a tet is strained by the mean gradient `F_g` of each of its five parts, its volume by the mean `F̄` of
+//! the whole: the tets would lock if every part had to keep its own volume.
 //! ```text
 //! U_e = Σ_g V_g Ψ(F_g; λ⁻, µ) + V_e Ψ(F̄; λ − λ⁻, 0)        F̄ = Σ_g V_g F_g / V_e,  λ⁻ = min(λ, 0)
 //! f_i = −Σ_g (P(F_g; λ⁻, µ) + P(F̄; λ − λ⁻, 0)) T_gi
@@ -63,8 +63,8 @@ impl ResidualElement {
         }
     }
 
-    /// Returns the gradient of every part: `F_g` of positions, its rate of velocities. A part without volume has the gradient
-    /// `empty`: the identity, or zero.
+    /// Returns the gradient of every part: `F_g` of positions, its rate of velocities. A part without volume has the
+    /// gradient `empty`: the identity, or zero.
     pub(super) fn gradients(&self, a: &[DVec3], empty: DMat3) -> [DMat3; PARTS] {
         let mut gradients = [DMat3::ZERO; PARTS];
         let Some(&first) = self.nodes.first() else { return [empty; PARTS] };
@@ -81,7 +81,8 @@ impl ResidualElement {
         })
     }
 
-    /// Returns `F_g` after some nodes were moved by `Δ_i` (m) from where it was `gradients`: `F_g + Σ_i Δ_i T_giᵀ / V_g`.
+    /// Returns `F_g` after some nodes were moved by `Δ_i` (m) from where it was `gradients`:
+    /// `F_g + Σ_i Δ_i T_giᵀ / V_g`.
     pub(super) fn gradients_after(&self, gradients: &[DMat3; PARTS], shifts_m: &[DVec3]) -> [DMat3; PARTS] {
         let mut after = *gradients;
         let moved =

@@ -1,4 +1,5 @@
-//! The coarse mass matrix `M'` as the loop runs it: factorised anew, without allocating, when other particles wake. Its oracle is `metric`.
+//! The coarse mass matrix `M'` as the loop runs it: factorised anew, without allocating, when other particles wake. Its
+//! oracle is `metric`.
 use super::{
     body::{HybridBody, NO_WEIGHT},
     composite::Anchor,
@@ -13,8 +14,9 @@ use glam::{BVec3, DVec3};
 
 /// The mass matrix `M'` and its Cholesky factor.
 ///
-/// Active particles follow nodes that are free or held along all axes, so that one factor serves the three. With accelerations `a` of
-/// free nodes `f` and none of held ones `h`, `M'_ff a = f_f`; whatever holds the latter has to bear `M'_hf a`.
+/// Active particles follow nodes that are free or held along all axes, so that one factor serves the three. With
+/// accelerations `a` of free nodes `f` and none of held ones `h`, `M'_ff a = f_f`; whatever holds the latter has to
+/// bear `M'_hf a`.
 #[derive(Debug, Clone)]
 pub(crate) struct RunningMetric {
     /// `(1 − ε) m_p` (kg) of active particles.
@@ -26,8 +28,8 @@ pub(crate) struct RunningMetric {
     inverse_per_kg: Vec<DVec3>,
     /// The masses that active particles take from the nodes they follow.
     followed: Vec<Followed>,
-    /// Nodes that active particles follow, which are the rows of the block: first the free ones, then the held ones, each
-    /// ascending.
+    /// Nodes that active particles follow, which are the rows of the block: first the free ones, then the held ones,
+    /// each ascending.
     touched: Vec<u32>,
     /// Number of those that are free; they are the rows of the factor.
     free_rows: usize,
@@ -126,8 +128,8 @@ impl RunningMetric {
         self.factor.factorise(block_kg, self.free_rows, 1e-12);
     }
 
-    /// Overwrites forces (N) on coarse nodes and then on active particles with `M'⁻¹ f` (m/s²) on free axes, zero on the
-    /// others; returns `fᵀ M'⁻¹ f` (N²/kg).
+    /// Overwrites forces (N) on coarse nodes and then on active particles with `M'⁻¹ f` (m/s²) on free axes, zero on
+    /// the others; returns `fᵀ M'⁻¹ f` (N²/kg).
     pub(crate) fn accelerate(&mut self, forces_n: &mut [DVec3]) -> f64 {
         let free = &self.touched[..self.free_rows];
         for (row, &node) in free.iter().enumerate() {
@@ -171,8 +173,8 @@ impl RunningMetric {
         kinetic_j - gravity_m_per_s2.dot(moment)
     }
 
-    /// Returns `v_h·M'_hf a_f` of velocities `a` (J), or of accelerations: then it is the power (W) that what moves the held
-    /// nodes gives to particles that follow them in part.
+    /// Returns `v_h·M'_hf a_f` of velocities `a` (J), or of accelerations: then it is the power (W) that what moves the
+    /// held nodes gives to particles that follow them in part.
     pub(crate) fn of_holders(&self, v: &[DVec3], a: &[DVec3]) -> f64 {
         let (free, held) = self.touched.split_at(self.free_rows);
         let rows = self.block_kg.chunks_exact(self.touched.len().max(1)).skip(self.free_rows).zip(held);
@@ -212,8 +214,8 @@ impl RunningMetric {
         (of_free.sum::<f64>() - of_holders_j, of_holders_j)
     }
 
-    /// Writes the momenta `M' v` (kg m/s) of coarse nodes and then of active particles. It goes particle by particle, since
-    /// these are fewer than the block's entries.
+    /// Writes the momenta `M' v` (kg m/s) of coarse nodes and then of active particles. It goes particle by particle,
+    /// since these are fewer than the block's entries.
     pub(crate) fn momenta(&self, hybrid: &HybridBody, v: &[DVec3], momenta: &mut [DVec3]) {
         let masses = hybrid.masses.node_kg.iter().chain(&self.particle_kg);
         for ((momentum, v), mass) in momenta.iter_mut().zip(v).zip(masses) {

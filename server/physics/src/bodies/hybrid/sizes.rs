@@ -1,17 +1,20 @@
 //! Cells of two sizes: near the surface those of the lattice, deeper down cells merged from eight of them.
 //!
-//! Blocks of 2 × 2 × 2 cells whose first corner is at even sites become one cell of twice the spacing, with particles at its own corners only. A site in the middle of one of its
-//! edges or faces *hangs*: smaller cells beside it have a corner there that is no particle. It moves by the mean of the particles at the ends of the edge, or at the corners of the face, as
-//! the doubled cell does there, so that displacements are continuous.
+//! Blocks of 2 × 2 × 2 cells whose first corner is at even sites become one cell of twice the spacing, with particles
+//! at its own corners only. A site in the middle of one of its edges or faces *hangs*: smaller cells beside it have a
+//! corner there that is no particle. It moves by the mean of the particles at the ends of the edge, or at the corners
+//! of the face, as the doubled cell does there, so that displacements are continuous.
 //!
-//! A cell beside a doubled one shares one corner, `v`, with the block of eight that it would belong to. Where the corner along axes `A` from it hangs, the block's own corner in
-//! that direction takes its place among the cell's particles, so that it has eight again. With corners numbered by bits (`sites`), and particles likewise,
+//! A cell beside a doubled one shares one corner, `v`, with the block of eight that it would belong to. Where the
+//! corner along axes `A` from it hangs, the block's own corner in that direction takes its place among the cell's
+//! particles, so that it has eight again. With corners numbered by bits (`sites`), and particles likewise,
 //! ```text
 //! y_c = Σ_p T_cp y_p        T_cp = 2^−|A| for p = v ⊕ B, B ⊆ A, of a corner c = v ⊕ A that hangs;  T_cc = 1 of one that does not
 //! ```
-//! If the middle of a face hangs, so do those of its edges: the corners that `T` refers to exist. All that is linear in a cell's corners (gradients, hourglasses, weights,
-//! masses) is transferred to its particles by `Tᵀ`. Affine motion is reproduced as before, and uniform stress is balanced as before, since the force of small cells on a
-//! hanging site is distributed as the doubled cell's own force there is.
+//! If the middle of a face hangs, so do those of its edges: the corners that `T` refers to exist. All that is linear in
+//! a cell's corners (gradients, hourglasses, weights, masses) is transferred to its particles by `Tᵀ`. Affine motion is
+//! reproduced as before, and uniform stress is balanced as before, since the force of small cells on a hanging site is
+//! distributed as the doubled cell's own force there is.
 use super::{moments::CellMoments, sites::Sites};
 use std::ops::{Add, Mul};
 
@@ -68,9 +71,9 @@ pub fn corner_of_block(sites: &Sites, cell: [usize; 3], corner: usize) -> usize 
     sites.site(std::array::from_fn(|axis| (cell[axis] & !1) + 2 * (corner >> axis & 1)))
 }
 
-/// Merges blocks of eight cells that lie beneath so many layers, where `may_merge` allows it for the cells' numbers. The first
-/// layer is made of the cells that the surface cuts and of those that touch a cell which does not exist; each further layer of
-/// the cells that touch the one before.
+/// Merges blocks of eight cells that lie beneath so many layers, where `may_merge` allows it for the cells' numbers.
+/// The first layer is made of the cells that the surface cuts and of those that touch a cell which does not exist; each
+/// further layer of the cells that touch the one before.
 pub fn merge(
     sites: &Sites,
     cells: Vec<CellMoments>,

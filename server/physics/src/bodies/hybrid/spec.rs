@@ -25,16 +25,17 @@ pub struct HybridSpec {
 /// The particles of a hybrid body.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ParticleSpec {
-    /// The body's surface at rest, which bounds its volume, is touched by tools and seen by viewers. It should be as fine as
-    /// the lattice, or finer.
+    /// The body's surface at rest, which bounds its volume, is touched by tools and seen by viewers. It should be as
+    /// fine as the lattice, or finer.
     pub skin: Skin,
     /// Spacing h (m) of the lattice.
     pub spacing_m: f64,
-    /// Thickness (m) of the layer of cells of this spacing at the surface; it has as many cells as begin within this depth, and
-    /// at least one. Deeper down blocks of eight are merged into cells of twice the spacing (`sizes`); with `None` no cells are
-    /// merged.
+    /// Thickness (m) of the layer of cells of this spacing at the surface; it has as many cells as begin within this
+    /// depth, and at least one. Deeper down blocks of eight are merged into cells of twice the spacing (`sizes`); with
+    /// `None` no cells are merged.
     pub fine_depth_m: Option<f64>,
-    /// A point (m) that planes of the lattice pass through; best on a surface that is held, so that no cell reaches past it.
+    /// A point (m) that planes of the lattice pass through; best on a surface that is held, so that no cell reaches
+    /// past it.
     pub lattice_through_m: DVec3,
     /// Largest number of particles that are active at once.
     pub most_active: usize,
@@ -106,7 +107,8 @@ pub fn fine_layers(depth_m: f64, spacing_m: f64) -> usize {
 }
 
 impl ParticleSpec {
-    /// Returns the number of layers of cells of the lattice's spacing at the surface; `None` where deeper ones are not merged.
+    /// Returns the number of layers of cells of the lattice's spacing at the surface; `None` where deeper ones are not
+    /// merged.
     pub(super) fn fine_layers(&self) -> Option<usize> {
         self.fine_depth_m.map(|depth_m| fine_layers(depth_m, self.spacing_m))
     }

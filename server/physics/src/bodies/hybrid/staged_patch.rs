@@ -1,4 +1,5 @@
-//! The staged patch: the next patch, laid out in slices over the ticks before its switch, since one tick has no time for all of it.
+//! The staged patch: the next patch, laid out in slices over the ticks before its switch, since one tick has no time
+//! for all of it.
 use super::{body::HybridBody, running::RunningPatch};
 
 /// A patch that is prepared beside the one that runs.

@@ -1,20 +1,21 @@
-//! The state of a hybrid body beside positions and velocities: which particles are active, their prestrain, and the transition force.
+//! The state of a hybrid body beside positions and velocities: which particles are active, their prestrain, and the
+//! transition force.
 use super::{body::HybridBody, long_steps::LongSteps, prestrain::PrestrainDecay, spec::Waking, switching::Ball};
 use crate::hash::Chain;
 use crate::{contact::ToolSpec, tick::MechanicalState};
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
-/// What a tick changes of a hybrid body beside its [`MechanicalState`], whose lists `x` and `v` have the values of the coarse
-/// nodes first, then those of the active particles.
+/// What a tick changes of a hybrid body beside its [`MechanicalState`], whose lists `x` and `v` have the values of the
+/// coarse nodes first, then those of the active particles.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct HybridState {
     /// Active particles, ascending.
     ids: Vec<u32>,
     /// Particles that are to be active next; others than `ids` while a switch is being prepared.
     pub(super) next: Vec<u32>,
-    /// Particles that are wanted awake. Where some have to fall asleep and others to wake, `next` first has those that stay
-    /// awake, and then all of these.
+    /// Particles that are wanted awake. Where some have to fall asleep and others to wake, `next` first has those that
+    /// stay awake, and then all of these.
     pub(super) wanted: Vec<u32>,
     /// The ball of every axis sample of every tool.
     pub(super) balls: Vec<Option<Ball>>,
@@ -135,8 +136,8 @@ impl HybridState {
         self.long_steps.copy_from(&other.long_steps);
     }
 
-    /// Returns whether a state read from a snapshot fits the body: particles are ascending, may wake and have room, and all
-    /// numbers are finite.
+    /// Returns whether a state read from a snapshot fits the body: particles are ascending, may wake and have room, and
+    /// all numbers are finite.
     pub(crate) fn fits(&self, body: &HybridBody, tools: &[ToolSpec]) -> bool {
         let (nodes, positions) = (body.node_count(), body.node_count() + self.ids.len());
         let may_wake = |id: &u32| body.may_wake(*id);
@@ -157,8 +158,8 @@ impl HybridState {
             })
     }
 
-    /// Switches a body at rest to the given active particles; they must be no more than there is room for, and each must be
-    /// allowed to wake.
+    /// Switches a body at rest to the given active particles; they must be no more than there is room for, and each
+    /// must be allowed to wake.
     pub(crate) fn wake_at_rest(&mut self, ids: &[u32], state: &mut MechanicalState) {
         self.ids.clear();
         self.ids.extend_from_slice(ids);
@@ -169,8 +170,8 @@ impl HybridState {
         }
     }
 
-    /// Switches to the particles that are to be active next: what wakes starts where, and as fast as, it followed. `moved` is
-    /// a buffer. Allocates nothing where there is room.
+    /// Switches to the particles that are to be active next: what wakes starts where, and as fast as, it followed.
+    /// `moved` is a buffer. Allocates nothing where there is room.
     pub(super) fn switch(&mut self, body: &HybridBody, state: &mut MechanicalState, moved: &mut Vec<DVec3>) {
         let nodes = body.node_count();
         for list in [&mut state.x, &mut state.v] {
@@ -198,8 +199,8 @@ pub(super) fn room_for_cells(body: &HybridBody, most_active: usize) -> usize {
     (body.partition().most_cells_at() * most_active).min(body.partition().cells().len())
 }
 
-/// Returns the number of axis samples of each tool that may keep particles awake: they are so near to one another that the
-/// balls about them overlap.
+/// Returns the number of axis samples of each tool that may keep particles awake: they are so near to one another that
+/// the balls about them overlap.
 pub(super) fn axis_sample_counts(body: &HybridBody, tools: &[ToolSpec]) -> impl Iterator<Item = usize> + Clone {
     let apart_m = match body.particles.waking {
         Waking::ByTools { reach_m } => reach_m,

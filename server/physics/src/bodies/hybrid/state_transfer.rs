@@ -1,7 +1,8 @@
-//! State transfer from one set of active particles to another: which cell or coarse tet answers for which volume changes, energy and force do not (`prestrain`).
+//! State transfer from one set of active particles to another: which cell or coarse tet answers for which volume
+//! changes, energy and force do not (`prestrain`).
 //!
-//! It leaves alone what a switch does not change: cells that stay awake and whose particles stay where they are, and coarse tets that keep their volume and whose
-//! nodes stay where they are.
+//! It leaves alone what a switch does not change: cells that stay awake and whose particles stay where they are, and
+//! coarse tets that keep their volume and whose nodes stay where they are.
 use super::{
     body::HybridBody,
     composite::PARTS,
@@ -82,8 +83,8 @@ impl Before {
         }
     }
 
-    /// Records the strain of all that a switch changes; returns its elastic energy (J). The patch before the switch is displaced to
-    /// positions `x` (m).
+    /// Records the strain of all that a switch changes; returns its elastic energy (J). The patch before the switch is
+    /// displaced to positions `x` (m).
     pub(super) fn take(
         &mut self,
         body: &HybridBody,
@@ -137,9 +138,9 @@ impl Before {
         residual_energy_j(residual, body.material_of_tet(tet), &parts, &whole)
     }
 
-    /// Records the tets, too, of which only nodes have moved, and replaces the prestrain `decay` by that after the switch. The
-    /// patch after the switch is displaced. Returns the elastic energy (J) that those tets had, and the one that all that changes
-    /// has now.
+    /// Records the tets, too, of which only nodes have moved, and replaces the prestrain `decay` by that after the
+    /// switch. The patch after the switch is displaced. Returns the elastic energy (J) that those tets had, and the one
+    /// that all that changes has now.
     pub(super) fn prestrain_after(
         &mut self,
         body: &HybridBody,
@@ -183,8 +184,8 @@ impl Before {
         (moved_j, now_j)
     }
 
-    /// Returns the prestrain of a cell that is awake now, with which it is strained as it was, or as its part was, and its
-    /// energy (J). A cell that was awake may have particles that have fallen asleep.
+    /// Returns the prestrain of a cell that is awake now, with which it is strained as it was, or as its part was, and
+    /// its energy (J). A cell that was awake may have particles that have fallen asleep.
     fn of_cell(&self, body: &HybridBody, patch: &RunningPatch, cell: u32) -> (Option<CellPrestrain>, f64) {
         let (rest, y) = (body.awake_cell(cell as usize), patch.corners_m(body, cell));
         let (f, now_m2) = (rest.gradient_of(&y), modes_m2(&rest, &y));
@@ -258,8 +259,8 @@ impl Before {
 }
 
 impl PatchSwitch<'_> {
-    /// Returns whether the switch changes nothing about an awake cell: it stays awake, and its particles stay where they are,
-    /// none of them following a coarse node that is moved.
+    /// Returns whether the switch changes nothing about an awake cell: it stays awake, and its particles stay where
+    /// they are, none of them following a coarse node that is moved.
     fn leaves_alone(&self, body: &HybridBody, cell: u32) -> bool {
         self.before.is_awake(cell) && self.after.is_awake(cell) && !self.after.follows(body, cell, self.is_moved)
     }

@@ -1,17 +1,22 @@
-//! Switching wakes particles near where a tool touches the skin or is about to, and lets others fall asleep once they have come to rest.
+//! Switching wakes particles near where a tool touches the skin or is about to, and lets others fall asleep once they
+//! have come to rest.
 //!
-//! A tool wants the particles within a ball at rest, about the vertex of the skin nearest to it, or nearest to where it is deepest in the body. The ball exists from when the gap is less than
-//! `g₀ + v·50 ms` until the gap has been twice that for 100 ms, and follows the tool in steps of a spacing. A capsule has several such balls, one for each sample of its axis. A particle that no
-//! tool wants any more falls asleep once it is nearly where it would be asleep, or when its room is needed.
+//! A tool wants the particles within a ball at rest, about the vertex of the skin nearest to it, or nearest to where it
+//! is deepest in the body. The ball exists from when the gap is less than `g₀ + v·50 ms` until the gap has been twice
+//! that for 100 ms, and follows the tool in steps of a spacing. A capsule has several such balls, one for each sample
+//! of its axis. A particle that no tool wants any more falls asleep once it is nearly where it would be asleep, or when
+//! its room is needed.
 //!
-//! A switch keeps momentum. What wakes moves as it was moved (`metric`). What falls asleep transfers impulses to the coarse nodes, and all of it together a couple: with
-//! `m = (1 − ε) m_p`, the position `x_p = Σ_i ζ_pi x_i` that a particle has then, and the free nodes of its tets, of masses `M_i` about their middle `x̄`,
+//! A switch keeps momentum. What wakes moves as it was moved (`metric`). What falls asleep transfers impulses to the
+//! coarse nodes, and all of it together a couple: with `m = (1 − ε) m_p`, the position `x_p = Σ_i ζ_pi x_i` that a
+//! particle has then, and the free nodes of its tets, of masses `M_i` about their middle `x̄`,
 //! ```text
 //! J_i = Σ_p m ζ_pi (w_p − Σ_j ζ_pj v_j) + M_i α × (x_i − x̄)       Σ_i M_i (x_i − x̄) × (α × (x_i − x̄)) = Σ_p m (y_p − x_p) × w_p
 //! v ← v + M''⁻¹ J
 //! ```
-//! with the matrix `M''` of what stays awake. So linear and angular momentum are kept. Coarse nodes are moved by `Δ_i` then (`projection`), for which `−Σ_i Δ_i × P_i`, with the momenta
-//! `P = M'' v + J`, is added to the couple on the right.
+//! with the matrix `M''` of what stays awake. So linear and angular momentum are kept. Coarse nodes are moved by `Δ_i`
+//! then (`projection`), for which `−Σ_i Δ_i × P_i`, with the momenta `P = M'' v + J`, is added to the couple on the
+//! right.
 use super::{
     body::HybridBody,
     carried_skin::SkinView,
@@ -35,8 +40,8 @@ use serde::{Deserialize, Serialize};
 
 /// Number of ticks in which a switch is prepared and done.
 const SWITCH_TICKS: u64 = 2 + RunningPatch::SLICES as u64;
-/// Number of ticks between two activation queries. After each, what is to sleep falls asleep, and then what is to wake wakes:
-/// both in one tick would take too long.
+/// Number of ticks between two activation queries. After each, what is to sleep falls asleep, and then what is to wake
+/// wakes: both in one tick would take too long.
 const LOOK_EVERY_TICKS: u64 = 2 * SWITCH_TICKS;
 /// Time (s) before its contact at which an approaching tool wakes particles.
 const AHEAD_S: f64 = 0.05;
@@ -115,8 +120,8 @@ impl ActivationQuery {
 }
 
 impl SteppedHybrid<'_> {
-    /// Prepares a tick: makes the patch that of the state's active particles, and every few ticks queries which should be
-    /// active, and switches to them. Allocates nothing.
+    /// Prepares a tick: makes the patch that of the state's active particles, and every few ticks queries which should
+    /// be active, and switches to them. Allocates nothing.
     pub(crate) fn prepare(&mut self, environment: &Environment, state: &mut MechanicalState) {
         let Self { body, own, scratch } = self;
         let tick_period_s = environment.settings.tick_period_s;
@@ -156,9 +161,9 @@ impl SteppedHybrid<'_> {
         state.contact.travelled_at_a_change(moved_m, were_current);
     }
 
-    /// Wakes these particles and no others, as tools would: what was active stays as it is, what wakes moves as the coarse
-    /// nodes have moved it. Particles that may not wake ([`HybridBody::may_wake`]), and those for which there is no room, are
-    /// left out.
+    /// Wakes these particles and no others, as tools would: what was active stays as it is, what wakes moves as the
+    /// coarse nodes have moved it. Particles that may not wake ([`HybridBody::may_wake`]), and those for which there is
+    /// no room, are left out.
     pub(crate) fn wake_only(
         &mut self,
         environment: &Environment,
@@ -181,8 +186,8 @@ impl SteppedHybrid<'_> {
 }
 
 impl HybridScratch {
-    /// Lets the transition force decay over a tick, and leaves the prestrain out, which decays with the substeps, once nearly
-    /// nothing is left of it.
+    /// Lets the transition force decay over a tick, and leaves the prestrain out, which decays with the substeps, once
+    /// nearly nothing is left of it.
     fn decay(&mut self, own: &mut HybridState, state: &mut MechanicalState, tick_period_s: f64) {
         own.decay_transition_force(tick_period_s);
         if own.prestrain.has_decayed() {
@@ -193,8 +198,9 @@ impl HybridScratch {
         }
     }
 
-    /// Switches to the particles that are to be active next. Returns a bound of how far (m) that moves any vertex of the skin:
-    /// particles that fall asleep move to where they follow, and coarse nodes, with what follows them, to the projection of those.
+    /// Switches to the particles that are to be active next. Returns a bound of how far (m) that moves any vertex of
+    /// the skin: particles that fall asleep move to where they follow, and coarse nodes, with what follows them, to the
+    /// projection of those.
     fn switch(&mut self, body: &HybridBody, gravity: DVec3, own: &mut HybridState, state: &mut MechanicalState) -> f64 {
         self.staged.finish(body, &own.next);
         let Self { patch, staged, query, before, momenta, transition, .. } = self;
@@ -298,7 +304,8 @@ fn update_balls(
     }
 }
 
-/// Returns the squared distance (m²) of a point `p` to the middles of balls, and to the lines between those of neighbours, `a` and `b`:
+/// Returns the squared distance (m²) of a point `p` to the middles of balls, and to the lines between those of
+/// neighbours, `a` and `b`:
 /// ```text
 /// |p − a − s (b − a)|²,   s = (p − a)·(b − a)/|b − a|², limited to 0 to 1
 /// ```
@@ -318,8 +325,8 @@ fn distance_to_balls_sq(balls: &[Option<Ball>], at_m: DVec3) -> f64 {
 }
 
 impl ActivationQuery {
-    /// Transfers the impulse of a particle at `y` (m) with velocity `w` (m/s), which falls asleep, to the coarse nodes. Returns its
-    /// couple (kg m²/s), and its distance (m) from where it will be asleep.
+    /// Transfers the impulse of a particle at `y` (m) with velocity `w` (m/s), which falls asleep, to the coarse nodes.
+    /// Returns its couple (kg m²/s), and its distance (m) from where it will be asleep.
     fn transfer(
         &mut self,
         body: &HybridBody,
@@ -341,7 +348,8 @@ impl ActivationQuery {
         (away_m.cross(w) * mass_kg, away_m.length())
     }
 
-    /// Moves the coarse nodes to the projection of what has fallen asleep; returns the angular momentum (kg m²/s) that they gain.
+    /// Moves the coarse nodes to the projection of what has fallen asleep; returns the angular momentum (kg m²/s) that
+    /// they gain.
     fn shift(
         &mut self,
         body: &HybridBody,
@@ -361,7 +369,8 @@ impl ActivationQuery {
         gained
     }
 
-    /// Adds the couple (kg m²/s) of all particles that fell asleep to the impulses; adds nothing where too few nodes are free.
+    /// Adds the couple (kg m²/s) of all particles that fell asleep to the impulses; adds nothing where too few nodes
+    /// are free.
     fn turn(&mut self, couple: DVec3, x: &[DVec3]) {
         let Turn { turn, middle } = turn_of(&self.weights_kg, x, couple);
         for ((impulse, weight), x) in self.impulses.iter_mut().zip(&self.weights_kg).zip(x) {
@@ -369,8 +378,8 @@ impl ActivationQuery {
         }
     }
 
-    /// Finds the particles in the tools' balls, ascending. Where there is no room for all, each tool gets as many: those nearest to
-    /// the middles of its balls, and to the lines between those of neighbours.
+    /// Finds the particles in the tools' balls, ascending. Where there is no room for all, each tool gets as many:
+    /// those nearest to the middles of its balls, and to the lines between those of neighbours.
     fn want(&mut self, body: &HybridBody, tools: &[ToolSpec], own: &HybridState, reach_m: f64, most: usize) {
         self.wanted.clear();
         let of_tool = |first: &mut usize, count: usize| {
@@ -382,7 +391,8 @@ impl ActivationQuery {
         for balls in tools() {
             self.found.clear();
             for (number, ball) in balls.iter().enumerate().filter_map(|(number, ball)| Some((number, (*ball)?))) {
-                // As samples are no farther from each other than balls reach, balls after the next two have hardly a particle of this one.
+                // As samples are no farther from each other than balls reach, balls after the next two have hardly a
+                // particle of this one.
                 let near = &balls[number.saturating_sub(1)..(number + 4).min(balls.len())];
                 body.partition.particles_within(ball.rest_m, reach_m, |particle, distance_sq| {
                     let is_found = &mut self.is_found[particle as usize];
@@ -408,8 +418,8 @@ impl ActivationQuery {
         self.wanted.dedup();
     }
 
-    /// Keeps active particles awake that no tool wants but that are not settled, as long as there is room; those that are
-    /// farthest from where they would be asleep come first.
+    /// Keeps active particles awake that no tool wants but that are not settled, as long as there is room; those that
+    /// are farthest from where they would be asleep come first.
     fn keep_unsettled(&mut self, patch: &RunningPatch, particles: &ParticleSpec) {
         self.unwanted.clear();
         for (particle, deviation_m) in patch.deviations_m() {

@@ -1,28 +1,32 @@
 //! The transition force keeps accelerations from jumping where particles wake or fall asleep under load; it decays.
 //!
-//! A particle that wakes under load is not in balance: forces that the coarse nodes bore now act on the particle. At a switch, everything is to accelerate as it did. So a force `c` is
-//! taken away, with the new matrix `M''` and the accelerations `a` before, those of what wakes following the nodes,
+//! A particle that wakes under load is not in balance: forces that the coarse nodes bore now act on the particle. At a
+//! switch, everything is to accelerate as it did. So a force `c` is taken away, with the new matrix `M''` and the
+//! accelerations `a` before, those of what wakes following the nodes,
 //! ```text
 //! c = f − (M'' a + Σ_{p asleep now} ζ_p (1 − ε) m_p (a_p − ζ_pᵀ a))       f ← f − c       c ← e^{−T/τ} c every tick
 //! ```
-//! `Σ c = 0`, since neither momentum nor external force changes. The torque of `c` is zero at first; as a body that is held nowhere moves on, its torque is cancelled by forces
-//! `M_i α × (x_i − x̄)` on the coarse nodes. The work of `c` is booked in the ledger.
+//! `Σ c = 0`, since neither momentum nor external force changes. The torque of `c` is zero at first; as a body that is
+//! held nowhere moves on, its torque is cancelled by forces `M_i α × (x_i − x̄)` on the coarse nodes. The work of `c`
+//! is booked in the ledger.
 //!
-//! It is a dead load: on a body that swings while regions are switched it may do work without end, as may decaying prestrain (`prestrain`). The energy that both gave lately, beyond what they and
-//! switches took, is kept; where it is more than [`MOST_GIVEN`] of the elastic energy that switches lately changed, there is no transition force, and accelerations jump.
+//! It is a dead load: on a body that swings while regions are switched it may do work without end, as may decaying
+//! prestrain (`prestrain`). The energy that both gave lately, beyond what they and switches took, is kept; where it is
+//! more than [`MOST_GIVEN`] of the elastic energy that switches lately changed, there is no transition force, and
+//! accelerations jump.
 use super::{body::HybridBody, patch::KEPT, prestrain, running_metric::RunningMetric, state::HybridState};
 use crate::tick::MechanicalState;
 use glam::{BVec3, DMat3, DVec3};
 
-/// `τ` (s), the time constant of the decay: less than that of prestrain, since a force that goes on pushing what swings may
-/// feed it.
+/// `τ` (s), the time constant of the decay: less than that of prestrain, since a force that goes on pushing what swings
+/// may feed it.
 const DECAY_S: f64 = 0.02;
 /// The time constant (s) where too much energy was given already.
 const FAST_DECAY_S: f64 = 0.003;
 /// Time constant (s) with which the energy that the decay gave is forgotten.
 const FORGETTING_S: f64 = 1.0;
-/// Largest energy given by the decay, over the elastic energy that a switch lately changed, with which there is a transition
-/// force.
+/// Largest energy given by the decay, over the elastic energy that a switch lately changed, with which there is a
+/// transition force.
 const MOST_GIVEN: f64 = 0.07;
 /// A transition force smaller than this, over the largest force, is left out.
 const NOTHING: f64 = 1e-9;
@@ -32,7 +36,8 @@ const NOTHING: f64 = 1e-9;
 pub(crate) struct TransitionForce {
     /// Accelerations (m/s²) before a switch.
     before: Vec<DVec3>,
-    /// Forces (N) with which accelerations do not jump; empty unless the next evaluation has to find the transition force.
+    /// Forces (N) with which accelerations do not jump; empty unless the next evaluation has to find the transition
+    /// force.
     due_n: Vec<DVec3>,
     /// The transition force (N) as it was taken away at the last evaluation.
     taken_n: Vec<DVec3>,
@@ -54,8 +59,8 @@ impl TransitionForce {
         }
     }
 
-    /// Adds to `forces_n` the forces (N) on coarse nodes that stand for a particle which falls asleep, the `number`th active one
-    /// before the switch.
+    /// Adds to `forces_n` the forces (N) on coarse nodes that stand for a particle which falls asleep, the `number`th
+    /// active one before the switch.
     pub(super) fn transfer(&self, body: &HybridBody, number: usize, particle: u32, forces_n: &mut [DVec3]) {
         if self.before.is_empty() {
             return;
@@ -66,8 +71,8 @@ impl TransitionForce {
         anchor.push((own - anchor.of(&self.before)) * mass_kg, forces_n);
     }
 
-    /// Finds, after a switch from the active particles `before` to those `after`, what the forces (N) have to be at the next
-    /// evaluation. `transferred_n` comes from [`Self::transfer`].
+    /// Finds, after a switch from the active particles `before` to those `after`, what the forces (N) have to be at the
+    /// next evaluation. `transferred_n` comes from [`Self::transfer`].
     pub(super) fn demand(
         &mut self,
         body: &HybridBody,
@@ -125,8 +130,8 @@ impl TransitionForce {
         }
     }
 
-    /// Returns the work (J) that the body does against the transition force over a kick of length `h_s`, with velocities `v` times
-    /// a factor on free axes, and accelerations (m/s²).
+    /// Returns the work (J) that the body does against the transition force over a kick of length `h_s`, with
+    /// velocities `v` times a factor on free axes, and accelerations (m/s²).
     pub(crate) fn work_j(&self, v: &[DVec3], factor: f64, accelerations: &[DVec3], h_s: f64) -> f64 {
         let power = |((taken, v), a): ((&DVec3, &DVec3), &DVec3)| taken.dot(*v * factor + *a * (0.5 * h_s));
         h_s * self.taken_n.iter().zip(v).zip(accelerations).map(power).sum::<f64>()
@@ -170,8 +175,8 @@ pub(super) struct Turn {
     pub(super) middle: DVec3,
 }
 
-/// Returns `α` and `x̄` with which `Σ_i W_i (x_i − x̄) × (α × (x_i − x̄))` is the given moment; zero where the points of
-/// positive weight lie on a line.
+/// Returns `α` and `x̄` with which `Σ_i W_i (x_i − x̄) × (α × (x_i − x̄))` is the given moment; zero where the points
+/// of positive weight lie on a line.
 pub(super) fn turn_of(weights: &[f64], x: &[DVec3], moment: DVec3) -> Turn {
     let weighty = || weights.iter().zip(x).filter(|(weight, _)| **weight > 0.0);
     let total: f64 = weighty().map(|(weight, _)| weight).sum();

@@ -1,20 +1,21 @@
 //! The narrow phase: pressure and friction of one tool on the samples inside it.
 //!
 //! A sample enters contact when the tool's surface passes over it from the outside, `n·(c − y) > 0` with the outward
-//! normal `n` and the nearest point `c` of the tool's axis; one that the tool reaches from behind (the far wall of a thin shell) is ignored for as long as it stays
-//! inside. Once in, a sample is tracked until it leaves, so that neither the normal nor the order of events can make the
-//! energy jump. A tool that is *put* into the surface (not moved there) presses nothing at first: its samples carry
-//! `k_f a (g − g₀)` from the depth `g₀` at which it was put, or the least depth since.
+//! normal `n` and the nearest point `c` of the tool's axis; one that the tool reaches from behind (the far wall of a
+//! thin shell) is ignored for as long as it stays inside. Once in, a sample is tracked until it leaves, so that neither
+//! the normal nor the order of events can make the energy jump. A tool that is *put* into the surface (not moved there)
+//! presses nothing at first: its samples carry `k_f a (g − g₀)` from the depth `g₀` at which it was put, or the least
+//! depth since.
 //!
-//! Coulomb friction: every sample in contact has a tangential spring `e` (m) of stiffness `k_t = τ k_f a`, stretched by the
-//! sample's motion relative to the tool and cut at the cone:
+//! Coulomb friction: every sample in contact has a tangential spring `e` (m) of stiffness `k_t = τ k_f a`, stretched by
+//! the sample's motion relative to the tool and cut at the cone:
 //! ```text
 //! e ← (I − n̂n̂ᵀ)(p − q)        p = y − c₀ from the tool's centre, q where the spring is at rest, n̂ = r/|r|, r = y − c
 //! e ← e · min(1, µ_f f_n / (k_t |e|))      slip; its heat k_t|e|·(cut length) ≥ 0
 //! f_t = −k_t e,  q ← p − e
 //! ```
-//! `q` is a point of the tool: where the tool turns (`R`), what is kept is `Rᵀq`, so that the spring is stretched by the motion of sample and tool
-//! relative to each other, `v + ω × p`.
+//! `q` is a point of the tool: where the tool turns (`R`), what is kept is `Rᵀq`, so that the spring is stretched by
+//! the motion of sample and tool relative to each other, `v + ω × p`.
 use super::{
     axis::Axis,
     broad::{Candidates, Triangles},
@@ -24,8 +25,8 @@ use super::{
 };
 use glam::{DQuat, DVec3};
 
-/// `τ`, the tangential over the normal stiffness of the foundation; Mindlin's ratio 2(1 − ν)/(2 − ν) is 0.71 at ν = 0.45 and 0.82 at 0.3.
-/// It may be at most 1, or the bound of the frequency fails.
+/// `τ`, the tangential over the normal stiffness of the foundation; Mindlin's ratio 2(1 − ν)/(2 − ν) is 0.71 at ν =
+/// 0.45 and 0.82 at 0.3. It may be at most 1, or the bound of the frequency fails.
 pub(super) const TANGENTIAL_RATIO: f64 = 0.75;
 
 /// One tool and the surface that it meets at one instant.
@@ -40,8 +41,8 @@ pub(super) struct Meeting<'a> {
     pub(super) orientation: Option<DQuat>,
     pub(super) radius_m: f64,
     pub(super) friction_coefficient: f64,
-    /// Whether the tool was put there, now or before, and has not left the surface yet: samples that are not on record then carry
-    /// nothing up to their present depth; those that cannot be recorded carry nothing at all.
+    /// Whether the tool was put there, now or before, and has not left the surface yet: samples that are not on record
+    /// then carry nothing up to their present depth; those that cannot be recorded carry nothing at all.
     pub(super) put_into: bool,
 }
 
@@ -72,7 +73,8 @@ pub(super) struct Pressed {
     pub(super) contacts: u32,
     /// Depth (m) of the deepest sample.
     pub(super) penetration_m: f64,
-    /// Vector (m) from the nearest point of the tool's axis to the nearest point of the surface; infinite when no triangle is listed.
+    /// Vector (m) from the nearest point of the tool's axis to the nearest point of the surface; infinite when no
+    /// triangle is listed.
     pub(super) to_surface_m: DVec3,
     /// Vector (m) from the tool's centre to that point of its axis.
     pub(super) arm_m: DVec3,
@@ -111,9 +113,9 @@ impl Pressed {
     }
 }
 
-/// Presses a tool on the listed triangles (ascending): adds the forces on nodes, updates the samples that it touches, and returns
-/// the sums. A triangle that cannot have come within the radius since it was looked at last is looked at only if no other one is
-/// within it, to find the nearest.
+/// Presses a tool on the listed triangles (ascending): adds the forces on nodes, updates the samples that it touches,
+/// and returns the sums. A triangle that cannot have come within the radius since it was looked at last is looked at
+/// only if no other one is within it, to find the nearest.
 pub(super) fn press(
     meeting: &Meeting<'_>,
     candidates: &mut Candidates,
@@ -247,8 +249,8 @@ impl Meeting<'_> {
     }
 }
 
-/// Presses one sample at `p` from the tool's centre, which is `distance_m` from the tool's axis in the direction `normal`; returns
-/// the force (N) on it.
+/// Presses one sample at `p` from the tool's centre, which is `distance_m` from the tool's axis in the direction
+/// `normal`; returns the force (N) on it.
 fn press_sample(
     meeting: &Meeting<'_>,
     samples: &TriangleSamples<'_>,

@@ -220,8 +220,8 @@ fn samples_reached_from_behind_carry_nothing_until_they_left() {
     assert!(bench.press(above(0.1 * RADIUS_M)).0.force_n.z > 0.0);
 }
 
-/// Where all that could be kept was met from behind, nothing told in the next tick that the tool was put there, and what could
-/// not be kept pressed with its full depth.
+/// Where all that could be kept was met from behind, nothing told in the next tick that the tool was put there, and
+/// what could not be kept pressed with its full depth.
 #[test]
 fn a_tool_put_into_the_surface_is_known_by_the_samples_it_met_from_behind() {
     let mut bench = Bench::new(0.0);

@@ -1,10 +1,10 @@
 //! Which particles are awake in an equilibrium.
 //!
-//! Those that a tool would keep awake where it rests, by the rules of the loop (`hybrid::switching`): a ball about the vertex of the skin nearest to where it is
-//! deepest, or to it. And
-//! those within the same reach of vertices that a load acts on, as its press is as local as a tool's. Where there is no room for all of a claim, the nearest;
-//! but if there is none even for those within a spacing of a load, it is spread wide, and left to the coarse tets: some of the particles beneath it, chosen by
-//! nothing, would make a pattern of it.
+//! Those that a tool would keep awake where it rests, by the rules of the loop (`hybrid::switching`): a ball about the
+//! vertex of the skin nearest to where it is deepest, or to it. And those within the same reach of vertices that a load
+//! acts on, as its press is as local as a tool's. Where there is no room for all of a claim, the nearest; but if there
+//! is none even for those within a spacing of a load, it is spread wide, and left to the coarse tets: some of the
+//! particles beneath it, chosen by nothing, would make a pattern of it.
 use super::awakened::Awakened;
 use crate::mesh::Surface;
 use crate::{
@@ -41,7 +41,8 @@ impl Claims {
         Self::ByRule { reach_m, balls: vec![None; environment.tools.len()], loads, spread: 0 }
     }
 
-    /// Looks at where tools are in an equilibrium, with these forces (N) on them: the particles that are to be awake, ascending.
+    /// Looks at where tools are in an equilibrium, with these forces (N) on them: the particles that are to be awake,
+    /// ascending.
     pub(super) fn look(&mut self, awakened: &Awakened<'_>, unknowns: &[DVec3], contact_n: &[DVec3]) -> Vec<u32> {
         let (environment, body) = (awakened.environment, awakened.body);
         let (most, spacing_m) = (body.particles().most_active, body.particles().spacing_m);
@@ -124,7 +125,8 @@ fn ball_of(
     }
 }
 
-/// Particles that may wake within a reach of vertices that a load acts on, with the distance (m) to the nearest of them.
+/// Particles that may wake within a reach of vertices that a load acts on, with the distance (m) to the nearest of
+/// them.
 fn near_load(surface: &Surface, body: &HybridBody, load: &LoadSpec, reach_m: f64) -> Vec<(f64, u32)> {
     let vertices: BTreeSet<u32> = match load {
         LoadSpec::NodalForces(forces) => forces.iter().map(|(vertex, _)| *vertex).collect(),

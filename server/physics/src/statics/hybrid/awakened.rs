@@ -1,7 +1,8 @@
 //! A hybrid body with some of its particles awake: what its equilibrium is sought over.
 //!
-//! A *place* lists positions (m): of the coarse nodes, of the awake particles, then of all tools. The skin follows it linearly,
-//! `y_v = Y_v + Σ_q w_vq (x_q − X_q)`, and hands forces back by the same weights; a *configuration* of contact lists the skin's vertices, then the tools.
+//! A *place* lists positions (m): of the coarse nodes, of the awake particles, then of all tools. The skin follows it
+//! linearly, `y_v = Y_v + Σ_q w_vq (x_q − X_q)`, and hands forces back by the same weights; a *configuration* of
+//! contact lists the skin's vertices, then the tools.
 use crate::{
     bodies::hybrid::{
         HybridBody,

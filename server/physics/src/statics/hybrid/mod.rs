@@ -1,7 +1,8 @@
 //! Equilibrium of a hybrid body: coarse nodes, the particles that are awake, and tools on springs.
 //!
-//! As for bodies of tets the goal is reached in stages. After each the solver looks which particles are to be awake, and where those are others, finds the
-//! stage's equilibrium again with them: what it ends with does not depend on what was awake on the way, but for where a tool's ball stays put.
+//! As for bodies of tets the goal is reached in stages. After each the solver looks which particles are to be awake,
+//! and where those are others, finds the stage's equilibrium again with them: what it ends with does not depend on what
+//! was awake on the way, but for where a tool's ball stays put.
 //!
 //! - `awake.rs`: which particles
 //! - `awakened.rs`: the body with them

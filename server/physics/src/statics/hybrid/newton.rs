@@ -1,7 +1,7 @@
 //! Newton's method for a hybrid body at one stage, its linear systems by preconditioned conjugate gradients.
 //!
-//! `K d = f` is solved until conjugate gradients find a direction in which `K` is not positive, or to a thousandth; either is a descent of the potential,
-//! along which a step is sought as for bodies of tets (`solve::newton`).
+//! `K d = f` is solved until conjugate gradients find a direction in which `K` is not positive, or to a thousandth;
+//! either is a descent of the potential, along which a step is sought as for bodies of tets (`solve::newton`).
 use super::{
     awakened::Awakened,
     stage::{Forces, Line, Outer, Stage},
@@ -115,9 +115,10 @@ impl Solver<'_> {
 
     /// Whether the tangent is positive definite.
     ///
-    /// As long as conjugate gradients have met no direction of curvature below zero, the polynomial of their residual has positive roots and is one at zero, hence at
-    /// least one below: a residual never gets smaller than what the right side had of an eigenvector with a negative eigenvalue. So a residual of `1e-6`, of a
-    /// right side that has some of every eigenvector, tells that there is none.
+    /// As long as conjugate gradients have met no direction of curvature below zero, the polynomial of their residual
+    /// has positive roots and is one at zero, hence at least one below: a residual never gets smaller than what the
+    /// right side had of an eigenvector with a negative eigenvalue. So a residual of `1e-6`, of a right side that has
+    /// some of every eigenvector, tells that there is none.
     pub(super) fn is_stable(awakened: &Awakened<'_>, stage: &Stage, unknowns: &[DVec3]) -> bool {
         let mut seed = 0x9e37_79b9_7f4a_7c15_u64;
         let mut random = || {
@@ -135,7 +136,8 @@ impl Solver<'_> {
     }
 }
 
-/// Solves with the tangent at a place: the solution, how many products it took, and whether one had no positive curvature.
+/// Solves with the tangent at a place: the solution, how many products it took, and whether one had no positive
+/// curvature.
 fn linear(
     awakened: &Awakened<'_>,
     outer: &Outer,
@@ -166,7 +168,8 @@ fn linear(
     (scratch.solution, products, found_negative)
 }
 
-/// Inverse of a diagonal block over the free axes, that of the body alone where contact leaves it not positive, the identity where there is none.
+/// Inverse of a diagonal block over the free axes, that of the body alone where contact leaves it not positive, the
+/// identity where there is none.
 fn inverse_of(block: &DMat3, elastic: &DMat3, free: BVec3) -> DMat3 {
     let kept = DMat3::from_diagonal(DVec3::select(free, DVec3::ONE, DVec3::ZERO));
     let of_free = |a: &DMat3| kept * *a * kept + (DMat3::IDENTITY - kept);
@@ -197,7 +200,8 @@ fn descend(
     search(longest_step(awakened, d), slope, change, slope_at).map(|alpha| line.at(alpha))
 }
 
-/// Share of a motion in which no coupled tool moves further than a quarter of its radius: contact is not known further ahead.
+/// Share of a motion in which no coupled tool moves further than a quarter of its radius: contact is not known further
+/// ahead.
 fn longest_step(awakened: &Awakened<'_>, d: &[DVec3]) -> f64 {
     let tools = awakened.environment.tools.iter().zip(&d[awakened.entries()..]);
     tools.map(|(tool, d)| 0.25 * tool.radius_m / d.length().max(f64::MIN_POSITIVE)).fold(1.0, f64::min)
@@ -228,7 +232,8 @@ mod tests {
         world::{Model, ModelSpec},
     };
 
-    /// StVK pressed evenly to a stretch s bears `½ E (s³ − s)`, less the more it is pressed beyond s = 1/√3: one half of a block then gives way to the other.
+    /// StVK pressed evenly to a stretch s bears `½ E (s³ − s)`, less the more it is pressed beyond s = 1/√3: one half
+    /// of a block then gives way to the other.
     #[test]
     fn a_tangent_that_is_not_positive_is_told() {
         let mesh = slab();

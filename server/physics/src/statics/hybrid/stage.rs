@@ -1,4 +1,5 @@
-//! What an equilibrium of a hybrid body balances, at a fraction of the goal: forces, their tangent, and the change of potential along a line.
+//! What an equilibrium of a hybrid body balances, at a fraction of the goal: forces, their tangent, and the change of
+//! potential along a line.
 use super::awakened::Awakened;
 use crate::{
     contact::{Pressing, RestingContact, SaturatingSpring},
@@ -252,7 +253,8 @@ impl<'a> Line<'a> {
         self.x.iter().zip(self.d).map(|(x, d)| *x + *d * alpha).collect()
     }
 
-    /// Change of potential (J) from 0 to `alpha`, and the size of the rounding in it; the work of follower pressures by Simpson's rule, which is exact.
+    /// Change of potential (J) from 0 to `alpha`, and the size of the rounding in it; the work of follower pressures by
+    /// Simpson's rule, which is exact.
     pub(super) fn potential_change_j(&self, alpha: f64) -> (f64, f64) {
         let x = self.at(alpha);
         let elastic = self.awakened.elastic_j(&x) - self.elastic_j;

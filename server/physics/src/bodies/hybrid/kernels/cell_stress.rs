@@ -1,4 +1,5 @@
-//! What full and cut cells of a hybrid body's patch share: sums and differences of eight, and the stress of a vector of cells.
+//! What full and cut cells of a hybrid body's patch share: sums and differences of eight, and the stress of a vector of
+//! cells.
 use crate::{
     lanes::real::{Real, Scalar, Vector},
     material::{
@@ -14,7 +15,8 @@ use glam::DMat3;
 /// Number of lanes of the widest vector.
 const LANES: usize = 16;
 
-/// Returns the sums and differences of eight values along the three axes, `x, y, z, yz, zx, xy, xyz`; the first value is zero.
+/// Returns the sums and differences of eight values along the three axes, `x, y, z, yz, zx, xy, xyz`; the first value
+/// is zero.
 #[inline(always)]
 pub(crate) fn patterns<V: Vector>(v: &[V; 7]) -> [V; 7] {
     let [v1, v2, v3, v4, v5, v6, v7] = *v;
@@ -72,8 +74,8 @@ pub(crate) fn stress<V: Vector<Scalar = T>, T: Scalar, L: ConstitutiveLaw, const
     (p, V::of(0.0))
 }
 
-/// Returns the same for a prestrain `A` (`hybrid::prestrain`): `P̃(F (I + A)) (I + A)ᵀ`, with `F (I + A) − I = H + A + H A`;
-/// viscous stress is that of `F`. Returns `P̃ : F A` (J/m³), too.
+/// Returns the same for a prestrain `A` (`hybrid::prestrain`): `P̃(F (I + A)) (I + A)ᵀ`, with
+/// `F (I + A) − I = H + A + H A`; viscous stress is that of `F`. Returns `P̃ : F A` (J/m³), too.
 #[inline(always)]
 pub(crate) fn prestrained_stress<V: Vector<Scalar = T>, T: Scalar, L: ConstitutiveLaw, const VISCOUS: bool>(
     constants: &Constants<T>,
@@ -131,8 +133,8 @@ fn stored<V: Vector>(m: &M3<V>) -> Stored<V::Scalar> {
     lanes
 }
 
-/// Computes the lanes outside the law's domain once more, in f64. It works on stored lanes, since a function that is not
-/// inlined has no vectors of its caller's instruction set.
+/// Computes the lanes outside the law's domain once more, in f64. It works on stored lanes, since a function that is
+/// not inlined has no vectors of its caller's instruction set.
 #[cold]
 #[inline(never)]
 fn redo_outside<T: Scalar, L: ConstitutiveLaw>(

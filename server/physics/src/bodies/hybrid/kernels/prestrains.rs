@@ -61,8 +61,8 @@ impl std::ops::AddAssign for Found {
     }
 }
 
-/// Returns elastic and viscous stress (Pa) of a cell with prestrains `a` of shape and volume, the power density (W/m³) of the
-/// latter stress, and `s ∂Ψ/∂s` (J/m³).
+/// Returns elastic and viscous stress (Pa) of a cell with prestrains `a` of shape and volume, the power density (W/m³)
+/// of the latter stress, and `s ∂Ψ/∂s` (J/m³).
 #[inline(always)]
 pub(crate) fn prestrained_cell_stress<V: Vector<Scalar = T>, T: Scalar, L: ConstitutiveLaw, const VISCOUS: bool>(
     split: &Split<T>,

@@ -1,9 +1,10 @@
 //! The full cells of a hybrid body's patch, row by row along x; their oracle is `hybrid::cell`.
 //!
-//! Points (the particles of awake cells) are numbered by their sites, x first, so the particles of neighbouring cells of a row are neighbours in
-//! memory: the eight of a lane are eight shifted loads, and nothing is gathered or scattered. Lanes past a row's end are given no strain and weight 0.
-//! Forces on the particles on the left and on the right of cells are summed apart, so that loads never overlap a
-//! store just made, and added at the end: `f_i = l_i + r_{i−1}`.
+//! Points (the particles of awake cells) are numbered by their sites, x first, so the particles of neighbouring cells
+//! of a row are neighbours in memory: the eight of a lane are eight shifted loads, and nothing is gathered or
+//! scattered. Lanes past a row's end are given no strain and weight 0. Forces on the particles on the left and on the
+//! right of cells are summed apart, so that loads never overlap a store just made, and added at the end:
+//! `f_i = l_i + r_{i−1}`.
 use super::{
     cell_stress::{particles, patterns, stress},
     prestrains::{ENTRIES, Found, Split, add_lanes, entries, prestrained_cell_stress, scaled},
@@ -40,7 +41,8 @@ pub struct CellRow {
     pub prestrained: bool,
 }
 
-/// Full cells, of the lattice's spacing or twice that: their materials, and displacements, velocities and forces of their points.
+/// Full cells, of the lattice's spacing or twice that: their materials, and displacements, velocities and forces of
+/// their points.
 #[derive(Debug, Clone)]
 pub struct RowKernel {
     layout: Layout,
@@ -127,8 +129,8 @@ impl<T: Scalar> Rows<T> {
 }
 
 impl RowKernel {
-    /// Makes the kernel for cells of edge `h` (m) that answer for `fraction` of their volume, and for those of twice the edge,
-    /// whose materials are numbered after theirs. Its points are at rest.
+    /// Makes the kernel for cells of edge `h` (m) that answer for `fraction` of their volume, and for those of twice
+    /// the edge, whose materials are numbered after theirs. Its points are at rest.
     pub fn new(edge_m: f64, fraction: f64, materials: &[Material], precision: Precision, room: Room) -> Self {
         let layout = match precision {
             Precision::Single => Layout::Single(Rows::new(materials, edge_m, fraction, room)),
@@ -137,14 +139,15 @@ impl RowKernel {
         Self { layout, instruction_set: Available::best() }
     }
 
-    /// Returns the same kernel, held to an instruction set or to the best available below it (for tests and benchmarks).
+    /// Returns the same kernel, held to an instruction set or to the best available below it (for tests and
+    /// benchmarks).
     #[must_use]
     pub fn with_instruction_set(self, instruction_set: InstructionSet) -> Self {
         Self { instruction_set: Available::at_most(instruction_set), ..self }
     }
 
-    /// Sums up the forces (N) of elastic and viscous stress on the first `points` points, with the fraction `left` of the
-    /// prestrain.
+    /// Sums up the forces (N) of elastic and viscous stress on the first `points` points, with the fraction `left` of
+    /// the prestrain.
     pub fn forces(&mut self, rows: &[CellRow], points: usize, left: f64) -> Found {
         match &mut self.layout {
             Layout::Single(of) => of.sum_up(self.instruction_set, rows, points, left),
@@ -252,8 +255,8 @@ impl<T: Scalar> LawPass for RowForces<'_, T> {
 }
 
 impl<T: Scalar> RowForces<'_, T> {
-    /// Computes a vector of cells, the first of which has its points 0, 2, 4, 6 at the entries `at`; there are `cells` of them,
-    /// or more than lanes. Their prestrains, if any, start at `first_prestrain`.
+    /// Computes a vector of cells, the first of which has its points 0, 2, 4, 6 at the entries `at`; there are `cells`
+    /// of them, or more than lanes. Their prestrains, if any, start at `first_prestrain`.
     #[inline(always)]
     fn lanes<V: Vector<Scalar = T>, L: ConstitutiveLaw, const VISCOUS: bool>(
         &mut self,

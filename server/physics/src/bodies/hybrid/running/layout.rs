@@ -16,7 +16,8 @@ pub(super) enum Slot {
 }
 
 impl RunningPatch {
-    /// Lays out rows of whole cells, of either size, and blocks of other cells, material by material, without prestrain.
+    /// Lays out rows of whole cells, of either size, and blocks of other cells, material by material, without
+    /// prestrain.
     pub(super) fn lay_out(&mut self, hybrid: &HybridBody) {
         let partition = &hybrid.partition;
         for &cell in &self.prestrained_cells {

@@ -1,6 +1,8 @@
-//! The patch as the loop runs it: it is rebuilt without allocating when other particles wake, and has its cells in lanes. Its oracle is `patch`.
+//! The patch as the loop runs it: it is rebuilt without allocating when other particles wake, and has its cells in
+//! lanes. Its oracle is `patch`.
 //!
-//! *Points* are the particles of awake cells, ascending: those that are active, and the constrained points, which follow the coarse nodes.
+//! *Points* are the particles of awake cells, ascending: those that are active, and the constrained points, which
+//! follow the coarse nodes.
 mod layout;
 #[cfg(test)]
 mod tests;
@@ -229,7 +231,8 @@ impl RunningPatch {
         &self.active
     }
 
-    /// Wakes these particles (ascending, no more than there is room for) and no others, with these prestrains. Allocates nothing.
+    /// Wakes these particles (ascending, no more than there is room for) and no others, with these prestrains.
+    /// Allocates nothing.
     pub(crate) fn wake(&mut self, hybrid: &HybridBody, active: &[u32], decay: &PrestrainDecay) {
         (0..Self::SLICES).for_each(|slice| self.set_slice(hybrid, active, slice));
         self.put_prestrains(decay);

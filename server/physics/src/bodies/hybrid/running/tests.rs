@@ -35,8 +35,8 @@ fn some_prestrain(hybrid: &HybridBody, cells: &[u32], random: &mut Random) -> Pr
     decay
 }
 
-/// Forces, power, accelerations and momenta are those of the oracle, whichever particles were awake before, with whichever
-/// prestrain.
+/// Forces, power, accelerations and momenta are those of the oracle, whichever particles were awake before, with
+/// whichever prestrain.
 #[test]
 fn running_patch_and_oracle_agree() {
     let [stvk, neo, corotated] = tissue();

@@ -15,7 +15,8 @@ use crate::{
     material::{ConstitutiveLaw, LawPass},
 };
 
-/// Number of blocks that are gathered, computed and scattered together: a wide load waits for the narrow stores it overlaps.
+/// Number of blocks that are gathered, computed and scattered together: a wide load waits for the narrow stores it
+/// overlaps.
 const BATCH: usize = 4;
 
 /// Points 1 to 3, 4 to 6, and 7 of a block's cells, three components each; entries beyond them stay zero.
@@ -92,8 +93,8 @@ fn store<V: Vector, const N: usize>(values: &[V; 7], corners: &mut Corners<V::Sc
     }
 }
 
-/// Returns `Σ_p a_p b_pᵀ` of some lanes. It is not a closure, since one that is not inlined has no vectors of its caller's
-/// instruction set.
+/// Returns `Σ_p a_p b_pᵀ` of some lanes. It is not a closure, since one that is not inlined has no vectors of its
+/// caller's instruction set.
 #[inline(always)]
 fn gradient<V: Vector, const N: usize>(
     block: &CutBlock<V::Scalar, N>,

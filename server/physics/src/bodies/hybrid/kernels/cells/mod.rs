@@ -1,7 +1,8 @@
 //! The cut cells of a hybrid body's patch (`hybrid::cell`), in blocks of lanes; their oracle is `hybrid::cell`.
 //!
-//! A cut cell carries its gradients and modes, and has its points anywhere. Displacements are taken as differences to the first point in f64 and
-//! rounded then; forces are summed in f64, that on the first point as minus the sum of the others.
+//! A cut cell carries its gradients and modes, and has its points anywhere. Displacements are taken as differences to
+//! the first point in f64 and rounded then; forces are summed in f64, that on the first point as minus the sum of the
+//! others.
 mod forces;
 #[cfg(test)]
 pub(crate) mod testing;
@@ -21,7 +22,8 @@ use forces::CutForces;
 use glam::DVec3;
 use std::ops::Range;
 
-/// Consecutive cells are spread over the lanes of this many blocks: sums of one point would wait for each other in the scatter.
+/// Consecutive cells are spread over the lanes of this many blocks: sums of one point would wait for each other in the
+/// scatter.
 const BLOCKS_PER_WINDOW: usize = 16;
 /// Cut cells in lanes. Lanes of padding have the spare point eight times, and zeros.
 #[derive(Debug, Clone)]
@@ -102,7 +104,8 @@ impl CutCells {
         }
     }
 
-    /// Returns the same kernel, held to an instruction set or to the best available below it (for tests and benchmarks).
+    /// Returns the same kernel, held to an instruction set or to the best available below it (for tests and
+    /// benchmarks).
     #[must_use]
     pub fn with_instruction_set(self, instruction_set: InstructionSet) -> Self {
         Self { instruction_set: Available::at_most(instruction_set), ..self }
@@ -116,8 +119,8 @@ impl CutCells {
         }
     }
 
-    /// Starts a run of `cells` cells of one material, without prestrain, to be filled by [`Self::put`]. Does not allocate
-    /// within the capacity.
+    /// Starts a run of `cells` cells of one material, without prestrain, to be filled by [`Self::put`]. Does not
+    /// allocate within the capacity.
     pub fn start(&mut self, material: u16, cells: usize) {
         match &mut self.layout {
             Layout::Single(blocks) => blocks.start(material, cells),
@@ -171,8 +174,8 @@ impl CutCells {
         }
     }
 
-    /// Sums up the forces (N) of elastic and viscous stress on the first `points` points, with the fraction `left` of the
-    /// prestrain.
+    /// Sums up the forces (N) of elastic and viscous stress on the first `points` points, with the fraction `left` of
+    /// the prestrain.
     pub fn forces(&mut self, points: usize, left: f64) -> Found {
         let Self { layout, instruction_set, displacements, velocities, sums } = self;
         sums[..points].fill(Sum::default());

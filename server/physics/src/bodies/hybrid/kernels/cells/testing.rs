@@ -29,8 +29,9 @@ pub(crate) struct Answer {
     pub(crate) power_w: f64,
 }
 
-/// Asserts that a kernel finds the forces of the plain code, whatever the law and the precision, and the same bits with every
-/// instruction set. The cells are those of a ball, all or only the full ones; the largest displacements turn some inside out.
+/// Asserts that a kernel finds the forces of the plain code, whatever the law and the precision, and the same bits with
+/// every instruction set. The cells are those of a ball, all or only the full ones; the largest displacements turn some
+/// inside out.
 pub(crate) fn agrees_with_oracle(only_full: bool, kernel: impl Fn(&Question<'_>) -> Answer) {
     let (mut cells, rest) = ball_cells();
     let whole = cells.iter().map(|(_, c)| c.volume_m3).fold(0.0, f64::max) * (1.0 - 1e-12);

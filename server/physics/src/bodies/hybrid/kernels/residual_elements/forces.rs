@@ -178,8 +178,8 @@ fn gather<V: Vector, const N: usize>(nodes: &[[u32; N]], values: &[Node], edges:
     }
 }
 
-/// Adds the nodes' forces, lane after lane, so that the order, and hence the bits, are always the same. `f_0 = −Σ f_i` is summed
-/// in f64.
+/// Adds the nodes' forces, lane after lane, so that the order, and hence the bits, are always the same. `f_0 = −Σ f_i`
+/// is summed in f64.
 #[inline(always)]
 fn scatter<T: Scalar, const N: usize>(nodes: &[[u32; N]], forces: &[Lanes<T, N>], sums: &mut [Sum]) {
     for first in (0..N).step_by(4) {

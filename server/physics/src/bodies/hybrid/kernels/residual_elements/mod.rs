@@ -1,8 +1,10 @@
-//! The residual elements of a hybrid body's coarse tets (`hybrid::residual_element` is the oracle), in blocks of lanes: one tet per lane.
+//! The residual elements of a hybrid body's coarse tets (`hybrid::residual_element` is the oracle), in blocks of lanes:
+//! one tet per lane.
 //!
-//! A lane's nodes are its tet's ten and those of neighbouring tets that its cells' particles follow. The parts' moments are kept only where some lane of a block
-//! has one, part by part; so nodes that have moments of the same parts get the same local numbers in their lanes ([`assign_local_nodes`]). The first node needs no
-//! moments, for they sum to zero. Cells that wake are taken from a lane's moments and volumes in place.
+//! A lane's nodes are its tet's ten and those of neighbouring tets that its cells' particles follow. The parts' moments
+//! are kept only where some lane of a block has one, part by part; so nodes that have moments of the same parts get the
+//! same local numbers in their lanes ([`assign_local_nodes`]). The first node needs no moments, for they sum to zero.
+//! Cells that wake are taken from a lane's moments and volumes in place.
 mod forces;
 
 use super::prestrains::Found;
@@ -112,7 +114,8 @@ impl ResidualKernel {
         }
     }
 
-    /// Returns the same kernel, held to an instruction set or to the best available below it (for tests and benchmarks).
+    /// Returns the same kernel, held to an instruction set or to the best available below it (for tests and
+    /// benchmarks).
     #[must_use]
     pub fn with_instruction_set(self, instruction_set: InstructionSet) -> Self {
         Self { instruction_set: Available::at_most(instruction_set), ..self }
@@ -134,8 +137,8 @@ impl ResidualKernel {
         }
     }
 
-    /// Adds forces (N) of elastic and viscous stress to `forces_n` at `displacements_m` and velocities `v` of the coarse nodes,
-    /// with the fraction `left` of the prestrain.
+    /// Adds forces (N) of elastic and viscous stress to `forces_n` at `displacements_m` and velocities `v` of the
+    /// coarse nodes, with the fraction `left` of the prestrain.
     pub fn add_forces_n(&mut self, displacements_m: &[DVec3], v: &[DVec3], left: f64, forces_n: &mut [DVec3]) -> Found {
         let Self { layout, instruction_set, displacements, velocities, sums } = self;
         for (to, from) in displacements.iter_mut().zip(displacements_m) {
@@ -317,9 +320,9 @@ impl<T: Scalar, const N: usize> Tables<T, N> {
 }
 
 /// Returns a local number for every node of a residual element, among those of a block that have moments of the parts
-/// `parts_of_local_node`, a bit each; these grow by the parts of the element's nodes. The node with moments of most parts is the
-/// first. Any other gets the number to which the fewest parts have to be added, and of such numbers the one of whose parts it
-/// leaves the fewest unused.
+/// `parts_of_local_node`, a bit each; these grow by the parts of the element's nodes. The node with moments of most
+/// parts is the first. Any other gets the number to which the fewest parts have to be added, and of such numbers the
+/// one of whose parts it leaves the fewest unused.
 fn assign_local_nodes(residual: &ResidualElement, parts_of_local_node: &mut Vec<u8>) -> Vec<u16> {
     let parts_of = |moments: &[DVec3; PARTS]| {
         moments.iter().enumerate().fold(0_u8, |parts, (part, moment)| parts | u8::from(*moment != DVec3::ZERO) << part)
