@@ -7,10 +7,11 @@
 //! - Body: `dF/dδ = 2 E* a` holds for every axisymmetric punch on an elastic half space (Bulychev, Alekhin & Shorshorov
 //!   1975; Pharr, Oliver & Brotzen 1992), with the contact radius `a`.
 //! - Contact radius, from force and energy of the foundation, which vary smoothly while the number of samples jumps:
-//!   `π a² = F²/(c k_f Φ)`, with c = 16/9 for Hertz's pressure and 3/2 for a parabolic one; `c = 1.65` is 4 % off either radius.
+//!   `π a² = F²/(c k_f Φ)`, with c = 16/9 for Hertz's pressure and 3/2 for a parabolic one; `c = 1.65` is 4 % off
+//!   either radius.
 //! - Foundation: `K_f = k_f π a²`.
-//! - `s` corrects for what the half space leaves out (thin walls, bonded layers, large strain, the mesh): it is the ratio of
-//!   measured secants `ΔF/Δδ` of recent ticks to `K₀`, averaged in its logarithm and limited to
+//! - `s` corrects for what the half space leaves out (thin walls, bonded layers, large strain, the mesh): it is the
+//!   ratio of measured secants `ΔF/Δδ` of recent ticks to `K₀`, averaged in its logarithm and limited to
 //!   [1/[`MOST_CORRECTION`], [`MOST_CORRECTION`]].
 //!
 //! Across the normal the stiffness of the sticking part of the contact is `2(1 − ν)/(2 − ν) ≈ 0.75` of that (Mindlin);

@@ -9,12 +9,12 @@
 //! mm/s, of which a damper of 2 N s/m makes a buzz of 0.1 N.
 //!
 //! What keeps it outside, whatever the device does:
-//! - The spring saturates ([`super::spring`]) at `F_max`, the force that presses a sphere of its radius [`SATURATION_DEPTH`]·R into the flat
-//!   foundation. The damper is cut where the sum exceeds it.
-//! - It moves at most `R/4` in a substep; within `R/4` of the surface it approaches the nearest point, seen from there, with at
-//!   most the kinetic energy that the flat foundation stores at depth [`IMPACT_DEPTH`]·R. The rest is taken from the (virtual) tool,
-//!   never given to tool or body. In contact that point moves with the dent, which the body will stop: there a surface that gives
-//!   way allows no more speed than one at rest.
+//! - The spring saturates ([`super::spring`]) at `F_max`, the force that presses a sphere of its radius
+//!   [`SATURATION_DEPTH`]·R into the flat foundation. The damper is cut where the sum exceeds it.
+//! - It moves at most `R/4` in a substep; within `R/4` of the surface it approaches the nearest point, seen from there,
+//!   with at most the kinetic energy that the flat foundation stores at depth [`IMPACT_DEPTH`]·R. The rest is taken
+//!   from the (virtual) tool, never given to tool or body. In contact that point moves with the dent, which the body
+//!   will stop: there a surface that gives way allows no more speed than one at rest.
 //!
 //! A tool that turns is advanced in its orientation likewise ([`super::turning`]).
 use super::{

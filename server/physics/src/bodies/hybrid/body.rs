@@ -13,7 +13,7 @@ use super::{
     sizes,
     spec::{HybridError, ParticleSpec},
     transition_force::is_free,
-    trilinear_point::{CellPoint, TrilinearPoint},
+    trilinear_point::CellPoint,
 };
 use crate::{
     elements::{
@@ -279,46 +279,6 @@ impl HybridBody {
     /// Computes the bounding boxes of the skin's triangles, given in the order of contact's broad phase.
     pub(crate) fn cluster(&mut self, triangles: &[[u32; 3]]) {
         self.clusters = SkinClusters::new(self, self.skin_rest_m(), triangles);
-    }
-
-    /// Returns the masses (kg) that contact may take for those of the skin's vertices: with the area `A_v` of a vertex,
-    /// `A_v min_p m_p/A_p` over its particles, `A_p = Σ_v w_vp A_v`. Each of a vertex's particles then bears what a
-    /// foundation does to the vertex per area.
-    pub(crate) fn vertex_masses_kg(&self) -> Vec<f64> {
-        let skin = &self.particles.skin;
-        let mut vertex_m2 = vec![0.0; self.vertex_points.len()];
-        for triangle in 0..skin.triangles().len() {
-            let [a, b, c] = skin.corners_m(triangle);
-            let third = (b - a).cross(c - a).length() / 6.0;
-            skin.triangles()[triangle].iter().for_each(|&vertex| vertex_m2[vertex as usize] += third);
-        }
-        let points = || self.vertex_points.iter().map(|point| point.trilinear(&self.partition)).zip(&vertex_m2);
-        let mut particle_m2 = vec![0.0; self.partition.particle_count()];
-        for (point, area_m2) in points() {
-            for (particle, weight) in point.particles.into_iter().zip(point.weights) {
-                particle_m2[particle as usize] += weight.max(0.0) * area_m2;
-            }
-        }
-        let per_area = |particle: u32| self.masses.particle_kg[particle as usize] / particle_m2[particle as usize];
-        let of_vertex = |(point, area_m2): (TrilinearPoint, &f64)| {
-            let carriers = point.particles.into_iter().zip(point.weights).filter(|(_, weight)| *weight > 1e-6);
-            area_m2 * carriers.map(|(particle, _)| per_area(particle)).fold(f64::INFINITY, f64::min)
-        };
-        points().map(of_vertex).collect()
-    }
-
-    /// Returns the springs (N/m) at vertices of the skin as their particles feel them: the row sums of
-    /// `Σ_v k_v w_v w_vᵀ`.
-    pub(crate) fn particle_springs_n_per_m(&self, of_vertices_n_per_m: &[f64]) -> Vec<f64> {
-        let mut springs = vec![0.0; self.partition.particle_count()];
-        for (point, stiffness) in self.vertex_points.iter().zip(of_vertices_n_per_m) {
-            let amplification = point.amplification();
-            let point = point.trilinear(&self.partition);
-            for (particle, weight) in point.particles.into_iter().zip(point.weights) {
-                springs[particle as usize] += stiffness * weight.abs() * amplification;
-            }
-        }
-        springs
     }
 
     /// Returns the material of the tet that a vertex of the skin is in.

@@ -1,5 +1,8 @@
 //! What carries the skin's vertices; their positions are computed when they are asked for.
-use super::{body::HybridBody, clusters::Displaced, composite::Anchor, partition::NONE, running::RunningPatch};
+use super::{
+    body::HybridBody, clusters::Displaced, composite::Anchor, partition::NONE, running::RunningPatch,
+    trilinear_point::TrilinearPoint,
+};
 use crate::{contact::Skin, tick::CarriedSkin};
 use glam::DVec3;
 
@@ -167,5 +170,45 @@ impl HybridBody {
         let cell_point = self.vertex_points[vertex as usize].trilinear(&self.partition);
         let rest_m = self.skin_rest_m()[vertex as usize];
         rest_m + cell_point.particles.into_iter().zip(cell_point.weights).map(|(p, w)| moved(p) * w).sum::<DVec3>()
+    }
+
+    /// Returns the masses (kg) that contact may take for those of the skin's vertices: with the area `A_v` of a vertex,
+    /// `A_v min_p m_p/A_p` over its particles, `A_p = Σ_v w_vp A_v`. Each of a vertex's particles then bears what a
+    /// foundation does to the vertex per area.
+    pub(crate) fn vertex_masses_kg(&self) -> Vec<f64> {
+        let skin = &self.particles.skin;
+        let mut vertex_m2 = vec![0.0; self.vertex_points.len()];
+        for triangle in 0..skin.triangles().len() {
+            let [a, b, c] = skin.corners_m(triangle);
+            let third = (b - a).cross(c - a).length() / 6.0;
+            skin.triangles()[triangle].iter().for_each(|&vertex| vertex_m2[vertex as usize] += third);
+        }
+        let points = || self.vertex_points.iter().map(|point| point.trilinear(&self.partition)).zip(&vertex_m2);
+        let mut particle_m2 = vec![0.0; self.partition.particle_count()];
+        for (point, area_m2) in points() {
+            for (particle, weight) in point.particles.into_iter().zip(point.weights) {
+                particle_m2[particle as usize] += weight.max(0.0) * area_m2;
+            }
+        }
+        let per_area = |particle: u32| self.masses.particle_kg[particle as usize] / particle_m2[particle as usize];
+        let of_vertex = |(point, area_m2): (TrilinearPoint, &f64)| {
+            let carriers = point.particles.into_iter().zip(point.weights).filter(|(_, weight)| *weight > 1e-6);
+            area_m2 * carriers.map(|(particle, _)| per_area(particle)).fold(f64::INFINITY, f64::min)
+        };
+        points().map(of_vertex).collect()
+    }
+
+    /// Returns the springs (N/m) at vertices of the skin as their particles feel them: the row sums of
+    /// `Σ_v k_v w_v w_vᵀ`.
+    pub(crate) fn particle_springs_n_per_m(&self, of_vertices_n_per_m: &[f64]) -> Vec<f64> {
+        let mut springs = vec![0.0; self.partition.particle_count()];
+        for (point, stiffness) in self.vertex_points.iter().zip(of_vertices_n_per_m) {
+            let amplification = point.amplification();
+            let point = point.trilinear(&self.partition);
+            for (particle, weight) in point.particles.into_iter().zip(point.weights) {
+                springs[particle as usize] += stiffness * weight.abs() * amplification;
+            }
+        }
+        springs
     }
 }

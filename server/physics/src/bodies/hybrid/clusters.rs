@@ -4,7 +4,8 @@
 //! shifted and widened by the least and largest displacement of the coarse nodes it follows, and by how far any active
 //! particle is from where it would be asleep:
 //! ```text
-//! x = X + Σ_i w_i u_i + Σ_p w_p d_p,   Σ w_i = 1, Σ |w_i| ≤ a:   x − X ∈ ū ± (a ½(u_max − u_min) + a max |d_p|),   ū = ½(u_min + u_max)
+//! x = X + Σ_i w_i u_i + Σ_p w_p d_p,   Σ w_i = 1, Σ |w_i| ≤ a
+//! x − X ∈ ū ± (a ½(u_max − u_min) + a max |d_p|),   ū = ½(u_min + u_max)
 //! ```
 //! The last term is left out where no active particle carries a vertex.
 use super::body::HybridBody;

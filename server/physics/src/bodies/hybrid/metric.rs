@@ -10,7 +10,8 @@
 //! momentum, linear or angular. If lumped mass were transferred (`M_i − Σ m_p ζ_pi`), a turning body would lose angular
 //! momentum, for lumps are farther out than what they stand for. The coarse mass matrix is
 //! ```text
-//! M' = diag(M_i) − (1 − ε) Σ_{p∈A} m_p ζ_p ζ_pᵀ      ≥ ε diag(Σ_{p∈A} m_p ζ_pi) + diag(Σ_{p∉A} m_p ζ_pi)      (ζ ≥ 0, Σ ζ = 1: Jensen)
+//! M' = diag(M_i) − (1 − ε) Σ_{p∈A} m_p ζ_p ζ_pᵀ
+//!    ≥ ε diag(Σ_{p∈A} m_p ζ_pi) + diag(Σ_{p∉A} m_p ζ_pi)      (ζ ≥ 0, Σ ζ = 1: Jensen)
 //! ```
 //! It is positive definite, and diagonal but for a small dense block of the nodes that active particles follow, which
 //! is factorised when the set changes.

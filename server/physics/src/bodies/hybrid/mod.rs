@@ -1,4 +1,5 @@
 //! The hybrid body: coarse tetrahedra throughout, and particles of which only those near a contact are awake.
+mod activation_query;
 pub mod body;
 mod build;
 mod carried_skin;

@@ -393,8 +393,7 @@ mod tests {
             }
             let volume_m3: f64 = (0..partition.cells().len()).flat_map(|cell| partition.particles_m3(cell)).sum();
             assert!((volume_m3 / partition.volume_m3() - 1.0).abs() < 1e-12);
-            let pairs: usize = (0..partition.particle_count() as u32).map(|p| partition.cells_at(p).count()).sum();
-            assert_eq!(pairs, 8 * partition.cells().len());
+            assert_eq!(all().map(|p| partition.cells_at(p).count()).sum::<usize>(), 8 * partition.cells().len());
         }
     }
 }

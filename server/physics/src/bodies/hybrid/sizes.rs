@@ -9,7 +9,8 @@
 //! corner along axes `A` from it hangs, the block's own corner in that direction takes its place among the cell's
 //! particles, so that it has eight again. With corners numbered by bits (`sites`), and particles likewise,
 //! ```text
-//! y_c = Σ_p T_cp y_p        T_cp = 2^−|A| for p = v ⊕ B, B ⊆ A, of a corner c = v ⊕ A that hangs;  T_cc = 1 of one that does not
+//! y_c = Σ_p T_cp y_p
+//! T_cp = 2^−|A| for p = v ⊕ B, B ⊆ A, of a corner c = v ⊕ A that hangs;  T_cc = 1 of one that does not
 //! ```
 //! If the middle of a face hangs, so do those of its edges: the corners that `T` refers to exist. All that is linear in
 //! a cell's corners (gradients, hourglasses, weights, masses) is transferred to its particles by `Tᵀ`. Affine motion is

@@ -11,13 +11,15 @@
 //! coarse nodes, and all of it together a couple: with `m = (1 − ε) m_p`, the position `x_p = Σ_i ζ_pi x_i` that a
 //! particle has then, and the free nodes of its tets, of masses `M_i` about their middle `x̄`,
 //! ```text
-//! J_i = Σ_p m ζ_pi (w_p − Σ_j ζ_pj v_j) + M_i α × (x_i − x̄)       Σ_i M_i (x_i − x̄) × (α × (x_i − x̄)) = Σ_p m (y_p − x_p) × w_p
+//! J_i = Σ_p m ζ_pi (w_p − Σ_j ζ_pj v_j) + M_i α × (x_i − x̄)
+//! Σ_i M_i (x_i − x̄) × (α × (x_i − x̄)) = Σ_p m (y_p − x_p) × w_p
 //! v ← v + M''⁻¹ J
 //! ```
 //! with the matrix `M''` of what stays awake. So linear and angular momentum are kept. Coarse nodes are moved by `Δ_i`
 //! then (`projection`), for which `−Σ_i Δ_i × P_i`, with the momenta `P = M'' v + J`, is added to the couple on the
 //! right.
 use super::{
+    activation_query::update_balls,
     body::HybridBody,
     carried_skin::SkinView,
     patch::KEPT,
@@ -25,14 +27,14 @@ use super::{
     running::RunningPatch,
     running_metric::RunningMetric,
     scratch::HybridScratch,
-    spec::{ParticleSpec, Waking},
+    spec::Waking,
     state::{HybridState, axis_sample_counts},
     state_transfer::{NodeShifts, PatchSwitch},
     stepped::SteppedHybrid,
     transition_force::{Turn, turn_of},
 };
 use crate::{
-    contact::{Near, Skin, ToolSpec},
+    contact::ToolSpec,
     tick::{Environment, MechanicalState},
 };
 use glam::{BVec3, DVec3};
@@ -42,17 +44,11 @@ use serde::{Deserialize, Serialize};
 const SWITCH_TICKS: u64 = 2 + RunningPatch::SLICES as u64;
 /// Number of ticks between two activation queries. After each, what is to sleep falls asleep, and then what is to wake
 /// wakes: both in one tick would take too long.
-const LOOK_EVERY_TICKS: u64 = 2 * SWITCH_TICKS;
-/// Time (s) before its contact at which an approaching tool wakes particles.
-const AHEAD_S: f64 = 0.05;
-/// Number of ticks for which a tool has to be away until its ball is given up.
-const AWAY_TICKS: u32 = 100;
+pub(super) const LOOK_EVERY_TICKS: u64 = 2 * SWITCH_TICKS;
 /// Gap, over the tool's radius and over the spacing, below which a tool's particles are awake.
 pub(crate) const GAP: f64 = 0.25;
 /// Distance, over the spacing, that the skin's nearest vertex moves at rest before a ball follows.
 pub(crate) const FOLLOW: f64 = 0.9;
-/// Deviation over the spacing below which a particle may fall asleep.
-const SETTLED: f64 = 0.04;
 
 /// The ball whose particles a tool keeps awake, about one of the samples of its axis.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -67,13 +63,13 @@ pub(crate) struct Ball {
 #[derive(Debug, Clone, Default)]
 pub(super) struct ActivationQuery {
     /// Particles in a tool's balls, each with its squared distance (m²).
-    found: Vec<(f64, u32)>,
+    pub(super) found: Vec<(f64, u32)>,
     /// Whether each particle is among these.
-    is_found: Vec<bool>,
+    pub(super) is_found: Vec<bool>,
     /// Particles that are to be awake.
-    wanted: Vec<u32>,
+    pub(super) wanted: Vec<u32>,
     /// Active particles that no tool wants, each with its distance (m) from where it would be asleep.
-    unwanted: Vec<(f64, u32)>,
+    pub(super) unwanted: Vec<(f64, u32)>,
     moved: Vec<DVec3>,
     /// Impulses (kg m/s) transferred to coarse nodes.
     impulses: Vec<DVec3>,
@@ -267,63 +263,6 @@ impl HybridScratch {
     }
 }
 
-/// Updates the tools' balls.
-fn update_balls(
-    environment: &Environment,
-    view: &mut SkinView<'_>,
-    body: &HybridBody,
-    own: &mut HybridState,
-    state: &MechanicalState,
-) {
-    let MechanicalState { tools, contact, force_is_current, .. } = state;
-    let spacing_m = body.particles.spacing_m;
-    let fitted = force_is_current.then(|| contact.boxes());
-    view.begin();
-    let samples = tools.iter().zip(&environment.tools).zip(axis_sample_counts(body, &environment.tools));
-    let samples =
-        samples.flat_map(|((tool, spec), count)| tool.axis_samples(spec, count).map(move |sample| (sample, spec)));
-    for ((sample, spec), ball) in samples.zip(&mut own.balls) {
-        let near_m = (GAP * spec.radius_m).max(GAP * spacing_m) + AHEAD_S * sample.speed_m_per_s;
-        let Near { vertex, gap_m, .. } = sample.look(view, (near_m, environment.contact.covering_radius_m), fitted);
-        match (ball.as_mut(), vertex) {
-            (_, Some((vertex, _))) if gap_m < near_m => {
-                let rest_m = body.skin_rest_m()[vertex as usize];
-                let moved = ball.is_none_or(|ball| ball.rest_m.distance(rest_m) > FOLLOW * spacing_m);
-                let rest_m = if moved { rest_m } else { ball.map_or(rest_m, |ball| ball.rest_m) };
-                *ball = Some(Ball { rest_m, away_ticks: 0 });
-            }
-            (Some(own), _) if gap_m > 2.0 * near_m => {
-                own.away_ticks += LOOK_EVERY_TICKS as u32;
-                if own.away_ticks >= AWAY_TICKS {
-                    *ball = None;
-                }
-            }
-            (Some(own), _) => own.away_ticks = 0,
-            (None, _) => {}
-        }
-    }
-}
-
-/// Returns the squared distance (m²) of a point `p` to the middles of balls, and to the lines between those of
-/// neighbours, `a` and `b`:
-/// ```text
-/// |p − a − s (b − a)|²,   s = (p − a)·(b − a)/|b − a|², limited to 0 to 1
-/// ```
-fn distance_to_balls_sq(balls: &[Option<Ball>], at_m: DVec3) -> f64 {
-    let (mut nearest_sq, mut before_m) = (f64::INFINITY, None);
-    for ball in balls {
-        let middle_m = ball.map(|ball| ball.rest_m);
-        if let Some(to_m) = middle_m {
-            let from_m = before_m.unwrap_or(to_m);
-            let along_m = to_m - from_m;
-            let part = (at_m - from_m).dot(along_m) / along_m.length_squared().max(f64::MIN_POSITIVE);
-            nearest_sq = nearest_sq.min(at_m.distance_squared(from_m + along_m * part.clamp(0.0, 1.0)));
-        }
-        before_m = middle_m;
-    }
-    nearest_sq
-}
-
 impl ActivationQuery {
     /// Transfers the impulse of a particle at `y` (m) with velocity `w` (m/s), which falls asleep, to the coarse nodes.
     /// Returns its couple (kg m²/s), and its distance (m) from where it will be asleep.
@@ -376,60 +315,5 @@ impl ActivationQuery {
         for ((impulse, weight), x) in self.impulses.iter_mut().zip(&self.weights_kg).zip(x) {
             *impulse += turn.cross(*x - middle) * *weight;
         }
-    }
-
-    /// Finds the particles in the tools' balls, ascending. Where there is no room for all, each tool gets as many:
-    /// those nearest to the middles of its balls, and to the lines between those of neighbours.
-    fn want(&mut self, body: &HybridBody, tools: &[ToolSpec], own: &HybridState, reach_m: f64, most: usize) {
-        self.wanted.clear();
-        let of_tool = |first: &mut usize, count: usize| {
-            *first += count;
-            Some(&own.balls[*first - count..*first])
-        };
-        let tools = || axis_sample_counts(body, tools).scan(0, of_tool);
-        let room = most / tools().filter(|balls| balls.iter().any(Option::is_some)).count().max(1);
-        for balls in tools() {
-            self.found.clear();
-            for (number, ball) in balls.iter().enumerate().filter_map(|(number, ball)| Some((number, (*ball)?))) {
-                // As samples are no farther from each other than balls reach, balls after the next two have hardly a
-                // particle of this one.
-                let near = &balls[number.saturating_sub(1)..(number + 4).min(balls.len())];
-                body.partition.particles_within(ball.rest_m, reach_m, |particle, distance_sq| {
-                    let is_found = &mut self.is_found[particle as usize];
-                    if body.may_wake(particle) && !std::mem::replace(is_found, true) {
-                        let at_m = body.partition.particle_m(particle);
-                        // Of a single ball the distance from its middle is known already.
-                        let is_alone = balls.len() == 1;
-                        self.found
-                            .push((if is_alone { distance_sq } else { distance_to_balls_sq(near, at_m) }, particle));
-                    }
-                });
-            }
-            for (_, particle) in &self.found {
-                self.is_found[*particle as usize] = false;
-            }
-            if self.found.len() > room {
-                self.found.select_nth_unstable_by(room, |a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-                self.found.truncate(room);
-            }
-            self.wanted.extend(self.found.iter().map(|(_, particle)| *particle));
-        }
-        self.wanted.sort_unstable();
-        self.wanted.dedup();
-    }
-
-    /// Keeps active particles awake that no tool wants but that are not settled, as long as there is room; those that
-    /// are farthest from where they would be asleep come first.
-    fn keep_unsettled(&mut self, patch: &RunningPatch, particles: &ParticleSpec) {
-        self.unwanted.clear();
-        for (particle, deviation_m) in patch.deviations_m() {
-            if deviation_m > SETTLED * particles.spacing_m && self.wanted.binary_search(&particle).is_err() {
-                self.unwanted.push((deviation_m, particle));
-            }
-        }
-        self.unwanted.sort_unstable_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
-        let room = particles.most_active.saturating_sub(self.wanted.len());
-        self.wanted.extend(self.unwanted.iter().take(room).map(|(_, particle)| *particle));
-        self.wanted.sort_unstable();
     }
 }

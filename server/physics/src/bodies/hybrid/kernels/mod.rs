@@ -5,6 +5,7 @@ mod cell_stress;
 mod cells;
 mod prestrains;
 mod residual_elements;
+mod row_lanes;
 mod rows;
 
 pub use cells::CutCells;

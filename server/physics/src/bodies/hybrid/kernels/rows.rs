@@ -8,6 +8,7 @@
 use super::{
     cell_stress::{particles, patterns, stress},
     prestrains::{ENTRIES, Found, Split, add_lanes, entries, prestrained_cell_stress, scaled},
+    row_lanes::{LANES, add, differences, first_lanes, matrix},
 };
 use crate::{
     bodies::hybrid::{
@@ -16,15 +17,12 @@ use crate::{
     },
     lanes::{
         Available, InstructionSet,
-        real::{Real, Scalar, Vector},
+        real::{Scalar, Vector},
     },
-    material::{ConstitutiveLaw, LawPass, Material, lane_matrix::M3},
+    material::{ConstitutiveLaw, LawPass, Material},
     settings::Precision,
 };
 use glam::DVec3;
-
-/// Number of lanes of the widest vector; arrays end on so many entries that belong to no point.
-const LANES: usize = 16;
 
 /// Full cells, one after the other along x.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -332,49 +330,6 @@ impl<T: Scalar> RowForces<'_, T> {
             add_lanes(density * weight * V::of(-minus_volume), power_w);
         }
     }
-}
-
-#[inline(always)]
-fn matrix<V: Vector>(entries: &[Vec<V::Scalar>], first: usize) -> M3<V> {
-    let mut m = [[V::of(0.0); 3]; 3];
-    for row in 0..3 {
-        for column in 0..3 {
-            m[row][column] = V::load(&entries[3 * row + column][first..]);
-        }
-    }
-    m
-}
-
-#[inline(always)]
-fn add<V: Vector>(sums: &mut [V::Scalar], a: V) {
-    (V::load(sums) + a).store(sums);
-}
-
-/// Returns 1 in the first lanes, 0 in the others.
-#[inline(always)]
-fn first_lanes<V: Vector>(count: usize) -> V {
-    let mut lanes = [V::Scalar::of(0.0); LANES];
-    for lane in 0..LANES {
-        if lane < count {
-            lanes[lane] = V::Scalar::of(1.0);
-        }
-    }
-    V::load(&lanes)
-}
-
-/// Returns `a_p − a_0` of points 1 to 7.
-#[inline(always)]
-fn differences<V: Vector>(values: &[V::Scalar], at: [usize; 4]) -> [V; 7] {
-    let zero = V::load(&values[at[0]..]);
-    let mut found = [V::of(0.0); 7];
-    for row in 0..4 {
-        let values = &values[at[row]..=at[row] + V::WIDTH];
-        if row > 0 {
-            found[2 * row - 1] = V::load(values) - zero;
-        }
-        found[2 * row] = V::load(&values[1..]) - zero;
-    }
-    found
 }
 
 #[cfg(test)]
