@@ -60,7 +60,7 @@ pub(crate) fn max_natural_frequency_with(
     (theta + residual).min(bound * bound + spring_bound_sq).sqrt()
 }
 
-/// `max_e ω_e ≥ ω_max` (rad/s): the frequency bound of single tets, each with its share `m_i V_e/Σ_{t∋i} V_t` of its
+/// `max_e ω_e ≥ ω_max` (rad/s): the frequency bound of single tets, each with its part `m_i V_e/Σ_{t∋i} V_t` of its
 /// nodes' masses (Irons & Treharne 1971: by Rayleigh's quotient no assembly of elements is faster than the fastest of
 /// them).
 ///

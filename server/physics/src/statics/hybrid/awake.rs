@@ -1,10 +1,10 @@
-//! Which particles are awake in an equilibrium.
+//! Finds which particles are awake in an equilibrium.
 //!
-//! Those that a tool would keep awake where it rests, by the rules of the loop (`hybrid::switching`): a ball about the
-//! vertex of the skin nearest to where it is deepest, or to it. And those within the same reach of vertices that a load
-//! acts on, as its press is as local as a tool's. Where there is no room for all of a claim, the nearest; but if there
-//! is none even for those within a spacing of a load, it is spread wide, and left to the coarse tets: some of the
-//! particles beneath it, chosen by nothing, would make a pattern of it.
+//! They are those that a tool would keep awake where it rests, by the rules of the loop (`hybrid::switching`): a ball
+//! about the vertex of the skin nearest to the tool, or nearest to where it is deepest. So are those within the same
+//! reach of vertices that a load acts on, since its press is as local as a tool's. Where there is no room for all of a
+//! claim, the nearest are awake. If there is no room even for those within a spacing of a load, the load is spread wide,
+//! and left to the coarse tets: some of the particles beneath it, chosen by nothing, would make a pattern of it.
 use super::awakened::Awakened;
 use crate::mesh::Surface;
 use crate::{
@@ -23,14 +23,15 @@ use std::collections::{BTreeMap, BTreeSet};
 /// What keeps particles awake.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) enum Claims {
-    /// These, whatever acts on the body.
+    /// These particles are awake, whatever acts on the body.
     Given(Vec<u32>),
-    /// Tools, by the middles of their balls at rest (m), and loads, each with its particles and their distances (m).
+    /// Tools keep particles awake, by the middles of their balls at rest (m), and loads, each with its particles and
+    /// their distances (m).
     ByRule { reach_m: f64, balls: Vec<Option<DVec3>>, loads: Vec<Vec<(f64, u32)>>, spread: u32 },
 }
 
 impl Claims {
-    /// Of the loads and tools of a goal, before a tool came near.
+    /// Returns the claims of the loads and tools of a goal, before a tool came near.
     pub(super) fn of(environment: &Environment, body: &HybridBody, goal: &Goal<'_>) -> Self {
         let reach_m = match body.particles().waking {
             Waking::ByTools { reach_m } => reach_m,
@@ -41,8 +42,8 @@ impl Claims {
         Self::ByRule { reach_m, balls: vec![None; environment.tools.len()], loads, spread: 0 }
     }
 
-    /// Looks at where tools are in an equilibrium, with these forces (N) on them: the particles that are to be awake,
-    /// ascending.
+    /// Looks at where tools are in an equilibrium, with these forces (N) on them; returns the particles that are to be
+    /// awake, ascending.
     pub(super) fn look(&mut self, awakened: &Awakened<'_>, unknowns: &[DVec3], contact_n: &[DVec3]) -> Vec<u32> {
         let (environment, body) = (awakened.environment, awakened.body);
         let (most, spacing_m) = (body.particles().most_active, body.particles().spacing_m);
@@ -81,7 +82,7 @@ impl Claims {
         wanted.into_iter().collect()
     }
 
-    /// Loads spread too wide for particles to wake beneath them.
+    /// Returns the number of loads that are spread too wide for particles to wake beneath them.
     pub(super) fn spread_loads(&self) -> u32 {
         match self {
             Self::Given(_) => 0,
@@ -125,8 +126,8 @@ fn ball_of(
     }
 }
 
-/// Particles that may wake within a reach of vertices that a load acts on, with the distance (m) to the nearest of
-/// them.
+/// Returns the particles that may wake within a reach of vertices that a load acts on, with the distance (m) to the
+/// nearest of them.
 fn near_load(surface: &Surface, body: &HybridBody, load: &LoadSpec, reach_m: f64) -> Vec<(f64, u32)> {
     let vertices: BTreeSet<u32> = match load {
         LoadSpec::NodalForces(forces) => forces.iter().map(|(vertex, _)| *vertex).collect(),

@@ -1,8 +1,8 @@
-//! A hybrid body with some of its particles awake: what its equilibrium is sought over.
+//! A hybrid body with some of its particles awake, whose equilibrium is sought.
 //!
-//! A *place* lists positions (m): of the coarse nodes, of the awake particles, then of all tools. The skin follows it
-//! linearly, `y_v = Y_v + Σ_q w_vq (x_q − X_q)`, and hands forces back by the same weights; a *configuration* of
-//! contact lists the skin's vertices, then the tools.
+//! The *unknowns* of an equilibrium are positions (m): of the coarse nodes, of the awake particles, then of all tools.
+//! The skin follows them linearly, `y_v = Y_v + Σ_q w_vq (x_q − X_q)`, and forces on it act on them by the same
+//! weights. A *configuration* of contact lists the skin's vertices, then the tools.
 use crate::{
     bodies::hybrid::{
         HybridBody,
@@ -19,7 +19,7 @@ pub(super) struct Awakened<'a> {
     pub(super) environment: &'a Environment,
     pub(super) body: &'a HybridBody,
     pub(super) patch: Patch,
-    /// Of every entry of a place, axes along which it may move.
+    /// Axes along which each unknown may move.
     pub(super) free: Vec<BVec3>,
     /// Rest positions (m) of nodes and particles.
     rest_m: Vec<DVec3>,
@@ -27,13 +27,13 @@ pub(super) struct Awakened<'a> {
     pub(super) weight_n: Vec<DVec3>,
     /// Diagonal blocks (N/m) of the elastic stiffness at rest, of nodes and particles.
     pub(super) diagonal_n_per_m: Vec<DMat3>,
-    /// Where the carriers of each vertex of the skin start, and one more.
+    /// Index in `carriers` of the first entry of each vertex of the skin, and the end of the last.
     first: Vec<u32>,
     carriers: Vec<(u32, f64)>,
 }
 
 impl<'a> Awakened<'a> {
-    /// With these particles, ascending, awake.
+    /// Makes the body with these particles, ascending, awake.
     pub(super) fn new(environment: &'a Environment, body: &'a HybridBody, ids: &[u32]) -> Self {
         let partition = body.partition();
         let patch = Patch::new(partition, &ids.iter().copied().collect());
@@ -88,22 +88,22 @@ impl<'a> Awakened<'a> {
         carriers
     }
 
-    /// Coarse nodes.
+    /// Returns the number of coarse nodes.
     pub(super) fn nodes(&self) -> usize {
         self.body.node_count()
     }
 
-    /// Entries of a place before the tools.
+    /// Returns the number of unknowns before those of the tools.
     pub(super) fn entries(&self) -> usize {
         self.rest_m.len()
     }
 
-    /// Vertices of the skin.
+    /// Returns the number of vertices of the skin.
     pub(super) fn vertices(&self) -> usize {
         self.first.len() - 1
     }
 
-    /// What an entry of a configuration moves with; tools with themselves.
+    /// Returns the unknowns that an entry of a configuration moves with, and their weights; a tool moves with itself.
     pub(super) fn carriers(&self, entry: u32) -> Vec<(u32, f64)> {
         match (entry as usize).checked_sub(self.vertices()) {
             Some(tool) => vec![((self.entries() + tool) as u32, 1.0)],
@@ -115,7 +115,7 @@ impl<'a> Awakened<'a> {
         &self.carriers[self.first[vertex] as usize..self.first[vertex + 1] as usize]
     }
 
-    /// The configuration at a place.
+    /// Returns the configuration of some unknowns.
     pub(super) fn configuration(&self, unknowns: &[DVec3]) -> Vec<DVec3> {
         let moved: Vec<DVec3> = unknowns.iter().zip(&self.rest_m).map(|(x, rest)| *x - *rest).collect();
         let mut configuration = self.directions(&moved);
@@ -126,13 +126,13 @@ impl<'a> Awakened<'a> {
         configuration
     }
 
-    /// How the skin's vertices move when nodes and particles do.
+    /// Returns how the skin's vertices move when nodes and particles do.
     pub(super) fn directions(&self, entries: &[DVec3]) -> Vec<DVec3> {
         let of = |vertex: usize| self.of_vertex(vertex).iter().map(|&(e, w)| entries[e as usize] * w).sum();
         (0..self.vertices()).map(of).collect()
     }
 
-    /// Adds forces (N) of a configuration to those of a place.
+    /// Adds forces (N) on a configuration to those on the unknowns.
     pub(super) fn push(&self, of_configuration_n: &[DVec3], forces_n: &mut [DVec3]) {
         let (of_skin, of_tools) = of_configuration_n.split_at(self.vertices());
         for (vertex, force_n) in of_skin.iter().enumerate().filter(|(_, force_n)| **force_n != DVec3::ZERO) {
@@ -145,7 +145,7 @@ impl<'a> Awakened<'a> {
         }
     }
 
-    /// Elastic forces (N) on nodes and particles, none on tools.
+    /// Returns the elastic forces (N) on nodes and particles, zero on tools.
     pub(super) fn elastic_n(&self, unknowns: &[DVec3]) -> Vec<DVec3> {
         let at = self.field(unknowns);
         let still = self.field(&vec![DVec3::ZERO; unknowns.len()]);
@@ -153,13 +153,13 @@ impl<'a> Awakened<'a> {
         Self::list(forces, unknowns.len())
     }
 
-    /// Their change along a direction.
+    /// Returns the change of the elastic forces (N) along a direction.
     pub(super) fn elastic_change_n(&self, unknowns: &[DVec3], direction: &[DVec3]) -> Vec<DVec3> {
         let changes = self.patch.products_n(&self.body.materials(), &self.field(unknowns), &self.field(direction));
         Self::list(changes, unknowns.len())
     }
 
-    /// Elastic energy (J).
+    /// Returns the elastic energy (J).
     pub(super) fn elastic_j(&self, unknowns: &[DVec3]) -> f64 {
         self.patch.energy_j(&self.body.materials(), &self.field(unknowns))
     }
@@ -175,13 +175,14 @@ impl<'a> Awakened<'a> {
         Field { nodes: unknowns[..self.nodes()].to_vec(), particles: unknowns[self.nodes()..self.entries()].to_vec() }
     }
 
-    /// Everything at rest.
+    /// Returns the unknowns of everything at rest.
     pub(super) fn at_rest(&self) -> Vec<DVec3> {
         let tools = self.environment.tools.iter().map(|tool| tool.start_position_m);
         self.rest_m.iter().copied().chain(tools).collect()
     }
 
-    /// A place where other particles were awake: what wakes is where it followed to, what falls asleep follows.
+    /// Returns the unknowns for this body's awake particles, from those of a body with others: particles that wake are
+    /// where they followed to.
     pub(super) fn taking_over(&self, other: &Self, unknowns: &[DVec3]) -> Vec<DVec3> {
         let (nodes, particles) = (&unknowns[..self.nodes()], &unknowns[self.nodes()..other.entries()]);
         let of = |id: &u32| match other.patch.active().binary_search(id) {

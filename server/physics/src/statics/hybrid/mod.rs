@@ -1,8 +1,8 @@
 //! Equilibrium of a hybrid body: coarse nodes, the particles that are awake, and tools on springs.
 //!
-//! As for bodies of tets the goal is reached in stages. After each the solver looks which particles are to be awake,
-//! and where those are others, finds the stage's equilibrium again with them: what it ends with does not depend on what
-//! was awake on the way, but for where a tool's ball stays put.
+//! As for bodies of tets the goal is reached in stages. After each stage the solver finds which particles are to be
+//! awake; where those are others, it finds the stage's equilibrium again with them. So the result does not depend on
+//! what was awake on the way, but for where a tool's ball stays.
 //!
 //! - `awake.rs`: which particles
 //! - `awakened.rs`: the body with them
@@ -27,10 +27,10 @@ use newton::Solver;
 use stage::Stage;
 use std::ops::ControlFlow;
 
-/// How often other particles may be woken at one stage.
+/// Largest number of sets of awake particles that are tried at one stage.
 const MAX_LOOKS: usize = 20;
 
-/// An equilibrium on the way.
+/// An equilibrium on the way to the goal.
 #[derive(Clone)]
 struct Reached {
     unknowns: Vec<DVec3>,
@@ -39,7 +39,8 @@ struct Reached {
     contact: RestingContact,
 }
 
-/// From rest to the goal; the particles `given`, ascending, are awake, or those that its tools and loads keep awake.
+/// Solves from rest to the goal. The particles `given`, ascending, are awake, or those that its tools and loads keep
+/// awake.
 pub(super) fn solve(
     environment: &Environment,
     body: &HybridBody,
@@ -66,7 +67,7 @@ pub(super) fn solve(
     Ok(solution(&awakened, solver, &stage, at, load_steps))
 }
 
-/// The equilibrium at a fraction, with the particles awake that it keeps awake itself.
+/// Finds the equilibrium at a fraction of the goal, with the particles awake that it keeps awake itself.
 fn stage_from(
     awakened: &mut Awakened<'_>,
     solver: &mut Solver<'_>,
@@ -98,7 +99,8 @@ fn stage_from(
     }
 }
 
-/// Equilibrium of a stage: a coupled tool that moves may come upon samples that it was not in front of when it set out.
+/// Finds the equilibrium of a stage. A coupled tool that moves may come upon samples that it was not in front of when
+/// it set out.
 fn settle(
     awakened: &Awakened<'_>,
     solver: &mut Solver<'_>,

@@ -17,11 +17,11 @@ use crate::{
 use glam::{BVec3, DMat3, DVec3};
 use std::ops::ControlFlow;
 
-/// Most products in a linear system.
+/// Largest number of products in a linear system.
 const MOST_PRODUCTS: u32 = 20_000;
-/// Each is solved to this.
+/// Residual, over the right side, to which each linear system is solved.
 const LINEAR_TOLERANCE: f64 = 1e-3;
-/// A right side of random numbers is solved to this before a tangent is said to be positive.
+/// Residual to which a right side of random numbers is solved before a tangent counts as positive definite.
 const STABLE_TOLERANCE: f64 = 1e-6;
 
 pub(super) struct Solver<'a> {
@@ -44,7 +44,7 @@ pub(super) fn rounding_n(awakened: &Awakened<'_>, unknowns: &[DVec3]) -> f64 {
 }
 
 impl Solver<'_> {
-    /// Newton's method at a stage, from a place.
+    /// Finds the equilibrium of a stage by Newton's method, from the given unknowns.
     pub(super) fn equilibrate(
         &mut self,
         awakened: &Awakened<'_>,
@@ -80,14 +80,15 @@ impl Solver<'_> {
         Ok(unknowns)
     }
 
-    /// `K d = f`.
+    /// Solves `K d = f`.
     fn direction(&mut self, awakened: &Awakened<'_>, outer: &Outer, unknowns: &[DVec3], f: &[DVec3]) -> Vec<DVec3> {
         let stop = EnoughOf { iterations: MOST_PRODUCTS, tolerance: LINEAR_TOLERANCE };
         self.linear_systems += 1;
         linear(awakened, outer, unknowns, f, stop).0
     }
 
-    /// Brings prescribed axes to their place, and the free ones along by one linear system: `K d = f + (∂f/∂x) δ`.
+    /// Moves prescribed axes to where they are prescribed, by `δ`, and free ones along by one linear system:
+    /// `K d = f + (∂f/∂x) δ`.
     fn move_prescribed(&mut self, awakened: &Awakened<'_>, goal: &Goal<'_>, stage: &Stage, unknowns: &mut [DVec3]) {
         let environment = awakened.environment;
         let mut moves = vec![DVec3::ZERO; unknowns.len()];
@@ -113,7 +114,7 @@ impl Solver<'_> {
         }
     }
 
-    /// Whether the tangent is positive definite.
+    /// Returns whether the tangent is positive definite.
     ///
     /// As long as conjugate gradients have met no direction of curvature below zero, the polynomial of their residual
     /// has positive roots and is one at zero, hence at least one below: a residual never gets smaller than what the
@@ -136,7 +137,7 @@ impl Solver<'_> {
     }
 }
 
-/// Solves with the tangent at a place: the solution, how many products it took, and whether one had no positive
+/// Solves with the tangent; returns the solution, how many products it took, and whether one had no positive
 /// curvature.
 fn linear(
     awakened: &Awakened<'_>,
@@ -168,8 +169,8 @@ fn linear(
     (scratch.solution, products, found_negative)
 }
 
-/// Inverse of a diagonal block over the free axes, that of the body alone where contact leaves it not positive, the
-/// identity where there is none.
+/// Returns the inverse of a diagonal block over the free axes, that of the body alone where contact leaves it not
+/// positive, the identity where there is none.
 fn inverse_of(block: &DMat3, elastic: &DMat3, free: BVec3) -> DMat3 {
     let kept = DMat3::from_diagonal(DVec3::select(free, DVec3::ONE, DVec3::ZERO));
     let of_free = |a: &DMat3| kept * *a * kept + (DMat3::IDENTITY - kept);
@@ -181,7 +182,7 @@ fn inverse_of(block: &DMat3, elastic: &DMat3, free: BVec3) -> DMat3 {
     usable.next().map_or(DMat3::IDENTITY, |a| a.inverse())
 }
 
-/// One step along a direction; `None` when no length of it is acceptable.
+/// Takes one step along a direction; returns `None` when no length of it is acceptable.
 fn descend(
     awakened: &Awakened<'_>,
     stage: &Stage,
@@ -200,8 +201,8 @@ fn descend(
     search(longest_step(awakened, d), slope, change, slope_at).map(|alpha| line.at(alpha))
 }
 
-/// Share of a motion in which no coupled tool moves further than a quarter of its radius: contact is not known further
-/// ahead.
+/// Returns the fraction of a motion in which no coupled tool moves further than a quarter of its radius: contact is not
+/// known further ahead.
 fn longest_step(awakened: &Awakened<'_>, d: &[DVec3]) -> f64 {
     let tools = awakened.environment.tools.iter().zip(&d[awakened.entries()..]);
     tools.map(|(tool, d)| 0.25 * tool.radius_m / d.length().max(f64::MIN_POSITIVE)).fold(1.0, f64::min)
