@@ -32,11 +32,11 @@ pub(super) struct PatchSwitch<'a> {
 #[derive(Debug, Clone, Copy)]
 pub(super) struct NodeShifts<'a> {
     /// Positions (m) before the switch.
-    pub(super) before_m: &'a [DVec3],
+    pub(super) x_before: &'a [DVec3],
     /// Displacements (m) by it.
     pub(super) shifts_m: &'a [DVec3],
     /// Positions (m) after it.
-    pub(super) after_m: &'a [DVec3],
+    pub(super) x_after: &'a [DVec3],
 }
 
 /// The cells and coarse tets that a switch changes, with their strain before it.
@@ -154,7 +154,7 @@ impl Before {
         for tet in 0..body.partition.residual_elements().len() as u32 {
             let is_known = self.tets[..known].binary_search_by_key(&tet, |before| before.tet).is_ok();
             if !is_known && next.residual_element(tet).nodes.iter().any(has_moved) {
-                moved_j += self.take_tet(body, tet, false, next.residual_element(tet), nodes.before_m, decay);
+                moved_j += self.take_tet(body, tet, false, next.residual_element(tet), nodes.x_before, decay);
             }
         }
         self.tets.sort_unstable_by_key(|before| before.tet);
@@ -235,7 +235,7 @@ impl Before {
             whole += before.whole * kept_m3[part];
         }
         let gradients = if before.residual_changes {
-            residual.gradients(nodes.after_m, DMat3::IDENTITY)
+            residual.gradients(nodes.x_after, DMat3::IDENTITY)
         } else {
             residual.gradients_after(&before.gradients, nodes.shifts_m)
         };

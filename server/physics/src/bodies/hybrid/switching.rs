@@ -238,7 +238,7 @@ impl HybridScratch {
         query.shifts_m.extend(query.were_m.iter().zip(&state.x).map(|(were_m, x)| *x - *were_m));
         farthest_m += query.shifts_m.iter().map(|shift| shift.length()).fold(0.0, f64::max);
         next.displace(body, &state.x);
-        let moved = NodeShifts { before_m: &query.were_m, shifts_m: &query.shifts_m, after_m: &state.x };
+        let moved = NodeShifts { x_before: &query.were_m, shifts_m: &query.shifts_m, x_after: &state.x };
         let switch = PatchSwitch { before: patch, after: next, is_moved: query.projection.is_moved() };
         let (first_moved_j, elastic_j) = before.prestrain_after(body, &switch, &moved, &mut own.prestrain);
         next.put_prestrains(&own.prestrain);
