@@ -166,20 +166,35 @@ mod tests {
 
     proptest! {
         #[test]
-        fn no_point_of_the_axis_is_nearer(centre in point(), half in point(), a in point(), b in point(), c in point()) {
+        fn no_point_of_the_axis_is_nearer(
+            centre in point(),
+            half in point(),
+            a in point(),
+            b in point(),
+            c in point(),
+        ) {
             let axis = Axis { centre_m: centre, half_m: half };
             let near = axis.approach([a, b, c]);
             let tried = by_trying(axis, [a, b, c]);
             let found = near.to_triangle_m.length();
             prop_assert!(found <= tried + 1e-12 && found >= tried - 1e-3 * half.length(), "{found} {tried}");
-            prop_assert!(near.weights.iter().all(|w| *w >= -1e-12) && (near.weights.iter().sum::<f64>() - 1.0).abs() < 1e-12);
+            prop_assert!(near.weights.iter().all(|w| *w >= -1e-12));
+            prop_assert!((near.weights.iter().sum::<f64>() - 1.0).abs() < 1e-12);
             let at = a * near.weights[0] + b * near.weights[1] + c * near.weights[2];
             prop_assert!((centre + near.arm_m + near.to_triangle_m - at).length() < 1e-9);
-            prop_assert!((axis.nearest_m(at - centre) - near.arm_m).length() < 1e-6 || found < 1e-9 || half.cross(b - a).length() < 1e-3);
+            let is_nearest = (axis.nearest_m(at - centre) - near.arm_m).length() < 1e-6;
+            prop_assert!(is_nearest || found < 1e-9 || half.cross(b - a).length() < 1e-3);
         }
 
         #[test]
-        fn a_bound_is_one_and_a_useful_one(centre in point(), half in point(), a in point(), b in point(), c in point(), wanted in 0.0..3.0_f64) {
+        fn a_bound_is_one_and_a_useful_one(
+            centre in point(),
+            half in point(),
+            a in point(),
+            b in point(),
+            c in point(),
+            wanted in 0.0..3.0_f64,
+        ) {
             let (axis, corners) = (Axis { centre_m: centre, half_m: half }, [a, b, c]);
             let from_point = |p: DVec3| p.distance(closest_point(p, corners));
             let (distance, bound) = (axis.distance_m(corners), axis.distance_bound_m(wanted, from_point));
@@ -191,7 +206,13 @@ mod tests {
         }
 
         #[test]
-        fn flat_triangles_and_short_axes_stay_finite(centre in point(), a in point(), b in point(), t in 0.0..1.0_f64, half in 0.0..1e-9_f64) {
+        fn flat_triangles_and_short_axes_stay_finite(
+            centre in point(),
+            a in point(),
+            b in point(),
+            t in 0.0..1.0_f64,
+            half in 0.0..1e-9_f64,
+        ) {
             let axis = Axis { centre_m: centre, half_m: DVec3::X * half };
             for corners in [[a, b, a.lerp(b, t)], [a; 3]] {
                 let near = axis.approach(corners);

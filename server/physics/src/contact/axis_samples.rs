@@ -179,13 +179,15 @@ mod tests {
         ) {
             let spec = capsule(half_length_m);
             let axis = axis.try_normalize().unwrap_or(DVec3::X);
-            let (orientation, contact_force_n) = (DQuat::from_rotation_arc(DVec3::Z, axis), force_n.unwrap_or_default());
+            let orientation = DQuat::from_rotation_arc(DVec3::Z, axis);
+            let contact_force_n = force_n.unwrap_or_default();
             let tool = ToolState { centre_m: DVec3::ZERO, orientation, contact_force_n, ..ToolState::at_start(&spec) };
             let from_axis_m = |p: DVec3| p.distance(axis * p.dot(axis).clamp(-half_length_m, half_length_m));
             let gap_m = at_m.iter().map(|p| from_axis_m(*p)).fold(f64::INFINITY, f64::min) - spec.radius_m;
             let cloud = Cloud { ids: (0..at_m.len() as u32).collect(), at_m };
             let count = spec.axis_sample_count(apart_m);
-            let looks: Vec<Near> = tool.axis_samples(&spec, count).map(|sample| sample.look(&cloud, (near_m, cover_m), None)).collect();
+            let samples = tool.axis_samples(&spec, count);
+            let looks: Vec<Near> = samples.map(|sample| sample.look(&cloud, (near_m, cover_m), None)).collect();
             let least_m = looks.iter().map(|near| near.gap_m).fold(f64::INFINITY, f64::min);
             let touches = contact_force_n != DVec3::ZERO;
             let reach_m = if touches { (near_m + cover_m).max(2.0 * near_m) } else { 2.0 * near_m };

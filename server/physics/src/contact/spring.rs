@@ -58,7 +58,10 @@ mod tests {
 
     proptest! {
         #[test]
-        fn force_and_stiffness_are_the_derivatives_of_the_energy(e in prop::array::uniform3(-2.0..2.0_f64), axis in 0..3_usize) {
+        fn force_and_stiffness_are_the_derivatives_of_the_energy(
+            e in prop::array::uniform3(-2.0..2.0_f64),
+            axis in 0..3_usize,
+        ) {
             let spring = SaturatingSpring { stiffness_n_per_m: 300.0, limit_n: 300.0 };
             let (e, step) = (DVec3::from(e), DVec3::AXES[axis] * 1e-6);
             // The stiffness has a kink there.

@@ -107,7 +107,10 @@ mod tests {
 
     proptest! {
         #[test]
-        fn rotation_vectors_come_back(v in prop::array::uniform3(-1.8..1.8_f64), scale in prop::sample::select(vec![1.0, 1e-6, 1e-12])) {
+        fn rotation_vectors_come_back(
+            v in prop::array::uniform3(-1.8..1.8_f64),
+            scale in prop::sample::select(vec![1.0, 1e-6, 1e-12]),
+        ) {
             let v = DVec3::from(v) * scale;
             for q in [DQuat::from_scaled_axis(v), -DQuat::from_scaled_axis(v)] {
                 prop_assume!(v.length() < 3.1);
@@ -119,7 +122,8 @@ mod tests {
         #[test]
         fn the_torque_is_the_gradient_of_the_spring(v in prop::array::uniform3(-1.5..1.5_f64), axis in 0..3_usize) {
             let (q, h) = (DQuat::from_scaled_axis(v.into()), 1e-6);
-            let energy = |e: f64| 0.5 * rotation_vector(q * DQuat::from_scaled_axis(DVec3::AXES[axis] * e).conjugate()).length_squared();
+            let turned = |e: f64| q * DQuat::from_scaled_axis(DVec3::AXES[axis] * e).conjugate();
+            let energy = |e: f64| 0.5 * rotation_vector(turned(e)).length_squared();
             let slope = (energy(h) - energy(-h)) / (2.0 * h);
             prop_assert!((slope + rotation_vector(q)[axis]).abs() < 1e-8, "{slope}");
         }

@@ -5,7 +5,7 @@ use super::{
     running::RunningPatch,
     spec::ParticleSpec,
     state::{HybridState, axis_sample_counts},
-    switching::{ActivationQuery, Ball, FOLLOW, GAP, LOOK_EVERY_TICKS},
+    switching::{ActivationQuery, Ball, FOLLOW, GAP, QUERY_EVERY_TICKS},
 };
 use crate::{
     contact::{Near, Skin, ToolSpec},
@@ -46,7 +46,7 @@ pub(super) fn update_balls(
                 *ball = Some(Ball { rest_m, away_ticks: 0 });
             }
             (Some(own), _) if gap_m > 2.0 * near_m => {
-                own.away_ticks += LOOK_EVERY_TICKS as u32;
+                own.away_ticks += QUERY_EVERY_TICKS as u32;
                 if own.away_ticks >= AWAY_TICKS {
                     *ball = None;
                 }

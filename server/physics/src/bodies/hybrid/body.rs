@@ -95,7 +95,7 @@ impl HybridBody {
     /// Lays the lattice of particles over coarse tets, whose boundary is given. `progress` is told the fraction done.
     ///
     /// # Errors
-    /// A specification outside its range, or a lattice that does not fit the body.
+    /// Fails for a specification outside its range, or a lattice that does not fit the body.
     pub(crate) fn lay_out(
         coarse: &Solid,
         boundary: &Surface,

@@ -85,7 +85,7 @@ fn needs(mesh: &TetMesh, surface: &Surface, held: &BTreeSet<u32>, waiting: &mut 
 }
 
 /// A boundary triangle near a point outside.
-struct Near {
+struct NearFace {
     triangle: usize,
     /// Weights of its corners at its point that is nearest to the point outside.
     weights: [f64; 3],
@@ -95,8 +95,8 @@ struct Near {
 
 /// Returns the boundary triangle nearest to a point; of several that are as near, the one that the point is highest
 /// above.
-fn nearest_face(mesh: &TetMesh, surface: &Surface, point_m: DVec3) -> Near {
-    let (mut best, mut nearest_m) = (Near { triangle: 0, weights: [0.0; 3], above_m: 0.0 }, f64::INFINITY);
+fn nearest_face(mesh: &TetMesh, surface: &Surface, point_m: DVec3) -> NearFace {
+    let (mut best, mut nearest_m) = (NearFace { triangle: 0, weights: [0.0; 3], above_m: 0.0 }, f64::INFINITY);
     for triangle in 0..surface.triangles.len() {
         let corners = surface.triangle_nodes(triangle).map(|n| mesh.positions_m()[n as usize]);
         let weights = closest_weights(point_m, corners);
@@ -106,7 +106,7 @@ fn nearest_face(mesh: &TetMesh, surface: &Surface, point_m: DVec3) -> Near {
         let above_m = (point_m - corners[0]).dot(normal);
         let tie = (distance_m - nearest_m).abs() <= ROUNDING * nearest_m;
         if if tie { above_m > best.above_m } else { distance_m < nearest_m } {
-            (best, nearest_m) = (Near { triangle, weights, above_m }, distance_m);
+            (best, nearest_m) = (NearFace { triangle, weights, above_m }, distance_m);
         }
     }
     best

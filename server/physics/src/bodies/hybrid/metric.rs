@@ -154,7 +154,7 @@ impl Metric {
 /// Returns the lower Cholesky factor of the rows and columns that are free, the identity elsewhere.
 ///
 /// # Errors
-/// The number of the first pivot that is not positive.
+/// Returns the number of the first pivot that is not positive.
 fn cholesky(a: &[f64], free: &[bool]) -> Result<Vec<f64>, usize> {
     let size = free.len();
     let mut l = vec![0.0; size * size];

@@ -36,7 +36,8 @@ pub enum SkinError {
     },
     /// An edge has no partner of the opposite sense.
     #[error(
-        "the fine surface is not closed: the edge from vertex {} to vertex {} has {found} neighbours on its other side, not one",
+        "the fine surface is not closed: the edge from vertex {} to vertex {} has {found} \
+         neighbours on its other side, not one",
         edge[0], edge[1]
     )]
     Open {

@@ -76,7 +76,8 @@ pub enum HybridError {
     },
     /// The lattice is too fine for the body.
     #[error(
-        "a lattice of {spacing_m} m over this body has {cells:.1e} cells, more than {MOST_CELLS:.0e}; take a larger spacing"
+        "a lattice of {spacing_m} m over this body has {cells:.1e} cells, more than {MOST_CELLS:.0e}; \
+         take a larger spacing"
     )]
     TooMany {
         /// Spacing (m).

@@ -44,7 +44,7 @@ use serde::{Deserialize, Serialize};
 const SWITCH_TICKS: u64 = 2 + RunningPatch::SLICES as u64;
 /// Number of ticks between two activation queries. After each, what is to sleep falls asleep, and then what is to wake
 /// wakes: both in one tick would take too long.
-pub(super) const LOOK_EVERY_TICKS: u64 = 2 * SWITCH_TICKS;
+pub(super) const QUERY_EVERY_TICKS: u64 = 2 * SWITCH_TICKS;
 /// Gap, over the tool's radius and over the spacing, below which a tool's particles are awake.
 pub(crate) const GAP: f64 = 0.25;
 /// Distance, over the spacing, that the skin's nearest vertex moves at rest before a ball follows.
@@ -128,7 +128,7 @@ impl SteppedHybrid<'_> {
         }
         let particles = &body.particles;
         let Waking::ByTools { reach_m } = particles.waking else { return };
-        match state.tick % LOOK_EVERY_TICKS {
+        match state.tick % QUERY_EVERY_TICKS {
             0 => {
                 let HybridScratch { patch, query, .. } = &mut **scratch;
                 patch.displace(body, &state.x);
@@ -138,8 +138,8 @@ impl SteppedHybrid<'_> {
                 own.want(&query.wanted);
             }
             SWITCH_TICKS => own.next.clone_from(&own.wanted),
-            since_look if own.is_switching() => {
-                self.go_on_switching(environment, state, since_look % SWITCH_TICKS);
+            since_query if own.is_switching() => {
+                self.go_on_switching(environment, state, since_query % SWITCH_TICKS);
             }
             _ => {}
         }
