@@ -178,7 +178,7 @@ fn switch_strained((mut rig, touched): (Rig, Vec<u32>)) {
     assert!(worst_step < 1e-2, "{worst_step:e}");
 }
 
-/// A region beneath a sphere that presses is switched in every tick, which nothing but this does: what fading gives is limited.
+/// A region beneath a sphere that presses is switched in every tick, which nothing but this does: what the decay of prestrain and transition force gives is limited.
 #[test]
 fn switching_in_every_tick_shakes_a_body_but_little() {
     for fine_depth_m in SIZES {

@@ -15,7 +15,7 @@ use serde::{Deserialize, Serialize};
 pub enum BodyState {
     /// Of tetrahedra there is nothing more.
     Tet,
-    /// Which particles are active, and what of them fades.
+    /// Which particles are active, their prestrain, and the transition force.
     Hybrid(Box<HybridState>),
     /// Which nodes are awake, and what is refined.
     MassSpring(Box<MassSpringState>),
