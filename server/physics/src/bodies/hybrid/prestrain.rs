@@ -1,5 +1,5 @@
-//! Prestrain, with which cells wake and volume falls asleep in a body that is strained without a step in energy or
-//! force.
+//! Prestrain: a change of rest state, with which cells of a strained body wake, and volume falls asleep, without a step
+//! in energy or force.
 //!
 //! A coarse part strains less than the cells in it do, so a cell that woke as it is would raise the energy. It is given
 //! the strain that its part had by a change of its rest state, the prestrain, which then decays: with
