@@ -77,7 +77,7 @@ fn kernels(criterion: &mut Criterion) {
                                 cells: 10,
                                 material: 0,
                                 first: 10 * r,
-                                fading: false,
+                                prestrained: false,
                             }
                         };
                         let mut rows: Vec<CellRow> = (0..100).map(row).collect();
@@ -89,9 +89,9 @@ fn kernels(criterion: &mut Criterion) {
                             b.iter(|| kernel.forces(&rows, rest.len(), 0.5));
                         });
                         for row in &mut rows {
-                            row.fading = true;
+                            row.prestrained = true;
                         }
-                        group.bench_function(format!("{precision:?} {set:?}, rows of 10 that fade"), |b| {
+                        group.bench_function(format!("{precision:?} {set:?}, rows of 10 with prestrain"), |b| {
                             b.iter(|| kernel.forces(&rows, rest.len(), 0.5));
                         });
                     }

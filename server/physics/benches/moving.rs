@@ -44,10 +44,10 @@ fn main() {
         spec.settings.mass_damping_per_s = 20.0;
         spec.tools = vec![sphere(RADIUS_M, DVec3::Z * (RADIUS_M + 1e-3), Coupling::Rigid)];
         let mut rig = Rig::new(spec);
-        let (mut quiet, mut fading, mut switching, mut awake) = (Vec::new(), Vec::new(), Vec::new(), 0);
+        let (mut quiet, mut prestrained, mut switching, mut awake) = (Vec::new(), Vec::new(), Vec::new(), 0);
         for tick in 0..TICKS {
             let before = rig.state.body.active_particles().to_vec();
-            let was_fading = !rig.state.body.as_hybrid().unwrap().fading().is_empty();
+            let was_prestrained = !rig.state.body.as_hybrid().unwrap().prestrain().is_empty();
             let start = Instant::now();
             let report = rig.tick_at(tool_m(tick));
             let took_us = start.elapsed().as_secs_f64() * 1e6;
@@ -55,8 +55,8 @@ fn main() {
             awake += rig.state.body.active_particles().len();
             if before != rig.state.body.active_particles() {
                 switching.push(took_us);
-            } else if was_fading {
-                fading.push(took_us);
+            } else if was_prestrained {
+                prestrained.push(took_us);
             } else {
                 quiet.push(took_us);
             }
@@ -67,8 +67,8 @@ fn main() {
             rig.model.substeps(),
             rig.state.mechanical.tools[0].contact_force_n.length()
         );
-        print("nothing fades", quiet);
-        print("strains fade", fading);
+        print("no prestrain", quiet);
+        print("prestrain decays", prestrained);
         print("particles switch", switching);
     }
 }

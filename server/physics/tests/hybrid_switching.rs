@@ -27,7 +27,8 @@ fn slide(rig: &mut Rig) -> bool {
     rig.state.body.active_particles() != before
 }
 
-/// In a dent many vertices are as near to the tool's centre, and which is nearest changes with the particles that are awake: what is awake may not.
+/// In a dent many vertices are as near to the tool's centre, and which is nearest changes with the particles that are
+/// awake: what is awake may not.
 #[test]
 fn beneath_a_tool_that_stands_still_the_same_particles_stay_awake() {
     for (across_m, depth_m) in [(0.0, 2e-3), (0.0, 3e-3), (0.125e-3, 2e-3), (0.375e-3, 2e-3), (0.625e-3, 2e-3)] {
@@ -46,7 +47,8 @@ fn beneath_a_tool_that_stands_still_the_same_particles_stay_awake() {
     }
 }
 
-/// The patch that a switch goes over to is made in ticks before it, beside the state: without it a state goes on no differently, wherever it was saved.
+/// The patch that a switch goes over to is made in ticks before it, beside the state: without it a state goes on no
+/// differently, wherever it was saved.
 #[test]
 fn what_is_saved_while_a_switch_is_coming_goes_on_with_the_same_bits() {
     for fine_depth_m in SIZES {
@@ -78,7 +80,8 @@ fn save_and_go_on(mut rig: Rig) {
     }
 }
 
-/// Contact goes on with what it knew of the skin where particles wake and fall asleep beneath a sliding tool, and misses nothing.
+/// Contact goes on with what it knew of the skin where particles wake and fall asleep beneath a sliding tool, and
+/// misses nothing.
 #[test]
 fn switches_are_followed_by_contact_as_if_it_looked_at_all_triangles() {
     let run = |distant_contact: bool, fine_depth_m: Option<f64>| {
@@ -178,7 +181,8 @@ fn switch_strained((mut rig, touched): (Rig, Vec<u32>)) {
     assert!(worst_step < 1e-2, "{worst_step:e}");
 }
 
-/// A region beneath a sphere that presses is switched in every tick, which nothing but this does: what fading gives is limited.
+/// A region beneath a sphere that presses is switched in every tick, which nothing but this does: what the decay of
+/// prestrain and transition force gives is limited.
 #[test]
 fn switching_in_every_tick_shakes_a_body_but_little() {
     for fine_depth_m in SIZES {
@@ -200,7 +204,8 @@ fn switch_always((mut rig, touched): (Rig, Vec<u32>)) {
     assert!(most_j < 0.1 * elastic_j, "{most_j:e} {elastic_j:e}");
 }
 
-/// All particles beneath a sphere that already presses wake at once: it feels them come within some hundredths of a second.
+/// All particles beneath a sphere that already presses wake at once: it feels them come within some hundredths of a
+/// second.
 #[test]
 fn waking_beneath_the_tool_is_not_felt_as_a_step() {
     let mut rig = Rig::new(pressed_block(Precision::Double, None));

@@ -116,7 +116,7 @@ fn wake_and_sleep(fine_depth_m: Option<f64>, half_length_m: Option<f64>) {
     let mut rig = Rig::new(spec);
     let mut saved = rig.state.clone();
     saved.copy_from(&rig.state);
-    let (mut sets, mut faded, mut count) = (0, 0, 0);
+    let (mut sets, mut prestrained, mut count) = (0, 0, 0);
     assert_no_alloc(|| {
         for tick in 0..3000 {
             let factor = (f64::from(tick) * 0.003).sin();
@@ -129,13 +129,13 @@ fn wake_and_sleep(fine_depth_m: Option<f64>, half_length_m: Option<f64>) {
             palpate_physics::step(&rig.model, &mut rig.state, &mut rig.scratch, &input);
             sets += u32::from(rig.state.body.active_particles().len() != count);
             count = rig.state.body.active_particles().len();
-            faded += u32::from(!rig.state.body.as_hybrid().unwrap().fading().is_empty());
+            prestrained += u32::from(!rig.state.body.as_hybrid().unwrap().prestrain().is_empty());
             if tick == 1500 {
                 rig.state.reset(&rig.model);
             }
         }
     });
-    assert!(rig.state.quarantine.is_none() && sets > 20 && faded > 100, "{sets} {faded}");
+    assert!(rig.state.quarantine.is_none() && sets > 20 && prestrained > 100, "{sets} {prestrained}");
 }
 
 /// Falls asleep, sleeps, and wakes for a load.

@@ -8,7 +8,7 @@ use palpate_lab::fine_levels::{
     PlacesOf,
     methods::{CONTROL, Kernel, Method, Row, SMOOTHING, particle_m3, particles_near},
 };
-use palpate_physics::bodies::hybrid::{partition::Partition, place::Place};
+use palpate_physics::bodies::hybrid::{partition::Partition, trilinear_point::TrilinearPoint};
 
 const NU: [&str; 3] = ["0.30", "0.45", "0.49"];
 const RAW: Method = Method::RawSph(Kernel::Cone);
@@ -193,7 +193,7 @@ fn parameters_of_moving_least_squares_are_softer_than_their_field() {
 }
 
 /// Values of the shape functions of moving least squares, as places of up to eight particles.
-fn by_least_squares(partition: &Partition, point_m: DVec3) -> Vec<Place> {
+fn by_least_squares(partition: &Partition, point_m: DVec3) -> Vec<TrilinearPoint> {
     let smoothing_m = SMOOTHING * partition.sites().spacing_m();
     let near = particles_near(partition, point_m, Kernel::support_m(smoothing_m));
     let row = |&particle: &u32| {
@@ -207,7 +207,7 @@ fn by_least_squares(partition: &Partition, point_m: DVec3) -> Vec<Place> {
         .fold(DMat4::ZERO, |sum, (_, p, w)| sum + DMat4::from_cols(*p * p.x, *p * p.y, *p * p.z, *p * p.w) * *w);
     let inverse = moment.inverse();
     let of_eight = |rows: &[(u32, DVec4, f64)]| {
-        let mut place = Place { particles: [rows[0].0; 8], weights: [0.0; 8] };
+        let mut place = TrilinearPoint { particles: [rows[0].0; 8], weights: [0.0; 8] };
         for (k, (particle, p, w)) in rows.iter().enumerate() {
             (place.particles[k], place.weights[k]) = (*particle, (inverse * *p).x * w);
         }

@@ -76,7 +76,7 @@ pub enum Body {
 pub enum BodyState {
     /// Of tetrahedra there is nothing more.
     Tet(Box<TetState>),
-    /// Which particles are active, and what of them still changes after a switch.
+    /// Which particles are active, their prestrain, and the transition force.
     Hybrid(Box<HybridState>),
     /// Which nodes are awake, and what is refined.
     MassSpring(Box<MassSpringState>),

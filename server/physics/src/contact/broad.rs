@@ -1,24 +1,26 @@
-//! Broad phase: which triangles a tool can touch, without looking at the others.
+//! The broad phase finds the triangles that a tool can touch, without looking at the others.
 //!
 //! The boundary's triangles are sorted along a Morton curve of their rest centroids and cut into clusters of
-//! [`CLUSTER`] neighbours. A cluster's box is refitted only when a tool might be near it. What makes a stale box safe is
-//! the *travel* `τ(t) = ∫ max_i |v_i| dt`: no surface point moves further than `τ(t) − τ(t₀)` after `t₀`, so the box of
-//! `t₀`, grown by that much, still holds its triangles. The leapfrog drift is a straight line at a known velocity, so the
-//! bound is exact, not an estimate.
+//! [`CLUSTER`] neighbours. A cluster's box is refitted only when a tool might be near it. What makes a stale box safe
+//! is the *travel* `τ(t) = ∫ max_i |v_i| dt`: no surface point moves further than `τ(t) − τ(t₀)` after `t₀`, so the box
+//! of `t₀`, grown by that much, still holds its triangles. The leapfrog drift is a straight line at a known velocity,
+//! so the bound is exact, not an estimate.
 //!
 //! A query lists the triangles within `reach` of a tool's axis and returns how much further away all others are. As
-//! long as the path of any point of that axis plus the travel stay below that slack, the list holds every triangle that can be touched: far
-//! from the body a tick costs two additions per tool and substep. Boxes are as far from an axis as from its centre, less half its length, or further, and so of pieces of it ([`Axis::distance_bound_m`]).
+//! long as the path of any point of that axis plus the travel stay below that slack, the list holds every triangle that
+//! can be touched: far from the body a tick costs two additions per tool and substep. A box is at least as far from an
+//! axis as from the axis's centre, less half its length; the same holds for pieces of the axis
+//! ([`Axis::distance_bound_m`]).
 use super::axis::Axis;
 use crate::mesh::Surface;
 use glam::DVec3;
 use std::ops::Range;
 
-/// Triangles per cluster.
+/// Number of triangles per cluster.
 pub(crate) const CLUSTER: usize = 32;
-/// Triangles per group of clusters, on the skin of a hybrid body.
+/// Number of triangles per group of clusters, on the skin of a hybrid body.
 pub(crate) const GROUP: usize = 32 * CLUSTER;
-/// Rounding of the travel sums is far below this (m).
+/// A length (m) far above the rounding of the travel's sums.
 pub(crate) const ROUNDING_M: f64 = 1e-12;
 
 /// The boundary's triangles in the order of the broad phase.
@@ -26,28 +28,28 @@ pub(crate) const ROUNDING_M: f64 = 1e-12;
 pub(super) struct Triangles {
     /// Nodes of each triangle, in Morton order.
     pub(super) nodes: Vec<[u32; 3]>,
-    /// Index in [`Surface::triangles`] of each.
+    /// Index of each in [`Surface::triangles`].
     pub(super) surface_triangle: Vec<u32>,
 }
 
-/// Box of a cluster at the time it was fitted.
+/// Box of a cluster at the time when it was fitted.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct ClusterBox {
     lo: DVec3,
     hi: DVec3,
-    /// Travel `τ` when fitted; −∞: never.
+    /// Travel `τ` (m) when the box was fitted; −∞ if it never was.
     fitted_at_m: f64,
 }
 
 impl ClusterBox {
     pub(super) const UNFITTED: Self = Self { lo: DVec3::ZERO, hi: DVec3::ZERO, fitted_at_m: f64::NEG_INFINITY };
 
-    /// Lower bound of the distance (m) from `p` to the cluster's triangles when the travel is `travel_m`.
+    /// Returns a lower bound of the distance (m) from `p` to the cluster's triangles when the travel is `travel_m`.
     pub(crate) fn distance_bound_m(&self, p: DVec3, travel_m: f64) -> f64 {
         box_distance_m(p, self.lo, self.hi) - (travel_m - self.fitted_at_m)
     }
 
-    /// The same from an axis, at its best where it is below `wanted_m`.
+    /// Returns the same from an axis; the bound is refined where it is below `wanted_m`.
     fn axis_bound_m(&self, axis: &Axis, wanted_m: f64, travel_m: f64) -> f64 {
         axis.distance_bound_m(wanted_m, |p| self.distance_bound_m(p, travel_m))
     }
@@ -58,30 +60,58 @@ impl ClusterBox {
     }
 }
 
-/// A surface whose positions are worked out when asked for: a hybrid body's skin, a refined mass-spring surface.
+/// The clusters' boxes and the travel by which they are out of date.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct FittedBoxes<'a> {
+    /// Box of every cluster.
+    pub(crate) boxes: &'a [ClusterBox],
+    /// Travel `τ` (m) now.
+    pub(crate) travel_m: f64,
+}
+
+/// The same boxes, to be refitted.
+#[derive(Debug)]
+pub(super) struct FittedBoxesMut<'a> {
+    /// Box of every cluster.
+    pub(super) boxes: &'a mut [ClusterBox],
+    /// Travel `τ` (m) now.
+    pub(super) travel_m: f64,
+}
+
+/// How far from a tool's axis triangles are listed.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct ListReach {
+    /// Triangles within this distance (m) are listed.
+    pub(super) listed_m: f64,
+    /// No triangle within this distance (m) may be missing from the list while it is used.
+    pub(super) complete_m: f64,
+}
+
+/// A surface whose positions are computed when they are asked for: a hybrid body's skin, or a refined mass-spring
+/// surface.
 pub(crate) trait Skin {
-    /// Queries begin, at positions that do not change before the last of them.
+    /// Begins queries, at positions that do not change before the last of them.
     fn begin(&mut self);
-    /// Lower bound (m) of the distance from a point to the triangles of a group.
+    /// Returns a lower bound (m) of the distance from a point to the triangles of a group.
     fn group_distance_m(&self, group: usize, from_m: DVec3) -> f64;
-    /// The same of a cluster.
+    /// Returns the same for a cluster.
     fn cluster_distance_m(&self, cluster: usize, from_m: DVec3) -> f64;
-    /// Number of clusters.
+    /// Returns the number of clusters.
     fn clusters(&self) -> usize;
-    /// The vertices of a cluster.
+    /// Returns the vertices of a cluster.
     fn vertices(&self, cluster: usize) -> &[u32];
-    /// Where a vertex is (m).
+    /// Returns the position (m) of a vertex.
     fn position_m(&self, vertex: u32) -> DVec3;
 }
 
-/// Triangles a tool may touch, and how far things may move before the list is out of date.
+/// Triangles that a tool may touch, and how far things may move before the list is out of date.
 #[derive(Debug, Clone)]
 pub(super) struct Candidates {
     list: Box<[u32]>,
-    /// What each triangle's distance (m) was above the slack when it was looked at last; −∞: never.
+    /// Each triangle's distance (m) less the slack when it was looked at last; −∞ if it never was.
     above_slack_m: Box<[f64]>,
     count: usize,
-    /// What relative motion (m) is left until the list must be renewed.
+    /// Relative motion (m) that is left until the list must be renewed.
     pub(super) slack_m: f64,
 }
 
@@ -101,7 +131,7 @@ impl Candidates {
         }
     }
 
-    /// Triangles, ascending.
+    /// Returns the listed triangles, ascending.
     pub(super) fn triangles(&self) -> &[u32] {
         &self.list[..self.count]
     }
@@ -112,13 +142,14 @@ impl Candidates {
         self.count += 1;
     }
 
-    /// Lower bound (m) of the distance from the tool's axis to a listed triangle: what it was when looked at last, less the motion since. Not a number
-    /// where all are listed whatever moves.
+    /// Returns a lower bound (m) of the distance from the tool's axis to a listed triangle: its distance when it was
+    /// looked at last, less the motion since. It is not a number where all triangles are listed
+    /// ([`Triangles::list_all`]).
     pub(super) fn least_distance_m(&self, number: usize) -> f64 {
         self.above_slack_m[number] + self.slack_m - ROUNDING_M
     }
 
-    /// How far (m) a listed triangle is now.
+    /// Records how far (m) a listed triangle is from the tool's axis now.
     pub(super) fn set_distance_m(&mut self, number: usize, distance_m: f64) {
         self.above_slack_m[number] = distance_m - self.slack_m;
     }
@@ -159,14 +190,14 @@ impl Triangles {
         ClusterBox::around(nodes.map(|&node| x[node as usize]), travel_m)
     }
 
-    /// Lists the triangles within `reach_m` of an axis, and sets the slack: how much further away than `inner_m` all
-    /// others are.
+    /// Lists the triangles within `reach.listed_m` of an axis, and sets the slack: how much further away than
+    /// `reach.complete_m` all others are.
     pub(super) fn query(
         &self,
         x: &[DVec3],
-        (boxes, travel_m): (&mut [ClusterBox], f64),
+        FittedBoxesMut { boxes, travel_m }: FittedBoxesMut<'_>,
         axis: &Axis,
-        (reach_m, inner_m): (f64, f64),
+        ListReach { listed_m: reach_m, complete_m }: ListReach,
         candidates: &mut Candidates,
     ) {
         candidates.count = 0;
@@ -189,17 +220,18 @@ impl Triangles {
                 }
             }
         }
-        candidates.slack_m = others_m - inner_m - ROUNDING_M;
+        candidates.slack_m = others_m - complete_m - ROUNDING_M;
     }
 
-    /// [`Self::query`] on a skin, whose positions are not at hand: bounds that need none rule clusters out first. Of those looked at,
-    /// positions (m) are put into `x`.
+    /// Does the same as [`Self::query`] on a skin, whose positions are computed only where they are needed: bounds that
+    /// need none rule clusters out first. Positions (m) of the others' vertices are written into `x`.
     pub(super) fn query_skin(
         &self,
-        (skin, x): (&mut impl Skin, &mut [DVec3]),
-        (boxes, travel_m): (&mut [ClusterBox], f64),
+        skin: &mut impl Skin,
+        x: &mut [DVec3],
+        FittedBoxesMut { boxes, travel_m }: FittedBoxesMut<'_>,
         axis: &Axis,
-        (reach_m, inner_m): (f64, f64),
+        ListReach { listed_m: reach_m, complete_m }: ListReach,
         candidates: &mut Candidates,
     ) {
         candidates.count = 0;
@@ -238,10 +270,10 @@ impl Triangles {
                 }
             }
         }
-        candidates.slack_m = others_m - inner_m - ROUNDING_M;
+        candidates.slack_m = others_m - complete_m - ROUNDING_M;
     }
 
-    /// The oracle of [`Self::query`]: every triangle.
+    /// Lists every triangle: the oracle of [`Self::query`].
     pub(super) fn list_all(&self, candidates: &mut Candidates) {
         candidates.count = 0;
         for triangle in 0..self.len() {
@@ -272,7 +304,7 @@ mod tests {
     use super::*;
     use crate::{contact::triangle::closest_point, mesh::TetMesh};
 
-    /// A strip of separate tets along x.
+    /// Returns a strip of separate tets along x.
     fn strip(tets: usize) -> (Surface, Vec<DVec3>) {
         let corner = [DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::Z];
         let positions: Vec<DVec3> = (0..tets).flat_map(|t| corner.map(|c| c * 0.5 + DVec3::X * t as f64)).collect();
@@ -302,7 +334,8 @@ mod tests {
         let mut boxes = vec![ClusterBox::UNFITTED; triangles.clusters()];
         let mut candidates = Candidates::with_capacity(triangles.len());
         let (mut travel, mut queries) = (0.0, 0);
-        let (reach, inner) = (1.5, 1.2);
+        let inner = 1.2;
+        let reach = ListReach { listed_m: 1.5, complete_m: inner };
         let mut centre = DVec3::new(-5.0, 0.3, 0.0);
         for step in 0..2000 {
             let motion = DVec3::new(0.03, 0.01 * (f64::from(step) * 0.1).sin(), 0.0);
@@ -316,7 +349,8 @@ mod tests {
             travel += fastest;
             candidates.slack_m -= motion.length() + fastest;
             if candidates.slack_m <= 0.0 {
-                triangles.query(&x, (&mut boxes, travel), &Axis::point(centre), (reach, inner), &mut candidates);
+                let fitted = FittedBoxesMut { boxes: &mut boxes, travel_m: travel };
+                triangles.query(&x, fitted, &Axis::point(centre), reach, &mut candidates);
                 queries += 1;
             }
             for needed in within(&triangles, &x, centre, inner) {
@@ -325,7 +359,8 @@ mod tests {
         }
         assert!(queries < 600, "{queries} queries in 2000 steps");
     }
-    /// A tool flying straight at what stands still: what was listed is renewed in the very step in which it runs out.
+    /// A tool flies straight at a surface that stands still: its list is renewed in the very step in which the slack
+    /// runs out.
     #[test]
     fn a_straight_approach_uses_all_of_the_slack_and_no_more() {
         let (surface, x) = strip(50);
@@ -339,7 +374,9 @@ mod tests {
             centre += motion;
             candidates.slack_m -= motion.length();
             if candidates.slack_m <= 0.0 {
-                triangles.query(&x, (&mut boxes, 0.0), &Axis::point(centre), (1.5, inner), &mut candidates);
+                let fitted = FittedBoxesMut { boxes: &mut boxes, travel_m: 0.0 };
+                let reach = ListReach { listed_m: 1.5, complete_m: inner };
+                triangles.query(&x, fitted, &Axis::point(centre), reach, &mut candidates);
                 queries += 1;
             }
             let needed = within(&triangles, &x, centre, inner);

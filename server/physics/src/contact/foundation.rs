@@ -2,34 +2,37 @@
 //!
 //! Every boundary triangle carries samples, fixed in the rest surface: its `n²` congruent parts' centroids, each with
 //! weights ζ of the corners and the rest area `a = A₀/n²`. A tool of radius `R` penetrates a sample `y = Σ ζ_i x_i` by
-//! `g = R − |y − c|`, `c` the point of its axis that is nearest to `y` (of a sphere, its centre), and meets the pressure `p = k_f g`:
+//! `g = R − |y − c|`, `c` the point of its axis that is nearest to `y` (of a sphere, its centre), and meets the
+//! pressure `p = k_f g`:
 //! ```text
 //! Φ = ½ Σ_s k_f a_s g_s²      f_i = −∂Φ/∂x_i = Σ_s ζ_si k_f a_s g_s (y_s − c)/|y_s − c|      f_tool = −Σ_i f_i
 //! ```
-//! (`c` may move along the axis, but that changes no `g`: `y − c` is across the axis, or `c` an end of it). So contact is conservative, and
-//! balances linear momentum exactly; angular too where the tool turns, with the torque `Σ (y − c₀) × f` about its centre `c₀`. `k_f = α (λ + 2µ)/min(h, R)` with the size `h = √(2A₀)`
-//! of the surface element: the foundation vanishes with the mesh (its compliance is first order in h), and its frequency
-//! scales like the element's own. Where a node has much surface and little mass (a sharp edge or corner), `k_f` is lowered so
-//! that the nodal part of the bound below stays under [`FREQUENCY_SHARE`] of the body's own ω²_max: contact never rules the
-//! time step.
+//! (`c` may move along the axis, but that changes no `g`: `y − c` is across the axis, or `c` an end of it). So contact
+//! is conservative, and balances linear momentum exactly; angular too where the tool turns, with the torque
+//! `Σ (y − c₀) × f` about its centre `c₀`. `k_f = α (λ + 2µ)/min(h, R)` with the size `h = √(2A₀)` of the surface
+//! element: the foundation vanishes with the mesh (its compliance is first order in h), and its frequency scales like
+//! the element's own. Where a node has much surface and little mass (a sharp edge or corner), `k_f` is lowered so that
+//! the nodal part of the bound below stays under [`FREQUENCY_FRACTION`] of the body's own ω²_max: contact never rules
+//! the time step.
 //!
-//! Bound of the frequency. With `w_s = (ζ_s, −1)` on (nodes, tool), `K = Σ k a_s w_s w_sᵀ ⊗ C_s`, `C_s ≤ I`
-//! (pressure along the normal, friction springs of at most the same stiffness across it). A positive block matrix is bounded
-//! by the sum of its diagonal blocks, and the nodal block by the diagonal of its row sums (Gershgorin, `Σ_j ζ_sj = 1`):
-//! `K ≤ diag(Σ_s k a_s ζ_si) ⊕ Σ_s k a_s`. Only samples inside the tool count: of a sphere, at most `2πR²` of surface on one node and
-//! `4πR²` in all; of a capsule of half length `L`, `R(R + L)` in place of `R²`. A tool that turns has `Σ_s k a_s (y_s − c₀)²` besides: at
-//! `s` along the cylinder `s² + R²`, on the hemispheres at most `(L + R)²`. The largest frequency of body and diagonal together comes from the same Lanczos iteration as the body's own.
+//! Bound of the frequency. With `w_s = (ζ_s, −1)` on (nodes, tool), `K = Σ k a_s w_s w_sᵀ ⊗ C_s`, `C_s ≤ I` (pressure
+//! along the normal, friction springs of at most the same stiffness across it). A positive block matrix is bounded by
+//! the sum of its diagonal blocks, and the nodal block by the diagonal of its row sums (Gershgorin, `Σ_j ζ_sj = 1`):
+//! `K ≤ diag(Σ_s k a_s ζ_si) ⊕ Σ_s k a_s`. Only samples inside the tool count: of a sphere, at most `2πR²` of surface
+//! on one node and `4πR²` in all; of a capsule of half length `L`, `R(R + L)` in place of `R²`. A tool that turns has
+//! `Σ_s k a_s (y_s − c₀)²` besides: at `s` along the cylinder `s² + R²`, on the hemispheres at most `(L + R)²`. The
+//! largest frequency of body and diagonal together comes from the same Lanczos iteration as the body's own.
 use super::{SurfaceModuli, broad::Triangles};
 use glam::DVec3;
 use std::f64::consts::PI;
 
-/// α: foundation stiffness over that of one element layer, `(λ + 2µ)/h`. See `docs/adr` on contact.
+/// `α`, the foundation's stiffness over that of one layer of elements, `(λ + 2µ)/h` (`docs/adr/contact-foundation.md`).
 const STIFFNESS_RATIO: f64 = 8.0;
-/// Largest share of the body's ω²_max that contact may add at a node.
-const FREQUENCY_SHARE: f64 = 1.5;
-/// Sample spacing wanted, as a fraction of the tool's radius.
+/// Largest addition of contact to the squared frequency at a node, over the body's ω²_max.
+const FREQUENCY_FRACTION: f64 = 1.5;
+/// Largest spacing of samples, over the tool's radius.
 pub(super) const SPACING: f64 = 1.0 / 3.0;
-/// Most subdivisions of a triangle's edge; larger triangles are refused.
+/// Largest number of subdivisions of a triangle's edge; triangles that need more are refused.
 pub(super) const MAX_LEVEL: usize = 48;
 
 /// Samples and stiffness of the surface as one tool meets it; indices are those of [`Triangles`].
@@ -45,13 +48,13 @@ pub(super) struct Foundation {
     stiffness_pa_per_m: Vec<f64>,
     /// Indentation modulus `E/(1 − ν²)` (Pa) of every triangle.
     indentation_modulus_pa: Vec<f64>,
-    /// All samples.
+    /// Number of all samples.
     pub(super) samples: usize,
-    /// `k_f` (Pa/m) of a typical triangle of the softest material; what the coupling's limits are made of.
+    /// `k_f` (Pa/m) of a typical triangle of the softest material; the coupling's limits are derived from it.
     pub(super) typical_pa_per_m: f64,
 }
 
-/// What the foundation is made for.
+/// The body at rest, for which the foundation is made.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct BodyAtRest<'a> {
     pub(super) triangles: &'a Triangles,
@@ -62,14 +65,14 @@ pub(super) struct BodyAtRest<'a> {
     pub(super) frequency_sq: f64,
 }
 
-/// A triangle as the foundation sees it.
+/// The samples of one triangle and its stiffness.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct TriangleSamples<'a> {
     /// Weights of the second and third corner.
     pub(super) weights: &'a [[f64; 2]],
     /// Number of the first sample.
     pub(super) first: u32,
-    /// `k_f a` (N/m) of each.
+    /// `k_f a` (N/m) of each sample.
     pub(super) stiffness_n_per_m: f64,
     /// `k_f` (Pa/m).
     pub(super) foundation_pa_per_m: f64,
@@ -77,7 +80,7 @@ pub(super) struct TriangleSamples<'a> {
     pub(super) indentation_modulus_pa: f64,
 }
 
-/// What contact can do to a tool at most.
+/// Bounds of contact's stiffness for a tool.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct ContactBound {
     /// `Σ_s k a_s` (N/m).
@@ -86,7 +89,7 @@ pub(super) struct ContactBound {
     pub(super) nm_per_rad: f64,
 }
 
-/// Weights of the samples for every subdivision in use.
+/// Weights of the samples for every number of subdivisions.
 #[derive(Debug, Clone, Default)]
 pub(super) struct SampleTables {
     tables: Vec<Vec<[f64; 2]>>,
@@ -98,7 +101,7 @@ impl SampleTables {
     }
 }
 
-/// Centroids of the `n²` congruent parts of a triangle, as weights of its second and third corner.
+/// Returns the centroids of the `n²` congruent parts of a triangle, as weights of its second and third corner.
 fn centroids(n: usize) -> Vec<[f64; 2]> {
     let at = |i: usize, j: usize, third: f64| [(i as f64 + third) / n as f64, (j as f64 + third) / n as f64];
     let row = |i: usize| {
@@ -158,24 +161,26 @@ impl Foundation {
         }
     }
 
-    /// The triangle of a sample, and the number after its last one.
+    /// Returns the triangle of a sample, and the number after the triangle's last sample.
     pub(super) fn triangle_of(&self, sample: u32) -> (usize, u32) {
         let next = self.first_sample.partition_point(|&first| first <= sample);
         (next - 1, self.first_sample.get(next).copied().unwrap_or(self.samples as u32))
     }
 
-    /// Force (N) that presses a sphere to depth `d` into a flat foundation: `∫ k_f (d − r²/2R) dA = π k_f R d²`.
+    /// Returns the force (N) that presses a sphere to depth `d` into a flat foundation:
+    /// `∫ k_f (d − r²/2R) dA = π k_f R d²`.
     pub(super) fn flat_force_n(&self, radius_m: f64, depth_m: f64) -> f64 {
         PI * self.typical_pa_per_m * radius_m * depth_m * depth_m
     }
 
-    /// Row sums `Σ_s k a_s ζ_si` (N/m) of what one tool can touch around each node, and of all it can touch at once; see the
-    /// module's documentation.
+    /// Returns the row sums `Σ_s k a_s ζ_si` (N/m) over the samples that one tool can touch around each node, and the
+    /// bounds of all that it can touch at once; see the module's documentation.
     pub(super) fn row_sums_n_per_m(
         &self,
         triangles: &Triangles,
         nodes: usize,
-        (radius_m, half_length_m): (f64, f64),
+        radius_m: f64,
+        half_length_m: f64,
     ) -> (Vec<f64>, ContactBound) {
         let quarter_m2 = quarter_m2(radius_m, half_length_m);
         let (mut nodal, mut stiffest_at) = (vec![0.0_f64; nodes], vec![0.0_f64; nodes]);
@@ -196,7 +201,7 @@ impl Foundation {
         }
         let square = |a: f64| a * a;
         let reach_sq = square(half_length_m + radius_m);
-        // ∫ p² dA of cylinder and hemispheres
+        // ∫ p² dA over cylinder and hemispheres
         let cylinder_m4 = PI * radius_m * half_length_m * (square(half_length_m) / 3.0 + square(radius_m));
         let moment_m4 = 4.0 * (cylinder_m4 + PI * square(radius_m) * reach_sq);
         let bound = ContactBound {
@@ -207,7 +212,7 @@ impl Foundation {
     }
 }
 
-/// A quarter of the surface of a tool (m²).
+/// Returns a quarter of the surface of a tool (m²).
 fn quarter_m2(radius_m: f64, half_length_m: f64) -> f64 {
     PI * radius_m * (radius_m + half_length_m)
 }
@@ -216,8 +221,9 @@ fn area_m2([a, b, c]: [DVec3; 3]) -> f64 {
     0.5 * (b - a).cross(c - a).length()
 }
 
-/// Largest `k_f` (Pa/m) each node can bear: `k_f min(A_i, 2πR²)/m_i ≤ share · ω²_max`, with its third `A_i` of the triangles around, and the
-/// `touched_m2` that a tool can touch at once in place of `2πR²`.
+/// Returns the largest `k_f` (Pa/m) that each node can bear: `k_f min(A_i, 2πR²)/m_i ≤ FREQUENCY_FRACTION · ω²_max`,
+/// with its third `A_i` of the triangles around it, and the area `touched_m2` (m²) that a tool can touch at once in
+/// place of `2πR²`.
 fn most_at_nodes(body: &BodyAtRest<'_>, touched_m2: f64) -> Vec<f64> {
     let mut area = vec![0.0; body.mass_kg.len()];
     for (triangle, nodes) in body.triangles.nodes.iter().enumerate() {
@@ -226,7 +232,7 @@ fn most_at_nodes(body: &BodyAtRest<'_>, touched_m2: f64) -> Vec<f64> {
             area[node as usize] += third;
         }
     }
-    let most = |(area, mass): (&f64, &f64)| FREQUENCY_SHARE * body.frequency_sq * mass / area.min(touched_m2);
+    let most = |(area, mass): (&f64, &f64)| FREQUENCY_FRACTION * body.frequency_sq * mass / area.min(touched_m2);
     area.iter().zip(body.mass_kg).map(most).collect()
 }
 

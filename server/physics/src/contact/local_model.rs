@@ -7,14 +7,16 @@
 //! - Body: `dF/dδ = 2 E* a` holds for every axisymmetric punch on an elastic half space (Bulychev, Alekhin & Shorshorov
 //!   1975; Pharr, Oliver & Brotzen 1992), with the contact radius `a`.
 //! - Contact radius, from force and energy of the foundation, which vary smoothly while the number of samples jumps:
-//!   `π a² = F²/(c k_f Φ)`, with c = 16/9 for Hertz's pressure and 3/2 for a parabolic one; `c = 1.65` is 4 % off either radius.
+//!   `π a² = F²/(c k_f Φ)`, with c = 16/9 for Hertz's pressure and 3/2 for a parabolic one; `c = 1.65` is 4 % off
+//!   either radius.
 //! - Foundation: `K_f = k_f π a²`.
-//! - `s` corrects for what the half space leaves out (thin walls, bonded layers, large strain, the mesh): the ratio of
-//!   measured secants `ΔF/Δδ` of recent ticks to `K₀`, averaged in its logarithm and kept within
+//! - `s` corrects for what the half space leaves out (thin walls, bonded layers, large strain, the mesh): it is the
+//!   ratio of measured secants `ΔF/Δδ` of recent ticks to `K₀`, averaged in its logarithm and limited to
 //!   [1/[`MOST_CORRECTION`], [`MOST_CORRECTION`]].
 //!
-//! Across the normal the sticking part of the contact carries `2(1 − ν)/(2 − ν) ≈ 0.75` of that (Mindlin); without friction, nothing.
-//! A capsule that is pressed at `p` from its centre gives way by turning too: the coupling is as soft there as `1/K_vc + |p × n|²/K_r` says.
+//! Across the normal the stiffness of the sticking part of the contact is `2(1 − ν)/(2 − ν) ≈ 0.75` of that (Mindlin);
+//! without friction it is zero. A capsule that is pressed at `p` from its centre gives way by turning, too: the
+//! coupling's compliance there is `1/K_vc + |p × n|²/K_r`.
 //!
 //! The stiffness is `−K_n nnᵀ − K_t (I − nnᵀ)`: symmetric, negative semi-definite, never stiffer than the coupling, and
 //! smoothed over some ten ticks. A tool that turns has a torque, too ([`super::local_torque`]).
@@ -29,49 +31,51 @@ use glam::{DMat3, DVec3};
 use serde::{Deserialize, Serialize};
 use std::f64::consts::PI;
 
-/// `c` of the contact radius.
+/// `c` in the formula of the contact radius.
 const PRESSURE_SHAPE: f64 = 1.65;
 /// Mindlin's ratio of tangential to normal stiffness.
 const TANGENTIAL_RATIO: f64 = 0.75;
 /// Bound of the correction `s` and of its inverse.
 pub(super) const MOST_CORRECTION: f64 = 8.0;
-/// Share of a new secant in `ln s`.
-const SECANT_SHARE: f64 = 0.3;
-/// Motion (over R) that makes a secant.
+/// Weight of a new secant in `ln s`.
+const SECANT_FRACTION: f64 = 0.3;
+/// Least motion (over R) over which a secant is measured.
 const SECANT_MOTION: f64 = 0.01;
-/// Ticks after which a secant's start is too old.
+/// Number of ticks after which a secant's start is too old.
 const SECANT_TICKS: u32 = 100;
-/// Share of a tick's stiffness in the smoothed one.
+/// Weight of a tick's stiffness in the smoothed one.
 const SMOOTHING: f64 = 0.15;
 
-/// What the local model remembers of earlier ticks.
+/// The estimate of the contact's stiffness, which the local model keeps from tick to tick.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub(super) struct StiffnessEstimate {
     /// `ln s`.
     pub(super) log_correction: f64,
-    /// Smoothed `K_n` and `K_t` (N/m); 0 out of contact.
+    /// Smoothed `K_n` and, below, `K_t` (N/m); 0 out of contact.
     pub(super) normal_n_per_m: f64,
     pub(super) tangential_n_per_m: f64,
     /// Smoothed `K_θ` (N m/rad).
     pub(super) turning_nm_per_rad: DMat3,
-    /// Start of the present secant, with its age in ticks; an age of 0: none.
+    /// Where the present secant starts (m), its force there (N), and its age in ticks; there is none where the age is
+    /// 0.
     pub(super) start_centre_m: DVec3,
     pub(super) start_force_n: f64,
     pub(super) age_ticks: u32,
 }
 
-/// Contact of a tool, mean over a tick.
+/// Contact of a tool, as the mean over a tick.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct MeanContact {
     pub(super) pressed: Pressed,
     /// Force on the device (N).
     pub(super) device_force_n: DVec3,
-    /// Torque on it (N m).
+    /// Torque on the device (N m).
     pub(super) device_torque_nm: DVec3,
 }
 
 impl Default for StiffnessEstimate {
-    /// Out of contact, with nothing learnt. (A matrix is the identity by default.)
+    /// Returns the estimate out of contact, with nothing learnt. It is written out since a matrix is the identity by
+    /// default.
     fn default() -> Self {
         Self {
             log_correction: 0.0,
@@ -91,19 +95,19 @@ impl StiffnessEstimate {
         numbers.iter().all(|n| n.is_finite()) && self.start_centre_m.is_finite() && self.turning_nm_per_rad.is_finite()
     }
 
-    /// Forgets the contact, keeps what was learnt of the body.
+    /// Forgets the contact, and keeps what was learnt of the body.
     fn leave(&mut self) {
         *self = Self { log_correction: self.log_correction, ..Self::default() };
     }
 
-    /// Takes a tick's motion into `s`; `prior_n_per_m` is `K₀`.
+    /// Updates `s` by a tick's motion; `prior_n_per_m` is `K₀`.
     fn learn(&mut self, centre_m: DVec3, normal: DVec3, force_n: f64, prior_n_per_m: f64, radius_m: f64) {
         let deeper_m = (self.start_centre_m - centre_m).dot(normal);
         if self.age_ticks > 0 && deeper_m.abs() >= SECANT_MOTION * radius_m {
             let ratio = (force_n - self.start_force_n) / deeper_m / prior_n_per_m;
             if ratio > 0.0 {
                 let measured = ratio.ln().clamp(-MOST_CORRECTION.ln(), MOST_CORRECTION.ln());
-                self.log_correction += SECANT_SHARE * (measured - self.log_correction);
+                self.log_correction += SECANT_FRACTION * (measured - self.log_correction);
             }
             self.age_ticks = 0;
         }
@@ -120,7 +124,7 @@ impl StiffnessEstimate {
     }
 }
 
-/// Updates the estimate and builds the model about the device's position; `None` out of contact.
+/// Updates the estimate and returns the model about the device's position, `None` out of contact.
 pub(super) fn update(
     model: &ToolModel,
     tool: &ToolState,
@@ -148,8 +152,8 @@ pub(super) fn update(
     estimate.smooth(series(contact, coupling), series(sticking, coupling));
     let (k_n, k_t) = (estimate.normal_n_per_m, estimate.tangential_n_per_m);
     let stiffness_n_per_m = outer(normal, normal) * (k_t - k_n) - DMat3::from_diagonal(DVec3::splat(k_t));
-    // Hertz's force, linearised about δ = a²/R, is wrong by (3/8)(r/δ)² of itself at a distance r: 5 % at r = 0.35 δ. The device
-    // moves further than the tool, by the coupling's stretch.
+    // Hertz's force, linearised about δ = a²/R, is wrong by (3/8)(r/δ)² of itself at a distance r: 5 % at r = 0.35 δ.
+    // The device moves further than the tool, by the coupling's stretch.
     let half_width_m = half_width_m(model, contact_radius_m);
     let body_radius_m = 0.35 * half_width_m * half_width_m / model.spec.radius_m;
     let validity_radius_m = body_radius_m * (contact / series(contact, coupling));
@@ -180,7 +184,8 @@ pub(super) fn update(
     })
 }
 
-/// `K_vc` (N/m) and `K_r` (N m/rad): infinite where the device holds the tool itself, and a tool that does not turn.
+/// Returns `K_vc` (N/m) and `K_r` (N m/rad). Both are infinite for a rigid tool, the latter for one that does not turn,
+/// too.
 fn coupling_stiffnesses(model: &ToolModel) -> (f64, f64) {
     let turning = |capsule: &Capsule| capsule.turning.stiffness_nm_per_rad;
     match model.spec.coupling {
@@ -191,7 +196,7 @@ fn coupling_stiffnesses(model: &ToolModel) -> (f64, f64) {
     }
 }
 
-/// Of a disc as large as the tool's outline (m).
+/// Returns the radius (m) of a disc as large as the tool's outline.
 fn largest_radius_m(model: &ToolModel) -> f64 {
     let radius_m = model.spec.radius_m;
     model
@@ -201,14 +206,15 @@ fn largest_radius_m(model: &ToolModel) -> f64 {
         .map_or(radius_m, |capsule| (radius_m * radius_m + 4.0 / PI * radius_m * capsule.half_length_m).sqrt())
 }
 
-/// Half the width (m) of a contact with the area of a disc: of a capsule's, which may be all along it, `π a² = 2b 2L`.
+/// Returns half the width (m) of a contact that has the area of a disc; with a capsule the contact may reach all along
+/// it, `π a² = 2b 2L`.
 fn half_width_m(model: &ToolModel, radius_m: f64) -> f64 {
     let capsule = model.spec.shape.as_capsule();
     capsule.map_or(radius_m, |capsule| radius_m.min(PI * radius_m * radius_m / (4.0 * capsule.half_length_m)))
 }
 
-/// Where on its axis, from its centre (m), a tool is pressed: `p = s h` with `p × F = τ` as far as the axis allows; an end of it when it is pressed
-/// along the axis.
+/// Returns where on its axis, from its centre (m), a tool is pressed: `p = s h` with `p × F = τ` as far as the axis
+/// allows, or an end of the axis when it is pressed along it.
 fn pressed_at_m(model: &ToolModel, tool: &ToolState, pressed: &Pressed) -> DVec3 {
     let half_m = model.axis(tool).half_m;
     let across = half_m.cross(pressed.force_n);
@@ -219,7 +225,8 @@ fn pressed_at_m(model: &ToolModel, tool: &ToolState, pressed: &Pressed) -> DVec3
     half_m * (pressed.torque_nm.dot(across) / across.length_squared()).clamp(-1.0, 1.0)
 }
 
-/// The mean force belongs to the middle of the tick; the device has moved on since.
+/// Returns the force (N) at the end of the tick: the mean force is that of the middle of the tick, and the device has
+/// moved on since.
 fn at_end_of_tick(model: &ToolModel, tool: &ToolState, mean: &MeanContact, stiffness_n_per_m: &DMat3) -> DVec3 {
     match model.spec.coupling {
         Coupling::Rigid => {
@@ -230,7 +237,7 @@ fn at_end_of_tick(model: &ToolModel, tool: &ToolState, mean: &MeanContact, stiff
     }
 }
 
-/// The same of the torque.
+/// Returns the torque (N m) at the end of the tick likewise.
 fn torque_at_end_of_tick(
     model: &ToolModel,
     tool: &ToolState,
@@ -246,7 +253,7 @@ fn torque_at_end_of_tick(
     }
 }
 
-/// Stiffness of two springs in series; any may be zero or infinite.
+/// Returns the stiffness of two springs in series; either may be zero or infinite.
 fn series(a: f64, b: f64) -> f64 {
     let (soft, stiff) = (a.min(b), a.max(b));
     if soft <= 0.0 || soft.is_infinite() { soft.max(0.0) } else { soft / (1.0 + soft / stiff) }

@@ -1,17 +1,21 @@
-//! The torque of the local contact model, of a tool that turns.
+//! The local torque model: the torque of the contact of a tool that turns.
 //!
-//! A rotation `θ` of the tool about its centre moves a sample at `p` by `θ × p`: along the sample's normal by `l·θ` with its lever `l = p × n`. So samples that share the
-//! contact's stiffnesses `K_n`, `K_t` (of [`super::local_model`], before the coupling) by the forces they carry, `w = |f_n|/Σ|f_n|`, resist it with the torque `−C θ`:
+//! A rotation `θ` of the tool about its centre moves a sample at `p` by `θ × p`: along the sample's normal by `l·θ`
+//! with its lever `l = p × n`. So samples that share the contact's stiffnesses `K_n`, `K_t` (of [`super::local_model`],
+//! before the coupling) by the forces they carry, `w = |f_n|/Σ|f_n|`, resist it with the torque `−C θ`:
 //! ```text
 //! C = k_n ⟨l⟩⟨l⟩ᵀ + K_n (⟨l lᵀ⟩ − ⟨l⟩⟨l⟩ᵀ) + k_t ⟨(p·p) I − p pᵀ − l lᵀ⟩,    1/k = 1/K + 1/K_vc
 //! ```
-//! (`θ·⟨…⟩θ` of the last is the mean square of a sample's way along the surface). A tool that is pressed at one place gives way there on the coupling that holds its centre, too;
-//! where it is pressed on both sides of its centre, it does not. The device turns it by the coupling's other half, in series for every direction:
+//! (`θ·⟨…⟩θ` of the last term is the mean square of a sample's motion along the surface). A tool that is pressed at one
+//! point moves against the coupling of its centre, too; one that is pressed on both sides of its centre does not. The
+//! device turns it by the coupling's other half, in series for every direction:
 //! ```text
 //! K_θ = (C⁻¹ + I/K_r)⁻¹ = C (I + C/K_r)⁻¹
 //! ```
-//! symmetric, positive semi-definite, never stiffer than `K_r`. An elastic body resists tilting more than its pressure's spread says (a flat punch on a half space twice as much), a
-//! foundation just as much: the model is up to a third too soft (`tests/local_model.rs`), which only delays, and a softer spring is stabler. What the tool's way does to the torque, and its turn to the force, is left to the next tick.
+//! It is symmetric, positive semi-definite, and never stiffer than `K_r`. An elastic body resists tilting more than its
+//! pressure's spread says (a flat punch on a half space twice as much), a foundation just as much: the model is up to a
+//! third too soft (`tests/local_model.rs`), which only delays, and a softer spring is stabler. The change of the torque
+//! by the tool's translation, and that of the force by its rotation, are left to the next tick.
 use super::narrow::Pressed;
 use crate::linalg::tensor::outer;
 use glam::{DMat3, DQuat, DVec3};
@@ -20,7 +24,8 @@ use serde::{Deserialize, Serialize};
 /// A torque model holds within this angle (rad) at most: a rotation vector is no sum of smaller ones.
 const LARGEST_ANGLE_RAD: f64 = 0.2;
 
-/// Torque on the device near `orientation`: `τ(R) = torque_nm + stiffness θ`, with the rotation vector `θ` (rad, world) of `R orientation⁻¹`.
+/// Torque on the device near `orientation`: `τ(R) = torque_nm + stiffness θ`, with the rotation vector `θ` (rad, world)
+/// of `R orientation⁻¹`.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct LocalTorqueModel {
     /// The device's orientation about which it is expanded.
@@ -42,7 +47,7 @@ impl LocalTorqueModel {
     }
 }
 
-/// How the samples in contact lie about the tool's centre, weighed by the forces that they carry.
+/// Moments of the samples in contact about the tool's centre, weighted by the forces that they carry.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Levers {
     /// `Σ |f_n| l` (N m).
@@ -54,14 +59,14 @@ pub(super) struct Levers {
 }
 
 impl Default for Levers {
-    /// None. (A matrix is the identity by default.)
+    /// Returns the levers of no samples. It is written out since a matrix is the identity by default.
     fn default() -> Self {
         Self { sum_nm: DVec3::ZERO, square: DMat3::ZERO, reach: DMat3::ZERO }
     }
 }
 
 impl Levers {
-    /// One more sample at `p` (m) from the centre, with its normal, which carries so much (N).
+    /// Adds a sample at `p` (m) from the centre, with its normal, which carries the force `f_n` (N).
     pub(super) fn push(&mut self, p: DVec3, normal: DVec3, f_n: f64) {
         let lever_m = p.cross(normal);
         self.sum_nm += f_n * lever_m;
@@ -91,7 +96,7 @@ pub(super) struct Springs {
     pub(super) turning_nm_per_rad: f64,
 }
 
-/// `K_θ` (N m/rad).
+/// Returns `K_θ` (N m/rad).
 pub(super) fn stiffness_nm_per_rad(pressed: &Pressed, springs: &Springs) -> DMat3 {
     let weight = 1.0 / pressed.pressing_n;
     let (mean_m, square) = (pressed.levers.sum_nm * weight, pressed.levers.square * weight);
@@ -105,7 +110,7 @@ pub(super) fn stiffness_nm_per_rad(pressed: &Pressed, springs: &Springs) -> DMat
     (both + both.transpose()) * 0.5
 }
 
-/// Angle (rad) that moves an end of the tool as far as the force may be extrapolated.
+/// Returns the angle (rad) that moves an end of the tool as far as the force may be extrapolated.
 pub(super) fn validity_angle_rad(radius_m: f64, half_length_m: f64) -> f64 {
     (radius_m / half_length_m).min(LARGEST_ANGLE_RAD)
 }

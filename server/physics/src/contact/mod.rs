@@ -1,9 +1,10 @@
 //! Spheres and capsules against the deforming surface.
 //!
-//! Once a substep, for every tool: it moves ([`proxy`]), the broad phase lists the triangles near it ([`broad`]), samples
-//! fixed in the surface press and rub ([`foundation`], [`narrow`]), and the forces go to nodes and tool by the transpose.
-//! Once a tick the contact is summed up for the servo loop ([`local_model`]).
+//! Once a substep every tool moves ([`proxy`]), the broad phase lists the triangles near it ([`broad`]), samples fixed
+//! in the surface press and rub ([`foundation`], [`narrow`]), and the forces are added to those of nodes and tool by
+//! the transpose. Once a tick the contact is summed up for the servo loop ([`local_model`]).
 mod axis;
+mod axis_samples;
 pub(crate) mod broad;
 mod foundation;
 mod inside;
@@ -12,7 +13,6 @@ mod local_torque;
 pub(crate) mod moduli;
 mod narrow;
 mod nearest;
-mod places;
 mod proxy;
 mod resting;
 mod spring;
@@ -25,12 +25,12 @@ mod touching;
 mod triangle;
 mod turning;
 
+pub(crate) use axis_samples::Near;
 pub(crate) use broad::Skin;
 pub use inside::is_inside;
 pub use local_torque::LocalTorqueModel;
 pub use moduli::SurfaceModuli;
 pub(crate) use nearest::deepest_m;
-pub(crate) use places::Near;
 pub use proxy::SubstepTime;
 pub(crate) use resting::{Pressing, RestingContact};
 pub(crate) use spring::SaturatingSpring;
@@ -39,7 +39,8 @@ pub(crate) use tangent::{ContactTangents, StepAhead};
 pub use tool::{Capsule, Coupling, LocalContactModel, ToolShape, ToolSpec, ToolState, ToolTarget, Turning};
 pub use triangle::closest_weights;
 
-/// The longest edge of a surface triangle, over the radius of a tool, that can still be sampled as finely as contact needs.
+/// The longest edge of a surface triangle, over the radius of a tool, that can still be sampled as finely as contact
+/// needs.
 pub const LARGEST_TRIANGLE: f64 = foundation::MAX_LEVEL as f64 * foundation::SPACING;
 
 use crate::mesh::Surface;
@@ -53,9 +54,9 @@ use touching::Touching;
 /// What contact needs that depends on the rest state alone.
 #[derive(Debug, Clone, Default)]
 pub struct ContactModel {
-    /// Bound (N/m) of what contact can do at each node: a spring in all directions. Empty without tools.
+    /// Bound (N/m) of contact's stiffness at each node, as a spring in all directions. Empty without tools.
     pub nodal_stiffness_n_per_m: Vec<f64>,
-    /// No point of the surface at rest is farther (m) from a vertex.
+    /// Largest distance (m) of a point of the surface at rest from the nearest vertex, or more.
     pub(crate) covering_radius_m: f64,
     /// Bound (rad²/s²) of what contact and coupling add through the tools' masses.
     pub tool_frequency_sq: f64,
@@ -69,13 +70,13 @@ pub struct ContactModel {
 struct ToolModel {
     spec: ToolSpec,
     foundation: Foundation,
-    /// Where the coupling saturates (N).
+    /// Force (N) at which the coupling saturates.
     force_limit_n: f64,
     /// Bound of the kinetic energy with which the tool meets the surface (J).
     impact_energy_j: f64,
 }
 
-/// The foundation on one boundary triangle, as one tool meets it: for methods with a contact of their own.
+/// The foundation on one boundary triangle, as one tool meets it, for methods with a contact of their own.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TriangleFoundation<'a> {
     /// Corners, counter-clockwise from outside.
@@ -86,22 +87,22 @@ pub struct TriangleFoundation<'a> {
     pub stiffness_n_per_m: f64,
 }
 
-/// The body at one instant.
+/// Positions and velocities of a body's nodes at one instant.
 #[derive(Debug, Clone, Copy)]
-pub struct Body<'a> {
+pub struct BodyMotion<'a> {
     /// Positions (m) of its nodes.
     pub x: &'a [DVec3],
     /// Velocities (m/s) of its nodes.
     pub v: &'a [DVec3],
-    /// Bound of the speed (m/s) with which any node came here.
+    /// Bound of the speed (m/s) of any node in the drift before.
     pub fastest_m_per_s: f64,
 }
 
 /// The surface at one instant.
 pub(crate) struct SurfaceNow<'a> {
-    /// Positions (m) of its nodes, of use at those that are listed.
+    /// Positions (m) of its nodes; only those of listed triangles are used.
     pub(crate) x: &'a [DVec3],
-    /// Velocity (m/s) of any of them.
+    /// Returns the velocity (m/s) of a node.
     pub(crate) velocity_m_per_s: &'a dyn Fn(u32) -> DVec3,
 }
 
@@ -109,7 +110,7 @@ pub(crate) struct SurfaceNow<'a> {
 #[derive(Debug, Clone, Default)]
 pub struct ContactScratch {
     tools: Vec<ToolScratch>,
-    /// Every triangle is looked at in every substep: no broad phase. Same bits, only slower.
+    /// Whether every triangle is looked at in every substep, without a broad phase: the bits are the same, only slower.
     exhaustive: bool,
 }
 
@@ -119,7 +120,7 @@ struct ToolScratch {
     sum: Pressed,
     coupling_sum_n: DVec3,
     coupling_sum_nm: DVec3,
-    /// Triangle (as the broad phase numbers them) nearest to the centre when it was last pressed.
+    /// Triangle, as the broad phase numbers them, that was nearest to the tool when it was pressed last.
     nearest: usize,
 }
 
@@ -136,12 +137,12 @@ impl ToolModel {
         }
     }
 
-    /// The axis of the tool now (m, world).
+    /// Returns the axis of the tool now (m, world).
     fn axis(&self, tool: &ToolState) -> Axis {
         self.spec.shape.axis(tool.centre_m, tool.orientation)
     }
 
-    /// The coupling's spring; `None` of a rigid tool.
+    /// Returns the coupling's spring, `None` for a rigid tool.
     fn spring(&self) -> Option<SaturatingSpring> {
         match self.spec.coupling {
             Coupling::Rigid => None,
@@ -153,8 +154,8 @@ impl ToolModel {
 }
 
 impl ContactModel {
-    /// Precomputes contact samples and the foundation stiffness of a body at rest, whose largest natural frequency without
-    /// contact is given. `moduli[triangle]` are those of the tets behind it.
+    /// Precomputes contact samples and the foundation stiffness of a body at rest, whose largest natural frequency
+    /// without contact is given. `moduli[triangle]` are those of the tets behind a triangle.
     pub fn build(
         rest_positions_m: &[DVec3],
         surface: &Surface,
@@ -172,20 +173,20 @@ impl ContactModel {
             positions_m: rest_positions_m,
             moduli,
             mass_kg,
-            // A body without a free node has none; its foundation is then of no consequence, but must be finite.
+            // A body without a free node has no frequency; its foundation does nothing then, but must be finite.
             frequency_sq: max_natural_frequency_rad_per_s.max(1.0).powi(2),
         };
         let tools: Vec<ToolModel> = tools
             .iter()
             .map(|tool| ToolModel::new(tool, Foundation::new(&body, tool.radius_m, tool.shape.half_length_m())))
             .collect();
-        // Of the triangles with a longest edge l, an equilateral one has the point that is farthest from all corners: l/√3.
+        // Among triangles whose longest edge is l, an equilateral one has the point farthest from all corners: l/√3.
         let edges_m = (0..surface.triangles.len()).map(|triangle| surface.longest_edge_m(triangle, rest_positions_m));
         let covering_radius_m = edges_m.fold(0.0, f64::max) / 3.0_f64.sqrt();
         let (mut nodal_stiffness_n_per_m, mut tool_frequency_sq) = (vec![0.0; mass_kg.len()], 0.0);
         for tool in &tools {
-            let size = (tool.spec.radius_m, tool.spec.shape.half_length_m());
-            let (nodal, total) = tool.foundation.row_sums_n_per_m(&triangles, mass_kg.len(), size);
+            let (radius_m, half_length_m) = (tool.spec.radius_m, tool.spec.shape.half_length_m());
+            let (nodal, total) = tool.foundation.row_sums_n_per_m(&triangles, mass_kg.len(), radius_m, half_length_m);
             for (sum, nodal) in nodal_stiffness_n_per_m.iter_mut().zip(nodal) {
                 *sum += nodal;
             }
@@ -195,12 +196,12 @@ impl ContactModel {
         Self { nodal_stiffness_n_per_m, covering_radius_m, tool_frequency_sq, triangles, tables, tools }
     }
 
-    /// Force (N) at which a tool's coupling saturates; infinite for a rigid tool.
+    /// Returns the force (N) at which a tool's coupling saturates, infinite for a rigid tool.
     pub fn force_limit_n(&self, tool: usize) -> f64 {
         self.spring(tool).map_or(f64::INFINITY, |spring| spring.limit_n)
     }
 
-    /// The foundation under a tool, triangle by triangle; nothing for a tool that is not there.
+    /// Returns the foundation under a tool, triangle by triangle; nothing for a tool that does not exist.
     pub fn foundation(&self, tool: usize) -> impl Iterator<Item = TriangleFoundation<'_>> {
         self.tools.get(tool).into_iter().flat_map(move |tool| {
             self.triangles.nodes.iter().enumerate().map(move |(triangle, &nodes)| {
@@ -210,22 +211,22 @@ impl ContactModel {
         })
     }
 
-    /// The spring of a tool's coupling; `None` of a rigid tool.
+    /// Returns the spring of a tool's coupling, `None` for a rigid tool.
     pub(crate) fn spring(&self, tool: usize) -> Option<SaturatingSpring> {
         self.tools[tool].spring()
     }
 
-    /// Contact's part of the state, touching nothing.
+    /// Returns contact's part of the state while tools touch nothing.
     pub fn state(&self) -> ContactState {
         ContactState::new(self)
     }
 
-    /// A state read from a snapshot, in buffers of this model's size; `None` when it does not fit.
+    /// Returns a state read from a snapshot, in buffers of this model's size; `None` when it does not fit.
     pub(crate) fn adopt(&self, saved: &ContactState) -> Option<ContactState> {
         self.state().adopt(saved, |tool| self.tools[tool].foundation.samples)
     }
 
-    /// Buffers large enough for every tick.
+    /// Returns buffers large enough for every tick. Without `skip_distant` there is no broad phase.
     pub fn scratch(&self, skip_distant: bool) -> ContactScratch {
         let tool = |tool: &ToolModel| ToolScratch {
             next: Touching::with_capacity(tool.foundation.samples),

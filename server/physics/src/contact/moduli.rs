@@ -11,13 +11,13 @@ pub struct SurfaceModuli {
     pub indentation_pa: f64,
 }
 
-/// `λ + 2µ` and `E/(1 − ν²)` (Pa).
+/// Returns `λ + 2µ` and `E/(1 − ν²)` (Pa).
 pub(crate) fn moduli_pa(material: &Material) -> DVec2 {
     let lame = material.lame;
     DVec2::new(lame.p_wave_modulus_pa(), lame.young_modulus_pa() / (1.0 - lame.poisson_ratio().powi(2)))
 }
 
-/// The moduli behind every triangle: the mean over its corners of [`moduli_pa`] at each node.
+/// Returns the moduli behind every triangle: the mean over its corners of [`moduli_pa`] at each node.
 pub(crate) fn mean_over_corners(of_node_pa: &[DVec2], surface: &Surface) -> Vec<SurfaceModuli> {
     let mean = |triangle| surface.triangle_nodes(triangle).iter().map(|&n| of_node_pa[n as usize]).sum::<DVec2>() / 3.0;
     (0..surface.triangles.len())

@@ -1,18 +1,19 @@
-//! The vertex of a skin that is nearest to a point, without looking at those that bounds rule out.
-use super::broad::{CLUSTER, ClusterBox, GROUP, ROUNDING_M, Skin};
+//! Finds the vertex of a skin that is nearest to a point, without looking at those that bounds rule out.
+use super::broad::{CLUSTER, FittedBoxes, GROUP, ROUNDING_M, Skin};
 use glam::DVec3;
 
 const NONE: u32 = u32::MAX;
 
-/// The vertex nearest to a point, if one is within a distance (m), and how far it is (m), of a skin of which a query has begun. Of several as near, the first one. `fitted` are contact's boxes and its travel (m), where they are of use.
+/// Returns the vertex nearest to a point, if one is within a distance (m), and its distance (m), on a skin of which a
+/// query has begun; of several that are as near, the first one. `fitted` are contact's boxes, where they may be used.
 pub(crate) fn nearest_vertex(
     skin: &impl Skin,
     from_m: DVec3,
     within_m: f64,
-    fitted: Option<(&[ClusterBox], f64)>,
+    fitted: Option<FittedBoxes<'_>>,
 ) -> Option<(u32, f64)> {
     let bound_m = |cluster: usize| {
-        let of_fitted_m = fitted.map_or(0.0, |(boxes, travel_m)| boxes[cluster].distance_bound_m(from_m, travel_m));
+        let of_fitted_m = fitted.map_or(0.0, |fitted| fitted.boxes[cluster].distance_bound_m(from_m, fitted.travel_m));
         skin.cluster_distance_m(cluster, from_m).max(of_fitted_m)
     };
     let in_group = GROUP / CLUSTER;
@@ -20,7 +21,7 @@ pub(crate) fn nearest_vertex(
     let groups = 0..clusters.div_ceil(in_group);
     let of_group = |group: usize| group * in_group..((group + 1) * in_group).min(clusters);
     let mut found = (within_m, NONE);
-    // What comes first should be near: it rules out most of the others.
+    // The first cluster should be near: it rules out most of the others.
     let near = |group: &usize| skin.group_distance_m(*group, from_m) <= within_m;
     let all = groups.clone().filter(near).flat_map(of_group);
     let first = all.map(|cluster| (bound_m(cluster), cluster)).min_by(|a, b| a.0.total_cmp(&b.0))?.1;
@@ -48,8 +49,8 @@ fn look_at(skin: &impl Skin, cluster: usize, from_m: DVec3, (nearest_m, nearest)
     }
 }
 
-/// Where a tool that touches is deepest in the body, by the force on it (N): in a dent many vertices are as near to its centre, and which is nearest would
-/// change with the particles that are awake.
+/// Returns where (m) a tool that touches is deepest in the body, by the force on it (N): in a dent many vertices are
+/// nearly as near to its centre, and the nearest one would change with the particles that are awake.
 pub(crate) fn deepest_m(centre_m: DVec3, radius_m: f64, contact_force_n: DVec3) -> Option<DVec3> {
     contact_force_n.try_normalize().map(|outwards| centre_m - outwards * radius_m)
 }

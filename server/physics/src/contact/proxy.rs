@@ -1,19 +1,20 @@
-//! How a tool moves: along its device's path, or as a mass on the virtual coupling.
+//! The motion of a tool: along its device's path, or as a mass on the virtual coupling.
 //!
-//! A coupled tool (the *proxy*) obeys `m c̈ = f_contact + K(d − c) + B(ḋ − ċ)` and is advanced with the body's own leapfrog:
-//! half kick, drift, new force, half kick. The damper is integrated exactly over each half kick,
+//! A coupled tool (the *proxy*) obeys `m c̈ = f_contact + K(d − c) + B(ḋ − ċ)` and is advanced with the body's own
+//! leapfrog: half kick, drift, new force, half kick. The damper is integrated exactly over each half kick,
 //! `v ← ḋ + (v − ḋ) e^{−B h/m}`, so no damping makes it unstable.
 //!
-//! The damper's `ḋ` is the velocity of the device's path, smoothed over [`SMOOTHED_S`]: an arm that counts steps of an encoder, or whose poses come beside the ticks,
-//! moves by leaps, and a damper makes of a leap of 0.05 mm in a tick of 1 ms 50 mm/s, and of 2 N s/m a buzz of 0.1 N.
+//! The damper's `ḋ` is the velocity of the device's path, smoothed over [`SMOOTHED_S`]: an arm that counts steps of an
+//! encoder, or whose poses are not in time with the ticks, moves by leaps. A leap of 0.05 mm in a tick of 1 ms is 50
+//! mm/s, of which a damper of 2 N s/m makes a buzz of 0.1 N.
 //!
 //! What keeps it outside, whatever the device does:
-//! - The spring saturates ([`super::spring`]) at `F_max`, the force that presses a sphere of its radius [`SATURATION_DEPTH`]·R into the flat
-//!   foundation. The damper is cut where the sum exceeds it.
-//! - It moves at most `R/4` in a substep; within `R/4` of the surface it approaches the nearest point, seen from there, with at
-//!   most the kinetic energy that the flat foundation stores at depth [`IMPACT_DEPTH`]·R. The rest is taken from the (virtual) tool,
-//!   never given to tool or body. In contact that point moves with the dent, which the body will stop: there a surface that gives
-//!   way allows no more speed than one at rest.
+//! - The spring saturates ([`super::spring`]) at `F_max`, the force that presses a sphere of its radius
+//!   [`SATURATION_DEPTH`]·R into the flat foundation. The damper is cut where the sum exceeds it.
+//! - It moves at most `R/4` in a substep; within `R/4` of the surface it approaches the nearest point, seen from there,
+//!   with at most the kinetic energy that the flat foundation stores at depth [`IMPACT_DEPTH`]·R. The rest is taken
+//!   from the (virtual) tool, never given to tool or body. In contact that point moves with the dent, which the body
+//!   will stop: there a surface that gives way allows no more speed than one at rest.
 //!
 //! A tool that turns is advanced in its orientation likewise ([`super::turning`]).
 use super::{
@@ -24,11 +25,11 @@ use super::{
 };
 use glam::DVec3;
 
-/// Depth over R at which the coupling's force saturates.
+/// Depth, over R, at which the coupling's force saturates.
 pub(super) const SATURATION_DEPTH: f64 = 0.3;
-/// Depth over R whose foundation energy bounds the proxy's kinetic energy near the surface.
+/// Depth, over R, whose foundation energy bounds the proxy's kinetic energy near the surface.
 pub(super) const IMPACT_DEPTH: f64 = 0.4;
-/// Largest motion in a substep, and the width of the zone near the surface, over R.
+/// Largest motion in a substep, and width of the zone near the surface, both over R.
 pub(super) const NEAR: f64 = 0.25;
 
 /// Time constant (s) of the device's velocity for the coupling's damper.
@@ -36,43 +37,44 @@ pub(super) const SMOOTHED_S: f64 = 5e-3;
 /// A device that stands still is at rest below this speed (m/s, rad/s): what is left of a smoothed velocity has no end.
 const AT_REST: f64 = 1e-7;
 
-/// Where a substep stands in its tick.
+/// The position of a substep within its tick.
 #[derive(Debug, Clone, Copy)]
 pub struct SubstepTime {
-    /// Part of the tick done at its end, 0..=1.
+    /// Fraction of the tick that is done at the substep's end, 0..=1.
     pub fraction: f64,
-    /// Its length (s); 0 evaluates forces where things are.
+    /// The substep's length (s); with 0 forces are evaluated where things are.
     pub dt_s: f64,
     /// The tick's length (s).
     pub tick_period_s: f64,
 }
 
 impl SubstepTime {
-    /// Position (m) and velocity (m/s) of the device: straight from target to target during a tick.
+    /// Returns position (m) and velocity (m/s) of the device, which moves straight from target to target during a tick.
     fn device(&self, tool: &ToolState) -> (DVec3, DVec3) {
         let (from, to) = (tool.previous_target.position_m, tool.target.position_m);
         (from.lerp(to, self.fraction), (to - from) / self.tick_period_s)
     }
 
-    /// At a tick's beginning: takes its path into the velocities that dampers have: `v ← v + (1 − e^{−T/τ}) (Δ/T − v)`.
+    /// Smooths, at a tick's beginning, its path into the velocities that dampers use:
+    /// `v ← v + (1 − e^{−T/τ}) (Δ/T − v)`.
     pub(super) fn smooth(&self, tool: &mut ToolState) {
-        let share = -(-self.tick_period_s / SMOOTHED_S).exp_m1();
+        let part = -(-self.tick_period_s / SMOOTHED_S).exp_m1();
         let smoothed = |old: DVec3, path: DVec3| {
-            let new = old + (path - old) * share;
+            let new = old + (path - old) * part;
             if path == DVec3::ZERO && new.length() < AT_REST { DVec3::ZERO } else { new }
         };
         tool.device_m_per_s = smoothed(tool.device_m_per_s, self.device(tool).1);
         tool.device_rad_per_s = smoothed(tool.device_rad_per_s, self.device_turn(tool).1);
     }
 
-    /// The same tick, where this substep begins.
+    /// Returns the time at which this substep begins.
     fn at_start(&self) -> Self {
         Self { fraction: self.fraction - self.dt_s / self.tick_period_s, ..*self }
     }
 }
 
 impl ToolModel {
-    /// `None` of a rigid tool.
+    /// Returns the coupling of position, `None` for a rigid tool.
     fn pull(&self) -> Option<Pull> {
         match (self.spec.coupling, self.spring()) {
             (Coupling::Spring { damping_n_s_per_m, mass_kg, .. }, Some(spring)) => {
@@ -83,7 +85,7 @@ impl ToolModel {
     }
 }
 
-/// A coupling's spring and damper, and what they move.
+/// A coupling's spring and damper, and the mass that they move.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Pull {
     pub(super) spring: SaturatingSpring,
@@ -93,7 +95,7 @@ pub(super) struct Pull {
     pub(super) mass_kg: f64,
 }
 
-/// What the coupling does to the tool.
+/// Force and torque of the coupling on the tool.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Coupled {
     /// Force (N).
@@ -102,11 +104,13 @@ pub(super) struct Coupled {
     pub(super) torque_nm: DVec3,
 }
 
-/// First half of a substep: half kick and drift. Returns how far any point of the tool's axis moved (m), at most.
+/// Does the first half of a substep, half kick and drift. Returns a bound (m) of how far any point of the tool's axis
+/// moved.
 pub(super) fn drift(
     model: &ToolModel,
     tool: &mut ToolState,
-    (contact_n, contact_nm): (DVec3, DVec3),
+    contact_n: DVec3,
+    contact_nm: DVec3,
     time: &SubstepTime,
 ) -> f64 {
     let before = model.axis(tool);
@@ -120,7 +124,7 @@ pub(super) fn drift(
         Some(pull) => {
             let (at_start, half_s) = (time.at_start(), 0.5 * time.dt_s);
             let stretch_m = at_start.device(tool).0 - tool.centre_m;
-            pull.half_kick(&mut tool.velocity_m_per_s, contact_n, (stretch_m, tool.device_m_per_s), half_s);
+            pull.half_kick(&mut tool.velocity_m_per_s, contact_n, stretch_m, tool.device_m_per_s, half_s);
             turning::half_kick(model, tool, contact_nm, &at_start, half_s);
             limit_speed(model, tool, NEAR * model.spec.radius_m / time.dt_s.max(f64::MIN_POSITIVE));
             tool.centre_m += tool.velocity_m_per_s * time.dt_s;
@@ -130,7 +134,8 @@ pub(super) fn drift(
     before.centre_m.distance(tool.centre_m) + before.half_m.distance(model.axis(tool).half_m)
 }
 
-/// Second half, with what the tool now meets. Returns what the coupling does to the tool.
+/// Does the second half of a substep, with the contact that the tool has now. Returns the coupling's force and torque
+/// on the tool.
 pub(super) fn finish(
     model: &ToolModel,
     tool: &mut ToolState,
@@ -149,24 +154,25 @@ pub(super) fn finish(
         match model.spec.shape.as_capsule() {
             None => limit_approach(tool, towards, limit_m_per_s),
             Some(capsule) => {
-                let inertia = (pull.mass_kg, capsule.turning.inertia_kg_m2);
-                turning::limit_approach(tool, (pressed.arm_m, towards), limit_m_per_s, inertia);
+                let inertia_kg_m2 = capsule.turning.inertia_kg_m2;
+                turning::limit_approach(tool, pressed.arm_m, towards, limit_m_per_s, pull.mass_kg, inertia_kg_m2);
             }
         }
     }
     let (stretch_m, half_s) = (time.device(tool).0 - tool.centre_m, 0.5 * time.dt_s);
-    let force_n = pull.half_kick(&mut tool.velocity_m_per_s, pressed.force_n, (stretch_m, tool.device_m_per_s), half_s);
+    let force_n = pull.half_kick(&mut tool.velocity_m_per_s, pressed.force_n, stretch_m, tool.device_m_per_s, half_s);
     Coupled { force_n, torque_nm: turning::half_kick(model, tool, pressed.torque_nm, time, half_s) }
 }
 
 impl Pull {
-    /// Kicks the tool over `h_s`, with the contact's force (N), the stretch (m) and the device's velocity (m/s), and returns the coupling's mean force
-    /// (N) over it.
+    /// Kicks the tool over `h_s`, with the contact's force (N), the stretch (m) and the device's velocity (m/s), and
+    /// returns the coupling's mean force (N) over it.
     pub(super) fn half_kick(
         &self,
         velocity_m_per_s: &mut DVec3,
         contact_n: DVec3,
-        (stretch_m, device_m_per_s): (DVec3, DVec3),
+        stretch_m: DVec3,
+        device_m_per_s: DVec3,
         h_s: f64,
     ) -> DVec3 {
         let Self { spring, damping_n_s_per_m, mass_kg } = *self;
@@ -176,17 +182,18 @@ impl Pull {
         }
         *velocity_m_per_s += (contact_n + spring_n) * (h_s / mass_kg);
         // Impulse of the damper over h: m (1 − e^{−B h/m}) (ḋ − ċ)
-        let share = -(-damping_n_s_per_m * h_s / mass_kg).exp_m1();
-        // |s + β d| ≤ limit and |s| ≤ limit: no more than twice the limit of it can be used.
-        let damper_n = shortened((device_m_per_s - *velocity_m_per_s) * (mass_kg * share / h_s), 2.0 * limit_n);
-        let damper_n = damper_n * share_within(spring_n, damper_n, limit_n);
+        let part = -(-damping_n_s_per_m * h_s / mass_kg).exp_m1();
+        // |s + β d| ≤ limit and |s| ≤ limit: no more than twice the limit of the damper's force can be used.
+        let damper_n = shortened((device_m_per_s - *velocity_m_per_s) * (mass_kg * part / h_s), 2.0 * limit_n);
+        let damper_n = damper_n * fraction_within(spring_n, damper_n, limit_n);
         *velocity_m_per_s += damper_n * (h_s / mass_kg);
         spring_n + damper_n
     }
 }
 
-/// Largest `β ≤ 1` with `|s + β d| ≤ limit`, for `|s| ≤ limit`. A shortened damper still only takes energy.
-fn share_within(s: DVec3, d: DVec3, limit: f64) -> f64 {
+/// Returns the largest `β ≤ 1` with `|s + β d| ≤ limit`, for `|s| ≤ limit`. A damper shortened by it still only takes
+/// energy.
+fn fraction_within(s: DVec3, d: DVec3, limit: f64) -> f64 {
     // A saturated spring may be a rounding beyond the limit by itself: without a damper there is nothing to shorten.
     if (s + d).length_squared() <= limit * limit || d == DVec3::ZERO {
         return 1.0;
@@ -196,8 +203,8 @@ fn share_within(s: DVec3, d: DVec3, limit: f64) -> f64 {
     (((half * half + square * rest).sqrt() - half) / square).clamp(0.0, 1.0)
 }
 
-/// Cuts the velocity towards the surface, but no more than to a stop; `towards` is not a direction when the centre lies on the
-/// surface.
+/// Cuts the velocity towards the surface, but no more than to a stop; `towards` is not a direction when the centre lies
+/// on the surface.
 fn limit_approach(tool: &mut ToolState, towards: DVec3, limit_m_per_s: f64) {
     let own = tool.velocity_m_per_s.dot(towards);
     let excess = (own - limit_m_per_s).min(own);
@@ -226,12 +233,12 @@ mod tests {
     #[test]
     fn the_damper_is_cut_at_the_limit_and_never_reversed() {
         for (s, d) in [(DVec3::X, DVec3::X * 5.0), (DVec3::X * 2.0, DVec3::Y), (DVec3::X * 2.0, DVec3::NEG_X * 9.0)] {
-            let share = share_within(s, d, 2.0);
-            assert!((0.0..=1.0).contains(&share));
-            assert!((s + d * share).length() <= 2.0 + 1e-12, "{s} {d} {share}");
+            let part = fraction_within(s, d, 2.0);
+            assert!((0.0..=1.0).contains(&part));
+            assert!((s + d * part).length() <= 2.0 + 1e-12, "{s} {d} {part}");
         }
-        assert_eq!(share_within(DVec3::X, DVec3::X * 0.5, 2.0), 1.0);
+        assert_eq!(fraction_within(DVec3::X, DVec3::X * 0.5, 2.0), 1.0);
         // Without damping, a spring that saturated at the limit and a rounding made the tool's velocity not a number.
-        assert_eq!(share_within(DVec3::X * (2.0 + 1e-15), DVec3::ZERO, 2.0), 1.0);
+        assert_eq!(fraction_within(DVec3::X * (2.0 + 1e-15), DVec3::ZERO, 2.0), 1.0);
     }
 }

@@ -1,20 +1,20 @@
 //! Contact at rest: the foundation's potential, force and stiffness, without friction or history.
 //!
 //! `Φ = ½ Σ_s k_f a_s g_s²`, `g = R − |r|`, `r = y − c` (see [`super::foundation`]). With `n̂ = r/|r|`:
-//! `−∂Φ/∂y = k g n̂ = ∂Φ/∂c`, `∂²Φ/∂r² = H = k n̂n̂ᵀ − k (g/|r|)(I − n̂n̂ᵀ)`; nodes get both through the weights ζ, so that with
-//! `w = (ζ, −1)` on (nodes, tool) the force is `−w ⊗ ∂Φ/∂r` and the stiffness `w wᵀ ⊗ H`.
+//! `−∂Φ/∂y = k g n̂ = ∂Φ/∂c`, `∂²Φ/∂r² = H = k n̂n̂ᵀ − k (g/|r|)(I − n̂n̂ᵀ)`; nodes get both through the weights ζ, so
+//! that with `w = (ζ, −1)` on (nodes, tool) the force is `−w ⊗ ∂Φ/∂r` and the stiffness `w wᵀ ⊗ H`.
 //!
 //! A *configuration* holds the positions of all nodes, then the centres of all tools.
 //!
-//! Which samples a tool may press is settled where it arrives: those whose outward side it is on, and of those inside it
-//! before, the ones it pressed then. So the potential is one smooth function while equilibrium is sought.
+//! Which samples a tool may press is settled where it arrives: those whose outward side it is on, and of those inside
+//! it before, the ones it pressed then. So the potential is one smooth function while equilibrium is sought.
 use super::ContactModel;
 use glam::{DMat3, DVec3};
 
-/// Which samples may be pressed.
+/// Contact at rest: which samples each tool may press.
 #[derive(Debug, Clone)]
 pub(crate) struct RestingContact {
-    /// Per tool and sample.
+    /// Whether a tool may press a sample, by tool and sample.
     front: Vec<Vec<bool>>,
 }
 
@@ -23,9 +23,9 @@ pub(crate) struct RestingContact {
 pub(crate) struct Pressing {
     /// Force of the body on the tool (N).
     pub(crate) force_n: DVec3,
-    /// Samples that carry force.
+    /// Number of samples that carry force.
     pub(crate) contacts: u32,
-    /// Deepest sample (m).
+    /// Depth (m) of the deepest sample.
     pub(crate) penetration_m: f64,
     /// `Φ` (J).
     pub(crate) energy_j: f64,
@@ -49,18 +49,19 @@ struct Sample {
     number: usize,
     /// `r = y − c` (m).
     from_centre_m: DVec3,
-    /// Outward (m²), twice the triangle's area long.
+    /// Outward normal of the triangle, of twice its area (m²).
     outward: DVec3,
 }
 
 impl RestingContact {
-    /// Tools that appear where they are.
+    /// Returns the contact of tools that appear where they are.
     pub(crate) fn appear(model: &ContactModel, configuration: &[DVec3]) -> Self {
         let nothing = Self { front: model.tools.iter().map(|tool| vec![false; tool.foundation.samples]).collect() };
         nothing.settled(model, configuration, |_, sample| sample.outward.dot(sample.from_centre_m) < 0.0)
     }
 
-    /// Tools that came from the configuration `before`, with this contact, to another.
+    /// Returns the contact of tools that moved from the configuration `before`, where they had this contact, to
+    /// another.
     pub(crate) fn arrive(&self, model: &ContactModel, before: &[DVec3], now: &[DVec3]) -> Self {
         let was_inside = inside(model, before);
         self.settled(model, now, |tool, sample| {
@@ -72,8 +73,8 @@ impl RestingContact {
         })
     }
 
-    /// Contact with the samples added that tools met from the outside between two configurations and could not press: `None` if
-    /// there are none.
+    /// Returns the contact with those samples added that tools met from the outside between two configurations and
+    /// could not press; `None` if there are none.
     pub(crate) fn widened(&self, model: &ContactModel, before: &[DVec3], now: &[DVec3]) -> Option<Self> {
         let (was_inside, is_inside) = (inside(model, before), inside(model, now));
         let mut widened = false;
@@ -99,14 +100,14 @@ impl RestingContact {
         settled
     }
 
-    /// `Φ` (J) of all tools.
+    /// Returns `Φ` (J) of all tools.
     pub(crate) fn potential_j(&self, model: &ContactModel, configuration: &[DVec3]) -> f64 {
         let mut sum = 0.0;
         self.for_each(model, configuration, |s| sum += 0.5 * s.stiffness_n_per_m * s.depth_m * s.depth_m);
         sum
     }
 
-    /// Adds the forces (N) on nodes and tools, and says how every tool presses.
+    /// Adds the forces (N) on nodes and tools, and returns how every tool presses.
     pub(crate) fn add_forces_n(
         &self,
         model: &ContactModel,
@@ -132,8 +133,9 @@ impl RestingContact {
         tools
     }
 
-    /// Calls `add(i, j, block)` with `∂²Φ/∂q_i∂q_j` (N/m), once per pair `i ≤ j` of a triangle's corners and the tool (numbered as in
-    /// the configuration). `definite` leaves out the part that pressing makes across the normal, which is negative.
+    /// Calls `add(i, j, block)` with `∂²Φ/∂q_i∂q_j` (N/m), once per pair `i ≤ j` of a triangle's corners and the tool
+    /// (numbered as in the configuration). `definite` leaves out the part that pressing makes across the normal, which
+    /// is negative.
     pub(crate) fn for_each_block(
         &self,
         model: &ContactModel,
@@ -180,7 +182,7 @@ impl RestingContact {
     }
 }
 
-/// Which samples are inside each tool.
+/// Returns which samples are inside each tool.
 fn inside(model: &ContactModel, configuration: &[DVec3]) -> Vec<Vec<bool>> {
     let mut inside: Vec<Vec<bool>> = model.tools.iter().map(|tool| vec![false; tool.foundation.samples]).collect();
     for_near_triangles(model, configuration, |tool, triangle, centre, corners| {

@@ -17,12 +17,12 @@ pub(crate) struct SaturatingSpring {
 }
 
 impl SaturatingSpring {
-    /// Force (N) on the tool.
+    /// Returns the force (N) on the tool.
     pub(crate) fn force_n(self, stretch_m: DVec3) -> DVec3 {
         shortened(stretch_m, self.limit_n / self.stiffness_n_per_m) * self.stiffness_n_per_m
     }
 
-    /// `Ψ` (J).
+    /// Returns `Ψ` (J).
     pub(crate) fn energy_j(self, stretch_m: DVec3) -> f64 {
         let (length_m, linear_m) = (stretch_m.length(), self.limit_n / self.stiffness_n_per_m);
         if length_m <= linear_m {
@@ -32,8 +32,8 @@ impl SaturatingSpring {
         }
     }
 
-    /// `∂²Ψ/∂c²` (N/m): `K I`, or `F_max/|e| (I − êêᵀ)`. `definite` gives the secant `F_max/|e| I` instead of the latter, which
-    /// is no less and leads straight to the device.
+    /// Returns `∂²Ψ/∂c²` (N/m): `K I`, or `F_max/|e| (I − êêᵀ)`. `definite` gives the secant `F_max/|e| I` instead of
+    /// the latter, which is no less and leads straight to the device.
     pub(crate) fn hessian_n_per_m(self, stretch_m: DVec3, definite: bool) -> DMat3 {
         let length_m = stretch_m.length();
         if self.stiffness_n_per_m * length_m <= self.limit_n {
@@ -45,7 +45,7 @@ impl SaturatingSpring {
     }
 }
 
-/// The vector, cut to a length; safe for any finite vector, however long.
+/// Returns the vector, cut to a length; it is safe for any finite vector, however long.
 pub(super) fn shortened(a: DVec3, limit: f64) -> DVec3 {
     let largest = a.abs().max_element();
     if largest <= limit { a.clamp_length_max(limit) } else { (a / largest).normalize() * limit }
@@ -58,10 +58,13 @@ mod tests {
 
     proptest! {
         #[test]
-        fn force_and_stiffness_are_the_derivatives_of_the_energy(e in prop::array::uniform3(-2.0..2.0_f64), axis in 0..3_usize) {
+        fn force_and_stiffness_are_the_derivatives_of_the_energy(
+            e in prop::array::uniform3(-2.0..2.0_f64),
+            axis in 0..3_usize,
+        ) {
             let spring = SaturatingSpring { stiffness_n_per_m: 300.0, limit_n: 300.0 };
             let (e, step) = (DVec3::from(e), DVec3::AXES[axis] * 1e-6);
-            // Not across the kink of the stiffness.
+            // The stiffness has a kink there.
             prop_assume!((e.length() - 1.0).abs() > 1e-3);
             let slope = (spring.energy_j(e + step) - spring.energy_j(e - step)) / 2e-6;
             prop_assert!((slope - spring.force_n(e)[axis]).abs() < 1e-6 * 300.0);

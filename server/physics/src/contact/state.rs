@@ -1,7 +1,7 @@
-//! What contact carries from one tick to the next.
+//! The state of contact, which is carried from one tick to the next.
 use super::{
     ContactModel,
-    broad::{Candidates, ClusterBox},
+    broad::{Candidates, ClusterBox, FittedBoxes, FittedBoxesMut},
     local_model::StiffnessEstimate,
     touching::Touching,
 };
@@ -11,9 +11,9 @@ use serde::{Deserialize, Serialize};
 
 /// Contact's part of [`crate::State`].
 ///
-/// Samples in contact, friction springs, the force at the end of the tick and the estimate of stiffness are state in the full
-/// sense: saved, restored, compared. The broad phase's boxes and lists follow from the positions; they are neither saved
-/// nor compared, and are rebuilt whenever `force_is_current` is false.
+/// Samples in contact, friction springs, the force at the end of the tick and the estimate of stiffness are state in
+/// the full sense: saved, restored, compared. The broad phase's boxes and lists follow from the positions; they are
+/// neither saved nor compared, and are rebuilt whenever `force_is_current` is false.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct ContactState {
     pub(super) tools: Vec<ToolContact>,
@@ -21,16 +21,16 @@ pub struct ContactState {
     boxes: Vec<ClusterBox>,
     #[serde(skip)]
     travel_m: f64,
-    /// The surface was moved, since forces were evaluated last, by nothing but what [`Self::travelled`] was told.
+    /// Whether all motion of the surface since the last evaluation of forces was told to [`Self::travelled`].
     #[serde(skip)]
     is_tracked: bool,
 }
 
-/// One tool's part.
+/// The contact of one tool.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub(super) struct ToolContact {
     pub(super) touching: Touching,
-    /// It was just put where it is: what is inside it then carries nothing as deep as that.
+    /// Whether it was just put where it is: samples inside it then carry nothing up to their present depth.
     pub(super) just_put: bool,
     /// Force of the body on the tool now (N).
     pub(super) force_n: DVec3,
@@ -81,7 +81,8 @@ impl ContactState {
         }
     }
 
-    /// Takes over what was read from a snapshot into buffers of the model's size; `None` when it does not fit the model.
+    /// Copies what was read from a snapshot into buffers of the model's size; returns `None` when it does not fit the
+    /// model.
     pub(super) fn adopt(mut self, saved: &Self, samples: impl Fn(usize) -> usize) -> Option<Self> {
         if saved.tools.len() != self.tools.len() {
             return None;
@@ -104,7 +105,7 @@ impl ContactState {
         Some(self)
     }
 
-    /// Adds all that is remembered.
+    /// Adds all that is saved to a hash.
     pub(crate) fn chain(&self, chain: &mut Chain) {
         chain.list(&self.tools, |chain, tool| {
             chain.list(tool.touching.records(), |chain, touch| {
@@ -133,7 +134,7 @@ impl ContactState {
         self.forget_geometry();
     }
 
-    /// Copies what another state remembers; its own geometry then fits neither.
+    /// Copies what another state saves; the broad phase's boxes and lists are then out of date.
     pub(crate) fn keep_memory_of(&mut self, other: &Self) {
         for (own, other) in self.tools.iter_mut().zip(&other.tools) {
             own.touching.copy_from(&other.touching);
@@ -141,7 +142,7 @@ impl ContactState {
         }
     }
 
-    /// Touching nothing. Allocates nothing.
+    /// Clears all contact: tools touch nothing. Allocates nothing.
     pub(crate) fn clear(&mut self) {
         for tool in &mut self.tools {
             tool.touching.clear();
@@ -152,7 +153,7 @@ impl ContactState {
         self.forget_geometry();
     }
 
-    /// One tool was put somewhere, and has touched nothing yet. Allocates nothing.
+    /// Resets the contact of a tool that was put somewhere: it has touched nothing yet. Allocates nothing.
     pub(crate) fn put_tool(&mut self, tool: usize) {
         let part = &mut self.tools[tool];
         part.touching.clear();
@@ -171,7 +172,7 @@ impl ContactState {
         }
     }
 
-    /// The surface moved by at most this much (m).
+    /// Records that the surface moved by at most this distance (m).
     pub(crate) fn travelled(&mut self, distance_m: f64) {
         self.travel_m += distance_m;
         for tool in &mut self.tools {
@@ -179,33 +180,35 @@ impl ContactState {
         }
     }
 
-    /// The surface moved by at most this much (m) as other nodes came to carry it. Where forces were current until then, its
-    /// geometry is still known at the next evaluation.
+    /// Records that the surface moved by at most this distance (m) as other nodes came to carry it. Where forces were
+    /// current until then, its geometry is still known at the next evaluation.
     pub(crate) fn travelled_at_a_change(&mut self, distance_m: f64, forces_were_current: bool) {
         self.travelled(distance_m);
         self.is_tracked = forces_were_current;
     }
 
-    /// Before forces are evaluated that are not current: makes the broad phase look at the positions anew, unless it knows how far the
-    /// surface moved.
+    /// Makes the broad phase look at the positions anew, before forces are evaluated that are not current, unless it
+    /// knows how far the surface moved.
     pub(crate) fn forget_untracked_geometry(&mut self) {
         if !std::mem::take(&mut self.is_tracked) {
             self.forget_geometry();
         }
     }
 
-    /// Triangles that any tool may touch.
+    /// Returns the triangles that any tool may touch.
     pub(super) fn listed(&self) -> impl Iterator<Item = u32> + '_ {
         self.tools.iter().flat_map(|tool| tool.candidates.triangles().iter().copied())
     }
 
-    /// The boxes as they were fitted, and the travel (m); of use while nothing but what is told to [`Self::travelled`] moved the surface.
-    pub(crate) fn boxes(&self) -> (&[ClusterBox], f64) {
-        (&self.boxes, self.travel_m)
+    /// Returns the boxes as they were fitted, and the travel; they may be used while all motion of the surface was told
+    /// to [`Self::travelled`].
+    pub(crate) fn boxes(&self) -> FittedBoxes<'_> {
+        FittedBoxes { boxes: &self.boxes, travel_m: self.travel_m }
     }
 
-    /// One tool's part, and the boxes with the travel.
-    pub(super) fn split(&mut self, tool: usize) -> (&mut ToolContact, &mut [ClusterBox], f64) {
-        (&mut self.tools[tool], &mut self.boxes, self.travel_m)
+    /// Returns the contact of one tool, and the boxes with the travel.
+    pub(super) fn split(&mut self, tool: usize) -> (&mut ToolContact, FittedBoxesMut<'_>) {
+        let fitted = FittedBoxesMut { boxes: &mut self.boxes, travel_m: self.travel_m };
+        (&mut self.tools[tool], fitted)
     }
 }

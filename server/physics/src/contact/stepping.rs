@@ -1,8 +1,8 @@
-//! The contact's part of a tick: its beginning, its substeps, its end.
+//! Contact's part of a tick: its beginning, its substeps, its end.
 use super::{
-    Body, ContactModel, ContactScratch, ContactState, Coupling, SubstepTime, SurfaceNow, ToolScratch, ToolState,
+    BodyMotion, ContactModel, ContactScratch, ContactState, Coupling, SubstepTime, SurfaceNow, ToolScratch, ToolState,
     axis::Axis,
-    broad::Skin,
+    broad::{ListReach, Skin},
     local_model::{self, MeanContact},
     narrow::{self, Meeting, Pressed},
     proxy,
@@ -10,7 +10,7 @@ use super::{
 use glam::DVec3;
 
 impl ContactModel {
-    /// Once a tick, before its first substep.
+    /// Begins a tick, before its first substep.
     pub fn begin_tick(&self, tools: &mut [ToolState], scratch: &mut ContactScratch, tick_period_s: f64) {
         let time = SubstepTime { fraction: 1.0, dt_s: 0.0, tick_period_s };
         for (tool, scratch) in tools.iter_mut().zip(&mut scratch.tools) {
@@ -22,10 +22,10 @@ impl ContactModel {
         }
     }
 
-    /// Once a substep, after the body drifted: moves the tools with it, and adds contact forces (N) on nodes to `forces_n`.
+    /// Does a substep, after the body drifted: moves the tools, and adds contact forces (N) on nodes to `forces_n`.
     pub fn substep(
         &self,
-        body: &Body<'_>,
+        body: &BodyMotion<'_>,
         time: &SubstepTime,
         tools: &mut [ToolState],
         contact: &mut ContactState,
@@ -40,7 +40,7 @@ impl ContactModel {
         self.press_tools(&surface, time, tools, contact, forces_n, scratch);
     }
 
-    /// The first part of a substep: the body drifted with up to `fastest_m_per_s`, the tools follow.
+    /// Does the first part of a substep: the tools move after the body, which drifted with up to `fastest_m_per_s`.
     pub(crate) fn move_tools(
         &self,
         fastest_m_per_s: f64,
@@ -54,42 +54,44 @@ impl ContactModel {
         }
     }
 
-    /// The second part, on a skin: lists anew where a list is out of date. Whether any was. `x` has room for positions (m) of all vertices.
+    /// Does the second part, on a skin: renews the lists that are out of date. Returns whether any was. `x` has room
+    /// for the positions (m) of all vertices.
     pub(crate) fn list_on_skin(
         &self,
-        (skin, x): (&mut impl Skin, &mut [DVec3]),
+        skin: &mut impl Skin,
+        x: &mut [DVec3],
         tools: &[ToolState],
         contact: &mut ContactState,
         scratch: &ContactScratch,
     ) -> bool {
         let mut renewed = false;
         for (index, tool) in tools.iter().enumerate() {
-            let (part, boxes, travel_m) = contact.split(index);
+            let (part, fitted) = contact.split(index);
             let candidates = &mut part.candidates;
             if scratch.exhaustive {
                 renewed |= candidates.triangles().len() != self.triangles.len();
                 self.triangles.list_all(candidates);
             } else if candidates.slack_m <= 0.0 {
-                let reach_m = self.reach_m(index);
+                let reach = self.reach(index);
                 let axis = self.tools[index].axis(tool);
-                self.triangles.query_skin((skin, x), (boxes, travel_m), &axis, reach_m, candidates);
+                self.triangles.query_skin(skin, x, fitted, &axis, reach, candidates);
                 renewed = true;
             }
         }
         renewed
     }
 
-    /// Nodes of the triangles that any tool may touch, some of them several times.
+    /// Returns the nodes of the triangles that any tool may touch, some of them several times.
     pub(crate) fn listed_nodes<'a>(&'a self, contact: &'a ContactState) -> impl Iterator<Item = u32> + 'a {
         contact.listed().flat_map(|triangle| self.triangles.nodes[triangle as usize])
     }
 
-    /// Nodes of all triangles, in the order of the broad phase.
+    /// Returns the nodes of all triangles, in the order of the broad phase.
     pub(crate) fn triangles(&self) -> &[[u32; 3]] {
         &self.triangles.nodes
     }
 
-    /// The last part: presses the tools on what is listed, and adds the forces (N) on nodes.
+    /// Does the last part: presses the tools on the listed triangles, and adds the forces (N) on nodes.
     pub(crate) fn press_tools(
         &self,
         SurfaceNow { x, velocity_m_per_s }: &SurfaceNow<'_>,
@@ -117,8 +119,8 @@ impl ContactModel {
         }
     }
 
-    /// [`Self::substep`] where the body does not move and no tool is near it, of which there is nothing but the tools' motion. Stops and
-    /// returns false as soon as one is near.
+    /// Does a [`Self::substep`] in which the body does not move and no tool is near it, so that only the tools move.
+    /// Stops and returns false as soon as a tool is near.
     pub fn substep_apart(
         &self,
         x: &[DVec3],
@@ -143,12 +145,14 @@ impl ContactModel {
         true
     }
 
-    /// Whether no tool is within a quarter of its radius of the surface. The lists must be of the present positions.
+    /// Returns whether no tool is within a quarter of its radius of the surface. The lists must be of the present
+    /// positions.
     pub fn is_apart(&self, x: &[DVec3], tools: &[ToolState], contact: &ContactState) -> bool {
         tools.iter().enumerate().all(|(index, tool)| !self.is_near(index, &self.tools[index].axis(tool), x, contact))
     }
 
-    /// By distances, not by what is listed: which triangles beyond the zone are on a list depends on when it was made.
+    /// Returns whether a tool is near the surface. It measures distances, since which triangles beyond the zone are
+    /// listed depends on when the list was made.
     fn is_near(&self, tool: usize, axis: &Axis, x: &[DVec3], contact: &ContactState) -> bool {
         let zone_m = (1.0 + proxy::NEAR) * self.tools[tool].spec.radius_m;
         let listed = contact.tools[tool].candidates.triangles();
@@ -157,23 +161,23 @@ impl ContactModel {
 
     fn drift(&self, index: usize, tool: &mut ToolState, time: &SubstepTime, contact: &mut ContactState) {
         let part = &contact.tools[index];
-        let moved_m = proxy::drift(&self.tools[index], tool, (part.force_n, part.torque_nm), time);
+        let moved_m = proxy::drift(&self.tools[index], tool, part.force_n, part.torque_nm, time);
         contact.tools[index].candidates.slack_m -= moved_m;
     }
 
     fn list_candidates(&self, tool: usize, axis: &Axis, x: &[DVec3], contact: &mut ContactState, exhaustive: bool) {
-        let (part, boxes, travel_m) = contact.split(tool);
+        let (part, fitted) = contact.split(tool);
         if exhaustive {
             self.triangles.list_all(&mut part.candidates);
         } else if part.candidates.slack_m <= 0.0 {
-            self.triangles.query(x, (boxes, travel_m), axis, self.reach_m(tool), &mut part.candidates);
+            self.triangles.query(x, fitted, axis, self.reach(tool), &mut part.candidates);
         }
     }
 
-    /// How far from a tool's axis (m) triangles are listed, and within what none may be missing.
-    fn reach_m(&self, tool: usize) -> (f64, f64) {
+    /// Returns how far from a tool's axis triangles are listed.
+    fn reach(&self, tool: usize) -> ListReach {
         let radius_m = self.tools[tool].spec.radius_m;
-        ((1.0 + 2.0 * proxy::NEAR) * radius_m, (1.0 + proxy::NEAR) * radius_m)
+        ListReach { listed_m: (1.0 + 2.0 * proxy::NEAR) * radius_m, complete_m: (1.0 + proxy::NEAR) * radius_m }
     }
 
     fn press(
@@ -202,7 +206,7 @@ impl ContactModel {
         pressed
     }
 
-    /// Velocity (m/s) of the point of the surface nearest to a tool.
+    /// Returns the velocity (m/s) of the point of the surface nearest to a tool.
     fn surface_m_per_s(&self, pressed: &Pressed, velocity_m_per_s: &dyn Fn(u32) -> DVec3) -> DVec3 {
         let (triangle, weights) = pressed.nearest;
         if weights == [0.0; 3] {
@@ -212,7 +216,7 @@ impl ContactModel {
         corners.into_iter().zip(weights).map(|(node, weight)| velocity_m_per_s(node) * weight).sum()
     }
 
-    /// Once a tick, at its end: means and local models.
+    /// Ends a tick: computes means over it, and the local models.
     pub fn end_tick(
         &self,
         tools: &mut [ToolState],
@@ -220,14 +224,14 @@ impl ContactModel {
         substeps: u32,
         scratch: &mut ContactScratch,
     ) {
-        let share = 1.0 / f64::from(substeps);
+        let fraction = 1.0 / f64::from(substeps);
         for (index, (tool, scratch)) in tools.iter_mut().zip(&scratch.tools).enumerate() {
             let model = &self.tools[index];
-            let pressed = scratch.sum.scaled(share);
+            let pressed = scratch.sum.scaled(fraction);
             (tool.contact_force_n, tool.contact_torque_nm) = (pressed.force_n, pressed.torque_nm);
             (tool.device_force_n, tool.device_torque_nm) = match model.spec.coupling {
                 Coupling::Rigid => (pressed.force_n, pressed.torque_nm),
-                Coupling::Spring { .. } => (-scratch.coupling_sum_n * share, -scratch.coupling_sum_nm * share),
+                Coupling::Spring { .. } => (-scratch.coupling_sum_n * fraction, -scratch.coupling_sum_nm * fraction),
             };
             let mean =
                 MeanContact { pressed, device_force_n: tool.device_force_n, device_torque_nm: tool.device_torque_nm };

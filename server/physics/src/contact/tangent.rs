@@ -1,27 +1,29 @@
-//! Stiffness of the contact there is, for implicit steps: the positive part of `−∂f/∂y` of every sample in contact.
+//! Stiffness of the present contact, for implicit steps: the positive part of `−∂f/∂y` of every sample in contact.
 //!
-//! With `w = ζ_i` on a triangle's corners and `H = k n̂n̂ᵀ + friction` per sample (see [`super::narrow`]): a sticking spring adds
-//! `k_t(I − n̂n̂ᵀ)`, a slipping one, whose force keeps its size and turns with the slip `t̂`, `k_t e/|e|_{trial}` across `t̂`, which is
-//! `µ_f f_n/|e|` at most. What pressing makes across the normal, `−k (g/|r|)(I − n̂n̂ᵀ)`, is negative and left out. So is what is
-//! not recorded (samples beyond the buffer): it stays explicit.
+//! With `w = ζ_i` on a triangle's corners and `H = k n̂n̂ᵀ + friction` per sample (see [`super::narrow`]): a sticking
+//! spring adds `k_t(I − n̂n̂ᵀ)`, a slipping one, whose force keeps its size and turns with the slip `t̂`,
+//! `k_t e/|e|_{trial}` across `t̂`, which is `µ_f f_n/|e|` at most. What pressing makes across the normal,
+//! `−k (g/|r|)(I − n̂n̂ᵀ)`, is negative and left out. Samples that are not recorded (those beyond the buffer) are left
+//! out, too: they stay explicit.
 //!
-//! A tool's motion during the step is known. It enters as the change of force it makes where the surface stays, which is not linear: a
-//! tool that leaves does not pull.
+//! A tool's motion during the step is known. It enters as the change of force it makes where the surface stays, which
+//! is not linear: a tool that leaves does not pull.
 //!
-//! All follows from the state alone (touched samples, positions), so that a restored run steps with the same bits.
+//! The stiffness follows from the state alone (touched samples, positions), so that a restored run steps with the same
+//! bits.
 use super::{ContactModel, ContactState, Coupling, ToolState, narrow::TANGENTIAL_RATIO, touching::Touch};
 use glam::{DMat3, DVec3};
 
-/// More pressed triangles than this per tool are left explicit.
+/// Largest number of pressed triangles per tool; others are left explicit.
 const MOST: usize = 4096;
 
 /// `Σ_s ζ_i ζ_j H_s` (N/m) of one triangle.
 #[derive(Debug, Clone, Copy)]
 struct TriangleTangent {
     nodes: [u32; 3],
-    /// What the tool's motion changes on the corners (N).
+    /// Change of the forces (N) on the corners by the tool's motion.
     change_n: [DVec3; 3],
-    /// Of the corner pairs (0,0), (1,1), (2,2), (0,1), (0,2), (1,2).
+    /// Blocks of the corner pairs (0,0), (1,1), (2,2), (0,1), (0,2), (1,2).
     blocks: [DMat3; 6],
 }
 
@@ -41,7 +43,7 @@ impl ContactTangents {
         Self { triangles: Vec::with_capacity(most), most }
     }
 
-    /// `out ← out + factor K_c a`.
+    /// Adds `factor K_c a` to `out`.
     pub(crate) fn add_products(&self, factor: f64, a: &[DVec3], out: &mut [DVec3]) {
         for triangle in &self.triangles {
             let a = triangle.nodes.map(|n| a[n as usize] * factor);
@@ -54,7 +56,7 @@ impl ContactTangents {
         }
     }
 
-    /// Adds `factor` times what the tools' motion changes.
+    /// Adds `factor` times the change of the forces (N) by the tools' motion.
     pub(crate) fn add_changes(&self, factor: f64, out: &mut [DVec3]) {
         for triangle in &self.triangles {
             for (&node, change_n) in triangle.nodes.iter().zip(triangle.change_n) {
@@ -75,12 +77,12 @@ impl ContactTangents {
 pub(crate) struct StepAhead {
     /// Its length (s).
     pub(crate) dt_s: f64,
-    /// The tick's (s).
+    /// The tick's length (s).
     pub(crate) tick_period_s: f64,
 }
 
 impl ContactModel {
-    /// Takes the stiffness of what tools touch, at positions `x` (m). Allocates nothing.
+    /// Computes the stiffness of what tools touch, at positions `x` (m). Allocates nothing.
     pub(crate) fn take_tangents(
         &self,
         x: &[DVec3],
@@ -95,13 +97,13 @@ impl ContactModel {
                 Coupling::Rigid => (tool.target.position_m - tool.previous_target.position_m) / step.tick_period_s,
                 Coupling::Spring { .. } => tool.velocity_m_per_s,
             };
-            let centres = (tool.centre_m, tool.centre_m + tool_m_per_s * step.dt_s);
+            let next_centre_m = tool.centre_m + tool_m_per_s * step.dt_s;
             let mut records = contact.tools[index].touching.records();
             while let Some(first) = records.first() {
                 let (triangle, end) = self.tools[index].foundation.triangle_of(first.sample);
                 let (here, rest) = records.split_at(records.partition_point(|touch| touch.sample < end));
                 records = rest;
-                tangents.push(&self.triangle_tangent(index, triangle, centres, x, here));
+                tangents.push(&self.triangle_tangent(index, triangle, tool.centre_m, next_centre_m, x, here));
             }
         }
     }
@@ -110,7 +112,8 @@ impl ContactModel {
         &self,
         tool: usize,
         triangle: usize,
-        (centre_m, next_centre_m): (DVec3, DVec3),
+        centre_m: DVec3,
+        next_centre_m: DVec3,
         x: &[DVec3],
         touches: &[Touch],
     ) -> TriangleTangent {
@@ -144,7 +147,7 @@ impl ContactModel {
     }
 }
 
-/// A sample met by a tool at `−r` from it.
+/// A sample in contact with a tool; the nearest point of the tool's axis is at `−r` from it.
 struct Sample {
     k: f64,
     friction: f64,
@@ -154,7 +157,7 @@ struct Sample {
 }
 
 impl Sample {
-    /// Unit normal, friction spring, and the length at which it slips; `None` out of contact.
+    /// Returns unit normal, friction spring, and the length at which the spring slips; `None` out of contact.
     fn contact(&self) -> Option<(DVec3, DVec3, f64)> {
         let distance_m = self.r.length();
         (self.depth_m > 0.0 && distance_m > 0.0).then(|| {
@@ -164,14 +167,14 @@ impl Sample {
         })
     }
 
-    /// Force (N) on the surface.
+    /// Returns the force (N) on the surface.
     fn force_n(&self) -> DVec3 {
         self.contact().map_or(DVec3::ZERO, |(normal, spring, limit_m)| {
             (normal * self.depth_m - spring.clamp_length_max(limit_m) * TANGENTIAL_RATIO) * self.k
         })
     }
 
-    /// Positive part `H` (N/m) of `−∂f/∂y`.
+    /// Returns the positive part `H` (N/m) of `−∂f/∂y`.
     fn stiffness(&self) -> DMat3 {
         let Some((normal, spring, limit_m)) = self.contact() else { return DMat3::ZERO };
         let square = |a: DVec3| DMat3::from_cols(a * a.x, a * a.y, a * a.z);

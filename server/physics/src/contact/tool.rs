@@ -1,4 +1,4 @@
-//! What a tool is, how it follows its device, and what is reported of it.
+//! Tools: their shape, how they follow their device, and what is reported of them.
 use super::{axis::Axis, foundation::ContactBound, local_torque::LocalTorqueModel};
 use glam::{DMat3, DQuat, DVec3};
 use serde::{Deserialize, Serialize};
@@ -24,25 +24,25 @@ pub enum Coupling {
 /// What a tool looks like: all that is nearer than its radius to a point, or to a segment.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum ToolShape {
-    /// A ball. It is the same whichever way its device is turned: it does not turn, and gives no torque.
+    /// A ball. It is the same whichever way its device is turned, so it does not turn, and has no torque.
     Sphere,
     /// A cylinder with a hemisphere on either end, along its own z. It turns with its device.
     Capsule(Capsule),
 }
 
-/// The capsule but its radius.
+/// The dimensions of a capsule beside its radius, and its rotation.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Capsule {
-    /// From its centre to the centre of a hemisphere (m), > 0.
+    /// Distance (m) from its centre to the centre of a hemisphere, > 0.
     pub half_length_m: f64,
-    /// How the device is turned at the start: tool frame to world.
+    /// Orientation of the device at the start, tool frame to world.
     pub start_orientation: DQuat,
-    /// How it follows its device's orientation; of no use to a rigid tool.
+    /// How it follows its device's orientation; not used for a rigid tool.
     pub turning: Turning,
 }
 
-/// The virtual coupling of orientation: `J ω̇ = τ_contact + K_r log(R_device Rᵀ) + B_r (ω_device − ω)`, with an inertia that is the same about
-/// every axis.
+/// The virtual coupling of orientation: `J ω̇ = τ_contact + K_r log(R_device Rᵀ) + B_r (ω_device − ω)`, with an inertia
+/// that is the same about every axis.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Turning {
     /// `K_r` (N m/rad).
@@ -54,8 +54,9 @@ pub struct Turning {
 }
 
 impl Turning {
-    /// What belongs to a coupling of position: `K_r = r² K`, `B_r = r² B`, `J = r² m`, with the radius of gyration of a rod with the body of a ball,
-    /// `r² = L²/3 + 2R²/5`. So a tool turns as fast, and is as well damped, as it moves. Nothing of a rigid one.
+    /// Returns the coupling of orientation that belongs to one of position: `K_r = r² K`, `B_r = r² B`, `J = r² m`,
+    /// with the radius of gyration of a rod with the body of a ball, `r² = L²/3 + 2R²/5`. So a tool turns as fast as it
+    /// moves, and with the same damping. For a rigid coupling all are zero.
     pub fn of(coupling: Coupling, radius_m: f64, half_length_m: f64) -> Self {
         let square = half_length_m * half_length_m / 3.0 + 0.4 * radius_m * radius_m;
         match coupling {
@@ -70,7 +71,7 @@ impl Turning {
 }
 
 impl ToolShape {
-    /// A capsule along a direction (world), with the [`Turning`] that belongs to its coupling.
+    /// Returns a capsule along a direction (world), with the [`Turning`] that belongs to its coupling.
     pub fn capsule(coupling: Coupling, radius_m: f64, half_length_m: f64, along: DVec3) -> Self {
         Self::Capsule(Capsule {
             half_length_m,
@@ -79,7 +80,7 @@ impl ToolShape {
         })
     }
 
-    /// The capsule, where it is one.
+    /// Returns the capsule, where it is one.
     pub fn as_capsule(&self) -> Option<&Capsule> {
         match self {
             Self::Sphere => None,
@@ -87,7 +88,7 @@ impl ToolShape {
         }
     }
 
-    /// From its centre to the farthest point from which its surface is one radius away (m).
+    /// Returns half the length (m) of its axis.
     pub fn half_length_m(&self) -> f64 {
         self.as_capsule().map_or(0.0, |capsule| capsule.half_length_m)
     }
@@ -96,7 +97,7 @@ impl ToolShape {
         self.as_capsule().map_or(DQuat::IDENTITY, |capsule| capsule.start_orientation)
     }
 
-    /// The axis of a tool of this shape (m, world).
+    /// Returns the axis of a tool of this shape (m, world).
     pub(super) fn axis(&self, centre_m: DVec3, orientation: DQuat) -> Axis {
         match self {
             Self::Sphere => Axis::point(centre_m),
@@ -129,26 +130,26 @@ pub struct ToolTarget {
     pub position_m: DVec3,
     /// Velocity (m/s, world).
     pub velocity_m_per_s: DVec3,
-    /// Orientation, tool frame to world. Spheres do not look at it.
+    /// Orientation, tool frame to world; spheres do not use it.
     pub orientation: DQuat,
     /// Angular velocity (rad/s, world).
     pub angular_velocity_rad_per_s: DVec3,
 }
 
 impl ToolTarget {
-    /// At rest, unrotated.
+    /// Returns a target at rest, unrotated.
     pub fn at(position_m: DVec3) -> Self {
         Self { position_m, ..Self::default() }
     }
 
-    /// The same, at rest.
+    /// Returns the same target, at rest.
     #[must_use]
     pub fn at_rest(self) -> Self {
         Self { velocity_m_per_s: DVec3::ZERO, angular_velocity_rad_per_s: DVec3::ZERO, ..self }
     }
 
     pub(crate) fn is_finite(&self) -> bool {
-        // What is not a rotation would shear the tool.
+        // A quaternion that is not a rotation would shear the tool.
         [self.position_m, self.velocity_m_per_s, self.angular_velocity_rad_per_s].iter().all(|a| a.is_finite())
             && self.orientation.is_finite()
             && self.orientation.is_normalized()
@@ -162,9 +163,9 @@ pub struct ToolState {
     pub centre_m: DVec3,
     /// Its velocity (m/s), at the same time.
     pub velocity_m_per_s: DVec3,
-    /// Its orientation, tool frame to world; of a sphere, unrotated.
+    /// Its orientation, tool frame to world; a sphere is not rotated.
     pub orientation: DQuat,
-    /// Its angular velocity (rad/s), at the same time; of a sphere, none.
+    /// Its angular velocity (rad/s), at the same time; zero for a sphere.
     pub angular_velocity_rad_per_s: DVec3,
     /// Device pose and velocity at the end of the last tick.
     pub target: ToolTarget,
@@ -178,12 +179,12 @@ pub struct ToolState {
     pub contact_force_n: DVec3,
     /// Force on the device (N), mean over the tick's substeps: the coupling's, or the contact force of a rigid tool.
     pub device_force_n: DVec3,
-    /// Torque of the body on the tool (N m, about its centre), mean over the tick's substeps; of a sphere, none.
+    /// Torque of the body on the tool (N m, about its centre), mean over the tick's substeps; zero for a sphere.
     pub contact_torque_nm: DVec3,
-    /// Torque on the device (N m, about the tool's centre), mean over the tick's substeps: the coupling's, or the contact's of a rigid tool; of a
-    /// sphere, none.
+    /// Torque on the device (N m, about the tool's centre), mean over the tick's substeps: the coupling's, or the
+    /// contact's of a rigid tool; zero for a sphere.
     pub device_torque_nm: DVec3,
-    /// Contact samples that carry force, at the end of the tick.
+    /// Number of contact samples that carry force, at the end of the tick.
     pub contacts: u32,
     /// Deepest penetration of the tool into the surface during the tick (m), whether it carries force or not.
     pub penetration_m: f64,
@@ -208,12 +209,12 @@ pub struct LocalContactModel {
     pub stiffness_n_per_m: DMat3,
     /// Radius inside which it may be used (m).
     pub validity_radius_m: f64,
-    /// Torque on a device whose tool turns.
+    /// Model of the torque, for a tool that turns.
     pub torque: Option<LocalTorqueModel>,
 }
 
 impl ToolState {
-    /// At its start, touching nothing.
+    /// Returns the state of a tool at its start, touching nothing.
     pub fn at_start(spec: &ToolSpec) -> Self {
         let target = spec.start();
         Self {
@@ -263,7 +264,7 @@ impl ToolState {
             && [self.penetration_m, self.contact_energy_j, self.friction_heat_j].iter().all(|n| n.is_finite())
     }
 
-    /// Ends its contact: no force, no speed.
+    /// Ends its contact: it has no force and no speed.
     pub(crate) fn let_go(&mut self) {
         *self = Self {
             velocity_m_per_s: DVec3::ZERO,
@@ -285,15 +286,17 @@ impl ToolState {
 }
 
 impl ToolSpec {
-    /// Where its device starts, at rest.
+    /// Returns the target with which its device starts, at rest.
     pub fn start(&self) -> ToolTarget {
         ToolTarget { orientation: self.shape.start_orientation(), ..ToolTarget::at(self.start_position_m) }
     }
 
-    /// What the coupling, and contact of at most this stiffness on a tool that is a mass, add (rad²/s²).
+    /// Returns a bound (rad²/s²) of what the coupling, and contact of at most this stiffness on a tool that is a mass,
+    /// add to the squared frequency.
     ///
-    /// A capsule's velocity and angular velocity are two: contact at a point `p` from its centre moves it by `(−I, [p]ₓ)`, and a positive block matrix
-    /// is bounded by the sum of its diagonal blocks, `Σ k a/m + Σ k a p²/J`. The couplings act on one each: the larger of them counts.
+    /// A capsule has a velocity and an angular velocity: contact at a point `p` from its centre moves it by
+    /// `(−I, [p]ₓ)`, and a positive block matrix is bounded by the sum of its diagonal blocks, `Σ k a/m + Σ k a p²/J`.
+    /// Each of the two couplings acts on one of them, so the larger one counts.
     pub(super) fn frequency_bound_sq(&self, contact: &ContactBound) -> f64 {
         match (self.coupling, &self.shape) {
             (Coupling::Rigid, _) => 0.0,

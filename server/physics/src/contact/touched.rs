@@ -1,9 +1,9 @@
-//! Which triangle of the surface is touched.
+//! Finds the triangle of the surface that is touched.
 use super::{ContactModel, ContactScratch, ContactState};
 
 impl ContactModel {
-    /// The triangle of the surface that the hardest pressed tool is nearest to; `None` where no tool has any of the surface inside it. The
-    /// buffers must be those that contact was just looked at with.
+    /// Returns the triangle of the surface that the hardest pressed tool is nearest to; `None` where no tool has any of
+    /// the surface inside it. The buffers must be those with which contact was evaluated last.
     pub(crate) fn touched_triangle(&self, contact: &ContactState, scratch: &ContactScratch) -> Option<u32> {
         let touching = (0..self.tools.len()).filter(|&tool| contact.touches(tool));
         let force_sq = |tool: usize| contact.tools[tool].force_n.length_squared();

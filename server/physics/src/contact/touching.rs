@@ -2,8 +2,8 @@
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
-/// More samples than this inside one tool are pressed without friction and without memory, or not at all where the tool was put
-/// into the surface.
+/// More samples than this inside one tool are pressed without friction and without memory, or not at all where the tool
+/// was put into the surface.
 const MOST: usize = 16_384;
 
 /// A sample inside the tool.
@@ -11,17 +11,17 @@ const MOST: usize = 16_384;
 pub(super) struct Touch {
     /// Its number.
     pub(super) sample: u32,
-    /// The tool reached it from behind the surface: it carries nothing until it leaves.
+    /// Whether the tool reached it from behind the surface: then it carries nothing until it leaves.
     pub(super) from_behind: bool,
-    /// Depth (m) up to which it carries nothing: that at which the tool was put there, or the least since; of a
-    /// sample met before a tool that was put there was clear of all, that at which it was met. From behind too: it
-    /// tells that the tool was put there.
+    /// Depth (m) up to which it carries nothing: that at which the tool was put there, or the least since. For a sample
+    /// that was met before a tool that was put there had left the surface, it is the depth at which it was met. It is
+    /// recorded for samples met from behind, too, since it tells that the tool was put there.
     pub(super) free_depth_m: f64,
     /// Position relative to the tool's centre (m) where its friction spring is at rest.
     pub(super) spring_origin_m: DVec3,
 }
 
-/// Records in ascending order of their samples. Its clones keep the capacity.
+/// Records of samples, in ascending order of these. Its clones keep the capacity.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 #[serde(from = "Vec<Touch>", into = "Vec<Touch>")]
 pub(super) struct Touching {
@@ -39,7 +39,7 @@ impl Touching {
         &self.buffer[..self.count]
     }
 
-    /// The tool was put where it is, and has not left yet.
+    /// Returns whether the tool was put where it is, and has not left the surface yet.
     pub(super) fn tells_it_was_put(&self) -> bool {
         self.records().iter().any(|touch| touch.free_depth_m > 0.0)
     }
@@ -53,7 +53,7 @@ impl Touching {
         self.buffer[..self.count].copy_from_slice(&other.buffer[..self.count]);
     }
 
-    /// False when full: the record is dropped.
+    /// Adds a record; when the buffer is full it is dropped, and false returned.
     pub(super) fn push(&mut self, touch: Touch) -> bool {
         let Some(slot) = self.buffer.get_mut(self.count) else { return false };
         *slot = touch;

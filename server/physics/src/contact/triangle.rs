@@ -1,7 +1,8 @@
 //! The point of a triangle closest to a given point.
 use glam::DVec3;
 
-/// Weights of the corners of the point of triangle `[a, b, c]` that is closest to `p`; they are ≥ 0 and sum to 1.
+/// Returns the weights of the corners at the point of triangle `[a, b, c]` that is closest to `p`; they are ≥ 0 and sum
+/// to 1.
 ///
 /// The plane of the triangle falls into seven regions: three where a corner is closest, three an edge, and the inside.
 /// With `ab·ap` and the like, the region follows from the signs of the projections on the edges and of the signed areas
@@ -46,7 +47,7 @@ pub fn closest_weights(p: DVec3, [a, b, c]: [DVec3; 3]) -> [f64; 3] {
     [1.0 - wb - wc, wb, wc]
 }
 
-/// Square of the height over the longest edge below which rounding decides the region.
+/// Squared ratio of height to longest edge below which rounding would decide the region.
 const FLAT: f64 = 1e-16;
 
 fn closest_on_edges(p: DVec3, corners: [DVec3; 3]) -> [f64; 3] {
@@ -64,7 +65,7 @@ fn closest_on_edges(p: DVec3, corners: [DVec3; 3]) -> [f64; 3] {
     best.0
 }
 
-/// The point of the triangle (m) closest to `p`.
+/// Returns the point (m) of the triangle closest to `p`.
 pub(super) fn closest_point(p: DVec3, corners: [DVec3; 3]) -> DVec3 {
     let [wa, wb, wc] = closest_weights(p, corners);
     corners[0] * wa + corners[1] * wb + corners[2] * wc

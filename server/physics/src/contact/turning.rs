@@ -1,15 +1,16 @@
-//! How a tool that turns follows its device's orientation: rigidly, or on the virtual coupling's other half.
+//! The rotation of a tool that turns: it follows its device's orientation rigidly, or on the virtual coupling of
+//! orientation.
 //!
-//! A coupled capsule obeys `J ω̇ = τ_contact + K_r log(R_d Rᵀ) + B_r (ω_d − ω)` beside `m c̈ = …` of [`super::proxy`], with the same half kicks,
-//! the damper integrated exactly, and `R ← exp(ω h) R` for a drift. `log` is the rotation vector of the shorter way round: it is the gradient of
-//! `½ |log|²`, so the spring `½ K_r |log(R_d Rᵀ)|²` is conservative. With one inertia `J` for every axis the angular momentum is `J ω`, whichever way
-//! the tool is turned.
+//! A coupled capsule obeys `J ω̇ = τ_contact + K_r log(R_d Rᵀ) + B_r (ω_d − ω)` beside `m c̈ = …` of [`super::proxy`],
+//! with the same half kicks, the damper integrated exactly, and `R ← exp(ω h) R` for a drift. `log` is the rotation
+//! vector of the shorter way round: it is the gradient of `½ |log|²`, so the spring `½ K_r |log(R_d Rᵀ)|²` is
+//! conservative. With one inertia `J` for every axis the angular momentum is `J ω`, whichever way the tool is turned.
 //!
-//! The spring saturates at `τ_max = F_max L`. Held by both couplings, a tool that is wedged between two walls carries `f₁ − f₂ ≤ F_max` and
-//! `(f₁ + f₂) L ≤ τ_max` at its ends: neither is more than `F_max`, which its hemisphere bears.
+//! The spring saturates at `τ_max = F_max L`. Held by both couplings, a tool that is wedged between two walls carries
+//! `f₁ − f₂ ≤ F_max` and `(f₁ + f₂) L ≤ τ_max` at its ends: neither is more than `F_max`, which its hemisphere bears.
 //!
-//! The limit of the approach is that of a sphere, at the point of the axis that is nearest to the surface: an impulse `λ` there takes
-//! `λ (1/m + |p × n|²/J)` of its speed, and energy only.
+//! The limit of the approach is that of a sphere, at the point of the axis that is nearest to the surface: an impulse
+//! `λ` there takes `λ (1/m + |p × n|²/J)` of its speed, and energy only.
 use super::{
     ToolModel, ToolState,
     proxy::{Pull, SubstepTime},
@@ -17,7 +18,7 @@ use super::{
 };
 use glam::{DQuat, DVec3};
 
-/// The rotation vector (rad) of a rotation, the shorter way round: `|v| ≤ π`.
+/// Returns the rotation vector (rad) of a rotation, the shorter way round: `|v| ≤ π`.
 pub(super) fn rotation_vector(q: DQuat) -> DVec3 {
     let q = if q.w < 0.0 { -q } else { q };
     let axis = q.xyz();
@@ -28,7 +29,8 @@ pub(super) fn rotation_vector(q: DQuat) -> DVec3 {
 }
 
 impl SubstepTime {
-    /// Orientation and angular velocity (rad/s) of the device: about one axis from target to target during a tick.
+    /// Returns orientation and angular velocity (rad/s) of the device, which turns about one axis from target to target
+    /// during a tick.
     pub(super) fn device_turn(&self, tool: &ToolState) -> (DQuat, DVec3) {
         let (from, to) = (tool.previous_target.orientation, tool.target.orientation);
         let turn = rotation_vector(to * from.conjugate());
@@ -37,7 +39,7 @@ impl SubstepTime {
 }
 
 impl ToolModel {
-    /// Spring, damper and inertia of a coupled tool that turns.
+    /// Returns spring, damper and inertia of a coupled tool that turns, `None` for others.
     fn turning(&self) -> Option<Pull> {
         let (capsule, spring) = (self.spec.shape.as_capsule()?, self.spring()?);
         let turning = capsule.turning;
@@ -50,14 +52,14 @@ impl ToolModel {
     }
 }
 
-/// A rigid tool is turned as its device is.
+/// Turns a rigid tool as its device is turned.
 pub(super) fn follow(model: &ToolModel, tool: &mut ToolState, time: &SubstepTime) {
     if model.spec.shape.as_capsule().is_some() {
         (tool.orientation, tool.angular_velocity_rad_per_s) = time.device_turn(tool);
     }
 }
 
-/// Half a kick of a coupled one. Returns the coupling's mean torque (N m) over it.
+/// Does half a kick of a coupled tool's rotation. Returns the coupling's mean torque (N m) over it.
 pub(super) fn half_kick(
     model: &ToolModel,
     tool: &mut ToolState,
@@ -67,10 +69,10 @@ pub(super) fn half_kick(
 ) -> DVec3 {
     let Some(pull) = model.turning() else { return DVec3::ZERO };
     let apart = rotation_vector(time.device_turn(tool).0 * tool.orientation.conjugate());
-    pull.half_kick(&mut tool.angular_velocity_rad_per_s, contact_nm, (apart, tool.device_rad_per_s), h_s)
+    pull.half_kick(&mut tool.angular_velocity_rad_per_s, contact_nm, apart, tool.device_rad_per_s, h_s)
 }
 
-/// Turns a coupled one.
+/// Does the drift of a coupled tool's rotation.
 pub(super) fn drift(model: &ToolModel, tool: &mut ToolState, dt_s: f64) {
     if model.spec.shape.as_capsule().is_some() {
         let turn = DQuat::from_scaled_axis(tool.angular_velocity_rad_per_s * dt_s);
@@ -78,12 +80,15 @@ pub(super) fn drift(model: &ToolModel, tool: &mut ToolState, dt_s: f64) {
     }
 }
 
-/// Cuts the speed with which a point of the axis, `arm_m` from the centre, goes towards the surface, but no more than to a stop.
+/// Cuts the speed with which a point of the axis, `arm_m` from the centre, goes towards the surface, but to no less
+/// than zero.
 pub(super) fn limit_approach(
     tool: &mut ToolState,
-    (arm_m, towards): (DVec3, DVec3),
+    arm_m: DVec3,
+    towards: DVec3,
     limit_m_per_s: f64,
-    (mass_kg, inertia_kg_m2): (f64, f64),
+    mass_kg: f64,
+    inertia_kg_m2: f64,
 ) {
     let own = (tool.velocity_m_per_s + tool.angular_velocity_rad_per_s.cross(arm_m)).dot(towards);
     let excess = (own - limit_m_per_s).min(own);
@@ -102,7 +107,10 @@ mod tests {
 
     proptest! {
         #[test]
-        fn rotation_vectors_come_back(v in prop::array::uniform3(-1.8..1.8_f64), scale in prop::sample::select(vec![1.0, 1e-6, 1e-12])) {
+        fn rotation_vectors_come_back(
+            v in prop::array::uniform3(-1.8..1.8_f64),
+            scale in prop::sample::select(vec![1.0, 1e-6, 1e-12]),
+        ) {
             let v = DVec3::from(v) * scale;
             for q in [DQuat::from_scaled_axis(v), -DQuat::from_scaled_axis(v)] {
                 prop_assume!(v.length() < 3.1);
@@ -114,7 +122,8 @@ mod tests {
         #[test]
         fn the_torque_is_the_gradient_of_the_spring(v in prop::array::uniform3(-1.5..1.5_f64), axis in 0..3_usize) {
             let (q, h) = (DQuat::from_scaled_axis(v.into()), 1e-6);
-            let energy = |e: f64| 0.5 * rotation_vector(q * DQuat::from_scaled_axis(DVec3::AXES[axis] * e).conjugate()).length_squared();
+            let turned = |e: f64| q * DQuat::from_scaled_axis(DVec3::AXES[axis] * e).conjugate();
+            let energy = |e: f64| 0.5 * rotation_vector(turned(e)).length_squared();
             let slope = (energy(h) - energy(-h)) / (2.0 * h);
             prop_assert!((slope + rotation_vector(q)[axis]).abs() < 1e-8, "{slope}");
         }

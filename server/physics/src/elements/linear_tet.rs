@@ -36,7 +36,8 @@ impl RestTet {
         self.volume_m3 * material.energy_density(&self.gradient_of(x))
     }
 
-    /// Corner forces `f_i = −V P b_i` (N) of elastic stress and, where the material has any, viscous stress. They sum to zero.
+    /// Corner forces `f_i = −V P b_i` (N) of elastic stress and, where the material has any, viscous stress. They sum
+    /// to zero.
     pub fn forces_n(&self, material: &Material, x: &[DVec3; 4], v: &[DVec3; 4]) -> [DVec3; 4] {
         let f = self.gradient_of(x);
         let mut p = material.piola(&f);
@@ -58,7 +59,8 @@ impl RestTet {
         [-(f1 + f2 + f3), f1, f2, f3]
     }
 
-    /// Stiffness block `∂f_i/∂x_j` (N/m), negative semi-definite at rest: column `c` is `−V δP b_i` for `δF = e_c b_jᵀ`.
+    /// Stiffness block `∂f_i/∂x_j` (N/m), negative semi-definite at rest: column `c` is `−V δP b_i` for
+    /// `δF = e_c b_jᵀ`.
     pub fn stiffness_block(&self, material: &Material, f: &DMat3, i: usize, j: usize) -> DMat3 {
         let column = |axis: DVec3| {
             let dp = material.piola_differential(f, &outer(axis, self.gradients_per_m[j]));

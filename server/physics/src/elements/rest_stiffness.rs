@@ -1,10 +1,10 @@
 //! The largest natural frequency of a discrete body, which bounds the step of explicit integration: `dt < 2/ω_max`.
 //!
 //! `K φ = ω² M φ` with lumped `M`, on the free degrees of freedom, is the symmetric problem `A y = ω² y` with
-//! `A = M^{-½} K M^{-½}`. Lanczos' three-term recurrence builds the tridiagonal `T_m`; its largest eigenvalue θ approaches
-//! ω²_max from below, the last component `s` of its eigenvector gives the residual `r = β_m |s|`, and an eigenvalue of
-//! `A` lies within `r` of θ (Parlett 1998, §13.2). No reorthogonalisation: rounding only makes copies of converged
-//! eigenvalues, and the largest one is all that is asked for.
+//! `A = M^{-½} K M^{-½}`. Lanczos' three-term recurrence builds the tridiagonal `T_m`; its largest eigenvalue θ
+//! approaches ω²_max from below, the last component `s` of its eigenvector gives the residual `r = β_m |s|`, and an
+//! eigenvalue of `A` lies within `r` of θ (Parlett 1998, §13.2). No reorthogonalisation: rounding only makes copies of
+//! converged eigenvalues, and the largest one is all that is asked for.
 //!
 //! `K` is applied tet by tet, with the linear elasticity that every law shares at rest:
 //! `f_i = −V σ b_i`, `σ = λ tr(G) I + µ(G + Gᵀ)`, `G = Σ_j a_j b_jᵀ`.
@@ -34,13 +34,13 @@ pub struct RestStiffness<'a> {
     pub springs_n_per_m: &'a [f64],
 }
 
-/// ω_max (rad/s) of `K φ = ω² M φ` at rest, on the free degrees of freedom (`inverse_mass_per_kg` is zero on fixed ones);
-/// zero if none is free.
+/// ω_max (rad/s) of `K φ = ω² M φ` at rest, on the free degrees of freedom (`inverse_mass_per_kg` is zero on fixed
+/// ones); zero if none is free.
 ///
 /// A safe estimate: `√(θ + r)`, the upper end of the interval that holds the eigenvalue found, but never more than the
-/// provable `√(ω_e² + max k_i/m_i)` with ω_e of [`element_bound_rad_per_s`]. With `r ≤ 1e-4 θ` it exceeds that eigenfrequency
-/// by at most 1e-4. What remains is the chance that the pseudo-random start vector misses the top of the spectrum;
-/// `Settings::step_safety` is there for it.
+/// provable `√(ω_e² + max k_i/m_i)` with ω_e of [`element_bound_rad_per_s`]. With `r ≤ 1e-4 θ` it exceeds that
+/// eigenfrequency by at most 1e-4. What remains is the chance that the pseudo-random start vector misses the top of the
+/// spectrum; `Settings::step_safety` is there for it.
 pub fn max_natural_frequency_rad_per_s(stiffness: &RestStiffness<'_>, inverse_mass_per_kg: &[DVec3]) -> f64 {
     max_natural_frequency_with(stiffness, inverse_mass_per_kg, &mut |_| {})
 }
@@ -60,8 +60,9 @@ pub(crate) fn max_natural_frequency_with(
     (theta + residual).min(bound * bound + spring_bound_sq).sqrt()
 }
 
-/// `max_e ω_e ≥ ω_max` (rad/s): the frequency bound of single tets, each with its share `m_i V_e/Σ_{t∋i} V_t` of its nodes'
-/// masses (Irons & Treharne 1971: by Rayleigh's quotient no assembly of elements is faster than the fastest of them).
+/// `max_e ω_e ≥ ω_max` (rad/s): the frequency bound of single tets, each with its part `m_i V_e/Σ_{t∋i} V_t` of its
+/// nodes' masses (Irons & Treharne 1971: by Rayleigh's quotient no assembly of elements is faster than the fastest of
+/// them).
 ///
 /// Per tet `aᵀK_e a = V(λ tr²G + ½µ|G + Gᵀ|²) ≤ V(3λ⁺ + 2µ)|G|²` and `|G|² ≤ λ_max(Σ_i b_i b_iᵀ/m_i) aᵀM_e a`.
 ///
@@ -78,8 +79,8 @@ pub fn element_bound_rad_per_s(stiffness: &RestStiffness<'_>, inverse_mass_per_k
     for ((nodes, rest), &material) in mesh.tets().iter().zip(rest_tets).zip(tet_material) {
         let Lame { lambda_pa, mu_pa } = materials[material as usize].lame;
         let gram = nodes.iter().zip(rest.gradients_per_m).fold(DMat3::ZERO, |sum, (&node, b)| {
-            let share = rest.volume_m3 / volume_of_node[node as usize];
-            sum + outer(b, b) * (inverse_mass_per_kg[node as usize].max_element() / share)
+            let part = rest.volume_m3 / volume_of_node[node as usize];
+            sum + outer(b, b) * (inverse_mass_per_kg[node as usize].max_element() / part)
         });
         let modulus = 3.0 * lambda_pa.max(0.0) + 2.0 * mu_pa;
         largest_sq = largest_sq.max(rest.volume_m3 * modulus * largest_eigenvalue(&gram));

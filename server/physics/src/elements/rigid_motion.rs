@@ -1,7 +1,8 @@
 //! Which rigid motions the constraints leave free.
 //!
-//! A small rigid motion moves a node at `X` by `t + ω × (X − c)`. It is free when it moves no prescribed axis: the null space of
-//! `CᵀC`, with one row `[e_axis, (X − c) × e_axis]` of `C` per prescribed axis. Checked for every connected part of the mesh.
+//! A small rigid motion moves a node at `X` by `t + ω × (X − c)`. It is free when it moves no prescribed axis: the null
+//! space of `CᵀC`, with one row `[e_axis, (X − c) × e_axis]` of `C` per prescribed axis. Checked for every connected
+//! part of the mesh.
 use crate::linalg::eigen;
 use glam::DVec3;
 use std::fmt;

@@ -2,8 +2,8 @@
 //!
 //! Forces are computed in f32 (16 lanes) or f64 (8 lanes) and summed per node in f64; positions and velocities are f64
 //! always. Displacements `u = x − X` and their differences along the edges of a tet are taken in f64, and only the
-//! differences are rounded: what a body's rigid motion and size would cost in digits is not lost. Same inputs, same bits,
-//! on every instruction set.
+//! differences are rounded: what a body's rigid motion and size would cost in digits is not lost. Same inputs, same
+//! bits, on every instruction set.
 // A vector type is only fast where it is inlined into a function compiled for its instruction set.
 #![allow(clippy::inline_always)]
 mod forces;
@@ -151,8 +151,9 @@ impl ForceKernel {
         }
     }
 
-    /// Overwrites `products_n` (N) with `−(α K + β C) a`: the tangent stiffness `K = −∂f/∂x` (N/m) of elastic stress and the
-    /// matrix `C = −∂f/∂v` (N s/m) of viscous stress, at the positions of the last [`Self::linearise_at`] with this scratch.
+    /// Overwrites `products_n` (N) with `−(α K + β C) a`: the tangent stiffness `K = −∂f/∂x` (N/m) of elastic stress
+    /// and the matrix `C = −∂f/∂v` (N s/m) of viscous stress, at the positions of the last [`Self::linearise_at`] with
+    /// this scratch.
     pub fn products_n(&self, factors: [f64; 2], a: &[DVec3], products_n: &mut [DVec3], scratch: &mut KernelScratch) {
         for (direction, a) in scratch.directions.iter_mut().zip(a) {
             *direction = node(*a);

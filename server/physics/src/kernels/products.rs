@@ -13,7 +13,7 @@ use crate::material::{
 };
 use glam::DMat3;
 
-/// Corner forces `−V (α δP(F; ∇a) + β P_v(F; ∇a)) b_i` of one block: the tets' share of `−(α K + β C) a`.
+/// Corner forces `−V (α δP(F; ∇a) + β P_v(F; ∇a)) b_i` of one block: the tets' part of `−(α K + β C) a`.
 #[inline(always)]
 pub(super) fn compute<V: Vector<Scalar = T>, T: Scalar, L: ConstitutiveLaw, const VISCOUS: bool, const N: usize>(
     constants: &Constants<T>,

@@ -1,8 +1,8 @@
 //! Elements of four nodes in blocks of `N` lanes, and the way from their nodes to lanes and back.
 //!
-//! A pass takes a few blocks at a time ([`Batch`]): it gathers differences of what the nodes have, computes all lanes a vector
-//! at a time, and scatters forces lane by lane in a fixed order. These are three passes over the batch, because a wide load
-//! waits for the narrow stores it overlaps until they have left the store buffer.
+//! A pass takes a few blocks at a time ([`Batch`]): it gathers differences of what the nodes have, computes all lanes a
+//! vector at a time, and scatters forces lane by lane in a fixed order. These are three passes over the batch, because
+//! a wide load waits for the narrow stores it overlaps until they have left the store buffer.
 #![allow(unsafe_code)] // unchecked node indices in gather and scatter: 10 % of the kernel's time (docs/adr/force-kernel.md)
 use super::{
     nodes::{Lanes, Node, Sum},
@@ -87,8 +87,8 @@ impl<'a, D, const N: usize> Batch<'a, D, N> {
         }
     }
 
-    /// Adds the corners' forces to `sums`, which has as many entries as the blocks were checked for, lane after lane: the same
-    /// order, hence the same bits, always. `f_0 = −(f_1 + f_2 + f_3)` in f64.
+    /// Adds the corners' forces to `sums`, which has as many entries as the blocks were checked for, lane after lane:
+    /// the same order, hence the same bits, always. `f_0 = −(f_1 + f_2 + f_3)` in f64.
     #[inline(always)]
     pub(crate) fn scatter<T: Scalar>(&self, forces: &BatchLanes<T, N>, sums: &mut [Sum]) {
         assert!(sums.len() == self.entries, "buffers of another kernel");

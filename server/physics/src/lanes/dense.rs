@@ -16,8 +16,8 @@ pub(crate) struct Symmetric<'a> {
     pub(crate) stride: usize,
 }
 
-/// `A = L Lᵀ`, with L by columns. Every column starts with the block of eight rows that its pivot is in, with zeros up to the
-/// pivot, which is kept apart.
+/// `A = L Lᵀ`, with L by columns. Every column starts with the block of eight rows that its pivot is in, with zeros up
+/// to the pivot, which is kept apart.
 #[derive(Debug, Clone)]
 pub(crate) struct Cholesky {
     columns: Vec<Lanes>,
@@ -37,8 +37,8 @@ impl Cholesky {
         }
     }
 
-    /// Factorises the first `size` rows and columns of a matrix. Pivots that are less than `least` of the diagonal, which of
-    /// a positive definite matrix rounding alone can make them, are raised to that. Allocates nothing.
+    /// Factorises the first `size` rows and columns of a matrix. Pivots that are less than `least` of the diagonal,
+    /// which of a positive definite matrix rounding alone can make them, are raised to that. Allocates nothing.
     pub(crate) fn factorise(&mut self, matrix: Symmetric<'_>, size: usize, least: f64) {
         let blocks = size.div_ceil(LANES);
         self.columns.clear();
@@ -183,7 +183,8 @@ mod tests {
     use super::*;
     use crate::{lanes::InstructionSet, testing::Random};
 
-    /// A symmetric matrix of so many rows, larger on its diagonal than all else of a row, with some zeros; its rows have three entries more.
+    /// A symmetric matrix of so many rows, larger on its diagonal than all else of a row, with some zeros; its rows
+    /// have three entries more.
     fn matrix(size: usize, random: &mut Random) -> (Vec<f64>, usize) {
         let stride = size + 3;
         let mut matrix = vec![f64::NAN; size * stride];

@@ -57,8 +57,8 @@ pub(crate) trait Pass {
     type Scalar: Scalar;
     /// What it finds.
     type Found;
-    /// Computes in vectors `V`. Implementations are `#[inline(always)]`: a vector type is only fast where it is inlined into
-    /// a function compiled for its instruction set.
+    /// Computes in vectors `V`. Implementations are `#[inline(always)]`: a vector type is only fast where it is inlined
+    /// into a function compiled for its instruction set.
     fn run<V: Vector<Scalar = Self::Scalar>>(self) -> Self::Found;
 }
 

@@ -6,8 +6,8 @@ use super::{
 };
 use glam::DVec3;
 
-/// `v ← (v k + h a) k` with `k` what damping leaves, component by component: `1 − free (1 − factor)` where `free_parts` are given, `factor` behind. Finds
-/// `Σ e·(v k + ½ h a)` (W), with `e` the `external_n`.
+/// `v ← (v k + h a) k` with `k` what damping leaves, component by component: `1 − free (1 − factor)` where `free_parts`
+/// are given, `factor` behind. Finds `Σ e·(v k + ½ h a)` (W), with `e` the `external_n`.
 #[derive(Debug)]
 pub(crate) struct Kick<'a> {
     pub(crate) v: &'a mut [DVec3],
@@ -71,7 +71,8 @@ impl Pass for Kick<'_> {
     }
 }
 
-/// `v ← (v k + h f/m) k` of nodes that move along all axes or none. Finds `Σ e·(v k + ½ h f/m)` (W), with `e` the `external_n`, and `Σ m v²` before and after the force, but for what damping takes then.
+/// `v ← (v k + h f/m) k` of nodes that move along all axes or none. Finds `Σ e·(v k + ½ h f/m)` (W), with `e` the
+/// `external_n`, and `Σ m v²` before and after the force, but for what damping takes then.
 #[derive(Debug)]
 pub(crate) struct LumpedKick<'a> {
     pub(crate) v: &'a mut [DVec3],

@@ -1,5 +1,5 @@
-//! Vectors of numbers, the instruction sets that work on them, and operations on whole lists: one of the three places of
-//! Palpate with `unsafe`.
+//! Vectors of numbers, the instruction sets that work on them, and operations on whole lists: one of the three places
+//! of Palpate with `unsafe`.
 //!
 //! All of it gives the same bits on every instruction set.
 // A vector type is only fast where it is inlined into a function compiled for its instruction set.

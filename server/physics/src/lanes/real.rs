@@ -41,7 +41,8 @@ pub(crate) trait Vector: Real {
     fn load(source: &[Self::Scalar]) -> Self;
     /// Lanes to the start of a slice that has at least [`Self::WIDTH`].
     fn store(self, target: &mut [Self::Scalar]);
-    /// Rows `a_i − a_0` of four tets, taken in f64 and then rounded, to lanes `first..first + 4`: `edges[3(i − 1) + axis][first + tet]`.
+    /// Rows `a_i − a_0` of four tets, taken in f64 and then rounded, to lanes `first..first + 4`:
+    /// `edges[3(i − 1) + axis][first + tet]`.
     fn edges_to_lanes<const N: usize>(corners: &[[&Node; 4]; 4], edges: &mut Lanes<Self::Scalar, N>, first: usize);
 }
 

@@ -1,4 +1,5 @@
-//! Sums over all nodes that judge a step (`integrate::stability`), in as many lanes on every instruction set: the same bits.
+//! Sums over all nodes that judge a step (`integrate::stability`), in as many lanes on every instruction set: the same
+//! bits.
 use super::{
     dispatch::{Available, Pass, run},
     real::Vector,
@@ -6,7 +7,8 @@ use super::{
 };
 use glam::DVec3;
 
-/// Forces `f` (N) at three instants, the newest first, their external parts `e` (N), and `M⁻¹` (1/kg), zero on held axes.
+/// Forces `f` (N) at three instants, the newest first, their external parts `e` (N), and `M⁻¹` (1/kg), zero on held
+/// axes.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct StepForces<'a> {
     pub(crate) total_n: [&'a [DVec3]; 3],

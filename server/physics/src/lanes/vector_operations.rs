@@ -1,5 +1,5 @@
-//! Vector operations on all nodes: what a substep does to every position, velocity and force. A sum is taken in as many lanes on
-//! every instruction set, which gives the same bits.
+//! Vector operations on all nodes: what a substep does to every position, velocity and force. A sum is taken in as many
+//! lanes on every instruction set, which gives the same bits.
 use super::{
     dispatch::{Available, Pass, run},
     real::{Real, Vector},
@@ -222,8 +222,8 @@ impl Pass for Answer<'_> {
         }
         let [mut answer, mut force_sq, mut moved_sq] = sums.map(total);
         let forces = steady_rest.iter().zip(beyond_rest).zip(f1_rest.iter().zip(f2_rest));
-        let places = x0_rest.iter().zip(x1_rest.iter().zip(x2_rest));
-        for (((steady, beyond), (f1, f2)), (x0, (x1, x2))) in forces.zip(places) {
+        let positions = x0_rest.iter().zip(x1_rest.iter().zip(x2_rest));
+        for (((steady, beyond), (f1, f2)), (x0, (x1, x2))) in forces.zip(positions) {
             let now = steady + beyond;
             let moved = second_difference(*x0, *x1, *x2);
             answer -= second_difference(now, *f1, *f2) * moved;

@@ -1,9 +1,10 @@
-//! Eigenvalues of small dense symmetric matrices by cyclic Jacobi rotations: accurate to rounding, any size up to dozens.
+//! Eigenvalues of small dense symmetric matrices by cyclic Jacobi rotations: accurate to rounding, any size up to
+//! dozens.
 
 /// Eigenvalues, and eigenvectors as rows, of the symmetric `n × n` matrix in `a` (row-major; overwritten).
 ///
-/// Each rotation zeroes `a_pq`: with `θ = (a_qq − a_pp)/(2a_pq)`, `t = sgn(θ)/(|θ| + √(θ² + 1))`, `c = 1/√(t² + 1)`, `s = tc`
-/// (Golub & Van Loan, Matrix Computations, 8.5).
+/// Each rotation zeroes `a_pq`: with `θ = (a_qq − a_pp)/(2a_pq)`, `t = sgn(θ)/(|θ| + √(θ² + 1))`, `c = 1/√(t² + 1)`,
+/// `s = tc` (Golub & Van Loan, Matrix Computations, 8.5).
 pub(crate) fn symmetric(a: &mut [f64], n: usize) -> (Vec<f64>, Vec<f64>) {
     let mut vectors = vec![0.0; n * n];
     for i in 0..n {

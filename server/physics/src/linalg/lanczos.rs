@@ -1,10 +1,10 @@
 //! Lanczos' method for the largest eigenvalue of `K φ = ω² M φ` with a lumped mass matrix `M`.
 //!
 //! On the free degrees of freedom it is the symmetric problem `A y = ω² y` with `A = M^{-½} K M^{-½}`. The three-term
-//! recurrence builds the tridiagonal `T_m`; its largest eigenvalue θ approaches ω²_max from below, the last component `s` of
-//! its eigenvector gives the residual `r = β_m |s|`, and an eigenvalue of `A` lies within `r` of θ (Parlett 1998, §13.2).
-//! There is no reorthogonalisation: rounding only makes copies of converged eigenvalues, and the largest one is all that is
-//! asked for.
+//! recurrence builds the tridiagonal `T_m`; its largest eigenvalue θ approaches ω²_max from below, the last component
+//! `s` of its eigenvector gives the residual `r = β_m |s|`, and an eigenvalue of `A` lies within `r` of θ (Parlett
+//! 1998, §13.2). There is no reorthogonalisation: rounding only makes copies of converged eigenvalues, and the largest
+//! one is all that is asked for.
 use glam::DVec3;
 
 /// Lanczos stops when the residual is below this fraction of θ.
@@ -27,8 +27,8 @@ pub(crate) fn telling<'a>(
     }
 }
 
-/// Largest eigenvalue θ of `A = D K D`, `D = M^{-½}`, and its residual `r` (both rad²/s²). `apply` overwrites its second argument with K times its
-/// first.
+/// Largest eigenvalue θ of `A = D K D`, `D = M^{-½}`, and its residual `r` (both rad²/s²). `apply` overwrites its
+/// second argument with K times its first.
 pub(crate) fn lanczos(apply: &mut dyn FnMut(&[DVec3], &mut [DVec3]), root_inverse_mass: &[DVec3]) -> (f64, f64) {
     lanczos_to(TOLERANCE, apply, root_inverse_mass)
 }
@@ -81,7 +81,8 @@ pub(crate) fn lanczos_to(
     best
 }
 
-/// A unit vector of pseudo-random components on the free degrees of freedom: the same on every machine and in every run.
+/// A unit vector of pseudo-random components on the free degrees of freedom: the same on every machine and in every
+/// run.
 fn start_vector(root_inverse_mass: &[DVec3]) -> Vec<DVec3> {
     let mut seed = 0x9e37_79b9_7f4a_7c15_u64;
     let mut random = |d: f64| {
@@ -104,10 +105,11 @@ fn dot(a: &[DVec3], b: &[DVec3]) -> f64 {
     a.iter().zip(b).map(|(a, b)| a.dot(*b)).sum()
 }
 
-/// Largest eigenvalue of a symmetric tridiagonal matrix and the last component of its unit eigenvector (absolute value).
+/// Largest eigenvalue of a symmetric tridiagonal matrix and the last component of its unit eigenvector (absolute
+/// value).
 ///
-/// Bisection on the sign count of `T − σI = L D Lᵀ` (Sylvester's inertia: as many negative pivots as eigenvalues below σ),
-/// between the largest diagonal entry and Gershgorin's bound.
+/// Bisection on the sign count of `T − σI = L D Lᵀ` (Sylvester's inertia: as many negative pivots as eigenvalues below
+/// σ), between the largest diagonal entry and Gershgorin's bound.
 fn largest_of_tridiagonal(diagonal: &[f64], off_diagonal: &[f64]) -> (f64, f64) {
     let n = diagonal.len();
     let off = |k: usize| off_diagonal.get(k).copied().unwrap_or(0.0);

@@ -1,15 +1,16 @@
 //! The rotation nearest to a 3×3 matrix, and how it changes with the matrix.
 //!
 //! `R` maximises `tr(RᵀF)` over rotations, so it exists for every `F`, singular and inverted ones included, and
-//! `F = R S` with `S` symmetric; of its eigenvalues `σ₁ ≥ σ₂ ≥ |σ₃|` the last carries the sign of `det F`. `R` is unique,
-//! and smooth in `F`, where `σ₂ + σ₃ > 0`. On the rest (rank ≤ 1, or inverted with `σ₃ = −σ₂`) one maximiser is taken.
+//! `F = R S` with `S` symmetric; of its eigenvalues `σ₁ ≥ σ₂ ≥ |σ₃|` the last carries the sign of `det F`. `R` is
+//! unique, and smooth in `F`, where `σ₂ + σ₃ > 0`. On the rest (rank ≤ 1, or inverted with `σ₃ = −σ₂`) one maximiser is
+//! taken.
 use super::tensor::trace;
 use glam::{DMat3, DQuat, DVec3, DVec4};
 
 /// The rotation `R` nearest to `F` in the Frobenius norm.
 ///
-/// With `R(q)` of a unit quaternion `q`, `tr(RᵀF) = qᵀ B q` for a symmetric traceless 4×4 matrix `B(F)` (Davenport's; Horn
-/// 1987): the eigenvector of its largest eigenvalue is `q`. Jacobi's rotations find it to rounding for any `F`.
+/// With `R(q)` of a unit quaternion `q`, `tr(RᵀF) = qᵀ B q` for a symmetric traceless 4×4 matrix `B(F)` (Davenport's;
+/// Horn 1987): the eigenvector of its largest eigenvalue is `q`. Jacobi's rotations find it to rounding for any `F`.
 pub(crate) fn nearest_rotation(f: &DMat3) -> DMat3 {
     let (c0, c1, c2) = (f.x_axis, f.y_axis, f.z_axis);
     let axial = DVec3::new(c1.z - c2.y, c2.x - c0.z, c0.y - c1.x);

@@ -1,4 +1,5 @@
-//! Preconditioned conjugate gradients in buffers that are there already, for a stiffness `K` or a step's `M + dt² K + dt C`.
+//! Preconditioned conjugate gradients in buffers that are there already, for a stiffness `K` or a step's
+//! `M + dt² K + dt C`.
 use glam::{DMat3, DVec3};
 
 /// When to stop.
@@ -38,8 +39,9 @@ impl PcgScratch {
 
 /// Solves `A s = r` from `s = 0`, with the blocks of `P⁻¹ ≈ A⁻¹`; returns the number of products.
 ///
-/// Where `A` turns out to be indefinite along a direction (`pᵀAp ≤ 0`: the tangent of a law under compression), it stops at what it
-/// has (Steihaug 1983), or at `P⁻¹r` if it has nothing: still a descent of the energy that the positive directions make.
+/// Where `A` turns out to be indefinite along a direction (`pᵀAp ≤ 0`: the tangent of a law under compression), it
+/// stops at what it has (Steihaug 1983), or at `P⁻¹r` if it has nothing: still a descent of the energy that the
+/// positive directions make.
 pub fn solve(
     mut apply: impl FnMut(&[DVec3], &mut [DVec3]),
     inverse_blocks: &[DMat3],

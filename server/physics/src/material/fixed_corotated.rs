@@ -1,5 +1,5 @@
-//! Fixed corotated elasticity (Stomakhin, Howes, Schroeder & Teran 2012): `Ψ = µ|F − R|² + ½λ(J − 1)²`, where `R` is the
-//! rotation nearest to `F` and `J = det F`.
+//! Fixed corotated elasticity (Stomakhin, Howes, Schroeder & Teran 2012): `Ψ = µ|F − R|² + ½λ(J − 1)²`, where `R` is
+//! the rotation nearest to `F` and `J = det F`.
 //!
 //! In lanes the rotation has a closed form. `t = tr(RᵀF) = σ₁ + σ₂ + σ₃` is the largest root of
 //! `p(t) = t⁴ − 2I t² − 8J t + 2|C|² − I²`, with `C = FᵀF`, `I = tr C` (the characteristic polynomial of Davenport's
@@ -63,8 +63,8 @@ impl ConstitutiveLaw for FixedCorotated {
 
     /// `P = R µ(2E − G²) + λ(J − 1) cof F`.
     ///
-    /// `F − R = R G`, `G = √C − I`, and from `(I + G)² = I + 2E`: `G = E − ½G²`. A first `G₀ = sym(RᵀF) − I`, which knows
-    /// strain only to the rounding of `R`, put into the right side, gives it relative to itself.
+    /// `F − R = R G`, `G = √C − I`, and from `(I + G)² = I + 2E`: `G = E − ½G²`. A first `G₀ = sym(RᵀF) − I`, which
+    /// knows strain only to the rounding of `R`, put into the right side, gives it relative to itself.
     #[inline(always)]
     fn lane_piola<T: Real>(c: &Constants<T>, h: &M3<T>) -> LaneStress<T> {
         let (cof_f, volume_change) = cofactor_and_volume_change(h);

@@ -1,4 +1,5 @@
-//! Measures of strain in lanes, from the displacement gradient `H = F − I`, so that they are accurate relative to the strain.
+//! Measures of strain in lanes, from the displacement gradient `H = F − I`, so that they are accurate relative to the
+//! strain.
 use super::lane_matrix::{M3, cofactor, cofactor_differential, column_dot, contract, trace};
 use crate::lanes::real::Real;
 
@@ -58,8 +59,8 @@ pub(crate) fn cofactor_and_volume_change<T: Real>(h: &M3<T>) -> (M3<T>, T) {
     (cofactor_of_sum(h, &cof_h, trace(h)), volume_change(h, &cof_h))
 }
 
-/// `a (cof F : δF) cof F + b δ(cof F)`, with `δ(cof F) = tr(δF) I − δFᵀ + δ(cof H)`: the differential of `b(J) cof F` where
-/// `a = ∂b/∂J`.
+/// `a (cof F : δF) cof F + b δ(cof F)`, with `δ(cof F) = tr(δF) I − δFᵀ + δ(cof H)`: the differential of `b(J) cof F`
+/// where `a = ∂b/∂J`.
 #[inline(always)]
 pub(crate) fn volumetric_differential<T: Real>(a: T, b: T, h: &M3<T>, cof_f: &M3<T>, df: &M3<T>) -> M3<T> {
     let (rate, tr) = (a * contract(cof_f, df), trace(df));

@@ -7,10 +7,11 @@ use glam::DMat3;
 ///
 /// A law is linear in λ and µ, and small strain sees exactly these: `δP = λ tr(δF) I + µ(δF + δFᵀ)` at `F = I`.
 ///
-/// The functions in lanes are given the displacement gradient `H = F − I`. Written in `H`, a law is accurate relative to the
-/// strain however small it is: `F` in f32 knows strain to 1e-7 at best, `H` keeps seven digits of it. They work on numbers
-/// and on vectors of numbers alike (`lanes::real`), so they have no branches, and they are `#[inline(always)]`, because a
-/// vector type is only fast where it is inlined into a function compiled for its instruction set.
+/// The functions in lanes are given the displacement gradient `H = F − I`. Written in `H`, a law is accurate relative
+/// to the strain however small it is: `F` in f32 knows strain to 1e-7 at best, `H` keeps seven digits of it. They work
+/// on numbers and on vectors of numbers alike (`lanes::real`), so they have no branches, and they are
+/// `#[inline(always)]`, because a vector type is only fast where it is inlined into a function compiled for its
+/// instruction set.
 pub(crate) trait ConstitutiveLaw {
     /// The name that a scene file gives the law.
     const NAME: &'static str;
@@ -23,12 +24,12 @@ pub(crate) trait ConstitutiveLaw {
     fn piola(lame: Lame, f: &DMat3) -> DMat3;
     /// Differential `δP = ∂P/∂F : δF` (Pa).
     fn piola_differential(lame: Lame, f: &DMat3, df: &DMat3) -> DMat3;
-    /// The largest P-wave modulus `n·(δP N)` (Pa), `δF = n Nᵀ` with unit `n` and `N`, where no principal stretch exceeds
-    /// `s ≥ 1`, of which the square is given; λ is not negative here.
+    /// The largest P-wave modulus `n·(δP N)` (Pa), `δF = n Nᵀ` with unit `n` and `N`, where no principal stretch
+    /// exceeds `s ≥ 1`, of which the square is given; λ is not negative here.
     fn stretched_modulus_pa(lame: Lame, stretch_sq: f64) -> f64;
 
-    /// Where [`LaneStress::domain`] is below this, the lane is computed once more in f64; `None` where a law in lanes is good
-    /// for every `F`.
+    /// Where [`LaneStress::domain`] is below this, the lane is computed once more in f64; `None` where a law in lanes
+    /// is good for every `F`.
     const DOMAIN: Option<f64> = None;
     /// `P(I + H)` (Pa).
     fn lane_piola<T: Real>(c: &Constants<T>, h: &M3<T>) -> LaneStress<T>;

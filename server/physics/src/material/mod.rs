@@ -1,8 +1,9 @@
 //! Constitutive laws: energy density `Ψ(F)` (Pa), first Piola-Kirchhoff stress `P = ∂Ψ/∂F` (Pa), and its differential
 //! `δP = ∂P/∂F : δF`.
 //!
-//! A law is one file and one line of the registry below (docs/how-to/add-a-law.md). One harness (`tests/derivatives.rs`)
-//! checks energy → stress → stiffness of all of them, another (`tests/kernel.rs`) their lanes against f64.
+//! A law is one file and one line of the registry below (docs/how-to/add-a-law.md). One harness
+//! (`tests/derivatives.rs`) checks energy → stress → stiffness of all of them, another (`tests/kernel.rs`) their lanes
+//! against f64.
 // A vector type is only fast where it is inlined into a function compiled for its instruction set.
 #![allow(clippy::inline_always)]
 pub(crate) mod constants;
@@ -42,13 +43,15 @@ impl Law {
     }
 }
 
-/// The papers' factors on elastic and viscous stress (MODEL §1.1): a seed convention halves or keeps what the formulas print.
+/// The papers' factors on elastic and viscous stress (MODEL §1.1): a seed convention halves or keeps what the formulas
+/// print.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Convention {
     /// Force is −∂U/∂x of the stated energy: factors 1 and 1.
     #[default]
     Consistent,
-    /// Printed in 2006: strain with ½ and force with V/2, so the elastic factor is ½; its strain rate has no ½: viscous factor 1.
+    /// Printed in 2006: strain with ½ and force with V/2, so the elastic factor is ½; its strain rate has no ½: viscous
+    /// factor 1.
     Paper2006,
     /// Printed in 2005: strain without ½, force with V/2: both factors 1.
     Paper2005,
@@ -98,8 +101,8 @@ impl Material {
     }
 
     /// How much the P-wave modulus grows when no principal stretch exceeds `s ≥ 1`: the largest `n·(δP N)` for
-    /// `δF = n Nᵀ`, unit `n` and `N`, over its rest value `λ + 2µ`. The square of the largest natural frequency grows by
-    /// about as much.
+    /// `δF = n Nᵀ`, unit `n` and `N`, over its rest value `λ + 2µ`. The square of the largest natural frequency grows
+    /// by about as much.
     pub fn stiffening(&self, stretch: f64) -> f64 {
         let lame = Lame { lambda_pa: self.lame.lambda_pa.max(0.0), ..self.lame };
         self.law.stretched_modulus_pa(lame, stretch * stretch) / lame.p_wave_modulus_pa()

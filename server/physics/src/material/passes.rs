@@ -1,4 +1,5 @@
-//! Passes over lists of elements, each compiled for every law, with and without viscous terms, and every instruction set.
+//! Passes over lists of elements, each compiled for every law, with and without viscous terms, and every instruction
+//! set.
 use super::ConstitutiveLaw;
 use crate::lanes::{
     Available,
@@ -11,8 +12,8 @@ use std::marker::PhantomData;
 pub(crate) trait LawPass {
     /// The precision it computes in.
     type Scalar: Scalar;
-    /// Adds what the elements give, computed in vectors `V`, and returns the power (W) that viscous stress takes, if forces
-    /// are what it adds.
+    /// Adds what the elements give, computed in vectors `V`, and returns the power (W) that viscous stress takes, if
+    /// forces are what it adds.
     fn run<V: Vector<Scalar = Self::Scalar>, L: ConstitutiveLaw, const VISCOUS: bool>(&mut self) -> f64;
 }
 

@@ -1,7 +1,8 @@
 //! The registry of laws: its macro makes the enumeration, the list and both dispatches from one line per law.
 
-/// From lines `module::TypeThatImplementsConstitutiveLaw`: the enumeration `Law` whose variants have the types' names, the
-/// list of all of them, and the functions of a law by a `match`, so that each call is compiled for its law (no `dyn`).
+/// From lines `module::TypeThatImplementsConstitutiveLaw`: the enumeration `Law` whose variants have the types' names,
+/// the list of all of them, and the functions of a law by a `match`, so that each call is compiled for its law (no
+/// `dyn`).
 macro_rules! laws {
     ($($(#[$attribute:meta])* $module:ident::$law:ident),+ $(,)?) => {
         /// Which law a material obeys.

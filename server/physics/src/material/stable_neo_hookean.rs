@@ -1,7 +1,8 @@
 //! Stable neo-Hookean (Smith, de Goes & Kim 2018, without the rest-state logarithm).
 //!
-//! `Ψ = ½µ(tr FᵀF − 3) + ½λ̂(J − 1)² − µ(J − 1)` with `λ̂ = λ + µ`, `J = det F`. At `F = I` energy and stress vanish, and
-//! `δP = µ(δF + δFᵀ) + (λ̂ − µ) tr(δF) I`: small strain sees exactly λ and µ. Defined for every `F`, inverted ones included.
+//! `Ψ = ½µ(tr FᵀF − 3) + ½λ̂(J − 1)² − µ(J − 1)` with `λ̂ = λ + µ`, `J = det F`. At `F = I` energy and stress vanish,
+//! and `δP = µ(δF + δFᵀ) + (λ̂ − µ) tr(δF) I`: small strain sees exactly λ and µ. Defined for every `F`, inverted ones
+//! included.
 use super::{
     ConstitutiveLaw, Lame,
     constants::Constants,

@@ -1,7 +1,7 @@
 //! The evaluation of forces at an instant of a tick: its time, and the forces of loads and injections.
 use super::{Environment, MechanicalState, PointForce, TickInput};
 use crate::{
-    contact::{Body, ContactScratch, ContactState, SubstepTime},
+    contact::{BodyMotion, ContactScratch, ContactState, SubstepTime},
     elements::loads::{LoadPositions, add_load_n},
     settings::LoadSpec,
 };
@@ -161,7 +161,7 @@ pub(crate) fn touch_nodes(
     external_n.fill(DVec3::ZERO);
     tick.add_given_n(load_factors, now, rest_m, x, external_n);
     if !tools.is_empty() {
-        let body = Body { x, v, fastest_m_per_s: now.fastest_m_per_s };
+        let body = BodyMotion { x, v, fastest_m_per_s: now.fastest_m_per_s };
         tick.environment.contact.substep(&body, &tick.substep_time(now), tools, contact, external_n, scratch);
     }
     *force_is_current = true;

@@ -110,7 +110,7 @@ mod tests {
     };
     use palpate_physics::{
         BodySpec, LoadSpec, Model, ModelSpec, Region, Settings, Solid,
-        bodies::hybrid::{HybridSpec, patch::Patch, place::Place},
+        bodies::hybrid::{HybridSpec, patch::Patch, trilinear_point::TrilinearPoint},
         statics::{Goal, StaticSettings, solve_static},
     };
     use std::{collections::BTreeSet, ops::ControlFlow};
@@ -157,7 +157,7 @@ mod tests {
         assert!(of_server.awake.ids.iter().eq(&active));
         let patch = Patch::new(partition, &active);
         let rest = model.surface_rest_positions_m();
-        let place = |vertex: usize| Place::new(partition, rest[vertex]);
+        let place = |vertex: usize| TrilinearPoint::new(partition, rest[vertex]);
         let mut loads_n = still(&FineLevel::at_rest(&patch, partition));
         for &(vertex, force_n) in &forces {
             places::push(&place(vertex as usize), partition, patch.active(), force_n, &mut loads_n);

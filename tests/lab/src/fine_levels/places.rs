@@ -1,9 +1,9 @@
 //! Points of a skin on what is awake of a body: where they go, and what a force on them does.
 use glam::DVec3;
-use palpate_physics::bodies::hybrid::{partition::Partition, patch::Field, place::Place};
+use palpate_physics::bodies::hybrid::{partition::Partition, patch::Field, trilinear_point::TrilinearPoint};
 
 /// What a place has of anything with three components, where these particles (ascending) are active.
-pub(super) fn value(place: &Place, partition: &Partition, active: &[u32], a: &Field) -> DVec3 {
+pub(super) fn value(place: &TrilinearPoint, partition: &Partition, active: &[u32], a: &Field) -> DVec3 {
     let of_particle = |particle: u32| match active.binary_search(&particle) {
         Ok(index) => a.particles[index],
         Err(_) => partition.anchor(particle).of(&a.nodes),
@@ -12,7 +12,13 @@ pub(super) fn value(place: &Place, partition: &Partition, active: &[u32], a: &Fi
 }
 
 /// Adds a force (N) at a place to what it moves with, where these particles (ascending) are active.
-pub(super) fn push(place: &Place, partition: &Partition, active: &[u32], force_n: DVec3, forces_n: &mut Field) {
+pub(super) fn push(
+    place: &TrilinearPoint,
+    partition: &Partition,
+    active: &[u32],
+    force_n: DVec3,
+    forces_n: &mut Field,
+) {
     for (&particle, weight) in place.particles.iter().zip(place.weights) {
         if let Ok(index) = active.binary_search(&particle) {
             forces_n.particles[index] += force_n * weight;
@@ -44,7 +50,7 @@ mod tests {
         // Some lie deep in the body.
         for (number, &point) in ball().positions_m().iter().enumerate() {
             let point = point * if number % 3 == 0 { 0.1 * (number % 10) as f64 } else { 1.0 };
-            let place = Place::new(&partition, point);
+            let place = TrilinearPoint::new(&partition, point);
             assert!((value(&place, &partition, patch.active(), &rest) - point).length() < 1e-15);
             let force = random.vector();
             let mut forces = still(&rest);

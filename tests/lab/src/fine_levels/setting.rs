@@ -26,8 +26,8 @@ use palpate_physics::{
         moments::integrate,
         partition::Partition,
         patch::{Materials, Patch},
-        place::Place,
         sites::Sites,
+        trilinear_point::TrilinearPoint,
     },
     mesh::tet::EDGES,
 };
@@ -36,7 +36,7 @@ use std::collections::BTreeSet;
 /// Points over the active particles, in place of cells.
 pub type PointsOf<'a> = &'a dyn Fn(&Partition, &BTreeSet<u32>) -> Points;
 /// What a point (m) of the skin moves with, in place of the particles of its cell: the sum of these.
-pub type PlacesOf = fn(&Partition, DVec3) -> Vec<Place>;
+pub type PlacesOf = fn(&Partition, DVec3) -> Vec<TrilinearPoint>;
 
 /// The coarse tets.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -145,7 +145,7 @@ impl Setting {
         };
         let level = level.as_ref();
         let places_of =
-            |at: DVec3| places.map_or_else(|| vec![Place::new(partition, at)], |places| places(partition, at));
+            |at: DVec3| places.map_or_else(|| vec![TrilinearPoint::new(partition, at)], |places| places(partition, at));
         let mut loads_n = still(&level.at_rest(partition));
         let rest = self.fine.mesh.positions_m();
         for &(node, force_n) in &self.load.forces_n {
@@ -153,12 +153,12 @@ impl Setting {
                 places::push(&place, partition, level.active(), force_n, &mut loads_n);
             }
         }
-        let of_tet = vec![0; partition.shares().len()];
+        let of_tet = vec![0; partition.residual_elements().len()];
         let materials = Materials { materials: &[self.problem.material()?], of_tet: &of_tet };
         let found = equilibrium(partition, level, &materials, &self.free, &loads_n, 1e-6).into_diagnostic()?;
         let mut x = rest.to_vec();
         for &node in &self.fine.surface.nodes {
-            let value = |place: &Place| places::value(place, partition, level.active(), &found);
+            let value = |place: &TrilinearPoint| places::value(place, partition, level.active(), &found);
             x[node as usize] = places_of(rest[node as usize]).iter().map(value).sum();
         }
         let displacements = Probe::new(&self.fine, &self.samples).displacements_m(rest, &x);

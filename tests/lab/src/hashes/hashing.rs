@@ -161,8 +161,8 @@ impl<'a> Run<'a> {
         *done = tick;
     }
 
-    /// Whether the other is where this is, and came there by the same bits: but for the ledger of a hybrid body, whose balancing forces of the last tick are not saved, so
-    /// that their work in the first half kick is missing.
+    /// Whether the other is where this is, and came there by the same bits: but for the ledger of a hybrid body, whose
+    /// transition force of the last tick is not saved, so that their work in the first half kick is missing.
     fn goes_with(&self, other: &Self) -> bool {
         if self.model.body().as_hybrid().is_none() {
             return self.chain == other.chain;

@@ -59,7 +59,7 @@ impl ServedBody for HybridBody {
     }
 
     fn description(&self) -> Vec<String> {
-        let (spec, partition, embedding) = (self.particles(), self.partition(), self.cage());
+        let (spec, partition, embedding) = (self.particles(), self.partition(), self.embedding());
         let mut lines = vec![format!(
             "particles  {}, {} mm apart, at most {} awake; skin of {}",
             partition.particle_count(),
@@ -106,7 +106,7 @@ impl ServedBody for HybridBody {
                 short(spec.spacing_m * 1e3)
             ));
         }
-        let outside = self.cage().outside;
+        let outside = self.embedding().outside;
         if outside as f64 > MANY_OUTSIDE * partition.particle_count() as f64 {
             warnings.push(format!(
                 "{outside} of {} particles are outside the coarse tets and never wake: where they are, the body answers as coarsely as its tets; ask for more tets",

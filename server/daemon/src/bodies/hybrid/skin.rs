@@ -7,7 +7,7 @@ use crate::bodies::{
 use glam::DVec3;
 use palpate_physics::{
     Model,
-    bodies::hybrid::{HybridBody, composite::Anchor, place::Place},
+    bodies::hybrid::{HybridBody, composite::Anchor, trilinear_point::TrilinearPoint},
 };
 use std::collections::BTreeMap;
 
@@ -43,7 +43,8 @@ impl SkinReader {
     pub(super) fn new(model: &Model, hybrid: &HybridBody, rest_f32_m: &[[f32; 3]]) -> Self {
         let partition = hybrid.partition();
         let rest = model.surface_rest_positions_m();
-        let places: Vec<Place> = (0..rest.len() as u32).map(|vertex| hybrid.place(vertex).place(partition)).collect();
+        let places: Vec<TrilinearPoint> =
+            (0..rest.len() as u32).map(|vertex| hybrid.vertex_point(vertex).trilinear(partition)).collect();
         let mut number: BTreeMap<u32, u32> =
             places.iter().flat_map(|place| place.particles).map(|particle| (particle, 0)).collect();
         number.values_mut().zip(0..).for_each(|(slot, index)| *slot = index);
@@ -52,7 +53,7 @@ impl SkinReader {
             rest_m: partition.particle_m(particle),
             anchor: partition.anchor(particle),
         };
-        let vertex = |((place, rest), rest_f32): ((&Place, &DVec3), &[f32; 3])| Vertex {
+        let vertex = |((place, rest), rest_f32): ((&TrilinearPoint, &DVec3), &[f32; 3])| Vertex {
             carriers: place.particles.map(|particle| number[&particle]),
             weights: place.weights,
             rounding_m: *rest - double(*rest_f32),

@@ -5,15 +5,15 @@ use super::{
     composite::Composite,
     embedding_mesh::{self, EmbeddingMesh},
     metric::Masses,
-    moments::{CellMoments, full_gradients_m2, integrate},
+    moments::{CellMoments, Moments, integrate},
     partition::Partition,
     patch::{KEPT, Materials},
-    place::{Place, SkinPlace},
     projection::Lumping,
     sites::Sites,
     sizes,
     spec::{HybridError, ParticleSpec},
     transition_force::is_free,
+    trilinear_point::CellPoint,
 };
 use crate::{
     elements::{
@@ -28,72 +28,74 @@ use crate::{
 use glam::{BVec3, DVec3};
 use std::collections::BTreeSet;
 
-/// A particle follows no coarse node with less than this.
+/// Weights below this count as zero: a particle does not follow such a coarse node.
 pub(super) const NO_WEIGHT: f64 = 1e-9;
 
-/// Parts of the time to build a body: by when its cells are integrated, counted to coarse tets, and their particles known.
+/// Fractions of the time to build a body at which its cells are integrated, are counted to coarse tets, and it is
+/// known which of its particles may wake.
 const INTEGRATED: f64 = 0.15;
-const SHARED: f64 = 0.85;
+const COUNTED: f64 = 0.85;
 const MAY_WAKE: f64 = 0.95;
 
-/// What a hybrid body is made of. Constant after load.
+/// All that the rest state of a hybrid body fixes. It does not change after loading.
 #[derive(Debug, Clone)]
 pub struct HybridBody {
     pub(super) partition: Partition,
     /// Rest data of a plain cell.
     full_cell: RestCell,
     pub(super) masses: Masses,
-    /// What lumping adds to them.
+    /// The part of the mass matrix that lumping adds to the consistent one.
     pub(super) lumping: Lumping,
     pub(super) materials: Vec<Material>,
     pub(super) of_tet: Vec<u16>,
     /// Axes along which coarse nodes may move.
     pub(super) free: Vec<BVec3>,
     free_parts: Vec<DVec3>,
-    /// It is held nowhere.
+    /// Whether the body is held nowhere.
     pub(super) is_free: bool,
-    /// Which particles may wake: those that follow some node that is free, none that is held along some axes only, and lie within the coarse tets.
+    /// Whether each particle may wake: it has to follow some free node, to follow no node that is held along some axes
+    /// only, and to lie within the coarse tets.
     pub(super) may_wake: Vec<bool>,
-    /// Where the skin's vertices are.
-    pub(super) places: Vec<SkinPlace>,
-    /// How much faster than the fastest node or particle a vertex of the skin can be.
+    /// The cell of each vertex of the skin, and the vertex's coordinates in it.
+    pub(super) vertex_points: Vec<CellPoint>,
+    /// Bound of the speed of any vertex of the skin over that of the fastest node or particle.
     pub(super) amplification: f64,
-    /// Bounds of the skin's triangles.
+    /// Bounding boxes of the skin's triangles.
     pub(super) clusters: SkinClusters,
     pub(super) densities_kg_per_m3: Vec<f64>,
-    cage: CageSummary,
-    /// The coarse mesh, its boundary moved so that it holds the particles.
+    embedding: EmbeddingSummary,
+    /// The embedding mesh: the coarse mesh, its boundary moved so that it holds the particles.
     coarse: TetMesh,
-    /// What the particles were made from.
+    /// The specification that the particles were made from.
     pub(super) particles: ParticleSpec,
     /// `1/m` (1/kg) per coarse node and axis, zero where prescribed or without mass.
     pub(super) inverse_mass_per_kg: Vec<DVec3>,
     pub(super) max_natural_frequency_rad_per_s: f64,
 }
 
-/// A hybrid body laid out.
+/// A hybrid body that has been laid out.
 #[derive(Debug)]
 pub(crate) struct Built {
-    /// The body, whose frequencies are not known yet.
+    /// The body; its frequencies are not known yet.
     pub(crate) body: HybridBody,
-    /// What is prescribed, with nodes in the middle of edges.
+    /// The prescribed sets, extended by nodes in the middle of edges.
     pub(crate) prescribed: Vec<PrescribedSpec>,
 }
 
-/// What became of the coarse mesh's boundary.
+/// How the coarse mesh's boundary was moved to hold the particles.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct CageSummary {
-    /// How far it was moved at most (m), so that the coarse tets hold the particles.
+pub struct EmbeddingSummary {
+    /// Largest displacement (m) of a node of the boundary.
     pub moved_m: f64,
-    /// Particles that they do not hold even so, which never wake.
+    /// Number of particles that the coarse tets do not hold even so; they never wake.
     pub outside: usize,
 }
 
 impl HybridBody {
-    /// Lays the lattice of particles over coarse tets, whose boundary is given; `progress` is told the part done.
+    /// Lays the lattice of particles over coarse tets, whose boundary is given. `progress` is told the fraction done.
     ///
     /// # Errors
-    /// A specification outside its range, or a lattice that does not fit the body.
+    /// Fails for a specification outside its range, or a lattice that does not fit the body.
     pub(crate) fn lay_out(
         coarse: &Solid,
         boundary: &Surface,
@@ -110,8 +112,8 @@ impl HybridBody {
         if moments.is_empty() {
             return Err(HybridError::Nothing { spacing_m });
         }
-        let EmbeddingMesh { mesh, moved_m, outside } = covering((mesh, surface), prescribed, &sites, &moments);
-        let cage = CageSummary { moved_m, outside };
+        let EmbeddingMesh { mesh, moved_m, outside } = covering(mesh, surface, prescribed, &sites, &moments);
+        let embedding = EmbeddingSummary { moved_m, outside };
         let composite = Composite::new(&mesh);
         let prescribed = with_edges(&mesh, surface, &composite, prescribed);
         let moments = match spec.fine_layers() {
@@ -119,9 +121,9 @@ impl HybridBody {
             None => moments,
         };
         let partition = Partition::new_with(sites, composite, &moments, &mut |part| {
-            progress(INTEGRATED + (SHARED - INTEGRATED) * part);
+            progress(INTEGRATED + (COUNTED - INTEGRATED) * part);
         });
-        progress(SHARED);
+        progress(COUNTED);
         let masses = Masses::new(&partition, |tet| densities_kg_per_m3[of_tet[tet] as usize]);
         let mut free: Vec<BVec3> = masses.node_kg.iter().map(|&mass| BVec3::splat(mass > 0.0)).collect();
         for set in &prescribed {
@@ -133,15 +135,15 @@ impl HybridBody {
         }
         let may_wake = (0..partition.particle_count() as u32).map(|p| may_wake(&partition, &free, p)).collect();
         progress(MAY_WAKE);
-        let places: Vec<SkinPlace> =
-            spec.skin.positions_m().iter().map(|&point| SkinPlace::new(&partition, point)).collect();
-        let of_places = places.iter().map(SkinPlace::amplification).fold(1.0, f64::max);
+        let vertex_points: Vec<CellPoint> =
+            spec.skin.positions_m().iter().map(|&point| CellPoint::new(&partition, point)).collect();
+        let of_vertices = vertex_points.iter().map(CellPoint::amplification).fold(1.0, f64::max);
         let of_anchors = (0..partition.particle_count() as u32)
             .map(|p| partition.anchor(p).weights.iter().map(|w| w.abs()).sum())
             .fold(1.0, f64::max);
         let hybrid = Self {
             lumping: Lumping::new(&partition, &masses),
-            full_cell: RestCell::new(spacing_m, 1.0 - KEPT, &(spacing_m.powi(3), full_gradients_m2(spacing_m))),
+            full_cell: RestCell::new(spacing_m, 1.0 - KEPT, &Moments::full(spacing_m)),
             materials,
             densities_kg_per_m3,
             of_tet: of_tet.to_vec(),
@@ -149,10 +151,10 @@ impl HybridBody {
             free_parts: free.iter().map(|free| DVec3::select(*free, DVec3::ONE, DVec3::ZERO)).collect(),
             free,
             may_wake,
-            places,
-            amplification: of_places * of_anchors,
+            vertex_points,
+            amplification: of_vertices * of_anchors,
             clusters: SkinClusters::default(),
-            cage,
+            embedding,
             partition,
             masses,
             coarse: mesh,
@@ -164,172 +166,135 @@ impl HybridBody {
         Ok(Built { body: hybrid, prescribed })
     }
 
-    /// The lattice on the coarse tets.
+    /// Returns the lattice's cells and particles on the coarse tets.
     pub fn partition(&self) -> &Partition {
         &self.partition
     }
 
-    /// Masses while all sleep.
+    /// Returns the masses while all particles sleep.
     pub fn masses(&self) -> &Masses {
         &self.masses
     }
 
-    /// The coarse mesh, its boundary moved so that it holds the particles.
+    /// Returns the embedding mesh: the coarse mesh, its boundary moved so that it holds the particles.
     pub fn coarse(&self) -> &TetMesh {
         &self.coarse
     }
 
-    /// What the particles were made from.
+    /// Returns the specification that the particles were made from.
     pub fn particles(&self) -> &ParticleSpec {
         &self.particles
     }
 
-    /// Rest positions (m) of the skin's vertices.
+    /// Returns the rest positions (m) of the skin's vertices.
     pub fn skin_rest_m(&self) -> &[DVec3] {
         self.particles.skin.positions_m()
     }
 
-    /// Rest positions (m) of the coarse nodes.
+    /// Returns the rest positions (m) of the coarse nodes.
     pub fn rest_positions_m(&self) -> &[DVec3] {
         self.partition.coarse().positions_m()
     }
 
-    /// `1/m` (1/kg) per coarse node and axis, zero where prescribed or without mass.
+    /// Returns `1/m` (1/kg) per coarse node and axis, zero where prescribed or without mass.
     pub fn inverse_mass_per_kg(&self) -> &[DVec3] {
         &self.inverse_mass_per_kg
     }
 
-    /// Largest natural frequency (rad/s) at rest.
+    /// Returns the largest natural frequency (rad/s) at rest.
     pub fn max_natural_frequency_rad_per_s(&self) -> f64 {
         self.max_natural_frequency_rad_per_s
     }
 
-    /// Coarse nodes, and the most particles that may be active at once.
+    /// Returns the number of coarse nodes plus that of the particles that may be active at once.
     pub(crate) fn most_positions(&self) -> usize {
         self.node_count() + self.particles.most_active
     }
 
-    /// The first part of its coarse level that is not held.
+    /// Returns the first part of the coarse level that is not held.
     pub(crate) fn first_free_part(&self) -> Option<FreePart> {
         let nodes = HeldNodes {
             rest_m: self.rest_positions_m(),
             mass_kg: &self.masses.node_kg,
             inverse_mass_per_kg: &self.inverse_mass_per_kg,
         };
-        first_free_part(&nodes, self.partition.shares().iter().map(|share| &share.nodes[..]))
+        first_free_part(&nodes, self.partition.residual_elements().iter().map(|residual| &residual.nodes[..]))
     }
 
-    /// What prescribed sets need.
+    /// Returns what prescribed sets need of the coarse nodes.
     pub(crate) fn prescribed_nodes(&self) -> PrescribedNodes<'_> {
         PrescribedNodes { rest_m: self.rest_positions_m(), mass_kg: &self.masses.node_kg }
     }
 
-    /// Materials of the coarse tets.
+    /// Returns the materials of the coarse tets.
     pub fn materials(&self) -> Materials<'_> {
         Materials { materials: &self.materials, of_tet: &self.of_tet }
     }
 
-    /// Number of coarse nodes: the first of a state's positions.
+    /// Returns the number of coarse nodes; their positions are the first of a state's.
     pub fn node_count(&self) -> usize {
         self.free.len()
     }
 
-    /// Axes along which coarse nodes may move.
+    /// Returns the axes along which coarse nodes may move.
     pub fn free(&self) -> &[BVec3] {
         &self.free
     }
 
-    /// Whether a particle may wake.
+    /// Returns whether a particle may wake.
     pub fn may_wake(&self, particle: u32) -> bool {
         self.may_wake.get(particle as usize).copied().unwrap_or(false)
     }
 
-    /// Rest data of a cell that is awake.
+    /// Returns the rest data of a cell that is awake.
     pub(super) fn awake_cell(&self, cell: usize) -> RestCell {
         if self.partition.is_plain(cell) { self.full_cell } else { self.partition.rest_cell(cell, 1.0 - KEPT) }
     }
 
-    /// The same as numbers: 1 along an axis on which a coarse node may move, 0 along others.
+    /// Returns the same as [`Self::free`] in numbers: 1 along an axis on which a coarse node may move, 0 along others.
     pub(crate) fn free_parts(&self) -> &[DVec3] {
         &self.free_parts
     }
 
-    /// The material of a coarse tet.
+    /// Returns the material of a coarse tet.
     pub(super) fn material_of_tet(&self, tet: u32) -> &Material {
         &self.materials[self.of_tet[tet as usize] as usize]
     }
 
-    /// The material of a cell.
+    /// Returns the material of a cell.
     pub(super) fn material_of_cell(&self, cell: usize) -> &Material {
         self.material_of_tet(self.partition.cells()[cell].tet)
     }
 
-    /// Where a vertex of the skin is.
-    pub fn place(&self, vertex: u32) -> SkinPlace {
-        self.places[vertex as usize]
+    /// Returns the cell of a vertex of the skin, and the vertex's coordinates in it.
+    pub fn vertex_point(&self, vertex: u32) -> CellPoint {
+        self.vertex_points[vertex as usize]
     }
 
-    /// How much faster than the fastest node or particle a vertex of the skin can be.
+    /// Returns a bound of the speed of any vertex of the skin over that of the fastest node or particle.
     pub(crate) fn amplification(&self) -> f64 {
         self.amplification
     }
 
-    /// Takes the skin's triangles in the order of contact's broad phase.
+    /// Computes the bounding boxes of the skin's triangles, given in the order of contact's broad phase.
     pub(crate) fn cluster(&mut self, triangles: &[[u32; 3]]) {
         self.clusters = SkinClusters::new(self, self.skin_rest_m(), triangles);
     }
 
-    /// What contact may take for the mass (kg) of a vertex of the skin: with its area `A_v`, `A_v min_p m_p/A_p` over its particles, `A_p = Σ_v w_vp A_v`.
-    /// What a foundation can bear per area at the vertex, each of its particles then can.
-    pub(crate) fn vertex_masses_kg(&self) -> Vec<f64> {
-        let skin = &self.particles.skin;
-        let mut vertex_m2 = vec![0.0; self.places.len()];
-        for triangle in 0..skin.triangles().len() {
-            let [a, b, c] = skin.corners_m(triangle);
-            let third = (b - a).cross(c - a).length() / 6.0;
-            skin.triangles()[triangle].iter().for_each(|&vertex| vertex_m2[vertex as usize] += third);
-        }
-        let places = || self.places.iter().map(|place| place.place(&self.partition)).zip(&vertex_m2);
-        let mut particle_m2 = vec![0.0; self.partition.particle_count()];
-        for (place, area_m2) in places() {
-            for (particle, weight) in place.particles.into_iter().zip(place.weights) {
-                particle_m2[particle as usize] += weight.max(0.0) * area_m2;
-            }
-        }
-        let per_area = |particle: u32| self.masses.particle_kg[particle as usize] / particle_m2[particle as usize];
-        let of_vertex = |(place, area_m2): (Place, &f64)| {
-            let carriers = place.particles.into_iter().zip(place.weights).filter(|(_, weight)| *weight > 1e-6);
-            area_m2 * carriers.map(|(particle, _)| per_area(particle)).fold(f64::INFINITY, f64::min)
-        };
-        places().map(of_vertex).collect()
-    }
-
-    /// Springs (N/m) at vertices of the skin as their particles feel them: the row sums of `Σ_v k_v w_v w_vᵀ`.
-    pub(crate) fn particle_springs_n_per_m(&self, of_vertices_n_per_m: &[f64]) -> Vec<f64> {
-        let mut springs = vec![0.0; self.partition.particle_count()];
-        for (place, stiffness) in self.places.iter().zip(of_vertices_n_per_m) {
-            let amplification = place.amplification();
-            let place = place.place(&self.partition);
-            for (particle, weight) in place.particles.into_iter().zip(place.weights) {
-                springs[particle as usize] += stiffness * weight.abs() * amplification;
-            }
-        }
-        springs
-    }
-
-    /// The material of the tet that a vertex of the skin is in.
+    /// Returns the material of the tet that a vertex of the skin is in.
     pub(crate) fn material_at(&self, vertex: u32) -> &Material {
-        let cell = self.partition.cells()[self.place(vertex).cell as usize];
+        let cell = self.partition.cells()[self.vertex_point(vertex).cell as usize];
         &self.materials[self.of_tet[cell.tet as usize] as usize]
     }
 
-    /// What became of the coarse mesh's boundary.
-    pub fn cage(&self) -> CageSummary {
-        self.cage
+    /// Returns how the coarse mesh's boundary was moved to hold the particles.
+    pub fn embedding(&self) -> EmbeddingSummary {
+        self.embedding
     }
 }
 
-/// Nodes in the middle of an edge whose surface is held along an axis are held along it, too: the sets with them.
+/// Returns the prescribed sets, extended by the nodes in the middle of edges: where all corners of a boundary triangle
+/// are in a set, so are the nodes in the middle of its edges.
 fn with_edges(
     mesh: &TetMesh,
     surface: &Surface,
@@ -359,7 +324,7 @@ fn with_edges(
     prescribed.iter().map(extended).collect()
 }
 
-/// With cells beneath so many layers merged, where they are of one material.
+/// Merges the cells beneath so many layers, eight to one, where they are of one material.
 fn merged(
     sites: &Sites,
     composite: &Composite,
@@ -376,7 +341,8 @@ fn merged(
 }
 
 fn covering(
-    (mesh, surface): (&TetMesh, &Surface),
+    mesh: &TetMesh,
+    surface: &Surface,
     prescribed: &[PrescribedSpec],
     sites: &Sites,
     moments: &[CellMoments],

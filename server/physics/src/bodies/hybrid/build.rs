@@ -1,4 +1,4 @@
-//! From a specification to a hybrid body in its environment.
+//! Builds a hybrid body and its environment from a specification.
 use super::{HybridBody, HybridError, HybridSpec, body::Built};
 use crate::{
     contact::{ContactModel, moduli},
@@ -9,10 +9,10 @@ use crate::{
 use glam::{DVec2, DVec3};
 
 impl HybridBody {
-    /// Checks, lays the lattice out, and chooses the substeps; `progress` is told the part done.
+    /// Checks the specification, lays the lattice out, and chooses the substeps. `progress` is told the fraction done.
     ///
     /// # Errors
-    /// [`HybridError`]; nothing is repaired silently.
+    /// Returns a [`HybridError`] for the first fault found; nothing is repaired silently.
     pub(crate) fn build(
         spec: HybridSpec,
         mut around: EnvironmentSpec,
@@ -69,7 +69,7 @@ impl HybridBody {
     }
 }
 
-/// What a body with particles cannot have.
+/// Refuses settings that a body with particles cannot have.
 fn demand(around: &EnvironmentSpec) -> Result<(), HybridError> {
     let refused = |what, instead| Err(HybridError::NotForParticles { what, instead });
     if around.settings.integrator != Integrator::Leapfrog {

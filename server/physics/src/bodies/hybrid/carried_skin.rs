@@ -1,14 +1,17 @@
-//! What carries the skin's vertices, and where each is when asked.
-use super::{body::HybridBody, clusters::Displaced, composite::Anchor, partition::NONE, running::RunningPatch};
+//! What carries the skin's vertices; their positions are computed when they are asked for.
+use super::{
+    body::HybridBody, clusters::Displaced, composite::Anchor, partition::NONE, running::RunningPatch,
+    trilinear_point::TrilinearPoint,
+};
 use crate::{contact::Skin, tick::CarriedSkin};
 use glam::DVec3;
 
-/// A vertex's rest position with what carries it.
+/// A vertex of the skin: its rest position, and the particles that carry it.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Carried {
     rest_m: DVec3,
     carriers: [(Carrier, f64); 8],
-    /// How many of them have weight, the first ones.
+    /// How many of the carriers have a weight other than zero; they are the first ones.
     weighty: usize,
 }
 
@@ -18,31 +21,31 @@ impl Carried {
     }
 }
 
-/// What carries a particle.
+/// What moves a particle that carries a vertex.
 #[derive(Debug, Clone, Copy)]
 enum Carrier {
-    /// A point of the patch, by its number.
+    /// A point of the patch, given by its number.
     Point(u32),
     /// The coarse nodes alone.
     Nodes(Anchor),
 }
 
-/// Where the skin is, for a query of contact.
+/// The skin at one instant, as contact queries it.
 pub(crate) struct SkinView<'a> {
     hybrid: &'a HybridBody,
     patch: &'a RunningPatch,
-    /// Velocities (m/s) of coarse nodes and then active particles; none where nobody asks for a vertex's.
+    /// Velocities (m/s) of coarse nodes and then active particles; empty where no vertex's velocity is asked for.
     v: &'a [DVec3],
     deviation_m: f64,
 }
 
 impl<'a> SkinView<'a> {
-    /// At where the patch was displaced to.
+    /// Views the skin where the patch was displaced to.
     pub(crate) fn new(hybrid: &'a HybridBody, patch: &'a RunningPatch) -> Self {
         Self { hybrid, patch, v: &[], deviation_m: 0.0 }
     }
 
-    /// The same, with velocities (m/s) of coarse nodes and then active particles.
+    /// Returns the same view with velocities (m/s) of coarse nodes and then active particles.
     pub(crate) fn moving(self, v: &'a [DVec3]) -> Self {
         Self { v, ..self }
     }
@@ -57,7 +60,7 @@ impl<'a> SkinView<'a> {
 }
 
 impl Skin for SkinView<'_> {
-    /// Takes how far the active particles are from where they would be asleep.
+    /// Measures how far the active particles are from where they would be asleep.
     fn begin(&mut self) {
         self.deviation_m = self.patch.deviation_m();
     }
@@ -80,14 +83,14 @@ impl Skin for SkinView<'_> {
     }
 
     fn position_m(&self, vertex: u32) -> DVec3 {
-        let place = self.hybrid.places[vertex as usize];
+        let cell_point = self.hybrid.vertex_points[vertex as usize];
         let partition = &self.hybrid.partition;
         let of = |particle: u32| match self.patch.point_of(particle) {
             NONE => partition.anchor(particle).of(self.patch.node_displacements_m()),
             point => self.patch.displacements_m()[point as usize],
         };
-        let particles = partition.corners(place.cell as usize);
-        let moved: DVec3 = particles.into_iter().zip(place.weights(partition)).map(|(p, w)| of(p) * w).sum();
+        let particles = partition.corners(cell_point.cell as usize);
+        let moved: DVec3 = particles.into_iter().zip(cell_point.weights(partition)).map(|(p, w)| of(p) * w).sum();
         self.hybrid.skin_rest_m()[vertex as usize] + moved
     }
 }
@@ -101,11 +104,11 @@ impl CarriedSkin for SkinView<'_> {
 
     fn carriers(&self, vertex: u32) -> Carried {
         let hybrid = self.hybrid;
-        let place = hybrid.places[vertex as usize];
+        let cell_point = hybrid.vertex_points[vertex as usize];
         let rest_m = hybrid.skin_rest_m()[vertex as usize];
         let mut carried = Carried { rest_m, carriers: [(Carrier::Point(NONE), 0.0); 8], weighty: 0 };
-        let particles = hybrid.partition.corners(place.cell as usize);
-        for (particle, weight) in particles.into_iter().zip(place.weights(&hybrid.partition)) {
+        let particles = hybrid.partition.corners(cell_point.cell as usize);
+        for (particle, weight) in particles.into_iter().zip(cell_point.weights(&hybrid.partition)) {
             if weight != 0.0 {
                 let carrier = match self.patch.point_of(particle) {
                     NONE => Carrier::Nodes(hybrid.partition.anchor(particle)),
@@ -129,13 +132,14 @@ impl CarriedSkin for SkinView<'_> {
 
     fn velocity_m_per_s(&self, vertex: u32) -> DVec3 {
         let hybrid = self.hybrid;
-        let place = hybrid.places[vertex as usize];
+        let cell_point = hybrid.vertex_points[vertex as usize];
         let of = |particle: u32| match self.patch.number_of(particle) {
             NONE => hybrid.partition.anchor(particle).of(self.v),
             number => self.v[hybrid.node_count() + number as usize],
         };
-        let particles = hybrid.partition.corners(place.cell as usize);
-        let weighty = particles.into_iter().zip(place.weights(&hybrid.partition)).filter(|(_, weight)| *weight != 0.0);
+        let particles = hybrid.partition.corners(cell_point.cell as usize);
+        let weighty =
+            particles.into_iter().zip(cell_point.weights(&hybrid.partition)).filter(|(_, weight)| *weight != 0.0);
         weighty.map(|(particle, weight)| of(particle) * weight).sum()
     }
 
@@ -152,7 +156,8 @@ impl CarriedSkin for SkinView<'_> {
 }
 
 impl HybridBody {
-    /// Where a vertex of the skin is (m), at positions `x` (m) of coarse nodes and then of the active particles `active`.
+    /// Returns the position (m) of a vertex of the skin, at positions `x` (m) of coarse nodes and then of the active
+    /// particles `active`.
     pub fn vertex_m(&self, vertex: u32, active: &[u32], x: &[DVec3]) -> DVec3 {
         let (of_nodes, of_particles) = x.split_at(self.node_count());
         let moved = |particle: u32| {
@@ -162,8 +167,48 @@ impl HybridBody {
             };
             x - self.partition.particle_m(particle)
         };
-        let place = self.places[vertex as usize].place(&self.partition);
+        let cell_point = self.vertex_points[vertex as usize].trilinear(&self.partition);
         let rest_m = self.skin_rest_m()[vertex as usize];
-        rest_m + place.particles.into_iter().zip(place.weights).map(|(p, w)| moved(p) * w).sum::<DVec3>()
+        rest_m + cell_point.particles.into_iter().zip(cell_point.weights).map(|(p, w)| moved(p) * w).sum::<DVec3>()
+    }
+
+    /// Returns the masses (kg) that contact may take for those of the skin's vertices: with the area `A_v` of a vertex,
+    /// `A_v min_p m_p/A_p` over its particles, `A_p = Σ_v w_vp A_v`. Each of a vertex's particles then bears what a
+    /// foundation does to the vertex per area.
+    pub(crate) fn vertex_masses_kg(&self) -> Vec<f64> {
+        let skin = &self.particles.skin;
+        let mut vertex_m2 = vec![0.0; self.vertex_points.len()];
+        for triangle in 0..skin.triangles().len() {
+            let [a, b, c] = skin.corners_m(triangle);
+            let third = (b - a).cross(c - a).length() / 6.0;
+            skin.triangles()[triangle].iter().for_each(|&vertex| vertex_m2[vertex as usize] += third);
+        }
+        let points = || self.vertex_points.iter().map(|point| point.trilinear(&self.partition)).zip(&vertex_m2);
+        let mut particle_m2 = vec![0.0; self.partition.particle_count()];
+        for (point, area_m2) in points() {
+            for (particle, weight) in point.particles.into_iter().zip(point.weights) {
+                particle_m2[particle as usize] += weight.max(0.0) * area_m2;
+            }
+        }
+        let per_area = |particle: u32| self.masses.particle_kg[particle as usize] / particle_m2[particle as usize];
+        let of_vertex = |(point, area_m2): (TrilinearPoint, &f64)| {
+            let carriers = point.particles.into_iter().zip(point.weights).filter(|(_, weight)| *weight > 1e-6);
+            area_m2 * carriers.map(|(particle, _)| per_area(particle)).fold(f64::INFINITY, f64::min)
+        };
+        points().map(of_vertex).collect()
+    }
+
+    /// Returns the springs (N/m) at vertices of the skin as their particles feel them: the row sums of
+    /// `Σ_v k_v w_v w_vᵀ`.
+    pub(crate) fn particle_springs_n_per_m(&self, of_vertices_n_per_m: &[f64]) -> Vec<f64> {
+        let mut springs = vec![0.0; self.partition.particle_count()];
+        for (point, stiffness) in self.vertex_points.iter().zip(of_vertices_n_per_m) {
+            let amplification = point.amplification();
+            let point = point.trilinear(&self.partition);
+            for (particle, weight) in point.particles.into_iter().zip(point.weights) {
+                springs[particle as usize] += stiffness * weight.abs() * amplification;
+            }
+        }
+        springs
     }
 }

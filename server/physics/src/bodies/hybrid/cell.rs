@@ -1,28 +1,30 @@
 //! The cell between eight particles, with one point of integration.
 //!
-//! `F = Σ_p y_p b_pᵀ` is blind to four patterns of motion a component (hourglasses): `ηζ`, `ζξ`, `ξη`, `ξηζ` in the cell's coordinates. With `γ_k` those patterns
-//! over eight, less their linear part (Flanagan & Belytschko 1981), `q_k = Σ_p γ_kp y_p` is their amplitude (m), zero for affine motion, and turns with the body:
+//! `F = Σ_p y_p b_pᵀ` is blind to four patterns of motion per component (hourglasses): `ηζ`, `ζξ`, `ξη`, `ξηζ` in the
+//! cell's coordinates. With `γ_k` those patterns over eight, less their linear part (Flanagan & Belytschko 1981),
+//! `q_k = Σ_p γ_kp y_p` is their amplitude (m), zero for affine motion, and turns with the body:
 //! ```text
 //! U_c = V Ψ(F) + ½ κ Σ_k w_k |q_k|²        κ = χ (4/3) µ V/h²,  w = (1, 1, 1, ½)
 //! f_p = −V P b_p − κ Σ_k w_k γ_kp q_k
 //! ```
-//! `χ = 2` is what the first three cost in shear when they bend a cell out of its plane. A cell then is too stiff in bending; [`HOURGLASS`] is a quarter of it.
-use super::{sites::CORNERS, sizes::Hanging};
+//! `χ = 2` is what the first three cost in shear when they bend a cell out of its plane. A cell then is too stiff in
+//! bending; [`HOURGLASS`] is a quarter of it.
+use super::{moments::Moments, sites::CORNERS, sizes::Hanging};
 use crate::{
     linalg::tensor::outer,
     material::{Lame, Material, viscous},
 };
 use glam::{DMat3, DVec3};
 
-/// χ.
+/// `χ`, the stiffness of hourglasses.
 pub const HOURGLASS: f64 = 0.5;
-/// `w_k`.
+/// `w_k`, the weights of the four hourglass patterns.
 pub const MODE_WEIGHTS: [f64; 4] = [1.0, 1.0, 1.0, 0.5];
 
 /// A cell at rest.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RestCell {
-    /// `V` (m³): what of the body's volume it answers for.
+    /// `V` (m³), the volume of the body that the cell answers for.
     pub volume_m3: f64,
     /// `b_p` (1/m).
     pub gradients_per_m: [DVec3; 8],
@@ -33,16 +35,17 @@ pub struct RestCell {
 }
 
 impl RestCell {
-    /// From `V_c` (m³) and `V_c b_cp` (m²) of the part of it that is body, of which it shall answer for the share `handed`.
-    pub fn new(edge_m: f64, handed: f64, moments: &(f64, [DVec3; 8])) -> Self {
-        Self::with_hanging(edge_m, handed, moments, Hanging::NONE)
+    /// Makes the rest data of a cell from the moments of the part of it that is body; it answers for `fraction` of
+    /// that.
+    pub fn new(edge_m: f64, fraction: f64, moments: &Moments) -> Self {
+        Self::with_hanging(edge_m, fraction, moments, Hanging::NONE)
     }
 
-    /// The same of a cell with corners that hang, in terms of its particles, as the moments are.
+    /// Does the same for a cell with hanging corners. The moments refer to the cell's particles, not to its corners.
     pub fn with_hanging(
         edge_m: f64,
-        handed: f64,
-        (volume_m3, gradients_m2): &(f64, [DVec3; 8]),
+        fraction: f64,
+        Moments { volume_m3, gradients_m2 }: &Moments,
         hanging: Hanging,
     ) -> Self {
         let gradients_per_m = gradients_m2.map(|g| g * (1.0 / volume_m3));
@@ -53,30 +56,30 @@ impl RestCell {
             let raw = hanging.to_particles(raw);
             std::array::from_fn(|p| raw[p] - linear.dot(gradients_per_m[p]))
         });
-        let volume_m3 = handed * volume_m3;
+        let volume_m3 = fraction * volume_m3;
         let hourglass_m = HOURGLASS * 4.0 / 3.0 * volume_m3 / (edge_m * edge_m);
         Self { volume_m3, gradients_per_m, modes, hourglass_m }
     }
 
-    /// `Σ_p a_p b_pᵀ`, with differences to the first particle.
+    /// Returns `Σ_p a_p b_pᵀ`, computed with differences to the first particle.
     pub fn gradient_of(&self, a: &[DVec3; 8]) -> DMat3 {
         let terms = a.iter().zip(self.gradients_per_m).skip(1);
         terms.fold(DMat3::ZERO, |sum, (a_p, b)| sum + outer(*a_p - a[0], b))
     }
 
-    /// `q_k` (m).
+    /// Returns the hourglass amplitudes `q_k` (m).
     pub fn amplitudes(&self, a: &[DVec3; 8]) -> [DVec3; 4] {
         self.modes.map(|mode| mode.iter().zip(a).skip(1).map(|(g, a_p)| (*a_p - a[0]) * *g).sum())
     }
 
-    /// `U_c` (J).
+    /// Returns the elastic energy `U_c` (J).
     pub fn energy_j(&self, material: &Material, y: &[DVec3; 8]) -> f64 {
         let kappa = self.hourglass_m * material.lame.mu_pa;
         let modes = self.amplitudes(y).iter().zip(MODE_WEIGHTS).map(|(q, w)| w * q.length_squared()).sum::<f64>();
         self.volume_m3 * material.energy_density(&self.gradient_of(y)) + 0.5 * kappa * modes
     }
 
-    /// `f_p` (N) of elastic and viscous stress, and the power (W) that viscous stress takes.
+    /// Returns the forces `f_p` (N) of elastic and viscous stress, and the power (W) that viscous stress takes.
     pub fn forces_n(&self, material: &Material, y: &[DVec3; 8], rate: &[DVec3; 8]) -> ([DVec3; 8], f64) {
         let f = self.gradient_of(y);
         let mut stress = material.piola(&f);
@@ -89,13 +92,14 @@ impl RestCell {
         (self.corner_forces_n(material, &stress, &self.amplitudes(y)), power_w)
     }
 
-    /// `−K a` (N): the change of the elastic forces along `a`.
+    /// Returns `−K a` (N), the change of the elastic forces along `a`.
     pub fn products_n(&self, material: &Material, y: &[DVec3; 8], a: &[DVec3; 8]) -> [DVec3; 8] {
         let change = material.piola_differential(&self.gradient_of(y), &self.gradient_of(a));
         self.corner_forces_n(material, &change, &self.amplitudes(a))
     }
 
-    /// Diagonal blocks (N/m) of the stiffness at rest, `V ((λ + µ) b_p b_pᵀ + µ |b_p|² I) + κ Σ_k w_k γ_kp² I`.
+    /// Returns the diagonal blocks (N/m) of the stiffness at rest,
+    /// `V ((λ + µ) b_p b_pᵀ + µ |b_p|² I) + κ Σ_k w_k γ_kp² I`.
     pub fn diagonal_n_per_m(&self, material: &Material) -> [DMat3; 8] {
         let Lame { lambda_pa, mu_pa } = material.lame;
         std::array::from_fn(|p| {
@@ -118,14 +122,11 @@ impl RestCell {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::bodies::hybrid::{
-        moments::full_gradients_m2,
-        testing::{Random, tissue},
-    };
+    use crate::bodies::hybrid::testing::{Random, tissue};
 
     fn cell() -> RestCell {
         let h = 2.5e-3_f64;
-        RestCell::new(h, 1.0, &(h.powi(3), full_gradients_m2(h)))
+        RestCell::new(h, 1.0, &Moments::full(h))
     }
 
     #[test]

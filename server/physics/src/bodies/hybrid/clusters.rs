@@ -1,17 +1,19 @@
-//! Bounds of the skin's triangles that need none of their positions.
+//! Bounding boxes of the skin's triangles that are found without the positions of their vertices.
 //!
-//! A vertex of the skin moves by a mean of the displacements of what it follows, so a cluster's box is its box at rest, shifted and widened by the
-//! least and largest displacement of the coarse nodes it follows, and by how far any active particle is from where it would be asleep:
+//! A vertex of the skin moves by a mean of the displacements of what it follows, so a cluster's box is its box at rest,
+//! shifted and widened by the least and largest displacement of the coarse nodes it follows, and by how far any active
+//! particle is from where it would be asleep:
 //! ```text
-//! x = X + Σ_i w_i u_i + Σ_p w_p d_p,   Σ w_i = 1, Σ |w_i| ≤ a:   x − X ∈ ū ± (a ½(u_max − u_min) + a max |d_p|),   ū = ½(u_min + u_max)
+//! x = X + Σ_i w_i u_i + Σ_p w_p d_p,   Σ w_i = 1, Σ |w_i| ≤ a
+//! x − X ∈ ū ± (a ½(u_max − u_min) + a max |d_p|),   ū = ½(u_min + u_max)
 //! ```
-//! The last term is there where active particles carry vertices alone.
+//! The last term is left out where no active particle carries a vertex.
 use super::body::HybridBody;
 use crate::contact::broad::{CLUSTER, GROUP, box_distance_m};
 use glam::DVec3;
 use std::collections::BTreeSet;
 
-/// Boxes at rest of clusters, and of groups of them, with the coarse nodes that they follow.
+/// Boxes at rest of clusters of triangles and of groups of clusters, with the coarse nodes that they follow.
 #[derive(Debug, Clone, Default)]
 pub struct SkinClusters {
     clusters: Boxes,
@@ -24,16 +26,16 @@ pub struct SkinClusters {
 struct Boxes {
     low_m: Vec<DVec3>,
     high_m: Vec<DVec3>,
-    /// First entry of each in `nodes`, and the end of the last.
+    /// Index in `nodes` of the first entry of each box, and the end of the last.
     first: Vec<u32>,
     nodes: Vec<u32>,
-    /// The same of vertices; of clusters only.
+    /// Index in `vertices` of the first entry of each cluster, and the end of the last; empty for groups.
     first_vertex: Vec<u32>,
     vertices: Vec<u32>,
 }
 
 impl SkinClusters {
-    /// Of triangles in the order of the broad phase.
+    /// Computes the boxes of triangles, which are given in the order of the broad phase.
     pub(crate) fn new(hybrid: &HybridBody, rest_positions_m: &[DVec3], triangles: &[[u32; 3]]) -> Self {
         let boxes = |size: usize| {
             let mut boxes = Boxes { first: vec![0], first_vertex: vec![0], ..Boxes::default() };
@@ -47,9 +49,10 @@ impl SkinClusters {
         for (cluster, ends) in (0..).zip(clusters.first_vertex.windows(2)) {
             let mut of_cluster = BTreeSet::new();
             for &vertex in &clusters.vertices[ends[0] as usize..ends[1] as usize] {
-                let place = hybrid.place(vertex);
-                let particles = hybrid.partition().corners(place.cell as usize);
-                let weighty = particles.into_iter().zip(place.weights(hybrid.partition())).filter(|(_, w)| *w != 0.0);
+                let cell_point = hybrid.vertex_point(vertex);
+                let particles = hybrid.partition().corners(cell_point.cell as usize);
+                let weighty =
+                    particles.into_iter().zip(cell_point.weights(hybrid.partition())).filter(|(_, w)| *w != 0.0);
                 of_cluster.extend(weighty.map(|(particle, _)| [particle, cluster]));
             }
             carried.extend(of_cluster);
@@ -58,12 +61,12 @@ impl SkinClusters {
         Self { clusters, groups, carried }
     }
 
-    /// Number of clusters.
+    /// Returns the number of clusters.
     pub(super) fn clusters(&self) -> usize {
         self.clusters.low_m.len()
     }
 
-    /// The clusters some of whose vertices a particle carries.
+    /// Returns the clusters that have a vertex which a particle carries.
     pub(super) fn carried_by(&self, particle: u32) -> impl Iterator<Item = usize> + '_ {
         let first = self.carried.partition_point(|carried| carried[0] < particle);
         self.carried[first..]
@@ -72,28 +75,28 @@ impl SkinClusters {
             .map(|carried| carried[1] as usize)
     }
 
-    /// Number of groups.
+    /// Returns the number of groups.
     pub(super) fn groups(&self) -> usize {
         self.groups.low_m.len()
     }
 
-    /// The group of a cluster.
+    /// Returns the group that a cluster belongs to.
     pub(super) fn group_of(cluster: usize) -> usize {
         cluster / (GROUP / CLUSTER)
     }
 
-    /// The vertices of a cluster.
+    /// Returns the vertices of a cluster.
     pub(super) fn vertices(&self, cluster: usize) -> &[u32] {
         let first = &self.clusters.first_vertex;
         &self.clusters.vertices[first[cluster] as usize..first[cluster + 1] as usize]
     }
 
-    /// Lower bound (m) of the distance of a cluster from a point, at `displacements_m` of the coarse nodes; see the module's documentation for the others.
+    /// Returns a lower bound (m) of the distance of a cluster from a point, by the module's formula.
     pub(super) fn cluster_distance_m(&self, cluster: usize, from_m: DVec3, bounds: &Displaced<'_>) -> f64 {
         self.clusters.distance_m(cluster, from_m, bounds)
     }
 
-    /// The same of a group.
+    /// Does the same for a group.
     pub(super) fn group_distance_m(&self, group: usize, from_m: DVec3, bounds: &Displaced<'_>) -> f64 {
         self.groups.distance_m(group, from_m, bounds)
     }
@@ -102,11 +105,11 @@ impl SkinClusters {
 /// What bounds how the skin moved.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Displaced<'a> {
-    /// Of the coarse nodes (m).
+    /// Displacements (m) of the coarse nodes.
     pub(super) displacements_m: &'a [DVec3],
-    /// `max |d_p|` (m), 0 of clusters whose vertices no active particle carries.
+    /// `max |d_p|` (m); 0 for clusters of which no active particle carries a vertex.
     pub(super) deviation_m: f64,
-    /// `a`.
+    /// `a`, the bound of `Σ |w_i|`.
     pub(super) amplification: f64,
 }
 
@@ -121,7 +124,7 @@ impl Boxes {
             if triangles.len() <= CLUSTER && !self.vertices[first_vertex..].contains(&vertex) {
                 self.vertices.push(vertex);
             }
-            for particle in partition.corners(hybrid.place(vertex).cell as usize) {
+            for particle in partition.corners(hybrid.vertex_point(vertex).cell as usize) {
                 for node in partition.anchor(particle).nodes {
                     if !self.nodes[start..].contains(&node) {
                         self.nodes.push(node);

@@ -1,54 +1,57 @@
-//! The coarse level's functions: on every tetrahedron ten nodes, four at corners and six at the middles of edges, and functions that are
-//! linear on each of its eight parts (the four corner tets, and the octahedron between them cut in four along its shortest diagonal).
+//! The shape functions of the coarse level. Every tetrahedron has ten nodes, four at its corners and six at the middles
+//! of its edges; the functions are linear on each of its eight parts (the four corner tets, and the octahedron between
+//! them cut in four along its shortest diagonal).
 //!
-//! They are never negative and reproduce affine functions, so a particle that follows the coarse nodes by them, `y_p = Σ_i ζ_pi x_i`, moves rigidly where they do,
-//! and its mass, spread by the same weights, is positive. A particle has at most four weights. (Composite tetrahedra: Thoutireddy et
-//! al. 2002. Quadratic functions on the same nodes are negative in places: mass spread by them would be, too.)
+//! They are never negative and reproduce affine functions, so a particle that follows the coarse nodes by them,
+//! `y_p = Σ_i ζ_pi x_i`, moves rigidly where they do, and its mass, spread by the same weights, is positive. A particle
+//! has at most four weights. (Composite tetrahedra: Thoutireddy et al. 2002. Quadratic functions on the same nodes are
+//! negative in places: mass spread by them would be, too.)
 use super::locate::Locator;
 use crate::mesh::{TetMesh, tet::EDGES};
 use glam::DVec3;
 use std::collections::BTreeMap;
 
-/// Nodes of a composite tetrahedron.
+/// Number of nodes of a composite tetrahedron.
 pub const NODES: usize = 10;
-/// Parts over which its strain is averaged: the corner tets and the octahedron.
+/// Number of parts over which its strain is averaged: the corner tets and the octahedron.
 pub const PARTS: usize = 5;
-/// Number of the octahedron among them.
+/// Number of the octahedron among the parts.
 const MIDDLE: u8 = 4;
 
 /// Number, within a tet, of the node on the edge between two corners.
 const NODE_OF_EDGE: [[usize; 4]; 4] = [[0, 4, 5, 6], [4, 1, 7, 8], [5, 7, 2, 9], [6, 8, 9, 3]];
 
-/// The functions over a tetrahedral mesh.
+/// The shape functions over a tetrahedral mesh.
 #[derive(Debug, Clone)]
 pub struct Composite {
     positions_m: Vec<DVec3>,
     tets: Vec<[u32; NODES]>,
-    /// The corner at the end of the shortest diagonal's first edge, beside corner 0.
+    /// Of each tet, the corner that, with corner 0, has the edge from whose middle the octahedron's shortest diagonal
+    /// starts.
     diagonal: Vec<u8>,
     locator: Locator,
 }
 
-/// What a point follows.
+/// The coarse nodes that a point follows, with their weights.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Anchor {
     /// Coarse nodes.
     pub nodes: [u32; 4],
-    /// ζ of each; they sum to one. Negative only outside the coarse tets.
+    /// Weights ζ of the nodes; they sum to one, and are negative only outside the coarse tets.
     pub weights: [f64; 4],
-    /// The tet.
+    /// The tet that they belong to.
     pub tet: u32,
-    /// The part of it.
+    /// The part of the tet.
     pub part: u8,
 }
 
 impl Anchor {
-    /// `Σ ζ_i a_i`.
+    /// Returns `Σ ζ_i a_i`.
     pub fn of(&self, a: &[DVec3]) -> DVec3 {
         self.nodes.iter().zip(self.weights).map(|(&node, weight)| a[node as usize] * weight).sum()
     }
 
-    /// Hands a force (N) back to the nodes.
+    /// Adds a force (N) on the point to those of its nodes: `f_i ← f_i + ζ_i f`.
     pub fn push(&self, force_n: DVec3, forces_n: &mut [DVec3]) {
         for (&node, weight) in self.nodes.iter().zip(self.weights) {
             forces_n[node as usize] += force_n * weight;
@@ -57,7 +60,7 @@ impl Anchor {
 }
 
 impl Composite {
-    /// Over a mesh: its nodes first, in their order, then one for every edge.
+    /// Makes the functions over a mesh. The mesh's nodes come first, in their order, then one for every edge.
     pub fn new(mesh: &TetMesh) -> Self {
         let mut positions_m = mesh.positions_m().to_vec();
         let mut of_edge: BTreeMap<[u32; 2], u32> = BTreeMap::new();
@@ -84,23 +87,23 @@ impl Composite {
         Self { positions_m, tets, diagonal, locator: Locator::new(mesh) }
     }
 
-    /// Rest positions (m) of all coarse nodes.
+    /// Returns the rest positions (m) of all coarse nodes.
     pub fn positions_m(&self) -> &[DVec3] {
         &self.positions_m
     }
 
-    /// Nodes of every tet: corners, then the edges in the order of [`EDGES`].
+    /// Returns the nodes of every tet: those of its corners, then those of its edges in the order of [`EDGES`].
     pub fn tets(&self) -> &[[u32; NODES]] {
         &self.tets
     }
 
-    /// What a point follows: the tet that holds it, or the one least far away.
+    /// Returns what a point follows: nodes of the tet that holds it, or of the one that is least far away.
     pub fn anchor(&self, point_m: DVec3) -> Anchor {
         let (tet, barycentric) = self.locator.nearest(point_m);
         self.anchor_at(tet, barycentric)
     }
 
-    /// The same for a point whose tet is known.
+    /// Does the same for a point whose tet is known.
     pub fn anchor_in(&self, tet: u32, point_m: DVec3) -> Anchor {
         self.anchor_at(tet as usize, self.locator.barycentric(tet as usize, point_m))
     }
@@ -112,7 +115,7 @@ impl Composite {
     }
 }
 
-/// The two corners besides 0 and `mate`.
+/// Returns the two corners besides 0 and `mate`.
 fn others(mate: usize) -> [usize; 2] {
     match mate {
         1 => [2, 3],
@@ -121,12 +124,12 @@ fn others(mate: usize) -> [usize; 2] {
     }
 }
 
-/// Nodes (numbered within the tet), weights and part for barycentric coordinates; the octahedron's diagonal joins the middle of edge
-/// `(0, mate)` with that of the edge opposite.
+/// Returns nodes (numbered within the tet), weights and part for barycentric coordinates. The octahedron's diagonal
+/// joins the middle of edge `(0, mate)` with that of the edge opposite.
 ///
-/// Corner tet `a` where `L_a ≥ ½`: `2L_a − 1` at the corner, `2L_b` at the middle of `(a, b)`. In the octahedron let `(s, t)` be the
-/// diagonal's edge with the larger `|L_s − L_t|`, `L_s ≥ L_t`, and `(u, v)` the other: `2L_t` at `(s, t)`, `1 − 2L_s` at `(u, v)`,
-/// `2L_u + 2L_s − 1` at `(s, u)`, `2L_v + 2L_s − 1` at `(s, v)`.
+/// Corner tet `a` where `L_a ≥ ½`: `2L_a − 1` at the corner, `2L_b` at the middle of `(a, b)`. In the octahedron let
+/// `(s, t)` be the diagonal's edge with the larger `|L_s − L_t|`, `L_s ≥ L_t`, and `(u, v)` the other: `2L_t` at
+/// `(s, t)`, `1 − 2L_s` at `(u, v)`, `2L_u + 2L_s − 1` at `(s, u)`, `2L_v + 2L_s − 1` at `(s, v)`.
 fn weights(l: [f64; 4], mate: usize) -> ([usize; 4], [f64; 4], u8) {
     if let Some(a) = (0..4).find(|&a| l[a] >= 0.5) {
         let mut nodes = [0, 1, 2, 3].map(|b| NODE_OF_EDGE[a][b]);

@@ -1,8 +1,8 @@
-//! The points of a patch that follow coarse nodes, in groups that follow the same.
+//! The points of a patch that follow coarse nodes, in groups of those that follow the same nodes.
 use super::composite::Anchor;
 use glam::DVec3;
 
-/// Points of the border, sorted by the nodes that they follow, so that those are read and written once for a group.
+/// Constrained points, sorted by the nodes that they follow, so that the nodes are read and written once per group.
 #[derive(Debug, Clone)]
 pub(super) struct ConstrainedPoints {
     followers: Vec<Follower>,
@@ -20,14 +20,14 @@ impl ConstrainedPoints {
         Self { followers: Vec::with_capacity(points) }
     }
 
-    /// Takes these points, with what they follow, and no others. Allocates nothing as long as there is room.
+    /// Replaces the points by these, each with what it follows. Allocates nothing as long as there is room.
     pub(super) fn take(&mut self, points: impl Iterator<Item = (u32, Anchor)>) {
         self.followers.clear();
         self.followers.extend(points.map(|(point, Anchor { nodes, weights, .. })| Follower { point, nodes, weights }));
         self.followers.sort_unstable_by_key(|follower| (follower.nodes, follower.point));
     }
 
-    /// `u_p = Σ ζ_pi u_i`, from the nodes `u_i` to the points.
+    /// Writes `u_p = Σ ζ_pi u_i` of every point, from the values `u_i` of the nodes.
     pub(super) fn follow(&self, of_nodes: &[DVec3], of_points: &mut [DVec3]) {
         for group in self.groups() {
             let [a, b, c, d] = group[0].nodes.map(|node| of_nodes[node as usize]);
@@ -37,7 +37,7 @@ impl ConstrainedPoints {
         }
     }
 
-    /// The transpose: `f_i ← f_i + Σ_p ζ_pi f_p`.
+    /// Adds the points' forces (N) to those of the nodes by the transpose: `f_i ← f_i + Σ_p ζ_pi f_p`.
     pub(super) fn push(&self, on_points_n: &[DVec3], on_nodes_n: &mut [DVec3]) {
         for group in self.groups() {
             let mut sums = [DVec3::ZERO; 4];

@@ -1,8 +1,9 @@
 //! Coarse tets that hold every particle: their boundary is moved outwards until they do.
 //!
-//! Coarse tets cut the corners of a curved body, and the lattice reaches past its surface by up to a cell. A particle outside all tets would have a
-//! negative weight: it would still follow affine motion, but could not be woken (`metric`). The tets carry no geometry (`partition`), so nothing is
-//! lost by making them larger. Nodes that are held stay where they are.
+//! Coarse tets cut the corners of a curved body, and the lattice reaches past its surface by up to a cell. A particle
+//! outside all tets would have a negative weight: it would still follow affine motion, but could not be woken
+//! (`metric`). The tets carry no geometry (`partition`), so nothing is lost by making them larger. Nodes that are held
+//! stay where they are.
 use super::locate::Locator;
 use crate::{
     contact::closest_weights,
@@ -11,31 +12,32 @@ use crate::{
 use glam::DVec3;
 use std::collections::BTreeSet;
 
-/// Rounds of moving nodes.
+/// Most rounds of moving nodes.
 const ROUNDS: usize = 12;
-/// A point that lies outside by less than this part of an edge is inside.
+/// A point that lies outside by less than this fraction of an edge counts as inside.
 const ROUNDING: f64 = 1e-9;
-/// A node moves along its normal by what its faces need, over how far they face away from it, at least this.
+/// A node moves along its normal by what its faces need, divided by the cosine between their normals and its own, which
+/// counts as this at least.
 const LEAST_COSINE: f64 = 0.3;
-/// A face moves for a point where its free nodes carry more than this of it.
-const LEAST_SHARE: f64 = 0.3;
-/// What is moved is moved by so much too far, that rounds end.
+/// A face is moved for a point only where the weights of its free nodes sum to more than this at the point.
+const LEAST_FREE_PART: f64 = 0.3;
+/// Nodes are moved by this times what is needed, so that the rounds end.
 const SURPLUS: f64 = 1.05;
-/// No tet may lose more than this part of its volume in a round.
+/// No tet may lose more than this fraction of its volume in a round.
 const MOST_LOST: f64 = 0.5;
 
-/// A covering mesh.
+/// A mesh that holds the particles.
 #[derive(Debug, Clone, PartialEq)]
 pub struct EmbeddingMesh {
     /// The mesh, with the same tets.
     pub mesh: TetMesh,
-    /// How far its boundary was moved at most (m).
+    /// Largest displacement (m) of a node of its boundary.
     pub moved_m: f64,
-    /// Points that are still outside.
+    /// Number of points that are still outside.
     pub outside: usize,
 }
 
-/// Moves the boundary outwards, but for `held` nodes, until the tets hold the points or nothing moves any more.
+/// Moves the boundary outwards, but for `held` nodes, until the tets hold the points or no node can be moved further.
 pub fn cover(mesh: &TetMesh, surface: &Surface, held: &BTreeSet<u32>, points_m: &[DVec3]) -> EmbeddingMesh {
     let mut covering = mesh.clone();
     let mut waiting: Vec<DVec3> = points_m.to_vec();
@@ -57,7 +59,8 @@ pub fn cover(mesh: &TetMesh, surface: &Surface, held: &BTreeSet<u32>, points_m: 
     EmbeddingMesh { mesh: covering, moved_m, outside: waiting.len() }
 }
 
-/// How far (m) each node's faces would have to move, from the points outside; the points inside are taken off the list.
+/// Returns how far (m) each node's faces would have to move to hold the points outside, and takes the points inside off
+/// the list.
 fn needs(mesh: &TetMesh, surface: &Surface, held: &BTreeSet<u32>, waiting: &mut Vec<DVec3>) -> Vec<f64> {
     let locator = Locator::new(mesh);
     let mut needs = vec![0.0_f64; mesh.positions_m().len()];
@@ -70,10 +73,10 @@ fn needs(mesh: &TetMesh, surface: &Surface, held: &BTreeSet<u32>, waiting: &mut 
         let nodes = surface.triangle_nodes(near.triangle);
         // Beside held nodes the face hardly moves with its free ones: such a point stays outside.
         let moves = |(node, weight): (&u32, f64)| if held.contains(node) { 0.0 } else { weight };
-        let share: f64 = nodes.iter().zip(near.weights).map(moves).sum();
-        if share > LEAST_SHARE {
+        let free_part: f64 = nodes.iter().zip(near.weights).map(moves).sum();
+        if free_part > LEAST_FREE_PART {
             for node in nodes {
-                needs[node as usize] = needs[node as usize].max(near.above_m / share);
+                needs[node as usize] = needs[node as usize].max(near.above_m / free_part);
             }
         }
         true
@@ -82,17 +85,18 @@ fn needs(mesh: &TetMesh, surface: &Surface, held: &BTreeSet<u32>, waiting: &mut 
 }
 
 /// A boundary triangle near a point outside.
-struct Near {
+struct NearFace {
     triangle: usize,
-    /// Of its corners, at its point nearest to that one.
+    /// Weights of its corners at its point that is nearest to the point outside.
     weights: [f64; 3],
-    /// How far (m) that one is above its plane.
+    /// Height (m) of the point outside above the triangle's plane.
     above_m: f64,
 }
 
-/// The nearest of all; of several as near, the one with the point highest above it.
-fn nearest_face(mesh: &TetMesh, surface: &Surface, point_m: DVec3) -> Near {
-    let (mut best, mut nearest_m) = (Near { triangle: 0, weights: [0.0; 3], above_m: 0.0 }, f64::INFINITY);
+/// Returns the boundary triangle nearest to a point; of several that are as near, the one that the point is highest
+/// above.
+fn nearest_face(mesh: &TetMesh, surface: &Surface, point_m: DVec3) -> NearFace {
+    let (mut best, mut nearest_m) = (NearFace { triangle: 0, weights: [0.0; 3], above_m: 0.0 }, f64::INFINITY);
     for triangle in 0..surface.triangles.len() {
         let corners = surface.triangle_nodes(triangle).map(|n| mesh.positions_m()[n as usize]);
         let weights = closest_weights(point_m, corners);
@@ -102,13 +106,13 @@ fn nearest_face(mesh: &TetMesh, surface: &Surface, point_m: DVec3) -> Near {
         let above_m = (point_m - corners[0]).dot(normal);
         let tie = (distance_m - nearest_m).abs() <= ROUNDING * nearest_m;
         if if tie { above_m > best.above_m } else { distance_m < nearest_m } {
-            (best, nearest_m) = (Near { triangle, weights, above_m }, distance_m);
+            (best, nearest_m) = (NearFace { triangle, weights, above_m }, distance_m);
         }
     }
     best
 }
 
-/// Displacements (m) that meet the needs.
+/// Returns displacements (m) of the nodes that meet the needs.
 fn moves(mesh: &TetMesh, surface: &Surface, held: &BTreeSet<u32>, needs: &[f64]) -> Vec<DVec3> {
     let normal_of = |triangle: usize| {
         let [a, b, c] = surface.triangle_nodes(triangle).map(|n| mesh.positions_m()[n as usize]);
@@ -134,7 +138,8 @@ fn moves(mesh: &TetMesh, surface: &Surface, held: &BTreeSet<u32>, needs: &[f64])
     (0..needs.len()).map(displacement).collect()
 }
 
-/// The mesh with its nodes moved, by less where a tet would lose too much; `None` when nothing can be moved.
+/// Returns the mesh with its nodes moved, all by less where a tet would lose too much volume; `None` when they cannot
+/// be moved.
 fn moved(mesh: &TetMesh, moves: &[DVec3]) -> Option<TetMesh> {
     let mut scale = 1.0;
     for _ in 0..6 {
@@ -163,7 +168,7 @@ mod tests {
     };
     use glam::BVec3;
 
-    /// Twenty tets within a ball, of which they hold three fifths.
+    /// Twenty tets inside a ball hold three fifths of it at first.
     #[test]
     fn tets_inside_a_ball_are_made_to_hold_its_particles() {
         let skin = ball(0.01, DVec3::ZERO, 3);
@@ -177,10 +182,10 @@ mod tests {
         let moments = integrate(&skin, &sites, &mut |_| {});
         let points: Vec<DVec3> =
             moments.iter().flat_map(|m| sites.corners(m.cell)).map(|site| sites.site_m(site)).collect();
-        let cage = cover(&mesh, &Surface::of(&mesh).unwrap(), &BTreeSet::new(), &points);
-        assert_eq!(cage.outside, 0);
-        assert!(cage.moved_m < 8e-3, "{}", cage.moved_m);
-        let partition = Partition::new(sites, Composite::new(&cage.mesh), &moments);
+        let embedding = cover(&mesh, &Surface::of(&mesh).unwrap(), &BTreeSet::new(), &points);
+        assert_eq!(embedding.outside, 0);
+        assert!(embedding.moved_m < 8e-3, "{}", embedding.moved_m);
+        let partition = Partition::new(sites, Composite::new(&embedding.mesh), &moments);
         let all: BTreeSet<u32> = (0..partition.particle_count() as u32).collect();
         assert!(all.iter().all(|&p| partition.anchor(p).weights.iter().all(|&w| w > -1e-8)));
         let masses = Masses::new(&partition, |_| 1000.0);
@@ -193,9 +198,9 @@ mod tests {
         let mesh = tet_box(DVec3::ZERO, DVec3::splat(0.02), [2, 2, 2]);
         let floor = (0..27).filter(|&n| mesh.positions_m()[n as usize].z < 1e-9).collect();
         let points = [DVec3::new(0.01, 0.01, 0.021), DVec3::new(0.021, 0.01, 0.01), DVec3::new(0.01, 0.01, -0.001)];
-        let cage = cover(&mesh, &Surface::of(&mesh).unwrap(), &floor, &points);
-        assert_eq!(cage.outside, 1);
-        for (node, (now, before)) in cage.mesh.positions_m().iter().zip(mesh.positions_m()).enumerate() {
+        let embedding = cover(&mesh, &Surface::of(&mesh).unwrap(), &floor, &points);
+        assert_eq!(embedding.outside, 1);
+        for (node, (now, before)) in embedding.mesh.positions_m().iter().zip(mesh.positions_m()).enumerate() {
             assert!(!floor.contains(&(node as u32)) || now == before);
         }
     }

@@ -1,4 +1,4 @@
-//! What a hybrid body holds: by the oracle, for a look now and then.
+//! Energies and momenta of a hybrid body, by the oracle: for diagnostics, not for every substep.
 use super::{
     body::HybridBody,
     metric::Metric,
@@ -12,7 +12,7 @@ use std::collections::BTreeSet;
 impl HybridBody {
     fn patch_of(&self, own: &HybridState) -> (Patch, BTreeSet<u32>) {
         let active: BTreeSet<u32> = own.ids().iter().copied().collect();
-        (Patch::new(&self.partition, &active).with_fading(own.fading().clone()), active)
+        (Patch::new(&self.partition, &active).with_prestrain(own.prestrain().clone()), active)
     }
 
     fn field(&self, list: &[DVec3]) -> Field {
@@ -20,7 +20,7 @@ impl HybridBody {
         Field { nodes: nodes.to_vec(), particles: particles.to_vec() }
     }
 
-    /// Kinetic, elastic and gravitational energy, beside the ledger's work and dissipation.
+    /// Returns kinetic, elastic and gravitational energy, beside the ledger's work and dissipation.
     pub(crate) fn energies(&self, gravity_m_per_s2: DVec3, own: &HybridState, state: &MechanicalState) -> Energies {
         let (patch, active) = self.patch_of(own);
         let (at, rate) = (self.field(&state.x), self.field(&state.v));
@@ -45,12 +45,12 @@ impl HybridBody {
         }
     }
 
-    /// Smallest `det F` of coarse tets' means and awake cells, and its tet.
+    /// Returns the smallest `det F` of coarse tets' means and awake cells, and the tet where it is.
     pub(crate) fn min_volume_ratio(&self, own: &HybridState, x: &[DVec3]) -> (f64, usize) {
         self.patch_of(own).0.min_volume_ratio(&self.field(x))
     }
 
-    /// Momentum (kg m/s) and angular momentum about the origin (kg m²/s).
+    /// Returns momentum (kg m/s) and angular momentum about the origin (kg m²/s).
     pub fn momentum(&self, own: &HybridState, state: &MechanicalState) -> (DVec3, DVec3) {
         let active = self.patch_of(own).1;
         let (at, rate) = (self.field(&state.x), self.field(&state.v));

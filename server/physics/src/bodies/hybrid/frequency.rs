@@ -1,7 +1,8 @@
-//! The largest natural frequency that a hybrid body can have, whichever particles are awake: that of all of them, over √(1 − ε).
+//! The largest natural frequency that a hybrid body can have, whichever particles are awake: that of all of them, over
+//! √(1 − ε).
 //!
-//! With no negative weight, a set of active particles has `U ≤ U_all` and `K ≥ (1 − ε) K_all` for the field it describes (Jensen, twice;
-//! `docs/adr/hybrid.md`).
+//! With no negative weight, a set of active particles has `U ≤ U_all` and `K ≥ (1 − ε) K_all` for the field it
+//! describes (Jensen, twice; `docs/adr/hybrid.md`).
 use super::{
     body::HybridBody,
     cell::{HOURGLASS, MODE_WEIGHTS},
@@ -16,19 +17,24 @@ use crate::{
 };
 use glam::{BVec3, DMat3, DVec3};
 
-/// Lanczos' residual over the eigenvalue, of bodies of up to so many cells and of larger ones.
+/// Bound of Lanczos' residual over the eigenvalue: `FINE` for bodies of up to `MANY_CELLS` cells, `ROUGH` for larger
+/// ones.
 const FINE: f64 = 1e-4;
 const MANY_CELLS: usize = 200_000;
 const ROUGH: f64 = 1e-2;
 
 impl HybridBody {
-    /// Largest natural frequency (rad/s) at rest, on springs (N/m, in all directions; one per particle, or none).
+    /// Returns the largest natural frequency (rad/s) at rest, on springs (N/m, in all directions; one per particle, or
+    /// none).
     ///
-    /// Lanczos' estimate with its residual, and no more than the bound of single cells, each with its share `ρV_cp`, an eighth a corner, of its particles' masses (by Rayleigh's
-    /// quotient no assembly is faster than the fastest cell): `ω_c² ≤ V_c/ρ ((3λ⁺ + 2µ) λ_max(Σ_p b_p b_pᵀ/V_cp) + κ/V_c Σ_p w_k γ_kp²/V_cp)`. Of full cells
-    /// that is `4 (3λ + 2µ)/(ρh²)`: all swell at once. Neighbours hinder each other, so that a lattice has some two thirds of it.
+    /// It is Lanczos' estimate plus its residual, and no more than the bound of single cells, each with its part
+    /// `ρV_cp` (an eighth per corner) of its particles' masses. By Rayleigh's quotient no assembly is faster than the
+    /// fastest cell: `ω_c² ≤ V_c/ρ ((3λ⁺ + 2µ) λ_max(Σ_p b_p b_pᵀ/V_cp) + κ/V_c Σ_p w_k γ_kp²/V_cp)`. For full cells
+    /// that is `4 (3λ + 2µ)/(ρh²)`, of cells that swell. Neighbours hinder each other, so that a lattice has some two
+    /// thirds of it.
     ///
-    /// Of very many cells the estimate is rougher, and as safe: its residual, which is added, may be a hundredth. `progress` is told the part done.
+    /// For very many cells the estimate is rougher, and as safe: its residual, which is added, may be a hundredth of
+    /// it. `progress` is told the fraction done.
     pub fn frequency_rad_per_s(&self, springs_n_per_m: &[f64], progress: &mut dyn FnMut(f64)) -> f64 {
         let tolerance = if self.partition.cells().len() > MANY_CELLS { ROUGH } else { FINE };
         self.frequency_to(tolerance, springs_n_per_m, progress)
@@ -45,7 +51,7 @@ impl HybridBody {
         ((theta + residual).min(bound_sq) / (1.0 - KEPT)).sqrt()
     }
 
-    /// The same of the coarse level alone, while all particles sleep.
+    /// Returns the largest natural frequency (rad/s) of the coarse level alone, while all particles sleep.
     pub fn coarse_frequency_rad_per_s(&self) -> f64 {
         let root = |(mass, free): (&f64, &BVec3)| {
             DVec3::select(*free, DVec3::splat(mass.max(f64::MIN_POSITIVE).sqrt().recip()), DVec3::ZERO)
@@ -54,8 +60,8 @@ impl HybridBody {
         let at_rest_m = self.partition.coarse().positions_m();
         let mut apply = |a: &[DVec3], out: &mut [DVec3]| {
             out.fill(DVec3::ZERO);
-            for (tet, share) in self.partition.shares().iter().enumerate() {
-                share.add_products_n(self.material_of_tet(tet as u32), at_rest_m, a, out);
+            for (tet, residual) in self.partition.residual_elements().iter().enumerate() {
+                residual.add_products_n(self.material_of_tet(tet as u32), at_rest_m, a, out);
             }
             for product in out {
                 *product = -*product;
@@ -65,7 +71,7 @@ impl HybridBody {
         (theta + residual).sqrt()
     }
 
-    /// `out ← K a` with all particles awake.
+    /// Writes `out ← K a` with all particles awake.
     fn apply(&self, springs_n_per_m: &[f64], a: &[DVec3], out: &mut [DVec3]) {
         out.fill(DVec3::ZERO);
         for number in 0..self.partition.cells().len() {
@@ -108,16 +114,18 @@ impl HybridBody {
     }
 }
 
-/// `σ` (Pa) of the gradient of a small displacement.
+/// Returns the stress `σ` (Pa) of the gradient of a small displacement.
 fn stress_pa(material: &Material, g: &DMat3) -> DMat3 {
     let Lame { lambda_pa, mu_pa } = material.lame;
     (*g + g.transpose()) * mu_pa + DMat3::from_diagonal(DVec3::splat(lambda_pa * trace(g)))
 }
 
-/// `out ← out + K_c a` of a cell that the surface does not cut, as of `cell`'s but with an eighth of its multiplications.
+/// Adds `K_c a` of a cell that the surface does not cut to `out`: the same as `cell`'s, with an eighth of its
+/// multiplications.
 ///
-/// Its gradient's rows and its hourglass amplitudes are sums of the corners' values with the signs of `ξ, η, ζ, ηζ, ζξ, ξη, ξηζ`: all come from three rounds of sums and differences
-/// of pairs, `t`, and go back the same way.
+/// Its gradient's rows and its hourglass amplitudes are sums of the corners' values with the signs of
+/// `ξ, η, ζ, ηζ, ζξ, ξη, ξηζ`: all come from three rounds of sums and differences of pairs, `t`, and go back the same
+/// way.
 /// ```text
 /// G e_j = t_j/4h,   q_k = t_k/8,   K a = Hᵀ (V/4h σ e_j, κ/8 w_k q_k)
 /// ```
@@ -156,7 +164,7 @@ mod tests {
     use crate::{
         bodies::hybrid::{
             cell::RestCell,
-            moments::full_gradients_m2,
+            moments::Moments,
             prestrain::PrestrainDecay,
             running::RunningPatch,
             testing::{Random, hybrid_ball, hybrid_ball_of, tissue},
@@ -164,7 +172,8 @@ mod tests {
         settings::Precision,
     };
 
-    /// The largest frequency (rad/s) of what is left to the coarse level, with the mass matrix of these active particles: powers of `M'⁻¹ K_c`.
+    /// Returns the largest frequency (rad/s) of what is left to the coarse level, with the mass matrix of these active
+    /// particles, by powers of `M'⁻¹ K_c`.
     fn left_rad_per_s(hybrid: &HybridBody, active: &[u32]) -> f64 {
         let mut running = RunningPatch::new(hybrid, active.len(), Precision::Double);
         running.wake(hybrid, active, &PrestrainDecay::default());
@@ -173,9 +182,9 @@ mod tests {
         let mut found = 0.0;
         for _ in 0..600 {
             let mut products = vec![DVec3::ZERO; a.len()];
-            for tet in 0..hybrid.partition.shares().len() as u32 {
-                let (share, material) = (running.share(tet), hybrid.material_of_tet(tet));
-                share.add_products_n(material, hybrid.partition.coarse().positions_m(), &a, &mut products);
+            for tet in 0..hybrid.partition.residual_elements().len() as u32 {
+                let (residual, material) = (running.residual_element(tet), hybrid.material_of_tet(tet));
+                residual.add_products_n(material, hybrid.partition.coarse().positions_m(), &a, &mut products);
             }
             let before: f64 = a.iter().map(|a| a.length_squared()).sum();
             running.metric_mut().accelerate(&mut products);
@@ -205,7 +214,7 @@ mod tests {
         }
     }
 
-    /// Rough: never less, and at most half of its residual more.
+    /// A rough estimate is never below the fine one, and above it by half of its residual at most.
     #[test]
     fn a_rough_estimate_is_as_safe_and_little_more() {
         for spacing_m in [1.1e-3, 0.5e-3] {
@@ -225,7 +234,7 @@ mod tests {
     #[test]
     fn products_of_full_cells_are_those_of_any_cell() {
         let (spacing_m, mut random) = (1.1e-3, Random(9));
-        let rest = RestCell::new(spacing_m, 1.0, &(spacing_m.powi(3), full_gradients_m2(spacing_m)));
+        let rest = RestCell::new(spacing_m, 1.0, &Moments::full(spacing_m));
         for material in tissue() {
             let a: [DVec3; 8] = std::array::from_fn(|_| random.vector());
             let sigma = stress_pa(&material, &rest.gradient_of(&a));

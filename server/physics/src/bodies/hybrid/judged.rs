@@ -1,4 +1,5 @@
-//! What the step of a hybrid body is judged by: norms in the metric of what is awake, and its long steps.
+//! How the length of a hybrid body's step is judged: by norms in the mass matrix of what is awake, and by its long
+//! steps.
 use super::{HybridScratch, SteppedHybrid};
 use crate::tick::{Environment, Judged, MechanicalState, StepEvidence, StepForcesNow};
 use glam::DVec3;
@@ -75,6 +76,6 @@ impl Judged for SteppedHybrid<'_> {
     }
 
     fn accept(&mut self) {
-        self.scratch.hand_on_long_step(self.own);
+        self.scratch.pass_on_long_step(self.own);
     }
 }

@@ -1,5 +1,5 @@
 //! What a hybrid body is as a kind of body.
-use super::{HybridBody, HybridState, place::Place};
+use super::{HybridBody, HybridState, trilinear_point::TrilinearPoint};
 use crate::{
     elements::linear_tet::VolumeRatio,
     hash::{Chain, Fnv},
@@ -57,7 +57,7 @@ impl BodyKind for HybridBody {
     }
 
     fn particles_that_never_wake(&self) -> usize {
-        self.cage().outside
+        self.embedding().outside
     }
 
     fn most_positions(&self) -> usize {
@@ -84,8 +84,8 @@ impl BodyKind for HybridBody {
             };
             x - partition.particle_m(particle)
         };
-        let place = Place::new(partition, point.rest_m);
-        place.particles.into_iter().zip(place.weights).map(|(particle, w)| moved(particle) * w).sum()
+        let at = TrilinearPoint::new(partition, point.rest_m);
+        at.particles.into_iter().zip(at.weights).map(|(particle, w)| moved(particle) * w).sum()
     }
 
     /// Over the coarse tets' means and the awake cells.

@@ -1,10 +1,10 @@
-//! Which tet of a mesh holds a point.
+//! Finds the tet of a mesh that holds a point.
 use crate::mesh::TetMesh;
 use glam::{DMat3, DVec3};
 
-/// A point so far (m) within a tet is in no other, whatever is rounded.
+/// A point that is farther than this (m) within a tet is in no other one, however the distances are rounded.
 const SURELY_INSIDE_M: f64 = 1e-12;
-/// Most boxes along an axis.
+/// Largest number of boxes along an axis.
 const MOST_BOXES: usize = 64;
 
 /// The tets of a mesh at rest, sorted into boxes.
@@ -14,17 +14,17 @@ pub(super) struct Locator {
     low_m: DVec3,
     box_m: DVec3,
     boxes: [usize; 3],
-    /// First entry of each box in `list`, and the end of the last.
+    /// Index in `list` of the first entry of each box, and the end of the last.
     first: Vec<u32>,
     list: Vec<u32>,
 }
 
-/// A tet by its barycentric coordinates: `L_1..3 = inverse (p − corner)`, `L_0 = 1 − Σ`.
+/// What gives barycentric coordinates in a tet: `L_1..3 = inverse (p − corner)`, `L_0 = 1 − Σ`.
 #[derive(Debug, Clone, Copy)]
 struct Frame {
     corner_m: DVec3,
     inverse: DMat3,
-    /// Height (m) of each corner over the face opposite.
+    /// Height (m) of each corner above the face opposite to it.
     heights_m: [f64; 4],
 }
 
@@ -34,7 +34,7 @@ impl Frame {
         [1.0 - l.x - l.y - l.z, l.x, l.y, l.z]
     }
 
-    /// Least distance (m) over its faces, positive inside.
+    /// Returns the least distance (m) of a point from the tet's faces, positive inside.
     fn inside_m(&self, barycentric: &[f64; 4]) -> f64 {
         barycentric.iter().zip(self.heights_m).map(|(l, height)| l * height).fold(f64::INFINITY, f64::min)
     }
@@ -83,17 +83,19 @@ impl Locator {
         locator
     }
 
-    /// Of a point in the frame of a tet.
+    /// Returns the barycentric coordinates of a point in a tet.
     pub(super) fn barycentric(&self, tet: usize, point_m: DVec3) -> [f64; 4] {
         self.tets[tet].barycentric(point_m)
     }
 
-    /// Least distance (m) of such a point over the faces of the tet, negative outside.
+    /// Returns the least distance (m) of a point, given by its barycentric coordinates, from the tet's faces, negative
+    /// outside.
     pub(super) fn inside_m(&self, tet: usize, barycentric: &[f64; 4]) -> f64 {
         self.tets[tet].inside_m(barycentric)
     }
 
-    /// The tet that holds a point, or the one it is least far outside of, and the point's barycentric coordinates there.
+    /// Returns the tet that holds a point, or the one that the point is least far outside of, and the point's
+    /// barycentric coordinates in it.
     pub(super) fn nearest(&self, point_m: DVec3) -> (usize, [f64; 4]) {
         let [x, y, z] = self.box_of(point_m);
         let at = (z * self.boxes[1] + y) * self.boxes[0] + x;

@@ -1,18 +1,21 @@
-//! The coarse level takes longer steps than what is awake.
+//! Long steps: the coarse level takes longer steps than the awake cells do.
 //!
-//! Its forces `f_c` are much of the work and change slowly beside those of awake cells and of contact, `f_a`. So they are evaluated every `k` substeps of
-//! length `h` only, and weigh `k` times then (Tuckerman, Berne & Martyna 1992):
+//! Its forces `f_c` are much of the work and change slowly beside those of awake cells and of contact, `f_a`. So they
+//! are evaluated only every `k` substeps of length `h`, and weigh `k` times then (Tuckerman, Berne & Martyna 1992):
 //! ```text
 //! v ← v + ½h M'⁻¹ (f_a + b + k (f_c − b))       at both ends of k substeps
 //! v ← v + h M'⁻¹ (f_a + b)                      between
 //! b ← b + (1 − e^{−T/τ}) (f_c − b)              after every tick
 //! ```
-//! While the steady part `b` does not change the step is symplectic, whatever `b` is. With `b = 0`, what balances at rest, `f_a = −f_c`, would push at one time and
-//! pull at another, and the body rest elsewhere, by some `(k h ω)²/24` of those forces (a dent by 4 % at two substeps, by 9 % at three). With `b = f_c` rest is rest, in
-//! every substep. Of a body that is held nowhere, `b` must have no torque as the body turns: it is taken from it at every evaluation (`transition_force`).
+//! While the steady part `b` does not change, the step is symplectic, whatever `b` is. With `b = 0`, forces that
+//! balance at rest, `f_a = −f_c`, would push at one time and pull at another, and the body would come to rest
+//! elsewhere, by some `(k h ω)²/24` of those forces (a dent by 4 % at two substeps, by 9 % at three). With `b = f_c` a
+//! body at rest stays at rest in every substep. Where a body is held nowhere, `b` must have no torque as the body
+//! turns: the torque is taken from it at every evaluation (`transition_force`).
 //!
-//! `k h` is stable for the coarse level alone, `h` for the whole. That does not prove both together to be (modes of the fine level with `ω k h` near `nπ` resonate with what they
-//! feel of the coarse one); `docs/adr/hybrid.md` has what was measured.
+//! `k h` is stable for the coarse level alone, `h` for the whole. That does not prove that both are stable together:
+//! modes of the fine level with `ω k h` near `nπ` resonate with what they feel of the coarse one. `docs/adr/hybrid.md`
+//! has what was measured.
 use super::kernels::Found;
 use super::{
     body::HybridBody, prestrain::Progress, scratch::HybridScratch, state::HybridState, transition_force::without_torque,
@@ -25,17 +28,17 @@ use crate::{
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
-/// How fast `b` follows (s).
+/// Time constant (s) with which `b` follows `f_c`.
 const TIME_CONSTANT_S: f64 = 0.02;
 
 /// Forces of the coarse level, one per coarse node; empty where it is evaluated in every substep.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub(crate) struct LongSteps {
-    /// `b` (N). Empty also until forces are evaluated next.
+    /// `b` (N). It is also empty after it was forgotten, until forces are evaluated next.
     steady_n: Vec<DVec3>,
     /// `f_c − b` (N) when it was evaluated last.
     beyond_n: Vec<DVec3>,
-    /// One tick before the state, of a body whose tick is one long step.
+    /// One tick before the state; known only for a body whose tick is one long step.
     before: Instant,
 }
 
@@ -48,7 +51,7 @@ impl LongSteps {
         }
     }
 
-    /// Adds the forces of the last evaluation, and the instant before.
+    /// Adds the forces of the last evaluation, and the instant before, to a hash.
     pub(super) fn chain(&self, chain: &mut Chain) {
         let Self { steady_n, beyond_n, before } = self;
         for list in [steady_n, beyond_n, &before.forces_n, &before.x] {
@@ -56,7 +59,7 @@ impl LongSteps {
         }
     }
 
-    /// The forces will be others, as particles wake or fall asleep.
+    /// Forgets all forces: as particles wake or fall asleep, they will be others.
     pub(crate) fn forget(&mut self) {
         self.steady_n.clear();
         self.beyond_n.clear();
@@ -69,7 +72,7 @@ impl LongSteps {
         self.before.copy_from(&other.before);
     }
 
-    /// Of so many coarse nodes, and finite.
+    /// Returns whether the lists have as many entries as there are coarse nodes and positions, and are finite.
     pub(super) fn fit(&self, nodes: usize, entries: usize) -> bool {
         let Self { steady_n, beyond_n, before } = self;
         let lists = [(steady_n, nodes), (beyond_n, nodes), (&before.forces_n, nodes), (&before.x, entries)];
@@ -81,14 +84,14 @@ impl LongSteps {
             && before.x.is_empty() == before.forces_n.is_empty()
     }
 
-    /// `b` has no torque when the body, which is held nowhere, has moved to `x`, either.
+    /// Takes the torque at positions `x` (m) from `b` of a body that is held nowhere.
     pub(crate) fn turn_with(&mut self, body: &HybridBody, x: &[DVec3]) {
         if body.is_free {
             without_torque(body, x, &mut self.steady_n);
         }
     }
 
-    /// Takes what `add_forces_n` adds for `f_c`; returns what that returns.
+    /// Evaluates `f_c`, which `add_forces_n` adds to zeros; returns what that returns.
     pub(crate) fn evaluate(&mut self, nodes: usize, add_forces_n: impl FnOnce(&mut [DVec3]) -> Found) -> Found {
         self.beyond_n.clear();
         self.beyond_n.resize(nodes, DVec3::ZERO);
@@ -104,33 +107,34 @@ impl LongSteps {
         found
     }
 
-    /// `b`, which is nothing where there is none, and nothing on what follows, in place of the forces (N).
+    /// Overwrites the forces (N) with `b` on the coarse nodes and zero on the particles; with zero on all where there
+    /// is no `b`.
     pub(crate) fn start_with_steady_n(&self, forces_n: &mut [DVec3]) {
         let (of_nodes, others) = forces_n.split_at_mut(self.steady_n.len());
         of_nodes.copy_from_slice(&self.steady_n);
         others.fill(DVec3::ZERO);
     }
 
-    /// Adds `factor (f_c − b)`.
+    /// Adds `factor (f_c − b)` to forces (N).
     pub(crate) fn add_beyond_n(&self, factor: f64, forces_n: &mut [DVec3]) {
         for (force, beyond) in forces_n.iter_mut().zip(&self.beyond_n) {
             *force += *beyond * factor;
         }
     }
 
-    /// `f_c − b` (N) of a coarse node; zero where `b` is all there is.
+    /// Returns `f_c − b` (N) of a coarse node; zero where the coarse level takes no long steps.
     pub(crate) fn beyond_of(&self, node: usize) -> DVec3 {
         self.beyond_n.get(node).copied().unwrap_or_default()
     }
 
-    /// `f_c` (N).
+    /// Returns `f_c` (N) of every coarse node.
     fn forces_n(&self) -> impl Iterator<Item = DVec3> {
         self.steady_n.iter().zip(&self.beyond_n).map(|(steady, beyond)| *steady + *beyond)
     }
 }
 
 impl LongSteps {
-    /// After a tick of `period_s`: a part of `f_c − b` goes over to `b`, and so to the forces (N) of every substep.
+    /// Moves a part of `f_c − b` to `b`, after a tick of `period_s`, and so to the forces (N) of every substep.
     pub(super) fn follow_coarse_forces(&mut self, period_s: f64, forces_n: &mut [DVec3]) {
         let part = -(-period_s / TIME_CONSTANT_S).exp_m1();
         let Self { steady_n, beyond_n, .. } = self;
@@ -143,7 +147,7 @@ impl LongSteps {
     }
 }
 
-/// Positions (m) of coarse nodes and active particles, and `f_c` (N), where a long step began; empty: not known.
+/// Positions (m) of coarse nodes and active particles, and `f_c` (N), where a long step began; empty where not known.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 struct Instant {
     x: Vec<DVec3>,
@@ -170,16 +174,16 @@ impl Instant {
     }
 }
 
-/// What long steps are judged by, and what a tick begins with.
+/// The long steps that a tick's length is judged by, and the state that the tick began with.
 #[derive(Debug, Clone)]
 pub(super) struct LongStepHistory {
-    /// Where the last long step began, and the one before it in the same tick.
+    /// The instants at which the last long step of the tick began, and the one before it.
     recent: [Instant; 2],
-    /// How many of a tick began so far.
+    /// Number of the tick's long steps that have begun.
     begun: u32,
     at_start: LongSteps,
-    fading_at_start: Progress,
-    /// [`HybridState::given_j`].
+    prestrain_at_start: Progress,
+    /// [`HybridState::given_j`] at the tick's start.
     given_at_start_j: f64,
 }
 
@@ -190,16 +194,16 @@ impl LongStepHistory {
             recent: [instant(), instant()],
             begun: 0,
             at_start: LongSteps::with_room(nodes, entries),
-            fading_at_start: Progress::default(),
+            prestrain_at_start: Progress::default(),
             given_at_start_j: 0.0,
         }
     }
 }
 
 impl HybridScratch {
-    /// Before a tick that may be repeated.
+    /// Keeps the state of the long steps before a tick that may be repeated.
     pub(crate) fn keep_long_steps(&mut self, own: &mut HybridState, state: &MechanicalState) {
-        self.long_steps.fading_at_start = own.fading.progress();
+        self.long_steps.prestrain_at_start = own.prestrain.progress();
         self.long_steps.given_at_start_j = own.given_j;
         let LongStepHistory { begun, at_start, .. } = &mut self.long_steps;
         *begun = 0;
@@ -210,9 +214,9 @@ impl HybridScratch {
         }
     }
 
-    /// As it was then, to be taken in more long steps.
+    /// Restores what [`Self::keep_long_steps`] kept, so that the tick can be taken again in more long steps.
     pub(crate) fn put_long_steps_back(&mut self, own: &mut HybridState) {
-        own.fading.go_back(self.long_steps.fading_at_start);
+        own.prestrain.go_back(self.long_steps.prestrain_at_start);
         own.given_j = self.long_steps.given_at_start_j;
         let LongStepHistory { begun, at_start, .. } = &mut self.long_steps;
         *begun = 0;
@@ -221,7 +225,7 @@ impl HybridScratch {
         own.long_steps.before.forget();
     }
 
-    /// A long step begins.
+    /// Records where a long step begins.
     pub(crate) fn note_long_step(&mut self, own: &HybridState, state: &MechanicalState) {
         let LongStepHistory { recent, begun, .. } = &mut self.long_steps;
         recent.swap(0, 1);
@@ -231,8 +235,9 @@ impl HybridScratch {
         *begun += 1;
     }
 
-    /// After a tick that was accepted: what the next one is judged by, if it is one long step.
-    pub(crate) fn hand_on_long_step(&mut self, own: &mut HybridState) {
+    /// Passes on, after a tick that was accepted, where its long step began: the next tick is judged by it, if it is
+    /// one long step again.
+    pub(crate) fn pass_on_long_step(&mut self, own: &mut HybridState) {
         let LongStepHistory { recent, begun, .. } = &mut self.long_steps;
         if *begun == 1 {
             std::mem::swap(&mut own.long_steps.before, &mut recent[0]);
@@ -241,12 +246,12 @@ impl HybridScratch {
         }
     }
 
-    /// At the tick's end: an estimate from below of the coarse level's largest `(k h ω)²`, from the last two long steps, or the last one where no more is
-    /// known.
+    /// Returns, at the tick's end, an estimate from below of the coarse level's largest `(k h ω)²`, from the last two
+    /// long steps, or from the last one where no more is known,
     /// ```text
     /// −Δ²f_c·Δ²x / (Δ²x·M' Δ²x/(k h)²)        since Δ²f_c = −K_c Δ²x
     /// ```
-    /// less what rounding of `f_c` may have done to it; 0 where the coarse level takes no longer steps.
+    /// less what rounding of `f_c` may have done to it. It is 0 where the coarse level takes no longer steps.
     pub(crate) fn long_step_quotient(
         &mut self,
         body: &HybridBody,
@@ -264,7 +269,7 @@ impl HybridScratch {
         let begun = self.long_steps.begun;
         let [one, two] = std::mem::take(&mut self.long_steps.recent);
         let before = if begun > 1 { &two } else { &own.long_steps.before };
-        // With the step before taken for none, differences are first ones.
+        // Where the step before is not known it counts as no step: the second differences are then first ones.
         let before = if before.is_known_of(state) { before } else { &one };
         let LongSteps { steady_n, beyond_n, .. } = &own.long_steps;
         let nodes = body.node_count();

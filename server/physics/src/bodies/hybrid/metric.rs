@@ -1,15 +1,20 @@
-//! Kinetic energy counted once, as volume is: what an active particle moves itself is taken from the coarse nodes that moved it.
+//! Kinetic energy is counted once, as volume is: the mass that an active particle moves itself is taken from the coarse
+//! nodes that moved it.
 //!
-//! Asleep, particles of mass `m_p` lump on the coarse nodes, `M_i = Σ_p m_p ζ_pi`. Awake, with velocity `w_p`, beside coarse velocities `v`:
+//! The masses `m_p` of sleeping particles are lumped on the coarse nodes, `M_i = Σ_p m_p ζ_pi`. With active ones of
+//! velocity `w_p`, beside coarse velocities `v`,
 //! ```text
 //! K = ½ Σ_i M_i |v_i|² + ½ (1 − ε) Σ_{p∈A} m_p (|w_p|² − |Σ_i ζ_pi v_i|²)
 //! ```
-//! A particle that wakes with the velocity it had, `w_p = Σ_i ζ_pi v_i`, so changes neither kinetic energy nor momentum, linear or angular; with lumped mass handed
-//! over (`M_i − Σ m_p ζ_pi`) a turning body would lose angular momentum, for lumps are farther out than what they stand for. The coarse mass matrix is
+//! A particle that wakes with the velocity it had, `w_p = Σ_i ζ_pi v_i`, therefore changes neither kinetic energy nor
+//! momentum, linear or angular. If lumped mass were transferred (`M_i − Σ m_p ζ_pi`), a turning body would lose angular
+//! momentum, for lumps are farther out than what they stand for. The coarse mass matrix is
 //! ```text
-//! M' = diag(M_i) − (1 − ε) Σ_{p∈A} m_p ζ_p ζ_pᵀ      ≥ ε diag(Σ_{p∈A} m_p ζ_pi) + diag(Σ_{p∉A} m_p ζ_pi)      (ζ ≥ 0, Σ ζ = 1: Jensen)
+//! M' = diag(M_i) − (1 − ε) Σ_{p∈A} m_p ζ_p ζ_pᵀ
+//!    ≥ ε diag(Σ_{p∈A} m_p ζ_pi) + diag(Σ_{p∉A} m_p ζ_pi)      (ζ ≥ 0, Σ ζ = 1: Jensen)
 //! ```
-//! positive definite, and diagonal but for the nodes that active particles follow: a small dense block, factorised when the set changes.
+//! It is positive definite, and diagonal but for a small dense block of the nodes that active particles follow, which
+//! is factorised when the set changes.
 use super::{partition::Partition, patch::KEPT};
 use glam::{BVec3, DVec3};
 use std::collections::BTreeSet;
@@ -24,7 +29,8 @@ pub struct Masses {
 }
 
 impl Masses {
-    /// An eighth of each cell to its particles, and from there to the coarse nodes. `density_kg_per_m3` is that of a coarse tet.
+    /// Gives an eighth of each cell's mass to each of its particles, and that of the particles to the coarse nodes.
+    /// `density_kg_per_m3` is that of a coarse tet.
     pub fn new(partition: &Partition, density_kg_per_m3: impl Fn(usize) -> f64) -> Self {
         let mut particle_kg = vec![0.0; partition.particle_count()];
         for (number, cell) in partition.cells().iter().enumerate() {
@@ -44,7 +50,7 @@ impl Masses {
     }
 }
 
-/// `M'` for a set of active particles.
+/// The mass matrix `M'` for a set of active particles.
 #[derive(Debug, Clone)]
 pub struct Metric {
     /// `(1 − ε) m_p` (kg) of active particles.
@@ -60,7 +66,7 @@ pub struct Metric {
     free: Vec<BVec3>,
 }
 
-/// `M'` of a set is not positive definite.
+/// `M'` of a set of particles is not positive definite.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct NotPositive {
     /// The coarse node at which it was found.
@@ -68,10 +74,11 @@ pub struct NotPositive {
 }
 
 impl Metric {
-    /// For a set of active particles; `free` tells along which axes each coarse node may move.
+    /// Factorises `M'` for a set of active particles; `free` tells along which axes each coarse node may move.
     ///
     /// # Errors
-    /// Where coarse weights are so negative (particles outside the coarse tets) that `M'` is not positive definite.
+    /// Fails where coarse weights are so negative (of particles outside the coarse tets) that `M'` is not positive
+    /// definite.
     pub fn new(
         partition: &Partition,
         masses: &Masses,
@@ -106,7 +113,7 @@ impl Metric {
         Ok(Self { particle_kg, node_kg: masses.node_kg.clone(), touched, block, factors, free })
     }
 
-    /// Momenta `M' v` (kg m/s) of the coarse nodes.
+    /// Returns the momenta `M' v` (kg m/s) of the coarse nodes.
     pub fn momenta(&self, v: &[DVec3]) -> Vec<DVec3> {
         let mut momenta: Vec<DVec3> = self.node_kg.iter().zip(v).map(|(m, v)| *v * *m).collect();
         let size = self.touched.len();
@@ -117,7 +124,8 @@ impl Metric {
         momenta
     }
 
-    /// `M'⁻¹ f` (m/s²) on free axes, zero on the others, in place of the forces (N) on the coarse nodes. `free` is that of [`Self::new`].
+    /// Overwrites the forces (N) on the coarse nodes with `M'⁻¹ f` (m/s²) on free axes, zero on the others. `free` is
+    /// that of [`Self::new`].
     pub fn accelerate(&self, free: &[BVec3], forces_n: &mut [DVec3]) {
         let mut block: Vec<DVec3> = self.touched.iter().map(|&node| forces_n[node as usize]).collect();
         for ((force, mass), free) in forces_n.iter_mut().zip(&self.node_kg).zip(free) {
@@ -131,19 +139,22 @@ impl Metric {
         }
     }
 
-    /// `(1 − ε) m_p` (kg) of the active particles.
+    /// Returns `(1 − ε) m_p` (kg) of the active particles.
     pub fn particle_kg(&self) -> &[f64] {
         &self.particle_kg
     }
 
-    /// Kinetic energy (J) of coarse velocities and those of the active particles.
+    /// Returns the kinetic energy (J) of coarse velocities and those of the active particles.
     pub fn kinetic_j(&self, v: &[DVec3], w: &[DVec3]) -> f64 {
         let coarse: f64 = self.momenta(v).iter().zip(v).map(|(p, v)| 0.5 * p.dot(*v)).sum();
         coarse + self.particle_kg.iter().zip(w).map(|(m, w)| 0.5 * m * w.length_squared()).sum::<f64>()
     }
 }
 
-/// Lower factor of the rows and columns that are free, the identity elsewhere; `Err` of the first pivot that is not positive.
+/// Returns the lower Cholesky factor of the rows and columns that are free, the identity elsewhere.
+///
+/// # Errors
+/// Returns the number of the first pivot that is not positive.
 fn cholesky(a: &[f64], free: &[bool]) -> Result<Vec<f64>, usize> {
     let size = free.len();
     let mut l = vec![0.0; size * size];
@@ -164,7 +175,7 @@ fn cholesky(a: &[f64], free: &[bool]) -> Result<Vec<f64>, usize> {
     Ok(l)
 }
 
-/// `L Lᵀ a = f` along one axis, in place; zero where it is not free.
+/// Solves `L Lᵀ a = f` along one axis, in place; the result is zero where a node is not free.
 fn solve(l: &[f64], f: &mut [DVec3], axis: usize, free: &[BVec3]) {
     let size = f.len();
     for i in 0..size {
@@ -183,23 +194,23 @@ mod tests {
     use super::*;
     use crate::bodies::hybrid::{
         patch::{Field, Materials, Patch},
-        testing::{Random, balls_in_cage, tissue},
+        testing::{Random, embedded_balls, tissue},
     };
     use crate::material::{Material, Viscosity};
 
-    struct Body {
+    struct TestBody {
         partition: Partition,
         masses: Masses,
         free: Vec<BVec3>,
         of_tet: Vec<u16>,
     }
 
-    /// With cells of one size and of two.
-    fn bodies() -> [Body; 2] {
-        balls_in_cage().map(|partition| {
+    /// Returns a body with cells of one size, and one with cells of two.
+    fn bodies() -> [TestBody; 2] {
+        embedded_balls().map(|partition| {
             let masses = Masses::new(&partition, |_| 1000.0);
             let free = masses.node_kg.iter().map(|&m| BVec3::splat(m > 0.0)).collect();
-            Body { of_tet: vec![0; partition.shares().len()], masses, free, partition }
+            TestBody { of_tet: vec![0; partition.residual_elements().len()], masses, free, partition }
         })
     }
 
@@ -212,7 +223,7 @@ mod tests {
     }
 
     impl Flight {
-        fn new(body: &Body, active: &BTreeSet<u32>, x: Vec<DVec3>, v: Vec<DVec3>) -> Self {
+        fn new(body: &TestBody, active: &BTreeSet<u32>, x: Vec<DVec3>, v: Vec<DVec3>) -> Self {
             let patch = Patch::new(&body.partition, active);
             let metric = Metric::new(&body.partition, &body.masses, active, &body.free).unwrap();
             let follow = |nodes: Vec<DVec3>| Field { particles: patch.following(&body.partition, &nodes), nodes };
@@ -222,16 +233,16 @@ mod tests {
         fn momentum(&self) -> (DVec3, DVec3) {
             let mut momenta = self.metric.momenta(&self.v.nodes);
             momenta.extend(self.metric.particle_kg().iter().zip(&self.v.particles).map(|(m, w)| *w * *m));
-            let places = self.x.nodes.iter().chain(&self.x.particles);
-            (momenta.iter().sum(), places.zip(&momenta).map(|(x, p)| x.cross(*p)).sum())
+            let positions = self.x.nodes.iter().chain(&self.x.particles);
+            (momenta.iter().sum(), positions.zip(&momenta).map(|(x, p)| x.cross(*p)).sum())
         }
 
         fn kinetic_j(&self) -> f64 {
             self.metric.kinetic_j(&self.v.nodes, &self.v.particles)
         }
 
-        /// Leapfrog; returns elastic and kinetic energy (J).
-        fn fly(&mut self, body: &Body, materials: &Materials<'_>, dt_s: f64, steps: usize) -> f64 {
+        /// Steps by leapfrog; returns the sum of elastic and kinetic energy (J).
+        fn fly(&mut self, body: &TestBody, materials: &Materials<'_>, dt_s: f64, steps: usize) -> f64 {
             for _ in 0..steps {
                 self.kick(body, materials, 0.5 * dt_s);
                 for (x, v) in self.x.nodes.iter_mut().zip(&self.v.nodes) {
@@ -245,7 +256,7 @@ mod tests {
             self.kinetic_j() + self.patch.energy_j(materials, &self.x)
         }
 
-        fn kick(&mut self, body: &Body, materials: &Materials<'_>, h_s: f64) {
+        fn kick(&mut self, body: &TestBody, materials: &Materials<'_>, h_s: f64) {
             let (mut force, _) = self.patch.forces_n(materials, &self.x, &self.v);
             self.metric.accelerate(&body.free, &mut force.nodes);
             for (v, a) in self.v.nodes.iter_mut().zip(&force.nodes) {
@@ -257,7 +268,7 @@ mod tests {
         }
     }
 
-    fn some(body: &Body, of: impl Fn(DVec3) -> bool) -> BTreeSet<u32> {
+    fn some(body: &TestBody, of: impl Fn(DVec3) -> bool) -> BTreeSet<u32> {
         (0..body.partition.particle_count() as u32).filter(|&p| of(body.partition.particle_m(p))).collect()
     }
 

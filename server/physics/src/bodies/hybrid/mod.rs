@@ -1,4 +1,5 @@
 //! The hybrid body: coarse tetrahedra throughout, and particles of which only those near a contact are awake.
+mod activation_query;
 pub mod body;
 mod build;
 mod carried_skin;
@@ -18,7 +19,6 @@ pub mod metric;
 pub mod moments;
 pub mod partition;
 pub mod patch;
-pub mod place;
 pub mod prestrain;
 mod projection;
 pub mod residual_element;
@@ -37,6 +37,7 @@ pub(crate) mod switching;
 #[cfg(test)]
 pub(crate) mod testing;
 mod transition_force;
+pub mod trilinear_point;
 
 pub use body::HybridBody;
 pub(crate) use scratch::HybridScratch;

@@ -1,45 +1,63 @@
-//! How much of each lattice cell is body: its volume there, and the integrals of its shape gradients.
+//! Moments of the part of each lattice cell that is body: its volume, and the integrals of its shape gradients.
 //!
-//! A cell `c` is integrated with one point (`F_c = Σ_p y_p b_cpᵀ`), so all it needs of the shape of the body within it are
+//! A cell `c` is integrated with one point (`F_c = Σ_p y_p b_cpᵀ`), so all that it needs to know of the shape of the
+//! body within it is
 //! ```text
 //! V_c = ∫_{c∩Ω} dV        V_c b_cp = ∫_{c∩Ω} ∇N_p dV        N_p trilinear
 //! ```
-//! `Σ_p b_cp = 0` and `Σ_p X_p b_cpᵀ = I` hold whatever the shape, because they hold at every point: affine motion is reproduced. And because
-//! the integrals of all cells at an interior particle are that of `∇N_p` over its whole support, they sum to zero there: uniform
-//! stress leaves it in balance.
+//! `Σ_p b_cp = 0` and `Σ_p X_p b_cpᵀ = I` hold whatever the shape, because they hold at every point: affine motion is
+//! reproduced. The integrals of all cells at an interior particle add up to that of `∇N_p` over its whole support,
+//! which is zero: uniform stress leaves the particle in balance.
 //!
-//! The integrals are taken along rays in z, [`RAYS`] by [`RAYS`] to a cell, exactly between the points where a ray crosses the surface. Which side of an
-//! edge a ray passes is decided by the same arithmetic for both triangles of the edge, so no ray slips through.
+//! The integrals are taken along rays in z, [`RAYS`] by [`RAYS`] to a cell, exactly between the points where a ray
+//! crosses the surface. Which side of an edge a ray passes is decided by the same arithmetic for both triangles of the
+//! edge, so no ray slips through.
 use super::{sites::Sites, skin::Skin};
 use glam::DVec3;
 
-/// Rays through a cell, each way.
+/// Number of rays through a cell along each of x and y.
 const RAYS: usize = 6;
-/// A cell that the body fills less than this is left out.
+/// A cell is left out if the body fills less than this fraction of it.
 const LEAST_FILLED: f64 = 0.01;
-/// And one that it fills to this is full.
+/// A cell counts as full if the body fills this fraction of it, or more.
 const FULL: f64 = 1.0 - 1e-9;
 
-/// What is body of one cell.
+/// Volume and shape gradients of the part of a cell that is body, integrated over it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Moments {
+    /// `V_c` (m³).
+    pub volume_m3: f64,
+    /// `V_c b_cp` (m²), `p` the cell's particles.
+    pub gradients_m2: [DVec3; 8],
+}
+
+impl Moments {
+    /// Returns the moments of a full cell.
+    pub fn full(edge_m: f64) -> Self {
+        Self { volume_m3: edge_m.powi(3), gradients_m2: full_gradients_m2(edge_m) }
+    }
+}
+
+/// The moments of the part of one cell that is body, with its number.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CellMoments {
     /// Number of the cell.
     pub cell: usize,
-    /// It is eight merged into one, of which this is the first (`sizes`).
+    /// Whether it is eight cells merged into one, of which `cell` is the first (`sizes`).
     pub doubled: bool,
     /// `V_c` (m³).
     pub volume_m3: f64,
-    /// `V_c b_cp` (m²); none of a full cell, which has [`full_gradients_m2`].
+    /// `V_c b_cp` (m²); `None` for a full cell, which has [`full_gradients_m2`].
     pub gradients_m2: Option<Box<[DVec3; 8]>>,
 }
 
-/// `V b_p` (m²) of a full cell of spacing h: `± h²/4` along every axis.
+/// Returns `V b_p` (m²) of a full cell of spacing h: `± h²/4` along every axis.
 pub fn full_gradients_m2(spacing_m: f64) -> [DVec3; 8] {
     let quarter = 0.25 * spacing_m * spacing_m;
     super::sites::CORNERS.map(|corner| (corner * 2.0 - DVec3::ONE) * quarter)
 }
 
-/// The cells that hold some of the body, ascending. `progress` is told the part done.
+/// Returns the cells that hold some of the body, ascending. `progress` is told the fraction done.
 pub fn integrate(skin: &Skin, sites: &Sites, progress: &mut dyn FnMut(f64)) -> Vec<CellMoments> {
     let [_, rows, _] = sites.cells();
     let in_row = triangles_by_row(skin, sites);
@@ -47,14 +65,14 @@ pub fn integrate(skin: &Skin, sites: &Sites, progress: &mut dyn FnMut(f64)) -> V
     let mut row = Row::new(sites);
     for (j, triangles) in in_row.iter().enumerate() {
         row.integrate(skin, triangles, j);
-        row.hand_over(j, &mut found);
+        row.move_into(j, &mut found);
         progress((j + 1) as f64 / rows as f64);
     }
     found.sort_by_key(|moments| moments.cell);
     found
 }
 
-/// Triangles that reach into each row of cells (all cells of one y).
+/// Returns the triangles that reach into each row of cells, a row being all cells of one y.
 fn triangles_by_row(skin: &Skin, sites: &Sites) -> Vec<Vec<u32>> {
     let mut rows = vec![Vec::new(); sites.cells()[1]];
     for triangle in 0..skin.triangles().len() {
@@ -68,11 +86,11 @@ fn triangles_by_row(skin: &Skin, sites: &Sites) -> Vec<Vec<u32>> {
     rows
 }
 
-/// A place where a ray crosses the surface.
+/// A point where a ray crosses the surface.
 #[derive(Debug, Clone, Copy)]
 struct Crossing {
     ray: u32,
-    /// Height over the origin, in cells.
+    /// Height above the origin, in cells.
     z: f64,
     enters: bool,
 }
@@ -87,7 +105,7 @@ impl Sums {
     const ZERO: Self = Self { volume: 0.0, gradients: [DVec3::ZERO; 8] };
 }
 
-/// The cells of one y, in units of the spacing.
+/// The cells of one y; lengths are in units of the spacing.
 struct Row<'a> {
     sites: &'a Sites,
     crossings: Vec<Crossing>,
@@ -122,13 +140,13 @@ impl<'a> Row<'a> {
         }
     }
 
-    /// One stretch of a ray within the body.
+    /// Adds one stretch of a ray within the body.
     fn add(&mut self, ray: usize, from: f64, to: f64) {
         let [nx, _, nz] = self.sites.cells();
         let (along_x, along_y) = (ray % (nx * RAYS), ray / (nx * RAYS));
         let at = |n: usize| ((n % RAYS) as f64 + 0.5) / RAYS as f64;
         let (x, y) = (at(along_x), at(along_y));
-        let share = 1.0 / (RAYS * RAYS) as f64;
+        let fraction = 1.0 / (RAYS * RAYS) as f64;
         let (from, to) = (from.max(0.0), to.min(nz as f64));
         for k in from as usize..(to.ceil().max(0.0) as usize).min(nz) {
             let (a, b) = ((from - k as f64).max(0.0), (to - k as f64).min(1.0));
@@ -136,21 +154,21 @@ impl<'a> Row<'a> {
                 continue;
             }
             let sums = &mut self.sums[k * nx + along_x / RAYS];
-            sums.volume += (b - a) * share;
-            // ∫ z dz over the stretch
+            sums.volume += (b - a) * fraction;
+            // ∫ z dz over the stretch within the cell
             let first = 0.5 * (b * b - a * a);
             for (gradient, corner) in sums.gradients.iter_mut().zip(super::sites::CORNERS) {
                 let [sx, sy, sz] = (corner * 2.0 - DVec3::ONE).to_array();
                 let wx = if corner.x == 0.0 { 1.0 - x } else { x };
                 let wy = if corner.y == 0.0 { 1.0 - y } else { y };
                 let wz = if corner.z == 0.0 { b - a - first } else { first };
-                *gradient += DVec3::new(sx * wy * wz, sy * wx * wz, sz * wx * wy * (b - a)) * share;
+                *gradient += DVec3::new(sx * wy * wz, sy * wx * wz, sz * wx * wy * (b - a)) * fraction;
             }
         }
     }
 
-    /// Gives away what was found and clears it.
-    fn hand_over(&mut self, j: usize, found: &mut Vec<CellMoments>) {
+    /// Moves what was found into `found`, and clears the row.
+    fn move_into(&mut self, j: usize, found: &mut Vec<CellMoments>) {
         let [nx, ..] = self.sites.cells();
         let h = self.sites.spacing_m();
         for (at, sums) in self.sums.iter_mut().enumerate() {
@@ -168,7 +186,7 @@ impl<'a> Row<'a> {
     }
 }
 
-/// Where the rays of row `j` cross a triangle, given in cells from the origin.
+/// Finds where the rays of row `j` cross a triangle, whose corners are given in cells from the origin.
 fn cross(ids: [u32; 3], corners: [DVec3; 3], nx: usize, j: usize, crossings: &mut Vec<Crossing>) {
     let low = corners.iter().fold(DVec3::INFINITY, |low, p| low.min(*p));
     let high = corners.iter().fold(DVec3::NEG_INFINITY, |high, p| high.max(*p));
@@ -181,7 +199,8 @@ fn cross(ids: [u32; 3], corners: [DVec3; 3], nx: usize, j: usize, crossings: &mu
     for along_y in rays(low.y, high.y, j * RAYS, RAYS) {
         for along_x in rays(low.x, high.x, 0, nx * RAYS) {
             let (x, y) = ((along_x as f64 + 0.5) / RAYS as f64, (along_y as f64 + 0.5) / RAYS as f64);
-            // Twice the areas that the point makes with the edges; the sign is that of the edge from its lower to its higher vertex.
+            // Twice the areas that the point makes with the edges; the sign is that of the edge from its lower to its
+            // higher vertex.
             let mut areas = [0.0; 3];
             let mut left = [false; 3];
             for edge in 0..3 {
@@ -198,7 +217,7 @@ fn cross(ids: [u32; 3], corners: [DVec3; 3], nx: usize, j: usize, crossings: &mu
             let total: f64 = areas.iter().sum();
             let height = (areas[0] * corners[0].z + areas[1] * corners[1].z + areas[2] * corners[2].z) / total;
             let z = if height.is_finite() { height.clamp(low.z, high.z) } else { low.z };
-            // Seen from outside counter-clockwise: a triangle that faces down is entered from below.
+            // Triangles are counter-clockwise seen from outside: through one that faces down a ray enters the body.
             let ray = (along_y - j * RAYS) * nx * RAYS + along_x;
             crossings.push(Crossing { ray: ray as u32, z, enters: !left[0] });
         }
@@ -257,7 +276,7 @@ mod tests {
         assert!(errors[0] < 2e-2 && errors[1] < 5e-3 && errors[2] < 2e-3, "{errors:?}");
     }
 
-    /// A box whose faces lie on planes of sites: every cell is full, none hangs on by rounding.
+    /// In a box whose faces lie on planes of sites every cell is full, and rounding adds none outside.
     #[test]
     fn a_box_on_the_lattice_has_full_cells_only() {
         let p: Vec<DVec3> = CORNERS.map(|c| c * DVec3::new(0.08, 0.08, 0.04) - DVec3::new(0.04, 0.04, 0.0)).to_vec();

@@ -1,41 +1,43 @@
-//! Who owns which volume: the cells of the lattice, the coarse tets they are counted to, and the particles between them.
+//! The partition of the body's volume into the cells of the lattice, the coarse tets that these are counted to, and the
+//! particles between them.
 //!
-//! The coarse level has no geometry of its own. Its energy is that of the lattice's cells, moved by the coarse nodes and integrated with few points:
-//! cells are counted to the part (`composite`) that holds their middle, and a part `g` has the mean gradient of its cells,
+//! The coarse level has no geometry of its own. Its energy is that of the lattice's cells, moved by the coarse nodes
+//! and integrated with few points: cells are counted to the part (`composite`) that holds their middle, and a part `g`
+//! has the mean gradient of its cells,
 //! ```text
 //! F_g = (1/V_g) Σ_i x_i T_giᵀ        T_gi = Σ_{c∈g} V_c Σ_p ζ_pi b_cp        V_g = Σ_{c∈g} V_c
 //! ```
-//! Affine motion is reproduced (`Σ_i T_gi = 0`, `Σ_i X_i T_giᵀ = V_g I`), whether or not the coarse tets follow the body's shape, and since cells balance at
-//! interior particles, the `T_gi` of all parts sum to zero at interior nodes.
+//! Affine motion is reproduced (`Σ_i T_gi = 0`, `Σ_i X_i T_giᵀ = V_g I`), whether or not the coarse tets follow the
+//! body's shape, and since cells balance at interior particles, the `T_gi` of all parts sum to zero at interior nodes.
 use super::{
     cell::RestCell,
     composite::{Anchor, Composite},
-    moments::{CellMoments, full_gradients_m2},
+    moments::{CellMoments, Moments, full_gradients_m2},
     residual_element::ResidualElement,
     sites::Sites,
     sizes::{self, Hanging, Site},
 };
 use glam::DVec3;
 
-/// Not there.
+/// The number that stands for an entry that does not exist.
 pub const NONE: u32 = u32::MAX;
 
 /// A cell that holds some of the body.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Cell {
-    /// Its number in the lattice's box; of a doubled one that of the first of its eight.
+    /// Its number in the lattice's box; that of the first of its eight cells for a doubled one.
     pub site_cell: u32,
-    /// The coarse tet it is counted to.
+    /// The coarse tet that it is counted to.
     pub tet: u32,
-    /// The part of it.
+    /// The part of the tet.
     pub part: u8,
-    /// Of twice the spacing.
+    /// Whether its edge is twice the spacing.
     pub doubled: bool,
-    /// Where its moments are, [`NONE`] of a full one none of whose corners hangs.
+    /// Index of its moments among those of cut cells, [`NONE`] for a full one none of whose corners hangs.
     cut: u32,
 }
 
-/// Progress is told whenever so many cells or sites are done.
+/// Progress is reported whenever this many cells or sites are done.
 const TELL_EVERY: usize = 1 << 15;
 
 /// The lattice's cells and particles on the coarse tets.
@@ -44,13 +46,13 @@ pub struct Partition {
     sites: Sites,
     coarse: Composite,
     cells: Vec<Cell>,
-    /// Of cells that the surface cuts or that have corners that hang: `V_c` and `V_c b_cp`.
-    cut: Vec<(f64, [DVec3; 8])>,
+    /// `V_c` and `V_c b_cp` of cells that the surface cuts or that have hanging corners.
+    cut: Vec<Moments>,
     /// Index in `cells` of every cell of the box; a doubled one is at eight of them.
     cell_at: Vec<u32>,
-    /// Some cells are doubled.
+    /// Whether some cells are doubled.
     has_doubled: bool,
-    /// Most cells that a particle moves.
+    /// Largest number of cells that a particle moves.
     most_cells_at: usize,
     /// Site of every particle, ascending.
     particles: Vec<u32>,
@@ -58,7 +60,7 @@ pub struct Partition {
     particle_at: Vec<u32>,
     /// The coarse tet that each particle follows.
     tet_of_particle: Vec<u32>,
-    shares: Vec<ResidualElement>,
+    residual_elements: Vec<ResidualElement>,
 }
 
 impl Partition {
@@ -67,7 +69,7 @@ impl Partition {
         Self::new_with(sites, coarse, moments, &mut |_| {})
     }
 
-    /// The same; `progress` is told the part done.
+    /// Does the same; `progress` is told the fraction done.
     pub(super) fn new_with(
         sites: Sites,
         coarse: Composite,
@@ -89,7 +91,7 @@ impl Partition {
             particles: Vec::new(),
             particle_at: vec![NONE; sites.site_count()],
             tet_of_particle: Vec::new(),
-            shares: vec![ResidualElement::default(); coarse.tets().len()],
+            residual_elements: vec![ResidualElement::default(); coarse.tets().len()],
             coarse,
         };
         let marks = sizes::mark(&sites, moments);
@@ -112,15 +114,15 @@ impl Partition {
         }
         for cell in 0..partition.cells.len() {
             tell(2.0, cell, count);
-            let (volume_m3, gradients_m2) = partition.moments(cell);
+            let moments = partition.moments(cell);
             let anchors = partition.corners(cell).map(|particle| partition.anchor(particle));
             let Cell { tet, part, .. } = partition.cells[cell];
-            partition.shares[tet as usize].add(part, 1.0, volume_m3, &gradients_m2, &anchors);
+            partition.residual_elements[tet as usize].add(part, 1.0, &moments, &anchors);
         }
         partition
     }
 
-    /// Takes a cell that holds some of the body.
+    /// Adds a cell that holds some of the body.
     fn count(&mut self, moments: &CellMoments, marks: &[Site]) {
         let (sites, number) = (self.sites, self.cells.len() as u32);
         let at = sites.cell_at(moments.cell);
@@ -140,43 +142,46 @@ impl Partition {
         if hanging.any() || moments.gradients_m2.is_some() {
             let of_corners = moments.gradients_m2.as_deref().copied();
             let of_corners = of_corners.unwrap_or_else(|| full_gradients_m2(sites.spacing_m()));
-            self.cut.push((moments.volume_m3, hanging.to_particles(of_corners)));
+            let gradients_m2 = hanging.to_particles(of_corners);
+            self.cut.push(Moments { volume_m3: moments.volume_m3, gradients_m2 });
             cut = self.cut.len() as u32 - 1;
         }
         self.cells.push(Cell { site_cell: moments.cell as u32, tet, part, doubled: moments.doubled, cut });
     }
 
-    /// The lattice.
+    /// Returns the lattice.
     pub fn sites(&self) -> &Sites {
         &self.sites
     }
 
-    /// The coarse level.
+    /// Returns the coarse level's shape functions.
     pub fn coarse(&self) -> &Composite {
         &self.coarse
     }
 
-    /// Cells that hold some of the body.
+    /// Returns the cells that hold some of the body.
     pub fn cells(&self) -> &[Cell] {
         &self.cells
     }
 
-    /// Index in [`Self::cells`] of a cell of the lattice's box, [`NONE`] where there is none of the body.
+    /// Returns the index in [`Self::cells`] of a cell of the lattice's box, [`NONE`] where it holds nothing of the
+    /// body.
     pub fn cell_at(&self, site_cell: usize) -> u32 {
         self.cell_at[site_cell]
     }
 
-    /// Number of particles.
+    /// Returns the number of particles.
     pub fn particle_count(&self) -> usize {
         self.particles.len()
     }
 
-    /// Rest position (m) of a particle.
+    /// Returns the rest position (m) of a particle.
     pub fn particle_m(&self, particle: u32) -> DVec3 {
         self.sites.site_m(self.particles[particle as usize] as usize)
     }
 
-    /// Tells the particles within a distance of a point (both m, at rest), ascending, with their squared distances (m²).
+    /// Tells the particles within a distance of a point (both m, at rest), ascending, with their squared distances
+    /// (m²).
     pub fn particles_within(&self, point_m: DVec3, reach_m: f64, mut tell: impl FnMut(u32, f64)) {
         let [nx, ny, nz] = self.sites.cells();
         let from = self.sites.cell_near(point_m - reach_m);
@@ -194,12 +199,13 @@ impl Partition {
         }
     }
 
-    /// What a particle follows while it sleeps.
+    /// Returns the coarse nodes that a particle follows while it sleeps.
     pub fn anchor(&self, particle: u32) -> Anchor {
         self.coarse.anchor_in(self.tet_of_particle[particle as usize], self.particle_m(particle))
     }
 
-    /// The eight particles of a cell: those at its corners, in their order, or at those of its block where they hang (`sizes`).
+    /// Returns the eight particles of a cell: those at its corners, in their order; in place of a hanging corner, the
+    /// one at the corner of its block (`sizes`).
     pub fn corners(&self, cell: usize) -> [u32; 8] {
         let Cell { site_cell, doubled, .. } = self.cells[cell];
         let site_cell = site_cell as usize;
@@ -217,7 +223,7 @@ impl Partition {
         corners
     }
 
-    /// Which corners of a cell hang.
+    /// Returns which corners of a cell hang.
     pub fn hanging(&self, cell: usize) -> Hanging {
         let Cell { site_cell, doubled, cut, .. } = self.cells[cell];
         if !self.has_doubled || doubled || cut == NONE {
@@ -227,35 +233,35 @@ impl Partition {
         Hanging::new(self.sites.cell_at(site_cell as usize), |corner| self.particle_at[corners[corner]] == NONE)
     }
 
-    /// Whether a cell is whole, and of the lattice's spacing.
+    /// Returns whether a cell is whole, and its edge is the lattice's spacing.
     pub fn is_plain(&self, cell: usize) -> bool {
         self.is_whole(cell) && !self.cells[cell].doubled
     }
 
-    /// Whether a cell is a whole cube, none of whose corners hangs.
+    /// Returns whether a cell is a whole cube, none of whose corners hangs.
     pub fn is_whole(&self, cell: usize) -> bool {
         self.cells[cell].cut == NONE
     }
 
-    /// Edge (m) of a cell.
+    /// Returns the edge (m) of a cell.
     pub fn edge_m(&self, cell: usize) -> f64 {
         if self.cells[cell].doubled { 2.0 * self.sites.spacing_m() } else { self.sites.spacing_m() }
     }
 
-    /// `V_c` (m³) and `V_c b_cp` (m²) of a cell, `p` its particles.
-    pub fn moments(&self, cell: usize) -> (f64, [DVec3; 8]) {
+    /// Returns `V_c` (m³) and `V_c b_cp` (m²) of a cell, `p` its particles.
+    pub fn moments(&self, cell: usize) -> Moments {
         match self.cells[cell].cut {
-            NONE => (self.edge_m(cell).powi(3), full_gradients_m2(self.edge_m(cell))),
+            NONE => Moments::full(self.edge_m(cell)),
             cut => self.cut[cut as usize],
         }
     }
 
-    /// A cell's rest data, to answer for the share `handed` of it.
-    pub fn rest_cell(&self, cell: usize, handed: f64) -> RestCell {
-        RestCell::with_hanging(self.edge_m(cell), handed, &self.moments(cell), self.hanging(cell))
+    /// Returns a cell's rest data; it answers for `fraction` of the cell's volume.
+    pub fn rest_cell(&self, cell: usize, fraction: f64) -> RestCell {
+        RestCell::with_hanging(self.edge_m(cell), fraction, &self.moments(cell), self.hanging(cell))
     }
 
-    /// Cells that a particle moves.
+    /// Returns the cells that a particle moves.
     pub fn cells_at(&self, particle: u32) -> impl Iterator<Item = usize> + '_ {
         let site = self.particles[particle as usize] as usize;
         let [nx, ny, nz] = self.sites.cells();
@@ -266,7 +272,7 @@ impl Partition {
             let around = (|| Some([beside(0)?, beside(1)?, beside(2)?]))();
             let around = around.filter(|[i, j, k]| *i < nx && *j < ny && *k < nz);
             let direct = around.map_or(NONE, |around| self.cell_at[self.sites.cell(around)]);
-            // Others of the same block have it in place of a corner that hangs.
+            // Other cells of the same block have this particle in place of a hanging corner.
             let block = around.filter(|_| of_blocks && (direct == NONE || !self.cells[direct as usize].doubled));
             let others = block.into_iter().flat_map(move |around| {
                 let others = self.cells_of_block(around).into_iter();
@@ -278,17 +284,17 @@ impl Partition {
         })
     }
 
-    /// Whether some cells are of twice the spacing.
+    /// Returns whether some cells are doubled.
     pub fn has_doubled(&self) -> bool {
         self.has_doubled
     }
 
-    /// Most cells that a particle moves: eight where all are of one size.
+    /// Returns the largest number of cells that a particle moves: eight where all are of one size.
     pub fn most_cells_at(&self) -> usize {
         self.most_cells_at
     }
 
-    /// Cells, or [`NONE`], of the block of eight that a cell of the box belongs to.
+    /// Returns the cells, or [`NONE`], of the block of eight that a cell of the box belongs to.
     fn cells_of_block(&self, around: [usize; 3]) -> [u32; 8] {
         let counts = self.sites.cells();
         std::array::from_fn(|c| {
@@ -298,61 +304,61 @@ impl Partition {
         })
     }
 
-    /// What of a cell's volume (m³) is its particles': an eighth for each corner.
+    /// Returns the parts of a cell's volume (m³) that its particles have: an eighth for each corner.
     pub fn particles_m3(&self, cell: usize) -> [f64; 8] {
-        self.hanging(cell).to_particles([self.moments(cell).0 / 8.0; 8])
+        self.hanging(cell).to_particles([self.moments(cell).volume_m3 / 8.0; 8])
     }
 
-    /// What of the body each coarse tet has when all particles sleep.
-    pub fn shares(&self) -> &[ResidualElement] {
-        &self.shares
+    /// Returns the residual elements of the coarse tets while all particles sleep: they have all of the body.
+    pub fn residual_elements(&self) -> &[ResidualElement] {
+        &self.residual_elements
     }
 
-    /// Volume of all cells (m³).
+    /// Returns the volume of all cells (m³).
     pub fn volume_m3(&self) -> f64 {
-        (0..self.cells.len()).map(|cell| self.moments(cell).0).sum()
+        (0..self.cells.len()).map(|cell| self.moments(cell).volume_m3).sum()
     }
 
-    /// What part of it is in cells that the surface does not cut.
+    /// Returns the fraction of the volume that is in cells that the surface does not cut.
     pub fn whole_part(&self) -> f64 {
         let spacing_m = self.sites.spacing_m();
         let whole_m3 = |doubled: bool| if doubled { 8.0 * spacing_m.powi(3) } else { spacing_m.powi(3) };
-        let is_cut = |cell: usize| self.moments(cell).0 < (1.0 - 1e-6) * whole_m3(self.cells[cell].doubled);
+        let is_cut = |cell: usize| self.moments(cell).volume_m3 < (1.0 - 1e-6) * whole_m3(self.cells[cell].doubled);
         let whole = (0..self.cells.len()).filter(|&cell| !is_cut(cell));
-        whole.map(|cell| self.moments(cell).0).sum::<f64>() / self.volume_m3()
+        whole.map(|cell| self.moments(cell).volume_m3).sum::<f64>() / self.volume_m3()
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::bodies::hybrid::{composite::PARTS, testing::balls_in_cage};
+    use crate::bodies::hybrid::{composite::PARTS, testing::embedded_balls};
 
     #[test]
     fn parts_reproduce_affine_motion_and_balance_at_interior_nodes() {
-        for partition in balls_in_cage() {
+        for partition in embedded_balls() {
             let coarse = partition.coarse();
             let mut total = vec![DVec3::ZERO; coarse.positions_m().len()];
-            for share in partition.shares() {
+            for residual in partition.residual_elements() {
                 for part in 0..PARTS {
-                    let sum: DVec3 = share.moments_m2.iter().map(|m| m[part]).sum();
+                    let sum: DVec3 = residual.moments_m2.iter().map(|m| m[part]).sum();
                     assert!(sum.length() < 1e-18);
                     for axis in 0..3 {
-                        let column: DVec3 = share
+                        let column: DVec3 = residual
                             .nodes
                             .iter()
-                            .zip(&share.moments_m2)
+                            .zip(&residual.moments_m2)
                             .map(|(&n, m)| m[part] * coarse.positions_m()[n as usize][axis])
                             .sum();
-                        let expected = DVec3::AXES[axis] * share.volume_m3[part];
+                        let expected = DVec3::AXES[axis] * residual.volume_m3[part];
                         assert!((column - expected).length() < 1e-12 * 1e-6, "{column} {expected}");
                     }
                 }
-                for (&node, moments) in share.nodes.iter().zip(&share.moments_m2) {
+                for (&node, moments) in residual.nodes.iter().zip(&residual.moments_m2) {
                     total[node as usize] += moments.iter().sum::<DVec3>();
                 }
             }
-            let volume: f64 = partition.shares().iter().flat_map(|s| s.volume_m3).sum();
+            let volume: f64 = partition.residual_elements().iter().flat_map(|s| s.volume_m3).sum();
             assert!((volume / partition.volume_m3() - 1.0).abs() < 1e-12);
             // Nodes whose whole support lies within the body: none of its cut cells' particles follows them.
             let mut at_surface = vec![false; total.len()];
@@ -372,7 +378,7 @@ mod tests {
 
     #[test]
     fn cells_and_particles_know_each_other() {
-        for partition in balls_in_cage() {
+        for partition in embedded_balls() {
             for particle in 0..partition.particle_count() as u32 {
                 let around: Vec<usize> = partition.cells_at(particle).collect();
                 assert!(!around.is_empty());
@@ -387,8 +393,7 @@ mod tests {
             }
             let volume_m3: f64 = (0..partition.cells().len()).flat_map(|cell| partition.particles_m3(cell)).sum();
             assert!((volume_m3 / partition.volume_m3() - 1.0).abs() < 1e-12);
-            let pairs: usize = (0..partition.particle_count() as u32).map(|p| partition.cells_at(p).count()).sum();
-            assert_eq!(pairs, 8 * partition.cells().len());
+            assert_eq!(all().map(|p| partition.cells_at(p).count()).sum::<usize>(), 8 * partition.cells().len());
         }
     }
 }

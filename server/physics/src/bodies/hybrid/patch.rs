@@ -1,9 +1,11 @@
-//! The particles that are awake, the cells between them, and what is left to the coarse tets.
+//! A patch: the active particles, the cells between them, and the residual elements of the coarse tets.
 //!
-//! Every cell that touches an active particle answers for the share `1 − ε` of its volume itself, and the coarse tets lose that
-//! share of it, `V_g ← V_g − (1 − ε) V_c` and `T_gi ← T_gi − (1 − ε) V_c Σ_p ζ_pi b_cp`: volume is counted once, and uniform stress stays in
-//! balance whichever particles are awake. The `ε` that stays keeps a coarse node whose surroundings are all awake from having neither stiffness nor mass.
-//! Particles of such cells that are not active themselves (the border) follow the coarse nodes, and hand forces back to them by the same weights.
+//! Every cell that has an active particle answers for the fraction `1 − ε` of its volume itself, and the coarse tets
+//! lose that fraction of it, `V_g ← V_g − (1 − ε) V_c` and `T_gi ← T_gi − (1 − ε) V_c Σ_p ζ_pi b_cp`: volume is counted
+//! once, and uniform stress stays in balance whichever particles are awake. The `ε` that stays keeps a coarse node
+//! whose surroundings are all awake from having neither stiffness nor mass. Particles of such cells that are not active
+//! themselves (the constrained points) follow the coarse nodes, and their forces are added to those of the nodes by the
+//! same weights.
 //!
 //! This is plain f64 code: the oracle of what runs in the loop.
 use super::{
@@ -14,28 +16,28 @@ use crate::material::Material;
 use glam::{DMat3, DVec3};
 use std::collections::{BTreeMap, BTreeSet};
 
-/// ε.
+/// `ε`, the fraction of an awake cell that stays with the coarse tets.
 pub const KEPT: f64 = 0.02;
 
-/// A set of active particles.
+/// A set of active particles, with its cells and residual elements.
 #[derive(Debug, Clone)]
 pub struct Patch {
     /// Active particles, ascending.
     active: Vec<u32>,
-    /// What the particles of the border follow; they are numbered after the active ones.
-    border: Vec<Anchor>,
+    /// What the constrained points follow; they are numbered after the active particles.
+    constrained: Vec<Anchor>,
     cells: Vec<PatchCell>,
-    /// What is left to each coarse tet.
-    shares: Vec<ResidualElement>,
-    /// What woke or fell asleep strained.
-    fading: PrestrainDecay,
+    /// Residual elements of the coarse tets.
+    residual_elements: Vec<ResidualElement>,
+    /// Prestrain of what woke or fell asleep while it was strained.
+    prestrain: PrestrainDecay,
 }
 
 #[derive(Debug, Clone)]
 struct PatchCell {
     number: u32,
     rest: RestCell,
-    /// Active particles, then those of the border.
+    /// Numbers of its points: active particles first, then constrained points.
     points: [u32; 8],
     tet: u32,
 }
@@ -43,20 +45,20 @@ struct PatchCell {
 /// Materials of a body's coarse tets.
 #[derive(Debug, Clone, Copy)]
 pub struct Materials<'a> {
-    /// All of them.
+    /// All materials.
     pub materials: &'a [Material],
-    /// Which each coarse tet has.
+    /// Index of the material of each coarse tet.
     pub of_tet: &'a [u16],
 }
 
 impl Materials<'_> {
-    /// That of a coarse tet, and of all that is counted to it.
+    /// Returns the material of a coarse tet, and of all cells that are counted to it.
     pub fn of(&self, tet: usize) -> &Material {
         &self.materials[self.of_tet[tet] as usize]
     }
 }
 
-/// Positions (m) or anything else with three components: of coarse nodes and of active particles.
+/// Positions (m), or anything else with three components, of coarse nodes and of active particles.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Field {
     /// One per coarse node.
@@ -66,7 +68,7 @@ pub struct Field {
 }
 
 impl Field {
-    /// `Σ a·b`.
+    /// Returns `Σ a·b`.
     pub fn dot(&self, other: &Self) -> f64 {
         let dot = |a: &[DVec3], b: &[DVec3]| a.iter().zip(b).map(|(a, b)| a.dot(*b)).sum::<f64>();
         dot(&self.nodes, &other.nodes) + dot(&self.particles, &other.particles)
@@ -74,24 +76,24 @@ impl Field {
 }
 
 impl Patch {
-    /// Wakes these particles.
+    /// Makes the patch of these active particles.
     pub fn new(partition: &Partition, active: &BTreeSet<u32>) -> Self {
         let active: Vec<u32> = active.iter().copied().collect();
         let awake: BTreeSet<usize> = active.iter().flat_map(|&particle| partition.cells_at(particle)).collect();
         let mut point_of: BTreeMap<u32, u32> = active.iter().copied().zip(0..).collect();
-        let mut border = Vec::new();
-        let mut shares = partition.shares().to_vec();
+        let mut constrained = Vec::new();
+        let mut residual_elements = partition.residual_elements().to_vec();
         let cells = awake
             .into_iter()
             .map(|number| {
                 let (cell, moments) = (&partition.cells()[number], partition.moments(number));
                 let corners = partition.corners(number);
                 let anchors = corners.map(|particle| partition.anchor(particle));
-                shares[cell.tet as usize].add(cell.part, KEPT - 1.0, moments.0, &moments.1, &anchors);
+                residual_elements[cell.tet as usize].add(cell.part, KEPT - 1.0, &moments, &anchors);
                 let points = std::array::from_fn(|p| {
                     *point_of.entry(corners[p]).or_insert_with(|| {
-                        border.push(anchors[p]);
-                        (active.len() + border.len()) as u32 - 1
+                        constrained.push(anchors[p]);
+                        (active.len() + constrained.len()) as u32 - 1
                     })
                 });
                 PatchCell {
@@ -102,67 +104,70 @@ impl Patch {
                 }
             })
             .collect();
-        Self { active, border, cells, shares, fading: PrestrainDecay::default() }
+        Self { active, constrained, cells, residual_elements, prestrain: PrestrainDecay::default() }
     }
 
-    /// The same patch with what fades in it; products leave that out.
+    /// Returns the same patch with prestrain; [`Self::products_n`] leaves it out.
     #[must_use]
-    pub fn with_fading(self, fading: PrestrainDecay) -> Self {
-        Self { fading, ..self }
+    pub fn with_prestrain(self, prestrain: PrestrainDecay) -> Self {
+        Self { prestrain, ..self }
     }
 
-    /// Active particles, ascending.
+    /// Returns the active particles, ascending.
     pub fn active(&self) -> &[u32] {
         &self.active
     }
 
-    /// The coarse nodes at rest, and the particles where they follow them to.
+    /// Returns the rest positions (m) of the coarse nodes, and of the particles, which follow them.
     pub fn at_rest(&self, partition: &Partition) -> Field {
         let nodes = partition.coarse().positions_m().to_vec();
         Field { particles: self.following(partition, &nodes), nodes }
     }
 
-    /// Where the active particles are, or how fast, while they follow the coarse nodes.
+    /// Returns the values that the active particles have while they follow the coarse nodes: positions of positions,
+    /// velocities of velocities.
     pub fn following(&self, partition: &Partition, nodes: &[DVec3]) -> Vec<DVec3> {
         self.active.iter().map(|&particle| partition.anchor(particle).of(nodes)).collect()
     }
 
-    /// Elastic energy (J).
+    /// Returns the elastic energy (J).
     pub fn energy_j(&self, materials: &Materials<'_>, at: &Field) -> f64 {
         let points = self.points(at);
         let of_cell = |cell: &PatchCell| {
             let (material, y) = (materials.of(cell.tet as usize), cell.of(&points));
-            match self.fading.of_cell(cell.number) {
-                Some(fade) => fade.energy_j(&cell.rest, material, &y),
+            match self.prestrain.of_cell(cell.number) {
+                Some(prestrain) => prestrain.energy_j(&cell.rest, material, &y),
                 None => cell.rest.energy_j(material, &y),
             }
         };
         let fine: f64 = self.cells.iter().map(of_cell).sum();
-        let of_share = |(tet, share): (usize, &ResidualElement)| match self.fading.of_tet(tet as u32) {
-            Some(fade) => fade.energy_j(share, materials.of(tet), &at.nodes),
-            None => share.energy_j(materials.of(tet), &at.nodes),
+        let of_residual = |(tet, residual): (usize, &ResidualElement)| match self.prestrain.of_tet(tet as u32) {
+            Some(prestrain) => prestrain.energy_j(residual, materials.of(tet), &at.nodes),
+            None => residual.energy_j(materials.of(tet), &at.nodes),
         };
-        fine + self.shares.iter().enumerate().map(of_share).sum::<f64>()
+        fine + self.residual_elements.iter().enumerate().map(of_residual).sum::<f64>()
     }
 
-    /// Smallest `det F` of coarse tets' means and cells, and its tet.
+    /// Returns the smallest `det F` of coarse tets' means and cells, and the tet where it is.
     pub fn min_volume_ratio(&self, at: &Field) -> (f64, usize) {
         let points = self.points(at);
         let of_cell = |cell: &PatchCell| (cell.rest.gradient_of(&cell.of(&points)).determinant(), cell.tet as usize);
-        let of_share = |(tet, share): (usize, &ResidualElement)| (share.volume_ratio(&at.nodes), tet);
-        let all = self.cells.iter().map(of_cell).chain(self.shares.iter().enumerate().map(of_share));
+        let of_residual = |(tet, residual): (usize, &ResidualElement)| (residual.volume_ratio(&at.nodes), tet);
+        let all = self.cells.iter().map(of_cell).chain(self.residual_elements.iter().enumerate().map(of_residual));
         all.fold((f64::INFINITY, 0), |least, found| if found.0 < least.0 { found } else { least })
     }
 
-    /// How many coarse tets' means and cells have `det F ≤ 0`.
+    /// Returns the number of coarse tets' means and cells that have `det F ≤ 0`.
     pub fn inverted(&self, at: &Field) -> u32 {
         let points = self.points(at);
         let is_inverted = |cell: &&PatchCell| cell.rest.gradient_of(&cell.of(&points)).determinant() <= 0.0;
         let cells = self.cells.iter().filter(is_inverted).count();
-        (cells + self.shares.iter().filter(|share| share.volume_ratio(&at.nodes) <= 0.0).count()) as u32
+        (cells + self.residual_elements.iter().filter(|residual| residual.volume_ratio(&at.nodes) <= 0.0).count())
+            as u32
     }
 
-    /// Forces (N) of elastic and viscous stress at positions `at` and velocities `rate`, and the power (W) that viscous stress takes.
+    /// Returns the forces (N) of elastic and viscous stress at positions `at` and velocities `rate`, and the power (W)
+    /// that viscous stress takes.
     pub fn forces_n(&self, materials: &Materials<'_>, at: &Field, rate: &Field) -> (Field, f64) {
         let (points, rates) = (self.points(at), self.points(rate));
         let mut nodes = vec![DVec3::ZERO; at.nodes.len()];
@@ -170,24 +175,24 @@ impl Patch {
         let mut power_w = 0.0;
         for cell in &self.cells {
             let (material, y, rate) = (materials.of(cell.tet as usize), cell.of(&points), cell.of(&rates));
-            let (forces, power) = match self.fading.of_cell(cell.number) {
-                Some(fade) => fade.forces_n(&cell.rest, material, &y, &rate),
+            let (forces, power) = match self.prestrain.of_cell(cell.number) {
+                Some(prestrain) => prestrain.forces_n(&cell.rest, material, &y, &rate),
                 None => cell.rest.forces_n(material, &y, &rate),
             };
             cell.add(&forces, &mut of_points);
             power_w += power;
         }
-        for (tet, share) in self.shares.iter().enumerate() {
+        for (tet, residual) in self.residual_elements.iter().enumerate() {
             let material = materials.of(tet);
-            power_w += match self.fading.of_tet(tet as u32) {
-                Some(fade) => fade.add_forces_n(share, material, &at.nodes, &rate.nodes, &mut nodes),
-                None => share.add_forces_n(material, &at.nodes, &rate.nodes, &mut nodes),
+            power_w += match self.prestrain.of_tet(tet as u32) {
+                Some(prestrain) => prestrain.add_forces_n(residual, material, &at.nodes, &rate.nodes, &mut nodes),
+                None => residual.add_forces_n(material, &at.nodes, &rate.nodes, &mut nodes),
             };
         }
-        (self.handed_back(nodes, of_points), power_w)
+        (self.push_constrained(nodes, of_points), power_w)
     }
 
-    /// `−K a` (N): the change of the elastic forces along `a` at positions `at`.
+    /// Returns `−K a` (N), the change of the elastic forces along `a` at positions `at`.
     pub fn products_n(&self, materials: &Materials<'_>, at: &Field, a: &Field) -> Field {
         let (points, changes) = (self.points(at), self.points(a));
         let mut nodes = vec![DVec3::ZERO; at.nodes.len()];
@@ -196,40 +201,41 @@ impl Patch {
             let material = materials.of(cell.tet as usize);
             cell.add(&cell.rest.products_n(material, &cell.of(&points), &cell.of(&changes)), &mut of_points);
         }
-        for (tet, share) in self.shares.iter().enumerate() {
-            share.add_products_n(materials.of(tet), &at.nodes, &a.nodes, &mut nodes);
+        for (tet, residual) in self.residual_elements.iter().enumerate() {
+            residual.add_products_n(materials.of(tet), &at.nodes, &a.nodes, &mut nodes);
         }
-        self.handed_back(nodes, of_points)
+        self.push_constrained(nodes, of_points)
     }
 
-    /// Diagonal blocks (N/m) of the stiffness at rest, of the coarse nodes and then of the active particles; the identity where there is none.
+    /// Returns the diagonal blocks (N/m) of the stiffness at rest, of the coarse nodes and then of the active
+    /// particles; the identity where there is no stiffness.
     pub fn diagonal_n_per_m(&self, materials: &Materials<'_>, nodes: usize) -> Vec<DMat3> {
         let mut of_nodes = vec![DMat3::ZERO; nodes];
-        let mut of_points = vec![DMat3::ZERO; self.active.len() + self.border.len()];
+        let mut of_points = vec![DMat3::ZERO; self.active.len() + self.constrained.len()];
         for cell in &self.cells {
             let blocks = cell.rest.diagonal_n_per_m(materials.of(cell.tet as usize));
             cell.points.iter().zip(blocks).for_each(|(&point, block)| of_points[point as usize] += block);
         }
-        for (anchor, block) in self.border.iter().zip(of_points.split_off(self.active.len())) {
+        for (anchor, block) in self.constrained.iter().zip(of_points.split_off(self.active.len())) {
             for (&node, weight) in anchor.nodes.iter().zip(anchor.weights) {
                 of_nodes[node as usize] += block * (weight * weight);
             }
         }
-        for (tet, share) in self.shares.iter().enumerate() {
-            share.add_diagonal_n_per_m(materials.of(tet), &mut of_nodes);
+        for (tet, residual) in self.residual_elements.iter().enumerate() {
+            residual.add_diagonal_n_per_m(materials.of(tet), &mut of_nodes);
         }
         let filled = |block: DMat3| if block == DMat3::ZERO { DMat3::IDENTITY } else { block };
         of_nodes.into_iter().chain(of_points).map(filled).collect()
     }
 
-    /// Of active particles, then of those of the border.
+    /// Returns the values of all points: of the active particles, then of the constrained points, which follow.
     fn points(&self, a: &Field) -> Vec<DVec3> {
-        a.particles.iter().copied().chain(self.border.iter().map(|anchor| anchor.of(&a.nodes))).collect()
+        a.particles.iter().copied().chain(self.constrained.iter().map(|anchor| anchor.of(&a.nodes))).collect()
     }
 
-    /// Forces of the border go to the coarse nodes.
-    fn handed_back(&self, mut nodes: Vec<DVec3>, mut of_points: Vec<DVec3>) -> Field {
-        for (anchor, force) in self.border.iter().zip(&of_points[self.active.len()..]) {
+    /// Adds the forces (N) on constrained points to those of the coarse nodes that they follow.
+    fn push_constrained(&self, mut nodes: Vec<DVec3>, mut of_points: Vec<DVec3>) -> Field {
+        for (anchor, force) in self.constrained.iter().zip(&of_points[self.active.len()..]) {
             for (&node, weight) in anchor.nodes.iter().zip(anchor.weights) {
                 nodes[node as usize] += *force * weight;
             }
@@ -254,7 +260,7 @@ impl PatchCell {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::bodies::hybrid::testing::{Random, balls_in_cage, moved, plus, random_like, tissue};
+    use crate::bodies::hybrid::testing::{Random, embedded_balls, moved, plus, random_like, tissue};
     use glam::DQuat;
 
     fn half_awake(partition: &Partition) -> Patch {
@@ -262,10 +268,10 @@ mod tests {
         Patch::new(partition, &(0..partition.particle_count() as u32).filter(right).collect())
     }
 
-    /// Active particles and nodes that nothing at the surface has anything to do with.
+    /// Returns the nodes, and the active particles, whose whole support lies within the body.
     fn interior(partition: &Partition, patch: &Patch) -> (Vec<usize>, Vec<usize>) {
         let mut node = vec![true; partition.coarse().positions_m().len()];
-        let is_cut = |cell: usize| partition.moments(cell).0 < partition.edge_m(cell).powi(3) * (1.0 - 1e-12);
+        let is_cut = |cell: usize| partition.moments(cell).volume_m3 < partition.edge_m(cell).powi(3) * (1.0 - 1e-12);
         for corner in (0..partition.cells().len()).filter(|&c| is_cut(c)).flat_map(|cell| partition.corners(cell)) {
             partition.anchor(corner).nodes.iter().for_each(|&n| node[n as usize] = false);
         }
@@ -279,12 +285,12 @@ mod tests {
 
     #[test]
     fn half_awake_uniform_stress_leaves_all_that_is_inside_in_balance() {
-        for partition in balls_in_cage() {
+        for partition in embedded_balls() {
             let patch = half_awake(&partition);
             let rest = patch.at_rest(&partition);
             let (nodes, particles) = interior(&partition, &patch);
             assert!(nodes.len() > 3 && particles.len() > 50, "{} {}", nodes.len(), particles.len());
-            let of_tet = vec![0; partition.shares().len()];
+            let of_tet = vec![0; partition.residual_elements().len()];
             let mut random = Random(7);
             for material in tissue() {
                 let materials = Materials { materials: &[material], of_tet: &of_tet };
@@ -295,7 +301,8 @@ mod tests {
                     let (forces, _) = patch.forces_n(&materials, &at, &still);
                     let stress = material.piola(&f);
                     let h = partition.sites().spacing_m();
-                    // What balances at a particle is eight times P h²/4, at a node as much as its surroundings are wide.
+                    // What balances at a particle is eight times P h²/4, at a node as much as its surroundings are
+                    // wide.
                     let at_particle = stress.x_axis.length().max(stress.y_axis.length()) * h * h;
                     let worst = particles.iter().map(|&p| forces.particles[p].length()).fold(0.0, f64::max);
                     print!("{:.1e} ", worst / at_particle);
@@ -311,10 +318,10 @@ mod tests {
 
     #[test]
     fn rigid_motion_is_free_of_force_and_force_of_momentum() {
-        for partition in balls_in_cage() {
+        for partition in embedded_balls() {
             let patch = half_awake(&partition);
             let rest = patch.at_rest(&partition);
-            let of_tet = vec![0; partition.shares().len()];
+            let of_tet = vec![0; partition.residual_elements().len()];
             let turn = DQuat::from_axis_angle(DVec3::new(0.48, 0.6, 0.64), 2.1);
             let mut random = Random(9);
             for material in tissue() {
@@ -340,10 +347,10 @@ mod tests {
 
     #[test]
     fn forces_are_the_energys_gradient_and_products_theirs() {
-        for partition in balls_in_cage() {
+        for partition in embedded_balls() {
             let patch = half_awake(&partition);
             let rest = patch.at_rest(&partition);
-            let of_tet = vec![0; partition.shares().len()];
+            let of_tet = vec![0; partition.residual_elements().len()];
             let mut random = Random(8);
             for material in tissue() {
                 let materials = Materials { materials: &[material], of_tet: &of_tet };

@@ -1,15 +1,19 @@
-//! How cells wake, and volume falls asleep, in a body that is strained: without a step in energy or force.
+//! Prestrain: a change of rest state, with which cells of a strained body wake, and volume falls asleep, without a step
+//! in energy or force.
 //!
-//! A coarse part strains less than the cells in it do, so a cell that woke as it is would raise the energy. It is given the strain that its part had by a
-//! change of its rest state, which then fades: with `A = F⁻¹ F_before − I` at first, the effective gradient is
+//! A coarse part strains less than the cells in it do, so a cell that woke as it is would raise the energy. It is given
+//! the strain that its part had by a change of its rest state, the prestrain, which then decays: with
+//! `A = F⁻¹ F_before − I` at first, the effective gradient is
 //! ```text
 //! F̃ = F (I + A)       P = P̃(F̃) (I + A)ᵀ       A = s A_0,  s = e^{−t/τ}
 //! ```
-//! one `A` for its shape and one for its volume, which is the tet's (`residual_element`), and hourglass stiffness `κ (1 − a)`, `a` from 1 to 0. What is left of a part,
-//! or what it gets back, has an `A` of its own: its effective gradient is at first the mean of what it is made of, by volume, and by Jensen its energy no more than
-//! theirs. Changes of the rest state are objective: momentum does not hear of them. What fading takes, `−ds/dt ∂U/∂s`, is booked in the ledger.
+//! There is one `A` for its shape and one for its volume, whose strain is the tet's (`residual_element`), and the
+//! hourglass stiffness is `κ (1 − a)`, with `a` from 1 to 0. A part that loses volume, or gets some back, has an `A` of
+//! its own: its effective gradient is at first the mean, by volume, of those of what it is made of, and by Jensen's
+//! inequality its energy is no more than theirs. Changes of the rest state are objective: they do not change momentum.
+//! The energy that the decay takes, `−ds/dt ∂U/∂s`, is booked in the ledger.
 //!
-//! Nor do accelerations jump (`transition_force`).
+//! Accelerations do not jump, either (`transition_force`).
 use super::{
     cell::{MODE_WEIGHTS, RestCell},
     composite::PARTS,
@@ -20,14 +24,14 @@ use crate::material::{Material, viscous};
 use glam::{DMat3, DVec3};
 use serde::{Deserialize, Serialize};
 
-/// τ (s).
-pub(super) const FADING_S: f64 = 0.04;
-/// A change of rest state smaller than this is none.
+/// `τ` (s), the time constant of the decay.
+pub(super) const DECAY_S: f64 = 0.04;
+/// A prestrain smaller than this is left out, and what is left of its energy booked.
 const NOTHING: f64 = 1e-6;
-/// One smaller than this has no energy to speak of.
+/// A prestrain smaller than this is left out, its energy being negligible.
 const TRACE: f64 = 1e-13;
 
-/// A cell that woke strained; `A` and `a` when it did.
+/// The prestrain of a cell: `A` and `a` when it woke.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct CellPrestrain {
     /// Index of the cell.
@@ -36,14 +40,14 @@ pub struct CellPrestrain {
     pub shape: DMat3,
     /// `A` of its volume.
     pub volume: DMat3,
-    /// `a`.
+    /// `a` of its hourglass stiffness.
     pub modes: f64,
 }
 
-/// A coarse tet of which some woke or fell asleep strained.
+/// The prestrain of a coarse tet's residual element, of which volume woke or fell asleep while it was strained.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct ResidualPrestrain {
-    /// The tet.
+    /// Index of the tet.
     pub tet: u32,
     /// `A` of its parts' shape.
     pub parts: [DMat3; PARTS],
@@ -51,64 +55,71 @@ pub struct ResidualPrestrain {
     pub whole: DMat3,
 }
 
-/// All that fades.
+/// All prestrains of a body, and how far they have decayed.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct PrestrainDecay {
-    /// Ascending, as are the tets; after changing either, [`Self::start`].
+    /// Prestrains of cells, ascending, as are those of tets. [`Self::start`] has to be called after either list was
+    /// changed.
     pub(super) cells: Vec<CellPrestrain>,
     pub(super) tets: Vec<ResidualPrestrain>,
     progress: Progress,
-    /// The largest entry of all.
+    /// Largest entry of all prestrains.
     most: f64,
-    /// A checksum of cells and tets, to know them by.
+    /// A checksum of cells and tets, by which kernels tell whether they have them.
     mark: u64,
 }
 
-/// How far.
+/// How far the prestrains have decayed.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub(super) struct Progress {
-    /// `s`.
+    /// `s`, the fraction that is left.
     left: f64,
     /// `s ∂U/∂s` (J) of coarse tets and of cells when their forces were last computed.
     along_j: [f64; 2],
 }
 
-/// `e^{−T/τ}`.
+/// Returns `e^{−T/τ}`, by which a decay goes on in a period `T`.
 pub(super) fn factor(period_s: f64, time_constant_s: f64) -> f64 {
     (-period_s / time_constant_s).exp()
 }
 
-/// `F (I + A)`.
+/// Returns the effective gradient `F (I + A)`.
 pub(super) fn effective(f: &DMat3, a: &DMat3) -> DMat3 {
     *f + *f * *a
 }
 
-/// `A` with which `F` counts as `wanted`; none where it is turned inside out.
+/// Returns `A` with which the effective gradient of `F` is `wanted`; zero where `F` is (nearly) inverted.
 pub(super) fn change(f: &DMat3, wanted: &DMat3) -> DMat3 {
     if f.determinant() > 0.05 { f.inverse() * (*wanted - *f) } else { DMat3::ZERO }
 }
 
-/// `P̃(F (I + A)) (I + A)ᵀ` (Pa).
+/// Returns the stress `P̃(F (I + A)) (I + A)ᵀ` (Pa).
 fn piola(material: &Material, f: &DMat3, a: &DMat3) -> DMat3 {
     let p = material.piola(&effective(f, a));
     p + p * a.transpose()
 }
 
-/// `U_c` (J) of effective gradients, and of modes' `(1 − a) Σ_k w_k |q_k|²` (m²).
-pub(super) fn cell_j(rest: &RestCell, material: &Material, [shape, volume]: [&DMat3; 2], modes_m2: f64) -> f64 {
+/// Returns `U_c` (J) of a cell's effective gradients, of shape and of volume, and of its hourglasses'
+/// `(1 − a) Σ_k w_k |q_k|²` (m²).
+pub(super) fn cell_energy_j(rest: &RestCell, material: &Material, [shape, volume]: [&DMat3; 2], modes_m2: f64) -> f64 {
     let (of_shape, of_volume) = split(material);
     let density = of_shape.energy_density(shape) + of_volume.energy_density(volume);
     rest.volume_m3 * density + 0.5 * rest.hourglass_m * material.lame.mu_pa * modes_m2
 }
 
-/// `U_e` (J) of effective gradients.
-pub(super) fn share_j(share: &ResidualElement, material: &Material, shapes: &[DMat3; PARTS], whole: &DMat3) -> f64 {
+/// Returns `U_e` (J) of a residual element's effective gradients, of the parts' shape and of the tet's volume.
+pub(super) fn residual_energy_j(
+    residual: &ResidualElement,
+    material: &Material,
+    shapes: &[DMat3; PARTS],
+    whole: &DMat3,
+) -> f64 {
     let (of_shape, of_volume) = split(material);
-    let shape: f64 = shapes.iter().zip(share.volume_m3).map(|(f, v)| v * of_shape.energy_density(f)).sum();
-    shape + share.total_m3() * of_volume.energy_density(whole)
+    let shape: f64 = shapes.iter().zip(residual.volume_m3).map(|(f, v)| v * of_shape.energy_density(f)).sum();
+    shape + residual.total_m3() * of_volume.energy_density(whole)
 }
 
-/// `Σ_k w_k |q_k|²` (m²).
+/// Returns `Σ_k w_k |q_k|²` (m²).
 pub(super) fn modes_m2(rest: &RestCell, y: &[DVec3; 8]) -> f64 {
     rest.amplitudes(y).iter().zip(MODE_WEIGHTS).map(|(q, w)| w * q.length_squared()).sum()
 }
@@ -122,31 +133,31 @@ impl PrestrainDecay {
         Self { cells: Vec::with_capacity(cells), tets: Vec::with_capacity(tets), ..Self::default() }
     }
 
-    /// Of these cells and tets, ascending.
+    /// Makes prestrains of these cells and tets, both ascending, whose decay starts now.
     pub fn new(cells: Vec<CellPrestrain>, tets: Vec<ResidualPrestrain>) -> Self {
-        let mut fading = Self { cells, tets, ..Self::default() };
-        fading.start();
-        fading
+        let mut decay = Self { cells, tets, ..Self::default() };
+        decay.start();
+        decay
     }
 
-    /// Adds all that fades, and how far it has.
+    /// Adds all prestrains, and how far they have decayed, to a hash.
     pub(super) fn chain(&self, chain: &mut Chain) {
-        chain.list(&self.cells, |chain, fade| {
-            chain.whole(u64::from(fade.cell));
-            chain.matrix(&fade.shape);
-            chain.matrix(&fade.volume);
-            chain.real(fade.modes);
+        chain.list(&self.cells, |chain, prestrain| {
+            chain.whole(u64::from(prestrain.cell));
+            chain.matrix(&prestrain.shape);
+            chain.matrix(&prestrain.volume);
+            chain.real(prestrain.modes);
         });
-        chain.list(&self.tets, |chain, fade| {
-            chain.whole(u64::from(fade.tet));
-            fade.parts.iter().for_each(|part| chain.matrix(part));
-            chain.matrix(&fade.whole);
+        chain.list(&self.tets, |chain, prestrain| {
+            chain.whole(u64::from(prestrain.tet));
+            prestrain.parts.iter().for_each(|part| chain.matrix(part));
+            chain.matrix(&prestrain.whole);
         });
         chain.real(self.progress.left);
         self.progress.along_j.into_iter().for_each(|along_j| chain.real(along_j));
     }
 
-    /// `s`.
+    /// Returns `s`, the fraction that is left.
     pub fn left(&self) -> f64 {
         self.progress.left
     }
@@ -155,7 +166,7 @@ impl PrestrainDecay {
         self.progress
     }
 
-    /// Goes back to what [`Self::progress`] was.
+    /// Restores what [`Self::progress`] was.
     pub(super) fn go_back(&mut self, progress: Progress) {
         self.progress = progress;
     }
@@ -164,7 +175,7 @@ impl PrestrainDecay {
         self.mark
     }
 
-    /// Whether nothing fades.
+    /// Returns whether nothing has prestrain.
     pub fn is_empty(&self) -> bool {
         self.cells.is_empty() && self.tets.is_empty()
     }
@@ -175,9 +186,10 @@ impl PrestrainDecay {
         (self.progress, self.most, self.mark) = (Progress::default(), 0.0, 0);
     }
 
-    /// From now on it fades: all has been taken, but for the order of tets.
+    /// Starts the decay, once all prestrains are in the lists: sorts the tets, and computes the largest entry and the
+    /// checksum.
     pub(super) fn start(&mut self) {
-        self.tets.sort_unstable_by_key(|fade| fade.tet);
+        self.tets.sort_unstable_by_key(|prestrain| prestrain.tet);
         self.progress = Progress { left: 1.0, along_j: [0.0; 2] };
         let of_cells = self.cells.iter().map(CellPrestrain::largest);
         self.most = of_cells.chain(self.tets.iter().map(ResidualPrestrain::largest)).fold(0.0, f64::max);
@@ -185,36 +197,37 @@ impl PrestrainDecay {
         let mix = |mark: u64, word: u64| (mark ^ word).wrapping_mul(0x0100_0000_01b3);
         let of_matrix =
             |mark: u64, a: &DMat3| a.to_cols_array().iter().fold(mark, |mark, entry| mix(mark, entry.to_bits()));
-        let of_cell = |mark: u64, fade: &CellPrestrain| {
-            let mark = mix(mix(mark, u64::from(fade.cell)), fade.modes.to_bits());
-            of_matrix(of_matrix(mark, &fade.shape), &fade.volume)
+        let of_cell = |mark: u64, prestrain: &CellPrestrain| {
+            let mark = mix(mix(mark, u64::from(prestrain.cell)), prestrain.modes.to_bits());
+            of_matrix(of_matrix(mark, &prestrain.shape), &prestrain.volume)
         };
-        let of_tet = |mark: u64, fade: &ResidualPrestrain| {
-            fade.parts.iter().chain([&fade.whole]).fold(mix(mark, u64::from(fade.tet)), of_matrix)
+        let of_tet = |mark: u64, prestrain: &ResidualPrestrain| {
+            prestrain.parts.iter().chain([&prestrain.whole]).fold(mix(mark, u64::from(prestrain.tet)), of_matrix)
         };
         let mark = self.cells.iter().fold(0xcbf2_9ce4_8422_2325, of_cell);
         self.mark = self.tets.iter().fold(mix(mark, self.cells.len() as u64), of_tet);
     }
 
-    /// Time (s) goes on.
-    pub(crate) fn go_on(&mut self, time_s: f64) {
-        self.progress.left *= factor(time_s, FADING_S);
+    /// Lets the prestrains decay for some time (s).
+    pub(crate) fn advance(&mut self, time_s: f64) {
+        self.progress.left *= factor(time_s, DECAY_S);
     }
 
-    /// Whether so little is left that it is nothing.
-    pub(super) fn has_faded(&self) -> bool {
+    /// Returns whether there are prestrains, and so little is left of them that they can be left out.
+    pub(super) fn has_decayed(&self) -> bool {
         !self.is_empty() && self.most * self.left() < NOTHING
     }
 
-    /// `s ∂U/∂s` (J) when forces were last computed.
+    /// Returns `s ∂U/∂s` (J) when forces were last computed.
     pub(super) fn along_j(&self) -> f64 {
         self.progress.along_j.iter().sum()
     }
 
-    /// Takes `s ∂U/∂s` (J) of coarse tets (0) or of cells (1); returns the energy (J) that fading took within the time (s) since the last one.
+    /// Records `s ∂U/∂s` (J) of coarse tets (level 0) or of cells (level 1); returns the energy (J) that the decay took
+    /// in the time (s) since the last record.
     pub(crate) fn take_along(&mut self, level: usize, along_j: f64, time_s: f64) -> f64 {
         let before_j = std::mem::replace(&mut self.progress.along_j[level], along_j);
-        0.5 * (before_j + along_j) * time_s / FADING_S
+        0.5 * (before_j + along_j) * time_s / DECAY_S
     }
 
     pub(super) fn copy_from(&mut self, other: &Self) {
@@ -230,27 +243,27 @@ impl PrestrainDecay {
         cells && self.tets.iter().all(|t| t.whole.is_finite() && t.parts.iter().all(DMat3::is_finite))
     }
 
-    /// What is left of a cell's, if it fades.
+    /// Returns what is left of a cell's prestrain, if it has any.
     pub(super) fn of_cell(&self, cell: u32) -> Option<CellPrestrain> {
-        let at = self.cells.binary_search_by_key(&cell, |fade| fade.cell).ok()?;
+        let at = self.cells.binary_search_by_key(&cell, |prestrain| prestrain.cell).ok()?;
         let CellPrestrain { shape, volume, modes, .. } = self.cells[at];
         let left = self.left();
         Some(CellPrestrain { cell, shape: shape * left, volume: volume * left, modes: modes * left })
     }
 
-    /// What is left of a tet's, if it fades.
+    /// Returns what is left of a tet's prestrain, if it has any.
     pub(super) fn of_tet(&self, tet: u32) -> Option<ResidualPrestrain> {
-        let at = self.tets.binary_search_by_key(&tet, |fade| fade.tet).ok()?;
+        let at = self.tets.binary_search_by_key(&tet, |prestrain| prestrain.tet).ok()?;
         let ResidualPrestrain { parts, whole, .. } = self.tets[at];
         Some(ResidualPrestrain { tet, parts: parts.map(|part| part * self.left()), whole: whole * self.left() })
     }
 
-    /// All that is left of tets', ascending.
+    /// Returns what is left of the prestrains of all tets, ascending.
     pub(super) fn left_of_tets(&self) -> impl Iterator<Item = ResidualPrestrain> + '_ {
-        self.tets.iter().filter_map(|fade| self.of_tet(fade.tet))
+        self.tets.iter().filter_map(|prestrain| self.of_tet(prestrain.tet))
     }
 
-    /// Whether cells and tets ascend.
+    /// Returns whether cells and tets are in ascending order.
     pub(super) fn is_sorted(&self) -> bool {
         self.cells.is_sorted_by(|a, b| a.cell < b.cell) && self.tets.is_sorted_by(|a, b| a.tet < b.tet)
     }
@@ -258,7 +271,7 @@ impl PrestrainDecay {
 
 impl CellPrestrain {
     fn largest(&self) -> f64 {
-        // Stiffness of modes that is too small by so little shows less than a strain would.
+        // An hourglass stiffness that is too small shows less than a strain of the same size.
         largest(&self.shape).max(largest(&self.volume)).max(self.modes * NOTHING.sqrt())
     }
 
@@ -266,29 +279,29 @@ impl CellPrestrain {
         self.largest() > NOTHING
     }
 
-    /// Whether it is more than what may be left out without being booked.
+    /// Returns whether it is more than what may be left out without being booked.
     pub(super) fn exceeds_a_trace(&self) -> bool {
         self.largest() > TRACE
     }
 
-    /// Nothing of a cell.
+    /// Returns the prestrain of a cell that has none.
     pub(crate) fn none(cell: u32) -> Self {
         Self { cell, shape: DMat3::ZERO, volume: DMat3::ZERO, modes: 0.0 }
     }
 
-    /// Effective gradients of shape and volume.
+    /// Returns the effective gradients of shape and volume.
     pub(super) fn effective(&self, rest: &RestCell, y: &[DVec3; 8]) -> [DMat3; 2] {
         let f = rest.gradient_of(y);
         [effective(&f, &self.shape), effective(&f, &self.volume)]
     }
 
-    /// `U_c` (J).
+    /// Returns the elastic energy `U_c` (J).
     pub(super) fn energy_j(&self, rest: &RestCell, material: &Material, y: &[DVec3; 8]) -> f64 {
         let [shape, volume] = self.effective(rest, y);
-        cell_j(rest, material, [&shape, &volume], (1.0 - self.modes) * modes_m2(rest, y))
+        cell_energy_j(rest, material, [&shape, &volume], (1.0 - self.modes) * modes_m2(rest, y))
     }
 
-    /// `f_p` (N), and the power (W) that viscous stress takes.
+    /// Returns the forces `f_p` (N), and the power (W) that viscous stress takes.
     pub(super) fn forces_n(
         &self,
         rest: &RestCell,
@@ -319,55 +332,55 @@ impl ResidualPrestrain {
         self.largest() > NOTHING
     }
 
-    /// Whether it is more than what may be left out without being booked.
+    /// Returns whether it is more than what may be left out without being booked.
     pub(super) fn exceeds_a_trace(&self) -> bool {
         self.largest() > TRACE
     }
 
-    /// Nothing of a tet.
+    /// Returns the prestrain of a tet that has none.
     pub(super) fn none(tet: u32) -> Self {
         Self { tet, parts: [DMat3::ZERO; PARTS], whole: DMat3::ZERO }
     }
 
-    /// Effective gradients of the parts' shape, and of the tet's volume.
-    pub(super) fn effective(&self, share: &ResidualElement, gradients: &[DMat3; PARTS]) -> ([DMat3; PARTS], DMat3) {
-        let mean = share.mean(gradients);
+    /// Returns the effective gradients of the parts' shape, and of the tet's volume.
+    pub(super) fn effective(&self, residual: &ResidualElement, gradients: &[DMat3; PARTS]) -> ([DMat3; PARTS], DMat3) {
+        let mean = residual.mean(gradients);
         (std::array::from_fn(|part| effective(&gradients[part], &self.parts[part])), effective(&mean, &self.whole))
     }
 
-    /// `U_e` (J).
-    pub(super) fn energy_j(&self, share: &ResidualElement, material: &Material, x: &[DVec3]) -> f64 {
-        if share.nodes.is_empty() {
+    /// Returns the elastic energy `U_e` (J).
+    pub(super) fn energy_j(&self, residual: &ResidualElement, material: &Material, x: &[DVec3]) -> f64 {
+        if residual.nodes.is_empty() {
             return 0.0;
         }
-        let (shapes, whole) = self.effective(share, &share.gradients(x, DMat3::IDENTITY));
-        share_j(share, material, &shapes, &whole)
+        let (shapes, whole) = self.effective(residual, &residual.gradients(x, DMat3::IDENTITY));
+        residual_energy_j(residual, material, &shapes, &whole)
     }
 
     /// Adds forces (N) to `forces_n`; returns the power (W) that viscous stress takes.
     pub(super) fn add_forces_n(
         &self,
-        share: &ResidualElement,
+        residual: &ResidualElement,
         material: &Material,
         x: &[DVec3],
         v: &[DVec3],
         forces_n: &mut [DVec3],
     ) -> f64 {
-        if share.nodes.is_empty() {
+        if residual.nodes.is_empty() {
             return 0.0;
         }
         let (of_shape, of_volume) = split(material);
-        let gradients = share.gradients(x, DMat3::IDENTITY);
-        let pressure = piola(&of_volume, &share.mean(&gradients), &self.whole);
+        let gradients = residual.gradients(x, DMat3::IDENTITY);
+        let pressure = piola(&of_volume, &residual.mean(&gradients), &self.whole);
         let mut power_w = 0.0;
         let mut stresses = [pressure; PARTS];
         for part in 0..PARTS {
             stresses[part] += piola(&of_shape, &gradients[part], &self.parts[part]);
         }
         if !material.viscosity.is_zero() {
-            power_w = share.add_viscous_pa(material, &gradients, v, &mut stresses);
+            power_w = residual.add_viscous_pa(material, &gradients, v, &mut stresses);
         }
-        share.scatter(&stresses, forces_n);
+        residual.scatter(&stresses, forces_n);
         power_w
     }
 }

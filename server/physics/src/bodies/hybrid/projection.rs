@@ -1,14 +1,18 @@
-//! Where coarse nodes go when particles fall asleep: to the field nearest, by mass, to what there was.
+//! Projects the motion of particles that fall asleep on the coarse nodes: these are moved to the field that is nearest
+//! to it in the mass norm.
 //!
-//! Little holds a node around which all is awake: what the coarse level keeps of its surroundings, which would have it nowhere near the particles. Were these to follow it
-//! where it happens to be, what they know of their dent would be lost, and a region that is switched again and again would build up stress. So coarse nodes are moved by
-//! `Δ` that, with particles `p` falling asleep at `y_p`, of mass `m = (1 − ε) m_p`, and the consistent mass matrix `C'` of what slept before,
+//! A node around which all is awake is held by little: by the `ε` that the coarse level keeps of its surroundings,
+//! which may have it far from the particles. If these followed it there when they fall asleep, the dent that they have
+//! would be lost, and a region that is switched again and again would build up stress. So coarse nodes are moved by
+//! `Δ`, which, with particles `p` falling asleep at `y_p`, of mass `m = (1 − ε) m_p`, and the consistent mass matrix
+//! `C'` of what slept before, is the solution of
 //! ```text
 //! min ½ Σ_p m |y_p − ζ_pᵀ(x + Δ)|² + ½ Δᵀ C' Δ        C'' Δ = Σ_p m ζ_p (y_p − ζ_pᵀ x)
 //! C'' = M'' − (1 − δ) L        L = Σ_{all p} m_p (diag ζ_p − ζ_p ζ_pᵀ)
 //! ```
-//! over the free nodes that they follow; `M''` is the mass matrix after the switch (`metric`), `L` what lumping adds to it, and a `δ` of that holds nodes that nothing else does. Solved by a
-//! few steps of conjugate gradients, preconditioned by `M''⁻¹`. Strains do not change by it (`prestrain`), nor do momenta (`switching`).
+//! over the free nodes that they follow. `M''` is the mass matrix after the switch (`metric`), `L` the part of it that
+//! lumping adds; `δ` of that holds nodes that nothing else does. The system is solved by a few steps of conjugate
+//! gradients, preconditioned by `M''⁻¹`. It changes neither strains (`prestrain`) nor momenta (`switching`).
 use super::{
     body::HybridBody,
     composite::{Anchor, NODES},
@@ -18,14 +22,14 @@ use super::{
 };
 use glam::DVec3;
 
-/// δ.
+/// `δ`, the fraction of the lumping that holds nodes.
 const HOLD: f64 = 0.05;
-/// Steps of conjugate gradients: each halves what is left, or better.
+/// Steps of conjugate gradients; each halves the residual at least.
 const STEPS: usize = 8;
-/// What is left (over what there was, in the preconditioner's norm, squared) that counts as nothing.
+/// Residual that counts as zero: squared, in the preconditioner's norm, over the largest one.
 const NOTHING: f64 = 1e-16;
 
-/// `L`.
+/// `L`, the part of the mass matrix that lumping adds.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Lumping {
     /// Pairs of nodes, and `Σ_p m_p ζ_pi ζ_pj` (kg).
@@ -61,7 +65,7 @@ impl Lumping {
         Self { pairs }
     }
 
-    /// The pairs of some nodes.
+    /// Returns the pairs that have one of these nodes.
     fn pairs_of<'a>(&'a self, nodes: &'a [bool]) -> impl Iterator<Item = ([u32; 2], f64)> + 'a {
         self.pairs.iter().copied().filter(|([i, j], _)| nodes[*i as usize] || nodes[*j as usize])
     }
@@ -70,11 +74,11 @@ impl Lumping {
 /// Buffers for a projection.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Projection {
-    /// `Σ_p m ζ_p (y_p − ζ_pᵀ x)` (kg m), then what is left of it.
+    /// `Σ_p m ζ_p (y_p − ζ_pᵀ x)` (kg m), and then the residual.
     moments: Vec<DVec3>,
-    /// Whether a node is moved.
+    /// Whether each coarse node is moved.
     is_moved: Vec<bool>,
-    /// Pairs of `L` with a node that is moved.
+    /// Pairs of `L` that have a node that is moved.
     pairs: Vec<([u32; 2], f64)>,
     /// `Δ` (m).
     shifts_m: Vec<DVec3>,
@@ -84,7 +88,7 @@ pub(super) struct Projection {
 }
 
 impl Projection {
-    /// Room for the coarse nodes, and so many active particles.
+    /// Makes room for the coarse nodes, and for so many active particles.
     pub(super) fn with_room(body: &HybridBody, most_active: usize) -> Self {
         let nodes = body.node_count();
         let list = || Vec::with_capacity(nodes + most_active);
@@ -99,7 +103,7 @@ impl Projection {
         }
     }
 
-    /// Before a switch.
+    /// Starts over, before a switch.
     pub(super) fn start(&mut self, nodes: usize) {
         self.moments.clear();
         self.moments.resize(nodes, DVec3::ZERO);
@@ -107,20 +111,22 @@ impl Projection {
         self.is_moved.resize(nodes, false);
     }
 
-    /// A particle of `(1 − ε) m_p` (kg) falls asleep away (m) from where it would be.
-    pub(super) fn hand_over(&mut self, body: &HybridBody, anchor: &Anchor, mass_kg: f64, away_m: DVec3) {
+    /// Adds a particle of mass `(1 − ε) m_p` (kg) that falls asleep at a distance `away_m` (m) from where it would be
+    /// asleep.
+    pub(super) fn transfer(&mut self, body: &HybridBody, anchor: &Anchor, mass_kg: f64, away_m: DVec3) {
         anchor.push(away_m * mass_kg, &mut self.moments);
         for (node, weight) in anchor.nodes.into_iter().zip(anchor.weights) {
             self.is_moved[node as usize] |= weight > 0.0 && body.free[node as usize].all();
         }
     }
 
-    /// Coarse nodes that will be moved: free ones that particles follow which fall asleep.
+    /// Returns whether each coarse node will be moved: those are the free ones that a particle follows which falls
+    /// asleep.
     pub(super) fn is_moved(&self) -> &[bool] {
         &self.is_moved
     }
 
-    /// `Δ` (m) of the coarse nodes, with the mass matrix after the switch. Allocates nothing.
+    /// Returns the displacements `Δ` (m) of the coarse nodes, with the mass matrix after the switch. Allocates nothing.
     pub(super) fn solve(&mut self, body: &HybridBody, metric: &mut RunningMetric) -> &[DVec3] {
         let nodes = self.moments.len();
         let all = nodes + metric.particle_kg().len();
@@ -189,7 +195,8 @@ mod tests {
         settings::Precision,
     };
 
-    /// Half of the awake particles fall asleep where random displacements put them: moments left by the exact `C''` of all particles, and the fit before and after.
+    /// Lets half of the awake particles fall asleep where displacements put them. Returns the residual with the exact
+    /// `C''` of all particles over the right side, and the misfit of the particles after and before.
     fn fall_asleep(away: impl Fn(DVec3, &mut Random) -> DVec3) -> (f64, f64, f64) {
         let [material, other, _] = tissue();
         let body = hybrid_ball(&[material, other]);
@@ -204,7 +211,7 @@ mod tests {
         let mut projection = Projection::with_room(&body, waking.len());
         projection.start(body.node_count());
         for (&p, away) in fell.iter().zip(&away) {
-            projection.hand_over(&body, &partition.anchor(p), kg(p), *away);
+            projection.transfer(&body, &partition.anchor(p), kg(p), *away);
         }
         let (start, moved) = (projection.moments.clone(), projection.is_moved.clone());
         let shifts = projection.solve(&body, patch.metric_mut()).to_vec();

@@ -1,23 +1,26 @@
-//! The coarse level: what of the body a coarse tet has, and its energy.
+//! The residual element of a coarse tet: what it still answers for of the body beside awake cells, and its energy.
 //!
-//! The shape of a tet is strained by the mean gradient `F_g` of each of its five parts, its volume by the mean `F̄` of the whole: volume would
-//! lock if every part had to keep its own.
+//! The shape of a tet is strained by the mean gradient `F_g` of each of its five parts, its volume by the mean `F̄` of
+//! the whole: the tets would lock if every part had to keep its own volume.
 //! ```text
 //! U_e = Σ_g V_g Ψ(F_g; λ⁻, µ) + V_e Ψ(F̄; λ − λ⁻, 0)        F̄ = Σ_g V_g F_g / V_e,  λ⁻ = min(λ, 0)
 //! f_i = −Σ_g (P(F_g; λ⁻, µ) + P(F̄; λ − λ⁻, 0)) T_gi
 //! ```
 //! (every law's Ψ is linear in λ and µ). Viscous stress acts on the parts.
-use super::composite::{Anchor, PARTS};
+use super::{
+    composite::{Anchor, PARTS},
+    moments::Moments,
+};
 use crate::{
     linalg::tensor::outer,
     material::{Lame, Material, viscous},
 };
 use glam::{DMat3, DVec3};
 
-/// A coarse tet's share of the body.
+/// The part of the body that a coarse tet answers for.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct ResidualElement {
-    /// Coarse nodes that move it.
+    /// Numbers of the coarse nodes that move it.
     pub nodes: Vec<u32>,
     /// `V_g` (m³) of every part.
     pub volume_m3: [f64; PARTS],
@@ -26,13 +29,13 @@ pub struct ResidualElement {
 }
 
 impl ResidualElement {
-    /// Adds a cell's `factor V_c` to a part; `corners` are its particles' anchors.
-    pub fn add(&mut self, part: u8, factor: f64, volume_m3: f64, gradients_m2: &[DVec3; 8], corners: &[Anchor; 8]) {
+    /// Adds `factor` times a cell's moments to a part; `corners` tell what the cell's particles follow.
+    pub fn add(&mut self, part: u8, factor: f64, moments: &Moments, corners: &[Anchor; 8]) {
         let numbers = corners.map(|anchor| anchor.nodes.map(|node| self.number_of(node)));
-        self.add_numbered(part, factor, (volume_m3, gradients_m2), corners, &numbers);
+        self.add_numbered(part, factor, moments, corners, &numbers);
     }
 
-    /// Number of a node among its own, as which it is taken in if need be.
+    /// Returns the number of a node among its own; adds the node if it is not among them.
     fn number_of(&mut self, node: u32) -> u32 {
         let number = self.nodes.iter().position(|&own| own == node).unwrap_or_else(|| {
             self.nodes.push(node);
@@ -42,12 +45,12 @@ impl ResidualElement {
         number as u32
     }
 
-    /// The same as [`Self::add`] where the numbers of the nodes are known.
+    /// Does the same as [`Self::add`] where the numbers of the nodes are known.
     pub(super) fn add_numbered(
         &mut self,
         part: u8,
         factor: f64,
-        (volume_m3, gradients_m2): (f64, &[DVec3; 8]),
+        Moments { volume_m3, gradients_m2 }: &Moments,
         corners: &[Anchor; 8],
         numbers: &[[u32; 4]; 8],
     ) {
@@ -60,12 +63,13 @@ impl ResidualElement {
         }
     }
 
-    /// `F_g` of every part of positions, or its rate of velocities; the identity's or zero where a part is empty.
+    /// Returns the gradient of every part: `F_g` of positions, its rate of velocities. A part without volume has the
+    /// gradient `empty`: the identity, or zero.
     pub(super) fn gradients(&self, a: &[DVec3], empty: DMat3) -> [DMat3; PARTS] {
         let mut gradients = [DMat3::ZERO; PARTS];
         let Some(&first) = self.nodes.first() else { return [empty; PARTS] };
         for (&node, moments) in self.nodes.iter().zip(&self.moments_m2) {
-            // Differences, so that a translation drops out exactly.
+            // Differences are taken so that a translation drops out exactly.
             let from_first = a[node as usize] - a[first as usize];
             for (gradient, moment) in gradients.iter_mut().zip(moments) {
                 *gradient += outer(from_first, *moment);
@@ -77,7 +81,8 @@ impl ResidualElement {
         })
     }
 
-    /// `F_g` where some nodes are moved by `Δ_i` (m) from where it was that: `F_g + Σ_i Δ_i T_giᵀ / V_g`.
+    /// Returns `F_g` after some nodes were moved by `Δ_i` (m) from where it was `gradients`:
+    /// `F_g + Σ_i Δ_i T_giᵀ / V_g`.
     pub(super) fn gradients_after(&self, gradients: &[DMat3; PARTS], shifts_m: &[DVec3]) -> [DMat3; PARTS] {
         let mut after = *gradients;
         let moved =
@@ -92,23 +97,23 @@ impl ResidualElement {
         after
     }
 
-    /// `Σ_g V_g A_g / V_e`.
+    /// Returns the mean over the parts, `Σ_g V_g A_g / V_e`.
     pub(super) fn mean(&self, of_parts: &[DMat3; PARTS]) -> DMat3 {
         let sum = of_parts.iter().zip(self.volume_m3).fold(DMat3::ZERO, |sum, (a, volume)| sum + *a * volume);
         sum * (1.0 / self.total_m3())
     }
 
-    /// `det F̄`; 1 of a tet without a share.
+    /// Returns `det F̄`; 1 for a tet that holds nothing of the body.
     pub fn volume_ratio(&self, x: &[DVec3]) -> f64 {
         if self.nodes.is_empty() { 1.0 } else { self.mean(&self.gradients(x, DMat3::IDENTITY)).determinant() }
     }
 
-    /// `V_e` (m³).
+    /// Returns `V_e` (m³).
     pub fn total_m3(&self) -> f64 {
         self.volume_m3.iter().sum()
     }
 
-    /// `U_e` (J).
+    /// Returns the elastic energy `U_e` (J).
     pub fn energy_j(&self, material: &Material, x: &[DVec3]) -> f64 {
         if self.nodes.is_empty() {
             return 0.0;
@@ -137,7 +142,7 @@ impl ResidualElement {
         power_w
     }
 
-    /// Adds viscous stress (Pa) to the parts'; returns the power (W) that it takes.
+    /// Adds viscous stress (Pa) to that of the parts; returns the power (W) that it takes.
     pub(super) fn add_viscous_pa(
         &self,
         material: &Material,
@@ -192,7 +197,7 @@ impl ResidualElement {
     }
 }
 
-/// The material of the parts' shape, and that of the tet's volume.
+/// Returns the material of the parts' shape, and that of the tet's volume.
 pub(crate) fn split(material: &Material) -> (Material, Material) {
     let Lame { lambda_pa, mu_pa } = material.lame;
     let of_parts = lambda_pa.min(0.0);

@@ -1,4 +1,5 @@
-//! The coarse mass matrix `M'` as the loop runs it: factorised anew, without allocating, when other particles wake. Its oracle is `metric`.
+//! The coarse mass matrix `M'` as the loop runs it: factorised anew, without allocating, when other particles wake. Its
+//! oracle is `metric`.
 use super::{
     body::{HybridBody, NO_WEIGHT},
     composite::Anchor,
@@ -11,23 +12,26 @@ use crate::lanes::{
 };
 use glam::{BVec3, DVec3};
 
-/// `M'` and its factor.
+/// The mass matrix `M'` and its Cholesky factor.
 ///
-/// Active particles follow nodes that are free or held along all axes, so that one factor serves the three. With accelerations `a` of free nodes `f` and none of
-/// held ones `h`, `M'_ff a = f_f`; what moves the holders feels `M'_hf a`.
+/// Active particles follow nodes that are free or held along all axes, so that one factor serves the three. With
+/// accelerations `a` of free nodes `f` and none of held ones `h`, `M'_ff a = f_f`; whatever holds the latter has to
+/// bear `M'_hf a`.
 #[derive(Debug, Clone)]
 pub(crate) struct RunningMetric {
     /// `(1 − ε) m_p` (kg) of active particles.
     particle_kg: Vec<f64>,
-    /// What gravity pulls coarse nodes with (kg): the row sums of `M'`.
+    /// Masses (kg) by which gravity pulls on coarse nodes: the row sums of `M'`.
     weight_kg: Vec<f64>,
-    /// `1/M_i` (1/kg) of coarse nodes, 0 on held axes and of those in the factor, and then `1/(1 − ε) m_p` of active particles.
+    /// `1/M_i` (1/kg) of coarse nodes, 0 on held axes and for nodes in the factor, and then `1/(1 − ε) m_p` of active
+    /// particles.
     inverse_per_kg: Vec<DVec3>,
-    /// What active particles take from the nodes they follow.
+    /// The masses that active particles take from the nodes they follow.
     followed: Vec<Followed>,
-    /// Nodes that active particles follow: the rows of the block. Free ones first, each ascending.
+    /// Nodes that active particles follow, which are the rows of the block: first the free ones, then the held ones,
+    /// each ascending.
     touched: Vec<u32>,
-    /// How many of them are free: the rows of the factor.
+    /// Number of those that are free; they are the rows of the factor.
     free_rows: usize,
     row_of: Vec<u32>,
     /// The dense block of `M'` (kg), row by row.
@@ -35,7 +39,7 @@ pub(crate) struct RunningMetric {
     factor: Cholesky,
 }
 
-/// An active particle that follows coarse nodes, with no weight where there are fewer than four.
+/// An active particle and the coarse nodes that it follows; weights are zero where there are fewer than four.
 #[derive(Debug, Clone, Copy)]
 struct Followed {
     /// `(1 − ε) m_p` (kg).
@@ -44,12 +48,12 @@ struct Followed {
     weights: [f64; 4],
 }
 
-/// Nodes that a particle does follow.
+/// Returns the nodes that a particle follows with a weight that counts.
 fn weighty(anchor: &Anchor) -> impl Iterator<Item = (u32, f64)> {
     anchor.nodes.into_iter().zip(anchor.weights).filter(|(_, weight)| *weight >= NO_WEIGHT)
 }
 
-/// `1/M_i` (1/kg) of a coarse node, 0 on held axes.
+/// Returns `1/M_i` (1/kg) of a coarse node, 0 on held axes.
 fn inverse_per_kg(hybrid: &HybridBody, node: usize) -> DVec3 {
     let mass_kg = hybrid.masses.node_kg[node].max(f64::MIN_POSITIVE);
     DVec3::select(hybrid.free[node], DVec3::splat(1.0 / mass_kg), DVec3::ZERO)
@@ -74,7 +78,7 @@ impl RunningMetric {
         }
     }
 
-    /// Takes the active particles, in order, with what they follow. Allocates nothing.
+    /// Factorises the matrix of these active particles, given in order, each with what it follows. Allocates nothing.
     pub(super) fn factorise(&mut self, hybrid: &HybridBody, followed: impl Iterator<Item = (u32, Anchor)> + Clone) {
         for &node in &self.touched {
             self.row_of[node as usize] = NONE;
@@ -124,7 +128,8 @@ impl RunningMetric {
         self.factor.factorise(block_kg, self.free_rows, 1e-12);
     }
 
-    /// `M'⁻¹ f` (m/s²) on free axes, zero on the others, in place of forces (N) on coarse nodes and then on active particles; returns `fᵀ M'⁻¹ f` (N²/kg).
+    /// Overwrites forces (N) on coarse nodes and then on active particles with `M'⁻¹ f` (m/s²) on free axes, zero on
+    /// the others; returns `fᵀ M'⁻¹ f` (N²/kg).
     pub(crate) fn accelerate(&mut self, forces_n: &mut [DVec3]) -> f64 {
         let free = &self.touched[..self.free_rows];
         for (row, &node) in free.iter().enumerate() {
@@ -144,16 +149,18 @@ impl RunningMetric {
         }
     }
 
-    /// `(1 − ε) m_p` (kg) of the active particles.
+    /// Returns `(1 − ε) m_p` (kg) of the active particles.
     pub(super) fn particle_kg(&self) -> &[f64] {
         &self.particle_kg
     }
 
-    /// Kinetic and gravitational energy (J) of coarse nodes and active particles. `momenta` is a buffer.
+    /// Returns the kinetic and gravitational energy (J) of coarse nodes and active particles, at positions
+    /// `x` (m) and velocities `v` (m/s). `momenta` is a buffer.
     pub(super) fn moving_j(
         &self,
         hybrid: &HybridBody,
-        (x, v): (&[DVec3], &[DVec3]),
+        x: &[DVec3],
+        v: &[DVec3],
         gravity_m_per_s2: DVec3,
         momenta: &mut Vec<DVec3>,
     ) -> f64 {
@@ -161,12 +168,13 @@ impl RunningMetric {
         momenta.resize(v.len(), DVec3::ZERO);
         self.momenta(hybrid, v, momenta);
         let kinetic_j: f64 = momenta.iter().zip(v).map(|(p, v)| 0.5 * p.dot(*v)).sum();
-        // Rest positions are left out: what falls asleep and what wakes has the same ones.
+        // Rest positions are left out: they do not change when particles wake or fall asleep.
         let moment: DVec3 = x.iter().zip(self.weight_kg.iter().chain(&self.particle_kg)).map(|(x, m)| *x * *m).sum();
         kinetic_j - gravity_m_per_s2.dot(moment)
     }
 
-    /// `v_h·M'_hf a_f` of velocities, or of accelerations: with these, what the holders have to give (W) to what follows them in part.
+    /// Returns `v_h·M'_hf a_f` of velocities `a` (J), or of accelerations: then it is the power (W) that what moves the
+    /// held nodes gives to particles that follow them in part.
     pub(crate) fn of_holders(&self, v: &[DVec3], a: &[DVec3]) -> f64 {
         let (free, held) = self.touched.split_at(self.free_rows);
         let rows = self.block_kg.chunks_exact(self.touched.len().max(1)).skip(self.free_rows).zip(held);
@@ -180,7 +188,7 @@ impl RunningMetric {
         rows.map(of_row).sum()
     }
 
-    /// Kinetic energy (J) of velocities less that of lumped masses, as far as held nodes have to do with it.
+    /// Returns the terms of the kinetic energy (J) that have velocities of held nodes, less those of lumped masses.
     pub(crate) fn of_held_j(&self, hybrid: &HybridBody, v: &[DVec3]) -> f64 {
         let held = &self.touched[self.free_rows..];
         let rows = self.block_kg.chunks_exact(self.touched.len().max(1)).skip(self.free_rows).zip(held);
@@ -195,7 +203,7 @@ impl RunningMetric {
         rows.map(of_row).sum::<f64>() + self.of_holders(v, v)
     }
 
-    /// What velocities have on free axes: `v_f·M'_ff v_f` and `v_h·M'_hf v_f` (J). `momenta` is a buffer.
+    /// Returns `v_f·M'_ff v_f` and `v_h·M'_hf v_f` (J) of velocities. `momenta` is a buffer.
     pub(crate) fn of_free_j(&self, hybrid: &HybridBody, v: &[DVec3], momenta: &mut Vec<DVec3>) -> (f64, f64) {
         momenta.clear();
         momenta.resize(v.len(), DVec3::ZERO);
@@ -206,7 +214,8 @@ impl RunningMetric {
         (of_free.sum::<f64>() - of_holders_j, of_holders_j)
     }
 
-    /// Momenta `M' v` (kg m/s) of coarse nodes and then of active particles: particle by particle, which are fewer than the block's entries.
+    /// Writes the momenta `M' v` (kg m/s) of coarse nodes and then of active particles. It goes particle by particle,
+    /// since these are fewer than the block's entries.
     pub(crate) fn momenta(&self, hybrid: &HybridBody, v: &[DVec3], momenta: &mut [DVec3]) {
         let masses = hybrid.masses.node_kg.iter().chain(&self.particle_kg);
         for ((momentum, v), mass) in momenta.iter_mut().zip(v).zip(masses) {

@@ -1,4 +1,4 @@
-//! What a hybrid body's ticks work in.
+//! The buffers that a hybrid body's ticks work in.
 use super::{
     body::HybridBody,
     carried_skin::Carried,
@@ -14,7 +14,7 @@ use super::{
 use crate::tick::{Environment, ListedVertices};
 use glam::DVec3;
 
-/// Buffers for hybrid bodies.
+/// Buffers of a hybrid body.
 #[derive(Debug, Clone)]
 pub(crate) struct HybridScratch {
     pub(crate) patch: RunningPatch,
@@ -25,46 +25,46 @@ pub(crate) struct HybridScratch {
     pub(crate) of_free_j: Option<(f64, f64)>,
     /// `fᵀ M'⁻¹ f` (N²/kg) at the last three kicks, the last one first.
     pub(crate) kick_sq: [f64; 3],
-    pub(super) looking: ActivationQuery,
-    pub(super) coming: StagedPatch,
+    pub(super) query: ActivationQuery,
+    pub(super) staged: StagedPatch,
     pub(super) before: Before,
-    pub(crate) balance: TransitionForce,
+    pub(crate) transition: TransitionForce,
     pub(super) long_steps: LongStepHistory,
 }
 
 impl HybridScratch {
-    /// For a body in its environment.
+    /// Makes the buffers of a body in its environment.
     pub(crate) fn new(body: &HybridBody, environment: &Environment) -> Self {
         let (most, positions) = (body.particles.most_active, body.most_positions());
         let patch = || RunningPatch::new(body, most, environment.settings.precision);
-        let (mut patch, coming) = (patch(), StagedPatch::new(patch()));
+        let (mut patch, staged) = (patch(), StagedPatch::new(patch()));
         patch.wake(body, &[], &PrestrainDecay::default());
         Self {
-            coming,
+            staged,
             patch,
-            skin: ListedVertices::new(body.places.len()),
+            skin: ListedVertices::new(body.vertex_points.len()),
             accelerations: Vec::with_capacity(positions),
             momenta: Vec::with_capacity(positions),
             of_free_j: None,
             kick_sq: [0.0; 3],
-            looking: ActivationQuery::new(body, &environment.tools),
+            query: ActivationQuery::new(body, &environment.tools),
             before: Before::with_room(
                 room_for_cells(body, body.particles.most_active),
-                body.partition().shares().len(),
+                body.partition().residual_elements().len(),
             ),
-            balance: TransitionForce::with_room(positions),
+            transition: TransitionForce::with_room(positions),
             long_steps: LongStepHistory::with_room(body.node_count(), positions),
         }
     }
 
-    /// `aᵀ M'⁻¹ a` of forces (N²/kg) on free axes.
+    /// Returns `fᵀ M'⁻¹ f` (N²/kg) of forces on free axes.
     pub(crate) fn size_sq(&mut self, forces_n: impl Iterator<Item = DVec3>) -> f64 {
         self.accelerations.clear();
         self.accelerations.extend(forces_n);
         self.patch.metric_mut().accelerate(&mut self.accelerations)
     }
 
-    /// `vᵀ M' v` (J) of velocities, or of displacements (kg m²).
+    /// Returns `vᵀ M' v` (J) of velocities; of displacements it is in kg m².
     pub(crate) fn twice_kinetic(&mut self, body: &HybridBody, v: impl Iterator<Item = DVec3>) -> f64 {
         let Self { patch, accelerations, momenta, .. } = self;
         accelerations.clear();
@@ -75,17 +75,17 @@ impl HybridScratch {
         momenta.iter().zip(accelerations.iter()).map(|(p, v)| p.dot(*v)).sum()
     }
 
-    /// `(1 − ε) m_p` (kg) of the active particles.
+    /// Returns `(1 − ε) m_p` (kg) of the active particles.
     pub(crate) fn particle_kg(&self) -> &[f64] {
         self.patch.metric().particle_kg()
     }
 
-    /// Makes the patch that of the state's active particles. Allocates nothing.
+    /// Makes the patch that of the state's active particles and prestrains, where it is not. Allocates nothing.
     pub(super) fn follow(&mut self, body: &HybridBody, active: &HybridState) {
         if self.patch.active() != active.ids() {
-            self.patch.wake(body, active.ids(), &active.fading);
-        } else if !self.patch.knows(&active.fading) {
-            self.patch.put_fades(&active.fading);
+            self.patch.wake(body, active.ids(), &active.prestrain);
+        } else if !self.patch.knows(&active.prestrain) {
+            self.patch.put_prestrains(&active.prestrain);
         }
     }
 }

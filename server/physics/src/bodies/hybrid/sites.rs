@@ -22,9 +22,9 @@ pub struct Sites {
 }
 
 impl Sites {
-    /// Cells of `spacing_m` that cover a box, with sites on the planes through `on_m`.
+    /// Makes the sites of cells of `spacing_m` that cover a box, with sites on the planes through `on_m`.
     pub fn covering((low_m, high_m): (DVec3, DVec3), spacing_m: f64, on_m: DVec3) -> Self {
-        // A box that ends on a plane of sites, but for rounding, ends there.
+        // A box that ends on a plane of sites, but for rounding, gets no further cells.
         let slack = 1e-9;
         let first = ((low_m - on_m) / spacing_m + slack).floor();
         let last = ((high_m - on_m) / spacing_m - slack).ceil();
@@ -32,60 +32,60 @@ impl Sites {
         Self { origin_m: on_m + first * spacing_m, spacing_m, cells: cells.to_array().map(|n| n as usize) }
     }
 
-    /// Spacing h (m).
+    /// Returns the spacing h (m).
     pub fn spacing_m(&self) -> f64 {
         self.spacing_m
     }
 
-    /// Cells along each axis.
+    /// Returns the number of cells along each axis.
     pub fn cells(&self) -> [usize; 3] {
         self.cells
     }
 
-    /// All cells of the box.
+    /// Returns the number of all cells of the box.
     pub fn cell_count(&self) -> usize {
         self.cells.iter().product()
     }
 
-    /// All sites of the box.
+    /// Returns the number of all sites of the box.
     pub fn site_count(&self) -> usize {
         self.cells.iter().map(|n| n + 1).product()
     }
 
-    /// Number of a cell.
+    /// Returns the number of a cell.
     pub fn cell(&self, [i, j, k]: [usize; 3]) -> usize {
         (k * self.cells[1] + j) * self.cells[0] + i
     }
 
-    /// Where a cell is, in cells from the origin.
+    /// Returns where a cell is, in cells from the origin.
     pub fn cell_at(&self, cell: usize) -> [usize; 3] {
         let [nx, ny, _] = self.cells;
         [cell % nx, cell / nx % ny, cell / (nx * ny)]
     }
 
-    /// Number of a site.
+    /// Returns the number of a site.
     pub fn site(&self, [i, j, k]: [usize; 3]) -> usize {
         (k * (self.cells[1] + 1) + j) * (self.cells[0] + 1) + i
     }
 
-    /// Where a site is (m).
+    /// Returns the position (m) of a site.
     pub fn site_m(&self, site: usize) -> DVec3 {
         let [nx, ny] = [self.cells[0] + 1, self.cells[1] + 1];
         self.at_m([site % nx, site / nx % ny, site / (nx * ny)])
     }
 
-    /// The sites of a cell's corners, in the order of [`CORNERS`].
+    /// Returns the sites of a cell's corners, in the order of [`CORNERS`].
     pub fn corners(&self, cell: usize) -> [usize; 8] {
         let [i, j, k] = self.cell_at(cell);
         std::array::from_fn(|corner| self.site([i + (corner & 1), j + (corner >> 1 & 1), k + (corner >> 2)]))
     }
 
-    /// The first corner of a cell (m).
+    /// Returns the position (m) of a cell's first corner.
     pub fn cell_m(&self, cell: usize) -> DVec3 {
         self.at_m(self.cell_at(cell))
     }
 
-    /// The cell of the box that holds a point or is nearest to it.
+    /// Returns the cell of the box that holds a point or is nearest to it.
     pub fn cell_near(&self, point_m: DVec3) -> [usize; 3] {
         let from = (point_m - self.origin_m) / self.spacing_m;
         std::array::from_fn(|axis| (from[axis].max(0.0) as usize).min(self.cells[axis] - 1))
@@ -96,7 +96,8 @@ impl Sites {
     }
 }
 
-/// Weights of a cell's corners at a point of it, given in units of the spacing from its first corner: the trilinear shape functions.
+/// Returns the weights of a cell's corners at a point of it, given in units of the spacing from its first corner: the
+/// trilinear shape functions.
 pub fn trilinear(local: DVec3) -> [f64; 8] {
     CORNERS.map(|corner| {
         let factor = |axis: usize| if corner[axis] == 0.0 { 1.0 - local[axis] } else { local[axis] };
@@ -118,7 +119,7 @@ mod tests {
     }
 
     #[test]
-    fn numbers_and_places_agree() {
+    fn numbers_and_positions_agree() {
         let sites = Sites::covering((DVec3::ZERO, DVec3::new(0.3, 0.2, 0.4)), 0.1, DVec3::ZERO);
         for cell in 0..sites.cell_count() {
             assert_eq!(sites.cell(sites.cell_at(cell)), cell);

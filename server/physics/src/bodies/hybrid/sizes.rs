@@ -1,44 +1,49 @@
-//! Cells of two sizes: those of the lattice near the surface, and deeper down eight of them merged into one.
+//! Cells of two sizes: near the surface those of the lattice, deeper down cells merged from eight of them.
 //!
-//! Blocks of 2 × 2 × 2 cells whose first corner is at even sites become one cell of twice the spacing, with particles at its own corners only. A site in the middle of one of its
-//! edges or faces *hangs*: cells of the spacing beside it have a corner there that is no particle, and moves with the mean of those at the ends of the edge or corners of the face, as the
-//! doubled cell does there. Displacements so are continuous.
+//! Blocks of 2 × 2 × 2 cells whose first corner is at even sites become one cell of twice the spacing, with particles
+//! at its own corners only. A site in the middle of one of its edges or faces *hangs*: smaller cells beside it have a
+//! corner there that is no particle. It moves by the mean of the particles at the ends of the edge, or at the corners
+//! of the face, as the doubled cell does there, so that displacements are continuous.
 //!
-//! A cell beside a doubled one shares one corner, `v`, with the block of eight that it would belong to. Where the corner along axes `A` from it hangs, the block's own corner in
-//! that direction takes its place among the cell's particles, so that it has eight again. With corners numbered by bits (`sites`), and particles likewise,
+//! A cell beside a doubled one shares one corner, `v`, with the block of eight that it would belong to. Where the
+//! corner along axes `A` from it hangs, the block's own corner in that direction takes its place among the cell's
+//! particles, so that it has eight again. With corners numbered by bits (`sites`), and particles likewise,
 //! ```text
-//! y_c = Σ_p T_cp y_p        T_cp = 2^−|A| for p = v ⊕ B, B ⊆ A, of a corner c = v ⊕ A that hangs;  T_cc = 1 of one that does not
+//! y_c = Σ_p T_cp y_p
+//! T_cp = 2^−|A| for p = v ⊕ B, B ⊆ A, of a corner c = v ⊕ A that hangs;  T_cc = 1 of one that does not
 //! ```
-//! If the middle of a face hangs, so do those of its edges: what `T` refers to is there. All that is linear in a cell's corners goes over to its particles by `Tᵀ`: gradients, hourglasses, weights,
-//! masses. Affine motion is reproduced as before, and uniform stress is balanced as before, for what the fine cells put on a hanging site is handed on as the doubled cell's own force there is.
+//! If the middle of a face hangs, so do those of its edges: the corners that `T` refers to exist. All that is linear in
+//! a cell's corners (gradients, hourglasses, weights, masses) is transferred to its particles by `Tᵀ`. Affine motion is
+//! reproduced as before, and uniform stress is balanced as before, since the force of small cells on a hanging site is
+//! distributed as the doubled cell's own force there is.
 use super::{moments::CellMoments, sites::Sites};
 use std::ops::{Add, Mul};
 
 /// Which corners of a cell hang.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Hanging {
-    /// A bit per corner.
+    /// A bit per corner, set where it hangs.
     corners: u8,
     /// The corner that the cell shares with its block.
     shared: u8,
 }
 
 impl Hanging {
-    /// No corner.
+    /// No corner hangs.
     pub const NONE: Self = Self { corners: 0, shared: 0 };
 
-    /// Corners of a cell at `at` (in cells from the lattice's origin).
+    /// Collects which corners of a cell hang; the cell is given in cells from the lattice's origin.
     pub fn new([i, j, k]: [usize; 3], hangs: impl Fn(usize) -> bool) -> Self {
         let corners = (0..8).filter(|&corner| hangs(corner)).fold(0, |bits, corner| bits | 1 << corner);
         Self { corners, shared: (i & 1 | (j & 1) << 1 | (k & 1) << 2) as u8 }
     }
 
-    /// Whether some corner hangs.
+    /// Returns whether some corner hangs.
     pub fn any(self) -> bool {
         self.corners != 0
     }
 
-    /// `Tᵀ a`: what corners have, as it is for the cell's particles.
+    /// Returns `Tᵀ a`: values of the cell's corners, distributed to its particles.
     #[must_use]
     pub fn to_particles<T: Copy + Add<Output = T> + Mul<f64, Output = T>>(self, of_corners: [T; 8]) -> [T; 8] {
         if !self.any() {
@@ -62,13 +67,14 @@ impl Hanging {
     }
 }
 
-/// The site of the block's corner in whose direction a corner of a cell lies.
+/// Returns the site of the corner of a cell's block that has the same number as the cell's corner.
 pub fn corner_of_block(sites: &Sites, cell: [usize; 3], corner: usize) -> usize {
     sites.site(std::array::from_fn(|axis| (cell[axis] & !1) + 2 * (corner >> axis & 1)))
 }
 
-/// Merges blocks of eight cells that lie beneath so many layers, where `may_merge` allows it of the cells' numbers. The first layer are the cells that the surface cuts, and those that touch one that is
-/// not there; those of the next touch them.
+/// Merges blocks of eight cells that lie beneath so many layers, where `may_merge` allows it for the cells' numbers.
+/// The first layer is made of the cells that the surface cuts and of those that touch a cell which does not exist; each
+/// further layer of the cells that touch the one before.
 pub fn merge(
     sites: &Sites,
     cells: Vec<CellMoments>,
@@ -103,12 +109,12 @@ pub fn merge(
     merged
 }
 
-/// The cells of the block that begins there.
+/// Returns the cells of the block whose first cell is given.
 pub fn eight(sites: &Sites, [i, j, k]: [usize; 3]) -> [usize; 8] {
     std::array::from_fn(|c| sites.cell([i + (c & 1), j + (c >> 1 & 1), k + (c >> 2)]))
 }
 
-/// Leaves those set that have as many set beside them along an axis, both ways.
+/// Leaves those set that have at least `depth` set beside them along an axis, on both sides.
 fn erode(sites: &Sites, is_set: &mut [bool], axis: usize, depth: usize) {
     let counts = sites.cells();
     let stride = counts[..axis].iter().product::<usize>();
@@ -132,7 +138,7 @@ fn erode(sites: &Sites, is_set: &mut [bool], axis: usize, depth: usize) {
     }
 }
 
-/// Which sites are corners of cells and which of these hang.
+/// Returns which sites are corners of cells, and which of these hang.
 pub fn mark(sites: &Sites, cells: &[CellMoments]) -> Vec<Site> {
     let mut marks = vec![Site::Unused; sites.site_count()];
     for cell in cells.iter().filter(|cell| cell.doubled) {
@@ -161,11 +167,11 @@ pub fn mark(sites: &Sites, cells: &[CellMoments]) -> Vec<Site> {
 /// What a site of the lattice is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Site {
-    /// No corner of any cell.
+    /// It is no corner of any cell.
     Unused,
-    /// A particle.
+    /// It is a particle.
     Particle,
-    /// In the middle of an edge or a face of a doubled cell.
+    /// It hangs: it is in the middle of an edge or a face of a doubled cell.
     Hangs,
 }
 
@@ -173,13 +179,14 @@ pub enum Site {
 mod tests {
     use super::*;
     use crate::bodies::hybrid::{
+        moments::Moments,
         partition::{NONE, Partition},
         sites::{CORNERS, trilinear},
-        testing::balls_in_cage,
+        testing::embedded_balls,
     };
     use std::collections::BTreeMap;
 
-    /// How particles move a corner of a cell.
+    /// Returns the weights with which particles move a corner of a cell.
     fn at_corner(partition: &Partition, cell: usize, corner: usize) -> BTreeMap<u32, f64> {
         let mut one = [0.0; 8];
         one[corner] = 1.0;
@@ -192,7 +199,7 @@ mod tests {
 
     #[test]
     fn displacements_are_continuous_between_cells_of_two_sizes() {
-        let [one_size, partition] = balls_in_cage();
+        let [one_size, partition] = embedded_balls();
         let sites = *partition.sites();
         let doubled = partition.cells().iter().filter(|cell| cell.doubled).count();
         assert_eq!(one_size.cells().len(), partition.cells().len() + 7 * doubled);
@@ -227,14 +234,14 @@ mod tests {
         assert!(doubled > 50 && shared > 5000 && hanging > 200, "{doubled} {shared} {hanging}");
     }
 
-    /// As a cell at rest is eight of half its edge.
+    /// A doubled cell at rest is eight cells of half its edge.
     #[test]
-    fn particles_reproduce_places_and_volume() {
-        let [_, partition] = balls_in_cage();
+    fn particles_reproduce_positions_and_volume() {
+        let [_, partition] = embedded_balls();
         for number in 0..partition.cells().len() {
             let cell = partition.cells()[number];
             let first_m = partition.sites().cell_m(cell.site_cell as usize);
-            let places_m = partition.corners(number).map(|p| partition.particle_m(p));
+            let positions_m = partition.corners(number).map(|p| partition.particle_m(p));
             for corner in 0..8 {
                 let at_m: glam::DVec3 = at_corner(&partition, number, corner)
                     .into_iter()
@@ -242,20 +249,20 @@ mod tests {
                     .sum();
                 assert!((at_m - first_m - CORNERS[corner] * partition.edge_m(number)).length() < 1e-16);
             }
-            let (volume_m3, gradients_m2) = partition.moments(number);
+            let Moments { volume_m3, gradients_m2 } = partition.moments(number);
             let rest = partition.rest_cell(number, 1.0);
             for axis in 0..3 {
-                let column: glam::DVec3 = gradients_m2.iter().zip(places_m).map(|(g, x)| *g * x[axis]).sum();
+                let column: glam::DVec3 = gradients_m2.iter().zip(positions_m).map(|(g, x)| *g * x[axis]).sum();
                 assert!((column - glam::DVec3::AXES[axis] * volume_m3).length() < 1e-12 * 1e-9);
             }
-            assert!(rest.amplitudes(&places_m).iter().all(|q| q.length() < 1e-16));
+            assert!(rest.amplitudes(&positions_m).iter().all(|q| q.length() < 1e-16));
             assert!((partition.particles_m3(number).iter().sum::<f64>() / volume_m3 - 1.0).abs() < 1e-14);
         }
     }
 
     #[test]
     fn only_what_is_whole_and_deep_enough_is_merged() {
-        let [one_size, _] = balls_in_cage();
+        let [one_size, _] = embedded_balls();
         let sites = *one_size.sites();
         let is_whole = |at: [usize; 3]| {
             let cell = one_size.cell_at(sites.cell(at));
@@ -265,8 +272,8 @@ mod tests {
             .map(|number| CellMoments {
                 cell: one_size.cells()[number].site_cell as usize,
                 doubled: false,
-                volume_m3: one_size.moments(number).0,
-                gradients_m2: (!one_size.is_whole(number)).then(|| Box::new(one_size.moments(number).1)),
+                volume_m3: one_size.moments(number).volume_m3,
+                gradients_m2: (!one_size.is_whole(number)).then(|| Box::new(one_size.moments(number).gradients_m2)),
             })
             .collect();
         for layers in 1..4 {

@@ -1,4 +1,4 @@
-//! The fine surface of a hybrid body: what bounds its volume, what tools touch and viewers see.
+//! The skin, the fine surface of a hybrid body: it bounds the body's volume; tools touch it, and viewers see it.
 use glam::DVec3;
 use std::collections::BTreeMap;
 use thiserror::Error;
@@ -13,7 +13,7 @@ pub struct Skin {
 /// Why a surface bounds no volume.
 #[derive(Debug, Clone, PartialEq, Error)]
 pub enum SkinError {
-    /// No triangles.
+    /// It has no triangles.
     #[error("the fine surface has no triangles")]
     Empty,
     /// A coordinate is NaN or infinite.
@@ -34,9 +34,10 @@ pub enum SkinError {
         /// Number of vertices.
         vertices: usize,
     },
-    /// An edge without a partner in the other sense.
+    /// An edge has no partner of the opposite sense.
     #[error(
-        "the fine surface is not closed: the edge from vertex {} to vertex {} has {found} neighbours on its other side, not one",
+        "the fine surface is not closed: the edge from vertex {} to vertex {} has {found} \
+         neighbours on its other side, not one",
         edge[0], edge[1]
     )]
     Open {
@@ -54,10 +55,10 @@ pub enum SkinError {
 }
 
 impl Skin {
-    /// Checks and takes a surface.
+    /// Checks a surface and makes it a skin.
     ///
     /// # Errors
-    /// The first [`SkinError`] found.
+    /// Returns the first [`SkinError`] found.
     pub fn new(positions_m: Vec<DVec3>, triangles: Vec<[u32; 3]>) -> Result<Self, SkinError> {
         if triangles.is_empty() {
             return Err(SkinError::Empty);
@@ -77,22 +78,22 @@ impl Skin {
         if volume_m3 > 0.0 { Ok(skin) } else { Err(SkinError::InsideOut { volume_m3 }) }
     }
 
-    /// Positions (m).
+    /// Returns the positions (m) of its vertices.
     pub fn positions_m(&self) -> &[DVec3] {
         &self.positions_m
     }
 
-    /// Triangles as vertex indices.
+    /// Returns the triangles as indices of vertices.
     pub fn triangles(&self) -> &[[u32; 3]] {
         &self.triangles
     }
 
-    /// Corners (m) of a triangle.
+    /// Returns the corners (m) of a triangle.
     pub fn corners_m(&self, triangle: usize) -> [DVec3; 3] {
         self.triangles[triangle].map(|v| self.positions_m[v as usize])
     }
 
-    /// Enclosed volume (m³), `⅙ Σ a·(b × c)`.
+    /// Returns the enclosed volume (m³), `⅙ Σ a·(b × c)`.
     pub fn volume_m3(&self) -> f64 {
         let sixth = |t| {
             let [a, b, c]: [DVec3; 3] = self.corners_m(t);
@@ -101,7 +102,7 @@ impl Skin {
         (0..self.triangles.len()).map(sixth).sum()
     }
 
-    /// Corners (m) of the bounding box.
+    /// Returns the lower and upper corner (m) of the bounding box.
     pub fn bounds_m(&self) -> (DVec3, DVec3) {
         let used = self.triangles.iter().flatten().map(|&v| self.positions_m[v as usize]);
         used.fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(low, high), p| (low.min(p), high.max(p)))

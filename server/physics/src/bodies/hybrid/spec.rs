@@ -1,4 +1,4 @@
-//! What a body's particles are made from.
+//! The specification of a hybrid body.
 use super::skin::Skin;
 use crate::{
     elements::solid::{Solid, SolidError},
@@ -8,7 +8,7 @@ use crate::{
 use glam::DVec3;
 use thiserror::Error;
 
-/// More cells than this in the lattice's box are refused: their numbers, and memory.
+/// More cells than this in the lattice's box are refused: their numbers have to fit an index, and they take memory.
 pub const MOST_CELLS: f64 = 5e8;
 /// More active particles than this are refused.
 pub const MOST_ACTIVE: usize = 20_000;
@@ -25,27 +25,30 @@ pub struct HybridSpec {
 /// The particles of a hybrid body.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ParticleSpec {
-    /// The body's surface at rest: what bounds its volume, what tools touch and viewers see. As fine as the lattice, or finer.
+    /// The body's surface at rest, which bounds its volume, is touched by tools and seen by viewers. It should be as
+    /// fine as the lattice, or finer.
     pub skin: Skin,
     /// Spacing h (m) of the lattice.
     pub spacing_m: f64,
-    /// How thick (m) the layer of cells of this spacing is at the surface: so many as begin within it, and at least one. Deeper down blocks of eight are merged into cells of twice the
-    /// spacing (`sizes`); none is where this is `None`.
+    /// Thickness (m) of the layer of cells of this spacing at the surface; it has as many cells as begin within this
+    /// depth, and at least one. Deeper down blocks of eight are merged into cells of twice the spacing (`sizes`); with
+    /// `None` no cells are merged.
     pub fine_depth_m: Option<f64>,
-    /// A point (m) that planes of the lattice pass through; best on a surface that is held, so that no cell reaches past it.
+    /// A point (m) that planes of the lattice pass through; best on a surface that is held, so that no cell reaches
+    /// past it.
     pub lattice_through_m: DVec3,
-    /// Most particles awake at once.
+    /// Largest number of particles that are active at once.
     pub most_active: usize,
-    /// What wakes them.
+    /// What wakes particles.
     pub waking: Waking,
 }
 
 /// What wakes particles.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Waking {
-    /// Nothing but [`crate::world::wake_only`].
+    /// They wake by nothing but [`crate::world::wake_only`].
     ByHand,
-    /// Tools near the skin: those within `reach_m` (m, at rest) of where it is touched or about to be.
+    /// Tools near the skin wake those within `reach_m` (m, at rest) of where it is touched or about to be.
     ByTools {
         /// Radius (m) at rest.
         reach_m: f64,
@@ -55,13 +58,13 @@ pub enum Waking {
 /// Why particles cannot be made.
 #[derive(Debug, Clone, PartialEq, Error)]
 pub enum HybridError {
-    /// The coarse level.
+    /// The coarse level is refused.
     #[error(transparent)]
     Solid(#[from] SolidError),
-    /// Settings, constraints, loads or tools.
+    /// Settings, constraints, loads or tools are refused.
     #[error(transparent)]
     Environment(#[from] EnvironmentError),
-    /// A number outside its range.
+    /// A number is outside its range.
     #[error("{name} = {value}: {rule}")]
     Setting {
         /// Name.
@@ -73,7 +76,8 @@ pub enum HybridError {
     },
     /// The lattice is too fine for the body.
     #[error(
-        "a lattice of {spacing_m} m over this body has {cells:.1e} cells, more than {MOST_CELLS:.0e}; take a larger spacing"
+        "a lattice of {spacing_m} m over this body has {cells:.1e} cells, more than {MOST_CELLS:.0e}; \
+         take a larger spacing"
     )]
     TooMany {
         /// Spacing (m).
@@ -87,24 +91,25 @@ pub enum HybridError {
         /// Spacing (m).
         spacing_m: f64,
     },
-    /// Something that only bodies without particles have.
+    /// Something was asked for that only bodies without particles have.
     #[error("{what} is not there for bodies with particles; {instead}")]
     NotForParticles {
-        /// What.
+        /// What was asked for.
         what: &'static str,
-        /// What to do.
+        /// What to do instead.
         instead: &'static str,
     },
 }
 
-/// Layers of cells that begin within a depth (m), at least one.
+/// Returns the number of layers of cells that begin within a depth (m), at least one.
 pub fn fine_layers(depth_m: f64, spacing_m: f64) -> usize {
-    // A depth of whole cells, but for rounding, is that many.
+    // A depth of whole cells, but for rounding, has that many layers.
     (depth_m / spacing_m - 1e-9).ceil().max(1.0) as usize
 }
 
 impl ParticleSpec {
-    /// Layers of cells of the lattice's spacing at the surface, where deeper ones are merged.
+    /// Returns the number of layers of cells of the lattice's spacing at the surface; `None` where deeper ones are not
+    /// merged.
     pub(super) fn fine_layers(&self) -> Option<usize> {
         self.fine_depth_m.map(|depth_m| fine_layers(depth_m, self.spacing_m))
     }

@@ -1,11 +1,12 @@
-//! The patch of a switch to come, laid out in slices over the ticks before it: one tick has no time for all of it.
+//! The staged patch: the next patch, laid out in slices over the ticks before its switch, since one tick has no time
+//! for all of it.
 use super::{body::HybridBody, running::RunningPatch};
 
-/// A patch beside the one that runs.
+/// A patch that is prepared beside the one that runs.
 #[derive(Debug, Clone)]
 pub(super) struct StagedPatch {
     pub(super) patch: RunningPatch,
-    /// Slices that are done, for the particles that the patch has.
+    /// Number of slices that are done for the particles that the patch has.
     done: u32,
 }
 
@@ -14,7 +15,7 @@ impl StagedPatch {
         Self { patch, done: 0 }
     }
 
-    /// The next slice, for these particles: from the first one where the last was for others. Allocates nothing.
+    /// Does the next slice for these particles; it is the first one if the last was for others. Allocates nothing.
     pub(super) fn go_on(&mut self, body: &HybridBody, particles: &[u32]) {
         if self.done > 0 && self.patch.active() != particles {
             self.done = 0;
@@ -25,7 +26,7 @@ impl StagedPatch {
         }
     }
 
-    /// All slices that are left.
+    /// Does all slices that are left.
     pub(super) fn finish(&mut self, body: &HybridBody, particles: &[u32]) {
         self.go_on(body, particles);
         while self.done < RunningPatch::SLICES {
@@ -33,7 +34,7 @@ impl StagedPatch {
         }
     }
 
-    /// Makes it the one that runs.
+    /// Exchanges it with the patch that runs.
     pub(super) fn swap(&mut self, running: &mut RunningPatch) {
         self.patch.number_after(running);
         std::mem::swap(&mut self.patch, running);

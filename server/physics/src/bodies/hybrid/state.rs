@@ -1,68 +1,70 @@
-//! What a tick changes of a hybrid body beside positions and velocities: which particles are active, and what of them still fades.
+//! The state of a hybrid body beside positions and velocities: which particles are active, their prestrain, and the
+//! transition force.
 use super::{body::HybridBody, long_steps::LongSteps, prestrain::PrestrainDecay, spec::Waking, switching::Ball};
 use crate::hash::Chain;
 use crate::{contact::ToolSpec, tick::MechanicalState};
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
-/// Active particles, and what of them still fades. Their positions and velocities follow those of the coarse nodes in
-/// [`MechanicalState::x`] and [`MechanicalState::v`].
+/// What a tick changes of a hybrid body beside its [`MechanicalState`], whose lists `x` and `v` have the values of the
+/// coarse nodes first, then those of the active particles.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct HybridState {
     /// Active particles, ascending.
     ids: Vec<u32>,
-    /// Those to be: others while a switch is coming.
+    /// Particles that are to be active next; others than `ids` while a switch is being prepared.
     pub(super) next: Vec<u32>,
-    /// Those to be after that: what is to sleep does so first, what is to wake follows.
+    /// Particles that are wanted awake. Where some have to fall asleep and others to wake, `next` first has those that
+    /// stay awake, and then all of these.
     pub(super) wanted: Vec<u32>,
-    /// Of every place of every tool.
+    /// The ball of every axis sample of every tool.
     pub(super) balls: Vec<Option<Ball>>,
-    pub(crate) fading: PrestrainDecay,
-    /// Balancing forces (N), as many as positions, or none.
-    pub(super) balance_n: Vec<DVec3>,
-    /// Energy (J) that fading strains and balancing forces gave lately, beyond what they and switches took.
+    pub(crate) prestrain: PrestrainDecay,
+    /// The transition force (N), of as many entries as there are positions, or none.
+    pub(super) transition_force_n: Vec<DVec3>,
+    /// Energy (J) that decaying prestrain and the transition force gave lately, beyond what they and switches took.
     pub(crate) given_j: f64,
-    /// Elastic energy (J) of what a switch lately changed, the most of any.
+    /// Largest elastic energy (J) of what any recent switch changed.
     pub(super) switched_j: f64,
     pub(crate) long_steps: LongSteps,
 }
 
 impl HybridState {
-    /// All particles sleep.
+    /// Makes the state of a body whose particles all sleep.
     pub(crate) fn at_rest(body: &HybridBody, tools: &[ToolSpec]) -> Self {
         let (most, positions) = (body.particles.most_active, body.most_positions());
         Self {
             ids: Vec::with_capacity(most),
             next: Vec::with_capacity(most),
             wanted: Vec::with_capacity(most),
-            balls: vec![None; places(body, tools).sum()],
-            fading: PrestrainDecay::with_room(
+            balls: vec![None; axis_sample_counts(body, tools).sum()],
+            prestrain: PrestrainDecay::with_room(
                 room_for_cells(body, body.particles.most_active),
-                body.partition.shares().len(),
+                body.partition.residual_elements().len(),
             ),
-            balance_n: Vec::with_capacity(positions),
+            transition_force_n: Vec::with_capacity(positions),
             given_j: 0.0,
             switched_j: 0.0,
             long_steps: LongSteps::with_room(body.node_count(), positions),
         }
     }
 
-    /// Their numbers.
+    /// Returns the active particles, ascending.
     pub fn ids(&self) -> &[u32] {
         &self.ids
     }
 
-    /// What of them and of the coarse tets woke or fell asleep strained.
-    pub fn fading(&self) -> &PrestrainDecay {
-        &self.fading
+    /// Returns the prestrain of cells that woke, and of coarse tets, while they were strained.
+    pub fn prestrain(&self) -> &PrestrainDecay {
+        &self.prestrain
     }
 
-    /// How many.
+    /// Returns the number of active particles.
     pub fn len(&self) -> usize {
         self.ids.len()
     }
 
-    /// Takes what is wanted: at first those of it that are awake, where others are, too.
+    /// Sets the wanted particles. Where particles are active that are not wanted, those that are both come next.
     pub(super) fn want(&mut self, wanted: &[u32]) {
         self.wanted.clear();
         self.wanted.extend_from_slice(wanted);
@@ -80,31 +82,31 @@ impl HybridState {
         self.next != self.ids
     }
 
-    /// Whether all sleep.
+    /// Returns whether all particles sleep.
     pub fn is_empty(&self) -> bool {
         self.ids.is_empty()
     }
 
-    /// Whether an active particle is at a cell.
+    /// Returns whether a cell has an active particle.
     fn touches(&self, body: &HybridBody, cell: u32) -> bool {
         let is_active = |particle: &u32| self.ids.binary_search(particle).is_ok();
         (cell as usize) < body.partition.cells().len() && body.partition.corners(cell as usize).iter().any(is_active)
     }
 
-    /// All particles sleep, in the buffers there are.
+    /// Lets all particles sleep, without allocating.
     pub(crate) fn clear(&mut self) {
         self.ids.clear();
         self.next.clear();
         self.wanted.clear();
         self.balls.fill(None);
-        self.fading.clear();
-        self.balance_n.clear();
+        self.prestrain.clear();
+        self.transition_force_n.clear();
         self.given_j = 0.0;
         self.switched_j = 0.0;
         self.long_steps.forget();
     }
 
-    /// Adds all of it.
+    /// Adds all of the state to a hash.
     pub(crate) fn chain(&self, chain: &mut Chain) {
         for list in [&self.ids, &self.next, &self.wanted] {
             chain.wholes(list);
@@ -115,8 +117,8 @@ impl HybridState {
                 chain.whole(u64::from(ball.away_ticks));
             });
         });
-        self.fading.chain(chain);
-        chain.vectors(&self.balance_n);
+        self.prestrain.chain(chain);
+        chain.vectors(&self.transition_force_n);
         chain.real(self.given_j);
         chain.real(self.switched_j);
         self.long_steps.chain(chain);
@@ -127,35 +129,37 @@ impl HybridState {
         self.next.clone_from(&other.next);
         self.wanted.clone_from(&other.wanted);
         self.balls.clone_from(&other.balls);
-        self.fading.copy_from(&other.fading);
-        self.balance_n.clone_from(&other.balance_n);
+        self.prestrain.copy_from(&other.prestrain);
+        self.transition_force_n.clone_from(&other.transition_force_n);
         self.given_j = other.given_j;
         self.switched_j = other.switched_j;
         self.long_steps.copy_from(&other.long_steps);
     }
 
-    /// Whether they are ascending, may be awake, and have room.
+    /// Returns whether a state read from a snapshot fits the body: particles are ascending, may wake and have room, and
+    /// all numbers are finite.
     pub(crate) fn fits(&self, body: &HybridBody, tools: &[ToolSpec]) -> bool {
         let (nodes, positions) = (body.node_count(), body.node_count() + self.ids.len());
         let may_wake = |id: &u32| body.may_wake(*id);
         let finite = |ball: &Ball| ball.rest_m.is_finite();
-        self.balls.len() == places(body, tools).sum::<usize>()
+        self.balls.len() == axis_sample_counts(body, tools).sum::<usize>()
             && self.balls.iter().flatten().all(finite)
-            && self.fading.is_finite()
-            && [0, positions].contains(&self.balance_n.len())
-            && self.balance_n.iter().all(|force| force.is_finite())
+            && self.prestrain.is_finite()
+            && [0, positions].contains(&self.transition_force_n.len())
+            && self.transition_force_n.iter().all(|force| force.is_finite())
             && self.given_j.is_finite()
             && self.switched_j.is_finite()
             && self.long_steps.fit(nodes, positions)
-            && self.fading.is_sorted()
-            && self.fading.cells.iter().all(|fade| self.touches(body, fade.cell))
-            && self.fading.tets.iter().all(|fade| (fade.tet as usize) < body.coarse().tets().len())
+            && self.prestrain.is_sorted()
+            && self.prestrain.cells.iter().all(|prestrain| self.touches(body, prestrain.cell))
+            && self.prestrain.tets.iter().all(|prestrain| (prestrain.tet as usize) < body.coarse().tets().len())
             && [&self.ids, &self.next, &self.wanted].into_iter().all(|list| {
                 list.len() <= body.particles.most_active && list.is_sorted_by(|a, b| a < b) && list.iter().all(may_wake)
             })
     }
 
-    /// Goes over to these particles, which have room and may wake, of a body at rest.
+    /// Switches a body at rest to the given active particles; they must be no more than there is room for, and each
+    /// must be allowed to wake.
     pub(crate) fn wake_at_rest(&mut self, ids: &[u32], state: &mut MechanicalState) {
         self.ids.clear();
         self.ids.extend_from_slice(ids);
@@ -166,7 +170,8 @@ impl HybridState {
         }
     }
 
-    /// Goes over to the particles that are to be active next. `moved` is a buffer. Allocates nothing where there is room.
+    /// Switches to the particles that are to be active next: what wakes starts where, and as fast as, it followed.
+    /// `moved` is a buffer. Allocates nothing where there is room.
     pub(super) fn switch(&mut self, body: &HybridBody, state: &mut MechanicalState, moved: &mut Vec<DVec3>) {
         let nodes = body.node_count();
         for list in [&mut state.x, &mut state.v] {
@@ -183,22 +188,23 @@ impl HybridState {
             list.resize(nodes + self.next.len(), DVec3::ZERO);
         }
         self.ids.clone_from(&self.next);
-        self.balance_n.clear();
+        self.transition_force_n.clear();
         self.long_steps.forget();
         state.force_is_current = false;
     }
 }
 
-/// Most awake cells of a body while no more particles are active than these.
+/// Returns the largest number of cells that are awake while no more than `most_active` particles are active.
 pub(super) fn room_for_cells(body: &HybridBody, most_active: usize) -> usize {
     (body.partition().most_cells_at() * most_active).min(body.partition().cells().len())
 }
 
-/// Places of each tool that may keep particles awake: so near to one another that the balls about them overlap.
-pub(super) fn places(body: &HybridBody, tools: &[ToolSpec]) -> impl Iterator<Item = usize> + Clone {
+/// Returns the number of axis samples of each tool that may keep particles awake: they are so near to one another that
+/// the balls about them overlap.
+pub(super) fn axis_sample_counts(body: &HybridBody, tools: &[ToolSpec]) -> impl Iterator<Item = usize> + Clone {
     let apart_m = match body.particles.waking {
         Waking::ByTools { reach_m } => reach_m,
         Waking::ByHand => f64::INFINITY,
     };
-    tools.iter().map(move |tool| tool.place_count(apart_m))
+    tools.iter().map(move |tool| tool.axis_sample_count(apart_m))
 }

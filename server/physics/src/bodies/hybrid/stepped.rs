@@ -42,24 +42,24 @@ impl<'a> Stepped<'a> for SteppedHybrid<'a> {
         let MechanicalState { x, v, force_n, viscous, ledger, .. } = &mut *state;
         let every = tick.environment.steps.substeps_per_long_step;
         let (mut viscous_w, mut taken_j) = (0.0, 0.0);
-        own.fading.go_on(now.dt_s);
-        let left = own.fading.left();
+        own.prestrain.advance(now.dt_s);
+        let left = own.prestrain.left();
         own.long_steps.turn_with(body, x);
         if every > 1 && now.ends_long_step {
             let of_coarse = |forces_n: &mut [DVec3]| patch.add_coarse_forces_n(v, left, forces_n);
             let found = own.long_steps.evaluate(body.node_count(), of_coarse);
             viscous_w += f64::from(every) * found.viscous_w;
-            taken_j += own.fading.take_along(0, found.fading_j, f64::from(every) * now.dt_s);
+            taken_j += own.prestrain.take_along(0, found.prestrain_j, f64::from(every) * now.dt_s);
         }
         own.long_steps.start_with_steady_n(force_n);
         if every == 1 {
             let found = patch.add_coarse_forces_n(v, left, force_n);
             viscous_w += found.viscous_w;
-            taken_j += own.fading.take_along(0, found.fading_j, now.dt_s);
+            taken_j += own.prestrain.take_along(0, found.prestrain_j, now.dt_s);
         }
         let found = patch.add_cell_forces_n(body, v, left, force_n);
         viscous_w += found.viscous_w;
-        taken_j += own.fading.take_along(1, found.fading_j, now.dt_s);
+        taken_j += own.prestrain.take_along(1, found.prestrain_j, now.dt_s);
         viscous.record(viscous_w, now.dt_s > 0.0);
         ledger.dissipated_j += taken_j;
         own.given_j -= taken_j;
@@ -68,19 +68,19 @@ impl<'a> Stepped<'a> for SteppedHybrid<'a> {
             patch.metric().add_weight_n(gravity, &mut state.force_n);
         }
         vector_operations::add(&mut state.force_n, &state.external_n);
-        scratch.balance.apply(body, own, state);
+        scratch.transition.apply(body, own, state);
         state.force_is_current = true;
     }
 
-    /// Velocities are not those that the last kick left.
+    /// Forgets the energy that the last kick left: velocities have changed since.
     fn begin_kicks(&mut self) {
         self.scratch.of_free_j = None;
     }
 
-    /// `v ← (v e^{−c h/2} + h M'⁻¹ f) e^{−c h/2}`, and the ledger's share of it, as of a body of tets.
+    /// Kicks, `v ← (v e^{−c h/2} + h M'⁻¹ f) e^{−c h/2}`, and books the work in the ledger, as for a body of tets.
     fn kick(&mut self, environment: &Environment, state: &mut MechanicalState, h_s: f64, ends_long_step: bool) {
         let Self { body, own, scratch } = self;
-        let HybridScratch { patch, accelerations, momenta, of_free_j, kick_sq, balance, .. } = &mut **scratch;
+        let HybridScratch { patch, accelerations, momenta, of_free_j, kick_sq, transition, .. } = &mut **scratch;
         accelerations.clear();
         accelerations.extend_from_slice(&state.force_n);
         if ends_long_step {
@@ -92,13 +92,13 @@ impl<'a> Stepped<'a> for SteppedHybrid<'a> {
         let factor = (-0.5 * damping * h_s).exp();
         let (mut before_j, mut with_holders_j, mut power_w) = (0.0, 0.0, 0.0);
         if damping > 0.0 {
-            // Velocities are what the kick before left, once it is known what they have.
+            // Velocities are those that the kick before left, of which the energy is known from there.
             (before_j, with_holders_j) = of_free_j.unwrap_or_else(|| patch.metric().of_free_j(body, &state.v, momenta));
             power_w = factor * (vector_operations::dot(&state.v, accelerations) + of_holders_w);
         }
         *kick_sq = [patch.metric_mut().accelerate(accelerations), kick_sq[0], kick_sq[1]];
         let inertia_w = patch.metric().of_holders(&state.v, accelerations);
-        let taken_j = balance.work_j((&state.v, factor), accelerations, h_s);
+        let taken_j = transition.work_j(&state.v, factor, accelerations, h_s);
         state.ledger.dissipated_j += taken_j;
         own.given_j -= taken_j;
         let free_parts = if factor < 1.0 { body.free_parts() } else { &[] };
@@ -108,7 +108,7 @@ impl<'a> Stepped<'a> for SteppedHybrid<'a> {
             // (v + h M'⁻¹f)ᵀ M' (v + h M'⁻¹f) = vᵀM'v + 2h v·f + h² fᵀM'⁻¹f
             let between_j = factor * factor * before_j + h_s * (2.0 * power_w + h_s * kick_sq[0]);
             state.ledger.dissipated_j += 0.5 * (before_j + between_j) * -(-damping * h_s).exp_m1();
-            // What free velocities have with those of holders is linear in them.
+            // The energy that free velocities have with those of held nodes is linear in the former.
             let between_holders_j = factor * with_holders_j + h_s * inertia_w;
             state.ledger.dissipated_j += (with_holders_j + between_holders_j) * (1.0 - factor);
             *of_free_j = Some((factor * factor * between_j, factor * between_holders_j));
@@ -118,7 +118,7 @@ impl<'a> Stepped<'a> for SteppedHybrid<'a> {
         state.ledger.external_work_j += h_s * (of_holders_w + inertia_w);
     }
 
-    /// Kinetic energy (J) that velocities of held axes have by themselves and with free ones.
+    /// Returns the kinetic energy (J) that velocities of held axes have by themselves and with free ones.
     fn held_kinetic_j(&self, state: &MechanicalState) -> f64 {
         self.scratch.patch.metric().of_held_j(self.body, &state.v)
     }

@@ -1,18 +1,25 @@
-//! Which particles are awake: those near where a tool touches the skin or is about to, and those that have not come to rest yet.
+//! Switching wakes particles near where a tool touches the skin or is about to, and lets others fall asleep once they
+//! have come to rest.
 //!
-//! A tool wants the particles within a ball at rest, about the vertex of the skin nearest to it, or to where it is deepest in the body, from a gap of `g₀ + v·50 ms` on and until the gap
-//! has been twice that for 100 ms; the ball follows it in steps of a spacing. A capsule has several such balls, one for each place along its axis. A particle that no tool wants any more sleeps once it is as
-//! good as where it would be asleep, or when its room is needed.
+//! A tool wants the particles within a ball at rest, about the vertex of the skin nearest to it, or nearest to where it
+//! is deepest in the body. The ball exists from when the gap is less than `g₀ + v·50 ms` until the gap has been twice
+//! that for 100 ms, and follows the tool in steps of a spacing. A capsule has several such balls, one for each sample
+//! of its axis. A particle that no tool wants any more falls asleep once it is nearly where it would be asleep, or when
+//! its room is needed.
 //!
-//! Momentum through a switch: what wakes moves as it was moved (`metric`). What falls asleep hands over impulses, and all of it together a couple: with
-//! `m = (1 − ε) m_p`, the place `x_p = Σ_i ζ_pi x_i` where a particle is then, and the free nodes of its tets, of masses `M_i` about their middle `x̄`,
+//! A switch keeps momentum. What wakes moves as it was moved (`metric`). What falls asleep transfers impulses to the
+//! coarse nodes, and all of it together a couple: with `m = (1 − ε) m_p`, the position `x_p = Σ_i ζ_pi x_i` that a
+//! particle has then, and the free nodes of its tets, of masses `M_i` about their middle `x̄`,
 //! ```text
-//! J_i = Σ_p m ζ_pi (w_p − Σ_j ζ_pj v_j) + M_i α × (x_i − x̄)       Σ_i M_i (x_i − x̄) × (α × (x_i − x̄)) = Σ_p m (y_p − x_p) × w_p
+//! J_i = Σ_p m ζ_pi (w_p − Σ_j ζ_pj v_j) + M_i α × (x_i − x̄)
+//! Σ_i M_i (x_i − x̄) × (α × (x_i − x̄)) = Σ_p m (y_p − x_p) × w_p
 //! v ← v + M''⁻¹ J
 //! ```
-//! with the matrix `M''` of what stays awake: linear and angular momentum are kept. Coarse nodes are moved by `Δ_i` then (`projection`), for which the couple on the right has
-//! `−Σ_i Δ_i × P_i`, of the momenta `P = M'' v + J`.
+//! with the matrix `M''` of what stays awake. So linear and angular momentum are kept. Coarse nodes are moved by `Δ_i`
+//! then (`projection`), for which `−Σ_i Δ_i × P_i`, with the momenta `P = M'' v + J`, is added to the couple on the
+//! right.
 use super::{
+    activation_query::update_balls,
     body::HybridBody,
     carried_skin::SkinView,
     patch::KEPT,
@@ -20,63 +27,59 @@ use super::{
     running::RunningPatch,
     running_metric::RunningMetric,
     scratch::HybridScratch,
-    spec::{ParticleSpec, Waking},
-    state::{HybridState, places},
+    spec::Waking,
+    state::{HybridState, axis_sample_counts},
+    state_transfer::{NodeShifts, PatchSwitch},
     stepped::SteppedHybrid,
     transition_force::{Turn, turn_of},
 };
 use crate::{
-    contact::{Near, Skin, ToolSpec},
+    contact::ToolSpec,
     tick::{Environment, MechanicalState},
 };
 use glam::{BVec3, DVec3};
 use serde::{Deserialize, Serialize};
 
-/// Ticks in which a switch is prepared and done.
+/// Number of ticks in which a switch is prepared and done.
 const SWITCH_TICKS: u64 = 2 + RunningPatch::SLICES as u64;
-/// Ticks between two looks: after each, what is to sleep falls asleep, and then what is to wake wakes. Both in one tick would take it as long as both.
-const LOOK_EVERY_TICKS: u64 = 2 * SWITCH_TICKS;
-/// Time (s) ahead of which an approaching tool is seen.
-const AHEAD_S: f64 = 0.05;
-/// Ticks for which a tool has to be away.
-const AWAY_TICKS: u32 = 100;
-/// Gap over the tool's radius, and over the spacing, from which its particles are awake.
+/// Number of ticks between two activation queries. After each, what is to sleep falls asleep, and then what is to wake
+/// wakes: both in one tick would take too long.
+pub(super) const QUERY_EVERY_TICKS: u64 = 2 * SWITCH_TICKS;
+/// Gap, over the tool's radius and over the spacing, below which a tool's particles are awake.
 pub(crate) const GAP: f64 = 0.25;
-/// Way over the spacing that the skin's nearest point goes before a ball follows.
+/// Distance, over the spacing, that the skin's nearest vertex moves at rest before a ball follows.
 pub(crate) const FOLLOW: f64 = 0.9;
-/// Deviation over the spacing below which a particle may fall asleep.
-const SETTLED: f64 = 0.04;
 
-/// The ball that a tool keeps awake, at one of its places.
+/// The ball whose particles a tool keeps awake, about one of the samples of its axis.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Ball {
     /// Its middle at rest (m).
     pub(super) rest_m: DVec3,
-    /// For how many ticks the tool has been away.
+    /// Number of ticks for which the tool has been away.
     pub(super) away_ticks: u32,
 }
 
-/// Buffers of a look.
+/// An activation query, which finds the particles that are to be awake, and buffers of switches.
 #[derive(Debug, Clone, Default)]
 pub(super) struct ActivationQuery {
-    /// Squared distance (m²) and number of particles in a tool's balls.
-    found: Vec<(f64, u32)>,
-    /// Whether a particle is among these.
-    is_found: Vec<bool>,
-    /// Active particles to be.
-    wanted: Vec<u32>,
-    /// Active particles that nobody wants, with how far (m) they are from where they would be asleep.
-    unwanted: Vec<(f64, u32)>,
+    /// Particles in a tool's balls, each with its squared distance (m²).
+    pub(super) found: Vec<(f64, u32)>,
+    /// Whether each particle is among these.
+    pub(super) is_found: Vec<bool>,
+    /// Particles that are to be awake.
+    pub(super) wanted: Vec<u32>,
+    /// Active particles that no tool wants, each with its distance (m) from where it would be asleep.
+    pub(super) unwanted: Vec<(f64, u32)>,
     moved: Vec<DVec3>,
-    /// Momenta (kg m/s) handed to coarse nodes.
+    /// Impulses (kg m/s) transferred to coarse nodes.
     impulses: Vec<DVec3>,
-    /// Forces (N) handed to them.
-    handed_n: Vec<DVec3>,
+    /// Forces (N) transferred to coarse nodes.
+    transferred_n: Vec<DVec3>,
     projection: Projection,
-    /// Positions (m) of the coarse nodes before, and how far they are moved (m).
+    /// Positions (m) of the coarse nodes before a switch, and their displacements (m) by it.
     were_m: Vec<DVec3>,
     shifts_m: Vec<DVec3>,
-    /// Active particles that were.
+    /// Particles that were active before a switch.
     left: Vec<u32>,
     /// Masses (kg) of the free nodes of tets in which particles fall asleep, 0 of others.
     weights_kg: Vec<f64>,
@@ -94,7 +97,7 @@ impl ActivationQuery {
         Self {
             found: Vec::with_capacity(
                 in_ball
-                    .saturating_mul(places(body, tools).max().unwrap_or_default())
+                    .saturating_mul(axis_sample_counts(body, tools).max().unwrap_or_default())
                     .min(body.partition.particle_count()),
             ),
             is_found: vec![false; body.partition.particle_count()],
@@ -102,7 +105,7 @@ impl ActivationQuery {
             unwanted: Vec::with_capacity(most),
             moved: Vec::with_capacity(most),
             impulses: Vec::with_capacity(body.node_count() + most),
-            handed_n: Vec::with_capacity(body.node_count()),
+            transferred_n: Vec::with_capacity(body.node_count()),
             projection: Projection::with_room(body, most),
             were_m: Vec::with_capacity(body.node_count()),
             shifts_m: Vec::with_capacity(body.node_count()),
@@ -113,39 +116,40 @@ impl ActivationQuery {
 }
 
 impl SteppedHybrid<'_> {
-    /// Before a tick: makes the patch that of the state's active particles, and now and then looks which should be. Allocates nothing.
+    /// Prepares a tick: makes the patch that of the state's active particles, and every few ticks queries which should
+    /// be active, and switches to them. Allocates nothing.
     pub(super) fn switch_if_due(&mut self, environment: &Environment, state: &mut MechanicalState) {
         let Self { body, own, scratch } = self;
         let tick_period_s = environment.settings.tick_period_s;
         scratch.follow(body, own);
         own.long_steps.follow_coarse_forces(tick_period_s, &mut state.force_n);
-        if !own.fading.is_empty() || !own.balance_n.is_empty() {
-            scratch.fade(own, state, tick_period_s);
+        if !own.prestrain.is_empty() || !own.transition_force_n.is_empty() {
+            scratch.decay(own, state, tick_period_s);
         }
         let particles = &body.particles;
         let Waking::ByTools { reach_m } = particles.waking else { return };
-        match state.tick % LOOK_EVERY_TICKS {
+        match state.tick % QUERY_EVERY_TICKS {
             0 => {
-                let HybridScratch { patch, looking, .. } = &mut **scratch;
+                let HybridScratch { patch, query, .. } = &mut **scratch;
                 patch.displace(body, &state.x);
-                place_balls(environment, &mut SkinView::new(body, patch), body, own, state);
-                looking.want(body, &environment.tools, own, (reach_m, particles.most_active));
-                looking.keep_unsettled(patch, particles);
-                own.want(&looking.wanted);
+                update_balls(environment, &mut SkinView::new(body, patch), body, own, state);
+                query.want(body, &environment.tools, own, reach_m, particles.most_active);
+                query.keep_unsettled(patch, particles);
+                own.want(&query.wanted);
             }
             SWITCH_TICKS => own.next.clone_from(&own.wanted),
-            since_look if own.is_switching() => {
-                self.go_on_switching(environment, state, since_look % SWITCH_TICKS);
+            since_query if own.is_switching() => {
+                self.go_on_switching(environment, state, since_query % SWITCH_TICKS);
             }
             _ => {}
         }
     }
 
-    /// Lays the coming patch out, a slice a tick, then goes over to it.
+    /// Lays the staged patch out, a slice per tick, then switches to it.
     fn go_on_switching(&mut self, environment: &Environment, state: &mut MechanicalState, slice: u64) {
         let Self { body, own, scratch } = self;
         if slice <= u64::from(RunningPatch::SLICES) {
-            scratch.coming.go_on(body, &own.next);
+            scratch.staged.go_on(body, &own.next);
             return;
         }
         let were_current = state.force_is_current;
@@ -153,8 +157,9 @@ impl SteppedHybrid<'_> {
         state.contact.travelled_at_a_change(moved_m, were_current);
     }
 
-    /// Wakes these particles and no others, as tools would: what was active goes on, what wakes moves as the coarse nodes have moved
-    /// it. Particles that may not wake ([`HybridBody::may_wake`]), and those for which there is no room, are left out.
+    /// Wakes these particles and no others, as tools would: what was active stays as it is, what wakes moves as the
+    /// coarse nodes have moved it. Particles that may not wake ([`HybridBody::may_wake`]), and those for which there is
+    /// no room, are left out.
     pub(crate) fn wake_only(
         &mut self,
         environment: &Environment,
@@ -177,153 +182,103 @@ impl SteppedHybrid<'_> {
 }
 
 impl HybridScratch {
-    /// A tick's fading of balancing forces; strains fade with the substeps, until nothing is left to speak of.
-    fn fade(&mut self, own: &mut HybridState, state: &mut MechanicalState, tick_period_s: f64) {
-        own.fade_balance(tick_period_s);
-        if own.fading.has_faded() {
-            state.ledger.dissipated_j += own.fading.along_j();
-            own.given_j -= own.fading.along_j();
-            own.fading.clear();
-            self.patch.put_fades(&own.fading);
+    /// Lets the transition force decay over a tick, and leaves the prestrain out, which decays with the substeps, once
+    /// nearly nothing is left of it.
+    fn decay(&mut self, own: &mut HybridState, state: &mut MechanicalState, tick_period_s: f64) {
+        own.decay_transition_force(tick_period_s);
+        if own.prestrain.has_decayed() {
+            state.ledger.dissipated_j += own.prestrain.along_j();
+            own.given_j -= own.prestrain.along_j();
+            own.prestrain.clear();
+            self.patch.put_prestrains(&own.prestrain);
         }
     }
 
-    /// Goes over to the particles that are to be active next; returns a bound of how far (m) that moves any vertex of the skin: particles that fall asleep
-    /// go where they follow to, and coarse nodes, with what follows them, to what is nearest to those.
+    /// Switches to the particles that are to be active next. Returns a bound of how far (m) that moves any vertex of
+    /// the skin: particles that fall asleep move to where they follow, and coarse nodes, with what follows them, to the
+    /// projection of those.
     fn switch(&mut self, body: &HybridBody, gravity: DVec3, own: &mut HybridState, state: &mut MechanicalState) -> f64 {
-        self.coming.finish(body, &own.next);
-        let Self { patch, coming, looking, before, momenta, balance, .. } = self;
-        let next = &mut coming.patch;
+        self.staged.finish(body, &own.next);
+        let Self { patch, staged, query, before, momenta, transition, .. } = self;
+        let next = &mut staged.patch;
         let nodes = body.node_count();
         patch.displace(body, &state.x);
-        looking.impulses.clear();
-        looking.impulses.resize(nodes, DVec3::ZERO);
-        looking.weights_kg.clear();
-        looking.weights_kg.resize(nodes, 0.0);
-        looking.handed_n.clear();
-        looking.handed_n.resize(nodes, DVec3::ZERO);
-        looking.projection.start(nodes);
-        looking.were_m.clear();
-        looking.were_m.extend_from_slice(&state.x[..nodes]);
-        balance.take(patch.metric_mut(), own, state);
+        query.impulses.clear();
+        query.impulses.resize(nodes, DVec3::ZERO);
+        query.weights_kg.clear();
+        query.weights_kg.resize(nodes, 0.0);
+        query.transferred_n.clear();
+        query.transferred_n.resize(nodes, DVec3::ZERO);
+        query.projection.start(nodes);
+        query.were_m.clear();
+        query.were_m.extend_from_slice(&state.x[..nodes]);
+        transition.take(patch.metric_mut(), own, state);
         let (mut couple, mut farthest_m) = (DVec3::ZERO, 0.0_f64);
         for (number, id) in own.ids().iter().enumerate() {
             if own.next.binary_search(id).is_err() {
                 let (taken, away_m) =
-                    looking.hand_over(body, *id, (state.x[nodes + number], state.v[nodes + number]), state);
+                    query.transfer(body, *id, state.x[nodes + number], state.v[nodes + number], state);
                 couple += taken;
                 farthest_m = farthest_m.max(away_m);
-                balance.hand_over(body, (number, *id), &mut looking.handed_n);
+                transition.transfer(body, number, *id, &mut query.transferred_n);
             }
         }
-        let mut held_j = before.take(body, [patch, next], looking.projection.is_moved(), &state.x, &own.fading);
-        held_j += patch.metric_mut().moving_j(body, (&state.x, &state.v), gravity, momenta);
+        let switch = PatchSwitch { before: patch, after: next, is_moved: query.projection.is_moved() };
+        let mut held_j = before.take(body, &switch, &state.x, &own.prestrain);
+        held_j += patch.metric_mut().moving_j(body, &state.x, &state.v, gravity, momenta);
         let some_sleep = own.ids().iter().any(|id| own.next.binary_search(id).is_err());
-        looking.left.clear();
-        looking.left.extend_from_slice(own.ids());
-        own.switch(body, state, &mut looking.moved);
+        query.left.clear();
+        query.left.extend_from_slice(own.ids());
+        own.switch(body, state, &mut query.moved);
         if some_sleep {
-            couple -= looking.shift(body, next.metric_mut(), state, momenta);
-            looking.turn(couple, &state.x);
+            couple -= query.shift(body, next.metric_mut(), state, momenta);
+            query.turn(couple, &state.x);
         }
-        looking.shifts_m.clear();
-        looking.shifts_m.extend(looking.were_m.iter().zip(&state.x).map(|(were_m, x)| *x - *were_m));
-        farthest_m += looking.shifts_m.iter().map(|shift| shift.length()).fold(0.0, f64::max);
+        query.shifts_m.clear();
+        query.shifts_m.extend(query.were_m.iter().zip(&state.x).map(|(were_m, x)| *x - *were_m));
+        farthest_m += query.shifts_m.iter().map(|shift| shift.length()).fold(0.0, f64::max);
         next.displace(body, &state.x);
-        let places = (&looking.were_m[..], &looking.shifts_m[..], &state.x[..]);
-        let is_moved = looking.projection.is_moved();
-        let (first_moved_j, elastic_j) = before.fade_into(body, [patch, next], is_moved, places, &mut own.fading);
-        next.put_fades(&own.fading);
+        let moved = NodeShifts { x_before: &query.were_m, shifts_m: &query.shifts_m, x_after: &state.x };
+        let switch = PatchSwitch { before: patch, after: next, is_moved: query.projection.is_moved() };
+        let (first_moved_j, elastic_j) = before.prestrain_after(body, &switch, &moved, &mut own.prestrain);
+        next.put_prestrains(&own.prestrain);
         if some_sleep {
-            looking.impulses.resize(state.v.len(), DVec3::ZERO);
-            next.metric_mut().accelerate(&mut looking.impulses);
-            for (v, change) in state.v.iter_mut().zip(&looking.impulses[..nodes]) {
+            query.impulses.resize(state.v.len(), DVec3::ZERO);
+            next.metric_mut().accelerate(&mut query.impulses);
+            for (v, change) in state.v.iter_mut().zip(&query.impulses[..nodes]) {
                 *v += *change;
             }
         }
         held_j += first_moved_j - elastic_j;
-        held_j -= next.metric_mut().moving_j(body, (&state.x, &state.v), gravity, momenta);
+        held_j -= next.metric_mut().moving_j(body, &state.x, &state.v, gravity, momenta);
         state.ledger.dissipated_j += held_j;
         own.given_j -= held_j;
         state.force_is_current = false;
         own.switched_j = own.switched_j.max(elastic_j);
-        if own.may_balance() {
-            balance.demand(body, next.metric_mut(), &looking.left, own.ids(), &looking.handed_n);
+        if own.may_use_transition_force() {
+            transition.demand(body, next.metric_mut(), &query.left, own.ids(), &query.transferred_n);
         }
-        coming.swap(patch);
+        staged.swap(patch);
         body.amplification() * farthest_m
     }
 }
 
-/// Where the tools' balls are now.
-fn place_balls(
-    environment: &Environment,
-    view: &mut SkinView<'_>,
-    body: &HybridBody,
-    own: &mut HybridState,
-    state: &MechanicalState,
-) {
-    let MechanicalState { tools, contact, force_is_current, .. } = state;
-    let spacing_m = body.particles.spacing_m;
-    let fitted = force_is_current.then(|| contact.boxes());
-    view.begin();
-    let places = tools.iter().zip(&environment.tools).zip(places(body, &environment.tools));
-    let places = places.flat_map(|((tool, spec), count)| tool.places(spec, count).map(move |place| (place, spec)));
-    for ((place, spec), ball) in places.zip(&mut own.balls) {
-        let near_m = (GAP * spec.radius_m).max(GAP * spacing_m) + AHEAD_S * place.speed_m_per_s;
-        let Near { vertex, gap_m, .. } = place.look(view, (near_m, environment.contact.covering_radius_m), fitted);
-        match (ball.as_mut(), vertex) {
-            (_, Some((vertex, _))) if gap_m < near_m => {
-                let rest_m = body.skin_rest_m()[vertex as usize];
-                let moved = ball.is_none_or(|ball| ball.rest_m.distance(rest_m) > FOLLOW * spacing_m);
-                let rest_m = if moved { rest_m } else { ball.map_or(rest_m, |ball| ball.rest_m) };
-                *ball = Some(Ball { rest_m, away_ticks: 0 });
-            }
-            (Some(own), _) if gap_m > 2.0 * near_m => {
-                own.away_ticks += LOOK_EVERY_TICKS as u32;
-                if own.away_ticks >= AWAY_TICKS {
-                    *ball = None;
-                }
-            }
-            (Some(own), _) => own.away_ticks = 0,
-            (None, _) => {}
-        }
-    }
-}
-
-/// Squared distance (m²) of a point `p` to the middles of balls, and to the lines between those of neighbours, `a` and `b`:
-/// ```text
-/// |p − a − s (b − a)|²,   s = (p − a)·(b − a)/|b − a|² kept within 0 to 1
-/// ```
-fn distance_to_balls_sq(balls: &[Option<Ball>], at_m: DVec3) -> f64 {
-    let (mut nearest_sq, mut before_m) = (f64::INFINITY, None);
-    for ball in balls {
-        let middle_m = ball.map(|ball| ball.rest_m);
-        if let Some(to_m) = middle_m {
-            let from_m = before_m.unwrap_or(to_m);
-            let along_m = to_m - from_m;
-            let part = (at_m - from_m).dot(along_m) / along_m.length_squared().max(f64::MIN_POSITIVE);
-            nearest_sq = nearest_sq.min(at_m.distance_squared(from_m + along_m * part.clamp(0.0, 1.0)));
-        }
-        before_m = middle_m;
-    }
-    nearest_sq
-}
-
 impl ActivationQuery {
-    /// Takes the impulse of a particle that falls asleep, and the nodes of its tet; returns its couple (kg m²/s), and how far (m) it is from where it goes.
-    fn hand_over(
+    /// Transfers the impulse of a particle at `y` (m) with velocity `w` (m/s), which falls asleep, to the coarse nodes.
+    /// Returns its couple (kg m²/s), and its distance (m) from where it will be asleep.
+    fn transfer(
         &mut self,
         body: &HybridBody,
         particle: u32,
-        (y, w): (DVec3, DVec3),
+        y: DVec3,
+        w: DVec3,
         state: &MechanicalState,
     ) -> (DVec3, f64) {
         let anchor = body.partition.anchor(particle);
         let mass_kg = (1.0 - KEPT) * body.masses.particle_kg[particle as usize];
         anchor.push((w - anchor.of(&state.v)) * mass_kg, &mut self.impulses);
         let away_m = y - anchor.of(&state.x);
-        self.projection.hand_over(body, &anchor, mass_kg, away_m);
+        self.projection.transfer(body, &anchor, mass_kg, away_m);
         for node in body.partition.coarse().tets()[anchor.tet as usize].map(|node| node as usize) {
             if body.free[node] == BVec3::TRUE {
                 self.weights_kg[node] = body.masses.node_kg[node];
@@ -332,7 +287,8 @@ impl ActivationQuery {
         (away_m.cross(w) * mass_kg, away_m.length())
     }
 
-    /// Moves the coarse nodes to what is nearest to what has fallen asleep; returns the angular momentum (kg m²/s) that they gain by it.
+    /// Moves the coarse nodes to the projection of what has fallen asleep; returns the angular momentum (kg m²/s) that
+    /// they gain.
     fn shift(
         &mut self,
         body: &HybridBody,
@@ -352,63 +308,12 @@ impl ActivationQuery {
         gained
     }
 
-    /// Takes the couple of all of them; none where too few of those nodes are free.
+    /// Adds the couple (kg m²/s) of all particles that fell asleep to the impulses; adds nothing where too few nodes
+    /// are free.
     fn turn(&mut self, couple: DVec3, x: &[DVec3]) {
         let Turn { turn, middle } = turn_of(&self.weights_kg, x, couple);
         for ((impulse, weight), x) in self.impulses.iter_mut().zip(&self.weights_kg).zip(x) {
             *impulse += turn.cross(*x - middle) * *weight;
         }
-    }
-
-    /// The particles in the tools' balls, ascending; where there is no room for all, as many for each tool, the nearest to their middles, and to the lines between those of neighbours.
-    fn want(&mut self, body: &HybridBody, tools: &[ToolSpec], own: &HybridState, (reach_m, most): (f64, usize)) {
-        self.wanted.clear();
-        let of_tool = |first: &mut usize, count: usize| {
-            *first += count;
-            Some(&own.balls[*first - count..*first])
-        };
-        let tools = || places(body, tools).scan(0, of_tool);
-        let room = most / tools().filter(|balls| balls.iter().any(Option::is_some)).count().max(1);
-        for balls in tools() {
-            self.found.clear();
-            for (number, ball) in balls.iter().enumerate().filter_map(|(number, ball)| Some((number, (*ball)?))) {
-                // As places are no farther from each other than balls reach, those after the next two hold next to nothing that this one does.
-                let near = &balls[number.saturating_sub(1)..(number + 4).min(balls.len())];
-                body.partition.particles_within(ball.rest_m, reach_m, |particle, distance_sq| {
-                    let is_found = &mut self.is_found[particle as usize];
-                    if body.may_wake(particle) && !std::mem::replace(is_found, true) {
-                        let at_m = body.partition.particle_m(particle);
-                        // The distance from its middle is at hand, and all there is.
-                        let is_alone = balls.len() == 1;
-                        self.found
-                            .push((if is_alone { distance_sq } else { distance_to_balls_sq(near, at_m) }, particle));
-                    }
-                });
-            }
-            for (_, particle) in &self.found {
-                self.is_found[*particle as usize] = false;
-            }
-            if self.found.len() > room {
-                self.found.select_nth_unstable_by(room, |a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-                self.found.truncate(room);
-            }
-            self.wanted.extend(self.found.iter().map(|(_, particle)| *particle));
-        }
-        self.wanted.sort_unstable();
-        self.wanted.dedup();
-    }
-
-    /// Keeps those awake that nobody wants but that are not settled, the farthest off first, as long as there is room.
-    fn keep_unsettled(&mut self, patch: &RunningPatch, particles: &ParticleSpec) {
-        self.unwanted.clear();
-        for (particle, deviation_m) in patch.deviations_m() {
-            if deviation_m > SETTLED * particles.spacing_m && self.wanted.binary_search(&particle).is_err() {
-                self.unwanted.push((deviation_m, particle));
-            }
-        }
-        self.unwanted.sort_unstable_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
-        let room = particles.most_active.saturating_sub(self.wanted.len());
-        self.wanted.extend(self.unwanted.iter().take(room).map(|(_, particle)| *particle));
-        self.wanted.sort_unstable();
     }
 }

@@ -1,38 +1,45 @@
-//! Forces that keep accelerations from jumping where particles wake or fall asleep under load, and fade.
+//! The transition force keeps accelerations from jumping where particles wake or fall asleep under load; it decays.
 //!
-//! A particle that wakes under load is not in balance: what was carried by the coarse nodes is not carried by it. At a switch, everything is to accelerate as
-//! it did; with the new matrix `M''` and the accelerations `a` before, what wakes following the nodes,
+//! A particle that wakes under load is not in balance: forces that the coarse nodes bore now act on the particle. At a
+//! switch, everything is to accelerate as it did. So a force `c` is taken away, with the new matrix `M''` and the
+//! accelerations `a` before, those of what wakes following the nodes,
 //! ```text
 //! c = f − (M'' a + Σ_{p asleep now} ζ_p (1 − ε) m_p (a_p − ζ_pᵀ a))       f ← f − c       c ← e^{−T/τ} c every tick
 //! ```
-//! `Σ c = 0`, since neither momentum nor external force changed. Their torque is zero at first; as the body moves on it is taken from them again by forces
-//! `M_i α × (x_i − x̄)` on the coarse nodes of a body that is held nowhere. The work of these forces is booked in the ledger.
+//! `Σ c = 0`, since neither momentum nor external force changes. The torque of `c` is zero at first; as a body that is
+//! held nowhere moves on, its torque is cancelled by forces `M_i α × (x_i − x̄)` on the coarse nodes. The work of `c`
+//! is booked in the ledger.
 //!
-//! They are dead loads: on what swings while regions are switched they may do work without end, as may strains that fade (`prestrain`). What both gave lately, beyond what they and
-//! switches took, is kept; where it is more than [`MOST_GIVEN`] of the elastic energy that switches lately changed, forces are balanced no more, and jump.
+//! It is a dead load: on a body that swings while regions are switched it may do work without end, as may decaying
+//! prestrain (`prestrain`). The energy that both gave lately, beyond what they and switches took, is kept; where it is
+//! more than [`MOST_GIVEN`] of the elastic energy that switches lately changed, there is no transition force, and
+//! accelerations jump.
 use super::{body::HybridBody, patch::KEPT, prestrain, running_metric::RunningMetric, state::HybridState};
 use crate::tick::MechanicalState;
 use glam::{BVec3, DMat3, DVec3};
 
-/// τ (s): less than that of strains, since forces that go on pushing what swings may feed it.
-const FADING_S: f64 = 0.02;
-/// The same where it did (s).
-const HURRIED_S: f64 = 0.003;
-/// How fast what fading gave is forgotten (s).
+/// `τ` (s), the time constant of the decay: less than that of prestrain, since a force that goes on pushing what swings
+/// may feed it.
+const DECAY_S: f64 = 0.02;
+/// The time constant (s) where too much energy was given already.
+const FAST_DECAY_S: f64 = 0.003;
+/// Time constant (s) with which the energy that the decay gave is forgotten.
 const FORGETTING_S: f64 = 1.0;
-/// Fading that gave more than this, over the elastic energy that a switch lately changed, is not helped on by balancing forces.
+/// Largest energy given by the decay, over the elastic energy that a switch lately changed, with which there is a
+/// transition force.
 const MOST_GIVEN: f64 = 0.07;
-/// Balancing forces smaller than this, over the largest force, are none.
+/// A transition force smaller than this, over the largest force, is left out.
 const NOTHING: f64 = 1e-9;
 
-/// Buffers for them.
+/// Buffers for the transition force.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct TransitionForce {
     /// Accelerations (m/s²) before a switch.
     before: Vec<DVec3>,
-    /// Forces (N) with which they go on after it; empty unless they are to be balanced by the next evaluation.
+    /// Forces (N) with which accelerations do not jump; empty unless the next evaluation has to find the transition
+    /// force.
     due_n: Vec<DVec3>,
-    /// The forces (N) taken away at the last evaluation.
+    /// The transition force (N) as it was taken away at the last evaluation.
     taken_n: Vec<DVec3>,
 }
 
@@ -42,7 +49,7 @@ impl TransitionForce {
         Self { before: list(), due_n: list(), taken_n: list() }
     }
 
-    /// Before a switch.
+    /// Records the accelerations before a switch.
     pub(super) fn take(&mut self, metric: &mut RunningMetric, own: &HybridState, state: &MechanicalState) {
         self.before.clear();
         if state.force_is_current {
@@ -52,8 +59,9 @@ impl TransitionForce {
         }
     }
 
-    /// A particle, the `number`th active one before the switch, falls asleep: `impulses` takes what the coarse nodes are to be pushed with for it (N).
-    pub(super) fn hand_over(&self, body: &HybridBody, (number, particle): (usize, u32), forces_n: &mut [DVec3]) {
+    /// Adds to `forces_n` the forces (N) on coarse nodes that stand for a particle which falls asleep, the `number`th
+    /// active one before the switch.
+    pub(super) fn transfer(&self, body: &HybridBody, number: usize, particle: u32, forces_n: &mut [DVec3]) {
         if self.before.is_empty() {
             return;
         }
@@ -63,15 +71,15 @@ impl TransitionForce {
         anchor.push((own - anchor.of(&self.before)) * mass_kg, forces_n);
     }
 
-    /// After a switch from particles `before` to those of the state: what the forces are to be at the next evaluation. `handed_n` comes from
-    /// [`Self::hand_over`].
+    /// Finds, after a switch from the active particles `before` to those `after`, what the forces (N) have to be at the
+    /// next evaluation. `transferred_n` comes from [`Self::transfer`].
     pub(super) fn demand(
         &mut self,
         body: &HybridBody,
         metric: &mut RunningMetric,
         before: &[u32],
         after: &[u32],
-        handed_n: &[DVec3],
+        transferred_n: &[DVec3],
     ) {
         self.due_n.clear();
         if self.before.is_empty() {
@@ -87,33 +95,33 @@ impl TransitionForce {
         self.taken_n.extend(after.iter().map(of));
         self.due_n.resize(self.taken_n.len(), DVec3::ZERO);
         metric.momenta(body, &self.taken_n, &mut self.due_n);
-        for (due, handed) in self.due_n.iter_mut().zip(handed_n) {
-            *due += *handed;
+        for (due, transferred) in self.due_n.iter_mut().zip(transferred_n) {
+            *due += *transferred;
         }
     }
 
-    /// At an evaluation: takes balancing forces away from the total forces, after working them out if that is due.
+    /// Takes the transition force away from the total forces at an evaluation; computes it first after a switch.
     pub(crate) fn apply(&mut self, body: &HybridBody, own: &mut HybridState, state: &mut MechanicalState) {
         let MechanicalState { x, force_n, .. } = state;
-        let balance_n = &mut own.balance_n;
+        let transition_force_n = &mut own.transition_force_n;
         if self.due_n.len() == force_n.len() {
-            balance_n.clear();
-            balance_n.extend(force_n.iter().zip(&self.due_n).map(|(force, due)| *force - *due));
-            for (balance, free) in balance_n.iter_mut().zip(&body.free) {
-                *balance = DVec3::select(*free, *balance, DVec3::ZERO);
+            transition_force_n.clear();
+            transition_force_n.extend(force_n.iter().zip(&self.due_n).map(|(force, due)| *force - *due));
+            for (force, free) in transition_force_n.iter_mut().zip(&body.free) {
+                *force = DVec3::select(*free, *force, DVec3::ZERO);
             }
         }
         self.due_n.clear();
         self.taken_n.clear();
-        if balance_n.len() != force_n.len() {
-            balance_n.clear();
+        if transition_force_n.len() != force_n.len() {
+            transition_force_n.clear();
             return;
         }
-        if largest(balance_n) <= NOTHING * largest(force_n) {
-            balance_n.clear();
+        if largest(transition_force_n) <= NOTHING * largest(force_n) {
+            transition_force_n.clear();
             return;
         }
-        self.taken_n.extend_from_slice(balance_n);
+        self.taken_n.extend_from_slice(transition_force_n);
         if body.is_free {
             without_torque(body, x, &mut self.taken_n);
         }
@@ -122,31 +130,32 @@ impl TransitionForce {
         }
     }
 
-    /// Work (J) over a kick of length `h_s` that the body's velocities, times a factor on free axes, with accelerations (m/s²), do against them.
-    pub(crate) fn work_j(&self, (v, factor): (&[DVec3], f64), accelerations: &[DVec3], h_s: f64) -> f64 {
+    /// Returns the work (J) that the body does against the transition force over a kick of length `h_s`, with
+    /// velocities `v` times a factor on free axes, and accelerations (m/s²).
+    pub(crate) fn work_j(&self, v: &[DVec3], factor: f64, accelerations: &[DVec3], h_s: f64) -> f64 {
         let power = |((taken, v), a): ((&DVec3, &DVec3), &DVec3)| taken.dot(*v * factor + *a * (0.5 * h_s));
         h_s * self.taken_n.iter().zip(v).zip(accelerations).map(power).sum::<f64>()
     }
 }
 
 impl HybridState {
-    /// Whether fading gave little beside the elastic energy that switches changed lately.
-    pub(super) fn may_balance(&self) -> bool {
+    /// Returns whether the decay gave little energy beside the elastic energy that switches changed lately.
+    pub(super) fn may_use_transition_force(&self) -> bool {
         self.given_j <= MOST_GIVEN * self.switched_j
     }
 
-    /// A tick's fading of balancing forces.
-    pub(super) fn fade_balance(&mut self, period_s: f64) {
+    /// Lets the transition force, and the energies by which it is judged, decay over a tick.
+    pub(super) fn decay_transition_force(&mut self, period_s: f64) {
         let forgotten = prestrain::factor(period_s, FORGETTING_S);
         self.given_j *= forgotten;
         self.switched_j *= forgotten;
-        let time_constant_s = if self.may_balance() { FADING_S } else { HURRIED_S };
+        let time_constant_s = if self.may_use_transition_force() { DECAY_S } else { FAST_DECAY_S };
         let factor = prestrain::factor(period_s, time_constant_s);
-        self.balance_n.iter_mut().for_each(|balance| *balance *= factor);
+        self.transition_force_n.iter_mut().for_each(|force| *force *= factor);
     }
 }
 
-/// Takes from forces (N) their torque at positions `x`, by forces on the coarse nodes that have no sum.
+/// Takes the torque of forces (N) at positions `x` away, by forces on the coarse nodes whose sum is zero.
 pub(super) fn without_torque(body: &HybridBody, x: &[DVec3], forces_n: &mut [DVec3]) {
     let torque: DVec3 = x.iter().zip(&*forces_n).map(|(x, force)| x.cross(*force)).sum();
     let turn = turn_of(&body.masses.node_kg, x, torque);
@@ -159,14 +168,15 @@ fn largest(list: &[DVec3]) -> f64 {
     list.iter().map(|a| a.length_squared()).fold(0.0, f64::max).sqrt()
 }
 
-/// A turn about a middle.
+/// An angular acceleration or velocity about a middle.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Turn {
     pub(super) turn: DVec3,
     pub(super) middle: DVec3,
 }
 
-/// `α` and `x̄` with `Σ_i W_i (x_i − x̄) × (α × (x_i − x̄))` the given moment; none where the weighty points lie on a line.
+/// Returns `α` and `x̄` with which `Σ_i W_i (x_i − x̄) × (α × (x_i − x̄))` is the given moment; zero where the points
+/// of positive weight lie on a line.
 pub(super) fn turn_of(weights: &[f64], x: &[DVec3], moment: DVec3) -> Turn {
     let weighty = || weights.iter().zip(x).filter(|(weight, _)| **weight > 0.0);
     let total: f64 = weighty().map(|(weight, _)| weight).sum();
@@ -181,7 +191,7 @@ pub(super) fn turn_of(weights: &[f64], x: &[DVec3], moment: DVec3) -> Turn {
     if turn.is_finite() { Turn { turn, middle } } else { Turn { turn: DVec3::ZERO, middle: DVec3::ZERO } }
 }
 
-/// Whether a body is held nowhere.
+/// Returns whether a body is held nowhere.
 pub(super) fn is_free(node_kg: &[f64], free: &[BVec3]) -> bool {
     node_kg.iter().zip(free).all(|(mass, free)| *mass == 0.0 || *free == BVec3::TRUE)
 }

@@ -138,7 +138,8 @@ impl MassSpringBody {
         let edge_m = lengths.sum::<f64>() / model.surface().edges().len() as f64;
         let rings = refinement.map_or(1, |refinement| if refinement.follows_dent { 1 } else { refinement.rings });
         // The regions about two neighbouring samples overlap by half.
-        let axis_samples: Vec<usize> = tools.iter().map(|tool| tool.place_count(f64::from(rings) * edge_m)).collect();
+        let axis_samples: Vec<usize> =
+            tools.iter().map(|tool| tool.axis_sample_count(f64::from(rings) * edge_m)).collect();
         // Vertices in a disc about each sample are awake; each vertex has the area √3/2 l².
         let each = model.spec().most_awake as f64 / axis_samples.iter().sum::<usize>().max(1) as f64;
         let awake_reach_m = edge_m * (each * 3.0_f64.sqrt() / (2.0 * std::f64::consts::PI)).sqrt();

@@ -87,7 +87,7 @@ impl SteppedMassSpring<'_> {
         // late at its back, it would drive the tool on.
         let tools = state.tools.iter().zip(&environment.tools).zip(body.axis_samples());
         let samples =
-            tools.flat_map(|((tool, spec), samples)| tool.places(spec, samples.len()).zip(&own.about[samples]));
+            tools.flat_map(|((tool, spec), samples)| tool.axis_samples(spec, samples.len()).zip(&own.about[samples]));
         let touching = samples.filter(|(_, about)| about.touched.is_some());
         let fastest_m_per_s = touching.map(|(sample, _)| sample.speed_m_per_s).fold(0.0, f64::max);
         let rate_hz = |r: Refinement| r.blend_s.recip() + fastest_m_per_s / (BLEND_WAY * body.edge_m());
@@ -158,7 +158,7 @@ impl MassSpringScratch {
             if ticks == 0 && About::is_fine(about) {
                 continue;
             }
-            for (sample, about) in tool.places(spec, about.len()).zip(about) {
+            for (sample, about) in tool.axis_samples(spec, about.len()).zip(about) {
                 // Distance that the sample moves until the next query.
                 let ahead_m = f64::from(QUERY_EVERY_TICKS) * tick_period_s * sample.speed_m_per_s;
                 let near_m = GAP * spec.radius_m + 0.5 * body.edge_m() + ahead_m;

@@ -1,20 +1,21 @@
-//! Narrow phase: pressure and friction of one tool on the samples inside it.
+//! The narrow phase: pressure and friction of one tool on the samples inside it.
 //!
 //! A sample enters contact when the tool's surface passes over it from the outside, `n·(c − y) > 0` with the outward
-//! normal `n` and the nearest point `c` of the tool's axis; one that the tool reaches from behind (the far wall of a thin shell) is ignored for as long as it stays
-//! inside. Once in, a sample is tracked until it leaves, so that neither the normal nor the order of events can make the
-//! energy jump. A tool that is *put* into the surface (not moved there) presses nothing at first: its samples carry
-//! `k_f a (g − g₀)` from the depth `g₀` at which it was put, or the least depth since.
+//! normal `n` and the nearest point `c` of the tool's axis; one that the tool reaches from behind (the far wall of a
+//! thin shell) is ignored for as long as it stays inside. Once in, a sample is tracked until it leaves, so that neither
+//! the normal nor the order of events can make the energy jump. A tool that is *put* into the surface (not moved there)
+//! presses nothing at first: its samples carry `k_f a (g − g₀)` from the depth `g₀` at which it was put, or the least
+//! depth since.
 //!
-//! Coulomb friction: every sample in contact has a tangential spring `e` (m) of stiffness `k_t = τ k_f a`, stretched by the
-//! sample's motion relative to the tool and cut at the cone:
+//! Coulomb friction: every sample in contact has a tangential spring `e` (m) of stiffness `k_t = τ k_f a`, stretched by
+//! the sample's motion relative to the tool and cut at the cone:
 //! ```text
 //! e ← (I − n̂n̂ᵀ)(p − q)        p = y − c₀ from the tool's centre, q where the spring is at rest, n̂ = r/|r|, r = y − c
 //! e ← e · min(1, µ_f f_n / (k_t |e|))      slip; its heat k_t|e|·(cut length) ≥ 0
 //! f_t = −k_t e,  q ← p − e
 //! ```
-//! `q` is a point of the tool: where the tool turns (`R`), what is kept is `Rᵀq`, so that the spring is stretched by the motion of sample and tool
-//! relative to each other, `v + ω × p`.
+//! `q` is a point of the tool: where the tool turns (`R`), what is kept is `Rᵀq`, so that the spring is stretched by
+//! the motion of sample and tool relative to each other, `v + ω × p`.
 use super::{
     axis::Axis,
     broad::{Candidates, Triangles},
@@ -24,11 +25,11 @@ use super::{
 };
 use glam::{DQuat, DVec3};
 
-/// τ: tangential over normal stiffness of the foundation; Mindlin's ratio 2(1 − ν)/(2 − ν) is 0.71 at ν = 0.45 and 0.82 at 0.3.
-/// At most 1, or the bound of the frequency fails.
+/// `τ`, the tangential over the normal stiffness of the foundation; Mindlin's ratio 2(1 − ν)/(2 − ν) is 0.71 at ν =
+/// 0.45 and 0.82 at 0.3. It may be at most 1, or the bound of the frequency fails.
 pub(super) const TANGENTIAL_RATIO: f64 = 0.75;
 
-/// What one tool meets at one instant.
+/// One tool and the surface that it meets at one instant.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Meeting<'a> {
     pub(super) triangles: &'a Triangles,
@@ -36,12 +37,12 @@ pub(super) struct Meeting<'a> {
     pub(super) tables: &'a SampleTables,
     pub(super) x: &'a [DVec3],
     pub(super) axis: Axis,
-    /// Of a tool that turns.
+    /// Orientation of a tool that turns, `None` for another.
     pub(super) orientation: Option<DQuat>,
     pub(super) radius_m: f64,
     pub(super) friction_coefficient: f64,
-    /// The tool was put there, now or before, and has not left yet: what is not known carries nothing as deep as it is, which for
-    /// what cannot be recorded is nothing at all.
+    /// Whether the tool was put there, now or before, and has not left the surface yet: samples that are not on record
+    /// then carry nothing up to their present depth; those that cannot be recorded carry nothing at all.
     pub(super) put_into: bool,
 }
 
@@ -50,11 +51,11 @@ pub(super) struct Meeting<'a> {
 pub(super) struct Pressed {
     /// Force on the tool (N).
     pub(super) force_n: DVec3,
-    /// Torque on the tool about its centre (N m); none of a tool that does not turn.
+    /// Torque on the tool about its centre (N m); zero for a tool that does not turn.
     pub(super) torque_nm: DVec3,
-    /// Where on such a tool it is pressed.
+    /// Moments of the samples in contact about the centre of such a tool.
     pub(super) levers: Levers,
-    /// Its part along the samples' normals (N).
+    /// The part of the force along the samples' normals (N).
     pub(super) normal_n: DVec3,
     /// `Σ |f_n|` (N).
     pub(super) pressing_n: f64,
@@ -68,15 +69,16 @@ pub(super) struct Pressed {
     pub(super) energy_j: f64,
     /// Heat of slipping (J) since the last evaluation.
     pub(super) heat_j: f64,
-    /// Samples that carry force.
+    /// Number of samples that carry force.
     pub(super) contacts: u32,
-    /// Deepest sample (m).
+    /// Depth (m) of the deepest sample.
     pub(super) penetration_m: f64,
-    /// From the nearest point of the tool's axis to the nearest point of the surface (m); infinite when nothing is listed.
+    /// Vector (m) from the nearest point of the tool's axis to the nearest point of the surface; infinite when no
+    /// triangle is listed.
     pub(super) to_surface_m: DVec3,
-    /// From the tool's centre to that point of its axis (m).
+    /// Vector (m) from the tool's centre to that point of its axis.
     pub(super) arm_m: DVec3,
-    /// The triangle of that point and its weights there; no weight when nothing is listed.
+    /// The triangle of the nearest point and its weights there; the weights are zero when no triangle is listed.
     pub(super) nearest: (usize, [f64; 3]),
 }
 
@@ -94,7 +96,7 @@ impl Pressed {
         self.energy_j += other.energy_j;
     }
 
-    /// Forces and energy times a factor.
+    /// Returns forces and energy times a factor.
     pub(super) fn scaled(&self, factor: f64) -> Self {
         Self {
             force_n: self.force_n * factor,
@@ -111,8 +113,9 @@ impl Pressed {
     }
 }
 
-/// Presses a tool on the listed triangles (ascending): adds the forces on nodes, updates what it touches, returns the sums. A triangle that cannot have
-/// come within the radius since it was looked at is looked at only where the nearest one is asked for, and no other is within.
+/// Presses a tool on the listed triangles (ascending): adds the forces on nodes, updates the samples that it touches,
+/// and returns the sums. A triangle that cannot have come within the radius since it was looked at last is looked at
+/// only if no other one is within it, to find the nearest.
 pub(super) fn press(
     meeting: &Meeting<'_>,
     candidates: &mut Candidates,
@@ -161,7 +164,7 @@ pub(super) fn press(
     pressed
 }
 
-/// The nearest point of the triangles looked at; of equally near ones that of the first triangle.
+/// The nearest point of the triangles that were looked at; of equally near ones that of the first triangle.
 #[derive(Debug, Clone, Copy, Default)]
 struct Nearest {
     distance_m: f64,
@@ -172,7 +175,7 @@ struct Nearest {
 }
 
 impl Nearest {
-    /// Returns how far (m) the triangle is from the axis.
+    /// Looks at a triangle, and returns how far (m) it is from the axis.
     fn look_at(&mut self, axis: &Axis, triangle: usize, corners: [DVec3; 3]) -> f64 {
         let found = axis.approach(corners);
         let distance_m = found.to_triangle_m.length();
@@ -184,7 +187,7 @@ impl Nearest {
     }
 }
 
-/// Forces (N) on the corners of one triangle.
+/// Presses the samples of one triangle; returns the forces (N) on its corners.
 fn press_triangle(
     meeting: &Meeting<'_>,
     samples: &TriangleSamples<'_>,
@@ -212,7 +215,7 @@ fn press_triangle(
         let depth_m = meeting.radius_m - distance_m;
         let free_depth_m = if meeting.put_into { depth_m } else { 0.0 };
         if from_behind {
-            // It carries nothing anyway, but tells the next tick that the tool was put there.
+            // The sample carries nothing, but its depth tells the next tick that the tool was put there.
             next.push(Touch { sample: number, from_behind, free_depth_m, spring_origin_m: meeting.in_tool(p) });
             continue;
         }
@@ -221,7 +224,7 @@ fn press_triangle(
         touch.free_depth_m = touch.free_depth_m.min(depth_m);
         // A sample exactly on the axis has no direction: it carries nothing for this instant.
         let normal = r / distance_m.max(f64::MIN_POSITIVE);
-        let force_n = press_sample(meeting, samples, (p, normal, distance_m), &mut touch, pressed);
+        let force_n = press_sample(meeting, samples, p, normal, distance_m, &mut touch, pressed);
         next.push(touch);
         nodal[0] += force_n * (1.0 - wb - wc);
         nodal[1] += force_n * wb;
@@ -235,22 +238,25 @@ fn press_triangle(
 }
 
 impl Meeting<'_> {
-    /// From the tool's centre (m): in the world, to the tool's frame where it turns.
+    /// Transforms a vector (m) from the tool's centre from the world to the tool's frame, where the tool turns.
     fn in_tool(&self, p: DVec3) -> DVec3 {
         self.orientation.map_or(p, |orientation| orientation.conjugate() * p)
     }
 
-    /// And back.
+    /// Transforms a vector back to the world.
     fn in_world(&self, p: DVec3) -> DVec3 {
         self.orientation.map_or(p, |orientation| orientation * p)
     }
 }
 
-/// Force (N) on one sample at `p` from the tool's centre, in the direction `normal` from the tool's axis and that far from it.
+/// Presses one sample at `p` from the tool's centre, which is `distance_m` from the tool's axis in the direction
+/// `normal`; returns the force (N) on it.
 fn press_sample(
     meeting: &Meeting<'_>,
     samples: &TriangleSamples<'_>,
-    (p, normal, distance_m): (DVec3, DVec3, f64),
+    p: DVec3,
+    normal: DVec3,
+    distance_m: f64,
     touch: &mut Touch,
     pressed: &mut Pressed,
 ) -> DVec3 {
@@ -282,7 +288,7 @@ fn press_sample(
     normal * f_n - spring * k_t
 }
 
-/// The record of a sample, if it was inside before; skips those of samples that left.
+/// Returns the record of a sample, if it was inside before; skips those of samples that left.
 fn take(before: &mut &[Touch], sample: u32) -> Option<Touch> {
     while let Some((first, rest)) = before.split_first() {
         if first.sample > sample {

@@ -123,7 +123,8 @@ proptest! {
             DVec3::new(shifted, turned, 0.0)
         };
         let slopes = (changes(1.0) - changes(-1.0)) / (2.0 * step);
-        prop_assert!((slopes.x + pressed.force_n[axis]).abs() <= 1e-5 * pressed.pressing_n, "{slopes} {}", pressed.force_n);
+        let apart_n = (slopes.x + pressed.force_n[axis]).abs();
+        prop_assert!(apart_n <= 1e-5 * pressed.pressing_n, "{slopes} {}", pressed.force_n);
         let torque_n = pressed.torque_nm[axis] / RADIUS_M;
         prop_assert!((slopes.y + torque_n).abs() <= 1e-5 * pressed.pressing_n, "{slopes} {torque_n}");
     }
@@ -139,7 +140,8 @@ proptest! {
             let friction = pressed.force_n - pressed.normal_n;
             prop_assert!(friction.length() <= mu * pressed.pressing_n * (1.0 + 1e-12));
             prop_assert!(pressed.heat_j >= 0.0);
-            prop_assert!((pressed.force_n + forces.iter().sum::<DVec3>()).length() <= 1e-12 * pressed.pressing_n + 1e-18);
+            let sum_n = pressed.force_n + forces.iter().sum::<DVec3>();
+            prop_assert!(sum_n.length() <= 1e-12 * pressed.pressing_n + 1e-18);
             for touch in bench.touching.records() {
                 prop_assert!(touch.spring_origin_m.is_finite());
             }
@@ -220,8 +222,8 @@ fn samples_reached_from_behind_carry_nothing_until_they_left() {
     assert!(bench.press(above(0.1 * RADIUS_M)).0.force_n.z > 0.0);
 }
 
-/// Where all that could be kept was met from behind, nothing told in the next tick that the tool was put there, and what could
-/// not be kept pressed with its full depth.
+/// Where all that could be kept was met from behind, nothing told in the next tick that the tool was put there, and
+/// what could not be kept pressed with its full depth.
 #[test]
 fn a_tool_put_into_the_surface_is_known_by_the_samples_it_met_from_behind() {
     let mut bench = Bench::new(0.0);

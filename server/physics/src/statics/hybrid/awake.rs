@@ -1,10 +1,10 @@
-//! Which particles are awake in an equilibrium.
+//! Finds which particles are awake in an equilibrium.
 //!
-//! Those that a tool would keep awake where it rests, by the rules of the loop (`hybrid::switching`): a ball about the vertex of the skin nearest to where it is
-//! deepest, or to it. And
-//! those within the same reach of vertices that a load acts on, as its press is as local as a tool's. Where there is no room for all of a claim, the nearest;
-//! but if there is none even for those within a spacing of a load, it is spread wide, and left to the coarse tets: some of the particles beneath it, chosen by
-//! nothing, would make a pattern of it.
+//! They are those that a tool would keep awake where it rests, by the rules of the loop (`hybrid::switching`): a ball
+//! about the vertex of the skin nearest to the tool, or nearest to where it is deepest. So are those within the same
+//! reach of vertices that a load acts on, since its press is as local as a tool's. Where there is no room for all of a
+//! claim, the nearest are awake. If there is no room even for those within a spacing of a load, the load is spread wide,
+//! and left to the coarse tets: some of the particles beneath it, chosen by nothing, would make a pattern of it.
 use super::awakened::Awakened;
 use crate::mesh::Surface;
 use crate::{
@@ -23,14 +23,15 @@ use std::collections::{BTreeMap, BTreeSet};
 /// What keeps particles awake.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) enum Claims {
-    /// These, whatever acts on the body.
+    /// These particles are awake, whatever acts on the body.
     Given(Vec<u32>),
-    /// Tools, by the middles of their balls at rest (m), and loads, each with its particles and their distances (m).
+    /// Tools keep particles awake, by the middles of their balls at rest (m), and loads, each with its particles and
+    /// their distances (m).
     ByRule { reach_m: f64, balls: Vec<Option<DVec3>>, loads: Vec<Vec<(f64, u32)>>, spread: u32 },
 }
 
 impl Claims {
-    /// Of the loads and tools of a goal, before a tool came near.
+    /// Returns the claims of the loads and tools of a goal, before a tool came near.
     pub(super) fn of(environment: &Environment, body: &HybridBody, goal: &Goal<'_>) -> Self {
         if let Some(given) = goal.awake {
             let mut ids: Vec<u32> = given.iter().copied().filter(|&particle| body.may_wake(particle)).collect();
@@ -47,21 +48,22 @@ impl Claims {
         Self::ByRule { reach_m, balls: vec![None; environment.tools.len()], loads, spread: 0 }
     }
 
-    /// Looks at where tools are in an equilibrium, with these forces (N) on them: the particles that are to be awake, ascending.
-    pub(super) fn look(&mut self, awakened: &Awakened<'_>, place: &[DVec3], contact_n: &[DVec3]) -> Vec<u32> {
+    /// Looks at where tools are in an equilibrium, with these forces (N) on them; returns the particles that are to be
+    /// awake, ascending.
+    pub(super) fn look(&mut self, awakened: &Awakened<'_>, unknowns: &[DVec3], contact_n: &[DVec3]) -> Vec<u32> {
         let (environment, body) = (awakened.environment, awakened.body);
         let (most, spacing_m) = (body.particles().most_active, body.particles().spacing_m);
         let (reach_m, balls, loads, spread) = match self {
             Self::Given(ids) => return ids.clone(),
             Self::ByRule { reach_m, balls, loads, spread } => (*reach_m, balls, loads, spread),
         };
-        let configuration = awakened.configuration(place);
+        let configuration = awakened.configuration(unknowns);
         let (skin_m, tools_m) = configuration.split_at(awakened.vertices());
         let all = balls.iter_mut().zip(tools_m).zip(&environment.tools).zip(contact_n);
         for (((ball, centre_m), tool), contact_n) in all {
             let near_m = (GAP * tool.radius_m).max(GAP * spacing_m);
-            let touch = (*centre_m, tool.radius_m, *contact_n);
-            *ball = ball_of(*ball, body, skin_m, touch, (near_m, FOLLOW * spacing_m));
+            let touch = TouchingTool { centre_m: *centre_m, radius_m: tool.radius_m, contact_force_n: *contact_n };
+            *ball = ball_of(*ball, body, skin_m, touch, near_m, FOLLOW * spacing_m);
         }
         let claims = (balls.iter().flatten().count() + loads.len()).max(1);
         let room = most / claims;
@@ -86,7 +88,7 @@ impl Claims {
         wanted.into_iter().collect()
     }
 
-    /// Loads spread too wide for particles to wake beneath them.
+    /// Returns the number of loads that are spread too wide for particles to wake beneath them.
     pub(super) fn spread_loads(&self) -> u32 {
         match self {
             Self::Given(_) => 0,
@@ -100,13 +102,22 @@ fn take_nearest(found: &mut [(f64, u32)], room: usize, wanted: &mut BTreeSet<u32
     wanted.extend(found.iter().take(room).map(|(_, particle)| *particle));
 }
 
-/// The ball of a tool at rest: the loop's, for a tool that stands still.
+/// A tool at rest, and the force of the body on it.
+#[derive(Debug, Clone, Copy)]
+struct TouchingTool {
+    centre_m: DVec3,
+    radius_m: f64,
+    contact_force_n: DVec3,
+}
+
+/// Returns the middle (m) of the ball of a tool at rest: the loop's ball, for a tool that stands still.
 fn ball_of(
     ball: Option<DVec3>,
     body: &HybridBody,
     skin_m: &[DVec3],
-    (centre_m, radius_m, contact_force_n): (DVec3, f64, DVec3),
-    (near_m, follow_m): (f64, f64),
+    TouchingTool { centre_m, radius_m, contact_force_n }: TouchingTool,
+    near_m: f64,
+    follow_m: f64,
 ) -> Option<DVec3> {
     let deepest_m = deepest_m(centre_m, radius_m, contact_force_n);
     let from_m = deepest_m.unwrap_or(centre_m);
@@ -121,7 +132,8 @@ fn ball_of(
     }
 }
 
-/// Particles that may wake within a reach of vertices that a load acts on, with the distance (m) to the nearest of them.
+/// Returns the particles that may wake within a reach of vertices that a load acts on, with the distance (m) to the
+/// nearest of them.
 fn near_load(surface: &Surface, body: &HybridBody, load: &LoadSpec, reach_m: f64) -> Vec<(f64, u32)> {
     let vertices: BTreeSet<u32> = match load {
         LoadSpec::NodalForces(forces) => forces.iter().map(|(vertex, _)| *vertex).collect(),

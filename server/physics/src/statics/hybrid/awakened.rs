@@ -1,12 +1,13 @@
-//! A hybrid body with some of its particles awake: what its equilibrium is sought over.
+//! A hybrid body with some of its particles awake, whose equilibrium is sought.
 //!
-//! A *place* lists positions (m): of the coarse nodes, of the awake particles, then of all tools. The skin follows it linearly,
-//! `y_v = Y_v + Σ_q w_vq (x_q − X_q)`, and hands forces back by the same weights; a *configuration* of contact lists the skin's vertices, then the tools.
+//! The *unknowns* of an equilibrium are positions (m): of the coarse nodes, of the awake particles, then of all tools.
+//! The skin follows them linearly, `y_v = Y_v + Σ_q w_vq (x_q − X_q)`, and forces on it act on them by the same
+//! weights. A *configuration* of contact lists the skin's vertices, then the tools.
 use crate::{
     bodies::hybrid::{
         HybridBody,
         patch::{Field, KEPT, Patch},
-        place::Place,
+        trilinear_point::TrilinearPoint,
     },
     tick::Environment,
 };
@@ -18,7 +19,7 @@ pub(super) struct Awakened<'a> {
     pub(super) environment: &'a Environment,
     pub(super) body: &'a HybridBody,
     pub(super) patch: Patch,
-    /// Of every entry of a place, axes along which it may move.
+    /// Axes along which each unknown may move.
     pub(super) free: Vec<BVec3>,
     /// Rest positions (m) of nodes and particles.
     rest_m: Vec<DVec3>,
@@ -26,13 +27,13 @@ pub(super) struct Awakened<'a> {
     pub(super) weight_n: Vec<DVec3>,
     /// Diagonal blocks (N/m) of the elastic stiffness at rest, of nodes and particles.
     pub(super) diagonal_n_per_m: Vec<DMat3>,
-    /// Where the carriers of each vertex of the skin start, and one more.
+    /// Index in `carriers` of the first entry of each vertex of the skin, and the end of the last.
     first: Vec<u32>,
     carriers: Vec<(u32, f64)>,
 }
 
 impl<'a> Awakened<'a> {
-    /// With these particles, ascending, awake.
+    /// Makes the body with these particles, ascending, awake.
     pub(super) fn new(environment: &'a Environment, body: &'a HybridBody, ids: &[u32]) -> Self {
         let partition = body.partition();
         let patch = Patch::new(partition, &ids.iter().copied().collect());
@@ -62,47 +63,47 @@ impl<'a> Awakened<'a> {
             carriers: Vec::new(),
         };
         for vertex in 0..body.skin_rest_m().len() as u32 {
-            let carriers = awakened.carriers_of(&body.place(vertex).place(partition));
+            let carriers = awakened.carriers_of(&body.vertex_point(vertex).trilinear(partition));
             awakened.carriers.extend(carriers);
             awakened.first.push(awakened.carriers.len() as u32);
         }
         awakened
     }
 
-    fn carriers_of(&self, place: &Place) -> BTreeMap<u32, f64> {
+    fn carriers_of(&self, point: &TrilinearPoint) -> BTreeMap<u32, f64> {
         let mut carriers = BTreeMap::new();
         let mut add = |entry: u32, weight: f64| {
             if weight != 0.0 {
                 *carriers.entry(entry).or_default() += weight;
             }
         };
-        for (&particle, weight) in place.particles.iter().zip(place.weights) {
+        for (&particle, weight) in point.particles.iter().zip(point.weights) {
             if let Ok(number) = self.patch.active().binary_search(&particle) {
                 add((self.nodes() + number) as u32, weight);
                 continue;
             }
             let anchor = self.body.partition().anchor(particle);
-            anchor.nodes.iter().zip(anchor.weights).for_each(|(&node, share)| add(node, weight * share));
+            anchor.nodes.iter().zip(anchor.weights).for_each(|(&node, part)| add(node, weight * part));
         }
         carriers
     }
 
-    /// Coarse nodes.
+    /// Returns the number of coarse nodes.
     pub(super) fn nodes(&self) -> usize {
         self.body.node_count()
     }
 
-    /// Entries of a place before the tools.
+    /// Returns the number of unknowns before those of the tools.
     pub(super) fn entries(&self) -> usize {
         self.rest_m.len()
     }
 
-    /// Vertices of the skin.
+    /// Returns the number of vertices of the skin.
     pub(super) fn vertices(&self) -> usize {
         self.first.len() - 1
     }
 
-    /// What an entry of a configuration moves with; tools with themselves.
+    /// Returns the unknowns that an entry of a configuration moves with, and their weights; a tool moves with itself.
     pub(super) fn carriers(&self, entry: u32) -> Vec<(u32, f64)> {
         match (entry as usize).checked_sub(self.vertices()) {
             Some(tool) => vec![((self.entries() + tool) as u32, 1.0)],
@@ -114,25 +115,25 @@ impl<'a> Awakened<'a> {
         &self.carriers[self.first[vertex] as usize..self.first[vertex + 1] as usize]
     }
 
-    /// The configuration at a place.
-    pub(super) fn configuration(&self, place: &[DVec3]) -> Vec<DVec3> {
-        let moved: Vec<DVec3> = place.iter().zip(&self.rest_m).map(|(x, rest)| *x - *rest).collect();
+    /// Returns the configuration of some unknowns.
+    pub(super) fn configuration(&self, unknowns: &[DVec3]) -> Vec<DVec3> {
+        let moved: Vec<DVec3> = unknowns.iter().zip(&self.rest_m).map(|(x, rest)| *x - *rest).collect();
         let mut configuration = self.directions(&moved);
         for (y, rest) in configuration.iter_mut().zip(self.body.skin_rest_m()) {
             *y += *rest;
         }
-        configuration.extend_from_slice(&place[self.entries()..]);
+        configuration.extend_from_slice(&unknowns[self.entries()..]);
         configuration
     }
 
-    /// How the skin's vertices move when nodes and particles do.
+    /// Returns how the skin's vertices move when nodes and particles do.
     pub(super) fn directions(&self, entries: &[DVec3]) -> Vec<DVec3> {
         let of = |vertex: usize| self.of_vertex(vertex).iter().map(|&(e, w)| entries[e as usize] * w).sum();
         (0..self.vertices()).map(of).collect()
     }
 
-    /// Adds forces (N) of a configuration to those of a place.
-    pub(super) fn hand_back(&self, of_configuration_n: &[DVec3], forces_n: &mut [DVec3]) {
+    /// Adds forces (N) on a configuration to those on the unknowns.
+    pub(super) fn push(&self, of_configuration_n: &[DVec3], forces_n: &mut [DVec3]) {
         let (of_skin, of_tools) = of_configuration_n.split_at(self.vertices());
         for (vertex, force_n) in of_skin.iter().enumerate().filter(|(_, force_n)| **force_n != DVec3::ZERO) {
             for &(entry, weight) in self.of_vertex(vertex) {
@@ -144,23 +145,23 @@ impl<'a> Awakened<'a> {
         }
     }
 
-    /// Elastic forces (N) on nodes and particles, none on tools.
-    pub(super) fn elastic_n(&self, place: &[DVec3]) -> Vec<DVec3> {
-        let at = self.field(place);
-        let still = self.field(&vec![DVec3::ZERO; place.len()]);
+    /// Returns the elastic forces (N) on nodes and particles, zero on tools.
+    pub(super) fn elastic_n(&self, unknowns: &[DVec3]) -> Vec<DVec3> {
+        let at = self.field(unknowns);
+        let still = self.field(&vec![DVec3::ZERO; unknowns.len()]);
         let forces = self.patch.forces_n(&self.body.materials(), &at, &still).0;
-        Self::list(forces, place.len())
+        Self::list(forces, unknowns.len())
     }
 
-    /// Their change along a direction.
-    pub(super) fn elastic_change_n(&self, place: &[DVec3], direction: &[DVec3]) -> Vec<DVec3> {
-        let changes = self.patch.products_n(&self.body.materials(), &self.field(place), &self.field(direction));
-        Self::list(changes, place.len())
+    /// Returns the change of the elastic forces (N) along a direction.
+    pub(super) fn elastic_change_n(&self, unknowns: &[DVec3], direction: &[DVec3]) -> Vec<DVec3> {
+        let changes = self.patch.products_n(&self.body.materials(), &self.field(unknowns), &self.field(direction));
+        Self::list(changes, unknowns.len())
     }
 
-    /// Elastic energy (J).
-    pub(super) fn elastic_j(&self, place: &[DVec3]) -> f64 {
-        self.patch.energy_j(&self.body.materials(), &self.field(place))
+    /// Returns the elastic energy (J).
+    pub(super) fn elastic_j(&self, unknowns: &[DVec3]) -> f64 {
+        self.patch.energy_j(&self.body.materials(), &self.field(unknowns))
     }
 
     fn list(field: Field, length: usize) -> Vec<DVec3> {
@@ -170,24 +171,25 @@ impl<'a> Awakened<'a> {
         list
     }
 
-    pub(super) fn field(&self, place: &[DVec3]) -> Field {
-        Field { nodes: place[..self.nodes()].to_vec(), particles: place[self.nodes()..self.entries()].to_vec() }
+    pub(super) fn field(&self, unknowns: &[DVec3]) -> Field {
+        Field { nodes: unknowns[..self.nodes()].to_vec(), particles: unknowns[self.nodes()..self.entries()].to_vec() }
     }
 
-    /// Everything at rest.
+    /// Returns the unknowns of everything at rest.
     pub(super) fn at_rest(&self) -> Vec<DVec3> {
         let tools = self.environment.tools.iter().map(|tool| tool.start_position_m);
         self.rest_m.iter().copied().chain(tools).collect()
     }
 
-    /// A place where other particles were awake: what wakes is where it followed to, what falls asleep follows.
-    pub(super) fn taking_over(&self, other: &Self, place: &[DVec3]) -> Vec<DVec3> {
-        let (nodes, particles) = (&place[..self.nodes()], &place[self.nodes()..other.entries()]);
+    /// Returns the unknowns for this body's awake particles, from those of a body with others: particles that wake are
+    /// where they followed to.
+    pub(super) fn taking_over(&self, other: &Self, unknowns: &[DVec3]) -> Vec<DVec3> {
+        let (nodes, particles) = (&unknowns[..self.nodes()], &unknowns[self.nodes()..other.entries()]);
         let of = |id: &u32| match other.patch.active().binary_search(id) {
             Ok(number) => particles[number],
             Err(_) => self.body.partition().anchor(*id).of(nodes),
         };
         let awake = self.patch.active().iter().map(of);
-        nodes.iter().copied().chain(awake).chain(place[other.entries()..].iter().copied()).collect()
+        nodes.iter().copied().chain(awake).chain(unknowns[other.entries()..].iter().copied()).collect()
     }
 }

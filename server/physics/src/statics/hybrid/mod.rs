@@ -1,7 +1,8 @@
 //! Equilibrium of a hybrid body: coarse nodes, the particles that are awake, and tools on springs.
 //!
-//! As for bodies of tets the goal is reached in stages. After each the solver looks which particles are to be awake, and where those are others, finds the
-//! stage's equilibrium again with them: what it ends with does not depend on what was awake on the way, but for where a tool's ball stays put.
+//! As for bodies of tets the goal is reached in stages. After each stage the solver finds which particles are to be
+//! awake; where those are others, it finds the stage's equilibrium again with them. So the result does not depend on
+//! what was awake on the way, but for where a tool's ball stays.
 //!
 //! - `awake.rs`: which particles
 //! - `awakened.rs`: the body with them
@@ -26,19 +27,19 @@ use newton::Solver;
 use stage::Stage;
 use std::ops::ControlFlow;
 
-/// How often other particles may be woken at one stage.
+/// Largest number of sets of awake particles that are tried at one stage.
 const MAX_LOOKS: usize = 20;
 
-/// An equilibrium on the way.
+/// An equilibrium on the way to the goal.
 #[derive(Clone)]
 struct Reached {
-    place: Vec<DVec3>,
+    unknowns: Vec<DVec3>,
     claims: Claims,
     ids: Vec<u32>,
     contact: RestingContact,
 }
 
-/// From rest to the goal.
+/// Solves from rest to the goal.
 pub(super) fn solve(
     environment: &Environment,
     body: &HybridBody,
@@ -52,9 +53,9 @@ pub(super) fn solve(
     let mut claims = Claims::of(environment, body, goal);
     let ids = claims.look(&asleep, &asleep.at_rest(), &vec![DVec3::ZERO; environment.tools.len()]);
     let mut awakened = Awakened::new(environment, body, &ids);
-    let place = awakened.at_rest();
-    let contact = RestingContact::appear(&environment.contact, &awakened.configuration(&place));
-    let mut at = Reached { place, claims, ids, contact };
+    let unknowns = awakened.at_rest();
+    let contact = RestingContact::appear(&environment.contact, &awakened.configuration(&unknowns));
+    let mut at = Reached { unknowns, claims, ids, contact };
     let (stage, load_steps) = load_path::raise(largest, settings, |fraction| {
         let found = stage_from(&mut awakened, &mut solver, goal, fraction, &at);
         let (next, stage) = found.map_err(|stop| (stop, solver.history.len() as u32))?;
@@ -64,7 +65,7 @@ pub(super) fn solve(
     Ok(solution(&awakened, solver, &stage, at, load_steps))
 }
 
-/// The equilibrium at a fraction, with the particles awake that it keeps awake itself.
+/// Finds the equilibrium at a fraction of the goal, with the particles awake that it keeps awake itself.
 fn stage_from(
     awakened: &mut Awakened<'_>,
     solver: &mut Solver<'_>,
@@ -79,24 +80,25 @@ fn stage_from(
     // A tool may be deepest at one vertex with these awake, and at another with those: it keeps what it came to first.
     let mut tried = vec![now.ids.clone()];
     loop {
-        let (mut stage, begin) = Stage::enter(awakened, goal, fraction, &now.place, &now.contact);
-        now.place = settle(awakened, solver, goal, &mut stage, &begin)?;
+        let (mut stage, begin) = Stage::enter(awakened, goal, fraction, &now.unknowns, &now.contact);
+        now.unknowns = settle(awakened, solver, goal, &mut stage, &begin)?;
         now.contact = stage.contact.clone();
-        let pressing = stage.forces(awakened, &now.place).tools;
+        let pressing = stage.forces(awakened, &now.unknowns).tools;
         let contact_n: Vec<DVec3> = pressing.iter().map(|pressing| pressing.force_n).collect();
-        let wanted = now.claims.look(awakened, &now.place, &contact_n);
+        let wanted = now.claims.look(awakened, &now.unknowns, &contact_n);
         if tried.contains(&wanted) || tried.len() == MAX_LOOKS {
             return Ok((now, stage));
         }
         tried.push(wanted.clone());
         let next = Awakened::new(awakened.environment, awakened.body, &wanted);
-        now.place = next.taking_over(awakened, &now.place);
+        now.unknowns = next.taking_over(awakened, &now.unknowns);
         now.ids = wanted;
         *awakened = next;
     }
 }
 
-/// Equilibrium of a stage: a coupled tool that moves may come upon samples that it was not in front of when it set out.
+/// Finds the equilibrium of a stage. A coupled tool that moves may come upon samples that it was not in front of when
+/// it set out.
 fn settle(
     awakened: &Awakened<'_>,
     solver: &mut Solver<'_>,
@@ -123,7 +125,7 @@ fn solution(
     load_steps: u32,
 ) -> StaticSolution {
     let environment = awakened.environment;
-    let forces = stage.forces(awakened, &found.place);
+    let forces = stage.forces(awakened, &found.unknowns);
     let (_, residual_n, relative_residual) = forces.residual(awakened);
     // The holder supplies what the other forces lack.
     let hold = |(free, f): (&BVec3, &DVec3)| DVec3::select(*free, DVec3::ZERO, -*f);
@@ -134,19 +136,19 @@ fn solution(
     };
     StaticSolution {
         reactions_n: environment.prescribed.iter().map(of_set).collect(),
-        tools: stage.tools_at_rest(awakened, &forces, &found.place),
+        tools: stage.tools_at_rest(awakened, &forces, &found.unknowns),
         iterations: solver.history.len() as u32,
         factorisations: 0,
         load_steps,
         residual_n,
         relative_residual,
         reference_n: forces.reference_n(),
-        rounding_n: newton::rounding_n(awakened, &found.place),
-        stable: Solver::is_stable(awakened, stage, &found.place),
-        inverted_tets: awakened.patch.inverted(&awakened.field(&found.place)),
+        rounding_n: newton::rounding_n(awakened, &found.unknowns),
+        stable: Solver::is_stable(awakened, stage, &found.unknowns),
+        inverted_tets: awakened.patch.inverted(&awakened.field(&found.unknowns)),
         awake: AwakeParticles { ids: found.ids, spread_loads: found.claims.spread_loads() },
         history: solver.history,
-        x: found.place[..awakened.entries()].to_vec(),
+        x: found.unknowns[..awakened.entries()].to_vec(),
         node_reactions_n,
     }
 }

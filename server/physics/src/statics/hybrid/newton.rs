@@ -1,7 +1,7 @@
 //! Newton's method for a hybrid body at one stage, its linear systems by preconditioned conjugate gradients.
 //!
-//! `K d = f` is solved until conjugate gradients find a direction in which `K` is not positive, or to a thousandth; either is a descent of the potential,
-//! along which a step is sought as for bodies of tets (`solve::newton`).
+//! `K d = f` is solved until conjugate gradients find a direction in which `K` is not positive, or to a thousandth;
+//! either is a descent of the potential, along which a step is sought as for bodies of tets (`solve::newton`).
 use super::{
     awakened::Awakened,
     stage::{Forces, Line, Outer, Stage},
@@ -17,11 +17,11 @@ use crate::{
 use glam::{BVec3, DMat3, DVec3};
 use std::ops::ControlFlow;
 
-/// Most products in a linear system.
+/// Largest number of products in a linear system.
 const MOST_PRODUCTS: u32 = 20_000;
-/// Each is solved to this.
+/// Residual, over the right side, to which each linear system is solved.
 const LINEAR_TOLERANCE: f64 = 1e-3;
-/// A right side of random numbers is solved to this before a tangent is said to be positive.
+/// Residual to which a right side of random numbers is solved before a tangent counts as positive definite.
 const STABLE_TOLERANCE: f64 = 1e-6;
 
 pub(super) struct Solver<'a> {
@@ -32,7 +32,7 @@ pub(super) struct Solver<'a> {
 }
 
 /// `ε ‖diag K‖₂ max|q|` (N): an entry known to `ε|q|` has a force known to `ε |q| K_ii`.
-pub(super) fn rounding_n(awakened: &Awakened<'_>, place: &[DVec3]) -> f64 {
+pub(super) fn rounding_n(awakened: &Awakened<'_>, unknowns: &[DVec3]) -> f64 {
     let environment = awakened.environment;
     let springs = (0..environment.tools.len()).filter_map(|tool| environment.contact.spring(tool));
     let springs_sq: f64 = springs.map(|spring| 3.0 * spring.stiffness_n_per_m.powi(2)).sum();
@@ -40,21 +40,21 @@ pub(super) fn rounding_n(awakened: &Awakened<'_>, place: &[DVec3]) -> f64 {
         DVec3::select(*free, DVec3::new(block.x_axis.x, block.y_axis.y, block.z_axis.z), DVec3::ZERO).length_squared()
     };
     let of_body: f64 = awakened.diagonal_n_per_m.iter().zip(&awakened.free).map(along).sum();
-    f64::EPSILON * (of_body + springs_sq).sqrt() * place.iter().map(|x| x.length()).fold(0.0, f64::max)
+    f64::EPSILON * (of_body + springs_sq).sqrt() * unknowns.iter().map(|x| x.length()).fold(0.0, f64::max)
 }
 
 impl Solver<'_> {
-    /// Newton's method at a stage, from a place.
+    /// Finds the equilibrium of a stage by Newton's method, from the given unknowns.
     pub(super) fn equilibrate(
         &mut self,
         awakened: &Awakened<'_>,
         goal: &Goal<'_>,
         stage: &Stage,
-        mut place: Vec<DVec3>,
+        mut unknowns: Vec<DVec3>,
     ) -> Result<Vec<DVec3>, Stop> {
-        self.move_prescribed(awakened, goal, stage, &mut place);
+        self.move_prescribed(awakened, goal, stage, &mut unknowns);
         for iteration in 0..=self.settings.max_iterations {
-            let forces = stage.forces(awakened, &place);
+            let forces = stage.forces(awakened, &unknowns);
             let (residual, residual_n, relative_residual) = forces.residual(awakened);
             if !(residual_n.is_finite() && relative_residual.is_finite()) {
                 return Err(Stop::Step(Failure::NotFinite { node: worst_entry(&forces) }));
@@ -64,61 +64,63 @@ impl Solver<'_> {
             if (self.progress)(&progress).is_break() {
                 return Err(Stop::Final(SolveError::Cancelled { load_fraction: stage.fraction }));
             }
-            if relative_residual <= self.settings.relative_residual || residual_n <= rounding_n(awakened, &place) {
-                return Ok(place);
+            if relative_residual <= self.settings.relative_residual || residual_n <= rounding_n(awakened, &unknowns) {
+                return Ok(unknowns);
             }
             if iteration == self.settings.max_iterations {
                 return Err(Stop::Step(Failure::Iterations { relative_residual }));
             }
-            let outer = stage.outer(awakened, &place);
-            let d = self.direction(awakened, &outer, &place, &residual);
-            let Some(next) = descend(awakened, stage, &place, &d, &residual) else {
+            let outer = stage.outer(awakened, &unknowns);
+            let d = self.direction(awakened, &outer, &unknowns, &residual);
+            let Some(next) = descend(awakened, stage, &unknowns, &d, &residual) else {
                 return Err(Stop::Step(Failure::LineSearch { relative_residual }));
             };
-            place = next;
+            unknowns = next;
         }
-        Ok(place)
+        Ok(unknowns)
     }
 
-    /// `K d = f`.
-    fn direction(&mut self, awakened: &Awakened<'_>, outer: &Outer, place: &[DVec3], f: &[DVec3]) -> Vec<DVec3> {
+    /// Solves `K d = f`.
+    fn direction(&mut self, awakened: &Awakened<'_>, outer: &Outer, unknowns: &[DVec3], f: &[DVec3]) -> Vec<DVec3> {
         let stop = EnoughOf { iterations: MOST_PRODUCTS, tolerance: LINEAR_TOLERANCE };
         self.linear_systems += 1;
-        linear(awakened, outer, place, f, stop).0
+        linear(awakened, outer, unknowns, f, stop).0
     }
 
-    /// Brings prescribed axes to their place, and the free ones along by one linear system: `K d = f + (∂f/∂x) δ`.
-    fn move_prescribed(&mut self, awakened: &Awakened<'_>, goal: &Goal<'_>, stage: &Stage, place: &mut [DVec3]) {
+    /// Moves prescribed axes to where they are prescribed, by `δ`, and free ones along by one linear system:
+    /// `K d = f + (∂f/∂x) δ`.
+    fn move_prescribed(&mut self, awakened: &Awakened<'_>, goal: &Goal<'_>, stage: &Stage, unknowns: &mut [DVec3]) {
         let environment = awakened.environment;
-        let mut moves = vec![DVec3::ZERO; place.len()];
+        let mut moves = vec![DVec3::ZERO; unknowns.len()];
         for (set, displacement) in environment.prescribed.iter().zip(goal.prescribed_displacements_m) {
             for node in set.nodes.iter().map(|&n| n as usize) {
                 for axis in (0..3).filter(|&axis| set.axes[axis]) {
                     let wanted_m = awakened.body.rest_positions_m()[node][axis] + displacement[axis] * stage.fraction;
-                    moves[node][axis] = wanted_m - place[node][axis];
+                    moves[node][axis] = wanted_m - unknowns[node][axis];
                 }
             }
         }
         if moves.iter().all(|d| *d == DVec3::ZERO) {
             return;
         }
-        let carried = awakened.elastic_change_n(place, &moves);
-        let total = stage.forces(awakened, place).total_n();
+        let carried = awakened.elastic_change_n(unknowns, &moves);
+        let total = stage.forces(awakened, unknowns).total_n();
         let total = total.iter().zip(&carried).zip(&awakened.free);
         let f: Vec<DVec3> = total.map(|((a, b), free)| DVec3::select(*free, *a + *b, DVec3::ZERO)).collect();
-        let d = self.direction(awakened, &stage.outer(awakened, place), place, &f);
-        let share = longest_step(awakened, &d);
-        for ((x, moved), d) in place.iter_mut().zip(&moves).zip(d) {
-            *x += *moved + d * share;
+        let d = self.direction(awakened, &stage.outer(awakened, unknowns), unknowns, &f);
+        let part = longest_step(awakened, &d);
+        for ((x, moved), d) in unknowns.iter_mut().zip(&moves).zip(d) {
+            *x += *moved + d * part;
         }
     }
 
-    /// Whether the tangent is positive definite.
+    /// Returns whether the tangent is positive definite.
     ///
-    /// As long as conjugate gradients have met no direction of curvature below zero, the polynomial of their residual has positive roots and is one at zero, hence at
-    /// least one below: a residual never gets smaller than what the right side had of an eigenvector with a negative eigenvalue. So a residual of `1e-6`, of a
-    /// right side that has some of every eigenvector, tells that there is none.
-    pub(super) fn is_stable(awakened: &Awakened<'_>, stage: &Stage, place: &[DVec3]) -> bool {
+    /// As long as conjugate gradients have met no direction of curvature below zero, the polynomial of their residual
+    /// has positive roots and is one at zero, hence at least one below: a residual never gets smaller than what the
+    /// right side had of an eigenvector with a negative eigenvalue. So a residual of `1e-6`, of a right side that has
+    /// some of every eigenvector, tells that there is none.
+    pub(super) fn is_stable(awakened: &Awakened<'_>, stage: &Stage, unknowns: &[DVec3]) -> bool {
         let mut seed = 0x9e37_79b9_7f4a_7c15_u64;
         let mut random = || {
             // xorshift64 (Marsaglia 2003)
@@ -130,30 +132,31 @@ impl Solver<'_> {
         let mut component = |free: &BVec3| DVec3::select(*free, DVec3::new(random(), random(), random()), DVec3::ZERO);
         let f: Vec<DVec3> = awakened.free.iter().map(&mut component).collect();
         let stop = EnoughOf { iterations: MOST_PRODUCTS, tolerance: STABLE_TOLERANCE };
-        let (_, products, found_negative) = linear(awakened, &stage.outer(awakened, place), place, &f, stop);
+        let (_, products, found_negative) = linear(awakened, &stage.outer(awakened, unknowns), unknowns, &f, stop);
         products < MOST_PRODUCTS && !found_negative
     }
 }
 
-/// Solves with the tangent at a place: the solution, how many products it took, and whether one had no positive curvature.
+/// Solves with the tangent; returns the solution, how many products it took, and whether one had no positive
+/// curvature.
 fn linear(
     awakened: &Awakened<'_>,
     outer: &Outer,
-    place: &[DVec3],
+    unknowns: &[DVec3],
     f: &[DVec3],
     stop: EnoughOf,
 ) -> (Vec<DVec3>, u32, bool) {
     let mut blocks = awakened.diagonal_n_per_m.clone();
-    blocks.resize(place.len(), DMat3::ZERO);
+    blocks.resize(unknowns.len(), DMat3::ZERO);
     let elastic = blocks.clone();
     outer.add_diagonal_n_per_m(&mut blocks);
     let of = |((block, elastic), free): ((&DMat3, &DMat3), &BVec3)| inverse_of(block, elastic, *free);
     let inverse: Vec<DMat3> = blocks.iter().zip(&elastic).zip(&awakened.free).map(of).collect();
-    let mut scratch = PcgScratch::new(place.len());
+    let mut scratch = PcgScratch::new(unknowns.len());
     scratch.residual.copy_from_slice(f);
     let mut found_negative = false;
     let apply = |a: &[DVec3], out: &mut [DVec3]| {
-        for (out, change) in out.iter_mut().zip(awakened.elastic_change_n(place, a)) {
+        for (out, change) in out.iter_mut().zip(awakened.elastic_change_n(unknowns, a)) {
             *out = -change;
         }
         outer.add_products_n(a, out);
@@ -166,7 +169,8 @@ fn linear(
     (scratch.solution, products, found_negative)
 }
 
-/// Inverse of a diagonal block over the free axes, that of the body alone where contact leaves it not positive, the identity where there is none.
+/// Returns the inverse of a diagonal block over the free axes, that of the body alone where contact leaves it not
+/// positive, the identity where there is none.
 fn inverse_of(block: &DMat3, elastic: &DMat3, free: BVec3) -> DMat3 {
     let kept = DMat3::from_diagonal(DVec3::select(free, DVec3::ONE, DVec3::ZERO));
     let of_free = |a: &DMat3| kept * *a * kept + (DMat3::IDENTITY - kept);
@@ -178,11 +182,11 @@ fn inverse_of(block: &DMat3, elastic: &DMat3, free: BVec3) -> DMat3 {
     usable.next().map_or(DMat3::IDENTITY, |a| a.inverse())
 }
 
-/// One step along a direction; `None` when no length of it is acceptable.
+/// Takes one step along a direction; returns `None` when no length of it is acceptable.
 fn descend(
     awakened: &Awakened<'_>,
     stage: &Stage,
-    place: &[DVec3],
+    unknowns: &[DVec3],
     d: &[DVec3],
     residual: &[DVec3],
 ) -> Option<Vec<DVec3>> {
@@ -191,13 +195,14 @@ fn descend(
     if !(slope < 0.0 && slope.is_finite()) {
         return None;
     }
-    let line = Line::new(awakened, stage, place, d);
+    let line = Line::new(awakened, stage, unknowns, d);
     let change = |alpha: f64| line.potential_change_j(alpha);
     let slope_at = |alpha: f64| -dot(&stage.forces(awakened, &line.at(alpha)).total_n(), d);
     search(longest_step(awakened, d), slope, change, slope_at).map(|alpha| line.at(alpha))
 }
 
-/// Share of a motion in which no coupled tool moves further than a quarter of its radius: contact is not known further ahead.
+/// Returns the fraction of a motion in which no coupled tool moves further than a quarter of its radius: contact is not
+/// known further ahead.
 fn longest_step(awakened: &Awakened<'_>, d: &[DVec3]) -> f64 {
     let tools = awakened.environment.tools.iter().zip(&d[awakened.entries()..]);
     tools.map(|(tool, d)| 0.25 * tool.radius_m / d.length().max(f64::MIN_POSITIVE)).fold(1.0, f64::min)
@@ -228,7 +233,8 @@ mod tests {
         world::{Model, ModelSpec},
     };
 
-    /// StVK pressed evenly to a stretch s bears `½ E (s³ − s)`, less the more it is pressed beyond s = 1/√3: one half of a block then gives way to the other.
+    /// StVK pressed evenly to a stretch s bears `½ E (s³ − s)`, less the more it is pressed beyond s = 1/√3: one half
+    /// of a block then gives way to the other.
     #[test]
     fn a_tangent_that_is_not_positive_is_told() {
         let mesh = slab();
@@ -277,9 +283,10 @@ mod tests {
             let goal = Goal::default();
             let contact = RestingContact::appear(model.contact(), &awakened.configuration(&awakened.at_rest()));
             for (stretch, stable) in [(1.0, true), (0.8, true), (0.5, false)] {
-                let place: Vec<DVec3> = awakened.at_rest().iter().map(|x| *x * DVec3::new(1.0, 1.0, stretch)).collect();
-                let (stage, place) = Stage::enter(&awakened, &goal, 1.0, &place, &contact);
-                assert_eq!(Solver::is_stable(&awakened, &stage, &place), stable, "{} awake, {stretch}", ids.len());
+                let unknowns: Vec<DVec3> =
+                    awakened.at_rest().iter().map(|x| *x * DVec3::new(1.0, 1.0, stretch)).collect();
+                let (stage, unknowns) = Stage::enter(&awakened, &goal, 1.0, &unknowns, &contact);
+                assert_eq!(Solver::is_stable(&awakened, &stage, &unknowns), stable, "{} awake, {stretch}", ids.len());
             }
         }
     }

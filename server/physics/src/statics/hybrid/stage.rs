@@ -1,4 +1,5 @@
-//! What an equilibrium of a hybrid body balances, at a fraction of the goal: forces, their tangent, and the change of potential along a line.
+//! What an equilibrium of a hybrid body balances, at a fraction of the goal: forces, their tangent, and the change of
+//! potential along a line.
 use super::awakened::Awakened;
 use crate::{
     contact::{Pressing, RestingContact, SaturatingSpring},
@@ -13,19 +14,19 @@ use crate::{
 use glam::{DMat3, DVec3};
 use std::collections::BTreeMap;
 
-/// The goal scaled to a fraction of the way.
+/// The goal, scaled to a fraction of it.
 #[derive(Debug, Clone)]
 pub(super) struct Stage {
     pub(super) fraction: f64,
     load_factors: Vec<f64>,
-    /// Gravity and dead loads (N) on a place's entries.
+    /// Gravity and dead loads (N) on the unknowns.
     dead_n: Vec<DVec3>,
-    /// Where the tools' devices are (m).
+    /// Positions (m) of the tools' devices.
     devices_m: Vec<DVec3>,
     pub(super) contact: RestingContact,
 }
 
-/// Forces (N) on a place's entries.
+/// Forces (N) on the unknowns.
 pub(super) struct Forces {
     pub(super) elastic_n: Vec<DVec3>,
     pub(super) external_n: Vec<DVec3>,
@@ -36,14 +37,15 @@ pub(super) struct Forces {
 pub(super) struct Outer {
     /// Entries of a configuration.
     entries: Vec<u32>,
-    /// Each with what it moves with.
+    /// The unknowns that each entry moves with, and their weights.
     carriers: Vec<Vec<(u32, f64)>>,
-    /// Blocks `∂(−f_i)/∂y_j`, `i` and `j` by their numbers in `entries`; what two have is given once.
+    /// Blocks `∂(−f_i)/∂y_j`, `i` and `j` by their numbers in `entries`; of a pair only one block is kept.
     blocks: BTreeMap<[u32; 2], DMat3>,
 }
 
 impl Stage {
-    /// The stage entered from a place, with contact as it was there; and the place to begin with.
+    /// Enters a stage from the unknowns `before`, where contact was `contact`; returns the stage, and the unknowns to
+    /// begin with.
     pub(super) fn enter(
         awakened: &Awakened<'_>,
         goal: &Goal<'_>,
@@ -65,7 +67,7 @@ impl Stage {
         }
         let mut dead_n: Vec<DVec3> = awakened.weight_n.iter().map(|weight| *weight * fraction).collect();
         dead_n.resize(before.len(), DVec3::ZERO);
-        awakened.hand_back(&on_skin_n, &mut dead_n);
+        awakened.push(&on_skin_n, &mut dead_n);
         let start = environment.tools.iter().map(|tool| tool.start_position_m);
         let devices_m: Vec<DVec3> = start.zip(goal.tools).map(|(s, tool)| s.lerp(tool.position_m, fraction)).collect();
         let mut begin = before.to_vec();
@@ -74,20 +76,21 @@ impl Stage {
                 begin[awakened.entries() + tool] = *device;
             }
         }
-        let [was, is] = [before, &begin].map(|place| awakened.configuration(place));
+        let [was, is] = [before, &begin].map(|unknowns| awakened.configuration(unknowns));
         let contact = contact.arrive(&environment.contact, &was, &is);
         (Self { fraction, load_factors, dead_n, devices_m, contact }, begin)
     }
 
-    /// Coupled tools: entry of a place, spring and its stretch `d − c` (m).
+    /// Returns the coupled tools, each with the number of its unknown, its spring, and the spring's stretch `d − c`
+    /// (m).
     fn springs<'a>(
         &'a self,
         awakened: &'a Awakened<'_>,
-        place: &'a [DVec3],
+        unknowns: &'a [DVec3],
     ) -> impl Iterator<Item = (usize, SaturatingSpring, DVec3)> + 'a {
         self.devices_m.iter().enumerate().filter_map(move |(tool, device)| {
             let (entry, spring) = (awakened.entries() + tool, awakened.environment.contact.spring(tool)?);
-            Some((entry, spring, *device - place[entry]))
+            Some((entry, spring, *device - unknowns[entry]))
         })
     }
 
@@ -102,30 +105,30 @@ impl Stage {
         }
     }
 
-    /// All forces at a place.
-    pub(super) fn forces(&self, awakened: &Awakened<'_>, place: &[DVec3]) -> Forces {
-        let configuration = awakened.configuration(place);
+    /// Computes all forces.
+    pub(super) fn forces(&self, awakened: &Awakened<'_>, unknowns: &[DVec3]) -> Forces {
+        let configuration = awakened.configuration(unknowns);
         let mut outer_n = vec![DVec3::ZERO; configuration.len()];
         self.add_followers_n(awakened, &configuration, &mut outer_n);
         let tools = self.contact.add_forces_n(&awakened.environment.contact, &configuration, &mut outer_n);
         let mut external_n = self.dead_n.clone();
-        awakened.hand_back(&outer_n, &mut external_n);
-        for (entry, spring, stretch_m) in self.springs(awakened, place) {
+        awakened.push(&outer_n, &mut external_n);
+        for (entry, spring, stretch_m) in self.springs(awakened, unknowns) {
             external_n[entry] += spring.force_n(stretch_m);
         }
-        Forces { elastic_n: awakened.elastic_n(place), external_n, tools }
+        Forces { elastic_n: awakened.elastic_n(unknowns), external_n, tools }
     }
 
-    /// The stiffness of contact, couplings and follower pressures at a place; of the latter its symmetric part.
-    pub(super) fn outer(&self, awakened: &Awakened<'_>, place: &[DVec3]) -> Outer {
-        let configuration = awakened.configuration(place);
+    /// Computes the stiffness of contact, couplings and follower pressures; of the latter its symmetric part.
+    pub(super) fn outer(&self, awakened: &Awakened<'_>, unknowns: &[DVec3]) -> Outer {
+        let configuration = awakened.configuration(unknowns);
         let mut blocks: BTreeMap<[u32; 2], DMat3> = BTreeMap::new();
         let mut add = |i: u32, j: u32, block: &DMat3| {
             let (pair, block) = if i <= j { ([i, j], *block) } else { ([j, i], block.transpose()) };
             *blocks.entry(pair).or_insert(DMat3::ZERO) += block;
         };
         self.contact.for_each_block(&awakened.environment.contact, &configuration, false, &mut add);
-        for (entry, spring, stretch_m) in self.springs(awakened, place) {
+        for (entry, spring, stretch_m) in self.springs(awakened, unknowns) {
             let own = (entry - awakened.entries() + awakened.vertices()) as u32;
             add(own, own, &spring.hessian_n_per_m(stretch_m, false));
         }
@@ -133,16 +136,21 @@ impl Stage {
         Outer::new(awakened, blocks)
     }
 
-    /// Potential (J) of contact and couplings at a place.
-    fn tools_j(&self, awakened: &Awakened<'_>, place: &[DVec3]) -> f64 {
-        let springs: f64 = self.springs(awakened, place).map(|(_, spring, stretch)| spring.energy_j(stretch)).sum();
-        self.contact.potential_j(&awakened.environment.contact, &awakened.configuration(place)) + springs
+    /// Returns the potential (J) of contact and couplings.
+    fn tools_j(&self, awakened: &Awakened<'_>, unknowns: &[DVec3]) -> f64 {
+        let springs: f64 = self.springs(awakened, unknowns).map(|(_, spring, stretch)| spring.energy_j(stretch)).sum();
+        self.contact.potential_j(&awakened.environment.contact, &awakened.configuration(unknowns)) + springs
     }
 
-    /// The tools at a place with these forces.
-    pub(super) fn tools_at_rest(&self, awakened: &Awakened<'_>, forces: &Forces, place: &[DVec3]) -> Vec<ToolAtRest> {
+    /// Returns the tools at rest, with these forces.
+    pub(super) fn tools_at_rest(
+        &self,
+        awakened: &Awakened<'_>,
+        forces: &Forces,
+        unknowns: &[DVec3],
+    ) -> Vec<ToolAtRest> {
         let at_rest = |(tool, pressing): (usize, &Pressing)| {
-            let (device_m, centre_m) = (self.devices_m[tool], place[awakened.entries() + tool]);
+            let (device_m, centre_m) = (self.devices_m[tool], unknowns[awakened.entries() + tool]);
             let spring_n = awakened.environment.contact.spring(tool).map(|spring| spring.force_n(device_m - centre_m));
             ToolAtRest::pressing(device_m, centre_m, pressing, spring_n)
         };
@@ -155,12 +163,12 @@ impl Forces {
         self.elastic_n.iter().zip(&self.external_n).map(|(a, b)| *a + *b).collect()
     }
 
-    /// `max(‖f_elastic‖₂, ‖f_external‖₂)` (N), prescribed axes included.
+    /// Returns `max(‖f_elastic‖₂, ‖f_external‖₂)` (N), prescribed axes included.
     pub(super) fn reference_n(&self) -> f64 {
         dot(&self.elastic_n, &self.elastic_n).max(dot(&self.external_n, &self.external_n)).sqrt()
     }
 
-    /// Total force (N) along the axes that may move, and its size; the size over [`Self::reference_n`].
+    /// Returns the total force (N) along the axes that may move, its size, and the size over [`Self::reference_n`].
     pub(super) fn residual(&self, awakened: &Awakened<'_>) -> (Vec<DVec3>, f64, f64) {
         let totals = self.total_n();
         let free: Vec<DVec3> =
@@ -182,7 +190,7 @@ impl Outer {
         Self { entries, carriers, blocks }
     }
 
-    /// `out ← out + K a`.
+    /// Adds `K a` to `out`.
     pub(super) fn add_products_n(&self, a: &[DVec3], out: &mut [DVec3]) {
         let of = |carriers: &Vec<(u32, f64)>| carriers.iter().map(|&(e, w)| a[e as usize] * w).sum();
         let moved: Vec<DVec3> = self.carriers.iter().map(of).collect();
@@ -200,7 +208,7 @@ impl Outer {
         }
     }
 
-    /// Adds the diagonal blocks (N/m) of a place's entries.
+    /// Adds the diagonal blocks (N/m) of the unknowns.
     pub(super) fn add_diagonal_n_per_m(&self, diagonal: &mut [DMat3]) {
         for ([i, j], block) in &self.blocks {
             let both = if i == j { *block } else { *block + block.transpose() };
@@ -247,7 +255,8 @@ impl<'a> Line<'a> {
         self.x.iter().zip(self.d).map(|(x, d)| *x + *d * alpha).collect()
     }
 
-    /// Change of potential (J) from 0 to `alpha`, and the size of the rounding in it; the work of follower pressures by Simpson's rule, which is exact.
+    /// Returns the change of potential (J) from 0 to `alpha`, and the size of the rounding in it; the work of follower
+    /// pressures is computed by Simpson's rule, which is exact.
     pub(super) fn potential_change_j(&self, alpha: f64) -> (f64, f64) {
         let x = self.at(alpha);
         let elastic = self.awakened.elastic_j(&x) - self.elastic_j;

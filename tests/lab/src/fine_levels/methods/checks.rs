@@ -24,7 +24,7 @@ use std::{collections::BTreeSet, f64::consts::PI};
 fn out_of_balance(partition: &Partition, method: Method, material: &Material) -> (f64, f64) {
     let active: BTreeSet<u32> = (0..partition.particle_count() as u32).collect();
     let patch = PointPatch::new(partition, &active, &method.points(partition, &active));
-    let of_tet = vec![0; partition.shares().len()];
+    let of_tet = vec![0; partition.residual_elements().len()];
     let materials = Materials { materials: &[*material], of_tet: &of_tet };
     let f = stretch(&mut Random(59));
     let at = moved(&patch.at_rest(partition), |p| f * p);
@@ -45,7 +45,7 @@ fn beside_traction(ball: &Partition, block: &Partition, method: Method, material
     let stress = material.piola(&f);
     let unit_pa = stress.x_axis.length().max(stress.y_axis.length()).max(stress.z_axis.length());
     let forces = |partition: &Partition, patch: &dyn FineLevel| {
-        let of_tet = vec![0; partition.shares().len()];
+        let of_tet = vec![0; partition.residual_elements().len()];
         let materials = Materials { materials: &[*material], of_tet: &of_tet };
         let at = moved(&patch.at_rest(partition), |p| f * p);
         patch.elastic_forces_n(&materials, &at)
@@ -98,7 +98,7 @@ fn least_stiffness(partition: &Partition, method: Method) -> (f64, [i32; 3]) {
     });
     let operator = Operator::new(&rows, 1.0, |particle| particle);
     let [material, ..] = tissue();
-    let of_tet = vec![0; partition.shares().len()];
+    let of_tet = vec![0; partition.residual_elements().len()];
     let materials = Materials { materials: &[material], of_tet: &of_tet };
     let volume_m3 = (PERIOD as f64 * h).powi(3);
     let waves = (0..216_i32).map(|n| [n % 6 - 2, n / 6 % 6 - 2, n / 36 - 2]).filter(|wave| *wave != [0; 3]);
@@ -143,7 +143,7 @@ fn control_leaves_no_mode_without_energy() {
 
 /// Square of the largest natural frequency (rad²/s²) of all particles awake, by power iteration.
 fn largest_square(partition: &Partition, patch: &dyn FineLevel, material: &Material) -> f64 {
-    let of_tet = vec![0; partition.shares().len()];
+    let of_tet = vec![0; partition.residual_elements().len()];
     let materials = Materials { materials: &[*material], of_tet: &of_tet };
     let rest = patch.at_rest(partition);
     let still = vec![DVec3::ZERO; rest.nodes.len()];

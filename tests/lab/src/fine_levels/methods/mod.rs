@@ -136,6 +136,6 @@ fn at_octant(partition: &Partition, cell: usize, corner: usize) -> Row {
     let inward = DVec3::ONE - CORNERS[corner] * 2.0;
     let at = partition.particle_m(origin) + inward * (0.25 * partition.sites().spacing_m());
     let terms = least_squares::terms(partition, at, origin);
-    let volume_m3 = partition.moments(cell).0 / 8.0;
+    let volume_m3 = partition.moments(cell).volume_m3 / 8.0;
     Row { volume_m3, origin, tet: partition.cells()[cell].tet, role: Role::Whole, terms }
 }

@@ -24,7 +24,7 @@ pub struct PointPatch {
     border: Vec<Anchor>,
     operator: Operator,
     /// What is left to each coarse tet.
-    shares: Vec<ResidualElement>,
+    residual_elements: Vec<ResidualElement>,
 }
 
 impl PointPatch {
@@ -39,20 +39,20 @@ impl PointPatch {
                 (active.len() + border.len()) as u32 - 1
             })
         });
-        let mut shares = partition.shares().to_vec();
+        let mut residual_elements = partition.residual_elements().to_vec();
         for &Handed { cell: number, part } in &points.handed {
             let (cell, moments) = (&partition.cells()[number], partition.moments(number));
             let anchors = partition.corners(number).map(|particle| partition.anchor(particle));
-            shares[cell.tet as usize].add(cell.part, part * (KEPT - 1.0), moments.0, &moments.1, &anchors);
+            residual_elements[cell.tet as usize].add(cell.part, part * (KEPT - 1.0), &moments, &anchors);
         }
-        Self { active, border, operator, shares }
+        Self { active, border, operator, residual_elements }
     }
 
     /// Elastic energy (J).
     pub fn energy_j(&self, materials: &Materials<'_>, at: &Field) -> f64 {
-        let of_share = |(tet, share): (usize, &ResidualElement)| share.energy_j(materials.of(tet), &at.nodes);
+        let of_share = |(tet, residual): (usize, &ResidualElement)| residual.energy_j(materials.of(tet), &at.nodes);
         let fine = self.operator.energy_j(materials, &self.points(at));
-        fine + self.shares.iter().enumerate().map(of_share).sum::<f64>()
+        fine + self.residual_elements.iter().enumerate().map(of_share).sum::<f64>()
     }
 
     /// Forces (N) of elastic and viscous stress at positions `at` and velocities `rate`, and the power (W) that viscous stress takes.
@@ -61,8 +61,8 @@ impl PointPatch {
         let mut nodes = vec![DVec3::ZERO; at.nodes.len()];
         let mut of_points = vec![DVec3::ZERO; points.len()];
         let mut power_w = self.operator.add_forces_n(materials, &points, &rates, &mut of_points);
-        for (tet, share) in self.shares.iter().enumerate() {
-            power_w += share.add_forces_n(materials.of(tet), &at.nodes, &rate.nodes, &mut nodes);
+        for (tet, residual) in self.residual_elements.iter().enumerate() {
+            power_w += residual.add_forces_n(materials.of(tet), &at.nodes, &rate.nodes, &mut nodes);
         }
         (self.handed_back(nodes, of_points), power_w)
     }
@@ -100,8 +100,8 @@ impl FineLevel for PointPatch {
         let mut nodes = vec![DVec3::ZERO; at.nodes.len()];
         let mut of_points = vec![DVec3::ZERO; points.len()];
         self.operator.add_products_n(materials, &points, &changes, &mut of_points);
-        for (tet, share) in self.shares.iter().enumerate() {
-            share.add_products_n(materials.of(tet), &at.nodes, &a.nodes, &mut nodes);
+        for (tet, residual) in self.residual_elements.iter().enumerate() {
+            residual.add_products_n(materials.of(tet), &at.nodes, &a.nodes, &mut nodes);
         }
         self.handed_back(nodes, of_points)
     }
@@ -115,8 +115,8 @@ impl FineLevel for PointPatch {
                 of_nodes[node as usize] += block * (weight * weight);
             }
         }
-        for (tet, share) in self.shares.iter().enumerate() {
-            share.add_diagonal_n_per_m(materials.of(tet), &mut of_nodes);
+        for (tet, residual) in self.residual_elements.iter().enumerate() {
+            residual.add_diagonal_n_per_m(materials.of(tet), &mut of_nodes);
         }
         let filled = |block: DMat3| if block == DMat3::ZERO { DMat3::IDENTITY } else { block };
         of_nodes.into_iter().chain(of_points).map(filled).collect()

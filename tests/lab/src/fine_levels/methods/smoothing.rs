@@ -67,7 +67,7 @@ fn at_node(partition: &Partition, gamma: f64, node: u32, tets: &[(usize, usize)]
     let mut volume_m3 = 0.0;
     let mut sums: BTreeMap<u32, DVec3> = BTreeMap::new();
     for &(cell, tet) in tets {
-        let quarter_m3 = partition.moments(cell).0 / 24.0;
+        let quarter_m3 = partition.moments(cell).volume_m3 / 24.0;
         volume_m3 += quarter_m3;
         let corners = partition.corners(cell);
         for (corner, gradient) in TETS[tet].into_iter().zip(gradients(TETS[tet])) {
@@ -82,7 +82,7 @@ fn in_tet(partition: &Partition, gamma: f64, cell: usize, tet: usize, quarters: 
     let corners = partition.corners(cell);
     let spacing_m = partition.sites().spacing_m();
     let terms = TETS[tet].into_iter().zip(gradients(TETS[tet])).map(|(corner, g)| (corners[corner], g / spacing_m));
-    let volume_m3 = f64::from(quarters) * partition.moments(cell).0 / 24.0;
+    let volume_m3 = f64::from(quarters) * partition.moments(cell).volume_m3 / 24.0;
     row(partition, Role::Stabilising { gamma }, partition.cells()[cell].tet, corners[0], volume_m3, terms)
 }
 

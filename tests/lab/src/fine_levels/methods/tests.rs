@@ -19,7 +19,7 @@ fn force_sums(at: &Field, forces: &Field) -> (DVec3, DVec3, f64) {
 #[test]
 fn forces_are_the_energys_gradient_and_products_theirs() {
     let partition = ball_in_cage();
-    let of_tet = vec![0; partition.shares().len()];
+    let of_tet = vec![0; partition.residual_elements().len()];
     let mut random = Random(41);
     for method in RAW.into_iter().chain(CORRECTED) {
         let patch = half_awake(&partition, method);
@@ -53,7 +53,7 @@ fn forces_are_the_energys_gradient_and_products_theirs() {
 #[test]
 fn the_diagonal_is_that_of_the_products_at_rest() {
     let partition = ball_in_cage();
-    let of_tet = vec![0; partition.shares().len()];
+    let of_tet = vec![0; partition.residual_elements().len()];
     let [material, ..] = tissue();
     let materials = Materials { materials: &[material], of_tet: &of_tet };
     for method in RAW.into_iter().chain(CORRECTED) {
@@ -73,7 +73,7 @@ fn the_diagonal_is_that_of_the_products_at_rest() {
 #[test]
 fn forces_sum_to_zero_and_objective_methods_know_no_torque_nor_rotation() {
     let partition = ball_in_cage();
-    let of_tet = vec![0; partition.shares().len()];
+    let of_tet = vec![0; partition.residual_elements().len()];
     let turn = DQuat::from_axis_angle(DVec3::new(0.48, 0.6, 0.64), 2.1);
     let scale = 10e3 * partition.sites().spacing_m().powi(2);
     let mut random = Random(43);
@@ -138,7 +138,7 @@ fn all_points_that_see_an_active_particle_are_awake() {
 #[test]
 fn volume_is_counted_once() {
     let partition = ball_in_cage();
-    let of_tet = vec![0; partition.shares().len()];
+    let of_tet = vec![0; partition.residual_elements().len()];
     let f = stretch(&mut Random(53));
     for method in CORRECTED {
         let patch = half_awake(&partition, method);

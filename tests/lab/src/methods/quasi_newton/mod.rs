@@ -22,7 +22,7 @@ use history::{History, dot};
 use miette::Result;
 use palpate_physics::{
     Precision, Settings, State, Substeps,
-    contact::{Body as ContactBody, ContactScratch, ContactState, SubstepTime, ToolState, ToolTarget},
+    contact::{BodyMotion, ContactScratch, ContactState, SubstepTime, ToolState, ToolTarget},
     kernels::KernelScratch,
 };
 use prefactor::Prefactored;
@@ -149,7 +149,7 @@ impl Body {
         if !self.tools.is_empty() {
             // The broad phase must hear of every motion; a halved step comes back by as much as is left.
             let moved = next.x.iter().zip(&self.x).map(|(a, b)| a.distance_squared(*b)).fold(0.0, f64::max).sqrt();
-            let body = ContactBody { x: &next.x, v: &self.v, fastest_m_per_s: moved / dt_s };
+            let body = BodyMotion { x: &next.x, v: &self.v, fastest_m_per_s: moved / dt_s };
             let time = SubstepTime { fraction: 1.0, dt_s, tick_period_s: dt_s };
             model.contact().substep(
                 &body,

@@ -1,4 +1,5 @@
-//! What full and cut cells of a hybrid body's patch share: sums and differences of eight, and the stress of a vector of cells.
+//! What full and cut cells of a hybrid body's patch share: sums and differences of eight, and the stress of a vector of
+//! cells.
 use crate::{
     lanes::real::{Real, Scalar, Vector},
     material::{
@@ -11,10 +12,11 @@ use crate::{
 };
 use glam::DMat3;
 
-/// The widest vector.
+/// Number of lanes of the widest vector.
 const LANES: usize = 16;
 
-/// Sums and differences of eight values along the three axes, the first of which is zero: `x, y, z, yz, zx, xy, xyz`.
+/// Returns the sums and differences of eight values along the three axes, `x, y, z, yz, zx, xy, xyz`; the first value
+/// is zero.
 #[inline(always)]
 pub(crate) fn patterns<V: Vector>(v: &[V; 7]) -> [V; 7] {
     let [v1, v2, v3, v4, v5, v6, v7] = *v;
@@ -29,7 +31,7 @@ pub(crate) fn patterns<V: Vector>(v: &[V; 7]) -> [V; 7] {
     [ds1 + ds0, sd1 + sd0, ss1 - ss0, sd1 - sd0, ds1 - ds0, dd1 + dd0, dd1 - dd0]
 }
 
-/// What the factors of [`patterns`] give particles 1 to 7.
+/// Returns the values of particles 1 to 7 that factors of [`patterns`] give: the transpose.
 #[inline(always)]
 pub(crate) fn particles<V: Vector>(c: &[V; 7]) -> [V; 7] {
     let [x, y, z, yz, zx, xy, xyz] = *c;
@@ -47,7 +49,7 @@ pub(crate) fn particles<V: Vector>(c: &[V; 7]) -> [V; 7] {
     ]
 }
 
-/// Elastic and viscous stress (Pa), and the power density (W/m³) of the latter.
+/// Returns elastic and viscous stress (Pa), and the power density (W/m³) of the latter.
 #[inline(always)]
 pub(crate) fn stress<V: Vector<Scalar = T>, T: Scalar, L: ConstitutiveLaw, const VISCOUS: bool>(
     constants: &Constants<T>,
@@ -72,10 +74,10 @@ pub(crate) fn stress<V: Vector<Scalar = T>, T: Scalar, L: ConstitutiveLaw, const
     (p, V::of(0.0))
 }
 
-/// The same of a rest state changed by `A` (`hybrid::fade`): `P̃(F (I + A)) (I + A)ᵀ`, with `F (I + A) − I = H + A + H A`; viscous stress is that of `F`. And
-/// `P̃ : F A` (J/m³).
+/// Returns the same for a prestrain `A` (`hybrid::prestrain`): `P̃(F (I + A)) (I + A)ᵀ`, with
+/// `F (I + A) − I = H + A + H A`; viscous stress is that of `F`. Returns `P̃ : F A` (J/m³), too.
 #[inline(always)]
-pub(crate) fn faded_stress<V: Vector<Scalar = T>, T: Scalar, L: ConstitutiveLaw, const VISCOUS: bool>(
+pub(crate) fn prestrained_stress<V: Vector<Scalar = T>, T: Scalar, L: ConstitutiveLaw, const VISCOUS: bool>(
     constants: &Constants<T>,
     a: &M3<V>,
     h: &M3<V>,
@@ -105,7 +107,7 @@ pub(crate) fn faded_stress<V: Vector<Scalar = T>, T: Scalar, L: ConstitutiveLaw,
     (back, V::of(0.0), along)
 }
 
-/// Lanes of nine entries, row by row.
+/// Loads a matrix from lanes of its nine entries, row by row.
 #[inline(always)]
 pub(crate) fn load_matrix<V: Vector, const N: usize>(lanes: &[[V::Scalar; N]], first: usize) -> M3<V> {
     let mut m = [[V::of(0.0); 3]; 3];
@@ -117,7 +119,7 @@ pub(crate) fn load_matrix<V: Vector, const N: usize>(lanes: &[[V::Scalar; N]], f
     m
 }
 
-/// The lanes of a matrix; what is over stays zero.
+/// The lanes of a matrix; lanes beyond the vector's width stay zero.
 type Stored<T> = [[[T; LANES]; 3]; 3];
 
 #[inline(always)]
@@ -131,7 +133,8 @@ fn stored<V: Vector>(m: &M3<V>) -> Stored<V::Scalar> {
     lanes
 }
 
-/// Lanes outside the law's domain, once more, in f64. On stored lanes: a function that is not inlined has no vectors of its caller's set.
+/// Computes the lanes outside the law's domain once more, in f64. It works on stored lanes, since a function that is
+/// not inlined has no vectors of its caller's instruction set.
 #[cold]
 #[inline(never)]
 fn redo_outside<T: Scalar, L: ConstitutiveLaw>(

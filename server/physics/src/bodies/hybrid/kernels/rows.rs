@@ -1,12 +1,14 @@
 //! The full cells of a hybrid body's patch, row by row along x; their oracle is `hybrid::cell`.
 //!
-//! Points (the particles of awake cells) are numbered by their sites, x first, so the particles of neighbouring cells of a row are neighbours in
-//! memory: the eight of a lane are eight shifted loads, and nothing is gathered or scattered. Lanes past a row's end are given no strain and weight 0.
-//! What cells give their particles on the left and on the right is summed apart, that loads never overlap a store just made, and put
-//! together at the end: `f_i = l_i + r_{i−1}`.
+//! Points (the particles of awake cells) are numbered by their sites, x first, so the particles of neighbouring cells
+//! of a row are neighbours in memory: the eight of a lane are eight shifted loads, and nothing is gathered or
+//! scattered. Lanes past a row's end are given no strain and weight 0. Forces on the particles on the left and on the
+//! right of cells are summed apart, so that loads never overlap a store just made, and added at the end:
+//! `f_i = l_i + r_{i−1}`.
 use super::{
     cell_stress::{particles, patterns, stress},
-    prestrains::{ENTRIES, Found, Split, add_lanes, entries, fading_stress, scaled},
+    prestrains::{ENTRIES, Found, Split, add_lanes, entries, prestrained_cell_stress, scaled},
+    row_lanes::{LANES, add, differences, first_lanes, matrix},
 };
 use crate::{
     bodies::hybrid::{
@@ -15,44 +17,42 @@ use crate::{
     },
     lanes::{
         Available, InstructionSet,
-        real::{Real, Scalar, Vector},
+        real::{Scalar, Vector},
     },
-    material::{ConstitutiveLaw, LawPass, Material, lane_matrix::M3},
+    material::{ConstitutiveLaw, LawPass, Material},
     settings::Precision,
 };
 use glam::DVec3;
-
-/// The widest vector: arrays end on so many entries of no point.
-const LANES: usize = 16;
 
 /// Full cells, one after the other along x.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct CellRow {
     /// The first cell's points 0, 2, 4 and 6; the others follow them.
     pub points: [u32; 4],
-    /// How many cells.
+    /// Number of cells.
     pub cells: u32,
     /// Index of their material.
     pub material: u16,
-    /// Number of the first cell among all of the rows, one after the other.
+    /// Number of the first cell when the cells of all rows are counted one after the other.
     pub first: u32,
-    /// Whether something fades in any of them ([`RowKernel::put_fade`]).
-    pub fading: bool,
+    /// Whether any of the cells has prestrain ([`RowKernel::put_prestrain`]).
+    pub prestrained: bool,
 }
 
-/// Full cells, which all are of one size: their materials, and displacements, velocities and forces of their points.
+/// Full cells, of the lattice's spacing or twice that: their materials, and displacements, velocities and forces of
+/// their points.
 #[derive(Debug, Clone)]
 pub struct RowKernel {
     layout: Layout,
     instruction_set: Available,
 }
 
-/// For how many it has buffers.
+/// How many points and cells a kernel has buffers for.
 #[derive(Debug, Clone, Copy)]
 pub struct Room {
-    /// Points.
+    /// Number of points.
     pub points: usize,
-    /// Cells.
+    /// Number of cells.
     pub cells: usize,
 }
 
@@ -78,17 +78,17 @@ struct CellMaterial<T> {
 #[derive(Debug, Clone)]
 struct Arrays<T> {
     displacements: [Vec<T>; 3],
-    /// Empty unless something is viscous.
+    /// Empty unless some material is viscous.
     velocities: [Vec<T>; 3],
     left: [Vec<T>; 3],
     right: [Vec<T>; 3],
-    /// Of every cell.
-    fades: [Vec<T>; ENTRIES],
+    /// Prestrain of every cell, entry by entry.
+    prestrains: [Vec<T>; ENTRIES],
 }
 
 impl<T: Scalar> Arrays<T> {
     fn new(points: usize, cells: usize, is_viscous: bool) -> Self {
-        // One before the first point, whose left neighbour gives it nothing.
+        // There is one entry before the first point, as its left neighbour, which adds nothing to it.
         let zeros = |count: usize| std::array::from_fn(|_| vec![T::of(0.0); count]);
         let entries = 1 + points + LANES;
         Self {
@@ -96,16 +96,16 @@ impl<T: Scalar> Arrays<T> {
             velocities: zeros(if is_viscous { entries } else { 0 }),
             left: zeros(entries),
             right: zeros(entries),
-            fades: std::array::from_fn(|_| vec![T::of(0.0); cells + LANES]),
+            prestrains: std::array::from_fn(|_| vec![T::of(0.0); cells + LANES]),
         }
     }
 }
 
 impl<T: Scalar> Rows<T> {
-    fn new(materials: &[Material], edge_m: f64, handed: f64, room: Room) -> Self {
+    fn new(materials: &[Material], edge_m: f64, fraction: f64, room: Room) -> Self {
         let is_viscous = materials.iter().any(|m| !m.viscosity.is_zero());
         Self {
-            materials: of_materials(materials, edge_m, handed),
+            materials: of_materials(materials, edge_m, fraction),
             arrays: Arrays::new(room.points, room.cells, is_viscous),
         }
     }
@@ -118,32 +118,34 @@ impl<T: Scalar> Rows<T> {
         let mut found = Found::default();
         for same in rows.chunk_by(|a, b| a.material == b.material) {
             let material = &materials[same[0].material as usize];
-            let mut pass = RowForces { material, rows: same, arrays, left, fading_j: 0.0 };
+            let mut pass = RowForces { material, rows: same, arrays, left, prestrain_j: 0.0 };
             let viscous_w = material.split.material.run(set, false, &mut pass);
-            found += Found { viscous_w, fading_j: pass.fading_j };
+            found += Found { viscous_w, prestrain_j: pass.prestrain_j };
         }
         found
     }
 }
 
 impl RowKernel {
-    /// For cells of edge `h` (m) that answer for the share `handed` of their volume, and for those of twice the edge, whose materials follow theirs;
-    /// its points are at rest.
-    pub fn new(edge_m: f64, handed: f64, materials: &[Material], precision: Precision, room: Room) -> Self {
+    /// Makes the kernel for cells of edge `h` (m) that answer for `fraction` of their volume, and for those of twice
+    /// the edge, whose materials are numbered after theirs. Its points are at rest.
+    pub fn new(edge_m: f64, fraction: f64, materials: &[Material], precision: Precision, room: Room) -> Self {
         let layout = match precision {
-            Precision::Single => Layout::Single(Rows::new(materials, edge_m, handed, room)),
-            Precision::Double => Layout::Double(Rows::new(materials, edge_m, handed, room)),
+            Precision::Single => Layout::Single(Rows::new(materials, edge_m, fraction, room)),
+            Precision::Double => Layout::Double(Rows::new(materials, edge_m, fraction, room)),
         };
         Self { layout, instruction_set: Available::best() }
     }
 
-    /// The same kernel, held to an instruction set or the best below it that there is (for tests and benchmarks).
+    /// Returns the same kernel, held to an instruction set or to the best available below it (for tests and
+    /// benchmarks).
     #[must_use]
     pub fn with_instruction_set(self, instruction_set: InstructionSet) -> Self {
         Self { instruction_set: Available::at_most(instruction_set), ..self }
     }
 
-    /// Sums up the forces (N) of elastic and viscous stress on the first `points` points, where `left` is left of what fades.
+    /// Sums up the forces (N) of elastic and viscous stress on the first `points` points, with the fraction `left` of
+    /// the prestrain.
     pub fn forces(&mut self, rows: &[CellRow], points: usize, left: f64) -> Found {
         match &mut self.layout {
             Layout::Single(of) => of.sum_up(self.instruction_set, rows, points, left),
@@ -151,7 +153,7 @@ impl RowKernel {
         }
     }
 
-    /// Displacements (m) of the points.
+    /// Sets the displacements (m) of the points.
     pub fn set_displacements(&mut self, displacements_m: &[DVec3]) {
         match &mut self.layout {
             Layout::Single(Rows { arrays, .. }) => put(&mut arrays.displacements, displacements_m),
@@ -159,7 +161,7 @@ impl RowKernel {
         }
     }
 
-    /// Velocities (m/s) of the points; of use only where a material is viscous.
+    /// Sets the velocities (m/s) of the points; they are used only where a material is viscous.
     pub fn set_velocities(&mut self, v: &[DVec3]) {
         match &mut self.layout {
             Layout::Single(Rows { arrays, .. }) if !arrays.velocities[0].is_empty() => put(&mut arrays.velocities, v),
@@ -168,11 +170,11 @@ impl RowKernel {
         }
     }
 
-    /// What fades in a cell.
-    pub fn put_fade(&mut self, cell: u32, fade: Option<&CellPrestrain>) {
+    /// Sets the prestrain of a cell, `None` for one without.
+    pub fn put_prestrain(&mut self, cell: u32, prestrain: Option<&CellPrestrain>) {
         match &mut self.layout {
-            Layout::Single(Rows { arrays, .. }) => put_fade(&mut arrays.fades, cell, fade),
-            Layout::Double(Rows { arrays, .. }) => put_fade(&mut arrays.fades, cell, fade),
+            Layout::Single(Rows { arrays, .. }) => put_prestrain(&mut arrays.prestrains, cell, prestrain),
+            Layout::Double(Rows { arrays, .. }) => put_prestrain(&mut arrays.prestrains, cell, prestrain),
         }
     }
 
@@ -185,9 +187,9 @@ impl RowKernel {
     }
 }
 
-fn of_materials<T: Scalar>(materials: &[Material], edge_m: f64, handed: f64) -> Vec<CellMaterial<T>> {
+fn of_materials<T: Scalar>(materials: &[Material], edge_m: f64, fraction: f64) -> Vec<CellMaterial<T>> {
     let of = |(material, edge_m): (&Material, f64)| {
-        let volume_m3 = handed * edge_m.powi(3);
+        let volume_m3 = fraction * edge_m.powi(3);
         let kappa = HOURGLASS * 4.0 / 3.0 * material.lame.mu_pa * volume_m3 / (edge_m * edge_m);
         CellMaterial { split: Split::of(material), cell: [0.25 / edge_m, -volume_m3, -kappa] }
     };
@@ -200,8 +202,8 @@ fn put<T: Scalar>([x, y, z]: &mut [Vec<T>; 3], list: &[DVec3]) {
     }
 }
 
-fn put_fade<T: Scalar>(fades: &mut [Vec<T>; ENTRIES], cell: u32, fade: Option<&CellPrestrain>) {
-    for (list, entry) in fades.iter_mut().zip(entries(fade)) {
+fn put_prestrain<T: Scalar>(prestrains: &mut [Vec<T>; ENTRIES], cell: u32, prestrain: Option<&CellPrestrain>) {
+    for (list, entry) in prestrains.iter_mut().zip(entries(prestrain)) {
         list[cell as usize] = T::of(entry);
     }
 }
@@ -222,7 +224,7 @@ struct RowForces<'a, T> {
     rows: &'a [CellRow],
     arrays: &'a mut Arrays<T>,
     left: f64,
-    fading_j: f64,
+    prestrain_j: f64,
 }
 
 impl<T: Scalar> LawPass for RowForces<'_, T> {
@@ -235,13 +237,13 @@ impl<T: Scalar> LawPass for RowForces<'_, T> {
             let mut first = 0;
             while first < row.cells as usize {
                 let at = row.points.map(|point| 1 + point as usize + first);
-                let fades = row.fading.then_some(row.first as usize + first);
+                let first_prestrain = row.prestrained.then_some(row.first as usize + first);
                 let left = row.cells as usize - first;
                 if left > V::Narrow::WIDTH {
-                    self.lanes::<V, L, VISCOUS>(at, left, fades, &mut power_w);
+                    self.lanes::<V, L, VISCOUS>(at, left, first_prestrain, &mut power_w);
                     first += V::WIDTH;
                 } else {
-                    self.lanes::<V::Narrow, L, VISCOUS>(at, left, fades, &mut power_w);
+                    self.lanes::<V::Narrow, L, VISCOUS>(at, left, first_prestrain, &mut power_w);
                     first += V::Narrow::WIDTH;
                 }
             }
@@ -251,13 +253,14 @@ impl<T: Scalar> LawPass for RowForces<'_, T> {
 }
 
 impl<T: Scalar> RowForces<'_, T> {
-    /// Cells whose points 0, 2, 4, 6 are at `at` and what follows; there are `cells` of them, or more than lanes. What fades of them, if any, starts at `fades`.
+    /// Computes a vector of cells, the first of which has its points 0, 2, 4, 6 at the entries `at`; there are `cells`
+    /// of them, or more than lanes. Their prestrains, if any, start at `first_prestrain`.
     #[inline(always)]
     fn lanes<V: Vector<Scalar = T>, L: ConstitutiveLaw, const VISCOUS: bool>(
         &mut self,
         at: [usize; 4],
         cells: usize,
-        fades: Option<usize>,
+        first_prestrain: Option<usize>,
         power_w: &mut f64,
     ) {
         let [quarter, minus_volume, minus_kappa] = self.material.cell;
@@ -280,14 +283,14 @@ impl<T: Scalar> RowForces<'_, T> {
             }
         }
         let mut kept_modes = weight;
-        let (p, density) = if let Some(first) = fades {
-            let (left, entries) = (V::of(self.left), &self.arrays.fades);
+        let (p, density) = if let Some(first) = first_prestrain {
+            let (left, entries) = (V::of(self.left), &self.arrays.prestrains);
             let of_shape = scaled(&matrix::<V>(&entries[..9], first), left);
             let of_volume = scaled(&matrix::<V>(&entries[9..18], first), left);
             let gone = V::load(&entries[18][first..]) * left;
             kept_modes = weight * (V::of(1.0) - gone);
-            let (p, density, fading) =
-                fading_stress::<V, T, L, VISCOUS>(&self.material.split, &[of_shape, of_volume], &h, &h_dot);
+            let (p, density, along) =
+                prestrained_cell_stress::<V, T, L, VISCOUS>(&self.material.split, &[of_shape, of_volume], &h, &h_dot);
             let mut squares = V::of(0.0);
             for axis in 0..3 {
                 for mode in 0..4 {
@@ -296,7 +299,7 @@ impl<T: Scalar> RowForces<'_, T> {
             }
             // s ∂U/∂s = V P̃ : F A − ½ κ a Σ w |q|²
             let of_modes = squares * gone * V::of(minus_kappa / 128.0);
-            add_lanes(weight * (fading * V::of(-minus_volume) + of_modes), &mut self.fading_j);
+            add_lanes(weight * (along * V::of(-minus_volume) + of_modes), &mut self.prestrain_j);
             (p, density)
         } else {
             stress::<V, T, L, VISCOUS>(&self.material.split.whole, &h, &h_dot)
@@ -329,49 +332,6 @@ impl<T: Scalar> RowForces<'_, T> {
     }
 }
 
-#[inline(always)]
-fn matrix<V: Vector>(entries: &[Vec<V::Scalar>], first: usize) -> M3<V> {
-    let mut m = [[V::of(0.0); 3]; 3];
-    for row in 0..3 {
-        for column in 0..3 {
-            m[row][column] = V::load(&entries[3 * row + column][first..]);
-        }
-    }
-    m
-}
-
-#[inline(always)]
-fn add<V: Vector>(sums: &mut [V::Scalar], a: V) {
-    (V::load(sums) + a).store(sums);
-}
-
-/// 1 in the first lanes, 0 in the others.
-#[inline(always)]
-fn first_lanes<V: Vector>(count: usize) -> V {
-    let mut lanes = [V::Scalar::of(0.0); LANES];
-    for lane in 0..LANES {
-        if lane < count {
-            lanes[lane] = V::Scalar::of(1.0);
-        }
-    }
-    V::load(&lanes)
-}
-
-/// `a_p − a_0` of points 1 to 7.
-#[inline(always)]
-fn differences<V: Vector>(values: &[V::Scalar], at: [usize; 4]) -> [V; 7] {
-    let zero = V::load(&values[at[0]..]);
-    let mut found = [V::of(0.0); 7];
-    for row in 0..4 {
-        let values = &values[at[row]..=at[row] + V::WIDTH];
-        if row > 0 {
-            found[2 * row - 1] = V::load(values) - zero;
-        }
-        found[2 * row] = V::load(&values[1..]) - zero;
-    }
-    found
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -380,7 +340,7 @@ mod tests {
     #[test]
     fn rows_and_oracle_agree() {
         agrees_with_oracle(true, |question: &Question<'_>| {
-            let Question { cells, u, v, material, precision, set, spacing_m, handed } = question;
+            let Question { cells, u, v, material, precision, set, spacing_m, fraction } = question;
             // Points are numbered along x, as the ball's particles are.
             let mut rows: Vec<CellRow> = Vec::new();
             for (points, _) in *cells {
@@ -391,13 +351,13 @@ mod tests {
                     _ => {
                         let points = [points[0], points[2], points[4], points[6]];
                         let first = rows.last().map_or(0, |row| row.first + row.cells);
-                        rows.push(CellRow { points, cells: 1, material: 0, first, fading: false });
+                        rows.push(CellRow { points, cells: 1, material: 0, first, prestrained: false });
                     }
                 }
             }
             assert!(rows.len() < cells.len() / 4);
             let room = Room { points: u.len(), cells: cells.len() };
-            let kernel = RowKernel::new(*spacing_m, *handed, &[*material], *precision, room);
+            let kernel = RowKernel::new(*spacing_m, *fraction, &[*material], *precision, room);
             let mut kernel = kernel.with_instruction_set(*set);
             kernel.set_displacements(u);
             kernel.set_velocities(v);

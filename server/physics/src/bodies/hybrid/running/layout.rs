@@ -6,25 +6,26 @@ use crate::bodies::hybrid::{
     prestrain::{CellPrestrain, PrestrainDecay},
 };
 
-/// Where a cell is laid out.
+/// Where the kernels have a cell.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Slot {
     /// A whole cell: its row, and its number among the cells of all rows.
     Row { row: u32, cell: u32 },
-    /// Another: its run, and its number in it.
+    /// Another cell: its run, and its number in the run.
     Cut { run: u32, number: u32 },
 }
 
 impl RunningPatch {
-    /// Rows of whole cells, of either size, and blocks of others, material by material; nothing fades in them.
+    /// Lays out rows of whole cells, of either size, and blocks of other cells, material by material, without
+    /// prestrain.
     pub(super) fn lay_out(&mut self, hybrid: &HybridBody) {
         let partition = &hybrid.partition;
-        for &cell in &self.fading_cells {
+        for &cell in &self.prestrained_cells {
             if let Slot::Row { cell, .. } = self.slots[cell as usize] {
-                self.full.put_fade(cell, None);
+                self.full.put_prestrain(cell, None);
             }
         }
-        self.fading_cells.clear();
+        self.prestrained_cells.clear();
         self.rows.clear();
         self.cut.clear();
         self.slots.clear();
@@ -53,7 +54,13 @@ impl RunningPatch {
                 let points = [points[0], points[2], points[4], points[6]];
                 match self.rows[first_row..].last_mut() {
                     Some(row) if row.points.map(|point| point + row.cells) == points => row.cells += 1,
-                    _ => self.rows.push(CellRow { points, cells: 1, material: of_size, first: in_rows, fading: false }),
+                    _ => self.rows.push(CellRow {
+                        points,
+                        cells: 1,
+                        material: of_size,
+                        first: in_rows,
+                        prestrained: false,
+                    }),
                 }
                 self.slots[number] = Slot::Row { row: self.rows.len() as u32 - 1, cell: in_rows };
                 in_rows += 1;
@@ -71,50 +78,50 @@ impl RunningPatch {
         }
     }
 
-    /// Whether this is what the kernels were told of last.
-    pub(in crate::bodies::hybrid) fn knows(&self, fading: &PrestrainDecay) -> bool {
-        self.fading_mark == fading.mark()
+    /// Returns whether these are the prestrains that the kernels were given last.
+    pub(in crate::bodies::hybrid) fn knows(&self, decay: &PrestrainDecay) -> bool {
+        self.prestrain_mark == decay.mark()
     }
 
-    /// Tells the kernels what fades.
-    pub(in crate::bodies::hybrid) fn put_fades(&mut self, fading: &PrestrainDecay) {
-        self.fading_mark = fading.mark();
-        let Self { rows, slots, full, cut, fading_cells, cells, .. } = self;
+    /// Gives the kernels the prestrains.
+    pub(in crate::bodies::hybrid) fn put_prestrains(&mut self, decay: &PrestrainDecay) {
+        self.prestrain_mark = decay.mark();
+        let Self { rows, slots, full, cut, prestrained_cells, cells, .. } = self;
         for row in rows.iter_mut() {
-            row.fading = false;
+            row.prestrained = false;
         }
-        let mut put = |number: u32, fade: Option<&CellPrestrain>| match slots[number as usize] {
+        let mut put = |number: u32, prestrain: Option<&CellPrestrain>| match slots[number as usize] {
             Slot::Row { row, cell } => {
-                rows[row as usize].fading |= fade.is_some();
-                full.put_fade(cell, fade);
+                rows[row as usize].prestrained |= prestrain.is_some();
+                full.put_prestrain(cell, prestrain);
             }
-            Slot::Cut { run, number } => cut.put_fade(run as usize, number as usize, fade),
+            Slot::Cut { run, number } => cut.put_prestrain(run as usize, number as usize, prestrain),
         };
-        for &number in fading_cells.iter() {
-            if fading.of_cell(cells[number as usize]).is_none() {
+        for &number in prestrained_cells.iter() {
+            if decay.of_cell(cells[number as usize]).is_none() {
                 put(number, None);
             }
         }
-        fading_cells.clear();
+        prestrained_cells.clear();
         let mut number = 0;
-        for fade in &fading.cells {
-            while cells.get(number).is_some_and(|&cell| cell < fade.cell) {
+        for prestrain in &decay.cells {
+            while cells.get(number).is_some_and(|&cell| cell < prestrain.cell) {
                 number += 1;
             }
-            if cells.get(number) == Some(&fade.cell) {
-                put(number as u32, Some(fade));
-                fading_cells.push(number as u32);
+            if cells.get(number) == Some(&prestrain.cell) {
+                put(number as u32, Some(prestrain));
+                prestrained_cells.push(number as u32);
             }
         }
-        for &tet in &self.fading_tets {
-            if fading.of_tet(tet).is_none() {
-                self.share_kernel.put_fade(tet as usize, None);
+        for &tet in &self.prestrained_tets {
+            if decay.of_tet(tet).is_none() {
+                self.residual_kernel.put_prestrain(tet as usize, None);
             }
         }
-        self.fading_tets.clear();
-        for fade in &fading.tets {
-            self.fading_tets.push(fade.tet);
-            self.share_kernel.put_fade(fade.tet as usize, Some(fade));
+        self.prestrained_tets.clear();
+        for prestrain in &decay.tets {
+            self.prestrained_tets.push(prestrain.tet);
+            self.residual_kernel.put_prestrain(prestrain.tet as usize, Some(prestrain));
         }
     }
 }

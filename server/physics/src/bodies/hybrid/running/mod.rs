@@ -1,11 +1,14 @@
-//! The patch as the loop runs it: rebuilt without allocating when other particles wake, its cells in lanes. Its oracle is `patch`.
+//! The patch as the loop runs it: it is rebuilt without allocating when other particles wake, and has its cells in
+//! lanes. Its oracle is `patch`.
 //!
-//! *Points* are the particles of awake cells, ascending: those that are active, and those of the border, which follow the coarse nodes.
+//! *Points* are the particles of awake cells, ascending: those that are active, and the constrained points, which
+//! follow the coarse nodes.
+mod forces;
 mod layout;
 #[cfg(test)]
 mod tests;
 
-use super::kernels::{CellRow, CutCells, Found, Room, RowKernel, ShareKernel};
+use super::kernels::{CellRow, CutCells, ResidualKernel, Room, RowKernel};
 use super::{
     body::HybridBody,
     clusters::SkinClusters,
@@ -28,7 +31,7 @@ pub(crate) struct RunningPatch {
     /// Active particles, ascending.
     active: Vec<u32>,
     points: Vec<Point>,
-    border: ConstrainedPoints,
+    constrained: ConstrainedPoints,
     /// Numbers of the active particles' points, ascending.
     points_of_active: Vec<u32>,
     /// Displacements (m) of the points.
@@ -40,44 +43,44 @@ pub(crate) struct RunningPatch {
     full: RowKernel,
     rows: Vec<CellRow>,
     cut: CutCells,
-    /// Where every awake cell is laid out.
+    /// Where the kernels have every awake cell.
     slots: Vec<Slot>,
-    /// Numbers, among the awake cells, of those that fade.
-    fading_cells: Vec<u32>,
-    fading_tets: Vec<u32>,
-    fading_mark: u64,
-    /// What is left to each coarse tet.
-    shares: Vec<ResidualElement>,
-    share_kernel: ShareKernel,
-    /// Number of every coarse node among those of a share, while something is taken from it.
+    /// Numbers, among the awake cells, of those with prestrain.
+    prestrained_cells: Vec<u32>,
+    prestrained_tets: Vec<u32>,
+    prestrain_mark: u64,
+    /// Residual elements of the coarse tets.
+    residual_elements: Vec<ResidualElement>,
+    residual_kernel: ResidualKernel,
+    /// Number of every coarse node among those of a residual element, while cells are taken from it.
     number_of_node: Vec<u32>,
-    /// Of which tets something was taken.
+    /// Coarse tets of which cells were taken.
     taken_from: Vec<u32>,
     metric: RunningMetric,
     /// Displacements (m) of coarse nodes.
     node_displacements_m: Vec<DVec3>,
-    /// Number of every particle among the points.
+    /// Number of every particle among the points, [`NONE`] for one that is no point.
     point_of: Vec<u32>,
-    /// Whether active particles carry any of a cluster's vertices, and a group's.
+    /// Whether active particles carry any vertex of each cluster, and of each group.
     carries_of_cluster: Vec<bool>,
     carries_of_group: Vec<bool>,
     is_awake: Vec<bool>,
     is_viscous: bool,
-    /// Counts the sets of active particles.
+    /// Number of sets of active particles that there have been.
     number: u64,
 }
 
 #[derive(Debug, Clone, Copy)]
 struct Point {
     particle: u32,
-    /// Its number among the active ones, [`NONE`] of the border's.
+    /// Its number among the active particles, [`NONE`] for a constrained point.
     active: u32,
     rest_m: DVec3,
     anchor: Anchor,
 }
 
 impl RunningPatch {
-    /// Room for `most_active` particles, none awake.
+    /// Makes room for `most_active` active particles; none is awake.
     pub(crate) fn new(hybrid: &HybridBody, most_active: usize, precision: Precision) -> Self {
         let partition = &hybrid.partition;
         let most_cells = room_for_cells(hybrid, most_active);
@@ -87,7 +90,7 @@ impl RunningPatch {
         Self {
             active: Vec::with_capacity(most_active),
             points: Vec::with_capacity(most_points),
-            border: ConstrainedPoints::with_room(most_points),
+            constrained: ConstrainedPoints::with_room(most_points),
             points_of_active: Vec::with_capacity(most_active),
             displacements_m: Vec::with_capacity(most_points),
             of_points: Vec::with_capacity(most_points),
@@ -95,20 +98,20 @@ impl RunningPatch {
             rows: Vec::with_capacity(most_cells),
             full: RowKernel::new(edge_m, 1.0 - KEPT, &hybrid.materials, precision, room),
             cut: CutCells::with_capacity(most_cells, most_points, &hybrid.materials, precision),
-            share_kernel: ShareKernel::build(
-                partition.shares(),
+            residual_kernel: ResidualKernel::build(
+                partition.residual_elements(),
                 hybrid.node_count(),
                 &hybrid.of_tet,
                 &hybrid.materials,
                 precision,
             ),
-            shares: partition.shares().to_vec(),
+            residual_elements: partition.residual_elements().to_vec(),
             slots: Vec::with_capacity(most_cells),
-            fading_cells: Vec::with_capacity(most_cells),
-            fading_tets: Vec::with_capacity(partition.shares().len()),
-            fading_mark: 0,
+            prestrained_cells: Vec::with_capacity(most_cells),
+            prestrained_tets: Vec::with_capacity(partition.residual_elements().len()),
+            prestrain_mark: 0,
             number_of_node: vec![0; hybrid.node_count()],
-            taken_from: Vec::with_capacity(partition.shares().len()),
+            taken_from: Vec::with_capacity(partition.residual_elements().len()),
             metric: RunningMetric::new(hybrid, most_active),
             node_displacements_m: vec![DVec3::ZERO; hybrid.node_count()],
             point_of: vec![NONE; partition.particle_count()],
@@ -120,83 +123,83 @@ impl RunningPatch {
         }
     }
 
-    /// The mass matrix.
+    /// Returns the mass matrix.
     pub(crate) fn metric(&self) -> &RunningMetric {
         &self.metric
     }
 
-    /// The same, to be solved with.
+    /// Returns the mass matrix, to be solved with.
     pub(crate) fn metric_mut(&mut self) -> &mut RunningMetric {
         &mut self.metric
     }
 
-    /// Counts the sets of active particles there have been.
+    /// Returns the number of sets of active particles that there have been.
     pub(super) fn number(&self) -> u64 {
         self.number
     }
 
-    /// Number of a particle among the points, [`NONE`] of one that is none.
+    /// Returns the number of a particle among the points, [`NONE`] for one that is no point.
     pub(super) fn point_of(&self, particle: u32) -> u32 {
         self.point_of[particle as usize]
     }
 
-    /// Number of a particle among the active ones, [`NONE`] of one that is asleep.
+    /// Returns the number of a particle among the active ones, [`NONE`] for one that is asleep.
     pub(super) fn number_of(&self, particle: u32) -> u32 {
         self.points.get(self.point_of(particle) as usize).map_or(NONE, |point| point.active)
     }
 
-    /// Displacements (m) of the points after [`Self::displace`].
+    /// Returns the displacements (m) of the points after [`Self::displace`].
     pub(super) fn displacements_m(&self) -> &[DVec3] {
         &self.displacements_m
     }
 
-    /// Displacements (m) of the coarse nodes after [`Self::displace`].
+    /// Returns the displacements (m) of the coarse nodes after [`Self::displace`].
     pub(super) fn node_displacements_m(&self) -> &[DVec3] {
         &self.node_displacements_m
     }
 
-    /// How far (m) each active particle is from where it would be asleep.
+    /// Returns the active particles, each with its distance (m) from where it would be asleep.
     pub(super) fn deviations_m(&self) -> impl Iterator<Item = (u32, f64)> + '_ {
         let active = self.points.iter().zip(&self.displacements_m).filter(|(point, _)| point.active != NONE);
         active.map(|(point, u)| (point.particle, u.distance(point.anchor.of(&self.node_displacements_m))))
     }
 
-    /// The largest of [`Self::deviations_m`].
+    /// Returns the largest distance (m) of [`Self::deviations_m`].
     pub(super) fn deviation_m(&self) -> f64 {
         self.deviations_m().map(|(_, deviation_m)| deviation_m).fold(0.0, f64::max)
     }
 
-    /// Whether active particles carry any vertex of a cluster of the skin.
+    /// Returns whether active particles carry any vertex of a cluster of the skin.
     pub(super) fn carries_of_cluster(&self, cluster: usize) -> bool {
         self.carries_of_cluster[cluster]
     }
 
-    /// The same of a group.
+    /// Returns the same for a group.
     pub(super) fn carries_of_group(&self, group: usize) -> bool {
         self.carries_of_group[group]
     }
 
-    /// Awake cells, ascending.
+    /// Returns the awake cells, ascending.
     pub(super) fn cells(&self) -> &[u32] {
         &self.cells
     }
 
-    /// Whether a cell is awake.
+    /// Returns whether a cell is awake.
     pub(super) fn is_awake(&self, cell: u32) -> bool {
         self.is_awake[cell as usize]
     }
 
-    /// Coarse tets that have lost some of their cells.
+    /// Returns the coarse tets that have lost some of their cells.
     pub(super) fn taken_from(&self) -> &[u32] {
         &self.taken_from
     }
 
-    /// What is left to a coarse tet.
-    pub(super) fn share(&self, tet: u32) -> &ResidualElement {
-        &self.shares[tet as usize]
+    /// Returns the residual element of a coarse tet.
+    pub(super) fn residual_element(&self, tet: u32) -> &ResidualElement {
+        &self.residual_elements[tet as usize]
     }
 
-    /// Positions (m) of the particles of an awake cell.
+    /// Returns the positions (m) of the particles of an awake cell.
     pub(super) fn corners_m(&self, hybrid: &HybridBody, cell: u32) -> [DVec3; 8] {
         hybrid.partition.corners(cell as usize).map(|particle| {
             let point = self.point_of[particle as usize] as usize;
@@ -204,7 +207,7 @@ impl RunningPatch {
         })
     }
 
-    /// Whether some particle of an awake cell follows one of these coarse nodes.
+    /// Returns whether some particle of an awake cell follows one of these coarse nodes.
     pub(super) fn follows(&self, hybrid: &HybridBody, cell: u32, nodes: &[bool]) -> bool {
         hybrid.partition.corners(cell as usize).into_iter().any(|particle| {
             let point = &self.points[self.point_of[particle as usize] as usize];
@@ -214,7 +217,7 @@ impl RunningPatch {
         })
     }
 
-    /// Hands a force (N) on a point to the particle or the coarse nodes that move it.
+    /// Adds a force (N) on a point to that of the particle, or to those of the coarse nodes, that move it.
     pub(super) fn push(&self, point: u32, force_n: DVec3, nodes: usize, forces_n: &mut [DVec3]) {
         let point = &self.points[point as usize];
         if point.active == NONE {
@@ -224,21 +227,22 @@ impl RunningPatch {
         }
     }
 
-    /// Active particles, ascending.
+    /// Returns the active particles, ascending.
     pub(crate) fn active(&self) -> &[u32] {
         &self.active
     }
 
-    /// Wakes these particles (ascending, no more than there is room for) and no others, of which this fades. Allocates nothing.
-    pub(crate) fn wake(&mut self, hybrid: &HybridBody, active: &[u32], fading: &PrestrainDecay) {
+    /// Wakes these particles (ascending, no more than there is room for) and no others, with these prestrains.
+    /// Allocates nothing.
+    pub(crate) fn wake(&mut self, hybrid: &HybridBody, active: &[u32], decay: &PrestrainDecay) {
         (0..Self::SLICES).for_each(|slice| self.set_slice(hybrid, active, slice));
-        self.put_fades(fading);
+        self.put_prestrains(decay);
     }
 
-    /// In how many slices particles wake.
+    /// Number of slices in which a patch is laid out.
     pub(super) const SLICES: u32 = 3;
 
-    /// A slice of [`Self::wake`], one after the other, before it is told what fades.
+    /// Does a slice of [`Self::wake`]. They have to be done one after the other, before the prestrains are given.
     pub(super) fn set_slice(&mut self, hybrid: &HybridBody, active: &[u32], slice: u32) {
         match slice {
             0 => {
@@ -249,7 +253,7 @@ impl RunningPatch {
                 self.find_points(hybrid);
                 self.mark_carried(hybrid, true);
             }
-            1 => self.take_from_shares(hybrid),
+            1 => self.take_from_residual_elements(hybrid),
             _ => {
                 self.lay_out(hybrid);
                 let points = self.points.iter().filter(|point| point.active != NONE);
@@ -258,7 +262,7 @@ impl RunningPatch {
         }
     }
 
-    /// Counts this one as the one after another.
+    /// Numbers this patch as the one after another.
     pub(super) fn number_after(&mut self, other: &Self) {
         self.number = other.number + 1;
     }
@@ -281,10 +285,11 @@ impl RunningPatch {
             self.is_awake[cell as usize] = false;
         }
         for &tet in &self.taken_from {
-            let (share, whole) = (&mut self.shares[tet as usize], &hybrid.partition.shares()[tet as usize]);
-            share.volume_m3 = whole.volume_m3;
-            share.moments_m2.copy_from_slice(&whole.moments_m2);
-            self.share_kernel.put(tet as usize, whole);
+            let (residual, whole) =
+                (&mut self.residual_elements[tet as usize], &hybrid.partition.residual_elements()[tet as usize]);
+            residual.volume_m3 = whole.volume_m3;
+            residual.moments_m2.copy_from_slice(&whole.moments_m2);
+            self.residual_kernel.put(tet as usize, whole);
         }
         self.taken_from.clear();
         self.active.clear();
@@ -326,12 +331,12 @@ impl RunningPatch {
             }
         }
         let numbered = (0..).zip(&self.points).filter(|(_, point)| point.active == NONE);
-        self.border.take(numbered.map(|(number, point)| (number, point.anchor)));
+        self.constrained.take(numbered.map(|(number, point)| (number, point.anchor)));
         self.displacements_m.resize(self.points.len(), DVec3::ZERO);
     }
 
-    /// `V_g ← V_g − (1 − ε) V_c` and likewise `T_gi`.
-    fn take_from_shares(&mut self, hybrid: &HybridBody) {
+    /// Takes the awake cells from the residual elements: `V_g ← V_g − (1 − ε) V_c`, and likewise `T_gi`.
+    fn take_from_residual_elements(&mut self, hybrid: &HybridBody) {
         let partition = &hybrid.partition;
         let mut last = NONE;
         for &cell in &self.cells {
@@ -341,83 +346,19 @@ impl RunningPatch {
                 if !self.taken_from.contains(&tet) {
                     self.taken_from.push(tet);
                 }
-                for (number, node) in (0..).zip(&self.shares[tet as usize].nodes) {
+                for (number, node) in (0..).zip(&self.residual_elements[tet as usize].nodes) {
                     self.number_of_node[*node as usize] = number;
                 }
             }
-            let (volume_m3, gradients_m2) = partition.moments(cell as usize);
+            let moments = partition.moments(cell as usize);
             let anchors = partition
                 .corners(cell as usize)
                 .map(|particle| self.points[self.point_of[particle as usize] as usize].anchor);
             let numbers = anchors.map(|anchor| anchor.nodes.map(|node| self.number_of_node[node as usize]));
-            self.shares[tet as usize].add_numbered(part, KEPT - 1.0, (volume_m3, &gradients_m2), &anchors, &numbers);
+            self.residual_elements[tet as usize].add_numbered(part, KEPT - 1.0, &moments, &anchors, &numbers);
         }
         for &tet in &self.taken_from {
-            self.share_kernel.put(tet as usize, &self.shares[tet as usize]);
-        }
-    }
-
-    /// Adds forces (N) on coarse nodes of elastic and viscous stress in what is left to the coarse level, where [`Self::displace`] put them, at their
-    /// velocities `v`, with `left` left of what fades.
-    pub(crate) fn add_coarse_forces_n(&mut self, v: &[DVec3], left: f64, forces_n: &mut [DVec3]) -> Found {
-        let v_nodes = &v[..self.node_displacements_m.len()];
-        self.share_kernel.add_forces_n(&self.node_displacements_m, v_nodes, left, forces_n)
-    }
-
-    /// The same of awake cells, on coarse nodes and active particles; whose forces were none.
-    pub(crate) fn add_cell_forces_n(
-        &mut self,
-        hybrid: &HybridBody,
-        v: &[DVec3],
-        left: f64,
-        forces_n: &mut [DVec3],
-    ) -> Found {
-        let nodes = hybrid.node_count();
-        let (v_nodes, v_particles) = v.split_at(nodes);
-        if self.active.is_empty() {
-            return Found::default();
-        }
-        // Less that of one of them: far from rest, their differences would be rounded too coarsely.
-        let first_m = self.displacements_m[0];
-        self.of_points.clear();
-        self.of_points.extend(self.displacements_m.iter().map(|displacement| *displacement - first_m));
-        self.full.set_displacements(&self.of_points);
-        let has_cut = !self.cut.is_empty();
-        if has_cut {
-            self.cut.set_displacements(&self.of_points);
-        }
-        if self.is_viscous {
-            self.border.follow(v_nodes, &mut self.of_points);
-            for (v, &point) in v_particles.iter().zip(&self.points_of_active) {
-                self.of_points[point as usize] = *v;
-            }
-            self.full.set_velocities(&self.of_points);
-            self.cut.set_velocities(&self.of_points);
-        }
-        let mut found = self.full.forces(&self.rows, self.points.len(), left);
-        self.full.forces_n(&mut self.of_points);
-        if has_cut {
-            found += self.cut.forces(self.points.len(), left);
-            self.cut.add_forces_n(&mut self.of_points);
-        }
-        let (f_nodes, f_particles) = forces_n.split_at_mut(nodes);
-        self.border.push(&self.of_points, f_nodes);
-        for (force_n, &point) in f_particles.iter_mut().zip(&self.points_of_active) {
-            *force_n = self.of_points[point as usize];
-        }
-        found
-    }
-
-    /// Takes positions (m) of coarse nodes and then active particles.
-    pub(crate) fn displace(&mut self, hybrid: &HybridBody, x: &[DVec3]) {
-        let (x_nodes, x_particles) = x.split_at(hybrid.node_count());
-        let rest = hybrid.partition.coarse().positions_m();
-        for ((u, x), rest) in self.node_displacements_m.iter_mut().zip(x_nodes).zip(rest) {
-            *u = *x - *rest;
-        }
-        self.border.follow(&self.node_displacements_m, &mut self.displacements_m);
-        for (x, &point) in x_particles.iter().zip(&self.points_of_active) {
-            self.displacements_m[point as usize] = *x - self.points[point as usize].rest_m;
+            self.residual_kernel.put(tet as usize, &self.residual_elements[tet as usize]);
         }
     }
 }

@@ -5,7 +5,7 @@ use crate::{
         composite::PARTS,
         metric::Metric,
         patch::{Field, Patch},
-        prestrain::{CellPrestrain, FADING_S, ResidualPrestrain},
+        prestrain::{CellPrestrain, DECAY_S, ResidualPrestrain},
         testing::{Random, hybrid_ball_of, tissue},
     },
     material::{Material, Viscosity},
@@ -22,20 +22,21 @@ fn largest(list: &[DVec3]) -> f64 {
     list.iter().map(|a| a.length()).fold(0.0, f64::max)
 }
 
-/// Something in some of the cells and tets, of the size of its strains.
-fn some_fading(hybrid: &HybridBody, cells: &[u32], random: &mut Random) -> PrestrainDecay {
+/// Returns prestrain in some of the cells and tets, of the size of the strains of this test.
+fn some_prestrain(hybrid: &HybridBody, cells: &[u32], random: &mut Random) -> PrestrainDecay {
     let mut matrix = || DMat3::from_cols(random.vector(), random.vector(), random.vector()) * 0.1;
     let cells = cells.iter().filter(|cell| **cell / 7 % 3 == 1);
-    let tets = (0..hybrid.partition.shares().len() as u32).filter(|tet| tet % 4 == 1);
+    let tets = (0..hybrid.partition.residual_elements().len() as u32).filter(|tet| tet % 4 == 1);
     let cells = cells.map(|&cell| CellPrestrain { cell, shape: matrix(), volume: matrix(), modes: 0.3 }).collect();
     let tets =
         tets.map(|tet| ResidualPrestrain { tet, parts: [(); PARTS].map(|()| matrix()), whole: matrix() }).collect();
-    let mut fading = PrestrainDecay::new(cells, tets);
-    fading.go_on(0.01);
-    fading
+    let mut decay = PrestrainDecay::new(cells, tets);
+    decay.advance(0.01);
+    decay
 }
 
-/// Whichever particles were awake, and whatever faded, before: forces, power, accelerations and momenta are the oracle's.
+/// Forces, power, accelerations and momenta are those of the oracle, whichever particles were awake before, with
+/// whichever prestrain.
 #[test]
 fn running_patch_and_oracle_agree() {
     let [stvk, neo, corotated] = tissue();
@@ -50,13 +51,13 @@ fn running_patch_and_oracle_agree() {
             let near = |p: DVec3| p.distance(DVec3::new(2e-3, 1e-3, 9e-3)) < 4e-3;
             let far = |p: DVec3| near(p) || p.distance(DVec3::new(-8e-3, 0.0, 0.0)) < 3e-3;
             let sets = [some(&hybrid, near), some(&hybrid, far), vec![], some(&hybrid, |p| p.x > 0.2e-3)];
-            for (active, fades) in sets.iter().flat_map(|set| [(set, true), (set, false)]) {
+            for (active, is_prestrained) in sets.iter().flat_map(|set| [(set, true), (set, false)]) {
                 running.wake(&hybrid, active, &PrestrainDecay::default());
-                let fading = some_fading(&hybrid, running.cells(), &mut random);
-                let fading = if fades { fading } else { PrestrainDecay::default() };
-                running.put_fades(&fading);
+                let decay = some_prestrain(&hybrid, running.cells(), &mut random);
+                let decay = if is_prestrained { decay } else { PrestrainDecay::default() };
+                running.put_prestrains(&decay);
                 let set: BTreeSet<u32> = active.iter().copied().collect();
-                let patch = Patch::new(&hybrid.partition, &set).with_fading(fading.clone());
+                let patch = Patch::new(&hybrid.partition, &set).with_prestrain(decay.clone());
                 let rest = patch.at_rest(&hybrid.partition);
                 let shaken = |list: &[DVec3], size: f64, random: &mut Random| -> Vec<DVec3> {
                     list.iter().map(|p| *p + DVec3::new(3.0, 2.0, 1.0) * size + random.vector() * size).collect()
@@ -76,23 +77,23 @@ fn running_patch_and_oracle_agree() {
                 let mut forces = x.clone();
                 running.displace(&hybrid, &x);
                 forces.fill(DVec3::ZERO);
-                let mut found = running.add_coarse_forces_n(&v, fading.left(), &mut forces);
-                found += running.add_cell_forces_n(&hybrid, &v, fading.left(), &mut forces);
+                let mut found = running.add_coarse_forces_n(&v, decay.left(), &mut forces);
+                found += running.add_cell_forces_n(&hybrid, &v, decay.left(), &mut forces);
                 let worst = forces.iter().zip(&expected).map(|(a, b)| a.distance(*b)).fold(0.0, f64::max);
                 println!("{precision:?}: {:.1e}", worst / largest(&expected));
                 assert!(worst < bound * largest(&expected), "{precision:?}, {}: {worst:e}", active.len());
                 assert!((found.viscous_w - expected_w).abs() <= 10.0 * bound * expected_w, "{found:?} {expected_w}");
                 // s ∂U/∂s
                 let energy_j = |time_s: f64| {
-                    let mut fading = fading.clone();
-                    fading.go_on(time_s);
-                    patch.clone().with_fading(fading).energy_j(&hybrid.materials(), &at)
+                    let mut decay = decay.clone();
+                    decay.advance(time_s);
+                    patch.clone().with_prestrain(decay).energy_j(&hybrid.materials(), &at)
                 };
                 let step_s = 1e-6;
                 let slope_w = (energy_j(step_s) - energy_j(-step_s)) / (2.0 * step_s);
-                let difference_j = found.fading_j + FADING_S * slope_w;
+                let difference_j = found.prestrain_j + DECAY_S * slope_w;
                 assert!(difference_j.abs() <= 100.0 * bound.max(1e-9) * energy_j(0.0), "{found:?} {slope_w}");
-                assert_eq!(found.fading_j != 0.0, fades);
+                assert_eq!(found.prestrain_j != 0.0, is_prestrained);
 
                 let metric = Metric::new(&hybrid.partition, &hybrid.masses, &set, &hybrid.free).unwrap();
                 let nodes = hybrid.node_count();

@@ -1,11 +1,11 @@
 //! The pass over cut cells: gather, stress, scatter.
-use super::{CutBlock, FadeBlock};
+use super::{CutBlock, PrestrainBlock};
 use crate::{
     bodies::hybrid::{
         cell::MODE_WEIGHTS,
         kernels::{
             cell_stress::{load_matrix, stress},
-            prestrains::{Split, add_lanes, fading_stress, scaled},
+            prestrains::{Split, add_lanes, prestrained_cell_stress, scaled},
         },
     },
     lanes::{
@@ -15,15 +15,16 @@ use crate::{
     material::{ConstitutiveLaw, LawPass},
 };
 
-/// Blocks that are gathered, computed and scattered together: a wide load waits for the narrow stores it overlaps.
+/// Number of blocks that are gathered, computed and scattered together: a wide load waits for the narrow stores it
+/// overlaps.
 const BATCH: usize = 4;
 
-/// Points 1 to 3, 4 to 6, and 7 of a block's cells, three components each; what is over stays zero.
+/// Points 1 to 3, 4 to 6, and 7 of a block's cells, three components each; entries beyond them stay zero.
 type Corners<T, const N: usize> = [Lanes<T, N>; 3];
 
-/// A block of which something fades.
-struct FadingBlock<'a, T, const N: usize> {
-    block: &'a FadeBlock<T, N>,
+/// The prestrains of a block, while its forces are computed.
+struct PrestrainedBlock<'a, T, const N: usize> {
+    block: &'a PrestrainBlock<T, N>,
     left: f64,
     /// `s ∂U/∂s` (J), added to.
     along_j: &'a mut f64,
@@ -33,15 +34,15 @@ struct FadingBlock<'a, T, const N: usize> {
 pub(super) struct CutForces<'a, T, const N: usize> {
     pub(super) split: &'a Split<T>,
     pub(super) blocks: &'a [CutBlock<T, N>],
-    /// As many.
-    pub(super) fades: &'a [FadeBlock<T, N>],
+    /// Prestrains of the blocks, one for each.
+    pub(super) prestrains: &'a [PrestrainBlock<T, N>],
     pub(super) displacements: &'a [Node],
     pub(super) velocities: &'a [Node],
     pub(super) sums: &'a mut [Sum],
-    /// What is left of what fades.
+    /// The fraction of the prestrain that is left.
     pub(super) left: f64,
     /// `s ∂U/∂s` (J), added to.
-    pub(super) fading_j: f64,
+    pub(super) prestrain_j: f64,
 }
 
 impl<T: Scalar, const N: usize> LawPass for CutForces<'_, T, N> {
@@ -61,10 +62,11 @@ impl<T: Scalar, const N: usize> LawPass for CutForces<'_, T, N> {
                 }
             }
             for (index, block) in batch.iter().enumerate() {
-                let (of, forces) = ([&edges[index], &rates[index]], &mut forces[index]);
-                let fade = Some(&self.fades[number * BATCH + index]).filter(|fade| fade.lanes != 0);
-                let fading = fade.map(|block| FadingBlock { block, left: self.left, along_j: &mut self.fading_j });
-                power_w += cut::<V, T, L, VISCOUS, N>(self.split, (block, fading), of, forces);
+                let (edges, rates, forces) = (&edges[index], &rates[index], &mut forces[index]);
+                let prestrain = Some(&self.prestrains[number * BATCH + index]).filter(|prestrain| prestrain.lanes != 0);
+                let prestrain =
+                    prestrain.map(|block| PrestrainedBlock { block, left: self.left, along_j: &mut self.prestrain_j });
+                power_w += cut::<V, T, L, VISCOUS, N>(self.split, block, prestrain, edges, rates, forces);
             }
             for (block, forces) in batch.iter().zip(&forces) {
                 scatter(&block.points, forces, self.sums);
@@ -74,7 +76,7 @@ impl<T: Scalar, const N: usize> LawPass for CutForces<'_, T, N> {
     }
 }
 
-/// One axis of points 1 to 7.
+/// Loads one axis of points 1 to 7.
 #[inline(always)]
 fn load<V: Vector, const N: usize>(corners: &Corners<V::Scalar, N>, axis: usize, first: usize) -> [V; 7] {
     let mut loaded = [V::of(0.0); 7];
@@ -91,7 +93,8 @@ fn store<V: Vector, const N: usize>(values: &[V; 7], corners: &mut Corners<V::Sc
     }
 }
 
-/// `Σ_p a_p b_pᵀ` of some lanes. No closure: one that is not inlined has no vectors of its caller's instruction set.
+/// Returns `Σ_p a_p b_pᵀ` of some lanes. It is not a closure, since one that is not inlined has no vectors of its
+/// caller's instruction set.
 #[inline(always)]
 fn gradient<V: Vector, const N: usize>(
     block: &CutBlock<V::Scalar, N>,
@@ -113,8 +116,10 @@ fn gradient<V: Vector, const N: usize>(
 #[inline(always)]
 fn cut<V: Vector<Scalar = T>, T: Scalar, L: ConstitutiveLaw, const VISCOUS: bool, const N: usize>(
     split: &Split<T>,
-    (block, mut fading): (&CutBlock<T, N>, Option<FadingBlock<'_, T, N>>),
-    [edges, rates]: [&Corners<T, N>; 2],
+    block: &CutBlock<T, N>,
+    mut prestrain: Option<PrestrainedBlock<'_, T, N>>,
+    edges: &Corners<T, N>,
+    rates: &Corners<T, N>,
     forces: &mut Corners<T, N>,
 ) -> f64 {
     let mut power = [T::of(0.0); N];
@@ -123,14 +128,15 @@ fn cut<V: Vector<Scalar = T>, T: Scalar, L: ConstitutiveLaw, const VISCOUS: bool
         let h_dot = if VISCOUS { gradient::<V, N>(block, rates, first) } else { h };
         let whole = V::load(&block.minus_kappa[first..]);
         let mut gone = V::of(0.0);
-        let mut faded = V::of(0.0);
-        let (p, density) = if let Some(FadingBlock { block: fade, left, .. }) = &fading {
+        let mut prestrain_j = V::of(0.0);
+        let (p, density) = if let Some(PrestrainedBlock { block: prestrain, left, .. }) = &prestrain {
             let left = V::of(*left);
-            gone = V::load(&fade.entries[18][first..]) * left;
-            let of_shape = scaled(&load_matrix::<V, N>(&fade.entries[..9], first), left);
-            let of_volume = scaled(&load_matrix::<V, N>(&fade.entries[9..18], first), left);
-            let (p, density, along) = fading_stress::<V, T, L, VISCOUS>(split, &[of_shape, of_volume], &h, &h_dot);
-            faded = V::of(0.0) - along * V::load(&block.minus_volume[first..]);
+            gone = V::load(&prestrain.entries[18][first..]) * left;
+            let of_shape = scaled(&load_matrix::<V, N>(&prestrain.entries[..9], first), left);
+            let of_volume = scaled(&load_matrix::<V, N>(&prestrain.entries[9..18], first), left);
+            let (p, density, along) =
+                prestrained_cell_stress::<V, T, L, VISCOUS>(split, &[of_shape, of_volume], &h, &h_dot);
+            prestrain_j = V::of(0.0) - along * V::load(&block.minus_volume[first..]);
             (p, density)
         } else {
             stress::<V, T, L, VISCOUS>(&split.whole, &h, &h_dot)
@@ -157,7 +163,7 @@ fn cut<V: Vector<Scalar = T>, T: Scalar, L: ConstitutiveLaw, const VISCOUS: bool
                     q = q + a[point] * V::load(&block.modes[7 * mode + point][first..]);
                 }
                 // s ∂U/∂s = V P̃ : F A − ½ κ a Σ w |q|²
-                faded = faded + q * q * half_gone * V::of(MODE_WEIGHTS[mode]);
+                prestrain_j = prestrain_j + q * q * half_gone * V::of(MODE_WEIGHTS[mode]);
                 let q = q * minus_kappa * V::of(MODE_WEIGHTS[mode]);
                 for point in 0..7 {
                     f[point] = f[point] + q * V::load(&block.modes[7 * mode + point][first..]);
@@ -165,14 +171,14 @@ fn cut<V: Vector<Scalar = T>, T: Scalar, L: ConstitutiveLaw, const VISCOUS: bool
             }
             store(&f, forces, axis, first);
         }
-        if let Some(fading) = &mut fading {
-            add_lanes(faded, fading.along_j);
+        if let Some(prestrain) = &mut prestrain {
+            add_lanes(prestrain_j, prestrain.along_j);
         }
     }
     power.iter().fold(0.0, |sum, &p| sum + p.into())
 }
 
-/// `a_p − a_0` of all lanes.
+/// Writes `a_p − a_0` of all lanes.
 #[inline(always)]
 fn gather<V: Vector, const N: usize>(points: &[[u32; 8]; N], values: &[Node], edges: &mut Corners<V::Scalar, N>) {
     for first in (0..N).step_by(4) {
@@ -191,7 +197,7 @@ fn gather<V: Vector, const N: usize>(points: &[[u32; 8]; N], values: &[Node], ed
     }
 }
 
-/// Adds the points' forces, lane after lane: the same order, hence the same bits, always.
+/// Adds the points' forces, lane after lane, so that the order, and hence the bits, are always the same.
 #[inline(always)]
 fn scatter<T: Scalar, const N: usize>(points: &[[u32; 8]; N], forces: &Corners<T, N>, sums: &mut [Sum]) {
     for first in (0..N).step_by(4) {

@@ -1,7 +1,8 @@
 //! The cut cells of a hybrid body's patch (`hybrid::cell`), in blocks of lanes; their oracle is `hybrid::cell`.
 //!
-//! A cut cell carries its gradients and modes, and has its points anywhere. Displacements are taken as differences to the first point in f64 and
-//! rounded then; forces are summed in f64, that on the first point as minus the sum of the others.
+//! A cut cell carries its gradients and modes, and has its points anywhere. Displacements are taken as differences to
+//! the first point in f64 and rounded then; forces are summed in f64, that on the first point as minus the sum of the
+//! others.
 mod forces;
 #[cfg(test)]
 pub(crate) mod testing;
@@ -21,9 +22,10 @@ use forces::CutForces;
 use glam::DVec3;
 use std::ops::Range;
 
-/// Consecutive cells are spread over the lanes of this many blocks: sums of one point would wait for each other in the scatter.
+/// Consecutive cells are spread over the lanes of this many blocks: sums of one point would wait for each other in the
+/// scatter.
 const BLOCKS_PER_WINDOW: usize = 16;
-/// Lanes of padding have the spare point eight times, and zeros.
+/// Cut cells in lanes. Lanes of padding have the spare point eight times, and zeros.
 #[derive(Debug, Clone)]
 #[repr(C, align(64))]
 struct CutBlock<T, const N: usize> {
@@ -38,12 +40,12 @@ struct CutBlock<T, const N: usize> {
     minus_kappa: [T; N],
 }
 
-/// What fades in the cells of a block.
+/// Prestrains of the cells of a block.
 #[derive(Debug, Clone)]
 #[repr(C, align(64))]
-struct FadeBlock<T, const N: usize> {
+struct PrestrainBlock<T, const N: usize> {
     entries: [[T; N]; ENTRIES],
-    /// Bits of the lanes in which something does.
+    /// A bit per lane, set where the cell has prestrain.
     lanes: u32,
 }
 
@@ -60,8 +62,8 @@ struct Run {
 struct Tables<T, const N: usize> {
     materials: Vec<Split<T>>,
     blocks: Vec<CutBlock<T, N>>,
-    /// As many.
-    fades: Vec<FadeBlock<T, N>>,
+    /// Prestrains of the blocks, one for each.
+    prestrains: Vec<PrestrainBlock<T, N>>,
     runs: Vec<Run>,
     spare: u32,
 }
@@ -78,20 +80,20 @@ pub struct CutCells {
     layout: Layout,
     instruction_set: Available,
     displacements: Vec<Node>,
-    /// Empty unless something is viscous.
+    /// Empty unless some material is viscous.
     velocities: Vec<Node>,
     sums: Vec<Sum>,
 }
 
 impl CutCells {
-    /// Room for `cells` cells over `points` points.
+    /// Makes room for `cells` cells over `points` points.
     pub fn with_capacity(cells: usize, points: usize, materials: &[Material], precision: Precision) -> Self {
         let layout = match precision {
             Precision::Single => Layout::Single(Tables::with_capacity(cells, points, materials)),
             Precision::Double => Layout::Double(Tables::with_capacity(cells, points, materials)),
         };
         let is_viscous = materials.iter().any(|m| !m.viscosity.is_zero());
-        // One spare point more, for the lanes of padding.
+        // There is one spare point more, for the lanes of padding.
         let count = points + 1;
         Self {
             layout,
@@ -102,13 +104,14 @@ impl CutCells {
         }
     }
 
-    /// The same, held to an instruction set or the best below it that there is (for tests and benchmarks).
+    /// Returns the same kernel, held to an instruction set or to the best available below it (for tests and
+    /// benchmarks).
     #[must_use]
     pub fn with_instruction_set(self, instruction_set: InstructionSet) -> Self {
         Self { instruction_set: Available::at_most(instruction_set), ..self }
     }
 
-    /// Leaves all cells.
+    /// Removes all cells.
     pub fn clear(&mut self) {
         match &mut self.layout {
             Layout::Single(blocks) => blocks.clear(),
@@ -116,7 +119,8 @@ impl CutCells {
         }
     }
 
-    /// Makes place for `cells` cells of one material, in which nothing fades, to be filled by [`Self::put`]. Does not allocate within the capacity.
+    /// Starts a run of `cells` cells of one material, without prestrain, to be filled by [`Self::put`]. Does not
+    /// allocate within the capacity.
     pub fn start(&mut self, material: u16, cells: usize) {
         match &mut self.layout {
             Layout::Single(blocks) => blocks.start(material, cells),
@@ -124,7 +128,7 @@ impl CutCells {
         }
     }
 
-    /// Number of [`Self::start`]s since all cells were left.
+    /// Returns the number of runs.
     pub fn runs(&self) -> usize {
         match &self.layout {
             Layout::Single(blocks) => blocks.runs.len(),
@@ -132,15 +136,15 @@ impl CutCells {
         }
     }
 
-    /// What fades in a cell of a run (from 0).
-    pub fn put_fade(&mut self, run: usize, number: usize, fade: Option<&CellPrestrain>) {
+    /// Sets the prestrain of a cell of a run (from 0), `None` for one without.
+    pub fn put_prestrain(&mut self, run: usize, number: usize, prestrain: Option<&CellPrestrain>) {
         match &mut self.layout {
-            Layout::Single(blocks) => blocks.put_fade(run, number, fade),
-            Layout::Double(blocks) => blocks.put_fade(run, number, fade),
+            Layout::Single(blocks) => blocks.put_prestrain(run, number, prestrain),
+            Layout::Double(blocks) => blocks.put_prestrain(run, number, prestrain),
         }
     }
 
-    /// Cell `number` of those of the last [`Self::start`].
+    /// Sets cell `number` of the last run.
     pub fn put(&mut self, number: usize, points: [u32; 8], rest: &RestCell) {
         match &mut self.layout {
             Layout::Single(blocks) => blocks.put(number, points, rest),
@@ -148,7 +152,7 @@ impl CutCells {
         }
     }
 
-    /// Whether there are none.
+    /// Returns whether there are no cells.
     pub fn is_empty(&self) -> bool {
         match &self.layout {
             Layout::Single(blocks) => blocks.blocks.is_empty(),
@@ -156,27 +160,28 @@ impl CutCells {
         }
     }
 
-    /// Displacements (m) of the points.
+    /// Sets the displacements (m) of the points.
     pub fn set_displacements(&mut self, displacements_m: &[DVec3]) {
         for (to, from) in self.displacements.iter_mut().zip(displacements_m) {
             *to = node(*from);
         }
     }
 
-    /// Velocities (m/s) of the points; of use only where a material is viscous.
+    /// Sets the velocities (m/s) of the points; they are used only where a material is viscous.
     pub fn set_velocities(&mut self, v: &[DVec3]) {
         for (to, from) in self.velocities.iter_mut().zip(v) {
             *to = node(*from);
         }
     }
 
-    /// Sums up the forces (N) of elastic and viscous stress on the first `points` points, where `left` is left of what fades.
+    /// Sums up the forces (N) of elastic and viscous stress on the first `points` points, with the fraction `left` of
+    /// the prestrain.
     pub fn forces(&mut self, points: usize, left: f64) -> Found {
         let Self { layout, instruction_set, displacements, velocities, sums } = self;
         sums[..points].fill(Sum::default());
         match layout {
-            Layout::Single(blocks) => blocks.sum_up(*instruction_set, left, [displacements, velocities], sums),
-            Layout::Double(blocks) => blocks.sum_up(*instruction_set, left, [displacements, velocities], sums),
+            Layout::Single(blocks) => blocks.sum_up(*instruction_set, left, displacements, velocities, sums),
+            Layout::Double(blocks) => blocks.sum_up(*instruction_set, left, displacements, velocities, sums),
         }
     }
 
@@ -194,7 +199,7 @@ impl<T: Scalar, const N: usize> Tables<T, N> {
             materials: materials.iter().map(Split::of).collect(),
             // Every run may leave one block in part empty.
             blocks: Vec::with_capacity(cells.div_ceil(N) + materials.len()),
-            fades: Vec::with_capacity(cells.div_ceil(N) + materials.len()),
+            prestrains: Vec::with_capacity(cells.div_ceil(N) + materials.len()),
             runs: Vec::with_capacity(materials.len()),
             spare: points as u32,
         }
@@ -202,7 +207,7 @@ impl<T: Scalar, const N: usize> Tables<T, N> {
 
     fn clear(&mut self) {
         self.blocks.clear();
-        self.fades.clear();
+        self.prestrains.clear();
         self.runs.clear();
     }
 
@@ -218,19 +223,19 @@ impl<T: Scalar, const N: usize> Tables<T, N> {
                 minus_kappa: [zero; N],
             });
         }
-        let nothing = FadeBlock { entries: [[zero; N]; ENTRIES], lanes: 0 };
-        self.fades.resize(self.blocks.len(), nothing);
+        let nothing = PrestrainBlock { entries: [[zero; N]; ENTRIES], lanes: 0 };
+        self.prestrains.resize(self.blocks.len(), nothing);
         self.runs.push(Run { material, blocks: first..self.blocks.len(), cells });
     }
 
-    fn put_fade(&mut self, run: usize, number: usize, fade: Option<&CellPrestrain>) {
+    fn put_prestrain(&mut self, run: usize, number: usize, prestrain: Option<&CellPrestrain>) {
         let run = &self.runs[run];
         let (block, lane) = run.lane::<N>(number);
-        let block = &mut self.fades[run.blocks.start + block];
-        for (lanes, entry) in block.entries.iter_mut().zip(entries(fade)) {
+        let block = &mut self.prestrains[run.blocks.start + block];
+        for (lanes, entry) in block.entries.iter_mut().zip(entries(prestrain)) {
             lanes[lane] = T::of(entry);
         }
-        block.lanes = block.lanes & !(1 << lane) | u32::from(fade.is_some()) << lane;
+        block.lanes = block.lanes & !(1 << lane) | u32::from(prestrain.is_some()) << lane;
     }
 
     fn put(&mut self, number: usize, points: [u32; 8], rest: &RestCell) {
@@ -251,22 +256,30 @@ impl<T: Scalar, const N: usize> Tables<T, N> {
         block.minus_kappa[lane] = T::of(-rest.hourglass_m * mu_pa);
     }
 
-    fn sum_up(&self, set: Available, left: f64, [displacements, velocities]: [&[Node]; 2], sums: &mut [Sum]) -> Found {
+    fn sum_up(
+        &self,
+        set: Available,
+        left: f64,
+        displacements: &[Node],
+        velocities: &[Node],
+        sums: &mut [Sum],
+    ) -> Found {
         let mut found = Found::default();
         for run in &self.runs {
             let split = &self.materials[run.material as usize];
             let blocks = &self.blocks[run.blocks.clone()];
-            let fades = &self.fades[run.blocks.clone()];
-            let mut pass = CutForces { split, blocks, fades, left, displacements, velocities, sums, fading_j: 0.0 };
+            let prestrains = &self.prestrains[run.blocks.clone()];
+            let mut pass =
+                CutForces { split, blocks, prestrains, left, displacements, velocities, sums, prestrain_j: 0.0 };
             let viscous_w = split.material.run(set, false, &mut pass);
-            found += Found { viscous_w, fading_j: pass.fading_j };
+            found += Found { viscous_w, prestrain_j: pass.prestrain_j };
         }
         found
     }
 }
 
 impl Run {
-    /// Block and lane of a cell: neighbours go to different blocks.
+    /// Returns block and lane of a cell; neighbours are in different blocks.
     fn lane<const N: usize>(&self, number: usize) -> (usize, usize) {
         let (window, within) = (number / (N * BLOCKS_PER_WINDOW), number % (N * BLOCKS_PER_WINDOW));
         let first = window * BLOCKS_PER_WINDOW;
@@ -288,10 +301,10 @@ mod tests {
             let Question { cells, u, v, material, precision, set, .. } = question;
             let mut kernel = CutCells::with_capacity(cells.len(), u.len(), &[*material], *precision);
             kernel = kernel.with_instruction_set(*set);
-            // Others before: nothing of them may stay.
+            // Nothing may stay of cells that were there before.
             kernel.start(0, 3);
             (0..3).for_each(|number| kernel.put(number, cells[number].0, &cells[number].1));
-            (0..3).for_each(|number| kernel.put_fade(0, number, Some(&CellPrestrain::none(0))));
+            (0..3).for_each(|number| kernel.put_prestrain(0, number, Some(&CellPrestrain::none(0))));
             kernel.clear();
             kernel.start(0, cells.len());
             for (number, (points, rest)) in cells.iter().enumerate() {

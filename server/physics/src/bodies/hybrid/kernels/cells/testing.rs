@@ -10,11 +10,11 @@ use crate::{
 };
 use glam::DVec3;
 
-/// Cells, and how their points moved.
+/// Cells, and how their points moved, for a kernel to compute.
 pub(crate) struct Question<'a> {
     pub(crate) cells: &'a [([u32; 8], RestCell)],
     pub(crate) spacing_m: f64,
-    pub(crate) handed: f64,
+    pub(crate) fraction: f64,
     pub(crate) u: &'a [DVec3],
     pub(crate) v: &'a [DVec3],
     pub(crate) material: Material,
@@ -22,15 +22,16 @@ pub(crate) struct Question<'a> {
     pub(crate) set: InstructionSet,
 }
 
-/// Forces of all points.
+/// The forces on all points that a kernel found, and the power of viscous stress.
 #[derive(Debug, PartialEq)]
 pub(crate) struct Answer {
     pub(crate) forces_n: Vec<DVec3>,
     pub(crate) power_w: f64,
 }
 
-/// Whatever the law, the precision and the instruction set: the forces of the plain code, and the same bits. Of the cells of a ball, all or
-/// the full ones; the largest displacements turn some inside out.
+/// Asserts that a kernel finds the forces of the plain code, whatever the law and the precision, and the same bits with
+/// every instruction set. The cells are those of a ball, all or only the full ones; the largest displacements turn some
+/// inside out.
 pub(crate) fn agrees_with_oracle(only_full: bool, kernel: impl Fn(&Question<'_>) -> Answer) {
     let (mut cells, rest) = ball_cells();
     let whole = cells.iter().map(|(_, c)| c.volume_m3).fold(0.0, f64::max) * (1.0 - 1e-12);
@@ -50,9 +51,9 @@ pub(crate) fn agrees_with_oracle(only_full: bool, kernel: impl Fn(&Question<'_>)
             }
             let largest = expected.iter().map(|f| f.length()).fold(0.0, f64::max);
             for (precision, bound) in [(Precision::Double, 1e-11), (Precision::Single, 2e-5)] {
-                let (spacing_m, handed) = (1.1e-3, 0.98);
+                let (spacing_m, fraction) = (1.1e-3, 0.98);
                 let (cells, u, v) = (&cells[..], &u[..], &v[..]);
-                let run = |set| kernel(&Question { cells, spacing_m, handed, u, v, material, precision, set });
+                let run = |set| kernel(&Question { cells, spacing_m, fraction, u, v, material, precision, set });
                 let baseline = run(InstructionSet::Baseline);
                 let pairs = baseline.forces_n.iter().zip(&expected);
                 let worst = pairs.map(|(a, b)| a.distance(*b)).fold(0.0, f64::max);

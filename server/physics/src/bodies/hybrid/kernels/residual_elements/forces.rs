@@ -1,10 +1,10 @@
 //! The pass over coarse tets: gather, stress, scatter.
-use super::{Run, ShareBlock};
+use super::{ResidualBlock, Run};
 use crate::{
     bodies::hybrid::{
         composite::PARTS,
         kernels::{
-            cell_stress::{faded_stress, load_matrix, stress},
+            cell_stress::{load_matrix, prestrained_stress, stress},
             prestrains::{add_lanes, scaled},
         },
     },
@@ -19,22 +19,22 @@ use crate::{
 };
 
 /// The pass over the tets of one material.
-pub(super) struct ShareForces<'a, T, const N: usize> {
+pub(super) struct ResidualForces<'a, T, const N: usize> {
     pub(super) run: &'a Run<T>,
-    pub(super) blocks: &'a [ShareBlock<T, N>],
+    pub(super) blocks: &'a [ResidualBlock<T, N>],
     pub(super) edges: &'a mut [Lanes<T, N>],
     pub(super) rates: &'a mut [Lanes<T, N>],
     pub(super) forces: &'a mut [Lanes<T, N>],
     pub(super) displacements: &'a [Node],
     pub(super) velocities: &'a [Node],
     pub(super) sums: &'a mut [Sum],
-    /// What is left of what fades.
+    /// The fraction of the prestrain that is left.
     pub(super) left: f64,
     /// `s ∂U/∂s` (J), added to.
-    pub(super) fading_j: f64,
+    pub(super) prestrain_j: f64,
 }
 
-impl<T: Scalar, const N: usize> LawPass for ShareForces<'_, T, N> {
+impl<T: Scalar, const N: usize> LawPass for ResidualForces<'_, T, N> {
     type Scalar = T;
 
     #[inline(always)]
@@ -59,11 +59,11 @@ impl<T: Scalar, const N: usize> LawPass for ShareForces<'_, T, N> {
     }
 }
 
-impl<T: Scalar, const N: usize> ShareForces<'_, T, N> {
+impl<T: Scalar, const N: usize> ResidualForces<'_, T, N> {
     #[inline(always)]
     fn lanes<V: Vector<Scalar = T>, L: ConstitutiveLaw, const VISCOUS: bool>(
         &mut self,
-        block: &ShareBlock<T, N>,
+        block: &ResidualBlock<T, N>,
         first: usize,
         power: &mut [T; N],
     ) {
@@ -78,28 +78,28 @@ impl<T: Scalar, const N: usize> ShareForces<'_, T, N> {
                 }
             }
         }
-        let fading = block.fading > 0;
+        let prestrained = block.prestrained > 0;
         let (of_shape, of_volume) = (&self.run.of_shape, &self.run.of_volume);
-        let mut faded = V::of(0.0);
+        let mut prestrain_j = V::of(0.0);
         let left = V::of(self.left);
-        let pressure = if fading {
-            let a = scaled(&load_matrix::<V, N>(&block.fades[PARTS], first), left);
-            let (p, _, along) = faded_stress::<V, T, L, false>(of_volume, &a, &mean, &mean);
+        let pressure = if prestrained {
+            let a = scaled(&load_matrix::<V, N>(&block.prestrains[PARTS], first), left);
+            let (p, _, along) = prestrained_stress::<V, T, L, false>(of_volume, &a, &mean, &mean);
             let mut volume = V::of(0.0);
             for part in 0..PARTS {
                 volume = volume + V::load(&block.volume[part][first..]);
             }
-            faded = along * volume;
+            prestrain_j = along * volume;
             p
         } else {
             stress::<V, T, L, false>(of_volume, &mean, &mean).0
         };
         for part in 0..PARTS {
             let h_dot = if VISCOUS { gradient::<V, N>(block, part, self.rates, first) } else { zero };
-            let (p, density) = if fading {
-                let a = scaled(&load_matrix::<V, N>(&block.fades[part], first), left);
-                let (p, density, along) = faded_stress::<V, T, L, VISCOUS>(of_shape, &a, &strains[part], &h_dot);
-                faded = faded + along * V::load(&block.volume[part][first..]);
+            let (p, density) = if prestrained {
+                let a = scaled(&load_matrix::<V, N>(&block.prestrains[part], first), left);
+                let (p, density, along) = prestrained_stress::<V, T, L, VISCOUS>(of_shape, &a, &strains[part], &h_dot);
+                prestrain_j = prestrain_j + along * V::load(&block.volume[part][first..]);
                 (p, density)
             } else {
                 stress::<V, T, L, VISCOUS>(of_shape, &strains[part], &h_dot)
@@ -107,11 +107,11 @@ impl<T: Scalar, const N: usize> ShareForces<'_, T, N> {
             let p = plus(&p, &pressure);
             for entry in block.parts[part].clone() {
                 let t = moment::<V, N>(&block.moments[entry], first);
-                let place = block.places[entry] as usize - 1;
-                let forces = &mut self.forces[place / 3];
+                let local_node = block.local_nodes[entry] as usize - 1;
+                let forces = &mut self.forces[local_node / 3];
                 for row in 0..3 {
                     let along = p[row][0] * t[0] + p[row][1] * t[1] + p[row][2] * t[2];
-                    let lanes = &mut forces[3 * (place % 3) + row][first..];
+                    let lanes = &mut forces[3 * (local_node % 3) + row][first..];
                     (V::load(lanes) - along).store(lanes);
                 }
             }
@@ -120,16 +120,16 @@ impl<T: Scalar, const N: usize> ShareForces<'_, T, N> {
                 sum.store(&mut power[first..]);
             }
         }
-        if fading {
-            add_lanes(faded, &mut self.fading_j);
+        if prestrained {
+            add_lanes(prestrain_j, &mut self.prestrain_j);
         }
     }
 }
 
-/// `1/V_g Σ_i (a_i − a_0) T_giᵀ`.
+/// Returns `1/V_g Σ_i (a_i − a_0) T_giᵀ`.
 #[inline(always)]
 fn gradient<V: Vector, const N: usize>(
-    block: &ShareBlock<V::Scalar, N>,
+    block: &ResidualBlock<V::Scalar, N>,
     part: usize,
     edges: &[Lanes<V::Scalar, N>],
     first: usize,
@@ -137,9 +137,9 @@ fn gradient<V: Vector, const N: usize>(
     let mut sum = [[V::of(0.0); 3]; 3];
     for entry in block.parts[part].clone() {
         let t = moment::<V, N>(&block.moments[entry], first);
-        let place = block.places[entry] as usize - 1;
+        let local_node = block.local_nodes[entry] as usize - 1;
         for row in 0..3 {
-            let a = V::load(&edges[place / 3][3 * (place % 3) + row][first..]);
+            let a = V::load(&edges[local_node / 3][3 * (local_node % 3) + row][first..]);
             for column in 0..3 {
                 sum[row][column] = sum[row][column] + a * t[column];
             }
@@ -154,13 +154,14 @@ fn gradient<V: Vector, const N: usize>(
     sum
 }
 
-/// Written out: a closure would not be inlined into a function compiled for its vectors' instruction set.
+/// Loads a moment. It is written out, since a closure would not be inlined into a function compiled for its vectors'
+/// instruction set.
 #[inline(always)]
 fn moment<V: Vector, const N: usize>(moment: &[[V::Scalar; N]; 3], first: usize) -> [V; 3] {
     [V::load(&moment[0][first..]), V::load(&moment[1][first..]), V::load(&moment[2][first..])]
 }
 
-/// `a_i − a_0` of all lanes.
+/// Writes `a_i − a_0` of all lanes.
 #[inline(always)]
 fn gather<V: Vector, const N: usize>(nodes: &[[u32; N]], values: &[Node], edges: &mut [Lanes<V::Scalar, N>]) {
     for (group, edges) in edges.iter_mut().enumerate().take(nodes.len() / 3) {
@@ -177,7 +178,8 @@ fn gather<V: Vector, const N: usize>(nodes: &[[u32; N]], values: &[Node], edges:
     }
 }
 
-/// Adds the nodes' forces, lane after lane: the same order, hence the same bits, always. `f_0 = −Σ f_i` in f64.
+/// Adds the nodes' forces, lane after lane, so that the order, and hence the bits, are always the same. `f_0 = −Σ f_i`
+/// is summed in f64.
 #[inline(always)]
 fn scatter<T: Scalar, const N: usize>(nodes: &[[u32; N]], forces: &[Lanes<T, N>], sums: &mut [Sum]) {
     for first in (0..N).step_by(4) {

@@ -1,30 +1,31 @@
-//! Points of a body at rest, such as those of its skin, between the particles that carry them.
+//! Points of a body at rest, such as the vertices of its skin, between the eight particles that carry them.
 use super::{
     partition::{NONE, Partition},
     sites::trilinear,
 };
 use glam::DVec3;
 
-/// The cell that a point of the skin belongs to, and where in it.
+/// A point given by the cell that it belongs to and its coordinates there.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct SkinPlace {
+pub struct CellPoint {
     /// Index of the cell.
     pub cell: u32,
-    /// In units of the cell's edge from its first corner.
+    /// Coordinates in units of the cell's edge, from its first corner.
     pub local: DVec3,
 }
 
-/// A point in a cell: it moves with the cell's particles by their trilinear weights, and hands forces to them by the same.
+/// A point given by the eight particles of its cell and their trilinear weights: it moves by the mean of their
+/// motions with these weights, and a force on it acts on them by the same weights.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Place {
-    /// Particles.
+pub struct TrilinearPoint {
+    /// The particles.
     pub particles: [u32; 8],
     /// Their weights; they sum to one, and are negative only where the point lies in no cell of the body.
     pub weights: [f64; 8],
 }
 
-impl SkinPlace {
-    /// Of a point (m); one that lies in no cell of the body belongs to the nearest.
+impl CellPoint {
+    /// Finds the cell of a point (m); a point that lies in no cell of the body belongs to the nearest one.
     pub fn new(partition: &Partition, point_m: DVec3) -> Self {
         let sites = partition.sites();
         let at = sites.cell_near(point_m);
@@ -54,42 +55,42 @@ impl SkinPlace {
         Self { cell, local: (point_m - first_m) / partition.edge_m(cell as usize) }
     }
 
-    /// Weights of its cell's particles.
+    /// Returns the weights of its cell's particles.
     pub fn weights(&self, partition: &Partition) -> [f64; 8] {
         partition.hanging(self.cell as usize).to_particles(trilinear(self.local))
     }
 
-    /// How much faster than the fastest of its particles the point can be: `Σ |w_p|`, 1 inside a cell.
+    /// Returns a bound of the point's speed over that of the fastest of its particles: `Σ |w_p|`, 1 inside a cell.
     pub fn amplification(&self) -> f64 {
         trilinear(self.local).iter().map(|w| w.abs()).sum()
     }
 
-    /// With its particles and weights.
-    pub fn place(&self, partition: &Partition) -> Place {
-        Place { particles: partition.corners(self.cell as usize), weights: self.weights(partition) }
+    /// Returns its particles and their weights.
+    pub fn trilinear(&self, partition: &Partition) -> TrilinearPoint {
+        TrilinearPoint { particles: partition.corners(self.cell as usize), weights: self.weights(partition) }
     }
 }
 
-impl Place {
-    /// Of a point (m); one that lies in no cell of the body belongs to the nearest.
+impl TrilinearPoint {
+    /// Finds the particles and weights of a point (m); one that lies in no cell of the body belongs to the nearest.
     pub fn new(partition: &Partition, point_m: DVec3) -> Self {
-        SkinPlace::new(partition, point_m).place(partition)
+        CellPoint::new(partition, point_m).trilinear(partition)
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::bodies::hybrid::testing::{ball, balls_in_cage};
+    use crate::bodies::hybrid::testing::{ball, embedded_balls};
 
     #[test]
     fn points_of_the_skin_move_affinely() {
-        for partition in balls_in_cage() {
+        for partition in embedded_balls() {
             let skin = ball(0.01, DVec3::new(0.2e-3, -0.3e-3, 0.1e-3), 3);
             // Some lie deep in the body.
             for (number, &point) in skin.positions_m().iter().enumerate() {
                 let point = point * if number % 3 == 0 { 0.1 * (number % 10) as f64 } else { 1.0 };
-                let Place { particles, weights } = Place::new(&partition, point);
+                let TrilinearPoint { particles, weights } = TrilinearPoint::new(&partition, point);
                 assert!(weights.iter().all(|&w| w > -0.5));
                 assert!((weights.iter().sum::<f64>() - 1.0).abs() < 1e-14, "{weights:?}");
                 let moved: DVec3 = particles.iter().zip(weights).map(|(&p, w)| partition.particle_m(p) * w).sum();

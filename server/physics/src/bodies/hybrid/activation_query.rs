@@ -1,0 +1,135 @@
+//! The activation query: the balls of the tools, and the particles that are to be awake in them.
+use super::{
+    body::HybridBody,
+    carried_skin::SkinView,
+    running::RunningPatch,
+    spec::ParticleSpec,
+    state::{HybridState, axis_sample_counts},
+    switching::{ActivationQuery, Ball, FOLLOW, GAP, QUERY_EVERY_TICKS},
+};
+use crate::{
+    contact::{Near, Skin, ToolSpec},
+    tick::{Environment, MechanicalState},
+};
+use glam::DVec3;
+
+/// Time (s) before its contact at which an approaching tool wakes particles.
+const AHEAD_S: f64 = 0.05;
+/// Number of ticks for which a tool has to be away until its ball is given up.
+const AWAY_TICKS: u32 = 100;
+/// Deviation over the spacing below which a particle may fall asleep.
+const SETTLED: f64 = 0.04;
+
+/// Updates the tools' balls.
+pub(super) fn update_balls(
+    environment: &Environment,
+    view: &mut SkinView<'_>,
+    body: &HybridBody,
+    own: &mut HybridState,
+    state: &MechanicalState,
+) {
+    let MechanicalState { tools, contact, force_is_current, .. } = state;
+    let spacing_m = body.particles.spacing_m;
+    let fitted = force_is_current.then(|| contact.boxes());
+    view.begin();
+    let samples = tools.iter().zip(&environment.tools).zip(axis_sample_counts(body, &environment.tools));
+    let samples =
+        samples.flat_map(|((tool, spec), count)| tool.axis_samples(spec, count).map(move |sample| (sample, spec)));
+    for ((sample, spec), ball) in samples.zip(&mut own.balls) {
+        let near_m = (GAP * spec.radius_m).max(GAP * spacing_m) + AHEAD_S * sample.speed_m_per_s;
+        let Near { vertex, gap_m, .. } = sample.look(view, (near_m, environment.contact.covering_radius_m), fitted);
+        match (ball.as_mut(), vertex) {
+            (_, Some((vertex, _))) if gap_m < near_m => {
+                let rest_m = body.skin_rest_m()[vertex as usize];
+                let moved = ball.is_none_or(|ball| ball.rest_m.distance(rest_m) > FOLLOW * spacing_m);
+                let rest_m = if moved { rest_m } else { ball.map_or(rest_m, |ball| ball.rest_m) };
+                *ball = Some(Ball { rest_m, away_ticks: 0 });
+            }
+            (Some(own), _) if gap_m > 2.0 * near_m => {
+                own.away_ticks += QUERY_EVERY_TICKS as u32;
+                if own.away_ticks >= AWAY_TICKS {
+                    *ball = None;
+                }
+            }
+            (Some(own), _) => own.away_ticks = 0,
+            (None, _) => {}
+        }
+    }
+}
+
+/// Returns the squared distance (m²) of a point `p` to the middles of balls, and to the lines between those of
+/// neighbours, `a` and `b`:
+/// ```text
+/// |p − a − s (b − a)|²,   s = (p − a)·(b − a)/|b − a|², limited to 0 to 1
+/// ```
+fn distance_to_balls_sq(balls: &[Option<Ball>], at_m: DVec3) -> f64 {
+    let (mut nearest_sq, mut before_m) = (f64::INFINITY, None);
+    for ball in balls {
+        let middle_m = ball.map(|ball| ball.rest_m);
+        if let Some(to_m) = middle_m {
+            let from_m = before_m.unwrap_or(to_m);
+            let along_m = to_m - from_m;
+            let part = (at_m - from_m).dot(along_m) / along_m.length_squared().max(f64::MIN_POSITIVE);
+            nearest_sq = nearest_sq.min(at_m.distance_squared(from_m + along_m * part.clamp(0.0, 1.0)));
+        }
+        before_m = middle_m;
+    }
+    nearest_sq
+}
+
+impl ActivationQuery {
+    /// Finds the particles in the tools' balls, ascending. Where there is no room for all, each tool gets as many:
+    /// those nearest to the middles of its balls, and to the lines between those of neighbours.
+    pub(super) fn want(&mut self, body: &HybridBody, tools: &[ToolSpec], own: &HybridState, reach_m: f64, most: usize) {
+        self.wanted.clear();
+        let of_tool = |first: &mut usize, count: usize| {
+            *first += count;
+            Some(&own.balls[*first - count..*first])
+        };
+        let tools = || axis_sample_counts(body, tools).scan(0, of_tool);
+        let room = most / tools().filter(|balls| balls.iter().any(Option::is_some)).count().max(1);
+        for balls in tools() {
+            self.found.clear();
+            for (number, ball) in balls.iter().enumerate().filter_map(|(number, ball)| Some((number, (*ball)?))) {
+                // As samples are no farther from each other than balls reach, balls after the next two have hardly a
+                // particle of this one.
+                let near = &balls[number.saturating_sub(1)..(number + 4).min(balls.len())];
+                body.partition.particles_within(ball.rest_m, reach_m, |particle, distance_sq| {
+                    let is_found = &mut self.is_found[particle as usize];
+                    if body.may_wake(particle) && !std::mem::replace(is_found, true) {
+                        let at_m = body.partition.particle_m(particle);
+                        // Of a single ball the distance from its middle is known already.
+                        let is_alone = balls.len() == 1;
+                        self.found
+                            .push((if is_alone { distance_sq } else { distance_to_balls_sq(near, at_m) }, particle));
+                    }
+                });
+            }
+            for (_, particle) in &self.found {
+                self.is_found[*particle as usize] = false;
+            }
+            if self.found.len() > room {
+                self.found.select_nth_unstable_by(room, |a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+                self.found.truncate(room);
+            }
+            self.wanted.extend(self.found.iter().map(|(_, particle)| *particle));
+        }
+        self.wanted.sort_unstable();
+        self.wanted.dedup();
+    }
+
+    /// Keeps active particles awake that no tool wants but that are not settled, as long as there is room; those that
+    /// are farthest from where they would be asleep come first.
+    pub(super) fn keep_unsettled(&mut self, patch: &RunningPatch, particles: &ParticleSpec) {
+        self.unwanted.clear();
+        for (particle, deviation_m) in patch.deviations_m() {
+            if deviation_m > SETTLED * particles.spacing_m && self.wanted.binary_search(&particle).is_err() {
+                self.unwanted.push((deviation_m, particle));
+            }
+        }
+        self.unwanted.sort_unstable_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
+        let room = particles.most_active.saturating_sub(self.wanted.len());
+        self.wanted.extend(self.unwanted.iter().take(room).map(|(_, particle)| *particle));
+        self.wanted.sort_unstable();
+    }
+}
