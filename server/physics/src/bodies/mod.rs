@@ -1,8 +1,8 @@
 //! The registry of the kinds of body.
 //!
 //! A kind has its own folder: what it is made from, what its rest state fixes, what a tick changes of it beside
-//! [`crate::tick::MechanicalState`], its buffers, and how it is stepped. It implements [`crate::tick::BodyKind`], [`crate::tick::KindState`] and
-//! [`crate::tick::Stepped`]; no kind knows another, nor this file. Here each has its lines: a variant of every enumeration, how its parts are made,
+//! [`crate::tick::MechanicalState`], its buffers, and how it is stepped. It implements [`crate::tick::KindSpec`], [`crate::tick::BodyKind`],
+//! [`crate::tick::KindState`] and [`crate::tick::Stepped`]; no kind knows another, nor this file. Here each has its lines: a variant of every enumeration, how its parts are made,
 //! and an arm of the macros by which the enumerations answer.
 mod body;
 pub mod hybrid;

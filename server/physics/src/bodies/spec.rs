@@ -1,6 +1,6 @@
 //! What a body is built from, whichever kind it is.
-use super::{BodySpec, hybrid::HybridSpec, mass_spring::MassSpringSpec, seed::SeedBodySpec};
-use crate::elements::solid::Solid;
+use super::{BodySpec, hybrid::HybridSpec, mass_spring::MassSpringSpec, of_kind, seed::SeedBodySpec};
+use crate::{elements::solid::Solid, tick::KindSpec};
 
 impl BodySpec {
     /// A hybrid body, if it is one.
@@ -20,21 +20,11 @@ impl BodySpec {
 
     /// The tets, of whatever level, with their materials, of kinds that have any.
     pub fn solid(&self) -> Option<&Solid> {
-        match self {
-            Self::Tet(solid) => Some(solid),
-            Self::Hybrid(spec) => Some(&spec.coarse),
-            Self::Seed(spec) => Some(&spec.core),
-            _ => None,
-        }
+        of_kind!(BodySpec, self, spec => KindSpec::solid(spec))
     }
 
     /// The same, to be changed.
     pub fn solid_mut(&mut self) -> Option<&mut Solid> {
-        match self {
-            Self::Tet(solid) => Some(solid),
-            Self::Hybrid(spec) => Some(&mut spec.coarse),
-            Self::Seed(spec) => Some(&mut spec.core),
-            _ => None,
-        }
+        of_kind!(BodySpec, self, spec => KindSpec::solid_mut(spec))
     }
 }

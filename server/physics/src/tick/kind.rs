@@ -1,6 +1,6 @@
-//! What a kind of body is: what its rest state fixes, what a tick changes of it, and how it is stepped.
+//! What a kind of body is: what it is built from, what its rest state fixes, what a tick changes of it, and how it is stepped.
 //!
-//! A kind implements these three traits in its folder (`bodies/<kind>/kind.rs`); `bodies/mod.rs` registers it. What only some kinds have is answered
+//! A kind implements these four traits in its folder (`bodies/<kind>/kind.rs`); `bodies/mod.rs` registers it. What only some kinds have is answered
 //! by a default here, which says what it means to have none.
 use super::{
     Energies, Environment, Evaluation, Judged, MaterialPoint, MechanicalState, PointForce, PrescribedNodes, Tick,
@@ -14,6 +14,19 @@ use crate::{
     settings::PrescribedSpec,
 };
 use glam::DVec3;
+
+/// What a kind of body is built from.
+pub(crate) trait KindSpec {
+    /// The tets, of whatever level, with their materials.
+    fn solid(&self) -> Option<&Solid> {
+        None
+    }
+
+    /// The same, to be changed.
+    fn solid_mut(&mut self) -> Option<&mut Solid> {
+        None
+    }
+}
 
 /// What the rest state of a kind of body fixes, and what that tells about a state. Constant after load.
 pub(crate) trait BodyKind {

@@ -22,7 +22,7 @@ pub(crate) use evaluation::{Evaluation, LoadRamp, Tick, touch_nodes};
 pub use inputs::{PointForce, TickInput};
 pub(crate) use inputs::{PrescribedNodes, take_prescribed, take_tools};
 pub(crate) use judged::{Judged, StepEvidence, StepForcesNow};
-pub(crate) use kind::{BodyKind, KindState, Stepped};
+pub(crate) use kind::{BodyKind, KindSpec, KindState, Stepped};
 pub use ledger::{Energies, Ledger, ViscousPower};
 pub use material_point::MaterialPoint;
 pub(crate) use skin::{CarriedSkin, ListedVertices, Touch, touch_skin};

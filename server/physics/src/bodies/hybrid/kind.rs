@@ -1,14 +1,24 @@
 //! What a hybrid body is as a kind of body.
-use super::{HybridBody, HybridState, trilinear_point::TrilinearPoint};
+use super::{HybridBody, HybridSpec, HybridState, trilinear_point::TrilinearPoint};
 use crate::{
-    elements::linear_tet::VolumeRatio,
+    elements::{linear_tet::VolumeRatio, solid::Solid},
     hash::{Chain, Fnv},
     mesh::{Surface, TetMesh},
     settings::PrescribedSpec,
-    tick::{BodyKind, Energies, Environment, KindState, MaterialPoint, MechanicalState},
+    tick::{BodyKind, Energies, Environment, KindSpec, KindState, MaterialPoint, MechanicalState},
 };
 use glam::DVec3;
 use std::fmt::Write;
+
+impl KindSpec for HybridSpec {
+    fn solid(&self) -> Option<&Solid> {
+        Some(&self.coarse)
+    }
+
+    fn solid_mut(&mut self) -> Option<&mut Solid> {
+        Some(&mut self.coarse)
+    }
+}
 
 impl BodyKind for HybridBody {
     type State = HybridState;

@@ -1,12 +1,14 @@
 //! What a mass-spring surface is as a kind of body.
-use super::{MassSpringBody, MassSpringState};
+use super::{MassSpringBody, MassSpringSpec, MassSpringState};
 use crate::{
     hash::{Chain, Fnv},
     mesh::Surface,
-    tick::{BodyKind, Energies, Environment, KindState, MaterialPoint, MechanicalState},
+    tick::{BodyKind, Energies, Environment, KindSpec, KindState, MaterialPoint, MechanicalState},
 };
 use glam::DVec3;
 use std::fmt::Write;
+
+impl KindSpec for MassSpringSpec {}
 
 impl BodyKind for MassSpringBody {
     type State = MassSpringState;

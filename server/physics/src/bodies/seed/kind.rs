@@ -1,5 +1,5 @@
 //! What the papers' hybrid is as a kind of body.
-use super::{SeedBody, SeedBodyState, layer::Layer};
+use super::{SeedBody, SeedBodySpec, SeedBodyState, layer::Layer};
 use crate::{
     elements::{
         linear_tet::{VolumeRatio, min_volume_ratio},
@@ -8,10 +8,20 @@ use crate::{
     hash::{Chain, Fnv},
     mesh::TetMesh,
     settings::PrescribedSpec,
-    tick::{BodyKind, Energies, Environment, KindState, MechanicalState},
+    tick::{BodyKind, Energies, Environment, KindSpec, KindState, MechanicalState},
 };
 use glam::DVec3;
 use std::fmt::Write;
+
+impl KindSpec for SeedBodySpec {
+    fn solid(&self) -> Option<&Solid> {
+        Some(&self.core)
+    }
+
+    fn solid_mut(&mut self) -> Option<&mut Solid> {
+        Some(&mut self.core)
+    }
+}
 
 impl BodyKind for SeedBody {
     type State = SeedBodyState;

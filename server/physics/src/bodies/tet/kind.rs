@@ -8,11 +8,21 @@ use crate::{
     hash::{Chain, Fnv},
     mesh::TetMesh,
     settings::PrescribedSpec,
-    tick::{BodyKind, Energies, Environment, KindState, MechanicalState},
+    tick::{BodyKind, Energies, Environment, KindSpec, KindState, MechanicalState},
 };
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 use std::fmt::Write;
+
+impl KindSpec for Solid {
+    fn solid(&self) -> Option<&Solid> {
+        Some(self)
+    }
+
+    fn solid_mut(&mut self) -> Option<&mut Solid> {
+        Some(self)
+    }
+}
 
 impl BodyKind for TetBody {
     type State = TetState;
