@@ -7,7 +7,7 @@ use palpate_physics::{
     BodySpec, BodyState, Energies, LoadSpec, ModelSpec, PointForce, PrescribedSpec, Settings, State, Substeps,
     bodies::mass_spring::{
         AnchorLaw, MassSpringSpec, Net, Refinement, Refining, SpringSpec,
-        calibration::{Calibration, ConstantsTable},
+        constants_table::{Calibration, ConstantsTable},
         equilibrium::settle,
         net::hexagonal_patch,
         region::Constants,

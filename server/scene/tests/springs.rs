@@ -5,7 +5,7 @@ use palpate_physics::{
     Model,
     bodies::mass_spring::{
         AnchorLaw, MassSpringSpec,
-        calibration::{Calibration, ConstantsTable},
+        constants_table::{Calibration, ConstantsTable},
     },
 };
 use palpate_scene::{Limits, Scene, SceneError, load_file, parse, to_calibrate};

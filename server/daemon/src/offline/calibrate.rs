@@ -1,7 +1,7 @@
 //! `palpated calibrate`: spring constants over displacement for a scene's refined surface, found on the surface itself.
 use crate::progress::Progress;
 use miette::{IntoDiagnostic, Report, WrapErr};
-use palpate_physics::bodies::mass_spring::calibration::{Calibration, ConstantsTable};
+use palpate_physics::bodies::mass_spring::constants_table::{Calibration, ConstantsTable};
 use palpate_scene::{Limits, ToCalibrate};
 use std::{
     path::{Path, PathBuf},

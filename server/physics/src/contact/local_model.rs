@@ -22,6 +22,7 @@
 //! smoothed over some ten ticks. A tool that turns has a torque, too ([`super::local_torque`]).
 use super::{
     Capsule, Coupling, LocalContactModel, LocalTorqueModel, ToolModel, ToolState,
+    friction::TANGENTIAL_RATIO,
     local_torque::{self, Springs},
     narrow::Pressed,
     turning::rotation_vector,
@@ -33,8 +34,6 @@ use std::f64::consts::PI;
 
 /// `c` in the formula of the contact radius.
 const PRESSURE_SHAPE: f64 = 1.65;
-/// Mindlin's ratio of tangential to normal stiffness.
-const TANGENTIAL_RATIO: f64 = 0.75;
 /// Bound of the correction `s` and of its inverse.
 pub(super) const MOST_CORRECTION: f64 = 8.0;
 /// Weight of a new secant in `ln s`.

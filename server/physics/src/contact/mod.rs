@@ -1,12 +1,13 @@
 //! Spheres and capsules against the deforming surface.
 //!
 //! Once a substep every tool moves ([`proxy`]), the broad phase lists the triangles near it ([`broad`]), samples fixed
-//! in the surface press and rub ([`foundation`], [`narrow`]), and the forces are added to those of nodes and tool by
+//! in the surface press and rub ([`foundation`], [`narrow`], [`friction`]), and the forces are added to those of nodes and tool by
 //! the transpose. Once a tick the contact is summed up for the servo loop ([`local_model`]).
 mod axis;
 mod axis_samples;
 pub(crate) mod broad;
 mod foundation;
+mod friction;
 mod inside;
 mod local_model;
 mod local_torque;

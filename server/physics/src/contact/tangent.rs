@@ -1,6 +1,6 @@
 //! Stiffness of the present contact, for implicit steps: the positive part of `−∂f/∂y` of every sample in contact.
 //!
-//! With `w = ζ_i` on a triangle's corners and `H = k n̂n̂ᵀ + friction` per sample (see [`super::narrow`]): a sticking
+//! With `w = ζ_i` on a triangle's corners and `H = k n̂n̂ᵀ + friction` per sample (see [`super::friction`]): a sticking
 //! spring adds `k_t(I − n̂n̂ᵀ)`, a slipping one, whose force keeps its size and turns with the slip `t̂`,
 //! `k_t e/|e|_{trial}` across `t̂`, which is `µ_f f_n/|e|` at most. What pressing makes across the normal,
 //! `−k (g/|r|)(I − n̂n̂ᵀ)`, is negative and left out. Samples that are not recorded (those beyond the buffer) are left
@@ -11,7 +11,7 @@
 //!
 //! The stiffness follows from the state alone (touched samples, positions), so that a restored run steps with the same
 //! bits.
-use super::{ContactModel, ContactState, Coupling, ToolState, narrow::TANGENTIAL_RATIO, touching::Touch};
+use super::{ContactModel, ContactState, Coupling, ToolState, friction::TANGENTIAL_RATIO, touching::Touch};
 use glam::{DMat3, DVec3};
 
 /// Largest number of pressed triangles per tool; others are left explicit.

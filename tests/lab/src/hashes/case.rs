@@ -1,7 +1,7 @@
 //! A scene, how much of it is run, and what is done to it.
 use glam::DVec3;
 use miette::{IntoDiagnostic, Result, WrapErr};
-use palpate_physics::{Model, PointForce, Scratch, State, bodies::mass_spring::calibration, contact::ToolTarget};
+use palpate_physics::{Model, PointForce, Scratch, State, bodies::mass_spring::constants_table, contact::ToolTarget};
 use palpate_scene::{Limits, Scene, ToCalibrate};
 use std::path::{Path, PathBuf};
 
@@ -113,8 +113,8 @@ fn calibrated(text: &str, limits: &Limits) -> Result<Scene> {
     write(&path, text)?;
     let ToCalibrate { surface, coarse, rings, table } = palpate_scene::to_calibrate(&path, limits)?;
     let ratio = coarse.mesh_n_per_m / coarse.anchor_n_per_m;
-    let of = calibration::Calibration { coarse, rings, ratio, samples: 2 };
-    let found = calibration::ConstantsTable::calibrate(&surface, of, &mut |_| {}).into_diagnostic()?;
+    let of = constants_table::Calibration { coarse, rings, ratio, samples: 2 };
+    let found = constants_table::ConstantsTable::calibrate(&surface, of, &mut |_| {}).into_diagnostic()?;
     write(&table, &serde_json::to_string(&found).into_diagnostic()?)?;
     Ok(palpate_scene::load_file(&path, limits, &mut |_, _| {})?)
 }

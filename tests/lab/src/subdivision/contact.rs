@@ -8,7 +8,7 @@ use palpate_physics::{
     BodySpec, Model, ModelError, ModelSpec, PrescribedSpec, Scratch, Settings, State, TickInput,
     bodies::mass_spring::{
         AnchorLaw, MassSpringSpec, Refinement, Refining, SpringSpec,
-        calibration::{Calibration, CalibrationError, ConstantsTable},
+        constants_table::{Calibration, CalibrationError, ConstantsTable},
         loop_scheme::refined,
         matching,
         net::hexagonal_patch,

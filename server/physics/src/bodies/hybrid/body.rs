@@ -4,7 +4,7 @@ use super::{
     clusters::SkinClusters,
     composite::Composite,
     embedding_mesh::{self, EmbeddingMesh},
-    metric::Masses,
+    mass_matrix::Masses,
     moments::{CellMoments, Moments, integrate},
     partition::Partition,
     patch::{KEPT, Materials},

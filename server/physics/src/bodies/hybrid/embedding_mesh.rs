@@ -2,7 +2,7 @@
 //!
 //! Coarse tets cut the corners of a curved body, and the lattice reaches past its surface by up to a cell. A particle
 //! outside all tets would have a negative weight: it would still follow affine motion, but could not be woken
-//! (`metric`). The tets carry no geometry (`partition`), so nothing is lost by making them larger. Nodes that are held
+//! (`mass_matrix`). The tets carry no geometry (`partition`), so nothing is lost by making them larger. Nodes that are held
 //! stay where they are.
 use super::locate::Locator;
 use crate::{
@@ -160,7 +160,7 @@ mod tests {
     use super::*;
     use crate::bodies::hybrid::{
         composite::Composite,
-        metric::{Masses, Metric},
+        mass_matrix::{MassMatrix, Masses},
         moments::integrate,
         partition::Partition,
         sites::Sites,
@@ -190,7 +190,7 @@ mod tests {
         assert!(all.iter().all(|&p| partition.anchor(p).weights.iter().all(|&w| w > -1e-8)));
         let masses = Masses::new(&partition, |_| 1000.0);
         let free = vec![BVec3::TRUE; masses.node_kg.len()];
-        assert!(Metric::new(&partition, &masses, &all, &free).is_ok());
+        assert!(MassMatrix::new(&partition, &masses, &all, &free).is_ok());
     }
 
     #[test]

@@ -187,7 +187,7 @@ mod tests {
                 residual.add_products_n(material, hybrid.partition.coarse().positions_m(), &a, &mut products);
             }
             let before: f64 = a.iter().map(|a| a.length_squared()).sum();
-            running.metric_mut().accelerate(&mut products);
+            running.mass_matrix_mut().accelerate(&mut products);
             let size = products.iter().map(|a| a.length_squared()).sum::<f64>().sqrt();
             found = size / before.sqrt();
             a = products.iter().map(|product| *product / size).collect();

@@ -10,15 +10,15 @@
 //! min ½ Σ_p m |y_p − ζ_pᵀ(x + Δ)|² + ½ Δᵀ C' Δ        C'' Δ = Σ_p m ζ_p (y_p − ζ_pᵀ x)
 //! C'' = M'' − (1 − δ) L        L = Σ_{all p} m_p (diag ζ_p − ζ_p ζ_pᵀ)
 //! ```
-//! over the free nodes that they follow. `M''` is the mass matrix after the switch (`metric`), `L` the part of it that
+//! over the free nodes that they follow. `M''` is the mass matrix after the switch (`mass_matrix`), `L` the part of it that
 //! lumping adds; `δ` of that holds nodes that nothing else does. The system is solved by a few steps of conjugate
 //! gradients, preconditioned by `M''⁻¹`. It changes neither strains (`prestrain`) nor momenta (`switching`).
 use super::{
     body::HybridBody,
     composite::{Anchor, NODES},
-    metric::Masses,
+    mass_matrix::Masses,
     partition::Partition,
-    running_metric::RunningMetric,
+    running_mass_matrix::RunningMassMatrix,
 };
 use glam::DVec3;
 
@@ -127,9 +127,9 @@ impl Projection {
     }
 
     /// Returns the displacements `Δ` (m) of the coarse nodes, with the mass matrix after the switch. Allocates nothing.
-    pub(super) fn solve(&mut self, body: &HybridBody, metric: &mut RunningMetric) -> &[DVec3] {
+    pub(super) fn solve(&mut self, body: &HybridBody, mass_matrix: &mut RunningMassMatrix) -> &[DVec3] {
         let nodes = self.moments.len();
-        let all = nodes + metric.particle_kg().len();
+        let all = nodes + mass_matrix.particle_kg().len();
         for list in [&mut self.shifts_m, &mut self.direction] {
             list.clear();
             list.resize(all, DVec3::ZERO);
@@ -143,7 +143,7 @@ impl Projection {
             let masked = self.moments.iter().zip(&self.is_moved);
             self.preconditioned.extend(masked.map(|(left, is_moved)| if *is_moved { *left } else { DVec3::ZERO }));
             self.preconditioned.resize(all, DVec3::ZERO);
-            metric.accelerate(&mut self.preconditioned);
+            mass_matrix.accelerate(&mut self.preconditioned);
             for (z, is_moved) in self.preconditioned.iter_mut().zip(&self.is_moved) {
                 *z = if *is_moved { *z } else { DVec3::ZERO };
             }
@@ -158,7 +158,7 @@ impl Projection {
             // C'' d = M'' d − (1 − δ) L d
             self.product.clear();
             self.product.resize(all, DVec3::ZERO);
-            metric.momenta(body, &self.direction, &mut self.product);
+            mass_matrix.momenta(body, &self.direction, &mut self.product);
             for &([i, j], kg) in &self.pairs {
                 let (i, j) = (i as usize, j as usize);
                 let flow = (self.direction[i] - self.direction[j]) * ((HOLD - 1.0) * kg);
@@ -214,7 +214,7 @@ mod tests {
             projection.transfer(&body, &partition.anchor(p), kg(p), *away);
         }
         let (start, moved) = (projection.moments.clone(), projection.is_moved.clone());
-        let shifts = projection.solve(&body, patch.metric_mut()).to_vec();
+        let shifts = projection.solve(&body, patch.mass_matrix_mut()).to_vec();
         assert!(shifts.iter().zip(&moved).all(|(shift, moved)| *moved || *shift == DVec3::ZERO));
         // Every particle's own term, beside what lumping holds.
         let mut left = start.clone();

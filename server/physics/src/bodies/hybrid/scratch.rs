@@ -61,7 +61,7 @@ impl HybridScratch {
     pub(crate) fn size_sq(&mut self, forces_n: impl Iterator<Item = DVec3>) -> f64 {
         self.accelerations.clear();
         self.accelerations.extend(forces_n);
-        self.patch.metric_mut().accelerate(&mut self.accelerations)
+        self.patch.mass_matrix_mut().accelerate(&mut self.accelerations)
     }
 
     /// Returns `vᵀ M' v` (J) of velocities; of displacements it is in kg m².
@@ -71,13 +71,13 @@ impl HybridScratch {
         accelerations.extend(v);
         momenta.clear();
         momenta.resize(accelerations.len(), DVec3::ZERO);
-        patch.metric_mut().momenta(body, accelerations, momenta);
+        patch.mass_matrix_mut().momenta(body, accelerations, momenta);
         momenta.iter().zip(accelerations.iter()).map(|(p, v)| p.dot(*v)).sum()
     }
 
     /// Returns `(1 − ε) m_p` (kg) of the active particles.
     pub(crate) fn particle_kg(&self) -> &[f64] {
-        self.patch.metric().particle_kg()
+        self.patch.mass_matrix().particle_kg()
     }
 
     /// Makes the patch that of the state's active particles and prestrains, where it is not. Allocates nothing.

@@ -65,7 +65,7 @@ impl<'a> Stepped<'a> for SteppedHybrid<'a> {
         own.given_j -= taken_j;
         let gravity = tick.environment.gravity_m_per_s2;
         if gravity != DVec3::ZERO {
-            patch.metric().add_weight_n(gravity, &mut state.force_n);
+            patch.mass_matrix().add_weight_n(gravity, &mut state.force_n);
         }
         vector_operations::add(&mut state.force_n, &state.external_n);
         scratch.transition.apply(body, own, state);
@@ -93,11 +93,12 @@ impl<'a> Stepped<'a> for SteppedHybrid<'a> {
         let (mut before_j, mut with_holders_j, mut power_w) = (0.0, 0.0, 0.0);
         if damping > 0.0 {
             // Velocities are those that the kick before left, of which the energy is known from there.
-            (before_j, with_holders_j) = of_free_j.unwrap_or_else(|| patch.metric().of_free_j(body, &state.v, momenta));
+            (before_j, with_holders_j) =
+                of_free_j.unwrap_or_else(|| patch.mass_matrix().of_free_j(body, &state.v, momenta));
             power_w = factor * (vector_operations::dot(&state.v, accelerations) + of_holders_w);
         }
-        *kick_sq = [patch.metric_mut().accelerate(accelerations), kick_sq[0], kick_sq[1]];
-        let inertia_w = patch.metric().of_holders(&state.v, accelerations);
+        *kick_sq = [patch.mass_matrix_mut().accelerate(accelerations), kick_sq[0], kick_sq[1]];
+        let inertia_w = patch.mass_matrix().of_holders(&state.v, accelerations);
         let taken_j = transition.work_j(&state.v, factor, accelerations, h_s);
         state.ledger.dissipated_j += taken_j;
         own.given_j -= taken_j;
@@ -120,7 +121,7 @@ impl<'a> Stepped<'a> for SteppedHybrid<'a> {
 
     /// Returns the kinetic energy (J) that velocities of held axes have by themselves and with free ones.
     fn held_kinetic_j(&self, state: &MechanicalState) -> f64 {
-        self.scratch.patch.metric().of_held_j(self.body, &state.v)
+        self.scratch.patch.mass_matrix().of_held_j(self.body, &state.v)
     }
 
     fn reaction_n(&self, node: usize, state: &MechanicalState) -> DVec3 {

@@ -7,7 +7,7 @@
 //! of its axis. A particle that no tool wants any more falls asleep once it is nearly where it would be asleep, or when
 //! its room is needed.
 //!
-//! A switch keeps momentum. What wakes moves as it was moved (`metric`). What falls asleep transfers impulses to the
+//! A switch keeps momentum. What wakes moves as it was moved (`mass_matrix`). What falls asleep transfers impulses to the
 //! coarse nodes, and all of it together a couple: with `m = (1 − ε) m_p`, the position `x_p = Σ_i ζ_pi x_i` that a
 //! particle has then, and the free nodes of its tets, of masses `M_i` about their middle `x̄`,
 //! ```text
@@ -25,7 +25,7 @@ use super::{
     patch::KEPT,
     projection::Projection,
     running::RunningPatch,
-    running_metric::RunningMetric,
+    running_mass_matrix::RunningMassMatrix,
     scratch::HybridScratch,
     spec::Waking,
     state::{HybridState, axis_sample_counts},
@@ -212,7 +212,7 @@ impl HybridScratch {
         query.projection.start(nodes);
         query.were_m.clear();
         query.were_m.extend_from_slice(&state.x[..nodes]);
-        transition.take(patch.metric_mut(), own, state);
+        transition.take(patch.mass_matrix_mut(), own, state);
         let (mut couple, mut farthest_m) = (DVec3::ZERO, 0.0_f64);
         for (number, id) in own.ids().iter().enumerate() {
             if own.next.binary_search(id).is_err() {
@@ -225,13 +225,13 @@ impl HybridScratch {
         }
         let switch = PatchSwitch { before: patch, after: next, is_moved: query.projection.is_moved() };
         let mut held_j = before.take(body, &switch, &state.x, &own.prestrain);
-        held_j += patch.metric_mut().moving_j(body, &state.x, &state.v, gravity, momenta);
+        held_j += patch.mass_matrix_mut().moving_j(body, &state.x, &state.v, gravity, momenta);
         let some_sleep = own.ids().iter().any(|id| own.next.binary_search(id).is_err());
         query.left.clear();
         query.left.extend_from_slice(own.ids());
         own.switch(body, state, &mut query.moved);
         if some_sleep {
-            couple -= query.shift(body, next.metric_mut(), state, momenta);
+            couple -= query.shift(body, next.mass_matrix_mut(), state, momenta);
             query.turn(couple, &state.x);
         }
         query.shifts_m.clear();
@@ -244,19 +244,19 @@ impl HybridScratch {
         next.put_prestrains(&own.prestrain);
         if some_sleep {
             query.impulses.resize(state.v.len(), DVec3::ZERO);
-            next.metric_mut().accelerate(&mut query.impulses);
+            next.mass_matrix_mut().accelerate(&mut query.impulses);
             for (v, change) in state.v.iter_mut().zip(&query.impulses[..nodes]) {
                 *v += *change;
             }
         }
         held_j += first_moved_j - elastic_j;
-        held_j -= next.metric_mut().moving_j(body, &state.x, &state.v, gravity, momenta);
+        held_j -= next.mass_matrix_mut().moving_j(body, &state.x, &state.v, gravity, momenta);
         state.ledger.dissipated_j += held_j;
         own.given_j -= held_j;
         state.force_is_current = false;
         own.switched_j = own.switched_j.max(elastic_j);
         if own.may_use_transition_force() {
-            transition.demand(body, next.metric_mut(), &query.left, own.ids(), &query.transferred_n);
+            transition.demand(body, next.mass_matrix_mut(), &query.left, own.ids(), &query.transferred_n);
         }
         staged.swap(patch);
         body.amplification() * farthest_m
@@ -292,14 +292,14 @@ impl ActivationQuery {
     fn shift(
         &mut self,
         body: &HybridBody,
-        metric: &mut RunningMetric,
+        mass_matrix: &mut RunningMassMatrix,
         state: &mut MechanicalState,
         momenta: &mut Vec<DVec3>,
     ) -> DVec3 {
         momenta.clear();
         momenta.resize(state.v.len(), DVec3::ZERO);
-        metric.momenta(body, &state.v, momenta);
-        let shifts_m = self.projection.solve(body, metric);
+        mass_matrix.momenta(body, &state.v, momenta);
+        let shifts_m = self.projection.solve(body, mass_matrix);
         let mut gained = DVec3::ZERO;
         for (((x, shift), momentum), impulse) in state.x.iter_mut().zip(shifts_m).zip(&*momenta).zip(&self.impulses) {
             *x += *shift;

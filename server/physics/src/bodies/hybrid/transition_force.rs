@@ -14,7 +14,7 @@
 //! prestrain (`prestrain`). The energy that both gave lately, beyond what they and switches took, is kept; where it is
 //! more than [`MOST_GIVEN`] of the elastic energy that switches lately changed, there is no transition force, and
 //! accelerations jump.
-use super::{body::HybridBody, patch::KEPT, prestrain, running_metric::RunningMetric, state::HybridState};
+use super::{body::HybridBody, patch::KEPT, prestrain, running_mass_matrix::RunningMassMatrix, state::HybridState};
 use crate::tick::MechanicalState;
 use glam::{BVec3, DMat3, DVec3};
 
@@ -50,12 +50,12 @@ impl TransitionForce {
     }
 
     /// Records the accelerations before a switch.
-    pub(super) fn take(&mut self, metric: &mut RunningMetric, own: &HybridState, state: &MechanicalState) {
+    pub(super) fn take(&mut self, mass_matrix: &mut RunningMassMatrix, own: &HybridState, state: &MechanicalState) {
         self.before.clear();
         if state.force_is_current {
             self.before.extend_from_slice(&state.force_n);
             own.long_steps.add_beyond_n(1.0, &mut self.before);
-            metric.accelerate(&mut self.before);
+            mass_matrix.accelerate(&mut self.before);
         }
     }
 
@@ -76,7 +76,7 @@ impl TransitionForce {
     pub(super) fn demand(
         &mut self,
         body: &HybridBody,
-        metric: &mut RunningMetric,
+        mass_matrix: &mut RunningMassMatrix,
         before: &[u32],
         after: &[u32],
         transferred_n: &[DVec3],
@@ -94,7 +94,7 @@ impl TransitionForce {
         };
         self.taken_n.extend(after.iter().map(of));
         self.due_n.resize(self.taken_n.len(), DVec3::ZERO);
-        metric.momenta(body, &self.taken_n, &mut self.due_n);
+        mass_matrix.momenta(body, &self.taken_n, &mut self.due_n);
         for (due, transferred) in self.due_n.iter_mut().zip(transferred_n) {
             *due += *transferred;
         }

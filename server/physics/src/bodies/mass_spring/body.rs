@@ -9,7 +9,7 @@
 //! it is refined.
 use super::{
     SpringError, SpringModel, SpringSpec,
-    calibration::{self, Calibration, CalibrationError, ConstantsTable},
+    constants_table::{self, Calibration, CalibrationError, ConstantsTable},
     region::Constants,
     skin::SkinBoxes,
 };
@@ -246,7 +246,7 @@ impl MassSpringBody {
 fn fingerprint(spec: &SpringSpec, refinement: Option<Refinement>, table: Option<&ConstantsTable>) -> u64 {
     let SpringSpec { surface, coarse, fine, anchor_law, mass_kg, held, most_awake, most_refined } = spec;
     let masses = mass_kg.iter().flat_map(|mass| mass.to_bits().to_le_bytes());
-    let mut hash = Fnv(fnv(calibration::fingerprint(surface), masses));
+    let mut hash = Fnv(fnv(constants_table::fingerprint(surface), masses));
     let how = (refinement, table);
     // Writing to the hash cannot fail.
     let _ = write!(hash, "{:?}", (coarse, fine, anchor_law, held, most_awake, most_refined, how));

@@ -18,6 +18,7 @@ mod build;
 pub mod calibration;
 #[cfg(test)]
 mod checks;
+pub mod constants_table;
 pub mod energy;
 pub mod equilibrium;
 pub mod kernels;

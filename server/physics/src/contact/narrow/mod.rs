@@ -1,4 +1,4 @@
-//! The narrow phase: pressure and friction of one tool on the samples inside it.
+//! The narrow phase: pressure and friction of one tool on the samples inside it; friction itself is in [`super::friction`].
 //!
 //! A sample enters contact when the tool's surface passes over it from the outside, `n·(c − y) > 0` with the outward
 //! normal `n` and the nearest point `c` of the tool's axis; one that the tool reaches from behind (the far wall of a
@@ -6,28 +6,15 @@
 //! the normal nor the order of events can make the energy jump. A tool that is *put* into the surface (not moved there)
 //! presses nothing at first: its samples carry `k_f a (g − g₀)` from the depth `g₀` at which it was put, or the least
 //! depth since.
-//!
-//! Coulomb friction: every sample in contact has a tangential spring `e` (m) of stiffness `k_t = τ k_f a`, stretched by
-//! the sample's motion relative to the tool and cut at the cone:
-//! ```text
-//! e ← (I − n̂n̂ᵀ)(p − q)        p = y − c₀ from the tool's centre, q where the spring is at rest, n̂ = r/|r|, r = y − c
-//! e ← e · min(1, µ_f f_n / (k_t |e|))      slip; its heat k_t|e|·(cut length) ≥ 0
-//! f_t = −k_t e,  q ← p − e
-//! ```
-//! `q` is a point of the tool: where the tool turns (`R`), what is kept is `Rᵀq`, so that the spring is stretched by
-//! the motion of sample and tool relative to each other, `v + ω × p`.
 use super::{
     axis::Axis,
     broad::{Candidates, Triangles},
     foundation::{Foundation, SampleTables, TriangleSamples},
+    friction::FrictionSpring,
     local_torque::Levers,
     touching::{Touch, Touching},
 };
 use glam::{DQuat, DVec3};
-
-/// `τ`, the tangential over the normal stiffness of the foundation; Mindlin's ratio 2(1 − ν)/(2 − ν) is 0.71 at ν =
-/// 0.45 and 0.82 at 0.3. It may be at most 1, or the bound of the frequency fails.
-pub(super) const TANGENTIAL_RATIO: f64 = 0.75;
 
 /// One tool and the surface that it meets at one instant.
 #[derive(Debug, Clone, Copy)]
@@ -274,18 +261,14 @@ fn press_sample(
     pressed.contacts += u32::from(depth_m > 0.0);
     pressed.penetration_m = pressed.penetration_m.max(meeting.radius_m - distance_m);
 
-    let k_t = TANGENTIAL_RATIO * samples.stiffness_n_per_m;
-    let trial = (p - meeting.in_world(touch.spring_origin_m)).reject_from_normalized(normal);
-    let (stretch_m, limit_m) = (trial.length(), meeting.friction_coefficient * f_n / k_t);
-    let spring = if stretch_m > limit_m {
-        pressed.heat_j += k_t * limit_m * (stretch_m - limit_m);
-        trial * (limit_m / stretch_m)
-    } else {
-        pressed.sticking_n += f_n;
-        trial
-    };
-    touch.spring_origin_m = meeting.in_tool(p - spring);
-    normal * f_n - spring * k_t
+    let trial_m = (p - meeting.in_world(touch.spring_origin_m)).reject_from_normalized(normal);
+    let spring = FrictionSpring::stretched(trial_m, samples.stiffness_n_per_m, f_n, meeting.friction_coefficient);
+    match spring.heat_j {
+        Some(heat_j) => pressed.heat_j += heat_j,
+        None => pressed.sticking_n += f_n,
+    }
+    touch.spring_origin_m = meeting.in_tool(p - spring.stretch_m);
+    normal * f_n - spring.stretch_m * spring.stiffness_n_per_m
 }
 
 /// Returns the record of a sample, if it was inside before; skips those of samples that left.

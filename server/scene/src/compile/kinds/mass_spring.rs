@@ -25,7 +25,7 @@ use palpate_physics::{
         AnchorLaw, MassSpringSpec, Refinement, Refining, SpringSpec,
         anchor::Layer,
         body::triangles_about,
-        calibration::{Calibration, ConstantsTable},
+        constants_table::{Calibration, ConstantsTable},
         loop_scheme, matching,
         region::Constants,
         topology::{Triangulation, TriangulationError},

@@ -18,7 +18,7 @@ use super::{
     patch::KEPT,
     prestrain::PrestrainDecay,
     residual_element::ResidualElement,
-    running_metric::RunningMetric,
+    running_mass_matrix::RunningMassMatrix,
     state::room_for_cells,
 };
 use crate::settings::Precision;
@@ -56,7 +56,7 @@ pub(crate) struct RunningPatch {
     number_of_node: Vec<u32>,
     /// Coarse tets of which cells were taken.
     taken_from: Vec<u32>,
-    metric: RunningMetric,
+    mass_matrix: RunningMassMatrix,
     /// Displacements (m) of coarse nodes.
     node_displacements_m: Vec<DVec3>,
     /// Number of every particle among the points, [`NONE`] for one that is no point.
@@ -112,7 +112,7 @@ impl RunningPatch {
             prestrain_mark: 0,
             number_of_node: vec![0; hybrid.node_count()],
             taken_from: Vec::with_capacity(partition.residual_elements().len()),
-            metric: RunningMetric::new(hybrid, most_active),
+            mass_matrix: RunningMassMatrix::new(hybrid, most_active),
             node_displacements_m: vec![DVec3::ZERO; hybrid.node_count()],
             point_of: vec![NONE; partition.particle_count()],
             carries_of_cluster: vec![false; hybrid.clusters.clusters()],
@@ -124,13 +124,13 @@ impl RunningPatch {
     }
 
     /// Returns the mass matrix.
-    pub(crate) fn metric(&self) -> &RunningMetric {
-        &self.metric
+    pub(crate) fn mass_matrix(&self) -> &RunningMassMatrix {
+        &self.mass_matrix
     }
 
     /// Returns the mass matrix, to be solved with.
-    pub(crate) fn metric_mut(&mut self) -> &mut RunningMetric {
-        &mut self.metric
+    pub(crate) fn mass_matrix_mut(&mut self) -> &mut RunningMassMatrix {
+        &mut self.mass_matrix
     }
 
     /// Returns the number of sets of active particles that there have been.
@@ -257,7 +257,7 @@ impl RunningPatch {
             _ => {
                 self.lay_out(hybrid);
                 let points = self.points.iter().filter(|point| point.active != NONE);
-                self.metric.factorise(hybrid, points.map(|point| (point.particle, point.anchor)));
+                self.mass_matrix.factorise(hybrid, points.map(|point| (point.particle, point.anchor)));
             }
         }
     }

@@ -3,7 +3,7 @@ use super::*;
 use crate::{
     bodies::hybrid::{
         composite::PARTS,
-        metric::Metric,
+        mass_matrix::MassMatrix,
         patch::{Field, Patch},
         prestrain::{CellPrestrain, DECAY_S, ResidualPrestrain},
         testing::{Random, hybrid_ball_of, tissue},
@@ -95,25 +95,25 @@ fn running_patch_and_oracle_agree() {
                 assert!(difference_j.abs() <= 100.0 * bound.max(1e-9) * energy_j(0.0), "{found:?} {slope_w}");
                 assert_eq!(found.prestrain_j != 0.0, is_prestrained);
 
-                let metric = Metric::new(&hybrid.partition, &hybrid.masses, &set, &hybrid.free).unwrap();
+                let mass_matrix = MassMatrix::new(&hybrid.partition, &hybrid.masses, &set, &hybrid.free).unwrap();
                 let nodes = hybrid.node_count();
                 let mut accelerations = expected[..nodes].to_vec();
-                metric.accelerate(&hybrid.free, &mut accelerations);
-                let particles = expected[nodes..].iter().zip(metric.particle_kg()).map(|(f, m)| *f / *m);
+                mass_matrix.accelerate(&hybrid.free, &mut accelerations);
+                let particles = expected[nodes..].iter().zip(mass_matrix.particle_kg()).map(|(f, m)| *f / *m);
                 accelerations.extend(particles);
                 let mut found = expected.clone();
-                running.metric.accelerate(&mut found);
+                running.mass_matrix.accelerate(&mut found);
                 let worst = found.iter().zip(&accelerations).map(|(a, b)| a.distance(*b)).fold(0.0, f64::max);
                 assert!(worst < 1e-9 * largest(&accelerations), "{worst:e} of {:e}", largest(&accelerations));
                 let mut momenta = v.clone();
-                running.metric.momenta(&hybrid, &v, &mut momenta);
-                let of_nodes = metric.momenta(&v[..nodes]);
+                running.mass_matrix.momenta(&hybrid, &v, &mut momenta);
+                let of_nodes = mass_matrix.momenta(&v[..nodes]);
                 let worst = momenta.iter().zip(&of_nodes).map(|(a, b)| a.distance(*b)).fold(0.0, f64::max);
                 assert!(worst < 1e-12 * largest(&of_nodes), "{worst:e}");
                 // Gravity moves everything alike.
                 let mut weight = zero(&x);
-                running.metric.add_weight_n(DVec3::X, &mut weight);
-                running.metric.momenta(&hybrid, &vec![DVec3::X; x.len()], &mut momenta);
+                running.mass_matrix.add_weight_n(DVec3::X, &mut weight);
+                running.mass_matrix.momenta(&hybrid, &vec![DVec3::X; x.len()], &mut momenta);
                 let worst = weight.iter().zip(&momenta).map(|(a, b)| a.distance(*b)).fold(0.0, f64::max);
                 assert!(worst < 1e-12 * largest(&weight), "{worst:e}");
             }

@@ -1,5 +1,5 @@
 //! The coarse mass matrix `M'` as the loop runs it: factorised anew, without allocating, when other particles wake. Its
-//! oracle is `metric`.
+//! oracle is `mass_matrix`.
 use super::{
     body::{HybridBody, NO_WEIGHT},
     composite::Anchor,
@@ -18,7 +18,7 @@ use glam::{BVec3, DVec3};
 /// accelerations `a` of free nodes `f` and none of held ones `h`, `M'_ff a = f_f`; whatever holds the latter has to
 /// bear `M'_hf a`.
 #[derive(Debug, Clone)]
-pub(crate) struct RunningMetric {
+pub(crate) struct RunningMassMatrix {
     /// `(1 − ε) m_p` (kg) of active particles.
     particle_kg: Vec<f64>,
     /// Masses (kg) by which gravity pulls on coarse nodes: the row sums of `M'`.
@@ -59,7 +59,7 @@ fn inverse_per_kg(hybrid: &HybridBody, node: usize) -> DVec3 {
     DVec3::select(hybrid.free[node], DVec3::splat(1.0 / mass_kg), DVec3::ZERO)
 }
 
-impl RunningMetric {
+impl RunningMassMatrix {
     pub(super) fn new(hybrid: &HybridBody, most_active: usize) -> Self {
         let nodes = hybrid.node_count();
         let most_touched = (4 * most_active).min(nodes);
@@ -123,7 +123,7 @@ impl RunningMetric {
                 }
             }
         }
-        // Pivots are positive where no weight is negative (`metric`), which [`HybridBody::may_wake`] sees to.
+        // Pivots are positive where no weight is negative (`mass_matrix`), which [`HybridBody::may_wake`] sees to.
         let block_kg = Symmetric { entries: &self.block_kg, stride: size };
         self.factor.factorise(block_kg, self.free_rows, 1e-12);
     }

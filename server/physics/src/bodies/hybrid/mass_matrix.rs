@@ -52,7 +52,7 @@ impl Masses {
 
 /// The mass matrix `M'` for a set of active particles.
 #[derive(Debug, Clone)]
-pub struct Metric {
+pub struct MassMatrix {
     /// `(1 − ε) m_p` (kg) of active particles.
     particle_kg: Vec<f64>,
     /// `M_i` (kg).
@@ -73,7 +73,7 @@ pub struct NotPositive {
     pub node: u32,
 }
 
-impl Metric {
+impl MassMatrix {
     /// Factorises `M'` for a set of active particles; `free` tells along which axes each coarse node may move.
     ///
     /// # Errors
@@ -217,7 +217,7 @@ mod tests {
     /// A set of particles awake, in motion.
     struct Flight {
         patch: Patch,
-        metric: Metric,
+        mass_matrix: MassMatrix,
         x: Field,
         v: Field,
     }
@@ -225,20 +225,20 @@ mod tests {
     impl Flight {
         fn new(body: &TestBody, active: &BTreeSet<u32>, x: Vec<DVec3>, v: Vec<DVec3>) -> Self {
             let patch = Patch::new(&body.partition, active);
-            let metric = Metric::new(&body.partition, &body.masses, active, &body.free).unwrap();
+            let mass_matrix = MassMatrix::new(&body.partition, &body.masses, active, &body.free).unwrap();
             let follow = |nodes: Vec<DVec3>| Field { particles: patch.following(&body.partition, &nodes), nodes };
-            Self { x: follow(x), v: follow(v), patch, metric }
+            Self { x: follow(x), v: follow(v), patch, mass_matrix }
         }
 
         fn momentum(&self) -> (DVec3, DVec3) {
-            let mut momenta = self.metric.momenta(&self.v.nodes);
-            momenta.extend(self.metric.particle_kg().iter().zip(&self.v.particles).map(|(m, w)| *w * *m));
+            let mut momenta = self.mass_matrix.momenta(&self.v.nodes);
+            momenta.extend(self.mass_matrix.particle_kg().iter().zip(&self.v.particles).map(|(m, w)| *w * *m));
             let positions = self.x.nodes.iter().chain(&self.x.particles);
             (momenta.iter().sum(), positions.zip(&momenta).map(|(x, p)| x.cross(*p)).sum())
         }
 
         fn kinetic_j(&self) -> f64 {
-            self.metric.kinetic_j(&self.v.nodes, &self.v.particles)
+            self.mass_matrix.kinetic_j(&self.v.nodes, &self.v.particles)
         }
 
         /// Steps by leapfrog; returns the sum of elastic and kinetic energy (J).
@@ -258,11 +258,11 @@ mod tests {
 
         fn kick(&mut self, body: &TestBody, materials: &Materials<'_>, h_s: f64) {
             let (mut force, _) = self.patch.forces_n(materials, &self.x, &self.v);
-            self.metric.accelerate(&body.free, &mut force.nodes);
+            self.mass_matrix.accelerate(&body.free, &mut force.nodes);
             for (v, a) in self.v.nodes.iter_mut().zip(&force.nodes) {
                 *v += *a * h_s;
             }
-            for ((w, f), m) in self.v.particles.iter_mut().zip(&force.particles).zip(self.metric.particle_kg()) {
+            for ((w, f), m) in self.v.particles.iter_mut().zip(&force.particles).zip(self.mass_matrix.particle_kg()) {
                 *w += *f * (h_s / m);
             }
         }
@@ -305,13 +305,14 @@ mod tests {
     #[test]
     fn momenta_undo_accelerations() {
         for body in bodies() {
-            let metric = Metric::new(&body.partition, &body.masses, &some(&body, |p| p.y > 0.0), &body.free).unwrap();
+            let mass_matrix =
+                MassMatrix::new(&body.partition, &body.masses, &some(&body, |p| p.y > 0.0), &body.free).unwrap();
             let mut random = Random(12);
             let forces: Vec<DVec3> =
                 body.free.iter().map(|free| DVec3::select(*free, random.vector(), DVec3::ZERO)).collect();
             let mut accelerations = forces.clone();
-            metric.accelerate(&body.free, &mut accelerations);
-            for (p, f) in metric.momenta(&accelerations).iter().zip(&forces) {
+            mass_matrix.accelerate(&body.free, &mut accelerations);
+            for (p, f) in mass_matrix.momenta(&accelerations).iter().zip(&forces) {
                 assert!((*p - *f).length() < 1e-10, "{p} {f}");
             }
         }
