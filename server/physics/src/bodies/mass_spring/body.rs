@@ -142,7 +142,7 @@ impl MassSpringBody {
         // Vertices in a disc about each sample are awake; each vertex has the area √3/2 l².
         let each = model.spec().most_awake as f64 / axis_samples.iter().sum::<usize>().max(1) as f64;
         let awake_reach_m = edge_m * (each * 3.0_f64.sqrt() / (2.0 * std::f64::consts::PI)).sqrt();
-        let fingerprint = fingerprint(model.spec(), refinement, &table);
+        let fingerprint = fingerprint(model.spec(), refinement, table.as_ref());
         let boxes = SkinBoxes::default();
         Ok(Self { model, refinement, boxes, edge_m, axis_samples, awake_reach_m, table, fingerprint })
     }
@@ -242,7 +242,7 @@ impl MassSpringBody {
     }
 }
 
-fn fingerprint(spec: &SpringSpec, refinement: Option<Refinement>, table: &Option<ConstantsTable>) -> u64 {
+fn fingerprint(spec: &SpringSpec, refinement: Option<Refinement>, table: Option<&ConstantsTable>) -> u64 {
     let SpringSpec { surface, coarse, fine, anchor_law, mass_kg, held, most_awake, most_refined } = spec;
     let masses = mass_kg.iter().flat_map(|mass| mass.to_bits().to_le_bytes());
     let mut hash = Fnv(fnv(calibration::fingerprint(surface), masses));

@@ -151,7 +151,7 @@ mod tests {
                 match way {
                     Way::Anchor(anchor) => assert_eq!(found.anchor_n_per_m, anchor),
                     Way::Ratio(ratio) => {
-                        assert!((found.mesh_n_per_m / found.anchor_n_per_m / ratio - 1.0).abs() < 1e-12)
+                        assert!((found.mesh_n_per_m / found.anchor_n_per_m / ratio - 1.0).abs() < 1e-12);
                     }
                 }
             }
