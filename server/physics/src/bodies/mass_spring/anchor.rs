@@ -18,7 +18,7 @@ pub enum AnchorLaw {
     Linear,
     /// The law `g = u + c u³`.
     Cubic {
-        /// `c` (1/m²).
+        /// Constant `c` (1/m²).
         per_m2: f64,
     },
     /// Several layers that lie one behind the other ([`Layers`]).

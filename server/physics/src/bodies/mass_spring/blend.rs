@@ -243,7 +243,7 @@ mod tests {
     const OUTSIDE: Constants = Constants { mesh_n_per_m: 60.0, anchor_n_per_m: 40.0 };
     const INSIDE: Constants = Constants { mesh_n_per_m: 45.0, anchor_n_per_m: 22.0 };
 
-    /// The coarse surface's springs with what levels add, on all nodes that the surface refined has.
+    /// Returns the coarse surface's springs with those that levels add, on all nodes of the surface refined everywhere.
     fn blended(surface: &Triangulation, levels: &Levels) -> Net {
         let rest_m = refined(surface).0;
         let coarse = surface.edges().iter().map(|edge| {
@@ -295,7 +295,8 @@ mod tests {
         }
     }
 
-    /// Energy follows the levels without a step, while one region comes and another, which overlaps it, goes.
+    /// Energy follows the levels without a step, while one region is refined and another one that overlaps it is made
+    /// coarse.
     #[test]
     fn levels_go_over_smoothly_and_end_where_they_should() {
         let patch = hexagon(5, 0.03);

@@ -176,7 +176,7 @@ mod tests {
         testing::{hexagon, sphere},
     };
 
-    /// Rows of a net, in the order of its nodes.
+    /// Returns the rows of a net, in the order of its nodes.
     fn rows_of(net: &Net) -> SpringRows {
         let mut rows = SpringRows::with_room(net.rest_m.len(), 8);
         for node in 0..net.rest_m.len() as u32 {

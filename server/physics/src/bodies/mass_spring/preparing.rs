@@ -24,7 +24,7 @@ const STILL: f64 = 1e-6;
 const CONSTANTS_FOLLOW_S: f64 = 0.02;
 /// Distance that a tool moves, over the length of coarse edges, in which levels change completely, however slowly they
 /// change beneath a tool that stands still.
-const BLEND_WAY: f64 = 1.0;
+const BLEND_DISTANCE: f64 = 1.0;
 
 /// Buffers, which are allocated once.
 #[derive(Debug, Clone)]
@@ -90,7 +90,7 @@ impl SteppedMassSpring<'_> {
             tools.flat_map(|((tool, spec), samples)| tool.axis_samples(spec, samples.len()).zip(&own.about[samples]));
         let touching = samples.filter(|(_, about)| about.touched.is_some());
         let fastest_m_per_s = touching.map(|(sample, _)| sample.speed_m_per_s).fold(0.0, f64::max);
-        let rate_hz = |r: Refinement| r.blend_s.recip() + fastest_m_per_s / (BLEND_WAY * body.edge_m());
+        let rate_hz = |r: Refinement| r.blend_s.recip() + fastest_m_per_s / (BLEND_DISTANCE * body.edge_m());
         let step = body.refinement().map_or(1.0, |r| tick_period_s * rate_hz(r));
         let wanted = Wanted { refined: &own.refined, step, fine, awake: &own.awake };
         let nodes = AwakeNodes { x_m: x, v_m_per_s: v };

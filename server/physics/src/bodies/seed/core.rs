@@ -75,42 +75,42 @@ impl Core {
         })
     }
 
-    /// Its tets.
+    /// Returns the core's tets.
     pub fn mesh(&self) -> &TetMesh {
         &self.mesh
     }
 
-    /// Rest positions (m) of its nodes.
+    /// Returns the rest positions (m) of the nodes.
     pub fn rest_m(&self) -> &[DVec3] {
         self.mesh.positions_m()
     }
 
-    /// Lumped mass (kg) of its nodes.
+    /// Returns the lumped masses (kg) of the nodes.
     pub fn mass_kg(&self) -> &[f64] {
         &self.mass_kg
     }
 
-    /// 1/m (1/kg) of its nodes; 0 of held ones.
+    /// Returns the inverse masses `1/m` (1/kg) of the nodes, which are zero for held ones.
     pub fn inverse_mass_per_kg(&self) -> &[f64] {
         &self.inverse_mass_per_kg
     }
 
-    /// Its rest data, in the order of the tets.
+    /// Returns the rest data of the tets, in their order.
     pub fn rest_tets(&self) -> &[RestTet] {
         &self.rest_tets
     }
 
-    /// What it is made of.
+    /// Returns the material.
     pub fn material(&self) -> &Material {
         &self.material
     }
 
-    /// Its boundary, the walls of cavities included.
+    /// Returns the boundary, including the walls of cavities.
     pub fn boundary(&self) -> &Surface {
         &self.boundary
     }
 
-    /// The outer part of its boundary, as nodes, counter-clockwise seen from outside.
+    /// Returns the triangles of the outer part of the boundary as nodes, counter-clockwise seen from outside.
     pub fn outer_triangles(&self) -> &[[u32; 3]] {
         &self.outer_triangles
     }
