@@ -5,7 +5,7 @@ use crate::{
     hash::{Chain, Fnv},
     mesh::{Surface, TetMesh},
     settings::PrescribedSpec,
-    tick::{BodyKind, Energies, Environment, KindSpec, KindState, MaterialPoint, MechanicalState},
+    tick::{BodyKind, Energies, KindSpec, MaterialPoint, MechanicalState},
 };
 use glam::DVec3;
 use std::fmt::Write;
@@ -106,37 +106,5 @@ impl BodyKind for HybridBody {
 
     fn chain_inverse_mass(&self, _: &[PrescribedSpec], chain: &mut Chain) {
         chain.vectors(self.inverse_mass_per_kg());
-    }
-}
-
-impl KindState for HybridState {
-    type Body = HybridBody;
-
-    fn at_rest(body: &HybridBody, environment: &Environment) -> Self {
-        Self::at_rest(body, &environment.tools)
-    }
-
-    fn reset(&mut self, _: &HybridBody) {
-        self.clear();
-    }
-
-    fn copy_from(&mut self, other: &Self) {
-        self.copy_from(other);
-    }
-
-    fn fits(&self, body: &HybridBody, environment: &Environment, _: &MechanicalState) -> bool {
-        self.fits(body, &environment.tools)
-    }
-
-    fn chain(&self, chain: &mut Chain) {
-        self.chain(chain);
-    }
-
-    fn active_particles(&self) -> &[u32] {
-        self.ids()
-    }
-
-    fn wake_at_rest(&mut self, ids: &[u32], state: &mut MechanicalState) {
-        self.wake_at_rest(ids, state);
     }
 }

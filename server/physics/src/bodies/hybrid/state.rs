@@ -1,8 +1,11 @@
 //! The state of a hybrid body beside positions and velocities: which particles are active, their prestrain, and the
 //! transition force.
 use super::{body::HybridBody, long_steps::LongSteps, prestrain::PrestrainDecay, spec::Waking, switching::Ball};
-use crate::hash::Chain;
-use crate::{contact::ToolSpec, tick::MechanicalState};
+use crate::{
+    contact::ToolSpec,
+    hash::Chain,
+    tick::{Environment, KindState, MechanicalState},
+};
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
@@ -30,25 +33,6 @@ pub struct HybridState {
 }
 
 impl HybridState {
-    /// Makes the state of a body whose particles all sleep.
-    pub(crate) fn at_rest(body: &HybridBody, tools: &[ToolSpec]) -> Self {
-        let (most, positions) = (body.particles.most_active, body.most_positions());
-        Self {
-            ids: Vec::with_capacity(most),
-            next: Vec::with_capacity(most),
-            wanted: Vec::with_capacity(most),
-            balls: vec![None; axis_sample_counts(body, tools).sum()],
-            prestrain: PrestrainDecay::with_room(
-                room_for_cells(body, body.particles.most_active),
-                body.partition.residual_elements().len(),
-            ),
-            transition_force_n: Vec::with_capacity(positions),
-            given_j: 0.0,
-            switched_j: 0.0,
-            long_steps: LongSteps::with_room(body.node_count(), positions),
-        }
-    }
-
     /// Returns the active particles, ascending.
     pub fn ids(&self) -> &[u32] {
         &self.ids
@@ -93,83 +77,6 @@ impl HybridState {
         (cell as usize) < body.partition.cells().len() && body.partition.corners(cell as usize).iter().any(is_active)
     }
 
-    /// Lets all particles sleep, without allocating.
-    pub(crate) fn clear(&mut self) {
-        self.ids.clear();
-        self.next.clear();
-        self.wanted.clear();
-        self.balls.fill(None);
-        self.prestrain.clear();
-        self.transition_force_n.clear();
-        self.given_j = 0.0;
-        self.switched_j = 0.0;
-        self.long_steps.forget();
-    }
-
-    /// Adds all of the state to a hash.
-    pub(crate) fn chain(&self, chain: &mut Chain) {
-        for list in [&self.ids, &self.next, &self.wanted] {
-            chain.wholes(list);
-        }
-        chain.list(&self.balls, |chain, ball| {
-            chain.maybe(ball.as_ref(), |chain, ball| {
-                chain.vector(ball.rest_m);
-                chain.whole(u64::from(ball.away_ticks));
-            });
-        });
-        self.prestrain.chain(chain);
-        chain.vectors(&self.transition_force_n);
-        chain.real(self.given_j);
-        chain.real(self.switched_j);
-        self.long_steps.chain(chain);
-    }
-
-    pub(crate) fn copy_from(&mut self, other: &Self) {
-        self.ids.clone_from(&other.ids);
-        self.next.clone_from(&other.next);
-        self.wanted.clone_from(&other.wanted);
-        self.balls.clone_from(&other.balls);
-        self.prestrain.copy_from(&other.prestrain);
-        self.transition_force_n.clone_from(&other.transition_force_n);
-        self.given_j = other.given_j;
-        self.switched_j = other.switched_j;
-        self.long_steps.copy_from(&other.long_steps);
-    }
-
-    /// Returns whether a state read from a snapshot fits the body: particles are ascending, may wake and have room, and
-    /// all numbers are finite.
-    pub(crate) fn fits(&self, body: &HybridBody, tools: &[ToolSpec]) -> bool {
-        let (nodes, positions) = (body.node_count(), body.node_count() + self.ids.len());
-        let may_wake = |id: &u32| body.may_wake(*id);
-        let finite = |ball: &Ball| ball.rest_m.is_finite();
-        self.balls.len() == axis_sample_counts(body, tools).sum::<usize>()
-            && self.balls.iter().flatten().all(finite)
-            && self.prestrain.is_finite()
-            && [0, positions].contains(&self.transition_force_n.len())
-            && self.transition_force_n.iter().all(|force| force.is_finite())
-            && self.given_j.is_finite()
-            && self.switched_j.is_finite()
-            && self.long_steps.fit(nodes, positions)
-            && self.prestrain.is_sorted()
-            && self.prestrain.cells.iter().all(|prestrain| self.touches(body, prestrain.cell))
-            && self.prestrain.tets.iter().all(|prestrain| (prestrain.tet as usize) < body.coarse().tets().len())
-            && [&self.ids, &self.next, &self.wanted].into_iter().all(|list| {
-                list.len() <= body.particles.most_active && list.is_sorted_by(|a, b| a < b) && list.iter().all(may_wake)
-            })
-    }
-
-    /// Switches a body at rest to the given active particles; they must be no more than there is room for, and each
-    /// must be allowed to wake.
-    pub(crate) fn wake_at_rest(&mut self, ids: &[u32], state: &mut MechanicalState) {
-        self.ids.clear();
-        self.ids.extend_from_slice(ids);
-        self.next.clone_from(&self.ids);
-        self.wanted.clone_from(&self.ids);
-        for list in [&mut state.x, &mut state.v, &mut state.force_n, &mut state.external_n] {
-            list.resize(list.len() + ids.len(), DVec3::ZERO);
-        }
-    }
-
     /// Switches to the particles that are to be active next: what wakes starts where, and as fast as, it followed.
     /// `moved` is a buffer. Allocates nothing where there is room.
     pub(super) fn switch(&mut self, body: &HybridBody, state: &mut MechanicalState, moved: &mut Vec<DVec3>) {
@@ -191,6 +98,106 @@ impl HybridState {
         self.transition_force_n.clear();
         self.long_steps.forget();
         state.force_is_current = false;
+    }
+}
+
+impl KindState for HybridState {
+    type Body = HybridBody;
+
+    /// Makes the state of a body whose particles all sleep.
+    fn at_rest(body: &HybridBody, environment: &Environment) -> Self {
+        let (most, positions) = (body.particles.most_active, body.most_positions());
+        Self {
+            ids: Vec::with_capacity(most),
+            next: Vec::with_capacity(most),
+            wanted: Vec::with_capacity(most),
+            balls: vec![None; axis_sample_counts(body, &environment.tools).sum()],
+            prestrain: PrestrainDecay::with_room(
+                room_for_cells(body, body.particles.most_active),
+                body.partition.residual_elements().len(),
+            ),
+            transition_force_n: Vec::with_capacity(positions),
+            given_j: 0.0,
+            switched_j: 0.0,
+            long_steps: LongSteps::with_room(body.node_count(), positions),
+        }
+    }
+
+    /// Lets all particles sleep.
+    fn reset(&mut self, _: &HybridBody) {
+        self.ids.clear();
+        self.next.clear();
+        self.wanted.clear();
+        self.balls.fill(None);
+        self.prestrain.clear();
+        self.transition_force_n.clear();
+        self.given_j = 0.0;
+        self.switched_j = 0.0;
+        self.long_steps.forget();
+    }
+
+    fn copy_from(&mut self, other: &Self) {
+        self.ids.clone_from(&other.ids);
+        self.next.clone_from(&other.next);
+        self.wanted.clone_from(&other.wanted);
+        self.balls.clone_from(&other.balls);
+        self.prestrain.copy_from(&other.prestrain);
+        self.transition_force_n.clone_from(&other.transition_force_n);
+        self.given_j = other.given_j;
+        self.switched_j = other.switched_j;
+        self.long_steps.copy_from(&other.long_steps);
+    }
+
+    /// Particles have to be ascending, may wake and have room, and all numbers are finite.
+    fn fits(&self, body: &HybridBody, environment: &Environment, _: &MechanicalState) -> bool {
+        let (nodes, positions) = (body.node_count(), body.node_count() + self.ids.len());
+        let may_wake = |id: &u32| body.may_wake(*id);
+        let finite = |ball: &Ball| ball.rest_m.is_finite();
+        self.balls.len() == axis_sample_counts(body, &environment.tools).sum::<usize>()
+            && self.balls.iter().flatten().all(finite)
+            && self.prestrain.is_finite()
+            && [0, positions].contains(&self.transition_force_n.len())
+            && self.transition_force_n.iter().all(|force| force.is_finite())
+            && self.given_j.is_finite()
+            && self.switched_j.is_finite()
+            && self.long_steps.fit(nodes, positions)
+            && self.prestrain.is_sorted()
+            && self.prestrain.cells.iter().all(|prestrain| self.touches(body, prestrain.cell))
+            && self.prestrain.tets.iter().all(|prestrain| (prestrain.tet as usize) < body.coarse().tets().len())
+            && [&self.ids, &self.next, &self.wanted].into_iter().all(|list| {
+                list.len() <= body.particles.most_active && list.is_sorted_by(|a, b| a < b) && list.iter().all(may_wake)
+            })
+    }
+
+    fn chain(&self, chain: &mut Chain) {
+        for list in [&self.ids, &self.next, &self.wanted] {
+            chain.wholes(list);
+        }
+        chain.list(&self.balls, |chain, ball| {
+            chain.maybe(ball.as_ref(), |chain, ball| {
+                chain.vector(ball.rest_m);
+                chain.whole(u64::from(ball.away_ticks));
+            });
+        });
+        self.prestrain.chain(chain);
+        chain.vectors(&self.transition_force_n);
+        chain.real(self.given_j);
+        chain.real(self.switched_j);
+        self.long_steps.chain(chain);
+    }
+
+    fn active_particles(&self) -> &[u32] {
+        &self.ids
+    }
+
+    fn wake_at_rest(&mut self, ids: &[u32], state: &mut MechanicalState) {
+        self.ids.clear();
+        self.ids.extend_from_slice(ids);
+        self.next.clone_from(&self.ids);
+        self.wanted.clone_from(&self.ids);
+        for list in [&mut state.x, &mut state.v, &mut state.force_n, &mut state.external_n] {
+            list.resize(list.len() + ids.len(), DVec3::ZERO);
+        }
     }
 }
 

@@ -3,7 +3,7 @@ use super::{MassSpringBody, MassSpringSpec, MassSpringState};
 use crate::{
     hash::{Chain, Fnv},
     mesh::Surface,
-    tick::{BodyKind, Energies, Environment, KindSpec, KindState, MaterialPoint, MechanicalState},
+    tick::{BodyKind, Energies, KindSpec, MaterialPoint, MechanicalState},
 };
 use glam::DVec3;
 use std::fmt::Write;
@@ -74,37 +74,5 @@ impl BodyKind for MassSpringBody {
             chain.real(constants.anchor_n_per_m);
         }
         chain.wholes(&spec.held);
-    }
-}
-
-impl KindState for MassSpringState {
-    type Body = MassSpringBody;
-
-    fn at_rest(body: &MassSpringBody, _: &Environment) -> Self {
-        Self::at_rest(body)
-    }
-
-    fn reset(&mut self, body: &MassSpringBody) {
-        self.reset(body);
-    }
-
-    fn copy_from(&mut self, other: &Self) {
-        self.copy_from(other);
-    }
-
-    fn fits(&self, body: &MassSpringBody, _: &Environment, _: &MechanicalState) -> bool {
-        self.fits(body)
-    }
-
-    fn chain(&self, chain: &mut Chain) {
-        self.chain(chain);
-    }
-
-    fn awake_nodes(&self) -> Option<&[u32]> {
-        Some(&self.motion.ids)
-    }
-
-    fn refine_only(&mut self, body: &MassSpringBody, centres: &[u32], rings: u32) {
-        self.refine_only(body, centres, rings);
     }
 }

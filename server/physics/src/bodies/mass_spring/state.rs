@@ -12,7 +12,10 @@ use super::{
     motion::SpringMotion,
     region::Constants,
 };
-use crate::hash::Chain;
+use crate::{
+    hash::Chain,
+    tick::{Environment, KindState, MechanicalState},
+};
 use serde::{Deserialize, Serialize};
 
 /// Number of ticks that a tool has to be away before the surface is no longer refined about it.
@@ -125,9 +128,10 @@ impl About {
     }
 }
 
-impl MassSpringState {
-    /// Returns the state in which every triangle is coarse and every node at rest.
-    pub(crate) fn at_rest(body: &MassSpringBody) -> Self {
+impl KindState for MassSpringState {
+    type Body = MassSpringBody;
+
+    fn at_rest(body: &MassSpringBody, _: &Environment) -> Self {
         let spec = body.model().spec();
         let mut awake = Vec::with_capacity(spec.most_awake.min(body.model().vertices() as usize));
         if body.is_all_awake() {
@@ -144,8 +148,7 @@ impl MassSpringState {
         }
     }
 
-    /// Makes the state as [`Self::at_rest`] in the buffers it has.
-    pub(crate) fn reset(&mut self, body: &MassSpringBody) {
+    fn reset(&mut self, body: &MassSpringBody) {
         self.motion.reset(body.model());
         self.motion.fine = body.fine_at(0.0);
         self.about.fill(About::default());
@@ -158,22 +161,35 @@ impl MassSpringState {
         self.motion.ids.extend_from_slice(&self.awake);
     }
 
-    /// Refines `rings` rings around the vertices `centres` and nothing else, of a body that is refined by hand
-    /// ([`Refining::ByHand`]). As with tools, levels change from tick to tick. Triangles for which there is no room are
-    /// left out.
-    pub(crate) fn refine_only(&mut self, body: &MassSpringBody, centres: &[u32], rings: u32) {
-        let springs = body.model();
-        let known = centres.iter().copied().filter(|&vertex| vertex < springs.vertices()).collect::<Vec<_>>();
-        let (mut triangles, mut corners) = (Vec::new(), Vec::new());
-        let levels = self.motion.levels.triangles().len();
-        let most = springs.spec().most_refined.saturating_sub(levels);
-        around::rings_into(springs.surface(), &known, rings, most, &mut triangles, &mut corners);
-        self.refined.clear();
-        self.refined.extend_from_slice(&triangles);
+    fn copy_from(&mut self, other: &Self) {
+        self.motion.copy_from(&other.motion);
+        self.about.clone_from(&other.about);
+        self.forced.clone_from(&other.forced);
+        self.refined.clone_from(&other.refined);
+        self.awake.clone_from(&other.awake);
+        self.given_j = other.given_j;
     }
 
-    /// Adds all of the state to a hash.
-    pub(crate) fn chain(&self, chain: &mut Chain) {
+    fn fits(&self, body: &MassSpringBody, _: &Environment, _: &MechanicalState) -> bool {
+        let model = body.model();
+        let (vertices, triangles) = (model.vertices(), model.surface().triangles().len());
+        let ascending = |list: &[u32]| list.windows(2).all(|pair| pair[0] < pair[1]);
+        let known = |about: &About| about.touched.into_iter().chain(about.awake).all(|vertex| vertex < vertices);
+        let refined = ascending(&self.refined) && self.refined.last().is_none_or(|last| (*last as usize) < triangles);
+        let levels = self.motion.levels.triangles();
+        let entering = self.refined.iter().filter(|t| levels.binary_search_by_key(*t, |level| level.0).is_err());
+        refined
+            && self.given_j.is_finite()
+            && levels.len() + entering.count() <= model.spec().most_refined
+            && self.about.len() == body.axis_sample_count()
+            && self.about.iter().all(|about| known(about) && about.rings <= MOST_RINGS)
+            && self.forced.len() <= MOST_FORCED
+            && self.forced.iter().all(|vertex| *vertex < vertices)
+            && (!body.is_all_awake() || self.awake.iter().copied().eq(0..vertices))
+            && self.motion.fits(model, &self.awake)
+    }
+
+    fn chain(&self, chain: &mut Chain) {
         chain.wholes(&self.motion.ids);
         chain.list(self.motion.levels.triangles(), |chain, (triangle, progress)| {
             chain.whole(u64::from(*triangle));
@@ -194,36 +210,26 @@ impl MassSpringState {
         chain.real(self.given_j);
     }
 
-    /// Copies another state of the same body. Nothing is allocated.
-    pub(crate) fn copy_from(&mut self, other: &Self) {
-        self.motion.copy_from(&other.motion);
-        self.about.clone_from(&other.about);
-        self.forced.clone_from(&other.forced);
-        self.refined.clone_from(&other.refined);
-        self.awake.clone_from(&other.awake);
-        self.given_j = other.given_j;
+    fn awake_nodes(&self) -> Option<&[u32]> {
+        Some(&self.motion.ids)
     }
 
-    /// Returns whether this may be a state of a body.
-    pub(crate) fn fits(&self, body: &MassSpringBody) -> bool {
-        let model = body.model();
-        let (vertices, triangles) = (model.vertices(), model.surface().triangles().len());
-        let ascending = |list: &[u32]| list.windows(2).all(|pair| pair[0] < pair[1]);
-        let known = |about: &About| about.touched.into_iter().chain(about.awake).all(|vertex| vertex < vertices);
-        let refined = ascending(&self.refined) && self.refined.last().is_none_or(|last| (*last as usize) < triangles);
-        let levels = self.motion.levels.triangles();
-        let entering = self.refined.iter().filter(|t| levels.binary_search_by_key(*t, |level| level.0).is_err());
-        refined
-            && self.given_j.is_finite()
-            && levels.len() + entering.count() <= model.spec().most_refined
-            && self.about.len() == body.axis_sample_count()
-            && self.about.iter().all(|about| known(about) && about.rings <= MOST_RINGS)
-            && self.forced.len() <= MOST_FORCED
-            && self.forced.iter().all(|vertex| *vertex < vertices)
-            && (!body.is_all_awake() || self.awake.iter().copied().eq(0..vertices))
-            && self.motion.fits(model, &self.awake)
+    /// Refines `rings` rings around the vertices `centres` and nothing else, of a body that is refined by hand
+    /// ([`Refining::ByHand`]). As with tools, levels change from tick to tick. Triangles for which there is no room are
+    /// left out.
+    fn refine_only(&mut self, body: &MassSpringBody, centres: &[u32], rings: u32) {
+        let springs = body.model();
+        let known = centres.iter().copied().filter(|&vertex| vertex < springs.vertices()).collect::<Vec<_>>();
+        let (mut triangles, mut corners) = (Vec::new(), Vec::new());
+        let levels = self.motion.levels.triangles().len();
+        let most = springs.spec().most_refined.saturating_sub(levels);
+        around::rings_into(springs.surface(), &known, rings, most, &mut triangles, &mut corners);
+        self.refined.clear();
+        self.refined.extend_from_slice(&triangles);
     }
+}
 
+impl MassSpringState {
     /// Returns the number of nodes of type 2: the middles of edges that are not coarse.
     pub fn refined_nodes(&self, body: &MassSpringBody) -> usize {
         self.motion.ids.len() - self.motion.ids.partition_point(|id| *id < body.model().vertices())

@@ -1,6 +1,9 @@
 //! What a tick changes of a seed body beside what every body has.
-use super::{SeedModel, SeedState, region::Region, state::Motion};
-use crate::hash::Chain;
+use super::{SeedBody, SeedModel, SeedState, region::Region, state::Motion};
+use crate::{
+    hash::Chain,
+    tick::{Environment, KindState, MechanicalState},
+};
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
@@ -17,12 +20,27 @@ pub struct SeedBodyState {
 
 impl SeedBodyState {
     /// Returns the state at rest.
-    pub(crate) fn at_rest(model: &SeedModel) -> Self {
+    pub(super) fn of(model: &SeedModel) -> Self {
         Self { now: SeedState::at_rest(model), touched: None, awake: 0 }
     }
 
-    /// Brings the state back to rest in the buffers it has.
-    pub(crate) fn reset(&mut self, model: &SeedModel) {
+    /// Sets all velocities to zero.
+    pub(crate) fn stop(&mut self) {
+        for motion in [&mut self.now.core, &mut self.now.skin, &mut self.now.particles] {
+            motion.v.fill(DVec3::ZERO);
+        }
+    }
+}
+
+impl KindState for SeedBodyState {
+    type Body = SeedBody;
+
+    fn at_rest(body: &SeedBody, _: &Environment) -> Self {
+        Self::of(body.model())
+    }
+
+    fn reset(&mut self, body: &SeedBody) {
+        let model = body.model();
         self.now.core.rest(model.core().rest_m());
         self.now.skin.rest(model.surface_rest_m());
         self.now.particles.rest(&[]);
@@ -30,8 +48,28 @@ impl SeedBodyState {
         (self.touched, self.awake) = (None, 0);
     }
 
-    /// Adds all of the state to a hash.
-    pub(crate) fn chain(&self, chain: &mut Chain) {
+    fn copy_from(&mut self, other: &Self) {
+        let (own, from) = (&mut self.now, &other.now);
+        own.core.copy_from(&from.core);
+        own.skin.copy_from(&from.skin);
+        own.particles.copy_from(&from.particles);
+        (own.step, own.touched) = (from.step, from.touched);
+        (self.touched, self.awake) = (other.touched, other.awake);
+    }
+
+    /// Nodes have to be where everybody's positions and velocities say.
+    fn fits(&self, body: &SeedBody, _: &Environment, state: &MechanicalState) -> bool {
+        let model = body.model();
+        let Self { now, touched, awake } = self;
+        let same = |nodes: &[DVec3], of: [&[DVec3]; 2]| nodes.iter().eq(of.into_iter().flatten());
+        now.fits(model)
+            && same(&state.x, [&now.core.x, &now.skin.x])
+            && same(&state.v, [&now.core.v, &now.skin.v])
+            && touched.is_none_or(|triangle| (triangle as usize) < model.surface_triangles().len())
+            && *awake as usize == model.awake(now).map_or(0, Region::len)
+    }
+
+    fn chain(&self, chain: &mut Chain) {
         let triangle = |chain: &mut Chain, triangle: u32| chain.whole(u64::from(triangle));
         chain.whole(self.now.step);
         chain.maybe(self.now.touched, triangle);
@@ -47,43 +85,21 @@ impl SeedBodyState {
         chain.vectors(&v[..awake]);
     }
 
-    /// Copies another state of the same model. Nothing is allocated.
-    pub(crate) fn copy_from(&mut self, other: &Self) {
-        let (own, from) = (&mut self.now, &other.now);
-        own.core.copy_from(&from.core);
-        own.skin.copy_from(&from.skin);
-        own.particles.copy_from(&from.particles);
-        (own.step, own.touched) = (from.step, from.touched);
-        (self.touched, self.awake) = (other.touched, other.awake);
+    fn awake_particles(&self) -> usize {
+        self.awake as usize
     }
 
-    /// Sets all velocities to zero.
-    pub(crate) fn stop(&mut self) {
-        for motion in [&mut self.now.core, &mut self.now.skin, &mut self.now.particles] {
-            motion.v.fill(DVec3::ZERO);
-        }
+    fn awake_particles_m<'a>(&'a self, _: &'a MechanicalState) -> &'a [DVec3] {
+        &self.now.particles.x[..self.awake as usize]
     }
 
-    /// Returns whether the awake particles are finite. Nodes are checked where those of every kind of body are.
-    pub(crate) fn particles_are_finite(&self) -> bool {
+    fn is_finite(&self) -> bool {
         self.now.particles.is_finite(self.awake as usize)
     }
 
-    /// Returns whether this may be a state of a model whose nodes are at `x` (m) with the velocities `v` (m/s); it may
-    /// come from a snapshot.
-    pub(crate) fn fits(&self, model: &SeedModel, x: &[DVec3], v: &[DVec3]) -> bool {
-        let Self { now, touched, awake } = self;
-        let same = |nodes: &[DVec3], of: [&[DVec3]; 2]| nodes.iter().eq(of.into_iter().flatten());
-        now.fits(model)
-            && same(x, [&now.core.x, &now.skin.x])
-            && same(v, [&now.core.v, &now.skin.v])
-            && touched.is_none_or(|triangle| (triangle as usize) < model.surface_triangles().len())
-            && *awake as usize == model.awake(now).map_or(0, Region::len)
-    }
-
-    /// Returns all positions and velocities, for a check that they are finite.
-    pub(crate) fn vectors(&self) -> impl Iterator<Item = &DVec3> {
+    fn vectors(&self) -> Box<dyn Iterator<Item = &DVec3> + '_> {
         let SeedState { core, skin, particles, .. } = &self.now;
-        [core, skin, particles].into_iter().flat_map(|motion: &Motion| motion.x.iter().chain(&motion.v))
+        let all = [core, skin, particles].into_iter();
+        Box::new(all.flat_map(|motion: &Motion| motion.x.iter().chain(&motion.v)))
     }
 }

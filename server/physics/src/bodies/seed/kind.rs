@@ -8,7 +8,7 @@ use crate::{
     hash::{Chain, Fnv},
     mesh::TetMesh,
     settings::PrescribedSpec,
-    tick::{BodyKind, Energies, Environment, KindSpec, KindState, MechanicalState},
+    tick::{BodyKind, Energies, KindSpec, MechanicalState},
 };
 use glam::DVec3;
 use std::fmt::Write;
@@ -83,45 +83,5 @@ impl BodyKind for SeedBody {
 
     fn chain_inverse_mass(&self, _: &[PrescribedSpec], chain: &mut Chain) {
         chain.vectors(self.inverse_mass_per_kg());
-    }
-}
-
-impl KindState for SeedBodyState {
-    type Body = SeedBody;
-
-    fn at_rest(body: &SeedBody, _: &Environment) -> Self {
-        Self::at_rest(body.model())
-    }
-
-    fn reset(&mut self, body: &SeedBody) {
-        self.reset(body.model());
-    }
-
-    fn copy_from(&mut self, other: &Self) {
-        self.copy_from(other);
-    }
-
-    fn fits(&self, body: &SeedBody, _: &Environment, state: &MechanicalState) -> bool {
-        self.fits(body.model(), &state.x, &state.v)
-    }
-
-    fn chain(&self, chain: &mut Chain) {
-        self.chain(chain);
-    }
-
-    fn awake_particles(&self) -> usize {
-        self.awake as usize
-    }
-
-    fn awake_particles_m<'a>(&'a self, _: &'a MechanicalState) -> &'a [DVec3] {
-        &self.now.particles.x[..self.awake as usize]
-    }
-
-    fn is_finite(&self) -> bool {
-        self.particles_are_finite()
-    }
-
-    fn vectors(&self) -> Box<dyn Iterator<Item = &DVec3> + '_> {
-        Box::new(self.vectors())
     }
 }

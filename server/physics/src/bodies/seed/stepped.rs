@@ -13,7 +13,7 @@
 use super::{AtVertex, SeedBody, SeedBodyState, SeedContact, SeedModel, SeedScratch};
 use crate::{
     contact::ContactScratch,
-    tick::{Environment, Evaluation, MechanicalState, Stepped, Tick, touch_nodes},
+    tick::{Environment, Evaluation, KindState, MechanicalState, Stepped, Tick, touch_nodes},
 };
 use glam::DVec3;
 
@@ -41,7 +41,7 @@ impl SeedBodyScratch {
         Self {
             step: SeedScratch::new(seed),
             forces_n: Vec::with_capacity(seed.surface_rest_m().len()),
-            last_good: SeedBodyState::at_rest(seed),
+            last_good: SeedBodyState::of(seed),
         }
     }
 }
@@ -89,7 +89,7 @@ impl<'a> Stepped<'a> for SteppedSeed<'a> {
     }
 
     fn is_finite(&self) -> bool {
-        self.own.particles_are_finite()
+        self.own.is_finite()
     }
 }
 
