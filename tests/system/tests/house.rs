@@ -128,6 +128,40 @@ fn unsafe_stays_in_its_named_places() {
     }
 }
 
+/// Which kind a body is, is asked in the rooms of the kinds: `bodies` of the physics and of the daemon, `compile/kinds` of the scenes. Elsewhere
+/// only these do: implicit integrators are of tetrahedra alone, and the solver at rest and natural modes are of some kinds.
+#[test]
+fn the_kind_of_a_body_is_asked_in_its_rooms() {
+    let rooms = ["server/physics/src/bodies/", "server/daemon/src/bodies/", "server/scene/src/compile/kinds/"];
+    let allowed = [("server/physics/src/integrate/scheme.rs", 3), ("server/physics/src/statics/mod.rs", 3)];
+    let kinds = ["Tet", "Hybrid", "MassSpring", "Seed"];
+    let enumerations = ["Body", "BodySpec", "BodyState", "BodyScratch", "SteppedBody", "Kind"];
+    let variants = enumerations.iter().flat_map(|of| kinds.iter().map(move |kind| format!("{of}::{kind}")));
+    let accessors = ["tet", "hybrid", "mass_spring", "seed"]
+        .iter()
+        .flat_map(|kind| [format!("as_{kind}("), format!("as_{kind}_mut(")]);
+    let questions: Vec<String> = variants.chain(accessors).collect();
+    let product = |path: &&String| {
+        ["physics", "scene", "daemon"].iter().any(|name| path.starts_with(&format!("server/{name}/src/")))
+            && path.ends_with(".rs")
+            && !path.contains("/test")
+            && !path.ends_with("/tests.rs")
+            && !rooms.iter().any(|room| path.starts_with(room))
+    };
+    let mut found = Vec::new();
+    for path in tracked().iter().filter(product) {
+        let text = fs::read_to_string(root().join(path)).unwrap();
+        let end = text.find("#[cfg(test)]\nmod tests {").unwrap_or(text.len());
+        let asks = |line: &&str| questions.iter().any(|question| line.contains(question.as_str()));
+        let lines = text[..end].lines().filter(|line| !line.trim_start().starts_with("//")).filter(asks).count();
+        if lines > 0 {
+            found.push((path.clone(), lines));
+        }
+    }
+    let expected: Vec<(String, usize)> = allowed.map(|(path, lines)| (path.to_owned(), lines)).into();
+    assert_eq!(found, expected, "lines that ask for the kind of a body");
+}
+
 /// A folder of modules has its module's file inside, `mod.rs`: one style, and a folder is moved with all that it has.
 #[test]
 fn the_file_of_a_module_with_a_folder_is_in_the_folder() {
