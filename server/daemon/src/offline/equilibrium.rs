@@ -5,7 +5,7 @@ use super::{
     frames::Frames,
     interrupt::Interrupt,
     load,
-    probes::ProbeRows,
+    probe_rows::ProbeRows,
     summary::{Ending, SolveNumbers, Summary},
 };
 use crate::{bodies::served, progress::Progress};

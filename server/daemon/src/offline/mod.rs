@@ -9,7 +9,7 @@ mod folder;
 mod frames;
 mod interrupt;
 mod load;
-mod probes;
+mod probe_rows;
 pub mod schema;
 pub mod simulate;
 mod summary;

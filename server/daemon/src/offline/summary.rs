@@ -1,5 +1,5 @@
 //! What a run did, as JSON for programs and as lines for people.
-use super::{folder, probes::ProbeRows};
+use super::{folder, probe_rows::ProbeRows};
 use miette::{IntoDiagnostic, WrapErr};
 use palpate_physics::{Energies, Model, State, snapshot, world};
 use palpate_scene::{Scene, wording::counted};

@@ -1,4 +1,4 @@
-//! The registry of the kinds of body.
+//! The registry of the kinds of body. Scenes and the daemon have one each, too: `compile/kinds/mod.rs`, `bodies/mod.rs`.
 //!
 //! A kind has its own folder: what it is made from, what its rest state fixes, what a tick changes of it beside
 //! [`crate::tick::MechanicalState`], its buffers, and how it is stepped. It implements [`crate::tick::KindSpec`], [`crate::tick::BodyKind`],

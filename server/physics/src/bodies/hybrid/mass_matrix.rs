@@ -15,6 +15,8 @@
 //! ```
 //! It is positive definite, and diagonal but for a small dense block of the nodes that active particles follow, which
 //! is factorised when the set changes.
+//!
+//! Ticks use the same matrix as `running/mass_matrix.rs` has it; this one is its oracle, and what energies are counted by.
 use super::{partition::Partition, patch::KEPT};
 use glam::{BVec3, DVec3};
 use std::collections::BTreeSet;

@@ -23,7 +23,6 @@ pub mod prestrain;
 mod projection;
 pub mod residual_element;
 mod running;
-mod running_mass_matrix;
 mod scratch;
 pub mod sites;
 pub mod sizes;

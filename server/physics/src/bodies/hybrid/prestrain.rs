@@ -13,7 +13,8 @@
 //! inequality its energy is no more than theirs. Changes of the rest state are objective: they do not change momentum.
 //! The energy that the decay takes, `−ds/dt ∂U/∂s`, is booked in the ledger.
 //!
-//! Accelerations do not jump, either (`transition_force`).
+//! Which cell or part wakes or falls asleep with which prestrain is worked out in `state_transfer`. Accelerations do not
+//! jump, either (`transition_force`).
 use super::{
     cell::{MODE_WEIGHTS, RestCell},
     composite::PARTS,

@@ -18,7 +18,7 @@ use super::{
     composite::{Anchor, NODES},
     mass_matrix::Masses,
     partition::Partition,
-    running_mass_matrix::RunningMassMatrix,
+    running::RunningMassMatrix,
 };
 use glam::DVec3;
 

@@ -14,7 +14,7 @@
 //! prestrain (`prestrain`). The energy that both gave lately, beyond what they and switches took, is kept; where it is
 //! more than [`MOST_GIVEN`] of the elastic energy that switches lately changed, there is no transition force, and
 //! accelerations jump.
-use super::{body::HybridBody, patch::KEPT, prestrain, running_mass_matrix::RunningMassMatrix, state::HybridState};
+use super::{body::HybridBody, patch::KEPT, prestrain, running::RunningMassMatrix, state::HybridState};
 use crate::tick::MechanicalState;
 use glam::{BVec3, DMat3, DVec3};
 

@@ -5,8 +5,11 @@
 //! follow the coarse nodes.
 mod forces;
 mod layout;
+mod mass_matrix;
 #[cfg(test)]
 mod tests;
+
+pub(super) use mass_matrix::RunningMassMatrix;
 
 use super::kernels::{CellRow, CutCells, ResidualKernel, Room, RowKernel};
 use super::{
@@ -18,7 +21,6 @@ use super::{
     patch::KEPT,
     prestrain::PrestrainDecay,
     residual_element::ResidualElement,
-    running_mass_matrix::RunningMassMatrix,
     state::room_for_cells,
 };
 use crate::settings::Precision;

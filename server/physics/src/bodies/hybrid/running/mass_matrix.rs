@@ -1,14 +1,16 @@
 //! The coarse mass matrix `M'` as the loop runs it: factorised anew, without allocating, when other particles wake. Its
-//! oracle is `mass_matrix`.
-use super::{
-    body::{HybridBody, NO_WEIGHT},
-    composite::Anchor,
-    partition::NONE,
-    patch::KEPT,
-};
-use crate::lanes::{
-    dense::{Cholesky, Symmetric},
-    vector_operations,
+//! oracle is [`crate::bodies::hybrid::mass_matrix`].
+use crate::{
+    bodies::hybrid::{
+        body::{HybridBody, NO_WEIGHT},
+        composite::Anchor,
+        partition::NONE,
+        patch::KEPT,
+    },
+    lanes::{
+        dense::{Cholesky, Symmetric},
+        vector_operations,
+    },
 };
 use glam::{BVec3, DVec3};
 
@@ -60,7 +62,7 @@ fn inverse_per_kg(hybrid: &HybridBody, node: usize) -> DVec3 {
 }
 
 impl RunningMassMatrix {
-    pub(super) fn new(hybrid: &HybridBody, most_active: usize) -> Self {
+    pub(in crate::bodies::hybrid) fn new(hybrid: &HybridBody, most_active: usize) -> Self {
         let nodes = hybrid.node_count();
         let most_touched = (4 * most_active).min(nodes);
         let mut inverses_per_kg = Vec::with_capacity(nodes + most_active);
@@ -79,7 +81,11 @@ impl RunningMassMatrix {
     }
 
     /// Factorises the matrix of these active particles, given in order, each with what it follows. Allocates nothing.
-    pub(super) fn factorise(&mut self, hybrid: &HybridBody, followed: impl Iterator<Item = (u32, Anchor)> + Clone) {
+    pub(in crate::bodies::hybrid) fn factorise(
+        &mut self,
+        hybrid: &HybridBody,
+        followed: impl Iterator<Item = (u32, Anchor)> + Clone,
+    ) {
         for &node in &self.touched {
             self.row_of[node as usize] = NONE;
             self.weight_kg[node as usize] = hybrid.masses.node_kg[node as usize];
@@ -150,13 +156,13 @@ impl RunningMassMatrix {
     }
 
     /// Returns `(1 − ε) m_p` (kg) of the active particles.
-    pub(super) fn particle_kg(&self) -> &[f64] {
+    pub(in crate::bodies::hybrid) fn particle_kg(&self) -> &[f64] {
         &self.particle_kg
     }
 
     /// Returns the kinetic and gravitational energy (J) of coarse nodes and active particles, at positions
     /// `x` (m) and velocities `v` (m/s). `momenta` is a buffer.
-    pub(super) fn moving_j(
+    pub(in crate::bodies::hybrid) fn moving_j(
         &self,
         hybrid: &HybridBody,
         x: &[DVec3],
