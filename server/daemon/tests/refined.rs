@@ -2,10 +2,7 @@
 #![allow(clippy::unwrap_used, clippy::expect_used)]
 mod common;
 use common::{Daemon, PATIENCE, hybrid::hybrid_scene, pressed_scene, springs::springs_scene};
-use palpate_physics::{
-    bodies::mass_spring::{Triangulation, loop_scheme::refined},
-    snapshot,
-};
+use palpate_physics::{bodies::mass_spring::loop_scheme::refined, mesh::Triangulation, snapshot};
 use palpate_proto::v1::{self, surface_event::Message};
 use palpate_scene::Scene;
 use tokio::time::timeout;

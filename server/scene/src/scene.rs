@@ -6,8 +6,8 @@ use crate::{
 };
 use palpate_physics::{
     ModelSpec,
-    bodies::mass_spring::{region::Constants, topology::Triangulation},
-    mesh::quality::Quality,
+    bodies::mass_spring::region::Constants,
+    mesh::{Triangulation, quality::Quality},
 };
 use std::path::PathBuf;
 

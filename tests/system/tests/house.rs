@@ -134,12 +134,18 @@ fn unsafe_stays_in_its_named_places() {
 fn the_kind_of_a_body_is_asked_in_its_rooms() {
     let rooms = ["server/physics/src/bodies/", "server/daemon/src/bodies/", "server/scene/src/compile/kinds/"];
     let allowed = [("server/physics/src/integrate/scheme.rs", 3), ("server/physics/src/statics/mod.rs", 3)];
-    let kinds = ["Tet", "Hybrid", "MassSpring", "Seed"];
+    // A kind is a folder of `bodies`, in snake case; its variants are in camel case.
+    let folders: BTreeSet<String> = tracked()
+        .iter()
+        .filter_map(|path| path.strip_prefix(rooms[0])?.split_once('/').map(|(folder, _)| folder.to_owned()))
+        .collect();
+    assert!(folders.len() >= 4, "{folders:?}");
+    let camel =
+        |folder: &String| -> String { folder.split('_').map(|word| word[..1].to_uppercase() + &word[1..]).collect() };
+    let kinds: Vec<String> = folders.iter().map(camel).collect();
     let enumerations = ["Body", "BodySpec", "BodyState", "BodyScratch", "SteppedBody", "Kind"];
     let variants = enumerations.iter().flat_map(|of| kinds.iter().map(move |kind| format!("{of}::{kind}")));
-    let accessors = ["tet", "hybrid", "mass_spring", "seed"]
-        .iter()
-        .flat_map(|kind| [format!("as_{kind}("), format!("as_{kind}_mut(")]);
+    let accessors = folders.iter().flat_map(|kind| [format!("as_{kind}("), format!("as_{kind}_mut(")]);
     let questions: Vec<String> = variants.chain(accessors).collect();
     let product = |path: &&String| {
         ["physics", "scene", "daemon"].iter().any(|name| path.starts_with(&format!("server/{name}/src/")))

@@ -7,8 +7,9 @@ use super::{
 use glam::DVec3;
 use palpate_physics::{
     Model, State,
-    bodies::mass_spring::{MassSpringBody, Refinement, SpringMotion, region::Constants, topology::Edge},
+    bodies::mass_spring::{MassSpringBody, Refinement, SpringMotion, region::Constants},
     contact::is_inside,
+    mesh::triangulation::Edge,
 };
 use palpate_scene::wording::{counted, short};
 use std::sync::Arc;

@@ -27,11 +27,10 @@ use glam::DVec3;
 use palpate_physics::{
     Model,
     bodies::mass_spring::{
-        Triangulation,
         around::rings_into,
         loop_scheme::{Mask, apply, edge_mask, vertex_mask},
-        topology::Edge,
     },
+    mesh::triangulation::{Edge, Triangulation},
 };
 use palpate_proto::v1;
 use std::collections::BTreeSet;

@@ -1,6 +1,6 @@
 //! What a kind of body is: what it is built from, what its rest state fixes, what a tick changes of it, and how it is stepped.
 //!
-//! A kind implements these four traits in its folder (`bodies/<kind>/kind.rs`); `bodies/mod.rs` registers it. What only some kinds have is answered
+//! A kind implements these four traits in its folder (`kind.rs`, and `stepped.rs` for [`Stepped`]); `bodies/mod.rs` registers it. What only some kinds have is answered
 //! by a default here, which says what it means to have none.
 use super::{
     Energies, Environment, Evaluation, Judged, MaterialPoint, MechanicalState, PointForce, PrescribedNodes, Tick,
@@ -39,10 +39,10 @@ pub(crate) trait BodyKind {
     /// Lumped mass (kg) of every node.
     fn mass_kg(&self) -> &[f64];
 
-    /// Largest natural frequency (rad/s) at rest.
+    /// Largest natural frequency (rad/s) at rest with its constraints, or a bound on it: for people to read.
     fn max_natural_frequency_rad_per_s(&self) -> f64;
 
-    /// What the body holds now, beside the ledger's work and dissipation.
+    /// What the body holds now, with the ledger's work and dissipation. Held nodes that move have kinetic energy, too.
     fn energies(&self, gravity_m_per_s2: DVec3, own: &Self::State, state: &MechanicalState) -> Energies;
 
     /// Writes what it was built from into a hash, so that a state goes back only into the body it came from.
@@ -129,7 +129,7 @@ pub(crate) trait BodyKind {
         chain.vectors(&free_inverse_mass(self.mass_kg(), prescribed).unwrap_or_default());
     }
 
-    /// Adds what of its rest state no function that every body has tells.
+    /// Adds constants of its rest state that no function of this trait tells, to the hash by which runs are compared bit by bit.
     fn chain(&self, _: &mut Chain) {}
 }
 
@@ -147,7 +147,7 @@ pub(crate) trait KindState {
     /// Copies another state of the same body. Allocates nothing.
     fn copy_from(&mut self, other: &Self);
 
-    /// Whether it may be a state of a body, beside one of what every body has: for states that come from elsewhere.
+    /// Whether it may be a state of a body: for states that come from elsewhere. Lengths and numbers of [`MechanicalState`] were looked at.
     fn fits(&self, body: &Self::Body, environment: &Environment, state: &MechanicalState) -> bool;
 
     /// Adds all of it.
@@ -192,7 +192,8 @@ pub(crate) trait KindState {
 
 /// A body with its own state and buffers, while it is stepped.
 pub(crate) trait Stepped<'a> {
-    /// Works out the total force (N) at the present positions, and its external part.
+    /// Overwrites `external_n`, what contact, loads and injections do (N), and `force_n`, the sum of that, weight and internal forces, at the
+    /// present positions; `force_is_current` is true then. The integrator moves the positions.
     fn evaluate(
         &mut self,
         tick: &Tick<'_>,
@@ -201,10 +202,11 @@ pub(crate) trait Stepped<'a> {
         contact: &mut ContactScratch,
     );
 
-    /// Gives a half or whole kick of length `h_s` (s): `v ← (v e^{−c h/2} + h f/m) e^{−c h/2}` with the mass damping `c` (1/s), and books it.
+    /// Gives a half or whole kick of length `h_s` (s): `v ← (v e^{−c h/2} + h f/m) e^{−c h/2}` with the mass damping `c` (1/s), and books it: the work of
+    /// external forces and of what holds nodes, and what damping takes. [`super::lumped::LumpedMass`] does all of it for masses at nodes.
     fn kick(&mut self, environment: &Environment, state: &mut MechanicalState, h_s: f64, ends_long_step: bool);
 
-    /// The force (N) that holds a node on its prescribed axes: what the other forces lack.
+    /// The force (N) that holds a node on its prescribed axes, its weight included: what the other forces lack. Zero on free axes.
     fn reaction_n(&self, node: usize, state: &MechanicalState) -> DVec3;
 
     /// Comes before a tick: what is to wake or to fall asleep, to be refined or coarse, goes on its way. Allocates nothing.
@@ -221,7 +223,7 @@ pub(crate) trait Stepped<'a> {
         None
     }
 
-    /// The nodes that prescribed sets move; `None` where what they hold stands still.
+    /// The nodes that prescribed sets move, or only hold; `None` where no set may move any.
     fn prescribed_nodes(&self) -> Option<PrescribedNodes<'a>> {
         None
     }

@@ -21,7 +21,7 @@ use crate::{
 use glam::DVec3;
 use palpate_physics::{
     MeshError, Surface, TetMesh,
-    bodies::mass_spring::topology::{Triangulation, TriangulationError},
+    mesh::{Triangulation, TriangulationError},
 };
 
 /// A body before regions, materials and loads.

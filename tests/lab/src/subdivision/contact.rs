@@ -13,9 +13,9 @@ use palpate_physics::{
         matching,
         net::hexagonal_patch,
         region::Constants,
-        topology::{Triangulation, TriangulationError},
     },
     contact::{Coupling, ToolShape, ToolSpec, ToolTarget},
+    mesh::{Triangulation, TriangulationError},
     step,
 };
 use std::time::Instant;

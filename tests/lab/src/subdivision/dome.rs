@@ -1,11 +1,13 @@
 //! Figure 12: a hemisphere pressed at a vertex, coarse and with one and two rings refined, drawn side by side.
 use glam::DVec3;
-use palpate_physics::bodies::mass_spring::{
-    Refined, Region,
-    loop_scheme::refined,
-    matching::{Way, matched, point_force_n},
-    region::Constants,
-    topology::{Triangulation, TriangulationError},
+use palpate_physics::{
+    bodies::mass_spring::{
+        Refined, Region,
+        loop_scheme::refined,
+        matching::{Way, matched, point_force_n},
+        region::Constants,
+    },
+    mesh::{Triangulation, TriangulationError},
 };
 use std::{collections::BTreeMap, fmt::Write as _};
 use thiserror::Error;

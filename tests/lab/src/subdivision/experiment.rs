@@ -7,12 +7,15 @@
 //! its rim or close its cracks, have the new constants; rest lengths are those of the flat sheet.
 use glam::DVec3;
 use miette::{IntoDiagnostic, Result};
-use palpate_physics::bodies::mass_spring::{
-    Net, Refined, Region, Triangulation,
-    loop_scheme::refined,
-    matching::{Way, matched, point_force_n},
-    net::hexagonal_patch,
-    region::Constants,
+use palpate_physics::{
+    bodies::mass_spring::{
+        Net, Refined, Region,
+        loop_scheme::refined,
+        matching::{Way, matched, point_force_n},
+        net::hexagonal_patch,
+        region::Constants,
+    },
+    mesh::Triangulation,
 };
 
 /// `L` (m).

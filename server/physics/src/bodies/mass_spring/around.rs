@@ -1,5 +1,5 @@
 //! Triangles and vertices around given vertices, written into buffers of the loop. The oracle is [`super::Region`].
-use super::topology::{NONE, Triangulation};
+use super::triangulation::{NONE, Triangulation};
 
 /// Writes the triangles of `rings` rings about the vertices `centres` into `triangles`, ascending, as
 /// [`super::Region::rings`] has them, but at most `most` of them. A ring for which there is no room is left out; of the

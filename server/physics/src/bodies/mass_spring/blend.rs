@@ -19,7 +19,7 @@
 //! itself, so that regions may grow, shrink and overlap while they are blended.
 use super::{
     region::{Constants, Region},
-    topology::{NONE, Triangulation},
+    triangulation::{NONE, Triangulation},
 };
 use glam::DVec3;
 use serde::{Deserialize, Serialize};

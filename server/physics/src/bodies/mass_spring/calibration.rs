@@ -15,7 +15,7 @@ use super::{
     matching::{Way, matched, point_force_n},
     net::Net,
     region::{Refined, Region},
-    topology::{NONE, Triangulation, TriangulationError},
+    triangulation::{NONE, Triangulation, TriangulationError},
 };
 use glam::DVec3;
 use std::collections::BTreeMap;

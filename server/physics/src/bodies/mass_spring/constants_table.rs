@@ -3,7 +3,7 @@
 use super::{
     matching::NoMatch,
     region::Constants,
-    topology::{Triangulation, TriangulationError},
+    triangulation::{Triangulation, TriangulationError},
 };
 use crate::hash::{OFFSET, fnv};
 use glam::DVec3;

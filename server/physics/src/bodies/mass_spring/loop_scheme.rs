@@ -8,7 +8,7 @@
 //! ```
 //! The curvature of the limit surface is continuous, except at *extraordinary* vertices inside, whose `k` is not 6;
 //! there its tangent plane is continuous.
-use super::topology::{Edge, NONE, Triangulation};
+use super::triangulation::{Edge, NONE, Triangulation};
 use glam::DVec3;
 use std::f64::consts::TAU;
 

@@ -37,8 +37,8 @@ pub(crate) mod state;
 mod stepped;
 #[cfg(test)]
 pub(crate) mod testing;
-pub mod topology;
-mod topology_error;
+
+use crate::mesh::triangulation;
 
 pub use anchor::{AnchorLaw, AnchorLawError};
 pub use body::{MassSpringBody, MassSpringError, MassSpringSpec, Refinement, Refining};
@@ -50,4 +50,3 @@ pub(crate) use preparing::MassSpringScratch;
 pub use region::{Refined, Region};
 pub use state::MassSpringState;
 pub(crate) use stepped::SteppedMassSpring;
-pub use topology::{Triangulation, TriangulationError};

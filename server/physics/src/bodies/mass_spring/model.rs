@@ -13,7 +13,7 @@ use super::{
     anchor::AnchorLaw,
     loop_scheme::refined,
     region::Constants,
-    topology::{Triangulation, TriangulationError},
+    triangulation::{Triangulation, TriangulationError},
 };
 use glam::DVec3;
 use thiserror::Error;

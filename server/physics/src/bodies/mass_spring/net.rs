@@ -1,7 +1,7 @@
 //! Energy, forces and stiffness of mesh and anchor springs, written plainly. This is the oracle of the running springs.
 use super::{
     anchor::AnchorLaw,
-    topology::{Triangulation, TriangulationError},
+    triangulation::{Triangulation, TriangulationError},
 };
 use glam::DVec3;
 

@@ -1,5 +1,5 @@
 //! The place of each node of a surface in the lists of awake nodes, found without a search.
-use super::topology::NONE;
+use super::triangulation::NONE;
 
 /// A numbering of some nodes of a surface by places, in both directions.
 #[derive(Debug, Clone)]

@@ -6,7 +6,7 @@
 use super::{
     anchor::AnchorLaw,
     net::{Net, Spring},
-    topology::{NONE, Triangulation},
+    triangulation::{NONE, Triangulation},
 };
 use glam::DVec3;
 use serde::{Deserialize, Serialize};

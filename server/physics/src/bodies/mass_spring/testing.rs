@@ -1,6 +1,6 @@
 //! Surfaces and specifications for tests.
 #![allow(clippy::unwrap_used)]
-use super::{anchor::AnchorLaw, model::SpringSpec, region::Constants, topology::Triangulation};
+use super::{anchor::AnchorLaw, model::SpringSpec, region::Constants, triangulation::Triangulation};
 use glam::DVec3;
 
 /// Returns a flat patch of equilateral triangles of edge `edge_m` (m) in the plane z = 0: all vertices within `rings`

@@ -15,8 +15,8 @@ use palpate_physics::{
         constants_table::{Calibration, ConstantsTable},
         matching,
         region::Constants,
-        topology::Triangulation,
     },
+    mesh::Triangulation,
 };
 
 fn positive(at: &Where, key: &str, value: f64) -> Result<f64, Fault> {

@@ -23,13 +23,9 @@ use crate::{
 use glam::DVec3;
 use palpate_physics::{
     BodySpec, Settings, Surface,
-    bodies::mass_spring::{
-        MassSpringSpec, Refinement, Refining, SpringSpec,
-        body::triangles_about,
-        loop_scheme,
-        topology::{Triangulation, TriangulationError},
-    },
+    bodies::mass_spring::{MassSpringSpec, Refinement, Refining, SpringSpec, body::triangles_about, loop_scheme},
     contact::ToolSpec,
+    mesh::{Triangulation, TriangulationError},
 };
 use std::{collections::BTreeSet, path::Path};
 

@@ -1,5 +1,5 @@
-//! The topology of a triangle surface that springs are put on: edges, neighbours and boundaries.
-pub use super::topology_error::TriangulationError;
+//! The topology of a triangle surface: edges, neighbours and boundaries.
+pub use super::triangulation_error::TriangulationError;
 use glam::DVec3;
 use std::collections::BTreeMap;
 
