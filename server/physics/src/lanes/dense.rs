@@ -131,6 +131,11 @@ impl Pass for Solve<'_> {
     fn run<V: Vector<Scalar = f64>>(self) -> f64 {
         let Self { columns, inverse_pivots, right: [x, y, z] } = self;
         let blocks = x.len();
+        // A solve with a right-hand side that is not finite leaves NaN in the lanes beyond the last row, and 0 · NaN spreads.
+        let rows_in_last_block = inverse_pivots.len() - blocks.saturating_sub(1) * LANES;
+        for last in [&mut *x, &mut *y, &mut *z].into_iter().filter_map(|list| list.last_mut()) {
+            last[rows_in_last_block..].fill(0.0);
+        }
         let mut size_sq = 0.0;
         // L y = b
         for (column, inverse) in inverse_pivots.iter().enumerate() {
@@ -239,6 +244,30 @@ mod tests {
                 let right = lists.each_mut().map(Vec::as_mut_slice);
                 assert_eq!(run(set, Solve { columns, inverse_pivots, right }).to_bits(), size_sq.to_bits(), "{set:?}");
                 assert!((0..size).all(|row| other.get(row) == solved[row]), "{set:?}");
+            }
+        }
+    }
+
+    /// A press that went wrong once could not be repeated in smaller steps: NaN of the first attempt stayed in the lanes behind the last
+    /// row and made every later solution NaN.
+    #[test]
+    fn a_solve_does_not_remember_an_earlier_one_that_was_not_finite() {
+        let mut random = Random(9);
+        let mut factor = Cholesky::with_room(41);
+        for size in [1, 7, 8, 9, 23, 41] {
+            let (matrix, stride) = matrix(size, &mut random);
+            factor.factorise(Symmetric { entries: &matrix, stride }, size, 1e-12);
+            let right: Vec<DVec3> = (0..size).map(|_| random.vector()).collect();
+            let solve = |factor: &mut Cholesky| -> Vec<u64> {
+                right.iter().enumerate().for_each(|(row, b)| factor.put(row, *b));
+                factor.solve();
+                (0..size).flat_map(|row| factor.get(row).to_array()).map(f64::to_bits).collect()
+            };
+            let expected = solve(&mut factor);
+            for bad in [f64::NAN, f64::INFINITY, f64::MAX] {
+                (0..size).for_each(|row| factor.put(row, DVec3::splat(bad)));
+                factor.solve();
+                assert_eq!(solve(&mut factor), expected, "{size} {bad}");
             }
         }
     }
