@@ -94,6 +94,26 @@ fn the_map_names_only_what_exists() {
     assert!(missing.is_empty(), "ARCHITECTURE.md names what does not exist: {missing:?}");
 }
 
+/// Documents name source files by the end of their path; files move, and what is written about them stays behind.
+#[test]
+fn documents_name_only_source_files_that_exist() {
+    let paths = tracked();
+    let exists = |name: &str| paths.iter().any(|path| path == name || path.ends_with(&format!("/{name}")));
+    let (mut named, mut missing) = (0, Vec::new());
+    for document in paths.iter().filter(|path| path.ends_with(".md")) {
+        let text = fs::read_to_string(root().join(document)).unwrap();
+        let words = text.split('`').skip(1).step_by(2);
+        for word in words.filter(|word| word.ends_with(".rs") && !word.contains([' ', '<', '*', '\n'])) {
+            named += 1;
+            if !exists(word) {
+                missing.push(format!("{document}: {word}"));
+            }
+        }
+    }
+    assert!(named > 100, "only {named} files are named");
+    assert!(missing.is_empty(), "documents name what does not exist: {missing:#?}");
+}
+
 /// The reverse: every source folder and every crate's top-level file has its place on the map.
 #[test]
 fn every_module_is_on_the_map() {

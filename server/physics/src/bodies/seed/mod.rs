@@ -15,7 +15,7 @@
 //! | exchange between particles and core | 6.1 | `exchange.rs` |
 //! | links of the outer surface | 6.1 | `links.rs` |
 //! | the step Δt, Verlet | 33 | `step.rs`, `state.rs` |
-//! | as a body of the loop: tools press it | | `body.rs`, `integrate/seed_body.rs` |
+//! | as a body of the loop: tools press it | | `body.rs`, `stepped.rs` |
 //!
 //! | what cannot work as printed | smallest repair | where |
 //! |---|---|---|

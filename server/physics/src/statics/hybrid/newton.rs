@@ -1,7 +1,7 @@
 //! Newton's method for a hybrid body at one stage, its linear systems by preconditioned conjugate gradients.
 //!
 //! `K d = f` is solved until conjugate gradients find a direction in which `K` is not positive, or to a thousandth;
-//! either is a descent of the potential, along which a step is sought as for bodies of tets (`solve::newton`).
+//! either is a descent of the potential, along which a step is sought as for bodies of tets (`statics::newton`).
 use super::{
     awakened::Awakened,
     stage::{Forces, Line, Outer, Stage},
