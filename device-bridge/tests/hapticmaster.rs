@@ -128,15 +128,12 @@ fn poses_follow_the_arm_though_answers_come_in_pieces() {
         });
         Faults::set(&emulated.faults.split, split);
         let mut arm = opened(&emulated, apart);
-        let mut farthest_m = 0.0_f64;
-        press::follow(&mut arm, |reading, _| {
-            farthest_m = farthest_m.max(reading.motion.position_m.distance(emulated.position_m()));
-        });
+        let followed = press::followed(&mut arm, || emulated.position_m(), |_| ());
         let end = arm.read(0).unwrap();
         assert!(end.motion.position_m.distance(emulated.position_m()) < 1e-3, "{:?}", end.motion);
         assert!(emulated.position_m().x > 0.02 && emulated.requests() > 100);
         // It moves at up to 0.2 m/s: some milliseconds.
-        assert!(farthest_m < 5e-3, "{farthest_m}");
+        assert!(followed.farthest_m < 5e-3 + followed.late_m(), "{}, {}", followed.farthest_m, followed.late_m());
         assert!(end.measured_force_n.is_some());
     }
 }

@@ -231,16 +231,13 @@ fn poses_follow_the_arm() {
     let path = HandPath::new(keys_of.to_vec(), None).unwrap();
     let emulated = Emulated::new(Settings { path, ..Settings::default() });
     let mut arm = started(&emulated.keys()).unwrap();
-    let (mut farthest_m, mut way_m) = (0.0_f64, DVec3::ZERO);
-    press::follow(&mut arm, |reading, passed_s| {
-        farthest_m = farthest_m.max(reading.motion.position_m.distance(emulated.arm.position_m()));
-        way_m += passed_s * reading.motion.velocity_m_per_s;
-    });
+    let followed = press::followed(&mut arm, || emulated.arm.position_m(), |_| ());
     let end = arm.read(0).unwrap();
     assert!(end.motion.position_m.distance(emulated.arm.position_m()) < 1e-5, "{:?}", end.motion);
     assert!(emulated.arm.position_m().x > 0.029 && emulated.arm.frames() > 100);
-    assert!(farthest_m < 5e-3, "{farthest_m}");
-    assert!(way_m.distance(DVec3::X * 0.03) < 3e-3, "{way_m}");
+    assert!(followed.farthest_m < 5e-3 + followed.late_m(), "{}, {}", followed.farthest_m, followed.late_m());
+    let wrong_m = followed.way_m.distance(DVec3::X * 0.03);
+    assert!(wrong_m < 3e-3 + followed.late_m(), "{wrong_m}, {}", followed.late_m());
 }
 
 #[test]

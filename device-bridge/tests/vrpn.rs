@@ -134,24 +134,26 @@ fn poses_follow_the_arm_though_messages_come_in_pieces() {
     let orientation = DQuat::from_euler(glam::EulerRot::XYZ, 0.3, -0.2, 0.9);
     for (split, velocities, from_poses) in [(false, true, false), (true, true, true), (true, false, false)] {
         let emulated = emulator(|settings| {
-            let keys = [(0.0, 0.0), (0.3, 0.03)].map(|(time_s, x)| Keyframe { time_s, position_m: DVec3::X * x });
+            // The arm waits until enough poses came to believe the server's clock.
+            let keys = [(0.0, 0.0), (0.25, 0.0), (0.55, 0.03)];
+            let keys = keys.map(|(time_s, x)| Keyframe { time_s, position_m: DVec3::X * x });
             settings.path = HandPath::new(keys.to_vec(), None).unwrap();
             (settings.velocities, settings.orientation) = (velocities, orientation);
         });
         Faults::set(&emulated.faults.split, split);
         let mut arm = started(&VrpnConfig { velocity_from_poses: from_poses, ..keys(&emulated) }).unwrap();
-        let (mut farthest_m, mut way_m) = (0.0_f64, DVec3::ZERO);
         let first_m = arm.read(0).unwrap().motion.position_m;
-        press::follow(&mut arm, |reading, passed_s| {
-            farthest_m = farthest_m.max(reading.motion.position_m.distance(emulated.position_m()));
-            way_m += passed_s * reading.motion.velocity_m_per_s;
-            assert!(reading.motion.orientation.angle_between(orientation) < 1e-6);
-        });
+        let followed = press::followed(
+            &mut arm,
+            || emulated.position_m(),
+            |reading| assert!(reading.motion.orientation.angle_between(orientation) < 1e-6),
+        );
         let end = arm.read(0).unwrap();
         assert!(end.motion.position_m.distance(emulated.position_m()) < 1e-4, "{:?}", end.motion);
         assert!(emulated.position_m().x > 0.02 && emulated.fields() > 100 && emulated.pongs() > 2);
-        assert!(farthest_m < 5e-3, "{farthest_m}");
-        assert!((first_m + way_m).distance(end.motion.position_m) < 3e-3, "{way_m}, {:?}", end.motion);
+        assert!(followed.farthest_m < 5e-3 + followed.late_m(), "{}, {}", followed.farthest_m, followed.late_m());
+        let wrong_m = (first_m + followed.way_m).distance(end.motion.position_m);
+        assert!(wrong_m < 3e-3 + followed.late_m(), "{wrong_m}, {}, {:?}", followed.late_m(), end.motion);
         assert!(end.motion.velocity_m_per_s.length() < 5e-3, "{:?}", end.motion);
     }
 }

@@ -137,16 +137,46 @@ pub fn follow(arm: &mut dyn Arm, mut look: impl FnMut(&Reading, f64)) {
     }
 }
 
-/// Follows an arm that is at `position_m`: how far (m) from there it said to be at most, and the way (m) that its velocities make.
+/// What following an arm showed.
+pub struct Followed {
+    /// How far from the arm its readings were at most, m.
+    pub farthest_m: f64,
+    /// The way that the velocities of all readings make, m.
+    pub way_m: DVec3,
+    /// The longest time for which nothing new came while the arm moved, s.
+    pub silent_s: f64,
+}
+
+impl Followed {
+    /// The way (m) that the arm makes at its fastest in that time. Both lengths above may be wrong by as much: a machine that
+    /// is busy stops the arm's thread or this one for tens of milliseconds, and a velocity then stands for a time in which it
+    /// was another.
+    pub fn late_m(&self) -> f64 {
+        FASTEST_M_PER_S * self.silent_s
+    }
+}
+
+/// The hand of these tests moves no faster, m/s.
+const FASTEST_M_PER_S: f64 = 0.2;
+
+/// Follows an arm that is at `position_m`; `look` sees every reading.
 ///
 /// One velocity says nothing where a busy machine tells lines late; all together make the way.
-pub fn followed(arm: &mut dyn Arm, position_m: impl Fn() -> DVec3) -> (f64, DVec3) {
+pub fn followed(arm: &mut dyn Arm, position_m: impl Fn() -> DVec3, mut look: impl FnMut(&Reading)) -> Followed {
     let (mut farthest_m, mut way_m) = (0.0_f64, DVec3::ZERO);
+    let (mut silent_s, mut moved_at, mut last_m) = (0.0_f64, None, None);
     follow(arm, |reading, passed_s| {
-        farthest_m = farthest_m.max(reading.motion.position_m.distance(position_m()));
+        let at_m = reading.motion.position_m;
+        farthest_m = farthest_m.max(at_m.distance(position_m()));
         way_m += passed_s * reading.motion.velocity_m_per_s;
+        silent_s = silent_s.max(passed_s);
+        if last_m.replace(at_m).is_some_and(|last_m| last_m != at_m) {
+            let before = moved_at.replace(Instant::now());
+            silent_s = silent_s.max(before.map_or(0.0, |before| before.elapsed().as_secs_f64()));
+        }
+        look(reading);
     });
-    (farthest_m, way_m)
+    Followed { farthest_m, way_m, silent_s }
 }
 
 /// Puts a force on an arm for 30 ticks.

@@ -2,6 +2,7 @@
 use super::{
     payload::{self, Pose, Velocity},
     peer::Kind,
+    wire::Time,
 };
 use crate::device::Fault;
 use glam::DVec3;
@@ -31,6 +32,9 @@ pub struct Heard {
     /// Since the velocity.
     poses: u32,
     is_new: bool,
+    /// When the message that is being taken was made.
+    time: Time,
+    pose_time: Time,
     buttons: u32,
     force_n: Option<DVec3>,
     /// Names under which an answer is asked for, bit i for name i.
@@ -41,7 +45,13 @@ impl Heard {
     /// Nothing yet.
     pub fn new(senders: Senders) -> Self {
         let (pose, velocity, force_n) = (None, None, None);
-        Self { senders, pose, velocity, poses: 0, is_new: false, buttons: 0, force_n, pings: 0 }
+        let (time, pose_time) = (Time::default(), Time::default());
+        Self { senders, pose, velocity, poses: 0, is_new: false, time, pose_time, buttons: 0, force_n, pings: 0 }
+    }
+
+    /// The messages that are taken from now on were made then, by the server's clock.
+    pub fn made_at(&mut self, time: Time) {
+        self.time = time;
     }
 
     /// A message.
@@ -58,6 +68,7 @@ impl Heard {
                 if pose.sensor == sensor {
                     self.pose = Some(pose);
                     self.is_new = true;
+                    self.pose_time = self.time;
                     self.poses = self.poses.saturating_add(1);
                 }
             }
@@ -92,6 +103,11 @@ impl Heard {
         self.pose.filter(|_| std::mem::take(&mut self.is_new))
     }
 
+    /// When the newest pose was made, by the server's clock.
+    pub fn pose_time(&self) -> Time {
+        self.pose_time
+    }
+
     /// The velocity that goes with the pose, as long as the server sends some.
     pub fn velocity(&self) -> Option<Velocity> {
         self.velocity.filter(|_| self.poses < POSES_A_VELOCITY_LASTS)
@@ -116,7 +132,7 @@ impl Heard {
 #[cfg(test)]
 mod tests {
     use super::{super::peer::Peer, super::wire::Outgoing, *};
-    use crate::device::vrpn::{peer, wire::Time};
+    use crate::device::vrpn::peer;
     use glam::DQuat;
     use proptest::prelude::*;
 

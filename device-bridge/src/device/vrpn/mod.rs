@@ -9,6 +9,7 @@
 pub mod heard;
 pub mod payload;
 pub mod peer;
+pub mod sender_clock;
 pub mod start;
 pub mod wire;
 
@@ -18,6 +19,7 @@ use heard::Heard;
 use palpate_control::{Motion, Velocity, extrapolate};
 use payload::{ForceField, Pose};
 use peer::{Kind, Peer};
+use sender_clock::SenderClock;
 use start::StartError;
 use std::{
     io::{ErrorKind, Read as _, Write as _},
@@ -73,6 +75,7 @@ pub struct Vrpn {
     silence_periods: u64,
     /// Rates of x, y and z (m/s), for a server that sends none.
     rates: [Velocity; 3],
+    sender_clock: SenderClock,
     motion: Motion,
     force_n: DVec3,
     /// Since the newest pose came.
@@ -103,6 +106,7 @@ impl Vrpn {
             silence_periods: (settings.silence.as_secs_f64() / period_s).ceil() as u64,
             // Poses are told at ticks.
             rates: std::array::from_fn(|_| Velocity::new(settings.position_step_m, period_s)),
+            sender_clock: SenderClock::default(),
             motion: Motion::at(DVec3::ZERO),
             force_n: DVec3::ZERO,
             quiet_periods: 0,
@@ -116,8 +120,9 @@ impl Vrpn {
         Ok(arm)
     }
 
-    /// A new pose, `passed_s` after the one before.
-    fn renew(&mut self, pose: &Pose, passed_s: f64) {
+    /// A new pose, which came `arrived_s` after the one before.
+    fn renew(&mut self, pose: &Pose, arrived_s: f64) {
+        let passed_s = self.sender_clock.passed_s(self.heard.pose_time(), arrived_s);
         let mut rates = DVec3::ZERO;
         for axis in 0..3 {
             rates[axis] = self.rates[axis].push(pose.position_m[axis], passed_s);
@@ -143,9 +148,9 @@ impl Vrpn {
             start::hear(&mut self.peer, &mut self.heard)?;
         }
         if let Some(pose) = self.heard.new_pose() {
-            let passed_s = self.quiet_periods as f64 * self.period_s;
+            let arrived_s = self.quiet_periods as f64 * self.period_s;
             self.quiet_periods = 0;
-            self.renew(&pose, passed_s);
+            self.renew(&pose, arrived_s);
         }
         // A server that hears nothing holds an old force.
         let is_silent = self.quiet_periods.max(self.unsent_periods) > self.silence_periods;

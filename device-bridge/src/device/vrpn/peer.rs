@@ -76,6 +76,8 @@ pub struct Told {
     pub sender: usize,
     /// Its type.
     pub kind: Kind,
+    /// When it was made, by the clock of its sender.
+    pub time: Time,
     payload: Range<usize>,
 }
 
@@ -108,7 +110,7 @@ impl Peer {
             if matches!(kind, wire::SENDER_DESCRIPTION | wire::TYPE_DESCRIPTION) {
                 self.learn(&header, payload)?;
             } else if let (Some(sender), Some(kind)) = (known(&self.senders, sender), known(&self.kinds, kind)) {
-                return Ok(Some(Told { sender, kind: Kind::ALL[kind], payload }));
+                return Ok(Some(Told { sender, kind: Kind::ALL[kind], time: header.time, payload }));
             }
         }
         Ok(None)
