@@ -149,10 +149,12 @@ impl Inverse3 {
     }
 }
 
-/// A stream whose bytes go one by one when they are to be split.
+/// A stream whose bytes go one by one when they are to be split and it is open: a handshake in hundreds of pieces is taken for
+/// an attack.
 struct Splitting {
     stream: TcpStream,
     faults: Arc<Faults>,
+    is_open: bool,
 }
 
 impl Read for Splitting {
@@ -163,7 +165,7 @@ impl Read for Splitting {
 
 impl Write for Splitting {
     fn write(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
-        let most = if Faults::is(&self.faults.split) { 1 } else { bytes.len() };
+        let most = if self.is_open && Faults::is(&self.faults.split) { 1 } else { bytes.len() };
         self.stream.write(&bytes[..most])
     }
 
@@ -179,8 +181,9 @@ impl Server<'_> {
         stream.set_nonblocking(false)?;
         stream.set_nodelay(true)?;
         stream.set_read_timeout(Some(Duration::from_secs(2)))?;
-        let splitting = Splitting { stream, faults: Arc::clone(&self.0.faults) };
+        let splitting = Splitting { stream, faults: Arc::clone(&self.0.faults), is_open: false };
         let mut socket = tungstenite::accept(splitting).map_err(|_| Error::ConnectionClosed)?;
+        socket.get_mut().is_open = true;
         socket.get_ref().stream.set_read_timeout(Some(LOOK_EVERY))?;
         let first = self.0.machine().state(true);
         self.say(&mut socket, &first)?;
