@@ -37,6 +37,13 @@ fn springs() {
     passes("springs");
 }
 
+/// Rigid tools are known to go into bodies; nothing else is.
+#[test]
+fn presses() {
+    let outcome = outcome("presses", 1);
+    assert!(!outcome.surprises(), "{}", outcome.reason());
+}
+
 #[test]
 fn activation() {
     passes("activation");

@@ -46,6 +46,8 @@ pub(super) struct Foundation {
     sample_stiffness_n_per_m: Vec<f64>,
     /// `k_f` (Pa/m) of every triangle.
     stiffness_pa_per_m: Vec<f64>,
+    /// Area (m²) of every triangle at rest.
+    rest_m2: Vec<f64>,
     /// Indentation modulus `E/(1 − ν²)` (Pa) of every triangle.
     indentation_modulus_pa: Vec<f64>,
     /// Number of all samples.
@@ -74,6 +76,10 @@ pub(super) struct TriangleSamples<'a> {
     pub(super) first: u32,
     /// `k_f a` (N/m) of each sample.
     pub(super) stiffness_n_per_m: f64,
+    /// `φ`, by which pressure is stiffer where the triangle is stretched (see [`super::stretched_area`]).
+    pub(super) area_factor: f64,
+    /// Area (m²) of the triangle at rest.
+    pub(super) rest_m2: f64,
     /// `k_f` (Pa/m).
     pub(super) foundation_pa_per_m: f64,
     /// `E/(1 − ν²)` (Pa).
@@ -121,6 +127,7 @@ impl Foundation {
             first_sample: Vec::with_capacity(count),
             sample_stiffness_n_per_m: Vec::with_capacity(count),
             stiffness_pa_per_m: Vec::with_capacity(count),
+            rest_m2: Vec::with_capacity(count),
             indentation_modulus_pa: Vec::with_capacity(count),
             samples: 0,
             typical_pa_per_m: 0.0,
@@ -141,6 +148,7 @@ impl Foundation {
             built.first_sample.push(built.samples as u32);
             built.sample_stiffness_n_per_m.push(k_f * area_m2 / (n * n) as f64);
             built.stiffness_pa_per_m.push(k_f);
+            built.rest_m2.push(area_m2);
             built.indentation_modulus_pa.push(moduli.indentation_pa);
             built.samples += n * n;
             softest_pa = softest_pa.min(moduli.p_wave_pa);
@@ -156,6 +164,8 @@ impl Foundation {
             weights: &tables.tables[self.level[triangle] as usize],
             first: self.first_sample[triangle],
             stiffness_n_per_m: self.sample_stiffness_n_per_m[triangle],
+            area_factor: 1.0,
+            rest_m2: self.rest_m2[triangle],
             foundation_pa_per_m: self.stiffness_pa_per_m[triangle],
             indentation_modulus_pa: self.indentation_modulus_pa[triangle],
         }

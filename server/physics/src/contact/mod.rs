@@ -19,6 +19,7 @@ mod resting;
 mod spring;
 mod state;
 mod stepping;
+mod stretched_area;
 mod tangent;
 mod tool;
 mod touched;
@@ -123,6 +124,13 @@ struct ToolScratch {
     coupling_sum_nm: DVec3,
     /// Triangle, as the broad phase numbers them, that was nearest to the tool when it was pressed last.
     nearest: usize,
+}
+
+impl ContactScratch {
+    /// Returns the largest factor by which the foundation was stiffer than at rest in the tick so far, 1 or more.
+    pub(crate) fn most_stiffened(&self) -> f64 {
+        self.tools.iter().map(|tool| tool.sum.most_stiffened).fold(1.0, f64::max)
+    }
 }
 
 impl ToolModel {

@@ -1,14 +1,22 @@
 //! Contact at rest: the foundation's potential, force and stiffness, without friction or history.
 //!
-//! `Φ = ½ Σ_s k_f a_s g_s²`, `g = R − |r|`, `r = y − c` (see [`super::foundation`]). With `n̂ = r/|r|`:
-//! `−∂Φ/∂y = k g n̂ = ∂Φ/∂c`, `∂²Φ/∂r² = H = k n̂n̂ᵀ − k (g/|r|)(I − n̂n̂ᵀ)`; nodes get both through the weights ζ, so
-//! that with `w = (ζ, −1)` on (nodes, tool) the force is `−w ⊗ ∂Φ/∂r` and the stiffness `w wᵀ ⊗ H`.
+//! With `W = ½ Σ_s k_f a_s g_s²` of a triangle, `g = R − |r|`, `r = y − c` (see [`super::foundation`]), and `n̂ = r/|r|`:
+//! `−∂W/∂y = k g n̂ = ∂W/∂c`, `∂²W/∂r² = H = k n̂n̂ᵀ − k (g/|r|)(I − n̂n̂ᵀ)`; nodes get both through the weights ζ, so
+//! that with `w = (ζ, −1)` on (nodes, tool) the gradient is `w ⊗ ∂W/∂r` and the stiffness `w wᵀ ⊗ H`. The potential
+//! counts the area of a stretched triangle (see [`super::stretched_area`]), with `r = A/A₀`:
+//! ```text
+//! Φ = φ(r) W        ∂Φ = φ ∂W + φ' W ∂r        ∂²Φ = φ ∂²W + φ' (∂r ∂Wᵀ + ∂W ∂rᵀ) + W (φ'' ∂r ∂rᵀ + φ' ∂²r)
+//! ```
 //!
 //! A *configuration* holds the positions of all nodes, then the centres of all tools.
 //!
 //! Which samples a tool may press is settled where it arrives: those whose outward side it is on, and of those inside
 //! it before, the ones it pressed then. So the potential is one smooth function while equilibrium is sought.
-use super::ContactModel;
+use super::{
+    ContactModel,
+    stretched_area::{AreaFactor, TriangleArea},
+};
+use crate::linalg::tensor::outer;
 use glam::{DMat3, DVec3};
 
 /// Contact at rest: which samples each tool may press.
@@ -33,8 +41,6 @@ pub(crate) struct Pressing {
 
 /// A sample inside a sphere.
 struct PressedSample {
-    tool: usize,
-    triangle: usize,
     weights: [f64; 3],
     /// `k_f a` (N/m).
     stiffness_n_per_m: f64,
@@ -42,6 +48,42 @@ struct PressedSample {
     depth_m: f64,
     distance_m: f64,
     normal: DVec3,
+}
+
+/// A triangle with samples inside a sphere.
+struct PressedTriangle<'a> {
+    tool: usize,
+    nodes: [u32; 3],
+    /// How its area counts.
+    area: TriangleArea,
+    samples: &'a [PressedSample],
+}
+
+impl PressedTriangle<'_> {
+    /// Returns `W` (J).
+    fn energy_at_rest_j(&self) -> f64 {
+        self.samples.iter().map(|s| 0.5 * s.stiffness_n_per_m * s.depth_m * s.depth_m).sum()
+    }
+
+    /// Returns `−∂W` (N) of the corners and of the tool.
+    fn forces_at_rest_n(&self) -> [DVec3; 4] {
+        let mut forces_n = [DVec3::ZERO; 4];
+        for s in self.samples {
+            let force_n = s.normal * (s.stiffness_n_per_m * s.depth_m);
+            for (sum, weight) in forces_n.iter_mut().zip(s.ends()) {
+                *sum += force_n * weight;
+            }
+        }
+        forces_n
+    }
+}
+
+impl PressedSample {
+    /// Returns `w`: the weights of the corners, and −1 of the tool.
+    fn ends(&self) -> [f64; 4] {
+        let [wa, wb, wc] = self.weights;
+        [wa, wb, wc, -1.0]
+    }
 }
 
 /// A sample, wherever it is.
@@ -103,7 +145,9 @@ impl RestingContact {
     /// Returns `Φ` (J) of all tools.
     pub(crate) fn potential_j(&self, model: &ContactModel, configuration: &[DVec3]) -> f64 {
         let mut sum = 0.0;
-        self.for_each(model, configuration, |s| sum += 0.5 * s.stiffness_n_per_m * s.depth_m * s.depth_m);
+        self.for_each(model, configuration, |pressed| {
+            sum += pressed.area.factor.factor * pressed.energy_at_rest_j();
+        });
         sum
     }
 
@@ -115,16 +159,19 @@ impl RestingContact {
         forces_n: &mut [DVec3],
     ) -> Vec<Pressing> {
         let mut tools = vec![Pressing::default(); model.tools.len()];
-        self.for_each(model, configuration, |s| {
-            let force = s.normal * (s.stiffness_n_per_m * s.depth_m);
-            for (&node, weight) in model.triangles.nodes[s.triangle].iter().zip(s.weights) {
-                forces_n[node as usize] += force * weight;
+        self.for_each(model, configuration, |pressed| {
+            let AreaFactor { factor, slope, .. } = pressed.area.factor;
+            let [on_corners_n @ .., on_tool_n] = pressed.forces_at_rest_n();
+            let energy_j = pressed.energy_at_rest_j();
+            for ((&node, force_n), gradient) in pressed.nodes.iter().zip(on_corners_n).zip(pressed.area.gradients_per_m)
+            {
+                forces_n[node as usize] += force_n * factor - gradient * (slope * energy_j);
             }
-            let tool = &mut tools[s.tool];
-            tool.force_n -= force;
-            tool.contacts += 1;
-            tool.penetration_m = tool.penetration_m.max(s.depth_m);
-            tool.energy_j += 0.5 * s.stiffness_n_per_m * s.depth_m * s.depth_m;
+            let tool = &mut tools[pressed.tool];
+            tool.force_n += on_tool_n * factor;
+            tool.contacts += pressed.samples.len() as u32;
+            tool.penetration_m = pressed.samples.iter().map(|s| s.depth_m).fold(tool.penetration_m, f64::max);
+            tool.energy_j += factor * energy_j;
         });
         let nodes = configuration.len() - tools.len();
         for (force, tool) in forces_n[nodes..].iter_mut().zip(&tools) {
@@ -133,9 +180,9 @@ impl RestingContact {
         tools
     }
 
-    /// Calls `add(i, j, block)` with `∂²Φ/∂q_i∂q_j` (N/m), once per pair `i ≤ j` of a triangle's corners and the tool
-    /// (numbered as in the configuration). `definite` leaves out the part that pressing makes across the normal, which
-    /// is negative.
+    /// Calls `add(i, j, block)` with `∂²Φ/∂q_i∂q_j` (N/m), once per pair of a triangle's corners and the tool (numbered
+    /// as in the configuration). `definite` leaves out what may be negative: the part that pressing makes across the
+    /// normal, and what depends on how area and depth change together.
     pub(crate) fn for_each_block(
         &self,
         model: &ContactModel,
@@ -144,32 +191,61 @@ impl RestingContact {
         mut add: impl FnMut(u32, u32, &DMat3),
     ) {
         let nodes = configuration.len() - model.tools.len();
-        self.for_each(model, configuration, |s| {
-            let along = DMat3::from_cols(s.normal * s.normal.x, s.normal * s.normal.y, s.normal * s.normal.z);
-            let across = if definite { 0.0 } else { s.depth_m / s.distance_m };
-            let hessian = (along - (DMat3::IDENTITY - along) * across) * s.stiffness_n_per_m;
-            let [a, b, c] = model.triangles.nodes[s.triangle];
-            let [wa, wb, wc] = s.weights;
-            let ends = [(a, wa), (b, wb), (c, wc), ((nodes + s.tool) as u32, -1.0)];
-            for (i, (p, wp)) in ends.into_iter().enumerate() {
-                for (q, wq) in &ends[i..] {
-                    add(p, *q, &(hessian * (wp * wq)));
+        self.for_each(model, configuration, |pressed| {
+            let area = &pressed.area;
+            let AreaFactor { factor, slope, curvature } = area.factor;
+            let [a, b, c] = pressed.nodes;
+            let ends = [a, b, c, (nodes + pressed.tool) as u32];
+            let mut blocks = [[DMat3::ZERO; 4]; 4];
+            for s in pressed.samples {
+                let along = outer(s.normal, s.normal);
+                let across = if definite { 0.0 } else { s.depth_m / s.distance_m };
+                let hessian = (along - (DMat3::IDENTITY - along) * across) * (factor * s.stiffness_n_per_m);
+                let weights = s.ends();
+                for i in 0..4 {
+                    for j in i..4 {
+                        blocks[i][j] += hessian * (weights[i] * weights[j]);
+                    }
+                }
+            }
+            if slope > 0.0 {
+                let (energy_j, forces_n) = (pressed.energy_at_rest_j(), pressed.forces_at_rest_n());
+                let [ra, rb, rc] = area.gradients_per_m;
+                let ratio = [ra, rb, rc, DVec3::ZERO];
+                for i in 0..4 {
+                    for j in i..4 {
+                        blocks[i][j] += outer(ratio[i], ratio[j]) * (curvature * energy_j);
+                        if !definite {
+                            let together = outer(ratio[i], forces_n[j]) + outer(forces_n[i], ratio[j]);
+                            blocks[i][j] -= together * slope;
+                        }
+                        if j < 3 {
+                            blocks[i][j] += area.hessian_per_m2(i, j, definite) * (slope * energy_j);
+                        }
+                    }
+                }
+            }
+            for i in 0..4 {
+                for j in i..4 {
+                    add(ends[i], ends[j], &blocks[i][j]);
                 }
             }
         });
     }
 
-    fn for_each(&self, model: &ContactModel, configuration: &[DVec3], mut visit: impl FnMut(&PressedSample)) {
-        for_near_triangles(model, configuration, |tool, triangle, centre, [a, b, c]| {
+    /// Calls `visit` for every triangle with samples that a tool presses.
+    fn for_each(&self, model: &ContactModel, configuration: &[DVec3], mut visit: impl FnMut(&PressedTriangle<'_>)) {
+        let mut pressed = Vec::new();
+        for_near_triangles(model, configuration, |tool, triangle, centre, corners| {
             let radius_m = model.tools[tool].spec.radius_m;
             let samples = model.tools[tool].foundation.of(triangle, &model.tables);
+            let [a, b, c] = corners;
+            pressed.clear();
             for (index, &[wb, wc]) in samples.weights.iter().enumerate() {
                 let r = a - centre + (b - a) * wb + (c - a) * wc;
                 let distance_m = r.length();
                 if distance_m < radius_m && distance_m > 0.0 && self.front[tool][samples.first as usize + index] {
-                    visit(&PressedSample {
-                        tool,
-                        triangle,
+                    pressed.push(PressedSample {
                         weights: [1.0 - wb - wc, wb, wc],
                         stiffness_n_per_m: samples.stiffness_n_per_m,
                         depth_m: radius_m - distance_m,
@@ -177,6 +253,10 @@ impl RestingContact {
                         normal: r / distance_m,
                     });
                 }
+            }
+            if !pressed.is_empty() {
+                let (nodes, area) = (model.triangles.nodes[triangle], TriangleArea::of(corners, samples.rest_m2));
+                visit(&PressedTriangle { tool, nodes, area, samples: &pressed });
             }
         });
     }

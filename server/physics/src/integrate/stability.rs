@@ -29,12 +29,12 @@
 //! A tick of two or more substeps is judged by its last three instants; one of a single step by its own two and the one
 //! before ([`Pace::before`]). Compare Park & Underwood 1980 and Bergan & Mollestad 1985, who choose steps by the
 //! quotient `Δxᵀ Δg/Δxᵀ M Δx`, which has neither filter.
+use super::pace::{InstantForces, Pace, most_substeps};
 use crate::{
-    settings::{Integrator, MAX_SUBSTEPS},
+    settings::Integrator,
     tick::{Environment, Judged, MechanicalState, StepEvidence, StepForcesNow},
 };
 use glam::DVec3;
-use serde::{Deserialize, Serialize};
 
 /// `Q` above this counts as unstable. The limit 4 at a step of 0.975 of the longest one gives this value.
 const LIMIT: f64 = 3.8;
@@ -43,135 +43,16 @@ const LIMIT: f64 = 3.8;
 const LONG_STEP_LIMIT: f64 = 2.0;
 /// Fraction of the stable step at which a repetition aims.
 const SAFETY: f64 = 0.9;
-/// Largest number of substeps that is tried, over the model's.
-const MOST_TIMES: u32 = 64;
 /// Factor on the substeps of a tick that is repeated because its result was not finite.
 const TIMES_IF_NOT_FINITE: u32 = 4;
 /// Largest number of repetitions of a tick.
 const MOST_REPETITIONS: u32 = 3;
-/// Number of ticks in a row that must show that fewer substeps suffice before fewer are tried.
-const SETTLED_TICKS: u32 = 100;
-
-/// The number of substeps in which ticks are taken, and the forces by which a tick of one step is judged.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Pace {
-    /// Number of substeps of the next tick, which is the model's unless a tick proved unstable.
-    pub substeps: u32,
-    /// Number of ticks in a row in which fewer substeps would have sufficed.
-    pub settled_ticks: u32,
-    /// Forces one step before those of the state; empty unless the model takes one step per tick.
-    pub before: InstantForces,
-    /// Whether `before` has those forces, and nothing was put elsewhere in between.
-    pub before_is_usable: bool,
-}
-
-impl Pace {
-    /// Returns the pace before the first tick of a body with so many nodes, whose lists have room for `most_positions`.
-    pub(crate) fn at_start(environment: &Environment, is_judged: bool, nodes: usize, most_positions: usize) -> Self {
-        let substeps = environment.steps.substeps;
-        let before = if is_judged && substeps == 1 {
-            InstantForces::zero(nodes, most_positions)
-        } else {
-            InstantForces::default()
-        };
-        Self { substeps, settled_ticks: 0, before, before_is_usable: false }
-    }
-
-    /// Makes the pace as at the start, in the buffers it has.
-    pub(crate) fn reset(&mut self, environment: &Environment) {
-        (self.substeps, self.settled_ticks, self.before_is_usable) = (environment.steps.substeps, 0, false);
-        self.before.total_n.fill(DVec3::ZERO);
-        self.before.external_n.fill(DVec3::ZERO);
-    }
-
-    pub(crate) fn copy_from(&mut self, other: &Self) {
-        self.before.total_n.clone_from(&other.before.total_n);
-        self.before.external_n.clone_from(&other.before.external_n);
-        (self.substeps, self.settled_ticks) = (other.substeps, other.settled_ticks);
-        self.before_is_usable = other.before_is_usable;
-    }
-
-    /// Returns whether the pace has lists of so many positions, and a number of substeps that the model may have.
-    pub(crate) fn fits(&self, environment: &Environment, is_judged: bool, positions: usize) -> bool {
-        let steps = environment.steps;
-        let nodes = if is_judged && steps.substeps == 1 { positions } else { 0 };
-        let most = if is_judged { most_substeps(environment) } else { steps.substeps };
-        [&self.before.total_n, &self.before.external_n].iter().all(|list| list.len() == nodes)
-            && (steps.substeps..=most).contains(&self.substeps)
-            && self.substeps.is_multiple_of(steps.substeps_per_long_step)
-    }
-
-    /// Returns all vectors, for a check that they are finite.
-    pub(crate) fn vectors(&self) -> impl Iterator<Item = &DVec3> {
-        self.before.total_n.iter().chain(&self.before.external_n)
-    }
-
-    /// Notes that the tick is repeated in `substeps` substeps.
-    fn start_again(&mut self, substeps: u32) {
-        (self.substeps, self.settled_ticks, self.before_is_usable) = (substeps, 0, false);
-    }
-
-    /// Notes a tick in `self.substeps` substeps that was accepted at once, and takes fewer substeps once enough ticks
-    /// have shown that they suffice.
-    fn settle(&mut self, environment: &Environment, quotient: f64) {
-        let steps = environment.steps;
-        let fewer = (self.substeps - (self.substeps / 8).max(1)).max(steps.substeps);
-        let fewer = fewer.next_multiple_of(steps.substeps_per_long_step).min(self.substeps);
-        // Q grows at most with dt².
-        let then = quotient * (f64::from(self.substeps) / f64::from(fewer)).powi(2);
-        self.settled_ticks = if then <= SAFETY * LIMIT { self.settled_ticks + 1 } else { 0 };
-        if self.settled_ticks >= SETTLED_TICKS {
-            (self.substeps, self.settled_ticks) = (fewer, 0);
-        }
-    }
-}
 
 /// Returns whether the ticks of a body are judged, given whether its steps can be. Only those of leapfrog are: the
 /// seeds' schemes run as their authors describe them, and backward Euler needs no judgement.
 pub(crate) fn is_judged(environment: &Environment, can_be: bool) -> bool {
     let settings = &environment.settings;
     settings.subcycle_unstable && settings.integrator == Integrator::Leapfrog && can_be
-}
-
-/// Returns the largest number of substeps that is tried.
-fn most_substeps(environment: &Environment) -> u32 {
-    let steps = environment.steps;
-    let most = steps.substeps.saturating_mul(MOST_TIMES).min(MAX_SUBSTEPS.max(steps.substeps));
-    most - most % steps.substeps_per_long_step
-}
-
-/// Forces at an instant.
-#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
-pub struct InstantForces {
-    /// Total force (N) on each node.
-    pub total_n: Vec<DVec3>,
-    /// The part of it that loads, tools and injected forces make (N).
-    pub external_n: Vec<DVec3>,
-}
-
-impl InstantForces {
-    fn zero(nodes: usize, most_positions: usize) -> Self {
-        let zeros = || {
-            let mut list = Vec::with_capacity(most_positions.max(nodes));
-            list.resize(nodes, DVec3::ZERO);
-            list
-        };
-        Self { total_n: zeros(), external_n: zeros() }
-    }
-
-    fn resize(&mut self, positions: usize) {
-        self.total_n.resize(positions, DVec3::ZERO);
-        self.external_n.resize(positions, DVec3::ZERO);
-    }
-
-    fn now(&self) -> StepForcesNow<'_> {
-        StepForcesNow { total_n: &self.total_n, external_n: &self.external_n }
-    }
-
-    fn swap(&mut self, state: &mut MechanicalState) {
-        std::mem::swap(&mut self.total_n, &mut state.force_n);
-        std::mem::swap(&mut self.external_n, &mut state.external_n);
-    }
 }
 
 /// Forces at those instants of a tick at which they are needed again; empty unless ticks are judged.
@@ -200,6 +81,8 @@ pub(crate) struct Attempt {
     pub(crate) is_spoilt: bool,
     /// Number of times that it had been repeated before.
     pub(crate) repeated: u32,
+    /// Largest factor by which contact was stiffer than at rest.
+    pub(crate) stiffened: f64,
 }
 
 /// The verdict on a tick that was run.
@@ -269,7 +152,7 @@ impl ForceHistory {
         pace: &mut Pace,
         attempt: Attempt,
     ) -> Verdict {
-        let Attempt { is_spoilt, repeated } = attempt;
+        let Attempt { is_spoilt, repeated, stiffened } = attempt;
         let substeps = pace.substeps;
         let evidence = self.evidence(environment, body, state, pace, start);
         let unstable = is_spoilt || self.is_unstable(&evidence, environment, body, state, pace);
@@ -277,10 +160,13 @@ impl ForceHistory {
         let more = substeps_for(environment, body.is_viscous(), substeps, found);
         if let Some(more) = more.filter(|_| unstable && repeated < MOST_REPETITIONS) {
             pace.start_again(more);
+            pace.too_few = pace.too_few.max(substeps);
             return Verdict::Repeat;
         }
-        if substeps > environment.steps.substeps && !unstable && repeated == 0 {
-            pace.settle(environment, quotient(&evidence));
+        if !unstable {
+            let least = environment.steps.with_stiffer_contact(stiffened).min(most_substeps(environment));
+            let part = quotient(&evidence) / (SAFETY * LIMIT);
+            pace.settle(least, environment.steps.substeps_per_long_step, part);
         }
         self.hand_on(pace, substeps);
         body.accept();

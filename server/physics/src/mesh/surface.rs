@@ -60,7 +60,7 @@ impl Surface {
     }
 
     /// The longest edge (m) of a triangle, its nodes at these positions (m).
-    pub(crate) fn longest_edge_m(&self, triangle: usize, positions_m: &[DVec3]) -> f64 {
+    pub fn longest_edge_m(&self, triangle: usize, positions_m: &[DVec3]) -> f64 {
         let [a, b, c] = self.triangle_nodes(triangle).map(|node| positions_m[node as usize]);
         a.distance(b).max(b.distance(c)).max(c.distance(a))
     }

@@ -16,12 +16,16 @@ pub(crate) fn stiffening(settings: &Settings, materials: &[Material]) -> f64 {
 }
 
 /// The substeps of a tick.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Steps {
     /// Number of substeps per tick.
     pub(crate) substeps: u32,
     /// Number of substeps in a long step of a coarse level; 1 where there is none.
     pub(crate) substeps_per_long_step: u32,
+    /// Number of substeps that would be enough, before it was rounded up; no more than `substeps`.
+    pub(crate) enough: f64,
+    /// Part of the square of the largest frequency that is contact's, from 0 to 1.
+    pub(crate) of_contact: f64,
 }
 
 impl Steps {
@@ -35,11 +39,17 @@ impl Steps {
     /// # Errors
     /// The body needs more than [`MAX_SUBSTEPS`].
     pub(crate) fn choose(settings: &Settings, materials: &[Material], omega: f64) -> Result<Self, EnvironmentError> {
-        let all_short = |substeps| Self { substeps, substeps_per_long_step: 1 };
+        let wanted = wanted(settings, materials, omega);
+        let all_short = |substeps: u32| Self {
+            substeps,
+            substeps_per_long_step: 1,
+            enough: wanted.min(f64::from(substeps)),
+            of_contact: 0.0,
+        };
         if let Substeps::Fixed(substeps) = settings.substeps {
             return Ok(all_short(substeps));
         }
-        let substeps = wanted(settings, materials, omega);
+        let substeps = wanted.ceil().max(1.0);
         if substeps <= f64::from(MAX_SUBSTEPS) {
             Ok(all_short(substeps as u32))
         } else {
@@ -47,11 +57,29 @@ impl Steps {
         }
     }
 
+    /// Returns the same substeps, of a body whose largest frequency (rad/s) is `alone` where nothing touches it and
+    /// `touched` elsewhere.
+    #[must_use]
+    pub(crate) fn with_contact(self, alone: f64, touched: f64) -> Self {
+        Self { of_contact: (1.0 - (alone / touched).powi(2)).clamp(0.0, 1.0), ..self }
+    }
+
+    /// Returns the number of substeps that contact needs whose stiffness is φ = `times` that at rest,
+    /// `n √(1 + ½ (φ − 1) c)`, with the part c of the squared frequency that is contact's.
+    ///
+    /// The half: c comes from the sums of the rows of contact's stiffness. In the modes of the largest frequency,
+    /// neighbours move against each other and the samples between them hardly, so that contact adds a quarter of these
+    /// sums or less there (`docs/measurements/deep-press.md`).
+    pub(crate) fn with_stiffer_contact(self, times: f64) -> u32 {
+        let needed = self.enough * (1.0 + 0.5 * (times - 1.0).max(0.0) * self.of_contact).sqrt();
+        (needed.ceil() as u32).max(self.substeps).next_multiple_of(self.substeps_per_long_step)
+    }
+
     /// Returns the same substeps for a body whose coarse level may take longer steps; `omega` (rad/s) is the largest
     /// frequency of that level when it is stretched.
     #[must_use]
     pub(crate) fn with_long_steps(self, settings: &Settings, materials: &[Material], omega: f64) -> Self {
-        let least = wanted(settings, materials, omega / LONG_STEP_FRACTION);
+        let least = wanted(settings, materials, omega / LONG_STEP_FRACTION).ceil().max(1.0);
         if !settings.long_coarse_steps || least >= f64::from(self.substeps) {
             return self;
         }
@@ -59,11 +87,11 @@ impl Steps {
         match settings.substeps {
             Substeps::Measured => {
                 let every = self.substeps.div_ceil(least);
-                Self { substeps: every * least, substeps_per_long_step: every }
+                Self { substeps: every * least, substeps_per_long_step: every, ..self }
             }
             Substeps::Fixed(substeps) => {
                 let long_steps = (least..=substeps).find(|long_steps| substeps.is_multiple_of(*long_steps));
-                Self { substeps, substeps_per_long_step: substeps / long_steps.unwrap_or(substeps) }
+                Self { substeps, substeps_per_long_step: substeps / long_steps.unwrap_or(substeps), ..self }
             }
         }
     }
@@ -73,7 +101,7 @@ fn wanted(settings: &Settings, materials: &[Material], omega: f64) -> f64 {
     let viscous_growth = settings.stretch_allowance.powi(4) / stiffening(settings, materials);
     let xi = 0.5 * omega * viscous_growth * materials.iter().map(relaxation_time_s).fold(0.0, f64::max);
     let dt_s = settings.step_safety * 2.0 / omega * ((1.0 + xi * xi).sqrt() - xi);
-    (settings.tick_period_s / dt_s).ceil().max(1.0)
+    settings.tick_period_s / dt_s
 }
 
 /// Returns the largest ratio of viscosity to stiffness (s) over P-waves, shear and bulk.

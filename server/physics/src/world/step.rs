@@ -82,7 +82,7 @@ pub fn step(model: &Model, state: &mut State, scratch: &mut Scratch, input: &Tic
             mechanical,
             start,
             pace,
-            Attempt { is_spoilt, repeated: report.repeated },
+            Attempt { is_spoilt, repeated: report.repeated, stiffened: contact.most_stiffened() },
         ) {
             Verdict::Accept => break spoilt,
             Verdict::Repeat => {

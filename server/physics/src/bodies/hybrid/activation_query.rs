@@ -3,6 +3,7 @@ use super::{
     body::HybridBody,
     carried_skin::SkinView,
     running::RunningPatch,
+    scratch::HybridScratch,
     spec::ParticleSpec,
     state::{HybridState, axis_sample_counts},
     switching::{ActivationQuery, Ball, FOLLOW, GAP, QUERY_EVERY_TICKS},
@@ -15,6 +16,8 @@ use glam::DVec3;
 
 /// Time (s) before its contact at which an approaching tool wakes particles.
 const AHEAD_S: f64 = 0.05;
+/// Time (s) before its contact at which a tool wakes particles at once.
+const ARRIVES_S: f64 = 2e-3;
 /// Number of ticks for which a tool has to be away until its ball is given up.
 const AWAY_TICKS: u32 = 100;
 /// Deviation over the spacing below which a particle may fall asleep.
@@ -55,6 +58,35 @@ pub(super) fn update_balls(
             (None, _) => {}
         }
     }
+}
+
+/// Returns whether a tool touches skin whose particles sleep but may wake, or will touch it before a switch that began
+/// with the next query would be done.
+pub(super) fn meets_sleeping_skin(
+    environment: &Environment,
+    body: &HybridBody,
+    scratch: &mut HybridScratch,
+    state: &MechanicalState,
+) -> bool {
+    let MechanicalState { tools, contact, force_is_current, .. } = state;
+    let fitted = force_is_current.then(|| contact.boxes());
+    let patch = &mut scratch.patch;
+    patch.displace(body, &state.x);
+    let counts = axis_sample_counts(body, &environment.tools);
+    tools.iter().zip(&environment.tools).zip(counts).any(|((tool, spec), count)| {
+        tool.axis_samples(spec, count).any(|sample| {
+            let near_m = (ARRIVES_S * sample.speed_m_per_s).max(0.1 * body.particles.spacing_m);
+            let mut view = SkinView::new(body, patch);
+            view.begin();
+            let near = sample.look(&view, (near_m, environment.contact.covering_radius_m), fitted);
+            let is_asleep = |vertex: u32| {
+                let cell = body.vertex_point(vertex).cell;
+                !patch.is_awake(cell)
+                    && body.partition.corners(cell as usize).iter().any(|&corner| body.may_wake(corner))
+            };
+            near.gap_m < near_m && near.vertex.is_some_and(|(vertex, _)| is_asleep(vertex))
+        })
+    })
 }
 
 /// Returns the squared distance (m²) of a point `p` to the middles of balls, and to the lines between those of

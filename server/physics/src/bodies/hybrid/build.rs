@@ -59,12 +59,14 @@ impl HybridBody {
             hybrid.frequency_rad_per_s(&springs, &mut building::touched(progress))
         };
         let omega_sq = stretch_sq * touched.max(omega).powi(2) + contact.tool_frequency_sq;
+        let alone = stretch_sq.sqrt() * omega;
         let coarse_omega = stretch_sq.sqrt() * hybrid.coarse_frequency_rad_per_s();
         let steps = Steps::choose(&around.settings, &materials, omega_sq.sqrt())?.with_long_steps(
             &around.settings,
             &materials,
             coarse_omega,
         );
+        let steps = steps.with_contact(alone, omega_sq.sqrt());
         Ok((hybrid, Environment::new(around, surface, contact, steps)))
     }
 }

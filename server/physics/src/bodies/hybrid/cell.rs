@@ -18,6 +18,8 @@ use glam::{DMat3, DVec3};
 
 /// `χ`, the stiffness of hourglasses.
 pub const HOURGLASS: f64 = 0.5;
+/// `β`, how fast hourglasses stiffen with their amplitude.
+pub const HOURGLASS_GROWTH: f64 = 20.0;
 /// `w_k`, the weights of the four hourglass patterns.
 pub const MODE_WEIGHTS: [f64; 4] = [1.0, 1.0, 1.0, 0.5];
 
@@ -32,6 +34,8 @@ pub struct RestCell {
     pub modes: [[f64; 8]; 4],
     /// `κ/µ` (m).
     pub hourglass_m: f64,
+    /// `β/h²` (1/m²).
+    pub growth_per_m2: f64,
 }
 
 impl RestCell {
@@ -58,7 +62,7 @@ impl RestCell {
         });
         let volume_m3 = fraction * volume_m3;
         let hourglass_m = HOURGLASS * 4.0 / 3.0 * volume_m3 / (edge_m * edge_m);
-        Self { volume_m3, gradients_per_m, modes, hourglass_m }
+        Self { volume_m3, gradients_per_m, modes, hourglass_m, growth_per_m2: HOURGLASS_GROWTH / (edge_m * edge_m) }
     }
 
     /// Returns `Σ_p a_p b_pᵀ`, computed with differences to the first particle.
@@ -75,8 +79,14 @@ impl RestCell {
     /// Returns the elastic energy `U_c` (J).
     pub fn energy_j(&self, material: &Material, y: &[DVec3; 8]) -> f64 {
         let kappa = self.hourglass_m * material.lame.mu_pa;
-        let modes = self.amplitudes(y).iter().zip(MODE_WEIGHTS).map(|(q, w)| w * q.length_squared()).sum::<f64>();
-        self.volume_m3 * material.energy_density(&self.gradient_of(y)) + 0.5 * kappa * modes
+        let modes_m2 = self.modes_m2(&self.amplitudes(y));
+        self.volume_m3 * material.energy_density(&self.gradient_of(y)) + 0.5 * kappa * modes_m2
+    }
+
+    /// Returns `Q (1 + ½ β Q/h²)` (m²) of hourglass amplitudes, `Q = Σ_k w_k |q_k|²`.
+    pub fn modes_m2(&self, amplitudes: &[DVec3; 4]) -> f64 {
+        let squares_m2 = squares_m2(amplitudes);
+        squares_m2 * (1.0 + 0.5 * self.growth_per_m2 * squares_m2)
     }
 
     /// Returns the forces `f_p` (N) of elastic and viscous stress, and the power (W) that viscous stress takes.
@@ -89,13 +99,25 @@ impl RestCell {
             stress += viscous::piola(material.viscosity, &f, &f_dot);
             power_w = self.volume_m3 * viscous::power_density(material.viscosity, &f, &f_dot);
         }
-        (self.corner_forces_n(material, &stress, &self.amplitudes(y)), power_w)
+        (self.corner_forces_n(material, &stress, &self.stiffened(&self.amplitudes(y))), power_w)
     }
 
     /// Returns `−K a` (N), the change of the elastic forces along `a`.
     pub fn products_n(&self, material: &Material, y: &[DVec3; 8], a: &[DVec3; 8]) -> [DVec3; 8] {
         let change = material.piola_differential(&self.gradient_of(y), &self.gradient_of(a));
-        self.corner_forces_n(material, &change, &self.amplitudes(a))
+        // δ((1 + β Q/h²) q_k) = (1 + β Q/h²) δq_k + (2 β/h²) (Σ_l w_l q_l·δq_l) q_k
+        let (q, dq) = (self.amplitudes(y), self.amplitudes(a));
+        let along: f64 = q.iter().zip(&dq).zip(MODE_WEIGHTS).map(|((q, dq), w)| w * q.dot(*dq)).sum();
+        let stiffened = 1.0 + self.growth_per_m2 * squares_m2(&q);
+        let grown = 2.0 * self.growth_per_m2 * along;
+        let changes = std::array::from_fn(|k| dq[k] * stiffened + q[k] * grown);
+        self.corner_forces_n(material, &change, &changes)
+    }
+
+    /// Returns `(1 + β Q/h²) q_k` (m).
+    pub(super) fn stiffened(&self, amplitudes: &[DVec3; 4]) -> [DVec3; 4] {
+        let factor = 1.0 + self.growth_per_m2 * squares_m2(amplitudes);
+        amplitudes.map(|q| q * factor)
     }
 
     /// Returns the diagonal blocks (N/m) of the stiffness at rest,
@@ -117,6 +139,11 @@ impl RestCell {
             *stress * self.gradients_per_m[p] * -self.volume_m3 - modes * kappa
         })
     }
+}
+
+/// Returns `Q = Σ_k w_k |q_k|²` (m²).
+fn squares_m2(amplitudes: &[DVec3; 4]) -> f64 {
+    amplitudes.iter().zip(MODE_WEIGHTS).map(|(q, w)| w * q.length_squared()).sum()
 }
 
 #[cfg(test)]

@@ -16,7 +16,7 @@
 //! Which cell or part wakes or falls asleep with which prestrain is worked out in `state_transfer`. Accelerations do not
 //! jump, either (`transition_force`).
 use super::{
-    cell::{MODE_WEIGHTS, RestCell},
+    cell::RestCell,
     composite::PARTS,
     residual_element::{ResidualElement, split},
 };
@@ -31,6 +31,9 @@ pub(super) const DECAY_S: f64 = 0.04;
 const NOTHING: f64 = 1e-6;
 /// A prestrain smaller than this is left out, its energy being negligible.
 const TRACE: f64 = 1e-13;
+/// Largest entry of a prestrain `A`. The stiffness of what wakes grows by `‖I + A‖²`, so that cells which wake while they
+/// are crushed would need many times more substeps than others.
+const MOST: f64 = 2.0;
 
 /// The prestrain of a cell: `A` and `a` when it woke.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -89,9 +92,14 @@ pub(super) fn effective(f: &DMat3, a: &DMat3) -> DMat3 {
     *f + *f * *a
 }
 
-/// Returns `A` with which the effective gradient of `F` is `wanted`; zero where `F` is (nearly) inverted.
+/// Returns `A` with which the effective gradient of `F` is `wanted`; it is shortened where it would have an entry above 2,
+/// and zero where `F` is (nearly) inverted. The energy then jumps, and the jump is booked.
 pub(super) fn change(f: &DMat3, wanted: &DMat3) -> DMat3 {
-    if f.determinant() > 0.05 { f.inverse() * (*wanted - *f) } else { DMat3::ZERO }
+    if f.determinant() <= 0.05 {
+        return DMat3::ZERO;
+    }
+    let a = f.inverse() * (*wanted - *f);
+    a * (MOST / largest(&a)).min(1.0)
 }
 
 /// Returns the stress `P̃(F (I + A)) (I + A)ᵀ` (Pa).
@@ -122,7 +130,7 @@ pub(super) fn residual_energy_j(
 
 /// Returns `Σ_k w_k |q_k|²` (m²).
 pub(super) fn modes_m2(rest: &RestCell, y: &[DVec3; 8]) -> f64 {
-    rest.amplitudes(y).iter().zip(MODE_WEIGHTS).map(|(q, w)| w * q.length_squared()).sum()
+    rest.modes_m2(&rest.amplitudes(y))
 }
 
 fn largest(a: &DMat3) -> f64 {
@@ -319,7 +327,7 @@ impl CellPrestrain {
             stress += viscous::piola(material.viscosity, &f, &f_dot);
             power_w = rest.volume_m3 * viscous::power_density(material.viscosity, &f, &f_dot);
         }
-        let amplitudes = rest.amplitudes(y).map(|q| q * (1.0 - self.modes));
+        let amplitudes = rest.stiffened(&rest.amplitudes(y)).map(|q| q * (1.0 - self.modes));
         (rest.corner_forces_n(material, &stress, &amplitudes), power_w)
     }
 }

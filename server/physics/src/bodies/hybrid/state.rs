@@ -30,6 +30,8 @@ pub struct HybridState {
     /// Largest elastic energy (J) of what any recent switch changed.
     pub(super) switched_j: f64,
     pub(crate) long_steps: LongSteps,
+    /// Ticks since particles were last woken at once, up to [`super::switching::QUERY_EVERY_TICKS`].
+    pub(super) ticks_since_at_once: u32,
 }
 
 impl HybridState {
@@ -120,6 +122,7 @@ impl KindState for HybridState {
             given_j: 0.0,
             switched_j: 0.0,
             long_steps: LongSteps::with_room(body.node_count(), positions),
+            ticks_since_at_once: 0,
         }
     }
 
@@ -134,6 +137,7 @@ impl KindState for HybridState {
         self.given_j = 0.0;
         self.switched_j = 0.0;
         self.long_steps.forget();
+        self.ticks_since_at_once = 0;
     }
 
     fn copy_from(&mut self, other: &Self) {
@@ -146,6 +150,7 @@ impl KindState for HybridState {
         self.given_j = other.given_j;
         self.switched_j = other.switched_j;
         self.long_steps.copy_from(&other.long_steps);
+        self.ticks_since_at_once = other.ticks_since_at_once;
     }
 
     /// Particles have to be ascending, may wake and have room, and all numbers are finite.
@@ -184,6 +189,7 @@ impl KindState for HybridState {
         chain.real(self.given_j);
         chain.real(self.switched_j);
         self.long_steps.chain(chain);
+        chain.whole(u64::from(self.ticks_since_at_once));
     }
 
     fn active_particles(&self) -> &[u32] {

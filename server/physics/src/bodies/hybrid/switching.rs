@@ -19,7 +19,7 @@
 //! then (`projection`), for which `−Σ_i Δ_i × P_i`, with the momenta `P = M'' v + J`, is added to the couple on the
 //! right.
 use super::{
-    activation_query::update_balls,
+    activation_query::{meets_sleeping_skin, update_balls},
     body::HybridBody,
     carried_skin::SkinView,
     patch::KEPT,
@@ -45,6 +45,8 @@ const SWITCH_TICKS: u64 = 2 + RunningPatch::SLICES as u64;
 /// Number of ticks between two activation queries. After each, what is to sleep falls asleep, and then what is to wake
 /// wakes: both in one tick would take too long.
 pub(super) const QUERY_EVERY_TICKS: u64 = 2 * SWITCH_TICKS;
+/// Number of ticks between two switches that are done at once.
+const AT_ONCE_EVERY_TICKS: u32 = 4;
 /// Gap, over the tool's radius and over the spacing, below which a tool's particles are awake.
 pub(crate) const GAP: f64 = 0.25;
 /// Distance, over the spacing, that the skin's nearest vertex moves at rest before a ball follows.
@@ -128,14 +130,15 @@ impl SteppedHybrid<'_> {
         }
         let particles = &body.particles;
         let Waking::ByTools { reach_m } = particles.waking else { return };
+        own.ticks_since_at_once = own.ticks_since_at_once.saturating_add(1).min(QUERY_EVERY_TICKS as u32);
+        if own.ticks_since_at_once >= AT_ONCE_EVERY_TICKS && meets_sleeping_skin(environment, body, scratch, state) {
+            self.wake_at_once(environment, state, reach_m);
+            return;
+        }
         match state.tick % QUERY_EVERY_TICKS {
             0 => {
-                let HybridScratch { patch, query, .. } = &mut **scratch;
-                patch.displace(body, &state.x);
-                update_balls(environment, &mut SkinView::new(body, patch), body, own, state);
-                query.want(body, &environment.tools, own, reach_m, particles.most_active);
-                query.keep_unsettled(patch, particles);
-                own.want(&query.wanted);
+                scratch.query(environment, body, own, state, reach_m);
+                own.want(&scratch.query.wanted);
             }
             SWITCH_TICKS => own.next.clone_from(&own.wanted),
             since_query if own.is_switching() => {
@@ -145,13 +148,31 @@ impl SteppedHybrid<'_> {
         }
     }
 
+    /// Queries and switches in this tick: a tool meets skin whose particles sleep.
+    fn wake_at_once(&mut self, environment: &Environment, state: &mut MechanicalState, reach_m: f64) {
+        let Self { body, own, scratch } = self;
+        own.ticks_since_at_once = 0;
+        scratch.query(environment, body, own, state, reach_m);
+        own.wanted.clone_from(&scratch.query.wanted);
+        own.next.clone_from(&scratch.query.wanted);
+        if own.is_switching() {
+            self.switch_now(environment, state);
+        }
+    }
+
     /// Lays the staged patch out, a slice per tick, then switches to it.
     fn go_on_switching(&mut self, environment: &Environment, state: &mut MechanicalState, slice: u64) {
-        let Self { body, own, scratch } = self;
+        let Self { body, own, scratch } = &mut *self;
         if slice <= u64::from(RunningPatch::SLICES) {
             scratch.staged.go_on(body, &own.next);
             return;
         }
+        self.switch_now(environment, state);
+    }
+
+    /// Switches to the particles that are to be active next.
+    fn switch_now(&mut self, environment: &Environment, state: &mut MechanicalState) {
+        let Self { body, own, scratch } = self;
         let were_current = state.force_is_current;
         let moved_m = scratch.switch(body, environment.gravity_m_per_s2, own, state);
         state.contact.travelled_at_a_change(moved_m, were_current);
@@ -182,6 +203,22 @@ impl SteppedHybrid<'_> {
 }
 
 impl HybridScratch {
+    /// Finds the particles that are to be awake.
+    fn query(
+        &mut self,
+        environment: &Environment,
+        body: &HybridBody,
+        own: &mut HybridState,
+        state: &MechanicalState,
+        reach_m: f64,
+    ) {
+        let Self { patch, query, .. } = self;
+        patch.displace(body, &state.x);
+        update_balls(environment, &mut SkinView::new(body, patch), body, own, state);
+        query.want(body, &environment.tools, own, reach_m, body.particles.most_active);
+        query.keep_unsettled(patch, &body.particles);
+    }
+
     /// Lets the transition force decay over a tick, and leaves the prestrain out, which decays with the substeps, once
     /// nearly nothing is left of it.
     fn decay(&mut self, own: &mut HybridState, state: &mut MechanicalState, tick_period_s: f64) {

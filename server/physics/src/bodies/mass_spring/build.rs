@@ -28,7 +28,7 @@ impl MassSpringBody {
             ContactModel::build(rest_m, &surface, &body.moduli(), &body.contact_mass_kg(), omega, &around.tools);
         body.cluster(contact.triangles());
         let omega_sq = body.model().touched_frequency_sq(&contact.nodal_stiffness_n_per_m) + contact.tool_frequency_sq;
-        let steps = Steps::choose(&around.settings, &[], omega_sq.sqrt())?;
+        let steps = Steps::choose(&around.settings, &[], omega_sq.sqrt())?.with_contact(omega, omega_sq.sqrt());
         free_inverse_mass(&body.model().spec().mass_kg, &around.prescribed)?;
         Ok((body, Environment::new(around, surface, contact, steps)))
     }

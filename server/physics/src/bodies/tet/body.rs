@@ -87,7 +87,8 @@ impl TetBody {
             _ => stretch_sq * touched.max(omega).powi(2),
         };
         let omega_sq = explicit_sq + contact.tool_frequency_sq;
-        let steps = Steps::choose(settings, &body.materials, omega_sq.sqrt())?;
+        let alone = stretch_sq.sqrt() * omega;
+        let steps = Steps::choose(settings, &body.materials, omega_sq.sqrt())?.with_contact(alone, omega_sq.sqrt());
         body.max_natural_frequency_rad_per_s = omega;
         let environment = Environment::new(spec, surface, contact, steps).with_inner_nodes(nodes);
         Ok((body, environment))

@@ -12,6 +12,7 @@ use super::{
     foundation::{Foundation, SampleTables, TriangleSamples},
     friction::FrictionSpring,
     local_torque::Levers,
+    stretched_area::{AreaFactor, area_gradients_m},
     touching::{Touch, Touching},
 };
 use glam::{DQuat, DVec3};
@@ -54,6 +55,8 @@ pub(super) struct Pressed {
     pub(super) force_times_modulus: f64,
     /// `Φ` (J).
     pub(super) energy_j: f64,
+    /// Largest factor by which the foundation is stiffer than at rest.
+    pub(super) most_stiffened: f64,
     /// Heat of slipping (J) since the last evaluation.
     pub(super) heat_j: f64,
     /// Number of samples that carry force.
@@ -81,6 +84,7 @@ impl Pressed {
         self.force_times_k_f += other.force_times_k_f;
         self.force_times_modulus += other.force_times_modulus;
         self.energy_j += other.energy_j;
+        self.most_stiffened = self.most_stiffened.max(other.most_stiffened);
     }
 
     /// Returns forces and energy times a factor.
@@ -186,6 +190,10 @@ fn press_triangle(
     let mut nodal = [DVec3::ZERO; 3];
     let (ab, ac, from_centre) = (b - a, c - a, a - meeting.axis.centre_m);
     let outward = ab.cross(ac);
+    let doubled_m2 = outward.length();
+    let area = AreaFactor::of(0.5 * doubled_m2 / samples.rest_m2);
+    let samples = TriangleSamples { area_factor: area.factor, ..*samples };
+    let energy_before_j = pressed.energy_j;
     let (radius_sq, is_sphere) = (meeting.radius_m * meeting.radius_m, meeting.axis.is_point());
     for (index, &[wb, wc]) in samples.weights.iter().enumerate() {
         // p = y − c₀, r = y − c
@@ -211,7 +219,7 @@ fn press_triangle(
         touch.free_depth_m = touch.free_depth_m.min(depth_m);
         // A sample exactly on the axis has no direction: it carries nothing for this instant.
         let normal = r / distance_m.max(f64::MIN_POSITIVE);
-        let force_n = press_sample(meeting, samples, p, normal, distance_m, &mut touch, pressed);
+        let force_n = press_sample(meeting, &samples, p, normal, distance_m, &mut touch, pressed);
         next.push(touch);
         nodal[0] += force_n * (1.0 - wb - wc);
         nodal[1] += force_n * wb;
@@ -219,6 +227,16 @@ fn press_triangle(
         pressed.force_n -= force_n;
         if meeting.orientation.is_some() {
             pressed.torque_nm -= p.cross(force_n);
+        }
+    }
+    if area.slope > 0.0 && pressed.energy_j > energy_before_j {
+        pressed.most_stiffened = pressed.most_stiffened.max(area.factor);
+        // f_i = −φ' W/A₀ ∂A/∂x_i
+        let energy_j = (pressed.energy_j - energy_before_j) / area.factor;
+        let tension_n_per_m = area.slope * energy_j / samples.rest_m2;
+        let gradients_m = area_gradients_m([a, b, c], outward / doubled_m2);
+        for (force_n, gradient_m) in nodal.iter_mut().zip(gradients_m) {
+            *force_n -= gradient_m * tension_n_per_m;
         }
     }
     nodal
@@ -248,8 +266,8 @@ fn press_sample(
     pressed: &mut Pressed,
 ) -> DVec3 {
     let depth_m = meeting.radius_m - distance_m - touch.free_depth_m;
-    // |f_n| = k_f a (g − g₀), Φ = ½ k_f a (g − g₀)²
-    let f_n = samples.stiffness_n_per_m * depth_m;
+    // |f_n| = φ k_f a (g − g₀), Φ = ½ φ k_f a (g − g₀)²
+    let f_n = samples.area_factor * samples.stiffness_n_per_m * depth_m;
     pressed.energy_j += 0.5 * f_n * depth_m;
     pressed.pressing_n += f_n;
     pressed.force_times_k_f += f_n * samples.foundation_pa_per_m;

@@ -83,10 +83,14 @@ proptest! {
     #[test]
     fn forces_balance_and_are_the_gradient_of_the_energy(
         shift in prop::array::uniform3(-0.3..0.3_f64), axis in 0..3_usize, node in 0..3_usize,
+        stretch in prop::array::uniform2(0.8..1.6_f64),
     ) {
         // Corners of the upper face, moved; the far one (3) is out of reach.
         let centre = above(0.3 * RADIUS_M) + DVec3::from(shift) * RADIUS_M;
         let mut bench = Bench::new(0.0);
+        for x in &mut bench.x[..3] {
+            *x *= DVec3::new(stretch[0], stretch[1], 1.0);
+        }
         let (pressed, forces) = bench.press(centre);
         prop_assert!((pressed.force_n + forces.iter().sum::<DVec3>()).length() <= 1e-12 * pressed.pressing_n);
         let step = 1e-7;

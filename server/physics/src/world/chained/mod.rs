@@ -22,6 +22,8 @@ impl Chain {
         self.mechanical(&state.mechanical);
         self.whole(u64::from(state.pace.substeps));
         self.whole(u64::from(state.pace.settled_ticks));
+        self.real(state.pace.settled_quotient);
+        self.whole(u64::from(state.pace.too_few));
         self.flag(state.pace.before_is_usable);
         self.vectors(&state.pace.before.total_n);
         self.vectors(&state.pace.before.external_n);

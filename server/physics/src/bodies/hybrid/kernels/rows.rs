@@ -12,7 +12,7 @@ use super::{
 };
 use crate::{
     bodies::hybrid::{
-        cell::{HOURGLASS, MODE_WEIGHTS},
+        cell::{HOURGLASS, HOURGLASS_GROWTH, MODE_WEIGHTS},
         prestrain::CellPrestrain,
     },
     lanes::{
@@ -71,8 +71,8 @@ struct Rows<T> {
 #[derive(Debug, Clone)]
 struct CellMaterial<T> {
     split: Split<T>,
-    /// `1/(4h)` (1/m), `−V` (m³) and `−κ` (N/m).
-    cell: [f64; 3],
+    /// `1/(4h)` (1/m), `−V` (m³), `−κ` (N/m) and `β/(8h)²` (1/m²).
+    cell: [f64; 4],
 }
 
 #[derive(Debug, Clone)]
@@ -191,7 +191,10 @@ fn of_materials<T: Scalar>(materials: &[Material], edge_m: f64, fraction: f64) -
     let of = |(material, edge_m): (&Material, f64)| {
         let volume_m3 = fraction * edge_m.powi(3);
         let kappa = HOURGLASS * 4.0 / 3.0 * material.lame.mu_pa * volume_m3 / (edge_m * edge_m);
-        CellMaterial { split: Split::of(material), cell: [0.25 / edge_m, -volume_m3, -kappa] }
+        CellMaterial {
+            split: Split::of(material),
+            cell: [0.25 / edge_m, -volume_m3, -kappa, HOURGLASS_GROWTH / (64.0 * edge_m * edge_m)],
+        }
     };
     [edge_m, 2.0 * edge_m].into_iter().flat_map(|edge_m| materials.iter().map(move |m| of((m, edge_m)))).collect()
 }
@@ -263,7 +266,7 @@ impl<T: Scalar> RowForces<'_, T> {
         first_prestrain: Option<usize>,
         power_w: &mut f64,
     ) {
-        let [quarter, minus_volume, minus_kappa] = self.material.cell;
+        let [quarter, minus_volume, minus_kappa, growth] = self.material.cell;
         let weight = first_lanes::<V>(cells);
         let of_strain = weight * V::of(quarter);
         let mut h = [[V::of(0.0); 3]; 3];
@@ -282,6 +285,13 @@ impl<T: Scalar> RowForces<'_, T> {
                 }
             }
         }
+        let mut squares = V::of(0.0);
+        for axis in 0..3 {
+            for mode in 0..4 {
+                squares = squares + modes[axis][mode] * modes[axis][mode] * V::of(MODE_WEIGHTS[mode]);
+            }
+        }
+        let grown = squares * V::of(growth);
         let mut kept_modes = weight;
         let (p, density) = if let Some(first) = first_prestrain {
             let (left, entries) = (V::of(self.left), &self.arrays.prestrains);
@@ -291,14 +301,8 @@ impl<T: Scalar> RowForces<'_, T> {
             kept_modes = weight * (V::of(1.0) - gone);
             let (p, density, along) =
                 prestrained_cell_stress::<V, T, L, VISCOUS>(&self.material.split, &[of_shape, of_volume], &h, &h_dot);
-            let mut squares = V::of(0.0);
-            for axis in 0..3 {
-                for mode in 0..4 {
-                    squares = squares + modes[axis][mode] * modes[axis][mode] * V::of(MODE_WEIGHTS[mode]);
-                }
-            }
-            // s ∂U/∂s = V P̃ : F A − ½ κ a Σ w |q|²
-            let of_modes = squares * gone * V::of(minus_kappa / 128.0);
+            // s ∂U/∂s = V P̃ : F A − ½ κ a Q (1 + ½ β Q/h²)
+            let of_modes = squares * (V::of(1.0) + V::of(0.5) * grown) * gone * V::of(minus_kappa / 128.0);
             add_lanes(weight * (along * V::of(-minus_volume) + of_modes), &mut self.prestrain_j);
             (p, density)
         } else {
@@ -307,7 +311,7 @@ impl<T: Scalar> RowForces<'_, T> {
         let of_stress = weight * V::of(minus_volume * quarter);
         let mut of_modes = [kept_modes; 4];
         for mode in 0..4 {
-            of_modes[mode] = kept_modes * V::of(minus_kappa * MODE_WEIGHTS[mode] / 64.0);
+            of_modes[mode] = kept_modes * (V::of(1.0) + grown) * V::of(minus_kappa * MODE_WEIGHTS[mode] / 64.0);
         }
         for axis in 0..3 {
             let mut c = [V::of(0.0); 7];

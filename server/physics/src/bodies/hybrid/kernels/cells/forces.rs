@@ -141,14 +141,28 @@ fn cut<V: Vector<Scalar = T>, T: Scalar, L: ConstitutiveLaw, const VISCOUS: bool
         } else {
             stress::<V, T, L, VISCOUS>(&split.whole, &h, &h_dot)
         };
-        let minus_kappa = whole * (V::of(1.0) - gone);
-        let half_gone = whole * gone * V::of(0.5);
+        let mut modes = [[V::of(0.0); 4]; 3];
+        let mut squares = V::of(0.0);
+        for axis in 0..3 {
+            let a = load::<V, N>(edges, axis, first);
+            for mode in 0..4 {
+                let mut q = V::of(0.0);
+                for point in 0..7 {
+                    q = q + a[point] * V::load(&block.modes[7 * mode + point][first..]);
+                }
+                modes[axis][mode] = q;
+                squares = squares + q * q * V::of(MODE_WEIGHTS[mode]);
+            }
+        }
+        let grown = squares * V::load(&block.growth[first..]);
+        // s ∂U/∂s = V P̃ : F A − ½ κ a Q (1 + ½ β Q/h²)
+        prestrain_j = prestrain_j + squares * (V::of(1.0) + V::of(0.5) * grown) * whole * gone * V::of(0.5);
+        let minus_kappa = whole * (V::of(1.0) - gone) * (V::of(1.0) + grown);
         let minus_volume = V::load(&block.minus_volume[first..]);
         if VISCOUS {
             (V::of(0.0) - density * minus_volume).store(&mut power[first..]);
         }
         for axis in 0..3 {
-            let a = load::<V, N>(edges, axis, first);
             let mut f = [V::of(0.0); 7];
             for point in 0..7 {
                 let mut along = V::of(0.0);
@@ -158,13 +172,7 @@ fn cut<V: Vector<Scalar = T>, T: Scalar, L: ConstitutiveLaw, const VISCOUS: bool
                 f[point] = along * minus_volume;
             }
             for mode in 0..4 {
-                let mut q = V::of(0.0);
-                for point in 0..7 {
-                    q = q + a[point] * V::load(&block.modes[7 * mode + point][first..]);
-                }
-                // s ∂U/∂s = V P̃ : F A − ½ κ a Σ w |q|²
-                prestrain_j = prestrain_j + q * q * half_gone * V::of(MODE_WEIGHTS[mode]);
-                let q = q * minus_kappa * V::of(MODE_WEIGHTS[mode]);
+                let q = modes[axis][mode] * minus_kappa * V::of(MODE_WEIGHTS[mode]);
                 for point in 0..7 {
                     f[point] = f[point] + q * V::load(&block.modes[7 * mode + point][first..]);
                 }

@@ -38,6 +38,8 @@ struct CutBlock<T, const N: usize> {
     minus_volume: [T; N],
     /// `−κ` (N/m).
     minus_kappa: [T; N],
+    /// `β/h²` (1/m²).
+    growth: [T; N],
 }
 
 /// Prestrains of the cells of a block.
@@ -221,6 +223,7 @@ impl<T: Scalar, const N: usize> Tables<T, N> {
                 modes: [[zero; N]; 28],
                 minus_volume: [zero; N],
                 minus_kappa: [zero; N],
+                growth: [zero; N],
             });
         }
         let nothing = PrestrainBlock { entries: [[zero; N]; ENTRIES], lanes: 0 };
@@ -253,6 +256,7 @@ impl<T: Scalar, const N: usize> Tables<T, N> {
         }
         block.minus_volume[lane] = T::of(-rest.volume_m3);
         let mu_pa = self.materials[run.material as usize].material.lame.mu_pa;
+        block.growth[lane] = T::of(rest.growth_per_m2);
         block.minus_kappa[lane] = T::of(-rest.hourglass_m * mu_pa);
     }
 

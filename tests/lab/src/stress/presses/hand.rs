@@ -1,0 +1,139 @@
+//! A random press: which tool, where, in which direction, how fast and how far.
+use super::{Body, Random};
+use glam::{DQuat, DVec3};
+use miette::{Result, bail};
+use palpate_physics::{
+    Model,
+    contact::{Coupling, ToolShape, ToolSpec, ToolTarget},
+};
+use std::fmt;
+
+/// Force (N) at which a hand goes no deeper: the largest that the strongest of common arms renders.
+pub(super) const LARGEST_FORCE_N: f64 = 20.0;
+/// Depth (m) to which a hand goes that meets no such force.
+const LARGEST_DEPTH_M: f64 = 0.03;
+/// Ticks for which it stays there.
+const STAYS_TICKS: u32 = 60;
+
+/// A press.
+#[derive(Debug, Clone)]
+pub(super) struct Press {
+    pub(super) tool: ToolSpec,
+    /// Unit vector into the body.
+    along: DVec3,
+    /// Way (m) of the hand from its start to where it would touch the body at rest.
+    gap_m: f64,
+    depth_m: f64,
+    pub(super) speed_m_per_s: f64,
+    /// Whether the tool is far from the body's edges.
+    pub(super) is_inland: bool,
+}
+
+impl Press {
+    /// Chooses tool, place, direction, speed and depth.
+    pub(super) fn random(bare: &Model, body: &Body, random: &mut Random) -> Result<Self> {
+        let (x, surface) = (bare.surface_rest_positions_m(), bare.surface());
+        let lowest_m = x.iter().map(|p| p.z).fold(f64::INFINITY, f64::min);
+        let longest_m =
+            (0..surface.triangles.len()).map(|triangle| surface.longest_edge_m(triangle, x)).fold(0.0, f64::max);
+        for _ in 0..1000 {
+            let least_m = (1.1 * longest_m / palpate_physics::contact::LARGEST_TRIANGLE).max(1e-3);
+            let radius_m = random.log_within(least_m, 0.02_f64.min(0.4 * body.edge_m));
+            let coupling = if random.chance(0.7) {
+                let (stiffness_n_per_m, mass_kg) = (random.log_within(200.0, 1000.0), random.log_within(0.02, 0.1));
+                let critical = 2.0 * (stiffness_n_per_m * mass_kg).sqrt();
+                Coupling::Spring { stiffness_n_per_m, mass_kg, damping_n_s_per_m: critical * random.within(0.2, 1.0) }
+            } else {
+                Coupling::Rigid
+            };
+            let shape = if random.chance(0.75) {
+                ToolShape::Sphere
+            } else {
+                ToolShape::capsule(coupling, radius_m, radius_m * random.within(0.5, 2.0), random.vector())
+            };
+            let [a, b, c] = surface.triangle_nodes(random.below(surface.triangles.len())).map(|node| x[node as usize]);
+            let normal = (b - a).cross(c - a).normalize_or(DVec3::Z);
+            let axis = normal.any_orthonormal_vector();
+            let tilt = DQuat::from_axis_angle(axis, random.within(0.0, 1.05));
+            let along = -(DQuat::from_axis_angle(normal, random.within(0.0, std::f64::consts::TAU)) * (tilt * normal));
+            let touch_m = (a + b + c) / 3.0 + normal * radius_m;
+            let gap_m = random.within(0.0, 0.01);
+            let start_position_m = touch_m - along * gap_m;
+            let friction_coefficient = if random.chance(0.5) { 0.0 } else { random.within(0.0, 0.8) };
+            let speed_m_per_s = random.log_within(0.05, 5.0);
+            let deepest_m = if coupling == Coupling::Rigid { body.rigid_depth_m } else { LARGEST_DEPTH_M };
+            let depth_m = random.within(0.2, 1.0) * deepest_m;
+            let name = "hand".to_owned();
+            let tool = ToolSpec { name, shape, radius_m, coupling, friction_coefficient, start_position_m };
+            let reach_m = radius_m + shape.half_length_m();
+            let is_clear = |way_m: f64| {
+                let at_m = start_position_m + along * way_m;
+                x.iter().all(|p| p.distance(at_m) > reach_m + 1e-4)
+            };
+            let is_below = touch_m.z < lowest_m + reach_m;
+            if is_below || !is_clear(0.0) {
+                continue;
+            }
+            let inland_m = 0.5 * body.edge_m - 2.0 * reach_m - depth_m;
+            let is_inland = normal.z > 0.99 && touch_m.x.abs() < inland_m && touch_m.y.abs() < inland_m;
+            return Ok(Self { tool, along, gap_m, depth_m, speed_m_per_s, is_inland });
+        }
+        bail!("no place for a tool was found")
+    }
+}
+
+impl fmt::Display for Press {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let kind = if self.tool.coupling == Coupling::Rigid { "rigid" } else { "coupled" };
+        let shape = if self.tool.shape.as_capsule().is_some() { "capsule" } else { "sphere" };
+        let (radius_mm, depth_mm) = (1e3 * self.tool.radius_m, 1e3 * self.depth_m);
+        write!(f, "{kind} {shape} of {radius_mm:.1} mm, {:.2} m/s, {depth_mm:.0} mm deep", self.speed_m_per_s)
+    }
+}
+
+/// The hand in the course of a press.
+#[derive(Debug, Clone)]
+pub(super) struct Hand<'a> {
+    press: &'a Press,
+    /// How far (m) it has gone.
+    way_m: f64,
+    stayed: u32,
+    is_back: bool,
+}
+
+impl<'a> Hand<'a> {
+    pub(super) fn new(press: &'a Press) -> Self {
+        Self { press, way_m: 0.0, stayed: 0, is_back: false }
+    }
+
+    /// Returns whether it still goes deeper.
+    pub(super) fn presses(&self) -> bool {
+        self.stayed == 0
+    }
+
+    /// Returns whether it is over.
+    pub(super) fn is_over(&self) -> bool {
+        self.is_back
+    }
+
+    /// Moves on by a tick, against this force (N) on the device.
+    pub(super) fn go_on(&mut self, period_s: f64, force_n: f64) -> ToolTarget {
+        let Press { along, gap_m, depth_m, speed_m_per_s, .. } = *self.press;
+        let step_m = speed_m_per_s * period_s;
+        let mut moved_m = 0.0;
+        if self.presses() && force_n < LARGEST_FORCE_N && self.way_m < gap_m + depth_m {
+            moved_m = step_m.min(gap_m + depth_m - self.way_m);
+        } else if self.stayed < STAYS_TICKS {
+            self.stayed += 1;
+        } else {
+            moved_m = -step_m.min(self.way_m);
+            self.is_back = self.way_m <= step_m;
+        }
+        self.way_m += moved_m;
+        ToolTarget {
+            velocity_m_per_s: along * (moved_m / period_s),
+            orientation: self.press.tool.start().orientation,
+            ..ToolTarget::at(self.press.tool.start_position_m + along * self.way_m)
+        }
+    }
+}

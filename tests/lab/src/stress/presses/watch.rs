@@ -1,0 +1,103 @@
+//! What is watched while a hand presses.
+use super::{Body, Hand, Press};
+use crate::stress::rig::{Drive, Rig};
+use miette::Result;
+use palpate_physics::{ModelSpec, contact::is_inside};
+
+/// Largest fall of the force, over the force before, in a tick and in 20 ms of a slow press.
+pub(super) const MOST_IN_A_TICK: f64 = 0.05;
+pub(super) const MOST_IN_20_MS: f64 = 0.20;
+/// Largest error of the ledger over the largest energy that moved.
+pub(super) const MOST_IMBALANCE: f64 = 0.05;
+/// Force (N) below which a fall is none, as samples come and go.
+const LEAST_N: f64 = 0.05;
+/// Energy (J) that counts as moved even where a hand hardly touches: forces in f32 are wrong by as much as a part of it.
+const LEAST_J: f64 = 1e-6;
+/// Depth (m) of the surface in a tool, over its radius, at which it presses.
+const DEEP: f64 = 0.02;
+/// Number of ticks between two looks at whether a tool is inside.
+const LOOK_EVERY: u32 = 5;
+/// Ticks after the hand is back.
+const LATER_TICKS: u32 = 100;
+
+/// What a press came to.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Found {
+    /// Tick that was refused.
+    pub(super) quarantined: Option<u64>,
+    /// Whether the tool's centre was in the body.
+    pub(super) is_inside: bool,
+    /// Whether the tool carried no force while the surface was in it, and how deep (m) that was.
+    pub(super) lets_go: bool,
+    pub(super) depth_m: f64,
+    pub(super) fall_in_a_tick: f64,
+    pub(super) fall_in_20_ms: f64,
+    pub(super) imbalance: f64,
+    pub(super) force_n: f64,
+    pub(super) repeated: u32,
+    /// Most substeps, over the model's.
+    pub(super) substeps: f64,
+}
+
+impl Found {
+    /// Returns the worse one of both in everything that is a number.
+    pub(super) fn worse(&self, other: &Self) -> Self {
+        Self {
+            imbalance: self.imbalance.max(other.imbalance),
+            force_n: self.force_n.max(other.force_n),
+            repeated: self.repeated + other.repeated,
+            substeps: self.substeps.max(other.substeps),
+            ..*self
+        }
+    }
+}
+
+/// Presses a body, and watches.
+pub(super) fn watch(spec: &ModelSpec, body: &Body, press: &Press) -> Result<Found> {
+    let mut rig = Rig::new(ModelSpec { tools: vec![press.tool.clone()], ..spec.clone() })?;
+    let mut drive = Drive::still(&rig.model);
+    let mut hand = Hand::new(press);
+    let period_s = rig.model.settings().tick_period_s;
+    let is_slow = press.is_inland && press.speed_m_per_s <= body.slow_m_per_s;
+    let triangles = rig.model.surface().triangles.clone();
+    let (mut found, mut surface_m, mut moved_j) = (Found::default(), Vec::new(), LEAST_J);
+    let (mut forces_n, mut later, mut imbalance_j) = (Vec::new(), 0, 0.0_f64);
+    while later < LATER_TICKS {
+        let tool = &rig.state.mechanical.tools[0];
+        drive.tools[0] = hand.go_on(period_s, tool.device_force_n.length());
+        later += u32::from(hand.is_over());
+        let report = rig.tick(&drive);
+        found.repeated += report.repeated;
+        found.substeps = found.substeps.max(f64::from(report.substeps) / f64::from(rig.model.substeps()));
+        if let Some(quarantine) = report.quarantined {
+            found.quarantined = Some(quarantine.tick);
+            return Ok(found);
+        }
+        let tool = &rig.state.mechanical.tools[0];
+        let force_n = tool.contact_force_n.length();
+        found.force_n = found.force_n.max(force_n);
+        if tool.penetration_m > DEEP * press.tool.radius_m && force_n == 0.0 {
+            (found.lets_go, found.depth_m) = (true, found.depth_m.max(tool.penetration_m));
+        }
+        if hand.presses() && is_slow {
+            forces_n.push(force_n);
+            let fall = |ticks: usize| {
+                let most_n = forces_n.iter().rev().take(ticks + 1).fold(0.0_f64, |most, force| most.max(*force));
+                if most_n > LEAST_N { 1.0 - force_n / most_n } else { 0.0 }
+            };
+            found.fall_in_a_tick = found.fall_in_a_tick.max(fall(1));
+            found.fall_in_20_ms = found.fall_in_20_ms.max(fall(20));
+        }
+        let energies = rig.energies();
+        for energy_j in [energies.kinetic_j, energies.elastic_j, energies.external_work_j, energies.dissipated_j] {
+            moved_j = moved_j.max(energy_j.abs());
+        }
+        imbalance_j = imbalance_j.max(energies.balance_j().abs());
+        if body.is_closed && rig.state.mechanical.tick.is_multiple_of(LOOK_EVERY.into()) {
+            rig.model.surface_positions_m(&rig.state, &mut surface_m);
+            found.is_inside |= is_inside(rig.state.mechanical.tools[0].centre_m, &triangles, &surface_m);
+        }
+    }
+    found.imbalance = imbalance_j / moved_j;
+    Ok(found)
+}
