@@ -7,6 +7,7 @@
 //! ```text
 //! Φ = ½ Σ_s k_f a_s g_s²      f_i = −∂Φ/∂x_i = Σ_s ζ_si k_f a_s g_s (y_s − c)/|y_s − c|      f_tool = −Σ_i f_i
 //! ```
+//! as long as no triangle is stretched ([`super::stretched_area`]) and no sample deep ([`super::depth`]).
 //! (`c` may move along the axis, but that changes no `g`: `y − c` is across the axis, or `c` an end of it). So contact
 //! is conservative, and balances linear momentum exactly; angular too where the tool turns, with the torque
 //! `Σ (y − c₀) × f` about its centre `c₀`. `k_f = α (λ + 2µ)/min(h, R)` with the size `h = √(2A₀)` of the surface

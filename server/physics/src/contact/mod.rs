@@ -6,6 +6,7 @@
 mod axis;
 mod axis_samples;
 pub(crate) mod broad;
+mod depth;
 mod foundation;
 mod friction;
 mod inside;

@@ -1,7 +1,7 @@
 //! Contact at rest: the foundation's potential, force and stiffness, without friction or history.
 //!
-//! With `W = ½ Σ_s k_f a_s g_s²` of a triangle, `g = R − |r|`, `r = y − c` (see [`super::foundation`]), and `n̂ = r/|r|`:
-//! `−∂W/∂y = k g n̂ = ∂W/∂c`, `∂²W/∂r² = H = k n̂n̂ᵀ − k (g/|r|)(I − n̂n̂ᵀ)`; nodes get both through the weights ζ, so
+//! With `W = Σ_s k_f a_s E(g_s)` of a triangle, `g = R − |r|`, `r = y − c` (see [`super::foundation`]), `F = E'`
+//! (see [`super::depth`]), and `n̂ = r/|r|`: `−∂W/∂y = k F n̂ = ∂W/∂c`, `∂²W/∂r² = H = k F' n̂n̂ᵀ − k (F/|r|)(I − n̂n̂ᵀ)`; nodes get both through the weights ζ, so
 //! that with `w = (ζ, −1)` on (nodes, tool) the gradient is `w ⊗ ∂W/∂r` and the stiffness `w wᵀ ⊗ H`. The potential
 //! counts the area of a stretched triangle (see [`super::stretched_area`]), with `r = A/A₀`:
 //! ```text
@@ -14,6 +14,7 @@
 //! it before, the ones it pressed then. So the potential is one smooth function while equilibrium is sought.
 use super::{
     ContactModel,
+    depth::DepthResponse,
     stretched_area::{AreaFactor, TriangleArea},
 };
 use crate::linalg::tensor::outer;
@@ -46,6 +47,8 @@ struct PressedSample {
     stiffness_n_per_m: f64,
     /// `R − |r|` (m).
     depth_m: f64,
+    /// How the foundation answers to it.
+    response: DepthResponse,
     distance_m: f64,
     normal: DVec3,
 }
@@ -62,14 +65,14 @@ struct PressedTriangle<'a> {
 impl PressedTriangle<'_> {
     /// Returns `W` (J).
     fn energy_at_rest_j(&self) -> f64 {
-        self.samples.iter().map(|s| 0.5 * s.stiffness_n_per_m * s.depth_m * s.depth_m).sum()
+        self.samples.iter().map(|s| s.stiffness_n_per_m * s.response.energy_m2).sum()
     }
 
     /// Returns `−∂W` (N) of the corners and of the tool.
     fn forces_at_rest_n(&self) -> [DVec3; 4] {
         let mut forces_n = [DVec3::ZERO; 4];
         for s in self.samples {
-            let force_n = s.normal * (s.stiffness_n_per_m * s.depth_m);
+            let force_n = s.normal * (s.stiffness_n_per_m * s.response.force_m);
             for (sum, weight) in forces_n.iter_mut().zip(s.ends()) {
                 *sum += force_n * weight;
             }
@@ -199,8 +202,9 @@ impl RestingContact {
             let mut blocks = [[DMat3::ZERO; 4]; 4];
             for s in pressed.samples {
                 let along = outer(s.normal, s.normal);
-                let across = if definite { 0.0 } else { s.depth_m / s.distance_m };
-                let hessian = (along - (DMat3::IDENTITY - along) * across) * (factor * s.stiffness_n_per_m);
+                let across = if definite { 0.0 } else { s.response.force_m / s.distance_m };
+                let hessian = (along * s.response.stiffness - (DMat3::IDENTITY - along) * across)
+                    * (factor * s.stiffness_n_per_m);
                 let weights = s.ends();
                 for i in 0..4 {
                     for j in i..4 {
@@ -249,6 +253,7 @@ impl RestingContact {
                         weights: [1.0 - wb - wc, wb, wc],
                         stiffness_n_per_m: samples.stiffness_n_per_m,
                         depth_m: radius_m - distance_m,
+                        response: DepthResponse::of(radius_m - distance_m, radius_m),
                         distance_m,
                         normal: r / distance_m,
                     });

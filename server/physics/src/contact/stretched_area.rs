@@ -5,7 +5,7 @@
 //! it further, and past some depth the axial force falls. So the foundation's energy density belongs to the current area
 //! where this is larger than at rest. With the area ratio `r = A/A₀` of a triangle,
 //! ```text
-//! Φ = φ(r) W        W = ½ Σ_s k_f a_s g_s²
+//! Φ = φ(r) W        W = Σ_s k_f a_s E(g_s)        (E: [`super::depth`])
 //! φ = 1                          r ≤ 1
 //!     1 + (r − 1)²/2δ            1 < r < 1 + δ
 //!     r − δ/2                    r ≥ 1 + δ

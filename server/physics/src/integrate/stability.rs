@@ -47,6 +47,9 @@ const SAFETY: f64 = 0.9;
 const TIMES_IF_NOT_FINITE: u32 = 4;
 /// Largest number of repetitions of a tick.
 const MOST_REPETITIONS: u32 = 3;
+/// Number of substeps that contact needed, over those of the tick, above which the tick is repeated: a tool came so fast that
+/// contact grew stiff within it.
+const HIT: f64 = 1.5;
 
 /// Returns whether the ticks of a body are judged, given whether its steps can be. Only those of leapfrog are: the
 /// seeds' schemes run as their authors describe them, and backward Euler needs no judgement.
@@ -157,14 +160,21 @@ impl ForceHistory {
         let evidence = self.evidence(environment, body, state, pace, start);
         let unstable = is_spoilt || self.is_unstable(&evidence, environment, body, state, pace);
         let found = (!is_spoilt).then(|| quotient(&evidence));
-        let more = substeps_for(environment, body.is_viscous(), substeps, found);
-        if let Some(more) = more.filter(|_| unstable && repeated < MOST_REPETITIONS) {
+        let least = environment.steps.with_stiffer_contact(stiffened).min(most_substeps(environment));
+        let is_hit = f64::from(least) > HIT * f64::from(substeps);
+        let more = if unstable {
+            substeps_for(environment, body.is_viscous(), substeps, found)
+        } else {
+            Some(least).filter(|_| is_hit)
+        };
+        if let Some(more) = more.filter(|_| repeated < MOST_REPETITIONS) {
             pace.start_again(more);
-            pace.too_few = pace.too_few.max(substeps);
+            if unstable {
+                pace.too_few = pace.too_few.max(substeps);
+            }
             return Verdict::Repeat;
         }
         if !unstable {
-            let least = environment.steps.with_stiffer_contact(stiffened).min(most_substeps(environment));
             let part = quotient(&evidence) / (SAFETY * LIMIT);
             pace.settle(least, environment.steps.substeps_per_long_step, part);
         }

@@ -9,6 +9,7 @@
 use super::{
     axis::Axis,
     broad::{Candidates, Triangles},
+    depth::DepthResponse,
     foundation::{Foundation, SampleTables, TriangleSamples},
     friction::FrictionSpring,
     local_torque::Levers,
@@ -230,7 +231,6 @@ fn press_triangle(
         }
     }
     if area.slope > 0.0 && pressed.energy_j > energy_before_j {
-        pressed.most_stiffened = pressed.most_stiffened.max(area.factor);
         // f_i = −φ' W/A₀ ∂A/∂x_i
         let energy_j = (pressed.energy_j - energy_before_j) / area.factor;
         let tension_n_per_m = area.slope * energy_j / samples.rest_m2;
@@ -266,9 +266,12 @@ fn press_sample(
     pressed: &mut Pressed,
 ) -> DVec3 {
     let depth_m = meeting.radius_m - distance_m - touch.free_depth_m;
-    // |f_n| = φ k_f a (g − g₀), Φ = ½ φ k_f a (g − g₀)²
-    let f_n = samples.area_factor * samples.stiffness_n_per_m * depth_m;
-    pressed.energy_j += 0.5 * f_n * depth_m;
+    let response = DepthResponse::of(depth_m, meeting.radius_m);
+    // |f_n| = φ k_f a F(g − g₀), Φ = φ k_f a E(g − g₀)
+    let stiffness_n_per_m = samples.area_factor * samples.stiffness_n_per_m;
+    let f_n = stiffness_n_per_m * response.force_m;
+    pressed.energy_j += stiffness_n_per_m * response.energy_m2;
+    pressed.most_stiffened = pressed.most_stiffened.max(samples.area_factor * response.stiffness);
     pressed.pressing_n += f_n;
     pressed.force_times_k_f += f_n * samples.foundation_pa_per_m;
     pressed.force_times_modulus += f_n * samples.indentation_modulus_pa;

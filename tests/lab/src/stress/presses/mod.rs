@@ -90,7 +90,9 @@ pub(super) fn run(options: &Options) -> Result<Outcome> {
             rigid += u32::from(is_rigid);
             rigid_inside += u32::from(is_rigid && found.is_inside);
             outcome.demand(is_rigid || !found.is_inside, || format!("{}: the tool is inside the body", at()));
-            outcome.demand(!found.lets_go, || format!("{}: no force at {:.1} mm of depth", at(), 1e3 * found.depth_m));
+            outcome.demand(is_rigid || !found.lets_go, || {
+                format!("{}: no force at {:.1} mm of depth", at(), 1e3 * found.depth_m)
+            });
             outcome.demand(found.fall_in_a_tick <= watch::MOST_IN_A_TICK, || {
                 format!("{}: the force fell by {:.0} % in a tick", at(), 100.0 * found.fall_in_a_tick)
             });

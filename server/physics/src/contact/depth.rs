@@ -1,0 +1,56 @@
+//! How pressure grows with depth.
+//!
+//! Up to `s₀ R` the foundation is linear. Beyond, a tool is nearer to passing through the surface than to what the
+//! foundation is made for (a coarse triangle that cannot follow it, an edge that bears little), and the samples on its
+//! flanks push each other: the axial force would fall while it sinks in. There pressure grows faster. With `s = g/R` and
+//! `u = max(0, s − s₀)`, per `k_f a` of a sample,
+//! ```text
+//! Φ = ½ g² + c R² u³        |f_n| = g + 3 c R u²        d|f_n|/dg = 1 + 6 c u
+//! ```
+
+/// `s₀`, the depth over the radius up to which the foundation is linear: the coupling of a tool saturates at less.
+const LINEAR: f64 = 0.4;
+/// `c`.
+const GROWTH: f64 = 10.0;
+
+/// The foundation's answer to a depth, per `k_f a` of a sample.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct DepthResponse {
+    /// Energy (m²).
+    pub(super) energy_m2: f64,
+    /// Force (m).
+    pub(super) force_m: f64,
+    /// Stiffness, 1 where the foundation is linear.
+    pub(super) stiffness: f64,
+}
+
+impl DepthResponse {
+    /// Returns the answer to a depth (m) in a tool of this radius (m).
+    pub(super) fn of(depth_m: f64, radius_m: f64) -> Self {
+        let beyond = (depth_m / radius_m - LINEAR).max(0.0);
+        Self {
+            energy_m2: 0.5 * depth_m * depth_m + GROWTH * radius_m * radius_m * beyond.powi(3),
+            force_m: depth_m + 3.0 * GROWTH * radius_m * beyond * beyond,
+            stiffness: 1.0 + 6.0 * GROWTH * beyond,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn force_and_stiffness_are_the_energys_derivatives_and_small_depths_are_linear() {
+        let radius_m = 0.01;
+        for depth_m in [0.0, 1e-3, 3.9e-3, 4.1e-3, 7e-3, 9.9e-3] {
+            let (step, at) = (1e-7, |d: f64| DepthResponse::of(d, radius_m));
+            let (low, here, high) = (at(depth_m - step), at(depth_m), at(depth_m + step));
+            let slope = (high.energy_m2 - low.energy_m2) / (2.0 * step);
+            assert!((slope - here.force_m).abs() < 1e-9, "{depth_m}");
+            let slope = (high.force_m - low.force_m) / (2.0 * step);
+            assert!((slope - here.stiffness).abs() < 1e-4, "{depth_m}");
+            assert!(depth_m > LINEAR * radius_m || here.force_m == depth_m);
+        }
+    }
+}
