@@ -9,8 +9,8 @@ use super::{
     switching::{ActivationQuery, Ball, FOLLOW, GAP, QUERY_EVERY_TICKS},
 };
 use crate::{
-    contact::{Near, Skin, ToolSpec},
-    tick::{Environment, MechanicalState},
+    contact::{Near, Skin},
+    tick::{Environment, MechanicalState, PointForce},
 };
 use glam::DVec3;
 
@@ -89,6 +89,28 @@ pub(super) fn meets_sleeping_skin(
     })
 }
 
+/// Returns whether a load or an injected force acts on skin whose particles sleep but may wake, where none did in the tick
+/// before.
+pub(super) fn begins_to_act(
+    environment: &Environment,
+    body: &HybridBody,
+    own: &mut HybridState,
+    scratch: &HybridScratch,
+    state: &MechanicalState,
+    points: &[PointForce],
+) -> bool {
+    let patch = &scratch.patch;
+    let sleeps = |particle: u32| patch.active().binary_search(&particle).is_err();
+    let is_asleep = |vertex: u32| {
+        let corners = body.partition.corners(body.vertex_point(vertex).cell as usize);
+        corners.iter().any(|&corner| body.may_wake(corner)) && corners.iter().all(|&corner| sleeps(corner))
+    };
+    let acts = scratch.query.load_claims.any_first(&state.load_factors, sleeps)
+        || points.iter().any(|point| environment.accepts(point) && is_asleep(point.node));
+    let did = std::mem::replace(&mut own.acts_on_sleeping_skin, acts);
+    acts && !did
+}
+
 /// Returns the squared distance (m²) of a point `p` to the middles of balls, and to the lines between those of
 /// neighbours, `a` and `b`:
 /// ```text
@@ -109,17 +131,38 @@ fn distance_to_balls_sq(balls: &[Option<Ball>], at_m: DVec3) -> f64 {
     nearest_sq
 }
 
+/// What acts on a body beside tools.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Acting<'a> {
+    /// Factor of every load.
+    pub(super) load_factors: &'a [f64],
+    /// Injected forces.
+    pub(super) points: &'a [PointForce],
+}
+
 impl ActivationQuery {
-    /// Finds the particles in the tools' balls, ascending. Where there is no room for all, each tool gets as many:
-    /// those nearest to the middles of its balls, and to the lines between those of neighbours.
-    pub(super) fn want(&mut self, body: &HybridBody, tools: &[ToolSpec], own: &HybridState, reach_m: f64, most: usize) {
+    /// Finds the particles that tools, loads and injected forces want, ascending. Where there is no room for all, each
+    /// claim gets as many: of a tool those nearest to the middles of its balls, and to the lines between those of
+    /// neighbours; of loads those nearest to where they act (see [`super::load_claims`]).
+    pub(super) fn want(
+        &mut self,
+        environment: &Environment,
+        body: &HybridBody,
+        own: &HybridState,
+        reach_m: f64,
+        acting: Acting<'_>,
+    ) {
+        let (tools, most) = (&environment.tools[..], body.particles.most_active);
         self.wanted.clear();
         let of_tool = |first: &mut usize, count: usize| {
             *first += count;
             Some(&own.balls[*first - count..*first])
         };
         let tools = || axis_sample_counts(body, tools).scan(0, of_tool);
-        let room = most / tools().filter(|balls| balls.iter().any(Option::is_some)).count().max(1);
+        let of_tools = tools().filter(|balls| balls.iter().any(Option::is_some)).count();
+        let of_points = usize::from(acting.points.iter().any(|point| environment.accepts(point)));
+        let claims = of_tools + self.load_claims.count(acting.load_factors) + of_points;
+        let room = most / claims.max(1);
         for balls in tools() {
             self.found.clear();
             for (number, ball) in balls.iter().enumerate().filter_map(|(number, ball)| Some((number, (*ball)?))) {
@@ -146,6 +189,9 @@ impl ActivationQuery {
             }
             self.wanted.extend(self.found.iter().map(|(_, particle)| *particle));
         }
+        self.load_claims.want(acting.load_factors, room, &mut self.nearest, &mut self.wanted);
+        self.nearest.add_points(environment, body, acting.points, reach_m);
+        self.nearest.take(room, &mut self.wanted);
         self.wanted.sort_unstable();
         self.wanted.dedup();
     }

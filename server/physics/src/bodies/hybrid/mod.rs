@@ -13,6 +13,7 @@ mod frequency;
 mod judged;
 pub mod kernels;
 mod kind;
+pub(crate) mod load_claims;
 mod locate;
 mod long_steps;
 pub mod mass_matrix;

@@ -47,7 +47,7 @@ impl HybridScratch {
             momenta: Vec::with_capacity(positions),
             of_free_j: None,
             kick_sq: [0.0; 3],
-            query: ActivationQuery::new(body, &environment.tools),
+            query: ActivationQuery::new(body, environment),
             before: Before::with_room(
                 room_for_cells(body, body.particles.most_active),
                 body.partition().residual_elements().len(),

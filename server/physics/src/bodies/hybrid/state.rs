@@ -32,6 +32,8 @@ pub struct HybridState {
     pub(crate) long_steps: LongSteps,
     /// Ticks since particles were last woken at once, up to [`super::switching::QUERY_EVERY_TICKS`].
     pub(super) ticks_since_at_once: u32,
+    /// Whether a load or an injected force acted on sleeping skin in the tick before.
+    pub(super) acts_on_sleeping_skin: bool,
 }
 
 impl HybridState {
@@ -123,6 +125,7 @@ impl KindState for HybridState {
             switched_j: 0.0,
             long_steps: LongSteps::with_room(body.node_count(), positions),
             ticks_since_at_once: 0,
+            acts_on_sleeping_skin: false,
         }
     }
 
@@ -138,6 +141,7 @@ impl KindState for HybridState {
         self.switched_j = 0.0;
         self.long_steps.forget();
         self.ticks_since_at_once = 0;
+        self.acts_on_sleeping_skin = false;
     }
 
     fn copy_from(&mut self, other: &Self) {
@@ -151,6 +155,7 @@ impl KindState for HybridState {
         self.switched_j = other.switched_j;
         self.long_steps.copy_from(&other.long_steps);
         self.ticks_since_at_once = other.ticks_since_at_once;
+        self.acts_on_sleeping_skin = other.acts_on_sleeping_skin;
     }
 
     /// Particles have to be ascending, may wake and have room, and all numbers are finite.
@@ -190,6 +195,7 @@ impl KindState for HybridState {
         chain.real(self.switched_j);
         self.long_steps.chain(chain);
         chain.whole(u64::from(self.ticks_since_at_once));
+        chain.whole(u64::from(self.acts_on_sleeping_skin));
     }
 
     fn active_particles(&self) -> &[u32] {

@@ -130,8 +130,8 @@ impl<'a> Stepped<'a> for SteppedHybrid<'a> {
         DVec3::select(held, -total_n, DVec3::ZERO)
     }
 
-    fn prepare(&mut self, environment: &Environment, state: &mut MechanicalState, _: &[PointForce]) {
-        self.switch_if_due(environment, state);
+    fn prepare(&mut self, environment: &Environment, state: &mut MechanicalState, points: &[PointForce]) {
+        self.switch_if_due(environment, state, points);
     }
 
     fn wake_only(

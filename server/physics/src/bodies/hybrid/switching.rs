@@ -19,9 +19,10 @@
 //! then (`projection`), for which `−Σ_i Δ_i × P_i`, with the momenta `P = M'' v + J`, is added to the couple on the
 //! right.
 use super::{
-    activation_query::{meets_sleeping_skin, update_balls},
+    activation_query::{Acting, begins_to_act, meets_sleeping_skin, update_balls},
     body::HybridBody,
     carried_skin::SkinView,
+    load_claims::{LoadClaims, NearestParticles},
     patch::KEPT,
     projection::Projection,
     running::RunningMassMatrix,
@@ -33,10 +34,7 @@ use super::{
     stepped::SteppedHybrid,
     transition_force::{Turn, turn_of},
 };
-use crate::{
-    contact::ToolSpec,
-    tick::{Environment, MechanicalState},
-};
+use crate::tick::{Environment, MechanicalState, PointForce};
 use glam::{BVec3, DVec3};
 use serde::{Deserialize, Serialize};
 
@@ -68,6 +66,10 @@ pub(super) struct ActivationQuery {
     pub(super) found: Vec<(f64, u32)>,
     /// Whether each particle is among these.
     pub(super) is_found: Vec<bool>,
+    /// What loads want.
+    pub(super) load_claims: LoadClaims,
+    /// A buffer of what loads and injected forces want.
+    pub(super) nearest: NearestParticles,
     /// Particles that are to be awake.
     pub(super) wanted: Vec<u32>,
     /// Active particles that no tool wants, each with its distance (m) from where it would be asleep.
@@ -88,8 +90,12 @@ pub(super) struct ActivationQuery {
 }
 
 impl ActivationQuery {
-    pub(super) fn new(body: &HybridBody, tools: &[ToolSpec]) -> Self {
-        let particles = &body.particles;
+    pub(super) fn new(body: &HybridBody, environment: &Environment) -> Self {
+        let (particles, tools) = (&body.particles, &environment.tools[..]);
+        let load_claims = match particles.waking {
+            Waking::ByHand => LoadClaims::default(),
+            Waking::ByTools { reach_m } => LoadClaims::new(environment, body, reach_m),
+        };
         let in_ball = match particles.waking {
             Waking::ByHand => 0,
             Waking::ByTools { reach_m } => (2.0 * reach_m / particles.spacing_m + 2.0).powi(3) as usize,
@@ -103,6 +109,8 @@ impl ActivationQuery {
                     .min(body.partition.particle_count()),
             ),
             is_found: vec![false; body.partition.particle_count()],
+            load_claims,
+            nearest: NearestParticles::with_room(body.partition.particle_count()),
             wanted: Vec::with_capacity(most_wanted),
             unwanted: Vec::with_capacity(most),
             moved: Vec::with_capacity(most),
@@ -120,7 +128,12 @@ impl ActivationQuery {
 impl SteppedHybrid<'_> {
     /// Prepares a tick: makes the patch that of the state's active particles, and every few ticks queries which should
     /// be active, and switches to them. Allocates nothing.
-    pub(super) fn switch_if_due(&mut self, environment: &Environment, state: &mut MechanicalState) {
+    pub(super) fn switch_if_due(
+        &mut self,
+        environment: &Environment,
+        state: &mut MechanicalState,
+        points: &[PointForce],
+    ) {
         let Self { body, own, scratch } = self;
         let tick_period_s = environment.settings.tick_period_s;
         scratch.follow(body, own);
@@ -131,13 +144,16 @@ impl SteppedHybrid<'_> {
         let particles = &body.particles;
         let Waking::ByTools { reach_m } = particles.waking else { return };
         own.ticks_since_at_once = own.ticks_since_at_once.saturating_add(1).min(QUERY_EVERY_TICKS as u32);
-        if own.ticks_since_at_once >= AT_ONCE_EVERY_TICKS && meets_sleeping_skin(environment, body, scratch, state) {
-            self.wake_at_once(environment, state, reach_m);
+        if own.ticks_since_at_once >= AT_ONCE_EVERY_TICKS
+            && (meets_sleeping_skin(environment, body, scratch, state)
+                || begins_to_act(environment, body, own, scratch, state, points))
+        {
+            self.wake_at_once(environment, state, points, reach_m);
             return;
         }
         match state.tick % QUERY_EVERY_TICKS {
             0 => {
-                scratch.query(environment, body, own, state, reach_m);
+                scratch.query(environment, body, own, state, points, reach_m);
                 own.want(&scratch.query.wanted);
             }
             SWITCH_TICKS => own.next.clone_from(&own.wanted),
@@ -148,11 +164,17 @@ impl SteppedHybrid<'_> {
         }
     }
 
-    /// Queries and switches in this tick: a tool meets skin whose particles sleep.
-    fn wake_at_once(&mut self, environment: &Environment, state: &mut MechanicalState, reach_m: f64) {
+    /// Queries and switches in this tick: something presses skin whose particles sleep.
+    fn wake_at_once(
+        &mut self,
+        environment: &Environment,
+        state: &mut MechanicalState,
+        points: &[PointForce],
+        reach_m: f64,
+    ) {
         let Self { body, own, scratch } = self;
         own.ticks_since_at_once = 0;
-        scratch.query(environment, body, own, state, reach_m);
+        scratch.query(environment, body, own, state, points, reach_m);
         own.wanted.clone_from(&scratch.query.wanted);
         own.next.clone_from(&scratch.query.wanted);
         if own.is_switching() {
@@ -210,12 +232,13 @@ impl HybridScratch {
         body: &HybridBody,
         own: &mut HybridState,
         state: &MechanicalState,
+        points: &[PointForce],
         reach_m: f64,
     ) {
         let Self { patch, query, .. } = self;
         patch.displace(body, &state.x);
         update_balls(environment, &mut SkinView::new(body, patch), body, own, state);
-        query.want(body, &environment.tools, own, reach_m, body.particles.most_active);
+        query.want(environment, body, own, reach_m, Acting { load_factors: &state.load_factors, points });
         query.keep_unsettled(patch, &body.particles);
     }
 

@@ -1,33 +1,29 @@
 //! Finds which particles are awake in an equilibrium.
 //!
 //! They are those that a tool would keep awake where it rests, by the rules of the loop (`hybrid::switching`): a ball
-//! about the vertex of the skin nearest to the tool, or nearest to where it is deepest. So are those within the same
-//! reach of vertices that a load acts on, since its press is as local as a tool's. Where there is no room for all of a
-//! claim, the nearest are awake. If there is no room even for those within a spacing of a load, the load is spread wide,
-//! and left to the coarse tets: some of the particles beneath it, chosen by nothing, would make a pattern of it.
+//! about the vertex of the skin nearest to the tool, or nearest to where it is deepest. So are those that loads want
+//! (`hybrid::load_claims`). Where there is no room for all of a claim, the nearest are awake.
 use super::awakened::Awakened;
-use crate::mesh::Surface;
 use crate::{
     bodies::hybrid::{
         HybridBody, Waking,
+        load_claims::{LoadClaims, NearestParticles},
         switching::{FOLLOW, GAP},
     },
     contact::deepest_m,
-    settings::LoadSpec,
     statics::equilibrium::Goal,
     tick::Environment,
 };
 use glam::DVec3;
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 
 /// What keeps particles awake.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone)]
 pub(super) enum Claims {
     /// These particles are awake, whatever acts on the body.
     Given(Vec<u32>),
-    /// Tools keep particles awake, by the middles of their balls at rest (m), and loads, each with its particles and
-    /// their distances (m).
-    ByRule { reach_m: f64, balls: Vec<Option<DVec3>>, loads: Vec<Vec<(f64, u32)>>, spread: u32 },
+    /// Tools keep particles awake, by the middles of their balls at rest (m), and so do loads with these factors.
+    ByRule { reach_m: f64, balls: Vec<Option<DVec3>>, loads: LoadClaims, load_factors: Vec<f64> },
 }
 
 impl Claims {
@@ -43,9 +39,9 @@ impl Claims {
             Waking::ByTools { reach_m } => reach_m,
             Waking::ByHand => return Self::Given(Vec::new()),
         };
-        let acting = environment.loads.iter().zip(goal.load_factors).filter(|(_, factor)| **factor != 0.0);
-        let loads: Vec<_> = acting.map(|(load, _)| near_load(&environment.surface, body, load, reach_m)).collect();
-        Self::ByRule { reach_m, balls: vec![None; environment.tools.len()], loads, spread: 0 }
+        let loads = LoadClaims::new(environment, body, reach_m);
+        let (balls, load_factors) = (vec![None; environment.tools.len()], goal.load_factors.to_vec());
+        Self::ByRule { reach_m, balls, loads, load_factors }
     }
 
     /// Looks at where tools are in an equilibrium, with these forces (N) on them; returns the particles that are to be
@@ -53,9 +49,9 @@ impl Claims {
     pub(super) fn look(&mut self, awakened: &Awakened<'_>, unknowns: &[DVec3], contact_n: &[DVec3]) -> Vec<u32> {
         let (environment, body) = (awakened.environment, awakened.body);
         let (most, spacing_m) = (body.particles().most_active, body.particles().spacing_m);
-        let (reach_m, balls, loads, spread) = match self {
+        let (reach_m, balls, loads, load_factors) = match self {
             Self::Given(ids) => return ids.clone(),
-            Self::ByRule { reach_m, balls, loads, spread } => (*reach_m, balls, loads, spread),
+            Self::ByRule { reach_m, balls, loads, load_factors } => (*reach_m, balls, loads, load_factors),
         };
         let configuration = awakened.configuration(unknowns);
         let (skin_m, tools_m) = configuration.split_at(awakened.vertices());
@@ -65,7 +61,7 @@ impl Claims {
             let touch = TouchingTool { centre_m: *centre_m, radius_m: tool.radius_m, contact_force_n: *contact_n };
             *ball = ball_of(*ball, body, skin_m, touch, near_m, FOLLOW * spacing_m);
         }
-        let claims = (balls.iter().flatten().count() + loads.len()).max(1);
+        let claims = (balls.iter().flatten().count() + loads.count(load_factors)).max(1);
         let room = most / claims;
         let mut wanted = BTreeSet::new();
         for middle_m in balls.iter().flatten() {
@@ -77,14 +73,14 @@ impl Claims {
             });
             take_nearest(&mut found, room, &mut wanted);
         }
-        *spread = 0;
-        for found in loads {
-            if found.iter().filter(|(distance_m, _)| *distance_m <= spacing_m * (1.0 + 1e-9)).count() > room {
-                *spread += 1;
-            } else {
-                take_nearest(found, room, &mut wanted);
-            }
-        }
+        let mut of_loads = Vec::new();
+        loads.want(
+            load_factors,
+            room,
+            &mut NearestParticles::with_room(body.partition().particle_count()),
+            &mut of_loads,
+        );
+        wanted.extend(of_loads);
         wanted.into_iter().collect()
     }
 
@@ -92,7 +88,7 @@ impl Claims {
     pub(super) fn spread_loads(&self) -> u32 {
         match self {
             Self::Given(_) => 0,
-            Self::ByRule { spread, .. } => *spread,
+            Self::ByRule { loads, load_factors, .. } => loads.spread_loads(load_factors),
         }
     }
 }
@@ -130,26 +126,4 @@ fn ball_of(
         None if gap_m >= near_m => None,
         _ => Some(*rest_m),
     }
-}
-
-/// Returns the particles that may wake within a reach of vertices that a load acts on, with the distance (m) to the
-/// nearest of them.
-fn near_load(surface: &Surface, body: &HybridBody, load: &LoadSpec, reach_m: f64) -> Vec<(f64, u32)> {
-    let vertices: BTreeSet<u32> = match load {
-        LoadSpec::NodalForces(forces) => forces.iter().map(|(vertex, _)| *vertex).collect(),
-        LoadSpec::Traction { triangles, .. } | LoadSpec::Pressure { triangles, .. } => {
-            triangles.iter().flat_map(|&triangle| surface.triangle_nodes(triangle as usize)).collect()
-        }
-    };
-    let mut nearest_sq: BTreeMap<u32, f64> = BTreeMap::new();
-    for vertex in vertices {
-        let rest_m = body.skin_rest_m()[vertex as usize];
-        body.partition().particles_within(rest_m, reach_m, |particle, distance_sq| {
-            if body.may_wake(particle) {
-                let nearest = nearest_sq.entry(particle).or_insert(distance_sq);
-                *nearest = nearest.min(distance_sq);
-            }
-        });
-    }
-    nearest_sq.into_iter().map(|(particle, distance_sq)| (distance_sq.sqrt(), particle)).collect()
 }
