@@ -388,5 +388,5 @@ fn from_file(kind: &'static dyn BodyKind, table: &MeshTable, files: &Files<'_>, 
     let parts = parts::of_groups(&grouped, &surface);
     let (warnings, report) = (grouped.warnings, grouped.notes);
     let body = Body::new(kind, BodyMesh::Tets(grouped.mesh), surface, format!("file {}", table.file));
-    Ok(Body { parts, warnings, report, ..body })
+    Ok(Body { parts, report, warnings, ..body })
 }
