@@ -37,7 +37,7 @@ fn canonical(mesh: &GroupedMesh) -> Vec<([[i64; 3]; 4], i64)> {
 }
 
 /// With the groups `left` (11) and `right` (12).
-const GROUPED: [&str; 36] = [
+const GROUPED: [&str; 39] = [
     "bar_v1.msh",
     "bar_v22_ascii.msh",
     "bar_v22_binary.msh",
@@ -45,6 +45,8 @@ const GROUPED: [&str; 36] = [
     "bar_sparse_v41_ascii.msh",
     "bar_sparse_v41_binary.msh",
     "bar_sparse_v22_ascii.msh",
+    "bar_parametric_v22_ascii.msh",
+    "bar_parametric_v22_binary.msh",
     "bar_parametric_v41_ascii.msh",
     "bar_parametric_v41_binary.msh",
     "bar_partitioned_v41_ascii.msh",
@@ -58,6 +60,7 @@ const GROUPED: [&str; 36] = [
     "bar_meshio_binary.vtu",
     "bar_meshio_zlib.vtu",
     "bar_meshio_v22_ascii.msh",
+    "bar_gmsh.mesh",
     "bar_tetgen.node",
     "bar_tetgen.ele",
     "bar_vtk42_ascii.vtk",

@@ -17,6 +17,7 @@ mod narrow;
 mod nearest;
 mod proxy;
 mod resting;
+mod sample_potential;
 mod spring;
 mod state;
 mod stepping;
@@ -36,6 +37,7 @@ pub use moduli::SurfaceModuli;
 pub(crate) use nearest::deepest_m;
 pub use proxy::SubstepTime;
 pub(crate) use resting::{Pressing, RestingContact};
+pub use sample_potential::SamplePotential;
 pub(crate) use spring::SaturatingSpring;
 pub use state::ContactState;
 pub(crate) use tangent::{ContactTangents, StepAhead};
@@ -49,7 +51,7 @@ pub const LARGEST_TRIANGLE: f64 = foundation::MAX_LEVEL as f64 * foundation::SPA
 use crate::mesh::Surface;
 use axis::Axis;
 use broad::Triangles;
-use foundation::{BodyAtRest, Foundation, SampleTables};
+use foundation::{BodyAtRest, Foundation, SampleTables, TriangleSamples};
 use glam::DVec3;
 use narrow::Pressed;
 use touching::Touching;
@@ -88,6 +90,8 @@ pub struct TriangleFoundation<'a> {
     pub weights: &'a [[f64; 2]],
     /// `k_f a` (N/m) of each sample.
     pub stiffness_n_per_m: f64,
+    /// Area (m²) of the triangle at rest.
+    pub rest_m2: f64,
 }
 
 /// Positions and velocities of a body's nodes at one instant.
@@ -215,8 +219,9 @@ impl ContactModel {
     pub fn foundation(&self, tool: usize) -> impl Iterator<Item = TriangleFoundation<'_>> {
         self.tools.get(tool).into_iter().flat_map(move |tool| {
             self.triangles.nodes.iter().enumerate().map(move |(triangle, &nodes)| {
-                let samples = tool.foundation.of(triangle, &self.tables);
-                TriangleFoundation { nodes, weights: samples.weights, stiffness_n_per_m: samples.stiffness_n_per_m }
+                let TriangleSamples { weights, stiffness_n_per_m, rest_m2, .. } =
+                    tool.foundation.of(triangle, &self.tables);
+                TriangleFoundation { nodes, weights, stiffness_n_per_m, rest_m2 }
             })
         })
     }

@@ -161,11 +161,11 @@ impl ForceHistory {
         let unstable = is_spoilt || self.is_unstable(&evidence, environment, body, state, pace);
         let found = (!is_spoilt).then(|| quotient(&evidence));
         let least = environment.steps.with_stiffer_contact(stiffened).min(most_substeps(environment));
-        let is_hit = f64::from(least) > HIT * f64::from(substeps);
+        let is_hit = environment.steps.needed_by_contact(stiffened) > HIT * f64::from(substeps);
         let more = if unstable {
             substeps_for(environment, body.is_viscous(), substeps, found)
         } else {
-            Some(least).filter(|_| is_hit)
+            Some(least).filter(|least| is_hit && *least > substeps)
         };
         if let Some(more) = more.filter(|_| repeated < MOST_REPETITIONS) {
             pace.start_again(more);

@@ -9,6 +9,9 @@ use crate::{
 /// judged unstable (`integrate::stability`).
 const LONG_STEP_FRACTION: f64 = 0.85;
 
+/// Number of substeps that stiffer contact needs, over those of the tick, up to which the step's safety is enough.
+const WITHIN_SAFETY: f64 = 1.05;
+
 /// Returns the factor by which the square of a frequency grows at the allowed stretch, the largest one of the laws
 /// ([`Material::stiffening`]).
 pub(crate) fn stiffening(settings: &Settings, materials: &[Material]) -> f64 {
@@ -71,8 +74,13 @@ impl Steps {
     /// neighbours move against each other and the samples between them hardly, so that contact adds a quarter of these
     /// sums or less there (`docs/measurements/deep-press.md`).
     pub(crate) fn with_stiffer_contact(self, times: f64) -> u32 {
-        let needed = self.enough * (1.0 + 0.5 * (times - 1.0).max(0.0) * self.of_contact).sqrt();
+        let needed = self.needed_by_contact(times) / WITHIN_SAFETY;
         (needed.ceil() as u32).max(self.substeps).next_multiple_of(self.substeps_per_long_step)
+    }
+
+    /// Returns the same before it is rounded up.
+    pub(crate) fn needed_by_contact(self, times: f64) -> f64 {
+        self.enough * (1.0 + 0.5 * (times - 1.0).max(0.0) * self.of_contact).sqrt()
     }
 
     /// Returns the same substeps for a body whose coarse level may take longer steps; `omega` (rad/s) is the largest

@@ -346,7 +346,8 @@ fn from_surfaces(
     let warnings = inner.warnings.iter().chain(&outer.warnings).cloned().collect();
     let parts = parts::of_boundary(&filled.regions, &surface);
     let origin = format!("wall between {} and {}", table.inner_file, table.outer_file);
-    let report = filled.report.to_string().lines().map(str::to_owned).collect();
+    let lines = filled.report.to_string();
+    let report = lines.lines().map(str::to_owned).chain(inner.notes.clone()).chain(outer.notes.clone()).collect();
     let mut body = Body { parts, report, warnings, ..Body::new(kind, BodyMesh::Tets(filled.mesh), surface, origin) };
     let around = |spacing_m| fill::around(inner_input, outer_input, spacing_m).map_err(refused);
     body.skin = kinds::skin_around(&body, of_body, files, around)?;
@@ -373,7 +374,7 @@ fn from_surface(
     let surface = Surface::alone(positions_m.len(), file.triangles);
     let origin = format!("surface {}", table.file);
     let mesh = BodyMesh::Surface { positions_m, control: None };
-    Ok(Body { warnings: file.warnings, ..Body::new(kind, mesh, surface, origin) })
+    Ok(Body { warnings: file.warnings, report: file.notes, ..Body::new(kind, mesh, surface, origin) })
 }
 
 fn from_file(kind: &'static dyn BodyKind, table: &MeshTable, files: &Files<'_>, at: &Where) -> Result<Body, Fault> {
@@ -384,7 +385,8 @@ fn from_file(kind: &'static dyn BodyKind, table: &MeshTable, files: &Files<'_>, 
     files.limits.check_tets(&at, volume.tets.len() as u64)?;
     let grouped = volume.into_tet_mesh(table.unit.in_m(), UnusedNodes::Drop).map_err(refused)?;
     let surface = Surface::of(&grouped.mesh).map_err(|error| mesh_fault(&at, error))?;
-    let (parts, warnings) = (parts::of_groups(&grouped, &surface), grouped.warnings.clone());
+    let parts = parts::of_groups(&grouped, &surface);
+    let (warnings, report) = (grouped.warnings, grouped.notes);
     let body = Body::new(kind, BodyMesh::Tets(grouped.mesh), surface, format!("file {}", table.file));
-    Ok(Body { parts, warnings, ..body })
+    Ok(Body { parts, report, warnings, ..body })
 }

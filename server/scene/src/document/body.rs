@@ -161,7 +161,7 @@ impl LengthUnit {
     }
 }
 
-/// A tetrahedral mesh file: Gmsh MSH, VTK, VTU or TetGen.
+/// A tetrahedral mesh file: Gmsh MSH, VTK, VTU, TetGen or MEDIT.
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct MeshTable {

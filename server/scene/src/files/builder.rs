@@ -1,4 +1,5 @@
 //! Collects what the readers of the single formats find, and makes a volume or a surface of it.
+use super::cursor::shown;
 use super::error::{FileError, Place, Problem};
 use super::{Group, SurfaceFile, VolumeFile};
 use glam::DVec3;
@@ -12,6 +13,8 @@ pub(super) enum Shape {
     Triangle,
     Polygon,
     Tet,
+    /// A line of the geometry that was meshed: read past, and no loss to volumes and surfaces.
+    Curve,
     /// Read past, and counted.
     Other,
 }
@@ -31,6 +34,7 @@ pub(super) struct Kind {
 pub(super) struct Builder {
     pub(super) nodes: Vec<DVec3>,
     pub(super) warnings: Vec<String>,
+    notes: Vec<String>,
     /// Names of physical groups by dimension and tag; may come before or after the elements.
     pub(super) names: HashMap<(u8, i64), String>,
     groups: Vec<(u8, Option<i64>)>,
@@ -45,6 +49,11 @@ pub(super) struct Builder {
     node_groups: BTreeMap<usize, Vec<u32>>,
     skipped: BTreeMap<&'static str, usize>,
     higher_order: BTreeMap<&'static str, usize>,
+    /// Arrays that nothing uses and that could not be read, and why.
+    left_out: BTreeMap<String, String>,
+    curves: usize,
+    /// Nodes of curves, and of points without a group.
+    of_geometry: Vec<u32>,
 }
 
 impl Builder {
@@ -59,6 +68,14 @@ impl Builder {
                     self.triangle([first, pair[0], pair[1]], tags);
                 }
             }
+            (Shape::Polygon, _) => {
+                return *self.skipped.entry("faces of fewer than three corners").or_default() += 1;
+            }
+            (Shape::Curve, _) => {
+                self.of_geometry.extend(nodes);
+                return self.curves += 1;
+            }
+            (Shape::Point, &[node]) if tags.is_empty() => self.of_geometry.push(node),
             (Shape::Point, &[node]) => {
                 for &tag in tags {
                     let group = self.group(0, Some(tag)) as usize;
@@ -109,6 +126,13 @@ impl Builder {
         self.node_groups.entry(group).or_default().push(node);
     }
 
+    /// Tells of an array that nothing uses why it is left out.
+    pub(super) fn leave_out(&mut self, array: &str, why: impl FnOnce() -> String) {
+        // VTK writes blanks in names so.
+        let name = shown(array.replace("%20", " ").as_bytes());
+        self.left_out.entry(name).or_insert_with(why);
+    }
+
     fn group(&mut self, dimension: u8, tag: Option<i64>) -> u32 {
         let groups = &mut self.groups;
         *self.group_of.entry((dimension, tag)).or_insert_with(|| {
@@ -137,11 +161,28 @@ impl Builder {
         if !self.tets.is_empty() {
             parts.push(format!("{} tetrahedra", self.tets.len()));
         }
+        if self.curves > 0 {
+            parts.push(format!("{} lines", self.curves));
+        }
         parts.extend(counted(&self.skipped));
         parts.join(", ")
     }
 
     fn note(&mut self) {
+        const NAMED: usize = 5;
+        if self.curves > 0 {
+            self.notes.push(format!("{} lines of the geometry are left out", self.curves));
+        }
+        if !self.left_out.is_empty() {
+            let mut named: Vec<_> =
+                self.left_out.iter().take(NAMED).map(|(name, why)| format!("`{name}` ({why})")).collect();
+            if self.left_out.len() > NAMED {
+                named.push(format!("… ({} in all)", self.left_out.len()));
+            }
+            self.warnings.push(format!("arrays that nothing uses are left out: {}", named.join(", ")));
+        }
+        self.of_geometry.sort_unstable();
+        self.of_geometry.dedup();
         if !self.skipped.is_empty() {
             let skipped = counted(&self.skipped).join(", ");
             self.warnings.push(format!("not used: {skipped}"));
@@ -170,7 +211,9 @@ impl Builder {
             more_tet_groups: self.more_tet_groups.into_iter().collect(),
             surface_groups: self.surface_groups.into_iter().collect(),
             node_groups: self.node_groups.into_iter().collect(),
+            of_geometry: self.of_geometry,
             warnings: self.warnings,
+            notes: self.notes,
         })
     }
 
@@ -197,12 +240,18 @@ impl Builder {
             *index = vertices.len() as u32;
             vertices.push(self.nodes[node]);
         }
-        let unused = self.nodes.len() - vertices.len();
+        let unused_by_geometry = |&node: &&u32| index_of[*node as usize] == u32::MAX;
+        let of_geometry = self.of_geometry.iter().filter(unused_by_geometry).count();
+        if of_geometry > 0 {
+            let note = "points of the geometry that belong to no triangle are left out";
+            self.notes.push(format!("{of_geometry} {note}"));
+        }
+        let unused = self.nodes.len() - vertices.len() - of_geometry;
         if unused > 0 {
             self.warnings.push(format!("{unused} points that belong to no triangle are left out"));
         }
         let triangles = self.triangles.iter().map(|t| t.map(|node| index_of[node as usize])).collect();
-        Ok(SurfaceFile { vertices, triangles, warnings: self.warnings })
+        Ok(SurfaceFile { vertices, triangles, warnings: self.warnings, notes: self.notes })
     }
 }
 

@@ -65,13 +65,22 @@ impl<'a> Cursor<'a> {
         self.at = self.data.len().min(self.at.saturating_add(bytes));
     }
 
+    /// Where the item taken last begins.
+    pub(super) fn place(&self) -> Place {
+        match self.encoding {
+            Encoding::Ascii => Place::Line(line_number(&self.data[..self.mark])),
+            _ => Place::Byte(self.mark),
+        }
+    }
+
     /// An error at the item taken last.
     pub(super) fn fail(&self, problem: Problem) -> FileError {
-        let place = match self.encoding {
-            Encoding::Ascii => Place::Line(self.data[..self.mark].split(|&b| b == b'\n').count()),
-            _ => Place::Byte(self.mark),
-        };
-        FileError::new(self.path, place, problem)
+        FileError::new(self.path, self.place(), problem)
+    }
+
+    /// Goes back by `bytes`, at most to the beginning.
+    pub(super) fn go_back(&mut self, bytes: usize) {
+        self.at = self.at.saturating_sub(bytes);
     }
 
     pub(super) fn truncated(&self, wanted: &str) -> FileError {
@@ -104,16 +113,22 @@ impl<'a> Cursor<'a> {
         std::str::from_utf8(word).map_err(|_| self.expected(wanted, word))
     }
 
-    /// The rest of the line, without its end; `None` at the end of the file.
+    /// The rest of the line, without its end (LF, CR LF or CR); `None` at the end of the file.
     pub(super) fn line(&mut self) -> Option<&'a [u8]> {
         if self.rest().is_empty() {
             return None;
         }
         self.mark = self.at;
-        let length = self.rest().iter().position(|&b| b == b'\n').unwrap_or(self.rest().len());
+        let length = self.rest().iter().position(|b| matches!(b, b'\n' | b'\r')).unwrap_or(self.rest().len());
         let line = &self.rest()[..length];
-        self.advance(length + 1);
-        Some(line.strip_suffix(b"\r").unwrap_or(line))
+        self.advance(length);
+        self.advance(if self.rest().starts_with(b"\r\n") { 2 } else { 1 });
+        Some(line)
+    }
+
+    /// Whether the end of the file was reached without an end of its last line.
+    pub(super) fn is_last_line_open(&self) -> bool {
+        self.rest().is_empty() && !matches!(self.data.last(), Some(b'\n' | b'\r'))
     }
 
     /// Parses the next word, whatever the encoding of the numbers.
@@ -145,6 +160,22 @@ impl<'a> Cursor<'a> {
             return self.parse(wanted);
         }
         Ok(self.binary(scalar, wanted)?.real())
+    }
+
+    /// A number that the mesh does not depend on, or the word, such as `-nan(ind)`, that stands in its place.
+    ///
+    /// What begins with a letter and is not NaN or infinite is a keyword: fewer numbers are there than announced.
+    pub(super) fn optional_real(&mut self, scalar: Scalar, wanted: &str) -> Result<Result<f64, &'a [u8]>, FileError> {
+        if self.encoding != Encoding::Ascii {
+            return Ok(Ok(self.binary(scalar, wanted)?.real()));
+        }
+        let word = self.word().ok_or_else(|| self.truncated(wanted))?;
+        if let Some(value) = std::str::from_utf8(word).ok().and_then(|text| text.parse().ok()) {
+            return Ok(Ok(value));
+        }
+        let begins = |letters: &[u8]| word.get(..3).is_some_and(|start| start.eq_ignore_ascii_case(letters));
+        let like_a_number = matches!(word, [b'0'..=b'9' | b'+' | b'-' | b'.' | b'#' | b'*', ..]);
+        if like_a_number || begins(b"nan") || begins(b"inf") { Ok(Err(word)) } else { Err(self.expected(wanted, word)) }
     }
 
     fn binary(&mut self, scalar: Scalar, wanted: &str) -> Result<Number, FileError> {
@@ -201,6 +232,13 @@ impl Number {
             Self::Real(value) => value,
         }
     }
+}
+
+/// The number, from 1, of the line that begins or goes on behind `before`.
+pub(super) fn line_number(before: &[u8]) -> usize {
+    let ends = |pair: &[u8]| pair[0] == b'\n' || (pair[0] == b'\r' && pair[1] != b'\n');
+    let last = matches!(before.last(), Some(b'\n' | b'\r'));
+    1 + before.windows(2).filter(|pair| ends(pair)).count() + usize::from(last)
 }
 
 /// Bytes as a message shows them: printable and short.

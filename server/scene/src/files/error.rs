@@ -185,7 +185,7 @@ impl Problem {
                 "copy or export the file again; its writer or the transfer may have been interrupted"
             }
             Self::UnknownFormat { .. } => {
-                "volumes: .msh .vtk .vtu .node/.ele; surfaces: .stl .obj .ply .vtk .vtp; see docs/formats.md"
+                "volumes: .msh .vtk .vtu .node/.ele .mesh; surfaces: .stl .obj .ply .vtk .vtp; see docs/formats.md"
             }
             Self::Expected { .. } => "the file is damaged, or of another format than it claims; export it again",
             Self::NonFinite { .. } | Self::UnknownNode { .. } | Self::DuplicateNode { .. } => {

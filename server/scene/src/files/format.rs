@@ -1,6 +1,6 @@
 //! Tells a file's format from its content and its name.
 use super::error::{FileError, Place, Problem};
-use super::stl;
+use super::{medit, stl};
 use std::path::Path;
 
 /// The families of formats, each with its reader.
@@ -10,6 +10,7 @@ pub(super) enum Format {
     VtkLegacy,
     VtkXml,
     TetGen,
+    Medit,
     Stl,
     Obj,
     Ply,
@@ -29,6 +30,11 @@ pub(super) fn load(path: &Path) -> Result<Vec<u8>, FileError> {
     Ok(data)
 }
 
+/// Without the byte order mark that some editors put before text in UTF-8. A binary STL file may begin with anything.
+pub(super) fn unmarked(data: &[u8]) -> &[u8] {
+    data.strip_prefix(b"\xef\xbb\xbf").filter(|_| !stl::is_binary(data)).unwrap_or(data)
+}
+
 /// The extension, in lower case.
 pub(super) fn extension(path: &Path) -> String {
     path.extension().map(|e| e.to_string_lossy().to_ascii_lowercase()).unwrap_or_default()
@@ -45,6 +51,7 @@ pub(super) fn recognise(path: &Path, data: &[u8]) -> Result<Format, FileError> {
         "vtk" => Ok(Format::VtkLegacy),
         "vtu" | "vtp" => Ok(Format::VtkXml),
         "node" | "ele" | "face" => Ok(Format::TetGen),
+        "mesh" => Ok(Format::Medit),
         "stl" => Ok(Format::Stl),
         "obj" => Ok(Format::Obj),
         "ply" => Ok(Format::Ply),
@@ -59,11 +66,13 @@ fn by_content(data: &[u8]) -> Option<Format> {
         Some(Format::Msh)
     } else if begins("# vtk DataFile") {
         Some(Format::VtkLegacy)
+    } else if begins(medit::FIRST) {
+        Some(Format::Medit)
     } else if begins("<?xml") || begins("<VTKFile") {
         Some(Format::VtkXml)
     } else if begins("ply\n") || begins("ply\r") {
         Some(Format::Ply)
-    } else if begins("solid") || stl::is_binary(data) {
+    } else if stl::begins_solid(start) || stl::is_binary(data) {
         Some(Format::Stl)
     } else {
         None

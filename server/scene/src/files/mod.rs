@@ -11,6 +11,7 @@ mod builder;
 mod cursor;
 mod error;
 mod format;
+mod medit;
 mod msh;
 mod obj;
 mod ply;
@@ -74,8 +75,12 @@ pub struct VolumeFile {
     pub surface_groups: Vec<(usize, Vec<[u32; 3]>)>,
     /// Points by group: index into `groups`, node indices.
     pub node_groups: Vec<(usize, Vec<u32>)>,
+    /// Nodes, ascending, of lines and ungrouped points of the geometry: no loss where no tet uses them.
+    pub of_geometry: Vec<u32>,
     /// What was skipped or changed, for the user to read.
     pub warnings: Vec<String>,
+    /// What was skipped without a loss, for the user to read.
+    pub notes: Vec<String>,
 }
 
 /// A triangulated surface as its file gives it.
@@ -87,9 +92,11 @@ pub struct SurfaceFile {
     pub triangles: Vec<[u32; 3]>,
     /// What was skipped or changed, for the user to read.
     pub warnings: Vec<String>,
+    /// What was skipped without a loss, for the user to read.
+    pub notes: Vec<String>,
 }
 
-/// Reads a tetrahedral mesh: Gmsh MSH, VTK legacy, VTU or TetGen. The content decides, then the extension.
+/// Reads a tetrahedral mesh: Gmsh MSH, VTK legacy, VTU, TetGen or MEDIT. The content decides, then the extension.
 ///
 /// # Errors
 /// A [`FileError`] with the place and what to do.
@@ -125,12 +132,14 @@ fn parse(path: &Path, data: &[u8]) -> Result<Builder, FileError> {
     if data.is_empty() {
         return Err(FileError::new(path, Place::File, Problem::Empty));
     }
+    let data = format::unmarked(data);
     match format::recognise(path, data)? {
         Format::Msh => msh::read(path, data),
         Format::VtkLegacy => vtk::legacy::read(path, data),
         Format::VtkXml => vtk::xml::read(path, data),
         // TetGen spreads a mesh over files with one stem.
         Format::TetGen => tetgen::read(path),
+        Format::Medit => medit::read(path, data),
         Format::Stl => stl::read(path, data),
         Format::Obj => obj::read(path, data),
         Format::Ply => ply::read(path, data),

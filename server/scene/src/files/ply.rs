@@ -1,6 +1,6 @@
 //! PLY (Stanford polygons), ASCII and binary of both byte orders: vertices and faces, other elements are read past.
 use super::builder::{Builder, Kind, Shape};
-use super::cursor::{Cursor, Encoding, Scalar};
+use super::cursor::{Cursor, Encoding, Scalar, shown};
 use super::error::{FileError, Problem};
 use glam::DVec3;
 use std::path::Path;
@@ -32,6 +32,11 @@ impl Element {
 pub(super) fn read(path: &Path, data: &[u8]) -> Result<Builder, FileError> {
     let mut cursor = Cursor::new(path, data);
     let (encoding, elements) = header(&mut cursor)?;
+    // Behind lines that end in CR alone a line feed is the first byte of binary data.
+    let header = &data[..data.len() - cursor.rest().len()];
+    if header.ends_with(b"\r\n") && !header[..header.len() - 1].contains(&b'\n') {
+        cursor.go_back(1);
+    }
     cursor.encoding = encoding;
     let mut builder = Builder::default();
     for element in &elements {
@@ -45,7 +50,7 @@ pub(super) fn read(path: &Path, data: &[u8]) -> Result<Builder, FileError> {
             "face" => faces(&mut cursor, &mut builder, element, count)?,
             _ => {
                 for _ in 0..count {
-                    item(&mut cursor, element, |_, _| ())?;
+                    item(&mut cursor, &mut builder, element, &[], |_, _| ())?;
                 }
                 let name = Kind { shape: Shape::Other, name: "items of other elements", corners: 0 };
                 (0..count).for_each(|_| builder.element(name, &[], &[]));
@@ -125,8 +130,14 @@ fn scalar_of(cursor: &Cursor, name: &str) -> Result<Scalar, FileError> {
     })
 }
 
-/// Takes one item; `keep` gets the index of the property and each of its values.
-fn item(cursor: &mut Cursor, element: &Element, mut keep: impl FnMut(usize, f64)) -> Result<(), FileError> {
+/// Takes one item; `keep` gets the index of each property in `used` and each of its values.
+fn item(
+    cursor: &mut Cursor,
+    builder: &mut Builder,
+    element: &Element,
+    used: &[usize],
+    mut keep: impl FnMut(usize, f64),
+) -> Result<(), FileError> {
     for (index, property) in element.properties.iter().enumerate() {
         let count = match property.length {
             None => 1,
@@ -137,7 +148,11 @@ fn item(cursor: &mut Cursor, element: &Element, mut keep: impl FnMut(usize, f64)
             }
         };
         for _ in 0..count {
-            keep(index, cursor.real(property.scalar, &property.name)?);
+            if used.contains(&index) {
+                keep(index, cursor.real(property.scalar, &property.name)?);
+            } else if let Err(word) = cursor.optional_real(property.scalar, &property.name)? {
+                builder.leave_out(&property.name, || format!("has `{}`{}", shown(word), cursor.place()));
+            }
         }
     }
     Ok(())
@@ -153,7 +168,7 @@ fn vertices(cursor: &mut Cursor, builder: &mut Builder, element: &Element, count
     }
     for node in 0..count {
         let mut position = DVec3::ZERO;
-        item(cursor, element, |index, value| {
+        item(cursor, builder, element, &axes, |index, value| {
             if let Some(axis) = axes.iter().position(|&a| a == index) {
                 position[axis] = value;
             }
@@ -176,11 +191,7 @@ fn faces(cursor: &mut Cursor, builder: &mut Builder, element: &Element, count: u
     let mut nodes = Vec::new();
     for face in 0..count {
         corners.clear();
-        item(cursor, element, |index, value| {
-            if index == list {
-                corners.push(value);
-            }
-        })?;
+        item(cursor, builder, element, &[list], |_, value| corners.push(value))?;
         nodes.clear();
         for &corner in &corners {
             if !(corner >= 0.0 && corner.fract() == 0.0 && corner < builder.nodes.len() as f64) {
@@ -189,10 +200,6 @@ fn faces(cursor: &mut Cursor, builder: &mut Builder, element: &Element, count: u
                 return Err(cursor.fail(Problem::UnknownNode { element, node: corner as i64, known }));
             }
             nodes.push(corner as u32);
-        }
-        if nodes.len() < 3 {
-            let found = format!("face {face} with {}", nodes.len());
-            return Err(cursor.expected("three or more corners", found.as_bytes()));
         }
         polygons += usize::from(nodes.len() > 3);
         builder.element(POLYGON, &nodes, &[]);

@@ -12,16 +12,48 @@ const HEADER: usize = 84;
 const FACET: usize = 50;
 const TRIANGLE: Kind = Kind { shape: Shape::Triangle, name: "triangles", corners: 3 };
 
-/// Whether the length is that of a binary file with the count it gives. Some writers begin binary files with `solid`.
+/// Whether the length is that of a binary file with the count it gives.
 pub(super) fn is_binary(data: &[u8]) -> bool {
-    let count = data.get(HEADER - 4..HEADER).and_then(|b| b.try_into().ok()).map(u32::from_le_bytes);
-    count.is_some_and(|count| data.len() as u64 == HEADER as u64 + FACET as u64 * u64::from(count))
+    announced_length(data) == Some(data.len() as u64)
+}
+
+/// Length of a binary file with the count that stands in `data`.
+fn announced_length(data: &[u8]) -> Option<u64> {
+    let count = data.get(HEADER - 4..HEADER)?.try_into().ok().map(u32::from_le_bytes)?;
+    Some(HEADER as u64 + FACET as u64 * u64::from(count))
+}
+
+/// Whether a text begins as an ASCII file does.
+pub(super) fn begins_solid(text: &[u8]) -> bool {
+    begins(text, b"solid")
+}
+
+/// Keywords are lower case by the format's definition, upper case by some writers.
+fn begins(text: &[u8], keyword: &[u8]) -> bool {
+    text.get(..keyword.len()).is_some_and(|start| start.eq_ignore_ascii_case(keyword))
+}
+
+/// Tells ASCII from binary files, which some writers begin with `solid` too, and some end with more than triangles.
+fn is_ascii(data: &[u8]) -> bool {
+    let text = data.trim_ascii_start();
+    if is_binary(data) || !begins_solid(text) {
+        return false;
+    }
+    // Four letters of a text are no control characters, and announce more than a file ever holds.
+    let count = data.get(HEADER - 4..HEADER).unwrap_or_default();
+    if count.iter().all(|byte| !byte.is_ascii_control() || byte.is_ascii_whitespace()) {
+        return true;
+    }
+    let behind = text.iter().position(|byte| matches!(byte, b'\n' | b'\r')).map_or(&[][..], |end| &text[end..]);
+    let second = behind.trim_ascii_start();
+    let fits = announced_length(data).is_some_and(|length| length <= data.len() as u64);
+    !fits && [&b"facet"[..], b"endsolid", b"solid"].iter().any(|keyword| begins(second, keyword))
 }
 
 pub(super) fn read(path: &Path, data: &[u8]) -> Result<Builder, FileError> {
     let mut soup = Soup::default();
     let mut cursor = Cursor::new(path, data);
-    if !is_binary(data) && data.trim_ascii_start().starts_with(b"solid") {
+    if is_ascii(data) {
         read_ascii(&mut cursor, &mut soup)?;
     } else {
         read_binary(&mut cursor, &mut soup)?;
@@ -58,11 +90,11 @@ fn read_ascii(cursor: &mut Cursor, soup: &mut Soup) -> Result<(), FileError> {
     // `solid` and `endsolid` carry a free name to the end of the line.
     while let Some(text) = line {
         let text = text.trim_ascii();
-        closed = if text.starts_with(b"solid") {
+        closed = if begins_solid(text) {
             false
-        } else if text.starts_with(b"endsolid") {
+        } else if begins(text, b"endsolid") {
             true
-        } else if text.starts_with(b"facet") {
+        } else if begins(text, b"facet") {
             facet(cursor, soup)?;
             closed
         } else if text.is_empty() {
@@ -81,7 +113,7 @@ fn facet(cursor: &mut Cursor, soup: &mut Soup) -> Result<(), FileError> {
     keyword(cursor, "loop")?;
     let mut corners = Vec::with_capacity(3);
     loop {
-        match cursor.text("`vertex` or `endloop`")? {
+        match cursor.text("`vertex` or `endloop`")?.to_ascii_lowercase().as_str() {
             "vertex" => {
                 let mut position = DVec3::ZERO;
                 for axis in 0..3 {
@@ -103,7 +135,11 @@ fn facet(cursor: &mut Cursor, soup: &mut Soup) -> Result<(), FileError> {
 
 fn keyword(cursor: &mut Cursor, wanted: &str) -> Result<(), FileError> {
     let found = cursor.text(wanted)?;
-    if found == wanted { Ok(()) } else { Err(cursor.expected(&format!("`{wanted}`"), found.as_bytes())) }
+    if found.eq_ignore_ascii_case(wanted) {
+        Ok(())
+    } else {
+        Err(cursor.expected(&format!("`{wanted}`"), found.as_bytes()))
+    }
 }
 
 fn read_binary(cursor: &mut Cursor, soup: &mut Soup) -> Result<(), FileError> {

@@ -31,6 +31,8 @@ pub struct GroupedMesh {
     pub file_node: Vec<u32>,
     /// What was skipped or changed, for the user to read.
     pub warnings: Vec<String>,
+    /// What was skipped without a loss, for the user to read.
+    pub notes: Vec<String>,
 }
 
 /// What belongs to a group.
@@ -114,6 +116,7 @@ impl VolumeFile {
             node_groups: self.node_groups.into_iter().map(|(group, of)| (group, points(of))).collect(),
             file_node,
             warnings: self.warnings,
+            notes: self.notes,
         })
     }
 
@@ -165,7 +168,16 @@ impl VolumeFile {
             if policy == UnusedNodes::Refuse {
                 return Err(self.fail(Problem::Mesh(MeshError::UnusedNode { node, count })));
             }
-            self.warnings.push(format!("{count} nodes that belong to no tetrahedron are left out"));
+            let is_unused = |&&node: &&u32| used.get(node as usize) == Some(&false);
+            let of_geometry = self.of_geometry.iter().filter(is_unused).count();
+            if of_geometry > 0 {
+                let note = "nodes of the geometry that belong to no tetrahedron are left out";
+                self.notes.push(format!("{of_geometry} {note}"));
+            }
+            if count > of_geometry {
+                let others = count - of_geometry;
+                self.warnings.push(format!("{others} nodes that belong to no tetrahedron are left out"));
+            }
         }
         Ok((0..used.len() as u32).filter(|&node| used[node as usize]).collect())
     }
@@ -189,7 +201,9 @@ mod tests {
             groups: vec![group("wall", 3, 7), group("8", 3, 8), group("inside", 2, 7), group("both", 3, 9)],
             surface_groups: vec![(2, vec![[1, 2, 3], [0, 1, 4]])],
             node_groups: vec![],
+            of_geometry: vec![],
             warnings: vec![],
+            notes: vec![],
         }
     }
 

@@ -21,11 +21,11 @@ pub(super) fn read(path: &Path) -> Result<Builder, FileError> {
     // A surface may come as .node and .face alone.
     if element_path.exists() || !face_path.exists() {
         let data = format::load(&element_path)?;
-        elements(&mut Lines::new(&element_path, &data), &mut builder, first, TET, 4)?;
+        elements(&mut Lines::new(&element_path, &data), &mut builder, first, TET)?;
     }
     if face_path.exists() {
         let data = format::load(&face_path)?;
-        elements(&mut Lines::new(&face_path, &data), &mut builder, first, TRIANGLE, 3)?;
+        elements(&mut Lines::new(&face_path, &data), &mut builder, first, TRIANGLE)?;
     }
     Ok(builder)
 }
@@ -37,7 +37,7 @@ struct Lines<'a> {
 
 impl<'a> Lines<'a> {
     fn new(path: &'a Path, data: &'a [u8]) -> Self {
-        Self { cursor: Cursor::new(path, data) }
+        Self { cursor: Cursor::new(path, format::unmarked(data)) }
     }
 
     fn next(&mut self, wanted: &str) -> Result<Vec<&'a str>, FileError> {
@@ -103,13 +103,16 @@ fn nodes(lines: &mut Lines, builder: &mut Builder) -> Result<i64, FileError> {
 }
 
 /// Tets: `count corners attributes`, then `number nodes… attributes…`, of which the first is the region.
-/// Faces: `count markers`, then `number nodes… [marker]`; the marker 0 is none.
-fn elements(lines: &mut Lines, builder: &mut Builder, first: i64, kind: Kind, corners: usize) -> Result<(), FileError> {
+/// Faces: `count markers`, then `number nodes… [marker]`; the marker 0 is none. They have three nodes, of second order
+/// six, which the length of a line tells alone.
+fn elements(lines: &mut Lines, builder: &mut Builder, first: i64, kind: Kind) -> Result<(), FileError> {
+    let corners = kind.corners;
     let tets = kind.shape == Shape::Tet;
     let head = lines.next("the number of elements")?;
     let count = lines.parse(&head, 0, "the number of elements")?;
     let count = lines.cursor.check_count(count, 2 * (corners + 1), kind.name)?;
-    let node_count = if tets { lines.parse(&head, 1, "the number of nodes of a tetrahedron, 4 or 10")? } else { 3 };
+    let mut node_count =
+        if tets { lines.parse(&head, 1, "the number of nodes of a tetrahedron, 4 or 10")? } else { 3 };
     if tets && node_count != 4 && node_count != 10 {
         return Err(lines.cursor.expected("4 or 10 nodes of a tetrahedron", node_count.to_string().as_bytes()));
     }
@@ -120,6 +123,9 @@ fn elements(lines: &mut Lines, builder: &mut Builder, first: i64, kind: Kind, co
     let mut nodes = Vec::with_capacity(node_count);
     for _ in 0..count {
         let words = lines.next("an element")?;
+        if !tets {
+            node_count = face_nodes(words.len(), attributes);
+        }
         nodes.clear();
         for corner in 0..node_count {
             let node: i64 = lines.parse(&words, 1 + corner, "the node of an element")?;
@@ -138,4 +144,9 @@ fn elements(lines: &mut Lines, builder: &mut Builder, first: i64, kind: Kind, co
         builder.element(kind, &nodes, tag.as_slice());
     }
     Ok(())
+}
+
+/// Number of nodes of a face whose line has so many words. Behind the marker TetGen may name the two tets beside it.
+fn face_nodes(words: usize, markers: usize) -> usize {
+    if matches!(words.checked_sub(markers), Some(7 | 9)) { 6 } else { 3 }
 }

@@ -60,6 +60,9 @@ def by_gmsh():
     save("bar_v41_binary.msh", 4.1, 1)
     save("bar_gmsh_ascii.vtk")
     save("bar_gmsh_binary.vtk", binary=1)
+    gmsh.option.setNumber("Mesh.SaveElementTagType", 2)  # references are those of physical groups
+    gmsh.write("bar_gmsh.mesh")
+    gmsh.option.setNumber("Mesh.SaveElementTagType", 1)
     tags, _, _ = gmsh.model.mesh.getNodes()
     gmsh.model.mesh.renumberNodes(tags, [int(7 + 10 * t) for t in tags])
     save("bar_sparse_v41_ascii.msh", 4.1)
@@ -71,6 +74,8 @@ def by_gmsh():
     save("bar_overlap_v22_ascii.msh", 2.2)
     gmsh.model.removePhysicalGroups([(3, 13)])
     gmsh.option.setNumber("Mesh.SaveParametric", 1)
+    save("bar_parametric_v22_ascii.msh", 2.2)
+    save("bar_parametric_v22_binary.msh", 2.2, 1)
     save("bar_parametric_v41_ascii.msh", 4.1)
     save("bar_parametric_v41_binary.msh", 4.1, 1)
     gmsh.option.setNumber("Mesh.SaveParametric", 0)

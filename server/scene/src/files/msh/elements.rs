@@ -1,7 +1,7 @@
 //! Gmsh's element types.
 use crate::files::builder::{Kind, Shape};
 
-const LINES: Kind = Kind { shape: Shape::Other, name: "lines", corners: 2 };
+const LINES: Kind = Kind { shape: Shape::Curve, name: "lines", corners: 2 };
 const TRIANGLES: Kind = Kind { shape: Shape::Triangle, name: "triangles", corners: 3 };
 const QUADRANGLES: Kind = Kind { shape: Shape::Polygon, name: "quadrangles", corners: 4 };
 const TETRAHEDRA: Kind = Kind { shape: Shape::Tet, name: "tetrahedra", corners: 4 };

@@ -34,9 +34,10 @@ pub(super) fn read(path: &Path, data: &[u8]) -> Result<Builder, FileError> {
             ("PartitionedEntities", Version::V4) => v4::entities(&mut reader, true)?,
             ("Nodes", Version::V4) => v4::nodes(&mut reader)?,
             ("Elements", Version::V4) => v4::elements(&mut reader)?,
-            ("Nodes", Version::V2) => v2::nodes(&mut reader)?,
+            ("Nodes", Version::V2) => v2::nodes(&mut reader, false)?,
+            ("ParametricNodes", Version::V2) => v2::nodes(&mut reader, true)?,
             ("Elements", Version::V2) => v2::elements(&mut reader)?,
-            ("Nodes" | "Elements" | "Entities", _) => {
+            ("Nodes" | "ParametricNodes" | "Elements" | "Entities", _) => {
                 return Err(reader.cursor.expected("$MeshFormat before any other section", section.as_bytes()));
             }
             _ => reader.skip(section)?,

@@ -3,15 +3,36 @@ use super::Reader;
 use crate::files::cursor::{Encoding, Scalar};
 use crate::files::error::FileError;
 
-/// `count`, then `tag x y z` of every node.
-pub(super) fn nodes(reader: &mut Reader) -> Result<(), FileError> {
+/// `count`, then `tag x y z` of every node; of a parametric one also `dimension entity`, and as many parameters as the
+/// curve or surface has that the node is on.
+pub(super) fn nodes(reader: &mut Reader, parametric: bool) -> Result<(), FileError> {
     let count = section_count(reader, "nodes", 28, 8)?;
     for _ in 0..count {
         let tag = reader.int("the tag of a node")?;
         let position = reader.position()?;
         reader.add_node(tag, position)?;
+        if parametric {
+            parameters(reader)?;
+        }
     }
-    reader.end("Nodes")
+    reader.end(if parametric { "ParametricNodes" } else { "Nodes" })
+}
+
+fn parameters(reader: &mut Reader) -> Result<(), FileError> {
+    let dimension = reader.int("the dimension of a node's entity")?;
+    reader.int("the tag of a node's entity")?;
+    let parameters = match dimension {
+        1 | 2 => dimension,
+        0 | 3 => 0,
+        _ => {
+            let found = dimension.to_string();
+            return Err(reader.cursor.expected("the dimension of a node's entity, 0 to 3", found.as_bytes()));
+        }
+    };
+    for _ in 0..parameters {
+        reader.cursor.optional_real(Scalar::F64, "a parametric coordinate")?.ok();
+    }
+    Ok(())
 }
 
 /// Text: `tag type tag-count tags… nodes…` of every element. Binary: blocks `type block-size tag-count`, behind each

@@ -37,7 +37,7 @@ fn entity(reader: &mut Reader, dimension: i64, partitioned: bool) -> Result<(), 
     }
     // A point has its position, the others have the corners of their bounding box.
     for _ in 0..if dimension == 0 { 3 } else { 6 } {
-        reader.cursor.real(Scalar::F64, "the bounds of an entity")?;
+        reader.cursor.optional_real(Scalar::F64, "the bounds of an entity")?.ok();
     }
     let physical = tags(reader, "physical groups")?.into_iter().map(i64::saturating_abs).collect();
     if dimension > 0 {
@@ -69,7 +69,7 @@ pub(super) fn nodes(reader: &mut Reader) -> Result<(), FileError> {
         for tag in tags {
             let position = reader.position()?;
             for _ in 0..parameters {
-                reader.cursor.real(Scalar::F64, "a parametric coordinate")?;
+                reader.cursor.optional_real(Scalar::F64, "a parametric coordinate")?.ok();
             }
             reader.add_node(tag, position)?;
         }

@@ -1,6 +1,6 @@
 //! The arrays of a VTK XML file: text, base64 or raw bytes, compressed or not.
 use super::base64;
-use crate::files::cursor::{Number, Scalar, shown};
+use crate::files::cursor::{Number, Scalar, line_number, shown};
 use crate::files::error::{FileError, Place, Problem};
 use std::borrow::Cow;
 use std::path::Path;
@@ -43,7 +43,7 @@ impl Storage<'_> {
         let before = &self.data[..at.min(self.data.len())];
         let place = match self.appended {
             Some((start, false)) if at >= start => Place::Byte(at),
-            _ => Place::Line(before.split(|&b| b == b'\n').count()),
+            _ => Place::Line(line_number(before)),
         };
         FileError::new(self.path, place, problem)
     }

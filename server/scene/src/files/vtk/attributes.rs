@@ -1,13 +1,14 @@
 //! The attributes behind the geometry of a legacy file. Only the cell array that tells groups is kept.
 use super::cells::Groups;
 use super::legacy::next_line;
-use crate::files::cursor::{Cursor, Encoding, Scalar};
-use crate::files::error::{FileError, Problem};
+use crate::files::builder::Builder;
+use crate::files::cursor::{Cursor, Encoding, Scalar, shown};
+use crate::files::error::FileError;
 
 /// The number type by its name.
 pub(super) fn scalar(cursor: &Cursor, name: &str) -> Result<Scalar, FileError> {
     Ok(match name.to_ascii_lowercase().as_str() {
-        "char" => Scalar::I8,
+        "char" | "signed_char" => Scalar::I8,
         "unsigned_char" => Scalar::U8,
         "short" => Scalar::I16,
         "unsigned_short" => Scalar::U16,
@@ -18,17 +19,18 @@ pub(super) fn scalar(cursor: &Cursor, name: &str) -> Result<Scalar, FileError> {
         "unsigned_long" | "unsigned_long_long" | "vtktypeuint64" => Scalar::U64,
         "float" => Scalar::F32,
         "double" => Scalar::F64,
-        "bit" | "string" | "variant" | "utf8_string" => {
-            let what = format!("arrays of type {name} are not read");
-            let instead = "save the mesh without this array, or as VTU".to_string();
-            return Err(cursor.fail(Problem::Unsupported { what, instead }));
-        }
         _ => return Err(cursor.expected("a number type of VTK (char … double)", name.as_bytes())),
     })
 }
 
-/// The arrays behind `CELL_DATA count` or `POINT_DATA count`; those of cells are offered to `groups`.
-pub(super) fn read(cursor: &mut Cursor, count: &str, mut groups: Option<&mut Groups>) -> Result<(), FileError> {
+/// What is kept of the arrays: the groups, if they are of cells; the builder tells what could not be read.
+pub(super) struct Keep<'a> {
+    pub(super) groups: Option<&'a mut Groups>,
+    pub(super) builder: &'a mut Builder,
+}
+
+/// The arrays behind `CELL_DATA count` or `POINT_DATA count`.
+pub(super) fn read(cursor: &mut Cursor, count: &str, keep: &mut Keep) -> Result<(), FileError> {
     let tuples = number(cursor, count)?;
     loop {
         let mut ahead = cursor.clone();
@@ -38,27 +40,27 @@ pub(super) fn read(cursor: &mut Cursor, count: &str, mut groups: Option<&mut Gro
         }
         *cursor = ahead;
         match *words.as_slice() {
-            ["SCALARS", name, kind] => scalars(cursor, name, kind, "1", tuples, groups.as_deref_mut())?,
+            ["SCALARS", name, kind] => scalars(cursor, name, kind, "1", tuples, keep)?,
             ["SCALARS", name, kind, components] => {
-                scalars(cursor, name, kind, components, tuples, groups.as_deref_mut())?;
+                scalars(cursor, name, kind, components, tuples, keep)?;
             }
-            ["VECTORS" | "NORMALS", _, kind] => array(cursor, kind, tuples, 3, None)?,
-            ["TENSORS", _, kind] => array(cursor, kind, tuples, 9, None)?,
-            ["TENSORS6", _, kind] => array(cursor, kind, tuples, 6, None)?,
-            ["TEXTURE_COORDINATES", _, components, kind] => {
+            ["VECTORS" | "NORMALS", name, kind] => unused(cursor, name, kind, tuples, 3, keep)?,
+            ["TENSORS", name, kind] => unused(cursor, name, kind, tuples, 9, keep)?,
+            ["TENSORS6", name, kind] => unused(cursor, name, kind, tuples, 6, keep)?,
+            ["TEXTURE_COORDINATES", name, components, kind] => {
                 let components = number(cursor, components)?;
-                array(cursor, kind, tuples, components, None)?;
+                unused(cursor, name, kind, tuples, components, keep)?;
             }
-            ["GLOBAL_IDS" | "PEDIGREE_IDS" | "EDGE_FLAGS", _, kind] => array(cursor, kind, tuples, 1, None)?,
-            ["COLOR_SCALARS", _, components] => {
+            ["GLOBAL_IDS" | "PEDIGREE_IDS" | "EDGE_FLAGS", name, kind] => unused(cursor, name, kind, tuples, 1, keep)?,
+            ["COLOR_SCALARS", name, components] => {
                 let components = number(cursor, components)?;
-                array(cursor, "unsigned_char", tuples, components, None)?;
+                unused(cursor, name, "unsigned_char", tuples, components, keep)?;
             }
-            ["LOOKUP_TABLE", _, size] => {
+            ["LOOKUP_TABLE", name, size] => {
                 let size = number(cursor, size)?;
-                array(cursor, "unsigned_char", size, 4, None)?;
+                unused(cursor, name, "unsigned_char", size, 4, keep)?;
             }
-            ["FIELD", _, count] => field(cursor, count, groups.as_deref_mut())?,
+            ["FIELD", _, count] => field(cursor, count, keep)?,
             ["METADATA", ..] => metadata(cursor),
             _ => return Err(cursor.expected("an attribute of VTK's legacy format", words.join(" ").as_bytes())),
         }
@@ -75,18 +77,18 @@ fn scalars(
     kind: &str,
     components: &str,
     tuples: usize,
-    groups: Option<&mut Groups>,
+    keep: &mut Keep,
 ) -> Result<(), FileError> {
     let components = number(cursor, components)?;
     // The data may begin right behind: blanks must not be passed in search of the line.
     if cursor.rest().starts_with(b"LOOKUP_TABLE") {
         cursor.line();
     }
-    array(cursor, kind, tuples, components, groups.map(|groups| (name, groups)))
+    array(cursor, name, kind, tuples, components, keep)
 }
 
 /// `count` arrays, each behind `name components tuples type`.
-pub(super) fn field(cursor: &mut Cursor, count: &str, mut groups: Option<&mut Groups>) -> Result<(), FileError> {
+pub(super) fn field(cursor: &mut Cursor, count: &str, keep: &mut Keep) -> Result<(), FileError> {
     let count: i64 = count.parse().map_err(|_| cursor.expected("a count", count.as_bytes()))?;
     let mut left = cursor.check_count(count, 8, "arrays")?;
     while left > 0 {
@@ -95,7 +97,7 @@ pub(super) fn field(cursor: &mut Cursor, count: &str, mut groups: Option<&mut Gr
             ["METADATA", ..] => metadata(cursor),
             [name, components, tuples, kind] => {
                 let [components, tuples] = [number(cursor, components)?, number(cursor, tuples)?];
-                array(cursor, kind, tuples, components, groups.as_deref_mut().map(|groups| (name, groups)))?;
+                array(cursor, name, kind, tuples, components, keep)?;
                 left -= 1;
             }
             _ => return Err(cursor.expected("`name components tuples type`", words.join(" ").as_bytes())),
@@ -106,24 +108,112 @@ pub(super) fn field(cursor: &mut Cursor, count: &str, mut groups: Option<&mut Gr
 
 fn array(
     cursor: &mut Cursor,
+    name: &str,
     kind: &str,
     tuples: usize,
     components: usize,
-    groups: Option<(&str, &mut Groups)>,
+    keep: &mut Keep,
 ) -> Result<(), FileError> {
+    let wanted = keep.groups.as_ref().is_some_and(|groups| groups.wants(name, components));
+    let is_number = !NO_NUMBERS.contains(&kind.to_ascii_lowercase().as_str());
+    let Some(groups) = keep.groups.as_deref_mut().filter(|_| wanted && is_number) else {
+        return unused(cursor, name, kind, tuples, components, keep);
+    };
     let scalar = scalar(cursor, kind)?;
+    let least = if cursor.encoding == Encoding::Ascii { 2 } else { scalar.size() };
+    let count = cursor.check_count(values(tuples, components), least, "values of an array")?;
+    let mut found = Vec::with_capacity(count);
+    for _ in 0..count {
+        found.push(value(cursor, name, scalar, keep.builder)?);
+    }
+    groups.offer(name, &found);
+    Ok(())
+}
+
+/// A value, NaN where a word tells of none.
+fn value(cursor: &mut Cursor, name: &str, scalar: Scalar, builder: &mut Builder) -> Result<f64, FileError> {
+    Ok(cursor.optional_real(scalar, "a value of an array")?.unwrap_or_else(|word| {
+        builder.leave_out(name, || format!("has `{}`{}", shown(word), cursor.place()));
+        f64::NAN
+    }))
+}
+
+fn values(tuples: usize, components: usize) -> i64 {
+    i64::try_from(tuples.saturating_mul(components)).unwrap_or(i64::MAX)
+}
+
+/// Types whose values are no numbers, or none of whole bytes.
+const NO_NUMBERS: [&str; 4] = ["bit", "string", "utf8_string", "variant"];
+
+/// What may begin behind an array of strings.
+const BEHIND_ARRAYS: [&[u8]; 8] =
+    [b"POINTS ", b"CELLS ", b"CELL_DATA ", b"POINT_DATA ", b"FIELD ", b"SCALARS ", b"VECTORS ", b"LOOKUP_TABLE "];
+
+/// Passes an array that nothing uses: whatever its values are, they are no reason to refuse the mesh.
+fn unused(
+    cursor: &mut Cursor,
+    name: &str,
+    kind: &str,
+    tuples: usize,
+    components: usize,
+    keep: &mut Keep,
+) -> Result<(), FileError> {
     let ascii = cursor.encoding == Encoding::Ascii;
-    let count = i64::try_from(tuples.saturating_mul(components)).unwrap_or(i64::MAX);
-    let count = cursor.check_count(count, if ascii { 2 } else { scalar.size() }, "values of an array")?;
-    match groups.filter(|(name, groups)| groups.wants(name, components)) {
-        None if ascii => (0..count).try_for_each(|_| cursor.real(scalar, "a value of an array").map(drop)),
-        None => cursor.take(count * scalar.size(), "an array").map(drop),
-        Some((name, groups)) => {
-            let values: Result<Vec<f64>, _> = (0..count).map(|_| cursor.real(scalar, "a value of an array")).collect();
-            groups.offer(name, &values?);
-            Ok(())
+    let count = values(tuples, components);
+    let of_type = || format!("of type {}", shown(kind.as_bytes()));
+    match kind.to_ascii_lowercase().as_str() {
+        "bit" if !ascii => {
+            // Eight values a byte.
+            cursor.take(usize::try_from(count).unwrap_or(usize::MAX).div_ceil(8), "an array")?;
+            keep.builder.leave_out(name, of_type);
+        }
+        "string" | "utf8_string" if !ascii => {
+            for _ in 0..cursor.check_count(count, 1, "strings")? {
+                let length = string_length(cursor)?;
+                cursor.take(length, "a string")?;
+            }
+            keep.builder.leave_out(name, of_type);
+        }
+        // A line each; variants in binary files too.
+        "string" | "utf8_string" | "variant" => {
+            for _ in 0..cursor.check_count(count, 1, "lines of text")? {
+                let line = cursor.line().ok_or_else(|| cursor.truncated("a line of text"))?;
+                // Blanks in strings are written as %20: fewer strings are there than announced.
+                if BEHIND_ARRAYS.iter().any(|keyword| line.starts_with(keyword)) {
+                    return Err(cursor.expected("a line of text in an array", line));
+                }
+            }
+            keep.builder.leave_out(name, of_type);
+        }
+        kind => {
+            let scalar = if kind == "bit" { Scalar::U8 } else { scalar(cursor, kind)? };
+            if kind == "bit" {
+                keep.builder.leave_out(name, of_type);
+            }
+            let count = cursor.check_count(count, if ascii { 2 } else { scalar.size() }, "values of an array")?;
+            if !ascii {
+                return cursor.take(count * scalar.size(), "an array").map(drop);
+            }
+            for _ in 0..count {
+                value(cursor, name, scalar, keep.builder)?;
+            }
         }
     }
+    Ok(())
+}
+
+/// The length before a string of a binary file: the two highest bits tell of how many bytes it is.
+fn string_length(cursor: &mut Cursor) -> Result<usize, FileError> {
+    const WANTED: &str = "the length of a string";
+    let &[first] = cursor.take(1, WANTED)? else { return Err(cursor.truncated(WANTED)) };
+    let more = match first >> 6 {
+        3 => 0,
+        2 => 1,
+        1 => 3,
+        _ => 7,
+    };
+    let length = cursor.take(more, WANTED)?.iter().fold(u64::from(first & 0x3f), |n, &b| n << 8 | u64::from(b));
+    Ok(usize::try_from(length).unwrap_or(usize::MAX))
 }
 
 /// Passes a block of metadata, which ends with an empty line.

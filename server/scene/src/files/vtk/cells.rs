@@ -7,7 +7,9 @@ fn kind(number: i64) -> Option<Kind> {
     let (shape, name, corners) = match number {
         1 => (Shape::Point, "points", 1),
         2 => (Shape::Other, "sets of points", 0),
-        3 | 4 | 21 | 35 | 68 | 75 => (Shape::Other, "lines", 2),
+        3 | 21 | 35 | 68 | 75 => (Shape::Curve, "lines", 2),
+        // Chains of lines are drawn for their own sake.
+        4 => (Shape::Other, "lines", 2),
         5 | 22 | 34 | 69 | 76 => (Shape::Triangle, "triangles", 3),
         7 => (Shape::Polygon, "polygons", usize::MAX),
         8 => (Shape::Other, "pixels", 4),
@@ -93,8 +95,7 @@ impl CellTable {
             return Err(Problem::Inconsistent { what });
         };
         let fits = match (kind.shape, number) {
-            (Shape::Other, _) => true,
-            (_, POLYGON) => nodes.len() >= 3,
+            (Shape::Other, _) | (_, POLYGON) => true,
             (_, 1 | 5 | 9 | 10) => nodes.len() == kind.corners,
             _ => nodes.len() > kind.corners,
         };
@@ -150,6 +151,8 @@ impl Groups {
 }
 
 fn rank(name: &str) -> Option<usize> {
+    // Legacy files write a blank in a name as %20.
+    let name = name.replace("%20", "");
     let plain: String = name.chars().filter(|c| !matches!(c, ' ' | '_' | '-')).flat_map(char::to_lowercase).collect();
     GROUP_ARRAYS.iter().position(|known| *known == plain)
 }

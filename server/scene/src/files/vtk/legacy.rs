@@ -1,5 +1,5 @@
 //! The legacy format of VTK, ASCII and binary (big-endian), versions 1 to 5.1: unstructured grids and polygonal data.
-use super::attributes;
+use super::attributes::{self, Keep};
 use super::cells::{CellTable, Groups, LINES, POLYGON, STRIP, VERTICES};
 use crate::files::builder::Builder;
 use crate::files::cursor::{Cursor, Encoding, Scalar, shown};
@@ -76,12 +76,17 @@ impl Reader<'_> {
             ["LINES", count, size] => self.cells(count, size, Some(LINES))?,
             ["POLYGONS", count, size] => self.cells(count, size, Some(POLYGON))?,
             ["TRIANGLE_STRIPS", count, size] => self.cells(count, size, Some(STRIP))?,
-            ["FIELD", _, count] => attributes::field(&mut self.cursor, count, None)?,
+            ["FIELD", _, count] => {
+                attributes::field(&mut self.cursor, count, &mut Keep { groups: None, builder: &mut self.builder })?;
+            }
             ["METADATA", ..] => attributes::metadata(&mut self.cursor),
             ["CELL_DATA", count] => {
-                attributes::read(&mut self.cursor, count, Some(&mut self.groups))?;
+                let mut keep = Keep { groups: Some(&mut self.groups), builder: &mut self.builder };
+                attributes::read(&mut self.cursor, count, &mut keep)?;
             }
-            ["POINT_DATA", count] => attributes::read(&mut self.cursor, count, None)?,
+            ["POINT_DATA", count] => {
+                attributes::read(&mut self.cursor, count, &mut Keep { groups: None, builder: &mut self.builder })?;
+            }
             _ => return Err(self.cursor.expected("a keyword of VTK's legacy format", words.join(" ").as_bytes())),
         }
         Ok(())

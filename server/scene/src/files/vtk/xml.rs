@@ -207,7 +207,14 @@ impl<'a> Document<'a> {
         }
         let mut groups = Groups::default();
         for array in piece.in_element("CellData").filter(|array| array.components <= 1) {
-            groups.offer(&array.name, &self.storage.reals(array)?);
+            match self.storage.reals(array) {
+                Ok(values) => groups.offer(&array.name, &values),
+                // Real numbers with words among them, such as `-nan(ind)`, tell no groups.
+                Err(error) if array.holds_words() && matches!(*error.problem, Problem::Expected { .. }) => {
+                    builder.leave_out(&array.name, || error.problem.to_string());
+                }
+                Err(error) => return Err(error),
+            }
         }
         let tables: &[(&str, Option<i64>)] = if self.unstructured {
             &[("Cells", None)]
@@ -247,6 +254,11 @@ impl Piece {
 }
 
 impl DataArray {
+    /// Whether what is no number in it may be a word for what is not finite.
+    fn holds_words(&self) -> bool {
+        matches!(self.source, Source::Ascii(_)) && !self.scalar.is_integer()
+    }
+
     fn unused(at: usize) -> Self {
         Self { name: String::new(), scalar: Scalar::U8, components: 1, source: Source::Ascii(String::new()), at }
     }

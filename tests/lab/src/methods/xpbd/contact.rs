@@ -1,13 +1,18 @@
 //! A rigid sphere without friction as inequality constraints on the samples of the surface.
 //!
-//! Every sample `y = Σ ζ_i x_i` inside the sphere that the sphere met from outside: `C = |y − c| − R ≥ 0` with the compliance
-//! `α = 1/(k_f a)` of the server's foundation, so that `C²/(2α)` is its potential:
+//! Every sample `y = Σ ζ_i x_i` inside the sphere that the sphere met from outside, to the depth `g = R − |y − c|`, has the
+//! potential `k_f a φ(r) E(g)` of the server's foundation. So `C = √(2 φ E) = 0` (which is g where the surface is not
+//! stretched and the sample not deep) with the compliance `α = 1/(k_f a)`:
 //! ```text
-//! Δλ = −C/(Σ w ζ² + α/h²)        Δx_i = w_i ζ_i n̂ Δλ        force on the tool −n̂ Δλ/h²
+//! ∇_i C = (−φ E' ζ_i n̂ + φ' E ∂r/∂x_i)/C
+//! Δλ = C/(Σ w |∇C|² + α/h²)        Δx_i = −w_i ∇_i C Δλ        force on the tool −φ E'/C n̂ Δλ/h²
 //! ```
 use super::elements::Node;
 use glam::DVec3;
-use palpate_physics::{Model, contact::closest_weights};
+use palpate_physics::{
+    Model,
+    contact::{SamplePotential, closest_weights},
+};
 
 /// How far (in R) the surface may come nearer within a tick.
 const MARGIN: f64 = 0.25;
@@ -26,6 +31,8 @@ struct Triangle {
     weights: Vec<[f64; 3]>,
     /// `1/(k_f a h²)` (1/kg).
     compliance: f64,
+    /// Area at rest (m²).
+    rest_m2: f64,
 }
 
 impl Contact {
@@ -35,6 +42,7 @@ impl Contact {
             nodes: t.nodes,
             weights: t.weights.iter().map(|&[b, c]| [1.0 - b - c, b, c]).collect(),
             compliance: 1.0 / (t.stiffness_n_per_m * h_s * h_s),
+            rest_m2: t.rest_m2,
         });
         let triangles: Vec<Triangle> = triangles.collect();
         Self { radius_m, near: Vec::with_capacity(triangles.len()), triangles }
@@ -80,12 +88,18 @@ impl Contact {
             }
             let distance_m = distance_sq.sqrt();
             let normal = r / distance_m;
-            let w = a.w * (wa * wa) + b.w * (wb * wb) + c.w * (wc * wc);
-            let step = (self.radius_m - distance_m) / ((w * normal).dot(normal) + triangle.compliance);
-            a.x += a.w * normal * (wa * step);
-            b.x += b.w * normal * (wb * step);
-            c.x += c.w * normal * (wc * step);
-            sum += normal * step;
+            let depth_m = self.radius_m - distance_m;
+            let found = SamplePotential::of([a.x, b.x, c.x], triangle.rest_m2, depth_m, self.radius_m);
+            let c_m = (2.0 * found.energy_m2).sqrt();
+            let push = normal * (found.force_m / c_m);
+            let [ga, gb, gc] = found.area_gradients_m.map(|gradient_m| gradient_m / c_m);
+            let along = [push * wa - ga, push * wb - gb, push * wc - gc];
+            let w: f64 = [a, b, c].iter().zip(along).map(|(node, along)| (node.w * along).dot(along)).sum();
+            let step = c_m / (w + triangle.compliance);
+            a.x += a.w * along[0] * step;
+            b.x += b.w * along[1] * step;
+            c.x += c.w * along[2] * step;
+            sum += push * step;
         }
         for (n, node) in n.into_iter().zip([a, b, c]) {
             nodes[n] = node;
