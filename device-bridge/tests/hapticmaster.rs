@@ -133,7 +133,7 @@ fn poses_follow_the_arm_though_answers_come_in_pieces() {
         assert!(end.motion.position_m.distance(emulated.position_m()) < 1e-3, "{:?}", end.motion);
         assert!(emulated.position_m().x > 0.02 && emulated.requests() > 100);
         // It moves at up to 0.2 m/s: some milliseconds.
-        assert!(followed.farthest_m < 5e-3 + followed.late_m(), "{}, {}", followed.farthest_m, followed.late_m());
+        followed.assert_near(5e-3);
         assert!(end.measured_force_n.is_some());
     }
 }

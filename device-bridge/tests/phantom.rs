@@ -235,9 +235,8 @@ fn poses_follow_the_arm() {
     let end = arm.read(0).unwrap();
     assert!(end.motion.position_m.distance(emulated.arm.position_m()) < 1e-5, "{:?}", end.motion);
     assert!(emulated.arm.position_m().x > 0.029 && emulated.arm.frames() > 100);
-    assert!(followed.farthest_m < 5e-3 + followed.late_m(), "{}, {}", followed.farthest_m, followed.late_m());
-    let wrong_m = followed.way_m.distance(DVec3::X * 0.03);
-    assert!(wrong_m < 3e-3 + followed.late_m(), "{wrong_m}, {}", followed.late_m());
+    followed.assert_near(5e-3);
+    followed.assert_way(DVec3::X * 0.03, 3e-3);
 }
 
 #[test]

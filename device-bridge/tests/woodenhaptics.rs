@@ -140,9 +140,8 @@ fn poses_follow_the_arm_though_lines_come_in_pieces() {
         let end = arm.read(0).unwrap();
         assert!(end.motion.position_m.distance(emulated.position_m()) < 1e-4, "{:?}", end.motion);
         assert!(emulated.position_m().x > 0.02 && emulated.lines() > 100);
-        assert!(followed.farthest_m < 5e-3 + followed.late_m(), "{}, {}", followed.farthest_m, followed.late_m());
-        let wrong_m = followed.way_m.distance(end.motion.position_m);
-        assert!(wrong_m < 3e-3 + followed.late_m(), "{wrong_m}, {}, {:?}", followed.late_m(), end.motion);
+        followed.assert_near(5e-3);
+        followed.assert_way(end.motion.position_m, 3e-3);
         assert!(end.motion.velocity_m_per_s.length() < 5e-3, "{:?}", end.motion);
     }
 }

@@ -8,7 +8,14 @@ use palpate_bridge::{
 };
 use palpate_control::{HandPath, Keyframe};
 use palpate_proto::v1;
-use std::time::{Duration, Instant};
+use std::{
+    sync::{
+        Arc,
+        atomic::{AtomicBool, Ordering},
+    },
+    thread::JoinHandle,
+    time::{Duration, Instant},
+};
 
 const ORIGIN_M: DVec3 = DVec3::new(0.1, 0.0, -0.2);
 
@@ -139,44 +146,81 @@ pub fn follow(arm: &mut dyn Arm, mut look: impl FnMut(&Reading, f64)) {
 
 /// What following an arm showed.
 pub struct Followed {
-    /// How far from the arm its readings were at most, m.
-    pub farthest_m: f64,
-    /// The way that the velocities of all readings make, m.
-    pub way_m: DVec3,
-    /// The longest time for which nothing new came while the arm moved, s.
-    pub silent_s: f64,
+    /// How far (m) from the arm its readings were at most.
+    farthest_m: f64,
+    /// The way (m) that the velocities of all readings make.
+    way_m: DVec3,
+    /// The longest time (s) for which the machine let a thread wait.
+    late_s: f64,
 }
 
+/// The hand of these tests moves no faster (m/s).
+const FASTEST_M_PER_S: f64 = 0.2;
+
 impl Followed {
-    /// The way (m) that the arm makes at its fastest in that time. Both lengths above may be wrong by as much: a machine that
-    /// is busy stops the arm's thread or this one for tens of milliseconds, and a velocity then stands for a time in which it
-    /// was another.
-    pub fn late_m(&self) -> f64 {
-        FASTEST_M_PER_S * self.silent_s
+    /// All readings were within `near_m` (m) of the arm.
+    pub fn assert_near(&self, near_m: f64) {
+        let Self { farthest_m, late_s, .. } = self;
+        assert!(*farthest_m < near_m + self.late_m(), "{farthest_m} m from the arm, {late_s} s late");
+    }
+
+    /// The velocities of all readings make this way (m), within `near_m` (m).
+    ///
+    /// One velocity says nothing where a busy machine tells lines late; all together make the way.
+    pub fn assert_way(&self, expected_m: DVec3, near_m: f64) {
+        let Self { way_m, late_s, .. } = self;
+        let wrong_m = way_m.distance(expected_m);
+        assert!(wrong_m < near_m + self.late_m(), "{way_m} in place of {expected_m}, {late_s} s late");
+    }
+
+    /// The way (m) that the arm makes at its fastest while the machine lets a thread wait: a busy one stops the arm's thread or
+    /// this one for tens of milliseconds, and a reading then stands for a time in which the arm was elsewhere.
+    fn late_m(&self) -> f64 {
+        FASTEST_M_PER_S * self.late_s
     }
 }
 
-/// The hand of these tests moves no faster, m/s.
-const FASTEST_M_PER_S: f64 = 0.2;
+/// How long a machine lets threads wait: a thread that sleeps for a millisecond at a time, and knows nothing of any arm, so that
+/// no fault of a driver is taken for one of the machine.
+struct Sleeper {
+    is_over: Arc<AtomicBool>,
+    sleeps: JoinHandle<Duration>,
+}
+
+impl Sleeper {
+    fn start() -> Self {
+        let is_over = Arc::new(AtomicBool::new(false));
+        let ends = Arc::clone(&is_over);
+        let sleeps = std::thread::spawn(move || {
+            let mut longest = Duration::ZERO;
+            while !ends.load(Ordering::Relaxed) {
+                let began = Instant::now();
+                std::thread::sleep(Duration::from_millis(1));
+                longest = longest.max(began.elapsed());
+            }
+            longest
+        });
+        Self { is_over, sleeps }
+    }
+
+    /// Returns the longest millisecond.
+    fn longest(self) -> Duration {
+        self.is_over.store(true, Ordering::Relaxed);
+        self.sleeps.join().unwrap()
+    }
+}
 
 /// Follows an arm that is at `position_m`; `look` sees every reading.
-///
-/// One velocity says nothing where a busy machine tells lines late; all together make the way.
 pub fn followed(arm: &mut dyn Arm, position_m: impl Fn() -> DVec3, mut look: impl FnMut(&Reading)) -> Followed {
-    let (mut farthest_m, mut way_m) = (0.0_f64, DVec3::ZERO);
-    let (mut silent_s, mut moved_at, mut last_m) = (0.0_f64, None, None);
+    let sleeper = Sleeper::start();
+    let (mut farthest_m, mut way_m, mut late_s) = (0.0_f64, DVec3::ZERO, 0.0_f64);
     follow(arm, |reading, passed_s| {
-        let at_m = reading.motion.position_m;
-        farthest_m = farthest_m.max(at_m.distance(position_m()));
+        farthest_m = farthest_m.max(reading.motion.position_m.distance(position_m()));
         way_m += passed_s * reading.motion.velocity_m_per_s;
-        silent_s = silent_s.max(passed_s);
-        if last_m.replace(at_m).is_some_and(|last_m| last_m != at_m) {
-            let before = moved_at.replace(Instant::now());
-            silent_s = silent_s.max(before.map_or(0.0, |before| before.elapsed().as_secs_f64()));
-        }
+        late_s = late_s.max(passed_s);
         look(reading);
     });
-    Followed { farthest_m, way_m, silent_s }
+    Followed { farthest_m, way_m, late_s: late_s.max(sleeper.longest().as_secs_f64()) }
 }
 
 /// Puts a force on an arm for 30 ticks.
