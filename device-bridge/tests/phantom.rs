@@ -4,7 +4,7 @@ mod common;
 #[path = "common/libhd.rs"]
 mod libhd;
 
-use common::press::{self, PRESSED_N, lost_by, pressed_n, simulated};
+use common::press::{self, PRESSED_N, lost_by, pressed, simulated};
 use glam::{DQuat, DVec3};
 use libhd::Emulated;
 use palpate_bridge::{
@@ -69,12 +69,13 @@ fn wait_until(what: &str, mut condition: impl FnMut() -> bool) {
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn a_press_ends_at_the_force_of_the_simulated_arm() {
-    let (expected_n, _) = pressed_n(2e-4, simulated()).await;
+    let expected_n = pressed(2e-4, simulated()).await.force_n;
     assert!((expected_n - PRESSED_N).abs() < 0.01, "{expected_n}");
     let emulated = Emulated::new(Settings { path: press::path(), ..Settings::default() });
-    let (found_n, summary) = pressed_n(2e-3, DeviceConfig::Phantom(emulated.keys())).await;
+    let pressed = pressed(2e-3, DeviceConfig::Phantom(emulated.keys())).await;
+    let found_n = pressed.force_n;
     assert!((found_n / expected_n - 1.0).abs() < 0.02, "{found_n} N, {expected_n} N");
-    assert!(summary.peak_force_n < 1.1 * expected_n, "{summary}");
+    pressed.assert_peak_below(1.1, expected_n);
     assert_eq!(emulated.arm.force_n(), DVec3::ZERO, "the bridge took its force away when it ended");
 }
 

@@ -2,7 +2,7 @@
 #![allow(clippy::unwrap_used)]
 mod common;
 
-use common::press::{self, PRESSED_N, lost_by, pressed_n, simulated, to_arm};
+use common::press::{self, PRESSED_N, lost_by, pressed, simulated, to_arm};
 use glam::DVec3;
 use palpate_bridge::{
     config::{DeviceConfig, WoodenHapticsConfig},
@@ -54,7 +54,7 @@ const FLICKER_N: f64 = 0.03;
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn a_press_ends_at_the_force_of_the_simulated_arm() {
-    let (expected_n, _) = pressed_n(2e-4, simulated()).await;
+    let expected_n = pressed(2e-4, simulated()).await.force_n;
     assert!((expected_n - PRESSED_N).abs() < 0.01, "{expected_n}");
     for answers in [false, true] {
         // The middle of the workspace is where the press is.
@@ -65,9 +65,10 @@ async fn a_press_ends_at_the_force_of_the_simulated_arm() {
             path: press::path(),
         });
         let arm = arm.unwrap();
-        let (found_n, summary) = pressed_n(FLICKER_N, DeviceConfig::Woodenhaptics(shifted(keys(arm.port())))).await;
+        let pressed = pressed(FLICKER_N, DeviceConfig::Woodenhaptics(shifted(keys(arm.port())))).await;
+        let found_n = pressed.force_n;
         assert!((found_n / expected_n - 1.0).abs() < 0.02, "{found_n} N, {expected_n} N: {answers}");
-        assert!(summary.peak_force_n < 1.1 * expected_n, "{summary}");
+        pressed.assert_peak_below(1.1, expected_n);
         common::until("the bridge took its force away when it ended", || arm.force_n() == DVec3::ZERO).await;
     }
 }
