@@ -204,6 +204,7 @@ async fn a_bridge_that_hung_goes_on_and_its_force_comes_back() {
             full_n = full_n.max(arm.force_n().length());
             tokio::time::sleep(Duration::from_millis(1)).await;
         }
+        assert!(full_n <= 1.25 * arm.full_n, "a {name}: {full_n} N where {} N is asked for", arm.full_n);
         bridge.stop();
         until(&format!("a {name} lets go"), || arm.force_n() == DVec3::ZERO).await;
         for _ in 0..2 {

@@ -2,7 +2,7 @@
 #![allow(clippy::unwrap_used)]
 mod common;
 
-use common::press::{self, PRESS, lost_in, pressed_in_n, pressed_n, simulated};
+use common::press::{self, PRESS, lost_in, pressed, pressed_in, simulated};
 use glam::{DVec2, DVec3, Vec3Swizzles as _};
 use palpate_bridge::{
     config::{DeviceConfig, Haply2diyConfig, WorkspaceConfig},
@@ -86,15 +86,16 @@ const FLICKER_N: f64 = 0.03;
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn a_press_ends_at_the_force_of_the_simulated_arm() {
-    let (expected_n, _) = pressed_n(2e-4, simulated()).await;
+    let expected_n = pressed(2e-4, simulated()).await.force_n;
     let key = |(time_s, y)| Keyframe { time_s, position_m: DVec3::Y * y };
     let path = HandPath::new(PRESS.map(key).to_vec(), None).unwrap();
     for generation in [|keys| keys, second] {
         let arm = emulated(&generation(keys("")), path.clone());
         let device = DeviceConfig::Haply2diy(generation(keys(arm.port())));
-        let (found_n, summary) = pressed_in_n(FLICKER_N, upright(), device).await;
+        let pressed = pressed_in(FLICKER_N, upright(), device).await;
+        let found_n = pressed.force_n;
         assert!((found_n / expected_n - 1.0).abs() < 0.02, "{found_n} N, {expected_n} N");
-        assert!(summary.peak_force_n < 1.1 * expected_n, "{summary}");
+        pressed.assert_peak_below(1.1, expected_n);
         common::until("the bridge took its force away when it ended", || arm.force_n() == DVec3::ZERO).await;
     }
 }
@@ -174,9 +175,8 @@ fn poses_follow_the_arm_though_answers_come_in_pieces() {
         let end = arm.read(0).unwrap();
         assert!(end.motion.position_m.distance(emulated.position_m()) < 1e-4, "{:?}", end.motion);
         assert!(emulated.position_m().x > 0.02 && emulated.requests() > 100);
-        assert!(followed.farthest_m < 1e-2 + followed.late_m(), "{}, {}", followed.farthest_m, followed.late_m());
-        let wrong_m = followed.way_m.distance(end.motion.position_m);
-        assert!(wrong_m < 6e-3 + followed.late_m(), "{wrong_m}, {}, {:?}", followed.late_m(), end.motion);
+        followed.assert_near(1e-2);
+        followed.assert_way(end.motion.position_m, 6e-3);
         assert!(end.motion.velocity_m_per_s.length() < 5e-3, "{:?}", end.motion);
         assert!(end.motion.position_m.z == 0.0 && end.age_s < 0.1);
     }

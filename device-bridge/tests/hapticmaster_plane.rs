@@ -4,7 +4,7 @@ mod common;
 
 use common::{
     Mock,
-    press::{self, PRESSED_N, bridged, pressed_by, pressed_n, simulated, wall},
+    press::{self, PRESSED_N, bridged, pressed, pressed_by, simulated, wall},
     start, until,
 };
 use glam::DVec3;
@@ -47,13 +47,14 @@ fn by_plane(emulator: &HapticMaster) -> DeviceConfig {
 /// The same press to the same force as the bridge's own rendering, in every dialect.
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn a_press_ends_at_the_force_of_the_simulated_arm() {
-    let (expected_n, _) = pressed_n(FLICKER_N, simulated()).await;
+    let expected_n = pressed(FLICKER_N, simulated()).await.force_n;
     for (headers, quoted, apart) in [(true, false, false), (false, true, false), (true, true, true)] {
         let arm = emulator(|settings| (settings.headers, settings.quoted, settings.apart) = (headers, quoted, apart));
         let keys = HapticMasterConfig { apart, ..keys(&arm, HapticMasterContact::Plane) };
-        let (found_n, summary) = pressed_n(FLICKER_N, DeviceConfig::Hapticmaster(keys)).await;
+        let pressed = pressed(FLICKER_N, DeviceConfig::Hapticmaster(keys)).await;
+        let found_n = pressed.force_n;
         assert!((found_n / expected_n - 1.0).abs() < 0.05, "{found_n} N, {expected_n} N: {headers} {quoted} {apart}");
-        assert!(summary.peak_force_n < 1.2 * expected_n, "{summary}");
+        pressed.assert_peak_below(1.2, expected_n);
         assert!(arm.peak_n() > 0.9 * expected_n && arm.effect_n() == DVec3::ZERO, "both are gone when the bridge ends");
     }
 }
@@ -207,7 +208,7 @@ async fn damping_is_told_as_a_share_or_as_it_is() {
         let arm = emulator(|settings| settings.effects.damping_is_ratio = ratio);
         let keys = HapticMasterConfig { damping_is_ratio: ratio, ..keys(&arm, HapticMasterContact::Plane) };
         let damped = |config: &mut Config| config.render.damping_n_s_per_m = 5.0;
-        let (found_n, _) = pressed_by(FLICKER_N, DeviceConfig::Hapticmaster(keys), damped).await;
+        let found_n = pressed_by(FLICKER_N, DeviceConfig::Hapticmaster(keys), damped).await.force_n;
         assert!((found_n / PRESSED_N - 1.0).abs() < 0.05, "{found_n} N");
     }
 }

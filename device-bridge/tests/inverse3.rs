@@ -2,7 +2,7 @@
 #![allow(clippy::unwrap_used)]
 mod common;
 
-use common::press::{self, PRESSED_N, lost_by, pressed_n, simulated};
+use common::press::{self, PRESSED_N, lost_by, pressed, simulated};
 use glam::{DQuat, DVec3};
 use palpate_bridge::{
     config::{DeviceConfig, Inverse3Config, Inverse3Dialect, RealtimeConfig},
@@ -48,7 +48,7 @@ fn started(keys: &Inverse3Config) -> Result<driver::Inverse3, driver::StartError
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn a_press_ends_at_the_force_of_the_simulated_arm() {
-    let (expected_n, _) = pressed_n(2e-4, simulated()).await;
+    let expected_n = pressed(2e-4, simulated()).await.force_n;
     assert!((expected_n - PRESSED_N).abs() < 0.01, "{expected_n}");
     for (dialect, told, streams) in [
         (Dialect::Values, Inverse3Dialect::Values, false),
@@ -57,9 +57,10 @@ async fn a_press_ends_at_the_force_of_the_simulated_arm() {
     ] {
         let arm = emulator(Settings { dialect: Some(dialect), streams, path: press::path(), ..Settings::default() });
         let keys = Inverse3Config { dialect: told, ..keys(&arm.url()) };
-        let (found_n, summary) = pressed_n(0.01, DeviceConfig::Inverse3(keys)).await;
+        let pressed = pressed(0.01, DeviceConfig::Inverse3(keys)).await;
+        let found_n = pressed.force_n;
         assert!((found_n / expected_n - 1.0).abs() < 0.02, "{found_n} N, {expected_n} N: {dialect:?}, {streams}");
-        assert!(summary.peak_force_n < 1.1 * expected_n, "{summary}");
+        pressed.assert_peak_below(1.1, expected_n);
         common::until("the bridge took its force away when it ended", || arm.force_n() == DVec3::ZERO).await;
     }
 }

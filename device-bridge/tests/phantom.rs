@@ -4,7 +4,7 @@ mod common;
 #[path = "common/libhd.rs"]
 mod libhd;
 
-use common::press::{self, PRESSED_N, lost_by, pressed_n, simulated};
+use common::press::{self, PRESSED_N, lost_by, pressed, simulated};
 use glam::{DQuat, DVec3};
 use libhd::Emulated;
 use palpate_bridge::{
@@ -69,12 +69,13 @@ fn wait_until(what: &str, mut condition: impl FnMut() -> bool) {
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn a_press_ends_at_the_force_of_the_simulated_arm() {
-    let (expected_n, _) = pressed_n(2e-4, simulated()).await;
+    let expected_n = pressed(2e-4, simulated()).await.force_n;
     assert!((expected_n - PRESSED_N).abs() < 0.01, "{expected_n}");
     let emulated = Emulated::new(Settings { path: press::path(), ..Settings::default() });
-    let (found_n, summary) = pressed_n(2e-3, DeviceConfig::Phantom(emulated.keys())).await;
+    let pressed = pressed(2e-3, DeviceConfig::Phantom(emulated.keys())).await;
+    let found_n = pressed.force_n;
     assert!((found_n / expected_n - 1.0).abs() < 0.02, "{found_n} N, {expected_n} N");
-    assert!(summary.peak_force_n < 1.1 * expected_n, "{summary}");
+    pressed.assert_peak_below(1.1, expected_n);
     assert_eq!(emulated.arm.force_n(), DVec3::ZERO, "the bridge took its force away when it ended");
 }
 
@@ -235,9 +236,8 @@ fn poses_follow_the_arm() {
     let end = arm.read(0).unwrap();
     assert!(end.motion.position_m.distance(emulated.arm.position_m()) < 1e-5, "{:?}", end.motion);
     assert!(emulated.arm.position_m().x > 0.029 && emulated.arm.frames() > 100);
-    assert!(followed.farthest_m < 5e-3 + followed.late_m(), "{}, {}", followed.farthest_m, followed.late_m());
-    let wrong_m = followed.way_m.distance(DVec3::X * 0.03);
-    assert!(wrong_m < 3e-3 + followed.late_m(), "{wrong_m}, {}", followed.late_m());
+    followed.assert_near(5e-3);
+    followed.assert_way(DVec3::X * 0.03, 3e-3);
 }
 
 #[test]

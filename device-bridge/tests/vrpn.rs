@@ -2,7 +2,7 @@
 #![allow(clippy::unwrap_used)]
 mod common;
 
-use common::press::{self, PRESSED_N, bridged, lost_by, pressed_n, simulated, to_arm};
+use common::press::{self, PRESSED_N, bridged, lost_by, pressed, simulated, to_arm};
 use glam::{DQuat, DVec3};
 use palpate_bridge::{
     config::{DeviceConfig, LimitsConfig, VrpnConfig},
@@ -56,16 +56,17 @@ fn started(keys: &VrpnConfig) -> Result<driver::Vrpn, driver::start::StartError>
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn a_press_ends_at_the_force_of_the_simulated_arm() {
-    let (expected_n, _) = pressed_n(2e-4, simulated()).await;
+    let expected_n = pressed(2e-4, simulated()).await.force_n;
     assert!((expected_n - PRESSED_N).abs() < 0.01, "{expected_n}");
     for (velocities, every) in [(true, 1), (false, 1), (true, 2)] {
         let arm = emulator(|settings| {
             settings.path = press::path();
             (settings.velocities, settings.every) = (velocities, every);
         });
-        let (found_n, summary) = pressed_n(0.01, device(&arm)).await;
+        let pressed = pressed(0.01, device(&arm)).await;
+        let found_n = pressed.force_n;
         assert!((found_n / expected_n - 1.0).abs() < 0.02, "{found_n} N, {expected_n} N: {velocities} {every}");
-        assert!(summary.peak_force_n < 1.1 * expected_n, "{summary}");
+        pressed.assert_peak_below(1.1, expected_n);
         common::until("the bridge took its force away when it ended", || arm.force_n() == DVec3::ZERO).await;
     }
 }
@@ -151,9 +152,8 @@ fn poses_follow_the_arm_though_messages_come_in_pieces() {
         let end = arm.read(0).unwrap();
         assert!(end.motion.position_m.distance(emulated.position_m()) < 1e-4, "{:?}", end.motion);
         assert!(emulated.position_m().x > 0.02 && emulated.fields() > 100 && emulated.pongs() > 2);
-        assert!(followed.farthest_m < 5e-3 + followed.late_m(), "{}, {}", followed.farthest_m, followed.late_m());
-        let wrong_m = (first_m + followed.way_m).distance(end.motion.position_m);
-        assert!(wrong_m < 3e-3 + followed.late_m(), "{wrong_m}, {}, {:?}", followed.late_m(), end.motion);
+        followed.assert_near(5e-3);
+        followed.assert_way(end.motion.position_m - first_m, 3e-3);
         assert!(end.motion.velocity_m_per_s.length() < 5e-3, "{:?}", end.motion);
     }
 }

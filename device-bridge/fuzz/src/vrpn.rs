@@ -5,7 +5,7 @@ use palpate_bridge::device::{
     vrpn::{
         heard::{Heard, Senders},
         payload::{self, ForceField, Pose, Velocity},
-        peer::{Kind, Peer},
+        peer::{Kind, Peer, Told},
         wire::{self, COOKIE_BYTES, Header, LONGEST_PAYLOAD, Malformed, Outgoing, Received},
     },
 };
@@ -122,7 +122,7 @@ fn driver(bytes: &[u8], piece: usize) -> Known {
     let senders = Senders { tracker: 0, sensor: 1, button: Some(1), force: Some(2) };
     let mut peer = Peer::new(["Arm", "Grip", "Motors"].map(str::to_owned).to_vec());
     let mut heard = Heard::new(senders);
-    let end = told(bytes, piece, &mut peer, |sender, kind, payload| heard.take(sender, kind, payload));
+    let end = told(bytes, piece, &mut peer, |told, payload| heard.take(told.sender, told.kind, told.time, payload));
     let names = std::array::from_fn(|name| peer.has(name));
     let (pose, velocity, force_n) = (heard.new_pose(), heard.velocity(), heard.force_n());
     Known { end, pose, velocity, force_n, bits: (heard.buttons(), heard.take_pings(), names) }
@@ -131,8 +131,8 @@ fn driver(bytes: &[u8], piece: usize) -> Known {
 /// Pings that the bridge's own server is to answer, to a program that speaks so.
 fn server(bytes: &[u8], piece: usize) -> (usize, Result<(), Fault>) {
     let (mut peer, mut pings) = (Peer::new(vec!["Arm".to_owned()]), 0);
-    let end = told(bytes, piece, &mut peer, |_, kind, _| {
-        pings += usize::from(kind == Kind::Ping);
+    let end = told(bytes, piece, &mut peer, |told, _| {
+        pings += usize::from(told.kind == Kind::Ping);
         Ok(())
     });
     (pings, end)
@@ -142,13 +142,13 @@ fn told(
     bytes: &[u8],
     piece: usize,
     peer: &mut Peer,
-    mut take: impl FnMut(usize, Kind, &[u8]) -> Result<(), Fault>,
+    mut take: impl FnMut(&Told, &[u8]) -> Result<(), Fault>,
 ) -> Result<(), Fault> {
     for mut rest in bytes.chunks(piece) {
         while !rest.is_empty() {
             rest = put(rest, &mut peer.received);
             while let Some(told) = peer.next_told().map_err(|_| Fault::Garbled)? {
-                take(told.sender, told.kind, peer.payload(&told))?;
+                take(&told, peer.payload(&told))?;
             }
         }
     }

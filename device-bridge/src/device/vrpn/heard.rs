@@ -32,8 +32,7 @@ pub struct Heard {
     /// Since the velocity.
     poses: u32,
     is_new: bool,
-    /// When the message that is being taken was made.
-    time: Time,
+    /// When the pose was made, by the server's clock.
     pose_time: Time,
     buttons: u32,
     force_n: Option<DVec3>,
@@ -45,20 +44,15 @@ impl Heard {
     /// Nothing yet.
     pub fn new(senders: Senders) -> Self {
         let (pose, velocity, force_n) = (None, None, None);
-        let (time, pose_time) = (Time::default(), Time::default());
-        Self { senders, pose, velocity, poses: 0, is_new: false, time, pose_time, buttons: 0, force_n, pings: 0 }
+        let pose_time = Time::default();
+        Self { senders, pose, velocity, poses: 0, is_new: false, pose_time, buttons: 0, force_n, pings: 0 }
     }
 
-    /// The messages that are taken from now on were made then, by the server's clock.
-    pub fn made_at(&mut self, time: Time) {
-        self.time = time;
-    }
-
-    /// A message.
+    /// A message, which was made at `time` by the server's clock.
     ///
     /// # Errors
     /// [`Fault::Garbled`] when it does not say what its type promises, [`Fault::Refused`] when the force device has failed.
-    pub fn take(&mut self, sender: usize, kind: Kind, bytes: &[u8]) -> Result<(), Fault> {
+    pub fn take(&mut self, sender: usize, kind: Kind, time: Time, bytes: &[u8]) -> Result<(), Fault> {
         let Senders { tracker, sensor, button, force } = self.senders;
         let garbled = Fault::Garbled;
         match kind {
@@ -68,7 +62,7 @@ impl Heard {
                 if pose.sensor == sensor {
                     self.pose = Some(pose);
                     self.is_new = true;
-                    self.pose_time = self.time;
+                    self.pose_time = time;
                     self.poses = self.poses.saturating_add(1);
                 }
             }
@@ -145,7 +139,7 @@ mod tests {
     fn told(heard: &mut Heard, sender: usize, kind: Kind, write: impl FnOnce(&mut Vec<u8>)) -> Result<(), Fault> {
         let mut bytes = Vec::new();
         write(&mut bytes);
-        heard.take(sender, kind, &bytes)
+        heard.take(sender, kind, Time::default(), &bytes)
     }
 
     fn pose(sensor: i32, x: f64) -> Pose {
@@ -205,7 +199,7 @@ mod tests {
         peer.received.room()[..bytes.len()].copy_from_slice(bytes);
         peer.received.came(bytes.len());
         while let Some(told) = peer.next_told().map_err(|_| Fault::Garbled)? {
-            heard.take(told.sender, told.kind, peer.payload(&told))?;
+            heard.take(told.sender, told.kind, told.time, peer.payload(&told))?;
         }
         Ok(())
     }

@@ -14,7 +14,7 @@ const LONGEST_S: f64 = 1.0;
 
 /// Compares the server's clock with ours.
 ///
-/// Servers exist whose clock stands still, counts milliseconds or is set while they run. So poses are believed by blocks: in the
+/// A server's clock may stand still, count in coarse steps or be set while it runs. So poses are believed by blocks: in the
 /// block before, every pose was later than the one before it, and both clocks told about the same time for all of it.
 #[derive(Debug, Clone, Default)]
 pub struct SenderClock {

@@ -136,8 +136,7 @@ pub(super) fn start(settings: &Settings) -> Result<Started, StartError> {
 /// Takes all whole messages.
 pub(super) fn hear(peer: &mut Peer, heard: &mut Heard) -> Result<(), Fault> {
     while let Some(told) = peer.next_told().map_err(|_| Fault::Garbled)? {
-        heard.made_at(told.time);
-        heard.take(told.sender, told.kind, peer.payload(&told))?;
+        heard.take(told.sender, told.kind, told.time, peer.payload(&told))?;
     }
     Ok(())
 }
