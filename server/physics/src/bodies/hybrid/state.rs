@@ -1,6 +1,12 @@
 //! The state of a hybrid body beside positions and velocities: which particles are active, their prestrain, and the
 //! transition force.
-use super::{body::HybridBody, long_steps::LongSteps, prestrain::PrestrainDecay, spec::Waking, switching::Ball};
+use super::{
+    body::HybridBody,
+    long_steps::LongSteps,
+    prestrain::PrestrainDecay,
+    spec::Waking,
+    switching::{Ball, QUERY_EVERY_TICKS},
+};
 use crate::{
     contact::ToolSpec,
     hash::Chain,
@@ -124,7 +130,7 @@ impl KindState for HybridState {
             given_j: 0.0,
             switched_j: 0.0,
             long_steps: LongSteps::with_room(body.node_count(), positions),
-            ticks_since_at_once: 0,
+            ticks_since_at_once: QUERY_EVERY_TICKS as u32,
             acts_on_sleeping_skin: false,
         }
     }
@@ -140,7 +146,7 @@ impl KindState for HybridState {
         self.given_j = 0.0;
         self.switched_j = 0.0;
         self.long_steps.forget();
-        self.ticks_since_at_once = 0;
+        self.ticks_since_at_once = QUERY_EVERY_TICKS as u32;
         self.acts_on_sleeping_skin = false;
     }
 
