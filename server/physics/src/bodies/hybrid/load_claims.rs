@@ -94,13 +94,14 @@ impl LoadClaims {
             }
             for other in others.into_iter().skip(1) {
                 let joined = std::mem::take(&mut claims.groups[other]);
-                joined
-                    .iter()
-                    .flat_map(|claim| &claim.near)
-                    .for_each(|(_, particle)| group_of[*particle as usize] = group);
+                for (_, particle) in joined.iter().flat_map(|claim| &claim.near) {
+                    group_of[*particle as usize] = group;
+                }
                 claims.groups[group].extend(joined);
             }
-            near.iter().for_each(|(_, particle)| group_of[*particle as usize] = group);
+            for (_, particle) in &near {
+                group_of[*particle as usize] = group;
+            }
             claims.groups[group].push(LoadClaim { load, near });
         }
         claims.groups.retain(|group| !group.is_empty());
@@ -121,7 +122,9 @@ impl LoadClaims {
     pub(crate) fn want(&self, factors: &[f64], room: usize, nearest: &mut NearestParticles, wanted: &mut Vec<u32>) {
         for group in &self.groups {
             for claim in group.iter().filter(|claim| acts(factors, claim.load)) {
-                claim.near.iter().for_each(|&(distance_sq, particle)| nearest.add(particle, distance_sq));
+                for &(distance_sq, particle) in &claim.near {
+                    nearest.add(particle, distance_sq);
+                }
             }
             nearest.take(room, wanted);
         }
