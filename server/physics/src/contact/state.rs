@@ -200,6 +200,13 @@ impl ContactState {
         self.tools.iter().flat_map(|tool| tool.candidates.triangles().iter().copied())
     }
 
+    /// Returns the triangles that a tool may touch before it and the surface have moved by this distance (m), and
+    /// perhaps others; `None` where they are not known.
+    pub(crate) fn listed_within(&self, tool: usize, distance_m: f64) -> Option<&[u32]> {
+        let candidates = &self.tools.get(tool)?.candidates;
+        (distance_m <= candidates.slack_m).then(|| candidates.triangles())
+    }
+
     /// Returns the boxes as they were fitted, and the travel; they may be used while all motion of the surface was told
     /// to [`Self::travelled`].
     pub(crate) fn boxes(&self) -> FittedBoxes<'_> {

@@ -6,7 +6,7 @@ use super::{
     scratch::HybridScratch,
     spec::ParticleSpec,
     state::{HybridState, axis_sample_counts},
-    switching::{ActivationQuery, Ball, FOLLOW, GAP, QUERY_EVERY_TICKS},
+    switching::{ActivationQuery, Ball, FOLLOW, GAP, LOOK_EVERY_TICKS, QUERY_EVERY_TICKS},
 };
 use crate::{
     contact::{Near, Skin},
@@ -16,8 +16,9 @@ use glam::DVec3;
 
 /// Time (s) before its contact at which an approaching tool wakes particles.
 const AHEAD_S: f64 = 0.05;
-/// Time (s) before its contact at which a tool wakes particles at once.
-const ARRIVES_S: f64 = 2e-3;
+/// Time (s) before its contact at which a tool wakes particles at once, which is longer than it takes from one look to the
+/// next.
+const ARRIVES_S: f64 = 5e-3;
 /// Number of ticks for which a tool has to be away until its ball is given up.
 const AWAY_TICKS: u32 = 100;
 /// Deviation over the spacing below which a particle may fall asleep.
@@ -60,6 +61,19 @@ pub(super) fn update_balls(
     }
 }
 
+/// Returns whether a part of a tool moves by half a spacing between two looks.
+pub(super) fn moves_quickly(environment: &Environment, body: &HybridBody, state: &MechanicalState) -> bool {
+    let between_looks_s = LOOK_EVERY_TICKS as f64 * environment.settings.tick_period_s;
+    let quick_m_per_s = 0.5 * body.particles.spacing_m / between_looks_s;
+    let counts = axis_sample_counts(body, &environment.tools);
+    state
+        .tools
+        .iter()
+        .zip(&environment.tools)
+        .zip(counts)
+        .any(|((tool, spec), count)| tool.axis_samples(spec, count).any(|sample| sample.speed_m_per_s > quick_m_per_s))
+}
+
 /// Returns whether a tool touches skin whose particles sleep but may wake, or will touch it before a switch that began
 /// with the next query would be done.
 pub(super) fn meets_sleeping_skin(
@@ -70,20 +84,27 @@ pub(super) fn meets_sleeping_skin(
 ) -> bool {
     let MechanicalState { tools, contact, force_is_current, .. } = state;
     let fitted = force_is_current.then(|| contact.boxes());
-    let patch = &mut scratch.patch;
-    patch.displace(body, &state.x);
+    scratch.patch.displace(body, &state.x);
+    let patch = &scratch.patch;
+    let is_asleep = |vertex: u32| {
+        let cell = body.vertex_point(vertex).cell;
+        !patch.is_awake(cell) && body.partition.corners(cell as usize).iter().any(|&corner| body.may_wake(corner))
+    };
+    let mut view = SkinView::new(body, patch);
+    view.begin();
     let counts = axis_sample_counts(body, &environment.tools);
-    tools.iter().zip(&environment.tools).zip(counts).any(|((tool, spec), count)| {
+    tools.iter().zip(&environment.tools).zip(counts).enumerate().any(|(index, ((tool, spec), count))| {
+        let near_of = |speed_m_per_s: f64| (ARRIVES_S * speed_m_per_s).max(0.1 * body.particles.spacing_m);
+        let fastest_m_per_s = tool.axis_samples(spec, count).map(|sample| sample.speed_m_per_s).fold(0.0, f64::max);
+        let listed = contact.listed_within(index, near_of(fastest_m_per_s)).filter(|_| *force_is_current);
+        let triangles = environment.contact.triangles();
+        if listed.is_some_and(|list| !list.iter().any(|&listed| triangles[listed as usize].into_iter().any(is_asleep)))
+        {
+            return false;
+        }
         tool.axis_samples(spec, count).any(|sample| {
-            let near_m = (ARRIVES_S * sample.speed_m_per_s).max(0.1 * body.particles.spacing_m);
-            let mut view = SkinView::new(body, patch);
-            view.begin();
+            let near_m = near_of(sample.speed_m_per_s);
             let near = sample.look(&view, (near_m, environment.contact.covering_radius_m), fitted);
-            let is_asleep = |vertex: u32| {
-                let cell = body.vertex_point(vertex).cell;
-                !patch.is_awake(cell)
-                    && body.partition.corners(cell as usize).iter().any(|&corner| body.may_wake(corner))
-            };
             near.gap_m < near_m && near.vertex.is_some_and(|(vertex, _)| is_asleep(vertex))
         })
     })

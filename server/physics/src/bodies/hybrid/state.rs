@@ -1,12 +1,6 @@
 //! The state of a hybrid body beside positions and velocities: which particles are active, their prestrain, and the
 //! transition force.
-use super::{
-    body::HybridBody,
-    long_steps::LongSteps,
-    prestrain::PrestrainDecay,
-    spec::Waking,
-    switching::{Ball, QUERY_EVERY_TICKS},
-};
+use super::{body::HybridBody, long_steps::LongSteps, prestrain::PrestrainDecay, spec::Waking, switching::Ball};
 use crate::{
     contact::ToolSpec,
     hash::Chain,
@@ -36,8 +30,8 @@ pub struct HybridState {
     /// Largest elastic energy (J) of what any recent switch changed.
     pub(super) switched_j: f64,
     pub(crate) long_steps: LongSteps,
-    /// Ticks since particles were last woken at once, up to [`super::switching::QUERY_EVERY_TICKS`].
-    pub(super) ticks_since_at_once: u32,
+    /// Ticks until particles may be woken at once again.
+    pub(super) ticks_to_at_once: u32,
     /// Whether a load or an injected force acted on sleeping skin in the tick before.
     pub(super) acts_on_sleeping_skin: bool,
 }
@@ -130,7 +124,7 @@ impl KindState for HybridState {
             given_j: 0.0,
             switched_j: 0.0,
             long_steps: LongSteps::with_room(body.node_count(), positions),
-            ticks_since_at_once: QUERY_EVERY_TICKS as u32,
+            ticks_to_at_once: 0,
             acts_on_sleeping_skin: false,
         }
     }
@@ -146,7 +140,7 @@ impl KindState for HybridState {
         self.given_j = 0.0;
         self.switched_j = 0.0;
         self.long_steps.forget();
-        self.ticks_since_at_once = QUERY_EVERY_TICKS as u32;
+        self.ticks_to_at_once = 0;
         self.acts_on_sleeping_skin = false;
     }
 
@@ -160,7 +154,7 @@ impl KindState for HybridState {
         self.given_j = other.given_j;
         self.switched_j = other.switched_j;
         self.long_steps.copy_from(&other.long_steps);
-        self.ticks_since_at_once = other.ticks_since_at_once;
+        self.ticks_to_at_once = other.ticks_to_at_once;
         self.acts_on_sleeping_skin = other.acts_on_sleeping_skin;
     }
 
@@ -200,7 +194,7 @@ impl KindState for HybridState {
         chain.real(self.given_j);
         chain.real(self.switched_j);
         self.long_steps.chain(chain);
-        chain.whole(u64::from(self.ticks_since_at_once));
+        chain.whole(u64::from(self.ticks_to_at_once));
         chain.whole(u64::from(self.acts_on_sleeping_skin));
     }
 

@@ -19,7 +19,7 @@
 //! then (`projection`), for which `−Σ_i Δ_i × P_i`, with the momenta `P = M'' v + J`, is added to the couple on the
 //! right.
 use super::{
-    activation_query::{Acting, begins_to_act, meets_sleeping_skin, update_balls},
+    activation_query::{Acting, begins_to_act, meets_sleeping_skin, moves_quickly, update_balls},
     body::HybridBody,
     carried_skin::SkinView,
     load_claims::{LoadClaims, NearestParticles},
@@ -45,6 +45,8 @@ const SWITCH_TICKS: u64 = 2 + RunningPatch::SLICES as u64;
 pub(super) const QUERY_EVERY_TICKS: u64 = 2 * SWITCH_TICKS;
 /// Number of ticks between two switches that are done at once.
 const AT_ONCE_EVERY_TICKS: u32 = 4;
+/// Number of ticks between two looks for tools that arrive at sleeping skin, if none is quick.
+pub(super) const LOOK_EVERY_TICKS: u64 = 4;
 /// Gap, over the tool's radius and over the spacing, below which a tool's particles are awake.
 pub(crate) const GAP: f64 = 0.25;
 /// Distance, over the spacing, that the skin's nearest vertex moves at rest before a ball follows.
@@ -143,9 +145,10 @@ impl SteppedHybrid<'_> {
         }
         let particles = &body.particles;
         let Waking::ByTools { reach_m } = particles.waking else { return };
-        own.ticks_since_at_once = own.ticks_since_at_once.saturating_add(1).min(QUERY_EVERY_TICKS as u32);
-        if own.ticks_since_at_once >= AT_ONCE_EVERY_TICKS
-            && (meets_sleeping_skin(environment, body, scratch, state)
+        own.ticks_to_at_once = own.ticks_to_at_once.saturating_sub(1);
+        let looks = state.tick.is_multiple_of(LOOK_EVERY_TICKS) || moves_quickly(environment, body, state);
+        if own.ticks_to_at_once == 0
+            && (looks && meets_sleeping_skin(environment, body, scratch, state)
                 || begins_to_act(environment, body, own, scratch, state, points))
         {
             self.wake_at_once(environment, state, points, reach_m);
@@ -173,10 +176,11 @@ impl SteppedHybrid<'_> {
         reach_m: f64,
     ) {
         let Self { body, own, scratch } = self;
-        own.ticks_since_at_once = 0;
         scratch.query(environment, body, own, state, points, reach_m);
         own.wanted.clone_from(&scratch.query.wanted);
         own.next.clone_from(&scratch.query.wanted);
+        // What sleeps although it is pressed, for want of room, sleeps on.
+        own.ticks_to_at_once = if own.is_switching() { AT_ONCE_EVERY_TICKS } else { QUERY_EVERY_TICKS as u32 };
         if own.is_switching() {
             self.switch_now(environment, state);
         }
