@@ -6,6 +6,7 @@
 mod axis;
 mod axis_samples;
 pub(crate) mod broad;
+mod clutch;
 mod depth;
 mod foundation;
 mod friction;

@@ -16,11 +16,14 @@
 //!   from the (virtual) tool, never given to tool or body. In contact that point moves with the dent, which the body
 //!   will stop: there a surface that gives way allows no more speed than one at rest.
 //!
+//! A rigid tool follows its device through a clutch ([`super::clutch`]).
+//!
 //! A tool that turns is advanced in its orientation likewise ([`super::turning`]).
 use super::{
-    Coupling, ToolModel, ToolState,
+    Coupling, ToolModel, ToolState, clutch,
     narrow::Pressed,
     spring::{SaturatingSpring, shortened},
+    state::ToolContact,
     turning,
 };
 use glam::DVec3;
@@ -106,26 +109,19 @@ pub(super) struct Coupled {
 
 /// Does the first half of a substep, half kick and drift. Returns a bound (m) of how far any point of the tool's axis
 /// moved.
-pub(super) fn drift(
-    model: &ToolModel,
-    tool: &mut ToolState,
-    contact_n: DVec3,
-    contact_nm: DVec3,
-    time: &SubstepTime,
-) -> f64 {
+pub(super) fn drift(model: &ToolModel, tool: &mut ToolState, contact: &ToolContact, time: &SubstepTime) -> f64 {
     let before = model.axis(tool);
     let (device_m, device_m_per_s) = time.device(tool);
     match model.pull() {
         None => {
-            tool.centre_m = device_m;
-            tool.velocity_m_per_s = device_m_per_s;
+            clutch::follow(model, tool, contact, (device_m, device_m_per_s), time.dt_s);
             turning::follow(model, tool, time);
         }
         Some(pull) => {
             let (at_start, half_s) = (time.at_start(), 0.5 * time.dt_s);
             let stretch_m = at_start.device(tool).0 - tool.centre_m;
-            pull.half_kick(&mut tool.velocity_m_per_s, contact_n, stretch_m, tool.device_m_per_s, half_s);
-            turning::half_kick(model, tool, contact_nm, &at_start, half_s);
+            pull.half_kick(&mut tool.velocity_m_per_s, contact.force_n, stretch_m, tool.device_m_per_s, half_s);
+            turning::half_kick(model, tool, contact.torque_nm, &at_start, half_s);
             limit_speed(model, tool, NEAR * model.spec.radius_m / time.dt_s.max(f64::MIN_POSITIVE));
             tool.centre_m += tool.velocity_m_per_s * time.dt_s;
             turning::drift(model, tool, time.dt_s);

@@ -36,6 +36,8 @@ pub(super) struct ToolContact {
     pub(super) force_n: DVec3,
     /// Torque of the body on the tool now (N m).
     pub(super) torque_nm: DVec3,
+    /// Largest depth (m) that any sample carries now.
+    pub(super) deepest_m: f64,
     pub(super) estimate: StiffnessEstimate,
     #[serde(skip)]
     pub(super) candidates: Candidates,
@@ -44,14 +46,14 @@ pub(super) struct ToolContact {
 impl ToolContact {
     fn keep_sums_of(&mut self, other: &Self) {
         (self.just_put, self.estimate) = (other.just_put, other.estimate);
-        (self.force_n, self.torque_nm) = (other.force_n, other.torque_nm);
+        (self.force_n, self.torque_nm, self.deepest_m) = (other.force_n, other.torque_nm, other.deepest_m);
     }
 }
 
 impl PartialEq for ContactState {
     fn eq(&self, other: &Self) -> bool {
         let same = |(a, b): (&ToolContact, &ToolContact)| {
-            let forces = a.force_n == b.force_n && a.torque_nm == b.torque_nm;
+            let forces = a.force_n == b.force_n && a.torque_nm == b.torque_nm && a.deepest_m == b.deepest_m;
             a.touching == b.touching && a.just_put == b.just_put && forces && a.estimate == b.estimate
         };
         self.tools.len() == other.tools.len() && self.tools.iter().zip(&other.tools).all(same)
@@ -70,6 +72,7 @@ impl ContactState {
             just_put: false,
             force_n: DVec3::ZERO,
             torque_nm: DVec3::ZERO,
+            deepest_m: 0.0,
             estimate: StiffnessEstimate::default(),
             candidates: Candidates::with_capacity(model.triangles.len()),
         };
@@ -93,6 +96,7 @@ impl ContactState {
             let known = touches.last().is_none_or(|last| (last.sample as usize) < samples(index));
             let finite = saved.force_n.is_finite()
                 && saved.torque_nm.is_finite()
+                && saved.deepest_m.is_finite()
                 && saved.estimate.is_finite()
                 && touches.iter().all(|touch| {
                     touch.spring_origin_m.is_finite() && (0.0..f64::INFINITY).contains(&touch.free_depth_m)
@@ -147,7 +151,7 @@ impl ContactState {
         for tool in &mut self.tools {
             tool.touching.clear();
             tool.just_put = false;
-            (tool.force_n, tool.torque_nm) = (DVec3::ZERO, DVec3::ZERO);
+            (tool.force_n, tool.torque_nm, tool.deepest_m) = (DVec3::ZERO, DVec3::ZERO, 0.0);
             tool.estimate = StiffnessEstimate::default();
         }
         self.forget_geometry();
@@ -158,7 +162,7 @@ impl ContactState {
         let part = &mut self.tools[tool];
         part.touching.clear();
         part.just_put = true;
-        (part.force_n, part.torque_nm) = (DVec3::ZERO, DVec3::ZERO);
+        (part.force_n, part.torque_nm, part.deepest_m) = (DVec3::ZERO, DVec3::ZERO, 0.0);
         part.estimate = StiffnessEstimate::default();
         part.candidates.slack_m = f64::NEG_INFINITY;
     }

@@ -160,8 +160,7 @@ impl ContactModel {
     }
 
     fn drift(&self, index: usize, tool: &mut ToolState, time: &SubstepTime, contact: &mut ContactState) {
-        let part = &contact.tools[index];
-        let moved_m = proxy::drift(&self.tools[index], tool, part.force_n, part.torque_nm, time);
+        let moved_m = proxy::drift(&self.tools[index], tool, &contact.tools[index], time);
         contact.tools[index].candidates.slack_m -= moved_m;
     }
 
@@ -202,7 +201,7 @@ impl ContactModel {
             put_into: std::mem::take(&mut part.just_put) || part.touching.tells_it_was_put(),
         };
         let pressed = narrow::press(&meeting, &mut part.candidates, &mut part.touching, &mut scratch.next, forces_n);
-        (part.force_n, part.torque_nm) = (pressed.force_n, pressed.torque_nm);
+        (part.force_n, part.torque_nm, part.deepest_m) = (pressed.force_n, pressed.torque_nm, pressed.deepest_m);
         pressed
     }
 

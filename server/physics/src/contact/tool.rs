@@ -171,6 +171,8 @@ pub struct ToolState {
     pub target: ToolTarget,
     /// The same at the end of the tick before: within a tick the device moves from there to `target`.
     pub previous_target: ToolTarget,
+    /// How far (m) a rigid tool has slipped from its device; zero for a coupled one.
+    pub slip_m: DVec3,
     /// Velocity of the device (m/s) as the coupling's damper has it: that of its path, smoothed.
     pub device_m_per_s: DVec3,
     /// Its angular velocity (rad/s) likewise.
@@ -224,6 +226,7 @@ impl ToolState {
             angular_velocity_rad_per_s: DVec3::ZERO,
             target,
             previous_target: target,
+            slip_m: DVec3::ZERO,
             device_m_per_s: DVec3::ZERO,
             device_rad_per_s: DVec3::ZERO,
             contact_force_n: DVec3::ZERO,
@@ -242,6 +245,7 @@ impl ToolState {
         let vectors = [
             self.centre_m,
             self.velocity_m_per_s,
+            self.slip_m,
             self.angular_velocity_rad_per_s,
             self.device_m_per_s,
             self.device_rad_per_s,
