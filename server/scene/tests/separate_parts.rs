@@ -35,7 +35,8 @@ fn write_boxes(path: &Path, gap_mm: f64, merged: bool) {
     fs::write(path, text + "$EndElements\n").unwrap();
 }
 
-const TETRAHEDRA: &str = "[[material]]\nlaw = \"stvk\"\nyoung_modulus_pa = 1e4\npoisson_ratio = 0.3\ndensity_kg_per_m3 = 1000\n";
+const TETRAHEDRA: &str =
+    "[[material]]\nlaw = \"stvk\"\nyoung_modulus_pa = 1e4\npoisson_ratio = 0.3\ndensity_kg_per_m3 = 1000\n";
 const SPRINGS: &str = "[body.springs]\nmesh_n_per_m = 60\nanchor_n_per_m = 12\nvertex_mass_kg = 2e-4\n";
 
 /// The warnings of a scene of two boxes, held where `held` says.
@@ -82,7 +83,8 @@ fn boxes_with_the_nodes_between_them_twice_are_told_with_what_is_not_held() {
 fn a_part_beside_the_other_is_told_where_it_is_not_held() {
     let told = warnings(5.0, false, TETRAHEDRA, ONE_SIDE);
     assert_eq!(told.len(), 1, "{told:?}");
-    let wanted = ["2 separate parts, 0 coincident nodes; part 2", "about (20, 5, 5) mm", "hold each part with a [[fixed]]"];
+    let wanted =
+        ["2 separate parts, 0 coincident nodes; part 2", "about (20, 5, 5) mm", "hold each part with a [[fixed]]"];
     assert!(wanted.iter().all(|part| told[0].contains(part)), "{told:?}");
     assert_eq!(warnings(5.0, false, TETRAHEDRA, ALL), Vec::<String>::new());
     assert_eq!(warnings(0.0, true, TETRAHEDRA, ONE_SIDE), Vec::<String>::new());

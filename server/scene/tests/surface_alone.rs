@@ -27,7 +27,11 @@ fn octahedron() -> Vec<[DVec3; 3]> {
 
 /// The surface of these triangles and what was said, from an OBJ in which every triangle has its own vertices, moved by `moved`, or
 /// in which they are shared.
-fn loaded(triangles: &[[DVec3; 3]], shared: bool, moved: impl Fn(usize) -> DVec3) -> Result<(Triangulation, Vec<String>), SceneError> {
+fn loaded(
+    triangles: &[[DVec3; 3]],
+    shared: bool,
+    moved: impl Fn(usize) -> DVec3,
+) -> Result<(Triangulation, Vec<String>), SceneError> {
     let (mut vertices, mut faces): (Vec<DVec3>, String) = (Vec::new(), String::new());
     for triangle in triangles {
         faces += "f";

@@ -38,7 +38,9 @@ pub(super) enum Untrusted {
         end: String,
     },
     /// An equilibrium with elements that have `det F ≤ 0`.
-    #[error("this equilibrium has {count} elements that are turned inside out: it is one of the formulas, not one of a body")]
+    #[error(
+        "this equilibrium has {count} elements that are turned inside out: it is one of the formulas, not one of a body"
+    )]
     #[diagnostic(help("apply less load, refine the mesh, or take law = \"stable-neo-hookean\""))]
     InvertedAtRest {
         /// How many.
@@ -98,9 +100,8 @@ impl Lowest {
     /// The ratio, where (at rest) and when.
     pub(super) fn told(&self, model: &Model) -> String {
         let middle = model.body().tets().map(|mesh| mesh.corners_m(self.found.tet).iter().sum::<glam::DVec3>() * 250.0);
-        let near = middle.map_or(String::new(), |mm| {
-            format!(" near ({:.2}, {:.2}, {:.2}) mm at rest", mm.x, mm.y, mm.z)
-        });
+        let near =
+            middle.map_or(String::new(), |mm| format!(" near ({:.2}, {:.2}, {:.2}) mm at rest", mm.x, mm.y, mm.z));
         format!("the least volume ratio was {} at {} s{near}", short(self.found.ratio), short(self.time_s))
     }
 }

@@ -100,7 +100,8 @@ pub fn run(args: &SimulateArgs) -> miette::Result<ExitCode> {
     };
     let mut summary = Summary::new(&scene, &model, &run.state, &rows, &ending);
     summary.time = Some(run.cost());
-    summary.lowest_volume_ratio = run.lowest.map(|lowest| PeakNumbers { value: lowest.found.ratio, time_s: lowest.time_s });
+    summary.lowest_volume_ratio =
+        run.lowest.map(|lowest| PeakNumbers { value: lowest.found.ratio, time_s: lowest.time_s });
     if let Some(out) = &out {
         summary.write(out)?;
     }

@@ -1,5 +1,8 @@
 //! Says so when a body's mesh is in parts that are not joined: they move apart, and what is not held is gone.
-use super::{body::Body, loads::Constraints};
+use super::{
+    body::{Body, BodyMesh},
+    loads::Constraints,
+};
 use crate::{
     places::{first_at_each_place, same_place},
     wording::{counted, short},
@@ -9,7 +12,7 @@ use palpate_physics::mesh::connected_parts;
 
 /// The warning, where there is something to warn of.
 pub(super) fn warning(body: &Body, constraints: &Constraints) -> Option<String> {
-    let positions_m = body.mesh.positions_m();
+    let positions_m = as_given_m(body);
     let part_of = part_of_nodes(body);
     let parts = part_of.iter().max().map_or(0, |last| last + 1);
     if parts < 2 {
@@ -18,7 +21,8 @@ pub(super) fn warning(body: &Body, constraints: &Constraints) -> Option<String> 
     let coincident = coincident(positions_m, &part_of);
     let loose = if body.kind.holds_each_node() { Vec::new() } else { not_held(&part_of, parts, constraints) };
     let what = if body.mesh.tets().is_some() { "mesh" } else { "surface" };
-    let mut text = format!("the body's {what} is {parts} separate parts, {}", counted(coincident.len(), "coincident node"));
+    let mut text =
+        format!("the body's {what} is {parts} separate parts, {}", counted(coincident.len(), "coincident node"));
     if let Some(&node) = coincident.first() {
         let at = mm(positions_m[node]);
         text += &format!(": nodes of different parts lie at one place, as at {at}, and do not move together");
@@ -40,6 +44,14 @@ pub(super) fn warning(body: &Body, constraints: &Constraints) -> Option<String> 
     let merge = "merge the coincident nodes in the program that made the file (in Gmsh: \"Coherence Mesh\")";
     let hold = "hold each part with a [[fixed]] region, or join them";
     Some(format!("{text}; {}", if coincident.is_empty() { hold } else { merge }))
+}
+
+/// Positions (m) of the nodes before Loop's scheme smooths a surface: its parts then come away from each other.
+fn as_given_m(body: &Body) -> &[DVec3] {
+    match &body.mesh {
+        BodyMesh::Surface { control: Some(surface), .. } => surface.positions_m(),
+        mesh => mesh.positions_m(),
+    }
 }
 
 /// The part of each node, joined through tets, or through the triangles of a surface without.

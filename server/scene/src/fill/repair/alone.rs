@@ -143,7 +143,8 @@ mod tests {
     fn a_sound_surface_keeps_its_numbers() {
         let open = Sample::lat_long(DVec3::splat(10.0), Some(5.0), 8, 12);
         let hollow = together(ball(10.0, DVec3::ZERO), inside_out(ball(5.0, DVec3::X)));
-        let touching = together(ball(10.0, DVec3::ZERO), ball(10.0, DVec3::X * 1e-9));
+        // Opposite points of the two lie at one place.
+        let touching = together(ball(10.0, DVec3::ZERO), ball(10.0, 2.0 * ball(10.0, DVec3::ZERO).points[0]));
         for sample in [open.clone(), inside_out(open), hollow, touching] {
             let found = mended(sample.clone());
             assert_eq!((found.points, found.triangles), (sample.points, sample.triangles));
