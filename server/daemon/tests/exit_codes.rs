@@ -1,5 +1,5 @@
-//! What `simulate` and `static` end with when there is a result that is not to be trusted: elements that were turned inside out, and
-//! equilibria that are none, ended with 0 and without a word.
+//! What `simulate` and `static` end with when there is a result that is not to be trusted: elements that were turned
+//! inside out, and equilibria that are none, ended with 0 and without a word.
 #![allow(clippy::unwrap_used)] // helpers outside #[test] functions
 use serde_json::Value;
 use std::{fs, path::Path, process::Command};
@@ -92,7 +92,8 @@ fn an_equilibrium_that_is_not_stable_ends_with_5() {
     assert!(sound.shown.contains("in equilibrium") && !sound.shown.contains("NOT"), "{}", sound.shown);
 }
 
-/// With coarse nodes closer than particles `static` found an equilibrium of nothing, and `simulate` stopped at its second tick.
+/// With coarse nodes closer than particles `static` found an equilibrium of nothing, and `simulate` stopped at its
+/// second tick.
 #[test]
 fn coarse_tets_too_small_for_the_particles_are_refused_before_any_tick() {
     let scene = "[scene]\nname = \"block\"\n[body]\n[body.box]\nsize_mm = [40, 40, 20]\ncells = [8, 8, 4]\n[body.particles]\nspacing_mm = 4\n\

@@ -13,7 +13,8 @@ pub(crate) fn same_place(points: &[DVec3]) -> f64 {
     if diagonal > 0.0 { SAME_POINT * diagonal } else { 1.0 }
 }
 
-/// Returns for every point the first one at its place: itself, or one within `tolerance`. Points that `counts` leaves out are by themselves.
+/// Returns for every point the first one at its place: itself, or one within `tolerance`. Points that `counts` leaves
+/// out are by themselves.
 pub(crate) fn first_at_each_place(points: &[DVec3], tolerance: f64, counts: impl Fn(u32) -> bool) -> Vec<u32> {
     let mut grid = Grid::new(points, tolerance);
     let mut first_of = Vec::with_capacity(points.len());

@@ -1,5 +1,5 @@
-//! Bodies whose parts are not joined: half of one flew away, and nothing was said. Two boxes side by side, whose common side has its
-//! nodes twice, once, or a gap.
+//! Bodies whose parts are not joined: half of one flew away, and nothing was said. Two boxes side by side, whose common
+//! side has its nodes twice, once, or a gap.
 #![allow(clippy::unwrap_used)] // helpers outside #[test] functions
 use palpate_scene::{Limits, Scene, load_file};
 use std::{fmt::Write, fs, path::Path};
@@ -7,7 +7,8 @@ use std::{fmt::Write, fs, path::Path};
 /// Six tets of a box by its corners, whose bits are x, y and z.
 const TETS: [[usize; 4]; 6] = [[0, 1, 3, 7], [0, 3, 2, 7], [0, 2, 6, 7], [0, 6, 4, 7], [0, 4, 5, 7], [0, 5, 1, 7]];
 
-/// Gmsh's format 2.2: a box of 10 mm from the origin and one `gap_mm` beside it; `merged` boxes share the nodes between them.
+/// Gmsh's format 2.2: a box of 10 mm from the origin and one `gap_mm` beside it; `merged` boxes share the nodes between
+/// them.
 fn write_boxes(path: &Path, gap_mm: f64, merged: bool) {
     let mut nodes: Vec<[f64; 3]> = Vec::new();
     let mut tets = Vec::new();
@@ -98,4 +99,13 @@ fn springs_hold_every_part_and_join_none() {
     assert!(told[0].contains("surface is 2 separate parts, 8 coincident nodes"), "{told:?}");
     assert!(!told[0].contains("not held"), "{told:?}");
     assert_eq!(warnings(5.0, false, SPRINGS, ""), Vec::<String>::new());
+}
+
+/// Cells of the lattice reach across the side between the boxes: a load on one does not take it away. Across a gap they do not.
+#[test]
+fn particles_join_what_touches() {
+    let particles = format!("[body.particles]\nspacing_mm = 2\n{TETRAHEDRA}");
+    assert_eq!(warnings(0.0, false, &particles, ONE_SIDE), Vec::<String>::new());
+    let told = warnings(5.0, false, &particles, ONE_SIDE);
+    assert!(told.len() == 1 && told[0].contains("part 2") && told[0].contains("not held"), "{told:?}");
 }

@@ -1,5 +1,5 @@
-//! `[body.surface]`: loose triangles gave a fiftieth of the force and a surface that was inside out none, without a word. Both are mended
-//! and told, and what is sound is left as it is.
+//! `[body.surface]`: loose triangles gave a fiftieth of the force and a surface that was inside out none, without a
+//! word. Both are mended and told, and what is sound is left as it is.
 #![allow(clippy::unwrap_used)] // helpers outside #[test] functions
 use glam::DVec3;
 use palpate_physics::mesh::Triangulation;
@@ -25,8 +25,8 @@ fn octahedron() -> Vec<[DVec3; 3]> {
     faces.into_iter().flat_map(quarter).collect()
 }
 
-/// The surface of these triangles and what was said, from an OBJ in which every triangle has its own vertices, moved by `moved`, or
-/// in which they are shared.
+/// The surface of these triangles and what was said, from an OBJ in which every triangle has its own vertices, moved by
+/// `moved`, or in which they are shared.
 fn loaded(
     triangles: &[[DVec3; 3]],
     shared: bool,

@@ -1,4 +1,5 @@
-//! Exit codes of `simulate` and `static` when there is a result that is not to be trusted, and the words that go with them.
+//! Exit codes of `simulate` and `static` when there is a result that is not to be trusted, and the words that go with
+//! them.
 use miette::{Diagnostic, Report};
 use palpate_physics::{Model, Quarantine, elements::linear_tet::VolumeRatio};
 use palpate_scene::wording::short;

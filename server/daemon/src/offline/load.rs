@@ -36,7 +36,8 @@ pub(super) fn load_with_warnings(name: &str) -> miette::Result<Scene> {
     Ok(scene)
 }
 
-/// Builds the model of a scene; what one would want to change about its body goes to standard error and to the scene's warnings.
+/// Builds the model of a scene; what one would want to change about its body goes to standard error and to the scene's
+/// warnings.
 pub(super) fn build_with_warnings(scene: &mut Scene) -> miette::Result<Model> {
     let model = build(scene)?;
     for warning in served(&model).warnings() {

@@ -1,6 +1,7 @@
 //! Which nodes of a mesh hang together through its elements.
 
-/// Returns the connected part of each node, numbered in order of the parts' first nodes. A node that no element has is a part by itself.
+/// Returns the connected part of each node, numbered in order of the parts' first nodes. A node that no element has is
+/// a part by itself.
 pub fn connected_parts<'e>(nodes: usize, elements: impl Iterator<Item = &'e [u32]>) -> Vec<usize> {
     let mut root: Vec<usize> = (0..nodes).collect();
     for element in elements {

@@ -20,30 +20,32 @@ pub(super) fn warning(body: &Body, constraints: &Constraints) -> Option<String> 
     }
     let coincident = coincident(positions_m, &part_of);
     let loose = if body.kind.holds_each_node() { Vec::new() } else { not_held(&part_of, parts, constraints) };
-    let what = if body.mesh.tets().is_some() { "mesh" } else { "surface" };
-    let mut text =
-        format!("the body's {what} is {parts} separate parts, {}", counted(coincident.len(), "coincident node"));
-    if let Some(&node) = coincident.first() {
-        let at = mm(positions_m[node]);
-        text += &format!(": nodes of different parts lie at one place, as at {at}, and do not move together");
+    if coincident.is_empty() && loose.is_empty() {
+        return None;
     }
-    if let Some(&part) = loose.first() {
+    let what = if body.mesh.tets().is_some() { "mesh" } else { "surface" };
+    let apart = coincident.first().map_or_else(String::new, |&node| {
+        let at = mm(positions_m[node]);
+        format!(": nodes of different parts lie at one place, as at {at}, and do not move together")
+    });
+    let flies = loose.first().map_or_else(String::new, |&part| {
         let of_part = || (0..part_of.len()).filter(|&node| part_of[node] == part);
         let count = of_part().count();
         let middle_m = of_part().map(|node| positions_m[node]).sum::<DVec3>() / count as f64;
         let which = format!("part {} ({} about {})", part + 1, counted(count, "node"), mm(middle_m));
-        text += &match loose.len() {
-            1 => format!("; {which} is not held"),
-            more => format!("; {more} parts are not held, the first of them {which}"),
+        let which = match loose.len() {
+            1 => format!("{which} is not held"),
+            more => format!("{more} parts are not held, the first of them {which}"),
         };
-        text += ": what acts there moves it away, and `palpated static` refuses it";
-    }
-    if coincident.is_empty() && loose.is_empty() {
-        return None;
-    }
-    let merge = "merge the coincident nodes in the program that made the file (in Gmsh: \"Coherence Mesh\")";
-    let hold = "hold each part with a [[fixed]] region, or join them";
-    Some(format!("{text}; {}", if coincident.is_empty() { hold } else { merge }))
+        format!("; {which}: what acts there moves it away, and `palpated static` refuses it")
+    });
+    let advice = if coincident.is_empty() {
+        "hold each part with a [[fixed]] region, or join them"
+    } else {
+        "merge the coincident nodes in the program that made the file (in Gmsh: \"Coherence Mesh\")"
+    };
+    let nodes = counted(coincident.len(), "coincident node");
+    Some(format!("the body's {what} is {parts} separate parts, {nodes}{apart}{flies}; {advice}"))
 }
 
 /// Positions (m) of the nodes before Loop's scheme smooths a surface: its parts then come away from each other.
@@ -54,14 +56,22 @@ fn as_given_m(body: &Body) -> &[DVec3] {
     }
 }
 
-/// The part of each node, joined through tets, or through the triangles of a surface without.
+/// The part of each node, joined through tets, or through the triangles of a surface without; where cells of a lattice reach from part to
+/// part, also through nodes at one place.
 fn part_of_nodes(body: &Body) -> Vec<usize> {
-    let nodes = body.mesh.positions_m().len();
-    if let Some(mesh) = body.mesh.tets() {
-        return connected_parts(nodes, mesh.tets().iter().map(|tet| &tet[..]));
+    let positions_m = as_given_m(body);
+    let Some(mesh) = body.mesh.tets() else {
+        let triangles = (0..body.surface.triangles.len()).map(|t| body.surface.triangle_nodes(t));
+        let triangles: Vec<[u32; 3]> = triangles.collect();
+        return connected_parts(positions_m.len(), triangles.iter().map(|corners| &corners[..]));
+    };
+    let tets = mesh.tets().iter().map(|tet| &tet[..]);
+    if !body.kind.joins_what_touches() {
+        return connected_parts(positions_m.len(), tets);
     }
-    let triangles: Vec<[u32; 3]> = (0..body.surface.triangles.len()).map(|t| body.surface.triangle_nodes(t)).collect();
-    connected_parts(nodes, triangles.iter().map(|corners| &corners[..]))
+    let first = first_at_each_place(positions_m, same_place(positions_m), |_| true);
+    let touching: Vec<[u32; 2]> = first.into_iter().zip(0..).map(|(first, node)| [first, node]).collect();
+    connected_parts(positions_m.len(), tets.chain(touching.iter().map(|pair| &pair[..])))
 }
 
 /// Nodes at whose place there is a node of another part, ascending.

@@ -1,8 +1,9 @@
 //! Whether particles see how the coarse level moves.
 //!
-//! The coarse level has no geometry of its own: all that it knows of a motion is what its particles do, `y_p = Σ_i ζ_pi x_i`. Of more nodes
-//! than particles some motions move no particle (there are fewer equations than unknowns). Nothing resists them, neither while particles
-//! sleep nor when they wake: equilibria are not stable, and what wakes makes them grow until a state is refused.
+//! The coarse level has no geometry of its own: all that it knows of a motion is what its particles do, `y_p = Σ_i ζ_pi
+//! x_i`. Of more nodes than particles some motions move no particle (there are fewer equations than unknowns). Nothing
+//! resists them, neither while particles sleep nor when they wake: equilibria are not stable, and what wakes makes them
+//! grow until a state is refused.
 use super::{body::NO_WEIGHT, partition::Partition, spec::HybridError};
 use crate::mesh::{TetMesh, tet::EDGES};
 use glam::BVec3;
@@ -73,8 +74,8 @@ mod tests {
         HybridBody::lay_out(&coarse, &surface, particles, &[], &mut |_| {}).map(|_| ())
     }
 
-    /// With nodes closer than particles a load made it not finite within ten ticks; with cells of 8 mm, whose nodes are as far
-    /// apart as particles, all was well.
+    /// With nodes closer than particles a load made it not finite within ten ticks; with cells of 8 mm, whose nodes are
+    /// as far apart as particles, all was well.
     #[test]
     fn coarse_nodes_closer_than_particles_are_refused_by_name() {
         for cells in [[2, 2, 1], [4, 4, 2], [5, 5, 2]] {

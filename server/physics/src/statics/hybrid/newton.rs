@@ -31,8 +31,8 @@ pub(super) struct Solver<'a> {
     pub(super) progress: &'a mut dyn FnMut(&Progress) -> ControlFlow<()>,
 }
 
-/// `ε ‖diag K‖₂ max|q|` (N), nodes and particles at rest: an entry known to `ε|q|` has a force known to `ε |q| K_ii`. (A node that nearly
-/// nothing holds may be found anywhere; what it has to do with forces is as little.)
+/// `ε ‖diag K‖₂ max|q|` (N), nodes and particles at rest: an entry known to `ε|q|` has a force known to `ε |q| K_ii`.
+/// (A node that nearly nothing holds may be found anywhere; what it has to do with forces is as little.)
 pub(super) fn rounding_n(awakened: &Awakened<'_>, unknowns: &[DVec3]) -> f64 {
     let environment = awakened.environment;
     let springs = (0..environment.tools.len()).filter_map(|tool| environment.contact.spring(tool));

@@ -63,6 +63,11 @@ pub(crate) trait BodyKind: Debug + Sync {
         false
     }
 
+    /// Whether parts of its mesh that share no node move together all the same where they touch.
+    fn joins_what_touches(&self) -> bool {
+        false
+    }
+
     /// What one would want to change.
     fn warnings(&self, _body: &Body, _tools: &[ToolSpec]) -> Vec<String> {
         Vec::new()

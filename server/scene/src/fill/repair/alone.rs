@@ -1,11 +1,12 @@
-//! A surface that stands alone, open or closed: welded where it is loose, turned where it is inside out. Holes and parts stay.
+//! A surface that stands alone, open or closed: welded where it is loose, turned where it is inside out. Holes and
+//! parts stay.
 use super::{Repairs, Soup, edges_of, manifold, weld};
 use crate::places::same_place;
 use glam::DVec3;
 use palpate_physics::contact::is_inside;
 
-/// Points on open edges are one point when they are nearer than this part of the shortest edge: texts of few digits round farther than
-/// numbers in single precision, and a slit so narrow is none.
+/// Points on open edges are one point when they are nearer than this part of the shortest edge: texts of few digits
+/// round farther than numbers in single precision, and a slit so narrow is none.
 const LOOSE: f64 = 0.01;
 
 /// A surface (m) after what was wrong with it is mended.
@@ -66,8 +67,8 @@ struct ClosedPart {
     high: DVec3,
 }
 
-/// Turns closed parts whose normals point inwards, or, of those within another, outwards: a hollow's do. Returns how many triangles were
-/// turned.
+/// Turns closed parts whose normals point inwards, or, of those within another, outwards: a hollow's do. Returns how
+/// many triangles were turned.
 fn turn_closed_parts(soup: &mut Soup) -> usize {
     let parts = closed_parts(soup);
     let corners_of = |part: &ClosedPart| part.triangles.iter().map(|&t| soup.triangles[t]).collect::<Vec<_>>();
@@ -92,7 +93,9 @@ fn closed_parts(soup: &Soup) -> Vec<ClosedPart> {
     let count = part_of.iter().max().map_or(0, |last| last + 1);
     let mut is_closed = vec![true; count];
     for owners in edges_of(&soup.triangles).values().filter(|owners| owners.len() != 2) {
-        owners.iter().for_each(|&t| is_closed[part_of[t as usize]] = false);
+        for &t in owners {
+            is_closed[part_of[t as usize]] = false;
+        }
     }
     let new = || ClosedPart { triangles: Vec::new(), volume: 0.0, low: DVec3::INFINITY, high: DVec3::NEG_INFINITY };
     let mut parts: Vec<ClosedPart> = (0..count).map(|_| new()).collect();

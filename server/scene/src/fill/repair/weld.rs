@@ -7,7 +7,8 @@ use std::collections::BTreeMap;
 /// Points on open edges are joined across gaps up to this part of their open edges' length.
 const GAP: f64 = 0.3;
 
-/// Merges points that `may_weld` allows and that are nearer than `tolerance`; drops triangles that are degenerate or present twice.
+/// Merges points that `may_weld` allows and that are nearer than `tolerance`; drops triangles that are degenerate or
+/// present twice.
 pub(super) fn weld(
     points: &[DVec3],
     triangles: &[[u32; 3]],
