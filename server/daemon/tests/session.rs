@@ -331,3 +331,17 @@ async fn a_caller_that_goes_away_does_not_leave_half_a_replacement() {
     assert!(daemon.status().await.tick > before.tick, "time goes on");
     daemon.finish().await;
 }
+
+/// Only `palpated check` told what is wrong with a body's lattice.
+#[tokio::test(flavor = "multi_thread")]
+async fn a_session_tells_what_is_wrong_with_its_lattice() {
+    let daemon = Daemon::on(block_scene("block", 3)).await;
+    let toml = "[scene]\nname = \"thin\"\n[body]\n[body.box]\nsize_mm = [40, 40, 20]\ncells = [2, 2, 1]\n\
+                [body.particles]\nspacing_mm = 5\nmost_active = 60\nfine_depth_mm = 15\n\
+                [[material]]\nlaw = \"stvk\"\nyoung_modulus_pa = 10e3\npoisson_ratio = 0.3\ndensity_kg_per_m3 = 1000\n[[fixed]]\nregion = \"z_min\"\n";
+    let source = Some(Source::Toml(toml.into()));
+    let loaded = daemon.session().load_scene(v1::LoadSceneRequest { source }).await.unwrap().into_inner();
+    let told = loaded.warnings.iter().any(|warning| warning.starts_with("fine depth in [body.particles]"));
+    assert!(told, "{:?}", loaded.warnings);
+    daemon.finish().await;
+}

@@ -13,6 +13,7 @@ pub mod fill;
 mod limits;
 mod load;
 pub mod path;
+mod places;
 pub mod probes;
 pub mod scene;
 pub mod shapes;

@@ -1,6 +1,7 @@
 //! `palpated static`: the equilibrium of a scene under its final loads.
 use super::{
     args::{OutputArgs, positive},
+    exit::{CODES, Untrusted},
     folder,
     frames::Frames,
     interrupt::Interrupt,
@@ -22,12 +23,12 @@ use thiserror::Error;
 
 /// Flags of `palpated static`.
 #[derive(Debug, Clone, clap::Args)]
-#[command(after_help = "Examples:\n  \
+#[command(after_help = format!("Examples:\n  \
     palpated static cantilever                 where the beam comes to rest\n  \
     palpated static cantilever --out rest      and keep probes.csv, frames.pvd and summary.json\n  \
     palpated static lame-sphere --json         a sphere under pressure, for other programs\n\n\
     Loads and tools arrive slowly, and without friction. A tool on a spring rests where the spring balances its contact.\n\
-    Of a body with particles those are awake that tools would keep awake where they rest, and those within the same reach of a load.")]
+    Of a body with particles those are awake that tools would keep awake where they rest, and those within the same reach of a load.\n\n{CODES}"))]
 pub struct StaticArgs {
     #[command(flatten)]
     output: OutputArgs,
@@ -55,8 +56,8 @@ struct NoEquilibrium {
 /// A scene that does not load, no convergence, or a folder that cannot be written.
 pub fn run(args: &StaticArgs) -> miette::Result<ExitCode> {
     let output = &args.output;
-    let scene = load::load_with_warnings(&output.scene)?;
-    let model = load::build(&scene)?;
+    let mut scene = load::load_with_warnings(&output.scene)?;
+    let model = load::build_with_warnings(&mut scene)?;
     if let Some(refusal) = served(&model).no_equilibrium(&scene.name) {
         return Err(refusal);
     }
@@ -73,7 +74,9 @@ pub fn run(args: &StaticArgs) -> miette::Result<ExitCode> {
     rows.sample(sought.time_s, &model, &state, &solution.node_reactions_n)?;
     rows.flush()?;
     let wall_s = started.elapsed().as_secs_f64();
-    let mut ending = Ending { command: "static", by: "equilibrium", simulated_s: sought.time_s, wall_s, frames: 0 };
+    let untrusted = untrusted(&solution, args.residual);
+    let by = untrusted.as_ref().map_or("equilibrium", Untrusted::word);
+    let mut ending = Ending { command: "static", by, simulated_s: sought.time_s, wall_s, frames: 0 };
     if let Some(out) = &out {
         let mut frames = Frames::new(out, &model)?;
         frames.write(sought.time_s, &model, &state)?;
@@ -94,7 +97,20 @@ pub fn run(args: &StaticArgs) -> miette::Result<ExitCode> {
         summary.write(out)?;
     }
     summary.print(output.json, out.as_deref())?;
-    Ok(ExitCode::SUCCESS)
+    Ok(untrusted.map_or(ExitCode::SUCCESS, Untrusted::told))
+}
+
+/// Why what was found is not to be trusted, if so.
+fn untrusted(found: &StaticSolution, residual: Option<f64>) -> Option<Untrusted> {
+    let balance = found.imbalance(residual.unwrap_or(StaticSettings::default().relative_residual));
+    if found.inverted_tets > 0 {
+        return Some(Untrusted::InvertedAtRest { count: found.inverted_tets });
+    }
+    if !found.stable {
+        let balance = balance.map_or_else(String::new, |balance| format!(", and its forces do not balance: {balance}"));
+        return Some(Untrusted::Unstable { balance });
+    }
+    balance.map(|balance| Untrusted::Unbalanced(balance.to_string()))
 }
 
 /// Under what the equilibrium is sought.

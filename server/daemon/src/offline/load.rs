@@ -1,5 +1,6 @@
 //! A scene for an offline command: progress and warnings on standard error, and its model.
 use crate::{
+    bodies::served,
     load::from_argument,
     progress::{BUILDING, Progress},
 };
@@ -33,6 +34,17 @@ pub(super) fn load_with_warnings(name: &str) -> miette::Result<Scene> {
         eprintln!("warning: {warning}");
     }
     Ok(scene)
+}
+
+/// Builds the model of a scene; what one would want to change about its body goes to standard error and to the scene's
+/// warnings.
+pub(super) fn build_with_warnings(scene: &mut Scene) -> miette::Result<Model> {
+    let model = build(scene)?;
+    for warning in served(&model).warnings() {
+        eprintln!("warning: {warning}");
+        scene.warnings.push(warning);
+    }
+    Ok(model)
 }
 
 /// Builds the model of a scene, with a progress bar.

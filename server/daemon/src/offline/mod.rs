@@ -5,6 +5,7 @@ pub mod calibrate;
 pub mod check;
 mod cost;
 pub mod equilibrium;
+mod exit;
 mod folder;
 mod frames;
 mod interrupt;

@@ -1,28 +1,35 @@
 //! `palpated simulate`: a scene headless, as fast as it goes, the same bits every time.
 use super::{
     args::{OutputArgs, positive},
+    exit::{CODES, Lowest, Untrusted},
     folder,
     frames::Frames,
     interrupt::Interrupt,
     load,
     probe_rows::ProbeRows,
-    summary::{Ending, Percentiles, Summary, TimeNumbers},
+    summary::{Ending, PeakNumbers, Percentiles, Summary, TimeNumbers},
 };
 use crate::progress::Progress;
 use glam::DVec3;
 use hdrhistogram::Histogram;
 use miette::IntoDiagnostic;
-use palpate_physics::{Model, Scratch, State, TickInput, contact::ToolTarget, step, world::wake_only};
-use palpate_scene::Scene;
+use palpate_physics::{
+    Model, Scratch, State, TickInput,
+    contact::ToolTarget,
+    elements::linear_tet::VolumeRatio,
+    step,
+    world::{min_volume_ratio, wake_only},
+};
+use palpate_scene::{Scene, wording::short};
 use std::{process::ExitCode, time::Instant};
 
 /// Flags of `palpated simulate`.
 #[derive(Debug, Clone, clap::Args)]
-#[command(after_help = "Examples:\n  \
+#[command(after_help = format!("Examples:\n  \
     palpated simulate ventricle                      print what it did\n  \
     palpated simulate ventricle --out run            and keep probes.csv, frames.pvd (open it in ParaView), summary.json\n  \
     palpated simulate my.toml --out run --frames none --duration-s 10\n\n\
-    Nothing in a run is random: two runs of one scene give the same bits.")]
+    Nothing in a run is random: two runs of one scene give the same bits.\n\n{CODES}"))]
 pub struct SimulateArgs {
     #[command(flatten)]
     output: OutputArgs,
@@ -33,6 +40,9 @@ pub struct SimulateArgs {
     #[arg(long, value_name = "N|none", requires = "out")]
     frames: Option<FrameCount>,
 }
+
+/// Elements inside out are looked for at every so many ticks, and at the end: of a body with particles that takes longer than a tick.
+const LOOK_EVERY: u64 = 10;
 
 /// How many frames a run writes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -62,8 +72,8 @@ impl std::str::FromStr for FrameCount {
 /// A scene that does not load, or a folder that cannot be written.
 pub fn run(args: &SimulateArgs) -> miette::Result<ExitCode> {
     let output = &args.output;
-    let scene = load::load_with_warnings(&output.scene)?;
-    let model = load::build(&scene)?;
+    let mut scene = load::load_with_warnings(&output.scene)?;
+    let model = load::build_with_warnings(&mut scene)?;
     let out = output.out.as_deref().map(|out| folder::prepare(out, output.force)).transpose()?;
     let ticks = |time_s: f64| in_ticks(time_s, &model);
     let plan = Plan::new(
@@ -90,12 +100,13 @@ pub fn run(args: &SimulateArgs) -> miette::Result<ExitCode> {
     };
     let mut summary = Summary::new(&scene, &model, &run.state, &rows, &ending);
     summary.time = Some(run.cost());
+    summary.lowest_volume_ratio =
+        run.lowest.map(|lowest| PeakNumbers { value: lowest.found.ratio, time_s: lowest.time_s });
     if let Some(out) = &out {
         summary.write(out)?;
     }
     summary.print(output.json, out.as_deref())?;
-    run.refuse_quarantined()?;
-    Ok(ExitCode::SUCCESS)
+    Ok(run.untrusted(summary.min_volume_ratio).map_or(ExitCode::SUCCESS, Untrusted::told))
 }
 
 /// What to do at which tick.
@@ -157,6 +168,7 @@ pub(super) struct Run<'s> {
     most_awake: usize,
     repeated_ticks: u64,
     asleep_ticks: u64,
+    lowest: Option<Lowest>,
 }
 
 impl<'s> Run<'s> {
@@ -175,6 +187,7 @@ impl<'s> Run<'s> {
             most_awake: 0,
             repeated_ticks: 0,
             asleep_ticks: 0,
+            lowest: None,
         })
     }
 
@@ -199,6 +212,9 @@ impl<'s> Run<'s> {
                 ended_by = "interrupted";
             }
             let last = tick == plan.ticks || ended_by != "duration";
+            if last || tick.is_multiple_of(LOOK_EVERY) {
+                self.look_for_inverted(time_s);
+            }
             if tick.is_multiple_of(plan.sample_every) || last {
                 rows.sample(time_s, self.model, &self.state, self.scratch.reactions_n())?;
             }
@@ -218,12 +234,33 @@ impl<'s> Run<'s> {
 
     /// An error when a tick's result was refused.
     pub(super) fn refuse_quarantined(&self) -> miette::Result<()> {
-        self.state.quarantine.map_or(Ok(()), |what| {
-            Err(miette::miette!(
-                help = "the step may be unstable: leave `numerics.substeps` out, raise `stretch_allowance`, or press less hard",
-                "{what}; the run stopped there"
-            ))
-        })
+        match self.state.quarantine {
+            Some(what) => Err(Untrusted::Quarantined { what, inverted: String::new() }.into()),
+            None => Ok(()),
+        }
+    }
+
+    fn look_for_inverted(&mut self, time_s: f64) {
+        let found = min_volume_ratio(self.model, &self.state);
+        let is_lower = |found: &VolumeRatio| self.lowest.is_none_or(|lowest| found.ratio < lowest.found.ratio);
+        if let Some(found) = found.filter(is_lower) {
+            self.lowest = Some(Lowest { found, time_s });
+        }
+    }
+
+    /// Why the run is not to be trusted, if so, which ended with this volume ratio.
+    fn untrusted(&self, end: f64) -> Option<Untrusted> {
+        let least = self.lowest.filter(Lowest::is_inverted).map(|lowest| lowest.told(self.model));
+        if let Some(what) = self.state.quarantine {
+            let before = |least: String| format!("; before that elements turned inside out: {least}");
+            return Some(Untrusted::Quarantined { what, inverted: least.map_or_else(String::new, before) });
+        }
+        let end = if end > 0.0 {
+            format!("they have come back, it is {} at the end", short(end))
+        } else {
+            format!("it is {} at the end", short(end))
+        };
+        least.map(|least| Untrusted::Inverted { least, end })
     }
 
     /// One tick: the inputs at its end, then the step, whose wall time is recorded.

@@ -13,7 +13,8 @@ pub(super) struct Summary {
     pub(super) command: &'static str,
     pub(super) scene: String,
     pub(super) body: BodyNumbers,
-    /// `duration`, `interrupted`, `quarantined` or `equilibrium`.
+    /// Of a run `duration`, `interrupted` or `quarantined`; of a static solve `equilibrium`, or what is wrong with it: `inverted`,
+    /// `unstable` or `unbalanced`.
     pub(super) ended_by: &'static str,
     pub(super) simulated_s: f64,
     pub(super) wall_s: f64,
@@ -24,6 +25,9 @@ pub(super) struct Summary {
     pub(super) energies_j: EnergyNumbers,
     /// Smallest deformed over rest volume of a tet; below 0: inverted. 1 of springs.
     pub(super) min_volume_ratio: f64,
+    /// The least that was seen of that ratio in a run over time, and when.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) lowest_volume_ratio: Option<PeakNumbers>,
     /// Newest value of every probe: unit, and value by column.
     pub(super) probes: BTreeMap<String, ProbeNumbers>,
     pub(super) samples: u64,
@@ -188,6 +192,7 @@ impl Summary {
                 balance: (ending.command == "simulate" && model.body().books_energy()).then(|| energies.balance_j()),
             },
             min_volume_ratio: world::min_volume_ratio(model, state).map_or(1.0, |smallest| smallest.ratio),
+            lowest_volume_ratio: None,
             probes,
             samples: rows.count(),
             frames: ending.frames,
@@ -211,8 +216,12 @@ impl Summary {
             println!("{}", serde_json::to_string_pretty(self).into_diagnostic()?);
             return Ok(());
         }
-        let ended =
-            if self.ended_by == "equilibrium" { "in equilibrium" } else { &format!("ended by {}", self.ended_by) };
+        let ended = match self.ended_by {
+            "equilibrium" => "in equilibrium".to_owned(),
+            "inverted" => "NOT in equilibrium: elements inside out".to_owned(),
+            wrong @ ("unstable" | "unbalanced") => format!("NOT in equilibrium: {wrong}"),
+            by => format!("ended by {by}"),
+        };
         println!("{}: {} tets, {} nodes, {ended}", self.scene, self.body.tets, self.body.nodes);
         if let Some(particles) = &self.body.particles {
             println!(

@@ -3,7 +3,7 @@
 //! A small rigid motion moves a node at `X` by `t + ω × (X − c)`. It is free when it moves no prescribed axis: the null
 //! space of `CᵀC`, with one row `[e_axis, (X − c) × e_axis]` of `C` per prescribed axis. Checked for every connected
 //! part of the mesh.
-use crate::linalg::eigen;
+use crate::{linalg::eigen, mesh::connected_parts};
 use glam::DVec3;
 use std::fmt;
 
@@ -80,7 +80,7 @@ pub(crate) fn first_free_part<'e>(
     nodes: &HeldNodes<'_>,
     elements: impl Iterator<Item = &'e [u32]>,
 ) -> Option<FreePart> {
-    let part_of = parts(nodes.rest_m.len(), elements);
+    let part_of = connected_parts(nodes.rest_m.len(), elements);
     for part in 0..part_of.iter().copied().max().map_or(0, |last| last + 1) {
         let of_part: Vec<usize> = (0..part_of.len()).filter(|&node| part_of[node] == part).collect();
         // Coarse nodes that nothing follows are no part of the body.
@@ -93,37 +93,6 @@ pub(crate) fn first_free_part<'e>(
         }
     }
     None
-}
-
-/// The connected part of each node, numbered in order of first node.
-fn parts<'e>(nodes: usize, elements: impl Iterator<Item = &'e [u32]>) -> Vec<usize> {
-    let mut root: Vec<usize> = (0..nodes).collect();
-    for element in elements {
-        for pair in element.windows(2) {
-            let (a, b) = (find(&mut root, pair[0] as usize), find(&mut root, pair[1] as usize));
-            root[a.max(b)] = a.min(b);
-        }
-    }
-    let mut number = vec![usize::MAX; nodes];
-    let mut count = 0;
-    (0..nodes)
-        .map(|node| {
-            let root = find(&mut root, node);
-            if number[root] == usize::MAX {
-                number[root] = count;
-                count += 1;
-            }
-            number[root]
-        })
-        .collect()
-}
-
-fn find(root: &mut [usize], mut node: usize) -> usize {
-    while root[node] != node {
-        root[node] = root[root[node]];
-        node = root[node];
-    }
-    node
 }
 
 fn free_motions(of: &HeldNodes<'_>, nodes: &[usize]) -> Vec<RigidMotion> {

@@ -30,7 +30,7 @@ use crate::{
 pub use equilibrium::Goal;
 pub use error::SolveError;
 pub use load_path::MAX_LOAD_STEPS;
-pub use solution::{AwakeParticles, StaticSolution, ToolAtRest};
+pub use solution::{AwakeParticles, Imbalance, StaticSolution, ToolAtRest};
 use std::ops::ControlFlow;
 use tet_model::TetModel;
 

@@ -13,9 +13,35 @@ use crate::{
     world::{Model, State},
 };
 use glam::{BVec3, DVec3};
+use std::fmt;
 
 /// Forces up to so many times `rounding_n` are rounding: that bounds the free axes, and held ones have theirs too.
 const ROUNDING_ONLY: f64 = 10.0;
+
+/// A residual that rounding excuses is at most this part of the forces: what is left of them otherwise is told by nothing.
+const MOST_ROUNDED: f64 = 0.01;
+
+/// Forces that do not balance.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Imbalance {
+    /// `‖f_free‖₂` (N).
+    pub residual_n: f64,
+    /// The forces in play (N).
+    pub reference_n: f64,
+    /// What rounding of positions alone leaves (N).
+    pub rounding_n: f64,
+}
+
+impl fmt::Display for Imbalance {
+    fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let &Self { residual_n, reference_n, rounding_n } = self;
+        write!(out, "{residual_n:.2e} N are left of forces of {reference_n:.2e} N")?;
+        if rounding_n > MOST_ROUNDED * reference_n {
+            write!(out, ", and rounding of positions alone makes {rounding_n:.2e} N: the forces are lost in it")?;
+        }
+        Ok(())
+    }
+}
 
 /// An equilibrium.
 #[derive(Debug, Clone, PartialEq)]
@@ -101,6 +127,15 @@ impl StaticSolution {
     /// held against `rounding_n`.
     pub fn is_unloaded(&self) -> bool {
         self.reference_n <= ROUNDING_ONLY * self.rounding_n
+    }
+
+    /// Why the forces do not balance as well as is wanted, `relative_residual` of them; `None` where they do, or where only rounding of
+    /// positions stands between.
+    pub fn imbalance(&self, relative_residual: f64) -> Option<Imbalance> {
+        let rounded = self.residual_n <= self.rounding_n && self.relative_residual <= MOST_ROUNDED;
+        let is_met = self.relative_residual <= relative_residual || rounded || self.is_unloaded();
+        let &Self { residual_n, reference_n, rounding_n, .. } = self;
+        (!is_met).then_some(Imbalance { residual_n, reference_n, rounding_n })
     }
 
     /// The equilibrium under `load_factors` as a state at tick 0, from which [`crate::step`] goes on without moving. Its ledger

@@ -4,10 +4,11 @@ use super::{
     kinds::{self, BodyKind},
     located::Located,
     parts::{self, Part},
+    surface_alone,
 };
 use crate::{
     document::{
-        body::{BodyTable, LengthUnit, MeshTable, SurfaceTable, SurfacesTable},
+        body::{BodyTable, LengthUnit, MeshTable, SurfacesTable},
         source::{Fault, Where},
     },
     error::Stage,
@@ -214,7 +215,7 @@ pub(crate) fn make(table: &BodyTable, files: &Files<'_>, progress: &mut dyn FnMu
     let kind = kinds::of(table);
     let mut body = match table {
         BodyTable { mesh: Some(mesh), .. } => from_file(kind, mesh, files, &at)?,
-        BodyTable { surface: Some(surface), .. } => from_surface(kind, surface, files, &at)?,
+        BodyTable { surface: Some(surface), .. } => surface_alone::read(kind, surface, files, &at)?,
         BodyTable { surfaces: Some(surfaces), .. } => from_surfaces(kind, table, surfaces, files, &at, progress)?,
         _ => from_shape(kind, table, key, files.limits, &at)?,
     };
@@ -316,7 +317,7 @@ fn of_shape(kind: &'static dyn BodyKind, shape: Shape, key: &str, at: &Where) ->
     Ok(Body { parts, report, ..body })
 }
 
-fn file_fault(at: &Where, error: FileError) -> Fault {
+pub(super) fn file_fault(at: &Where, error: FileError) -> Fault {
     Fault::value(at.clone(), error.to_string()).of(Stage::Body).help(error.problem.help()).cause(error)
 }
 
@@ -356,25 +357,6 @@ fn from_surfaces(
 
 fn input(file: &SurfaceFile, metres_per_unit: f64) -> SurfaceInput<'_> {
     SurfaceInput { vertices: &file.vertices, triangles: &file.triangles, metres_per_unit }
-}
-
-/// Reads a surface file as a body without an inside.
-fn from_surface(
-    kind: &'static dyn BodyKind,
-    table: &SurfaceTable,
-    files: &Files<'_>,
-    at: &Where,
-) -> Result<Body, Fault> {
-    let at = at.key("file");
-    let path = files.resolve(&at, &table.file)?;
-    let file = files::read_surface(&path).map_err(|error| file_fault(&at, error))?;
-    files.limits.check_tets(&at, file.triangles.len() as u64)?;
-    let scale = table.unit.in_m();
-    let positions_m: Vec<DVec3> = file.vertices.iter().map(|vertex| *vertex * scale).collect();
-    let surface = Surface::alone(positions_m.len(), file.triangles);
-    let origin = format!("surface {}", table.file);
-    let mesh = BodyMesh::Surface { positions_m, control: None };
-    Ok(Body { warnings: file.warnings, report: file.notes, ..Body::new(kind, mesh, surface, origin) })
 }
 
 fn from_file(kind: &'static dyn BodyKind, table: &MeshTable, files: &Files<'_>, at: &Where) -> Result<Body, Fault> {

@@ -9,7 +9,9 @@ mod material;
 mod parts;
 mod probes;
 mod regions;
+mod separate_parts;
 mod shape;
+mod surface_alone;
 mod tools;
 
 use crate::{
@@ -84,7 +86,8 @@ pub(crate) fn compile(
     let probes = probes::compile(&document.probe, &regions, &body, &tools.specs, &constraints, &mut warnings)?;
     let summary = summary(&body, &regions, &compiled);
     warn_of_shape(&summary, &mut warnings);
-    warnings.extend(nothing_held(document));
+    warnings.extend(nothing_held(document, &body));
+    warnings.extend(separate_parts::warning(&body, &constraints));
     progress(1.0, "done");
     Ok(Scene {
         name: document.scene.name.clone(),
@@ -259,14 +262,15 @@ fn summary(body: &Body, regions: &Regions<'_>, compiled: &Compiled) -> BodySumma
 }
 
 /// Says so when what acts on a body may move it as a whole.
-fn nothing_held(document: &Document) -> Option<String> {
+fn nothing_held(document: &Document, body: &Body) -> Option<String> {
     let acts = [
         (document.scene.gravity_m_per_s2 != [0.0; 3], "gravity will move"),
         (!document.load.is_empty(), "a load may move"),
         (!document.tool.is_empty(), "a tool will move"),
     ];
     let (_, moves) = acts.into_iter().find(|(given, _)| *given)?;
-    (document.fixed.is_empty() && document.prescribed.is_empty()).then(|| {
+    let is_held = !document.fixed.is_empty() || !document.prescribed.is_empty() || body.kind.holds_each_node();
+    (!is_held).then(|| {
         format!(
             "nothing holds the body: {moves} it as a whole, and `palpated static` refuses it; add a [[fixed]] region"
         )

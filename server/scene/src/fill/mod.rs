@@ -20,6 +20,7 @@ mod wall;
 
 pub use error::FillError;
 pub use repair::Repairs;
+pub(crate) use repair::{Mended, mend};
 pub use report::{FillReport, SurfaceReport};
 pub(crate) use skin::around;
 

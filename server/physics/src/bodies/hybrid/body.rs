@@ -9,6 +9,7 @@ use super::{
     partition::Partition,
     patch::{KEPT, Materials},
     projection::Lumping,
+    seen::demand_seen,
     sites::Sites,
     sizes,
     spec::{HybridError, ParticleSpec},
@@ -133,6 +134,7 @@ impl HybridBody {
                 }
             }
         }
+        demand_seen(&partition, &mesh, &free)?;
         let may_wake = (0..partition.particle_count() as u32).map(|p| may_wake(&partition, &free, p)).collect();
         progress(MAY_WAKE);
         let vertex_points: Vec<CellPoint> =

@@ -25,6 +25,7 @@ mod projection;
 pub mod residual_element;
 mod running;
 mod scratch;
+mod seen;
 pub mod sites;
 pub mod sizes;
 pub mod skin;

@@ -91,6 +91,24 @@ pub enum HybridError {
         /// Spacing (m).
         spacing_m: f64,
     },
+    /// Particles do not see all motions of the coarse level.
+    #[error(
+        "the coarse tets are too small beside the particles of [body.particles], which are {spacing_mm:.2} mm apart: {nodes} coarse nodes \
+         (corners of tets and middles of their edges, which are {edge_mm:.2} mm long in the mean) are followed by {particles} particles, so that \
+         they can move in ways that no particle feels, and do once particles wake; take fewer, larger tets, with edges of at least \
+         {:.2} mm, or a smaller spacing",
+        2.0 * spacing_mm
+    )]
+    CoarseTooFine {
+        /// Coarse nodes that may move and that particles follow.
+        nodes: usize,
+        /// Particles that follow them.
+        particles: usize,
+        /// Mean edge (mm) of the coarse tets.
+        edge_mm: f64,
+        /// Spacing (mm).
+        spacing_mm: f64,
+    },
     /// Something was asked for that only bodies without particles have.
     #[error("{what} is not there for bodies with particles; {instead}")]
     NotForParticles {

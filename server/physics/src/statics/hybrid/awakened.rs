@@ -22,7 +22,7 @@ pub(super) struct Awakened<'a> {
     /// Axes along which each unknown may move.
     pub(super) free: Vec<BVec3>,
     /// Rest positions (m) of nodes and particles.
-    rest_m: Vec<DVec3>,
+    pub(super) rest_m: Vec<DVec3>,
     /// `m g` (N) of nodes and particles.
     pub(super) weight_n: Vec<DVec3>,
     /// Diagonal blocks (N/m) of the elastic stiffness at rest, of nodes and particles.

@@ -31,7 +31,8 @@ pub(super) struct Solver<'a> {
     pub(super) progress: &'a mut dyn FnMut(&Progress) -> ControlFlow<()>,
 }
 
-/// `ε ‖diag K‖₂ max|q|` (N): an entry known to `ε|q|` has a force known to `ε |q| K_ii`.
+/// `ε ‖diag K‖₂ max|q|` (N), nodes and particles at rest: an entry known to `ε|q|` has a force known to `ε |q| K_ii`.
+/// (A node that nearly nothing holds may be found anywhere; what it has to do with forces is as little.)
 pub(super) fn rounding_n(awakened: &Awakened<'_>, unknowns: &[DVec3]) -> f64 {
     let environment = awakened.environment;
     let springs = (0..environment.tools.len()).filter_map(|tool| environment.contact.spring(tool));
@@ -40,7 +41,8 @@ pub(super) fn rounding_n(awakened: &Awakened<'_>, unknowns: &[DVec3]) -> f64 {
         DVec3::select(*free, DVec3::new(block.x_axis.x, block.y_axis.y, block.z_axis.z), DVec3::ZERO).length_squared()
     };
     let of_body: f64 = awakened.diagonal_n_per_m.iter().zip(&awakened.free).map(along).sum();
-    f64::EPSILON * (of_body + springs_sq).sqrt() * unknowns.iter().map(|x| x.length()).fold(0.0, f64::max)
+    let places = awakened.rest_m.iter().chain(&unknowns[awakened.entries()..]);
+    f64::EPSILON * (of_body + springs_sq).sqrt() * places.map(|x| x.length()).fold(0.0, f64::max)
 }
 
 impl Solver<'_> {

@@ -110,6 +110,11 @@ impl BodyKind for Hybrid {
         }
     }
 
+    /// Cells of the lattice have particles on either side.
+    fn joins_what_touches(&self) -> bool {
+        true
+    }
+
     /// Says so when the coarse level is none.
     fn warnings(&self, body: &Body, _: &[ToolSpec]) -> Vec<String> {
         const MANY_TETS: usize = 5000;

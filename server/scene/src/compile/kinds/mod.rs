@@ -58,6 +58,16 @@ pub(crate) trait BodyKind: Debug + Sync {
         None
     }
 
+    /// Whether each of its nodes is held by itself, as by a spring to where it is at rest.
+    fn holds_each_node(&self) -> bool {
+        false
+    }
+
+    /// Whether parts of its mesh that share no node move together all the same where they touch.
+    fn joins_what_touches(&self) -> bool {
+        false
+    }
+
     /// What one would want to change.
     fn warnings(&self, _body: &Body, _tools: &[ToolSpec]) -> Vec<String> {
         Vec::new()

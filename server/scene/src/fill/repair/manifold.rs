@@ -98,6 +98,30 @@ pub(super) fn orient(which: &'static str, soup: &mut Soup, repairs: &mut Repairs
     Ok(())
 }
 
+/// The part of each triangle, joined through edges, numbered in order of first triangle.
+pub(super) fn parts(triangles: &[[u32; 3]]) -> Vec<usize> {
+    let adjacent = neighbours(triangles);
+    let mut part_of = vec![usize::MAX; triangles.len()];
+    let mut count = 0;
+    for start in 0..triangles.len() {
+        if part_of[start] != usize::MAX {
+            continue;
+        }
+        part_of[start] = count;
+        let mut stack = vec![start as u32];
+        while let Some(t) = stack.pop() {
+            for &s in &adjacent[t as usize] {
+                if part_of[s as usize] == usize::MAX {
+                    part_of[s as usize] = count;
+                    stack.push(s);
+                }
+            }
+        }
+        count += 1;
+    }
+    part_of
+}
+
 /// Keeps the part with the largest area; the others must be debris.
 pub(super) fn keep_largest_part(
     which: &'static str,
@@ -105,26 +129,10 @@ pub(super) fn keep_largest_part(
     debris: f64,
     repairs: &mut Repairs,
 ) -> Result<(), FillError> {
-    let adjacent = neighbours(&soup.triangles);
-    let mut part_of = vec![usize::MAX; soup.triangles.len()];
-    let mut areas: Vec<f64> = Vec::new();
-    for start in 0..soup.triangles.len() {
-        if part_of[start] != usize::MAX {
-            continue;
-        }
-        let part = areas.len();
-        areas.push(0.0);
-        part_of[start] = part;
-        let mut stack = vec![start as u32];
-        while let Some(t) = stack.pop() {
-            areas[part] += soup.area(soup.triangles[t as usize]);
-            for &s in &adjacent[t as usize] {
-                if part_of[s as usize] == usize::MAX {
-                    part_of[s as usize] = part;
-                    stack.push(s);
-                }
-            }
-        }
+    let part_of = parts(&soup.triangles);
+    let mut areas = vec![0.0; part_of.iter().max().map_or(0, |last| last + 1)];
+    for (&part, &triangle) in part_of.iter().zip(&soup.triangles) {
+        areas[part] += soup.area(triangle);
     }
     let whole: f64 = areas.iter().sum();
     let largest = (0..areas.len()).max_by(|&a, &b| areas[a].total_cmp(&areas[b])).unwrap_or(0);

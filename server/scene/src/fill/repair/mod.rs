@@ -1,10 +1,14 @@
 //! From the triangles of a file to a clean surface: one oriented manifold, closed or with one rim.
+mod alone;
 mod holes;
 mod manifold;
 mod weld;
 
+pub(crate) use alone::{Mended, mend};
+
 use super::error::FillError;
 use super::trimesh::TriMesh;
+use crate::places::same_place;
 use crate::wording::counted;
 use glam::DVec3;
 use std::fmt;
@@ -73,7 +77,7 @@ pub(crate) fn clean(which: &'static str, points: &[DVec3], triangles: &[[u32; 3]
     if let Some(&vertex) = triangles.iter().flatten().find(|&&v| v as usize >= points.len()) {
         return Err(FillError::IndexOutOfRange { which, vertex, vertices: points.len() });
     }
-    let mut soup = weld::weld(points, triangles, &mut repairs);
+    let mut soup = weld::weld(points, triangles, same_place(points), |_| true, &mut repairs);
     if soup.triangles.is_empty() {
         return Err(FillError::Empty { which });
     }
@@ -89,6 +93,7 @@ pub(crate) fn clean(which: &'static str, points: &[DVec3], triangles: &[[u32; 3]
 }
 
 /// Triangles over points, not yet a manifold.
+#[derive(Clone)]
 struct Soup {
     points: Vec<DVec3>,
     triangles: Vec<[u32; 3]>,
@@ -98,12 +103,6 @@ impl Soup {
     fn area(&self, [a, b, c]: [u32; 3]) -> f64 {
         let p = |v: u32| self.points[v as usize];
         0.5 * (p(b) - p(a)).cross(p(c) - p(a)).length()
-    }
-
-    fn diagonal(points: &[DVec3]) -> f64 {
-        let low = points.iter().fold(DVec3::INFINITY, |m, p| m.min(*p));
-        let high = points.iter().fold(DVec3::NEG_INFINITY, |m, p| m.max(*p));
-        low.distance(high)
     }
 
     /// Renumbers the points by `map` (target of each point), drops what collapses, repeats and is not used.

@@ -1,70 +1,23 @@
 //! Merging of points: those that coincide, and those that face each other across a gap.
 use super::{Repairs, Soup, edges_of};
+use crate::places::{Grid, first_at_each_place};
 use glam::DVec3;
-use std::collections::{BTreeMap, HashMap};
+use std::collections::BTreeMap;
 
-/// Points nearer than this part of the bounding box's diagonal are one point (single-precision files need 1e-7).
-const SAME_POINT: f64 = 1e-6;
 /// Points on open edges are joined across gaps up to this part of their open edges' length.
 const GAP: f64 = 0.3;
 
-/// Points by cell of a grid with the given cell size; queries look at the 27 cells around.
-struct Grid<'a> {
-    points: &'a [DVec3],
-    cell: f64,
-    cells: HashMap<[i64; 3], Vec<u32>>,
-}
-
-impl<'a> Grid<'a> {
-    fn new(points: &'a [DVec3], cell: f64) -> Self {
-        Self { points, cell, cells: HashMap::new() }
-    }
-
-    fn key(&self, p: DVec3) -> [i64; 3] {
-        (p / self.cell).floor().to_array().map(|x| x as i64)
-    }
-
-    fn insert(&mut self, v: u32) {
-        self.cells.entry(self.key(self.points[v as usize])).or_default().push(v);
-    }
-
-    /// Nearest inserted point within the cell size that `ok` accepts, lowest index first among equals.
-    fn nearest(&self, p: DVec3, ok: impl Fn(u32) -> bool) -> Option<(u32, f64)> {
-        let [x, y, z] = self.key(p);
-        let mut best: Option<(u32, f64)> = None;
-        for (dx, dy, dz) in (-1..=1).flat_map(|i| (-1..=1).flat_map(move |j| (-1..=1).map(move |k| (i, j, k)))) {
-            for &v in self
-                .cells
-                .get(&[x.saturating_add(dx), y.saturating_add(dy), z.saturating_add(dz)])
-                .into_iter()
-                .flatten()
-            {
-                let distance = self.points[v as usize].distance(p);
-                let better = best.is_none_or(|(w, least)| (distance, v) < (least, w));
-                if distance <= self.cell && better && ok(v) {
-                    best = Some((v, distance));
-                }
-            }
-        }
-        best
-    }
-}
-
-/// Merges coinciding points; drops triangles that are degenerate or present twice.
-pub(super) fn weld(points: &[DVec3], triangles: &[[u32; 3]], repairs: &mut Repairs) -> Soup {
-    let diagonal = Soup::diagonal(points);
-    let tolerance = if diagonal > 0.0 { SAME_POINT * diagonal } else { 1.0 };
-    let mut grid = Grid::new(points, tolerance);
-    let mut map: Vec<u32> = Vec::with_capacity(points.len());
-    for v in 0..points.len() as u32 {
-        if let Some((first, _)) = grid.nearest(points[v as usize], |_| true) {
-            map.push(first);
-            repairs.welded_points += 1;
-        } else {
-            map.push(v);
-            grid.insert(v);
-        }
-    }
+/// Merges points that `may_weld` allows and that are nearer than `tolerance`; drops triangles that are degenerate or
+/// present twice.
+pub(super) fn weld(
+    points: &[DVec3],
+    triangles: &[[u32; 3]],
+    tolerance: f64,
+    may_weld: impl Fn(u32) -> bool,
+    repairs: &mut Repairs,
+) -> Soup {
+    let map = first_at_each_place(points, tolerance, may_weld);
+    repairs.welded_points += (0..).zip(&map).filter(|(v, first)| v != *first).count();
     let mut soup = Soup { points: points.to_vec(), triangles: triangles.to_vec() };
     soup.renumber(&map, repairs);
     // Flat triangles with three different corners would open a slit when dropped; they stay and do no harm.

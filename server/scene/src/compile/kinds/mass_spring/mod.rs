@@ -83,6 +83,11 @@ impl BodyKind for MassSpring {
         Located::nearest(body.surface_positions_m(), body.triangles(), point_m)
     }
 
+    /// By anchor springs, whose stiffness is never zero.
+    fn holds_each_node(&self) -> bool {
+        true
+    }
+
     /// Says so when a tool would pass between the vertices: contact presses it no harder than the springs behind can bear.
     fn warnings(&self, body: &Body, tools: &[ToolSpec]) -> Vec<String> {
         /// Of the mean edge's length.
