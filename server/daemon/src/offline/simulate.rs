@@ -102,6 +102,10 @@ pub fn run(args: &SimulateArgs) -> miette::Result<ExitCode> {
     summary.time = Some(run.cost());
     summary.lowest_volume_ratio =
         run.lowest.map(|lowest| PeakNumbers { value: lowest.found.ratio, time_s: lowest.time_s });
+    for slipped in run.slipped() {
+        eprintln!("warning: {slipped}");
+        summary.warnings.push(slipped);
+    }
     if let Some(out) = &out {
         summary.write(out)?;
     }
@@ -169,6 +173,8 @@ pub(super) struct Run<'s> {
     repeated_ticks: u64,
     asleep_ticks: u64,
     lowest: Option<Lowest>,
+    /// How far (m) each tool slipped from its device at most, and when (s).
+    slips: Vec<(f64, f64)>,
 }
 
 impl<'s> Run<'s> {
@@ -188,6 +194,7 @@ impl<'s> Run<'s> {
             repeated_ticks: 0,
             asleep_ticks: 0,
             lowest: None,
+            slips: vec![(0.0, 0.0); scene.model.tools.len()],
         })
     }
 
@@ -280,6 +287,12 @@ impl<'s> Run<'s> {
         let report = step(self.model, &mut self.state, &mut self.scratch, &input);
         self.repeated_ticks += u64::from(report.repeated > 0);
         self.asleep_ticks += u64::from(report.substeps == 0 && self.state.sleep.asleep);
+        for (most, tool) in self.slips.iter_mut().zip(&self.state.mechanical.tools) {
+            let slip_m = tool.slip_m.length();
+            if slip_m > most.0 {
+                *most = (slip_m, time_s);
+            }
+        }
         let wall_ns = started.elapsed().as_nanos() as u64;
         self.tick_wall_ns.saturating_record(wall_ns);
         let awake = self.state.awake_particles();
@@ -287,6 +300,20 @@ impl<'s> Run<'s> {
             self.awake_wall_ns.saturating_record(wall_ns);
             self.most_awake = self.most_awake.max(awake);
         }
+    }
+
+    /// What to tell of rigid tools that slipped from their devices.
+    fn slipped(&self) -> impl Iterator<Item = String> + '_ {
+        let slips = self.scene.model.tools.iter().zip(&self.slips).filter(|(_, (most_m, _))| *most_m > 0.0);
+        slips.map(|(tool, (most_m, time_s))| {
+            format!(
+                "the rigid tool \"{}\" slipped: at {} s it was {} mm behind where its driver says, since it would have gone through \
+                 the surface there; press less deep or more slowly, or give it coupling = \"spring\"",
+                tool.name,
+                short(*time_s),
+                short(most_m * 1e3)
+            )
+        })
     }
 
     /// Wakes these particles and no others.
