@@ -57,7 +57,7 @@ fn a_device_that_goes_through_the_floor_leaves_its_tool_above() {
         let (mut peak_n, mut deepest_m, mut lowest_m) = (0.0_f64, 0.0_f64, f64::INFINITY);
         go(&mut rig, DVec3::Z * -0.06, 400, |rig| {
             let force_n = tool(rig).contact_force_n.z;
-            assert!(force_n >= 0.8 * peak_n, "{force_n} N after {peak_n} N");
+            assert!(force_n >= 0.8 * peak_n || peak_n < 0.05, "{force_n} N after {peak_n} N");
             (peak_n, deepest_m) = (peak_n.max(force_n), deepest_m.max(tool(rig).penetration_m));
             lowest_m = lowest_m.min(tool(rig).centre_m.z);
         });

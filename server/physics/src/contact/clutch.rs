@@ -9,17 +9,19 @@
 //! s ← s + (g − g_max) f/|f|            for g > g_max
 //! |s| ← max(|s| − (g_max − g), 0)      otherwise
 //! ```
-//! No depth changes by more than the tool moves, so neither overshoots. While the tool touches, it comes back by no more
-//! than R in [`RETURN_S`]: a soft body would make way for one that is quicker, down to its floor. What the device does and the tool does not is
+//! No depth changes by more than the tool moves, so neither overshoots. The tool comes back by no more than R in
+//! [`RETURN_S`]: a soft body would make way for one that is quicker, down to its floor. What the device does and the tool does not is
 //! lost in the clutch, as in one of steel: it takes energy only.
 //!
-//! Nor does the tool move by more than [`NEAR`]·R in a substep, so that a device that leaps takes it through nothing
-//! unseen.
+//! Nor does the tool move faster than [`LEAP_M_PER_S`], or by more than [`NEAR`]·R in a substep, so that a device that
+//! leaps takes it through nothing unseen.
 use super::{ToolModel, ToolState, proxy::NEAR, spring::shortened, state::ToolContact};
 use glam::DVec3;
 
-/// Time (s) in which a tool that touches comes back by a radius.
-const RETURN_S: f64 = 0.02;
+/// Time (s) in which a tool comes back to its device by a radius.
+const RETURN_S: f64 = 0.01;
+/// Speed (m/s) above which a device leaps, rather than moves.
+const LEAP_M_PER_S: f64 = 5.0;
 /// Depth, over R, of a sample at which the clutch slips: pressure has grown to several times what a coupling gives.
 const SLIP_DEPTH: f64 = 0.6;
 
@@ -36,7 +38,7 @@ pub(super) fn follow(
         (tool.centre_m, tool.velocity_m_per_s) = (device_m + tool.slip_m, device_m_per_s);
         return;
     }
-    let (before_m, most_m) = (tool.centre_m, NEAR * model.spec.radius_m);
+    let (before_m, most_m) = (tool.centre_m, f64::min(NEAR * model.spec.radius_m, LEAP_M_PER_S * dt_s));
     tool.slip_m = slipped(model.spec.radius_m, tool.slip_m, contact, dt_s);
     let step_m = device_m + tool.slip_m - before_m;
     // Within rounding: a device that goes just so fast is followed.
@@ -53,7 +55,7 @@ fn slipped(radius_m: f64, slip_m: DVec3, contact: &ToolContact, dt_s: f64) -> DV
     if too_deep_m > 0.0 {
         slip_m + contact.force_n.normalize_or_zero() * too_deep_m
     } else {
-        let most_m = if contact.deepest_m > 0.0 { radius_m * dt_s / RETURN_S } else { f64::INFINITY };
+        let most_m = radius_m * dt_s / RETURN_S;
         slip_m - slip_m.clamp_length_max(most_m.min(-too_deep_m))
     }
 }
