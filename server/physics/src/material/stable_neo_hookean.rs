@@ -9,6 +9,7 @@ use super::{
     lane_matrix::{M3, cofactor as lane_cofactor, plus, scaled, trace},
     lane_strain::{cofactor_and_volume_change, cofactor_of_sum, volume_change, volumetric_differential},
     law::LaneStress,
+    stretch_limit,
 };
 use crate::{
     lanes::real::Real,
@@ -29,12 +30,14 @@ impl ConstitutiveLaw for StableNeoHookean {
         let volume_change = f.determinant() - 1.0;
         let lambda_hat = lame.lambda_pa + lame.mu_pa;
         0.5 * lame.mu_pa * (contract(f, f) - 3.0) + volume_change * (0.5 * lambda_hat * volume_change - lame.mu_pa)
+            + stretch_limit::energy_density(lame, f)
     }
 
     /// `P = µF + (λ̂(J − 1) − µ) cof F`.
     fn piola(lame: Lame, f: &DMat3) -> DMat3 {
         let lambda_hat = lame.lambda_pa + lame.mu_pa;
         *f * lame.mu_pa + cofactor(f) * (lambda_hat * (f.determinant() - 1.0) - lame.mu_pa)
+            + stretch_limit::piola(lame, f)
     }
 
     /// `δP = µδF + λ̂ (cof F : δF) cof F + (λ̂(J − 1) − µ) δ(cof F)`.
@@ -66,6 +69,7 @@ impl ConstitutiveLaw for StableNeoHookean {
                 p[i][j] = c.mu * (h[i][j] + h[j][i] - trace_part - cof_h[i][j]) + pressure * cof_f[i][j];
             }
         }
+        stretch_limit::add_lane_piola(c.mu, h, &mut p);
         LaneStress::everywhere(p)
     }
 
