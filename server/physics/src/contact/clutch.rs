@@ -23,7 +23,7 @@ const RETURN_S: f64 = 0.01;
 /// Speed (m/s) above which a device leaps, rather than moves.
 const LEAP_M_PER_S: f64 = 5.0;
 /// Depth, over R, of a sample at which the clutch slips: pressure has grown to several times what a coupling gives.
-const SLIP_DEPTH: f64 = 0.6;
+const SLIP_DEPTH: f64 = 0.4;
 
 /// Moves a rigid tool after its device, which is at `device_m` and moves by `device_m_per_s`, with the contact that it
 /// had before.

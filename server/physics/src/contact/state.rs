@@ -32,6 +32,8 @@ pub(super) struct ToolContact {
     pub(super) touching: Touching,
     /// Whether it was just put where it is: samples inside it then carry nothing up to their present depth.
     pub(super) just_put: bool,
+    /// Whether nothing is within the zone near the surface ([`super::proxy`]) now.
+    pub(super) is_clear: bool,
     /// Force of the body on the tool now (N).
     pub(super) force_n: DVec3,
     /// Torque of the body on the tool now (N m).
@@ -45,7 +47,7 @@ pub(super) struct ToolContact {
 
 impl ToolContact {
     fn keep_sums_of(&mut self, other: &Self) {
-        (self.just_put, self.estimate) = (other.just_put, other.estimate);
+        (self.just_put, self.is_clear, self.estimate) = (other.just_put, other.is_clear, other.estimate);
         (self.force_n, self.torque_nm, self.deepest_m) = (other.force_n, other.torque_nm, other.deepest_m);
     }
 }
@@ -54,7 +56,8 @@ impl PartialEq for ContactState {
     fn eq(&self, other: &Self) -> bool {
         let same = |(a, b): (&ToolContact, &ToolContact)| {
             let forces = a.force_n == b.force_n && a.torque_nm == b.torque_nm && a.deepest_m == b.deepest_m;
-            a.touching == b.touching && a.just_put == b.just_put && forces && a.estimate == b.estimate
+            let flags = (a.just_put, a.is_clear) == (b.just_put, b.is_clear);
+            a.touching == b.touching && flags && forces && a.estimate == b.estimate
         };
         self.tools.len() == other.tools.len() && self.tools.iter().zip(&other.tools).all(same)
     }
@@ -70,6 +73,7 @@ impl ContactState {
         let tool = |tool: &super::ToolModel| ToolContact {
             touching: Touching::with_capacity(tool.foundation.samples),
             just_put: false,
+            is_clear: false,
             force_n: DVec3::ZERO,
             torque_nm: DVec3::ZERO,
             deepest_m: 0.0,

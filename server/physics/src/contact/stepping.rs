@@ -138,6 +138,7 @@ impl ContactModel {
                 return false;
             }
             let nothing = Pressed { to_surface_m: DVec3::INFINITY, ..Pressed::default() };
+            contact.tools[index].is_clear = true;
             let coupling = proxy::finish(&self.tools[index], tool, &nothing, DVec3::ZERO, time);
             scratch.coupling_sum_n += coupling.force_n;
             scratch.coupling_sum_nm += coupling.torque_nm;
@@ -202,6 +203,7 @@ impl ContactModel {
         };
         let pressed = narrow::press(&meeting, &mut part.candidates, &mut part.touching, &mut scratch.next, forces_n);
         (part.force_n, part.torque_nm, part.deepest_m) = (pressed.force_n, pressed.torque_nm, pressed.deepest_m);
+        part.is_clear = proxy::is_clear(model, &pressed);
         pressed
     }
 

@@ -10,6 +10,7 @@ mod constrained_points;
 pub mod embedding_mesh;
 mod energy;
 mod frequency;
+mod hourglass_growth;
 mod judged;
 pub mod kernels;
 mod kind;
