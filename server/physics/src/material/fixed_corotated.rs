@@ -7,10 +7,9 @@
 //! `R = ((t² + I) F + 2t cof F − 2FC)/q`, `q = t³ − I t − 2J = 2(σ₁+σ₂)(σ₂+σ₃)(σ₁+σ₃)`.
 //! Halley's iteration falls monotonically onto the largest root from `√(3I) ≥ t`.
 //!
-//! Beyond what tissue can be stretched or squeezed it stiffens ([`super::stretch_limit`],
-//! [`super::compression_limit`]).
+//! Beyond what tissue can be stretched it stiffens ([`super::stretch_limit`]).
 use super::{
-    ConstitutiveLaw, Lame, compression_limit,
+    ConstitutiveLaw, Lame,
     constants::Constants,
     lane_matrix::{
         M3, cofactor as lane_cofactor, column_dot, contract as lane_contract, plus_identity, product, scaled,
@@ -43,14 +42,12 @@ impl ConstitutiveLaw for FixedCorotated {
         lame.mu_pa * contract(&stretch, &stretch)
             + 0.5 * lame.lambda_pa * (f.determinant() - 1.0).powi(2)
             + stretch_limit::energy_density(lame, f)
-            + compression_limit::energy_density(lame.lambda_pa, f.determinant())
     }
 
     /// `P = 2µ(F − R) + λ(J − 1) cof F`: `R` is stationary, so its change does no work.
     fn piola(lame: Lame, f: &DMat3) -> DMat3 {
         (*f - nearest_rotation(f)) * (2.0 * lame.mu_pa)
             + cofactor(f) * (lame.lambda_pa * (f.determinant() - 1.0))
-            + cofactor(f) * compression_limit::pressure_pa(lame.lambda_pa, f.determinant())
             + stretch_limit::piola(lame, f)
     }
 
@@ -60,7 +57,6 @@ impl ConstitutiveLaw for FixedCorotated {
         (*df - rotation_differential(f, df)) * (2.0 * lame.mu_pa)
             + cof * (lame.lambda_pa * contract(&cof, df))
             + cofactor_differential(f, df) * (lame.lambda_pa * (f.determinant() - 1.0))
-            + compression_limit::piola_differential(lame.lambda_pa, f, df)
             + stretch_limit::piola_differential(lame, f, df)
     }
 
@@ -92,7 +88,7 @@ impl ConstitutiveLaw for FixedCorotated {
             }
         }
         let mut p = product(&r, &doubled);
-        let pressure = c.lambda * volume_change + compression_limit::lane_pressure(c.lambda, volume_change);
+        let pressure = c.lambda * volume_change;
         for a in 0..3 {
             for b in 0..3 {
                 p[a][b] = p[a][b] + pressure * cof_f[a][b];
@@ -126,9 +122,7 @@ impl ConstitutiveLaw for FixedCorotated {
             w[i] = scale * (inverse[i][0] * a[0] + inverse[i][1] * a[1] + inverse[i][2] * a[2]);
         }
         let two_mu = T::of(2.0) * c.mu;
-        let pressure = c.lambda * volume_change + compression_limit::lane_pressure(c.lambda, volume_change);
-        let slope = c.lambda + compression_limit::lane_slope(c.lambda, volume_change);
-        let mut p = volumetric_differential(slope, pressure, h, &cof_f, df);
+        let mut p = volumetric_differential(c.lambda, c.lambda * volume_change, h, &cof_f, df);
         for i in 0..3 {
             // Row i of R [ω]×.
             let turned =

@@ -6,7 +6,6 @@
 //! against f64.
 // A vector type is only fast where it is inlined into a function compiled for its instruction set.
 #![allow(clippy::inline_always)]
-mod compression_limit;
 pub(crate) mod constants;
 pub mod fixed_corotated;
 pub(crate) mod lane_matrix;
@@ -16,7 +15,7 @@ pub mod parameters;
 pub(crate) mod passes;
 mod registry;
 pub mod stable_neo_hookean;
-mod stretch_limit;
+pub mod stretch_limit;
 pub mod stvk;
 pub mod viscous;
 

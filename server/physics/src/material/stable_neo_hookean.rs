@@ -2,17 +2,15 @@
 //!
 //! `Ψ = ½µ(tr FᵀF − 3) + ½λ̂(J − 1)² − µ(J − 1)` with `λ̂ = λ + µ`, `J = det F`. At `F = I` energy and stress vanish,
 //! and `δP = µ(δF + δFᵀ) + (λ̂ − µ) tr(δF) I`: small strain sees exactly λ and µ. Defined for every `F`, inverted ones
-//! included. Beyond what tissue can be stretched or squeezed it stiffens ([`super::stretch_limit`],
-//! [`super::compression_limit`]).
+//! included. Beyond what tissue can be stretched it stiffens ([`super::stretch_limit`]).
 use super::{
-    ConstitutiveLaw, Lame, compression_limit,
+    ConstitutiveLaw, Lame,
     constants::Constants,
     lane_matrix::{M3, cofactor as lane_cofactor, plus, scaled, trace},
     lane_strain::{cofactor_and_volume_change, cofactor_of_sum, volume_change, volumetric_differential},
     law::LaneStress,
     stretch_limit,
 };
-
 use crate::{
     lanes::real::Real,
     linalg::tensor::{cofactor, cofactor_differential, contract},
@@ -34,7 +32,6 @@ impl ConstitutiveLaw for StableNeoHookean {
         0.5 * lame.mu_pa * (contract(f, f) - 3.0)
             + volume_change * (0.5 * lambda_hat * volume_change - lame.mu_pa)
             + stretch_limit::energy_density(lame, f)
-            + compression_limit::energy_density(lambda_hat, f.determinant())
     }
 
     /// `P = µF + (λ̂(J − 1) − µ) cof F`.
@@ -42,7 +39,6 @@ impl ConstitutiveLaw for StableNeoHookean {
         let lambda_hat = lame.lambda_pa + lame.mu_pa;
         *f * lame.mu_pa
             + cofactor(f) * (lambda_hat * (f.determinant() - 1.0) - lame.mu_pa)
-            + cofactor(f) * compression_limit::pressure_pa(lambda_hat, f.determinant())
             + stretch_limit::piola(lame, f)
     }
 
@@ -53,7 +49,6 @@ impl ConstitutiveLaw for StableNeoHookean {
         *df * lame.mu_pa
             + cof * (lambda_hat * contract(&cof, df))
             + cofactor_differential(f, df) * (lambda_hat * (f.determinant() - 1.0) - lame.mu_pa)
-            + compression_limit::piola_differential(lambda_hat, f, df)
             + stretch_limit::piola_differential(lame, f, df)
     }
 
@@ -70,8 +65,7 @@ impl ConstitutiveLaw for StableNeoHookean {
         let tr = trace(h);
         let volume_change = volume_change(h, &cof_h);
         let cof_f = cofactor_of_sum(h, &cof_h, tr);
-        let lambda_hat = c.lambda + c.mu;
-        let pressure = lambda_hat * volume_change + compression_limit::lane_pressure(lambda_hat, volume_change);
+        let pressure = (c.lambda + c.mu) * volume_change;
         let mut p = *h;
         for i in 0..3 {
             for j in 0..3 {
@@ -88,10 +82,8 @@ impl ConstitutiveLaw for StableNeoHookean {
     fn lane_piola_differential<T: Real>(c: &Constants<T>, h: &M3<T>, df: &M3<T>) -> LaneStress<T> {
         let lambda_hat = c.lambda + c.mu;
         let (cof_f, volume_change) = cofactor_and_volume_change(h);
-        let limited = compression_limit::lane_pressure(lambda_hat, volume_change);
-        let pressure = lambda_hat * volume_change - c.mu + limited;
-        let slope = lambda_hat + compression_limit::lane_slope(lambda_hat, volume_change);
-        let volumetric = volumetric_differential(slope, pressure, h, &cof_f, df);
+        let pressure = lambda_hat * volume_change - c.mu;
+        let volumetric = volumetric_differential(lambda_hat, pressure, h, &cof_f, df);
         let mut dp = plus(&scaled(df, c.mu), &volumetric);
         stretch_limit::add_lane_piola_differential(c.mu, h, df, &mut dp);
         LaneStress::everywhere(dp)
