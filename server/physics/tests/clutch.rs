@@ -24,8 +24,12 @@ fn block() -> ModelSpec {
     with_tool(spec)
 }
 
+/// 80 × 80 × 40 mm with particles 2.5 mm apart, and a skin of triangles half as large, as scenes make them.
 fn with_particles() -> ModelSpec {
-    with_tool(rig::held_below(hybrid_block((0.02, 1, 8), 0.45, 400, Waking::ByTools { reach_m: 0.012 })))
+    let mut spec = rig::held_below(hybrid_block((0.04, 2, 32), 0.45, 600, Waking::ByTools { reach_m: 0.012 }));
+    rig::particles_mut(&mut spec).spacing_m = 2.5e-3;
+    rig::solid_mut(&mut spec).regions[0].material.viscosity.psi_pa_s = 0.3;
+    with_tool(spec)
 }
 
 fn with_tool(mut spec: ModelSpec) -> ModelSpec {
@@ -51,13 +55,17 @@ fn go(rig: &mut Rig, to_m: DVec3, ticks: u32, mut look: impl FnMut(&Rig)) {
 /// The device goes through body and floor, and comes back. The tool stays above, with the force that the body gives there.
 #[test]
 fn a_device_that_goes_through_the_floor_leaves_its_tool_above() {
-    for spec in [block(), with_particles()] {
+    for (spec, floor_m) in [(block(), -0.02), (with_particles(), -0.04)] {
         let mut rig = Rig::new(spec);
         let start_m = tool(&rig).centre_m;
         let (mut peak_n, mut deepest_m, mut lowest_m) = (0.0_f64, 0.0_f64, f64::INFINITY);
+        let mut forces_n = Vec::new();
         go(&mut rig, DVec3::Z * -0.06, 400, |rig| {
             let force_n = tool(rig).contact_force_n.z;
-            assert!(force_n >= 0.8 * peak_n || peak_n < 0.05, "{force_n} N after {peak_n} N");
+            forces_n.push(force_n);
+            let recent_n = forces_n.iter().rev().take(20).fold(0.0_f64, |most, n| most.max(*n));
+            assert!(force_n >= 0.8 * recent_n || recent_n < 0.05, "{force_n} N after {recent_n} N within 20 ms");
+            assert!(force_n >= 0.6 * peak_n || peak_n < 0.05, "{force_n} N after {peak_n} N");
             (peak_n, deepest_m) = (peak_n.max(force_n), deepest_m.max(tool(rig).penetration_m));
             lowest_m = lowest_m.min(tool(rig).centre_m.z);
         });
@@ -65,8 +73,8 @@ fn a_device_that_goes_through_the_floor_leaves_its_tool_above() {
         go(&mut rig, DVec3::Z * -0.06, 200, |rig| lowest_m = lowest_m.min(tool(rig).centre_m.z));
         let held_n = tool(&rig).device_force_n.z;
         println!("peak {peak_n} N, held {held_n} N, lowest {lowest_m} m, deepest {} R", deepest_m / RADIUS_M);
-        assert!(lowest_m > -0.02 + 0.2 * RADIUS_M && deepest_m < 0.8 * RADIUS_M, "{lowest_m} m, {deepest_m} m");
-        assert!(held_n > 0.8 * peak_n && peak_n > 0.5, "{held_n} N of {peak_n} N");
+        assert!(lowest_m > floor_m + 0.2 * RADIUS_M && deepest_m < 0.8 * RADIUS_M, "{lowest_m} m, {deepest_m} m");
+        assert!(held_n > 0.7 * peak_n && peak_n > 0.5, "{held_n} N of {peak_n} N");
         go(&mut rig, start_m, 300, |_| ());
         go(&mut rig, start_m, 300, |_| ());
         assert_eq!((tool(&rig).slip_m, tool(&rig).centre_m), (DVec3::ZERO, start_m));

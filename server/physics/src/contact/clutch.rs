@@ -7,9 +7,10 @@
 //! The clutch has no mass. With the depth `g` of the deepest sample and the force `f` on the tool, a substep does
 //! ```text
 //! s ← s + (g − g_max) f/|f|            for g > g_max
-//! |s| ← max(|s| − (g_max − g), 0)      otherwise
+//! |s| ← max(|s| − (g_back − g), 0)     for g < g_back
 //! ```
-//! No depth changes by more than the tool moves, so neither overshoots. The tool comes back by no more than R in
+//! No depth changes by more than the tool moves, so neither overshoots. Between `g_back` and `g_max` the slip stays: a body
+//! that has just made way for the tool would otherwise be struck again and again. The tool comes back by no more than R in
 //! [`RETURN_S`]: a soft body would make way for one that is quicker, down to its floor. What the device does and the tool does not is
 //! lost in the clutch, as in one of steel: it takes energy only.
 //!
@@ -24,6 +25,9 @@ const RETURN_S: f64 = 0.01;
 const LEAP_M_PER_S: f64 = 5.0;
 /// Depth, over R, of a sample at which the clutch slips: pressure has grown to several times what a coupling gives.
 const SLIP_DEPTH: f64 = 0.4;
+
+/// Depth, over R, below which the tool comes back.
+const BACK_DEPTH: f64 = 0.3;
 
 /// Moves a rigid tool after its device, which is at `device_m` and moves by `device_m_per_s`, with the contact that it
 /// had before.
@@ -55,7 +59,7 @@ fn slipped(radius_m: f64, slip_m: DVec3, contact: &ToolContact, dt_s: f64) -> DV
     if too_deep_m > 0.0 {
         slip_m + contact.force_n.normalize_or_zero() * too_deep_m
     } else {
-        let most_m = radius_m * dt_s / RETURN_S;
-        slip_m - slip_m.clamp_length_max(most_m.min(-too_deep_m))
+        let most_m = f64::min(radius_m * dt_s / RETURN_S, BACK_DEPTH * radius_m - contact.deepest_m);
+        slip_m - slip_m.clamp_length_max(most_m.max(0.0))
     }
 }

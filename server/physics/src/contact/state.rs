@@ -123,6 +123,8 @@ impl ContactState {
                 chain.vector(touch.spring_origin_m);
             });
             chain.flag(tool.just_put);
+            chain.flag(tool.is_clear);
+            chain.real(tool.deepest_m);
             chain.vector(tool.force_n);
             chain.vector(tool.torque_nm);
             let estimate = &tool.estimate;

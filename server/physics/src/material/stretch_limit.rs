@@ -2,7 +2,7 @@
 //!
 //! Such a law lets a surface that wraps around a tool, and is stretched by it, give way: like a balloon's, its tension
 //! grows more slowly than its area, and past some depth one cell grows at the cost of its neighbours until the tool is
-//! through. Tissue stiffens long before. So these laws have, with `I₁ = tr FᵀF` and [`LIMIT`] `L`, beside what they are,
+//! through. Tissue stiffens long before. So these laws have, with `I₁ = tr FᵀF` and `L` = 8, beside what they are,
 //! ```text
 //! Ψ_L = µ k/(2L) w²        w = max(0, I₁ − L)
 //! P_L = 2 µ k/L w F
@@ -18,7 +18,7 @@ use crate::{lanes::real::Real, linalg::tensor::contract};
 use glam::DMat3;
 
 /// `L`, the sum of squared principal stretches from which a law stiffens; 3 at rest.
-pub const LIMIT: f64 = 8.0;
+const LIMIT: f64 = 8.0;
 /// `k`.
 const STIFFNESS: f64 = 4.0;
 

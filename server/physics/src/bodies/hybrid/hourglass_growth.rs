@@ -11,7 +11,7 @@
 use crate::lanes::real::Real;
 
 /// `β`, how fast hourglasses stiffen with their amplitude.
-pub const GROWTH: f64 = 20.0;
+pub(crate) const GROWTH: f64 = 20.0;
 /// `G₀`, where they come to stiffen faster: `|q| = 0.4 h` in one of the first three modes.
 const FASTER_BEYOND: f64 = 3.2;
 /// `c`.
