@@ -60,12 +60,12 @@ fn a_device_that_goes_through_the_floor_leaves_its_tool_above() {
         let start_m = tool(&rig).centre_m;
         let (mut peak_n, mut deepest_m, mut lowest_m) = (0.0_f64, 0.0_f64, f64::INFINITY);
         let mut forces_n = Vec::new();
-        go(&mut rig, DVec3::Z * -0.06, 400, |rig| {
+        go(&mut rig, DVec3::Z * -0.06, 700, |rig| {
             let force_n = tool(rig).contact_force_n.z;
             forces_n.push(force_n);
             let recent_n = forces_n.iter().rev().take(20).fold(0.0_f64, |most, n| most.max(*n));
-            assert!(force_n >= 0.8 * recent_n || recent_n < 0.05, "{force_n} N after {recent_n} N within 20 ms");
-            assert!(force_n >= 0.6 * peak_n || peak_n < 0.05, "{force_n} N after {peak_n} N");
+            assert!(force_n >= 0.95 * recent_n || recent_n < 0.05, "{force_n} N after {recent_n} N within 20 ms");
+            assert!(force_n >= 0.9 * peak_n || peak_n < 0.05, "{force_n} N after {peak_n} N");
             (peak_n, deepest_m) = (peak_n.max(force_n), deepest_m.max(tool(rig).penetration_m));
             lowest_m = lowest_m.min(tool(rig).centre_m.z);
         });
@@ -74,7 +74,7 @@ fn a_device_that_goes_through_the_floor_leaves_its_tool_above() {
         let held_n = tool(&rig).device_force_n.z;
         println!("peak {peak_n} N, held {held_n} N, lowest {lowest_m} m, deepest {} R", deepest_m / RADIUS_M);
         assert!(lowest_m > floor_m + 0.2 * RADIUS_M && deepest_m < 0.8 * RADIUS_M, "{lowest_m} m, {deepest_m} m");
-        assert!(held_n > 0.7 * peak_n && peak_n > 0.5, "{held_n} N of {peak_n} N");
+        assert!(held_n > 0.9 * peak_n && peak_n > 0.5, "{held_n} N of {peak_n} N");
         go(&mut rig, start_m, 300, |_| ());
         go(&mut rig, start_m, 300, |_| ());
         assert_eq!((tool(&rig).slip_m, tool(&rig).centre_m), (DVec3::ZERO, start_m));
