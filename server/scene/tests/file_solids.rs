@@ -1,0 +1,578 @@
+//! Hexahedra, prisms and pyramids, split into tetrahedra that fit each other: on cubes whose volume and area are known,
+//! with their nodes numbered at random, in every format.
+#![allow(clippy::unwrap_used, clippy::expect_used)] // a test that cannot read its meshes has failed
+use glam::DVec3;
+use palpate_scene::files::{FileError, GroupedMesh, Problem, UnusedNodes, VolumeFile, parse_volume};
+use std::collections::HashMap;
+use std::fmt::Write;
+use std::path::Path;
+
+/// Kinds of solids by their number of corners: those of Gmsh, VTK and XDMF, and MEDIT's word.
+const KINDS: [(usize, i64, i64, i64, &str); 4] =
+    [(8, 5, 12, 9, "Hexahedra"), (6, 6, 13, 8, "Prisms"), (5, 7, 14, 7, "Pyramids"), (4, 4, 10, 6, "Tetrahedra")];
+
+/// Nodes, and solids of any kind: the number of their corners tells which.
+#[derive(Debug, Clone, Default)]
+struct Mesh {
+    nodes: Vec<DVec3>,
+    solids: Vec<Vec<usize>>,
+    /// Groups, of all or of none.
+    tags: Vec<i64>,
+    quadrangles: Vec<[usize; 4]>,
+}
+
+/// Random numbers, the same on every machine (Marsaglia's xorshift).
+struct Random(u64);
+
+impl Random {
+    fn below(&mut self, bound: usize) -> usize {
+        self.0 ^= self.0 << 13;
+        self.0 ^= self.0 >> 7;
+        self.0 ^= self.0 << 17;
+        (self.0 >> 11) as usize % bound
+    }
+}
+
+/// What a cube is made of.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Of {
+    Hexahedra,
+    /// Two, cut along a diagonal that differs between neighbouring columns.
+    Prisms,
+    /// Six around the middle.
+    Pyramids,
+    /// All of them, cube by cube.
+    Mixed,
+}
+
+/// The unit cube of n³ cubes, each of hexahedra, prisms or pyramids. Its side x = 0 has quadrangles.
+fn cube(n: usize, of: Of) -> Mesh {
+    let index = |x: usize, y: usize, z: usize| x + (n + 1) * (y + (n + 1) * z);
+    let mut mesh = Mesh::default();
+    for place in 0..(n + 1).pow(3) {
+        let [x, y, z] = [place % (n + 1), place / (n + 1) % (n + 1), place / (n + 1).pow(2)];
+        mesh.nodes.push(DVec3::new(x as f64, y as f64, z as f64) / n as f64);
+    }
+    for place in 0..n.pow(3) {
+        let [x, y, z] = [place % n, place / n % n, place / n.pow(2)];
+        let corner = |[a, b, c]: [usize; 3]| index(x + a, y + b, z + c);
+        let c = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0, 0, 1], [1, 0, 1], [1, 1, 1], [0, 1, 1]].map(corner);
+        // Triangles of prisms face others of their column alone, whatever is beside.
+        let kind = match of {
+            Of::Mixed if (x + y) % 2 == 1 => Of::Prisms,
+            Of::Mixed if z % 2 == 0 => Of::Hexahedra,
+            Of::Mixed => Of::Pyramids,
+            other => other,
+        };
+        let before = mesh.solids.len();
+        match kind {
+            Of::Prisms if (x + y / 2) % 2 == 0 => {
+                mesh.solids.push(vec![c[0], c[1], c[2], c[4], c[5], c[6]]);
+                mesh.solids.push(vec![c[0], c[2], c[3], c[4], c[6], c[7]]);
+            }
+            Of::Prisms => {
+                mesh.solids.push(vec![c[0], c[1], c[3], c[4], c[5], c[7]]);
+                mesh.solids.push(vec![c[1], c[2], c[3], c[5], c[6], c[7]]);
+            }
+            Of::Pyramids => {
+                let middle = mesh.nodes.len();
+                mesh.nodes.push(c.iter().map(|&node| mesh.nodes[node]).sum::<DVec3>() / 8.0);
+                for face in [[0, 1, 2, 3], [4, 7, 6, 5], [0, 4, 5, 1], [1, 5, 6, 2], [2, 6, 7, 3], [3, 7, 4, 0]] {
+                    mesh.solids.push(face.map(|corner| c[corner]).into_iter().chain([middle]).collect());
+                }
+            }
+            _ => mesh.solids.push(c.to_vec()),
+        }
+        let left = if place % n < n / 2 { 1 } else { 2 };
+        mesh.tags.extend(std::iter::repeat_n(left, mesh.solids.len() - before));
+        if x == 0 {
+            mesh.quadrangles.push([c[0], c[4], c[7], c[3]]);
+        }
+    }
+    mesh
+}
+
+impl Mesh {
+    /// The same mesh with its nodes numbered, and its solids ordered, at random.
+    fn shuffled(&self, seed: u64) -> Self {
+        let mut random = Random(seed | 1);
+        let mut new: Vec<usize> = (0..self.nodes.len()).collect();
+        for place in (1..new.len()).rev() {
+            new.swap(place, random.below(place + 1));
+        }
+        let mut mesh = self.clone();
+        for (old, &new) in new.iter().enumerate() {
+            mesh.nodes[new] = self.nodes[old];
+        }
+        mesh.solids.iter_mut().flatten().for_each(|node| *node = new[*node]);
+        mesh.quadrangles.iter_mut().flatten().for_each(|node| *node = new[*node]);
+        for place in (1..mesh.solids.len()).rev() {
+            let other = random.below(place + 1);
+            mesh.solids.swap(place, other);
+            mesh.tags.swap(place, other);
+        }
+        mesh
+    }
+
+    fn msh22(&self) -> String {
+        let mut text = format!("$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Nodes\n{}\n", self.nodes.len());
+        for (node, p) in self.nodes.iter().enumerate() {
+            writeln!(text, "{} {} {} {}", node + 1, p.x, p.y, p.z).unwrap();
+        }
+        writeln!(text, "$EndNodes\n$Elements\n{}", self.solids.len() + self.quadrangles.len()).unwrap();
+        for (element, solid) in self.solids.iter().enumerate() {
+            write!(text, "{} {} 2 {} 1", element + 1, kind(solid.len()).1, self.tags[element]).unwrap();
+            solid.iter().for_each(|node| write!(text, " {}", node + 1).unwrap());
+            text.push('\n');
+        }
+        for (element, [a, b, c, d]) in self.quadrangles.iter().enumerate() {
+            let [a, b, c, d] = [a, b, c, d].map(|node| node + 1);
+            writeln!(text, "{} 3 2 7 1 {a} {b} {c} {d}", 1 + element + self.solids.len()).unwrap();
+        }
+        text + "$EndElements\n"
+    }
+
+    /// Blocks of one type and one entity, whose physical group is its number; 4.1 has unsigned counts of 8 bytes.
+    fn msh41(&self, binary: bool) -> Vec<u8> {
+        let mut out = Output { binary, data: b"$MeshFormat\n4.1 ".to_vec() };
+        out.data.extend(if binary { b"1 8\n\x01\0\0\0\n" } else { &b"0 8\n"[..] });
+        out.data.extend(b"$EndMeshFormat\n$Entities\n");
+        out.counts(&[0, 0, 1, 2]);
+        for entity in [7, 1, 2] {
+            out.ints(&[entity]);
+            out.reals(&[0.0; 6]);
+            out.counts(&[1]);
+            out.ints(&[entity]);
+            out.counts(&[0]);
+        }
+        out.data.extend(b"$EndEntities\n$Nodes\n");
+        out.counts(&[1, self.nodes.len(), 1, self.nodes.len()]);
+        out.ints(&[3, 1, 0]);
+        out.counts(&[self.nodes.len()]);
+        (1..=self.nodes.len()).for_each(|tag| out.counts(&[tag]));
+        self.nodes.iter().for_each(|p| out.reals(&p.to_array()));
+        out.data.extend(b"$EndNodes\n$Elements\n");
+        // A block for each element.
+        let all = self.solids.len() + self.quadrangles.len();
+        out.counts(&[all, all, 1, all]);
+        for (element, solid) in self.solids.iter().enumerate() {
+            out.ints(&[3, self.tags[element], kind(solid.len()).1]);
+            out.counts(&[1]);
+            out.counts(&[&[element + 1], solid.iter().map(|node| node + 1).collect::<Vec<_>>().as_slice()].concat());
+        }
+        for (element, corners) in self.quadrangles.iter().enumerate() {
+            out.ints(&[2, 7, 3]);
+            out.counts(&[1]);
+            out.counts(&[&[1 + element + self.solids.len()][..], &corners.map(|node| node + 1)].concat());
+        }
+        out.data.extend(b"$EndElements\n");
+        out.data
+    }
+
+    fn vtk(&self) -> String {
+        let mut text = format!(
+            "# vtk DataFile Version 3.0\nby hand\nASCII\nDATASET UNSTRUCTURED_GRID\nPOINTS {} double\n",
+            self.nodes.len()
+        );
+        self.nodes.iter().for_each(|p| writeln!(text, "{} {} {}", p.x, p.y, p.z).unwrap());
+        let numbers: usize = self.solids.iter().map(|solid| solid.len() + 1).sum();
+        writeln!(text, "CELLS {} {numbers}", self.solids.len()).unwrap();
+        self.solids.iter().for_each(|solid| writeln!(text, "{} {}", solid.len(), words(solid)).unwrap());
+        writeln!(text, "CELL_TYPES {}", self.solids.len()).unwrap();
+        self.solids.iter().for_each(|solid| writeln!(text, "{}", kind(solid.len()).2).unwrap());
+        let n = self.solids.len();
+        writeln!(text, "CELL_DATA {n}\nSCALARS region int\nLOOKUP_TABLE default\n{}", words(&self.tags)).unwrap();
+        text
+    }
+
+    fn vtu(&self) -> String {
+        let array = |kind: &str, name: &str, components: usize, values: String| {
+            format!("<DataArray type='{kind}' Name='{name}' NumberOfComponents='{components}' format='ascii'>{values}</DataArray>")
+        };
+        let ends = self.solids.iter().scan(0, |end, solid| {
+            *end += solid.len();
+            Some(*end)
+        });
+        format!(
+            "<VTKFile type='UnstructuredGrid'><UnstructuredGrid><Piece NumberOfPoints='{}' NumberOfCells='{}'><CellData>{}</CellData>\
+             <Points>{}</Points><Cells>{}{}{}</Cells></Piece></UnstructuredGrid></VTKFile>",
+            self.nodes.len(),
+            self.solids.len(),
+            array("Int32", "region", 1, words(&self.tags)),
+            array("Float64", "Points", 3, self.coordinates()),
+            array("Int64", "connectivity", 1, words(&self.solids.concat())),
+            array("Int64", "offsets", 1, words(&ends.collect::<Vec<_>>())),
+            array("UInt8", "types", 1, words(&self.solids.iter().map(|s| kind(s.len()).2).collect::<Vec<_>>())),
+        )
+    }
+
+    fn medit(&self) -> String {
+        let mut text = format!("MeshVersionFormatted 2\nDimension 3\nVertices\n{}\n", self.nodes.len());
+        self.nodes.iter().for_each(|p| writeln!(text, "{} {} {} 0", p.x, p.y, p.z).unwrap());
+        for (corners, .., word) in KINDS {
+            let of_kind: Vec<usize> = (0..self.solids.len()).filter(|&s| self.solids[s].len() == corners).collect();
+            writeln!(text, "{word} {}", of_kind.len()).unwrap();
+            for solid in of_kind {
+                let nodes: Vec<usize> = self.solids[solid].iter().map(|node| node + 1).collect();
+                writeln!(text, "{} {}", words(&nodes), self.tags[solid]).unwrap();
+            }
+        }
+        let quadrangle = |q: &[usize; 4]| format!("{} 7\n", words(&q.map(|node| node + 1)));
+        let quadrangles: String = self.quadrangles.iter().map(quadrangle).collect();
+        text + &format!("Quadrilaterals\n{}\n{quadrangles}End\n", self.quadrangles.len())
+    }
+
+    fn xdmf(&self) -> String {
+        let cells: Vec<i64> = self
+            .solids
+            .iter()
+            .flat_map(|solid| [kind(solid.len()).3].into_iter().chain(solid.iter().map(|&node| node as i64)))
+            .collect();
+        format!(
+            "<?xml version=\"1.0\"?>\n<Xdmf Version=\"3.0\"><Domain><Grid Name=\"Grid\">\n\
+             <Geometry GeometryType=\"XYZ\"><DataItem DataType=\"Float\" Dimensions=\"{} 3\" Format=\"XML\" Precision=\"8\">{}</DataItem></Geometry>\n\
+             <Topology TopologyType=\"Mixed\" NumberOfElements=\"{}\"><DataItem DataType=\"Int\" Dimensions=\"{}\" Format=\"XML\" Precision=\"8\">\
+             {}</DataItem></Topology>\n<Attribute Name=\"region\" AttributeType=\"Scalar\" Center=\"Cell\">\
+             <DataItem DataType=\"Int\" Dimensions=\"{}\" Format=\"XML\" Precision=\"4\">{}</DataItem></Attribute>\n</Grid></Domain></Xdmf>\n",
+            self.nodes.len(),
+            self.coordinates(),
+            self.solids.len(),
+            cells.len(),
+            words(&cells),
+            self.tags.len(),
+            words(&self.tags)
+        )
+    }
+
+    fn coordinates(&self) -> String {
+        words(&self.nodes.iter().flat_map(|p| p.to_array()).collect::<Vec<_>>())
+    }
+}
+
+struct Output {
+    binary: bool,
+    data: Vec<u8>,
+}
+
+impl Output {
+    fn counts(&mut self, values: &[usize]) {
+        values.iter().for_each(|&value| self.number((value as u64).to_le_bytes().as_slice(), &value));
+    }
+
+    fn ints(&mut self, values: &[i64]) {
+        values.iter().for_each(|&value| self.number((value as i32).to_le_bytes().as_slice(), &value));
+    }
+
+    fn reals(&mut self, values: &[f64]) {
+        values.iter().for_each(|&value| self.number(value.to_le_bytes().as_slice(), &value));
+    }
+
+    fn number(&mut self, bytes: &[u8], value: &impl std::fmt::Display) {
+        if self.binary { self.data.extend(bytes) } else { self.data.extend(format!("{value}\n").bytes()) }
+    }
+}
+
+fn kind(corners: usize) -> (usize, i64, i64, i64, &'static str) {
+    *KINDS.iter().find(|kind| kind.0 == corners).unwrap()
+}
+
+fn words<T: std::fmt::Display>(values: &[T]) -> String {
+    values.iter().map(T::to_string).collect::<Vec<_>>().join(" ")
+}
+
+fn volume(name: &str, data: impl AsRef<[u8]>) -> VolumeFile {
+    parse_volume(Path::new(name), data.as_ref()).unwrap_or_else(|error| panic!("{name}: {error}"))
+}
+
+fn read(name: &str, data: impl AsRef<[u8]>) -> GroupedMesh {
+    volume(name, data).into_tet_mesh(1.0, UnusedNodes::Refuse).unwrap_or_else(|error| panic!("{name}: {error}"))
+}
+
+/// Faces of tets, each with how many tets have it.
+fn faces(mesh: &GroupedMesh) -> HashMap<[u32; 3], usize> {
+    let mut faces = HashMap::new();
+    for &[a, b, c, d] in mesh.mesh.tets() {
+        for mut face in [[b, c, d], [a, c, d], [a, b, d], [a, b, c]] {
+            face.sort_unstable();
+            *faces.entry(face).or_default() += 1;
+        }
+    }
+    faces
+}
+
+fn area(mesh: &GroupedMesh, face: [u32; 3]) -> f64 {
+    let [a, b, c] = face.map(|node| mesh.mesh.positions_m()[node as usize]);
+    (b - a).cross(c - a).length() / 2.0
+}
+
+/// The mesh is the unit cube, without a gap: its volume and area, and every face within has two tets.
+fn is_the_unit_cube(mesh: &GroupedMesh, told: &str) {
+    // Tets of no volume, and inverted ones, are refused before.
+    assert!((mesh.mesh.total_volume_m3() - 1.0).abs() < 1e-12, "{told}");
+    let mut outside = 0.0;
+    for (face, tets) in faces(mesh) {
+        let corners = face.map(|node| mesh.mesh.positions_m()[node as usize]);
+        let on = |side: &dyn Fn(DVec3) -> f64| corners.iter().all(|&p| side(p).abs() < 1e-12);
+        let is_outside = (0..3).any(|axis| on(&|p| p[axis]) || on(&|p| p[axis] - 1.0));
+        assert_eq!(tets, if is_outside { 1 } else { 2 }, "{told}: {corners:?}");
+        outside += if is_outside { area(mesh, face) } else { 0.0 };
+    }
+    assert!((outside - 6.0).abs() < 1e-12, "{told}: {outside}");
+}
+
+/// Every kind, every numbering: upright tets, no gap, the cube's volume and area; quadrangles of the surface are cut
+/// as the faces of the solids on which they lie.
+#[test]
+fn cubes_are_filled_whatever_the_numbers_of_their_nodes() {
+    for of in [Of::Hexahedra, Of::Prisms, Of::Pyramids, Of::Mixed] {
+        for n in 1..5 {
+            for seed in 0..25 {
+                let told = format!("{of:?}, {n}³, seed {seed}");
+                let plain = cube(n, of);
+                let whole = if seed == 0 { plain } else { plain.shuffled(seed * 0x9e37_79b9_7f4a_7c15) };
+                let mesh = read("cube.msh", whole.msh22());
+                is_the_unit_cube(&mesh, &told);
+                let faces = faces(&mesh);
+                let quadrangles = &mesh.members()[mesh.groups.iter().position(|g| g.tag == 7).unwrap()].triangles;
+                assert_eq!(quadrangles.len(), 2 * n * n, "{told}");
+                for &triangle in quadrangles {
+                    let mut key = triangle;
+                    key.sort_unstable();
+                    assert_eq!(faces.get(&key), Some(&1), "{told}: {triangle:?} is no face of a tet on the surface");
+                }
+                assert!(mesh.warnings.is_empty(), "{told}: {:?}", mesh.warnings);
+            }
+        }
+    }
+}
+
+/// Corners by position and the group, sorted: numbering plays no part.
+fn canonical(mesh: &GroupedMesh) -> Vec<([[i64; 3]; 4], i64)> {
+    let tet = |tet: usize| {
+        let mut corners = mesh.mesh.corners_m(tet).map(|p| (p * 1e9).round().as_i64vec3().to_array());
+        corners.sort_unstable();
+        (corners, mesh.groups[mesh.tet_group[tet] as usize].tag)
+    };
+    let mut all: Vec<_> = (0..mesh.mesh.tets().len()).map(tet).collect();
+    all.sort_unstable();
+    all
+}
+
+#[test]
+fn every_format_gives_the_same_tetrahedra_and_groups() {
+    for of in [Of::Hexahedra, Of::Prisms, Of::Pyramids, Of::Mixed] {
+        let whole = cube(3, of).shuffled(2026);
+        let reference = read("cube.msh", whole.msh22());
+        let tags: Vec<i64> = canonical(&reference).iter().map(|tet| tet.1).collect();
+        assert!(tags.contains(&1) && tags.contains(&2), "{of:?}");
+        for (name, data) in [
+            ("ascii.msh", whole.msh41(false)),
+            ("binary.msh", whole.msh41(true)),
+            ("cube.vtk", whole.vtk().into_bytes()),
+            ("cube.vtu", whole.vtu().into_bytes()),
+            ("cube.mesh", whole.medit().into_bytes()),
+            ("cube.xdmf", whole.xdmf().into_bytes()),
+        ] {
+            let mesh = read(name, data);
+            assert!(canonical(&mesh) == canonical(&reference), "{of:?}: {name}");
+            assert!(mesh.warnings.is_empty() && !mesh.notes.is_empty(), "{name}: {:?}, {:?}", mesh.warnings, mesh.notes);
+        }
+    }
+}
+
+#[test]
+fn what_was_split_is_told_in_one_line() {
+    let whole = cube(2, Of::Hexahedra);
+    let text = whole.msh22().replace(
+        "$Elements\n12\n",
+        "$Elements\n17\n20 1 2 0 1 1 2\n21 1 2 0 1 2 3\n22 1 2 0 1 3 6\n23 15 2 0 1 1\n24 15 2 0 1 3\n",
+    );
+    let mesh = read("cube.msh", text);
+    let split = "8 hexahedra were split into 48 tetrahedra; 3 lines and 2 points of the geometry were left out";
+    assert_eq!(mesh.notes, [split.to_string()]);
+    let mixed = read("cube.msh", cube(2, Of::Mixed).msh22());
+    assert_eq!(mixed.notes.len(), 1);
+    assert!(mixed.notes[0].starts_with("2 hexahedra, 8 prisms and 12 pyramids were split into "), "{:?}", mixed.notes);
+    let one = Mesh { quadrangles: vec![], ..cube(1, Of::Hexahedra) };
+    assert_eq!(read("cube.msh", one.msh22()).notes, ["1 hexahedron was split into 6 tetrahedra"]);
+}
+
+/// A solid that lists its corners the other way round is turned by itself; the file's own tets by theirs.
+#[test]
+fn solids_that_are_inverted_are_turned() {
+    for of in [Of::Hexahedra, Of::Prisms, Of::Pyramids] {
+        let mut whole = cube(2, of).shuffled(7);
+        for solid in whole.solids.iter_mut().step_by(2) {
+            match solid.as_mut_slice() {
+                [a, b, c, d, e, f, g, h] => {
+                    (*a, *b, *c, *d, *e, *f, *g, *h) = (*e, *f, *g, *h, *a, *b, *c, *d);
+                }
+                [a, b, c, d, e, f] => (*a, *b, *c, *d, *e, *f) = (*d, *e, *f, *a, *b, *c),
+                [_, b, _, d, _] => std::mem::swap(b, d),
+                _ => unreachable!(),
+            }
+        }
+        let mesh = read("cube.msh", whole.msh22());
+        is_the_unit_cube(&mesh, "turned");
+        assert!(mesh.notes.iter().any(|note| note.contains("the corners are taken in the other order")), "{:?}", mesh.notes);
+        assert!(mesh.warnings.is_empty());
+    }
+    // A hexahedron and a tet beside, which is inverted: as all of the file's tets, it is turned.
+    let mut whole = cube(1, Of::Hexahedra);
+    whole.nodes.push(DVec3::new(2.0, 2.0, 2.0));
+    whole.nodes.push(DVec3::new(2.0, 0.0, 2.0));
+    for (tet, volume) in [([7, 6, 8, 9], 1.0), ([6, 7, 8, 9], 1.0)] {
+        let whole = Mesh { solids: vec![whole.solids[0].clone(), tet.to_vec()], tags: vec![1, 1], ..whole.clone() };
+        let mesh = read("cube.msh", whole.msh22());
+        assert!(mesh.mesh.total_volume_m3() > volume);
+    }
+}
+
+/// ANSYS writes prisms, pyramids and tetrahedra as hexahedra whose corners fall together.
+#[test]
+fn collapsed_hexahedra_give_what_is_left_of_them() {
+    for of in [Of::Prisms, Of::Pyramids, Of::Mixed] {
+        let whole = cube(3, of).shuffled(11);
+        let mut collapsed = whole.clone();
+        for solid in &mut collapsed.solids {
+            *solid = match *solid.as_slice() {
+                [a, b, c, d, e, f] => vec![a, b, c, c, d, e, f, f],
+                [a, b, c, d, apex] => vec![a, b, c, d, apex, apex, apex, apex],
+                _ => solid.clone(),
+            };
+        }
+        let mesh = read("cube.msh", collapsed.msh22());
+        is_the_unit_cube(&mesh, "collapsed");
+        assert!(canonical(&mesh) == canonical(&read("cube.msh", whole.msh22())), "{of:?}");
+    }
+    // One that has collapsed to a face is left out, and told.
+    let mut whole = cube(1, Of::Hexahedra);
+    whole.solids.push(vec![0, 1, 3, 2, 0, 1, 3, 2]);
+    whole.tags.push(1);
+    let mesh = read("cube.msh", whole.msh22());
+    is_the_unit_cube(&mesh, "with a flat one");
+    assert_eq!(mesh.warnings, ["left out, for their corners fall together and leave no volume: 1 hexahedron"]);
+}
+
+fn refused(mesh: &Mesh) -> FileError {
+    parse_volume(Path::new("cube.msh"), mesh.msh22().as_bytes()).unwrap_err()
+}
+
+/// A hexahedron that is turned inside out at a corner is told with its number and its place.
+#[test]
+fn inverted_and_flat_hexahedra_are_named() {
+    let mut whole = cube(3, Of::Hexahedra);
+    // The node in the middle of all, pushed through the opposite corner of the cube that it begins: number 13 of 27.
+    let middle = whole.solids[13][0];
+    whole.nodes[middle] = DVec3::splat(0.9);
+    let error = refused(&whole);
+    let Problem::InvertedSolids { first, .. } = &*error.problem else { panic!("{error}") };
+    assert!(first.contains(&13), "{error}");
+    assert!(error.to_string().starts_with("cube.msh: "), "{error}");
+    assert!(error.to_string().contains("of 27 hexahedra are flat or turned inside out at a corner (numbers "), "{error}");
+    let mut flat = cube(2, Of::Hexahedra);
+    flat.nodes.iter_mut().for_each(|p| p.z = if p.z > 0.6 { 0.5 } else { p.z });
+    let told = refused(&flat).to_string();
+    assert!(told.contains("4 of 8 hexahedra are flat") && told.contains("(numbers 4, 5, 6, 7,"), "{told}");
+    assert!(told.contains("the first is around (0.25, 0.25, 0.5) in the file's unit"), "{told}");
+}
+
+/// Faces that are bent so much that the rule gives an inverted tet: a node in the middle, from which all corners are seen.
+#[test]
+fn much_bent_hexahedra_are_split_around_their_middle() {
+    let mut seen = 0;
+    for seed in 0..40 {
+        let mut whole = cube(3, Of::Hexahedra);
+        let mut random = Random(seed * 0x9e37_79b9_7f4a_7c15 | 1);
+        let within = |p: &DVec3| p.min_element() > 0.1 && p.max_element() < 0.9;
+        for p in whole.nodes.iter_mut().filter(|p| within(p)) {
+            *p += DVec3::from([0; 3].map(|_| (random.below(2001) as f64 / 1000.0 - 1.0) * 0.14));
+        }
+        // One that is beyond that may be refused, never read with a gap.
+        let Ok(file) = parse_volume(Path::new("cube.msh"), whole.msh22().as_bytes()) else { continue };
+        let mesh = file.into_tet_mesh(1.0, UnusedNodes::Refuse).unwrap();
+        is_the_unit_cube(&mesh, "bent");
+        seen += usize::from(mesh.notes.iter().any(|note| note.contains("split around a node of their own in the middle")));
+    }
+    assert!(seen >= 5, "{seen}");
+}
+
+/// A hexahedron beside two tets whose faces are cut along the other diagonal: the body is open there, and that is said.
+#[test]
+fn faces_that_cannot_fit_are_told() {
+    let nodes = [[0., 0., 0.], [1., 0., 0.], [1., 1., 0.], [0., 1., 0.], [0., 0., 1.], [1., 0., 1.], [1., 1., 1.], [0., 1., 1.]];
+    let mut whole = Mesh { nodes: nodes.map(DVec3::from).to_vec(), ..Mesh::default() };
+    whole.nodes.push(DVec3::new(0.5, 0.5, 2.0));
+    // The top is cut from node 4 to node 6.
+    whole.solids = vec![(0..8).collect(), vec![4, 5, 6, 8], vec![4, 6, 7, 8]];
+    whole.tags = vec![1; 3];
+    let fitting = read("a.msh", whole.msh22());
+    assert!(fitting.warnings.is_empty(), "{:?}", fitting.warnings);
+    assert_eq!(faces(&fitting).values().filter(|&&tets| tets == 1).count(), 10 + 4);
+    whole.solids = vec![(0..8).collect(), vec![4, 5, 7, 8], vec![5, 6, 7, 8]];
+    let open = read("a.msh", whole.msh22());
+    let told = "2 triangles of tetrahedra, prisms or pyramids lie across the diagonal along which the face of four corners";
+    assert!(open.warnings.len() == 1 && open.warnings[0].starts_with(told), "{:?}", open.warnings);
+    // A pyramid has a face of four corners, and fits whatever the numbers are.
+    whole.solids = vec![(0..8).collect(), vec![4, 5, 6, 7, 8]];
+    whole.tags = vec![1; 2];
+    let pyramid = read("a.msh", whole.msh22());
+    assert!(pyramid.warnings.is_empty(), "{:?}", pyramid.warnings);
+    assert!((pyramid.mesh.total_volume_m3() - 4.0 / 3.0).abs() < 1e-14);
+}
+
+/// MSH 2.2 lists a solid once for each of its groups; XDMF's tags list the cells once more.
+#[test]
+fn a_solid_that_is_listed_for_each_of_its_groups_is_one() {
+    let mut whole = cube(2, Of::Hexahedra);
+    for solid in 0..8 {
+        whole.solids.push(whole.solids[solid].clone());
+        whole.tags.push(9);
+    }
+    let mesh = read("cube.msh", whole.msh22());
+    is_the_unit_cube(&mesh, "listed twice");
+    let group = mesh.groups.iter().position(|group| group.tag == 9).unwrap();
+    assert_eq!(mesh.members()[group].tets.len(), 48);
+    assert!(mesh.warnings.is_empty() && mesh.notes[0].starts_with("8 hexahedra were split into 48"), "{:?}", mesh.notes);
+    whole.solids.push(whole.solids[0].clone());
+    whole.tags.push(9);
+    assert_eq!(read("cube.msh", whole.msh22()).warnings, ["repeated elements are used once: 1 hexahedron"]);
+}
+
+/// Voxels and pixels of VTK count their corners along the axes.
+#[test]
+fn voxels_and_pixels() {
+    let hexahedra = cube(2, Of::Hexahedra);
+    let mut voxels = hexahedra.clone();
+    voxels.solids.iter_mut().for_each(|s| (s[2], s[3], s[6], s[7]) = (s[3], s[2], s[7], s[6]));
+    let (hexahedra, voxels) = (hexahedra.vtk(), voxels.vtk().replace("\n12\n12\n", "\n11\n11\n").replace("\n12\n", "\n11\n"));
+    assert!(canonical(&read("a.vtk", &voxels)) == canonical(&read("a.vtk", &hexahedra)));
+    let sheet = |numbers: &str, kind: i64| {
+        let head = "# vtk DataFile Version 3.0\nby hand\nASCII\nDATASET UNSTRUCTURED_GRID\nPOINTS 4 float\n0 0 0 1 0 0 0 1 0 1 1 0\n";
+        let text = format!("{head}CELLS 1 5\n4 {numbers}\nCELL_TYPES 1\n{kind}\n");
+        palpate_scene::files::parse_surface(Path::new("a.vtk"), text.as_bytes()).unwrap().triangles
+    };
+    assert_eq!(sheet("0 1 2 3", 8), sheet("0 1 3 2", 9));
+}
+
+/// Of hexahedra and prisms of second order the corners are used, in every format's own number of nodes.
+#[test]
+fn second_order_is_reduced_to_the_corners() {
+    let whole = cube(2, Of::Hexahedra);
+    let more = |count: usize| " 1".repeat(count);
+    for (number, nodes) in [(12, 27), (17, 20)] {
+        let text = whole.msh22();
+        let mut quadratic = String::new();
+        for line in text.lines() {
+            let is_hexahedron = line.split(' ').nth(1) == Some("5") && line.split(' ').count() == 13;
+            if is_hexahedron {
+                writeln!(quadratic, "{}{}", line.replacen(" 5 ", &format!(" {number} "), 1), more(nodes - 8)).unwrap();
+            } else {
+                writeln!(quadratic, "{line}").unwrap();
+            }
+        }
+        let mesh = read("cube.msh", quadratic);
+        is_the_unit_cube(&mesh, "second order");
+        assert!(mesh.warnings[0].starts_with("of 8 hexahedra the corner nodes are used"), "{:?}", mesh.warnings);
+    }
+}
