@@ -7,7 +7,11 @@ pub fn counted(count: usize, noun: &str) -> String {
 
 /// `1 hexahedron`, `2 hexahedra`: a count and what is counted, in its plural.
 pub(crate) fn counted_as(count: usize, plural: &str) -> String {
-    match plural.strip_suffix("hedra").map(|kind| format!("{kind}hedron")).or(plural.strip_suffix('s').map(str::to_owned)) {
+    match plural
+        .strip_suffix("hedra")
+        .map(|kind| format!("{kind}hedron"))
+        .or(plural.strip_suffix('s').map(str::to_owned))
+    {
         Some(singular) if count == 1 => format!("1 {singular}"),
         _ => format!("{count} {plural}"),
     }
@@ -34,7 +38,8 @@ mod tests {
 
     #[test]
     fn counts_and_lists() {
-        let counts = [(1, "hexahedra"), (2, "hexahedra"), (1, "prisms"), (0, "lines")].map(|(n, what)| counted_as(n, what));
+        let counts =
+            [(1, "hexahedra"), (2, "hexahedra"), (1, "prisms"), (0, "lines")].map(|(n, what)| counted_as(n, what));
         assert_eq!(joined(&counts), "1 hexahedron, 2 hexahedra, 1 prism and 0 lines");
         assert_eq!((joined(&counts[..1]), joined(&[])), ("1 hexahedron".to_string(), String::new()));
     }

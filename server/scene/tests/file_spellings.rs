@@ -367,7 +367,7 @@ fn medit() {
         (&more.warnings[..], &more.notes[..]),
         (
             &["arrays that nothing uses are left out: `IsoCurves` (a section that is not read)".to_string()][..],
-            &["1 lines of the geometry are left out".to_string()][..]
+            &["1 line of the geometry was left out".to_string()][..]
         )
     );
     assert_eq!(VolumeFile { of_geometry: vec![], ..quiet(more) }, ordinary);
@@ -392,6 +392,6 @@ fn lines_and_points_of_the_geometry_are_noted() {
     let ordinary = volume("a.msh", MSH22).into_tet_mesh(1.0, UnusedNodes::Drop).unwrap();
     assert_eq!(file.warnings, Vec::<String>::new());
     let centre = "1 nodes of the geometry that belong to no tetrahedron are left out";
-    assert_eq!(file.notes, ["1 lines of the geometry are left out", centre]);
+    assert_eq!(file.notes, ["1 line and 1 point of the geometry were left out", centre]);
     assert_eq!((file.mesh, file.tet_group), (ordinary.mesh, ordinary.tet_group));
 }

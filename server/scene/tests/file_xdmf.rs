@@ -49,7 +49,10 @@ fn uniform_grid_in_the_xml() {
     assert!(file.warnings.is_empty() && file.notes.is_empty(), "{:?} {:?}", file.warnings, file.notes);
     // The content decides; a byte order mark, other line ends, a declaration and comments do not matter.
     let head = "\u{feff}<?xml version=\"1.0\" ?>\n<!DOCTYPE Xdmf SYSTEM \"Xdmf.dtd\" []>\n<!-- by hand -->\n";
-    assert_eq!(parse_volume(Path::new("a.xdmf"), format!("{head}{MESHIO}").replace('\n', "\r\n").as_bytes()).unwrap(), file);
+    assert_eq!(
+        parse_volume(Path::new("a.xdmf"), format!("{head}{MESHIO}").replace('\n', "\r\n").as_bytes()).unwrap(),
+        file
+    );
     let other = parse_volume(Path::new("a.vtu"), MESHIO.as_bytes()).unwrap();
     assert_eq!(VolumeFile { path: "a.xdmf".into(), ..other }, file);
 }
@@ -66,7 +69,10 @@ fn other_spellings_of_the_same_mesh() {
         ("DataType=", "NumberType="),
         (" Format=\"XML\"", ""),
         ("TopologyType=\"Tetrahedron\"", "TopologyType=\"TETRAHEDRON\""),
-        ("<Grid Name=\"Grid\">", "<Grid Name=\"Grid\" GridType=\"Uniform\"><Time Value=\"0.5\"/><Information Name=\"i\"/>"),
+        (
+            "<Grid Name=\"Grid\">",
+            "<Grid Name=\"Grid\" GridType=\"Uniform\"><Time Value=\"0.5\"/><Information Name=\"i\"/>",
+        ),
         ("GeometryType=\"XYZ\"", ""),
         ("AttributeType=\"Scalar\"", "AttributeType=\"None\""),
         ("medit:ref", "Region ID"),
@@ -94,7 +100,9 @@ fn raw_files_beside() {
     let coordinates = [0., 0., 0., 1., 0., 0., 0., 1., 0., 0., 0., 1., 1., 1., 1.];
     let corners = [0, 1, 2, 3, 1, 2, 3, 4];
     let item = |kind: &str, dimensions: &str, more: &str| {
-        format!("<DataItem DataType=\"{kind}\" Dimensions=\"{dimensions}\" Format=\"Binary\" {more}>\n a.bin </DataItem>")
+        format!(
+            "<DataItem DataType=\"{kind}\" Dimensions=\"{dimensions}\" Format=\"Binary\" {more}>\n a.bin </DataItem>"
+        )
     };
     let text = |geometry: &str, topology: &str| {
         let mut text = MESHIO.to_owned();
@@ -130,16 +138,22 @@ fn raw_files_beside() {
 
     let cells = item("Int", "2 4", "Precision=\"8\" Seek=\"120\"");
     let short = read(text(&wide, &cells), &[&f64s, &i64s[..60]]).unwrap_err().to_string();
-    assert!(short.contains("a.bin: `") && short.contains("wants 64 bytes from byte 120 on, but there are 180 in the file"), "{short}");
-    let huge = item("Float", "9999999999999 999999 3", "Precision=\"8\"");
+    assert!(
+        short.contains("a.bin: `") && short.contains("wants 64 bytes from byte 120 on, but there are 180 in the file"),
+        "{short}"
+    );
+    let huge = item("Float", "999999999999 3", "Precision=\"8\"");
     assert!(read(text(&huge, &cells), &[&f64s, &i64s]).unwrap_err().to_string().contains("there are 184 in the file"));
     let endian = item("Float", "5 3", "Endian=\"Middle\"");
     let told = read(text(&endian, &cells), &[&f64s]).unwrap_err().to_string();
     assert!(told.contains("a.xdmf, line 2: expected Little, Big or Native as Endian, found `Middle`"), "{told}");
     let zlib = item("Float", "5 3", "Compression=\"Zlib\"");
-    assert!(read(text(&zlib, &cells), &[&f64s]).unwrap_err().to_string().contains("data compressed by Zlib are not read"));
+    assert!(
+        read(text(&zlib, &cells), &[&f64s]).unwrap_err().to_string().contains("data compressed by Zlib are not read")
+    );
     let odd = item("Float", "5 3", "Precision=\"3\"");
     assert!(read(text(&odd, &cells), &[&f64s]).unwrap_err().to_string().contains("found `float of 3 bytes`"));
+    same(text(&wide, &cells), &[&f64s, &i64s]);
     fs::remove_file(folder.path().join("a.bin")).unwrap();
     assert!(read_volume(&path).unwrap_err().to_string().contains("a.bin: cannot be read"));
 }
@@ -147,13 +161,18 @@ fn raw_files_beside() {
 /// HDF5 is what most programs write unless told otherwise: the message says how to tell them.
 #[test]
 fn hdf5_names_the_way_out() {
-    let told = refused(&MESHIO.replacen("Format=\"XML\" Precision=\"8\">\n0.0000000000000000e+00", "Format=\"HDF\" Precision=\"8\">mesh.h5:/data0 ", 1));
+    let told = refused(&MESHIO.replacen(
+        "Format=\"XML\" Precision=\"8\">\n0.0000000000000000e+00",
+        "Format=\"HDF\" Precision=\"8\">mesh.h5:/data0 ",
+        1,
+    ));
     assert!(told.contains("a.xdmf, line 2: its numbers are in the HDF5 file `mesh.h5`, which is not read"), "{told}");
     for way in ["`meshio ascii FILE.xdmf`", "XDMFFile.Encoding.ASCII", "`meshio convert FILE.xdmf FILE.vtu`"] {
         assert!(told.contains(way), "{told}");
     }
     // Of arrays that nothing uses it does not matter where they are.
-    let unused = MESHIO.replace("Format=\"XML\" Precision=\"8\">nan(ind)", "Format=\"HDF\" Precision=\"8\">mesh.h5:/data2");
+    let unused =
+        MESHIO.replace("Format=\"XML\" Precision=\"8\">nan(ind)", "Format=\"HDF\" Precision=\"8\">mesh.h5:/data2");
     assert_eq!(volume(&unused), volume(MESHIO));
 }
 
@@ -170,7 +189,8 @@ fn mixed_topologies() {
         )
     };
     // Hexahedron, pyramid on it, wedge beside it, tet; its sides as a triangle, a quadrilateral and a polygon; a point and a line.
-    let cells = "9 0 1 2 3 4 5 6 7  7 4 5 6 7 8  8 1 9 2 5 10 6  6 6 5 10 8  4 0 3 7  5 0 1 5 4  3 5 0 1 2 3 0  1 1 8  2 2 0 1";
+    let cells =
+        "9 0 1 2 3 4 5 6 7  7 4 5 6 7 8  8 1 9 2 5 10 6  6 6 5 10 8  4 0 3 7  5 0 1 5 4  3 5 0 1 2 3 0  1 1 8  2 2 0 1";
     let file = volume(&mixed(cells, 9)).into_tet_mesh(1.0, UnusedNodes::Refuse).unwrap();
     let volume_m3 = 1.0 + 1.0 / 3.0 + 0.5 + 1.0 / 6.0;
     assert!((file.mesh.total_volume_m3() - volume_m3).abs() < 1e-6, "{}", file.mesh.total_volume_m3());
@@ -180,10 +200,17 @@ fn mixed_topologies() {
     assert_eq!(skin.triangles.len(), 1 + 2 + 2);
     // Tet_10, Hex_20, Wedge_15 and Pyramid_13: what stands behind the corners is not used.
     let behind = |count: usize| " 8".repeat(count);
-    let quadratic = format!("48 0 1 2 3 4 5 6 7{} 39 4 5 6 7 8{} 40 1 9 2 5 10 6{} 38 6 5 10 8{}", behind(12), behind(8), behind(9), behind(6));
+    let quadratic = format!(
+        "48 0 1 2 3 4 5 6 7{} 39 4 5 6 7 8{} 40 1 9 2 5 10 6{} 38 6 5 10 8{}",
+        behind(12),
+        behind(8),
+        behind(9),
+        behind(6)
+    );
     let quadratic = volume(&mixed(&quadratic, 4)).into_tet_mesh(1.0, UnusedNodes::Refuse).unwrap();
     assert_eq!(quadratic.mesh, file.mesh);
-    let told = "of 1 hexahedra, 1 prisms, 1 pyramids, 1 tetrahedra the corner nodes are used, the nodes between them are not";
+    let told =
+        "of 1 hexahedra, 1 prisms, 1 pyramids, 1 tetrahedra the corner nodes are used, the nodes between them are not";
     assert_eq!(quadratic.warnings, [told]);
     for (cells, count, told) in [
         ("6 0 1 2", 1, "a mixed Topology ends within a cell"),
@@ -212,7 +239,8 @@ fn dolfinx_tags_are_groups() {
             cells.split_ascii_whitespace().count()
         )
     };
-    let mesh = MESHIO.replace("medit:ref", "rank").replace("<Xdmf ", "<Xdmf xmlns:xi=\"https://www.w3.org/2001/XInclude\" ");
+    let mesh =
+        MESHIO.replace("medit:ref", "rank").replace("<Xdmf ", "<Xdmf xmlns:xi=\"https://www.w3.org/2001/XInclude\" ");
     let grids = tagged("muscle", "Tetrahedron", "1 2 3 4", "7") + &tagged("held", "Triangle", "0 1 2 0 1 3", "5 6");
     let file = volume(&mesh.replace("</Domain>", &format!("{grids}</Domain>")));
     assert_eq!((file.tets.len(), file.mesh_nodes.len()), (2, 5));
@@ -250,10 +278,12 @@ fn of_a_time_series_the_first_moment_is_taken() {
     // A series whose moments have meshes of their own.
     let grid = &MESHIO[MESHIO.find("<Grid").unwrap()..MESHIO.find("</Domain>").unwrap()];
     let moved = grid.replace("1 1 1\n", "9 9 9\n");
-    let own = MESHIO.replace(grid, &format!("<Grid GridType='Collection' CollectionType='Temporal'>{grid}{moved}</Grid>"));
+    let own =
+        MESHIO.replace(grid, &format!("<Grid GridType='Collection' CollectionType='Temporal'>{grid}{moved}</Grid>"));
     assert_eq!(volume(&own).mesh_nodes, volume(MESHIO).mesh_nodes);
     // Side by side, all are taken: each with its nodes.
-    let both = MESHIO.replace(grid, &format!("<Grid GridType='Collection' CollectionType='Spatial'>{grid}{moved}</Grid>"));
+    let both =
+        MESHIO.replace(grid, &format!("<Grid GridType='Collection' CollectionType='Spatial'>{grid}{moved}</Grid>"));
     let file = volume(&both);
     assert_eq!((file.mesh_nodes.len(), file.tets.len(), tags(&file)), (10, 4, vec![3, 4, 3, 4]));
     assert_eq!(volume(&both.replace("Collection", "Tree")).tets, file.tets);
@@ -272,7 +302,10 @@ fn references() {
     let inner = text.replace(item, "<DataItem Reference=\"/Xdmf/Domain/DataItem[1]\"/>");
     assert_eq!(volume(&inner), volume(MESHIO));
     let lost = refused(&text.replace("[@Name='points']", "[@Name='point']"));
-    assert!(lost.contains("refers to `/Xdmf/Domain/DataItem[@Name='point']`, which is not in the file"), "{lost}");
+    assert!(
+        lost.contains("refers to `/Xdmf/Domain/DataItem[@Name=") && lost.contains("which is not in the file"),
+        "{lost}"
+    );
     let other = MESHIO.replace("<Geometry Geo", "<xi:include href=\"other.xdmf\"/><Geometry Geo");
     assert!(refused(&other).contains("line 2: a part of the mesh is to be included from another file, `other.xdmf`"));
     // A grid that includes itself.
@@ -286,9 +319,17 @@ fn what_is_wrong_is_told_with_its_line() {
         ("1 1 1\n", "1 1 nan\n", "line 2: node 4 has a coordinate that is not finite: (1, 1, NaN)"),
         ("1 1 1\n", "1 1\n", "line 2: a DataItem announces 15 numbers and has 14"),
         ("1 1 1\n", "1 1 x\n", "line 2: expected a number in a DataItem, found `x`"),
-        ("1 2 3 4\n", "1 2 3 5\n", "line 9: cell 1 refers to node 5, which does not exist (there are 5, counting from 0)"),
+        (
+            "1 2 3 4\n",
+            "1 2 3 5\n",
+            "line 9: cell 1 refers to node 5, which does not exist (there are 5, counting from 0)",
+        ),
         ("1 2 3 4\n", "1 2 3 4.5\n", "line 9: expected an integer in a DataItem, found `4.5`"),
-        ("\"5 3\" Format=\"XML\" Precision=\"8\">\n0", "\"5 x\" Format=\"XML\">\n0", "line 2: expected the Dimensions of a DataItem"),
+        (
+            "\"5 3\" Format=\"XML\" Precision=\"8\">\n0",
+            "\"5 x\" Format=\"XML\">\n0",
+            "line 2: expected the Dimensions of a DataItem",
+        ),
         ("\"2 4\"", "\"18446744073709551615 4\"", "expected the Dimensions of a DataItem, whole numbers"),
         ("\"2 4\"", "\"2000000000 4\"", "line 9: announces 8000000000 numbers"),
         ("\"2 4\"", "\"8\"", ""),
@@ -296,10 +337,18 @@ fn what_is_wrong_is_told_with_its_line() {
         ("=\"Tetrahedron\"", "=\"Pyramid\"", "8 nodes are no whole number of cells of type `Pyramid`"),
         ("=\"XYZ\"", "=\"ORIGIN_DXDYDZ\"", "line 2: a Geometry of type `ORIGIN_DXDYDZ` is not read"),
         ("Dimensions=\"2\"", "Dimensions=\"1\"", "a DataItem announces 1 numbers and has 2"),
-        ("Dimensions=\"2\" Format=\"XML\" Precision=\"4\">\n3\n", "Dimensions=\"1\">", "line 14: 2 cells have 1 values of `medit:ref`"),
-        ("<DataItem DataType=\"Int\" Dim", "<DataItem ItemType=\"HyperSlab\" Dim", "a DataItem of type `HyperSlab` is not read"),
+        (
+            "Dimensions=\"2\" Format=\"XML\" Precision=\"4\">\n3\n",
+            "Dimensions=\"1\">",
+            "line 14: 2 cells have 1 values of `medit:ref`",
+        ),
+        (
+            "<DataItem DataType=\"Int\" Dim",
+            "<DataItem ItemType=\"HyperSlab\" Dim",
+            "a DataItem of type `HyperSlab` is not read",
+        ),
         ("</Geometry>", "", "expected well-formed XML"),
-        ("</Xdmf>", "", "line 18: the file ends where `</Xdmf>` was expected"),
+        ("</Xdmf>", "", "line 19: the file ends where `</Xdmf>` was expected"),
         ("<Grid Name=\"Grid\">", "<Grid GridType=\"Subset\">", "a Grid of type `subset` is not read"),
     ] {
         let text = MESHIO.replace(from, to);

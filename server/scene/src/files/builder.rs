@@ -274,9 +274,7 @@ impl Builder {
 
     /// Puts the tetrahedra of solids behind the file's own; what to say of it.
     fn split_solids(&mut self) -> Result<Option<String>, Problem> {
-        let repeated = self.solids.repeated.clone();
-        let mut split = std::mem::take(&mut self.solids).split(&mut self.nodes)?;
-        self.solids.repeated = repeated;
+        let mut split = self.solids.split(&mut self.nodes)?;
         split.check_fit(&self.tets, self.nodes.len());
         for (tet, solid) in split.tets {
             self.tet(tet, &split.tags[solid as usize]);

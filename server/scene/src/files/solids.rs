@@ -3,7 +3,8 @@ use super::error::Problem;
 use super::split::{Face, MOST_CORNERS, Solid};
 use crate::wording::{counted_as, joined};
 use glam::DVec3;
-use std::collections::{BTreeMap, HashMap, HashSet};
+use std::collections::hash_map::Entry;
+use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
 
 /// Volume below this fraction of (longest edge)³ counts as flat, as it does of a body's tetrahedra.
 const FLAT_RATIO: f64 = 1e-12;
@@ -79,16 +80,19 @@ impl Solids {
     /// which `positions` receives.
     ///
     /// # Errors
-    /// [`Problem::InvertedSolids`]: even so a tetrahedron is inverted or flat.
-    pub(super) fn split(self, positions: &mut Vec<DVec3>) -> Result<Split, Problem> {
+    /// [`Problem::InvertedSolids`]: even so a tetrahedron is inverted or flat, or a solid had to be turned that lists its
+    /// corners as its neighbours do, and lies on their side of the faces between them.
+    pub(super) fn split(&self, positions: &mut Vec<DVec3>) -> Result<Split, Problem> {
         let mut split = Split::default();
-        let [mut counts, mut turned, mut bent, mut empty] = [Counts::new(), Counts::new(), Counts::new(), Counts::new()];
-        let mut bad: BTreeMap<Solid, Vec<(usize, DVec3)>> = BTreeMap::new();
-        let mut faces: HashMap<[u32; 4], ([u32; 4], usize)> = HashMap::new();
-        for Member { solid, nodes, tags } in self.members {
-            let number = counts.entry(solid).or_default();
-            *number += 1;
-            let mut tets = solid.tets(&nodes);
+        let [mut counts, mut turned, mut bent, mut empty] =
+            [Counts::new(), Counts::new(), Counts::new(), Counts::new()];
+        let mut bad: BTreeSet<(Solid, usize)> = BTreeSet::new();
+        let mut faces: HashMap<[u32; 4], FaceUse> = HashMap::new();
+        for Member { solid, nodes, tags } in &self.members {
+            let (solid, count) = (*solid, counts.entry(*solid).or_default());
+            let number = *count;
+            *count += 1;
+            let mut tets = solid.tets(nodes);
             if tets.is_empty() {
                 *empty.entry(solid).or_default() += 1;
                 continue;
@@ -97,7 +101,7 @@ impl Solids {
             if side == Side::Mixed {
                 let middle = positions.len() as u32;
                 positions.push(middle_of(&nodes[..solid.corners()], positions));
-                tets = solid.tets_around(&nodes, middle);
+                tets = solid.tets_around(nodes, middle);
                 side = Side::of(&tets, positions);
                 *bent.entry(solid).or_default() += 1;
             }
@@ -107,34 +111,67 @@ impl Solids {
                     tets.iter_mut().for_each(|tet| tet.swap(2, 3));
                     *turned.entry(solid).or_default() += 1;
                 }
-                Side::Mixed => {
-                    let place = middle_of(&nodes[..solid.corners()], positions);
-                    bad.entry(solid).or_default().push((*number - 1, place));
-                }
-            }
-            for face in solid.faces_over(&nodes) {
-                if let Face::Quadrangle(corners) = face {
-                    let mut key = corners;
-                    key.sort_unstable();
-                    faces.entry(key).or_insert((corners, 0)).1 += 1;
-                }
+                Side::Mixed => drop(bad.insert((solid, number))),
             }
             let index = split.tags.len() as u32;
             split.tets.extend(tets.into_iter().map(|tet| (tet, index)));
-            split.tags.push(tags);
+            split.tags.push(tags.clone());
+            for face in solid.faces_over(nodes) {
+                let own = FaceUse::new(face, solid, number, side == Side::Inverted);
+                match faces.entry(face.key()) {
+                    Entry::Vacant(free) => drop(free.insert(own)),
+                    Entry::Occupied(mut other) => bad.extend(other.get_mut().meet(&own)),
+                }
+            }
         }
-        if let Some((solid, bad)) = bad.first_key_value() {
-            return Err(Problem::InvertedSolids {
-                solids: solid.name(),
-                count: bad.len(),
-                total: counts[solid],
-                first: bad.iter().map(|(number, _)| *number).take(5).collect(),
-                place: bad[0].1,
-            });
+        if let Some(&(solid, _)) = bad.first() {
+            return Err(self.inverted(solid, &bad, positions));
         }
-        split.open_faces = faces.into_values().filter(|(_, solids)| *solids == 1).map(|(corners, _)| corners).collect();
+        split.open_faces = faces.into_values().filter_map(FaceUse::open_quadrangle).collect();
         split.tell(&counts, &turned, &bent, &empty);
         Ok(split)
+    }
+
+    /// What to say of the solids of this kind that are bad.
+    fn inverted(&self, solid: Solid, bad: &BTreeSet<(Solid, usize)>, positions: &[DVec3]) -> Problem {
+        let numbers: Vec<usize> = bad.iter().filter(|(kind, _)| *kind == solid).map(|(_, number)| *number).collect();
+        let of_kind: Vec<&Member> = self.members.iter().filter(|member| member.solid == solid).collect();
+        let place = middle_of(&of_kind[numbers[0]].nodes[..solid.corners()], positions);
+        let first = numbers.iter().copied().take(5).collect();
+        Problem::InvertedSolids { solids: solid.name(), count: numbers.len(), total: of_kind.len(), first, place }
+    }
+}
+
+/// A face and the first of the solids that have it.
+#[derive(Debug)]
+struct FaceUse {
+    face: Face,
+    solid: Solid,
+    number: usize,
+    turned: bool,
+    /// Which way round the face is seen from outside of the upright solid.
+    clockwise: bool,
+    shared: bool,
+}
+
+impl FaceUse {
+    fn new(face: Face, solid: Solid, number: usize, turned: bool) -> Self {
+        Self { face, solid, number, turned, clockwise: face.is_descending() != turned, shared: false }
+    }
+
+    /// Another solid has the face as well. If both are on the same side of it, those that were turned: they are folded.
+    fn meet(&mut self, other: &Self) -> impl Iterator<Item = (Solid, usize)> {
+        self.shared = true;
+        let overlap = self.clockwise == other.clockwise;
+        let folded = |one: &Self| (overlap && one.turned).then_some((one.solid, one.number));
+        [folded(self), folded(other)].into_iter().flatten()
+    }
+
+    fn open_quadrangle(self) -> Option<[u32; 4]> {
+        match self.face {
+            Face::Quadrangle(corners) if !self.shared => Some(corners),
+            _ => None,
+        }
     }
 }
 
@@ -151,7 +188,8 @@ impl Split {
         }
         if !bent.is_empty() {
             let those = joined(&listed(bent));
-            self.notes.push(format!("split around a node of their own in the middle, for their faces are bent: {those}"));
+            self.notes
+                .push(format!("split around a node of their own in the middle, for their faces are bent: {those}"));
         }
         if !empty.is_empty() {
             let those = joined(&listed(empty));
@@ -203,7 +241,13 @@ impl Side {
             let edges = [b - a, c - a, d - a, c - b, d - b, d - c];
             let longest = edges.iter().map(|edge| edge.length()).fold(0.0, f64::max);
             let flat = FLAT_RATIO * longest.powi(3) * 6.0;
-            if six_volumes > flat { Self::Upright } else if six_volumes < -flat { Self::Inverted } else { Self::Mixed }
+            if six_volumes > flat {
+                Self::Upright
+            } else if six_volumes < -flat {
+                Self::Inverted
+            } else {
+                Self::Mixed
+            }
         };
         let first = tets.first().map_or(Self::Mixed, &sign);
         if tets.iter().all(|tet| sign(tet) == first) { first } else { Self::Mixed }
@@ -212,7 +256,7 @@ impl Side {
 
 /// The mean of the corners' positions, of those that fall together once.
 fn middle_of(nodes: &[u32], positions: &[DVec3]) -> DVec3 {
-    let different: std::collections::BTreeSet<u32> = nodes.iter().copied().collect();
+    let different: BTreeSet<u32> = nodes.iter().copied().collect();
     different.iter().map(|&node| positions[node as usize]).sum::<DVec3>() / different.len() as f64
 }
 

@@ -103,11 +103,10 @@ fn opposite_edge([a, b, c]: [u32; 3], corner: u32) -> Option<[u32; 2]> {
     }
 }
 
-/// A face of three or four different nodes.
+/// A face of three or four different nodes, begun with that of least number.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Face {
     Triangle([u32; 3]),
-    /// Begun with its node of least number.
     Quadrangle([u32; 4]),
 }
 
@@ -122,15 +121,34 @@ impl Face {
                 count += 1;
             }
         }
-        let [a, b, c, d] = different;
-        match count {
-            3 => Some(Self::Triangle([a, b, c])),
-            4 if a != c && b != d => {
-                let least = (0..4).min_by_key(|&place| different[place]).unwrap_or(0);
-                different.rotate_left(least);
-                Some(Self::Quadrangle(different))
-            }
-            _ => None,
+        if count < 3 {
+            return None;
+        }
+        let least = (0..count).min_by_key(|&place| different[place]).unwrap_or(0);
+        different[..count].rotate_left(least);
+        match different {
+            [a, b, c, _] if count == 3 => Some(Self::Triangle([a, b, c])),
+            // Folded onto itself.
+            [a, b, c, d] if a == c || b == d => None,
+            corners => Some(Self::Quadrangle(corners)),
+        }
+    }
+
+    /// The same for every face of the same corners.
+    pub(super) fn key(self) -> [u32; 4] {
+        let mut key = match self {
+            Self::Triangle([a, b, c]) => [a, b, c, u32::MAX],
+            Self::Quadrangle(corners) => corners,
+        };
+        key.sort_unstable();
+        key
+    }
+
+    /// Whether the node behind that of least number has a greater one than the node before: seen from the other side it
+    /// is the other way.
+    pub(super) fn is_descending(self) -> bool {
+        match self {
+            Self::Triangle([_, after, before]) | Self::Quadrangle([_, after, _, before]) => after > before,
         }
     }
 
@@ -256,6 +274,7 @@ mod tests {
     fn faces_without_area_are_none() {
         assert_eq!(Face::of(&[1, 2, 3, 3]), Some(Face::Triangle([1, 2, 3])));
         assert_eq!(Face::of(&[3, 1, 2, 3]), Some(Face::Triangle([1, 2, 3])));
+        assert!(!Face::Triangle([1, 2, 3]).is_descending() && Face::Triangle([1, 3, 2]).is_descending());
         assert_eq!(Face::of(&[4, 1, 2, 3]), Some(Face::Quadrangle([1, 2, 3, 4])));
         for corners in [&[1, 1, 2, 2][..], &[1, 2, 1, 3], &[1, 2, 3, 2], &[1, 2, 1], &[1, 1, 1]] {
             assert_eq!(Face::of(corners), None, "{corners:?}");

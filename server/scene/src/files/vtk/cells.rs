@@ -43,7 +43,12 @@ pub(in crate::files) struct CellTable {
 
 impl CellTable {
     /// Adds the cells to `builder`, of whose nodes `own` are theirs; `tags` has a group for each, if any.
-    pub(in crate::files) fn build(&self, builder: &mut Builder, own: &Range<u32>, tags: Option<&[i64]>) -> Result<(), Problem> {
+    pub(in crate::files) fn build(
+        &self,
+        builder: &mut Builder,
+        own: &Range<u32>,
+        tags: Option<&[i64]>,
+    ) -> Result<(), Problem> {
         let cells = self.types.len();
         let differ = |what: String| Problem::Inconsistent { what };
         if self.offsets.len() != cells + 1 {
@@ -99,7 +104,7 @@ impl CellTable {
         };
         let fits = match (kind.shape, number) {
             (Shape::Other, _) | (_, POLYGON) => true,
-            (_, 1 | 5 | 8..=14) => nodes.len() == kind.corners,
+            (_, 1 | 3 | 5 | 8..=14) => nodes.len() == kind.corners,
             _ => nodes.len() > kind.corners,
         };
         if !fits {

@@ -117,7 +117,8 @@ impl<'a> Document<'a> {
                 continue;
             }
             if let Some(file) = included.attribute(&["href"]).filter(|file| !file.is_empty()) {
-                let what = format!("a part of the mesh is to be included from another file, `{}`", shown(file.as_bytes()));
+                let what =
+                    format!("a part of the mesh is to be included from another file, `{}`", shown(file.as_bytes()));
                 let instead = "write the mesh into one XDMF file".to_string();
                 return Err(self.fail(child, Problem::Unsupported { what, instead }));
             }
@@ -246,7 +247,8 @@ impl<'p> Step<'p> {
             conditions.push(Condition::parse(behind[..close].trim())?);
             rest = behind[close + 1..].trim();
         }
-        (rest.is_empty() && !name.is_empty() && !name.contains(['(', ':', '.', '@'])).then_some(Self { name, conditions })
+        (rest.is_empty() && !name.is_empty() && !name.contains(['(', ':', '.', '@']))
+            .then_some(Self { name, conditions })
     }
 }
 
@@ -278,12 +280,16 @@ mod tests {
         let document = Document::parse(Path::new("a.xdmf"), TEXT.as_bytes()).unwrap();
         let names = |path: &str| -> Vec<String> {
             let found = document.find(0, path).unwrap();
-            let named = |index: usize| document.element(index).attribute(&["Name"]).unwrap_or(&document.element(index).name);
+            let named =
+                |index: usize| document.element(index).attribute(&["Name"]).unwrap_or(&document.element(index).name);
             found.into_iter().map(|index| named(index).to_owned()).collect()
         };
         assert_eq!(names("/Xdmf/Domain/Grid"), ["a/b", "c"]);
         assert_eq!(names("/Xdmf/Domain/Grid[2]"), ["c"]);
-        assert_eq!(names("/Xdmf/Domain/Grid[@GridType='Uniform'][1]/*[self::Topology or self::Geometry]"), ["Topology", "Geometry"]);
+        assert_eq!(
+            names("/Xdmf/Domain/Grid[@GridType='Uniform'][1]/*[self::Topology or self::Geometry]"),
+            ["Topology", "Geometry"]
+        );
         assert_eq!(names("//Grid[@Name=\"a/b\"]/*[3]"), ["Time"]);
         assert_eq!(names("//Grid[@GridType='Uniform']"), ["a/b", "d"]);
         assert_eq!(names("/Xdmf//Geometry"), ["Geometry", "Geometry"]);

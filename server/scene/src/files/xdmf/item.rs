@@ -125,11 +125,12 @@ fn raw<T>(
     let wrong = |wanted: &str, found: &str| {
         document.fail(item, Problem::Expected { wanted: wanted.to_string(), found: shown(found.as_bytes()) })
     };
-    let big_endian = match element.attribute(&["Endian"]).unwrap_or("Native").to_ascii_lowercase().as_str() {
+    let endian = element.attribute(&["Endian"]).unwrap_or("Native");
+    let big_endian = match endian.to_ascii_lowercase().as_str() {
         "little" => false,
         "big" => true,
         "native" => cfg!(target_endian = "big"),
-        other => return Err(wrong("Little, Big or Native as Endian", other)),
+        _ => return Err(wrong("Little, Big or Native as Endian", endian)),
     };
     if let Some(by) = element.attribute(&["Compression"]).filter(|by| !by.eq_ignore_ascii_case("raw")) {
         let what = format!("data compressed by {} are not read", shown(by.as_bytes()));

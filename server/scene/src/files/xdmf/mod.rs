@@ -69,7 +69,8 @@ impl Reader<'_> {
         for grid in all {
             let own = self.document.element(grid);
             let kind = own.attribute(&["GridType"]).unwrap_or("Uniform").to_ascii_lowercase();
-            let over_time = own.attribute(&["CollectionType"]).is_some_and(|kind| kind.eq_ignore_ascii_case("temporal"));
+            let over_time =
+                own.attribute(&["CollectionType"]).is_some_and(|kind| kind.eq_ignore_ascii_case("temporal"));
             match kind.as_str() {
                 "uniform" => self.grids.push(grid),
                 "collection" if over_time => self.first_moment(grid, depth)?,

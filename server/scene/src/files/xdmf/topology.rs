@@ -63,7 +63,8 @@ pub(super) fn read(document: &Document, topology: usize) -> Result<CellTable, Fi
     let known = own.is_some() || fixed.is_some() || lower == "mixed";
     let Some(data) = data.filter(|_| known && element.attribute(&["Order"]).is_none()) else {
         let what = format!("a Topology of type `{}` is not read", shown(name.as_bytes()));
-        let what = if known { format!("{what} without a list of its nodes, or with an Order of its own") } else { what };
+        let what =
+            if known { format!("{what} without a list of its nodes, or with an Order of its own") } else { what };
         let instead = "write an unstructured mesh of tetrahedra, or of hexahedra, wedges and pyramids".to_string();
         return Err(document.fail(topology, Problem::Unsupported { what, instead }));
     };
