@@ -467,6 +467,7 @@ fn collapsed_hexahedra_give_what_is_left_of_them() {
     let mesh = read("cube.msh", whole.msh22());
     is_the_unit_cube(&mesh, "with a flat one");
     assert_eq!(mesh.warnings, ["left out, for their corners fall together and leave no volume: 1 hexahedron"]);
+    assert_eq!(mesh.notes, ["1 hexahedron was split into 6 tetrahedra"]);
 }
 
 fn refused(mesh: &Mesh) -> FileError {

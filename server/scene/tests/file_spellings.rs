@@ -395,3 +395,19 @@ fn lines_and_points_of_the_geometry_are_noted() {
     assert_eq!(file.notes, ["1 line and 1 point of the geometry were left out", centre]);
     assert_eq!((file.mesh, file.tet_group), (ordinary.mesh, ordinary.tet_group));
 }
+
+/// A line among the cells refused a VTK file, for it has no more nodes than its two ends.
+#[test]
+fn lines_among_the_cells_of_vtk() {
+    let ordinary = volume("a.vtk", VTK51);
+    let text = VTK51
+        .replace("CELLS 2 4", "CELLS 3 6")
+        .replace("vtktypeint64\n0 4\n", "vtktypeint64\n0 4 6\n")
+        .replace("0 1 2 3\nCELL_TYPES 1\n10\n", "0 1 2 3 0 1\nCELL_TYPES 2\n10 3\n");
+    let file = volume("a.vtk", text);
+    assert_eq!(
+        (file.warnings.len(), file.notes.as_slice()),
+        (0, &["1 line of the geometry was left out".to_string()][..])
+    );
+    assert_eq!(VolumeFile { of_geometry: vec![], ..quiet(file) }, ordinary);
+}

@@ -45,6 +45,16 @@ pub(super) struct Split {
 /// How many of each kind.
 type Counts = BTreeMap<Solid, usize>;
 
+/// What is told of them.
+#[derive(Debug, Default)]
+struct Tally {
+    split: Counts,
+    turned: Counts,
+    bent: Counts,
+    /// Their corners leave no volume.
+    empty: Counts,
+}
+
 impl Solids {
     /// Adds one over its corners, as many as it has; one that is there already gets the further groups.
     pub(super) fn add(&mut self, solid: Solid, corners: &[u32], tags: &[i64]) {
@@ -72,7 +82,9 @@ impl Solids {
     /// `8 hexahedra`, for every kind.
     pub(super) fn counted(&self) -> Vec<String> {
         let mut counts = Counts::new();
-        self.members.iter().for_each(|member| *counts.entry(member.solid).or_default() += 1);
+        for member in &self.members {
+            next(&mut counts, member.solid);
+        }
         listed(&counts)
     }
 
@@ -84,32 +96,31 @@ impl Solids {
     /// corners as its neighbours do, and lies on their side of the faces between them.
     pub(super) fn split(&self, positions: &mut Vec<DVec3>) -> Result<Split, Problem> {
         let mut split = Split::default();
-        let [mut counts, mut turned, mut bent, mut empty] =
-            [Counts::new(), Counts::new(), Counts::new(), Counts::new()];
+        let (mut numbers, mut tally) = (Counts::new(), Tally::default());
         let mut bad: BTreeSet<(Solid, usize)> = BTreeSet::new();
         let mut faces: HashMap<[u32; 4], FaceUse> = HashMap::new();
         for Member { solid, nodes, tags } in &self.members {
-            let (solid, count) = (*solid, counts.entry(*solid).or_default());
-            let number = *count;
-            *count += 1;
+            let solid = *solid;
+            let number = next(&mut numbers, solid);
             let mut tets = solid.tets(nodes);
             if tets.is_empty() {
-                *empty.entry(solid).or_default() += 1;
+                next(&mut tally.empty, solid);
                 continue;
             }
+            next(&mut tally.split, solid);
             let mut side = Side::of(&tets, positions);
             if side == Side::Mixed {
                 let middle = positions.len() as u32;
                 positions.push(middle_of(&nodes[..solid.corners()], positions));
                 tets = solid.tets_around(nodes, middle);
                 side = Side::of(&tets, positions);
-                *bent.entry(solid).or_default() += 1;
+                next(&mut tally.bent, solid);
             }
             match side {
                 Side::Upright => {}
                 Side::Inverted => {
                     tets.iter_mut().for_each(|tet| tet.swap(2, 3));
-                    *turned.entry(solid).or_default() += 1;
+                    next(&mut tally.turned, solid);
                 }
                 Side::Mixed => drop(bad.insert((solid, number))),
             }
@@ -128,7 +139,7 @@ impl Solids {
             return Err(self.inverted(solid, &bad, positions));
         }
         split.open_faces = faces.into_values().filter_map(FaceUse::open_quadrangle).collect();
-        split.tell(&counts, &turned, &bent, &empty);
+        split.tell(&tally);
         Ok(split)
     }
 
@@ -176,11 +187,11 @@ impl FaceUse {
 }
 
 impl Split {
-    fn tell(&mut self, counts: &Counts, turned: &Counts, bent: &Counts, empty: &Counts) {
-        if !counts.is_empty() {
-            let verb = if counts.values().sum::<usize>() == 1 { "was" } else { "were" };
+    fn tell(&mut self, Tally { split, turned, bent, empty }: &Tally) {
+        if !split.is_empty() {
+            let verb = if split.values().sum::<usize>() == 1 { "was" } else { "were" };
             let tets = counted_as(self.tets.len(), "tetrahedra");
-            self.told = Some(format!("{} {verb} split into {tets}", joined(&listed(counts))));
+            self.told = Some(format!("{} {verb} split into {tets}", joined(&listed(split))));
         }
         if !turned.is_empty() {
             let those = joined(&listed(turned));
@@ -263,6 +274,13 @@ fn middle_of(nodes: &[u32], positions: &[DVec3]) -> DVec3 {
 fn sorted(mut corners: [u32; 3]) -> [u32; 3] {
     corners.sort_unstable();
     corners
+}
+
+/// Counts one more of a kind: how many there were before.
+fn next(counts: &mut Counts, solid: Solid) -> usize {
+    let count = counts.entry(solid).or_default();
+    *count += 1;
+    *count - 1
 }
 
 fn listed(counts: &Counts) -> Vec<String> {

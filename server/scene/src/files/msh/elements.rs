@@ -6,6 +6,7 @@ const LINES: Kind = Kind { shape: Shape::Curve, name: "lines", corners: 2 };
 const TRIANGLES: Kind = Kind { shape: Shape::Triangle, name: "triangles", corners: 3 };
 const QUADRANGLES: Kind = Kind { shape: Shape::Polygon, name: "quadrangles", corners: 4 };
 const TETRAHEDRA: Kind = Kind { shape: Shape::Tet, name: "tetrahedra", corners: 4 };
+const TRIHEDRA: Kind = Kind { shape: Shape::Other, name: "trihedra", corners: 4 };
 const POINTS: Kind = Kind { shape: Shape::Point, name: "points", corners: 1 };
 
 /// The element type by Gmsh's number, and its number of nodes (first, second and higher orders).
@@ -42,8 +43,14 @@ pub(super) fn kind(number: i64) -> Option<(Kind, usize)> {
         29 => (TETRAHEDRA, 20),
         30 => (TETRAHEDRA, 35),
         31 => (TETRAHEDRA, 56),
+        90 => (prisms, 40),
+        91 => (prisms, 75),
         92 => (hexahedra, 64),
         93 => (hexahedra, 125),
+        118 => (pyramids, 30),
+        119 => (pyramids, 55),
+        // Flat: between a quadrangle and two triangles.
+        140 => (TRIHEDRA, 4),
         _ => return None,
     })
 }

@@ -1,7 +1,7 @@
 //! The numbers of a `DataItem`: in its text, or in a raw file beside.
 use super::document::Document;
 use crate::files::cursor::{Number, Scalar, shown};
-use crate::files::error::{FileError, Place, Problem};
+use crate::files::error::{FileError, Problem};
 use std::fs::File;
 use std::io::{Read, Seek, SeekFrom};
 
@@ -151,22 +151,21 @@ fn raw<T>(
 /// So many bytes of the file beside; no more memory is set aside than it has.
 fn bytes(document: &Document, item: usize, start: u64, length: Option<usize>) -> Result<Vec<u8>, FileError> {
     let name = document.element(item).text.trim();
-    let path = document.path.with_file_name(name);
-    let io = |error| FileError::new(&path, Place::File, Problem::Io { action: "read", error });
-    let mut file = File::open(&path).map_err(io)?;
+    let wrong = |what: String| {
+        let what = format!("the file `{}`, which has its numbers, {what}", shown(name.as_bytes()));
+        let instead = "put the file that was written with this one beside it, or write both again".to_string();
+        document.fail(item, Problem::Unsupported { what, instead })
+    };
+    let io = |error| wrong(format!("cannot be read: {error}"));
+    let mut file = File::open(document.path.with_file_name(name)).map_err(io)?;
     let of_file = file.metadata().map_err(io)?;
     if !of_file.is_file() {
-        return Err(FileError::new(&path, Place::File, Problem::NotAFile));
+        return Err(wrong("is not a regular file".to_string()));
     }
     let end = length.and_then(|length| start.checked_add(length as u64)).filter(|&end| end <= of_file.len());
     let (Some(length), Some(_)) = (length, end) else {
         let needed = length.map_or("too many".to_string(), |length| length.to_string());
-        let what = format!(
-            "`{}` wants {needed} bytes from byte {start} on, but there are {} in the file",
-            shown(document.path.display().to_string().as_bytes()),
-            of_file.len()
-        );
-        return Err(FileError::new(&path, Place::File, Problem::Inconsistent { what }));
+        return Err(wrong(format!("has {} bytes; {needed} from byte {start} on are needed", of_file.len())));
     };
     let mut bytes = vec![0; length];
     file.seek(SeekFrom::Start(start)).map_err(io)?;

@@ -30,6 +30,7 @@ pub(super) fn read(path: &Path, data: &[u8]) -> Result<Builder, FileError> {
         document: &document,
         builder: Builder::default(),
         grids: Vec::new(),
+        met: 0,
         nodes_of: HashMap::new(),
         built: HashSet::new(),
     };
@@ -52,6 +53,8 @@ struct Reader<'a> {
     builder: Builder,
     /// Uniform grids: each has a mesh.
     grids: Vec<usize>,
+    /// How many grids of any kind were met on the way, those that are included again and again too.
+    met: usize,
     /// The nodes of a Geometry, which several grids may share.
     nodes_of: HashMap<usize, Range<u32>>,
     /// Topologies whose cells are there, with their Geometry.
@@ -62,7 +65,8 @@ impl Reader<'_> {
     /// Finds the uniform grids in an element, of a collection over time those of its first moment.
     fn grids_in(&mut self, element: usize, depth: usize) -> Result<(), FileError> {
         let all = self.children(element, "Grid")?;
-        if depth > DEEPEST || self.grids.len() + all.len() > MOST_GRIDS {
+        self.met += all.len();
+        if depth > DEEPEST || self.met > MOST_GRIDS {
             let what = "the grids include each other without end".to_string();
             return Err(self.document.fail(element, Problem::Inconsistent { what }));
         }
