@@ -1,5 +1,5 @@
-//! What Gmsh writes into a mesh by itself is no reason for a warning: names, points, lines, entities, partitions, ghosts,
-//! periodic nodes, parameters, fields. `palpated check --strict` fails on warnings alone.
+//! What Gmsh writes into a mesh by itself is no reason for a warning: names, points, lines, entities, partitions,
+//! ghosts, periodic nodes, parameters, fields. `palpated check --strict` fails on warnings alone.
 #![allow(clippy::unwrap_used)] // a test that cannot read its meshes has failed
 use palpate_scene::files::{GroupedMesh, UnusedNodes, parse_volume};
 use std::path::Path;

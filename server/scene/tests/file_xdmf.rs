@@ -190,7 +190,7 @@ fn mixed_topologies() {
             cells.split_ascii_whitespace().count()
         )
     };
-    // Hexahedron, pyramid on it, wedge beside it, tet; its sides as a triangle, a quadrilateral and a polygon; a point and a line.
+    // Hexahedron, pyramid on it, wedge beside it, tet; sides as triangle, quadrilateral and polygon; a point and a line.
     let cells =
         "9 0 1 2 3 4 5 6 7  7 4 5 6 7 8  8 1 9 2 5 10 6  6 6 5 10 8  4 0 3 7  5 0 1 5 4  3 5 0 1 2 3 0  1 1 8  2 2 0 1";
     let file = volume(&mixed(cells, 9)).into_tet_mesh(1.0, UnusedNodes::Refuse).unwrap();

@@ -64,8 +64,8 @@ impl Group {
 pub struct VolumeFile {
     /// Where it was read from.
     pub path: PathBuf,
-    /// Nodes in file order and in the file's unit, unscaled; unused ones included. Behind them the middles of solids that
-    /// were split around one.
+    /// Nodes in file order and in the file's unit, unscaled; unused ones included. Behind them the middles of solids
+    /// that were split around one.
     pub mesh_nodes: Vec<DVec3>,
     /// Nodes of every tet, as indices into `mesh_nodes`, in the file's orientation.
     pub tets: Vec<[u32; 4]>,
@@ -103,7 +103,8 @@ pub struct SurfaceFile {
     pub notes: Vec<String>,
 }
 
-/// Reads a mesh of tetrahedra, hexahedra, prisms and pyramids: Gmsh MSH, VTK legacy, VTU, XDMF, TetGen or MEDIT. The content decides, then the extension.
+/// Reads a mesh of tetrahedra, hexahedra, prisms and pyramids: Gmsh MSH, VTK legacy, VTU, XDMF, TetGen or MEDIT. The
+/// content decides, then the extension.
 ///
 /// # Errors
 /// A [`FileError`] with the place and what to do.

@@ -88,12 +88,12 @@ impl Solids {
         listed(&counts)
     }
 
-    /// Splits all. A solid that is bent so much that the rule does not give upright tetrahedra gets a node in its middle,
-    /// which `positions` receives.
+    /// Splits all. A solid that is bent so much that the rule does not give upright tetrahedra gets a node in its
+    /// middle, which `positions` receives.
     ///
     /// # Errors
-    /// [`Problem::InvertedSolids`]: even so a tetrahedron is inverted or flat, or a solid had to be turned that lists its
-    /// corners as its neighbours do, and lies on their side of the faces between them.
+    /// [`Problem::InvertedSolids`]: even so a tetrahedron is inverted or flat, or a solid had to be turned that lists
+    /// its corners as its neighbours do, and lies on their side of the faces between them.
     pub(super) fn split(&self, positions: &mut Vec<DVec3>) -> Result<Split, Problem> {
         let mut split = Split::default();
         let (mut numbers, mut tally) = (Counts::new(), Tally::default());
@@ -208,12 +208,12 @@ impl Split {
         }
     }
 
-    /// Warns of faces of four corners against which tetrahedra lie that are cut along the other diagonal. The tetrahedra
-    /// on both sides then share four nodes there, and no face.
+    /// Warns of faces of four corners against which tetrahedra lie that are cut along the other diagonal. The
+    /// tetrahedra on both sides then share four nodes there, and no face.
     pub(super) fn check_fit(&mut self, own: &[[u32; 4]], node_count: usize) {
         let mut on_open = vec![false; node_count];
         let mut other_way = HashSet::new();
-        // A face begins with the node from which it was cut to the third: the other two triangles have all but one of these.
+        // A face begins with the node from which it was cut to the third: of the other two triangles neither has both.
         for &[a, b, c, d] in &self.open_faces {
             [a, b, c, d].iter().for_each(|&node| on_open[node as usize] = true);
             other_way.extend([sorted([a, b, d]), sorted([b, c, d])]);
@@ -227,8 +227,8 @@ impl Split {
             .collect();
         if !misfits.is_empty() {
             self.warnings.push(format!(
-                "{} of tetrahedra, prisms or pyramids lie across the diagonal along which the face of four corners beside \
-                 them is cut: the body is open there. Put pyramids between, or mesh all of it with tetrahedra",
+                "{} of tetrahedra, prisms or pyramids lie across the diagonal along which the face of four corners \
+                 beside them is cut: the body is open there. Put pyramids between, or mesh all of it with tetrahedra",
                 counted_as(misfits.len(), "triangles")
             ));
         }

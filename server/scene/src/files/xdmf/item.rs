@@ -44,8 +44,9 @@ fn numbers<T>(
 }
 
 const CONVERT: &str = "write the numbers into the XML (Format=\"XML\"), or save the mesh as VTU";
-const WITHOUT_HDF5: &str = "put the numbers into the XML: a file of meshio's by `meshio ascii FILE.xdmf`, which rewrites it; from \
-     dolfinx by XDMFFile(…, encoding=XDMFFile.Encoding.ASCII); or save the mesh as VTU, from ParaView or by `meshio convert FILE.xdmf FILE.vtu`";
+const WITHOUT_HDF5: &str = "put the numbers into the XML: a file of meshio's by `meshio ascii FILE.xdmf`, which \
+     rewrites it; from dolfinx by XDMFFile(…, encoding=XDMFFile.Encoding.ASCII); or save the mesh as VTU, from ParaView \
+     or by `meshio convert FILE.xdmf FILE.vtu`";
 
 /// The product of the `Dimensions`.
 fn count(document: &Document, item: usize) -> Result<usize, FileError> {

@@ -174,8 +174,8 @@ impl Reader<'_> {
         Ok(nodes)
     }
 
-    /// The groups of the cells: of the array whose name tells groups. A grid over the nodes of an earlier one, as dolfinx
-    /// writes its tags, has them in its one array, whatever its name.
+    /// The groups of the cells: of the array whose name tells groups. A grid over the nodes of an earlier one, as
+    /// dolfinx writes its tags, has them in its one array, whatever its name.
     fn groups(&self, grid: usize, cells: &CellTable, shared: bool) -> Result<Option<Vec<i64>>, FileError> {
         let of_cells = |&attribute: &usize| {
             let own = self.document.element(attribute);
