@@ -8,23 +8,23 @@ const KINDS: [(usize, i64, i64, i64, &str); 4] =
 
 /// Nodes, and solids of any kind: the number of their corners tells which.
 #[derive(Debug, Clone, Default)]
-pub struct Mesh {
-    pub nodes: Vec<DVec3>,
-    pub solids: Vec<Vec<usize>>,
+pub(crate) struct Mesh {
+    pub(crate) nodes: Vec<DVec3>,
+    pub(crate) solids: Vec<Vec<usize>>,
     /// Groups, of all or of none.
-    pub tags: Vec<i64>,
-    pub quadrangles: Vec<[usize; 4]>,
+    pub(crate) tags: Vec<i64>,
+    pub(crate) quadrangles: Vec<[usize; 4]>,
 }
 
 /// Random numbers, the same on every machine (Marsaglia's xorshift).
-pub struct Random(u64);
+pub(crate) struct Random(u64);
 
 impl Random {
-    pub fn of(seed: u64) -> Self {
+    pub(crate) fn of(seed: u64) -> Self {
         Self(seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) | 1)
     }
 
-    pub fn below(&mut self, bound: usize) -> usize {
+    pub(crate) fn below(&mut self, bound: usize) -> usize {
         self.0 ^= self.0 << 13;
         self.0 ^= self.0 >> 7;
         self.0 ^= self.0 << 17;
@@ -34,7 +34,7 @@ impl Random {
 
 /// What a cube is made of.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Of {
+pub(crate) enum Of {
     Hexahedra,
     /// Two, cut along a diagonal that differs between neighbouring columns.
     Prisms,
@@ -45,7 +45,7 @@ pub enum Of {
 }
 
 /// The unit cube of n³ cubes, each of hexahedra, prisms or pyramids. Its side x = 0 has quadrangles.
-pub fn cube(n: usize, of: Of) -> Mesh {
+pub(crate) fn cube(n: usize, of: Of) -> Mesh {
     let index = |x: usize, y: usize, z: usize| x + (n + 1) * (y + (n + 1) * z);
     let mut mesh = Mesh::default();
     for place in 0..(n + 1).pow(3) {
@@ -93,7 +93,7 @@ pub fn cube(n: usize, of: Of) -> Mesh {
 
 impl Mesh {
     /// The same mesh with its nodes numbered, and its solids ordered, at random.
-    pub fn shuffled(&self, seed: u64) -> Self {
+    pub(crate) fn shuffled(&self, seed: u64) -> Self {
         let mut random = Random::of(seed);
         let mut new: Vec<usize> = (0..self.nodes.len()).collect();
         for place in (1..new.len()).rev() {
@@ -113,7 +113,7 @@ impl Mesh {
         mesh
     }
 
-    pub fn msh22(&self) -> String {
+    pub(crate) fn msh22(&self) -> String {
         let mut text = format!("$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Nodes\n{}\n", self.nodes.len());
         for (node, p) in self.nodes.iter().enumerate() {
             writeln!(text, "{} {} {} {}", node + 1, p.x, p.y, p.z).unwrap();
@@ -132,7 +132,7 @@ impl Mesh {
     }
 
     /// Blocks of one type and one entity, whose physical group is its number; 4.1 has unsigned counts of 8 bytes.
-    pub fn msh41(&self, binary: bool) -> Vec<u8> {
+    pub(crate) fn msh41(&self, binary: bool) -> Vec<u8> {
         let mut out = Output { binary, data: b"$MeshFormat\n4.1 ".to_vec() };
         out.data.extend(if binary { b"1 8\n\x01\0\0\0\n" } else { &b"0 8\n"[..] });
         out.data.extend(b"$EndMeshFormat\n$Entities\n");
@@ -168,7 +168,7 @@ impl Mesh {
         out.data
     }
 
-    pub fn vtk(&self) -> String {
+    pub(crate) fn vtk(&self) -> String {
         let mut text = format!(
             "# vtk DataFile Version 3.0\nby hand\nASCII\nDATASET UNSTRUCTURED_GRID\nPOINTS {} double\n",
             self.nodes.len()
@@ -184,7 +184,7 @@ impl Mesh {
         text
     }
 
-    pub fn vtu(&self) -> String {
+    pub(crate) fn vtu(&self) -> String {
         let array = |kind: &str, name: &str, components: usize, values: String| {
             format!(
                 "<DataArray type='{kind}' Name='{name}' NumberOfComponents='{components}' format='ascii'>{values}</DataArray>"
@@ -207,7 +207,7 @@ impl Mesh {
         )
     }
 
-    pub fn medit(&self) -> String {
+    pub(crate) fn medit(&self) -> String {
         let mut text = format!("MeshVersionFormatted 2\nDimension 3\nVertices\n{}\n", self.nodes.len());
         self.nodes.iter().for_each(|p| writeln!(text, "{} {} {} 0", p.x, p.y, p.z).unwrap());
         for (corners, .., word) in KINDS {
@@ -223,7 +223,7 @@ impl Mesh {
         text + &format!("Quadrilaterals\n{}\n{quadrangles}End\n", self.quadrangles.len())
     }
 
-    pub fn xdmf(&self) -> String {
+    pub(crate) fn xdmf(&self) -> String {
         let cells: Vec<i64> = self
             .solids
             .iter()
