@@ -36,17 +36,23 @@ impl Msh {
     }
 
     fn ints(&mut self, values: &[i32]) -> &mut Self {
-        values.iter().for_each(|value| self.number(&value.to_le_bytes(), value));
+        for value in values {
+            self.number(&value.to_le_bytes(), value);
+        }
         self.end_of_line()
     }
 
     fn counts(&mut self, values: &[u64]) -> &mut Self {
-        values.iter().for_each(|value| self.number(&value.to_le_bytes(), value));
+        for value in values {
+            self.number(&value.to_le_bytes(), value);
+        }
         self.end_of_line()
     }
 
     fn reals(&mut self, values: &[f64]) -> &mut Self {
-        values.iter().for_each(|value| self.number(&value.to_le_bytes(), value));
+        for value in values {
+            self.number(&value.to_le_bytes(), value);
+        }
         self.end_of_line()
     }
 
@@ -198,7 +204,9 @@ fn msh4(binary: bool, parametric: bool, partitioned: bool) -> Msh {
         }
         msh.counts(&[2, 2, 2, 1]);
         for (dimension, tags) in [(0, &[1, 9][..]), (1, &[1, 9]), (2, &[1, 9]), (3, &[1])] {
-            tags.iter().for_each(|&tag| entity(msh, partitioned, dimension, tag));
+            for &tag in tags {
+                entity(msh, partitioned, dimension, tag);
+            }
         }
     };
     msh.section("Entities", "", |msh| entities(msh, false));
@@ -223,9 +231,9 @@ fn msh4(binary: bool, parametric: bool, partitioned: bool) -> Msh {
         msh.counts(&[9, 9, 1, 9]);
         for (place, &(kind, dimension, entity, nodes)) in ELEMENTS.iter().enumerate() {
             msh.ints(&[dimension, entity + shift, kind]).counts(&[1]).counts(&[place as u64 + 1]);
-            nodes.iter().for_each(|&node| {
+            for &node in nodes {
                 msh.counts(&[node as u64]);
-            });
+            }
         }
     });
     msh.section("Periodic", "", |msh| {

@@ -214,7 +214,7 @@ fn inverted_and_flat_hexahedra_are_named() {
     assert!(first.contains(&13), "{error}");
     assert!(error.to_string().starts_with("cube.msh: "), "{error}");
     assert!(
-        error.to_string().contains("of 27 hexahedra are flat or turned inside out at a corner (numbers "),
+        error.to_string().contains("1 of 27 hexahedra is flat or turned inside out at a corner (numbers 13, "),
         "{error}"
     );
     let mut flat = cube(2, Of::Hexahedra);

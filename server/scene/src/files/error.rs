@@ -156,9 +156,9 @@ pub enum Problem {
     },
     /// Hexahedra, prisms or pyramids that cannot be split into upright tetrahedra.
     #[error(
-        "{count} of {total} {solids} are flat or turned inside out at a corner (numbers {}, counting the {solids} from 0; \
+        "{count} of {total} {solids} {} flat or turned inside out at a corner (numbers {}, counting the {solids} from 0; \
          the first is around ({}, {}, {}) in the file's unit)",
-        list(first, *count), short(place.x), short(place.y), short(place.z)
+        if *count == 1 { "is" } else { "are" }, list(first, *count), short(place.x), short(place.y), short(place.z)
     )]
     InvertedSolids {
         /// What they are, plural.

@@ -119,7 +119,9 @@ impl Solids {
             match side {
                 Side::Upright => {}
                 Side::Inverted => {
-                    tets.iter_mut().for_each(|tet| tet.swap(2, 3));
+                    for tet in &mut tets {
+                        tet.swap(2, 3);
+                    }
                     next(&mut tally.turned, solid);
                 }
                 Side::Mixed => drop(bad.insert((solid, number))),
@@ -215,7 +217,9 @@ impl Split {
         let mut other_way = HashSet::new();
         // A face begins with the node from which it was cut to the third: of the other two triangles neither has both.
         for &[a, b, c, d] in &self.open_faces {
-            [a, b, c, d].iter().for_each(|&node| on_open[node as usize] = true);
+            for node in [a, b, c, d] {
+                on_open[node as usize] = true;
+            }
             other_way.extend([sorted([a, b, d]), sorted([b, c, d])]);
         }
         let all = own.iter().copied().chain(self.tets.iter().map(|(tet, _)| *tet));

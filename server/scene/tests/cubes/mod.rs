@@ -121,7 +121,9 @@ impl Mesh {
         writeln!(text, "$EndNodes\n$Elements\n{}", self.solids.len() + self.quadrangles.len()).unwrap();
         for (element, solid) in self.solids.iter().enumerate() {
             write!(text, "{} {} 2 {} 1", element + 1, kind(solid.len()).1, self.tags[element]).unwrap();
-            solid.iter().for_each(|node| write!(text, " {}", node + 1).unwrap());
+            for node in solid {
+                write!(text, " {}", node + 1).unwrap();
+            }
             text.push('\n');
         }
         for (element, [a, b, c, d]) in self.quadrangles.iter().enumerate() {
@@ -149,7 +151,9 @@ impl Mesh {
         out.ints(&[3, 1, 0]);
         out.counts(&[self.nodes.len()]);
         (1..=self.nodes.len()).for_each(|tag| out.counts(&[tag]));
-        self.nodes.iter().for_each(|p| out.reals(&p.to_array()));
+        for p in &self.nodes {
+            out.reals(&p.to_array());
+        }
         out.data.extend(b"$EndNodes\n$Elements\n");
         // A block for each element.
         let all = self.solids.len() + self.quadrangles.len();
@@ -173,12 +177,18 @@ impl Mesh {
             "# vtk DataFile Version 3.0\nby hand\nASCII\nDATASET UNSTRUCTURED_GRID\nPOINTS {} double\n",
             self.nodes.len()
         );
-        self.nodes.iter().for_each(|p| writeln!(text, "{} {} {}", p.x, p.y, p.z).unwrap());
+        for p in &self.nodes {
+            writeln!(text, "{} {} {}", p.x, p.y, p.z).unwrap();
+        }
         let numbers: usize = self.solids.iter().map(|solid| solid.len() + 1).sum();
         writeln!(text, "CELLS {} {numbers}", self.solids.len()).unwrap();
-        self.solids.iter().for_each(|solid| writeln!(text, "{} {}", solid.len(), words(solid)).unwrap());
+        for solid in &self.solids {
+            writeln!(text, "{} {}", solid.len(), words(solid)).unwrap();
+        }
         writeln!(text, "CELL_TYPES {}", self.solids.len()).unwrap();
-        self.solids.iter().for_each(|solid| writeln!(text, "{}", kind(solid.len()).2).unwrap());
+        for solid in &self.solids {
+            writeln!(text, "{}", kind(solid.len()).2).unwrap();
+        }
         let n = self.solids.len();
         writeln!(text, "CELL_DATA {n}\nSCALARS region int\nLOOKUP_TABLE default\n{}", words(&self.tags)).unwrap();
         text
@@ -209,7 +219,9 @@ impl Mesh {
 
     pub(crate) fn medit(&self) -> String {
         let mut text = format!("MeshVersionFormatted 2\nDimension 3\nVertices\n{}\n", self.nodes.len());
-        self.nodes.iter().for_each(|p| writeln!(text, "{} {} {} 0", p.x, p.y, p.z).unwrap());
+        for p in &self.nodes {
+            writeln!(text, "{} {} {} 0", p.x, p.y, p.z).unwrap();
+        }
         for (corners, .., word) in KINDS {
             let of_kind: Vec<usize> = (0..self.solids.len()).filter(|&s| self.solids[s].len() == corners).collect();
             writeln!(text, "{word} {}", of_kind.len()).unwrap();
@@ -246,7 +258,7 @@ impl Mesh {
     }
 
     fn coordinates(&self) -> String {
-        words(&self.nodes.iter().flat_map(|p| p.to_array()).collect::<Vec<_>>())
+        words(&self.nodes.iter().flat_map(DVec3::to_array).collect::<Vec<_>>())
     }
 }
 
@@ -257,15 +269,21 @@ struct Output {
 
 impl Output {
     fn counts(&mut self, values: &[usize]) {
-        values.iter().for_each(|&value| self.number((value as u64).to_le_bytes().as_slice(), &value));
+        for &value in values {
+            self.number((value as u64).to_le_bytes().as_slice(), &value);
+        }
     }
 
     fn ints(&mut self, values: &[i64]) {
-        values.iter().for_each(|&value| self.number((value as i32).to_le_bytes().as_slice(), &value));
+        for &value in values {
+            self.number((value as i32).to_le_bytes().as_slice(), &value);
+        }
     }
 
     fn reals(&mut self, values: &[f64]) {
-        values.iter().for_each(|&value| self.number(value.to_le_bytes().as_slice(), &value));
+        for &value in values {
+            self.number(value.to_le_bytes().as_slice(), &value);
+        }
     }
 
     fn number(&mut self, bytes: &[u8], value: &impl std::fmt::Display) {

@@ -207,13 +207,15 @@ impl Element {
 fn steps_of(path: &str) -> Vec<&str> {
     let (mut steps, mut start, mut depth, mut quote) = (Vec::new(), 0, 0usize, None);
     for (at, character) in path.char_indices() {
-        match (character, quote) {
-            (_, Some(open)) if character == open => quote = None,
-            (_, Some(_)) => {}
-            ('"' | '\'', None) => quote = Some(character),
-            ('[', None) => depth += 1,
-            (']', None) => depth = depth.saturating_sub(1),
-            ('/', None) if depth == 0 => {
+        if let Some(open) = quote {
+            quote = (character != open).then_some(open);
+            continue;
+        }
+        match character {
+            '"' | '\'' => quote = Some(character),
+            '[' => depth += 1,
+            ']' => depth = depth.saturating_sub(1),
+            '/' if depth == 0 => {
                 steps.push(&path[start..at]);
                 start = at + 1;
             }

@@ -95,7 +95,9 @@ pub(super) fn read(document: &Document, topology: usize) -> Result<CellTable, Fi
         return Err(inconsistent(document, topology, &what));
     }
     let base: i64 = element.attribute(&["BaseOffset"]).and_then(|base| base.trim().parse().ok()).unwrap_or(0);
-    nodes.iter_mut().for_each(|node| *node = node.saturating_sub(base));
+    for node in &mut nodes {
+        *node = node.saturating_sub(base);
+    }
     table.connectivity = nodes;
     Ok(table)
 }
