@@ -53,6 +53,11 @@ pub trait ServedBody {
         None
     }
 
+    /// Whether a scene may give it any law of material.
+    fn takes_any_law(&self) -> bool {
+        true
+    }
+
     /// Lines that `palpated check` prints of what is particular to the kind.
     fn description(&self) -> Vec<String> {
         Vec::new()

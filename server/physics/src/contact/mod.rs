@@ -7,6 +7,7 @@ mod axis;
 mod axis_samples;
 pub(crate) mod broad;
 mod depth;
+mod following;
 mod foundation;
 mod friction;
 mod inside;
@@ -31,6 +32,7 @@ mod turning;
 
 pub(crate) use axis_samples::Near;
 pub(crate) use broad::Skin;
+pub use following::{CoupledFollowing, Following};
 pub use inside::is_inside;
 pub use local_torque::LocalTorqueModel;
 pub use moduli::SurfaceModuli;
