@@ -202,7 +202,7 @@ fn to_json(status: &StatusResponse) -> serde_json::Value {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use palpate_proto::v1::{NamedVector, StageTime};
+    use palpate_proto::v1::{NamedVector, SessionInfo, StageTime};
 
     fn status() -> StatusResponse {
         let cost = |p50, max| Some(Percentiles { p50, p99: p50, p999: p50, max, count: 12_345 });
@@ -245,6 +245,27 @@ mod tests {
         let ledger = "ledger: kinetic 1.000e0, elastic 2.000e0, gravitational 3.000e0, external work 4.000e0, dissipated 5.000e0 J";
         assert!(text.contains(ledger), "{text}");
         assert!(text.lines().any(|line| line.ends_with("J: 5.000e-1")), "{text}");
+    }
+
+    #[test]
+    fn particles_are_told_with_what_they_are_awake_for() {
+        let session = Some(SessionInfo { particle_count: 500, most_active_particles: 200, ..Default::default() });
+        let of = |awake_for| StatusResponse { session: session.clone(), active_particles: 98, awake_for, ..status() };
+        let counts = AwakeFor { tools: 60, loads: 0, injected_forces: 30, nothing: 8 };
+        let text = to_text(&of(Some(counts)));
+        let told = "500, 98 of at most 200 awake: 60 for tools, 30 for injected forces, 8 for nothing any more";
+        assert!(text.contains(told), "{text}");
+        assert_eq!(to_json(&of(Some(counts)))["active_for"]["injected_forces"], 30);
+        // Daemons before this, and bodies of other kinds, do not tell.
+        assert!(to_text(&of(None)).contains("98 of at most 200 awake\n"));
+        assert!(to_json(&of(None))["active_for"].is_null());
+    }
+
+    #[test]
+    fn what_is_wrong_with_the_body_comes_first() {
+        let wrong = StatusResponse { state_warnings: vec!["elements are inside out".into()], ..status() };
+        assert!(to_text(&wrong).starts_with("WARNING: elements are inside out\n\n"));
+        assert_eq!(to_json(&wrong)["state_warnings"][0], "elements are inside out");
     }
 
     #[test]

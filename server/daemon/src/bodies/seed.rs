@@ -31,7 +31,7 @@ impl ServedBody for SeedBody {
         false
     }
 
-    fn description(&self) -> Vec<String> {
+    fn description(&self, _: &Model) -> Vec<String> {
         let seed = self.model();
         let parameters = seed.parameters();
         let mut lines = vec![

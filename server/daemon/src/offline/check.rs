@@ -43,9 +43,9 @@ pub fn run(args: &CheckArgs) -> miette::Result<ExitCode> {
     let model = load::build(&scene)?;
     print_body(&scene);
     let body = served(&model);
-    body.description().iter().for_each(|line| println!("{line}"));
+    body.description(&model).iter().for_each(|line| println!("{line}"));
     print_contents(&scene, &model);
-    let warnings = [scene.warnings.clone(), body.warnings(), check_laws::warnings(&scene, &model)].concat();
+    let warnings = [scene.warnings.clone(), body.warnings(&model), check_laws::warnings(&scene, &model)].concat();
     for warning in &warnings {
         println!("warning: {warning}");
     }
