@@ -69,7 +69,7 @@ fn check_tells_how_tools_follow_their_devices() {
 #[test]
 fn how_much_too_stiffly_tets_answer_is_told_by_their_size_and_their_compressibility() {
     let coarse = run("check", &block(4, 0.45, NEO_HOOKEAN, RIGID), &[]).shown;
-    let words = "warning: pressed by the tool \"ball\", 10 mm in radius, the body answers about 150 % too stiffly, mostly since linear tets lock";
+    let words = "warning: pressed by the tool \"ball\", 10 mm in radius, half of that deep, the body answers about 150 % too stiffly, mostly since linear tets lock";
     assert!(coarse.contains(words), "{coarse}");
     for command in ["simulate", "static"] {
         let ended = run(command, &block(4, 0.45, NEO_HOOKEAN, RIGID), &["--json"]);
@@ -79,7 +79,11 @@ fn how_much_too_stiffly_tets_answer_is_told_by_their_size_and_their_compressibil
     // Finer, it is a limit that is told; the smaller, the finer, and the more compressible.
     let finer = run("check", &block(16, 0.45, NEO_HOOKEAN, RIGID), &["--strict"]);
     assert_eq!(finer.code, Some(0), "{}", finer.shown);
-    assert!(finer.shown.contains("limit      pressed by") && finer.shown.contains("about 30 % too stiffly"), "{}", finer.shown);
+    assert!(
+        finer.shown.contains("limit      pressed by") && finer.shown.contains("about 30 % too stiffly"),
+        "{}",
+        finer.shown
+    );
     let compressible = run("check", &block(8, 0.3, NEO_HOOKEAN, RIGID), &["--strict"]).shown;
     assert!(compressible.contains("mostly since so few tets are under the tool"), "{compressible}");
     let stiffer = run("check", &block(8, 0.499, NEO_HOOKEAN, RIGID), &[]).shown;
@@ -106,13 +110,16 @@ fn squeezed(by_mm: f64, law: &str) -> String {
 #[test]
 fn check_tells_until_where_stvk_holds_and_what_to_take_instead() {
     let shown = run("check", &block(4, 0.45, "stvk", ""), &[]).shown;
-    for part in ["holds until it is pressed to 58 % of its length", "below 90 % already", "law = \"stable-neo-hookean\""] {
+    for part in
+        ["holds until it is pressed to 58 % of its length", "below 90 % already", "law = \"stable-neo-hookean\""]
+    {
         assert!(shown.contains(part), "{part}: {shown}");
     }
     assert!(!run("check", &block(4, 0.2, "stvk", ""), &[]).shown.contains("sideways"));
     assert!(!run("check", &block(4, 0.45, NEO_HOOKEAN, ""), &[]).shown.contains("58 %"));
     // The papers' hybrid has no other: it is told, and is no warning.
-    let seed = Command::new(env!("CARGO_BIN_EXE_palpated")).args(["check", "seed-hybrid", "--strict"]).output().unwrap();
+    let seed =
+        Command::new(env!("CARGO_BIN_EXE_palpated")).args(["check", "seed-hybrid", "--strict"]).output().unwrap();
     assert!(seed.status.success() && String::from_utf8(seed.stdout).unwrap().contains("58 % of its length"));
 }
 
@@ -172,7 +179,10 @@ fn particles_outside_the_coarse_tets_are_told_with_their_place_by_every_command(
             assert!(ended.said.contains(sign) && ended.said.contains(words), "{command}: {}", ended.said);
             let particles = &json(&ended)["body"]["particles"];
             let outside = particles["outside"].as_u64().unwrap();
-            assert!(outside > 0 && ended.said.contains(&format!("{outside} of {} particles, between (", particles["count"])));
+            assert!(
+                outside > 0
+                    && ended.said.contains(&format!("{outside} of {} particles, between (", particles["count"]))
+            );
         }
     }
     let none = run("check", &few.replace("spacing_mm = 3", "spacing_mm = 2.5"), &["--strict"]).shown;

@@ -28,7 +28,11 @@ async fn particles_are_awake_for_tools_and_for_forces_that_are_injected() {
     let vertex = (0..rest.len()).find(|&v| rest[v].distance(corner) < 1e-9).unwrap() as u32;
     let force_n = Some(vec3(DVec3::NEG_Z * 0.005));
     let force = v1::InjectedForce { surface_vertex: vertex, force_n, from_tick: 0, tick_count: 40 };
-    daemon.session().inject_forces(v1::InjectForcesRequest { forces: vec![force], ..Default::default() }).await.unwrap();
+    daemon
+        .session()
+        .inject_forces(v1::InjectForcesRequest { forces: vec![force], ..Default::default() })
+        .await
+        .unwrap();
     daemon.step(30).await;
     let pushed = daemon.status().await;
     let counts = pushed.awake_for.unwrap();

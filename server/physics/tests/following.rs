@@ -6,7 +6,7 @@ mod rig;
 use glam::DVec3;
 use palpate_physics::{
     ModelSpec,
-    contact::{Coupling, CoupledFollowing, Following},
+    contact::{CoupledFollowing, Coupling, Following},
     material::Law,
 };
 use rig::{Rig, body, bricks, even, hold, material, nodes_where, sphere};

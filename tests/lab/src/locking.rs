@@ -43,7 +43,10 @@ fn presses() -> [(&'static str, Action); 4] {
 /// # Errors
 /// No equilibrium.
 pub fn print() -> Result<()> {
-    println!("| press | ν | reference | {} |", CELLS.map(|cells| format!("cells of {} mm", 80 / cells)).join(" | "));
+    println!(
+        "| press | ν | reference | {} |",
+        CELLS.map(|cells| format!("cells of {:.1} mm", BLOCK_M[0] * 1e3 / f64::from(cells))).join(" | ")
+    );
     println!("|---|---|---|{}", "---|".repeat(CELLS.len()));
     for (name, action) in presses() {
         for poisson_ratio in POISSON_RATIOS {
@@ -87,12 +90,8 @@ fn at_rest(problem: &Problem, cells: u32) -> Result<f64> {
     let tools: Vec<ToolTarget> =
         subject.tool.iter().map(|tool| ToolTarget { position_m: tool.centre_m(1.0), ..tool.spec().start() }).collect();
     let load_factors = vec![1.0; subject.model.loads().len()];
-    let goal = Goal {
-        load_factors: &load_factors,
-        prescribed_displacements_m: &prescribed,
-        tools: &tools,
-        awake: None,
-    };
+    let goal =
+        Goal { load_factors: &load_factors, prescribed_displacements_m: &prescribed, tools: &tools, awake: None };
     let settings = StaticSettings::default();
     let solved =
         solve_static(&subject.model, &goal, &settings, &mut |_| ControlFlow::Continue(())).into_diagnostic()?;

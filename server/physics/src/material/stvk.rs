@@ -146,7 +146,8 @@ mod tests {
     #[test]
     fn it_gives_way_sideways_where_that_is_said_and_with_free_sides_nowhere() {
         for nu in POISSON_RATIOS {
-            let sideways = |f: &DMat3| StVenantKirchhoff::piola_differential(lame(nu), f, &outer(DVec3::Y, DVec3::X)).x_axis.y;
+            let sideways =
+                |f: &DMat3| StVenantKirchhoff::piola_differential(lame(nu), f, &outer(DVec3::Y, DVec3::X)).x_axis.y;
             let limit = gives_way_sideways_below(lame(nu));
             assert!(sideways(&stretched(limit + 1e-4, 1.0)) > 0.0, "nu {nu}");
             if nu > 0.0 {

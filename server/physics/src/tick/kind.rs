@@ -3,8 +3,8 @@
 //! A kind implements these four traits in its folder (`kind.rs`, and `stepped.rs` for [`Stepped`]); `bodies/mod.rs` registers it. What only some kinds have is answered
 //! by a default here, which says what it means to have none.
 use super::{
-    AwakeFor, Energies, Environment, Evaluation, Judged, MaterialPoint, MechanicalState, PointForce, PrescribedNodes, Tick,
-    free_inverse_mass,
+    AwakeFor, Energies, Environment, Evaluation, Judged, MaterialPoint, MechanicalState, PointForce, PrescribedNodes,
+    Tick, free_inverse_mass,
 };
 use crate::{
     contact::ContactScratch,

@@ -16,4 +16,3 @@ impl Energies {
 pub fn elastic_energy_j(model: &Model, state: &State) -> f64 {
     model.body().energies(DVec3::ZERO, &state.body, &state.mechanical).elastic_j
 }
-

@@ -111,7 +111,9 @@ impl ServedBody for HybridBody {
             ));
         }
         if many_are_outside(self) {
-            warnings.extend(outside(self).map(|outside| format!("{outside}; ask for more tets, or hold less of the surface")));
+            warnings.extend(
+                outside(self).map(|outside| format!("{outside}; ask for more tets, or hold less of the surface")),
+            );
         }
         if spec.fine_depth_m.is_some() && !partition.cells().iter().any(|cell| cell.doubled) {
             warnings.push(

@@ -195,7 +195,13 @@ impl ActivationQuery {
     }
 
     /// Returns how many particles each claim gets.
-    pub(super) fn room(&self, environment: &Environment, body: &HybridBody, own: &HybridState, acting: Acting<'_>) -> usize {
+    pub(super) fn room(
+        &self,
+        environment: &Environment,
+        body: &HybridBody,
+        own: &HybridState,
+        acting: Acting<'_>,
+    ) -> usize {
         let of_tools = balls_of_tools(environment, body, own).filter(|balls| balls.iter().any(Option::is_some)).count();
         let of_points = usize::from(acting.points.iter().any(|point| environment.accepts(point)));
         let claims = of_tools + self.load_claims.count(acting.load_factors) + of_points;
