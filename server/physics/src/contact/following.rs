@@ -1,5 +1,8 @@
 //! How well a tool can follow its device, by its coupling and its size: what is told of a scene before a hand feels it.
-use super::{ContactModel, Coupling, ToolModel, proxy::NEAR};
+use super::{
+    ContactModel, Coupling, ToolModel,
+    proxy::{NEAR, SMOOTHED_S},
+};
 
 /// What bounds how a tool follows its device.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -41,8 +44,9 @@ impl ContactModel {
 
 impl ToolModel {
     /// A mass `m` on a spring `K` and a damper `B`, both limited to `F_max` together, behind a device that sets off with
-    /// `v`: while nothing is limited, the force on the mass is at most `v max(√(K m), B)`, since `√(K m)` is its peak
-    /// without damping and `B v` that at the start with much. So `v = F_max / max(√(K m), B)` and `a = F_max/m`.
+    /// `v`: while nothing is limited, the force on the mass is at most `v max(√(K m), min(B, m/τ))`. `√(K m)` is its peak
+    /// without damping; with much, the mass follows the velocity that the damper has, which comes to `v` with the time
+    /// constant `τ` ([`SMOOTHED_S`]). So a device may set off with `F_max` over that maximum, and `a = F_max/m`.
     fn following(&self, dt_s: f64) -> Following {
         let radius_m = self.spec.radius_m;
         let Coupling::Spring { stiffness_n_per_m, damping_n_s_per_m, mass_kg } = self.spec.coupling else {
@@ -50,7 +54,8 @@ impl ToolModel {
         };
         let force_limit_n = self.force_limit_n;
         let moves_m_per_s = NEAR * radius_m / dt_s;
-        let unlimited_m_per_s = force_limit_n / (stiffness_n_per_m * mass_kg).sqrt().max(damping_n_s_per_m);
+        let of_damper_n_s_per_m = damping_n_s_per_m.min(mass_kg / SMOOTHED_S);
+        let unlimited_m_per_s = force_limit_n / (stiffness_n_per_m * mass_kg).sqrt().max(of_damper_n_s_per_m);
         Following::Coupled(CoupledFollowing {
             force_limit_n,
             stretch_limit_m: force_limit_n / stiffness_n_per_m,
