@@ -75,7 +75,8 @@ fn a_device_that_sets_off_as_fast_as_is_told_is_followed_within_the_limit() {
 
 #[test]
 fn a_tool_gains_speed_and_moves_no_faster_than_is_told_and_as_fast() {
-    let mut rig = plate(spring(400.0, 2.0, 0.02), 0.1);
+    // A damper would hold it against a device that stands.
+    let mut rig = plate(spring(400.0, 0.0, 0.02), 0.1);
     let told = coupled(&rig);
     let mut fastest_m_per_s = 0.0_f64;
     for tick in 1..=800 {
@@ -94,6 +95,23 @@ fn a_tool_gains_speed_and_moves_no_faster_than_is_told_and_as_fast() {
     // Half a kick comes after the limit.
     let kick_m_per_s = told.gains_m_per_s2 * dt_s(&rig);
     assert!((fastest_m_per_s - told.moves_m_per_s).abs() <= kick_m_per_s, "{fastest_m_per_s}");
+}
+
+/// A device that leaps and stands: the saturated spring pulls against the damper.
+#[test]
+fn a_tool_comes_back_to_a_device_that_stands_as_fast_as_is_told() {
+    for (stiffness, damping, mass) in [(400.0, 2.0, 0.02), (800.0, 3.0, 0.02), (200.0, 1.0, 0.005)] {
+        let mut rig = plate(spring(stiffness, damping, mass), 0.1);
+        let told = coupled(&rig);
+        for _ in 0..300 {
+            rig.tick_at(DVec3::Z * 0.4);
+        }
+        let tool = &rig.state.mechanical.tools[0];
+        assert!(tool.centre_m.z < 0.4 - 2.0 * told.stretch_limit_m, "{} is still far away", tool.centre_m);
+        let speed_m_per_s = tool.velocity_m_per_s.length();
+        println!("{told:?}: {speed_m_per_s}");
+        assert!((speed_m_per_s / told.comes_back_m_per_s - 1.0).abs() < 0.01, "{stiffness} {damping}: {speed_m_per_s}");
+    }
 }
 
 #[test]

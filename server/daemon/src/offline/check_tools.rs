@@ -41,10 +41,11 @@ fn following(following: &Following) -> Vec<String> {
             ),
             format!(
                 "in the air it follows a device that sets off at up to {} m/s; behind a faster one it gains {} m/s each second, \
-                 up to {} m/s. It meets the surface at up to {} m/s",
+                 up to {} m/s, and to one that has stopped it comes back at up to {} m/s. It meets the surface at up to {} m/s",
                 round(told.sets_off_m_per_s),
                 round(told.gains_m_per_s2),
                 round(told.moves_m_per_s),
+                round(told.comes_back_m_per_s),
                 round(told.meets_m_per_s)
             ),
         ],

@@ -29,6 +29,8 @@ pub struct CoupledFollowing {
     pub gains_m_per_s2: f64,
     /// A device that sets off no faster than this (m/s) does not bring the coupling to its limit.
     pub sets_off_m_per_s: f64,
+    /// It comes back no faster than this (m/s) to a device that stands far away: its damper holds it against its spring.
+    pub comes_back_m_per_s: f64,
     /// It never moves faster than this (m/s).
     pub moves_m_per_s: f64,
     /// It meets the surface no faster than this (m/s).
@@ -61,6 +63,8 @@ impl ToolModel {
             stretch_limit_m: force_limit_n / stiffness_n_per_m,
             gains_m_per_s2: force_limit_n / mass_kg,
             sets_off_m_per_s: unlimited_m_per_s.min(moves_m_per_s),
+            // F_max = B v; without damping nothing but the steps bounds it.
+            comes_back_m_per_s: (force_limit_n / damping_n_s_per_m).min(moves_m_per_s),
             moves_m_per_s,
             meets_m_per_s: (2.0 * self.impact_energy_j / mass_kg).sqrt().min(moves_m_per_s),
         })
