@@ -110,7 +110,9 @@ fn a_tool_comes_back_to_a_device_that_stands_as_fast_as_is_told() {
         assert!(tool.centre_m.z < 0.4 - 2.0 * told.stretch_limit_m, "{} is still far away", tool.centre_m);
         let speed_m_per_s = tool.velocity_m_per_s.length();
         println!("{told:?}: {speed_m_per_s}");
-        assert!((speed_m_per_s / told.comes_back_m_per_s - 1.0).abs() < 0.01, "{stiffness} {damping}: {speed_m_per_s}");
+        // The damper is limited together with the spring, kick by kick: a little less is left of it.
+        let part = speed_m_per_s / told.comes_back_m_per_s;
+        assert!((0.97..=1.0 + 1e-9).contains(&part), "{stiffness} {damping}: {speed_m_per_s}");
     }
 }
 

@@ -153,7 +153,9 @@ fn print_contents(scene: &Scene, model: &Model) {
         1 => println!("held       {}; {loads}", counted(held, "node")),
         sets => println!("held       {} in {}; {loads}", counted(held, "node"), counted(sets, "set")),
     }
-    check_tools::lines(scene, model).iter().for_each(|line| println!("{line}"));
+    for line in check_tools::lines(scene, model) {
+        println!("{line}");
+    }
     let probes: Vec<&str> = scene.probes.iter().map(palpate_scene::Probe::name).collect();
     println!("probes     {}", if probes.is_empty() { "none".to_owned() } else { probes.join(", ") });
 }
