@@ -1,7 +1,7 @@
 //! `palpated simulate`: a scene headless, as fast as it goes, the same bits every time.
 use super::{
     args::{OutputArgs, positive},
-    exit::{CODES, Lowest, Untrusted},
+    exit::{CODES, Untrusted},
     folder,
     frames::Frames,
     interrupt::Interrupt,
@@ -9,16 +9,15 @@ use super::{
     probe_rows::ProbeRows,
     summary::{Ending, PeakNumbers, Percentiles, Summary, TimeNumbers},
 };
-use crate::progress::Progress;
+use crate::{progress::Progress, strained::Seen};
 use glam::DVec3;
 use hdrhistogram::Histogram;
 use miette::IntoDiagnostic;
 use palpate_physics::{
     Model, Scratch, State, TickInput,
     contact::ToolTarget,
-    elements::linear_tet::VolumeRatio,
     step,
-    world::{min_volume_ratio, wake_only},
+    world::{strained_in, wake_only},
 };
 use palpate_scene::{Scene, wording::short};
 use std::{process::ExitCode, time::Instant};
@@ -41,7 +40,7 @@ pub struct SimulateArgs {
     frames: Option<FrameCount>,
 }
 
-/// Elements inside out are looked for at every so many ticks, and at the end: of a body with particles that takes longer than a tick.
+/// Elements that are inside out, or pressed beyond what their law is made for, are looked for at every so many ticks, and at the end.
 const LOOK_EVERY: u64 = 10;
 
 /// How many frames a run writes.
@@ -100,12 +99,14 @@ pub fn run(args: &SimulateArgs) -> miette::Result<ExitCode> {
     };
     let mut summary = Summary::new(&scene, &model, &run.state, &rows, &ending);
     summary.time = Some(run.cost());
-    summary.lowest_volume_ratio =
-        run.lowest.map(|lowest| PeakNumbers { value: lowest.found.ratio, time_s: lowest.time_s });
     for slipped in run.slipped() {
         eprintln!("warning: {slipped}");
         summary.warnings.push(slipped);
     }
+    let peak = |(value, time_s): (f64, f64)| PeakNumbers { value, time_s };
+    summary.lowest_volume_ratio = run.seen.lowest().map(peak);
+    summary.least_stretch_beyond_law = run.seen.pressed().map(peak);
+    summary.warn(run.seen.weakened(&model, true));
     if let Some(out) = &out {
         summary.write(out)?;
     }
@@ -172,9 +173,9 @@ pub(super) struct Run<'s> {
     most_awake: usize,
     repeated_ticks: u64,
     asleep_ticks: u64,
-    lowest: Option<Lowest>,
     /// How far (m) each tool slipped from its device at most, and when (s).
     slips: Vec<(f64, f64)>,
+    seen: Seen,
 }
 
 impl<'s> Run<'s> {
@@ -193,8 +194,8 @@ impl<'s> Run<'s> {
             most_awake: 0,
             repeated_ticks: 0,
             asleep_ticks: 0,
-            lowest: None,
             slips: vec![(0.0, 0.0); scene.model.tools.len()],
+            seen: Seen::default(),
         })
     }
 
@@ -220,7 +221,7 @@ impl<'s> Run<'s> {
             }
             let last = tick == plan.ticks || ended_by != "duration";
             if last || tick.is_multiple_of(LOOK_EVERY) {
-                self.look_for_inverted(time_s);
+                self.look(time_s);
             }
             if tick.is_multiple_of(plan.sample_every) || last {
                 rows.sample(time_s, self.model, &self.state, self.scratch.reactions_n())?;
@@ -247,17 +248,16 @@ impl<'s> Run<'s> {
         }
     }
 
-    fn look_for_inverted(&mut self, time_s: f64) {
-        let found = min_volume_ratio(self.model, &self.state);
-        let is_lower = |found: &VolumeRatio| self.lowest.is_none_or(|lowest| found.ratio < lowest.found.ratio);
-        if let Some(found) = found.filter(is_lower) {
-            self.lowest = Some(Lowest { found, time_s });
+    /// Looks for strained elements; a body that sleeps is as it was at the look before.
+    fn look(&mut self, time_s: f64) {
+        if !self.state.sleep.asleep || self.seen.lowest().is_none() {
+            self.seen.see(strained_in(self.model, &self.state, &mut self.scratch), time_s);
         }
     }
 
     /// Why the run is not to be trusted, if so, which ended with this volume ratio.
     fn untrusted(&self, end: f64) -> Option<Untrusted> {
-        let least = self.lowest.filter(Lowest::is_inverted).map(|lowest| lowest.told(self.model));
+        let least = self.seen.inverted(self.model);
         if let Some(what) = self.state.quarantine {
             let before = |least: String| format!("; before that elements turned inside out: {least}");
             return Some(Untrusted::Quarantined { what, inverted: least.map_or_else(String::new, before) });

@@ -8,6 +8,7 @@ mod axis_samples;
 pub(crate) mod broad;
 mod clutch;
 mod depth;
+mod following;
 mod foundation;
 mod friction;
 mod inside;
@@ -32,6 +33,7 @@ mod turning;
 
 pub(crate) use axis_samples::Near;
 pub(crate) use broad::Skin;
+pub use following::{CoupledFollowing, Following};
 pub use inside::is_inside;
 pub use local_torque::LocalTorqueModel;
 pub use moduli::SurfaceModuli;

@@ -156,7 +156,7 @@ impl ContactState {
     pub(crate) fn clear(&mut self) {
         for tool in &mut self.tools {
             tool.touching.clear();
-            tool.just_put = false;
+            (tool.just_put, tool.is_clear) = (false, false);
             (tool.force_n, tool.torque_nm, tool.deepest_m) = (DVec3::ZERO, DVec3::ZERO, 0.0);
             tool.estimate = StiffnessEstimate::default();
         }
@@ -167,7 +167,7 @@ impl ContactState {
     pub(crate) fn put_tool(&mut self, tool: usize) {
         let part = &mut self.tools[tool];
         part.touching.clear();
-        part.just_put = true;
+        (part.just_put, part.is_clear) = (true, false);
         (part.force_n, part.torque_nm, part.deepest_m) = (DVec3::ZERO, DVec3::ZERO, 0.0);
         part.estimate = StiffnessEstimate::default();
         part.candidates.slack_m = f64::NEG_INFINITY;
