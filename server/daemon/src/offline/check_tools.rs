@@ -29,23 +29,20 @@ pub(super) fn lines(scene: &Scene, model: &Model) -> Vec<String> {
 /// How a tool follows its device, a line or two.
 fn following(following: &Following) -> Vec<String> {
     match following {
-        Following::Rigid { leaps_above_m_per_s } => vec![format!(
-            "rigid: above {} m/s it moves by more than its radius in a substep, and may leap over a surface, however thick the body is",
-            round(*leaps_above_m_per_s)
+        Following::Rigid { slips_at_n, moves_m_per_s } => vec![format!(
+            "rigid: it is where its driver says, up to {} m/s; it slips before it would go through a surface, at {} N or less",
+            round(*moves_m_per_s),
+            round(*slips_at_n)
         )],
         Following::Coupled(told) => vec![
             format!(
-                "on a spring that gives at most {} N, from a stretch of {} mm on: more would drive so small a tool through this surface",
+                "on a spring that gives at most {} N near the surface, from a stretch of {} mm on: more would drive so small a tool through it",
                 round(told.force_limit_n),
                 round(told.stretch_limit_m * 1e3)
             ),
             format!(
-                "in the air it follows a device that sets off at up to {} m/s; behind a faster one it gains {} m/s each second, \
-                 up to {} m/s, and to one that has stopped it comes back at up to {} m/s. It meets the surface at up to {} m/s",
-                round(told.sets_off_m_per_s),
-                round(told.gains_m_per_s2),
+                "in the air it follows at up to {} m/s, and meets the surface at up to {} m/s",
                 round(told.moves_m_per_s),
-                round(told.comes_back_m_per_s),
                 round(told.meets_m_per_s)
             ),
         ],

@@ -31,7 +31,7 @@ use std::f64::consts::PI;
 /// Time (s) in which a tool comes back to its device by a radius.
 const RETURN_S: f64 = 0.01;
 /// Speed (m/s) above which a device leaps, rather than moves.
-const LEAP_M_PER_S: f64 = 5.0;
+pub(super) const LEAP_M_PER_S: f64 = 5.0;
 /// Depth, over R, of a sample at which the clutch slips: pressure has grown to more than a coupling gives.
 const SLIP_DEPTH: f64 = 0.4;
 /// Force at which it slips, over that at which the coupling of a tool of the same radius saturates.
@@ -66,7 +66,7 @@ pub(super) fn follow(
 
 fn slipped(model: &ToolModel, slip_m: DVec3, contact: &ToolContact, dt_s: f64) -> DVec3 {
     let radius_m = model.spec.radius_m;
-    let (deepest_m, force_n) = (SLIP_DEPTH * radius_m, SLIP_FORCE * bearable_n(model));
+    let (deepest_m, force_n) = (SLIP_DEPTH * radius_m, slips_at_n(model));
     let loaded = f64::max(contact.deepest_m / deepest_m, contact.force_n.length() / force_n);
     if loaded > 1.0 {
         // A sample loses what is above its limit at once; a mean one is half as deep as the deepest.
@@ -78,11 +78,11 @@ fn slipped(model: &ToolModel, slip_m: DVec3, contact: &ToolContact, dt_s: f64) -
     }
 }
 
-/// Returns the force (N) that presses a tool into the flat foundation as deep as its coupling would at most. Beside its
-/// two hemispheres, which are a sphere, a capsule has a cylinder: pressed in by `d`, it displaces
+/// Returns the force (N) at which a rigid tool slips: [`SLIP_FORCE`] times what presses it into the flat foundation as
+/// deep as the coupling of a tool of its radius would at most. Beside its two hemispheres, which are a sphere, a capsule has a cylinder: pressed in by `d`, it displaces
 /// `2L (4/3) √(2R) d^{3/2}`, where the sphere displaces `π R d²`.
-fn bearable_n(model: &ToolModel) -> f64 {
+pub(super) fn slips_at_n(model: &ToolModel) -> f64 {
     let (radius_m, half_m) = (model.spec.radius_m, model.spec.shape.half_length_m());
     let of_cylinder = 8.0 / (3.0 * PI) * (2.0 / SATURATION_DEPTH).sqrt() * half_m / radius_m;
-    model.force_limit_n * (1.0 + of_cylinder)
+    SLIP_FORCE * model.force_limit_n * (1.0 + of_cylinder)
 }

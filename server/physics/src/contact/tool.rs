@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Coupling {
     /// The tool is where the device is: kinematic (trajectories, known-answer tests). It moves in a straight line
-    /// during the tick; nothing keeps it outside if it is driven further than its radius in one substep.
+    /// during the tick, and slips from its device before it would go through the surface ([`super::clutch`]).
     Rigid,
     /// The tool is a mass on a spring and damper to the device (virtual coupling): the proxy stays outside the body
     /// while the device may be inside.
