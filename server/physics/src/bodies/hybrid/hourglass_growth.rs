@@ -8,6 +8,8 @@
 //! ∂U/∂Q = ½ κ φ(G)    φ = d(G ε)/dG = 1 + G + c b
 //! ```
 //! `φ` has no jump, so forces have none. The functions work on numbers and on lanes alike.
+// A vector type is only fast where it is inlined into a function compiled for its instruction set.
+#![allow(clippy::inline_always)]
 use crate::lanes::real::Real;
 
 /// `β`, how fast hourglasses stiffen with their amplitude.
