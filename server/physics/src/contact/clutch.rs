@@ -1,8 +1,7 @@
 //! The slip clutch between a rigid tool and its device.
 //!
 //! A rigid tool is where its device is, as long as the surface can bear it: no sample that it presses is deeper in it than
-//! [`SLIP_DEPTH`]·R, and the force is no more than [`SLIP_FORCE`] times that at which the coupling of a tool of its radius
-//! saturates ([`super::proxy`]). Beyond, the clutch slips: the tool stays behind by the slip `s`, at `c = d + s`, and
+//! [`SLIP_DEPTH`]·R, and the force is no more than [`slips_at_n`]. Beyond, the clutch slips: the tool stays behind by the slip `s`, at `c = d + s`, and
 //! carries what the body gives there. Without it, a device that goes on drives the tool through any surface.
 //!
 //! The clutch has no mass. With the depth `g` of the deepest sample, the force `f` on the tool, and how far they are from
@@ -20,7 +19,8 @@
 //! Nor does the tool move faster than [`LEAP_M_PER_S`], or by more than [`NEAR`]·R in a substep, so that a device that
 //! leaps takes it through nothing unseen.
 use super::{
-    ToolModel, ToolState,
+    ToolModel, ToolSpec, ToolState,
+    foundation::Foundation,
     proxy::{NEAR, SATURATION_DEPTH},
     spring::shortened,
     state::ToolContact,
@@ -66,7 +66,7 @@ pub(super) fn follow(
 
 fn slipped(model: &ToolModel, slip_m: DVec3, contact: &ToolContact, dt_s: f64) -> DVec3 {
     let radius_m = model.spec.radius_m;
-    let (deepest_m, force_n) = (SLIP_DEPTH * radius_m, slips_at_n(model));
+    let (deepest_m, force_n) = (SLIP_DEPTH * radius_m, model.slips_at_n);
     let loaded = f64::max(contact.deepest_m / deepest_m, contact.force_n.length() / force_n);
     if loaded > 1.0 {
         // A sample loses what is above its limit at once; a mean one is half as deep as the deepest.
@@ -79,10 +79,15 @@ fn slipped(model: &ToolModel, slip_m: DVec3, contact: &ToolContact, dt_s: f64) -
 }
 
 /// Returns the force (N) at which a rigid tool slips: [`SLIP_FORCE`] times what presses it into the flat foundation as
-/// deep as the coupling of a tool of its radius would at most. Beside its two hemispheres, which are a sphere, a capsule has a cylinder: pressed in by `d`, it displaces
+/// deep as the coupling of a tool of its radius would at most, or what presses it by a radius into the body where that is
+/// more (Hertz, `4/3 E/(1 − ν²) R²`): on coarse triangles the foundation is soft, and the body is stiffer than it should be.
+///
+/// Beside its two hemispheres, which are a sphere, a capsule has a cylinder: pressed in by `d`, it displaces
 /// `2L (4/3) √(2R) d^{3/2}`, where the sphere displaces `π R d²`.
-pub(super) fn slips_at_n(model: &ToolModel) -> f64 {
-    let (radius_m, half_m) = (model.spec.radius_m, model.spec.shape.half_length_m());
+pub(super) fn slips_at_n(spec: &ToolSpec, foundation: &Foundation) -> f64 {
+    let (radius_m, half_m) = (spec.radius_m, spec.shape.half_length_m());
+    let flat_n = foundation.flat_force_n(radius_m, SATURATION_DEPTH * radius_m);
+    let into_body_n = 4.0 / 3.0 * foundation.mean_indentation_modulus_pa() * radius_m * radius_m;
     let of_cylinder = 8.0 / (3.0 * PI) * (2.0 / SATURATION_DEPTH).sqrt() * half_m / radius_m;
-    SLIP_FORCE * model.force_limit_n * (1.0 + of_cylinder)
+    SLIP_FORCE * flat_n.max(into_body_n) * (1.0 + of_cylinder)
 }

@@ -1,9 +1,5 @@
 //! How well a tool can follow its device, by its coupling and its size: what is told of a scene before a hand feels it.
-use super::{
-    ContactModel, Coupling, ToolModel,
-    clutch::{LEAP_M_PER_S, slips_at_n},
-    proxy::NEAR,
-};
+use super::{ContactModel, Coupling, ToolModel, clutch::LEAP_M_PER_S, proxy::NEAR};
 
 /// What bounds how a tool follows its device.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -46,7 +42,7 @@ impl ToolModel {
         let moves_m_per_s = NEAR * self.spec.radius_m / dt_s;
         match self.spec.coupling {
             Coupling::Rigid => {
-                Following::Rigid { slips_at_n: slips_at_n(self), moves_m_per_s: moves_m_per_s.min(LEAP_M_PER_S) }
+                Following::Rigid { slips_at_n: self.slips_at_n, moves_m_per_s: moves_m_per_s.min(LEAP_M_PER_S) }
             }
             Coupling::Spring { stiffness_n_per_m, mass_kg, .. } => Following::Coupled(CoupledFollowing {
                 force_limit_n: self.force_limit_n,

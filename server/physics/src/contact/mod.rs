@@ -80,6 +80,8 @@ struct ToolModel {
     foundation: Foundation,
     /// Force (N) at which the coupling saturates.
     force_limit_n: f64,
+    /// Force (N) beyond which the tool slips, if it is rigid.
+    slips_at_n: f64,
     /// Bound of the kinetic energy with which the tool meets the surface (J).
     impact_energy_j: f64,
 }
@@ -148,6 +150,7 @@ impl ToolModel {
         Self {
             spec: spec.clone(),
             force_limit_n: foundation.flat_force_n(radius_m, proxy::SATURATION_DEPTH * radius_m),
+            slips_at_n: clutch::slips_at_n(spec, &foundation),
             // ∫ π k_f R d² dd
             impact_energy_j: foundation.flat_force_n(radius_m, depth_m) * depth_m / 3.0,
             foundation,
