@@ -1,8 +1,9 @@
 //! The slip clutch between a rigid tool and its device.
 //!
 //! A rigid tool is where its device is, as long as the surface can bear it: no sample that it presses is deeper in it than
-//! [`SLIP_DEPTH`]·R, and the force is no more than [`slips_at_n`]. Beyond, the clutch slips: the tool stays behind by the slip `s`, at `c = d + s`, and
-//! carries what the body gives there. Without it, a device that goes on drives the tool through any surface.
+//! [`SLIP_DEPTH`]·R, and the force is no more than [`slips_at_n`]. Beyond, the clutch slips: the tool stays behind by the
+//! slip `s`, at `c = d + s`, and carries what the body gives there. Without it, a device that goes on drives the tool
+//! through any surface.
 //!
 //! The clutch has no mass. With the depth `g` of the deepest sample, the force `f` on the tool, and how far they are from
 //! their limits, `ρ = max(g/g_max, |f|/f_max)`, a substep does
