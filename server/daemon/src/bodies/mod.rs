@@ -13,9 +13,23 @@ mod tet;
 pub use shape::{Shape, ShapeReader};
 
 use glam::DVec3;
-use palpate_physics::{Body, Model, Scratch, State, contact::is_inside};
+use palpate_physics::{
+    Body, Model, Scratch, State,
+    contact::{ToolTarget, is_inside},
+};
 use palpate_scene::Scene;
 use std::sync::Arc;
+
+/// A light touch of a tool where it is nearest to a body at rest.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct FirstTouch {
+    /// A little above the skin.
+    pub above: ToolTarget,
+    /// In it.
+    pub pressed: ToolTarget,
+    /// How deep (m) that is.
+    pub depth_m: f64,
+}
 
 /// What the daemon asks of a kind of body.
 pub trait ServedBody {
@@ -48,9 +62,8 @@ pub trait ServedBody {
         false
     }
 
-    /// The scene with particles that wake by hand only, and those that its first tool would wake where it is nearest to the body, the
-    /// nearest first; `None` where a tool wakes none.
-    fn woken_by_first_tool(&self, _scene: &Scene) -> Option<(Scene, Vec<u32>)> {
+    /// Where the first tool of a scene would touch the body first, and wake particles; `None` where it wakes none.
+    fn first_touch(&self, _scene: &Scene) -> Option<FirstTouch> {
         None
     }
 

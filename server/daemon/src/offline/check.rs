@@ -118,7 +118,9 @@ fn print_time(model: &Model, cost: &Cost) {
     line(&cost.all.tick_wall_us, cost.all.ticks, "");
     let deciding = cost.awake.as_ref().map_or(&cost.all.tick_wall_us, |awake| &awake.tick_wall_us);
     if let Some(awake) = &cost.awake {
-        let how = if awake.untouched { ", nothing touching them," } else { "" };
+        let how = awake.touched_m.map_or_else(String::new, |touched_m| {
+            format!(", the first tool pressed {} mm into the body,", short(touched_m * 1e3))
+        });
         line(&awake.tick_wall_us, awake.ticks, &format!(" with up to {} particles awake{how}", awake.most));
     }
     say(format_args!(

@@ -28,12 +28,12 @@ pub(super) struct AwakeCost {
     pub(super) ticks: u64,
     /// Most particles that were awake at once.
     pub(super) most: usize,
-    /// Within the measured time no tool came near: particles were woken for it, in a body at rest.
-    pub(super) untouched: bool,
+    /// Within the measured time no tool came near: the first one was put to the body for it, and pressed so deep (m).
+    pub(super) touched_m: Option<f64>,
 }
 
-/// Runs the scene for up to half a second of wall time, or its own duration; a hybrid body that no tool touched by then once more, with the
-/// particles awake that its first tool would wake where it is nearest to the body.
+/// Runs the scene for up to half a second of wall time, or its own duration; a hybrid body that no tool touched by then once more, with its
+/// first tool in a light touch where it is nearest to the body.
 ///
 /// # Errors
 /// A state that is refused, or a body that cannot be built.
@@ -49,9 +49,9 @@ pub(super) fn measure(scene: &Scene, model: &Model) -> miette::Result<Cost> {
     let all = run_for(&mut run, scene, model)?;
     let (tick_wall_us, ticks, most) = run.cost_awake();
     let awake = if ticks >= ENOUGH_TICKS && served(model).wakes_particles_for_tools() {
-        Some(AwakeCost { tick_wall_us, ticks, most, untouched: false })
+        Some(AwakeCost { tick_wall_us, ticks, most, touched_m: None })
     } else {
-        woken(scene, model)?
+        touched(scene, model)?
     };
     Ok(Cost { all, awake })
 }
@@ -67,17 +67,16 @@ fn run_for(run: &mut Run<'_>, scene: &Scene, model: &Model) -> miette::Result<Ti
     }
 }
 
-/// Ticks of the body at rest with particles awake; `None` where there are none that a tool might wake.
-fn woken(scene: &Scene, model: &Model) -> miette::Result<Option<AwakeCost>> {
-    let Some((by_hand, particles)) = served(model).woken_by_first_tool(scene) else { return Ok(None) };
-    let model = load::build(&by_hand)?;
-    let mut run = Run::new(&by_hand, &model)?;
-    run.wake_only(particles);
+/// Ticks of the body with its first tool in a light touch; `None` where it wakes no particles there.
+fn touched(scene: &Scene, model: &Model) -> miette::Result<Option<AwakeCost>> {
+    let Some(touch) = served(model).first_touch(scene) else { return Ok(None) };
+    let mut run = Run::new(scene, model)?;
+    run.touch(&touch);
     let started = Instant::now();
-    while started.elapsed() < BUDGET || run.cost_awake().1 < ENOUGH_TICKS {
+    while started.elapsed() < BUDGET || run.state.mechanical.tick < ENOUGH_TICKS {
         run.tick();
         run.refuse_quarantined()?;
     }
     let (tick_wall_us, ticks, most) = run.cost_awake();
-    Ok(Some(AwakeCost { tick_wall_us, ticks, most, untouched: true }))
+    Ok((ticks > 0).then_some(AwakeCost { tick_wall_us, ticks, most, touched_m: Some(touch.depth_m) }))
 }

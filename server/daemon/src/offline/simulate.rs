@@ -9,16 +9,11 @@ use super::{
     probe_rows::ProbeRows,
     summary::{Ending, PeakNumbers, Percentiles, Summary, TimeNumbers},
 };
-use crate::{progress::Progress, strained::Seen};
+use crate::{bodies::FirstTouch, progress::Progress, strained::Seen};
 use glam::DVec3;
 use hdrhistogram::Histogram;
 use miette::IntoDiagnostic;
-use palpate_physics::{
-    Model, Scratch, State, TickInput,
-    contact::ToolTarget,
-    step,
-    world::{strained_in, wake_only},
-};
+use palpate_physics::{Model, Scratch, State, TickInput, contact::ToolTarget, step, world::strained_in};
 use palpate_scene::{Scene, wording::short};
 use std::{process::ExitCode, time::Instant};
 
@@ -165,6 +160,8 @@ pub(super) struct Run<'s> {
     pub(super) state: State,
     scratch: Scratch,
     targets: Vec<ToolTarget>,
+    /// Where the first tool goes instead of where its driver says.
+    first_tool: Option<ToolTarget>,
     load_factors: Vec<f64>,
     prescribed_m: Vec<DVec3>,
     tick_wall_ns: Histogram<u64>,
@@ -187,6 +184,7 @@ impl<'s> Run<'s> {
             state: State::at_rest(model),
             scratch: Scratch::new(model),
             targets: vec![ToolTarget::default(); scene.model.tools.len()],
+            first_tool: None,
             load_factors: vec![0.0; scene.model.loads.len()],
             prescribed_m: vec![DVec3::ZERO; scene.model.prescribed.len()],
             tick_wall_ns: Histogram::new_with_bounds(1, LONGEST_TICK_NS, 3).into_diagnostic()?,
@@ -274,7 +272,7 @@ impl<'s> Run<'s> {
     pub(super) fn tick(&mut self) {
         let time_s = (self.state.mechanical.tick + 1) as f64 * self.model.settings().tick_period_s;
         for (tool, target) in self.targets.iter_mut().enumerate() {
-            *target = self.scene.offline_target(tool, time_s);
+            *target = self.first_tool.filter(|_| tool == 0).unwrap_or_else(|| self.scene.offline_target(tool, time_s));
         }
         self.scene.timeline.fill(time_s, &mut self.load_factors, &mut self.prescribed_m);
         let input = TickInput {
@@ -316,9 +314,10 @@ impl<'s> Run<'s> {
         })
     }
 
-    /// Wakes these particles and no others.
-    pub(super) fn wake_only(&mut self, particles: impl IntoIterator<Item = u32>) {
-        wake_only(self.model, &mut self.state, &mut self.scratch, particles);
+    /// Puts the first tool above the body; from there it goes to a touch, and stays, whatever its driver says.
+    pub(super) fn touch(&mut self, touch: &FirstTouch) {
+        self.state.place_tool(0, touch.above);
+        self.first_tool = Some(touch.pressed);
     }
 
     /// What the ticks cost.

@@ -1,11 +1,12 @@
 //! Hybrid bodies: coarse tetrahedra, and particles of which those near a contact are awake.
 mod inside;
 mod skin;
+mod touch;
 
-use super::{ServedBody, Shape, ShapeReader};
+use super::{FirstTouch, ServedBody, Shape, ShapeReader};
 use glam::DVec3;
 use palpate_physics::{
-    BodySpec, Model, Scratch, State,
+    Model, Scratch, State,
     bodies::hybrid::{HybridBody, Waking},
     world::wake_only,
 };
@@ -46,16 +47,8 @@ impl ServedBody for HybridBody {
         matches!(self.particles().waking, Waking::ByTools { .. })
     }
 
-    fn woken_by_first_tool(&self, scene: &Scene) -> Option<(Scene, Vec<u32>)> {
-        let particles = near_first_tool(self, scene);
-        if particles.is_empty() {
-            return None;
-        }
-        let mut by_hand = scene.clone();
-        if let BodySpec::Hybrid(spec) = &mut by_hand.model.body {
-            spec.particles.waking = Waking::ByHand;
-        }
-        Some((by_hand, particles))
+    fn first_touch(&self, scene: &Scene) -> Option<FirstTouch> {
+        touch::first_touch(self, scene)
     }
 
     fn description(&self, _: &Model) -> Vec<String> {
@@ -168,28 +161,4 @@ impl LatticeShape {
     pub(super) fn particles_m(&self) -> &[DVec3] {
         &self.x[self.x.len() - self.active.len()..]
     }
-}
-
-/// The particles that the first tool would wake where it is nearest to the body, the nearest first.
-fn near_first_tool(hybrid: &HybridBody, scene: &Scene) -> Vec<u32> {
-    let Some(tool) = scene.model.tools.first() else { return Vec::new() };
-    let spec = hybrid.particles();
-    let Waking::ByTools { reach_m } = spec.waking else { return Vec::new() };
-    let partition = hybrid.partition();
-    let all = || (0..partition.particle_count() as u32).filter(|&particle| hybrid.may_wake(particle));
-    let from_tool_m = |particle: &u32| partition.particle_m(*particle).distance(tool.start_position_m);
-    let Some(first) = all().min_by(|a, b| from_tool_m(a).total_cmp(&from_tool_m(b))) else { return Vec::new() };
-    let centre_m = partition.particle_m(first);
-    let capsule = tool.shape.as_capsule();
-    let half_m = capsule.map_or(DVec3::ZERO, |own| own.start_orientation * (DVec3::Z * own.half_length_m));
-    // From a point of a sphere, from a segment of a capsule.
-    let distance_m = |particle: u32| {
-        let from_centre_m = partition.particle_m(particle) - centre_m;
-        let along = (from_centre_m.dot(half_m) / half_m.length_squared().max(f64::MIN_POSITIVE)).clamp(-1.0, 1.0);
-        from_centre_m.distance(half_m * along)
-    };
-    let mut near: Vec<(f64, u32)> = all().map(|p| (distance_m(p), p)).filter(|(d, _)| *d <= reach_m).collect();
-    near.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-    near.truncate(spec.most_active);
-    near.into_iter().map(|(_, particle)| particle).collect()
 }
