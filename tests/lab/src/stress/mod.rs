@@ -7,11 +7,11 @@
 //! - one file per row
 mod activation;
 mod bad_input;
+mod hands;
 mod impulses;
 mod incompressible;
 pub(crate) mod meshes;
 mod outcome;
-mod presses;
 pub(crate) mod random;
 mod random_scenes;
 mod record;
@@ -78,7 +78,7 @@ pub struct Row {
 }
 
 /// Every row, in the order of the table.
-pub const ROWS: [Row; 12] = [
+pub const ROWS: [Row; 13] = [
     Row { name: "time-step", criterion: time_step::CRITERION, run: time_step::run },
     Row { name: "stiffness-ratio", criterion: stiffness_ratio::CRITERION, run: stiffness_ratio::run },
     Row { name: "incompressible", criterion: incompressible::CRITERION, run: incompressible::run },
@@ -89,7 +89,8 @@ pub const ROWS: [Row; 12] = [
     Row { name: "slivers", criterion: slivers::CRITERION, run: slivers::run },
     Row { name: "random-scenes", criterion: random_scenes::CRITERION, run: random_scenes::run },
     Row { name: "activation", criterion: activation::CRITERION, run: activation::run },
-    Row { name: "presses", criterion: presses::CRITERION, run: presses::run },
+    Row { name: "presses", criterion: hands::presses::CRITERION, run: hands::presses::run },
+    Row { name: "leaps", criterion: hands::leaps::CRITERION, run: hands::leaps::run },
     Row { name: "springs", criterion: springs::CRITERION, run: springs::run },
 ];
 

@@ -1,5 +1,6 @@
 //! A random press: which tool, where, in which direction, how fast and how far.
-use super::{Body, Random};
+use super::Body;
+use crate::stress::random::Random;
 use glam::{DQuat, DVec3};
 use miette::{Result, bail};
 use palpate_physics::{
@@ -20,9 +21,9 @@ const STAYS_TICKS: u32 = 60;
 pub(super) struct Press {
     pub(super) tool: ToolSpec,
     /// Unit vector into the body.
-    along: DVec3,
+    pub(super) along: DVec3,
     /// Way (m) of the hand from its start to where it would touch the body at rest.
-    gap_m: f64,
+    pub(super) gap_m: f64,
     depth_m: f64,
     pub(super) speed_m_per_s: f64,
     /// Whether the tool is far from the body's edges.
