@@ -44,6 +44,7 @@ pub fn run(args: &CheckArgs) -> miette::Result<ExitCode> {
     let body = served(&model);
     body.description().iter().for_each(|line| println!("{line}"));
     print_contents(&scene);
+    print_walls(&model);
     let warnings = [scene.warnings.clone(), body.warnings()].concat();
     for warning in &warnings {
         println!("warning: {warning}");
@@ -132,6 +133,19 @@ fn verdict(us: &Percentiles, period_us: f64, cost: &Cost) -> &'static str {
         }
     } else {
         "fits"
+    }
+}
+
+/// Whether walls of the body press each other where they meet.
+fn print_walls(model: &Model) {
+    if !model.has_self_contact() {
+        println!("walls      pass through each other where they meet");
+        return;
+    }
+    println!("walls      press each other where they meet");
+    let left_out = model.vertices_against_themselves();
+    if left_out > 0 {
+        println!("           {left_out} of its vertices do not: the body lies against itself there at rest");
     }
 }
 

@@ -7,7 +7,7 @@ use super::{
     interrupt::Interrupt,
     load,
     probe_rows::ProbeRows,
-    summary::{Ending, PeakNumbers, Percentiles, Summary, TimeNumbers},
+    summary::{Ending, PeakNumbers, Percentiles, Summary, TimeNumbers, WallNumbers},
 };
 use crate::progress::Progress;
 use glam::DVec3;
@@ -100,6 +100,7 @@ pub fn run(args: &SimulateArgs) -> miette::Result<ExitCode> {
     };
     let mut summary = Summary::new(&scene, &model, &run.state, &rows, &ending);
     summary.time = Some(run.cost());
+    summary.walls = (run.walls.ticks > 0).then_some(run.walls);
     summary.lowest_volume_ratio =
         run.lowest.map(|lowest| PeakNumbers { value: lowest.found.ratio, time_s: lowest.time_s });
     if let Some(out) = &out {
@@ -169,6 +170,7 @@ pub(super) struct Run<'s> {
     repeated_ticks: u64,
     asleep_ticks: u64,
     lowest: Option<Lowest>,
+    walls: WallNumbers,
 }
 
 impl<'s> Run<'s> {
@@ -188,6 +190,7 @@ impl<'s> Run<'s> {
             repeated_ticks: 0,
             asleep_ticks: 0,
             lowest: None,
+            walls: WallNumbers::default(),
         })
     }
 
@@ -281,6 +284,7 @@ impl<'s> Run<'s> {
         self.repeated_ticks += u64::from(report.repeated > 0);
         self.asleep_ticks += u64::from(report.substeps == 0 && self.state.sleep.asleep);
         let wall_ns = started.elapsed().as_nanos() as u64;
+        self.walls.add(&self.scratch.meeting_walls());
         self.tick_wall_ns.saturating_record(wall_ns);
         let awake = self.state.awake_particles();
         if awake > 0 {

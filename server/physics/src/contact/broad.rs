@@ -102,6 +102,10 @@ pub(crate) trait Skin {
     fn vertices(&self, cluster: usize) -> &[u32];
     /// Returns the position (m) of a vertex.
     fn position_m(&self, vertex: u32) -> DVec3;
+    /// Returns a box (m) around the displacements of a cluster's vertices: any, where a kind of body has no bound.
+    fn displacements_m(&self, _cluster: usize) -> [DVec3; 2] {
+        [DVec3::NEG_INFINITY, DVec3::INFINITY]
+    }
 }
 
 /// Triangles that a tool may touch, and how far things may move before the list is out of date.
@@ -181,7 +185,7 @@ impl Triangles {
         self.nodes[triangle].map(|n| x[n as usize])
     }
 
-    fn cluster_range(&self, cluster: usize) -> Range<usize> {
+    pub(super) fn cluster_range(&self, cluster: usize) -> Range<usize> {
         cluster * CLUSTER..((cluster + 1) * CLUSTER).min(self.nodes.len())
     }
 

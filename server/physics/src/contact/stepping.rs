@@ -13,6 +13,7 @@ impl ContactModel {
     /// Begins a tick, before its first substep.
     pub fn begin_tick(&self, tools: &mut [ToolState], scratch: &mut ContactScratch, tick_period_s: f64) {
         let time = SubstepTime { fraction: 1.0, dt_s: 0.0, tick_period_s };
+        scratch.walls.most_frequency_sq = 0.0;
         for (tool, scratch) in tools.iter_mut().zip(&mut scratch.tools) {
             time.smooth(tool);
             tool.penetration_m = 0.0;
@@ -101,6 +102,9 @@ impl ContactModel {
         forces_n: &mut [DVec3],
         scratch: &mut ContactScratch,
     ) {
+        for (index, scratch) in scratch.tools.iter_mut().enumerate() {
+            scratch.push = self.push_of_others(index, tools);
+        }
         for (index, (tool, scratch)) in tools.iter_mut().zip(&mut scratch.tools).enumerate() {
             let model = &self.tools[index];
             let pressed = self.press(index, tool, x, contact, forces_n, scratch);
@@ -130,6 +134,9 @@ impl ContactModel {
         scratch: &mut ContactScratch,
     ) -> bool {
         let exhaustive = scratch.exhaustive;
+        if (0..tools.len()).any(|index| self.push_of_others(index, tools).is_some()) {
+            return false;
+        }
         for (index, (tool, scratch)) in tools.iter_mut().zip(&mut scratch.tools).enumerate() {
             self.drift(index, tool, time, contact);
             let axis = self.tools[index].axis(tool);
@@ -201,7 +208,12 @@ impl ContactModel {
             friction_coefficient: model.spec.friction_coefficient,
             put_into: std::mem::take(&mut part.just_put) || part.touching.tells_it_was_put(),
         };
-        let pressed = narrow::press(&meeting, &mut part.candidates, &mut part.touching, &mut scratch.next, forces_n);
+        let mut pressed = narrow::press(&meeting, &mut part.candidates, &mut part.touching, &mut scratch.next, forces_n);
+        if let Some(push) = scratch.push {
+            pressed.force_n += push.force_n;
+            pressed.torque_nm += push.torque_nm;
+            pressed.energy_j += push.energy_j;
+        }
         (part.force_n, part.torque_nm) = (pressed.force_n, pressed.torque_nm);
         pressed
     }

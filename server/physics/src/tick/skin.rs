@@ -122,6 +122,7 @@ pub(crate) fn touch_skin<S: CarriedSkin>(
     let (model, time) = (&tick.environment.contact, tick.substep_time(now));
     model.move_tools(fastest_m_per_s, &time, tools, contact);
     let mut renewed = model.list_on_skin(skin, &mut listed.x, tools, contact, scratch);
+    renewed |= model.list_walls_on_skin(skin, contact, scratch);
     renewed |= listed.layout != skin.layout();
     renewed |= tick.usable_points().any(|point| !listed.is_listed(point.node));
     if renewed {
@@ -134,6 +135,7 @@ pub(crate) fn touch_skin<S: CarriedSkin>(
     let velocity = |vertex: u32| skin.velocity_m_per_s(vertex);
     let surface = SurfaceNow { x: &listed.x, velocity_m_per_s: &velocity };
     model.press_tools(&surface, &time, tools, contact, &mut listed.forces_n, scratch);
+    model.press_walls_on_skin(&listed.x, contact, &mut listed.forces_n, scratch);
     external_n.fill(DVec3::ZERO);
     listed.push(skin, external_n);
 }

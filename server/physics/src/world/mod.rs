@@ -14,7 +14,7 @@ mod state;
 mod step;
 
 pub use by_hand::{refine_only, wake_only};
-pub use energies::{elastic_energy_j, min_volume_ratio};
+pub use energies::{elastic_energy_j, meeting_walls, min_volume_ratio};
 pub use error::ModelError;
 pub use model::Model;
 pub use quarantine::{Quarantine, first_non_finite};

@@ -82,6 +82,10 @@ impl Skin for SkinView<'_> {
         self.hybrid.clusters.cluster_distance_m(cluster, from_m, &displaced)
     }
 
+    fn displacements_m(&self, cluster: usize) -> [DVec3; 2] {
+        self.hybrid.clusters.displacements_m(cluster, &self.displaced(self.patch.carries_of_cluster(cluster)))
+    }
+
     fn position_m(&self, vertex: u32) -> DVec3 {
         let cell_point = self.hybrid.vertex_points[vertex as usize];
         let partition = &self.hybrid.partition;

@@ -96,6 +96,11 @@ impl SkinClusters {
         self.clusters.distance_m(cluster, from_m, bounds)
     }
 
+    /// Returns a box (m) around the displacements of a cluster's vertices, by the module's formula.
+    pub(super) fn displacements_m(&self, cluster: usize, bounds: &Displaced<'_>) -> [DVec3; 2] {
+        self.clusters.displacements_m(cluster, bounds)
+    }
+
     /// Does the same for a group.
     pub(super) fn group_distance_m(&self, group: usize, from_m: DVec3, bounds: &Displaced<'_>) -> f64 {
         self.groups.distance_m(group, from_m, bounds)
@@ -139,6 +144,11 @@ impl Boxes {
     }
 
     fn distance_m(&self, number: usize, from_m: DVec3, bounds: &Displaced<'_>) -> f64 {
+        let [low_m, high_m] = self.displacements_m(number, bounds);
+        box_distance_m(from_m, self.low_m[number] + low_m, self.high_m[number] + high_m)
+    }
+
+    fn displacements_m(&self, number: usize, bounds: &Displaced<'_>) -> [DVec3; 2] {
         let nodes = &self.nodes[self.first[number] as usize..self.first[number + 1] as usize];
         let (mut least, mut most) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
         for &node in nodes {
@@ -147,6 +157,6 @@ impl Boxes {
         }
         let middle = (least + most) * 0.5;
         let reach = ((most - least) * 0.5 + bounds.deviation_m) * bounds.amplification;
-        box_distance_m(from_m, self.low_m[number] + middle - reach, self.high_m[number] + middle + reach)
+        [middle - reach, middle + reach]
     }
 }

@@ -1,0 +1,65 @@
+//! Self-contact's part of a substep.
+use super::{MovedSurface, SelfContact};
+use crate::contact::{ContactModel, ContactScratch, ContactState, broad::Skin};
+use glam::DVec3;
+
+impl ContactModel {
+    /// Presses the walls of a body whose surface's vertices are its nodes, at `x` (m), and adds the forces (N) on nodes.
+    /// The body's travel was told to the state before.
+    pub(crate) fn press_walls_of_nodes(
+        &self,
+        x: &[DVec3],
+        contact: &mut ContactState,
+        forces_n: &mut [DVec3],
+        scratch: &mut ContactScratch,
+    ) {
+        let Some(walls) = self.walls() else { return };
+        if contact.walls.slack_m <= 0.0 {
+            let surface = MovedSurface {
+                displacements_m: &|cluster| walls.displacements_m(cluster, x),
+                position_m: &|node| x[node as usize],
+            };
+            walls.query(&surface, scratch.exhaustive, &mut contact.walls, &mut scratch.walls);
+        }
+        walls.press(x, &contact.walls, forces_n, &mut scratch.walls);
+    }
+
+    /// Renews the list of what may meet on a skin, where it is out of date. Returns whether it was.
+    pub(crate) fn list_walls_on_skin(
+        &self,
+        skin: &mut impl Skin,
+        contact: &mut ContactState,
+        scratch: &mut ContactScratch,
+    ) -> bool {
+        let Some(walls) = self.walls().filter(|_| contact.walls.slack_m <= 0.0) else { return false };
+        skin.begin();
+        let surface = MovedSurface {
+            displacements_m: &|cluster| skin.displacements_m(cluster),
+            position_m: &|vertex| skin.position_m(vertex),
+        };
+        walls.query(&surface, scratch.exhaustive, &mut contact.walls, &mut scratch.walls);
+        true
+    }
+
+    /// Presses the walls of a skin whose listed vertices are at `x` (m), and adds the forces (N) on vertices.
+    pub(crate) fn press_walls_on_skin(
+        &self,
+        x: &[DVec3],
+        contact: &ContactState,
+        forces_n: &mut [DVec3],
+        scratch: &mut ContactScratch,
+    ) {
+        if let Some(walls) = self.walls() {
+            walls.press(x, &contact.walls, forces_n, &mut scratch.walls);
+        }
+    }
+
+    /// Returns the nodes of what may meet, some of them several times.
+    pub(crate) fn nodes_of_walls<'a>(&'a self, contact: &'a ContactState) -> impl Iterator<Item = u32> + 'a {
+        self.walls().into_iter().flat_map(|walls: &SelfContact| {
+            contact.walls.pairs().iter().flat_map(|&[node, triangle]| {
+                walls.triangles.nodes[triangle as usize].into_iter().chain([node])
+            })
+        })
+    }
+}
