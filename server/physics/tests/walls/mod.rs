@@ -47,7 +47,7 @@ pub fn gripped_clamp(self_contact: SelfContactChoice) -> ModelSpec {
     let (back, below, above) =
         (of(&|p| p.x < 1e-4), of(&|p| p.x > 0.04 && p.z < -0.0099), of(&|p| p.x > 0.04 && p.z > 0.0099));
     spec.prescribed =
-        vec![hold("back", back, [true; 3]), hold("below", below, [false, false, true]), hold("above", above, [false, false, true])];
+        vec![hold("back", back, [true; 3]), hold("below", below, [true; 3]), hold("above", above, [true; 3])];
     spec.settings.mass_damping_per_s = 40.0;
     spec
 }
@@ -93,6 +93,8 @@ pub fn hybrid_clamp(self_contact: SelfContactChoice) -> ModelSpec {
     spec.settings.mass_damping_per_s = 40.0;
     spec.settings.self_contact = self_contact;
     spec.tools = [-1.0, 1.0].map(|side| sphere(6e-3, outside(side, 0.0), Coupling::Rigid)).to_vec();
+    // Without friction the arms would slip aside.
+    spec.tools.iter_mut().for_each(|tool| tool.friction_coefficient = 0.6);
     let particles = ParticleSpec {
         skin: Skin::new(positions, surface.triangles).unwrap(),
         spacing_m: 4e-3,

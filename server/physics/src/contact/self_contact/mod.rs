@@ -6,6 +6,7 @@
 //! ```text
 //! Φ = Σ_v κ_v φ(m_v − g_v)      f_y = −∂Φ/∂y = κ φ'(s) n̂,  n̂ = ∂g/∂y      f_i = −w_i f_y  at the corners, p = Σ w_i x_i
 //! ```
+//! At a rim, where a wall that faces the vertex ends, all of it fades beside the wall.
 //! Both walls press each other's vertices, so each has half of a foundation's stiffness. `f_y` acts along `y − p`, so
 //! that momentum and angular momentum are conserved. The potential depends on positions alone: there is no history.
 //!

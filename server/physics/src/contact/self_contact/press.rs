@@ -1,5 +1,5 @@
 //! Pressing walls that meet: forces, energy, and what they ask of the step.
-use super::{gap::Gap, lists::NearWalls, query::WallScratch, response::Response, rest::SelfContact};
+use super::{gap::Gap, lists::NearWalls, query::WallScratch, response::Response, rest::{NodeAtRest, SelfContact}};
 use glam::DVec3;
 
 /// The walls of a body that meet, at the last evaluation of a tick.
@@ -26,12 +26,31 @@ impl MeetingWalls {
 /// A vertex that is pressed.
 struct Pressed {
     gap: Gap,
-    /// `κ φ` (J).
+    /// `κ φ F` (J).
     energy_j: f64,
-    /// `κ φ'` (N).
+    /// Force (N) along the gap's direction: `κ φ' F`, or `κ (φ' F + 2 h φ ∂F/∂δ²)` at a rim.
     force_n: f64,
-    /// `κ φ''` (N/m).
+    /// Force (N) along the way to the rim: `−2 κ φ ∂F/∂δ² (y − p)`.
+    beside_n: DVec3,
+    /// `κ φ'' F` (N/m).
     stiffness_n_per_m: f64,
+}
+
+impl Pressed {
+    /// Makes what a gap smaller than the vertex's margin gives.
+    fn of(gap: Gap, at: &NodeAtRest) -> Self {
+        let (k, of) = (at.stiffness_n_per_m, Response::of(at.margin_m - gap.gap_m, at.margin_m));
+        let (fade, slope_per_m2, way) =
+            gap.beside.map_or((1.0, 0.0, DVec3::ZERO), |beside| (beside.fade, beside.slope_per_m2, beside.way));
+        let fading_n_per_m = 2.0 * k * of.energy_m2 * slope_per_m2;
+        Self {
+            gap,
+            energy_j: k * of.energy_m2 * fade,
+            force_n: k * of.force_m * fade + gap.gap_m * fading_n_per_m,
+            beside_n: way * -fading_n_per_m,
+            stiffness_n_per_m: k * of.stiffness * fade,
+        }
+    }
 }
 
 impl SelfContact {
@@ -49,14 +68,20 @@ impl SelfContact {
         let mut touched = false;
         self.for_each_pressed(x, near, |node, pressed| {
             touched = true;
-            let Pressed { gap, energy_j, force_n, stiffness_n_per_m } = pressed;
+            let Pressed { gap, energy_j, force_n, beside_n, stiffness_n_per_m } = pressed;
             let force = gap.direction * *force_n;
-            let row = 2.0 * stiffness_n_per_m;
-            forces_n[node as usize] += force;
+            let row = stiffness_n_per_m * (1.0 + gap.weights.iter().map(|weight| weight.abs()).sum::<f64>());
+            forces_n[node as usize] += force + *beside_n;
             rows_n_per_m[node as usize] += row;
-            for (corner, weight) in self.triangles.nodes[gap.triangle as usize].into_iter().zip(gap.weights) {
+            let corners = self.triangles.nodes[gap.triangle as usize];
+            for (corner, weight) in corners.into_iter().zip(gap.weights) {
                 forces_n[corner as usize] -= force * weight;
-                rows_n_per_m[corner as usize] += row * weight;
+                rows_n_per_m[corner as usize] += row * weight.abs();
+            }
+            if let Some(beside) = gap.beside {
+                for (corner, weight) in corners.into_iter().zip(beside.weights) {
+                    forces_n[corner as usize] -= *beside_n * weight;
+                }
             }
             seen.add(gap.gap_m, *energy_j);
         });
@@ -85,11 +110,8 @@ impl SelfContact {
             let node = of_vertex[0][0];
             let Some(gap) = self.gap(node, of_vertex.iter().map(|pair| pair[1]), x) else { continue };
             let at = &self.nodes[node as usize];
-            let depth_m = at.margin_m - gap.gap_m;
-            if depth_m > 0.0 {
-                let (k, of) = (at.stiffness_n_per_m, Response::of(depth_m, at.margin_m));
-                let (energy_j, force_n) = (k * of.energy_m2, k * of.force_m);
-                visit(node, &Pressed { gap, energy_j, force_n, stiffness_n_per_m: k * of.stiffness });
+            if gap.gap_m < at.margin_m {
+                visit(node, &Pressed::of(gap, at));
             }
         }
     }

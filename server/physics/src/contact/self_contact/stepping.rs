@@ -54,12 +54,15 @@ impl ContactModel {
         }
     }
 
-    /// Returns the nodes of what may meet, some of them several times.
+    /// Returns the nodes whose positions decide how what is listed meets, some of them several times: those of the pairs,
+    /// and of all triangles around them, by which it is known what faces what.
     pub(crate) fn nodes_of_walls<'a>(&'a self, contact: &'a ContactState) -> impl Iterator<Item = u32> + 'a {
         self.walls().into_iter().flat_map(|walls: &SelfContact| {
-            contact.walls.pairs().iter().flat_map(|&[node, triangle]| {
+            let of_pairs = contact.walls.pairs().iter().flat_map(|&[node, triangle]| {
                 walls.triangles.nodes[triangle as usize].into_iter().chain([node])
-            })
+            });
+            let around = of_pairs.flat_map(|node| walls.around.row(node as usize));
+            around.flat_map(|&triangle| walls.triangles.nodes[triangle as usize])
         })
     }
 }
