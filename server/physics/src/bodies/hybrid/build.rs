@@ -41,11 +41,13 @@ impl HybridBody {
         let vertices = hybrid.skin_rest_m().len() as u32;
         let moduli_pa: Vec<DVec2> = (0..vertices).map(|v| moduli::moduli_pa(hybrid.material_at(v))).collect();
         let (moduli, mass_kg) = (moduli::mean_over_corners(&moduli_pa, &surface), hybrid.vertex_masses_kg());
+        let bearing_kg = hybrid.bearing_masses_kg();
         let skin = SkinAtRest {
             positions_m: hybrid.skin_rest_m(),
             surface: &surface,
             moduli: &moduli,
             mass_kg: &mass_kg,
+            bearing_kg: &bearing_kg,
             max_natural_frequency_rad_per_s: omega,
         };
         let contact = ContactModel::build(skin.positions_m, &surface, &moduli, &mass_kg, omega, &around.tools)

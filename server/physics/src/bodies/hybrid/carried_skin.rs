@@ -202,6 +202,25 @@ impl HybridBody {
         points().map(of_vertex).collect()
     }
 
+    /// Returns the masses (kg) by which what is pressed at the skin's vertices is borne where neighbours are pressed alike:
+    /// `min_p m_p/Σ_v w_vp` over the particles of each. Unlike [`Self::vertex_masses_kg`] it knows no areas: a vertex of
+    /// small triangles is borne by the same particles as its neighbours.
+    pub(crate) fn bearing_masses_kg(&self) -> Vec<f64> {
+        let points = || self.vertex_points.iter().map(|point| point.trilinear(&self.partition));
+        let mut shares = vec![0.0; self.partition.particle_count()];
+        for point in points() {
+            for (particle, weight) in point.particles.into_iter().zip(point.weights) {
+                shares[particle as usize] += weight.max(0.0);
+            }
+        }
+        let of_vertex = |point: TrilinearPoint| {
+            let carriers = point.particles.into_iter().zip(point.weights).filter(|(_, weight)| *weight > 1e-6);
+            let each = carriers.map(|(p, _)| self.masses.particle_kg[p as usize] / shares[p as usize]);
+            each.fold(f64::INFINITY, f64::min)
+        };
+        points().map(of_vertex).collect()
+    }
+
     /// Returns the springs (N/m) at vertices of the skin as their particles feel them: the row sums of
     /// `Σ_v k_v w_v w_vᵀ`.
     pub(crate) fn particle_springs_n_per_m(&self, of_vertices_n_per_m: &[f64]) -> Vec<f64> {

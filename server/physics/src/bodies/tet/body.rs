@@ -70,6 +70,7 @@ impl TetBody {
             surface: &surface,
             moduli: &moduli,
             mass_kg: &body.mass_kg,
+            bearing_kg: &body.mass_kg,
             max_natural_frequency_rad_per_s: omega,
         };
         let contact = ContactModel::build(skin.positions_m, &surface, &moduli, skin.mass_kg, omega, &spec.tools)

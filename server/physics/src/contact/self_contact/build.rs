@@ -19,6 +19,8 @@ const CLOSE: f64 = 6.0;
 const STRIDE: f64 = 0.25;
 /// Gap at rest over the size of the skin's triangles below which the body lies against itself.
 const AGAINST_ITSELF: f64 = 0.02;
+/// Least part of the stiffness that counts as borne.
+const LEAST_BORNE: f64 = 1e-6;
 /// Part of the gap at rest that a margin may take.
 const OF_GAP: f64 = 0.5;
 
@@ -31,8 +33,10 @@ pub(crate) struct SkinAtRest<'a> {
     pub(crate) surface: &'a Surface,
     /// Moduli behind its triangles.
     pub(crate) moduli: &'a [SurfaceModuli],
-    /// Mass (kg) that bears contact at each node.
+    /// Each node's part of the mass (kg) that bears contact, by its area.
     pub(crate) mass_kg: &'a [f64],
+    /// Mass (kg) that bears what is pressed at each node, if its neighbours are pressed alike.
+    pub(crate) bearing_kg: &'a [f64],
     /// ω_max (rad/s) of the body without contact.
     pub(crate) max_natural_frequency_rad_per_s: f64,
 }
@@ -46,6 +50,7 @@ impl SelfContact {
             nodes: vec![NodeAtRest::INSIDE; skin.positions_m.len()],
             rest_m: skin.positions_m.to_vec(),
             of_cluster: Rows::default(),
+            of_triangles: Rows::default(),
             clusters: Vec::new(),
             close: Rows::default(),
             reach_m: 0.0,
@@ -94,7 +99,7 @@ impl SelfContact {
 
     /// Returns the box (m) around the displacements of a cluster's nodes, at `x` (m).
     pub(in crate::contact) fn displacements_m(&self, cluster: usize, x: &[DVec3]) -> [DVec3; 2] {
-        let nodes = self.triangles.nodes[self.triangles.cluster_range(cluster)].iter().flatten();
+        let nodes = self.of_triangles.row(cluster).iter();
         nodes.fold([DVec3::INFINITY, DVec3::NEG_INFINITY], |[low_m, high_m], &node| {
             let u = x[node as usize] - self.rest_m[node as usize];
             [low_m.min(u), high_m.max(u)]
@@ -103,7 +108,7 @@ impl SelfContact {
 
     fn box_clusters(&mut self) {
         let mut is_taken = vec![false; self.rest_m.len()];
-        let mut own = Vec::new();
+        let (mut own, mut all) = (Vec::new(), Vec::new());
         for cluster in 0..self.triangles.clusters() {
             let (mut low_m, mut high_m) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
             let mut nodes = Vec::new();
@@ -115,14 +120,19 @@ impl SelfContact {
                 }
             }
             own.push(nodes);
+            let mut of_triangles: Vec<u32> =
+                self.triangles.nodes[self.triangles.cluster_range(cluster)].iter().flatten().copied().collect();
+            of_triangles.sort_unstable();
+            of_triangles.dedup();
+            all.push(of_triangles);
             let far = f64::INFINITY;
             self.clusters.push(ClusterAtRest { low_m, high_m, free_close_m: far, free_far_m: far });
         }
-        self.of_cluster = Rows::of(own);
+        (self.of_cluster, self.of_triangles) = (Rows::of(own), Rows::of(all));
     }
 
-    /// Finds normals, sizes and stiffness of the surface's nodes. `κ` is no more than what the node's mass bears: a
-    /// vertex and the corners that press it add `4 κ/m` to its squared frequency.
+    /// Finds normals, sizes and stiffness of the surface's nodes, and what part of it their masses bear: a vertex and the
+    /// corners that press it add `4 κ c/m` to its squared frequency.
     fn measure_nodes(&mut self, skin: &SkinAtRest<'_>) {
         let frequency_sq = skin.max_natural_frequency_rad_per_s.max(1.0).powi(2);
         for &node in &skin.surface.nodes {
@@ -139,17 +149,18 @@ impl SelfContact {
                 area_m2 += third_m2;
                 wanted += third_m2 * modulus_pa;
             }
-            let mass_kg = skin.mass_kg[node as usize];
-            let half_of = 0.5 * STIFFNESS_RATIO * wanted / size_m;
-            let stiffness_n_per_m = half_of.min(0.25 * FREQUENCY_FRACTION * frequency_sq * mass_kg);
-            let is_usable = area_m2 > 0.0 && stiffness_n_per_m.is_finite();
+            let stiffness_n_per_m = 0.5 * STIFFNESS_RATIO * wanted / size_m;
+            let most_n_per_m = 0.25 * FREQUENCY_FRACTION * frequency_sq * skin.mass_kg[node as usize];
+            let bears = (most_n_per_m / stiffness_n_per_m).clamp(LEAST_BORNE, 1.0);
+            let is_usable = area_m2 > 0.0 && stiffness_n_per_m.is_finite() && bears.is_finite();
             self.nodes[node as usize] = NodeAtRest {
                 normal: normal.normalize_or_zero(),
                 size_m,
                 thickness_m: f64::INFINITY,
                 margin_m: MARGIN * size_m,
                 stiffness_n_per_m: if is_usable { stiffness_n_per_m } else { 0.0 },
-                mass_kg,
+                bears: if is_usable { bears } else { LEAST_BORNE },
+                bearing_kg: skin.bearing_kg[node as usize],
             };
         }
     }
@@ -201,9 +212,9 @@ impl SelfContact {
     /// Makes the margins so small that nothing is pressed at rest, and leaves vertices out that lie against a wall.
     fn fit_margins(&mut self) {
         let near = self.near_at(&self.rest_m);
-        for of_vertex in near.pairs().chunk_by(|one, next| one[0] == next[0]) {
-            let node = of_vertex[0][0];
-            let Some(gap) = self.gap(node, of_vertex.iter().map(|pair| pair[1]), &self.rest_m) else { continue };
+        for of_vertex in near.pairs().chunk_by(|one, next| one.node == next.node) {
+            let node = of_vertex[0].node;
+            let Some(gap) = self.gap(node, of_vertex.iter().map(|pair| pair.triangle), &self.rest_m) else { continue };
             let at = &mut self.nodes[node as usize];
             at.margin_m = at.margin_m.min(OF_GAP * gap.gap_m);
             if gap.gap_m < AGAINST_ITSELF * at.size_m {

@@ -34,18 +34,11 @@ pub(super) struct Gap {
     pub(super) triangle: u32,
     /// `−∂g/∂x_i` along `direction`: weights of its corners.
     pub(super) weights: [f64; 3],
-    /// What lies beside a rim.
-    pub(super) beside: Option<Beside>,
-}
-
-/// How far a vertex is beside a rim.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Beside {
+    /// Weights `w` of the corners at `p`.
+    pub(super) at: [f64; 3],
     /// `y − p` (m).
     pub(super) way: DVec3,
-    /// Weights of the corners at `p`.
-    pub(super) weights: [f64; 3],
-    /// `F`.
+    /// `F`, 1 where there is no rim.
     pub(super) fade: f64,
     /// `∂F/∂δ²` (1/m²).
     pub(super) slope_per_m2: f64,
@@ -99,7 +92,7 @@ impl SelfContact {
         let sign = self.side(&nearest, x);
         let direction = nearest.way * (sign / distance_m);
         let Nearest { triangle, weights, .. } = nearest;
-        Some(Gap { gap_m: sign * distance_m, direction, triangle, weights, beside: None })
+        Some(Gap { gap_m: sign * distance_m, direction, triangle, weights, ..nearest.over_face() })
     }
 
     /// Returns the triangles that have the edge or corner on which the nearest point lies.
@@ -148,17 +141,16 @@ impl SelfContact {
             from.cross(c - a).dot(area) / area.length_squared(),
             (b - a).cross(from).dot(area) / area.length_squared(),
         );
-        let way_weights = closest_weights(y, corners);
-        let way = y - (a * way_weights[0] + b * way_weights[1] + c * way_weights[2]);
+        let at = closest_weights(y, corners);
+        let way = y - (a * at[0] + b * at[1] + c * at[2]);
         let fades_sq = (FADES_WITHIN * self.nodes[node as usize].margin_m).powi(2);
         let q = (way.length_squared() - height_m * height_m).max(0.0) / fades_sq;
         if q >= 1.0 {
             return None;
         }
         let (fade, slope_per_m2) = (1.0 - q * q * (3.0 - 2.0 * q), 6.0 * q * (q - 1.0) / fades_sq);
-        let beside = Beside { way, weights: way_weights, fade, slope_per_m2 };
         let weights = [1.0 - wb - wc, wb, wc];
-        Some(Gap { gap_m: height_m, direction: normal, triangle, weights, beside: Some(beside) })
+        Some(Gap { gap_m: height_m, direction: normal, triangle, weights, at, way, fade, slope_per_m2 })
     }
 
     /// Returns 1 where the way from a point on an edge or corner leads to the front of the skin, else −1.
@@ -176,6 +168,7 @@ impl SelfContact {
 impl Nearest {
     fn over_face(&self) -> Gap {
         let Self { triangle, weights, way, normal } = *self;
-        Gap { gap_m: way.dot(normal), direction: normal, triangle, weights, beside: None }
+        let (gap_m, direction) = (way.dot(normal), normal);
+        Gap { gap_m, direction, triangle, weights, at: weights, way, fade: 1.0, slope_per_m2: 0.0 }
     }
 }

@@ -1,5 +1,12 @@
 //! Pressing walls that meet: forces, energy, and what they ask of the step.
-use super::{gap::Gap, lists::NearWalls, query::WallScratch, response::Response, rest::{NodeAtRest, SelfContact}};
+use super::{
+    gap::Gap,
+    lists::NearWalls,
+    query::WallScratch,
+    response::Response,
+    rest::{NodeAtRest, SelfContact, twice_area_m2},
+};
+use crate::contact::{broad::ROUNDING_M, triangle::closest_weights};
 use glam::DVec3;
 
 /// The walls of a body that meet, at the last evaluation of a tick.
@@ -23,33 +30,84 @@ impl MeetingWalls {
     }
 }
 
-/// A vertex that is pressed.
+/// A vertex that is pressed. With the part `C` of its stiffness that it and the wall bear
+/// (`1/C = ½/c + ½ Σ w_i/c_i`), `Φ = κ C F φ`.
 struct Pressed {
     gap: Gap,
-    /// `κ φ F` (J).
+    /// `Φ` (J).
     energy_j: f64,
-    /// Force (N) along the gap's direction: `κ φ' F`, or `κ (φ' F + 2 h φ ∂F/∂δ²)` at a rim.
+    /// Force (N) along the gap's direction: `κ C (φ' F + 2 h φ ∂F/∂δ²)`.
     force_n: f64,
-    /// Force (N) along the way to the rim: `−2 κ φ ∂F/∂δ² (y − p)`.
+    /// Force (N) along the way to the nearest point: `−2 κ C φ ∂F/∂δ² (y − p)`.
     beside_n: DVec3,
-    /// `κ φ'' F` (N/m).
+    /// `∂Φ/∂w_i` (J).
+    by_weight_j: [f64; 3],
+    /// `κ C φ'' F` (N/m).
     stiffness_n_per_m: f64,
 }
 
 impl Pressed {
-    /// Makes what a gap smaller than the vertex's margin gives.
-    fn of(gap: Gap, at: &NodeAtRest) -> Self {
-        let (k, of) = (at.stiffness_n_per_m, Response::of(at.margin_m - gap.gap_m, at.margin_m));
-        let (fade, slope_per_m2, way) =
-            gap.beside.map_or((1.0, 0.0, DVec3::ZERO), |beside| (beside.fade, beside.slope_per_m2, beside.way));
-        let fading_n_per_m = 2.0 * k * of.energy_m2 * slope_per_m2;
+    /// Makes what a gap smaller than the vertex's margin gives. `bears` is `c` of the corners.
+    fn of(gap: Gap, at: &NodeAtRest, bears: [f64; 3]) -> Self {
+        let softness: f64 = 0.5 / at.bears + gap.at.iter().zip(bears).map(|(w, c)| 0.5 * w / c).sum::<f64>();
+        let (k, of) = (at.stiffness_n_per_m / softness, Response::of(at.margin_m - gap.gap_m, at.margin_m));
+        let fading_n_per_m = 2.0 * k * of.energy_m2 * gap.slope_per_m2;
+        let energy_j = k * of.energy_m2 * gap.fade;
         Self {
+            energy_j,
+            force_n: k * of.force_m * gap.fade + gap.gap_m * fading_n_per_m,
+            beside_n: gap.way * -fading_n_per_m,
+            by_weight_j: bears.map(|c| -0.5 * energy_j / (softness * c)),
+            stiffness_n_per_m: k * of.stiffness * gap.fade,
             gap,
-            energy_j: k * of.energy_m2 * fade,
-            force_n: k * of.force_m * fade + gap.gap_m * fading_n_per_m,
-            beside_n: way * -fading_n_per_m,
-            stiffness_n_per_m: k * of.stiffness * fade,
         }
+    }
+
+    /// Returns the forces (N) on the vertex and on the corners, which are at `corners` (m). They sum to zero.
+    fn forces_n(&self, corners: [DVec3; 3]) -> [DVec3; 4] {
+        let Self { gap, force_n, beside_n, .. } = self;
+        let along = gap.direction * *force_n;
+        let [on_vertex, a, b, c] = self.forces_by_weights_n(corners);
+        let on_corner = |corner: usize, by_weights: DVec3| {
+            by_weights - along * gap.weights[corner] - *beside_n * gap.at[corner]
+        };
+        [on_vertex + along + *beside_n, on_corner(0, a), on_corner(1, b), on_corner(2, c)]
+    }
+
+    /// Returns the forces (N) that come from the nearest point's motion over a wall that bears more in one place than in
+    /// another. Over a face, and over an edge `e = x_j − x_i` with `w_j = t`,
+    /// ```text
+    /// ∂w_i = ∇N_i·(∂y − Σ w_j ∂x_j) + g Σ_j (∇N_i·∇N_j) n̂·∂x_j,     ∇N_i = n̂ × e_i/2A
+    /// ∂t = (e·(∂y − ∂x_i) + (y − p − t e)·(∂x_j − ∂x_i))/e²
+    /// ```
+    fn forces_by_weights_n(&self, corners: [DVec3; 3]) -> [DVec3; 4] {
+        let (Gap { at, way, .. }, by) = (self.gap, self.by_weight_j);
+        let mut forces_n = [DVec3::ZERO; 4];
+        let used: [bool; 3] = at.map(|weight| weight > 0.0);
+        match used.iter().filter(|used| **used).count() {
+            3 => {
+                let area = twice_area_m2(corners);
+                let [a, b, c] = corners;
+                let slopes = [c - b, a - c, b - a].map(|edge| area.cross(edge) / area.length_squared());
+                let along: DVec3 = slopes.iter().zip(by).map(|(slope, by)| *slope * by).sum();
+                forces_n[0] = -along;
+                for corner in 0..3 {
+                    forces_n[corner + 1] = along * at[corner] - way * along.dot(slopes[corner]);
+                }
+            }
+            2 => {
+                let first = used.iter().position(|used| *used).unwrap_or(0);
+                let last = used.iter().rposition(|used| *used).unwrap_or(0);
+                let edge = corners[last] - corners[first];
+                let slope = (by[last] - by[first]) / edge.length_squared();
+                let turning = way - edge * at[last];
+                forces_n[0] = edge * -slope;
+                forces_n[first + 1] = (edge + turning) * slope;
+                forces_n[last + 1] = turning * -slope;
+            }
+            _ => {}
+        }
+        forces_n
     }
 }
 
@@ -59,7 +117,7 @@ impl SelfContact {
     pub(in crate::contact) fn press(
         &self,
         x: &[DVec3],
-        near: &NearWalls,
+        near: &mut NearWalls,
         forces_n: &mut [DVec3],
         scratch: &mut WallScratch,
     ) {
@@ -68,51 +126,63 @@ impl SelfContact {
         let mut touched = false;
         self.for_each_pressed(x, near, |node, pressed| {
             touched = true;
-            let Pressed { gap, energy_j, force_n, beside_n, stiffness_n_per_m } = pressed;
-            let force = gap.direction * *force_n;
-            let row = stiffness_n_per_m * (1.0 + gap.weights.iter().map(|weight| weight.abs()).sum::<f64>());
-            forces_n[node as usize] += force + *beside_n;
-            rows_n_per_m[node as usize] += row;
+            let Pressed { gap, energy_j, stiffness_n_per_m, .. } = pressed;
             let corners = self.triangles.nodes[gap.triangle as usize];
-            for (corner, weight) in corners.into_iter().zip(gap.weights) {
-                forces_n[corner as usize] -= force * weight;
-                rows_n_per_m[corner as usize] += row * weight.abs();
-            }
-            if let Some(beside) = gap.beside {
-                for (corner, weight) in corners.into_iter().zip(beside.weights) {
-                    forces_n[corner as usize] -= *beside_n * weight;
-                }
+            let ends = [node, corners[0], corners[1], corners[2]];
+            let of_ends = pressed.forces_n(corners.map(|n| x[n as usize]));
+            let weights = [1.0, gap.weights[0], gap.weights[1], gap.weights[2]].map(f64::abs);
+            let row = stiffness_n_per_m * weights.iter().sum::<f64>();
+            for ((end, force), weight) in ends.into_iter().zip(of_ends).zip(weights) {
+                forces_n[end as usize] += force;
+                rows_n_per_m[end as usize] += row * weight;
             }
             seen.add(gap.gap_m, *energy_j);
         });
         if !touched {
             return;
         }
-        for &[node, triangle] in near.pairs() {
-            for node in self.triangles.nodes[triangle as usize].into_iter().chain([node]) {
+        for pair in near.pairs() {
+            for node in self.triangles.nodes[pair.triangle as usize].into_iter().chain([pair.node]) {
                 let row = std::mem::take(&mut rows_n_per_m[node as usize]);
-                *most_frequency_sq = most_frequency_sq.max(row / self.nodes[node as usize].mass_kg);
+                *most_frequency_sq = most_frequency_sq.max(row / self.nodes[node as usize].bearing_kg);
             }
         }
     }
 
     /// Returns which walls meet with nodes at `x` (m), for those who have no list of what is near. It allocates.
     pub(crate) fn meeting(&self, x: &[DVec3]) -> MeetingWalls {
-        let near = self.near_at(x);
+        let mut near = self.near_at(x);
         let mut seen = MeetingWalls { missed: near.missed, ..MeetingWalls::default() };
-        self.for_each_pressed(x, &near, |_, pressed| seen.add(pressed.gap.gap_m, pressed.energy_j));
+        self.for_each_pressed(x, &mut near, |_, pressed| seen.add(pressed.gap.gap_m, pressed.energy_j));
         seen
     }
 
-    /// Calls `visit` for every vertex that is pressed, in ascending order.
-    fn for_each_pressed(&self, x: &[DVec3], near: &NearWalls, mut visit: impl FnMut(u32, &Pressed)) {
-        for of_vertex in near.pairs().chunk_by(|one, next| one[0] == next[0]) {
-            let node = of_vertex[0][0];
-            let Some(gap) = self.gap(node, of_vertex.iter().map(|pair| pair[1]), x) else { continue };
+    /// Calls `visit` for every vertex that is pressed, in ascending order. Pairs that cannot be within reach yet are passed
+    /// over.
+    fn for_each_pressed(&self, x: &[DVec3], near: &mut NearWalls, mut visit: impl FnMut(u32, &Pressed)) {
+        let (pairs, moved_m) = near.pairs_mut();
+        for of_vertex in pairs.chunk_by_mut(|one, next| one.node == next.node) {
+            let node = of_vertex[0].node;
+            if of_vertex.iter().all(|pair| moved_m < pair.free_m) {
+                continue;
+            }
             let at = &self.nodes[node as usize];
+            for pair in of_vertex.iter_mut().filter(|pair| moved_m >= pair.free_m && pair.free_m.is_finite()) {
+                let distance_m = self.distance_m(node, pair.triangle, x);
+                pair.free_m = moved_m + 0.5 * (distance_m - at.reach_m()) - ROUNDING_M;
+            }
+            let within = of_vertex.iter().filter(|pair| moved_m >= pair.free_m).map(|pair| pair.triangle);
+            let Some(gap) = self.gap(node, within, x) else { continue };
             if gap.gap_m < at.margin_m {
-                visit(node, &Pressed::of(gap, at));
+                let bears = self.triangles.nodes[gap.triangle as usize].map(|n| self.nodes[n as usize].bears);
+                visit(node, &Pressed::of(gap, at, bears));
             }
         }
+    }
+
+    fn distance_m(&self, node: u32, triangle: u32, x: &[DVec3]) -> f64 {
+        let corners = self.triangles.corners(triangle as usize, x);
+        let [wa, wb, wc] = closest_weights(x[node as usize], corners);
+        x[node as usize].distance(corners[0] * wa + corners[1] * wb + corners[2] * wc)
     }
 }

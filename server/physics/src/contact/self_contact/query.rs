@@ -9,7 +9,7 @@
 //! Pairs that remain are looked at vertex by vertex. The surface moves by no more than its travel, as contact's broad
 //! phase has it, so what is `r + 2 d` apart cannot meet within a travel of `d`.
 use super::{
-    lists::NearWalls,
+    lists::{NearWalls, Pair},
     rest::{ClusterAtRest, SelfContact},
 };
 use crate::contact::{
@@ -70,6 +70,18 @@ impl WallScratch {
     }
 }
 
+impl WallScratch {
+    /// Returns a lower bound (m) of the distance between two clusters that are `free_m` or more apart at rest where they
+    /// may meet.
+    fn bound_m(&self, walls: &SelfContact, pair: [usize; 2], free_m: f64) -> f64 {
+        let [a, b] = pair.map(|cluster| self.displaced[cluster]);
+        let apart = (a.high_m - b.low_m).abs().max((b.high_m - a.low_m).abs());
+        let boxes = pair
+            .map(|cluster| self.fitted[cluster].unwrap_or(walls.clusters[cluster].moved(&self.displaced[cluster])));
+        (free_m - apart.length()).max(boxes_distance_m(boxes[0], boxes[1]))
+    }
+}
+
 impl SelfContact {
     /// Lists what may meet soon. `exhaustive` looks at every pair of clusters, and has to be asked again at once.
     pub(in crate::contact) fn query(
@@ -119,8 +131,7 @@ impl SelfContact {
                 }
             }
         }
-        near.finish();
-        near.slack_m = if exhaustive { f64::NEG_INFINITY } else { slack_m - ROUNDING_M };
+        if exhaustive { near.finish_for_now() } else { near.finish(slack_m - ROUNDING_M) }
     }
 
     /// Returns how far (m) a cluster may still move until something `free_m` away at rest might be within reach, if
@@ -139,14 +150,46 @@ impl SelfContact {
         near: &mut NearWalls,
         scratch: &mut WallScratch,
     ) -> f64 {
-        let [a, b] = pair.map(|cluster| scratch.displaced[cluster]);
-        let apart = (a.high_m - b.low_m).abs().max((b.high_m - a.low_m).abs());
-        let [one, other] = pair.map(|cluster| self.clusters[cluster].moved(&scratch.displaced[cluster]));
-        let bound_m = (free_m - apart.length()).max(boxes_distance_m(one, other));
-        if bound_m >= self.reach_m + 2.0 * self.stride_m {
+        let listed_m = self.reach_m + 2.0 * self.stride_m;
+        let bound_m = scratch.bound_m(self, pair, free_m);
+        if bound_m >= listed_m {
             return 0.5 * (bound_m - self.reach_m);
         }
+        // Where its vertices are known, a cluster's displacements are, too.
+        if self.fit(pair, surface, scratch) {
+            let bound_m = scratch.bound_m(self, pair, free_m);
+            if bound_m >= listed_m {
+                return 0.5 * (bound_m - self.reach_m);
+            }
+        }
         self.look_at(pair, surface, near, scratch)
+    }
+
+    /// Makes the boxes of two clusters and of their displacements exact. Returns whether any was not.
+    fn fit(&self, pair: [usize; 2], surface: &MovedSurface<'_>, scratch: &mut WallScratch) -> bool {
+        let mut changed = false;
+        for cluster in pair {
+            if scratch.fitted[cluster].is_none() {
+                self.fit_one(cluster, surface, scratch);
+                changed = true;
+            }
+        }
+        changed
+    }
+
+    fn fit_one(&self, cluster: usize, surface: &MovedSurface<'_>, scratch: &mut WallScratch) {
+        let none = [DVec3::INFINITY, DVec3::NEG_INFINITY];
+        let (mut places, mut displacements) = (none, none);
+        let hold = |[low, high]: [DVec3; 2], p: DVec3| [low.min(p), high.max(p)];
+        for &node in self.of_triangles.row(cluster) {
+            let p = (surface.position_m)(node);
+            scratch.x[node as usize] = p;
+            places = hold(places, p);
+            displacements = hold(displacements, p - self.rest_m[node as usize]);
+        }
+        let [low_m, high_m] = displacements;
+        scratch.fitted[cluster] = Some(places);
+        scratch.displaced[cluster] = Displaced { low_m, high_m, most_m: scratch.displaced[cluster].most_m };
     }
 
     /// Lists the vertices of each of two clusters with the triangles of the other that are near, and returns the same as
@@ -158,22 +201,9 @@ impl SelfContact {
         near: &mut NearWalls,
         scratch: &mut WallScratch,
     ) -> f64 {
-        for cluster in [one, other] {
-            if scratch.fitted[cluster].is_none() {
-                scratch.fitted[cluster] = Some(self.fit(cluster, surface, &mut scratch.x));
-            }
-        }
+        self.fit([one, other], surface, scratch);
         let slack_m = self.list(one, other, near, scratch);
         if one == other { slack_m } else { slack_m.min(self.list(other, one, near, scratch)) }
-    }
-
-    fn fit(&self, cluster: usize, surface: &MovedSurface<'_>, x: &mut [DVec3]) -> [DVec3; 2] {
-        let nodes = self.triangles.nodes[self.triangles.cluster_range(cluster)].iter().flatten();
-        nodes.fold([DVec3::INFINITY, DVec3::NEG_INFINITY], |[low_m, high_m], &node| {
-            let p = (surface.position_m)(node);
-            x[node as usize] = p;
-            [low_m.min(p), high_m.max(p)]
-        })
     }
 
     /// Lists the vertices of one cluster with the near triangles of another.
@@ -194,12 +224,20 @@ impl SelfContact {
             }
             for triangle in self.triangles.cluster_range(of_triangles) {
                 let corners = self.triangles.corners(triangle, &scratch.x);
+                // No point of a triangle is farther from a corner than the longer edge there.
+                let [from, one, other] = [y, corners[1], corners[2]].map(|p| p.distance(corners[0]));
+                let bound_m = from - one.max(other);
+                if bound_m >= listed_m {
+                    slack_m = slack_m.min(0.5 * (bound_m - reach_m));
+                    continue;
+                }
                 let [wa, wb, wc] = closest_weights(y, corners);
                 let distance_m = y.distance(corners[0] * wa + corners[1] * wb + corners[2] * wc);
                 if distance_m >= listed_m {
                     slack_m = slack_m.min(0.5 * (distance_m - reach_m));
                 } else if self.may_meet(node, triangle).0 {
-                    near.push(node, triangle);
+                    let free_m = 0.5 * (distance_m - reach_m) - ROUNDING_M;
+                    near.push(Pair { node, triangle: triangle as u32, free_m });
                 }
             }
         }

@@ -12,7 +12,9 @@ pub(super) const STIFFNESS_RATIO: f64 = 4.0;
 pub(super) const FREQUENCY_FRACTION: f64 = 0.25;
 /// Triangles nearer at rest than this, over the size of those at the vertex, are beside it along the skin unless they
 /// face it across a gap.
-const BESIDE: f64 = 2.0;
+const BESIDE: f64 = 3.0;
+/// Part of the size of triangles that is rounding.
+const NOTHING: f64 = 1e-9;
 /// Sine of the angle with the skin from which a way counts as one into the material.
 const INTO: f64 = 0.25;
 /// Cosine of the angle between a triangle's normal and the opposite of one at a vertex from which they face each other.
@@ -32,6 +34,8 @@ pub(crate) struct SelfContact {
     pub(super) around: Rows<u32>,
     /// Nodes of each cluster, each node in one cluster only.
     pub(super) of_cluster: Rows<u32>,
+    /// Nodes of the triangles of each cluster.
+    pub(super) of_triangles: Rows<u32>,
     pub(super) clusters: Vec<ClusterAtRest>,
     /// Clusters near each cluster at rest, itself included, with the least distance (m) of what may meet.
     pub(super) close: Rows<CloseCluster>,
@@ -56,8 +60,10 @@ pub(super) struct NodeAtRest {
     pub(super) margin_m: f64,
     /// `κ` (N/m); 0 where it is left out.
     pub(super) stiffness_n_per_m: f64,
-    /// Mass (kg) that bears it.
-    pub(super) mass_kg: f64,
+    /// `c`, the part of it that its mass bears, up to 1.
+    pub(super) bears: f64,
+    /// Mass (kg) that bears what is pressed there.
+    pub(super) bearing_kg: f64,
 }
 
 impl NodeAtRest {
@@ -68,7 +74,8 @@ impl NodeAtRest {
         thickness_m: 0.0,
         margin_m: 0.0,
         stiffness_n_per_m: 0.0,
-        mass_kg: f64::INFINITY,
+        bears: 1.0,
+        bearing_kg: f64::INFINITY,
     };
 
     /// Returns the largest distance (m) from a wall at which it is pushed.
@@ -138,7 +145,7 @@ impl SelfContact {
         if corners.contains(&node) {
             return (false, distance_m);
         }
-        let into_m = INTO * distance_m;
+        let into_m = (INTO * distance_m).max(NOTHING * at.size_m);
         let is_through = from.dot(normal) < -into_m && from.dot(at.normal) > into_m;
         if is_through && distance_m < WITHIN_WALL * at.thickness_m {
             return (false, distance_m);
@@ -146,7 +153,8 @@ impl SelfContact {
         if distance_m >= BESIDE * at.size_m {
             return (true, distance_m);
         }
-        let across = from.dot(normal) >= 0.5 * distance_m;
+        // Parts that lie against each other are told apart from neighbours, too.
+        let across = from.dot(normal) > 0.5 * distance_m - NOTHING * at.size_m;
         (across && !self.is_adjacent(node, corners) && self.faces(node, normal, &self.rest_m), distance_m)
     }
 

@@ -21,7 +21,7 @@ impl ContactModel {
             };
             walls.query(&surface, scratch.exhaustive, &mut contact.walls, &mut scratch.walls);
         }
-        walls.press(x, &contact.walls, forces_n, &mut scratch.walls);
+        walls.press(x, &mut contact.walls, forces_n, &mut scratch.walls);
     }
 
     /// Renews the list of what may meet on a skin, where it is out of date. Returns whether it was.
@@ -45,12 +45,12 @@ impl ContactModel {
     pub(crate) fn press_walls_on_skin(
         &self,
         x: &[DVec3],
-        contact: &ContactState,
+        contact: &mut ContactState,
         forces_n: &mut [DVec3],
         scratch: &mut ContactScratch,
     ) {
         if let Some(walls) = self.walls() {
-            walls.press(x, &contact.walls, forces_n, &mut scratch.walls);
+            walls.press(x, &mut contact.walls, forces_n, &mut scratch.walls);
         }
     }
 
@@ -58,8 +58,8 @@ impl ContactModel {
     /// and of all triangles around them, by which it is known what faces what.
     pub(crate) fn nodes_of_walls<'a>(&'a self, contact: &'a ContactState) -> impl Iterator<Item = u32> + 'a {
         self.walls().into_iter().flat_map(|walls: &SelfContact| {
-            let of_pairs = contact.walls.pairs().iter().flat_map(|&[node, triangle]| {
-                walls.triangles.nodes[triangle as usize].into_iter().chain([node])
+            let of_pairs = contact.walls.pairs().iter().flat_map(|pair| {
+                walls.triangles.nodes[pair.triangle as usize].into_iter().chain([pair.node])
             });
             let around = of_pairs.flat_map(|node| walls.around.row(node as usize));
             around.flat_map(|&triangle| walls.triangles.nodes[triangle as usize])
