@@ -5,6 +5,7 @@ fn main() {
     let scene = palpate_scene::load_file(std::path::Path::new(&path), &palpate_scene::Limits::local(), &mut |_, _| {}).unwrap();
     let model = Model::build(scene.model.clone()).unwrap();
     let (mut state, mut scratch) = (State::at_rest(&model), Scratch::new(&model));
+    println!("of cells {:?}", model.body().as_hybrid().map(|h| (0..h.skin_rest_m().len() as u32).map(|v| h.vertex_point(v).amplification()).fold(1.0, f64::max)));
     println!("model substeps {} omega {}", model.substeps(), model.body().max_natural_frequency_rad_per_s());
     let t0 = std::time::Instant::now();
     for tick in 1..=1000u32 {

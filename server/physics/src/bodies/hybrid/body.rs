@@ -139,11 +139,7 @@ impl HybridBody {
         progress(MAY_WAKE);
         let vertex_points: Vec<CellPoint> =
             spec.skin.positions_m().iter().map(|&point| CellPoint::new(&partition, point)).collect();
-        let of_vertices = vertex_points.iter().map(CellPoint::amplification).fold(1.0, f64::max);
-        let of_anchors = (0..partition.particle_count() as u32)
-            .map(|p| partition.anchor(p).weights.iter().map(|w| w.abs()).sum())
-            .fold(1.0, f64::max);
-        let hybrid = Self {
+        let mut hybrid = Self {
             lumping: Lumping::new(&partition, &masses),
             full_cell: RestCell::new(spacing_m, 1.0 - KEPT, &Moments::full(spacing_m)),
             materials,
@@ -154,7 +150,7 @@ impl HybridBody {
             free,
             may_wake,
             vertex_points,
-            amplification: of_vertices * of_anchors,
+            amplification: 1.0,
             clusters: SkinClusters::default(),
             embedding,
             partition,
@@ -164,6 +160,8 @@ impl HybridBody {
             inverse_mass_per_kg: Vec::new(),
             max_natural_frequency_rad_per_s: 0.0,
         };
+        let vertices = 0..hybrid.vertex_points.len() as u32;
+        hybrid.amplification = vertices.map(|vertex| hybrid.amplification_of(vertex)).fold(1.0, f64::max);
         progress(1.0);
         Ok(Built { body: hybrid, prescribed })
     }

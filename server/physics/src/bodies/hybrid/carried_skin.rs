@@ -54,7 +54,6 @@ impl<'a> SkinView<'a> {
         Displaced {
             displacements_m: self.patch.node_displacements_m(),
             deviation_m: if by_particles { self.deviation_m } else { 0.0 },
-            amplification: self.hybrid.amplification,
         }
     }
 }
@@ -200,6 +199,14 @@ impl HybridBody {
             area_m2 * carriers.map(|(particle, _)| per_area(particle)).fold(f64::INFINITY, f64::min)
         };
         points().map(of_vertex).collect()
+    }
+
+    /// Returns the bound of the speed of a vertex of the skin over that of the fastest node or particle,
+    /// `Σ_p |w_vp| Σ_i |ζ_pi|`.
+    pub(super) fn amplification_of(&self, vertex: u32) -> f64 {
+        let point = self.vertex_points[vertex as usize].trilinear(&self.partition);
+        let of = |particle: u32| self.partition.anchor(particle).weights.iter().map(|w| w.abs()).sum::<f64>().max(1.0);
+        point.particles.into_iter().zip(point.weights).map(|(particle, w)| w.abs() * of(particle)).sum()
     }
 
     /// Returns the masses (kg) by which what is pressed at the skin's vertices is borne where neighbours are pressed alike:

@@ -32,6 +32,8 @@ struct Boxes {
     /// Index in `vertices` of the first entry of each cluster, and the end of the last; empty for groups.
     first_vertex: Vec<u32>,
     vertices: Vec<u32>,
+    /// `a`, the bound of `Σ |w_i|`, of each box.
+    amplification: Vec<f64>,
 }
 
 impl SkinClusters {
@@ -114,18 +116,18 @@ pub(super) struct Displaced<'a> {
     pub(super) displacements_m: &'a [DVec3],
     /// `max |d_p|` (m); 0 for clusters of which no active particle carries a vertex.
     pub(super) deviation_m: f64,
-    /// `a`, the bound of `Σ |w_i|`.
-    pub(super) amplification: f64,
 }
 
 impl Boxes {
     fn push(&mut self, hybrid: &HybridBody, rest_positions_m: &[DVec3], triangles: &[[u32; 3]]) {
         let (mut low, mut high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
         let (start, first_vertex) = (self.nodes.len(), self.vertices.len());
+        let mut amplification = 1.0_f64;
         for &vertex in triangles.iter().flatten() {
             let rest_m = rest_positions_m[vertex as usize];
             (low, high) = (low.min(rest_m), high.max(rest_m));
             let partition = hybrid.partition();
+            amplification = amplification.max(hybrid.amplification_of(vertex));
             if triangles.len() <= CLUSTER && !self.vertices[first_vertex..].contains(&vertex) {
                 self.vertices.push(vertex);
             }
@@ -137,6 +139,7 @@ impl Boxes {
                 }
             }
         }
+        self.amplification.push(amplification);
         self.low_m.push(low);
         self.high_m.push(high);
         self.first.push(self.nodes.len() as u32);
@@ -156,7 +159,7 @@ impl Boxes {
             (least, most) = (least.min(u), most.max(u));
         }
         let middle = (least + most) * 0.5;
-        let reach = ((most - least) * 0.5 + bounds.deviation_m) * bounds.amplification;
+        let reach = ((most - least) * 0.5 + bounds.deviation_m) * self.amplification[number];
         [middle - reach, middle + reach]
     }
 }

@@ -14,7 +14,7 @@ use crate::{
 use glam::DVec3;
 
 /// Clusters nearer at rest than so many mean edges of the skin are close.
-const CLOSE: f64 = 6.0;
+const CLOSE: f64 = 8.0;
 /// How far the surface may move at least between two queries, over the mean edge.
 const STRIDE: f64 = 0.25;
 /// Gap at rest over the size of the skin's triangles below which the body lies against itself.

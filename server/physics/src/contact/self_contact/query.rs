@@ -41,6 +41,9 @@ struct Displaced {
     high_m: DVec3,
     /// Largest displacement (m).
     most_m: f64,
+    /// A ball around its vertices: middle and radius (m).
+    middle_m: DVec3,
+    radius_m: f64,
 }
 
 /// A surface, as a query asks about it.
@@ -59,7 +62,8 @@ impl WallScratch {
 
     pub(super) fn new(walls: &SelfContact) -> Self {
         let (nodes, clusters) = (walls.rest_m.len(), walls.clusters.len());
-        let still = Displaced { low_m: DVec3::ZERO, high_m: DVec3::ZERO, most_m: 0.0 };
+        let (low_m, high_m, middle_m) = (DVec3::ZERO, DVec3::ZERO, DVec3::ZERO);
+        let still = Displaced { low_m, high_m, most_m: 0.0, middle_m, radius_m: 0.0 };
         Self {
             x: vec![DVec3::ZERO; nodes],
             displaced: vec![still; clusters],
@@ -71,6 +75,11 @@ impl WallScratch {
 }
 
 impl WallScratch {
+    fn balls_apart_m(&self, one: usize, other: usize) -> f64 {
+        let (a, b) = (&self.displaced[one], &self.displaced[other]);
+        a.middle_m.distance(b.middle_m) - a.radius_m - b.radius_m
+    }
+
     /// Returns a lower bound (m) of the distance between two clusters that are `free_m` or more apart at rest where they
     /// may meet.
     fn bound_m(&self, walls: &SelfContact, pair: [usize; 2], free_m: f64) -> f64 {
@@ -95,8 +104,16 @@ impl SelfContact {
         scratch.fitted.fill(None);
         for (cluster, displaced) in scratch.displaced.iter_mut().enumerate() {
             let [low_m, high_m] = (surface.displacements_m)(cluster);
-            *displaced = Displaced { low_m, high_m, most_m: low_m.abs().max(high_m.abs()).length() };
+            let at = &self.clusters[cluster];
+            *displaced = Displaced {
+                low_m,
+                high_m,
+                most_m: low_m.abs().max(high_m.abs()).length(),
+                middle_m: (at.low_m + low_m + at.high_m + high_m) * 0.5,
+                radius_m: (at.high_m + high_m - at.low_m - low_m).length() * 0.5,
+            };
         }
+        let listed_m = self.reach_m + 2.0 * self.stride_m;
         let mut slack_m = f64::INFINITY;
         for one in 0..self.clusters.len() {
             if exhaustive {
@@ -125,6 +142,11 @@ impl SelfContact {
                         continue;
                     }
                     if other >= one || self.left_m(scratch, other, self.clusters[other].free_far_m) >= self.stride_m {
+                        let bound_m = scratch.balls_apart_m(one, other);
+                        if bound_m >= listed_m {
+                            slack_m = slack_m.min(0.5 * (bound_m - self.reach_m));
+                            continue;
+                        }
                         let [a, b] = [one, other].map(|cluster| &self.clusters[cluster]);
                         slack_m = slack_m.min(self.pair([one, other], a.rest_distance_m(b), surface, near, scratch));
                     }
@@ -189,7 +211,7 @@ impl SelfContact {
         }
         let [low_m, high_m] = displacements;
         scratch.fitted[cluster] = Some(places);
-        scratch.displaced[cluster] = Displaced { low_m, high_m, most_m: scratch.displaced[cluster].most_m };
+        scratch.displaced[cluster] = Displaced { low_m, high_m, ..scratch.displaced[cluster] };
     }
 
     /// Lists the vertices of each of two clusters with the triangles of the other that are near, and returns the same as

@@ -11,8 +11,10 @@ pub(super) const STIFFNESS_RATIO: f64 = 4.0;
 /// Largest addition of a vertex at its margin to the squared frequency at a node, over the body's ω²_max.
 pub(super) const FREQUENCY_FRACTION: f64 = 0.25;
 /// Triangles nearer at rest than this, over the size of those at the vertex, are beside it along the skin unless they
-/// face it across a gap.
-const BESIDE: f64 = 3.0;
+/// face it across a gap. Fewer, and wherever the body bends strongly every query looks at all that is beside.
+const BESIDE: f64 = 6.0;
+/// Sine of the least angle with a triangle at which a vertex is before it.
+const BEFORE: f64 = 0.1;
 /// Part of the size of triangles that is rounding.
 const NOTHING: f64 = 1e-9;
 /// Sine of the angle with the skin from which a way counts as one into the material.
@@ -154,7 +156,7 @@ impl SelfContact {
             return (true, distance_m);
         }
         // Parts that lie against each other are told apart from neighbours, too.
-        let across = from.dot(normal) > 0.5 * distance_m - NOTHING * at.size_m;
+        let across = from.dot(normal) > BEFORE * distance_m - NOTHING * at.size_m;
         (across && !self.is_adjacent(node, corners) && self.faces(node, normal, &self.rest_m), distance_m)
     }
 

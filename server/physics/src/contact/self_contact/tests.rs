@@ -93,7 +93,8 @@ fn forces_are_the_potentials_negative_gradient_and_change_no_momentum() {
 fn what_the_step_is_told_is_no_less_than_the_stiffness() {
     let mesh = clamp();
     let walls = walls_of(&mesh, true).unwrap();
-    let x = bent(&mesh, 2.2e-3, 0.0, 1);
+    // Not vertex over vertex, where what walls bear has a kink.
+    let x = bent(&mesh, 2.2e-3, 1e-4, 1);
     let mut near = walls.near_at(&x);
     let mut scratch = walls.scratch();
     walls.press(&x, &mut near, &mut vec![DVec3::ZERO; x.len()], &mut scratch);
