@@ -106,6 +106,14 @@ pub(crate) trait Skin {
     fn displacements_m(&self, _cluster: usize) -> [DVec3; 2] {
         [DVec3::NEG_INFINITY, DVec3::INFINITY]
     }
+    /// Returns the displacements (m) that move its vertices; none, where a kind of body does not tell them.
+    fn moving_m(&self) -> impl ExactSizeIterator<Item = DVec3> {
+        std::iter::empty()
+    }
+    /// Returns a bound of how far a vertex moves over the farthest of these.
+    fn amplification(&self) -> f64 {
+        1.0
+    }
 }
 
 /// Triangles that a tool may touch, and how far things may move before the list is out of date.

@@ -48,6 +48,7 @@ impl HybridBody {
             moduli: &moduli,
             mass_kg: &mass_kg,
             bearing_kg: &bearing_kg,
+            moving: hybrid.most_positions(),
             max_natural_frequency_rad_per_s: omega,
         };
         let contact = ContactModel::build(skin.positions_m, &surface, &moduli, &mass_kg, omega, &around.tools)

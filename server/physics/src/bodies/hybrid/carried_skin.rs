@@ -81,6 +81,14 @@ impl Skin for SkinView<'_> {
         self.hybrid.clusters.cluster_distance_m(cluster, from_m, &displaced)
     }
 
+    fn moving_m(&self) -> impl ExactSizeIterator<Item = DVec3> {
+        self.patch.moving_m()
+    }
+
+    fn amplification(&self) -> f64 {
+        self.hybrid.amplification
+    }
+
     fn displacements_m(&self, cluster: usize) -> [DVec3; 2] {
         self.hybrid.clusters.displacements_m(cluster, &self.displaced(self.patch.carries_of_cluster(cluster)))
     }

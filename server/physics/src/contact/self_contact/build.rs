@@ -37,6 +37,8 @@ pub(crate) struct SkinAtRest<'a> {
     pub(crate) mass_kg: &'a [f64],
     /// Mass (kg) that bears what is pressed at each node, if its neighbours are pressed alike.
     pub(crate) bearing_kg: &'a [f64],
+    /// Number of positions that move the surface, at most.
+    pub(crate) moving: usize,
     /// ω_max (rad/s) of the body without contact.
     pub(crate) max_natural_frequency_rad_per_s: f64,
 }
@@ -56,6 +58,7 @@ impl SelfContact {
             reach_m: 0.0,
             stride_m: 0.0,
             left_out: 0,
+            moving: skin.moving,
             triangles,
         };
         built.box_clusters();
@@ -78,7 +81,7 @@ impl SelfContact {
 
     /// Returns an empty list with room for what may meet.
     pub(in crate::contact) fn no_walls(&self) -> NearWalls {
-        NearWalls::with_room(self.nodes.iter().filter(|at| at.stiffness_n_per_m > 0.0).count())
+        NearWalls::with_room(self.nodes.iter().filter(|at| at.stiffness_n_per_m > 0.0).count(), self.moving)
     }
 
     /// Returns buffers.

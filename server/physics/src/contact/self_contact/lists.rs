@@ -1,5 +1,8 @@
 //! The vertices and triangles that may meet before the surface has moved some way, in a list that never grows.
 
+use crate::contact::broad::ROUNDING_M;
+use glam::DVec3;
+
 /// Most pairs that are listed, per vertex of the skin, and at least.
 const PAIRS_PER_VERTEX: usize = 24;
 const AT_LEAST: usize = 4096;
@@ -27,19 +30,35 @@ pub(in crate::contact) struct NearWalls {
     whole_slack_m: f64,
     /// Number of pairs for which there was no room.
     pub(super) missed: u32,
+    /// Where (m) what moves the surface was when the list was made; none where it is not known.
+    then_m: Box<[DVec3]>,
+    then_count: usize,
+    /// What carried the surface then, as a number that changes with it.
+    layout: u64,
 }
 
 impl Default for NearWalls {
     fn default() -> Self {
-        Self { pairs: Box::default(), count: 0, slack_m: f64::NEG_INFINITY, whole_slack_m: 0.0, missed: 0 }
+        Self {
+            pairs: Box::default(),
+            count: 0,
+            slack_m: f64::NEG_INFINITY,
+            whole_slack_m: 0.0,
+            missed: 0,
+            then_m: Box::default(),
+            then_count: 0,
+            layout: 0,
+        }
     }
 }
 
 impl NearWalls {
-    pub(super) fn with_room(vertices: usize) -> Self {
+    /// Makes room for pairs of so many vertices, which so many positions move.
+    pub(super) fn with_room(vertices: usize, moving: usize) -> Self {
         let room = (PAIRS_PER_VERTEX * vertices).max(AT_LEAST);
         let none = Pair { node: 0, triangle: 0, free_m: 0.0 };
-        Self { pairs: vec![none; room].into_boxed_slice(), ..Self::default() }
+        let then_m = vec![DVec3::ZERO; moving].into_boxed_slice();
+        Self { pairs: vec![none; room].into_boxed_slice(), then_m, ..Self::default() }
     }
 
     /// Returns the pairs, sorted by vertex and then by triangle.
@@ -47,9 +66,40 @@ impl NearWalls {
         &self.pairs[..self.count]
     }
 
-    /// Returns the same, to note how far they are, and how far (m) the surface has moved since the query.
-    pub(super) fn pairs_mut(&mut self) -> (&mut [Pair], f64) {
-        (&mut self.pairs[..self.count], self.whole_slack_m - self.slack_m)
+    /// Returns a bound of how far (m) the surface is from where it was at the query.
+    pub(super) fn moved_m(&self) -> f64 {
+        self.whole_slack_m - self.slack_m
+    }
+
+    /// Notes where (m) what moves the surface is, which is carried as the number `layout` tells, when the list is made.
+    pub(super) fn remember(&mut self, layout: u64, moving_m: impl Iterator<Item = DVec3>) {
+        (self.layout, self.then_count) = (layout, 0);
+        for place_m in moving_m {
+            let Some(slot) = self.then_m.get_mut(self.then_count) else {
+                self.then_count = 0;
+                return;
+            };
+            *slot = place_m;
+            self.then_count += 1;
+        }
+    }
+
+    /// Looks, where the surface's travel has used the list up, how far it really is from where it was: what trembles
+    /// travels far and goes nowhere. Returns whether the list is not out of date after all. No vertex moves farther than
+    /// `amplification` times what moves it.
+    pub(super) fn is_still_good(
+        &mut self,
+        layout: u64,
+        amplification: f64,
+        moving_m: impl ExactSizeIterator<Item = DVec3>,
+    ) -> bool {
+        if !self.slack_m.is_finite() || layout != self.layout || moving_m.len() != self.then_count || self.then_count == 0 {
+            return false;
+        }
+        let then_m = &self.then_m[..self.then_count];
+        let farthest_sq = moving_m.zip(then_m).map(|(now, then)| now.distance_squared(*then)).fold(0.0, f64::max);
+        self.slack_m = self.whole_slack_m - amplification * farthest_sq.sqrt() - ROUNDING_M;
+        self.slack_m > 0.0
     }
 
     pub(super) fn clear(&mut self) {

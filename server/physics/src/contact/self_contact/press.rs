@@ -6,7 +6,6 @@ use super::{
     response::Response,
     rest::{NodeAtRest, SelfContact, twice_area_m2},
 };
-use crate::contact::{broad::ROUNDING_M, triangle::closest_weights};
 use glam::DVec3;
 
 /// The walls of a body that meet, at the last evaluation of a tick.
@@ -117,7 +116,7 @@ impl SelfContact {
     pub(in crate::contact) fn press(
         &self,
         x: &[DVec3],
-        near: &mut NearWalls,
+        near: &NearWalls,
         forces_n: &mut [DVec3],
         scratch: &mut WallScratch,
     ) {
@@ -151,38 +150,25 @@ impl SelfContact {
 
     /// Returns which walls meet with nodes at `x` (m), for those who have no list of what is near. It allocates.
     pub(crate) fn meeting(&self, x: &[DVec3]) -> MeetingWalls {
-        let mut near = self.near_at(x);
+        let near = self.near_at(x);
         let mut seen = MeetingWalls { missed: near.missed, ..MeetingWalls::default() };
-        self.for_each_pressed(x, &mut near, |_, pressed| seen.add(pressed.gap.gap_m, pressed.energy_j));
+        self.for_each_pressed(x, &near, |_, pressed| seen.add(pressed.gap.gap_m, pressed.energy_j));
         seen
     }
 
     /// Calls `visit` for every vertex that is pressed, in ascending order. Pairs that cannot be within reach yet are passed
     /// over.
-    fn for_each_pressed(&self, x: &[DVec3], near: &mut NearWalls, mut visit: impl FnMut(u32, &Pressed)) {
-        let (pairs, moved_m) = near.pairs_mut();
-        for of_vertex in pairs.chunk_by_mut(|one, next| one.node == next.node) {
+    fn for_each_pressed(&self, x: &[DVec3], near: &NearWalls, mut visit: impl FnMut(u32, &Pressed)) {
+        let moved_m = near.moved_m();
+        for of_vertex in near.pairs().chunk_by(|one, next| one.node == next.node) {
             let node = of_vertex[0].node;
-            if of_vertex.iter().all(|pair| moved_m < pair.free_m) {
-                continue;
-            }
-            let at = &self.nodes[node as usize];
-            for pair in of_vertex.iter_mut().filter(|pair| moved_m >= pair.free_m && pair.free_m.is_finite()) {
-                let distance_m = self.distance_m(node, pair.triangle, x);
-                pair.free_m = moved_m + 0.5 * (distance_m - at.reach_m()) - ROUNDING_M;
-            }
-            let within = of_vertex.iter().filter(|pair| moved_m >= pair.free_m).map(|pair| pair.triangle);
+            let within = of_vertex.iter().filter(|pair| pair.free_m <= moved_m).map(|pair| pair.triangle);
             let Some(gap) = self.gap(node, within, x) else { continue };
+            let at = &self.nodes[node as usize];
             if gap.gap_m < at.margin_m {
                 let bears = self.triangles.nodes[gap.triangle as usize].map(|n| self.nodes[n as usize].bears);
                 visit(node, &Pressed::of(gap, at, bears));
             }
         }
-    }
-
-    fn distance_m(&self, node: u32, triangle: u32, x: &[DVec3]) -> f64 {
-        let corners = self.triangles.corners(triangle as usize, x);
-        let [wa, wb, wc] = closest_weights(x[node as usize], corners);
-        x[node as usize].distance(corners[0] * wa + corners[1] * wb + corners[2] * wc)
     }
 }

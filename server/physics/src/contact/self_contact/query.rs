@@ -25,6 +25,8 @@ pub(in crate::contact) struct WallScratch {
     x: Vec<DVec3>,
     /// What each cluster was displaced by.
     displaced: Vec<Displaced>,
+    /// Balls around the triangles of such clusters: middle (m), and radius (m).
+    balls: Vec<(DVec3, f64)>,
     /// Box (m) of each cluster that was looked at in the present query.
     fitted: Vec<Option<[DVec3; 2]>>,
     /// `Σ_j |K_ij|` (N/m) of the nodes that are pressed, else 0.
@@ -66,6 +68,7 @@ impl WallScratch {
         let still = Displaced { low_m, high_m, most_m: 0.0, middle_m, radius_m: 0.0 };
         Self {
             x: vec![DVec3::ZERO; nodes],
+            balls: vec![(DVec3::ZERO, 0.0); walls.triangles.len()],
             displaced: vec![still; clusters],
             fitted: vec![None; clusters],
             rows_n_per_m: vec![0.0; nodes],
@@ -209,6 +212,12 @@ impl SelfContact {
             places = hold(places, p);
             displacements = hold(displacements, p - self.rest_m[node as usize]);
         }
+        for triangle in self.triangles.cluster_range(cluster) {
+            let [a, b, c] = self.triangles.corners(triangle, &scratch.x);
+            let middle = (a + b + c) / 3.0;
+            let farthest_sq = a.distance_squared(middle).max(b.distance_squared(middle)).max(c.distance_squared(middle));
+            scratch.balls[triangle] = (middle, farthest_sq.sqrt());
+        }
         let [low_m, high_m] = displacements;
         scratch.fitted[cluster] = Some(places);
         scratch.displaced[cluster] = Displaced { low_m, high_m, ..scratch.displaced[cluster] };
@@ -245,14 +254,14 @@ impl SelfContact {
                 continue;
             }
             for triangle in self.triangles.cluster_range(of_triangles) {
-                let corners = self.triangles.corners(triangle, &scratch.x);
-                // No point of a triangle is farther from a corner than the longer edge there.
-                let [from, one, other] = [y, corners[1], corners[2]].map(|p| p.distance(corners[0]));
-                let bound_m = from - one.max(other);
-                if bound_m >= listed_m {
-                    slack_m = slack_m.min(0.5 * (bound_m - reach_m));
+                let (middle_m, radius_m) = scratch.balls[triangle];
+                let away_sq = y.distance_squared(middle_m);
+                let within_m = listed_m + radius_m;
+                if away_sq >= within_m * within_m {
+                    slack_m = slack_m.min(self.stride_m);
                     continue;
                 }
+                let corners = self.triangles.corners(triangle, &scratch.x);
                 let [wa, wb, wc] = closest_weights(y, corners);
                 let distance_m = y.distance(corners[0] * wa + corners[1] * wb + corners[2] * wc);
                 if distance_m >= listed_m {

@@ -11,8 +11,8 @@ pub(super) const STIFFNESS_RATIO: f64 = 4.0;
 /// Largest addition of a vertex at its margin to the squared frequency at a node, over the body's ω²_max.
 pub(super) const FREQUENCY_FRACTION: f64 = 0.25;
 /// Triangles nearer at rest than this, over the size of those at the vertex, are beside it along the skin unless they
-/// face it across a gap. Fewer, and wherever the body bends strongly every query looks at all that is beside.
-const BESIDE: f64 = 6.0;
+/// face it across a gap. If it were less, every query would look at all that is beside wherever the body bends strongly.
+const BESIDE: f64 = 12.0;
 /// Sine of the least angle with a triangle at which a vertex is before it.
 const BEFORE: f64 = 0.1;
 /// Part of the size of triangles that is rounding.
@@ -47,6 +47,8 @@ pub(crate) struct SelfContact {
     pub(super) stride_m: f64,
     /// Number of vertices that are left out because the body lies against itself there at rest.
     pub(super) left_out: usize,
+    /// Number of positions that move the surface, at most.
+    pub(super) moving: usize,
 }
 
 /// A vertex of the skin at rest.

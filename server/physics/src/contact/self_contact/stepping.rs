@@ -14,30 +14,38 @@ impl ContactModel {
         scratch: &mut ContactScratch,
     ) {
         let Some(walls) = self.walls() else { return };
-        if contact.walls.slack_m <= 0.0 {
+        let moving_m = || x.iter().copied();
+        if contact.walls.slack_m <= 0.0 && !contact.walls.is_still_good(0, 1.0, moving_m()) {
             let surface = MovedSurface {
                 displacements_m: &|cluster| walls.displacements_m(cluster, x),
                 position_m: &|node| x[node as usize],
             };
             walls.query(&surface, scratch.exhaustive, &mut contact.walls, &mut scratch.walls);
+            contact.walls.remember(0, moving_m());
         }
-        walls.press(x, &mut contact.walls, forces_n, &mut scratch.walls);
+        walls.press(x, &contact.walls, forces_n, &mut scratch.walls);
     }
 
-    /// Renews the list of what may meet on a skin, where it is out of date. Returns whether it was.
+    /// Renews the list of what may meet on a skin, where it is out of date. Returns whether it was. `layout` is a number
+    /// that changes with what carries the skin.
     pub(crate) fn list_walls_on_skin(
         &self,
         skin: &mut impl Skin,
+        layout: u64,
         contact: &mut ContactState,
         scratch: &mut ContactScratch,
     ) -> bool {
         let Some(walls) = self.walls().filter(|_| contact.walls.slack_m <= 0.0) else { return false };
+        if contact.walls.is_still_good(layout, skin.amplification(), skin.moving_m()) {
+            return false;
+        }
         skin.begin();
         let surface = MovedSurface {
             displacements_m: &|cluster| skin.displacements_m(cluster),
             position_m: &|vertex| skin.position_m(vertex),
         };
         walls.query(&surface, scratch.exhaustive, &mut contact.walls, &mut scratch.walls);
+        contact.walls.remember(layout, skin.moving_m());
         true
     }
 
@@ -45,12 +53,12 @@ impl ContactModel {
     pub(crate) fn press_walls_on_skin(
         &self,
         x: &[DVec3],
-        contact: &mut ContactState,
+        contact: &ContactState,
         forces_n: &mut [DVec3],
         scratch: &mut ContactScratch,
     ) {
         if let Some(walls) = self.walls() {
-            walls.press(x, &mut contact.walls, forces_n, &mut scratch.walls);
+            walls.press(x, &contact.walls, forces_n, &mut scratch.walls);
         }
     }
 

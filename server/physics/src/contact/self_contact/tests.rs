@@ -34,6 +34,7 @@ fn walls_of(mesh: &TetMesh, only_if_facing: bool) -> Option<SelfContact> {
         moduli: &moduli,
         mass_kg: &mass_kg,
         bearing_kg: &mass_kg,
+        moving: mesh.positions_m().len(),
         max_natural_frequency_rad_per_s: 5e3,
     };
     SelfContact::build(&skin, only_if_facing)
@@ -51,8 +52,8 @@ fn bent(mesh: &TetMesh, by_m: f64, shaken_m: f64, seed: u64) -> Vec<DVec3> {
 
 fn pressed(walls: &SelfContact, x: &[DVec3]) -> (Vec<DVec3>, super::MeetingWalls) {
     let (mut forces_n, mut scratch) = (vec![DVec3::ZERO; x.len()], walls.scratch());
-    let mut near: NearWalls = walls.near_at(x);
-    walls.press(x, &mut near, &mut forces_n, &mut scratch);
+    let near: NearWalls = walls.near_at(x);
+    walls.press(x, &near, &mut forces_n, &mut scratch);
     (forces_n, scratch.seen())
 }
 
@@ -95,9 +96,9 @@ fn what_the_step_is_told_is_no_less_than_the_stiffness() {
     let walls = walls_of(&mesh, true).unwrap();
     // Not vertex over vertex, where what walls bear has a kink.
     let x = bent(&mesh, 2.2e-3, 1e-4, 1);
-    let mut near = walls.near_at(&x);
+    let near = walls.near_at(&x);
     let mut scratch = walls.scratch();
-    walls.press(&x, &mut near, &mut vec![DVec3::ZERO; x.len()], &mut scratch);
+    walls.press(&x, &near, &mut vec![DVec3::ZERO; x.len()], &mut scratch);
     // The largest eigenvalue of M⁻¹K by power iteration on differences of forces.
     let mut direction = vec![DVec3::Z; x.len()];
     let mut value = 0.0;
@@ -105,7 +106,7 @@ fn what_the_step_is_told_is_no_less_than_the_stiffness() {
         let at = |sign: f64| {
             let x: Vec<DVec3> = x.iter().zip(&direction).map(|(x, d)| *x + *d * (1e-9 * sign)).collect();
             let mut forces_n = vec![DVec3::ZERO; x.len()];
-            walls.press(&x, &mut walls.near_at(&x), &mut forces_n, &mut walls.scratch());
+            walls.press(&x, &walls.near_at(&x), &mut forces_n, &mut walls.scratch());
             forces_n
         };
         let kg = |node: usize| if node % 3 == 0 { 6e-6 } else { 3e-5 };

@@ -160,6 +160,15 @@ impl RunningPatch {
         &self.node_displacements_m
     }
 
+    /// Returns the displacements (m) of the coarse nodes and then of the active particles, after [`Self::displace`].
+    pub(super) fn moving_m(&self) -> impl ExactSizeIterator<Item = DVec3> {
+        let (nodes, points) = (self.node_displacements_m.len(), self.points_of_active.len());
+        (0..nodes + points).map(move |number| match number.checked_sub(nodes) {
+            None => self.node_displacements_m[number],
+            Some(active) => self.displacements_m[self.points_of_active[active] as usize],
+        })
+    }
+
     /// Returns the active particles, each with its distance (m) from where it would be asleep.
     pub(super) fn deviations_m(&self) -> impl Iterator<Item = (u32, f64)> + '_ {
         let active = self.points.iter().zip(&self.displacements_m).filter(|(point, _)| point.active != NONE);
