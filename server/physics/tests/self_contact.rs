@@ -247,7 +247,8 @@ fn arms_of_a_hybrid_clamp_meet_and_part() {
 /// Pairs of vertices of the arms' inner sides that are one above the other at rest.
 fn facing_vertices(rig: &Rig) -> Vec<[u32; 2]> {
     let x = rig.model.surface_rest_positions_m();
-    let at = |z: f64| (0..x.len() as u32).filter(move |&v| (x[v as usize].z - z).abs() < 1e-6 && x[v as usize].x > 0.0119);
+    let at =
+        |z: f64| (0..x.len() as u32).filter(move |&v| (x[v as usize].z - z).abs() < 1e-6 && x[v as usize].x > 0.0119);
     let over = |b: u32| at(walls::HALF_GAP_M).find(|&a| (x[a as usize] - x[b as usize]).truncate().length() < 1e-6);
     at(-walls::HALF_GAP_M).filter_map(|b| over(b).map(|a| [b, a])).collect()
 }

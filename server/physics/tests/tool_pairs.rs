@@ -25,10 +25,8 @@ fn squeezed(couplings: [Coupling; 2]) -> ModelSpec {
     let held = nodes_where(mesh_of(&spec), |p| p.x.abs() > 0.0199);
     spec.prescribed = vec![hold("sides", held, [true; 3])];
     spec.settings.mass_damping_per_s = 15.0;
-    spec.tools = vec![
-        sphere(RADIUS_M, DVec3::Z * 0.012, couplings[0]),
-        sphere(RADIUS_M, DVec3::Z * -0.012, couplings[1]),
-    ];
+    spec.tools =
+        vec![sphere(RADIUS_M, DVec3::Z * 0.012, couplings[0]), sphere(RADIUS_M, DVec3::Z * -0.012, couplings[1])];
     spec
 }
 
@@ -61,7 +59,8 @@ fn coupled_tools_that_squeeze_a_slab_do_not_pass_through_each_other() {
 #[test]
 fn in_the_air_what_one_gets_the_other_gives() {
     for long in [false, true] {
-        let mut spec = squeezed([Coupling::Spring { stiffness_n_per_m: 1e-6, damping_n_s_per_m: 0.0, mass_kg: 0.02 }; 2]);
+        let mut spec =
+            squeezed([Coupling::Spring { stiffness_n_per_m: 1e-6, damping_n_s_per_m: 0.0, mass_kg: 0.02 }; 2]);
         for (tool, sign) in spec.tools.iter_mut().zip([1.0, -1.0]) {
             tool.start_position_m = DVec3::new(0.02 * sign, 0.001 * sign, 0.5);
             if long {

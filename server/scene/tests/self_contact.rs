@@ -35,7 +35,10 @@ fn without_leapfrog_there_is_none_and_asking_for_it_is_refused() {
     let numerics = "[numerics]\nintegrator = \"backward-euler\"";
     assert!(!has_it("", SHELL, numerics));
     let message = scene("self_contact = true", SHELL, numerics).unwrap_err().one_line();
-    assert!(message.contains("walls of a body that is not integrated by leapfrog cannot press each other"), "{message}");
+    assert!(
+        message.contains("walls of a body that is not integrated by leapfrog cannot press each other"),
+        "{message}"
+    );
     assert!(message.contains("self_contact") && message.contains("leave `self_contact` out"), "{message}");
 }
 

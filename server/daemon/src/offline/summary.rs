@@ -128,7 +128,7 @@ impl WallNumbers {
 
     fn line(&self) -> String {
         let (ticks, vertices) = (counted(self.ticks as usize, "tick"), self.most_vertices);
-        
+
         let missed = match self.most_missed {
             0 => String::new(),
             _ => "; there was no room for all that was near, so that walls may have passed".to_owned(),

@@ -172,7 +172,7 @@ impl ContactState {
     pub(crate) fn forget_geometry(&mut self) {
         self.boxes.fill(ClusterBox::UNFITTED);
         self.travel_m = 0.0;
-        self.walls.slack_m = f64::NEG_INFINITY;
+        self.walls.forget();
         for tool in &mut self.tools {
             tool.candidates.slack_m = f64::NEG_INFINITY;
         }
@@ -200,6 +200,11 @@ impl ContactState {
         if !std::mem::take(&mut self.is_tracked) {
             self.forget_geometry();
         }
+    }
+
+    /// Returns what walls of the body that meet stored (J) at the last evaluation of forces, if it is known.
+    pub(crate) fn stored_in_walls_j(&self) -> Option<f64> {
+        self.walls.energy_j()
     }
 
     /// Returns the triangles that any tool may touch.

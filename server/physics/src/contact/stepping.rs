@@ -208,7 +208,8 @@ impl ContactModel {
             friction_coefficient: model.spec.friction_coefficient,
             put_into: std::mem::take(&mut part.just_put) || part.touching.tells_it_was_put(),
         };
-        let mut pressed = narrow::press(&meeting, &mut part.candidates, &mut part.touching, &mut scratch.next, forces_n);
+        let mut pressed =
+            narrow::press(&meeting, &mut part.candidates, &mut part.touching, &mut scratch.next, forces_n);
         if let Some(push) = scratch.push {
             pressed.force_n += push.force_n;
             pressed.torque_nm += push.torque_nm;

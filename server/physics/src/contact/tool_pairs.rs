@@ -42,7 +42,9 @@ impl ContactModel {
         let pair = [index.min(other), index.max(other)];
         let [one, two] = pair.map(|tool| &self.tools[tool]);
         let stiffness_n_per_m = pair
-            .map(|tool| self.tools[tool].spring().map(|spring| STIFFNESS * spring.limit_n / self.tools[tool].spec.radius_m))
+            .map(|tool| {
+                self.tools[tool].spring().map(|spring| STIFFNESS * spring.limit_n / self.tools[tool].spec.radius_m)
+            })
             .into_iter()
             .flatten()
             .reduce(f64::min)?;

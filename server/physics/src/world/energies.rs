@@ -9,7 +9,8 @@ impl Energies {
     /// known; neither is its dissipation.
     pub fn of(model: &Model, state: &State) -> Self {
         let own = model.body().energies(model.gravity_m_per_s2(), &state.body, &state.mechanical);
-        let stored_j = meeting_walls(model, state).energy_j;
+        let known_j = state.mechanical.contact.stored_in_walls_j().filter(|_| state.mechanical.force_is_current);
+        let stored_j = known_j.unwrap_or_else(|| meeting_walls(model, state).energy_j);
         // The ledger books what walls that meet do to the body, which they take back from what they store.
         Self { elastic_j: own.elastic_j + stored_j, external_work_j: own.external_work_j + stored_j, ..own }
     }

@@ -1,6 +1,10 @@
 //! The buffers that a tick works in.
 use super::{Model, rollback::LastGood};
-use crate::{bodies::BodyScratch, contact::{ContactScratch, MeetingWalls}, integrate::ForceHistory};
+use crate::{
+    bodies::BodyScratch,
+    contact::{ContactScratch, MeetingWalls},
+    integrate::ForceHistory,
+};
 use glam::DVec3;
 
 /// Buffers of [`crate::step`], which are allocated once.

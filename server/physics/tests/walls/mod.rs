@@ -1,8 +1,6 @@
 //! Bodies with walls that can be pressed together: a clamp, and two blocks one above the other.
 #![allow(dead_code, unreachable_pub, clippy::unwrap_used)] // every test file uses its own part
-use super::rig::{
-    Drive, Rig, at, body, bricks, even, hold, material, mesh_of, nodes_where, sphere, with_particles,
-};
+use super::rig::{Drive, Rig, at, body, bricks, even, hold, material, mesh_of, nodes_where, sphere, with_particles};
 use glam::DVec3;
 use palpate_physics::{
     ModelSpec, SelfContactChoice, Surface, TetMesh,

@@ -12,6 +12,7 @@ use super::{
     seen::demand_seen,
     sites::Sites,
     sizes,
+    skin_anchors::SkinAnchors,
     spec::{HybridError, ParticleSpec},
     transition_force::is_free,
     trilinear_point::CellPoint,
@@ -59,10 +60,14 @@ pub struct HybridBody {
     pub(super) may_wake: Vec<bool>,
     /// The cell of each vertex of the skin, and the vertex's coordinates in it.
     pub(super) vertex_points: Vec<CellPoint>,
+    /// Anchors of the particles that carry these.
+    pub(super) skin_anchors: SkinAnchors,
     /// Bound of the speed of any vertex of the skin over that of the fastest node or particle.
     pub(super) amplification: f64,
     /// Bounding boxes of the skin's triangles.
     pub(super) clusters: SkinClusters,
+    /// The same of the clusters in which self-contact has them; none where there is none.
+    pub(super) wall_clusters: SkinClusters,
     pub(super) densities_kg_per_m3: Vec<f64>,
     embedding: EmbeddingSummary,
     /// The embedding mesh: the coarse mesh, its boundary moved so that it holds the particles.
@@ -149,9 +154,11 @@ impl HybridBody {
             free_parts: free.iter().map(|free| DVec3::select(*free, DVec3::ONE, DVec3::ZERO)).collect(),
             free,
             may_wake,
+            skin_anchors: SkinAnchors::new(&partition, &vertex_points),
             vertex_points,
             amplification: 1.0,
             clusters: SkinClusters::default(),
+            wall_clusters: SkinClusters::default(),
             embedding,
             partition,
             masses,
@@ -276,9 +283,11 @@ impl HybridBody {
         self.amplification
     }
 
-    /// Computes the bounding boxes of the skin's triangles, given in the order of contact's broad phase.
-    pub(crate) fn cluster(&mut self, triangles: &[[u32; 3]]) {
+    /// Computes the bounding boxes of the skin's triangles, given in the order of contact's broad phase and in that of
+    /// self-contact.
+    pub(crate) fn cluster(&mut self, triangles: &[[u32; 3]], of_walls: &[[u32; 3]]) {
         self.clusters = SkinClusters::new(self, self.skin_rest_m(), triangles);
+        self.wall_clusters = SkinClusters::new(self, self.skin_rest_m(), of_walls);
     }
 
     /// Returns the material of the tet that a vertex of the skin is in.

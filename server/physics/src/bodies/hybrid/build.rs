@@ -53,7 +53,7 @@ impl HybridBody {
         };
         let contact = ContactModel::build(skin.positions_m, &surface, &moduli, &mass_kg, omega, &around.tools)
             .with_walls(around.walls_of(&skin));
-        hybrid.cluster(contact.walls().map_or(contact.triangles(), SelfContact::triangle_nodes));
+        hybrid.cluster(contact.triangles(), contact.walls().map_or(&[], SelfContact::triangle_nodes));
         let stretch_sq = stiffening(&around.settings, &materials);
         let touched = if contact.nodal_stiffness_n_per_m.is_empty() {
             omega

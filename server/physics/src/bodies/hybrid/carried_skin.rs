@@ -90,14 +90,14 @@ impl Skin for SkinView<'_> {
     }
 
     fn displacements_m(&self, cluster: usize) -> [DVec3; 2] {
-        self.hybrid.clusters.displacements_m(cluster, &self.displaced(self.patch.carries_of_cluster(cluster)))
+        self.hybrid.wall_clusters.displacements_m(cluster, &self.displaced(self.patch.carries_of_wall(cluster)))
     }
 
     fn position_m(&self, vertex: u32) -> DVec3 {
         let cell_point = self.hybrid.vertex_points[vertex as usize];
         let partition = &self.hybrid.partition;
         let of = |particle: u32| match self.patch.point_of(particle) {
-            NONE => partition.anchor(particle).of(self.patch.node_displacements_m()),
+            NONE => self.hybrid.skin_anchors.of(particle).of(self.patch.node_displacements_m()),
             point => self.patch.displacements_m()[point as usize],
         };
         let particles = partition.corners(cell_point.cell as usize);
@@ -122,7 +122,7 @@ impl CarriedSkin for SkinView<'_> {
         for (particle, weight) in particles.into_iter().zip(cell_point.weights(&hybrid.partition)) {
             if weight != 0.0 {
                 let carrier = match self.patch.point_of(particle) {
-                    NONE => Carrier::Nodes(hybrid.partition.anchor(particle)),
+                    NONE => Carrier::Nodes(*hybrid.skin_anchors.of(particle)),
                     point => Carrier::Point(point),
                 };
                 carried.carriers[carried.weighty] = (carrier, weight);
@@ -145,7 +145,7 @@ impl CarriedSkin for SkinView<'_> {
         let hybrid = self.hybrid;
         let cell_point = hybrid.vertex_points[vertex as usize];
         let of = |particle: u32| match self.patch.number_of(particle) {
-            NONE => hybrid.partition.anchor(particle).of(self.v),
+            NONE => hybrid.skin_anchors.of(particle).of(self.v),
             number => self.v[hybrid.node_count() + number as usize],
         };
         let particles = hybrid.partition.corners(cell_point.cell as usize);
@@ -174,7 +174,7 @@ impl HybridBody {
         let moved = |particle: u32| {
             let x = match active.binary_search(&particle) {
                 Ok(number) => of_particles[number],
-                Err(_) => self.partition.anchor(particle).of(of_nodes),
+                Err(_) => self.skin_anchors.of(particle).of(of_nodes),
             };
             x - self.partition.particle_m(particle)
         };
@@ -213,7 +213,7 @@ impl HybridBody {
     /// `Σ_p |w_vp| Σ_i |ζ_pi|`.
     pub(super) fn amplification_of(&self, vertex: u32) -> f64 {
         let point = self.vertex_points[vertex as usize].trilinear(&self.partition);
-        let of = |particle: u32| self.partition.anchor(particle).weights.iter().map(|w| w.abs()).sum::<f64>().max(1.0);
+        let of = |particle: u32| self.skin_anchors.of(particle).weights.iter().map(|w| w.abs()).sum::<f64>().max(1.0);
         point.particles.into_iter().zip(point.weights).map(|(particle, w)| w.abs() * of(particle)).sum()
     }
 

@@ -132,7 +132,7 @@ impl Boxes {
                 self.vertices.push(vertex);
             }
             for particle in partition.corners(hybrid.vertex_point(vertex).cell as usize) {
-                for node in partition.anchor(particle).nodes {
+                for node in hybrid.skin_anchors.of(particle).nodes {
                     if !self.nodes[start..].contains(&node) {
                         self.nodes.push(node);
                     }

@@ -29,6 +29,7 @@ mod seen;
 pub mod sites;
 pub mod sizes;
 pub mod skin;
+mod skin_anchors;
 pub mod spec;
 mod staged_patch;
 mod state;

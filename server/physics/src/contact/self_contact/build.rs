@@ -1,5 +1,6 @@
 //! Builds self-contact from the body at rest.
 use super::{
+    compact::compact,
     lists::NearWalls,
     query::{MovedSurface, WallScratch},
     rest::{
@@ -7,10 +8,7 @@ use super::{
         twice_area_m2,
     },
 };
-use crate::{
-    contact::{SurfaceModuli, broad::Triangles},
-    mesh::Surface,
-};
+use crate::{contact::SurfaceModuli, mesh::Surface};
 use glam::DVec3;
 
 /// Clusters nearer at rest than so many mean edges of the skin are close.
@@ -46,7 +44,7 @@ pub(crate) struct SkinAtRest<'a> {
 impl SelfContact {
     /// Returns the self-contact of a body, or `None` where its skin nowhere faces itself at rest and `only_if_facing`.
     pub(crate) fn build(skin: &SkinAtRest<'_>, only_if_facing: bool) -> Option<Self> {
-        let triangles = Triangles::of(skin.surface, skin.positions_m);
+        let triangles = compact(skin.surface, skin.positions_m);
         let mut built = Self {
             around: rows_of(skin.positions_m.len(), triangles.nodes.iter()),
             nodes: vec![NodeAtRest::INSIDE; skin.positions_m.len()],
@@ -58,13 +56,19 @@ impl SelfContact {
             reach_m: 0.0,
             stride_m: 0.0,
             left_out: 0,
+            normals: triangles
+                .nodes
+                .iter()
+                .map(|nodes| twice_area_m2(nodes.map(|n| skin.positions_m[n as usize])).normalize_or_zero())
+                .collect(),
             moving: skin.moving,
             triangles,
         };
         built.box_clusters();
         built.measure_nodes(skin);
         let surface_nodes = || skin.surface.nodes.iter().copied();
-        if only_if_facing && surface_nodes().all(|node| built.ray_m(node, built.nodes[node as usize].normal).is_infinite())
+        if only_if_facing
+            && surface_nodes().all(|node| built.ray_m(node, built.nodes[node as usize].normal).is_infinite())
         {
             return None;
         }
@@ -208,8 +212,7 @@ impl SelfContact {
         let nodes = self.of_cluster.row(of_nodes).iter();
         let pairs =
             nodes.flat_map(|&node| self.triangles.cluster_range(of_triangles).map(move |triangle| (node, triangle)));
-        let distances_m = pairs.map(|(node, triangle)| self.may_meet(node, triangle));
-        distances_m.filter(|(may, _)| *may).map(|(_, distance_m)| distance_m).fold(f64::INFINITY, f64::min)
+        pairs.filter_map(|(node, triangle)| self.may_meet_m(node, triangle)).fold(f64::INFINITY, f64::min)
     }
 
     /// Makes the margins so small that nothing is pressed at rest, and leaves vertices out that lie against a wall.

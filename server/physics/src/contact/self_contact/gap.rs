@@ -56,12 +56,7 @@ struct Nearest {
 impl SelfContact {
     /// Returns the gap between a vertex and the nearest of these triangles (ascending) that face it, where any is within
     /// its reach; nodes are at `x` (m).
-    pub(super) fn gap(
-        &self,
-        node: u32,
-        triangles: impl Iterator<Item = u32> + Clone,
-        x: &[DVec3],
-    ) -> Option<Gap> {
+    pub(super) fn gap(&self, node: u32, triangles: impl Iterator<Item = u32> + Clone, x: &[DVec3]) -> Option<Gap> {
         let y = x[node as usize];
         let mut nearest_sq = self.nodes[node as usize].reach_m().powi(2);
         let mut nearest: Option<Nearest> = None;
@@ -155,12 +150,12 @@ impl SelfContact {
 
     /// Returns 1 where the way from a point on an edge or corner leads to the front of the skin, else −1.
     fn side(&self, nearest: &Nearest, x: &[DVec3]) -> f64 {
-        let along = |other: u32| {
-            twice_area_m2(self.triangles.corners(other as usize, x)).normalize_or_zero().dot(nearest.way)
-        };
-        let most = self.around_point(nearest).map(along).fold(0.0_f64, |most, along_m| {
-            if along_m.abs() > most.abs() { along_m } else { most }
-        });
+        let along =
+            |other: u32| twice_area_m2(self.triangles.corners(other as usize, x)).normalize_or_zero().dot(nearest.way);
+        let most = self
+            .around_point(nearest)
+            .map(along)
+            .fold(0.0_f64, |most, along_m| if along_m.abs() > most.abs() { along_m } else { most });
         if most < 0.0 { -1.0 } else { 1.0 }
     }
 }

@@ -6,6 +6,8 @@ use glam::DVec3;
 /// Most pairs that are listed, per vertex of the skin, and at least.
 const PAIRS_PER_VERTEX: usize = 24;
 const AT_LEAST: usize = 4096;
+/// Part of the way until the next query after which it is looked again which pairs may be within reach.
+const AWAKE: f64 = 0.2;
 /// A way (m) that no surface moves between two queries.
 const FOR_EVER_M: f64 = 1e6;
 
@@ -30,6 +32,10 @@ pub(in crate::contact) struct NearWalls {
     whole_slack_m: f64,
     /// Number of pairs for which there was no room.
     pub(super) missed: u32,
+    /// What the walls that meet store (J), as far as it is known.
+    energy_j: Option<f64>,
+    /// How far (m) the surface may have moved since then until more pairs may be within reach than were told to be.
+    awake_m: f64,
     /// Where (m) what moves the surface was when the list was made; none where it is not known.
     then_m: Box<[DVec3]>,
     then_count: usize,
@@ -45,6 +51,8 @@ impl Default for NearWalls {
             slack_m: f64::NEG_INFINITY,
             whole_slack_m: 0.0,
             missed: 0,
+            energy_j: None,
+            awake_m: 0.0,
             then_m: Box::default(),
             then_count: 0,
             layout: 0,
@@ -93,13 +101,46 @@ impl NearWalls {
         amplification: f64,
         moving_m: impl ExactSizeIterator<Item = DVec3>,
     ) -> bool {
-        if !self.slack_m.is_finite() || layout != self.layout || moving_m.len() != self.then_count || self.then_count == 0 {
+        if !self.slack_m.is_finite()
+            || layout != self.layout
+            || moving_m.len() != self.then_count
+            || self.then_count == 0
+        {
             return false;
         }
         let then_m = &self.then_m[..self.then_count];
         let farthest_sq = moving_m.zip(then_m).map(|(now, then)| now.distance_squared(*then)).fold(0.0, f64::max);
         self.slack_m = self.whole_slack_m - amplification * farthest_sq.sqrt() - ROUNDING_M;
         self.slack_m > 0.0
+    }
+
+    /// Returns the pairs that may be within reach until the surface has moved some way.
+    pub(super) fn awake(&self) -> impl Iterator<Item = &Pair> {
+        self.pairs().iter().filter(|pair| pair.free_m <= self.awake_m)
+    }
+
+    /// Looks whether the surface has moved so far that more pairs may be within reach. Returns whether it has; then
+    /// [`Self::awake`] tells of more.
+    pub(super) fn wakes_more(&mut self) -> bool {
+        let wakes = self.moved_m() > self.awake_m;
+        if wakes {
+            self.awake_m = self.moved_m() + AWAKE * self.whole_slack_m;
+        }
+        wakes
+    }
+
+    /// Forgets all that follows from positions.
+    pub(in crate::contact) fn forget(&mut self) {
+        (self.slack_m, self.energy_j) = (f64::NEG_INFINITY, None);
+    }
+
+    /// Returns what the walls that meet stored (J) at the last evaluation of forces, if it is known.
+    pub(in crate::contact) fn energy_j(&self) -> Option<f64> {
+        self.energy_j
+    }
+
+    pub(super) fn set_energy_j(&mut self, energy_j: f64) {
+        self.energy_j = Some(energy_j);
     }
 
     pub(super) fn clear(&mut self) {
@@ -122,6 +163,7 @@ impl NearWalls {
         self.pairs[..self.count].sort_unstable_by_key(|pair| (pair.node, pair.triangle));
         self.slack_m = slack_m.min(FOR_EVER_M);
         self.whole_slack_m = self.slack_m;
+        self.awake_m = AWAKE * self.whole_slack_m;
     }
 
     /// Does the same where the list is to be made again at once, and every pair looked at.
@@ -129,5 +171,6 @@ impl NearWalls {
         self.finish(0.0);
         self.pairs[..self.count].iter_mut().for_each(|pair| pair.free_m = f64::NEG_INFINITY);
         self.slack_m = f64::NEG_INFINITY;
+        self.awake_m = f64::INFINITY;
     }
 }

@@ -22,6 +22,7 @@
 //! `2 κ φ''` and `2 w_i κ φ''`. The largest sum over mass that the walls that meet have is added to the body's squared
 //! frequency ([`crate::tick`]'s substeps); no vertex at its margin adds more than [`rest::FREQUENCY_FRACTION`] of it.
 mod build;
+mod compact;
 mod gap;
 mod lists;
 mod press;

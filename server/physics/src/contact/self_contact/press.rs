@@ -67,9 +67,8 @@ impl Pressed {
         let Self { gap, force_n, beside_n, .. } = self;
         let along = gap.direction * *force_n;
         let [on_vertex, a, b, c] = self.forces_by_weights_n(corners);
-        let on_corner = |corner: usize, by_weights: DVec3| {
-            by_weights - along * gap.weights[corner] - *beside_n * gap.at[corner]
-        };
+        let on_corner =
+            |corner: usize, by_weights: DVec3| by_weights - along * gap.weights[corner] - *beside_n * gap.at[corner];
         [on_vertex + along + *beside_n, on_corner(0, a), on_corner(1, b), on_corner(2, c)]
     }
 

@@ -88,8 +88,8 @@ impl WallScratch {
     fn bound_m(&self, walls: &SelfContact, pair: [usize; 2], free_m: f64) -> f64 {
         let [a, b] = pair.map(|cluster| self.displaced[cluster]);
         let apart = (a.high_m - b.low_m).abs().max((b.high_m - a.low_m).abs());
-        let boxes = pair
-            .map(|cluster| self.fitted[cluster].unwrap_or(walls.clusters[cluster].moved(&self.displaced[cluster])));
+        let boxes =
+            pair.map(|cluster| self.fitted[cluster].unwrap_or(walls.clusters[cluster].moved(&self.displaced[cluster])));
         (free_m - apart.length()).max(boxes_distance_m(boxes[0], boxes[1]))
     }
 }
@@ -215,7 +215,8 @@ impl SelfContact {
         for triangle in self.triangles.cluster_range(cluster) {
             let [a, b, c] = self.triangles.corners(triangle, &scratch.x);
             let middle = (a + b + c) / 3.0;
-            let farthest_sq = a.distance_squared(middle).max(b.distance_squared(middle)).max(c.distance_squared(middle));
+            let farthest_sq =
+                a.distance_squared(middle).max(b.distance_squared(middle)).max(c.distance_squared(middle));
             scratch.balls[triangle] = (middle, farthest_sq.sqrt());
         }
         let [low_m, high_m] = displacements;
@@ -266,7 +267,7 @@ impl SelfContact {
                 let distance_m = y.distance(corners[0] * wa + corners[1] * wb + corners[2] * wc);
                 if distance_m >= listed_m {
                     slack_m = slack_m.min(0.5 * (distance_m - reach_m));
-                } else if self.may_meet(node, triangle).0 {
+                } else if self.may_meet_m(node, triangle).is_some() {
                     let free_m = 0.5 * (distance_m - reach_m) - ROUNDING_M;
                     near.push(Pair { node, triangle: triangle as u32, free_m });
                 }

@@ -32,6 +32,8 @@ pub(crate) struct SelfContact {
     pub(super) rest_m: Vec<DVec3>,
     /// By node; nodes inside the body have no stiffness.
     pub(super) nodes: Vec<NodeAtRest>,
+    /// Outward unit normals of the triangles at rest.
+    pub(super) normals: Vec<DVec3>,
     /// Triangles around each node.
     pub(super) around: Rows<u32>,
     /// Nodes of each cluster, each node in one cluster only.
@@ -135,31 +137,34 @@ pub(super) fn twice_area_m2([a, b, c]: [DVec3; 3]) -> DVec3 {
 }
 
 impl SelfContact {
-    /// Returns whether a vertex and a triangle may ever meet, and their distance (m) at rest. They may not
+    /// Returns the distance (m) at rest of a vertex and a triangle that may ever meet, `None` of others. They may not
     /// - where the straight way from one to the other goes into the material at both ends, and is no longer than the
     ///   wall is thick there: the triangle is the other side of the vertex's own wall;
     /// - where they are beside each other along the skin, and do not face each other across a gap.
-    pub(super) fn may_meet(&self, node: u32, triangle: usize) -> (bool, f64) {
+    pub(super) fn may_meet_m(&self, node: u32, triangle: usize) -> Option<f64> {
         let corners = self.triangles.nodes[triangle];
+        if corners.contains(&node) {
+            return None;
+        }
         let (at, rest) = (&self.nodes[node as usize], self.rest_m[node as usize]);
         let corners_m = corners.map(|n| self.rest_m[n as usize]);
+        let (beside_m, normal) = (BESIDE * at.size_m, self.normals[triangle]);
+        let faces = self.around.row(node as usize).iter().any(|&own| -self.normals[own as usize].dot(normal) > FACING);
+        if !faces && rest.distance_squared(corners_m[0]) < beside_m * beside_m {
+            return None;
+        }
         let [wa, wb, wc] = closest_weights(rest, corners_m);
         let from = rest - (corners_m[0] * wa + corners_m[1] * wb + corners_m[2] * wc);
-        let (distance_m, normal) = (from.length(), twice_area_m2(corners_m).normalize_or_zero());
-        if corners.contains(&node) {
-            return (false, distance_m);
-        }
+        let distance_m = from.length();
         let into_m = (INTO * distance_m).max(NOTHING * at.size_m);
         let is_through = from.dot(normal) < -into_m && from.dot(at.normal) > into_m;
         if is_through && distance_m < WITHIN_WALL * at.thickness_m {
-            return (false, distance_m);
-        }
-        if distance_m >= BESIDE * at.size_m {
-            return (true, distance_m);
+            return None;
         }
         // Parts that lie against each other are told apart from neighbours, too.
-        let across = from.dot(normal) > BEFORE * distance_m - NOTHING * at.size_m;
-        (across && !self.is_adjacent(node, corners) && self.faces(node, normal, &self.rest_m), distance_m)
+        let across = || from.dot(normal) > BEFORE * distance_m - NOTHING * at.size_m;
+        let may = distance_m >= beside_m || faces && across() && !self.is_adjacent(node, corners);
+        may.then_some(distance_m)
     }
 
     /// Returns whether a triangle has a corner in common with those around a vertex.
@@ -181,7 +186,7 @@ impl SelfContact {
         self.left_out
     }
 
-    /// Returns the triangles in the order of the broad phase.
+    /// Returns the triangles in the order of its clusters.
     pub(crate) fn triangle_nodes(&self) -> &[[u32; 3]] {
         &self.triangles.nodes
     }

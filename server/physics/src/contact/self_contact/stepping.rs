@@ -24,6 +24,7 @@ impl ContactModel {
             contact.walls.remember(0, moving_m());
         }
         walls.press(x, &contact.walls, forces_n, &mut scratch.walls);
+        contact.walls.set_energy_j(scratch.walls.seen().energy_j);
     }
 
     /// Renews the list of what may meet on a skin, where it is out of date. Returns whether it was. `layout` is a number
@@ -35,9 +36,10 @@ impl ContactModel {
         contact: &mut ContactState,
         scratch: &mut ContactScratch,
     ) -> bool {
-        let Some(walls) = self.walls().filter(|_| contact.walls.slack_m <= 0.0) else { return false };
-        if contact.walls.is_still_good(layout, skin.amplification(), skin.moving_m()) {
-            return false;
+        let Some(walls) = self.walls() else { return false };
+        let is_used_up = contact.walls.slack_m <= 0.0;
+        if !is_used_up || contact.walls.is_still_good(layout, skin.amplification(), skin.moving_m()) {
+            return contact.walls.wakes_more();
         }
         skin.begin();
         let surface = MovedSurface {
@@ -53,12 +55,13 @@ impl ContactModel {
     pub(crate) fn press_walls_on_skin(
         &self,
         x: &[DVec3],
-        contact: &ContactState,
+        contact: &mut ContactState,
         forces_n: &mut [DVec3],
         scratch: &mut ContactScratch,
     ) {
         if let Some(walls) = self.walls() {
             walls.press(x, &contact.walls, forces_n, &mut scratch.walls);
+            contact.walls.set_energy_j(scratch.walls.seen().energy_j);
         }
     }
 
@@ -66,9 +69,10 @@ impl ContactModel {
     /// and of all triangles around them, by which it is known what faces what.
     pub(crate) fn nodes_of_walls<'a>(&'a self, contact: &'a ContactState) -> impl Iterator<Item = u32> + 'a {
         self.walls().into_iter().flat_map(|walls: &SelfContact| {
-            let of_pairs = contact.walls.pairs().iter().flat_map(|pair| {
-                walls.triangles.nodes[pair.triangle as usize].into_iter().chain([pair.node])
-            });
+            let of_pairs = contact
+                .walls
+                .awake()
+                .flat_map(|pair| walls.triangles.nodes[pair.triangle as usize].into_iter().chain([pair.node]));
             let around = of_pairs.flat_map(|node| walls.around.row(node as usize));
             around.flat_map(|&triangle| walls.triangles.nodes[triangle as usize])
         })

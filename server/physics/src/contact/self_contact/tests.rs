@@ -134,7 +134,7 @@ fn who_may_meet_is_settled_at_rest() {
     let at = |p: DVec3| mesh.positions_m().iter().position(|q| q.distance(p) < 1e-9).unwrap() as u32;
     let inner = at(DVec3::new(0.028, 0.004, 0.008));
     let triangles_at = |node: u32| walls.around.row(node as usize).iter().map(|&t| t as usize);
-    let may = |node: u32, other: u32| triangles_at(other).any(|triangle| walls.may_meet(node, triangle).0);
+    let may = |node: u32, other: u32| triangles_at(other).any(|triangle| walls.may_meet_m(node, triangle).is_some());
     assert!(may(inner, at(DVec3::new(0.028, 0.004, 0.012))), "the other arm's inner side");
     assert!(!may(inner, at(DVec3::new(0.028, 0.004, 0.0))), "its own arm's outer side");
     assert!(!may(inner, at(DVec3::new(0.032, 0.004, 0.008))), "a neighbour");
@@ -184,7 +184,7 @@ fn queries_lose_nothing_that_is_within_reach() {
         assert!(slack_m >= 0.99 * walls.stride_m, "{slack_m}");
         let surface_nodes = (0..x.len() as u32).filter(|&n| walls.nodes[n as usize] != NodeAtRest::INSIDE);
         for node in surface_nodes {
-            let all = (0..walls.triangles.len() as u32).filter(|&t| walls.may_meet(node, t as usize).0);
+            let all = (0..walls.triangles.len() as u32).filter(|&t| walls.may_meet_m(node, t as usize).is_some());
             let listed = found.pairs().iter().filter(|pair| pair.node == node).map(|pair| pair.triangle);
             let (by_all, by_list) = (walls.gap(node, all, &x), walls.gap(node, listed, &x));
             assert_eq!(by_all, by_list, "node {node}");

@@ -66,6 +66,8 @@ pub(crate) struct RunningPatch {
     /// Whether active particles carry any vertex of each cluster, and of each group.
     carries_of_cluster: Vec<bool>,
     carries_of_group: Vec<bool>,
+    /// The same of self-contact's clusters.
+    carries_of_wall: Vec<bool>,
     is_awake: Vec<bool>,
     is_viscous: bool,
     /// Number of sets of active particles that there have been.
@@ -119,6 +121,7 @@ impl RunningPatch {
             point_of: vec![NONE; partition.particle_count()],
             carries_of_cluster: vec![false; hybrid.clusters.clusters()],
             carries_of_group: vec![false; hybrid.clusters.groups()],
+            carries_of_wall: vec![false; hybrid.wall_clusters.clusters()],
             is_awake: vec![false; partition.cells().len()],
             is_viscous: hybrid.materials.iter().any(|m| !m.viscosity.is_zero()),
             number: 0,
@@ -183,6 +186,11 @@ impl RunningPatch {
     /// Returns whether active particles carry any vertex of a cluster of the skin.
     pub(super) fn carries_of_cluster(&self, cluster: usize) -> bool {
         self.carries_of_cluster[cluster]
+    }
+
+    /// Returns the same for a cluster of self-contact.
+    pub(super) fn carries_of_wall(&self, cluster: usize) -> bool {
+        self.carries_of_wall[cluster]
     }
 
     /// Returns the same for a group.
@@ -283,6 +291,9 @@ impl RunningPatch {
             for cluster in hybrid.clusters.carried_by(particle) {
                 self.carries_of_cluster[cluster] = carried;
                 self.carries_of_group[SkinClusters::group_of(cluster)] = carried;
+            }
+            for cluster in hybrid.wall_clusters.carried_by(particle) {
+                self.carries_of_wall[cluster] = carried;
             }
         }
     }
