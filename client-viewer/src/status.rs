@@ -1,6 +1,6 @@
 //! `status`: what the daemon runs, how well it keeps time, and who is attached.
 use crate::{ViewError, cli, connect::Server};
-use palpate_proto::v1::{Percentiles, StatusRequest, StatusResponse, session_client::SessionClient};
+use palpate_proto::v1::{AwakeFor, Percentiles, StatusRequest, StatusResponse, session_client::SessionClient};
 use serde_json::json;
 use std::fmt::Write as _;
 
@@ -20,6 +20,9 @@ pub fn to_text(status: &StatusResponse) -> String {
     if !status.quarantine.is_empty() {
         // Writing into a String cannot fail.
         let _ = write!(text, "QUARANTINED: {}\n\n", status.quarantine);
+    }
+    for warning in &status.state_warnings {
+        let _ = write!(text, "WARNING: {warning}\n\n");
     }
     text.push_str(&table(&facts(status)));
     text.push_str("\n\n");
@@ -43,7 +46,8 @@ fn facts(status: &StatusResponse) -> Vec<Vec<String>> {
     );
     if session.particle_count > 0 {
         let (awake, most) = (status.active_particles, session.most_active_particles);
-        line("particles", format!("{}, {awake} of at most {most} awake", session.particle_count));
+        let what_for = status.awake_for.map_or_else(String::new, |counts| awake_for(&counts));
+        line("particles", format!("{}, {awake} of at most {most} awake{what_for}", session.particle_count));
     }
     line(
         "time",
@@ -91,6 +95,19 @@ fn facts(status: &StatusResponse) -> Vec<Vec<String>> {
     }
     line("viewers", format!("{} ({} frames skipped)", status.viewers, status.frames_skipped));
     rows
+}
+
+/// `: 98 for tools, 2 for nothing any more`; nothing where none is awake.
+fn awake_for(counts: &AwakeFor) -> String {
+    let all = [
+        (counts.tools, "for tools"),
+        (counts.loads, "for loads"),
+        (counts.injected_forces, "for injected forces"),
+        (counts.nothing, "for nothing any more"),
+    ];
+    let some = all.iter().filter(|(count, _)| *count > 0).map(|(count, what)| format!("{count} {what}"));
+    let told = some.collect::<Vec<_>>().join(", ");
+    if told.is_empty() { told } else { format!(": {told}") }
 }
 
 /// Values with their names where they have one, and their unit; the unit of a plain number is not written.
@@ -148,6 +165,9 @@ fn to_json(status: &StatusResponse) -> serde_json::Value {
         "tets": session.tet_count,
         "particles": session.particle_count,
         "active_particles": status.active_particles,
+        "active_for": status.awake_for.map(|counts| json!({
+            "tools": counts.tools, "loads": counts.loads, "injected_forces": counts.injected_forces, "nothing": counts.nothing,
+        })),
         "substeps_per_tick": session.substeps_per_tick,
         "tick_period_s": session.tick_period_s,
         "tick": status.tick,
@@ -175,13 +195,14 @@ fn to_json(status: &StatusResponse) -> serde_json::Value {
         "frames_skipped": status.frames_skipped,
         "samples_rejected": status.samples_rejected,
         "quarantine": status.quarantine,
+        "state_warnings": status.state_warnings,
     })
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use palpate_proto::v1::{NamedVector, StageTime};
+    use palpate_proto::v1::{NamedVector, SessionInfo, StageTime};
 
     fn status() -> StatusResponse {
         let cost = |p50, max| Some(Percentiles { p50, p99: p50, p999: p50, max, count: 12_345 });
@@ -224,6 +245,27 @@ mod tests {
         let ledger = "ledger: kinetic 1.000e0, elastic 2.000e0, gravitational 3.000e0, external work 4.000e0, dissipated 5.000e0 J";
         assert!(text.contains(ledger), "{text}");
         assert!(text.lines().any(|line| line.ends_with("J: 5.000e-1")), "{text}");
+    }
+
+    #[test]
+    fn particles_are_told_with_what_they_are_awake_for() {
+        let session = Some(SessionInfo { particle_count: 500, most_active_particles: 200, ..Default::default() });
+        let of = |awake_for| StatusResponse { session: session.clone(), active_particles: 98, awake_for, ..status() };
+        let counts = AwakeFor { tools: 60, loads: 0, injected_forces: 30, nothing: 8 };
+        let text = to_text(&of(Some(counts)));
+        let told = "500, 98 of at most 200 awake: 60 for tools, 30 for injected forces, 8 for nothing any more";
+        assert!(text.contains(told), "{text}");
+        assert_eq!(to_json(&of(Some(counts)))["active_for"]["injected_forces"], 30);
+        // Daemons before this, and bodies of other kinds, do not tell.
+        assert!(to_text(&of(None)).contains("98 of at most 200 awake\n"));
+        assert!(to_json(&of(None))["active_for"].is_null());
+    }
+
+    #[test]
+    fn what_is_wrong_with_the_body_comes_first() {
+        let wrong = StatusResponse { state_warnings: vec!["elements are inside out".into()], ..status() };
+        assert!(to_text(&wrong).starts_with("WARNING: elements are inside out\n\n"));
+        assert_eq!(to_json(&wrong)["state_warnings"][0], "elements are inside out");
     }
 
     #[test]

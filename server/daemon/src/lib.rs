@@ -10,6 +10,7 @@ pub mod serve;
 pub mod session;
 pub mod sim;
 pub mod status;
+pub mod strained;
 pub mod stream;
 pub mod telemetry;
 pub mod tick_budget;

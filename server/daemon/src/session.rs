@@ -247,7 +247,7 @@ pub fn prepare(
     palpate_realtime::Deadlines::new(palpate_realtime::Clock::Monotonic, period_s)?;
     tick_budget::check(&model)?;
     let mut warnings = scene.warnings;
-    warnings.extend(served(&model).warnings());
+    warnings.extend(served(&model).warnings(&model));
     warnings.extend(tick_budget::warning(&model));
     let (number, id) = numbers.next_session();
     let for_devices: Vec<bool> = scene.drivers.iter().map(|driver| matches!(driver, Driver::Device)).collect();

@@ -6,8 +6,9 @@ use crate::{
         command::{Copy, Done},
         timing::STAGES,
     },
+    strained::Seen,
 };
-use palpate_physics::Energies;
+use palpate_physics::{AwakeFor, Energies, world::strained};
 use palpate_proto::v1;
 use palpate_realtime::{Clock, Histogram};
 use palpate_scene::probes::MAX_COLUMNS;
@@ -45,7 +46,21 @@ pub fn of(daemon: &Daemon, session: &ActiveSession, copy: &Copy, done: &Done) ->
         substeps_now: copy.state.pace.substeps,
         asleep: copy.state.sleep.asleep,
         active_particles: copy.state.awake_particles() as u32,
+        awake_for: copy.state.awake_for(&session.model, &copy.injected).map(awake_for),
+        state_warnings: state_warnings(session, copy),
     }
+}
+
+fn awake_for(counts: AwakeFor) -> v1::AwakeFor {
+    let AwakeFor { tools, loads, injected, nothing } = counts;
+    let [tools, loads, injected_forces, nothing] = [tools, loads, injected, nothing].map(|count| count as u32);
+    v1::AwakeFor { tools, loads, injected_forces, nothing }
+}
+
+/// What is wrong with the body as it is.
+fn state_warnings(session: &ActiveSession, copy: &Copy) -> Vec<String> {
+    let seen = Seen::of(strained(&session.model, &copy.state));
+    seen.inverted_now(&session.model).into_iter().chain(seen.weakened(&session.model, false)).collect()
 }
 
 fn percentiles(histogram: &Histogram) -> v1::Percentiles {

@@ -52,5 +52,5 @@ pub use crate::mesh::{MeshError, Surface, TetMesh};
 pub use crate::settings::{
     Integrator, LoadSpec, Precision, PrescribedSpec, SelfContactChoice, Settings, Skips, Substeps,
 };
-pub use crate::tick::{Energies, Ledger, PointForce, TickInput};
+pub use crate::tick::{AwakeFor, Energies, Ledger, PointForce, TickInput};
 pub use crate::world::{Model, ModelError, ModelSpec, Quarantine, Scratch, State, StepReport, step};

@@ -5,6 +5,27 @@ pub fn counted(count: usize, noun: &str) -> String {
     format!("{count} {noun}{}", if count == 1 { "" } else { "s" })
 }
 
+/// `1 hexahedron`, `2 hexahedra`: a count and what is counted, in its plural.
+pub(crate) fn counted_as(count: usize, plural: &str) -> String {
+    match plural
+        .strip_suffix("hedra")
+        .map(|kind| format!("{kind}hedron"))
+        .or(plural.strip_suffix('s').map(str::to_owned))
+    {
+        Some(singular) if count == 1 => format!("1 {singular}"),
+        _ => format!("{count} {plural}"),
+    }
+}
+
+/// `a, b and c`.
+pub(crate) fn joined(parts: &[String]) -> String {
+    match parts {
+        [] => String::new(),
+        [one] => one.clone(),
+        [first @ .., last] => format!("{} and {last}", first.join(", ")),
+    }
+}
+
 /// Four significant digits, without the zeros behind them.
 pub fn short(value: f64) -> String {
     let rounded: f64 = format!("{value:.3e}").parse().unwrap_or(value);
@@ -14,6 +35,14 @@ pub fn short(value: f64) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn counts_and_lists() {
+        let counts =
+            [(1, "hexahedra"), (2, "hexahedra"), (1, "prisms"), (0, "lines")].map(|(n, what)| counted_as(n, what));
+        assert_eq!(joined(&counts), "1 hexahedron, 2 hexahedra, 1 prism and 0 lines");
+        assert_eq!((joined(&counts[..1]), joined(&[])), ("1 hexahedron".to_string(), String::new()));
+    }
 
     #[test]
     fn numbers_have_the_digits_they_need() {

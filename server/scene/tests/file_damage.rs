@@ -153,7 +153,7 @@ fn extreme_words_in_text_files() {
     }
 }
 
-const HEADS: [&str; 16] = [
+const HEADS: [&str; 18] = [
     "",
     "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Nodes\n",
     "$MeshFormat\n4.1 0 8\n$EndMeshFormat\n$Nodes\n",
@@ -165,6 +165,8 @@ const HEADS: [&str; 16] = [
     "# vtk DataFile Version 5.1\nt\nBINARY\nDATASET UNSTRUCTURED_GRID\nPOINTS 1 double\n",
     "<?xml version=\"1.0\"?><VTKFile type=\"UnstructuredGrid\">",
     "<VTKFile type=\"PolyData\"><AppendedData encoding=\"raw\">_",
+    "<Xdmf><Domain><Grid><Geometry><DataItem Dimensions=\"1 3\">",
+    "<Xdmf><Domain><Grid><Geometry><DataItem Dimensions=\"1 3\">0 0 0</DataItem></Geometry><Topology TopologyType=\"Mixed\"><DataItem Dimensions=\"5\">",
     "solid a\nfacet normal 0 0 1\nouter loop\n",
     "ply\nformat ascii 1.0\n",
     "ply\nformat binary_big_endian 1.0\nelement vertex 2\nproperty float x\nproperty float y\nproperty float z\nend_header\n",
@@ -179,7 +181,7 @@ proptest! {
     fn garbage(
         head in prop::sample::select(&HEADS[..]),
         tail in prop::collection::vec(any::<u8>(), 0..300),
-        extension in prop::sample::select(&["msh", "vtk", "vtu", "vtp", "stl", "obj", "ply", "dat", ""][..]),
+        extension in prop::sample::select(&["msh", "vtk", "vtu", "vtp", "xdmf", "stl", "obj", "ply", "dat", ""][..]),
         surface in any::<bool>(),
     ) {
         let name = format!("{}_garbage.{extension}", if surface { "skin" } else { "bar" });

@@ -37,7 +37,7 @@ fn canonical(mesh: &GroupedMesh) -> Vec<([[i64; 3]; 4], i64)> {
 }
 
 /// With the groups `left` (11) and `right` (12).
-const GROUPED: [&str; 39] = [
+const GROUPED: [&str; 42] = [
     "bar_v1.msh",
     "bar_v22_ascii.msh",
     "bar_v22_binary.msh",
@@ -77,6 +77,9 @@ const GROUPED: [&str; 39] = [
     "bar_vtk_raw_zlib.vtu",
     "bar_vtk_base64_u32_zlib.vtu",
     "bar_vtk_raw_zlib_blocks.vtu",
+    "bar_xdmf_meshio.xdmf",
+    "bar_xdmf_binary.xdmf",
+    "bar_xdmf_dolfinx.xdmf",
 ];
 
 #[test]
@@ -94,13 +97,7 @@ fn every_volume_format_gives_the_same_mesh_and_groups() {
 #[test]
 fn formats_without_groups_give_the_same_tets() {
     let without = |name| canonical(&mesh(name)).into_iter().map(|(corners, _)| corners).collect::<Vec<_>>();
-    for name in [
-        "bar_gmsh_ascii.vtk",
-        "bar_gmsh_binary.vtk",
-        "bar_meshio_v41_binary.msh",
-        "bar_mixed.vtu",
-        "bar_mixed_v22_ascii.msh",
-    ] {
+    for name in ["bar_gmsh_ascii.vtk", "bar_gmsh_binary.vtk", "bar_meshio_v41_binary.msh"] {
         assert!(without(name) == without("bar_v41_ascii.msh"), "{name}");
     }
 }
@@ -111,8 +108,32 @@ fn formats_without_groups_give_the_same_tets() {
 fn double_precision_is_kept_to_the_bit() {
     let nodes = |name| read_volume(&sample(name)).unwrap().mesh_nodes;
     assert!(nodes("bar_v22_binary.msh") == nodes("bar_v41_binary.msh"));
-    for name in ["bar_meshio51_binary.vtk", "bar_meshio_zlib.vtu", "bar_vtk_raw_big.vtu", "bar_tetgen.ele"] {
+    for name in [
+        "bar_meshio51_binary.vtk",
+        "bar_meshio_zlib.vtu",
+        "bar_vtk_raw_big.vtu",
+        "bar_tetgen.ele",
+        "bar_xdmf_binary.xdmf",
+    ] {
         assert!(nodes(name) == nodes("bar_v41_ascii.msh"), "{name}");
+    }
+}
+
+/// The bar and, apart, a cube of a millimetre, which is one hexahedron.
+#[test]
+fn hexahedra_among_tets_are_split() {
+    let bar = canonical(&mesh("bar_v41_ascii.msh"));
+    for name in ["bar_mixed.vtu", "bar_mixed_v22_ascii.msh"] {
+        let mesh = mesh(name);
+        let of_cube = |tet: &([[i64; 3]; 4], i64)| tet.0.iter().all(|corner| corner[0] >= 9_000_000);
+        let (cube, rest): (Vec<_>, Vec<_>) = canonical(&mesh).into_iter().partition(of_cube);
+        assert_eq!(
+            rest.iter().map(|tet| tet.0).collect::<Vec<_>>(),
+            bar.iter().map(|tet| tet.0).collect::<Vec<_>>(),
+            "{name}"
+        );
+        assert_eq!((cube.len(), mesh.mesh.positions_m().len()), (6, 48), "{name}");
+        assert!((mesh.mesh.total_volume_m3() - 5e-9).abs() < 1e-20, "{name}");
     }
 }
 
@@ -153,6 +174,18 @@ fn physical_names_surfaces_and_points_are_kept() {
     }
 }
 
+/// dolfinx writes what tags facets as a mesh of triangles over the same nodes.
+#[test]
+fn tagged_facets_are_groups() {
+    let mesh = mesh("bar_xdmf_dolfinx.xdmf");
+    let x_mm = |group: &str| -> Vec<f64> {
+        members(&mesh, group).nodes.iter().map(|&node| mesh.mesh.positions_m()[node as usize].x * 1e3).collect()
+    };
+    assert!(x_mm("21").len() > 3 && x_mm("21").iter().all(|x| x.abs() < 1e-9));
+    assert!(x_mm("22").len() > 3 && x_mm("22").iter().all(|x| (x - 4.0).abs() < 1e-9));
+    assert!(mesh.warnings.is_empty(), "{:?}", mesh.warnings);
+}
+
 /// A tet may belong to several physical groups: MSH 2.2 then lists it once for each.
 #[test]
 fn overlapping_groups_are_kept() {
@@ -184,9 +217,11 @@ fn what_is_not_used_is_said() {
         let warnings = mesh(name).warnings;
         assert!(warnings.iter().any(|w| w.contains(words)), "{name}: {warnings:?}");
     };
-    said("bar_mixed_v22_ascii.msh", "1 hexahedra");
-    said("bar_mixed.vtu", "1 hexahedra");
-    said("bar_mixed.vtu", "8 nodes that belong to no tet");
+    for name in ["bar_mixed_v22_ascii.msh", "bar_mixed.vtu"] {
+        let mesh = mesh(name);
+        assert!(mesh.warnings.is_empty(), "{name}: {:?}", mesh.warnings);
+        assert_eq!(mesh.notes, ["1 hexahedron was split into 6 tetrahedra"], "{name}");
+    }
     said("bar_quadratic_v41_ascii.msh", "91 tetrahedra");
     said("bar_quadratic_v41_ascii.msh", "corner nodes");
     assert_eq!(mesh("bar_v41_binary.msh").warnings, Vec::<String>::new());
@@ -202,6 +237,10 @@ fn what_is_not_read_names_the_way_out() {
     assert!(version.contains("line 2: MSH version 4 is not read") && version.contains("-format msh41"), "{version}");
     assert!(refused("bar_vtk_raw_lz4.vtu").contains("vtkLZ4DataCompressor"));
     assert!(refused("bar_meshio_lzma.vtu").contains("vtkLZMADataCompressor"));
+    assert!(
+        refused("bar_xdmf_hdf.xdmf")
+            .contains("in the HDF5 file `bar.h5`, which is not read; put the numbers into the XML")
+    );
     assert!(refused("skin_meshio_ascii.stl").contains("no tetrahedra (it holds 38 nodes, 72 triangles)"));
 }
 

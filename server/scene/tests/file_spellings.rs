@@ -367,7 +367,7 @@ fn medit() {
         (&more.warnings[..], &more.notes[..]),
         (
             &["arrays that nothing uses are left out: `IsoCurves` (a section that is not read)".to_string()][..],
-            &["1 lines of the geometry are left out".to_string()][..]
+            &["1 line of the geometry was left out".to_string()][..]
         )
     );
     assert_eq!(VolumeFile { of_geometry: vec![], ..quiet(more) }, ordinary);
@@ -392,6 +392,22 @@ fn lines_and_points_of_the_geometry_are_noted() {
     let ordinary = volume("a.msh", MSH22).into_tet_mesh(1.0, UnusedNodes::Drop).unwrap();
     assert_eq!(file.warnings, Vec::<String>::new());
     let centre = "1 nodes of the geometry that belong to no tetrahedron are left out";
-    assert_eq!(file.notes, ["1 lines of the geometry are left out", centre]);
+    assert_eq!(file.notes, ["1 line and 1 point of the geometry were left out", centre]);
     assert_eq!((file.mesh, file.tet_group), (ordinary.mesh, ordinary.tet_group));
+}
+
+/// A line among the cells refused a VTK file, for it has no more nodes than its two ends.
+#[test]
+fn lines_among_the_cells_of_vtk() {
+    let ordinary = volume("a.vtk", VTK51);
+    let text = VTK51
+        .replace("CELLS 2 4", "CELLS 3 6")
+        .replace("vtktypeint64\n0 4\n", "vtktypeint64\n0 4 6\n")
+        .replace("0 1 2 3\nCELL_TYPES 1\n10\n", "0 1 2 3 0 1\nCELL_TYPES 2\n10 3\n");
+    let file = volume("a.vtk", text);
+    assert_eq!(
+        (file.warnings.len(), file.notes.as_slice()),
+        (0, &["1 line of the geometry was left out".to_string()][..])
+    );
+    assert_eq!(VolumeFile { of_geometry: vec![], ..quiet(file) }, ordinary);
 }

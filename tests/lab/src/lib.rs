@@ -4,6 +4,7 @@ pub mod convergence;
 pub mod fine_levels;
 pub mod hashes;
 pub mod jitter;
+pub mod locking;
 pub mod machine;
 pub mod measure;
 pub mod methods;

@@ -1,6 +1,6 @@
 //! `palpate-lab`: run time beside error.
 use clap::{Parser, Subcommand};
-use palpate_lab::{fine_levels, hashes, jitter, references, report, stress, subdivision};
+use palpate_lab::{fine_levels, hashes, jitter, locking, references, report, stress, subdivision};
 
 #[derive(Parser)]
 #[command(
@@ -35,6 +35,8 @@ enum Command {
     ///
     /// A sheet of springs pulled at one vertex, before and after one ring or two about it are refined: which constants make it feel the same.
     Subdivision(subdivision::Options),
+    /// How much too stiff linear tets are, by Poisson's ratio and size: a block pressed by patches and spheres
+    Locking,
     /// Whether every bit of every scene is as it was (tests/lab/records/hashes.txt); exit code 1 if not
     Hashes(hashes::Options),
 }
@@ -49,6 +51,7 @@ fn main() -> miette::Result<()> {
         Command::Stress(command) => stress::run(&command),
         Command::FineLevels(options) => fine_levels::run(&options),
         Command::Subdivision(options) => subdivision::run(&options),
+        Command::Locking => locking::print(),
         Command::Hashes(options) => hashes::run(&options),
     }
 }

@@ -42,7 +42,7 @@ impl ServedBody for MassSpringBody {
         is_inside(point_m, enclosing_triangles, self.rest_positions_m())
     }
 
-    fn description(&self) -> Vec<String> {
+    fn description(&self, _: &Model) -> Vec<String> {
         let spec = self.model().spec();
         let of = |constants: &Constants| {
             format!("K_m {} N/m, K_h {} N/m", short(constants.mesh_n_per_m), short(constants.anchor_n_per_m))

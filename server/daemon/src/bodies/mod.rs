@@ -4,6 +4,7 @@
 //! What physics answers for all kinds ([`palpate_physics::bodies::Body`]) is not asked again here. A kind is one file with one
 //! `impl ServedBody`, and one line of [`served`]; nowhere else does the daemon ask which kind a body is.
 mod hybrid;
+mod locking;
 mod mass_spring;
 mod seed;
 mod shape;
@@ -53,13 +54,23 @@ pub trait ServedBody {
         None
     }
 
+    /// Whether a scene may give it any law of material.
+    fn takes_any_law(&self) -> bool {
+        true
+    }
+
     /// Lines that `palpated check` prints of what is particular to the kind.
-    fn description(&self) -> Vec<String> {
+    fn description(&self, _model: &Model) -> Vec<String> {
+        Vec::new()
+    }
+
+    /// What every command tells of the body that is no fault of it.
+    fn remarks(&self) -> Vec<String> {
         Vec::new()
     }
 
     /// What one would want to change about the body.
-    fn warnings(&self) -> Vec<String> {
+    fn warnings(&self, _model: &Model) -> Vec<String> {
         Vec::new()
     }
 

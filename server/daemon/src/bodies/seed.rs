@@ -26,11 +26,18 @@ impl ServedBody for SeedBody {
         }
     }
 
-    fn description(&self) -> Vec<String> {
+    /// The papers have one.
+    fn takes_any_law(&self) -> bool {
+        false
+    }
+
+    fn description(&self, _: &Model) -> Vec<String> {
         let seed = self.model();
         let parameters = seed.parameters();
-        let mut lines =
-            vec![format!("seed       the papers' own hybrid; steps of {} ms", short(parameters.dt_s * 1e3))];
+        let mut lines = vec![
+            format!("seed       the papers' own hybrid; steps of {} ms", short(parameters.dt_s * 1e3)),
+            "           its law, \"stvk\", bears less the more it is pressed below 58 % of its length, and does not resist inversion".to_owned(),
+        ];
         if let Some(layer) = seed.layer() {
             let spacing_m = layer.voxels.spacing_m;
             let sizes = seed.regions().iter().map(Region::len);

@@ -1,6 +1,6 @@
 //! Bodies of tetrahedra, and every other whose surface's vertices are nodes.
 use super::{
-    ServedBody, Shape, ShapeReader,
+    ServedBody, Shape, ShapeReader, locking,
     shape::{double, single},
 };
 use glam::DVec3;
@@ -14,6 +14,14 @@ impl ServedBody for TetBody {
 
     fn shape_reader(&self, _model: &Arc<Model>, rest_f32_m: &[[f32; 3]]) -> Box<dyn ShapeReader> {
         Box::new(NodeReader::new(rest_f32_m))
+    }
+
+    fn description(&self, model: &Model) -> Vec<String> {
+        locking::told(model).into_iter().collect()
+    }
+
+    fn warnings(&self, model: &Model) -> Vec<String> {
+        locking::warning(model).into_iter().collect()
     }
 }
 

@@ -1,5 +1,6 @@
 //! `palpated check`: what a scene's body is like, and what a tick costs on this machine.
 use super::{
+    check_laws, check_tools,
     cost::{self, Cost},
     load,
     summary::Percentiles,
@@ -42,10 +43,10 @@ pub fn run(args: &CheckArgs) -> miette::Result<ExitCode> {
     let model = load::build(&scene)?;
     print_body(&scene);
     let body = served(&model);
-    body.description().iter().for_each(|line| println!("{line}"));
-    print_contents(&scene);
+    body.description(&model).iter().for_each(|line| println!("{line}"));
+    print_contents(&scene, &model);
     print_walls(&model);
-    let warnings = [scene.warnings.clone(), body.warnings()].concat();
+    let warnings = [scene.warnings.clone(), body.warnings(&model), check_laws::warnings(&scene, &model)].concat();
     for warning in &warnings {
         println!("warning: {warning}");
     }
@@ -158,7 +159,7 @@ fn print_memory() {
     }
 }
 
-fn print_contents(scene: &Scene) {
+fn print_contents(scene: &Scene, model: &Model) {
     let held: usize = scene.model.prescribed.iter().map(|set| set.nodes.len()).sum();
     let loads = counted(scene.model.loads.len(), "load");
     match scene.model.prescribed.len() {
@@ -166,13 +167,8 @@ fn print_contents(scene: &Scene) {
         1 => println!("held       {}; {loads}", counted(held, "node")),
         sets => println!("held       {} in {}; {loads}", counted(held, "node"), counted(sets, "set")),
     }
-    for (tool, driver) in scene.model.tools.iter().zip(&scene.drivers) {
-        let driver = match driver {
-            palpate_scene::Driver::Device => "a device",
-            palpate_scene::Driver::Trajectory(_) => "a trajectory",
-            palpate_scene::Driver::Script(_) => "a script",
-        };
-        println!("tool       {:<16} radius {:.3} mm, driven by {driver}", tool.name, tool.radius_m * 1e3);
+    for line in check_tools::lines(scene, model) {
+        println!("{line}");
     }
     let probes: Vec<&str> = scene.probes.iter().map(palpate_scene::Probe::name).collect();
     println!("probes     {}", if probes.is_empty() { "none".to_owned() } else { probes.join(", ") });

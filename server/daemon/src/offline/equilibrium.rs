@@ -9,14 +9,14 @@ use super::{
     probe_rows::ProbeRows,
     summary::{Ending, SolveNumbers, Summary},
 };
-use crate::{bodies::served, progress::Progress};
+use crate::{bodies::served, progress::Progress, strained::Seen};
 use glam::DVec3;
 use miette::Diagnostic;
 use palpate_physics::{
     Model, State,
     contact::ToolTarget,
     statics::{self, Goal, SolveError, StaticSettings, StaticSolution},
-    world,
+    world::{self, strained},
 };
 use palpate_scene::{Scene, wording::short};
 use std::{ops::ControlFlow, process::ExitCode, time::Instant};
@@ -98,6 +98,7 @@ pub fn run(args: &StaticArgs) -> miette::Result<ExitCode> {
         inverted_tets: solution.inverted_tets,
         spread_loads: (model.body().particle_count() > 0).then_some(solution.awake.spread_loads),
     });
+    summary.warn(Seen::of(strained(&model, &state)).weakened(&model, false));
     if let Some(out) = &out {
         summary.write(out)?;
     }

@@ -1,8 +1,7 @@
 //! Exit codes of `simulate` and `static` when there is a result that is not to be trusted, and the words that go with
 //! them.
 use miette::{Diagnostic, Report};
-use palpate_physics::{Model, Quarantine, elements::linear_tet::VolumeRatio};
-use palpate_scene::wording::short;
+use palpate_physics::Quarantine;
 use std::process::ExitCode;
 use thiserror::Error;
 
@@ -82,27 +81,5 @@ impl Untrusted {
         };
         eprintln!("Error: {:?}", Report::new(self));
         ExitCode::from(code)
-    }
-}
-
-/// The least volume ratio of a run, and when it was.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Lowest {
-    pub(super) found: VolumeRatio,
-    pub(super) time_s: f64,
-}
-
-impl Lowest {
-    /// Whether elements were inside out, or flat.
-    pub(super) fn is_inverted(&self) -> bool {
-        self.found.ratio <= 0.0
-    }
-
-    /// The ratio, where (at rest) and when.
-    pub(super) fn told(&self, model: &Model) -> String {
-        let middle = model.body().tets().map(|mesh| mesh.corners_m(self.found.tet).iter().sum::<glam::DVec3>() * 250.0);
-        let near =
-            middle.map_or(String::new(), |mm| format!(" near ({:.2}, {:.2}, {:.2}) mm at rest", mm.x, mm.y, mm.z));
-        format!("the least volume ratio was {} at {} s{near}", short(self.found.ratio), short(self.time_s))
     }
 }

@@ -40,7 +40,10 @@ pub(super) fn load_with_warnings(name: &str) -> miette::Result<Scene> {
 /// warnings.
 pub(super) fn build_with_warnings(scene: &mut Scene) -> miette::Result<Model> {
     let model = build(scene)?;
-    for warning in served(&model).warnings() {
+    for remark in served(&model).remarks() {
+        eprintln!("note: {remark}");
+    }
+    for warning in served(&model).warnings(&model) {
         eprintln!("warning: {warning}");
         scene.warnings.push(warning);
     }

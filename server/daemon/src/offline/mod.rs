@@ -3,6 +3,8 @@
 mod args;
 pub mod calibrate;
 pub mod check;
+mod check_laws;
+mod check_tools;
 mod cost;
 pub mod equilibrium;
 mod exit;

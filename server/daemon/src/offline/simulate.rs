@@ -1,7 +1,7 @@
 //! `palpated simulate`: a scene headless, as fast as it goes, the same bits every time.
 use super::{
     args::{OutputArgs, positive},
-    exit::{CODES, Lowest, Untrusted},
+    exit::{CODES, Untrusted},
     folder,
     frames::Frames,
     interrupt::Interrupt,
@@ -9,16 +9,15 @@ use super::{
     probe_rows::ProbeRows,
     summary::{Ending, PeakNumbers, Percentiles, Summary, TimeNumbers, WallNumbers},
 };
-use crate::progress::Progress;
+use crate::{progress::Progress, strained::Seen};
 use glam::DVec3;
 use hdrhistogram::Histogram;
 use miette::IntoDiagnostic;
 use palpate_physics::{
     Model, Scratch, State, TickInput,
     contact::ToolTarget,
-    elements::linear_tet::VolumeRatio,
     step,
-    world::{min_volume_ratio, wake_only},
+    world::{strained_in, wake_only},
 };
 use palpate_scene::{Scene, wording::short};
 use std::{process::ExitCode, time::Instant};
@@ -41,7 +40,7 @@ pub struct SimulateArgs {
     frames: Option<FrameCount>,
 }
 
-/// Elements inside out are looked for at every so many ticks, and at the end: of a body with particles that takes longer than a tick.
+/// Elements that are inside out, or pressed beyond what their law is made for, are looked for at every so many ticks, and at the end.
 const LOOK_EVERY: u64 = 10;
 
 /// How many frames a run writes.
@@ -101,8 +100,14 @@ pub fn run(args: &SimulateArgs) -> miette::Result<ExitCode> {
     let mut summary = Summary::new(&scene, &model, &run.state, &rows, &ending);
     summary.time = Some(run.cost());
     summary.walls = (run.walls.ticks > 0).then_some(run.walls);
-    summary.lowest_volume_ratio =
-        run.lowest.map(|lowest| PeakNumbers { value: lowest.found.ratio, time_s: lowest.time_s });
+    for slipped in run.slipped() {
+        eprintln!("warning: {slipped}");
+        summary.warnings.push(slipped);
+    }
+    let peak = |(value, time_s): (f64, f64)| PeakNumbers { value, time_s };
+    summary.lowest_volume_ratio = run.seen.lowest().map(peak);
+    summary.least_stretch_beyond_law = run.seen.pressed().map(peak);
+    summary.warn(run.seen.weakened(&model, true));
     if let Some(out) = &out {
         summary.write(out)?;
     }
@@ -169,7 +174,9 @@ pub(super) struct Run<'s> {
     most_awake: usize,
     repeated_ticks: u64,
     asleep_ticks: u64,
-    lowest: Option<Lowest>,
+    /// How far (m) each tool slipped from its device at most, and when (s).
+    slips: Vec<(f64, f64)>,
+    seen: Seen,
     walls: WallNumbers,
 }
 
@@ -189,7 +196,8 @@ impl<'s> Run<'s> {
             most_awake: 0,
             repeated_ticks: 0,
             asleep_ticks: 0,
-            lowest: None,
+            slips: vec![(0.0, 0.0); scene.model.tools.len()],
+            seen: Seen::default(),
             walls: WallNumbers::default(),
         })
     }
@@ -216,7 +224,7 @@ impl<'s> Run<'s> {
             }
             let last = tick == plan.ticks || ended_by != "duration";
             if last || tick.is_multiple_of(LOOK_EVERY) {
-                self.look_for_inverted(time_s);
+                self.look(time_s);
             }
             if tick.is_multiple_of(plan.sample_every) || last {
                 rows.sample(time_s, self.model, &self.state, self.scratch.reactions_n())?;
@@ -243,17 +251,16 @@ impl<'s> Run<'s> {
         }
     }
 
-    fn look_for_inverted(&mut self, time_s: f64) {
-        let found = min_volume_ratio(self.model, &self.state);
-        let is_lower = |found: &VolumeRatio| self.lowest.is_none_or(|lowest| found.ratio < lowest.found.ratio);
-        if let Some(found) = found.filter(is_lower) {
-            self.lowest = Some(Lowest { found, time_s });
+    /// Looks for strained elements; a body that sleeps is as it was at the look before.
+    fn look(&mut self, time_s: f64) {
+        if !self.state.sleep.asleep || self.seen.lowest().is_none() {
+            self.seen.see(strained_in(self.model, &self.state, &mut self.scratch), time_s);
         }
     }
 
     /// Why the run is not to be trusted, if so, which ended with this volume ratio.
     fn untrusted(&self, end: f64) -> Option<Untrusted> {
-        let least = self.lowest.filter(Lowest::is_inverted).map(|lowest| lowest.told(self.model));
+        let least = self.seen.inverted(self.model);
         if let Some(what) = self.state.quarantine {
             let before = |least: String| format!("; before that elements turned inside out: {least}");
             return Some(Untrusted::Quarantined { what, inverted: least.map_or_else(String::new, before) });
@@ -283,6 +290,12 @@ impl<'s> Run<'s> {
         let report = step(self.model, &mut self.state, &mut self.scratch, &input);
         self.repeated_ticks += u64::from(report.repeated > 0);
         self.asleep_ticks += u64::from(report.substeps == 0 && self.state.sleep.asleep);
+        for (most, tool) in self.slips.iter_mut().zip(&self.state.mechanical.tools) {
+            let slip_m = tool.slip_m.length();
+            if slip_m > most.0 {
+                *most = (slip_m, time_s);
+            }
+        }
         let wall_ns = started.elapsed().as_nanos() as u64;
         self.walls.add(&self.scratch.meeting_walls());
         self.tick_wall_ns.saturating_record(wall_ns);
@@ -291,6 +304,20 @@ impl<'s> Run<'s> {
             self.awake_wall_ns.saturating_record(wall_ns);
             self.most_awake = self.most_awake.max(awake);
         }
+    }
+
+    /// What to tell of rigid tools that slipped from their devices.
+    fn slipped(&self) -> impl Iterator<Item = String> + '_ {
+        let slips = self.scene.model.tools.iter().zip(&self.slips).filter(|(_, (most_m, _))| *most_m > 0.0);
+        slips.map(|(tool, (most_m, time_s))| {
+            format!(
+                "the rigid tool \"{}\" slipped: at {} s it was {} mm behind where its driver says, since it would have gone through \
+                 the surface there; press less deep or more slowly, or give it coupling = \"spring\"",
+                tool.name,
+                short(*time_s),
+                short(most_m * 1e3)
+            )
+        })
     }
 
     /// Wakes these particles and no others.

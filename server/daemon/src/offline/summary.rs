@@ -1,7 +1,7 @@
 //! What a run did, as JSON for programs and as lines for people.
 use super::{folder, probe_rows::ProbeRows};
 use miette::{IntoDiagnostic, WrapErr};
-use palpate_physics::{Energies, Model, State, contact::MeetingWalls, snapshot, world};
+use palpate_physics::{AwakeFor, Energies, Model, State, contact::MeetingWalls, snapshot, world};
 use palpate_scene::{Scene, wording::counted};
 use serde::Serialize;
 use std::{collections::BTreeMap, path::Path};
@@ -31,6 +31,9 @@ pub(super) struct Summary {
     /// The least that was seen of that ratio in a run over time, and when.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) lowest_volume_ratio: Option<PeakNumbers>,
+    /// The least principal stretch of an element that was pressed beyond what its law is made for, and when; absent where none was.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) least_stretch_beyond_law: Option<PeakNumbers>,
     /// Newest value of every probe: unit, and value by column.
     pub(super) probes: BTreeMap<String, ProbeNumbers>,
     pub(super) samples: u64,
@@ -61,9 +64,41 @@ pub(super) struct ParticleNumbers {
     pub(super) most_active: usize,
     /// Awake at the end.
     pub(super) active: usize,
+    /// What for; absent of a seed body.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) active_for: Option<AwakeForNumbers>,
     /// Those that never wake, because the coarse tets do not hold them; 0 of a seed body.
     pub(super) outside: usize,
     pub(super) skin_triangles: usize,
+}
+
+/// How many of the awake particles are awake for what. One that several want counts for the first of them, in this order.
+#[derive(Debug, Clone, Copy, Serialize)]
+pub(super) struct AwakeForNumbers {
+    pub(super) tools: usize,
+    pub(super) loads: usize,
+    pub(super) injected_forces: usize,
+    /// For nothing any more: they have not come to rest, or are about to be put to sleep.
+    pub(super) nothing: usize,
+}
+
+impl AwakeForNumbers {
+    fn of(AwakeFor { tools, loads, injected, nothing }: AwakeFor) -> Self {
+        Self { tools, loads, injected_forces: injected, nothing }
+    }
+
+    /// `98 for tools, 2 for nothing any more`; nothing where none is awake.
+    fn told(self) -> String {
+        let Self { tools, loads, injected_forces, nothing } = self;
+        let all = [
+            (tools, "for tools"),
+            (loads, "for loads"),
+            (injected_forces, "for injected forces"),
+            (nothing, "for nothing any more"),
+        ];
+        let some = all.iter().filter(|(count, _)| *count > 0).map(|(count, what)| format!("{count} {what}"));
+        some.collect::<Vec<_>>().join(", ")
+    }
 }
 
 impl ParticleNumbers {
@@ -73,6 +108,7 @@ impl ParticleNumbers {
             spacing_m: model.body().particle_spacing_m(),
             most_active: model.body().most_awake_particles(),
             active: state.awake_particles(),
+            active_for: state.awake_for(model, &[]).map(AwakeForNumbers::of),
             outside: model.body().particles_that_never_wake(),
             skin_triangles: model.surface().triangles.len(),
         })
@@ -233,11 +269,20 @@ impl Summary {
             },
             min_volume_ratio: world::min_volume_ratio(model, state).map_or(1.0, |smallest| smallest.ratio),
             lowest_volume_ratio: None,
+            least_stretch_beyond_law: None,
             probes,
             samples: rows.count(),
             frames: ending.frames,
             state_hash: format!("{:016x}", snapshot::state_hash(state)),
             warnings: scene.warnings.clone(),
+        }
+    }
+
+    /// Adds what was seen to be wrong to the warnings, and tells it on standard error.
+    pub(super) fn warn(&mut self, warning: Option<String>) {
+        if let Some(warning) = warning {
+            eprintln!("warning: {warning}");
+            self.warnings.push(warning);
         }
     }
 
@@ -264,12 +309,14 @@ impl Summary {
         };
         println!("{}: {} tets, {} nodes, {ended}", self.scene, self.body.tets, self.body.nodes);
         if let Some(particles) = &self.body.particles {
+            let what_for = particles.active_for.map(AwakeForNumbers::told).filter(|told| !told.is_empty());
             println!(
-                "  {} particles {:.3} mm apart, {} of at most {} awake at the end",
+                "  {} particles {:.3} mm apart, {} of at most {} awake at the end{}",
                 particles.count,
                 particles.spacing_m * 1e3,
                 particles.active,
-                particles.most_active
+                particles.most_active,
+                what_for.map_or_else(String::new, |told| format!(": {told}"))
             );
         }
         if let Some(time) = &self.time {

@@ -1,6 +1,6 @@
 //! What `palpated serve` prints: at its start where to connect, at its end how it went.
 use super::{Running, ServeConfig, Summary};
-use crate::sim::timing::STAGES;
+use crate::{bodies::served, sim::timing::STAGES};
 use palpate_realtime::Histogram;
 use palpate_scene::wording::counted;
 use std::fmt::Write as _;
@@ -39,6 +39,9 @@ pub fn startup(running: &Running, config: &ServeConfig, description: &str) -> St
     );
     for note in &running.notes {
         let _ = writeln!(text, "real time  {note}");
+    }
+    for remark in served(&session.model).remarks() {
+        let _ = writeln!(text, "note       {remark}");
     }
     for warning in &session.warnings {
         let _ = writeln!(text, "warning    {warning}");

@@ -2,11 +2,11 @@
 //! neither allocates nor frees. A clerk task outside the loop answers the callers.
 use super::{
     bell::{Ear, bell},
-    inject::{InjectRefusal, Injection},
+    inject::{self, InjectRefusal, Injection},
     simulation::Simulation,
 };
 use glam::DVec3;
-use palpate_physics::{Model, State};
+use palpate_physics::{Model, PointForce, State};
 use palpate_realtime::Doorbell;
 use rtrb::{Consumer, Producer, RingBuffer};
 use std::{io, sync::Arc, time::Duration};
@@ -45,12 +45,18 @@ pub struct Copy {
     pub state: State,
     /// Force (N) that holds each prescribed degree of freedom; as long as the model has nodes.
     pub reactions_n: Vec<DVec3>,
+    /// Forces that were injected into the last tick.
+    pub injected: Vec<PointForce>,
 }
 
 impl Copy {
     /// Room for a model's.
     pub fn of(model: &Model) -> Self {
-        Self { state: State::at_rest(model), reactions_n: vec![DVec3::ZERO; model.rest_positions_m().len()] }
+        Self {
+            state: State::at_rest(model),
+            reactions_n: vec![DVec3::ZERO; model.rest_positions_m().len()],
+            injected: Vec::with_capacity(inject::CAPACITY),
+        }
     }
 }
 

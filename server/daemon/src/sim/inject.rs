@@ -63,6 +63,11 @@ impl Injections {
         self.pending.len() as u32
     }
 
+    /// The forces of the last tick.
+    pub fn acting(&self) -> &[PointForce] {
+        &self.acting
+    }
+
     /// Takes all, or none. Returns the first tick one of them acts in.
     ///
     /// # Errors

@@ -253,6 +253,9 @@ impl Loop {
         for (copied, reaction_n) in copy.reactions_n.iter_mut().zip(self.simulation.scratch.reactions_n()) {
             *copied = *reaction_n;
         }
+        // It has room for all that may act.
+        copy.injected.clear();
+        copy.injected.extend_from_slice(self.simulation.injections.acting());
         Ok(())
     }
 

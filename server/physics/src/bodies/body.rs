@@ -1,6 +1,6 @@
 //! What a body answers, whichever kind it is.
 use super::{
-    Body, BodyState, MaterialPoint, VolumeRatio,
+    Body, BodyScratch, BodyState, MaterialPoint,
     hybrid::HybridBody,
     mass_spring::MassSpringBody,
     of_both, of_kind,
@@ -10,11 +10,12 @@ use super::{
 use crate::{
     elements::solid::Solid,
     hash::{Chain, Fnv},
+    material::Law,
     mesh::TetMesh,
     settings::PrescribedSpec,
-    tick::{BodyKind, Energies, Environment, MechanicalState},
+    tick::{AwakeFor, BodyKind, Energies, Environment, MechanicalState, PointForce},
 };
-use glam::DVec3;
+use glam::{DMat3, DVec3};
 
 impl Body {
     /// The body of tetrahedra, if it is one.
@@ -153,10 +154,39 @@ impl Body {
         }, else Energies::NAN)
     }
 
-    /// The smallest `J = det F` over all tets; of a hybrid body, over the coarse tets' means and the awake cells. A surface of springs has
-    /// none.
-    pub(crate) fn min_volume_ratio(&self, own: &BodyState, x: &[DVec3]) -> Option<VolumeRatio> {
-        of_both!(Body, self, BodyState, own, (body, own) => BodyKind::min_volume_ratio(&**body, own, x), else None)
+    /// How many of the awake particles are awake for what; `None` of bodies without particles that wake and sleep by claims.
+    pub(crate) fn awake_for(
+        &self,
+        environment: &Environment,
+        own: &BodyState,
+        load_factors: &[f64],
+        points: &[PointForce],
+    ) -> Option<AwakeFor> {
+        of_both!(Body, self, BodyState, own, (body, own) => {
+            BodyKind::awake_for(&**body, environment, own, load_factors, points)
+        }, else None)
+    }
+
+    /// Tells the deformation gradient of every tet, its law and its number; of a hybrid body, of the awake cells and the coarse tets' means.
+    /// A surface of springs has none.
+    pub(crate) fn each_gradient(&self, own: &BodyState, x: &[DVec3], each: &mut dyn FnMut(&DMat3, Law, usize)) {
+        of_both!(Body, self, BodyState, own, (body, own) => BodyKind::each_gradient(&**body, own, x, each), else ());
+    }
+
+    /// Does the same with the buffers of a run that is at this state, where they have most of it ready.
+    pub(crate) fn each_gradient_in(
+        &self,
+        own: &BodyState,
+        scratch: &mut BodyScratch,
+        x: &[DVec3],
+        each: &mut dyn FnMut(&DMat3, Law, usize),
+    ) {
+        match (self, own, scratch) {
+            (Self::Hybrid(body), BodyState::Hybrid(own), BodyScratch::Hybrid(scratch)) if scratch.is_of(own) => {
+                scratch.each_gradient(body, x, each);
+            }
+            _ => self.each_gradient(own, x, each),
+        }
     }
 
     /// Writes what it was built from into a hash, so that a state goes back only into the body it came from.

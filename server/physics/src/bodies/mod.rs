@@ -13,7 +13,7 @@ mod state;
 mod stepped;
 pub mod tet;
 
-pub use crate::{elements::linear_tet::VolumeRatio, tick::MaterialPoint};
+pub use crate::tick::MaterialPoint;
 
 use crate::{
     elements::solid::Solid,

@@ -184,6 +184,11 @@ impl Foundation {
         PI * self.typical_pa_per_m * radius_m * depth_m * depth_m
     }
 
+    /// Returns the mean of `E/(1 − ν²)` (Pa) behind the triangles; 0 without any.
+    pub(super) fn mean_indentation_modulus_pa(&self) -> f64 {
+        self.indentation_modulus_pa.iter().sum::<f64>() / self.indentation_modulus_pa.len().max(1) as f64
+    }
+
     /// Returns the row sums `Σ_s k a_s ζ_si` (N/m) over the samples that one tool can touch around each node, and the
     /// bounds of all that it can touch at once; see the module's documentation.
     pub(super) fn row_sums_n_per_m(

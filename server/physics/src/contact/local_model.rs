@@ -145,7 +145,7 @@ pub(super) fn update(
     estimate.learn(tool.centre_m + arm_m, normal, pressed.normal_n.dot(normal), prior, model.spec.radius_m);
     let contact = prior * estimate.log_correction.exp();
     let sticking = TANGENTIAL_RATIO * contact * pressed.sticking_n / force_n;
-    let (moving, turning) = coupling_stiffnesses(model);
+    let (moving, turning) = coupling_stiffnesses(model, tool);
     // 1/K_vc + |p × n|²/K_r
     let coupling = series(moving, turning / arm_m.cross(normal).length_squared());
     estimate.smooth(series(contact, coupling), series(sticking, coupling));
@@ -184,10 +184,11 @@ pub(super) fn update(
 }
 
 /// Returns `K_vc` (N/m) and `K_r` (N m/rad). Both are infinite for a rigid tool, the latter for one that does not turn,
-/// too.
-fn coupling_stiffnesses(model: &ToolModel) -> (f64, f64) {
+/// too; a tool that slips from its device is not moved by it.
+fn coupling_stiffnesses(model: &ToolModel, tool: &ToolState) -> (f64, f64) {
     let turning = |capsule: &Capsule| capsule.turning.stiffness_nm_per_rad;
     match model.spec.coupling {
+        Coupling::Rigid if tool.slip_m != DVec3::ZERO => (0.0, f64::INFINITY),
         Coupling::Rigid => (f64::INFINITY, f64::INFINITY),
         Coupling::Spring { stiffness_n_per_m, .. } => {
             (stiffness_n_per_m, model.spec.shape.as_capsule().map_or(f64::INFINITY, turning))

@@ -6,7 +6,9 @@
 mod axis;
 mod axis_samples;
 pub(crate) mod broad;
+mod clutch;
 mod depth;
+mod following;
 mod foundation;
 mod friction;
 mod inside;
@@ -33,6 +35,7 @@ mod turning;
 
 pub(crate) use axis_samples::Near;
 pub(crate) use broad::Skin;
+pub use following::{CoupledFollowing, Following};
 pub use inside::is_inside;
 pub use local_torque::LocalTorqueModel;
 pub use moduli::SurfaceModuli;
@@ -85,6 +88,8 @@ struct ToolModel {
     foundation: Foundation,
     /// Force (N) at which the coupling saturates.
     force_limit_n: f64,
+    /// Force (N) beyond which the tool slips, if it is rigid.
+    slips_at_n: f64,
     /// Bound of the kinetic energy with which the tool meets the surface (J).
     impact_energy_j: f64,
 }
@@ -166,6 +171,7 @@ impl ToolModel {
         Self {
             spec: spec.clone(),
             force_limit_n: foundation.flat_force_n(radius_m, proxy::SATURATION_DEPTH * radius_m),
+            slips_at_n: clutch::slips_at_n(spec, &foundation),
             // ∫ π k_f R d² dd
             impact_energy_j: foundation.flat_force_n(radius_m, depth_m) * depth_m / 3.0,
             foundation,

@@ -10,17 +10,22 @@
 //!
 //! What keeps it outside, whatever the device does:
 //! - The spring saturates ([`super::spring`]) at `F_max`, the force that presses a sphere of its radius
-//!   [`SATURATION_DEPTH`]·R into the flat foundation. The damper is cut where the sum exceeds it.
+//!   [`SATURATION_DEPTH`]·R into the flat foundation. The damper is cut where the sum exceeds it. Where nothing is within
+//!   R/4 of the tool, neither is: so limited, a small tool falls behind a quick hand in the air. What its device is told
+//!   is limited everywhere.
 //! - It moves at most `R/4` in a substep; within `R/4` of the surface it approaches the nearest point, seen from there,
 //!   with at most the kinetic energy that the flat foundation stores at depth [`IMPACT_DEPTH`]·R. The rest is taken
 //!   from the (virtual) tool, never given to tool or body. In contact that point moves with the dent, which the body
 //!   will stop: there a surface that gives way allows no more speed than one at rest.
 //!
+//! A rigid tool follows its device through a clutch ([`super::clutch`]).
+//!
 //! A tool that turns is advanced in its orientation likewise ([`super::turning`]).
 use super::{
-    Coupling, ToolModel, ToolState,
+    Coupling, ToolModel, ToolState, clutch,
     narrow::Pressed,
     spring::{SaturatingSpring, shortened},
+    state::ToolContact,
     turning,
 };
 use glam::DVec3;
@@ -32,6 +37,8 @@ pub(super) const IMPACT_DEPTH: f64 = 0.4;
 /// Largest motion in a substep, and width of the zone near the surface, both over R.
 pub(super) const NEAR: f64 = 0.25;
 
+/// Stretch (m) at which the coupling saturates where nothing is near: further than an arm reaches.
+const FREE_STRETCH_M: f64 = 1.0;
 /// Time constant (s) of the device's velocity for the coupling's damper.
 pub(super) const SMOOTHED_S: f64 = 5e-3;
 /// A device that stands still is at rest below this speed (m/s, rad/s): what is left of a smoothed velocity has no end.
@@ -106,32 +113,31 @@ pub(super) struct Coupled {
 
 /// Does the first half of a substep, half kick and drift. Returns a bound (m) of how far any point of the tool's axis
 /// moved.
-pub(super) fn drift(
-    model: &ToolModel,
-    tool: &mut ToolState,
-    contact_n: DVec3,
-    contact_nm: DVec3,
-    time: &SubstepTime,
-) -> f64 {
+pub(super) fn drift(model: &ToolModel, tool: &mut ToolState, contact: &ToolContact, time: &SubstepTime) -> f64 {
     let before = model.axis(tool);
     let (device_m, device_m_per_s) = time.device(tool);
     match model.pull() {
         None => {
-            tool.centre_m = device_m;
-            tool.velocity_m_per_s = device_m_per_s;
+            clutch::follow(model, tool, contact, (device_m, device_m_per_s), time.dt_s);
             turning::follow(model, tool, time);
         }
         Some(pull) => {
             let (at_start, half_s) = (time.at_start(), 0.5 * time.dt_s);
             let stretch_m = at_start.device(tool).0 - tool.centre_m;
-            pull.half_kick(&mut tool.velocity_m_per_s, contact_n, stretch_m, tool.device_m_per_s, half_s);
-            turning::half_kick(model, tool, contact_nm, &at_start, half_s);
+            let pull = if contact.is_clear { pull.in_the_clear() } else { pull };
+            pull.half_kick(&mut tool.velocity_m_per_s, contact.force_n, stretch_m, tool.device_m_per_s, half_s);
+            turning::half_kick(model, tool, contact.torque_nm, &at_start, half_s);
             limit_speed(model, tool, NEAR * model.spec.radius_m / time.dt_s.max(f64::MIN_POSITIVE));
             tool.centre_m += tool.velocity_m_per_s * time.dt_s;
             turning::drift(model, tool, time.dt_s);
         }
     }
     before.centre_m.distance(tool.centre_m) + before.half_m.distance(model.axis(tool).half_m)
+}
+
+/// Returns whether nothing is within the zone near the surface.
+pub(super) fn is_clear(model: &ToolModel, pressed: &Pressed) -> bool {
+    pressed.to_surface_m.length() >= (1.0 + NEAR) * model.spec.radius_m
 }
 
 /// Does the second half of a substep, with the contact that the tool has now. Returns the coupling's force and torque
@@ -145,7 +151,7 @@ pub(super) fn finish(
 ) -> Coupled {
     let Some(pull) = model.pull() else { return Coupled::default() };
     let distance_m = pressed.to_surface_m.length();
-    if distance_m < (1.0 + NEAR) * model.spec.radius_m {
+    if !is_clear(model, pressed) {
         let limit_m_per_s = (2.0 * model.impact_energy_j / pull.mass_kg).sqrt();
         let towards = pressed.to_surface_m / distance_m;
         let recedes_m_per_s = surface_m_per_s.dot(towards);
@@ -160,11 +166,22 @@ pub(super) fn finish(
         }
     }
     let (stretch_m, half_s) = (time.device(tool).0 - tool.centre_m, 0.5 * time.dt_s);
+    let limit_n = pull.spring.limit_n;
+    let pull = if is_clear(model, pressed) { pull.in_the_clear() } else { pull };
     let force_n = pull.half_kick(&mut tool.velocity_m_per_s, pressed.force_n, stretch_m, tool.device_m_per_s, half_s);
-    Coupled { force_n, torque_nm: turning::half_kick(model, tool, pressed.torque_nm, time, half_s) }
+    Coupled {
+        force_n: shortened(force_n, limit_n),
+        torque_nm: turning::half_kick(model, tool, pressed.torque_nm, time, half_s),
+    }
 }
 
 impl Pull {
+    /// Returns the same, with a spring that saturates at [`FREE_STRETCH_M`] only.
+    fn in_the_clear(self) -> Self {
+        let limit_n = self.spring.limit_n.max(self.spring.stiffness_n_per_m * FREE_STRETCH_M);
+        Self { spring: SaturatingSpring { limit_n, ..self.spring }, ..self }
+    }
+
     /// Kicks the tool over `h_s`, with the contact's force (N), the stretch (m) and the device's velocity (m/s), and
     /// returns the coupling's mean force (N) over it.
     pub(super) fn half_kick(

@@ -36,10 +36,14 @@ pub(super) struct ToolContact {
     pub(super) touching: Touching,
     /// Whether it was just put where it is: samples inside it then carry nothing up to their present depth.
     pub(super) just_put: bool,
+    /// Whether nothing is within the zone near the surface ([`super::proxy`]) now.
+    pub(super) is_clear: bool,
     /// Force of the body on the tool now (N).
     pub(super) force_n: DVec3,
     /// Torque of the body on the tool now (N m).
     pub(super) torque_nm: DVec3,
+    /// Largest depth (m) that any sample carries now.
+    pub(super) deepest_m: f64,
     pub(super) estimate: StiffnessEstimate,
     #[serde(skip)]
     pub(super) candidates: Candidates,
@@ -47,16 +51,17 @@ pub(super) struct ToolContact {
 
 impl ToolContact {
     fn keep_sums_of(&mut self, other: &Self) {
-        (self.just_put, self.estimate) = (other.just_put, other.estimate);
-        (self.force_n, self.torque_nm) = (other.force_n, other.torque_nm);
+        (self.just_put, self.is_clear, self.estimate) = (other.just_put, other.is_clear, other.estimate);
+        (self.force_n, self.torque_nm, self.deepest_m) = (other.force_n, other.torque_nm, other.deepest_m);
     }
 }
 
 impl PartialEq for ContactState {
     fn eq(&self, other: &Self) -> bool {
         let same = |(a, b): (&ToolContact, &ToolContact)| {
-            let forces = a.force_n == b.force_n && a.torque_nm == b.torque_nm;
-            a.touching == b.touching && a.just_put == b.just_put && forces && a.estimate == b.estimate
+            let forces = a.force_n == b.force_n && a.torque_nm == b.torque_nm && a.deepest_m == b.deepest_m;
+            let flags = (a.just_put, a.is_clear) == (b.just_put, b.is_clear);
+            a.touching == b.touching && flags && forces && a.estimate == b.estimate
         };
         self.tools.len() == other.tools.len() && self.tools.iter().zip(&other.tools).all(same)
     }
@@ -72,8 +77,10 @@ impl ContactState {
         let tool = |tool: &super::ToolModel| ToolContact {
             touching: Touching::with_capacity(tool.foundation.samples),
             just_put: false,
+            is_clear: false,
             force_n: DVec3::ZERO,
             torque_nm: DVec3::ZERO,
+            deepest_m: 0.0,
             estimate: StiffnessEstimate::default(),
             candidates: Candidates::with_capacity(model.triangles.len()),
         };
@@ -98,6 +105,7 @@ impl ContactState {
             let known = touches.last().is_none_or(|last| (last.sample as usize) < samples(index));
             let finite = saved.force_n.is_finite()
                 && saved.torque_nm.is_finite()
+                && saved.deepest_m.is_finite()
                 && saved.estimate.is_finite()
                 && touches.iter().all(|touch| {
                     touch.spring_origin_m.is_finite() && (0.0..f64::INFINITY).contains(&touch.free_depth_m)
@@ -120,6 +128,8 @@ impl ContactState {
                 chain.vector(touch.spring_origin_m);
             });
             chain.flag(tool.just_put);
+            chain.flag(tool.is_clear);
+            chain.real(tool.deepest_m);
             chain.vector(tool.force_n);
             chain.vector(tool.torque_nm);
             let estimate = &tool.estimate;
@@ -151,8 +161,8 @@ impl ContactState {
     pub(crate) fn clear(&mut self) {
         for tool in &mut self.tools {
             tool.touching.clear();
-            tool.just_put = false;
-            (tool.force_n, tool.torque_nm) = (DVec3::ZERO, DVec3::ZERO);
+            (tool.just_put, tool.is_clear) = (false, false);
+            (tool.force_n, tool.torque_nm, tool.deepest_m) = (DVec3::ZERO, DVec3::ZERO, 0.0);
             tool.estimate = StiffnessEstimate::default();
         }
         self.forget_geometry();
@@ -162,8 +172,8 @@ impl ContactState {
     pub(crate) fn put_tool(&mut self, tool: usize) {
         let part = &mut self.tools[tool];
         part.touching.clear();
-        part.just_put = true;
-        (part.force_n, part.torque_nm) = (DVec3::ZERO, DVec3::ZERO);
+        (part.just_put, part.is_clear) = (true, false);
+        (part.force_n, part.torque_nm, part.deepest_m) = (DVec3::ZERO, DVec3::ZERO, 0.0);
         part.estimate = StiffnessEstimate::default();
         part.candidates.slack_m = f64::NEG_INFINITY;
     }

@@ -145,6 +145,7 @@ impl ContactModel {
                 return false;
             }
             let nothing = Pressed { to_surface_m: DVec3::INFINITY, ..Pressed::default() };
+            contact.tools[index].is_clear = true;
             let coupling = proxy::finish(&self.tools[index], tool, &nothing, DVec3::ZERO, time);
             scratch.coupling_sum_n += coupling.force_n;
             scratch.coupling_sum_nm += coupling.torque_nm;
@@ -167,8 +168,7 @@ impl ContactModel {
     }
 
     fn drift(&self, index: usize, tool: &mut ToolState, time: &SubstepTime, contact: &mut ContactState) {
-        let part = &contact.tools[index];
-        let moved_m = proxy::drift(&self.tools[index], tool, part.force_n, part.torque_nm, time);
+        let moved_m = proxy::drift(&self.tools[index], tool, &contact.tools[index], time);
         contact.tools[index].candidates.slack_m -= moved_m;
     }
 
@@ -215,7 +215,8 @@ impl ContactModel {
             pressed.torque_nm += push.torque_nm;
             pressed.energy_j += push.energy_j;
         }
-        (part.force_n, part.torque_nm) = (pressed.force_n, pressed.torque_nm);
+        (part.force_n, part.torque_nm, part.deepest_m) = (pressed.force_n, pressed.torque_nm, pressed.deepest_m);
+        part.is_clear = proxy::is_clear(model, &pressed);
         pressed
     }
 

@@ -94,8 +94,10 @@ impl ContactModel {
         tangents.triangles.clear();
         for (index, tool) in tools.iter().enumerate() {
             let tool_m_per_s = match self.tools[index].spec.coupling {
-                Coupling::Rigid => (tool.target.position_m - tool.previous_target.position_m) / step.tick_period_s,
-                Coupling::Spring { .. } => tool.velocity_m_per_s,
+                Coupling::Rigid if tool.slip_m == DVec3::ZERO => {
+                    (tool.target.position_m - tool.previous_target.position_m) / step.tick_period_s
+                }
+                _ => tool.velocity_m_per_s,
             };
             let next_centre_m = tool.centre_m + tool_m_per_s * step.dt_s;
             let mut records = contact.tools[index].touching.records();

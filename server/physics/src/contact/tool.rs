@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Coupling {
     /// The tool is where the device is: kinematic (trajectories, known-answer tests). It moves in a straight line
-    /// during the tick; nothing keeps it outside if it is driven further than its radius in one substep.
+    /// during the tick, and slips from its device before it would go through the surface ([`super::clutch`]).
     Rigid,
     /// The tool is a mass on a spring and damper to the device (virtual coupling): the proxy stays outside the body
     /// while the device may be inside.
@@ -171,6 +171,8 @@ pub struct ToolState {
     pub target: ToolTarget,
     /// The same at the end of the tick before: within a tick the device moves from there to `target`.
     pub previous_target: ToolTarget,
+    /// How far (m) a rigid tool has slipped from its device; zero for a coupled one.
+    pub slip_m: DVec3,
     /// Velocity of the device (m/s) as the coupling's damper has it: that of its path, smoothed.
     pub device_m_per_s: DVec3,
     /// Its angular velocity (rad/s) likewise.
@@ -224,6 +226,7 @@ impl ToolState {
             angular_velocity_rad_per_s: DVec3::ZERO,
             target,
             previous_target: target,
+            slip_m: DVec3::ZERO,
             device_m_per_s: DVec3::ZERO,
             device_rad_per_s: DVec3::ZERO,
             contact_force_n: DVec3::ZERO,
@@ -242,6 +245,7 @@ impl ToolState {
         let vectors = [
             self.centre_m,
             self.velocity_m_per_s,
+            self.slip_m,
             self.angular_velocity_rad_per_s,
             self.device_m_per_s,
             self.device_rad_per_s,

@@ -4,7 +4,6 @@
 //! Nodal force: `f_i = −∂U/∂x_i = −V P b_i` (N).
 use crate::linalg::tensor::outer;
 use crate::material::{Material, viscous};
-use crate::mesh::TetMesh;
 use glam::{DMat3, DVec3};
 
 /// What the rest state fixes for one tet.
@@ -77,16 +76,4 @@ pub struct VolumeRatio {
     pub ratio: f64,
     /// Where it is: a tet's number, of a hybrid body a coarse tet's.
     pub tet: usize,
-}
-
-/// Smallest `J = det F` of all tets at positions `x` (m).
-pub(crate) fn min_volume_ratio(mesh: &TetMesh, rest_tets: &[RestTet], x: &[DVec3]) -> VolumeRatio {
-    let mut worst = VolumeRatio { ratio: f64::INFINITY, tet: 0 };
-    for (tet, (nodes, rest)) in mesh.tets().iter().zip(rest_tets).enumerate() {
-        let ratio = rest.gradient_of(&nodes.map(|n| x[n as usize])).determinant();
-        if ratio < worst.ratio {
-            worst = VolumeRatio { ratio, tet };
-        }
-    }
-    worst
 }

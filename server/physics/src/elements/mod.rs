@@ -6,3 +6,4 @@ pub mod mass;
 pub mod rest_stiffness;
 pub mod rigid_motion;
 pub mod solid;
+pub mod strained;

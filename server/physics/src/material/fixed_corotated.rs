@@ -6,6 +6,8 @@
 //! matrix, whose roots are all real), and since `R = ∂t/∂F`, differentiating `p(t(F), F) = 0` gives
 //! `R = ((t² + I) F + 2t cof F − 2FC)/q`, `q = t³ − I t − 2J = 2(σ₁+σ₂)(σ₂+σ₃)(σ₁+σ₃)`.
 //! Halley's iteration falls monotonically onto the largest root from `√(3I) ≥ t`.
+//!
+//! Beyond what tissue can be stretched it stiffens ([`super::stretch_limit`]).
 use super::{
     ConstitutiveLaw, Lame,
     constants::Constants,
@@ -15,6 +17,7 @@ use super::{
     },
     lane_strain::{cofactor_and_volume_change, twice_green_strain, volumetric_differential},
     law::LaneStress,
+    stretch_limit,
 };
 use crate::{
     lanes::real::Real,
@@ -36,12 +39,16 @@ impl ConstitutiveLaw for FixedCorotated {
     /// `Ψ = µ|F − R|² + ½λ(J − 1)²`.
     fn energy_density(lame: Lame, f: &DMat3) -> f64 {
         let stretch = *f - nearest_rotation(f);
-        lame.mu_pa * contract(&stretch, &stretch) + 0.5 * lame.lambda_pa * (f.determinant() - 1.0).powi(2)
+        lame.mu_pa * contract(&stretch, &stretch)
+            + 0.5 * lame.lambda_pa * (f.determinant() - 1.0).powi(2)
+            + stretch_limit::energy_density(lame, f)
     }
 
     /// `P = 2µ(F − R) + λ(J − 1) cof F`: `R` is stationary, so its change does no work.
     fn piola(lame: Lame, f: &DMat3) -> DMat3 {
-        (*f - nearest_rotation(f)) * (2.0 * lame.mu_pa) + cofactor(f) * (lame.lambda_pa * (f.determinant() - 1.0))
+        (*f - nearest_rotation(f)) * (2.0 * lame.mu_pa)
+            + cofactor(f) * (lame.lambda_pa * (f.determinant() - 1.0))
+            + stretch_limit::piola(lame, f)
     }
 
     /// `δP = 2µ(δF − δR) + λ(cof F : δF) cof F + λ(J − 1) δ(cof F)`.
@@ -50,11 +57,13 @@ impl ConstitutiveLaw for FixedCorotated {
         (*df - rotation_differential(f, df)) * (2.0 * lame.mu_pa)
             + cof * (lame.lambda_pa * contract(&cof, df))
             + cofactor_differential(f, df) * (lame.lambda_pa * (f.determinant() - 1.0))
+            + stretch_limit::piola_differential(lame, f, df)
     }
 
     /// `2µ + λ|cof F N|²` at most, with `|cof F N| ≤ s²`.
     fn stretched_modulus_pa(lame: Lame, stretch_sq: f64) -> f64 {
-        2.0 * lame.mu_pa + lame.lambda_pa * stretch_sq * stretch_sq
+        let limited_pa = stretch_limit::stretched_modulus_pa(lame, stretch_sq);
+        2.0 * lame.mu_pa + lame.lambda_pa * stretch_sq * stretch_sq + limited_pa
     }
 
     /// `q ≥ 0.2 max(t³, 1)` (16 against 5.4 at rest, 1 against 0.68 for σ = (1, 1, −½)): outside, `R` is close to
@@ -85,6 +94,7 @@ impl ConstitutiveLaw for FixedCorotated {
                 p[a][b] = p[a][b] + pressure * cof_f[a][b];
             }
         }
+        stretch_limit::add_lane_piola(c.mu, h, &mut p);
         LaneStress { p, domain }
     }
 
@@ -121,6 +131,7 @@ impl ConstitutiveLaw for FixedCorotated {
                 p[i][j] = p[i][j] + two_mu * (df[i][j] - turned[j]);
             }
         }
+        stretch_limit::add_lane_piola_differential(c.mu, h, df, &mut p);
         LaneStress { p, domain }
     }
 }

@@ -28,6 +28,9 @@ pub(crate) trait ConstitutiveLaw {
     /// exceeds `s ≥ 1`, of which the square is given; λ is not negative here.
     fn stretched_modulus_pa(lame: Lame, stretch_sq: f64) -> f64;
 
+    /// The principal stretch below which it bears less the more it is compressed; `None` where a law bears more with more
+    /// compression.
+    const WEAKENS_BELOW: Option<f64> = None;
     /// Where [`LaneStress::domain`] is below this, the lane is computed once more in f64; `None` where a law in lanes
     /// is good for every `F`.
     const DOMAIN: Option<f64> = None;

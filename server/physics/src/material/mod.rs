@@ -15,6 +15,7 @@ pub mod parameters;
 pub(crate) mod passes;
 mod registry;
 pub mod stable_neo_hookean;
+mod stretch_limit;
 pub mod stvk;
 pub mod viscous;
 

@@ -21,6 +21,11 @@ macro_rules! laws {
             pub fn description(self) -> &'static str {
                 match self { $(Self::$law => $module::$law::DESCRIPTION),+ }
             }
+            /// The principal stretch (deformed over rest length) below which it bears less the more it is compressed;
+            /// `None` where a law bears more with more compression.
+            pub fn weakens_below(self) -> Option<f64> {
+                match self { $(Self::$law => $module::$law::WEAKENS_BELOW),+ }
+            }
             fn energy_density(self, lame: Lame, f: &DMat3) -> f64 {
                 match self { $(Self::$law => $module::$law::energy_density(lame, f)),+ }
             }

@@ -2,13 +2,14 @@
 //!
 //! `Ψ = ½µ(tr FᵀF − 3) + ½λ̂(J − 1)² − µ(J − 1)` with `λ̂ = λ + µ`, `J = det F`. At `F = I` energy and stress vanish,
 //! and `δP = µ(δF + δFᵀ) + (λ̂ − µ) tr(δF) I`: small strain sees exactly λ and µ. Defined for every `F`, inverted ones
-//! included.
+//! included. Beyond what tissue can be stretched it stiffens ([`super::stretch_limit`]).
 use super::{
     ConstitutiveLaw, Lame,
     constants::Constants,
     lane_matrix::{M3, cofactor as lane_cofactor, plus, scaled, trace},
     lane_strain::{cofactor_and_volume_change, cofactor_of_sum, volume_change, volumetric_differential},
     law::LaneStress,
+    stretch_limit,
 };
 use crate::{
     lanes::real::Real,
@@ -28,13 +29,17 @@ impl ConstitutiveLaw for StableNeoHookean {
     fn energy_density(lame: Lame, f: &DMat3) -> f64 {
         let volume_change = f.determinant() - 1.0;
         let lambda_hat = lame.lambda_pa + lame.mu_pa;
-        0.5 * lame.mu_pa * (contract(f, f) - 3.0) + volume_change * (0.5 * lambda_hat * volume_change - lame.mu_pa)
+        0.5 * lame.mu_pa * (contract(f, f) - 3.0)
+            + volume_change * (0.5 * lambda_hat * volume_change - lame.mu_pa)
+            + stretch_limit::energy_density(lame, f)
     }
 
     /// `P = µF + (λ̂(J − 1) − µ) cof F`.
     fn piola(lame: Lame, f: &DMat3) -> DMat3 {
         let lambda_hat = lame.lambda_pa + lame.mu_pa;
-        *f * lame.mu_pa + cofactor(f) * (lambda_hat * (f.determinant() - 1.0) - lame.mu_pa)
+        *f * lame.mu_pa
+            + cofactor(f) * (lambda_hat * (f.determinant() - 1.0) - lame.mu_pa)
+            + stretch_limit::piola(lame, f)
     }
 
     /// `δP = µδF + λ̂ (cof F : δF) cof F + (λ̂(J − 1) − µ) δ(cof F)`.
@@ -44,11 +49,13 @@ impl ConstitutiveLaw for StableNeoHookean {
         *df * lame.mu_pa
             + cof * (lambda_hat * contract(&cof, df))
             + cofactor_differential(f, df) * (lambda_hat * (f.determinant() - 1.0) - lame.mu_pa)
+            + stretch_limit::piola_differential(lame, f, df)
     }
 
     /// `µ + (λ + µ)|cof F N|²` with `|cof F N| ≤ s²`; `J` is linear along `n Nᵀ`.
     fn stretched_modulus_pa(lame: Lame, stretch_sq: f64) -> f64 {
-        lame.mu_pa + (lame.lambda_pa + lame.mu_pa) * stretch_sq * stretch_sq
+        let limited_pa = stretch_limit::stretched_modulus_pa(lame, stretch_sq);
+        lame.mu_pa + (lame.lambda_pa + lame.mu_pa) * stretch_sq * stretch_sq + limited_pa
     }
 
     /// `P = µ(F − cof F) + λ̂(J − 1) cof F`, with `F − cof F = H + Hᵀ − tr(H) I − cof H`.
@@ -66,6 +73,7 @@ impl ConstitutiveLaw for StableNeoHookean {
                 p[i][j] = c.mu * (h[i][j] + h[j][i] - trace_part - cof_h[i][j]) + pressure * cof_f[i][j];
             }
         }
+        stretch_limit::add_lane_piola(c.mu, h, &mut p);
         LaneStress::everywhere(p)
     }
 
@@ -76,6 +84,8 @@ impl ConstitutiveLaw for StableNeoHookean {
         let (cof_f, volume_change) = cofactor_and_volume_change(h);
         let pressure = lambda_hat * volume_change - c.mu;
         let volumetric = volumetric_differential(lambda_hat, pressure, h, &cof_f, df);
-        LaneStress::everywhere(plus(&scaled(df, c.mu), &volumetric))
+        let mut dp = plus(&scaled(df, c.mu), &volumetric);
+        stretch_limit::add_lane_piola_differential(c.mu, h, df, &mut dp);
+        LaneStress::everywhere(dp)
     }
 }

@@ -3,17 +3,18 @@
 //! A kind implements these four traits in its folder (`kind.rs`, and `stepped.rs` for [`Stepped`]); `bodies/mod.rs` registers it. What only some kinds have is answered
 //! by a default here, which says what it means to have none.
 use super::{
-    Energies, Environment, Evaluation, Judged, MaterialPoint, MechanicalState, PointForce, PrescribedNodes, Tick,
-    free_inverse_mass,
+    AwakeFor, Energies, Environment, Evaluation, Judged, MaterialPoint, MechanicalState, PointForce, PrescribedNodes,
+    Tick, free_inverse_mass,
 };
 use crate::{
     contact::ContactScratch,
-    elements::{linear_tet::VolumeRatio, solid::Solid},
+    elements::solid::Solid,
     hash::{Chain, Fnv},
+    material::Law,
     mesh::{Surface, TetMesh},
     settings::PrescribedSpec,
 };
-use glam::DVec3;
+use glam::{DMat3, DVec3};
 
 /// What a kind of body is built from.
 pub(crate) trait KindSpec {
@@ -118,10 +119,19 @@ pub(crate) trait BodyKind {
         point.of(&state.x) - point.of(self.rest_positions_m())
     }
 
-    /// The smallest `J = det F`; `None` where there is no volume.
-    fn min_volume_ratio(&self, _: &Self::State, _: &[DVec3]) -> Option<VolumeRatio> {
+    /// How many of the awake particles are awake for what, where that is known.
+    fn awake_for(
+        &self,
+        _: &Environment,
+        _: &Self::State,
+        _load_factors: &[f64],
+        _points: &[PointForce],
+    ) -> Option<AwakeFor> {
         None
     }
+
+    /// Tells the deformation gradient of every element, its law, and the number of the tet where it is; nothing where there is no volume.
+    fn each_gradient(&self, _: &Self::State, _x: &[DVec3], _each: &mut dyn FnMut(&DMat3, Law, usize)) {}
 
     /// Adds `1/m` (1/kg) of every node and axis, zero where it is prescribed.
     fn chain_inverse_mass(&self, prescribed: &[PrescribedSpec], chain: &mut Chain) {

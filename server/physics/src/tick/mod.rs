@@ -1,5 +1,6 @@
 //! What all kinds of body share in a tick: the surroundings, the inputs, the state that every kind has, and the
 //! operations on lumped masses.
+mod awake_for;
 mod constraints;
 mod environment;
 mod error;
@@ -15,6 +16,7 @@ mod skin;
 mod state;
 mod substeps;
 
+pub use awake_for::AwakeFor;
 pub(crate) use constraints::free_inverse_mass;
 pub use environment::{Environment, EnvironmentSpec};
 pub use error::EnvironmentError;

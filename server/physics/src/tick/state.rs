@@ -118,7 +118,7 @@ impl MechanicalState {
         let Some(state) = self.tools.get_mut(tool).filter(|_| pose.is_finite()) else { return };
         state.target = pose.at_rest();
         state.let_go();
-        (state.centre_m, state.orientation) = (pose.position_m, pose.orientation);
+        (state.centre_m, state.orientation, state.slip_m) = (pose.position_m, pose.orientation, DVec3::ZERO);
         self.contact.put_tool(tool);
         self.force_is_current = false;
     }

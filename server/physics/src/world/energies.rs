@@ -1,6 +1,6 @@
 //! The energies of a state.
 use super::{Model, State};
-use crate::{bodies::VolumeRatio, contact::MeetingWalls, tick::Energies};
+use crate::{contact::MeetingWalls, tick::Energies};
 use glam::DVec3;
 
 impl Energies {
@@ -30,10 +30,4 @@ pub fn meeting_walls(model: &Model, state: &State) -> MeetingWalls {
 /// Returns the elastic energy (J): `Σ V Ψ(F)`, or that of the springs.
 pub fn elastic_energy_j(model: &Model, state: &State) -> f64 {
     model.body().energies(DVec3::ZERO, &state.body, &state.mechanical).elastic_j
-}
-
-/// Returns the smallest `J = det F` over all tets, or of a hybrid body over the means of coarse tets and the awake
-/// cells. A surface of springs has none.
-pub fn min_volume_ratio(model: &Model, state: &State) -> Option<VolumeRatio> {
-    model.body().min_volume_ratio(&state.body, &state.mechanical.x)
 }

@@ -12,9 +12,10 @@ mod sleep;
 mod spec;
 mod state;
 mod step;
+mod strained;
 
 pub use by_hand::{refine_only, wake_only};
-pub use energies::{elastic_energy_j, meeting_walls, min_volume_ratio};
+pub use energies::{elastic_energy_j, meeting_walls};
 pub use error::ModelError;
 pub use model::Model;
 pub use quarantine::{Quarantine, first_non_finite};
@@ -23,3 +24,4 @@ pub use sleep::Sleep;
 pub use spec::ModelSpec;
 pub use state::State;
 pub use step::{StepReport, step};
+pub use strained::{min_volume_ratio, strained, strained_in};

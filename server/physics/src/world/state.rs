@@ -1,6 +1,11 @@
 //! The state: everything that a tick changes.
 use super::{Model, Quarantine, Sleep};
-use crate::{bodies::BodyState, contact::ToolTarget, integrate::Pace, tick::MechanicalState};
+use crate::{
+    bodies::BodyState,
+    contact::ToolTarget,
+    integrate::Pace,
+    tick::{AwakeFor, MechanicalState, PointForce},
+};
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
@@ -81,6 +86,14 @@ impl State {
     /// Returns the number of awake particles.
     pub fn awake_particles(&self) -> usize {
         self.body.awake_particles()
+    }
+
+    /// Returns how many of the awake particles are awake for tools, loads and injected forces, with the forces that were injected
+    /// into the last tick; `None` of bodies whose particles do not wake for these. It is worked out from the state, in more
+    /// than a tick's time.
+    pub fn awake_for(&self, model: &Model, points: &[PointForce]) -> Option<AwakeFor> {
+        let load_factors = &self.mechanical.load_factors;
+        model.body().awake_for(model.environment(), &self.body, load_factors, points)
     }
 
     /// Returns the positions (m) of the awake particles.

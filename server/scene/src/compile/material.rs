@@ -27,9 +27,7 @@ pub(crate) fn compile(tables: &[MaterialTable], regions: &Regions<'_>, body: &Bo
         for tet in regions.tets(name, &at.key("region"))? {
             owner[tet as usize] = Some(number);
         }
-        let region = material(table, name, &at)?;
-        warn_of_locking(&region, &mut warnings);
-        found.push(region);
+        found.push(material(table, name, &at)?);
     }
     let bare = owner.iter().filter(|tet| tet.is_none()).count();
     if bare > 0 {
@@ -98,16 +96,4 @@ fn parameter_fault(at: &Where, error: ParameterError) -> Fault {
         ParameterError::Viscosity { name, .. } => name,
     };
     Fault::value(at.key(key), error.to_string()).cause(error)
-}
-
-fn warn_of_locking(region: &Region, warnings: &mut Vec<String>) {
-    const LOCKING_POISSON_RATIO: f64 = 0.495;
-    let nu = region.material.lame.poisson_ratio();
-    if nu > LOCKING_POISSON_RATIO {
-        warnings.push(format!(
-            "the material \"{}\" has Poisson's ratio {nu:.4}: linear tets are far too stiff above {LOCKING_POISSON_RATIO}, \
-             and the tick needs many substeps",
-            region.name
-        ));
-    }
 }

@@ -1,7 +1,10 @@
 //! Collects what the readers of the single formats find, and makes a volume or a surface of it.
 use super::cursor::shown;
 use super::error::{FileError, Place, Problem};
+use super::solids::Solids;
+use super::split::{Face, Solid};
 use super::{Group, SurfaceFile, VolumeFile};
+use crate::wording::{counted_as, joined};
 use glam::DVec3;
 use std::collections::{BTreeMap, HashMap};
 use std::path::Path;
@@ -13,6 +16,8 @@ pub(super) enum Shape {
     Triangle,
     Polygon,
     Tet,
+    /// Split into tetrahedra.
+    Solid(Solid),
     /// A line of the geometry that was meshed: read past, and no loss to volumes and surfaces.
     Curve,
     /// Read past, and counted.
@@ -27,6 +32,12 @@ pub(super) struct Kind {
     pub(super) name: &'static str,
     /// Nodes at the corners; they come first.
     pub(super) corners: usize,
+}
+
+impl Kind {
+    pub(super) fn solid(solid: Solid) -> Self {
+        Self { shape: Shape::Solid(solid), name: solid.name(), corners: solid.corners() }
+    }
 }
 
 /// A mesh in the making. Node indices are checked by the readers, who know the place of an error.
@@ -44,6 +55,7 @@ pub(super) struct Builder {
     tet_of: HashMap<[u32; 4], u32>,
     more_tet_groups: BTreeMap<usize, Vec<u32>>,
     repeated_tets: usize,
+    solids: Solids,
     triangles: Vec<[u32; 3]>,
     surface_groups: BTreeMap<usize, Vec<[u32; 3]>>,
     node_groups: BTreeMap<usize, Vec<u32>>,
@@ -52,6 +64,8 @@ pub(super) struct Builder {
     /// Arrays that nothing uses and that could not be read, and why.
     left_out: BTreeMap<String, String>,
     curves: usize,
+    /// Points without a group.
+    points: usize,
     /// Nodes of curves, and of points without a group.
     of_geometry: Vec<u32>,
 }
@@ -62,7 +76,13 @@ impl Builder {
         let corners = &nodes[..kind.corners.min(nodes.len())];
         match (kind.shape, corners) {
             (Shape::Tet, &[a, b, c, d]) => self.tet([a, b, c, d], tags),
+            (Shape::Solid(solid), _) if corners.len() == kind.corners => self.solids.add(solid, corners, tags),
             (Shape::Triangle, &[a, b, c]) => self.triangle([a, b, c], tags),
+            // Cut as the faces of solids are, on one of which it may lie.
+            (Shape::Polygon, &[_, _, _, _]) => match Face::of(corners) {
+                Some(face) => face.triangles().for_each(|triangle| self.triangle(triangle, tags)),
+                None => return *self.skipped.entry("faces of fewer than three corners").or_default() += 1,
+            },
             (Shape::Polygon, &[first, _, _, ..]) => {
                 for pair in corners[1..].windows(2) {
                     self.triangle([first, pair[0], pair[1]], tags);
@@ -75,7 +95,10 @@ impl Builder {
                 self.of_geometry.extend(nodes);
                 return self.curves += 1;
             }
-            (Shape::Point, &[node]) if tags.is_empty() => self.of_geometry.push(node),
+            (Shape::Point, &[node]) if tags.is_empty() => {
+                self.of_geometry.push(node);
+                self.points += 1;
+            }
             (Shape::Point, &[node]) => {
                 for &tag in tags {
                     let group = self.group(0, Some(tag)) as usize;
@@ -104,7 +127,11 @@ impl Builder {
         }
         for &tag in tags {
             let group = self.group(3, Some(tag));
-            if self.tet_group[tet as usize] == group {
+            let first = &mut self.tet_group[tet as usize];
+            if self.groups[*first as usize] == (3, None) {
+                // Listed before without a group.
+                *first = group;
+            } else if *first == group {
                 self.repeated_tets += 1;
             } else {
                 self.more_tet_groups.entry(group as usize).or_default().push(tet);
@@ -124,6 +151,16 @@ impl Builder {
     pub(super) fn node_in_group(&mut self, node: u32, tag: i64) {
         let group = self.group(0, Some(tag)) as usize;
         self.node_groups.entry(group).or_default().push(node);
+    }
+
+    /// A node that no element has: of the geometry, such as the centre of an arc.
+    pub(super) fn lone_node(&mut self, node: u32) {
+        self.of_geometry.push(node);
+    }
+
+    /// Tells of something that the body loses nothing by.
+    pub(super) fn note(&mut self, text: String) {
+        self.notes.push(text);
     }
 
     /// Tells of an array that nothing uses why it is left out.
@@ -161,6 +198,7 @@ impl Builder {
         if !self.tets.is_empty() {
             parts.push(format!("{} tetrahedra", self.tets.len()));
         }
+        parts.extend(self.solids.counted());
         if self.curves > 0 {
             parts.push(format!("{} lines", self.curves));
         }
@@ -168,10 +206,19 @@ impl Builder {
         parts.join(", ")
     }
 
-    fn note(&mut self) {
+    /// Tells what was skipped or changed; `split` says what was split.
+    fn tell(&mut self, split: Option<String>) {
         const NAMED: usize = 5;
-        if self.curves > 0 {
-            self.notes.push(format!("{} lines of the geometry are left out", self.curves));
+        let geometry: Vec<String> = [(self.curves, "lines"), (self.points, "points")]
+            .into_iter()
+            .filter(|(count, _)| *count > 0)
+            .map(|(count, what)| counted_as(count, what))
+            .collect();
+        let verb = if self.curves + self.points == 1 { "was" } else { "were" };
+        let left = (!geometry.is_empty()).then(|| format!("{} of the geometry {verb} left out", joined(&geometry)));
+        let told: Vec<String> = split.into_iter().chain(left).collect();
+        if !told.is_empty() {
+            self.notes.push(told.join("; "));
         }
         if !self.left_out.is_empty() {
             let mut named: Vec<_> =
@@ -191,19 +238,27 @@ impl Builder {
             let curved = counted(&self.higher_order).join(", ");
             self.warnings.push(format!("of {curved} the corner nodes are used, the nodes between them are not"));
         }
+        let mut repeated = self.solids.repeated.clone();
         if self.repeated_tets > 0 {
-            self.warnings.push(format!("{} repeated tetrahedra are used once", self.repeated_tets));
+            repeated.insert("tetrahedra", self.repeated_tets);
+        }
+        if !repeated.is_empty() {
+            let repeated: Vec<String> = repeated.iter().map(|(what, &count)| counted_as(count, what)).collect();
+            self.warnings.push(format!("repeated elements are used once: {}", joined(&repeated)));
         }
     }
 
     /// The volume, if there are tets.
     pub(super) fn into_volume(mut self, path: &Path) -> Result<VolumeFile, FileError> {
-        if self.tets.is_empty() {
+        if self.tets.is_empty() && self.solids.is_empty() {
             return Err(FileError::new(path, Place::File, Problem::NoTets { found: self.inventory() }));
         }
-        self.note();
+        let own_tets = self.tets.len();
+        let told = self.split_solids().map_err(|problem| FileError::new(path, Place::File, problem))?;
+        self.tell(told);
         Ok(VolumeFile {
             path: path.to_path_buf(),
+            own_tets,
             groups: self.named_groups(),
             mesh_nodes: self.nodes,
             tets: self.tets,
@@ -217,6 +272,18 @@ impl Builder {
         })
     }
 
+    /// Puts the tetrahedra of solids behind the file's own; what to say of it.
+    fn split_solids(&mut self) -> Result<Option<String>, Problem> {
+        let mut split = self.solids.split(&mut self.nodes)?;
+        split.check_fit(&self.tets, self.nodes.len());
+        for (tet, solid) in split.tets {
+            self.tet(tet, &split.tags[solid as usize]);
+        }
+        self.warnings.append(&mut split.warnings);
+        self.notes.append(&mut split.notes);
+        Ok(split.told)
+    }
+
     /// The surface, if there are triangles: every triangle of the file and the vertices they use.
     pub(super) fn into_surface(mut self, path: &Path) -> Result<SurfaceFile, FileError> {
         let all = self.triangles.len();
@@ -224,7 +291,7 @@ impl Builder {
         if self.triangles.is_empty() {
             return Err(FileError::new(path, Place::File, Problem::NoTriangles { found: self.inventory() }));
         }
-        self.note();
+        self.tell(None);
         let collapsed = all - self.triangles.len();
         if collapsed > 0 {
             self.warnings.push(format!("{collapsed} triangles that use a vertex twice are left out"));

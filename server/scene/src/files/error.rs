@@ -1,4 +1,5 @@
 //! What can be wrong with a mesh file, said so that a user can act on it.
+use crate::wording::short;
 use glam::DVec3;
 use miette::Diagnostic;
 use palpate_physics::MeshError;
@@ -153,6 +154,24 @@ pub enum Problem {
         /// The first few.
         first: Vec<usize>,
     },
+    /// Hexahedra, prisms or pyramids that cannot be split into upright tetrahedra.
+    #[error(
+        "{count} of {total} {solids} {} flat or turned inside out at a corner (numbers {}, counting the {solids} from 0; \
+         the first is around ({}, {}, {}) in the file's unit)",
+        if *count == 1 { "is" } else { "are" }, list(first, *count), short(place.x), short(place.y), short(place.z)
+    )]
+    InvertedSolids {
+        /// What they are, plural.
+        solids: &'static str,
+        /// How many.
+        count: usize,
+        /// Of how many.
+        total: usize,
+        /// The first few.
+        first: Vec<usize>,
+        /// The middle of the first.
+        place: DVec3,
+    },
     /// The factor from the file's unit to metres is no length.
     #[error("the scale from the file's unit to metres is {scale}, which is not positive and finite")]
     Scale {
@@ -185,7 +204,7 @@ impl Problem {
                 "copy or export the file again; its writer or the transfer may have been interrupted"
             }
             Self::UnknownFormat { .. } => {
-                "volumes: .msh .vtk .vtu .node/.ele .mesh; surfaces: .stl .obj .ply .vtk .vtp; see docs/formats.md"
+                "volumes: .msh .vtk .vtu .xdmf .node/.ele .mesh; surfaces: .stl .obj .ply .vtk .vtp; see docs/formats.md"
             }
             Self::Expected { .. } => "the file is damaged, or of another format than it claims; export it again",
             Self::NonFinite { .. } | Self::UnknownNode { .. } | Self::DuplicateNode { .. } => {
@@ -197,7 +216,7 @@ impl Problem {
                 "a body needs a tetrahedral mesh: mesh the volume (`gmsh -3`), or give two surfaces to be filled"
             }
             Self::NoTriangles { .. } => "give a triangulated surface",
-            Self::Inverted { .. } => "repair or optimise the mesh where it was made (`gmsh -optimize`)",
+            Self::Inverted { .. } | Self::InvertedSolids { .. } => "repair or optimise the mesh where it was made (`gmsh -optimize`)",
             Self::Scale { .. } => "give the length of one file unit in metres, 0.001 for millimetres",
             Self::Mesh(_) => {
                 "repair the mesh where it was made; tets and nodes are counted from 0, in the file's order"

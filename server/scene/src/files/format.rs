@@ -1,4 +1,5 @@
 //! Tells a file's format from its content and its name.
+use super::cursor::find;
 use super::error::{FileError, Place, Problem};
 use super::{medit, stl};
 use std::path::Path;
@@ -9,6 +10,7 @@ pub(super) enum Format {
     Msh,
     VtkLegacy,
     VtkXml,
+    Xdmf,
     TetGen,
     Medit,
     Stl,
@@ -50,12 +52,23 @@ pub(super) fn recognise(path: &Path, data: &[u8]) -> Result<Format, FileError> {
         "msh" => Ok(Format::Msh),
         "vtk" => Ok(Format::VtkLegacy),
         "vtu" | "vtp" => Ok(Format::VtkXml),
+        "xdmf" | "xmf" => Ok(Format::Xdmf),
         "node" | "ele" | "face" => Ok(Format::TetGen),
         "mesh" => Ok(Format::Medit),
         "stl" => Ok(Format::Stl),
         "obj" => Ok(Format::Obj),
         "ply" => Ok(Format::Ply),
         _ => Err(FileError::new(path, Place::File, Problem::UnknownFormat { extension })),
+    }
+}
+
+/// What the first element of XML says that is known; comments and declarations may be before it.
+fn by_root(data: &[u8]) -> Option<Format> {
+    let place = |root: &[u8]| find(data, root).unwrap_or(usize::MAX);
+    match (place(b"<Xdmf"), place(b"<VTKFile")) {
+        (usize::MAX, usize::MAX) => None,
+        (xdmf, vtk) if xdmf < vtk => Some(Format::Xdmf),
+        _ => Some(Format::VtkXml),
     }
 }
 
@@ -68,8 +81,8 @@ fn by_content(data: &[u8]) -> Option<Format> {
         Some(Format::VtkLegacy)
     } else if begins(medit::FIRST) {
         Some(Format::Medit)
-    } else if begins("<?xml") || begins("<VTKFile") {
-        Some(Format::VtkXml)
+    } else if begins("<") {
+        by_root(start)
     } else if begins("ply\n") || begins("ply\r") {
         Some(Format::Ply)
     } else if stl::begins_solid(start) || stl::is_binary(data) {

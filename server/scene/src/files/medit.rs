@@ -1,21 +1,18 @@
-//! MEDIT's `.mesh`, ASCII: triangles, quadrilaterals and tetrahedra, whose references are groups, 0 being none.
+//! MEDIT's `.mesh`, ASCII: faces of three and four corners and solids, whose references are groups, 0 being none.
 use super::builder::{Builder, Kind, Shape};
 use super::cursor::{Cursor, Scalar};
 use super::error::{FileError, Problem};
+use super::split::Solid;
 use glam::DVec3;
 use std::path::Path;
 
 /// The word that a file begins with, behind comments.
 pub(super) const FIRST: &str = "MeshVersionFormatted";
 
-const POINTS: Kind = Kind { shape: Shape::Point, name: "points", corners: 1 };
 const EDGES: Kind = Kind { shape: Shape::Curve, name: "lines", corners: 2 };
 const TRIANGLES: Kind = Kind { shape: Shape::Triangle, name: "triangles", corners: 3 };
 const QUADRILATERALS: Kind = Kind { shape: Shape::Polygon, name: "quadrangles", corners: 4 };
 const TETRAHEDRA: Kind = Kind { shape: Shape::Tet, name: "tetrahedra", corners: 4 };
-const HEXAHEDRA: Kind = Kind { shape: Shape::Other, name: "hexahedra", corners: 8 };
-const PRISMS: Kind = Kind { shape: Shape::Other, name: "prisms", corners: 6 };
-const PYRAMIDS: Kind = Kind { shape: Shape::Other, name: "pyramids", corners: 5 };
 
 pub(super) fn read(path: &Path, data: &[u8]) -> Result<Builder, FileError> {
     let mut reader = Reader { cursor: Cursor::new(path, data), builder: Builder::default(), used: Vec::new() };
@@ -36,9 +33,13 @@ pub(super) fn read(path: &Path, data: &[u8]) -> Result<Builder, FileError> {
             "Quadrilaterals" => reader.elements(QUADRILATERALS, 4)?,
             "Tetrahedra" => reader.elements(TETRAHEDRA, 4)?,
             "TetrahedraP2" => reader.elements(TETRAHEDRA, 10)?,
-            "Hexahedra" => reader.elements(HEXAHEDRA, 8)?,
-            "Prisms" => reader.elements(PRISMS, 6)?,
-            "Pyramids" => reader.elements(PYRAMIDS, 5)?,
+            "QuadrilateralsQ2" => reader.elements(QUADRILATERALS, 9)?,
+            "Hexahedra" => reader.elements(Kind::solid(Solid::Hexahedron), 8)?,
+            "HexahedraQ2" => reader.elements(Kind::solid(Solid::Hexahedron), 27)?,
+            "Prisms" => reader.elements(Kind::solid(Solid::Prism), 6)?,
+            "PrismsP2" => reader.elements(Kind::solid(Solid::Prism), 18)?,
+            "Pyramids" => reader.elements(Kind::solid(Solid::Pyramid), 5)?,
+            "PyramidsP2" => reader.elements(Kind::solid(Solid::Pyramid), 14)?,
             "End" => return Ok(reader.finish()),
             _ => reader.skip(section)?,
         }
@@ -136,7 +137,7 @@ impl<'a> Reader<'a> {
     /// Vertices without an element are points of the geometry, such as the centre of an arc.
     fn finish(mut self) -> Builder {
         for (node, _) in self.used.iter().enumerate().filter(|(_, used)| !**used) {
-            self.builder.element(POINTS, &[node as u32], &[]);
+            self.builder.lone_node(node as u32);
         }
         self.builder
     }

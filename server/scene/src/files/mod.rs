@@ -15,11 +15,14 @@ mod medit;
 mod msh;
 mod obj;
 mod ply;
+mod solids;
+mod split;
 mod stl;
 mod tet_mesh;
 mod tetgen;
 mod vtk;
 mod write;
+mod xdmf;
 
 pub use error::{FileError, Place, Problem};
 pub use tet_mesh::{GroupedMesh, Members, UnusedNodes};
@@ -61,10 +64,14 @@ impl Group {
 pub struct VolumeFile {
     /// Where it was read from.
     pub path: PathBuf,
-    /// Nodes in file order and in the file's unit, unscaled; unused ones included.
+    /// Nodes in file order and in the file's unit, unscaled; unused ones included. Behind them the middles of solids
+    /// that were split around one.
     pub mesh_nodes: Vec<DVec3>,
     /// Nodes of every tet, as indices into `mesh_nodes`, in the file's orientation.
     pub tets: Vec<[u32; 4]>,
+    /// How many of the tets, the first, are the file's own; the others are what its hexahedra, prisms and pyramids were
+    /// split into, and are upright.
+    pub own_tets: usize,
     /// For every tet, its (first) group as an index into `groups`.
     pub tet_group: Vec<u32>,
     /// Tets of a further group: index into `groups`, tets. Empty unless groups overlap.
@@ -96,7 +103,8 @@ pub struct SurfaceFile {
     pub notes: Vec<String>,
 }
 
-/// Reads a tetrahedral mesh: Gmsh MSH, VTK legacy, VTU, TetGen or MEDIT. The content decides, then the extension.
+/// Reads a mesh of tetrahedra, hexahedra, prisms and pyramids: Gmsh MSH, VTK legacy, VTU, XDMF, TetGen or MEDIT. The
+/// content decides, then the extension.
 ///
 /// # Errors
 /// A [`FileError`] with the place and what to do.
@@ -137,6 +145,7 @@ fn parse(path: &Path, data: &[u8]) -> Result<Builder, FileError> {
         Format::Msh => msh::read(path, data),
         Format::VtkLegacy => vtk::legacy::read(path, data),
         Format::VtkXml => vtk::xml::read(path, data),
+        Format::Xdmf => xdmf::read(path, data),
         // TetGen spreads a mesh over files with one stem.
         Format::TetGen => tetgen::read(path),
         Format::Medit => medit::read(path, data),

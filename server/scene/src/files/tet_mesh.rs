@@ -134,18 +134,19 @@ impl VolumeFile {
         Ok(())
     }
 
-    /// Turns every tet when all are inverted; refuses a mixture.
+    /// Turns every tet of the file's own when all of them are inverted; refuses a mixture.
     fn orient(&mut self) -> Result<(), FileError> {
         const NAMED: usize = 5;
-        let inverted: Vec<usize> = (0..self.tets.len()).filter(|&tet| self.is_inverted(tet)).collect();
+        let own = self.own_tets.min(self.tets.len());
+        let inverted: Vec<usize> = (0..own).filter(|&tet| self.is_inverted(tet)).collect();
         if inverted.is_empty() {
             return Ok(());
         }
-        if inverted.len() < self.tets.len() {
+        if inverted.len() < own {
             let first = inverted.iter().copied().take(NAMED).collect();
-            return Err(self.fail(Problem::Inverted { count: inverted.len(), total: self.tets.len(), first }));
+            return Err(self.fail(Problem::Inverted { count: inverted.len(), total: own, first }));
         }
-        for tet in &mut self.tets {
+        for tet in &mut self.tets[..own] {
             tet.swap(2, 3);
         }
         self.warnings.push("all tetrahedra are inverted: their nodes are taken in the other order".to_string());
@@ -196,6 +197,7 @@ mod tests {
             path: PathBuf::from("two.msh"),
             mesh_nodes: vec![DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::Z, DVec3::NEG_ONE, DVec3::ONE],
             tets: vec![[0, 1, 2, 3], [1, 2, 3, 5]],
+            own_tets: 2,
             tet_group: vec![0, 1],
             more_tet_groups: vec![(3, vec![0])],
             groups: vec![group("wall", 3, 7), group("8", 3, 8), group("inside", 2, 7), group("both", 3, 9)],

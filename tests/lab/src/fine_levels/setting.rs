@@ -98,14 +98,15 @@ impl Setting {
         let points: Vec<DVec3> =
             moments.iter().flat_map(|m| sites.corners(m.cell)).map(|site| sites.site_m(site)).collect();
         let held: BTreeSet<u32> = coarse.prescribed.iter().flat_map(|set| set.nodes.clone()).collect();
-        let EmbeddingMesh { mesh, outside, .. } = embedding_mesh::cover(&coarse.mesh, &coarse.surface, &held, &points);
+        let EmbeddingMesh { mesh, outside_m, .. } =
+            embedding_mesh::cover(&coarse.mesh, &coarse.surface, &held, &points);
         let composite = Composite::new(&mesh);
         let free = free_axes(&composite, &held, &Surface::of(&mesh).into_diagnostic()?);
         let partition = Partition::new(sites, composite, &moments);
         let load = load::on_tets(problem.action, &fine).ok_or_else(|| miette!("{} has no load", problem.name))?;
         Ok(Self {
             coarse_tets: coarse.mesh.tets().len(),
-            outside,
+            outside: outside_m.len(),
             near: near(&partition, &free, fine.touch_m),
             samples: sample::points(problem.body),
             reference: Reference::of(&problem)?,

@@ -20,6 +20,7 @@ mod xpbd;
 
 pub(crate) use hybrid::{nearest, particles};
 pub use pace::{Pace, tremor};
+pub(crate) use subject::Subject;
 pub(crate) use subject::tet_body;
 
 use crate::problems::{Problem, body::Body};

@@ -14,15 +14,15 @@ use palpate_physics::{
 };
 
 /// Model, and what acts on it.
-pub(super) struct Subject {
-    pub(super) model: Model,
+pub(crate) struct Subject {
+    pub(crate) model: Model,
     pub(super) load: Option<NodalLoad>,
-    pub(super) tool: Option<Tool>,
+    pub(crate) tool: Option<Tool>,
     pub(super) probe: Probe,
 }
 
 impl Subject {
-    pub(super) fn new(problem: &Problem, resolution: u32, material: Material, settings: Settings) -> Result<Self> {
+    pub(crate) fn new(problem: &Problem, resolution: u32, material: Material, settings: Settings) -> Result<Self> {
         let body = problem.body.tets(resolution)?;
         let load = load::on_tets(problem.action, &body);
         let mut spec = spec(material, &body, settings);
@@ -42,7 +42,7 @@ impl Subject {
     }
 
     /// The problem's answer (N or m) where nodes are at `x` (m) and the body presses the tool with `force_n` (N).
-    pub(super) fn answer(&self, x: &[DVec3], force_n: DVec3) -> f64 {
+    pub(crate) fn answer(&self, x: &[DVec3], force_n: DVec3) -> f64 {
         match (&self.tool, &self.load) {
             (Some(tool), _) => force_n.dot(tool.normal),
             (None, Some(load)) => load.displacement_m(self.model.rest_positions_m(), x),
@@ -96,7 +96,7 @@ pub(super) fn unloaded(problem: &Problem, body: &TetBody) -> Result<Model> {
 }
 
 /// A rigid sphere without friction, and its way.
-pub(super) struct Tool {
+pub(crate) struct Tool {
     pub(super) touch_m: DVec3,
     pub(super) way_m: DVec3,
     pub(super) normal: DVec3,
@@ -105,11 +105,11 @@ pub(super) struct Tool {
 
 impl Tool {
     /// Its centre (m) after a part of its way.
-    pub(super) fn centre_m(&self, fraction: f64) -> DVec3 {
+    pub(crate) fn centre_m(&self, fraction: f64) -> DVec3 {
         self.touch_m + self.way_m * fraction
     }
 
-    pub(super) fn spec(&self) -> ToolSpec {
+    pub(crate) fn spec(&self) -> ToolSpec {
         ToolSpec {
             name: "tool".into(),
             shape: ToolShape::Sphere,

@@ -58,7 +58,7 @@ impl ServedBody for HybridBody {
         Some((by_hand, particles))
     }
 
-    fn description(&self) -> Vec<String> {
+    fn description(&self, _: &Model) -> Vec<String> {
         let (spec, partition, embedding) = (self.particles(), self.partition(), self.embedding());
         let mut lines = vec![format!(
             "particles  {}, {} mm apart, at most {} awake; skin of {}",
@@ -80,10 +80,11 @@ impl ServedBody for HybridBody {
             lines.push(format!("           those within {} mm of a tool's contact wake", short(reach_m * 1e3)));
         }
         lines.push(format!(
-            "           the coarse tets' surface was moved by up to {} mm to hold them; {} outside never wake",
+            "           the coarse tets' surface was moved by up to {} mm to hold them{}",
             short(embedding.moved_m * 1e3),
-            embedding.outside
+            if embedding.outside == 0 { ", and none is outside" } else { "" }
         ));
+        lines.extend(self.remarks().iter().map(|remark| format!("           {remark}")));
         lines.push(format!(
             "           coarse level of {}; {:.0} % of the volume is in whole cells, the surface cuts the others",
             counted(self.node_count(), "node"),
@@ -92,11 +93,14 @@ impl ServedBody for HybridBody {
         lines
     }
 
-    fn warnings(&self) -> Vec<String> {
+    /// Particles outside the coarse tets, where they are so few that it is no warning.
+    fn remarks(&self) -> Vec<String> {
+        outside(self).filter(|_| !many_are_outside(self)).into_iter().collect()
+    }
+
+    fn warnings(&self, _: &Model) -> Vec<String> {
         /// Of the volume in whole cells: less is a lattice that hardly sees the body.
         const FEW_WHOLE: f64 = 0.2;
-        /// Of the particles outside the coarse tets.
-        const MANY_OUTSIDE: f64 = 0.1;
         let (spec, partition) = (self.particles(), self.partition());
         let mut warnings = Vec::new();
         if partition.whole_part() < FEW_WHOLE {
@@ -106,12 +110,10 @@ impl ServedBody for HybridBody {
                 short(spec.spacing_m * 1e3)
             ));
         }
-        let outside = self.embedding().outside;
-        if outside as f64 > MANY_OUTSIDE * partition.particle_count() as f64 {
-            warnings.push(format!(
-                "{outside} of {} particles are outside the coarse tets and never wake: where they are, the body answers as coarsely as its tets; ask for more tets",
-                partition.particle_count()
-            ));
+        if many_are_outside(self) {
+            warnings.extend(
+                outside(self).map(|outside| format!("{outside}; ask for more tets, or hold less of the surface")),
+            );
         }
         if spec.fine_depth_m.is_some() && !partition.cells().iter().any(|cell| cell.doubled) {
             warnings.push(
@@ -121,6 +123,30 @@ impl ServedBody for HybridBody {
         }
         warnings
     }
+}
+
+/// Whether so many particles are outside the coarse tets that it is a warning.
+fn many_are_outside(body: &HybridBody) -> bool {
+    /// Of all particles.
+    const MANY: f64 = 0.1;
+    body.embedding().outside as f64 > MANY * body.partition().particle_count() as f64
+}
+
+/// Says which particles are outside the coarse tets, and what becomes of it; `None` where none is.
+fn outside(body: &HybridBody) -> Option<String> {
+    let embedding = body.embedding();
+    let [low, high] = embedding.outside_m.map(|corner_m| {
+        let [x, y, z] = (corner_m * 1e3).to_array().map(short);
+        format!("({x}, {y}, {z})")
+    });
+    (embedding.outside > 0).then(|| {
+        format!(
+            "{} of {} particles, between {low} and {high} mm, are outside the coarse tets, whose surface cannot be moved further there, as where it is \
+             held: they never wake, and there the body answers as coarsely as its tets",
+            embedding.outside,
+            body.partition().particle_count()
+        )
+    })
 }
 
 /// What the skin of a hybrid body follows.

@@ -161,6 +161,18 @@ pub(super) struct Acting<'a> {
     pub(super) points: &'a [PointForce],
 }
 
+/// Returns the balls of every tool.
+fn balls_of_tools<'a>(
+    environment: &'a Environment,
+    body: &'a HybridBody,
+    own: &'a HybridState,
+) -> impl Iterator<Item = &'a [Option<Ball>]> {
+    axis_sample_counts(body, &environment.tools).scan(0, |first, count| {
+        *first += count;
+        Some(&own.balls[*first - count..*first])
+    })
+}
+
 impl ActivationQuery {
     /// Finds the particles that tools, loads and injected forces want, ascending. Where there is no room for all, each
     /// claim gets as many: of a tool those nearest to the middles of its balls, and to the lines between those of
@@ -173,18 +185,39 @@ impl ActivationQuery {
         reach_m: f64,
         acting: Acting<'_>,
     ) {
-        let (tools, most) = (&environment.tools[..], body.particles.most_active);
         self.wanted.clear();
-        let of_tool = |first: &mut usize, count: usize| {
-            *first += count;
-            Some(&own.balls[*first - count..*first])
-        };
-        let tools = || axis_sample_counts(body, tools).scan(0, of_tool);
-        let of_tools = tools().filter(|balls| balls.iter().any(Option::is_some)).count();
+        let room = self.room(environment, body, own, acting);
+        self.want_for_tools(environment, body, own, reach_m, room);
+        self.want_for_loads(acting, room);
+        self.want_for_points(environment, body, acting, reach_m, room);
+        self.wanted.sort_unstable();
+        self.wanted.dedup();
+    }
+
+    /// Returns how many particles each claim gets.
+    pub(super) fn room(
+        &self,
+        environment: &Environment,
+        body: &HybridBody,
+        own: &HybridState,
+        acting: Acting<'_>,
+    ) -> usize {
+        let of_tools = balls_of_tools(environment, body, own).filter(|balls| balls.iter().any(Option::is_some)).count();
         let of_points = usize::from(acting.points.iter().any(|point| environment.accepts(point)));
         let claims = of_tools + self.load_claims.count(acting.load_factors) + of_points;
-        let room = most / claims.max(1);
-        for balls in tools() {
+        body.particles.most_active / claims.max(1)
+    }
+
+    /// Adds what tools want, of each as many as there is room for.
+    pub(super) fn want_for_tools(
+        &mut self,
+        environment: &Environment,
+        body: &HybridBody,
+        own: &HybridState,
+        reach_m: f64,
+        room: usize,
+    ) {
+        for balls in balls_of_tools(environment, body, own) {
             self.found.clear();
             for (number, ball) in balls.iter().enumerate().filter_map(|(number, ball)| Some((number, (*ball)?))) {
                 // As samples are no farther from each other than balls reach, balls after the next two have hardly a
@@ -210,11 +243,24 @@ impl ActivationQuery {
             }
             self.wanted.extend(self.found.iter().map(|(_, particle)| *particle));
         }
+    }
+
+    /// Adds what loads want.
+    pub(super) fn want_for_loads(&mut self, acting: Acting<'_>, room: usize) {
         self.load_claims.want(acting.load_factors, room, &mut self.nearest, &mut self.wanted);
+    }
+
+    /// Adds what injected forces want.
+    pub(super) fn want_for_points(
+        &mut self,
+        environment: &Environment,
+        body: &HybridBody,
+        acting: Acting<'_>,
+        reach_m: f64,
+        room: usize,
+    ) {
         self.nearest.add_points(environment, body, acting.points, reach_m);
         self.nearest.take(room, &mut self.wanted);
-        self.wanted.sort_unstable();
-        self.wanted.dedup();
     }
 
     /// Keeps active particles awake that no tool wants but that are not settled, as long as there is room; those that

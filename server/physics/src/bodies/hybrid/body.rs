@@ -95,6 +95,16 @@ pub struct EmbeddingSummary {
     pub moved_m: f64,
     /// Number of particles that the coarse tets do not hold even so; they never wake.
     pub outside: usize,
+    /// The corners (m) of the smallest box around these particles, along the axes.
+    pub outside_m: [DVec3; 2],
+}
+
+impl EmbeddingSummary {
+    fn new(moved_m: f64, outside_m: &[DVec3]) -> Self {
+        let low_m = outside_m.iter().copied().reduce(DVec3::min).unwrap_or_default();
+        let high_m = outside_m.iter().copied().reduce(DVec3::max).unwrap_or_default();
+        Self { moved_m, outside: outside_m.len(), outside_m: [low_m, high_m] }
+    }
 }
 
 impl HybridBody {
@@ -118,8 +128,8 @@ impl HybridBody {
         if moments.is_empty() {
             return Err(HybridError::Nothing { spacing_m });
         }
-        let EmbeddingMesh { mesh, moved_m, outside } = covering(mesh, surface, prescribed, &sites, &moments);
-        let embedding = EmbeddingSummary { moved_m, outside };
+        let EmbeddingMesh { mesh, moved_m, outside_m } = covering(mesh, surface, prescribed, &sites, &moments);
+        let embedding = EmbeddingSummary::new(moved_m, &outside_m);
         let composite = Composite::new(&mesh);
         let prescribed = with_edges(&mesh, surface, &composite, prescribed);
         let moments = match spec.fine_layers() {

@@ -4,12 +4,18 @@
 //! cell's coordinates. With `γ_k` those patterns over eight, less their linear part (Flanagan & Belytschko 1981),
 //! `q_k = Σ_p γ_kp y_p` is their amplitude (m), zero for affine motion, and turns with the body:
 //! ```text
-//! U_c = V Ψ(F) + ½ κ Σ_k w_k |q_k|²        κ = χ (4/3) µ V/h²,  w = (1, 1, 1, ½)
-//! f_p = −V P b_p − κ Σ_k w_k γ_kp q_k
+//! U_c = V Ψ(F) + ½ κ Q ε        Q = Σ_k w_k |q_k|²,  κ = χ (4/3) µ V/h²,  w = (1, 1, 1, ½)
+//! f_p = −V P b_p − κ φ Σ_k w_k γ_kp q_k
 //! ```
 //! `χ = 2` is what the first three cost in shear when they bend a cell out of its plane. A cell then is too stiff in
-//! bending; [`HOURGLASS`] is a quarter of it.
-use super::{moments::Moments, sites::CORNERS, sizes::Hanging};
+//! bending; [`HOURGLASS`] is a quarter of it. `ε` and `φ`, 1 at small amplitudes, are those of
+//! [`super::hourglass_growth`].
+use super::{
+    hourglass_growth::{self, GROWTH, energy_factor, force_factor},
+    moments::Moments,
+    sites::CORNERS,
+    sizes::Hanging,
+};
 use crate::{
     linalg::tensor::outer,
     material::{Lame, Material, viscous},
@@ -18,8 +24,6 @@ use glam::{DMat3, DVec3};
 
 /// `χ`, the stiffness of hourglasses.
 pub const HOURGLASS: f64 = 0.5;
-/// `β`, how fast hourglasses stiffen with their amplitude.
-pub const HOURGLASS_GROWTH: f64 = 20.0;
 /// `w_k`, the weights of the four hourglass patterns.
 pub const MODE_WEIGHTS: [f64; 4] = [1.0, 1.0, 1.0, 0.5];
 
@@ -62,7 +66,7 @@ impl RestCell {
         });
         let volume_m3 = fraction * volume_m3;
         let hourglass_m = HOURGLASS * 4.0 / 3.0 * volume_m3 / (edge_m * edge_m);
-        Self { volume_m3, gradients_per_m, modes, hourglass_m, growth_per_m2: HOURGLASS_GROWTH / (edge_m * edge_m) }
+        Self { volume_m3, gradients_per_m, modes, hourglass_m, growth_per_m2: GROWTH / (edge_m * edge_m) }
     }
 
     /// Returns `Σ_p a_p b_pᵀ`, computed with differences to the first particle.
@@ -83,10 +87,10 @@ impl RestCell {
         self.volume_m3 * material.energy_density(&self.gradient_of(y)) + 0.5 * kappa * modes_m2
     }
 
-    /// Returns `Q (1 + ½ β Q/h²)` (m²) of hourglass amplitudes, `Q = Σ_k w_k |q_k|²`.
+    /// Returns `Q ε(β Q/h²)` (m²) of hourglass amplitudes.
     pub fn modes_m2(&self, amplitudes: &[DVec3; 4]) -> f64 {
         let squares_m2 = squares_m2(amplitudes);
-        squares_m2 * (1.0 + 0.5 * self.growth_per_m2 * squares_m2)
+        squares_m2 * energy_factor(self.growth_per_m2 * squares_m2)
     }
 
     /// Returns the forces `f_p` (N) of elastic and viscous stress, and the power (W) that viscous stress takes.
@@ -105,18 +109,19 @@ impl RestCell {
     /// Returns `−K a` (N), the change of the elastic forces along `a`.
     pub fn products_n(&self, material: &Material, y: &[DVec3; 8], a: &[DVec3; 8]) -> [DVec3; 8] {
         let change = material.piola_differential(&self.gradient_of(y), &self.gradient_of(a));
-        // δ((1 + β Q/h²) q_k) = (1 + β Q/h²) δq_k + (2 β/h²) (Σ_l w_l q_l·δq_l) q_k
+        // δ(φ q_k) = φ δq_k + φ' (2 β/h²) (Σ_l w_l q_l·δq_l) q_k
         let (q, dq) = (self.amplitudes(y), self.amplitudes(a));
         let along: f64 = q.iter().zip(&dq).zip(MODE_WEIGHTS).map(|((q, dq), w)| w * q.dot(*dq)).sum();
-        let stiffened = 1.0 + self.growth_per_m2 * squares_m2(&q);
-        let grown = 2.0 * self.growth_per_m2 * along;
+        let growth = self.growth_per_m2 * squares_m2(&q);
+        let stiffened = force_factor(growth);
+        let grown = hourglass_growth::slope(growth) * 2.0 * self.growth_per_m2 * along;
         let changes = std::array::from_fn(|k| dq[k] * stiffened + q[k] * grown);
         self.corner_forces_n(material, &change, &changes)
     }
 
-    /// Returns `(1 + β Q/h²) q_k` (m).
+    /// Returns `φ q_k` (m).
     pub(super) fn stiffened(&self, amplitudes: &[DVec3; 4]) -> [DVec3; 4] {
-        let factor = 1.0 + self.growth_per_m2 * squares_m2(amplitudes);
+        let factor = force_factor(self.growth_per_m2 * squares_m2(amplitudes));
         amplitudes.map(|q| q * factor)
     }
 

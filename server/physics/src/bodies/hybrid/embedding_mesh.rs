@@ -33,8 +33,8 @@ pub struct EmbeddingMesh {
     pub mesh: TetMesh,
     /// Largest displacement (m) of a node of its boundary.
     pub moved_m: f64,
-    /// Number of points that are still outside.
-    pub outside: usize,
+    /// Points that are still outside (m).
+    pub outside_m: Vec<DVec3>,
 }
 
 /// Moves the boundary outwards, but for `held` nodes, until the tets hold the points or no node can be moved further.
@@ -56,7 +56,7 @@ pub fn cover(mesh: &TetMesh, surface: &Surface, held: &BTreeSet<u32>, points_m: 
     let moved_m =
         covering.positions_m().iter().zip(mesh.positions_m()).map(|(a, b)| a.distance(*b)).fold(0.0, f64::max);
     needs(&covering, surface, held, &mut waiting);
-    EmbeddingMesh { mesh: covering, moved_m, outside: waiting.len() }
+    EmbeddingMesh { mesh: covering, moved_m, outside_m: waiting }
 }
 
 /// Returns how far (m) each node's faces would have to move to hold the points outside, and takes the points inside off
@@ -183,7 +183,7 @@ mod tests {
         let points: Vec<DVec3> =
             moments.iter().flat_map(|m| sites.corners(m.cell)).map(|site| sites.site_m(site)).collect();
         let embedding = cover(&mesh, &Surface::of(&mesh).unwrap(), &BTreeSet::new(), &points);
-        assert_eq!(embedding.outside, 0);
+        assert_eq!(embedding.outside_m, []);
         assert!(embedding.moved_m < 8e-3, "{}", embedding.moved_m);
         let partition = Partition::new(sites, Composite::new(&embedding.mesh), &moments);
         let all: BTreeSet<u32> = (0..partition.particle_count() as u32).collect();
@@ -199,7 +199,7 @@ mod tests {
         let floor = (0..27).filter(|&n| mesh.positions_m()[n as usize].z < 1e-9).collect();
         let points = [DVec3::new(0.01, 0.01, 0.021), DVec3::new(0.021, 0.01, 0.01), DVec3::new(0.01, 0.01, -0.001)];
         let embedding = cover(&mesh, &Surface::of(&mesh).unwrap(), &floor, &points);
-        assert_eq!(embedding.outside, 1);
+        assert_eq!(embedding.outside_m, [points[2]]);
         for (node, (now, before)) in embedding.mesh.positions_m().iter().zip(mesh.positions_m()).enumerate() {
             assert!(!floor.contains(&(node as u32)) || now == before);
         }

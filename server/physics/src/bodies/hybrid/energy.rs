@@ -5,8 +5,11 @@ use super::{
     patch::{Field, Patch},
     state::HybridState,
 };
-use crate::tick::{Energies, MechanicalState};
-use glam::DVec3;
+use crate::{
+    material::Law,
+    tick::{Energies, MechanicalState},
+};
+use glam::{DMat3, DVec3};
 use std::collections::BTreeSet;
 
 impl HybridBody {
@@ -45,9 +48,11 @@ impl HybridBody {
         }
     }
 
-    /// Returns the smallest `det F` of coarse tets' means and awake cells, and the tet where it is.
-    pub(crate) fn min_volume_ratio(&self, own: &HybridState, x: &[DVec3]) -> (f64, usize) {
-        self.patch_of(own).0.min_volume_ratio(&self.field(x))
+    /// Tells the deformation gradients of awake cells and the means of coarse tets.
+    pub(crate) fn each_gradient(&self, own: &HybridState, x: &[DVec3], each: &mut dyn FnMut(&DMat3, Law, usize)) {
+        let materials = self.materials();
+        let patch = self.patch_of(own).0;
+        patch.each_gradient(&self.field(x), &mut |f, tet| each(f, materials.of(tet).law, tet));
     }
 
     /// Returns momentum (kg m/s) and angular momentum about the origin (kg m²/s).

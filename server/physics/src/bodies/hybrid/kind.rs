@@ -1,13 +1,14 @@
 //! What a hybrid body is as a kind of body.
 use super::{HybridBody, HybridSpec, HybridState, trilinear_point::TrilinearPoint};
 use crate::{
-    elements::{linear_tet::VolumeRatio, solid::Solid},
+    elements::solid::Solid,
     hash::{Chain, Fnv},
+    material::Law,
     mesh::{Surface, TetMesh},
     settings::PrescribedSpec,
-    tick::{BodyKind, Energies, KindSpec, MaterialPoint, MechanicalState},
+    tick::{AwakeFor, BodyKind, Energies, Environment, KindSpec, MaterialPoint, MechanicalState, PointForce},
 };
-use glam::DVec3;
+use glam::{DMat3, DVec3};
 use std::fmt::Write;
 
 impl KindSpec for HybridSpec {
@@ -98,10 +99,19 @@ impl BodyKind for HybridBody {
         at.particles.into_iter().zip(at.weights).map(|(particle, w)| moved(particle) * w).sum()
     }
 
-    /// Over the coarse tets' means and the awake cells.
-    fn min_volume_ratio(&self, own: &HybridState, x: &[DVec3]) -> Option<VolumeRatio> {
-        let (ratio, tet) = self.min_volume_ratio(own, x);
-        Some(VolumeRatio { ratio, tet })
+    fn awake_for(
+        &self,
+        environment: &Environment,
+        own: &HybridState,
+        load_factors: &[f64],
+        points: &[PointForce],
+    ) -> Option<AwakeFor> {
+        Some(self.awake_for(environment, own, load_factors, points))
+    }
+
+    /// Of the awake cells, and the coarse tets' means.
+    fn each_gradient(&self, own: &HybridState, x: &[DVec3], each: &mut dyn FnMut(&DMat3, Law, usize)) {
+        self.each_gradient(own, x, each);
     }
 
     fn chain_inverse_mass(&self, _: &[PrescribedSpec], chain: &mut Chain) {

@@ -1,5 +1,6 @@
 //! The hybrid body: coarse tetrahedra throughout, and particles of which only those near a contact are awake.
 mod activation_query;
+mod awake_for;
 pub mod body;
 mod build;
 mod carried_skin;
@@ -10,6 +11,8 @@ mod constrained_points;
 pub mod embedding_mesh;
 mod energy;
 mod frequency;
+mod gradients;
+mod hourglass_growth;
 mod judged;
 pub mod kernels;
 mod kind;

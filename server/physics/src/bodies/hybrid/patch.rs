@@ -148,22 +148,22 @@ impl Patch {
         fine + self.residual_elements.iter().enumerate().map(of_residual).sum::<f64>()
     }
 
-    /// Returns the smallest `det F` of coarse tets' means and cells, and the tet where it is.
-    pub fn min_volume_ratio(&self, at: &Field) -> (f64, usize) {
+    /// Tells the deformation gradients of cells and the means of coarse tets, each with the number of its coarse tet.
+    pub fn each_gradient(&self, at: &Field, each: &mut dyn FnMut(&DMat3, usize)) {
         let points = self.points(at);
-        let of_cell = |cell: &PatchCell| (cell.rest.gradient_of(&cell.of(&points)).determinant(), cell.tet as usize);
-        let of_residual = |(tet, residual): (usize, &ResidualElement)| (residual.volume_ratio(&at.nodes), tet);
-        let all = self.cells.iter().map(of_cell).chain(self.residual_elements.iter().enumerate().map(of_residual));
-        all.fold((f64::INFINITY, 0), |least, found| if found.0 < least.0 { found } else { least })
+        for cell in &self.cells {
+            each(&cell.rest.gradient_of(&cell.of(&points)), cell.tet as usize);
+        }
+        for (tet, residual) in self.residual_elements.iter().enumerate() {
+            each(&residual.mean_gradient(&at.nodes), tet);
+        }
     }
 
     /// Returns the number of coarse tets' means and cells that have `det F ≤ 0`.
     pub fn inverted(&self, at: &Field) -> u32 {
-        let points = self.points(at);
-        let is_inverted = |cell: &&PatchCell| cell.rest.gradient_of(&cell.of(&points)).determinant() <= 0.0;
-        let cells = self.cells.iter().filter(is_inverted).count();
-        (cells + self.residual_elements.iter().filter(|residual| residual.volume_ratio(&at.nodes) <= 0.0).count())
-            as u32
+        let mut count = 0;
+        self.each_gradient(at, &mut |f, _| count += u32::from(f.determinant() <= 0.0));
+        count
     }
 
     /// Returns the forces (N) of elastic and viscous stress at positions `at` and velocities `rate`, and the power (W)

@@ -103,9 +103,15 @@ impl ResidualElement {
         sum * (1.0 / self.total_m3())
     }
 
-    /// Returns `det F̄`; 1 for a tet that holds nothing of the body.
-    pub fn volume_ratio(&self, x: &[DVec3]) -> f64 {
-        if self.nodes.is_empty() { 1.0 } else { self.mean(&self.gradients(x, DMat3::IDENTITY)).determinant() }
+    /// Returns `F̄ = (1/V_e) Σ_i x_i (Σ_g T_gi)ᵀ`, `Σ_g V_g F_g / V_e` with the sums exchanged; the identity for a tet that
+    /// holds nothing of the body.
+    pub fn mean_gradient(&self, x: &[DVec3]) -> DMat3 {
+        let Some(&first) = self.nodes.first() else { return DMat3::IDENTITY };
+        let mut sum = DMat3::ZERO;
+        for (&node, moments) in self.nodes.iter().zip(&self.moments_m2) {
+            sum += outer(x[node as usize] - x[first as usize], moments.iter().sum());
+        }
+        sum * (1.0 / self.total_m3())
     }
 
     /// Returns `V_e` (m³).

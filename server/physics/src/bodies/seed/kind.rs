@@ -1,16 +1,14 @@
 //! What the papers' hybrid is as a kind of body.
 use super::{SeedBody, SeedBodySpec, SeedBodyState, layer::Layer};
 use crate::{
-    elements::{
-        linear_tet::{VolumeRatio, min_volume_ratio},
-        solid::Solid,
-    },
+    elements::solid::Solid,
     hash::{Chain, Fnv},
+    material::Law,
     mesh::TetMesh,
     settings::PrescribedSpec,
     tick::{BodyKind, Energies, KindSpec, MechanicalState},
 };
-use glam::DVec3;
+use glam::{DMat3, DVec3};
 use std::fmt::Write;
 
 impl KindSpec for SeedBodySpec {
@@ -77,8 +75,11 @@ impl BodyKind for SeedBody {
         true
     }
 
-    fn min_volume_ratio(&self, _: &SeedBodyState, x: &[DVec3]) -> Option<VolumeRatio> {
-        Some(min_volume_ratio(self.mesh(), self.model().core().rest_tets(), x))
+    /// Of the core.
+    fn each_gradient(&self, _: &SeedBodyState, x: &[DVec3], each: &mut dyn FnMut(&DMat3, Law, usize)) {
+        for (tet, (nodes, rest)) in self.mesh().tets().iter().zip(self.model().core().rest_tets()).enumerate() {
+            each(&rest.gradient_of(&nodes.map(|n| x[n as usize])), Law::StVenantKirchhoff, tet);
+        }
     }
 
     fn chain_inverse_mass(&self, _: &[PrescribedSpec], chain: &mut Chain) {

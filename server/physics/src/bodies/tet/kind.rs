@@ -1,16 +1,14 @@
 //! What a body of tetrahedra is as a kind of body.
 use super::TetBody;
 use crate::{
-    elements::{
-        linear_tet::{VolumeRatio, min_volume_ratio},
-        solid::Solid,
-    },
+    elements::solid::Solid,
     hash::{Chain, Fnv},
+    material::Law,
     mesh::TetMesh,
     settings::PrescribedSpec,
     tick::{BodyKind, Energies, Environment, KindSpec, KindState, MechanicalState},
 };
-use glam::DVec3;
+use glam::{DMat3, DVec3};
 use serde::{Deserialize, Serialize};
 use std::fmt::Write;
 
@@ -70,8 +68,10 @@ impl BodyKind for TetBody {
         true
     }
 
-    fn min_volume_ratio(&self, _: &TetState, x: &[DVec3]) -> Option<VolumeRatio> {
-        Some(min_volume_ratio(self.mesh(), self.rest_tets(), x))
+    fn each_gradient(&self, _: &TetState, x: &[DVec3], each: &mut dyn FnMut(&DMat3, Law, usize)) {
+        for (tet, (nodes, rest)) in self.mesh().tets().iter().zip(self.rest_tets()).enumerate() {
+            each(&rest.gradient_of(&nodes.map(|n| x[n as usize])), self.material_of(tet).law, tet);
+        }
     }
 
     fn chain_inverse_mass(&self, _: &[PrescribedSpec], chain: &mut Chain) {

@@ -62,8 +62,10 @@ pub(super) struct Pressed {
     pub(super) heat_j: f64,
     /// Number of samples that carry force.
     pub(super) contacts: u32,
-    /// Depth (m) of the deepest sample.
+    /// Depth (m) of the deepest sample, whether it carries all of it or not.
     pub(super) penetration_m: f64,
+    /// Largest depth (m) that any sample carries.
+    pub(super) deepest_m: f64,
     /// Vector (m) from the nearest point of the tool's axis to the nearest point of the surface; infinite when no
     /// triangle is listed.
     pub(super) to_surface_m: DVec3,
@@ -280,6 +282,7 @@ fn press_sample(
         pressed.levers.push(p, normal, f_n);
     }
     pressed.contacts += u32::from(depth_m > 0.0);
+    pressed.deepest_m = pressed.deepest_m.max(depth_m);
     pressed.penetration_m = pressed.penetration_m.max(meeting.radius_m - distance_m);
 
     let trial_m = (p - meeting.in_world(touch.spring_origin_m)).reject_from_normalized(normal);

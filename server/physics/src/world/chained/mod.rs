@@ -65,6 +65,7 @@ impl Chain {
         self.target(&tool.target);
         self.target(&tool.previous_target);
         for vector in [
+            tool.slip_m,
             tool.device_m_per_s,
             tool.device_rad_per_s,
             tool.contact_force_n,

@@ -1,6 +1,8 @@
 //! VTK's cells, and the cell array that tells their groups.
 use crate::files::builder::{Builder, Kind, Shape};
 use crate::files::error::Problem;
+use crate::files::split::Solid;
+use std::ops::Range;
 
 /// The element type by VTK's number.
 fn kind(number: i64) -> Option<Kind> {
@@ -12,19 +14,20 @@ fn kind(number: i64) -> Option<Kind> {
         4 => (Shape::Other, "lines", 2),
         5 | 22 | 34 | 69 | 76 => (Shape::Triangle, "triangles", 3),
         7 => (Shape::Polygon, "polygons", usize::MAX),
-        8 => (Shape::Other, "pixels", 4),
+        8 => (Shape::Polygon, "pixels", 4),
         9 | 23 | 28 | 30 | 70 | 77 => (Shape::Polygon, "quadrangles", 4),
         10 | 24 | 71 | 78 => (Shape::Tet, "tetrahedra", 4),
-        11 => (Shape::Other, "voxels", 8),
-        12 | 25 | 29 | 33 | 72 | 79 => (Shape::Other, "hexahedra", 8),
-        13 | 26 | 31 | 32 | 73 | 80 => (Shape::Other, "prisms", 6),
-        14 | 27 | 37 | 74 | 81 => (Shape::Other, "pyramids", 5),
+        11 | 12 | 25 | 29 | 33 | 72 | 79 => return Some(Kind::solid(Solid::Hexahedron)),
+        13 | 26 | 31 | 32 | 73 | 80 => return Some(Kind::solid(Solid::Prism)),
+        14 | 27 | 37 | 74 | 81 => return Some(Kind::solid(Solid::Pyramid)),
         15 | 16 | 36 | 41 | 42 => (Shape::Other, "polygons and polyhedra of other types", 0),
         _ => return None,
     };
     Some(Kind { shape, name, corners })
 }
 
+const PIXEL: i64 = 8;
+const VOXEL: i64 = 11;
 pub(super) const VERTICES: i64 = 2;
 pub(super) const LINES: i64 = 4;
 pub(super) const STRIP: i64 = 6;
@@ -32,15 +35,20 @@ pub(super) const POLYGON: i64 = 7;
 
 /// Cells of any types: those of cell `i` are `connectivity[offsets[i]..offsets[i + 1]]`.
 #[derive(Debug, Default)]
-pub(super) struct CellTable {
-    pub(super) connectivity: Vec<i64>,
-    pub(super) offsets: Vec<i64>,
-    pub(super) types: Vec<i64>,
+pub(in crate::files) struct CellTable {
+    pub(in crate::files) connectivity: Vec<i64>,
+    pub(in crate::files) offsets: Vec<i64>,
+    pub(in crate::files) types: Vec<i64>,
 }
 
 impl CellTable {
-    /// Adds the cells to `builder`, whose nodes from `first_node` on are theirs; `tags` has a group for each, if any.
-    pub(super) fn build(&self, builder: &mut Builder, first_node: u32, tags: Option<&[i64]>) -> Result<(), Problem> {
+    /// Adds the cells to `builder`, of whose nodes `own` are theirs; `tags` has a group for each, if any.
+    pub(in crate::files) fn build(
+        &self,
+        builder: &mut Builder,
+        own: &Range<u32>,
+        tags: Option<&[i64]>,
+    ) -> Result<(), Problem> {
         let cells = self.types.len();
         let differ = |what: String| Problem::Inconsistent { what };
         if self.offsets.len() != cells + 1 {
@@ -51,14 +59,14 @@ impl CellTable {
         }
         let mut nodes = Vec::new();
         for cell in 0..cells {
-            self.nodes_of(cell, builder.nodes.len() as u32, first_node, &mut nodes)?;
+            self.nodes_of(cell, own, &mut nodes)?;
             let tag = tags.map(|tags| &tags[cell..=cell]).unwrap_or_default();
             self.add(builder, cell, &nodes, tag)?;
         }
         Ok(())
     }
 
-    fn nodes_of(&self, cell: usize, node_count: u32, first_node: u32, nodes: &mut Vec<u32>) -> Result<(), Problem> {
+    fn nodes_of(&self, cell: usize, own: &Range<u32>, nodes: &mut Vec<u32>) -> Result<(), Problem> {
         let [from, to] = [self.offsets[cell], self.offsets[cell + 1]];
         let range = usize::try_from(from).ok().zip(usize::try_from(to).ok());
         let Some(corners) = range.and_then(|(from, to)| self.connectivity.get(from..to)) else {
@@ -69,12 +77,12 @@ impl CellTable {
         };
         nodes.clear();
         for &node in corners {
-            let count = node_count - first_node;
+            let count = own.end - own.start;
             if !(0..i64::from(count)).contains(&node) {
                 let known = format!("there are {count}, counting from 0");
                 return Err(Problem::UnknownNode { element: format!("cell {cell}"), node, known });
             }
-            nodes.push(first_node + node as u32);
+            nodes.push(own.start + node as u32);
         }
         Ok(())
     }
@@ -96,14 +104,19 @@ impl CellTable {
         };
         let fits = match (kind.shape, number) {
             (Shape::Other, _) | (_, POLYGON) => true,
-            (_, 1 | 5 | 9 | 10) => nodes.len() == kind.corners,
+            (_, 1 | 3 | 5 | 8..=14) => nodes.len() == kind.corners,
             _ => nodes.len() > kind.corners,
         };
         if !fits {
             let what = format!("cell {cell} (type {number}, {}) has {} nodes", kind.name, nodes.len());
             return Err(Problem::Inconsistent { what });
         }
-        builder.element(kind, nodes, tag);
+        match *nodes {
+            // Pixels and voxels count their corners along the axes, not around.
+            [a, b, c, d] if number == PIXEL => builder.element(kind, &[a, b, d, c], tag),
+            [a, b, c, d, e, f, g, h] if number == VOXEL => builder.element(kind, &[a, b, d, c, e, f, h, g], tag),
+            _ => builder.element(kind, nodes, tag),
+        }
         Ok(())
     }
 }
@@ -130,19 +143,19 @@ const GROUP_ARRAYS: [&str; 16] = [
 
 /// The cell array that tells the groups, among those seen so far.
 #[derive(Debug, Default)]
-pub(super) struct Groups {
+pub(in crate::files) struct Groups {
     best: Option<usize>,
-    pub(super) tags: Option<Vec<i64>>,
+    pub(in crate::files) tags: Option<Vec<i64>>,
 }
 
 impl Groups {
     /// Whether an array of this name would be taken.
-    pub(super) fn wants(&self, name: &str, components: usize) -> bool {
+    pub(in crate::files) fn wants(&self, name: &str, components: usize) -> bool {
         components == 1 && rank(name).is_some_and(|rank| self.best.is_none_or(|best| rank < best))
     }
 
     /// Offers an array; one with values that are not whole is no group.
-    pub(super) fn offer(&mut self, name: &str, values: &[f64]) {
+    pub(in crate::files) fn offer(&mut self, name: &str, values: &[f64]) {
         if self.wants(name, 1) && values.iter().all(|v| v.fract() == 0.0 && v.abs() < 9e15) {
             self.best = rank(name);
             self.tags = Some(values.iter().map(|&v| v as i64).collect());

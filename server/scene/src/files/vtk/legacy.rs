@@ -186,7 +186,8 @@ impl Reader<'_> {
     fn finish(mut self) -> Result<Builder, FileError> {
         // The groups of polygonal data are those of surfaces, which have none.
         let tags = if self.unstructured { self.groups.tags.as_deref() } else { None };
-        self.table.build(&mut self.builder, 0, tags).map_err(|problem| self.cursor.fail(problem))?;
+        let own = 0..self.builder.nodes.len() as u32;
+        self.table.build(&mut self.builder, &own, tags).map_err(|problem| self.cursor.fail(problem))?;
         Ok(self.builder)
     }
 

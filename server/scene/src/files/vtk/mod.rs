@@ -2,6 +2,6 @@
 mod array;
 mod attributes;
 mod base64;
-mod cells;
+pub(super) mod cells;
 pub(super) mod legacy;
 pub(super) mod xml;

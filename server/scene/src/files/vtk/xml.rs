@@ -205,6 +205,7 @@ impl<'a> Document<'a> {
             }
             builder.nodes.push(position);
         }
+        let own = first_node..builder.nodes.len() as u32;
         let mut groups = Groups::default();
         for array in piece.in_element("CellData").filter(|array| array.components <= 1) {
             match self.storage.reals(array) {
@@ -225,7 +226,7 @@ impl<'a> Document<'a> {
             let arrays: Vec<&DataArray> = piece.in_element(parent).collect();
             let table = self.table(&arrays, cell_type)?;
             let tags = groups.tags.as_deref().filter(|_| self.unstructured);
-            table.build(builder, first_node, tags).map_err(|problem| self.storage.fail(piece.at, problem))?;
+            table.build(builder, &own, tags).map_err(|problem| self.storage.fail(piece.at, problem))?;
         }
         Ok(())
     }

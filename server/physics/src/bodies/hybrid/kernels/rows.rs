@@ -12,7 +12,8 @@ use super::{
 };
 use crate::{
     bodies::hybrid::{
-        cell::{HOURGLASS, HOURGLASS_GROWTH, MODE_WEIGHTS},
+        cell::{HOURGLASS, MODE_WEIGHTS},
+        hourglass_growth::{GROWTH, energy_factor, force_factor},
         prestrain::CellPrestrain,
     },
     lanes::{
@@ -193,7 +194,7 @@ fn of_materials<T: Scalar>(materials: &[Material], edge_m: f64, fraction: f64) -
         let kappa = HOURGLASS * 4.0 / 3.0 * material.lame.mu_pa * volume_m3 / (edge_m * edge_m);
         CellMaterial {
             split: Split::of(material),
-            cell: [0.25 / edge_m, -volume_m3, -kappa, HOURGLASS_GROWTH / (64.0 * edge_m * edge_m)],
+            cell: [0.25 / edge_m, -volume_m3, -kappa, GROWTH / (64.0 * edge_m * edge_m)],
         }
     };
     [edge_m, 2.0 * edge_m].into_iter().flat_map(|edge_m| materials.iter().map(move |m| of((m, edge_m)))).collect()
@@ -301,17 +302,18 @@ impl<T: Scalar> RowForces<'_, T> {
             kept_modes = weight * (V::of(1.0) - gone);
             let (p, density, along) =
                 prestrained_cell_stress::<V, T, L, VISCOUS>(&self.material.split, &[of_shape, of_volume], &h, &h_dot);
-            // s ∂U/∂s = V P̃ : F A − ½ κ a Q (1 + ½ β Q/h²)
-            let of_modes = squares * (V::of(1.0) + V::of(0.5) * grown) * gone * V::of(minus_kappa / 128.0);
+            // s ∂U/∂s = V P̃ : F A − ½ κ a Q ε
+            let of_modes = squares * energy_factor(grown) * gone * V::of(minus_kappa / 128.0);
             add_lanes(weight * (along * V::of(-minus_volume) + of_modes), &mut self.prestrain_j);
             (p, density)
         } else {
             stress::<V, T, L, VISCOUS>(&self.material.split.whole, &h, &h_dot)
         };
         let of_stress = weight * V::of(minus_volume * quarter);
+        let factor = force_factor(grown);
         let mut of_modes = [kept_modes; 4];
         for mode in 0..4 {
-            of_modes[mode] = kept_modes * (V::of(1.0) + grown) * V::of(minus_kappa * MODE_WEIGHTS[mode] / 64.0);
+            of_modes[mode] = kept_modes * factor * V::of(minus_kappa * MODE_WEIGHTS[mode] / 64.0);
         }
         for axis in 0..3 {
             let mut c = [V::of(0.0); 7];

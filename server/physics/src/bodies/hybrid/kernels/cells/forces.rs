@@ -3,6 +3,7 @@ use super::{CutBlock, PrestrainBlock};
 use crate::{
     bodies::hybrid::{
         cell::MODE_WEIGHTS,
+        hourglass_growth::{energy_factor, force_factor},
         kernels::{
             cell_stress::{load_matrix, stress},
             prestrains::{Split, add_lanes, prestrained_cell_stress, scaled},
@@ -155,9 +156,9 @@ fn cut<V: Vector<Scalar = T>, T: Scalar, L: ConstitutiveLaw, const VISCOUS: bool
             }
         }
         let grown = squares * V::load(&block.growth[first..]);
-        // s ∂U/∂s = V P̃ : F A − ½ κ a Q (1 + ½ β Q/h²)
-        prestrain_j = prestrain_j + squares * (V::of(1.0) + V::of(0.5) * grown) * whole * gone * V::of(0.5);
-        let minus_kappa = whole * (V::of(1.0) - gone) * (V::of(1.0) + grown);
+        // s ∂U/∂s = V P̃ : F A − ½ κ a Q ε
+        prestrain_j = prestrain_j + squares * energy_factor(grown) * whole * gone * V::of(0.5);
+        let minus_kappa = whole * (V::of(1.0) - gone) * force_factor(grown);
         let minus_volume = V::load(&block.minus_volume[first..]);
         if VISCOUS {
             (V::of(0.0) - density * minus_volume).store(&mut power[first..]);

@@ -1,0 +1,94 @@
+//! The slip clutch between a rigid tool and its device.
+//!
+//! A rigid tool is where its device is, as long as the surface can bear it: no sample that it presses is deeper in it than
+//! [`SLIP_DEPTH`]·R, and the force is no more than [`slips_at_n`]. Beyond, the clutch slips: the tool stays behind by the
+//! slip `s`, at `c = d + s`, and carries what the body gives there. Without it, a device that goes on drives the tool
+//! through any surface.
+//!
+//! The clutch has no mass. With the depth `g` of the deepest sample, the force `f` on the tool, and how far they are from
+//! their limits, `ρ = max(g/g_max, |f|/f_max)`, a substep does
+//! ```text
+//! s ← s + (ρ − 1) g_max f/|f|              for ρ > 1
+//! |s| ← max(|s| − (ρ_back − ρ) g_max, 0)   for ρ < ρ_back
+//! ```
+//! No depth changes by more than the tool moves, and a force by no more than its own part of it, so neither overshoots.
+//! Between `ρ_back` and 1 the slip stays: a body that has just made way for the tool would otherwise be struck again and
+//! again. The tool comes back by no more than R in [`RETURN_S`]: a soft body would make way for one that is quicker, down
+//! to its floor. What the device does and the tool does not is lost in the clutch, as in one of steel: it takes energy
+//! only.
+//!
+//! Nor does the tool move faster than [`LEAP_M_PER_S`], or by more than [`NEAR`]·R in a substep, so that a device that
+//! leaps takes it through nothing unseen.
+use super::{
+    ToolModel, ToolSpec, ToolState,
+    foundation::Foundation,
+    proxy::{NEAR, SATURATION_DEPTH},
+    spring::shortened,
+    state::ToolContact,
+};
+use glam::DVec3;
+use std::f64::consts::PI;
+
+/// Time (s) in which a tool comes back to its device by a radius.
+const RETURN_S: f64 = 0.01;
+/// Speed (m/s) above which a device leaps, rather than moves.
+pub(super) const LEAP_M_PER_S: f64 = 5.0;
+/// Depth, over R, of a sample at which the clutch slips: pressure has grown to more than a coupling gives.
+const SLIP_DEPTH: f64 = 0.4;
+/// Force at which it slips, over that at which the coupling of a tool of the same radius saturates.
+const SLIP_FORCE: f64 = 1.2;
+/// `ρ_back`.
+const BACK: f64 = 0.75;
+
+/// Moves a rigid tool after its device, which is at `device_m` and moves by `device_m_per_s`, with the contact that it
+/// had before.
+pub(super) fn follow(
+    model: &ToolModel,
+    tool: &mut ToolState,
+    contact: &ToolContact,
+    (device_m, device_m_per_s): (DVec3, DVec3),
+    dt_s: f64,
+) {
+    if dt_s == 0.0 {
+        (tool.centre_m, tool.velocity_m_per_s) = (device_m + tool.slip_m, device_m_per_s);
+        return;
+    }
+    let (before_m, most_m) = (tool.centre_m, f64::min(NEAR * model.spec.radius_m, LEAP_M_PER_S * dt_s));
+    tool.slip_m = slipped(model, tool.slip_m, contact, dt_s);
+    let step_m = device_m + tool.slip_m - before_m;
+    // Within rounding: a device that goes just so fast is followed.
+    if step_m.length() > most_m * (1.0 + 1e-9) {
+        tool.slip_m = before_m + shortened(step_m, most_m) - device_m;
+    }
+    tool.centre_m = device_m + tool.slip_m;
+    let slips = tool.slip_m != DVec3::ZERO;
+    tool.velocity_m_per_s = if slips { (tool.centre_m - before_m) / dt_s } else { device_m_per_s };
+}
+
+fn slipped(model: &ToolModel, slip_m: DVec3, contact: &ToolContact, dt_s: f64) -> DVec3 {
+    let radius_m = model.spec.radius_m;
+    let (deepest_m, force_n) = (SLIP_DEPTH * radius_m, model.slips_at_n);
+    let loaded = f64::max(contact.deepest_m / deepest_m, contact.force_n.length() / force_n);
+    if loaded > 1.0 {
+        // A sample loses what is above its limit at once; a mean one is half as deep as the deepest.
+        let beyond_m = f64::max(contact.deepest_m - deepest_m, 0.5 * (loaded - 1.0) * deepest_m);
+        slip_m + contact.force_n.normalize_or_zero() * beyond_m.min(deepest_m)
+    } else {
+        let most_m = f64::min(radius_m * dt_s / RETURN_S, (BACK - loaded) * deepest_m);
+        slip_m - slip_m.clamp_length_max(most_m.max(0.0))
+    }
+}
+
+/// Returns the force (N) at which a rigid tool slips: [`SLIP_FORCE`] times what presses it into the flat foundation as
+/// deep as the coupling of a tool of its radius would at most, or what presses it by a radius into the body where that is
+/// more (Hertz, `4/3 E/(1 − ν²) R²`): on coarse triangles the foundation is soft, and the body is stiffer than it should be.
+///
+/// Beside its two hemispheres, which are a sphere, a capsule has a cylinder: pressed in by `d`, it displaces
+/// `2L (4/3) √(2R) d^{3/2}`, where the sphere displaces `π R d²`.
+pub(super) fn slips_at_n(spec: &ToolSpec, foundation: &Foundation) -> f64 {
+    let (radius_m, half_m) = (spec.radius_m, spec.shape.half_length_m());
+    let flat_n = foundation.flat_force_n(radius_m, SATURATION_DEPTH * radius_m);
+    let into_body_n = 4.0 / 3.0 * foundation.mean_indentation_modulus_pa() * radius_m * radius_m;
+    let of_cylinder = 8.0 / (3.0 * PI) * (2.0 / SATURATION_DEPTH).sqrt() * half_m / radius_m;
+    SLIP_FORCE * flat_n.max(into_body_n) * (1.0 + of_cylinder)
+}
