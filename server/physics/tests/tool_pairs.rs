@@ -69,7 +69,7 @@ fn in_the_air_what_one_gets_the_other_gives() {
         }
         let mut rig = Rig::new(spec);
         for (tool, sign) in rig.state.mechanical.tools.iter_mut().zip([1.0, -1.0]) {
-            tool.velocity_m_per_s = DVec3::X * (-0.5 * sign);
+            tool.velocity_m_per_s = DVec3::X * (-0.1 * sign);
         }
         let inertia = |rig: &Rig| match rig.spec.tools[0].shape {
             ToolShape::Capsule(capsule) => capsule.turning.inertia_kg_m2,
@@ -93,7 +93,7 @@ fn in_the_air_what_one_gets_the_other_gives() {
         };
         let start = sums(&rig);
         let (mut met, mut worst) = (0, 0.0_f64);
-        for _ in 0..200 {
+        for _ in 0..400 {
             rig.tick(&rig.still());
             let now = sums(&rig);
             met += u32::from(rig.state.mechanical.tools[0].contact_energy_j > 0.0);
@@ -102,7 +102,32 @@ fn in_the_air_what_one_gets_the_other_gives() {
         }
         let apart = rig.state.mechanical.tools[0].velocity_m_per_s.x;
         println!("met in {met} ticks, energy to {worst:.1e}, then {apart:.2} m/s");
-        assert!(met > 3 && apart > 0.1 && worst < 5e-3, "{met} {apart} {worst}");
+        assert!(met > 3 && apart > 0.02 && worst < 5e-3, "{met} {apart} {worst}");
+    }
+}
+
+/// In the air couplings are not limited, and a quick tool has more energy than the other's potential: devices that crossed
+/// at 2 m/s took their tools through each other.
+#[test]
+fn quick_tools_do_not_leap_over_each_other() {
+    for (m_per_s, other) in [(0.3, coupled()), (2.0, coupled()), (5.0, coupled()), (2.0, Coupling::Rigid)] {
+        let mut spec = squeezed([coupled(), other]);
+        let off_axis = DVec3::new(0.5, 0.5, 0.0);
+        let place = |z: f64| [off_axis + DVec3::new(1e-3, 0.0, z), off_axis - DVec3::Z * z];
+        for (tool, start) in spec.tools.iter_mut().zip(place(0.06)) {
+            tool.start_position_m = start;
+        }
+        let mut rig = Rig::new(spec);
+        let (mut least_m, mut z) = (f64::INFINITY, 0.06_f64);
+        for _ in 0..400 {
+            z = (z - 1e-3 * m_per_s).max(if other == Coupling::Rigid { 0.0 } else { -0.004 });
+            rig.tick(&Drive { tools: place(z).map(at).to_vec(), ..rig.still() });
+            let [a, b] = [0, 1].map(|tool| rig.state.mechanical.tools[tool].centre_m);
+            least_m = least_m.min(a.distance(b));
+        }
+        let [a, b] = [0, 1].map(|tool| rig.state.mechanical.tools[tool].centre_m);
+        println!("{m_per_s} m/s: least distance {:.2} mm of 12, at the end {:.2}", 1e3 * least_m, 1e3 * a.distance(b));
+        assert!(a.z > b.z && least_m > RADIUS_M, "{m_per_s} {other:?} {least_m}");
     }
 }
 

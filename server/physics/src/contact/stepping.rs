@@ -6,6 +6,7 @@ use super::{
     local_model::{self, MeanContact},
     narrow::{self, Meeting, Pressed},
     proxy,
+    tool_pairs::Push,
 };
 use glam::DVec3;
 
@@ -108,7 +109,7 @@ impl ContactModel {
         for (index, (tool, scratch)) in tools.iter_mut().zip(&mut scratch.tools).enumerate() {
             let model = &self.tools[index];
             let pressed = self.press(index, tool, x, contact, forces_n, scratch);
-            let surface_m_per_s = self.surface_m_per_s(&pressed, *velocity_m_per_s);
+            let surface_m_per_s = self.surface_m_per_s(&pressed, scratch.push, *velocity_m_per_s);
             let coupling = proxy::finish(model, tool, &pressed, surface_m_per_s, time);
             scratch.nearest = pressed.nearest.0;
             tool.friction_heat_j += pressed.heat_j;
@@ -211,20 +212,18 @@ impl ContactModel {
         let mut pressed =
             narrow::press(&meeting, &mut part.candidates, &mut part.touching, &mut scratch.next, forces_n);
         if let Some(push) = scratch.push {
-            pressed.force_n += push.force_n;
-            pressed.torque_nm += push.torque_nm;
-            pressed.energy_j += push.energy_j;
+            push.add_to(&mut pressed);
         }
         (part.force_n, part.torque_nm, part.deepest_m) = (pressed.force_n, pressed.torque_nm, pressed.deepest_m);
         part.is_clear = proxy::is_clear(model, &pressed);
         pressed
     }
 
-    /// Returns the velocity (m/s) of the point of the surface nearest to a tool.
-    fn surface_m_per_s(&self, pressed: &Pressed, velocity_m_per_s: &dyn Fn(u32) -> DVec3) -> DVec3 {
+    /// Returns the velocity (m/s) of the point nearest to a tool, of the surface or of another tool.
+    fn surface_m_per_s(&self, pressed: &Pressed, push: Option<Push>, velocity_m_per_s: &dyn Fn(u32) -> DVec3) -> DVec3 {
         let (triangle, weights) = pressed.nearest;
         if weights == [0.0; 3] {
-            return DVec3::ZERO;
+            return push.map_or(DVec3::ZERO, |push| push.other_m_per_s);
         }
         let corners = self.triangles.nodes[triangle];
         corners.into_iter().zip(weights).map(|(node, weight)| velocity_m_per_s(node) * weight).sum()
