@@ -113,7 +113,7 @@ fn quick_tools_do_not_leap_over_each_other() {
     for (m_per_s, other) in [(0.3, coupled()), (2.0, coupled()), (5.0, coupled()), (2.0, Coupling::Rigid)] {
         let mut spec = squeezed([coupled(), other]);
         let off_axis = DVec3::new(0.5, 0.5, 0.0);
-        let place = |z: f64| [off_axis + DVec3::new(1e-3, 0.0, z), off_axis - DVec3::Z * z];
+        let place = |z: f64| [off_axis + DVec3::Z * z, off_axis - DVec3::Z * z];
         for (tool, start) in spec.tools.iter_mut().zip(place(0.06)) {
             tool.start_position_m = start;
         }

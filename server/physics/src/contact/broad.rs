@@ -102,18 +102,6 @@ pub(crate) trait Skin {
     fn vertices(&self, cluster: usize) -> &[u32];
     /// Returns the position (m) of a vertex.
     fn position_m(&self, vertex: u32) -> DVec3;
-    /// Returns a box (m) around the displacements of a cluster's vertices: any, where a kind of body has no bound.
-    fn displacements_m(&self, _cluster: usize) -> [DVec3; 2] {
-        [DVec3::NEG_INFINITY, DVec3::INFINITY]
-    }
-    /// Returns the displacements (m) that move its vertices; none, where a kind of body does not tell them.
-    fn moving_m(&self) -> impl ExactSizeIterator<Item = DVec3> {
-        std::iter::empty()
-    }
-    /// Returns a bound of how far a vertex moves over the farthest of these.
-    fn amplification(&self) -> f64 {
-        1.0
-    }
 }
 
 /// Triangles that a tool may touch, and how far things may move before the list is out of date.

@@ -127,7 +127,7 @@ pub(crate) fn touch_skin<S: CarriedSkin>(
     let (model, time) = (&tick.environment.contact, tick.substep_time(now));
     model.move_tools(fastest_m_per_s, &time, tools, contact);
     let mut renewed = model.list_on_skin(skin, &mut listed.x, tools, contact, scratch);
-    renewed |= model.list_walls_on_skin(skin, skin.layout(), contact, scratch);
+    renewed |= model.list_walls_on_skin(skin, contact, scratch);
     renewed |= listed.layout != skin.layout();
     renewed |= tick.usable_points().any(|point| !listed.is_listed(point.node));
     if renewed {

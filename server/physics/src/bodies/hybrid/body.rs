@@ -12,7 +12,7 @@ use super::{
     seen::demand_seen,
     sites::Sites,
     sizes,
-    skin_anchors::SkinAnchors,
+    skin_carriers::SkinCarriers,
     spec::{HybridError, ParticleSpec},
     transition_force::is_free,
     trilinear_point::CellPoint,
@@ -60,14 +60,12 @@ pub struct HybridBody {
     pub(super) may_wake: Vec<bool>,
     /// The cell of each vertex of the skin, and the vertex's coordinates in it.
     pub(super) vertex_points: Vec<CellPoint>,
-    /// Anchors of the particles that carry these.
-    pub(super) skin_anchors: SkinAnchors,
+    /// The particles that carry these.
+    pub(super) skin_carriers: SkinCarriers,
     /// Bound of the speed of any vertex of the skin over that of the fastest node or particle.
     pub(super) amplification: f64,
     /// Bounding boxes of the skin's triangles.
     pub(super) clusters: SkinClusters,
-    /// The same of the clusters in which self-contact has them; none where there is none.
-    pub(super) wall_clusters: SkinClusters,
     pub(super) densities_kg_per_m3: Vec<f64>,
     embedding: EmbeddingSummary,
     /// The embedding mesh: the coarse mesh, its boundary moved so that it holds the particles.
@@ -154,7 +152,8 @@ impl HybridBody {
         progress(MAY_WAKE);
         let vertex_points: Vec<CellPoint> =
             spec.skin.positions_m().iter().map(|&point| CellPoint::new(&partition, point)).collect();
-        let mut hybrid = Self {
+        let skin_carriers = SkinCarriers::new(&partition, &vertex_points);
+        let hybrid = Self {
             lumping: Lumping::new(&partition, &masses),
             full_cell: RestCell::new(spacing_m, 1.0 - KEPT, &Moments::full(spacing_m)),
             materials,
@@ -164,11 +163,10 @@ impl HybridBody {
             free_parts: free.iter().map(|free| DVec3::select(*free, DVec3::ONE, DVec3::ZERO)).collect(),
             free,
             may_wake,
-            skin_anchors: SkinAnchors::new(&partition, &vertex_points),
+            amplification: skin_carriers.amplification(),
+            skin_carriers,
             vertex_points,
-            amplification: 1.0,
             clusters: SkinClusters::default(),
-            wall_clusters: SkinClusters::default(),
             embedding,
             partition,
             masses,
@@ -177,8 +175,6 @@ impl HybridBody {
             inverse_mass_per_kg: Vec::new(),
             max_natural_frequency_rad_per_s: 0.0,
         };
-        let vertices = 0..hybrid.vertex_points.len() as u32;
-        hybrid.amplification = vertices.map(|vertex| hybrid.amplification_of(vertex)).fold(1.0, f64::max);
         progress(1.0);
         Ok(Built { body: hybrid, prescribed })
     }
@@ -293,11 +289,9 @@ impl HybridBody {
         self.amplification
     }
 
-    /// Computes the bounding boxes of the skin's triangles, given in the order of contact's broad phase and in that of
-    /// self-contact.
-    pub(crate) fn cluster(&mut self, triangles: &[[u32; 3]], of_walls: &[[u32; 3]]) {
+    /// Computes the bounding boxes of the skin's triangles, given in the order of contact's broad phase.
+    pub(crate) fn cluster(&mut self, triangles: &[[u32; 3]]) {
         self.clusters = SkinClusters::new(self, self.skin_rest_m(), triangles);
-        self.wall_clusters = SkinClusters::new(self, self.skin_rest_m(), of_walls);
     }
 
     /// Returns the material of the tet that a vertex of the skin is in.

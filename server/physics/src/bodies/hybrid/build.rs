@@ -1,7 +1,7 @@
 //! Builds a hybrid body and its environment from a specification.
 use super::{HybridBody, HybridError, HybridSpec, body::Built};
 use crate::{
-    contact::{ContactModel, SelfContact, SkinAtRest, moduli},
+    contact::{ContactModel, SkinAtRest, moduli},
     mesh::Surface,
     settings::Integrator,
     tick::{Environment, EnvironmentSpec, Steps, free_inverse_mass, progress as building, stiffening},
@@ -48,12 +48,11 @@ impl HybridBody {
             moduli: &moduli,
             mass_kg: &mass_kg,
             bearing_kg: &bearing_kg,
-            moving: hybrid.most_positions(),
             max_natural_frequency_rad_per_s: omega,
         };
         let contact = ContactModel::build(skin.positions_m, &surface, &moduli, &mass_kg, omega, &around.tools)
             .with_walls(around.walls_of(&skin));
-        hybrid.cluster(contact.triangles(), contact.walls().map_or(&[], SelfContact::triangle_nodes));
+        hybrid.cluster(contact.triangles());
         let stretch_sq = stiffening(&around.settings, &materials);
         let touched = if contact.nodal_stiffness_n_per_m.is_empty() {
             omega

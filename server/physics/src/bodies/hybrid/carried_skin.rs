@@ -54,6 +54,7 @@ impl<'a> SkinView<'a> {
         Displaced {
             displacements_m: self.patch.node_displacements_m(),
             deviation_m: if by_particles { self.deviation_m } else { 0.0 },
+            amplification: self.hybrid.amplification,
         }
     }
 }
@@ -81,27 +82,13 @@ impl Skin for SkinView<'_> {
         self.hybrid.clusters.cluster_distance_m(cluster, from_m, &displaced)
     }
 
-    fn moving_m(&self) -> impl ExactSizeIterator<Item = DVec3> {
-        self.patch.moving_m()
-    }
-
-    fn amplification(&self) -> f64 {
-        self.hybrid.amplification
-    }
-
-    fn displacements_m(&self, cluster: usize) -> [DVec3; 2] {
-        self.hybrid.wall_clusters.displacements_m(cluster, &self.displaced(self.patch.carries_of_wall(cluster)))
-    }
-
     fn position_m(&self, vertex: u32) -> DVec3 {
-        let cell_point = self.hybrid.vertex_points[vertex as usize];
-        let partition = &self.hybrid.partition;
+        let carriers = &self.hybrid.skin_carriers;
         let of = |particle: u32| match self.patch.point_of(particle) {
-            NONE => self.hybrid.skin_anchors.of(particle).of(self.patch.node_displacements_m()),
+            NONE => carriers.anchor(particle).of(self.patch.node_displacements_m()),
             point => self.patch.displacements_m()[point as usize],
         };
-        let particles = partition.corners(cell_point.cell as usize);
-        let moved: DVec3 = particles.into_iter().zip(cell_point.weights(partition)).map(|(p, w)| of(p) * w).sum();
+        let moved: DVec3 = carriers.of_vertex(vertex).iter().map(|&(particle, weight)| of(particle) * weight).sum();
         self.hybrid.skin_rest_m()[vertex as usize] + moved
     }
 }
@@ -115,21 +102,16 @@ impl CarriedSkin for SkinView<'_> {
 
     fn carriers(&self, vertex: u32) -> Carried {
         let hybrid = self.hybrid;
-        let cell_point = hybrid.vertex_points[vertex as usize];
-        let rest_m = hybrid.skin_rest_m()[vertex as usize];
-        let mut carried = Carried { rest_m, carriers: [(Carrier::Point(NONE), 0.0); 8], weighty: 0 };
-        let particles = hybrid.partition.corners(cell_point.cell as usize);
-        for (particle, weight) in particles.into_iter().zip(cell_point.weights(&hybrid.partition)) {
-            if weight != 0.0 {
-                let carrier = match self.patch.point_of(particle) {
-                    NONE => Carrier::Nodes(*hybrid.skin_anchors.of(particle)),
-                    point => Carrier::Point(point),
-                };
-                carried.carriers[carried.weighty] = (carrier, weight);
-                carried.weighty += 1;
-            }
+        let (rest_m, of_vertex) = (hybrid.skin_rest_m()[vertex as usize], hybrid.skin_carriers.of_vertex(vertex));
+        let mut carriers = [(Carrier::Point(NONE), 0.0); 8];
+        for (&(particle, weight), slot) in of_vertex.iter().zip(&mut carriers) {
+            let carrier = match self.patch.point_of(particle) {
+                NONE => Carrier::Nodes(*hybrid.skin_carriers.anchor(particle)),
+                point => Carrier::Point(point),
+            };
+            *slot = (carrier, weight);
         }
-        carried
+        Carried { rest_m, carriers, weighty: of_vertex.len() }
     }
 
     fn carried_m(&self, carried: &Carried) -> DVec3 {
@@ -143,15 +125,11 @@ impl CarriedSkin for SkinView<'_> {
 
     fn velocity_m_per_s(&self, vertex: u32) -> DVec3 {
         let hybrid = self.hybrid;
-        let cell_point = hybrid.vertex_points[vertex as usize];
         let of = |particle: u32| match self.patch.number_of(particle) {
-            NONE => hybrid.skin_anchors.of(particle).of(self.v),
+            NONE => hybrid.skin_carriers.anchor(particle).of(self.v),
             number => self.v[hybrid.node_count() + number as usize],
         };
-        let particles = hybrid.partition.corners(cell_point.cell as usize);
-        let weighty =
-            particles.into_iter().zip(cell_point.weights(&hybrid.partition)).filter(|(_, weight)| *weight != 0.0);
-        weighty.map(|(particle, weight)| of(particle) * weight).sum()
+        hybrid.skin_carriers.of_vertex(vertex).iter().map(|&(particle, weight)| of(particle) * weight).sum()
     }
 
     fn push(&self, carried: &Carried, force_n: DVec3, forces_n: &mut [DVec3]) {
@@ -174,7 +152,7 @@ impl HybridBody {
         let moved = |particle: u32| {
             let x = match active.binary_search(&particle) {
                 Ok(number) => of_particles[number],
-                Err(_) => self.skin_anchors.of(particle).of(of_nodes),
+                Err(_) => self.partition.anchor(particle).of(of_nodes),
             };
             x - self.partition.particle_m(particle)
         };
@@ -207,14 +185,6 @@ impl HybridBody {
             area_m2 * carriers.map(|(particle, _)| per_area(particle)).fold(f64::INFINITY, f64::min)
         };
         points().map(of_vertex).collect()
-    }
-
-    /// Returns the bound of the speed of a vertex of the skin over that of the fastest node or particle,
-    /// `Σ_p |w_vp| Σ_i |ζ_pi|`.
-    pub(super) fn amplification_of(&self, vertex: u32) -> f64 {
-        let point = self.vertex_points[vertex as usize].trilinear(&self.partition);
-        let of = |particle: u32| self.skin_anchors.of(particle).weights.iter().map(|w| w.abs()).sum::<f64>().max(1.0);
-        point.particles.into_iter().zip(point.weights).map(|(particle, w)| w.abs() * of(particle)).sum()
     }
 
     /// Returns the masses (kg) by which what is pressed at the skin's vertices is borne where neighbours are pressed alike:

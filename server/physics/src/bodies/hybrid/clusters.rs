@@ -32,8 +32,6 @@ struct Boxes {
     /// Index in `vertices` of the first entry of each cluster, and the end of the last; empty for groups.
     first_vertex: Vec<u32>,
     vertices: Vec<u32>,
-    /// `a`, the bound of `Σ |w_i|`, of each box.
-    amplification: Vec<f64>,
 }
 
 impl SkinClusters {
@@ -98,11 +96,6 @@ impl SkinClusters {
         self.clusters.distance_m(cluster, from_m, bounds)
     }
 
-    /// Returns a box (m) around the displacements of a cluster's vertices, by the module's formula.
-    pub(super) fn displacements_m(&self, cluster: usize, bounds: &Displaced<'_>) -> [DVec3; 2] {
-        self.clusters.displacements_m(cluster, bounds)
-    }
-
     /// Does the same for a group.
     pub(super) fn group_distance_m(&self, group: usize, from_m: DVec3, bounds: &Displaced<'_>) -> f64 {
         self.groups.distance_m(group, from_m, bounds)
@@ -116,30 +109,29 @@ pub(super) struct Displaced<'a> {
     pub(super) displacements_m: &'a [DVec3],
     /// `max |d_p|` (m); 0 for clusters of which no active particle carries a vertex.
     pub(super) deviation_m: f64,
+    /// `a`, the bound of `Σ |w_i|`.
+    pub(super) amplification: f64,
 }
 
 impl Boxes {
     fn push(&mut self, hybrid: &HybridBody, rest_positions_m: &[DVec3], triangles: &[[u32; 3]]) {
         let (mut low, mut high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
         let (start, first_vertex) = (self.nodes.len(), self.vertices.len());
-        let mut amplification = 1.0_f64;
         for &vertex in triangles.iter().flatten() {
             let rest_m = rest_positions_m[vertex as usize];
             (low, high) = (low.min(rest_m), high.max(rest_m));
             let partition = hybrid.partition();
-            amplification = amplification.max(hybrid.amplification_of(vertex));
             if triangles.len() <= CLUSTER && !self.vertices[first_vertex..].contains(&vertex) {
                 self.vertices.push(vertex);
             }
             for particle in partition.corners(hybrid.vertex_point(vertex).cell as usize) {
-                for node in hybrid.skin_anchors.of(particle).nodes {
+                for node in partition.anchor(particle).nodes {
                     if !self.nodes[start..].contains(&node) {
                         self.nodes.push(node);
                     }
                 }
             }
         }
-        self.amplification.push(amplification);
         self.low_m.push(low);
         self.high_m.push(high);
         self.first.push(self.nodes.len() as u32);
@@ -147,11 +139,6 @@ impl Boxes {
     }
 
     fn distance_m(&self, number: usize, from_m: DVec3, bounds: &Displaced<'_>) -> f64 {
-        let [low_m, high_m] = self.displacements_m(number, bounds);
-        box_distance_m(from_m, self.low_m[number] + low_m, self.high_m[number] + high_m)
-    }
-
-    fn displacements_m(&self, number: usize, bounds: &Displaced<'_>) -> [DVec3; 2] {
         let nodes = &self.nodes[self.first[number] as usize..self.first[number + 1] as usize];
         let (mut least, mut most) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
         for &node in nodes {
@@ -159,7 +146,7 @@ impl Boxes {
             (least, most) = (least.min(u), most.max(u));
         }
         let middle = (least + most) * 0.5;
-        let reach = ((most - least) * 0.5 + bounds.deviation_m) * self.amplification[number];
-        [middle - reach, middle + reach]
+        let reach = ((most - least) * 0.5 + bounds.deviation_m) * bounds.amplification;
+        box_distance_m(from_m, self.low_m[number] + middle - reach, self.high_m[number] + middle + reach)
     }
 }

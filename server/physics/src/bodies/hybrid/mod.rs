@@ -32,7 +32,7 @@ mod seen;
 pub mod sites;
 pub mod sizes;
 pub mod skin;
-mod skin_anchors;
+mod skin_carriers;
 pub mod spec;
 mod staged_patch;
 mod state;

@@ -71,7 +71,6 @@ impl TetBody {
             moduli: &moduli,
             mass_kg: &body.mass_kg,
             bearing_kg: &body.mass_kg,
-            moving: body.rest_positions_m().len(),
             max_natural_frequency_rad_per_s: omega,
         };
         let contact = ContactModel::build(skin.positions_m, &surface, &moduli, skin.mass_kg, omega, &spec.tools)

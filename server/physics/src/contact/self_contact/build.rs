@@ -2,10 +2,10 @@
 use super::{
     compact::compact,
     lists::NearWalls,
-    query::{MovedSurface, WallScratch},
+    query::WallScratch,
     rest::{
-        CloseCluster, ClusterAtRest, FREQUENCY_FRACTION, MARGIN, NodeAtRest, Rows, STIFFNESS_RATIO, SelfContact,
-        twice_area_m2,
+        CloseCluster, ClusterAtRest, FACING, FREQUENCY_FRACTION, MARGIN, NodeAtRest, Rows, STIFFNESS_RATIO,
+        SelfContact, twice_area_m2,
     },
 };
 use crate::{contact::SurfaceModuli, mesh::Surface};
@@ -35,8 +35,6 @@ pub(crate) struct SkinAtRest<'a> {
     pub(crate) mass_kg: &'a [f64],
     /// Mass (kg) that bears what is pressed at each node, if its neighbours are pressed alike.
     pub(crate) bearing_kg: &'a [f64],
-    /// Number of positions that move the surface, at most.
-    pub(crate) moving: usize,
     /// ω_max (rad/s) of the body without contact.
     pub(crate) max_natural_frequency_rad_per_s: f64,
 }
@@ -61,7 +59,6 @@ impl SelfContact {
                 .iter()
                 .map(|nodes| twice_area_m2(nodes.map(|n| skin.positions_m[n as usize])).normalize_or_zero())
                 .collect(),
-            moving: skin.moving,
             triangles,
         };
         built.box_clusters();
@@ -85,7 +82,7 @@ impl SelfContact {
 
     /// Returns an empty list with room for what may meet.
     pub(in crate::contact) fn no_walls(&self) -> NearWalls {
-        NearWalls::with_room(self.nodes.iter().filter(|at| at.stiffness_n_per_m > 0.0).count(), self.moving)
+        NearWalls::with_room(self.nodes.iter().filter(|at| at.stiffness_n_per_m > 0.0).count(), self.rest_m.len())
     }
 
     /// Returns buffers.
@@ -96,21 +93,8 @@ impl SelfContact {
     /// Lists what is near with nodes at `x` (m).
     pub(super) fn near_at(&self, x: &[DVec3]) -> NearWalls {
         let (mut near, mut scratch) = (self.no_walls(), self.scratch());
-        let surface = MovedSurface {
-            displacements_m: &|cluster| self.displacements_m(cluster, x),
-            position_m: &|node| x[node as usize],
-        };
-        self.query(&surface, false, &mut near, &mut scratch);
+        self.query(x, false, &mut near, &mut scratch);
         near
-    }
-
-    /// Returns the box (m) around the displacements of a cluster's nodes, at `x` (m).
-    pub(in crate::contact) fn displacements_m(&self, cluster: usize, x: &[DVec3]) -> [DVec3; 2] {
-        let nodes = self.of_triangles.row(cluster).iter();
-        nodes.fold([DVec3::INFINITY, DVec3::NEG_INFINITY], |[low_m, high_m], &node| {
-            let u = x[node as usize] - self.rest_m[node as usize];
-            [low_m.min(u), high_m.max(u)]
-        })
     }
 
     fn box_clusters(&mut self) {
@@ -162,14 +146,25 @@ impl SelfContact {
             let is_usable = area_m2 > 0.0 && stiffness_n_per_m.is_finite() && bears.is_finite();
             self.nodes[node as usize] = NodeAtRest {
                 normal: normal.normalize_or_zero(),
+                faces_below: self.faces_below(node, normal.normalize_or_zero()),
                 size_m,
                 thickness_m: f64::INFINITY,
                 margin_m: MARGIN * size_m,
                 stiffness_n_per_m: if is_usable { stiffness_n_per_m } else { 0.0 },
                 bears: if is_usable { bears } else { LEAST_BORNE },
                 bearing_kg: skin.bearing_kg[node as usize],
+                free_close_m: f64::INFINITY,
             };
         }
+    }
+
+    /// Returns the cosine of the angle from a vertex's normal beyond which no triangle around it is faced: with `α` the
+    /// largest angle between that normal and one of theirs, `cos(arccos(−FACING) − α)`.
+    fn faces_below(&self, node: u32, normal: DVec3) -> f64 {
+        let angle_of = |&triangle: &u32| self.normals[triangle as usize].dot(normal).clamp(-1.0, 1.0).acos();
+        let widest = self.around.row(node as usize).iter().map(angle_of).fold(0.0, f64::max);
+        // Within rounding: what is told apart here is told apart by the triangles, too.
+        ((-FACING).acos() - widest - 1e-6).max(0.0).cos()
     }
 
     fn mean_edge_m(&self) -> f64 {
@@ -207,12 +202,19 @@ impl SelfContact {
         self.close = Rows::of(close);
     }
 
-    /// Returns the least distance (m) at rest between vertices of one cluster and triangles of another that may meet.
-    fn free_m(&self, of_nodes: usize, of_triangles: usize) -> f64 {
-        let nodes = self.of_cluster.row(of_nodes).iter();
-        let pairs =
-            nodes.flat_map(|&node| self.triangles.cluster_range(of_triangles).map(move |triangle| (node, triangle)));
-        pairs.filter_map(|(node, triangle)| self.may_meet_m(node, triangle)).fold(f64::INFINITY, f64::min)
+    /// Returns the least distance (m) at rest between vertices of one cluster and triangles of another that may meet, and
+    /// notes it of each vertex.
+    fn free_m(&mut self, of_nodes: usize, of_triangles: usize) -> f64 {
+        let mut least_m = f64::INFINITY;
+        for node in self.of_cluster.row(of_nodes).to_vec() {
+            let distances_m =
+                self.triangles.cluster_range(of_triangles).filter_map(|triangle| self.may_meet_m(node, triangle));
+            let free_m = distances_m.fold(f64::INFINITY, f64::min);
+            let of_node_m = &mut self.nodes[node as usize].free_close_m;
+            *of_node_m = of_node_m.min(free_m);
+            least_m = least_m.min(free_m);
+        }
+        least_m
     }
 
     /// Makes the margins so small that nothing is pressed at rest, and leaves vertices out that lie against a wall.

@@ -8,6 +8,8 @@ const PAIRS_PER_VERTEX: usize = 24;
 const AT_LEAST: usize = 4096;
 /// Part of the way until the next query after which it is looked again which pairs may be within reach.
 const AWAKE: f64 = 0.2;
+/// Part of the way until the next query below which a list is made anew rather than looked after.
+const WORTH_KEEPING: f64 = 0.25;
 /// A way (m) that no surface moves between two queries.
 const FOR_EVER_M: f64 = 1e6;
 
@@ -36,11 +38,8 @@ pub(in crate::contact) struct NearWalls {
     energy_j: Option<f64>,
     /// How far (m) the surface may have moved since then until more pairs may be within reach than were told to be.
     awake_m: f64,
-    /// Where (m) what moves the surface was when the list was made; none where it is not known.
+    /// Where (m) the nodes were when the list was made.
     then_m: Box<[DVec3]>,
-    then_count: usize,
-    /// What carried the surface then, as a number that changes with it.
-    layout: u64,
 }
 
 impl Default for NearWalls {
@@ -54,18 +53,16 @@ impl Default for NearWalls {
             energy_j: None,
             awake_m: 0.0,
             then_m: Box::default(),
-            then_count: 0,
-            layout: 0,
         }
     }
 }
 
 impl NearWalls {
-    /// Makes room for pairs of so many vertices, which so many positions move.
-    pub(super) fn with_room(vertices: usize, moving: usize) -> Self {
+    /// Makes room for pairs of so many vertices, among so many nodes.
+    pub(super) fn with_room(vertices: usize, nodes: usize) -> Self {
         let room = (PAIRS_PER_VERTEX * vertices).max(AT_LEAST);
         let none = Pair { node: 0, triangle: 0, free_m: 0.0 };
-        let then_m = vec![DVec3::ZERO; moving].into_boxed_slice();
+        let then_m = vec![DVec3::ZERO; nodes].into_boxed_slice();
         Self { pairs: vec![none; room].into_boxed_slice(), then_m, ..Self::default() }
     }
 
@@ -79,39 +76,20 @@ impl NearWalls {
         self.whole_slack_m - self.slack_m
     }
 
-    /// Notes where (m) what moves the surface is, which is carried as the number `layout` tells, when the list is made.
-    pub(super) fn remember(&mut self, layout: u64, moving_m: impl Iterator<Item = DVec3>) {
-        (self.layout, self.then_count) = (layout, 0);
-        for place_m in moving_m {
-            let Some(slot) = self.then_m.get_mut(self.then_count) else {
-                self.then_count = 0;
-                return;
-            };
-            *slot = place_m;
-            self.then_count += 1;
-        }
+    /// Notes where (m) the nodes are when the list is made.
+    pub(super) fn remember(&mut self, x: &[DVec3]) {
+        self.then_m.copy_from_slice(x);
     }
 
     /// Looks, where the surface's travel has used the list up, how far it really is from where it was: what trembles
-    /// travels far and goes nowhere. Returns whether the list is not out of date after all. No vertex moves farther than
-    /// `amplification` times what moves it.
-    pub(super) fn is_still_good(
-        &mut self,
-        layout: u64,
-        amplification: f64,
-        moving_m: impl ExactSizeIterator<Item = DVec3>,
-    ) -> bool {
-        if !self.slack_m.is_finite()
-            || layout != self.layout
-            || moving_m.len() != self.then_count
-            || self.then_count == 0
-        {
+    /// travels far and goes nowhere. Returns whether the list is good for some time after all.
+    pub(super) fn is_still_good(&mut self, x: &[DVec3]) -> bool {
+        if !self.slack_m.is_finite() {
             return false;
         }
-        let then_m = &self.then_m[..self.then_count];
-        let farthest_sq = moving_m.zip(then_m).map(|(now, then)| now.distance_squared(*then)).fold(0.0, f64::max);
-        self.slack_m = self.whole_slack_m - amplification * farthest_sq.sqrt() - ROUNDING_M;
-        self.slack_m > 0.0
+        let farthest_sq = x.iter().zip(&self.then_m).map(|(now, then)| now.distance_squared(*then)).fold(0.0, f64::max);
+        self.slack_m = self.whole_slack_m - farthest_sq.sqrt() - ROUNDING_M;
+        self.slack_m > WORTH_KEEPING * self.whole_slack_m
     }
 
     /// Returns the pairs that may be within reach until the surface has moved some way.
@@ -153,8 +131,13 @@ impl NearWalls {
                 *slot = pair;
                 self.count += 1;
             }
-            None => self.missed = self.missed.saturating_add(1),
+            None => self.miss(),
         }
+    }
+
+    /// Counts what is not listed though it may meet.
+    pub(super) fn miss(&mut self) {
+        self.missed = self.missed.saturating_add(1);
     }
 
     /// Sorts the pairs, so that sums have the same bits whenever they were listed, which serve while the surface moves no
@@ -164,13 +147,5 @@ impl NearWalls {
         self.slack_m = slack_m.min(FOR_EVER_M);
         self.whole_slack_m = self.slack_m;
         self.awake_m = AWAKE * self.whole_slack_m;
-    }
-
-    /// Does the same where the list is to be made again at once, and every pair looked at.
-    pub(super) fn finish_for_now(&mut self) {
-        self.finish(0.0);
-        self.pairs[..self.count].iter_mut().for_each(|pair| pair.free_m = f64::NEG_INFINITY);
-        self.slack_m = f64::NEG_INFINITY;
-        self.awake_m = f64::INFINITY;
     }
 }

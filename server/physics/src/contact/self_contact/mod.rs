@@ -37,5 +37,5 @@ mod tests;
 pub(crate) use build::SkinAtRest;
 pub(super) use lists::NearWalls;
 pub use press::MeetingWalls;
-pub(super) use query::{MovedSurface, WallScratch};
+pub(super) use query::WallScratch;
 pub(crate) use rest::SelfContact;

@@ -17,7 +17,7 @@ pub struct MeetingWalls {
     pub least_gap_m: f64,
     /// What they store (J).
     pub energy_j: f64,
-    /// Number of pairs of a vertex and a triangle for which there was no room, so that walls may pass there.
+    /// Number of pairs that could not be looked at, as there was no room or the skin was torn, so that walls may pass there.
     pub missed: u32,
 }
 

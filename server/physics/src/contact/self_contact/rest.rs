@@ -49,8 +49,6 @@ pub(crate) struct SelfContact {
     pub(super) stride_m: f64,
     /// Number of vertices that are left out because the body lies against itself there at rest.
     pub(super) left_out: usize,
-    /// Number of positions that move the surface, at most.
-    pub(super) moving: usize,
 }
 
 /// A vertex of the skin at rest.
@@ -58,6 +56,8 @@ pub(crate) struct SelfContact {
 pub(super) struct NodeAtRest {
     /// Outward unit normal.
     pub(super) normal: DVec3,
+    /// Cosine of the angle between this and a triangle's normal from which no triangle at it faces that triangle.
+    pub(super) faces_below: f64,
     /// Longest edge (m) at it.
     pub(super) size_m: f64,
     /// Thickness (m) of the wall behind it.
@@ -70,18 +70,22 @@ pub(super) struct NodeAtRest {
     pub(super) bears: f64,
     /// Mass (kg) that bears what is pressed there.
     pub(super) bearing_kg: f64,
+    /// Least distance (m) at rest of triangles in close clusters that it may meet.
+    pub(super) free_close_m: f64,
 }
 
 impl NodeAtRest {
     /// Stands for a node inside the body.
     pub(super) const INSIDE: Self = Self {
         normal: DVec3::ZERO,
+        faces_below: 1.0,
         size_m: 0.0,
         thickness_m: 0.0,
         margin_m: 0.0,
         stiffness_n_per_m: 0.0,
         bears: 1.0,
         bearing_kg: f64::INFINITY,
+        free_close_m: f64::INFINITY,
     };
 
     /// Returns the largest distance (m) from a wall at which it is pushed.
@@ -149,7 +153,8 @@ impl SelfContact {
         let (at, rest) = (&self.nodes[node as usize], self.rest_m[node as usize]);
         let corners_m = corners.map(|n| self.rest_m[n as usize]);
         let (beside_m, normal) = (BESIDE * at.size_m, self.normals[triangle]);
-        let faces = self.around.row(node as usize).iter().any(|&own| -self.normals[own as usize].dot(normal) > FACING);
+        let faces = at.normal.dot(normal) < at.faces_below
+            && self.around.row(node as usize).iter().any(|&own| -self.normals[own as usize].dot(normal) > FACING);
         if !faces && rest.distance_squared(corners_m[0]) < beside_m * beside_m {
             return None;
         }
@@ -184,10 +189,5 @@ impl SelfContact {
     /// Returns the number of vertices that are left out because the body lies against itself there at rest.
     pub(crate) fn left_out(&self) -> usize {
         self.left_out
-    }
-
-    /// Returns the triangles in the order of its clusters.
-    pub(crate) fn triangle_nodes(&self) -> &[[u32; 3]] {
-        &self.triangles.nodes
     }
 }

@@ -1,5 +1,5 @@
 //! Self-contact's part of a substep.
-use super::{MovedSurface, SelfContact};
+use super::SelfContact;
 use crate::contact::{ContactModel, ContactScratch, ContactState, broad::Skin};
 use glam::DVec3;
 
@@ -14,41 +14,27 @@ impl ContactModel {
         scratch: &mut ContactScratch,
     ) {
         let Some(walls) = self.walls() else { return };
-        let moving_m = || x.iter().copied();
-        if contact.walls.slack_m <= 0.0 && !contact.walls.is_still_good(0, 1.0, moving_m()) {
-            let surface = MovedSurface {
-                displacements_m: &|cluster| walls.displacements_m(cluster, x),
-                position_m: &|node| x[node as usize],
-            };
-            walls.query(&surface, scratch.exhaustive, &mut contact.walls, &mut scratch.walls);
-            contact.walls.remember(0, moving_m());
-        }
+        walls.renew(x, scratch.exhaustive, &mut contact.walls, &mut scratch.walls);
         walls.press(x, &contact.walls, forces_n, &mut scratch.walls);
         contact.walls.set_energy_j(scratch.walls.seen().energy_j);
     }
 
-    /// Renews the list of what may meet on a skin, where it is out of date. Returns whether it was. `layout` is a number
-    /// that changes with what carries the skin.
+    /// Renews the list of what may meet on a skin, where it is out of date. Returns whether more may be within reach.
     pub(crate) fn list_walls_on_skin(
         &self,
-        skin: &mut impl Skin,
-        layout: u64,
+        skin: &impl Skin,
         contact: &mut ContactState,
         scratch: &mut ContactScratch,
     ) -> bool {
         let Some(walls) = self.walls() else { return false };
-        let is_used_up = contact.walls.slack_m <= 0.0;
-        if !is_used_up || contact.walls.is_still_good(layout, skin.amplification(), skin.moving_m()) {
+        if contact.walls.slack_m > 0.0 {
             return contact.walls.wakes_more();
         }
-        skin.begin();
-        let surface = MovedSurface {
-            displacements_m: &|cluster| skin.displacements_m(cluster),
-            position_m: &|vertex| skin.position_m(vertex),
-        };
-        walls.query(&surface, scratch.exhaustive, &mut contact.walls, &mut scratch.walls);
-        contact.walls.remember(layout, skin.moving_m());
-        true
+        let mut x = std::mem::take(&mut scratch.walls.x);
+        (0..).zip(&mut x).for_each(|(vertex, x_m)| *x_m = skin.position_m(vertex));
+        let renewed = walls.renew(&x, scratch.exhaustive, &mut contact.walls, &mut scratch.walls);
+        scratch.walls.x = x;
+        renewed || contact.walls.wakes_more()
     }
 
     /// Presses the walls of a skin whose listed vertices are at `x` (m), and adds the forces (N) on vertices.

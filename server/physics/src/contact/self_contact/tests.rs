@@ -34,7 +34,6 @@ fn walls_of(mesh: &TetMesh, only_if_facing: bool) -> Option<SelfContact> {
         moduli: &moduli,
         mass_kg: &mass_kg,
         bearing_kg: &mass_kg,
-        moving: mesh.positions_m().len(),
         max_natural_frequency_rad_per_s: 5e3,
     };
     SelfContact::build(&skin, only_if_facing)

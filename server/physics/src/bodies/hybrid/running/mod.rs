@@ -66,8 +66,6 @@ pub(crate) struct RunningPatch {
     /// Whether active particles carry any vertex of each cluster, and of each group.
     carries_of_cluster: Vec<bool>,
     carries_of_group: Vec<bool>,
-    /// The same of self-contact's clusters.
-    carries_of_wall: Vec<bool>,
     is_awake: Vec<bool>,
     is_viscous: bool,
     /// Number of sets of active particles that there have been.
@@ -121,7 +119,6 @@ impl RunningPatch {
             point_of: vec![NONE; partition.particle_count()],
             carries_of_cluster: vec![false; hybrid.clusters.clusters()],
             carries_of_group: vec![false; hybrid.clusters.groups()],
-            carries_of_wall: vec![false; hybrid.wall_clusters.clusters()],
             is_awake: vec![false; partition.cells().len()],
             is_viscous: hybrid.materials.iter().any(|m| !m.viscosity.is_zero()),
             number: 0,
@@ -163,15 +160,6 @@ impl RunningPatch {
         &self.node_displacements_m
     }
 
-    /// Returns the displacements (m) of the coarse nodes and then of the active particles, after [`Self::displace`].
-    pub(super) fn moving_m(&self) -> impl ExactSizeIterator<Item = DVec3> {
-        let (nodes, points) = (self.node_displacements_m.len(), self.points_of_active.len());
-        (0..nodes + points).map(move |number| match number.checked_sub(nodes) {
-            None => self.node_displacements_m[number],
-            Some(active) => self.displacements_m[self.points_of_active[active] as usize],
-        })
-    }
-
     /// Returns the active particles, each with its distance (m) from where it would be asleep.
     pub(super) fn deviations_m(&self) -> impl Iterator<Item = (u32, f64)> + '_ {
         let active = self.points.iter().zip(&self.displacements_m).filter(|(point, _)| point.active != NONE);
@@ -186,11 +174,6 @@ impl RunningPatch {
     /// Returns whether active particles carry any vertex of a cluster of the skin.
     pub(super) fn carries_of_cluster(&self, cluster: usize) -> bool {
         self.carries_of_cluster[cluster]
-    }
-
-    /// Returns the same for a cluster of self-contact.
-    pub(super) fn carries_of_wall(&self, cluster: usize) -> bool {
-        self.carries_of_wall[cluster]
     }
 
     /// Returns the same for a group.
@@ -291,9 +274,6 @@ impl RunningPatch {
             for cluster in hybrid.clusters.carried_by(particle) {
                 self.carries_of_cluster[cluster] = carried;
                 self.carries_of_group[SkinClusters::group_of(cluster)] = carried;
-            }
-            for cluster in hybrid.wall_clusters.carried_by(particle) {
-                self.carries_of_wall[cluster] = carried;
             }
         }
     }
