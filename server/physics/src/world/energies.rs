@@ -5,8 +5,8 @@ use glam::DVec3;
 
 impl Energies {
     /// Returns the kinetic, elastic and gravitational energy of a state (in O(tets)), with the ledger's work and
-    /// dissipation. What walls that meet store is counted as elastic. The elastic energy of a seed body is that of its core, as that of its particles and links is not
-    /// known; neither is its dissipation.
+    /// dissipation. What walls that meet store is counted as elastic. The elastic energy of a seed body is that of its
+    /// core, as that of its particles and links is not known; neither is its dissipation.
     pub fn of(model: &Model, state: &State) -> Self {
         let own = model.body().energies(model.gravity_m_per_s2(), &state.body, &state.mechanical);
         let known_j = state.mechanical.contact.stored_in_walls_j().filter(|_| state.mechanical.force_is_current);

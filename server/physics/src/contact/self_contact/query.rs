@@ -18,8 +18,8 @@ use crate::contact::{
 };
 use glam::DVec3;
 
-/// Size of a cluster over that at rest from which it is torn: in a step that was too long and will be repeated, a body that
-/// is anywhere would be looked at vertex by vertex for seconds.
+/// Size of a cluster over that at rest from which it is torn. In a step that was too long and will be repeated, the body may
+/// be anywhere, and would be looked at vertex by vertex for seconds.
 const TORN: f64 = 8.0;
 
 /// Buffers of queries and of pressing, sized once.
@@ -104,11 +104,17 @@ impl SelfContact {
     fn cluster_now(&self, cluster: usize, x: &[DVec3]) -> ClusterNow {
         let (mut low_m, mut high_m) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
         let (mut least_m, mut most_m) = (low_m, high_m);
+        let mut is_finite = true;
         for &node in self.of_triangles.row(cluster) {
             let p = x[node as usize];
             let u = p - self.rest_m[node as usize];
             (low_m, high_m) = (low_m.min(p), high_m.max(p));
             (least_m, most_m) = (least_m.min(u), most_m.max(u));
+            is_finite &= p.is_finite();
+        }
+        if !is_finite {
+            // Minima and maxima may not see it.
+            (low_m, high_m) = (DVec3::NEG_INFINITY, DVec3::INFINITY);
         }
         ClusterNow { low_m, high_m, least_m, most_m, displaced_m: least_m.abs().max(most_m.abs()).length() }
     }
