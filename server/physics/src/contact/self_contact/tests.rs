@@ -192,3 +192,20 @@ fn queries_lose_nothing_that_is_within_reach() {
     }
     assert!(met > 100, "{met}");
 }
+
+/// In a step that was too long nodes were anywhere or not finite, and one query looked at every vertex with every
+/// triangle for seconds, before the tick was taken back.
+#[test]
+fn a_torn_skin_is_passed_over_and_told() {
+    let mesh = clamp();
+    let walls = walls_of(&mesh, true).unwrap();
+    let mut random = Random(3);
+    let anywhere: Vec<DVec3> = mesh.positions_m().iter().map(|p| *p + random.vector()).collect();
+    let mut not_finite = mesh.positions_m().to_vec();
+    not_finite.iter_mut().step_by(3).for_each(|p| p.y = f64::NAN);
+    for x in [anywhere, not_finite] {
+        let near = walls.near_at(&x);
+        assert!(near.pairs().is_empty() && walls.meeting(&x).missed > 0);
+    }
+    assert_eq!(walls.meeting(mesh.positions_m()).missed, 0);
+}
