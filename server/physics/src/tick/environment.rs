@@ -107,12 +107,11 @@ impl EnvironmentSpec {
     /// Returns the self-contact of a body with this skin, where it is to have it.
     pub(crate) fn walls_of(&self, skin: &SkinAtRest<'_>) -> Option<SelfContact> {
         match self.settings.self_contact {
-            SelfContactChoice::Off => None,
             SelfContactChoice::On => SelfContact::build(skin, false),
             SelfContactChoice::WhereFacing if self.settings.integrator == Integrator::Leapfrog => {
                 SelfContact::build(skin, true)
             }
-            SelfContactChoice::WhereFacing => None,
+            SelfContactChoice::Off | SelfContactChoice::WhereFacing => None,
         }
     }
 

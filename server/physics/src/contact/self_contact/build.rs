@@ -198,7 +198,9 @@ impl SelfContact {
                 }
             }
         }
-        close.iter_mut().for_each(|row| row.sort_unstable_by_key(|entry| entry.cluster));
+        for row in &mut close {
+            row.sort_unstable_by_key(|entry| entry.cluster);
+        }
         self.close = Rows::of(close);
     }
 
@@ -222,10 +224,10 @@ impl SelfContact {
         let near = self.near_at(&self.rest_m);
         for of_vertex in near.pairs().chunk_by(|one, next| one.node == next.node) {
             let node = of_vertex[0].node;
-            let Some(gap) = self.gap(node, of_vertex.iter().map(|pair| pair.triangle), &self.rest_m) else { continue };
+            let Some(gap) = self.gap(node, &of_vertex.iter().map(|pair| pair.triangle), &self.rest_m) else { continue };
             let at = &mut self.nodes[node as usize];
-            at.margin_m = at.margin_m.min(OF_GAP * gap.gap_m);
-            if gap.gap_m < AGAINST_ITSELF * at.size_m {
+            at.margin_m = at.margin_m.min(OF_GAP * gap.distance_m);
+            if gap.distance_m < AGAINST_ITSELF * at.size_m {
                 at.stiffness_n_per_m = 0.0;
                 self.left_out += 1;
             }
@@ -237,7 +239,9 @@ impl SelfContact {
 fn rows_of<'a>(nodes: usize, triangles: impl Iterator<Item = &'a [u32; 3]>) -> Rows<u32> {
     let mut around = vec![Vec::new(); nodes];
     for (triangle, corners) in (0..).zip(triangles) {
-        corners.iter().for_each(|&node| around[node as usize].push(triangle));
+        for &node in corners {
+            around[node as usize].push(triangle);
+        }
     }
     Rows::of(around)
 }

@@ -27,7 +27,7 @@ const FADES_WITHIN: f64 = 2.0;
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Gap {
     /// `g` (m), negative behind the wall.
-    pub(super) gap_m: f64,
+    pub(super) distance_m: f64,
     /// `∂g/∂y`, of length 1.
     pub(super) direction: DVec3,
     /// The triangle of the nearest point.
@@ -56,7 +56,7 @@ struct Nearest {
 impl SelfContact {
     /// Returns the gap between a vertex and the nearest of these triangles (ascending) that face it, where any is within
     /// its reach; nodes are at `x` (m).
-    pub(super) fn gap(&self, node: u32, triangles: impl Iterator<Item = u32> + Clone, x: &[DVec3]) -> Option<Gap> {
+    pub(super) fn gap(&self, node: u32, triangles: &(impl Iterator<Item = u32> + Clone), x: &[DVec3]) -> Option<Gap> {
         let y = x[node as usize];
         let mut nearest_sq = self.nodes[node as usize].reach_m().powi(2);
         let mut nearest: Option<Nearest> = None;
@@ -87,7 +87,7 @@ impl SelfContact {
         let sign = self.side(&nearest, x);
         let direction = nearest.way * (sign / distance_m);
         let Nearest { triangle, weights, .. } = nearest;
-        Some(Gap { gap_m: sign * distance_m, direction, triangle, weights, ..nearest.over_face() })
+        Some(Gap { distance_m: sign * distance_m, direction, triangle, weights, ..nearest.over_face() })
     }
 
     /// Returns the triangles that have the edge or corner on which the nearest point lies.
@@ -115,7 +115,7 @@ impl SelfContact {
         &self,
         node: u32,
         nearest: &Nearest,
-        triangles: impl Iterator<Item = u32> + Clone,
+        triangles: &(impl Iterator<Item = u32> + Clone),
         x: &[DVec3],
     ) -> Option<Gap> {
         let y = x[node as usize];
@@ -145,7 +145,7 @@ impl SelfContact {
         }
         let (fade, slope_per_m2) = (1.0 - q * q * (3.0 - 2.0 * q), 6.0 * q * (q - 1.0) / fades_sq);
         let weights = [1.0 - wb - wc, wb, wc];
-        Some(Gap { gap_m: height_m, direction: normal, triangle, weights, at, way, fade, slope_per_m2 })
+        Some(Gap { distance_m: height_m, direction: normal, triangle, weights, at, way, fade, slope_per_m2 })
     }
 
     /// Returns 1 where the way from a point on an edge or corner leads to the front of the skin, else −1.
@@ -163,7 +163,7 @@ impl SelfContact {
 impl Nearest {
     fn over_face(&self) -> Gap {
         let Self { triangle, weights, way, normal } = *self;
-        let (gap_m, direction) = (way.dot(normal), normal);
-        Gap { gap_m, direction, triangle, weights, at: weights, way, fade: 1.0, slope_per_m2: 0.0 }
+        let (distance_m, direction) = (way.dot(normal), normal);
+        Gap { distance_m, direction, triangle, weights, at: weights, way, fade: 1.0, slope_per_m2: 0.0 }
     }
 }

@@ -49,12 +49,12 @@ impl Pressed {
     /// Makes what a gap smaller than the vertex's margin gives. `bears` is `c` of the corners.
     fn of(gap: Gap, at: &NodeAtRest, bears: [f64; 3]) -> Self {
         let softness: f64 = 0.5 / at.bears + gap.at.iter().zip(bears).map(|(w, c)| 0.5 * w / c).sum::<f64>();
-        let (k, of) = (at.stiffness_n_per_m / softness, Response::of(at.margin_m - gap.gap_m, at.margin_m));
+        let (k, of) = (at.stiffness_n_per_m / softness, Response::of(at.margin_m - gap.distance_m, at.margin_m));
         let fading_n_per_m = 2.0 * k * of.energy_m2 * gap.slope_per_m2;
         let energy_j = k * of.energy_m2 * gap.fade;
         Self {
             energy_j,
-            force_n: k * of.force_m * gap.fade + gap.gap_m * fading_n_per_m,
+            force_n: k * of.force_m * gap.fade + gap.distance_m * fading_n_per_m,
             beside_n: gap.way * -fading_n_per_m,
             by_weight_j: bears.map(|c| -0.5 * energy_j / (softness * c)),
             stiffness_n_per_m: k * of.stiffness * gap.fade,
@@ -134,7 +134,7 @@ impl SelfContact {
                 forces_n[end as usize] += force;
                 rows_n_per_m[end as usize] += row * weight;
             }
-            seen.add(gap.gap_m, *energy_j);
+            seen.add(gap.distance_m, *energy_j);
         });
         if !touched {
             return;
@@ -151,7 +151,7 @@ impl SelfContact {
     pub(crate) fn meeting(&self, x: &[DVec3]) -> MeetingWalls {
         let near = self.near_at(x);
         let mut seen = MeetingWalls { missed: near.missed, ..MeetingWalls::default() };
-        self.for_each_pressed(x, &near, |_, pressed| seen.add(pressed.gap.gap_m, pressed.energy_j));
+        self.for_each_pressed(x, &near, |_, pressed| seen.add(pressed.gap.distance_m, pressed.energy_j));
         seen
     }
 
@@ -162,9 +162,9 @@ impl SelfContact {
         for of_vertex in near.pairs().chunk_by(|one, next| one.node == next.node) {
             let node = of_vertex[0].node;
             let within = of_vertex.iter().filter(|pair| pair.free_m <= moved_m).map(|pair| pair.triangle);
-            let Some(gap) = self.gap(node, within, x) else { continue };
+            let Some(gap) = self.gap(node, &within, x) else { continue };
             let at = &self.nodes[node as usize];
-            if gap.gap_m < at.margin_m {
+            if gap.distance_m < at.margin_m {
                 let bears = self.triangles.nodes[gap.triangle as usize].map(|n| self.nodes[n as usize].bears);
                 visit(node, &Pressed::of(gap, at, bears));
             }

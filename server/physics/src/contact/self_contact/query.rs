@@ -37,6 +37,7 @@ pub(in crate::contact) struct WallScratch {
 
 /// Where a cluster's nodes are.
 #[derive(Debug, Clone, Copy)]
+#[allow(clippy::struct_field_names)] // all of them are lengths
 struct ClusterNow {
     /// Its box (m).
     low_m: DVec3,

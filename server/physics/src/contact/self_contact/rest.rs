@@ -96,6 +96,7 @@ impl NodeAtRest {
 
 /// A cluster of triangles at rest.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[allow(clippy::struct_field_names)] // all of them are lengths
 pub(super) struct ClusterAtRest {
     /// Its box (m).
     pub(super) low_m: DVec3,

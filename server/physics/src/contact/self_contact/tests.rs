@@ -27,7 +27,8 @@ fn walls_of(mesh: &TetMesh, only_if_facing: bool) -> Option<SelfContact> {
     let surface = Surface::of(mesh).unwrap();
     let moduli = vec![SurfaceModuli { p_wave_pa: 2e4, indentation_pa: 1e4 }; surface.triangles.len()];
     // Of different masses, so that walls bear more in one place than in another.
-    let mass_kg: Vec<f64> = (0..mesh.positions_m().len()).map(|node| if node % 3 == 0 { 6e-6 } else { 3e-5 }).collect();
+    let mass_kg: Vec<f64> =
+        (0..mesh.positions_m().len()).map(|node| if node.is_multiple_of(3) { 6e-6 } else { 3e-5 }).collect();
     let skin = SkinAtRest {
         positions_m: mesh.positions_m(),
         surface: &surface,
@@ -108,7 +109,7 @@ fn what_the_step_is_told_is_no_less_than_the_stiffness() {
             walls.press(&x, &walls.near_at(&x), &mut forces_n, &mut walls.scratch());
             forces_n
         };
-        let kg = |node: usize| if node % 3 == 0 { 6e-6 } else { 3e-5 };
+        let kg = |node: usize| if node.is_multiple_of(3) { 6e-6 } else { 3e-5 };
         let changes = at(1.0).into_iter().zip(at(-1.0)).enumerate();
         let product: Vec<DVec3> = changes.map(|(node, (p, m))| (m - p) / 2e-9 / kg(node)).collect();
         value = product.iter().map(|p| p.length_squared()).sum::<f64>().sqrt();
@@ -116,7 +117,9 @@ fn what_the_step_is_told_is_no_less_than_the_stiffness() {
         let noise = if round == 0 { value } else { 0.0 };
         direction = product.iter().map(|p| (*p + random.vector() * noise) / value).collect();
         let length = direction.iter().map(|d| d.length_squared()).sum::<f64>().sqrt();
-        direction.iter_mut().for_each(|d| *d /= length);
+        for d in &mut direction {
+            *d /= length;
+        }
     }
     let told = scratch.most_frequency_sq;
     println!("largest {value:.3e} 1/s², told {told:.3e} 1/s²");
@@ -185,9 +188,9 @@ fn queries_lose_nothing_that_is_within_reach() {
         for node in surface_nodes {
             let all = (0..walls.triangles.len() as u32).filter(|&t| walls.may_meet_m(node, t as usize).is_some());
             let listed = found.pairs().iter().filter(|pair| pair.node == node).map(|pair| pair.triangle);
-            let (by_all, by_list) = (walls.gap(node, all, &x), walls.gap(node, listed, &x));
+            let (by_all, by_list) = (walls.gap(node, &all, &x), walls.gap(node, &listed, &x));
             assert_eq!(by_all, by_list, "node {node}");
-            met += u32::from(by_all.is_some_and(|gap| gap.gap_m < walls.nodes[node as usize].margin_m));
+            met += u32::from(by_all.is_some_and(|gap| gap.distance_m < walls.nodes[node as usize].margin_m));
         }
     }
     assert!(met > 100, "{met}");
@@ -202,7 +205,9 @@ fn a_torn_skin_is_passed_over_and_told() {
     let mut random = Random(3);
     let anywhere: Vec<DVec3> = mesh.positions_m().iter().map(|p| *p + random.vector()).collect();
     let mut not_finite = mesh.positions_m().to_vec();
-    not_finite.iter_mut().step_by(3).for_each(|p| p.y = f64::NAN);
+    for p in not_finite.iter_mut().step_by(3) {
+        p.y = f64::NAN;
+    }
     for x in [anywhere, not_finite] {
         let near = walls.near_at(&x);
         assert!(near.pairs().is_empty() && walls.meeting(&x).missed > 0);
