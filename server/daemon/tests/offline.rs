@@ -321,7 +321,7 @@ fn meshes_of_gmsh_and_of_hexahedra_pass_a_strict_check() {
     let samples = Path::new(env!("CARGO_MANIFEST_DIR")).join("../scene/tests/files");
     let check = |mesh: &Path, fixed: &str| {
         let text = format!(
-            "[scene]\nname = \"bar\"\n[body]\n[body.mesh]\nfile = '{}'\nunit = \"cm\"\n[[material]]\nlaw = \"stvk\"\n\
+            "[scene]\nname = \"bar\"\n[body]\n[body.mesh]\nfile = '{}'\nunit = \"cm\"\n[[material]]\nlaw = \"stable-neo-hookean\"\n\
              young_modulus_pa = 10e3\npoisson_ratio = 0.3\ndensity_kg_per_m3 = 1000\n[[fixed]]\n{fixed}\n[output]\nduration_s = 0.01\n",
             mesh.display()
         );
@@ -402,4 +402,21 @@ fn an_interrupted_run_keeps_what_is_there() {
     assert_eq!(summary["ended_by"], Value::from("interrupted"));
     let rows = fs::read_to_string(out.join("probes.csv")).unwrap().lines().count() as u64;
     assert_eq!(summary["samples"].as_u64(), Some(rows - 1));
+}
+
+/// `palpated check heart.toml | head` ended in a panic when `head` left.
+#[test]
+fn a_reader_that_leaves_changes_neither_exit_code_nor_files() {
+    let folder = tempfile::tempdir().unwrap();
+    let (path, out) = (folder.path().join("beam.toml"), folder.path().join("out"));
+    fs::write(&path, BEAM.replace("duration_s = 1.5", "duration_s = 0.05")).unwrap();
+    let (path, out) = (path.to_str().unwrap(), out.to_str().unwrap());
+    for arguments in [&["check", path][..], &["simulate", path, "--out", out], &["static", path, "--json"]] {
+        let (reader, writer) = std::io::pipe().unwrap();
+        drop(reader);
+        let output = Command::new(env!("CARGO_BIN_EXE_palpated")).args(arguments).stdout(writer).output().unwrap();
+        let said = String::from_utf8(output.stderr).unwrap();
+        assert!(output.status.success() && !said.contains("panicked"), "{arguments:?}: {} {said}", output.status);
+    }
+    assert!(Path::new(out).join("summary.json").exists());
 }

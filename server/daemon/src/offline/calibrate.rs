@@ -1,4 +1,5 @@
 //! `palpated calibrate`: spring constants over displacement for a scene's refined surface, found on the surface itself.
+use super::say::say;
 use crate::progress::Progress;
 use miette::{IntoDiagnostic, Report, WrapErr};
 use palpate_physics::bodies::mass_spring::constants_table::{Calibration, ConstantsTable};
@@ -54,24 +55,24 @@ pub fn run(args: &CalibrateArgs) -> miette::Result<ExitCode> {
     bar.finish();
     let found = found.into_diagnostic().wrap_err("there is no table for this surface")?;
     write(&found, &table)?;
-    println!(
+    say(format_args!(
         "K'_h and K'_m = {ratio:.4} K'_h of {rings} refined rings, over displacement x/L, L the edges' mean length:"
-    );
-    println!("     x/L   K'_h/K_h     K'_h (N/m)   spread   energy");
+    ));
+    say(format_args!("     x/L   K'_h/K_h     K'_h (N/m)   spread   energy"));
     for row in &found.rows {
-        println!(
+        say(format_args!(
             "  {:6.2} {:10.4} {:14.4} {:7.1} % {:8.3}",
             row.xi,
             row.anchor_ratio,
             row.anchor_ratio * coarse.anchor_n_per_m,
             100.0 * row.spread,
             row.energy_ratio
-        );
+        ));
     }
-    println!(
+    say(format_args!(
         "spread: how far the farthest of the vertices tried is off; energy: refined over coarse, at the same force"
-    );
-    println!("written to {}", table.display());
+    ));
+    say(format_args!("written to {}", table.display()));
     Ok(ExitCode::SUCCESS)
 }
 

@@ -3,6 +3,7 @@ use super::{
     check_laws, check_tools,
     cost::{self, Cost},
     load,
+    say::say,
     summary::Percentiles,
 };
 use crate::{bodies::served, tick_budget::USABLE};
@@ -36,19 +37,19 @@ pub struct CheckArgs {
 /// A scene that does not load.
 pub fn run(args: &CheckArgs) -> miette::Result<ExitCode> {
     let Some(name) = args.scene.as_deref().filter(|_| !args.list) else {
-        println!("{}", builtin_names().join("\n"));
+        say(format_args!("{}", builtin_names().join("\n")));
         return Ok(ExitCode::SUCCESS);
     };
     let scene = load::load_scene(name)?;
     let model = load::build(&scene)?;
     print_body(&scene);
     let body = served(&model);
-    body.description(&model).iter().for_each(|line| println!("{line}"));
+    body.description(&model).iter().for_each(|line| say(format_args!("{line}")));
     print_contents(&scene, &model);
     print_walls(&model);
     let warnings = [scene.warnings.clone(), body.warnings(&model), check_laws::warnings(&scene, &model)].concat();
     for warning in &warnings {
-        println!("warning: {warning}");
+        say(format_args!("warning: {warning}"));
     }
     print_time(&model, &cost::measure(&scene, &model)?);
     print_memory();
@@ -58,52 +59,62 @@ pub fn run(args: &CheckArgs) -> miette::Result<ExitCode> {
 
 fn print_body(scene: &Scene) {
     let body = &scene.summary;
-    println!("{}", [scene.name.as_str(), &scene.description].map(str::trim).join(": ").trim_end_matches([':', ' ']));
-    println!("body       {}", body.origin);
+    say(format_args!(
+        "{}",
+        [scene.name.as_str(), &scene.description].map(str::trim).join(": ").trim_end_matches([':', ' '])
+    ));
+    say(format_args!("body       {}", body.origin));
     let surface = counted(body.surface_triangles, "surface triangle");
-    println!("           {}, {}, {surface}", counted(body.tets, "tet"), counted(body.nodes, "node"));
+    say(format_args!("           {}, {}, {surface}", counted(body.tets, "tet"), counted(body.nodes, "node")));
     if let Some(quality) = &body.quality {
-        println!("           volume {} ml, mass {} g", short(body.volume_m3 * 1e6), short(body.mass_kg * 1e3));
-        println!(
+        say(format_args!("           volume {} ml, mass {} g", short(body.volume_m3 * 1e6), short(body.mass_kg * 1e3)));
+        say(format_args!(
             "quality    dihedral angles {:.1}° to {:.1}°, volume-length ratio {:.3} at worst, {:.3} in the mean",
             quality.min_dihedral_deg, quality.max_dihedral_deg, quality.min_volume_length, quality.mean_volume_length
-        );
-        println!("           edges {:.3} to {:.3} mm", quality.edge_range_m.0 * 1e3, quality.edge_range_m.1 * 1e3);
+        ));
+        say(format_args!(
+            "           edges {:.3} to {:.3} mm",
+            quality.edge_range_m.0 * 1e3,
+            quality.edge_range_m.1 * 1e3
+        ));
     } else {
-        println!("           mass {} g", short(body.mass_kg * 1e3));
+        say(format_args!("           mass {} g", short(body.mass_kg * 1e3)));
     }
     for line in &body.fill_report {
-        println!("           {line}");
+        say(format_args!("           {line}"));
     }
     for part in &body.parts {
         let sets = [(part.nodes, "node"), (part.triangles, "triangle"), (part.tets, "tet")];
-        println!("region     {:<16} {}", part.name, sets.map(|(count, what)| counted(count, what)).join(", "));
+        say(format_args!("region     {:<16} {}", part.name, sets.map(|(count, what)| counted(count, what)).join(", ")));
     }
     for region in scene.model.body.solid().map_or(&[][..], |solid| &solid.regions) {
         let lame = region.material.lame;
-        println!(
+        say(format_args!(
             "material   {:<16} {}, E {} Pa, nu {}, {} kg/m3",
             region.name,
             region.material.law.name(),
             short(lame.young_modulus_pa()),
             short(lame.poisson_ratio()),
             region.density_kg_per_m3
-        );
+        ));
     }
 }
 
 fn print_time(model: &Model, cost: &Cost) {
     let period_us = cost.all.tick_period_s * 1e6;
-    println!(
+    say(format_args!(
         "time       tick {} ms, {}; highest natural frequency {} Hz",
         short(period_us * 1e-3),
         counted(cost.all.substeps_per_tick as usize, "substep"),
         short(model.body().max_natural_frequency_rad_per_s() / std::f64::consts::TAU)
-    );
+    ));
     let line = |us: &Percentiles, ticks: u64, with: &str| {
         let build = if cfg!(debug_assertions) { ", in an UNOPTIMISED build" } else { "" };
         let ticks = counted(ticks as usize, "tick");
-        println!("           a tick{with} costs {:.1} us here (p99 {:.1} us over {ticks}{build})", us.p50, us.p99);
+        say(format_args!(
+            "           a tick{with} costs {:.1} us here (p99 {:.1} us over {ticks}{build})",
+            us.p50, us.p99
+        ));
     };
     line(&cost.all.tick_wall_us, cost.all.ticks, "");
     let deciding = cost.awake.as_ref().map_or(&cost.all.tick_wall_us, |awake| &awake.tick_wall_us);
@@ -111,11 +122,11 @@ fn print_time(model: &Model, cost: &Cost) {
         let how = if awake.untouched { ", nothing touching them," } else { "" };
         line(&awake.tick_wall_us, awake.ticks, &format!(" with up to {} particles awake{how}", awake.most));
     }
-    println!(
+    say(format_args!(
         "           {:.1} % of the tick: {}",
         100.0 * deciding.p50 / period_us,
         verdict(deciding, period_us, cost)
-    );
+    ));
 }
 
 fn verdict(us: &Percentiles, period_us: f64, cost: &Cost) -> &'static str {
@@ -155,7 +166,7 @@ fn print_memory() {
     let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
     let resident = status.lines().find_map(|line| line.strip_prefix("VmRSS:")?.trim().strip_suffix(" kB"));
     if let Some(kilobytes) = resident.and_then(|text| text.trim().parse::<f64>().ok()) {
-        println!("memory     {:.0} MB in this process", kilobytes * 1.024e-3);
+        say(format_args!("memory     {:.0} MB in this process", kilobytes * 1.024e-3));
     }
 }
 
@@ -163,13 +174,13 @@ fn print_contents(scene: &Scene, model: &Model) {
     let held: usize = scene.model.prescribed.iter().map(|set| set.nodes.len()).sum();
     let loads = counted(scene.model.loads.len(), "load");
     match scene.model.prescribed.len() {
-        0 => println!("held       nothing; {loads}"),
-        1 => println!("held       {}; {loads}", counted(held, "node")),
-        sets => println!("held       {} in {}; {loads}", counted(held, "node"), counted(sets, "set")),
+        0 => say(format_args!("held       nothing; {loads}")),
+        1 => say(format_args!("held       {}; {loads}", counted(held, "node"))),
+        sets => say(format_args!("held       {} in {}; {loads}", counted(held, "node"), counted(sets, "set"))),
     }
     for line in check_tools::lines(scene, model) {
-        println!("{line}");
+        say(format_args!("{line}"));
     }
     let probes: Vec<&str> = scene.probes.iter().map(palpate_scene::Probe::name).collect();
-    println!("probes     {}", if probes.is_empty() { "none".to_owned() } else { probes.join(", ") });
+    say(format_args!("probes     {}", if probes.is_empty() { "none".to_owned() } else { probes.join(", ") }));
 }

@@ -13,6 +13,7 @@ mod frames;
 mod interrupt;
 mod load;
 mod probe_rows;
+mod say;
 pub mod schema;
 pub mod simulate;
 mod summary;

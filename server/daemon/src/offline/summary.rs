@@ -1,5 +1,5 @@
 //! What a run did, as JSON for programs and as lines for people.
-use super::{folder, probe_rows::ProbeRows};
+use super::{folder, probe_rows::ProbeRows, say::say};
 use miette::{IntoDiagnostic, WrapErr};
 use palpate_physics::{AwakeFor, Energies, Model, State, contact::MeetingWalls, snapshot, world};
 use palpate_scene::{Scene, wording::counted};
@@ -298,7 +298,7 @@ impl Summary {
     /// Prints it: JSON when asked for, else lines for people.
     pub(super) fn print(&self, json: bool, out: Option<&Path>) -> miette::Result<()> {
         if json {
-            println!("{}", serde_json::to_string_pretty(self).into_diagnostic()?);
+            say(format_args!("{}", serde_json::to_string_pretty(self).into_diagnostic()?));
             return Ok(());
         }
         let ended = match self.ended_by {
@@ -307,70 +307,70 @@ impl Summary {
             wrong @ ("unstable" | "unbalanced") => format!("NOT in equilibrium: {wrong}"),
             by => format!("ended by {by}"),
         };
-        println!("{}: {} tets, {} nodes, {ended}", self.scene, self.body.tets, self.body.nodes);
+        say(format_args!("{}: {} tets, {} nodes, {ended}", self.scene, self.body.tets, self.body.nodes));
         if let Some(particles) = &self.body.particles {
             let what_for = particles.active_for.map(AwakeForNumbers::told).filter(|told| !told.is_empty());
-            println!(
+            say(format_args!(
                 "  {} particles {:.3} mm apart, {} of at most {} awake at the end{}",
                 particles.count,
                 particles.spacing_m * 1e3,
                 particles.active,
                 particles.most_active,
                 what_for.map_or_else(String::new, |told| format!(": {told}"))
-            );
+            ));
         }
         if let Some(time) = &self.time {
             let us = time.tick_wall_us;
-            println!(
+            say(format_args!(
                 "  {:.3} s simulated in {:.3} s, {} of {}",
                 self.simulated_s,
                 self.wall_s,
                 counted(time.ticks as usize, "tick"),
                 counted(time.substeps_per_tick as usize, "substep")
-            );
+            ));
             if time.asleep_ticks > 0 {
-                println!("  {} slept through, at rest", counted(time.asleep_ticks as usize, "tick"));
+                say(format_args!("  {} slept through, at rest", counted(time.asleep_ticks as usize, "tick")));
             }
             if time.repeated_ticks > 0 {
                 let ticks = counted(time.repeated_ticks as usize, "tick");
-                println!("  {ticks} proved unstable and had to be repeated in more substeps");
+                say(format_args!("  {ticks} proved unstable and had to be repeated in more substeps"));
             }
-            println!(
+            say(format_args!(
                 "  tick: p50 {:.1} us, p99 {:.1} us, max {:.1} us; {:.1} times real time",
                 us.p50, us.p99, us.max, time.real_time_factor
-            );
+            ));
         }
         if let Some(walls) = &self.walls {
             println!("  {}", walls.line());
         }
         if let Some(solve) = &self.solve {
-            println!("  {}, in {:.3} s", solve.line(), self.wall_s);
+            say(format_args!("  {}, in {:.3} s", solve.line(), self.wall_s));
             if let Some(spread) = solve.spread_loads.filter(|spread| *spread > 0) {
-                println!(
+                say(format_args!(
                     "  {} on more of the skin than may be awake: carried by the coarse tets alone",
                     counted(spread as usize, "load")
-                );
+                ));
             }
         }
         for (name, probe) in &self.probes {
             print_probe(name, probe);
         }
         if self.body.tets > 0 {
-            println!("  smallest volume ratio {:.4}, state {}", self.min_volume_ratio, self.state_hash);
+            say(format_args!("  smallest volume ratio {:.4}, state {}", self.min_volume_ratio, self.state_hash));
         } else {
-            println!("  state {}", self.state_hash);
+            say(format_args!("  state {}", self.state_hash));
         }
         if let Some(balance) = self.energies_j.balance {
-            println!("  energy balance {balance:.2e} J");
+            say(format_args!("  energy balance {balance:.2e} J"));
         }
         match out {
-            Some(out) => println!(
+            Some(out) => say(format_args!(
                 "  written to {}: {}, {}",
                 out.display(),
                 counted(self.samples as usize, "row"),
                 counted(self.frames, "frame")
-            ),
-            None => println!("  nothing was saved; add --out DIR for probes.csv, frames and summary.json"),
+            )),
+            None => say(format_args!("  nothing was saved; add --out DIR for probes.csv, frames and summary.json")),
         }
         Ok(())
     }
@@ -400,10 +400,10 @@ fn print_probe(name: &str, probe: &ProbeNumbers) {
         if column == "value" { value } else { format!("{column} {value}") }
     };
     let values: Vec<String> = probe.values.iter().map(|(column, value)| told(column, *value)).collect();
-    println!("  {name}{unit}: {}", values.join(", "));
+    say(format_args!("  {name}{unit}: {}", values.join(", ")));
     let peak = |(of, peak): (&&str, &PeakNumbers)| format!("{} at {:.3} s", told(of, peak.value), peak.time_s);
     let peaks: Vec<String> = probe.peaks.iter().map(peak).collect();
     if !peaks.is_empty() {
-        println!("    peak: {}", peaks.join(", "));
+        say(format_args!("    peak: {}", peaks.join(", ")));
     }
 }

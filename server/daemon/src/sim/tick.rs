@@ -5,7 +5,7 @@
 use super::{
     simulation::Simulation,
     timing::Timing,
-    tool::{Moment, Order, ToolLoop},
+    tool::{Moment, Order},
 };
 use palpate_physics::{StepReport, TickInput, step};
 use palpate_realtime::Clock;
@@ -77,12 +77,10 @@ impl Simulation {
         let moment = Moment { now_ns, tick: self.state.mechanical.tick, period_s: self.period_s(), quarantined };
         let look = plan.advance && self.state.mechanical.tick.is_multiple_of(LOOK_EVERY_TICKS);
         for (index, (tool, state)) in self.tools.iter_mut().zip(&self.state.mechanical.tools).enumerate() {
-            let waits = look && tool.waits_to_be_clear();
-            if waits && !self.inside.holds(&self.model, &self.state, state.target.position_m) {
-                let radius_m = self.model.tools()[index].radius_m;
-                // One that touches nothing is outside the body, or deep inside it.
-                let is_clear = ToolLoop::follows(state, radius_m) && !self.state.mechanical.contact.touches(index);
-                if is_clear { tool.found_clear() } else { tool.place_again() }
+            // One that touches nothing is outside the body, or deep inside it.
+            let may_be_clear = look && tool.waits_to_be_clear() && !self.state.mechanical.contact.touches(index);
+            if may_be_clear && !self.inside.holds(&self.model, &self.state, state.centre_m) {
+                tool.found_clear();
             }
             tool.couple(state, &moment, plan.order, plan.advance);
         }

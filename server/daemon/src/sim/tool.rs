@@ -35,16 +35,11 @@ pub enum Order {
     Release,
 }
 
-/// A tool that touches nothing and is so near to its device, in radii, follows it freely: its own mass, and the damper of its coupling, keep it a little behind.
-const FREE_RADII: f64 = 0.1;
-
 /// How far a tool has come to its device.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Place {
-    /// Somewhere else: the first sample says where it belongs.
-    Unknown,
-    /// At the device since the first sample, with no force yet: it may be in the body.
-    Held,
+    /// The device may be in the body: the tool is put to it in every tick, and there is no force yet.
+    Put,
     /// Has been clear of the body at least once.
     Clear,
 }
@@ -148,30 +143,20 @@ impl ToolLoop {
     fn start_over(&mut self) {
         let attached = self.is_attached();
         self.level = if attached { 0.0 } else { 1.0 };
-        self.place = if attached { Place::Unknown } else { Place::Clear };
+        self.place = if attached { Place::Put } else { Place::Clear };
     }
 
-    /// Where the tool has to be put before its device moves it: it must not sweep through the body on its way
-    /// from where it was.
-    pub fn new_place(&mut self) -> Option<ToolTarget> {
-        let sample = self.newest.filter(|_| self.place == Place::Unknown && self.is_attached())?;
-        self.place = Place::Held;
+    /// Where the tool has to be put before its device moves it, as long as it was not clear of the body since the device
+    /// came. It must not sweep through the body on its way from where it was. A tool that was put into a wall once, and
+    /// moved by its device from there on, pressed its way to the other side of it and was caught in the cavity.
+    pub fn new_place(&self) -> Option<ToolTarget> {
+        let sample = self.newest.filter(|_| self.waits_to_be_clear())?;
         Some(ToolTarget { orientation: sample.orientation, ..ToolTarget::at(sample.position_m) })
     }
 
-    /// Whether it waits to be clear of the body.
+    /// Whether it waits to be clear of the body, with a device that says where it is.
     pub fn waits_to_be_clear(&self) -> bool {
-        self.place == Place::Held
-    }
-
-    /// Whether it is at its device, as far as the tool's radius (m) says how near that is.
-    pub fn follows(tool: &ToolState, radius_m: f64) -> bool {
-        tool.centre_m.distance(tool.target.position_m) < FREE_RADII * radius_m
-    }
-
-    /// Its device is outside the body and it is not clear of it: on its way out, or caught in a wall that it was put into. It is put to its device once more, which moves the body less than pressing it would.
-    pub fn place_again(&mut self) {
-        self.place = Place::Unknown;
+        self.place == Place::Put && self.is_attached() && self.newest.is_some()
     }
 
     /// It is outside the body: from now on there is force.

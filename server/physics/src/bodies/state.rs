@@ -23,8 +23,8 @@ impl BodyState {
     }
 
     /// Wakes these particles in a body at rest. There must be room for them, and they must be such as may wake; other bodies have none.
-    pub(crate) fn wake_at_rest(&mut self, ids: &[u32], state: &mut MechanicalState) {
-        of_kind!(BodyState, self, own => KindState::wake_at_rest(&mut **own, ids, state));
+    pub(crate) fn wake_at_rest(&mut self, ids: &[u32], middles_m: &[Option<DVec3>], state: &mut MechanicalState) {
+        of_kind!(BodyState, self, own => KindState::wake_at_rest(&mut **own, ids, middles_m, state));
     }
 
     /// Refines so many rings around vertices and nothing else, of a body that is refined by hand; others are not refined.

@@ -80,10 +80,13 @@ pub struct StaticSolution {
 }
 
 /// The particles awake in an equilibrium of a hybrid body.
-#[derive(Debug, Clone, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, PartialEq, Default)]
 pub struct AwakeParticles {
     /// Ascending.
     pub ids: Vec<u32>,
+    /// For every sample of every tool's axis, the rest position (m) of the vertex about which it keeps them awake; `None` where the
+    /// tool is far from the body. Empty where the particles were given.
+    pub middles_m: Vec<Option<DVec3>>,
     /// Loads that act on too much of the skin for all particles within a spacing of it to be awake, so that none is for them.
     pub spread_loads: u32,
 }
@@ -143,7 +146,7 @@ impl StaticSolution {
     pub fn state(&self, model: &Model, load_factors: &[f64]) -> State {
         let mut state = State::at_rest(model);
         let State { mechanical, body: own, .. } = &mut state;
-        own.wake_at_rest(&self.awake.ids, mechanical);
+        own.wake_at_rest(&self.awake.ids, &self.awake.middles_m, mechanical);
         mechanical.x.copy_from_slice(&self.x);
         mechanical.load_factors.copy_from_slice(load_factors);
         for (tool, found) in mechanical.tools.iter_mut().zip(&self.tools) {

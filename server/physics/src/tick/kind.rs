@@ -173,8 +173,9 @@ pub(crate) trait KindState {
         &[]
     }
 
-    /// Wakes these particles in a body at rest. There must be room for them, and they must be such as may wake.
-    fn wake_at_rest(&mut self, _ids: &[u32], _state: &mut MechanicalState) {}
+    /// Wakes these particles in a body at rest. There must be room for them, and they must be such as may wake. What samples of tools'
+    /// axes keep awake from now on is about these rest positions (m), where any are given.
+    fn wake_at_rest(&mut self, _ids: &[u32], _middles_m: &[Option<DVec3>], _state: &mut MechanicalState) {}
 
     /// Refines so many rings around vertices and nothing else, where that is done by hand.
     fn refine_only(&mut self, _body: &Self::Body, _centres: &[u32], _rings: u32) {}

@@ -202,7 +202,10 @@ impl KindState for HybridState {
         &self.ids
     }
 
-    fn wake_at_rest(&mut self, ids: &[u32], state: &mut MechanicalState) {
+    fn wake_at_rest(&mut self, ids: &[u32], middles_m: &[Option<DVec3>], state: &mut MechanicalState) {
+        for (ball, middle_m) in self.balls.iter_mut().zip(middles_m) {
+            *ball = middle_m.map(|rest_m| Ball { rest_m, away_ticks: 0 });
+        }
         self.ids.clear();
         self.ids.extend_from_slice(ids);
         self.next.clone_from(&self.ids);

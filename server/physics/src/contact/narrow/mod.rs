@@ -5,7 +5,7 @@
 //! thin shell) is ignored for as long as it stays inside. Once in, a sample is tracked until it leaves, so that neither
 //! the normal nor the order of events can make the energy jump. A tool that is *put* into the surface (not moved there)
 //! presses nothing at first: its samples carry `k_f a (g − g₀)` from the depth `g₀` at which it was put, or the least
-//! depth since.
+//! depth since. A sample that carries nothing and comes behind the tool is ignored, too.
 use super::{
     axis::Axis,
     broad::{Candidates, Triangles},
@@ -212,6 +212,10 @@ fn press_triangle(
         let distance_m = distance_sq.sqrt();
         let depth_m = meeting.radius_m - distance_m;
         let free_depth_m = if meeting.put_into { depth_m } else { 0.0 };
+        // One that carries nothing and passes the axis is behind from then on: on its way back to the outside the tool would
+        // be held by it.
+        let from_behind =
+            from_behind || known.is_some_and(|touch| depth_m <= touch.free_depth_m) && outward.dot(r) >= 0.0;
         if from_behind {
             // The sample carries nothing, but its depth tells the next tick that the tool was put there.
             next.push(Touch { sample: number, from_behind, free_depth_m, spring_origin_m: meeting.in_tool(p) });

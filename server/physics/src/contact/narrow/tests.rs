@@ -247,3 +247,28 @@ fn a_tool_put_into_the_surface_is_known_by_the_samples_it_met_from_behind() {
     }
     assert!(met_from_the_front, "those that were not kept are met anew");
 }
+
+/// A device came back in the middle of a press, and its tool was put where its centre was just above the surface. The
+/// surface passed the centre without a force, and from then on held the tool from above: it was caught in the wall, however
+/// often the device went out and in.
+#[test]
+fn a_tool_put_into_the_surface_is_not_caught_when_its_centre_passes_it() {
+    for height in [0.01, 0.1, 0.4] {
+        let mut bench = Bench::new(0.0);
+        let at = |height: f64| DVec3::new(0.008, 0.008, height * RADIUS_M);
+        bench.meet(at(height), true);
+        // In until the centre is on the other side of the surface, and out again, in small steps.
+        let steps = ((height + 0.5) / 0.01).round() as i32;
+        for step in 0..=steps {
+            bench.meet(at(height - 0.01 * f64::from(step)), false);
+        }
+        for step in 0..=170 {
+            let height = -0.5 + 0.01 * f64::from(step);
+            let (pressed, _) = bench.meet(at(height), false);
+            assert_eq!((pressed.force_n, pressed.energy_j), (DVec3::ZERO, 0.0), "at a height of {height} radii");
+        }
+        assert!(bench.touching.records().is_empty(), "it is outside");
+        let (pressed, _) = bench.meet(at(0.8), false);
+        assert!(pressed.force_n.z > 0.0, "and meets the surface as any other tool");
+    }
+}

@@ -10,8 +10,8 @@ use crate::{
         load_claims::{LoadClaims, NearestParticles},
         switching::{FOLLOW, GAP},
     },
-    contact::deepest_m,
-    statics::equilibrium::Goal,
+    contact::{ToolSpec, deepest_m},
+    statics::{AwakeParticles, equilibrium::Goal},
     tick::Environment,
 };
 use glam::DVec3;
@@ -84,12 +84,15 @@ impl Claims {
         wanted.into_iter().collect()
     }
 
-    /// Returns the number of loads that are spread too wide for particles to wake beneath them.
-    pub(super) fn spread_loads(&self) -> u32 {
-        match self {
-            Self::Given(_) => 0,
-            Self::ByRule { loads, load_factors, .. } => loads.spread_loads(load_factors),
-        }
+    /// Returns these particles with what keeps them awake. Every sample of a tool's axis has the ball of its tool.
+    pub(super) fn awake(&self, environment: &Environment, ids: Vec<u32>) -> AwakeParticles {
+        let Self::ByRule { reach_m, balls, loads, load_factors } = self else {
+            return AwakeParticles { ids, ..AwakeParticles::default() };
+        };
+        let of_tool =
+            |(ball, tool): (&Option<DVec3>, &ToolSpec)| std::iter::repeat_n(*ball, tool.axis_sample_count(*reach_m));
+        let middles_m = balls.iter().zip(&environment.tools).flat_map(of_tool).collect();
+        AwakeParticles { ids, middles_m, spread_loads: loads.spread_loads(load_factors) }
     }
 }
 

@@ -14,7 +14,7 @@ mod newton;
 mod stage;
 
 use super::{
-    AwakeParticles, Progress, SolveError, StaticSettings, StaticSolution,
+    Progress, SolveError, StaticSettings, StaticSolution,
     equilibrium::Goal,
     load_path,
     newton::{Failure, Stop},
@@ -146,7 +146,7 @@ fn solution(
         rounding_n: newton::rounding_n(awakened, &found.unknowns),
         stable: Solver::is_stable(awakened, stage, &found.unknowns),
         inverted_tets: awakened.patch.inverted(&awakened.field(&found.unknowns)),
-        awake: AwakeParticles { ids: found.ids, spread_loads: found.claims.spread_loads() },
+        awake: found.claims.awake(environment, found.ids),
         history: solver.history,
         x: found.unknowns[..awakened.entries()].to_vec(),
         node_reactions_n,
