@@ -49,6 +49,8 @@ pub use crate::bodies::{Body, BodySpec, BodyState};
 pub use crate::elements::solid::{Region, Solid};
 pub use crate::hash::Chain;
 pub use crate::mesh::{MeshError, Surface, TetMesh};
-pub use crate::settings::{Integrator, LoadSpec, Precision, PrescribedSpec, Settings, Skips, Substeps};
+pub use crate::settings::{
+    Integrator, LoadSpec, Precision, PrescribedSpec, SelfContactChoice, Settings, Skips, Substeps,
+};
 pub use crate::tick::{AwakeFor, Energies, Ledger, PointForce, TickInput};
 pub use crate::world::{Model, ModelError, ModelSpec, Quarantine, Scratch, State, StepReport, step};

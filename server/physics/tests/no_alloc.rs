@@ -1,15 +1,17 @@
 //! After `Scratch::new` a tick neither allocates nor frees.
 #![allow(clippy::unwrap_used)]
 mod rig;
+mod walls;
 use assert_no_alloc::{AllocDisabler, assert_no_alloc};
 use glam::DVec3;
 use palpate_physics::{
-    Integrator, LoadSpec, PointForce, Substeps, TickInput,
+    Integrator, LoadSpec, PointForce, SelfContactChoice, Substeps, TickInput,
     bodies::hybrid::{ParticleSpec, Skin, Waking},
     contact::{Coupling, ToolShape, ToolTarget},
     material::{Lame, Law, Viscosity},
 };
 use rig::{Rig, at, body, bricks, even, hold, material, mesh_of, nodes_where, solid_mut, sphere, with_particles};
+use walls::{gripped_clamp, hybrid_clamp, squeeze_hybrid};
 
 #[global_allocator]
 static ALLOCATOR: AllocDisabler = AllocDisabler;
@@ -227,4 +229,30 @@ fn quarantine_and_reset_allocate_nothing() {
         }
     });
     assert_eq!(quarantined, 6);
+}
+
+/// Walls that meet and part, of tets and of a body with particles.
+#[test]
+fn nor_do_walls_that_meet() {
+    for spec in [gripped_clamp(SelfContactChoice::On), hybrid_clamp(SelfContactChoice::On)] {
+        let mut rig = Rig::new(spec);
+        let drives: Vec<rig::Drive> = (0..260).map(|tick| drive_of_walls(&rig, tick)).collect();
+        let mut met = 0;
+        assert_no_alloc(|| {
+            for drive in &drives {
+                rig.tick(drive);
+                met += u32::from(rig.scratch.meeting_walls().vertices > 0);
+            }
+        });
+        assert!(met > 20 && rig.state.quarantine.is_none(), "{met}");
+    }
+}
+
+/// Squeezes a clamp by its sets or by its tools.
+fn drive_of_walls(rig: &Rig, tick: u32) -> rig::Drive {
+    if !rig.model.tools().is_empty() {
+        return squeeze_hybrid(rig, 5.5e-3, tick);
+    }
+    let depth_m = 4e-3 * (std::f64::consts::PI * (f64::from(tick) / 200.0).min(1.0)).sin();
+    rig::Drive { prescribed: vec![DVec3::ZERO, DVec3::Z * depth_m, DVec3::Z * -depth_m], ..rig.still() }
 }

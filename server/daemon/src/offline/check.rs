@@ -46,6 +46,7 @@ pub fn run(args: &CheckArgs) -> miette::Result<ExitCode> {
     let body = served(&model);
     body.description(&model).iter().for_each(|line| say(format_args!("{line}")));
     print_contents(&scene, &model);
+    print_walls(&model);
     let warnings = [scene.warnings.clone(), body.warnings(&model), check_laws::warnings(&scene, &model)].concat();
     for warning in &warnings {
         say(format_args!("warning: {warning}"));
@@ -146,6 +147,19 @@ fn verdict(us: &Percentiles, period_us: f64, cost: &Cost) -> &'static str {
         }
     } else {
         "fits"
+    }
+}
+
+/// Whether walls of the body press each other where they meet.
+fn print_walls(model: &Model) {
+    if !model.has_self_contact() {
+        println!("walls      pass through each other where they meet");
+        return;
+    }
+    println!("walls      press each other where they meet");
+    let left_out = model.vertices_against_themselves();
+    if left_out > 0 {
+        println!("           {left_out} of its vertices do not: the body lies against itself there at rest");
     }
 }
 

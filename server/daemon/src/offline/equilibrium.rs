@@ -13,12 +13,12 @@ use crate::{bodies::served, progress::Progress, strained::Seen};
 use glam::DVec3;
 use miette::Diagnostic;
 use palpate_physics::{
-    Model,
+    Model, State,
     contact::ToolTarget,
     statics::{self, Goal, SolveError, StaticSettings, StaticSolution},
-    world::strained,
+    world::{self, strained},
 };
-use palpate_scene::Scene;
+use palpate_scene::{Scene, wording::short};
 use std::{ops::ControlFlow, process::ExitCode, time::Instant};
 use thiserror::Error;
 
@@ -75,6 +75,10 @@ pub fn run(args: &StaticArgs) -> miette::Result<ExitCode> {
     rows.sample(sought.time_s, &model, &state, &solution.node_reactions_n)?;
     rows.flush()?;
     let wall_s = started.elapsed().as_secs_f64();
+    if let Some(warning) = walls_that_meet(&model, &state) {
+        eprintln!("warning: {warning}");
+        scene.warnings.push(warning);
+    }
     let untrusted = untrusted(&solution, args.residual);
     let by = untrusted.as_ref().map_or("equilibrium", Untrusted::word);
     let mut ending = Ending { command: "static", by, simulated_s: sought.time_s, wall_s, frames: 0 };
@@ -100,6 +104,18 @@ pub fn run(args: &StaticArgs) -> miette::Result<ExitCode> {
     }
     summary.print(output.json, out.as_deref())?;
     Ok(untrusted.map_or(ExitCode::SUCCESS, Untrusted::told))
+}
+
+/// What to say where walls of the body meet, which the solver lets pass.
+fn walls_that_meet(model: &Model, state: &State) -> Option<String> {
+    let walls = world::meeting_walls(model, state);
+    (walls.vertices > 0).then(|| {
+        let gap_mm = short(walls.least_gap_m * 1e3);
+        format!(
+            "walls of the body meet in this equilibrium (least gap {gap_mm} mm), and the search for it does not count \
+             that they press each other; let `palpated simulate` come to rest"
+        )
+    })
 }
 
 /// Why what was found is not to be trusted, if so.

@@ -7,7 +7,7 @@ use super::{
     interrupt::Interrupt,
     load,
     probe_rows::ProbeRows,
-    summary::{Ending, PeakNumbers, Percentiles, Summary, TimeNumbers},
+    summary::{Ending, PeakNumbers, Percentiles, Summary, TimeNumbers, WallNumbers},
 };
 use crate::{bodies::FirstTouch, progress::Progress, strained::Seen};
 use glam::DVec3;
@@ -94,6 +94,7 @@ pub fn run(args: &SimulateArgs) -> miette::Result<ExitCode> {
     };
     let mut summary = Summary::new(&scene, &model, &run.state, &rows, &ending);
     summary.time = Some(run.cost());
+    summary.walls = (run.walls.ticks > 0).then_some(run.walls);
     for slipped in run.slipped() {
         eprintln!("warning: {slipped}");
         summary.warnings.push(slipped);
@@ -173,6 +174,7 @@ pub(super) struct Run<'s> {
     /// How far (m) each tool slipped from its device at most, and when (s).
     slips: Vec<(f64, f64)>,
     seen: Seen,
+    walls: WallNumbers,
 }
 
 impl<'s> Run<'s> {
@@ -194,6 +196,7 @@ impl<'s> Run<'s> {
             asleep_ticks: 0,
             slips: vec![(0.0, 0.0); scene.model.tools.len()],
             seen: Seen::default(),
+            walls: WallNumbers::default(),
         })
     }
 
@@ -292,6 +295,7 @@ impl<'s> Run<'s> {
             }
         }
         let wall_ns = started.elapsed().as_nanos() as u64;
+        self.walls.add(&self.scratch.meeting_walls());
         self.tick_wall_ns.saturating_record(wall_ns);
         let awake = self.state.awake_particles();
         if awake > 0 {

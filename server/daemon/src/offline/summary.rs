@@ -1,7 +1,7 @@
 //! What a run did, as JSON for programs and as lines for people.
 use super::{folder, probe_rows::ProbeRows, say::say};
 use miette::{IntoDiagnostic, WrapErr};
-use palpate_physics::{AwakeFor, Energies, Model, State, snapshot, world};
+use palpate_physics::{AwakeFor, Energies, Model, State, contact::MeetingWalls, snapshot, world};
 use palpate_scene::{Scene, wording::counted};
 use serde::Serialize;
 use std::{collections::BTreeMap, path::Path};
@@ -20,6 +20,9 @@ pub(super) struct Summary {
     pub(super) wall_s: f64,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) time: Option<TimeNumbers>,
+    /// Where walls of the body met.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) walls: Option<WallNumbers>,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) solve: Option<SolveNumbers>,
     pub(super) energies_j: EnergyNumbers,
@@ -135,6 +138,42 @@ pub(super) struct Percentiles {
     pub(super) max: f64,
 }
 
+/// Walls of the body that met.
+#[derive(Debug, Clone, Copy, Default, Serialize)]
+pub(super) struct WallNumbers {
+    /// Ticks at whose end they did.
+    pub(super) ticks: u64,
+    /// Most vertices of the surface that were pressed at once.
+    pub(super) most_vertices: u32,
+    /// The least gap (m) between them, negative where they overlapped.
+    pub(super) least_gap_m: f64,
+    /// Most pairs of a vertex and a triangle that had no room in the lists at once: walls may have passed there.
+    pub(super) most_missed: u32,
+}
+
+impl WallNumbers {
+    /// Counts a tick.
+    pub(super) fn add(&mut self, seen: &MeetingWalls) {
+        self.most_missed = self.most_missed.max(seen.missed);
+        if seen.vertices > 0 {
+            self.least_gap_m = if self.ticks == 0 { seen.least_gap_m } else { self.least_gap_m.min(seen.least_gap_m) };
+            self.ticks += 1;
+            self.most_vertices = self.most_vertices.max(seen.vertices);
+        }
+    }
+
+    fn line(&self) -> String {
+        let (ticks, vertices) = (counted(self.ticks as usize, "tick"), self.most_vertices);
+
+        let missed = match self.most_missed {
+            0 => String::new(),
+            _ => "; there was no room for all that was near, so that walls may have passed".to_owned(),
+        };
+        let gap_mm = self.least_gap_m * 1e3;
+        format!("walls of the body met in {ticks}: up to {vertices} vertices pressed, least gap {gap_mm:.3} mm{missed}")
+    }
+}
+
 /// The cost and quality of a static solve.
 #[derive(Debug, Serialize)]
 pub(super) struct SolveNumbers {
@@ -218,6 +257,7 @@ impl Summary {
             simulated_s: ending.simulated_s,
             wall_s: ending.wall_s,
             time: None,
+            walls: None,
             solve: None,
             energies_j: EnergyNumbers {
                 kinetic: energies.kinetic_j,
@@ -299,6 +339,9 @@ impl Summary {
                 "  tick: p50 {:.1} us, p99 {:.1} us, max {:.1} us; {:.1} times real time",
                 us.p50, us.p99, us.max, time.real_time_factor
             ));
+        }
+        if let Some(walls) = &self.walls {
+            println!("  {}", walls.line());
         }
         if let Some(solve) = &self.solve {
             say(format_args!("  {}, in {:.3} s", solve.line(), self.wall_s));

@@ -73,6 +73,13 @@ impl Axis {
         self.approach(corners).to_triangle_m.length()
     }
 
+    /// Returns the vectors (m) from the centres of two axes to the points of them that are nearest to each other.
+    pub(super) fn nearest_of(one: &Self, other: &Self) -> [DVec3; 2] {
+        let start = |axis: &Self| axis.centre_m - axis.half_m;
+        let (s, t) = nearest_of_segments(start(one), one.half_m * 2.0, start(other), other.half_m * 2.0);
+        [one.half_m * (2.0 * s - 1.0), other.half_m * (2.0 * t - 1.0)]
+    }
+
     /// Finds where a triangle is nearest to it. A segment that does not cross the triangle is nearest to it at one of
     /// its ends, or at one of the triangle's edges.
     pub(super) fn approach(&self, corners: [DVec3; 3]) -> Approach {

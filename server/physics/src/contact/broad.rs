@@ -181,7 +181,7 @@ impl Triangles {
         self.nodes[triangle].map(|n| x[n as usize])
     }
 
-    fn cluster_range(&self, cluster: usize) -> Range<usize> {
+    pub(super) fn cluster_range(&self, cluster: usize) -> Range<usize> {
         cluster * CLUSTER..((cluster + 1) * CLUSTER).min(self.nodes.len())
     }
 

@@ -20,12 +20,14 @@ mod nearest;
 mod proxy;
 mod resting;
 mod sample_potential;
+pub(crate) mod self_contact;
 mod spring;
 mod state;
 mod stepping;
 mod stretched_area;
 mod tangent;
 mod tool;
+mod tool_pairs;
 mod touched;
 mod touching;
 mod triangle;
@@ -41,6 +43,8 @@ pub(crate) use nearest::deepest_m;
 pub use proxy::SubstepTime;
 pub(crate) use resting::{Pressing, RestingContact};
 pub use sample_potential::SamplePotential;
+pub use self_contact::MeetingWalls;
+pub(crate) use self_contact::{SelfContact, SkinAtRest};
 pub(crate) use spring::SaturatingSpring;
 pub use state::ContactState;
 pub(crate) use tangent::{ContactTangents, StepAhead};
@@ -57,6 +61,8 @@ use broad::Triangles;
 use foundation::{BodyAtRest, Foundation, SampleTables, TriangleSamples};
 use glam::DVec3;
 use narrow::Pressed;
+use self_contact::WallScratch;
+use tool_pairs::Push;
 use touching::Touching;
 
 /// What contact needs that depends on the rest state alone.
@@ -71,6 +77,8 @@ pub struct ContactModel {
     triangles: Triangles,
     tables: SampleTables,
     tools: Vec<ToolModel>,
+    /// How walls of the body press each other; `None` where they are left to pass.
+    walls: Option<Box<SelfContact>>,
 }
 
 /// What contact needs of one tool.
@@ -124,6 +132,7 @@ pub struct ContactScratch {
     tools: Vec<ToolScratch>,
     /// Whether every triangle is looked at in every substep, without a broad phase: the bits are the same, only slower.
     exhaustive: bool,
+    walls: WallScratch,
 }
 
 #[derive(Debug, Clone)]
@@ -134,9 +143,21 @@ struct ToolScratch {
     coupling_sum_nm: DVec3,
     /// Triangle, as the broad phase numbers them, that was nearest to the tool when it was pressed last.
     nearest: usize,
+    /// What other tools do to it now.
+    push: Option<Push>,
 }
 
 impl ContactScratch {
+    /// Returns the largest addition (1/s²) of walls that meet to the squared frequency at a node in the tick so far.
+    pub(crate) fn most_of_walls(&self) -> f64 {
+        self.walls.most_frequency_sq
+    }
+
+    /// Returns the walls that meet, at the last evaluation of forces.
+    pub(crate) fn meeting_walls(&self) -> MeetingWalls {
+        self.walls.seen()
+    }
+
     /// Returns the largest factor by which the foundation was stiffer than at rest in the tick so far, 1 or more.
     pub(crate) fn most_stiffened(&self) -> f64 {
         self.tools.iter().map(|tool| tool.sum.most_stiffened).fold(1.0, f64::max)
@@ -213,7 +234,18 @@ impl ContactModel {
             tool_frequency_sq += tool.spec.frequency_bound_sq(&total);
         }
         let tables = SampleTables::new();
-        Self { nodal_stiffness_n_per_m, covering_radius_m, tool_frequency_sq, triangles, tables, tools }
+        Self { nodal_stiffness_n_per_m, covering_radius_m, tool_frequency_sq, triangles, tables, tools, walls: None }
+    }
+
+    /// Returns the same contact, where walls of the body press each other as told.
+    #[must_use]
+    pub(crate) fn with_walls(self, walls: Option<SelfContact>) -> Self {
+        Self { walls: walls.map(Box::new), ..self }
+    }
+
+    /// Returns how walls of the body press each other, `None` where they do not.
+    pub(crate) fn walls(&self) -> Option<&SelfContact> {
+        self.walls.as_deref()
     }
 
     /// Returns the force (N) at which a tool's coupling saturates, infinite for a rigid tool.
@@ -255,7 +287,9 @@ impl ContactModel {
             coupling_sum_n: DVec3::ZERO,
             coupling_sum_nm: DVec3::ZERO,
             nearest: 0,
+            push: None,
         };
-        ContactScratch { tools: self.tools.iter().map(tool).collect(), exhaustive: !skip_distant }
+        let walls = self.walls.as_ref().map(|walls| walls.scratch()).unwrap_or_default();
+        ContactScratch { tools: self.tools.iter().map(tool).collect(), exhaustive: !skip_distant, walls }
     }
 }

@@ -1,8 +1,9 @@
 //! The state of contact, which is carried from one tick to the next.
 use super::{
-    ContactModel,
+    ContactModel, SelfContact,
     broad::{Candidates, ClusterBox, FittedBoxes, FittedBoxesMut},
     local_model::StiffnessEstimate,
+    self_contact::NearWalls,
     touching::Touching,
 };
 use crate::hash::Chain;
@@ -24,6 +25,9 @@ pub struct ContactState {
     /// Whether all motion of the surface since the last evaluation of forces was told to [`Self::travelled`].
     #[serde(skip)]
     is_tracked: bool,
+    /// What of the body's own walls may meet.
+    #[serde(skip)]
+    pub(super) walls: NearWalls,
 }
 
 /// The contact of one tool.
@@ -85,6 +89,7 @@ impl ContactState {
             boxes: vec![ClusterBox::UNFITTED; model.triangles.clusters()],
             travel_m: 0.0,
             is_tracked: false,
+            walls: model.walls().map(SelfContact::no_walls).unwrap_or_default(),
         }
     }
 
@@ -177,6 +182,7 @@ impl ContactState {
     pub(crate) fn forget_geometry(&mut self) {
         self.boxes.fill(ClusterBox::UNFITTED);
         self.travel_m = 0.0;
+        self.walls.forget();
         for tool in &mut self.tools {
             tool.candidates.slack_m = f64::NEG_INFINITY;
         }
@@ -185,6 +191,7 @@ impl ContactState {
     /// Records that the surface moved by at most this distance (m).
     pub(crate) fn travelled(&mut self, distance_m: f64) {
         self.travel_m += distance_m;
+        self.walls.slack_m -= distance_m;
         for tool in &mut self.tools {
             tool.candidates.slack_m -= distance_m;
         }
@@ -203,6 +210,11 @@ impl ContactState {
         if !std::mem::take(&mut self.is_tracked) {
             self.forget_geometry();
         }
+    }
+
+    /// Returns what walls of the body that meet stored (J) at the last evaluation of forces, if it is known.
+    pub(crate) fn stored_in_walls_j(&self) -> Option<f64> {
+        self.walls.energy_j()
     }
 
     /// Returns the triangles that any tool may touch.

@@ -6,6 +6,7 @@ use super::{
     local_model::{self, MeanContact},
     narrow::{self, Meeting, Pressed},
     proxy,
+    tool_pairs::Push,
 };
 use glam::DVec3;
 
@@ -13,6 +14,7 @@ impl ContactModel {
     /// Begins a tick, before its first substep.
     pub fn begin_tick(&self, tools: &mut [ToolState], scratch: &mut ContactScratch, tick_period_s: f64) {
         let time = SubstepTime { fraction: 1.0, dt_s: 0.0, tick_period_s };
+        scratch.walls.most_frequency_sq = 0.0;
         for (tool, scratch) in tools.iter_mut().zip(&mut scratch.tools) {
             time.smooth(tool);
             tool.penetration_m = 0.0;
@@ -101,10 +103,13 @@ impl ContactModel {
         forces_n: &mut [DVec3],
         scratch: &mut ContactScratch,
     ) {
+        for (index, scratch) in scratch.tools.iter_mut().enumerate() {
+            scratch.push = self.push_of_others(index, tools);
+        }
         for (index, (tool, scratch)) in tools.iter_mut().zip(&mut scratch.tools).enumerate() {
             let model = &self.tools[index];
             let pressed = self.press(index, tool, x, contact, forces_n, scratch);
-            let surface_m_per_s = self.surface_m_per_s(&pressed, *velocity_m_per_s);
+            let surface_m_per_s = self.surface_m_per_s(&pressed, scratch.push, *velocity_m_per_s);
             let coupling = proxy::finish(model, tool, &pressed, surface_m_per_s, time);
             scratch.nearest = pressed.nearest.0;
             tool.friction_heat_j += pressed.heat_j;
@@ -130,6 +135,9 @@ impl ContactModel {
         scratch: &mut ContactScratch,
     ) -> bool {
         let exhaustive = scratch.exhaustive;
+        if (0..tools.len()).any(|index| self.push_of_others(index, tools).is_some()) {
+            return false;
+        }
         for (index, (tool, scratch)) in tools.iter_mut().zip(&mut scratch.tools).enumerate() {
             self.drift(index, tool, time, contact);
             let axis = self.tools[index].axis(tool);
@@ -201,17 +209,21 @@ impl ContactModel {
             friction_coefficient: model.spec.friction_coefficient,
             put_into: std::mem::take(&mut part.just_put) || part.touching.tells_it_was_put(),
         };
-        let pressed = narrow::press(&meeting, &mut part.candidates, &mut part.touching, &mut scratch.next, forces_n);
+        let mut pressed =
+            narrow::press(&meeting, &mut part.candidates, &mut part.touching, &mut scratch.next, forces_n);
+        if let Some(push) = scratch.push {
+            push.add_to(&mut pressed);
+        }
         (part.force_n, part.torque_nm, part.deepest_m) = (pressed.force_n, pressed.torque_nm, pressed.deepest_m);
         part.is_clear = proxy::is_clear(model, &pressed);
         pressed
     }
 
-    /// Returns the velocity (m/s) of the point of the surface nearest to a tool.
-    fn surface_m_per_s(&self, pressed: &Pressed, velocity_m_per_s: &dyn Fn(u32) -> DVec3) -> DVec3 {
+    /// Returns the velocity (m/s) of the point nearest to a tool, of the surface or of another tool.
+    fn surface_m_per_s(&self, pressed: &Pressed, push: Option<Push>, velocity_m_per_s: &dyn Fn(u32) -> DVec3) -> DVec3 {
         let (triangle, weights) = pressed.nearest;
         if weights == [0.0; 3] {
-            return DVec3::ZERO;
+            return push.map_or(DVec3::ZERO, |push| push.other_m_per_s);
         }
         let corners = self.triangles.nodes[triangle];
         corners.into_iter().zip(weights).map(|(node, weight)| velocity_m_per_s(node) * weight).sum()

@@ -32,7 +32,7 @@
 use super::pace::{InstantForces, Pace, most_substeps};
 use crate::{
     settings::Integrator,
-    tick::{Environment, Judged, MechanicalState, StepEvidence, StepForcesNow},
+    tick::{Environment, Judged, MechanicalState, StepEvidence, StepForcesNow, StifferContact},
 };
 use glam::DVec3;
 
@@ -84,8 +84,8 @@ pub(crate) struct Attempt {
     pub(crate) is_spoilt: bool,
     /// Number of times that it had been repeated before.
     pub(crate) repeated: u32,
-    /// Largest factor by which contact was stiffer than at rest.
-    pub(crate) stiffened: f64,
+    /// How much stiffer contact was than the model's substeps are made for.
+    pub(crate) stiffened: StifferContact,
 }
 
 /// The verdict on a tick that was run.

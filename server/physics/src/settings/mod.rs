@@ -52,6 +52,18 @@ pub enum Integrator {
     BackwardEuler,
 }
 
+/// Whether walls of one body press each other where they meet.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum SelfContactChoice {
+    /// Where the skin of a body that can have it faces itself at rest, as around a cavity.
+    #[default]
+    WhereFacing,
+    /// Whatever the skin is like. Bodies and integrators that cannot have it refuse.
+    On,
+    /// Nowhere: walls pass through each other.
+    Off,
+}
+
 /// What is left out where a scene does not need it. Results are the same bit for bit; the switches are for tests and benchmarks
 /// that prove it and tell the time saved.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -96,6 +108,8 @@ pub struct Settings {
     /// A body that is at rest to within this (m), every node of it, and that no tool is near is not computed (`integrate::sleep`);
     /// 0: never.
     pub sleep_tolerance_m: f64,
+    /// Whether walls of the body press each other where they meet.
+    pub self_contact: SelfContactChoice,
     /// What is left out.
     pub skips: Skips,
 }
@@ -122,6 +136,7 @@ impl Default for Settings {
             solver_iterations: 100,
             solver_tolerance: 1e-3,
             sleep_tolerance_m: 0.0,
+            self_contact: SelfContactChoice::default(),
             skips: Skips::default(),
         }
     }

@@ -1,9 +1,12 @@
 //! The surroundings of a body of any kind.
 use super::{EnvironmentError, PointForce, Steps};
 use crate::{
-    contact::{ContactModel, Coupling, LARGEST_TRIANGLE, SubstepTime, ToolShape, ToolSpec, ToolState, Turning},
+    contact::{
+        ContactModel, Coupling, LARGEST_TRIANGLE, SelfContact, SkinAtRest, SubstepTime, ToolShape, ToolSpec, ToolState,
+        Turning,
+    },
     mesh::Surface,
-    settings::{Integrator, LoadSpec, MAX_SUBSTEPS, PrescribedSpec, Settings, Substeps},
+    settings::{Integrator, LoadSpec, MAX_SUBSTEPS, PrescribedSpec, SelfContactChoice, Settings, Substeps},
 };
 use glam::DVec3;
 
@@ -101,6 +104,17 @@ impl EnvironmentSpec {
         self.check_settings()
     }
 
+    /// Returns the self-contact of a body with this skin, where it is to have it.
+    pub(crate) fn walls_of(&self, skin: &SkinAtRest<'_>) -> Option<SelfContact> {
+        match self.settings.self_contact {
+            SelfContactChoice::On => SelfContact::build(skin, false),
+            SelfContactChoice::WhereFacing if self.settings.integrator == Integrator::Leapfrog => {
+                SelfContact::build(skin, true)
+            }
+            SelfContactChoice::Off | SelfContactChoice::WhereFacing => None,
+        }
+    }
+
     /// Refuses capsules, because they cannot press `what`.
     pub(crate) fn demand_spheres(&self, what: &'static str) -> Result<(), EnvironmentError> {
         match self.tools.iter().find(|tool| tool.shape.as_capsule().is_some()) {
@@ -131,6 +145,8 @@ impl EnvironmentSpec {
             sleep == 0.0 || sleeps,
             "must be 0 with the seeds' schemes, which never sleep",
         )?;
+        let walls_ok = s.self_contact != SelfContactChoice::On || s.integrator == Integrator::Leapfrog;
+        setting("self_contact", 1.0, walls_ok, "needs leapfrog, whose substeps are made for it")?;
         if let Substeps::Fixed(n) = s.substeps {
             setting("substeps", f64::from(n), (1..=MAX_SUBSTEPS).contains(&n), "must be 1 to 100000")?;
         }

@@ -108,6 +108,7 @@ impl Tick<'_> {
     pub(crate) fn list_touched(&self, contact: &ContactState, mut list: impl FnMut(u32)) {
         let environment = self.environment;
         environment.contact.listed_nodes(contact).for_each(&mut list);
+        environment.contact.nodes_of_walls(contact).for_each(&mut list);
         for load in &environment.loads {
             match load {
                 LoadSpec::NodalForces(forces) => forces.iter().for_each(|(vertex, _)| list(*vertex)),
@@ -160,9 +161,13 @@ pub(crate) fn touch_nodes(
     let MechanicalState { x, v, external_n, tools, contact, load_factors, force_is_current, .. } = state;
     external_n.fill(DVec3::ZERO);
     tick.add_given_n(load_factors, now, rest_m, x, external_n);
-    if !tools.is_empty() {
+    let model = &tick.environment.contact;
+    if tools.is_empty() {
+        contact.travelled(now.fastest_m_per_s * now.dt_s);
+    } else {
         let body = BodyMotion { x, v, fastest_m_per_s: now.fastest_m_per_s };
-        tick.environment.contact.substep(&body, &tick.substep_time(now), tools, contact, external_n, scratch);
+        model.substep(&body, &tick.substep_time(now), tools, contact, external_n, scratch);
     }
+    model.press_walls_of_nodes(x, contact, external_n, scratch);
     *force_is_current = true;
 }

@@ -28,6 +28,8 @@ pub(crate) struct ListedVertices<C> {
     /// Forces (N) on all vertices, which are zero except at listed ones.
     forces_n: Vec<DVec3>,
     listed: Vec<ListedVertex<C>>,
+    /// The listed vertices, while they are listed.
+    numbers: Vec<u32>,
     is_listed: Vec<bool>,
     /// Layout to which the carriers belong.
     layout: u64,
@@ -46,6 +48,7 @@ impl<C> ListedVertices<C> {
             x: vec![DVec3::ZERO; vertices],
             forces_n: vec![DVec3::ZERO; vertices],
             listed: Vec::with_capacity(vertices),
+            numbers: Vec::with_capacity(vertices),
             is_listed: vec![false; vertices],
             layout: u64::MAX,
         }
@@ -65,16 +68,18 @@ impl<C> ListedVertices<C> {
     }
 
     /// Lists a vertex. Nothing is allocated.
-    fn list<S: CarriedSkin<Carriers = C>>(&mut self, skin: &S, vertex: u32) {
+    fn list(&mut self, vertex: u32) {
         if !std::mem::replace(&mut self.is_listed[vertex as usize], true) {
-            self.listed.push(ListedVertex { vertex, carriers: skin.carriers(vertex) });
+            self.numbers.push(vertex);
         }
     }
 
     /// Ends the listing. Vertices are sorted, so that sums have the same bits whenever and for whatever reason the
     /// vertices were listed.
-    fn finish(&mut self) {
-        self.listed.sort_unstable_by_key(|listed| listed.vertex);
+    fn finish<S: CarriedSkin<Carriers = C>>(&mut self, skin: &S) {
+        self.numbers.sort_unstable();
+        let listed = self.numbers.drain(..).map(|vertex| ListedVertex { vertex, carriers: skin.carriers(vertex) });
+        self.listed.extend(listed);
     }
 
     /// Computes the positions of the listed vertices, and sets the forces on them to zero.
@@ -122,18 +127,20 @@ pub(crate) fn touch_skin<S: CarriedSkin>(
     let (model, time) = (&tick.environment.contact, tick.substep_time(now));
     model.move_tools(fastest_m_per_s, &time, tools, contact);
     let mut renewed = model.list_on_skin(skin, &mut listed.x, tools, contact, scratch);
+    renewed |= model.list_walls_on_skin(skin, contact, scratch);
     renewed |= listed.layout != skin.layout();
     renewed |= tick.usable_points().any(|point| !listed.is_listed(point.node));
     if renewed {
         listed.start(skin.layout());
-        tick.list_touched(contact, |vertex| listed.list(skin, vertex));
-        listed.finish();
+        tick.list_touched(contact, |vertex| listed.list(vertex));
+        listed.finish(skin);
     }
     listed.refresh(skin);
     tick.add_given_n(load_factors, now, rest_m, &listed.x, &mut listed.forces_n);
     let velocity = |vertex: u32| skin.velocity_m_per_s(vertex);
     let surface = SurfaceNow { x: &listed.x, velocity_m_per_s: &velocity };
     model.press_tools(&surface, &time, tools, contact, &mut listed.forces_n, scratch);
+    model.press_walls_on_skin(&listed.x, contact, &mut listed.forces_n, scratch);
     external_n.fill(DVec3::ZERO);
     listed.push(skin, external_n);
 }

@@ -18,6 +18,15 @@ pub(crate) fn stiffening(settings: &Settings, materials: &[Material]) -> f64 {
     materials.iter().map(|material| material.stiffening(settings.stretch_allowance)).fold(1.0, f64::max)
 }
 
+/// How much stiffer contact was in a tick than the substeps are made for.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct StifferContact {
+    /// Largest factor φ by which a tool's foundation was stiffer than at rest.
+    pub(crate) times: f64,
+    /// Largest addition a (rad²/s²) of walls that meet to the squared frequency at a node.
+    pub(crate) walls_sq: f64,
+}
+
 /// The substeps of a tick.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Steps {
@@ -29,6 +38,8 @@ pub(crate) struct Steps {
     pub(crate) enough: f64,
     /// Part of the square of the largest frequency that is contact's, from 0 to 1.
     pub(crate) of_contact: f64,
+    /// Square (rad²/s²) of the largest frequency that they are enough for.
+    pub(crate) frequency_sq: f64,
 }
 
 impl Steps {
@@ -48,6 +59,7 @@ impl Steps {
             substeps_per_long_step: 1,
             enough: wanted.min(f64::from(substeps)),
             of_contact: 0.0,
+            frequency_sq: omega * omega,
         };
         if let Substeps::Fixed(substeps) = settings.substeps {
             return Ok(all_short(substeps));
@@ -67,20 +79,21 @@ impl Steps {
         Self { of_contact: (1.0 - (alone / touched).powi(2)).clamp(0.0, 1.0), ..self }
     }
 
-    /// Returns the number of substeps that contact needs whose stiffness is φ = `times` that at rest,
-    /// `n √(1 + ½ (φ − 1) c)`, with the part c of the squared frequency that is contact's.
+    /// Returns the number of substeps that contact needs, `n √(1 + ½ (φ − 1) c + a/ω²)`: with a foundation φ times as
+    /// stiff as at rest, the part c of the squared frequency `ω²` that is contact's, and what walls that meet add to it, a.
     ///
     /// The half: c comes from the sums of the rows of contact's stiffness. In the modes of the largest frequency,
     /// neighbours move against each other and the samples between them hardly, so that contact adds a quarter of these
     /// sums or less there (`docs/measurements/deep-press.md`).
-    pub(crate) fn with_stiffer_contact(self, times: f64) -> u32 {
-        let needed = self.needed_by_contact(times) / WITHIN_SAFETY;
+    pub(crate) fn with_stiffer_contact(self, stiffer: StifferContact) -> u32 {
+        let needed = self.needed_by_contact(stiffer) / WITHIN_SAFETY;
         (needed.ceil() as u32).max(self.substeps).next_multiple_of(self.substeps_per_long_step)
     }
 
     /// Returns the same before it is rounded up.
-    pub(crate) fn needed_by_contact(self, times: f64) -> f64 {
-        self.enough * (1.0 + 0.5 * (times - 1.0).max(0.0) * self.of_contact).sqrt()
+    pub(crate) fn needed_by_contact(self, StifferContact { times, walls_sq }: StifferContact) -> f64 {
+        let of_walls = if walls_sq > 0.0 { walls_sq / self.frequency_sq.max(f64::MIN_POSITIVE) } else { 0.0 };
+        self.enough * (1.0 + 0.5 * (times - 1.0).max(0.0) * self.of_contact + of_walls).sqrt()
     }
 
     /// Returns the same substeps for a body whose coarse level may take longer steps; `omega` (rad/s) is the largest

@@ -15,7 +15,7 @@ mod step;
 mod strained;
 
 pub use by_hand::{refine_only, wake_only};
-pub use energies::elastic_energy_j;
+pub use energies::{elastic_energy_j, meeting_walls};
 pub use error::ModelError;
 pub use model::Model;
 pub use quarantine::{Quarantine, first_non_finite};

@@ -2,7 +2,7 @@
 use super::{ModelError, ModelSpec, State, sleep::SleepBound};
 use crate::{
     bodies::{Body, MaterialPoint},
-    contact::{ContactModel, ToolSpec},
+    contact::{ContactModel, SelfContact, ToolSpec},
     integrate::{Scheme, is_judged},
     mesh::Surface,
     settings::{LoadSpec, PrescribedSpec, Settings},
@@ -116,6 +116,17 @@ impl Model {
     /// Returns the displacement (m) of a point of the material from rest.
     pub fn displacement_m(&self, state: &State, point: &MaterialPoint) -> DVec3 {
         self.body.displacement_m(&state.body, &state.mechanical, point)
+    }
+
+    /// Returns whether walls of the body press each other where they meet.
+    pub fn has_self_contact(&self) -> bool {
+        self.contact().walls().is_some()
+    }
+
+    /// Returns the number of the surface's vertices that press no walls, because the body lies against itself there at
+    /// rest.
+    pub fn vertices_against_themselves(&self) -> usize {
+        self.contact().walls().map_or(0, SelfContact::left_out)
     }
 
     pub(super) fn scheme(&self) -> &Scheme {

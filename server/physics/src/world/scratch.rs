@@ -1,6 +1,10 @@
 //! The buffers that a tick works in.
 use super::{Model, rollback::LastGood};
-use crate::{bodies::BodyScratch, contact::ContactScratch, integrate::ForceHistory};
+use crate::{
+    bodies::BodyScratch,
+    contact::{ContactScratch, MeetingWalls},
+    integrate::ForceHistory,
+};
 use glam::DVec3;
 
 /// Buffers of [`crate::step`], which are allocated once.
@@ -30,6 +34,11 @@ impl Scratch {
             contact: environment.contact.scratch(environment.settings.skips.distant_contact),
             body: BodyScratch::new(body, environment),
         }
+    }
+
+    /// Returns the walls of the body that meet, at the end of the last tick.
+    pub fn meeting_walls(&self) -> MeetingWalls {
+        self.contact.meeting_walls()
     }
 
     /// Returns the force (N) that holds each prescribed degree of freedom at the end of the last tick, which is zero on

@@ -8,7 +8,7 @@ use crate::{
     bodies::SteppedBody,
     contact::ContactScratch,
     integrate::{Attempt, ForceHistory, Scheme, Verdict},
-    tick::{Environment, LoadRamp, MechanicalState, Tick, TickInput, take_prescribed, take_tools},
+    tick::{Environment, LoadRamp, MechanicalState, StifferContact, Tick, TickInput, take_prescribed, take_tools},
 };
 use glam::DVec3;
 
@@ -76,13 +76,14 @@ pub fn step(model: &Model, state: &mut State, scratch: &mut Scratch, input: &Tic
         let Some(judged) = body.judged().filter(|_| history.is_kept()) else { break spoilt };
         let start = last_good.start_of_tick();
         let is_spoilt = spoilt.is_some();
+        let stiffened = StifferContact { times: contact.most_stiffened(), walls_sq: contact.most_of_walls() };
         match history.judge(
             environment,
             judged,
             mechanical,
             start,
             pace,
-            Attempt { is_spoilt, repeated: report.repeated, stiffened: contact.most_stiffened() },
+            Attempt { is_spoilt, repeated: report.repeated, stiffened },
         ) {
             Verdict::Accept => break spoilt,
             Verdict::Repeat => {

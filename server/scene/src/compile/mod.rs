@@ -26,7 +26,8 @@ use body::Body;
 use glam::DVec3;
 use kinds::{Compiled, Ingredients};
 use palpate_physics::{
-    Integrator, ModelSpec, Precision, Settings, Skips, Substeps, mesh::quality, settings::MAX_SUBSTEPS,
+    Integrator, ModelSpec, Precision, SelfContactChoice, Settings, Skips, Substeps, mesh::quality,
+    settings::MAX_SUBSTEPS,
 };
 use regions::Regions;
 use std::path::{Path, PathBuf};
@@ -173,6 +174,7 @@ fn settings(document: &Document) -> Result<Settings, Fault> {
             "must be 1 to 100000; leave it out to have it measured",
         )?;
     }
+    let self_contact = self_contact(document)?;
     Ok(Settings {
         tick_period_s: period,
         integrator: match integrator {
@@ -194,8 +196,30 @@ fn settings(document: &Document) -> Result<Settings, Fault> {
         solver_iterations,
         solver_tolerance,
         sleep_tolerance_m: 1e-6 * sleep_tolerance_um,
+        self_contact,
         skips: Skips::default(),
     })
+}
+
+/// Whether walls of the body press each other.
+fn self_contact(document: &Document) -> Result<SelfContactChoice, Fault> {
+    let cannot = |what: &str| {
+        let message = format!("walls of {what} cannot press each other");
+        Fault::value(Where::root("body").key("self_contact"), message)
+            .help("leave `self_contact` out, or set it to false")
+    };
+    match document.body.self_contact {
+        None => Ok(SelfContactChoice::WhereFacing),
+        Some(false) => Ok(SelfContactChoice::Off),
+        Some(true) if document.body.springs.is_some() => Err(cannot("a surface of springs, which is a single sheet,")),
+        Some(true) if document.body.seed.is_some() => {
+            Err(cannot("the papers' hybrid, which is stepped as they print it,"))
+        }
+        Some(true) if document.numerics.integrator != IntegratorName::Leapfrog => {
+            Err(cannot("a body that is not integrated by leapfrog"))
+        }
+        Some(true) => Ok(SelfContactChoice::On),
+    }
 }
 
 fn output(table: &OutputTable) -> Result<OutputSettings, Fault> {

@@ -28,6 +28,9 @@ pub(crate) struct BodyTable {
     pub(crate) particles: Option<ParticlesTable>,
     /// Makes it the papers' hybrid, whose core its tets are.
     pub(crate) seed: Option<SeedTable>,
+    /// Whether walls of the body press each other where they meet; by default where its skin faces itself at rest, as around a cavity,
+    /// with leapfrog. Surfaces of springs and the papers' hybrid cannot have it.
+    pub(crate) self_contact: Option<bool>,
     /// Moves the body (m, world); zero by default.
     #[serde(default)]
     pub(crate) offset_m: [f64; 3],

@@ -12,6 +12,7 @@ use super::{
     seen::demand_seen,
     sites::Sites,
     sizes,
+    skin_carriers::SkinCarriers,
     spec::{HybridError, ParticleSpec},
     transition_force::is_free,
     trilinear_point::CellPoint,
@@ -59,6 +60,8 @@ pub struct HybridBody {
     pub(super) may_wake: Vec<bool>,
     /// The cell of each vertex of the skin, and the vertex's coordinates in it.
     pub(super) vertex_points: Vec<CellPoint>,
+    /// The particles that carry these.
+    pub(super) skin_carriers: SkinCarriers,
     /// Bound of the speed of any vertex of the skin over that of the fastest node or particle.
     pub(super) amplification: f64,
     /// Bounding boxes of the skin's triangles.
@@ -149,10 +152,7 @@ impl HybridBody {
         progress(MAY_WAKE);
         let vertex_points: Vec<CellPoint> =
             spec.skin.positions_m().iter().map(|&point| CellPoint::new(&partition, point)).collect();
-        let of_vertices = vertex_points.iter().map(CellPoint::amplification).fold(1.0, f64::max);
-        let of_anchors = (0..partition.particle_count() as u32)
-            .map(|p| partition.anchor(p).weights.iter().map(|w| w.abs()).sum())
-            .fold(1.0, f64::max);
+        let skin_carriers = SkinCarriers::new(&partition, &vertex_points);
         let hybrid = Self {
             lumping: Lumping::new(&partition, &masses),
             full_cell: RestCell::new(spacing_m, 1.0 - KEPT, &Moments::full(spacing_m)),
@@ -163,8 +163,9 @@ impl HybridBody {
             free_parts: free.iter().map(|free| DVec3::select(*free, DVec3::ONE, DVec3::ZERO)).collect(),
             free,
             may_wake,
+            amplification: skin_carriers.amplification(),
+            skin_carriers,
             vertex_points,
-            amplification: of_vertices * of_anchors,
             clusters: SkinClusters::default(),
             embedding,
             partition,

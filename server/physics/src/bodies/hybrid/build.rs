@@ -1,7 +1,7 @@
 //! Builds a hybrid body and its environment from a specification.
 use super::{HybridBody, HybridError, HybridSpec, body::Built};
 use crate::{
-    contact::{ContactModel, moduli},
+    contact::{ContactModel, SkinAtRest, moduli},
     mesh::Surface,
     settings::Integrator,
     tick::{Environment, EnvironmentSpec, Steps, free_inverse_mass, progress as building, stiffening},
@@ -40,14 +40,18 @@ impl HybridBody {
         hybrid.max_natural_frequency_rad_per_s = omega;
         let vertices = hybrid.skin_rest_m().len() as u32;
         let moduli_pa: Vec<DVec2> = (0..vertices).map(|v| moduli::moduli_pa(hybrid.material_at(v))).collect();
-        let contact = ContactModel::build(
-            hybrid.skin_rest_m(),
-            &surface,
-            &moduli::mean_over_corners(&moduli_pa, &surface),
-            &hybrid.vertex_masses_kg(),
-            omega,
-            &around.tools,
-        );
+        let (moduli, mass_kg) = (moduli::mean_over_corners(&moduli_pa, &surface), hybrid.vertex_masses_kg());
+        let bearing_kg = hybrid.bearing_masses_kg();
+        let skin = SkinAtRest {
+            positions_m: hybrid.skin_rest_m(),
+            surface: &surface,
+            moduli: &moduli,
+            mass_kg: &mass_kg,
+            bearing_kg: &bearing_kg,
+            max_natural_frequency_rad_per_s: omega,
+        };
+        let contact = ContactModel::build(skin.positions_m, &surface, &moduli, &mass_kg, omega, &around.tools)
+            .with_walls(around.walls_of(&skin));
         hybrid.cluster(contact.triangles());
         let stretch_sq = stiffening(&around.settings, &materials);
         let touched = if contact.nodal_stiffness_n_per_m.is_empty() {

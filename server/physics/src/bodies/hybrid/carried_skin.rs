@@ -83,14 +83,12 @@ impl Skin for SkinView<'_> {
     }
 
     fn position_m(&self, vertex: u32) -> DVec3 {
-        let cell_point = self.hybrid.vertex_points[vertex as usize];
-        let partition = &self.hybrid.partition;
+        let carriers = &self.hybrid.skin_carriers;
         let of = |particle: u32| match self.patch.point_of(particle) {
-            NONE => partition.anchor(particle).of(self.patch.node_displacements_m()),
+            NONE => carriers.anchor(particle).of(self.patch.node_displacements_m()),
             point => self.patch.displacements_m()[point as usize],
         };
-        let particles = partition.corners(cell_point.cell as usize);
-        let moved: DVec3 = particles.into_iter().zip(cell_point.weights(partition)).map(|(p, w)| of(p) * w).sum();
+        let moved: DVec3 = carriers.of_vertex(vertex).iter().map(|&(particle, weight)| of(particle) * weight).sum();
         self.hybrid.skin_rest_m()[vertex as usize] + moved
     }
 }
@@ -104,21 +102,16 @@ impl CarriedSkin for SkinView<'_> {
 
     fn carriers(&self, vertex: u32) -> Carried {
         let hybrid = self.hybrid;
-        let cell_point = hybrid.vertex_points[vertex as usize];
-        let rest_m = hybrid.skin_rest_m()[vertex as usize];
-        let mut carried = Carried { rest_m, carriers: [(Carrier::Point(NONE), 0.0); 8], weighty: 0 };
-        let particles = hybrid.partition.corners(cell_point.cell as usize);
-        for (particle, weight) in particles.into_iter().zip(cell_point.weights(&hybrid.partition)) {
-            if weight != 0.0 {
-                let carrier = match self.patch.point_of(particle) {
-                    NONE => Carrier::Nodes(hybrid.partition.anchor(particle)),
-                    point => Carrier::Point(point),
-                };
-                carried.carriers[carried.weighty] = (carrier, weight);
-                carried.weighty += 1;
-            }
+        let (rest_m, of_vertex) = (hybrid.skin_rest_m()[vertex as usize], hybrid.skin_carriers.of_vertex(vertex));
+        let mut carriers = [(Carrier::Point(NONE), 0.0); 8];
+        for (&(particle, weight), slot) in of_vertex.iter().zip(&mut carriers) {
+            let carrier = match self.patch.point_of(particle) {
+                NONE => Carrier::Nodes(*hybrid.skin_carriers.anchor(particle)),
+                point => Carrier::Point(point),
+            };
+            *slot = (carrier, weight);
         }
-        carried
+        Carried { rest_m, carriers, weighty: of_vertex.len() }
     }
 
     fn carried_m(&self, carried: &Carried) -> DVec3 {
@@ -132,15 +125,11 @@ impl CarriedSkin for SkinView<'_> {
 
     fn velocity_m_per_s(&self, vertex: u32) -> DVec3 {
         let hybrid = self.hybrid;
-        let cell_point = hybrid.vertex_points[vertex as usize];
         let of = |particle: u32| match self.patch.number_of(particle) {
-            NONE => hybrid.partition.anchor(particle).of(self.v),
+            NONE => hybrid.skin_carriers.anchor(particle).of(self.v),
             number => self.v[hybrid.node_count() + number as usize],
         };
-        let particles = hybrid.partition.corners(cell_point.cell as usize);
-        let weighty =
-            particles.into_iter().zip(cell_point.weights(&hybrid.partition)).filter(|(_, weight)| *weight != 0.0);
-        weighty.map(|(particle, weight)| of(particle) * weight).sum()
+        hybrid.skin_carriers.of_vertex(vertex).iter().map(|&(particle, weight)| of(particle) * weight).sum()
     }
 
     fn push(&self, carried: &Carried, force_n: DVec3, forces_n: &mut [DVec3]) {
@@ -194,6 +183,25 @@ impl HybridBody {
         let of_vertex = |(point, area_m2): (TrilinearPoint, &f64)| {
             let carriers = point.particles.into_iter().zip(point.weights).filter(|(_, weight)| *weight > 1e-6);
             area_m2 * carriers.map(|(particle, _)| per_area(particle)).fold(f64::INFINITY, f64::min)
+        };
+        points().map(of_vertex).collect()
+    }
+
+    /// Returns the masses (kg) by which what is pressed at the skin's vertices is borne where neighbours are pressed alike:
+    /// `min_p m_p/Σ_v w_vp` over the particles of each. Unlike [`Self::vertex_masses_kg`] it knows no areas: a vertex of
+    /// small triangles is borne by the same particles as its neighbours.
+    pub(crate) fn bearing_masses_kg(&self) -> Vec<f64> {
+        let points = || self.vertex_points.iter().map(|point| point.trilinear(&self.partition));
+        let mut shares = vec![0.0; self.partition.particle_count()];
+        for point in points() {
+            for (particle, weight) in point.particles.into_iter().zip(point.weights) {
+                shares[particle as usize] += weight.max(0.0);
+            }
+        }
+        let of_vertex = |point: TrilinearPoint| {
+            let carriers = point.particles.into_iter().zip(point.weights).filter(|(_, weight)| *weight > 1e-6);
+            let each = carriers.map(|(p, _)| self.masses.particle_kg[p as usize] / shares[p as usize]);
+            each.fold(f64::INFINITY, f64::min)
         };
         points().map(of_vertex).collect()
     }

@@ -47,6 +47,7 @@ pub struct Anchor {
 
 impl Anchor {
     /// Returns `Σ ζ_i a_i`.
+    #[inline]
     pub fn of(&self, a: &[DVec3]) -> DVec3 {
         self.nodes.iter().zip(self.weights).map(|(&node, weight)| a[node as usize] * weight).sum()
     }

@@ -32,6 +32,7 @@ mod seen;
 pub mod sites;
 pub mod sizes;
 pub mod skin;
+mod skin_carriers;
 pub mod spec;
 mod staged_patch;
 mod state;

@@ -1,7 +1,7 @@
 //! What the rest state of a body of tetrahedra fixes.
 use super::TetBodyError;
 use crate::{
-    contact::{ContactModel, SurfaceModuli, moduli},
+    contact::{ContactModel, SkinAtRest, SurfaceModuli, moduli},
     elements::{
         free_axes::FreeAxes,
         linear_tet::RestTet,
@@ -64,14 +64,17 @@ impl TetBody {
         };
         let at_rest = body.rest_stiffness();
         let omega = max_natural_frequency_with(&at_rest, &body.inverse_mass_per_kg, &mut building::untouched(progress));
-        let contact = ContactModel::build(
-            body.rest_positions_m(),
-            &surface,
-            &body.moduli_of_triangles(&surface),
-            &body.mass_kg,
-            omega,
-            &spec.tools,
-        );
+        let moduli = body.moduli_of_triangles(&surface);
+        let skin = SkinAtRest {
+            positions_m: body.rest_positions_m(),
+            surface: &surface,
+            moduli: &moduli,
+            mass_kg: &body.mass_kg,
+            bearing_kg: &body.mass_kg,
+            max_natural_frequency_rad_per_s: omega,
+        };
+        let contact = ContactModel::build(skin.positions_m, &surface, &moduli, skin.mass_kg, omega, &spec.tools)
+            .with_walls(spec.walls_of(&skin));
         let stretch_sq = stiffening(settings, &body.materials);
         // λ_max(s K + C) = s λ_max(K + C/s)
         let springs: Vec<f64> = contact.nodal_stiffness_n_per_m.iter().map(|k| k / stretch_sq).collect();

@@ -1,0 +1,151 @@
+//! The vertices and triangles that may meet before the surface has moved some way, in a list that never grows.
+
+use crate::contact::broad::ROUNDING_M;
+use glam::DVec3;
+
+/// Most pairs that are listed, per vertex of the skin, and at least.
+const PAIRS_PER_VERTEX: usize = 24;
+const AT_LEAST: usize = 4096;
+/// Part of the way until the next query after which it is looked again which pairs may be within reach.
+const AWAKE: f64 = 0.2;
+/// Part of the way until the next query below which a list is made anew rather than looked after.
+const WORTH_KEEPING: f64 = 0.25;
+/// A way (m) that no surface moves between two queries.
+const FOR_EVER_M: f64 = 1e6;
+
+/// A vertex and a triangle that are near each other.
+#[derive(Debug, Clone, Copy, PartialEq, PartialOrd)]
+pub(super) struct Pair {
+    pub(super) node: u32,
+    pub(super) triangle: u32,
+    /// How far (m) the surface has to have moved since the query before they can be within the vertex's reach.
+    pub(super) free_m: f64,
+}
+
+/// Pairs of a vertex and a triangle that are near each other. It follows from positions: it is neither saved nor
+/// compared. Its clones keep the capacity.
+#[derive(Debug, Clone)]
+pub(in crate::contact) struct NearWalls {
+    pairs: Box<[Pair]>,
+    count: usize,
+    /// How far (m) the surface may still move until the list is out of date.
+    pub(in crate::contact) slack_m: f64,
+    /// The same when the list was made.
+    whole_slack_m: f64,
+    /// Number of pairs for which there was no room.
+    pub(super) missed: u32,
+    /// What the walls that meet store (J), as far as it is known.
+    energy_j: Option<f64>,
+    /// How far (m) the surface may have moved since then until more pairs may be within reach than were told to be.
+    awake_m: f64,
+    /// Where (m) the nodes were when the list was made.
+    then_m: Box<[DVec3]>,
+}
+
+impl Default for NearWalls {
+    fn default() -> Self {
+        Self {
+            pairs: Box::default(),
+            count: 0,
+            slack_m: f64::NEG_INFINITY,
+            whole_slack_m: 0.0,
+            missed: 0,
+            energy_j: None,
+            awake_m: 0.0,
+            then_m: Box::default(),
+        }
+    }
+}
+
+impl NearWalls {
+    /// Makes room for pairs of so many vertices, among so many nodes.
+    pub(super) fn with_room(vertices: usize, nodes: usize) -> Self {
+        let room = (PAIRS_PER_VERTEX * vertices).max(AT_LEAST);
+        let none = Pair { node: 0, triangle: 0, free_m: 0.0 };
+        let then_m = vec![DVec3::ZERO; nodes].into_boxed_slice();
+        Self { pairs: vec![none; room].into_boxed_slice(), then_m, ..Self::default() }
+    }
+
+    /// Returns the pairs, sorted by vertex and then by triangle.
+    pub(super) fn pairs(&self) -> &[Pair] {
+        &self.pairs[..self.count]
+    }
+
+    /// Returns a bound of how far (m) the surface is from where it was at the query.
+    pub(super) fn moved_m(&self) -> f64 {
+        self.whole_slack_m - self.slack_m
+    }
+
+    /// Notes where (m) the nodes are when the list is made.
+    pub(super) fn remember(&mut self, x: &[DVec3]) {
+        self.then_m.copy_from_slice(x);
+    }
+
+    /// Looks, where the surface's travel has used the list up, how far it really is from where it was: what trembles
+    /// travels far and goes nowhere. Returns whether the list is good for some time after all.
+    pub(super) fn is_still_good(&mut self, x: &[DVec3]) -> bool {
+        if !self.slack_m.is_finite() {
+            return false;
+        }
+        let farthest_sq = x.iter().zip(&self.then_m).map(|(now, then)| now.distance_squared(*then)).fold(0.0, f64::max);
+        self.slack_m = self.whole_slack_m - farthest_sq.sqrt() - ROUNDING_M;
+        self.slack_m > WORTH_KEEPING * self.whole_slack_m
+    }
+
+    /// Returns the pairs that may be within reach until the surface has moved some way.
+    pub(super) fn awake(&self) -> impl Iterator<Item = &Pair> {
+        self.pairs().iter().filter(|pair| pair.free_m <= self.awake_m)
+    }
+
+    /// Looks whether the surface has moved so far that more pairs may be within reach. Returns whether it has; then
+    /// [`Self::awake`] tells of more.
+    pub(super) fn wakes_more(&mut self) -> bool {
+        let wakes = self.moved_m() > self.awake_m;
+        if wakes {
+            self.awake_m = self.moved_m() + AWAKE * self.whole_slack_m;
+        }
+        wakes
+    }
+
+    /// Forgets all that follows from positions.
+    pub(in crate::contact) fn forget(&mut self) {
+        (self.slack_m, self.energy_j) = (f64::NEG_INFINITY, None);
+    }
+
+    /// Returns what the walls that meet stored (J) at the last evaluation of forces, if it is known.
+    pub(in crate::contact) fn energy_j(&self) -> Option<f64> {
+        self.energy_j
+    }
+
+    pub(super) fn set_energy_j(&mut self, energy_j: f64) {
+        self.energy_j = Some(energy_j);
+    }
+
+    pub(super) fn clear(&mut self) {
+        (self.count, self.missed) = (0, 0);
+    }
+
+    pub(super) fn push(&mut self, pair: Pair) {
+        match self.pairs.get_mut(self.count) {
+            Some(slot) => {
+                *slot = pair;
+                self.count += 1;
+            }
+            None => self.miss(),
+        }
+    }
+
+    /// Counts what is not listed though it may meet.
+    pub(super) fn miss(&mut self) {
+        self.missed = self.missed.saturating_add(1);
+    }
+
+    /// Sorts the pairs, so that sums have the same bits whenever they were listed, which serve while the surface moves no
+    /// more than `slack_m` (m).
+    pub(super) fn finish(&mut self, slack_m: f64) {
+        self.pairs[..self.count].sort_unstable_by_key(|pair| (pair.node, pair.triangle));
+        self.slack_m = slack_m.min(FOR_EVER_M);
+        self.whole_slack_m = self.slack_m;
+        self.awake_m = AWAKE * self.whole_slack_m;
+    }
+}

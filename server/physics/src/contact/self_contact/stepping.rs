@@ -1,0 +1,66 @@
+//! Self-contact's part of a substep.
+use super::SelfContact;
+use crate::contact::{ContactModel, ContactScratch, ContactState, broad::Skin};
+use glam::DVec3;
+
+impl ContactModel {
+    /// Presses the walls of a body whose surface's vertices are its nodes, at `x` (m), and adds the forces (N) on nodes.
+    /// The body's travel was told to the state before.
+    pub(crate) fn press_walls_of_nodes(
+        &self,
+        x: &[DVec3],
+        contact: &mut ContactState,
+        forces_n: &mut [DVec3],
+        scratch: &mut ContactScratch,
+    ) {
+        let Some(walls) = self.walls() else { return };
+        walls.renew(x, scratch.exhaustive, &mut contact.walls, &mut scratch.walls);
+        walls.press(x, &contact.walls, forces_n, &mut scratch.walls);
+        contact.walls.set_energy_j(scratch.walls.seen().energy_j);
+    }
+
+    /// Renews the list of what may meet on a skin, where it is out of date. Returns whether more may be within reach.
+    pub(crate) fn list_walls_on_skin(
+        &self,
+        skin: &impl Skin,
+        contact: &mut ContactState,
+        scratch: &mut ContactScratch,
+    ) -> bool {
+        let Some(walls) = self.walls() else { return false };
+        if contact.walls.slack_m > 0.0 {
+            return contact.walls.wakes_more();
+        }
+        let mut x = std::mem::take(&mut scratch.walls.x);
+        (0..).zip(&mut x).for_each(|(vertex, x_m)| *x_m = skin.position_m(vertex));
+        let renewed = walls.renew(&x, scratch.exhaustive, &mut contact.walls, &mut scratch.walls);
+        scratch.walls.x = x;
+        renewed || contact.walls.wakes_more()
+    }
+
+    /// Presses the walls of a skin whose listed vertices are at `x` (m), and adds the forces (N) on vertices.
+    pub(crate) fn press_walls_on_skin(
+        &self,
+        x: &[DVec3],
+        contact: &mut ContactState,
+        forces_n: &mut [DVec3],
+        scratch: &mut ContactScratch,
+    ) {
+        if let Some(walls) = self.walls() {
+            walls.press(x, &contact.walls, forces_n, &mut scratch.walls);
+            contact.walls.set_energy_j(scratch.walls.seen().energy_j);
+        }
+    }
+
+    /// Returns the nodes whose positions decide how what is listed meets, some of them several times: those of the pairs,
+    /// and of all triangles around them, by which it is known what faces what.
+    pub(crate) fn nodes_of_walls<'a>(&'a self, contact: &'a ContactState) -> impl Iterator<Item = u32> + 'a {
+        self.walls().into_iter().flat_map(|walls: &SelfContact| {
+            let of_pairs = contact
+                .walls
+                .awake()
+                .flat_map(|pair| walls.triangles.nodes[pair.triangle as usize].into_iter().chain([pair.node]));
+            let around = of_pairs.flat_map(|node| walls.around.row(node as usize));
+            around.flat_map(|&triangle| walls.triangles.nodes[triangle as usize])
+        })
+    }
+}

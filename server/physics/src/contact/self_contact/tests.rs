@@ -1,0 +1,216 @@
+//! Self-contact by itself, of a clamp whose arms are put together.
+use super::{NearWalls, SelfContact, SkinAtRest, rest::NodeAtRest};
+use crate::{
+    contact::SurfaceModuli,
+    mesh::{Surface, TetMesh},
+    testing::{Random, tet_box},
+};
+use glam::DVec3;
+
+const GAP_M: f64 = 4e-3;
+
+/// A clamp whose arms of 8 mm are 4 mm apart; what is left of a box.
+fn clamp() -> TetMesh {
+    let whole = tet_box(DVec3::ZERO, DVec3::new(0.04, 0.012, 0.02), [10, 3, 5]);
+    let middle = |tet: &[u32; 4]| tet.iter().map(|&n| whole.positions_m()[n as usize]).sum::<DVec3>() * 0.25;
+    let is_kept = |p: DVec3| p.x < 0.012 || (p.z - 0.01).abs() > 0.5 * GAP_M;
+    let kept: Vec<[u32; 4]> = whole.tets().iter().filter(|tet| is_kept(middle(tet))).copied().collect();
+    let mut nodes: Vec<u32> = kept.iter().flatten().copied().collect();
+    nodes.sort_unstable();
+    nodes.dedup();
+    let number = |node: u32| nodes.binary_search(&node).unwrap() as u32;
+    let positions = nodes.iter().map(|&n| whole.positions_m()[n as usize]).collect();
+    TetMesh::new(positions, kept.iter().map(|tet| tet.map(number)).collect()).unwrap()
+}
+
+fn walls_of(mesh: &TetMesh, only_if_facing: bool) -> Option<SelfContact> {
+    let surface = Surface::of(mesh).unwrap();
+    let moduli = vec![SurfaceModuli { p_wave_pa: 2e4, indentation_pa: 1e4 }; surface.triangles.len()];
+    // Of different masses, so that walls bear more in one place than in another.
+    let mass_kg: Vec<f64> =
+        (0..mesh.positions_m().len()).map(|node| if node.is_multiple_of(3) { 6e-6 } else { 3e-5 }).collect();
+    let skin = SkinAtRest {
+        positions_m: mesh.positions_m(),
+        surface: &surface,
+        moduli: &moduli,
+        mass_kg: &mass_kg,
+        bearing_kg: &mass_kg,
+        max_natural_frequency_rad_per_s: 5e3,
+    };
+    SelfContact::build(&skin, only_if_facing)
+}
+
+/// Arms bent towards each other by so much at their ends, and shaken.
+fn bent(mesh: &TetMesh, by_m: f64, shaken_m: f64, seed: u64) -> Vec<DVec3> {
+    let mut random = Random(seed);
+    let bend = |p: &DVec3| {
+        let along = ((p.x - 0.012) / 0.028).max(0.0);
+        *p - DVec3::Z * (by_m * along * (p.z - 0.01).signum()) + random.vector() * shaken_m
+    };
+    mesh.positions_m().iter().map(bend).collect()
+}
+
+fn pressed(walls: &SelfContact, x: &[DVec3]) -> (Vec<DVec3>, super::MeetingWalls) {
+    let (mut forces_n, mut scratch) = (vec![DVec3::ZERO; x.len()], walls.scratch());
+    let near: NearWalls = walls.near_at(x);
+    walls.press(x, &near, &mut forces_n, &mut scratch);
+    (forces_n, scratch.seen())
+}
+
+#[test]
+fn forces_are_the_potentials_negative_gradient_and_change_no_momentum() {
+    let mesh = clamp();
+    let walls = walls_of(&mesh, true).unwrap();
+    let mut looked_at = 0;
+    for seed in 1..7 {
+        // From a touch at the ends to arms that overlap by more than the linear part of the answer.
+        let x = bent(&mesh, 1.6e-3 + 3e-4 * seed as f64, 1e-4, seed);
+        let (forces_n, seen) = pressed(&walls, &x);
+        assert!(seen.vertices > 5, "{seen:?}");
+        let largest_n = forces_n.iter().map(|f| f.length()).fold(0.0, f64::max);
+        let (sum, moment) = forces_n
+            .iter()
+            .zip(&x)
+            .fold((DVec3::ZERO, DVec3::ZERO), |(sum, moment), (f, p)| (sum + *f, moment + p.cross(*f)));
+        assert!(sum.length() < 1e-13 * largest_n && moment.length() < 1e-14 * largest_n, "{sum} {moment}");
+        assert!((seen.energy_j / walls.meeting(&x).energy_j - 1.0).abs() < 1e-12);
+        for (node, force_n) in forces_n.iter().enumerate().filter(|(_, f)| f.length() > 1e-3 * largest_n) {
+            for axis in 0..3 {
+                let moved = |by_m: f64| {
+                    let mut x = x.clone();
+                    x[node][axis] += by_m;
+                    walls.meeting(&x).energy_j
+                };
+                let slope = -(moved(1e-8) - moved(-1e-8)) / 2e-8;
+                assert!((slope - force_n[axis]).abs() < 1e-4 * largest_n, "node {node}: {slope} {force_n}");
+                looked_at += 1;
+            }
+        }
+    }
+    assert!(looked_at > 300, "{looked_at}");
+}
+
+#[test]
+fn what_the_step_is_told_is_no_less_than_the_stiffness() {
+    let mesh = clamp();
+    let walls = walls_of(&mesh, true).unwrap();
+    // Not vertex over vertex, where what walls bear has a kink.
+    let x = bent(&mesh, 2.2e-3, 1e-4, 1);
+    let near = walls.near_at(&x);
+    let mut scratch = walls.scratch();
+    walls.press(&x, &near, &mut vec![DVec3::ZERO; x.len()], &mut scratch);
+    // The largest eigenvalue of M⁻¹K by power iteration on differences of forces.
+    let mut direction = vec![DVec3::Z; x.len()];
+    let mut value = 0.0;
+    for round in 0..60 {
+        let at = |sign: f64| {
+            let x: Vec<DVec3> = x.iter().zip(&direction).map(|(x, d)| *x + *d * (1e-9 * sign)).collect();
+            let mut forces_n = vec![DVec3::ZERO; x.len()];
+            walls.press(&x, &walls.near_at(&x), &mut forces_n, &mut walls.scratch());
+            forces_n
+        };
+        let kg = |node: usize| if node.is_multiple_of(3) { 6e-6 } else { 3e-5 };
+        let changes = at(1.0).into_iter().zip(at(-1.0)).enumerate();
+        let product: Vec<DVec3> = changes.map(|(node, (p, m))| (m - p) / 2e-9 / kg(node)).collect();
+        value = product.iter().map(|p| p.length_squared()).sum::<f64>().sqrt();
+        let mut random = Random(7 + round);
+        let noise = if round == 0 { value } else { 0.0 };
+        direction = product.iter().map(|p| (*p + random.vector() * noise) / value).collect();
+        let length = direction.iter().map(|d| d.length_squared()).sum::<f64>().sqrt();
+        for d in &mut direction {
+            *d /= length;
+        }
+    }
+    let told = scratch.most_frequency_sq;
+    println!("largest {value:.3e} 1/s², told {told:.3e} 1/s²");
+    assert!(value > 0.1 * told && value < told, "{value:e} {told:e}");
+}
+
+/// Neighbours along the skin and the other side of a vertex's own wall may never meet; the arm on the other side may.
+#[test]
+fn who_may_meet_is_settled_at_rest() {
+    let mesh = clamp();
+    let walls = walls_of(&mesh, true).unwrap();
+    let (forces_n, seen) = pressed(&walls, mesh.positions_m());
+    assert!(forces_n.iter().all(|f| *f == DVec3::ZERO) && seen.vertices == 0 && walls.left_out() == 0);
+    let at = |p: DVec3| mesh.positions_m().iter().position(|q| q.distance(p) < 1e-9).unwrap() as u32;
+    let inner = at(DVec3::new(0.028, 0.004, 0.008));
+    let triangles_at = |node: u32| walls.around.row(node as usize).iter().map(|&t| t as usize);
+    let may = |node: u32, other: u32| triangles_at(other).any(|triangle| walls.may_meet_m(node, triangle).is_some());
+    assert!(may(inner, at(DVec3::new(0.028, 0.004, 0.012))), "the other arm's inner side");
+    assert!(!may(inner, at(DVec3::new(0.028, 0.004, 0.0))), "its own arm's outer side");
+    assert!(!may(inner, at(DVec3::new(0.032, 0.004, 0.008))), "a neighbour");
+    // Pressed flat to a third of its thickness, an arm presses nothing by itself.
+    let flat: Vec<DVec3> = mesh.positions_m().iter().map(|p| DVec3::new(p.x, p.y, p.z / 3.0)).collect();
+    let only_lower = |p: &DVec3| p.z < 0.008;
+    let lower: f64 = pressed(&walls, &flat)
+        .0
+        .iter()
+        .zip(mesh.positions_m())
+        .filter(|(_, rest)| only_lower(rest) && (rest.z - 0.008).abs() > 1e-6)
+        .map(|(f, _)| f.length())
+        .sum();
+    assert_eq!(lower, 0.0);
+}
+
+#[test]
+fn a_box_faces_itself_nowhere() {
+    assert!(walls_of(&tet_box(DVec3::ZERO, DVec3::splat(0.02), [4; 3]), true).is_none());
+    assert!(walls_of(&tet_box(DVec3::ZERO, DVec3::splat(0.02), [4; 3]), false).is_some());
+}
+
+/// A vertex that lies on a wall at rest is left out and told; without it the rest state would press.
+#[test]
+fn parts_that_touch_at_rest_press_nothing_there() {
+    let one = tet_box(DVec3::ZERO, DVec3::new(0.02, 0.02, 0.01), [4, 4, 2]);
+    let other = tet_box(DVec3::Z * 0.01, DVec3::new(0.02, 0.02, 0.01), [5, 5, 2]);
+    let count = one.positions_m().len() as u32;
+    let positions = one.positions_m().iter().chain(other.positions_m()).copied().collect();
+    let tets = one.tets().iter().copied().chain(other.tets().iter().map(|tet| tet.map(|n| n + count))).collect();
+    let mesh = TetMesh::new(positions, tets).unwrap();
+    let walls = walls_of(&mesh, false).unwrap();
+    assert_eq!(walls.left_out(), 25 + 36);
+    assert_eq!(pressed(&walls, mesh.positions_m()).1.vertices, 0);
+}
+
+/// All that a query rules out by bounds is indeed out of reach, whatever the deformation.
+#[test]
+fn queries_lose_nothing_that_is_within_reach() {
+    let mesh = clamp();
+    let walls = walls_of(&mesh, true).unwrap();
+    let mut met = 0;
+    for seed in 0..40 {
+        let x = bent(&mesh, 1e-4 * seed as f64, 3e-4, seed + 1);
+        let found = walls.near_at(&x);
+        let slack_m = found.slack_m;
+        assert!(slack_m >= 0.99 * walls.stride_m, "{slack_m}");
+        let surface_nodes = (0..x.len() as u32).filter(|&n| walls.nodes[n as usize] != NodeAtRest::INSIDE);
+        for node in surface_nodes {
+            let all = (0..walls.triangles.len() as u32).filter(|&t| walls.may_meet_m(node, t as usize).is_some());
+            let listed = found.pairs().iter().filter(|pair| pair.node == node).map(|pair| pair.triangle);
+            let (by_all, by_list) = (walls.gap(node, &all, &x), walls.gap(node, &listed, &x));
+            assert_eq!(by_all, by_list, "node {node}");
+            met += u32::from(by_all.is_some_and(|gap| gap.distance_m < walls.nodes[node as usize].margin_m));
+        }
+    }
+    assert!(met > 100, "{met}");
+}
+
+/// In a step that was too long nodes were anywhere or not finite, and one query looked at every vertex with every
+/// triangle for seconds, before the tick was taken back.
+#[test]
+fn a_torn_skin_is_passed_over_and_told() {
+    let mesh = clamp();
+    let walls = walls_of(&mesh, true).unwrap();
+    let mut random = Random(3);
+    let anywhere: Vec<DVec3> = mesh.positions_m().iter().map(|p| *p + random.vector()).collect();
+    let mut not_finite = mesh.positions_m().to_vec();
+    for p in not_finite.iter_mut().step_by(3) {
+        p.y = f64::NAN;
+    }
+    for x in [anywhere, not_finite] {
+        let near = walls.near_at(&x);
+        assert!(near.pairs().is_empty() && walls.meeting(&x).missed > 0);
+    }
+    assert_eq!(walls.meeting(mesh.positions_m()).missed, 0);
+}
