@@ -43,6 +43,11 @@ fn presses() {
 }
 
 #[test]
+fn squeezes() {
+    passes("squeezes");
+}
+
+#[test]
 fn leaps() {
     passes("leaps");
 }

@@ -5,6 +5,7 @@
 mod hand;
 pub(super) mod leaps;
 pub(super) mod presses;
+pub(super) mod squeezes;
 mod watch;
 
 use miette::{Result, bail, miette};
