@@ -42,10 +42,8 @@ fn nearest(points: impl Iterator<Item = DVec3>, to_m: DVec3) -> Option<(usize, D
 /// Returns the outward unit normal of the skin at a vertex, by the areas of the triangles there.
 fn outward(hybrid: &HybridBody, vertex: u32) -> Option<DVec3> {
     let rest_m = hybrid.skin_rest_m();
-    let skin = &hybrid.particles().skin;
-    let of_triangle = |&triangle: &u32| {
-        let [a, b, c] = skin.triangles()[triangle as usize].map(|corner| rest_m[corner as usize]);
-        (b - a).cross(c - a)
-    };
-    skin.triangles_at(vertex).iter().map(of_triangle).sum::<DVec3>().try_normalize()
+    let around = hybrid.particles().skin.triangles().iter().filter(|corners| corners.contains(&vertex));
+    let sum_m2: DVec3 =
+        around.map(|corners| corners.map(|corner| rest_m[corner as usize])).map(|[a, b, c]| (b - a).cross(c - a)).sum();
+    sum_m2.try_normalize()
 }
