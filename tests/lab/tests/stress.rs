@@ -43,16 +43,6 @@ fn presses() {
 }
 
 #[test]
-fn squeezes() {
-    passes("squeezes");
-}
-
-#[test]
-fn leaps() {
-    passes("leaps");
-}
-
-#[test]
 fn activation() {
     passes("activation");
 }
