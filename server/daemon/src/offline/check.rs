@@ -153,13 +153,13 @@ fn verdict(us: &Percentiles, period_us: f64, cost: &Cost) -> &'static str {
 /// Whether walls of the body press each other where they meet.
 fn print_walls(model: &Model) {
     if !model.has_self_contact() {
-        println!("walls      pass through each other where they meet");
+        say(format_args!("walls      pass through each other where they meet"));
         return;
     }
-    println!("walls      press each other where they meet");
+    say(format_args!("walls      press each other where they meet"));
     let left_out = model.vertices_against_themselves();
     if left_out > 0 {
-        println!("           {left_out} of its vertices do not: the body lies against itself there at rest");
+        say(format_args!("           {left_out} of its vertices do not: the body lies against itself there at rest"));
     }
 }
 

@@ -341,7 +341,7 @@ impl Summary {
             ));
         }
         if let Some(walls) = &self.walls {
-            println!("  {}", walls.line());
+            say(format_args!("  {}", walls.line()));
         }
         if let Some(solve) = &self.solve {
             say(format_args!("  {}, in {:.3} s", solve.line(), self.wall_s));
