@@ -88,7 +88,9 @@ fn pressed(daemon: &Daemon, arm: &Emulated, period_s: f64, recording: &Path) -> 
 }
 
 /// A machine that runs tests stands still for 17 ms now and then, and then the force is gone for 0.7 s: so often is a press tried.
-const TRIES: usize = 8;
+const TRIES: usize = 4;
+/// Presses among which the simulated arm's force is to come twice.
+const PRESSES: usize = 9;
 
 /// Presses until the force is that of `expected`, but for `most` of the peak (root mean square).
 fn judge(name: &str, expected: &Curve, most: f64, press: impl Fn() -> Curve) {
@@ -113,7 +115,7 @@ fn judge(name: &str, expected: &Curve, most: f64, press: impl Fn() -> Curve) {
 /// The curve of the simulated arm: one that comes twice, whatever came between.
 fn expected(daemon: &Daemon, hand: &Hand, recording: &Path) -> Curve {
     let mut earlier: Vec<Curve> = Vec::new();
-    for _ in 0..=TRIES {
+    for _ in 0..PRESSES {
         let curve = pressed(daemon, &arms::simulated(hand), hand.period_s, recording);
         if earlier.iter().any(|before| curve.apart_n(before).0 < 5e-3 * curve.peak_n()) {
             return curve;

@@ -17,3 +17,4 @@ mod say;
 pub mod schema;
 pub mod simulate;
 mod summary;
+mod walls;

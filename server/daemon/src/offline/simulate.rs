@@ -7,7 +7,8 @@ use super::{
     interrupt::Interrupt,
     load,
     probe_rows::ProbeRows,
-    summary::{Ending, PeakNumbers, Percentiles, Summary, TimeNumbers, WallNumbers},
+    summary::{Ending, PeakNumbers, Percentiles, Summary, TimeNumbers},
+    walls::WallNumbers,
 };
 use crate::{bodies::FirstTouch, progress::Progress, strained::Seen};
 use glam::DVec3;

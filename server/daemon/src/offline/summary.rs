@@ -1,7 +1,7 @@
 //! What a run did, as JSON for programs and as lines for people.
-use super::{folder, probe_rows::ProbeRows, say::say};
+use super::{folder, probe_rows::ProbeRows, say::say, walls::WallNumbers};
 use miette::{IntoDiagnostic, WrapErr};
-use palpate_physics::{AwakeFor, Energies, Model, State, contact::MeetingWalls, snapshot, world};
+use palpate_physics::{AwakeFor, Energies, Model, State, snapshot, world};
 use palpate_scene::{Scene, wording::counted};
 use serde::Serialize;
 use std::{collections::BTreeMap, path::Path};
@@ -136,42 +136,6 @@ pub(super) struct Percentiles {
     pub(super) p50: f64,
     pub(super) p99: f64,
     pub(super) max: f64,
-}
-
-/// Walls of the body that met.
-#[derive(Debug, Clone, Copy, Default, Serialize)]
-pub(super) struct WallNumbers {
-    /// Ticks at whose end they did.
-    pub(super) ticks: u64,
-    /// Most vertices of the surface that were pressed at once.
-    pub(super) most_vertices: u32,
-    /// The least gap (m) between them, negative where they overlapped.
-    pub(super) least_gap_m: f64,
-    /// Most pairs of a vertex and a triangle that had no room in the lists at once: walls may have passed there.
-    pub(super) most_missed: u32,
-}
-
-impl WallNumbers {
-    /// Counts a tick.
-    pub(super) fn add(&mut self, seen: &MeetingWalls) {
-        self.most_missed = self.most_missed.max(seen.missed);
-        if seen.vertices > 0 {
-            self.least_gap_m = if self.ticks == 0 { seen.least_gap_m } else { self.least_gap_m.min(seen.least_gap_m) };
-            self.ticks += 1;
-            self.most_vertices = self.most_vertices.max(seen.vertices);
-        }
-    }
-
-    fn line(&self) -> String {
-        let (ticks, vertices) = (counted(self.ticks as usize, "tick"), self.most_vertices);
-
-        let missed = match self.most_missed {
-            0 => String::new(),
-            _ => "; there was no room for all that was near, so that walls may have passed".to_owned(),
-        };
-        let gap_mm = self.least_gap_m * 1e3;
-        format!("walls of the body met in {ticks}: up to {vertices} vertices pressed, least gap {gap_mm:.3} mm{missed}")
-    }
 }
 
 /// The cost and quality of a static solve.

@@ -1,0 +1,40 @@
+//! What `simulate` tells of walls of the body that met.
+use palpate_physics::contact::MeetingWalls;
+use palpate_scene::wording::counted;
+use serde::Serialize;
+
+/// Walls of the body that met in the ticks of a run.
+#[derive(Debug, Clone, Copy, Default, Serialize)]
+pub(super) struct WallNumbers {
+    /// Ticks at whose end they did.
+    pub(super) ticks: u64,
+    /// Most vertices of the surface that were pressed at once.
+    pub(super) most_vertices: u32,
+    /// The least gap (m) between them, negative where they overlapped.
+    pub(super) least_gap_m: f64,
+    /// Most pairs that could not be looked at at once, as there was no room or the skin was torn: walls may have passed there.
+    pub(super) most_missed: u32,
+}
+
+impl WallNumbers {
+    /// Counts a tick.
+    pub(super) fn add(&mut self, seen: &MeetingWalls) {
+        self.most_missed = self.most_missed.max(seen.missed);
+        if seen.vertices > 0 {
+            self.least_gap_m = if self.ticks == 0 { seen.least_gap_m } else { self.least_gap_m.min(seen.least_gap_m) };
+            self.ticks += 1;
+            self.most_vertices = self.most_vertices.max(seen.vertices);
+        }
+    }
+
+    /// Says it in words.
+    pub(super) fn line(&self) -> String {
+        let (ticks, vertices) = (counted(self.ticks as usize, "tick"), self.most_vertices);
+        let missed = match self.most_missed {
+            0 => String::new(),
+            _ => "; not all that was near could be looked at, so that walls may have passed".to_owned(),
+        };
+        let gap_mm = self.least_gap_m * 1e3;
+        format!("walls of the body met in {ticks}: up to {vertices} vertices pressed, least gap {gap_mm:.3} mm{missed}")
+    }
+}
