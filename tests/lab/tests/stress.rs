@@ -43,6 +43,16 @@ fn presses() {
 }
 
 #[test]
+fn squeezes() {
+    passes("squeezes");
+}
+
+#[test]
+fn leaps() {
+    passes("leaps");
+}
+
+#[test]
 fn activation() {
     passes("activation");
 }

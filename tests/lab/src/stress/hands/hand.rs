@@ -21,9 +21,9 @@ const STAYS_TICKS: u32 = 60;
 pub(super) struct Press {
     pub(super) tool: ToolSpec,
     /// Unit vector into the body.
-    along: DVec3,
+    pub(super) along: DVec3,
     /// Way (m) of the hand from its start to where it would touch the body at rest.
-    gap_m: f64,
+    pub(super) gap_m: f64,
     depth_m: f64,
     pub(super) speed_m_per_s: f64,
     /// Whether the tool is far from the body's edges.

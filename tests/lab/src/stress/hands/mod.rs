@@ -3,7 +3,9 @@
 //!
 //! A body that passes only what it was tuned on is of no use to a hand.
 mod hand;
+pub(super) mod leaps;
 pub(super) mod presses;
+pub(super) mod squeezes;
 mod watch;
 
 use miette::{Result, bail, miette};

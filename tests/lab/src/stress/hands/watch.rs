@@ -15,11 +15,11 @@ pub(super) const MOST_IMBALANCE: f64 = 0.05;
 /// Force (N) below which a fall is none, as samples come and go.
 const LEAST_N: f64 = 0.05;
 /// Energy (J) that counts as moved even where a hand hardly touches: forces in f32 are wrong by as much as a part of it.
-const LEAST_J: f64 = 1e-6;
+pub(super) const LEAST_J: f64 = 1e-6;
 /// Depth (m) of the surface in a tool, over its radius, at which it presses.
-const DEEP: f64 = 0.02;
+pub(super) const DEEP: f64 = 0.02;
 /// Number of ticks between two looks at whether a tool is inside.
-const LOOK_EVERY: u32 = 5;
+pub(super) const LOOK_EVERY: u32 = 5;
 /// Ticks after the hand is back.
 const LATER_TICKS: u32 = 100;
 
