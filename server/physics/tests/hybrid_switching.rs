@@ -225,3 +225,30 @@ fn waking_beneath_the_tool_is_not_felt_as_a_step() {
     println!("waking beneath: {coarse_n:.3} to {fine_n:.3} N, at most {worst:.1e} in a tick");
     assert!(fine_n < 0.8 * coarse_n && worst < 0.05, "{coarse_n} {fine_n} {worst}");
 }
+
+/// A tool touches skin whose particles sleep, where coarse tets are turned inside out in part. What woke there with the
+/// energy of a crushed volume drove the body through the tool.
+#[test]
+fn what_sleeps_in_crushed_parts_of_tets_does_not_wake_with_energy_from_nowhere() {
+    let mut woken = 0;
+    for (number, push_m) in [0.0, 2e-3, 4e-3, 6e-3, 8e-3].into_iter().enumerate() {
+        let mut spec = held_below(hybrid_block((0.02, 2, 8), 0.45, 400, Waking::ByTools { reach_m: 8e-3 }));
+        spec.tools = vec![sphere(6e-3, DVec3::Z * 6.2e-3, Coupling::Rigid)];
+        let mut rig = Rig::new(spec);
+        let rest = rig.model.rest_positions_m().to_vec();
+        for (x, rest) in rig.state.mechanical.x.iter_mut().zip(&rest) {
+            // Beneath the tool, one node is pushed down towards the one below it, and aside.
+            if rest.z > -1e-3 && rest.truncate().length() < 1e-3 {
+                *x += DVec3::new(0.4, 0.1, -1.0) * push_m;
+            }
+        }
+        let elastic_j = Energies::of(&rig.model, &rig.state).elastic_j;
+        rig.tick_at(DVec3::Z * (5.9e-3 - push_m));
+        let awake = rig.state.body.active_particles().len();
+        let dissipated_j = rig.state.mechanical.ledger.dissipated_j;
+        println!("{push_m}: {awake} awake, {elastic_j:.3e} J, {dissipated_j:.3e} J");
+        woken += usize::from(awake > 0);
+        assert!(dissipated_j > -0.02 * elastic_j, "{number}");
+    }
+    assert!(woken > 1);
+}

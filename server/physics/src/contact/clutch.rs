@@ -21,8 +21,8 @@
 //! leaps takes it through nothing unseen.
 use super::{
     ToolModel, ToolSpec, ToolState,
-    foundation::Foundation,
-    proxy::{NEAR, SATURATION_DEPTH},
+    foundation::{Foundation, SATURATION_DEPTH},
+    proxy::NEAR,
     spring::shortened,
     state::ToolContact,
 };
@@ -79,15 +79,15 @@ fn slipped(model: &ToolModel, slip_m: DVec3, contact: &ToolContact, dt_s: f64) -
     }
 }
 
-/// Returns the force (N) at which a rigid tool slips: [`SLIP_FORCE`] times what presses it into the flat foundation as
-/// deep as the coupling of a tool of its radius would at most, or what presses it by a radius into the body where that is
+/// Returns the force (N) at which a rigid tool slips: [`SLIP_FORCE`] times what the coupling of a tool of its radius would
+/// press the surface with at most ([`Foundation::bears_n`]), or what presses it by a radius into the body where that is
 /// more (Hertz, `4/3 E/(1 − ν²) R²`): on coarse triangles the foundation is soft, and the body is stiffer than it should be.
 ///
 /// Beside its two hemispheres, which are a sphere, a capsule has a cylinder: pressed in by `d`, it displaces
 /// `2L (4/3) √(2R) d^{3/2}`, where the sphere displaces `π R d²`.
 pub(super) fn slips_at_n(spec: &ToolSpec, foundation: &Foundation) -> f64 {
     let (radius_m, half_m) = (spec.radius_m, spec.shape.half_length_m());
-    let flat_n = foundation.flat_force_n(radius_m, SATURATION_DEPTH * radius_m);
+    let flat_n = foundation.bears_n(radius_m);
     let into_body_n = 4.0 / 3.0 * foundation.mean_indentation_modulus_pa() * radius_m * radius_m;
     let of_cylinder = 8.0 / (3.0 * PI) * (2.0 / SATURATION_DEPTH).sqrt() * half_m / radius_m;
     SLIP_FORCE * flat_n.max(into_body_n) * (1.0 + of_cylinder)

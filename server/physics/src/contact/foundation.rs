@@ -35,6 +35,10 @@ const FREQUENCY_FRACTION: f64 = 1.5;
 pub(super) const SPACING: f64 = 1.0 / 3.0;
 /// Largest number of subdivisions of a triangle's edge; triangles that need more are refused.
 pub(super) const MAX_LEVEL: usize = 48;
+/// Depth, over R, in the flat foundation at which a coupling's force saturates.
+pub(super) const SATURATION_DEPTH: f64 = 0.3;
+/// Depth, over R, in a deep body of elastic material beyond which no tool is pressed.
+const BEARS_RADII: f64 = 3.0;
 
 /// Samples and stiffness of the surface as one tool meets it; indices are those of [`Triangles`].
 #[derive(Debug, Clone)]
@@ -182,6 +186,16 @@ impl Foundation {
     /// `∫ k_f (d − r²/2R) dA = π k_f R d²`.
     pub(super) fn flat_force_n(&self, radius_m: f64, depth_m: f64) -> f64 {
         PI * self.typical_pa_per_m * radius_m * depth_m * depth_m
+    }
+
+    /// Returns the most force (N) that a tool of this radius may press the surface with: what presses a sphere
+    /// [`SATURATION_DEPTH`]·R into the flat foundation, and no more than what presses it [`BEARS_RADII`]·R deep into the
+    /// stiffest part of the body, `4/3 E/(1 − ν²) √R d^{3/2}` (Hertz). On fine triangles the foundation is so much stiffer than
+    /// the body that it would bear what turns the body inside out.
+    pub(super) fn bears_n(&self, radius_m: f64) -> f64 {
+        let stiffest_pa = self.indentation_modulus_pa.iter().copied().fold(0.0, f64::max);
+        let of_body_n = 4.0 / 3.0 * stiffest_pa * radius_m * radius_m * BEARS_RADII.powf(1.5);
+        self.flat_force_n(radius_m, SATURATION_DEPTH * radius_m).min(of_body_n)
     }
 
     /// Returns the mean of `E/(1 − ν²)` (Pa) behind the triangles; 0 without any.

@@ -170,7 +170,7 @@ impl ToolModel {
         let depth_m = proxy::IMPACT_DEPTH * radius_m;
         Self {
             spec: spec.clone(),
-            force_limit_n: foundation.flat_force_n(radius_m, proxy::SATURATION_DEPTH * radius_m),
+            force_limit_n: foundation.bears_n(radius_m),
             slips_at_n: clutch::slips_at_n(spec, &foundation),
             // ∫ π k_f R d² dd
             impact_energy_j: foundation.flat_force_n(radius_m, depth_m) * depth_m / 3.0,

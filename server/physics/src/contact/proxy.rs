@@ -9,14 +9,17 @@
 //! mm/s, of which a damper of 2 N s/m makes a buzz of 0.1 N.
 //!
 //! What keeps it outside, whatever the device does:
-//! - The spring saturates ([`super::spring`]) at `F_max`, the force that presses a sphere of its radius
-//!   [`SATURATION_DEPTH`]·R into the flat foundation. The damper is cut where the sum exceeds it. Where nothing is within
+//! - The spring saturates ([`super::spring`]) at `F_max`, the force that the surface may be pressed with
+//!   ([`super::foundation::Foundation::bears_n`]). The damper is cut where the sum exceeds it. Where nothing is within
 //!   R/4 of the tool, neither is: so limited, a small tool falls behind a quick hand in the air. What its device is told
 //!   is limited everywhere.
 //! - It moves at most `R/4` in a substep; within `R/4` of the surface it approaches the nearest point, seen from there,
 //!   with at most the kinetic energy that the flat foundation stores at depth [`IMPACT_DEPTH`]·R. The rest is taken
 //!   from the (virtual) tool, never given to tool or body. In contact that point moves with the dent, which the body
 //!   will stop: there a surface that gives way allows no more speed than one at rest.
+//!
+//! A saturated spring is as soft as its secant, `K e₀/|e|`, so its damper is weaker by the root of that,
+//! `B √(e₀/|e|)`: the whole of it would let a small tool creep to its device at `F_max/B`, a few millimetres per second.
 //!
 //! A rigid tool follows its device through a clutch ([`super::clutch`]).
 //!
@@ -30,8 +33,6 @@ use super::{
 };
 use glam::DVec3;
 
-/// Depth, over R, at which the coupling's force saturates.
-pub(super) const SATURATION_DEPTH: f64 = 0.3;
 /// Depth, over R, whose foundation energy bounds the proxy's kinetic energy near the surface.
 pub(super) const IMPACT_DEPTH: f64 = 0.4;
 /// Largest motion in a substep, and width of the zone near the surface, both over R.
@@ -199,6 +200,7 @@ impl Pull {
         }
         *velocity_m_per_s += (contact_n + spring_n) * (h_s / mass_kg);
         // Impulse of the damper over h: m (1 − e^{−B h/m}) (ḋ − ċ)
+        let damping_n_s_per_m = damping_n_s_per_m * spring.secant(stretch_m).sqrt();
         let part = -(-damping_n_s_per_m * h_s / mass_kg).exp_m1();
         // |s + β d| ≤ limit and |s| ≤ limit: no more than twice the limit of the damper's force can be used.
         let damper_n = shortened((device_m_per_s - *velocity_m_per_s) * (mass_kg * part / h_s), 2.0 * limit_n);

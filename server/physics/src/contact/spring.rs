@@ -22,6 +22,12 @@ impl SaturatingSpring {
         shortened(stretch_m, self.limit_n / self.stiffness_n_per_m) * self.stiffness_n_per_m
     }
 
+    /// Returns the secant stiffness over `K`: 1 or, beyond `e₀`, `e₀/|e|`.
+    pub(crate) fn secant(self, stretch_m: DVec3) -> f64 {
+        let full_n = self.stiffness_n_per_m * stretch_m.length();
+        if full_n <= self.limit_n { 1.0 } else { self.limit_n / full_n }
+    }
+
     /// Returns `Ψ` (J).
     pub(crate) fn energy_j(self, stretch_m: DVec3) -> f64 {
         let (length_m, linear_m) = (stretch_m.length(), self.limit_n / self.stiffness_n_per_m);

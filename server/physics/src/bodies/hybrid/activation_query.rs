@@ -23,6 +23,9 @@ const ARRIVES_S: f64 = 5e-3;
 const AWAY_TICKS: u32 = 100;
 /// Deviation over the spacing below which a particle may fall asleep.
 const SETTLED: f64 = 0.04;
+/// Deviation over the spacing from which a particle does not fall asleep, even where its room is needed: crushed cells
+/// would change so much in the instant that the body is driven by it rather than by the tool.
+const FAR_OFF: f64 = 0.5;
 
 /// Updates the tools' balls.
 pub(super) fn update_balls(
@@ -176,7 +179,8 @@ fn balls_of_tools<'a>(
 impl ActivationQuery {
     /// Finds the particles that tools, loads and injected forces want, ascending. Where there is no room for all, each
     /// claim gets as many: of a tool those nearest to the middles of its balls, and to the lines between those of
-    /// neighbours; of loads those nearest to where they act (see [`super::load_claims`]).
+    /// neighbours; of loads those nearest to where they act (see [`super::load_claims`]). The room of `occupied` particles
+    /// is left free.
     pub(super) fn want(
         &mut self,
         environment: &Environment,
@@ -184,9 +188,10 @@ impl ActivationQuery {
         own: &HybridState,
         reach_m: f64,
         acting: Acting<'_>,
+        occupied: usize,
     ) {
         self.wanted.clear();
-        let room = self.room(environment, body, own, acting);
+        let room = self.room(environment, body, own, acting, occupied);
         self.want_for_tools(environment, body, own, reach_m, room);
         self.want_for_loads(acting, room);
         self.want_for_points(environment, body, acting, reach_m, room);
@@ -194,18 +199,19 @@ impl ActivationQuery {
         self.wanted.dedup();
     }
 
-    /// Returns how many particles each claim gets.
+    /// Returns how many particles each claim gets, of the room that `occupied` ones leave.
     pub(super) fn room(
         &self,
         environment: &Environment,
         body: &HybridBody,
         own: &HybridState,
         acting: Acting<'_>,
+        occupied: usize,
     ) -> usize {
         let of_tools = balls_of_tools(environment, body, own).filter(|balls| balls.iter().any(Option::is_some)).count();
         let of_points = usize::from(acting.points.iter().any(|point| environment.accepts(point)));
         let claims = of_tools + self.load_claims.count(acting.load_factors) + of_points;
-        body.particles.most_active / claims.max(1)
+        body.particles.most_active.saturating_sub(occupied) / claims.max(1)
     }
 
     /// Adds what tools want, of each as many as there is room for.
@@ -261,6 +267,15 @@ impl ActivationQuery {
     ) {
         self.nearest.add_points(environment, body, acting.points, reach_m);
         self.nearest.take(room, &mut self.wanted);
+    }
+
+    /// Returns the number of active particles that are not wanted, but too far from where they would be asleep to fall
+    /// asleep now.
+    pub(super) fn far_off(&self, patch: &RunningPatch, particles: &ParticleSpec) -> usize {
+        let is_far_off = |&(particle, deviation_m): &(u32, f64)| {
+            deviation_m > FAR_OFF * particles.spacing_m && self.wanted.binary_search(&particle).is_err()
+        };
+        patch.deviations_m().filter(is_far_off).count()
     }
 
     /// Keeps active particles awake that no tool wants but that are not settled, as long as there is room; those that

@@ -22,7 +22,7 @@ impl HybridBody {
         }
         let mut query = ActivationQuery::new(self, environment);
         let acting = Acting { load_factors, points };
-        let room = query.room(environment, self, own, acting);
+        let room = query.room(environment, self, own, acting, 0);
         let mut of_claim = |wanted: &mut Vec<u32>| wanted.drain(..).filter(|particle| left.remove(particle)).count();
         query.want_for_tools(environment, self, own, reach_m, room);
         let tools = of_claim(&mut query.wanted);

@@ -190,7 +190,7 @@ mod tests {
         assert!(all.iter().all(|&p| partition.anchor(p).weights.iter().all(|&w| w > -1e-8)));
         let masses = Masses::new(&partition, |_| 1000.0);
         let free = vec![BVec3::TRUE; masses.node_kg.len()];
-        assert!(MassMatrix::new(&partition, &masses, &all, &free).is_ok());
+        assert!(MassMatrix::new(&partition, &masses, &all).factorise(&free).is_ok());
     }
 
     #[test]

@@ -28,17 +28,15 @@ impl HybridBody {
         let (patch, active) = self.patch_of(own);
         let (at, rate) = (self.field(&state.x), self.field(&state.v));
         let rest = patch.at_rest(&self.partition);
-        // Active particles follow free nodes within the coarse tets only: the matrix is positive.
-        let mass_matrix = MassMatrix::new(&self.partition, &self.masses, &active, &self.free);
-        let (kinetic_j, gravitational_j) = mass_matrix.map_or((f64::NAN, f64::NAN), |mass_matrix| {
-            let moved = |list: &[DVec3], rest: &[DVec3]| -> Vec<DVec3> {
-                list.iter().zip(rest).map(|(x, rest)| *x - *rest).collect()
-            };
-            let of_nodes: DVec3 = mass_matrix.momenta(&moved(&at.nodes, &rest.nodes)).iter().sum();
-            let particles = moved(&at.particles, &rest.particles);
-            let of_particles: DVec3 = particles.iter().zip(mass_matrix.particle_kg()).map(|(u, m)| *u * *m).sum();
-            (mass_matrix.kinetic_j(&rate.nodes, &rate.particles), 0.0 - gravity_m_per_s2.dot(of_nodes + of_particles))
-        });
+        let mass_matrix = MassMatrix::new(&self.partition, &self.masses, &active);
+        let moved = |list: &[DVec3], rest: &[DVec3]| -> Vec<DVec3> {
+            list.iter().zip(rest).map(|(x, rest)| *x - *rest).collect()
+        };
+        let of_nodes: DVec3 = mass_matrix.momenta(&moved(&at.nodes, &rest.nodes)).iter().sum();
+        let particles = moved(&at.particles, &rest.particles);
+        let of_particles: DVec3 = particles.iter().zip(mass_matrix.particle_kg()).map(|(u, m)| *u * *m).sum();
+        let kinetic_j = mass_matrix.kinetic_j(&rate.nodes, &rate.particles);
+        let gravitational_j = 0.0 - gravity_m_per_s2.dot(of_nodes + of_particles);
         Energies {
             kinetic_j,
             elastic_j: patch.energy_j(&self.materials(), &at),
@@ -59,9 +57,7 @@ impl HybridBody {
     pub fn momentum(&self, own: &HybridState, state: &MechanicalState) -> (DVec3, DVec3) {
         let active = self.patch_of(own).1;
         let (at, rate) = (self.field(&state.x), self.field(&state.v));
-        let Ok(mass_matrix) = MassMatrix::new(&self.partition, &self.masses, &active, &self.free) else {
-            return (DVec3::NAN, DVec3::NAN);
-        };
+        let mass_matrix = MassMatrix::new(&self.partition, &self.masses, &active);
         let of_nodes = mass_matrix.momenta(&rate.nodes);
         let of_particles = rate.particles.iter().zip(mass_matrix.particle_kg()).map(|(w, m)| *w * *m);
         let pairs = at.nodes.iter().chain(&at.particles).zip(of_nodes.into_iter().chain(of_particles));

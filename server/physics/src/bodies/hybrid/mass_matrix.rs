@@ -16,7 +16,8 @@
 //! It is positive definite, and diagonal but for a small dense block of the nodes that active particles follow, which
 //! is factorised when the set changes.
 //!
-//! Ticks use the same matrix as `running/mass_matrix.rs` has it; this one is its oracle, and what energies are counted by.
+//! Ticks use the same matrix as `running/mass_matrix.rs` has it; this one is its oracle, and what energies are counted by,
+//! for which it need not be factorised.
 use super::{partition::Partition, patch::KEPT};
 use glam::{BVec3, DVec3};
 use std::collections::BTreeSet;
@@ -63,8 +64,16 @@ pub struct MassMatrix {
     touched: Vec<u32>,
     /// The dense block of `M'` (kg), row by row.
     block: Vec<f64>,
-    /// Its lower Cholesky factor, axis by axis, over nodes that are free along it; the identity elsewhere.
+}
+
+/// A mass matrix and the factors with which it is solved.
+#[derive(Debug, Clone)]
+pub struct FactorisedMassMatrix {
+    matrix: MassMatrix,
+    /// The lower Cholesky factor of its dense block, axis by axis, over nodes that are free along it; the identity
+    /// elsewhere.
     factors: [Vec<f64>; 3],
+    /// Along which axes each touched node may move.
     free: Vec<BVec3>,
 }
 
@@ -76,17 +85,8 @@ pub struct NotPositive {
 }
 
 impl MassMatrix {
-    /// Factorises `M'` for a set of active particles; `free` tells along which axes each coarse node may move.
-    ///
-    /// # Errors
-    /// Fails where coarse weights are so negative (of particles outside the coarse tets) that `M'` is not positive
-    /// definite.
-    pub fn new(
-        partition: &Partition,
-        masses: &Masses,
-        active: &BTreeSet<u32>,
-        free: &[BVec3],
-    ) -> Result<Self, NotPositive> {
+    /// Returns `M'` for a set of active particles.
+    pub fn new(partition: &Partition, masses: &Masses, active: &BTreeSet<u32>) -> Self {
         let anchors: Vec<_> = active.iter().map(|&particle| partition.anchor(particle)).collect();
         let touched: BTreeSet<u32> = anchors.iter().flat_map(|anchor| anchor.nodes).collect();
         let touched: Vec<u32> = touched.into_iter().collect();
@@ -106,13 +106,22 @@ impl MassMatrix {
                 }
             }
         }
-        let free: Vec<BVec3> = touched.iter().map(|&node| free[node as usize]).collect();
+        Self { particle_kg, node_kg: masses.node_kg.clone(), touched, block }
+    }
+
+    /// Factorises it; `free` tells along which axes each coarse node may move.
+    ///
+    /// # Errors
+    /// Fails where coarse weights are so negative (of particles outside the coarse tets) that `M'` is not positive
+    /// definite.
+    pub fn factorise(self, free: &[BVec3]) -> Result<FactorisedMassMatrix, NotPositive> {
+        let free: Vec<BVec3> = self.touched.iter().map(|&node| free[node as usize]).collect();
         let mut factors = [const { Vec::new() }; 3];
         for (axis, factor) in factors.iter_mut().enumerate() {
             let is_free: Vec<bool> = free.iter().map(|f| f.test(axis)).collect();
-            *factor = cholesky(&block, &is_free).map_err(|at| NotPositive { node: touched[at] })?;
+            *factor = cholesky(&self.block, &is_free).map_err(|at| NotPositive { node: self.touched[at] })?;
         }
-        Ok(Self { particle_kg, node_kg: masses.node_kg.clone(), touched, block, factors, free })
+        Ok(FactorisedMassMatrix { matrix: self, factors, free })
     }
 
     /// Returns the momenta `M' v` (kg m/s) of the coarse nodes.
@@ -126,21 +135,6 @@ impl MassMatrix {
         momenta
     }
 
-    /// Overwrites the forces (N) on the coarse nodes with `M'⁻¹ f` (m/s²) on free axes, zero on the others. `free` is
-    /// that of [`Self::new`].
-    pub fn accelerate(&self, free: &[BVec3], forces_n: &mut [DVec3]) {
-        let mut block: Vec<DVec3> = self.touched.iter().map(|&node| forces_n[node as usize]).collect();
-        for ((force, mass), free) in forces_n.iter_mut().zip(&self.node_kg).zip(free) {
-            *force = DVec3::select(*free, *force / *mass, DVec3::ZERO);
-        }
-        for axis in 0..3 {
-            solve(&self.factors[axis], &mut block, axis, &self.free);
-        }
-        for (&node, acceleration) in self.touched.iter().zip(block) {
-            forces_n[node as usize] = acceleration;
-        }
-    }
-
     /// Returns `(1 − ε) m_p` (kg) of the active particles.
     pub fn particle_kg(&self) -> &[f64] {
         &self.particle_kg
@@ -150,6 +144,29 @@ impl MassMatrix {
     pub fn kinetic_j(&self, v: &[DVec3], w: &[DVec3]) -> f64 {
         let coarse: f64 = self.momenta(v).iter().zip(v).map(|(p, v)| 0.5 * p.dot(*v)).sum();
         coarse + self.particle_kg.iter().zip(w).map(|(m, w)| 0.5 * m * w.length_squared()).sum::<f64>()
+    }
+}
+
+impl FactorisedMassMatrix {
+    /// Returns the matrix itself.
+    pub fn matrix(&self) -> &MassMatrix {
+        &self.matrix
+    }
+
+    /// Overwrites the forces (N) on the coarse nodes with `M'⁻¹ f` (m/s²) on free axes, zero on the others. `free` is
+    /// that of [`MassMatrix::factorise`].
+    pub fn accelerate(&self, free: &[BVec3], forces_n: &mut [DVec3]) {
+        let MassMatrix { touched, node_kg, .. } = &self.matrix;
+        let mut block: Vec<DVec3> = touched.iter().map(|&node| forces_n[node as usize]).collect();
+        for ((force, mass), free) in forces_n.iter_mut().zip(node_kg).zip(free) {
+            *force = DVec3::select(*free, *force / *mass, DVec3::ZERO);
+        }
+        for axis in 0..3 {
+            solve(&self.factors[axis], &mut block, axis, &self.free);
+        }
+        for (&node, acceleration) in touched.iter().zip(block) {
+            forces_n[node as usize] = acceleration;
+        }
     }
 }
 
@@ -219,7 +236,7 @@ mod tests {
     /// A set of particles awake, in motion.
     struct Flight {
         patch: Patch,
-        mass_matrix: MassMatrix,
+        mass_matrix: FactorisedMassMatrix,
         x: Field,
         v: Field,
     }
@@ -227,20 +244,20 @@ mod tests {
     impl Flight {
         fn new(body: &TestBody, active: &BTreeSet<u32>, x: Vec<DVec3>, v: Vec<DVec3>) -> Self {
             let patch = Patch::new(&body.partition, active);
-            let mass_matrix = MassMatrix::new(&body.partition, &body.masses, active, &body.free).unwrap();
+            let mass_matrix = MassMatrix::new(&body.partition, &body.masses, active).factorise(&body.free).unwrap();
             let follow = |nodes: Vec<DVec3>| Field { particles: patch.following(&body.partition, &nodes), nodes };
             Self { x: follow(x), v: follow(v), patch, mass_matrix }
         }
 
         fn momentum(&self) -> (DVec3, DVec3) {
-            let mut momenta = self.mass_matrix.momenta(&self.v.nodes);
-            momenta.extend(self.mass_matrix.particle_kg().iter().zip(&self.v.particles).map(|(m, w)| *w * *m));
+            let mut momenta = self.mass_matrix.matrix().momenta(&self.v.nodes);
+            momenta.extend(self.mass_matrix.matrix().particle_kg().iter().zip(&self.v.particles).map(|(m, w)| *w * *m));
             let positions = self.x.nodes.iter().chain(&self.x.particles);
             (momenta.iter().sum(), positions.zip(&momenta).map(|(x, p)| x.cross(*p)).sum())
         }
 
         fn kinetic_j(&self) -> f64 {
-            self.mass_matrix.kinetic_j(&self.v.nodes, &self.v.particles)
+            self.mass_matrix.matrix().kinetic_j(&self.v.nodes, &self.v.particles)
         }
 
         /// Steps by leapfrog; returns the sum of elastic and kinetic energy (J).
@@ -264,7 +281,9 @@ mod tests {
             for (v, a) in self.v.nodes.iter_mut().zip(&force.nodes) {
                 *v += *a * h_s;
             }
-            for ((w, f), m) in self.v.particles.iter_mut().zip(&force.particles).zip(self.mass_matrix.particle_kg()) {
+            for ((w, f), m) in
+                self.v.particles.iter_mut().zip(&force.particles).zip(self.mass_matrix.matrix().particle_kg())
+            {
                 *w += *f * (h_s / m);
             }
         }
@@ -307,14 +326,14 @@ mod tests {
     #[test]
     fn momenta_undo_accelerations() {
         for body in bodies() {
-            let mass_matrix =
-                MassMatrix::new(&body.partition, &body.masses, &some(&body, |p| p.y > 0.0), &body.free).unwrap();
+            let mass_matrix = MassMatrix::new(&body.partition, &body.masses, &some(&body, |p| p.y > 0.0));
+            let mass_matrix = mass_matrix.factorise(&body.free).unwrap();
             let mut random = Random(12);
             let forces: Vec<DVec3> =
                 body.free.iter().map(|free| DVec3::select(*free, random.vector(), DVec3::ZERO)).collect();
             let mut accelerations = forces.clone();
             mass_matrix.accelerate(&body.free, &mut accelerations);
-            for (p, f) in mass_matrix.momenta(&accelerations).iter().zip(&forces) {
+            for (p, f) in mass_matrix.matrix().momenta(&accelerations).iter().zip(&forces) {
                 assert!((*p - *f).length() < 1e-10, "{p} {f}");
             }
         }

@@ -8,6 +8,7 @@ pub mod cell;
 pub mod clusters;
 pub mod composite;
 mod constrained_points;
+mod crushed_parts;
 pub mod embedding_mesh;
 mod energy;
 mod frequency;

@@ -82,6 +82,9 @@ pub(super) struct Progress {
     along_j: [f64; 2],
 }
 
+/// Determinant of a gradient up to which it counts as inverted.
+const LEAST_J: f64 = 0.05;
+
 /// Returns `e^{−T/τ}`, by which a decay goes on in a period `T`.
 pub(super) fn factor(period_s: f64, time_constant_s: f64) -> f64 {
     (-period_s / time_constant_s).exp()
@@ -95,11 +98,16 @@ pub(super) fn effective(f: &DMat3, a: &DMat3) -> DMat3 {
 /// Returns `A` with which the effective gradient of `F` is `wanted`; it is shortened where it would have an entry above 2,
 /// and zero where `F` is (nearly) inverted. The energy then jumps, and the jump is booked.
 pub(super) fn change(f: &DMat3, wanted: &DMat3) -> DMat3 {
-    if f.determinant() <= 0.05 {
+    if f.determinant() <= LEAST_J {
         return DMat3::ZERO;
     }
     let a = f.inverse() * (*wanted - *f);
     a * (MOST / largest(&a)).min(1.0)
+}
+
+/// Returns whether there is an `A` with which the effective gradient of `F` is `wanted`, neither zero nor shortened.
+pub(super) fn is_in_reach(f: &DMat3, wanted: &DMat3) -> bool {
+    f.determinant() > LEAST_J && largest(&(f.inverse() * (*wanted - *f))) <= MOST
 }
 
 /// Returns the stress `P̃(F (I + A)) (I + A)ᵀ` (Pa).

@@ -5,7 +5,7 @@
 //! is deepest in the body. The ball exists from when the gap is less than `g₀ + v·50 ms` until the gap has been twice
 //! that for 100 ms, and follows the tool in steps of a spacing. A capsule has several such balls, one for each sample
 //! of its axis. A particle that no tool wants any more falls asleep once it is nearly where it would be asleep, or when
-//! its room is needed.
+//! its room is needed and it is not far from there.
 //!
 //! A switch keeps momentum. What wakes moves as it was moved (`mass_matrix`). What falls asleep transfers impulses to the
 //! coarse nodes, and all of it together a couple: with `m = (1 − ε) m_p`, the position `x_p = Σ_i ζ_pi x_i` that a
@@ -22,6 +22,7 @@ use super::{
     activation_query::{Acting, begins_to_act, meets_sleeping_skin, moves_quickly, update_balls},
     body::HybridBody,
     carried_skin::SkinView,
+    crushed_parts::CrushedParts,
     load_claims::{LoadClaims, NearestParticles},
     patch::KEPT,
     projection::Projection,
@@ -43,6 +44,8 @@ const SWITCH_TICKS: u64 = 2 + RunningPatch::SLICES as u64;
 /// Number of ticks between two activation queries. After each, what is to sleep falls asleep, and then what is to wake
 /// wakes: both in one tick would take too long.
 pub(super) const QUERY_EVERY_TICKS: u64 = 2 * SWITCH_TICKS;
+/// Number of times that room is made in a query for what may not fall asleep.
+const MOST_WANTS: usize = 4;
 /// Number of ticks between two switches that are done at once.
 const AT_ONCE_EVERY_TICKS: u32 = 4;
 /// Number of ticks between two looks for tools that arrive at sleeping skin, if none is quick.
@@ -76,6 +79,7 @@ pub(super) struct ActivationQuery {
     pub(super) wanted: Vec<u32>,
     /// Active particles that no tool wants, each with its distance (m) from where it would be asleep.
     pub(super) unwanted: Vec<(f64, u32)>,
+    crushed_parts: CrushedParts,
     moved: Vec<DVec3>,
     /// Impulses (kg m/s) transferred to coarse nodes.
     impulses: Vec<DVec3>,
@@ -115,6 +119,7 @@ impl ActivationQuery {
             nearest: NearestParticles::with_room(body.partition.particle_count()),
             wanted: Vec::with_capacity(most_wanted),
             unwanted: Vec::with_capacity(most),
+            crushed_parts: CrushedParts::new(body),
             moved: Vec::with_capacity(most),
             impulses: Vec::with_capacity(body.node_count() + most),
             transferred_n: Vec::with_capacity(body.node_count()),
@@ -242,7 +247,17 @@ impl HybridScratch {
         let Self { patch, query, .. } = self;
         patch.displace(body, &state.x);
         update_balls(environment, &mut SkinView::new(body, patch), body, own, state);
-        query.want(environment, body, own, reach_m, Acting { load_factors: &state.load_factors, points });
+        let acting = Acting { load_factors: &state.load_factors, points };
+        query.want(environment, body, own, reach_m, acting, 0);
+        // What has no room any more may be far off itself.
+        for _ in 0..MOST_WANTS {
+            let far_off = query.far_off(patch, &body.particles);
+            if query.wanted.len() + far_off <= body.particles.most_active {
+                break;
+            }
+            query.want(environment, body, own, reach_m, acting, far_off);
+        }
+        query.crushed_parts.leave_asleep(body, patch, &state.x, &mut query.wanted);
         query.keep_unsettled(patch, &body.particles);
     }
 
