@@ -83,11 +83,11 @@ fn a_device_that_leaps_out_of_the_world_leaves_numbers_finite() {
     }
 }
 
-/// A device whose tool a surface holds goes 14 mm along it, beneath it. The damper of the whole spring let the tool creep after it,
+/// A device whose tool a surface holds goes 9 mm along it, beneath it. The damper of the whole spring let the tool creep after it,
 /// at what the surface bears over the damping, 10 mm/s.
 #[test]
 fn a_small_tool_that_a_surface_holds_does_not_creep_after_its_device() {
-    let (from_m, to_m) = (DVec3::new(-7e-3, 0.0, -2e-3), DVec3::new(7e-3, 0.0, -2e-3));
+    let (from_m, to_m) = (DVec3::new(-7e-3, 0.0, -2e-3), DVec3::new(2e-3, 0.0, -2e-3));
     let mut rig = Rig::new(block(3.0, DVec3::new(-7e-3, 0.0, 2e-3)));
     (0..200).for_each(|_| _ = rig.tick_at(from_m));
     assert!(tool(&rig).contact_force_n.z > 0.0 && tool(&rig).centre_m.distance(from_m) > 2e-3);
@@ -95,7 +95,8 @@ fn a_small_tool_that_a_surface_holds_does_not_creep_after_its_device() {
         rig.tick_at(to_m);
         let tool = tool(&rig);
         assert!(tool.centre_m.z > -0.5 * RADIUS_M, "{tick}: {}", tool.centre_m);
-        assert!(tick < 500 || (tool.centre_m.x - to_m.x).abs() < 1e-3, "{tick}: {}", tool.centre_m);
+        assert!(tick < 400 || (tool.centre_m.x - to_m.x).abs() < 3e-3, "{tick}: {}", tool.centre_m);
     }
+    assert!((tool(&rig).centre_m.x - to_m.x).abs() < 0.5e-3, "{}", tool(&rig).centre_m);
     assert!(tool(&rig).contact_force_n.z > 0.0);
 }

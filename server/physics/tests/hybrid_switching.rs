@@ -233,7 +233,7 @@ fn what_sleeps_in_crushed_parts_of_tets_does_not_wake_with_energy_from_nowhere()
     let mut woken = 0;
     for (number, push_m) in [0.0, 2e-3, 4e-3, 6e-3, 8e-3].into_iter().enumerate() {
         let mut spec = held_below(hybrid_block((0.02, 2, 8), 0.45, 400, Waking::ByTools { reach_m: 8e-3 }));
-        spec.tools = vec![sphere(6e-3, DVec3::Z * 6.2e-3, Coupling::Rigid)];
+        spec.tools = vec![sphere(6e-3, DVec3::Z * (6.2e-3 - push_m), Coupling::Rigid)];
         let mut rig = Rig::new(spec);
         let rest = rig.model.rest_positions_m().to_vec();
         for (x, rest) in rig.state.mechanical.x.iter_mut().zip(&rest) {

@@ -8,7 +8,7 @@ pub mod cell;
 pub mod clusters;
 pub mod composite;
 mod constrained_points;
-mod crushed_parts;
+mod crushed_cells;
 pub mod embedding_mesh;
 mod energy;
 mod frequency;

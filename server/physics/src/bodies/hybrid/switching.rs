@@ -22,7 +22,7 @@ use super::{
     activation_query::{Acting, begins_to_act, meets_sleeping_skin, moves_quickly, update_balls},
     body::HybridBody,
     carried_skin::SkinView,
-    crushed_parts::CrushedParts,
+    crushed_cells::CrushedCells,
     load_claims::{LoadClaims, NearestParticles},
     patch::KEPT,
     projection::Projection,
@@ -79,7 +79,7 @@ pub(super) struct ActivationQuery {
     pub(super) wanted: Vec<u32>,
     /// Active particles that no tool wants, each with its distance (m) from where it would be asleep.
     pub(super) unwanted: Vec<(f64, u32)>,
-    crushed_parts: CrushedParts,
+    crushed_cells: CrushedCells,
     moved: Vec<DVec3>,
     /// Impulses (kg m/s) transferred to coarse nodes.
     impulses: Vec<DVec3>,
@@ -119,7 +119,7 @@ impl ActivationQuery {
             nearest: NearestParticles::with_room(body.partition.particle_count()),
             wanted: Vec::with_capacity(most_wanted),
             unwanted: Vec::with_capacity(most),
-            crushed_parts: CrushedParts::new(body),
+            crushed_cells: CrushedCells::new(body),
             moved: Vec::with_capacity(most),
             impulses: Vec::with_capacity(body.node_count() + most),
             transferred_n: Vec::with_capacity(body.node_count()),
@@ -257,7 +257,7 @@ impl HybridScratch {
             }
             query.want(environment, body, own, reach_m, acting, far_off);
         }
-        query.crushed_parts.leave_asleep(body, patch, &state.x, &mut query.wanted);
+        query.crushed_cells.leave_asleep(body, patch, &state.x, &mut query.wanted);
         query.keep_unsettled(patch, &body.particles);
     }
 
