@@ -1,0 +1,95 @@
+//! How much the force on a tool ripples with the particles of a hybrid body that it touches, by how large they are beneath it.
+//!
+//! A surface that particles carry gives way more at a particle than in the middle of a cell, and a tool that touches less than some cells
+//! feels it while it is dragged. Measured (`docs/measurements/ripple.md`: spheres dragged over a block), the force swings from its least to
+//! its largest value by about
+//! ```text
+//! e = min(1, 0.13 σ²)        σ = h/a,  a = √(R δ)
+//! ```
+//! of its mean, with the particles' spacing h and the contact's radius a, of a sphere of radius R dragged δ deep: neither R/h nor the skin's
+//! triangles count. That is at most 1.5 times less than was measured, and up to three times more, as particles may be in step with what the
+//! contact averages.
+use palpate_physics::{Model, contact::{ToolShape, ToolSpec}};
+use palpate_scene::wording::short;
+
+/// Depths (m) that are told: a light touch, and a press.
+const DEPTHS_M: [f64; 2] = [0.3e-3, 2e-3];
+/// Depth over radius that is told at most.
+const DEEPEST: f64 = 0.5;
+/// Below this a hand feels none of it.
+const SMOOTH: f64 = 0.02;
+/// Above this, while it presses, a hand feels particles in place of a body: it tells forces apart that differ by 7 to 10 %.
+const ROUGH: f64 = 0.1;
+/// Ripple over `σ²`.
+const RIPPLE: f64 = 0.13;
+
+/// What is to be expected of a tool that is dragged.
+struct Expected<'m> {
+    tool: &'m ToolSpec,
+    spacing_m: f64,
+}
+
+/// Says how much the force on the smallest sphere ripples, where that is felt only while it hardly touches.
+pub(super) fn told(model: &Model, spacing_m: f64) -> Option<String> {
+    let expected = Expected::of(model, spacing_m)?;
+    let is_told = expected.ripple(0) > SMOOTH && expected.ripple(1) <= ROUGH;
+    is_told.then(|| format!("limit      {}", expected.sentence()))
+}
+
+/// Warns of particles that are too coarse for the smallest sphere even while it presses.
+pub(super) fn warning(model: &Model, spacing_m: f64) -> Option<String> {
+    let expected = Expected::of(model, spacing_m)?;
+    (expected.ripple(1) > ROUGH).then(|| expected.sentence())
+}
+
+/// Returns how far the force swings, over its mean, where the particles' spacing over the contact's radius is this.
+fn expected_ripple(spacing_over_contact: f64) -> f64 {
+    (RIPPLE * spacing_over_contact * spacing_over_contact).min(1.0)
+}
+
+impl<'m> Expected<'m> {
+    /// Of the smallest sphere; `None` without any. A capsule lies on more particles than a sphere of its radius.
+    fn of(model: &'m Model, spacing_m: f64) -> Option<Self> {
+        let spheres = model.tools().iter().filter(|tool| tool.shape == ToolShape::Sphere);
+        let tool = spheres.min_by(|a, b| a.radius_m.total_cmp(&b.radius_m))?;
+        Some(Self { tool, spacing_m })
+    }
+
+    fn depth_m(&self, number: usize) -> f64 {
+        DEPTHS_M[number].min(DEEPEST * self.tool.radius_m)
+    }
+
+    /// `√(R δ)` (m).
+    fn contact_radius_m(&self, number: usize) -> f64 {
+        (self.tool.radius_m * self.depth_m(number)).sqrt()
+    }
+
+    fn ripple(&self, number: usize) -> f64 {
+        expected_ripple(self.spacing_m / self.contact_radius_m(number))
+    }
+
+    /// The spacing (m) of particles on which the ripple is [`SMOOTH`].
+    fn serving_m(&self, number: usize) -> f64 {
+        (SMOOTH / RIPPLE).sqrt() * self.contact_radius_m(number)
+    }
+
+    fn sentence(&self) -> String {
+        let [light_mm, deep_mm] = [0, 1].map(|number| short(self.depth_m(number) * 1e3));
+        let [light, deep] = [0, 1].map(|number| two_digits(100.0 * self.ripple(number)));
+        let [fine_mm, coarse_mm] = [0, 1].map(|number| two_digits(self.serving_m(number) * 1e3));
+        format!(
+            "dragged over particles {} mm apart, the tool \"{}\", {} mm in radius, feels them: its force swings by about {deep} % of its mean {deep_mm} mm \
+             deep, and by about {light} % {light_mm} mm deep. It is smooth to {} % on particles {coarse_mm} mm apart at the one depth, {fine_mm} mm apart at the \
+             other (spacing in [body.particles])",
+            short(self.spacing_m * 1e3),
+            self.tool.name,
+            short(self.tool.radius_m * 1e3),
+            short(100.0 * SMOOTH),
+        )
+    }
+}
+
+/// To two digits, for it is an estimate.
+fn two_digits(value: f64) -> String {
+    short(format!("{value:.1e}").parse().unwrap_or(value))
+}
