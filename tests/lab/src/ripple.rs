@@ -63,7 +63,8 @@ pub fn print() -> Result<()> {
             let model = block(spacing_mm, radius_mm)?;
             for (on, part) in [("a particle", 0.0), ("the middle of a cell", 0.5)] {
                 let forces_n = pressed(&model, DVec2::splat(part * spacing_mm));
-                let ripples = PRESSES_MM.map(|press_mm| format!("{:.1} %", 100.0 * stiffness_ripple(&forces_n, press_mm)));
+                let ripples =
+                    PRESSES_MM.map(|press_mm| format!("{:.1} %", 100.0 * stiffness_ripple(&forces_n, press_mm)));
                 println!("| {spacing_mm} mm | {radius_mm} mm | {on} | {} |", ripples.join(" | "));
             }
         }

@@ -9,7 +9,10 @@
 //! of its mean, with the particles' spacing h and the contact's radius a, of a sphere of radius R dragged δ deep: neither R/h nor the skin's
 //! triangles count. That is at most 1.5 times less than was measured, and up to three times more, as particles may be in step with what the
 //! contact averages.
-use palpate_physics::{Model, contact::{ToolShape, ToolSpec}};
+use palpate_physics::{
+    Model,
+    contact::{ToolShape, ToolSpec},
+};
 use palpate_scene::wording::short;
 
 /// Depths (m) that are told: a light touch, and a press.

@@ -132,6 +132,7 @@ pub fn hybrid_block(
             skin: Skin::new(positions, surface.triangles).unwrap(),
             spacing_m: a_m / cells as f64,
             fine_depth_m: None,
+            smooth_skin: false,
             lattice_through_m: DVec3::ZERO,
             most_active,
             waking,

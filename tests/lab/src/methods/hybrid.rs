@@ -147,7 +147,15 @@ pub(crate) fn particles(body: Body, fine: &TetBody, spacing_m: f64, most_active:
     // The planes that are held lie on the lattice.
     let off_axis = DVec3::new(0.5, 0.5, 0.0) * spacing_m + DVec3::Z * skin.bounds_m().1.z;
     let lattice_through_m = if body == Body::Block { DVec3::ZERO } else { off_axis };
-    Ok(ParticleSpec { skin, spacing_m, fine_depth_m: None, lattice_through_m, most_active, waking: Waking::ByHand })
+    Ok(ParticleSpec {
+        skin,
+        spacing_m,
+        fine_depth_m: None,
+        smooth_skin: false,
+        lattice_through_m,
+        most_active,
+        waking: Waking::ByHand,
+    })
 }
 
 /// The particles nearest to a point that may wake.

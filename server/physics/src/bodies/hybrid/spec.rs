@@ -34,6 +34,9 @@ pub struct ParticleSpec {
     /// depth, and at least one. Deeper down blocks of eight are merged into cells of twice the spacing (`sizes`); with
     /// `None` no cells are merged.
     pub fine_depth_m: Option<f64>,
+    /// Whether the skin follows a mean of the particles around each of its vertices, not those of one cell alone, and tools press it
+    /// through a softer foundation: so they do not feel single particles ([`super::skin_carriers`]).
+    pub smooth_skin: bool,
     /// A point (m) that planes of the lattice pass through; best on a surface that is held, so that no cell reaches
     /// past it.
     pub lattice_through_m: DVec3,
