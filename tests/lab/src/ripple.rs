@@ -1,17 +1,20 @@
 //! How much the force on a tool ripples with the particles of the hybrid body that it touches: the measurement behind what
 //! `palpated check` says of it (`docs/measurements/ripple.md`).
 //!
-//! The scene `hybrid-block` on particles of several spacings, under a rigid sphere without friction. Dragged: at a constant depth
+//! The scene `hybrid-block` on particles of several spacings, with skins that are smooth and skins that are not, under a rigid sphere
+//! without friction. Dragged: at a constant depth
 //! it goes over four spacings along one axis of the lattice and one along the other, so that it comes over particles, edges and
 //! middles of cells. Pressed: it goes straight down on a particle, and on the middle of a cell.
 use crate::press::Slow;
 use glam::{DMat3, DVec2, DVec3};
-use miette::{Result, ensure, miette};
+use miette::{IntoDiagnostic, Result, ensure, miette};
 use palpate_physics::{Model, contact::Coupling};
 use palpate_scene::Limits;
 
 /// Spacings (mm) of particles.
 const SPACINGS_MM: [f64; 3] = [5.0, 2.5, 1.25];
+/// Whether the skin is smooth.
+const SKINS: [(bool, &str); 2] = [(false, "cells"), (true, "smooth")];
 /// Radii (mm) of spheres.
 const RADII_MM: [f64; 6] = [1.5, 2.5, 3.75, 5.0, 10.0, 20.0];
 /// Depths (mm) at which they are dragged; none is dragged deeper than [`DEEPEST`].
@@ -38,34 +41,42 @@ const HALF_WINDOW: usize = 50;
 /// # Errors
 /// A scene that is refused.
 pub fn print() -> Result<()> {
-    println!("| spacing | radius | depth | spacing over contact | mean force | ripple | sideways |");
-    println!("|---|---|---|---|---|---|---|");
+    println!(
+        "| spacing | radius | depth | spacing over contact | {} |",
+        SKINS.map(|(_, name)| format!("{name}: mean force | ripple | sideways")).join(" | ")
+    );
+    println!("|---|---|---|---|{}", "---|---|---|".repeat(SKINS.len()));
     for spacing_mm in SPACINGS_MM {
         for radius_mm in RADII_MM {
-            let model = block(spacing_mm, radius_mm)?;
+            let [cells, smooth] = SKINS.map(|(is_smooth, _)| block(spacing_mm, radius_mm, is_smooth));
+            let models = [cells?, smooth?];
             for depth_mm in DEPTHS_MM.into_iter().filter(|depth_mm| *depth_mm <= DEEPEST * radius_mm) {
-                let Dragged { mean_n, ripple, sideways } = dragged(&model, spacing_mm, depth_mm);
+                let of_skins = models.each_ref().map(|model| {
+                    let Dragged { mean_n, ripple, sideways } = dragged(model, spacing_mm, depth_mm);
+                    format!("{:.2} mN | {:.1} % | {:.1} %", 1e3 * mean_n, 100.0 * ripple, 100.0 * sideways)
+                });
+                let over_contact = spacing_mm / (radius_mm * depth_mm).sqrt();
                 println!(
-                    "| {spacing_mm} mm | {radius_mm} mm | {depth_mm} mm | {:.2} | {:.2} mN | {:.1} % | {:.1} % |",
-                    spacing_mm / (radius_mm * depth_mm).sqrt(),
-                    1e3 * mean_n,
-                    100.0 * ripple,
-                    100.0 * sideways
+                    "| {spacing_mm} mm | {radius_mm} mm | {depth_mm} mm | {over_contact:.2} | {} |",
+                    of_skins.join(" | ")
                 );
             }
         }
     }
     println!();
-    println!("| spacing | radius | on | {} |", PRESSES_MM.map(|[from, to]| format!("{from} to {to} mm")).join(" | "));
-    println!("|---|---|---|---|---|");
+    println!(
+        "| spacing | radius | skin | on | {} |",
+        PRESSES_MM.map(|[from, to]| format!("{from} to {to} mm")).join(" | ")
+    );
+    println!("|---|---|---|---|---|---|");
     for spacing_mm in SPACINGS_MM {
-        for radius_mm in PRESSED_MM {
-            let model = block(spacing_mm, radius_mm)?;
+        for (radius_mm, (is_smooth, skin)) in PRESSED_MM.into_iter().flat_map(|r| SKINS.map(|skin| (r, skin))) {
+            let model = block(spacing_mm, radius_mm, is_smooth)?;
             for (on, part) in [("a particle", 0.0), ("the middle of a cell", 0.5)] {
                 let forces_n = pressed(&model, DVec2::splat(part * spacing_mm));
                 let ripples =
                     PRESSES_MM.map(|press_mm| format!("{:.1} %", 100.0 * stiffness_ripple(&forces_n, press_mm)));
-                println!("| {spacing_mm} mm | {radius_mm} mm | {on} | {} |", ripples.join(" | "));
+                println!("| {spacing_mm} mm | {radius_mm} mm | {skin} | {on} | {} |", ripples.join(" | "));
             }
         }
     }
@@ -73,11 +84,11 @@ pub fn print() -> Result<()> {
 }
 
 /// The scene's block on particles of this spacing, under a rigid sphere of this radius without friction.
-fn block(spacing_mm: f64, radius_mm: f64) -> Result<Model> {
+fn block(spacing_mm: f64, radius_mm: f64, is_smooth: bool) -> Result<Model> {
     const SPACING: &str = "spacing_mm = 2.5";
     let text = palpate_scene::builtin("hybrid-block").ok_or_else(|| miette!("there is no scene hybrid-block"))?;
     ensure!(text.matches(SPACING).count() == 1, "the scene hybrid-block has not one line \"{SPACING}\"");
-    let text = text.replace(SPACING, &format!("spacing_mm = {spacing_mm}"));
+    let text = text.replace(SPACING, &format!("spacing_mm = {spacing_mm}\nsmooth_skin = {is_smooth}"));
     let mut scene = palpate_scene::parse(&text, "hybrid-block", None, &Limits::local(), &mut |_, _| {})?;
     for tool in &mut scene.model.tools {
         tool.radius_m = 1e-3 * radius_mm;
@@ -85,7 +96,7 @@ fn block(spacing_mm: f64, radius_mm: f64) -> Result<Model> {
         tool.coupling = Coupling::Rigid;
         tool.start_position_m = DVec3::Z * (tool.radius_m + 1e-3);
     }
-    Ok(Model::build(scene.model)?)
+    Model::build(scene.model).into_diagnostic()
 }
 
 /// What is felt while a sphere is dragged.

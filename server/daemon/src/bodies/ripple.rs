@@ -4,13 +4,14 @@
 //! feels it while it is dragged. Measured (`docs/measurements/ripple.md`: spheres dragged over a block), the force swings from its least to
 //! its largest value by about
 //! ```text
-//! e = min(1, 0.13 σ²)        σ = h/a,  a = √(R δ)
+//! e = min(1, c σ²)        σ = h/a,  a = √(R δ),  c = 0.13, with a smooth skin 0.022
 //! ```
 //! of its mean, with the particles' spacing h and the contact's radius a, of a sphere of radius R dragged δ deep: neither R/h nor the skin's
 //! triangles count. That is at most 1.5 times less than was measured, and up to three times more, as particles may be in step with what the
 //! contact averages.
 use palpate_physics::{
     Model,
+    bodies::hybrid::ParticleSpec,
     contact::{ToolShape, ToolSpec},
 };
 use palpate_scene::wording::short;
@@ -23,39 +24,45 @@ const DEEPEST: f64 = 0.5;
 const SMOOTH: f64 = 0.02;
 /// Above this, while it presses, a hand feels particles in place of a body: it tells forces apart that differ by 7 to 10 %.
 const ROUGH: f64 = 0.1;
-/// Ripple over `σ²`.
-const RIPPLE: f64 = 0.13;
+/// Ripple over `σ²`, and the same with a smooth skin.
+const OF_CELLS: f64 = 0.13;
+const OF_MEANS: f64 = 0.022;
 
 /// What is to be expected of a tool that is dragged.
 struct Expected<'m> {
     tool: &'m ToolSpec,
     spacing_m: f64,
+    smooth_skin: bool,
 }
 
 /// Says how much the force on the smallest sphere ripples, where that is felt only while it hardly touches.
-pub(super) fn told(model: &Model, spacing_m: f64) -> Option<String> {
-    let expected = Expected::of(model, spacing_m)?;
+pub(super) fn told(model: &Model, particles: &ParticleSpec) -> Option<String> {
+    let expected = Expected::of(model, particles)?;
     let is_told = expected.ripple(0) > SMOOTH && expected.ripple(1) <= ROUGH;
     is_told.then(|| format!("limit      {}", expected.sentence()))
 }
 
 /// Warns of particles that are too coarse for the smallest sphere even while it presses.
-pub(super) fn warning(model: &Model, spacing_m: f64) -> Option<String> {
-    let expected = Expected::of(model, spacing_m)?;
+pub(super) fn warning(model: &Model, particles: &ParticleSpec) -> Option<String> {
+    let expected = Expected::of(model, particles)?;
     (expected.ripple(1) > ROUGH).then(|| expected.sentence())
 }
 
 /// Returns how far the force swings, over its mean, where the particles' spacing over the contact's radius is this.
-fn expected_ripple(spacing_over_contact: f64) -> f64 {
-    (RIPPLE * spacing_over_contact * spacing_over_contact).min(1.0)
+fn expected_ripple(spacing_over_contact: f64, smooth_skin: bool) -> f64 {
+    (over_square(smooth_skin) * spacing_over_contact * spacing_over_contact).min(1.0)
+}
+
+fn over_square(smooth_skin: bool) -> f64 {
+    if smooth_skin { OF_MEANS } else { OF_CELLS }
 }
 
 impl<'m> Expected<'m> {
     /// Of the smallest sphere; `None` without any. A capsule lies on more particles than a sphere of its radius.
-    fn of(model: &'m Model, spacing_m: f64) -> Option<Self> {
+    fn of(model: &'m Model, particles: &ParticleSpec) -> Option<Self> {
         let spheres = model.tools().iter().filter(|tool| tool.shape == ToolShape::Sphere);
         let tool = spheres.min_by(|a, b| a.radius_m.total_cmp(&b.radius_m))?;
-        Some(Self { tool, spacing_m })
+        Some(Self { tool, spacing_m: particles.spacing_m, smooth_skin: particles.smooth_skin })
     }
 
     fn depth_m(&self, number: usize) -> f64 {
@@ -68,26 +75,31 @@ impl<'m> Expected<'m> {
     }
 
     fn ripple(&self, number: usize) -> f64 {
-        expected_ripple(self.spacing_m / self.contact_radius_m(number))
+        expected_ripple(self.spacing_m / self.contact_radius_m(number), self.smooth_skin)
     }
 
-    /// The spacing (m) of particles on which the ripple is [`SMOOTH`].
-    fn serving_m(&self, number: usize) -> f64 {
-        (SMOOTH / RIPPLE).sqrt() * self.contact_radius_m(number)
+    /// The spacing (m) of particles on which the ripple is [`SMOOTH`], beneath such a skin.
+    fn serving_m(&self, number: usize, smooth_skin: bool) -> f64 {
+        (SMOOTH / over_square(smooth_skin)).sqrt() * self.contact_radius_m(number)
     }
 
     fn sentence(&self) -> String {
         let [light_mm, deep_mm] = [0, 1].map(|number| short(self.depth_m(number) * 1e3));
         let [light, deep] = [0, 1].map(|number| two_digits(100.0 * self.ripple(number)));
-        let [fine_mm, coarse_mm] = [0, 1].map(|number| two_digits(self.serving_m(number) * 1e3));
+        let serving = |smooth_skin| {
+            let [fine_mm, coarse_mm] = [0, 1].map(|number| two_digits(self.serving_m(number, smooth_skin) * 1e3));
+            format!("particles {coarse_mm} mm apart at the one depth, {fine_mm} mm apart at the other")
+        };
+        let with_means =
+            if self.smooth_skin { String::new() } else { format!("; with smooth_skin = true, on {}", serving(true)) };
         format!(
             "dragged over particles {} mm apart, the tool \"{}\", {} mm in radius, feels them: its force swings by about {deep} % of its mean {deep_mm} mm \
-             deep, and by about {light} % {light_mm} mm deep. It is smooth to {} % on particles {coarse_mm} mm apart at the one depth, {fine_mm} mm apart at the \
-             other (spacing in [body.particles])",
+             deep, and by about {light} % {light_mm} mm deep. It is smooth to {} % on {}{with_means} (in [body.particles])",
             short(self.spacing_m * 1e3),
             self.tool.name,
             short(self.tool.radius_m * 1e3),
             short(100.0 * SMOOTH),
+            serving(self.smooth_skin),
         )
     }
 }

@@ -192,6 +192,12 @@ pub fn pressed_block(precision: Precision, fine_depth_m: Option<f64>) -> ModelSp
     spec
 }
 
+/// The same body with a skin that follows means of particles.
+pub fn smooth(mut spec: ModelSpec) -> ModelSpec {
+    particles_mut(&mut spec).smooth_skin = true;
+    spec
+}
+
 /// Particles within a distance of a point, at rest.
 pub fn near(rig: &Rig, point: DVec3, distance_m: f64) -> Vec<u32> {
     let partition = rig.model.body().as_hybrid().unwrap().partition();

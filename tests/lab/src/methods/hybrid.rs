@@ -28,6 +28,8 @@ pub(super) struct Hybrid {
 enum Lattice {
     /// All of one size.
     Same,
+    /// The same beneath a smooth skin.
+    Smooth,
     /// Beneath the first layer of twice the size.
     Doubled,
     /// In the first layer, and wherever eight make no whole one, of half the size; the skin is as fine.
@@ -48,6 +50,7 @@ impl Hybrid {
         let of = |(lattice, active): (Lattice, usize)| {
             let (name, cells) = match lattice {
                 Lattice::Same => ("hybrid", "cells"),
+                Lattice::Smooth => ("hybrid smooth", "cells, a skin that follows means of particles"),
                 Lattice::Doubled => ("hybrid doubled", "cells, deeper down twice as large"),
                 Lattice::Halved => ("hybrid halved", "cells, at the surface half as large"),
             };
@@ -61,7 +64,8 @@ impl Hybrid {
             }
         };
         let same = [50, 200, 600, 1400].map(|active| (Lattice::Same, active));
-        let others = [200, 600].into_iter().flat_map(|n| [(Lattice::Doubled, n), (Lattice::Halved, n)]);
+        let lattices = [Lattice::Smooth, Lattice::Doubled, Lattice::Halved];
+        let others = [200, 600].into_iter().flat_map(|n| lattices.map(|lattice| (lattice, n)));
         same.into_iter().chain(others).map(of).collect()
     }
 
@@ -77,7 +81,7 @@ impl Hybrid {
         let is_round = problem.body != Body::Block && matches!(problem.action, Action::Sphere { .. });
         let skin = if is_round { finer } else { skin };
         Some(match self.lattice {
-            Lattice::Same => Fineness { spacing_m, fine_depth_m: None, skin },
+            Lattice::Same | Lattice::Smooth => Fineness { spacing_m, fine_depth_m: None, skin },
             Lattice::Doubled => Fineness { spacing_m, fine_depth_m: Some(spacing_m), skin },
             Lattice::Halved => {
                 Fineness { spacing_m: 0.5 * spacing_m, fine_depth_m: Some(0.5 * spacing_m), skin: finer }
@@ -110,7 +114,9 @@ impl Method for Hybrid {
             self.fineness(problem).ok_or_else(|| miette!("the {} has no particles", problem.body.name()))?;
         let (coarse, fine) = (problem.body.tets(resolution)?, problem.body.tets(skin)?);
         let settings = Settings { mass_damping_per_s: pace.damping_per_s, ..Settings::for_particles() };
-        let particles = ParticleSpec { fine_depth_m, ..particles(problem.body, &fine, spacing_m, self.active)? };
+        let smooth_skin = matches!(self.lattice, Lattice::Smooth);
+        let particles =
+            ParticleSpec { fine_depth_m, smooth_skin, ..particles(problem.body, &fine, spacing_m, self.active)? };
         let hybrid = HybridSpec { coarse: super::subject::solid(problem.material()?, &coarse), particles };
         let mut spec = ModelSpec {
             body: BodySpec::Hybrid(hybrid),

@@ -83,7 +83,7 @@ impl ServedBody for HybridBody {
             counted(self.node_count(), "node"),
             100.0 * partition.whole_part()
         ));
-        lines.extend(ripple::told(model, spec.spacing_m));
+        lines.extend(ripple::told(model, spec));
         lines
     }
 
@@ -115,7 +115,7 @@ impl ServedBody for HybridBody {
                     .to_owned(),
             );
         }
-        warnings.extend(ripple::warning(model, spec.spacing_m));
+        warnings.extend(ripple::warning(model, spec));
         warnings
     }
 }

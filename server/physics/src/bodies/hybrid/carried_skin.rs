@@ -186,7 +186,8 @@ impl HybridBody {
             let third = (b - a).cross(c - a).length() / 6.0;
             skin.triangles()[triangle].iter().for_each(|&vertex| vertex_m2[vertex as usize] += third);
         }
-        let points = || (0..).map(|vertex| self.carriers_of_vertex(vertex)).zip(&vertex_m2);
+        let vertices = 0..self.vertex_points.len() as u32;
+        let points = || vertices.clone().map(|vertex| self.carriers_of_vertex(vertex)).zip(&vertex_m2);
         let mut particle_m2 = vec![0.0; self.partition.particle_count()];
         for (carriers, area_m2) in points() {
             for &(particle, weight) in carriers {
