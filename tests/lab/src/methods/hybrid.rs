@@ -1,6 +1,5 @@
 //! Hybrid bodies as the server runs them: coarse tets, and the particles nearest to the touch awake.
 use super::{Method, Pace, Running, driven::Driven, subject::Tool};
-use crate::methods::tet_body;
 use crate::problems::{
     Action, Problem,
     body::{Body, TetBody},
@@ -241,7 +240,7 @@ impl Running for Pressed {
     fn size(&self) -> [usize; 3] {
         let awake = self.driven.state.body.as_seed().map_or(0, |_| self.model.body().most_awake_particles());
         [
-            tet_body(&self.model).mesh().tets().len(),
+            self.model.body().tets().map_or(0, |mesh| mesh.tets().len()),
             self.driven.state.mechanical.x.len() + awake,
             self.model.substeps() as usize,
         ]
