@@ -156,7 +156,7 @@ fn looking_only_where_the_tool_may_be_costs_no_bit() {
     }
 }
 
-/// The compliance of trilinear cells is that of one particle on a particle, and of four between them: 2.4 times the force.
+/// The compliance of trilinear cells is that of one particle on a particle, and of four between them: more than twice the force.
 #[test]
 fn beneath_a_smooth_skin_a_light_touch_does_not_feel_single_particles() {
     let force_n = |spec: ModelSpec, at_m: DVec3| {
@@ -179,7 +179,7 @@ fn beneath_a_smooth_skin_a_light_touch_does_not_feel_single_particles() {
     let ratio = |block: &dyn Fn() -> ModelSpec| force_n(block(), between_m) / force_n(block(), DVec3::ZERO);
     let (cells, means) = (ratio(&block), ratio(&|| smooth(block())));
     println!("force between particles over force on one: {cells:.3}, on a smooth skin {means:.3}");
-    assert!(cells > 1.8 && (means - 1.0).abs() < 0.15, "{cells} {means}");
+    assert!(cells > 1.8 && (means - 1.0).abs() < 0.25 * (cells - 1.0), "{cells} {means}");
 }
 
 /// A sphere comes from far, presses, slides and leaves. Particles wake before it touches, follow it, and sleep in the end.
