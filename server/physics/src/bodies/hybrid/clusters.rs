@@ -127,9 +127,13 @@ impl Boxes {
                     }
                 }
             };
-            partition.corners(hybrid.vertex_point(vertex).cell as usize).into_iter().for_each(&mut follow);
+            for particle in partition.corners(hybrid.vertex_point(vertex).cell as usize) {
+                follow(particle);
+            }
             if hybrid.particles().smooth_skin {
-                hybrid.carriers_of_vertex(vertex).iter().for_each(|(particle, _)| follow(*particle));
+                for (particle, _) in hybrid.carriers_of_vertex(vertex) {
+                    follow(*particle);
+                }
             }
         }
         self.low_m.push(low);

@@ -41,11 +41,14 @@ impl SkinCarriers {
         let mut found = Self { first: vec![0], number_of: vec![NONE; partition.particle_count()], ..Self::default() };
         for point in vertices {
             if is_smooth {
-                smoothed(partition, point).into_iter().for_each(|carrier| found.push(partition, carrier));
+                for carrier in smoothed(partition, point) {
+                    found.push(partition, carrier);
+                }
             } else {
                 let TrilinearPoint { particles, weights } = point.trilinear(partition);
-                let weighty = particles.into_iter().zip(weights).filter(|(_, w)| *w != 0.0);
-                weighty.for_each(|carrier| found.push(partition, carrier));
+                for carrier in particles.into_iter().zip(weights).filter(|(_, weight)| *weight != 0.0) {
+                    found.push(partition, carrier);
+                }
             }
             found.first.push(found.carriers.len() as u32);
         }
