@@ -99,6 +99,39 @@ fn how_much_too_stiffly_tets_answer_is_told_by_their_size_and_their_compressibil
     assert!(!run("check", &hybrid, &[]).shown.contains("stiffly"));
 }
 
+/// A sphere of 3 mm that was dragged over particles of 2.5 mm felt each of them (its force swung by half), and nothing was said.
+#[test]
+fn how_much_a_tool_feels_single_particles_is_told_with_the_spacing_that_serves_it() {
+    let on = |spacing_mm: f64, tool: &str| {
+        let particles = format!("[body.particles]\nspacing_mm = {spacing_mm}\nmost_active = 50\n[[material]]");
+        block(4, 0.45, NEO_HOOKEAN, tool).replace("[[material]]", &particles)
+    };
+    let small = RIGID.replace("radius_mm = 10", "radius_mm = 3");
+    let coarse = run("check", &on(5.0, &small), &[]).shown;
+    let words = "warning: dragged over particles 5 mm apart, the tool \"ball\", 3 mm in radius, feels them: its force swings by about 72 % of its mean 1.5 mm deep, \
+                 and by about 90 % 0.3 mm deep. It is smooth to 2 % on particles 0.83 mm apart at the one depth, 0.37 mm apart at the other; with smooth_skin = true, on particles 1.9 mm apart";
+    assert!(coarse.contains(words), "{coarse}");
+    for command in ["simulate", "static"] {
+        let ended = run(command, &on(5.0, &small), &["--json"]);
+        assert!(ended.said.contains("feels them"), "{command}: {}", ended.said);
+        assert!(json(&ended)["warnings"].to_string().contains("feels them"), "{command}");
+    }
+    let smooth = on(5.0, &small).replace("spacing_mm = 5", "spacing_mm = 5\nsmooth_skin = true");
+    let smooth = run("check", &smooth, &[]).shown;
+    assert!(
+        smooth.contains("swings by about 14 % of its mean 1.5 mm deep") && !smooth.contains("with smooth_skin"),
+        "{smooth}"
+    );
+    // Where only a light touch feels them, it is a limit that is told.
+    let large = run("check", &on(2.5, RIGID), &["--strict"]);
+    assert_eq!(large.code, Some(0), "{}", large.shown);
+    assert!(large.shown.contains("limit      dragged over particles 2.5 mm apart"), "{}", large.shown);
+    // Tets are no particles, and there is nothing to tell without a tool.
+    for scene in [block(4, 0.3, NEO_HOOKEAN, &small), on(5.0, "")] {
+        assert!(!run("check", &scene, &[]).shown.contains("feels them"));
+    }
+}
+
 /// A block between two plates that come nearer by so much (mm) of its 10, its faces free to slide.
 fn squeezed(by_mm: f64, law: &str) -> String {
     format!(

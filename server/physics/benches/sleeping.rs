@@ -66,6 +66,7 @@ fn pressed(n: usize) -> Rig {
         skin,
         spacing_m: SPACING_M,
         fine_depth_m: None,
+        smooth_skin: false,
         lattice_through_m: DVec3::ZERO,
         most_active: ACTIVE,
         waking: Waking::ByHand,

@@ -6,7 +6,7 @@ use palpate_physics::{
     Energies, ModelSpec, Precision, Settings, Substeps, bodies::hybrid::Waking, contact::Coupling, snapshot,
     world::wake_only,
 };
-use rig::{Rig, at, held_below, hybrid_block, near, particles_mut, pressed_block, sphere};
+use rig::{Rig, at, held_below, hybrid_block, near, particles_mut, pressed_block, smooth, sphere};
 
 /// 40 × 40 × 20 mm in 24 coarse tets, particles 2.5 mm apart, its lower face at z = −20 mm.
 fn block(poisson_ratio: f64) -> ModelSpec {
@@ -81,7 +81,9 @@ fn what_follows_holders_in_part_wakes_and_their_work_is_booked() {
 #[test]
 fn a_sphere_is_pushed_back_with_the_work_it_does() {
     for fine_depth_m in SIZES {
-        press(Rig::new(pressed_block(Precision::Double, fine_depth_m)));
+        let block = || pressed_block(Precision::Double, fine_depth_m);
+        press(Rig::new(block()));
+        press(Rig::new(smooth(block())));
     }
 }
 
@@ -103,7 +105,13 @@ fn press(mut rig: Rig) {
 
 #[test]
 fn what_was_saved_goes_on_with_the_same_bits() {
-    let mut rig = Rig::new(pressed_block(Precision::Single, None));
+    let block = || pressed_block(Precision::Single, None);
+    saved_and_restored(block);
+    saved_and_restored(|| smooth(block()));
+}
+
+fn saved_and_restored(block: impl Fn() -> ModelSpec) {
+    let mut rig = Rig::new(block());
     let awake = near(&rig, DVec3::ZERO, 9e-3);
     wake_only(&rig.model, &mut rig.state, &mut rig.scratch, awake);
     let way = |tick: u32| DVec3::Z * (6e-3 - 2e-3 * (f64::from(tick) * 0.02).sin());
@@ -111,7 +119,7 @@ fn what_was_saved_goes_on_with_the_same_bits() {
         rig.tick_at(way(tick));
     }
     let bytes = snapshot::save(&rig.model, &rig.state);
-    let mut other = Rig::new(pressed_block(Precision::Single, None));
+    let mut other = Rig::new(block());
     other.state = snapshot::restore(&other.model, &bytes).unwrap();
     assert_eq!(other.state.body, rig.state.body);
     for tick in 100..200 {
@@ -124,8 +132,9 @@ fn what_was_saved_goes_on_with_the_same_bits() {
 
 #[test]
 fn looking_only_where_the_tool_may_be_costs_no_bit() {
-    let run = |distant_contact: bool| {
+    let run = |distant_contact: bool, smooth_skin: bool| {
         let mut spec = pressed_block(Precision::Double, None);
+        particles_mut(&mut spec).smooth_skin = smooth_skin;
         spec.settings.skips.distant_contact = distant_contact;
         let mut rig = Rig::new(spec);
         for tick in 0..400_u32 {
@@ -142,7 +151,35 @@ fn looking_only_where_the_tool_may_be_costs_no_bit() {
         assert!(rig.state.mechanical.tools[0].contact_force_n.length() > 0.01);
         rig.state
     };
-    assert_eq!(run(true), run(false));
+    for smooth_skin in [false, true] {
+        assert_eq!(run(true, smooth_skin), run(false, smooth_skin));
+    }
+}
+
+/// The compliance of trilinear cells is that of one particle on a particle, and of four between them: more than twice the force.
+#[test]
+fn beneath_a_smooth_skin_a_light_touch_does_not_feel_single_particles() {
+    let force_n = |spec: ModelSpec, at_m: DVec3| {
+        let mut rig = Rig::new(spec);
+        let awake = near(&rig, DVec3::ZERO, 10e-3);
+        wake_only(&rig.model, &mut rig.state, &mut rig.scratch, awake);
+        for tick in 0..500 {
+            let depth_m = 0.3e-3 * f64::from(tick.min(200)) / 200.0;
+            rig.tick_at(at_m + DVec3::Z * (3.75e-3 - depth_m));
+        }
+        rig.state.mechanical.tools[0].contact_force_n.z
+    };
+    let block = || {
+        let mut spec = pressed_block(Precision::Double, None);
+        spec.gravity_m_per_s2 = DVec3::ZERO;
+        spec.tools[0].radius_m = 3.75e-3;
+        spec
+    };
+    let between_m = DVec3::new(1.25e-3, 1.25e-3, 0.0);
+    let ratio = |block: &dyn Fn() -> ModelSpec| force_n(block(), between_m) / force_n(block(), DVec3::ZERO);
+    let (cells, means) = (ratio(&block), ratio(&|| smooth(block())));
+    println!("force between particles over force on one: {cells:.3}, on a smooth skin {means:.3}");
+    assert!(cells > 1.8 && (means - 1.0).abs() < 0.25 * (cells - 1.0), "{cells} {means}");
 }
 
 /// A sphere comes from far, presses, slides and leaves. Particles wake before it touches, follow it, and sleep in the end.

@@ -9,7 +9,9 @@ use palpate_physics::{
     statics::{Goal, SolveError, StaticSettings, StaticSolution, solve_static},
     world::wake_only,
 };
-use rig::{Drive, Rig, at, held_below, hold, hybrid_block, mesh_of, nodes_where, particles, particles_mut, sphere};
+use rig::{
+    Drive, Rig, at, held_below, hold, hybrid_block, mesh_of, nodes_where, particles, particles_mut, smooth, sphere,
+};
 use std::ops::ControlFlow;
 
 /// 40 × 40 × 20 mm in 24 coarse tets, particles 2.5 mm apart, its upper face at z = 0.
@@ -46,7 +48,11 @@ fn apart_m(rig: &Rig, found: &StaticSolution) -> (f64, f64) {
 
 #[test]
 fn loads_weight_and_moved_supports_come_to_the_same_rest_in_time() {
-    let mut spec = held_below(block(Waking::ByHand));
+    loads_come_to_the_same_rest(held_below(block(Waking::ByHand)));
+    loads_come_to_the_same_rest(smooth(held_below(block(Waking::ByHand))));
+}
+
+fn loads_come_to_the_same_rest(mut spec: ModelSpec) {
     let pressed = skin_vertices(&spec, |p| p.length() < 5e-3);
     let force_n = DVec3::new(2e-3, 0.0, -2e-2) / pressed.len() as f64;
     let side = skin_triangles(&spec, |p| p.x > 0.02 - 1e-6 && p.z > -0.011);
@@ -84,9 +90,10 @@ fn loads_weight_and_moved_supports_come_to_the_same_rest_in_time() {
 }
 
 /// A sphere of 6 mm above the block, which weighs, with particles that it wakes.
-fn pressed(coupling: Coupling, fine_depth_m: Option<f64>) -> Rig {
+fn pressed(coupling: Coupling, fine_depth_m: Option<f64>, smooth_skin: bool) -> Rig {
     let mut spec = held_below(block(Waking::ByTools { reach_m: 11e-3 }));
     particles_mut(&mut spec).fine_depth_m = fine_depth_m;
+    particles_mut(&mut spec).smooth_skin = smooth_skin;
     spec.settings = Settings { mass_damping_per_s: 60.0, ..spec.settings };
     spec.tools = vec![sphere(6e-3, DVec3::new(0.4e-3, 0.3e-3, 9e-3), coupling)];
     spec.gravity_m_per_s2 = DVec3::Z * -9.81;
@@ -106,10 +113,10 @@ fn solved(model: &Model, device_m: DVec3) -> StaticSolution {
 
 fn a_tool_rests_where_the_loop_has_it(
     coupling: Coupling,
-    fine_depth_m: Option<f64>,
+    (fine_depth_m, smooth_skin): (Option<f64>, bool),
     device_z_m: f64,
 ) -> StaticSolution {
-    let mut rig = pressed(coupling, fine_depth_m);
+    let mut rig = pressed(coupling, fine_depth_m, smooth_skin);
     let (start, device) = (DVec3::new(0.4e-3, 0.3e-3, 9e-3), DVec3::new(0.4e-3, 0.3e-3, device_z_m));
     for tick in 1..=2500 {
         rig.tick_at(start.lerp(device, (f64::from(tick) / 500.0).min(1.0)));
@@ -149,8 +156,8 @@ fn a_tool_rests_where_the_loop_has_it(
 
 #[test]
 fn a_rigid_tool_wakes_what_it_would_in_the_loop_and_rests_as_there() {
-    for fine_depth_m in [None, Some(2.5e-3)] {
-        let found = a_tool_rests_where_the_loop_has_it(Coupling::Rigid, fine_depth_m, 5e-3);
+    for of_block in [(None, false), (Some(2.5e-3), false), (None, true), (Some(2.5e-3), true)] {
+        let found = a_tool_rests_where_the_loop_has_it(Coupling::Rigid, of_block, 5e-3);
         assert!(found.tools[0].contact_force_n.z > 0.02);
     }
 }
@@ -160,8 +167,10 @@ fn a_tool_on_a_spring_too() {
     let (mass_kg, stiffness_n_per_m) = (0.02_f64, 100.0);
     let damping_n_s_per_m = 2.0 * (stiffness_n_per_m * mass_kg).sqrt();
     let spring = Coupling::Spring { stiffness_n_per_m, damping_n_s_per_m, mass_kg };
-    let found = a_tool_rests_where_the_loop_has_it(spring, None, 4e-3);
-    assert!((found.tools[0].contact_force_n - found.tools[0].device_force_n).length() < 1e-10);
+    for smooth_skin in [false, true] {
+        let found = a_tool_rests_where_the_loop_has_it(spring, (None, smooth_skin), 4e-3);
+        assert!((found.tools[0].contact_force_n - found.tools[0].device_force_n).length() < 1e-10);
+    }
 }
 
 /// Uniaxial stress of the stable neo-Hookean law: the transverse stretch that frees the sides, and `P` along (Pa).

@@ -108,6 +108,7 @@ fn wake_and_sleep(fine_depth_m: Option<f64>, half_length_m: Option<f64>) {
         skin: Skin::new(positions, surface.triangles.clone()).unwrap(),
         spacing_m: 2e-3,
         fine_depth_m,
+        smooth_skin: false,
         lattice_through_m: DVec3::ZERO,
         most_active: 300,
         waking: Waking::ByTools { reach_m: 7e-3 },

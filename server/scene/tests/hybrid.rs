@@ -250,6 +250,7 @@ fn a_finer_skin_and_larger_cells_deep_down_are_what_was_asked_for() {
     };
     let (same, two_sizes, finer) = (of(""), of("fine_depth_mm = 1.25"), of("skin_edge_mm = 0.6"));
     assert_eq!((same.fine_depth_m, two_sizes.fine_depth_m), (None, Some(1.25e-3)));
+    assert_eq!((same.smooth_skin, of("smooth_skin = true").smooth_skin), (false, true));
     let longest_m = |particles: &ParticleSpec| {
         let edges = (0..particles.skin.triangles().len()).flat_map(|t| {
             let [a, b, c] = particles.skin.corners_m(t);

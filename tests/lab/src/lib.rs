@@ -14,6 +14,7 @@ pub mod problems;
 pub mod reference;
 pub mod references;
 pub mod report;
+pub mod ripple;
 pub mod skips;
 pub mod stress;
 pub mod subdivision;

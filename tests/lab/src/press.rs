@@ -60,3 +60,40 @@ impl<'m> Press<'m> {
         self.state.mechanical.tools.first().map_or(0, |tool| tool.contacts)
     }
 }
+
+/// A body at rest whose first tool is led by hand, tick by tick.
+#[derive(Debug)]
+pub struct Slow<'m> {
+    model: &'m Model,
+    state: State,
+    scratch: Scratch,
+    prescribed_m: Vec<DVec3>,
+    targets: Vec<ToolTarget>,
+}
+
+impl<'m> Slow<'m> {
+    /// At rest, with every tool where it starts.
+    pub fn at_rest(model: &'m Model) -> Self {
+        Self {
+            model,
+            state: State::at_rest(model),
+            scratch: Scratch::new(model),
+            prescribed_m: vec![DVec3::ZERO; model.prescribed().len()],
+            targets: model.tools().iter().map(|tool| tool.start()).collect(),
+        }
+    }
+
+    /// One tick, at whose end the first tool is there (m); returns the force (N) of the body on it.
+    pub fn tick(&mut self, position_m: DVec3) -> DVec3 {
+        let Some(target) = self.targets.first_mut() else { return DVec3::ZERO };
+        target.position_m = position_m;
+        let input = TickInput {
+            tools: &self.targets,
+            load_factors: &[],
+            prescribed_displacements_m: &self.prescribed_m,
+            point_forces: &[],
+        };
+        step(self.model, &mut self.state, &mut self.scratch, &input);
+        self.state.mechanical.tools[0].contact_force_n
+    }
+}

@@ -6,6 +6,7 @@
 mod hybrid;
 mod locking;
 mod mass_spring;
+mod ripple;
 mod seed;
 mod shape;
 mod tet;

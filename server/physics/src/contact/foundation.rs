@@ -16,6 +16,11 @@
 //! the nodal part of the bound below stays under [`FREQUENCY_FRACTION`] of the body's own ω²_max: contact never rules
 //! the time step.
 //!
+//! Where a smooth skin follows means of particles that are `h` apart, it gives way less under a small load than a solid does, by
+//! what is finer than the means. The foundation makes up for that: it is then `k_f = α' E/(1 − ν²)/min(h, R)`, which with α' = 2.9
+//! gives spheres on a block the force of a solid to 5 % (`docs/measurements/ripple.md`); and samples are `min(h, R)/3` apart, for a
+//! light touch presses few of them.
+//!
 //! Bound of the frequency. With `w_s = (ζ_s, −1)` on (nodes, tool), `K = Σ k a_s w_s w_sᵀ ⊗ C_s`, `C_s ≤ I` (pressure
 //! along the normal, friction springs of at most the same stiffness across it). A positive block matrix is bounded by
 //! the sum of its diagonal blocks, and the nodal block by the diagonal of its row sums (Gershgorin, `Σ_j ζ_sj = 1`):
@@ -29,6 +34,8 @@ use std::f64::consts::PI;
 
 /// `α`, the foundation's stiffness over that of one layer of elements, `(λ + 2µ)/h` (`docs/adr/contact-foundation.md`).
 const STIFFNESS_RATIO: f64 = 8.0;
+/// `α'`, the foundation's stiffness under a smooth skin over `E/((1 − ν²) h)`.
+const SMOOTH_STIFFNESS_RATIO: f64 = 2.9;
 /// Largest addition of contact to the squared frequency at a node, over the body's ω²_max.
 const FREQUENCY_FRACTION: f64 = 1.5;
 /// Largest spacing of samples, over the tool's radius.
@@ -70,6 +77,8 @@ pub(super) struct BodyAtRest<'a> {
     pub(super) mass_kg: &'a [f64],
     /// ω²_max (rad²/s²) of the body without contact.
     pub(super) frequency_sq: f64,
+    /// How far apart (m) particles are of which the surface follows means; `None` where it follows no means.
+    pub(super) means_over_m: Option<f64>,
 }
 
 /// The samples of one triangle and its stiffness.
@@ -143,12 +152,16 @@ impl Foundation {
             let moduli = body.moduli[body.triangles.surface_triangle[triangle] as usize];
             let corners = body.triangles.corners(triangle, body.positions_m);
             let area_m2 = area_m2(corners);
-            // k_f = α (λ + 2µ)/min(h, R), and no more than any of its nodes can bear
-            let wanted = STIFFNESS_RATIO * moduli.p_wave_pa / (2.0 * area_m2).sqrt().min(radius_m);
+            // k_f = α (λ + 2µ)/min(h, R), of means α' E/(1 − ν²)/min(h, R); and no more than any of its nodes can bear
+            let wanted = match body.means_over_m {
+                Some(apart_m) => SMOOTH_STIFFNESS_RATIO * moduli.indentation_pa / apart_m.min(radius_m),
+                None => STIFFNESS_RATIO * moduli.p_wave_pa / (2.0 * area_m2).sqrt().min(radius_m),
+            };
             let k_f = body.triangles.nodes[triangle].iter().map(|&n| most[n as usize]).fold(wanted, f64::min);
             let [a, b, c] = corners;
             let longest_m = a.distance(b).max(b.distance(c)).max(c.distance(a));
-            let n = ((longest_m / (SPACING * radius_m)).ceil() as usize).clamp(1, MAX_LEVEL);
+            let apart_m = SPACING * body.means_over_m.unwrap_or(radius_m).min(radius_m);
+            let n = ((longest_m / apart_m).ceil() as usize).clamp(1, MAX_LEVEL);
             built.level.push(n as u8);
             built.first_sample.push(built.samples as u32);
             built.sample_stiffness_n_per_m.push(k_f * area_m2 / (n * n) as f64);

@@ -205,6 +205,20 @@ impl ContactModel {
         max_natural_frequency_rad_per_s: f64,
         tools: &[ToolSpec],
     ) -> Self {
+        let omega = max_natural_frequency_rad_per_s;
+        Self::build_on_means(rest_positions_m, surface, moduli, mass_kg, omega, tools, None)
+    }
+
+    /// The same for a surface that follows means of particles so far (m) apart.
+    pub(crate) fn build_on_means(
+        rest_positions_m: &[DVec3],
+        surface: &Surface,
+        moduli: &[SurfaceModuli],
+        mass_kg: &[f64],
+        max_natural_frequency_rad_per_s: f64,
+        tools: &[ToolSpec],
+        means_over_m: Option<f64>,
+    ) -> Self {
         if tools.is_empty() {
             return Self::default();
         }
@@ -216,6 +230,7 @@ impl ContactModel {
             mass_kg,
             // A body without a free node has no frequency; its foundation does nothing then, but must be finite.
             frequency_sq: max_natural_frequency_rad_per_s.max(1.0).powi(2),
+            means_over_m,
         };
         let tools: Vec<ToolModel> = tools
             .iter()

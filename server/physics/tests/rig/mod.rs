@@ -132,6 +132,7 @@ pub fn hybrid_block(
             skin: Skin::new(positions, surface.triangles).unwrap(),
             spacing_m: a_m / cells as f64,
             fine_depth_m: None,
+            smooth_skin: false,
             lattice_through_m: DVec3::ZERO,
             most_active,
             waking,
@@ -188,6 +189,12 @@ pub fn pressed_block(precision: Precision, fine_depth_m: Option<f64>) -> ModelSp
     spec.tools = vec![sphere(6e-3, DVec3::Z * 7e-3, Coupling::Rigid)];
     spec.tools[0].friction_coefficient = 0.3;
     spec.gravity_m_per_s2 = DVec3::Z * -9.81;
+    spec
+}
+
+/// The same body with a skin that follows means of particles.
+pub fn smooth(mut spec: ModelSpec) -> ModelSpec {
+    particles_mut(&mut spec).smooth_skin = true;
     spec
 }
 

@@ -97,6 +97,7 @@ pub fn hybrid_clamp(self_contact: SelfContactChoice) -> ModelSpec {
         skin: Skin::new(positions, surface.triangles).unwrap(),
         spacing_m: 4e-3,
         fine_depth_m: None,
+        smooth_skin: false,
         lattice_through_m: DVec3::new(0.0, 0.0, -0.010),
         most_active: 150,
         waking: Waking::ByTools { reach_m: 9e-3 },

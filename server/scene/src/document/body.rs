@@ -46,6 +46,9 @@ pub(crate) struct ParticlesTable {
     pub(crate) skin_edge_m: Option<f64>,
     /// How thick (m) the layer of cells of this spacing is at the surface, at least one cell; deeper down they are twice as large. By default all are of one size.
     pub(crate) fine_depth_m: Option<f64>,
+    /// Whether tools feel a mean of the particles around them, over a spacing each way, in place of single ones; false by default.
+    #[serde(default)]
+    pub(crate) smooth_skin: bool,
     /// Most particles awake at once, 1 to 20000.
     #[serde(default = "default_most_active")]
     pub(crate) most_active: u32,

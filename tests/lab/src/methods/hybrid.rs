@@ -1,6 +1,5 @@
 //! Hybrid bodies as the server runs them: coarse tets, and the particles nearest to the touch awake.
 use super::{Method, Pace, Running, driven::Driven, subject::Tool};
-use crate::methods::tet_body;
 use crate::problems::{
     Action, Problem,
     body::{Body, TetBody},
@@ -28,6 +27,8 @@ pub(super) struct Hybrid {
 enum Lattice {
     /// All of one size.
     Same,
+    /// The same beneath a smooth skin.
+    Smooth,
     /// Beneath the first layer of twice the size.
     Doubled,
     /// In the first layer, and wherever eight make no whole one, of half the size; the skin is as fine.
@@ -48,6 +49,7 @@ impl Hybrid {
         let of = |(lattice, active): (Lattice, usize)| {
             let (name, cells) = match lattice {
                 Lattice::Same => ("hybrid", "cells"),
+                Lattice::Smooth => ("hybrid smooth", "cells, a skin that follows means of particles"),
                 Lattice::Doubled => ("hybrid doubled", "cells, deeper down twice as large"),
                 Lattice::Halved => ("hybrid halved", "cells, at the surface half as large"),
             };
@@ -61,7 +63,8 @@ impl Hybrid {
             }
         };
         let same = [50, 200, 600, 1400].map(|active| (Lattice::Same, active));
-        let others = [200, 600].into_iter().flat_map(|n| [(Lattice::Doubled, n), (Lattice::Halved, n)]);
+        let lattices = [Lattice::Smooth, Lattice::Doubled, Lattice::Halved];
+        let others = [200, 600].into_iter().flat_map(|n| lattices.map(|lattice| (lattice, n)));
         same.into_iter().chain(others).map(of).collect()
     }
 
@@ -77,7 +80,7 @@ impl Hybrid {
         let is_round = problem.body != Body::Block && matches!(problem.action, Action::Sphere { .. });
         let skin = if is_round { finer } else { skin };
         Some(match self.lattice {
-            Lattice::Same => Fineness { spacing_m, fine_depth_m: None, skin },
+            Lattice::Same | Lattice::Smooth => Fineness { spacing_m, fine_depth_m: None, skin },
             Lattice::Doubled => Fineness { spacing_m, fine_depth_m: Some(spacing_m), skin },
             Lattice::Halved => {
                 Fineness { spacing_m: 0.5 * spacing_m, fine_depth_m: Some(0.5 * spacing_m), skin: finer }
@@ -110,7 +113,9 @@ impl Method for Hybrid {
             self.fineness(problem).ok_or_else(|| miette!("the {} has no particles", problem.body.name()))?;
         let (coarse, fine) = (problem.body.tets(resolution)?, problem.body.tets(skin)?);
         let settings = Settings { mass_damping_per_s: pace.damping_per_s, ..Settings::for_particles() };
-        let particles = ParticleSpec { fine_depth_m, ..particles(problem.body, &fine, spacing_m, self.active)? };
+        let smooth_skin = matches!(self.lattice, Lattice::Smooth);
+        let particles =
+            ParticleSpec { fine_depth_m, smooth_skin, ..particles(problem.body, &fine, spacing_m, self.active)? };
         let hybrid = HybridSpec { coarse: super::subject::solid(problem.material()?, &coarse), particles };
         let mut spec = ModelSpec {
             body: BodySpec::Hybrid(hybrid),
@@ -147,7 +152,15 @@ pub(crate) fn particles(body: Body, fine: &TetBody, spacing_m: f64, most_active:
     // The planes that are held lie on the lattice.
     let off_axis = DVec3::new(0.5, 0.5, 0.0) * spacing_m + DVec3::Z * skin.bounds_m().1.z;
     let lattice_through_m = if body == Body::Block { DVec3::ZERO } else { off_axis };
-    Ok(ParticleSpec { skin, spacing_m, fine_depth_m: None, lattice_through_m, most_active, waking: Waking::ByHand })
+    Ok(ParticleSpec {
+        skin,
+        spacing_m,
+        fine_depth_m: None,
+        smooth_skin: false,
+        lattice_through_m,
+        most_active,
+        waking: Waking::ByHand,
+    })
 }
 
 /// The particles nearest to a point that may wake.
@@ -227,7 +240,7 @@ impl Running for Pressed {
     fn size(&self) -> [usize; 3] {
         let awake = self.driven.state.body.as_seed().map_or(0, |_| self.model.body().most_awake_particles());
         [
-            tet_body(&self.model).mesh().tets().len(),
+            self.model.body().tets().map_or(0, |mesh| mesh.tets().len()),
             self.driven.state.mechanical.x.len() + awake,
             self.model.substeps() as usize,
         ]

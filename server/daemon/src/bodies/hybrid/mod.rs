@@ -3,7 +3,7 @@ mod inside;
 mod skin;
 mod touch;
 
-use super::{FirstTouch, ServedBody, Shape, ShapeReader};
+use super::{FirstTouch, ServedBody, Shape, ShapeReader, ripple};
 use glam::DVec3;
 use palpate_physics::{
     Model, Scratch, State,
@@ -51,7 +51,7 @@ impl ServedBody for HybridBody {
         touch::first_touch(self, scene)
     }
 
-    fn description(&self, _: &Model) -> Vec<String> {
+    fn description(&self, model: &Model) -> Vec<String> {
         let (spec, partition, embedding) = (self.particles(), self.partition(), self.embedding());
         let mut lines = vec![format!(
             "particles  {}, {} mm apart, at most {} awake; skin of {}",
@@ -83,6 +83,7 @@ impl ServedBody for HybridBody {
             counted(self.node_count(), "node"),
             100.0 * partition.whole_part()
         ));
+        lines.extend(ripple::told(model, spec));
         lines
     }
 
@@ -91,7 +92,7 @@ impl ServedBody for HybridBody {
         outside(self).filter(|_| !many_are_outside(self)).into_iter().collect()
     }
 
-    fn warnings(&self, _: &Model) -> Vec<String> {
+    fn warnings(&self, model: &Model) -> Vec<String> {
         /// Of the volume in whole cells: less is a lattice that hardly sees the body.
         const FEW_WHOLE: f64 = 0.2;
         let (spec, partition) = (self.particles(), self.partition());
@@ -114,6 +115,7 @@ impl ServedBody for HybridBody {
                     .to_owned(),
             );
         }
+        warnings.extend(ripple::warning(model, spec));
         warnings
     }
 }

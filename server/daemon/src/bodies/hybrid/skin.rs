@@ -7,7 +7,7 @@ use crate::bodies::{
 use glam::DVec3;
 use palpate_physics::{
     Model,
-    bodies::hybrid::{HybridBody, composite::Anchor, trilinear_point::TrilinearPoint},
+    bodies::hybrid::{HybridBody, composite::Anchor},
 };
 use std::collections::BTreeMap;
 
@@ -17,6 +17,8 @@ pub(super) struct SkinReader {
     /// Particles that carry vertices, ascending.
     particles: Vec<Carrier>,
     vertices: Vec<Vertex>,
+    /// Indices in `particles` and weights of what carries the vertices, one vertex after another.
+    carriers: Vec<(u32, f64)>,
     /// Displacement (m) of every carrier.
     carried_m: Vec<DVec3>,
     /// Displacement (m) of every vertex from its f32 rest position.
@@ -32,9 +34,8 @@ struct Carrier {
 
 #[derive(Debug)]
 struct Vertex {
-    /// Indices in `particles`.
-    carriers: [u32; 8],
-    weights: [f64; 8],
+    /// How many carriers it has.
+    carriers: usize,
     /// Rest position less the one that viewers have (m).
     rounding_m: DVec3,
 }
@@ -43,25 +44,23 @@ impl SkinReader {
     pub(super) fn new(model: &Model, hybrid: &HybridBody, rest_f32_m: &[[f32; 3]]) -> Self {
         let partition = hybrid.partition();
         let rest = model.surface_rest_positions_m();
-        let places: Vec<TrilinearPoint> =
-            (0..rest.len() as u32).map(|vertex| hybrid.vertex_point(vertex).trilinear(partition)).collect();
-        let mut number: BTreeMap<u32, u32> =
-            places.iter().flat_map(|place| place.particles).map(|particle| (particle, 0)).collect();
+        let of_vertices = || (0..rest.len() as u32).map(|vertex| hybrid.carriers_of_vertex(vertex));
+        let mut number: BTreeMap<u32, u32> = of_vertices().flatten().map(|(particle, _)| (*particle, 0)).collect();
         number.values_mut().zip(0..).for_each(|(slot, index)| *slot = index);
         let carrier = |&particle: &u32| Carrier {
             particle,
             rest_m: partition.particle_m(particle),
             anchor: partition.anchor(particle),
         };
-        let vertex = |((place, rest), rest_f32): ((&TrilinearPoint, &DVec3), &[f32; 3])| Vertex {
-            carriers: place.particles.map(|particle| number[&particle]),
-            weights: place.weights,
+        let vertex = |((carriers, rest), rest_f32): ((&[(u32, f64)], &DVec3), &[f32; 3])| Vertex {
+            carriers: carriers.len(),
             rounding_m: *rest - double(*rest_f32),
         };
         Self {
-            vertices: places.iter().zip(rest).zip(rest_f32_m).map(vertex).collect(),
+            vertices: of_vertices().zip(rest).zip(rest_f32_m).map(vertex).collect(),
+            carriers: of_vertices().flatten().map(|(particle, weight)| (number[particle], *weight)).collect(),
             carried_m: vec![DVec3::ZERO; number.len()],
-            displacements_m: vec![[0.0; 3]; places.len()],
+            displacements_m: vec![[0.0; 3]; rest.len()],
             particles: number.keys().map(carrier).collect(),
         }
     }
@@ -80,9 +79,12 @@ impl ShapeReader for SkinReader {
             *carried_m = x - *rest_m;
         }
         let mut largest_sq = 0.0_f64;
+        let mut left = &self.carriers[..];
         for (displacement_m, vertex) in self.displacements_m.iter_mut().zip(&self.vertices) {
-            let carried = vertex.carriers.iter().map(|&carrier| self.carried_m[carrier as usize]);
-            let moved = carried.zip(vertex.weights).map(|(u, weight)| u * weight).sum::<DVec3>() + vertex.rounding_m;
+            let (carriers, others) = left.split_at(vertex.carriers);
+            left = others;
+            let carried = carriers.iter().map(|&(carrier, weight)| self.carried_m[carrier as usize] * weight);
+            let moved = carried.sum::<DVec3>() + vertex.rounding_m;
             largest_sq = largest_sq.max(moved.length_squared());
             *displacement_m = single(moved);
         }

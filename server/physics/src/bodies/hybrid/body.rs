@@ -152,7 +152,7 @@ impl HybridBody {
         progress(MAY_WAKE);
         let vertex_points: Vec<CellPoint> =
             spec.skin.positions_m().iter().map(|&point| CellPoint::new(&partition, point)).collect();
-        let skin_carriers = SkinCarriers::new(&partition, &vertex_points);
+        let skin_carriers = SkinCarriers::new(&partition, &vertex_points, spec.smooth_skin);
         let hybrid = Self {
             lumping: Lumping::new(&partition, &masses),
             full_cell: RestCell::new(spacing_m, 1.0 - KEPT, &Moments::full(spacing_m)),
@@ -292,6 +292,11 @@ impl HybridBody {
     /// Computes the bounding boxes of the skin's triangles, given in the order of contact's broad phase.
     pub(crate) fn cluster(&mut self, triangles: &[[u32; 3]]) {
         self.clusters = SkinClusters::new(self, self.skin_rest_m(), triangles);
+    }
+
+    /// Returns the particles that carry a vertex of the skin, with their weights, of which none is zero.
+    pub fn carriers_of_vertex(&self, vertex: u32) -> &[(u32, f64)] {
+        self.skin_carriers.of_vertex(vertex)
     }
 
     /// Returns the material of the tet that a vertex of the skin is in.

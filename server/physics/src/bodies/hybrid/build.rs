@@ -50,8 +50,11 @@ impl HybridBody {
             bearing_kg: &bearing_kg,
             max_natural_frequency_rad_per_s: omega,
         };
-        let contact = ContactModel::build(skin.positions_m, &surface, &moduli, &mass_kg, omega, &around.tools)
-            .with_walls(around.walls_of(&skin));
+        let means_over_m = hybrid.particles().smooth_skin.then(|| hybrid.particles().spacing_m);
+        let tools = &around.tools;
+        let contact =
+            ContactModel::build_on_means(skin.positions_m, &surface, &moduli, &mass_kg, omega, tools, means_over_m)
+                .with_walls(around.walls_of(&skin));
         hybrid.cluster(contact.triangles());
         let stretch_sq = stiffening(&around.settings, &materials);
         let touched = if contact.nodal_stiffness_n_per_m.is_empty() {

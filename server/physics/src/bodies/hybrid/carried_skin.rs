@@ -1,8 +1,5 @@
 //! What carries the skin's vertices; their positions are computed when they are asked for.
-use super::{
-    body::HybridBody, clusters::Displaced, composite::Anchor, partition::NONE, running::RunningPatch,
-    trilinear_point::TrilinearPoint,
-};
+use super::{body::HybridBody, clusters::Displaced, composite::Anchor, partition::NONE, running::RunningPatch};
 use crate::{contact::Skin, tick::CarriedSkin};
 use glam::DVec3;
 
@@ -10,8 +7,10 @@ use glam::DVec3;
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Carried {
     rest_m: DVec3,
+    vertex: u32,
     carriers: [(Carrier, f64); 8],
-    /// How many of the carriers have a weight other than zero; they are the first ones.
+    /// How many of the carriers have a weight other than zero; they are the first ones. None where there are more than eight, as
+    /// of a smooth skin: those are looked up.
     weighty: usize,
 }
 
@@ -104,6 +103,9 @@ impl CarriedSkin for SkinView<'_> {
         let hybrid = self.hybrid;
         let (rest_m, of_vertex) = (hybrid.skin_rest_m()[vertex as usize], hybrid.skin_carriers.of_vertex(vertex));
         let mut carriers = [(Carrier::Point(NONE), 0.0); 8];
+        if of_vertex.len() > carriers.len() {
+            return Carried { rest_m, vertex, carriers, weighty: 0 };
+        }
         for (&(particle, weight), slot) in of_vertex.iter().zip(&mut carriers) {
             let carrier = match self.patch.point_of(particle) {
                 NONE => Carrier::Nodes(*hybrid.skin_carriers.anchor(particle)),
@@ -111,10 +113,13 @@ impl CarriedSkin for SkinView<'_> {
             };
             *slot = (carrier, weight);
         }
-        Carried { rest_m, carriers, weighty: of_vertex.len() }
+        Carried { rest_m, vertex, carriers, weighty: of_vertex.len() }
     }
 
     fn carried_m(&self, carried: &Carried) -> DVec3 {
+        if carried.weighty == 0 {
+            return self.position_m(carried.vertex);
+        }
         let of = |carrier: &Carrier| match carrier {
             Carrier::Point(point) => self.patch.displacements_m()[*point as usize],
             Carrier::Nodes(anchor) => anchor.of(self.patch.node_displacements_m()),
@@ -133,6 +138,16 @@ impl CarriedSkin for SkinView<'_> {
     }
 
     fn push(&self, carried: &Carried, force_n: DVec3, forces_n: &mut [DVec3]) {
+        if carried.weighty == 0 {
+            let carriers = &self.hybrid.skin_carriers;
+            for &(particle, weight) in carriers.of_vertex(carried.vertex) {
+                match self.patch.point_of(particle) {
+                    NONE => carriers.anchor(particle).push(force_n * weight, forces_n),
+                    point => self.patch.push(point, force_n * weight, self.hybrid.node_count(), forces_n),
+                }
+            }
+            return;
+        }
         for (carrier, weight) in carried.carriers() {
             match carrier {
                 Carrier::Nodes(anchor) => anchor.push(force_n * *weight, forces_n),
@@ -156,9 +171,8 @@ impl HybridBody {
             };
             x - self.partition.particle_m(particle)
         };
-        let cell_point = self.vertex_points[vertex as usize].trilinear(&self.partition);
         let rest_m = self.skin_rest_m()[vertex as usize];
-        rest_m + cell_point.particles.into_iter().zip(cell_point.weights).map(|(p, w)| moved(p) * w).sum::<DVec3>()
+        rest_m + self.carriers_of_vertex(vertex).iter().map(|&(p, w)| moved(p) * w).sum::<DVec3>()
     }
 
     /// Returns the masses (kg) that contact may take for those of the skin's vertices: with the area `A_v` of a vertex,
@@ -172,17 +186,18 @@ impl HybridBody {
             let third = (b - a).cross(c - a).length() / 6.0;
             skin.triangles()[triangle].iter().for_each(|&vertex| vertex_m2[vertex as usize] += third);
         }
-        let points = || self.vertex_points.iter().map(|point| point.trilinear(&self.partition)).zip(&vertex_m2);
+        let vertices = 0..self.vertex_points.len() as u32;
+        let points = || vertices.clone().map(|vertex| self.carriers_of_vertex(vertex)).zip(&vertex_m2);
         let mut particle_m2 = vec![0.0; self.partition.particle_count()];
-        for (point, area_m2) in points() {
-            for (particle, weight) in point.particles.into_iter().zip(point.weights) {
+        for (carriers, area_m2) in points() {
+            for &(particle, weight) in carriers {
                 particle_m2[particle as usize] += weight.max(0.0) * area_m2;
             }
         }
         let per_area = |particle: u32| self.masses.particle_kg[particle as usize] / particle_m2[particle as usize];
-        let of_vertex = |(point, area_m2): (TrilinearPoint, &f64)| {
-            let carriers = point.particles.into_iter().zip(point.weights).filter(|(_, weight)| *weight > 1e-6);
-            area_m2 * carriers.map(|(particle, _)| per_area(particle)).fold(f64::INFINITY, f64::min)
+        let of_vertex = |(carriers, area_m2): (&[(u32, f64)], &f64)| {
+            let carriers = carriers.iter().filter(|(_, weight)| *weight > 1e-6);
+            area_m2 * carriers.map(|(particle, _)| per_area(*particle)).fold(f64::INFINITY, f64::min)
         };
         points().map(of_vertex).collect()
     }
@@ -191,16 +206,16 @@ impl HybridBody {
     /// `min_p m_p/Σ_v w_vp` over the particles of each. Unlike [`Self::vertex_masses_kg`] it knows no areas: a vertex of
     /// small triangles is borne by the same particles as its neighbours.
     pub(crate) fn bearing_masses_kg(&self) -> Vec<f64> {
-        let points = || self.vertex_points.iter().map(|point| point.trilinear(&self.partition));
+        let points = || (0..self.vertex_points.len() as u32).map(|vertex| self.carriers_of_vertex(vertex));
         let mut shares = vec![0.0; self.partition.particle_count()];
-        for point in points() {
-            for (particle, weight) in point.particles.into_iter().zip(point.weights) {
+        for carriers in points() {
+            for &(particle, weight) in carriers {
                 shares[particle as usize] += weight.max(0.0);
             }
         }
-        let of_vertex = |point: TrilinearPoint| {
-            let carriers = point.particles.into_iter().zip(point.weights).filter(|(_, weight)| *weight > 1e-6);
-            let each = carriers.map(|(p, _)| self.masses.particle_kg[p as usize] / shares[p as usize]);
+        let of_vertex = |carriers: &[(u32, f64)]| {
+            let carriers = carriers.iter().filter(|(_, weight)| *weight > 1e-6);
+            let each = carriers.map(|(p, _)| self.masses.particle_kg[*p as usize] / shares[*p as usize]);
             each.fold(f64::INFINITY, f64::min)
         };
         points().map(of_vertex).collect()
@@ -210,10 +225,11 @@ impl HybridBody {
     /// `Σ_v k_v w_v w_vᵀ`.
     pub(crate) fn particle_springs_n_per_m(&self, of_vertices_n_per_m: &[f64]) -> Vec<f64> {
         let mut springs = vec![0.0; self.partition.particle_count()];
-        for (point, stiffness) in self.vertex_points.iter().zip(of_vertices_n_per_m) {
-            let amplification = point.amplification();
-            let point = point.trilinear(&self.partition);
-            for (particle, weight) in point.particles.into_iter().zip(point.weights) {
+        for ((vertex, point), stiffness) in (0..).zip(&self.vertex_points).zip(of_vertices_n_per_m) {
+            let carriers = self.carriers_of_vertex(vertex);
+            let of_carriers = || carriers.iter().map(|(_, weight)| weight.abs()).sum();
+            let amplification = if self.particles.smooth_skin { of_carriers() } else { point.amplification() };
+            for &(particle, weight) in carriers {
                 springs[particle as usize] += stiffness * weight.abs() * amplification;
             }
         }

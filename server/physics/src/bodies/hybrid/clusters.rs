@@ -49,11 +49,7 @@ impl SkinClusters {
         for (cluster, ends) in (0..).zip(clusters.first_vertex.windows(2)) {
             let mut of_cluster = BTreeSet::new();
             for &vertex in &clusters.vertices[ends[0] as usize..ends[1] as usize] {
-                let cell_point = hybrid.vertex_point(vertex);
-                let particles = hybrid.partition().corners(cell_point.cell as usize);
-                let weighty =
-                    particles.into_iter().zip(cell_point.weights(hybrid.partition())).filter(|(_, w)| *w != 0.0);
-                of_cluster.extend(weighty.map(|(particle, _)| [particle, cluster]));
+                of_cluster.extend(hybrid.carriers_of_vertex(vertex).iter().map(|(particle, _)| [*particle, cluster]));
             }
             carried.extend(of_cluster);
         }
@@ -124,11 +120,19 @@ impl Boxes {
             if triangles.len() <= CLUSTER && !self.vertices[first_vertex..].contains(&vertex) {
                 self.vertices.push(vertex);
             }
-            for particle in partition.corners(hybrid.vertex_point(vertex).cell as usize) {
+            let mut follow = |particle: u32| {
                 for node in partition.anchor(particle).nodes {
                     if !self.nodes[start..].contains(&node) {
                         self.nodes.push(node);
                     }
+                }
+            };
+            for particle in partition.corners(hybrid.vertex_point(vertex).cell as usize) {
+                follow(particle);
+            }
+            if hybrid.particles().smooth_skin {
+                for (particle, _) in hybrid.carriers_of_vertex(vertex) {
+                    follow(*particle);
                 }
             }
         }

@@ -67,6 +67,7 @@ mod tests {
             skin: Skin::new(CORNERS.map(|corner| corner * size).to_vec(), triangles).unwrap(),
             spacing_m: 4e-3,
             fine_depth_m: None,
+            smooth_skin: false,
             lattice_through_m: DVec3::ZERO,
             most_active: 600,
             waking: Waking::ByHand,

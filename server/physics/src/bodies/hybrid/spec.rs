@@ -6,6 +6,7 @@ use crate::{
     tick::EnvironmentError,
 };
 use glam::DVec3;
+use std::fmt;
 use thiserror::Error;
 
 /// More cells than this in the lattice's box are refused: their numbers have to fit an index, and they take memory.
@@ -23,7 +24,7 @@ pub struct HybridSpec {
 }
 
 /// The particles of a hybrid body.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Clone, PartialEq)]
 pub struct ParticleSpec {
     /// The body's surface at rest, which bounds its volume, is touched by tools and seen by viewers. It should be as
     /// fine as the lattice, or finer.
@@ -34,6 +35,9 @@ pub struct ParticleSpec {
     /// depth, and at least one. Deeper down blocks of eight are merged into cells of twice the spacing (`sizes`); with
     /// `None` no cells are merged.
     pub fine_depth_m: Option<f64>,
+    /// Whether the skin follows a mean of the particles around each of its vertices, not those of one cell alone, and tools press it
+    /// through a softer foundation: so they do not feel single particles ([`super::skin_carriers`]).
+    pub smooth_skin: bool,
     /// A point (m) that planes of the lattice pass through; best on a surface that is held, so that no cell reaches
     /// past it.
     pub lattice_through_m: DVec3,
@@ -41,6 +45,20 @@ pub struct ParticleSpec {
     pub most_active: usize,
     /// What wakes particles.
     pub waking: Waking,
+}
+
+/// A body's fingerprint is made of this text; bodies without a smooth skin keep the one that they had before there were any.
+impl fmt::Debug for ParticleSpec {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { skin, spacing_m, fine_depth_m, smooth_skin, lattice_through_m, most_active, waking } = self;
+        let mut text = f.debug_struct("ParticleSpec");
+        text.field("skin", skin).field("spacing_m", spacing_m).field("fine_depth_m", fine_depth_m);
+        if *smooth_skin {
+            text.field("smooth_skin", smooth_skin);
+        }
+        text.field("lattice_through_m", lattice_through_m).field("most_active", most_active);
+        text.field("waking", waking).finish()
+    }
 }
 
 /// What wakes particles.

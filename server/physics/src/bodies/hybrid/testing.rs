@@ -48,6 +48,7 @@ pub(crate) fn hybrid_ball_of(materials: &[Material; 2], spacing_m: f64, fine_dep
         skin: ball(0.01, DVec3::new(0.2e-3, -0.3e-3, 0.1e-3), 3),
         spacing_m,
         fine_depth_m,
+        smooth_skin: false,
         lattice_through_m: DVec3::splat(0.4e-3),
         most_active: 2000,
         waking: Waking::ByHand,

@@ -60,6 +60,12 @@ impl CellPoint {
         partition.hanging(self.cell as usize).to_particles(trilinear(self.local))
     }
 
+    /// Returns its position (m) at rest.
+    pub(super) fn rest_m(&self, partition: &Partition) -> DVec3 {
+        let first_m = partition.sites().cell_m(partition.cells()[self.cell as usize].site_cell as usize);
+        first_m + self.local * partition.edge_m(self.cell as usize)
+    }
+
     /// Returns a bound of the point's speed over that of the fastest of its particles: `Σ |w_p|`, 1 inside a cell.
     pub fn amplification(&self) -> f64 {
         trilinear(self.local).iter().map(|w| w.abs()).sum()

@@ -7,7 +7,6 @@ use crate::{
     bodies::hybrid::{
         HybridBody,
         patch::{Field, KEPT, Patch},
-        trilinear_point::TrilinearPoint,
     },
     tick::Environment,
 };
@@ -63,21 +62,21 @@ impl<'a> Awakened<'a> {
             carriers: Vec::new(),
         };
         for vertex in 0..body.skin_rest_m().len() as u32 {
-            let carriers = awakened.carriers_of(&body.vertex_point(vertex).trilinear(partition));
+            let carriers = awakened.carriers_of(body.carriers_of_vertex(vertex));
             awakened.carriers.extend(carriers);
             awakened.first.push(awakened.carriers.len() as u32);
         }
         awakened
     }
 
-    fn carriers_of(&self, point: &TrilinearPoint) -> BTreeMap<u32, f64> {
+    fn carriers_of(&self, particles: &[(u32, f64)]) -> BTreeMap<u32, f64> {
         let mut carriers = BTreeMap::new();
         let mut add = |entry: u32, weight: f64| {
             if weight != 0.0 {
                 *carriers.entry(entry).or_default() += weight;
             }
         };
-        for (&particle, weight) in point.particles.iter().zip(point.weights) {
+        for &(particle, weight) in particles {
             if let Ok(number) = self.patch.active().binary_search(&particle) {
                 add((self.nodes() + number) as u32, weight);
                 continue;

@@ -264,6 +264,7 @@ mod tests {
                     skin: Skin::new(corners, triangles).unwrap(),
                     spacing_m: 5e-3,
                     fine_depth_m: None,
+                    smooth_skin: false,
                     lattice_through_m: DVec3::ZERO,
                     most_active: 300,
                     waking: Waking::ByHand,

@@ -84,6 +84,7 @@ impl BodyKind for Hybrid {
             skin,
             spacing_m: table.spacing_m,
             fine_depth_m: table.fine_depth_m,
+            smooth_skin: table.smooth_skin,
             most_active: table.most_active as usize,
             waking: Waking::ByTools { reach_m: table.reach_m.unwrap_or_else(|| half_ball_m(table)) },
         };

@@ -27,6 +27,7 @@ pub(super) fn cases() -> Vec<Case> {
         block("hybrid/two-tools", 500, "", &[double, &tissue, &spring, &capsule]).acting(strokes),
         block("hybrid/no-long-steps", 500, "", &["long_coarse_steps = false\n", &tissue, &rigid]).acting(strokes),
         block("hybrid/merged-cells", 500, "fine_depth_mm = 5\n", &["", &tissue, &rigid]).acting(strokes),
+        block("hybrid/smooth-skin", 500, "smooth_skin = true\n", &["", &tissue, &rigid]).acting(strokes),
         block("hybrid/actions", 500, "", &["", &tissue, ACTIONS, &rigid]).acting(pushed),
         block("hybrid/by-hand", 200, "", &["", &tissue, &rigid]).changed(by_hand).acting(wakes),
         block("hybrid/too-long", 200, "", &["substeps = 1\n", &tissue, &rigid]).acting(strokes),
