@@ -1,6 +1,10 @@
 //! A body at work: it rings, and a tool, if it has one, goes in and stays.
 use glam::DVec3;
-use palpate_physics::{Model, Scratch, State, StepReport, TickInput, contact::ToolTarget, step};
+use palpate_physics::{
+    Model, Scratch, State, StepReport, TickInput,
+    contact::{ToolSpec, ToolTarget},
+    step,
+};
 
 /// A body under way. [`Press::tick`] does not allocate.
 #[derive(Debug)]
@@ -79,7 +83,7 @@ impl<'m> Slow<'m> {
             state: State::at_rest(model),
             scratch: Scratch::new(model),
             prescribed_m: vec![DVec3::ZERO; model.prescribed().len()],
-            targets: model.tools().iter().map(|tool| tool.start()).collect(),
+            targets: model.tools().iter().map(ToolSpec::start).collect(),
         }
     }
 

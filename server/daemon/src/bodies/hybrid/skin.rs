@@ -52,12 +52,10 @@ impl SkinReader {
             rest_m: partition.particle_m(particle),
             anchor: partition.anchor(particle),
         };
-        let vertex = |((carriers, rest), rest_f32): ((&[(u32, f64)], &DVec3), &[f32; 3])| Vertex {
-            carriers: carriers.len(),
-            rounding_m: *rest - double(*rest_f32),
-        };
+        let counts = of_vertices().map(<[(u32, f64)]>::len);
+        let roundings_m = rest.iter().zip(rest_f32_m).map(|(rest, rest_f32)| *rest - double(*rest_f32));
         Self {
-            vertices: of_vertices().zip(rest).zip(rest_f32_m).map(vertex).collect(),
+            vertices: counts.zip(roundings_m).map(|(carriers, rounding_m)| Vertex { carriers, rounding_m }).collect(),
             carriers: of_vertices().flatten().map(|(particle, weight)| (number[particle], *weight)).collect(),
             carried_m: vec![DVec3::ZERO; number.len()],
             displacements_m: vec![[0.0; 3]; rest.len()],
