@@ -1,6 +1,7 @@
 //! The lab: what Palpate costs, measured beside what it gets wrong.
 pub mod bodies;
 pub mod convergence;
+pub mod deep;
 pub mod fine_levels;
 pub mod hashes;
 pub mod jitter;

@@ -100,4 +100,9 @@ impl<'m> Slow<'m> {
         step(self.model, &mut self.state, &mut self.scratch, &input);
         self.state.mechanical.tools[0].contact_force_n
     }
+
+    /// Where the first tool is (m).
+    pub fn tool_m(&self) -> DVec3 {
+        self.state.mechanical.tools.first().map_or(DVec3::NAN, |tool| tool.centre_m)
+    }
 }
