@@ -303,7 +303,7 @@ fn a_hybrid_body_is_checked_with_particles_awake() {
         path.to_str().unwrap().to_owned()
     };
     let far = "driver = \"script\"\nkeyframe = [{ time_s = 0, position_mm = [20, 20, 80] }, { time_s = 1, position_mm = [20, 20, 70] }]";
-    let few = "spacing_mm = 5\nmost_active = 60";
+    let few = "spacing_mm = 5\nmost_active = 60\nsmooth_skin = true";
     let text = succeeds(&["check", &scene("far.toml", few, far), "--strict"]);
     // A tenth of its radius, though its driver keeps it far away.
     let (before, _) = text.split_once(" particles awake, the first tool pressed 0.8 mm into the body, costs ").unwrap();

@@ -178,7 +178,9 @@ impl<'a> Problem<'a> {
         };
         let wanted = sphere.penalty_pa_per_m;
         let mut found = Some(x.to_vec());
-        for share in PENALTIES {
+        // A soft sphere that is deep would be around the surface, and push it out above itself.
+        let is_deep = self.largest_step() < fraction;
+        for share in PENALTIES.into_iter().filter(|share| !is_deep || *share == 1.0) {
             if let Action::Sphere { sphere, .. } = &mut self.action {
                 sphere.penalty_pa_per_m = share * wanted;
             }
