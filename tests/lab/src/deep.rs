@@ -1,5 +1,4 @@
-//! Force against depth, far beyond the bench: a block with particles that a sphere on a spring presses to half its height, beside
-//! the lab's triquadratic hexahedra (`docs/measurements/deep-press.md`).
+//! Force against depth, beyond the bench: a block with particles that a sphere on a spring presses a radius deep, beside the lab's triquadratic hexahedra (`docs/measurements/deep-press.md`).
 //!
 //! The scene `hybrid-block`, its tool on a virtual coupling and without friction, its device going down slowly; the depth is that of
 //! the tool, not of the device. The reference is a rigid sphere on the same block and law at each depth.
@@ -13,8 +12,8 @@ use miette::{IntoDiagnostic, Result, ensure, miette};
 use palpate_physics::{Model, contact::Coupling, material::Law};
 use palpate_scene::Limits;
 
-/// Depths (mm), to half the block's height.
-const DEPTHS_MM: [f64; 8] = [2.5, 5.0, 7.5, 10.0, 12.5, 15.0, 17.5, 20.0];
+/// Depths (mm). Beyond a radius the reference's sphere, which presses by its penalty alone, comes to be around the surface.
+const DEPTHS_MM: [f64; 4] = [2.5, 5.0, 7.5, 10.0];
 /// Elements of the reference over one and a half radii of the contact.
 const GRIDS: [usize; 3] = [2, 3, 4];
 /// κ of the reference's sphere over `E/((1 − ν²)√(Rδ))`; where Newton's method does not converge with the first, the next.

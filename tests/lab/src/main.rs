@@ -37,7 +37,7 @@ enum Command {
     Subdivision(subdivision::Options),
     /// How much too stiff linear tets are, by Poisson's ratio and size: a block pressed by patches and spheres
     Locking,
-    /// Force against depth of a block with particles that a sphere presses to half its height, beside the reference's: some minutes
+    /// Force against depth of a block with particles that a sphere on a spring presses a radius deep, beside the reference's: some minutes
     Deep,
     /// How much the force on a tool ripples with the particles beneath it, by their spacing: a block dragged over and pressed by spheres: some minutes
     Ripple,

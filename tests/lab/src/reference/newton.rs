@@ -14,8 +14,6 @@ const SHIFTS: [f64; 4] = [1e-4, 1e-3, 1e-2, 1e-1];
 const MAX_BACKTRACKS: usize = 20;
 /// The first load step over the smallest.
 const MAX_HALVINGS: i32 = 8;
-/// Largest way of a sphere in a load step, over its radius.
-const STEP_RADII: f64 = 0.5;
 /// At each load a sphere's penalty is raised in these shares of it: Newton finds the contact's rim from a soft one.
 const PENALTIES: [f64; 3] = [0.01, 0.1, 1.0];
 /// Sufficient decrease of the potential (Armijo).
@@ -68,17 +66,16 @@ struct Problem<'a> {
 pub fn solve(solid: &Solid, body: &Body, action: &Action, tell: &mut dyn FnMut(&str)) -> Result<Equilibrium> {
     let mut problem = Problem::new(solid, body, action)?;
     let mut x = solid.grid.positions_m.clone();
-    let largest = problem.largest_step();
-    let (mut reached, mut step, mut iterations) = (0.0_f64, largest, 0);
+    let (mut reached, mut step, mut iterations) = (0.0_f64, 1.0_f64, 0);
     while reached < 1.0 {
         let fraction = (reached + step).min(1.0);
         if let Some(found) = problem.through_penalties(fraction, &x, &mut iterations, tell) {
             (x, reached) = (found, fraction);
-            step = f64::min(2.0 * step, largest);
+            step *= 2.0;
             continue;
         }
         step *= 0.5;
-        if step < largest * 0.5_f64.powi(MAX_HALVINGS) {
+        if step < 0.5_f64.powi(MAX_HALVINGS) {
             bail!("the reference does not converge past {:.1} % of the load", 100.0 * reached);
         }
     }
@@ -113,15 +110,6 @@ impl<'a> Problem<'a> {
             size_m: (high - low).max_element(),
             rounding_j: ROUNDING * solid.stiffest_j(),
         })
-    }
-
-    /// The largest load step: a sphere goes by no more than [`STEP_RADII`]·R, or it is around points of the surface, which
-    /// it pushes out above itself.
-    fn largest_step(&self) -> f64 {
-        match &self.action {
-            Action::Forces(_) => 1.0,
-            Action::Sphere { sphere, depth_m } => f64::min(1.0, STEP_RADII * sphere.radius_m / depth_m),
-        }
     }
 
     fn centre_m(&self, fraction: f64) -> DVec3 {
@@ -178,9 +166,7 @@ impl<'a> Problem<'a> {
         };
         let wanted = sphere.penalty_pa_per_m;
         let mut found = Some(x.to_vec());
-        // A soft sphere that is deep would be around the surface, and push it out above itself.
-        let is_deep = self.largest_step() < fraction;
-        for share in PENALTIES.into_iter().filter(|share| !is_deep || *share == 1.0) {
+        for share in PENALTIES {
             if let Action::Sphere { sphere, .. } = &mut self.action {
                 sphere.penalty_pa_per_m = share * wanted;
             }
