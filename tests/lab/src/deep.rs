@@ -1,4 +1,5 @@
-//! Force against depth, beyond the bench: a block with particles that a sphere on a spring presses a radius deep, beside the lab's triquadratic hexahedra (`docs/measurements/deep-press.md`).
+//! Force against depth, beyond the bench: a block with particles that a sphere on a spring presses a radius deep, beside the
+//! lab's triquadratic hexahedra (`docs/measurements/deep-press.md`).
 //!
 //! The scene `hybrid-block`, its tool on a virtual coupling and without friction, its device going down slowly; the depth is that of
 //! the tool, not of the device. The reference is a rigid sphere on the same block and law at each depth.
