@@ -8,8 +8,8 @@
 use super::{body::HybridBody, composite::PARTS, prestrain::is_in_reach, running::RunningPatch};
 use glam::{DMat3, DVec3};
 
-/// A tet whose parts all have volume ratios above this, and that of the tet no more than its inverse times theirs, has no
-/// crushed cell: its cells are not looked at.
+/// A tet of which no part has a smaller volume ratio than this, nor a smaller one than this times the whole tet's, is taken to
+/// have no crushed cell: its cells are not looked at.
 const SOUND: f64 = 0.6;
 
 /// What is known of a tet.
