@@ -32,6 +32,11 @@ pub fn short(value: f64) -> String {
     if rounded == 0.0 || (1e-4..1e7).contains(&rounded.abs()) { rounded.to_string() } else { format!("{rounded:e}") }
 }
 
+/// Two significant digits, without the zeros behind them: an estimate.
+pub fn two_digits(value: f64) -> String {
+    short(format!("{value:.1e}").parse().unwrap_or(value))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -57,6 +62,13 @@ mod tests {
         ];
         for (value, text) in cases {
             assert_eq!(short(value), text);
+        }
+    }
+
+    #[test]
+    fn estimates_have_two_digits() {
+        for (value, text) in [(0.1234, "0.12"), (99.6, "100"), (1349.0, "1300"), (2.0, "2"), (0.0, "0")] {
+            assert_eq!(two_digits(value), text);
         }
     }
 }

@@ -1,24 +1,37 @@
-//! Force against depth, beyond the bench: a block with particles that a sphere on a spring presses a radius deep, beside the
+//! Force against depth, beyond the bench: a block with particles that a sphere on a spring presses two radii deep, beside the
 //! lab's triquadratic hexahedra (`docs/measurements/deep-press.md`).
 //!
 //! The scene `hybrid-block`, its tool on a virtual coupling and without friction, its device going down slowly; the depth is that of
 //! the tool, not of the device. The reference is a rigid sphere on the same block and law at each depth.
 use crate::{
+    bodies::material,
     press::Slow,
-    problems::{Action, Motion, Problem, body::BLOCK_M, body::Body},
-    references::{limit, on_grid},
+    problems::body::BLOCK_M,
+    reference::{
+        bodies,
+        newton::{Action, solve_through},
+        solid::Solid,
+        sphere::Sphere,
+    },
+    references::limit,
 };
+use clap::Args;
 use glam::DVec3;
+use indicatif::{ProgressBar, ProgressStyle};
 use miette::{IntoDiagnostic, Result, ensure, miette};
 use palpate_physics::{Model, contact::Coupling, material::Law};
 use palpate_scene::Limits;
+use std::time::Duration;
 
-/// Depths (mm). Beyond a radius the reference's sphere, which presses by its penalty alone, comes to be around the surface.
-const DEPTHS_MM: [f64; 4] = [2.5, 5.0, 7.5, 10.0];
-/// Elements of the reference over one and a half radii of the contact.
-const GRIDS: [usize; 3] = [2, 3, 4];
-/// κ of the reference's sphere over `E/((1 − ν²)√(Rδ))`; where Newton's method does not converge with the first, the next.
-const PENALTIES: [f64; 3] = [1e3, 2.5e2, 1e2];
+/// Depths (mm), to half of the block's height.
+const DEPTHS_MM: [f64; 8] = [2.5, 5.0, 7.5, 10.0, 12.5, 15.0, 17.5, 20.0];
+/// Elements of the reference over one and a half radii of the contact at the deepest of them.
+const GRIDS: [usize; 3] = [4, 5, 6];
+/// κ of the reference's sphere over `E/((1 − ν²)√(Rδ))`.
+const PENALTY: f64 = 1e3;
+/// The block's material, as the scene has it.
+const YOUNG_MODULUS_PA: f64 = 10e3;
+const POISSON_RATIO: f64 = 0.45;
 /// The coupling: stiffness (N/m), damping (N s/m) and mass (kg).
 const COUPLING: Coupling = Coupling::Spring { stiffness_n_per_m: 800.0, damping_n_s_per_m: 4.0, mass_kg: 0.05 };
 const RADIUS_M: f64 = 10e-3;
@@ -26,11 +39,28 @@ const RADIUS_M: f64 = 10e-3;
 const SPEED_M_PER_S: f64 = 0.01;
 const MOST_WAY_M: f64 = 0.045;
 
+/// At which depths the force is compared.
+#[derive(Debug, Clone, Args)]
+pub struct Options {
+    /// Depths in mm, to half of the block's height of 40 mm
+    #[arg(default_values_t = DEPTHS_MM)]
+    depths_mm: Vec<f64>,
+}
+
 /// Measures and prints, as the rows of a table.
 ///
 /// # Errors
-/// A scene that is refused.
-pub fn print() -> Result<()> {
+/// A scene that is refused, or a depth that is none.
+pub fn print(options: &Options) -> Result<()> {
+    let deepest_mm = 0.5e3 * BLOCK_M[1];
+    let is_meant = |depth_mm: &f64| *depth_mm > 0.0 && *depth_mm <= deepest_mm;
+    ensure!(options.depths_mm.iter().all(is_meant), "depths have to be above 0 and at most {deepest_mm} mm");
+    let mut depths_m: Vec<f64> = options.depths_mm.iter().map(|mm| 1e-3 * mm).collect();
+    depths_m.sort_by(f64::total_cmp);
+    let bar = ProgressBar::new(GRIDS.len() as u64);
+    bar.set_style(ProgressStyle::with_template("{pos}/{len} {elapsed} {prefix} {msg}").into_diagnostic()?);
+    bar.enable_steady_tick(Duration::from_millis(200));
+    bar.set_message("pressing the hybrid");
     let model = block()?;
     let pressed = press(&model);
     println!(
@@ -38,52 +68,61 @@ pub fn print() -> Result<()> {
         model.contact().force_limit_n(0),
         pressed.last().map_or(0.0, |(depth_m, _)| 1e3 * depth_m)
     );
+    bar.reset();
+    let mut grids = Vec::new();
+    for n in GRIDS {
+        bar.set_prefix(format!("n = {n}"));
+        let (forces_n, ended) = on_grid(n, &depths_m, &mut |text| bar.set_message(text.to_owned()))?;
+        if let Some(why) = ended {
+            bar.suspend(|| println!("n = {n}: {why}"));
+        }
+        grids.push(forces_n);
+        bar.inc(1);
+    }
+    bar.finish_and_clear();
     println!("| depth | hexahedra: {} | limit | hybrid | off by |", GRIDS.map(|n| format!("n = {n}")).join(" | "));
     println!("|---|---|---|---|---|---|---|");
-    for depth_mm in DEPTHS_MM {
-        let depth_m = 1e-3 * depth_mm;
-        let force_n = at_depth(&pressed, depth_m);
-        let found = reference(depth_m);
-        let (grids, limit_n) = match &found {
-            Ok((grids, limit)) => (
-                grids.map(|n| format!("{n:.4} N")).join(" | "),
-                format!("{:.4} ± {:.4} N", limit.value, limit.uncertainty),
-            ),
-            Err(error) => ([&error.to_string(), "", ""].join(" | "), String::new()),
+    for (number, depth_m) in depths_m.iter().enumerate() {
+        let of_grids: Vec<Option<f64>> = grids.iter().map(|forces_n| forces_n.get(number).copied()).collect();
+        let limit = match of_grids[..] {
+            [Some(first), Some(second), Some(third)] => {
+                Some(limit([first, second, third], GRIDS.map(|n| 1.0 / n as f64)))
+            }
+            _ => None,
         };
-        let off = force_n.zip(found.ok()).map(|(force_n, (_, limit))| 100.0 * (force_n / limit.value - 1.0));
+        let force_n = at_depth(&pressed, *depth_m);
+        let off = force_n.zip(limit).map(|(force_n, limit)| 100.0 * (force_n / limit.value - 1.0));
+        let of_grids = of_grids.into_iter().map(|force_n| told(force_n, |n| format!("{n:.4} N")));
         println!(
-            "| {depth_mm} mm | {grids} | {limit_n} | {} | {} |",
-            force_n.map_or("not reached".into(), |n| format!("{n:.4} N")),
-            off.map_or(String::new(), |off| format!("{off:+.1} %")),
+            "| {} mm | {} | {} | {} | {} |",
+            1e3 * depth_m,
+            of_grids.collect::<Vec<_>>().join(" | "),
+            told(limit, |limit| format!("{:.4} ± {:.4} N", limit.value, limit.uncertainty)),
+            told(force_n, |n| format!("{n:.4} N")),
+            told(off, |off| format!("{off:+.1} %")),
         );
     }
     Ok(())
 }
 
-/// The force (N) of the reference at a depth (m): of every grid, and their limit.
-fn reference(depth_m: f64) -> Result<([f64; 3], crate::references::Limit)> {
-    let problem = Problem {
-        name: "deep".into(),
-        sentence: String::new(),
-        body: Body::Block,
-        action: Action::Sphere { radius_m: RADIUS_M, depth_m },
-        motion: Motion::ToRest,
-        law: Law::StableNeoHookean,
-        young_modulus_pa: 10e3,
-        poisson_ratio: 0.45,
-    };
-    let mut last = Err(miette!("no penalty"));
-    for penalty in PENALTIES {
-        let [first, second, third] =
-            GRIDS.map(|n| on_grid(&problem, n, penalty, &mut |_| ()).map(|solved| solved.grid.value));
-        last = first.and_then(|first| Ok([first, second?, third?]));
-        if last.is_ok() {
-            break;
-        }
-    }
-    let grids = last?;
-    Ok((grids, limit(grids, GRIDS.map(|n| 1.0 / n as f64))))
+fn told<T>(value: Option<T>, as_text: impl Fn(T) -> String) -> String {
+    value.map_or_else(|| "not reached".into(), as_text)
+}
+
+/// The forces (N) of a reference on one grid at each of the depths (m), as far as it comes, and why it comes no farther.
+fn on_grid(n: usize, depths_m: &[f64], tell: &mut dyn FnMut(&str)) -> Result<(Vec<f64>, Option<String>)> {
+    let deepest_m = depths_m.last().copied().unwrap_or_default();
+    let contact_m = (RADIUS_M * deepest_m).sqrt();
+    let body = bodies::block(BLOCK_M[0], BLOCK_M[1], contact_m, n);
+    let material = material(Law::StableNeoHookean, YOUNG_MODULUS_PA, POISSON_RATIO)?;
+    let solid = Solid::new(body.grid.clone(), material)?;
+    let penalty_pa_per_m = PENALTY * YOUNG_MODULUS_PA / (1.0 - POISSON_RATIO.powi(2)) / contact_m;
+    let sphere = Sphere::new(&solid.grid, solid.grid.faces(body.touched), body.normal, RADIUS_M, penalty_pa_per_m);
+    let action = Action::Sphere { sphere, depth_m: deepest_m };
+    let parts: Vec<f64> = depths_m.iter().map(|depth_m| depth_m / deepest_m).collect();
+    let mut forces_n = Vec::new();
+    let ended = solve_through(&solid, &body, &action, &parts, tell, &mut |_, found| forces_n.push(found.sphere_n));
+    Ok((forces_n, ended.err().map(|error| error.to_string())))
 }
 
 /// The scene's block under a sphere on a spring, without friction.

@@ -37,8 +37,8 @@ enum Command {
     Subdivision(subdivision::Options),
     /// How much too stiff linear tets are, by Poisson's ratio and size: a block pressed by patches and spheres
     Locking,
-    /// Force against depth of a block with particles that a sphere on a spring presses a radius deep, beside the reference's: some minutes
-    Deep,
+    /// Force against depth of a block with particles that a sphere on a spring presses two radii deep, beside the reference's: some minutes a depth
+    Deep(deep::Options),
     /// How much the force on a tool ripples with the particles beneath it, by their spacing: a block dragged over and pressed by spheres: some minutes
     Ripple,
     /// Whether every bit of every scene is as it was (tests/lab/records/hashes.txt); exit code 1 if not
@@ -56,7 +56,7 @@ fn main() -> miette::Result<()> {
         Command::FineLevels(options) => fine_levels::run(&options),
         Command::Subdivision(options) => subdivision::run(&options),
         Command::Locking => locking::print(),
-        Command::Deep => deep::print(),
+        Command::Deep(options) => deep::print(&options),
         Command::Ripple => ripple::print(),
         Command::Hashes(options) => hashes::run(&options),
     }

@@ -7,7 +7,7 @@ use palpate_lab::{
         bodies::{Body, block, sphere_octant, ventricle},
         dynamics::{Clock, Dynamics},
         grid::{HexGrid, Side, graded},
-        newton::{Action, Equilibrium, solve},
+        newton::{Action, Equilibrium, solve, solve_through},
         solid::{Solid, surface_points},
         sphere::Sphere,
     },
@@ -59,6 +59,70 @@ fn forces_are_the_energys_slope_and_stiffness_the_forces() {
                 assert!((difference - entry).abs() < 1e-7 * scale, "{difference} {entry}");
             }
         }
+    }
+}
+
+/// Both of a sphere that presses and of its shaft, which keeps deep presses from ending around the sphere.
+#[test]
+fn the_spheres_forces_are_its_energys_slope_and_its_stiffness_theirs() {
+    let body = block(2.0, 1.0, 0.5, 2);
+    let sphere = Sphere::new(&body.grid, body.grid.faces(body.touched), body.normal, 0.6, 7.0);
+    let wavy = |p: &DVec3| *p + DVec3::new((3.0 * p.y).sin(), (2.0 * p.x * p.z).cos(), p.y * p.x) * 0.1;
+    let x: Vec<DVec3> = body.grid.positions_m.iter().map(wavy).collect();
+    let groups: Vec<Vec<u32>> = sphere.groups().collect();
+    for (below_m, is_on_shaft) in [(-0.3, false), (0.45, true)] {
+        let centre_m = body.touch_m - body.normal * below_m + DVec3::new(0.2, 0.1, 0.0);
+        assert_eq!(sphere.on_shaft_n(&x, centre_m) > 1e-3, is_on_shaft);
+        let forces_n = |x: &[DVec3]| {
+            let mut forces_n = vec![DVec3::ZERO; x.len()];
+            sphere.add_forces_n(x, centre_m, &mut forces_n);
+            forces_n
+        };
+        let (forces, stiffness, step) = (forces_n(&x), sphere.stiffness(&x, centre_m), 1e-6);
+        let scale = forces.iter().map(|f| f.length()).fold(0.0, f64::max);
+        assert!(forces[groups[0][4] as usize].length() > 1e-3);
+        for (local, axis) in [(0, 0), (2, 1), (8, 2), (4, 0)] {
+            let node = groups[0][local] as usize;
+            let moved = |sign: f64| {
+                let mut x = x.clone();
+                x[node][axis] += sign * step;
+                x
+            };
+            let (up, down) = (moved(1.0), moved(-1.0));
+            let slope = (sphere.energy_j(&up, centre_m) - sphere.energy_j(&down, centre_m)) / (2.0 * step);
+            assert!((slope + forces[node][axis]).abs() < 1e-7 * scale, "{slope} {}", forces[node]);
+            let (up, down) = (forces_n(&up), forces_n(&down));
+            for other in 0..9 {
+                let n = groups[0][other] as usize;
+                for r in 0..3 {
+                    let entries = groups.iter().zip(&stiffness).filter_map(|(group, block)| {
+                        let row = group.iter().position(|&member| member as usize == n)?;
+                        let column = group.iter().position(|&member| member as usize == node)?;
+                        Some(block[(3 * row + r) * 27 + 3 * column + axis])
+                    });
+                    let entry: f64 = entries.sum();
+                    let difference = (down[n][r] - up[n][r]) / (2.0 * step);
+                    assert!((difference - entry).abs() < 1e-5 * scale, "{difference} {entry}");
+                }
+            }
+        }
+    }
+}
+
+/// On the way to a deep press the reference has the forces that presses of less depth have.
+#[test]
+fn a_deep_press_comes_through_shallower_ones() {
+    let (young, nu, radius, depth) = (10e3, 0.45, 0.01, 0.008);
+    let body = block(0.08, 0.04, 0.009, 2);
+    let solid = Solid::new(body.grid.clone(), material(Law::StableNeoHookean, young, nu).unwrap()).unwrap();
+    let sphere = Sphere::new(&solid.grid, solid.grid.faces(body.touched), body.normal, radius, 1e8);
+    let action = |depth_m: f64| Action::Sphere { sphere: sphere.clone(), depth_m };
+    let mut forces_n = Vec::new();
+    let visit = &mut |_, found: Equilibrium| forces_n.push(found.sphere_n);
+    solve_through(&solid, &body, &action(depth), &[0.3, 1.0], &mut |_| {}, visit).unwrap();
+    for (part, force_n) in [0.3, 1.0].into_iter().zip(forces_n) {
+        let alone_n = solve_quietly(&solid, &body, &action(part * depth)).sphere_n;
+        assert!((force_n / alone_n - 1.0).abs() < 1e-6, "{part}: {force_n} {alone_n}");
     }
 }
 
@@ -129,7 +193,7 @@ fn hertz_at_small_depth() {
     let solid = Solid::new(body.grid.clone(), material(Law::StableNeoHookean, young, nu).unwrap()).unwrap();
     let contact = (radius * depth).sqrt();
     let modulus = young / (1.0 - nu * nu);
-    let sphere = Sphere::new(&solid.grid, solid.grid.faces(body.touched), radius, 4e3 * modulus / contact);
+    let sphere = Sphere::new(&solid.grid, solid.grid.faces(body.touched), body.normal, radius, 4e3 * modulus / contact);
     let found = solve_quietly(&solid, &body, &Action::Sphere { sphere, depth_m: depth });
     let chi = contact / height;
     let pi = std::f64::consts::PI;

@@ -9,7 +9,7 @@
 //! to a third for σ from 1/3 to 3 and ν from 0.4 to 0.49; at ν = 0.499 it is up to twice too much, and so it is of the little that is left
 //! with fine tets and small ν. Hybrid bodies' coarse tets keep volume on the mean, and their particles do not lock.
 use palpate_physics::{Model, Region, contact::ToolSpec};
-use palpate_scene::wording::short;
+use palpate_scene::wording::{short, two_digits};
 
 /// Above this a hand feels another body: twice as stiff.
 const MUCH: f64 = 1.0;
@@ -115,24 +115,19 @@ impl<'m> Expected<'m> {
             tool.name,
             short(tool.radius_m * 1e3),
             too_stiffly(*error),
-            round(size_m * 1e3),
+            two_digits(size_m * 1e3),
             region.name,
             short(nu),
         )
     }
 }
 
-/// To two digits, for it is an estimate.
 fn too_stiffly(error: f64) -> String {
     if error < 2.0 {
-        format!("about {} % too stiffly", round(100.0 * error))
+        format!("about {} % too stiffly", two_digits(100.0 * error))
     } else {
-        format!("about {} times as stiffly as it should", round(error + 1.0))
+        format!("about {} times as stiffly as it should", two_digits(error + 1.0))
     }
-}
-
-fn round(value: f64) -> String {
-    short(format!("{value:.1e}").parse().unwrap_or(value))
 }
 
 #[cfg(test)]

@@ -14,7 +14,7 @@ use palpate_physics::{
     bodies::hybrid::ParticleSpec,
     contact::{ToolShape, ToolSpec},
 };
-use palpate_scene::wording::short;
+use palpate_scene::wording::{short, two_digits};
 
 /// Depths (m) that are told: a light touch, and a press.
 const DEPTHS_M: [f64; 2] = [0.3e-3, 2e-3];
@@ -103,11 +103,6 @@ impl<'m> Expected<'m> {
             serving(self.smooth_skin),
         )
     }
-}
-
-/// To two digits, for it is an estimate.
-fn two_digits(value: f64) -> String {
-    short(format!("{value:.1e}").parse().unwrap_or(value))
 }
 
 #[cfg(test)]

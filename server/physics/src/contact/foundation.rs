@@ -28,7 +28,7 @@
 //! on one node and `4πR²` in all; of a capsule of half length `L`, `R(R + L)` in place of `R²`. A tool that turns has
 //! `Σ_s k a_s (y_s − c₀)²` besides: at `s` along the cylinder `s² + R²`, on the hemispheres at most `(L + R)²`. The
 //! largest frequency of body and diagonal together comes from the same Lanczos iteration as the body's own.
-use super::{SurfaceModuli, broad::Triangles};
+use super::{SkinAtRest, broad::Triangles};
 use glam::DVec3;
 use std::f64::consts::PI;
 
@@ -66,19 +66,6 @@ pub(super) struct Foundation {
     pub(super) samples: usize,
     /// `k_f` (Pa/m) of a typical triangle of the softest material; the coupling's limits are derived from it.
     pub(super) typical_pa_per_m: f64,
-}
-
-/// The body at rest, for which the foundation is made.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct BodyAtRest<'a> {
-    pub(super) triangles: &'a Triangles,
-    pub(super) positions_m: &'a [DVec3],
-    pub(super) moduli: &'a [SurfaceModuli],
-    pub(super) mass_kg: &'a [f64],
-    /// ω²_max (rad²/s²) of the body without contact.
-    pub(super) frequency_sq: f64,
-    /// How far apart (m) particles are of which the surface follows means; `None` where it follows no means.
-    pub(super) means_over_m: Option<f64>,
 }
 
 /// The samples of one triangle and its stiffness.
@@ -134,8 +121,8 @@ fn centroids(n: usize) -> Vec<[f64; 2]> {
 }
 
 impl Foundation {
-    pub(super) fn new(body: &BodyAtRest<'_>, radius_m: f64, half_length_m: f64) -> Self {
-        let count = body.triangles.len();
+    pub(super) fn new(skin: &SkinAtRest<'_>, triangles: &Triangles, radius_m: f64, half_length_m: f64) -> Self {
+        let count = triangles.len();
         let mut built = Self {
             level: Vec::with_capacity(count),
             first_sample: Vec::with_capacity(count),
@@ -146,21 +133,21 @@ impl Foundation {
             samples: 0,
             typical_pa_per_m: 0.0,
         };
-        let most = most_at_nodes(body, 2.0 * quarter_m2(radius_m, half_length_m));
+        let most = most_at_nodes(skin, triangles, 2.0 * quarter_m2(radius_m, half_length_m));
         let (mut softest_pa, mut ratio_area, mut total_m2) = (f64::INFINITY, 0.0, 0.0);
         for triangle in 0..count {
-            let moduli = body.moduli[body.triangles.surface_triangle[triangle] as usize];
-            let corners = body.triangles.corners(triangle, body.positions_m);
+            let moduli = skin.moduli[triangles.surface_triangle[triangle] as usize];
+            let corners = triangles.corners(triangle, skin.positions_m);
             let area_m2 = area_m2(corners);
             // k_f = α (λ + 2µ)/min(h, R), of means α' E/(1 − ν²)/min(h, R); and no more than any of its nodes can bear
-            let wanted = match body.means_over_m {
+            let wanted = match skin.means_over_m {
                 Some(apart_m) => SMOOTH_STIFFNESS_RATIO * moduli.indentation_pa / apart_m.min(radius_m),
                 None => STIFFNESS_RATIO * moduli.p_wave_pa / (2.0 * area_m2).sqrt().min(radius_m),
             };
-            let k_f = body.triangles.nodes[triangle].iter().map(|&n| most[n as usize]).fold(wanted, f64::min);
+            let k_f = triangles.nodes[triangle].iter().map(|&n| most[n as usize]).fold(wanted, f64::min);
             let [a, b, c] = corners;
             let longest_m = a.distance(b).max(b.distance(c)).max(c.distance(a));
-            let apart_m = SPACING * body.means_over_m.unwrap_or(radius_m).min(radius_m);
+            let apart_m = SPACING * skin.means_over_m.unwrap_or(radius_m).min(radius_m);
             let n = ((longest_m / apart_m).ceil() as usize).clamp(1, MAX_LEVEL);
             built.level.push(n as u8);
             built.first_sample.push(built.samples as u32);
@@ -267,16 +254,16 @@ fn area_m2([a, b, c]: [DVec3; 3]) -> f64 {
 /// Returns the largest `k_f` (Pa/m) that each node can bear: `k_f min(A_i, 2πR²)/m_i ≤ FREQUENCY_FRACTION · ω²_max`,
 /// with its third `A_i` of the triangles around it, and the area `touched_m2` (m²) that a tool can touch at once in
 /// place of `2πR²`.
-fn most_at_nodes(body: &BodyAtRest<'_>, touched_m2: f64) -> Vec<f64> {
-    let mut area = vec![0.0; body.mass_kg.len()];
-    for (triangle, nodes) in body.triangles.nodes.iter().enumerate() {
-        let third = area_m2(body.triangles.corners(triangle, body.positions_m)) / 3.0;
+fn most_at_nodes(skin: &SkinAtRest<'_>, triangles: &Triangles, touched_m2: f64) -> Vec<f64> {
+    let mut area = vec![0.0; skin.mass_kg.len()];
+    for (triangle, nodes) in triangles.nodes.iter().enumerate() {
+        let third = area_m2(triangles.corners(triangle, skin.positions_m)) / 3.0;
         for &node in nodes {
             area[node as usize] += third;
         }
     }
-    let most = |(area, mass): (&f64, &f64)| FREQUENCY_FRACTION * body.frequency_sq * mass / area.min(touched_m2);
-    area.iter().zip(body.mass_kg).map(most).collect()
+    let most = |(area, mass): (&f64, &f64)| FREQUENCY_FRACTION * skin.frequency_sq() * mass / area.min(touched_m2);
+    area.iter().zip(skin.mass_kg).map(most).collect()
 }
 
 #[cfg(test)]

@@ -21,6 +21,7 @@ mod proxy;
 mod resting;
 mod sample_potential;
 pub(crate) mod self_contact;
+mod skin_at_rest;
 mod spring;
 mod state;
 mod stepping;
@@ -44,7 +45,8 @@ pub use proxy::SubstepTime;
 pub(crate) use resting::{Pressing, RestingContact};
 pub use sample_potential::SamplePotential;
 pub use self_contact::MeetingWalls;
-pub(crate) use self_contact::{SelfContact, SkinAtRest};
+pub(crate) use self_contact::SelfContact;
+pub(crate) use skin_at_rest::SkinAtRest;
 pub(crate) use spring::SaturatingSpring;
 pub use state::ContactState;
 pub(crate) use tangent::{ContactTangents, StepAhead};
@@ -55,10 +57,9 @@ pub use triangle::closest_weights;
 /// needs.
 pub const LARGEST_TRIANGLE: f64 = foundation::MAX_LEVEL as f64 * foundation::SPACING;
 
-use crate::mesh::Surface;
 use axis::Axis;
 use broad::Triangles;
-use foundation::{BodyAtRest, Foundation, SampleTables, TriangleSamples};
+use foundation::{Foundation, SampleTables, TriangleSamples};
 use glam::DVec3;
 use narrow::Pressed;
 use self_contact::WallScratch;
@@ -195,54 +196,26 @@ impl ToolModel {
 }
 
 impl ContactModel {
-    /// Precomputes contact samples and the foundation stiffness of a body at rest, whose largest natural frequency
-    /// without contact is given. `moduli[triangle]` are those of the tets behind a triangle.
-    pub fn build(
-        rest_positions_m: &[DVec3],
-        surface: &Surface,
-        moduli: &[SurfaceModuli],
-        mass_kg: &[f64],
-        max_natural_frequency_rad_per_s: f64,
-        tools: &[ToolSpec],
-    ) -> Self {
-        let omega = max_natural_frequency_rad_per_s;
-        Self::build_on_means(rest_positions_m, surface, moduli, mass_kg, omega, tools, None)
-    }
-
-    /// The same for a surface that follows means of particles so far (m) apart.
-    pub(crate) fn build_on_means(
-        rest_positions_m: &[DVec3],
-        surface: &Surface,
-        moduli: &[SurfaceModuli],
-        mass_kg: &[f64],
-        max_natural_frequency_rad_per_s: f64,
-        tools: &[ToolSpec],
-        means_over_m: Option<f64>,
-    ) -> Self {
+    /// Precomputes contact samples and the foundation's stiffness of a body at rest.
+    pub(crate) fn build(skin: &SkinAtRest<'_>, tools: &[ToolSpec]) -> Self {
         if tools.is_empty() {
             return Self::default();
         }
-        let triangles = Triangles::of(surface, rest_positions_m);
-        let body = BodyAtRest {
-            triangles: &triangles,
-            positions_m: rest_positions_m,
-            moduli,
-            mass_kg,
-            // A body without a free node has no frequency; its foundation does nothing then, but must be finite.
-            frequency_sq: max_natural_frequency_rad_per_s.max(1.0).powi(2),
-            means_over_m,
-        };
+        let (surface, nodes) = (skin.surface, skin.mass_kg.len());
+        let triangles = Triangles::of(surface, skin.positions_m);
         let tools: Vec<ToolModel> = tools
             .iter()
-            .map(|tool| ToolModel::new(tool, Foundation::new(&body, tool.radius_m, tool.shape.half_length_m())))
+            .map(|tool| {
+                ToolModel::new(tool, Foundation::new(skin, &triangles, tool.radius_m, tool.shape.half_length_m()))
+            })
             .collect();
         // Among triangles whose longest edge is l, an equilateral one has the point farthest from all corners: l/√3.
-        let edges_m = (0..surface.triangles.len()).map(|triangle| surface.longest_edge_m(triangle, rest_positions_m));
+        let edges_m = (0..surface.triangles.len()).map(|triangle| surface.longest_edge_m(triangle, skin.positions_m));
         let covering_radius_m = edges_m.fold(0.0, f64::max) / 3.0_f64.sqrt();
-        let (mut nodal_stiffness_n_per_m, mut tool_frequency_sq) = (vec![0.0; mass_kg.len()], 0.0);
+        let (mut nodal_stiffness_n_per_m, mut tool_frequency_sq) = (vec![0.0; nodes], 0.0);
         for tool in &tools {
             let (radius_m, half_length_m) = (tool.spec.radius_m, tool.spec.shape.half_length_m());
-            let (nodal, total) = tool.foundation.row_sums_n_per_m(&triangles, mass_kg.len(), radius_m, half_length_m);
+            let (nodal, total) = tool.foundation.row_sums_n_per_m(&triangles, nodes, radius_m, half_length_m);
             for (sum, nodal) in nodal_stiffness_n_per_m.iter_mut().zip(nodal) {
                 *sum += nodal;
             }

@@ -1,4 +1,4 @@
-//! Hybrid bodies as the server runs them: coarse tets, and the particles nearest to the touch awake.
+//! Hybrid bodies as the server runs them: coarse tets, and particles that tools and loads wake.
 use super::{Method, Pace, Running, driven::Driven, subject::Tool};
 use crate::problems::{
     Action, Problem,
@@ -11,7 +11,6 @@ use miette::{IntoDiagnostic, Result, miette};
 use palpate_physics::{
     BodySpec, LoadSpec, Model, ModelSpec, Settings,
     bodies::hybrid::{HybridSpec, ParticleSpec, Skin, Waking},
-    world::wake_only,
 };
 
 /// So many particles awake.
@@ -56,7 +55,7 @@ impl Hybrid {
             Self {
                 name: format!("{name} {active}"),
                 what: format!(
-                    "Composite coarse tets and {active} active particles on a lattice ({cells}), explicit leapfrog, forces in f32."
+                    "Composite coarse tets and {active} active particles at most on a lattice ({cells}), as tools and loads wake them, explicit leapfrog, forces in f32."
                 ),
                 lattice,
                 active,
@@ -114,8 +113,12 @@ impl Method for Hybrid {
         let (coarse, fine) = (problem.body.tets(resolution)?, problem.body.tets(skin)?);
         let settings = Settings { mass_damping_per_s: pace.damping_per_s, ..Settings::for_particles() };
         let smooth_skin = matches!(self.lattice, Lattice::Smooth);
-        let particles =
-            ParticleSpec { fine_depth_m, smooth_skin, ..particles(problem.body, &fine, spacing_m, self.active)? };
+        let particles = ParticleSpec {
+            fine_depth_m,
+            smooth_skin,
+            waking: Waking::in_half_ball(spacing_m, fine_depth_m, self.active),
+            ..particles(problem.body, &fine, spacing_m, self.active)?
+        };
         let hybrid = HybridSpec { coarse: super::subject::solid(problem.material()?, &coarse), particles };
         let mut spec = ModelSpec {
             body: BodySpec::Hybrid(hybrid),
@@ -136,15 +139,12 @@ impl Method for Hybrid {
         };
         spec.tools = tool.iter().map(Tool::spec).collect();
         let model = Model::build(spec).into_diagnostic()?;
-        let mut driven = Driven::at_rest(&model, tool.as_ref());
-        let touched = nearest(&model, fine.touch_m, self.active);
-        wake_only(&model, &mut driven.state, &mut driven.scratch, touched);
         let probe = Probe::new(&fine, &sample::points(problem.body));
-        Ok(Box::new(Pressed { model, driven, tool, load, fine, probe }))
+        Ok(Box::new(Pressed::new(model, tool, load, (fine, probe))))
     }
 }
 
-/// Particles in a body whose skin is the boundary of a fine mesh.
+/// Particles in a body whose skin is the boundary of a fine mesh, woken by hand.
 pub(crate) fn particles(body: Body, fine: &TetBody, spacing_m: f64, most_active: usize) -> Result<ParticleSpec> {
     let rest = fine.mesh.positions_m();
     let on_skin = fine.surface.nodes.iter().map(|&node| rest[node as usize]).collect();

@@ -1,7 +1,7 @@
 //! Newton's method on a reference grid, with load stepping and a line search on the potential.
 use super::{bodies::Body, matrix::System, ordering, solid::Solid, sphere::Sphere};
 use glam::{BVec3, DVec3};
-use miette::{Result, bail};
+use miette::{Result, bail, miette};
 
 /// Converged when `‖f_free‖ ≤ TOLERANCE · ‖f_elastic‖`.
 const TOLERANCE: f64 = 1e-9;
@@ -14,6 +14,11 @@ const SHIFTS: [f64; 4] = [1e-4, 1e-3, 1e-2, 1e-1];
 const MAX_BACKTRACKS: usize = 20;
 /// The first load step over the smallest.
 const MAX_HALVINGS: i32 = 8;
+/// Spheres go this far (over their radius) at once, and deeper in such steps.
+const AT_ONCE: f64 = 0.5;
+const DEEP_STEP: f64 = 0.1;
+/// What may press on the sphere's shaft, over the force on the sphere.
+const ON_SHAFT: f64 = 1e-9;
 /// At each load a sphere's penalty is raised in these shares of it: Newton finds the contact's rim from a soft one.
 const PENALTIES: [f64; 3] = [0.01, 0.1, 1.0];
 /// Sufficient decrease of the potential (Armijo).
@@ -35,6 +40,18 @@ pub enum Action {
         /// Its way (m) past first touch.
         depth_m: f64,
     },
+}
+
+impl Action {
+    /// The largest step of the load, over all of it.
+    fn longest_step(&self) -> f64 {
+        match self {
+            Self::Sphere { sphere, depth_m } if *depth_m > AT_ONCE * sphere.radius_m => {
+                DEEP_STEP * sphere.radius_m / depth_m
+            }
+            _ => 1.0,
+        }
+    }
 }
 
 /// An equilibrium of a reference body.
@@ -64,30 +81,63 @@ struct Problem<'a> {
 /// # Errors
 /// No convergence at the smallest load step.
 pub fn solve(solid: &Solid, body: &Body, action: &Action, tell: &mut dyn FnMut(&str)) -> Result<Equilibrium> {
+    let mut found = None;
+    solve_through(solid, body, action, &[1.0], tell, &mut |_, equilibrium| found = Some(equilibrium))?;
+    found.ok_or_else(|| miette!("there is no load to solve for"))
+}
+
+/// Finds equilibria at parts of the load that ascend to 1, from rest. `found` hears of each with its number as soon as it is found,
+/// `tell` of every iteration.
+///
+/// # Errors
+/// No convergence at the smallest load step.
+pub fn solve_through(
+    solid: &Solid,
+    body: &Body,
+    action: &Action,
+    parts: &[f64],
+    tell: &mut dyn FnMut(&str),
+    found: &mut dyn FnMut(usize, Equilibrium),
+) -> Result<()> {
     let mut problem = Problem::new(solid, body, action)?;
-    let mut x = solid.grid.positions_m.clone();
-    let (mut reached, mut step, mut iterations) = (0.0_f64, 1.0_f64, 0);
-    while reached < 1.0 {
-        let fraction = (reached + step).min(1.0);
-        if let Some(found) = problem.through_penalties(fraction, &x, &mut iterations, tell) {
-            (x, reached) = (found, fraction);
-            step *= 2.0;
-            continue;
+    let longest = action.longest_step();
+    let mut path = Path { x: solid.grid.positions_m.clone(), reached: 0.0, before: None };
+    let (mut step, mut iterations) = (longest, 0);
+    for (number, &part) in parts.iter().enumerate() {
+        while path.reached < part {
+            let fraction = (path.reached + step).min(part);
+            if let Some(x) = problem.next(fraction, &path, &mut iterations, tell) {
+                path = Path { before: Some((path.x, path.reached)), x, reached: fraction };
+                step = (2.0 * step).min(longest);
+                continue;
+            }
+            step *= 0.5;
+            if step < longest * 0.5_f64.powi(MAX_HALVINGS) {
+                bail!("the reference does not converge past {:.1} % of the load", 100.0 * path.reached);
+            }
         }
-        step *= 0.5;
-        if step < 0.5_f64.powi(MAX_HALVINGS) {
-            bail!("the reference does not converge past {:.1} % of the load", 100.0 * reached);
-        }
+        let sphere_n = problem.sphere_n(part, &path.x)?;
+        found(number, Equilibrium { x: path.x.clone(), sphere_n, iterations });
     }
-    let mut forces = vec![DVec3::ZERO; x.len()];
-    let sphere_n = match action {
-        Action::Forces(_) => 0.0,
-        Action::Sphere { sphere, .. } => {
-            let on_sphere = sphere.add_forces_n(&x, problem.centre_m(1.0), &mut forces);
-            on_sphere.dot(body.normal) * body.multiplicity
-        }
-    };
-    Ok(Equilibrium { x, sphere_n, iterations })
+    Ok(())
+}
+
+/// Where the solve has come to.
+struct Path {
+    /// Positions (m) in the last equilibrium, and the part of the load there.
+    x: Vec<DVec3>,
+    reached: f64,
+    /// The same of the one before.
+    before: Option<(Vec<DVec3>, f64)>,
+}
+
+impl Path {
+    /// Goes on straight from the last two equilibria.
+    fn predicted(&self, fraction: f64) -> Option<Vec<DVec3>> {
+        let (before, at) = self.before.as_ref()?;
+        let ratio = (fraction - self.reached) / (self.reached - at);
+        Some(self.x.iter().zip(before).map(|(x, before)| *x + (*x - *before) * ratio).collect())
+    }
 }
 
 impl<'a> Problem<'a> {
@@ -152,6 +202,34 @@ impl<'a> Problem<'a> {
             *force = DVec3::select(*free, *force, DVec3::ZERO);
         }
         (forces, scale.max(applied.sqrt()))
+    }
+
+    /// The force (N) of the whole body on the sphere along the outward normal; 0 without a sphere.
+    fn sphere_n(&self, fraction: f64, x: &[DVec3]) -> Result<f64> {
+        let Action::Sphere { sphere, .. } = &self.action else { return Ok(0.0) };
+        let centre_m = self.centre_m(fraction);
+        let on_sphere = sphere.add_forces_n(x, centre_m, &mut vec![DVec3::ZERO; x.len()]);
+        let on_shaft_n = sphere.on_shaft_n(x, centre_m);
+        if on_shaft_n > ON_SHAFT * on_sphere.length() {
+            bail!(
+                "the body presses on the reference's shaft ({on_shaft_n:.2e} N), so that it is no sphere that presses"
+            );
+        }
+        Ok(on_sphere.dot(self.body.normal) * self.body.multiplicity)
+    }
+
+    /// Finds the equilibrium at a part of the load. Deep in the body it looks first where the last two lead to.
+    fn next(
+        &mut self,
+        fraction: f64,
+        path: &Path,
+        iterations: &mut usize,
+        tell: &mut dyn FnMut(&str),
+    ) -> Option<Vec<DVec3>> {
+        let is_deep = self.action.longest_step() < 1.0;
+        let predicted = path.predicted(fraction).filter(|_| is_deep);
+        let near = predicted.and_then(|x| self.equilibrate(fraction, x, iterations, tell));
+        near.or_else(|| self.through_penalties(fraction, &path.x, iterations, tell))
     }
 
     fn through_penalties(

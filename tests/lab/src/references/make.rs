@@ -49,7 +49,7 @@ pub fn on_grid(problem: &Problem, n: usize, penalty: f64, tell: &mut dyn FnMut(&
         Action::Sphere { radius_m, depth_m } => {
             let modulus = problem.young_modulus_pa / (1.0 - problem.poisson_ratio.powi(2));
             let faces = solid.grid.faces(body.touched);
-            let sphere = Sphere::new(&solid.grid, faces, radius_m, penalty * modulus / contact_m);
+            let sphere = Sphere::new(&solid.grid, faces, body.normal, radius_m, penalty * modulus / contact_m);
             (newton::Action::Sphere { sphere, depth_m }, None)
         }
         Action::Patch { radius_m, force_n } => {

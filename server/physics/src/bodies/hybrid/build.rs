@@ -49,12 +49,9 @@ impl HybridBody {
             mass_kg: &mass_kg,
             bearing_kg: &bearing_kg,
             max_natural_frequency_rad_per_s: omega,
+            means_over_m: hybrid.particles().smooth_skin.then(|| hybrid.particles().spacing_m),
         };
-        let means_over_m = hybrid.particles().smooth_skin.then(|| hybrid.particles().spacing_m);
-        let tools = &around.tools;
-        let contact =
-            ContactModel::build_on_means(skin.positions_m, &surface, &moduli, &mass_kg, omega, tools, means_over_m)
-                .with_walls(around.walls_of(&skin));
+        let contact = ContactModel::build(&skin, &around.tools).with_walls(around.walls_of(&skin));
         hybrid.cluster(contact.triangles());
         let stretch_sq = stiffening(&around.settings, &materials);
         let touched = if contact.nodal_stiffness_n_per_m.is_empty() {

@@ -48,6 +48,6 @@ pub mod trilinear_point;
 pub use body::HybridBody;
 pub(crate) use scratch::HybridScratch;
 pub use skin::{Skin, SkinError};
-pub use spec::{HybridError, HybridSpec, ParticleSpec, Waking, fine_layers};
+pub use spec::{HybridError, HybridSpec, ParticleSpec, Waking};
 pub use state::HybridState;
 pub(crate) use stepped::SteppedHybrid;

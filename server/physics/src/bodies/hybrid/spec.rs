@@ -6,7 +6,7 @@ use crate::{
     tick::EnvironmentError,
 };
 use glam::DVec3;
-use std::fmt;
+use std::{f64::consts::PI, fmt};
 use thiserror::Error;
 
 /// More cells than this in the lattice's box are refused: their numbers have to fit an index, and they take memory.
@@ -71,6 +71,34 @@ pub enum Waking {
         /// Radius (m) at rest.
         reach_m: f64,
     },
+}
+
+impl Waking {
+    /// Lets tools wake what is within the radius r (m) of the half ball, as at a flat surface, that holds `most_active` particles: one in
+    /// every h³ of a lattice with spacing h (m), or, in a lattice of two sizes, one in every h³ in the layers of fine ones, d thick, and one
+    /// in every 8 h³ below,
+    /// ```text
+    /// n h³ = ⅔ π r³      n h³ = ⅛ (2π/3) r³ + ⅞ π d (r² − d²/3),  d ≤ r
+    /// ```
+    pub fn in_half_ball(spacing_m: f64, fine_depth_m: Option<f64>, most_active: usize) -> Self {
+        let count = most_active as f64;
+        let Some(depth_m) = fine_depth_m else {
+            return Self::ByTools { reach_m: spacing_m * (count * 6.0 / (4.0 * PI)).cbrt() };
+        };
+        let depth_m = fine_layers(depth_m, spacing_m) as f64 * spacing_m;
+        let all_m3 = count * spacing_m.powi(3);
+        let held_m3 = |r: f64| {
+            let d = depth_m.min(r);
+            PI * (r.powi(3) / 12.0 + 7.0 / 8.0 * d * (r * r - d * d / 3.0))
+        };
+        // It is the largest where all are 8 h³ apart.
+        let (mut low, mut high) = (0.0, (all_m3 * 12.0 / PI).cbrt());
+        for _ in 0..60 {
+            let middle = f64::midpoint(low, high);
+            *(if held_m3(middle) < all_m3 { &mut low } else { &mut high }) = middle;
+        }
+        Self::ByTools { reach_m: f64::midpoint(low, high) }
+    }
 }
 
 /// Why particles cannot be made.
@@ -138,7 +166,7 @@ pub enum HybridError {
 }
 
 /// Returns the number of layers of cells that begin within a depth (m), at least one.
-pub fn fine_layers(depth_m: f64, spacing_m: f64) -> usize {
+pub(super) fn fine_layers(depth_m: f64, spacing_m: f64) -> usize {
     // A depth of whole cells, but for rounding, has that many layers.
     (depth_m / spacing_m - 1e-9).ceil().max(1.0) as usize
 }

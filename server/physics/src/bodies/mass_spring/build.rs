@@ -1,7 +1,7 @@
 //! Builds a mass-spring surface and its environment from specifications.
 use super::{MassSpringBody, MassSpringError, MassSpringSpec};
 use crate::{
-    contact::ContactModel,
+    contact::{ContactModel, SkinAtRest},
     settings::Integrator,
     tick::{Environment, EnvironmentError, EnvironmentSpec, Steps, free_inverse_mass},
 };
@@ -24,8 +24,17 @@ impl MassSpringBody {
         let (surface, rest_m) = (body.skin(), body.model().rest_m());
         around.check(&surface, rest_m, vertices)?;
         let omega = body.model().frequency_rad_per_s();
-        let contact =
-            ContactModel::build(rest_m, &surface, &body.moduli(), &body.contact_mass_kg(), omega, &around.tools);
+        let bearing_kg = body.contact_mass_kg();
+        let skin = SkinAtRest {
+            positions_m: rest_m,
+            surface: &surface,
+            moduli: &body.moduli(),
+            mass_kg: &bearing_kg,
+            bearing_kg: &bearing_kg,
+            max_natural_frequency_rad_per_s: omega,
+            means_over_m: None,
+        };
+        let contact = ContactModel::build(&skin, &around.tools);
         body.cluster(contact.triangles());
         let omega_sq = body.model().touched_frequency_sq(&contact.nodal_stiffness_n_per_m) + contact.tool_frequency_sq;
         let steps = Steps::choose(&around.settings, &[], omega_sq.sqrt())?.with_contact(omega, omega_sq.sqrt());

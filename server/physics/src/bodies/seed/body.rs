@@ -3,7 +3,7 @@ use super::{
     LayerSpec, SeedBodyState, SeedError, SeedModel, SeedParameters, SeedSpec, core::outer_part, layer::enclosed_m3,
 };
 use crate::{
-    contact::{ContactModel, SurfaceModuli},
+    contact::{ContactModel, SkinAtRest, SurfaceModuli},
     elements::{
         rest_stiffness::{RestStiffness, max_natural_frequency_rad_per_s},
         solid::Solid,
@@ -91,14 +91,17 @@ impl SeedBody {
         // Contact is made so that its natural frequency hardly exceeds this: the explicit step bears (ω dt)² ≤ 4, and
         // this is a quarter of it.
         let contact_rad_per_s = model.parameters().dt_s.recip();
-        let contact = ContactModel::build(
-            &rest_m,
-            &surface,
-            &moduli(&model),
-            &model.contact_mass_kg(),
-            contact_rad_per_s,
-            &around.tools,
-        );
+        let bearing_kg = model.contact_mass_kg();
+        let skin = SkinAtRest {
+            positions_m: &rest_m,
+            surface: &surface,
+            moduli: &moduli(&model),
+            mass_kg: &bearing_kg,
+            bearing_kg: &bearing_kg,
+            max_natural_frequency_rad_per_s: contact_rad_per_s,
+            means_over_m: None,
+        };
+        let contact = ContactModel::build(&skin, &around.tools);
         demand_soft_couplings(&contact, &model)?;
         let enough = f64::from(substeps);
         let steps = Steps { substeps, substeps_per_long_step: 1, enough, of_contact: 0.0, frequency_sq: 0.0 };

@@ -72,9 +72,9 @@ impl TetBody {
             mass_kg: &body.mass_kg,
             bearing_kg: &body.mass_kg,
             max_natural_frequency_rad_per_s: omega,
+            means_over_m: None,
         };
-        let contact = ContactModel::build(skin.positions_m, &surface, &moduli, skin.mass_kg, omega, &spec.tools)
-            .with_walls(spec.walls_of(&skin));
+        let contact = ContactModel::build(&skin, &spec.tools).with_walls(spec.walls_of(&skin));
         let stretch_sq = stiffening(settings, &body.materials);
         // λ_max(s K + C) = s λ_max(K + C/s)
         let springs: Vec<f64> = contact.nodal_stiffness_n_per_m.iter().map(|k| k / stretch_sq).collect();

@@ -1,5 +1,5 @@
 use super::*;
-use crate::contact::{ContactModel, SurfaceModuli, ToolShape, ToolSpec};
+use crate::contact::{ContactModel, SkinAtRest, SurfaceModuli, ToolShape, ToolSpec};
 use crate::{
     contact::Coupling,
     mesh::{Surface, TetMesh},
@@ -44,7 +44,16 @@ impl Bench {
             start_position_m: DVec3::Z,
         };
         let moduli = vec![SurfaceModuli { p_wave_pa: 38e3, indentation_pa: 12.5e3 }; 4];
-        let model = ContactModel::build(mesh.positions_m(), &surface, &moduli, &[1.0; 4], 1e6, &[tool]);
+        let skin = SkinAtRest {
+            positions_m: mesh.positions_m(),
+            surface: &surface,
+            moduli: &moduli,
+            mass_kg: &[1.0; 4],
+            bearing_kg: &[1.0; 4],
+            max_natural_frequency_rad_per_s: 1e6,
+            means_over_m: None,
+        };
+        let model = ContactModel::build(&skin, &[tool]);
         let samples = model.tools[0].foundation.samples;
         let buffer = || Touching::with_capacity(samples);
         Self { model, x, touching: buffer(), next: buffer(), orientation }

@@ -2,13 +2,16 @@
 use super::{
     compact::compact,
     lists::NearWalls,
-    query::WallScratch,
+    query::{Ball, WallScratch},
     rest::{
         CloseCluster, ClusterAtRest, FACING, FREQUENCY_FRACTION, MARGIN, NodeAtRest, Rows, STIFFNESS_RATIO,
         SelfContact, twice_area_m2,
     },
 };
-use crate::{contact::SurfaceModuli, mesh::Surface};
+use crate::contact::{
+    SkinAtRest,
+    broad::{ROUNDING_M, box_distance_m},
+};
 use glam::DVec3;
 
 /// Clusters nearer at rest than so many mean edges of the skin are close.
@@ -21,23 +24,6 @@ const AGAINST_ITSELF: f64 = 0.02;
 const LEAST_BORNE: f64 = 1e-6;
 /// Part of the gap at rest that a margin may take.
 const OF_GAP: f64 = 0.5;
-
-/// The skin of a body at rest, for which self-contact is built.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct SkinAtRest<'a> {
-    /// Positions (m) of the surface's nodes.
-    pub(crate) positions_m: &'a [DVec3],
-    /// The skin.
-    pub(crate) surface: &'a Surface,
-    /// Moduli behind its triangles.
-    pub(crate) moduli: &'a [SurfaceModuli],
-    /// Each node's part of the mass (kg) that bears contact, by its area.
-    pub(crate) mass_kg: &'a [f64],
-    /// Mass (kg) that bears what is pressed at each node, if its neighbours are pressed alike.
-    pub(crate) bearing_kg: &'a [f64],
-    /// ω_max (rad/s) of the body without contact.
-    pub(crate) max_natural_frequency_rad_per_s: f64,
-}
 
 impl SelfContact {
     /// Returns the self-contact of a body, or `None` where its skin nowhere faces itself at rest and `only_if_facing`.
@@ -125,7 +111,7 @@ impl SelfContact {
     /// Finds normals, sizes and stiffness of the surface's nodes, and what part of it their masses bear: a vertex and the
     /// corners that press it add `4 κ c/m` to its squared frequency.
     fn measure_nodes(&mut self, skin: &SkinAtRest<'_>) {
-        let frequency_sq = skin.max_natural_frequency_rad_per_s.max(1.0).powi(2);
+        let frequency_sq = skin.frequency_sq();
         for &node in &skin.surface.nodes {
             let (mut normal, mut area_m2, mut size_m, mut wanted) = (DVec3::ZERO, 0.0, 0.0_f64, 0.0);
             for &triangle in self.around.row(node as usize) {
@@ -176,6 +162,9 @@ impl SelfContact {
     /// Finds which clusters are within a distance (m) of each other at rest, and how far apart what may meet is.
     fn find_close(&mut self, within_m: f64) {
         let count = self.clusters.len();
+        let balls: Vec<Ball> = (0..self.triangles.len())
+            .map(|triangle| Ball::around(self.triangles.corners(triangle, &self.rest_m)))
+            .collect();
         let mut close: Vec<Vec<CloseCluster>> = vec![Vec::new(); count];
         for one in 0..count {
             for other in one..count {
@@ -187,7 +176,7 @@ impl SelfContact {
                     }
                     continue;
                 }
-                let free_m = self.free_m(one, other).min(self.free_m(other, one));
+                let free_m = self.free_m(one, other, &balls).min(self.free_m(other, one, &balls));
                 close[one].push(CloseCluster { cluster: other as u32, free_m });
                 if other != one {
                     close[other].push(CloseCluster { cluster: one as u32, free_m });
@@ -205,16 +194,25 @@ impl SelfContact {
     }
 
     /// Returns the least distance (m) at rest between vertices of one cluster and triangles of another that may meet, and
-    /// notes it of each vertex.
-    fn free_m(&mut self, of_nodes: usize, of_triangles: usize) -> f64 {
+    /// notes it of each vertex. What is too far away to lower either is passed over.
+    fn free_m(&mut self, of_nodes: usize, of_triangles: usize, balls: &[Ball]) -> f64 {
+        let ClusterAtRest { low_m, high_m, .. } = self.clusters[of_triangles];
         let mut least_m = f64::INFINITY;
-        for node in self.of_cluster.row(of_nodes).to_vec() {
-            let distances_m =
-                self.triangles.cluster_range(of_triangles).filter_map(|triangle| self.may_meet_m(node, triangle));
-            let free_m = distances_m.fold(f64::INFINITY, f64::min);
-            let of_node_m = &mut self.nodes[node as usize].free_close_m;
-            *of_node_m = of_node_m.min(free_m);
-            least_m = least_m.min(free_m);
+        for &node in self.of_cluster.row(of_nodes) {
+            let rest_m = self.rest_m[node as usize];
+            let mut of_node_m = self.nodes[node as usize].free_close_m;
+            if box_distance_m(rest_m, low_m, high_m) - ROUNDING_M >= of_node_m.max(least_m) {
+                continue;
+            }
+            for triangle in self.triangles.cluster_range(of_triangles) {
+                if balls[triangle].distance_m(rest_m) - ROUNDING_M >= of_node_m.max(least_m) {
+                    continue;
+                }
+                if let Some(distance_m) = self.may_meet_m(node, triangle) {
+                    (of_node_m, least_m) = (of_node_m.min(distance_m), least_m.min(distance_m));
+                }
+            }
+            self.nodes[node as usize].free_close_m = of_node_m;
         }
         least_m
     }

@@ -34,7 +34,6 @@ mod stepping;
 #[cfg(test)]
 mod tests;
 
-pub(crate) use build::SkinAtRest;
 pub(super) use lists::NearWalls;
 pub use press::MeetingWalls;
 pub(super) use query::WallScratch;

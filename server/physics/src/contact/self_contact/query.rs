@@ -195,9 +195,9 @@ impl SelfContact {
     fn list(&self, of_nodes: usize, of_triangles: usize, is_close: bool, query: &mut Query<'_>) -> f64 {
         let (x, other) = (query.x, &query.clusters[of_triangles]);
         let triangles = self.triangles.cluster_range(of_triangles);
-        let mut balls = [(DVec3::ZERO, 0.0); CLUSTER];
+        let mut balls = [Ball::default(); CLUSTER];
         for (triangle, ball) in triangles.clone().zip(&mut balls) {
-            *ball = ball_around(self.triangles.corners(triangle, x));
+            *ball = Ball::around(self.triangles.corners(triangle, x));
         }
         let mut slack_m = f64::INFINITY;
         for &node in self.of_cluster.row(of_nodes) {
@@ -214,9 +214,9 @@ impl SelfContact {
                 slack_m = slack_m.min(0.5 * (bound_m - reach_m));
                 continue;
             }
-            for (triangle, (middle_m, radius_m)) in triangles.clone().zip(balls) {
-                let within_m = listed_m + radius_m;
-                if y.distance_squared(middle_m) >= within_m * within_m {
+            for (triangle, ball) in triangles.clone().zip(balls) {
+                let within_m = listed_m + ball.radius_m;
+                if y.distance_squared(ball.middle_m) >= within_m * within_m {
                     slack_m = slack_m.min(self.stride_m);
                     continue;
                 }
@@ -270,11 +270,25 @@ impl ClusterNow {
     }
 }
 
-/// Returns a ball around a triangle: its middle (m) and its radius (m).
-fn ball_around([a, b, c]: [DVec3; 3]) -> (DVec3, f64) {
-    let middle_m = (a + b + c) / 3.0;
-    let farthest_sq = a.distance_squared(middle_m).max(b.distance_squared(middle_m)).max(c.distance_squared(middle_m));
-    (middle_m, farthest_sq.sqrt())
+/// A ball.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Ball {
+    middle_m: DVec3,
+    radius_m: f64,
+}
+
+impl Ball {
+    /// Returns one around a triangle.
+    pub(super) fn around([a, b, c]: [DVec3; 3]) -> Self {
+        let middle_m = (a + b + c) / 3.0;
+        let of = |corner: DVec3| corner.distance_squared(middle_m);
+        Self { middle_m, radius_m: of(a).max(of(b)).max(of(c)).sqrt() }
+    }
+
+    /// Returns how far (m) a point is from it, negative inside.
+    pub(super) fn distance_m(self, point_m: DVec3) -> f64 {
+        point_m.distance(self.middle_m) - self.radius_m
+    }
 }
 
 fn boxes_distance_m([low, high]: [DVec3; 2], [other_low, other_high]: [DVec3; 2]) -> f64 {

@@ -154,9 +154,14 @@ impl SelfContact {
         let (at, rest) = (&self.nodes[node as usize], self.rest_m[node as usize]);
         let corners_m = corners.map(|n| self.rest_m[n as usize]);
         let (beside_m, normal) = (BESIDE * at.size_m, self.normals[triangle]);
+        let is_near = rest.distance_squared(corners_m[0]) < beside_m * beside_m;
+        // Behind its plane, more than rounding could be, is not across a gap from it.
+        if is_near && (rest - corners_m[0]).dot(normal) < -2.0 * NOTHING * at.size_m {
+            return None;
+        }
         let faces = at.normal.dot(normal) < at.faces_below
             && self.around.row(node as usize).iter().any(|&own| -self.normals[own as usize].dot(normal) > FACING);
-        if !faces && rest.distance_squared(corners_m[0]) < beside_m * beside_m {
+        if is_near && !faces {
             return None;
         }
         let [wa, wb, wc] = closest_weights(rest, corners_m);

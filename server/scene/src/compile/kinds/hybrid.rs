@@ -21,11 +21,11 @@ use crate::{
 use glam::DVec3;
 use palpate_physics::{
     BodySpec, Settings, TetMesh,
-    bodies::hybrid::{HybridSpec, ParticleSpec, Skin, Waking, composite::Composite, fine_layers, spec::MOST_ACTIVE},
+    bodies::hybrid::{HybridSpec, ParticleSpec, Skin, Waking, composite::Composite, spec::MOST_ACTIVE},
     contact::{ToolSpec, is_inside},
     mesh::tet::EDGES,
 };
-use std::{collections::BTreeSet, f64::consts::PI};
+use std::collections::BTreeSet;
 
 /// Cells of the lattice's box for each tet that is allowed: a body fills little of the box around it.
 const CELLS_PER_TET: f64 = 50.0;
@@ -86,7 +86,10 @@ impl BodyKind for Hybrid {
             fine_depth_m: table.fine_depth_m,
             smooth_skin: table.smooth_skin,
             most_active: table.most_active as usize,
-            waking: Waking::ByTools { reach_m: table.reach_m.unwrap_or_else(|| half_ball_m(table)) },
+            waking: match table.reach_m {
+                Some(reach_m) => Waking::ByTools { reach_m },
+                None => Waking::in_half_ball(table.spacing_m, table.fine_depth_m, table.most_active as usize),
+            },
         };
         let volume_m3 = particles.skin.volume_m3();
         let mass_kg = mass_kg(&coarse, volume_m3);
@@ -242,29 +245,6 @@ impl ParticlesTable {
     fn longest_edge_m(&self) -> f64 {
         self.skin_edge_m.unwrap_or(self.spacing_m)
     }
-}
-
-/// The radius r (m) of the half ball, as at a flat surface, that holds `most_active` particles: one in every h³ in the layers of fine ones, d thick, one in every 8 h³ below,
-/// ```text
-/// n h³ = ⅛ (2π/3) r³ + ⅞ π d (r² − d²/3),  d ≤ r
-/// ```
-fn half_ball_m(table: &ParticlesTable) -> f64 {
-    let Some(depth_m) = table.fine_depth_m else {
-        return table.spacing_m * (f64::from(table.most_active) * 6.0 / (4.0 * PI)).cbrt();
-    };
-    let depth_m = fine_layers(depth_m, table.spacing_m) as f64 * table.spacing_m;
-    let all_m3 = f64::from(table.most_active) * table.spacing_m.powi(3);
-    let held_m3 = |r: f64| {
-        let d = depth_m.min(r);
-        PI * (r.powi(3) / 12.0 + 7.0 / 8.0 * d * (r * r - d * d / 3.0))
-    };
-    // It is the largest where all are 8 h³ apart.
-    let (mut low, mut high) = (0.0, (all_m3 * 12.0 / PI).cbrt());
-    for _ in 0..60 {
-        let middle = f64::midpoint(low, high);
-        *(if held_m3(middle) < all_m3 { &mut low } else { &mut high }) = middle;
-    }
-    f64::midpoint(low, high)
 }
 
 /// What bodies with particles cannot have, at its key.

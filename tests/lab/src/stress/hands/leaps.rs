@@ -7,7 +7,7 @@ use super::{
     BODIES, Body,
     hand::Press,
     spec,
-    watch::{DEEP, LEAST_J, LOOK_EVERY, MOST_IMBALANCE},
+    watch::{DEEP, LOOK_EVERY, LedgerSeen, MOST_IMBALANCE},
 };
 use crate::stress::{
     Measured, Options, Outcome,
@@ -143,7 +143,7 @@ fn watch(spec: &ModelSpec, body: &Body, press: &Press, act: Act) -> Result<Found
         rig.state.place_tool(0, at(act.way_m(press.gap_m, 0, period_s)));
     }
     let triangles = rig.model.surface().triangles.clone();
-    let (mut found, mut surface_m, mut moved_j, mut imbalance_j) = (Found::default(), Vec::new(), LEAST_J, 0.0_f64);
+    let (mut found, mut surface_m, mut ledger) = (Found::default(), Vec::new(), LedgerSeen::NOTHING);
     let mut had_none = false;
     for tick in 0..act.lasts_ticks(press.gap_m, period_s) + BACK_TICKS {
         drive.tools[0] = at(act.way_m(press.gap_m, tick, period_s));
@@ -162,11 +162,7 @@ fn watch(spec: &ModelSpec, body: &Body, press: &Press, act: Act) -> Result<Found
         if !tick.is_multiple_of(LOOK_EVERY) {
             continue;
         }
-        let energies = rig.energies();
-        for energy_j in [energies.kinetic_j, energies.elastic_j, energies.external_work_j, energies.dissipated_j] {
-            moved_j = moved_j.max(energy_j.abs());
-        }
-        imbalance_j = imbalance_j.max(energies.balance_j().abs());
+        ledger.look(&rig.energies());
         if body.is_closed && !is_put {
             rig.model.surface_positions_m(&rig.state, &mut surface_m);
             found.is_inside |= is_inside(tool_centre_m(&rig), &triangles, &surface_m);
@@ -175,7 +171,7 @@ fn watch(spec: &ModelSpec, body: &Body, press: &Press, act: Act) -> Result<Found
     let may_be_held_off = !is_put && !body.is_convex;
     let is_away = tool_centre_m(&rig).distance(start.position_m) > FOLLOWS_M;
     found.is_caught = !may_be_held_off && (is_away || rig.state.mechanical.contact.touches(0));
-    found.imbalance = imbalance_j / moved_j;
+    found.imbalance = ledger.imbalance();
     Ok(found)
 }
 

@@ -1,7 +1,7 @@
 //! Two tools that squeeze a wall between them, and let it go.
 //!
 //! Found by it, or what it was written after: a wall of 10 mm that two tools squeezed to 2.4 mm ended in quarantine.
-use super::watch::{LEAST_J, LOOK_EVERY, MOST_IMBALANCE};
+use super::watch::{LOOK_EVERY, LedgerSeen, MOST_IMBALANCE};
 use crate::stress::{
     Measured, Options, Outcome,
     random::Random,
@@ -139,7 +139,7 @@ fn watch(spec: &ModelSpec, squeeze: &Squeeze) -> Result<Found> {
     let mut rig = Rig::new(ModelSpec { tools: squeeze.tools.to_vec(), ..spec.clone() })?;
     let mut drive = Drive::still(&rig.model);
     let period_s = rig.model.settings().tick_period_s;
-    let (mut found, mut moved_j, mut imbalance_j) = (Found::default(), LEAST_J, 0.0_f64);
+    let (mut found, mut ledger) = (Found::default(), LedgerSeen::NOTHING);
     for tick in 0..2 * squeeze.way_ticks(period_s) + THERE_TICKS + BACK_TICKS {
         for (target, (tool, side)) in drive.tools.iter_mut().zip(squeeze.tools.iter().zip([1.0, -1.0])) {
             let way_m = squeeze.part(tick, period_s) * squeeze.way_m;
@@ -156,15 +156,11 @@ fn watch(spec: &ModelSpec, squeeze: &Squeeze) -> Result<Found> {
         if !tick.is_multiple_of(LOOK_EVERY) {
             continue;
         }
-        let energies = rig.energies();
-        for energy_j in [energies.kinetic_j, energies.elastic_j, energies.external_work_j, energies.dissipated_j] {
-            moved_j = moved_j.max(energy_j.abs());
-        }
-        imbalance_j = imbalance_j.max(energies.balance_j().abs());
+        ledger.look(&rig.energies());
     }
     found.is_caught = squeeze.tools.iter().zip(&rig.state.mechanical.tools).enumerate().any(|(index, (spec, tool))| {
         tool.centre_m.distance(spec.start_position_m) > FOLLOWS_M || rig.state.mechanical.contact.touches(index)
     });
-    found.imbalance = imbalance_j / moved_j;
+    found.imbalance = ledger.imbalance();
     Ok(found)
 }

@@ -5,7 +5,7 @@ use super::{
 };
 use crate::stress::rig::{Drive, Rig};
 use miette::Result;
-use palpate_physics::{ModelSpec, contact::is_inside};
+use palpate_physics::{Energies, ModelSpec, contact::is_inside};
 
 /// Largest fall of the force, over the force before, in a tick and in 20 ms of a slow press.
 pub(super) const MOST_IN_A_TICK: f64 = 0.05;
@@ -15,7 +15,7 @@ pub(super) const MOST_IMBALANCE: f64 = 0.05;
 /// Force (N) below which a fall is none, as samples come and go.
 const LEAST_N: f64 = 0.05;
 /// Energy (J) that counts as moved even where a hand hardly touches: forces in f32 are wrong by as much as a part of it.
-pub(super) const LEAST_J: f64 = 1e-6;
+const LEAST_J: f64 = 1e-6;
 /// Depth (m) of the surface in a tool, over its radius, at which it presses.
 pub(super) const DEEP: f64 = 0.02;
 /// Number of ticks between two looks at whether a tool is inside.
@@ -55,6 +55,28 @@ impl Found {
     }
 }
 
+/// The error of the ledger over the largest energy that moved, until now.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct LedgerSeen {
+    moved_j: f64,
+    imbalance_j: f64,
+}
+
+impl LedgerSeen {
+    pub(super) const NOTHING: Self = Self { moved_j: LEAST_J, imbalance_j: 0.0 };
+
+    pub(super) fn look(&mut self, energies: &Energies) {
+        for energy_j in [energies.kinetic_j, energies.elastic_j, energies.external_work_j, energies.dissipated_j] {
+            self.moved_j = self.moved_j.max(energy_j.abs());
+        }
+        self.imbalance_j = self.imbalance_j.max(energies.balance_j().abs());
+    }
+
+    pub(super) fn imbalance(self) -> f64 {
+        self.imbalance_j / self.moved_j
+    }
+}
+
 /// Presses a body, and watches.
 pub(super) fn watch(spec: &ModelSpec, body: &Body, press: &Press) -> Result<Found> {
     let mut rig = Rig::new(ModelSpec { tools: vec![press.tool.clone()], ..spec.clone() })?;
@@ -63,8 +85,8 @@ pub(super) fn watch(spec: &ModelSpec, body: &Body, press: &Press) -> Result<Foun
     let period_s = rig.model.settings().tick_period_s;
     let is_slow = press.is_inland && press.speed_m_per_s <= body.slow_m_per_s;
     let triangles = rig.model.surface().triangles.clone();
-    let (mut found, mut surface_m, mut moved_j) = (Found::default(), Vec::new(), LEAST_J);
-    let (mut forces_n, mut later, mut imbalance_j) = (Vec::new(), 0, 0.0_f64);
+    let (mut found, mut surface_m, mut ledger) = (Found::default(), Vec::new(), LedgerSeen::NOTHING);
+    let (mut forces_n, mut later) = (Vec::new(), 0);
     while later < LATER_TICKS {
         let tool = &rig.state.mechanical.tools[0];
         drive.tools[0] = hand.go_on(period_s, tool.device_force_n.length());
@@ -91,16 +113,12 @@ pub(super) fn watch(spec: &ModelSpec, body: &Body, press: &Press) -> Result<Foun
             found.fall_in_a_tick = found.fall_in_a_tick.max(fall(1));
             found.fall_in_20_ms = found.fall_in_20_ms.max(fall(20));
         }
-        let energies = rig.energies();
-        for energy_j in [energies.kinetic_j, energies.elastic_j, energies.external_work_j, energies.dissipated_j] {
-            moved_j = moved_j.max(energy_j.abs());
-        }
-        imbalance_j = imbalance_j.max(energies.balance_j().abs());
+        ledger.look(&rig.energies());
         if body.is_closed && rig.state.mechanical.tick.is_multiple_of(LOOK_EVERY.into()) {
             rig.model.surface_positions_m(&rig.state, &mut surface_m);
             found.is_inside |= is_inside(rig.state.mechanical.tools[0].centre_m, &triangles, &surface_m);
         }
     }
-    found.imbalance = imbalance_j / moved_j;
+    found.imbalance = ledger.imbalance();
     Ok(found)
 }
