@@ -48,6 +48,16 @@ fn squeezes() {
 }
 
 #[test]
+fn strokes() {
+    passes("strokes");
+}
+
+#[test]
+fn laws() {
+    passes("laws");
+}
+
+#[test]
 fn leaps() {
     passes("leaps");
 }

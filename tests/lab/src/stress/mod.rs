@@ -78,7 +78,7 @@ pub struct Row {
 }
 
 /// Every row, in the order of the table.
-pub const ROWS: [Row; 14] = [
+pub const ROWS: [Row; 16] = [
     Row { name: "time-step", criterion: time_step::CRITERION, run: time_step::run },
     Row { name: "stiffness-ratio", criterion: stiffness_ratio::CRITERION, run: stiffness_ratio::run },
     Row { name: "incompressible", criterion: incompressible::CRITERION, run: incompressible::run },
@@ -90,8 +90,10 @@ pub const ROWS: [Row; 14] = [
     Row { name: "random-scenes", criterion: random_scenes::CRITERION, run: random_scenes::run },
     Row { name: "activation", criterion: activation::CRITERION, run: activation::run },
     Row { name: "presses", criterion: hands::presses::CRITERION, run: hands::presses::run },
+    Row { name: "laws", criterion: hands::laws::CRITERION, run: hands::laws::run },
     Row { name: "leaps", criterion: hands::leaps::CRITERION, run: hands::leaps::run },
     Row { name: "squeezes", criterion: hands::squeezes::CRITERION, run: hands::squeezes::run },
+    Row { name: "strokes", criterion: hands::strokes::CRITERION, run: hands::strokes::run },
     Row { name: "springs", criterion: springs::CRITERION, run: springs::run },
 ];
 

@@ -3,9 +3,11 @@
 //!
 //! A body that passes only what it was tuned on is of no use to a hand.
 mod hand;
+pub(super) mod laws;
 pub(super) mod leaps;
 pub(super) mod presses;
 pub(super) mod squeezes;
+pub(super) mod strokes;
 mod watch;
 
 use miette::{Result, bail, miette};

@@ -3,13 +3,16 @@ use super::{
     Body,
     hand::{Hand, Press},
 };
-use crate::stress::rig::{Drive, Rig};
+use crate::stress::{
+    Measured, Outcome,
+    rig::{Drive, Rig},
+};
 use miette::Result;
 use palpate_physics::{Energies, ModelSpec, contact::is_inside};
 
 /// Largest fall of the force, over the force before, in a tick and in 20 ms of a slow press.
-pub(super) const MOST_IN_A_TICK: f64 = 0.05;
-pub(super) const MOST_IN_20_MS: f64 = 0.20;
+const MOST_IN_A_TICK: f64 = 0.05;
+const MOST_IN_20_MS: f64 = 0.20;
 /// Largest error of the ledger over the largest energy that moved.
 pub(super) const MOST_IMBALANCE: f64 = 0.05;
 /// Force (N) below which a fall is none, as samples come and go.
@@ -52,6 +55,35 @@ impl Found {
             substeps: self.substeps.max(other.substeps),
             ..*self
         }
+    }
+
+    /// Demands what every press has to come to; of the force that it does not fall only if `may_not_fall`. `at` says which press it is.
+    pub(super) fn judge(&self, may_not_fall: bool, outcome: &mut Outcome, at: &dyn Fn() -> String) {
+        if let Some(tick) = self.quarantined {
+            outcome.broken.push(format!("{}: quarantined at tick {tick}", at()));
+        }
+        outcome.demand(!self.is_inside, || format!("{}: the tool is inside the body", at()));
+        outcome.demand(!self.lets_go, || format!("{}: no force at {:.1} mm of depth", at(), 1e3 * self.depth_m));
+        for (fall, most, when) in
+            [(self.fall_in_a_tick, MOST_IN_A_TICK, "a tick"), (self.fall_in_20_ms, MOST_IN_20_MS, "20 ms")]
+        {
+            outcome.demand(!may_not_fall || fall <= most, || {
+                format!("{}: the force fell by {:.0} % in {when}", at(), 100.0 * fall)
+            });
+        }
+        outcome.demand(self.imbalance <= MOST_IMBALANCE, || {
+            format!("{}: {:.3} of what moved came from nowhere or went there", at(), self.imbalance)
+        });
+    }
+
+    /// Adds the numbers of a body's worst press.
+    pub(super) fn push(&self, body: &str, outcome: &mut Outcome) {
+        let name = |what: &str| format!("{body}: {what}");
+        outcome.push(Measured::value(name("largest force"), self.force_n, "N"));
+        outcome.push(Measured::value(name("ticks taken back"), f64::from(self.repeated), "ticks"));
+        outcome.push(Measured::value(name("most substeps over the model's"), self.substeps, "1"));
+        let ledger = name("error of the ledger over what moved");
+        outcome.push(Measured::bounded(ledger, self.imbalance, "1", MOST_IMBALANCE));
     }
 }
 
