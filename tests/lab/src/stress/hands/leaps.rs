@@ -24,7 +24,7 @@ use std::fmt;
 
 pub(in crate::stress) const CRITERION: &str = "a device leaps 5 to 90 mm into or across a shipped body, or its tool is put \
      0.1 to 1.5 radii into it: finite, no quarantine, a tool that leaps never inside, force where there is depth, and clear of the body \
-     once the device is (a tool that leaps, where no wall of the body can be between them)";
+     once the device is, unless the body is between them";
 
 /// Ticks before a leap, there, and after the device is back.
 const BEFORE_TICKS: u32 = 20;
@@ -32,6 +32,8 @@ const THERE_TICKS: u32 = 200;
 const BACK_TICKS: u32 = 400;
 /// Distance (m) from its device within which a tool that is clear of the body has come to it.
 const FOLLOWS_M: f64 = 1e-3;
+/// Distance between two looks at whether a body is between a tool and its device, over the tool's radius.
+const LOOK_EVERY_RADII: f64 = 0.2;
 
 /// What a device does.
 #[derive(Debug, Clone, Copy)]
@@ -168,11 +170,23 @@ fn watch(spec: &ModelSpec, body: &Body, press: &Press, act: Act) -> Result<Found
             found.is_inside |= is_inside(tool_centre_m(&rig), &triangles, &surface_m);
         }
     }
-    let may_be_held_off = !is_put && !body.is_convex;
     let is_away = tool_centre_m(&rig).distance(start.position_m) > FOLLOWS_M;
-    found.is_caught = !may_be_held_off && (is_away || rig.state.mechanical.contact.touches(0));
+    rig.model.surface_positions_m(&rig.state, &mut surface_m);
+    let is_held_off = !is_put
+        && (!body.is_closed
+            || is_between(tool_centre_m(&rig), start.position_m, press.tool.radius_m, &triangles, &surface_m));
+    found.is_caught = !is_held_off && (is_away || rig.state.mechanical.contact.touches(0));
     found.imbalance = ledger.imbalance();
     Ok(found)
+}
+
+/// Returns whether a closed body is between two points (m): a tool that is drawn straight from one to the other is held off by it.
+fn is_between(from_m: DVec3, to_m: DVec3, radius_m: f64, triangles: &[[u32; 3]], surface_m: &[DVec3]) -> bool {
+    let parts = (from_m.distance(to_m) / (LOOK_EVERY_RADII * radius_m)).ceil().max(1.0) as u32;
+    (1..parts).any(|part| {
+        let at_m = from_m.lerp(to_m, f64::from(part) / f64::from(parts));
+        is_inside(at_m, triangles, surface_m)
+    })
 }
 
 fn tool_centre_m(rig: &Rig) -> DVec3 {

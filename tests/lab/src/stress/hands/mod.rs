@@ -28,8 +28,6 @@ struct Body {
     rigid_depth_m: f64,
     /// Whether a point may be inside it.
     is_closed: bool,
-    /// Whether none of it can be between a tool and its device that are outside, once it is at rest.
-    is_convex: bool,
 }
 
 const BODIES: [Body; 4] = [
@@ -41,7 +39,6 @@ const BODIES: [Body; 4] = [
         edge_m: 0.08,
         rigid_depth_m: 0.02,
         is_closed: true,
-        is_convex: true,
     },
     Body {
         name: "block of tets",
@@ -51,7 +48,6 @@ const BODIES: [Body; 4] = [
         edge_m: 0.08,
         rigid_depth_m: 0.02,
         is_closed: true,
-        is_convex: true,
     },
     Body {
         name: "ventricle with particles",
@@ -61,7 +57,6 @@ const BODIES: [Body; 4] = [
         edge_m: 0.04,
         rigid_depth_m: 0.008,
         is_closed: true,
-        is_convex: false,
     },
     Body {
         name: "dome of springs",
@@ -71,7 +66,6 @@ const BODIES: [Body; 4] = [
         edge_m: 0.04,
         rigid_depth_m: 0.01,
         is_closed: false,
-        is_convex: false,
     },
 ];
 
