@@ -165,6 +165,7 @@ impl SelfContact {
         let balls: Vec<Ball> = (0..self.triangles.len())
             .map(|triangle| Ball::around(self.triangles.corners(triangle, &self.rest_m)))
             .collect();
+        let cones: Vec<Cone> = (0..count).map(|cluster| self.cone(cluster)).collect();
         let mut close: Vec<Vec<CloseCluster>> = vec![Vec::new(); count];
         for one in 0..count {
             for other in one..count {
@@ -176,7 +177,11 @@ impl SelfContact {
                     }
                     continue;
                 }
-                let free_m = self.free_m(one, other, &balls).min(self.free_m(other, one, &balls));
+                let free_m = self.free_m([one, other], &cones[other], &balls).min(self.free_m(
+                    [other, one],
+                    &cones[one],
+                    &balls,
+                ));
                 close[one].push(CloseCluster { cluster: other as u32, free_m });
                 if other != one {
                     close[other].push(CloseCluster { cluster: one as u32, free_m });
@@ -195,13 +200,16 @@ impl SelfContact {
 
     /// Returns the least distance (m) at rest between vertices of one cluster and triangles of another that may meet, and
     /// notes it of each vertex. What is too far away to lower either is passed over.
-    fn free_m(&mut self, of_nodes: usize, of_triangles: usize, balls: &[Ball]) -> f64 {
+    fn free_m(&mut self, [of_nodes, of_triangles]: [usize; 2], cone: &Cone, balls: &[Ball]) -> f64 {
         let ClusterAtRest { low_m, high_m, .. } = self.clusters[of_triangles];
         let mut least_m = f64::INFINITY;
         for &node in self.of_cluster.row(of_nodes) {
-            let rest_m = self.rest_m[node as usize];
-            let mut of_node_m = self.nodes[node as usize].free_close_m;
-            if box_distance_m(rest_m, low_m, high_m) - ROUNDING_M >= of_node_m.max(least_m) {
+            let (at, rest_m) = (&self.nodes[node as usize], self.rest_m[node as usize]);
+            let mut of_node_m = at.free_close_m;
+            let farthest_m = (rest_m - low_m).abs().max((rest_m - high_m).abs()).length();
+            if box_distance_m(rest_m, low_m, high_m) - ROUNDING_M >= of_node_m.max(least_m)
+                || farthest_m < at.beside_m() - ROUNDING_M && cone.faces_away_from(at)
+            {
                 continue;
             }
             for triangle in self.triangles.cluster_range(of_triangles) {
@@ -217,6 +225,13 @@ impl SelfContact {
         least_m
     }
 
+    fn cone(&self, cluster: usize) -> Cone {
+        let normals = || &self.normals[self.triangles.cluster_range(cluster)];
+        let axis = normals().iter().sum::<DVec3>().normalize_or_zero();
+        let angle = |normal: &DVec3| normal.dot(axis).clamp(-1.0, 1.0).acos();
+        Cone { axis, half_angle: normals().iter().map(angle).fold(0.0, f64::max) }
+    }
+
     /// Makes the margins so small that nothing is pressed at rest, and leaves vertices out that lie against a wall.
     fn fit_margins(&mut self) {
         let near = self.near_at(&self.rest_m);
@@ -230,6 +245,20 @@ impl SelfContact {
                 self.left_out += 1;
             }
         }
+    }
+}
+
+/// A cone that holds the normals of a cluster's triangles.
+struct Cone {
+    axis: DVec3,
+    half_angle: f64,
+}
+
+impl Cone {
+    /// Returns whether none of the triangles faces a vertex, by the normals alone.
+    fn faces_away_from(&self, at: &NodeAtRest) -> bool {
+        let from_axis = at.normal.dot(self.axis).clamp(-1.0, 1.0).acos();
+        from_axis + self.half_angle < at.faces_below.acos() - 1e-6
     }
 }
 

@@ -88,6 +88,11 @@ impl NodeAtRest {
         free_close_m: f64::INFINITY,
     };
 
+    /// Returns the distance (m) at rest within which triangles are beside it along the skin unless they face it across a gap.
+    pub(super) fn beside_m(&self) -> f64 {
+        BESIDE * self.size_m
+    }
+
     /// Returns the largest distance (m) from a wall at which it is pushed.
     pub(super) fn reach_m(&self) -> f64 {
         DEEPEST * self.size_m
@@ -153,7 +158,7 @@ impl SelfContact {
         }
         let (at, rest) = (&self.nodes[node as usize], self.rest_m[node as usize]);
         let corners_m = corners.map(|n| self.rest_m[n as usize]);
-        let (beside_m, normal) = (BESIDE * at.size_m, self.normals[triangle]);
+        let (beside_m, normal) = (at.beside_m(), self.normals[triangle]);
         let is_near = rest.distance_squared(corners_m[0]) < beside_m * beside_m;
         // Behind its plane, more than rounding could be, is not across a gap from it.
         if is_near && (rest - corners_m[0]).dot(normal) < -2.0 * NOTHING * at.size_m {
