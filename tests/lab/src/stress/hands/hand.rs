@@ -5,7 +5,7 @@ use glam::{DQuat, DVec3};
 use miette::{Result, bail};
 use palpate_physics::{
     Model,
-    contact::{Coupling, ToolShape, ToolSpec, ToolTarget},
+    contact::{Coupling, ToolShape, ToolSpec, ToolTarget, closest_weights},
 };
 use std::fmt;
 
@@ -13,6 +13,8 @@ use std::fmt;
 pub(super) const LARGEST_FORCE_N: f64 = 20.0;
 /// Depth (m) to which a hand goes that meets no such force.
 const LARGEST_DEPTH_M: f64 = 0.03;
+/// Points on either half of a capsule's axis at which it is looked whether it is clear of a body.
+const AXIS_PARTS: i32 = 8;
 /// Ticks for which it stays there.
 const STAYS_TICKS: u32 = 60;
 
@@ -72,7 +74,7 @@ impl Press {
                 x.iter().all(|p| p.distance(at_m) > reach_m + 1e-4)
             };
             let is_below = touch_m.z < lowest_m + reach_m;
-            if is_below || !is_clear(0.0) {
+            if is_below || !is_clear(0.0) || cuts(&shape, start_position_m, radius_m, bare) {
                 continue;
             }
             let inland_m = 0.5 * body.edge_m - 2.0 * reach_m - depth_m;
@@ -81,6 +83,21 @@ impl Press {
         }
         bail!("no place for a tool was found")
     }
+}
+
+/// Returns whether a capsule at its start reaches into a body at rest, between vertices too.
+fn cuts(shape: &ToolShape, centre_m: DVec3, radius_m: f64, bare: &Model) -> bool {
+    let Some(capsule) = shape.as_capsule() else { return false };
+    let half_m = capsule.start_orientation * (DVec3::Z * capsule.half_length_m);
+    let (x, surface) = (bare.surface_rest_positions_m(), bare.surface());
+    (-AXIS_PARTS..=AXIS_PARTS).any(|part| {
+        let at_m = centre_m + half_m * (f64::from(part) / f64::from(AXIS_PARTS));
+        (0..surface.triangles.len()).any(|triangle| {
+            let corners = surface.triangle_nodes(triangle).map(|node| x[node as usize]);
+            let [wa, wb, wc] = closest_weights(at_m, corners);
+            at_m.distance(corners[0] * wa + corners[1] * wb + corners[2] * wc) < radius_m
+        })
+    })
 }
 
 impl fmt::Display for Press {
