@@ -4,7 +4,6 @@
 //! The scene `hybrid-block`, its tool on a virtual coupling and without friction, its device going down slowly; the depth is that of
 //! the tool, not of the device. The reference is a rigid sphere on the same block and law at each depth.
 use crate::{
-    bodies::material,
     press::Slow,
     problems::body::BLOCK_M,
     reference::{
@@ -19,7 +18,7 @@ use clap::Args;
 use glam::DVec3;
 use indicatif::{ProgressBar, ProgressStyle};
 use miette::{IntoDiagnostic, Result, ensure, miette};
-use palpate_physics::{Model, contact::Coupling, material::Law};
+use palpate_physics::{Model, contact::Coupling, material::Material};
 use palpate_scene::Limits;
 use std::time::Duration;
 
@@ -29,9 +28,6 @@ const DEPTHS_MM: [f64; 8] = [2.5, 5.0, 7.5, 10.0, 12.5, 15.0, 17.5, 20.0];
 const GRIDS: [usize; 3] = [4, 5, 6];
 /// κ of the reference's sphere over `E/((1 − ν²)√(Rδ))`.
 const PENALTY: f64 = 1e3;
-/// The block's material, as the scene has it.
-const YOUNG_MODULUS_PA: f64 = 10e3;
-const POISSON_RATIO: f64 = 0.45;
 /// The coupling: stiffness (N/m), damping (N s/m) and mass (kg).
 const COUPLING: Coupling = Coupling::Spring { stiffness_n_per_m: 800.0, damping_n_s_per_m: 4.0, mass_kg: 0.05 };
 const RADIUS_M: f64 = 10e-3;
@@ -62,6 +58,7 @@ pub fn print(options: &Options) -> Result<()> {
     bar.enable_steady_tick(Duration::from_millis(200));
     bar.set_message("pressing the hybrid");
     let model = block()?;
+    let material = material_of(&model)?;
     let pressed = press(&model);
     println!(
         "coupling saturates at {:.2} N; deepest {:.2} mm",
@@ -72,7 +69,7 @@ pub fn print(options: &Options) -> Result<()> {
     let mut grids = Vec::new();
     for n in GRIDS {
         bar.set_prefix(format!("n = {n}"));
-        let (forces_n, ended) = on_grid(n, &depths_m, &mut |text| bar.set_message(text.to_owned()))?;
+        let (forces_n, ended) = on_grid(n, &material, &depths_m, &mut |text| bar.set_message(text.to_owned()))?;
         if let Some(why) = ended {
             bar.suspend(|| println!("n = {n}: {why}"));
         }
@@ -110,13 +107,18 @@ fn told<T>(value: Option<T>, as_text: impl Fn(T) -> String) -> String {
 }
 
 /// The forces (N) of a reference on one grid at each of the depths (m), as far as it comes, and why it comes no farther.
-fn on_grid(n: usize, depths_m: &[f64], tell: &mut dyn FnMut(&str)) -> Result<(Vec<f64>, Option<String>)> {
+fn on_grid(
+    n: usize,
+    material: &Material,
+    depths_m: &[f64],
+    tell: &mut dyn FnMut(&str),
+) -> Result<(Vec<f64>, Option<String>)> {
     let deepest_m = depths_m.last().copied().unwrap_or_default();
     let contact_m = (RADIUS_M * deepest_m).sqrt();
     let body = bodies::block(BLOCK_M[0], BLOCK_M[1], contact_m, n);
-    let material = material(Law::StableNeoHookean, YOUNG_MODULUS_PA, POISSON_RATIO)?;
-    let solid = Solid::new(body.grid.clone(), material)?;
-    let penalty_pa_per_m = PENALTY * YOUNG_MODULUS_PA / (1.0 - POISSON_RATIO.powi(2)) / contact_m;
+    let solid = Solid::new(body.grid.clone(), *material)?;
+    let modulus_pa = material.lame.young_modulus_pa() / (1.0 - material.lame.poisson_ratio().powi(2));
+    let penalty_pa_per_m = PENALTY * modulus_pa / contact_m;
     let sphere = Sphere::new(&solid.grid, solid.grid.faces(body.touched), body.normal, RADIUS_M, penalty_pa_per_m);
     let action = Action::Sphere { sphere, depth_m: deepest_m };
     let parts: Vec<f64> = depths_m.iter().map(|depth_m| depth_m / deepest_m).collect();
@@ -142,6 +144,13 @@ fn block() -> Result<Model> {
         "the scene's block is not the reference's"
     );
     Ok(model)
+}
+
+/// What the scene's block is made of, without the viscosity, which has no part at rest.
+fn material_of(model: &Model) -> Result<Material> {
+    let solid = model.body().filling_tets().ok_or_else(|| miette!("the scene's block is not made of tets"))?;
+    ensure!(solid.regions.len() == 1, "the scene's block is of {} materials, not of one", solid.regions.len());
+    Ok(solid.regions[0].material)
 }
 
 /// Depths (m) of the tool's lowest point beneath the face at rest, and forces (N), tick by tick.

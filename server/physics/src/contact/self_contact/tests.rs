@@ -197,6 +197,31 @@ fn queries_lose_nothing_that_is_within_reach() {
     assert!(met > 100, "{met}");
 }
 
+/// What is too far away or faces away is passed over when the least distances at rest are found.
+#[test]
+fn distances_at_rest_are_those_of_all_vertices_and_triangles() {
+    let walls = walls_of(&clamp(), true).unwrap();
+    let nodes = |cluster: usize| walls.of_cluster.row(cluster).iter().copied();
+    let least_m = |node: u32, cluster: usize| {
+        let range = walls.triangles.cluster_range(cluster);
+        range.filter_map(|triangle| walls.may_meet_m(node, triangle)).fold(f64::INFINITY, f64::min)
+    };
+    let mut facing = 0;
+    for one in 0..walls.clusters.len() {
+        for entry in walls.close.row(one) {
+            let other = entry.cluster as usize;
+            let of_pair_m = nodes(one).map(|n| least_m(n, other)).chain(nodes(other).map(|n| least_m(n, one)));
+            assert_eq!(entry.free_m, of_pair_m.fold(f64::INFINITY, f64::min), "clusters {one} and {other}");
+            facing += u32::from(entry.free_m.is_finite());
+        }
+        for node in nodes(one) {
+            let close = walls.close.row(one).iter().map(|entry| least_m(node, entry.cluster as usize));
+            assert_eq!(walls.nodes[node as usize].free_close_m, close.fold(f64::INFINITY, f64::min), "node {node}");
+        }
+    }
+    assert!(facing > 10, "{facing}");
+}
+
 /// In a step that was too long nodes were anywhere or not finite, and one query looked at every vertex with every
 /// triangle for seconds, before the tick was taken back.
 #[test]
