@@ -3,31 +3,39 @@
 use serialport::{SerialPort as _, TTYPort};
 use std::{
     io::{Read as _, Write as _},
-    time::Duration,
+    time::{Duration, Instant},
 };
+
+/// How long a pseudo terminal of a busy machine may take to hand on what was written.
+const PATIENCE: Duration = Duration::from_secs(30);
+/// How long a driver that starts is listened to at a time.
+const LISTENED: Duration = Duration::from_millis(5);
 
 /// Both ends of a pseudo terminal, and the path of the driver's.
 pub(crate) struct Pair {
     ours: TTYPort,
     /// Open, or ours would end with whoever closes it.
-    _theirs: TTYPort,
+    theirs: TTYPort,
     pub(crate) path: String,
 }
 
 impl Pair {
     pub(crate) fn new() -> Self {
-        let (ours, theirs) = TTYPort::pair().unwrap();
+        let (mut ours, theirs) = TTYPort::pair().unwrap();
+        ours.set_timeout(PATIENCE).unwrap();
         let path = theirs.name().unwrap();
-        Self { ours, _theirs: theirs, path }
+        Self { ours, theirs, path }
     }
 
     /// A driver that starts, while every message of its is answered so.
     pub(crate) fn starting<T: Send>(&mut self, answer: &[u8], start: impl FnOnce() -> T + Send) -> T {
-        self.ours.set_timeout(Duration::from_millis(5)).unwrap();
         std::thread::scope(|scope| {
             let started = scope.spawn(start);
             while !started.is_finished() {
-                if self.ours.read(&mut [0; 64]).is_ok() {
+                self.ours.set_timeout(LISTENED).unwrap();
+                let said = self.ours.read(&mut [0; 64]).is_ok();
+                self.ours.set_timeout(PATIENCE).unwrap();
+                if said {
                     self.ours.write_all(answer).unwrap();
                 }
             }
@@ -56,7 +64,8 @@ impl Pair {
         }
     }
 
-    /// A million random bytes, in pieces of up to 64: every other one within messages of the arm; `look` after each.
+    /// A million random bytes, in pieces of up to 64: every other one within messages of the arm; `look` after each has
+    /// come to the driver's end.
     pub(crate) fn feed(&mut self, message: &[u8], mut look: impl FnMut()) {
         let mut left = 1_000_000_usize;
         let mut random = Random(0x9e37_79b9_7f4a_7c15);
@@ -65,11 +74,22 @@ impl Pair {
             let piece =
                 if noise.len().is_multiple_of(2) { spliced(message, &noise, &mut random) } else { noise.clone() };
             self.ours.write_all(&piece).unwrap();
+            self.wait_for(piece.len());
             look();
             left = left.saturating_sub(noise.len());
             // What the driver says is not heard, and must not pile up.
             let said = self.ours.bytes_to_read().unwrap() as usize;
             self.ours.read_exact(&mut vec![0; said]).unwrap();
+        }
+    }
+
+    /// Until so many bytes are at the driver's end: the kernel hands them on a moment after they were written, and on a
+    /// busy machine several pieces at once.
+    fn wait_for(&self, count: usize) {
+        let began = Instant::now();
+        while (self.theirs.bytes_to_read().unwrap() as usize) < count {
+            assert!(began.elapsed() < PATIENCE, "the pseudo terminal does not hand on {count} bytes");
+            std::thread::yield_now();
         }
     }
 }
