@@ -11,9 +11,9 @@
 //! is booked in the ledger.
 //!
 //! It is a dead load: on a body that swings while regions are switched it may do work without end, as may decaying
-//! prestrain (`prestrain`). The energy that both gave lately, beyond what they and switches took, is kept; where it is
-//! more than [`MOST_GIVEN`] of the elastic energy that switches lately changed, there is no transition force, and
-//! accelerations jump.
+//! prestrain (`prestrain`); and what wakes in an impact flees the tool while the load that kept it there pushes on. The
+//! energy that both gave lately, beyond what they and switches took, is kept; in the substep in which it is more than
+//! [`MOST_GIVEN`] of the elastic energy that switches lately changed, the transition force ends, and accelerations jump.
 use super::{body::HybridBody, patch::KEPT, prestrain, running::RunningMassMatrix, state::HybridState};
 use crate::tick::MechanicalState;
 use glam::{BVec3, DMat3, DVec3};
@@ -21,8 +21,6 @@ use glam::{BVec3, DMat3, DVec3};
 /// `τ` (s), the time constant of the decay: less than that of prestrain, since a force that goes on pushing what swings
 /// may feed it.
 const DECAY_S: f64 = 0.02;
-/// The time constant (s) where too much energy was given already.
-const FAST_DECAY_S: f64 = 0.003;
 /// Time constant (s) with which the energy that the decay gave is forgotten.
 const FORGETTING_S: f64 = 1.0;
 /// Largest energy given by the decay, over the elastic energy that a switch lately changed, with which there is a
@@ -103,6 +101,7 @@ impl TransitionForce {
     /// Takes the transition force away from the total forces at an evaluation; computes it first after a switch.
     pub(crate) fn apply(&mut self, body: &HybridBody, own: &mut HybridState, state: &mut MechanicalState) {
         let MechanicalState { x, force_n, .. } = state;
+        let may_be = own.may_use_transition_force();
         let transition_force_n = &mut own.transition_force_n;
         if self.due_n.len() == force_n.len() {
             transition_force_n.clear();
@@ -117,7 +116,7 @@ impl TransitionForce {
             transition_force_n.clear();
             return;
         }
-        if largest(transition_force_n) <= NOTHING * largest(force_n) {
+        if !may_be || largest(transition_force_n) <= NOTHING * largest(force_n) {
             transition_force_n.clear();
             return;
         }
@@ -149,8 +148,7 @@ impl HybridState {
         let forgotten = prestrain::factor(period_s, FORGETTING_S);
         self.given_j *= forgotten;
         self.switched_j *= forgotten;
-        let time_constant_s = if self.may_use_transition_force() { DECAY_S } else { FAST_DECAY_S };
-        let factor = prestrain::factor(period_s, time_constant_s);
+        let factor = prestrain::factor(period_s, DECAY_S);
         self.transition_force_n.iter_mut().for_each(|force| *force *= factor);
     }
 }

@@ -7,7 +7,7 @@ use super::{
     BODIES, Body,
     hand::Press,
     spec,
-    watch::{DEEP, LOOK_EVERY, LedgerSeen, MOST_IMBALANCE},
+    watch::{LOOK_EVERY, LedgerSeen, LettingGo, MOST_IMBALANCE},
 };
 use crate::stress::{
     Measured, Options, Outcome,
@@ -18,7 +18,7 @@ use glam::DVec3;
 use miette::{IntoDiagnostic, Result, WrapErr};
 use palpate_physics::{
     Model, ModelSpec,
-    contact::{ToolTarget, is_inside},
+    contact::{ToolTarget, closest_weights, is_inside},
 };
 use std::fmt;
 
@@ -26,14 +26,20 @@ pub(in crate::stress) const CRITERION: &str = "a device leaps 5 to 90 mm into or
      0.1 to 1.5 radii into it: finite, no quarantine, a tool that leaps never inside, force where there is depth, and clear of the body \
      once the device is, unless the body is between them";
 
-/// Ticks before a leap, there, and after the device is back.
+/// Ticks before a leap, there, and after the device is back: at least, and at most of a tool that still moves.
 const BEFORE_TICKS: u32 = 20;
 const THERE_TICKS: u32 = 200;
 const BACK_TICKS: u32 = 400;
+const MOST_BACK_TICKS: u32 = 4000;
+/// Ticks in which a tool moves that has not come to rest, and how far (m).
+const REST_TICKS: u32 = 200;
+const REST_M: f64 = 5e-4;
 /// Distance (m) from its device within which a tool that is clear of the body has come to it.
 const FOLLOWS_M: f64 = 1e-3;
-/// Distance between two looks at whether a body is between a tool and its device, over the tool's radius.
+/// Distance between two looks at whether a body is between a tool and its device, and how much deeper the tool would have to
+/// go into it on the way than it is, both over the tool's radius.
 const LOOK_EVERY_RADII: f64 = 0.2;
+const DEEPER_RADII: f64 = 0.1;
 
 /// What a device does.
 #[derive(Debug, Clone, Copy)]
@@ -146,8 +152,18 @@ fn watch(spec: &ModelSpec, body: &Body, press: &Press, act: Act) -> Result<Found
     }
     let triangles = rig.model.surface().triangles.clone();
     let (mut found, mut surface_m, mut ledger) = (Found::default(), Vec::new(), LedgerSeen::NOTHING);
-    let mut had_none = false;
-    for tick in 0..act.lasts_ticks(press.gap_m, period_s) + BACK_TICKS {
+    let mut letting_go = LettingGo::default();
+    let back_tick = act.lasts_ticks(press.gap_m, period_s);
+    let (mut rested_m, mut tick) = (start.position_m, 0);
+    loop {
+        let is_back = tick >= back_tick + BACK_TICKS;
+        if is_back && tick.is_multiple_of(REST_TICKS) {
+            let rests = tool_centre_m(&rig).distance(rested_m) < REST_M;
+            rested_m = tool_centre_m(&rig);
+            if rests || tick > back_tick + MOST_BACK_TICKS {
+                break;
+            }
+        }
         drive.tools[0] = at(act.way_m(press.gap_m, tick, period_s));
         let report = rig.tick(&drive);
         if let Some(quarantine) = report.quarantined {
@@ -157,10 +173,8 @@ fn watch(spec: &ModelSpec, body: &Body, press: &Press, act: Act) -> Result<Found
         let tool = &rig.state.mechanical.tools[0];
         let force_n = tool.contact_force_n.length();
         found.force_n = found.force_n.max(force_n);
-        // A contact that ends as the tick begins has a depth, but no force in it.
-        let has_none = !is_put && tool.penetration_m > DEEP * press.tool.radius_m && force_n == 0.0;
-        found.lets_go |= has_none && had_none;
-        had_none = has_none;
+        found.lets_go |= letting_go.look(tool, press.tool.radius_m) && !is_put;
+        tick += 1;
         if !tick.is_multiple_of(LOOK_EVERY) {
             continue;
         }
@@ -172,21 +186,49 @@ fn watch(spec: &ModelSpec, body: &Body, press: &Press, act: Act) -> Result<Found
     }
     let is_away = tool_centre_m(&rig).distance(start.position_m) > FOLLOWS_M;
     rig.model.surface_positions_m(&rig.state, &mut surface_m);
-    let is_held_off = !is_put
-        && (!body.is_closed
-            || is_between(tool_centre_m(&rig), start.position_m, press.tool.radius_m, &triangles, &surface_m));
+    let held_off = || Swept { rig: &rig, radius_m: press.tool.radius_m, triangles: &triangles, surface_m: &surface_m };
+    let is_held_off = !is_put && (!body.is_closed || held_off().meets_more(start.position_m));
     found.is_caught = !is_held_off && (is_away || rig.state.mechanical.contact.touches(0));
     found.imbalance = ledger.imbalance();
     Ok(found)
 }
 
-/// Returns whether a closed body is between two points (m): a tool that is drawn straight from one to the other is held off by it.
-fn is_between(from_m: DVec3, to_m: DVec3, radius_m: f64, triangles: &[[u32; 3]], surface_m: &[DVec3]) -> bool {
-    let parts = (from_m.distance(to_m) / (LOOK_EVERY_RADII * radius_m)).ceil().max(1.0) as u32;
-    (1..parts).any(|part| {
-        let at_m = from_m.lerp(to_m, f64::from(part) / f64::from(parts));
-        is_inside(at_m, triangles, surface_m)
-    })
+/// A tool that is drawn straight to a point, as if nothing gave way.
+struct Swept<'a> {
+    rig: &'a Rig,
+    radius_m: f64,
+    triangles: &'a [[u32; 3]],
+    surface_m: &'a [DVec3],
+}
+
+impl Swept<'_> {
+    /// Returns whether a closed body is in its way: whether it would go deeper into it than it is now.
+    fn meets_more(&self, to_m: DVec3) -> bool {
+        let from_m = tool_centre_m(self.rig);
+        let parts = (from_m.distance(to_m) / (LOOK_EVERY_RADII * self.radius_m)).ceil().max(1.0) as u32;
+        let nearest_m = self.clearance_m(DVec3::ZERO) - DEEPER_RADII * self.radius_m;
+        (1..parts).any(|part| self.clearance_m((to_m - from_m) * (f64::from(part) / f64::from(parts))) < nearest_m)
+    }
+
+    /// Returns the distance (m) from the axis of the tool, moved by so much (m), to the surface; negative where a point of it is
+    /// inside.
+    fn clearance_m(&self, by_m: DVec3) -> f64 {
+        let tool = &self.rig.model.tools()[0];
+        let half_m = self.rig.state.mechanical.tools[0].orientation * (DVec3::Z * tool.shape.half_length_m());
+        let of = |at_m: DVec3| {
+            let distance_m = self.triangles.iter().map(|corners| {
+                let corners = corners.map(|node| self.surface_m[node as usize]);
+                let [wa, wb, wc] = closest_weights(at_m, corners);
+                at_m.distance(corners[0] * wa + corners[1] * wb + corners[2] * wc)
+            });
+            let distance_m = distance_m.fold(f64::INFINITY, f64::min);
+            if is_inside(at_m, self.triangles, self.surface_m) { -distance_m } else { distance_m }
+        };
+        [-1.0, 0.0, 1.0]
+            .map(|part| of(tool_centre_m(self.rig) + by_m + half_m * part))
+            .into_iter()
+            .fold(f64::INFINITY, f64::min)
+    }
 }
 
 fn tool_centre_m(rig: &Rig) -> DVec3 {

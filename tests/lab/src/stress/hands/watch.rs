@@ -7,8 +7,12 @@ use crate::stress::{
     Measured, Outcome,
     rig::{Drive, Rig},
 };
+use glam::DVec3;
 use miette::Result;
-use palpate_physics::{Energies, ModelSpec, contact::is_inside};
+use palpate_physics::{
+    Energies, ModelSpec,
+    contact::{ToolState, is_inside},
+};
 
 /// Largest fall of the force, over the force before, in a tick and in 20 ms of a slow press.
 const MOST_IN_A_TICK: f64 = 0.05;
@@ -20,7 +24,7 @@ const LEAST_N: f64 = 0.05;
 /// Energy (J) that counts as moved even where a hand hardly touches: forces in f32 are wrong by as much as a part of it.
 const LEAST_J: f64 = 1e-6;
 /// Depth (m) of the surface in a tool, over its radius, at which it presses.
-pub(super) const DEEP: f64 = 0.02;
+const DEEP: f64 = 0.02;
 /// Number of ticks between two looks at whether a tool is inside.
 pub(super) const LOOK_EVERY: u32 = 5;
 /// Ticks after the hand is back.
@@ -109,6 +113,22 @@ impl LedgerSeen {
     }
 }
 
+/// Whether a tool carries no force where the surface is in it.
+///
+/// One tick is none: where contact ends as a tick begins, the tick has a depth, but no force in it.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct LettingGo {
+    had_none: bool,
+}
+
+impl LettingGo {
+    /// Looks at the next tick. Returns whether a tool of this radius (m) let go in it and in the one before.
+    pub(super) fn look(&mut self, tool: &ToolState, radius_m: f64) -> bool {
+        let has_none = tool.penetration_m > DEEP * radius_m && tool.contact_force_n == DVec3::ZERO;
+        std::mem::replace(&mut self.had_none, has_none) && has_none
+    }
+}
+
 /// Presses a body, and watches.
 pub(super) fn watch(spec: &ModelSpec, body: &Body, press: &Press) -> Result<Found> {
     let mut rig = Rig::new(ModelSpec { tools: vec![press.tool.clone()], ..spec.clone() })?;
@@ -118,7 +138,7 @@ pub(super) fn watch(spec: &ModelSpec, body: &Body, press: &Press) -> Result<Foun
     let is_slow = press.is_inland && press.speed_m_per_s <= body.slow_m_per_s;
     let triangles = rig.model.surface().triangles.clone();
     let (mut found, mut surface_m, mut ledger) = (Found::default(), Vec::new(), LedgerSeen::NOTHING);
-    let (mut forces_n, mut later) = (Vec::new(), 0);
+    let (mut forces_n, mut later, mut letting_go) = (Vec::new(), 0, LettingGo::default());
     while later < LATER_TICKS {
         let tool = &rig.state.mechanical.tools[0];
         drive.tools[0] = hand.go_on(period_s, tool.device_force_n.length());
@@ -133,7 +153,7 @@ pub(super) fn watch(spec: &ModelSpec, body: &Body, press: &Press) -> Result<Foun
         let tool = &rig.state.mechanical.tools[0];
         let force_n = tool.contact_force_n.length();
         found.force_n = found.force_n.max(force_n);
-        if tool.penetration_m > DEEP * press.tool.radius_m && force_n == 0.0 {
+        if letting_go.look(tool, press.tool.radius_m) {
             (found.lets_go, found.depth_m) = (true, found.depth_m.max(tool.penetration_m));
         }
         if hand.presses() && is_slow {
