@@ -2,7 +2,12 @@
 #![allow(clippy::unwrap_used)]
 mod rig;
 use glam::DVec3;
-use palpate_physics::{ModelSpec, contact::Coupling, material::Law, world};
+use palpate_physics::{
+    ModelSpec,
+    contact::{Coupling, is_inside},
+    material::Law,
+    world,
+};
 use rig::{Rig, body, bricks, even, hold, material, nodes_where, sphere};
 
 const RADIUS_M: f64 = 0.005;
@@ -97,6 +102,37 @@ fn a_hard_edge_hit_at_speed_is_not_crossed() {
         println!("edge: deepest {deepest:.3} R");
         assert!(deepest < 0.6, "{deepest}");
         assert!(rig.state.mechanical.tools[0].centre_m.distance(sweep(600)) < 1e-4);
+    }
+}
+
+/// Beside the plate, up along its side, over its edge and down: the samples of the upper face were inside the sphere from
+/// the start, reached from behind, and carried nothing when it came down on them.
+#[test]
+fn a_tool_that_comes_round_an_edge_does_not_sink_in_behind_it() {
+    for beside_m in [-0.034, -0.032, -0.028] {
+        for over_m in [-0.027, -0.024] {
+            let mut spec = plate(0.02, 1000.0, 0.02);
+            let start_m = DVec3::new(-0.038, 0.004, -0.003);
+            spec.tools[0].start_position_m = start_m;
+            let mut rig = Rig::new(spec);
+            let way = [start_m, DVec3::new(beside_m, 0.004, -0.003), DVec3::new(over_m, 0.004, 0.002)];
+            let way = [way[0], way[1], way[2], DVec3::new(over_m, 0.004, -0.012), way[2], way[1], way[0]];
+            let surface = rig.model.surface().triangles.clone();
+            let mut x_m = Vec::new();
+            for tick in 0..1800_u32 {
+                let (leg, along) = ((tick / 300) as usize, f64::from(tick % 300) / 300.0);
+                rig.tick_at(way[leg].lerp(way[leg + 1], along));
+                rig.model.surface_positions_m(&rig.state, &mut x_m);
+                let tool = &rig.state.mechanical.tools[0];
+                assert!(
+                    !is_inside(tool.centre_m, &surface, &x_m),
+                    "{beside_m} {over_m}: tick {tick}: the tool is inside, at {}",
+                    tool.centre_m
+                );
+            }
+            (0..300).for_each(|_| _ = rig.tick_at(start_m));
+            assert!(rig.state.mechanical.tools[0].centre_m.distance(start_m) < 1e-4, "{beside_m} {over_m}");
+        }
     }
 }
 

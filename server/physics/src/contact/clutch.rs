@@ -12,8 +12,9 @@
 //! |s| ← max(|s| − (ρ_back − ρ) g_max, 0)   for ρ < ρ_back
 //! ```
 //! No depth changes by more than the tool moves, and a force by no more than its own part of it, so neither overshoots.
-//! Between `ρ_back` and 1 the slip stays: a body that has just made way for the tool would otherwise be struck again and
-//! again. The tool comes back by no more than R in [`RETURN_S`]: a soft body would make way for one that is quicker, down
+//! Between `ρ_back` and 1 the slip stays where the way back is against the force, `s·f ≥ 0`: a body that has just made way
+//! for the tool would otherwise be struck again and again. Where the force pushes the tool on its way back, waiting would
+//! let a body that presses it from the side hold it for ever. The tool comes back by no more than R in [`RETURN_S`]: a soft body would make way for one that is quicker, down
 //! to its floor. What the device does and the tool does not is lost in the clutch, as in one of steel: it takes energy
 //! only.
 //!
@@ -74,8 +75,14 @@ fn slipped(model: &ToolModel, slip_m: DVec3, contact: &ToolContact, dt_s: f64) -
         let beyond_m = f64::max(contact.deepest_m - deepest_m, 0.5 * (loaded - 1.0) * deepest_m);
         slip_m + contact.force_n.normalize_or_zero() * beyond_m.min(deepest_m)
     } else {
-        let most_m = f64::min(radius_m * dt_s / RETURN_S, (BACK - loaded) * deepest_m);
-        slip_m - slip_m.clamp_length_max(most_m.max(0.0))
+        let quickest_m = radius_m * dt_s / RETURN_S;
+        if loaded < BACK {
+            return slip_m - slip_m.clamp_length_max(quickest_m.min((BACK - loaded) * deepest_m));
+        }
+        // What pushes the tool on its way is let go by it.
+        let is_pushed_back = contact.force_n.dot(slip_m) < 0.0;
+        let most_m = if is_pushed_back { quickest_m * (1.0 - loaded) / (1.0 - BACK) } else { 0.0 };
+        slip_m - slip_m.clamp_length_max(most_m)
     }
 }
 

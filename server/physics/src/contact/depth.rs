@@ -10,8 +10,8 @@
 
 /// `s₀`, the depth over the radius up to which the foundation is linear: the coupling of a tool saturates at less.
 const LINEAR: f64 = 0.4;
-/// `c`.
-const GROWTH: f64 = 10.0;
+/// `c`. At 10 a coarse triangle at an edge, whose foundation is softer, let small spheres through.
+const GROWTH: f64 = 25.0;
 
 /// The foundation's answer to a depth, per `k_f a` of a sample.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -52,5 +52,19 @@ mod tests {
             assert!((slope - here.stiffness).abs() < 1e-4, "{depth_m}");
             assert!(depth_m > LINEAR * radius_m || here.force_m == depth_m);
         }
+    }
+
+    /// `F/(k_f R³) = 2π (1 − s) ∫₀ˢ F(σ R)/R dσ`, of a sphere whose deepest point is `s R` in a plane.
+    #[test]
+    fn a_flat_foundation_resists_more_and_more_until_the_centre_is_near_to_it() {
+        let force = |s: f64| {
+            let parts = 2000;
+            let mean = (0..parts).map(|i| DepthResponse::of(s * (f64::from(i) + 0.5) / f64::from(parts), 1.0).force_m);
+            2.0 * std::f64::consts::PI * (1.0 - s) * s * mean.sum::<f64>() / f64::from(parts)
+        };
+        let forces: Vec<f64> = (1..=16).map(|i| force(0.05 * f64::from(i))).collect();
+        assert!(forces.windows(2).all(|pair| pair[1] > pair[0]), "{forces:?}");
+        // Couplings saturate at 0.3 R; at an edge a quarter of the surface may bear, with half the stiffness.
+        assert!(forces[15] > 8.0 * forces[5], "{forces:?}");
     }
 }

@@ -13,12 +13,25 @@ pub(super) struct Touch {
     pub(super) sample: u32,
     /// Whether the tool reached it from behind the surface: then it carries nothing until it leaves.
     pub(super) from_behind: bool,
+    /// Whether the tool reached it from behind and then came round an edge to its outer side.
+    pub(super) came_round: bool,
     /// Depth (m) up to which it carries nothing: that at which the tool was put there, or the least since. For a sample
     /// that was met before a tool that was put there had left the surface, it is the depth at which it was met. It is
-    /// recorded for samples met from behind, too, since it tells that the tool was put there.
+    /// recorded for samples met from behind, too, since it tells that the tool was put there. For a sample that came
+    /// round, it is the depth at which it did, or the least since.
     pub(super) free_depth_m: f64,
     /// Position relative to the tool's centre (m) where its friction spring is at rest.
     pub(super) spring_origin_m: DVec3,
+}
+
+impl Touch {
+    /// Returns the record of the same sample, reached from behind, as the tool comes to its outer side: with this depth (m),
+    /// and at this position relative to the tool's centre (m).
+    pub(super) fn come_round(self, depth_m: f64, from_centre_m: DVec3) -> Self {
+        // One that tells that the tool was put there goes on telling it.
+        let came_round = self.free_depth_m == 0.0;
+        Self { from_behind: false, came_round, free_depth_m: depth_m, spring_origin_m: from_centre_m, ..self }
+    }
 }
 
 /// Records of samples, in ascending order of these. Its clones keep the capacity.
@@ -31,7 +44,8 @@ pub(super) struct Touching {
 
 impl Touching {
     pub(super) fn with_capacity(samples: usize) -> Self {
-        let empty = Touch { sample: 0, from_behind: false, free_depth_m: 0.0, spring_origin_m: DVec3::ZERO };
+        let empty =
+            Touch { sample: 0, from_behind: false, came_round: false, free_depth_m: 0.0, spring_origin_m: DVec3::ZERO };
         Self { buffer: vec![empty; samples.min(MOST)].into_boxed_slice(), count: 0 }
     }
 
@@ -41,7 +55,7 @@ impl Touching {
 
     /// Returns whether the tool was put where it is, and has not left the surface yet.
     pub(super) fn tells_it_was_put(&self) -> bool {
-        self.records().iter().any(|touch| touch.free_depth_m > 0.0)
+        self.records().iter().any(|touch| touch.free_depth_m > 0.0 && !touch.came_round)
     }
 
     pub(super) fn clear(&mut self) {

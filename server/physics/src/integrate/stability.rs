@@ -29,6 +29,10 @@
 //! A tick of two or more substeps is judged by its last three instants; one of a single step by its own two and the one
 //! before ([`Pace::before`]). Compare Park & Underwood 1980 and Bergan & Mollestad 1985, who choose steps by the
 //! quotient `Δxᵀ Δg/Δxᵀ M Δx`, which has neither filter.
+//!
+//! What a blow drives on may turn a cell inside out within a substep that is stable by (1). So points of bodies with
+//! particles may not move farther in one than [`Judged::longest_stride_m`], against the mean of all points: a motion of
+//! the whole body does not count.
 use super::pace::{InstantForces, Pace, most_substeps};
 use crate::{
     settings::Integrator,
@@ -162,10 +166,13 @@ impl ForceHistory {
         let found = (!is_spoilt).then(|| quotient(&evidence));
         let least = environment.steps.with_stiffer_contact(stiffened).min(most_substeps(environment));
         let is_hit = environment.steps.needed_by_contact(stiffened) > HIT * f64::from(substeps);
+        let strides = strides(environment, body.longest_stride_m(), state, substeps);
         let more = if unstable {
             substeps_for(environment, body.is_viscous(), substeps, found)
         } else {
-            Some(least).filter(|least| is_hit && *least > substeps)
+            let of_hit = if is_hit { least } else { 0 };
+            let of_strides = if strides > 1.0 { times_as_many(environment, substeps, strides) } else { 0 };
+            Some(of_hit.max(of_strides)).filter(|more| *more > substeps)
         };
         if let Some(more) = more.filter(|_| repeated < MOST_REPETITIONS) {
             pace.start_again(more);
@@ -175,7 +182,8 @@ impl ForceHistory {
             return Verdict::Repeat;
         }
         if !unstable {
-            let part = quotient(&evidence) / (SAFETY * LIMIT);
+            // Of what falls with dt², as the pace takes it.
+            let part = (quotient(&evidence) / (SAFETY * LIMIT)).max((strides / SAFETY).powi(2));
             pace.settle(least, environment.steps.substeps_per_long_step, part);
         }
         self.hand_on(pace, substeps);
@@ -267,10 +275,27 @@ fn substeps_for(environment: &Environment, is_viscous: bool, substeps: u32, quot
     let wanted = match quotient.filter(|q| q.is_finite()) {
         None => substeps.saturating_mul(TIMES_IF_NOT_FINITE),
         Some(quotient) => {
-            let times = if is_viscous { 0.25 * quotient } else { (0.25 * quotient).sqrt() };
-            (f64::from(substeps) * times / SAFETY).ceil().min(f64::from(most)) as u32
+            times_as_many(environment, substeps, if is_viscous { 0.25 * quotient } else { (0.25 * quotient).sqrt() })
         }
     };
     let every = environment.steps.substeps_per_long_step;
     (substeps < most).then(|| wanted.clamp(substeps + 1, most).next_multiple_of(every))
+}
+
+/// Returns so many times as many substeps, and some more to be safe, up to the largest number that is tried.
+fn times_as_many(environment: &Environment, substeps: u32, times: f64) -> u32 {
+    let most = most_substeps(environment);
+    let wanted = (f64::from(substeps) * times / SAFETY).ceil().min(f64::from(most)) as u32;
+    wanted.next_multiple_of(environment.steps.substeps_per_long_step)
+}
+
+/// Returns the longest way of a point in one of so many substeps against the mean of all, over the longest it may be:
+/// `max |v − v̄| dt/s`.
+fn strides(environment: &Environment, longest_m: f64, state: &MechanicalState, substeps: u32) -> f64 {
+    if longest_m == f64::INFINITY {
+        return 0.0;
+    }
+    let mean = state.v.iter().sum::<DVec3>() / state.v.len().max(1) as f64;
+    let fastest_sq = state.v.iter().map(|v| v.distance_squared(mean)).fold(0.0, f64::max);
+    fastest_sq.sqrt() * environment.settings.tick_period_s / (f64::from(substeps) * longest_m)
 }

@@ -4,6 +4,10 @@ use super::{HybridScratch, SteppedHybrid};
 use crate::tick::{Environment, Judged, MechanicalState, StepEvidence, StepForcesNow};
 use glam::DVec3;
 
+/// Longest way in one step, over the spacing of particles. Where a rigid sphere leapt 6 mm deep into a ventricle and particles
+/// moved by 0.6 spacings in a step, a cell turned inside out and 7 % of the energy went; with this limit, 0.3 %.
+const STRIDE: f64 = 0.25;
+
 impl Judged for SteppedHybrid<'_> {
     fn evidence(
         &mut self,
@@ -61,6 +65,10 @@ impl Judged for SteppedHybrid<'_> {
 
     fn is_viscous(&self) -> bool {
         self.body.materials().materials.iter().any(|material| !material.viscosity.is_zero())
+    }
+
+    fn longest_stride_m(&self) -> f64 {
+        STRIDE * self.body.partition().sites().spacing_m()
     }
 
     fn keep(&mut self, state: &MechanicalState) {

@@ -64,6 +64,10 @@ impl Judged for SteppedTet<'_> {
         self.body.kernel().is_viscous()
     }
 
+    fn longest_stride_m(&self) -> f64 {
+        f64::INFINITY
+    }
+
     fn keep(&mut self, _: &MechanicalState) {}
 
     fn put_back(&mut self) {}

@@ -6,6 +6,10 @@
 //! the normal nor the order of events can make the energy jump. A tool that is *put* into the surface (not moved there)
 //! presses nothing at first: its samples carry `k_f a (g − g₀)` from the depth `g₀` at which it was put, or the least
 //! depth since. A sample that carries nothing and comes behind the tool is ignored, too.
+//!
+//! Around an edge, the samples of the far side are reached from behind. Where a tool then comes round the edge without
+//! leaving them, to their outer side, they are in its way: from there on such a sample carries `k_f a (g − g₀)` with the
+//! depth `g₀` at which it came before the tool, or the least since. Otherwise the tool would sink in through them.
 use super::{
     axis::Axis,
     broad::{Candidates, Triangles},
@@ -62,7 +66,8 @@ pub(super) struct Pressed {
     pub(super) heat_j: f64,
     /// Number of samples that carry force.
     pub(super) contacts: u32,
-    /// Depth (m) of the deepest sample, whether it carries all of it or not.
+    /// Depth (m) of the deepest sample, whether it carries all of it or not; what carries nothing since the tool came round
+    /// an edge to it is no depth.
     pub(super) penetration_m: f64,
     /// Largest depth (m) that any sample carries.
     pub(super) deepest_m: f64,
@@ -207,21 +212,29 @@ fn press_triangle(
             continue;
         }
         let number = samples.first + index as u32;
-        let known = take(before, number);
-        let from_behind = known.map_or(outward.dot(r) >= 0.0, |touch| touch.from_behind);
+        let is_behind = outward.dot(r) >= 0.0;
         let distance_m = distance_sq.sqrt();
         let depth_m = meeting.radius_m - distance_m;
+        let known = take(before, number).map(|touch| {
+            if touch.from_behind && !is_behind { touch.come_round(depth_m, meeting.in_tool(p)) } else { touch }
+        });
+        let from_behind = known.map_or(is_behind, |touch| touch.from_behind);
         let free_depth_m = if meeting.put_into { depth_m } else { 0.0 };
         // One that carries nothing and passes the axis is behind from then on: on its way back to the outside the tool would
         // be held by it.
-        let from_behind =
-            from_behind || known.is_some_and(|touch| depth_m <= touch.free_depth_m) && outward.dot(r) >= 0.0;
+        let from_behind = from_behind || known.is_some_and(|touch| depth_m <= touch.free_depth_m) && is_behind;
+        let new = || Touch {
+            sample: number,
+            from_behind,
+            came_round: false,
+            free_depth_m,
+            spring_origin_m: meeting.in_tool(p),
+        };
         if from_behind {
             // The sample carries nothing, but its depth tells the next tick that the tool was put there.
-            next.push(Touch { sample: number, from_behind, free_depth_m, spring_origin_m: meeting.in_tool(p) });
+            next.push(new());
             continue;
         }
-        let new = || Touch { sample: number, from_behind, free_depth_m, spring_origin_m: meeting.in_tool(p) };
         let mut touch = known.unwrap_or_else(new);
         touch.free_depth_m = touch.free_depth_m.min(depth_m);
         // A sample exactly on the axis has no direction: it carries nothing for this instant.
@@ -287,7 +300,8 @@ fn press_sample(
     }
     pressed.contacts += u32::from(depth_m > 0.0);
     pressed.deepest_m = pressed.deepest_m.max(depth_m);
-    pressed.penetration_m = pressed.penetration_m.max(meeting.radius_m - distance_m);
+    let seen_m = if touch.came_round { depth_m } else { meeting.radius_m - distance_m };
+    pressed.penetration_m = pressed.penetration_m.max(seen_m);
 
     let trial_m = (p - meeting.in_world(touch.spring_origin_m)).reject_from_normalized(normal);
     let spring = FrictionSpring::stretched(trial_m, samples.stiffness_n_per_m, f_n, meeting.friction_coefficient);

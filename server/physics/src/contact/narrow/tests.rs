@@ -281,3 +281,37 @@ fn a_tool_put_into_the_surface_is_not_caught_when_its_centre_passes_it() {
         assert!(pressed.force_n.z > 0.0, "and meets the surface as any other tool");
     }
 }
+
+/// A sphere beside a face has samples of the next face inside it, reached from behind. It went up, over the edge and down
+/// again without leaving them, and sank into the body through the face as if there were none.
+#[test]
+fn a_tool_that_comes_round_an_edge_is_held_off_by_what_it_came_round_to() {
+    let mut bench = Bench::new(0.0);
+    let at = |x: f64, z: f64| DVec3::new(x * RADIUS_M, 1.2 * RADIUS_M, z * RADIUS_M);
+    let corners = [at(-0.7, -0.4), at(-0.3, 0.25), at(0.8, 0.25), at(0.8, 0.05), at(0.8, 1.2)];
+    let (mut before, _) = bench.press(corners[0]);
+    let (mut pressed_up, mut given_j, start_j) = (0.0_f64, 0.0, before.energy_j);
+    let mut most_j = start_j;
+    for leg in corners.windows(2) {
+        for step in 1..=400 {
+            let (from, to) =
+                (leg[0].lerp(leg[1], f64::from(step - 1) / 400.0), leg[0].lerp(leg[1], f64::from(step) / 400.0));
+            let (pressed, _) = bench.press(to);
+            // No energy comes from nowhere or goes there, where samples come round or elsewhere.
+            given_j -= 0.5 * (before.force_n + pressed.force_n).dot(to - from);
+            most_j = most_j.max(pressed.energy_j);
+            assert!((pressed.energy_j - start_j - given_j).abs() < 2e-3 * most_j, "{to}");
+            if to == corners[3] {
+                pressed_up = pressed.force_n.z;
+            }
+            before = pressed;
+        }
+    }
+    // The same sphere that comes from above is the measure.
+    let mut straight = Bench::new(0.0);
+    (0..=100).for_each(|step| _ = straight.press(at(0.8, 1.05 - 0.01 * f64::from(step))));
+    let (of_straight, _) = straight.press(corners[3]);
+    println!("{pressed_up:.3} N of {:.3}", of_straight.force_n.z);
+    assert!(pressed_up > 0.3 * of_straight.force_n.z, "{pressed_up} {}", of_straight.force_n);
+    assert!(bench.touching.records().is_empty() && before.force_n == DVec3::ZERO, "it leaves as any other");
+}
