@@ -30,9 +30,8 @@
 //! before ([`Pace::before`]). Compare Park & Underwood 1980 and Bergan & Mollestad 1985, who choose steps by the
 //! quotient `Δxᵀ Δg/Δxᵀ M Δx`, which has neither filter.
 //!
-//! What a blow drives on may turn a cell inside out within a substep that is stable by (1). So points of bodies with
-//! particles may not move farther in one than [`Judged::longest_stride_m`], against the mean of all points: a motion of
-//! the whole body does not count.
+//! What a blow drives on may turn a cell inside out within a substep that is stable by (1). So particles may not move far
+//! in one either ([`Judged::strides`]).
 use super::pace::{InstantForces, Pace, most_substeps};
 use crate::{
     settings::Integrator,
@@ -166,7 +165,7 @@ impl ForceHistory {
         let found = (!is_spoilt).then(|| quotient(&evidence));
         let least = environment.steps.with_stiffer_contact(stiffened).min(most_substeps(environment));
         let is_hit = environment.steps.needed_by_contact(stiffened) > HIT * f64::from(substeps);
-        let strides = strides(environment, body.longest_stride_m(), state, substeps);
+        let strides = body.strides(state, environment.settings.tick_period_s / f64::from(substeps));
         let more = if unstable {
             substeps_for(environment, body.is_viscous(), substeps, found)
         } else {
@@ -287,15 +286,4 @@ fn times_as_many(environment: &Environment, substeps: u32, times: f64) -> u32 {
     let most = most_substeps(environment);
     let wanted = (f64::from(substeps) * times / SAFETY).ceil().min(f64::from(most)) as u32;
     wanted.next_multiple_of(environment.steps.substeps_per_long_step)
-}
-
-/// Returns the longest way of a point in one of so many substeps against the mean of all, over the longest it may be:
-/// `max |v − v̄| dt/s`.
-fn strides(environment: &Environment, longest_m: f64, state: &MechanicalState, substeps: u32) -> f64 {
-    if longest_m == f64::INFINITY {
-        return 0.0;
-    }
-    let mean = state.v.iter().sum::<DVec3>() / state.v.len().max(1) as f64;
-    let fastest_sq = state.v.iter().map(|v| v.distance_squared(mean)).fold(0.0, f64::max);
-    fastest_sq.sqrt() * environment.settings.tick_period_s / (f64::from(substeps) * longest_m)
 }

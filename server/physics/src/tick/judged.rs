@@ -68,8 +68,8 @@ pub(crate) trait Judged {
     /// Returns whether viscous stress acts, whose part of `Q` falls with the step and not with its square.
     fn is_viscous(&self) -> bool;
 
-    /// Returns how far (m) a point may move in one step against the mean of all; infinite where nothing limits it.
-    fn longest_stride_m(&self) -> f64;
+    /// Returns how far the fastest point goes in a step of `dt_s`, over how far it may; 0 where nothing limits it.
+    fn strides(&self, state: &MechanicalState, dt_s: f64) -> f64;
 
     /// Keeps what a tick that may be repeated changes beside positions and velocities.
     fn keep(&mut self, state: &MechanicalState);
