@@ -153,22 +153,3 @@ fn what_has_slipped_is_saved() {
     }
     assert_eq!(rig.state, other.state);
 }
-
-/// A device leaps through the side of the block close beneath its upper edge and back. The corner that the tool crushed presses it
-/// from below, across its way out: as that was more than lets a tool come back, it stayed there for ever.
-#[test]
-fn a_tool_that_the_body_presses_from_the_side_comes_back() {
-    for height_m in [0.0, -1e-3, -2e-3, -3e-3, -5e-3] {
-        let mut spec = block();
-        let start_m = DVec3::new(1e-3, 0.02 + 1.5 * RADIUS_M, height_m);
-        spec.tools[0].start_position_m = start_m;
-        spec.tools[0].friction_coefficient = 0.3;
-        let mut rig = Rig::new(spec);
-        let across_m = start_m - DVec3::Y * 0.05;
-        go(&mut rig, across_m, 1, |_| ());
-        go(&mut rig, across_m, 200, |_| ());
-        go(&mut rig, start_m, 1, |_| ());
-        go(&mut rig, start_m, 600, |_| ());
-        assert_eq!((tool(&rig).slip_m, tool(&rig).centre_m), (DVec3::ZERO, start_m), "at {height_m} m");
-    }
-}

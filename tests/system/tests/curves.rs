@@ -67,7 +67,7 @@ impl Curve {
         Self { force_n: shifted(&self.force_n, by), place_m: shifted(&self.place_m, by) }
     }
 
-    /// The median force at each place of curves that lie over one another: where the machine was late in one of them, the others
+    /// The median force at each place of an odd number of curves that lie over one another: where the machine was late in one of them, the others
     /// have the force.
     fn median(curves: &[Self]) -> Self {
         let at = |i: usize| {
@@ -116,7 +116,10 @@ fn judge(name: &str, expected: &Curve, most: f64, press: impl Fn() -> Curve) {
     for _ in 0..TRIES {
         pressed.push(press().laid_over(expected));
         let last = &pressed[pressed.len() - 1];
-        for (what, curve) in [("this press", last), ("all presses", &Curve::median(&pressed))] {
+        // Of an even number of presses there is no middle one.
+        let median = (pressed.len() % 2 == 1).then(|| Curve::median(&pressed));
+        for (what, curve) in std::iter::once(("this press", last)).chain(median.iter().map(|all| ("all presses", all)))
+        {
             let (rms_n, farthest_n) = curve.apart_n(expected);
             println!(
                 "{name}, {what}: peak {:.3} N of {expected_n:.3}; apart by {rms_n:.4} N (root mean square), by less than {farthest_n:.3} N in 98 of 100 ticks",

@@ -10,13 +10,14 @@
 //! ```text
 //! s ← s + (ρ − 1) g_max f/|f|              for ρ > 1
 //! |s| ← max(|s| − (ρ_back − ρ) g_max, 0)   for ρ < ρ_back
+//! |s| ← max(|s| − b (1 − ρ)/(1 − ρ_back), 0)   for ρ_back ≤ ρ ≤ 1, where s·f < 0
 //! ```
 //! No depth changes by more than the tool moves, and a force by no more than its own part of it, so neither overshoots.
 //! Between `ρ_back` and 1 the slip stays where the way back is against the force, `s·f ≥ 0`: a body that has just made way
 //! for the tool would otherwise be struck again and again. Where the force pushes the tool on its way back, waiting would
-//! let a body that presses it from the side hold it for ever. The tool comes back by no more than R in [`RETURN_S`]: a soft body would make way for one that is quicker, down
-//! to its floor. What the device does and the tool does not is lost in the clutch, as in one of steel: it takes energy
-//! only.
+//! let a body that presses it from the side hold it for ever. The tool comes back by no more than `b`, for which it needs
+//! [`RETURN_S`] per radius: a soft body would make way for one that is quicker, down to its floor. What the device does
+//! and the tool does not is lost in the clutch, as in one of steel: it takes energy only.
 //!
 //! Nor does the tool move faster than [`LEAP_M_PER_S`], or by more than [`NEAR`]·R in a substep, so that a device that
 //! leaps takes it through nothing unseen.
@@ -55,7 +56,13 @@ pub(super) fn follow(
         return;
     }
     let (before_m, most_m) = (tool.centre_m, f64::min(NEAR * model.spec.radius_m, LEAP_M_PER_S * dt_s));
-    tool.slip_m = slipped(model, tool.slip_m, contact, dt_s);
+    let borne = Borne {
+        radius_m: model.spec.radius_m,
+        deepest_m: contact.deepest_m,
+        force_n: contact.force_n,
+        slips_at_n: model.slips_at_n,
+    };
+    tool.slip_m = borne.slipped(tool.slip_m, dt_s);
     let step_m = device_m + tool.slip_m - before_m;
     // Within rounding: a device that goes just so fast is followed.
     if step_m.length() > most_m * (1.0 + 1e-9) {
@@ -66,23 +73,36 @@ pub(super) fn follow(
     tool.velocity_m_per_s = if slips { (tool.centre_m - before_m) / dt_s } else { device_m_per_s };
 }
 
-fn slipped(model: &ToolModel, slip_m: DVec3, contact: &ToolContact, dt_s: f64) -> DVec3 {
-    let radius_m = model.spec.radius_m;
-    let (deepest_m, force_n) = (SLIP_DEPTH * radius_m, model.slips_at_n);
-    let loaded = f64::max(contact.deepest_m / deepest_m, contact.force_n.length() / force_n);
-    if loaded > 1.0 {
-        // A sample loses what is above its limit at once; a mean one is half as deep as the deepest.
-        let beyond_m = f64::max(contact.deepest_m - deepest_m, 0.5 * (loaded - 1.0) * deepest_m);
-        slip_m + contact.force_n.normalize_or_zero() * beyond_m.min(deepest_m)
-    } else {
-        let quickest_m = radius_m * dt_s / RETURN_S;
-        if loaded < BACK {
-            return slip_m - slip_m.clamp_length_max(quickest_m.min((BACK - loaded) * deepest_m));
-        }
-        // What pushes the tool on its way is let go by it.
-        let is_pushed_back = contact.force_n.dot(slip_m) < 0.0;
-        let most_m = if is_pushed_back { quickest_m * (1.0 - loaded) / (1.0 - BACK) } else { 0.0 };
-        slip_m - slip_m.clamp_length_max(most_m)
+/// What a rigid tool bears.
+#[derive(Debug, Clone, Copy)]
+struct Borne {
+    radius_m: f64,
+    /// `g` (m).
+    deepest_m: f64,
+    /// `f` (N).
+    force_n: DVec3,
+    /// `f_max` (N).
+    slips_at_n: f64,
+}
+
+impl Borne {
+    /// Returns the slip (m) after a substep that began with this one.
+    fn slipped(&self, slip_m: DVec3, dt_s: f64) -> DVec3 {
+        let most_deep_m = SLIP_DEPTH * self.radius_m;
+        let loaded = f64::max(self.deepest_m / most_deep_m, self.force_n.length() / self.slips_at_n);
+        let quickest_m = self.radius_m * dt_s / RETURN_S;
+        let back_m = if loaded > 1.0 {
+            // A sample loses what is above its limit at once; a mean one is half as deep as the deepest.
+            let beyond_m = f64::max(self.deepest_m - most_deep_m, 0.5 * (loaded - 1.0) * most_deep_m);
+            return slip_m + self.force_n.normalize_or_zero() * beyond_m.min(most_deep_m);
+        } else if loaded < BACK {
+            quickest_m.min((BACK - loaded) * most_deep_m)
+        } else if self.force_n.dot(slip_m) < 0.0 {
+            quickest_m * (1.0 - loaded) / (1.0 - BACK)
+        } else {
+            0.0
+        };
+        slip_m - slip_m.clamp_length_max(back_m)
     }
 }
 
@@ -98,4 +118,41 @@ pub(super) fn slips_at_n(spec: &ToolSpec, foundation: &Foundation) -> f64 {
     let into_body_n = 4.0 / 3.0 * foundation.mean_indentation_modulus_pa() * radius_m * radius_m;
     let of_cylinder = 8.0 / (3.0 * PI) * (2.0 / SATURATION_DEPTH).sqrt() * half_m / radius_m;
     SLIP_FORCE * flat_n.max(into_body_n) * (1.0 + of_cylinder)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const DT_S: f64 = 1e-4;
+    const SLIP_M: DVec3 = DVec3::new(0.0, -0.02, 0.0);
+
+    /// How far a tool of 10 mm comes back along +y in a substep, that slips at 1 N and bears a force.
+    fn back_m(force_n: DVec3) -> f64 {
+        let borne = Borne { radius_m: 0.01, deepest_m: 1e-3, force_n, slips_at_n: 1.0 };
+        (borne.slipped(SLIP_M, DT_S) - SLIP_M).y
+    }
+
+    /// A tool that bore nine tenths of its limit across its way out stayed where it was for ever.
+    #[test]
+    fn a_tool_that_is_pressed_from_the_side_comes_back_where_the_force_lets_it() {
+        let (on_its_way, against) = (DVec3::new(0.0, 0.05, 0.9), DVec3::new(0.0, -0.05, 0.9));
+        let expected_m = 1e-4 * (1.0 - on_its_way.length()) / 0.25;
+        assert!((back_m(on_its_way) - expected_m).abs() < 1e-12 && expected_m > 3e-5, "{}", back_m(on_its_way));
+        assert_eq!(back_m(against), 0.0);
+        assert!((back_m(DVec3::Z * 0.5) - 1e-4).abs() < 1e-12, "{}", back_m(DVec3::Z * 0.5));
+        // It comes as quickly as it may at the lower end of the range, and not at all at the upper one.
+        let at = |load: f64| back_m(DVec3::new(0.0, 0.1, 0.99499).normalize() * load);
+        assert!(at(0.750_001) > 0.99e-4, "{}", at(0.750_001));
+        assert!(at(0.999_999).abs() < 1e-9, "{}", at(0.999_999));
+    }
+
+    #[test]
+    fn a_tool_beyond_its_limit_gives_way_along_the_force() {
+        let force_n = DVec3::new(0.0, -0.6, 0.8) * 1.5;
+        let borne = Borne { radius_m: 0.01, deepest_m: 1e-3, force_n, slips_at_n: 1.0 };
+        let moved_m = borne.slipped(SLIP_M, DT_S) - SLIP_M;
+        // ½ (ρ − 1) g_max, as the deepest sample is within its limit
+        assert!(moved_m.distance(force_n.normalize() * (0.5 * 0.5 * 0.004)) < 1e-12, "{moved_m}");
+    }
 }

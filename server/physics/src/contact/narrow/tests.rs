@@ -288,7 +288,7 @@ fn a_tool_put_into_the_surface_is_not_caught_when_its_centre_passes_it() {
 fn a_tool_that_comes_round_an_edge_is_held_off_by_what_it_came_round_to() {
     let mut bench = Bench::new(0.0);
     let at = |x: f64, z: f64| DVec3::new(x * RADIUS_M, 1.2 * RADIUS_M, z * RADIUS_M);
-    let corners = [at(-0.7, -0.4), at(-0.3, 0.25), at(0.8, 0.25), at(0.8, 0.05), at(0.8, 1.2)];
+    let corners = [at(-0.7, -0.4), at(-0.3, 0.25), at(0.4, 0.25), at(0.4, 0.05), at(0.4, 1.2)];
     let (mut before, _) = bench.press(corners[0]);
     let (mut pressed_up, mut given_j, start_j) = (0.0_f64, 0.0, before.energy_j);
     let mut most_j = start_j;
@@ -307,11 +307,12 @@ fn a_tool_that_comes_round_an_edge_is_held_off_by_what_it_came_round_to() {
             before = pressed;
         }
     }
-    // The same sphere that comes from above is the measure.
+    // The same sphere that comes from above is the measure. What it came round to makes half of the force: what it meets from the
+    // front beside that, 0.37 of the measure.
     let mut straight = Bench::new(0.0);
-    (0..=100).for_each(|step| _ = straight.press(at(0.8, 1.05 - 0.01 * f64::from(step))));
+    (0..=100).for_each(|step| _ = straight.press(at(0.4, 1.05 - 0.01 * f64::from(step))));
     let (of_straight, _) = straight.press(corners[3]);
     println!("{pressed_up:.3} N of {:.3}", of_straight.force_n.z);
-    assert!(pressed_up > 0.3 * of_straight.force_n.z, "{pressed_up} {}", of_straight.force_n);
+    assert!(pressed_up > 0.6 * of_straight.force_n.z, "{pressed_up} {}", of_straight.force_n);
     assert!(bench.touching.records().is_empty() && before.force_n == DVec3::ZERO, "it leaves as any other");
 }

@@ -24,7 +24,7 @@ use std::fmt;
 
 pub(in crate::stress) const CRITERION: &str = "a device leaps 5 to 90 mm into or across a shipped body, or its tool is put \
      0.1 to 1.5 radii into it: finite, no quarantine, a tool that leaps never inside, force where there is depth, and clear of the body \
-     once the device is, unless the body is between them";
+     once the device is, unless it would have to go deeper on its way there";
 
 /// Ticks before a leap, there, and after the device is back: at least, and at most of a tool that still moves.
 const BEFORE_TICKS: u32 = 20;
