@@ -156,7 +156,7 @@ fn binary_stl_that_begins_with_solid_and_has_a_trail() {
         let whole = binary_stl(header, 2);
         assert_eq!(surface("a.stl", &whole), surface("a.stl", STL));
         let trailed = surface("a.stl", [&whole[..], b"\n"].concat());
-        assert_eq!(trailed.warnings, ["1 bytes behind the last triangle are not read"]);
+        assert_eq!(trailed.warnings, ["a byte behind the last triangle is not read"]);
         assert_eq!(quiet_surface(trailed), surface("a.stl", STL));
     }
     // Cut, it is refused as what it is.

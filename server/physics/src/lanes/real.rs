@@ -15,6 +15,8 @@ pub(crate) trait Real:
     fn sqrt(self) -> Self;
     /// The larger one, for numbers that are not NaN.
     fn max(self, other: Self) -> Self;
+    /// Whether any lane is above zero; a lane that is NaN is not.
+    fn any_positive(self) -> bool;
 }
 
 /// f32 or f64: what is stored.
@@ -61,6 +63,10 @@ macro_rules! scalar {
             #[inline(always)]
             fn max(self, other: Self) -> Self {
                 if self > other { self } else { other }
+            }
+            #[inline(always)]
+            fn any_positive(self) -> bool {
+                self > 0.0
             }
         }
 
@@ -136,4 +142,46 @@ mod elsewhere {
     }
     plain!(f32);
     plain!(f64);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::lanes::dispatch::{self, Available, InstructionSet, Pass};
+
+    /// Whether any lane of a vector is positive, and how many lanes it has.
+    struct AnyPositive<'a, S>(&'a [S]);
+
+    impl<S: Scalar> Pass for AnyPositive<'_, S> {
+        type Scalar = S;
+        type Found = (bool, usize);
+        #[inline(always)]
+        fn run<V: Vector<Scalar = S>>(self) -> (bool, usize) {
+            (V::load(self.0).any_positive(), V::WIDTH)
+        }
+    }
+
+    fn one_positive_lane_is_found<S: Scalar>() {
+        for set in InstructionSet::available() {
+            let set = Available::at_most(set);
+            let mut lanes = [-1.0, 0.0, -0.0, f64::NAN, f64::NEG_INFINITY, -1e-30, 0.0, -7.0].repeat(2);
+            let found = |lanes: &[f64]| {
+                let lanes: Vec<S> = lanes.iter().map(|lane| S::of(*lane)).collect();
+                dispatch::run(set, AnyPositive(&lanes))
+            };
+            assert!(!found(&lanes).0, "{set:?}");
+            for lane in 0..lanes.len() {
+                let before = std::mem::replace(&mut lanes[lane], 1e-30);
+                let (any, width) = found(&lanes);
+                assert_eq!(any, lane < width, "{set:?}, lane {lane}");
+                lanes[lane] = before;
+            }
+        }
+    }
+
+    #[test]
+    fn one_positive_lane_of_any_vector_is_found() {
+        one_positive_lane_is_found::<f32>();
+        one_positive_lane_is_found::<f64>();
+    }
 }

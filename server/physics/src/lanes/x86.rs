@@ -12,7 +12,7 @@ use std::ops::{Add, Div, Mul, Neg, Sub};
 macro_rules! vector {
     ($name:ident, $narrow:ident, $register:ident, $scalar:ident, $width:expr,
      $add:ident, $sub:ident, $mul:ident, $div:ident, $sqrt:ident, $max:ident, $splat:ident, $load:ident, $store:ident,
-     $edges:path) => {
+     $any_positive:ident, $edges:path) => {
         #[derive(Clone, Copy)]
         pub(crate) struct $name($register);
 
@@ -45,6 +45,10 @@ macro_rules! vector {
             fn max(self, other: Self) -> Self {
                 // SAFETY: see the module: the machine has the instruction.
                 Self(unsafe { $max(self.0, other.0) })
+            }
+            #[inline(always)]
+            fn any_positive(self) -> bool {
+                $any_positive(self)
             }
         }
 
@@ -97,6 +101,7 @@ vector!(
     _mm_set1_ps,
     _mm_loadu_ps,
     _mm_storeu_ps,
+    any_positive_f32x4,
     edges_f32_sse
 );
 vector!(
@@ -114,6 +119,7 @@ vector!(
     _mm_set1_pd,
     _mm_loadu_pd,
     _mm_storeu_pd,
+    any_positive_f64x2,
     real::edges_to_lanes
 );
 vector!(
@@ -131,6 +137,7 @@ vector!(
     _mm256_set1_ps,
     _mm256_loadu_ps,
     _mm256_storeu_ps,
+    any_positive_f32x8,
     edges_f32_avx
 );
 vector!(
@@ -148,6 +155,7 @@ vector!(
     _mm256_set1_pd,
     _mm256_loadu_pd,
     _mm256_storeu_pd,
+    any_positive_f64x4,
     edges_f64_avx
 );
 vector!(
@@ -165,6 +173,7 @@ vector!(
     _mm512_set1_ps,
     _mm512_loadu_ps,
     _mm512_storeu_ps,
+    any_positive_f32x16,
     edges_f32_avx
 );
 vector!(
@@ -182,8 +191,26 @@ vector!(
     _mm512_set1_pd,
     _mm512_loadu_pd,
     _mm512_storeu_pd,
+    any_positive_f64x8,
     edges_f64_avx
 );
+
+/// [`Real::any_positive`]: whether a comparison with zero is true in any lane.
+macro_rules! any_positive {
+    ($name:ident, $vector:ident, $lanes:ident => $mask:expr) => {
+        #[inline(always)]
+        fn $name($lanes: $vector) -> bool {
+            // SAFETY: see the module: the machine has the instructions.
+            (unsafe { $mask }) != 0
+        }
+    };
+}
+any_positive!(any_positive_f32x4, F32x4, v => _mm_movemask_ps(_mm_cmpgt_ps(v.0, _mm_setzero_ps())));
+any_positive!(any_positive_f64x2, F64x2, v => _mm_movemask_pd(_mm_cmpgt_pd(v.0, _mm_setzero_pd())));
+any_positive!(any_positive_f32x8, F32x8, v => _mm256_movemask_ps(_mm256_cmp_ps::<_CMP_GT_OQ>(v.0, _mm256_setzero_ps())));
+any_positive!(any_positive_f64x4, F64x4, v => _mm256_movemask_pd(_mm256_cmp_pd::<_CMP_GT_OQ>(v.0, _mm256_setzero_pd())));
+any_positive!(any_positive_f32x16, F32x16, v => _mm512_cmp_ps_mask::<_CMP_GT_OQ>(v.0, _mm512_setzero_ps()));
+any_positive!(any_positive_f64x8, F64x8, v => _mm512_cmp_pd_mask::<_CMP_GT_OQ>(v.0, _mm512_setzero_pd()));
 
 impl Scalar for f32 {
     type Baseline = F32x4;

@@ -52,7 +52,11 @@ pub(super) fn stretched_modulus_pa(lame: Lame, stretch_sq: f64) -> f64 {
 /// Adds `δP_L` (Pa).
 #[inline(always)]
 pub(super) fn add_lane_piola_differential<T: Real>(mu: T, h: &M3<T>, df: &M3<T>, p: &mut M3<T>) {
-    let beyond = beyond(h).max(T::of(0.0));
+    let beyond = beyond(h);
+    if !beyond.any_positive() {
+        return;
+    }
+    let beyond = beyond.max(T::of(0.0));
     // 1 where w > 0: no lane branches.
     let is_beyond = beyond / beyond.max(T::of(f64::from(f32::MIN_POSITIVE)));
     let factor = mu * T::of(2.0 * STIFFNESS / LIMIT);
@@ -76,7 +80,12 @@ fn beyond<T: Real>(h: &M3<T>) -> T {
 /// Adds `P_L` (Pa).
 #[inline(always)]
 pub(super) fn add_lane_piola<T: Real>(mu: T, h: &M3<T>, p: &mut M3<T>) {
-    let factor = mu * T::of(2.0 * STIFFNESS / LIMIT) * beyond(h).max(T::of(0.0));
+    let beyond = beyond(h);
+    // Hardly any tet is stretched so far.
+    if !beyond.any_positive() {
+        return;
+    }
+    let factor = mu * T::of(2.0 * STIFFNESS / LIMIT) * beyond.max(T::of(0.0));
     for i in 0..3 {
         for j in 0..3 {
             p[i][j] = p[i][j] + factor * h[i][j];

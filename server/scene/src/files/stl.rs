@@ -159,9 +159,11 @@ fn read_binary(cursor: &mut Cursor, soup: &mut Soup) -> Result<(), FileError> {
         }
         soup.builder.element(TRIANGLE, &corners, &[]);
     }
-    let left = cursor.rest().len();
-    if left > 0 {
-        soup.builder.warnings.push(format!("{left} bytes behind the last triangle are not read"));
+    let behind = "behind the last triangle";
+    match cursor.rest().len() {
+        0 => {}
+        1 => soup.builder.warnings.push(format!("a byte {behind} is not read")),
+        left => soup.builder.warnings.push(format!("{left} bytes {behind} are not read")),
     }
     Ok(())
 }
