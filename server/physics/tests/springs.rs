@@ -226,3 +226,33 @@ fn what_springs_cannot_have_is_refused_by_name() {
     );
     assert!(refused(&|spec| spec.tools[0].radius_m = 1e-5).contains("too small for the surface"));
 }
+
+/// Contact grows stiffer than at rest where the surface is stretched and a tool is deep in it. Then a tick has as many more
+/// substeps, and half of the energy that was missing is there.
+#[test]
+fn a_tool_that_tears_along_gets_the_substeps_that_contact_needs() {
+    let torn = |coupling: Coupling, subcycle: bool| {
+        let (radius_m, speed_m_per_s) = (8e-3, 2.0);
+        let mut spec = sheet(10, Some(refined(2, Refining::ByTools)));
+        spec.settings.subcycle_unstable = subcycle;
+        spec.tools[0] = ToolSpec { friction_coefficient: 0.3, ..sphere(radius_m, DVec3::Z * 0.01, coupling) };
+        let mut rig = Rig::new(spec);
+        let (mut most, mut missing_j, mut moved_j) = (0, 0.0_f64, 0.0_f64);
+        for tick in 0..400 {
+            let time_s = f64::from(tick) * 1e-3;
+            let depth_m = (speed_m_per_s * time_s).min(0.9 * radius_m);
+            let x_m = 0.03 * (speed_m_per_s * (time_s - 0.02).max(0.0) / 0.03).sin();
+            most = most.max(rig.tick_at(DVec3::new(x_m, 0.0, radius_m - depth_m)).substeps);
+            let e = energies(&rig);
+            missing_j = missing_j.max(e.balance_j().abs());
+            moved_j = moved_j.max(e.external_work_j.abs()).max(e.dissipated_j.abs()).max(e.held_j());
+        }
+        println!("{coupling:?}: up to {most} substeps, {:.4} of what moved is missing", missing_j / moved_j);
+        (most > rig.model.substeps(), missing_j / moved_j)
+    };
+    let spring = Coupling::Spring { stiffness_n_per_m: 400.0, damping_n_s_per_m: 2.0, mass_kg: 0.05 };
+    for coupling in [Coupling::Rigid, spring] {
+        let [(has_more, missing), (had_more, was_missing)] = [true, false].map(|judged| torn(coupling, judged));
+        assert!(has_more && !had_more && missing < 0.5 * was_missing, "{coupling:?}: {missing} {was_missing}");
+    }
+}

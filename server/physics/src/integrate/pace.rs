@@ -46,12 +46,14 @@ impl Pace {
         Self { substeps, settled_ticks: 0, settled_quotient: 0.0, too_few: 0, before, before_is_usable: false }
     }
 
-    /// Makes the pace as at the start, in the buffers it has.
-    pub(crate) fn reset(&mut self, environment: &Environment) {
+    /// Makes the pace as at the start, of a body with so many positions, in the buffers it has.
+    pub(crate) fn reset(&mut self, environment: &Environment, is_judged: bool, positions: usize) {
         self.start_again(environment.steps.substeps);
         self.too_few = 0;
-        self.before.total_n.fill(DVec3::ZERO);
-        self.before.external_n.fill(DVec3::ZERO);
+        self.before.resize(0);
+        if is_judged && environment.steps.substeps == 1 {
+            self.before.resize(positions);
+        }
     }
 
     pub(crate) fn copy_from(&mut self, other: &Self) {

@@ -61,9 +61,11 @@ pub(crate) fn is_judged(environment: &Environment, can_be: bool) -> bool {
     settings.subcycle_unstable && settings.integrator == Integrator::Leapfrog && can_be
 }
 
-/// Forces at those instants of a tick at which they are needed again; empty unless ticks are judged.
+/// Forces at those instants of a tick at which they are needed again.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct ForceHistory {
+    /// Whether ticks are judged; there are no forces otherwise.
+    is_kept: bool,
     start: InstantForces,
     two_before: InstantForces,
     one_before: InstantForces,
@@ -105,24 +107,24 @@ impl ForceHistory {
     /// `most_positions`.
     pub(crate) fn new(nodes: usize, most_positions: usize) -> Self {
         let forces = || InstantForces::zero(nodes, most_positions);
-        Self { start: forces(), two_before: forces(), one_before: forces(), held_jump: 0.0 }
+        Self { is_kept: true, start: forces(), two_before: forces(), one_before: forces(), held_jump: 0.0 }
     }
 
     /// Returns whether ticks are judged by this history.
     pub(crate) fn is_kept(&self) -> bool {
-        !self.start.total_n.is_empty()
+        self.is_kept
     }
 
     /// Makes all lists as long as the state's positions before a tick, as there may be more or fewer of these than
     /// before. What the lists held is then of no use, which [`MechanicalState::force_is_current`] tells.
-    pub(crate) fn fit(&mut self, positions: usize, pace: &mut Pace) {
-        if !self.is_kept() || self.start.total_n.len() == positions {
+    pub(crate) fn fit(&mut self, environment: &Environment, positions: usize, pace: &mut Pace) {
+        if !self.is_kept || self.start.total_n.len() == positions {
             return;
         }
         for forces in [&mut self.start, &mut self.one_before, &mut self.two_before] {
             forces.resize(positions);
         }
-        if !pace.before.total_n.is_empty() {
+        if environment.steps.substeps == 1 {
             pace.before.resize(positions);
         }
     }
@@ -221,7 +223,7 @@ impl ForceHistory {
 
     /// Keeps the forces of a tick that was accepted by which the next one is judged.
     fn hand_on(&mut self, pace: &mut Pace, substeps: u32) {
-        pace.before_is_usable = substeps == 1 && !pace.before.total_n.is_empty();
+        pace.before_is_usable = substeps == 1;
         if pace.before_is_usable {
             std::mem::swap(&mut pace.before, &mut self.start);
         }

@@ -42,7 +42,7 @@ pub(super) fn enter_quarantine(
     place: u32,
     body: &mut SteppedBody<'_>,
     state: &mut MechanicalState,
-    pace: &mut Pace,
+    (pace, is_judged): (&mut Pace, bool),
 ) -> Quarantine {
     let node = body.node_at(place).unwrap_or(Quarantine::NOT_A_NODE);
     let tick = state.tick;
@@ -55,7 +55,7 @@ pub(super) fn enter_quarantine(
     for tool in &mut state.tools {
         tool.let_go();
     }
-    pace.reset(environment);
+    pace.reset(environment, is_judged, state.x.len());
     Quarantine { tick, node }
 }
 

@@ -31,7 +31,7 @@ impl State {
         let own = BodyState::at_rest(body, environment);
         let mut x = Vec::with_capacity(body.most_positions());
         x.extend(own.rest_m(body));
-        let nodes = body.rest_positions_m().len();
+        let nodes = x.len();
         Self {
             mechanical: MechanicalState::at_rest(environment, x),
             body: own,
@@ -70,7 +70,7 @@ impl State {
         let (environment, body) = (model.environment(), model.body());
         self.body.reset(body);
         self.mechanical.reset(environment, self.body.rest_m(body));
-        self.pace.reset(environment);
+        self.pace.reset(environment, model.is_judged(), self.mechanical.x.len());
         self.sleep.reset();
         self.quarantine = None;
     }

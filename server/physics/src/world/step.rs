@@ -56,7 +56,7 @@ pub fn step(model: &Model, state: &mut State, scratch: &mut Scratch, input: &Tic
     let Some(mut body) = SteppedBody::of(model.body(), own, buffers) else { return StepReport::NOTHING };
 
     body.prepare(environment, mechanical, input.point_forces);
-    history.fit(mechanical.x.len(), pace);
+    history.fit(environment, mechanical.x.len(), pace);
     let was_quiet = model.sleep_bound().is_some() && state.sleep.is_quiet(&mechanical.load_factors, input);
     last_good.keep(mechanical);
     body.keep_last_good();
@@ -99,7 +99,7 @@ pub fn step(model: &Model, state: &mut State, scratch: &mut Scratch, input: &Tic
     match spoilt {
         Some(place) => {
             last_good.put_back(mechanical);
-            let quarantine = enter_quarantine(environment, place, &mut body, mechanical, pace);
+            let quarantine = enter_quarantine(environment, place, &mut body, mechanical, (pace, history.is_kept()));
             reaction_n.fill(DVec3::ZERO);
             state.sleep.wake();
             state.quarantine = Some(quarantine);

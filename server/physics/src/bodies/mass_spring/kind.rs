@@ -48,6 +48,10 @@ impl BodyKind for MassSpringBody {
         self.model().most_nodes()
     }
 
+    fn can_be_judged(&self) -> bool {
+        true
+    }
+
     fn surface_into_m(
         &self,
         surface: &Surface,

@@ -21,6 +21,7 @@ mod checks;
 pub mod constants_table;
 pub mod energy;
 pub mod equilibrium;
+mod judged;
 pub mod kernels;
 mod kind;
 pub mod loop_scheme;

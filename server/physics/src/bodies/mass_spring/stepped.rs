@@ -3,7 +3,7 @@ use super::{MassSpringBody, MassSpringScratch, MassSpringState, skin::SpringSkin
 use crate::{
     contact::ContactScratch,
     lanes::kicks::LumpedKick,
-    tick::{Environment, Evaluation, MechanicalState, PointForce, Stepped, Tick, Touch, touch_skin},
+    tick::{Environment, Evaluation, Judged, MechanicalState, PointForce, Stepped, Tick, Touch, touch_skin},
 };
 use glam::DVec3;
 
@@ -67,11 +67,15 @@ impl<'a> Stepped<'a> for SteppedMassSpring<'a> {
     }
 
     /// Returns the force (N) that holds a node, which is zero while the node sleeps.
-    /// Returns the node at a place among the awake nodes.
     fn reaction_n(&self, node: usize, state: &MechanicalState) -> DVec3 {
         self.scratch.place(node as u32).map_or(DVec3::ZERO, |place| -state.force_n[place])
     }
 
+    fn judged(&mut self) -> Option<&mut dyn Judged> {
+        Some(self)
+    }
+
+    /// Returns the node at a place among the awake nodes.
     fn node_at(&self, place: u32) -> Option<u32> {
         self.own.motion.ids.get(place as usize).copied()
     }
