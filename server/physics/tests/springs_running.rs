@@ -5,7 +5,7 @@ mod sheet;
 use assert_no_alloc::{AllocDisabler, assert_no_alloc};
 use glam::{DQuat, DVec3};
 use palpate_physics::{
-    BodyState, PointForce, State,
+    BodyState, PointForce, State, Substeps,
     bodies::mass_spring::{AnchorLaw, Refining},
     contact::{Coupling, ToolShape, ToolTarget},
     snapshot,
@@ -77,6 +77,38 @@ fn looking_at_all_triangles_or_going_on_from_a_snapshot_gives_the_same_bits() {
         let bytes = snapshot::save(&rig.model, &rig.state);
         assert_eq!(snapshot::restore(&rig.model, &bytes).unwrap(), State::at_rest(&rig.model));
     }
+}
+
+/// Fewer substeps than a sheet needs: ticks are repeated, from where they began, and a restored run goes on as
+/// the one that was saved, whatever wakes and falls asleep.
+#[test]
+fn repeated_ticks_begin_where_they_began_and_restored_runs_repeat_the_same() {
+    let mut spec = sheet(10, Some(refined(2, Refining::ByTools)));
+    springs_mut(&mut spec).springs.most_awake = 60;
+    spec.tools[0].friction_coefficient = 0.3;
+    let needed = Rig::new(spec.clone()).model.substeps();
+    spec.settings.substeps = Substeps::Fixed(1);
+    let mut rig = Rig::new(spec);
+    let (mut repeated, mut lengths) = (0, std::collections::BTreeSet::new());
+    for tick in 0..700 {
+        let bytes = snapshot::save(&rig.model, &rig.state);
+        let mut restored = Rig { state: snapshot::restore(&rig.model, &bytes).unwrap(), ..Rig::new(rig.spec.clone()) };
+        let before = rig.state.clone();
+        let report = rig.tick_at(taps(tick));
+        assert_eq!(report.quarantined, None, "tick {tick}");
+        assert_eq!((restored.tick_at(taps(tick)), &restored.state), (report, &rig.state), "tick {tick}");
+        lengths.insert(rig.state.mechanical.x.len());
+        if report.repeated > 0 {
+            let mut at_once = Rig { state: before, ..Rig::new(rig.spec.clone()) };
+            at_once.state.pace.substeps = report.substeps;
+            assert_eq!(at_once.tick_at(taps(tick)).repeated, 0, "tick {tick}");
+            at_once.state.pace = rig.state.pace.clone();
+            assert_eq!(at_once.state, rig.state, "tick {tick}");
+            repeated += 1;
+        }
+    }
+    println!("{repeated} ticks repeated, of {needed} substeps");
+    assert!(repeated > 0 && lengths.len() > 2, "{repeated} {lengths:?}");
 }
 
 #[test]

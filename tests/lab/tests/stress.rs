@@ -52,8 +52,8 @@ fn presses_that_sank_in_at_edges() {
     passes_with("presses", [75, 176, 186]);
 }
 
-/// A dome of springs had too few substeps, a blow drove particles to 21 m/s, the body held a tool for ever, an edge let one
-/// through.
+/// A dome of springs had too few substeps, a blow drove particles to 21 m/s, the body held a tool for ever, an edge let
+/// one through.
 #[test]
 fn leaps_that_went_wrong() {
     passes_with("leaps", [54, 98, 108, 202]);

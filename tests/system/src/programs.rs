@@ -30,8 +30,8 @@ fn build() {
     // With the tests, as `cargo test --workspace` builds them: the programs alone would choose other features of shared
     // dependencies, and compile most of them once more.
     cargo.args(["build", "--quiet", "--workspace", "--bins", "--examples", "--tests"]);
-    // Without what cargo tells a running test of its package: build scripts that read these variables (ring's) would run
-    // anew, and everything above them would be compiled once more.
+    // Without what cargo tells a running test of its package: build scripts that read these variables (ring's) would
+    // run anew, and everything above them would be compiled once more.
     for (name, _) in std::env::vars_os() {
         let of_package = |name: &str| name.starts_with("CARGO_PKG_") || name.starts_with("CARGO_MANIFEST_");
         if name.to_str().is_some_and(of_package) {

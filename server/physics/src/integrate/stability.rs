@@ -106,7 +106,7 @@ impl ForceHistory {
     /// Returns a history for ticks that are judged, of a body with so many nodes, whose lists have room for
     /// `most_positions`.
     pub(crate) fn new(nodes: usize, most_positions: usize) -> Self {
-        let forces = || InstantForces::zero(nodes, most_positions);
+        let forces = || InstantForces::zero(nodes.min(most_positions), most_positions);
         Self { is_kept: true, start: forces(), two_before: forces(), one_before: forces(), held_jump: 0.0 }
     }
 
@@ -118,14 +118,18 @@ impl ForceHistory {
     /// Makes all lists as long as the state's positions before a tick, as there may be more or fewer of these than
     /// before. What the lists held is then of no use, which [`MechanicalState::force_is_current`] tells.
     pub(crate) fn fit(&mut self, environment: &Environment, positions: usize, pace: &mut Pace) {
-        if !self.is_kept || self.start.total_n.len() == positions {
+        if !self.is_kept {
+            return;
+        }
+        // The state's list is fitted on its own: the state may have been reset or restored since the last tick.
+        if environment.steps.substeps == 1 {
+            pace.before.resize(positions);
+        }
+        if self.start.total_n.len() == positions {
             return;
         }
         for forces in [&mut self.start, &mut self.one_before, &mut self.two_before] {
             forces.resize(positions);
-        }
-        if environment.steps.substeps == 1 {
-            pace.before.resize(positions);
         }
     }
 

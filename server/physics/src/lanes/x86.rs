@@ -207,8 +207,10 @@ macro_rules! any_positive {
 }
 any_positive!(any_positive_f32x4, F32x4, v => _mm_movemask_ps(_mm_cmpgt_ps(v.0, _mm_setzero_ps())));
 any_positive!(any_positive_f64x2, F64x2, v => _mm_movemask_pd(_mm_cmpgt_pd(v.0, _mm_setzero_pd())));
-any_positive!(any_positive_f32x8, F32x8, v => _mm256_movemask_ps(_mm256_cmp_ps::<_CMP_GT_OQ>(v.0, _mm256_setzero_ps())));
-any_positive!(any_positive_f64x4, F64x4, v => _mm256_movemask_pd(_mm256_cmp_pd::<_CMP_GT_OQ>(v.0, _mm256_setzero_pd())));
+any_positive!(any_positive_f32x8, F32x8, v =>
+    _mm256_movemask_ps(_mm256_cmp_ps::<_CMP_GT_OQ>(v.0, _mm256_setzero_ps())));
+any_positive!(any_positive_f64x4, F64x4, v =>
+    _mm256_movemask_pd(_mm256_cmp_pd::<_CMP_GT_OQ>(v.0, _mm256_setzero_pd())));
 any_positive!(any_positive_f32x16, F32x16, v => _mm512_cmp_ps_mask::<_CMP_GT_OQ>(v.0, _mm512_setzero_ps()));
 any_positive!(any_positive_f64x8, F64x8, v => _mm512_cmp_pd_mask::<_CMP_GT_OQ>(v.0, _mm512_setzero_pd()));
 

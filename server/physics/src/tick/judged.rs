@@ -69,17 +69,19 @@ pub(crate) trait Judged {
     fn is_viscous(&self) -> bool;
 
     /// Returns how far the fastest point goes in a step of `dt_s`, over how far it may; 0 where nothing limits it.
-    fn strides(&self, state: &MechanicalState, dt_s: f64) -> f64;
+    fn strides(&self, _: &MechanicalState, _dt_s: f64) -> f64 {
+        0.0
+    }
 
     /// Keeps what a tick that may be repeated changes beside positions and velocities.
-    fn keep(&mut self, state: &MechanicalState);
+    fn keep(&mut self, _: &MechanicalState) {}
 
     /// Puts back what was kept, so that the tick can be taken again.
-    fn put_back(&mut self);
+    fn put_back(&mut self) {}
 
     /// Notes that a long step of a coarse level begins at this state.
-    fn note_long_step(&mut self, state: &MechanicalState);
+    fn note_long_step(&mut self, _: &MechanicalState) {}
 
     /// Ends a tick that was accepted.
-    fn accept(&mut self);
+    fn accept(&mut self) {}
 }

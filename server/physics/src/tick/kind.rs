@@ -229,7 +229,7 @@ pub(crate) trait Stepped<'a> {
     /// Comes before the first kick of a tick.
     fn begin_kicks(&mut self) {}
 
-    /// What leapfrog's step is judged by; `None` of bodies whose step is never too long, or that step themselves.
+    /// What leapfrog's step is judged by; `None` of bodies that step themselves.
     fn judged(&mut self) -> Option<&mut dyn Judged> {
         None
     }

@@ -10,6 +10,7 @@ mod judged;
 mod kind;
 mod ledger;
 pub(crate) mod lumped;
+pub(crate) mod lumped_evidence;
 mod material_point;
 pub(crate) mod progress;
 mod skin;

@@ -42,7 +42,8 @@ pub(super) fn enter_quarantine(
     place: u32,
     body: &mut SteppedBody<'_>,
     state: &mut MechanicalState,
-    (pace, is_judged): (&mut Pace, bool),
+    pace: &mut Pace,
+    is_judged: bool,
 ) -> Quarantine {
     let node = body.node_at(place).unwrap_or(Quarantine::NOT_A_NODE);
     let tick = state.tick;

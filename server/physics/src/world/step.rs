@@ -99,7 +99,7 @@ pub fn step(model: &Model, state: &mut State, scratch: &mut Scratch, input: &Tic
     match spoilt {
         Some(place) => {
             last_good.put_back(mechanical);
-            let quarantine = enter_quarantine(environment, place, &mut body, mechanical, (pace, history.is_kept()));
+            let quarantine = enter_quarantine(environment, place, &mut body, mechanical, pace, history.is_kept());
             reaction_n.fill(DVec3::ZERO);
             state.sleep.wake();
             state.quarantine = Some(quarantine);

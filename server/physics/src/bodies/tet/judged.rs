@@ -1,27 +1,27 @@
 //! What the step of a body of tetrahedra is judged by.
 use super::SteppedTet;
-use crate::{
-    lanes::StepForces,
-    tick::{Environment, Judged, MechanicalState, StepEvidence, StepForcesNow},
+use crate::tick::{
+    Environment, Judged, MechanicalState, StepEvidence, StepForcesNow,
+    lumped_evidence::{LumpedEvidence, StepStart, internal_sq},
 };
 use glam::DVec3;
+
+impl SteppedTet<'_> {
+    fn lumped(&self) -> LumpedEvidence<'_> {
+        LumpedEvidence { inverse_mass_per_kg: self.body.inverse_mass_per_kg() }
+    }
+}
 
 impl Judged for SteppedTet<'_> {
     fn evidence(
         &mut self,
         _: &Environment,
         state: &MechanicalState,
-        [one, two]: [StepForcesNow<'_>; 2],
+        older: [StepForcesNow<'_>; 2],
         held_sq: f64,
         _: u32,
     ) -> StepEvidence {
-        let forces = StepForces {
-            total_n: [&state.force_n, one.total_n, two.total_n],
-            external_n: [&state.external_n, one.external_n, two.external_n],
-            inverse_mass_per_kg: self.body.inverse_mass_per_kg(),
-        };
-        let [answer_sq, one_sq, two_sq] = forces.sums();
-        StepEvidence { answer_sq, cause_sq: one_sq.max(two_sq) + held_sq, long_step: 0.0 }
+        self.lumped().of(state, older, held_sq)
     }
 
     fn evidence_of_first_step(
@@ -32,47 +32,19 @@ impl Judged for SteppedTet<'_> {
         start_x: &[DVec3],
         start_v: &[DVec3],
     ) -> StepEvidence {
-        let dt_s = environment.settings.tick_period_s;
-        let (mut change_sq, mut moved_sq, mut speed_sq) = (0.0, 0.0, 0.0);
-        for node in 0..state.x.len() {
-            let now = state.force_n[node] - state.external_n[node];
-            let change = now - (before.total_n[node] - before.external_n[node]);
-            change_sq += (change * change * self.body.inverse_mass_per_kg()[node]).element_sum();
-            moved_sq += self.body.mass_kg()[node] * state.x[node].distance_squared(start_x[node]);
-            speed_sq += self.body.mass_kg()[node] * start_v[node].length_squared();
-        }
-        let cause_sq = (moved_sq / (dt_s * dt_s)).max(speed_sq) / (dt_s * dt_s);
-        StepEvidence { answer_sq: change_sq, cause_sq, long_step: 0.0 }
+        let start = StepStart { x: start_x, v: start_v, dt_s: environment.settings.tick_period_s };
+        self.lumped().of_first_step(state, before, start, self.body.mass_kg().iter().copied())
     }
 
     fn change(&mut self, one: StepForcesNow<'_>, two: StepForcesNow<'_>) -> f64 {
-        let changes = one.internal_n().zip(two.internal_n()).map(|(g, before)| g - before);
-        let weighted = changes.zip(self.body.inverse_mass_per_kg());
-        weighted.map(|(change, inverse_mass)| (change * change).dot(*inverse_mass)).sum::<f64>().sqrt()
+        self.lumped().change_sq(one, two).sqrt()
     }
 
     fn internal_sq(&self, environment: &Environment, state: &MechanicalState) -> f64 {
-        let mut internal_sq = 0.0;
-        let nodes = StepForcesNow::of(state).internal_n().zip(self.body.mass_kg());
-        for (internal_n, mass) in nodes.filter(|(_, mass)| **mass > 0.0) {
-            internal_sq += (internal_n - environment.gravity_m_per_s2 * *mass).length_squared() / mass;
-        }
-        internal_sq
+        internal_sq(state, environment.gravity_m_per_s2, self.body.mass_kg().iter().copied())
     }
 
     fn is_viscous(&self) -> bool {
         self.body.kernel().is_viscous()
     }
-
-    fn strides(&self, _: &MechanicalState, _: f64) -> f64 {
-        0.0
-    }
-
-    fn keep(&mut self, _: &MechanicalState) {}
-
-    fn put_back(&mut self) {}
-
-    fn note_long_step(&mut self, _: &MechanicalState) {}
-
-    fn accept(&mut self) {}
 }
