@@ -69,6 +69,7 @@ fn kernels(criterion: &mut Criterion) {
             });
             for precision in [Precision::Single, Precision::Double] {
                 for set in InstructionSet::available() {
+                    let room = Room { points: rest.len(), cells: cells.len() };
                     if offset == 0.0 {
                         let row = |r: u32| {
                             let at = |j: u32, k: u32| ((r / 10 + k) * 11 + r % 10 + j) * 11;
@@ -81,7 +82,6 @@ fn kernels(criterion: &mut Criterion) {
                             }
                         };
                         let mut rows: Vec<CellRow> = (0..100).map(row).collect();
-                        let room = Room { points: rest.len(), cells: cells.len() };
                         let kernel = RowKernel::new(SPACING_M, 1.0, &[material], precision, room);
                         let mut kernel = kernel.with_instruction_set(set);
                         kernel.set_displacements(&u);
@@ -95,7 +95,7 @@ fn kernels(criterion: &mut Criterion) {
                             b.iter(|| kernel.forces(&rows, rest.len(), 0.5));
                         });
                     }
-                    let mut kernel = CutCells::with_capacity(cells.len(), rest.len(), &[material], precision);
+                    let mut kernel = CutCells::with_capacity(SPACING_M, &[material], precision, room);
                     kernel = kernel.with_instruction_set(set);
                     kernel.start(0, cells.len());
                     cells.iter().enumerate().for_each(|(c, (points, rest))| kernel.put(c, *points, rest));

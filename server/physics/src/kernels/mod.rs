@@ -2,8 +2,8 @@
 //!
 //! Forces are computed in f32 (16 lanes) or f64 (8 lanes) and summed per node in f64; positions and velocities are f64
 //! always. Displacements `u = x − X` and their differences along the edges of a tet are taken in f64, and only the
-//! differences are rounded: what a body's rigid motion and size would cost in digits is not lost. Same inputs, same
-//! bits, on every instruction set.
+//! differences are rounded to the kernel's precision: what a body's rigid motion and size would cost in digits is not
+//! lost. Same inputs, same bits, on every instruction set.
 // A vector type is only fast where it is inlined into a function compiled for its instruction set.
 #![allow(clippy::inline_always)]
 mod forces;
@@ -16,6 +16,7 @@ use crate::{
     elements::linear_tet::RestTet,
     lanes::{
         Available, InstructionSet, LANES_F32, LANES_F64,
+        grid::DisplacementGrid,
         nodes::{Node, Sum, node},
         real::Scalar,
     },
@@ -31,6 +32,7 @@ use tets::{Forces, Products, Run, TetBlocks};
 #[derive(Debug, Clone)]
 pub struct ForceKernel {
     layout: Layout,
+    grid: DisplacementGrid,
     nodes: usize,
     /// Whether some material is viscous.
     is_viscous: bool,
@@ -74,8 +76,10 @@ impl ForceKernel {
                 Layout::Double(blocks, runs)
             }
         };
+        let largest_m3 = rest_tets.iter().map(|rest| rest.volume_m3).fold(0.0, f64::max);
         Self {
             layout,
+            grid: DisplacementGrid::of_tets(precision, largest_m3),
             nodes: mesh.positions_m().len(),
             is_viscous: materials.iter().any(|m| !m.viscosity.is_zero()),
             every_viscosity: false,
@@ -147,7 +151,7 @@ impl ForceKernel {
     /// Takes the positions `x` (m) about which [`Self::products_n`] linearises.
     pub fn linearise_at(&self, rest_positions_m: &[DVec3], x: &[DVec3], scratch: &mut KernelScratch) {
         for ((u, x), rest) in scratch.displacements.iter_mut().zip(x).zip(rest_positions_m) {
-            *u = node(*x - *rest);
+            *u = node(self.grid.rounded(*x - *rest));
         }
     }
 

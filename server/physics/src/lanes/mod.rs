@@ -7,6 +7,7 @@
 pub(crate) mod blocks;
 pub(crate) mod dense;
 pub(crate) mod dispatch;
+pub(crate) mod grid;
 pub(crate) mod kicks;
 pub(crate) mod nodes;
 pub(crate) mod real;

@@ -18,6 +18,7 @@ use crate::{
     },
     lanes::{
         Available, InstructionSet,
+        grid::DisplacementGrid,
         real::{Scalar, Vector},
     },
     material::{ConstitutiveLaw, LawPass, Material},
@@ -45,6 +46,7 @@ pub struct CellRow {
 #[derive(Debug, Clone)]
 pub struct RowKernel {
     layout: Layout,
+    grid: DisplacementGrid,
     instruction_set: Available,
 }
 
@@ -135,7 +137,8 @@ impl RowKernel {
             Precision::Single => Layout::Single(Rows::new(materials, edge_m, fraction, room)),
             Precision::Double => Layout::Double(Rows::new(materials, edge_m, fraction, room)),
         };
-        Self { layout, instruction_set: Available::best() }
+        let grid = DisplacementGrid::of_cells(precision, edge_m);
+        Self { layout, grid, instruction_set: Available::best() }
     }
 
     /// Returns the same kernel, held to an instruction set or to the best available below it (for tests and
@@ -156,17 +159,22 @@ impl RowKernel {
 
     /// Sets the displacements (m) of the points.
     pub fn set_displacements(&mut self, displacements_m: &[DVec3]) {
+        let rounded = displacements_m.iter().map(|u| self.grid.rounded(*u));
         match &mut self.layout {
-            Layout::Single(Rows { arrays, .. }) => put(&mut arrays.displacements, displacements_m),
-            Layout::Double(Rows { arrays, .. }) => put(&mut arrays.displacements, displacements_m),
+            Layout::Single(Rows { arrays, .. }) => put(&mut arrays.displacements, rounded),
+            Layout::Double(Rows { arrays, .. }) => put(&mut arrays.displacements, rounded),
         }
     }
 
     /// Sets the velocities (m/s) of the points; they are used only where a material is viscous.
     pub fn set_velocities(&mut self, v: &[DVec3]) {
         match &mut self.layout {
-            Layout::Single(Rows { arrays, .. }) if !arrays.velocities[0].is_empty() => put(&mut arrays.velocities, v),
-            Layout::Double(Rows { arrays, .. }) if !arrays.velocities[0].is_empty() => put(&mut arrays.velocities, v),
+            Layout::Single(Rows { arrays, .. }) if !arrays.velocities[0].is_empty() => {
+                put(&mut arrays.velocities, v.iter().copied())
+            }
+            Layout::Double(Rows { arrays, .. }) if !arrays.velocities[0].is_empty() => {
+                put(&mut arrays.velocities, v.iter().copied())
+            }
             Layout::Single(_) | Layout::Double(_) => {}
         }
     }
@@ -200,7 +208,7 @@ fn of_materials<T: Scalar>(materials: &[Material], edge_m: f64, fraction: f64) -
     [edge_m, 2.0 * edge_m].into_iter().flat_map(|edge_m| materials.iter().map(move |m| of((m, edge_m)))).collect()
 }
 
-fn put<T: Scalar>([x, y, z]: &mut [Vec<T>; 3], list: &[DVec3]) {
+fn put<T: Scalar>([x, y, z]: &mut [Vec<T>; 3], list: impl Iterator<Item = DVec3>) {
     for (((x, y), z), a) in x[1..].iter_mut().zip(&mut y[1..]).zip(&mut z[1..]).zip(list) {
         (*x, *y, *z) = (T::of(a.x), T::of(a.y), T::of(a.z));
     }

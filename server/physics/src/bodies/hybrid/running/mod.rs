@@ -99,7 +99,7 @@ impl RunningPatch {
             cells: Vec::with_capacity(most_cells),
             rows: Vec::with_capacity(most_cells),
             full: RowKernel::new(edge_m, 1.0 - KEPT, &hybrid.materials, precision, room),
-            cut: CutCells::with_capacity(most_cells, most_points, &hybrid.materials, precision),
+            cut: CutCells::with_capacity(edge_m, &hybrid.materials, precision, room),
             residual_kernel: ResidualKernel::build(
                 partition.residual_elements(),
                 hybrid.node_count(),

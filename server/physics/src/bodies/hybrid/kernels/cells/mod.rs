@@ -7,11 +7,15 @@ mod forces;
 #[cfg(test)]
 pub(crate) mod testing;
 
-use super::prestrains::{ENTRIES, Found, Split, entries};
+use super::{
+    Room,
+    prestrains::{ENTRIES, Found, Split, entries},
+};
 use crate::{
     bodies::hybrid::{cell::RestCell, prestrain::CellPrestrain},
     lanes::{
         Available, InstructionSet, LANES_F32, LANES_F64,
+        grid::DisplacementGrid,
         nodes::{Node, Sum, node},
         real::Scalar,
     },
@@ -80,6 +84,7 @@ enum Layout {
 #[derive(Debug, Clone)]
 pub struct CutCells {
     layout: Layout,
+    grid: DisplacementGrid,
     instruction_set: Available,
     displacements: Vec<Node>,
     /// Empty unless some material is viscous.
@@ -88,8 +93,9 @@ pub struct CutCells {
 }
 
 impl CutCells {
-    /// Makes room for `cells` cells over `points` points.
-    pub fn with_capacity(cells: usize, points: usize, materials: &[Material], precision: Precision) -> Self {
+    /// Makes room for cells of edge `h` (m), or of twice that, over points.
+    pub fn with_capacity(edge_m: f64, materials: &[Material], precision: Precision, room: Room) -> Self {
+        let Room { points, cells } = room;
         let layout = match precision {
             Precision::Single => Layout::Single(Tables::with_capacity(cells, points, materials)),
             Precision::Double => Layout::Double(Tables::with_capacity(cells, points, materials)),
@@ -99,6 +105,7 @@ impl CutCells {
         let count = points + 1;
         Self {
             layout,
+            grid: DisplacementGrid::of_cells(precision, edge_m),
             instruction_set: Available::best(),
             displacements: vec![Node::default(); count],
             velocities: vec![Node::default(); if is_viscous { count } else { 0 }],
@@ -165,7 +172,7 @@ impl CutCells {
     /// Sets the displacements (m) of the points.
     pub fn set_displacements(&mut self, displacements_m: &[DVec3]) {
         for (to, from) in self.displacements.iter_mut().zip(displacements_m) {
-            *to = node(*from);
+            *to = node(self.grid.rounded(*from));
         }
     }
 
@@ -179,7 +186,7 @@ impl CutCells {
     /// Sums up the forces (N) of elastic and viscous stress on the first `points` points, with the fraction `left` of
     /// the prestrain.
     pub fn forces(&mut self, points: usize, left: f64) -> Found {
-        let Self { layout, instruction_set, displacements, velocities, sums } = self;
+        let Self { layout, instruction_set, displacements, velocities, sums, .. } = self;
         sums[..points].fill(Sum::default());
         match layout {
             Layout::Single(blocks) => blocks.sum_up(*instruction_set, left, displacements, velocities, sums),
@@ -302,8 +309,9 @@ mod tests {
     #[test]
     fn cut_cells_and_oracle_agree() {
         agrees_with_oracle(false, |question: &Question<'_>| {
-            let Question { cells, u, v, material, precision, set, .. } = question;
-            let mut kernel = CutCells::with_capacity(cells.len(), u.len(), &[*material], *precision);
+            let Question { cells, spacing_m, u, v, material, precision, set, .. } = question;
+            let room = Room { points: u.len(), cells: cells.len() };
+            let mut kernel = CutCells::with_capacity(*spacing_m, &[*material], *precision, room);
             kernel = kernel.with_instruction_set(*set);
             // Nothing may stay of cells that were there before.
             kernel.start(0, 3);

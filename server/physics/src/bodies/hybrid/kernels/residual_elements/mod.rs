@@ -17,6 +17,7 @@ use crate::{
     },
     lanes::{
         Available, InstructionSet, LANES_F32, LANES_F64,
+        grid::DisplacementGrid,
         nodes::{Lanes, Node, Sum, node},
         real::Scalar,
     },
@@ -84,6 +85,7 @@ enum Layout {
 #[derive(Debug, Clone)]
 pub struct ResidualKernel {
     layout: Layout,
+    grid: DisplacementGrid,
     instruction_set: Available,
     displacements: Vec<Node>,
     /// Empty unless some material is viscous.
@@ -107,8 +109,10 @@ impl ResidualKernel {
         let is_viscous = materials.iter().any(|m| !m.viscosity.is_zero());
         // There is one spare node more, for the lanes of padding.
         let count = nodes + 1;
+        let volumes_m3 = residual_elements.iter().map(|residual| residual.volume_m3.iter().sum());
         Self {
             layout,
+            grid: DisplacementGrid::of_tets(precision, volumes_m3.fold(0.0, f64::max)),
             instruction_set: Available::best(),
             displacements: vec![Node::default(); count],
             velocities: vec![Node::default(); if is_viscous { count } else { 0 }],
@@ -142,9 +146,9 @@ impl ResidualKernel {
     /// Adds forces (N) of elastic and viscous stress to `forces_n` at `displacements_m` and velocities `v` of the
     /// coarse nodes, with the fraction `left` of the prestrain.
     pub fn add_forces_n(&mut self, displacements_m: &[DVec3], v: &[DVec3], left: f64, forces_n: &mut [DVec3]) -> Found {
-        let Self { layout, instruction_set, displacements, velocities, sums } = self;
+        let Self { layout, grid, instruction_set, displacements, velocities, sums } = self;
         for (to, from) in displacements.iter_mut().zip(displacements_m) {
-            *to = node(*from);
+            *to = node(grid.rounded(*from));
         }
         for (to, from) in velocities.iter_mut().zip(v.iter().take(displacements_m.len())) {
             *to = node(*from);
