@@ -2,7 +2,7 @@
 use super::{
     cell::RestCell,
     clusters::SkinClusters,
-    composite::Composite,
+    composite::{Composite, NO_WEIGHT},
     embedding_mesh::{self, EmbeddingMesh},
     mass_matrix::Masses,
     moments::{CellMoments, Moments, integrate},
@@ -29,9 +29,6 @@ use crate::{
 };
 use glam::{BVec3, DVec3};
 use std::collections::BTreeSet;
-
-/// Weights below this count as zero: a particle does not follow such a coarse node.
-pub(super) const NO_WEIGHT: f64 = 1e-9;
 
 /// Fractions of the time to build a body at which its cells are integrated, are counted to coarse tets, and it is
 /// known which of its particles may wake.

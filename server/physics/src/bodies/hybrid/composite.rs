@@ -21,6 +21,9 @@ const MIDDLE: u8 = 4;
 /// Number, within a tet, of the node on the edge between two corners.
 const NODE_OF_EDGE: [[usize; 4]; 4] = [[0, 4, 5, 6], [4, 1, 7, 8], [5, 7, 2, 9], [6, 8, 9, 3]];
 
+/// Weights below this count as zero: a particle does not follow such a coarse node.
+pub(super) const NO_WEIGHT: f64 = 1e-9;
+
 /// The shape functions over a tetrahedral mesh.
 #[derive(Debug, Clone)]
 pub struct Composite {
@@ -46,6 +49,20 @@ pub struct Anchor {
 }
 
 impl Anchor {
+    /// Returns the weights by which the mass of what follows the nodes is spread on them: those of a point outside the
+    /// coarse tets without the negative ones, and of sum one again.
+    ///
+    /// What is outside never wakes. If it took mass from nodes by negative weights, those that wake could take more from
+    /// there than is left, and the mass matrix would not be positive definite (`mass_matrix`).
+    pub fn mass_weights(&self) -> [f64; 4] {
+        if self.weights.iter().all(|weight| *weight > -NO_WEIGHT) {
+            return self.weights;
+        }
+        let positive = self.weights.map(|weight| weight.max(0.0));
+        let sum: f64 = positive.iter().sum();
+        positive.map(|weight| weight / sum)
+    }
+
     /// Returns `Σ ζ_i a_i`.
     #[inline]
     pub fn of(&self, a: &[DVec3]) -> DVec3 {

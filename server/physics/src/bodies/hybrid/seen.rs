@@ -4,7 +4,7 @@
 //! x_i`. Of more nodes than particles some motions move no particle (there are fewer equations than unknowns). Nothing
 //! resists them, neither while particles sleep nor when they wake: equilibria are not stable, and what wakes makes them
 //! grow until a state is refused.
-use super::{body::NO_WEIGHT, partition::Partition, spec::HybridError};
+use super::{composite::NO_WEIGHT, partition::Partition, spec::HybridError};
 use crate::mesh::{TetMesh, tet::EDGES};
 use glam::BVec3;
 

@@ -2,8 +2,8 @@
 //! oracle is [`crate::bodies::hybrid::mass_matrix`].
 use crate::{
     bodies::hybrid::{
-        body::{HybridBody, NO_WEIGHT},
-        composite::Anchor,
+        body::HybridBody,
+        composite::{Anchor, NO_WEIGHT},
         partition::NONE,
         patch::KEPT,
     },
