@@ -11,7 +11,7 @@
 //! can be touched: far from the body a tick costs two additions per tool and substep. A box is at least as far from an
 //! axis as from the axis's centre, less half its length; the same holds for pieces of the axis
 //! ([`Axis::distance_bound_m`]).
-use super::axis::Axis;
+use super::{CarriersThen, axis::Axis};
 use crate::mesh::Surface;
 use glam::DVec3;
 use std::ops::Range;
@@ -102,6 +102,19 @@ pub(crate) trait Skin {
     fn vertices(&self, cluster: usize) -> &[u32];
     /// Returns the position (m) of a vertex.
     fn position_m(&self, vertex: u32) -> DVec3;
+
+    /// Writes the positions (m) of all vertices.
+    fn place(&mut self, x: &mut [DVec3]) {
+        (0..).zip(x).for_each(|(vertex, x_m)| *x_m = self.position_m(vertex));
+    }
+
+    /// Notes where what carries the skin is.
+    fn remember(&self, _: &mut CarriersThen) {}
+
+    /// Returns a bound of how far (m) any vertex is from where it was then. Nothing is known of a skin that notes nothing.
+    fn moved_m(&self, _: &CarriersThen) -> f64 {
+        f64::INFINITY
+    }
 }
 
 /// Triangles that a tool may touch, and how far things may move before the list is out of date.

@@ -6,6 +6,7 @@
 mod axis;
 mod axis_samples;
 pub(crate) mod broad;
+mod carriers;
 mod clutch;
 mod depth;
 mod following;
@@ -36,6 +37,7 @@ mod turning;
 
 pub(crate) use axis_samples::Near;
 pub(crate) use broad::Skin;
+pub(crate) use carriers::{CarriersThen, MostCarriers};
 pub use following::{CoupledFollowing, Following};
 pub use inside::is_inside;
 pub use local_torque::LocalTorqueModel;

@@ -1,5 +1,5 @@
 //! The skin of a body at rest, from which contact is built.
-use super::SurfaceModuli;
+use super::{MostCarriers, SurfaceModuli};
 use crate::mesh::Surface;
 use glam::DVec3;
 
@@ -20,6 +20,8 @@ pub(crate) struct SkinAtRest<'a> {
     pub(crate) max_natural_frequency_rad_per_s: f64,
     /// How far apart (m) particles are of which the skin follows means; `None` where it follows no means.
     pub(crate) means_over_m: Option<f64>,
+    /// What carries the skin.
+    pub(crate) carriers: MostCarriers,
 }
 
 impl SkinAtRest<'_> {

@@ -1,7 +1,7 @@
 //! Builds a hybrid body and its environment from a specification.
 use super::{HybridBody, HybridError, HybridSpec, body::Built};
 use crate::{
-    contact::{ContactModel, SkinAtRest, moduli},
+    contact::{ContactModel, MostCarriers, SkinAtRest, moduli},
     mesh::Surface,
     settings::Integrator,
     tick::{Environment, EnvironmentSpec, Steps, free_inverse_mass, progress as building, stiffening},
@@ -50,6 +50,7 @@ impl HybridBody {
             bearing_kg: &bearing_kg,
             max_natural_frequency_rad_per_s: omega,
             means_over_m: hybrid.particles().smooth_skin.then(|| hybrid.particles().spacing_m),
+            carriers: MostCarriers { nodes: hybrid.node_count(), particles: hybrid.particles().most_active },
         };
         let contact = ContactModel::build(&skin, &around.tools).with_walls(around.walls_of(&skin));
         hybrid.cluster(contact.triangles());

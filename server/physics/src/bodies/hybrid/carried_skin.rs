@@ -1,6 +1,9 @@
 //! What carries the skin's vertices; their positions are computed when they are asked for.
 use super::{body::HybridBody, clusters::Displaced, composite::Anchor, partition::NONE, running::RunningPatch};
-use crate::{contact::Skin, tick::CarriedSkin};
+use crate::{
+    contact::{CarriersThen, Skin},
+    tick::CarriedSkin,
+};
 use glam::DVec3;
 
 /// A vertex of the skin: its rest position, and the particles that carry it.
@@ -35,18 +38,33 @@ pub(crate) struct SkinView<'a> {
     patch: &'a RunningPatch,
     /// Velocities (m/s) of coarse nodes and then active particles; empty where no vertex's velocity is asked for.
     v: &'a [DVec3],
+    /// A buffer for the displacements (m) of the particles that carry the skin; empty where not all vertices are placed.
+    carriers_m: &'a mut [DVec3],
     deviation_m: f64,
 }
 
 impl<'a> SkinView<'a> {
     /// Views the skin where the patch was displaced to.
     pub(crate) fn new(hybrid: &'a HybridBody, patch: &'a RunningPatch) -> Self {
-        Self { hybrid, patch, v: &[], deviation_m: 0.0 }
+        Self { hybrid, patch, v: &[], carriers_m: &mut [], deviation_m: 0.0 }
     }
 
     /// Returns the same view with velocities (m/s) of coarse nodes and then active particles.
     pub(crate) fn moving(self, v: &'a [DVec3]) -> Self {
         Self { v, ..self }
+    }
+
+    /// Returns the same view with a buffer for the displacements (m) of all particles that carry the skin.
+    pub(crate) fn with_buffer(self, carriers_m: &'a mut [DVec3]) -> Self {
+        Self { carriers_m, ..self }
+    }
+
+    /// Returns the displacement (m) of a particle.
+    fn displacement_m(&self, particle: u32, anchor: &Anchor) -> DVec3 {
+        match self.patch.point_of(particle) {
+            NONE => anchor.of(self.patch.node_displacements_m()),
+            point => self.patch.displacements_m()[point as usize],
+        }
     }
 
     fn displaced(&self, by_particles: bool) -> Displaced<'_> {
@@ -83,12 +101,55 @@ impl Skin for SkinView<'_> {
 
     fn position_m(&self, vertex: u32) -> DVec3 {
         let carriers = &self.hybrid.skin_carriers;
-        let of = |particle: u32| match self.patch.point_of(particle) {
-            NONE => carriers.anchor(particle).of(self.patch.node_displacements_m()),
-            point => self.patch.displacements_m()[point as usize],
-        };
+        let of = |particle: u32| self.displacement_m(particle, carriers.anchor(particle));
         let moved: DVec3 = carriers.of_vertex(vertex).iter().map(|&(particle, weight)| of(particle) * weight).sum();
         self.hybrid.skin_rest_m()[vertex as usize] + moved
+    }
+
+    /// A particle carries many vertices: each is displaced once.
+    fn place(&mut self, x: &mut [DVec3]) {
+        let carriers = &self.hybrid.skin_carriers;
+        let buffer = std::mem::take(&mut self.carriers_m);
+        if buffer.len() == carriers.particles().len() {
+            for (slot, (particle, anchor)) in buffer.iter_mut().zip(carriers.particles()) {
+                *slot = self.displacement_m(particle, anchor);
+            }
+            for ((vertex, x_m), rest_m) in (0..).zip(x).zip(self.hybrid.skin_rest_m()) {
+                *x_m = *rest_m + carriers.moved_m(vertex, buffer);
+            }
+        } else {
+            (0..).zip(x).for_each(|(vertex, x_m)| *x_m = self.position_m(vertex));
+        }
+        self.carriers_m = buffer;
+    }
+
+    fn remember(&self, then: &mut CarriersThen) {
+        let particles_m = self.patch.active_displacements_m().map(|(particle, _, u)| (particle, u));
+        then.remember(self.patch.node_displacements_m(), particles_m);
+    }
+
+    /// Vertices follow particles, and those the coarse nodes unless they are active or were: none moved by more than
+    /// `A max(|Δu_i|, |Δu_p|)` over nodes and such particles ([`HybridBody::amplification`]).
+    fn moved_m(&self, then: &CarriersThen) -> f64 {
+        let (nodes_m, carriers) = (self.patch.node_displacements_m(), &self.hybrid.skin_carriers);
+        let pairs = nodes_m.iter().zip(then.nodes_m());
+        let mut farthest_sq = pairs.map(|(now, then)| now.distance_squared(*then)).fold(0.0, f64::max);
+        let mut fell_asleep = |&(particle, then_m): &(u32, DVec3)| {
+            let now_m = if carriers.has(particle) { carriers.anchor(particle).of(nodes_m) } else { then_m };
+            farthest_sq = f64::max(farthest_sq, now_m.distance_squared(then_m));
+        };
+        let mut earlier = then.particles_m().iter().peekable();
+        let mut active_sq = 0.0;
+        for (particle, anchor, now_m) in self.patch.active_displacements_m() {
+            while let Some(other) = earlier.next_if(|(other, _)| *other < particle) {
+                fell_asleep(other);
+            }
+            let was_active = earlier.next_if(|(other, _)| *other == particle);
+            let then_m = was_active.map_or_else(|| anchor.of(then.nodes_m()), |(_, then_m)| *then_m);
+            active_sq = f64::max(active_sq, now_m.distance_squared(then_m));
+        }
+        earlier.for_each(fell_asleep);
+        self.hybrid.amplification * farthest_sq.max(active_sq).sqrt()
     }
 }
 
@@ -234,5 +295,64 @@ impl HybridBody {
             }
         }
         springs
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{
+        bodies::hybrid::{
+            prestrain::PrestrainDecay,
+            testing::{Random, hybrid_ball, tissue},
+        },
+        contact::MostCarriers,
+        settings::Precision,
+    };
+
+    /// Returns a patch with these particles awake, its nodes and particles displaced at random.
+    fn displaced(body: &HybridBody, active: &[u32], size_m: f64, random: &mut Random) -> RunningPatch {
+        let mut patch = RunningPatch::new(body, 2000, Precision::Double);
+        patch.wake(body, active, &PrestrainDecay::default());
+        let rest = body.partition.coarse().positions_m().iter().copied();
+        let of_particles = active.iter().map(|&particle| body.partition.particle_m(particle));
+        let x: Vec<DVec3> = rest.chain(of_particles).map(|rest| rest + random.vector() * size_m).collect();
+        patch.displace(body, &x);
+        patch
+    }
+
+    #[test]
+    fn vertices_are_placed_alike_and_never_move_farther_than_their_carriers_tell() {
+        let [material, other, _] = tissue();
+        let body = hybrid_ball(&[material, other]);
+        let all: Vec<u32> = (0..body.partition.particle_count() as u32).filter(|&p| body.may_wake(p)).collect();
+        let some = |of: fn(DVec3) -> bool| -> Vec<u32> {
+            all.iter().copied().filter(|&particle| of(body.partition.particle_m(particle))).collect()
+        };
+        let sets = [vec![], some(|p| p.x > 2e-3), some(|p| p.y > -2e-3), all.clone()];
+        let most = MostCarriers { nodes: body.node_count(), particles: all.len() };
+        let mut random = Random(17);
+        let mut buffer = vec![DVec3::ZERO; body.skin_carriers.particles().len()];
+        let mut place = |patch: &RunningPatch| {
+            let mut x = vec![DVec3::NAN; body.skin_rest_m().len()];
+            SkinView::new(&body, patch).with_buffer(&mut buffer).place(&mut x);
+            for (vertex, x) in (0..).zip(&x) {
+                assert_eq!(*x, SkinView::new(&body, patch).position_m(vertex));
+            }
+            x
+        };
+        for (before, after) in sets.iter().flat_map(|before| sets.iter().map(move |after| (before, after))) {
+            for size_m in [1e-6, 1e-3] {
+                let then = displaced(&body, before, size_m, &mut random);
+                let now = displaced(&body, after, size_m, &mut random);
+                let mut carriers_then = CarriersThen::with_room(most);
+                SkinView::new(&body, &then).remember(&mut carriers_then);
+                let bound_m = SkinView::new(&body, &now).moved_m(&carriers_then);
+                let moved_m = place(&then).iter().zip(place(&now)).map(|(a, b)| a.distance(b)).fold(0.0, f64::max);
+                assert!(moved_m <= bound_m, "{moved_m} {bound_m}");
+                assert!(bound_m < 3.0 * body.amplification * size_m * 2.0, "{bound_m}");
+                assert_eq!(SkinView::new(&body, &then).moved_m(&carriers_then), 0.0);
+            }
+        }
     }
 }

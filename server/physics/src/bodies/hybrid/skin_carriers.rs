@@ -32,6 +32,8 @@ pub(super) struct SkinCarriers {
     carriers: Vec<(u32, f64)>,
     /// Number in `anchors` of every particle, [`NONE`] of those that carry no vertex.
     number_of: Vec<u32>,
+    /// Particles that carry vertices, in the order in which they were found.
+    particles: Vec<u32>,
     anchors: Vec<Anchor>,
 }
 
@@ -60,6 +62,7 @@ impl SkinCarriers {
         let number = &mut self.number_of[particle as usize];
         if *number == NONE {
             *number = self.anchors.len() as u32;
+            self.particles.push(particle);
             self.anchors.push(partition.anchor(particle));
         }
     }
@@ -82,6 +85,22 @@ impl SkinCarriers {
     /// Returns the anchor of a particle that carries a vertex.
     pub(super) fn anchor(&self, particle: u32) -> &Anchor {
         &self.anchors[self.number_of[particle as usize] as usize]
+    }
+
+    /// Returns whether a particle carries any vertex.
+    pub(super) fn has(&self, particle: u32) -> bool {
+        self.number_of[particle as usize] != NONE
+    }
+
+    /// Returns the particles that carry vertices, with their anchors.
+    pub(super) fn particles(&self) -> impl ExactSizeIterator<Item = (u32, &Anchor)> {
+        self.particles.iter().copied().zip(&self.anchors)
+    }
+
+    /// Returns `Σ w_p u_p` (m) of a vertex, with the displacements (m) of [`Self::particles`].
+    pub(super) fn moved_m(&self, vertex: u32, displacements_m: &[DVec3]) -> DVec3 {
+        let of = |particle: u32| displacements_m[self.number_of[particle as usize] as usize];
+        self.of_vertex(vertex).iter().map(|&(particle, weight)| of(particle) * weight).sum()
     }
 }
 

@@ -1,7 +1,7 @@
 //! Builds a mass-spring surface and its environment from specifications.
 use super::{MassSpringBody, MassSpringError, MassSpringSpec};
 use crate::{
-    contact::{ContactModel, SkinAtRest},
+    contact::{ContactModel, MostCarriers, SkinAtRest},
     settings::Integrator,
     tick::{Environment, EnvironmentError, EnvironmentSpec, Steps, free_inverse_mass},
 };
@@ -33,6 +33,7 @@ impl MassSpringBody {
             bearing_kg: &bearing_kg,
             max_natural_frequency_rad_per_s: omega,
             means_over_m: None,
+            carriers: MostCarriers::default(),
         };
         let contact = ContactModel::build(&skin, &around.tools);
         body.cluster(contact.triangles());

@@ -3,7 +3,7 @@ use super::{
     LayerSpec, SeedBodyState, SeedError, SeedModel, SeedParameters, SeedSpec, core::outer_part, layer::enclosed_m3,
 };
 use crate::{
-    contact::{ContactModel, SkinAtRest, SurfaceModuli},
+    contact::{ContactModel, MostCarriers, SkinAtRest, SurfaceModuli},
     elements::{
         rest_stiffness::{RestStiffness, max_natural_frequency_rad_per_s},
         solid::Solid,
@@ -100,6 +100,7 @@ impl SeedBody {
             bearing_kg: &bearing_kg,
             max_natural_frequency_rad_per_s: contact_rad_per_s,
             means_over_m: None,
+            carriers: MostCarriers::default(),
         };
         let contact = ContactModel::build(&skin, &around.tools);
         demand_soft_couplings(&contact, &model)?;

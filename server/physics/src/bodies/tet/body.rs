@@ -1,7 +1,7 @@
 //! What the rest state of a body of tetrahedra fixes.
 use super::TetBodyError;
 use crate::{
-    contact::{ContactModel, SkinAtRest, SurfaceModuli, moduli},
+    contact::{ContactModel, MostCarriers, SkinAtRest, SurfaceModuli, moduli},
     elements::{
         free_axes::FreeAxes,
         linear_tet::RestTet,
@@ -73,6 +73,7 @@ impl TetBody {
             bearing_kg: &body.mass_kg,
             max_natural_frequency_rad_per_s: omega,
             means_over_m: None,
+            carriers: MostCarriers::default(),
         };
         let contact = ContactModel::build(&skin, &spec.tools).with_walls(spec.walls_of(&skin));
         let stretch_sq = stiffening(settings, &body.materials);

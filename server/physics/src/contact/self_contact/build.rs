@@ -39,6 +39,7 @@ impl SelfContact {
             close: Rows::default(),
             reach_m: 0.0,
             stride_m: 0.0,
+            carriers: skin.carriers,
             left_out: 0,
             normals: triangles
                 .nodes
@@ -68,7 +69,8 @@ impl SelfContact {
 
     /// Returns an empty list with room for what may meet.
     pub(in crate::contact) fn no_walls(&self) -> NearWalls {
-        NearWalls::with_room(self.nodes.iter().filter(|at| at.stiffness_n_per_m > 0.0).count(), self.rest_m.len())
+        let vertices = self.nodes.iter().filter(|at| at.stiffness_n_per_m > 0.0).count();
+        NearWalls::with_room(vertices, self.rest_m.len(), self.carriers)
     }
 
     /// Returns buffers.

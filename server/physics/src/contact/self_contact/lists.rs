@@ -1,6 +1,6 @@
 //! The vertices and triangles that may meet before the surface has moved some way, in a list that never grows.
 
-use crate::contact::broad::ROUNDING_M;
+use crate::contact::{CarriersThen, MostCarriers, broad::ROUNDING_M};
 use glam::DVec3;
 
 /// Most pairs that are listed, per vertex of the skin, and at least.
@@ -40,6 +40,8 @@ pub(in crate::contact) struct NearWalls {
     awake_m: f64,
     /// Where (m) the nodes were when the list was made.
     then_m: Box<[DVec3]>,
+    /// Where what carries the nodes was then, if they are vertices of a skin.
+    pub(super) carriers_then: CarriersThen,
 }
 
 impl Default for NearWalls {
@@ -53,17 +55,19 @@ impl Default for NearWalls {
             energy_j: None,
             awake_m: 0.0,
             then_m: Box::default(),
+            carriers_then: CarriersThen::default(),
         }
     }
 }
 
 impl NearWalls {
-    /// Makes room for pairs of so many vertices, among so many nodes.
-    pub(super) fn with_room(vertices: usize, nodes: usize) -> Self {
+    /// Makes room for pairs of so many vertices, among so many nodes, and for what carries these.
+    pub(super) fn with_room(vertices: usize, nodes: usize, carriers: MostCarriers) -> Self {
         let room = (PAIRS_PER_VERTEX * vertices).max(AT_LEAST);
         let none = Pair { node: 0, triangle: 0, free_m: 0.0 };
         let then_m = vec![DVec3::ZERO; nodes].into_boxed_slice();
-        Self { pairs: vec![none; room].into_boxed_slice(), then_m, ..Self::default() }
+        let carriers_then = CarriersThen::with_room(carriers);
+        Self { pairs: vec![none; room].into_boxed_slice(), then_m, carriers_then, ..Self::default() }
     }
 
     /// Returns the pairs, sorted by vertex and then by triangle.
@@ -81,15 +85,19 @@ impl NearWalls {
         self.then_m.copy_from_slice(x);
     }
 
-    /// Looks, where the surface's travel has used the list up, how far it really is from where it was: what trembles
+    /// Looks, where the surface's travel has used the list up, how far (m) it really is from where it was: what trembles
     /// travels far and goes nowhere. Returns whether the list is good for some time after all.
-    pub(super) fn is_still_good(&mut self, x: &[DVec3]) -> bool {
+    pub(super) fn is_still_good(&mut self, moved_m: impl FnOnce(&Self) -> f64) -> bool {
         if !self.slack_m.is_finite() {
             return false;
         }
-        let farthest_sq = x.iter().zip(&self.then_m).map(|(now, then)| now.distance_squared(*then)).fold(0.0, f64::max);
-        self.slack_m = self.whole_slack_m - farthest_sq.sqrt() - ROUNDING_M;
+        self.slack_m = self.whole_slack_m - moved_m(self) - ROUNDING_M;
         self.slack_m > WORTH_KEEPING * self.whole_slack_m
+    }
+
+    /// Returns how far (m) the farthest of nodes at `x` (m) is from where it was when the list was made.
+    pub(super) fn farthest_m(&self, x: &[DVec3]) -> f64 {
+        x.iter().zip(&self.then_m).map(|(now, then)| now.distance_squared(*then)).fold(0.0, f64::max).sqrt()
     }
 
     /// Returns the pairs that may be within reach until the surface has moved some way.

@@ -21,6 +21,8 @@ use glam::DVec3;
 /// Size of a cluster over that at rest from which it is torn. In a step that was too long and will be repeated, the body may
 /// be anywhere, and would be looked at vertex by vertex for seconds.
 const TORN: f64 = 8.0;
+/// Number of clusters that are ruled out together.
+const GROUP: usize = 32;
 
 /// Buffers of queries and of pressing, sized once.
 #[derive(Debug, Clone, Default)]
@@ -28,6 +30,8 @@ pub(in crate::contact) struct WallScratch {
     /// Positions (m) of the vertices of a skin whose vertices are no nodes.
     pub(super) x: Vec<DVec3>,
     clusters: Vec<ClusterNow>,
+    /// The boxes (m) around [`GROUP`] clusters each.
+    groups: Vec<[DVec3; 2]>,
     /// `Σ_j |K_ij|` (N/m) of the nodes that are pressed, else 0.
     pub(super) rows_n_per_m: Vec<f64>,
     /// Largest of them over mass (1/s²) in the tick so far.
@@ -60,6 +64,7 @@ impl WallScratch {
         Self {
             x: walls.rest_m.clone(),
             clusters: (0..walls.clusters.len()).map(|cluster| walls.cluster_now(cluster, &walls.rest_m)).collect(),
+            groups: vec![[DVec3::ZERO; 2]; walls.clusters.len().div_ceil(GROUP)],
             rows_n_per_m: vec![0.0; nodes],
             ..Self::default()
         }
@@ -70,13 +75,14 @@ impl WallScratch {
 struct Query<'a> {
     x: &'a [DVec3],
     clusters: &'a [ClusterNow],
+    groups: &'a [[DVec3; 2]],
     near: &'a mut NearWalls,
 }
 
 impl SelfContact {
     /// Renews the list of what may meet with nodes at `x` (m), where it is out of date. Returns whether it was.
     pub(super) fn renew(&self, x: &[DVec3], exhaustive: bool, near: &mut NearWalls, scratch: &mut WallScratch) -> bool {
-        if near.slack_m > 0.0 || near.is_still_good(x) {
+        if near.slack_m > 0.0 || near.is_still_good(|near| near.farthest_m(x)) {
             return false;
         }
         self.query(x, exhaustive, near, scratch);
@@ -95,7 +101,11 @@ impl SelfContact {
         for (cluster, now) in scratch.clusters.iter_mut().enumerate() {
             *now = self.cluster_now(cluster, x);
         }
-        let mut query = Query { x, clusters: &scratch.clusters, near };
+        for (group, clusters) in scratch.groups.iter_mut().zip(scratch.clusters.chunks(GROUP)) {
+            let none = [DVec3::INFINITY, DVec3::NEG_INFINITY];
+            *group = clusters.iter().fold(none, |[low, high], now| [low.min(now.low_m), high.max(now.high_m)]);
+        }
+        let mut query = Query { x, clusters: &scratch.clusters, groups: &scratch.groups, near };
         let slack_m = (0..self.clusters.len())
             .map(|cluster| f64::min(self.look_close(cluster, &mut query), self.look_far(cluster, &mut query)))
             .fold(f64::INFINITY, f64::min);
@@ -152,10 +162,19 @@ impl SelfContact {
         }
         slack_m = f64::INFINITY;
         let mut close = self.close.row(one).iter().map(|entry| entry.cluster as usize).peekable();
-        for other in 0..self.clusters.len() {
-            let is_close = close.next_if_eq(&other).is_some();
-            if !is_close && (other >= one || left_m(other, query) >= self.stride_m) {
-                slack_m = slack_m.min(self.pair([one, other], None, query));
+        let now = query.clusters[one];
+        for (group, of_group) in query.groups.iter().enumerate() {
+            let bound_m = boxes_distance_m([now.low_m, now.high_m], *of_group);
+            if bound_m >= self.listed_m() {
+                slack_m = slack_m.min(0.5 * (bound_m - self.reach_m));
+                continue;
+            }
+            for other in group * GROUP..((group + 1) * GROUP).min(self.clusters.len()) {
+                while close.next_if(|close| *close < other).is_some() {}
+                let is_close = close.peek() == Some(&other);
+                if !is_close && (other >= one || left_m(other, query) >= self.stride_m) {
+                    slack_m = slack_m.min(self.pair([one, other], None, query));
+                }
             }
         }
         slack_m
@@ -179,11 +198,16 @@ impl SelfContact {
             Some(free_m) => (free_m - a.differs_m(b.least_m, b.most_m)).max(a.distance_m(b)),
             None => a.distance_m(b),
         };
-        if bound_m >= self.reach_m + 2.0 * self.stride_m {
+        if bound_m >= self.listed_m() {
             return 0.5 * (bound_m - self.reach_m);
         }
         let slack_m = self.list(one, other, free_m.is_some(), query);
         if one == other { slack_m } else { slack_m.min(self.list(other, one, free_m.is_some(), query)) }
+    }
+
+    /// Returns the distance (m) within which what may meet is listed, whatever vertex it is.
+    fn listed_m(&self) -> f64 {
+        self.reach_m + 2.0 * self.stride_m
     }
 
     fn is_torn(&self, cluster: usize, now: &ClusterNow) -> bool {

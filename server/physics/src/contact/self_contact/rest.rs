@@ -1,5 +1,5 @@
 //! What self-contact needs of the body at rest.
-use crate::contact::{broad::Triangles, triangle::closest_weights};
+use crate::contact::{MostCarriers, broad::Triangles, triangle::closest_weights};
 use glam::DVec3;
 
 /// Gap over the size of the skin's triangles below which walls press each other.
@@ -47,6 +47,8 @@ pub(crate) struct SelfContact {
     pub(super) reach_m: f64,
     /// How far (m) the surface may move at least between two queries.
     pub(super) stride_m: f64,
+    /// What carries the skin, if its vertices are no nodes.
+    pub(super) carriers: MostCarriers,
     /// Number of vertices that are left out because the body lies against itself there at rest.
     pub(super) left_out: usize,
 }

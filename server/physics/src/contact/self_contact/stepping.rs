@@ -22,18 +22,22 @@ impl ContactModel {
     /// Renews the list of what may meet on a skin, where it is out of date. Returns whether more may be within reach.
     pub(crate) fn list_walls_on_skin(
         &self,
-        skin: &impl Skin,
+        skin: &mut impl Skin,
         contact: &mut ContactState,
         scratch: &mut ContactScratch,
     ) -> bool {
         let Some(walls) = self.walls() else { return false };
-        if contact.walls.slack_m > 0.0 {
-            return contact.walls.wakes_more();
+        let near = &mut contact.walls;
+        if near.slack_m > 0.0 || near.is_still_good(|near| skin.moved_m(&near.carriers_then)) {
+            return near.wakes_more();
         }
         let mut x = std::mem::take(&mut scratch.walls.x);
-        (0..).zip(&mut x).for_each(|(vertex, x_m)| *x_m = skin.position_m(vertex));
-        let renewed = walls.renew(&x, scratch.exhaustive, &mut contact.walls, &mut scratch.walls);
+        skin.place(&mut x);
+        let renewed = walls.renew(&x, scratch.exhaustive, near, &mut scratch.walls);
         scratch.walls.x = x;
+        if renewed {
+            skin.remember(&mut near.carriers_then);
+        }
         renewed || contact.walls.wakes_more()
     }
 

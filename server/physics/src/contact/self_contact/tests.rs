@@ -1,7 +1,7 @@
 //! Self-contact by itself, of a clamp whose arms are put together.
 use super::{NearWalls, SelfContact, rest::NodeAtRest};
 use crate::{
-    contact::{SkinAtRest, SurfaceModuli},
+    contact::{MostCarriers, SkinAtRest, SurfaceModuli},
     mesh::{Surface, TetMesh},
     testing::{Random, tet_box},
 };
@@ -37,6 +37,7 @@ fn walls_of(mesh: &TetMesh, only_if_facing: bool) -> Option<SelfContact> {
         bearing_kg: &mass_kg,
         max_natural_frequency_rad_per_s: 5e3,
         means_over_m: None,
+        carriers: MostCarriers::default(),
     };
     SelfContact::build(&skin, only_if_facing)
 }

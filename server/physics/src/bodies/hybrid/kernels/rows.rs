@@ -170,10 +170,10 @@ impl RowKernel {
     pub fn set_velocities(&mut self, v: &[DVec3]) {
         match &mut self.layout {
             Layout::Single(Rows { arrays, .. }) if !arrays.velocities[0].is_empty() => {
-                put(&mut arrays.velocities, v.iter().copied())
+                put(&mut arrays.velocities, v.iter().copied());
             }
             Layout::Double(Rows { arrays, .. }) if !arrays.velocities[0].is_empty() => {
-                put(&mut arrays.velocities, v.iter().copied())
+                put(&mut arrays.velocities, v.iter().copied());
             }
             Layout::Single(_) | Layout::Double(_) => {}
         }

@@ -160,10 +160,16 @@ impl RunningPatch {
         &self.node_displacements_m
     }
 
+    /// Returns the active particles, ascending, each with its anchor and its displacement (m).
+    pub(super) fn active_displacements_m(&self) -> impl Iterator<Item = (u32, &Anchor, DVec3)> {
+        let active = self.points.iter().zip(&self.displacements_m).filter(|(point, _)| point.active != NONE);
+        active.map(|(point, u)| (point.particle, &point.anchor, *u))
+    }
+
     /// Returns the active particles, each with its distance (m) from where it would be asleep.
     pub(super) fn deviations_m(&self) -> impl Iterator<Item = (u32, f64)> + '_ {
-        let active = self.points.iter().zip(&self.displacements_m).filter(|(point, _)| point.active != NONE);
-        active.map(|(point, u)| (point.particle, u.distance(point.anchor.of(&self.node_displacements_m))))
+        let active = self.active_displacements_m();
+        active.map(|(particle, anchor, u)| (particle, u.distance(anchor.of(&self.node_displacements_m))))
     }
 
     /// Returns the largest distance (m) of [`Self::deviations_m`].
