@@ -13,6 +13,7 @@ use super::{
     sites::Sites,
     sizes,
     skin_carriers::SkinCarriers,
+    skin_influence::SkinInfluence,
     spec::{HybridError, ParticleSpec},
     transition_force::is_free,
     trilinear_point::CellPoint,
@@ -59,8 +60,8 @@ pub struct HybridBody {
     pub(super) vertex_points: Vec<CellPoint>,
     /// The particles that carry these.
     pub(super) skin_carriers: SkinCarriers,
-    /// Bound of the speed of any vertex of the skin over that of the fastest node or particle.
-    pub(super) amplification: f64,
+    /// How much coarse nodes move the skin.
+    pub(super) skin_influence: SkinInfluence,
     /// Bounding boxes of the skin's triangles.
     pub(super) clusters: SkinClusters,
     pub(super) densities_kg_per_m3: Vec<f64>,
@@ -160,7 +161,7 @@ impl HybridBody {
             free_parts: free.iter().map(|free| DVec3::select(*free, DVec3::ONE, DVec3::ZERO)).collect(),
             free,
             may_wake,
-            amplification: skin_carriers.amplification(),
+            skin_influence: SkinInfluence::new(&skin_carriers, masses.node_kg.len()),
             skin_carriers,
             vertex_points,
             clusters: SkinClusters::default(),
@@ -283,7 +284,7 @@ impl HybridBody {
 
     /// Returns a bound of the speed of any vertex of the skin over that of the fastest node or particle.
     pub(crate) fn amplification(&self) -> f64 {
-        self.amplification
+        self.skin_influence.amplification()
     }
 
     /// Computes the bounding boxes of the skin's triangles, given in the order of contact's broad phase.
@@ -373,7 +374,7 @@ fn covering(
 fn may_wake(partition: &Partition, free: &[BVec3], particle: u32) -> bool {
     let anchor = partition.anchor(particle);
     let mut follows = anchor.nodes.iter().zip(anchor.weights).filter(|(_, weight)| *weight >= NO_WEIGHT);
-    anchor.weights.iter().all(|&weight| weight > -NO_WEIGHT)
+    anchor.is_inside()
         && follows.clone().all(|(&node, _)| free[node as usize].all() || !free[node as usize].any())
         && follows.any(|(&node, _)| free[node as usize].all())
 }

@@ -71,7 +71,7 @@ impl<'a> SkinView<'a> {
         Displaced {
             displacements_m: self.patch.node_displacements_m(),
             deviation_m: if by_particles { self.deviation_m } else { 0.0 },
-            amplification: self.hybrid.amplification,
+            amplification: self.hybrid.amplification(),
         }
     }
 }
@@ -128,18 +128,15 @@ impl Skin for SkinView<'_> {
         then.remember(self.patch.node_displacements_m(), particles_m);
     }
 
-    /// Vertices follow particles, and those the coarse nodes unless they are active or were: none moved by more than
-    /// `A max(|Δu_i|, |Δu_p|)` over nodes and such particles ([`HybridBody::amplification`]).
+    /// Vertices follow particles, and those the coarse nodes unless they are active or were ([`super::skin_influence`]).
     fn moved_m(&self, then: &CarriersThen) -> f64 {
         let (nodes_m, carriers) = (self.patch.node_displacements_m(), &self.hybrid.skin_carriers);
-        let pairs = nodes_m.iter().zip(then.nodes_m());
-        let mut farthest_sq = pairs.map(|(now, then)| now.distance_squared(*then)).fold(0.0, f64::max);
+        let (mut asleep_sq, mut active_sq) = (0.0, 0.0);
         let mut fell_asleep = |&(particle, then_m): &(u32, DVec3)| {
             let now_m = if carriers.has(particle) { carriers.anchor(particle).of(nodes_m) } else { then_m };
-            farthest_sq = f64::max(farthest_sq, now_m.distance_squared(then_m));
+            asleep_sq = f64::max(asleep_sq, now_m.distance_squared(then_m));
         };
         let mut earlier = then.particles_m().iter().peekable();
-        let mut active_sq = 0.0;
         for (particle, anchor, now_m) in self.patch.active_displacements_m() {
             while let Some(other) = earlier.next_if(|(other, _)| *other < particle) {
                 fell_asleep(other);
@@ -149,7 +146,8 @@ impl Skin for SkinView<'_> {
             active_sq = f64::max(active_sq, now_m.distance_squared(then_m));
         }
         earlier.for_each(fell_asleep);
-        self.hybrid.amplification * farthest_sq.max(active_sq).sqrt()
+        let node_sq = |node: usize| nodes_m[node].distance_squared(then.nodes_m()[node]);
+        self.hybrid.skin_influence.bound(node_sq, f64::max(asleep_sq, active_sq))
     }
 }
 
@@ -221,6 +219,14 @@ impl CarriedSkin for SkinView<'_> {
 }
 
 impl HybridBody {
+    /// Returns a bound of the speed (m/s) of any vertex of the skin, at velocities `v` (m/s) of coarse nodes and then of
+    /// active particles.
+    pub(crate) fn fastest_of_skin_m_per_s(&self, v: &[DVec3]) -> f64 {
+        let (of_nodes, of_particles) = v.split_at(self.node_count());
+        let particles_sq = of_particles.iter().map(|v| v.length_squared()).fold(0.0, f64::max);
+        self.skin_influence.bound(|node| of_nodes[node].length_squared(), particles_sq)
+    }
+
     /// Returns the position (m) of a vertex of the skin, at positions `x` (m) of coarse nodes and then of the active
     /// particles `active`.
     pub fn vertex_m(&self, vertex: u32, active: &[u32], x: &[DVec3]) -> DVec3 {
@@ -350,7 +356,7 @@ mod tests {
                 let bound_m = SkinView::new(&body, &now).moved_m(&carriers_then);
                 let moved_m = place(&then).iter().zip(place(&now)).map(|(a, b)| a.distance(b)).fold(0.0, f64::max);
                 assert!(moved_m <= bound_m, "{moved_m} {bound_m}");
-                assert!(bound_m < 3.0 * body.amplification * size_m * 2.0, "{bound_m}");
+                assert!(bound_m < 3.0 * body.amplification() * size_m * 2.0, "{bound_m}");
                 assert_eq!(SkinView::new(&body, &then).moved_m(&carriers_then), 0.0);
             }
         }

@@ -49,18 +49,25 @@ pub struct Anchor {
 }
 
 impl Anchor {
-    /// Returns the weights by which the mass of what follows the nodes is spread on them: those of a point outside the
-    /// coarse tets without the negative ones, and of sum one again.
+    /// Returns weights `a_i ≥ 0` with which lumped masses `m a_i Σ_j a_j` on the nodes have no less kinetic energy than the
+    /// point, of mass `m`: `|ζ_i|`. Inside the coarse tets the lumped masses are `m ζ_i`; outside, where some weights are
+    /// negative, they sum to more than `m`.
     ///
-    /// What is outside never wakes. If it took mass from nodes by negative weights, those that wake could take more from
-    /// there than is left, and the mass matrix would not be positive definite (`mass_matrix`).
-    pub fn mass_weights(&self) -> [f64; 4] {
-        if self.weights.iter().all(|weight| *weight > -NO_WEIGHT) {
-            return self.weights;
-        }
-        let positive = self.weights.map(|weight| weight.max(0.0));
-        let sum: f64 = positive.iter().sum();
-        positive.map(|weight| weight / sum)
+    /// By Cauchy's inequality, `|Σ ζ_i v_i|² ≤ Σ_j |ζ_j| Σ_i |ζ_i| |v_i|²`.
+    pub fn bearing_weights(&self) -> [f64; 4] {
+        if self.is_inside() { self.weights } else { self.weights.map(f64::abs) }
+    }
+
+    /// Returns the lumped masses (kg) on the nodes of a point of mass `mass_kg` ([`Self::bearing_weights`]).
+    pub fn lumped_kg(&self, mass_kg: f64) -> [f64; 4] {
+        let weights = self.bearing_weights();
+        let sum = if self.is_inside() { 1.0 } else { weights.iter().sum() };
+        weights.map(|weight| mass_kg * weight * sum)
+    }
+
+    /// Returns whether no weight is negative.
+    pub fn is_inside(&self) -> bool {
+        self.weights.iter().all(|weight| *weight > -NO_WEIGHT)
     }
 
     /// Returns `Σ ζ_i a_i`.

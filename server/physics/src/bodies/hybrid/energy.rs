@@ -32,7 +32,10 @@ impl HybridBody {
         let moved = |list: &[DVec3], rest: &[DVec3]| -> Vec<DVec3> {
             list.iter().zip(rest).map(|(x, rest)| *x - *rest).collect()
         };
-        let of_nodes: DVec3 = mass_matrix.momenta(&moved(&at.nodes, &rest.nodes)).iter().sum();
+        let moved_m = moved(&at.nodes, &rest.nodes);
+        let weights = self.masses.node_weight_kg.iter().zip(&self.masses.node_kg);
+        let beside: DVec3 = moved_m.iter().zip(weights).map(|(u, (weight, mass))| *u * (weight - mass)).sum();
+        let of_nodes = mass_matrix.momenta(&moved_m).iter().sum::<DVec3>() + beside;
         let particles = moved(&at.particles, &rest.particles);
         let of_particles: DVec3 = particles.iter().zip(mass_matrix.particle_kg()).map(|(u, m)| *u * *m).sum();
         let kinetic_j = mass_matrix.kinetic_j(&rate.nodes, &rate.particles);

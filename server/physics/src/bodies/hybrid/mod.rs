@@ -34,6 +34,7 @@ pub mod sites;
 pub mod sizes;
 pub mod skin;
 mod skin_carriers;
+mod skin_influence;
 pub mod spec;
 mod staged_patch;
 mod state;

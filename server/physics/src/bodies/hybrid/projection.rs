@@ -42,7 +42,7 @@ impl Lumping {
         let mut of_tets = vec![[[0.0; NODES]; NODES]; tets.len()];
         for (particle, mass) in masses.particle_kg.iter().enumerate() {
             let anchor = partition.anchor(particle as u32);
-            let (Anchor { nodes, tet, .. }, weights) = (anchor, anchor.mass_weights());
+            let (Anchor { nodes, tet, .. }, weights) = (anchor, anchor.bearing_weights());
             let numbers = nodes.map(|node| tets[tet as usize].iter().position(|own| *own == node).unwrap_or(0));
             for (i, j) in (0..4).flat_map(|i| (0..i).map(move |j| (i, j))) {
                 let (low, high) = (numbers[i].min(numbers[j]), numbers[i].max(numbers[j]));

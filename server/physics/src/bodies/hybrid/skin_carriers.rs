@@ -73,13 +73,9 @@ impl SkinCarriers {
         &self.carriers[self.first[at] as usize..self.first[at + 1] as usize]
     }
 
-    /// Returns a bound of the speed of any vertex over that of the fastest node or particle:
-    /// `max_v Σ_p |w_vp| max(1, Σ_i |ζ_pi|)`.
-    pub(super) fn amplification(&self) -> f64 {
-        let of_particle = |particle: u32| self.anchor(particle).weights.iter().map(|w| w.abs()).sum::<f64>().max(1.0);
-        let of_vertex =
-            |vertex: u32| self.of_vertex(vertex).iter().map(|(p, w)| w.abs() * of_particle(*p)).sum::<f64>();
-        (0..self.first.len() as u32 - 1).map(of_vertex).fold(1.0, f64::max)
+    /// Returns the number of vertices.
+    pub(super) fn vertices(&self) -> u32 {
+        self.first.len() as u32 - 1
     }
 
     /// Returns the anchor of a particle that carries a vertex.

@@ -36,7 +36,7 @@ impl<'a> Stepped<'a> for SteppedHybrid<'a> {
             load_factors,
             external_n,
             scratch: contact,
-            fastest_m_per_s: now.fastest_m_per_s * body.amplification(),
+            fastest_m_per_s: if now.fastest_m_per_s > 0.0 { body.fastest_of_skin_m_per_s(v) } else { 0.0 },
         };
         let mut view = SkinView::new(body, patch).moving(v).with_buffer(carriers_m);
         touch_skin(tick, now, body.skin_rest_m(), &mut view, skin, touch);

@@ -43,7 +43,7 @@ impl<'a> Awakened<'a> {
         let rest_m = partition.coarse().positions_m().iter().copied();
         let rest_m = rest_m.chain(ids.iter().map(|&id| partition.particle_m(id))).collect();
         let mut weight_n: Vec<DVec3> =
-            body.masses().node_kg.iter().map(|mass| environment.gravity_m_per_s2 * *mass).collect();
+            body.masses().node_weight_kg.iter().map(|mass| environment.gravity_m_per_s2 * *mass).collect();
         for &id in ids {
             let own_n = environment.gravity_m_per_s2 * ((1.0 - KEPT) * body.masses().particle_kg[id as usize]);
             partition.anchor(id).push(-own_n, &mut weight_n[..nodes]);

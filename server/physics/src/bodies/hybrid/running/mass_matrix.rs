@@ -69,7 +69,7 @@ impl RunningMassMatrix {
         inverses_per_kg.extend((0..nodes).map(|node| inverse_per_kg(hybrid, node)));
         Self {
             particle_kg: Vec::with_capacity(most_active),
-            weight_kg: hybrid.masses.node_kg.clone(),
+            weight_kg: hybrid.masses.node_weight_kg.clone(),
             inverse_per_kg: inverses_per_kg,
             followed: Vec::with_capacity(most_active),
             touched: Vec::with_capacity(most_touched),
@@ -88,7 +88,7 @@ impl RunningMassMatrix {
     ) {
         for &node in &self.touched {
             self.row_of[node as usize] = NONE;
-            self.weight_kg[node as usize] = hybrid.masses.node_kg[node as usize];
+            self.weight_kg[node as usize] = hybrid.masses.node_weight_kg[node as usize];
             self.inverse_per_kg[node as usize] = inverse_per_kg(hybrid, node as usize);
         }
         self.touched.clear();

@@ -1,0 +1,98 @@
+//! A bound of how far, or how fast, any vertex of the skin moves, by what moves it: coarse nodes and active particles.
+//!
+//! A vertex's displacement is `Σ_i W_vi u_i + Σ_{p∈A} w_vp u_p`, with `W_vi = Σ_{p∉A} w_vp ζ_pi`, and `Σ_i |W_vi| + Σ_{p∈A} |w_vp| ≤ A`
+//! whichever particles are active. A coarse mesh that holds a body of any shape has nodes far outside of it, which carry next to
+//! nothing and, being light, move more than all others. So, with the *influence* `W_i = max_v |W_vi|`, and the largest displacement
+//! `s` of active particles and of nodes that are not faint,
+//! ```text
+//! |u_v| ≤ A s + Σ_{i faint} W_i (|u_i| − s)⁺
+//! ```
+use super::skin_carriers::SkinCarriers;
+
+/// Influence below which a node is faint.
+const FAINT: f64 = 0.1;
+
+/// How much each coarse node moves the skin.
+#[derive(Debug, Clone, Default)]
+pub(super) struct SkinInfluence {
+    /// `A = max_v Σ_p |w_vp| max(1, Σ_i |ζ_pi|)`.
+    amplification: f64,
+    /// Nodes that are not faint.
+    strong: Vec<u32>,
+    /// Faint nodes that move any vertex, each with its influence.
+    faint: Vec<(u32, f64)>,
+}
+
+impl SkinInfluence {
+    /// Measures how much each of so many coarse nodes moves the skin's vertices.
+    pub(super) fn new(carriers: &SkinCarriers, nodes: usize) -> Self {
+        let (mut influence, mut of_vertex) = (vec![0.0_f64; nodes], vec![0.0; nodes]);
+        let mut amplification = 1.0_f64;
+        for vertex in 0..carriers.vertices() {
+            let mut sum = 0.0;
+            for &(particle, weight) in carriers.of_vertex(vertex) {
+                let anchor = carriers.anchor(particle);
+                for (&node, zeta) in anchor.nodes.iter().zip(anchor.weights) {
+                    of_vertex[node as usize] += (weight * zeta).abs();
+                }
+                sum += weight.abs() * anchor.weights.iter().map(|zeta| zeta.abs()).sum::<f64>().max(1.0);
+            }
+            amplification = amplification.max(sum);
+            for node in carriers.of_vertex(vertex).iter().flat_map(|(particle, _)| carriers.anchor(*particle).nodes) {
+                let of_vertex = std::mem::take(&mut of_vertex[node as usize]);
+                influence[node as usize] = influence[node as usize].max(of_vertex);
+            }
+        }
+        let all = || (0..).zip(&influence).map(|(node, influence)| (node, *influence));
+        Self {
+            amplification,
+            strong: all().filter(|(_, influence)| *influence >= FAINT).map(|(node, _)| node).collect(),
+            faint: all().filter(|(_, influence)| *influence > 0.0 && *influence < FAINT).collect(),
+        }
+    }
+
+    /// Returns `A`.
+    pub(super) fn amplification(&self) -> f64 {
+        self.amplification
+    }
+
+    /// Returns the bound, with the square of every node's size and that of the largest active particle's.
+    pub(super) fn bound(&self, node_sq: impl Fn(usize) -> f64, particles_sq: f64) -> f64 {
+        let strong_sq = self.strong.iter().map(|&node| node_sq(node as usize)).fold(particles_sq, f64::max);
+        let largest = strong_sq.sqrt();
+        let beyond = |&(node, influence): &(u32, f64)| {
+            let faint_sq = node_sq(node as usize);
+            if faint_sq > strong_sq { influence * (faint_sq.sqrt() - largest) } else { 0.0 }
+        };
+        self.amplification * largest + self.faint.iter().map(beyond).sum::<f64>()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::bodies::hybrid::testing::{Random, hybrid_ball, tissue};
+    use glam::DVec3;
+
+    /// The coarse nodes move at random, and faint ones a hundred times as fast: the bound holds, and these make little of it.
+    #[test]
+    fn nodes_that_carry_little_make_little_of_the_bound() {
+        let [material, other, _] = tissue();
+        let body = hybrid_ball(&[material, other]);
+        let (carriers, influence) = (&body.skin_carriers, &body.skin_influence);
+        assert!(influence.faint.len() > 5 && influence.strong.len() > 50, "{influence:?}");
+        let mut random = Random(31);
+        for times in [1.0, 100.0] {
+            let mut u: Vec<DVec3> = (0..body.node_count()).map(|_| random.vector()).collect();
+            influence.faint.iter().for_each(|(node, _)| u[*node as usize] *= times);
+            let moved = |vertex| -> DVec3 {
+                let of = |&(particle, weight): &(u32, f64)| carriers.anchor(particle).of(&u) * weight;
+                carriers.of_vertex(vertex).iter().map(of).sum()
+            };
+            let most = (0..carriers.vertices()).map(|vertex| moved(vertex).length()).fold(0.0, f64::max);
+            let bound = influence.bound(|node| u[node].length_squared(), 0.0);
+            let by_the_largest = influence.amplification() * u.iter().map(|u| u.length()).fold(0.0, f64::max);
+            assert!(most <= bound, "{most} {bound}");
+            assert!(times == 1.0 || bound < 0.8 * by_the_largest, "{bound} {by_the_largest}");
+        }
+    }
+}
