@@ -160,7 +160,7 @@ impl ActiveSession {
             surface_triangle_count: model.surface().triangles.len() as u32,
             substeps_per_tick: model.substeps(),
             tick_period_s: model.settings().tick_period_s,
-            mass_kg: model.body().mass_kg().iter().sum(),
+            mass_kg: model.body().total_mass_kg(),
             max_natural_frequency_rad_per_s: model.body().max_natural_frequency_rad_per_s(),
             tool_names: self.tools.iter().map(|tool| tool.name.clone()).collect(),
             particle_count: model.body().particle_count() as u32,

@@ -64,6 +64,11 @@ impl Body {
         of_kind!(Body, self, body => BodyKind::mass_kg(&**body))
     }
 
+    /// Mass (kg) of the body.
+    pub fn total_mass_kg(&self) -> f64 {
+        of_kind!(Body, self, body => BodyKind::total_mass_kg(&**body))
+    }
+
     /// Largest natural frequency (rad/s) at rest.
     pub fn max_natural_frequency_rad_per_s(&self) -> f64 {
         of_kind!(Body, self, body => BodyKind::max_natural_frequency_rad_per_s(&**body))

@@ -40,6 +40,11 @@ pub(crate) trait BodyKind {
     /// Lumped mass (kg) of every node.
     fn mass_kg(&self) -> &[f64];
 
+    /// Mass (kg) of the body.
+    fn total_mass_kg(&self) -> f64 {
+        self.mass_kg().iter().sum()
+    }
+
     /// Largest natural frequency (rad/s) at rest with its constraints, or a bound on it: for people to read.
     fn max_natural_frequency_rad_per_s(&self) -> f64;
 

@@ -1,8 +1,8 @@
 //! The largest natural frequency that a hybrid body can have, whichever particles are awake: that of all of them, over
 //! √(1 − ε).
 //!
-//! With no negative weight, a set of active particles has `U ≤ U_all` and `K ≥ (1 − ε) K_all` for the field it
-//! describes (Jensen, twice; `docs/adr/hybrid.md`).
+//! A set of active particles has `U ≤ U_all` (Jensen) and `K ≥ (1 − ε) K_all` (Jensen, and Cauchy where weights are
+//! negative) for the field it describes (`docs/adr/hybrid.md`).
 use super::{
     body::HybridBody,
     cell::{HOURGLASS, MODE_WEIGHTS},

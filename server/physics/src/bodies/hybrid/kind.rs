@@ -33,6 +33,11 @@ impl BodyKind for HybridBody {
         &self.masses().node_kg
     }
 
+    /// Lumped masses sum to more where particles are outside the coarse tets.
+    fn total_mass_kg(&self) -> f64 {
+        self.masses().particle_kg.iter().sum()
+    }
+
     fn max_natural_frequency_rad_per_s(&self) -> f64 {
         self.max_natural_frequency_rad_per_s()
     }

@@ -121,8 +121,7 @@ impl MassMatrix {
     /// Factorises it; `free` tells along which axes each coarse node may move.
     ///
     /// # Errors
-    /// Fails where coarse weights of active particles are so negative (outside the coarse tets) that `M'` is not
-    /// positive definite.
+    /// Fails where `M'` is not positive definite, as it may be for masses that [`Masses::new`] did not make.
     pub fn factorise(self, free: &[BVec3]) -> Result<FactorisedMassMatrix, NotPositive> {
         let free: Vec<BVec3> = self.touched.iter().map(|&node| free[node as usize]).collect();
         let mut factors = [const { Vec::new() }; 3];

@@ -91,8 +91,12 @@ impl NearWalls {
         if !self.slack_m.is_finite() {
             return false;
         }
-        self.slack_m = self.whole_slack_m - moved_m(self) - ROUNDING_M;
-        self.slack_m > WORTH_KEEPING * self.whole_slack_m
+        let slack_m = self.whole_slack_m - moved_m(self) - ROUNDING_M;
+        let is_good = slack_m > WORTH_KEEPING * self.whole_slack_m;
+        if is_good {
+            self.slack_m = slack_m;
+        }
+        is_good
     }
 
     /// Returns how far (m) the farthest of nodes at `x` (m) is from where it was when the list was made.

@@ -23,7 +23,7 @@ use glam::{BVec3, DVec3};
 pub(crate) struct RunningMassMatrix {
     /// `(1 − ε) m_p` (kg) of active particles.
     particle_kg: Vec<f64>,
-    /// Masses (kg) by which gravity pulls on coarse nodes: the row sums of `M'`.
+    /// Masses (kg) by which gravity pulls on coarse nodes: `Σ_p m_p ζ_pi`, less what active particles have of it.
     weight_kg: Vec<f64>,
     /// `1/M_i` (1/kg) of coarse nodes, 0 on held axes and for nodes in the factor, and then `1/(1 − ε) m_p` of active
     /// particles.
