@@ -78,9 +78,9 @@ mod tests {
     use crate::bodies::hybrid::testing::{Random, hybrid_ball, tissue};
     use glam::DVec3;
 
-    /// The coarse nodes move at random, and faint ones a hundred times as fast: the bound holds, and these make little of it.
+    /// The coarse nodes move at random, and a faint one a hundred times as fast: the bound holds, and this makes little of it.
     #[test]
-    fn nodes_that_carry_little_make_little_of_the_bound() {
+    fn a_node_that_carries_little_makes_little_of_the_bound() {
         let [material, other, _] = tissue();
         let body = hybrid_ball(&[material, other]);
         let (carriers, influence) = (&body.skin_carriers, &body.skin_influence);
@@ -88,7 +88,7 @@ mod tests {
         let mut random = Random(31);
         for times in [1.0, 100.0] {
             let mut u: Vec<DVec3> = (0..body.node_count()).map(|_| random.vector()).collect();
-            influence.faint.iter().for_each(|(node, _)| u[*node as usize] *= times);
+            u[influence.faint[0].0 as usize] *= times;
             let moved = |vertex| -> DVec3 {
                 let of = |&(particle, weight): &(u32, f64)| carriers.anchor(particle).of(&u) * weight;
                 carriers.of_vertex(vertex).iter().map(of).sum()
@@ -97,7 +97,7 @@ mod tests {
             let bound = influence.bound(|node| u[node].length_squared(), 0.0);
             let by_the_largest = influence.amplification() * u.iter().map(|u| u.length()).fold(0.0, f64::max);
             assert!(most <= bound, "{most} {bound}");
-            assert!(bound <= by_the_largest * if times == 1.0 { 1.0 } else { 0.8 }, "{bound} {by_the_largest}");
+            assert!(bound <= by_the_largest * if times == 1.0 { 1.0 } else { 0.3 }, "{bound} {by_the_largest}");
         }
     }
 }
