@@ -18,7 +18,7 @@ use std::ops::Range;
 
 /// Number of triangles per cluster.
 pub(crate) const CLUSTER: usize = 32;
-/// Number of triangles per group of clusters, on the skin of a hybrid body.
+/// Number of triangles per group of clusters.
 pub(crate) const GROUP: usize = 32 * CLUSTER;
 /// A length (m) far above the rounding of the travel's sums.
 pub(crate) const ROUNDING_M: f64 = 1e-12;
@@ -103,8 +103,9 @@ pub(crate) trait Skin {
     /// Returns the position (m) of a vertex.
     fn position_m(&self, vertex: u32) -> DVec3;
 
-    /// Writes the positions (m) of all vertices.
-    fn place(&mut self, x: &mut [DVec3]) {
+    /// Writes the positions (m) of all vertices. The buffer is for the displacements (m) of what carries them
+    /// ([`super::MostCarriers`]).
+    fn place(&self, x: &mut [DVec3], _: &mut [DVec3]) {
         (0..).zip(x).for_each(|(vertex, x_m)| *x_m = self.position_m(vertex));
     }
 

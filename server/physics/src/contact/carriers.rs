@@ -1,11 +1,15 @@
 //! Where what carries a skin was some time ago: a bound of how far the skin has moved since then, without its vertices.
 use glam::DVec3;
 
-/// Most nodes and particles that carry a skin; none of a surface whose vertices are nodes.
+/// How many nodes and particles carry a skin; none of a surface whose vertices are nodes.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct MostCarriers {
+    /// Coarse nodes.
     pub(crate) nodes: usize,
-    pub(crate) particles: usize,
+    /// Most particles that are active at once.
+    pub(crate) active: usize,
+    /// Particles that carry any vertex.
+    pub(crate) of_skin: usize,
 }
 
 /// Displacements (m) of a skin's carriers at some instant. Its clones keep the capacity.
@@ -21,7 +25,7 @@ impl CarriersThen {
     pub(crate) fn with_room(most: MostCarriers) -> Self {
         Self {
             nodes_m: vec![DVec3::ZERO; most.nodes].into_boxed_slice(),
-            particles_m: vec![(0, DVec3::ZERO); most.particles].into_boxed_slice(),
+            particles_m: vec![(0, DVec3::ZERO); most.active].into_boxed_slice(),
             count: 0,
         }
     }

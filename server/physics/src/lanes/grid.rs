@@ -2,15 +2,15 @@
 use crate::settings::Precision;
 use glam::DVec3;
 
-/// The least strain that a grid leaves, or up to twice of it. From 2.3e-13 on, f32 has cubes as normal numbers: of the strains
-/// that are left the least few have none. A coarser grid would cost digits of small strains.
+/// The least strain that a grid leaves, or up to twice of it. From 2.3e-13 on, f32 has cubes as normal numbers: of the
+/// strains that are left the least few have none. A coarser grid would cost digits of small strains.
 const LEAST_STRAIN: f64 = 1e-13;
 
 /// Multiples of a length, to which displacements are rounded.
 ///
 /// A body that is still moves by the last bits of its positions, 1e-18 m. Those are strains of 1e-16, whose cubes f32 has
-/// only as subnormal numbers, and processors compute subnormal numbers a hundred times more slowly. On a grid such strains
-/// are zero. The grid follows the largest elements' size, so that a strain of 1e-6 keeps six digits in these, and one less in
+/// only as subnormal numbers, and processors compute subnormal numbers much more slowly. On a grid such strains are zero.
+/// The grid follows the largest elements' size, so that a strain of 1e-6 keeps six digits in these, and one less in
 /// elements a tenth as large.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct DisplacementGrid {

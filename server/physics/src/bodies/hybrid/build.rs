@@ -50,7 +50,11 @@ impl HybridBody {
             bearing_kg: &bearing_kg,
             max_natural_frequency_rad_per_s: omega,
             means_over_m: hybrid.particles().smooth_skin.then(|| hybrid.particles().spacing_m),
-            carriers: MostCarriers { nodes: hybrid.node_count(), particles: hybrid.particles().most_active },
+            carriers: MostCarriers {
+                nodes: hybrid.node_count(),
+                active: hybrid.particles().most_active,
+                of_skin: hybrid.skin_carriers.particles().len(),
+            },
         };
         let contact = ContactModel::build(&skin, &around.tools).with_walls(around.walls_of(&skin));
         hybrid.cluster(contact.triangles());

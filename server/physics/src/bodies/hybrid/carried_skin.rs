@@ -38,25 +38,18 @@ pub(crate) struct SkinView<'a> {
     patch: &'a RunningPatch,
     /// Velocities (m/s) of coarse nodes and then active particles; empty where no vertex's velocity is asked for.
     v: &'a [DVec3],
-    /// A buffer for the displacements (m) of the particles that carry the skin; empty where not all vertices are placed.
-    carriers_m: &'a mut [DVec3],
     deviation_m: f64,
 }
 
 impl<'a> SkinView<'a> {
     /// Views the skin where the patch was displaced to.
     pub(crate) fn new(hybrid: &'a HybridBody, patch: &'a RunningPatch) -> Self {
-        Self { hybrid, patch, v: &[], carriers_m: &mut [], deviation_m: 0.0 }
+        Self { hybrid, patch, v: &[], deviation_m: 0.0 }
     }
 
     /// Returns the same view with velocities (m/s) of coarse nodes and then active particles.
     pub(crate) fn moving(self, v: &'a [DVec3]) -> Self {
         Self { v, ..self }
-    }
-
-    /// Returns the same view with a buffer for the displacements (m) of all particles that carry the skin.
-    pub(crate) fn with_buffer(self, carriers_m: &'a mut [DVec3]) -> Self {
-        Self { carriers_m, ..self }
     }
 
     /// Returns the displacement (m) of a particle.
@@ -107,20 +100,14 @@ impl Skin for SkinView<'_> {
     }
 
     /// A particle carries many vertices: each is displaced once.
-    fn place(&mut self, x: &mut [DVec3]) {
+    fn place(&self, x: &mut [DVec3], of_carriers_m: &mut [DVec3]) {
         let carriers = &self.hybrid.skin_carriers;
-        let buffer = std::mem::take(&mut self.carriers_m);
-        if buffer.len() == carriers.particles().len() {
-            for (slot, (particle, anchor)) in buffer.iter_mut().zip(carriers.particles()) {
-                *slot = self.displacement_m(particle, anchor);
-            }
-            for ((vertex, x_m), rest_m) in (0..).zip(x).zip(self.hybrid.skin_rest_m()) {
-                *x_m = *rest_m + carriers.moved_m(vertex, buffer);
-            }
-        } else {
-            (0..).zip(x).for_each(|(vertex, x_m)| *x_m = self.position_m(vertex));
+        for (slot, (particle, anchor)) in of_carriers_m.iter_mut().zip(carriers.particles()) {
+            *slot = self.displacement_m(particle, anchor);
         }
-        self.carriers_m = buffer;
+        for ((vertex, x_m), rest_m) in (0..).zip(x).zip(self.hybrid.skin_rest_m()) {
+            *x_m = *rest_m + carriers.moved_m(vertex, of_carriers_m);
+        }
     }
 
     fn remember(&self, then: &mut CarriersThen) {
@@ -336,12 +323,13 @@ mod tests {
             all.iter().copied().filter(|&particle| of(body.partition.particle_m(particle))).collect()
         };
         let sets = [vec![], some(|p| p.x > 2e-3), some(|p| p.y > -2e-3), all.clone()];
-        let most = MostCarriers { nodes: body.node_count(), particles: all.len() };
+        let most =
+            MostCarriers { nodes: body.node_count(), active: all.len(), of_skin: body.skin_carriers.particles().len() };
         let mut random = Random(17);
-        let mut buffer = vec![DVec3::ZERO; body.skin_carriers.particles().len()];
+        let mut of_carriers_m = vec![DVec3::ZERO; most.of_skin];
         let mut place = |patch: &RunningPatch| {
             let mut x = vec![DVec3::NAN; body.skin_rest_m().len()];
-            SkinView::new(&body, patch).with_buffer(&mut buffer).place(&mut x);
+            SkinView::new(&body, patch).place(&mut x, &mut of_carriers_m);
             for (vertex, x) in (0..).zip(&x) {
                 assert_eq!(*x, SkinView::new(&body, patch).position_m(vertex));
             }

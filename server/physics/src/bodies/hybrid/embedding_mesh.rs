@@ -2,8 +2,8 @@
 //!
 //! Coarse tets cut the corners of a curved body, and the lattice reaches past its surface by up to a cell. A particle
 //! outside all tets would have a negative weight: it would still follow affine motion, but may not be woken
-//! ([`super::HybridBody::may_wake`]). The tets carry no geometry (`partition`), so nothing is lost by making them larger. Nodes that are held
-//! stay where they are.
+//! ([`super::HybridBody::may_wake`]). The tets carry no geometry (`partition`), so nothing is lost by making them larger.
+//! Nodes that are held stay where they are.
 use super::locate::Locator;
 use crate::{
     contact::closest_weights,

@@ -10,10 +10,10 @@
 //! min ½ Σ_p m |y_p − ζ_pᵀ(x + Δ)|² + ½ Δᵀ C' Δ        C'' Δ = Σ_p m ζ_p (y_p − ζ_pᵀ x)
 //! C'' = M'' − (1 − δ) L        L = Σ_{all p} m_p (diag ζ_p − ζ_p ζ_pᵀ)
 //! ```
-//! over the free nodes that they follow. A particle outside the coarse tets, which sleeps, has `|ζ_pi|` for its weights in these
-//! (`mass_matrix`): what holds nodes there is no less than its mass. `M''` is the mass matrix after the switch (`mass_matrix`), `L` the part of it that
-//! lumping adds; `δ` of that holds nodes that nothing else does. The system is solved by a few steps of conjugate
-//! gradients, preconditioned by `M''⁻¹`. It changes neither strains (`prestrain`) nor momenta (`switching`).
+//! over the free nodes that they follow. `M''` is the mass matrix after the switch (`mass_matrix`), `L` the part of it that
+//! lumping adds; `δ` of that holds nodes that nothing else does. A particle outside the coarse tets, which sleeps, has
+//! `|ζ_pi|` for its weights in these: what holds nodes there is no less than its mass. The system is solved by a few steps
+//! of conjugate gradients, preconditioned by `M''⁻¹`. It changes neither strains (`prestrain`) nor momenta (`switching`).
 use super::{
     body::HybridBody,
     composite::{Anchor, NODES},

@@ -19,8 +19,6 @@ use glam::DVec3;
 pub(crate) struct HybridScratch {
     pub(crate) patch: RunningPatch,
     pub(crate) skin: ListedVertices<Carried>,
-    /// Displacements (m) of the particles that carry the skin, where all its vertices are placed.
-    pub(super) carriers_m: Vec<DVec3>,
     pub(crate) accelerations: Vec<DVec3>,
     pub(crate) momenta: Vec<DVec3>,
     /// `v_f·M'_ff v_f` and `v_h·M'_hf v_f` (J) since the last kick of this tick.
@@ -45,7 +43,6 @@ impl HybridScratch {
             staged,
             patch,
             skin: ListedVertices::new(body.vertex_points.len()),
-            carriers_m: vec![DVec3::ZERO; body.skin_carriers.particles().len()],
             accelerations: Vec::with_capacity(positions),
             momenta: Vec::with_capacity(positions),
             of_free_j: None,

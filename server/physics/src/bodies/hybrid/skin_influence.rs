@@ -1,10 +1,10 @@
 //! A bound of how far, or how fast, any vertex of the skin moves, by what moves it: coarse nodes and active particles.
 //!
-//! A vertex's displacement is `u_v = Σ_p w_vp u_p` of the particles that carry it; one that is not active follows coarse nodes,
-//! `u_p = Σ_i ζ_pi u_i`. Node `i` has the *influence* `Y_i = max_v Σ_p |w_vp ζ_pi|`, over all particles, and with
-//! `a = max_v Σ_p |w_vp| max(1, Σ_i |ζ_pi|)` no vertex moves by more than `a` times the largest of all displacements. A coarse mesh
-//! that holds a body of any shape has nodes far outside of it, which carry next to nothing and, being light, move more than all
-//! others. So, with the largest displacement `s` of active particles and of nodes that are not faint,
+//! A vertex's displacement is `u_v = Σ_p w_vp u_p` of the particles that carry it; one that is not active follows coarse
+//! nodes, `u_p = Σ_i ζ_pi u_i`. Node `i` has the *influence* `Y_i = max_v Σ_p |w_vp ζ_pi|`, over all particles, and with
+//! `a = max_v Σ_p |w_vp| max(1, Σ_i |ζ_pi|)` no vertex moves by more than `a` times the largest of all displacements. A
+//! coarse mesh that holds a body of any shape has nodes far outside of it, which carry next to nothing and, being light,
+//! move more than all others. So, with the largest displacement `s` of active particles and of nodes that are not faint,
 //! ```text
 //! |u_v| ≤ min(a s + Σ_{i faint} Y_i (|u_i| − s)⁺, a max(s, max_{i faint} |u_i|))
 //! ```

@@ -27,7 +27,7 @@ impl<'a> Stepped<'a> for SteppedHybrid<'a> {
         contact: &mut ContactScratch,
     ) {
         let Self { body, own, scratch } = self;
-        let HybridScratch { patch, skin, carriers_m, .. } = &mut **scratch;
+        let HybridScratch { patch, skin, .. } = &mut **scratch;
         let MechanicalState { x, v, external_n, tools, contact: touched, load_factors, .. } = state;
         patch.displace(body, x);
         let touch = Touch {
@@ -38,8 +38,7 @@ impl<'a> Stepped<'a> for SteppedHybrid<'a> {
             scratch: contact,
             fastest_m_per_s: if now.fastest_m_per_s > 0.0 { body.fastest_of_skin_m_per_s(v) } else { 0.0 },
         };
-        let mut view = SkinView::new(body, patch).moving(v).with_buffer(carriers_m);
-        touch_skin(tick, now, body.skin_rest_m(), &mut view, skin, touch);
+        touch_skin(tick, now, body.skin_rest_m(), &mut SkinView::new(body, patch).moving(v), skin, touch);
         let MechanicalState { x, v, force_n, viscous, ledger, .. } = &mut *state;
         let every = tick.environment.steps.substeps_per_long_step;
         let (mut viscous_w, mut taken_j) = (0.0, 0.0);

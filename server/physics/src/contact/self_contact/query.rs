@@ -13,7 +13,7 @@ use super::{
     rest::{ClusterAtRest, SelfContact},
 };
 use crate::contact::{
-    broad::{CLUSTER, ROUNDING_M, box_distance_m},
+    broad::{self, CLUSTER, ROUNDING_M, box_distance_m},
     triangle::closest_weights,
 };
 use glam::DVec3;
@@ -22,13 +22,15 @@ use glam::DVec3;
 /// be anywhere, and would be looked at vertex by vertex for seconds.
 const TORN: f64 = 8.0;
 /// Number of clusters that are ruled out together.
-const GROUP: usize = 32;
+const GROUP: usize = broad::GROUP / CLUSTER;
 
 /// Buffers of queries and of pressing, sized once.
 #[derive(Debug, Clone, Default)]
 pub(in crate::contact) struct WallScratch {
     /// Positions (m) of the vertices of a skin whose vertices are no nodes.
     pub(super) x: Vec<DVec3>,
+    /// Displacements (m) of the particles that carry them.
+    pub(super) of_carriers_m: Vec<DVec3>,
     clusters: Vec<ClusterNow>,
     /// The boxes (m) around [`GROUP`] clusters each.
     groups: Vec<[DVec3; 2]>,
@@ -63,6 +65,7 @@ impl WallScratch {
         let nodes = walls.rest_m.len();
         Self {
             x: walls.rest_m.clone(),
+            of_carriers_m: vec![DVec3::ZERO; walls.carriers.of_skin],
             clusters: (0..walls.clusters.len()).map(|cluster| walls.cluster_now(cluster, &walls.rest_m)).collect(),
             groups: vec![[DVec3::ZERO; 2]; walls.clusters.len().div_ceil(GROUP)],
             rows_n_per_m: vec![0.0; nodes],

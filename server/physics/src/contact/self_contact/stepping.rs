@@ -22,7 +22,7 @@ impl ContactModel {
     /// Renews the list of what may meet on a skin, where it is out of date. Returns whether more may be within reach.
     pub(crate) fn list_walls_on_skin(
         &self,
-        skin: &mut impl Skin,
+        skin: &impl Skin,
         contact: &mut ContactState,
         scratch: &mut ContactScratch,
     ) -> bool {
@@ -32,7 +32,7 @@ impl ContactModel {
             return near.wakes_more();
         }
         let mut x = std::mem::take(&mut scratch.walls.x);
-        skin.place(&mut x);
+        skin.place(&mut x, &mut scratch.walls.of_carriers_m);
         let renewed = walls.renew(&x, scratch.exhaustive, near, &mut scratch.walls);
         scratch.walls.x = x;
         if renewed {

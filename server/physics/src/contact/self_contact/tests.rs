@@ -11,7 +11,12 @@ const GAP_M: f64 = 4e-3;
 
 /// A clamp whose arms of 8 mm are 4 mm apart; what is left of a box.
 fn clamp() -> TetMesh {
-    let whole = tet_box(DVec3::ZERO, DVec3::new(0.04, 0.012, 0.02), [10, 3, 5]);
+    clamp_of([10, 3, 5])
+}
+
+/// The same clamp, of as many cells along each axis.
+fn clamp_of(cells: [usize; 3]) -> TetMesh {
+    let whole = tet_box(DVec3::ZERO, DVec3::new(0.04, 0.012, 0.02), cells);
     let middle = |tet: &[u32; 4]| tet.iter().map(|&n| whole.positions_m()[n as usize]).sum::<DVec3>() * 0.25;
     let is_kept = |p: DVec3| p.x < 0.012 || (p.z - 0.01).abs() > 0.5 * GAP_M;
     let kept: Vec<[u32; 4]> = whole.tets().iter().filter(|tet| is_kept(middle(tet))).copied().collect();
@@ -178,11 +183,26 @@ fn parts_that_touch_at_rest_press_nothing_there() {
 /// All that a query rules out by bounds is indeed out of reach, whatever the deformation.
 #[test]
 fn queries_lose_nothing_that_is_within_reach() {
-    let mesh = clamp();
-    let walls = walls_of(&mesh, true).unwrap();
+    let met = met_in(&clamp(), (0..40).map(|seed| (1e-4 * f64::from(seed), 3e-4)));
+    assert!(met > 100, "{met}");
+}
+
+/// A clamp of several groups of clusters, whose arms pass each other by up to 2 mm.
+#[test]
+fn groups_that_are_ruled_out_together_lose_nothing_either() {
+    let mesh = clamp_of([20, 6, 10]);
+    assert!(walls_of(&mesh, true).unwrap().clusters.len() > 40);
+    let met = met_in(&mesh, [(1.9e-3, 1e-4), (2.2e-3, 1e-4), (4e-3, 1e-4)].into_iter());
+    assert!(met > 100, "{met}");
+}
+
+/// Asks, with arms that are bent and shaken by so much (m), what every vertex meets, of all triangles and of those that are
+/// listed; returns how many times one met something.
+fn met_in(mesh: &TetMesh, motions_m: impl Iterator<Item = (f64, f64)>) -> u32 {
+    let walls = walls_of(mesh, true).unwrap();
     let mut met = 0;
-    for seed in 0..40 {
-        let x = bent(&mesh, 1e-4 * seed as f64, 3e-4, seed + 1);
+    for (number, (by_m, shaken_m)) in (1..).zip(motions_m) {
+        let x = bent(mesh, by_m, shaken_m, number);
         let found = walls.near_at(&x);
         let slack_m = found.slack_m;
         assert!(slack_m >= 0.99 * walls.stride_m, "{slack_m}");
@@ -195,7 +215,7 @@ fn queries_lose_nothing_that_is_within_reach() {
             met += u32::from(by_all.is_some_and(|gap| gap.distance_m < walls.nodes[node as usize].margin_m));
         }
     }
-    assert!(met > 100, "{met}");
+    met
 }
 
 /// What is too far away or faces away is passed over when the least distances at rest are found.
