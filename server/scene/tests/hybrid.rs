@@ -4,6 +4,7 @@ use glam::DVec3;
 use palpate_physics::{
     LoadSpec, Model, Scratch, State, TickInput,
     bodies::hybrid::{ParticleSpec, Waking},
+    contact::ToolTarget,
     step,
 };
 use palpate_scene::{Limits, Scene, parse};
@@ -124,6 +125,41 @@ fn the_table_bears_what_the_skin_is_loaded_with() {
         })
         .sum();
     assert!((reaction.z / (100.0 * area) - 1.0).abs() < 1e-3, "{} {}", reaction.z, 100.0 * area);
+}
+
+/// Particles of a plate lie in faces of tets that are as thin as particles are apart: coarse nodes between the faces are
+/// followed by rounding alone. The plate died two ticks after the gentlest touch, by the rounding of single precision.
+#[test]
+fn a_plate_of_cells_as_thin_as_particles_are_apart_bears_a_touch() {
+    let body = "[body]\noffset_mm = [-20, -10, -8]\n[body.box]\nsize_mm = [40, 20, 8]\ncells = [4, 2, 4]\n[body.particles]\n\
+                spacing_mm = 2\n[[fixed]]\nregion = \"z_min\"\n[[tool]]\nname = \"finger\"\nradius_mm = 5\ncoupling = \"rigid\"\n\
+                driver = \"script\"\nkeyframe = [{ time_s = 0, position_mm = [0, 0, 5.5] }]";
+    let force_n = |body: &str, precision: &str| {
+        let text = format!("[scene]\nname = \"t\"\n{body}\n{TAIL}precision = \"{precision}\"\n");
+        let scene = loaded(&text.replace("[20, 20, 20]", "[0, 0, 0]")).unwrap();
+        let model = Model::build(scene.model).unwrap();
+        let (mut state, mut scratch) = (State::at_rest(&model), Scratch::new(&model));
+        let start = model.tools()[0].start();
+        let mut force_n = DVec3::ZERO;
+        for tick in 1..=150 {
+            let depth_m = 1e-3 * f64::min(0.01 * f64::from(tick), 1.0);
+            let target = ToolTarget { position_m: start.position_m - DVec3::Z * (0.5e-3 + depth_m), ..start };
+            let input = TickInput {
+                tools: &[target],
+                load_factors: &[],
+                prescribed_displacements_m: &[DVec3::ZERO],
+                point_forces: &[],
+            };
+            let report = step(&model, &mut state, &mut scratch, &input);
+            assert!(report.quarantined.is_none() && report.repeated == 0, "{precision}, {tick}: {report:?}");
+            force_n = state.mechanical.tools[0].contact_force_n;
+        }
+        force_n
+    };
+    let [single, double] = ["single", "double"].map(|precision| force_n(body, precision));
+    assert!(single.z > 0.02 && (single - double).length() < 1e-3 * double.length(), "{single} {double}");
+    let thick = force_n(&body.replace("cells = [4, 2, 4]", "cells = [4, 2, 2]"), "double");
+    assert!((double.z / thick.z - 1.0).abs() < 0.05, "{double} {thick}");
 }
 
 /// The lattice lies in the plane of the cut, which is held, and its middle on the axis.
