@@ -2,11 +2,13 @@
 #![allow(clippy::unwrap_used)] // helpers outside #[test] functions
 use glam::DVec3;
 use palpate_physics::{
-    Model,
+    Model, Scratch, State, TickInput,
     bodies::mass_spring::{
         AnchorLaw, MassSpringSpec,
         constants_table::{Calibration, ConstantsTable},
     },
+    contact::{ToolTarget, is_inside},
+    step,
 };
 use palpate_scene::{Limits, Scene, SceneError, load_file, parse, to_calibrate};
 use std::path::Path;
@@ -299,6 +301,48 @@ fn a_tool_that_slips_through_is_told() {
     assert!(scene(&tool(1.0)).unwrap().warnings[0].contains("slips through"));
 }
 
+/// The hollow surface of a pan 12 mm thick, and a fingertip that an arm presses through it, drags to one side and takes away. Pressed by
+/// the upper wall alone, the upper wall passed the lower one, and the fingertip was held by that from outside for ever.
+#[test]
+fn a_fingertip_that_pressed_one_wall_beyond_another_comes_free() {
+    let text = "[scene]\nname = \"pan\"\n[body.ellipsoid_shell]\ninner_semi_axes_mm = [28, 28, 4]\nouter_semi_axes_mm = [30, 30, 6]\n\
+                target_tets = 4000\n[body.springs]\npart = \"outer\"\nmesh_n_per_m = 60\nanchor_n_per_m = 12\n\
+                area_density_kg_per_m2 = 15\ndamping_n_s_per_m = 0.02\n[[tool]]\nname = \"fingertip\"\nradius_mm = 5\n\
+                coupling = \"spring\"\nstiffness_n_per_m = 1000\ndamping_n_s_per_m = 1\nmass_kg = 0.05\nfriction_coefficient = 0.2\n\
+                driver = \"script\"\nkeyframe = [{ time_s = 0, position_mm = [0, 0, 15] }]\n";
+    for (aside_mm, deep_mm) in [(15.0, 12.0), (22.0, 10.0), (0.0, 14.0)] {
+        let model = Model::build(scene(text).unwrap().model).unwrap();
+        let (mut state, mut scratch) = (State::at_rest(&model), Scratch::new(&model));
+        let corners_mm = [[0.0, 15.0], [0.0, -deep_mm], [aside_mm, -deep_mm], [aside_mm, 40.0], [aside_mm, 40.0]];
+        let triangles = &model.surface().triangles;
+        let (mut surface_m, mut deepest_m) = (Vec::new(), f64::INFINITY);
+        for (tick, part) in (0..1200).map(|tick| (tick, f64::from(tick % 300) / 300.0)) {
+            let [[x, z], [to_x, to_z]] = [0, 1].map(|next| corners_mm[tick as usize / 300 + next]);
+            let at_mm = DVec3::new(x + (to_x - x) * part, 0.0, z + (to_z - z) * part);
+            let input = TickInput {
+                tools: &[ToolTarget::at(at_mm * 1e-3)],
+                load_factors: &[],
+                prescribed_displacements_m: &[],
+                point_forces: &[],
+            };
+            assert!(
+                step(&model, &mut state, &mut scratch, &input).quarantined.is_none(),
+                "{aside_mm}, {deep_mm}: {tick}"
+            );
+            let centre_m = state.mechanical.tools[0].centre_m;
+            deepest_m = deepest_m.min(centre_m.z);
+            if tick % 20 == 0 {
+                model.surface_positions_m(&state, &mut surface_m);
+                assert!(!is_inside(centre_m, triangles, &surface_m), "{aside_mm}, {deep_mm}: {tick}");
+            }
+        }
+        let tool = &state.mechanical.tools[0];
+        let left_mm = tool.centre_m.distance(DVec3::new(aside_mm, 0.0, 40.0) * 1e-3) * 1e3;
+        assert!(left_mm < 1.0 && tool.contact_force_n == DVec3::ZERO, "{aside_mm}, {deep_mm}: {left_mm} mm, {tool:?}");
+        assert!(deepest_m < 0.0, "{aside_mm}, {deep_mm}: {deepest_m}");
+    }
+}
+
 /// Tools and probes see the surface refined everywhere, moved with the body.
 #[test]
 fn probes_follow_the_surface() {
@@ -308,7 +352,7 @@ fn probes_follow_the_surface() {
     let scene = scene(&text).unwrap();
     let probe = scene.probes[0].clone();
     let model = Model::build(scene.model).unwrap();
-    let mut state = palpate_physics::State::at_rest(&model);
+    let mut state = State::at_rest(&model);
     let middle = (0..81).find(|&v| model.rest_positions_m()[v].distance(DVec3::new(0.02, 0.02, 0.0)) < 1e-9).unwrap();
     state.mechanical.x[middle].z -= 1e-3;
     let mut row = [0.0; 3];

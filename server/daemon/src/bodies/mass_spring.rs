@@ -9,7 +9,6 @@ use palpate_physics::{
     Model, State,
     bodies::mass_spring::{MassSpringBody, Refinement, SpringMotion, region::Constants},
     contact::is_inside,
-    mesh::triangulation::Edge,
 };
 use palpate_scene::wording::{counted, short};
 use std::sync::Arc;
@@ -33,8 +32,7 @@ impl ServedBody for MassSpringBody {
     /// None of a surface that is open.
     fn enclosing_triangles(&self, _model: &Model) -> Vec<[u32; 3]> {
         let surface = self.model().surface();
-        let is_closed = !surface.edges().iter().any(Edge::is_boundary);
-        if is_closed { surface.triangles().to_vec() } else { Vec::new() }
+        if surface.is_closed() { surface.triangles().to_vec() } else { Vec::new() }
     }
 
     /// Looks at the surface at rest, from which a tool's dent differs by little.

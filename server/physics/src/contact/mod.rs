@@ -82,6 +82,8 @@ pub struct ContactModel {
     tools: Vec<ToolModel>,
     /// How walls of the body press each other; `None` where they are left to pass.
     walls: Option<Box<SelfContact>>,
+    /// Whether the surface is closed with nothing inside, so that a tool that presses one wall pushes others out ([`narrow`]).
+    is_hollow: bool,
 }
 
 /// What contact needs of one tool.
@@ -224,7 +226,22 @@ impl ContactModel {
             tool_frequency_sq += tool.spec.frequency_bound_sq(&total);
         }
         let tables = SampleTables::new();
-        Self { nodal_stiffness_n_per_m, covering_radius_m, tool_frequency_sq, triangles, tables, tools, walls: None }
+        Self {
+            nodal_stiffness_n_per_m,
+            covering_radius_m,
+            tool_frequency_sq,
+            triangles,
+            tables,
+            tools,
+            walls: None,
+            is_hollow: false,
+        }
+    }
+
+    /// Returns the same contact of a surface that has nothing inside.
+    #[must_use]
+    pub(crate) fn hollow(self) -> Self {
+        Self { is_hollow: true, ..self }
     }
 
     /// Returns the same contact, where walls of the body press each other as told.

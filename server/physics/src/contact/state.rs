@@ -123,7 +123,9 @@ impl ContactState {
         chain.list(&self.tools, |chain, tool| {
             chain.list(tool.touching.records(), |chain, touch| {
                 chain.whole(u64::from(touch.sample));
-                chain.whole(u64::from(touch.from_behind) + 2 * u64::from(touch.came_round));
+                chain.whole(
+                    u64::from(touch.from_behind) + 2 * u64::from(touch.came_round) + 4 * u64::from(touch.pushed_out),
+                );
                 chain.real(touch.free_depth_m);
                 chain.vector(touch.spring_origin_m);
             });

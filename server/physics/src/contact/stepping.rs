@@ -208,6 +208,7 @@ impl ContactModel {
             radius_m: model.spec.radius_m,
             friction_coefficient: model.spec.friction_coefficient,
             put_into: std::mem::take(&mut part.just_put) || part.touching.tells_it_was_put(),
+            meets_from_behind: self.is_hollow && part.touching.presses_a_wall(),
         };
         let mut pressed =
             narrow::press(&meeting, &mut part.candidates, &mut part.touching, &mut scratch.next, forces_n);

@@ -144,6 +144,11 @@ impl Triangulation {
         self.edges_at(vertex).iter().any(|&edge| self.edges[edge as usize].is_boundary())
     }
 
+    /// Returns whether no edge lies on a boundary.
+    pub fn is_closed(&self) -> bool {
+        !self.edges.iter().any(Edge::is_boundary)
+    }
+
     /// Returns the length (m) of an edge.
     pub fn length_m(&self, edge: u32) -> f64 {
         let [a, b] = self.edges[edge as usize].nodes;

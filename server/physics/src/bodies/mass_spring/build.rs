@@ -36,6 +36,9 @@ impl MassSpringBody {
             carriers: MostCarriers::default(),
         };
         let contact = ContactModel::build(&skin, &around.tools);
+        // A wall that sleeps could not be pushed out.
+        let is_hollow = body.model().surface().is_closed() && body.is_all_awake();
+        let contact = if is_hollow { contact.hollow() } else { contact };
         body.cluster(contact.triangles());
         let omega_sq = body.model().touched_frequency_sq(&contact.nodal_stiffness_n_per_m) + contact.tool_frequency_sq;
         let steps = Steps::choose(&around.settings, &[], omega_sq.sqrt())?.with_contact(omega, omega_sq.sqrt());

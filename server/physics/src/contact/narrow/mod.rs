@@ -10,6 +10,11 @@
 //! Around an edge, the samples of the far side are reached from behind. Where a tool then comes round the edge without
 //! leaving them, to their outer side, they are in its way: from there on such a sample carries `k_f a (g − g₀)` with the
 //! depth `g₀` at which it came before the tool, or the least since. Otherwise the tool would sink in through them.
+//!
+//! A closed surface of springs is hollow. Where a tool presses one of its walls and reaches another from behind, the first wall
+//! is between the tool and the second and would press it. So the second is in the tool's way, too: it is pushed out, and what was
+//! reached before the first was pressed carries nothing up to its depth at that time. Otherwise the first wall would pass through
+//! the second, and the tool, once it is beyond, would be caught behind it.
 use super::{
     axis::Axis,
     broad::{Candidates, Triangles},
@@ -37,6 +42,8 @@ pub(super) struct Meeting<'a> {
     /// Whether the tool was put there, now or before, and has not left the surface yet: samples that are not on record
     /// then carry nothing up to their present depth; those that cannot be recorded carry nothing at all.
     pub(super) put_into: bool,
+    /// Whether samples that are reached from behind are in the tool's way.
+    pub(super) meets_from_behind: bool,
 }
 
 /// Sums over the samples in contact.
@@ -216,17 +223,26 @@ fn press_triangle(
         let distance_m = distance_sq.sqrt();
         let depth_m = meeting.radius_m - distance_m;
         let known = take(before, number).map(|touch| {
-            if touch.from_behind && !is_behind { touch.come_round(depth_m, meeting.in_tool(p)) } else { touch }
+            if touch.from_behind && !is_behind {
+                touch.come_round(depth_m, meeting.in_tool(p))
+            } else if touch.from_behind && meeting.meets_from_behind && touch.free_depth_m == 0.0 {
+                touch.push_out(depth_m)
+            } else {
+                touch
+            }
         });
-        let from_behind = known.map_or(is_behind, |touch| touch.from_behind);
+        let is_ignored = is_behind && !meeting.meets_from_behind;
+        let from_behind = known.map_or(is_ignored, |touch| touch.from_behind);
         let free_depth_m = if meeting.put_into { depth_m } else { 0.0 };
         // One that carries nothing and passes the axis is behind from then on: on its way back to the outside the tool would
         // be held by it.
-        let from_behind = from_behind || known.is_some_and(|touch| depth_m <= touch.free_depth_m) && is_behind;
+        let carries_nothing = |touch: &Touch| depth_m <= touch.free_depth_m && !touch.pushed_out;
+        let from_behind = from_behind || known.as_ref().is_some_and(carries_nothing) && is_behind;
         let new = || Touch {
             sample: number,
             from_behind,
             came_round: false,
+            pushed_out: is_behind && !from_behind,
             free_depth_m,
             spring_origin_m: meeting.in_tool(p),
         };

@@ -13,6 +13,7 @@ struct Bench {
     touching: Touching,
     next: Touching,
     orientation: DQuat,
+    meets_from_behind: bool,
 }
 
 const RADIUS_M: f64 = 0.01;
@@ -57,7 +58,7 @@ impl Bench {
         let model = ContactModel::build(&skin, &[tool]);
         let samples = model.tools[0].foundation.samples;
         let buffer = || Touching::with_capacity(samples);
-        Self { model, x, touching: buffer(), next: buffer(), orientation }
+        Self { model, x, touching: buffer(), next: buffer(), orientation, meets_from_behind: false }
     }
 
     fn press(&mut self, centre_m: DVec3) -> (Pressed, Vec<DVec3>) {
@@ -76,6 +77,7 @@ impl Bench {
             radius_m: RADIUS_M,
             friction_coefficient: tool.spec.friction_coefficient,
             put_into: just_put || self.touching.tells_it_was_put(),
+            meets_from_behind: self.meets_from_behind,
         };
         let mut forces = vec![DVec3::ZERO; 4];
         let mut all = Candidates::with_capacity(4);
@@ -234,6 +236,31 @@ fn samples_reached_from_behind_carry_nothing_until_they_left() {
     bench.press(DVec3::Z);
     assert!(bench.touching.records().is_empty());
     assert!(bench.press(above(0.1 * RADIUS_M)).0.force_n.z > 0.0);
+}
+
+/// In the way of a tool that presses another wall, they are pushed out, by a force that is the gradient of what it stores.
+#[test]
+fn samples_reached_from_behind_are_pushed_out_where_they_are_in_the_way() {
+    let mut bench = Bench::new(0.0);
+    bench.meets_from_behind = true;
+    let at = |depth: f64| DVec3::new(0.004, 0.004, -RADIUS_M + depth * RADIUS_M);
+    let (mut pressed, mut forces) = bench.press(at(0.0));
+    for step in 1..=30 {
+        let before = pressed;
+        (pressed, forces) = bench.press(at(0.01 * f64::from(step)));
+        let work_j = -0.5 * (pressed.force_n + before.force_n).z * 0.01 * RADIUS_M;
+        let stored_j = pressed.energy_j - before.energy_j;
+        assert!((work_j - stored_j).abs() < 0.02 * pressed.energy_j, "step {step}: {work_j} {stored_j}");
+    }
+    assert!(pressed.force_n.z < 0.0 && pressed.contacts > 100, "{}", pressed.force_n);
+    let pushed: DVec3 = forces.iter().sum();
+    assert!(pushed.z > 0.0 && (pushed + pressed.force_n).length() < 1e-12 * pushed.length(), "{pushed}");
+    // What came so stays so until it leaves, even when the other wall is let go.
+    bench.meets_from_behind = false;
+    assert!(bench.press(at(0.3)).0.force_n.z < 0.0);
+    bench.press(DVec3::Z);
+    bench.press(at(0.3));
+    assert_eq!(bench.press(at(0.3)).0.contacts, 0);
 }
 
 /// Where all that could be kept was met from behind, nothing told in the next tick that the tool was put there, and

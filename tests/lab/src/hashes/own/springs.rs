@@ -27,6 +27,17 @@ fn ball(springs: &str, refine: &str, more: &str) -> String {
     )
 }
 
+/// The same without what is held and as flat as a pan, so that a tool reaches its far wall from behind.
+fn pan(ball: &str) -> String {
+    ball.replace(
+        "[body.sphere_shell]\ninner_radius_mm = 16\nouter_radius_mm = 20",
+        "[body.ellipsoid_shell]\ninner_semi_axes_mm = [18, 18, 3]\nouter_semi_axes_mm = [20, 20, 5]",
+    )
+    .replace("[[fixed]]\nregion = \"lower\"\n", "")
+    .replace("start_mm = [0, 0, 32]", "start_mm = [0, 0, 14]")
+    .replace("point_mm = [0, 0, -5]", "point_mm = [0, 0, 0]")
+}
+
 pub(super) fn cases() -> Vec<Case> {
     const DAMPED: &str = "damping_n_s_per_m = 0.02\n";
     const RIGID: &str = "coupling = \"rigid\"\n";
@@ -62,6 +73,7 @@ pub(super) fn cases() -> Vec<Case> {
             ball(DAMPED, AREA, &load).replace("[body.sphere", "gravity_m_per_s2 = [0, 1, -9.81]\n[body.sphere"),
         ),
         case("springs/awake-in-part", ball(&part, AREA, RIGID)),
+        case("springs/pan", pan(&ball("", AREA, &spring))).acting(presses_through),
         case("springs/skips-off", ball(DAMPED, AREA, RIGID))
             .changed(|scene| scene.model.settings.skips.distant_contact = false),
         case("springs/by-hand", ball(DAMPED, AREA, RIGID))
@@ -91,6 +103,18 @@ fn presses(moment: &mut Moment<'_>) {
         let node = farthest_node(moment.model, DVec3::X);
         moment.drive.point_forces.push(PointForce { node, force_n: DVec3::new(0.01, 0.0, 0.005) });
     }
+}
+
+/// A press 10 mm below the far wall of a pan, a drag to one side, and away.
+fn presses_through(moment: &mut Moment<'_>) {
+    let stroke = Stroke {
+        each_s: 0.08,
+        press_m: DVec3::Z * -29e-3,
+        drag_m: DVec3::new(9e-3, 2e-3, 0.0),
+        axis: DVec3::Z,
+        half_sine: 0.3,
+    };
+    moment.drive.tools[0] = stroke.at(moment.model.tools()[0].start(), moment.time_s);
 }
 
 fn refines(moment: &mut Moment<'_>) {
