@@ -37,6 +37,11 @@ fn time_step() {
 }
 
 #[test]
+fn hearts() {
+    passes_with("hearts", [1]);
+}
+
+#[test]
 fn springs() {
     passes("springs");
 }

@@ -2,10 +2,8 @@
 //! that makes it an equilibrium is `−Div P`, `(Div P)_i = Σ_k [δP(F; ∂F/∂X_k) e_k]_i`, integrated against the shape functions.
 use super::Convergence;
 use crate::methods::tet_body;
-use crate::{
-    bodies,
-    stress::{meshes, random::Random},
-};
+use crate::random::Random;
+use crate::{bodies, stress::meshes};
 use glam::{DMat3, DVec3};
 use miette::{IntoDiagnostic, Result};
 use palpate_physics::{

@@ -5,6 +5,7 @@ use super::{
     methods::{PointPatch, Points},
     places,
 };
+use crate::random::Random;
 use crate::{
     problems::{
         Problem,
@@ -13,7 +14,6 @@ use crate::{
         sample::{self, FieldError, Probe, Sample},
     },
     references::Reference,
-    stress::random::Random,
 };
 use glam::{BVec3, DVec3};
 use miette::{IntoDiagnostic, Result, miette};

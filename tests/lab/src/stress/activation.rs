@@ -1,5 +1,6 @@
 //! Beside a sphere that presses a hybrid body, and trembles, a strained region wakes and falls asleep a hundred times a second.
-use super::{Measured, Options, Outcome, random::Random, rig};
+use super::{Measured, Options, Outcome, rig};
+use crate::random::Random;
 use crate::{bodies, methods, problems::body::Body};
 use glam::DQuat;
 use miette::Result;

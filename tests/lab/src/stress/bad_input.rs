@@ -2,9 +2,10 @@
 //!
 //! That the arm's force ramps to zero within 5 ms is the control law's and the daemon's (`palpate-control`, `palpated` test it); physics
 //! takes the force of a refused tick away at once.
-use super::{Measured, Options, Outcome, meshes, random::Random, rig, rig::Drive, rig::Rig};
+use super::{Measured, Options, Outcome, meshes, rig, rig::Drive, rig::Rig};
 use crate::bodies::material;
 use crate::methods::tet_body;
+use crate::random::Random;
 use glam::DVec3;
 use miette::Result;
 use palpate_physics::{

@@ -1,6 +1,7 @@
 //! Random impulses on random nodes of a free body, in bursts and pauses.
-use super::{Measured, Options, Outcome, meshes, random::Random, rig, rig::Drive, rig::Rig};
+use super::{Measured, Options, Outcome, meshes, rig, rig::Drive, rig::Rig};
 use crate::bodies::material;
+use crate::random::Random;
 use miette::Result;
 use palpate_physics::{PointForce, Substeps, material::Law};
 

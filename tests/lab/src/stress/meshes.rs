@@ -1,5 +1,5 @@
 //! Meshes of the stress suite: bricks with any spacing, jittered and slivered ones.
-use super::random::Random;
+use crate::random::Random;
 use glam::DVec3;
 use miette::{IntoDiagnostic, Result};
 use palpate_physics::{Surface, TetMesh};

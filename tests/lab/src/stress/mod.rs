@@ -3,7 +3,7 @@
 //! - `outcome.rs`: numbers, limits, known shortfalls
 //! - `table.rs`: the printed table and `stress.csv`
 //! - `record.rs`: long runs, kept in the source tree
-//! - `rig.rs`, `meshes.rs`, `random.rs`: what rows share
+//! - `rig.rs`, `meshes.rs`: what rows share
 //! - one file per row
 mod activation;
 mod bad_input;
@@ -12,7 +12,6 @@ mod impulses;
 mod incompressible;
 pub(crate) mod meshes;
 mod outcome;
-pub(crate) mod random;
 mod random_scenes;
 mod record;
 mod recovery;
@@ -78,7 +77,7 @@ pub struct Row {
 }
 
 /// Every row, in the order of the table.
-pub const ROWS: [Row; 16] = [
+pub const ROWS: [Row; 17] = [
     Row { name: "time-step", criterion: time_step::CRITERION, run: time_step::run },
     Row { name: "stiffness-ratio", criterion: stiffness_ratio::CRITERION, run: stiffness_ratio::run },
     Row { name: "incompressible", criterion: incompressible::CRITERION, run: incompressible::run },
@@ -94,6 +93,7 @@ pub const ROWS: [Row; 16] = [
     Row { name: "leaps", criterion: hands::leaps::CRITERION, run: hands::leaps::run },
     Row { name: "squeezes", criterion: hands::squeezes::CRITERION, run: hands::squeezes::run },
     Row { name: "strokes", criterion: hands::strokes::CRITERION, run: hands::strokes::run },
+    Row { name: "hearts", criterion: hands::hearts::CRITERION, run: hands::hearts::run },
     Row { name: "springs", criterion: springs::CRITERION, run: springs::run },
 ];
 

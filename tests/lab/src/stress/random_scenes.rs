@@ -1,8 +1,9 @@
 //! Scenes made at random: meshes, materials, loads, tools and blows. Scene k of a run has the seed `--seed` + k, so that
 //! `palpate-lab stress random-scenes --seed N` begins with the scene that failed as N.
-use super::{Measured, Options, Outcome, meshes, random::Random, rig, rig::Drive, rig::Rig};
+use super::{Measured, Options, Outcome, meshes, rig, rig::Drive, rig::Rig};
 use crate::bodies::material;
 use crate::methods::tet_body;
+use crate::random::Random;
 use glam::DVec3;
 use miette::{IntoDiagnostic, Result};
 use palpate_physics::{

@@ -2,9 +2,10 @@
 //!
 //! A block held on its floor with mass damping, at the default step, which stretches beyond its allowance make unstable: ticks must be
 //! repeated in more substeps. Its free nodes are put wrong at rest and let go for five seconds.
-use super::{Measured, Options, Outcome, meshes, random::Random, rig, rig::Drive, rig::Rig};
+use super::{Measured, Options, Outcome, meshes, rig, rig::Drive, rig::Rig};
 use crate::bodies::material;
 use crate::methods::tet_body;
+use crate::random::Random;
 use glam::DVec3;
 use miette::Result;
 use palpate_physics::material::Law;

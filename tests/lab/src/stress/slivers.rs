@@ -1,6 +1,7 @@
 //! Meshes no one should use: a sliver of 1°, edges in a ratio of 1000:1. The step comes from their spectrum.
-use super::{Measured, Options, Outcome, meshes, random::Random, rig, rig::Drive, rig::Rig};
+use super::{Measured, Options, Outcome, meshes, rig, rig::Drive, rig::Rig};
 use crate::bodies::material;
+use crate::random::Random;
 use miette::Result;
 use palpate_physics::{TetMesh, material::Law, mesh::quality};
 

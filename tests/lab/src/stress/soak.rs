@@ -2,8 +2,9 @@
 //!
 //! The energy `K + U` of the moment oscillates by O((ω dt)²), so drift is of means: over the last hundredth of the run, or second, against
 //! the first. Beside it stands the same of the energy that leapfrog conserves, `K + U − ⅛ dt² Σ f²/m`.
-use super::{Extent, Measured, Options, Outcome, meshes, random::Random, rig, rig::Drive, rig::Rig};
+use super::{Extent, Measured, Options, Outcome, meshes, rig, rig::Drive, rig::Rig};
 use crate::bodies::material;
+use crate::random::Random;
 use assert_no_alloc::assert_no_alloc;
 use glam::DVec3;
 use indicatif::{ProgressBar, ProgressStyle};

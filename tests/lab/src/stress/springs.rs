@@ -2,9 +2,9 @@
 //! refined in any way, most of them asleep or none.
 use super::{
     Measured, Options, Outcome,
-    random::Random,
     rig::{Drive, Rig, hold},
 };
+use crate::random::Random;
 use glam::DVec3;
 use miette::{IntoDiagnostic, Result, bail};
 use palpate_physics::{

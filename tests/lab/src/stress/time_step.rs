@@ -3,8 +3,9 @@
 //! Up to the limit velocity Verlet conserves `½v² + ½ω²(1 − r²)x²` of every mode, so its energy never exceeds `E₀/(1 − r²)`: the
 //! bound asked for, sharp, at any number of steps. The body moves by about 1e-6 of its size, so that it is linear. Above it the
 //! physics must notice, and the energy stays what it is then.
-use super::{Measured, Options, Outcome, meshes, random::Random, rig, rig::Drive, rig::Rig};
+use super::{Measured, Options, Outcome, meshes, rig, rig::Drive, rig::Rig};
 use crate::bodies::material;
+use crate::random::Random;
 use miette::Result;
 use palpate_physics::{Substeps, material::Law};
 

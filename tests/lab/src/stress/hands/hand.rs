@@ -1,6 +1,6 @@
 //! A random press: which tool, where, in which direction, how fast and how far.
 use super::Body;
-use crate::stress::random::Random;
+use crate::random::Random;
 use glam::{DQuat, DVec3};
 use miette::{Result, bail};
 use palpate_physics::{
@@ -27,6 +27,8 @@ pub(super) struct Press {
     /// Way (m) of the hand from its start to where it would touch the body at rest.
     pub(super) gap_m: f64,
     depth_m: f64,
+    /// How far (m) it is dragged once it is there.
+    drag_m: DVec3,
     pub(super) speed_m_per_s: f64,
     /// Whether the tool is far from the body's edges.
     pub(super) is_inland: bool,
@@ -79,9 +81,15 @@ impl Press {
             }
             let inland_m = 0.5 * body.edge_m - 2.0 * reach_m - depth_m;
             let is_inland = normal.z > 0.99 && touch_m.x.abs() < inland_m && touch_m.y.abs() < inland_m;
-            return Ok(Self { tool, along, gap_m, depth_m, speed_m_per_s, is_inland });
+            return Ok(Self { tool, along, gap_m, depth_m, drag_m: DVec3::ZERO, speed_m_per_s, is_inland });
         }
         bail!("no place for a tool was found")
+    }
+
+    /// Returns the press of a hand that is dragged on so far (m) where it touched, in the direction nearest to this across the one in which it pressed.
+    pub(super) fn dragged(self, direction: DVec3, length_m: f64) -> Self {
+        let across = direction.reject_from_normalized(self.along).normalize_or(self.along.any_orthonormal_vector());
+        Self { drag_m: across * length_m, ..self }
     }
 }
 
@@ -105,7 +113,8 @@ impl fmt::Display for Press {
         let kind = if self.tool.coupling == Coupling::Rigid { "rigid" } else { "coupled" };
         let shape = if self.tool.shape.as_capsule().is_some() { "capsule" } else { "sphere" };
         let (radius_mm, depth_mm) = (1e3 * self.tool.radius_m, 1e3 * self.depth_m);
-        write!(f, "{kind} {shape} of {radius_mm:.1} mm, {:.2} m/s, {depth_mm:.0} mm deep", self.speed_m_per_s)
+        write!(f, "{kind} {shape} of {radius_mm:.1} mm, {:.2} m/s, {depth_mm:.0} mm deep", self.speed_m_per_s)?;
+        if self.drag_m == DVec3::ZERO { Ok(()) } else { write!(f, ", dragged {:.0} mm", 1e3 * self.drag_m.length()) }
     }
 }
 
@@ -115,13 +124,15 @@ pub(super) struct Hand<'a> {
     press: &'a Press,
     /// How far (m) it has gone.
     way_m: f64,
+    /// The part of its drag that it has gone.
+    dragged: f64,
     stayed: u32,
     is_back: bool,
 }
 
 impl<'a> Hand<'a> {
     pub(super) fn new(press: &'a Press) -> Self {
-        Self { press, way_m: 0.0, stayed: 0, is_back: false }
+        Self { press, way_m: 0.0, dragged: 0.0, stayed: 0, is_back: false }
     }
 
     /// Returns whether it still goes deeper.
@@ -136,22 +147,25 @@ impl<'a> Hand<'a> {
 
     /// Moves on by a tick, against this force (N) on the device.
     pub(super) fn go_on(&mut self, period_s: f64, force_n: f64) -> ToolTarget {
-        let Press { along, gap_m, depth_m, speed_m_per_s, .. } = *self.press;
+        let Press { along, gap_m, depth_m, drag_m, speed_m_per_s, .. } = *self.press;
         let step_m = speed_m_per_s * period_s;
-        let mut moved_m = 0.0;
+        let (mut moved_m, mut dragged) = (0.0, 0.0);
         if self.presses() && force_n < LARGEST_FORCE_N && self.way_m < gap_m + depth_m {
             moved_m = step_m.min(gap_m + depth_m - self.way_m);
         } else if self.stayed < STAYS_TICKS {
             self.stayed += 1;
+        } else if self.dragged < 1.0 && drag_m != DVec3::ZERO && self.way_m > gap_m {
+            dragged = (step_m / drag_m.length()).min(1.0 - self.dragged);
         } else {
             moved_m = -step_m.min(self.way_m);
             self.is_back = self.way_m <= step_m;
         }
         self.way_m += moved_m;
+        self.dragged += dragged;
         ToolTarget {
-            velocity_m_per_s: along * (moved_m / period_s),
+            velocity_m_per_s: (along * moved_m + drag_m * dragged) / period_s,
             orientation: self.press.tool.start().orientation,
-            ..ToolTarget::at(self.press.tool.start_position_m + along * self.way_m)
+            ..ToolTarget::at(self.press.tool.start_position_m + along * self.way_m + drag_m * self.dragged)
         }
     }
 }

@@ -3,9 +3,10 @@ use super::{
     BODIES,
     presses::{Pressed, press_all},
 };
+use crate::random::Random;
 use crate::{
     bodies::material,
-    stress::{Options, Outcome, random::Random},
+    stress::{Options, Outcome},
 };
 use miette::{Result, miette};
 use palpate_physics::{
@@ -21,7 +22,7 @@ const BELOW_HALF: [f64; 2] = [1e-4, 0.2];
 const YOUNG_MODULUS_PA: f64 = 10e3;
 
 pub(in crate::stress) fn run(options: &Options) -> Result<Outcome> {
-    let blocks = BODIES.iter().filter(|body| body.slow_m_per_s > 0.0);
+    let blocks = BODIES.iter().filter(|shipped| shipped.body.slow_m_per_s > 0.0);
     press_all(blocks, options.pick(1, 8, 1000), options.seed, &of_any_law)
 }
 

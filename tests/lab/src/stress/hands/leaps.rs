@@ -9,9 +9,9 @@ use super::{
     spec,
     watch::{LOOK_EVERY, LedgerSeen, LettingGo, MOST_IMBALANCE},
 };
+use crate::random::Random;
 use crate::stress::{
     Measured, Options, Outcome,
-    random::Random,
     rig::{Drive, Rig},
 };
 use glam::DVec3;
@@ -111,8 +111,9 @@ struct Found {
 pub(in crate::stress) fn run(options: &Options) -> Result<Outcome> {
     let leaps = options.pick(2, 12, 1000);
     let mut outcome = Outcome::passing();
-    for body in &BODIES {
-        let spec = spec(body).wrap_err(body.name)?;
+    for shipped in &BODIES {
+        let body = &shipped.body;
+        let spec = spec(shipped).wrap_err(body.name)?;
         let bare = Model::build(ModelSpec { tools: Vec::new(), ..spec.clone() }).into_diagnostic()?;
         let (mut imbalance, mut force_n) = (0.0_f64, 0.0_f64);
         for number in 0..leaps {

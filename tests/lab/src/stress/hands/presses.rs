@@ -3,12 +3,13 @@
 //! Found by it: at 1.3 tool radii the force of a slow press fell from 2.3 N to nothing and the tool was buried; of thirty
 //! quick ones twelve ended in quarantine.
 use super::{
-    BODIES, Body,
+    BODIES, Shipped,
     hand::Press,
     spec,
     watch::{Found, watch},
 };
-use crate::stress::{Options, Outcome, random::Random};
+use crate::random::Random;
+use crate::stress::{Options, Outcome};
 use miette::{IntoDiagnostic, Result, WrapErr};
 use palpate_physics::{Model, ModelSpec};
 
@@ -32,14 +33,15 @@ pub(super) struct Pressed {
 
 /// Presses every body so many times at random; `vary` makes what is pressed of it.
 pub(super) fn press_all<'b>(
-    bodies: impl Iterator<Item = &'b Body>,
+    bodies: impl Iterator<Item = &'b Shipped>,
     presses: u64,
     first_seed: u64,
     vary: &dyn Fn(&ModelSpec, &mut Random) -> Result<Pressed>,
 ) -> Result<Outcome> {
     let mut outcome = Outcome::passing();
-    for body in bodies {
-        let spec = spec(body).wrap_err(body.name)?;
+    for shipped in bodies {
+        let body = &shipped.body;
+        let spec = spec(shipped).wrap_err(body.name)?;
         let bare = Model::build(ModelSpec { tools: Vec::new(), ..spec.clone() }).into_diagnostic()?;
         let mut worst = Found::default();
         for number in 0..presses {

@@ -2,9 +2,9 @@
 //!
 //! Found by it, or what it was written after: a wall of 10 mm that two tools squeezed to 2.4 mm ended in quarantine.
 use super::watch::{LOOK_EVERY, LedgerSeen, MOST_IMBALANCE};
+use crate::random::Random;
 use crate::stress::{
     Measured, Options, Outcome,
-    random::Random,
     rig::{Drive, Rig},
 };
 use glam::DVec3;

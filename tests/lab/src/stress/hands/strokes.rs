@@ -6,9 +6,9 @@ use super::{
     BODIES, spec,
     watch::{LedgerSeen, MOST_IMBALANCE},
 };
+use crate::random::Random;
 use crate::stress::{
     Measured, Options, Outcome,
-    random::Random,
     rig::{Drive, Rig},
 };
 use assert_no_alloc::assert_no_alloc;

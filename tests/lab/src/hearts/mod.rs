@@ -1,0 +1,10 @@
+//! Irregular hearts: walls that no scene of ours was tuned on.
+//!
+//! A heart that was segmented from images is no ellipsoid: its axis points anywhere, its wall is thick here and thin there,
+//! its septum flat, its base no plane, muscles stand out into its cavity, and its surfaces are those of voxels. A seed
+//! decides all of it.
+mod anatomy;
+mod isosurface;
+mod scene;
+
+pub(crate) use scene::Heart;
