@@ -68,6 +68,34 @@ fn elements_inside_out_are_told_and_end_a_run_with_4() {
     assert!((0.5..0.99).contains(&least) && !gentle.said.contains("inside out"), "{least} {}", gentle.said);
 }
 
+/// Elements were looked for every ten ticks: of long ticks that was too seldom, and what a probe showed ended with 0.
+#[test]
+fn what_a_probe_tells_is_told_at_the_end_whatever_a_tick_lasts() {
+    let laws = ["stable-neo-hookean", "stvk"];
+    for (law, period_ms) in laws.iter().flat_map(|law| ["0.5", "1", "2", "4"].map(|period_ms| (law, period_ms))) {
+        let scene = format!(
+            "[scene]\nname = \"jab\"\ntick_period_s = {period_ms}e-3\n[body]\noffset_mm = [-20, -20, -20]\n[body.box]\nsize_mm = [40, 40, 20]\ncells = [6, 6, 4]\n\
+             [[material]]\nlaw = \"{law}\"\nyoung_modulus_pa = 10e3\npoisson_ratio = 0.45\ndensity_kg_per_m3 = 1000\n\
+             [[fixed]]\nregion = \"z_min\"\n[[tool]]\nname = \"finger\"\nradius_mm = 4\ncoupling = \"rigid\"\ndriver = \"script\"\n\
+             keyframe = [{{ time_s = 0, position_mm = [0, 0, 5] }}, {{ time_s = 0.004, position_mm = [0, 0, -11] }},\n\
+             {{ time_s = 0.008, position_mm = [0, 0, 5] }}]\n[[probe]]\nname = \"ratio\"\nmeasure = \"min-volume-ratio\"\n\
+             [numerics]\nmass_damping_per_s = 20\n[output]\nduration_s = 0.04\n\
+             sample_interval_s = {period_ms}e-3\n"
+        );
+        let folder = tempfile::tempdir().unwrap();
+        let out = folder.path().join("out");
+        let ended = run("simulate", &scene, &["--json", "--out", out.to_str().unwrap()]);
+        let rows = fs::read_to_string(out.join("probes.csv")).unwrap_or_else(|error| panic!("{error}: {}", ended.said));
+        let values = rows.lines().skip(1).map(|row| row.rsplit(',').next().unwrap().parse::<f64>().unwrap());
+        let shown = values.fold(1.0, f64::min);
+        let summary: Value = serde_json::from_str(&ended.shown).unwrap();
+        let told = summary["lowest_volume_ratio"]["value"].as_f64().unwrap();
+        assert!(told <= shown, "{law}, {period_ms} ms: {told} {shown}");
+        assert!(told < 0.0 || *law != "stvk", "{period_ms} ms: {told}");
+        assert_eq!(ended.code == Some(4), told <= 0.0, "{law}, {period_ms} ms: {told} {:?} {}", ended.code, ended.said);
+    }
+}
+
 #[test]
 fn a_quarantine_ends_a_run_with_3() {
     let step = "[numerics]\nsubsteps = 1\nsubcycle_unstable = false\n";

@@ -57,6 +57,11 @@ impl Probe {
         &self.measure
     }
 
+    /// Whether it tells of elements that are turned inside out.
+    pub fn tells_of_inversion(&self) -> bool {
+        matches!(self.measure, Measure::MinVolumeRatio)
+    }
+
     /// Unit of its values: `m`, `N`, `Nm`, `J` or `1`.
     pub fn unit(&self) -> &'static str {
         match self.measure {

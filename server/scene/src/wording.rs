@@ -5,15 +5,29 @@ pub fn counted(count: usize, noun: &str) -> String {
     format!("{count} {noun}{}", if count == 1 { "" } else { "s" })
 }
 
-/// `1 hexahedron`, `2 hexahedra`: a count and what is counted, in its plural.
+/// `1 point that belongs to no triangle is left out`, `2 points that belong to no triangle are left out`: how many there are of
+/// what is left out, its noun, and what is true of it, which starts with a verb.
+pub(crate) fn left_out(count: usize, noun: &str, belong_to_nothing: &str) -> String {
+    let (first, of) = noun.split_once(' ').map_or((noun, String::new()), |(first, of)| (first, format!(" {of}")));
+    let (verb, rest) = belong_to_nothing.split_once(' ').unwrap_or((belong_to_nothing, ""));
+    let (s, are) = if count == 1 { ("s", "is") } else { ("", "are") };
+    format!("{}{of} that {verb}{s} {rest} {are} left out", counted(count, first))
+}
+
+/// `1 hexahedron`, `2 hexahedra`, `1 face of a solid`: a count and what is counted, in its plural, of which "lines and points" have
+/// no other number.
 pub(crate) fn counted_as(count: usize, plural: &str) -> String {
+    if plural.contains(" and ") {
+        return format!("{count} {plural}");
+    }
+    let (plural, of) = plural.find(" of ").map_or((plural, ""), |at| plural.split_at(at));
     match plural
         .strip_suffix("hedra")
         .map(|kind| format!("{kind}hedron"))
         .or(plural.strip_suffix('s').map(str::to_owned))
     {
-        Some(singular) if count == 1 => format!("1 {singular}"),
-        _ => format!("{count} {plural}"),
+        Some(singular) if count == 1 => format!("1 {singular}{of}"),
+        _ => format!("{count} {plural}{of}"),
     }
 }
 
@@ -46,7 +60,18 @@ mod tests {
         let counts =
             [(1, "hexahedra"), (2, "hexahedra"), (1, "prisms"), (0, "lines")].map(|(n, what)| counted_as(n, what));
         assert_eq!(joined(&counts), "1 hexahedron, 2 hexahedra, 1 prism and 0 lines");
+        assert_eq!(counted_as(1, "lines and points"), "1 lines and points");
+        let faces = [1, 2].map(|count| counted_as(count, "faces of many corners"));
+        assert_eq!(faces, ["1 face of many corners", "2 faces of many corners"]);
         assert_eq!((joined(&counts[..1]), joined(&[])), ("1 hexahedron".to_string(), String::new()));
+    }
+
+    #[test]
+    fn what_is_left_out_agrees_with_its_number() {
+        let told = [1, 2].map(|count| left_out(count, "node of the geometry", "belong to no tetrahedron"));
+        assert_eq!(told[0], "1 node of the geometry that belongs to no tetrahedron is left out");
+        assert_eq!(told[1], "2 nodes of the geometry that belong to no tetrahedron are left out");
+        assert_eq!(left_out(1, "triangle", "use a vertex twice"), "1 triangle that uses a vertex twice is left out");
     }
 
     #[test]

@@ -252,7 +252,7 @@ fn messages_name_line_node_and_element() {
     let word = refused("d.msh", &format!("{whole}7 four 2 1 1 1 2 3 4\n$EndElements\n"));
     assert!(word.contains("line 13: expected the type of an element, found `four`"), "{word}");
     let none = refused("e.msh", &format!("{whole}7 2 2 1 1 1 2 3\n$EndElements\n"));
-    assert!(none.contains("e.msh: holds no tetrahedra (it holds 4 nodes, 1 triangles)"), "{none}");
+    assert!(none.contains("e.msh: holds no tetrahedra (it holds 4 nodes, 1 triangle)"), "{none}");
     assert!(none.contains("gmsh -3"), "{none}");
     let cut = refused("f.msh", &format!("{whole}7 4 2 1 1 1 2"));
     assert!(cut.contains("line 13: the file ends where the node of an element was expected"), "{cut}");

@@ -77,7 +77,7 @@ fn ply_passes_over_what_is_no_part_of_a_surface() {
     let file = surface("a.ply", text);
     assert_eq!(file.vertices, [DVec3::ZERO, DVec3::X, DVec3::Z]);
     assert_eq!(file.triangles, [[0, 1, 2]]);
-    assert!(file.warnings.iter().any(|w| w.contains("1 points that belong to no triangle")), "{:?}", file.warnings);
+    assert!(file.warnings.iter().any(|w| w.contains("1 point that belongs to no triangle")), "{:?}", file.warnings);
 }
 
 #[test]
@@ -88,7 +88,7 @@ fn stl_joins_points_and_drops_collapsed_triangles() {
     let thin = facet("vertex 1 0 0\nvertex 1 0 0\nvertex 0 1 0\n");
     let file = surface("a.stl", &format!("solid two words\n{one}{two}{thin}endsolid two words\n"));
     assert_eq!((file.vertices.len(), file.triangles.as_slice()), (4, &[[0, 1, 2], [1, 3, 2]][..]));
-    assert!(file.warnings.iter().any(|w| w.starts_with("1 triangles that use a vertex twice")), "{:?}", file.warnings);
+    assert!(file.warnings.iter().any(|w| w.starts_with("1 triangle that uses a vertex twice")), "{:?}", file.warnings);
 }
 
 const LEGACY: &str = "# vtk DataFile Version 2.0\nby hand\nASCII\nDATASET UNSTRUCTURED_GRID\nPOINTS 4 float\n\
@@ -117,7 +117,7 @@ fn legacy_strips_alternate() {
                 LINES 1 3\n2 0 1\nTRIANGLE_STRIPS 1 5\n4 0 1 2 3\n";
     let file = surface("a.vtk", text);
     assert_eq!(file.triangles, [[0, 1, 2], [2, 1, 3]]);
-    assert!(file.warnings.iter().any(|w| w.contains("1 lines")), "{:?}", file.warnings);
+    assert!(file.warnings.iter().any(|w| w.contains("1 line")), "{:?}", file.warnings);
 }
 
 #[test]

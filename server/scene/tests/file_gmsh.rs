@@ -123,7 +123,7 @@ fn is_sound(mesh: &GroupedMesh, name: &str) {
     // The point and the line of groups: the point is kept, of lines none is.
     let split =
         "1 hexahedron and 1 pyramid were split into 8 tetrahedra; 2 lines and 1 point of the geometry were left out";
-    let centre = "1 nodes of the geometry that belong to no tetrahedron are left out";
+    let centre = "1 node of the geometry that belongs to no tetrahedron is left out";
     assert_eq!(mesh.notes, [split, centre], "{name}");
     assert!((mesh.mesh.total_volume_m3() - 4.0 / 3.0).abs() < 1e-14, "{name}");
     let members = |wanted: &str| {

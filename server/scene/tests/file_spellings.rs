@@ -323,7 +323,7 @@ fn binary_msh_22_with_parametric_nodes() {
 /// One face of two corners among thousands refused the surface.
 #[test]
 fn faces_of_fewer_than_three_corners() {
-    let told = ["not used: 1 faces of fewer than three corners"];
+    let told = ["not used: 1 face of fewer than three corners"];
     let ply = surface("a.ply", PLY.replace("face 2", "face 3").replace("3 0 1 2\n", "3 0 1 2\n2 1 2\n"));
     let obj = surface("a.obj", OBJ.replace("f 1 2 3\n", "f 1 2 3\nf 2 3\n"));
     let head =
@@ -346,7 +346,7 @@ fn tetgen_faces_of_second_order() {
     let read = |face: &str| tetgen(&[("node", &node), ("ele", ele), ("face", face)]);
     let ordinary = read(FACE);
     let file = read("2 1\n1 1 3 2 6 5 7 3\n2 2 3 4 10 9 6 0\n");
-    assert!(file.warnings.iter().any(|w| w.starts_with("of 1 tetrahedra, 2 triangles the corner nodes are used")));
+    assert!(file.warnings.iter().any(|w| w.starts_with("of 1 tetrahedron, 2 triangles the corner nodes are used")));
     // With the tets beside each face (-nn), and where only the tets are of second order.
     assert_eq!(quiet(read("2 1\n1 1 3 2 6 5 7 3 1 -1\n2 2 3 4 10 9 6 0 1 -1\n")), quiet(ordinary.clone()));
     assert_eq!(quiet(read("2 1\n1 1 3 2 3 1 -1\n2 2 3 4 0 1 -1\n")), quiet(ordinary.clone()));
@@ -391,7 +391,7 @@ fn lines_and_points_of_the_geometry_are_noted() {
     let file = volume("a.msh", text).into_tet_mesh(1.0, UnusedNodes::Drop).unwrap();
     let ordinary = volume("a.msh", MSH22).into_tet_mesh(1.0, UnusedNodes::Drop).unwrap();
     assert_eq!(file.warnings, Vec::<String>::new());
-    let centre = "1 nodes of the geometry that belong to no tetrahedron are left out";
+    let centre = "1 node of the geometry that belongs to no tetrahedron is left out";
     assert_eq!(file.notes, ["1 line and 1 point of the geometry were left out", centre]);
     assert_eq!((file.mesh, file.tet_group), (ordinary.mesh, ordinary.tet_group));
 }

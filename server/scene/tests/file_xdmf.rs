@@ -212,7 +212,7 @@ fn mixed_topologies() {
     let quadratic = volume(&mixed(&quadratic, 4)).into_tet_mesh(1.0, UnusedNodes::Refuse).unwrap();
     assert_eq!(quadratic.mesh, file.mesh);
     let told =
-        "of 1 hexahedra, 1 prisms, 1 pyramids, 1 tetrahedra the corner nodes are used, the nodes between them are not";
+        "of 1 hexahedron, 1 prism, 1 pyramid, 1 tetrahedron the corner nodes are used, the nodes between them are not";
     assert_eq!(quadratic.warnings, [told]);
     for (cells, count, told) in [
         ("6 0 1 2", 1, "a mixed Topology ends within a cell"),

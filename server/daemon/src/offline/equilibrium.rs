@@ -8,6 +8,7 @@ use super::{
     load,
     probe_rows::ProbeRows,
     summary::{Ending, SolveNumbers, Summary},
+    walls,
 };
 use crate::{bodies::served, progress::Progress, strained::Seen};
 use glam::DVec3;
@@ -18,7 +19,7 @@ use palpate_physics::{
     statics::{self, Goal, SolveError, StaticSettings, StaticSolution},
     world::{self, strained},
 };
-use palpate_scene::{Scene, wording::short};
+use palpate_scene::Scene;
 use std::{ops::ControlFlow, process::ExitCode, time::Instant};
 use thiserror::Error;
 
@@ -108,12 +109,12 @@ pub fn run(args: &StaticArgs) -> miette::Result<ExitCode> {
 
 /// What to say where walls of the body meet, which the solver lets pass.
 fn walls_that_meet(model: &Model, state: &State) -> Option<String> {
-    let walls = world::meeting_walls(model, state);
-    (walls.vertices > 0).then(|| {
-        let gap_mm = short(walls.least_gap_m * 1e3);
+    let met = world::meeting_walls(model, state);
+    (met.vertices > 0).then(|| {
         format!(
-            "walls of the body meet in this equilibrium (least gap {gap_mm} mm), and the search for it does not count \
-             that they press each other; let `palpated simulate` come to rest"
+            "walls of the body meet in this equilibrium, {}; the search for it does not count that they press each other: \
+             let `palpated simulate` come to rest",
+            walls::apart(met.least_gap_m)
         )
     })
 }

@@ -2,6 +2,7 @@
 //! them.
 use miette::{Diagnostic, Report};
 use palpate_physics::Quarantine;
+use palpate_scene::wording::counted;
 use std::process::ExitCode;
 use thiserror::Error;
 
@@ -39,7 +40,8 @@ pub(super) enum Untrusted {
     },
     /// An equilibrium with elements that have `det F ≤ 0`.
     #[error(
-        "this equilibrium has {count} elements that are turned inside out: it is one of the formulas, not one of a body"
+        "this equilibrium has {} turned inside out: it is one of the formulas, not one of a body",
+        counted(*count as usize, "element")
     )]
     #[diagnostic(help("apply less load, refine the mesh, or take law = \"stable-neo-hookean\""))]
     InvertedAtRest {

@@ -14,8 +14,8 @@ use crate::{bodies::FirstTouch, progress::Progress, strained::Seen};
 use glam::DVec3;
 use hdrhistogram::Histogram;
 use miette::IntoDiagnostic;
-use palpate_physics::{Model, Scratch, State, TickInput, contact::ToolTarget, step, world::strained_in};
-use palpate_scene::{Scene, wording::short};
+use palpate_physics::{Model, Scratch, State, StepReport, TickInput, contact::ToolTarget, step, world::strained_in};
+use palpate_scene::{Probe, Scene, wording::short};
 use std::{process::ExitCode, time::Instant};
 
 /// Flags of `palpated simulate`.
@@ -36,8 +36,9 @@ pub struct SimulateArgs {
     frames: Option<FrameCount>,
 }
 
-/// Elements that are inside out, or pressed beyond what their law is made for, are looked for at every so many ticks, and at the end.
-const LOOK_EVERY: u64 = 10;
+/// Elements that are inside out, or pressed beyond what their law is made for, are looked for so often (s), wherever a tick
+/// had to be repeated, with every sample of a probe that tells of them, and at the end.
+const LOOK_EVERY_S: f64 = 0.01;
 
 /// How many frames a run writes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -211,10 +212,10 @@ impl<'s> Run<'s> {
         let interrupt = Interrupt::listen();
         let mut bar = Progress::new(&self.scene.name);
         let mut ended_by = "duration";
+        let look_every = in_ticks(LOOK_EVERY_S, self.model);
+        let samples_tell = self.scene.probes.iter().any(Probe::tells_of_inversion);
         for tick in 0..=plan.ticks {
-            if tick > 0 {
-                self.tick();
-            }
+            let repeated = tick > 0 && self.tick().repeated > 0;
             let time_s = self.state.time_s(self.model);
             if self.state.quarantine.is_some() {
                 ended_by = "quarantined";
@@ -222,10 +223,11 @@ impl<'s> Run<'s> {
                 ended_by = "interrupted";
             }
             let last = tick == plan.ticks || ended_by != "duration";
-            if last || tick.is_multiple_of(LOOK_EVERY) {
+            let sampled = last || tick.is_multiple_of(plan.sample_every);
+            if repeated || tick.is_multiple_of(look_every) || (sampled && samples_tell) || last {
                 self.look(time_s);
             }
-            if tick.is_multiple_of(plan.sample_every) || last {
+            if sampled {
                 rows.sample(time_s, self.model, &self.state, self.scratch.reactions_n())?;
             }
             if let Some(frames) = &mut frames
@@ -273,7 +275,7 @@ impl<'s> Run<'s> {
     }
 
     /// One tick: the inputs at its end, then the step, whose wall time is recorded.
-    pub(super) fn tick(&mut self) {
+    pub(super) fn tick(&mut self) -> StepReport {
         let time_s = (self.state.mechanical.tick + 1) as f64 * self.model.settings().tick_period_s;
         for (tool, target) in self.targets.iter_mut().enumerate() {
             *target = self.first_tool.filter(|_| tool == 0).unwrap_or_else(|| self.scene.offline_target(tool, time_s));
@@ -303,6 +305,7 @@ impl<'s> Run<'s> {
             self.awake_wall_ns.saturating_record(wall_ns);
             self.most_awake = self.most_awake.max(awake);
         }
+        report
     }
 
     /// What to tell of rigid tools that slipped from their devices.

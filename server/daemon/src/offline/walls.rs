@@ -1,6 +1,6 @@
 //! What `simulate` tells of walls of the body that met.
 use palpate_physics::contact::MeetingWalls;
-use palpate_scene::wording::counted;
+use palpate_scene::wording::{counted, short};
 use serde::Serialize;
 
 /// Walls of the body that met in the ticks of a run.
@@ -34,7 +34,15 @@ impl WallNumbers {
             0 => String::new(),
             _ => "; not all that was near could be looked at, so that walls may have passed".to_owned(),
         };
-        let gap_mm = self.least_gap_m * 1e3;
-        format!("walls of the body met in {ticks}: up to {vertices} vertices pressed, least gap {gap_mm:.3} mm{missed}")
+        let apart = apart(self.least_gap_m);
+        format!("walls of the body met in {ticks}: up to {vertices} of their vertices were pressed, {apart}{missed}")
+    }
+}
+
+/// How near walls came, given the least gap (m) between them.
+pub(super) fn apart(least_gap_m: f64) -> String {
+    match short(least_gap_m.abs() * 1e3) {
+        mm if least_gap_m < 0.0 => format!("and the walls overlapped by up to {mm} mm"),
+        mm => format!("and the least gap was {mm} mm"),
     }
 }

@@ -11,6 +11,7 @@ mod probes;
 mod regions;
 mod separate_parts;
 mod shape;
+mod starts;
 mod surface_alone;
 mod tools;
 

@@ -1,5 +1,5 @@
 //! `[[tool]]` and `[arm]`: tools and what moves them.
-use super::{Files, body::Body, check, csv, shape, unique_names};
+use super::{Files, body::Body, check, csv, shape, starts, unique_names};
 use crate::{
     document::{
         Document,
@@ -40,7 +40,7 @@ pub(crate) fn compile(document: &Document, body: &Body, files: &Files<'_>) -> Re
         let driver = driver.turned(shape.as_capsule().map(|capsule| capsule.start_orientation).unwrap_or_default());
         let spec =
             ToolSpec { name: table.name.clone(), shape, radius_m, coupling, friction_coefficient, start_position_m };
-        tools.warn_of_start(&spec, body);
+        tools.warnings.extend(starts::warnings(&spec, body));
         tools.specs.push(spec);
         tools.drivers.push(driver);
     }
@@ -54,20 +54,6 @@ pub(crate) fn compile(document: &Document, body: &Body, files: &Files<'_>) -> Re
 }
 
 impl Tools {
-    fn warn_of_start(&mut self, tool: &ToolSpec, body: &Body) {
-        let half_m = tool.start().orientation * (DVec3::Z * tool.shape.half_length_m());
-        let along =
-            [0.0, -1.0, -0.5, 0.5, 1.0].map(|part| body.locate(tool.start_position_m + half_m * part).distance_m);
-        let distance_m = along.into_iter().fold(f64::INFINITY, f64::min);
-        if distance_m < tool.radius_m {
-            self.warnings.push(format!(
-                "the tool \"{}\" starts inside the body or touching it (gap {:.3} mm): the first tick pushes hard",
-                tool.name,
-                (distance_m - tool.radius_m) * 1e3
-            ));
-        }
-    }
-
     fn warn_of_idle(&mut self, document: &Document) {
         for table in document.tool.iter().filter(|tool| tool.driver == DriverName::Device) {
             if document.arm.as_ref().is_none_or(|arm| arm.tool != table.name) {

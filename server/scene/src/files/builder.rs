@@ -4,7 +4,7 @@ use super::error::{FileError, Place, Problem};
 use super::solids::Solids;
 use super::split::{Face, Solid};
 use super::{Group, SurfaceFile, VolumeFile};
-use crate::wording::{counted_as, joined};
+use crate::wording::{counted_as, joined, left_out};
 use glam::DVec3;
 use std::collections::{BTreeMap, HashMap};
 use std::path::Path;
@@ -191,16 +191,16 @@ impl Builder {
 
     /// What the file holds, for the message that it is not what was wanted.
     fn inventory(&self) -> String {
-        let mut parts = vec![format!("{} nodes", self.nodes.len())];
+        let mut parts = vec![counted_as(self.nodes.len(), "nodes")];
         if !self.triangles.is_empty() {
-            parts.push(format!("{} triangles", self.triangles.len()));
+            parts.push(counted_as(self.triangles.len(), "triangles"));
         }
         if !self.tets.is_empty() {
-            parts.push(format!("{} tetrahedra", self.tets.len()));
+            parts.push(counted_as(self.tets.len(), "tetrahedra"));
         }
         parts.extend(self.solids.counted());
         if self.curves > 0 {
-            parts.push(format!("{} lines", self.curves));
+            parts.push(counted_as(self.curves, "lines"));
         }
         parts.extend(counted(&self.skipped));
         parts.join(", ")
@@ -294,7 +294,7 @@ impl Builder {
         self.tell(None);
         let collapsed = all - self.triangles.len();
         if collapsed > 0 {
-            self.warnings.push(format!("{collapsed} triangles that use a vertex twice are left out"));
+            self.warnings.push(left_out(collapsed, "triangle", "use a vertex twice"));
         }
         let mut index_of = vec![u32::MAX; self.nodes.len()];
         let mut vertices = Vec::new();
@@ -310,12 +310,11 @@ impl Builder {
         let unused_by_geometry = |&node: &&u32| index_of[*node as usize] == u32::MAX;
         let of_geometry = self.of_geometry.iter().filter(unused_by_geometry).count();
         if of_geometry > 0 {
-            let note = "points of the geometry that belong to no triangle are left out";
-            self.notes.push(format!("{of_geometry} {note}"));
+            self.notes.push(left_out(of_geometry, "point of the geometry", "belong to no triangle"));
         }
         let unused = self.nodes.len() - vertices.len() - of_geometry;
         if unused > 0 {
-            self.warnings.push(format!("{unused} points that belong to no triangle are left out"));
+            self.warnings.push(left_out(unused, "point", "belong to no triangle"));
         }
         let triangles = self.triangles.iter().map(|t| t.map(|node| index_of[node as usize])).collect();
         Ok(SurfaceFile { vertices, triangles, warnings: self.warnings, notes: self.notes })
@@ -323,5 +322,5 @@ impl Builder {
 }
 
 fn counted(counts: &BTreeMap<&'static str, usize>) -> Vec<String> {
-    counts.iter().map(|(name, count)| format!("{count} {name}")).collect()
+    counts.iter().map(|(name, count)| counted_as(*count, name)).collect()
 }

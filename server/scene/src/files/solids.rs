@@ -230,8 +230,9 @@ impl Split {
             .filter(|face| other_way.contains(face))
             .collect();
         if !misfits.is_empty() {
+            let lie = if misfits.len() == 1 { "lies" } else { "lie" };
             self.warnings.push(format!(
-                "{} of tetrahedra, prisms or pyramids lie across the diagonal along which the face of four corners \
+                "{} of tetrahedra, prisms or pyramids {lie} across the diagonal along which the face of four corners \
                  beside them is cut: the body is open there. Put pyramids between, or mesh all of it with tetrahedra",
                 counted_as(misfits.len(), "triangles")
             ));

@@ -1,6 +1,7 @@
 //! From a file's volume to the mesh of a body.
 use super::error::{FileError, Place, Problem};
 use super::{Group, VolumeFile};
+use crate::wording::left_out;
 use palpate_physics::{MeshError, TetMesh};
 
 /// What to do with nodes that belong to no tet.
@@ -172,12 +173,10 @@ impl VolumeFile {
             let is_unused = |&&node: &&u32| used.get(node as usize) == Some(&false);
             let of_geometry = self.of_geometry.iter().filter(is_unused).count();
             if of_geometry > 0 {
-                let note = "nodes of the geometry that belong to no tetrahedron are left out";
-                self.notes.push(format!("{of_geometry} {note}"));
+                self.notes.push(left_out(of_geometry, "node of the geometry", "belong to no tetrahedron"));
             }
             if count > of_geometry {
-                let others = count - of_geometry;
-                self.warnings.push(format!("{others} nodes that belong to no tetrahedron are left out"));
+                self.warnings.push(left_out(count - of_geometry, "node", "belong to no tetrahedron"));
             }
         }
         Ok((0..used.len() as u32).filter(|&node| used[node as usize]).collect())
@@ -220,7 +219,7 @@ mod tests {
         let members = mesh.members();
         assert_eq!([0, 1, 2, 3].map(|group| members[group].tets.as_slice()), [&[0][..], &[1], &[], &[0]]);
         assert_eq!((&members[2].triangles, &members[2].nodes), (&vec![[1, 2, 3]], &vec![1, 2, 3]));
-        assert!(mesh.warnings[0].starts_with("1 nodes that belong to no tet"));
+        assert!(mesh.warnings[0].starts_with("1 node that belongs to no tet"));
     }
 
     #[test]
