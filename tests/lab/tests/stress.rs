@@ -37,6 +37,11 @@ fn time_step() {
 }
 
 #[test]
+fn pans() {
+    passes("pans");
+}
+
+#[test]
 fn hearts() {
     passes_with("hearts", [1]);
 }

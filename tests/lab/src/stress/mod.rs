@@ -77,7 +77,7 @@ pub struct Row {
 }
 
 /// Every row, in the order of the table.
-pub const ROWS: [Row; 17] = [
+pub const ROWS: [Row; 18] = [
     Row { name: "time-step", criterion: time_step::CRITERION, run: time_step::run },
     Row { name: "stiffness-ratio", criterion: stiffness_ratio::CRITERION, run: stiffness_ratio::run },
     Row { name: "incompressible", criterion: incompressible::CRITERION, run: incompressible::run },
@@ -94,6 +94,7 @@ pub const ROWS: [Row; 17] = [
     Row { name: "squeezes", criterion: hands::squeezes::CRITERION, run: hands::squeezes::run },
     Row { name: "strokes", criterion: hands::strokes::CRITERION, run: hands::strokes::run },
     Row { name: "hearts", criterion: hands::hearts::CRITERION, run: hands::hearts::run },
+    Row { name: "pans", criterion: hands::pans::CRITERION, run: hands::pans::run },
     Row { name: "springs", criterion: springs::CRITERION, run: springs::run },
 ];
 

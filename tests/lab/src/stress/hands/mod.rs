@@ -6,6 +6,7 @@ mod hand;
 pub(super) mod hearts;
 pub(super) mod laws;
 pub(super) mod leaps;
+pub(super) mod pans;
 pub(super) mod presses;
 pub(super) mod squeezes;
 pub(super) mod strokes;
