@@ -103,11 +103,9 @@ pub(crate) trait Skin {
     /// Returns the position (m) of a vertex.
     fn position_m(&self, vertex: u32) -> DVec3;
 
-    /// Writes the displacements (m) of what carries the vertices ([`super::MostCarriers::of_skin`]).
-    fn displace_carriers(&self, _: &mut [DVec3]) {}
-
-    /// Writes the positions (m) of all vertices, whose carriers are displaced so far (m).
-    fn place(&self, x: &mut [DVec3], _: &[DVec3]) {
+    /// Writes the positions (m) of all vertices. The buffer is for the displacements (m) of what carries them
+    /// ([`super::MostCarriers`]).
+    fn place(&self, x: &mut [DVec3], _: &mut [DVec3]) {
         (0..).zip(x).for_each(|(vertex, x_m)| *x_m = self.position_m(vertex));
     }
 
@@ -116,12 +114,6 @@ pub(crate) trait Skin {
 
     /// Returns a bound of how far (m) any vertex is from where it was then. Nothing is known of a skin that notes nothing.
     fn moved_m(&self, _: &CarriersThen) -> f64 {
-        f64::INFINITY
-    }
-
-    /// Returns a bound of how far (m) any vertex is from where it was then, but for a translation of all of them, now that
-    /// the carriers are displaced so far (m).
-    fn moved_apart_m(&self, _: &CarriersThen, _: &[DVec3]) -> f64 {
         f64::INFINITY
     }
 }

@@ -19,8 +19,6 @@ pub(crate) struct CarriersThen {
     /// Active particles, ascending.
     particles_m: Box<[(u32, DVec3)]>,
     count: usize,
-    /// Particles that carry any vertex, in the skin's own order.
-    of_skin_m: Box<[DVec3]>,
 }
 
 impl CarriersThen {
@@ -29,7 +27,6 @@ impl CarriersThen {
             nodes_m: vec![DVec3::ZERO; most.nodes].into_boxed_slice(),
             particles_m: vec![(0, DVec3::ZERO); most.active].into_boxed_slice(),
             count: 0,
-            of_skin_m: vec![DVec3::ZERO; most.of_skin].into_boxed_slice(),
         }
     }
 
@@ -41,16 +38,6 @@ impl CarriersThen {
             *slot = particle;
             self.count += 1;
         }
-    }
-
-    /// Notes the displacements (m) of the particles that carry any vertex.
-    pub(crate) fn remember_skin(&mut self, of_skin_m: &[DVec3]) {
-        self.of_skin_m.copy_from_slice(of_skin_m);
-    }
-
-    /// Returns the displacements (m) of the particles that carry any vertex.
-    pub(crate) fn of_skin_m(&self) -> &[DVec3] {
-        &self.of_skin_m
     }
 
     /// Returns the displacements (m) of the nodes.

@@ -35,8 +35,6 @@ pub(super) struct SkinCarriers {
     /// Particles that carry vertices, in the order in which they were found.
     particles: Vec<u32>,
     anchors: Vec<Anchor>,
-    /// `max_v Σ_p |w_vp|`.
-    largest_weight_sum: f64,
 }
 
 impl SkinCarriers {
@@ -56,9 +54,6 @@ impl SkinCarriers {
             }
             found.first.push(found.carriers.len() as u32);
         }
-        let sums =
-            (0..found.vertices()).map(|vertex| found.of_vertex(vertex).iter().map(|(_, weight)| weight.abs()).sum());
-        found.largest_weight_sum = sums.fold(0.0, f64::max);
         found
     }
 
@@ -76,11 +71,6 @@ impl SkinCarriers {
     pub(super) fn of_vertex(&self, vertex: u32) -> &[(u32, f64)] {
         let at = vertex as usize;
         &self.carriers[self.first[at] as usize..self.first[at + 1] as usize]
-    }
-
-    /// Returns `max_v Σ_p |w_vp|`.
-    pub(super) fn largest_weight_sum(&self) -> f64 {
-        self.largest_weight_sum
     }
 
     /// Returns the number of vertices.

@@ -31,19 +31,12 @@ impl ContactModel {
         if near.slack_m > 0.0 || near.is_still_good(|near| skin.moved_m(&near.carriers_then)) {
             return near.wakes_more();
         }
-        // A particle carries many vertices: to displace those that carry any costs a fraction of placing all vertices, and a
-        // body that sways as a whole brings no walls together.
-        skin.displace_carriers(&mut scratch.walls.of_carriers_m);
-        if near.is_still_good(|near| skin.moved_apart_m(&near.carriers_then, &scratch.walls.of_carriers_m)) {
-            return near.wakes_more();
-        }
         let mut x = std::mem::take(&mut scratch.walls.x);
-        skin.place(&mut x, &scratch.walls.of_carriers_m);
+        skin.place(&mut x, &mut scratch.walls.of_carriers_m);
         let renewed = walls.renew(&x, scratch.exhaustive, near, &mut scratch.walls);
         scratch.walls.x = x;
         if renewed {
             skin.remember(&mut near.carriers_then);
-            near.carriers_then.remember_skin(&scratch.walls.of_carriers_m);
         }
         renewed || contact.walls.wakes_more()
     }
