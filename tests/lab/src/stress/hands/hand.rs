@@ -44,13 +44,7 @@ impl Press {
         for _ in 0..1000 {
             let least_m = (1.1 * longest_m / palpate_physics::contact::LARGEST_TRIANGLE).max(1e-3);
             let radius_m = random.log_within(least_m, 0.02_f64.min(0.4 * body.edge_m));
-            let coupling = if random.chance(0.7) {
-                let (stiffness_n_per_m, mass_kg) = (random.log_within(200.0, 1000.0), random.log_within(0.02, 0.1));
-                let critical = 2.0 * (stiffness_n_per_m * mass_kg).sqrt();
-                Coupling::Spring { stiffness_n_per_m, mass_kg, damping_n_s_per_m: critical * random.within(0.2, 1.0) }
-            } else {
-                Coupling::Rigid
-            };
+            let coupling = random_coupling(0.7, random);
             let shape = if random.chance(0.75) {
                 ToolShape::Sphere
             } else {
@@ -91,6 +85,16 @@ impl Press {
         let across = direction.reject_from_normalized(self.along).normalize_or(self.along.any_orthonormal_vector());
         Self { drag_m: across * length_m, ..self }
     }
+}
+
+/// Returns the coupling of a random hand: a damped spring with this probability, else none.
+pub(super) fn random_coupling(probability: f64, random: &mut Random) -> Coupling {
+    if !random.chance(probability) {
+        return Coupling::Rigid;
+    }
+    let (stiffness_n_per_m, mass_kg) = (random.log_within(200.0, 1000.0), random.log_within(0.02, 0.1));
+    let critical = 2.0 * (stiffness_n_per_m * mass_kg).sqrt();
+    Coupling::Spring { stiffness_n_per_m, mass_kg, damping_n_s_per_m: critical * random.within(0.2, 1.0) }
 }
 
 /// Returns whether a capsule at its start reaches into a body at rest, between vertices too.

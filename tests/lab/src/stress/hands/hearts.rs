@@ -1,6 +1,6 @@
 //! Random presses of irregular hearts: each heart is another one, and a hand that is down is dragged along its wall.
 //!
-//! Found by it: hearts that were pressed beside the held base flew apart, since particles outside the coarse tets took mass
+//! Written after hearts of a script like it: those that were pressed beside the held base flew apart, since particles outside the coarse tets took mass
 //! from nodes by negative weights; and light nodes far outside of the body were faster than the substeps.
 use super::{
     Body,

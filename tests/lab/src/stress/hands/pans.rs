@@ -2,7 +2,7 @@
 //!
 //! Found by a hand like these: the near wall passed the far one beneath the tool, which was then held by the far wall's outer side for ever.
 use super::{
-    hand::LARGEST_FORCE_N,
+    hand::{LARGEST_FORCE_N, random_coupling},
     watch::{LOOK_EVERY, LedgerSeen, MOST_IMBALANCE},
 };
 use crate::{
@@ -41,13 +41,7 @@ struct Reach {
 impl Reach {
     fn random(random: &mut Random) -> Self {
         let (half_height_mm, radius_m) = (random.within(2.0, 8.0), random.within(3e-3, 8e-3));
-        let coupling = if random.chance(0.7) {
-            let (stiffness_n_per_m, mass_kg) = (random.log_within(200.0, 1000.0), random.log_within(0.02, 0.1));
-            let critical = 2.0 * (stiffness_n_per_m * mass_kg).sqrt();
-            Coupling::Spring { stiffness_n_per_m, mass_kg, damping_n_s_per_m: critical * random.within(0.2, 1.0) }
-        } else {
-            Coupling::Rigid
-        };
+        let coupling = random_coupling(0.7, random);
         let shape = if random.chance(0.7) {
             ToolShape::Sphere
         } else {

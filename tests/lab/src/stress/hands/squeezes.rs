@@ -1,7 +1,10 @@
 //! Two tools that squeeze a wall between them, and let it go.
 //!
 //! Found by it, or what it was written after: a wall of 10 mm that two tools squeezed to 2.4 mm ended in quarantine.
-use super::watch::{LOOK_EVERY, LedgerSeen, MOST_IMBALANCE};
+use super::{
+    hand::random_coupling,
+    watch::{LOOK_EVERY, LedgerSeen, MOST_IMBALANCE},
+};
 use crate::random::Random;
 use crate::stress::{
     Measured, Options, Outcome,
@@ -47,13 +50,7 @@ impl Squeeze {
         let middle_m = DVec3::new(random.within(-0.012, 0.012), random.within(-0.012, 0.012), 0.0);
         let gap_m = random.within(1e-3, 5e-3);
         let tool = |side: f64, random: &mut Random| {
-            let coupling = if random.chance(0.6) {
-                let (stiffness_n_per_m, mass_kg) = (random.log_within(200.0, 1000.0), random.log_within(0.02, 0.1));
-                let critical = 2.0 * (stiffness_n_per_m * mass_kg).sqrt();
-                Coupling::Spring { stiffness_n_per_m, mass_kg, damping_n_s_per_m: critical * random.within(0.2, 1.0) }
-            } else {
-                Coupling::Rigid
-            };
+            let coupling = random_coupling(0.6, random);
             let aside_m = random.vector() * DVec3::new(1e-3, 1e-3, 0.0);
             ToolSpec {
                 name: if side > 0.0 { "above".into() } else { "below".into() },
