@@ -12,7 +12,7 @@ use thiserror::Error;
 const MAGIC: [u8; 4] = *b"PLPS";
 const HEADER: usize = 24;
 /// Version of the layout; snapshots of other versions are refused.
-pub const VERSION: u32 = 18;
+pub const VERSION: u32 = 19;
 
 /// Why bytes are not a state of a body.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]

@@ -1,12 +1,13 @@
 //! The slip clutch between a rigid tool and its device.
 //!
 //! A rigid tool is where its device is, as long as the surface can bear it: no sample that it presses is deeper in it than
-//! [`SLIP_DEPTH`]·R, and the force is no more than [`slips_at_n`]. Beyond, the clutch slips: the tool stays behind by the
-//! slip `s`, at `c = d + s`, and carries what the body gives there. Without it, a device that goes on drives the tool
-//! through any surface.
+//! [`SLIP_DEPTH`]·R, the force is no more than [`slips_at_n`], and the surface that it presses is not stretched so far that
+//! neighbouring samples are further apart than [`MOST_APART`]·R, where the tool would pass between them. Beyond, the clutch
+//! slips: the tool stays behind by the slip `s`, at `c = d + s`, and carries what the body gives there. Without it, a device
+//! that goes on drives the tool through any surface.
 //!
-//! The clutch has no mass. With the depth `g` of the deepest sample, the force `f` on the tool, and how far they are from
-//! their limits, `ρ = max(g/g_max, |f|/f_max)`, a substep does
+//! The clutch has no mass. With the depth `g` of the deepest sample, the distance `a` between samples, the force `f` on the tool,
+//! and how far they are from their limits, `ρ = max(g/g_max, a/a_max, |f|/f_max)`, a substep does
 //! ```text
 //! s ← s + (ρ − 1) g_max f/|f|              for ρ > 1
 //! |s| ← max(|s| − (ρ_back − ρ) g_max, 0)   for ρ < ρ_back
@@ -39,6 +40,9 @@ pub(super) const LEAP_M_PER_S: f64 = 5.0;
 const SLIP_DEPTH: f64 = 0.4;
 /// Force at which it slips, over that at which the coupling of a tool of the same radius saturates.
 const SLIP_FORCE: f64 = 1.2;
+/// Distance, over R, between the samples that it presses at which it slips; at rest they are no further apart than
+/// [`super::foundation::SPACING`].
+const MOST_APART: f64 = 1.0;
 /// `ρ_back`.
 const BACK: f64 = 0.75;
 
@@ -59,6 +63,7 @@ pub(super) fn follow(
     let borne = Borne {
         radius_m: model.spec.radius_m,
         deepest_m: contact.deepest_m,
+        apart_m: contact.apart_sq_m2.sqrt(),
         force_n: contact.force_n,
         slips_at_n: model.slips_at_n,
     };
@@ -79,6 +84,8 @@ struct Borne {
     radius_m: f64,
     /// `g` (m).
     deepest_m: f64,
+    /// `a` (m).
+    apart_m: f64,
     /// `f` (N).
     force_n: DVec3,
     /// `f_max` (N).
@@ -89,7 +96,9 @@ impl Borne {
     /// Returns the slip (m) after a substep that began with this one.
     fn slipped(&self, slip_m: DVec3, dt_s: f64) -> DVec3 {
         let most_deep_m = SLIP_DEPTH * self.radius_m;
-        let loaded = f64::max(self.deepest_m / most_deep_m, self.force_n.length() / self.slips_at_n);
+        let loaded = (self.deepest_m / most_deep_m)
+            .max(self.apart_m / (MOST_APART * self.radius_m))
+            .max(self.force_n.length() / self.slips_at_n);
         let quickest_m = self.radius_m * dt_s / RETURN_S;
         let back_m = if loaded > 1.0 {
             // A sample loses what is above its limit at once; a mean one is half as deep as the deepest.
@@ -129,7 +138,7 @@ mod tests {
 
     /// How far a tool of 10 mm comes back along +y in a substep, that slips at 1 N and bears a force.
     fn back_m(force_n: DVec3) -> f64 {
-        let borne = Borne { radius_m: 0.01, deepest_m: 1e-3, force_n, slips_at_n: 1.0 };
+        let borne = Borne { radius_m: 0.01, deepest_m: 1e-3, apart_m: 0.0, force_n, slips_at_n: 1.0 };
         (borne.slipped(SLIP_M, DT_S) - SLIP_M).y
     }
 
@@ -147,10 +156,23 @@ mod tests {
         assert!(at(0.999_999).abs() < 1e-9, "{}", at(0.999_999));
     }
 
+    /// A tool passed between the samples of a surface that it stretched to nine times its length.
+    #[test]
+    fn a_tool_that_presses_samples_far_apart_gives_way() {
+        let moved_m = |apart_m: f64| {
+            let borne = Borne { radius_m: 0.01, deepest_m: 1e-3, apart_m, force_n: DVec3::Z * 0.8, slips_at_n: 1.0 };
+            borne.slipped(SLIP_M, DT_S) - SLIP_M
+        };
+        assert_eq!(moved_m(0.0), DVec3::ZERO);
+        assert_eq!(moved_m(0.0099), DVec3::ZERO);
+        // ½ (ρ − 1) g_max
+        assert!(moved_m(0.012).distance(DVec3::Z * (0.5 * 0.2 * 0.004)) < 1e-12, "{}", moved_m(0.012));
+    }
+
     #[test]
     fn a_tool_beyond_its_limit_gives_way_along_the_force() {
         let force_n = DVec3::new(0.0, -0.6, 0.8) * 1.5;
-        let borne = Borne { radius_m: 0.01, deepest_m: 1e-3, force_n, slips_at_n: 1.0 };
+        let borne = Borne { radius_m: 0.01, deepest_m: 1e-3, apart_m: 0.0, force_n, slips_at_n: 1.0 };
         let moved_m = borne.slipped(SLIP_M, DT_S) - SLIP_M;
         // ½ (ρ − 1) g_max, as the deepest sample is within its limit
         assert!(moved_m.distance(force_n.normalize() * (0.5 * 0.5 * 0.004)) < 1e-12, "{moved_m}");

@@ -44,6 +44,8 @@ pub(super) struct ToolContact {
     pub(super) torque_nm: DVec3,
     /// Largest depth (m) that any sample carries now.
     pub(super) deepest_m: f64,
+    /// Square (m²) of the largest distance between neighbouring samples of a triangle that carries force now.
+    pub(super) apart_sq_m2: f64,
     pub(super) estimate: StiffnessEstimate,
     #[serde(skip)]
     pub(super) candidates: Candidates,
@@ -52,14 +54,16 @@ pub(super) struct ToolContact {
 impl ToolContact {
     fn keep_sums_of(&mut self, other: &Self) {
         (self.just_put, self.is_clear, self.estimate) = (other.just_put, other.is_clear, other.estimate);
-        (self.force_n, self.torque_nm, self.deepest_m) = (other.force_n, other.torque_nm, other.deepest_m);
+        (self.force_n, self.torque_nm) = (other.force_n, other.torque_nm);
+        (self.deepest_m, self.apart_sq_m2) = (other.deepest_m, other.apart_sq_m2);
     }
 }
 
 impl PartialEq for ContactState {
     fn eq(&self, other: &Self) -> bool {
         let same = |(a, b): (&ToolContact, &ToolContact)| {
-            let forces = a.force_n == b.force_n && a.torque_nm == b.torque_nm && a.deepest_m == b.deepest_m;
+            let forces = (a.force_n, a.torque_nm) == (b.force_n, b.torque_nm)
+                && (a.deepest_m, a.apart_sq_m2) == (b.deepest_m, b.apart_sq_m2);
             let flags = (a.just_put, a.is_clear) == (b.just_put, b.is_clear);
             a.touching == b.touching && flags && forces && a.estimate == b.estimate
         };
@@ -81,6 +85,7 @@ impl ContactState {
             force_n: DVec3::ZERO,
             torque_nm: DVec3::ZERO,
             deepest_m: 0.0,
+            apart_sq_m2: 0.0,
             estimate: StiffnessEstimate::default(),
             candidates: Candidates::with_capacity(model.triangles.len()),
         };
@@ -106,6 +111,7 @@ impl ContactState {
             let finite = saved.force_n.is_finite()
                 && saved.torque_nm.is_finite()
                 && saved.deepest_m.is_finite()
+                && saved.apart_sq_m2.is_finite()
                 && saved.estimate.is_finite()
                 && touches.iter().all(|touch| {
                     touch.spring_origin_m.is_finite() && (0.0..f64::INFINITY).contains(&touch.free_depth_m)
@@ -132,6 +138,7 @@ impl ContactState {
             chain.flag(tool.just_put);
             chain.flag(tool.is_clear);
             chain.real(tool.deepest_m);
+            chain.real(tool.apart_sq_m2);
             chain.vector(tool.force_n);
             chain.vector(tool.torque_nm);
             let estimate = &tool.estimate;
@@ -164,7 +171,8 @@ impl ContactState {
         for tool in &mut self.tools {
             tool.touching.clear();
             (tool.just_put, tool.is_clear) = (false, false);
-            (tool.force_n, tool.torque_nm, tool.deepest_m) = (DVec3::ZERO, DVec3::ZERO, 0.0);
+            (tool.force_n, tool.torque_nm) = (DVec3::ZERO, DVec3::ZERO);
+            (tool.deepest_m, tool.apart_sq_m2) = (0.0, 0.0);
             tool.estimate = StiffnessEstimate::default();
         }
         self.forget_geometry();
@@ -175,7 +183,8 @@ impl ContactState {
         let part = &mut self.tools[tool];
         part.touching.clear();
         (part.just_put, part.is_clear) = (true, false);
-        (part.force_n, part.torque_nm, part.deepest_m) = (DVec3::ZERO, DVec3::ZERO, 0.0);
+        (part.force_n, part.torque_nm) = (DVec3::ZERO, DVec3::ZERO);
+        (part.deepest_m, part.apart_sq_m2) = (0.0, 0.0);
         part.estimate = StiffnessEstimate::default();
         part.candidates.slack_m = f64::NEG_INFINITY;
     }

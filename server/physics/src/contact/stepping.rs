@@ -215,7 +215,8 @@ impl ContactModel {
         if let Some(push) = scratch.push {
             push.add_to(&mut pressed);
         }
-        (part.force_n, part.torque_nm, part.deepest_m) = (pressed.force_n, pressed.torque_nm, pressed.deepest_m);
+        (part.force_n, part.torque_nm) = (pressed.force_n, pressed.torque_nm);
+        (part.deepest_m, part.apart_sq_m2) = (pressed.deepest_m, pressed.apart_sq_m2);
         part.is_clear = proxy::is_clear(model, &pressed);
         pressed
     }

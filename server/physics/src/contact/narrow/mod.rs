@@ -78,6 +78,8 @@ pub(super) struct Pressed {
     pub(super) penetration_m: f64,
     /// Largest depth (m) that any sample carries.
     pub(super) deepest_m: f64,
+    /// Square (m²) of the largest distance between neighbouring samples of a triangle that carries force.
+    pub(super) apart_sq_m2: f64,
     /// Vector (m) from the nearest point of the tool's axis to the nearest point of the surface; infinite when no
     /// triangle is listed.
     pub(super) to_surface_m: DVec3,
@@ -264,6 +266,10 @@ fn press_triangle(
         if meeting.orientation.is_some() {
             pressed.torque_nm -= p.cross(force_n);
         }
+    }
+    if pressed.energy_j > energy_before_j {
+        // n² samples in the triangle's area: 2A/n²
+        pressed.apart_sq_m2 = pressed.apart_sq_m2.max(doubled_m2 / samples.weights.len() as f64);
     }
     if area.slope > 0.0 && pressed.energy_j > energy_before_j {
         // f_i = −φ' W/A₀ ∂A/∂x_i

@@ -91,6 +91,20 @@ fn above(depth_m: f64) -> DVec3 {
     DVec3::new(0.01, 0.01, RADIUS_M - depth_m)
 }
 
+/// The face's longest edge is 42.4 mm, which 13 parts of R/3 cover: 169 samples, of which each has an area of A/169.
+#[test]
+fn samples_are_as_far_apart_as_their_triangle_is_stretched() {
+    for stretch in [1.0, 3.0, 9.0] {
+        let mut bench = Bench::new(0.0);
+        for x in &mut bench.x[..3] {
+            *x *= stretch;
+        }
+        assert_eq!(bench.press(above(-0.1 * RADIUS_M)).0.apart_sq_m2, 0.0, "nothing is pressed");
+        let apart_m = bench.press(above(0.3 * RADIUS_M)).0.apart_sq_m2.sqrt();
+        assert!((apart_m - stretch * 0.03 / 13.0).abs() < 1e-12, "{stretch}: {apart_m}");
+    }
+}
+
 proptest! {
     #[test]
     fn forces_balance_and_are_the_gradient_of_the_energy(
