@@ -150,3 +150,62 @@ fn what_is_wrong_with_a_lattice_is_told_by_every_command() {
         assert!(summary["warnings"].to_string().contains(warning), "{command}: {summary}");
     }
 }
+
+/// Gravity a thousand times too strong crushed the body in the ticks that `check` ran to time them, of which it told the time alone.
+#[test]
+fn check_tells_of_elements_that_it_saw_inside_out() {
+    let scene =
+        pressed("stable-neo-hookean", 0.1).replace("[body.box]", "gravity_m_per_s2 = [0, 0, -9810]\n[body.box]");
+    let ended = run("check", &scene, &[]);
+    assert_eq!(ended.code, Some(0), "{} {}", ended.shown, ended.said);
+    let told =
+        "warning: elements turned inside out in the ticks that were run to time them: the least volume ratio was -";
+    assert!(ended.shown.contains(told), "{}", ended.shown);
+    assert_eq!(run("check", &scene, &["--strict"]).code, Some(1));
+    assert_eq!(run("simulate", &scene, &[]).code, Some(4));
+    assert!(!run("check", &pressed("stable-neo-hookean", 0.1), &[]).shown.contains("inside out"));
+}
+
+/// `check` refused the tool and sent to `check`, which had not told of the unit.
+#[test]
+fn check_tells_what_it_knows_of_a_body_that_is_refused() {
+    let scene = pressed("stable-neo-hookean", 0.1).replace("size_mm", "size_m")
+        + "[[tool]]\nname = \"tip\"\nradius_mm = 6\ncoupling = \"rigid\"\ndriver = \"script\"\n\
+           keyframe = [{ time_s = 0, position_m = [0, 0, 20] }]\n";
+    let ended = run("check", &scene, &[]);
+    assert_eq!(ended.code, Some(1), "{} {}", ended.shown, ended.said);
+    for part in ["body       shape box", "warning: the body is 20.0000 m long: if millimetres were meant"] {
+        assert!(ended.shown.contains(part), "{part}: {}", ended.shown);
+    }
+    assert!(
+        ended.said.contains("too small for the surface") && !ended.said.contains("palpated check"),
+        "{}",
+        ended.said
+    );
+    assert!(run("simulate", &scene, &[]).said.contains("`palpated check` shows what its body is like"));
+}
+
+/// Whatever asked for too many substeps, the body was blamed.
+#[test]
+fn what_asks_for_too_many_substeps_is_named() {
+    let scene = pressed("stable-neo-hookean", 0.1);
+    let tool = "[[tool]]\nname = \"tip\"\nradius_mm = 6\ncoupling = \"spring\"\nstiffness_n_per_m = 5000\ndamping_n_s_per_m = 1\n\
+                mass_kg = 1e-12\ndriver = \"script\"\nkeyframe = [{ time_s = 0, position_mm = [0, 0, 20] }]\n";
+    for (scene, by, advice) in [
+        (scene.replace("10e3", "10e15"), "the body needs", "soften the material"),
+        (scene.replace("psi_pa_s = 0.3", "psi_pa_s = 3e6"), "the viscosity of the body needs", "lower the viscosity"),
+        (scene + tool, "a tool on its spring needs", "more mass_kg"),
+    ] {
+        let ended = run("check", &scene, &[]);
+        assert_eq!(ended.code, Some(1), "{} {}", ended.shown, ended.said);
+        assert!(ended.said.contains(by) && ended.said.contains(advice), "{}", ended.said);
+    }
+}
+
+#[test]
+fn check_tells_what_viscosity_costs() {
+    let scene = pressed("stable-neo-hookean", 0.1);
+    let viscous = scene.replace("psi_pa_s = 0.3", "psi_pa_s = 30");
+    assert!(!run("check", &scene, &[]).shown.contains("viscosity)"));
+    assert!(run("check", &viscous, &[]).shown.contains("times as many as without viscosity)"));
+}

@@ -41,19 +41,25 @@ pub fn run(args: &CheckArgs) -> miette::Result<ExitCode> {
         return Ok(ExitCode::SUCCESS);
     };
     let scene = load::load_scene(name)?;
-    let model = load::build(&scene)?;
     print_body(&scene);
+    let warn = |warning: &String| say(format_args!("warning: {warning}"));
+    let model = load::build(&scene).inspect_err(|_| scene.warnings.iter().for_each(warn))?;
     let body = served(&model);
     body.description(&model).iter().for_each(|line| say(format_args!("{line}")));
     print_contents(&scene, &model);
     print_walls(&model);
     let warnings = [scene.warnings.clone(), body.warnings(&model), check_laws::warnings(&scene, &model)].concat();
-    for warning in &warnings {
-        say(format_args!("warning: {warning}"));
+    warnings.iter().for_each(warn);
+    let cost = cost::measure(&scene, &model)?;
+    if let Some(least) = &cost.inverted {
+        say(format_args!(
+            "warning: elements turned inside out in the ticks that were run to time them: {least}. No real body does that; press or load \
+             less hard, or look for constants in the wrong unit"
+        ));
     }
-    print_time(&model, &cost::measure(&scene, &model)?);
+    print_time(&model, &cost);
     print_memory();
-    let failed = args.strict && !warnings.is_empty();
+    let failed = args.strict && (!warnings.is_empty() || cost.inverted.is_some());
     Ok(if failed { ExitCode::FAILURE } else { ExitCode::SUCCESS })
 }
 
@@ -102,8 +108,14 @@ fn print_body(scene: &Scene) {
 
 fn print_time(model: &Model, cost: &Cost) {
     let period_us = cost.all.tick_period_s * 1e6;
+    let for_viscosity = model.substeps_for_viscosity();
+    let viscous = if for_viscosity > 2.0 {
+        format!(" ({} times as many as without viscosity)", short(for_viscosity))
+    } else {
+        String::new()
+    };
     say(format_args!(
-        "time       tick {} ms, {}; highest natural frequency {} Hz",
+        "time       tick {} ms, {}{viscous}; highest natural frequency {} Hz",
         short(period_us * 1e-3),
         counted(cost.all.substeps_per_tick as usize, "substep"),
         short(model.body().max_natural_frequency_rad_per_s() / std::f64::consts::TAU)

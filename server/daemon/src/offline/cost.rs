@@ -11,8 +11,9 @@ use std::time::{Duration, Instant};
 
 /// Wall time of a measurement.
 const BUDGET: Duration = Duration::from_millis(500);
-/// Fewer ticks than these with particles awake tell nothing.
+/// Fewer ticks than these with particles awake tell little; they are waited for until [`PATIENCE`] is over.
 const ENOUGH_TICKS: u64 = 100;
+const PATIENCE: Duration = Duration::from_secs(5);
 
 /// What ticks cost.
 pub(super) struct Cost {
@@ -20,6 +21,8 @@ pub(super) struct Cost {
     pub(super) all: TimeNumbers,
     /// Those with particles awake, of a hybrid body that a tool may touch.
     pub(super) awake: Option<AwakeCost>,
+    /// Told where elements turned inside out in the ticks that were run.
+    pub(super) inverted: Option<String>,
 }
 
 /// What ticks with particles awake cost.
@@ -43,23 +46,26 @@ pub(super) fn measure(scene: &Scene, model: &Model) -> miette::Result<Cost> {
         let mut awake = scene.clone();
         awake.model.settings.sleep_tolerance_m = 0.0;
         let model = load::build(&awake)?;
-        return Ok(Cost { all: run_for(&mut Run::new(&awake, &model)?, &awake, &model)?, awake: None });
+        let mut run = Run::new(&awake, &model)?;
+        let all = run_for(&mut run, &awake, &model)?;
+        return Ok(Cost { all, awake: None, inverted: run.inverted() });
     }
     let mut run = Run::new(scene, model)?;
     let all = run_for(&mut run, scene, model)?;
+    let inverted = run.inverted();
     let (tick_wall_us, ticks, most) = run.cost_awake();
     let awake = if ticks >= ENOUGH_TICKS && served(model).wakes_particles_for_tools() {
         Some(AwakeCost { tick_wall_us, ticks, most, touched_m: None })
     } else {
         touched(scene, model)?
     };
-    Ok(Cost { all, awake })
+    Ok(Cost { all, awake, inverted })
 }
 
 fn run_for(run: &mut Run<'_>, scene: &Scene, model: &Model) -> miette::Result<TimeNumbers> {
     let started = Instant::now();
     loop {
-        run.tick();
+        run.tick_and_look();
         run.refuse_quarantined()?;
         if started.elapsed() > BUDGET || run.state.time_s(model) >= scene.output.duration_s {
             return Ok(run.cost());
@@ -73,7 +79,8 @@ fn touched(scene: &Scene, model: &Model) -> miette::Result<Option<AwakeCost>> {
     let mut run = Run::new(scene, model)?;
     run.touch(&touch);
     let started = Instant::now();
-    while started.elapsed() < BUDGET || run.state.mechanical.tick < ENOUGH_TICKS {
+    let is_enough = |ticks: u64, passed: Duration| passed >= PATIENCE || (passed >= BUDGET && ticks >= ENOUGH_TICKS);
+    while !is_enough(run.state.mechanical.tick, started.elapsed()) {
         run.tick();
         run.refuse_quarantined()?;
     }

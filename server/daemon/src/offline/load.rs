@@ -12,9 +12,11 @@ use thiserror::Error;
 /// The physics' refusal of a scene.
 #[derive(Debug, Error, Diagnostic)]
 #[error("the scene \"{scene}\" cannot be simulated")]
-#[diagnostic(help("`palpated check` shows what its body is like"))]
 struct Refused {
     scene: String,
+    /// `palpated check` itself shows the body before it is refused.
+    #[help]
+    help: Option<&'static str>,
     #[source]
     cause: ModelError,
 }
@@ -39,7 +41,7 @@ pub(super) fn load_with_warnings(name: &str) -> miette::Result<Scene> {
 /// Builds the model of a scene; what one would want to change about its body goes to standard error and to the scene's
 /// warnings.
 pub(super) fn build_with_warnings(scene: &mut Scene) -> miette::Result<Model> {
-    let model = build(scene)?;
+    let model = build_or_advise(scene, Some("`palpated check` shows what its body is like"))?;
     for remark in served(&model).remarks() {
         eprintln!("note: {remark}");
     }
@@ -52,8 +54,12 @@ pub(super) fn build_with_warnings(scene: &mut Scene) -> miette::Result<Model> {
 
 /// Builds the model of a scene, with a progress bar.
 pub(super) fn build(scene: &Scene) -> miette::Result<Model> {
+    build_or_advise(scene, None)
+}
+
+fn build_or_advise(scene: &Scene, help: Option<&'static str>) -> miette::Result<Model> {
     let mut bar = Progress::new(&scene.name);
     let model = Model::build_with(scene.model.clone(), &mut |part| bar.show(part, BUILDING));
     bar.finish();
-    model.map_err(|cause| Refused { scene: scene.name.clone(), cause }.into())
+    model.map_err(|cause| Refused { scene: scene.name.clone(), help, cause }.into())
 }

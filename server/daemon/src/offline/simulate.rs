@@ -252,6 +252,19 @@ impl<'s> Run<'s> {
         }
     }
 
+    /// One tick, after which strained elements are looked for where they are when all is run.
+    pub(super) fn tick_and_look(&mut self) {
+        let repeated = self.tick().repeated > 0;
+        if repeated || self.state.mechanical.tick.is_multiple_of(in_ticks(LOOK_EVERY_S, self.model)) {
+            self.look(self.state.time_s(self.model));
+        }
+    }
+
+    /// Tells where and when elements were inside out in the looks until now.
+    pub(super) fn inverted(&self) -> Option<String> {
+        self.seen.inverted(self.model)
+    }
+
     /// Looks for strained elements; a body that sleeps is as it was at the look before.
     fn look(&mut self, time_s: f64) {
         if !self.state.sleep.asleep || self.seen.lowest().is_none() {

@@ -1,5 +1,6 @@
 //! Why a body cannot have the surroundings that are asked for.
 use glam::DVec3;
+use std::fmt;
 use thiserror::Error;
 
 /// Why a body cannot have the surroundings that are asked for.
@@ -64,12 +65,15 @@ pub enum EnvironmentError {
         /// What it cannot press.
         what: &'static str,
     },
-    /// The body needs more substeps than a tick may have.
+    /// The scene needs more substeps than a tick may have.
     #[error(
-        "the body needs {substeps:.3e} substeps per tick (largest natural frequency {omega_rad_per_s:.3e} rad/s); \
-         coarsen or improve the mesh, soften the material, or lengthen the tick (limit {limit})"
+        "{asked_by} needs {substeps:.3e} substeps per tick (largest natural frequency {omega_rad_per_s:.3e} rad/s); {}, or shorten the \
+         tick (limit {limit})",
+        asked_by.advice()
     )]
     TooStiff {
+        /// That without which there would be few enough, or the body.
+        asked_by: AskedBy,
         /// Number of substeps needed.
         substeps: f64,
         /// Largest natural frequency ω_max (rad/s).
@@ -77,6 +81,37 @@ pub enum EnvironmentError {
         /// Largest number of substeps allowed.
         limit: u32,
     },
+}
+
+/// What asks for too many substeps.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum AskedBy {
+    /// The body's stiffness over its mass.
+    Body,
+    /// Its viscosity.
+    Viscosity,
+    /// Tools: their couplings, and contact on their masses.
+    Tools,
+}
+
+impl AskedBy {
+    fn advice(self) -> &'static str {
+        match self {
+            Self::Body => "coarsen or improve the mesh, soften the material",
+            Self::Viscosity => "lower the viscosity, which is large for so soft a material or so fine a mesh",
+            Self::Tools => "give tools on springs more mass_kg or less stiffness_n_per_m",
+        }
+    }
+}
+
+impl fmt::Display for AskedBy {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Body => "the body",
+            Self::Viscosity => "the viscosity of the body",
+            Self::Tools => "a tool on its spring",
+        })
+    }
 }
 
 fn point(p: DVec3) -> String {

@@ -30,4 +30,4 @@ pub use ledger::{Energies, Ledger, ViscousPower};
 pub use material_point::MaterialPoint;
 pub(crate) use skin::{CarriedSkin, ListedVertices, Touch, touch_skin};
 pub use state::MechanicalState;
-pub(crate) use substeps::{Steps, StifferContact, relaxation_time_s, stiffening};
+pub(crate) use substeps::{Frequencies, Steps, StifferContact, relaxation_time_s, stiffening};

@@ -1,5 +1,5 @@
 //! The number of substeps that a tick needs.
-use super::EnvironmentError;
+use super::{EnvironmentError, error::AskedBy};
 use crate::{
     material::Material,
     settings::{MAX_SUBSTEPS, Settings, Substeps},
@@ -27,6 +27,15 @@ pub(crate) struct StifferContact {
     pub(crate) walls_sq: f64,
 }
 
+/// Largest frequencies of a body (rad/s).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Frequencies {
+    /// Where nothing touches it.
+    pub(crate) alone: f64,
+    /// Touched everywhere, tools on their couplings included.
+    pub(crate) touched: f64,
+}
+
 /// The substeps of a tick.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Steps {
@@ -40,6 +49,8 @@ pub(crate) struct Steps {
     pub(crate) of_contact: f64,
     /// Square (rad²/s²) of the largest frequency that they are enough for.
     pub(crate) frequency_sq: f64,
+    /// How many times as many there are as without viscosity.
+    pub(crate) for_viscosity: f64,
 }
 
 impl Steps {
@@ -52,14 +63,20 @@ impl Steps {
     ///
     /// # Errors
     /// The body needs more than [`MAX_SUBSTEPS`].
-    pub(crate) fn choose(settings: &Settings, materials: &[Material], omega: f64) -> Result<Self, EnvironmentError> {
+    pub(crate) fn choose(
+        settings: &Settings,
+        materials: &[Material],
+        Frequencies { alone, touched: omega }: Frequencies,
+    ) -> Result<Self, EnvironmentError> {
         let wanted = wanted(settings, materials, omega);
+        let for_viscosity = wanted.max(1.0) / wanted_without_viscosity(settings, omega).max(1.0);
         let all_short = |substeps: u32| Self {
             substeps,
             substeps_per_long_step: 1,
             enough: wanted.min(f64::from(substeps)),
-            of_contact: 0.0,
+            of_contact: (1.0 - (alone / omega).powi(2)).clamp(0.0, 1.0),
             frequency_sq: omega * omega,
+            for_viscosity,
         };
         if let Substeps::Fixed(substeps) = settings.substeps {
             return Ok(all_short(substeps));
@@ -68,15 +85,16 @@ impl Steps {
         if substeps <= f64::from(MAX_SUBSTEPS) {
             Ok(all_short(substeps as u32))
         } else {
-            Err(EnvironmentError::TooStiff { substeps, omega_rad_per_s: omega, limit: MAX_SUBSTEPS })
+            let most = f64::from(MAX_SUBSTEPS);
+            let asked_by = if self::wanted(settings, materials, alone) <= most {
+                AskedBy::Tools
+            } else if wanted_without_viscosity(settings, alone) <= most {
+                AskedBy::Viscosity
+            } else {
+                AskedBy::Body
+            };
+            Err(EnvironmentError::TooStiff { asked_by, substeps, omega_rad_per_s: omega, limit: MAX_SUBSTEPS })
         }
-    }
-
-    /// Returns the same substeps, of a body whose largest frequency (rad/s) is `alone` where nothing touches it and
-    /// `touched` elsewhere.
-    #[must_use]
-    pub(crate) fn with_contact(self, alone: f64, touched: f64) -> Self {
-        Self { of_contact: (1.0 - (alone / touched).powi(2)).clamp(0.0, 1.0), ..self }
     }
 
     /// Returns the number of substeps that contact needs, `n √(1 + ½ (φ − 1) c + a/ω²)`: with a foundation φ times as
@@ -116,6 +134,11 @@ impl Steps {
             }
         }
     }
+}
+
+/// Returns how many substeps are enough where nothing is viscous.
+fn wanted_without_viscosity(settings: &Settings, omega: f64) -> f64 {
+    settings.tick_period_s * omega / (2.0 * settings.step_safety)
 }
 
 fn wanted(settings: &Settings, materials: &[Material], omega: f64) -> f64 {

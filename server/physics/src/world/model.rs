@@ -93,6 +93,11 @@ impl Model {
         self.environment.steps.substeps
     }
 
+    /// Returns how many times as many substeps a tick has as it would have without viscosity.
+    pub fn substeps_for_viscosity(&self) -> f64 {
+        self.environment.steps.for_viscosity
+    }
+
     /// Returns the number of substeps in a step of a hybrid body's coarse level.
     pub fn substeps_per_long_step(&self) -> u32 {
         self.environment.steps.substeps_per_long_step

@@ -4,7 +4,7 @@ use crate::{
     contact::{ContactModel, MostCarriers, SkinAtRest, moduli},
     mesh::Surface,
     settings::Integrator,
-    tick::{Environment, EnvironmentSpec, Steps, free_inverse_mass, progress as building, stiffening},
+    tick::{Environment, EnvironmentSpec, Frequencies, Steps, free_inverse_mass, progress as building, stiffening},
 };
 use glam::{DVec2, DVec3};
 
@@ -70,12 +70,8 @@ impl HybridBody {
         let omega_sq = stretch_sq * touched.max(omega).powi(2) + contact.tool_frequency_sq;
         let alone = stretch_sq.sqrt() * omega;
         let coarse_omega = stretch_sq.sqrt() * hybrid.coarse_frequency_rad_per_s();
-        let steps = Steps::choose(&around.settings, &materials, omega_sq.sqrt())?.with_long_steps(
-            &around.settings,
-            &materials,
-            coarse_omega,
-        );
-        let steps = steps.with_contact(alone, omega_sq.sqrt());
+        let steps = Steps::choose(&around.settings, &materials, Frequencies { alone, touched: omega_sq.sqrt() })?;
+        let steps = steps.with_long_steps(&around.settings, &materials, coarse_omega);
         Ok((hybrid, Environment::new(around, surface, contact, steps)))
     }
 }

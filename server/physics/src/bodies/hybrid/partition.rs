@@ -325,7 +325,8 @@ impl Partition {
         let whole_m3 = |doubled: bool| if doubled { 8.0 * spacing_m.powi(3) } else { spacing_m.powi(3) };
         let is_cut = |cell: usize| self.moments(cell).volume_m3 < (1.0 - 1e-6) * whole_m3(self.cells[cell].doubled);
         let whole = (0..self.cells.len()).filter(|&cell| !is_cut(cell));
-        whole.map(|cell| self.moments(cell).volume_m3).sum::<f64>() / self.volume_m3()
+        // The sum of no numbers is −0.
+        whole.map(|cell| self.moments(cell).volume_m3).fold(0.0, |sum, volume_m3| sum + volume_m3) / self.volume_m3()
     }
 }
 

@@ -3,7 +3,7 @@ use super::{MassSpringBody, MassSpringError, MassSpringSpec};
 use crate::{
     contact::{ContactModel, MostCarriers, SkinAtRest},
     settings::Integrator,
-    tick::{Environment, EnvironmentError, EnvironmentSpec, Steps, free_inverse_mass},
+    tick::{Environment, EnvironmentError, EnvironmentSpec, Frequencies, Steps, free_inverse_mass},
 };
 use glam::DVec3;
 
@@ -41,7 +41,7 @@ impl MassSpringBody {
         let contact = if is_hollow { contact.hollow() } else { contact };
         body.cluster(contact.triangles());
         let omega_sq = body.model().touched_frequency_sq(&contact.nodal_stiffness_n_per_m) + contact.tool_frequency_sq;
-        let steps = Steps::choose(&around.settings, &[], omega_sq.sqrt())?.with_contact(omega, omega_sq.sqrt());
+        let steps = Steps::choose(&around.settings, &[], Frequencies { alone: omega, touched: omega_sq.sqrt() })?;
         free_inverse_mass(&body.model().spec().mass_kg, &around.prescribed)?;
         Ok((body, Environment::new(around, surface, contact, steps)))
     }

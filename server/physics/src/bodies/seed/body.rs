@@ -105,7 +105,14 @@ impl SeedBody {
         let contact = ContactModel::build(&skin, &around.tools);
         demand_soft_couplings(&contact, &model)?;
         let enough = f64::from(substeps);
-        let steps = Steps { substeps, substeps_per_long_step: 1, enough, of_contact: 0.0, frequency_sq: 0.0 };
+        let steps = Steps {
+            substeps,
+            substeps_per_long_step: 1,
+            enough,
+            of_contact: 0.0,
+            frequency_sq: 0.0,
+            for_viscosity: 1.0,
+        };
         let body =
             Self { model, core, layer, rest_m, mass_kg, inverse_mass_per_kg, max_natural_frequency_rad_per_s: omega };
         Ok((body, Environment::new(around, surface, contact, steps)))

@@ -15,7 +15,7 @@ use crate::{
     mesh::{Surface, TetMesh},
     settings::Integrator,
     tick::{
-        Environment, EnvironmentSpec, PrescribedNodes, Steps, free_inverse_mass, lumped::LumpedMass,
+        Environment, EnvironmentSpec, Frequencies, PrescribedNodes, Steps, free_inverse_mass, lumped::LumpedMass,
         progress as building, stiffening,
     },
 };
@@ -92,7 +92,7 @@ impl TetBody {
         };
         let omega_sq = explicit_sq + contact.tool_frequency_sq;
         let alone = stretch_sq.sqrt() * omega;
-        let steps = Steps::choose(settings, &body.materials, omega_sq.sqrt())?.with_contact(alone, omega_sq.sqrt());
+        let steps = Steps::choose(settings, &body.materials, Frequencies { alone, touched: omega_sq.sqrt() })?;
         body.max_natural_frequency_rad_per_s = omega;
         let environment = Environment::new(spec, surface, contact, steps).with_inner_nodes(nodes);
         Ok((body, environment))
