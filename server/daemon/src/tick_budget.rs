@@ -60,14 +60,17 @@ pub fn check(model: &Model) -> Result<(), BudgetError> {
 pub fn warning(model: &Model) -> Option<String> {
     let cost_s = median_tick_s(model);
     let period_s = model.settings().tick_period_s;
+    let (cost_ms, period_ms) = (cost_s * 1e3, period_s * 1e3);
+    let what = if cost_s > period_s {
+        format!("the body runs about {:.1} times slower than real time", cost_s / period_s)
+    } else {
+        "too little is left of it for late ticks to catch up".to_owned()
+    };
     (cost_s > USABLE * period_s).then(|| {
         format!(
-            "a tick costs {:.2} ms here and should last {:.2} ms ({} substeps): the body runs about {:.1} times slower than real \
-             time; coarsen the mesh, soften the material or lengthen the tick",
-            cost_s * 1e3,
-            period_s * 1e3,
-            model.substeps(),
-            cost_s / period_s,
+            "a tick costs {cost_ms:.2} ms here and should last {period_ms:.2} ms ({} substeps): {what}; coarsen the mesh, soften the \
+             material or lengthen the tick",
+            model.substeps()
         )
     })
 }

@@ -51,7 +51,7 @@ fn squeezed(by_mm: f64) -> String {
         "[scene]\nname = \"squeezed\"\n[body.box]\nsize_mm = [20, 20, 10]\ncells = [4, 4, 4]\n\
          [[material]]\nlaw = \"stvk\"\nyoung_modulus_pa = 10e3\npoisson_ratio = 0\ndensity_kg_per_m3 = 1000\nviscosity_psi_pa_s = 0.3\n\
          [[fixed]]\nregion = \"z_min\"\n[[prescribed]]\nregion = \"z_max\"\ndisplacement_mm = [0, 0, -{by_mm}]\n\
-         amplitude.smooth_step.duration_s = 0.2\n"
+         amplitude.smooth_step.duration_s = 0.2\n[[probe]]\nname = \"table\"\nmeasure = \"reaction\"\nregion = \"z_min\"\n"
     )
 }
 
@@ -72,6 +72,11 @@ async fn a_body_that_is_pressed_beyond_its_law_is_told_while_it_is() {
         for words in ["the law \"stvk\" bears less", "elements are turned inside out"] {
             assert_eq!(told.iter().any(|warning| warning.contains(words)), is_told, "{told:?}");
         }
+        // The force that held it is not told of the body at rest.
+        let table_n = async || daemon.status().await.probes[0].values[2];
+        assert!(table_n().await.abs() > 0.1, "{}", table_n().await);
+        daemon.reset().await;
+        assert_eq!(table_n().await, 0.0);
         // Bodies without particles have none that are awake.
         assert_eq!(daemon.status().await.awake_for, None);
         daemon.finish().await;

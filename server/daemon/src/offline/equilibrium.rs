@@ -112,7 +112,7 @@ fn walls_that_meet(model: &Model, state: &State) -> Option<String> {
     let met = world::meeting_walls(model, state);
     (met.vertices > 0).then(|| {
         format!(
-            "walls of the body meet in this equilibrium, {}; the search for it does not count that they press each other: \
+            "walls of the body meet in this equilibrium, their vertices {}; the search for it does not count that they press each other: \
              let `palpated simulate` come to rest",
             walls::apart(met.least_gap_m)
         )

@@ -320,7 +320,16 @@ impl Summary {
             print_probe(name, probe);
         }
         if self.body.tets > 0 {
-            say(format_args!("  smallest volume ratio {:.4}, state {}", self.min_volume_ratio, self.state_hash));
+            let lowest = match &self.lowest_volume_ratio {
+                Some(lowest) if lowest.value < self.min_volume_ratio => {
+                    format!(" at the end, {:.4} at {:.3} s", lowest.value, lowest.time_s)
+                }
+                _ => String::new(),
+            };
+            say(format_args!(
+                "  smallest volume ratio {:.4}{lowest}, state {}",
+                self.min_volume_ratio, self.state_hash
+            ));
         } else {
             say(format_args!("  state {}", self.state_hash));
         }

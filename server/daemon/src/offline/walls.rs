@@ -39,10 +39,10 @@ impl WallNumbers {
     }
 }
 
-/// How near walls came, given the least gap (m) between them.
+/// How near vertices came to other walls, given the least gap (m). Edges that cross between vertices may overlap by more.
 pub(super) fn apart(least_gap_m: f64) -> String {
     match short(least_gap_m.abs() * 1e3) {
-        mm if least_gap_m < 0.0 => format!("and the walls overlapped by up to {mm} mm"),
-        mm => format!("and the least gap was {mm} mm"),
+        mm if least_gap_m < 0.0 => format!("up to {mm} mm within the other wall"),
+        mm => format!("{mm} mm from the other wall at least"),
     }
 }

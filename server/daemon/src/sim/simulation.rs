@@ -127,6 +127,7 @@ impl Simulation {
     /// Back to rest at tick 0. Does not allocate.
     pub fn reset(&mut self) {
         self.state.reset(&self.model);
+        self.scratch.forget_reactions();
         self.injections.clear();
         self.tools.iter_mut().for_each(ToolLoop::reset);
     }
@@ -144,6 +145,7 @@ impl Simulation {
         if !self.state.try_copy_from(state) {
             return false;
         }
+        self.scratch.forget_reactions();
         self.injections.clear();
         for (tool, state) in self.tools.iter_mut().zip(&self.state.mechanical.tools) {
             tool.restored(state);

@@ -46,4 +46,9 @@ impl Scratch {
     pub fn reactions_n(&self) -> &[DVec3] {
         &self.reaction_n
     }
+
+    /// Forgets them, where the state is no longer that of the last tick: they are zero until the next one.
+    pub fn forget_reactions(&mut self) {
+        self.reaction_n.fill(DVec3::ZERO);
+    }
 }
