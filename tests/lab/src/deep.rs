@@ -18,7 +18,7 @@ use clap::Args;
 use glam::DVec3;
 use indicatif::{ProgressBar, ProgressStyle};
 use miette::{IntoDiagnostic, Result, ensure, miette};
-use palpate_physics::{Model, contact::Coupling, material::Material};
+use palpate_physics::{Model, ModelSpec, contact::Coupling, material::Material};
 use palpate_scene::Limits;
 use std::time::Duration;
 
@@ -57,8 +57,7 @@ pub fn print(options: &Options) -> Result<()> {
     bar.set_style(ProgressStyle::with_template("{pos}/{len} {elapsed} {prefix} {msg}").into_diagnostic()?);
     bar.enable_steady_tick(Duration::from_millis(200));
     bar.set_message("pressing the hybrid");
-    let model = block()?;
-    let material = material_of(&model)?;
+    let (model, material) = block()?;
     let pressed = press(&model);
     println!(
         "coupling saturates at {:.2} N; deepest {:.2} mm",
@@ -127,8 +126,8 @@ fn on_grid(
     Ok((forces_n, ended.err().map(|error| error.to_string())))
 }
 
-/// The scene's block under a sphere on a spring, without friction.
-fn block() -> Result<Model> {
+/// The scene's block under a sphere on a spring, without friction, and what it is made of.
+fn block() -> Result<(Model, Material)> {
     let text = palpate_scene::builtin("hybrid-block").ok_or_else(|| miette!("there is no scene hybrid-block"))?;
     let mut scene = palpate_scene::parse(text, "hybrid-block", None, &Limits::local(), &mut |_, _| {})?;
     ensure!(scene.model.tools.len() == 1, "the scene hybrid-block has not one tool");
@@ -136,6 +135,7 @@ fn block() -> Result<Model> {
         (tool.radius_m, tool.friction_coefficient, tool.coupling) = (RADIUS_M, 0.0, COUPLING);
         tool.start_position_m = DVec3::Z * (RADIUS_M + 1e-3);
     }
+    let material = material_of(&scene.model)?;
     let model = Model::build(scene.model).into_diagnostic()?;
     let (width_m, height_m) = (BLOCK_M[0], BLOCK_M[1]);
     let lowest_m = model.surface_rest_positions_m().iter().fold(DVec3::INFINITY, |low, x| low.min(*x));
@@ -143,12 +143,12 @@ fn block() -> Result<Model> {
         lowest_m.distance(DVec3::new(-0.5 * width_m, -0.5 * width_m, -height_m)) < 1e-9,
         "the scene's block is not the reference's"
     );
-    Ok(model)
+    Ok((model, material))
 }
 
 /// What the scene's block is made of, without the viscosity, which has no part at rest.
-fn material_of(model: &Model) -> Result<Material> {
-    let solid = model.body().filling_tets().ok_or_else(|| miette!("the scene's block is not made of tets"))?;
+fn material_of(spec: &ModelSpec) -> Result<Material> {
+    let solid = spec.body.solid().ok_or_else(|| miette!("the scene's block is not made of tets"))?;
     ensure!(solid.regions.len() == 1, "the scene's block is of {} materials, not of one", solid.regions.len());
     Ok(solid.regions[0].material)
 }
@@ -172,4 +172,30 @@ fn at_depth(pressed: &[(f64, f64)], depth_m: f64) -> Option<f64> {
     let near: Vec<f64> =
         pressed.iter().filter(|(own_m, _)| (own_m - depth_m).abs() < 25e-6).map(|(_, force_n)| *force_n).collect();
     (!near.is_empty()).then(|| near.iter().sum::<f64>() / near.len() as f64)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The command refused its own scene, of which nothing but the command itself knew.
+    #[test]
+    fn the_scenes_block_is_taken_and_the_hybrid_is_near_its_reference() {
+        let (model, material) = block().unwrap();
+        assert_eq!(material.lame.poisson_ratio(), 0.45);
+        let mut slow = Slow::at_rest(&model);
+        // A tenth of the way is enough for a millimetre and a half.
+        let step_m = SPEED_M_PER_S * model.settings().tick_period_s;
+        let pressed: Vec<_> = (1..=300)
+            .map(|tick| {
+                let force_n = slow.tick(DVec3::Z * (RADIUS_M + 1e-3 - step_m * f64::from(tick)));
+                (RADIUS_M - slow.tool_m().z, force_n.z)
+            })
+            .collect();
+        let (depth_m, _) = *pressed.last().unwrap();
+        let (forces_n, ended) = on_grid(2, &material, &[0.75 * depth_m], &mut |_| ()).unwrap();
+        assert_eq!(ended, None);
+        let own_n = at_depth(&pressed, 0.75 * depth_m).unwrap();
+        assert!((own_n / forces_n[0] - 1.0).abs() < 0.1, "{own_n} N, {} N", forces_n[0]);
+    }
 }

@@ -49,7 +49,7 @@ pub(crate) struct Steps {
     pub(crate) of_contact: f64,
     /// Square (rad²/s²) of the largest frequency that they are enough for.
     pub(crate) frequency_sq: f64,
-    /// How many times as many there are as without viscosity.
+    /// How many times as many there are as without viscosity; 1 where their number is fixed.
     pub(crate) for_viscosity: f64,
 }
 
@@ -79,7 +79,7 @@ impl Steps {
             for_viscosity,
         };
         if let Substeps::Fixed(substeps) = settings.substeps {
-            return Ok(all_short(substeps));
+            return Ok(Self { for_viscosity: 1.0, ..all_short(substeps) });
         }
         let substeps = wanted.ceil().max(1.0);
         if substeps <= f64::from(MAX_SUBSTEPS) {
