@@ -4,7 +4,7 @@ use super::{
     clusters::SkinClusters,
     composite::{Composite, NO_WEIGHT},
     embedding_mesh::{self, EmbeddingMesh},
-    mass_matrix::Masses,
+    masses::Masses,
     moments::{CellMoments, Moments, integrate},
     partition::Partition,
     patch::{KEPT, Materials},

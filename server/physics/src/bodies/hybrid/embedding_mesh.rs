@@ -160,7 +160,8 @@ mod tests {
     use super::*;
     use crate::bodies::hybrid::{
         composite::Composite,
-        mass_matrix::{MassMatrix, Masses},
+        mass_matrix::MassMatrix,
+        masses::Masses,
         moments::integrate,
         partition::Partition,
         sites::Sites,

@@ -1,8 +1,8 @@
 //! Kinetic energy is counted once, as volume is: the mass that an active particle moves itself is taken from the coarse
 //! nodes that moved it.
 //!
-//! The masses `m_p` of sleeping particles are lumped on the coarse nodes, `M_i = Σ_p m_p ζ_pi`. With active ones of
-//! velocity `w_p`, beside coarse velocities `v`,
+//! The masses `m_p` of sleeping particles are lumped on the coarse nodes, `M_i = Σ_p m_p ζ_pi` ([`super::masses`]). With active
+//! ones of velocity `w_p`, beside coarse velocities `v`,
 //! ```text
 //! K = ½ Σ_i M_i |v_i|² + ½ (1 − ε) Σ_{p∈A} m_p (|w_p|² − |Σ_i ζ_pi v_i|²)
 //! ```
@@ -13,64 +13,17 @@
 //! M' = diag(M_i) − (1 − ε) Σ_{p∈A} m_p ζ_p ζ_pᵀ
 //!    ≥ ε diag(Σ_{p∈A} m_p ζ_pi) + diag(Σ_{p∉A} m_p ζ_pi)      (ζ ≥ 0, Σ ζ = 1: Jensen)
 //! ```
-//! Particles outside the coarse tets, which never wake, have negative weights. Their lumped masses are such that they have
-//! no less kinetic energy than the particles ([`super::composite::Anchor::bearing_weights`]): more than the particles'
-//! own, but nowhere is the matrix less than above, nor a frequency higher than with all particles awake. Gravity pulls
-//! by `Σ_p m_p ζ_pi`.
+//! Lumped masses of particles outside the coarse tets, which never wake, are such that nowhere is the matrix less than above,
+//! nor a frequency higher than with all particles awake.
 //!
 //! It is positive definite, and diagonal but for a small dense block of the nodes that active particles follow, which
 //! is factorised when the set changes.
 //!
 //! Ticks use the same matrix as `running/mass_matrix.rs` has it; this one is its oracle, and what energies are counted by,
 //! for which it need not be factorised.
-use super::{partition::Partition, patch::KEPT};
+use super::{masses::Masses, partition::Partition, patch::KEPT};
 use glam::{BVec3, DVec3};
 use std::collections::BTreeSet;
-
-/// A coarse node that no particle follows with more weight than this has no mass, and stays: where particles lie in the
-/// faces of coarse tets, nodes beside the faces are followed by rounding alone, and the rounding of forces in single
-/// precision would throw such masses anywhere.
-const NO_FOLLOWER: f64 = 1e-6;
-
-/// Masses of a body whose particles all sleep.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Masses {
-    /// `m_p` (kg).
-    pub particle_kg: Vec<f64>,
-    /// `M_i` (kg).
-    pub node_kg: Vec<f64>,
-    /// `Σ_p m_p ζ_pi` (kg), by which gravity pulls on the nodes.
-    pub node_weight_kg: Vec<f64>,
-}
-
-impl Masses {
-    /// Gives an eighth of each cell's mass to each of its particles, and that of the particles to the coarse nodes.
-    /// `density_kg_per_m3` is that of a coarse tet.
-    pub fn new(partition: &Partition, density_kg_per_m3: impl Fn(usize) -> f64) -> Self {
-        let mut particle_kg = vec![0.0; partition.particle_count()];
-        for (number, cell) in partition.cells().iter().enumerate() {
-            let density = density_kg_per_m3(cell.tet as usize);
-            for (particle, volume_m3) in partition.corners(number).into_iter().zip(partition.particles_m3(number)) {
-                particle_kg[particle as usize] += density * volume_m3;
-            }
-        }
-        let mut node_kg = vec![0.0; partition.coarse().positions_m().len()];
-        let mut node_weight_kg = node_kg.clone();
-        let mut largest_weights = node_kg.clone();
-        for (particle, mass) in particle_kg.iter().enumerate() {
-            let anchor = partition.anchor(particle as u32);
-            for ((&node, weight), lumped_kg) in anchor.nodes.iter().zip(anchor.weights).zip(anchor.lumped_kg(*mass)) {
-                node_weight_kg[node as usize] += mass * weight;
-                node_kg[node as usize] += lumped_kg;
-                largest_weights[node as usize] = f64::max(largest_weights[node as usize], weight.abs());
-            }
-        }
-        for (node, _) in largest_weights.iter().enumerate().filter(|(_, weight)| **weight <= NO_FOLLOWER) {
-            (node_kg[node], node_weight_kg[node]) = (0.0, 0.0);
-        }
-        Self { particle_kg, node_kg, node_weight_kg }
-    }
-}
 
 /// The mass matrix `M'` for a set of active particles.
 #[derive(Debug, Clone)]
@@ -230,17 +183,10 @@ fn solve(l: &[f64], f: &mut [DVec3], axis: usize, free: &[BVec3]) {
 mod tests {
     use super::*;
     use crate::bodies::hybrid::{
-        composite::Composite,
-        moments::integrate,
         patch::{Field, Materials, Patch},
-        sites::Sites,
-        skin::Skin,
-        testing::{Random, ball, embedded_balls, tet_box, tissue},
+        testing::{Random, balls_sticking_out, embedded_balls, tissue},
     };
-    use crate::{
-        material::{Material, Viscosity},
-        mesh::Surface,
-    };
+    use crate::material::{Material, Viscosity};
 
     struct TestBody {
         partition: Partition,
@@ -318,57 +264,11 @@ mod tests {
         (0..body.partition.particle_count() as u32).filter(|&p| of(body.partition.particle_m(p))).collect()
     }
 
-    #[test]
-    fn masses_are_the_bodys() {
-        for body in bodies() {
-            let volume = body.partition.volume_m3();
-            for list in [&body.masses.particle_kg, &body.masses.node_kg] {
-                assert!((list.iter().sum::<f64>() / (1000.0 * volume) - 1.0).abs() < 1e-12);
-            }
-        }
-    }
-
-    /// A plate 8 mm thick in four layers of tets as high as particles are apart: all particles lie in faces of tets.
-    #[test]
-    fn a_node_that_particles_follow_by_rounding_alone_has_no_mass() {
-        let size_m = DVec3::new(0.02, 0.02, 0.008);
-        let block = tet_box(DVec3::ZERO, size_m, [1, 1, 1]);
-        let surface = Surface::of(&block).unwrap();
-        let triangles = (0..surface.triangles.len()).map(|triangle| surface.triangle_nodes(triangle)).collect();
-        let skin = Skin::new(block.positions_m().to_vec(), triangles).unwrap();
-        let sites = Sites::covering(skin.bounds_m(), 2e-3, DVec3::ZERO);
-        let coarse = Composite::new(&tet_box(DVec3::ZERO, size_m, [2, 2, 4]));
-        let partition = Partition::new(sites, coarse, &integrate(&skin, &sites, &mut |_| {}));
-        let masses = Masses::new(&partition, |_| 1000.0);
-        let whole_kg = 1000.0 * partition.volume_m3();
-        for list in [&masses.node_kg, &masses.node_weight_kg] {
-            assert!((list.iter().sum::<f64>() / whole_kg - 1.0).abs() < 1e-6);
-            assert!(list.contains(&0.0));
-            assert!(list.iter().all(|&mass| mass == 0.0 || mass > 1e-6 * whole_kg / list.len() as f64), "{list:?}");
-        }
-    }
-
-    /// Returns a ball in boxes of coarse tets that are too small for it, and its particles that are inside.
-    fn sticking_out() -> Vec<(Partition, BTreeSet<u32>)> {
-        let skin = ball(0.01, DVec3::new(0.2e-3, -0.3e-3, 0.1e-3), 3);
-        let of = |size_m: f64| {
-            let sites = Sites::covering(skin.bounds_m(), 1.1e-3, DVec3::splat(0.4e-3));
-            let coarse = Composite::new(&tet_box(DVec3::splat(-0.5 * size_m), DVec3::splat(size_m), [3, 3, 3]));
-            let moments = integrate(&skin, &sites, &mut |_| {});
-            let partition = Partition::new(sites, coarse, &moments);
-            let all = 0..partition.particle_count() as u32;
-            let inside: BTreeSet<u32> = all.clone().filter(|&p| partition.anchor(p).is_inside()).collect();
-            assert!(inside.len() < all.len() && inside.len() > 500, "{} of {}", inside.len(), all.len());
-            (partition, inside)
-        };
-        [0.012, 0.014, 0.016].map(of).into()
-    }
-
     /// Hearts pressed beside the held base flew apart: particles outside the coarse tets, which never wake, took mass
     /// from nodes there by negative weights, and those that woke took more than was left.
     #[test]
     fn where_particles_are_outside_the_coarse_tets_those_that_wake_leave_mass() {
-        for (partition, inside) in sticking_out() {
+        for (partition, inside) in balls_sticking_out() {
             let masses = Masses::new(&partition, |_| 1000.0);
             assert!((masses.node_weight_kg.iter().sum::<f64>() / (1000.0 * partition.volume_m3()) - 1.0).abs() < 1e-12);
             let free: Vec<BVec3> = masses.node_kg.iter().map(|&mass| BVec3::splat(mass > 0.0)).collect();
@@ -380,23 +280,6 @@ mod tests {
             // fᵀ M'⁻¹ f is that of a mass of at least ε M.
             let least: f64 = masses.node_kg.iter().filter(|mass| **mass > 0.0).map(|mass| 1.0 / (KEPT * mass)).sum();
             assert!(power > 0.0 && power <= least, "{power} {least}");
-        }
-    }
-
-    /// That no frequency is higher than with all particles awake rests on this.
-    #[test]
-    fn lumped_masses_move_with_no_less_energy_than_what_follows_them() {
-        let mut random = Random(14);
-        for (partition, _) in sticking_out() {
-            let masses = Masses::new(&partition, |_| 1000.0);
-            for _ in 0..20 {
-                let v: Vec<DVec3> = masses.node_kg.iter().map(|_| random.vector() * random.unit().powi(8)).collect();
-                let of =
-                    |(particle, mass): (usize, &f64)| mass * partition.anchor(particle as u32).of(&v).length_squared();
-                let of_particles: f64 = masses.particle_kg.iter().enumerate().map(of).sum();
-                let lumped: f64 = masses.node_kg.iter().zip(&v).map(|(mass, v)| mass * v.length_squared()).sum();
-                assert!(of_particles <= lumped * (1.0 + 1e-12), "{of_particles} {lumped}");
-            }
         }
     }
 

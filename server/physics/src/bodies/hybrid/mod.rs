@@ -21,6 +21,7 @@ pub(crate) mod load_claims;
 mod locate;
 mod long_steps;
 pub mod mass_matrix;
+pub mod masses;
 pub mod moments;
 pub mod partition;
 pub mod patch;

@@ -17,7 +17,7 @@
 use super::{
     body::HybridBody,
     composite::{Anchor, NODES},
-    mass_matrix::Masses,
+    masses::Masses,
     partition::Partition,
     running::RunningMassMatrix,
 };

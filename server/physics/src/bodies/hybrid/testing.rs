@@ -12,6 +12,7 @@ use crate::{
     testing::sphere,
 };
 use glam::DVec3;
+use std::collections::BTreeSet;
 
 /// Returns the skin of a ball: an icosahedron whose triangles are split in four `rounds` times.
 pub(crate) fn ball(radius_m: f64, centre_m: DVec3, rounds: u32) -> Skin {
@@ -35,7 +36,23 @@ pub(crate) fn embedded_balls() -> [Partition; 2] {
     [moments, two_sizes].map(|moments| Partition::new(sites, composite.clone(), &moments))
 }
 
-/// Returns that ball as a body of two materials; the coarse nodes below z = −9 mm are held along two axes, those beyond
+/// Returns a ball in boxes of coarse tets that are too small for it, and its particles that are inside.
+pub(crate) fn balls_sticking_out() -> Vec<(Partition, BTreeSet<u32>)> {
+    let skin = ball(0.01, DVec3::new(0.2e-3, -0.3e-3, 0.1e-3), 3);
+    let of = |size_m: f64| {
+        let sites = Sites::covering(skin.bounds_m(), 1.1e-3, DVec3::splat(0.4e-3));
+        let coarse = Composite::new(&tet_box(DVec3::splat(-0.5 * size_m), DVec3::splat(size_m), [3, 3, 3]));
+        let moments = integrate(&skin, &sites, &mut |_| {});
+        let partition = Partition::new(sites, coarse, &moments);
+        let all = 0..partition.particle_count() as u32;
+        let inside: BTreeSet<u32> = all.clone().filter(|&p| partition.anchor(p).is_inside()).collect();
+        assert!(inside.len() < all.len() && inside.len() > 500, "{} of {}", inside.len(), all.len());
+        (partition, inside)
+    };
+    [0.012, 0.014, 0.016].map(of).into()
+}
+
+/// Returns the embedded ball as a body of two materials; the coarse nodes below z = −9 mm are held along two axes, those beyond
 /// y = 9 mm along all.
 pub(crate) fn hybrid_ball(materials: &[Material; 2]) -> HybridBody {
     hybrid_ball_of(materials, 1.1e-3, None)
@@ -95,7 +112,7 @@ pub(crate) fn plus(a: &Field, b: &Field, s: f64) -> Field {
     Field { nodes: sum(&a.nodes, &b.nodes), particles: sum(&a.particles, &b.particles) }
 }
 
-/// Returns the cells of that ball, all awake, and the rest positions (m) of their particles.
+/// Returns the cells of the embedded ball, all awake, and the rest positions (m) of their particles.
 pub(crate) fn ball_cells() -> (Vec<([u32; 8], RestCell)>, Vec<DVec3>) {
     let partition = embedded_ball();
     let rest = (0..partition.particle_count() as u32).map(|p| partition.particle_m(p)).collect();
