@@ -58,7 +58,7 @@ pub fn print(options: &Options) -> Result<()> {
     bar.enable_steady_tick(Duration::from_millis(200));
     bar.set_message("pressing the hybrid");
     let (model, material) = block()?;
-    let pressed = press(&model);
+    let pressed = press(&model, MOST_WAY_M);
     println!(
         "coupling saturates at {:.2} N; deepest {:.2} mm",
         model.contact().force_limit_n(0),
@@ -153,11 +153,11 @@ fn material_of(spec: &ModelSpec) -> Result<Material> {
     Ok(solid.regions[0].material)
 }
 
-/// Depths (m) of the tool's lowest point beneath the face at rest, and forces (N), tick by tick.
-fn press(model: &Model) -> Vec<(f64, f64)> {
+/// Depths (m) of the tool's lowest point beneath the face at rest, and forces (N), tick by tick, while its device goes so far (m).
+fn press(model: &Model, way_m: f64) -> Vec<(f64, f64)> {
     let mut slow = Slow::at_rest(model);
     let step_m = SPEED_M_PER_S * model.settings().tick_period_s;
-    let ticks = (MOST_WAY_M / step_m).ceil() as usize;
+    let ticks = (way_m / step_m).ceil() as usize;
     let at = |tick: usize| DVec3::Z * (RADIUS_M + 1e-3 - step_m * tick as f64);
     (1..=ticks)
         .map(|tick| {
@@ -183,15 +183,7 @@ mod tests {
     fn the_scenes_block_is_taken_and_the_hybrid_is_near_its_reference() {
         let (model, material) = block().unwrap();
         assert_eq!(material.lame.poisson_ratio(), 0.45);
-        let mut slow = Slow::at_rest(&model);
-        // A tenth of the way is enough for a millimetre and a half.
-        let step_m = SPEED_M_PER_S * model.settings().tick_period_s;
-        let pressed: Vec<_> = (1..=300)
-            .map(|tick| {
-                let force_n = slow.tick(DVec3::Z * (RADIUS_M + 1e-3 - step_m * f64::from(tick)));
-                (RADIUS_M - slow.tool_m().z, force_n.z)
-            })
-            .collect();
+        let pressed = press(&model, 3e-3);
         let (depth_m, _) = *pressed.last().unwrap();
         let (forces_n, ended) = on_grid(2, &material, &[0.75 * depth_m], &mut |_| ()).unwrap();
         assert_eq!(ended, None);

@@ -97,6 +97,13 @@ pub(super) fn random_coupling(probability: f64, random: &mut Random) -> Coupling
     Coupling::Spring { stiffness_n_per_m, mass_kg, damping_n_s_per_m: critical * random.within(0.2, 1.0) }
 }
 
+/// Tells what a hand's tool is.
+pub(super) fn told(tool: &ToolSpec) -> String {
+    let kind = if tool.coupling == Coupling::Rigid { "rigid" } else { "coupled" };
+    let shape = if tool.shape.as_capsule().is_some() { "capsule" } else { "sphere" };
+    format!("{kind} {shape} of {:.1} mm", 1e3 * tool.radius_m)
+}
+
 /// Returns whether a capsule at its start reaches into a body at rest, between vertices too.
 fn cuts(shape: &ToolShape, centre_m: DVec3, radius_m: f64, bare: &Model) -> bool {
     let Some(capsule) = shape.as_capsule() else { return false };
@@ -114,10 +121,7 @@ fn cuts(shape: &ToolShape, centre_m: DVec3, radius_m: f64, bare: &Model) -> bool
 
 impl fmt::Display for Press {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let kind = if self.tool.coupling == Coupling::Rigid { "rigid" } else { "coupled" };
-        let shape = if self.tool.shape.as_capsule().is_some() { "capsule" } else { "sphere" };
-        let (radius_mm, depth_mm) = (1e3 * self.tool.radius_m, 1e3 * self.depth_m);
-        write!(f, "{kind} {shape} of {radius_mm:.1} mm, {:.2} m/s, {depth_mm:.0} mm deep", self.speed_m_per_s)?;
+        write!(f, "{}, {:.2} m/s, {:.0} mm deep", told(&self.tool), self.speed_m_per_s, 1e3 * self.depth_m)?;
         if self.drag_m == DVec3::ZERO { Ok(()) } else { write!(f, ", dragged {:.0} mm", 1e3 * self.drag_m.length()) }
     }
 }

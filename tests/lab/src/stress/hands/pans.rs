@@ -2,7 +2,7 @@
 //!
 //! Found by a hand like these: the near wall passed the far one beneath the tool, which was then held by the far wall's outer side for ever.
 use super::{
-    hand::{LARGEST_FORCE_N, random_coupling},
+    hand::{LARGEST_FORCE_N, random_coupling, told},
     watch::{LOOK_EVERY, LedgerSeen, MOST_IMBALANCE},
 };
 use crate::{
@@ -16,7 +16,7 @@ use glam::DVec3;
 use miette::Result;
 use palpate_physics::{
     ModelSpec,
-    contact::{Coupling, ToolShape, ToolSpec, ToolTarget, is_inside},
+    contact::{ToolShape, ToolSpec, ToolTarget, is_inside},
 };
 use palpate_scene::Limits;
 use std::fmt;
@@ -78,10 +78,7 @@ impl Reach {
 
 impl fmt::Display for Reach {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let kind = if self.tool.coupling == Coupling::Rigid { "rigid" } else { "coupled" };
-        let shape = if self.tool.shape.as_capsule().is_some() { "capsule" } else { "sphere" };
-        let (thick_mm, radius_mm) = (2.0 * self.half_height_mm, 1e3 * self.tool.radius_m);
-        write!(f, "{thick_mm:.1} mm thick, {kind} {shape} of {radius_mm:.1} mm, {:.2} m/s", self.speed_m_per_s)
+        write!(f, "{:.1} mm thick, {}, {:.2} m/s", 2.0 * self.half_height_mm, told(&self.tool), self.speed_m_per_s)
     }
 }
 
@@ -156,6 +153,7 @@ fn watch(reach: &Reach) -> Result<Found> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use palpate_physics::contact::Coupling;
 
     /// They stretched triangles of 1.8 mm to 10 and 17 mm, and passed between the samples of one into the pan.
     #[test]
