@@ -6,8 +6,8 @@ use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use glam::DVec3;
 use palpate_physics::{
     Precision,
-    elements::linear_tet::RestTet,
-    kernels::{ForceKernel, Oracle},
+    elements::{integration_points::IntegrationPoints, linear_tet::RestTet},
+    kernels::ForceKernel,
     lanes::InstructionSet,
     material::{Convention, Lame, Law, Material, Viscosity},
 };
@@ -26,16 +26,22 @@ fn kernels(criterion: &mut Criterion) {
             let name = format!("{law:?}{}", if viscosity.is_zero() { "" } else { " viscous" });
             let mut group = criterion.benchmark_group(name);
             group.throughput(Throughput::Elements(rest.len() as u64));
-            let oracle = Oracle::build(&mesh, &rest, &tet_material, &materials);
-            group.bench_function("oracle", |b| b.iter(|| oracle.forces_n(&x, &v, &mut forces)));
+            let linear = IntegrationPoints::of_linear_tets(&mesh, &rest, &tet_material, &materials);
+            let smoothed = IntegrationPoints::of_smoothed_tets(&mesh, &rest, &tet_material, &materials);
+            group.bench_function("oracle", |b| b.iter(|| linear.forces_n(&x, &v, &mut forces)));
+            group.bench_function("oracle, smoothed", |b| b.iter(|| smoothed.forces_n(&x, &v, &mut forces)));
             for precision in [Precision::Single, Precision::Double] {
                 for set in InstructionSet::available() {
-                    let kernel = ForceKernel::build(&mesh, &rest, &tet_material, &materials, precision);
-                    let kernel = kernel.with_instruction_set(set);
-                    let mut scratch = kernel.scratch();
-                    group.bench_function(format!("{precision:?} {set:?}"), |b| {
-                        b.iter(|| kernel.forces_n(mesh.positions_m(), &x, &v, &mut forces, &mut scratch));
-                    });
+                    for (kind, kernel) in [
+                        ("", ForceKernel::build(&mesh, &linear, precision)),
+                        (", smoothed", ForceKernel::build(&mesh, &smoothed, precision)),
+                    ] {
+                        let kernel = kernel.with_instruction_set(set);
+                        let mut scratch = kernel.scratch();
+                        group.bench_function(format!("{precision:?} {set:?}{kind}"), |b| {
+                            b.iter(|| kernel.forces_n(mesh.positions_m(), &x, &v, &mut forces, &mut scratch));
+                        });
+                    }
                 }
             }
         }

@@ -156,11 +156,14 @@ mod tests {
             viscosity: crate::material::Viscosity::default(),
         };
         Model::build(ModelSpec {
-            body: BodySpec::Tet(Solid {
-                mesh: TetMesh::new(p, vec![[0, 1, 2, 3]]).unwrap(),
-                regions: vec![Region { name: "all".into(), material, density_kg_per_m3: 1e3 }],
-                tet_region: vec![0],
-            }),
+            body: BodySpec::Tet(
+                Solid {
+                    mesh: TetMesh::new(p, vec![[0, 1, 2, 3]]).unwrap(),
+                    regions: vec![Region { name: "all".into(), material, density_kg_per_m3: 1e3 }],
+                    tet_region: vec![0],
+                }
+                .into(),
+            ),
             prescribed: Vec::new(),
             loads: Vec::new(),
             gravity_m_per_s2: DVec3::ZERO,

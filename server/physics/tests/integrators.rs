@@ -3,11 +3,8 @@
 mod rig;
 use glam::DVec3;
 use palpate_physics::{
-    Energies, Integrator, ModelSpec, PointForce, Substeps,
-    contact::Coupling,
-    elements::rest_stiffness::{RestStiffness, nodal_stiffness_n_per_m},
-    material::Law,
-    snapshot, statics,
+    Energies, Integrator, ModelSpec, PointForce, Substeps, contact::Coupling,
+    elements::rest_stiffness::nodal_stiffness_n_per_m, material::Law, snapshot, statics,
 };
 use rig::{Drive, Rig, at, body, bricks, even, hold, material, mesh_of, nodes_where, solid_mut, sphere};
 
@@ -98,28 +95,17 @@ fn only_the_semi_implicit_seed_drags_rigid_motion() {
 fn block_jacobi_spectral_radius(spec: ModelSpec) -> f64 {
     let model = palpate_physics::Model::build(spec).unwrap();
     let tets = model.body().as_tet().unwrap();
-    let (materials, regions) = ([*tets.material_of(0)], &tets.solid().tet_region);
-    let body = RestStiffness {
-        mesh: tets.mesh(),
-        rest_tets: tets.rest_tets(),
-        tet_material: regions,
-        materials: &materials,
-        springs_n_per_m: &[],
-    };
-    let inverse: Vec<_> = nodal_stiffness_n_per_m(&body).iter().map(|d| d.inverse()).collect();
+    let points = tets.points();
+    let inverse: Vec<_> = nodal_stiffness_n_per_m(points, tets.mass_kg().len()).iter().map(|d| d.inverse()).collect();
     let mut a: Vec<DVec3> = (0..inverse.len())
         .map(|i| DVec3::new((i as f64).sin(), (2.3 * i as f64).cos(), (0.7 * i as f64).sin()))
         .collect();
     let mut lambda = 0.0;
     for _ in 0..2000 {
         let mut ka = vec![DVec3::ZERO; a.len()];
-        for (tet, nodes) in model.body().tets().unwrap().tets().iter().enumerate() {
-            let rest = &model.body().as_tet().unwrap().rest_tets()[tet];
-            let gradient = rest.gradient_of(&nodes.map(|n| a[n as usize]));
-            let dp = materials[0].piola_differential(&glam::DMat3::IDENTITY, &gradient);
-            for (&node, force) in nodes.iter().zip(rest.corner_forces_n(&dp)) {
-                ka[node as usize] -= force;
-            }
+        for point in points.iter() {
+            let dp = point.material.piola_differential(&glam::DMat3::IDENTITY, &point.gradient_of(&a));
+            point.add_forces_n(&-dp, &mut ka);
         }
         let next: Vec<DVec3> = inverse.iter().zip(&ka).map(|(inverse, ka)| *inverse * *ka).collect();
         let length = |b: &[DVec3]| b.iter().map(|b| b.length_squared()).sum::<f64>().sqrt();

@@ -35,11 +35,14 @@ pub fn model(shape: &Shape, material: Material, tool: Option<ToolSpec>) -> Resul
 pub fn spec(shape: &Shape, material: Material, tool: Option<ToolSpec>) -> ModelSpec {
     let base = shape.region("base").map(BoundaryRegion::nodes);
     ModelSpec {
-        body: BodySpec::Tet(Solid {
-            mesh: shape.mesh.clone(),
-            regions: vec![Region { name: "body".into(), material, density_kg_per_m3: 1000.0 }],
-            tet_region: vec![0; shape.mesh.tets().len()],
-        }),
+        body: BodySpec::Tet(
+            Solid {
+                mesh: shape.mesh.clone(),
+                regions: vec![Region { name: "body".into(), material, density_kg_per_m3: 1000.0 }],
+                tet_region: vec![0; shape.mesh.tets().len()],
+            }
+            .into(),
+        ),
         prescribed: base
             .map(|nodes| PrescribedSpec { name: "base".into(), nodes, axes: [true; 3] })
             .into_iter()

@@ -1,4 +1,4 @@
-//! How much too stiff linear tets are by Poisson's ratio and by how large they are under what presses: the measurement
+//! How much too stiff tets are, linear and smoothed, by Poisson's ratio and by how large they are under what presses: the measurement
 //! behind the warning of `palpated check` (`docs/measurements/locking.md`).
 //!
 //! A block of tets is pressed by a patch or a sphere, and brought to rest as `palpated static` does. What it is held
@@ -11,6 +11,7 @@ use crate::{
 use miette::{IntoDiagnostic, Result};
 use palpate_physics::{
     Settings,
+    bodies::tet::TetElements,
     contact::ToolTarget,
     material::Law,
     statics::{Goal, StaticSettings, solve_static},
@@ -44,10 +45,10 @@ fn presses() -> [(&'static str, Action); 4] {
 /// No equilibrium.
 pub fn print() -> Result<()> {
     println!(
-        "| press | ν | reference | {} |",
+        "| press | ν | reference | tets | {} |",
         CELLS.map(|cells| format!("cells of {:.1} mm", BLOCK_M[0] * 1e3 / f64::from(cells))).join(" | ")
     );
-    println!("|---|---|---|{}", "---|".repeat(CELLS.len()));
+    println!("|---|---|---|---|{}", "---|".repeat(CELLS.len()));
     for (name, action) in presses() {
         for poisson_ratio in POISSON_RATIOS {
             let problem = Problem {
@@ -63,12 +64,15 @@ pub fn print() -> Result<()> {
             let values = GRIDS.map(|n| on_grid(&problem, n, PENALTY, &mut |_| ()).map(|solved| solved.grid.value));
             let [first, second, third] = values;
             let found = limit([first?, second?, third?], GRIDS.map(|n| 1.0 / n as f64));
-            let errors = CELLS.iter().map(|&cells| match at_rest(&problem, cells) {
-                Ok(answer) => format!("{:+.1} %", 100.0 * (stiffness_ratio(&problem, answer, found.value) - 1.0)),
-                Err(error) => error.to_string(),
-            });
-            let (errors, uncertain) = (errors.collect::<Vec<_>>().join(" | "), 100.0 * found.uncertainty / found.value);
-            println!("| {name} | {poisson_ratio} | {:.4e} ± {:.1} % | {errors} |", found.value, uncertain.abs());
+            let uncertain = (100.0 * found.uncertainty / found.value).abs();
+            for (kind, elements) in [("linear", TetElements::Linear), ("smoothed", TetElements::Smoothed)] {
+                let errors = CELLS.iter().map(|&cells| match at_rest(elements, &problem, cells) {
+                    Ok(answer) => format!("{:+.1} %", 100.0 * (stiffness_ratio(&problem, answer, found.value) - 1.0)),
+                    Err(error) => error.to_string(),
+                });
+                let errors = errors.collect::<Vec<_>>().join(" | ");
+                println!("| {name} | {poisson_ratio} | {:.4e} ± {uncertain:.1} % | {kind} | {errors} |", found.value);
+            }
         }
     }
     println!("The block is {} × {} × {} mm.", BLOCK_M[0] * 1e3, BLOCK_M[0] * 1e3, BLOCK_M[1] * 1e3);
@@ -83,9 +87,9 @@ fn stiffness_ratio(problem: &Problem, answer: f64, reference: f64) -> f64 {
     }
 }
 
-/// The answer of linear tets at rest.
-fn at_rest(problem: &Problem, cells: u32) -> Result<f64> {
-    let subject = Subject::new(problem, cells, problem.material()?, Settings::default())?;
+/// The answer of tets at rest.
+fn at_rest(elements: TetElements, problem: &Problem, cells: u32) -> Result<f64> {
+    let subject = Subject::of_elements(elements, problem, cells, problem.material()?, Settings::default())?;
     let prescribed = vec![glam::DVec3::ZERO; subject.model.prescribed().len()];
     let tools: Vec<ToolTarget> =
         subject.tool.iter().map(|tool| ToolTarget { position_m: tool.centre_m(1.0), ..tool.spec().start() }).collect();

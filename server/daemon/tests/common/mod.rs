@@ -69,11 +69,14 @@ pub fn block_scene(name: &str, cells: u32) -> Scene {
         name: name.into(),
         description: "a soft block".into(),
         model: ModelSpec {
-            body: BodySpec::Tet(Solid {
-                tet_region: vec![0; tets],
-                mesh: shape.mesh,
-                regions: vec![Region { name: "all".into(), material, density_kg_per_m3: 1e3 }],
-            }),
+            body: BodySpec::Tet(
+                Solid {
+                    tet_region: vec![0; tets],
+                    mesh: shape.mesh,
+                    regions: vec![Region { name: "all".into(), material, density_kg_per_m3: 1e3 }],
+                }
+                .into(),
+            ),
             prescribed: vec![PrescribedSpec { name: "table".into(), nodes: bottom.clone(), axes: [true; 3] }],
             loads: Vec::new(),
             gravity_m_per_s2: DVec3::ZERO,

@@ -15,24 +15,21 @@ pub mod tet;
 
 pub use crate::tick::MaterialPoint;
 
-use crate::{
-    elements::solid::Solid,
-    tick::{Environment, EnvironmentSpec, KindState},
-};
+use crate::tick::{Environment, EnvironmentSpec, KindState};
 use hybrid::{HybridBody, HybridError, HybridScratch, HybridSpec, HybridState, SteppedHybrid};
 use mass_spring::{
     MassSpringBody, MassSpringError, MassSpringScratch, MassSpringSpec, MassSpringState, SteppedMassSpring,
 };
 use seed::{SeedBody, SeedBodyScratch, SeedBodySpec, SeedBodyState, SeedError, SteppedSeed};
 use serde::{Deserialize, Serialize};
-use tet::{SteppedTet, TetBody, TetBodyError, TetScratch, TetState};
+use tet::{SteppedTet, TetBody, TetBodyError, TetScratch, TetSpec, TetState};
 use thiserror::Error;
 
 /// What a body is built from.
 #[derive(Debug, Clone, PartialEq)]
 pub enum BodySpec {
-    /// Linear tetrahedra throughout.
-    Tet(Solid),
+    /// Tetrahedra throughout.
+    Tet(TetSpec),
     /// Coarse tetrahedra, and particles.
     Hybrid(HybridSpec),
     /// A surface of masses on springs.
@@ -61,7 +58,7 @@ pub enum BodyError {
 /// A body: all that its rest state fixes. Constant after load.
 #[derive(Debug, Clone)]
 pub enum Body {
-    /// Linear tetrahedra throughout.
+    /// Tetrahedra throughout.
     Tet(Box<TetBody>),
     /// Coarse tetrahedra throughout, and particles of which those near a contact are awake.
     Hybrid(Box<HybridBody>),

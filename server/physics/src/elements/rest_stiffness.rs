@@ -6,16 +6,15 @@
 //! eigenvalue of `A` lies within `r` of θ (Parlett 1998, §13.2). No reorthogonalisation: rounding only makes copies of
 //! converged eigenvalues, and the largest one is all that is asked for.
 //!
-//! `K` is applied tet by tet, with the linear elasticity that every law shares at rest:
+//! `K` is applied point by point of integration, with the linear elasticity that every law shares at rest:
 //! `f_i = −V σ b_i`, `σ = λ tr(G) I + µ(G + Gᵀ)`, `G = Σ_j a_j b_jᵀ`.
-use super::linear_tet::RestTet;
+use super::integration_points::{IntegrationPoint, IntegrationPoints};
 use crate::linalg::lanczos::lanczos;
 use crate::linalg::lanczos::telling;
 use crate::linalg::tensor::largest_eigenvalue;
 use crate::{
     linalg::tensor::{outer, trace},
-    material::{Lame, Material},
-    mesh::TetMesh,
+    material::Lame,
 };
 use glam::{DMat3, DVec3};
 
@@ -23,13 +22,7 @@ use glam::{DMat3, DVec3};
 #[derive(Debug, Clone, Copy)]
 pub struct RestStiffness<'a> {
     /// The body.
-    pub mesh: &'a TetMesh,
-    /// Rest data of its tets.
-    pub rest_tets: &'a [RestTet],
-    /// Index into `materials`, one per tet.
-    pub tet_material: &'a [u16],
-    /// Materials.
-    pub materials: &'a [Material],
+    pub points: &'a IntegrationPoints,
     /// `k_i ≥ 0` (N/m, in all directions), one per node, or none: `K + diag(k_i)`.
     pub springs_n_per_m: &'a [f64],
 }
@@ -60,45 +53,46 @@ pub(crate) fn max_natural_frequency_with(
     (theta + residual).min(bound * bound + spring_bound_sq).sqrt()
 }
 
-/// `max_e ω_e ≥ ω_max` (rad/s): the frequency bound of single tets, each with its part `m_i V_e/Σ_{t∋i} V_t` of its
-/// nodes' masses (Irons & Treharne 1971: by Rayleigh's quotient no assembly of elements is faster than the fastest of
-/// them).
+/// `√(Σ_layers max_q ω_q²) ≥ ω_max` (rad/s): the frequency bound of single points of integration, each with its part
+/// `m_i V_q/Σ_{p∋i} V_p` of its nodes' masses (Irons & Treharne 1971: by Rayleigh's quotient no assembly of elements is
+/// faster than the fastest of them). Layers that each fill the body share its masses, so their quotients add up.
 ///
-/// Per tet `aᵀK_e a = V(λ tr²G + ½µ|G + Gᵀ|²) ≤ V(3λ⁺ + 2µ)|G|²` and `|G|² ≤ λ_max(Σ_i b_i b_iᵀ/m_i) aᵀM_e a`.
+/// Per point `aᵀK_q a = V(λ tr²G + ½µ|G + Gᵀ|²) ≤ V(3λ⁺ + 2µ)|G|²` and `|G|² ≤ λ_max(Σ_i b_i b_iᵀ/m_i) aᵀM_q a`.
 ///
 /// The springs are left out.
 pub fn element_bound_rad_per_s(stiffness: &RestStiffness<'_>, inverse_mass_per_kg: &[DVec3]) -> f64 {
-    let RestStiffness { mesh, rest_tets, tet_material, materials, .. } = *stiffness;
+    stiffness.points.layers().map(|layer| layer_bound_sq(layer, inverse_mass_per_kg)).sum::<f64>().sqrt()
+}
+
+/// `max_q ω_q²` over the points of a layer.
+fn layer_bound_sq<'a>(layer: impl Iterator<Item = IntegrationPoint<'a>> + Clone, inverse_mass_per_kg: &[DVec3]) -> f64 {
     let mut volume_of_node = vec![0.0; inverse_mass_per_kg.len()];
-    for (nodes, rest) in mesh.tets().iter().zip(rest_tets) {
-        for &node in nodes {
-            volume_of_node[node as usize] += rest.volume_m3;
+    for point in layer.clone() {
+        for &node in point.nodes {
+            volume_of_node[node as usize] += point.volume_m3;
         }
     }
-    let mut largest_sq = 0.0_f64;
-    for ((nodes, rest), &material) in mesh.tets().iter().zip(rest_tets).zip(tet_material) {
-        let Lame { lambda_pa, mu_pa } = materials[material as usize].lame;
-        let gram = nodes.iter().zip(rest.gradients_per_m).fold(DMat3::ZERO, |sum, (&node, b)| {
-            let part = rest.volume_m3 / volume_of_node[node as usize];
-            sum + outer(b, b) * (inverse_mass_per_kg[node as usize].max_element() / part)
+    let omega_sq = |point: IntegrationPoint<'_>| {
+        let Lame { lambda_pa, mu_pa } = point.material.lame;
+        let gram = point.nodes.iter().zip(point.gradients_per_m).fold(DMat3::ZERO, |sum, (&node, b)| {
+            let part = point.volume_m3 / volume_of_node[node as usize];
+            sum + outer(*b, *b) * (inverse_mass_per_kg[node as usize].max_element() / part)
         });
         let modulus = 3.0 * lambda_pa.max(0.0) + 2.0 * mu_pa;
-        largest_sq = largest_sq.max(rest.volume_m3 * modulus * largest_eigenvalue(&gram));
-    }
-    largest_sq.sqrt()
+        point.volume_m3 * modulus * largest_eigenvalue(&gram)
+    };
+    layer.map(omega_sq).fold(0.0, f64::max)
 }
 
 impl RestStiffness<'_> {
     /// `out ← K a`.
     fn apply(&self, a: &[DVec3], out: &mut [DVec3]) {
         out.fill(DVec3::ZERO);
-        for ((nodes, rest), &material) in self.mesh.tets().iter().zip(self.rest_tets).zip(self.tet_material) {
-            let Lame { lambda_pa, mu_pa } = self.materials[material as usize].lame;
-            let g = rest.gradient_of(&nodes.map(|n| a[n as usize]));
+        for point in self.points.iter() {
+            let Lame { lambda_pa, mu_pa } = point.material.lame;
+            let g = point.gradient_of(a);
             let sigma = (g + g.transpose()) * mu_pa + DMat3::from_diagonal(DVec3::splat(lambda_pa * trace(&g)));
-            for (&node, force) in nodes.iter().zip(rest.corner_forces_n(&sigma)) {
-                out[node as usize] -= force;
-            }
+            point.add_forces_n(&-sigma, out);
         }
         for ((out, a), spring) in out.iter_mut().zip(a).zip(self.springs_n_per_m) {
             *out += *a * *spring;
@@ -106,13 +100,13 @@ impl RestStiffness<'_> {
     }
 }
 
-/// `D_i = Σ_{t∋i} −∂f_i/∂x_i` (N/m) of every node at rest: the block diagonal of `K`, symmetric and positive definite.
-pub fn nodal_stiffness_n_per_m(body: &RestStiffness<'_>) -> Vec<DMat3> {
-    let mut nodal = vec![DMat3::ZERO; body.mesh.positions_m().len()];
-    for ((nodes, rest), &material) in body.mesh.tets().iter().zip(body.rest_tets).zip(body.tet_material) {
-        for (corner, &node) in nodes.iter().enumerate() {
-            let material = &body.materials[material as usize];
-            nodal[node as usize] -= rest.stiffness_block(material, &DMat3::IDENTITY, corner, corner);
+/// `D_i = Σ_{q∋i} −∂f_i/∂x_i` (N/m) of each of so many nodes at rest: the block diagonal of `K`, symmetric and positive
+/// definite.
+pub fn nodal_stiffness_n_per_m(points: &IntegrationPoints, nodes: usize) -> Vec<DMat3> {
+    let mut nodal = vec![DMat3::ZERO; nodes];
+    for point in points.iter() {
+        for (number, &node) in point.nodes.iter().enumerate() {
+            nodal[node as usize] -= point.stiffness_block(&DMat3::IDENTITY, number, number);
         }
     }
     nodal

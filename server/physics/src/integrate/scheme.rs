@@ -7,7 +7,7 @@ use super::{
 use crate::{
     bodies::{Body, SteppedBody, tet::TetBody},
     contact::ContactScratch,
-    elements::rest_stiffness::{RestStiffness, nodal_stiffness_n_per_m},
+    elements::rest_stiffness::nodal_stiffness_n_per_m,
     material::{Lame, Law, Material, Viscosity},
     settings::Integrator,
     tick::{Environment, MechanicalState, Tick},
@@ -38,10 +38,9 @@ impl Scheme {
             (Integrator::SeedVerlet, _) => Self::SeedVerlet,
             (Integrator::SeedSemiImplicit, Some(body)) => Self::SeedSemiImplicit(nodal_implicit(body, dt_s)),
             (Integrator::BackwardEuler, Some(body)) => {
-                let at_rest = body.rest_stiffness();
-                let as_elastic: Vec<Material> = body.materials().iter().map(viscosity_as_stiffness).collect();
-                let viscous = nodal_stiffness_n_per_m(&RestStiffness { materials: &as_elastic, ..at_rest });
-                let nodal = nodal_stiffness_n_per_m(&at_rest);
+                let (points, nodes) = (body.points(), body.mass_kg().len());
+                let viscous = nodal_stiffness_n_per_m(&points.with_materials(viscosity_as_stiffness), nodes);
+                let nodal = nodal_stiffness_n_per_m(points, nodes);
                 Self::BackwardEuler(NodalImplicit::new(&nodal, Some(&viscous), body, dt_s))
             }
             // Other bodies refuse other integrators as they are built.
@@ -73,7 +72,7 @@ impl Scheme {
 }
 
 fn nodal_implicit(body: &TetBody, dt_s: f64) -> NodalImplicit {
-    NodalImplicit::new(&nodal_stiffness_n_per_m(&body.rest_stiffness()), None, body, dt_s)
+    NodalImplicit::new(&nodal_stiffness_n_per_m(body.points(), body.mass_kg().len()), None, body, dt_s)
 }
 
 /// A material that at rest answers strain as this one's viscosity answers its rate: λ = φ, µ = ψ.

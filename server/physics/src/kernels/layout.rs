@@ -1,29 +1,30 @@
 //! From a mesh to blocks: tets grouped by material, ordered for locality, padded to whole blocks.
 use super::tets::{RestLanes, Run, TetBlocks};
 use crate::{
-    elements::linear_tet::RestTet,
+    elements::integration_points::{IntegrationPoint, IntegrationPoints},
     lanes::{
         blocks::{Block, Blocks},
         real::Scalar,
     },
-    material::{Material, constants::Constants},
+    material::constants::Constants,
     mesh::TetMesh,
 };
 use glam::DVec3;
 
 /// Consecutive tets along the space-filling curve are spread over the lanes of this many blocks, so that lanes of one
 /// block rarely share a node: sums of one node would wait for each other in the scatter.
-const BLOCKS_PER_WINDOW: usize = 16;
+pub(super) const BLOCKS_PER_WINDOW: usize = 16;
 
-/// Blocks of all tets, and the runs of equal material among them.
+/// Blocks of the points of all tets, and the runs of equal material among them.
 pub(super) fn blocks<T: Scalar, const N: usize>(
     mesh: &TetMesh,
-    rest_tets: &[RestTet],
-    tet_material: &[u16],
-    materials: &[Material],
+    points: &IntegrationPoints,
 ) -> (TetBlocks<T, N>, Vec<Run<T>>) {
-    let curve = morton_codes(mesh);
-    let mut order: Vec<u32> = (0..rest_tets.len() as u32).collect();
+    let (tet_material, materials) = points.materials();
+    let tets = mesh.tets().len();
+    let centroid = |tet| mesh.corners_m(tet).iter().sum::<DVec3>() / 4.0;
+    let curve = morton_codes((0..tets).map(centroid), mesh.bounds_m());
+    let mut order: Vec<u32> = (0..tets as u32).collect();
     order.sort_by_key(|&t| (tet_material[t as usize], curve[t as usize], t));
     let spare = mesh.positions_m().len() as u32;
     let mut blocks = Vec::with_capacity(order.len().div_ceil(N) + materials.len());
@@ -34,7 +35,7 @@ pub(super) fn blocks<T: Scalar, const N: usize>(
             let count = window.len().div_ceil(N);
             for first in 0..count {
                 let lanes = window.iter().skip(first).step_by(count);
-                blocks.push(block(lanes.map(|&t| t as usize), mesh, rest_tets, spare));
+                blocks.push(block(lanes.map(|&t| points.point(t as usize)), spare));
             }
         }
         let material = materials[tet_material[group[0] as usize] as usize];
@@ -43,40 +44,35 @@ pub(super) fn blocks<T: Scalar, const N: usize>(
     (Blocks::new(blocks, spare as usize + 1), runs)
 }
 
-fn block<T: Scalar, const N: usize>(
-    tets: impl Iterator<Item = usize>,
-    mesh: &TetMesh,
-    rest_tets: &[RestTet],
+fn block<'a, T: Scalar, const N: usize>(
+    tets: impl Iterator<Item = IntegrationPoint<'a>>,
     spare: u32,
 ) -> Block<RestLanes<T, N>, N> {
     let zero = T::of(0.0);
     let rest = RestLanes { gradients: [[zero; N]; 9], minus_volume: [zero; N] };
     let mut block = Block { nodes: [[spare; 4]; N], rest };
     for (lane, tet) in tets.enumerate() {
-        block.nodes[lane] = mesh.tets()[tet];
+        block.nodes[lane].copy_from_slice(tet.nodes);
         for corner in 0..3 {
             for axis in 0..3 {
-                let gradient = rest_tets[tet].gradients_per_m[corner + 1][axis];
+                let gradient = tet.gradients_per_m[corner + 1][axis];
                 block.rest.gradients[3 * corner + axis][lane] = T::of(gradient);
             }
         }
-        block.rest.minus_volume[lane] = T::of(-rest_tets[tet].volume_m3);
+        block.rest.minus_volume[lane] = T::of(-tet.volume_m3);
     }
     block
 }
 
-/// Place of each tet's centroid along the Morton curve through the bounding box.
-fn morton_codes(mesh: &TetMesh) -> Vec<u64> {
-    let (low, high) = mesh.bounds_m();
+/// Place of each point (m) along the Morton curve through a box.
+pub(super) fn morton_codes(points_m: impl Iterator<Item = DVec3>, (low, high): (DVec3, DVec3)) -> Vec<u64> {
     let extent = (high - low).max_element();
     let cells = f64::from(1_u32 << 20);
-    (0..mesh.tets().len())
-        .map(|tet| {
-            let centroid = mesh.corners_m(tet).iter().sum::<DVec3>() / 4.0;
-            let cell = (centroid - low) / extent * cells;
-            spread(cell.x as u64) | spread(cell.y as u64) << 1 | spread(cell.z as u64) << 2
-        })
-        .collect()
+    let code = |point: DVec3| {
+        let cell = (point - low) / extent * cells;
+        spread(cell.x as u64) | spread(cell.y as u64) << 1 | spread(cell.z as u64) << 2
+    };
+    points_m.map(code).collect()
 }
 
 /// Two zero bits between any two of the low 21 bits.
@@ -96,7 +92,8 @@ fn spread(mut bits: u64) -> u64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::material::{Convention, Lame, Law, Viscosity};
+    use crate::elements::linear_tet::RestTet;
+    use crate::material::{Convention, Lame, Law, Material, Viscosity};
 
     #[test]
     fn bits_are_spread_by_three() {
@@ -120,7 +117,8 @@ mod tests {
             Material::new(Law::default(), lame, Viscosity::default(), Convention::Consistent)
         };
         let tet_material: Vec<u16> = (0..37).map(|t| u16::from(t % 3 == 0)).collect();
-        let (blocks, runs) = blocks::<f32, 16>(&mesh, &rest, &tet_material, &[of(1.0), of(2.0)]);
+        let points = IntegrationPoints::of_linear_tets(&mesh, &rest, &tet_material, &[of(1.0), of(2.0)]);
+        let (blocks, runs) = blocks::<f32, 16>(&mesh, &points);
         let mut seen = vec![0; 37];
         for run in &runs {
             for block in blocks.batches(run.blocks.clone()).flat_map(|batch| batch.blocks()) {

@@ -1,4 +1,4 @@
-//! The force kernel: internal forces of all tets, in blocks of lanes, beside its scalar oracle.
+//! The force kernel: internal forces of all tets, in blocks of lanes; [`IntegrationPoints`] is its scalar oracle.
 //!
 //! Forces are computed in f32 (16 lanes) or f64 (8 lanes) and summed per node in f64; positions and velocities are f64
 //! always. Displacements `u = x − X` and their differences along the edges of a tet are taken in f64, and only the
@@ -8,24 +8,24 @@
 #![allow(clippy::inline_always)]
 mod forces;
 mod layout;
-mod oracle;
+mod point_layout;
+mod points;
 mod products;
 mod tets;
 
 use crate::{
-    elements::linear_tet::RestTet,
+    elements::integration_points::IntegrationPoints,
     lanes::{
         Available, InstructionSet, LANES_F32, LANES_F64,
         grid::DisplacementGrid,
         nodes::{Node, Sum, node},
         real::Scalar,
     },
-    material::Material,
     mesh::TetMesh,
     settings::Precision,
 };
 use glam::DVec3;
-pub use oracle::Oracle;
+use points::{PointForces, PointProducts, PointTables};
 use tets::{Forces, Products, Run, TetBlocks};
 
 /// Internal forces of a body: rest data laid out for the kernel of the chosen precision.
@@ -43,8 +43,16 @@ pub struct ForceKernel {
 
 #[derive(Debug, Clone)]
 enum Layout {
-    Single(TetBlocks<f32, LANES_F32>, Vec<Run<f32>>),
-    Double(TetBlocks<f64, LANES_F64>, Vec<Run<f64>>),
+    Single(Tables<f32, LANES_F32>),
+    Double(Tables<f64, LANES_F64>),
+}
+
+/// Tets, and points over more nodes, in lanes.
+#[derive(Debug, Clone)]
+struct Tables<T, const N: usize> {
+    tets: TetBlocks<T, N>,
+    runs: Vec<Run<T>>,
+    points: PointTables<T, N>,
 }
 
 /// Buffers of the kernel.
@@ -58,30 +66,18 @@ pub struct KernelScratch {
 }
 
 impl ForceKernel {
-    /// Lays out the rest data. `tet_material[t]` indexes `materials`.
-    pub fn build(
-        mesh: &TetMesh,
-        rest_tets: &[RestTet],
-        tet_material: &[u16],
-        materials: &[Material],
-        precision: Precision,
-    ) -> Self {
+    /// Lays out the integration points of a mesh.
+    pub fn build(mesh: &TetMesh, points: &IntegrationPoints, precision: Precision) -> Self {
         let layout = match precision {
-            Precision::Single => {
-                let (blocks, runs) = layout::blocks(mesh, rest_tets, tet_material, materials);
-                Layout::Single(blocks, runs)
-            }
-            Precision::Double => {
-                let (blocks, runs) = layout::blocks(mesh, rest_tets, tet_material, materials);
-                Layout::Double(blocks, runs)
-            }
+            Precision::Single => Layout::Single(Tables::build(mesh, points)),
+            Precision::Double => Layout::Double(Tables::build(mesh, points)),
         };
-        let largest_m3 = rest_tets.iter().map(|rest| rest.volume_m3).fold(0.0, f64::max);
+        let largest_m3 = points.of_tets().map(|point| point.volume_m3).fold(0.0, f64::max);
         Self {
             layout,
             grid: DisplacementGrid::of_tets(precision, largest_m3),
             nodes: mesh.positions_m().len(),
-            is_viscous: materials.iter().any(|m| !m.viscosity.is_zero()),
+            is_viscous: points.materials().1.iter().any(|m| !m.viscosity.is_zero()),
             every_viscosity: false,
             instruction_set: Available::best(),
         }
@@ -134,8 +130,8 @@ impl ForceKernel {
         // The spare node of the padding, past the end of `v`, stays zero.
         scratch.sums.fill(Sum::default());
         let power_w = match &self.layout {
-            Layout::Single(blocks, runs) => self.add_forces(blocks, runs, scratch),
-            Layout::Double(blocks, runs) => self.add_forces(blocks, runs, scratch),
+            Layout::Single(tables) => self.add_forces(tables, scratch),
+            Layout::Double(tables) => self.add_forces(tables, scratch),
         };
         for (force, Sum([fx, fy, fz, _])) in forces_n.iter_mut().zip(&scratch.sums) {
             *force = DVec3::new(*fx, *fy, *fz);
@@ -164,8 +160,8 @@ impl ForceKernel {
         }
         scratch.sums.fill(Sum::default());
         match &self.layout {
-            Layout::Single(blocks, runs) => self.add_products(factors, blocks, runs, scratch),
-            Layout::Double(blocks, runs) => self.add_products(factors, blocks, runs, scratch),
+            Layout::Single(tables) => self.add_products(factors, tables, scratch),
+            Layout::Double(tables) => self.add_products(factors, tables, scratch),
         }
         for (product, Sum([x, y, z, _])) in products_n.iter_mut().zip(&scratch.sums) {
             *product = DVec3::new(*x, *y, *z);
@@ -175,29 +171,40 @@ impl ForceKernel {
     fn add_products<T: Scalar, const N: usize>(
         &self,
         factors: [f64; 2],
-        blocks: &TetBlocks<T, N>,
-        runs: &[Run<T>],
+        tables: &Tables<T, N>,
         scratch: &mut KernelScratch,
     ) {
         let KernelScratch { displacements, directions, sums, .. } = scratch;
+        let Tables { tets, runs, points } = tables;
         for run in runs {
-            let mut pass = Products { blocks, run, displacements, directions, factors, sums };
+            let mut pass = Products { blocks: tets, run, displacements, directions, factors, sums };
+            run.material.run(self.instruction_set, self.every_viscosity, &mut pass);
+        }
+        for run in &points.runs {
+            let mut pass = PointProducts { tables: points, run, displacements, directions, factors, sums };
             run.material.run(self.instruction_set, self.every_viscosity, &mut pass);
         }
     }
 
-    fn add_forces<T: Scalar, const N: usize>(
-        &self,
-        blocks: &TetBlocks<T, N>,
-        runs: &[Run<T>],
-        scratch: &mut KernelScratch,
-    ) -> f64 {
+    fn add_forces<T: Scalar, const N: usize>(&self, tables: &Tables<T, N>, scratch: &mut KernelScratch) -> f64 {
         let KernelScratch { displacements, velocities, sums, .. } = scratch;
+        let Tables { tets, runs, points } = tables;
         let mut power_w = 0.0;
         for run in runs {
-            let mut pass = Forces { blocks, run, displacements, velocities, sums };
+            let mut pass = Forces { blocks: tets, run, displacements, velocities, sums };
+            power_w += run.material.run(self.instruction_set, self.every_viscosity, &mut pass);
+        }
+        for run in &points.runs {
+            let mut pass = PointForces { tables: points, run, displacements, velocities, sums };
             power_w += run.material.run(self.instruction_set, self.every_viscosity, &mut pass);
         }
         power_w
+    }
+}
+
+impl<T: Scalar, const N: usize> Tables<T, N> {
+    fn build(mesh: &TetMesh, points: &IntegrationPoints) -> Self {
+        let (tets, runs) = layout::blocks(mesh, points);
+        Self { tets, runs, points: point_layout::tables(points, mesh) }
     }
 }

@@ -109,6 +109,17 @@ impl Material {
         self.law.stretched_modulus_pa(lame, stretch * stretch) / lame.p_wave_modulus_pa()
     }
 
+    /// Returns the material of shape alone, `(λ⁻, µ)` with `λ⁻ = min(λ, 0)`, and that of volume alone, `(λ − λ⁻, 0)`. Every
+    /// law's energy is linear in λ and µ, so theirs sum to this one's.
+    pub(crate) fn shape_and_volume(&self) -> (Self, Self) {
+        let Lame { lambda_pa, mu_pa } = self.lame;
+        let of_shape = lambda_pa.min(0.0);
+        (
+            Self { lame: Lame { lambda_pa: of_shape, mu_pa }, ..*self },
+            Self { lame: Lame { lambda_pa: lambda_pa - of_shape, mu_pa: 0.0 }, ..*self },
+        )
+    }
+
     /// Runs a pass that was compiled for this material's law and the instruction set; viscous terms are computed if the
     /// material has any, or if `every_viscosity` asks for them.
     pub(crate) fn run<P: LawPass>(&self, set: Available, every_viscosity: bool, pass: &mut P) -> f64 {

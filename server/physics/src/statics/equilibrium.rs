@@ -2,7 +2,7 @@
 use super::{ToolAtRest, follower, tet_model::TetModel};
 use crate::{
     contact::{Pressing, RestingContact, SaturatingSpring, ToolTarget},
-    elements::{free_axes::FreeAxes, linear_tet::RestTet, loads},
+    elements::{free_axes::FreeAxes, integration_points::IntegrationPoint, loads},
     settings::LoadSpec,
 };
 use glam::{DMat3, DVec3};
@@ -192,25 +192,15 @@ fn norm(nodal: &[DVec3]) -> f64 {
 /// Elastic nodal forces (N), element by element in f64.
 fn elastic_n(model: TetModel<'_>, x: &[DVec3]) -> Vec<DVec3> {
     let mut forces = vec![DVec3::ZERO; x.len()];
-    for (tet, nodes) in model.body.mesh().tets().iter().enumerate() {
-        let rest = &model.body.rest_tets()[tet];
-        let f = rest.gradient_of(&nodes.map(|n| x[n as usize]));
-        let corner = rest.corner_forces_n(&model.body.material_of(tet).piola(&f));
-        for (node, force) in nodes.iter().zip(corner) {
-            forces[*node as usize] += force;
-        }
+    for point in model.body.points().iter() {
+        point.add_forces_n(&point.material.piola(&point.gradient_of(x)), &mut forces);
     }
     forces
 }
 
-/// Elastic energy (J) of every tet.
+/// Elastic energy (J) of every integration point.
 fn elastic_j(model: TetModel<'_>, x: &[DVec3]) -> Vec<f64> {
-    (0..model.body.rest_tets().len())
-        .map(|tet| {
-            let corners = model.body.mesh().tets()[tet].map(|n| x[n as usize]);
-            model.body.rest_tets()[tet].energy_j(model.body.material_of(tet), &corners)
-        })
-        .collect()
+    model.body.points().iter().map(|point| point.energy_j(x)).collect()
 }
 
 /// The line `x + αd`, and the potential along it.
@@ -229,9 +219,8 @@ pub(super) struct Line<'a> {
 impl<'a> Line<'a> {
     pub(super) fn new(model: TetModel<'a>, stage: &'a Stage, x: &'a [DVec3], d: &'a [DVec3]) -> Self {
         let elastic_j = elastic_j(model, x);
-        let modulus =
-            |(tet, rest): (usize, &RestTet)| rest.volume_m3 * model.body.material_of(tet).lame.p_wave_modulus_pa();
-        let cancelling_j = model.body.rest_tets().iter().enumerate().map(modulus).sum();
+        let modulus = |point: IntegrationPoint<'_>| point.volume_m3 * point.material.lame.p_wave_modulus_pa();
+        let cancelling_j = model.body.points().iter().map(modulus).sum();
         let tools_j = stage.tools_j(model, x);
         Self { model, stage, x, d, elastic_j, tools_j, cancelling_j, dead_slope_w: dot(&stage.dead_n, d) }
     }

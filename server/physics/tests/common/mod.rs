@@ -147,11 +147,14 @@ pub(crate) fn spec(
     loads: Vec<LoadSpec>,
 ) -> ModelSpec {
     ModelSpec {
-        body: BodySpec::Tet(Solid {
-            tet_region: vec![0; mesh.tets().len()],
-            mesh,
-            regions: vec![Region { name: "body".into(), material, density_kg_per_m3: 1000.0 }],
-        }),
+        body: BodySpec::Tet(
+            Solid {
+                tet_region: vec![0; mesh.tets().len()],
+                mesh,
+                regions: vec![Region { name: "body".into(), material, density_kg_per_m3: 1000.0 }],
+            }
+            .into(),
+        ),
         prescribed,
         loads,
         gravity_m_per_s2: DVec3::ZERO,

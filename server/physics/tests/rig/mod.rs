@@ -77,11 +77,14 @@ pub fn material(law: Law, young_modulus_pa: f64, poisson_ratio: f64) -> Material
 pub fn body(mesh: TetMesh, material: Material) -> ModelSpec {
     let tets = mesh.tets().len();
     ModelSpec {
-        body: BodySpec::Tet(Solid {
-            mesh,
-            regions: vec![Region { name: "all".into(), material, density_kg_per_m3: 1000.0 }],
-            tet_region: vec![0; tets],
-        }),
+        body: BodySpec::Tet(
+            Solid {
+                mesh,
+                regions: vec![Region { name: "all".into(), material, density_kg_per_m3: 1000.0 }],
+                tet_region: vec![0; tets],
+            }
+            .into(),
+        ),
         prescribed: Vec::new(),
         loads: Vec::new(),
         gravity_m_per_s2: DVec3::ZERO,

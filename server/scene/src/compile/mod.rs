@@ -67,7 +67,13 @@ pub(crate) fn compile(
     progress: &mut dyn FnMut(f64, &str),
 ) -> Result<Scene, Fault> {
     files.limits.check_entries(document)?;
-    kinds::of(&document.body).refuse(document)?;
+    let kind = kinds::of(&document.body);
+    kind.refuse(document)?;
+    if document.body.elements.is_some() && !kind.has_elements() {
+        let message =
+            "only a body of tets alone has `elements`: this one has particles, springs, or is the papers' hybrid";
+        return Err(Fault::value(Where::root("body").key("elements"), message).help("leave `elements` out"));
+    }
     let mut settings = settings(document)?;
     let output = output(&document.output)?;
     let body = body::make(&document.body, files, progress)?;

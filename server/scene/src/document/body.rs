@@ -28,12 +28,24 @@ pub(crate) struct BodyTable {
     pub(crate) particles: Option<ParticlesTable>,
     /// Makes it the papers' hybrid, whose core its tets are.
     pub(crate) seed: Option<SeedTable>,
+    /// What the elastic energy of a body of tets is taken of; "linear" by default.
+    pub(crate) elements: Option<ElementsName>,
     /// Whether walls of the body press each other where they meet; by default where its skin faces itself at rest, as around a cavity,
     /// with leapfrog. Surfaces of springs and the papers' hybrid cannot have it.
     pub(crate) self_contact: Option<bool>,
     /// Moves the body (m, world); zero by default.
     #[serde(default)]
     pub(crate) offset_m: [f64; 3],
+}
+
+/// What the elastic energy of a body of tets is taken of.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub(crate) enum ElementsName {
+    /// The strain of every tet: too stiff where bodies bend or hardly change their volume.
+    Linear,
+    /// Mostly the mean strain around every node.
+    Smoothed,
 }
 
 /// The particles of a hybrid body, whose tets are then the coarse level.

@@ -31,15 +31,18 @@ fn swung(substeps: u32) -> Result<Vec<DVec3>> {
     let body = Body::Block.tets(8)?;
     let load = load::on_tets(Action::Patch { radius_m: 20e-3, force_n: 1.0 }, &body);
     let model = Model::build(ModelSpec {
-        body: BodySpec::Tet(Solid {
-            regions: vec![Region {
-                name: "body".into(),
-                material: bodies::material(Law::StableNeoHookean, 10e3, 0.4)?,
-                density_kg_per_m3: 1000.0,
-            }],
-            tet_region: vec![0; body.mesh.tets().len()],
-            mesh: body.mesh,
-        }),
+        body: BodySpec::Tet(
+            Solid {
+                regions: vec![Region {
+                    name: "body".into(),
+                    material: bodies::material(Law::StableNeoHookean, 10e3, 0.4)?,
+                    density_kg_per_m3: 1000.0,
+                }],
+                tet_region: vec![0; body.mesh.tets().len()],
+                mesh: body.mesh,
+            }
+            .into(),
+        ),
         prescribed: body.prescribed,
         loads: load.into_iter().map(|load| LoadSpec::NodalForces(load.forces_n)).collect(),
         gravity_m_per_s2: DVec3::ZERO,

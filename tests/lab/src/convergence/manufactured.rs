@@ -145,11 +145,14 @@ fn loaded(mesh: TetMesh, boundary: Vec<u32>, material: Material, rule: &[([f64; 
         }
     }
     Model::build(ModelSpec {
-        body: BodySpec::Tet(Solid {
-            regions: vec![Region { name: "body".into(), material, density_kg_per_m3: 1000.0 }],
-            tet_region: vec![0; mesh.tets().len()],
-            mesh,
-        }),
+        body: BodySpec::Tet(
+            Solid {
+                regions: vec![Region { name: "body".into(), material, density_kg_per_m3: 1000.0 }],
+                tet_region: vec![0; mesh.tets().len()],
+                mesh,
+            }
+            .into(),
+        ),
         prescribed: vec![PrescribedSpec { name: "boundary".into(), nodes: boundary, axes: [true; 3] }],
         loads: vec![LoadSpec::NodalForces((0u32..).zip(forces).collect())],
         gravity_m_per_s2: DVec3::ZERO,

@@ -9,6 +9,7 @@ use glam::DVec3;
 use miette::{IntoDiagnostic, Result};
 use palpate_physics::{
     Body, BodySpec, LoadSpec, Model, ModelSpec, Region, Settings, Solid,
+    bodies::tet::{TetElements, TetSpec},
     contact::{Coupling, ToolShape, ToolSpec},
     material::Material,
 };
@@ -23,9 +24,20 @@ pub(crate) struct Subject {
 
 impl Subject {
     pub(crate) fn new(problem: &Problem, resolution: u32, material: Material, settings: Settings) -> Result<Self> {
+        Self::of_elements(TetElements::Linear, problem, resolution, material, settings)
+    }
+
+    pub(crate) fn of_elements(
+        elements: TetElements,
+        problem: &Problem,
+        resolution: u32,
+        material: Material,
+        settings: Settings,
+    ) -> Result<Self> {
         let body = problem.body.tets(resolution)?;
         let load = load::on_tets(problem.action, &body);
         let mut spec = spec(material, &body, settings);
+        spec.body = BodySpec::Tet(TetSpec { solid: solid(material, &body), elements });
         spec.loads = load.iter().map(|load| LoadSpec::NodalForces(load.forces_n.clone())).collect();
         let tool = match problem.action {
             Action::Sphere { radius_m, depth_m } => Some(Tool {
@@ -73,7 +85,7 @@ pub(super) fn solid(material: Material, body: &TetBody) -> Solid {
 
 pub(super) fn spec(material: Material, body: &TetBody, settings: Settings) -> ModelSpec {
     ModelSpec {
-        body: BodySpec::Tet(solid(material, body)),
+        body: BodySpec::Tet(solid(material, body).into()),
         prescribed: body.prescribed.clone(),
         loads: vec![],
         gravity_m_per_s2: DVec3::ZERO,

@@ -5,6 +5,7 @@ use glam::DVec3;
 use miette::{IntoDiagnostic, Result};
 use palpate_physics::{
     Integrator, Precision, Settings, Substeps,
+    bodies::tet::TetElements,
     material::{Convention, Lame, Law, Material, Viscosity},
 };
 
@@ -14,6 +15,7 @@ pub(super) struct Tetrahedra {
     what: &'static str,
     /// Instead of the problem's law, with its factor convention.
     law: Option<(Law, Convention)>,
+    elements: TetElements,
     settings: fn() -> Settings,
 }
 
@@ -26,25 +28,42 @@ impl Tetrahedra {
                 name: super::DEFAULT,
                 what: "The default: the problem's law, explicit leapfrog, forces in f32.",
                 law: None,
+                elements: TetElements::Linear,
                 settings: Settings::default,
             },
-            Self { name: "leapfrog f64", what: "The same with forces in f64.", law: None, settings: double },
+            Self {
+                name: "smoothed tets",
+                what: "The same with most of the strain averaged around nodes.",
+                law: None,
+                elements: TetElements::Smoothed,
+                settings: Settings::default,
+            },
+            Self {
+                name: "leapfrog f64",
+                what: "The default with forces in f64.",
+                law: None,
+                elements: TetElements::Linear,
+                settings: double,
+            },
             Self {
                 name: "seed Verlet",
                 what: "The seeds' position Verlet (2006, eq. 33) with the problem's law: leapfrog's positions, velocities half a step ahead.",
                 law: None,
+                elements: TetElements::Linear,
                 settings: || Settings { integrator: Integrator::SeedVerlet, ..Settings::default() },
             },
             Self {
                 name: "seed semi-implicit",
                 what: "The seeds' semi-implicit Euler with nodewise Jacobian (eq. 34) with the problem's law, at leapfrog's substeps.",
                 law: None,
+                elements: TetElements::Linear,
                 settings: || Settings { integrator: Integrator::SeedSemiImplicit, ..Settings::default() },
             },
             Self {
                 name: "seed semi-implicit once",
                 what: "The same in one step per tick, as the 2006 paper takes it, stable or not.",
                 law: None,
+                elements: TetElements::Linear,
                 settings: || Settings {
                     integrator: Integrator::SeedSemiImplicit,
                     substeps: Substeps::Fixed(1),
@@ -56,12 +75,14 @@ impl Tetrahedra {
                 what: "Linearised backward Euler with the problem's law: one step per tick, solved by preconditioned conjugate gradients \
                        to a thousandth of the first residual.",
                 law: None,
+                elements: TetElements::Linear,
                 settings: || Settings { integrator: Integrator::BackwardEuler, ..Settings::default() },
             },
             Self {
                 name: "backward Euler loose",
                 what: "The same to a tenth.",
                 law: None,
+                elements: TetElements::Linear,
                 settings: || Settings {
                     integrator: Integrator::BackwardEuler,
                     solver_tolerance: 0.1,
@@ -73,12 +94,14 @@ impl Tetrahedra {
                 what: "The seeds' St. Venant-Kirchhoff law with the elastic factor that the 2006 paper prints (half of the consistent \
                        one), by leapfrog in f32.",
                 law: stvk(Convention::Paper2006),
+                elements: TetElements::Linear,
                 settings: Settings::default,
             },
             Self {
                 name: "StVK as in 2005",
                 what: "The same law with the 2005 paper's factors, which are consistent, by leapfrog in f32.",
                 law: stvk(Convention::Paper2005),
+                elements: TetElements::Linear,
                 settings: Settings::default,
             },
         ]
@@ -106,7 +129,7 @@ impl Method for Tetrahedra {
 
     fn build(&self, problem: &Problem, resolution: u32, pace: &Pace) -> Result<Box<dyn Running>> {
         let settings = Settings { mass_damping_per_s: pace.damping_per_s, ..(self.settings)() };
-        let subject = Subject::new(problem, resolution, self.material(problem)?, settings)?;
+        let subject = Subject::of_elements(self.elements, problem, resolution, self.material(problem)?, settings)?;
         Ok(Box::new(Body { driven: Driven::at_rest(&subject.model, subject.tool.as_ref()), subject }))
     }
 }

@@ -213,8 +213,8 @@ fn spoil_field(spec: &mut ModelSpec, field: usize, bad: f64, axis: usize, random
     let tool = random.below(spec.tools.len());
     let coupling = &mut spec.tools[1].coupling;
     let Coupling::Spring { stiffness_n_per_m, damping_n_s_per_m, mass_kg } = coupling else { return };
-    let BodySpec::Tet(solid) = &mut spec.body else { return };
-    let region = &mut solid.regions[0];
+    let BodySpec::Tet(body) = &mut spec.body else { return };
+    let region = &mut body.solid.regions[0];
     match field {
         3 => region.material.lame.lambda_pa = bad,
         4 => region.material.lame.mu_pa = bad,

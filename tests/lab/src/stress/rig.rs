@@ -115,11 +115,14 @@ pub(super) fn settings(_options: &Options) -> Settings {
 /// A body of one material without viscosity, 1000 kg/m³, nothing held or loaded.
 pub(super) fn body(options: &Options, mesh: TetMesh, material: Material) -> ModelSpec {
     ModelSpec {
-        body: BodySpec::Tet(Solid {
-            tet_region: vec![0; mesh.tets().len()],
-            mesh,
-            regions: vec![Region { name: "body".into(), material, density_kg_per_m3: 1000.0 }],
-        }),
+        body: BodySpec::Tet(
+            Solid {
+                tet_region: vec![0; mesh.tets().len()],
+                mesh,
+                regions: vec![Region { name: "body".into(), material, density_kg_per_m3: 1000.0 }],
+            }
+            .into(),
+        ),
         prescribed: Vec::new(),
         loads: Vec::new(),
         gravity_m_per_s2: DVec3::ZERO,
@@ -131,7 +134,7 @@ pub(super) fn body(options: &Options, mesh: TetMesh, material: Material) -> Mode
 /// The tets of a body that was made by [`body`].
 pub(super) fn solid_mut(spec: &mut ModelSpec) -> &mut Solid {
     match &mut spec.body {
-        BodySpec::Tet(solid) => solid,
+        BodySpec::Tet(spec) => &mut spec.solid,
         _ => unreachable!("stressed bodies are of tetrahedra until they are given particles"),
     }
 }
@@ -139,7 +142,7 @@ pub(super) fn solid_mut(spec: &mut ModelSpec) -> &mut Solid {
 /// The same, to be read.
 pub(super) fn solid(spec: &ModelSpec) -> &Solid {
     match &spec.body {
-        BodySpec::Tet(solid) => solid,
+        BodySpec::Tet(spec) => &spec.solid,
         _ => unreachable!("stressed bodies are of tetrahedra until they are given particles"),
     }
 }

@@ -15,11 +15,7 @@
 //!
 //! Which cell or part wakes or falls asleep with which prestrain is worked out in `state_transfer`. Accelerations do not
 //! jump, either (`transition_force`).
-use super::{
-    cell::RestCell,
-    composite::PARTS,
-    residual_element::{ResidualElement, split},
-};
+use super::{cell::RestCell, composite::PARTS, residual_element::ResidualElement};
 use crate::hash::Chain;
 use crate::material::{Material, viscous};
 use glam::{DMat3, DVec3};
@@ -119,7 +115,7 @@ fn piola(material: &Material, f: &DMat3, a: &DMat3) -> DMat3 {
 /// Returns `U_c` (J) of a cell's effective gradients, of shape and of volume, and of its hourglasses'
 /// `(1 − a) Σ_k w_k |q_k|²` (m²).
 pub(super) fn cell_energy_j(rest: &RestCell, material: &Material, [shape, volume]: [&DMat3; 2], modes_m2: f64) -> f64 {
-    let (of_shape, of_volume) = split(material);
+    let (of_shape, of_volume) = material.shape_and_volume();
     let density = of_shape.energy_density(shape) + of_volume.energy_density(volume);
     rest.volume_m3 * density + 0.5 * rest.hourglass_m * material.lame.mu_pa * modes_m2
 }
@@ -131,7 +127,7 @@ pub(super) fn residual_energy_j(
     shapes: &[DMat3; PARTS],
     whole: &DMat3,
 ) -> f64 {
-    let (of_shape, of_volume) = split(material);
+    let (of_shape, of_volume) = material.shape_and_volume();
     let shape: f64 = shapes.iter().zip(residual.volume_m3).map(|(f, v)| v * of_shape.energy_density(f)).sum();
     shape + residual.total_m3() * of_volume.energy_density(whole)
 }
@@ -326,7 +322,7 @@ impl CellPrestrain {
         y: &[DVec3; 8],
         rate: &[DVec3; 8],
     ) -> ([DVec3; 8], f64) {
-        let (of_shape, of_volume) = split(material);
+        let (of_shape, of_volume) = material.shape_and_volume();
         let f = rest.gradient_of(y);
         let mut stress = piola(&of_shape, &f, &self.shape) + piola(&of_volume, &f, &self.volume);
         let mut power_w = 0.0;
@@ -386,7 +382,7 @@ impl ResidualPrestrain {
         if residual.nodes.is_empty() {
             return 0.0;
         }
-        let (of_shape, of_volume) = split(material);
+        let (of_shape, of_volume) = material.shape_and_volume();
         let gradients = residual.gradients(x, DMat3::IDENTITY);
         let pressure = piola(&of_volume, &residual.mean(&gradients), &self.whole);
         let mut power_w = 0.0;

@@ -124,7 +124,7 @@ impl ResidualElement {
         if self.nodes.is_empty() {
             return 0.0;
         }
-        let (of_shape, of_volume) = split(material);
+        let (of_shape, of_volume) = material.shape_and_volume();
         let gradients = self.gradients(x, DMat3::IDENTITY);
         let shape: f64 =
             gradients.iter().zip(self.volume_m3).map(|(f, volume)| volume * of_shape.energy_density(f)).sum();
@@ -136,7 +136,7 @@ impl ResidualElement {
         if self.nodes.is_empty() {
             return 0.0;
         }
-        let (of_shape, of_volume) = split(material);
+        let (of_shape, of_volume) = material.shape_and_volume();
         let gradients = self.gradients(x, DMat3::IDENTITY);
         let pressure = of_volume.piola(&self.mean(&gradients));
         let mut stresses = gradients.map(|f| of_shape.piola(&f) + pressure);
@@ -171,7 +171,7 @@ impl ResidualElement {
         if self.nodes.is_empty() {
             return;
         }
-        let (of_shape, of_volume) = split(material);
+        let (of_shape, of_volume) = material.shape_and_volume();
         let (gradients, changes) = (self.gradients(x, DMat3::IDENTITY), self.gradients(a, DMat3::ZERO));
         let pressure = of_volume.piola_differential(&self.mean(&gradients), &self.mean(&changes));
         let stresses: [DMat3; PARTS] =
@@ -181,7 +181,7 @@ impl ResidualElement {
 
     /// Adds the diagonal blocks (N/m) of the stiffness at rest.
     pub fn add_diagonal_n_per_m(&self, material: &Material, blocks: &mut [DMat3]) {
-        let (of_shape, of_volume) = split(material);
+        let (of_shape, of_volume) = material.shape_and_volume();
         let Lame { lambda_pa, mu_pa } = of_shape.lame;
         for (&node, moments) in self.nodes.iter().zip(&self.moments_m2) {
             let block = &mut blocks[node as usize];
@@ -201,14 +201,4 @@ impl ResidualElement {
             }
         }
     }
-}
-
-/// Returns the material of the parts' shape, and that of the tet's volume.
-pub(crate) fn split(material: &Material) -> (Material, Material) {
-    let Lame { lambda_pa, mu_pa } = material.lame;
-    let of_parts = lambda_pa.min(0.0);
-    (
-        Material { lame: Lame { lambda_pa: of_parts, mu_pa }, ..*material },
-        Material { lame: Lame { lambda_pa: lambda_pa - of_parts, mu_pa: 0.0 }, ..*material },
-    )
 }

@@ -5,6 +5,7 @@ use super::{
 use crate::{
     contact::{ContactModel, MostCarriers, SkinAtRest, SurfaceModuli},
     elements::{
+        integration_points::IntegrationPoints,
         rest_stiffness::{RestStiffness, max_natural_frequency_rad_per_s},
         solid::Solid,
     },
@@ -79,13 +80,9 @@ impl SeedBody {
         around.demand_spheres("a body of the papers' hybrid, which is touched at one triangle")?;
         let inverse_mass_per_kg = free_inverse_mass(&mass_kg, &around.prescribed)?;
         let materials = [*model.core().material()];
-        let of_core = RestStiffness {
-            mesh: &core.mesh,
-            rest_tets: model.core().rest_tets(),
-            tet_material: &core.tet_region,
-            materials: &materials,
-            springs_n_per_m: &[],
-        };
+        let points =
+            IntegrationPoints::of_linear_tets(&core.mesh, model.core().rest_tets(), &core.tet_region, &materials);
+        let of_core = RestStiffness { points: &points, springs_n_per_m: &[] };
         let core_nodes = core.mesh.positions_m().len();
         let omega = max_natural_frequency_rad_per_s(&of_core, &inverse_mass_per_kg[..core_nodes]);
         // Contact is made so that its natural frequency hardly exceeds this: the explicit step bears (ω dt)² ≤ 4, and

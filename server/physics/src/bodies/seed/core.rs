@@ -6,9 +6,7 @@
 use super::{SeedError, SeedParameters};
 use crate::{
     elements::{
-        linear_tet::RestTet,
-        mass,
-        rest_stiffness::{RestStiffness, nodal_stiffness_n_per_m},
+        integration_points::IntegrationPoints, linear_tet::RestTet, mass, rest_stiffness::nodal_stiffness_n_per_m,
     },
     material::{Law, Material},
     mesh::{Surface, TetMesh},
@@ -42,13 +40,9 @@ impl Core {
         let material = Material::new(Law::StVenantKirchhoff, lame, viscosity, convention);
         let rest_tets: Vec<RestTet> = (0..mesh.tets().len()).map(|t| RestTet::new(&mesh.edge_matrix_m(t))).collect();
         let mass_kg = mass::lumped_kg(mesh, |_| density_kg_per_m3);
-        let stiffness_n_per_m = nodal_stiffness_n_per_m(&RestStiffness {
-            mesh,
-            rest_tets: &rest_tets,
-            tet_material: &vec![0; rest_tets.len()],
-            materials: &[material],
-            springs_n_per_m: &[],
-        });
+        let of_tet = vec![0; rest_tets.len()];
+        let points = IntegrationPoints::of_linear_tets(mesh, &rest_tets, &of_tet, &[material]);
+        let stiffness_n_per_m = nodal_stiffness_n_per_m(&points, count);
         let mut inverse_mass_per_kg: Vec<f64> = mass_kg.iter().map(|m| 1.0 / m).collect();
         let mut implicit_per_kg: Vec<DMat3> = mass_kg
             .iter()

@@ -1,9 +1,10 @@
 //! What the rest state of a body of tetrahedra fixes.
-use super::TetBodyError;
+use super::{TetBodyError, TetElements, TetSpec};
 use crate::{
     contact::{ContactModel, MostCarriers, SkinAtRest, SurfaceModuli, moduli},
     elements::{
         free_axes::FreeAxes,
+        integration_points::IntegrationPoints,
         linear_tet::RestTet,
         mass,
         rest_stiffness::{RestStiffness, max_natural_frequency_with},
@@ -21,12 +22,14 @@ use crate::{
 };
 use glam::{BVec3, DVec2, DVec3};
 
-/// A body of linear tetrahedra. Constant after load.
+/// A body of tetrahedra. Constant after load.
 #[derive(Debug, Clone)]
 pub struct TetBody {
     solid: Solid,
+    elements: TetElements,
     materials: Vec<Material>,
     rest_tets: Vec<RestTet>,
+    points: IntegrationPoints,
     mass_kg: Vec<f64>,
     inverse_mass_per_kg: Vec<DVec3>,
     kernel: ForceKernel,
@@ -39,7 +42,7 @@ impl TetBody {
     /// # Errors
     /// [`TetBodyError`]; nothing is repaired silently.
     pub(crate) fn build(
-        solid: Solid,
+        TetSpec { solid, elements }: TetSpec,
         spec: EnvironmentSpec,
         progress: &mut dyn FnMut(f64),
     ) -> Result<(Self, Environment), TetBodyError> {
@@ -51,12 +54,19 @@ impl TetBody {
         let (materials, rest_tets) = (solid.materials(), solid.rest_tets());
         let mass_kg = mass::lumped_kg(&solid.mesh, |tet| solid.region_of(tet).density_kg_per_m3);
         let inverse_mass_per_kg = free_inverse_mass(&mass_kg, &spec.prescribed)?;
-        let kernel = ForceKernel::build(&solid.mesh, &rest_tets, &solid.tet_region, &materials, settings.precision);
+        let (mesh, of_tet) = (&solid.mesh, &solid.tet_region);
+        let points = match elements {
+            TetElements::Linear => IntegrationPoints::of_linear_tets(mesh, &rest_tets, of_tet, &materials),
+            TetElements::Smoothed => IntegrationPoints::of_smoothed_tets(mesh, &rest_tets, of_tet, &materials),
+        };
+        let kernel = ForceKernel::build(mesh, &points, settings.precision);
         let kernel = if settings.skips.viscous_terms { kernel } else { kernel.with_every_viscosity() };
         let mut body = Self {
             solid,
+            elements,
             materials,
             rest_tets,
+            points,
             mass_kg,
             inverse_mass_per_kg,
             kernel,
@@ -101,6 +111,16 @@ impl TetBody {
     /// Mesh, materials and densities.
     pub fn solid(&self) -> &Solid {
         &self.solid
+    }
+
+    /// What its energy is taken of.
+    pub fn elements(&self) -> TetElements {
+        self.elements
+    }
+
+    /// Its integration points.
+    pub fn points(&self) -> &IntegrationPoints {
+        &self.points
     }
 
     /// Mesh at rest.
@@ -150,13 +170,7 @@ impl TetBody {
 
     /// `K` at rest.
     pub(crate) fn rest_stiffness(&self) -> RestStiffness<'_> {
-        RestStiffness {
-            mesh: &self.solid.mesh,
-            rest_tets: &self.rest_tets,
-            tet_material: &self.solid.tet_region,
-            materials: &self.materials,
-            springs_n_per_m: &[],
-        }
+        RestStiffness { points: &self.points, springs_n_per_m: &[] }
     }
 
     /// Numbers of its free axes.
@@ -195,12 +209,7 @@ impl TetBody {
 
     /// `Σ V Ψ(F)` (J) at positions `x` (m).
     pub(crate) fn elastic_energy_j(&self, x: &[DVec3]) -> f64 {
-        (0..self.mesh().tets().len())
-            .map(|tet| {
-                let corners = self.mesh().tets()[tet].map(|n| x[n as usize]);
-                self.rest_tets[tet].energy_j(self.material_of(tet), &corners)
-            })
-            .sum()
+        self.points.energy_j(x)
     }
 
     /// Mean over a triangle's corners of the stiffest tet at each.

@@ -1,5 +1,5 @@
 //! What a body of tetrahedra is as a kind of body.
-use super::TetBody;
+use super::{TetBody, TetElements, TetSpec};
 use crate::{
     elements::solid::Solid,
     hash::{Chain, Fnv},
@@ -12,13 +12,13 @@ use glam::{DMat3, DVec3};
 use serde::{Deserialize, Serialize};
 use std::fmt::Write;
 
-impl KindSpec for Solid {
+impl KindSpec for TetSpec {
     fn solid(&self) -> Option<&Solid> {
-        Some(self)
+        Some(&self.solid)
     }
 
     fn solid_mut(&mut self) -> Option<&mut Solid> {
-        Some(self)
+        Some(&mut self.solid)
     }
 }
 
@@ -54,6 +54,9 @@ impl BodyKind for TetBody {
     fn fingerprint_into(&self, hash: &mut Fnv) {
         // A float prints as the shortest text that reads back to its bits. Writing to the hash cannot fail.
         let _ = write!(hash, "tet {:?}", self.solid());
+        if self.elements() != TetElements::Linear {
+            let _ = write!(hash, " {:?}", self.elements());
+        }
     }
 
     fn tets(&self) -> Option<&TetMesh> {

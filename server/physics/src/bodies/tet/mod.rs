@@ -1,10 +1,11 @@
-//! A body of linear tetrahedra throughout.
+//! A body of tetrahedra throughout.
 mod body;
 mod error;
 mod judged;
 mod kind;
 mod modes;
 mod rest_bound;
+mod spec;
 mod stepped;
 pub(crate) mod stiffness;
 
@@ -13,4 +14,5 @@ pub use error::TetBodyError;
 pub use kind::TetState;
 pub use modes::{Mode, ModesError, natural_modes};
 pub(crate) use rest_bound::RestBound;
+pub use spec::{TetElements, TetSpec};
 pub(crate) use stepped::{SteppedTet, TetScratch};

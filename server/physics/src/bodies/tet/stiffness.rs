@@ -3,19 +3,17 @@ use super::TetBody;
 use crate::{
     elements::free_axes::{FreeAxes, NONE},
     linalg::{cholesky::LowerTriangle, eigen},
+    material::Material,
     mesh::Surface,
 };
 use glam::{DMat3, DVec3};
 
-/// The ten pairs of a tet's corners.
-const PAIRS: [[usize; 2]; 10] = [[0, 0], [0, 1], [0, 2], [0, 3], [1, 1], [1, 2], [1, 3], [2, 2], [2, 3], [3, 3]];
-
-/// Sparse lower triangle with the places where each tet adds.
+/// Sparse lower triangle with the places where each integration point adds.
 #[derive(Debug, Clone)]
 pub(crate) struct Stiffness {
     pub(crate) matrix: LowerTriangle,
-    /// Per tet, pair of corners and entry of the 3×3 block (column-major): index into `value`.
-    places: Vec<[[u32; 9]; 10]>,
+    /// Per integration point, pair of its nodes ([`pairs`]) and entry of the 3×3 block (column-major): index into `value`.
+    places: Vec<[u32; 9]>,
 }
 
 /// How element stiffness enters.
@@ -28,13 +26,13 @@ pub(crate) enum Definiteness {
 }
 
 impl Stiffness {
-    /// Lays out the pattern: two free axes share an entry when a tet joins their nodes. A coupled tool, which may touch any part
+    /// Lays out the pattern: two free axes share an entry when an integration point joins their nodes. A coupled tool, which may touch any part
     /// of the surface, is joined to all its nodes: three dense rows, which come last in the elimination.
     pub(crate) fn pattern(body: &TetBody, surface: &Surface, free: &FreeAxes) -> Self {
         let mut neighbours: Vec<Vec<u32>> = vec![Vec::new(); free.number.len()];
-        for tet in body.mesh().tets() {
-            for &node in tet {
-                neighbours[node as usize].extend(tet);
+        for point in body.points().iter() {
+            for &node in point.nodes {
+                neighbours[node as usize].extend(point.nodes);
             }
         }
         let tools = body.mass_kg().len() as u32..free.number.len() as u32;
@@ -60,20 +58,21 @@ impl Stiffness {
         let value = vec![0.0; row.len()];
         let matrix = LowerTriangle { column_start, row, value };
         let mut stiffness = Self { matrix, places: Vec::new() };
-        stiffness.places = body.mesh().tets().iter().map(|tet| stiffness.places_of(free, tet)).collect();
+        let places = |nodes: &[u32]| -> Vec<[u32; 9]> {
+            pairs(nodes.len()).map(|[i, j]| stiffness.places_of(free, [nodes[i], nodes[j]])).collect()
+        };
+        stiffness.places = body.points().iter().flat_map(|point| places(point.nodes)).collect();
         stiffness
     }
 
-    fn places_of(&self, free: &FreeAxes, tet: &[u32; 4]) -> [[u32; 9]; 10] {
-        PAIRS.map(|[i, j]| {
-            let (rows, columns) = (free.number[tet[i] as usize], free.number[tet[j] as usize]);
-            std::array::from_fn(|entry| {
-                let (r, c) = (rows[entry % 3], columns[entry / 3]);
-                if r == NONE || c == NONE || (i == j && r < c) {
-                    return NONE;
-                }
-                self.place(r.max(c), r.min(c)).map_or(NONE, |place| place as u32)
-            })
+    fn places_of(&self, free: &FreeAxes, nodes: [u32; 2]) -> [u32; 9] {
+        let [rows, columns] = nodes.map(|node| free.number[node as usize]);
+        std::array::from_fn(|entry| {
+            let (r, c) = (rows[entry % 3], columns[entry / 3]);
+            if r == NONE || c == NONE || (nodes[0] == nodes[1] && r < c) {
+                return NONE;
+            }
+            self.place(r.max(c), r.min(c)).map_or(NONE, |place| place as u32)
         })
     }
 
@@ -86,16 +85,15 @@ impl Stiffness {
     /// Elastic stiffness at positions `x`.
     pub(crate) fn assemble(&mut self, body: &TetBody, x: &[DVec3], definiteness: Definiteness) {
         self.matrix.value.fill(0.0);
-        for (tet, nodes) in body.mesh().tets().iter().enumerate() {
-            let rest = &body.rest_tets()[tet];
-            let f = rest.gradient_of(&nodes.map(|n| x[n as usize]));
-            let mut a = stress_differentials(body, tet, &f);
+        let mut places = self.places.iter();
+        for point in body.points().iter() {
+            let mut a = stress_differentials(point.material, &point.gradient_of(x));
             if definiteness == Definiteness::Projected {
                 project(&mut a);
             }
-            for (pair, [i, j]) in PAIRS.into_iter().enumerate() {
-                let block = block(&a, rest.gradients_per_m[i], rest.gradients_per_m[j]) * rest.volume_m3;
-                for (entry, &place) in self.places[tet][pair].iter().enumerate().filter(|(_, p)| **p != NONE) {
+            for ([i, j], places) in pairs(point.nodes.len()).zip(&mut places) {
+                let block = block(&a, point.gradients_per_m[i], point.gradients_per_m[j]) * point.volume_m3;
+                for (entry, &place) in places.iter().enumerate().filter(|(_, p)| **p != NONE) {
                     self.matrix.value[place as usize] += block.col(entry / 3)[entry % 3];
                 }
             }
@@ -130,13 +128,18 @@ impl Stiffness {
     }
 }
 
+/// Pairs of so many nodes, each once, with itself too.
+fn pairs(nodes: usize) -> impl Iterator<Item = [usize; 2]> {
+    (0..nodes).flat_map(move |i| (i..nodes).map(move |j| [i, j]))
+}
+
 /// `∂P/∂F` (Pa) as a symmetric 9×9 matrix over the entries of `F` in column-major order; row `q` is `∂P : e_q`.
-fn stress_differentials(body: &TetBody, tet: usize, f: &DMat3) -> [f64; 81] {
+fn stress_differentials(material: &Material, f: &DMat3) -> [f64; 81] {
     let mut a = [0.0; 81];
     for (q, row) in a.chunks_exact_mut(9).enumerate() {
         let mut unit = [0.0; 9];
         unit[q] = 1.0;
-        let dp = body.material_of(tet).piola_differential(f, &DMat3::from_cols_array(&unit));
+        let dp = material.piola_differential(f, &DMat3::from_cols_array(&unit));
         row.copy_from_slice(&dp.to_cols_array());
     }
     a
@@ -178,17 +181,9 @@ fn block(a: &[f64; 81], bi: DVec3, bj: DVec3) -> DMat3 {
 /// `∂f/∂x · dx` (N) of the elastic forces, without a matrix: for increments of prescribed axes too.
 pub(crate) fn force_differential_n(body: &TetBody, x: &[DVec3], dx: &[DVec3]) -> Vec<DVec3> {
     let mut df = vec![DVec3::ZERO; x.len()];
-    for (tet, nodes) in body.mesh().tets().iter().enumerate() {
-        let rest = &body.rest_tets()[tet];
-        let moved = nodes.map(|n| dx[n as usize]);
-        if moved.iter().all(|d| *d == DVec3::ZERO) {
-            continue;
-        }
-        let f = rest.gradient_of(&nodes.map(|n| x[n as usize]));
-        let dp = body.material_of(tet).piola_differential(&f, &rest.gradient_of(&moved));
-        for (corner, force) in rest.corner_forces_n(&dp).into_iter().enumerate() {
-            df[nodes[corner] as usize] += force;
-        }
+    for point in body.points().iter().filter(|point| point.nodes.iter().any(|&n| dx[n as usize] != DVec3::ZERO)) {
+        let dp = point.material.piola_differential(&point.gradient_of(x), &point.gradient_of(dx));
+        point.add_forces_n(&dp, &mut df);
     }
     df
 }

@@ -13,19 +13,22 @@ use glam::DVec3;
 fn model() -> Model {
     let coupling = Coupling::Spring { stiffness_n_per_m: 100.0, damping_n_s_per_m: 1.0, mass_kg: 0.1 };
     Model::build(ModelSpec {
-        body: BodySpec::Tet(Solid {
-            mesh: TetMesh::new(vec![DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::Z], vec![[0, 1, 2, 3]]).unwrap(),
-            regions: vec![Region {
-                name: "all".into(),
-                material: Material {
-                    law: Law::StableNeoHookean,
-                    lame: Lame::from_young_poisson(1e4, 0.3).unwrap(),
-                    viscosity: Viscosity::default(),
-                },
-                density_kg_per_m3: 1e3,
-            }],
-            tet_region: vec![0],
-        }),
+        body: BodySpec::Tet(
+            Solid {
+                mesh: TetMesh::new(vec![DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::Z], vec![[0, 1, 2, 3]]).unwrap(),
+                regions: vec![Region {
+                    name: "all".into(),
+                    material: Material {
+                        law: Law::StableNeoHookean,
+                        lame: Lame::from_young_poisson(1e4, 0.3).unwrap(),
+                        viscosity: Viscosity::default(),
+                    },
+                    density_kg_per_m3: 1e3,
+                }],
+                tet_region: vec![0],
+            }
+            .into(),
+        ),
         prescribed: Vec::new(),
         loads: Vec::new(),
         gravity_m_per_s2: DVec3::ZERO,

@@ -68,6 +68,11 @@ pub(crate) trait BodyKind: Debug + Sync {
         false
     }
 
+    /// Whether `elements` of `[body]` says what its energy is taken of.
+    fn has_elements(&self) -> bool {
+        false
+    }
+
     /// What one would want to change.
     fn warnings(&self, _body: &Body, _tools: &[ToolSpec]) -> Vec<String> {
         Vec::new()

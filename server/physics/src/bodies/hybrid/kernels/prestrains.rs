@@ -1,7 +1,7 @@
 //! Prestrain of cells (`hybrid::prestrain`), as both kernels of cells keep it.
 use super::cell_stress::prestrained_stress;
 use crate::{
-    bodies::hybrid::{prestrain::CellPrestrain, residual_element},
+    bodies::hybrid::prestrain::CellPrestrain,
     lanes::real::{Real, Scalar, Vector},
     material::{
         ConstitutiveLaw, Material,
@@ -39,7 +39,7 @@ pub(crate) struct Split<T> {
 
 impl<T: Scalar> Split<T> {
     pub(crate) fn of(material: &Material) -> Self {
-        let (shape, volume) = residual_element::split(material);
+        let (shape, volume) = material.shape_and_volume();
         let [whole, shape, volume] = [material, &shape, &volume].map(Constants::of);
         Self { material: *material, whole, shape, volume }
     }

@@ -10,11 +10,7 @@ mod local_nodes;
 
 use super::prestrains::Found;
 use crate::{
-    bodies::hybrid::{
-        composite::PARTS,
-        prestrain::ResidualPrestrain,
-        residual_element::{self, ResidualElement},
-    },
+    bodies::hybrid::{composite::PARTS, prestrain::ResidualPrestrain, residual_element::ResidualElement},
     lanes::{
         Available, InstructionSet, LANES_F32, LANES_F64,
         grid::DisplacementGrid,
@@ -188,7 +184,7 @@ impl<T: Scalar, const N: usize> Tables<T, N> {
                 built.push_block(lanes, residual_elements, nodes as u32);
             }
             let material = &materials[of_tet[same[0]] as usize];
-            let (of_shape, of_volume) = residual_element::split(material);
+            let (of_shape, of_volume) = material.shape_and_volume();
             built.runs.push(Run {
                 material: *material,
                 of_shape: Constants::of(&of_shape),

@@ -1,0 +1,28 @@
+//! What a body of tetrahedra is built from.
+use crate::elements::solid::Solid;
+
+/// What the elastic energy of a body of tetrahedra is taken of.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum TetElements {
+    /// The strain of every tet. They are too stiff in bending, and lock as Poisson's ratio nears ½.
+    #[default]
+    Linear,
+    /// Mostly of the mean strain around every node (docs/adr/smoothed-tets.md).
+    Smoothed,
+}
+
+/// What a body of tetrahedra is built from.
+#[derive(Debug, Clone, PartialEq)]
+pub struct TetSpec {
+    /// The tets with their materials.
+    pub solid: Solid,
+    /// What their energy is taken of.
+    pub elements: TetElements,
+}
+
+impl From<Solid> for TetSpec {
+    /// A body of linear tets.
+    fn from(solid: Solid) -> Self {
+        Self { solid, elements: TetElements::Linear }
+    }
+}
