@@ -8,7 +8,7 @@
 //! with the size of the surface's triangles h = √(2A) and the contact's radius a, of a sphere of radius R pressed δ deep. That is right
 //! to a third for σ from 1/3 to 3 and ν from 0.4 to 0.49; at ν = 0.499 it is up to twice too much, and so it is of the little that is left
 //! with fine tets and small ν. Hybrid bodies' coarse tets keep volume on the mean, and their particles do not lock.
-use palpate_physics::{Model, Region, contact::ToolSpec};
+use palpate_physics::{Model, Region, bodies::tet::TetElements, contact::ToolSpec};
 use palpate_scene::wording::{short, two_digits};
 
 /// Above this a hand feels another body: twice as stiff.
@@ -40,6 +40,7 @@ pub(super) fn told(model: &Model) -> Option<String> {
 pub(super) fn warning(model: &Model) -> Option<String> {
     match Expected::of(model) {
         Some(expected) => (expected.error > MUCH).then(|| expected.sentence()),
+        None if !is_of_linear_tets(model) => None,
         None => least_compressible(model).filter(|region| nu(region) > MANY_SUBSTEPS).map(|region| {
             format!(
                 "the material \"{}\" has Poisson's ratio {}, at which linear tets lock: a press with a radius of {TRIANGLES} of the \
@@ -50,6 +51,11 @@ pub(super) fn warning(model: &Model) -> Option<String> {
             )
         }),
     }
+}
+
+/// Smoothed tets do not lock.
+fn is_of_linear_tets(model: &Model) -> bool {
+    model.body().as_tet().is_some_and(|body| body.elements() == TetElements::Linear)
 }
 
 fn nu(region: &Region) -> f64 {
@@ -92,6 +98,9 @@ fn contact_radius_m(tool: &ToolSpec) -> f64 {
 impl<'m> Expected<'m> {
     /// Of the material that is the least compressible, under the smallest tool; `None` without tets or tools.
     fn of(model: &'m Model) -> Option<Self> {
+        if !is_of_linear_tets(model) {
+            return None;
+        }
         let region = least_compressible(model)?;
         let tool = model.tools().iter().min_by(|a, b| a.radius_m.total_cmp(&b.radius_m))?;
         let size_m = triangle_size_m(model);
