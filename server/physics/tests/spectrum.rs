@@ -32,15 +32,15 @@ struct Body {
 }
 
 impl Body {
-    fn new(of_tets: OfTets, mesh: TetMesh, materials: Vec<Material>, fixed: impl Fn(usize) -> [bool; 3]) -> Self {
+    fn new(of_tets: OfTets, mesh: &TetMesh, materials: &[Material], fixed: impl Fn(usize) -> [bool; 3]) -> Self {
         let rest: Vec<RestTet> = (0..mesh.tets().len()).map(|t| RestTet::new(&mesh.edge_matrix_m(t))).collect();
         let tet_material: Vec<u16> = (0..rest.len()).map(|t| (t * materials.len() / rest.len()) as u16).collect();
-        let inverse_mass = mass::lumped_kg(&mesh, |_| 1000.0)
+        let inverse_mass = mass::lumped_kg(mesh, |_| 1000.0)
             .iter()
             .enumerate()
             .map(|(node, m)| DVec3::from_array(fixed(node).map(|f| if f { 0.0 } else { 1.0 / m })))
             .collect();
-        Self { points: of_tets(&mesh, &rest, &tet_material, &materials), inverse_mass }
+        Self { points: of_tets(mesh, &rest, &tet_material, materials), inverse_mass }
     }
 
     fn stiffness<'a>(&'a self, springs_n_per_m: &'a [f64]) -> RestStiffness<'a> {
@@ -98,7 +98,7 @@ fn lanczos_agrees_with_a_dense_solve_and_stays_below_the_element_bound() {
         for fixed in [[false; 3], [true; 3], [true, false, true]] {
             for of_tets in [LINEAR, IntegrationPoints::of_smoothed_tets] {
                 let held = |node| if node < 5 { fixed } else { [false; 3] };
-                let body = Body::new(of_tets, mesh.clone(), materials.clone(), held);
+                let body = Body::new(of_tets, &mesh, &materials, held);
                 let exact = body.dense();
                 assert_agrees(body.measured(), exact);
                 assert!(body.element_bound() >= exact, "{} < {exact}", body.element_bound());
@@ -114,7 +114,7 @@ fn one_free_axis_has_the_frequency_of_the_formula() {
     let mesh = TetMesh::new(vec![DVec3::ZERO, DVec3::X * h, DVec3::Y * h, DVec3::Z * h], vec![[0, 1, 2, 3]]).unwrap();
     let m = material(20e3, 0.4, Law::StableNeoHookean);
     let modulus = m.lame.p_wave_modulus_pa();
-    let body = Body::new(LINEAR, mesh, vec![m], |node| [node != 1, true, true]);
+    let body = Body::new(LINEAR, &mesh, &[m], |node| [node != 1, true, true]);
     let expected = (4.0 * modulus / 1000.0).sqrt() / h;
     assert!((body.measured() / expected - 1.0).abs() < 1e-12, "{} {expected}", body.measured());
 }
@@ -123,7 +123,7 @@ fn one_free_axis_has_the_frequency_of_the_formula() {
 #[test]
 fn springs_as_strong_as_the_masses_shift_the_whole_spectrum() {
     let mesh = block([3, 2, 2], 5e-3, 0.15, &mut Random(3));
-    let body = Body::new(LINEAR, mesh, vec![material(10e3, 0.45, Law::StableNeoHookean)], |_| [false; 3]);
+    let body = Body::new(LINEAR, &mesh, &[material(10e3, 0.45, Law::StableNeoHookean)], |_| [false; 3]);
     let exact = body.dense();
     for c in [0.5 * exact * exact, 20.0 * exact * exact] {
         let springs: Vec<f64> = body.inverse_mass.iter().map(|inverse| c / inverse.x).collect();
@@ -139,14 +139,14 @@ fn a_cube_is_at_least_as_fast_as_its_uniform_stretch() {
     let h = 4e-3;
     let mesh = block([1, 1, 1], h, 0.0, &mut Random(1));
     let m = material(10e3, 0.0, Law::StVenantKirchhoff);
-    let body = Body::new(LINEAR, mesh, vec![m], |_| [false, true, true]);
+    let body = Body::new(LINEAR, &mesh, &[m], |_| [false, true, true]);
     assert!(body.measured() >= 2.0 / h * (m.lame.p_wave_modulus_pa() / 1000.0).sqrt());
 }
 
 #[test]
 fn a_body_held_everywhere_has_no_frequency() {
     let mesh = block([1, 1, 1], 1e-3, 0.0, &mut Random(1));
-    let body = Body::new(LINEAR, mesh, vec![material(10e3, 0.3, Law::StableNeoHookean)], |_| [true; 3]);
+    let body = Body::new(LINEAR, &mesh, &[material(10e3, 0.3, Law::StableNeoHookean)], |_| [true; 3]);
     assert_eq!(body.measured(), 0.0);
 }
 

@@ -333,7 +333,10 @@ fn redo_outside<T: Scalar, L: ConstitutiveLaw, const N: usize>(
     in_f64: &mut dyn FnMut(usize) -> M3<f64>,
 ) {
     let limit = T::of(L::DOMAIN.unwrap_or(0.0));
-    for lane in (0..N).filter(|&lane| !(inside[lane] >= limit)) {
+    for lane in 0..N {
+        if inside[lane] >= limit {
+            continue;
+        }
         let p = in_f64(lane);
         for row in 0..3 {
             for column in 0..3 {
