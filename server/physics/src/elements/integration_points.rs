@@ -23,7 +23,7 @@ pub struct IntegrationPoints {
     nodes: Vec<u32>,
     gradients_per_m: Vec<DVec3>,
     volume_m3: Vec<f64>,
-    material_of: Vec<u16>,
+    material_of: Vec<u32>,
     materials: Vec<Material>,
     /// Ranges of points that each fill the body once.
     layers: Vec<Range<usize>>,
@@ -47,7 +47,7 @@ impl IntegrationPoints {
     pub fn of_linear_tets(mesh: &TetMesh, rest_tets: &[RestTet], tet_material: &[u16], materials: &[Material]) -> Self {
         let mut points = Self::over(materials.to_vec());
         for ((nodes, rest), &material) in mesh.tets().iter().zip(rest_tets).zip(tet_material) {
-            points.push(nodes, &rest.gradients_per_m, rest.volume_m3, material);
+            points.push(nodes, &rest.gradients_per_m, rest.volume_m3, u32::from(material));
         }
         points.end_layer();
         points
@@ -59,14 +59,14 @@ impl IntegrationPoints {
     }
 
     /// Adds materials for points to come; returns the number of the first.
-    pub(super) fn add_materials(&mut self, materials: impl Iterator<Item = Material>) -> u16 {
-        let first = self.materials.len() as u16;
+    pub(super) fn add_materials(&mut self, materials: impl Iterator<Item = Material>) -> u32 {
+        let first = self.materials.len() as u32;
         self.materials.extend(materials);
         first
     }
 
     /// Adds a point.
-    pub(super) fn push(&mut self, nodes: &[u32], gradients_per_m: &[DVec3], volume_m3: f64, material: u16) {
+    pub(super) fn push(&mut self, nodes: &[u32], gradients_per_m: &[DVec3], volume_m3: f64, material: u32) {
         debug_assert_eq!(nodes.len(), gradients_per_m.len());
         self.nodes.extend_from_slice(nodes);
         self.gradients_per_m.extend_from_slice(gradients_per_m);
@@ -135,7 +135,7 @@ impl IntegrationPoints {
     }
 
     /// Returns the number of each point's material, and the materials.
-    pub(crate) fn materials(&self) -> (&[u16], &[Material]) {
+    pub(crate) fn materials(&self) -> (&[u32], &[Material]) {
         (&self.material_of, &self.materials)
     }
 

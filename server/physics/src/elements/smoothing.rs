@@ -39,7 +39,7 @@ impl IntegrationPoints {
         for tets in around_nodes.chunk_by(|a, b| (a.0, a.1) == (b.0, b.1)) {
             let (material, node, _) = tets[0];
             patch.fill(node, tets.iter().map(|(.., tet)| *tet as usize), mesh, rest_tets);
-            points.push(&patch.nodes, &patch.gradients_per_m, patch.volume_m3, first_of_nodes + material);
+            points.push(&patch.nodes, &patch.gradients_per_m, patch.volume_m3, first_of_nodes + u32::from(material));
         }
         points.end_layer();
         points
@@ -47,7 +47,7 @@ impl IntegrationPoints {
 }
 
 /// Returns the materials that tets have of their own, `γ (λ⁻, µ)`.
-pub(crate) fn materials_of_tets(materials: &[Material]) -> Vec<Material> {
+fn materials_of_tets(materials: &[Material]) -> Vec<Material> {
     let part = |material: &Material| {
         let Material { lame, viscosity, .. } = *material;
         Material {
