@@ -12,9 +12,9 @@ fn scene(key: &str, more: &str) -> Result<Scene, SceneError> {
 }
 
 #[test]
-fn tets_are_linear_unless_they_are_to_be_smoothed() {
+fn tets_are_smoothed_unless_they_are_to_be_linear() {
     for (key, expected) in [
-        ("", TetElements::Linear),
+        ("", TetElements::Smoothed),
         ("elements = \"linear\"", TetElements::Linear),
         ("elements = \"smoothed\"", TetElements::Smoothed),
     ] {

@@ -4,7 +4,7 @@ pub mod convergence;
 pub mod deep;
 pub mod fine_levels;
 pub mod hashes;
-mod hearts;
+pub mod hearts;
 pub mod jitter;
 pub mod locking;
 pub mod machine;

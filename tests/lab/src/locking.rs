@@ -28,14 +28,16 @@ const GRIDS: [usize; 3] = [2, 3, 4];
 const PENALTY: f64 = 1e3;
 
 /// What presses: a name and an action.
-fn presses() -> [(&'static str, Action); 4] {
+fn presses() -> [(&'static str, Action); 6] {
     let patch = |radius_m| Action::Patch { radius_m, force_n: 0.02 };
-    let sphere = |radius_m| Action::Sphere { radius_m, depth_m: 5e-3 };
+    let sphere = |radius_m, depth_m| Action::Sphere { radius_m, depth_m };
     [
         ("patch of 7.5 mm", patch(7.5e-3)),
         ("patch of 15 mm", patch(15e-3)),
-        ("sphere of 10 mm, 5 mm deep", sphere(10e-3)),
-        ("sphere of 20 mm, 5 mm deep", sphere(20e-3)),
+        ("sphere of 10 mm, 5 mm deep", sphere(10e-3, 5e-3)),
+        ("sphere of 20 mm, 5 mm deep", sphere(20e-3, 5e-3)),
+        ("sphere of 10 mm, 1 mm deep", sphere(10e-3, 1e-3)),
+        ("sphere of 20 mm, 1 mm deep", sphere(20e-3, 1e-3)),
     ]
 }
 

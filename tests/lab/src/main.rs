@@ -1,6 +1,8 @@
 //! `palpate-lab`: run time beside error.
 use clap::{Parser, Subcommand};
-use palpate_lab::{deep, fine_levels, hashes, jitter, locking, references, report, ripple, stress, subdivision};
+use palpate_lab::{
+    deep, fine_levels, hashes, hearts, jitter, locking, references, report, ripple, stress, subdivision,
+};
 
 #[derive(Parser)]
 #[command(
@@ -41,6 +43,8 @@ enum Command {
     Deep(deep::Options),
     /// How much the force on a tool ripples with the particles beneath it, by their spacing: a block dragged over and pressed by spheres: some minutes
     Ripple,
+    /// What ticks of irregular hearts cost: at rest, pressed and dragged, and swaying after it
+    Hearts(hearts::Options),
     /// Whether every bit of every scene is as it was (tests/lab/records/hashes.txt); exit code 1 if not
     Hashes(hashes::Options),
 }
@@ -58,6 +62,7 @@ fn main() -> miette::Result<()> {
         Command::Locking => locking::print(),
         Command::Deep(options) => deep::print(&options),
         Command::Ripple => ripple::print(),
+        Command::Hearts(options) => hearts::print(&options),
         Command::Hashes(options) => hashes::run(&options),
     }
 }

@@ -1,4 +1,4 @@
-//! How much too stiff a body of linear tets answers, by how large they are under a tool and by Poisson's ratio.
+//! How much too stiff a body of tets answers, by how large they are under a tool and, of linear ones, by Poisson's ratio.
 //!
 //! Linear tets are too stiff where few of them are under what presses, and lock as ν → ½: each has one volume to keep. Measured
 //! (`docs/measurements/locking.md`: spheres pressed into a block), the force is too large by about
@@ -7,8 +7,17 @@
 //! ```
 //! with the size of the surface's triangles h = √(2A) and the contact's radius a, of a sphere of radius R pressed δ deep. That is right
 //! to a third for σ from 1/3 to 3 and ν from 0.4 to 0.49; at ν = 0.499 it is up to twice too much, and so it is of the little that is left
-//! with fine tets and small ν. Hybrid bodies' coarse tets keep volume on the mean, and their particles do not lock.
-use palpate_physics::{Model, Region, bodies::tet::TetElements, contact::ToolSpec};
+//! with fine tets and small ν. Smoothed tets do not lock, but are stiffer between nodes than at them where few are under the tool, by up to about
+//! ```text
+//! e = 0.1 σ^1.8
+//! ```
+//! (a block whose nodes join 8 or 24 tets by turns; `smoothed.rs` among the tests of `server/physics`). Hybrid bodies' coarse tets keep
+//! volume on the mean, and their particles do not lock.
+use palpate_physics::{
+    Model, Region,
+    bodies::tet::{TetBody, TetElements},
+    contact::ToolSpec,
+};
 use palpate_scene::wording::{short, two_digits};
 
 /// Above this a hand feels another body: twice as stiff.
@@ -24,6 +33,7 @@ const MANY_SUBSTEPS: f64 = 0.495;
 struct Expected<'m> {
     region: &'m Region,
     tool: &'m ToolSpec,
+    elements: TetElements,
     /// Size (m) of the surface's triangles.
     size_m: f64,
     /// Force over what it should be, less one.
@@ -40,11 +50,12 @@ pub(super) fn told(model: &Model) -> Option<String> {
 pub(super) fn warning(model: &Model) -> Option<String> {
     match Expected::of(model) {
         Some(expected) => (expected.error > MUCH).then(|| expected.sentence()),
-        None if !is_of_linear_tets(model) => None,
+        None if elements_of(model) != Some(TetElements::Linear) => None,
         None => least_compressible(model).filter(|region| nu(region) > MANY_SUBSTEPS).map(|region| {
             format!(
                 "the material \"{}\" has Poisson's ratio {}, at which linear tets lock: a press with a radius of {TRIANGLES} of the \
-                 surface's triangles is answered {}, and the tick needs many substeps. Take [body.particles], which do not lock",
+                 surface's triangles is answered {}, and the tick needs many substeps. Leave `elements` at \"smoothed\", or take [body.particles], \
+                 which do not lock",
                 region.name,
                 short(nu(region)),
                 too_stiffly(expected_error(1.0 / TRIANGLES, nu(region)))
@@ -53,9 +64,9 @@ pub(super) fn warning(model: &Model) -> Option<String> {
     }
 }
 
-/// Smoothed tets do not lock.
-fn is_of_linear_tets(model: &Model) -> bool {
-    model.body().as_tet().is_some_and(|body| body.elements() == TetElements::Linear)
+/// What a body of tets is made of; `None` of other bodies.
+fn elements_of(model: &Model) -> Option<TetElements> {
+    model.body().as_tet().map(TetBody::elements)
 }
 
 fn nu(region: &Region) -> f64 {
@@ -70,11 +81,16 @@ fn least_compressible(model: &Model) -> Option<&Region> {
     used.max_by(|a, b| nu(a).total_cmp(&nu(b)))
 }
 
-/// Returns how many times too large the force is, less one, where the surface's triangles have this size over the contact's
-/// radius.
+/// Returns how many times too large the force on linear tets is, less one, where the surface's triangles have this size over the
+/// contact's radius.
 fn expected_error(size_over_contact: f64, poisson_ratio: f64) -> f64 {
     let incompressibility = poisson_ratio.max(0.0) / (1.0 - 2.0 * poisson_ratio);
     0.21 * size_over_contact + 0.054 * size_over_contact.powf(1.3) * incompressibility
+}
+
+/// Returns the same of smoothed tets, between their nodes.
+fn expected_between_nodes(size_over_contact: f64) -> f64 {
+    0.1 * size_over_contact.powf(1.8)
 }
 
 /// Returns the size (m) of the surface's triangles, `Σ A √(2A) / Σ A`.
@@ -98,19 +114,31 @@ fn contact_radius_m(tool: &ToolSpec) -> f64 {
 impl<'m> Expected<'m> {
     /// Of the material that is the least compressible, under the smallest tool; `None` without tets or tools.
     fn of(model: &'m Model) -> Option<Self> {
-        if !is_of_linear_tets(model) {
-            return None;
-        }
+        let elements = elements_of(model)?;
         let region = least_compressible(model)?;
         let tool = model.tools().iter().min_by(|a, b| a.radius_m.total_cmp(&b.radius_m))?;
         let size_m = triangle_size_m(model);
-        let error = expected_error(size_m / contact_radius_m(tool), nu(region));
-        Some(Self { region, tool, size_m, error })
+        let size_over_contact = size_m / contact_radius_m(tool);
+        let error = match elements {
+            TetElements::Linear => expected_error(size_over_contact, nu(region)),
+            TetElements::Smoothed => expected_between_nodes(size_over_contact),
+        };
+        Some(Self { region, tool, elements, size_m, error })
     }
 
     fn sentence(&self) -> String {
-        let Self { region, tool, size_m, error } = self;
+        let Self { region, tool, elements, size_m, error } = self;
         let nu = nu(region);
+        let (name, radius_mm, size_mm) = (&tool.name, short(tool.radius_m * 1e3), two_digits(size_m * 1e3));
+        let pressed =
+            format!("pressed by the tool \"{name}\", {radius_mm} mm in radius, half of that deep, the body answers");
+        if *elements == TetElements::Smoothed {
+            return format!(
+                "{pressed} up to {} between the corners of its triangles, since few tets are under the tool: its surface's triangles are {size_mm} mm \
+                 in size. Take smaller tets, or [body.particles]",
+                too_stiffly(*error)
+            );
+        }
         let of_size = expected_error(size_m / contact_radius_m(tool), 0.0);
         let why = if *error > 2.0 * of_size {
             "mostly since linear tets lock when they are hardly compressible"
@@ -119,12 +147,9 @@ impl<'m> Expected<'m> {
         };
         let substeps = if nu > MANY_SUBSTEPS { ", and the tick needs many substeps" } else { "" };
         format!(
-            "pressed by the tool \"{}\", {} mm in radius, half of that deep, the body answers {}, {why}: its surface's triangles are {} mm in size, and the \
-             material \"{}\" has Poisson's ratio {}{substeps}. Take smaller tets, or [body.particles], which do not lock",
-            tool.name,
-            short(tool.radius_m * 1e3),
+            "{pressed} {}, {why}: its surface's triangles are {size_mm} mm in size, and the material \"{}\" has Poisson's ratio {}{substeps}. Leave \
+             `elements` at \"smoothed\", or take [body.particles], which do not lock",
             too_stiffly(*error),
-            two_digits(size_m * 1e3),
             region.name,
             short(nu),
         )

@@ -13,13 +13,17 @@
 //! `Σ (y − c₀) × f` about its centre `c₀`. `k_f = α (λ + 2µ)/min(h, R)` with the size `h = √(2A₀)` of the surface
 //! element: the foundation vanishes with the mesh (its compliance is first order in h), and its frequency scales like
 //! the element's own. Where a node has much surface and little mass (a sharp edge or corner), `k_f` is lowered so that
-//! the nodal part of the bound below stays under [`FREQUENCY_FRACTION`] of the body's own ω²_max: contact never rules
-//! the time step.
+//! the nodal part of the bound below stays under a fraction ([`FREQUENCY_FRACTION`]) of the body's own ω²_max: contact
+//! never rules the time step alone.
 //!
 //! Where a smooth skin follows means of particles that are `h` apart, it gives way less under a small load than a solid does, by
 //! what is finer than the means. The foundation makes up for that: it is then `k_f = α' E/(1 − ν²)/min(h, R)`, which with α' = 2.9
 //! gives spheres on a block the force of a solid to 5 % (`docs/measurements/ripple.md`); and samples are `min(h, R)/3` apart, for a
 //! light touch presses few of them.
+//!
+//! Smoothed tets give way as a solid does, and the foundation need not hide that they would be too stiff: `k_f = α'' E/(1 − ν²)/min(h, R)`
+//! with α'' = 10, and up to four times ω²_max at a node. Under a contact that is smaller than an element it is what gives way in place of
+//! the element; under a larger one it hardly shows (`docs/measurements/locking.md`).
 //!
 //! Bound of the frequency. With `w_s = (ζ_s, −1)` on (nodes, tool), `K = Σ k a_s w_s w_sᵀ ⊗ C_s`, `C_s ≤ I` (pressure
 //! along the normal, friction springs of at most the same stiffness across it). A positive block matrix is bounded by
@@ -28,7 +32,7 @@
 //! on one node and `4πR²` in all; of a capsule of half length `L`, `R(R + L)` in place of `R²`. A tool that turns has
 //! `Σ_s k a_s (y_s − c₀)²` besides: at `s` along the cylinder `s² + R²`, on the hemispheres at most `(L + R)²`. The
 //! largest frequency of body and diagonal together comes from the same Lanczos iteration as the body's own.
-use super::{SkinAtRest, broad::Triangles};
+use super::{SkinAtRest, SkinFollows, broad::Triangles};
 use glam::DVec3;
 use std::f64::consts::PI;
 
@@ -36,8 +40,12 @@ use std::f64::consts::PI;
 const STIFFNESS_RATIO: f64 = 8.0;
 /// `α'`, the foundation's stiffness under a smooth skin over `E/((1 − ν²) h)`.
 const SMOOTH_STIFFNESS_RATIO: f64 = 2.9;
+/// `α''`, the foundation's stiffness over `E/((1 − ν²) h)` on elements that give way as a solid does.
+const TRUE_STIFFNESS_RATIO: f64 = 10.0;
 /// Largest addition of contact to the squared frequency at a node, over the body's ω²_max.
 const FREQUENCY_FRACTION: f64 = 1.5;
+/// The same on elements that give way as a solid does.
+const TRUE_FREQUENCY_FRACTION: f64 = 4.0;
 /// Largest spacing of samples, over the tool's radius.
 pub(super) const SPACING: f64 = 1.0 / 3.0;
 /// Largest number of subdivisions of a triangle's edge; triangles that need more are refused.
@@ -139,15 +147,19 @@ impl Foundation {
             let moduli = skin.moduli[triangles.surface_triangle[triangle] as usize];
             let corners = triangles.corners(triangle, skin.positions_m);
             let area_m2 = area_m2(corners);
-            // k_f = α (λ + 2µ)/min(h, R), of means α' E/(1 − ν²)/min(h, R); and no more than any of its nodes can bear
-            let wanted = match skin.means_over_m {
-                Some(apart_m) => SMOOTH_STIFFNESS_RATIO * moduli.indentation_pa / apart_m.min(radius_m),
-                None => STIFFNESS_RATIO * moduli.p_wave_pa / (2.0 * area_m2).sqrt().min(radius_m),
+            // k_f = α (λ + 2µ)/min(h, R), or of E/(1 − ν²) in place of λ + 2µ; and no more than any of its nodes can bear
+            let size_m = (2.0 * area_m2).sqrt();
+            let wanted = match skin.follows {
+                SkinFollows::StiffElements => STIFFNESS_RATIO * moduli.p_wave_pa / size_m.min(radius_m),
+                SkinFollows::TrueElements => TRUE_STIFFNESS_RATIO * moduli.indentation_pa / size_m.min(radius_m),
+                SkinFollows::Means { apart_m } => {
+                    SMOOTH_STIFFNESS_RATIO * moduli.indentation_pa / apart_m.min(radius_m)
+                }
             };
             let k_f = triangles.nodes[triangle].iter().map(|&n| most[n as usize]).fold(wanted, f64::min);
             let [a, b, c] = corners;
             let longest_m = a.distance(b).max(b.distance(c)).max(c.distance(a));
-            let apart_m = SPACING * skin.means_over_m.unwrap_or(radius_m).min(radius_m);
+            let apart_m = SPACING * skin.follows.apart_m().unwrap_or(radius_m).min(radius_m);
             let n = ((longest_m / apart_m).ceil() as usize).clamp(1, MAX_LEVEL);
             built.level.push(n as u8);
             built.first_sample.push(built.samples as u32);
@@ -251,7 +263,7 @@ fn area_m2([a, b, c]: [DVec3; 3]) -> f64 {
     0.5 * (b - a).cross(c - a).length()
 }
 
-/// Returns the largest `k_f` (Pa/m) that each node can bear: `k_f min(A_i, 2πR²)/m_i ≤ FREQUENCY_FRACTION · ω²_max`,
+/// Returns the largest `k_f` (Pa/m) that each node can bear: `k_f min(A_i, 2πR²)/m_i ≤ fraction · ω²_max`,
 /// with its third `A_i` of the triangles around it, and the area `touched_m2` (m²) that a tool can touch at once in
 /// place of `2πR²`.
 fn most_at_nodes(skin: &SkinAtRest<'_>, triangles: &Triangles, touched_m2: f64) -> Vec<f64> {
@@ -262,7 +274,11 @@ fn most_at_nodes(skin: &SkinAtRest<'_>, triangles: &Triangles, touched_m2: f64) 
             area[node as usize] += third;
         }
     }
-    let most = |(area, mass): (&f64, &f64)| FREQUENCY_FRACTION * skin.frequency_sq() * mass / area.min(touched_m2);
+    let fraction = match skin.follows {
+        SkinFollows::TrueElements => TRUE_FREQUENCY_FRACTION,
+        SkinFollows::StiffElements | SkinFollows::Means { .. } => FREQUENCY_FRACTION,
+    };
+    let most = |(area, mass): (&f64, &f64)| fraction * skin.frequency_sq() * mass / area.min(touched_m2);
     area.iter().zip(skin.mass_kg).map(most).collect()
 }
 

@@ -48,7 +48,7 @@ pub(crate) use resting::{Pressing, RestingContact};
 pub use sample_potential::SamplePotential;
 pub use self_contact::MeetingWalls;
 pub(crate) use self_contact::SelfContact;
-pub(crate) use skin_at_rest::SkinAtRest;
+pub(crate) use skin_at_rest::{SkinAtRest, SkinFollows};
 pub(crate) use spring::SaturatingSpring;
 pub use state::ContactState;
 pub(crate) use tangent::{ContactTangents, StepAhead};

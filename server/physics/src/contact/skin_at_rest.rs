@@ -3,6 +3,20 @@ use super::{MostCarriers, SurfaceModuli};
 use crate::mesh::Surface;
 use glam::DVec3;
 
+/// What the nodes of a skin follow, and so how well they give way to a small load.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) enum SkinFollows {
+    /// Nodes of linear elements, or of springs, which give way less than a solid.
+    StiffElements,
+    /// Nodes of elements that give way as a solid does.
+    TrueElements,
+    /// Means of particles, which give way less than a solid by what is finer than the means.
+    Means {
+        /// How far apart (m) the particles are.
+        apart_m: f64,
+    },
+}
+
 /// What contact needs to know of a body's skin at rest.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct SkinAtRest<'a> {
@@ -18,10 +32,20 @@ pub(crate) struct SkinAtRest<'a> {
     pub(crate) bearing_kg: &'a [f64],
     /// ω_max (rad/s) of the body without contact.
     pub(crate) max_natural_frequency_rad_per_s: f64,
-    /// How far apart (m) particles are of which the skin follows means; `None` where it follows no means.
-    pub(crate) means_over_m: Option<f64>,
+    /// What its nodes follow.
+    pub(crate) follows: SkinFollows,
     /// What carries the skin.
     pub(crate) carriers: MostCarriers,
+}
+
+impl SkinFollows {
+    /// How far apart (m) particles are of whose means the skin is made.
+    pub(super) fn apart_m(self) -> Option<f64> {
+        match self {
+            Self::Means { apart_m } => Some(apart_m),
+            Self::StiffElements | Self::TrueElements => None,
+        }
+    }
 }
 
 impl SkinAtRest<'_> {

@@ -28,7 +28,7 @@ pub(crate) struct BodyTable {
     pub(crate) particles: Option<ParticlesTable>,
     /// Makes it the papers' hybrid, whose core its tets are.
     pub(crate) seed: Option<SeedTable>,
-    /// What the elastic energy of a body of tets is taken of; "linear" by default.
+    /// What the elastic energy of a body of tets is taken of; "smoothed" by default.
     pub(crate) elements: Option<ElementsName>,
     /// Whether walls of the body press each other where they meet; by default where its skin faces itself at rest, as around a cavity,
     /// with leapfrog. Surfaces of springs and the papers' hybrid cannot have it.

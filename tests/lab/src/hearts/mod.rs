@@ -6,5 +6,7 @@
 mod anatomy;
 mod isosurface;
 mod scene;
+mod ticks;
 
 pub(crate) use scene::Heart;
+pub use ticks::{Options, print};

@@ -1,7 +1,7 @@
 //! Builds a hybrid body and its environment from a specification.
 use super::{HybridBody, HybridError, HybridSpec, body::Built};
 use crate::{
-    contact::{ContactModel, MostCarriers, SkinAtRest, moduli},
+    contact::{ContactModel, MostCarriers, SkinAtRest, SkinFollows, moduli},
     mesh::Surface,
     settings::Integrator,
     tick::{Environment, EnvironmentSpec, Frequencies, Steps, free_inverse_mass, progress as building, stiffening},
@@ -49,7 +49,11 @@ impl HybridBody {
             mass_kg: &mass_kg,
             bearing_kg: &bearing_kg,
             max_natural_frequency_rad_per_s: omega,
-            means_over_m: hybrid.particles().smooth_skin.then(|| hybrid.particles().spacing_m),
+            follows: if hybrid.particles().smooth_skin {
+                SkinFollows::Means { apart_m: hybrid.particles().spacing_m }
+            } else {
+                SkinFollows::StiffElements
+            },
             carriers: MostCarriers {
                 nodes: hybrid.node_count(),
                 active: hybrid.particles().most_active,

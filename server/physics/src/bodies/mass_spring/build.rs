@@ -1,7 +1,7 @@
 //! Builds a mass-spring surface and its environment from specifications.
 use super::{MassSpringBody, MassSpringError, MassSpringSpec};
 use crate::{
-    contact::{ContactModel, MostCarriers, SkinAtRest},
+    contact::{ContactModel, MostCarriers, SkinAtRest, SkinFollows},
     settings::Integrator,
     tick::{Environment, EnvironmentError, EnvironmentSpec, Frequencies, Steps, free_inverse_mass},
 };
@@ -32,7 +32,7 @@ impl MassSpringBody {
             mass_kg: &bearing_kg,
             bearing_kg: &bearing_kg,
             max_natural_frequency_rad_per_s: omega,
-            means_over_m: None,
+            follows: SkinFollows::StiffElements,
             carriers: MostCarriers::default(),
         };
         let contact = ContactModel::build(&skin, &around.tools);

@@ -3,7 +3,7 @@ use super::{
     LayerSpec, SeedBodyState, SeedError, SeedModel, SeedParameters, SeedSpec, core::outer_part, layer::enclosed_m3,
 };
 use crate::{
-    contact::{ContactModel, MostCarriers, SkinAtRest, SurfaceModuli},
+    contact::{ContactModel, MostCarriers, SkinAtRest, SkinFollows, SurfaceModuli},
     elements::{
         integration_points::IntegrationPoints,
         rest_stiffness::{RestStiffness, max_natural_frequency_rad_per_s},
@@ -96,7 +96,7 @@ impl SeedBody {
             mass_kg: &bearing_kg,
             bearing_kg: &bearing_kg,
             max_natural_frequency_rad_per_s: contact_rad_per_s,
-            means_over_m: None,
+            follows: SkinFollows::StiffElements,
             carriers: MostCarriers::default(),
         };
         let contact = ContactModel::build(&skin, &around.tools);

@@ -1,7 +1,7 @@
 //! What the rest state of a body of tetrahedra fixes.
 use super::{TetBodyError, TetElements, TetSpec};
 use crate::{
-    contact::{ContactModel, MostCarriers, SkinAtRest, SurfaceModuli, moduli},
+    contact::{ContactModel, MostCarriers, SkinAtRest, SkinFollows, SurfaceModuli, moduli},
     elements::{
         free_axes::FreeAxes,
         integration_points::IntegrationPoints,
@@ -82,7 +82,10 @@ impl TetBody {
             mass_kg: &body.mass_kg,
             bearing_kg: &body.mass_kg,
             max_natural_frequency_rad_per_s: omega,
-            means_over_m: None,
+            follows: match elements {
+                TetElements::Linear => SkinFollows::StiffElements,
+                TetElements::Smoothed => SkinFollows::TrueElements,
+            },
             carriers: MostCarriers::default(),
         };
         let contact = ContactModel::build(&skin, &spec.tools).with_walls(spec.walls_of(&skin));

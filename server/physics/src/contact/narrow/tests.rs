@@ -1,5 +1,5 @@
 use super::*;
-use crate::contact::{ContactModel, MostCarriers, SkinAtRest, SurfaceModuli, ToolShape, ToolSpec};
+use crate::contact::{ContactModel, MostCarriers, SkinAtRest, SkinFollows, SurfaceModuli, ToolShape, ToolSpec};
 use crate::{
     contact::Coupling,
     mesh::{Surface, TetMesh},
@@ -52,7 +52,7 @@ impl Bench {
             mass_kg: &[1.0; 4],
             bearing_kg: &[1.0; 4],
             max_natural_frequency_rad_per_s: 1e6,
-            means_over_m: None,
+            follows: SkinFollows::StiffElements,
             carriers: MostCarriers::default(),
         };
         let model = ContactModel::build(&skin, &[tool]);

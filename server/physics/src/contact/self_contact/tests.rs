@@ -1,7 +1,7 @@
 //! Self-contact by itself, of a clamp whose arms are put together.
 use super::{NearWalls, SelfContact, rest::NodeAtRest};
 use crate::{
-    contact::{MostCarriers, SkinAtRest, SurfaceModuli},
+    contact::{MostCarriers, SkinAtRest, SkinFollows, SurfaceModuli},
     mesh::{Surface, TetMesh},
     testing::{Random, tet_box},
 };
@@ -41,7 +41,7 @@ fn walls_of(mesh: &TetMesh, only_if_facing: bool) -> Option<SelfContact> {
         mass_kg: &mass_kg,
         bearing_kg: &mass_kg,
         max_natural_frequency_rad_per_s: 5e3,
-        means_over_m: None,
+        follows: SkinFollows::StiffElements,
         carriers: MostCarriers::default(),
     };
     SelfContact::build(&skin, only_if_facing)

@@ -19,8 +19,8 @@ impl BodyKind for Tet {
         let solid = ingredients.solid()?;
         let volume_m3 = solid.mesh.total_volume_m3();
         let elements = match ingredients.document.body.elements {
-            None | Some(ElementsName::Linear) => TetElements::Linear,
-            Some(ElementsName::Smoothed) => TetElements::Smoothed,
+            None | Some(ElementsName::Smoothed) => TetElements::Smoothed,
+            Some(ElementsName::Linear) => TetElements::Linear,
         };
         let mass_kg = mass_kg(&solid, volume_m3);
         Ok(Compiled { mass_kg, volume_m3, spec: BodySpec::Tet(TetSpec { solid, elements }) })

@@ -1,0 +1,218 @@
+//! What ticks of irregular hearts cost: at rest, pressed and dragged, and swaying after it.
+use super::Heart;
+use crate::timing::quantiles;
+use clap::Args;
+use glam::DVec3;
+use miette::{IntoDiagnostic, Result, bail, miette};
+use palpate_physics::{
+    BodySpec, Model, ModelSpec, Scratch, SelfContactChoice, State, TickInput,
+    bodies::hybrid::Waking,
+    contact::{Coupling, ToolShape, ToolSpec, ToolTarget},
+    step,
+};
+use palpate_scene::Limits;
+use std::time::Instant;
+
+/// Radius (m) of the fingertip.
+const RADIUS_M: f64 = 6e-3;
+/// Depth (m) to which it presses.
+const DEPTH_M: f64 = 12e-3;
+/// How far (m) it starts from the heart.
+const GAP_M: f64 = 20e-3;
+/// Speed (m/s) of the hand.
+const SPEED_M_PER_S: f64 = 0.1;
+/// How far (m) it is dragged either way.
+const DRAG_M: f64 = 15e-3;
+/// Ticks of 1 ms at rest, of dragging, of which the first are not counted, after it has gone until the heart is taken to be left alone, and of
+/// swaying alone.
+const REST_TICKS: u32 = 300;
+const DRAG_TICKS: u32 = 1_000;
+const LEAVES_TICKS: u32 = 400;
+const SWAY_TICKS: u32 = 300;
+
+/// Which hearts.
+#[derive(Debug, Clone, Args)]
+pub struct Options {
+    /// How many hearts; the shipped `hybrid-ventricle` comes before them
+    #[arg(long, default_value_t = 5)]
+    hearts: u64,
+    /// Seed of the first of them
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// Most particles awake at once
+    #[arg(long, value_delimiter = ',', default_values_t = [200, 600])]
+    awake: Vec<usize>,
+    /// Walls of the heart pass through each other
+    #[arg(long)]
+    no_self_contact: bool,
+}
+
+/// Measures and prints, as the rows of a table.
+///
+/// # Errors
+/// A heart that cannot be built.
+pub fn print(options: &Options) -> Result<()> {
+    println!(
+        "Ticks of 1 ms, in microseconds. A finger of {:.0} mm presses {:.0} mm deep and is dragged {:.0} mm to and fro at {:.0} mm/s.\n",
+        1e3 * RADIUS_M,
+        1e3 * DEPTH_M,
+        1e3 * DRAG_M,
+        1e3 * SPEED_M_PER_S
+    );
+    println!(
+        "| heart | awake | substeps | at rest | dragged: median, p99, longest | substeps taken | mean force | swaying |"
+    );
+    println!("|---|---|---|---|---|---|---|---|");
+    let text = palpate_scene::builtin("hybrid-ventricle").ok_or_else(|| miette!("the built-in scene is missing"))?;
+    let shipped = palpate_scene::parse(text, "hybrid-ventricle", None, &Limits::local(), &mut |_, _| {})?;
+    rows("hybrid-ventricle", &shipped.model, options)?;
+    for seed in options.seed..options.seed.saturating_add(options.hearts) {
+        let heart = Heart::random(seed)?;
+        rows(&format!("{seed}: {}", heart.told), &heart.spec, options)?;
+    }
+    Ok(())
+}
+
+fn rows(name: &str, spec: &ModelSpec, options: &Options) -> Result<()> {
+    for &awake in &options.awake {
+        let mut spec = spec.clone();
+        let BodySpec::Hybrid(hybrid) = &mut spec.body else { bail!("{name} has no particles") };
+        let particles = &mut hybrid.particles;
+        particles.most_active = awake;
+        particles.waking = Waking::in_half_ball(particles.spacing_m, particles.fine_depth_m, awake);
+        if options.no_self_contact {
+            spec.settings.self_contact = SelfContactChoice::Off;
+        }
+        spec.tools = Vec::new();
+        let place = Place::of(&Model::build(spec.clone()).into_diagnostic()?);
+        spec.tools = vec![ToolSpec {
+            name: "finger".to_owned(),
+            shape: ToolShape::Sphere,
+            radius_m: RADIUS_M,
+            coupling: Coupling::Rigid,
+            friction_coefficient: 0.0,
+            start_position_m: place.finger_m(-GAP_M, 0.0),
+        }];
+        let model = Model::build(spec).into_diagnostic()?;
+        println!("| {name} | {awake} | {} | {} |", model.substeps(), Session::new(&model, place).run()?);
+    }
+    Ok(())
+}
+
+/// Where a heart is pressed.
+#[derive(Debug, Clone, Copy)]
+struct Place {
+    touch_m: DVec3,
+    outwards: DVec3,
+    drag: DVec3,
+}
+
+impl Place {
+    /// The vertex that is outermost across the heart's axis and somewhat towards its apex, whose tangent plane has nothing before it.
+    fn of(bare: &Model) -> Self {
+        let x = bare.surface_rest_positions_m();
+        let held: Vec<DVec3> =
+            bare.prescribed()[0].nodes.iter().map(|&n| bare.rest_positions_m()[n as usize]).collect();
+        let mean = |points: &[DVec3]| points.iter().sum::<DVec3>() / points.len() as f64;
+        let apexwards = (mean(x) - mean(&held)).normalize();
+        let outwards = (apexwards.any_orthonormal_vector() + 0.5 * apexwards).normalize();
+        let touch_m = x.iter().copied().max_by(|a, b| a.dot(outwards).total_cmp(&b.dot(outwards))).unwrap_or_default();
+        Self { touch_m, outwards, drag: apexwards.cross(outwards).normalize() }
+    }
+
+    /// Position (m) of a finger that is so deep (m), dragged so far (m).
+    fn finger_m(&self, depth_m: f64, dragged_m: f64) -> DVec3 {
+        self.touch_m + self.outwards * (RADIUS_M - depth_m) + self.drag * dragged_m
+    }
+}
+
+/// A heart under the finger.
+struct Session<'a> {
+    model: &'a Model,
+    place: Place,
+    state: State,
+    scratch: Scratch,
+    prescribed_m: Vec<DVec3>,
+    load_factors: Vec<f64>,
+    at_m: DVec3,
+    substeps: u64,
+}
+
+impl<'a> Session<'a> {
+    fn new(model: &'a Model, place: Place) -> Self {
+        Self {
+            state: State::at_rest(model),
+            scratch: Scratch::new(model),
+            prescribed_m: vec![DVec3::ZERO; model.prescribed().len()],
+            load_factors: vec![0.0; model.loads().len()],
+            at_m: place.finger_m(-GAP_M, 0.0),
+            substeps: 0,
+            model,
+            place,
+        }
+    }
+
+    /// A tick with the finger there; its time (s).
+    fn tick(&mut self, depth_m: f64, dragged_m: f64) -> Result<f64> {
+        let position_m = self.place.finger_m(depth_m, dragged_m);
+        let period_s = self.model.settings().tick_period_s;
+        let velocity_m_per_s = (position_m - self.at_m) / period_s;
+        self.at_m = position_m;
+        let tools = [ToolTarget { velocity_m_per_s, ..ToolTarget::at(position_m) }];
+        let input = TickInput {
+            tools: &tools,
+            load_factors: &self.load_factors,
+            prescribed_displacements_m: &self.prescribed_m,
+            point_forces: &[],
+        };
+        let start = Instant::now();
+        let report = step(self.model, &mut self.state, &mut self.scratch, &input);
+        let took_s = start.elapsed().as_secs_f64();
+        self.substeps += u64::from(report.substeps);
+        match report.quarantined {
+            None => Ok(took_s),
+            Some(quarantine) => bail!("the heart did not survive: {quarantine:?}"),
+        }
+    }
+
+    /// The rest of the row.
+    fn run(mut self) -> Result<String> {
+        let step_m = SPEED_M_PER_S * self.model.settings().tick_period_s;
+        let mut rest_s = Vec::new();
+        for _ in 0..REST_TICKS {
+            rest_s.push(self.tick(-GAP_M, 0.0)?);
+        }
+        let way = ((GAP_M + DEPTH_M) / step_m) as u32;
+        for tick in 0..way {
+            self.tick(-GAP_M + f64::from(tick) * step_m, 0.0)?;
+        }
+        self.substeps = 0;
+        let (mut dragged_s, mut force_n, mut dragged_m) = (Vec::new(), 0.0, 0.0);
+        for tick in 0..DRAG_TICKS {
+            // To one side, to the other and on.
+            let phase = (f64::from(tick) * step_m / DRAG_M + 1.0).rem_euclid(4.0);
+            dragged_m = DRAG_M * (if phase < 2.0 { phase - 1.0 } else { 3.0 - phase });
+            dragged_s.push(self.tick(DEPTH_M, dragged_m)?);
+            force_n += self.state.mechanical.tools[0].contact_force_n.length() / f64::from(DRAG_TICKS);
+        }
+        let substeps = self.substeps as f64 / f64::from(DRAG_TICKS);
+        for tick in 0..way + LEAVES_TICKS {
+            self.tick((DEPTH_M - f64::from(tick) * step_m).max(-GAP_M), dragged_m)?;
+        }
+        let mut swaying_s = Vec::new();
+        for _ in 0..SWAY_TICKS {
+            swaying_s.push(self.tick(-GAP_M, dragged_m)?);
+        }
+        let [rest] = quantiles(&mut rest_s, [0.5]);
+        let [median, p99, longest] = quantiles(&mut dragged_s, [0.5, 0.99, 1.0]);
+        let [swaying] = quantiles(&mut swaying_s, [0.5]);
+        Ok(format!(
+            "{:.1} | {:.0}, {:.0}, {:.0} | {substeps:.1} | {force_n:.3} N | {:.0}",
+            1e6 * rest,
+            1e6 * median,
+            1e6 * p99,
+            1e6 * longest,
+            1e6 * swaying
+        ))
+    }
+}
